@@ -1,7 +1,7 @@
 //! Loading a scene: splats are counted before they are made, limits hold for the scene as a whole, interrupts are heard.
 
 use organza::scene::{LoadOptions, Scene, parse};
-use organza::{Error, Progress, RenderOptions, explain, load};
+use organza::{Error, Files, Loaded, Progress, RenderOptions, explain};
 use splat_core::Exceeded;
 use std::path::Path;
 
@@ -15,6 +15,11 @@ const SCENE: &str = "version = 1\n\
 
 fn scene(more: &str) -> Scene {
     parse(Path::new("s.toml"), format!("{SCENE}{more}").as_bytes(), &LoadOptions::default()).unwrap()
+}
+
+/// Nothing was read before.
+fn load(scene: &Scene, options: &RenderOptions, progress: &Progress) -> Result<Loaded, Error> {
+    organza::load(scene, options, progress, &Files::default())
 }
 
 #[test]

@@ -9,13 +9,14 @@ mod record;
 use crate::repo::{Outcome, Repo};
 use record::Run;
 use std::process::{Command, Output};
+use std::time::Instant;
 
 /// Where the targets lie.
 const TARGETS: &str = "fuzz/fuzz_targets/";
 
 /// Most memory of the whole process and of one allocation, MiB, and the longest time of one input, s. Readers are allowed 64 MiB for
 /// a file and as much for what is made of it; the rest is the sanitizer's.
-const LIMITS: [&str; 3] = ["-rss_limit_mb=2048", "-malloc_limit_mb=256", "-timeout=20"];
+const LIMITS: [&str; 4] = ["-rss_limit_mb=2048", "-malloc_limit_mb=256", "-timeout=20", "-report_slow_units=20"];
 
 /// What is asked for.
 #[derive(Debug, PartialEq)]
@@ -69,9 +70,10 @@ pub(crate) fn run(repo: &Repo, words: &[&str]) -> Outcome {
         println!("<== {run}");
         said.extend(run.found.iter().map(|input| format!("{target}: see {input}")));
         runs.push(run);
-    }
-    if plan.is_recorded {
-        record::write(repo, &runs)?;
+        // Each as soon as it is there: all of them take hours.
+        if plan.is_recorded {
+            record::write(repo, &runs)?;
+        }
     }
     if said.is_empty() { Ok(format!("fuzz: {} targets, nothing found", runs.len())) } else { Err(said.join("\n")) }
 }
@@ -130,9 +132,10 @@ fn fuzz(repo: &Repo, target: &str, seconds: u64) -> Result<Run, String> {
     }
     let time = format!("-max_total_time={seconds}");
     let words = [&["fuzz", "run", target, &corpus][..], seeds(target), &["--", &time, "-print_final_stats=1"], &LIMITS];
+    let start = Instant::now();
     let out = nightly(repo, &words.concat())?;
     let text = String::from_utf8_lossy(&out.stderr);
-    let run = Run::of(target, &text)?;
+    let run = Run::of(target, &text, start.elapsed().as_secs())?;
     if out.status.success() != run.found.is_empty() {
         return Err(format!("{target} ended with {}\n{text}", out.status));
     }

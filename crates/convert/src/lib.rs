@@ -35,6 +35,7 @@ mod combine;
 mod convert_error;
 pub mod cost;
 mod counted;
+mod creases;
 #[cfg(feature = "surfels")]
 mod discs;
 mod domain;
@@ -112,6 +113,7 @@ pub use color_map::ColorMap;
 pub use color_scale::{ColorScale, ScaleNumbers};
 pub use combine::{ClippedField, CombinedField, RegionField, SharedField};
 pub use convert_error::ConvertError;
+pub use creases::part_at_creases;
 #[cfg(feature = "surfels")]
 pub use discs::{DiscShape, DiscSize};
 #[cfg(feature = "read")]

@@ -5,6 +5,12 @@ use rayon::prelude::*;
 use splat_core::glam::DVec3;
 use splat_core::{Clip, DAabb, Grid, TransferFunction};
 
+/// How far voxels reach around their lattice points, cells.
+const REACH: f64 = 0.5;
+
+/// Most ends of rows that are seen with what surrounds them.
+const FEW: usize = 10_000;
+
 /// Cells along the longest side of a box, in which an implicit surface is looked for.
 const SURFACE_CELLS: f64 = 32.0;
 
@@ -57,7 +63,7 @@ pub fn extinct_bounds(grid: &Grid, transfer: &TransferFunction) -> DAabb {
 }
 
 /// The first and the last lattice point of every row within all regions to which a transfer function gives extinction above a `share` of
-/// its largest; where it gives none, the corners of [`extinct_bounds`].
+/// its largest, of a lattice of few rows the corners around what is seen of each; where it gives none, the corners of [`extinct_bounds`].
 pub fn visible_ends(grid: &Grid, transfer: &TransferFunction, share: f32, clips: &[Clip]) -> Vec<DVec3> {
     let most = transfer.points().iter().fold(0.0, |most: f32, p| most.max(p.extinction));
     let seen = |v: &f32| transfer.at(*v).extinction > share * most;
@@ -68,8 +74,16 @@ pub fn visible_ends(grid: &Grid, transfer: &TransferFunction, share: f32, clips:
         let (first, last) = ((0..nx).find(is_seen)?, (0..nx).rfind(is_seen)?);
         Some([first, last].map(place))
     };
-    let ends: Vec<DVec3> = grid.values.par_chunks(nx).enumerate().filter_map(row).flatten_iter().collect();
-    if ends.is_empty() { extinct_bounds(grid, transfer).corners().to_vec() } else { ends }
+    let mut ends: Vec<DVec3> = grid.values.par_chunks(nx).enumerate().filter_map(row).flatten_iter().collect();
+    if ends.is_empty() {
+        return extinct_bounds(grid, transfer).corners().to_vec();
+    }
+    // In a lattice of many rows half a voxel is less than a pixel or two.
+    if ends.len() <= FEW {
+        let around = DAabb::around(DVec3::ZERO, DVec3::splat(REACH)).corners().map(|index| grid.axes * index);
+        ends = ends.iter().flat_map(|end| around.map(|reach| *end + reach)).collect();
+    }
+    ends
 }
 
 /// Cells that fill a box.
@@ -96,5 +110,25 @@ impl Cells {
         let [nx, ny, _] = self.counts;
         let index = DVec3::new((k % nx) as f64, (k / nx % ny) as f64, (k / (nx * ny)) as f64);
         (self.low + self.step * (index + 0.5), 0.5 * self.step.length() * (1.0 + 1e-12))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use splat_core::TransferPoint;
+    use splat_core::glam::DMat3;
+
+    #[test]
+    fn few_voxels_are_seen_with_what_surrounds_them_and_many_as_their_middles() {
+        let dense = TransferPoint { value: 1.0, color: [1.0; 3], extinction: 1.0 };
+        let transfer = TransferFunction::new(vec![dense]).expect("one point");
+        let seen = |n: usize| {
+            let grid = Grid { origin: DVec3::ZERO, axes: DMat3::IDENTITY, dims: [n; 3], values: vec![1.0; n * n * n] };
+            DAabb::of_points(visible_ends(&grid, &transfer, 0.02, &[]))
+        };
+        let around = DAabb::new(DVec3::splat(-REACH), DVec3::splat(1.0 + REACH));
+        assert_eq!(seen(2), around);
+        assert_eq!(seen(80), DAabb::new(DVec3::ZERO, DVec3::splat(79.0)));
     }
 }

@@ -17,6 +17,7 @@
 use crate::cache::Key;
 use crate::columns::{self, CHUNK, Wanted};
 use crate::convert_error::check_cancelled;
+use crate::counted::counted;
 use crate::discs::{DiscShape, DiscSize, Discs};
 use crate::footprints::choose_footprints;
 use crate::matter::check_columns;
@@ -99,6 +100,15 @@ pub struct SurfelReport {
     pub median_spacing: f64,
     /// Sum of the areas, world units².
     pub area: f64,
+}
+
+impl SurfelReport {
+    /// What there is to say of it, one sentence without a full stop: that points at one place have each become a surfel.
+    pub fn said(&self) -> Option<String> {
+        let lie = if self.duplicates == 1 { "lies" } else { "lie" };
+        (self.duplicates > 0 && self.splats == self.points)
+            .then(|| format!("{} {lie} where another one lies", counted(self.duplicates, "point")))
+    }
 }
 
 /// Makes surfels of raw points. Columns of the points (`RawPoints::columns`) say more, each a number a point: `radius`, the length in units of

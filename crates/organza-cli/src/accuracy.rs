@@ -27,13 +27,13 @@ pub(super) fn run(arguments: &AccuracyArguments) -> Result<(), Error> {
     processor_only(&arguments.scene)?;
     let mut scene = load_scene(&arguments.scene)?;
     let options = Options { quick: arguments.quick, finer: arguments.finer, seed: scene.render.seed };
-    if arguments.scene.size.is_none() {
+    if arguments.scene.common.size.is_none() {
         accuracy::shrink(&mut scene, options.longest_side());
     }
     in_folder(&arguments.out, || {
         let targets = Report::check(&arguments.out, arguments.force, &scene.files())?;
         let mut render = render_options(&arguments.scene);
-        if arguments.scene.max_memory.is_none() {
+        if arguments.scene.common.max_memory.is_none() {
             render.max_memory = render.max_memory.min(options.memory());
         }
         let (studies, absent) = with_bar(|progress| {
@@ -63,7 +63,7 @@ pub(super) fn run(arguments: &AccuracyArguments) -> Result<(), Error> {
         })?;
         let report = Report::new(&scene, options, studies, absent);
         accuracy::write(&report, &targets)?;
-        console::out(&summary(&report, &targets, arguments.scene.json))
+        console::out(&summary(&report, &targets, arguments.scene.common.json))
     })
 }
 

@@ -72,12 +72,12 @@ impl Command {
     /// Whether stdout has to carry one JSON document.
     pub(super) fn wants_json(&self) -> bool {
         match self {
-            Self::Render(a) => a.scene.json,
-            Self::Init(a) => a.json,
-            Self::Convert(a) => a.scene.json,
-            Self::Explain(a) => a.scene.json,
-            Self::Accuracy(a) => a.scene.json,
-            Self::Orders(a) => a.scene.json,
+            Self::Render(a) => a.scene.common.json,
+            Self::Init(a) => a.common.json,
+            Self::Convert(a) => a.scene.common.json,
+            Self::Explain(a) => a.scene.common.json,
+            Self::Accuracy(a) => a.scene.common.json,
+            Self::Orders(a) => a.scene.common.json,
             Self::Info(a) => a.json,
             Self::Devices(a) => a.json,
             Self::Passport(a) => a.json,
@@ -125,6 +125,29 @@ pub(super) struct FirstArguments {
     pub(super) ground: bool,
 }
 
+/// What all commands that read data for a picture share.
+#[derive(Debug, Args)]
+pub(super) struct CommonArguments {
+    /// Size of the picture, pixels
+    #[arg(long, value_name = "WxH", value_parser = parse_size)]
+    pub(super) size: Option<[i64; 2]>,
+    /// Threads; 0 takes one for each core
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u64).range(0..=MOST_THREADS))]
+    pub(super) threads: u64,
+    /// Bytes that all buffers together may take, such as 8G [default: three quarters of the memory]
+    #[arg(long, value_name = "BYTES", value_parser = parse_bytes)]
+    pub(super) max_memory: Option<u64>,
+    /// Leave out points that are not finite instead of refusing their file; meshes are refused all the same
+    #[arg(long)]
+    pub(super) drop_invalid: bool,
+    /// Refuse files with faults that could be mended, such as a face that crosses itself
+    #[arg(long)]
+    pub(super) strict: bool,
+    /// Print one JSON document on stdout
+    #[arg(long)]
+    pub(super) json: bool,
+}
+
 /// What all commands on a scene share.
 #[derive(Debug, Args)]
 pub(super) struct SceneArguments {
@@ -148,15 +171,9 @@ pub(super) struct SceneArguments {
     /// The GPU composites the splats too; beauty then differs from the processor's by rounding, up to 1e-5
     #[arg(long)]
     pub(super) device_composites: bool,
-    /// Size of the picture, pixels
-    #[arg(long, value_name = "WxH", value_parser = parse_size)]
-    pub(super) size: Option<[i64; 2]>,
     /// Seed of everything random
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(i64).range(0..))]
     pub(super) seed: Option<i64>,
-    /// Threads; 0 takes one for each core
-    #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u64).range(0..=MOST_THREADS))]
-    pub(super) threads: u64,
     /// Largest change of a displayed pixel (0 to 1) by what is not simulated
     #[arg(long, value_name = "T", allow_negative_numbers = true, value_parser = parse_finite)]
     pub(super) tolerance: Option<f64>,
@@ -172,30 +189,20 @@ pub(super) struct SceneArguments {
     /// Images to keep besides beauty and alpha, such as direct,shadow,depth
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     pub(super) layers: Option<Vec<String>>,
-    /// Bytes that all buffers together may take, such as 8G [default: three quarters of the memory]
-    #[arg(long, value_name = "BYTES", value_parser = parse_bytes)]
-    pub(super) max_memory: Option<u64>,
     /// Folder for what converting large clouds of points finds out, which the next run reads; no picture depends on it
     #[arg(long, value_name = "DIR")]
     pub(super) cache: Option<PathBuf>,
     /// Bytes that the files of --cache may take; those that were not used for longest go first
     #[arg(long, value_name = "BYTES", default_value = "8G", value_parser = parse_bytes)]
     pub(super) cache_size: u64,
-    /// Leave out points that are not finite instead of refusing their file; meshes are refused all the same
-    #[arg(long)]
-    pub(super) drop_invalid: bool,
-    /// Refuse files with faults that could be mended, such as a face that crosses itself
-    #[arg(long)]
-    pub(super) strict: bool,
     /// Make points of a `points` object at one place one
     #[arg(long)]
     pub(super) merge_duplicates: bool,
     /// Allow data outside the scene's root folder
     #[arg(long)]
     pub(super) allow_path: bool,
-    /// Print one JSON document on stdout
-    #[arg(long)]
-    pub(super) json: bool,
+    #[command(flatten)]
+    pub(super) common: CommonArguments,
 }
 
 #[derive(Debug, Args)]
@@ -245,30 +252,14 @@ pub(super) struct InitArguments {
     pub(super) output: Option<PathBuf>,
     #[command(flatten)]
     pub(super) first: FirstArguments,
-    /// Size of the picture, pixels
-    #[arg(long, value_name = "WxH", value_parser = parse_size)]
-    pub(super) size: Option<[i64; 2]>,
     /// Place the camera for a turntable of so many frames, which `organza render` draws: nothing is cut off in any of them
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
     pub(super) turntable: Option<u32>,
-    /// Threads; 0 takes one for each core
-    #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u64).range(0..=MOST_THREADS))]
-    pub(super) threads: u64,
-    /// Bytes that the files may take, such as 8G [default: three quarters of the memory]
-    #[arg(long, value_name = "BYTES", value_parser = parse_bytes)]
-    pub(super) max_memory: Option<u64>,
-    /// Leave out points that are not finite instead of refusing their file
-    #[arg(long)]
-    pub(super) drop_invalid: bool,
-    /// Refuse files with faults that could be mended
-    #[arg(long)]
-    pub(super) strict: bool,
     /// Replace a scene that exists
     #[arg(long)]
     pub(super) force: bool,
-    /// Print one JSON document on stdout
-    #[arg(long)]
-    pub(super) json: bool,
+    #[command(flatten)]
+    pub(super) common: CommonArguments,
 }
 
 #[derive(Debug, Args)]

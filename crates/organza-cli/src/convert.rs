@@ -25,12 +25,10 @@ pub(super) fn run(arguments: &ConvertArguments) -> Result<(), Error> {
     let mut targets = Targets::default();
     targets.add_inputs(&scene.files());
     let target = targets.add(path, arguments.force)?;
-    // What was looked at to make a scene is read again: as the scene asks for it.
-    drop(files);
     as_splats(&mut scene);
     let options = render_options(&arguments.scene);
     let (loaded, bytes) = with_bar(|progress| {
-        let mut loaded = organza::load(&scene, &options, progress)?;
+        let mut loaded = organza::load(&scene, &options, progress, &files)?;
         refuse_gaussians(&loaded)?;
         refuse_images(&loaded)?;
         // A power of two: no bit of a splat is lost.
@@ -45,7 +43,7 @@ pub(super) fn run(arguments: &ConvertArguments) -> Result<(), Error> {
     if let Some(said) = said_of_unlit(&loaded) {
         console::remark(&said);
     }
-    if arguments.scene.json {
+    if arguments.scene.common.json {
         return console::out(&format!("{:#}\n", document(&loaded, target.path(), bytes)));
     }
     let path = printable(target.path());

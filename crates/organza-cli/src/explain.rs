@@ -28,7 +28,7 @@ pub(super) fn run(arguments: &ExplainArguments) -> Result<(), Error> {
         console::warn(warning);
     }
     notes.iter().for_each(|note| console::remark(note));
-    if arguments.scene.json {
+    if arguments.scene.common.json {
         let document = json!({
             "scene": arguments.scene.inputs.first().map(|path| path_text(path)),
             "camera": report::camera_json(&scene, found.as_ref()),

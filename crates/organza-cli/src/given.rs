@@ -25,13 +25,13 @@ pub(super) struct Given {
 /// of data is in the files.
 pub(super) fn given(arguments: &SceneArguments, turntable: Option<u32>) -> Result<(Given, Files), Error> {
     check_backend(arguments)?;
-    start_threads(arguments.threads)?;
+    start_threads(arguments.common.threads)?;
     let files = Files::default();
     if let Some(file) = scene_among(&arguments.inputs)? {
         refuse_wishes(&arguments.first)?;
         return Ok((Given { file: file.clone(), bytes: scene::read(file)?, is_made: false }, files));
     }
-    let wish = wish(&arguments.first, arguments.size, turntable)?;
+    let wish = wish(&arguments.first, arguments.common.size, turntable)?;
     let file = virtual_file(&arguments.inputs);
     let written = write_first(&arguments.inputs, &file, &wish, &files, &render_options(arguments))?;
     Ok((Given { file, bytes: written.text.into_bytes(), is_made: true }, files))

@@ -1,11 +1,11 @@
 //! `organza init`.
 
 use super::args::InitArguments;
+use super::console;
 use super::given::{is_scene, wish, write_first};
-use super::session::{path_text, start_threads};
-use super::{console, memory};
+use super::session::{path_text, reading_options, start_threads};
 use organza::output::{Target, Targets};
-use organza::{Error, Files, RenderOptions, printable};
+use organza::{Error, Files, printable};
 use serde_json::{Value, json};
 use std::path::Path;
 
@@ -14,18 +14,13 @@ pub(super) fn run(arguments: &InitArguments) -> Result<(), Error> {
     if let Some(scene) = arguments.inputs.iter().find(|path| is_scene(path)) {
         return Err(Error::usage(format!("{} is a scene already", printable(scene)), "name data files"));
     }
-    let wish = wish(&arguments.first, arguments.size, arguments.turntable)?;
+    let wish = wish(&arguments.first, arguments.common.size, arguments.turntable)?;
     let mut targets = Targets::default();
     targets.add_inputs(&arguments.inputs);
     let target = arguments.output.as_deref().map(|path| check_name(path)).transpose()?;
     let target = target.map(|path| targets.add(path, arguments.force)).transpose()?;
-    start_threads(arguments.threads)?;
-    let options = RenderOptions {
-        max_memory: arguments.max_memory.unwrap_or_else(memory::default_limit),
-        drop_invalid: arguments.drop_invalid,
-        strict: arguments.strict,
-        ..RenderOptions::default()
-    };
+    start_threads(arguments.common.threads)?;
+    let options = reading_options(&arguments.common);
     let files = Files::default();
     let scene_file = target.as_ref().map_or(Path::new("scene.toml"), Target::path);
     let written = write_first(&arguments.inputs, scene_file, &wish, &files, &options)?;
@@ -33,7 +28,7 @@ pub(super) fn run(arguments: &InitArguments) -> Result<(), Error> {
     if let Some(target) = &target {
         target.write(written.text.as_bytes())?;
     }
-    if arguments.json {
+    if arguments.common.json {
         let path = target.as_ref().map(|target| path_text(target.path()));
         let inputs: Value = arguments.inputs.iter().map(|path| path_text(path)).collect();
         return console::out(&format!("{:#}\n", json!({ "inputs": inputs, "scene": path, "text": written.text })));

@@ -13,7 +13,7 @@ use serde_json::json;
 pub(super) fn run(arguments: &OrdersArguments) -> Result<(), Error> {
     processor_only(&arguments.scene)?;
     let mut scene = load_scene(&arguments.scene)?;
-    if arguments.scene.size.is_none() {
+    if arguments.scene.common.size.is_none() {
         accuracy::shrink(&mut scene, orders::LONGEST_SIDE);
     }
     in_folder(&arguments.out, || {
@@ -22,7 +22,7 @@ pub(super) fn run(arguments: &OrdersArguments) -> Result<(), Error> {
         let comparison = with_bar(|progress| orders::compare(&scene, &options, progress))?;
         let report = OrdersReport::new(&scene, comparison)?;
         orders::write(&report, &targets)?;
-        if arguments.scene.json {
+        if arguments.scene.common.json {
             let files: Vec<String> = targets.iter().map(|f| path_text(f.path())).collect();
             let report: serde_json::Value = serde_json::from_str(&report.json()).unwrap_or_default();
             return console::out(&format!("{:#}\n", json!({ "outputs": files, "report": report })));

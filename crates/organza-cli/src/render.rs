@@ -79,7 +79,7 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<u8, Error> {
             noted.push(note);
         }
     }
-    if outcome.is_ok() || !arguments.scene.json {
+    if outcome.is_ok() || !arguments.scene.common.json {
         console::out(&summary(&jobs, &done, arguments))?;
     }
     outcome?;
@@ -219,7 +219,7 @@ impl Job<'_> {
 
 /// Of one picture its own account, of frames a list of them.
 fn summary(jobs: &Jobs<'_>, done: &[Done], arguments: &RenderArguments) -> String {
-    if !arguments.scene.json {
+    if !arguments.scene.common.json {
         return done.iter().map(|d| d.text.as_str()).collect();
     }
     let mut documents = done.iter().map(|d| &d.json);

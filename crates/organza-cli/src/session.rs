@@ -1,6 +1,6 @@
 //! What all commands on a scene do first: options become overrides, the scene is loaded, the threads start.
 
-use super::args::{Backend, SceneArguments};
+use super::args::{Backend, CommonArguments, SceneArguments};
 use super::given::{Given, camera_overrides, given};
 use super::memory;
 use organza::device::{Choice, Device, DeviceChoice};
@@ -28,17 +28,23 @@ pub(super) fn parse_scene(
     Ok(scene::parse(&given.file, &given.bytes, &options)?)
 }
 
-/// What the render may take and how it treats doubtful input, by the processor.
-pub(super) fn render_options(arguments: &SceneArguments) -> RenderOptions {
+/// What reading may take and how it treats doubtful input.
+pub(super) fn reading_options(arguments: &CommonArguments) -> RenderOptions {
     RenderOptions {
         max_memory: arguments.max_memory.unwrap_or_else(memory::default_limit),
         drop_invalid: arguments.drop_invalid,
         strict: arguments.strict,
+        ..RenderOptions::default()
+    }
+}
+
+/// The same of a render by the processor.
+pub(super) fn render_options(arguments: &SceneArguments) -> RenderOptions {
+    RenderOptions {
         merge_duplicates: arguments.merge_duplicates,
-        checkpoint: None,
         cache: arguments.cache.as_ref().map(|folder| Arc::new(Cache::new(folder, arguments.cache_size))),
-        device: None,
         device_composites: arguments.device_composites,
+        ..reading_options(&arguments.common)
     }
 }
 
@@ -107,7 +113,7 @@ pub(super) fn overrides(a: &SceneArguments, is_made: bool) -> Result<Vec<Overrid
     if let Some(name) = &a.technique {
         options.push((format!("--technique {name}"), "render.technique", quote(name)));
     }
-    if let Some([w, h]) = a.size.filter(|_| !is_made) {
+    if let Some([w, h]) = a.common.size.filter(|_| !is_made) {
         options.push((format!("--size {w}x{h}"), "camera.size", format!("[{w}, {h}]")));
     }
     if let Some(seed) = a.seed {

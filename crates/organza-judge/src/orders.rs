@@ -18,7 +18,7 @@ use crate::accuracy::{SEEDS, Sampled};
 use hbsort::Thickness;
 use organza::scene::{LayerChoice, ParticlesSettings, Scene, Technique};
 use organza::{
-    CostRecord, Error, Frame, Loaded, Planned, Progress, RenderOptions, Shaded, draw_loaded, load, plan_loaded,
+    CostRecord, Error, Files, Frame, Loaded, Planned, Progress, RenderOptions, Shaded, draw_loaded, load, plan_loaded,
 };
 use reference::metrics::{Disorder, Image, Linear, Rays};
 use reference::statistics::Spread;
@@ -105,7 +105,7 @@ pub fn compare(scene: &Scene, options: &RenderOptions, progress: &Progress) -> R
     progress.plan([(LOAD, 2.0), (ORDERS, 8.0), (TRUTH, 8.0), (SHEETS, 8.0), (SETS_OF_PARTICLES, 8.0), (LAYERS, 8.0)]);
     progress.begin(LOAD);
     progress.enter();
-    let loaded = load(&scene, options, progress)?;
+    let loaded = load(&scene, options, progress, &Files::default())?;
     let plan = plan_loaded(&scene, &loaded, options)?;
     let frame = Frame::new(&scene, &loaded, &plan, progress);
     let mut cost = CostRecord::default();

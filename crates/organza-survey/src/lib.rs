@@ -25,7 +25,7 @@ pub use data_file::DataFile;
 pub use facts::{Facts, facts};
 pub use first_scene::{Written, first_scene};
 pub use histogram::Histogram;
-pub use number::{grouped, rounded};
+pub use number::{counted, grouped, rounded};
 pub use preset::{Preset, Wish};
 
 /// The page's example compiles and holds.

@@ -44,6 +44,11 @@ pub fn grouped(count: u64) -> String {
     text
 }
 
+/// A count of one thing or of several, with commas: `1 edge`, `1,234 edges`.
+pub fn counted(count: u64, [one, several]: [&str; 2]) -> String {
+    format!("{} {}", grouped(count), if count == 1 { one } else { several })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -64,5 +69,7 @@ mod tests {
     #[test]
     fn counts_have_commas() {
         assert_eq!([0, 999, 1000, 1_234_567].map(grouped), ["0", "999", "1,000", "1,234,567"]);
+        let edges = [0, 1, 1234].map(|n| counted(n, ["edge", "edges"]));
+        assert_eq!(edges, ["0 edges", "1 edge", "1,234 edges"]);
     }
 }

@@ -155,7 +155,7 @@ mod tests {
         let options = LoadOptions { overrides, ..LoadOptions::default() };
         let scene = parse("seam.toml".as_ref(), SCENE, &options).unwrap();
         let (options, progress) = (RenderOptions::default(), Progress::new());
-        let loaded = load(&scene, &options, &progress).unwrap();
+        let loaded = load(&scene, &options, &progress, &crate::Files::default()).unwrap();
         let plan = plan_loaded(&scene, &loaded, &options).unwrap();
         let frame = Frame::new(&scene, &loaded, &plan, &progress);
         let unit = libm::exp2(f64::from(-loaded.exponent)) as f32;

@@ -204,17 +204,16 @@ fn check_samples(scene: &Scene) -> Result<(), Error> {
     Exceeded::check("the longer side of the image", needed, limit, "samples", hint).map_err(Error::Limit)
 }
 
-/// Reads every visible object, chooses its technique and form, and converts it.
+/// Reads every visible object whose file was not read before, chooses its technique and form, and converts it.
 ///
 /// # Errors
 /// See [`crate::render`].
-pub fn load(scene: &Scene, options: &RenderOptions, progress: &Progress) -> Result<Loaded, Error> {
-    let files = Files::default();
-    let (scene, _) = fitted(scene, options, progress, &files)?;
-    load_measured(&scene, options, progress, &files, &mut CostRecord::default())
+pub fn load(scene: &Scene, options: &RenderOptions, progress: &Progress, files: &Files) -> Result<Loaded, Error> {
+    let (scene, _) = fitted(scene, options, progress, files)?;
+    load_measured(&scene, options, progress, files, &mut CostRecord::default())
 }
 
-/// [`load`] with what was read before, and with entries in the cost record: reading, and conversion where something is
+/// [`load`] with entries in the cost record: reading, and conversion where something is
 /// converted.
 fn load_measured(
     scene: &Scene,

@@ -176,11 +176,12 @@ impl Statistics {
     /// What is translucent and drawn by a technique, or from its own data, in words; `None` for nothing.
     pub fn translucent_of(&self, technique: Technique) -> Option<String> {
         let [splats, own] = self.translucent_by.iter().find(|(t, _)| *t == technique)?.1;
+        let by_own = if own == 1 { "1 object by its".to_owned() } else { format!("{own} objects by their") };
         match (splats, own) {
             (0, 0) => None,
             (n, 0) => Some(format!("{n} translucent splats")),
-            (0, own) => Some(format!("{own} objects by their own data")),
-            (n, own) => Some(format!("{n} translucent splats and {own} objects by their own data")),
+            (0, _) => Some(format!("{by_own} own data")),
+            (n, _) => Some(format!("{n} translucent splats and {by_own} own data")),
         }
     }
 }

@@ -1,4 +1,4 @@
-//! The data file that a header names, in the header's folder or below.
+//! Data behind a header or in the file that it names, in the header's folder or below.
 
 use super::ReadParams;
 use super::beside::Beside;
@@ -8,13 +8,35 @@ use std::path::Path;
 
 const HINT: &str = "put the data beside the header and name it without folders";
 
+/// Where the data of a header lies.
+pub(super) struct DataOf<'a> {
+    /// The file of the header, if it was read from one.
+    pub(super) header: Option<&'a Path>,
+    /// Byte behind the header, and how many lines it has.
+    pub(super) end: (usize, u64),
+    /// The name of the data file and where it stands, if the data does not follow the header.
+    pub(super) file: Option<&'a (String, Place)>,
+}
+
+impl DataOf<'_> {
+    /// What `read` makes of the data; it is told after how many lines of its file that begins.
+    pub(super) fn read<T>(
+        &self,
+        mut stream: Stream<'_>,
+        params: &ReadParams,
+        read: impl FnOnce(Stream<'_>, u64) -> Result<T, ReadError>,
+    ) -> Result<T, ReadError> {
+        let Some((name, place)) = self.file else {
+            stream.skip(self.end.0 as u64)?;
+            return read(stream, self.end.1);
+        };
+        let data = open(name, *place, self.header, params)?;
+        read(data, 0).map_err(|e| of(name, e))
+    }
+}
+
 /// The content of the data file of this name, which stands at `place` of the file `header`.
-pub(super) fn open(
-    name: &str,
-    place: Place,
-    header: Option<&Path>,
-    params: &ReadParams,
-) -> Result<Stream<'static>, ReadError> {
+fn open(name: &str, place: Place, header: Option<&Path>, params: &ReadParams) -> Result<Stream<'static>, ReadError> {
     let refused =
         |expected: &str| Err(ReadError::input(place, expected, format!("'{}'", escaped(name.as_bytes(), 60)), HINT));
     if name.contains('%') || name.starts_with("LIST") {
@@ -31,7 +53,7 @@ pub(super) fn open(
 }
 
 /// An error of the data file, which is told of its header.
-pub(super) fn of(name: &str, error: ReadError) -> ReadError {
+fn of(name: &str, error: ReadError) -> ReadError {
     let expected = format!("the data file '{}': {}", escaped(name.as_bytes(), 60), error.expected);
     ReadError { expected, ..error }
 }

@@ -5,7 +5,7 @@
 
 mod header;
 
-use super::detached;
+use super::detached::DataOf;
 use super::input::Stream;
 use super::selection::Selection;
 use super::text::Words;
@@ -40,16 +40,8 @@ pub(super) fn read(
     stored.check(header.place_of_sizes, HINT)?;
     notes.not_used(header.unused.iter().map(String::as_bytes));
     notes.remarks.push("space: left-posterior-superior, converted to right-anterior-superior".to_owned());
-    let values = match &header.data_file {
-        None => {
-            stream.skip(header.end as u64)?;
-            voxels_of(stream, &header, header.lines, &stored, params)?
-        }
-        Some((name, place)) => {
-            let data = detached::open(name, *place, path, params)?;
-            voxels_of(data, &header, 0, &stored, params).map_err(|e| detached::of(name, e))?
-        }
-    };
+    let data = DataOf { header: path, end: (header.end, header.lines), file: header.data_file.as_ref() };
+    let values = data.read(stream, params, |data, lines| voxels_of(data, &header, lines, &stored, params))?;
     let dims = header.sizes.map(|n| n as usize);
     Ok(Grid { origin: SIGNS * header.origin, axes: DMat3::from_diagonal(SIGNS) * header.axes, dims, values })
 }

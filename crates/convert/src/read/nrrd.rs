@@ -7,7 +7,7 @@
 mod axes;
 mod header;
 
-use super::detached;
+use super::detached::DataOf;
 use super::input::{self, Stream};
 use super::selection::Selection;
 use super::text::Words;
@@ -38,16 +38,8 @@ pub(super) fn read(
         notes.remarks.push(format!("space: {space}, converted to right-anterior-superior"));
     }
     let (origin, steps, dims) = (axes.origin, axes.steps, axes.sizes.map(|n| n as usize));
-    let values = match &header.data_file {
-        None => {
-            stream.skip(header.end as u64)?;
-            voxels_of(stream, &header, header.lines, &stored, params)?
-        }
-        Some((name, place)) => {
-            let data = detached::open(name, *place, path, params)?;
-            voxels_of(data, &header, 0, &stored, params).map_err(|e| detached::of(name, e))?
-        }
-    };
+    let data = DataOf { header: path, end: (header.end, header.lines), file: header.data_file.as_ref() };
+    let values = data.read(stream, params, |data, lines| voxels_of(data, &header, lines, &stored, params))?;
     Ok(Grid { origin, axes: steps, dims, values })
 }
 
@@ -60,7 +52,7 @@ fn selection(header: &Header, params: &ReadParams, notes: &mut Notes) -> Result<
             Selection::of_frames(size, place, params, notes)
         }
         Some(Other { size, meaning: Meaning::Series, is_fastest: true, place }) => {
-            Selection::of_mingled_frames(size, place, params, notes)
+            Selection::of_frames(size, place, params, notes).map(Selection::mingled)
         }
         Some(Other { size, meaning, place, .. }) => Selection::of_frames(1, place, params, notes)?.with_numbers(
             (size, header.kind, meaning == Meaning::Color),

@@ -293,7 +293,7 @@ impl Content<'_> {
         if colored || !self.materials.is_used {
             return Ok(Loaded::Mesh(mesh));
         }
-        painted::painted(mesh, &self.corners, &self.places, self.materials, reading).map(Loaded::Mesh)
+        painted::painted(mesh, self.corners, &self.places, self.materials, reading).map(Loaded::Mesh)
     }
 }
 

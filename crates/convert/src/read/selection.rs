@@ -39,26 +39,31 @@ pub(super) struct Selection {
 }
 
 impl Selection {
-    /// The frame that `params` ask for, of so many volumes one behind the other; 1 where the format has no series.
+    /// The frame that `params` ask for, of so many volumes one behind the other; 1 where the format has no series. Says which, if there
+    /// are several.
     pub(super) fn of_frames(
         frames: u64,
         place: Place,
         params: &ReadParams,
         notes: &mut Notes,
     ) -> Result<Self, ReadError> {
-        let frame = chosen(frames, place, params, notes)?;
+        let frame = params.frame;
+        if frame >= frames {
+            let expected = match frames {
+                1 => "`frame` 0, as the file has one volume".to_owned(),
+                _ => format!("a `frame` from 0 to {}, as the file has {frames} volumes", frames.saturating_sub(1)),
+            };
+            return Err(ReadError::input(place, expected, format!("`frame` {frame}"), "choose another `frame`"));
+        }
+        if frames > 1 {
+            notes.remarks.push(format!("frame {frame} of {frames}; `frame` chooses another"));
+        }
         Ok(Self { frames, frame, numbers: 1, value: Value::Number(0) })
     }
 
-    /// The same of a series whose voxels have the numbers of all frames side by side.
-    pub(super) fn of_mingled_frames(
-        frames: u64,
-        place: Place,
-        params: &ReadParams,
-        notes: &mut Notes,
-    ) -> Result<Self, ReadError> {
-        let frame = chosen(frames, place, params, notes)?;
-        Ok(Self { frames: 1, frame: 0, numbers: frames, value: Value::Number(frame) })
+    /// The same frame where the voxels have the numbers of all frames side by side.
+    pub(super) fn mingled(self) -> Self {
+        Self { frames: 1, frame: 0, numbers: self.frames, value: Value::Number(self.frame) }
     }
 
     /// The same with `numbers` a voxel, which is a colour if they are three or four and `declared` to be one, or unsigned
@@ -84,20 +89,4 @@ impl Selection {
         notes.remarks.push(format!("{luma}{alpha}"));
         Ok(Self { numbers, value: Value::Luma, ..self })
     }
-}
-
-/// The frame that is read of so many; says which, if there are several.
-fn chosen(frames: u64, place: Place, params: &ReadParams, notes: &mut Notes) -> Result<u64, ReadError> {
-    let frame = params.frame;
-    if frame >= frames {
-        let expected = match frames {
-            1 => "`frame` 0, as the file has one volume".to_owned(),
-            _ => format!("a `frame` from 0 to {}, as the file has {frames} volumes", frames.saturating_sub(1)),
-        };
-        return Err(ReadError::input(place, expected, format!("`frame` {frame}"), "choose another `frame`"));
-    }
-    if frames > 1 {
-        notes.remarks.push(format!("frame {frame} of {frames}; `frame` chooses another"));
-    }
-    Ok(frame)
 }

@@ -2,7 +2,7 @@
 
 use organza::scene::UpAxis;
 use organza::{escape_controls, printable};
-use organza_survey::{Facts, Histogram, grouped, rounded};
+use organza_survey::{Facts, Histogram, counted, grouped, rounded};
 use serde_json::Value;
 use std::fmt::Write;
 use std::path::Path;
@@ -111,7 +111,7 @@ fn places(facts: &Facts, text: &mut Lines) {
         );
     }
     if let Some(duplicates) = facts.duplicates.filter(|d| *d > 0) {
-        text.add("duplicates", format!("{} points lie where another one lies", grouped(duplicates)));
+        text.add("duplicates", format!("{} where another one lies", counted(duplicates, ["point lies", "points lie"])));
     }
     if let Some(steps) = facts.steps {
         let lengths = steps.map(|s| s.length());
@@ -161,18 +161,16 @@ fn bars(histogram: &Histogram, text: &mut Lines) {
 
 fn faults(facts: &Facts, text: &mut Lines) {
     let Some(faults) = facts.faults else { return };
+    let rims = counted(faults.holes, ["hole or open rim", "holes or open rims"]);
     let found = [
-        (faults.open_edges, "edges of one triangle alone, in about {} holes or open rims"),
-        (faults.crowded_edges, "edges of more than two triangles"),
-        (faults.duplicates, "triangles that another one covers"),
-        (faults.degenerate, "triangles without area"),
-        (faults.isolated, "vertices of no triangle"),
+        (faults.open_edges, ["edge", "edges"], format!(" of one triangle alone, in about {rims}")),
+        (faults.crowded_edges, ["edge", "edges"], " of more than two triangles".to_owned()),
+        (faults.duplicates, ["triangle", "triangles"], " that another one covers".to_owned()),
+        (faults.degenerate, ["triangle", "triangles"], " without area".to_owned()),
+        (faults.isolated, ["vertex", "vertices"], " of no triangle".to_owned()),
     ];
-    let there: Vec<String> = found
-        .iter()
-        .filter(|(count, _)| *count > 0)
-        .map(|(count, what)| format!("{} {}", grouped(*count), what.replace("{}", &grouped(faults.holes))))
-        .collect();
+    let there = found.into_iter().filter(|(count, ..)| *count > 0);
+    let there: Vec<String> = there.map(|(count, of, what)| counted(count, of) + &what).collect();
     if there.is_empty() {
         text.add("faults", "none: a closed surface");
     }

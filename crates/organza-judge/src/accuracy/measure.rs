@@ -3,7 +3,7 @@
 use super::{Facts, Request};
 use organza::scene::Scene;
 use organza::{
-    CostRecord, Error, Loaded, Planned, Progress, RenderOptions, draw_loaded, load, plan_loaded, same_splats,
+    CostRecord, Error, Files, Loaded, Planned, Progress, RenderOptions, draw_loaded, load, plan_loaded, same_splats,
 };
 use reference::metrics::{Display, Errors, Image, Linear, Viewing, compare, epsilon_8_bit, flip, psnr};
 use splat_core::SplatKind;
@@ -224,7 +224,7 @@ impl<'a> Renderer<'a> {
             None => {
                 self.loaded.truncate(1);
                 let start = Instant::now();
-                let loaded = load(scene, self.options, self.progress)?;
+                let loaded = load(scene, self.options, self.progress, &Files::default())?;
                 seconds = Some(start.elapsed().as_secs_f64());
                 self.loaded.push((scene.clone(), loaded));
                 self.loaded.len() - 1

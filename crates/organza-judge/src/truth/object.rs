@@ -306,8 +306,9 @@ fn read(path: &Path, frame: u64, options: &RenderOptions) -> Result<FileData, Er
     convert::read::file(path, &params, None).map(|read| read.0).map_err(|e| Error::from_read(path, &e))
 }
 
-/// Moves a mesh into the world; without normals it gets smooth ones, as its splats do.
+/// Moves a mesh into the world; without normals it gets smooth ones between sharp edges, as its splats do.
 fn place(mesh: &mut Mesh, t: &Similarity) {
+    convert::part_at_creases(mesh);
     if mesh.normal.is_empty() {
         mesh.normal = convert::vertex_normals(mesh);
     }

@@ -98,7 +98,10 @@ impl Files {
         let (data, notes) = read.map_err(|e| Error::from_read(path, &e))?;
         add(&self.mended, notes.mended.iter().map(Mended::to_string));
         let data = match data {
-            Loaded::Mesh(mesh) => FileData::Mesh(mesh.into()),
+            Loaded::Mesh(mut mesh) => {
+                convert::part_at_creases(&mut mesh);
+                FileData::Mesh(mesh.into())
+            }
             Loaded::Points(points) => FileData::Points(points.into()),
             Loaded::Grid(grid) => FileData::Grid(grid.into()),
             Loaded::Image(image) => FileData::Image(image.into()),

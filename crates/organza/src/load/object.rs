@@ -193,10 +193,8 @@ fn surfels(
     warnings: &mut Vec<String>,
 ) -> Result<Cloud, ConvertError> {
     let (cloud, report) = convert::raw_to_surfels(points, params, Some(context.progress))?;
-    if let (n @ 1.., false) = (report.duplicates, params.merge_duplicates) {
-        warnings
-            .push(format!("{}: {n} points lie where another one lies (--merge-duplicates)", crate::printable(path)));
-    }
+    let named = |said| format!("{}: {said} (--merge-duplicates)", crate::printable(path));
+    warnings.extend(report.said().map(named));
     Ok(cloud)
 }
 

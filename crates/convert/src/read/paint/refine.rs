@@ -131,7 +131,8 @@ fn halved(t: &[u32; 3], edges: &[Edge]) -> [Option<usize>; 3] {
 fn add_middles(mesh: &mut Mesh, painting: &mut Painting, edges: &[Edge]) {
     for &[a, b] in edges {
         let [a, b] = [a as usize, b as usize];
-        mesh.position.push(0.5 * (mesh.position[a] + mesh.position[b]));
+        // Halved before they are added: their sum may be more than a number can be.
+        mesh.position.push(0.5 * mesh.position[a] + 0.5 * mesh.position[b]);
         if !mesh.normal.is_empty() {
             let between = mesh.normal[a] + mesh.normal[b];
             // Opposite normals have none between them.
@@ -139,9 +140,9 @@ fn add_middles(mesh: &mut Mesh, painting: &mut Painting, edges: &[Edge]) {
         }
         if !painting.tint.is_empty() {
             let (of_a, of_b) = (painting.tint[a], painting.tint[b]);
-            painting.tint.push(std::array::from_fn(|c| 0.5 * (of_a[c] + of_b[c])));
+            painting.tint.push(std::array::from_fn(|c| 0.5 * of_a[c] + 0.5 * of_b[c]));
         }
-        let between = 0.5 * (Vec2::from(painting.place[a]) + Vec2::from(painting.place[b]));
+        let between = 0.5 * Vec2::from(painting.place[a]) + 0.5 * Vec2::from(painting.place[b]);
         painting.place.push(between.to_array());
         painting.paint_of.push(painting.paint_of[a]);
     }
@@ -211,5 +212,16 @@ mod tests {
                 assert_eq!(n, if is_rim { 1 } else { 2 }, "{subset}: {a} {b}");
             }
         }
+    }
+
+    #[test]
+    fn middles_between_the_largest_numbers_are_numbers() {
+        // Found by fuzzing glTF: the sum of two places was infinite.
+        let (far, place) = (Vec3::splat(f32::MAX), vec![[f32::MAX; 2]; 2]);
+        let mut mesh = Mesh { position: vec![far; 2], ..Mesh::default() };
+        let mut painting =
+            Painting { paint_of: vec![0; 2], place, tint: vec![[f32::MAX; 4]; 2], ..Painting::default() };
+        add_middles(&mut mesh, &mut painting, &[[0, 1]]);
+        assert_eq!((mesh.position[2], painting.place[2], painting.tint[2]), (far, [f32::MAX; 2], [f32::MAX; 4]));
     }
 }
