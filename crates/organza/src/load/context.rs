@@ -8,7 +8,6 @@ use convert::{Orientation, SplatParams, SurfelParams, VolumeParams};
 use glam::DVec3;
 use splat_core::{Limits, Progress, Shading};
 use std::path::Path;
-use std::sync::Arc;
 
 /// Bytes that a splat takes from its conversion to the finished picture, at most.
 pub(crate) const BYTES_PER_SPLAT: u64 = 256;
@@ -49,7 +48,7 @@ impl Context<'_> {
             material: object.material as u16,
             footprint: object.footprints.of[0],
             profile: self.scene.footprints.layers()[usize::from(object.footprints.of[0])],
-            footprints: Some(Arc::clone(&object.footprints)),
+            footprints: Some(object.footprints.clone()),
             transform: object.transform,
             color: object.color.unwrap_or(material.color),
             limits: Limits::NONE,
