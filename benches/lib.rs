@@ -13,7 +13,7 @@ pub use device::device;
 pub use dragon::{disc_scale, dragon, mean_degree, overlap_graph};
 pub use frame::Frame;
 
-use organza::{Loaded, Progress, RenderOptions, load, scene};
+use organza::{Files, Loaded, Progress, RenderOptions, load, scene};
 use splat_core::{Camera, Cloud, glam::Vec3, rng};
 use std::path::Path;
 use std::sync::OnceLock;
@@ -27,7 +27,8 @@ pub fn outdoor() -> &'static Loaded {
     SCENE.get_or_init(|| {
         let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenes/outdoor.toml");
         let scene = scene::load(&file, &scene::LoadOptions::default()).expect("scenes/outdoor.toml");
-        load(&scene, &RenderOptions::default(), &Progress::new()).expect("the data of scenes/outdoor.toml")
+        load(&scene, &RenderOptions::default(), &Progress::new(), &Files::default())
+            .expect("the data of scenes/outdoor.toml")
     })
 }
 

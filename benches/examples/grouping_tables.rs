@@ -46,7 +46,7 @@ fn table_2(cloud: &Cloud, scale: f32, all: &OverlapGraph, add: &mut impl FnMut(S
         ("hash with", Collisions::Resolve),
         ("hash near", Collisions::ResolveNear { eye, distance }),
     ] {
-        let params = HashParams { groups: GROUPS, disc_scale: scale, collisions, ..HashParams::default() };
+        let params = HashParams { groups: GROUPS, disc_scale: scale, collisions };
         let groups = hash_grouping(cloud, &params, None).expect("invariant: a valid cloud");
         add(format!("2,dragon,{name},{GROUPS},,,{:.3}", overlap(&groups)));
     }
