@@ -51,7 +51,10 @@ fn table_3(discs: u64, degree: f64, bench: &mut impl FnMut(&str, &dyn Fn())) {
     let distance = 0.35 * f64::from((bounds.max - bounds.min).length());
     for collisions in [Collisions::Keep, Collisions::Resolve, Collisions::ResolveNear { eye, distance }] {
         let params = HashParams { disc_scale: scale, collisions, ..HashParams::default() };
-        bench(&format!("hash of {discs}, {collisions:?}"), &|| drop(hash_grouping(&cloud, &params, None)));
+        // Without the numbers of what is near.
+        let name = format!("{collisions:?}");
+        let name = name.split(' ').next().unwrap_or(&name);
+        bench(&format!("hash of {discs}, {name}"), &|| drop(hash_grouping(&cloud, &params, None)));
     }
 }
 
