@@ -19,7 +19,8 @@ fn elliptical() -> SurfelParams {
     SurfelParams { shape: DiscShape::Elliptical, ..SurfelParams::default() }
 }
 
-fn surfels(points: &RawPoints, params: &SurfelParams) -> Cloud {
+/// The cloud of some points, as large as is foretold.
+pub(crate) fn surfels(points: &RawPoints, params: &SurfelParams) -> Cloud {
     let (cloud, _) = raw_to_surfels(points, params, None).unwrap();
     cloud.validate().unwrap();
     let predicted = cost::raw_points(points, params).unwrap();

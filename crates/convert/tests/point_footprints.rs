@@ -1,12 +1,13 @@
 //! Footprints point by point: by a column, or by chance; how images lie, and what has none.
 #![cfg(feature = "surfels")]
 
+use crate::point_attributes::surfels;
 use convert::{
     Column, FootprintChoice, MatterParams, PointsShown, RawPoints, Rectangle, SplatParams, SurfelParams, cost,
     raw_to_matter, raw_to_surfels, rectangle, shown_points,
 };
 use splat_core::glam::{DVec3, Vec3};
-use splat_core::{Cloud, FootprintImage, FootprintStack, Similarity};
+use splat_core::{FootprintImage, FootprintStack, Similarity};
 use std::sync::Arc;
 
 /// Formulas of 3, 2 and 5 deviations, an image in the place of the last.
@@ -34,14 +35,6 @@ fn wall(order: impl Fn(usize) -> usize) -> RawPoints {
 fn with_column(points: RawPoints, number: impl Fn(Vec3) -> f64) -> RawPoints {
     let values = points.position.iter().map(|p| number(*p)).collect();
     RawPoints { columns: vec![Column { name: "footprint".into(), values }], ..points }
-}
-
-fn surfels(points: &RawPoints, params: &SurfelParams) -> Cloud {
-    let (cloud, _) = raw_to_surfels(points, params, None).unwrap();
-    cloud.validate().unwrap();
-    let predicted = cost::raw_points(points, params).unwrap();
-    assert_eq!((predicted.splats, predicted.bytes), (cloud.len() as u64, cloud.bytes()));
-    cloud
 }
 
 #[test]
