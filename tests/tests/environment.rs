@@ -52,6 +52,24 @@ fn db15_a_constant_map_is_that_colour_bit_for_bit_in_every_technique() {
     assert_eq!(by("environment = 'constant.hdr'"), by("color = [0.5, 0.25, 1.25]"));
 }
 
+#[test]
+fn ou10_lights_alone_and_objects_without_a_point_leave_the_background_as_it_is() {
+    let folder = tempfile::tempdir().unwrap();
+    let empty =
+        "ply\nformat ascii 1.0\nelement vertex 0\nproperty float x\nproperty float y\nproperty float z\nend_header\n";
+    std::fs::write(folder.path().join("empty.ply"), empty).unwrap();
+    let lamp = "[[light]]\nkind = 'point'\nposition = [2, 4, 3]\nintensity = [20, 20, 20]\n";
+    let points = format!("{lamp}[[object]]\nname = 'nothing'\npoints = 'empty.ply'\n");
+    for technique in TECHNIQUES {
+        for objects in ["", lamp, &points] {
+            let picture = drawn(folder.path(), "color = [0.5, 0.25, 1.25]", objects, &["--technique", technique]);
+            for (channel, expected) in [("R", 0.5), ("G", 0.25), ("B", 1.25), ("A", 0.0)] {
+                assert_eq!(picture.channel(channel), vec![expected; 24 * 18], "{technique}: {channel}, {objects}");
+            }
+        }
+    }
+}
+
 /// An image with a colour for every direction, and its file.
 fn varied(folder: &Path) -> RadianceImage {
     let size = [32, 16];

@@ -5,7 +5,19 @@ use serde_json::Value;
 use std::path::{Path, PathBuf};
 
 /// What every scene is drawn with.
-const ARGUMENTS: [&str; 8] = ["--size", "96x54", "--repeat-level", "8", "--layers", "effects", "--threads", "2"];
+const ARGUMENTS: [&str; 6] = ["--repeat-level", "8", "--layers", "effects", "--threads", "2"];
+
+/// Pixels of every picture.
+const PIXELS: f64 = 96.0 * 54.0;
+
+/// A small size in the shape of a scene's own picture, which shows what that shows.
+fn size(scene: &Path) -> String {
+    let text = std::fs::read_to_string(scene).unwrap();
+    let own = text.lines().find_map(|line| line.strip_prefix("size = [")?.strip_suffix(']')?.split_once(", ")).unwrap();
+    let [width, height] = [own.0, own.1].map(|n| n.parse::<f64>().unwrap());
+    let scale = (PIXELS / (width * height)).sqrt();
+    format!("{:.0}x{:.0}", width * scale, height * scale)
+}
 
 fn scenes() -> Vec<PathBuf> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenes");
@@ -18,7 +30,8 @@ fn scenes() -> Vec<PathBuf> {
 
 /// What `explain` says as a document.
 fn explained(scene: &Path) -> Value {
-    let out = organza().arg("explain").arg(scene).arg("--json").args(ARGUMENTS).output().unwrap();
+    let out =
+        organza().arg("explain").arg(scene).args(["--json", "--size", &size(scene)]).args(ARGUMENTS).output().unwrap();
     assert!(out.status.success(), "{}: {}", scene.display(), String::from_utf8_lossy(&out.stderr));
     serde_json::from_slice(&out.stdout).unwrap()
 }
@@ -38,7 +51,7 @@ fn memory_stays_within_what_is_explained_effects_sum_to_beauty_and_nothing_is_do
         let image = folder.path().join("out.exr");
         let mut command = organza();
         command.arg("render").arg(&scene).arg("-o").arg(&image).args(["--max-memory", &bytes.to_string()]);
-        let (out, peak) = run_measured(command.args(ARGUMENTS));
+        let (out, peak) = run_measured(command.args(["--size", &size(&scene)]).args(ARGUMENTS));
         assert!(out.status.success(), "{name} within {bytes}: {}", String::from_utf8_lossy(&out.stderr));
         let resident = peak.resident;
         println!("{name}: explained {bytes}, resident {resident}");

@@ -118,7 +118,8 @@ pub(crate) fn deep(repo: &Repo) -> Outcome {
     // Of the whole workspace, so that what other steps have compiled serves this one.
     let slow = format!("{TESTS} --features {FEATURES},{DRIVER},{DEEP} --test end-to-end -- every_scene:: deep::");
     let damage = format!("{TESTS} --features {FEATURES},{DRIVER},{DEEP} --test bad_inputs_damage");
-    let alone = bare(repo).into_iter().map(|check| check.1).chain(with_one_feature(repo)).collect();
+    let strict = |words: Vec<String>| [words, split("-- -D warnings")].concat();
+    let alone = bare(repo).into_iter().map(|check| check.1).chain(with_one_feature(repo)).map(strict).collect();
     let steps = [
         Step { name: "deny", work: Work::Task(deny::run) },
         Step { name: "shaders", work: Work::Task(|repo| shaders::run(repo, true)) },
@@ -138,9 +139,9 @@ pub(crate) fn split(line: &str) -> Vec<String> {
 fn bare(repo: &Repo) -> Vec<(&str, Vec<String>)> {
     // A command has no library.
     let is_library = |folder: &&str| repo.text(&format!("{folder}/src/main.rs")).is_none();
-    let check =
-        |folder: &str| format!("check --package {} --lib --no-default-features", folder.trim_start_matches("crates/"));
-    repo.crate_folders().into_iter().filter(is_library).map(|folder| (folder, split(&check(folder)))).collect()
+    let check = |folder| Some(format!("clippy --package {} --lib --no-default-features", repo.package(folder)?));
+    let libraries = repo.crate_folders().into_iter().filter(is_library);
+    libraries.filter_map(|folder| Some((folder, split(&check(folder)?)))).collect()
 }
 
 /// The same with each of its features alone.
@@ -160,15 +161,20 @@ mod tests {
 
     #[test]
     fn every_feature_is_checked_alone() {
-        let manifest = "[features]\ndefault = [\"ply\"]\nply = [\"dep:x\"]\nlas = []\n[dependencies]\ny = \"1\"\n";
-        let command = [("crates/c/Cargo.toml", ""), ("crates/c/src/main.rs", ""), ("crates/organza-d/Cargo.toml", "")];
-        let repo =
-            Repo::of(&[&[("crates/a/Cargo.toml", manifest), ("crates/b/Cargo.toml", "")], &command[..]].concat());
+        let [a, b, c, d] = ["organza-a", "b", "c", "organza-d"].map(|name| format!("[package]\nname = \"{name}\"\n"));
+        let a = a + "[features]\ndefault = [\"ply\"]\nply = [\"dep:x\"]\nlas = []\n[dependencies]\ny = \"1\"\n";
+        let repo = Repo::of(&[
+            ("crates/a/Cargo.toml", &a),
+            ("crates/b/Cargo.toml", &b),
+            ("crates/c/Cargo.toml", &c),
+            ("crates/c/src/main.rs", ""),
+            ("crates/organza-d/Cargo.toml", &d),
+        ]);
         let words = |checks: Vec<Vec<String>>| checks.iter().map(|words| words[2..].join(" ")).collect::<Vec<_>>();
         let line = "--lib --no-default-features";
         let bare: Vec<_> = bare(&repo).into_iter().map(|check| check.1).collect();
-        assert_eq!(words(bare), [format!("a {line}"), format!("b {line}"), format!("organza-d {line}")]);
-        let features = ["ply", "las"].map(|feature| format!("a {line} --features {feature}"));
+        assert_eq!(words(bare), [format!("organza-a {line}"), format!("b {line}"), format!("organza-d {line}")]);
+        let features = ["ply", "las"].map(|feature| format!("organza-a {line} --features {feature}"));
         assert_eq!(words(with_one_feature(&repo)), features);
     }
 

@@ -5,7 +5,6 @@
 
 use crate::ci::{FEATURES, Step, Work, clippy, follow, split};
 use crate::repo::{Outcome, Repo};
-use crate::toml_lines::{lines, string};
 use crate::{papers, tidy};
 use std::collections::BTreeSet;
 use std::process::Command;
@@ -56,9 +55,9 @@ fn changed(repo: &Repo) -> Result<Vec<String>, String> {
 
 /// The packages that files belong to: each to the one in the deepest folder above it.
 fn packages(repo: &Repo, paths: &[String]) -> BTreeSet<String> {
-    let named = |(path, text): (&str, &str)| {
-        let name = lines(text).into_iter().find(|l| l.table == "package" && l.key == "name")?;
-        Some((path.strip_suffix("Cargo.toml")?.to_owned(), string(name.value).ok()?))
+    let named = |(path, _): (&str, &str)| {
+        let folder = path.strip_suffix("/Cargo.toml")?;
+        Some((format!("{folder}/"), repo.package(folder)?))
     };
     // What is a workspace of its own has no tests here.
     let manifests =

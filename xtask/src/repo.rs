@@ -1,5 +1,6 @@
 //! The files of the working tree that belong to the repository, read once.
 
+use crate::toml_lines::{lines, string};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -62,6 +63,12 @@ impl Repo {
     pub(crate) fn crate_folders(&self) -> Vec<&str> {
         let manifests = self.files.iter().filter_map(|f| f.path.strip_suffix("/Cargo.toml"));
         manifests.filter(|folder| folder.starts_with("crates/")).collect()
+    }
+
+    /// The name of the package whose manifest lies in a folder.
+    pub(crate) fn package(&self, folder: &str) -> Option<String> {
+        let manifest = lines(self.text(&format!("{folder}/Cargo.toml"))?);
+        string(manifest.iter().find(|l| l.table == "package" && l.key == "name")?.value).ok()
     }
 
     /// A tree that exists in memory only.

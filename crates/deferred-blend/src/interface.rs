@@ -79,7 +79,7 @@ mod tests {
     }
 
     #[test]
-    fn db08_shares_are_continuous_at_the_critical_angle_and_no_number_is_lost() {
+    fn db8_shares_are_continuous_at_the_critical_angle_and_no_number_is_lost() {
         for ratio in [1e-15, 1.05f32, 1.5, 7.6, 1e6, 1e15] {
             for k in 0..=1000 {
                 let found = cross(ray(k as f32 / 1000.0), Vec3::Z, ratio);

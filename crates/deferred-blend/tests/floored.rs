@@ -80,7 +80,7 @@ fn db3_floored_depths_attenuate_a_curved_surface_twice_where_a_step_ends() {
 }
 
 #[test]
-fn db04_the_farthest_disc_is_seen_and_so_is_what_has_one_depth() {
+fn db4_the_farthest_disc_is_seen_and_so_is_what_has_one_depth() {
     let mut cloud = Cloud::new(DVec3::ZERO);
     plane(&mut cloud, Vec3::ZERO, Vec3::Z, 20, &disc(Vec3::ZERO, Vec3::Z, 0.1, 0.5));
     let flat = Scene::new(cloud.clone(), parallel(DVec3::Z * 3.0, 1.0, [16, 16]));

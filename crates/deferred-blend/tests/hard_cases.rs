@@ -47,6 +47,30 @@ fn db7_layers_of_no_opacity_of_half_and_of_all_and_no_layers() {
     }
 }
 
+/// Layers are counted by no channel that ends: thousands of faint ones multiply, and so do those of unlike opacities.
+#[test]
+fn db6_opacities_of_any_layers_multiply() {
+    let params = Params { disc_scale: 1.0, transmittance_cutoff: 0.0, ..Params::default() };
+    for opacities in [vec![0.9, 0.1, 0.1], vec![1e-3; 5_000]] {
+        let mut cloud = Cloud::new(DVec3::ZERO);
+        for (l, opacity) in opacities.iter().enumerate() {
+            cloud.push(&disc(Vec3::Z * (-0.5 * l as f32), Vec3::Z, 0.1, *opacity));
+        }
+        let scene = Scene::new(cloud, parallel(DVec3::Z * 3.0, 0.02, [2, 2]));
+        let groups = by_turns(&scene.cloud, 1);
+        let floors = Floors { groups: &groups, steps: 1 << 20 };
+        let expected: f64 = opacities.iter().map(|opacity| 1.0 - f64::from(*opacity)).product();
+        for layering in [Layering::Gaps, Layering::Algorithm1(floors), Layering::Algorithm2(floors)] {
+            let mut picture = Accumulator::new([2, 2], 1, 3, true, true);
+            scene.draw_by(&params, layering, &[], &mut picture).expect("nobody cancels");
+            for tau in &picture.optical_depth[0] {
+                let found = libm::exp(-f64::from(*tau));
+                assert!((found - expected).abs() < 1e-5, "{layering:?}, {} layers: {found}", opacities.len());
+            }
+        }
+    }
+}
+
 /// Ten thousand kilometres away no pair overlaps that does not, and groups are those that they were.
 #[test]
 fn db10_edges_and_groups_far_away_are_those_at_hand() {

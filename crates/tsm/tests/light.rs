@@ -393,3 +393,46 @@ fn papers_model_goes_dark_at_an_absorbance_of_two() {
         assert!((light - expected).abs() < 1e-5, "behind {k}: {light}, not {expected}");
     }
 }
+
+/// Light behind a cloud of smooth, overlapping splats, by tables of ever more cells, against the sum of their kernels along each ray.
+#[test]
+fn smooth_shadows_converge_in_second_order() {
+    let footprint = splat_core::Footprint::default();
+    let (radius, spread) = (0.25f32, 1.0f32);
+    let mut cloud = Cloud::new(DVec3::ZERO);
+    for i in 0..400 {
+        let u = |k| splat_core::rng::unit_f32(31, 0, i, k) - 0.5;
+        let position = Vec3::new(u(0), u(1), u(2)) * (2.0 * spread);
+        cloud.push(&Splat { position, radius, cross_section: 0.01, ..Splat::default() });
+    }
+    let places: Vec<Vec3> = (0..4000u64)
+        .map(|i| {
+            let u = |k| (splat_core::rng::unit_f32(32, 0, i, k) - 0.5) * 2.6;
+            Vec3::new(u(0), u(1), -3.0)
+        })
+        .collect();
+    let exact: Vec<f64> = places
+        .iter()
+        .map(|place| {
+            let depth = |p: &Vec3| {
+                let s = f64::from((*p - *place).truncate().length_squared() / (radius * radius));
+                0.01 * footprint.norm() * footprint.profile(s.min(1.0)) / f64::from(radius * radius)
+            };
+            libm::exp(-cloud.position.iter().map(depth).sum::<f64>())
+        })
+        .collect();
+    let error = |n: u32| {
+        let params = Params { resolution: Resolution::Cells(n), tolerance: 1e-6, ..Params::default() };
+        let map = build(&cloud, &directional(-DVec3::Z), &params);
+        let square = |(place, exact): (&Vec3, &f64)| (f64::from(light_at(&map, *place)) - exact).powi(2);
+        (places.iter().zip(&exact).map(square).sum::<f64>() / places.len() as f64).sqrt()
+    };
+    // A splat's radius is of 6.4, 12.8 and 25.6 cells: from 4 on kernels are taken on the rays of cells, and only interpolation is left.
+    let errors = [64, 128, 256].map(error);
+    println!("{errors:?}; of 0.8, 1.6 and 3.2 cells a radius {:?}", [8, 16, 32].map(error));
+    for pair in errors.windows(2) {
+        let order = libm::log2(pair[0] / pair[1]);
+        assert!((1.9..2.1).contains(&order), "{errors:?}: order {order}");
+    }
+    assert!(errors[0] < 6e-3, "{errors:?}");
+}

@@ -94,6 +94,23 @@ mod tests {
         assert_eq!(e, Errors { rmse: 0.5, bias: 0.0, mean_absolute: 0.5, max: 0.5 });
     }
 
+    /// Sums in f32 would end at 2²⁴ equal parts, and lose small parts beside a large one.
+    #[test]
+    fn ou5_means_of_many_pixels_are_exact_and_one_huge_pixel_is_told() {
+        let n = 1_000_000;
+        let mut pixels: Vec<[f64; 3]> = (0..n).map(|i| [0.1 + (i % 1000) as f64 * 1e-3; 3]).collect();
+        let size = [1000, 1000];
+        let black = Image::from_radiance(size, vec![[0.0; 3]; n]).unwrap();
+        let e = compare(&Image::from_radiance(size, pixels.clone()).unwrap(), &black).unwrap();
+        // The mean and the mean square of 0.1, 0.101, … 1.099.
+        let (mean, variance) = (0.5995, 1e-6 * (1e6 - 1.0) / 12.0);
+        assert!((e.bias - mean).abs() < 1e-12 && (e.mean_absolute - mean).abs() < 1e-12, "{e:?}");
+        assert!((e.rmse - f64::sqrt(mean * mean + variance)).abs() < 1e-12 && e.max == 1.099, "{e:?}");
+        pixels[7] = [1e30; 3];
+        let e = compare(&Image::from_radiance(size, pixels).unwrap(), &black).unwrap();
+        assert!(e.max == 1e30 && (e.bias / 1e24 - 1.0).abs() < 1e-12 && (e.rmse / 1e27 - 1.0).abs() < 1e-12, "{e:?}");
+    }
+
     #[test]
     fn equal_pictures_and_unequal_sizes() {
         assert_eq!(psnr(&shown(0.5), &shown(0.5)).unwrap(), f64::INFINITY);

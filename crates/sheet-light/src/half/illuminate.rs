@@ -213,6 +213,8 @@ pub(crate) struct ThroughVolumes<'a> {
     pub(crate) frame: &'a Frame,
     /// Slab coordinates.
     pub(crate) places: &'a [Vec3],
+    /// What polygons let through of each point of the light, place by place, where it has several.
+    pub(crate) visible: Option<&'a [f32]>,
     pub(crate) out: &'a mut [[f32; 3]],
 }
 
@@ -221,9 +223,12 @@ impl pulp::WithSimd for ThroughVolumes<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let Self { of, frame, places, out } = self;
+        let Self { of, frame, places, visible, out } = self;
         let mut extinction = vec![[0.0; MAX_LANES]; of.volumes.len()];
-        for (places, out) in places.chunks(Lanes::<S>::COUNT).zip(out.chunks_mut(Lanes::<S>::COUNT)) {
+        let points = visible.map_or(0, |visible| visible.len() / places.len().max(1));
+        let chunks = places.chunks(Lanes::<S>::COUNT).zip(out.chunks_mut(Lanes::<S>::COUNT));
+        for (chunk, (places, out)) in chunks.enumerate() {
+            let visible = visible.map(|visible| &visible[chunk * Lanes::<S>::COUNT * points..]);
             let (mut at, mut wanted) = ([[0.0; MAX_LANES]; 3], [0.0; MAX_LANES]);
             for (lane, place) in places.iter().enumerate() {
                 (0..3).for_each(|a| at[a][lane] = place[a]);
@@ -232,7 +237,7 @@ impl pulp::WithSimd for ThroughVolumes<'_> {
                 extinction.iter_mut().zip(of.volumes).for_each(|(e, v)| e[lane] = v.extinction_at(world) as f32);
             }
             let at = [Lanes::load(simd, &at[0]), Lanes::load(simd, &at[1]), Lanes::load(simd, &at[2])];
-            let soft = of.buffer.soft.as_ref().map(|soft| soft.beside(simd, &at, &wanted));
+            let soft = of.buffer.soft.as_ref().map(|soft| soft.beside(simd, &at, &wanted, visible));
             let mut optical = [[Lanes::splat(simd, 0.0); NODES]; 3];
             for v in 0..of.volumes.len() {
                 let mean = of.means(simd, v, &at, &extinction, &wanted);

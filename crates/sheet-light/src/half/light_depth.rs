@@ -124,8 +124,13 @@ impl LightDepths {
 
     /// Share of the light that polygons let through to a world position, which lies on a surface of this normal or in the open.
     pub(crate) fn visibility(&self, world: DVec3, face: Option<Vec3>) -> f32 {
+        self.visible(world, face).sum()
+    }
+
+    /// The same by the points of the light.
+    pub(crate) fn visible(&self, world: DVec3, face: Option<Vec3>) -> impl Iterator<Item = f32> {
         let place = (world - self.origin).as_vec3();
-        self.points.iter().map(|point| point.share * self.at(point, place, face)).sum()
+        self.points.iter().map(move |point| point.share * self.at(point, place, face))
     }
 
     fn at(&self, point: &PointDepths, place: Vec3, face: Option<Vec3>) -> f32 {

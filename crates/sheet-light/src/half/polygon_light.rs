@@ -27,6 +27,7 @@ const CHUNK: usize = 256;
 pub(crate) struct PolygonLight<'a> {
     of: &'a EyePolygons<'a>,
     camera: &'a Camera,
+    depths: Option<&'a LightDepths>,
     /// By pixel: share by channel; all of it before the sweep comes to it.
     through: Vec<[f32; 3]>,
 }
@@ -59,7 +60,7 @@ impl PolygonSlabs {
 
 impl<'a> PolygonLight<'a> {
     /// Light that comes to all of them, but for polygons in its way.
-    pub(crate) fn new(of: &'a EyePolygons<'a>, camera: &'a Camera, depths: Option<&LightDepths>) -> Self {
+    pub(crate) fn new(of: &'a EyePolygons<'a>, camera: &'a Camera, depths: Option<&'a LightDepths>) -> Self {
         let mut through = vec![[1.0; 3]; of.pixels.len()];
         if let Some(depths) = depths {
             through.par_iter_mut().zip(&of.pixels).for_each(|(through, pixel)| {
@@ -67,7 +68,7 @@ impl<'a> PolygonLight<'a> {
                 *through = [depths.visibility(world, Some(face)); 3];
             });
         }
-        Self { of, camera, through }
+        Self { of, camera, depths, through }
     }
 
     /// Takes up the polygons of a slab, or those behind the last, behind the volumes and the splats before them.
@@ -82,7 +83,9 @@ impl<'a> PolygonLight<'a> {
         let mut found = vec![[1.0; 3]; ranks.len()];
         found.par_chunks_mut(CHUNK).zip(ranks.par_chunks(CHUNK)).for_each(|(out, ranks)| {
             let places: Vec<Vec3> = ranks.iter().map(|rank| slabs.places[*rank as usize]).collect();
-            pulp::Arch::new().dispatch(ThroughVolumes { of: volumes, frame, places: &places, out });
+            let visible = volumes.buffer.soft.as_ref().and_then(|_| self.visible(ranks));
+            let work = ThroughVolumes { of: volumes, frame, places: &places, visible: visible.as_deref(), out };
+            pulp::Arch::new().dispatch(work);
             let Some(splats) = splats else { return };
             for (out, place) in out.iter_mut().zip(&places) {
                 let own = splats.transmittance_at(*place, place.z / frame.slabs.width as f32 - slab as f32);
@@ -93,6 +96,16 @@ impl<'a> PolygonLight<'a> {
             let through = &mut self.through[*rank as usize];
             (0..3).for_each(|c| through[c] *= found[c]);
         }
+    }
+
+    /// What polygons let through of each point of the light, pixel by pixel.
+    fn visible(&self, ranks: &[u32]) -> Option<Vec<f32>> {
+        let depths = self.depths?;
+        let of = |rank: &u32| {
+            let Seen { world, face, .. } = self.of.seen(self.of.pixels[*rank as usize], self.camera);
+            depths.visible(world, Some(face))
+        };
+        Some(ranks.iter().flat_map(of).collect())
     }
 
     /// Adds what polygons show of the lights of the sweep.

@@ -170,13 +170,24 @@ impl SoftBuffer {
     /// What the penumbra makes of the optical depth about places of the present slab, in the volumes.
     #[inline(always)]
     pub(crate) fn at<S: Simd>(&self, simd: S, places: &Places<S>, wanted: &[f32; MAX_LANES]) -> Soft<S> {
-        self.soft(simd, places, wanted, |place, plane| self.arriving(self.penumbra.pixel(place), plane))
+        self.soft(simd, places, wanted, |_, place, plane| self.arriving(self.penumbra.pixel(place), plane))
     }
 
-    /// The same of places anywhere behind what was added so far: each point's own ray is looked up.
+    /// The same of places anywhere behind what was added so far: each point's own ray is looked up. Points count by what polygons let
+    /// through from each to each place, `visible`, where that is known: those that are seen past the edge of a polygon may be those that a
+    /// volume hides, or those that it does not.
     #[inline(always)]
-    pub(crate) fn beside<S: Simd>(&self, simd: S, places: &Places<S>, wanted: &[f32; MAX_LANES]) -> Soft<S> {
-        self.soft(simd, places, wanted, |place, plane| self.come_to(place, plane))
+    pub(crate) fn beside<S: Simd>(
+        &self,
+        simd: S,
+        places: &Places<S>,
+        wanted: &[f32; MAX_LANES],
+        visible: Option<&[f32]>,
+    ) -> Soft<S> {
+        let count = self.penumbra.count();
+        let seen = |lane: usize| visible.map(|all| &all[lane * count..][..count]);
+        let shares = |lane| seen(lane).filter(|own| own.iter().any(|v| *v > 0.0)).unwrap_or(&self.penumbra.shares);
+        self.soft(simd, places, wanted, |lane, place, plane| self.come_to(place, plane, shares(lane)))
     }
 
     #[inline(always)]
@@ -185,7 +196,7 @@ impl SoftBuffer {
         simd: S,
         places: &Places<S>,
         wanted: &[f32; MAX_LANES],
-        arriving: impl Fn(DVec3, usize) -> [f32; 2],
+        arriving: impl Fn(usize, DVec3, usize) -> [f32; 2],
     ) -> Soft<S> {
         let mut at = [[0.0; MAX_LANES]; 3];
         for a in 0..3 {
@@ -199,7 +210,7 @@ impl SoftBuffer {
                     (share[p][lane], rest[p][lane]) = (share[0][lane], rest[0][lane]);
                     continue;
                 }
-                let [soft, hard] = arriving(place, p);
+                let [soft, hard] = arriving(lane, place, p);
                 let changed = (soft - hard).abs() / soft.max(hard).max(f32::MIN_POSITIVE);
                 share[p][lane] = (1.0 - changed / CHANGED).max(0.0);
                 rest[p][lane] = (1.0 - share[p][lane]) * soft;
@@ -209,15 +220,15 @@ impl SoftBuffer {
         Soft { share: share.map(load), rest: rest.map(load) }
     }
 
-    /// Optical depth of what arrives at a place and of the centre's light alone, ray by ray.
-    fn come_to(&self, place: DVec3, plane: usize) -> [f32; 2] {
+    /// Optical depth of what arrives at a place and of the centre's light alone, ray by ray, points by these shares.
+    fn come_to(&self, place: DVec3, plane: usize, shares: &[f32]) -> [f32; 2] {
         if !self.penumbra.is_behind(place.z) {
             return [0.0; 2];
         }
         let pixel = self.penumbra.pixel(place);
         let length = self.stretch(pixel);
         let (mut through, mut all) = (0.0, 0.0);
-        for (point, share) in self.penumbra.shares.iter().enumerate() {
+        for (point, share) in shares.iter().enumerate() {
             let Shift { scale, start } = self.penumbra.shift(point, place.z).inverse();
             let own = [0, 1].map(|a| pixel[a] * (1.0 + scale) + start[a]);
             through += share * self.through(own, [point + 1, plane], length);

@@ -146,9 +146,15 @@ impl<'a> SplatSheets<'a> {
             let mut volumes = vec![[1.0; 3]; ids.len()];
             volumes.par_chunks_mut(CHUNK).zip(ids.par_chunks(CHUNK)).for_each(|(out, ids)| {
                 let places: Vec<Vec3> = ids.iter().map(|id| self.places[*id as usize]).collect();
-                pulp::Arch::new().dispatch(ThroughVolumes { of, frame: &self.frame, places: &places, out });
-                for (out, place) in out.iter_mut().zip(places).filter(|_| depths.is_some()) {
-                    let visible = depths.map_or(1.0, |of| of.visibility(self.frame.world(place.as_dvec3()), None));
+                let seen = |of: &LightDepths| -> Vec<f32> {
+                    places.iter().flat_map(|p| of.visible(self.frame.world(p.as_dvec3()), None)).collect()
+                };
+                let visible = depths.map(seen);
+                let work = ThroughVolumes { of, frame: &self.frame, places: &places, visible: visible.as_deref(), out };
+                pulp::Arch::new().dispatch(work);
+                let Some(visible) = visible else { return };
+                for (out, points) in out.iter_mut().zip(visible.chunks_exact(visible.len() / places.len())) {
+                    let visible: f32 = points.iter().sum();
                     *out = out.map(|t| t * visible);
                 }
             });

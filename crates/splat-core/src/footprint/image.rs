@@ -122,7 +122,10 @@ impl FootprintImage {
     pub fn bytes(&self) -> u64 {
         self.levels.iter().map(|level| size_of_val(&*level.texels) as u64).sum()
     }
+}
 
+#[cfg(feature = "raster")]
+impl FootprintImage {
     /// Which level a pixel sees that is so wide, in units of the semi-axes: its texels are about as wide as the pixel. The number of levels
     /// is that of the formula.
     pub(crate) fn level(&self, pixel: f32) -> f32 {

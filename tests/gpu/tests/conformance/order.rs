@@ -150,7 +150,7 @@ fn parts_joined_are_the_order_of_all() {
 }
 
 #[test]
-fn steps_submitted_one_by_one_or_in_batches_give_the_same() {
+fn ou8_ou9_steps_submitted_one_by_one_or_in_batches_give_the_same() {
     // Validation follows one command buffer, so that only what it does not watch is submitted in parts.
     let (cloud, camera) = (cloud(40_000, DVec3::ZERO), camera(DVec3::ZERO, Projection::Perspective { fov_y: 0.9 }));
     let params = Params { exact: true, ..Params::default() };
@@ -162,7 +162,7 @@ fn steps_submitted_one_by_one_or_in_batches_give_the_same() {
     let watched = open().unwrap().run(&recorded.recording, &inputs).unwrap();
     let mut ash = gpu_ash::Device::open(&adapter(), Validation::Off).unwrap().prepare(&recorded.recording).unwrap();
     let mut wgpu = gpu_wgpu::Device::open(&adapter(), Validation::Off).unwrap().prepare(&recorded.recording).unwrap();
-    for run in 0..3 {
+    for run in 0..10 {
         for found in [ash.run(&inputs).unwrap(), wgpu.run(&inputs).unwrap()] {
             assert!(read.iter().all(|b| found.bytes(*b) == watched.bytes(*b)), "run {run}");
         }

@@ -63,7 +63,7 @@ fn on_device(device: &mut Device, deposits: &Deposits, most: Capacities) -> (Sha
 const ANY: Capacities = Capacities { entries: u32::MAX, cells: u32::MAX, channels: 1 };
 
 #[test]
-fn the_lists_are_the_cpu_s_bit_for_bit() {
+fn ou6_the_lists_are_the_cpu_s_bit_for_bit() {
     let mut device = open().unwrap();
     let far = DVec3::new(1e7, -3e6, 5e6);
     let beam = Light {
