@@ -153,6 +153,16 @@ fn bi36_openexr_without_colours_deep_cropped_or_with_what_is_no_radiance() {
 }
 
 #[test]
+fn bi36_openexr_whose_tiles_are_said_to_be_huge_is_refused_before_they_take_room() {
+    let mut content = exr(Compression::PIZ, Blocks::Tiles(Vec2(8, 4)));
+    let name = b"tiledesc\0";
+    let at = content.windows(name.len()).position(|w| w == name).unwrap() + name.len() + 4;
+    content[at..at + 8].copy_from_slice(&[[0, 0, 1, 0], [0, 0, 1, 0]].concat());
+    let error = bytes("a.exr", &content, &ReadParams::default(), None).unwrap_err();
+    assert!(error.fault == Fault::Limit && error.to_string().contains("a packed tile"), "{error}");
+}
+
+#[test]
 fn png_of_a_display_becomes_linear_radiance() {
     // IEC 61966-2-1.
     let linear = |v: f64| if v <= 0.04045 { v / 12.92 } else { ((v + 0.055) / 1.055).powf(2.4) };

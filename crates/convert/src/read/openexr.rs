@@ -6,7 +6,7 @@ use super::input::{check_packed, reserve};
 use super::reading::Reading;
 use crate::error::{Place, ReadError, escaped};
 use ::exr::math::Vec2;
-use ::exr::meta::MetaData;
+use ::exr::meta::{BlockDescription, MetaData};
 use ::exr::meta::header::Header;
 use ::exr::prelude::{ReadChannels, ReadLayers, ReadSpecificChannel};
 use splat_core::RadianceImage;
@@ -22,6 +22,7 @@ pub(super) fn read(content: &[u8], reading: &mut Reading<'_>) -> Result<Radiance
     let header = first_in_color(&meta)?;
     let (size, has_alpha) = (checked_size(header)?, header.channels.list.iter().any(|c| c.name.to_string() == ALPHA));
     check_packed(check_image(size, reading.params)?, content.len() as u64, "the packed image")?;
+    meta.headers.iter().try_for_each(|header| check_packed(block_bytes(header), content.len() as u64, "a packed tile"))?;
     // Asked for first, where an allocator that has no room can still be told.
     let mut room: Vec<[f32; 3]> = Vec::new();
     reserve(&mut room, size[0] as usize * size[1] as usize)?;
@@ -92,6 +93,16 @@ fn first_in_color(meta: &MetaData) -> Result<&Header, ReadError> {
         ));
     };
     Ok(header)
+}
+
+/// Most bytes of the tiles or groups of scanlines of a part: the decoder takes room for as many as one says that it has. Tiles may be larger than
+/// the image.
+fn block_bytes(header: &Header) -> u64 {
+    let [width, height] = match header.blocks {
+        BlockDescription::Tiles(tiles) => [tiles.tile_size.0, tiles.tile_size.1],
+        BlockDescription::ScanLines => [header.layer_size.0, header.compression.scan_lines_per_block()],
+    };
+    [width, height].iter().fold(header.channels.bytes_per_pixel as u64, |bytes, n| bytes.saturating_mul(*n as u64))
 }
 
 /// Width and height of an image that is whole.
