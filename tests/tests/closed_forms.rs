@@ -44,13 +44,33 @@ fn slab_in_perspective_follows_the_length_of_its_rays() {
     }
 }
 
-/// A slab between a slanted directional light and a wall.
-fn shadow(tau: f64, cells: &str) -> (f64, f64) {
+/// A border across cells, and one beside all that is seen.
+#[test]
+fn what_a_cut_leaves_of_a_slab_and_a_ball_has_its_optical_depth_by_every_technique() {
+    let clip = "clip = [{ normal = [0, 0, 2], point = [9, 0, 0.0875] }, { box = [[-1.5, -1.5, -9], [1.5, 1.5, 9]] }]\n";
+    let ball = format!(
+        "{}[[object]]\nname = 'ball'\n\
+         medium_ball = {{ center = [0, 0, 0], radius = 8, extinction = 0.25, spacing = 0.4 }}\n",
+        parallel_view(2.0, 96)
+    );
+    let cases = [(slab(2.0, 0), 4.0 * 0.3375, "the slab"), (ball, 0.25 * (8.0 + 0.0875), "the ball")];
+    for (text, tau, what) in cases {
+        for (technique, most) in [("points", 2e-5), ("reference", 2e-5), ("sheets", 1e-3), ("particles", 4e-3)] {
+            let picture = draw(&format!("{text}{clip}[render]\ntechnique = '{technique}'\n"), &[]);
+            let (mean, _) = mean_and_ripple(&window(&picture.channel("A"), 96, 24..72, 24..72));
+            let error = (1.0 - mean - (-tau).exp()).abs();
+            assert!(error < most, "{technique}: {what} is off by {error:e}");
+        }
+    }
+}
+
+/// A slab, cut as `clip` says, between a slanted directional light and a wall.
+fn shadow(tau: f64, cells: &str, clip: &str) -> (f64, f64) {
     let text = format!(
         "{}[render]\nlayers = ['shadow']\n{cells}\n\
          [[light]]\nkind = 'directional'\ndirection = [0, -1, -1]\nirradiance = [1, 1, 1]\n\
          [[object]]\nname = 'slab'\n\
-         medium_box = {{ min = [-3, 0.8, 0.5], max = [3, 5, 0.9], extinction = {:?}, spacing = 0.05 }}\n\
+         medium_box = {{ min = [-3, 0.8, 0.5], max = [3, 5, 0.9], extinction = {:?}, spacing = 0.05 }}\n{clip}\n\
          [[object]]\nname = 'wall'\n\
          rectangle = {{ center = [0, 0, -1], u = [1.5, 0, 0], v = [0, 1.5, 0], spacing = 0.04 }}\n",
         parallel_view(2.0, 96),
@@ -63,16 +83,19 @@ fn shadow(tau: f64, cells: &str) -> (f64, f64) {
 #[test]
 fn shadow_of_a_slab_has_the_transmittance_of_its_optical_depth() {
     for tau in [0.01f64, 1.0, 5.0] {
-        let (mean, ripple) = shadow(tau, "");
+        let (mean, ripple) = shadow(tau, "", "");
         let error = (mean - (-tau).exp()).abs();
         assert!(error < 1e-4, "τ {tau}: mean off by {error:e}");
         assert!(ripple <= 1e-2, "τ {tau}: ripple {ripple:e}");
     }
+    let (mean, _) = shadow(2.0, "", "clip = [{ normal = [0, 0, -1], point = [0, 0, 0.67] }]");
+    let error = (mean - (-2.0 * 0.23 / 0.4f64).exp()).abs();
+    assert!(error < 1e-4, "cut: mean off by {error:e}");
 }
 
 #[test]
 fn ripple_of_a_shadow_falls_with_the_size_of_its_table() {
-    let ripple = |cells: u32| shadow(1.0, &format!("shadow = {{ cells = {cells} }}")).1;
+    let ripple = |cells: u32| shadow(1.0, &format!("shadow = {{ cells = {cells} }}"), "").1;
     let (coarse, fine) = (ripple(48), ripple(192));
     assert!(fine < coarse && fine < 1e-2, "48 cells {coarse:e}, 192 cells {fine:e}");
 }

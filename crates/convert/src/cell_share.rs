@@ -1,7 +1,7 @@
 //! How much of a lattice's cell lies within regions: the volume of a cube below planes, in closed form.
 
-use splat_core::glam::DVec3;
-use splat_core::{Clip, Grid};
+use splat_core::Clip;
+use splat_core::glam::{DMat3, DVec3};
 
 /// Components of a plane's normal below this part of the largest do not tilt it.
 const FLAT: f64 = 1e-6;
@@ -13,9 +13,9 @@ pub(crate) struct CellShares {
 }
 
 impl CellShares {
-    pub(crate) fn new(clips: &[Clip], lattice: &Grid) -> Self {
-        let of_lattice =
-            |(normal, offset): (DVec3, f64)| (lattice.axes.transpose() * normal, offset - normal.dot(lattice.origin));
+    /// Of a lattice whose point 0 is `origin` and whose steps are the columns of `axes`.
+    pub(crate) fn new(clips: &[Clip], origin: DVec3, axes: DMat3) -> Self {
+        let of_lattice = |(normal, offset): (DVec3, f64)| (axes.transpose() * normal, offset - normal.dot(origin));
         Self { planes: clips.iter().flat_map(Clip::half_spaces).map(of_lattice).collect() }
     }
 
@@ -55,7 +55,7 @@ fn below(normal: DVec3, distance: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use splat_core::glam::DMat3;
+    use splat_core::Grid;
 
     #[test]
     fn shares_of_a_cube_are_those_of_closed_forms() {
@@ -87,7 +87,7 @@ mod tests {
         let axes = DMat3::from_cols(DVec3::new(0.5, 0.1, 0.0), DVec3::new(0.0, 2.0, 0.0), DVec3::new(0.3, 0.0, 1.0));
         let grid = Grid { origin: DVec3::new(1e6, 0.0, 0.0), axes, dims: [4; 3], values: vec![0.0; 64] };
         let middle = grid.position(2, 1, 3);
-        let shares = CellShares::new(&[Clip::HalfSpace { normal: DVec3::Y, offset: middle.y }], &grid);
+        let shares = CellShares::new(&[Clip::HalfSpace { normal: DVec3::Y, offset: middle.y }], grid.origin, axes);
         assert!((shares.of(DVec3::new(2.0, 1.0, 3.0)) - 0.5).abs() < 1e-9);
         assert_eq!([shares.of(DVec3::new(2.0, 0.0, 3.0)), shares.of(DVec3::new(2.0, 3.0, 3.0))], [1.0, 0.0]);
     }

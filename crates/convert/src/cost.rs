@@ -8,7 +8,7 @@
 //! | volume | cells with extinction; where steps are split voxels with extinction, times the factors | where none is split |
 //! | zero set | 2·A/h², A from a mesh of 48 cells a side | within some ten percent |
 //! | density, procedural cloud | lattice points times the share of a coarse lattice that is above zero | within some percent |
-//! | box, ball, parallelogram | cells; of a ball π/6 of them | yes; a ball within some percent |
+//! | box, ball, parallelogram | cells, those that a cut leaves; of a ball π/6 of all | yes; a ball within some percent, one that is cut at most |
 //!
 //! `at_most` holds always: memory that is not to be exceeded is planned with it.
 
@@ -24,7 +24,7 @@ use crate::{ConvertError, DensityParams, MeshParams, SplatParams, VolumeParams, 
 #[cfg(feature = "surfels")]
 use crate::{MatterParams, RawPoints, SurfelParams, matter, surfels};
 use splat_core::{
-    DAabb, Grid, Mesh, ScalarField, TransferFunction,
+    Clip, DAabb, Grid, Mesh, ScalarField, TransferFunction,
     glam::{DMat3, DVec3},
 };
 
@@ -192,15 +192,21 @@ pub fn procedural(shape: &CloudShape, spacing: f64, params: &VolumeParams) -> Re
 ///
 /// # Errors
 /// As the conversion.
-pub fn medium(medium: &HomogeneousMedium, params: &SplatParams) -> Result<Prediction, ConvertError> {
-    let counts = Lattice::new(medium, params)?.counts;
-    let cells = if medium.extinction > 0.0 { counts.iter().product::<u64>() as f64 } else { 0.0 };
+pub fn medium(medium: &HomogeneousMedium, clips: &[Clip], params: &SplatParams) -> Result<Prediction, ConvertError> {
+    let lattice = Lattice::new(medium, params)?;
+    let cells = if medium.extinction > 0.0 { lattice.counts.iter().product::<u64>() as f64 } else { 0.0 };
+    let kept = if clips.is_empty() || cells == 0.0 {
+        cells
+    } else {
+        let cut = lattice.cut(clips);
+        lattice.offsets().filter(|offset| cut(*offset) > 0.0).count() as f64
+    };
     Ok(match medium.body {
-        MediumBody::Box(_) => Prediction::exact(cells, Wanted::default()),
+        MediumBody::Box(_) => Prediction::exact(kept, Wanted::default()),
         MediumBody::Ball { .. } => {
             // Cells that the surface cuts count whole: a shell of about half a cell.
             let inside = std::f64::consts::PI / 6.0 * (libm::cbrt(cells) + 1.0).powi(3);
-            Prediction::new(inside.min(cells), Some(cells), Wanted::default())
+            Prediction::new(inside.min(kept), Some(kept), Wanted::default())
         }
     })
 }

@@ -56,7 +56,7 @@ impl<'a> Keep<'a> {
             ],
             _ => [f32::INFINITY, f32::NEG_INFINITY],
         };
-        let cut = (!params.clip.is_empty()).then(|| CellShares::new(&params.clip, lattice));
+        let cut = (!params.clip.is_empty()).then(|| CellShares::new(&params.clip, lattice.origin, lattice.axes));
         Self { lattice, threshold, support, bricks: Bricks::new(lattice, &classes), classes, cut }
     }
 

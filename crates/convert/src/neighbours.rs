@@ -266,7 +266,8 @@ impl Nearest {
     }
 
     /// Offers one point to all queries.
-    // Integers, minima and signs instead of conditions: so it becomes vector instructions.
+    // Integers, minima and signs instead of conditions, and none that is checked: so it becomes vector instructions. Nothing wraps, as keys are
+    // not negative.
     #[inline(always)]
     fn offer(&mut self, distances: Lanes, id: u32) {
         let mut keys = [0; WIDTH];
@@ -274,7 +275,7 @@ impl Nearest {
         for i in 0..WIDTH {
             let bits = distances[i].to_bits() as i32;
             // Negative where the point is as near as the k-th or nearer.
-            signs |= bits - self.limits[i] - 1;
+            signs |= bits.wrapping_sub(self.limits[i]).wrapping_sub(1);
             keys[i] = i64::from(bits) << 32 | i64::from(id);
         }
         if signs >= 0 {
@@ -287,7 +288,7 @@ impl Nearest {
             let mut signs = 0;
             for i in 0..WIDTH {
                 row[i] = row[i].min(keys[i]).max(above[i]);
-                signs |= keys[i] - above[i];
+                signs |= keys[i].wrapping_sub(above[i]);
             }
             if signs >= 0 {
                 return;

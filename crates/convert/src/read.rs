@@ -294,6 +294,9 @@ fn parse(
     }
     let head = stream.peek(MARK)?;
     let format = format_of(path, head);
+    if reading.params.is_coverage && !matches!(format, Some(Format::Exr | Format::Png)) {
+        return Err(unread::without_coverage(path, head, format));
+    }
     if let Some(error) = unread::by_mark(path, head) {
         return Err(error);
     }

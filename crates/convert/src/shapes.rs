@@ -4,11 +4,12 @@
 //! ray is the closed form convolved with the kernel. For tests, and for scenes that want just a slab of fog.
 
 use crate::borders::Borders;
+use crate::cell_share::CellShares;
 use crate::columns::Wanted;
 use crate::footprints::choose_by_place;
 use crate::{ConvertError, SplatParams, mesh_points};
 use splat_core::glam::{DMat3, DVec3, Vec3};
-use splat_core::{Cloud, DAabb, Grid, Splat, SplatKind, optics};
+use splat_core::{Clip, Cloud, DAabb, Grid, Splat, SplatKind, optics};
 
 /// Sub-samples along each axis of a cell that a ball's surface cuts.
 const SUBDIVISION: i32 = 8;
@@ -48,23 +49,29 @@ impl MediumBody {
     }
 }
 
-/// A homogeneous medium as splats. Cells that the surface of a ball cuts count with the share of their volume inside, and all
-/// together with the volume 4/3·πr³ exactly.
+/// A homogeneous medium as splats, of which all regions of `clips` keep something. Cells that the surface of a ball cuts count with the
+/// share of their volume inside, and all together, before they are cut, with the volume 4/3·πr³ exactly; cells that a region cuts
+/// count with the share of them that is kept.
 ///
 /// # Errors
 /// [`ConvertError::Parameter`] for an empty box, a spacing or an extinction out of range, [`ConvertError::Limit`].
-pub fn medium(medium: &HomogeneousMedium, params: &SplatParams) -> Result<Cloud, ConvertError> {
+pub fn medium(medium: &HomogeneousMedium, clips: &[Clip], params: &SplatParams) -> Result<Cloud, ConvertError> {
     let lattice = Lattice::new(medium, params)?;
-    let MediumBody::Ball { radius, .. } = medium.body else { return lattice.fill(params, |_| 1.0) };
-    let mut cloud = lattice.fill(params, |offset| share_in_ball(offset, radius, lattice.step))?;
+    let cut = lattice.cut(clips);
+    let MediumBody::Ball { radius, .. } = medium.body else { return lattice.fill(params, |offset| cut(offset)) };
+    let in_ball = |offset| share_in_ball(offset, radius, lattice.step);
+    let mut cloud = lattice.fill(params, in_ball)?;
     let total: f64 = cloud.cross_section.iter().map(|k| f64::from(*k)).sum();
     let volume = 4.0 / 3.0 * std::f64::consts::PI * (radius * params.transform.scale).powi(3);
     let correction = (medium.extinction * volume / total) as f32;
+    if !clips.is_empty() {
+        cloud = lattice.fill(params, |offset| in_ball(offset) * cut(offset))?;
+    }
     cloud.cross_section.iter_mut().for_each(|k| *k *= correction);
     Ok(cloud)
 }
 
-/// The same as a volume: its extinction (1/world unit) on a lattice of cells that fill its bounds, before the transform of
+/// The same, uncut, as a volume: its extinction (1/world unit) on a lattice of cells that fill its bounds, before the transform of
 /// `params`. A cell that the surface of a ball cuts has the share that lies inside.
 ///
 /// # Errors
@@ -182,6 +189,12 @@ impl Lattice {
         Ok(Self { step, counts: counts.map(|n| n as u64), center: (min + max) * 0.5, extinction })
     }
 
+    /// The share of the cell around an offset from the middle of the box that all of the regions keep.
+    pub(crate) fn cut(&self, clips: &[Clip]) -> impl Fn(DVec3) -> f64 + use<> {
+        let (shares, step) = (CellShares::new(clips, self.center, DMat3::from_diagonal(self.step)), self.step);
+        move |offset| shares.of(offset / step)
+    }
+
     /// The extinction of each cell at its middle, times `share(offset)`.
     fn grid(&self, share: impl Fn(DVec3) -> f64) -> Grid {
         let dims = self.counts.map(|n| n as usize);
@@ -204,21 +217,22 @@ impl Lattice {
         let volume = self.step.element_product() * scale.powi(3);
         let splat = Splat { radius: params.radius(self.step.max_element() * scale) as f32, ..template(params) };
         let mut cloud = Cloud::new(params.transform.apply(self.center));
-        let middle = DVec3::from_array(self.counts.map(|n| 0.5 * n as f64));
-        for k in 0..self.counts[2] {
-            for j in 0..self.counts[1] {
-                for i in 0..self.counts[0] {
-                    let cell = DVec3::new(i as f64 + 0.5, j as f64 + 0.5, k as f64 + 0.5);
-                    let offset = (cell - middle) * self.step;
-                    let cross_section = (self.extinction * volume * share(offset)) as f32;
-                    if cross_section > 0.0 {
-                        let position: Vec3 = params.transform.rotate(offset * scale).as_vec3();
-                        cloud.push(&Splat { position, cross_section, ..splat });
-                    }
-                }
+        for offset in self.offsets() {
+            let cross_section = (self.extinction * volume * share(offset)) as f32;
+            if cross_section > 0.0 {
+                let position: Vec3 = params.transform.rotate(offset * scale).as_vec3();
+                cloud.push(&Splat { position, cross_section, ..splat });
             }
         }
         Ok(cloud)
+    }
+
+    /// The middles of the cells, from the middle of the box.
+    pub(crate) fn offsets(&self) -> impl Iterator<Item = DVec3> {
+        let middle = DVec3::from_array(self.counts.map(|n| 0.5 * n as f64));
+        let [nx, ny, nz] = self.counts;
+        let cells = (0..nz).flat_map(move |k| (0..ny).flat_map(move |j| (0..nx).map(move |i| [i, j, k])));
+        cells.map(move |cell| (DVec3::from_array(cell.map(|n| n as f64 + 0.5)) - middle) * self.step)
     }
 }
 
@@ -266,9 +280,9 @@ mod tests {
     #[test]
     fn cross_sections_sum_to_extinction_times_volume() {
         let p = SplatParams::default();
-        let slab = medium(&SLAB, &p).unwrap();
+        let slab = medium(&SLAB, &[], &p).unwrap();
         assert!((total(&slab) / 3.0 - 1.0).abs() < 1e-6, "{}", total(&slab));
-        let ball = medium(&BALL, &p).unwrap();
+        let ball = medium(&BALL, &[], &p).unwrap();
         let exact = 2.0 * 4.0 / 3.0 * std::f64::consts::PI * 0.125;
         assert!((total(&ball) / exact - 1.0).abs() < 1e-6, "{}", total(&ball));
     }
@@ -292,6 +306,24 @@ mod tests {
     }
 
     #[test]
+    fn a_cut_leaves_the_part_of_the_volume_that_is_within() {
+        let p = SplatParams::default();
+        let oblique = Clip::HalfSpace { normal: DVec3::new(1.0, 2.0, 0.0), offset: 2.0 };
+        // Half of the slab, by symmetry; of it what lies below a plane that crosses cells.
+        let slab = medium(&SLAB, &[oblique], &p).unwrap();
+        assert!((total(&slab) / 1.5 - 1.0).abs() < 1e-6, "{}", total(&slab));
+        let low = Clip::Box(DAabb::new(DVec3::splat(-1.0), DVec3::new(3.0, 3.0, 0.11)));
+        let both = medium(&SLAB, &[oblique, low], &p).unwrap();
+        assert!((total(&both) / (1.5 * 0.11 / 0.3) - 1.0).abs() < 1e-6, "{}", total(&both));
+        // A cap of height h of a ball has the volume πh²(r − h/3).
+        let cap = medium(&BALL, &[Clip::HalfSpace { normal: DVec3::Z, offset: 0.73 }], &p).unwrap();
+        let exact = 2.0 * std::f64::consts::PI * 0.23f64.powi(2) * (0.5 - 0.23 / 3.0);
+        assert!((total(&cap) / exact - 1.0).abs() < 5e-3, "{} {exact}", total(&cap));
+        let nothing = [Clip::HalfSpace { normal: DVec3::Z, offset: -1.0 }];
+        assert!(medium(&BALL, &nothing, &p).unwrap().is_empty() && medium(&SLAB, &nothing, &p).unwrap().is_empty());
+    }
+
+    #[test]
     fn rectangle_carries_the_optical_depth_of_its_area() {
         let p = SplatParams::default();
         let flat = Rectangle { center: DVec3::ZERO, u: DVec3::X, v: DVec3::Z * 2.0, spacing: 0.05 };
@@ -305,9 +337,9 @@ mod tests {
     fn cv10_a_spacing_beyond_the_budget_is_refused() {
         let p = SplatParams { limits: splat_core::Limits::elements(1000), ..SplatParams::default() };
         for spacing in [1e-9, 0.0, f64::INFINITY, f64::NAN] {
-            assert!(medium(&HomogeneousMedium { spacing, ..SLAB }, &p).is_err(), "{spacing}");
+            assert!(medium(&HomogeneousMedium { spacing, ..SLAB }, &[], &p).is_err(), "{spacing}");
         }
         let body = MediumBody::Box(DAabb::new(DVec3::ONE, DVec3::ZERO));
-        assert!(medium(&HomogeneousMedium { body, ..BALL }, &SplatParams::default()).is_err());
+        assert!(medium(&HomogeneousMedium { body, ..BALL }, &[], &SplatParams::default()).is_err());
     }
 }

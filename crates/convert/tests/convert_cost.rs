@@ -104,7 +104,9 @@ fn closed_shapes_are_counted() {
     let (low, high) = (DVec3::ZERO, DVec3::new(2.0, 1.0, 0.3));
     for extinction in [5.0, 0.0] {
         let slab = HomogeneousMedium { body: MediumBody::Box(DAabb::new(low, high)), extinction, spacing: 0.07 };
-        exact(cost::medium(&slab, &p).unwrap(), &medium(&slab, &p).unwrap());
+        for clips in [&[][..], &[Clip::HalfSpace { normal: DVec3::ONE, offset: 1.3 }]] {
+            exact(cost::medium(&slab, clips, &p).unwrap(), &medium(&slab, clips, &p).unwrap());
+        }
     }
     let (u, v) = (DVec3::X, DVec3::Z * 2.0);
     for opacity in [0.75, 1.0] {
@@ -114,7 +116,7 @@ fn closed_shapes_are_counted() {
     for spacing in [0.03, 0.1] {
         let ball =
             HomogeneousMedium { body: MediumBody::Ball { center: DVec3::ONE, radius: 0.8 }, extinction: 2.0, spacing };
-        close(cost::medium(&ball, &p).unwrap(), &medium(&ball, &p).unwrap(), 0.06);
+        close(cost::medium(&ball, &[], &p).unwrap(), &medium(&ball, &[], &p).unwrap(), 0.06);
     }
 }
 

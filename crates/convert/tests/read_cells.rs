@@ -226,7 +226,7 @@ fn what_is_wrong_in_one_of_several_pieces_is_named() {
         (
             "\"Float32\" Name=\"density\"",
             "\"Float64\" Name=\"density\"",
-            "expected 1 components of type Float32, as the array has in another Piece, found '1 of Float64'",
+            "expected 1 component of type Float32, as the array has in another Piece, found '1 of Float64'",
         ),
         ("1 2 4 3 5 0 1 2", "1 2 4 3 6 0 1 2", "expected points of cell 0 among the 6 that there are"),
         ("14 5", "14 42", "found a polyhedron (type 42) at cell 1"),

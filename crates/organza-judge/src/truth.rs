@@ -130,8 +130,9 @@ pub fn truth(
         splat_core::Error::Cancelled => Error::Cancelled,
         other => Error::Internal(other.to_string()),
     };
+    let densities: Vec<_> = bodies.iter().map(Body::density).collect::<Result<_, _>>().map_err(fault)?;
     let traced = reference::Scene {
-        media: bodies.iter().filter_map(|b| b.medium().transpose()).collect::<Result<_, _>>().map_err(fault)?,
+        media: bodies.iter().zip(&densities).filter_map(|(body, whole)| body.medium(whole.as_ref()?)).collect(),
         surfaces: bodies.iter().filter_map(Body::surface).collect(),
         lights,
         unshadowed: scene.lights.iter().map(|l| !l.shadow).collect(),

@@ -14,6 +14,8 @@ use splat_core::{LayerData, Layers};
 
 /// Largest finite f16.
 const LARGEST_HALF: f32 = 65504.0;
+/// Pictures of longer sides than this are packed by several threads.
+const LONGEST_ALONE: u32 = 256;
 /// Type of a text in the file layout of OpenEXR, which limits neither its length nor its bytes.
 const TEXT: &str = "string";
 
@@ -36,7 +38,11 @@ pub(super) fn encode(
     let size = Vec2(layers.size[0] as usize, layers.size[1] as usize);
     let layer = Layer::new(size, attributes, Encoding::SMALL_LOSSLESS, AnyChannels::sort(channels));
     let mut bytes = std::io::Cursor::new(Vec::new());
-    Image::from_layer(layer).write().to_buffered(&mut bytes).map_err(fail)?;
+    let image = Image::from_layer(layer);
+    // Threads of its own are started for each file: of small pictures, such as an animation's, they cost more than they give.
+    let writer = image.write();
+    let writer = if layers.size[0].max(layers.size[1]) <= LONGEST_ALONE { writer.non_parallel() } else { writer };
+    writer.to_buffered(&mut bytes).map_err(fail)?;
     let mut bytes = bytes.into_inner();
     sort_attributes(&mut bytes).ok_or_else(|| Error::Internal("the EXR header cannot be read back".into()))?;
     Ok(bytes)

@@ -114,13 +114,13 @@ fn images_in(folder: &Path) -> std::io::Result<Vec<String>> {
 fn read_image(at: &At<'_>, path: &Path) -> Result<Arc<FootprintImage>, Error> {
     let most = u64::from(LONGEST_SIDE) * u64::from(LONGEST_SIDE) * 16;
     let params = ReadParams { is_coverage: true, limits: Limits::bytes(most), ..ReadParams::default() };
-    let (loaded, notes) = file(path, &params, None)
+    let (loaded, _) = file(path, &params, None)
         .map_err(|e| at.error(format!("{}{}: expected {}, found {}", e.file, e.place, e.expected, e.found), e.hint))?;
     let refuse = |found: String, hint: &str| {
         Err(at.error(format!("expected an image of coverage, {} has {found}", printable(path)), hint))
     };
     let image = match loaded {
-        Loaded::Image(image) if notes.format != "Hdr" => image,
+        Loaded::Image(image) => image,
         _ => return refuse("something else".into(), "name a PNG or OpenEXR image"),
     };
     let [width, height] = image.size;

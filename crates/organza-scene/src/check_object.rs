@@ -92,10 +92,6 @@ fn refuse_what_does_not_apply(at: &At<'_>, raw: &RawObject, source: &Source) -> 
     if has_own_spacing && raw.spacing.is_some() {
         return Err(at.key("spacing").error("this source states its own spacing", "move `spacing` into the source"));
     }
-    if matches!(source, Source::Medium(_)) && !raw.clip.is_empty() {
-        let hint = "use a `density`, whose expression may be 1 everywhere";
-        return Err(at.key("clip").error("a homogeneous medium has no `clip`", hint));
-    }
     if raw.slice.is_some() && raw.unit_length.is_some() {
         return Err(at.key("unit_length").error("a slice has no extinction", "its `opacity` is that of one crossing"));
     }

@@ -4,7 +4,10 @@
 use crate::ray::Ray;
 use crate::roots::{RootParams, crossings};
 use glam::{DMat3, DVec3};
-use splat_core::{DAabb, Error, Grid, ScalarField};
+use splat_core::{Clip, DAabb, Error, Grid, ScalarField};
+
+/// Majorant cells along each axis of a density that is cut.
+const CUT_DETAIL: usize = 8;
 
 /// Relative density over space, ≥ 0; the medium multiplies it by its extinction.
 #[derive(Clone, Copy)]
@@ -45,6 +48,13 @@ pub enum Density<'a> {
         bounds: DAabb,
         /// No value in the box exceeds this.
         majorant: f64,
+    },
+    /// Another density where all of these regions keep it, 0 elsewhere.
+    Cut {
+        /// The whole.
+        of: &'a Density<'a>,
+        /// The regions, world space.
+        clips: &'a [Clip],
     },
 }
 
@@ -166,6 +176,7 @@ impl Density<'_> {
             Self::Field { field, bounds, .. } if bounds.contains(p) => field.value(p).max(0.0),
             Self::Inside { field, bounds } if bounds.contains(p) => f64::from(field.value(p) < 0.0),
             Self::Function { function, bounds, .. } if bounds.contains(p) => function(p).max(0.0),
+            Self::Cut { of, clips } if clips.iter().all(|clip| clip.keeps(p)) => of.value(p),
             _ => 0.0,
         }
     }
@@ -177,6 +188,7 @@ impl Density<'_> {
             Self::Field { bounds, .. } | Self::Inside { bounds, .. } | Self::Function { bounds, .. } => *bounds,
             Self::Ball { center, radius } => DAabb::around(*center, DVec3::splat(*radius)),
             Self::Grid(lattice) => DAabb::of_points(lattice.corners()),
+            Self::Cut { of, .. } => of.bounds(),
         }
     }
 
@@ -200,12 +212,19 @@ impl Density<'_> {
             }
             Self::Inside { field, .. } => f64::from(field.bound(middle, reach).is_none_or(|(low, _)| low < 0.0)),
             Self::Function { majorant, .. } => *majorant,
+            Self::Cut { of, clips } => {
+                let may_be_kept = clips.iter().all(|clip| clip.may_keep(middle, reach));
+                if may_be_kept { of.upper(bounds) } else { 0.0 }
+            }
         }
     }
 
     /// Whether the density is a polynomial of degree ≤ 3 between neighbouring [`Density::breaks`].
     pub(crate) fn is_piecewise_cubic(&self) -> bool {
-        !matches!(self, Self::Field { .. } | Self::Function { .. })
+        match self {
+            Self::Cut { of, .. } => of.is_piecewise_cubic(),
+            _ => !matches!(self, Self::Field { .. } | Self::Function { .. }),
+        }
     }
 
     /// Appends the distances in (t0, t1) where the density along the ray is not smooth, in no order.
@@ -222,6 +241,13 @@ impl Density<'_> {
                     out.extend(crossings(*field, ray, a, b, &RootParams::default()).roots);
                 }
             }
+            Self::Cut { of, clips } => {
+                of.breaks(ray, t0, t1, out);
+                // A ray along a border does not cross it: what is divided by 0 is not in the range.
+                let planes = clips.iter().flat_map(Clip::half_spaces);
+                let crossings = planes.map(|(n, offset)| (offset - n.dot(ray.origin)) / n.dot(ray.direction));
+                out.extend(crossings.filter(|t| t0 < *t && *t < t1));
+            }
         }
     }
 
@@ -232,6 +258,7 @@ impl Density<'_> {
             Self::Ball { .. } => [8; 3],
             Self::Field { .. } | Self::Inside { .. } => [32; 3],
             Self::Grid(lattice) => lattice.grid.dims.map(|d| d.div_ceil(4).min(64)),
+            Self::Cut { of, .. } => of.detail().map(|n| n.max(CUT_DETAIL)),
         }
     }
 
@@ -249,6 +276,7 @@ impl Density<'_> {
             {
                 Err(Error::invalid("medium", index, "majorant", majorant, "a finite number ≥ 0"))
             }
+            Self::Cut { of, clips } => clips.iter().try_for_each(Clip::validate).and_then(|()| of.validate(index)),
             _ => Ok(()),
         }
     }

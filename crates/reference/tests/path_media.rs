@@ -7,7 +7,7 @@ use reference::{
     Scene, march_image,
 };
 use splat_core::glam::{DMat3, DVec3};
-use splat_core::{DAabb, Grid};
+use splat_core::{Clip, DAabb, Grid};
 use std::f64::consts::PI;
 
 const WIDE: f64 = 1e6;
@@ -40,6 +40,51 @@ fn blobs(n: usize) -> Grid {
         dims: [n; 3],
         values: (0..n * n * n).map(value).collect(),
     }
+}
+
+/// Half a ball and a slab cut by an oblique plane and a box, against the chords that are left; what lies in a volume between its lattice points is cut likewise.
+#[test]
+fn what_a_cut_leaves_transmits_e_to_the_minus_tau_of_its_chord() {
+    let camera = parallel(DVec3::Z * 3.0, DVec3::ZERO, 2.4, [8, 8]);
+    let (ball, slab) = (Density::Ball { center: DVec3::ZERO, radius: 1.0 }, slab(1.0));
+    let ones = Grid { values: vec![1.0; 64], ..blobs(4) };
+    let cube = Density::Grid(Lattice::new(&ones).unwrap());
+    type Chord = fn(f64, f64) -> [f64; 2];
+    let cases: [(&Density<'_>, Chord); 3] = [
+        (&ball, |x, y| {
+            let half = (1.0 - x * x - y * y).max(0.0).sqrt();
+            [-half, half]
+        }),
+        (&slab, |_, _| [-1.0, 0.0]),
+        (&cube, |x, y| if x.min(y) > 0.0 && x.max(y) < 1.0 { [0.0, 1.0] } else { [0.0, 0.0] }),
+    ];
+    let oblique = Clip::HalfSpace { normal: DVec3::new(1.0, -2.0, 4.0), offset: 0.3 };
+    let boxed = Clip::Box(DAabb::new(DVec3::new(-0.7, -9.0, -0.9), DVec3::new(9.0, 0.8, 0.75)));
+    let mut apart = 0;
+    for (of, chord) in cases {
+        for clips in [&[oblique][..], &[oblique, boxed]] {
+            let medium = Medium::new(Density::Cut { of, clips }, 1.5, 0.0);
+            let scene = Scene { media: vec![medium], background: Some([1.0; 3]), ..Scene::default() };
+            let left = |pixel: usize| {
+                let at = |k: usize| (k as f64 + 0.5) * 0.3 - 1.2;
+                let (x, y) = (at(pixel % 8), -at(pixel / 8));
+                let [near, far] = chord(x, y);
+                let below = (0.3 - x + 2.0 * y) / 4.0;
+                let within = clips.len() == 1 || (x > -0.7 && y < 0.8);
+                let [near, far] = if clips.len() == 1 { [near, far] } else { [near.max(-0.9), far.min(0.75)] };
+                if within { (far.min(below) - near).max(0.0) } else { 0.0 }
+            };
+            let marched = march_image(&scene, &camera, &MarchParams::default(), None).unwrap();
+            let traced = trace(&scene, &camera, &settings(2000, None));
+            for (pixel, found) in marched.radiance.iter().enumerate() {
+                let exact = (-1.5 * left(pixel)).exp();
+                assert!((found[0] - exact).abs() < 1e-6, "pixel {pixel}: {found:?}, expected {exact}");
+                apart += usize::from(left(pixel) > 0.0);
+            }
+            assert_mean(&traced, |pixel| [(-1.5 * left(pixel)).exp(); 3], 4.5, "cut");
+        }
+    }
+    assert!(apart > 60, "{apart} pixels show something");
 }
 
 #[test]

@@ -37,7 +37,11 @@ fn images_are_read_and_refused_with_file_key_and_hint() {
     GrayImage::from_pixel(4, 4, Luma([9])).save(path("grey.png")).unwrap();
     GrayImage::new(4, 4).save(path("black.png")).unwrap();
     GrayImage::from_pixel(4097, 1, Luma([9])).save(path("wide.png")).unwrap();
-    std::fs::write(path("text.png"), "no image").unwrap();
+    for (name, bytes) in
+        [("text.png", &b"no image"[..]), ("text", b"no image"), ("leaf.png.ply", b"ply\n"), ("leaf", b"\xff\xd8\xff")]
+    {
+        std::fs::write(path(name), bytes).unwrap();
+    }
     std::fs::create_dir(path("none")).unwrap();
     std::fs::create_dir(path("some")).unwrap();
     std::fs::copy(path("grey.png"), path("some/b.png")).unwrap();
@@ -55,6 +59,14 @@ fn images_are_read_and_refused_with_file_key_and_hint() {
         ("[{ image = \"black.png\" }]", "", "black.png has no pixel above 0", "alpha"),
         ("[{ image = \"wide.png\" }]", "", "wide.png has 4097 x 1 pixels", "make it smaller"),
         ("[{ image = \"text.png\" }]", "", "text.png", ""),
+        ("[{ image = \"text\" }]", "", "text: expected a PNG or OpenEXR image, found 'no image'", "as PNG"),
+        (
+            "[{ image = \"leaf.png.ply\" }]",
+            "",
+            "expected a PNG or OpenEXR image, found a file that is read as Ply",
+            "as PNG",
+        ),
+        ("[{ image = \"leaf\" }]", "", "leaf: expected a PNG or OpenEXR image, found a JPEG image", "as PNG"),
         ("[{ images = \"none\" }]", "", "expected a folder with PNG or OpenEXR images, found none in \"none\"", ".png"),
         ("[{ image = \"s.toml\" }]", "", "s.toml", ""),
         ("[3, { image = \"grey.png\" }]", "footprint = 1", "a medium has no image as a footprint", "a formula"),

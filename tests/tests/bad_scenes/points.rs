@@ -103,10 +103,3 @@ fn slabs_across_half_vectors_cut_no_volume() {
     let error = try_toml(&text).unwrap_err();
     assert!(error.to_string().contains("`clip`: slabs across half vectors cut no volume"), "{error}");
 }
-
-#[test]
-fn a_homogeneous_medium_is_not_cut() {
-    let ball = "medium_ball = { center = [0, 0, 0], radius = 1, spacing = 0.1, extinction = 1 }";
-    let clip = "clip = [{ box = [[0, 0, 0], [1, 1, 1]] }]";
-    refused("mesh = \"a.ply\"", &format!("{ball}\n{clip}"), "a homogeneous medium has no `clip`");
-}

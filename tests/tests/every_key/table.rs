@@ -173,7 +173,6 @@ pub(super) const SUN: &[&str] = &["light=[{kind='directional', direction=[-2, -3
 
 const OF_THE_TRANSFER: Expected = Refused(2, "are those of its `transfer`");
 const NOT_OF_POINTS: Expected = Refused(2, "`merge_duplicates` belongs to `points`");
-const NO_CLIP: Expected = Refused(2, "a homogeneous medium has no `clip`");
 const RAW: Which = These(&["points", "plain points"]);
 const HOT: &[&str] = &["object.it.points='hot.xyz'", "object.it.color_by={column='heat'}"];
 const MATTER: &[&str] = &["object.it.as='medium'", "object.it.extinction=3"];
@@ -209,8 +208,7 @@ fn objects() -> Vec<Entry> {
             .look(Look::Told)
             .but(These(&["points", "plain points"]), Expected::Changes)
             .but(All, NOT_OF_POINTS),
-        of(All, "object.clip", "object.it.clip=[{normal=[0, 1, 0], point=[0, 0.1, 0]}]")
-            .but(These(&["medium_box", "medium_ball"]), NO_CLIP),
+        of(All, "object.clip", "object.it.clip=[{normal=[0, 1, 0], point=[0, 0.1, 0]}]"),
         of(OPEN, "object.clip.normal", "object.it.clip.0.normal=[1, 0, 0]")
             .with(&["object.it.clip=[{normal=[0, 1, 0], point=[0, 0.1, 0]}]"]),
         of(OPEN, "object.clip.point", "object.it.clip.0.point=[0, -0.1, 0]")

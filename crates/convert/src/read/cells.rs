@@ -94,7 +94,12 @@ pub(super) fn check_count((found, count, what): (u64, usize, &str), place: Place
     if found == count as u64 {
         return Ok(());
     }
-    Err(ReadError::input(place, format!("{count} values, one for each of the {what}"), found.to_string(), HINT))
+    Err(ReadError::input(
+        place,
+        format!("{}, one for each of the {what}", counted(count as u64, "value")),
+        found.to_string(),
+        HINT,
+    ))
 }
 
 /// The field of an array of that name, of points or of cells: one number of each tuple.

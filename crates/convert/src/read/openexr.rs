@@ -16,6 +16,8 @@ const CHANNELS: [&str; 3] = ["R", "G", "B"];
 const ALPHA: &str = "A";
 /// How bright red, green and blue of Rec.709 are.
 const LUMINANCE: [f32; 3] = [0.2126, 0.7152, 0.0722];
+/// Images of longer sides than this are decoded by several threads.
+const LONGEST_ALONE: u32 = 1024;
 
 pub(super) fn read(content: &[u8], reading: &mut Reading<'_>) -> Result<RadianceImage, ReadError> {
     let meta = MetaData::read_from_buffered(Cursor::new(content), false).map_err(damaged)?;
@@ -34,7 +36,7 @@ pub(super) fn read(content: &[u8], reading: &mut Reading<'_>) -> Result<Radiance
         (true, true) => [a; 3],
         (true, false) => [LUMINANCE[0] * r + LUMINANCE[1] * g + LUMINANCE[2] * b; 3],
     };
-    let image = ::exr::prelude::read()
+    let reader = ::exr::prelude::read()
         .no_deep_data()
         .largest_resolution_level()
         .specific_channels()
@@ -49,9 +51,10 @@ pub(super) fn read(content: &[u8], reading: &mut Reading<'_>) -> Result<Radiance
             },
         )
         .first_valid_layer()
-        .all_attributes()
-        .from_buffered(Cursor::new(content))
-        .map_err(damaged)?;
+        .all_attributes();
+    // Its threads are started anew for each file, beside those that read other files.
+    let reader = if size[0].max(size[1]) <= LONGEST_ALONE { reader.non_parallel() } else { reader };
+    let image = reader.from_buffered(Cursor::new(content)).map_err(damaged)?;
     let (width, pixels) = image.layer_data.channel_data.pixels;
     if [width, pixels.len()] != [size[0] as usize, size[0] as usize * size[1] as usize] {
         return Err(refused(

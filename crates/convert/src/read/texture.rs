@@ -101,7 +101,8 @@ impl Texture {
             }
         });
         let [r, g, b, alpha] = self.texels[j as usize * self.size[0] as usize + i as usize];
-        let [r, g, b] = [r, g, b].map(|c| LINEAR[usize::from(c)]);
+        let linear: &[f32; 256] = &LINEAR;
+        let [r, g, b] = [r, g, b].map(|c| linear[usize::from(c)]);
         [r, g, b, f32::from(alpha) / 255.0]
     }
 }

@@ -1,5 +1,6 @@
 //! Formats that are not read, by what they are: their name, and what a person can do.
 
+use super::format::Format;
 use crate::error::{Place, ReadError, escaped};
 use std::path::Path;
 
@@ -96,12 +97,26 @@ fn error(unread: &Unread) -> ReadError {
     ReadError::input(Place::File, "a file of a format that is read", found, unread.hint)
 }
 
+/// The error for a file that is asked for as an image of coverage and is none.
+pub(super) fn without_coverage(path: &Path, head: &[u8], format: Option<Format>) -> ReadError {
+    let found = match (format, by_name(path).or_else(|| marked(head))) {
+        (Some(format), _) => format!("a file that is read as {format:?}"),
+        (None, Some(unread)) => unread.name.to_owned(),
+        (None, None) => first_bytes(head),
+    };
+    ReadError::input(Place::File, "a PNG or OpenEXR image", found, "save it as PNG, or name another file")
+}
+
 /// The error for a file whose first bytes are those of a format that is not read, whatever its name says; of archives the
 /// name tells what they are.
 pub(super) fn by_mark(path: &Path, head: &[u8]) -> Option<ReadError> {
-    let has = |(at, mark): &(usize, &[u8])| head.get(*at..).is_some_and(|rest| rest.starts_with(mark));
-    let marked = UNREAD.iter().find(|u| u.marks.iter().any(has))?;
+    let marked = marked(head)?;
     Some(error(by_name(path).unwrap_or(marked)))
+}
+
+fn marked(head: &[u8]) -> Option<&'static Unread> {
+    let has = |(at, mark): &(usize, &[u8])| head.get(*at..).is_some_and(|rest| rest.starts_with(mark));
+    UNREAD.iter().find(|u| u.marks.iter().any(has))
 }
 
 fn by_name(path: &Path) -> Option<&'static Unread> {
@@ -117,10 +132,14 @@ pub(super) fn refused(path: &Path, head: &[u8]) -> ReadError {
             Place::Byte(0),
             "'ply', 'LASF', 'ASTM-E57', 'NRRD', 'glTF', '# .PCD', '#?', a NIfTI-1, OpenEXR or PNG header, or the extension of a \
             format without a mark",
-            format!("'{}'", escaped(&head[..head.len().min(16)], 16)),
+            first_bytes(head),
             READ,
         )
     })
+}
+
+fn first_bytes(head: &[u8]) -> String {
+    format!("'{}'", escaped(&head[..head.len().min(16)], 16))
 }
 
 #[cfg(test)]

@@ -9,6 +9,7 @@ use super::direction::unit;
 use super::extras::{Extras, UNFIT_HINT};
 use super::text::{Line, Lines, Word};
 use super::{Notes, ReadParams, input, origin};
+use crate::counted::counted;
 use crate::error::{Place, ReadError};
 use crate::raw_points::RawPoints;
 use crate::srgb::linear_from_srgb;
@@ -78,10 +79,10 @@ pub(super) fn read(content: &[u8], params: &ReadParams, notes: &mut Notes) -> Re
     if let Some((announced, place)) = count
         && announced != positions.len() as u64 + points.dropped
     {
-        let found = format!("{} points", positions.len() as u64 + points.dropped);
+        let found = counted(positions.len() as u64 + points.dropped, "point");
         return Err(ReadError::input(
             place,
-            format!("{announced} points, as announced"),
+            format!("{}, as announced", counted(announced, "point")),
             found,
             "the file is truncated",
         ));

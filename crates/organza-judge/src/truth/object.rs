@@ -1,7 +1,7 @@
 //! One object as the path tracer takes it: a density or a mesh in the world.
 
 use convert::read::{Loaded as FileData, ReadParams};
-use convert::{ExpressionField, SplatParams};
+use convert::{Clip, ExpressionField, SplatParams};
 use glam::{DMat3, DQuat, DVec3, Vec3};
 use organza::scene::{Scene, SceneMaterial, SceneObject, Source, VolumeSource};
 use organza::{Error, RenderOptions, expression_field, printable};
@@ -31,6 +31,8 @@ pub(super) enum Body {
 /// A density with its optical properties.
 pub(super) struct MediumBody {
     shape: Shape,
+    /// What it is cut to, world space.
+    clips: Vec<Clip>,
     /// Per channel, where the density is 1.
     extinction: [f64; 3],
     albedo: [f64; 3],
@@ -77,7 +79,6 @@ pub(super) fn body(
             return no("surfaces of measured fields are not path-traced");
         }
         Source::Implicit(_) if !object.clip.is_empty() => return no("open surfaces are not path-traced"),
-        source if source.is_medium() && !object.clip.is_empty() => return no("media that are cut are not path-traced"),
         Source::Mesh(path) => match read(path, 0, options)? {
             FileData::Mesh(mesh) => mesh,
             _ => {
@@ -115,20 +116,26 @@ pub(super) fn body(
 }
 
 impl Body {
-    /// The medium for the tracer, if it is one.
-    pub(super) fn medium(&self) -> Result<Option<Medium<'_>>, splat_core::Error> {
+    /// The density of a medium before it is cut.
+    pub(super) fn density(&self) -> Result<Option<Density<'_>>, splat_core::Error> {
         let Self::Medium(body) = self else { return Ok(None) };
-        let density = match &body.shape {
+        Ok(Some(match &body.shape {
             Shape::Box(bounds) => Density::Box(*bounds),
             Shape::Ball { center, radius } => Density::Ball { center: *center, radius: *radius },
             Shape::Grid(grid) => Density::Grid(Lattice::new(grid)?),
             Shape::Field { field, bounds, majorant } => Density::Field { field, bounds: *bounds, majorant: *majorant },
             Shape::Turned { field, bounds } => Density::Inside { field, bounds: *bounds },
             Shape::Volume(v) => Density::Field { field: &**v, bounds: v.bounds(), majorant: v.most() },
-        };
+        }))
+    }
+
+    /// The medium of this density for the tracer, if it is one.
+    pub(super) fn medium<'a>(&'a self, whole: &'a Density<'a>) -> Option<Medium<'a>> {
+        let Self::Medium(body) = self else { return None };
+        let density = if body.clips.is_empty() { *whole } else { Density::Cut { of: whole, clips: &body.clips } };
         let MediumBody { extinction, albedo, asymmetry, emission, glow, liberty, .. } = *body;
         let color = body.color.as_ref().map(|c| &**c as ColorAt<'_>);
-        Ok(Some(Medium { density, extinction, albedo, asymmetry, emission, glow, color, liberty }))
+        Some(Medium { density, extinction, albedo, asymmetry, emission, glow, color, liberty })
     }
 
     /// The surface for the tracer, if it is one.
@@ -157,7 +164,7 @@ fn liberty(object: &SceneObject, shading: Shading, brightest: f64) -> Liberty {
 fn medium(scene: &Scene, object: &SceneObject, options: &RenderOptions) -> Result<Body, Error> {
     let material = &scene.materials[object.material];
     let m = &material.material;
-    let (shape, extinction) = shape(object, options)?;
+    let ((shape, extinction), clips) = (shape(object, options)?, world_clips(object));
     let asymmetry = f64::from(m.asymmetry);
     let per_channel = m.extinction_rgb.map(|e| extinction * f64::from(e));
     let unlit = m.shading == Shading::Unlit;
@@ -172,7 +179,8 @@ fn medium(scene: &Scene, object: &SceneObject, options: &RenderOptions) -> Resul
         let color = Some(Box::new(move |p: DVec3| source.color(p).map(|c| c / gain)) as Box<_>);
         let glow = per_color.map(|g| g * gain);
         let (albedo, emission) = ([albedo; 3], own);
-        let body = MediumBody { shape, extinction: per_channel, albedo, asymmetry, emission, glow, color, liberty };
+        let extinction = per_channel;
+        let body = MediumBody { shape, clips, extinction, albedo, asymmetry, emission, glow, color, liberty };
         return Ok(Body::Medium(body));
     }
     let color = object.color.unwrap_or(material.color).map(f64::from);
@@ -181,7 +189,18 @@ fn medium(scene: &Scene, object: &SceneObject, options: &RenderOptions) -> Resul
     let emission = if unlit { std::array::from_fn(|c| own[c] + color[c]) } else { ambient(scene, material, scattered) };
     let albedo = scattered.map(|s| s / liberty.gain);
     let (glow, color) = ([0.0; 3], None);
-    Ok(Body::Medium(MediumBody { shape, extinction: per_channel, albedo, asymmetry, emission, glow, color, liberty }))
+    let extinction = per_channel;
+    Ok(Body::Medium(MediumBody { shape, clips, extinction, albedo, asymmetry, emission, glow, color, liberty }))
+}
+
+/// What an object is cut to, in the world.
+fn world_clips(object: &SceneObject) -> Vec<Clip> {
+    let t = &object.transform;
+    let to_world = |(normal, offset): (DVec3, f64)| {
+        let normal = t.rotate(normal);
+        Clip::HalfSpace { normal, offset: offset * t.scale + normal.dot(t.translation) }
+    };
+    object.clip.iter().flat_map(Clip::half_spaces).map(to_world).collect()
 }
 
 /// The density of a medium and the extinction where it is 1.

@@ -55,7 +55,7 @@ impl<'i> Outline<'i> {
             Input::Procedural(shape, ..) => {
                 shape.ellipsoids.iter().flat_map(|e| corners(DAabb::around(e.center, e.radii))).collect()
             }
-            Input::Medium(medium, _) => corners(medium.body.bounds()),
+            Input::Medium(medium, ..) => corners(medium.body.bounds()),
             Input::Rectangle(r, ..) => {
                 [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)].map(|(s, t)| r.center + r.u * s + r.v * t).to_vec()
             }

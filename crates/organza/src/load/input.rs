@@ -9,9 +9,9 @@ use crate::scene::{
 };
 use crate::statistics::ObjectData;
 use convert::{
-    ClippedField, CloudShape, Density, DensityParams, ExpressionField, GridField, HomogeneousMedium, Interpolation,
-    MatterParams, MediumBody, MeshParams, MpuParams, RawPoints, Section, SharedField, ShownPoints, SplatParams,
-    SurfelParams, VolumeParams,
+    Clip, ClippedField, CloudShape, Density, DensityParams, ExpressionField, GridField, HomogeneousMedium,
+    Interpolation, MatterParams, MediumBody, MeshParams, MpuParams, RawPoints, Section, SharedField, ShownPoints,
+    SplatParams, SurfelParams, VolumeParams,
 };
 use pbsr::{BoundedExtinction, Matter};
 use splat_core::{DAabb, Grid, Mesh, TransferFunction};
@@ -32,7 +32,7 @@ pub(super) enum Input<'a> {
     Surface(SharedField, DAabb, MeshParams, Option<(Arc<Grid>, f32)>),
     Density(SharedField, DAabb, DensityParams),
     Procedural(CloudShape, f64, VolumeParams),
-    Medium(HomogeneousMedium, SplatParams),
+    Medium(HomogeneousMedium, SplatParams, &'a [Clip]),
     Rectangle(convert::Rectangle, f64, SplatParams),
 }
 
@@ -65,7 +65,7 @@ impl Input<'_> {
             Self::Points(_, _, SurfelParams { splat, .. }) | Self::Matter(_, _, MatterParams { splat, .. }) => splat,
             Self::Volume(_, _, params) | Self::Procedural(_, _, params) => &params.splat,
             Self::Density(_, _, params) => &params.volume.splat,
-            Self::Medium(_, params) | Self::Rectangle(_, _, params) => params,
+            Self::Medium(_, params, _) | Self::Rectangle(_, _, params) => params,
         }
     }
 
@@ -95,7 +95,7 @@ impl Input<'_> {
             Self::Density(field, bounds, params) if !params.volume.normals && params.volume.clip.is_empty() => {
                 BoundedExtinction::new(Matter::Density(field.clone()), params.extinction * scale, *bounds)
             }
-            Self::Medium(medium, _) => {
+            Self::Medium(medium, _, []) => {
                 let matter = match medium.body {
                     MediumBody::Box(_) => Matter::Everywhere,
                     MediumBody::Ball { center, radius } => Matter::Ball { center, radius },
@@ -170,7 +170,7 @@ pub(super) fn input<'a>(object: &'a SceneObject, context: &Context<'_>) -> Resul
             Input::Density(Arc::new(expression_field(expression, object)?), *bounds, params)
         }
         Source::Cloud(cloud) => Input::Procedural(cloud.shape(), cloud.spacing, context.volume_params(splat)),
-        Source::Medium(medium) => Input::Medium(*medium, splat),
+        Source::Medium(medium) => Input::Medium(*medium, splat, &object.clip),
         Source::Rectangle(r) if object.clip.is_empty() => Input::Rectangle(*r, opacity, splat),
         Source::Rectangle(r) => {
             let density = Density::Spacing(r.spacing * splat.transform.scale);

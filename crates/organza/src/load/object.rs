@@ -101,7 +101,7 @@ fn predict(input: &Input<'_>) -> Result<Prediction, ConvertError> {
         Input::Surface(field, bounds, params, _) => cost::surface(field.as_ref(), *bounds, params),
         Input::Density(field, bounds, params) => cost::density(field.as_ref(), *bounds, params),
         Input::Procedural(shape, spacing, params) => cost::procedural(shape, *spacing, params),
-        Input::Medium(medium, params) => cost::medium(medium, params),
+        Input::Medium(medium, params, clip) => cost::medium(medium, clip, params),
         Input::Rectangle(r, opacity, params) => cost::rectangle(r, *opacity, params),
     }
 }
@@ -179,7 +179,7 @@ pub(super) fn convert(
                 _ => procedural(shape, *spacing, &params.splat, context).and_then(|(grid, tf)| convert(&grid, &tf)),
             }
         }
-        Input::Medium(medium, _) => convert::medium(medium, &splat),
+        Input::Medium(medium, _, clip) => convert::medium(medium, clip, &splat),
         Input::Rectangle(r, opacity, _) => convert::rectangle(r, *opacity, &splat),
     };
     Ok(cloud?)

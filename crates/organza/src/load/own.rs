@@ -251,9 +251,9 @@ fn data(
             let (grid, transfer) = convert::density_to_grid(field.as_ref(), *bounds, params)?;
             cells(grid.into(), transfer, (params.volume.normals, &params.volume.clip))
         }
-        Input::Medium(medium, params) => {
+        Input::Medium(medium, params, clip) => {
             let grid = convert::medium_to_grid(medium, params)?;
-            cells(grid.into(), convert::extinction_as_it_is(medium.extinction, params)?, (false, &[]))
+            cells(grid.into(), convert::extinction_as_it_is(medium.extinction, params)?, (false, clip))
         }
     })
 }
@@ -262,7 +262,7 @@ fn data(
 fn field_data(prepared: &Prepared<'_>, field: BoundedExtinction) -> Option<Data> {
     let spacing = match &prepared.input {
         Input::Density(_, _, params) => world_spacing(&params.density) / params.volume.splat.transform.scale,
-        Input::Medium(medium, _) => medium.spacing,
+        Input::Medium(medium, ..) => medium.spacing,
         _ => 0.0,
     };
     let (seen, side) = field.seen();

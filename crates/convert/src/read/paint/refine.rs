@@ -111,7 +111,9 @@ fn deviates(corners: [Vec2; 3], texture: &Texture, longest: f32, cutoff: Option<
     // A sample a texel: `longest` is at most COARSE.
     let n = longest.ceil() as usize;
     (0..=n).any(|i| {
-        (0..=n - i).any(|j| {
+        // The corners themselves are as they are.
+        let is_corner = |j: &usize| [i, *j, n - i - j].contains(&n);
+        (0..=n - i).filter(|j| !is_corner(j)).any(|j| {
             let [u, v] = [i, j].map(|k| k as f32 / n as f32);
             let w = 1.0 - u - v;
             let found = at(corners[0] * w + corners[1] * u + corners[2] * v);

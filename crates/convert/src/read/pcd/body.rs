@@ -3,6 +3,7 @@
 use super::TRUNCATED;
 use super::columns::{Columns, Number};
 use super::header::{Field, Header, Kind};
+use crate::counted::counted;
 use crate::error::{Place, ReadError};
 use crate::read::reading::Reading;
 use crate::read::text::{Lines, Word};
@@ -89,7 +90,7 @@ impl<'a> Text<'a> {
             }
             if words.len() != numbers || count == points {
                 let expected =
-                    if count == points { "the end of the file".into() } else { format!("{numbers} numbers") };
+                    if count == points { "the end of the file".into() } else { counted(numbers as u64, "number") };
                 let found = format!("{} on the line", words.len());
                 return Err(ReadError::input(line.place(), expected, found, TRUNCATED));
             }
@@ -102,8 +103,8 @@ impl<'a> Text<'a> {
         if count == points {
             return Ok(());
         }
-        let expected = format!("{points} points, as announced");
-        Err(ReadError::input(header.place_of_points, expected, format!("{count} points"), TRUNCATED))
+        let expected = format!("{}, as announced", counted(points as u64, "point"));
+        Err(ReadError::input(header.place_of_points, expected, counted(count as u64, "point"), TRUNCATED))
     }
 }
 

@@ -1,6 +1,7 @@
 //! The header of a PCD file: lines of a keyword and its values, up to `DATA`.
 
 use super::TRUNCATED;
+use crate::counted::counted;
 use crate::error::{Place, ReadError, escaped};
 use crate::read::text::{Line, Lines, Word};
 
@@ -159,7 +160,7 @@ impl<'a> Statements<'a> {
         if values.len() == fields {
             return Ok(values);
         }
-        let (expected, found) = (format!("{fields} values, one a field"), values.len().to_string());
+        let (expected, found) = (format!("{}, one a field", counted(fields as u64, "value")), values.len().to_string());
         Err(ReadError::input(word.place(), expected, found, "the header is damaged"))
     }
 

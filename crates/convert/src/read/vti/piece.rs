@@ -2,6 +2,7 @@
 
 use super::data::Encoding;
 use super::{arrays, child, chosen, components, kind, name, not_used, place, selection, wrong};
+use crate::counted::counted;
 use crate::error::ReadError;
 use crate::read::Loaded;
 use crate::read::cells::{self, Cells, Field, Lists, PointColumns};
@@ -96,7 +97,8 @@ fn joined<'a, 'i>(
         let numbers = components(array)?;
         if own.attribute("type") != array.attribute("type") || components(own)? != numbers {
             let kind = array.attribute("type").unwrap_or_default();
-            let expected = format!("{numbers} components of type {kind}, as the array has in another Piece");
+            let expected =
+                format!("{} of type {kind}, as the array has in another Piece", counted(numbers as u64, "component"));
             let found = format!("{} of {}", components(own)?, own.attribute("type").unwrap_or_default());
             return Err(wrong(own, &expected, &found));
         }

@@ -1,6 +1,7 @@
 //! The arrays of a legacy VTK file: where they lie, without reading them.
 
 use super::{HINT, next, wrong};
+use crate::counted::counted;
 use crate::error::{Place, ReadError, escaped};
 use crate::read::cells;
 use crate::read::reading::Reading;
@@ -239,7 +240,7 @@ impl<'a> Arrays<'a> {
         } else {
             for passed in 0..count {
                 if !data.next().is_some_and(|word| may_be_number(word.text)) {
-                    let (expected, found) = (format!("{count} numbers"), passed.to_string());
+                    let (expected, found) = (counted(count as u64, "number"), passed.to_string());
                     return Err(ReadError::input(line.place(), expected, found, HINT));
                 }
             }
