@@ -53,13 +53,23 @@ fn what_a_cut_leaves_of_a_slab_and_a_ball_has_its_optical_depth_by_every_techniq
          medium_ball = {{ center = [0, 0, 0], radius = 8, extinction = 0.25, spacing = 0.4 }}\n",
         parallel_view(2.0, 96)
     );
-    let cases = [(slab(2.0, 0), 4.0 * 0.3375, "the slab"), (ball, 0.25 * (8.0 + 0.0875), "the ball")];
-    for (text, tau, what) in cases {
+    // Of a ball so large its chord hardly differs among the pixels; cells at its rim count by samples.
+    let chord = |at: usize| {
+        let [x, y] = [at % 48, at / 48].map(|k| (k as f64 - 23.5) / 48.0);
+        (64.0 - x * x - y * y).sqrt() + 0.0875
+    };
+    let through: f64 = (0..48 * 48).map(|at| (-0.25 * chord(at)).exp()).sum::<f64>() / (48.0 * 48.0);
+    let cases = [(slab(2.0, 0), (-4.0 * 0.3375f64).exp(), 0.0, "the slab"), (ball, through, 1e-3, "the ball")];
+    for (text, exact, least, what) in cases {
         for (technique, most) in [("points", 2e-5), ("reference", 2e-5), ("sheets", 1e-3), ("particles", 4e-3)] {
+            // Most of so large a ball lies beside the picture.
+            if technique == "particles" && least > 0.0 {
+                continue;
+            }
             let picture = draw(&format!("{text}{clip}[render]\ntechnique = '{technique}'\n"), &[]);
             let (mean, _) = mean_and_ripple(&window(&picture.channel("A"), 96, 24..72, 24..72));
-            let error = (1.0 - mean - (-tau).exp()).abs();
-            assert!(error < most, "{technique}: {what} is off by {error:e}");
+            let error = (1.0 - mean - exact).abs();
+            assert!(error < f64::max(most, least), "{technique}: {what} is off by {error:e}");
         }
     }
 }

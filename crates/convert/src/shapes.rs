@@ -58,7 +58,7 @@ impl MediumBody {
 pub fn medium(medium: &HomogeneousMedium, clips: &[Clip], params: &SplatParams) -> Result<Cloud, ConvertError> {
     let lattice = Lattice::new(medium, params)?;
     let cut = lattice.cut(clips);
-    let MediumBody::Ball { radius, .. } = medium.body else { return lattice.fill(params, |offset| cut(offset)) };
+    let MediumBody::Ball { radius, .. } = medium.body else { return lattice.fill(params, cut) };
     let in_ball = |offset| share_in_ball(offset, radius, lattice.step);
     let mut cloud = lattice.fill(params, in_ball)?;
     let total: f64 = cloud.cross_section.iter().map(|k| f64::from(*k)).sum();
