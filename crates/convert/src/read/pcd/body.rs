@@ -103,8 +103,8 @@ impl<'a> Text<'a> {
         if count == points {
             return Ok(());
         }
-        let expected = format!("{}, as announced", counted(points as u64, "point"));
-        Err(ReadError::input(header.place_of_points, expected, counted(count as u64, "point"), TRUNCATED))
+        let expected = format!("{}, as announced", counted(points, "point"));
+        Err(ReadError::input(header.place_of_points, expected, counted(count, "point"), TRUNCATED))
     }
 }
 

@@ -153,7 +153,7 @@ impl<'a> Encoding<'a> {
         };
         // A digit and a blank each, but for the last one.
         if count > (words.left() as u64).div_ceil(2) {
-            return Err(wrong(array, &counted(count as u64, "number"), &words.count().to_string()));
+            return Err(wrong(array, &counted(count, "number"), &words.count().to_string()));
         }
         let mut numbers = cells::room(count, reading)?;
         for word in words.by_ref().take(count as usize) {
@@ -163,7 +163,7 @@ impl<'a> Encoding<'a> {
         if found == count && more == 0 {
             return Ok(numbers);
         }
-        Err(wrong(array, &counted(count as u64, "number"), &(found + more).to_string()))
+        Err(wrong(array, &counted(count, "number"), &(found + more).to_string()))
     }
 
     /// What an array of so many bytes holds.

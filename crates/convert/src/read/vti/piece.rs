@@ -98,7 +98,7 @@ fn joined<'a, 'i>(
         if own.attribute("type") != array.attribute("type") || components(own)? != numbers {
             let kind = array.attribute("type").unwrap_or_default();
             let expected =
-                format!("{} of type {kind}, as the array has in another Piece", counted(numbers as u64, "component"));
+                format!("{} of type {kind}, as the array has in another Piece", counted(numbers, "component"));
             let found = format!("{} of {}", components(own)?, own.attribute("type").unwrap_or_default());
             return Err(wrong(own, &expected, &found));
         }

@@ -240,7 +240,7 @@ impl<'a> Arrays<'a> {
         } else {
             for passed in 0..count {
                 if !data.next().is_some_and(|word| may_be_number(word.text)) {
-                    let (expected, found) = (counted(count as u64, "number"), passed.to_string());
+                    let (expected, found) = (counted(count, "number"), passed.to_string());
                     return Err(ReadError::input(line.place(), expected, found, HINT));
                 }
             }
