@@ -37,6 +37,7 @@ mod output;
 mod particle_layers;
 mod particles;
 mod point_columns;
+mod point_materials;
 mod point_opacity;
 mod progress;
 mod reading;

@@ -12,8 +12,8 @@ use splat_core::glam::{DVec2, DVec3};
 /// Share by which the moments along two ways have to differ, or a cell is round.
 const ROUND: f64 = 1e-3;
 
-/// The long side of the rectangle of cell `i`, across `normal`, and the length of the short one; zero and `spacing` for a round cell.
-pub(crate) fn ellipse(lines: &Lines, cells: &Cells, i: usize, normal: DVec3, spacing: f64) -> (DVec3, f64) {
+/// The long side of the rectangle of cell `i`, in its plane, and the length of the short one; zero and `spacing` for a round cell.
+pub(crate) fn ellipse(lines: &Lines, cells: &Cells, i: usize, spacing: f64) -> (DVec3, f64) {
     let (covariance, corners) = moments(lines, &cells.area, i);
     let round = (DVec3::ZERO, spacing);
     let Some((long, [first, second])) = covariance.and_then(axes) else { return round };
@@ -25,8 +25,7 @@ pub(crate) fn ellipse(lines: &Lines, cells: &Cells, i: usize, normal: DVec3, spa
     let reach = corners.map(farthest).fold(0.0, f64::max);
     let least = (cells.area[i] / (sides[0] * sides[1])).sqrt();
     let enlarged = (2.0 * reach).sqrt().clamp(least, 2.0 * least);
-    let (u, v) = normal.any_orthonormal_pair();
-    ((u * long.x + v * long.y) * (enlarged * sides[0]), enlarged * sides[1])
+    (lines.in_space(i, long) * (enlarged * sides[0]), enlarged * sides[1])
 }
 
 /// Second moments xx, yy, xy of a cell about its point over its area, and its corners.

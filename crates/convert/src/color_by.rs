@@ -82,6 +82,8 @@ pub struct ColorBy {
 pub struct Colored {
     /// Linear Rec.709, one a point.
     pub color: Vec<[f32; 3]>,
+    /// The numbers of the column, of which gaps are not finite.
+    pub numbers: Vec<f64>,
     /// What a transfer function that classifies says of each point; empty for others.
     pub classified: Vec<f32>,
     /// The numbers at the ends of a colour map.
@@ -150,7 +152,8 @@ pub fn colored(points: &RawPoints, by: &ColorBy, up: DVec3, splat: &SplatParams)
     let gaps = numbers.iter().filter(|n| !n.is_finite()).count() as u64;
     let is_of_whole = matches!(by.colors, PointColors::Classes | PointColors::Distinct);
     let present = if is_of_whole { present(&numbers) } else { Vec::new() };
-    Ok(Colored { color: numbers.par_iter().map(color).collect(), classified, range, gaps, present })
+    let color = numbers.par_iter().map(color).collect();
+    Ok(Colored { color, numbers, classified, range, gaps, present })
 }
 
 /// The least whole numbers that occur, rising.

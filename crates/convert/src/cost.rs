@@ -93,8 +93,8 @@ pub fn raw_points(points: &RawPoints, params: &SurfelParams) -> Result<Predictio
 pub fn raw_matter(points: &RawPoints, params: &MatterParams) -> Result<Prediction, ConvertError> {
     matter::check(points, params)?;
     let splats = matter::count(points, params) as f64;
-    params.splat.check_cloud(splats, matter::wanted(points))?;
-    Ok(Prediction::exact(splats, matter::wanted(points)))
+    params.splat.check_cloud(splats, matter::wanted(points, params))?;
+    Ok(Prediction::exact(splats, matter::wanted(points, params)))
 }
 
 /// Of [`crate::volume_to_points`].

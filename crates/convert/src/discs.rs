@@ -1,8 +1,8 @@
 //! How large the discs of points are, and along which way: by one size for all, as their file says, or as their neighbours lie.
 
 use crate::places::Place;
-use crate::point_attributes::{FOOTPRINT, RADIUS, TANGENT};
-use crate::{RawPoints, SurfelParams};
+use crate::point_attributes::{FOOTPRINT, MATERIAL, RADIUS, TANGENT};
+use crate::{RawPoints, SplatParams, SurfelParams};
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::{Camera, Footprint};
 
@@ -119,7 +119,7 @@ pub(crate) fn unused_by_discs(
     points: &RawPoints,
     has_size: bool,
     shape: DiscShape,
-    has_footprint: bool,
+    splat: &SplatParams,
 ) -> Vec<String> {
     let has = |name: &str| points.own_column(name).is_some();
     let mut said = Vec::new();
@@ -133,8 +133,11 @@ pub(crate) fn unused_by_discs(
     if radius && has_size {
         said.push(format!("`{RADIUS}` is not used beside `point_size`"));
     }
-    if has(FOOTPRINT) && has_footprint {
+    if has(FOOTPRINT) && splat.footprints.as_ref().is_some_and(|choice| !choice.by_column) {
         said.push(format!("`{FOOTPRINT}` of the file is not used: the object has one"));
+    }
+    if has(MATERIAL) && splat.materials.is_none() {
+        said.push(format!("`{MATERIAL}` of the file is not used: the object has one, and no list `materials`"));
     }
     if (radius || tangent.is_some() && missing.is_none()) && shape == DiscShape::Elliptical {
         said.push("discs have the sizes of the file, and not those of their cells".to_owned());

@@ -1,6 +1,7 @@
 //! Splats of a file become those of an object: as they are, or as its transform moves them.
 
 use crate::columns::Wanted;
+use crate::materials::materials_of;
 use crate::{ConvertError, RawPoints, SurfelParams};
 use splat_core::Cloud;
 use splat_core::glam::DQuat;
@@ -35,7 +36,10 @@ pub(crate) fn to_cloud(points: &RawPoints, params: &SurfelParams) -> Result<Clou
         let normals = cloud.normal.iter_mut().chain(&mut cloud.shading_normal);
         normals.for_each(|normal| *normal = t.rotate(normal.as_dvec3()).as_vec3());
     }
-    cloud.material.fill(splat.material);
+    match materials_of(points, splat)? {
+        Some(of) => cloud.material.iter_mut().enumerate().for_each(|(i, id)| *id = of(i).id),
+        None => cloud.material.fill(splat.material),
+    }
     cloud.footprint.fill(splat.footprint);
     cloud.object.fill(splat.object);
     if !params.colors {

@@ -57,6 +57,8 @@ mod keep_points;
 mod lid;
 mod marching_cubes;
 #[cfg(feature = "surfels")]
+mod materials;
+#[cfg(feature = "surfels")]
 mod matter;
 mod mesh_points;
 #[cfg(feature = "surfels")]
@@ -130,6 +132,8 @@ pub use keep_points::{Kept, Within, kept};
 #[cfg(feature = "lids")]
 pub use lid::{LidReport, lidded_mesh};
 pub use marching_cubes::isosurface_to_mesh;
+#[cfg(feature = "surfels")]
+pub use materials::PointMaterial;
 #[cfg(feature = "surfels")]
 pub use matter::{MatterParams, MatterReport, raw_to_matter};
 pub use mesh_points::{MeshParams, MeshReport, flatten_leaning, mesh_to_points, mesh_to_points_into};

@@ -11,7 +11,7 @@
 use crate::columns::{self, CHUNK, Wanted};
 use crate::params::SplatParams;
 use crate::point_attributes::{
-    EXTINCTION, FOOTPRINT, MASS, RADIUS, SHADOW_COEFFICIENT, SMOOTHING_LENGTH, TANGENT, attribute, expected,
+    EXTINCTION, FOOTPRINT, MASS, MATERIAL, RADIUS, SHADOW_COEFFICIENT, SMOOTHING_LENGTH, TANGENT, attribute, expected,
 };
 use crate::point_cells::{cells_of, cut_outliers};
 use crate::surfels::{canonical_order, distinct_places};
@@ -28,6 +28,8 @@ pub struct MatterParams {
     pub splat: SplatParams,
     /// Whether splats keep the points' colours.
     pub colors: bool,
+    /// Whether splats keep the points' values.
+    pub values: bool,
     /// Extinction σ_t within the points, 1/world unit, ≥ 0; that of points with a column `extinction` is its numbers times this. Of points
     /// with a column `mass` it is their cross-section a unit of mass, world units².
     pub extinction: f64,
@@ -44,6 +46,7 @@ impl Default for MatterParams {
         Self {
             splat: SplatParams::default(),
             colors: true,
+            values: false,
             extinction: 1.0,
             spacing: None,
             largest_spacing: 4.0,
@@ -204,14 +207,10 @@ pub(crate) fn unused_by_matter(points: &RawPoints) -> Vec<String> {
     let length = || format!("a medium does not use `{SMOOTHING_LENGTH}` beside `{RADIUS}`");
     let tangent = TANGENT.into_iter().find(|name| has(name));
     let tangent = tangent.map(|name| format!("a medium does not use `{name}`: its kernels are balls"));
-    let footprint = || format!("a medium does not use `{FOOTPRINT}`: it has that of its object");
-    let footprint = has(FOOTPRINT).then(footprint);
-    opacity
-        .into_iter()
-        .chain((has(RADIUS) && has(SMOOTHING_LENGTH)).then(length))
-        .chain(tangent)
-        .chain(footprint)
-        .collect()
+    let ids = [FOOTPRINT, MATERIAL].into_iter().filter(|name| has(name));
+    let ids: Vec<String> =
+        ids.map(|name| format!("a medium does not use `{name}`: it has that of its object")).collect();
+    opacity.into_iter().chain((has(RADIUS) && has(SMOOTHING_LENGTH)).then(length)).chain(tangent).chain(ids).collect()
 }
 
 /// How many splats a conversion makes.
@@ -264,7 +263,7 @@ fn emit(
 ) -> Result<Cloud, ConvertError> {
     let (p, t) = (&params.splat, &params.splat.transform);
     let mut cloud = Cloud::new(t.apply(points.origin));
-    columns::size_columns(&mut cloud, merged.len(), SplatKind::Medium, wanted(points), p)?;
+    columns::size_columns(&mut cloud, merged.len(), SplatKind::Medium, wanted(points, params), p)?;
     let matter = OfMatter::new(points);
     // By what the points of one splat are weighed.
     let amount = |i: usize| matter.amount(i, cells[i].volume * t.scale.powi(3));
@@ -294,17 +293,25 @@ fn emit(
             *color = tint.as_vec3().to_array();
         },
     );
-    let coefficients = cloud.shadow_coefficient.par_iter_mut().enumerate().with_min_len(CHUNK);
-    coefficients.for_each(|(splat, coefficient)| {
+    let mean = |splat: usize, of: &(dyn Fn(usize) -> f64 + Sync)| -> f64 {
         let ids = || merged.points_of(splat).iter().map(|i| *i as usize);
         let total: f64 = ids().map(amount).sum();
-        let mean: f64 = ids().map(|i| amount(i) / total * matter.shadow_coefficient(i)).sum();
-        *coefficient = mean.clamp(0.0, 1.0) as f32;
+        ids().map(|i| amount(i) / total * of(i)).sum()
+    };
+    let coefficients = cloud.shadow_coefficient.par_iter_mut().enumerate().with_min_len(CHUNK);
+    coefficients.for_each(|(splat, coefficient)| {
+        *coefficient = mean(splat, &|i| matter.shadow_coefficient(i)).clamp(0.0, 1.0) as f32;
     });
+    let values = cloud.value.par_iter_mut().enumerate().with_min_len(CHUNK);
+    values.for_each(|(splat, value)| *value = mean(splat, &|i| points.value[i].into()) as f32);
     Ok(cloud)
 }
 
 /// Which columns the splats fill.
-pub(crate) fn wanted(points: &RawPoints) -> Wanted {
-    Wanted { shadow_coefficient: points.own_column(SHADOW_COEFFICIENT).is_some(), ..Wanted::default() }
+pub(crate) fn wanted(points: &RawPoints, params: &MatterParams) -> Wanted {
+    Wanted {
+        shadow_coefficient: points.own_column(SHADOW_COEFFICIENT).is_some(),
+        value: params.values && !points.value.is_empty(),
+        ..Wanted::default()
+    }
 }

@@ -1,7 +1,9 @@
 //! Parameters that all conversions share.
 
-#[cfg(feature = "cache")]
 use crate::Cache;
+#[cfg(feature = "cache")]
+#[cfg(feature = "surfels")]
+use crate::PointMaterial;
 use crate::columns::Wanted;
 use crate::{ConvertError, FootprintChoice};
 use splat_core::{Exceeded, Footprint, Limits, Similarity};
@@ -25,6 +27,9 @@ pub struct SplatParams {
     pub profile: Footprint,
     /// Which footprint each disc has, and how images lie; `None` for `footprint`, a formula.
     pub footprints: Option<Arc<FootprintChoice>>,
+    /// What a column `material` of raw points chooses from, by numbers from 0; `None` for `material`, one for all.
+    #[cfg(feature = "surfels")]
+    pub materials: Option<Arc<[PointMaterial]>>,
     /// Object space → world space, applied in f64.
     pub transform: Similarity,
     /// Linear Rec.709 colour, each channel ≥ 0, where the input has none.
@@ -48,6 +53,8 @@ impl Default for SplatParams {
             footprint: 0,
             profile: Footprint::default(),
             footprints: None,
+            #[cfg(feature = "surfels")]
+            materials: None,
             transform: Similarity::default(),
             color: [1.0; 3],
             limits: Limits::default(),

@@ -136,7 +136,7 @@ fn leaf_places(offsets: &[Offset], params: &SurfelParams, out: &mut [Place]) {
         let (long, across) = match params.shape {
             DiscShape::Round => (Vec3::ZERO, 0.0),
             DiscShape::Elliptical => {
-                let (long, across) = ellipse(&lines, &cells, i, normals[i], spacing);
+                let (long, across) = ellipse(&lines, &cells, i, spacing);
                 (long.as_vec3(), across as f32)
             }
         };

@@ -17,9 +17,18 @@ pub(crate) const SHADOW_COEFFICIENT: &str = "shadow_coefficient";
 /// The footprint of a disc, by its place in the scene's list.
 pub(crate) const FOOTPRINT: &str = "footprint";
 
+/// The material of a disc, by its place in the object's list.
+pub(crate) const MATERIAL: &str = "material";
+
 /// The columns of discs; those of points that are a medium are all.
-const OF_DISCS: [&str; 6] = [RADIUS, TANGENT[0], TANGENT[1], TANGENT[2], SHADOW_COEFFICIENT, FOOTPRINT];
+const OF_DISCS: [&str; 7] = [RADIUS, TANGENT[0], TANGENT[1], TANGENT[2], SHADOW_COEFFICIENT, FOOTPRINT, MATERIAL];
 const OF_MATTER: [&str; 3] = [SMOOTHING_LENGTH, EXTINCTION, MASS];
+
+/// Whether its numbers are names of things, of which there is no mean.
+#[cfg(feature = "surfels")]
+pub(crate) fn is_id(column: &str) -> bool {
+    [FOOTPRINT, MATERIAL].contains(&column)
+}
 
 /// The name, where it is that of an attribute: of discs, or of matter too.
 pub(crate) fn attribute(column: &str, matter: bool) -> Option<&'static str> {
@@ -34,6 +43,9 @@ pub(crate) fn expected(column: &str, number: f64) -> Option<&'static str> {
         RADIUS | SMOOTHING_LENGTH if !(number.is_finite() && number > 0.0) => Some("a finite length above 0"),
         FOOTPRINT if !((0.0..=255.0).contains(&number) && number.fract() == 0.0) => {
             Some("a whole number from 0 to 255")
+        }
+        MATERIAL if !((0.0..=65535.0).contains(&number) && number.fract() == 0.0) => {
+            Some("a whole number from 0 to 65535")
         }
         SHADOW_COEFFICIENT if !(0.0..=1.0).contains(&number) => Some("a share from 0 to 1"),
         _ if TANGENT.contains(&column) && !number.is_finite() => Some("a finite number"),

@@ -151,7 +151,7 @@ pub struct ReadParams {
     /// that [`RawPoints::column`] knows. One that a file of points has not is an error that names those that it has.
     pub columns: Vec<String>,
     /// Whether points may become a medium: columns `smoothing_length`, `extinction` and `mass` are kept too, beside those that are kept of all
-    /// points where there are such, `radius`, `tx`, `ty`, `tz` and `shadow_coefficient`. Numbers that these cannot have are refused, see
+    /// points where there are such, `radius`, `tx`, `ty`, `tz`, `shadow_coefficient`, `footprint` and `material`. Numbers that these cannot have are refused, see
     /// [`crate::raw_to_matter`] and [`crate::raw_to_surfels`].
     pub matter: bool,
     /// Whether the ranges of all columns of points are found, kept or not, for [`Notes::columns`].

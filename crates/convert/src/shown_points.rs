@@ -2,6 +2,7 @@
 
 use crate::counted::counted;
 use crate::discs::unused_by_discs;
+use crate::materials::with_materials;
 use crate::matter::unused_by_matter;
 use crate::point_attributes::EXTINCTION;
 use crate::{
@@ -30,6 +31,8 @@ pub struct PointsShown<'a> {
     pub has_size: bool,
     /// Whether the object states an opacity.
     pub has_opacity: bool,
+    /// Whether points that have the colours of a column have its numbers as their values.
+    pub keeps_values: bool,
     /// Where `height` grows.
     pub up: DVec3,
 }
@@ -64,10 +67,7 @@ pub fn shown_points(
     let mut scale = None;
     let mut said = match shown.as_matter {
         true => unused_by_matter(&points),
-        false => {
-            let has_footprint = splat.footprints.as_ref().is_some_and(|choice| !choice.by_column);
-            unused_by_discs(&points, shown.has_size, shown.shape, has_footprint)
-        }
+        false => unused_by_discs(&points, shown.has_size, shown.shape, splat),
     };
     if !points.ready.cloud.is_empty() {
         check_ready(shown, splat)?;
@@ -85,6 +85,7 @@ pub fn shown_points(
     if let Some(spacing) = shown.spacing {
         points = thinned(&points, spacing, splat)?.into();
     }
+    points = with_materials(points, splat, shown.has_opacity)?;
     if let Some(by) = shown.color_by.filter(|_| !points.is_empty()) {
         let colored = colored(&points, by, shown.up, splat)?;
         said.push(sentence(by, &colored));
@@ -105,6 +106,15 @@ pub fn shown_points(
             _ => {}
         }
         own.color = colored.color;
+        if shown.keeps_values {
+            match colored.gaps {
+                0 => own.value = colored.numbers.iter().map(|number| *number as f32).collect(),
+                gaps => {
+                    own.value.clear();
+                    said.push(format!("splats keep no values: {} without a number", counted(gaps, "point")));
+                }
+            }
+        }
         points = own.into();
     }
     Ok(ShownPoints { points, said, scale })

@@ -20,6 +20,7 @@ use crate::convert_error::check_cancelled;
 use crate::counted::counted;
 use crate::discs::{DiscShape, DiscSize, Discs};
 use crate::footprints::choose_footprints;
+use crate::materials::materials_of;
 use crate::matter::check_columns;
 use crate::neighbours::MAX_NEIGHBOURS;
 use crate::orient::{self, Orientation};
@@ -113,7 +114,8 @@ impl SurfelReport {
 
 /// Makes surfels of raw points. Columns of the points (`RawPoints::columns`) say more, each a number a point: `radius`, the length in units of
 /// the file within which an opaque disc hides, > 0; `tx`, `ty` and `tz`, a semi-axis of a disc that is an ellipse, as long as it hides that way,
-/// whose second one has that radius, and zero for a round disc; and `shadow_coefficient`, the share of a shadow that it receives. Points that
+/// whose second one has that radius, and zero for a round disc; `shadow_coefficient`, the share of a shadow that it receives; and `footprint` and
+/// `material`, places in [`SplatParams::footprints`] and [`SplatParams::materials`]. Points that
 /// are Gaussians become splats that are seen as these, each one, also where several lie at one place; points that are splats stay what they are.
 ///
 /// ```
@@ -427,6 +429,9 @@ fn emit(
     coefficients.for_each(|(coefficient, s)| *coefficient = shares[s.1 as usize] as f32);
     let values = cloud.value.par_iter_mut().zip(&surfels).with_min_len(CHUNK);
     values.for_each(|(v, s)| *v = points.value[s.1 as usize]);
+    if let Some(of) = materials_of(points, &params.splat)? {
+        cloud.material.par_iter_mut().zip(&surfels).with_min_len(CHUNK).for_each(|(id, s)| *id = of(s.1 as usize).id);
+    }
     let ids = points.own_column(FOOTPRINT);
     let stated = |k: usize| ids.map_or(0.0, |ids| ids[surfels[k].1 as usize]);
     let place = |k: usize| points.position[surfels[k].1 as usize];

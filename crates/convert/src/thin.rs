@@ -1,6 +1,7 @@
 //! Fewer raw points: those of one cell of a lattice become one, their mean.
 
 use crate::columns::CHUNK;
+use crate::point_attributes::is_id;
 use crate::surfels::compare;
 use crate::{Column, ConvertError, RawPoints, ReadySplats, SplatParams};
 use rayon::prelude::*;
@@ -8,8 +9,8 @@ use splat_core::Gaussians;
 use splat_core::glam::{DVec3, Vec3};
 
 /// Points that lie about `spacing` apart, units of the file, where the given ones lie closer: those of each cell of a
-/// lattice with that step become one with their mean place, normal, colour, value, opacity and further columns, and the class of the first. The
-/// lattice has a point at zero of the file's coordinates, so nothing depends on the order of the points.
+/// lattice with that step become one with their mean place, normal, colour, value, opacity and further columns, and the class, `footprint` and
+/// `material` of the first. The lattice has a point at zero of the file's coordinates, so nothing depends on the order of the points.
 ///
 /// ```
 /// use convert::{RawPoints, SplatParams, thinned};
@@ -44,7 +45,10 @@ pub fn thinned(points: &RawPoints, spacing: f64, params: &SplatParams) -> Result
         mean(&column).into_iter().map(|v| v.x).collect()
     };
     let column = |c: &Column| {
-        let of = |r: &&[([f64; 3], u32)]| r.iter().map(|(_, i)| c.values[*i as usize]).sum::<f64>() / r.len() as f64;
+        let of = |r: &&[([f64; 3], u32)]| match is_id(&c.name) {
+            true => c.values[r[0].1 as usize],
+            false => r.iter().map(|(_, i)| c.values[*i as usize]).sum::<f64>() / r.len() as f64,
+        };
         Column { name: c.name.clone(), values: ranges.iter().map(of).collect() }
     };
     let first = |r: &&[([f64; 3], u32)]| points.classification[r[0].1 as usize];

@@ -4,11 +4,16 @@
 //! keeps t·(q × p) ≤ ½ p·(p − q): every pair of neighbours bounds t on both lines, by one division and without a branch. Between its
 //! bounds a line is a side of the cell, of the area ¼|q|²·Δt with the point. Lines at one place share that side: one has what is
 //! before its middle, the other what is behind it.
+//!
+//! The square that holds a cell lies along the way to its nearest neighbour, so that cells turn with their points.
 
 use crate::extremes::{greater, lesser};
 use crate::neighbours::{Lanes, MAX_NEIGHBOURS, WIDTH};
 use crate::tangent_plane::{Eight, Offset};
 use splat_core::glam::{DVec2, DVec3};
+
+/// Share of the way to a neighbour that lies in the plane from which on it has a direction there.
+const FLAT: f64 = 0.5;
 
 /// Half the side of the square that holds a cell, over the distance of the farthest neighbour. What lies within 0.5 is
 /// known exactly; beyond, neighbours that were not asked for would cut too. Measured so that areas of scattered points
@@ -40,6 +45,8 @@ pub(crate) struct Lines {
     count: usize,
     /// What lengths are counted in, a power of two for each point.
     unit: Eight,
+    /// The two unit vectors of each plane.
+    axes: [[DVec3; 2]; WIDTH],
 }
 
 /// The sides of the Voronoi cells of points among neighbours at `offsets` (near to far, at least one), in the planes across `normals`, within
@@ -47,15 +54,17 @@ pub(crate) struct Lines {
 #[inline(always)]
 pub(crate) fn voronoi_sides(offsets: &[Offset], normals: &[DVec3; WIDTH]) -> Lines {
     let unit = units(&offsets[offsets.len() - 1]);
-    let mut lines = Lines::of_square(&offsets[offsets.len() - 1], unit);
+    let mut axes = [[DVec3::ZERO; 2]; WIDTH];
     let [mut u, mut v] = [[[0.0; WIDTH]; 3]; 2];
     for i in 0..WIDTH {
-        let (along, across) = normals[i].any_orthonormal_pair();
+        axes[i] = axes_of(offsets, i, normals[i]);
+        let [along, across] = axes[i];
         for a in 0..3 {
             // The unit is a power of two.
             (u[a][i], v[a][i]) = (along[a] / unit[i], across[a] / unit[i]);
         }
     }
+    let mut lines = Lines::of_square(&offsets[offsets.len() - 1], unit, axes);
     for offset in offsets {
         let mut q = [[0.0; WIDTH]; 2];
         for i in 0..WIDTH {
@@ -66,6 +75,21 @@ pub(crate) fn voronoi_sides(offsets: &[Offset], normals: &[DVec3; WIDTH]) -> Lin
         lines.add(q);
     }
     lines
+}
+
+/// Unit vectors across a normal, the first of them towards the nearest neighbour that has a direction in their plane.
+#[inline(always)]
+fn axes_of(offsets: &[Offset], i: usize, normal: DVec3) -> [DVec3; 2] {
+    for offset in offsets {
+        let to = DVec3::new(offset[0][i].into(), offset[1][i].into(), offset[2][i].into());
+        let flat = to - normal * normal.dot(to);
+        if flat.length_squared() > FLAT * FLAT * to.length_squared() {
+            let along = flat.normalize();
+            return [along, normal.cross(along)];
+        }
+    }
+    // All neighbours are above the point or below it: the square alone is left, as large whichever way it lies.
+    normal.any_orthonormal_pair().into()
 }
 
 /// A power of two for each point, such that its farthest neighbour is 1 to 2 away.
@@ -82,7 +106,7 @@ fn units(farthest: &Offset) -> Eight {
 
 impl Lines {
     #[inline(always)]
-    fn of_square(farthest: &Offset, unit: Eight) -> Self {
+    fn of_square(farthest: &Offset, unit: Eight, axes: [[DVec3; 2]; WIDTH]) -> Self {
         let mut side = [0.0; WIDTH];
         for i in 0..WIDTH {
             let [x, y, z] = [f64::from(farthest[0][i]), f64::from(farthest[1][i]), f64::from(farthest[2][i])];
@@ -94,6 +118,7 @@ impl Lines {
             high: [[0.5; WIDTH]; SIDES + MAX_NEIGHBOURS],
             count: SIDES,
             unit,
+            axes,
         };
         for i in 0..WIDTH {
             (lines.q[0][0][i], lines.q[1][1][i]) = (side[i], side[i]);
@@ -133,7 +158,12 @@ impl Lines {
         self.count += 1;
     }
 
-    /// The sides of the cell of point `i`, each as its two ends in the plane of the pair that is any orthonormal one to its normal.
+    /// What lies at a place of the plane of point `i`, from the point.
+    pub(crate) fn in_space(&self, i: usize, place: DVec2) -> DVec3 {
+        self.axes[i][0] * place.x + self.axes[i][1] * place.y
+    }
+
+    /// The sides of the cell of point `i`, each as its two ends in its plane.
     pub(crate) fn sides(&self, i: usize) -> impl Iterator<Item = [DVec2; 2]> {
         (0..self.count).filter_map(move |line| {
             let q = DVec2::from(self.q[line].map(|lanes| f64::from(lanes[i])));
@@ -218,6 +248,8 @@ mod tests {
                 (0..10).map(|i| u * unit(i, 0) + v * unit(i, 1) + normal * 0.1 * unit(i, 2)).collect();
             offsets.sort_by(|a, b| a.length().total_cmp(&b.length()));
             let half = CELL_LIMIT * offsets[9].length();
+            let all: Vec<Offset> = offsets.iter().map(|o| o.as_vec3().to_array().map(|c| [c; WIDTH])).collect();
+            let [u, v] = axes_of(&all, 0, normal);
             let mut corners = vec![[-half, -half], [half, -half], [half, half], [-half, half]];
             for o in &offsets {
                 let q = [o.dot(u), o.dot(v)];

@@ -10,11 +10,11 @@ use std::fmt::Write as _;
 /// The version of the format. Readers refuse others.
 pub(crate) const VERSION: &str = "1";
 
-/// The file of a cloud, in which no splat is a Gaussian. `objects` are names by id; names and whatever else a comment cannot hold are escaped.
+/// The file of a cloud, in which no splat is a Gaussian. `objects` and `materials` are names by id; names and whatever else a comment cannot hold are escaped.
 ///
 /// # Panics
 /// If a splat is a Gaussian.
-pub fn splats_to_ply(cloud: &Cloud, objects: &[String], footprints: &FootprintStack) -> Vec<u8> {
+pub fn splats_to_ply(cloud: &Cloud, objects: &[String], materials: &[String], footprints: &FootprintStack) -> Vec<u8> {
     assert!(cloud.gaussians.is_empty(), "invariant: Gaussians have a format of their own");
     let some = |of: &&SplatColumns| of.is_there.is_none_or(|is_there| is_there(cloud));
     let groups: Vec<&SplatColumns> = COLUMNS.iter().filter(some).collect();
@@ -25,8 +25,10 @@ pub fn splats_to_ply(cloud: &Cloud, objects: &[String], footprints: &FootprintSt
     for (id, footprint) in footprints.layers().iter().enumerate() {
         let _ = writeln!(head, "comment organza footprint {id} {:?}", footprint.cutoff);
     }
-    for (id, name) in objects.iter().enumerate() {
-        let _ = writeln!(head, "comment object {id}: {}", name.escape_debug());
+    for (what, names) in [("object", objects), ("material", materials)] {
+        for (id, name) in names.iter().enumerate() {
+            let _ = writeln!(head, "comment {what} {id}: {}", name.escape_debug());
+        }
     }
     for of in &groups {
         let names: Vec<&str> = of.columns.iter().map(|column| column.name).collect();

@@ -1,9 +1,10 @@
 //! Raw points become surfels: hard cases CV11 and CV12, normals, areas, orientation, invariances.
 #![cfg(feature = "surfels")]
 
-use convert::{Orientation, RawPoints, SurfelParams, raw_to_surfels, reference};
-use splat_core::glam::{DVec3, Vec3};
+use convert::{DiscShape, Orientation, RawPoints, SurfelParams, raw_to_surfels, reference};
+use splat_core::glam::{DQuat, DVec3, Vec3};
 use splat_core::{Footprint, optics, rng};
+use std::f64::consts::FRAC_PI_2;
 
 fn plane(side: u32) -> RawPoints {
     let position = (0..side * side).map(|i| Vec3::new((i % side) as f32, 0.0, (i / side) as f32)).collect();
@@ -172,4 +173,47 @@ fn x4_and_x1_neither_order_nor_threads_matter() {
     let one = run(&points, 1);
     assert!(run(&reversed, 3) == one);
     assert!(run(&points, 7) == one);
+}
+
+/// The square that ends cells among few neighbours lies as these do, and not as the axes: turned points have turned discs.
+#[test]
+fn discs_turn_with_their_points() {
+    let scattered = |n: u64, round: bool| {
+        let at = |i: u64| {
+            let place = DVec3::from_array([0, 1, 2].map(|axis| 2.0 * rng::unit(31, n, i, axis) - 1.0));
+            if round { place.normalize() } else { place }
+        };
+        (0..n).map(at).collect::<Vec<DVec3>>()
+    };
+    // Area and radius of every point, by its rank.
+    let discs = |places: &[DVec3], turn: DQuat, shape| {
+        let position = places.iter().map(|p| (turn * *p).as_vec3()).collect();
+        let value = (0..places.len()).map(|i| i as f32).collect();
+        let points = RawPoints { position, value, ..RawPoints::default() };
+        let params = SurfelParams { values: true, shape, ..SurfelParams::default() };
+        let (cloud, _) = raw_to_surfels(&points, &params, None).unwrap();
+        let mut discs = vec![[0.0; 2]; places.len()];
+        for i in 0..cloud.len() {
+            discs[cloud.value[i] as usize] = [cloud.cross_section[i], cloud.radius[i]].map(f64::from);
+        }
+        discs
+    };
+    for (places, shape) in [
+        (scattered(400, true), DiscShape::Round),
+        (scattered(400, true), DiscShape::Elliptical),
+        (scattered(60, false), DiscShape::Round),
+    ] {
+        let still = discs(&places, DQuat::IDENTITY, shape);
+        for turn in [
+            DQuat::from_rotation_x(FRAC_PI_2),
+            DQuat::from_rotation_z(FRAC_PI_2),
+            DQuat::from_axis_angle(DVec3::new(0.48, 0.6, -0.64), 1.0),
+        ] {
+            let turned = discs(&places, turn, shape);
+            for (i, (a, b)) in still.iter().zip(&turned).enumerate() {
+                let off = (0..2).map(|k| (b[k] / a[k] - 1.0).abs()).fold(0.0, f64::max);
+                assert!(off < 1e-4, "{shape:?} {} {turn}: disc {i} is {a:?}, turned {b:?}", places.len());
+            }
+        }
+    }
 }

@@ -68,7 +68,7 @@ fn splats() -> Vec<u8> {
     let mut cloud = Cloud::new(DVec3::new(1e6, 0.0, 0.5));
     cloud.push(&Splat { value: 2.0, ..Splat::default() });
     cloud.push(&Splat { kind: SplatKind::Surface, normal: Vec3::Y, tangent: Vec3::X, ..Splat::default() });
-    convert::splats_to_ply(&cloud, &["it".to_owned()], &FootprintStack::default())
+    convert::splats_to_ply(&cloud, &["it".to_owned()], &[], &FootprintStack::default())
 }
 
 /// Files that hold an image, and its bytes.

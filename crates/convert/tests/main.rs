@@ -17,6 +17,7 @@ mod marching_cubes;
 mod mpu_fields;
 mod point_attributes;
 mod point_footprints;
+mod point_materials;
 mod point_opacity;
 mod read_assets;
 mod read_cells;

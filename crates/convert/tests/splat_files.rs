@@ -35,7 +35,7 @@ fn cloud(count: u64) -> Cloud {
 }
 
 fn file(cloud: &Cloud) -> Vec<u8> {
-    splats_to_ply(cloud, &["it".into(), "a\nb".into()], &FootprintStack::default())
+    splats_to_ply(cloud, &["it".into(), "a\nb".into()], &[], &FootprintStack::default())
 }
 
 fn read(file: &[u8]) -> Result<RawPoints, String> {

@@ -33,7 +33,8 @@ pub(super) fn run(arguments: &ConvertArguments) -> Result<(), Error> {
         refuse_images(&loaded)?;
         // A power of two: no bit of a splat is lost.
         loaded.cloud.scale_world(2f64.powi(loaded.exponent));
-        let bytes = splats_to_ply(&loaded.cloud, &names(&loaded), &loaded.footprints);
+        let materials: Vec<String> = scene.materials.iter().map(|material| material.name.clone()).collect();
+        let bytes = splats_to_ply(&loaded.cloud, &names(&loaded), &materials, &loaded.footprints);
         target.write(&bytes)?;
         progress.finish();
         Ok((loaded, bytes.len() as u64))
@@ -53,10 +54,13 @@ pub(super) fn run(arguments: &ConvertArguments) -> Result<(), Error> {
     ))
 }
 
-/// Every object as splats, whatever draws it.
+/// Every object as splats, whatever draws it, with the values that their points have.
 fn as_splats(scene: &mut Scene) {
     scene.render.technique = Technique::Points;
-    scene.objects.iter_mut().for_each(|object| object.technique = None);
+    for object in &mut scene.objects {
+        object.technique = None;
+        object.points.keeps_values = true;
+    }
 }
 
 fn names(loaded: &Loaded) -> Vec<String> {

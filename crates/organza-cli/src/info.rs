@@ -35,6 +35,7 @@ fn scene_document(scene: &Scene) -> Value {
             "path": source_path(&o.source),
             "up": o.up.axis.name(),
             "material": scene.materials[o.material].name,
+            "materials": o.material_ids().map(|id| &scene.materials[id].name).collect::<Vec<_>>(),
             "visible": o.visible,
         })
     });

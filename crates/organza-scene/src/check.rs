@@ -6,7 +6,7 @@ use super::check_camera::check_camera;
 use super::check_drawn::check_drawn;
 use super::check_footprint::check_footprints;
 use super::check_light::check_light;
-use super::check_material::{check_materials, unknown_material};
+use super::check_material::{check_listed, check_materials, unknown_material};
 use super::check_object::{Named, check_object};
 use super::check_render::check_render;
 use super::load::Turn;
@@ -217,15 +217,15 @@ fn check_objects(
             let message = format!("duplicate object name `{}`, first at {first}", crate::shown(&object.name));
             return Err(at.key("name").error(message, "each object needs a name of its own"));
         }
-        let material = match object.material.as_deref() {
-            None => 0,
-            Some(name) => match named_materials.get(name) {
-                Some(i) => *i,
-                None => return Err(unknown_material(&at, &at_materials(at_objects), name, materials)),
-            },
+        let of_name = |at: &At<'_>, name: &str| match named_materials.get(name) {
+            Some(i) => Ok(*i),
+            None => Err(unknown_material(at, &at_materials(at_objects), name, materials)),
         };
+        let listed = check_listed(&at, &object, materials, of_name)?;
+        let named_one = object.material.as_deref().map(|name| of_name(&at.key("material"), name)).transpose()?;
+        let material = named_one.or(listed.first().copied()).unwrap_or(0);
         let deforms = animation.is_some_and(|animation| deforms(animation, i, &object.name));
-        objects.push(SceneObject { deforms, ..check_object(&at, object, material, named)? });
+        objects.push(SceneObject { deforms, materials: listed, ..check_object(&at, object, material, named)? });
     }
     Ok(objects)
 }

@@ -6,6 +6,8 @@ use super::check_footprint::check_footprint;
 use super::de::suggest;
 use super::paths::Paths;
 use super::raw_material::{RawBump, RawMaterial, RawShading, RawSurfaceOpacity};
+use super::raw_object::RawObject;
+use super::raw_points::RawPointForm;
 use crate::{Error, shown};
 use splat_core::optics::{SurfaceOpacity, absorption_coefficient};
 use splat_core::{Bump, FootprintStack, Material, Shading};
@@ -51,7 +53,47 @@ pub(super) fn unknown_material(at: &At<'_>, at_materials: &At<'_>, name: &str, m
             hint + &place.unwrap_or_default()
         }
     };
-    at.key("material").error(format!("material `{}` is not defined", shown(name)), hint)
+    at.error(format!("material `{}` is not defined", shown(name)), hint)
+}
+
+/// The materials that an object lists, which its points choose among; empty where it lists none.
+pub(super) fn check_listed(
+    at: &At<'_>,
+    object: &RawObject,
+    materials: &[SceneMaterial],
+    of_name: impl Fn(&At<'_>, &str) -> Result<usize, Error>,
+) -> Result<Vec<usize>, Error> {
+    let Some(names) = &object.materials else { return Ok(Vec::new()) };
+    let at = at.key("materials");
+    if object.points.is_none() || object.form == Some(RawPointForm::Medium) {
+        let hint = "a column `material` of points that are surfaces chooses among them; else name one `material`";
+        return Err(at.error("`materials` belongs to `points` that are surfaces", hint));
+    }
+    let excluded = [("material", object.material.is_some()), ("unlit", object.unlit.is_some())];
+    if let Some((key, _)) = excluded.iter().find(|(_, on)| *on) {
+        return Err(at.error(format!("`materials` and `{key}` exclude each other"), "leave one of them out"));
+    }
+    if names.is_empty() || names.len() > usize::from(u16::MAX) {
+        return Err(at.error(format!("`materials`: expected 1 to {} names, found {}", u16::MAX, names.len()), ""));
+    }
+    let ids = names.iter().enumerate().map(|(i, name)| {
+        let at = at.index(i);
+        let id = of_name(&at, name)?;
+        let SceneMaterial { material, footprint, .. } = &materials[id];
+        let of_one = [
+            ("bounds matter", material.bounds_matter()),
+            ("has bumps", material.bump.height > 0.0),
+            ("names a footprint", footprint.is_some()),
+        ];
+        match of_one.iter().find(|(_, has)| *has) {
+            Some((what, _)) => {
+                let message = format!("material `{}` {what}, which is for all points of an object alike", shown(name));
+                Err(at.error(message, "give those points an object and a `material` of their own, by `keep`"))
+            }
+            None => Ok(id),
+        }
+    });
+    ids.collect()
 }
 
 fn check_material(at: &At<'_>, name: &str, raw: &RawMaterial, paths: &Paths) -> Result<SceneMaterial, Error> {

@@ -51,6 +51,7 @@ pub(super) fn check_object(
         up,
         source,
         material,
+        materials: Vec::new(),
         color: raw.color.map(|c| at.color("color", c)).transpose()?,
         opacity: raw.opacity.map(|a| at.number("opacity", a, 0.0..=1.0)).transpose()?,
         packing: match raw.lattice {

@@ -73,6 +73,7 @@ pub(super) fn check_points(at: &At<'_>, raw: &RawObject) -> Result<PointsLook, E
             None | Some(RawDiscShape::Round) => DiscShape::Round,
             Some(RawDiscShape::Elliptical) => DiscShape::Elliptical,
         },
+        keeps_values: false,
         size: raw.point_size.as_ref().map(|size| check_size(&at.key("point_size"), size)).transpose()?,
     })
 }

@@ -127,6 +127,8 @@ pub struct SceneObject {
     pub up: Up,
     /// Index into [`Scene::materials`].
     pub material: usize,
+    /// Those that a column of its points chooses among, the first of which is [`Self::material`]; empty where that is the one of all.
+    pub materials: Vec<usize>,
     /// Colour that replaces the data's and the material's, linear Rec.709.
     pub color: Option<[f32; 3]>,
     /// Opacity of one crossing that replaces the material's, in \[0, 1\]; surfaces and raw points.

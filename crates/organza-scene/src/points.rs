@@ -1,7 +1,8 @@
 //! How raw points look beside what all objects have, checked.
 
-use super::{MatterSource, SceneObject, Source};
-use convert::{ColorBy, DiscShape, DiscSize, Kept, MatterParams, PointsShown, SplatParams};
+use super::{MatterSource, Scene, SceneMaterial, SceneObject, Source};
+use convert::{ColorBy, DiscShape, DiscSize, Kept, MatterParams, PointMaterial, PointsShown, SplatParams};
+use std::sync::Arc;
 
 /// What a scene says of raw points; of other sources nothing.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -16,6 +17,26 @@ pub struct PointsLook {
     pub shape: DiscShape,
     /// Diameter of their discs; `None` where it follows from their neighbours.
     pub size: Option<DiscSize>,
+    /// Whether splats keep the values that their points have, or the numbers of the column that these have their colours from; no picture
+    /// needs them.
+    pub keeps_values: bool,
+}
+
+impl Scene {
+    /// Opacity of one crossing of the surfaces of an object; 1 where that is for the materials of its points to say.
+    pub fn opacity_of(&self, object: &SceneObject) -> f64 {
+        let of_material = if object.materials.is_empty() { self.materials[object.material].opacity } else { 1.0 };
+        object.opacity.unwrap_or(of_material)
+    }
+
+    /// What the points of an object choose their materials from, if they do.
+    pub fn point_materials(&self, object: &SceneObject) -> Option<Arc<[PointMaterial]>> {
+        let of = |id: &usize| {
+            let SceneMaterial { color, opacity, .. } = self.materials[*id];
+            PointMaterial { id: *id as u16, color, opacity }
+        };
+        (!object.materials.is_empty()).then(|| object.materials.iter().map(of).collect())
+    }
 }
 
 impl PointsLook {
@@ -26,12 +47,18 @@ impl PointsLook {
 }
 
 impl SceneObject {
+    /// The materials that its splats may have.
+    pub fn material_ids(&self) -> impl Iterator<Item = usize> + Clone + '_ {
+        let one = self.materials.is_empty().then_some(self.material);
+        one.into_iter().chain(self.materials.iter().copied())
+    }
+
     /// How its points become a medium of these attributes, if they do.
     pub fn matter_params(&self, splat: &SplatParams) -> Option<MatterParams> {
         let Source::Matter(MatterSource { extinction, .. }) = self.source else { return None };
         let spacing = self.spacing.map(|spacing| spacing / self.transform.scale);
-        let (splat, colors) = (splat.clone(), self.color.is_none());
-        Some(MatterParams { splat, colors, extinction, spacing, ..MatterParams::default() })
+        let (splat, colors, values) = (splat.clone(), self.color.is_none(), self.points.keeps_values);
+        Some(MatterParams { splat, colors, values, extinction, spacing, ..MatterParams::default() })
     }
 
     /// What is shown of its points, in the unit of their file. Those of a medium are made fewer when they stand for volumes.
@@ -45,6 +72,7 @@ impl SceneObject {
             shape: self.points.shape,
             has_size: self.points.size.is_some(),
             has_opacity: self.opacity.is_some(),
+            keeps_values: self.points.keeps_values,
             up: self.up.axis.direction(),
         }
     }

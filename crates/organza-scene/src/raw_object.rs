@@ -72,6 +72,8 @@ pub(super) struct RawObject {
     pub(super) transform: RawTransform,
     /// Name of a material.
     pub(super) material: Option<String>,
+    /// Names of materials that a column `material` of `points` chooses among, counted from 0; in the place of `material`.
+    pub(super) materials: Option<Vec<String>>,
     /// Opacity of one crossing, from 0 to 1, instead of the material's.
     pub(super) opacity: Option<f64>,
     /// Colour, linear Rec.709, instead of the data's and the material's.

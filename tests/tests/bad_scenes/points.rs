@@ -33,6 +33,7 @@ fn how_points_look_is_checked() {
         "color_by = { column = \"z\" }\ntransfer = [{ value = 0, color = [1, 1, 1], opacity = 1.5 }]",
         "`opacity`: expected",
     );
+    refused("materials = [\"glass\"]", "`materials` and `material` exclude each other");
     refused("discs = \"square\"", "expected");
     refused(
         "discs = \"elliptical\"\npoint_size = { pixels = 2 }",
@@ -102,4 +103,27 @@ fn slabs_across_half_vectors_cut_no_volume() {
     let text = SCENE.replacen("[render]", clipped, 1).replacen("volume = \"b.nii\"", clip, 1);
     let error = try_toml(&text).unwrap_err();
     assert!(error.to_string().contains("`clip`: slabs across half vectors cut no volume"), "{error}");
+}
+
+#[test]
+fn lists_of_materials_are_checked() {
+    let listed = |keys: &str, expected: &str| {
+        let text = SCENE.replacen("mesh = \"a.ply\"\nmaterial = \"glass\"", &format!("points = \"a.las\"\n{keys}"), 1);
+        let found = try_toml(&format!(
+            "{text}\n[material.lens]\nior = 1.5\n[material.bumpy]\nbump = {{ height = 1, size = 1 }}\n\
+             [material.soft]\nfootprint = 1\n"
+        ));
+        match found {
+            Ok(scene) => assert!(expected.is_empty() && scene.objects[0].materials.len() == 2, "{keys}"),
+            Err(e) => assert!(!expected.is_empty() && e.to_string().contains(expected), "{keys}: {e}"),
+        }
+    };
+    listed("materials = [\"glass\", \"glass\"]", "");
+    listed("materials = []", "`materials`: expected 1 to 65535 names, found 0");
+    listed("materials = [\"glass\", \"glas\"]", "13:23: material `glas` is not defined");
+    listed("materials = [\"glass\"]\nas = \"medium\"", "`materials` belongs to `points` that are surfaces");
+    listed("materials = [\"glass\"]\nunlit = true", "`materials` and `unlit` exclude each other");
+    listed("materials = [\"lens\"]", "material `lens` bounds matter, which is for all points of an object alike");
+    listed("materials = [\"bumpy\"]", "material `bumpy` has bumps");
+    listed("materials = [\"soft\"]", "material `soft` names a footprint");
 }

@@ -49,6 +49,7 @@ impl Context<'_> {
             footprint: object.footprints.of[0],
             profile: self.scene.footprints.layers()[usize::from(object.footprints.of[0])],
             footprints: Some(object.footprints.clone()),
+            materials: self.scene.point_materials(object),
             transform: object.transform,
             color: object.color.unwrap_or(material.color),
             limits: Limits::NONE,
@@ -81,13 +82,13 @@ impl Context<'_> {
 
     /// Parameters of raw points.
     pub(super) fn surfel_params(&self, object: &SceneObject, splat: SplatParams) -> SurfelParams {
-        // Terrain faces the sky.
-        let up = splat.transform.rotation.inverse() * DVec3::Y;
         SurfelParams {
+            // Terrain faces the sky.
+            orientation: Orientation::Auto(splat.transform.rotation.inverse() * DVec3::Y),
             splat,
             colors: object.color.is_none(),
-            orientation: Orientation::Auto(up),
-            opacity: self.opacity(object),
+            values: object.points.keeps_values,
+            opacity: self.scene.opacity_of(object),
             largest_spacing: LARGEST_SPACING,
             shape: object.points.shape,
             size: object.points.size,
@@ -120,10 +121,5 @@ impl Context<'_> {
         let (normals, clip) = (needs_gradients(object, self.scene), object.clip.clone());
         let classification_error = CLASSIFICATION_SHARE * self.scene.render.tolerance;
         VolumeParams { splat, normals, classification_error, clip, ..VolumeParams::default() }
-    }
-
-    /// Opacity of one crossing of the object's surfaces.
-    pub(super) fn opacity(&self, object: &SceneObject) -> f64 {
-        object.opacity.unwrap_or(self.scene.materials[object.material].opacity)
     }
 }

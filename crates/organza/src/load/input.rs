@@ -122,7 +122,7 @@ impl Input<'_> {
 /// Reads one object.
 pub(super) fn input<'a>(object: &'a SceneObject, context: &Context<'_>) -> Result<Input<'a>, Error> {
     let splat = context.splat_params(object);
-    let opacity = context.opacity(object);
+    let opacity = context.scene.opacity_of(object);
     context.files.scales.borrow_mut().extend(object.value_scale());
     Ok(match &object.source {
         Source::Mesh(path) => {
