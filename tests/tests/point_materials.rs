@@ -13,7 +13,7 @@ fn place(columns: &str) -> Place {
     let mut text = format!("x,y,z,{columns}\n");
     for i in 0..400 {
         let (x, y) = (f64::from(i % 20) * 0.1 - 1.0, f64::from(i / 20) * 0.1 - 1.0);
-        writeln!(text, "{x:.2},{y:.2},0,{},{}", u8::from(x + y > 0.05), 0.5 * x + y).unwrap();
+        writeln!(text, "{x:.2},{y:.2},0,{},{}", u8::from(x + y > 0.05), i % 20 + 2 * (i / 20)).unwrap();
     }
     let place = Place::new(&format!("{HEAD}points = 'wall.csv'\nmaterials = ['glass', 'clay']\n"));
     place.write("wall.csv", text);

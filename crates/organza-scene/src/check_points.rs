@@ -69,10 +69,7 @@ pub(super) fn check_points(at: &At<'_>, raw: &RawObject) -> Result<PointsLook, E
         color_by: raw.color_by.as_ref().map(|by| check_color_by(at, raw, by)).transpose()?,
         keep: keep.collect::<Result<_, _>>()?,
         unlit: raw.unlit,
-        shape: match raw.discs {
-            None | Some(RawDiscShape::Round) => DiscShape::Round,
-            Some(RawDiscShape::Elliptical) => DiscShape::Elliptical,
-        },
+        shape: if raw.discs == Some(RawDiscShape::Elliptical) { DiscShape::Elliptical } else { DiscShape::Round },
         keeps_values: false,
         size: raw.point_size.as_ref().map(|size| check_size(&at.key("point_size"), size)).transpose()?,
     })

@@ -33,7 +33,6 @@ fn how_points_look_is_checked() {
         "color_by = { column = \"z\" }\ntransfer = [{ value = 0, color = [1, 1, 1], opacity = 1.5 }]",
         "`opacity`: expected",
     );
-    refused("materials = [\"glass\"]", "`materials` and `material` exclude each other");
     refused("discs = \"square\"", "expected");
     refused(
         "discs = \"elliptical\"\npoint_size = { pixels = 2 }",
@@ -119,6 +118,7 @@ fn lists_of_materials_are_checked() {
         }
     };
     listed("materials = [\"glass\", \"glass\"]", "");
+    listed("materials = [\"glass\"]\nmaterial = \"glass\"", "`materials` and `material` exclude each other");
     listed("materials = []", "`materials`: expected 1 to 65535 names, found 0");
     listed("materials = [\"glass\", \"glas\"]", "13:23: material `glas` is not defined");
     listed("materials = [\"glass\"]\nas = \"medium\"", "`materials` belongs to `points` that are surfaces");

@@ -217,9 +217,7 @@ fn objects() -> Vec<Entry> {
             .with(&["object.it.clip=[{box=[[-0.3, -0.3, -1], [0.3, 0.3, 1]]}]"]),
         of(RAW, "object.as", "object.it.as='medium'").with(&["material.m.medium={extinction=3}"]).by(POINTS),
         of(RAW, "object.extinction", "object.it.extinction=1").with(MATTER).by(POINTS),
-        of(RAW, "object.materials", "object.it.materials=['m', 'other']").but(All, Refused(2, "exclude each other")),
-        one("object.materials", "object.it.materials=['m']")
-            .but(All, Refused(2, "`materials` belongs to `points` that are surfaces")),
+        one("object.materials", "object.it.materials=['m']").but(All, Refused(2, "belongs to `points` that are")),
         of(RAW, "object.color_by", "object.it.color_by={column='z'}"),
         one("object.color_by", "object.it.color_by={column='z'}")
             .but(All, Refused(2, "`color_by` belongs to `points`")),
