@@ -3,9 +3,11 @@
 //! Light takes the paths of its [`Orders`]: those that the `points` technique simulates, emission, one scattering or reflection, shadows
 //! that translucent things colour; or more, as far as nature's, and [`Truth::beside`] says how much that is. What the scene asks otherwise than nature a path tracer can follow too (`reference::Liberty`):
 //! shadows that are turned off or weakened, and colours above 1, which scatter more light than arrives; the truth says so.
-//! What has no truth is named instead of being guessed at: raw points (nobody knows the surface that they sample), volumes
-//! shaded by their gradient, surfaces that scatter by a phase function.
+//! A volume is classified where light meets it, and reflects about the gradient there where its material asks for that.
+//! What has no truth is named instead of being guessed at: raw points (nobody knows the surface that they sample), surfaces
+//! that scatter by a phase function.
 
+mod medium;
 mod object;
 
 use object::Body;

@@ -1,25 +1,30 @@
-//! A classified volume as a field of extinction: v(p) trilinear between lattice points, then colour and extinction by the
-//! transfer function (post-classification).
+//! A classified volume as a density: v(p) trilinear between lattice points, then colour and extinction by the transfer function
+//! (post-classification), and −∇v/|∇v| by central differences over a step of the lattice on either side.
 //!
-//! The value at a lattice point stands for its cell: constant in the outer half cells, nothing beyond.
+//! The value at a lattice point stands for its cell: constant in the outer half cells, nothing beyond. Between the places where a ray
+//! crosses planes of lattice points or values of control points its extinction is a cubic.
 
+use crate::density::{clamped_cells, lattice_breaks};
+use crate::ray::Ray;
 use glam::{DMat3, DVec3};
-use splat_core::{DAabb, Grid, ScalarField, Similarity, TransferFunction};
+use splat_core::{DAabb, Grid, Similarity, TransferFunction};
 
-/// The extinction of a volume in the world, 1/world unit, as a field: a [`Density::Field`](crate::Density::Field) of a medium
-/// whose own extinction is 1.
+/// A volume in the world behind its transfer function: a [`Density::Volume`](crate::Density::Volume) of a medium whose own
+/// extinction is 1.
 ///
 /// ```
 /// use reference::Classified;
 /// use splat_core::glam::{DMat3, DVec3};
-/// use splat_core::{Grid, ScalarField, Similarity, TransferFunction, TransferPoint};
+/// use splat_core::{Grid, Similarity, TransferFunction, TransferPoint};
 /// let grid = Grid { origin: DVec3::ZERO, axes: DMat3::IDENTITY, dims: [2, 1, 1], values: vec![0.0, 1.0] };
 /// let point = |value, extinction| TransferPoint { value, color: [1.0; 3], extinction };
 /// let transfer = TransferFunction::new(vec![point(0.0, 0.0), point(1.0, 4.0)]).unwrap();
 /// let volume = Classified::new(grid, transfer, &Similarity::default());
-/// assert_eq!(volume.value(DVec3::new(0.5, 0.0, 0.0)), 2.0);
+/// let middle = DVec3::new(0.5, 0.0, 0.0);
+/// assert_eq!((volume.extinction(middle), volume.normal(middle)), (2.0, DVec3::NEG_X));
 /// assert_eq!((volume.most(), volume.bounds().max.x), (4.0, 1.5));
 /// ```
+#[derive(Debug)]
 pub struct Classified {
     grid: Grid,
     index_from_world: DMat3,
@@ -43,13 +48,15 @@ impl Classified {
         self.index_from_world * (p - self.grid.origin)
     }
 
-    /// Value at a place in units of the lattice; `None` outside.
-    fn trilinear(&self, q: DVec3) -> Option<f64> {
-        let last = self.last();
-        if q.cmplt(DVec3::splat(-0.5)).any() || q.cmpgt(last + 0.5).any() {
-            return None;
-        }
-        let q = q.max(DVec3::ZERO).min(last);
+    /// Place in units of the lattice, where there is something.
+    fn inside(&self, p: DVec3) -> Option<DVec3> {
+        let q = self.index(p);
+        (q.cmpge(DVec3::splat(-0.5)).all() && q.cmple(self.last() + 0.5).all()).then_some(q)
+    }
+
+    /// Value at a place in units of the lattice, that of the nearest face outside.
+    fn trilinear(&self, q: DVec3) -> f64 {
+        let q = q.max(DVec3::ZERO).min(self.last());
         let base = q.floor();
         let part = q - base;
         let at = |dx: isize, dy: isize, dz: isize| {
@@ -58,12 +65,54 @@ impl Classified {
         let mix = |a: f64, b: f64, t: f64| a + (b - a) * t;
         let line = |dy, dz| mix(at(0, dy, dz), at(1, dy, dz), part.x);
         let plane = |dz| mix(line(0, dz), line(1, dz), part.y);
-        Some(mix(plane(0), plane(1), part.z))
+        mix(plane(0), plane(1), part.z)
+    }
+
+    /// Red, green, blue and extinction of a value: linear between control points, in f64.
+    fn class(&self, value: f64) -> [f64; 4] {
+        let points = self.transfer.points();
+        let upper = points.partition_point(|p| f64::from(p.value) <= value);
+        let four = |i: usize| {
+            let ([red, green, blue], extinction) = (points[i].color, points[i].extinction);
+            [red, green, blue, extinction].map(f64::from)
+        };
+        if upper == 0 || upper == points.len() {
+            return four(upper.saturating_sub(1));
+        }
+        let [from, to] = [upper - 1, upper].map(|i| f64::from(points[i].value));
+        let (a, b, t) = (four(upper - 1), four(upper), (value - from) / (to - from));
+        std::array::from_fn(|c| a[c] + (b[c] - a[c]) * t)
+    }
+
+    /// Extinction, 1/world unit; 0 outside.
+    pub fn extinction(&self, p: DVec3) -> f64 {
+        self.inside(p).map_or(0.0, |q| self.class(self.trilinear(q))[3])
     }
 
     /// Colour by the transfer function, linear Rec.709; black outside.
     pub fn color(&self, p: DVec3) -> [f64; 3] {
-        self.trilinear(self.index(p)).map_or([0.0; 3], |v| self.transfer.at(v as f32).color.map(f64::from))
+        self.inside(p).map_or([0.0; 3], |q| {
+            let [red, green, blue, _] = self.class(self.trilinear(q));
+            [red, green, blue]
+        })
+    }
+
+    /// −∇v/|∇v|, world space: differences over a step of the lattice on either side, as far as there are lattice points. Zero where
+    /// values do not differ.
+    pub fn normal(&self, p: DVec3) -> DVec3 {
+        let last = self.last();
+        let q = self.index(p).max(DVec3::ZERO).min(last);
+        let mut gradient = DVec3::ZERO;
+        for axis in 0..3 {
+            let (mut before, mut after) = (q, q);
+            before[axis] = (q[axis] - 1.0).max(0.0);
+            after[axis] = (q[axis] + 1.0).min(last[axis]);
+            let apart = after[axis] - before[axis];
+            if apart > 0.0 {
+                gradient[axis] = (self.trilinear(after) - self.trilinear(before)) / apart;
+            }
+        }
+        -(self.index_from_world.transpose() * gradient).normalize_or_zero()
     }
 
     /// Largest number in a colour of the transfer function.
@@ -71,7 +120,7 @@ impl Classified {
         self.transfer.points().iter().flat_map(|p| p.color).fold(0.0, |most, c| most.max(f64::from(c)))
     }
 
-    /// Largest extinction of the transfer function, 1/world unit: a majorant of the field.
+    /// Largest extinction of the transfer function, 1/world unit.
     pub fn most(&self) -> f64 {
         self.transfer.points().iter().fold(0.0, |most, p| most.max(f64::from(p.extinction)))
     }
@@ -82,54 +131,92 @@ impl Classified {
         DAabb::of_points(voxels.corners().map(|corner| self.grid.origin + self.grid.axes * corner))
     }
 
-    /// Least and largest extinction of the values between two.
-    fn range(&self, low: f32, high: f32) -> (f64, f64) {
-        let between = self.transfer.points().iter().filter(|p| p.value > low && p.value < high).map(|p| p.extinction);
-        let ends = [low, high].map(|v| self.transfer.at(v).extinction);
-        let fold = |(least, most): (f32, f32), e: f32| (least.min(e), most.max(e));
-        let (least, most) = ends.into_iter().chain(between).fold((f32::INFINITY, 0.0), fold);
-        // Between two control points the tracer rounds in f32 too.
-        (f64::from(least) * (1.0 - 1e-6), f64::from(most) * (1.0 + 1e-6))
+    pub(crate) fn dims(&self) -> [usize; 3] {
+        self.grid.dims
+    }
+
+    /// Largest extinction of the values in a box of the world.
+    pub(crate) fn upper(&self, bounds: &DAabb) -> f64 {
+        let of = DAabb::of_points(bounds.corners().map(|c| self.index(c)));
+        let Some(cells) = clamped_cells(&of, self.last()) else { return 0.0 };
+        let (mut low, mut high) = (f32::INFINITY, f32::NEG_INFINITY);
+        let [nx, ny, _] = self.grid.dims;
+        let [x, y, z] = cells;
+        for row in z.flat_map(|k| y.clone().map(move |j| (k * ny + j) * nx)) {
+            for value in &self.grid.values[row + x.start()..=row + x.end()] {
+                (low, high) = (low.min(*value), high.max(*value));
+            }
+        }
+        let (low, high) = (f64::from(low), f64::from(high));
+        let between = self.transfer.points().iter().filter(|p| (low..=high).contains(&f64::from(p.value)));
+        let ends = self.class(low)[3].max(self.class(high)[3]);
+        // Rounding may leave the hull of the control points by an ulp.
+        between.fold(ends, |most, p| most.max(f64::from(p.extinction))) * (1.0 + 1e-12)
+    }
+
+    /// Appends the distances in (t0, t1) where the extinction along the ray is not smooth, in no order.
+    pub(crate) fn breaks(&self, ray: &Ray, t0: f64, t1: f64, out: &mut Vec<f64>) {
+        let local = Ray { origin: self.index(ray.origin), direction: self.index_from_world * ray.direction };
+        let mut planes = Vec::new();
+        lattice_breaks(&local, self.last(), (t0, t1), &mut planes);
+        planes.sort_by(f64::total_cmp);
+        for ends in planes.windows(2) {
+            let width = ends[1] - ends[0];
+            let values = [0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0].map(|s| self.trilinear(local.at(ends[0] + width * s)));
+            let cubic = Cubic::through(values);
+            let kinks = self.transfer.points().iter().flat_map(|p| cubic.places_of(f64::from(p.value)));
+            out.extend(kinks.map(|s| ends[0] + width * s));
+        }
+        out.append(&mut planes);
     }
 }
 
-impl ScalarField for Classified {
-    fn value(&self, p: DVec3) -> f64 {
-        self.trilinear(self.index(p)).map_or(0.0, |v| f64::from(self.transfer.at(v as f32).extinction))
+/// A polynomial on \[0, 1\], by its coefficients of 1, s, s², s³.
+struct Cubic([f64; 4]);
+
+impl Cubic {
+    /// Through its values at 0, 1/3, 2/3 and 1.
+    fn through([a, b, c, d]: [f64; 4]) -> Self {
+        // Newton's form: what is 0 stays 0 of values that are alike.
+        let (first, second, third) = (b - a, c - 2.0 * b + a, d - 3.0 * c + 3.0 * b - a);
+        Self([a, 3.0 * first - 1.5 * second + third, 4.5 * (second - third), 4.5 * third])
     }
 
-    /// Not used: a density is not shaded by its gradient.
-    fn gradient(&self, _p: DVec3) -> DVec3 {
-        DVec3::ZERO
+    fn at(&self, s: f64) -> f64 {
+        let [a, b, c, d] = self.0;
+        a + s * (b + s * (c + s * d))
     }
 
-    fn hessian(&self, _p: DVec3) -> DMat3 {
-        DMat3::ZERO
+    /// Where it turns, rising, between 0 and 1, with these.
+    fn monotone(&self) -> Vec<f64> {
+        let [_, b, c, d] = self.0;
+        let root = (c * c - 3.0 * d * b).max(0.0).sqrt();
+        // Of 3ds² + 2cs + b, without cancellation.
+        let sum = -(c + root.copysign(c));
+        let mut ends: Vec<f64> = [sum / (3.0 * d), b / sum].into_iter().filter(|s| *s > 0.0 && *s < 1.0).collect();
+        ends.extend([0.0, 1.0]);
+        ends.sort_by(f64::total_cmp);
+        ends
     }
 
-    fn bound(&self, p: DVec3, radius: f64) -> Option<(f64, f64)> {
-        let rows = self.index_from_world.transpose();
-        let reach = radius * DVec3::new(rows.x_axis.length(), rows.y_axis.length(), rows.z_axis.length());
-        let (q, last) = (self.index(p), self.last());
-        let (low, high) = (q - reach, q + reach);
-        let half = DVec3::splat(0.5);
-        if high.cmplt(-half).any() || low.cmpgt(last + half).any() {
-            return Some((0.0, 0.0));
-        }
-        let cells = |a: usize| {
-            let clamp = |v: f64| v.clamp(0.0, last[a]) as usize;
-            clamp((low[a] - 1e-6).floor())..=clamp((high[a] + 1e-6).ceil())
+    /// Where it crosses a value.
+    fn places_of(&self, value: f64) -> Vec<f64> {
+        let above = |s: f64| self.at(s) > value;
+        let crossed = |ends: &[f64]| {
+            let (mut a, mut b) = (ends[0], ends[1]);
+            let at_a = above(a);
+            if at_a == above(b) {
+                return None;
+            }
+            loop {
+                let middle = 0.5 * (a + b);
+                if middle <= a || middle >= b || b - a < 1e-15 {
+                    return Some(middle);
+                }
+                *(if above(middle) == at_a { &mut a } else { &mut b }) = middle;
+            }
         };
-        let [nx, ny, _] = self.grid.dims;
-        let row = |j: usize, k: usize| (k * ny + j) * nx;
-        let x = cells(0);
-        let values = cells(2)
-            .flat_map(|k| cells(1).map(move |j| (j, k)))
-            .flat_map(|(j, k)| &self.grid.values[row(j, k) + x.start()..=row(j, k) + x.end()]);
-        let (least, most) = values.fold((f32::INFINITY, f32::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
-        let (least, most) = self.range(least, most);
-        let inside = low.cmpge(-half).all() && high.cmple(last + half).all();
-        Some((if inside { least } else { 0.0 }, most))
+        self.monotone().windows(2).filter_map(crossed).collect()
     }
 }
 
@@ -154,28 +241,41 @@ mod tests {
         let v = volume();
         for (i, j, k) in [(0, 0, 0), (3, 2, 1), (5, 4, 3)] {
             let own = v.transfer.at(v.grid.at_clamped(i, j, k)).extinction;
-            let found = v.value(v.grid.position(i as usize, j as usize, k as usize));
+            let found = v.extinction(v.grid.position(i as usize, j as usize, k as usize));
             assert!((found - f64::from(own)).abs() < 1e-4, "{found} and {own}");
         }
         let DAabb { min: low, max: high } = v.bounds();
-        assert_eq!((v.value(low - 0.01), v.value(high + 0.01)), (0.0, 0.0));
+        assert_eq!((v.extinction(low - 0.01), v.extinction(high + 0.01)), (0.0, 0.0));
         assert_eq!((v.most(), v.brightest()), (9.0, 1.5));
     }
 
     #[test]
-    fn bounds_hold_for_every_point_of_a_ball() {
+    fn bounds_hold_for_every_point_of_a_box() {
         let v = volume();
         let DAabb { min: low, max: high } = v.bounds();
         for i in 0..400 {
             let u = |k| rng::unit(7, 1, i, k);
-            let p = low + (high - low) * DVec3::new(u(0), u(1), u(2));
-            let radius = 0.3 * u(3);
-            let (least, most) = v.bound(p, radius).unwrap();
+            let middle = low + (high - low) * DVec3::new(u(0), u(1), u(2));
+            let within = DAabb::around(middle, DVec3::splat(0.3 * u(3)));
+            let most = v.upper(&within);
             for s in 0..40 {
-                let d = |k| rng::unit(8, i, s, k) - 0.5;
-                let q = p + DVec3::new(d(0), d(1), d(2)).normalize() * radius * rng::unit(9, i, s, 0);
-                assert!((least..=most).contains(&v.value(q)), "{} not in {least} to {most}", v.value(q));
+                let d = |k| rng::unit(8, i, s, k);
+                let p = within.min + within.size() * DVec3::new(d(0), d(1), d(2));
+                assert!(v.extinction(p) <= most, "{} above {most}", v.extinction(p));
             }
+        }
+    }
+
+    #[test]
+    fn cubics_cross_values_where_they_do() {
+        // (s − 0.2)(s − 0.5)(s − 0.9), and a straight line.
+        let f = |s: f64| (s - 0.2) * (s - 0.5) * (s - 0.9);
+        for (f, places) in
+            [(&f as &dyn Fn(f64) -> f64, vec![0.2, 0.5, 0.9]), (&|s| 0.7 - s, vec![0.7]), (&|_| 1.0, vec![])]
+        {
+            let found = Cubic::through([0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0].map(f)).places_of(0.0);
+            assert_eq!(found.len(), places.len(), "{found:?}");
+            assert!(found.iter().zip(&places).all(|(a, b)| (a - b).abs() < 1e-14), "{found:?}");
         }
     }
 }

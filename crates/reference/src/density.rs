@@ -1,10 +1,12 @@
 //! Densities: how much of a medium there is at a point, where along a ray the density is smooth, and how large it can
 //! get inside a box.
 
+use crate::classified::Classified;
 use crate::ray::Ray;
 use crate::roots::{RootParams, crossings};
 use glam::{DMat3, DVec3};
 use splat_core::{Clip, DAabb, Error, Grid, ScalarField};
+use std::ops::RangeInclusive;
 
 /// Majorant cells along each axis of a density that is cut.
 const CUT_DETAIL: usize = 8;
@@ -24,6 +26,8 @@ pub enum Density<'a> {
     },
     /// A volume, see [`Lattice`].
     Grid(Lattice<'a>),
+    /// The extinction of a volume behind its transfer function, see [`Classified`].
+    Volume(&'a Classified),
     /// A field's value where it is positive, inside a box.
     Field {
         /// The field.
@@ -125,42 +129,49 @@ impl<'a> Lattice<'a> {
     }
 
     fn upper(&self, bounds: &DAabb) -> f64 {
-        let DAabb { min: low, max: high } = DAabb::of_points(bounds.corners().map(|c| self.index(c)));
-        // A guard of 2⁻²⁰ cells: the box may be computed in other roundings than the points in it.
-        let guard = DVec3::splat(0.5 + 1.0 / 1_048_576.0);
-        if high.cmplt(-guard).any() || low.cmpgt(self.last + guard).any() {
-            return 0.0;
-        }
-        let range = |a: usize| {
-            let clamp = |v: f64| v.clamp(0.0, self.last[a]) as usize;
-            clamp((low[a] - 1e-6).floor())..=clamp((high[a] + 1e-6).ceil())
-        };
+        let of = DAabb::of_points(bounds.corners().map(|c| self.index(c)));
+        let Some([x, y, z]) = clamped_cells(&of, self.last) else { return 0.0 };
         let [nx, ny, _] = self.grid.dims;
-        let rows = range(2).flat_map(|k| range(1).map(move |j| (k * ny + j) * nx));
-        rows.map(|row| {
-            let r = range(0);
-            self.grid.values[row + r.start()..=row + r.end()].iter().fold(0.0f32, |m, v| m.max(*v))
-        })
-        .fold(0.0, |m: f64, v| m.max(f64::from(v)))
+        let rows = z.flat_map(|k| y.clone().map(move |j| (k * ny + j) * nx));
+        rows.map(|row| self.grid.values[row + x.start()..=row + x.end()].iter().fold(0.0f32, |m, v| m.max(*v)))
+            .fold(0.0, |m: f64, v| m.max(f64::from(v)))
     }
 
     fn breaks(&self, ray: &Ray, t0: f64, t1: f64, out: &mut Vec<f64>) {
-        // In index space the lattice is a box of unit cells; t stays the world distance.
         let local = Ray { origin: self.index(ray.origin), direction: self.index_from_world * ray.direction };
-        let half = DVec3::splat(0.5);
-        let Some((enter, leave)) = local.clip(&DAabb::new(-half, self.last + half), t0, t1) else { return };
-        out.extend([enter, leave]);
-        for a in 0..3 {
-            let (o, d) = (local.origin[a], local.direction[a]);
-            if d == 0.0 {
-                continue;
-            }
-            let (p, q) = (o + enter * d, o + leave * d);
-            let first = p.min(q).ceil().max(0.0) as usize;
-            let last = p.max(q).floor().min(self.last[a]);
-            if last >= 0.0 {
-                out.extend((first..=last as usize).map(|i| (i as f64 - o) / d));
-            }
+        lattice_breaks(&local, self.last, (t0, t1), out);
+    }
+}
+
+/// Lattice points that a box in units of the lattice has values of, by axis; `None` where it lies outside.
+pub(crate) fn clamped_cells(bounds: &DAabb, last: DVec3) -> Option<[RangeInclusive<usize>; 3]> {
+    let DAabb { min: low, max: high } = *bounds;
+    // A guard of 2⁻²⁰ cells: the box may be computed in other roundings than the points in it.
+    let guard = DVec3::splat(0.5 + 1.0 / 1_048_576.0);
+    let range = |a: usize| {
+        let clamp = |v: f64| v.clamp(0.0, last[a]) as usize;
+        clamp((low[a] - 1e-6).floor())..=clamp((high[a] + 1e-6).ceil())
+    };
+    let is_outside = high.cmplt(-guard).any() || low.cmpgt(last + guard).any();
+    (!is_outside).then(|| [0, 1, 2].map(range))
+}
+
+/// Appends the distances in (t0, t1) where a ray crosses planes of lattice points, or the faces half a cell beyond the outermost. The ray
+/// is one in units of the lattice whose distances are those of the world.
+pub(crate) fn lattice_breaks(local: &Ray, last: DVec3, (t0, t1): (f64, f64), out: &mut Vec<f64>) {
+    let half = DVec3::splat(0.5);
+    let Some((enter, leave)) = local.clip(&DAabb::new(-half, last + half), t0, t1) else { return };
+    out.extend([enter, leave]);
+    for a in 0..3 {
+        let (o, d) = (local.origin[a], local.direction[a]);
+        if d == 0.0 {
+            continue;
+        }
+        let (p, q) = (o + enter * d, o + leave * d);
+        let first = p.min(q).ceil().max(0.0) as usize;
+        let last = p.max(q).floor().min(last[a]);
+        if last >= 0.0 {
+            out.extend((first..=last as usize).map(|i| (i as f64 - o) / d));
         }
     }
 }
@@ -171,6 +182,7 @@ impl Density<'_> {
     pub fn value(&self, p: DVec3) -> f64 {
         match self {
             Self::Grid(lattice) => lattice.value(p),
+            Self::Volume(volume) => volume.extinction(p),
             Self::Box(bounds) => f64::from(bounds.contains(p)),
             Self::Ball { center, radius } => f64::from((p - center).length() <= *radius),
             Self::Field { field, bounds, .. } if bounds.contains(p) => field.value(p).max(0.0),
@@ -188,6 +200,7 @@ impl Density<'_> {
             Self::Field { bounds, .. } | Self::Inside { bounds, .. } | Self::Function { bounds, .. } => *bounds,
             Self::Ball { center, radius } => DAabb::around(*center, DVec3::splat(*radius)),
             Self::Grid(lattice) => DAabb::of_points(lattice.corners()),
+            Self::Volume(volume) => volume.bounds(),
             Self::Cut { of, .. } => of.bounds(),
         }
     }
@@ -207,6 +220,7 @@ impl Density<'_> {
                 f64::from((nearest - center).length() <= radius * (1.0 + 1e-9))
             }
             Self::Grid(lattice) => lattice.upper(bounds),
+            Self::Volume(volume) => volume.upper(bounds),
             Self::Field { field, majorant, .. } => {
                 field.bound(middle, reach).map_or(*majorant, |(_, high)| high.max(0.0).min(*majorant))
             }
@@ -235,6 +249,7 @@ impl Density<'_> {
             Self::Ball { center, radius } => push(ray.clip_ball(*center, *radius, t0, t1)),
             Self::Field { bounds, .. } | Self::Function { bounds, .. } => push(ray.clip(bounds, t0, t1)),
             Self::Grid(lattice) => lattice.breaks(ray, t0, t1, out),
+            Self::Volume(volume) => volume.breaks(ray, t0, t1, out),
             Self::Inside { field, bounds } => {
                 if let Some((a, b)) = ray.clip(bounds, t0, t1) {
                     out.extend([a, b]);
@@ -257,7 +272,8 @@ impl Density<'_> {
             Self::Box(_) | Self::Function { .. } => [1; 3],
             Self::Ball { .. } => [8; 3],
             Self::Field { .. } | Self::Inside { .. } => [32; 3],
-            Self::Grid(lattice) => lattice.grid.dims.map(|d| d.div_ceil(4).min(64)),
+            Self::Grid(lattice) => majorant_cells(lattice.grid.dims),
+            Self::Volume(volume) => majorant_cells(volume.dims()),
             Self::Cut { of, .. } => of.detail().map(|n| n.max(CUT_DETAIL)),
         }
     }
@@ -280,4 +296,9 @@ impl Density<'_> {
             _ => Ok(()),
         }
     }
+}
+
+/// Four lattice points a cell.
+fn majorant_cells(dims: [usize; 3]) -> [usize; 3] {
+    dims.map(|d| d.div_ceil(4).min(64))
 }

@@ -80,7 +80,7 @@ pub use implicit::{ImplicitSurface, SurfaceImage, SurfaceScene, composite_surfac
 pub use liberty::Liberty;
 pub use lights::LightSource;
 pub use march::{MarchedImage, MarchedRay, march, march_image, optical_depth};
-pub use medium::{ColorAt, Medium};
+pub use medium::{ColorAt, Facets, Medium};
 pub use path::PathRules;
 pub use phase::{henyey_greenstein, sample_henyey_greenstein};
 pub use pixel::PixelSum;

@@ -1,7 +1,7 @@
 //! Ray marching of media with error control: transmittance, emission and single scattering along a ray.
 //!
-//! L = ∫T(t)·σ(t)·[S + Σ_lights ω·p·I·T_light/d²] dt + T·L_background, T = e^−∫σ. A ray is cut where a density is not
-//! smooth (boxes, balls, lattice planes, roots of fields). Between cuts of piecewise cubic densities the two-point Gauss
+//! L = ∫T(t)·σ(t)·[S + Σ_lights ω·p·I·T_light/d²] dt + T·L_background, T = e^−∫σ; with [`crate::Facets`] a surface's response
+//! stands for ω·p. A ray is cut where a density is not smooth (boxes, balls, lattice planes, values of control points, roots of fields). Between cuts of piecewise cubic densities the two-point Gauss
 //! rule gives the optical depth exactly; other densities, and the light, are integrated adaptively
 //! ([`MarchParams`]). Near a light without extent t = t_c + D·tan θ (D the distance of the ray) turns dt/d² into dθ/D, so
 //! the integrand stays smooth (equiangular substitution). A ray through the light itself has no finite value: its error
@@ -9,7 +9,6 @@
 
 use crate::lights::LightSource;
 use crate::medium::Medium;
-use crate::phase::henyey_greenstein;
 use crate::quadrature::{Integral, MarchParams, integrate};
 use crate::ray::Ray;
 use crate::scene::Scene;
@@ -204,13 +203,16 @@ impl<'a> Line<'a> {
         let mut sum = [0.0; 3];
         for medium in self.media {
             let density = medium.density.value(p);
-            let (_, emitted) = medium.source(p);
+            if density <= 0.0 {
+                continue;
+            }
+            let emitted = medium.emitted(p);
             (0..3).for_each(|c| sum[c] += left[c] * density * medium.extinction[c] * emitted[c]);
         }
         sum
     }
 
-    /// Light scattered towards the eye at a distance, per unit of 1/d² for a light with a pole.
+    /// Light scattered or reflected towards the eye at a distance, per unit of 1/d² for a light with a pole.
     fn scattered(&self, light: &LightSource, t: f64) -> [f64; 3] {
         let p = self.ray.at(t);
         let density_at = |m: &Medium<'_>| m.density.value(p);
@@ -227,9 +229,11 @@ impl<'a> Line<'a> {
         let (left, intensity) = (self.transmittance(t), light.intensity(p));
         let mut sum = [0.0; 3];
         for medium in self.media {
-            let phase = density_at(medium) * henyey_greenstein(self.ray.direction, to_light, medium.asymmetry);
-            let (albedo, _) = medium.source(p);
-            (0..3).for_each(|c| sum[c] += medium.extinction[c] * albedo[c] * phase);
+            let density = density_at(medium);
+            if density > 0.0 {
+                let share = medium.toward(p, to_light, -self.ray.direction);
+                (0..3).for_each(|c| sum[c] += medium.extinction[c] * density * share[c]);
+            }
         }
         std::array::from_fn(|c| sum[c] * left[c] * intensity[c] * (-depth[c]).exp())
     }

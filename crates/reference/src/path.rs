@@ -12,7 +12,9 @@
 mod direct;
 
 use crate::dielectric::{Dielectric, fresnel_reflectance, reflect, refract};
+use crate::liberty::Liberty;
 use crate::lights::LightSource;
+use crate::medium::Event;
 use crate::phase::{henyey_greenstein, sample_henyey_greenstein};
 use crate::random::Stream;
 use crate::ray::Ray;
@@ -133,6 +135,15 @@ impl Path {
 struct Vertex {
     scatter: Scatter,
     shadow_coefficient: f64,
+}
+
+/// A place that reflects light about a normal, a surface's or a medium's.
+struct Mirror<'a> {
+    point: DVec3,
+    response: Response,
+    liberty: &'a Liberty,
+    /// The triangle that it lies on.
+    on: Option<u32>,
 }
 
 enum Scatter {
@@ -284,10 +295,20 @@ impl<'a> Tracer<'a> {
 
     fn scatter_in_medium(&self, path: &mut Path, c: &Collision, rng: &mut Stream) -> bool {
         let medium = &self.scene.media[c.medium];
-        let (albedo, emitted) = medium.source(c.point);
         if path.bounces == 0 || self.rules.emission_illuminates {
-            path.add(emitted, 1.0);
+            path.add(medium.emitted(c.point), 1.0);
         }
+        let travel = path.ray.direction;
+        let (albedo, asymmetry) = match medium.event(c.point, -travel) {
+            Event::Reflected(response) => {
+                return self.reflect(
+                    path,
+                    Mirror { point: c.point, response, liberty: &medium.liberty, on: None },
+                    rng,
+                );
+            }
+            Event::Scattered { albedo, asymmetry } => (albedo, asymmetry),
+        };
         if !self.may_scatter(path) {
             return false;
         }
@@ -296,15 +317,14 @@ impl<'a> Tracer<'a> {
         if !path.survives(rng) {
             return false;
         }
-        let travel = path.ray.direction;
-        let scatter = Scatter::Medium { travel, asymmetry: medium.asymmetry };
+        let scatter = Scatter::Medium { travel, asymmetry };
         let vertex = Vertex { scatter, shadow_coefficient: medium.liberty.shadow_coefficient };
         path.turn(c.point, travel, u32::MAX);
         self.gather(path, &vertex, &self.at_vertices, u32::MAX, rng);
         self.gather_environment(path, &vertex, u32::MAX, rng);
-        let direction = sample_henyey_greenstein(travel, medium.asymmetry, rng.pair());
+        let direction = sample_henyey_greenstein(travel, asymmetry, rng.pair());
         path.turn(c.point, direction, u32::MAX);
-        path.density = Some(henyey_greenstein(travel, direction, medium.asymmetry));
+        path.density = Some(henyey_greenstein(travel, direction, asymmetry));
         true
     }
 
@@ -325,22 +345,31 @@ impl<'a> Tracer<'a> {
         if path.bounces == 0 || self.rules.emission_illuminates {
             path.add(surface.material.emitted(color), 1.0);
         }
+        let response = surface.material.response(color, surface.normal(hit.triangle, hit.uv, geometric), -travel);
+        let point = path.ray.at(hit.t);
+        self.reflect(path, Mirror { point, response, liberty: &surface.material.liberty, on: Some(hit.id) }, rng)
+    }
+
+    /// Light that is reflected about a normal; false when the path ends.
+    fn reflect(&self, path: &mut Path, mirror: Mirror<'_>, rng: &mut Stream) -> bool {
         if !self.may_scatter(path) || self.rules.reflects_apart && path.bounces > 0 {
             return false;
         }
         path.bounces += 1;
         path.is_over = self.rules.reflects_apart;
-        let response = surface.material.response(color, surface.normal(hit.triangle, hit.uv, geometric), -travel);
-        let point = path.ray.at(hit.t);
-        path.turn(point, travel, hit.id);
-        let liberty = &surface.material.liberty;
+        let Mirror { point, response, liberty, on } = mirror;
+        let skip = on.unwrap_or(u32::MAX);
+        path.turn(point, path.ray.direction, skip);
         path.scale([liberty.gain; 3]);
         let vertex = Vertex { scatter: Scatter::Surface(response), shadow_coefficient: liberty.shadow_coefficient };
-        self.gather(path, &vertex, &self.at_vertices, hit.id, rng);
-        self.gather(path, &vertex, &self.along_segments, hit.id, rng);
-        self.gather_environment(path, &vertex, hit.id, rng);
+        self.gather(path, &vertex, &self.at_vertices, skip, rng);
+        // Inside a medium these were gathered along the segment.
+        if on.is_some() {
+            self.gather(path, &vertex, &self.along_segments, skip, rng);
+        }
+        self.gather_environment(path, &vertex, skip, rng);
         let Some((direction, weight, density)) = response.sample(rng) else { return false };
-        path.turn(point, direction, hit.id);
+        path.turn(point, direction, skip);
         path.density = Some(density);
         path.scale(weight);
         path.survives(rng)

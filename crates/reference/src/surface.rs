@@ -80,7 +80,7 @@ pub struct Surface<'a> {
 /// A surface's response at one point, for one direction of view.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Response {
-    /// Shading normal on the viewer's side.
+    /// Shading normal: of a surface on the viewer's side.
     normal: DVec3,
     mirrored: DVec3,
     diffuse: [f64; 3],
@@ -112,18 +112,8 @@ impl SurfaceMaterial {
     /// Response seen from unit direction `to_eye`; `normal` on either side.
     pub(crate) fn response(&self, color: [f64; 3], normal: DVec3, to_eye: DVec3) -> Response {
         let normal = if normal.dot(to_eye) < 0.0 { -normal } else { normal };
-        let diffuse: [f64; 3] = std::array::from_fn(|c| (self.diffuse[c] * color[c]).clamp(0.0, 1.0));
-        let brightest = diffuse.iter().fold(0.0, |m: f64, d| m.max(*d));
-        let sum = brightest + self.specular;
-        Response {
-            normal,
-            mirrored: normal * (2.0 * normal.dot(to_eye)) - to_eye,
-            diffuse,
-            transmission: self.transmission,
-            specular: self.specular,
-            shininess: self.shininess,
-            lobe: if sum > 0.0 { self.specular / sum } else { 0.0 },
-        }
+        let diffuse = std::array::from_fn(|c| (self.diffuse[c] * color[c]).clamp(0.0, 1.0));
+        Response::new(diffuse, [self.transmission, self.specular, self.shininess], normal, to_eye)
     }
 
     pub(crate) fn validate(&self, index: usize) -> Result<(), Error> {
@@ -154,6 +144,26 @@ impl SurfaceMaterial {
 }
 
 impl Response {
+    /// About a unit normal, as it is.
+    pub(crate) fn new(
+        diffuse: [f64; 3],
+        [transmission, specular, shininess]: [f64; 3],
+        normal: DVec3,
+        to_eye: DVec3,
+    ) -> Self {
+        let brightest = diffuse.iter().fold(0.0, |m: f64, d| m.max(*d));
+        let sum = brightest + specular;
+        Self {
+            normal,
+            mirrored: normal * (2.0 * normal.dot(to_eye)) - to_eye,
+            diffuse,
+            transmission,
+            specular,
+            shininess,
+            lobe: if sum > 0.0 { specular / sum } else { 0.0 },
+        }
+    }
+
     /// BRDF or BTDF times the cosine, towards unit direction `leave`, and the density of sampling it.
     pub(crate) fn toward(&self, leave: DVec3) -> ([f64; 3], f64) {
         let cosine = self.normal.dot(leave);

@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod agrees_with_raster;
+mod classified;
 mod flip;
 mod path_liberties;
 mod path_media;

@@ -2,7 +2,6 @@
 
 use super::{Lamp, Path, Tracer, Vertex};
 use crate::lights::LightSample;
-use crate::phase::henyey_greenstein;
 use crate::random::Stream;
 use crate::ray::Ray;
 use crate::visibility::Filter;
@@ -72,7 +71,7 @@ impl Tracer<'_> {
         path.add(std::array::from_fn(|c| share[c] * s.value[c] * arrives[c]), balance / chosen);
     }
 
-    /// Single scattering from lights inside media, along the part of the segment that media fill.
+    /// Light of lights inside media that is scattered or reflected by them once, along the part of the segment that media fill.
     pub(super) fn gather_along(&self, path: &mut Path, end: f64, rng: &mut Stream) {
         let Some((t0, t1)) = self.volume.bounds().and_then(|b| path.ray.clip(b, path.t, end)) else { return };
         let n = self.along_segments.len();
@@ -83,7 +82,8 @@ impl Tracer<'_> {
         let (a, b) = ((t0 - middle).atan2(apart), (t1 - middle).atan2(apart));
         let t = middle + apart * (a + (b - a) * rng.unit()).tan();
         let point = path.ray.at(t);
-        let (scattered, dimmed) = self.scattering(point, pole, path.ray.direction);
+        let may_reflect = !self.rules.reflects_apart || path.bounces == 0;
+        let (scattered, dimmed) = self.scattering(point, pole, path.ray.direction, may_reflect);
         if !(t0..=t1).contains(&t) || scattered.iter().all(|s| *s == 0.0) {
             return;
         }
@@ -99,18 +99,16 @@ impl Tracer<'_> {
         path.add(std::array::from_fn(|c| lit(c) * intensity[c] * passing[c] * seen[c]), factor);
     }
 
-    /// Σ over media of extinction · albedo · phase towards a light, per channel; all, and the share that shadows dim.
-    fn scattering(&self, p: DVec3, pole: DVec3, travel: DVec3) -> ([f64; 3], [f64; 3]) {
+    /// Σ over media of extinction · share of the light that is scattered or reflected, per channel; all, and the share that shadows dim.
+    fn scattering(&self, p: DVec3, pole: DVec3, travel: DVec3, may_reflect: bool) -> ([f64; 3], [f64; 3]) {
         let (mut sum, mut dimmed) = ([0.0; 3], [0.0; 3]);
         let to_light = (pole - p).normalize_or_zero();
         for medium in &self.scene.media {
             let density = medium.density.value(p);
-            if density > 0.0 {
-                let (albedo, _) = medium.source(p);
-                let phase = henyey_greenstein(travel, to_light, medium.asymmetry);
-                let factor = density * phase * medium.liberty.gain;
+            if density > 0.0 && (may_reflect || !medium.reflects(p)) {
+                let (share, factor) = (medium.toward(p, to_light, -travel), density * medium.liberty.gain);
                 for c in 0..3 {
-                    let own = factor * medium.extinction[c] * albedo[c];
+                    let own = factor * medium.extinction[c] * share[c];
                     sum[c] += own;
                     dimmed[c] += medium.liberty.shadow_coefficient * own;
                 }
