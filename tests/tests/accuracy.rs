@@ -393,17 +393,21 @@ fn what_a_report_says_to_write_gives_the_scene_that_it_drew() {
     let facts = Facts { slice_thickness: Some(0.1), cells: Some(64) };
     let thorough = Options { quick: false, ..OPTIONS };
     let ball = "implicit = { expression = \"x^2 + y^2 + z^2 - 0.25\", box = [[-1, -1, -1], [1, 1, 1]], spacing = 0.1 }";
-    let text = format!("{SCENE}[[object]]\nname = \"ball\"\n{ball}\nopacity = 0.5\n");
+    let volume =
+        "[[object]]\nname = 'v'\nvolume = 'v.nii'\ntransfer = [{ value = 0, color = [1, 1, 1], extinction = 1 }]";
+    let lamp = "[[light]]\nkind = 'sphere'\nposition = [0, 9, 0]\nradius = 1\nintensity = [1, 1, 1]";
+    let text = format!("{SCENE}{lamp}\n{volume}\n[[object]]\nname = \"ball\"\n{ball}\nopacity = 0.5\n");
     let parsed = |set: &[String]| {
         let overrides = set.iter().map(|s| scene::Override::parse(s).unwrap()).collect();
         let options = scene::LoadOptions { overrides, ..Default::default() };
         scene::parse("s.toml".as_ref(), text.as_bytes(), &options).unwrap()
     };
     let half_vector = "render.sheets.slicing='half_vector'";
+    let scattered = [half_vector, "render.sheets.scattering='forward_and_back'"];
     let algorithm = ["render.surfels.layers='algorithm2'", "render.surfels.grouping='hash'"];
+    let coarse = ["render.points.slice_thickness=0.25", "render.shadow.cells=99"];
     let (mut tried, mut told) = (0, 0);
-    for own in [&[][..], &[half_vector], &algorithm, &["render.points.slice_thickness=0.25", "render.shadow.cells=99"]]
-    {
+    for own in [&[][..], &[half_vector], &scattered, &algorithm, &coarse] {
         let own: Vec<String> = own.iter().map(|s| (*s).to_owned()).collect();
         let written = parsed(&own);
         let sweeps = [

@@ -11,4 +11,5 @@ mod scattering;
 mod soft;
 mod soft_polygons;
 mod splats;
+mod splats_scattered;
 mod twin;

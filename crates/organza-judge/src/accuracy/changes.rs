@@ -3,8 +3,10 @@
 use super::Request;
 use super::points::spacing_factor;
 use organza::scene::{
-    Collisions, Coverage, Grouping, RenderSettings, Scene, ShadowMapping, Slicing, SurfaceSampler, SurfelLayers,
+    Classify, Collisions, Coverage, Grouping, RenderSettings, Scene, ShadowMapping, Slicing, SoftShadows,
+    SurfaceSampler, SurfelLayers,
 };
+use splat_core::Packing;
 use splat_core::raster::Accumulation;
 
 /// A key of a scene and its value.
@@ -43,12 +45,15 @@ pub fn changes(as_written: &Scene, request: &Request) -> Vec<Change> {
     found.extend(gone.map(|(table, key, _)| Change { table: (*table).into(), key, value: None }));
     // The layout of a file: a table is opened once.
     found.sort_by_key(|change| stated_tables().position(|table| table == change.table));
-    let objects = as_written.objects.iter().zip(&request.scene.objects).filter(|(a, b)| a.technique != b.technique);
-    found.extend(objects.map(|(_, object)| Change {
-        table: format!("object.{}", object.name),
-        key: "technique",
-        value: object.technique.map(|technique| quoted(technique.name())),
-    }));
+    for (before, object) in as_written.objects.iter().zip(&request.scene.objects) {
+        let mut add = |key, value| found.push(Change { table: format!("object.{}", object.name), key, value });
+        if before.technique != object.technique {
+            add("technique", object.technique.map(|technique| quoted(technique.name())));
+        }
+        if before.packing != object.packing {
+            add("lattice", Some(quoted(if object.packing == Packing::BodyCentred { "bcc" } else { "cartesian" })));
+        }
+    }
     found
 }
 
@@ -146,8 +151,15 @@ fn sheets(render: &RenderSettings, all: &mut Vec<Stated>) {
     add("kernel_extent", number(sheets.kernel_extent));
     add("kernel_sigma", number(sheets.kernel_sigma));
     add("transmittance_cutoff", number(sheets.transmittance_cutoff));
-    if let Slicing::HalfVector { light_pixels, .. } = sheets.slicing {
-        add("light_pixels", number(light_pixels));
+    let Slicing::HalfVector { light_pixels, scattering, soft_shadows, .. } = sheets.slicing else {
+        add("classify", quoted(if sheets.classify == Classify::Before { "before" } else { "after" }));
+        return;
+    };
+    add("light_pixels", number(light_pixels));
+    add("soft_shadows", quoted(if soft_shadows == SoftShadows::OneSweep { "one_sweep" } else { "points" }));
+    if let Some(scattering) = scattering {
+        add("scattering_cone", scattering.cone.map_or_else(|| quoted("auto"), |cone| number(cone.to_degrees())));
+        add("voxels_per_cell", scattering.voxels_per_cell.to_string());
     }
 }
 

@@ -2,7 +2,8 @@
 
 use super::points::{absorbance_cut, cells, choice, cutoffs, finer, samples, step};
 use super::{Facts, Knob, Options, Request, Skipped, Sweep, Theory};
-use organza::scene::{LayerChoice, Scene, Slicing, Technique};
+use organza::scene::{Classify, LayerChoice, Scattering, Scene, SceneObject, Slicing, SoftShadows, Source, Technique};
+use splat_core::Packing;
 
 /// Knobs of `sheets` in this scene, whose slabs are `slab_width` wide by its own setting; or why there are none.
 ///
@@ -30,6 +31,11 @@ pub fn sheets(scene: &Scene, slab_width: Option<f64>, facts: &Facts, options: &O
         ("absorbance cut", absorbance_cut(facts, options)),
         ("transmittance cut", Ok(transmittance_cut(options))),
         ("light buffer", light_buffer(scene)),
+        ("soft shadows", soft_shadows(scene)),
+        ("cells of scattered light", scattered_cells(scene, options)),
+        ("cone of scattered light", scattered_cone(scene)),
+        ("classification", classification(scene)),
+        ("lattice", lattice(scene)),
         ("samples", samples(options)),
     ];
     for (name, knob) in knobs {
@@ -77,45 +83,145 @@ fn light_buffer(scene: &Scene) -> Result<Knob, String> {
     if scene.render.sheets.slicing == Slicing::View {
         return Err("slabs across the view have no light buffers".into());
     }
-    Ok(Knob {
-        name: "light buffer",
-        size_meaning: "",
-        set: |request, value| {
+    Ok(choices(
+        "light buffer",
+        |request, value| {
             if let Slicing::HalfVector { light_pixels, .. } = &mut request.scene.render.sheets.slicing {
                 *light_pixels = value;
             }
         },
-        steps: [0.5, 1.0, 1.5, 3.0].map(|n| choice(&format!("{n} pixels a step of the lattice"), n)).to_vec(),
+        &[0.5, 1.0, 1.5, 3.0].map(|n| (format!("{n} pixels a step of the lattice"), n)),
+    ))
+}
+
+/// A sweep for each point of a light with an extent, or one for all.
+fn soft_shadows(scene: &Scene) -> Result<Knob, String> {
+    if !scene.lights.iter().any(|l| l.light.shape.is_extended()) || scene.render.sheets.slicing == Slicing::View {
+        return Err("no light with an extent is carried by slabs".into());
+    }
+    Ok(choices(
+        "soft shadows",
+        |request, value| {
+            if let Slicing::HalfVector { soft_shadows, .. } = &mut request.scene.render.sheets.slicing {
+                *soft_shadows = if value > 0.0 { SoftShadows::OneSweep } else { SoftShadows::Points };
+            }
+        },
+        &[("a sweep for each point", 0.0), ("one sweep", 1.0)],
+    ))
+}
+
+const SCATTERED_ONCE: &str = "no light is scattered more than once";
+
+/// Where light is scattered more than once, what is set for that.
+fn scattering(request: &mut Request) -> Option<&mut Scattering> {
+    match &mut request.scene.render.sheets.slicing {
+        Slicing::HalfVector { scattering, .. } => scattering.as_mut(),
+        Slicing::View => None,
+    }
+}
+
+/// How coarse the cells of reflectances are.
+fn scattered_cells(scene: &Scene, options: &Options) -> Result<Knob, String> {
+    scene.render.sheets.scattering().ok_or(SCATTERED_ONCE)?;
+    let voxels: &[f64] = if options.quick { &[256.0, 64.0, 16.0] } else { &[1024.0, 256.0, 64.0, 32.0, 16.0] };
+    let at = |n: f64| step(format!("{n} voxels a cell"), n.cbrt(), n);
+    Ok(Knob {
+        name: "cells of scattered light",
+        size_meaning: "width of a cell over that of a voxel",
+        set: |request, value| {
+            if let Some(scattering) = scattering(request) {
+                scattering.voxels_per_cell = value as u32;
+            }
+        },
+        steps: voxels.iter().map(|n| at(*n)).collect(),
+        ends: [1.0, 4.0].map(at).to_vec(),
+        end_is_exact: false,
+        theory: Some(Theory {
+            low: 1.0,
+            high: 2.0,
+            why: "2 inside of media, 1 where light leaves them or ends, for that is at a face of a cell",
+        }),
+        joint: true,
+    })
+}
+
+/// How light spreads that is scattered ahead; a negative angle stands for the media's own.
+fn scattered_cone(scene: &Scene) -> Result<Knob, String> {
+    scene.render.sheets.scattering().ok_or(SCATTERED_ONCE)?;
+    Ok(choices(
+        "cone of scattered light",
+        |request, value| {
+            if let Some(scattering) = scattering(request) {
+                scattering.cone = (value >= 0.0).then_some(value.to_radians());
+            }
+        },
+        &[("that of the media", -1.0), ("0°", 0.0), ("15°", 15.0), ("30°", 30.0), ("60°", 60.0)],
+    ))
+}
+
+/// When values become colours.
+fn classification(scene: &Scene) -> Result<Knob, String> {
+    if scene.render.sheets.slicing != Slicing::View {
+        return Err("slabs across half vectors classify what they have reconstructed".into());
+    }
+    Ok(choices(
+        "classification",
+        |request, value| {
+            request.scene.render.sheets.classify = if value > 0.0 { Classify::Before } else { Classify::After };
+        },
+        &[("after reconstruction", 0.0), ("before it", 1.0)],
+    ))
+}
+
+/// What volumes are drawn on.
+fn lattice(scene: &Scene) -> Result<Knob, String> {
+    if scene.render.sheets.slicing != Slicing::View {
+        return Err("slabs across half vectors take no body-centred lattice".into());
+    }
+    if !scene.objects.iter().any(may_be_packed) {
+        return Err("no volume of a file is drawn".into());
+    }
+    Ok(choices(
+        "lattice",
+        |request, value| {
+            for object in request.scene.objects.iter_mut().filter(|o| may_be_packed(o)) {
+                object.packing = if value > 0.0 { Packing::BodyCentred } else { Packing::Cartesian };
+            }
+        },
+        &[("Cartesian", 0.0), ("body-centred cubic, 71 % of the points", 1.0)],
+    ))
+}
+
+fn may_be_packed(object: &SceneObject) -> bool {
+    let is_drawn = object.visible && object.technique.is_none_or(|t| t == Technique::Sheets);
+    is_drawn && object.clip.is_empty() && matches!(object.source, Source::Volume(_))
+}
+
+/// A knob whose steps are no sizes.
+fn choices(name: &'static str, set: fn(&mut Request, f64), steps: &[(impl AsRef<str>, f64)]) -> Knob {
+    Knob {
+        name,
+        size_meaning: "",
+        set,
+        steps: steps.iter().map(|(label, value)| choice(label.as_ref(), *value)).collect(),
         ends: Vec::new(),
         end_is_exact: false,
         theory: None,
         joint: false,
-    })
+    }
 }
 
 /// How far a kernel reaches with the deviation that it has.
 fn radius() -> Knob {
-    Knob {
-        name: "kernel radius",
-        size_meaning: "",
-        set: |request, value| request.scene.render.sheets.kernel_extent = value,
-        steps: [1.5, 2.0, 3.0].map(|steps| choice(&format!("{steps} steps of the lattice"), steps)).to_vec(),
-        ends: Vec::new(),
-        end_is_exact: false,
-        theory: None,
-        joint: false,
-    }
+    let set = |request: &mut Request, value| request.scene.render.sheets.kernel_extent = value;
+    choices("kernel radius", set, &[1.5, 2.0, 3.0].map(steps_of_the_lattice))
 }
 
 fn deviation() -> Knob {
-    Knob {
-        name: "kernel deviation",
-        size_meaning: "",
-        set: |request, value| request.scene.render.sheets.kernel_sigma = value,
-        steps: [0.5, 0.7, 1.0].map(|steps| choice(&format!("{steps} steps of the lattice"), steps)).to_vec(),
-        ends: Vec::new(),
-        end_is_exact: false,
-        theory: None,
-        joint: false,
-    }
+    let set = |request: &mut Request, value| request.scene.render.sheets.kernel_sigma = value;
+    choices("kernel deviation", set, &[0.5, 0.7, 1.0].map(steps_of_the_lattice))
+}
+
+fn steps_of_the_lattice(steps: f64) -> (String, f64) {
+    (format!("{steps} steps of the lattice"), steps)
 }

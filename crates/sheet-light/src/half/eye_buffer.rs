@@ -1,7 +1,8 @@
 //! The eye's image: what is composited so far in a band, front to back or back to front (step 20 of the pseudocode).
 //!
 //! Front to back: weight = T·(1 − e^(−τ)), T ← T − weight, C ← C + weight·L. Back to front: C ← (1 − e^(−τ))·L + e^(−τ)·C. Optical
-//! depth is summed with its rounding error kept (Kahan), whichever way, so alpha does not know the order.
+//! depth and radiance are summed with their rounding errors kept (Kahan), whichever way, so alpha does not know the order, and what many
+//! thin slabs add is not too little to be added.
 
 use super::band::Band;
 use splat_core::raster::lanes::{Lanes, MAX_LANES};
@@ -37,6 +38,8 @@ pub(crate) struct Pixels {
     excess: Vec<Vec<f32>>,
     transmittance: Vec<Vec<f32>>,
     values: Vec<Vec<f32>>,
+    /// What the values are too large by.
+    value_excess: Vec<Vec<f32>>,
     pub(crate) depth: Vec<DepthProfile>,
     pub(crate) object: Vec<u32>,
 }
@@ -54,6 +57,7 @@ impl Pixels {
             excess: vec![plane(0.0); planes],
             transmittance: vec![plane(1.0); planes],
             values: vec![plane(0.0); channels],
+            value_excess: vec![plane(0.0); channels],
             depth: vec![DepthProfile::default(); has(!of.depth.is_empty())],
             object: vec![u32::MAX; has(!of.object.is_empty())],
         }
@@ -62,7 +66,7 @@ impl Pixels {
     /// Bytes of the planes.
     pub(crate) fn bytes(&self) -> u64 {
         let floats: usize = self.optical_depth.iter().map(|p| 3 * p.len()).sum::<usize>()
-            + self.values.iter().map(Vec::len).sum::<usize>();
+            + self.values.iter().map(|v| 2 * v.len()).sum::<usize>();
         (4 * floats + self.depth.len() * size_of::<DepthProfile>() + 4 * self.object.len()) as u64
     }
 
@@ -101,8 +105,8 @@ impl Pixels {
         }
         for c in 0..self.channels {
             let weight = weights[ChannelLayout::plane_of(c, self.channels, self.planes)];
-            let sum = &mut self.values[c][k..];
-            weight.mul_add(Lanes::load(simd, &of.values[c]), Lanes::load(simd, sum)).store(sum);
+            let term = weight * Lanes::load(simd, &of.values[c]);
+            add(simd, &mut self.values[c][k..], &mut self.value_excess[c][k..], term);
         }
         self.add_objects(simd, k, of, false);
     }
@@ -118,8 +122,8 @@ impl Pixels {
         for c in 0..self.channels {
             let weight = weights[ChannelLayout::plane_of(c, self.channels, self.planes)];
             let sum = &mut self.values[c][k..];
-            let behind = Lanes::load(simd, sum);
-            (Lanes::load(simd, &of.values[c]) - behind).mul_add(weight, behind).store(sum);
+            let term = (Lanes::load(simd, &of.values[c]) - Lanes::load(simd, sum)) * weight;
+            add(simd, sum, &mut self.value_excess[c][k..], term);
         }
         self.add_objects(simd, k, of, true);
     }
@@ -127,11 +131,8 @@ impl Pixels {
     /// Adds to the optical depth of plane `p`.
     #[inline(always)]
     fn sum<S: Simd>(&mut self, simd: S, p: usize, k: usize, of: &Fragments) {
-        let sum = Lanes::load(simd, &self.optical_depth[p][k..]);
-        let term = Lanes::load(simd, &of.optical_depth[p]) - Lanes::load(simd, &self.excess[p][k..]);
-        let new = sum + term;
-        ((new - sum) - term).store(&mut self.excess[p][k..]);
-        new.store(&mut self.optical_depth[p][k..]);
+        let term = Lanes::load(simd, &of.optical_depth[p]);
+        add(simd, &mut self.optical_depth[p][k..], &mut self.excess[p][k..], term);
     }
 
     #[inline(always)]
@@ -191,4 +192,14 @@ impl Pixels {
             }
         }
     }
+}
+
+/// Adds to sums that are too large by `excess`.
+#[inline(always)]
+fn add<S: Simd>(simd: S, sums: &mut [f32], excess: &mut [f32], term: Lanes<S>) {
+    let sum = Lanes::load(simd, sums);
+    let term = term - Lanes::load(simd, excess);
+    let new = sum + term;
+    ((new - sum) - term).store(excess);
+    new.store(sums);
 }

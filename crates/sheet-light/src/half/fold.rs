@@ -230,7 +230,8 @@ pub fn balance(input: &HalfInput<'_>, params: &HalfParams, light: usize) -> Resu
     if !scatter::is_wanted(volumes, &lit.light, params) {
         return Ok(Balance::default());
     }
-    let scene = Scene::new(volumes, lit, params, input.sheets.shadow_origin);
+    let splats = input.splats.as_ref().filter(|splats| !splats.cloud.is_empty());
+    let scene = Scene::new((volumes, splats), lit, params, input.sheets.shadow_origin);
     Ok(Scattered::new(&scene, params.scattering, false).balance.scaled(lit.light.intensity))
 }
 
@@ -257,7 +258,7 @@ fn check(input: &HalfInput<'_>, params: &HalfParams) -> Result<(), Error> {
         ));
     }
     if let Some(splats) = &input.splats {
-        check_splats(input, splats, params)?;
+        check_splats(input, splats)?;
     }
     for (light, lit) in carried(input).map(|(lit, _)| lit).chain(&input.mapped).enumerate() {
         lit.light.validate(light).map_err(Error::Light)?;
@@ -292,7 +293,7 @@ fn check_polygons(input: &HalfInput<'_>) -> Result<(), Error> {
 const BYTES_A_SPLAT: u64 = 160;
 
 /// Refuses splats that sweeps cannot take.
-fn check_splats(input: &HalfInput<'_>, splats: &HalfSplats<'_>, params: &HalfParams) -> Result<(), Error> {
+fn check_splats(input: &HalfInput<'_>, splats: &HalfSplats<'_>) -> Result<(), Error> {
     if let Some(opaque) = splats.opaque() {
         return Err(Error::parameter("splats", format!("splat {opaque} is opaque"), "surfaces and media"));
     }
@@ -306,10 +307,6 @@ fn check_splats(input: &HalfInput<'_>, splats: &HalfSplats<'_>, params: &HalfPar
         let found = format!("{} lights", input.extended.len());
         let expected = "none beside splats, whose shadows are those of points: `Light::points` has them";
         return Err(Error::parameter("extended", found, expected));
-    }
-    if params.scattering != Scattering::None {
-        let expected = "None beside splats, which shadow no light that is scattered more than once";
-        return Err(Error::parameter("scattering", params.scattering, expected));
     }
     Ok(())
 }
@@ -350,9 +347,12 @@ pub fn bytes<'l>(
     let of_splats = bodies.splats.map_or(0, |_| 4 * (3 + MAX_CHANNELS as u64));
     let of_a_pixel = 4 * (5 + 12 * volumes.len() as u64) + of_splats;
     let [width, height] = camera.size.map(u64::from);
-    let sheets = if volumes.iter().any(|v| v.normals) { 3 } else { 1 };
-    let eye =
-        width * height * (of_a_pixel + 4 * 6 * sheets * volumes.len() as u64 + 160) * (ROWS as u64 + 2) / ROWS as u64;
+    let sheets: usize = if volumes.iter().any(|v| v.normals) { 3 } else { 1 };
+    let eye = width
+        * height
+        * (of_a_pixel + 4 * (6 * sheets * volumes.len() + MAX_CHANNELS) as u64 + 160)
+        * (ROWS as u64 + 2)
+        / ROWS as u64;
     let voxels = |v: &Volume<'_>| {
         let dims = Lattice::new(v.grid, [usize::MAX; 3]).dims;
         // A record once in the order of the lattice and once for each image, with its bucket.

@@ -62,6 +62,11 @@ impl Frame {
         Ok(frame)
     }
 
+    /// Slabs across the last of three axes, along the others, from a place on; of what no eye sees.
+    pub(crate) fn along(center: DVec3, axes: [DVec3; 3], slabs: Slabs) -> Self {
+        Self { center, axes, slabs, back_to_front: false }
+    }
+
     /// Slab coordinates of a world direction.
     pub(crate) fn direction(&self, world: DVec3) -> DVec3 {
         DVec3::new(self.axes[0].dot(world), self.axes[1].dot(world), self.axes[2].dot(world))

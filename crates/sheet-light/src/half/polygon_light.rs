@@ -9,7 +9,6 @@ use super::illuminate::{Illumination, ThroughVolumes};
 use super::light_depth::LightDepths;
 use super::polygons::{EyePolygons, Seen};
 use super::scatter::SurfaceLight;
-use super::serves::travel;
 use super::splat_light::SplatLight;
 use super::splat_squares::BySlab;
 use super::splats::Lamps;
@@ -17,8 +16,7 @@ use rayon::prelude::*;
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::raster::{OpaqueImage, pulp};
 use splat_core::shade::{ChannelLayout, LitBy, MAX_CHANNELS, arriving};
-use splat_core::{Accumulator, Camera, Light, Shading};
-use std::f32::consts::PI;
+use splat_core::{Accumulator, Camera};
 
 /// Pixels of one task.
 const CHUNK: usize = 256;
@@ -125,7 +123,8 @@ impl<'a> PolygonLight<'a> {
                 let seen = self.of.seen(self.of.pixels[rank], self.camera);
                 self.add(&seen, rank, (lamps, &lights, origin), (&layout, values, received));
                 if let (Some(diffuse), Some(lit), Some(first)) = (diffuse, &lamps.carried, layout.multiple()) {
-                    let shown = scattered(&seen, &lit.light, diffuse);
+                    let (point, of) = (seen.point(), seen.of.material);
+                    let shown = diffuse.reflected(seen.world, point.normal.as_dvec3(), (of, point.color), &lit.light);
                     (0..3).for_each(|c| values[first + c] += shown[c]);
                 }
             }
@@ -163,22 +162,6 @@ impl<'a> PolygonLight<'a> {
         // The normal is the same under all lights, and the shadow is found at the end.
         values[colors..].copy_from_slice(&own[colors..layout.count()]);
     }
-}
-
-/// What a place shows of light that media scatter to it.
-fn scattered(seen: &Seen<'_>, light: &Light, diffuse: &SurfaceLight) -> [f32; 3] {
-    let (point, m) = (seen.point(), seen.of.material);
-    if m.shading != Shading::Phong {
-        return [0.0; 3];
-    }
-    let travel = travel(light, seen.world);
-    let arriving = |normal: DVec3, share: f32| match share {
-        0.0 => [0.0; 3],
-        share => diffuse.irradiance(seen.world, normal, travel).map(|e| share * e),
-    };
-    let normal = point.normal.as_dvec3();
-    let (front, back) = (arriving(normal, 1.0 - m.transmission), arriving(-normal, m.transmission));
-    [0, 1, 2].map(|c| light.intensity[c] * point.color[c] * m.diffuse / PI * (front[c] + back[c]))
 }
 
 /// What polygons show, of all lights so far.

@@ -14,7 +14,8 @@
 //! | … added from the far side to the light, and back | `adding.rs` |
 //! | where the power stays | `balance.rs` |
 //! | Eq. 2: radiance towards the eye | [`Scattered::radiance`] |
-//! | … towards polygons | `surface.rs` |
+//! | … towards polygons and translucent surfaces | `surface.rs` |
+//! | translucent surfaces and points in the light's way | `through_splats.rs` |
 
 pub(crate) mod adding;
 pub(crate) mod balance;
@@ -28,6 +29,7 @@ pub(crate) mod scene;
 pub(crate) mod slant;
 pub(crate) mod streams;
 mod surface;
+mod through_splats;
 
 use super::{HalfParams, Scattering};
 use crate::Volume;

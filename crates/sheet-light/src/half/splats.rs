@@ -10,6 +10,7 @@ use super::frame::Frame;
 use super::illuminate::{Illumination, ThroughVolumes};
 use super::light_buffer::LightBuffer;
 use super::light_depth::LightDepths;
+use super::scatter::SurfaceLight;
 use super::splat_light::SplatLight;
 use super::splat_squares::{BySlab, Slab, Squares};
 use rayon::prelude::*;
@@ -54,6 +55,13 @@ impl HalfSplats<'_> {
     pub(crate) fn are_lit(&self) -> bool {
         let is_lit: Vec<bool> = self.materials.iter().map(|m| m.shading != Shading::Unlit).collect();
         self.cloud.material.iter().any(|m| is_lit[usize::from(*m)])
+    }
+
+    /// Whether light that is scattered to surfaces is reflected by any.
+    pub(crate) fn have_surfaces(&self) -> bool {
+        let is_lit: Vec<bool> = self.materials.iter().map(|m| m.shading == Shading::Phong).collect();
+        let mut kinds = self.cloud.kind.iter().zip(&self.cloud.material);
+        kinds.any(|(kind, material)| *kind != SplatKind::Medium && is_lit[usize::from(*material)])
     }
 
     /// The first that is opaque.
@@ -131,13 +139,13 @@ impl<'a> SplatSheets<'a> {
         self.squares.bytes() + light + 24 * self.places.len() as u64
     }
 
-    /// Takes the splats of a slab up for eye and light, the latter behind the volumes of the slabs before and behind polygons, if there is any. Fragments
-    /// of both.
+    /// Takes the splats of a slab up for eye and light, the latter behind the volumes of the slabs before and behind polygons, if there is any, with what
+    /// volumes scatter to surfaces. Fragments of both.
     pub(crate) fn enter(
         &mut self,
         slab: u32,
         lamps: &Lamps<'_>,
-        volumes: Option<(&Illumination<'_>, Option<&LightDepths>)>,
+        (volumes, diffuse): (Option<(&Illumination<'_>, Option<&LightDepths>)>, Option<&SurfaceLight>),
         layout: &ChannelLayout,
     ) -> [u64; 2] {
         let (ids, mut fragments) = (self.drawn.of(slab), 0);
@@ -160,7 +168,7 @@ impl<'a> SplatSheets<'a> {
             });
             light.attenuate(ids, &volumes);
         }
-        self.shade(slab, lamps, layout);
+        self.shade(slab, lamps, diffuse, layout);
         [self.draw(slab), fragments]
     }
 
@@ -178,7 +186,7 @@ impl<'a> SplatSheets<'a> {
     }
 
     /// Finds the radiance of the splats of a slab.
-    fn shade(&mut self, slab: u32, lamps: &Lamps<'_>, layout: &ChannelLayout) {
+    fn shade(&mut self, slab: u32, lamps: &Lamps<'_>, diffuse: Option<&SurfaceLight>, layout: &ChannelLayout) {
         let (of, ids, channels) = (self.of, self.drawn.of(slab), layout.count());
         self.values.clear();
         self.values.resize(ids.len() * channels, 0.0);
@@ -201,6 +209,14 @@ impl<'a> SplatSheets<'a> {
                     (radiance.ambient, radiance.emission) = ([0.0; 3], [0.0; 3]);
                 }
                 radiance.write(normal, layout, values);
+                if let (Some(diffuse), Some(lit), Some(first)) = (diffuse, &lamps.carried, layout.multiple())
+                    && cloud.kind[i] != SplatKind::Medium
+                {
+                    let world = cloud.origin + cloud.position[i].as_dvec3();
+                    let of = (&materials[usize::from(cloud.material[i])], cloud.color[i]);
+                    let own = diffuse.reflected(world, normal.as_dvec3(), of, &lit.light);
+                    (0..3).for_each(|c| values[first + c] += own[c]);
+                }
             }
         });
     }

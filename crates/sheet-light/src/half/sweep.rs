@@ -17,13 +17,13 @@ use super::penumbra::Penumbra;
 use super::placed::Placed;
 use super::polygon_light::{PolygonImage, PolygonLight, PolygonSlabs};
 use super::polygons::EyePolygons;
-use super::scatter::{self, Scattered, Scene};
+use super::scatter::{self, Scattered, Scene, SurfaceLight};
 use super::serves::axis_of_view;
 use super::shade::is_lit;
 use super::sight::{Shape, Sight};
 use super::splat_light::SplatLight;
 use super::splats::{Lamps, SplatSheets};
-use super::{HalfInput, HalfParams, fold, lamp};
+use super::{HalfInput, HalfParams, HalfSplats, fold, lamp};
 use crate::error::cancelled;
 use crate::shadows::Shadows;
 use crate::visible::Voxels;
@@ -136,8 +136,11 @@ impl<'a> Sweep<'a> {
         let origin = self.input.sheets.shadow_origin;
         let beside = self.depths.as_ref().map(|depths| Beside { depths, others: lit.shadow, origin });
         let shadow = beside.as_ref().map(|beside| beside as &dyn Transmittance).or(lit.shadow);
-        let scene = Scene::new(self.volumes, &LitBy { shadow, ..*lit }, params, origin);
-        Some(Scattered::new(&scene, params.scattering, self.polygons.is_some_and(EyePolygons::are_lit)))
+        let splats = self.input.splats.as_ref().filter(|splats| !splats.cloud.is_empty());
+        let scene = Scene::new((self.volumes, splats), &LitBy { shadow, ..*lit }, params, origin);
+        let lights_surfaces =
+            self.polygons.is_some_and(EyePolygons::are_lit) || splats.is_some_and(HalfSplats::have_surfaces);
+        Some(Scattered::new(&scene, params.scattering, lights_surfaces))
     }
 
     /// Finds the voxels that matter, with the shadows there that are known, and sorts them for both images (steps 3 and 4).
@@ -191,7 +194,7 @@ impl<'a> Sweep<'a> {
             if let Some(splats) = &mut splats {
                 let volumes = self.light_buffer.as_ref().map(|buffer| self.illumination(buffer, slab, None));
                 let through = volumes.as_ref().map(|volumes| (volumes, depths.as_ref()));
-                let [eye, light] = splats.enter(slab, &self.lamps(), through, layout);
+                let [eye, light] = splats.enter(slab, &self.lamps(), (through, self.at_surfaces()), layout);
                 (counts.eye_fragments, counts.light_fragments) =
                     (counts.eye_fragments + eye, counts.light_fragments + light);
             }
@@ -209,8 +212,7 @@ impl<'a> Sweep<'a> {
         }
         if let (Some(mut polygons), Some(image)) = (polygons, image) {
             self.light_polygons(&mut polygons, self.frame.slabs.count, splats.as_ref());
-            let diffuse = self.scattered.as_ref().and_then(|scattered| scattered.at_surfaces.as_ref());
-            polygons.0.shade(&self.lamps(), self.input.sheets.shadow_origin, diffuse, image);
+            polygons.0.shade(&self.lamps(), self.input.sheets.shadow_origin, self.at_surfaces(), image);
         }
         counts.bytes += splats.as_ref().map_or(0, SplatSheets::bytes);
         counts.soft_passes =
@@ -282,6 +284,11 @@ impl<'a> Sweep<'a> {
     fn splats(&self, form: &Accumulator) -> Option<SplatSheets<'a>> {
         let of = self.input.splats.as_ref().filter(|splats| !splats.cloud.is_empty())?;
         Some(SplatSheets::new(of, &self.frame, self.light_buffer.as_ref(), self.input.opaque, form))
+    }
+
+    /// Light that is scattered to surfaces.
+    fn at_surfaces(&self) -> Option<&SurfaceLight> {
+        self.scattered.as_ref().and_then(|scattered| scattered.at_surfaces.as_ref())
     }
 
     fn lamps(&self) -> Lamps<'a> {

@@ -37,24 +37,33 @@ pub(crate) struct Block {
 
 /// Shares of the light that leave to its own side, to the other, and by the sides.
 pub(crate) fn trace(block: &Block, paths: u32, seed: u64) -> [f64; 3] {
+    trace_with(block, (0.0, 1.0), paths, seed)
+}
+
+/// The same with a pane across the light at a depth, which lets a share through and absorbs the rest.
+pub(crate) fn trace_with(block: &Block, pane: (f64, f64), paths: u32, seed: u64) -> [f64; 3] {
     let mut random = Random(seed);
     let mut counts = [0u32; 3];
     for _ in 0..paths {
-        if let Some(side) = path(block, &mut random) {
+        if let Some(side) = path(block, pane, &mut random) {
             counts[side] += 1;
         }
     }
     counts.map(|n| f64::from(n) / f64::from(paths))
 }
 
-fn path(block: &Block, random: &mut Random) -> Option<usize> {
+fn path(block: &Block, (pane, passing): (f64, f64), random: &mut Random) -> Option<usize> {
     let is_slab = block.width.is_infinite();
     let start = |random: &mut Random| if is_slab { 0.0 } else { block.width * random.unit() };
     let mut p = [start(random), start(random), 0.0];
     let mut d = [0.0, 0.0, 1.0];
     loop {
         let way = -(1.0 - random.unit()).ln();
+        let before = p[2];
         (0..3).for_each(|a| p[a] += way * d[a]);
+        if passing < 1.0 && (before < pane) != (p[2] < pane) && random.unit() >= passing {
+            return None;
+        }
         if let Some(side) = left(block, p, d, is_slab) {
             return Some(side);
         }

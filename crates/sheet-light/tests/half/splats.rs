@@ -2,7 +2,7 @@
 
 use super::common::{draw, exact, input, lamp, lit, scattering, sun};
 use crate::common::{BEAUTY, constant, cubic, grid, largest, parallel, perspective, projected, volume};
-use sheet_light::half::{Extended, HalfInput, HalfParams, HalfSplats, Scattering, fold};
+use sheet_light::half::{Extended, HalfInput, HalfParams, HalfSplats, fold};
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::raster::{self, FoldInput, OpaqueImage, Projected};
 use splat_core::shade::LitBy;
@@ -13,17 +13,17 @@ use splat_core::{
 use std::f64::consts::PI;
 
 /// Splats as sweeps take them.
-struct Shown {
+pub(super) struct Shown {
     cloud: Cloud,
     projected: Projected,
     footprints: FootprintStack,
     materials: Vec<Material>,
-    objects: Vec<Object>,
+    pub(super) objects: Vec<Object>,
     slab_width: f64,
 }
 
 impl Shown {
-    fn new(cloud: Cloud, camera: &Camera, materials: Vec<Material>, slab_width: f64) -> Self {
+    pub(super) fn new(cloud: Cloud, camera: &Camera, materials: Vec<Material>, slab_width: f64) -> Self {
         let (footprints, projected) = (FootprintStack::default(), projected(&cloud, camera, &materials));
         let objects = (0..4).map(|i| Object { name: i.to_string(), ..Object::default() }).collect();
         Self { cloud, projected, footprints, materials, objects, slab_width }
@@ -58,7 +58,7 @@ fn plane(cloud: &mut Cloud, (at, normal): (DVec3, DVec3), half: f64, tau: f64, l
     }
 }
 
-fn with<'a>(of: &'a Shown, input: HalfInput<'a>) -> HalfInput<'a> {
+pub(super) fn with<'a>(of: &'a Shown, input: HalfInput<'a>) -> HalfInput<'a> {
     HalfInput { splats: Some(of.splats()), ..input }
 }
 
@@ -294,12 +294,7 @@ fn splats_that_sweeps_cannot_take_are_refused() {
     let pair = Shown::new(cloud, &camera, vec![lambert()], 1.0);
     let among = draw(&with(&pair, input(&[], &camera, &[lamp])), &exact(None)).err().unwrap().to_string();
     assert!(among.contains("lies among the splats"), "{among}");
-    let again = HalfParams { scattering: Scattering::Forward, ..exact(None) };
     let of = shown(SplatKind::Surface, 1.0);
-    let mut out = Accumulator::new(camera.size, 1, 6, false, false);
-    let layout = BEAUTY.with_multiple();
-    let refused = fold(&with(&of, input(&[], &camera, &lights)), &again, &layout, &mut out, None).err().unwrap();
-    assert!(refused.to_string().contains("beside splats"), "{refused}");
     let shape = LightShape::Disk { center: DVec3::Z * 9.0, normal: DVec3::NEG_Z, radius: 0.5 };
     let extended = vec![Extended { lit: lit(shape), samples: 4 }];
     let input = HalfInput { extended, ..with(&of, input(&[], &camera, &[])) };

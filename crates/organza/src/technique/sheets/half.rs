@@ -54,10 +54,6 @@ fn points_served(matter: &Matter<'_>, points: &[LightPoint]) -> Result<Carries, 
         let message = "a translucent surface, whose shadow of a light with an extent is that of points";
         return refuse(splats, message, ", make it opaque, or use render.sheets.soft_shadows = \"points\"");
     }
-    if let Some(splats) = translucent().find(|o| o.form == Form::Splats && scatters_again) {
-        let message = "a translucent surface, whose shadow light that is scattered more than once does not have";
-        return refuse(splats, message, ", make it opaque, or leave render.sheets.scattering out");
-    }
     let (volumes, splats) = (volumes(matter).collect::<Vec<_>>(), splat_bounds(matter));
     let bodies = Bodies { volumes: &volumes, splats };
     let words = |reason: Reason| match reason {

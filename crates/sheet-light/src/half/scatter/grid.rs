@@ -5,7 +5,8 @@
 //! the light is one piece of memory for each row, and rows are tasks.
 
 use crate::Volume;
-use crate::half::frame::world_corners;
+use crate::half::frame::{Frame, world_corners};
+use crate::slabs::Slabs;
 use splat_core::Camera;
 use splat_core::glam::DVec3;
 
@@ -73,6 +74,16 @@ impl LightGrid {
     /// Number of cells.
     pub(crate) fn cells(&self) -> usize {
         self.columns[0] * self.columns[1] * self.layers
+    }
+
+    /// Slabs that are the layers, with one more before them and one behind them for all that is there.
+    pub(crate) fn slabs(&self) -> Frame {
+        let [width, height] = self.columns.map(|n| n as f64);
+        let half = 0.5 * self.layers as f64;
+        let center = self.world([0.5 * (width - 1.0), 0.5 * (height - 1.0), half]);
+        // Along the axis: the middle of a lamp's cells may lie beside it.
+        let slabs = Slabs { origin: -(half + 1.0) * self.depth, width: self.depth, count: self.layers as u32 + 2 };
+        Frame::along(center, self.axes, slabs)
     }
 
     /// Columns, rows and faces about a world position: whole numbers at the middles of columns and at faces.

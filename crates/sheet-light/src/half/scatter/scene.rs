@@ -5,8 +5,9 @@ use super::grid::LightGrid;
 use super::medium::{self, Cell};
 use super::phase;
 use super::streams::{Sources, Streams};
+use super::through_splats;
 use crate::Volume;
-use crate::half::{Bodies, HalfParams, lamp};
+use crate::half::{Bodies, HalfParams, HalfSplats, lamp};
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::shade::LitBy;
 use splat_core::{Light, Receiver, SplatKind};
@@ -31,7 +32,12 @@ pub(crate) fn entering(lit: &LitBy<'_>, place: DVec3, area: f64) -> [f64; 3] {
 
 impl Scene {
     /// `shadow_origin`: what places of shadows are relative to.
-    pub(crate) fn new(volumes: &[Volume<'_>], lit: &LitBy<'_>, params: &HalfParams, shadow_origin: DVec3) -> Self {
+    pub(crate) fn new(
+        (volumes, splats): (&[Volume<'_>], Option<&HalfSplats<'_>>),
+        lit: &LitBy<'_>,
+        params: &HalfParams,
+        shadow_origin: DVec3,
+    ) -> Self {
         let camera = lamp::camera_of(&Bodies::volumes(volumes), &lit.light, params);
         let grid = LightGrid::new(volumes, &camera, params.voxels_per_cell);
         let cells = medium::cells(&grid, volumes, params.scattering);
@@ -55,9 +61,18 @@ impl Scene {
             };
             (0..width * height * (layers + 1)).map(face).collect()
         };
+        let mut others = lit.shadow.map_or_else(Vec::new, others);
+        if let Some(splats) = splats {
+            let through = through_splats::through(splats, &grid, &camera);
+            if others.is_empty() {
+                others = through;
+            } else {
+                others.iter_mut().zip(through).for_each(|(to, own)| (0..3).for_each(|c| to[c] *= own[c]));
+            }
+        }
         Self {
             entering: [0, 1, 2].map(entering),
-            others: lit.shadow.map_or_else(Vec::new, others),
+            others,
             cone: params.cone.unwrap_or_else(|| phase::cone_of(params.scattering, medium::mean_asymmetry(&cells))),
             cells,
             grid,

@@ -1,4 +1,4 @@
-//! Light that is scattered more than once where it meets polygons: irradiance of one side of a surface, from the cells before it.
+//! Light that is scattered more than once where it meets surfaces: irradiance of one side of a surface, from the cells before it.
 //!
 //! Diffuse radiance towards a direction v is (φ + 3J·v)/4π, so a side with the unit normal n receives
 //!
@@ -15,7 +15,10 @@ use super::grid::LightGrid;
 use super::scene::Scene;
 use super::streams::transport;
 use super::{FLUENCE, FLUX, NUMBERS};
+use crate::half::serves::travel;
 use splat_core::glam::DVec3;
+use splat_core::{Light, Material, Shading};
+use std::f32::consts::PI;
 
 /// What arrives at faces of cells, as it is: neither weighed nor softened.
 pub(crate) struct SurfaceLight {
@@ -64,7 +67,7 @@ impl SurfaceLight {
 
     /// Irradiance of the side of a surface with this unit normal, by channel, per unit of the light's intensity; `travel` is the
     /// unit direction in which light comes there.
-    pub(crate) fn irradiance(&self, world: DVec3, normal: DVec3, travel: DVec3) -> [f32; 3] {
+    fn irradiance(&self, world: DVec3, normal: DVec3, travel: DVec3) -> [f32; 3] {
         let (within, place) = (self.within(world), self.grid.place(world + normal * self.half_a_cell(normal, world)));
         let ([width, height], layers) = (self.grid.columns, self.grid.layers);
         let counts = [width, height, layers + 1];
@@ -94,6 +97,26 @@ impl SurfaceLight {
         }
         // Of places out of the cells no face has a part.
         if weights > 0.0 { sum.map(|v| (within * v / weights) as f32) } else { [0.0; 3] }
+    }
+
+    /// Radiance that a surface of a material and colour shows of it, on the side of this unit normal.
+    pub(crate) fn reflected(
+        &self,
+        world: DVec3,
+        normal: DVec3,
+        (m, color): (&Material, [f32; 3]),
+        light: &Light,
+    ) -> [f32; 3] {
+        if m.shading != Shading::Phong {
+            return [0.0; 3];
+        }
+        let travel = travel(light, world);
+        let arriving = |normal: DVec3, share: f32| match share {
+            0.0 => [0.0; 3],
+            share => self.irradiance(world, normal, travel).map(|e| share * e),
+        };
+        let (front, back) = (arriving(normal, 1.0 - m.transmission), arriving(-normal, m.transmission));
+        [0, 1, 2].map(|c| light.intensity[c] * color[c] * m.diffuse / PI * (front[c] + back[c]))
     }
 
     /// 1 in the cells, and less within one of them about it; 0 farther away.
