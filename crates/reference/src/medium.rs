@@ -143,8 +143,8 @@ impl<'a> Medium<'a> {
             return Err(Error::invalid("medium", index, "albedo", self.albedo, "three numbers in [0, 1]"));
         }
         if let Some(Facets { diffuse, transmission, specular, shininess, glow, .. }) = self.facets {
-            let shares = [diffuse, transmission, specular];
-            if !shares.iter().all(|s| (0.0..=1.0).contains(s)) || !(shininess.is_finite() && shininess >= 0.0) {
+            let are_shares = [diffuse, transmission, specular].iter().all(|s| (0.0..=1.0).contains(s));
+            if !(are_shares && shininess.is_finite() && shininess >= 0.0) {
                 let found = [diffuse, transmission, specular, shininess];
                 return Err(Error::invalid(
                     "medium",
