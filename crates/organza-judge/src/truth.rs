@@ -128,10 +128,6 @@ pub fn truth(
         slides.push(slide(light, options)?);
     }
     let environment = environment(scene, options)?;
-    let fault = |e: splat_core::Error| match e {
-        splat_core::Error::Cancelled => Error::Cancelled,
-        other => Error::Internal(other.to_string()),
-    };
     let densities: Vec<_> = bodies.iter().map(Body::density).collect::<Result<_, _>>().map_err(fault)?;
     let traced = reference::Scene {
         media: bodies.iter().zip(&densities).filter_map(|(body, whole)| body.medium(whole.as_ref()?)).collect(),
@@ -165,6 +161,14 @@ pub fn truth(
         liberties(scene, &traced)
     );
     Ok(Ok(Truth { method, image, standard_error: estimate.radiance.standard_error, all_orders: None }))
+}
+
+/// What a scene that was checked does not come to, but for being stopped.
+fn fault(error: splat_core::Error) -> Error {
+    match error {
+        splat_core::Error::Cancelled => Error::Cancelled,
+        other => Error::Internal(other.to_string()),
+    }
 }
 
 /// What is seen behind everything, by mirrored and bent rays too.
