@@ -6,8 +6,8 @@ use super::input::{check_packed, reserve};
 use super::reading::Reading;
 use crate::error::{Place, ReadError, escaped};
 use ::exr::math::Vec2;
-use ::exr::meta::{BlockDescription, MetaData};
 use ::exr::meta::header::Header;
+use ::exr::meta::{BlockDescription, MetaData};
 use ::exr::prelude::{ReadChannels, ReadLayers, ReadSpecificChannel};
 use splat_core::RadianceImage;
 use std::io::Cursor;
@@ -24,7 +24,9 @@ pub(super) fn read(content: &[u8], reading: &mut Reading<'_>) -> Result<Radiance
     let header = first_in_color(&meta)?;
     let (size, has_alpha) = (checked_size(header)?, header.channels.list.iter().any(|c| c.name.to_string() == ALPHA));
     check_packed(check_image(size, reading.params)?, content.len() as u64, "the packed image")?;
-    meta.headers.iter().try_for_each(|header| check_packed(block_bytes(header), content.len() as u64, "a packed tile"))?;
+    meta.headers
+        .iter()
+        .try_for_each(|header| check_packed(block_bytes(header), content.len() as u64, "a packed tile"))?;
     // Asked for first, where an allocator that has no room can still be told.
     let mut room: Vec<[f32; 3]> = Vec::new();
     reserve(&mut room, size[0] as usize * size[1] as usize)?;
