@@ -25,7 +25,7 @@ pub(crate) struct Step {
 
 /// The features that are off by default. Tests on a device and without one have all of them, and the whole workspace: cargo
 /// compiles a crate anew for every other choice.
-pub(crate) const FEATURES: &str = "hbsort/gpu,pbsr/gpu,splat-core/gpu,tsm/gpu";
+pub(crate) const FEATURES: &str = "organza-hbsort/gpu,organza-pbsr/gpu,organza-splat-core/gpu,organza-tsm/gpu";
 
 /// The feature that asks for a Vulkan driver.
 pub(crate) const DRIVER: &str = "gpu-conformance/driver";

@@ -104,7 +104,7 @@ fn missing(repo: &Repo) -> Option<String> {
 /// Writes the small files of `convert` beside what was found before.
 fn write_seeds(repo: &Repo) -> Result<(), String> {
     let program = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
-    let words = ["run", "--quiet", "--package", "convert", "--example", "samples", "--", "fuzz/corpus"];
+    let words = ["run", "--quiet", "--package", "organza-convert", "--example", "samples", "--", "fuzz/corpus"];
     match Command::new(program).args(words).current_dir(&repo.root).status() {
         Ok(status) if status.success() => Ok(()),
         Ok(status) => Err(format!("`cargo {}`: {status}", words.join(" "))),

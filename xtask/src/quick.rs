@@ -77,7 +77,7 @@ mod tests {
     #[test]
     fn the_tests_of_what_changed_are_run() {
         let manifest = |name: &str| format!("[package]\nname = \"{name}\"\n[[test]]\nname = \"other\"\n");
-        let [tsm, tests, gpu] = ["tsm", "organza-tests", "gpu-conformance"].map(manifest);
+        let [tsm, tests, gpu] = ["organza-tsm", "organza-tests", "gpu-conformance"].map(manifest);
         let fuzz = manifest("fuzz") + "[workspace]\n[dependencies]\n";
         let files = [("crates/tsm/Cargo.toml", &tsm), ("tests/Cargo.toml", &tests), ("tests/gpu/Cargo.toml", &gpu)];
         let files = [&files[..], &[("fuzz/Cargo.toml", &fuzz)]].concat();
@@ -85,9 +85,9 @@ mod tests {
         let repo = Repo::of(&files);
         let paths = ["crates/tsm/src/lookup.rs", "tests/gpu/lib.rs", "fuzz/src/lib.rs", "README.md"].map(str::to_owned);
         let found = packages(&repo, &paths);
-        assert_eq!(found.iter().collect::<Vec<_>>(), ["gpu-conformance", "tsm"]);
+        assert_eq!(found.iter().collect::<Vec<_>>(), ["gpu-conformance", "organza-tsm"]);
         let Work::Cargo(runs, _) = &steps(&found).pop().expect("steps").work else { panic!("tests are run by cargo") };
-        assert_eq!(runs[0].join(" "), "test --package gpu-conformance --package tsm --features tsm/gpu");
+        assert_eq!(runs[0].join(" "), "test --package gpu-conformance --package organza-tsm --features organza-tsm/gpu");
         assert_eq!(steps(&BTreeSet::new()).last().map(|step| step.name), Some("clippy"));
     }
 }

@@ -1,6 +1,6 @@
 //! Implicit surfaces of a volume and of scattered points: what they cost.
 //!
-//! `cargo run --release -p convert --example implicit`. Times are the least of several runs on one
+//! `cargo run --release -p organza-convert --example implicit`. Times are the least of several runs on one
 //! thread.
 
 use convert::read::{self, Loaded, ReadParams};

@@ -1,4 +1,4 @@
-//! `cargo run -p convert --example samples -- FOLDER`: writes a small file of each format and kind into `FOLDER/FEATURE/`, as seeds of
+//! `cargo run -p organza-convert --example samples -- FOLDER`: writes a small file of each format and kind into `FOLDER/FEATURE/`, as seeds of
 //! fuzzing.
 #![allow(clippy::unwrap_used, reason = "what is made in memory is well formed")]
 

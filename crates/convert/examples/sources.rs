@@ -1,6 +1,6 @@
 //! One object from each source, as clouds of splats: a triangle, an implicit ball, a procedural cloud and raw points.
 //!
-//! `cargo run -p convert --example sources`
+//! `cargo run -p organza-convert --example sources`
 
 use convert::{
     CloudShape, Density, ExpressionField, MeshParams, RawPoints, SplatParams, SurfelParams, VolumeParams,

@@ -1,4 +1,4 @@
-//! Slices a random cloud and prints what came out: `cargo run --release -p hbsort --example slices [SPLATS]`.
+//! Slices a random cloud and prints what came out: `cargo run --release -p organza-hbsort --example slices [SPLATS]`.
 
 use hbsort::{Params, Scratch, slice_cloud};
 use splat_core::glam::{DVec3, Vec3};

@@ -1,5 +1,5 @@
 //! How fast the truth is: paths a second in a cloud of 64³ voxels and the time to 1 % standard error; the exact
-//! compositor on 1.84 million points. `cargo run --release -p reference --example speed [paths|error|error5|points]…`
+//! compositor on 1.84 million points. `cargo run --release -p organza-reference --example speed [paths|error|error5|points]…`
 //! (`error5` stops at 5 %, in a 25th of the time)
 
 use reference::{Density, Input, Lattice, LightSource, Medium, Order, PathSettings, Scene, composite, path_trace};

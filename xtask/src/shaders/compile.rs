@@ -25,7 +25,7 @@ pub(super) fn run(root: &Path, check: bool) -> Outcome {
         absent.into_iter().try_for_each(|p| fs::write(&p, []).map_err(|e| format!("{}: {e}", p.display())))?;
     }
     let mut made = Files::new();
-    let structs = cargo(root, &["run", "--quiet", "--package", "splat-shaders", "--example", "layouts"])?;
+    let structs = cargo(root, &["run", "--quiet", "--package", "organza-splat-shaders", "--example", "layouts"])?;
     made.insert("glsl/include/layouts.glsl".to_owned(), structs.into_bytes());
     let mut sources = Files::new();
     for include in names(&folder.join("glsl/include"), ".glsl")? {
