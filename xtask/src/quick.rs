@@ -87,7 +87,10 @@ mod tests {
         let found = packages(&repo, &paths);
         assert_eq!(found.iter().collect::<Vec<_>>(), ["gpu-conformance", "organza-tsm"]);
         let Work::Cargo(runs, _) = &steps(&found).pop().expect("steps").work else { panic!("tests are run by cargo") };
-        assert_eq!(runs[0].join(" "), "test --package gpu-conformance --package organza-tsm --features organza-tsm/gpu");
+        assert_eq!(
+            runs[0].join(" "),
+            "test --package gpu-conformance --package organza-tsm --features organza-tsm/gpu"
+        );
         assert_eq!(steps(&BTreeSet::new()).last().map(|step| step.name), Some("clippy"));
     }
 }
