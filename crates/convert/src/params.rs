@@ -1,7 +1,7 @@
 //! Parameters that all conversions share.
 
-use crate::Cache;
 #[cfg(feature = "cache")]
+use crate::Cache;
 #[cfg(feature = "surfels")]
 use crate::PointMaterial;
 use crate::columns::Wanted;
