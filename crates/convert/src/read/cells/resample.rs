@@ -22,6 +22,9 @@ const MOST: f64 = 256.0 * 256.0 * 256.0;
 const VOXELS_PER_BODY: f64 = 8.0;
 /// Samples of a voxel along an axis.
 const SAMPLES: usize = 2;
+/// By what a sample is multiplied in the sum of its voxel, a power of two: differences of values may be twice as large as a value, and sums of so
+/// many fit single precision nevertheless.
+const SHARE: f64 = 0.5 / (SAMPLES * SAMPLES * SAMPLES) as f64;
 /// Parts of the volume that are filled side by side, whatever the number of threads.
 const PARTS: usize = 16;
 /// How far outside a tetrahedron a sample may lie, in barycentric coordinates: between two neighbours nothing is left out.
@@ -171,7 +174,7 @@ struct Lattice {
 struct Part<'a> {
     /// The first and the last sample along z.
     samples: [f64; 2],
-    /// Sums of the samples of each voxel, above the value outside.
+    /// Sums of the samples of each voxel, above the value outside, times [`SHARE`].
     sums: &'a mut [f32],
     /// Samples of each voxel that lie within a body.
     taken: &'a mut [u8],
@@ -212,8 +215,9 @@ impl Lattice {
             Ok(())
         })?;
         drop(taken);
-        let of_all = 1.0 / (SAMPLES * SAMPLES * SAMPLES) as f64;
-        sums.par_iter_mut().for_each(|v| *v = (self.outside + f64::from(*v) * of_all) as f32);
+        // A sum that was rounded may lie a little beyond the largest value.
+        let (low, high) = (f64::from(f32::MIN), f64::from(f32::MAX));
+        sums.par_iter_mut().for_each(|v| *v = (self.outside + 2.0 * f64::from(*v)).clamp(low, high) as f32);
         Ok(sums)
     }
 
@@ -248,7 +252,7 @@ impl Lattice {
                     if part.taken[voxel] & bit == 0 {
                         part.taken[voxel] |= bit;
                         let value = (before + i as f64 * along).dot(DVec4::from_array(values));
-                        part.sums[voxel] += value.clamp(least, most) as f32;
+                        part.sums[voxel] += (value.clamp(least, most) * SHARE) as f32;
                     }
                 }
             }
@@ -309,6 +313,18 @@ mod tests {
             let expected = 6.0 * linear(DVec3::new(1.5, 0.5, 1.0) + shift);
             assert!((mass(&grid) / expected - 1.0).abs() < 1e-6, "{}", mass(&grid));
         }
+    }
+
+    #[test]
+    fn values_as_large_as_single_precision_has_them_stay_numbers() {
+        let (points, corners) = (block(DVec3::ZERO, DVec3::ONE), (0..8).collect::<Vec<u32>>());
+        let sampled = |largest: f32| {
+            let signs = [1.0, -1.0, 1.0, 1.0, 1.0, -1.0, 1.0, 1.0];
+            let field = Field::Points(signs.map(|sign| sign * f64::from(largest)).to_vec());
+            sampled(&points, &[Body { cell: 0, corners: &corners, faces: HEXAHEDRON }], &field).values
+        };
+        let (small, large) = (sampled(1.0), sampled(f32::MAX));
+        assert!(large.iter().zip(&small).all(|(l, s)| (l / f32::MAX - s).abs() < 1e-6), "{large:?}");
     }
 
     /// Its border runs through voxels: of the samples that it parts half belong to it.
