@@ -107,12 +107,11 @@ pub fn shown_points(
         }
         own.color = colored.color;
         if shown.keeps_values {
-            match colored.gaps {
-                0 => own.value = colored.numbers.iter().map(|number| *number as f32).collect(),
-                gaps => {
-                    own.value.clear();
-                    said.push(format!("splats keep no values: {} without a number", counted(gaps, "point")));
-                }
+            own.value = colored.numbers.iter().map(|number| *number as f32).collect();
+            let gaps = own.value.iter().filter(|value| !value.is_finite()).count() as u64;
+            if gaps > 0 {
+                own.value.clear();
+                said.push(format!("splats keep no values: {} without a number that f32 holds", counted(gaps, "point")));
             }
         }
         points = own.into();

@@ -95,7 +95,10 @@ fn splats_keep_the_numbers_that_their_colours_are_of_where_that_is_asked_for() {
         assert!((0..cloud.len()).all(|i| off(i) < 1e-4 + 0.01 * f64::from(spacing.is_some() as u8)), "{spacing:?}");
     }
     // A value is a number: where one is missing none is kept, and that is said.
-    let gaps = of(wall("heat", |p| if p == Vec3::X { f64::NAN } else { p.x.into() }), &asked);
-    assert!(gaps.points.value.is_empty());
-    assert_eq!(gaps.said.last().map(String::as_str), Some("splats keep no values: 1 point without a number"));
+    for missing in [f64::NAN, 1e300] {
+        let gaps = of(wall("heat", |p| if p == Vec3::X { missing } else { p.x.into() }), &asked);
+        assert!(gaps.points.value.is_empty());
+        let said = "splats keep no values: 1 point without a number that f32 holds";
+        assert_eq!(gaps.said.last().map(String::as_str), Some(said));
+    }
 }
