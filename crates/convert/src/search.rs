@@ -11,6 +11,12 @@ const REACH: f64 = 0.5;
 /// Most ends of rows that are seen with what surrounds them.
 const FEW: usize = 10_000;
 
+/// Share of the largest extinction from which a voxel is seen.
+const FAINT: f32 = 0.02;
+
+/// Optical depth from which it is.
+const FAINT_DEPTH: f64 = 0.5 / 255.0;
+
 /// Cells along the longest side of a box, in which an implicit surface is looked for.
 const SURFACE_CELLS: f64 = 32.0;
 
@@ -62,11 +68,13 @@ pub fn extinct_bounds(grid: &Grid, transfer: &TransferFunction) -> DAabb {
     DAabb::of_points(DAabb::new(low, high).corners().map(|index| grid.origin + grid.axes * index))
 }
 
-/// The first and the last lattice point of every row within all regions to which a transfer function gives extinction above a `share` of
-/// its largest, of a lattice of few rows the corners around what is seen of each; where it gives none, the corners of [`extinct_bounds`].
-pub fn visible_ends(grid: &Grid, transfer: &TransferFunction, share: f32, clips: &[Clip]) -> Vec<DVec3> {
+/// The first and the last lattice point of every row within all regions to which a transfer function gives enough extinction to be seen, by
+/// itself or with what is beside it; of a lattice of few rows the corners around what is seen of each; where it gives none, the corners of
+/// [`extinct_bounds`]. A voxel is seen by an optical depth of half a grey level of eight bits, or by a fiftieth of the densest.
+pub fn visible_ends(grid: &Grid, transfer: &TransferFunction, clips: &[Clip]) -> Vec<DVec3> {
     let most = transfer.points().iter().fold(0.0, |most: f32, p| most.max(p.extinction));
-    let seen = |v: &f32| transfer.at(*v).extinction > share * most;
+    let least = (FAINT * most).min((FAINT_DEPTH / grid.cell_volume().cbrt()) as f32);
+    let seen = |v: &f32| transfer.at(*v).extinction > least;
     let [nx, ny, _] = grid.dims;
     let row = |(row, values): (usize, &[f32])| {
         let place = |i: usize| grid.position(i, row % ny, row / ny);
@@ -125,7 +133,7 @@ mod tests {
         let transfer = TransferFunction::new(vec![dense]).expect("one point");
         let seen = |n: usize| {
             let grid = Grid { origin: DVec3::ZERO, axes: DMat3::IDENTITY, dims: [n; 3], values: vec![1.0; n * n * n] };
-            DAabb::of_points(visible_ends(&grid, &transfer, 0.02, &[]))
+            DAabb::of_points(visible_ends(&grid, &transfer, &[]))
         };
         let around = DAabb::new(DVec3::splat(-REACH), DVec3::splat(1.0 + REACH));
         assert_eq!(seen(2), around);

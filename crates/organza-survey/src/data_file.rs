@@ -64,22 +64,32 @@ impl DataFile {
         if name.trim_matches('-').is_empty() { "object".to_owned() } else { name }
     }
 
-    /// Whether its data has colours of its own.
+    /// Whether its data has colours of its own, those of splats too.
     pub(crate) fn is_colored(&self) -> bool {
+        self.has_colors() || matches!(&self.data, FileData::Points(points) if !points.ready.cloud.is_empty())
+    }
+
+    /// Whether its vertices or points have colours that show something.
+    pub(crate) fn has_colors(&self) -> bool {
+        !self.colors().is_empty() && !self.is_black()
+    }
+
+    /// Whether all its colours are black: those of a file that has room for colours, and none.
+    pub(crate) fn is_black(&self) -> bool {
+        !self.colors().is_empty() && self.colors().iter().all(|color| *color == [0.0; 3])
+    }
+
+    fn colors(&self) -> &[[f32; 3]] {
         match &self.data {
-            FileData::Mesh(mesh) => !mesh.color.is_empty(),
-            FileData::Points(points) => !points.color.is_empty() || !points.ready.cloud.is_empty(),
-            _ => false,
+            FileData::Mesh(mesh) => &mesh.color,
+            FileData::Points(points) => &points.color,
+            _ => &[],
         }
     }
 
     /// Mean luminance of its own colours.
     pub(crate) fn luminance(&self) -> Option<f64> {
-        let colors = match &self.data {
-            FileData::Mesh(mesh) => &mesh.color,
-            FileData::Points(points) => &points.color,
-            _ => return None,
-        };
+        let colors = if self.has_colors() { self.colors() } else { &[] };
         let luminance = |c: &[f32; 3]| f64::from(0.2126 * c[0] + 0.7152 * c[1] + 0.0722 * c[2]);
         (!colors.is_empty()).then(|| colors.iter().map(luminance).sum::<f64>() / colors.len() as f64)
     }
@@ -89,6 +99,19 @@ impl DataFile {
 mod tests {
     use super::*;
     use convert::RawPoints;
+
+    #[test]
+    fn colours_that_are_all_black_are_none() {
+        let file = |color: Vec<[f32; 3]>| {
+            let points = RawPoints { position: vec![Default::default(); color.len()], color, ..RawPoints::default() };
+            DataFile { path: "a.las".into(), data: FileData::Points(points.into()), stated_up: None, stands: None }
+        };
+        let black = file(vec![[0.0; 3]; 3]);
+        assert!(black.is_black() && !black.is_colored() && black.luminance().is_none());
+        let dark = file(vec![[0.0; 3], [0.0, 0.0, 1e-3]]);
+        assert!(!dark.is_black() && dark.is_colored() && dark.luminance().is_some_and(|l| l > 0.0));
+        assert!(!file(Vec::new()).is_black() && !file(Vec::new()).is_colored());
+    }
 
     #[test]
     fn objects_are_named_after_files_without_what_parts_paths() {

@@ -8,9 +8,9 @@ mod point_colors;
 
 use crate::data_file::DataFile;
 use crate::lamps::lamps;
-use crate::number::{color, list, rounded};
+use crate::number::{color, list, rounded, significant};
 use crate::preset::{Preset, Wish};
-use look::{Object, objects};
+use look::{Object, drawn_steps, objects};
 use organza::scene::{DEFAULT_AZIMUTH, FoundCamera, LoadOptions, ROOT_KEY, parse, relative_path, root_for};
 use organza::{Error, FileData, Files, Progress, RenderOptions, printable};
 use splat_core::glam::DVec3;
@@ -31,12 +31,10 @@ const GROUND: f64 = 4.0;
 const GROUND_STEPS: f64 = 320.0;
 const GROUND_COLOR: [f32; 3] = [0.32, 0.32, 0.33];
 
-/// Volumes alone: their smooth edges need no more than one sample a pixel.
-const SHARP: &str = "
-[render]
-technique = \"sheets\"     # sharp; \"points\" is softer and takes half the time
-antialias = 1
-";
+/// Width of a slab over the step of a volume: slabs as wide as a voxel show as a weave on flat surfaces.
+const SLAB_WIDTH: f64 = 0.5;
+/// Largest step over the least up to which it is that of the least one, whichever way the volume is seen.
+const MOST_STEPS: f64 = 16.0;
 
 /// A scene that was written.
 #[derive(Debug, Clone, PartialEq)]
@@ -75,7 +73,7 @@ pub fn first_scene(
     let _ = writeln!(camera, "size = {:?}", wish.size);
     let drawn = render_text(data, wish);
     let seen: String = objects.iter().map(Object::material).chain(objects.iter().map(Object::text)).collect();
-    let first = head(&camera) + &seen + drawn;
+    let first = head(&camera) + &seen + &drawn;
     let scene =
         parse(scene_file, first.as_bytes(), &LoadOptions { turntable: wish.turntable, ..LoadOptions::default() })?;
     let found = organza::fitted(&scene, options, progress, files)?.1;
@@ -90,15 +88,27 @@ pub fn first_scene(
     if wish.ground {
         text += &ground(&found);
     }
-    text += drawn;
+    text += &drawn;
     Ok(Written { text, found })
 }
 
-/// How it is drawn, where that is not as everything is.
-fn render_text(data: &[DataFile], wish: &Wish) -> &'static str {
-    let are_volumes = data.iter().all(|d| matches!(d.data, FileData::Grid(_)));
+/// How it is drawn, where that is not as everything is: volumes alone by sheets, whose smooth edges need no more than one sample a pixel.
+fn render_text(data: &[DataFile], wish: &Wish) -> String {
+    let steps_of = |d: &DataFile| if let FileData::Grid(grid) = &d.data { Some(drawn_steps(grid)) } else { None };
+    let steps: Option<Vec<[f64; 2]>> = data.iter().map(steps_of).collect();
     let is_cloud = wish.preset.as_ref().is_some_and(Preset::is_cloud);
-    if are_volumes && !is_cloud && !wish.ground { SHARP } else { "" }
+    let Some(steps) = steps.filter(|_| !is_cloud && !wish.ground) else { return String::new() };
+    let mut text =
+        "\n[render]\ntechnique = \"sheets\"     # sharp; \"points\" is softer and quicker\nantialias = 1\n".to_owned();
+    let least = steps.iter().fold(f64::INFINITY, |least, [step, _]| least.min(*step));
+    if steps.iter().all(|[_, most]| *most <= MOST_STEPS * least) {
+        let width = significant(SLAB_WIDTH * least, 3);
+        let _ = write!(
+            text,
+            "\n[render.sheets]\nslab_width = {width}     # half a voxel: wider ones take less time, and show on flat surfaces\n"
+        );
+    }
+    text
 }
 
 /// Scanned bodies look away from where everything else is seen.

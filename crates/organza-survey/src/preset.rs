@@ -23,6 +23,8 @@ pub(crate) enum Look {
     Cloud,
     /// The colours of a map over the body of the values.
     Map(ColorMap),
+    /// The same of a computed field: thin and without light, so that colours stand for values and its middle is seen.
+    Field(ColorMap),
     /// Colours, and opacities where there are some, of a preset of ParaView.
     Sampled(Sampled),
 }

@@ -98,6 +98,7 @@ fn points(matter: &Matter, look: Option<&Look>) -> (Vec<Point>, f64) {
         }
         Some(Look::Cloud) => (vec![of_body(0.0, DROPLETS, 0.0), of_body(1.0, DROPLETS, 1.0)], 5.0),
         Some(Look::Map(map)) => (of_map(*map, of_body), 8.0),
+        Some(Look::Field(map)) => (of_map(*map, of_body), 4.0),
         Some(Look::CtBone) => {
             let [low, high] = BONE;
             let bones =
@@ -172,7 +173,9 @@ mod tests {
         for step in [0.001, 1.0, 250.0] {
             let grid = cube(step);
             let matter = Matter::of(&grid).unwrap();
-            for look in [None, Some(Look::Cloud), Some(Look::Map(ColorMap::VIRIDIS))] {
+            for look in
+                [None, Some(Look::Cloud), Some(Look::Map(ColorMap::VIRIDIS)), Some(Look::Field(ColorMap::VIRIDIS))]
+            {
                 let (_, depth) = points(&matter, look.as_ref());
                 let transfer = Transfer::new(&grid, Some(&matter), look.as_ref());
                 // Twelve voxels of full weight.

@@ -57,12 +57,15 @@ pub(super) fn write(repo: &Repo, runs: &[Run]) -> Result<(), String> {
         [r.target.clone(), [r.seconds, r.executions, r.edges, r.found.len() as u64].map(|n| n.to_string()).join(",")]
             .join(",")
     };
+    // As they are by now: another run may have ended in between.
+    let now = |path: &str| std::fs::read_to_string(repo.root.join(path)).map_err(|e| format!("{path}: {e}"));
     let is_new = |old: &&str| !runs.iter().any(|run| old.split(',').next() == Some(run.target.as_str()));
-    let old = repo.text(RUNS).unwrap_or_default().lines().skip(1).filter(is_new).map(str::to_owned);
+    let before = now(RUNS)?;
+    let old = before.lines().skip(1).filter(is_new).map(str::to_owned);
     let mut rows: Vec<String> = old.chain(runs.iter().map(row)).collect();
     rows.sort_unstable();
     let text = format!("{HEAD}\n{}\n", rows.join("\n"));
-    let page = page(repo.text(PAGE).unwrap_or_default(), &text)?;
+    let page = page(&now(PAGE)?, &text)?;
     for (path, content) in [(RUNS, &text), (PAGE, &page)] {
         std::fs::write(repo.root.join(path), content).map_err(|e| format!("{path}: {e}"))?;
     }

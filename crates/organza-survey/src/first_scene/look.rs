@@ -7,6 +7,7 @@ use crate::matter::Matter;
 use crate::number::{color, grouped, rounded, significant};
 use crate::preset::{Look, Preset, Wish};
 use crate::transfer::Transfer;
+use convert::ColorMap;
 use organza::FileData;
 use splat_core::{DAabb, Grid, optics};
 use std::collections::BTreeMap;
@@ -57,6 +58,7 @@ impl Object {
 
 const CLAY: (&str, &str) = ("clay", "specular = 0.015\nshininess = 20\n");
 const TISSUE: (&str, &str) = ("tissue", "shading = \"phong\"\nspecular = 0.08\nshininess = 24\n");
+const VALUES: (&str, &str) = ("values", "shading = \"unlit\"\n");
 const DROPLETS: (&str, &str) = ("droplets", "ambient = 0.6\nmedium = { albedo = 0.98, asymmetry = 0.3 }\n");
 
 /// The objects of all files, each with a name of its own.
@@ -73,7 +75,11 @@ pub(super) fn objects(data: &[DataFile], paths: &[String], wish: &Wish) -> Vec<O
         if *count > 1 {
             name = format!("{name}-{count}");
         }
-        let colors = if let FileData::Points(points) = &file.data { point_colors(points, wish) } else { None };
+        let colors = if let FileData::Points(points) = &file.data {
+            point_colors(points, file.has_colors(), wish)
+        } else {
+            None
+        };
         let bare = if file.is_colored() || colors.is_some() { None } else { clays.next() };
         let mut object = object(file, wish.preset.as_ref(), colors);
         if let Some(up) = wish.up.or(file.stands.filter(|_| all_stand)) {
@@ -81,6 +87,10 @@ pub(super) fn objects(data: &[DataFile], paths: &[String], wish: &Wish) -> Vec<O
         }
         if let (Some(clay), false) = (bare, matches!(file.data, FileData::Grid(_))) {
             object.keys = format!("color = {}\n{}", color(*clay), object.keys);
+        }
+        if file.is_black() {
+            object.keys =
+                format!("# All colours of the file are black, as if it had none: others are shown.\n{}", object.keys);
         }
         if let Some((material, _, first)) = &mut object.material {
             *first = !materials.contains(material);
@@ -121,19 +131,37 @@ fn object(file: &DataFile, preset: Option<&Preset>, colors: Option<String>) -> O
             let as_they_are = "# Colours of a photograph hold its light: they are shown as they are; name a material to light them.\n";
             match colors {
                 Some(colors) => of("points", about, clay, colors),
-                None if points.color.is_empty() => of("points", about, clay, String::new()),
+                None if !file.has_colors() => of("points", about, clay, String::new()),
                 None => of("points", about, None, as_they_are.to_owned()),
             }
         }
         FileData::Grid(grid) => {
-            let look = preset.map(|p| &p.0);
-            let material = if look == Some(&Look::Cloud) { DROPLETS } else { TISSUE };
+            let look = volume_look(grid, preset, file.stated_up.is_some());
+            let material = match look {
+                Some(Look::Cloud) => DROPLETS,
+                Some(Look::Field(_)) => VALUES,
+                _ => TISSUE,
+            };
             let about =
                 format!("{} × {} × {} voxels; {}", grid.dims[0], grid.dims[1], grid.dims[2], sides(extent(grid)));
-            of("volume", about, Some((material.0, material.1, false)), volume_keys(grid, look))
+            of("volume", about, Some((material.0, material.1, false)), volume_keys(grid, look.as_ref()))
         }
         // Images are refused when they are read.
         FileData::Image(_) => of("environment", String::new(), None, String::new()),
+    }
+}
+
+/// How a volume looks: a computed field in the colours of a map, unless its look has a name. What scanners measure comes in whole numbers, in
+/// Hounsfield units, or in formats that state how the patient lies.
+fn volume_look(grid: &Grid, preset: Option<&Preset>, is_scan: bool) -> Option<Look> {
+    let is_field = || {
+        let has_fractions = grid.values.iter().any(|value| value.fract() != 0.0);
+        !is_scan && has_fractions && !Matter::of(grid).is_some_and(|matter| matter.has_units())
+    };
+    match preset.map(|preset| &preset.0) {
+        None if is_field() => Some(Look::Field(ColorMap::VIRIDIS)),
+        Some(Look::Map(map)) if is_field() => Some(Look::Field(*map)),
+        look => look.cloned(),
     }
 }
 
@@ -156,6 +184,19 @@ fn extent(grid: &Grid) -> DAabb {
     DAabb::of_points((0..8).map(corner))
 }
 
+/// The least step of the lattice that a volume is drawn on, world units, and the largest one.
+pub(super) fn drawn_steps(grid: &Grid) -> [f64; 2] {
+    let steps = [grid.axes.x_axis, grid.axes.y_axis, grid.axes.z_axis].map(|axis| axis.length());
+    let own = || [steps.into_iter().fold(f64::INFINITY, f64::min), steps.into_iter().fold(0.0, f64::max)];
+    coarser_spacing(grid).map_or_else(own, |spacing| [spacing; 2])
+}
+
+/// The spacing that a large volume is drawn with instead of its own.
+fn coarser_spacing(grid: &Grid) -> Option<f64> {
+    let voxels: f64 = grid.dims.iter().map(|n| *n as f64).product();
+    (voxels > MOST_VOXELS).then(|| (grid.cell_volume() * voxels / MOST_VOXELS).cbrt())
+}
+
 /// `unit_length` and `transfer`, and a coarser lattice for a large volume.
 fn volume_keys(grid: &Grid, look: Option<&Look>) -> String {
     let matter = Matter::of(grid);
@@ -163,9 +204,7 @@ fn volume_keys(grid: &Grid, look: Option<&Look>) -> String {
     let unit = significant(UNIT * extent(grid).diagonal(), 2);
     let unit_length: f64 = unit.parse().unwrap_or(UNIT * extent(grid).diagonal());
     let mut text = String::new();
-    let voxels: f64 = grid.dims.iter().map(|n| *n as f64).product();
-    if voxels > MOST_VOXELS {
-        let spacing = (grid.cell_volume() * voxels / MOST_VOXELS).cbrt();
+    if let Some(spacing) = coarser_spacing(grid) {
         let _ = writeln!(
             text,
             "spacing = {}     # coarser than the file, for speed; leave it out for all voxels",
@@ -188,4 +227,40 @@ fn volume_keys(grid: &Grid, look: Option<&Look>) -> String {
         let _ = writeln!(text, "  {{ value = {value}, color = {}, opacity = {opacity} }},", color(point.color));
     }
     text + "]\n"
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use splat_core::glam::{DMat3, DVec3};
+
+    /// A ball whose values fade.
+    fn ball(value: impl Fn(f64) -> f64) -> Grid {
+        let at = |i: usize| DVec3::new((i % 12) as f64, (i / 12 % 12) as f64, (i / 144) as f64) - 5.5;
+        let values = (0..1728).map(|i| value(at(i).length_squared()) as f32).collect();
+        Grid { origin: DVec3::ZERO, axes: DMat3::IDENTITY, dims: [12; 3], values }
+    }
+
+    #[test]
+    fn computed_fields_have_the_colours_of_values_and_scans_those_of_tissue() {
+        let field = ball(|r| libm::exp(-r / 12.0));
+        let [bytes, units] = [ball(|r| (255.0 * libm::exp(-r / 12.0)).floor()), ball(|r| 900.0 - 60.1 * r)];
+        let named = |name: &str| Preset::named(name).ok();
+        assert_eq!(volume_look(&field, None, false), Some(Look::Field(ColorMap::VIRIDIS)));
+        assert!(matches!(volume_look(&field, named("turbo").as_ref(), false), Some(Look::Field(_))));
+        assert_eq!(volume_look(&field, named("cloud").as_ref(), false), Some(Look::Cloud));
+        assert_eq!(volume_look(&field, None, true), None);
+        assert_eq!(volume_look(&bytes, None, false), None);
+        assert!(matches!(volume_look(&bytes, named("turbo").as_ref(), false), Some(Look::Map(_))));
+        assert_eq!(volume_look(&units, None, false), None);
+    }
+
+    #[test]
+    fn slabs_follow_the_lattice_that_is_drawn() {
+        let axes = DMat3::from_diagonal(DVec3::new(0.5, 0.5, 2.5));
+        let scan = |dims: [usize; 3]| Grid { origin: DVec3::ZERO, axes, dims, values: Vec::new() };
+        assert_eq!(drawn_steps(&scan([100; 3])), [0.5, 2.5]);
+        let [least, most] = drawn_steps(&scan([400; 3]));
+        assert!(least == most && (least - (0.625 * 64e6 / MOST_VOXELS).cbrt()).abs() < 1e-9, "{least}");
+    }
 }

@@ -12,10 +12,10 @@ const CLASSIFIED: f64 = 0.5;
 const NOTHING: [u8; 2] = [0, 1];
 
 /// The keys of the colours; `None` where the file has colours and no others are asked for, and where no column tells anything.
-pub(super) fn point_colors(points: &RawPoints, wish: &Wish) -> Option<String> {
+pub(super) fn point_colors(points: &RawPoints, are_colored: bool, wish: &Wish) -> Option<String> {
     let chosen = match &wish.color_by {
         Some(column) => column.as_str(),
-        None if points.color.is_empty() => telling(points)?,
+        None if !are_colored => telling(points)?,
         None => return None,
     };
     let mut text = String::new();
@@ -76,13 +76,13 @@ mod tests {
     fn what_is_asked_for_goes_before_colours_of_the_file() {
         let mut colored = points(vec![2, 6], Vec::new());
         colored.color = vec![[1.0; 3]; 2];
-        assert_eq!(point_colors(&colored, &Wish::default()), None);
+        assert_eq!(point_colors(&colored, true, &Wish::default()), None);
         let preset = Some(Preset::named("turbo").unwrap());
         let wish = Wish { color_by: Some("height".into()), preset, ..Wish::default() };
-        let text = point_colors(&colored, &wish).unwrap();
+        let text = point_colors(&colored, true, &wish).unwrap();
         assert!(text.ends_with("color_by = { column = \"height\", map = \"turbo\" }\n"), "{text}");
         let wish = Wish { color_by: Some("classification".into()), ..Wish::default() };
-        let text = point_colors(&colored, &wish).unwrap();
+        let text = point_colors(&colored, true, &wish).unwrap();
         assert!(text.starts_with("# Classes: 2 (ground) 1, 6 (building) 1.\n"), "{text}");
     }
 }

@@ -10,9 +10,6 @@ use glam::DVec3;
 use splat_core::DAabb;
 use std::borrow::Cow;
 
-/// Share of the largest extinction below which a voxel is not looked for by a camera.
-const FAINT: f32 = 0.02;
-
 /// The scene with a camera that sees all visible objects, where it leaves the camera's place to the data, and that camera; else the scene
 /// as it is. `files` keeps what is read for this.
 ///
@@ -50,7 +47,7 @@ impl<'i> Outline<'i> {
         let points = match input {
             Input::Mesh(..) => Vec::new(),
             Input::Points(_, points, _) | Input::Matter(_, points, _) => points.bulk().map_or_else(Vec::new, corners),
-            Input::Volume(grid, transfer, params) => visible_ends(grid, transfer, FAINT, &params.clip),
+            Input::Volume(grid, transfer, params) => visible_ends(grid, transfer, &params.clip),
             Input::Surface(_, bounds, ..) | Input::Density(_, bounds, _) => corners(*bounds),
             Input::Procedural(shape, ..) => {
                 shape.ellipsoids.iter().flat_map(|e| corners(DAabb::around(e.center, e.radii))).collect()
