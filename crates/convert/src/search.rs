@@ -73,7 +73,7 @@ pub fn extinct_bounds(grid: &Grid, transfer: &TransferFunction) -> DAabb {
 /// [`extinct_bounds`]. A voxel is seen by an optical depth of half a grey level of eight bits, or by a fiftieth of the densest.
 pub fn visible_ends(grid: &Grid, transfer: &TransferFunction, clips: &[Clip]) -> Vec<DVec3> {
     let most = transfer.points().iter().fold(0.0, |most: f32, p| most.max(p.extinction));
-    let least = (FAINT * most).min((FAINT_DEPTH / grid.cell_volume().cbrt()) as f32);
+    let least = (FAINT * most).min((FAINT_DEPTH / libm::cbrt(grid.cell_volume())) as f32);
     let seen = |v: &f32| transfer.at(*v).extinction > least;
     let [nx, ny, _] = grid.dims;
     let row = |(row, values): (usize, &[f32])| {
