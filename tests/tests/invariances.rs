@@ -106,6 +106,28 @@ fn x8_light_is_additive_and_layers_sum_to_beauty() {
     assert!(largest <= 1e-6 * brightest, "twice the light: {largest:e} of {brightest}");
 }
 
+#[test]
+fn x8_two_scenes_apart_add_up() {
+    let head = "version = 1\n[camera]\nposition = [0, 0, 4]\ntarget = [0, 0, 0]\nfov_y = 35\nsize = [48, 24]\n[render]\n\
+                points = { exact = true }\n[material.red]\nshading = 'unlit'\ncolor = [0.9, 0.2, 0.1]\n\
+                [material.blue]\nshading = 'unlit'\ncolor = [0.1, 0.3, 2.0]\n";
+    let ball = |material: &str, x: f64| {
+        format!(
+            "[[object]]\nname = '{material}'\nmaterial = '{material}'\n\
+             medium_ball = {{ center = [{x:?}, 0, 0], radius = 0.5, extinction = 2.0, spacing = 0.125 }}\n"
+        )
+    };
+    let [red, blue] = [ball("red", -1.0), ball("blue", 1.0)];
+    let [one, other, both] =
+        [&red, &blue, &format!("{red}{blue}")].map(|objects| draw(&format!("{head}{objects}"), &[]));
+    for name in ["R", "G", "B"] {
+        let sum: Vec<f64> = one.channel(name).iter().zip(other.channel(name)).map(|(a, b)| a + b).collect();
+        let largest = largest_difference(&sum, &both.channel(name));
+        let brightest = sum.iter().copied().fold(0.0, f64::max);
+        assert!(brightest > 0.01 && largest <= 1e-6 * brightest, "{name}: {largest:e} of {brightest}");
+    }
+}
+
 /// The scene, lit by a sun in place of the second lamp.
 fn sunny(scale: f64, technique: &str) -> String {
     let text = scene(scale, 0.0, false);

@@ -4,6 +4,7 @@ mod assets;
 mod ci;
 mod deny;
 mod fuzz;
+mod mutants;
 mod papers;
 mod quick;
 mod repo;
@@ -25,6 +26,8 @@ usage: cargo xtask COMMAND
   deny             licences and sources of all dependencies, by cargo-deny
   fuzz [--seconds N] [--record] [TARGET…]
                    all kinds of bytes as files, scenes and formulas, by cargo-fuzz on nightly; --record writes docs/robustness.md
+  mutants [--every N] [CRATE…]
+                   plants every hundredth fault that cargo-mutants knows in the stages, and says which no test sees
   tidy             the rules that the compiler does not know: heads, sizes, dependency direction, assets
   papers           writes docs/papers.md from docs/papers/*.toml
   papers --times   takes what benchmarks of `cargo bench` measured last into docs/papers/*-times.csv, then writes the page
@@ -48,6 +51,7 @@ fn main() -> ExitCode {
         ["quick"] => Repo::open().and_then(|repo| quick::run(&repo)),
         ["deny"] => Repo::open().and_then(|repo| deny::run(&repo)),
         ["fuzz", rest @ ..] => Repo::open().and_then(|repo| fuzz::run(&repo, rest)),
+        ["mutants", rest @ ..] => Repo::open().and_then(|repo| mutants::run(&repo, rest)),
         ["tidy"] => Repo::open().and_then(|repo| tidy::run(&repo)),
         ["papers"] => Repo::open().and_then(|repo| papers::write(&repo)),
         ["papers", "--times"] => Repo::open().and_then(|repo| {

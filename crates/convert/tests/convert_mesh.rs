@@ -121,6 +121,15 @@ fn cv05_transmittance_does_not_depend_on_the_number_of_pieces() {
         assert!((mean - 1.0).abs() < 1e-3, "spacing {spacing}: mean {mean}");
         assert!(ripple < 1e-2, "spacing {spacing}: ripple {ripple}");
     }
+    // From one piece a triangle on, whatever is seen of the rims: the cross-sections of the pieces sum to τ times the area.
+    let mut fewest = usize::MAX;
+    for spacing in (0..8).map(|k| 2f64.powi(2 - k)) {
+        let (cloud, _) = mesh_to_points(&quad(1.0), &params(spacing, 0.9), None).unwrap();
+        let sum: f64 = cloud.cross_section.iter().map(|k| f64::from(*k)).sum();
+        assert!((sum / tau - 1.0).abs() < 1e-6, "spacing {spacing}: {sum}");
+        fewest = fewest.min(cloud.len());
+    }
+    assert_eq!(fewest, 2);
     // Far finer than the kernels: the sum is the integral.
     let (mut cloud, report) = mesh_to_points(&quad(1.0), &params(1.0 / 64.0, 0.9), None).unwrap();
     cloud.radius.fill(4.0 * report.radius as f32);

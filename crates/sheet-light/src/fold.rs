@@ -195,7 +195,8 @@ impl<'a> Prepared<'a> {
         let reach = viewed.lattice_reach(camera, slabs, volume.normals);
         let lattice = Lattice::packed(grid, volume.packing, reach);
         let viewed = viewed.with_rim(lattice.rim);
-        let voxels = Voxels::needed(&lattice, volume.transfer, reach);
+        let transfer = &volume.seen();
+        let voxels = Voxels::needed(&lattice, transfer, reach);
         let segments = Segments::new(&viewed, slabs, &voxels, lattice.dims, tiles);
         let cutoff = params.kernel.extent / params.kernel.sigma;
         let footprint = Footprint { cutoff: cutoff as f32 };
@@ -210,7 +211,7 @@ impl<'a> Prepared<'a> {
             taper: Taper::new(0.5 * cutoff * cutoff),
             kernel: Kernel::new(&footprint),
             classify: params.classify,
-            classifier: Classifier::new(volume.transfer, volume.extinction_scale, base),
+            classifier: Classifier::new(transfer, volume.extinction_scale, base),
             rays: LatticeRays::new(&volume, camera, slabs.origin),
             footprint: camera.is_orthographic().then(|| viewed.footprint(camera.focal_px())),
             viewed,

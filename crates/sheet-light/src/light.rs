@@ -5,6 +5,7 @@
 
 use crate::volume::SheetInput;
 use splat_core::glam::{DVec3, Vec3};
+use splat_core::optics::TRACE;
 use splat_core::raster::lanes::{Lanes, MAX_LANES};
 use splat_core::raster::pulp::Simd;
 use splat_core::shade::LitBy;
@@ -184,6 +185,7 @@ impl Reflector<'_> {
             if let Some(passing) = &passing {
                 irradiance = irradiance * passing[c];
             }
+            irradiance = irradiance.where_less(Lanes::splat(simd, TRACE), irradiance);
             let arrives = if lamp.has_shadow { irradiance * self.taken(simd, through[c]) } else { irradiance };
             lit.radiance[c] = arrives.mul_add(spots.color[c].mul_add(factor, specular), lit.radiance[c]);
             if c == 1 {

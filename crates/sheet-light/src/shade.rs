@@ -11,6 +11,7 @@ use crate::tile::{SIDE, TILE};
 use crate::volume::{SheetInput, Volume};
 use splat_core::Shading;
 use splat_core::glam::Vec3;
+use splat_core::optics::TRACE;
 use splat_core::raster::lanes::{Lanes, MAX_LANES};
 use splat_core::raster::pulp::Simd;
 use splat_core::shade::{ChannelLayout, MAX_CHANNELS};
@@ -266,8 +267,9 @@ impl Shader<'_> {
         self.channels(simd, of, &self.spots(simd, of, place, medium), wanted & of.open, values);
         for c in 0..self.layout.count() {
             // What is not seen may be no number.
-            let zero = Lanes::splat(simd, 0.0);
-            Lanes::load(simd, &values[c]).where_less(zero, medium.depth).store(&mut values[c]);
+            let (zero, value) = (Lanes::splat(simd, 0.0), Lanes::load(simd, &values[c]));
+            let least = Lanes::splat(simd, if c < self.layout.colors() { TRACE } else { -f32::MAX });
+            value.where_less(zero, medium.depth).where_less(least, value).store(&mut values[c]);
         }
     }
 

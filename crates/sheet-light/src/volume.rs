@@ -4,6 +4,7 @@ use crate::fold::extremes;
 use crate::visible::without_extinction;
 use crate::{Error, Splats};
 use splat_core::glam::{DMat3, DVec3};
+use splat_core::optics::TRACE;
 use splat_core::shade::LitBy;
 use splat_core::{Camera, Clip, Grid, Material, Packing, Similarity, TransferFunction};
 
@@ -62,7 +63,15 @@ impl Volume<'_> {
     /// greatest.
     pub fn is_seen(&self) -> bool {
         let (least, greatest) = extremes(&self.grid.values);
-        !without_extinction(self.transfer).iter().any(|[low, high]| *low <= least && greatest <= *high)
+        !without_extinction(&self.seen()).iter().any(|[low, high]| *low <= least && greatest <= *high)
+    }
+
+    /// The transfer function without what can not be seen ([`TRACE`]): extinctions of which no ray through the whole volume gathers more, and
+    /// colours.
+    pub(crate) fn seen(&self) -> TransferFunction {
+        let (axes, [nx, ny, nz]) = (self.axes(), self.grid.dims.map(|n| n as f64));
+        let longest = axes.x_axis.length() * nx + axes.y_axis.length() * ny + axes.z_axis.length() * nz;
+        self.transfer.without_traces((f64::from(TRACE) / (self.extinction_scale * longest)) as f32, TRACE)
     }
 
     /// Extinction about a world position, of trilinear values, 1/world unit; 0 outside.

@@ -1,8 +1,10 @@
 //! Work, counted: what is shaded of what was touched, and how fragments follow widths of slabs and pixels of a voxel.
 
 use crate::common::{constant, cubic, draw, exact, grid, input, parallel, transfer, unlit, volume};
-use sheet_light::{Params, SheetCounts};
-use splat_core::Grid;
+use sheet_light::{Params, SheetCounts, SheetInput};
+use splat_core::glam::DVec3;
+use splat_core::shade::LitBy;
+use splat_core::{Grid, Light, LightShape, Material};
 
 /// The counts of a volume that is seen along z, of which the picture shows a square.
 fn counts(grid: &Grid, extinction: &[(f32, f32)], side: f64, pixels: u32, params: &Params) -> SheetCounts {
@@ -41,6 +43,27 @@ fn pixels_that_are_opaque_are_not_shaded() {
     let (full, early) = (of(&exact()), of(&cut));
     println!("half of it is thin: {:.1}, {:.1} with the threshold", a_pixel(full), a_pixel(early));
     assert!(a_pixel(full) >= 64.0 && a_pixel(early) < 0.5 * a_pixel(full) + 0.5 * 12.0, "{full:?}, {early:?}");
+}
+
+#[test]
+fn x6_traces_of_matter_and_light_are_not_drawn() {
+    let half = grid([24; 3], cubic(0.25), |p| if p.x < 0.0 { 1.0 } else { 0.0 });
+    let (material, camera) = (Material::default(), parallel([0.0, 0.0, 30.0], 6.0, [48, 48]));
+    let of = |extinction: f32, intensity: f32| {
+        let shape = LightShape::Directional { direction: DVec3::new(0.6, 0.0, -0.8) };
+        let lights = [LitBy { slide: None, light: Light { shape, intensity: [intensity; 3] }, shadow: None }];
+        let tf = transfer(&[(0.0, extinction), (0.5, extinction), (1.0, 1e-6)]);
+        let volumes = [volume(&half, &tf, &material)];
+        let input = SheetInput { ambient: [0.0; 3], ..input(&volumes, &camera, &lights) };
+        let (out, counts) = draw(&input, &exact()).unwrap();
+        (out.optical_depth, out.channels, counts.records)
+    };
+    let (nothing, trace) = (of(0.0, 1.0), of(1e-36, 1.0));
+    assert!(trace == nothing && trace.2 > 0);
+    // Matter that is not yet a trace takes all voxels.
+    assert!(of(1e-20, 1.0).2 > trace.2);
+    assert_eq!(of(0.0, 1e-39).1, of(0.0, 0.0).1);
+    assert!(nothing.1.iter().flatten().any(|v| *v > 0.0));
 }
 
 #[test]

@@ -11,6 +11,7 @@ pub use census::Census;
 pub use channels::{ChannelLayout, MAX_CHANNELS, MAX_SHADED_CHANNELS};
 pub use point::{Point, Radiance, arriving, facing};
 
+use crate::optics::TRACE;
 use crate::raster::Projected;
 use crate::{Camera, Cloud, Error, Light, Material, Object, Progress, Receiver, Slide, Transmittance};
 use glam::{DVec3, Vec3};
@@ -33,12 +34,13 @@ pub struct LitBy<'a> {
 
 impl LitBy<'_> {
     /// Direction to the light, and the unshadowed irradiance per channel, as [`Light::irradiance`] has them, behind the slide: the one
-    /// place where light arrives, whoever asks.
+    /// place where light arrives, whoever asks. A trace of it ([`crate::optics::TRACE`]) is none.
     #[inline]
     pub fn irradiance(&self, p: DVec3, spread: f64) -> (DVec3, [f32; 3]) {
         let (to_light, irradiance) = self.light.irradiance(p, spread);
         let passing = self.slide.map_or([1.0; 3], |slide| slide.passing(p, spread));
-        (to_light, std::array::from_fn(|c| irradiance[c] * passing[c]))
+        let arriving = |c: usize| irradiance[c] * passing[c];
+        (to_light, std::array::from_fn(|c| if arriving(c) > TRACE { arriving(c) } else { 0.0 }))
     }
 }
 

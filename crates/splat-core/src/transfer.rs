@@ -67,6 +67,17 @@ impl TransferFunction {
         }
     }
 
+    /// The same with 0 for extinctions that are no more than `extinction`, and for colours that are no more than `color`.
+    pub fn without_traces(&self, extinction: f32, color: f32) -> Self {
+        let above = |v: f32, least: f32| if v > least { v } else { 0.0 };
+        let kept = |p: &TransferPoint| TransferPoint {
+            extinction: above(p.extinction, extinction),
+            color: p.color.map(|c| above(c, color)),
+            ..*p
+        };
+        Self { points: self.points.iter().map(kept).collect() }
+    }
+
     /// The control points.
     pub fn points(&self) -> &[TransferPoint] {
         &self.points

@@ -1,4 +1,4 @@
-//! Footprints, opaque rims, shaded points, environments, slides and recordings. One program: it is linked once, and its tests share all cores.
+//! Footprints, opaque rims, packed clouds, shaded points, environments, slides, traces and recordings. One program: it is linked once, and its tests share all cores.
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod accumulation;
@@ -6,8 +6,10 @@ mod environment;
 mod extended_lights;
 mod image_footprints;
 mod opaque_rim;
+mod packed;
 #[cfg(feature = "gpu")]
 mod recording;
 mod shaded_points;
 mod slides;
+mod traces;
 mod triangles;

@@ -1,7 +1,7 @@
 //! The recorded compositing, without a device: what it is, and what it refuses.
 
 use glam::{DVec3, Vec3};
-use splat_core::raster::gpu::{AttributeRoom, Capacities, follow, project, record, resolve};
+use splat_core::raster::gpu::{AttributeRoom, Attributes, Capacities, follow, project, record, resolve};
 use splat_core::raster::{self, Accumulation, Detail, OpaqueImage, Params, ProjectInput, Projected};
 use splat_core::raster::{FoldInput, OpaqueInput};
 use splat_core::shade::{ChannelLayout, MAX_SHADED_CHANNELS, gpu as shade};
@@ -244,4 +244,32 @@ fn what_follows_a_sort_reads_how_many_splats_it_left() {
     assert_eq!(given, [80, 0, 0, 0, 16 * (5 * footprints.layers().len() + 1), 0, 0]);
     let other = Accumulator::new([8, 8], 1, 3, false, false);
     assert!(matches!(follow::uploads(&follows, &input, &other), Err(Error::ColumnLength { .. })));
+}
+
+#[test]
+fn ou7_what_is_no_number_is_refused_before_a_device_sees_it() {
+    let mut cloud = Cloud::new(DVec3::ZERO);
+    (0..5).for_each(|_| cloud.push(&Splat { normal: Vec3::Z, tangent: Vec3::X, value: 1.0, ..Splat::default() }));
+    assert!(Attributes::new(&cloud, None).is_ok());
+    type Poison = fn(&mut Cloud, f32);
+    let fields: [(&str, Poison); 7] = [
+        ("position", |cloud, v| cloud.position[3].y = v),
+        ("radius", |cloud, v| cloud.radius[3] = v),
+        ("cross_section", |cloud, v| cloud.cross_section[3] = v),
+        ("color", |cloud, v| cloud.color[3][2] = v),
+        ("normal", |cloud, v| cloud.normal[3].x = v),
+        ("tangent", |cloud, v| cloud.tangent[3].z = v),
+        ("value", |cloud, v| cloud.value[3] = v),
+    ];
+    for (name, poison) in fields {
+        for number in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+            let mut cloud = cloud.clone();
+            poison(&mut cloud, number);
+            let found = Attributes::new(&cloud, None);
+            assert!(
+                matches!(found, Err(Error::Invalid { element: "splat", index: 3, attribute, .. }) if attribute == name),
+                "{name} {number}: {found:?}"
+            );
+        }
+    }
 }

@@ -104,9 +104,9 @@ fn ts10_light_inside_a_ball() {
             map.counts(),
             (-sigma * r).exp()
         );
-        assert!((mean - true_mean).abs() < 1e-3, "mean {mean}, truth {true_mean}");
+        assert!((mean - true_mean).abs() < 1e-5, "mean {mean}, truth {true_mean}");
         assert!((mean - f64::from((-sigma * r).exp())).abs() < 5e-3);
-        assert!(worst < 1.5e-2, "{worst}");
+        assert!(worst < 1e-3, "{worst}");
     }
 }
 
@@ -230,7 +230,7 @@ fn ts16_mean_transmittance_does_not_depend_on_the_table() {
     // One layer of optical depth 1, so that 1024 rows are soon built; seen at an angle, and along an axis, where the octahedral
     // table has a corner and the polar one its pole.
     let cloud = medium([10, 10, 0], 0.1, 10.0, |_| true);
-    for (position, tolerance) in [(DVec3::new(-1.3, 0.9, -2.6), 1e-3), (DVec3::new(0.05, 0.02, -3.0), 5e-3)] {
+    for position in [DVec3::new(-1.3, 0.9, -2.6), DVec3::new(0.05, 0.02, -3.0)] {
         for mapping in [MappingChoice::Octahedral, MappingChoice::PolarAzimuth, MappingChoice::Planar] {
             // A planar table spends all its cells on the casters.
             let planar = mapping == MappingChoice::Planar;
@@ -240,11 +240,7 @@ fn ts16_mean_transmittance_does_not_depend_on_the_table() {
                 mean_behind_layer(&build(&cloud, &point_light(position), &params), position)
             });
             println!("{mapping:?} {means:?}");
-            // The paper's cells are not of equal area; its coarsest table is allowed twice as much.
-            let slack = if mapping == MappingChoice::PolarAzimuth { 2.0 } else { 1.0 };
-            for mean in means {
-                assert!((mean - means[4]).abs() < slack * tolerance, "{mapping:?}: {means:?}");
-            }
+            assert!(means.iter().all(|mean| (mean - means[4]).abs() < 1e-3), "{mapping:?}: {means:?}");
         }
     }
 }

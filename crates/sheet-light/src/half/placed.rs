@@ -51,7 +51,7 @@ impl<'a> Placed<'a> {
             cutoff,
             sections: SectionTable::new(reach / frame.slabs.width, &footprint),
             kernel: Kernel::new(&footprint),
-            classifier: Classifier::new(volume.transfer, volume.extinction_scale, base),
+            classifier: Classifier::new(&volume.seen(), volume.extinction_scale, base),
             base,
             width: frame.slabs.width,
         }
@@ -84,7 +84,7 @@ impl<'a> Placed<'a> {
     /// The lattice with the rim that kernels reach, and the voxels of it that may matter.
     pub(crate) fn voxels(&self, reach: [usize; 3]) -> (Lattice<'a>, Voxels) {
         let lattice = Lattice::new(self.volume.grid, reach);
-        let voxels = Voxels::needed(&lattice, self.volume.transfer, reach);
+        let voxels = Voxels::needed(&lattice, &self.volume.seen(), reach);
         (lattice, voxels)
     }
 

@@ -6,6 +6,7 @@
 //! E is the irradiance of a light times its transmittance; ambient radiance adds ρ·L_ambient.
 
 use super::{ChannelLayout, LitBy};
+use crate::optics::TRACE;
 use crate::{Material, SHADED_EFFECTS, Shading, SplatKind, henyey_greenstein};
 use glam::{DVec3, Vec3};
 
@@ -122,7 +123,7 @@ impl Radiance {
         [self.ambient, self.emission, self.direct, self.scatter1]
     }
 
-    /// Writes the channels of `layout`, with the normal that the point has; 0 for what is scattered more than once.
+    /// Writes the channels of `layout`, with the normal that the point has; 0 for what is scattered more than once, and for a [`TRACE`].
     ///
     /// # Panics
     /// If `out` has fewer numbers than the layout.
@@ -137,6 +138,7 @@ impl Radiance {
             // One of `direct` and `scatter1` is 0: beauty has the same bits as if they were one.
             out[..3].copy_from_slice(&others.iter().fold(first, |sum, e| [0, 1, 2].map(|c| sum[c] + e[c])));
         }
+        out[..layout.colors()].iter_mut().filter(|v| **v <= TRACE).for_each(|v| *v = 0.0);
         if let Some(at) = layout.normal() {
             out[at..at + 3].copy_from_slice(&normal.to_array());
         }

@@ -73,8 +73,10 @@ impl Attributes {
     /// Of a cloud, or of the splats `ids` of it, in their order.
     ///
     /// # Errors
-    /// [`Error::Overflow`] for more than 2³² splats, [`Error::Invalid`] for an id that no splat has.
+    /// [`Error::Overflow`] for more than 2³² splats, [`Error::Invalid`] for an id that no splat has; those of [`Cloud::validate`], since a
+    /// device need not know what is no number.
     pub fn new(cloud: &Cloud, ids: Option<&[u32]>) -> Result<Self, Error> {
+        cloud.validate()?;
         let n = ids.map_or(cloud.len(), <[u32]>::len);
         let splats = u32::try_from(n)
             .map_err(|_| Error::Overflow(Overflow { what: "splats", needed: n as u64, had: u32::MAX.into() }))?;

@@ -1,0 +1,153 @@
+//! Clouds that are packed: how far each number may be off, what is exact, how many bytes a splat.
+
+use glam::{DVec3, Vec3};
+use splat_core::{Cloud, Error, Gaussians, PackedCloud, Splat, SplatKind, rng};
+use std::sync::Arc;
+
+fn unit(item: u64, k: u64) -> f32 {
+    rng::unit_f32(7, 0, item, k)
+}
+
+fn direction(item: u64) -> Vec3 {
+    let (z, angle) = (2.0 * unit(item, 10) - 1.0, std::f32::consts::TAU * unit(item, 11));
+    let (sin, cos) = angle.sin_cos();
+    let flat = (1.0 - z * z).max(0.0).sqrt();
+    Vec3::new(flat * cos, flat * sin, z)
+}
+
+/// A cloud of all kinds, in canonical order, 10⁷ m away.
+fn cloud(n: u64) -> Cloud {
+    let mut cloud = Cloud::new(DVec3::new(1e7, -1e7, 3.0));
+    for i in 0..n {
+        // Seven objects, each of one kind, material and footprint.
+        let object = (i % 7) as u32;
+        let kind = [SplatKind::Medium, SplatKind::Surface, SplatKind::Opaque][object as usize % 3];
+        cloud.push(&Splat {
+            position: Vec3::new(unit(i, 0), unit(i, 1), unit(i, 2)) * 40.0 - Vec3::splat(20.0),
+            radius: 0.02 + 0.1 * unit(i, 3),
+            cross_section: 0.3 * unit(i, 4),
+            color: [unit(i, 5), 3.0 * unit(i, 6), 0.0],
+            kind,
+            material: object as u16 % 5,
+            footprint: object as u8 % 2,
+            object,
+            normal: if kind == SplatKind::Medium { Vec3::ZERO } else { direction(i) },
+            value: 1000.0 + unit(i, 8),
+            crossing_depth: unit(i, 9),
+            ..Splat::default()
+        });
+    }
+    cloud.canonicalize();
+    cloud
+}
+
+fn range(values: impl Iterator<Item = f32>) -> [f64; 2] {
+    let of = values.map(f64::from).fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], v| [a.min(v), b.max(v)]);
+    assert!(of[0] <= of[1]);
+    of
+}
+
+/// Half of one of so many steps over the range of `values` by `measure`, with the rounding of f32 at their size.
+fn check(name: &str, pairs: &[(f32, f32)], steps: f64, measure: fn(f64) -> f64) {
+    let [low, high] = range(pairs.iter().map(|p| p.0));
+    let half = 0.5 * (measure(high) - measure(low)) / steps;
+    let rounding = 4.0 * f64::from(f32::EPSILON) * measure(low.abs().max(high.abs()));
+    for (given, found) in pairs {
+        let error = (measure(f64::from(*given)) - measure(f64::from(*found))).abs();
+        assert!(error <= half + rounding, "{name}: {given} became {found}, half a step is {half:e}");
+    }
+}
+
+#[test]
+fn every_number_is_off_by_half_a_step_of_its_block_at_most() {
+    let cloud = cloud(10_000);
+    let found = PackedCloud::new(&cloud).unwrap().unpack();
+    found.validate().unwrap();
+    assert_eq!(found.origin, cloud.origin);
+    assert_eq!(
+        (&found.kind, &found.material, &found.footprint, &found.object),
+        (&cloud.kind, &cloud.material, &cloud.footprint, &cloud.object)
+    );
+    let all: Vec<usize> = (0..cloud.len()).collect();
+    for block in all.chunks(256) {
+        let pairs = |of: &dyn Fn(&Cloud, usize) -> f32| -> Vec<(f32, f32)> {
+            block.iter().map(|i| (of(&cloud, *i), of(&found, *i))).collect()
+        };
+        let (even, root): (fn(f64) -> f64, fn(f64) -> f64) = (|v| v, f64::sqrt);
+        for axis in 0..3 {
+            check("position", &pairs(&|c, i| c.position[i][axis]), 65535.0, even);
+        }
+        check("radius", &pairs(&|c, i| c.radius[i]), 255.0, root);
+        check("cross_section", &pairs(&|c, i| c.cross_section[i]), 65535.0, root);
+        check("value", &pairs(&|c, i| c.value[i]), 65535.0, even);
+        check("crossing_depth", &pairs(&|c, i| c.crossing_depth[i]), 65535.0, root);
+        // Colours from 0 to the brightest number of the block.
+        let colors = block.iter().flat_map(|i| cloud.color[*i].into_iter().zip(found.color[*i]));
+        check("color", &colors.chain([(0.0, 0.0)]).collect::<Vec<_>>(), 255.0, root);
+    }
+    // The least angle between steps makes the cosine's own rounding count.
+    let off = |i: &usize| f64::from(cloud.normal[*i].cross(found.normal[*i]).length()).asin().to_degrees();
+    assert!(all.iter().all(|i| (cloud.normal[*i] == Vec3::ZERO) == (found.normal[*i] == Vec3::ZERO)));
+    let worst = all.iter().map(off).fold(0.0, f64::max);
+    assert!((0.3..0.64).contains(&worst), "{worst}°");
+}
+
+#[test]
+fn normals_along_axes_and_on_edges_are_kept() {
+    let mut cloud = Cloud::default();
+    let axes = [Vec3::X, Vec3::Y, Vec3::Z, Vec3::NEG_X, Vec3::NEG_Y, Vec3::NEG_Z];
+    axes.iter().for_each(|n| cloud.push(&Splat { normal: *n, kind: SplatKind::Opaque, ..Splat::default() }));
+    assert_eq!(PackedCloud::new(&cloud).unwrap().unpack(), cloud);
+}
+
+#[test]
+fn what_a_block_has_one_of_is_exact_and_empty_columns_stay_empty() {
+    let mut cloud = Cloud::new(DVec3::ONE);
+    let splat = Splat { radius: 0.1, cross_section: 0.03, color: [0.7; 3], object: 9, ..Splat::default() };
+    (0..300).for_each(|_| cloud.push(&splat));
+    cloud.shadow_coefficient = vec![0.25; 300];
+    assert_eq!(PackedCloud::new(&cloud).unwrap().unpack(), cloud);
+    assert_eq!(PackedCloud::new(&Cloud::default()).unwrap().unpack(), Cloud::default());
+}
+
+#[test]
+fn a_splat_with_a_normal_takes_less_than_sixteen_bytes() {
+    let mut cloud = cloud(30_000);
+    (cloud.value, cloud.crossing_depth) = (Vec::new(), Vec::new());
+    let packed = PackedCloud::new(&cloud).unwrap();
+    let [bytes, before] = [packed.bytes(), cloud.bytes()].map(|b| b as f64 / cloud.len() as f64);
+    println!("{bytes:.2} bytes a splat in place of {before}");
+    assert!(bytes <= 16.0 && before >= 52.0, "{bytes} in place of {before}");
+}
+
+#[test]
+fn x1_any_number_of_threads_packs_and_unpacks_the_same_bits() {
+    let cloud = cloud(20_000);
+    let of = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| {
+            let packed = PackedCloud::new(&cloud).unwrap();
+            let again = packed.unpack();
+            (packed, again)
+        })
+    };
+    let one = of(1);
+    assert!([2, 3, 7].into_iter().all(|threads| of(threads) == one));
+}
+
+#[test]
+fn what_is_no_number_and_gaussians_are_refused() {
+    let mut bad = cloud(10);
+    bad.color[4][1] = f32::NAN;
+    assert!(matches!(PackedCloud::new(&bad), Err(Error::Invalid { attribute: "color", index: 4, .. })));
+    let mut gaussian = cloud(10);
+    let mut table = Gaussians::default();
+    table.axes.push([Vec3::X, Vec3::Y, Vec3::Z]);
+    table.opacity.push(0.5);
+    table.harmonics.push([1.0; 3]);
+    gaussian.gaussians = Arc::new(table);
+    gaussian.gaussian = vec![Gaussians::NONE; 10];
+    (gaussian.gaussian[3], gaussian.kind[3]) = (0, SplatKind::Medium);
+    gaussian.validate().unwrap();
+    assert!(matches!(PackedCloud::new(&gaussian), Err(Error::Invalid { attribute: "gaussian", index: 3, .. })));
+}
