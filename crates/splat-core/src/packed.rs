@@ -157,7 +157,14 @@ impl PackedCloud {
 }
 
 /// A column made from another, each entry by its block.
-fn by_block<Q: Sync, T: Send>(blocks: &[Block], from: &[Q], of: impl Fn(&Block, &Q) -> T + Sync) -> Vec<T> {
-    let entry = |(i, v): (usize, &Q)| of(&blocks[i / BLOCK], v);
-    from.par_iter().enumerate().with_min_len(FEW * BLOCK).map(entry).collect()
+fn by_block<Q: Sync, T: Clone + Default + Send>(
+    blocks: &[Block],
+    from: &[Q],
+    of: impl Fn(&Block, &Q) -> T + Sync,
+) -> Vec<T> {
+    let mut out = vec![T::default(); from.len()];
+    let parts = out.par_chunks_mut(BLOCK).zip(from.par_chunks(BLOCK)).zip(blocks).with_min_len(FEW);
+    // Loops over one block each, of which what they read of it leaves vectors of lanes.
+    parts.for_each(|((out, from), block)| out.iter_mut().zip(from).for_each(|(to, v)| *to = of(block, v)));
+    out
 }
