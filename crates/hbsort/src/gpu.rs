@@ -215,3 +215,32 @@ fn slices_of(slicing: &Slicing, keys: impl ExactSizeIterator<Item = u32>) -> (Ve
     starts.push(end);
     (starts, indices)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::radix::key_of;
+
+    #[test]
+    fn bs01_slices_of_sorted_keys_are_those_of_their_depths() {
+        for direction in [Direction::FrontToBack, Direction::BackToFront] {
+            let mut depths: Vec<f32> = (0..500u16).map(|i| 1.0 + f32::from(i % 97) * 0.0931).collect();
+            depths.sort_by(f32::total_cmp);
+            if direction == Direction::BackToFront {
+                depths.reverse();
+            }
+            let slicing = Slicing::new(1.0, 10.0, 0.25, direction, 0);
+            let key = |depth: &f32| if direction == Direction::BackToFront { !key_of(*depth) } else { key_of(*depth) };
+            let (starts, indices) = slices_of(&slicing, depths.iter().map(key));
+            let of_depths: Vec<u64> = depths.iter().map(|depth| slicing.slice_of(*depth)).collect();
+            let (mut begins, mut slices): (Vec<u32>, Vec<u64>) = (0..500)
+                .filter(|at| *at == 0 || of_depths[*at] != of_depths[*at - 1])
+                .map(|at| (at as u32, of_depths[at]))
+                .unzip();
+            begins.push(500);
+            slices.dedup();
+            assert!(slices.len() > 20);
+            assert_eq!((starts, indices), (begins, slices), "{direction:?}");
+        }
+    }
+}

@@ -282,6 +282,11 @@ fn bs09_nothing_in_nothing_out() {
 
     let order = slice_depths(&[4.0], &params(0.1, Direction::BackToFront, false), &mut scratch).unwrap();
     assert_eq!((slices_of(&order), order.near, order.far, order.slices), (vec![vec![0]], 4.0, 4.0, 1));
+    // What the scratch holds from another sort is told all the same.
+    let held = scratch.info().bytes;
+    slice_cloud(&behind, None, &camera, &Params::default(), &mut scratch).unwrap();
+    assert_eq!((scratch.info().items_in, scratch.info().bytes), (10, held));
+    assert!(held > 0);
     let none = slice_cloud(&behind, Some(&[]), &camera, &Params::default(), &mut scratch).unwrap();
     assert_eq!((none.non_empty_slices(), none.culled), (0, 0));
 }
