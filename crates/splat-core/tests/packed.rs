@@ -47,8 +47,11 @@ fn range(values: impl Iterator<Item = f32>) -> [f64; 2] {
     of
 }
 
+/// What steps are even in.
+type Measure = fn(f64) -> f64;
+
 /// Half of one of so many steps over the range of `values` by `measure`, with the rounding of f32 at their size.
-fn check(name: &str, pairs: &[(f32, f32)], steps: f64, measure: fn(f64) -> f64) {
+fn check(name: &str, pairs: &[(f32, f32)], steps: f64, measure: Measure) {
     let [low, high] = range(pairs.iter().map(|p| p.0));
     let half = 0.5 * (measure(high) - measure(low)) / steps;
     let rounding = 4.0 * f64::from(f32::EPSILON) * measure(low.abs().max(high.abs()));
@@ -73,7 +76,7 @@ fn every_number_is_off_by_half_a_step_of_its_block_at_most() {
         let pairs = |of: &dyn Fn(&Cloud, usize) -> f32| -> Vec<(f32, f32)> {
             block.iter().map(|i| (of(&cloud, *i), of(&found, *i))).collect()
         };
-        let (even, root): (fn(f64) -> f64, fn(f64) -> f64) = (|v| v, f64::sqrt);
+        let [even, root]: [Measure; 2] = [|v| v, f64::sqrt];
         for axis in 0..3 {
             check("position", &pairs(&|c, i| c.position[i][axis]), 65535.0, even);
         }
