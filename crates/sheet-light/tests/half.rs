@@ -10,6 +10,7 @@ mod polygons_scattered;
 mod scattering;
 mod soft;
 mod soft_polygons;
+mod soft_splats;
 mod splats;
 mod splats_scattered;
 mod twin;

@@ -293,11 +293,11 @@ impl OneSlab<'_> {
         let light = self.of.illumination(buffer, self.slab, splats);
         let part = self.depths.and_then(|depths| LitPart::new(simd, (depths, &self.of.frame), &ends, wanted));
         let Some(part) = part else {
-            let asked = Asked { ends, extinction, optical_depth: &of.optical_depth };
+            let asked = Asked { ends, extinction, optical_depth: &of.optical_depth, lit: &[] };
             return light.transmittance(simd, &asked, wanted, planes);
         };
         let optical_depth = &part.optical_depth(&of.optical_depth);
-        let asked = Asked { ends: part.ends(simd, &ends), extinction, optical_depth };
+        let asked = Asked { ends: part.ends(simd, &ends), extinction, optical_depth, lit: &part.by_point };
         let mut through = light.transmittance(simd, &asked, wanted, planes);
         part.weigh(&of.optical_depth, &mut through);
         through

@@ -303,11 +303,6 @@ fn check_splats(input: &HalfInput<'_>, splats: &HalfSplats<'_>) -> Result<(), Er
     if splats.cloud.origin != input.sheets.shadow_origin {
         return Err(Error::parameter("sheets.shadow_origin", input.sheets.shadow_origin, "the origin of the splats"));
     }
-    if !input.extended.is_empty() {
-        let found = format!("{} lights", input.extended.len());
-        let expected = "none beside splats, whose shadows are those of points: `Light::points` has them";
-        return Err(Error::parameter("extended", found, expected));
-    }
     Ok(())
 }
 
@@ -403,7 +398,8 @@ fn soft_bytes(
     let frame = Frame::new(bodies, camera, &sheets, &axis_of_view(bodies, camera, Some(light.0)));
     let penumbra = frame.ok().and_then(|frame| Penumbra::new(&frame, bodies, light, image, params.most_light_pixels));
     penumbra.map_or(0, |penumbra| {
-        let planes = planes(bodies.volumes) as u64;
+        // The materials of splats are not known here.
+        let planes = if bodies.splats.is_some() { 3 } else { planes(bodies.volumes, None) as u64 };
         SoftBuffer::bytes_of(&penumbra, planes) + 4 * planes * image.size.into_iter().map(u64::from).product::<u64>()
     })
 }

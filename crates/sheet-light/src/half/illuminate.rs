@@ -31,6 +31,9 @@ pub(crate) struct Asked<'a, S: Simd> {
     pub(crate) extinction: &'a [[f32; MAX_LANES]],
     /// Optical depth of the part, by plane.
     pub(crate) optical_depth: &'a [[f32; MAX_LANES]; 3],
+    /// How much of the part each point of the light reaches, ray by ray, where polygons keep some of it from some of them; all 0 for a ray that
+    /// they do not.
+    pub(crate) lit: &'a [f32],
 }
 
 /// The place at a share of the way between the ends.
@@ -70,7 +73,7 @@ impl Illumination<'_> {
         let of = |v: f32| Lanes::splat(simd, v);
         let [nearer, farther] = &asked.ends;
         let middle = between(asked, of(0.5));
-        let soft = self.buffer.soft.as_ref().map(|soft| soft.at(simd, &middle, wanted));
+        let soft = self.buffer.soft.as_ref().map(|soft| soft.at(simd, &middle, wanted, asked.lit));
         let (mut optical, mut bends, mut is_bent) = ([[of(0.0); NODES]; 3], [of(1.0); BENDS], of(0.0));
         for v in 0..self.volumes.len() {
             let mean = self.means(simd, v, &middle, asked.extinction, wanted);
@@ -103,7 +106,7 @@ impl Illumination<'_> {
             }
         }
         if let Some(splats) = self.splats {
-            self.add_splats(simd, splats, &middle, wanted, &mut optical);
+            self.add_splats(simd, splats, &middle, wanted, (&soft, &mut optical));
         }
         let mut out = [[1.0; MAX_LANES]; 3];
         for p in 0..planes {
@@ -146,17 +149,18 @@ impl Illumination<'_> {
         splats: &SplatLight<'_>,
         middle: &Places<S>,
         wanted: &[f32; MAX_LANES],
-        to: &mut [[Lanes<S>; NODES]; 3],
+        (soft, to): (&Option<Soft<S>>, &mut [[Lanes<S>; NODES]; 3]),
     ) {
-        let (places, mut own) = (stored(middle), [[0.0; MAX_LANES]; 3]);
+        let (places, mut tau) = (stored(middle), [[[0.0; MAX_LANES]; 2]; 3]);
         for lane in (0..Lanes::<S>::COUNT).filter(|lane| wanted[*lane] > 0.0) {
             let at = Vec3::new(places[0][lane], places[1][lane], places[2][lane]);
-            let tau = splats.optical_depth(self.buffer.sight.pixel(at), (at.z - self.face) / self.width);
-            (0..3).for_each(|p| own[p][lane] = tau[p]);
+            let of_each = splats.optical_depth(at, (at.z - self.face) / self.width);
+            (0..3).for_each(|p| (0..2).for_each(|n| tau[p][n][lane] = of_each[p][n]));
         }
         for p in 0..3 {
-            let own = Lanes::load(simd, &own[p]);
-            (0..NODES).for_each(|n| to[p][n] = to[p][n] + own);
+            let [before, own] = [0, 1].map(|n| Lanes::load(simd, &tau[p][n]));
+            let before = soft.as_ref().map_or(before, |soft| before * soft.share[p]);
+            (0..NODES).for_each(|n| to[p][n] = to[p][n] + before + own);
         }
     }
 
@@ -207,14 +211,15 @@ impl Illumination<'_> {
     }
 }
 
-/// What volumes let through to places in a slab, by channel, in the form that [`pulp`] compiles once per instruction set.
+/// What volumes let through to places in a slab on the way from the light's centre, by channel, in the form that [`pulp`] compiles once per
+/// instruction set.
 pub(crate) struct ThroughVolumes<'a> {
     pub(crate) of: &'a Illumination<'a>,
     pub(crate) frame: &'a Frame,
     /// Slab coordinates.
     pub(crate) places: &'a [Vec3],
-    /// What polygons let through of each point of the light, place by place, where it has several.
-    pub(crate) visible: Option<&'a [f32]>,
+    /// Optical depths that are added, place by place; or nothing.
+    pub(crate) more: &'a [[f32; 3]],
     pub(crate) out: &'a mut [[f32; 3]],
 }
 
@@ -223,36 +228,85 @@ impl pulp::WithSimd for ThroughVolumes<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let Self { of, frame, places, visible, out } = self;
+        let Self { of, frame, places, more, out } = self;
         let mut extinction = vec![[0.0; MAX_LANES]; of.volumes.len()];
-        let points = visible.map_or(0, |visible| visible.len() / places.len().max(1));
         let chunks = places.chunks(Lanes::<S>::COUNT).zip(out.chunks_mut(Lanes::<S>::COUNT));
         for (chunk, (places, out)) in chunks.enumerate() {
-            let visible = visible.map(|visible| &visible[chunk * Lanes::<S>::COUNT * points..]);
-            let (mut at, mut wanted) = ([[0.0; MAX_LANES]; 3], [0.0; MAX_LANES]);
+            let (at, wanted) = lanes(simd, places);
             for (lane, place) in places.iter().enumerate() {
-                (0..3).for_each(|a| at[a][lane] = place[a]);
-                wanted[lane] = 1.0;
                 let world = frame.world(place.as_dvec3());
                 extinction.iter_mut().zip(of.volumes).for_each(|(e, v)| e[lane] = v.extinction_at(world) as f32);
             }
-            let at = [Lanes::load(simd, &at[0]), Lanes::load(simd, &at[1]), Lanes::load(simd, &at[2])];
-            let soft = of.buffer.soft.as_ref().map(|soft| soft.beside(simd, &at, &wanted, visible));
             let mut optical = [[Lanes::splat(simd, 0.0); NODES]; 3];
             for v in 0..of.volumes.len() {
                 let mean = of.means(simd, v, &at, &extinction, &wanted);
                 let own = Lanes::load(simd, &extinction[v]);
                 let ways = of.paths[v].ways(simd, &at, of.face);
-                of.add(simd, (&ways, mean, own), &soft, [v, 0], &mut optical);
+                of.add(simd, (&ways, mean, own), &None, [v, 0], &mut optical);
             }
             for p in 0..3 {
-                let mut through = [0.0; MAX_LANES];
-                let optical = soft.as_ref().map_or(optical[p][0], |soft| optical[p][0] + soft.rest[p]);
-                optical.exp_neg().store(&mut through);
+                let (mut added, mut through) = ([0.0; MAX_LANES], [0.0; MAX_LANES]);
+                let more = more.iter().skip(chunk * Lanes::<S>::COUNT);
+                added.iter_mut().zip(more).for_each(|(added, more)| *added = more[p]);
+                (optical[p][0] + Lanes::load(simd, &added)).exp_neg().store(&mut through);
                 out.iter_mut().zip(through).for_each(|(out, through)| out[p] = through);
             }
         }
     }
+}
+
+/// What the extent of a light changes at places behind the slabs so far, by channel, in the form that [`pulp`] compiles once per instruction
+/// set: the optical depth of what comes through volumes and splats of those slabs from all of its points, less that of the volumes alone from its
+/// centre.
+pub(crate) struct Around<'a> {
+    pub(crate) of: &'a Illumination<'a>,
+    /// Slab coordinates.
+    pub(crate) places: &'a [Vec3],
+    /// What polygons let through of each point of the light, place by place; or nothing.
+    pub(crate) visible: &'a [f32],
+    pub(crate) out: &'a mut [[f32; 3]],
+}
+
+impl pulp::WithSimd for Around<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let Self { of, places, visible, out } = self;
+        let Some(soft) = &of.buffer.soft else { return out.fill([0.0; 3]) };
+        let (points, none) = (visible.len() / places.len().max(1), vec![[0.0; MAX_LANES]; of.volumes.len()]);
+        let (one, zero) = (Lanes::splat(simd, 1.0), Lanes::splat(simd, 0.0));
+        let chunks = places.chunks(Lanes::<S>::COUNT).zip(out.chunks_mut(Lanes::<S>::COUNT));
+        for (chunk, (places, out)) in chunks.enumerate() {
+            let (at, wanted) = lanes(simd, places);
+            let soft = soft.beside(simd, &at, &wanted, &visible[chunk * Lanes::<S>::COUNT * points..]);
+            let mut optical = soft.rest;
+            for (v, volume) in of.volumes.iter().enumerate().filter(|(_, v)| v.casts_shadow) {
+                let mean = of.means(simd, v, &at, &none, &wanted);
+                let before = of.paths[v].ways(simd, &at, of.face).optical_depth(simd, mean, zero);
+                for p in 0..3 {
+                    let share = (soft.share[p] - one) * Lanes::splat(simd, volume.material.extinction_rgb[p]);
+                    optical[p] = before.mul_add(share, optical[p]);
+                }
+            }
+            let (share, optical) = (stored(&soft.share), stored(&optical));
+            for (lane, (place, out)) in places.iter().zip(out).enumerate() {
+                let splats = of.splats.map(|splats| splats.optical_depth(*place, f32::NEG_INFINITY));
+                *out = [0, 1, 2].map(|p| optical[p][lane] + splats.map_or(0.0, |tau| share[p][lane] * tau[p][0]));
+            }
+        }
+    }
+}
+
+/// Places of neighbours, and which there are.
+#[inline(always)]
+fn lanes<S: Simd>(simd: S, places: &[Vec3]) -> (Places<S>, [f32; MAX_LANES]) {
+    let (mut at, mut wanted) = ([[0.0; MAX_LANES]; 3], [0.0; MAX_LANES]);
+    for (lane, place) in places.iter().enumerate() {
+        (0..3).for_each(|a| at[a][lane] = place[a]);
+        wanted[lane] = 1.0;
+    }
+    ([Lanes::load(simd, &at[0]), Lanes::load(simd, &at[1]), Lanes::load(simd, &at[2])], wanted)
 }
 
 /// Difference to a straight line at which optical depth towards a lamp is curved.

@@ -5,6 +5,7 @@
 //! extinction on the way, interpolates: where light enters through a face that lies slanted to the slabs, τ has a kink at which
 //! neighbours mislead, while the length on the way to any place is known in closed form.
 
+use super::HalfSplats;
 use super::band::{Band, ROWS};
 use super::buckets::Buckets;
 use super::frame::Frame;
@@ -13,6 +14,7 @@ use super::placed::Placed;
 use super::sheet::{Sheet, Splatter};
 use super::sight::{Shape, Sight};
 use super::soft_buffer::SoftBuffer;
+use super::splat_light::SplatLight;
 use crate::Volume;
 use rayon::prelude::*;
 use splat_core::Camera;
@@ -64,9 +66,8 @@ impl LightBuffer {
         }
     }
 
-    /// Gives the light an extent.
-    pub(crate) fn soften(&mut self, penumbra: Penumbra, volumes: &[Volume<'_>]) {
-        let planes = planes(volumes);
+    /// Gives the light an extent, and its images `planes` channels of extinction.
+    pub(crate) fn soften(&mut self, penumbra: Penumbra, planes: usize) {
         for LightBand { band, slab, .. } in &mut self.bands {
             *slab = vec![0.0; band.rows.len() * band.width * planes];
         }
@@ -101,21 +102,29 @@ impl LightBuffer {
         self.buckets.iter().map(Buckets::bytes).sum()
     }
 
-    /// Reconstructs a slab in the light's image and attenuates by it (steps 11, 14 and 21 of the pseudocode). Number of footprint
-    /// numbers.
-    pub(crate) fn attenuate(&mut self, slab: u32, frame: &Frame, placed: &[Placed<'_>]) -> u64 {
+    /// Reconstructs a slab in the light's image and attenuates by it (steps 11, 14 and 21 of the pseudocode); a light with an extent by the
+    /// splats of the slab, too. Number of footprint numbers.
+    pub(crate) fn attenuate(
+        &mut self,
+        slab: u32,
+        frame: &Frame,
+        placed: &[Placed<'_>],
+        splats: Option<&SplatLight<'_>>,
+    ) -> u64 {
         let Self { sight, shapes, buckets, bands, sums, volumes, soft } = self;
-        if *volumes == 0 {
-            return 0;
-        }
-        let row = sight.camera.size[0] as usize * *volumes;
+        // Splats alone have no sums here.
+        let row = sight.camera.size[0] as usize * (*volumes).max(1);
         let chunks = sums.par_chunks_mut(row * ROWS);
         let of = Attenuate { slab, frame, placed, sight, shapes, buckets };
         let band = |(index, (band, sums)): (usize, (&mut LightBand, &mut [Sums]))| {
             pulp::Arch::new().dispatch(OneBand { of: &of, index, band, sums })
         };
+        bands.par_iter_mut().for_each(|band| band.slab.fill(0.0));
         let fragments = bands.par_iter_mut().zip(chunks).enumerate().map(band).sum();
         if let Some(soft) = soft {
+            if let Some(splats) = splats {
+                bands.par_iter_mut().for_each(|band| band.add_splats(splats));
+            }
             soft.add([frame.slabs.face(slab), frame.slabs.face(slab + 1)], bands);
         }
         fragments
@@ -132,6 +141,21 @@ impl LightBuffer {
             let (upper, lower) = (a[n] + (b[n] - a[n]) * u, c[n] + (d[n] - c[n]) * u);
             upper + (lower - upper) * v
         })
+    }
+}
+
+impl LightBand {
+    /// Adds the splats of the present slab: their optical depths over the length of the light's rays per depth.
+    fn add_splats(&mut self, splats: &SplatLight<'_>) {
+        let Self { band, slab, .. } = self;
+        let planes = slab.len() / (band.rows.len() * band.width);
+        for y in 0..band.stored {
+            for x in splats.span(band.top + y).into_iter().flatten().take_while(|x| *x < band.width) {
+                let own = splats.of_slab([x, band.top + y]);
+                let to = &mut slab[(y * band.width + x) * planes..][..planes];
+                to.iter_mut().zip(own).for_each(|(to, own)| *to += own / band.stretch[y * band.stride + x]);
+            }
+        }
     }
 }
 
@@ -160,7 +184,6 @@ impl pulp::WithSimd for OneBand<'_> {
     fn with_simd<S: Simd>(self, simd: S) -> u64 {
         let Attenuate { slab, frame, placed, sight, shapes, buckets } = *self.of;
         let LightBand { band, sheet, slab: depths } = self.band;
-        depths.fill(0.0);
         let planes = depths.len() / (band.rows.len() * band.width);
         let faces = [frame.slabs.face(slab), frame.slabs.face(slab + 1)];
         let mut fragments = 0;
@@ -207,10 +230,11 @@ fn add_depth<S: Simd>(own: Lanes<S>, to: &mut [f32], [count, planes]: [usize; 2]
     }
 }
 
-/// Channels of extinction that differ: one where all volumes attenuate all alike.
-pub(crate) fn planes(volumes: &[Volume<'_>]) -> usize {
-    let is_alike = |v: &Volume<'_>| v.material.extinction_rgb.windows(2).all(|w| w[0] == w[1]);
-    if volumes.iter().all(is_alike) { 1 } else { 3 }
+/// Channels of extinction that differ: one where all volumes and splats attenuate all alike.
+pub(crate) fn planes(volumes: &[Volume<'_>], splats: Option<&HalfSplats<'_>>) -> usize {
+    let of_splats = splats.into_iter().flat_map(|splats| splats.materials);
+    let mut all = volumes.iter().map(|v| v.material).chain(of_splats);
+    if all.all(|m| m.extinction_rgb.windows(2).all(|w| w[0] == w[1])) { 1 } else { 3 }
 }
 
 fn placed_count(of: &Attenuate<'_>) -> usize {

@@ -140,9 +140,15 @@ impl LightDepths {
         sighted.visibility(bias, face.map(|face| sighted.view.turned(face)))
     }
 
+    /// Points of the light.
+    pub(crate) fn points(&self) -> usize {
+        self.points.len()
+    }
+
     /// Which part of a way between world positions light reaches: shares at which that begins and ends. Where it is reached here
-    /// and there, or by some of the light's points, a part as long as all these, about their middle.
-    pub(crate) fn lit(&self, ends: [DVec3; 2]) -> [f32; 2] {
+    /// and there, or by some of the light's points, a part as long as all these, about their middle. How much of it each point reaches, times its
+    /// share of the light, is added to `by_point` where there are several.
+    pub(crate) fn lit(&self, ends: [DVec3; 2], by_point: &mut Vec<f32>) -> [f32; 2] {
         let ends = ends.map(|p| (p - self.origin).as_vec3());
         if let [point] = &self.points[..] {
             return self.lit_by(point, ends);
@@ -151,6 +157,7 @@ impl LightDepths {
         for point in &self.points {
             let [from, to] = self.lit_by(point, ends);
             is_whole &= [from, to] == [0.0, 1.0];
+            by_point.push(point.share * (to - from));
             sum += point.share * (to - from);
             moment += point.share * 0.5 * (to - from) * (from + to);
         }

@@ -14,6 +14,9 @@ use splat_core::raster::pulp::Simd;
 pub(crate) struct LitPart {
     from: [f32; MAX_LANES],
     to: [f32; MAX_LANES],
+    /// How much of the way each point of the light reaches, ray by ray, times its share of the light; 0 for all where each reaches all. Empty for a
+    /// light of one point.
+    pub(crate) by_point: Vec<f32>,
 }
 
 impl LitPart {
@@ -26,14 +29,20 @@ impl LitPart {
         wanted: &[f32; MAX_LANES],
     ) -> Option<Self> {
         let ends = [stored(nearer), stored(farther)];
-        let mut part = Self { from: [0.0; MAX_LANES], to: [1.0; MAX_LANES] };
+        let mut part = Self { from: [0.0; MAX_LANES], to: [1.0; MAX_LANES], by_point: Vec::new() };
+        let points = depths.points();
         let mut is_whole = true;
         for lane in (0..Lanes::<S>::COUNT).filter(|lane| wanted[*lane] > 0.0) {
             let world =
                 |end: &[[f32; MAX_LANES]; 3]| frame.world(DVec3::from_array([0, 1, 2].map(|a| end[a][lane].into())));
-            let [from, to] = depths.lit([world(&ends[0]), world(&ends[1])]);
+            part.by_point.resize(lane * points, 0.0);
+            let [from, to] = depths.lit([world(&ends[0]), world(&ends[1])], &mut part.by_point);
             (part.from[lane], part.to[lane]) = (from, to);
-            is_whole &= from <= 0.0 && to >= 1.0;
+            if from <= 0.0 && to >= 1.0 {
+                part.by_point.truncate(lane * points);
+            } else {
+                is_whole = false;
+            }
         }
         (!is_whole).then_some(part)
     }

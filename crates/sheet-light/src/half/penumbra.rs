@@ -52,9 +52,11 @@ pub(crate) struct Penumbra {
     pub(crate) shares: Vec<f32>,
     /// What all give there over what the centre gives.
     pub(crate) gain: f64,
-    /// Corners of the volumes, and depths that they lie between.
+    /// Corners of the bodies, and depths that they lie between.
     corners: Vec<[DVec3; 8]>,
     ends: [f64; 2],
+    /// Whether there are splats, which reach beyond the slab and the corners that their centres lie in.
+    has_splats: bool,
     /// Depth of the plane that rays are called by.
     reference: f64,
     /// Where pixel 0 has its middle on that plane.
@@ -65,7 +67,7 @@ pub(crate) struct Penumbra {
 }
 
 impl Penumbra {
-    /// That of `samples` points of a light before the volumes, in pixels as wide as those of the light's image and at most `most`
+    /// That of `samples` points of a light before the bodies, in pixels as wide as those of the light's image and at most `most`
     /// along a side; `None` where no point's rays differ from the centre's.
     pub(crate) fn new(
         frame: &Frame,
@@ -81,15 +83,16 @@ impl Penumbra {
         let all = Light { intensity: [1.0; 3], ..*light }.points(samples);
         let points: Vec<DVec3> = all.iter().filter_map(|p| p.shape.place()).map(|p| frame.point(p)).collect();
         let (shares, gain) = received(light, &all, bodies.middle());
-        let corners: Vec<[DVec3; 8]> =
-            bodies.volumes.iter().map(|v| world_corners(v).map(|p| frame.point(p))).collect();
+        let boxes = bodies.volumes.iter().map(world_corners).chain(bodies.splats.map(|s| s.bounds.corners()));
+        let corners: Vec<[DVec3; 8]> = boxes.map(|corners| corners.map(|p| frame.point(p))).collect();
+        let has_splats = bodies.splats.is_some();
         let depths = || corners.iter().flatten().map(|p| p.z);
         let ends = [depths().fold(f64::INFINITY, f64::min), depths().fold(f64::NEG_INFINITY, f64::max)];
         let [near, far] = ends.map(|z| z - center.z);
         // Rays move as much before the reference as behind it.
         let reference = center.z + 2.0 / (near.recip() + far.recip());
-        let mut own =
-            Self { center, points, shares, gain, corners, ends, reference, low: DVec2::ZERO, pixel: 1.0, size: [1, 1] };
+        let (low, pixel, size) = (DVec2::ZERO, 1.0, [1, 1]);
+        let mut own = Self { center, points, shares, gain, corners, ends, has_splats, reference, low, pixel, size };
         let (low, high, shift) = own.reach();
         let extent = high - low;
         let way = frame.point(bodies.middle()) - center;
@@ -175,8 +178,12 @@ impl Penumbra {
         0.5 * (from.max(self.ends[0]) + to.min(self.ends[1]))
     }
 
-    /// Columns, by whole vectors, and rows of the volumes between two depths, with a margin; `None` for none.
+    /// Columns, by whole vectors, and rows of the volumes between two depths, with a margin, or all of them where there are splats; `None` for
+    /// none.
     pub(crate) fn bounds(&self, [from, to]: [f64; 2]) -> Option<[Range<usize>; 2]> {
+        if self.has_splats {
+            return Some(self.size.map(|n| 0..n));
+        }
         let (mut low, mut high) = (DVec2::INFINITY, DVec2::NEG_INFINITY);
         for corners in &self.corners {
             for (c, a) in (0..8).flat_map(|c| (0..3).map(move |a| (c, a))).filter(|(c, a)| c >> a & 1 == 0) {

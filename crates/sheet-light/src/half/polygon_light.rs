@@ -5,7 +5,7 @@
 //! that lies on the face of a slab belongs to the slab behind it, for the eye as for the light.
 
 use super::frame::Frame;
-use super::illuminate::{Illumination, ThroughVolumes};
+use super::illuminate::{Around, Illumination, ThroughVolumes};
 use super::light_depth::LightDepths;
 use super::polygons::{EyePolygons, Seen};
 use super::scatter::SurfaceLight;
@@ -81,12 +81,22 @@ impl<'a> PolygonLight<'a> {
         let mut found = vec![[1.0; 3]; ranks.len()];
         found.par_chunks_mut(CHUNK).zip(ranks.par_chunks(CHUNK)).for_each(|(out, ranks)| {
             let places: Vec<Vec3> = ranks.iter().map(|rank| slabs.places[*rank as usize]).collect();
-            let visible = volumes.buffer.soft.as_ref().and_then(|_| self.visible(ranks));
-            let work = ThroughVolumes { of: volumes, frame, places: &places, visible: visible.as_deref(), out };
-            pulp::Arch::new().dispatch(work);
-            let Some(splats) = splats else { return };
+            let depth = |place: &Vec3| place.z / frame.slabs.width as f32 - slab as f32;
+            let mut more = Vec::new();
+            if volumes.buffer.soft.is_some() {
+                let (of, visible) = (&Illumination { splats, ..*volumes }, &self.visible(ranks));
+                more.resize(places.len(), [0.0; 3]);
+                let work = Around { of, places: &places, visible, out: &mut more };
+                pulp::Arch::new().dispatch(work);
+                for (more, place) in more.iter_mut().zip(&places) {
+                    let own = splats.map(|splats| splats.optical_depth(*place, depth(place)));
+                    (0..3).for_each(|p| more[p] += own.map_or(0.0, |tau| tau[p][1]));
+                }
+            }
+            pulp::Arch::new().dispatch(ThroughVolumes { of: volumes, frame, places: &places, more: &more, out });
+            let Some(splats) = splats.filter(|_| more.is_empty()) else { return };
             for (out, place) in out.iter_mut().zip(&places) {
-                let own = splats.transmittance_at(*place, place.z / frame.slabs.width as f32 - slab as f32);
+                let own = splats.transmittance_at(*place, depth(place));
                 (0..3).for_each(|c| out[c] *= own[c]);
             }
         });
@@ -96,14 +106,14 @@ impl<'a> PolygonLight<'a> {
         }
     }
 
-    /// What polygons let through of each point of the light, pixel by pixel.
-    fn visible(&self, ranks: &[u32]) -> Option<Vec<f32>> {
-        let depths = self.depths?;
+    /// What polygons let through of each point of the light, pixel by pixel; empty without any in the way.
+    fn visible(&self, ranks: &[u32]) -> Vec<f32> {
+        let Some(depths) = self.depths else { return Vec::new() };
         let of = |rank: &u32| {
             let Seen { world, face, .. } = self.of.seen(self.of.pixels[*rank as usize], self.camera);
             depths.visible(world, Some(face))
         };
-        Some(ranks.iter().flat_map(of).collect())
+        ranks.iter().flat_map(of).collect()
     }
 
     /// Adds what polygons show of the lights of the sweep.

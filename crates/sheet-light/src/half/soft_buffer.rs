@@ -167,14 +167,25 @@ impl SoftBuffer {
         rows.par_chunks_mut(row).enumerate().map(one).reduce(|| false, |a, b| a | b)
     }
 
-    /// What the penumbra makes of the optical depth about places of the present slab, in the volumes.
+    /// What the penumbra makes of the optical depth about places of the present slab, in the volumes. Points count by how much of the way there
+    /// they light, `lit`, place by place, where polygons keep a part of it from some: that is 0 for all of them where it is not so.
     #[inline(always)]
-    pub(crate) fn at<S: Simd>(&self, simd: S, places: &Places<S>, wanted: &[f32; MAX_LANES]) -> Soft<S> {
-        self.soft(simd, places, wanted, |_, place, plane| self.arriving(self.penumbra.pixel(place), plane))
+    pub(crate) fn at<S: Simd>(&self, simd: S, places: &Places<S>, wanted: &[f32; MAX_LANES], lit: &[f32]) -> Soft<S> {
+        self.soft(simd, places, wanted, |lane, place, plane| match self.points_of(lit, lane) {
+            Some(shares) => self.come_to(place, plane, shares),
+            None => self.arriving(self.penumbra.pixel(place), plane),
+        })
+    }
+
+    /// Shares of the points at a place, from those of all places; `None` where there are none or all are 0.
+    fn points_of<'a>(&self, all: &'a [f32], lane: usize) -> Option<&'a [f32]> {
+        let count = self.penumbra.count();
+        let own = all.get(lane * count..(lane + 1) * count);
+        own.filter(|own| own.iter().any(|v| *v > 0.0))
     }
 
     /// The same of places anywhere behind what was added so far: each point's own ray is looked up. Points count by what polygons let
-    /// through from each to each place, `visible`, where that is known: those that are seen past the edge of a polygon may be those that a
+    /// through from each to each place, `visible`, or all alike where that is empty: those that are seen past the edge of a polygon may be those that a
     /// volume hides, or those that it does not.
     #[inline(always)]
     pub(crate) fn beside<S: Simd>(
@@ -182,11 +193,9 @@ impl SoftBuffer {
         simd: S,
         places: &Places<S>,
         wanted: &[f32; MAX_LANES],
-        visible: Option<&[f32]>,
+        visible: &[f32],
     ) -> Soft<S> {
-        let count = self.penumbra.count();
-        let seen = |lane: usize| visible.map(|all| &all[lane * count..][..count]);
-        let shares = |lane| seen(lane).filter(|own| own.iter().any(|v| *v > 0.0)).unwrap_or(&self.penumbra.shares);
+        let shares = |lane| self.points_of(visible, lane).unwrap_or(&self.penumbra.shares);
         self.soft(simd, places, wanted, |lane, place, plane| self.come_to(place, plane, shares(lane)))
     }
 

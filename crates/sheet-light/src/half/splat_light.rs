@@ -3,6 +3,9 @@
 //! Within a slab, light has come through as much as it would if all that a pixel has there lay spread over a slab's width about its mean
 //! depth. So it makes no difference whether a layer of splats lies in the midst of a slab or on a face, and a slab of many layers
 //! is a ramp.
+//!
+//! Beside the points of a light with an extent these images are those of its centre: what its points get is known by [`super::soft_buffer`], to
+//! which the splats of each slab are added.
 
 use super::frame::Frame;
 use super::sight::Sight;
@@ -15,6 +18,7 @@ use splat_core::raster::Projected;
 use splat_core::raster::bins::TILE;
 use splat_core::shade::ChannelLayout;
 use splat_core::{Accumulator, Camera, SplatKind};
+use std::ops::Range;
 
 /// The splats of one light.
 pub(crate) struct SplatLight<'a> {
@@ -31,16 +35,16 @@ pub(crate) struct SplatLight<'a> {
     /// For each splat the depth across the slabs, in slabs, at which it asks for light; and the ids by that slab.
     asks: Vec<f32>,
     by_slab: BySlab,
-    /// Share of the light that is let through, by id.
+    /// Share of the light that is let through, by id; for a light with an extent, what its points change, until the sweep comes to the splat.
     through: Vec<[f32; 3]>,
 }
 
 impl<'a> SplatLight<'a> {
-    /// `places` are slab coordinates of the centres; `order` has the ids slab by slab.
+    /// `places` are slab coordinates of the centres; `order` has the ids slab by slab. A look-up has a part of what lies so many pixels around a place.
     pub(crate) fn new(
         of: &'a HalfSplats<'a>,
         frame: &Frame,
-        sight: &Sight,
+        (sight, around_px): (&Sight, f64),
         (places, order): (&[Vec3], &[u32]),
         planes: usize,
     ) -> Self {
@@ -50,8 +54,8 @@ impl<'a> SplatLight<'a> {
         let form = Accumulator::new([1, 1], planes, 1, false, false);
         let squares = Squares::new(&projected, &casters, &[], &form);
         let last = frame.slabs.count - 1;
-        let asks: Vec<f32> =
-            (0..places.len()).into_par_iter().map(|i| asks_at(of, frame, &sight.camera, i, places[i])).collect();
+        let asks_at = |i: usize| asks_at(of, frame, (&sight.camera, around_px), i, places[i]);
+        let asks: Vec<f32> = (0..places.len()).into_par_iter().map(asks_at).collect();
         let slabs: Vec<u32> = asks.iter().map(|slab| (*slab as u32).min(last)).collect();
         Self {
             of,
@@ -73,6 +77,23 @@ impl<'a> SplatLight<'a> {
         &self.through
     }
 
+    /// Those that ask for light in a slab.
+    pub(crate) fn asking(&self, slab: u32) -> &[u32] {
+        self.by_slab.of(slab)
+    }
+
+    /// Sets what some of them get.
+    pub(crate) fn set(&mut self, ids: &[u32], through: &[[f32; 3]]) {
+        ids.iter().zip(through).for_each(|(id, own)| self.through[*id as usize] = *own);
+    }
+
+    /// Optical depth at a splat beside that of the volumes from the light's centre, of a light with an extent, by channel: what its points change,
+    /// and what lies before the splat in its own slab.
+    pub(crate) fn more(&self, id: u32, place: Vec3, slab: u32) -> [f32; 3] {
+        let (around, own) = (self.through[id as usize], self.optical_depth(place, self.depth_of(id, slab)));
+        [0, 1, 2].map(|p| around[p] + own[p][1])
+    }
+
     /// Attenuates what some of them get by what volumes let through.
     pub(crate) fn attenuate(&mut self, ids: &[u32], volumes: &[[f32; 3]]) {
         for (id, own) in ids.iter().zip(volumes) {
@@ -87,22 +108,26 @@ impl<'a> SplatLight<'a> {
         self.squares.bytes() + sums + self.projected.bytes() + 20 * self.asks.len() as u64
     }
 
-    /// Begins a slab, of these splats: takes them up, and finds what arrives at those that ask here. Fragments.
+    /// Begins a slab, of these splats. Fragments.
     pub(crate) fn enter(&mut self, slab: u32, ids: &[u32], slabs: &[u32], places: &[Vec3]) -> u64 {
         let (projected, materials) = (&self.projected, self.of.materials);
         // Depths in the slab, for the mean depth of a pixel.
         let values: Vec<f32> = ids.iter().map(|id| places[*id as usize].z / self.slab_width - slab as f32).collect();
-        let fragments = self.squares.fill(Slab { projected, materials, slabs, slab, ids, values: &values });
-        let arrives = |id: &u32| {
-            let place = places[*id as usize];
-            // What is a surface lets through nothing or all of a slab's others.
-            let is_medium = self.of.cloud.kind[*id as usize] == SplatKind::Medium;
-            let depth = if is_medium { self.asks[*id as usize] - slab as f32 } else { f32::NEG_INFINITY };
-            (*id, self.transmittance(self.sight.pixel(place), depth))
-        };
-        let found: Vec<(u32, [f32; 3])> = self.by_slab.of(slab).par_iter().map(arrives).collect();
-        found.into_iter().for_each(|(id, share)| self.through[id as usize] = share);
-        fragments
+        self.squares.fill(Slab { projected, materials, slabs, slab, ids, values: &values })
+    }
+
+    /// Finds what arrives of a light without an extent at those that ask in the present slab.
+    pub(crate) fn ask(&mut self, slab: u32, places: &[Vec3]) {
+        let arrives = |id: &u32| self.transmittance(self.sight.pixel(places[*id as usize]), self.depth_of(*id, slab));
+        let found: Vec<[f32; 3]> = self.asking(slab).par_iter().map(arrives).collect();
+        let ids = self.asking(slab).to_vec();
+        self.set(&ids, &found);
+    }
+
+    /// Up to which depth in a slab, in slabs, a splat counts what lies there: what is a surface lets through nothing or all of a slab's others.
+    pub(crate) fn depth_of(&self, id: u32, slab: u32) -> f32 {
+        let is_medium = self.of.cloud.kind[id as usize] == SplatKind::Medium;
+        if is_medium { self.asks[id as usize] - slab as f32 } else { f32::NEG_INFINITY }
     }
 
     /// Ends a slab: its splats lie before all that comes.
@@ -114,9 +139,20 @@ impl<'a> SplatLight<'a> {
         }
     }
 
-    /// Optical depth by plane, at a pixel, of the splats of all slabs before and of the present one up to a depth, in slabs.
+    /// Optical depth by plane of the present slab at a pixel.
+    pub(crate) fn of_slab(&self, at: [usize; 2]) -> [f32; 3] {
+        let own = self.squares.at(at, 1);
+        [0, 1, 2].map(|p| own.map_or(0.0, |(lines, at)| lines.pixel(p.min(self.planes - 1), at)))
+    }
+
+    /// Columns of a row of pixels between which any splat of the present slab lies.
+    pub(crate) fn span(&self, y: usize) -> Option<Range<usize>> {
+        self.squares.span(y)
+    }
+
+    /// Optical depth by plane, at a pixel, of the splats of all slabs before; and of the present one up to a depth, in slabs.
     #[inline]
-    fn of_pixel(&self, [x, y]: [usize; 2], depth: f32) -> [f32; 3] {
+    fn of_pixel(&self, [x, y]: [usize; 2], depth: f32) -> [[f32; 2]; 3] {
         let (square, at) = (y / TILE * self.columns + x / TILE, [x % TILE, y % TILE]);
         let own = self.squares.at([x, y], 1).map(|(lines, at)| {
             let of = lines.pixel(ChannelLayout::plane_of(0, 1, self.planes), at).max(f32::MIN_POSITIVE);
@@ -125,7 +161,8 @@ impl<'a> SplatLight<'a> {
         });
         [0, 1, 2].map(|p| {
             let p = p.min(self.planes - 1);
-            self.sums[square].pixel(p, at) + own.map_or(0.0, |(lines, at, share)| share * lines.pixel(p, at))
+            let own = own.map_or(0.0, |(lines, at, share)| share * lines.pixel(p, at));
+            [self.sums[square].pixel(p, at), own]
         })
     }
 
@@ -137,13 +174,17 @@ impl<'a> SplatLight<'a> {
         [([x0, y0], left * upper), ([x1, y0], u * upper), ([x0, y1], left * v), ([x1, y1], u * v)]
     }
 
-    /// Mean optical depth by plane about a place of the light's image, up to a depth in the present slab, in slabs.
+    /// Mean optical depth by plane about slab coordinates, of the slabs before, and of the present one up to a depth, in slabs; 0 where the light's
+    /// image does not show them.
     #[inline]
-    pub(crate) fn optical_depth(&self, pixel: [f32; 2], depth: f32) -> [f32; 3] {
-        let mut sum = [0.0; 3];
-        for (at, weight) in self.patch(pixel) {
+    pub(crate) fn optical_depth(&self, place: Vec3, depth: f32) -> [[f32; 2]; 3] {
+        let mut sum = [[0.0; 2]; 3];
+        if !self.sight.shows(place) {
+            return sum;
+        }
+        for (at, weight) in self.patch(self.sight.pixel(place)) {
             let tau = self.of_pixel(at, depth);
-            (0..3).for_each(|p| sum[p] += weight * tau[p]);
+            (0..3).for_each(|p| (0..2).for_each(|n| sum[p][n] += weight * tau[p][n]));
         }
         sum
     }
@@ -158,7 +199,7 @@ impl<'a> SplatLight<'a> {
         let mut sum = [0.0; 3];
         for (at, weight) in self.patch(pixel) {
             let tau = self.of_pixel(at, depth);
-            (0..3).for_each(|p| sum[p] += weight * libm::expf(-tau[p]));
+            (0..3).for_each(|p| sum[p] += weight * libm::expf(-(tau[p][0] + tau[p][1])));
         }
         sum
     }
@@ -172,7 +213,7 @@ const LEAST_COSINE: f64 = 0.3;
 
 /// Where a splat asks for light, in slabs: a medium at its centre; a surface before the centres of all discs that cover a pixel about it, if
 /// the surface is flat.
-fn asks_at(of: &HalfSplats<'_>, frame: &Frame, camera: &Camera, i: usize, place: Vec3) -> f32 {
+fn asks_at(of: &HalfSplats<'_>, frame: &Frame, (camera, around_px): (&Camera, f64), i: usize, place: Vec3) -> f32 {
     let lift = if of.cloud.kind[i] == SplatKind::Medium {
         0.0
     } else {
@@ -185,9 +226,9 @@ fn asks_at(of: &HalfSplats<'_>, frame: &Frame, camera: &Camera, i: usize, place:
             [view.z / camera.focal_px(), DVec3::new(right, up, forward).dot(view) / view.length()]
         };
         let across = frame.axes[2].dot(normal);
-        // A pixel on the surface: what the filter reaches, and as far again as a look-up does.
+        // A pixel on the surface: what the filter reaches, and what a look-up does.
         let pixel = pixel / to_light.abs().max(LEAST_COSINE);
-        let reach = f64::from(of.cloud.radius[i]).hypot(FILTER_PX * pixel) + pixel;
+        let reach = f64::from(of.cloud.radius[i]).hypot(FILTER_PX * pixel) + around_px * pixel;
         reach * (1.0 - across * across).max(0.0).sqrt()
     };
     ((f64::from(place.z) - lift) / frame.slabs.width).max(0.0) as f32

@@ -7,7 +7,7 @@
 
 use super::bodies::SplatBounds;
 use super::frame::Frame;
-use super::illuminate::{Illumination, ThroughVolumes};
+use super::illuminate::{Around, Illumination, ThroughVolumes};
 use super::light_buffer::LightBuffer;
 use super::light_depth::LightDepths;
 use super::scatter::SurfaceLight;
@@ -23,6 +23,9 @@ use splat_core::{
 
 /// Splats shaded by one task.
 const CHUNK: usize = 256;
+
+/// How far around a place a look-up sees of a light with an extent: a slab is interpolated between pixels of the light's image, moved by a cubic, and looked up.
+const SOFT_LOOK_UP_PX: f64 = 4.0;
 
 /// Splats of the input.
 #[derive(Clone, Copy)]
@@ -120,7 +123,8 @@ impl<'a> SplatSheets<'a> {
         let slabs: Vec<u32> = places.iter().map(|p| slab(p.z)).collect();
         let drawn = BySlab::new(&slabs, frame.slabs.count);
         let planes = form.optical_depth.len();
-        let light = |buffer: &LightBuffer| SplatLight::new(of, frame, &buffer.sight, (&places, &drawn.ids), planes);
+        let around = |buffer: &LightBuffer| if buffer.soft.is_some() { SOFT_LOOK_UP_PX } else { 1.0 };
+        let light = |b: &LightBuffer| SplatLight::new(of, frame, (&b.sight, around(b)), (&places, &drawn.ids), planes);
         Self {
             light: buffer.map(light),
             squares: Squares::new(of.projected, &drawn.ids, opaque, form),
@@ -151,22 +155,40 @@ impl<'a> SplatSheets<'a> {
         let (ids, mut fragments) = (self.drawn.of(slab), 0);
         if let (Some(light), Some((of, depths))) = (&mut self.light, volumes) {
             fragments = light.enter(slab, ids, &self.slabs, &self.places);
+            let frame = &self.frame;
+            let is_soft = of.buffer.soft.is_some();
+            let places = |ids: &[u32]| -> Vec<Vec3> { ids.iter().map(|id| self.places[*id as usize]).collect() };
+            if is_soft {
+                let asking = light.asking(slab).to_vec();
+                let mut found = vec![[0.0; 3]; asking.len()];
+                let of = &Illumination { splats: Some(light), ..*of };
+                found.par_chunks_mut(CHUNK).zip(asking.par_chunks(CHUNK)).for_each(|(out, ids)| {
+                    let places = places(ids);
+                    let seen = |of: &LightDepths| -> Vec<f32> {
+                        places.iter().flat_map(|p| of.visible(frame.world(p.as_dvec3()), None)).collect()
+                    };
+                    let visible = &depths.map(seen).unwrap_or_default();
+                    pulp::Arch::new().dispatch(Around { of, places: &places, visible, out });
+                });
+                light.set(&asking, &found);
+            } else {
+                light.ask(slab, &self.places);
+            }
             let mut volumes = vec![[1.0; 3]; ids.len()];
             volumes.par_chunks_mut(CHUNK).zip(ids.par_chunks(CHUNK)).for_each(|(out, ids)| {
-                let places: Vec<Vec3> = ids.iter().map(|id| self.places[*id as usize]).collect();
-                let seen = |of: &LightDepths| -> Vec<f32> {
-                    places.iter().flat_map(|p| of.visible(self.frame.world(p.as_dvec3()), None)).collect()
+                let places = places(ids);
+                let more: Vec<[f32; 3]> = match is_soft {
+                    true => ids.iter().map(|id| light.more(*id, self.places[*id as usize], slab)).collect(),
+                    false => Vec::new(),
                 };
-                let visible = depths.map(seen);
-                let work = ThroughVolumes { of, frame: &self.frame, places: &places, visible: visible.as_deref(), out };
-                pulp::Arch::new().dispatch(work);
-                let Some(visible) = visible else { return };
-                for (out, points) in out.iter_mut().zip(visible.chunks_exact(visible.len() / places.len())) {
-                    let visible: f32 = points.iter().sum();
+                pulp::Arch::new().dispatch(ThroughVolumes { of, frame, places: &places, more: &more, out });
+                let Some(depths) = depths else { return };
+                for (out, place) in out.iter_mut().zip(&places) {
+                    let visible = depths.visibility(frame.world(place.as_dvec3()), None);
                     *out = out.map(|t| t * visible);
                 }
             });
-            light.attenuate(ids, &volumes);
+            if is_soft { light.set(ids, &volumes) } else { light.attenuate(ids, &volumes) }
         }
         self.shade(slab, lamps, diffuse, layout);
         [self.draw(slab), fragments]

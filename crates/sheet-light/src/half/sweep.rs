@@ -10,7 +10,7 @@ use super::eye_sheets::{EyeBand, OneSlab, Step};
 use super::frame::Frame;
 use super::gradient::Gradients;
 use super::illuminate::Illumination;
-use super::light_buffer::LightBuffer;
+use super::light_buffer::{LightBuffer, planes};
 use super::light_depth::{Beside, LightDepths};
 use super::light_path::LightPath;
 use super::penumbra::Penumbra;
@@ -92,7 +92,8 @@ impl<'a> Sweep<'a> {
             let is_parallel = matches!(lit.light.shape, LightShape::Directional { .. });
             lit.shadow.is_some() || lit.slide.is_some() || !is_parallel
         };
-        let light_buffer = carried.map(|carried| light_buffer(&frame, params, &placed, bodies, carried));
+        let planes = planes(volumes, input.splats.as_ref());
+        let light_buffer = carried.map(|carried| light_buffer((&frame, planes), params, &placed, bodies, carried));
         let gain = light_buffer.as_ref().and_then(|b| b.soft.as_ref()).map(|soft| soft.penumbra.gain);
         let lit = |lit: &LitBy<'a>| LitBy { light: brighter(&lit.light, gain.unwrap_or(1.0)), ..*lit };
         let light = carried.map(|(of, _)| lit(of));
@@ -204,7 +205,10 @@ impl<'a> Sweep<'a> {
                 self.light_polygons(polygons, slab, splats.as_ref());
             }
             if let Some(buffer) = &mut self.light_buffer {
-                counts.light_fragments += buffer.attenuate(slab, &self.frame, &self.placed);
+                counts.light_fragments += {
+                    let splats = splats.as_ref().and_then(|splats| splats.light.as_ref());
+                    buffer.attenuate(slab, &self.frame, &self.placed, splats)
+                };
             }
             if let Some(splats) = &mut splats {
                 splats.leave();
@@ -359,7 +363,7 @@ impl<'a> Sweep<'a> {
 
 /// The light's image, and those of its points where it has an extent.
 fn light_buffer(
-    frame: &Frame,
+    (frame, planes): (&Frame, usize),
     params: &HalfParams,
     placed: &[Placed<'_>],
     bodies: &Bodies<'_>,
@@ -368,7 +372,7 @@ fn light_buffer(
     let (camera, volumes) = (lamp::camera_of(bodies, &lit.light, params), bodies.volumes);
     let mut buffer = LightBuffer::new(frame, camera, volumes, placed);
     if let Some(penumbra) = Penumbra::new(frame, bodies, (&lit.light, samples), &camera, params.most_light_pixels) {
-        buffer.soften(penumbra, volumes);
+        buffer.soften(penumbra, planes);
     }
     buffer
 }

@@ -111,18 +111,20 @@ fn hv09_penumbras_of_polygons_on_polygons_are_as_wide_as_similar_triangles_say()
     }
 }
 
-/// Half of a light's points are behind the polygon and half behind the volume, so none is seen: what is left is the width of the seam. Shares
-/// of each, one times the other, would let a quarter through.
+/// Half of a light's points are behind the polygon and half behind the volume, so none is seen, by a polygon or in a medium: what is left is the width of
+/// the seam. Shares of each, one times the other, would let a quarter through.
 #[test]
 fn a_polygon_and_a_volume_side_by_side_leave_no_light_between_them() {
     let blocks = &[block([0.0, -0.6, 1.98], [1.8, 0.6, 2.02], 0.2)][..];
     let (walls, floor) = (&[half_plane()][..], wall([0.0; 3], [1.6, 0.0, 0.0], [0.0, 0.4, 0.0]));
-    let bench = Bench { blocks, walls, haze: None, floor: Some(&floor) };
-    for kind in 0..3 {
+    let receiver = block([-1.6, -0.4, -0.02], [1.6, 0.4, 0.02], 0.1);
+    for (kind, in_haze) in (0..3).flat_map(|kind| [false, true].map(|in_haze| (kind, in_haze))) {
+        let (haze, floor) = if in_haze { (Some(&receiver), None) } else { (None, Some(&floor)) };
+        let bench = Bench { blocks, walls, haze, floor };
         let profile = bench.profile(&extended(above(kind, 0.6), 32), &from_aside(), &fine(50.0));
         let most = profile.iter().filter(|[x, _]| x.abs() < 1.0).map(|[_, light]| *light).fold(0.0, f64::max);
-        println!("light {kind}: {most}");
-        assert!(most < 0.05, "light {kind}: {most} comes through");
+        println!("light {kind}, in haze {in_haze}: {most}");
+        assert!(most < 0.05, "light {kind}, in haze {in_haze}: {most} comes through");
     }
 }
 

@@ -1,14 +1,13 @@
 //! Splats in half-vector slabs: closed forms of what shadows what, and the limits of other ways to composite them.
 
-use super::common::{draw, exact, input, lamp, lit, scattering, sun};
+use super::common::{draw, exact, input, lamp, scattering, sun};
 use crate::common::{BEAUTY, constant, cubic, grid, largest, parallel, perspective, projected, volume};
-use sheet_light::half::{Extended, HalfInput, HalfParams, HalfSplats, fold};
+use sheet_light::half::{HalfInput, HalfParams, HalfSplats, fold};
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::raster::{self, FoldInput, OpaqueImage, Projected};
 use splat_core::shade::LitBy;
 use splat_core::{
-    Accumulator, Camera, Cloud, Direction, Footprint, FootprintStack, LightShape, Material, Object, Shading, Splat,
-    SplatKind, rng,
+    Accumulator, Camera, Cloud, Direction, Footprint, FootprintStack, Material, Object, Shading, Splat, SplatKind, rng,
 };
 use std::f64::consts::PI;
 
@@ -36,12 +35,12 @@ impl Shown {
 }
 
 /// Reflects all light alike to all sides, from both sides.
-fn lambert() -> Material {
+pub(super) fn lambert() -> Material {
     Material { ambient: 0.0, diffuse: 1.0, specular: 0.0, ..Material::default() }
 }
 
 /// Discs 1/8 apart that fill a square of the plane through `at` across `normal`, `half` to each side: τ for each crossing.
-fn plane(cloud: &mut Cloud, (at, normal): (DVec3, DVec3), half: f64, tau: f64, like: &Splat) {
+pub(super) fn plane(cloud: &mut Cloud, (at, normal): (DVec3, DVec3), half: f64, tau: f64, like: &Splat) {
     let step = 0.125;
     let (u, v) = normal.any_orthonormal_pair();
     let n = (half / step) as i32;
@@ -294,10 +293,4 @@ fn splats_that_sweeps_cannot_take_are_refused() {
     let pair = Shown::new(cloud, &camera, vec![lambert()], 1.0);
     let among = draw(&with(&pair, input(&[], &camera, &[lamp])), &exact(None)).err().unwrap().to_string();
     assert!(among.contains("lies among the splats"), "{among}");
-    let of = shown(SplatKind::Surface, 1.0);
-    let shape = LightShape::Disk { center: DVec3::Z * 9.0, normal: DVec3::NEG_Z, radius: 0.5 };
-    let extended = vec![Extended { lit: lit(shape), samples: 4 }];
-    let input = HalfInput { extended, ..with(&of, input(&[], &camera, &[])) };
-    let refused = draw(&input, &exact(None)).err().unwrap();
-    assert!(refused.to_string().contains("none beside splats"), "{refused}");
 }

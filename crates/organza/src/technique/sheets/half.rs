@@ -39,21 +39,15 @@ pub(crate) fn is_asked(scene: &Scene) -> bool {
 /// For each point of a light: whether half vectors serve it, or why not.
 fn points_served(matter: &Matter<'_>, points: &[LightPoint]) -> Result<Carries, Error> {
     let translucent = || matter.planned.iter().filter(|o| !matches!(o.form, Form::Opaque | Form::Polygons));
-    let refuse = |o: &PlannedObject, message: &str, or: &str| {
-        Err(Error::input(format!("object '{}'", crate::shown(&o.object)), message, format!("{HINT}{or}")))
+    let refuse = |o: &PlannedObject, message: &str| {
+        Err(Error::input(format!("object '{}'", crate::shown(&o.object)), message, HINT))
     };
     if let Some(other) = translucent().find(|o| o.technique != Technique::Sheets) {
         let message =
             format!("drawn by {}, where half-vector sheets draw alone what is translucent", other.technique.name());
-        return refuse(other, &message, "");
+        return refuse(other, &message);
     }
     let scatters_again = matter.scene.render.sheets.scattering().is_some();
-    if let Some(splats) = translucent().find(|o| o.form == Form::Splats)
-        && points.iter().any(|point| is_whole(matter.scene, point))
-    {
-        let message = "a translucent surface, whose shadow of a light with an extent is that of points";
-        return refuse(splats, message, ", make it opaque, or use render.sheets.soft_shadows = \"points\"");
-    }
     let (volumes, splats) = (volumes(matter).collect::<Vec<_>>(), splat_bounds(matter));
     let bodies = Bodies { volumes: &volumes, splats };
     let words = |reason: Reason| match reason {

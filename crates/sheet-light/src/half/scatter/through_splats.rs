@@ -22,7 +22,7 @@ pub(crate) fn through(splats: &HalfSplats<'_>, grid: &LightGrid, camera: &Camera
     // What lies before the first slab is in it, what lies behind the last in that.
     let slabs: Vec<u32> = places.iter().map(|p| ((p.z / width) as u32).min(count - 1)).collect();
     let by_slab = BySlab::new(&slabs, count);
-    let mut light = SplatLight::new(splats, &frame, &Sight::new(&frame, *camera), (&places, &by_slab.ids), 3);
+    let mut light = SplatLight::new(splats, &frame, (&Sight::new(&frame, *camera), 1.0), (&places, &by_slab.ids), 3);
     let ([columns, rows], faces) = (grid.columns, grid.layers + 1);
     let mut out = vec![[1.0; 3]; columns * rows * faces];
     for slab in 0..count {
