@@ -195,7 +195,6 @@ fn what_the_older_methods_and_body_centred_lattices_do_not_draw_is_refused_by_na
     let (bcc, axis) = ("object.it.lattice='bcc'", "render.sheets.aligned='axis'");
     let half = "render.sheets.slicing='half_vector'";
     refused(&[bcc, "render.technique='points'"], 2, "the technique `points` draws no body-centred lattice");
-    refused(&[bcc, half], 2, "slabs across half vectors take no body-centred lattice");
     refused(&["object.fog.lattice='bcc'"], 2, "`lattice` belongs to a `volume`");
     refused(&["render.sheets.classify='before'", half], 2, "slabs across half vectors have no such choice");
     refused(&[axis, half], 2, "slabs across half vectors have no such choice");

@@ -2,7 +2,7 @@
 
 use super::check::At;
 use super::check_render::own_layers;
-use super::{RenderSettings, SceneMaterial, SceneObject, Slicing, Technique};
+use super::{RenderSettings, SceneMaterial, SceneObject, Technique};
 use crate::Error;
 use splat_core::Packing;
 
@@ -17,7 +17,6 @@ pub(super) fn check_drawn(
 ) -> Result<(), Error> {
     check_one_technique(at, objects, render)?;
     check_lattices(at, objects, render)?;
-    check_clips(at, objects, render)?;
     check_surfels(at, objects, render)?;
     check_bounds(at, objects, materials)?;
     check_scattered(at_layers, layers, objects, render)?;
@@ -34,7 +33,7 @@ fn check_one_technique(at: &At<'_>, objects: &[SceneObject], render: &RenderSett
     })
 }
 
-/// Refuses body-centred lattices wherever they are not splatted in slabs across the view.
+/// Refuses body-centred lattices wherever they are not splatted in slabs.
 fn check_lattices(at: &At<'_>, objects: &[SceneObject], render: &RenderSettings) -> Result<(), Error> {
     let body_centred = objects.iter().enumerate().filter(|(_, o)| o.visible && o.packing == Packing::BodyCentred);
     for (i, object) in body_centred {
@@ -44,25 +43,8 @@ fn check_lattices(at: &At<'_>, objects: &[SceneObject], render: &RenderSettings)
             let message = format!("`lattice`: the technique `{}` draws no body-centred lattice", technique.name());
             return refuse(&message, "use technique = \"sheets\", or leave it out");
         }
-        if render.sheets.slicing != Slicing::View {
-            let message = "`lattice`: slabs across half vectors take no body-centred lattice";
-            return refuse(message, "use render.sheets.slicing = \"view\", or leave it out");
-        }
     }
     Ok(())
-}
-
-/// Refuses volumes that are cut where slabs lie across half vectors, which show them whole.
-fn check_clips(at: &At<'_>, objects: &[SceneObject], render: &RenderSettings) -> Result<(), Error> {
-    let by_sheets = |o: &SceneObject| o.technique.unwrap_or(render.technique) == Technique::Sheets;
-    let is_cut = |o: &SceneObject| o.visible && o.source.is_medium() && !o.clip.is_empty() && by_sheets(o);
-    match objects.iter().position(is_cut) {
-        Some(i) if render.sheets.slicing != Slicing::View => {
-            let message = "`clip`: slabs across half vectors cut no volume";
-            Err(at.index(i).key("clip").error(message, "use render.sheets.slicing = \"view\", or another technique"))
-        }
-        _ => Ok(()),
-    }
 }
 
 /// Refuses media that would be drawn as discs of surfaces.

@@ -74,7 +74,7 @@ pub struct Sheeted<'a> {
 /// [`Error::Parameter`], [`Error::Volume`], [`Error::Limit`] before much is taken, or [`Error::Cancelled`].
 pub fn prepare<'a>(input: SheetInput<'a>, params: &Params, progress: Option<&Progress>) -> Result<Sheeted<'a>, Error> {
     params.check_any_mode()?;
-    input.check_any_lattice()?;
+    input.check()?;
     let slant = Slant::new(&input, params)?;
     let slabs = slabs_of(&input, params, slant)?;
     let tiles = tile::tiles(input.camera);
@@ -154,7 +154,7 @@ fn memory(input: &SheetInput<'_>, params: &Params, slabs: &Slabs, tiles: [usize;
     let mut needed = threads * 4 * 4 * (TILE * TILE) as u64;
     let sums = if params.classify == Classify::Before { 1 + Preclassified::times() } else { 1 };
     for volume in &input.volumes {
-        let dims = Lattice::packed(volume.grid, volume.packing, [usize::MAX; 3]).dims;
+        let dims = Lattice::new(volume.grid, volume.packing, [usize::MAX; 3]).dims;
         let stride = stride(volume, input, params, slabs.width);
         let width = slabs.width * f64::from(stride);
         let touched = crate::sections::touched(reach(volume, input, params) / width);
@@ -193,7 +193,7 @@ impl<'a> Prepared<'a> {
         let viewed = Viewed::new(&volume, camera, slabs, params, slant);
         let lacking = near_eye::lacking(&volume, camera, slabs, viewed.reach);
         let reach = viewed.lattice_reach(camera, slabs, volume.normals);
-        let lattice = Lattice::packed(grid, volume.packing, reach);
+        let lattice = Lattice::new(grid, volume.packing, reach);
         let viewed = viewed.with_rim(lattice.rim);
         let transfer = &volume.seen();
         let voxels = Voxels::needed(&lattice, transfer, reach);

@@ -28,13 +28,9 @@ pub(crate) struct Lattice<'a> {
 type Term = (f64, usize);
 
 impl<'a> Lattice<'a> {
-    /// With a rim for kernels that reach so many steps along the axes.
-    pub(crate) fn new(grid: &'a Grid, reach: [usize; 3]) -> Self {
-        Self::packed(grid, Packing::Cartesian, reach)
-    }
-
-    /// The same of planes that lie like that. Planes of the two lattices of a body-centred one go on each by itself.
-    pub(crate) fn packed(grid: &'a Grid, packing: Packing, reach: [usize; 3]) -> Self {
+    /// Of planes that lie like that, with a rim for kernels that reach so many steps along the axes. Planes of the two lattices of a body-centred
+    /// one go on each by itself.
+    pub(crate) fn new(grid: &'a Grid, packing: Packing, reach: [usize; 3]) -> Self {
         let most = [MOST_RIM, MOST_RIM, if packing == Packing::Cartesian { MOST_RIM } else { MOST_PLANES }];
         let rim = [0, 1, 2].map(|a| reach[a].min(most[a]));
         Self { grid, packing, rim, dims: [0, 1, 2].map(|a| grid.dims[a] + 2 * rim[a]) }
@@ -129,7 +125,7 @@ mod tests {
         let place = |n: usize| [n % 5, n / 5 % 4, n / 20].map(|v| v as f64);
         let values = (0..120).map(|n| at(place(n)) as f32).collect();
         let grid = Grid { origin: DVec3::ZERO, axes: DMat3::IDENTITY, dims, values };
-        let lattice = Lattice::new(&grid, [3, 2, 9]);
+        let lattice = Lattice::new(&grid, Packing::Cartesian, [3, 2, 9]);
         assert_eq!((lattice.rim, lattice.dims), ([3, 2, 3], [11, 8, 12]));
         let mut row = Vec::new();
         for (k, j) in (0..12).flat_map(|k| (0..8).map(move |j| (k, j))) {
@@ -152,7 +148,7 @@ mod tests {
         for planes in [2, 8] {
             let values = (0..20 * planes).map(|n| at(place(n)) as f32).collect();
             let grid = Grid { origin: DVec3::ZERO, axes: DMat3::IDENTITY, dims: [5, 4, planes], values };
-            let lattice = Lattice::packed(&grid, packing, [2, 3, 9]);
+            let lattice = Lattice::new(&grid, packing, [2, 3, 9]);
             assert_eq!((lattice.rim, lattice.dims), ([2, 3, 6], [9, 10, planes + 12]));
             // Two planes say nothing of how values rise from plane to plane of one lattice.
             for (k, j, i) in (0..planes + 12).flat_map(|k| (0..10).flat_map(move |j| (0..9).map(move |i| (k, j, i)))) {
@@ -167,7 +163,7 @@ mod tests {
     #[test]
     fn one_plane_goes_on_as_it_is() {
         let grid = Grid { origin: DVec3::ZERO, axes: DMat3::IDENTITY, dims: [1, 1, 2], values: vec![4.0, 6.0] };
-        let lattice = Lattice::new(&grid, [2, 2, 2]);
+        let lattice = Lattice::new(&grid, Packing::Cartesian, [2, 2, 2]);
         assert_eq!((0..6).map(|k| lattice.value(0, 4, k)).collect::<Vec<_>>(), [2.0, 2.0, 4.0, 6.0, 8.0, 8.0]);
     }
 }

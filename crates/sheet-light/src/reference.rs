@@ -46,7 +46,7 @@ struct Sheets {
 /// [`Error::Parameter`], [`Error::Volume`] or [`Error::Limit`].
 pub fn draw(input: &SheetInput<'_>, params: &Params) -> Result<Picture, Error> {
     params.check_any_mode()?;
-    input.check_any_lattice()?;
+    input.check()?;
     let slant = Slant::new(input, params)?;
     let slabs = slabs_of(input, params, slant)?;
     let view = View { input, params, slant };
@@ -105,7 +105,7 @@ impl Sheets {
         };
         let viewed = Viewed::new(volume, camera, slabs, params, slant);
         let reach = viewed.lattice_reach(camera, slabs, volume.normals);
-        let lattice = Lattice::packed(volume.grid, volume.packing, reach);
+        let lattice = Lattice::new(volume.grid, volume.packing, reach);
         let viewed = viewed.with_rim(lattice.rim);
         let [nx, ny, nz] = lattice.dims;
         for (k, j, i) in (0..nz).flat_map(|k| (0..ny).flat_map(move |j| (0..nx).map(move |i| (k, j, i)))) {

@@ -18,7 +18,7 @@ pub struct Volume<'a> {
     /// in lattice coordinates.
     pub grid: &'a Grid,
     /// How the planes of `grid` lie: [`Packing::BodyCentred`] for those of a [`splat_core::BccGrid`], which fill the parallelepiped
-    /// from −1/4 to n − 1/4 along i and j. Half-vector sheets take Cartesian ones alone.
+    /// from −1/4 to n − 1/4 along i and j.
     pub packing: Packing,
     /// From the grid's space to the world.
     pub transform: Similarity,
@@ -28,8 +28,7 @@ pub struct Volume<'a> {
     pub extinction_scale: f64,
     /// How light becomes radiance.
     pub material: &'a Material,
-    /// Regions that it is kept in, in the grid's space: rays end at their borders, and what is left shows its values there. Half-vector
-    /// sheets take none.
+    /// Regions that it is kept in, in the grid's space: rays of the eye and of light end at their borders, and what is left shows its values there.
     pub clip: &'a [Clip],
     /// Whether light is reflected about the gradient of the values, −∇v/|∇v| being the normal.
     pub normals: bool,
@@ -74,22 +73,46 @@ impl Volume<'_> {
         self.transfer.without_traces((f64::from(TRACE) / (self.extinction_scale * longest)) as f32, TRACE)
     }
 
-    /// Extinction about a world position, of trilinear values, 1/world unit; 0 outside.
+    /// Extinction about a world position, 1/world unit; 0 outside.
     pub(crate) fn extinction_at(&self, world: DVec3) -> f64 {
-        let at = self.axes().inverse() * (world - self.origin());
-        let highest = DVec3::from_array(self.grid.dims.map(|n| n as f64 - 0.5));
-        if at.cmplt(DVec3::splat(-0.5)).any() || at.cmpgt(highest).any() {
-            return 0.0;
+        let value = self.value_at(self.axes().inverse() * (world - self.origin()));
+        value.map_or(0.0, |value| f64::from(self.transfer.at(value).extinction) * self.extinction_scale)
+    }
+
+    /// Value at lattice coordinates, linear between planes and in each of them; `None` outside and where it is cut away.
+    pub(crate) fn value_at(&self, at: DVec3) -> Option<f32> {
+        let [lowest, highest] = self.ends();
+        let is_cut = || self.planes().any(|(normal, offset)| normal.dot(at) > offset);
+        if at.cmplt(lowest).any() || at.cmpgt(highest).any() || is_cut() {
+            return None;
         }
-        let (low, part) = (at.floor(), (at - at.floor()).as_vec3());
-        let [i, j, k] = low.to_array().map(|v| v as isize);
-        let along = |j: isize, k: isize| {
-            let [a, b] = [0, 1].map(|n| self.grid.at_clamped(i + n, j, k));
-            a + (b - a) * part.x
+        let plane = |k: isize| {
+            let shift = self.packing.shift(k.rem_euclid(2) as usize);
+            let [x, y] = [at.x - shift, at.y - shift];
+            let (i, j, u, v) = (x.floor() as isize, y.floor() as isize, (x - x.floor()) as f32, (y - y.floor()) as f32);
+            let row = |j: isize| {
+                let [a, b] = [0, 1].map(|n| self.grid.at_clamped(i + n, j, k));
+                a + (b - a) * u
+            };
+            row(j) + (row(j + 1) - row(j)) * v
         };
-        let across = |k: isize| along(j, k) + (along(j + 1, k) - along(j, k)) * part.y;
-        let value = across(k) + (across(k + 1) - across(k)) * part.z;
-        f64::from(self.transfer.at(value).extinction) * self.extinction_scale
+        let (k, w) = (at.z.floor() as isize, (at.z - at.z.floor()) as f32);
+        Some(plane(k) + (plane(k + 1) - plane(k)) * w)
+    }
+
+    /// Lattice coordinates that it lies between.
+    pub(crate) fn ends(&self) -> [DVec3; 2] {
+        let lowest = self.packing.lowest();
+        [lowest, lowest + DVec3::from_array(self.grid.dims.map(|n| n as f64))]
+    }
+
+    /// The planes that it is cut along, in lattice coordinates: unit normals that lead out, and their products with the border.
+    pub(crate) fn planes(&self) -> impl Iterator<Item = (DVec3, f64)> {
+        let plane = |(normal, offset): (DVec3, f64)| {
+            let (own, offset) = (self.grid.axes.transpose() * normal, offset - normal.dot(self.grid.origin));
+            (own / own.length(), offset / own.length())
+        };
+        self.clip.iter().flat_map(Clip::half_spaces).map(plane)
     }
 
     /// World position of the first lattice point.
@@ -104,26 +127,7 @@ impl Volume<'_> {
 }
 
 impl SheetInput<'_> {
-    /// What [`SheetInput::check_any_lattice`] does, and that all lattices are Cartesian and whole.
     pub(crate) fn check(&self) -> Result<(), Error> {
-        self.check_any_lattice()?;
-        if let Some(volume) = self.volumes.iter().position(|v| !v.clip.is_empty()) {
-            let (found, expected) = (self.volumes[volume].clip, "no regions: half-vector sheets cut nothing");
-            let source = splat_core::Error::invalid("volume", volume, "clip", found, expected);
-            return Err(Error::Volume { volume, source });
-        }
-        let other = self.volumes.iter().position(|v| v.packing != Packing::Cartesian);
-        other.map_or(Ok(()), |volume| {
-            let expected = "a Cartesian lattice: half-vector sheets take no body-centred one";
-            let found = self.volumes[volume].packing;
-            Err(Error::Volume {
-                volume,
-                source: splat_core::Error::invalid("volume", volume, "packing", found, expected),
-            })
-        })
-    }
-
-    pub(crate) fn check_any_lattice(&self) -> Result<(), Error> {
         if let Some(width) = self.splats.as_ref().map(|s| s.slab_width).filter(|w| !(w.is_finite() && *w > 0.0)) {
             return Err(Error::parameter("splats.slab_width", width, "a finite number > 0, world units"));
         }

@@ -5,11 +5,10 @@ use crate::common::{
     transfer, unlit, volume,
 };
 use crate::twin::{Slope, differences};
-use sheet_light::half::{HalfInput, HalfParams, fold};
-use sheet_light::{Error, Params, SheetInput};
+use sheet_light::{Error, Params};
 use splat_core::glam::DVec3;
-use splat_core::shade::{ChannelLayout, LitBy};
-use splat_core::{Accumulator, BccGrid, Camera, Grid, LayerSet, Light, LightShape, Material, TransferFunction};
+use splat_core::shade::LitBy;
+use splat_core::{Accumulator, BccGrid, Camera, Grid, Light, LightShape, Material, TransferFunction};
 
 /// Waves of lengths from 4.5 to 9 spacings of 1, along axes and diagonals: all inside the sphere that both spectra hold.
 fn waves(p: DVec3) -> f64 {
@@ -138,7 +137,7 @@ fn a_constant_body_centred_volume_fills_its_box() {
 }
 
 #[test]
-fn what_no_body_centred_lattice_is_is_refused_and_half_vectors_take_none() {
+fn what_no_body_centred_lattice_is_is_refused() {
     let (tf, material) = (constant(0.4), unlit());
     let bcc = body_centred([4, 4, 8], 2.0, |_| 3.0);
     let camera = parallel([0.0, 0.0, 9.0], 3.0, [8, 8]);
@@ -147,11 +146,4 @@ fn what_no_body_centred_lattice_is_is_refused_and_half_vectors_take_none() {
     assert!(draw(&input(&[bcc_volume(&odd, &tf, &material)], &camera, &[]), &exact()).is_ok());
     let refused = draw(&input(&[bcc_volume(&three, &tf, &material)], &camera, &[]), &exact());
     assert!(matches!(&refused, Err(e @ Error::Volume { volume: 0, .. }) if e.to_string().contains("even number")));
-    let volumes = [bcc_volume(&bcc, &tf, &material)];
-    let sheets: SheetInput<'_> = input(&volumes, &camera, &[]);
-    let layout = ChannelLayout::new(&LayerSet::default());
-    let mut out = Accumulator::new(camera.size, 1, layout.count(), false, false);
-    let half = HalfInput { sheets, splats: None, polygons: &[], extended: Vec::new(), mapped: Vec::new(), opaque: &[] };
-    let refused = fold(&half, &HalfParams::default(), &layout, &mut out, None);
-    assert!(matches!(&refused, Err(e @ Error::Volume { volume: 0, .. }) if e.to_string().contains("half-vector")));
 }

@@ -2,6 +2,7 @@
 
 mod closed_forms;
 mod common;
+mod cut;
 mod hard_cases;
 mod invariances;
 mod paths;

@@ -96,15 +96,6 @@ fn what_raw_points_alone_have_is_refused_elsewhere() {
 }
 
 #[test]
-fn slabs_across_half_vectors_cut_no_volume() {
-    let clipped = "[render]\ntechnique = \"sheets\"\nsheets = { slicing = \"half_vector\" }";
-    let clip = "volume = \"b.nii\"\nclip = [{ normal = [0, 1, 0], point = [0, 0, 0] }]";
-    let text = SCENE.replacen("[render]", clipped, 1).replacen("volume = \"b.nii\"", clip, 1);
-    let error = try_toml(&text).unwrap_err();
-    assert!(error.to_string().contains("`clip`: slabs across half vectors cut no volume"), "{error}");
-}
-
-#[test]
 fn lists_of_materials_are_checked() {
     let listed = |keys: &str, expected: &str| {
         let text = SCENE.replacen("mesh = \"a.ply\"\nmaterial = \"glass\"", &format!("points = \"a.las\"\n{keys}"), 1);

@@ -175,9 +175,6 @@ fn classification(scene: &Scene) -> Result<Knob, String> {
 
 /// What volumes are drawn on.
 fn lattice(scene: &Scene) -> Result<Knob, String> {
-    if scene.render.sheets.slicing != Slicing::View {
-        return Err("slabs across half vectors take no body-centred lattice".into());
-    }
     if !scene.objects.iter().any(may_be_packed) {
         return Err("no volume of a file is drawn".into());
     }

@@ -48,9 +48,10 @@ impl<'a> Bodies<'a> {
         low + 0.5 * (self.corners().fold(DVec3::NEG_INFINITY, DVec3::max) - low)
     }
 
-    /// The least step of a lattice and distance of splats, world units.
+    /// The least step of a Cartesian lattice, or of that of the same spectrum as one that is not, and distance of splats, world units.
     pub(crate) fn least_step(&self) -> f64 {
-        let axes = self.volumes.iter().map(Volume::axes).flat_map(|axes| [axes.x_axis, axes.y_axis, axes.z_axis]);
+        let steps = |v: &Volume<'_>| v.packing.equivalent_steps(v.axes());
+        let axes = self.volumes.iter().map(steps).flat_map(|axes| [axes.x_axis, axes.y_axis, axes.z_axis]);
         let splats = self.splats.map(|splats| splats.slab_width);
         axes.map(DVec3::length).chain(splats).fold(f64::INFINITY, f64::min)
     }

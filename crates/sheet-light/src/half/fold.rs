@@ -349,7 +349,7 @@ pub fn bytes<'l>(
         * (ROWS as u64 + 2)
         / ROWS as u64;
     let voxels = |v: &Volume<'_>| {
-        let dims = Lattice::new(v.grid, [usize::MAX; 3]).dims;
+        let dims = Lattice::new(v.grid, v.packing, [usize::MAX; 3]).dims;
         // A record once in the order of the lattice and once for each image, with its bucket.
         // The shadows of what is not carried, of the light of a sweep and of those without one.
         let of_a_voxel = 3 * 16 + 24 + 8 * (1 + mapped as u64);

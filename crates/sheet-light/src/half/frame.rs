@@ -30,11 +30,8 @@ pub(crate) struct Ray {
 
 /// World positions of the corners of a volume.
 pub(crate) fn world_corners(volume: &Volume<'_>) -> [DVec3; 8] {
-    let (dims, origin, axes) = (volume.grid.dims, volume.origin(), volume.axes());
-    std::array::from_fn(|c| {
-        let at = [0, 1, 2].map(|a| if c >> a & 1 == 1 { dims[a] as f64 - 0.5 } else { -0.5 });
-        origin + axes * DVec3::from_array(at)
-    })
+    let (ends, origin, axes) = (volume.ends(), volume.origin(), volume.axes());
+    std::array::from_fn(|c| origin + axes * DVec3::from_array([0, 1, 2].map(|a| ends[c >> a & 1][a])))
 }
 
 impl Frame {
@@ -50,7 +47,7 @@ impl Frame {
         let mut frame = Self { center: bodies.middle(), axes, slabs: nowhere, back_to_front: axis.back_to_front };
         let (mut spacing, mut reach) = (f64::INFINITY, 0.0f64);
         for volume in bodies.volumes {
-            let along = spacing_along(&frame.steps(volume));
+            let along = spacing_along(&volume.packing.equivalent_steps(frame.steps(volume)));
             (spacing, reach) = (spacing.min(along), reach.max(along * params.kernel.extent));
         }
         if let Some(splats) = bodies.splats.filter(|_| bodies.volumes.is_empty()) {

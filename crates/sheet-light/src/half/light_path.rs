@@ -1,7 +1,8 @@
 //! Ways of light in a volume: what it comes through before it reaches a place, and where on a ray that changes.
 //!
 //! A volume is three pairs of faces, a slab has one more. Light that comes to a place has passed a face of each pair at a distance
-//! depth/step; it is in the volume since the least of the three, and in the slab since the fourth. Along a ray the quotients of two
+//! depth/step; it is in the volume since the least of the three, and in the slab since the fourth. Planes that it is cut along are faces, too, each
+//! without another side. Along a ray the quotients of two
 //! faces agree where depth_i·step_k − depth_k·step_i changes sign, which is linear there, wherever the light comes from.
 
 use super::frame::Frame;
@@ -22,12 +23,15 @@ const ROUNDING: f32 = 1e-4;
 const FAR: f32 = 1e30;
 
 /// The ways of light in one volume, a parallelepiped in lattice coordinates.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct LightPath {
     /// Lattice from slab coordinates.
     start: Vec3,
     steps: Mat3,
+    lowest: Vec3,
     highest: Vec3,
+    /// Planes that it is cut along, in lattice coordinates: unit normals that lead out, and their products with the border.
+    planes: Vec<(Vec3, f32)>,
     /// Lattice steps per unit of length, for directional light.
     direction: Vec3,
     /// Depth across the slabs per unit of length, for directional light.
@@ -60,7 +64,9 @@ impl LightPath {
         Self {
             start: start.as_vec3(),
             steps: steps.as_mat3(),
-            highest: Vec3::from_array(volume.grid.dims.map(|n| n as f32 - 0.5)),
+            lowest: volume.ends()[0].as_vec3(),
+            highest: volume.ends()[1].as_vec3(),
+            planes: volume.planes().map(|(normal, offset)| (normal.as_vec3(), offset as f32)).collect(),
             direction: (inverse * direction).as_vec3(),
             across: frame.direction(direction).z as f32,
             lamp: lamp.map(|p| [frame.point(p).as_vec3(), lattice(p).as_vec3()]),
@@ -82,7 +88,7 @@ impl LightPath {
         let steepest = towards[0].abs().max(towards[1].abs()).max(towards[2].abs());
         let (mut enters, mut leaves, mut depths, mut steps) = ([of(FAR); FACES], zero, [zero; FACES], [zero; FACES]);
         for a in 0..3 {
-            let (above, below) = (here[a] - of(-0.5), of(self.highest[a]) - here[a]);
+            let (above, below) = (here[a] - of(self.lowest[a]), of(self.highest[a]) - here[a]);
             let rate = length / towards[a].abs().max(tiny * steepest);
             let is_parallel = [towards[a].abs(), tiny * steepest];
             let inside = of(FAR).where_less_or(of(-ROUNDING), above.min(below), of(-FAR));
@@ -91,9 +97,24 @@ impl LightPath {
             enters[a] = inside.where_less_or(is_parallel[0], is_parallel[1], depths[a] * rate);
             leaves = leaves.max(zero.where_less_or(is_parallel[0], is_parallel[1], leave));
         }
+        let mut cut = of(FAR);
+        for (normal, offset) in &self.planes {
+            let (mut depth, mut step) = (of(*offset), zero);
+            for a in 0..3 {
+                depth = depth - of(normal[a]) * here[a];
+                step = of(normal[a]).mul_add(towards[a], step);
+            }
+            let (along, flat) = (step.abs(), tiny * steepest);
+            let distance = depth * (length / along.max(flat));
+            let enter = distance.where_less_or(step, zero, of(FAR));
+            let inside = of(FAR).where_less_or(of(-ROUNDING), depth, of(-FAR));
+            let leave = (zero - distance).where_less(zero, step);
+            cut = cut.min(inside.where_less_or(along, flat, enter));
+            leaves = leaves.max(zero.where_less_or(along, flat, leave));
+        }
         (depths[SLAB], steps[SLAB]) = ((at[2] - of(face)).max(zero), across);
         enters[SLAB] = depths[SLAB] * length / across;
-        Ways { enters, depths, steps, leaves }
+        Ways { enters, cut, depths, steps, leaves }
     }
 
     /// Of the light's ray to each place: a length, the lattice steps on it, and the depth across the slabs.
@@ -131,6 +152,8 @@ pub(crate) const BENDS: usize = PAIRS.len() + 3;
 pub(crate) struct Ways<S: Simd> {
     /// Light is in the volume once it has come through a face of each pair.
     enters: [Lanes<S>; FACES],
+    /// And through the planes that the volume is cut along.
+    cut: Lanes<S>,
     /// How far behind each face a place is, and how far light comes towards it on a way of one length for all.
     depths: [Lanes<S>; FACES],
     steps: [Lanes<S>; FACES],
@@ -141,7 +164,7 @@ pub(crate) struct Ways<S: Simd> {
 impl<S: Simd> Ways<S> {
     #[inline(always)]
     fn entered(&self) -> Lanes<S> {
-        self.enters[0].min(self.enters[1]).min(self.enters[2])
+        self.enters[0].min(self.enters[1]).min(self.enters[2]).min(self.cut)
     }
 
     /// How much later light comes through the first face of a pair than through the other, times both steps.
@@ -172,7 +195,7 @@ impl<S: Simd> Ways<S> {
         let (zero, one) = (Lanes::splat(simd, 0.0), Lanes::splat(simd, 1.0));
         let (here, there) = (self.entered(), other.entered());
         // No face of the volume is the last one at both places, or only at one of them light comes into the slab later.
-        let mut does = one;
+        let mut does = one.where_less(here, self.cut).max(one.where_less(there, other.cut));
         for f in 0..SLAB {
             does = does.min(one.where_less(here, self.enters[f]).max(one.where_less(there, other.enters[f])));
         }

@@ -36,7 +36,8 @@ pub(crate) struct Placed<'a> {
 impl<'a> Placed<'a> {
     pub(crate) fn new(volume: &'a Volume<'a>, frame: &Frame, params: &Params) -> Self {
         let axes = frame.steps(volume);
-        let m = axes * axes.transpose() * (params.kernel.extent * params.kernel.extent);
+        let steps = volume.packing.equivalent_steps(axes);
+        let m = steps * steps.transpose() * (params.kernel.extent * params.kernel.extent);
         let reach = libm::sqrt(m.z_axis.z);
         let cutoff = params.kernel.extent / params.kernel.sigma;
         let footprint = Footprint { cutoff: cutoff as f32 };
@@ -77,13 +78,14 @@ impl<'a> Placed<'a> {
             let row = inverse.row(axis);
             let along = libm::sqrt((row.x * row.x * aa + 2.0 * row.x * row.y * ab + row.y * row.y * bb).max(0.0));
             let steps = along + (row.x.abs() + row.y.abs()) * pixel * neighbour + row.z.abs() * across;
-            (steps + 0.5).min(1e6) as usize
+            // From any place of a cell; as much more along planes as every second one is shifted.
+            (steps + 0.5 + if axis < 2 { self.volume.packing.shift(1) } else { 0.0 }).min(1e6) as usize
         })
     }
 
     /// The lattice with the rim that kernels reach, and the voxels of it that may matter.
     pub(crate) fn voxels(&self, reach: [usize; 3]) -> (Lattice<'a>, Voxels) {
-        let lattice = Lattice::new(self.volume.grid, reach);
+        let lattice = Lattice::new(self.volume.grid, self.volume.packing, reach);
         let voxels = Voxels::needed(&lattice, &self.volume.seen(), reach);
         (lattice, voxels)
     }
@@ -98,7 +100,9 @@ impl<'a> Placed<'a> {
 
     /// Slab coordinates of a lattice point, counted from the corner of a rim.
     pub(crate) fn position(&self, rim: [usize; 3], at: [usize; 3]) -> DVec3 {
-        let steps = [0, 1, 2].map(|a| at[a] as f64 - rim[a] as f64);
+        let shift = self.volume.packing.shift(at[2] + rim[2] % 2);
+        let shifts = [shift, shift, 0.0];
+        let steps = [0, 1, 2].map(|a| at[a] as f64 - rim[a] as f64 + shifts[a]);
         self.start + self.axes * DVec3::from_array(steps)
     }
 }

@@ -112,7 +112,8 @@ impl<'a> View<'a> {
         let frame = Frame::new(&input.bodies(), input.sheets.camera, &params.sheets, axis)?;
         let placed: Vec<Placed<'a>> = volumes.iter().map(|v| Placed::new(v, &frame, &params.sheets)).collect();
         let of = |placed: &Placed<'_>| {
-            let lattice = Lattice::new(placed.volume.grid, [3; 3]);
+            let (volume, most) = (placed.volume, [3, 3, 6]);
+            let lattice = Lattice::new(volume.grid, volume.packing, most);
             let [nx, ny, nz] = lattice.dims;
             let places = (0..nz).flat_map(|k| (0..ny).flat_map(move |j| (0..nx).map(move |i| [i, j, k])));
             let voxel = |at: [usize; 3]| {
@@ -357,11 +358,24 @@ impl<'a> View<'a> {
     }
 }
 
-/// Between which multiples of `step` a line from `start`, in lattice coordinates, is in the cells of a volume.
+/// Between which multiples of `step` a line from `start`, in lattice coordinates, is in the cells of a volume and not cut away.
 fn clip(volume: &Volume<'_>, start: DVec3, step: DVec3) -> Option<[f64; 2]> {
     let (mut near, mut far) = (f64::NEG_INFINITY, f64::INFINITY);
+    for (normal, offset) in volume.planes() {
+        let (depth, leaves) = (offset - normal.dot(start), normal.dot(step));
+        if leaves.abs() < 1e-12 * step.length() {
+            if depth < -1e-9 {
+                return None;
+            }
+        } else if leaves > 0.0 {
+            far = far.min(depth / leaves);
+        } else {
+            near = near.max(depth / leaves);
+        }
+    }
+    let [lowest, highest] = volume.ends();
     for a in 0..3 {
-        let (low, high) = (-0.5 - start[a], volume.grid.dims[a] as f64 - 0.5 - start[a]);
+        let (low, high) = (lowest[a] - start[a], highest[a] - start[a]);
         if step[a].abs() < 1e-12 * step.length() {
             if low > 1e-9 || high < -1e-9 {
                 return None;

@@ -199,7 +199,8 @@ fn least(cosines: impl Iterator<Item = f64>) -> f64 {
 
 fn is_inside(volume: &Volume<'_>, p: DVec3) -> bool {
     let at = volume.axes().inverse() * (p - volume.origin());
-    (0..3).all(|a| at[a] >= -0.5 && at[a] <= volume.grid.dims[a] as f64 - 0.5)
+    let [lowest, highest] = volume.ends();
+    at.cmpge(lowest).all() && at.cmple(highest).all()
 }
 
 fn world(camera: &Camera, v: DVec3) -> DVec3 {

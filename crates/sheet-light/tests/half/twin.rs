@@ -7,7 +7,7 @@ use splat_core::glam::{DMat3, DVec3};
 use splat_core::{Light, Material};
 
 /// Greatest differences from the twin: optical depth, colour times 4π.
-fn differences(input: &HalfInput<'_>, params: &HalfParams) -> [f64; 2] {
+pub(super) fn differences(input: &HalfInput<'_>, params: &HalfParams) -> [f64; 2] {
     let (found, counts) = draw(input, params).unwrap();
     let twin = reference::draw(input, params).unwrap();
     let mut worst = [0.0f64; 2];

@@ -1,6 +1,6 @@
 //! What the cells of diffuse light are filled with: means of extinction and scattering over places in each cell.
 //!
-//! Values are interpolated trilinearly between voxels and classified then, as in the sheets. Volumes that share a cell add: their
+//! Values are interpolated linearly between voxels and classified then, as in the sheets. Volumes that share a cell add: their
 //! extinctions, and their scattering with its own phase function, so media mix by how much they scatter.
 
 use super::grid::LightGrid;
@@ -59,29 +59,10 @@ impl<'a> Lattice<'a> {
         Self { volume, inverse, origin, ahead, scatters: scatters(volume) }
     }
 
-    /// Classified value at a world position; `None` outside.
+    /// Classified value at a world position; `None` outside and where it is cut away.
     fn at(&self, world: DVec3) -> Option<TransferPoint> {
-        let at = self.inverse * (world - self.origin);
-        let dims = self.volume.grid.dims;
-        let mut low = [0; 3];
-        let mut share = [0.0; 3];
-        for a in 0..3 {
-            let last = dims[a] as f64 - 1.0;
-            if !(-0.5..=last + 0.5).contains(&at[a]) {
-                return None;
-            }
-            let v = at[a].clamp(0.0, last);
-            low[a] = (v as usize).min(dims[a].saturating_sub(2));
-            share[a] = (v - low[a] as f64) as f32;
-        }
-        let value = |i: usize, j: usize, k: usize| {
-            let at = [(low[0] + i).min(dims[0] - 1), (low[1] + j).min(dims[1] - 1), (low[2] + k).min(dims[2] - 1)];
-            self.volume.grid.values[(at[2] * dims[1] + at[1]) * dims[0] + at[0]]
-        };
-        let mix = |a: f32, b: f32, n: usize| a + (b - a) * share[n];
-        let row = |j: usize, k: usize| mix(value(0, j, k), value(1, j, k), 0);
-        let plane = |k: usize| mix(row(0, k), row(1, k), 1);
-        Some(self.volume.transfer.at(mix(plane(0), plane(1), 2)))
+        let value = self.volume.value_at(self.inverse * (world - self.origin))?;
+        Some(self.volume.transfer.at(value))
     }
 }
 
