@@ -1,7 +1,7 @@
 //! One tile of the accumulator: optical depths, transmittances, colours, depths; what is still seen through.
 //!
-//! Front to back: weight = T·(1 − e^−τ), T ← T − weight, C ← C + weight·L, 1 − e^−τ by a series. Optical depth is summed with its
-//! rounding error kept (Kahan), so thousands of slabs cost it no digits.
+//! Front to back: weight = T·(1 − e^−τ), C ← C + weight·L, 1 − e^−τ by a series; T is e^−τ of all so far. Optical depth and radiance are summed with
+//! their rounding errors kept (Kahan), so slabs by the hundred thousand cost no digits.
 
 use crate::tile::{SIDE, TILE};
 use splat_core::raster::lanes::{Lanes, MAX_LANES, exp_neg};
@@ -40,6 +40,8 @@ pub(crate) struct Picture {
     excess: Vec<f32>,
     transmittance: Vec<f32>,
     values: Vec<f32>,
+    /// What the values are too large by.
+    value_excess: Vec<f32>,
     depth: Vec<DepthProfile>,
     object: Vec<u32>,
     cutoff: f32,
@@ -64,6 +66,7 @@ impl Picture {
             // Nothing outside the image keeps a tile busy.
             transmittance: vec![0.0; planes * PIXELS],
             values: vec![0.0; channels * PIXELS],
+            value_excess: vec![0.0; channels * PIXELS],
             depth: if from.depth.is_empty() { Vec::new() } else { vec![DepthProfile::default(); PIXELS] },
             object: if from.object.is_empty() { Vec::new() } else { vec![u32::MAX; PIXELS] },
             cutoff,
@@ -168,20 +171,18 @@ impl Picture {
             let through = Lanes::load(simd, &self.transmittance[plane..]);
             let opacity = tau.opacity();
             weights[p] = through * opacity;
-            opacity.negate_mul_add(through, through).store(&mut self.transmittance[plane..]);
             let sum = Lanes::load(simd, &self.optical_depth[plane..]);
             if p == self.planes / 2 {
                 before = sum;
             }
-            let add = tau - Lanes::load(simd, &self.excess[plane..]);
-            let new = sum + add;
-            ((new - sum) - add).store(&mut self.excess[plane..]);
-            new.store(&mut self.optical_depth[plane..]);
+            let new = add(simd, &mut self.optical_depth[plane..], &mut self.excess[plane..], tau);
+            new.exp_neg().store(&mut self.transmittance[plane..]);
         }
         for c in 0..self.channels {
             let weight = weights[ChannelLayout::plane_of(c, self.channels, self.planes)];
-            let sum = &mut self.values[c * PIXELS + at..];
-            weight.mul_add(Lanes::load(simd, &of.values[c]), Lanes::load(simd, sum)).store(sum);
+            let channel = c * PIXELS + at;
+            let term = weight * Lanes::load(simd, &of.values[c]);
+            add(simd, &mut self.values[channel..], &mut self.value_excess[channel..], term);
         }
         if !(self.depth.is_empty() && self.object.is_empty()) {
             let mut nearer = [0.0; MAX_LANES];
@@ -208,4 +209,15 @@ impl Picture {
             }
         }
     }
+}
+
+/// Adds to sums that are too large by `excess`; the new sums.
+#[inline(always)]
+pub(crate) fn add<S: Simd>(simd: S, sums: &mut [f32], excess: &mut [f32], term: Lanes<S>) -> Lanes<S> {
+    let sum = Lanes::load(simd, sums);
+    let term = term - Lanes::load(simd, excess);
+    let new = sum + term;
+    ((new - sum) - term).store(excess);
+    new.store(sums);
+    new
 }

@@ -1,10 +1,11 @@
 //! The eye's image: what is composited so far in a band, front to back or back to front (step 20 of the pseudocode).
 //!
-//! Front to back: weight = T·(1 − e^(−τ)), T ← T − weight, C ← C + weight·L. Back to front: C ← (1 − e^(−τ))·L + e^(−τ)·C. Optical
+//! Front to back: weight = T·(1 − e^(−τ)), C ← C + weight·L, T = e^(−Στ). Back to front: C ← (1 − e^(−τ))·L + e^(−τ)·C. Optical
 //! depth and radiance are summed with their rounding errors kept (Kahan), whichever way, so alpha does not know the order, and what many
 //! thin slabs add is not too little to be added.
 
 use super::band::Band;
+use crate::picture::add;
 use splat_core::raster::lanes::{Lanes, MAX_LANES};
 use splat_core::raster::pulp::Simd;
 use splat_core::shade::{ChannelLayout, MAX_CHANNELS};
@@ -100,8 +101,7 @@ impl Pixels {
             let through = Lanes::load(simd, &self.transmittance[p][k..]);
             let opacity = Lanes::load(simd, &of.optical_depth[p]).opacity();
             weights[p] = through * opacity;
-            opacity.negate_mul_add(through, through).store(&mut self.transmittance[p][k..]);
-            self.sum(simd, p, k, of);
+            self.sum(simd, p, k, of).exp_neg().store(&mut self.transmittance[p][k..]);
         }
         for c in 0..self.channels {
             let weight = weights[ChannelLayout::plane_of(c, self.channels, self.planes)];
@@ -128,11 +128,11 @@ impl Pixels {
         self.add_objects(simd, k, of, true);
     }
 
-    /// Adds to the optical depth of plane `p`.
+    /// Adds to the optical depth of plane `p`, which it returns.
     #[inline(always)]
-    fn sum<S: Simd>(&mut self, simd: S, p: usize, k: usize, of: &Fragments) {
+    fn sum<S: Simd>(&mut self, simd: S, p: usize, k: usize, of: &Fragments) -> Lanes<S> {
         let term = Lanes::load(simd, &of.optical_depth[p]);
-        add(simd, &mut self.optical_depth[p][k..], &mut self.excess[p][k..], term);
+        add(simd, &mut self.optical_depth[p][k..], &mut self.excess[p][k..], term)
     }
 
     #[inline(always)]
@@ -192,14 +192,4 @@ impl Pixels {
             }
         }
     }
-}
-
-/// Adds to sums that are too large by `excess`.
-#[inline(always)]
-fn add<S: Simd>(simd: S, sums: &mut [f32], excess: &mut [f32], term: Lanes<S>) {
-    let sum = Lanes::load(simd, sums);
-    let term = term - Lanes::load(simd, excess);
-    let new = sum + term;
-    ((new - sum) - term).store(excess);
-    new.store(sums);
 }

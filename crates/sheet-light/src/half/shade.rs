@@ -54,9 +54,14 @@ impl Lit<'_> {
         radiance
     }
 
-    /// What the point shows of light that is scattered more than once, where that is simulated.
+    /// What the point shows of light that is scattered more than once, where that is simulated: scattered once more by a medium, reflected about the
+    /// gradient by one that has it.
     pub(crate) fn scattered(&self, of: &Sweep<'_>, pixel: [usize; 2], at: DVec3) -> Option<[f32; 3]> {
         let (scattered, light) = (of.scattered.as_ref()?, &of.light.as_ref()?.light);
+        if reflects(self.volume) {
+            let (surfaces, facet) = (scattered.at_surfaces.as_ref()?, (self.volume.material, self.color));
+            return Some(surfaces.reflected(of.frame.world(at), self.normal.as_dvec3(), facet, light));
+        }
         if !medium::scatters(self.volume) {
             return None;
         }
@@ -68,4 +73,9 @@ impl Lit<'_> {
 /// Whether a volume asks for light at all.
 pub(crate) fn is_lit(volume: &Volume<'_>) -> bool {
     volume.material.shading != Shading::Unlit
+}
+
+/// Whether a volume reflects light about its gradient.
+pub(crate) fn reflects(volume: &Volume<'_>) -> bool {
+    volume.normals && volume.material.shading == Shading::Phong
 }

@@ -19,7 +19,7 @@ use super::polygon_light::{PolygonImage, PolygonLight, PolygonSlabs};
 use super::polygons::EyePolygons;
 use super::scatter::{self, Scattered, Scene, SurfaceLight};
 use super::serves::axis_of_view;
-use super::shade::is_lit;
+use super::shade::{is_lit, reflects};
 use super::sight::{Shape, Sight};
 use super::splat_light::SplatLight;
 use super::splats::{Lamps, SplatSheets};
@@ -139,8 +139,9 @@ impl<'a> Sweep<'a> {
         let shadow = beside.as_ref().map(|beside| beside as &dyn Transmittance).or(lit.shadow);
         let splats = self.input.splats.as_ref().filter(|splats| !splats.cloud.is_empty());
         let scene = Scene::new((self.volumes, splats), &LitBy { shadow, ..*lit }, params, origin);
-        let lights_surfaces =
-            self.polygons.is_some_and(EyePolygons::are_lit) || splats.is_some_and(HalfSplats::have_surfaces);
+        let lights_surfaces = self.polygons.is_some_and(EyePolygons::are_lit)
+            || splats.is_some_and(HalfSplats::have_surfaces)
+            || self.volumes.iter().any(reflects);
         Some(Scattered::new(&scene, params.scattering, lights_surfaces))
     }
 

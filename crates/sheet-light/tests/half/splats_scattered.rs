@@ -4,10 +4,14 @@ use super::common::{exact, input, scattering, sun};
 use super::paths::{Block, trace_with};
 use super::splats::{Shown, with};
 use crate::common::{constant, cubic, grid, parallel, volume};
+use sheet_light::Volume;
 use sheet_light::half::{HalfParams, Scattering, balance, fold};
-use splat_core::glam::{DVec3, Vec3};
+use splat_core::glam::{DMat3, DVec3, Vec3};
 use splat_core::shade::ChannelLayout;
-use splat_core::{Accumulator, Camera, Cloud, Footprint, LayerSet, Material, Shading, Splat, SplatKind};
+use splat_core::{
+    Accumulator, Camera, Cloud, Footprint, LayerSet, Material, Shading, Splat, SplatKind, TransferFunction,
+    TransferPoint,
+};
 use std::f64::consts::PI;
 
 /// Effects apart, `scatterN` among them, and its first channel.
@@ -46,9 +50,15 @@ fn pane(z: f64, (half, step): (f64, f64), tau: f64, color: [f32; 3]) -> Cloud {
 
 /// The middle pixel of scattered light of a slab of τ 2 between z = ±2, lit along −z, beside splats.
 fn middle(shown: Option<&Shown>, camera: &Camera) -> [f64; 3] {
+    middle_beside(&[], shown, camera)
+}
+
+/// The same beside other volumes.
+fn middle_beside(others: &[Volume<'_>], shown: Option<&Shown>, camera: &Camera) -> [f64; 3] {
     let slab = grid([48, 48, 8], cubic(0.5), |_| 1.0);
     let (tf, medium) = (constant(0.5), scattering());
-    let (volumes, lights) = ([volume(&slab, &tf, &medium)], [sun([0.0, 0.0, 1.0])]);
+    let lights = [sun([0.0, 0.0, 1.0])];
+    let volumes: Vec<Volume<'_>> = [volume(&slab, &tf, &medium)].into_iter().chain(others.iter().copied()).collect();
     let plain = input(&volumes, camera, &lights);
     let input = shown.map_or_else(|| plain.clone(), |shown| with(shown, plain.clone()));
     let mut out = Accumulator::new(camera.size, 3, APART.count(), false, false);
@@ -101,15 +111,25 @@ fn a_pane_in_a_medium_lets_through_what_paths_do() {
     }
 }
 
-#[test]
-fn a_thin_pane_shows_what_the_medium_scatters_to_either_side_of_it() {
-    // Slabs are thin, for what shares one with the medium is seen through half of it. Half of the fluence and of the net flux of two streams: ψ and J at an optical depth of 1 of 2.
+/// By side of the eye: what a white Lambert surface of no thickness shows there in the middle of the slab, over the opacity of it. Half of the fluence and of the
+/// net flux of two streams, ψ and J at an optical depth of 1 of 2.
+fn on_either_side() -> [(f64, f64); 2] {
     let tau = 2.0f64;
     let first = (1.5 * tau + 0.5 * (-tau).exp_m1()) / (2.0 + 1.5 * tau);
     let psi = first - 1.5 * ((1.0 - first) + (-1f64).exp_m1());
     let net = 1.0 - first - (-1f64).exp();
-    let lambert = Material { ambient: 0.0, diffuse: 1.0, specular: 0.0, ..Material::default() };
-    for (eye, expected) in [(12.0, psi + net), (-12.0, psi - net)] {
+    [(12.0, 0.5 * (psi + net)), (-12.0, 0.5 * (psi - net))]
+}
+
+fn lambert() -> Material {
+    Material { ambient: 0.0, diffuse: 1.0, specular: 0.0, ..Material::default() }
+}
+
+#[test]
+fn a_thin_pane_shows_what_the_medium_scatters_to_either_side_of_it() {
+    // Slabs are thin, for what shares one with the medium is seen through half of it.
+    let lambert = lambert();
+    for (eye, expected) in on_either_side() {
         let camera = parallel([0.0, 0.0, eye], 2.0, [9, 9]);
         let of = |color: [f32; 3]| {
             let shown = Shown::new(pane(0.0, (15.0, 0.25), 0.05, color), &camera, vec![lambert], 0.1);
@@ -117,6 +137,25 @@ fn a_thin_pane_shows_what_the_medium_scatters_to_either_side_of_it() {
         };
         // Of a white one more than of a black one, behind half of the slab.
         let found = PI * (of([1.0; 3]) - of([0.0; 3])) / (-(-0.05f64).exp_m1() * (-1f64).exp());
-        assert!((found - 0.5 * expected).abs() < 0.03, "eye {eye}: {found}, not {}", 0.5 * expected);
+        assert!((found - expected).abs() < 0.03, "eye {eye}: {found}, not {expected}");
+    }
+}
+
+#[test]
+fn volumes_that_reflect_about_their_gradient_show_what_the_medium_scatters_as_a_thin_pane_does() {
+    let (tau, material) = (0.005f64, lambert());
+    for (eye, expected) in on_either_side() {
+        let camera = parallel([0.0, 0.0, eye], 2.0, [9, 9]);
+        // Values fall towards the eye. What it takes of the light is lost to the medium: as little as can be told.
+        let thin = grid([48, 48, 4], DMat3::from_diagonal(DVec3::new(0.5, 0.5, 0.05)), |p| -p.z * eye);
+        let of = |color: [f32; 3]| {
+            let point = TransferPoint { value: 0.0, color, extinction: (tau / 0.2) as f32 };
+            let tf = TransferFunction::new(vec![point]).unwrap();
+            let facets = Volume { normals: true, ..volume(&thin, &tf, &material) };
+            middle_beside(&[facets], None, &camera)[1]
+        };
+        let found = PI * (of([1.0; 3]) - of([0.0; 3])) / (-(-tau).exp_m1() * (-1f64).exp());
+        println!("eye {eye}: {found}, {expected}");
+        assert!((found - expected).abs() < 0.03, "eye {eye}: {found}, not {expected}");
     }
 }
