@@ -147,27 +147,55 @@ impl Classified {
                 (low, high) = (low.min(*value), high.max(*value));
             }
         }
-        let (low, high) = (f64::from(low), f64::from(high));
-        let between = self.transfer.points().iter().filter(|p| (low..=high).contains(&f64::from(p.value)));
-        let ends = self.class(low)[3].max(self.class(high)[3]);
         // Rounding may leave the hull of the control points by an ulp.
-        between.fold(ends, |most, p| most.max(f64::from(p.extinction))) * (1.0 + 1e-12)
+        self.most_between([low, high].map(f64::from)) * (1.0 + 1e-12)
     }
 
-    /// Appends the distances in (t0, t1) where the extinction along the ray is not smooth, in no order.
+    /// Largest extinction of values between two.
+    fn most_between(&self, [low, high]: [f64; 2]) -> f64 {
+        let between = self.transfer.points().iter().filter(|p| (low..=high).contains(&f64::from(p.value)));
+        let ends = self.class(low)[3].max(self.class(high)[3]);
+        between.fold(ends, |most, p| most.max(f64::from(p.extinction)))
+    }
+
+    /// Least and greatest value of the cell of lattice points about a place in units of the lattice.
+    fn ends_of_cell(&self, q: DVec3) -> [f64; 2] {
+        let base = q.max(DVec3::ZERO).min(self.last()).floor().to_array().map(|v| v as isize);
+        let corner = |c: isize| self.grid.at_clamped(base[0] + (c & 1), base[1] + (c >> 1 & 1), base[2] + (c >> 2));
+        let join = |[low, high]: [f32; 2], v: f32| [low.min(v), high.max(v)];
+        (0..8).map(corner).fold([f32::INFINITY, f32::NEG_INFINITY], join).map(f64::from)
+    }
+
+    /// Appends the distances in (t0, t1) where the extinction along the ray is not smooth, in no order. Between cells that nothing is in there are none.
     pub(crate) fn breaks(&self, ray: &Ray, t0: f64, t1: f64, out: &mut Vec<f64>) {
         let local = Ray { origin: self.index(ray.origin), direction: self.index_from_world * ray.direction };
         let mut planes = Vec::new();
         lattice_breaks(&local, self.last(), (t0, t1), &mut planes);
         planes.sort_by(f64::total_cmp);
+        let mut was_empty = false;
         for ends in planes.windows(2) {
             let width = ends[1] - ends[0];
+            let [low, high] = self.ends_of_cell(local.at(ends[0] + 0.5 * width));
+            let is_empty = self.most_between([low, high]) == 0.0;
+            if !(is_empty && was_empty) {
+                out.push(ends[0]);
+            }
+            was_empty = is_empty;
+            let mut crossed = self
+                .transfer
+                .points()
+                .iter()
+                .map(|p| f64::from(p.value))
+                .filter(|v| (low..=high).contains(v))
+                .peekable();
+            if is_empty || crossed.peek().is_none() {
+                continue;
+            }
             let values = [0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0].map(|s| self.trilinear(local.at(ends[0] + width * s)));
             let cubic = Cubic::through(values);
-            let kinks = self.transfer.points().iter().flat_map(|p| cubic.places_of(f64::from(p.value)));
-            out.extend(kinks.map(|s| ends[0] + width * s));
+            out.extend(crossed.flat_map(|value| cubic.places_of(value)).map(|s| ends[0] + width * s));
         }
-        out.append(&mut planes);
+        out.extend(planes.last());
     }
 }
 
@@ -264,6 +292,23 @@ mod tests {
                 assert!(v.extinction(p) <= most, "{} above {most}", v.extinction(p));
             }
         }
+    }
+
+    #[test]
+    fn rays_are_cut_where_something_is_and_nowhere_else() {
+        // Of 64 cells along x those about 20 and 21 hold something.
+        let point = |value, extinction| TransferPoint { value, color: [1.0; 3], extinction };
+        let transfer = TransferFunction::new(vec![point(0.5, 0.0), point(1.0, 4.0)]).unwrap();
+        let values = (0..64 * 4).map(|i| if matches!(i % 64, 20 | 21) { 1.0 } else { 0.0 }).collect();
+        let grid = Grid { origin: DVec3::ZERO, axes: DMat3::IDENTITY, dims: [64, 2, 2], values };
+        let volume = Classified::new(grid, transfer, &Similarity::default());
+        let ray = Ray { origin: DVec3::new(-9.0, 0.25, 0.25), direction: DVec3::X };
+        let mut cuts = Vec::new();
+        volume.breaks(&ray, 0.0, f64::INFINITY, &mut cuts);
+        cuts.sort_by(f64::total_cmp);
+        cuts.dedup();
+        let expected = [-0.5, 19.0, 19.5, 20.0, 21.0, 21.5, 22.0, 63.5].map(|x| x + 9.0);
+        assert!(cuts.len() == 8 && cuts.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12), "{cuts:?}");
     }
 
     #[test]
