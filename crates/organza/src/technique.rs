@@ -160,7 +160,6 @@ pub(crate) static TABLE: [Row; 5] = [
         how: "are composited in slabs, volumes classified after reconstruction",
         form: Some(sheets::form),
         polygons: sheets::keeps_polygons,
-        gaussians: false,
         steps: &[Step { pass: pass::SHEETS, stage: stage::SHEETS, seconds: sheets::seconds }],
         bytes: sheets::bytes,
         carries: sheets::carries,

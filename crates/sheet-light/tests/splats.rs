@@ -1,6 +1,8 @@
 //! Splats in sheets, beside volumes and alone.
 
-use crate::common::{apart, constant, cubic, exact, grid, largest, parallel, perspective, projected, unlit, volume};
+use crate::common::{
+    apart, constant, cubic, exact, grid, largest, parallel, perspective, projected, unlit, volume, with_gaussians,
+};
 use sheet_light::{Params, SheetInput, Splats, prepare};
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::raster::{self, FoldInput, OpaqueImage, Projected};
@@ -86,7 +88,7 @@ fn materials() -> Vec<Material> {
 fn a_slab_for_each_splat_is_the_order_of_splats() {
     let size = [100, 70];
     for camera in [parallel([0.0, 0.0, 9.0], 4.0, size), perspective([0.0, 0.0, 6.0], 40.0, size)] {
-        let shown = Shown::new(some(256), &camera, materials());
+        let shown = Shown::new(with_gaussians(some(256)), &camera, materials());
         let opaque: Vec<f32> = (0..7000).map(|i| if i % 100 < 40 { 6.0 } else { f32::INFINITY }).collect();
         for planes in [1, 3] {
             let hidden = OpaqueImage { depth: opaque.clone(), ..OpaqueImage::default() };

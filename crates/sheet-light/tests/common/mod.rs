@@ -1,13 +1,14 @@
 //! Volumes, views and pictures for the tests.
 
 use sheet_light::{Error, Params, SheetCounts, SheetInput, Volume, prepare};
-use splat_core::glam::{DMat3, DVec3};
+use splat_core::glam::{DMat3, DVec3, Vec3};
 use splat_core::raster::{self, Detail, ProjectInput, Projected, project};
 use splat_core::shade::{ChannelLayout, LitBy};
 use splat_core::{
-    Accumulator, BccGrid, Camera, Cloud, FootprintStack, Grid, LayerSet, Material, Packing, Projection, Shading,
-    Similarity, TransferFunction, TransferPoint, rng,
+    Accumulator, BccGrid, Camera, Cloud, FootprintStack, Gaussians, Grid, LayerSet, Material, Packing, Projection,
+    Shading, Similarity, SplatKind, TransferFunction, TransferPoint, rng,
 };
+use std::sync::Arc;
 
 /// A lattice around the origin, its values by place in world space.
 pub(crate) fn grid(dims: [usize; 3], axes: DMat3, value: impl Fn(DVec3) -> f64) -> Grid {
@@ -148,6 +149,23 @@ pub(crate) fn apart(a: &Accumulator, b: &Accumulator) -> f32 {
     let through = |a: &Accumulator| a.optical_depth[0].iter().map(|t| (-t).exp()).collect::<Vec<f32>>();
     let planes = a.channels.iter().zip(&b.channels).map(|(a, b)| largest(a, b));
     planes.fold(largest(&through(a), &through(b)), f32::max)
+}
+
+/// Makes every fifth splat a Gaussian, three times as long as wide, of its colour.
+pub(crate) fn with_gaussians(mut cloud: Cloud) -> Cloud {
+    let mut all = Gaussians::default();
+    cloud.gaussian = vec![Gaussians::NONE; cloud.len()];
+    for i in (1..cloud.len()).step_by(5) {
+        let along = |k: u64| (rng::unit(9, k, i as u64, 0) - 0.5) as f32;
+        let axis = Vec3::new(along(0), along(1), along(2)).normalize();
+        let (other, last) = axis.any_orthonormal_pair();
+        (cloud.gaussian[i], cloud.kind[i]) = (all.len() as u32, SplatKind::Medium);
+        all.axes.push([axis * 0.18, other * 0.06, last * 0.06]);
+        all.opacity.push(0.7);
+        all.harmonics.push(Gaussians::constant(cloud.color[i]));
+    }
+    cloud.gaussians = Arc::new(all);
+    cloud
 }
 
 /// All that is known of splats in a camera's image, by default footprints.

@@ -1,7 +1,7 @@
 //! Splats in half-vector slabs: closed forms of what shadows what, and the limits of other ways to composite them.
 
 use super::common::{draw, exact, input, lamp, scattering, sun};
-use crate::common::{BEAUTY, constant, cubic, grid, largest, parallel, perspective, projected, volume};
+use crate::common::{BEAUTY, constant, cubic, grid, largest, parallel, perspective, projected, volume, with_gaussians};
 use sheet_light::half::{HalfInput, HalfParams, HalfSplats, fold};
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::raster::{self, FoldInput, OpaqueImage, Projected};
@@ -211,7 +211,7 @@ fn a_slab_for_each_splat_is_the_order_of_splats() {
     let size = [100, 70];
     for camera in [parallel([0.0, 0.0, 9.0], 4.0, size), perspective([0.0, 0.0, 6.0], 40.0, size)] {
         let (cloud, materials) = some(256, Shading::Unlit);
-        let shown = Shown::new(cloud, &camera, materials, 1.0 / 128.0);
+        let shown = Shown::new(with_gaussians(cloud), &camera, materials, 1.0 / 128.0);
         let opaque: Vec<f32> = (0..7000).map(|i| if i % 100 < 40 { 6.0 } else { f32::INFINITY }).collect();
         let hidden = OpaqueImage { depth: opaque.clone(), ..OpaqueImage::default() };
         for planes in [1, 3] {
@@ -223,7 +223,7 @@ fn a_slab_for_each_splat_is_the_order_of_splats() {
                 let [a, b] = [a, b].map(|i| place.depth(shown.cloud.position[*i as usize]));
                 a.total_cmp(&b)
             });
-            let values: Vec<f32> = shown.cloud.color.iter().flatten().copied().collect();
+            let values: Vec<f32> = (0..256).flat_map(|i| shown.cloud.color_along(i, Vec3::Z)).collect();
             let fold_input = FoldInput {
                 projected: &shown.projected,
                 order: &order,
