@@ -268,8 +268,8 @@ impl Shader<'_> {
         for c in 0..self.layout.count() {
             // What is not seen may be no number.
             let (zero, value) = (Lanes::splat(simd, 0.0), Lanes::load(simd, &values[c]));
-            let least = Lanes::splat(simd, if c < self.layout.colors() { TRACE } else { -f32::MAX });
-            value.where_less(zero, medium.depth).where_less(least, value).store(&mut values[c]);
+            let least = Lanes::splat(simd, if c < self.layout.colors() { TRACE } else { -1.0 });
+            value.where_less(zero, medium.depth).where_less(least, value.abs()).store(&mut values[c]);
         }
     }
 

@@ -138,7 +138,7 @@ impl Radiance {
             // One of `direct` and `scatter1` is 0: beauty has the same bits as if they were one.
             out[..3].copy_from_slice(&others.iter().fold(first, |sum, e| [0, 1, 2].map(|c| sum[c] + e[c])));
         }
-        out[..layout.colors()].iter_mut().filter(|v| **v <= TRACE).for_each(|v| *v = 0.0);
+        out[..layout.colors()].iter_mut().filter(|v| v.abs() <= TRACE).for_each(|v| *v = 0.0);
         if let Some(at) = layout.normal() {
             out[at..at + 3].copy_from_slice(&normal.to_array());
         }
