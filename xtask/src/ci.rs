@@ -98,6 +98,7 @@ fn steps() -> Vec<Step> {
         step("fmt", one("fmt --all --check")),
         step("tidy", Work::Task(tidy::run)),
         step("papers", Work::Task(papers::check)),
+        step("deny", Work::Task(deny::run)),
         step("clippy", one(&clippy())),
         step("docs", docs),
         step("modules", Work::Task(vulkan::modules)),
@@ -110,7 +111,7 @@ pub(crate) fn clippy() -> String {
     format!("clippy --workspace --all-targets --features {FEATURES},{DRIVER},{DEEP} -- -D warnings")
 }
 
-/// What takes minutes and rarely breaks where [`run`] holds, to be run before a release: licences of dependencies; kernels
+/// What takes minutes and rarely breaks where [`run`] holds, to be run before a release: kernels
 /// compiled anew, where tests hold the hashes of what they were compiled from; each crate by itself, with none of its features
 /// and with each of them; recordings by every executor under every validation; every scene drawn, forms
 /// that take long, and every bit of small files flipped.
@@ -121,7 +122,6 @@ pub(crate) fn deep(repo: &Repo) -> Outcome {
     let strict = |words: Vec<String>| [words, split("-- -D warnings")].concat();
     let alone = bare(repo).into_iter().map(|check| check.1).chain(with_one_feature(repo)).map(strict).collect();
     let steps = [
-        Step { name: "deny", work: Work::Task(deny::run) },
         Step { name: "shaders", work: Work::Task(|repo| shaders::run(repo, true)) },
         Step { name: "alone", work: Work::Cargo(alone, &[]) },
         Step { name: "vulkan", work: Work::Task(vulkan::run) },
@@ -182,7 +182,7 @@ mod tests {
     fn warnings_fail_and_what_is_slow_comes_last() {
         let steps = steps();
         let names: Vec<_> = steps.iter().map(|s| s.name).collect();
-        assert_eq!(names, ["fmt", "tidy", "papers", "clippy", "docs", "modules", "tests"]);
+        assert_eq!(names, ["fmt", "tidy", "papers", "deny", "clippy", "docs", "modules", "tests"]);
         let Work::Cargo(_, environment) = &steps[4].work else { panic!("docs are built by cargo") };
         assert_eq!(*environment, [("RUSTDOCFLAGS", "-D warnings")]);
     }
