@@ -70,10 +70,11 @@ pub fn extinct_bounds(grid: &Grid, transfer: &TransferFunction) -> DAabb {
 
 /// The first and the last lattice point of every row within all regions to which a transfer function gives enough extinction to be seen, by
 /// itself or with what is beside it; of a lattice of few rows the corners around what is seen of each; where it gives none, the corners of
-/// [`extinct_bounds`]. A voxel is seen by an optical depth of half a grey level of eight bits, or by a fiftieth of the densest.
-pub fn visible_ends(grid: &Grid, transfer: &TransferFunction, clips: &[Clip]) -> Vec<DVec3> {
+/// [`extinct_bounds`]. A voxel is seen by an optical depth of half a grey level of eight bits, or by a fiftieth of the densest. `scale` is the
+/// length of a unit of the lattice in that of extinctions.
+pub fn visible_ends(grid: &Grid, transfer: &TransferFunction, scale: f64, clips: &[Clip]) -> Vec<DVec3> {
     let most = transfer.points().iter().fold(0.0, |most: f32, p| most.max(p.extinction));
-    let least = (FAINT * most).min((FAINT_DEPTH / libm::cbrt(grid.cell_volume())) as f32);
+    let least = (FAINT * most).min((FAINT_DEPTH / (libm::cbrt(grid.cell_volume()) * scale)) as f32);
     let seen = |v: &f32| transfer.at(*v).extinction > least;
     let [nx, ny, _] = grid.dims;
     let row = |(row, values): (usize, &[f32])| {
@@ -133,10 +134,29 @@ mod tests {
         let transfer = TransferFunction::new(vec![dense]).expect("one point");
         let seen = |n: usize| {
             let grid = Grid { origin: DVec3::ZERO, axes: DMat3::IDENTITY, dims: [n; 3], values: vec![1.0; n * n * n] };
-            DAabb::of_points(visible_ends(&grid, &transfer, &[]))
+            DAabb::of_points(visible_ends(&grid, &transfer, 1.0, &[]))
         };
         let around = DAabb::new(DVec3::splat(-REACH), DVec3::splat(1.0 + REACH));
         assert_eq!(seen(2), around);
         assert_eq!(seen(80), DAabb::new(DVec3::ZERO, DVec3::splat(79.0)));
+    }
+
+    #[test]
+    fn a_faint_rim_is_seen_where_many_such_voxels_are_and_whatever_the_unit_is() {
+        // Values 0 to 63 along x; a voxel of value 1 has an optical depth of a fifth of a grey level, of value 3 of three fifths.
+        let dims = [64, 8, 8];
+        let values = (0..64 * 64).map(|i| (i % 64) as f32).collect();
+        let grid = Grid { origin: DVec3::ZERO, axes: DMat3::IDENTITY, dims, values };
+        for unit in [1.0, 1.3, 1e-3, 1e3] {
+            let point =
+                |value: f32, depth: f64| TransferPoint { value, color: [1.0; 3], extinction: (depth / unit) as f32 };
+            let transfer = TransferFunction::new(vec![point(0.0, 0.0), point(5.0, 1.0 / 255.0), point(63.0, 2.0)]);
+            let ends = visible_ends(&grid, &transfer.expect("three points"), unit, &[]);
+            assert_eq!(DAabb::of_points(ends).min.x, 3.0 - REACH, "{unit}");
+        }
+        // Where all is that faint, what is densest is seen.
+        let thin = [TransferPoint { value: 63.0, color: [1.0; 3], extinction: 1e-6 }];
+        let thin = TransferFunction::new(thin.to_vec()).expect("one point");
+        assert_eq!(DAabb::of_points(visible_ends(&grid, &thin, 1.0, &[])).max.x, 63.0 + REACH);
     }
 }

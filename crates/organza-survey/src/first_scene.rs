@@ -177,3 +177,26 @@ fn text_of(path: &Path) -> Result<String, Error> {
 pub(crate) fn quoted(text: &str) -> String {
     serde_json::Value::from(text).to_string().replace('\u{7f}', "\\u007f")
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use splat_core::Grid;
+    use splat_core::glam::DMat3;
+
+    #[test]
+    fn volumes_have_slabs_of_half_a_voxel_unless_their_steps_are_too_unlike() {
+        let file = |steps: DVec3| {
+            let grid =
+                Grid { origin: DVec3::ZERO, axes: DMat3::from_diagonal(steps), dims: [2; 3], values: vec![0.0; 8] };
+            DataFile { path: "a.nrrd".into(), data: FileData::Grid(grid.into()), stated_up: None, stands: None }
+        };
+        let text = |files: &[DataFile]| render_text(files, &Wish::default());
+        assert!(text(&[file(DVec3::new(0.7, 0.7, 2.5))]).contains("\nslab_width = 0.35 "));
+        assert!(text(&[file(DVec3::splat(4.0)), file(DVec3::ONE)]).contains("\nslab_width = 0.5 "));
+        for unlike in [vec![file(DVec3::new(0.1, 0.1, 2.5))], vec![file(DVec3::ONE), file(DVec3::splat(20.0))]] {
+            assert!(text(&unlike).contains("sheets") && !text(&unlike).contains("slab_width"));
+        }
+        assert_eq!(render_text(&[file(DVec3::ONE)], &Wish { ground: true, ..Wish::default() }), "");
+    }
+}

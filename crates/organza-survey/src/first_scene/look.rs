@@ -136,7 +136,8 @@ fn object(file: &DataFile, preset: Option<&Preset>, colors: Option<String>) -> O
             }
         }
         FileData::Grid(grid) => {
-            let look = volume_look(grid, preset, file.stated_up.is_some());
+            let matter = Matter::of(grid);
+            let look = volume_look(grid, matter.as_ref(), preset, file.stated_up.is_some());
             let material = match look {
                 Some(Look::Cloud) => DROPLETS,
                 Some(Look::Field(_)) => VALUES,
@@ -144,7 +145,12 @@ fn object(file: &DataFile, preset: Option<&Preset>, colors: Option<String>) -> O
             };
             let about =
                 format!("{} × {} × {} voxels; {}", grid.dims[0], grid.dims[1], grid.dims[2], sides(extent(grid)));
-            of("volume", about, Some((material.0, material.1, false)), volume_keys(grid, look.as_ref()))
+            of(
+                "volume",
+                about,
+                Some((material.0, material.1, false)),
+                volume_keys(grid, matter.as_ref(), look.as_ref()),
+            )
         }
         // Images are refused when they are read.
         FileData::Image(_) => of("environment", String::new(), None, String::new()),
@@ -153,11 +159,9 @@ fn object(file: &DataFile, preset: Option<&Preset>, colors: Option<String>) -> O
 
 /// How a volume looks: a computed field in the colours of a map, unless its look has a name. What scanners measure comes in whole numbers, in
 /// Hounsfield units, or in formats that state how the patient lies.
-fn volume_look(grid: &Grid, preset: Option<&Preset>, is_scan: bool) -> Option<Look> {
-    let is_field = || {
-        let has_fractions = grid.values.iter().any(|value| value.fract() != 0.0);
-        !is_scan && has_fractions && !Matter::of(grid).is_some_and(|matter| matter.has_units())
-    };
+fn volume_look(grid: &Grid, matter: Option<&Matter>, preset: Option<&Preset>, is_scan: bool) -> Option<Look> {
+    let is_field =
+        || !is_scan && !matter.is_some_and(Matter::has_units) && grid.values.iter().any(|value| value.fract() != 0.0);
     match preset.map(|preset| &preset.0) {
         None if is_field() => Some(Look::Field(ColorMap::VIRIDIS)),
         Some(Look::Map(map)) if is_field() => Some(Look::Field(*map)),
@@ -198,9 +202,8 @@ fn coarser_spacing(grid: &Grid) -> Option<f64> {
 }
 
 /// `unit_length` and `transfer`, and a coarser lattice for a large volume.
-fn volume_keys(grid: &Grid, look: Option<&Look>) -> String {
-    let matter = Matter::of(grid);
-    let transfer = Transfer::new(grid, matter.as_ref(), look);
+fn volume_keys(grid: &Grid, matter: Option<&Matter>, look: Option<&Look>) -> String {
+    let transfer = Transfer::new(grid, matter, look);
     let unit = significant(UNIT * extent(grid).diagonal(), 2);
     let unit_length: f64 = unit.parse().unwrap_or(UNIT * extent(grid).diagonal());
     let mut text = String::new();
@@ -211,14 +214,14 @@ fn volume_keys(grid: &Grid, look: Option<&Look>) -> String {
             significant(spacing, 3)
         );
     }
-    if let Some(air) = matter.as_ref().and_then(|m| m.air) {
+    if let Some(air) = matter.and_then(|m| m.air) {
         let _ = writeln!(text, "# Around it the values are about {}.", significant(air, 3));
     }
     let _ = writeln!(
         text,
         "unit_length = {unit}     # opacities below are over this length: a smaller one makes all denser\ntransfer = ["
     );
-    let step = matter.as_ref().map_or(1.0, |m| 1e-4 * (m.last - m.first).abs());
+    let step = matter.map_or(1.0, |m| 1e-4 * (m.last - m.first).abs());
     for point in &transfer.points {
         // With three digits nothing may become 1, which no medium has.
         let opacity = optics::opacity(transfer.extinction * point.weight * unit_length).min(0.999);
@@ -245,14 +248,17 @@ mod tests {
     fn computed_fields_have_the_colours_of_values_and_scans_those_of_tissue() {
         let field = ball(|r| libm::exp(-r / 12.0));
         let [bytes, units] = [ball(|r| (255.0 * libm::exp(-r / 12.0)).floor()), ball(|r| 900.0 - 60.1 * r)];
-        let named = |name: &str| Preset::named(name).ok();
-        assert_eq!(volume_look(&field, None, false), Some(Look::Field(ColorMap::VIRIDIS)));
-        assert!(matches!(volume_look(&field, named("turbo").as_ref(), false), Some(Look::Field(_))));
-        assert_eq!(volume_look(&field, named("cloud").as_ref(), false), Some(Look::Cloud));
-        assert_eq!(volume_look(&field, None, true), None);
-        assert_eq!(volume_look(&bytes, None, false), None);
-        assert!(matches!(volume_look(&bytes, named("turbo").as_ref(), false), Some(Look::Map(_))));
-        assert_eq!(volume_look(&units, None, false), None);
+        let look = |grid: &Grid, name: Option<&str>, is_scan| {
+            let preset = name.map(|name| Preset::named(name).expect("a look"));
+            volume_look(grid, Matter::of(grid).as_ref(), preset.as_ref(), is_scan)
+        };
+        assert_eq!(look(&field, None, false), Some(Look::Field(ColorMap::VIRIDIS)));
+        assert!(matches!(look(&field, Some("turbo"), false), Some(Look::Field(_))));
+        assert_eq!(look(&field, Some("cloud"), false), Some(Look::Cloud));
+        assert_eq!(look(&field, None, true), None);
+        assert_eq!(look(&bytes, None, false), None);
+        assert!(matches!(look(&bytes, Some("turbo"), false), Some(Look::Map(_))));
+        assert_eq!(look(&units, None, false), None);
     }
 
     #[test]

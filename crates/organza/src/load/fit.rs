@@ -47,7 +47,9 @@ impl<'i> Outline<'i> {
         let points = match input {
             Input::Mesh(..) => Vec::new(),
             Input::Points(_, points, _) | Input::Matter(_, points, _) => points.bulk().map_or_else(Vec::new, corners),
-            Input::Volume(grid, transfer, params) => visible_ends(grid, transfer, &params.clip),
+            Input::Volume(grid, transfer, params) => {
+                visible_ends(grid, transfer, params.splat.transform.scale, &params.clip)
+            }
             Input::Surface(_, bounds, ..) | Input::Density(_, bounds, _) => corners(*bounds),
             Input::Procedural(shape, ..) => {
                 shape.ellipsoids.iter().flat_map(|e| corners(DAabb::around(e.center, e.radii))).collect()

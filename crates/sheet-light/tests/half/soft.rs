@@ -24,6 +24,22 @@ pub(super) fn as_points(light: &Extended<'static>, samples: u32) -> Vec<LitBy<'s
     light.lit.light.points(samples).into_iter().map(|light| LitBy { slide: None, light, shadow: None }).collect()
 }
 
+/// Volumes under a light with an extent in one sweep, or under `points` of it; its image is fine, as the edges of blocks are as sharp as its pixels.
+pub(super) fn under<'a>(
+    volumes: &'a [Volume<'a>],
+    camera: &'a Camera,
+    (light, points): (&Extended<'a>, &'a [LitBy<'a>]),
+    one_sweep: bool,
+) -> (HalfInput<'a>, HalfParams) {
+    let input = if one_sweep { soft(volumes, camera, vec![*light]) } else { input(volumes, camera, points) };
+    (input, HalfParams { light_pixels: 6.0, ..exact(None) })
+}
+
+/// What is made with that many threads.
+pub(super) fn on_threads<T: Send>(threads: usize, make: impl FnOnce() -> T + Send) -> T {
+    rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap().install(make)
+}
+
 /// A constant block between two corners.
 pub(super) fn block(from: [f64; 3], to: [f64; 3], step: f64) -> Grid {
     let (from, to) = (DVec3::from_array(from), DVec3::from_array(to));

@@ -1,8 +1,8 @@
 //! Soft shadows of opaque polygons, and on them: penumbras by similar triangles, the same light as many points.
 
-use super::common::{exact, input, ray, scattering};
+use super::common::{ray, scattering};
 use super::polygons::{polygons, wall, white};
-use super::soft::{PIXEL, above, as_points, block, edge, extended, fine, soft};
+use super::soft::{PIXEL, above, as_points, block, edge, extended, fine, on_threads, soft, under};
 use crate::common::{BEAUTY, constant, cubic, grid, parallel, perspective, volume};
 use sheet_light::half::{Drawn, Extended, HalfInput, HalfParams, Polygons, fold};
 use splat_core::glam::DVec3;
@@ -139,14 +139,8 @@ fn mixed(camera: &Camera, light: &Extended<'static>, one_sweep: bool, threads: u
     ];
     let all = [polygons(&meshes[0], &paper), polygons(&meshes[1], &paper)];
     let points = as_points(light, 16);
-    let input = match one_sweep {
-        true => soft(&volumes, camera, vec![*light]),
-        false => input(&volumes, camera, &points),
-    };
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-    // The block's own edges are as sharp as pixels of the light buffer.
-    let params = HalfParams { light_pixels: 6.0, ..exact(None) };
-    pool.install(|| draw(&HalfInput { polygons: &all, ..input }, &params))
+    let (input, params) = under(&volumes, camera, (light, &points), one_sweep);
+    on_threads(threads, || draw(&HalfInput { polygons: &all, ..input }, &params))
 }
 
 #[test]

@@ -1,9 +1,9 @@
 //! Soft shadows of translucent surfaces and of media that are classified already, and on them: the same light as many points, penumbras by similar
 //! triangles, nothing between what hides half of a light and what hides the other.
 
-use super::common::{exact, input, ray, scattering};
+use super::common::{ray, scattering};
 use super::polygons::{polygons, wall, white};
-use super::soft::{PIXEL, above, as_points, block, edge, extended, fine, soft};
+use super::soft::{PIXEL, above, as_points, block, edge, extended, fine, on_threads, soft, under};
 use super::splats::{Shown, lambert, plane, with};
 use crate::common::{BEAUTY, constant, cubic, grid, parallel, perspective, volume};
 use sheet_light::half::{Drawn, Extended, HalfInput, HalfParams, fold};
@@ -33,14 +33,8 @@ fn mixed(camera: &Camera, light: &Extended<'static>, one_sweep: bool, threads: u
     let shown = Shown::new(cloud, camera, vec![lambert(), material], 0.2);
     let floor = wall([0.0, -1.8, 0.0], [3.0, 0.0, 0.0], [0.0, 0.0, -3.0]);
     let points = as_points(light, 16);
-    let input = match one_sweep {
-        true => soft(&volumes, camera, vec![*light]),
-        false => input(&volumes, camera, &points),
-    };
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-    // The block's own edges are as sharp as pixels of the light buffer.
-    let params = HalfParams { light_pixels: 6.0, ..exact(None) };
-    pool.install(|| draw(&HalfInput { polygons: &[polygons(&floor, &paper)], ..with(&shown, input) }, &params))
+    let (input, params) = under(&volumes, camera, (light, &points), one_sweep);
+    on_threads(threads, || draw(&HalfInput { polygons: &[polygons(&floor, &paper)], ..with(&shown, input) }, &params))
 }
 
 #[test]
