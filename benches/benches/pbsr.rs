@@ -167,7 +167,7 @@ fn sampling(c: &mut Criterion) {
         (
             "volume, Metropolis",
             1,
-            Box::new(MetropolisSampler::new(&grid, &transfer, &volume, &MetropolisParams::default()).expect(why)),
+            Box::new(MetropolisSampler::new(&grid, &transfer, &volume, &MetropolisParams::default(), None).expect(why)),
         ),
         ("torus, lines", 2, lines(&torus, 32, &by_lines)),
         ("cosine wave, lines", 2, lines(&wave, 48, &by_lines)),

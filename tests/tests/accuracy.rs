@@ -445,18 +445,18 @@ fn what_a_report_says_to_write_gives_the_scene_that_it_drew() {
 fn the_samplers_of_implicit_surfaces_are_knobs_of_particles() {
     let facts = Facts { slice_thickness: Some(0.1), cells: None };
     let names = |sweep: &Sweep| sweep.knobs.iter().map(|k| k.name).collect::<Vec<_>>();
-    // Media alone have none.
+    // Media alone have none, but one of their own.
     let sweep = particles(&scene(), &facts, &OPTIONS).unwrap();
-    assert_eq!(names(&sweep), ["repeat level"]);
+    assert_eq!(names(&sweep), ["repeat level", "volume sampler"]);
     assert!(sweep.skipped.iter().any(|s| s.knob == "surface sampler" && s.reason.contains("implicit")));
 
     let ball = "implicit = { expression = \"x^2 + y^2 + z^2 - 0.25\", box = [[-1, -1, -1], [1, 1, 1]], spacing = 0.1 }";
     let text = format!("{SCENE}[[object]]\nname = \"ball\"\n{ball}\nopacity = 0.5\n");
     let with_ball = scene::parse("s.toml".as_ref(), text.as_bytes(), &Default::default()).unwrap();
     let quick = particles(&with_ball, &facts, &Options { quick: true, ..OPTIONS }).unwrap();
-    assert_eq!(names(&quick), ["repeat level", "surface sampler"]);
+    assert_eq!(names(&quick), ["repeat level", "surface sampler", "volume sampler"]);
     let sweep = particles(&with_ball, &facts, &Options { quick: false, ..OPTIONS }).unwrap();
-    assert_eq!(names(&sweep), ["repeat level", "surface sampler", "Brownian step"]);
+    assert_eq!(names(&sweep), ["repeat level", "surface sampler", "Brownian step", "volume sampler"]);
     let turned = |knob: &Knob| -> Vec<scene::SurfaceSampler> {
         knob.steps.iter().map(|s| sweep.turned(knob, s).scene.render.particles.surface_sampler).collect()
     };

@@ -76,6 +76,22 @@ fn the_splats_of_a_scene_in_a_file_are_drawn_to_the_same_bits() {
         .collect();
     assert_eq!((named[0], named[4].0), (("scan", 300), "grains"));
     assert!(named.iter().all(|(_, n)| *n > 200) && document["splats"] == named.iter().map(|(_, n)| n).sum::<u64>());
+    place.expect(0, &["convert", "s.toml", "-o", "packed.ply", "--packed"], "");
+    let ratio = fs::metadata(place.path("packed.ply")).unwrap().len() as f64 / document["bytes"].as_f64().unwrap();
+    assert!(ratio < 0.5, "{ratio}");
+    place.write(
+        "packed.toml",
+        fs::read_to_string(place.path("splats.toml")).unwrap().replace("splats.ply", "packed.ply"),
+    );
+    let drawn = |scene: &str, image: &str| {
+        place.expect(0, &["render", scene, "-o", image], "");
+        let picture = picture_of(&place.path(image));
+        ["R", "G", "B"].map(|c| picture.channel(c)).concat()
+    };
+    let (given, packed) = (drawn("s.toml", "given.exr"), drawn("packed.toml", "packed.exr"));
+    let square = given.iter().zip(&packed).map(|(a, b)| (a - b).powi(2)).sum::<f64>() / given.len() as f64;
+    println!("{ratio:.3} of the bytes, {:.5} of radiance", square.sqrt());
+    assert!(square.sqrt() < 4e-3 && given != packed, "{square}");
     for technique in ["points", "reference"] {
         for (scene, image) in [("s.toml", "a.exr"), ("splats.toml", "b.exr")] {
             place.expect(0, &["render", scene, "-o", image, "--force", "--technique", technique], "");

@@ -3,6 +3,7 @@
 //! The keys are those of the JSON Schema that `organza schema` prints; docs/scene.md lists the same. A key that is in
 //! neither table of `every_key/` fails the test, so a new one cannot be silently ignored.
 
+mod fields;
 mod footprints;
 mod lights;
 mod scenes;

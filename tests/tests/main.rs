@@ -16,6 +16,7 @@ mod every_key;
 #[cfg(all(target_os = "linux", feature = "deep"))]
 mod every_scene;
 mod exact_particles;
+mod extract;
 mod eye_inside;
 mod first_scene;
 mod footprints;
@@ -43,6 +44,7 @@ mod progress;
 mod reading;
 mod sheets;
 mod slanted_slabs;
+mod solids;
 mod start;
 mod surfel_layers;
 mod surfels;

@@ -163,21 +163,48 @@ fn data() -> tempfile::TempDir {
     folder
 }
 
-#[test]
-fn a_trilinear_isosurface_is_the_same_by_lines_along_its_lattice_and_by_random_ones() {
-    let folder = data();
-    let object = "material = 'a'\nisosurface = { volume = 'hill.nrrd', level = 0.4 }\nspacing = 0.02\n";
-    let picture = |by: &str| {
-        let text = own(object, "") + &format!("[render.particles]\nrepeat_level = 144\nsurface_sampler = '{by}'\n");
-        let picture = draw_in(folder.path(), &text, &["--technique", "particles", "--layers", "std_error"]);
-        (luminance(&picture), picture.channel("std_error.A"))
-    };
-    let ((a, of_a), (b, of_b)) = (picture("auto"), picture("lines"));
+/// Luminance and its standard error, of so many sets by a sampler.
+fn sampled(folder: &std::path::Path, object: &str, sets: u32, by: &str) -> [Vec<f64>; 2] {
+    let text = own(object, "") + &format!("[render.particles]\nrepeat_level = {sets}\n{by}\n");
+    let picture = draw_in(folder, &text, &["--technique", "particles", "--layers", "std_error"]);
+    [luminance(&picture), picture.channel("std_error.A")]
+}
+
+/// Pixels in which both have noise, the mean of the squares of their differences in standard errors, and the mean difference.
+fn apart([a, of_a]: &[Vec<f64>; 2], [b, of_b]: &[Vec<f64>; 2]) -> [f64; 3] {
     let noisy: Vec<usize> = (0..a.len()).filter(|&k| of_a[k] > 0.0 && of_b[k] > 0.0).collect();
     let n = noisy.len() as f64;
     let square = noisy.iter().map(|&k| (a[k] - b[k]).powi(2) / (of_a[k].powi(2) + of_b[k].powi(2))).sum::<f64>() / n;
     let mean = noisy.iter().map(|&k| a[k] - b[k]).sum::<f64>() / n;
     println!("{n} pixels, mean z² {square:.3}, mean difference {mean:.6}");
+    [n, square, mean]
+}
+
+#[test]
+fn a_volume_is_the_same_cell_by_cell_and_by_metropolis_chains_cut_or_whole() {
+    let folder = data();
+    let object = "material = 'c'\nvolume = 'hill.nrrd'\ntransfer = [{ value = 0, color = [1, 0.2, 0.1], extinction = 0 }, \
+                  { value = 1, color = [0.2, 0.9, 0.3], extinction = 4 }]\n";
+    let clip = "clip = [{ normal = [0, 1, 1], point = [0, 0, 0.1] }]\n";
+    for (object, more) in [(object.to_owned(), true), (format!("{object}{clip}"), false)] {
+        let by = |by: &str| sampled(folder.path(), &object, 48, &format!("volume_sampler = {by}"));
+        let (cells, chains) = (by("'cells'"), by("'metropolis'"));
+        let [n, square, mean] = apart(&cells, &chains);
+        assert!(n > 300.0 && (0.8..1.2).contains(&square) && mean.abs() < 2e-3, "{n} {square} {mean}");
+        // One step from particle to particle takes places twice, and starts of chains are more of it: that is seen.
+        if more {
+            let [_, square, mean] = apart(&chains, &by("'metropolis'\nmetropolis_stride = 1"));
+            assert!(square > 2.0 && mean.abs() > 4e-3, "{square} {mean}");
+        }
+    }
+}
+
+#[test]
+fn a_trilinear_isosurface_is_the_same_by_lines_along_its_lattice_and_by_random_ones() {
+    let folder = data();
+    let object = "material = 'a'\nisosurface = { volume = 'hill.nrrd', level = 0.4 }\nspacing = 0.02\n";
+    let by = |by: &str| sampled(folder.path(), object, 144, &format!("surface_sampler = '{by}'"));
+    let [n, square, mean] = apart(&by("auto"), &by("lines"));
     assert!(n > 300.0 && (0.8..1.2).contains(&square) && mean.abs() < 2e-3, "{n} {square} {mean}");
     // What is clipped has an end that no lattice knows.
     let clipped = own(&format!("{object}clip = [{{ normal = [0, 1, 1], point = [0, 0, 0.1] }}]\n"), "");

@@ -17,7 +17,7 @@ mod stencil;
 use jet::{Slope, control_range, hessian, slope};
 use ranges::{Ranges, widen};
 use splat_core::glam::{BVec3, DMat3, DVec3};
-use splat_core::{DAabb, Error, Grid, ScalarField};
+use splat_core::{Clip, DAabb, Error, Grid, ScalarField};
 use std::sync::Arc;
 use stencil::{Control, Stencil};
 
@@ -133,6 +133,17 @@ impl GridField {
         let low = far.x_axis.min(zero) + far.y_axis.min(zero) + far.z_axis.min(zero);
         let high = far.x_axis.max(zero) + far.y_axis.max(zero) + far.z_axis.max(zero);
         DAabb::new(origin + low, origin + high)
+    }
+
+    /// The six sides of the lattice, between which the surface lies.
+    pub fn walls(&self) -> Vec<Clip> {
+        let (rows, origin) = (self.lattice_from_object.transpose(), self.grid().origin);
+        let sides = |(row, last): (DVec3, f64)| {
+            let low = row.dot(origin);
+            let high = Clip::HalfSpace { normal: row, offset: low + last };
+            [Clip::HalfSpace { normal: -row, offset: -low }, high]
+        };
+        [rows.x_axis, rows.y_axis, rows.z_axis].into_iter().zip(self.last.to_array()).flat_map(sides).collect()
     }
 
     #[inline(always)]

@@ -91,6 +91,7 @@ mod shapes;
 #[cfg(feature = "surfels")]
 mod shown_points;
 mod sobel;
+mod solids;
 mod srgb;
 mod subdivide;
 mod surface_nets;
@@ -155,6 +156,7 @@ pub use shapes::{HomogeneousMedium, MediumBody, Rectangle, medium, medium_to_gri
 #[cfg(feature = "surfels")]
 pub use shown_points::{PointsShown, ShownPoints, shown_points};
 pub use sobel::{sobel_gradient, sobel_gradient_into};
+pub use solids::{Combination, Solid};
 pub use splat_core::Clip;
 #[cfg(feature = "surfels")]
 pub use surfels::{SurfelParams, SurfelReport, raw_to_surfels};
@@ -162,4 +164,4 @@ pub use surfels::{SurfelParams, SurfelReport, raw_to_surfels};
 pub use thin::thinned;
 pub use vertex_normals::vertex_normals;
 pub use volume_points::{VolumeParams, VolumeReport, volume_to_points};
-pub use write_splats::splats_to_ply;
+pub use write_splats::{packed_splats_to_ply, splats_to_ply};

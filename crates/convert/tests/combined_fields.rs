@@ -1,10 +1,11 @@
 //! Unions, intersections, differences, complements and clipped surfaces.
 
 use convert::{
-    Clip, ClippedField, CombinedField, Density, MeshParams, SharedField, SplatParams, field_to_mesh, surface_to_points,
+    Clip, ClippedField, Combination, CombinedField, Density, ExpressionField, GridField, Inside, Interpolation,
+    MeshParams, SharedField, Solid, SplatParams, field_to_mesh, surface_to_points,
 };
 use splat_core::glam::{DMat3, DVec3};
-use splat_core::{DAabb, ScalarField, rng};
+use splat_core::{DAabb, Grid, ScalarField, rng};
 use std::sync::Arc;
 
 /// Distance from a ball's surface; its domain is where x < 2, its values end at |p| = 50.
@@ -185,4 +186,152 @@ fn meshes_and_splats_end_at_the_border_of_the_domain() {
     assert_eq!((same.position, same.triangles), (uncut.position, uncut.triangles));
     let none = ClippedField::new(a, vec![Clip::Box(DAabb::around(DVec3::ZERO, DVec3::splat(0.1)))]).unwrap();
     assert!(field_to_mesh(&none, bounds, 0.05, &SplatParams::default(), None).unwrap().triangles.is_empty());
+}
+
+/// Distances from a ball of radius `r` about the origin, negative inside, on a lattice of steps of 0.05 from −1.5 to `top` in z.
+fn distances(r: f64, top: usize) -> GridField {
+    let at = |i: usize| 0.05 * i as f64 - 1.5;
+    let value = |i: usize| DVec3::new(at(i % 61), at(i / 61 % 61), at(i / 3721)).length() - r;
+    let values = (0..3721 * top).map(|i| value(i) as f32).collect();
+    let grid = Grid {
+        origin: DVec3::splat(-1.5),
+        axes: DMat3::from_diagonal(DVec3::splat(0.05)),
+        dims: [61, 61, top],
+        values,
+    };
+    GridField::new(Arc::new(grid), Interpolation::CatmullRom, 0.0, Inside::Below).unwrap()
+}
+
+fn of_grid(field: GridField) -> Solid {
+    let (walls, bounds) = (field.walls(), field.bounds());
+    Solid { field: Arc::new(field), walls, bounds, step: 0.03 }
+}
+
+fn of_formula(text: &str, bounds: DAabb) -> Solid {
+    Solid { field: Arc::new(ExpressionField::parse(text).unwrap()), walls: Vec::new(), bounds, step: 0.03 }.closed()
+}
+
+/// Area by splats, and the volume by the mesh.
+fn area_and_volume(solid: &Solid) -> [f64; 2] {
+    let params = MeshParams { opacity: 0.5, density: Density::Spacing(solid.step), ..MeshParams::default() };
+    let (cloud, _) = surface_to_points(solid.field.as_ref(), solid.bounds, &params, None).unwrap();
+    let area = cloud.cross_section.iter().map(|k| f64::from(*k)).sum::<f64>() / std::f64::consts::LN_2;
+    let mesh = field_to_mesh(solid.field.as_ref(), solid.bounds, solid.step, &SplatParams::default(), None).unwrap();
+    let of = |t: &[u32; 3]| {
+        let [a, b, c] = t.map(|v| mesh.position[v as usize].as_dvec3());
+        a.dot(b.cross(c)) / 6.0
+    };
+    [area, mesh.triangles.iter().map(of).sum()]
+}
+
+/// Area that is lost at most where an edge of so much length is cut off within a cell of the lattice, √2 steps wide.
+fn cut_off(edge: f64) -> f64 {
+    0.03 * std::f64::consts::SQRT_2 * edge
+}
+
+#[test]
+fn solids_of_an_isosurface_and_a_formula_have_their_closed_forms() {
+    let ball = || of_grid(distances(1.0, 61));
+    let small = || {
+        of_formula(
+            "sqrt((x - 0.8)^2 + y^2 + z^2) - 0.7",
+            DAabb::new(DVec3::new(0.0, -0.8, -0.8), DVec3::new(1.6, 0.8, 0.8)),
+        )
+    };
+    // Caps of the two balls beyond the plane x = c in which they meet: volumes, then areas.
+    let pi = std::f64::consts::PI;
+    let c = (1.0 + 0.64 - 0.49) / 1.6;
+    let (of_ball, of_small) = (1.0 - c, 0.7 - (0.8 - c));
+    let cap = |r: f64, h: f64| [2.0 * pi * r * h, pi * h * h * (3.0 * r - h) / 3.0];
+    let whole = |r: f64| [4.0 * pi * r * r, 4.0 / 3.0 * pi * r * r * r];
+    let [a, b, cap_a, cap_b] = [whole(1.0), whole(0.7), cap(1.0, of_ball), cap(0.7, of_small)];
+    for (combination, exact) in [
+        (Combination::Union, [0, 1].map(|k| a[k] - cap_a[k] + b[k] - cap_b[k])),
+        (Combination::Intersection, [0, 1].map(|k| cap_a[k] + cap_b[k])),
+        (Combination::Difference, [a[0] - cap_a[0] + cap_b[0], a[1] - cap_a[1] - cap_b[1]]),
+    ] {
+        let solid = Solid::combined(combination, vec![ball(), small()]).unwrap();
+        let found = area_and_volume(&solid);
+        let most = [cut_off(std::f64::consts::TAU * (1.0 - c * c).sqrt()), 6e-3 * exact[1]];
+        for k in 0..2 {
+            assert!((found[k] - exact[k]).abs() < most[k], "{combination:?}: {found:?}, {exact:?}");
+        }
+        // The edge is where both have their zeros, by the field itself.
+        let edge = DVec3::new(c, (1.0 - c * c).sqrt(), 0.0);
+        assert!(solid.field.value(edge).abs() < 1e-4);
+        let (before, after) =
+            (solid.field.gradient(edge - DVec3::X * 0.01), solid.field.gradient(edge + DVec3::X * 0.01));
+        assert!(before.dot(after) < 0.8 * before.length() * after.length(), "{combination:?}: the edge is round");
+    }
+}
+
+#[test]
+fn a_part_that_reaches_its_walls_ends_flat_there() {
+    let far = || {
+        of_formula(
+            "sqrt((x - 1)^2 + (y - 1)^2 + (z + 1)^2) - 0.05",
+            DAabb::around(DVec3::new(1.0, 1.0, -1.0), DVec3::splat(0.1)),
+        )
+    };
+    let pi = std::f64::consts::PI;
+    let ball = [4.0 * pi * 0.05 * 0.05, 4.0 / 3.0 * pi * 0.05f64.powi(3)];
+    // The lattice ends at z = 0, and so does the ball that it holds; the expression is all of a box with a corner that is cut off.
+    let dome = [2.0 * pi + pi, 2.0 / 3.0 * pi];
+    let cut = [6.0 - 3.0 * 0.5 * 0.09 + 3f64.sqrt() / 2.0 * 0.09, 1.0 - 0.027 / 6.0];
+    let block = || of_formula("-x - y - z - 1.2", DAabb::around(DVec3::ZERO, DVec3::splat(0.5)));
+    for (solid, exact, edge) in [(of_grid(distances(1.0, 31)), dome, 2.0 * pi), (block(), cut, 12.0)] {
+        let union = Solid::combined(Combination::Union, vec![solid, far()]).unwrap();
+        let found = area_and_volume(&union);
+        let most = [cut_off(edge), 1.5e-2 * exact[1]];
+        for k in 0..2 {
+            assert!((found[k] - exact[k] - ball[k]).abs() < most[k], "{found:?}, {exact:?} + {ball:?}");
+        }
+    }
+    // A root has no value beyond the box, where the walls alone count; without one inside that is told.
+    let root = Solid::combined(
+        Combination::Union,
+        vec![of_formula("sqrt(x) - 0.5", DAabb::new(DVec3::ZERO, DVec3::ONE)), far()],
+    );
+    let root = root.unwrap();
+    assert!(root.field.value(DVec3::new(-0.5, 0.5, 0.5)) > 0.0 && root.field.value(DVec3::splat(0.1)) < 0.0);
+    let none = of_formula("sqrt(x - 0.9) - 0.5", DAabb::new(DVec3::ZERO, DVec3::ONE));
+    assert!(Solid::combined(Combination::Union, vec![none, far()]).unwrap().field.value(DVec3::splat(0.5)).is_nan());
+    for i in 0..200 {
+        let (center, radius) = (place(i), 0.4 * rng::unit(34, 0, i, 0));
+        let union = Solid::combined(Combination::Difference, vec![block(), of_grid(distances(0.4, 31))]).unwrap();
+        let Some((low, high)) = union.field.bound(center, radius) else { continue };
+        for j in 0..20 {
+            let d = DVec3::from_array([0, 1, 2].map(|k| 2.0 * rng::unit(35, i, j, k) - 1.0)).clamp_length_max(1.0);
+            let v = union.field.value(center + d * radius);
+            assert!(low - 1e-9 <= v && v <= high + 1e-9, "{v} outside {low}..{high}");
+        }
+    }
+}
+
+/// Values of a scan rise by hundreds within a step, where a wall is some steps away.
+#[test]
+fn parts_of_unlike_scales_keep_their_surfaces() {
+    let steep = of_formula("1000*(sqrt(x^2 + y^2 + z^2) - 1)", DAabb::around(DVec3::ZERO, DVec3::splat(1.5)));
+    let notch = of_formula("x - 2", DAabb::new(DVec3::ZERO, DVec3::ONE));
+    let solid = Solid::combined(Combination::Difference, vec![steep, notch]).unwrap();
+    let mesh = field_to_mesh(solid.field.as_ref(), solid.bounds, 0.05, &SplatParams::default(), None).unwrap();
+    let mut round = 0;
+    for (p, normal) in mesh.position.iter().zip(&mesh.normal) {
+        let p = p.as_dvec3() + mesh.origin;
+        // What is left of the ball, but for a cell beside the notch.
+        if p.min_element() < -0.06 {
+            assert!((p.length() - 1.0).abs() < 1e-6 && normal.as_dvec3().dot(p) > 0.9999, "{p} {normal}");
+            round += 1;
+        }
+    }
+    assert!(round > 3000, "{round}");
+}
+
+#[test]
+fn solids_that_make_none_are_refused() {
+    let small = |x: f64| of_formula("x^2 + y^2 + z^2 - 1", DAabb::around(DVec3::X * x, DVec3::ONE));
+    let alone = Solid::combined(Combination::Difference, vec![small(0.0)]).unwrap_err().to_string();
+    assert!(alone.contains("at least two"), "{alone}");
+    let apart = Solid::combined(Combination::Intersection, vec![small(0.0), small(3.0)]).unwrap_err().to_string();
+    assert!(apart.contains("a place in common"), "{apart}");
 }

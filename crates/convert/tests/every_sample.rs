@@ -56,7 +56,8 @@ pub(crate) fn samples() -> Vec<(&'static str, Vec<u8>)> {
         ("a.png", images::png(image::ExtendedColorType::Rgb8, &images::png_bytes(3))),
         ("trained.ply", trained_ply(&[trained(0, 1)], 1, "binary_little_endian")),
         ("words.ply", packed_ply(&[trained(0, 1), trained(1, 1)], 1)),
-        ("splats.ply", splats()),
+        ("splats.ply", splats(false)),
+        ("packed_splats.ply", splats(true)),
         ("a.splat", splat(&[trained(0, 0)])),
         ("old.spz", spz(&[trained(0, 1), trained(1, 1)], 1, 2)),
         ("new.spz", gzip(&spz(&[trained(0, 1), trained(1, 1)], 1, 3))),
@@ -64,11 +65,15 @@ pub(crate) fn samples() -> Vec<(&'static str, Vec<u8>)> {
 }
 
 /// Two splats as files have them.
-fn splats() -> Vec<u8> {
+fn splats(packed: bool) -> Vec<u8> {
     let mut cloud = Cloud::new(DVec3::new(1e6, 0.0, 0.5));
     cloud.push(&Splat { value: 2.0, ..Splat::default() });
     cloud.push(&Splat { kind: SplatKind::Surface, normal: Vec3::Y, tangent: Vec3::X, ..Splat::default() });
-    convert::splats_to_ply(&cloud, &["it".to_owned()], &[], &FootprintStack::default())
+    let (names, footprints) = (["it".to_owned()], FootprintStack::default());
+    if packed {
+        return convert::packed_splats_to_ply(&cloud, &names, &[], &footprints).unwrap();
+    }
+    convert::splats_to_ply(&cloud, &names, &[], &footprints)
 }
 
 /// Files that hold an image, and its bytes.

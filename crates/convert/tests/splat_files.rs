@@ -3,11 +3,11 @@
 
 use convert::read::{Loaded, ReadParams, bytes};
 use convert::{
-    DiscShape, Kept, MatterParams, PointsShown, RawPoints, SplatParams, SurfelParams, Within, cost, raw_to_matter,
-    raw_to_surfels, shown_points, splats_to_ply, thinned,
+    DiscShape, Kept, MatterParams, PointsShown, RawPoints, SplatParams, SurfelParams, Within, cost,
+    packed_splats_to_ply, raw_to_matter, raw_to_surfels, shown_points, splats_to_ply, thinned,
 };
 use splat_core::glam::{DQuat, DVec3, Vec3};
-use splat_core::{Cloud, Footprint, FootprintStack, Similarity, Splat, SplatKind, rng};
+use splat_core::{Cloud, Footprint, FootprintStack, PackedCloud, Similarity, Splat, SplatKind, rng};
 
 /// Splats of all kinds with every attribute, far from zero.
 fn cloud(count: u64) -> Cloud {
@@ -80,6 +80,64 @@ fn what_is_written_is_read_again_bit_by_bit() {
         "{head}"
     );
     assert!(read(&file(&Cloud::new(DVec3::ZERO))).unwrap().is_empty());
+}
+
+fn packed(cloud: &Cloud) -> Vec<u8> {
+    packed_splats_to_ply(cloud, &["it".into()], &[], &FootprintStack::default()).unwrap()
+}
+
+#[test]
+fn packed_splats_are_read_as_they_unpack() {
+    let all = cloud(2000);
+    let unpacked = PackedCloud::new(&all).unwrap().unpack();
+    let points = read(&packed(&all)).unwrap();
+    assert_eq!(made(&points, &SurfelParams::default()), unpacked);
+    // Of what scans and meshes become, in their order.
+    let mut discs = Cloud::new(DVec3::ZERO);
+    for i in (0..2000).map(|i| all.get(i)) {
+        let none = Vec3::ZERO;
+        discs.push(&Splat {
+            shading_normal: none,
+            tangent: none,
+            shadow_coefficient: 1.0,
+            value: 0.0,
+            crossing_depth: 0.0,
+            ..i
+        });
+    }
+    discs.canonicalize();
+    let (small, whole) = (packed(&discs).len(), file(&discs).len());
+    assert!(small < 17 * 2000 && whole > 48 * 2000, "{small} {whole}");
+    assert!(read(&packed(&Cloud::new(DVec3::ZERO))).unwrap().is_empty());
+}
+
+#[test]
+fn wrong_packed_files_are_refused_with_their_place() {
+    let whole = packed(&cloud(4));
+    let end = whole.windows(11).position(|w| w == b"end_header\n").unwrap() + 11;
+    let count = format!("element packed {}", whole.len() - end);
+    let less = format!("element packed {}", whole.len() - end - 1);
+    for (from, to, expected) in [
+        (count.as_str(), less.as_str(), "expected packed splats, found"),
+        ("property uchar byte", "property char byte", "expected one property 'uchar byte' of 'packed'"),
+        ("origin 637012.23987", "origin 637012.5", "expected packed splats about the origin that the header states"),
+        (
+            "element packed",
+            "element vertex 0\nproperty float x\nelement packed",
+            "expected an element 'vertex' or 'packed', found both",
+        ),
+    ] {
+        let error = read(&with(&whole, from, to)).unwrap_err();
+        assert!(error.starts_with("s.ply") && error.contains(expected), "{from} {to}: {error}");
+    }
+    // The lowest x of the block is no number.
+    let mut broken = whole.clone();
+    broken[end + 48..end + 52].copy_from_slice(&f32::NAN.to_le_bytes());
+    let error = read(&broken).unwrap_err();
+    assert!(error.contains("position of splat 0: "), "{error}");
+    let drop = ReadParams { drop_invalid: true, ..ReadParams::default() };
+    let Ok((Loaded::Points(points), _)) = bytes("s.ply", &broken, &drop, None) else { panic!("refused") };
+    assert_eq!((points.len(), points.dropped), (0, 4));
 }
 
 /// Any program may write the same numbers as text.

@@ -41,6 +41,11 @@ pub(super) enum Command {
         after_help = "Examples:\n  organza convert scene.toml -o splats.ply\n  organza convert bunny.ply -o splats.ply\n  organza render splats.ply -o splats.png"
     )]
     Convert(ConvertArguments),
+    /// Writes the surface that a light sees first, from its shadow map, as points with normals, which `points` of a scene reads.
+    #[command(
+        after_help = "Examples:\n  organza extract scene.toml --absorbance 0.5 -o skin.ply\n  organza extract scene.toml --light 1 -o lit.ply"
+    )]
+    Extract(ExtractArguments),
     /// Says what a render would simulate, what not, and why.
     #[command(
         after_help = "Examples:\n  organza explain scene.toml\n  organza explain scene.toml --measure --json\n  organza explain bunny.ply"
@@ -75,6 +80,7 @@ impl Command {
             Self::Render(a) => a.scene.common.json,
             Self::Init(a) => a.common.json,
             Self::Convert(a) => a.scene.common.json,
+            Self::Extract(a) => a.scene.common.json,
             Self::Explain(a) => a.scene.common.json,
             Self::Accuracy(a) => a.scene.common.json,
             Self::Orders(a) => a.scene.common.json,
@@ -266,6 +272,27 @@ pub(super) struct InitArguments {
 pub(super) struct ConvertArguments {
     #[command(flatten)]
     pub(super) scene: SceneArguments,
+    /// Output, .ply
+    #[arg(short, long = "output", value_name = "FILE.ply")]
+    pub(super) output: PathBuf,
+    /// Replace an output that exists
+    #[arg(long)]
+    pub(super) force: bool,
+    /// Write some 16 bytes a splat in the place of 50, each number off by half a step of its block at most
+    #[arg(long)]
+    pub(super) packed: bool,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct ExtractArguments {
+    #[command(flatten)]
+    pub(super) scene: SceneArguments,
+    /// Which light of the scene looks, counted from 0; of one with an extent its middle
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub(super) light: usize,
+    /// Absorbance up to the surface, above 0, at most 10: 0.69 takes half of the light
+    #[arg(long, value_name = "A", default_value_t = 1.0)]
+    pub(super) absorbance: f32,
     /// Output, .ply
     #[arg(short, long = "output", value_name = "FILE.ply")]
     pub(super) output: PathBuf,

@@ -5,7 +5,7 @@ use super::bar::with_bar;
 use super::console;
 use super::given::given;
 use super::session::{parse_scene, path_text, processor_only, render_options};
-use ::convert::splats_to_ply;
+use ::convert::{packed_splats_to_ply, splats_to_ply};
 use organza::output::{Target, Targets};
 use organza::scene::{Scene, Technique};
 use organza::{Error, Loaded, printable, shown};
@@ -34,7 +34,12 @@ pub(super) fn run(arguments: &ConvertArguments) -> Result<(), Error> {
         // A power of two: no bit of a splat is lost.
         loaded.cloud.scale_world(2f64.powi(loaded.exponent));
         let materials: Vec<String> = scene.materials.iter().map(|material| material.name.clone()).collect();
-        let bytes = splats_to_ply(&loaded.cloud, &names(&loaded), &materials, &loaded.footprints);
+        let (cloud, names, footprints) = (&loaded.cloud, names(&loaded), &loaded.footprints);
+        let bytes = if arguments.packed {
+            packed_splats_to_ply(cloud, &names, &materials, footprints).map_err(|e| Error::Internal(e.to_string()))?
+        } else {
+            splats_to_ply(cloud, &names, &materials, footprints)
+        };
         target.write(&bytes)?;
         progress.finish();
         Ok((loaded, bytes.len() as u64))
@@ -55,7 +60,7 @@ pub(super) fn run(arguments: &ConvertArguments) -> Result<(), Error> {
 }
 
 /// Every object as splats, whatever draws it, with the values that their points have.
-fn as_splats(scene: &mut Scene) {
+pub(super) fn as_splats(scene: &mut Scene) {
     scene.render.technique = Technique::Points;
     for object in &mut scene.objects {
         object.technique = None;
@@ -127,7 +132,7 @@ fn said_of_unlit(loaded: &Loaded) -> Option<String> {
 }
 
 /// Splats are written as PLY: another name would be read as something else.
-fn check_name(path: &Path) -> Result<&Path, Error> {
+pub(super) fn check_name(path: &Path) -> Result<&Path, Error> {
     match path.extension() {
         Some(extension) if extension.eq_ignore_ascii_case("ply") => Ok(path),
         _ => Err(Error::usage(format!("{}: expected a name that ends in .ply", printable(path)), "")),
@@ -135,7 +140,7 @@ fn check_name(path: &Path) -> Result<&Path, Error> {
 }
 
 /// What is said of pictures says nothing of splats.
-fn refuse_of_pictures(scene: &SceneArguments) -> Result<(), Error> {
+pub(super) fn refuse_of_pictures(scene: &SceneArguments) -> Result<(), Error> {
     let all = [
         ("--technique", scene.technique.is_some()),
         ("--target-error", scene.target_error.is_some()),

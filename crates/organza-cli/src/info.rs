@@ -7,7 +7,7 @@ use super::given::is_scene;
 use super::session::path_text;
 use super::{console, memory};
 use organza::Error;
-use organza::scene::{self, LoadOptions, Scene, Source, UpAxis};
+use organza::scene::{self, Combination, LoadOptions, Scene, Source, UpAxis};
 use organza_survey::{Facts, Histogram, facts};
 use serde_json::{Value, json};
 use splat_core::LightShape;
@@ -66,6 +66,11 @@ fn source_name(source: &Source) -> &'static str {
         Source::Implicit(_) => "implicit",
         Source::Isosurface(_) => "isosurface",
         Source::LevelSet(_) => "level_set",
+        Source::Combined(source) => match source.combination {
+            Combination::Union => "union",
+            Combination::Intersection => "intersection",
+            Combination::Difference => "difference",
+        },
         Source::Slice(_) => "slice",
         Source::Density(_) => "density",
         Source::Cloud(_) => "cloud",
@@ -74,8 +79,10 @@ fn source_name(source: &Source) -> &'static str {
     }
 }
 
+/// The file that it reads, or all of them.
 fn source_path(source: &Source) -> Option<String> {
-    source.path().map(path_text)
+    let paths: Vec<String> = source.paths().into_iter().map(path_text).collect();
+    (!paths.is_empty()).then(|| paths.join(", "))
 }
 
 fn light_name(shape: &LightShape) -> &'static str {

@@ -1,7 +1,7 @@
 //! The command `organza`: arguments → library calls → text or JSON, with one exit code for each kind of error.
 //!
 //! ```text
-//! args ─► given (a scene, or one made of data files) ─► session (overrides, memory) ─► render convert explain accuracy orders ─► report ─► console
+//! args ─► given (a scene, or one made of data files) ─► session (overrides, memory) ─► render convert extract explain accuracy orders ─► report ─► console
 //!         init info devices passport
 //! ```
 #![forbid(unsafe_code)]
@@ -13,6 +13,7 @@ mod console;
 mod convert;
 mod devices;
 mod explain;
+mod extract;
 mod given;
 mod info;
 mod init;
@@ -64,6 +65,7 @@ fn run(command: Command) -> Result<u8, Error> {
         Command::Render(arguments) => return render::run(&arguments),
         Command::Init(arguments) => init::run(&arguments),
         Command::Convert(arguments) => convert::run(&arguments),
+        Command::Extract(arguments) => extract::run(&arguments),
         Command::Explain(arguments) => explain::run(&arguments),
         Command::Accuracy(arguments) => accuracy::run(&arguments),
         Command::Orders(arguments) => orders::run(&arguments),

@@ -2,7 +2,7 @@
 
 use super::check::At;
 use super::check_render::own_layers;
-use super::{RenderSettings, SceneMaterial, SceneObject, Technique};
+use super::{RenderSettings, SceneMaterial, SceneObject, Source, Technique, VolumeSampler};
 use crate::Error;
 use splat_core::Packing;
 
@@ -18,6 +18,7 @@ pub(super) fn check_drawn(
     check_one_technique(at, objects, render)?;
     check_lattices(at, objects, render)?;
     check_surfels(at, objects, render)?;
+    check_sampled(at, objects, render)?;
     check_bounds(at, objects, materials)?;
     check_scattered(at_layers, layers, objects, render)?;
     check_bent(at_layers, layers, objects, (materials, render))
@@ -57,6 +58,19 @@ fn check_surfels(at: &At<'_>, objects: &[SceneObject], render: &RenderSettings) 
         let hint = format!("set object.{name}.technique = \"sheets\", or \"points\"");
         Err(at.index(i).error(message, hint))
     })
+}
+
+/// Refuses a sampler of media for particles that are of none.
+fn check_sampled(at: &At<'_>, objects: &[SceneObject], render: &RenderSettings) -> Result<(), Error> {
+    let drawn =
+        || objects.iter().filter(|o| o.visible && o.technique.unwrap_or(render.technique) == Technique::Particles);
+    let is_volume = |o: &SceneObject| o.source.is_medium() && !matches!(o.source, Source::Matter(_));
+    if render.particles.volume_sampler == VolumeSampler::Auto || drawn().next().is_none() || drawn().any(is_volume) {
+        return Ok(());
+    }
+    let message =
+        "`volume_sampler`: the technique `particles` draws no volume, density, cloud or homogeneous medium here";
+    Err(At::of(at.document).key("render").key("particles").key("volume_sampler").error(message, "leave it out"))
 }
 
 /// Whether an object bends light: `surfels` draw it, and `auto` gives it to them.

@@ -1,12 +1,12 @@
 //! Checks of the surfaces of fields: isosurfaces, level sets, slices, and where they end.
 
 use super::check::{At, LARGEST};
-use super::check_source::check_box;
+use super::check_source::{check_box, check_implicit};
 use super::paths::Paths;
-use super::raw_source::{RawClip, RawInside, RawInterpolation, RawIsosurface, RawLevelSet, RawSlice};
-use super::{IsosurfaceSource, LevelSetSource, SliceSource};
+use super::raw_source::{RawClip, RawInside, RawInterpolation, RawIsosurface, RawLevelSet, RawPart, RawSlice};
+use super::{CombinedSource, IsosurfaceSource, LevelSetSource, SliceSource, Source};
 use crate::Error;
-use convert::{Clip, Inside, Interpolation, MpuParams};
+use convert::{Clip, Combination, Inside, Interpolation, MpuParams};
 use splat_core::TransferFunction;
 
 pub(super) fn check_isosurface(at: &At<'_>, raw: &RawIsosurface, paths: &Paths) -> Result<IsosurfaceSource, Error> {
@@ -32,6 +32,47 @@ pub(super) fn check_level_set(at: &At<'_>, raw: &RawLevelSet, paths: &Paths) -> 
         return Err(at.key("tolerance").error(message, "it is a share of the diagonal of the points' box"));
     }
     Ok(LevelSetSource { path: paths.resolve(&at.key("points"), &raw.points)?, tolerance })
+}
+
+/// Solids that become one; `at` is the place of the list.
+pub(super) fn check_combined(
+    at: &At<'_>,
+    combination: Combination,
+    parts: &[RawPart],
+    paths: &Paths,
+) -> Result<CombinedSource, Error> {
+    if parts.len() < 2 {
+        let message = format!("expected at least two solids, found {}", parts.len());
+        return Err(
+            at.error(message, "one solid alone is a source of its own: `implicit`, `isosurface` or `level_set`")
+        );
+    }
+    let parts = parts.iter().enumerate().map(|(i, part)| check_part(&at.index(i), part, paths));
+    Ok(CombinedSource { combination, parts: parts.collect::<Result<_, _>>()? })
+}
+
+fn check_part(at: &At<'_>, raw: &RawPart, paths: &Paths) -> Result<Source, Error> {
+    let all = |key: &'static str, combination, parts: &Option<Vec<RawPart>>| {
+        let parts = parts.as_ref()?;
+        Some(check_combined(&at.key(key), combination, parts, paths).map(Source::Combined))
+    };
+    let found = [
+        raw.implicit.as_ref().map(|i| check_implicit(&at.key("implicit"), i).map(Source::Implicit)),
+        raw.isosurface.as_ref().map(|i| check_isosurface(&at.key("isosurface"), i, paths).map(Source::Isosurface)),
+        raw.level_set.as_ref().map(|l| check_level_set(&at.key("level_set"), l, paths).map(Source::LevelSet)),
+        all("union", Combination::Union, &raw.union),
+        all("intersection", Combination::Intersection, &raw.intersection),
+        all("difference", Combination::Difference, &raw.difference),
+    ];
+    let mut found = found.into_iter().flatten();
+    match (found.next(), found.next()) {
+        (Some(one), None) => one,
+        (none, _) => {
+            let count = if none.is_none() { "none" } else { "several" };
+            let hint = "solids are implicit, isosurface, level_set, union, intersection and difference";
+            Err(at.error(format!("expected exactly one solid in each part, found {count}"), hint))
+        }
+    }
 }
 
 pub(super) fn check_slice(

@@ -41,7 +41,7 @@ pub(super) fn check_object(
     let up = match raw.transform.up {
         // An invisible object is not even read.
         RawUp::Auto if raw.visible == Some(false) => Up { axis: UpAxis::Y, by_file: false },
-        RawUp::Auto => Up { axis: source.path().map_or(UpAxis::Y, up_axis), by_file: source.path().is_some() },
+        RawUp::Auto => up_of_files(at, &source)?,
         RawUp::Y => Up { axis: UpAxis::Y, by_file: false },
         RawUp::Z => Up { axis: UpAxis::Z, by_file: false },
         RawUp::MinusY => Up { axis: UpAxis::MinusY, by_file: false },
@@ -75,6 +75,22 @@ pub(super) fn check_object(
         deforms: false,
         name: raw.name,
     })
+}
+
+/// The axis that points up by the source's files, which have to agree.
+fn up_of_files(at: &At<'_>, source: &Source) -> Result<Up, Error> {
+    let mut axes = source.paths().into_iter().map(|path| (path, up_axis(path)));
+    let Some((first, axis)) = axes.next() else { return Ok(Up { axis: UpAxis::Y, by_file: false }) };
+    if let Some((other, another)) = axes.find(|(_, another)| *another != axis) {
+        let [first, other] = [first, other].map(crate::printable);
+        let message = format!(
+            "the files of an object have several axes that point up: {first} has {}, {other} {}",
+            axis.name(),
+            another.name()
+        );
+        return Err(at.key("transform").error(message, "say which one counts: `transform = { up = \"z\" }`"));
+    }
+    Ok(Up { axis, by_file: true })
 }
 
 /// The technique that an object names; "auto" is that of the scene.

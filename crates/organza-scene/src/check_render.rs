@@ -5,11 +5,11 @@ use super::check_surfels::check_surfels;
 use super::de::suggest;
 use super::raw_render::{
     Auto, RawAccumulation, RawAligned, RawClassify, RawDirection, RawMapping, RawParticles, RawPoints, RawRender,
-    RawScattering, RawShadow, RawSheets, RawSlicing, RawSoftShadows, RawSurfaceSampler,
+    RawScattering, RawShadow, RawSheets, RawSlicing, RawSoftShadows, RawSurfaceSampler, RawVolumeSampler,
 };
 use super::{
     Aligned, Classify, LAYER_NAMES, LayerChoice, ParticlesSettings, PointsSettings, RenderSettings, Scattering,
-    ShadowMapping, ShadowSettings, SheetsSettings, Slicing, SoftShadows, SurfaceSampler, Technique,
+    ShadowMapping, ShadowSettings, SheetsSettings, Slicing, SoftShadows, SurfaceSampler, Technique, VolumeSampler,
 };
 use crate::{Error, shown};
 use splat_core::Direction;
@@ -81,6 +81,7 @@ fn check_particles(at: &At<'_>, raw: &RawParticles) -> Result<ParticlesSettings,
         repeat_level: at.whole("repeat_level", raw.repeat_level.unwrap_or(100), 2..=1_000_000)?,
         target_error: raw.target_error.map(|e| at.number("target_error", e, SMALLEST..=LARGEST)).transpose()?,
         surface_sampler: check_surface_sampler(at, raw)?,
+        volume_sampler: check_volume_sampler(at, raw)?,
     })
 }
 
@@ -96,6 +97,19 @@ fn check_surface_sampler(at: &At<'_>, raw: &RawParticles) -> Result<SurfaceSampl
         RawSurfaceSampler::Triangles => SurfaceSampler::Triangles,
         // The paper's for a surface of width 1.
         RawSurfaceSampler::Brownian => SurfaceSampler::Brownian { step: step.unwrap_or(0.01) },
+    })
+}
+
+fn check_volume_sampler(at: &At<'_>, raw: &RawParticles) -> Result<VolumeSampler, Error> {
+    let stride = raw.metropolis_stride.map(|n| at.whole("metropolis_stride", n, 1..=4096)).transpose()?;
+    if stride.is_some() && raw.volume_sampler != RawVolumeSampler::Metropolis {
+        let message = "`metropolis_stride`: the volume sampler is not \"metropolis\"";
+        return Err(at.key("metropolis_stride").error(message, "set volume_sampler = \"metropolis\""));
+    }
+    Ok(match raw.volume_sampler {
+        RawVolumeSampler::Auto => VolumeSampler::Auto,
+        RawVolumeSampler::Cells => VolumeSampler::Cells,
+        RawVolumeSampler::Metropolis => VolumeSampler::Metropolis { stride: stride.unwrap_or(16) },
     })
 }
 

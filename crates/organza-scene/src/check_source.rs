@@ -1,28 +1,31 @@
 //! Checks of the source of an object.
 
 use super::check::{At, LARGEST, SMALLEST};
-use super::check_field::{check_isosurface, check_level_set, check_slice};
+use super::check_field::{check_combined, check_isosurface, check_level_set, check_slice};
 use super::check_light::check_half_axes;
 use super::check_transfer::{Beside, beside_of_points, check_transfer};
 use super::paths::Paths;
 use super::raw_object::RawObject;
 use super::raw_points::RawPointForm;
-use super::raw_source::{RawCloud, RawDensity, RawImplicit, RawMediumBall, RawMediumBox, RawRectangle};
+use super::raw_source::{RawCloud, RawDensity, RawImplicit, RawMediumBall, RawMediumBox, RawPart, RawRectangle};
 use super::{CloudSource, DensitySource, ImplicitSource, MatterSource, Source, VolumeSource};
 use crate::{Error, shown};
-use convert::{ExpressionField, HomogeneousMedium, MediumBody, Rectangle};
+use convert::{Combination, ExpressionField, HomogeneousMedium, MediumBody, Rectangle};
 use glam::DVec3;
 use splat_core::DAabb;
 use std::path::PathBuf;
 
 /// The keys that name a source.
-const SOURCES: [&str; 12] = [
+const SOURCES: [&str; 15] = [
     "mesh",
     "volume",
     "points",
     "implicit",
     "isosurface",
     "level_set",
+    "union",
+    "intersection",
+    "difference",
     "slice",
     "density",
     "cloud",
@@ -34,7 +37,7 @@ const SOURCES: [&str; 12] = [
 /// Longest expression, bytes.
 const LONGEST_EXPRESSION: usize = 4096;
 
-fn present(raw: &RawObject) -> [bool; 12] {
+fn present(raw: &RawObject) -> [bool; 15] {
     [
         raw.mesh.is_some(),
         raw.volume.is_some(),
@@ -42,6 +45,9 @@ fn present(raw: &RawObject) -> [bool; 12] {
         raw.implicit.is_some(),
         raw.isosurface.is_some(),
         raw.level_set.is_some(),
+        raw.union.is_some(),
+        raw.intersection.is_some(),
+        raw.difference.is_some(),
         raw.slice.is_some(),
         raw.density.is_some(),
         raw.cloud.is_some(),
@@ -74,12 +80,8 @@ pub(super) fn check_source(
     }
     if let Some(path) = &raw.volume {
         let path = paths.resolve(&at_source, path)?;
-        let frame = raw.frame.unwrap_or(0).into();
-        return Ok(Source::Volume(VolumeSource {
-            path,
-            frame,
-            transfer: check_transfer(at, raw, Beside::Extinction)?,
-        }));
+        let (frame, transfer) = (raw.frame.unwrap_or(0).into(), check_transfer(at, raw, Beside::Extinction)?);
+        return Ok(Source::Volume(VolumeSource { path, frame, transfer }));
     }
     if let Some(implicit) = &raw.implicit {
         return check_implicit(&at_source, implicit).map(Source::Implicit);
@@ -89,6 +91,9 @@ pub(super) fn check_source(
     }
     if let Some(level_set) = &raw.level_set {
         return check_level_set(&at_source, level_set, paths).map(Source::LevelSet);
+    }
+    if let Some((parts, combination)) = solids(raw) {
+        return check_combined(&at_source, combination, parts, paths).map(Source::Combined);
     }
     if let Some(slice) = &raw.slice {
         return check_slice(&at_source, slice, check_transfer(at, raw, Beside::Nothing)?, paths).map(Source::Slice);
@@ -109,6 +114,16 @@ pub(super) fn check_source(
         return Err(Error::Internal("an object has a source of no kind".into()));
     };
     check_medium_ball(&at_source, b, fallback).map(Source::Medium)
+}
+
+/// The solids that become one, and how.
+fn solids(raw: &RawObject) -> Option<(&[RawPart], Combination)> {
+    let all = [
+        (&raw.union, Combination::Union),
+        (&raw.intersection, Combination::Intersection),
+        (&raw.difference, Combination::Difference),
+    ];
+    all.into_iter().find_map(|(parts, how)| Some((parts.as_deref()?, how)))
 }
 
 /// Points as samples of a surface, or as matter.
@@ -212,7 +227,7 @@ fn check_region(
     Ok((bounds, spacing))
 }
 
-fn check_implicit(at: &At<'_>, raw: &RawImplicit) -> Result<ImplicitSource, Error> {
+pub(super) fn check_implicit(at: &At<'_>, raw: &RawImplicit) -> Result<ImplicitSource, Error> {
     let (bounds, spacing) = check_region(at, &raw.expression, raw.bounds, raw.resolution, raw.spacing)?;
     Ok(ImplicitSource { expression: raw.expression.clone(), bounds, spacing })
 }

@@ -56,7 +56,7 @@ mod source;
 mod tree;
 
 pub use convert::read::UpAxis;
-pub use convert::{ColorMap, ColorScale, PointColors, ScaleNumbers};
+pub use convert::{ColorMap, ColorScale, Combination, PointColors, ScaleNumbers};
 pub use error::Error;
 pub use fit::{CameraFit, DEFAULT_AZIMUTH, DEFAULT_FILL, DEFAULT_SIZE, EachPoint, FoundCamera};
 pub use layer_choice::{LAYER_NAMES, LayerChoice};
@@ -69,12 +69,12 @@ pub use points::PointsLook;
 pub use settings::{
     Aligned, Bending, Classify, Collisions, Coverage, Grouping, OpaqueSurfels, ParticlesSettings, PointsSettings,
     RenderSettings, Scattering, ShadowMapping, ShadowSettings, SheetsSettings, Slicing, SoftShadows, SurfaceSampler,
-    SurfelGroups, SurfelLayers, SurfelsSettings, Technique,
+    SurfelGroups, SurfelLayers, SurfelsSettings, Technique, VolumeSampler,
 };
 pub use shown::{escape_controls, place, printable, shown};
 pub use source::{
-    CloudSource, DensitySource, ImplicitSource, IsosurfaceSource, LevelSetSource, MatterSource, SliceSource, Source,
-    VolumeSource,
+    CloudSource, CombinedSource, DensitySource, ImplicitSource, IsosurfaceSource, LevelSetSource, MatterSource,
+    SliceSource, Source, VolumeSource,
 };
 
 /// The page's example compiles and holds.

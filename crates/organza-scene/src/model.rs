@@ -51,7 +51,7 @@ pub struct Scene {
 impl Scene {
     /// Every file that the scene is made of, its own first.
     pub fn files(&self) -> Vec<PathBuf> {
-        let data = self.objects.iter().filter_map(|o| o.source.path());
+        let data = self.objects.iter().flat_map(|o| o.source.paths());
         let footprints = self.footprint_files.iter().map(PathBuf::as_path);
         std::iter::once(&*self.file).chain(data).chain(self.images()).chain(footprints).map(Path::to_owned).collect()
     }

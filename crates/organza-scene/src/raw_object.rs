@@ -3,15 +3,15 @@
 use super::raw_footprint::RawChoice;
 use super::raw_points::{RawColorBy, RawDiscShape, RawPointForm, RawPointSize};
 use super::raw_source::{
-    RawClip, RawCloud, RawDensity, RawImplicit, RawIsosurface, RawLevelSet, RawMediumBall, RawMediumBox, RawRectangle,
-    RawSlice, RawTransferPoint,
+    RawClip, RawCloud, RawDensity, RawImplicit, RawIsosurface, RawLevelSet, RawMediumBall, RawMediumBox, RawPart,
+    RawRectangle, RawSlice, RawTransferPoint,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
 use std::collections::BTreeMap;
 
-/// An object: a name, exactly one source (`mesh`, `volume`, `points`, `implicit`, `isosurface`, `level_set`, `slice`,
-/// `density`, `cloud`, `rectangle`, `medium_box` or `medium_ball`), and how it looks.
+/// An object: a name, exactly one source (`mesh`, `volume`, `points`, `implicit`, `isosurface`, `level_set`, `union`,
+/// `intersection`, `difference`, `slice`, `density`, `cloud`, `rectangle`, `medium_box` or `medium_ball`), and how it looks.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, expecting = "a table")]
 #[schemars(rename = "Object")]
@@ -32,6 +32,12 @@ pub(super) struct RawObject {
     pub(super) isosurface: Option<RawIsosurface>,
     /// The surface through scattered points.
     pub(super) level_set: Option<RawLevelSet>,
+    /// The surface of what lies in any of some solids.
+    pub(super) union: Option<Vec<RawPart>>,
+    /// The surface of what lies in all of some solids.
+    pub(super) intersection: Option<Vec<RawPart>>,
+    /// The surface of what lies in the first of some solids and in none of the others.
+    pub(super) difference: Option<Vec<RawPart>>,
     /// A plane through a volume, coloured by `transfer`.
     pub(super) slice: Option<RawSlice>,
     /// An expression as the density of a medium.

@@ -45,6 +45,10 @@ pub(super) struct RawParticles {
     pub(super) surface_sampler: RawSurfaceSampler,
     /// Step of "brownian" over the longest side of the surface's box, 0.0001 to 0.1; default 0.01.
     pub(super) brownian_step: Option<f64>,
+    /// How media are sampled: "auto" (default), "cells" or "metropolis".
+    pub(super) volume_sampler: RawVolumeSampler,
+    /// Steps of a chain of "metropolis" from one particle to the next, 1 to 4096; default 16.
+    pub(super) metropolis_stride: Option<u32>,
 }
 
 /// Settings of the `sheets` technique.
@@ -139,6 +143,17 @@ pub(super) enum RawSurfaceSampler {
     Lines,
     Triangles,
     Brownian,
+}
+
+/// How media are sampled.
+#[derive(Debug, Default, Clone, Copy, PartialEq, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+#[schemars(rename = "VolumeSampler")]
+pub(super) enum RawVolumeSampler {
+    #[default]
+    Auto,
+    Cells,
+    Metropolis,
 }
 
 /// Settings of the `points` technique.

@@ -70,6 +70,25 @@ pub(super) struct RawLevelSet {
     pub(super) tolerance: Option<f64>,
 }
 
+/// A solid among several: exactly one of the keys.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, expecting = "a table")]
+#[schemars(rename = "Part")]
+pub(super) struct RawPart {
+    /// What lies inside of the zero set of an expression, and within its box.
+    pub(super) implicit: Option<RawImplicit>,
+    /// What lies inside of the surface in a volume on which its value is a given one, and within the volume.
+    pub(super) isosurface: Option<RawIsosurface>,
+    /// What lies inside of the surface through scattered points.
+    pub(super) level_set: Option<RawLevelSet>,
+    /// What lies in any of some parts.
+    pub(super) union: Option<Vec<RawPart>>,
+    /// What lies in all of some parts.
+    pub(super) intersection: Option<Vec<RawPart>>,
+    /// What lies in the first of some parts and in none of the others.
+    pub(super) difference: Option<Vec<RawPart>>,
+}
+
 /// A plane through a volume.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, expecting = "a table")]

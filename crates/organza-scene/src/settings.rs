@@ -89,6 +89,8 @@ pub struct ParticlesSettings {
     pub target_error: Option<f64>,
     /// How implicit surfaces are sampled.
     pub surface_sampler: SurfaceSampler,
+    /// How media are sampled.
+    pub volume_sampler: VolumeSampler,
 }
 
 /// Settings of the `sheets` technique.
@@ -352,6 +354,20 @@ pub enum SurfaceSampler {
     Brownian {
         /// √(2Δt), over the longest side of the surface's box, > 0.
         step: f64,
+    },
+}
+
+/// How the particles of media are found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum VolumeSampler {
+    /// By a field of extinction that has a bound, and else by the cells of a lattice.
+    Auto,
+    /// Cell by cell of a lattice.
+    Cells,
+    /// Chains of places on a lattice, by the Metropolis method.
+    Metropolis {
+        /// Steps from one particle to the next, ≥ 1.
+        stride: u32,
     },
 }
 

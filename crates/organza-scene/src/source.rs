@@ -1,6 +1,9 @@
 //! Where an object's data comes from, checked: files, expressions and shapes.
 
-use convert::{CloudShape, Ellipsoid, HomogeneousMedium, Inside, Interpolation, Rectangle};
+use crate::Error;
+use convert::{
+    CloudShape, Combination, Ellipsoid, ExpressionField, HomogeneousMedium, Inside, Interpolation, Rectangle,
+};
 use glam::DVec3;
 use splat_core::{DAabb, TransferFunction};
 use std::path::{Path, PathBuf};
@@ -22,6 +25,8 @@ pub enum Source {
     Isosurface(IsosurfaceSource),
     /// The surface through scattered points.
     LevelSet(LevelSetSource),
+    /// The surface of a solid that is made of several.
+    Combined(CombinedSource),
     /// A plane through a volume.
     Slice(SliceSource),
     /// An expression as a density.
@@ -40,9 +45,36 @@ impl Source {
         matches!(self, Self::Matter(_) | Self::Volume(_) | Self::Density(_) | Self::Cloud(_) | Self::Medium(_))
     }
 
-    /// The file that it reads.
+    /// Whether it is the zero set of a field.
+    pub fn is_of_field(&self) -> bool {
+        matches!(self, Self::Implicit(_) | Self::Isosurface(_) | Self::LevelSet(_) | Self::Combined(_))
+    }
+
+    /// Operations of its expressions, all of them, at one place.
+    ///
+    /// # Errors
+    /// As [`ImplicitSource::field`].
+    pub fn operations(&self) -> Result<usize, Error> {
+        match self {
+            Self::Implicit(source) => Ok(source.field()?.operations()),
+            Self::Density(source) => Ok(source.field()?.operations()),
+            Self::Combined(source) => source.parts.iter().map(Self::operations).sum(),
+            _ => Ok(0),
+        }
+    }
+
+    /// The files that it reads.
+    pub fn paths(&self) -> Vec<&Path> {
+        match self {
+            Self::Combined(source) => source.parts.iter().flat_map(Self::paths).collect(),
+            _ => self.path().into_iter().collect(),
+        }
+    }
+
+    /// The file that it reads; of several the first.
     pub fn path(&self) -> Option<&Path> {
         match self {
+            Self::Combined(source) => source.parts.iter().find_map(Self::path),
             Self::Mesh(path) | Self::Points(path) => Some(path),
             Self::Matter(source) => Some(&source.path),
             Self::Volume(source) => Some(&source.path),
@@ -85,6 +117,20 @@ pub struct ImplicitSource {
     pub spacing: f64,
 }
 
+impl ImplicitSource {
+    /// Its field, in the coordinates of the expression: before the object's transform.
+    ///
+    /// # Errors
+    /// [`Error::Internal`] for a text that is no expression, which no checked scene has.
+    pub fn field(&self) -> Result<ExpressionField, Error> {
+        parsed(&self.expression)
+    }
+}
+
+fn parsed(expression: &str) -> Result<ExpressionField, Error> {
+    ExpressionField::parse(expression).map_err(|e| Error::Internal(e.to_string()))
+}
+
 /// A volume file, and the surface on which its value is a given one.
 #[derive(Debug, Clone, PartialEq)]
 pub struct IsosurfaceSource {
@@ -107,6 +153,15 @@ pub struct LevelSetSource {
     pub path: PathBuf,
     /// How far points may lie from the surface, over the diagonal of their box.
     pub tolerance: f64,
+}
+
+/// Solids that become one.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CombinedSource {
+    /// How.
+    pub combination: Combination,
+    /// At least two, each [`Source::Implicit`], [`Source::Isosurface`], [`Source::LevelSet`] or [`Source::Combined`].
+    pub parts: Vec<Source>,
 }
 
 /// A plane through a volume. Lengths are before the object's transform.
@@ -136,6 +191,16 @@ pub struct DensitySource {
     pub spacing: f64,
     /// Extinction σ_t where the expression is 1, 1/world unit.
     pub extinction: f64,
+}
+
+impl DensitySource {
+    /// Its field, as [`ImplicitSource::field`].
+    ///
+    /// # Errors
+    /// As there.
+    pub fn field(&self) -> Result<ExpressionField, Error> {
+        parsed(&self.expression)
+    }
 }
 
 /// A cloud: ellipsoids whose density is disturbed by turbulence. Lengths are before the object's transform.

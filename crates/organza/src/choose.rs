@@ -96,14 +96,15 @@ pub(crate) fn choose<'a>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::SurfaceSampler;
+    use crate::scene::{SurfaceSampler, VolumeSampler};
 
     fn chosen(objects: &[ObjectStatistics], lights: &[LightStatistics]) -> Vec<PlannedObject> {
         choose(objects.iter().map(|o| (o, Technique::Particles)), lights, |_| false)
     }
 
     fn object(data: ObjectData) -> ObjectStatistics {
-        ObjectStatistics { name: "a".into(), data, opaque: false, by_gradient: false, casts: true, receives: true }
+        let (name, volumes_by) = ("a".into(), VolumeSampler::Auto);
+        ObjectStatistics { name, data, opaque: false, by_gradient: false, volumes_by, casts: true, receives: true }
     }
 
     const SUN: LightStatistics = LightStatistics { wants_shadow: true, is_dark: false, points: 1 };
@@ -128,6 +129,9 @@ mod tests {
         assert_eq!(of(object(ObjectData::Density { bounded: false })), Form::Cells);
         let lit = ObjectStatistics { by_gradient: true, ..object(ObjectData::Density { bounded: true }) };
         assert_eq!(of(lit), Form::Cells);
+        let by = |volumes_by, data| of(ObjectStatistics { volumes_by, ..object(data) });
+        assert_eq!(by(VolumeSampler::Cells, ObjectData::Density { bounded: true }), Form::Cells);
+        assert_eq!(by(VolumeSampler::Metropolis { stride: 4 }, ObjectData::Volume), Form::Chains);
         assert_eq!(of(ObjectStatistics { opaque: true, ..auto(2.6) }), Form::Opaque);
     }
 

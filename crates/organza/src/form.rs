@@ -17,6 +17,8 @@ pub enum Form {
     Triangles,
     /// A lattice with a transfer function, or of extinction.
     Cells,
+    /// The same, through which chains of places go.
+    Chains,
     /// A field of extinction.
     Field,
     /// Opaque triangles, which their technique lights itself.
@@ -35,6 +37,7 @@ impl Form {
             Self::Brownian => "brownian",
             Self::Triangles => "triangles",
             Self::Cells => "cells",
+            Self::Chains => "metropolis",
             Self::Field => "field",
             Self::Polygons => "polygons",
             Self::Splats => "splats",

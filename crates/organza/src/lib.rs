@@ -60,7 +60,6 @@ pub use frame::{Frame, Shaded};
 pub use load::Loaded;
 pub use load::files::{FileData, Files};
 pub use load::fitted;
-pub use load::input::expression_field;
 pub use options::RenderOptions;
 pub use organza_device as device;
 pub use organza_output as output;

@@ -98,6 +98,7 @@ pub fn same_splats(a: &Scene, b: &Scene) -> bool {
         && a.objects.iter().zip(&b.objects).all(|(of_a, of_b)| same_forms(technique_of(of_a, a), technique_of(of_b, b)))
         && a.render.sheets.slicing == b.render.sheets.slicing
         && a.render.particles.surface_sampler == b.render.particles.surface_sampler
+        && a.render.particles.volume_sampler == b.render.particles.volume_sampler
         && a.render.layers == b.render.layers
         && a.render.max_points == b.render.max_points
 }

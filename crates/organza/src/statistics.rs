@@ -2,7 +2,7 @@
 
 use crate::form::PlannedObject;
 use crate::lights;
-use crate::scene::{SceneLight, SurfaceSampler, Technique};
+use crate::scene::{SceneLight, SurfaceSampler, Technique, VolumeSampler};
 use convert::cost::Prediction;
 use splat_core::Material;
 use splat_core::shade::Census;
@@ -58,6 +58,8 @@ pub struct ObjectStatistics {
     pub opaque: bool,
     /// Whether the gradients of its values shade it or fill a layer.
     pub by_gradient: bool,
+    /// How the scene has media sampled.
+    pub volumes_by: VolumeSampler,
     /// Whether it could cast a shadow.
     pub casts: bool,
     /// Whether it could receive a shadow.

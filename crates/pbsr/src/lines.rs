@@ -103,6 +103,13 @@ impl Default for LineParams {
     }
 }
 
+impl LineParams {
+    /// A cell for every two samples `spacing` apart that show a surface, whose box is `width` long: 16 to 96 of them.
+    pub fn for_spacing(width: f64, spacing: f64) -> Self {
+        Self { resolution: (0.5 * width / spacing).clamp(16.0, 96.0).ceil() as u32 }
+    }
+}
+
 /// Particles on an implicit surface, by random lines.
 pub struct LineSampler<'a> {
     surface: ImplicitSurface<'a>,

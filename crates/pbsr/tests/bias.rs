@@ -203,7 +203,7 @@ fn splats_have_the_optical_depth_of_their_kernels() {
 }
 
 #[test]
-fn three_samplers_of_one_volume_agree() {
+fn samplers_of_one_volume_agree() {
     // Extinction x in the unit cube: τ = x along z. Its last voxel reaches beyond what is seen.
     let values = (0..4 * 3 * 3).map(|i| (i % 4) as f32 / 3.0).collect();
     let grid = Grid {
@@ -219,7 +219,10 @@ fn three_samplers_of_one_volume_agree() {
     let params = VolumeParams { cross_section: s, ..VolumeParams::default() };
     let cells = GridSampler::new(&grid, &transfer, &params, None).unwrap();
     let chains = MetropolisParams { particles_per_chain: 4, ..MetropolisParams::default() };
-    let chains = MetropolisSampler::new(&grid, &transfer, &params, &chains).unwrap();
+    let thinned = Density { field: &Field::Ramp, max: 2.0 };
+    let even = Grid { values: vec![1.0; 36], ..grid.clone() };
+    let even = MetropolisSampler::new(&even, &transfer, &params, &chains, Some(thinned)).unwrap();
+    let chains = MetropolisSampler::new(&grid, &transfer, &params, &chains, None).unwrap();
     let ramp = Density { field: &Field::Ramp, max: 1.0 };
     let [low, high] = [DVec3::new(0.0, -0.5, -0.5), DVec3::new(1.0, 0.5, 0.5)];
     let field = FieldVolumeSampler::new(
@@ -228,8 +231,8 @@ fn three_samplers_of_one_volume_agree() {
         &FieldVolumeParams { resolution: 6, cross_section: s, color: [1.0; 3], seed: 3 },
     )
     .unwrap();
-    let samplers: [&dyn Sampler; 3] = [&cells, &chains, &field];
-    for (name, sampler) in ["cells", "chains", "field"].iter().zip(samplers) {
+    let samplers: [&dyn Sampler; 4] = [&cells, &chains, &even, &field];
+    for (name, sampler) in ["cells", "chains", "chains, thinned", "field"].iter().zip(samplers) {
         let found = bias(&render(&camera, &[sampler], 1500), &|x, y| {
             // The mean of e^−x over a pixel of width w is e^−x·sinh(w/2)/(w/2): 4·10⁻⁵ beside the middle's.
             let at = |v: u32| (f64::from(v) + 0.5) / 16.0 - 1.0;

@@ -73,7 +73,7 @@ fn every_sampler_gives_its_colour_in_the_mean() {
         ("lattice lines", Box::new(LatticeSampler::new(&grid, 200.5, &surface()).unwrap())),
         ("walk", Box::new(BrownianSampler::new(&ball, &walk, &fine).unwrap())),
         ("cells", Box::new(GridSampler::new(&grid, &transfer, &volume, None).unwrap())),
-        ("chains", Box::new(MetropolisSampler::new(&grid, &transfer, &volume, &few).unwrap())),
+        ("chains", Box::new(MetropolisSampler::new(&grid, &transfer, &volume, &few, None).unwrap())),
         ("splats", Box::new(SplatSampler::new(&cloud, &splats).unwrap())),
         (
             "field",

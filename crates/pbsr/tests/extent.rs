@@ -51,7 +51,7 @@ fn samplers<'a>(grid: &'a Grid, transfer: &'a TransferFunction, params: &VolumeP
     let chains = MetropolisParams { particles_per_chain: 1, burn_in: 48, stride: 1 };
     [
         Box::new(GridSampler::new(grid, transfer, params, None).unwrap()),
-        Box::new(MetropolisSampler::new(grid, transfer, params, &chains).unwrap()),
+        Box::new(MetropolisSampler::new(grid, transfer, params, &chains, None).unwrap()),
     ]
 }
 

@@ -171,7 +171,8 @@ fn pb13_pb14_lattice_lines() {
 fn pb13_pb14_metropolis_chains() {
     let (grid, transfer) = homogeneous();
     let chains = MetropolisParams { particles_per_chain: 1, ..MetropolisParams::default() };
-    let make = |s| Box::new(MetropolisSampler::new(grid, transfer, &volume(s), &chains).unwrap()) as Box<dyn Sampler>;
+    let make =
+        |s| Box::new(MetropolisSampler::new(grid, transfer, &volume(s), &chains, None).unwrap()) as Box<dyn Sampler>;
     check(&make, in_cube, 3);
 }
 

@@ -16,6 +16,7 @@
 //! tangents, shading normals and shadow coefficients are kept as they are.
 
 mod block;
+mod bytes;
 mod octahedral;
 
 use crate::{Cloud, Error};

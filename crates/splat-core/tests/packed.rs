@@ -154,3 +154,36 @@ fn what_is_no_number_and_gaussians_are_refused() {
     gaussian.validate().unwrap();
     assert!(matches!(PackedCloud::new(&gaussian), Err(Error::Invalid { attribute: "gaussian", index: 3, .. })));
 }
+
+#[test]
+fn bytes_are_the_packed_cloud_again_and_no_others() {
+    for n in [0, 1, 257, 700] {
+        let mut all = cloud(n);
+        if n == 257 {
+            all.shadow_coefficient = (0..257).map(|i| unit(i, 12)).collect();
+            all.tangent = vec![Vec3::X; 257];
+        }
+        let packed = PackedCloud::new(&all).unwrap();
+        let bytes = packed.to_bytes();
+        assert_eq!(PackedCloud::from_bytes(&bytes).unwrap(), packed);
+        assert!(bytes.len() as u64 <= packed.bytes() + 48, "{} {}", bytes.len(), packed.bytes());
+        for length in (0..bytes.len()).step_by(1 + bytes.len() / 97) {
+            let error = PackedCloud::from_bytes(&bytes[..length]).unwrap_err().to_string();
+            assert!(error.contains("as many as its counts say, more than these"), "{length}: {error}");
+        }
+        let longer = [&bytes[..], &[0]].concat();
+        let error = PackedCloud::from_bytes(&longer).unwrap_err().to_string();
+        assert!(error.contains("as many as its counts say"), "{error}");
+    }
+    // Counts that no memory holds, a kind that there is not, a look beyond the list.
+    let bytes = PackedCloud::new(&cloud(7)).unwrap().to_bytes();
+    let with = |at: usize, byte: u8| {
+        let mut bytes = bytes.clone();
+        bytes[at] = byte;
+        PackedCloud::from_bytes(&bytes).map(|_| ()).unwrap_err().to_string()
+    };
+    let looks = 48 + 84;
+    assert!(with(7, 255).contains("as many as its counts say"));
+    assert!(with(looks + 7, 3).contains("look 0: kind"), "{}", with(looks + 7, 3));
+    assert!(with(looks + 7 * 8, 200).contains("splat 0: look is 200"), "{}", with(looks + 56, 200));
+}

@@ -23,7 +23,7 @@ const TRANSFER: &str = "transfer = [{ value = 0, color = [1, 0.5, 0.2], extincti
                         { value = 1, color = [0.2, 0.6, 1], extinction = 4 }]";
 
 /// All sources; data with and without colours where it can have some.
-pub(crate) const SOURCES: [SourceCase; 14] = [
+pub(crate) const SOURCES: [SourceCase; 15] = [
     case("mesh", false, "mesh = 'colored.ply'"),
     case("plain mesh", false, "mesh = 'plain.ply'"),
     case("points", false, "points = 'colored.xyz'"),
@@ -36,6 +36,12 @@ pub(crate) const SOURCES: [SourceCase; 14] = [
     ),
     case("isosurface", false, "isosurface = { volume = 'grid.nrrd', level = 0.85 }"),
     case("level_set", false, "level_set = { points = 'ball.xyz' }\nspacing = 0.2"),
+    case(
+        "union",
+        false,
+        "union = [{ isosurface = { volume = 'grid.nrrd', level = 0.85 } }, \
+          { implicit = { expression = '(x - 0.3)^2 + y^2 + z^2 - 0.1', box = [[-0.1, -0.4, -0.4], [0.7, 0.4, 0.4]], spacing = 0.1 } }]",
+    ),
     case(
         "slice",
         false,

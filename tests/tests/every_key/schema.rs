@@ -13,7 +13,14 @@ pub(crate) fn keys() -> BTreeSet<String> {
 
 fn collect(root: &Value, node: &Value, path: &str, keys: &mut BTreeSet<String>) {
     if let Some(name) = node["$ref"].as_str() {
-        return collect(root, &root["$defs"][name.rsplit('/').next().unwrap()], path, keys);
+        let name = name.rsplit('/').next().unwrap();
+        // Parts of solids are the same wherever they stand, within each other too.
+        let is_part = name == "Part";
+        if is_part && path.starts_with("object.part") {
+            return;
+        }
+        let path = if is_part { "object.part" } else { path };
+        return collect(root, &root["$defs"][name], path, keys);
     }
     let join = |key: &str| if path.is_empty() { key.to_owned() } else { format!("{path}.{key}") };
     for (key, value) in node["properties"].as_object().into_iter().flatten() {
@@ -90,6 +97,8 @@ pub(crate) fn heading(table: &str) -> &'static str {
         "object.transform" => "`transform`",
         "object.transfer" => "`transfer`",
         "object.isosurface" | "object.level_set" | "object.slice" => "### Surfaces of fields",
+        "object.part" => "#### Solids from solids",
+        "object.part.isosurface" | "object.part.level_set" => "### Surfaces of fields",
         "object.clip" => "### `clip`",
         "object.color_by" | "object.point_size" => "### Raw points",
         "material" | "material.medium" | "material.absorption" | "material.cauchy" | "material.bump" => {
@@ -125,6 +134,9 @@ pub(crate) fn is_value(name: &str) -> bool {
         "medium_ball",
         "isosurface",
         "level_set",
+        "union",
+        "intersection",
+        "difference",
         "slice",
         "track",
         "ply",

@@ -1,7 +1,7 @@
 //! A value for every key that must change what is seen, and where it must not, with the reason.
 
 use super::scenes::SOURCES;
-use super::{footprints, lights, surfels};
+use super::{fields, footprints, lights, surfels};
 
 /// Where a change is looked for.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -134,7 +134,7 @@ pub(super) fn one(key: &'static str, set: &'static str) -> Entry {
 
 pub(crate) fn entries() -> Vec<Entry> {
     let first = [scene(), footprints::entries(), lights::entries(), objects()];
-    let others = [sources(), materials(), render(), surfels::entries(), animation()];
+    let others = [sources(), fields::entries(), materials(), render(), surfels::entries(), animation()];
     first.into_iter().chain(others).flatten().collect()
 }
 
@@ -178,7 +178,7 @@ const HOT: &[&str] = &["object.it.points='hot.xyz'", "object.it.color_by={column
 const MATTER: &[&str] = &["object.it.as='medium'", "object.it.extinction=3"];
 const OWN_SPACING: Expected = Refused(2, "states its own spacing");
 const NO_TRANSFER: Expected = Refused(2, "belongs to a `volume` or `slice`, and to `points` with `color_by`");
-pub(super) const OPEN: Which = These(&["implicit", "isosurface", "level_set"]);
+pub(super) const OPEN: Which = These(&["implicit", "isosurface", "level_set", "union"]);
 
 fn objects() -> Vec<Entry> {
     vec![
@@ -264,21 +264,6 @@ fn sources() -> Vec<Entry> {
         of(VOLUME, "object.transfer.extinction", "object.it.transfer.1.extinction=2"),
         of(VOLUME, "object.transfer.opacity", "object.it.transfer.1.opacity=0.5").with(OPACITIES),
         of(VOLUME, "object.unit_length", "object.it.unit_length=0.3").with(OPACITIES),
-        one("object.implicit", "object.it.implicit={expression='x^2 + y^2 + z^2 - 0.2', box=[[-0.9, -0.9, -0.9], [0.9, 0.9, 0.9]], spacing=0.1}"),
-        one("object.implicit.expression", "object.it.implicit.expression='x^2 + y^2 + z^2 - 0.2'"),
-        one("object.implicit.box", "object.it.implicit.box=[[-0.9, -0.9, -0.9], [0.2, 0.9, 0.9]]"),
-        one("object.implicit.resolution", "object.it.implicit.resolution=16"),
-        one("object.implicit.spacing", "object.it.implicit.spacing=0.15").with(&["object.it.implicit={expression='x^2 + y^2 + 2*z^2 - 0.3', box=[[-0.9, -0.9, -0.9], [0.9, 0.9, 0.9]], spacing=0.1}"]),
-        of(These(&["isosurface"]), "object.isosurface", "object.it.isosurface={volume='grid.nrrd', level=0.75}"),
-        of(These(&["isosurface"]), "object.isosurface.volume", "object.it.isosurface.volume='other.nrrd'"),
-        of(These(&["isosurface"]), "object.isosurface.frame", "object.it.isosurface.frame=1")
-            .with(&["object.it.isosurface.volume='series.nrrd'"]),
-        of(These(&["isosurface"]), "object.isosurface.level", "object.it.isosurface.level=0.75"),
-        of(These(&["isosurface"]), "object.isosurface.interpolation", "object.it.isosurface.interpolation='catmull-rom'"),
-        of(These(&["isosurface"]), "object.isosurface.inside", "object.it.isosurface.inside='below'"),
-        of(These(&["level_set"]), "object.level_set", "object.it.level_set={points='larger.xyz'}"),
-        of(These(&["level_set"]), "object.level_set.points", "object.it.level_set.points='larger.xyz'"),
-        of(These(&["level_set"]), "object.level_set.tolerance", "object.it.level_set.tolerance=0.05"),
         of(These(&["slice"]), "object.slice", "object.it.slice={volume='grid.nrrd', center=[0, 0, 0.2], normal=[0, 0, 1]}"),
         of(These(&["slice"]), "object.slice.volume", "object.it.slice.volume='other.nrrd'"),
         of(These(&["slice"]), "object.slice.frame", "object.it.slice.frame=1")
@@ -426,6 +411,13 @@ fn render() -> Vec<Entry> {
             .look(Look::Sets)
             .with(&["render.particles.repeat_level=50"]),
         of(OPEN, "render.particles.surface_sampler", "render.particles.surface_sampler='triangles'").by(PARTICLES),
+        of(Media, "render.particles.volume_sampler", "render.particles.volume_sampler='metropolis'").by(PARTICLES),
+        one("render.particles.volume_sampler", "render.particles.volume_sampler='metropolis'")
+            .but(All, Refused(2, "draws no volume, density, cloud or homogeneous medium"))
+            .by(PARTICLES),
+        of(Media, "render.particles.metropolis_stride", "render.particles.metropolis_stride=3")
+            .with(&["render.particles.volume_sampler='metropolis'"])
+            .by(PARTICLES),
         one("render.particles.brownian_step", "render.particles.brownian_step=0.05")
             .by(PARTICLES)
             .with(&["render.particles.surface_sampler='brownian'"]),

@@ -4,7 +4,7 @@ use super::Request;
 use super::points::spacing_factor;
 use organza::scene::{
     Classify, Collisions, Coverage, Grouping, RenderSettings, Scene, ShadowMapping, Slicing, SoftShadows,
-    SurfaceSampler, SurfelLayers,
+    SurfaceSampler, SurfelLayers, VolumeSampler,
 };
 use splat_core::Packing;
 use splat_core::raster::Accumulation;
@@ -141,6 +141,15 @@ fn particles(render: &RenderSettings, all: &mut Vec<Stated>) {
     add("surface_sampler", quoted(sampler));
     if let Some(step) = step {
         add("brownian_step", number(step));
+    }
+    let (sampler, stride) = match render.particles.volume_sampler {
+        VolumeSampler::Auto => ("auto", None),
+        VolumeSampler::Cells => ("cells", None),
+        VolumeSampler::Metropolis { stride } => ("metropolis", Some(stride)),
+    };
+    add("volume_sampler", quoted(sampler));
+    if let Some(stride) = stride {
+        add("metropolis_stride", stride.to_string());
     }
 }
 

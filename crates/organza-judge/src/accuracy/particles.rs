@@ -1,8 +1,8 @@
 //! Knobs of the technique `particles` (Tanaka 2012): the repeat level, how many sets are averaged; how implicit surfaces are
-//! sampled, and the step of the paper's Brownian motion on them.
+//! sampled, the step of the paper's Brownian motion on them, and how media are.
 
 use super::{Facts, Knob, Options, Request, Skipped, Step, Sweep, Theory};
-use organza::scene::{LayerChoice, Scene, Source, SurfaceSampler, Technique};
+use organza::scene::{LayerChoice, Scene, Source, SurfaceSampler, Technique, VolumeSampler};
 
 /// Steps of the Brownian motion, over the width of the surface; the paper's is 0.01.
 const BROWNIAN_STEPS: [f64; 4] = [0.08, 0.04, 0.02, 0.01];
@@ -29,9 +29,11 @@ pub fn particles(scene: &Scene, facts: &Facts, options: &Options) -> Result<Swee
     }
     let mut knobs = vec![repeat_level(levels)];
     let mut skipped = Vec::new();
-    for (name, knob) in
-        [("surface sampler", surface_sampler(&scene)), ("Brownian step", brownian_step(&scene, options.quick))]
-    {
+    for (name, knob) in [
+        ("surface sampler", surface_sampler(&scene)),
+        ("Brownian step", brownian_step(&scene, options.quick)),
+        ("volume sampler", volume_sampler(&scene)),
+    ] {
         match knob {
             Ok(knob) => knobs.push(knob),
             Err(reason) => skipped.push(Skipped { knob: name, reason }),
@@ -70,10 +72,10 @@ fn repeat_level(levels: &[u32]) -> Knob {
 
 /// Whether particles of some surface come from a field.
 fn has_surface(scene: &Scene) -> bool {
-    scene.objects.iter().any(|o| {
-        let field = matches!(o.source, Source::Implicit(_) | Source::Isosurface(_) | Source::LevelSet(_));
-        field && o.visible && o.opacity.unwrap_or(scene.materials[o.material].opacity) < 1.0
-    })
+    scene
+        .objects
+        .iter()
+        .any(|o| o.source.is_of_field() && o.visible && o.opacity.unwrap_or(scene.materials[o.material].opacity) < 1.0)
 }
 
 const NO_SURFACE: &str = "no translucent surface is implicit";
@@ -117,6 +119,34 @@ fn brownian_step(scene: &Scene, quick: bool) -> Result<Knob, String> {
             request.scene.render.particles.surface_sampler = SurfaceSampler::Brownian { step: value };
         },
         steps: BROWNIAN_STEPS.iter().map(step).collect(),
+        ends: Vec::new(),
+        end_is_exact: true,
+        theory: None,
+        joint: false,
+    })
+}
+
+/// Strides of Metropolis chains.
+const STRIDES: [u32; 3] = [1, 4, 16];
+
+/// Cell by cell against chains that take more and more steps from one particle to the next, which have its expectation in the end.
+fn volume_sampler(scene: &Scene) -> Result<Knob, String> {
+    let is_sampled = |source: &Source| source.is_medium() && !matches!(source, Source::Matter(_));
+    if !scene.objects.iter().any(|o| o.visible && is_sampled(&o.source)) {
+        return Err("nothing translucent is a medium".into());
+    }
+    let chains = |stride: u32| (f64::from(stride), format!("chains of {stride} steps a particle"));
+    let step = |(value, label)| Step { label, size: None, value };
+    Ok(Knob {
+        name: "volume sampler",
+        size_meaning: "",
+        set: |request, value| {
+            request.scene.render.particles.volume_sampler = match value as u32 {
+                0 => VolumeSampler::Cells,
+                stride => VolumeSampler::Metropolis { stride },
+            };
+        },
+        steps: STRIDES.map(chains).into_iter().chain([(0.0, "cells".into())]).map(step).collect(),
         ends: Vec::new(),
         end_is_exact: true,
         theory: None,

@@ -312,9 +312,12 @@ fn spacings(scene: &mut Scene) -> impl Iterator<Item = &mut f64> {
 
 fn spacing_of(object: &mut SceneObject) -> Option<&mut f64> {
     match &mut object.source {
-        Source::Mesh(_) | Source::Volume(_) | Source::Isosurface(_) | Source::LevelSet(_) | Source::Slice(_) => {
-            object.spacing.as_mut()
-        }
+        Source::Mesh(_)
+        | Source::Volume(_)
+        | Source::Isosurface(_)
+        | Source::LevelSet(_)
+        | Source::Combined(_)
+        | Source::Slice(_) => object.spacing.as_mut(),
         // The spacing of its samples decides what an implicit surface is, that of the object how it is splatted.
         Source::Implicit(implicit) => Some(object.spacing.as_mut().unwrap_or(&mut implicit.spacing)),
         Source::Density(density) => Some(&mut density.spacing),

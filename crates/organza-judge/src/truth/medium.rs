@@ -5,7 +5,7 @@ use convert::read::Loaded as FileData;
 use convert::{Clip, ExpressionField, SplatParams};
 use glam::{DMat3, DQuat, DVec3};
 use organza::scene::{Scene, SceneObject, Source, VolumeSource};
-use organza::{Error, RenderOptions, expression_field, printable};
+use organza::{Error, RenderOptions, printable};
 use reference::{Classified, ColorAt, Density, Facets, Lattice, Liberty, Medium, Placed, TurnedBox};
 use splat_core::{DAabb, Grid, ScalarField, Shading};
 use std::sync::Arc;
@@ -185,7 +185,7 @@ fn shape(object: &SceneObject, reflects: Option<[f32; 3]>, options: &RenderOptio
             (Shape::Grid(grid), 1.0)
         }
         Source::Density(d) => {
-            let field = Placed::new(expression_field(&d.expression, object)?, t, d.bounds);
+            let field = Placed::new(d.field()?, t, d.bounds);
             let bounds = DAabb::of_points(d.bounds.corners().map(|p| t.apply(p)));
             let majorant = majorant(&field, bounds);
             (Shape::Field { field: Arc::new(field), bounds, majorant }, d.extinction)

@@ -5,7 +5,7 @@ use convert::SplatParams;
 use convert::read::{Loaded as FileData, ReadParams};
 use glam::Vec3;
 use organza::scene::{Scene, SceneMaterial, SceneObject, Source};
-use organza::{Error, RenderOptions, expression_field};
+use organza::{Error, RenderOptions};
 use reference::{Density, Dielectric, Liberty, Medium, Surface, SurfaceKind, SurfaceMaterial};
 use splat_core::{Mesh, Shading, Similarity, optics};
 use std::path::Path;
@@ -46,6 +46,11 @@ pub(super) fn body(
         Source::Isosurface(_) | Source::LevelSet(_) | Source::Slice(_) => {
             return no("surfaces of measured fields are not path-traced");
         }
+        Source::Combined(_) => {
+            return no(
+                "unions, intersections and differences are not path-traced: an `implicit` of `min` and `max` is",
+            );
+        }
         Source::Implicit(_) if !object.clip.is_empty() => return no("open surfaces are not path-traced"),
         Source::Mesh(path) => match read(path, 0, options)? {
             FileData::Mesh(mesh) => mesh,
@@ -58,7 +63,7 @@ pub(super) fn body(
             }
         },
         Source::Implicit(i) => {
-            let field = expression_field(&i.expression, object)?;
+            let field = i.field()?;
             let params = SplatParams { object_name: object.name.clone(), ..SplatParams::default() };
             convert::field_to_mesh(&field, i.bounds, i.spacing * FINER, &params, None)?
         }

@@ -4,14 +4,14 @@ use super::context::Context;
 use super::files::{FileData, Fitted};
 use crate::Error;
 use crate::scene::{
-    DensitySource, ImplicitSource, LevelSetSource, MatterSource, SceneObject, SliceSource, Source, SurfaceSampler,
+    CombinedSource, DensitySource, LevelSetSource, MatterSource, SceneObject, SliceSource, Source, SurfaceSampler,
     VolumeSource,
 };
 use crate::statistics::ObjectData;
 use convert::{
-    Clip, ClippedField, CloudShape, Density, DensityParams, ExpressionField, GridField, HomogeneousMedium,
-    Interpolation, MatterParams, MediumBody, MeshParams, MpuParams, RawPoints, Section, SharedField, ShownPoints,
-    SplatParams, SurfelParams, VolumeParams,
+    Clip, ClippedField, CloudShape, Density, DensityParams, GridField, HomogeneousMedium, Interpolation, MatterParams,
+    MediumBody, MeshParams, MpuParams, RawPoints, Section, SharedField, ShownPoints, Solid, SplatParams, SurfelParams,
+    VolumeParams,
 };
 use pbsr::{BoundedExtinction, Matter};
 use splat_core::{DAabb, Grid, Mesh, TransferFunction};
@@ -141,33 +141,17 @@ pub(super) fn input<'a>(object: &'a SceneObject, context: &Context<'_>) -> Resul
             let grid = object.spacing.map_or_else(|| Ok(grid.clone()), at)?;
             Input::Volume(grid, transfer, context.volume_params(splat))
         }
-        Source::Implicit(ImplicitSource { expression, bounds, spacing }) => {
-            let field = Arc::new(expression_field(expression, object)?);
-            surface(ZeroSet { field, trilinear: None, bounds: *bounds, step: *spacing }, object, splat, opacity)?
-        }
-        Source::Isosurface(source) => {
-            let grid = read_grid(&source.path, source.frame, context)?;
-            let step = grid.shortest_step();
-            let trilinear =
-                (source.interpolation == Interpolation::Trilinear).then(|| (grid.clone(), source.level as f32));
-            let field = GridField::new(grid, source.interpolation, source.level, source.inside)
-                .map_err(|e| refuse_data(&source.path, &e))?;
-            let bounds = field.bounds();
-            surface(ZeroSet { field: Arc::new(field), trilinear, bounds, step }, object, splat, opacity)?
-        }
-        Source::LevelSet(source) => {
-            let (field, bounds) = level_set(source, object, context)?;
-            let step = bounds.size().max_element() / LEVEL_SET_STEPS;
-            surface(ZeroSet { field, trilinear: None, bounds, step }, object, splat, opacity)?
+        Source::Implicit(_) | Source::Isosurface(_) | Source::LevelSet(_) | Source::Combined(_) => {
+            surface(solid(&object.source, object, context)?, object, splat, opacity)?
         }
         Source::Slice(source) => slice(source, object, splat, opacity, context)?,
-        Source::Density(DensitySource { expression, bounds, spacing, extinction }) => {
+        Source::Density(density @ DensitySource { bounds, spacing, extinction, .. }) => {
             let params = DensityParams {
                 density: Density::Spacing(spacing * splat.transform.scale),
                 extinction: *extinction,
                 volume: context.volume_params(splat),
             };
-            Input::Density(Arc::new(expression_field(expression, object)?), *bounds, params)
+            Input::Density(Arc::new(density.field()?), *bounds, params)
         }
         Source::Cloud(cloud) => Input::Procedural(cloud.shape(), cloud.spacing, context.volume_params(splat)),
         Source::Medium(medium) => Input::Medium(*medium, splat, &object.clip),
@@ -197,19 +181,47 @@ fn slice<'a>(
     Ok(Input::Mesh(name, mesh, MeshParams { splat, density, opacity }))
 }
 
-/// A field whose zero set is drawn.
-struct ZeroSet {
-    field: SharedField,
-    /// The lattice and the level that it comes of, where that is all.
-    trilinear: Option<(Arc<Grid>, f32)>,
-    bounds: DAabb,
-    /// Distance of its splats where the object states none, object units.
-    step: f64,
+/// The lattice and the level that a surface comes of, where that is all.
+type Trilinear = Option<(Arc<Grid>, f32)>;
+
+/// What a field and where it is known make; its step is the distance of its splats where the object states none.
+fn solid(source: &Source, object: &SceneObject, context: &Context<'_>) -> Result<(Solid, Trilinear), Error> {
+    let boxed = |field, bounds, step| (Solid { field, walls: Vec::new(), bounds, step }.closed(), None);
+    Ok(match source {
+        Source::Implicit(source) => boxed(Arc::new(source.field()?), source.bounds, source.spacing),
+        Source::Isosurface(source) => {
+            let grid = read_grid(&source.path, source.frame, context)?;
+            let step = grid.shortest_step();
+            let is_trilinear = source.interpolation == Interpolation::Trilinear;
+            let trilinear = is_trilinear.then(|| (grid.clone(), source.level as f32));
+            let field = GridField::new(grid, source.interpolation, source.level, source.inside)
+                .map_err(|e| refuse_data(&source.path, &e))?;
+            let (walls, bounds) = (field.walls(), field.bounds());
+            (Solid { field: Arc::new(field), walls, bounds, step }, trilinear)
+        }
+        Source::LevelSet(source) => {
+            let (field, bounds) = level_set(source, object, context)?;
+            boxed(field, bounds, bounds.size().max_element() / LEVEL_SET_STEPS)
+        }
+        Source::Combined(CombinedSource { combination, parts }) => {
+            let parts = parts.iter().map(|part| Ok(solid(part, object, context)?.0)).collect::<Result<_, Error>>()?;
+            let refused = |e: splat_core::Error| {
+                Error::input(format!("object '{}'", crate::shown(&object.name)), e.to_string(), "")
+            };
+            (Solid::combined(*combination, parts).map_err(refused)?, None)
+        }
+        _ => return Err(Error::Internal("a solid is of a source that has no field".into())),
+    })
 }
 
 /// A surface of a field.
-fn surface<'a>(zero: ZeroSet, object: &SceneObject, splat: SplatParams, opacity: f64) -> Result<Input<'a>, Error> {
-    let ZeroSet { field, trilinear, bounds, step } = zero;
+fn surface<'a>(
+    (solid, trilinear): (Solid, Trilinear),
+    object: &SceneObject,
+    splat: SplatParams,
+    opacity: f64,
+) -> Result<Input<'a>, Error> {
+    let Solid { field, bounds, step, .. } = solid;
     let density = Density::Spacing(object.spacing.unwrap_or(step * splat.transform.scale));
     let field = if object.clip.is_empty() {
         field
@@ -283,16 +295,4 @@ fn read_grid(path: &Path, frame: u64, context: &Context<'_>) -> Result<Arc<Grid>
         FileData::Grid(grid) => Ok(grid),
         _ => Err(Error::wrong_kind(path, "a volume", "use `mesh = ` or `points = ` for this file")),
     }
-}
-
-/// The field of an expression of an object, in the coordinates of the expression: before the object's transform.
-///
-/// # Errors
-/// [`Error::Input`] for a text that is no expression of x, y and z.
-pub fn expression_field(text: &str, object: &SceneObject) -> Result<ExpressionField, Error> {
-    // The scene's check has parsed it already.
-    ExpressionField::parse(text).map_err(|e| {
-        let what = format!("object '{}', expression", crate::shown(&object.name));
-        Error::input(what, e.to_string(), "variables are x, y and z")
-    })
 }

@@ -74,18 +74,17 @@ pub(super) fn prepare<'a>(
 
 /// Refuses an expression that would be worked at for many minutes before anything is drawn.
 fn check_work(object: &SceneObject, input: &Input<'_>) -> Result<(), Error> {
-    let (expression, evaluations) = match (&object.source, input) {
-        (Source::Implicit(i), Input::Surface(field, bounds, params, _)) => {
-            (&i.expression, cost::surface_evaluations(field.as_ref(), *bounds, params))
+    let operations = object.source.operations()?;
+    let evaluations = match input {
+        Input::Surface(field, bounds, params, _) if operations > 0 => {
+            cost::surface_evaluations(field.as_ref(), *bounds, params)
         }
-        (Source::Density(d), Input::Density(_, bounds, params)) => {
-            (&d.expression, cost::density_evaluations(*bounds, params))
-        }
+        Input::Density(_, bounds, params) => cost::density_evaluations(*bounds, params),
         _ => return Ok(()),
     };
     // A lattice of too many points has a refusal of its own.
     let Ok(evaluations) = evaluations else { return Ok(()) };
-    let needed = evaluations * super::input::expression_field(expression, object)?.operations() as f64;
+    let needed = evaluations * operations as f64;
     let what = format!("the expression of object '{}'", crate::escape_controls(&object.name));
     let hint = "use a larger spacing or a smaller resolution, a smaller box, or an expression with a bound";
     let unit = "operations before anything is drawn";
@@ -121,13 +120,15 @@ impl Prepared<'_> {
     pub(super) fn statistics(&self, object: &SceneObject, context: &Context<'_>) -> ObjectStatistics {
         let material = &context.scene.materials[object.material].material;
         // Fields of measured data have tight bounds.
-        let looseness = if matches!(object.source, Source::Implicit(_)) { self.looseness() } else { 0.0 };
+        let looseness =
+            if matches!(object.source, Source::Implicit(_) | Source::Combined(_)) { self.looseness() } else { 0.0 };
         let extinct = material.extinction_rgb.iter().any(|e| *e > 0.0) || self.input.opacity() == Some(1.0);
         ObjectStatistics {
             name: object.name.clone(),
             data: self.input.data(self.bounded.is_some(), looseness, context.scene.render.particles.surface_sampler),
             opaque: self.input.opacity() == Some(1.0),
             by_gradient: self.input.by_gradient(),
+            volumes_by: context.scene.render.particles.volume_sampler,
             casts: object.casts_shadow && extinct,
             receives: !self.as_it_is && material.shading != Shading::Unlit && object.shadow_coefficient > 0.0,
         }

@@ -10,13 +10,10 @@ use crate::form::{Form, PlannedObject};
 use crate::scene::{SurfaceSampler, Technique};
 use convert::{Clip, RegionField, SharedField, VolumeParams, extinct_bounds};
 use glam::DVec3;
-use pbsr::BoundedExtinction;
+use pbsr::{BoundedExtinction, LineParams};
 use rayon::prelude::*;
 use splat_core::{BccGrid, DAabb, Footprint, Grid, Mesh, Packing, Similarity, SplatKind, TransferFunction, optics};
 use std::sync::Arc;
-
-/// Cells along an object in which lines look for roots.
-const LINE_CELLS: std::ops::RangeInclusive<f64> = 16.0..=96.0;
 
 /// Which zeros belong to a surface.
 pub(crate) type Inside = Box<dyn Fn(DVec3) -> bool + Send + Sync>;
@@ -184,21 +181,18 @@ impl Own {
 fn table_bytes(body: &Body, bounds: DAabb, splats: u64) -> u64 {
     match body {
         Body::Cells { grid, transfer, .. } => {
-            32 * grid.values.par_iter().filter(|v| transfer.at(**v).extinction > 0.0).count() as u64
+            // Chains find cells by an index of each voxel.
+            4 * grid.values.len() as u64
+                + 32 * grid.values.par_iter().filter(|v| transfer.at(**v).extinction > 0.0).count() as u64
         }
         Body::Lattice { .. } => 32 * splats,
         Body::Triangles(mesh) => 16 * mesh.triangles.len() as u64,
         Body::Field(field) => 8 * u64::from(field.cells()).pow(3),
         Body::Surface { spacing, .. } => {
-            let cells = line_cells(bounds.size().max_element(), *spacing);
-            96 * 6 * u64::from(cells).pow(2)
+            let lines = LineParams::for_spacing(bounds.size().max_element(), *spacing);
+            96 * 6 * u64::from(lines.resolution).pow(2)
         }
     }
-}
-
-/// Cells along the longest side of a surface's box, in which lines look for its roots.
-pub(crate) fn line_cells(width: f64, spacing: f64) -> u32 {
-    (0.5 * width / spacing).clamp(*LINE_CELLS.start(), *LINE_CELLS.end()).ceil() as u32
 }
 
 /// Data, bounds and the distance of splats, object units.

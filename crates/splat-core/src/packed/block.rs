@@ -29,8 +29,8 @@ impl Look {
 /// Even steps from the least number of a block to its greatest.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Even {
-    low: f32,
-    step: f32,
+    pub(super) low: f32,
+    pub(super) step: f32,
 }
 
 impl Even {
@@ -54,9 +54,9 @@ impl Even {
 /// Steps that are even in the square roots of numbers ≥ 0, so that small ones are more exact than large ones.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Rooted {
-    low: f32,
-    root: f32,
-    step: f32,
+    pub(super) low: f32,
+    pub(super) root: f32,
+    pub(super) step: f32,
 }
 
 impl Rooted {
@@ -82,7 +82,7 @@ impl Rooted {
 /// What a block's numbers are counted from and in.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Block {
-    position: [Even; 3],
+    pub(super) position: [Even; 3],
     pub(super) radius: Rooted,
     pub(super) cross_section: Rooted,
     pub(super) color: Rooted,

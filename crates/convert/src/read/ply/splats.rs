@@ -1,18 +1,21 @@
 //! Rendering-oriented points as `organza convert` writes them: splats, each with all of its attributes.
 
 use super::body::{Source, check_count, look, skip_element};
-use super::header::{Comment, Element, Header, Property, Shape, at_line};
+use super::header::{Comment, Element, Header, Property, Shape, Type, at_line};
 use crate::error::{ReadError, escaped};
 use crate::raw_points::RawPoints;
 use crate::read::input;
 use crate::read::reading::Reading;
 use crate::ready_splats::{COLUMNS, ReadySplats, SplatColumn};
-use crate::write_splats::VERSION;
+use crate::write_splats::{PACKED, VERSION};
 use splat_core::glam::DVec3;
-use splat_core::{Cloud, Splat};
+use splat_core::{Cloud, PackedCloud, Splat};
 
 /// Properties by which a file without a comment of ours is told all the same: some programs leave comments out.
 const SIGNATURE: [&[u8]; 3] = [b"cross_section", b"kind", b"radius"];
+
+/// Fewest bytes of a packed splat: its look, place, radius, cross-section and colour.
+const LEAST_PACKED: u64 = 13;
 
 const HINT: &str = "write the file anew by `organza convert`, and keep its header as it is";
 
@@ -31,10 +34,17 @@ pub(super) fn read<S: Source>(
 ) -> Result<RawPoints, ReadError> {
     let said = Said::new(header)?;
     let mut points = None;
+    let is_packed = |element: &Element| element.name == PACKED.as_bytes();
+    let has_both = header.elements.iter().any(is_packed) && header.elements.iter().any(|e| e.name == b"vertex");
+    if has_both {
+        let expected = format!("an element 'vertex' or '{PACKED}'");
+        return Err(ReadError::input(at_line(header.body_line - 1), expected, "both", HINT));
+    }
     for element in &header.elements {
         check_count(&source, element)?;
         match element.name.as_slice() {
             b"vertex" => points = Some(splats(&mut source, element, &said, reading)?),
+            _ if is_packed(element) => points = Some(packed(&mut source, element, &said, reading)?),
             _ => {
                 reading.notes.not_used(element.properties.iter().map(|p| p.name.as_slice()));
                 skip_element(&mut source, element, reading)?;
@@ -80,6 +90,13 @@ impl Said {
             }
         }
         Ok(Self { origin: DVec3::new(x, y, z), cutoffs })
+    }
+
+    /// These splats as points.
+    fn points(&self, cloud: Cloud, dropped: u64) -> RawPoints {
+        let position = cloud.position.clone();
+        let ready = ReadySplats { cloud, cutoffs: self.cutoffs.clone() };
+        RawPoints { origin: self.origin, position, ready, dropped, ..RawPoints::default() }
     }
 }
 
@@ -154,20 +171,71 @@ fn splats<S: Source>(
             (column.set)(&mut splat, number);
         }
         source.end_record()?;
-        match splat.check().map_err(|e| (format!("{} of splat {record}: {}", e.attribute, e.expected), e.found)) {
-            Ok(()) if usize::from(splat.footprint) >= said.cutoffs.len() => {
-                let expected = format!("a footprint of splat {record} that a comment of the header states");
-                return Err(ReadError::input(source.place(), expected, splat.footprint.to_string(), HINT));
-            }
-            Ok(()) => cloud.push(&splat),
-            Err(_) if reading.params.drop_invalid => dropped += 1,
-            Err((expected, found)) => {
-                let hint = "remove the splat, or ask to drop invalid points";
-                return Err(ReadError::input(source.place(), expected, found, hint));
-            }
+        if is_valid(&splat, record, source, said, reading)? {
+            cloud.push(&splat);
+        } else {
+            dropped += 1;
         }
     }
-    let position = cloud.position.clone();
-    let ready = ReadySplats { cloud, cutoffs: said.cutoffs.clone() };
-    Ok(RawPoints { origin: said.origin, position, ready, dropped, ..RawPoints::default() })
+    Ok(said.points(cloud, dropped))
+}
+
+/// Whether a splat is one, or is to be dropped; else an error with its number.
+fn is_valid<S: Source>(
+    splat: &Splat,
+    record: u64,
+    source: &S,
+    said: &Said,
+    reading: &Reading<'_>,
+) -> Result<bool, ReadError> {
+    match splat.check() {
+        Ok(()) if usize::from(splat.footprint) >= said.cutoffs.len() => {
+            let expected = format!("a footprint of splat {record} that a comment of the header states");
+            Err(ReadError::input(source.place(), expected, splat.footprint.to_string(), HINT))
+        }
+        Ok(()) => Ok(true),
+        Err(_) if reading.params.drop_invalid => Ok(false),
+        Err(e) => {
+            let expected = format!("{} of splat {record}: {}", e.attribute, e.expected);
+            let hint = "remove the splat, or ask to drop invalid points";
+            Err(ReadError::input(source.place(), expected, e.found, hint))
+        }
+    }
+}
+
+/// Splats that are packed, unpacked.
+fn packed<S: Source>(
+    source: &mut S,
+    element: &Element,
+    said: &Said,
+    reading: &mut Reading<'_>,
+) -> Result<RawPoints, ReadError> {
+    let [Property { shape: Shape::Scalar(kind @ Type::U8), .. }] = element.properties[..] else {
+        let expected = format!("one property 'uchar byte' of '{PACKED}'");
+        return Err(ReadError::input(at_line(element.line), expected, "others", HINT));
+    };
+    // A splat of the least bytes that one is packed into becomes a whole one.
+    let most = element.count.div_ceil(LEAST_PACKED).saturating_mul(2 * size_of::<Splat>() as u64);
+    input::check_bytes("the splats", most, reading.params)?;
+    let mut bytes = Vec::with_capacity(element.count as usize);
+    for record in 0..element.count {
+        look(record, reading)?;
+        source.begin_record()?;
+        bytes.push(source.number(kind)? as u8);
+        source.end_record()?;
+    }
+    let broken = |e: splat_core::Error| ReadError::input(source.place(), "packed splats", e.to_string(), HINT);
+    let cloud = PackedCloud::from_bytes(&bytes).map_err(broken)?.unpack();
+    if cloud.origin != said.origin {
+        let expected = format!("packed splats about the origin that the header states, {:?}", said.origin);
+        return Err(ReadError::input(source.place(), expected, format!("{:?}", cloud.origin), HINT));
+    }
+    let mut kept = Vec::with_capacity(cloud.len());
+    for i in 0..cloud.len() {
+        if is_valid(&cloud.get(i), i as u64, source, said, reading)? {
+            kept.push(i as u32);
+        }
+    }
+    let dropped = (cloud.len() - kept.len()) as u64;
+    Ok(said.points(if dropped > 0 { cloud.gather(&kept) } else { cloud }, dropped))
 }

@@ -4,7 +4,7 @@
 //! points).
 
 use crate::form::Form;
-use crate::scene::SurfaceSampler;
+use crate::scene::{SurfaceSampler, VolumeSampler};
 use crate::statistics::{ObjectData, ObjectStatistics};
 
 /// Looseness of a field's bound above which triangles are faster than lines.
@@ -18,6 +18,10 @@ pub(crate) fn form(object: &ObjectStatistics) -> (Form, &'static str) {
         ObjectData::Points | ObjectData::Gaussians => (Form::Splats, "there is nothing between raw points"),
         ObjectData::Triangles => (Form::Triangles, "a uniform place on a triangle is exact"),
         ObjectData::Surface { looseness, trilinear, by } => surface(looseness, trilinear, by),
+        ObjectData::Volume | ObjectData::Density { .. } if object.volumes_by != VolumeSampler::Auto => {
+            let by_cells = object.volumes_by == VolumeSampler::Cells;
+            (if by_cells { Form::Cells } else { Form::Chains }, "the scene asks for it")
+        }
         ObjectData::Volume => (Form::Cells, "extinction is known on a lattice"),
         ObjectData::Density { bounded: false } => {
             (Form::Cells, "the expression has no bound, so it is sampled on a lattice")

@@ -10,7 +10,7 @@ use crate::Error;
 use crate::frame::Frame;
 use crate::load::Loaded;
 use crate::load::own::Own;
-use crate::scene::Technique;
+use crate::scene::{Technique, VolumeSampler};
 use glam::DVec3;
 use pbsr::{Appearance, KeptSets, Object, Sampler, SplatParams, SplatSampler};
 use splat_core::{Camera, Cloud, DAabb, Similarity, SplatKind, rng};
@@ -32,6 +32,7 @@ pub(super) struct Source<'a> {
     /// Cross-section of the particles, units² of the data.
     cross_section: f64,
     seed: u64,
+    volumes_by: VolumeSampler,
     /// Rank of the object in the scene.
     of: u32,
     /// A box in the world that holds it.
@@ -134,6 +135,7 @@ fn of_own<'a>(own: &'a Own, (n, sum): (u32, f64), frame: &Frame<'a>) -> Source<'
         },
         cross_section: finest_area(&frame.camera, &own.transform, own.bounds),
         seed: seed(frame, own.object as u32, own.kind()),
+        volumes_by: frame.settings.particles.volume_sampler,
         of: own.object as u32,
         bounds: own.world_box(),
     }
@@ -177,7 +179,8 @@ fn of_splats<'a>(frame: &Frame<'a>) -> Vec<Source<'a>> {
         let look = Appearance { material, kind, radius: radius as f32, shadow_coefficient };
         let data = Data::Splats(Box::new((splats, params)));
         let name = objects[object as usize].name.clone();
-        Source { name, data, transform: Similarity::default(), look, cross_section, seed, of: object, bounds }
+        let (transform, volumes_by) = (Similarity::default(), VolumeSampler::Auto);
+        Source { name, data, transform, look, cross_section, seed, volumes_by, of: object, bounds }
     };
     of_object.into_iter().map(part).collect()
 }

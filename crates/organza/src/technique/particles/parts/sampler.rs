@@ -1,10 +1,12 @@
 //! The sampler of an object with data of its own, and what is doubtful about it.
 
 use super::Source;
-use crate::load::own::{Body, Own, line_cells};
+use crate::load::own::{Body, Own};
+use crate::scene::VolumeSampler;
 use pbsr::{
     BoundedExtinction, BrownianParams, BrownianSampler, Density, FieldVolumeSampler, GridSampler, ImplicitSurface,
-    LatticeSampler, LineSampler, MeshSampler, Sampler, SurfaceParams, VolumeParams,
+    LatticeSampler, LineParams, LineSampler, MeshSampler, MetropolisParams, MetropolisSampler, Sampler, SurfaceParams,
+    VolumeParams,
 };
 
 /// Optical depth of a surface that is not quite opaque, at most.
@@ -22,16 +24,15 @@ impl<'a> Source<'a> {
                 let bounds = own.bounds;
                 let surface = ImplicitSurface { field: field.as_ref(), level: 0.0, bounds, inside: Some(inside) };
                 let width = bounds.size().max_element();
-                let cells = line_cells(width, *spacing);
+                let lines = LineParams::for_spacing(width, *spacing);
                 if let Some(step) = step {
                     let paper = BrownianParams::for_width(width);
-                    let walk = BrownianParams { step: step * width, resolution: cells, ..paper };
+                    let walk = BrownianParams { step: step * width, resolution: lines.resolution, ..paper };
                     let sampler = BrownianSampler::new(&surface, &walk, &self.surface(own))?;
                     warnings.extend(sampler.report().doubt().map(named));
                     return Ok(Box::new(sampler));
                 }
-                let sampler =
-                    LineSampler::new(&surface, &pbsr::LineParams { resolution: cells }, &self.surface(own), None)?;
+                let sampler = LineSampler::new(&surface, &lines, &self.surface(own), None)?;
                 warnings.extend(sampler.report().doubts().map(named));
                 Box::new(sampler)
             }
@@ -45,7 +46,11 @@ impl<'a> Source<'a> {
                     seed: self.seed,
                 };
                 let kept = cut.as_ref().map(|field| Density { field: field.as_ref(), max: 1.0 });
-                Box::new(GridSampler::new(grid, transfer, &params, kept)?)
+                let VolumeSampler::Metropolis { stride } = self.volumes_by else {
+                    return Ok(Box::new(GridSampler::new(grid, transfer, &params, kept)?));
+                };
+                let chains = MetropolisParams { stride, ..MetropolisParams::default() };
+                Box::new(MetropolisSampler::new(grid, transfer, &params, &chains, kept)?)
             }
             Body::Field(field) => self.field(own, field)?,
         })
