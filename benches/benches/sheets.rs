@@ -80,7 +80,8 @@ impl Likeness {
     fn new(grid: &Grid, bytes: bool) -> Self {
         const HEAD: DVec3 = DVec3::new(197.0, 233.0, 189.0);
         let range = |least: f32, of: fn(f32, f32) -> f32| grid.values.iter().copied().fold(least, of);
-        let (lowest, highest) = if bytes { (0.0, 255.0) } else { (range(f32::MAX, f32::min), range(f32::MIN, f32::max)) };
+        let (lowest, highest) =
+            if bytes { (0.0, 255.0) } else { (range(f32::MAX, f32::min), range(f32::MIN, f32::max)) };
         let diagonal = (grid.axes * DVec3::from_array(grid.dims.map(|n| n as f64))).length();
         Self { lowest, step: (highest - lowest) / 255.0, length: diagonal / HEAD.length() }
     }
@@ -110,7 +111,8 @@ impl Likeness {
 
 fn main() {
     let words: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with('-')).collect();
-    let (files, words): (Vec<_>, Vec<_>) = words.into_iter().partition(|word| Path::new(word).is_file() || word == "dense");
+    let (files, words): (Vec<_>, Vec<_>) =
+        words.into_iter().partition(|word| Path::new(word).is_file() || word == "dense");
     let only = words.concat();
     let asset = Path::new(env!("CARGO_MANIFEST_DIR")).join("../assets/mni152/mni152_t1.nii.gz");
     let grid = match files.first() {

@@ -4,8 +4,8 @@ use super::check::{At, LARGEST, SMALLEST};
 use super::check_surfels::check_surfels;
 use super::de::suggest;
 use super::raw_render::{
-    Auto, RawAccumulation, RawAligned, RawClassify, RawDirection, RawMapping, RawParticles, RawPoints, RawRender,
-    RawScattering, RawShadow, RawSheets, RawSlicing, RawSoftShadows, RawSurfaceSampler, RawVolumeSampler,
+    Auto, RawAccumulation, RawAligned, RawClassify, RawDirection, RawGradients, RawMapping, RawParticles, RawPoints,
+    RawRender, RawScattering, RawShadow, RawSheets, RawSlicing, RawSoftShadows, RawSurfaceSampler, RawVolumeSampler,
 };
 use super::{
     Aligned, Classify, LAYER_NAMES, LayerChoice, ParticlesSettings, PointsSettings, RenderSettings, Scattering,
@@ -131,11 +131,15 @@ fn check_points(at: &At<'_>, raw: &RawPoints) -> Result<PointsSettings, Error> {
         first_slices: raw.first_slices,
         transmittance_cutoff: check_cutoff(at, raw.transmittance_cutoff)?,
         resampling_filter: raw.resampling_filter.unwrap_or(true),
-        accumulation: match raw.accumulation {
-            RawAccumulation::F32 => Accumulation::F32,
-            RawAccumulation::F16 => Accumulation::F16,
-        },
+        accumulation: check_accumulation(raw.accumulation),
     })
+}
+
+fn check_accumulation(raw: RawAccumulation) -> Accumulation {
+    match raw {
+        RawAccumulation::F32 => Accumulation::F32,
+        RawAccumulation::F16 => Accumulation::F16,
+    }
 }
 
 /// The transmittance at which a pixel is finished.
@@ -166,8 +170,19 @@ fn check_sheets(at: &At<'_>, raw: &RawSheets) -> Result<SheetsSettings, Error> {
         slab_width,
         kernel_extent: extent,
         kernel_sigma: sigma,
+        kernel_sections: check_sections(at, raw.kernel_sections.unwrap_or(256))?,
+        accumulation: check_accumulation(raw.accumulation),
+        gradient_volume: raw.gradients == RawGradients::Volume,
         transmittance_cutoff: check_cutoff(at, raw.transmittance_cutoff)?,
     })
+}
+
+fn check_sections(at: &At<'_>, sections: u32) -> Result<u32, Error> {
+    if sections.is_power_of_two() && sections <= 256 {
+        return Ok(sections);
+    }
+    let message = format!("`kernel_sections`: expected 1, 2, 4 and so on up to 256, found {sections}");
+    Err(at.key("kernel_sections").error(message, "the paper has 64, and 256 is the default"))
 }
 
 fn check_aligned(at: &At<'_>, raw: &RawSheets, slab_width: Option<f64>) -> Result<Aligned, Error> {

@@ -80,8 +80,24 @@ pub(super) struct RawSheets {
     pub(super) kernel_extent: Option<f64>,
     /// Standard deviation of the kernel in steps of the lattice, an eighth of the extent to the whole; default 0.35 of it.
     pub(super) kernel_sigma: Option<f64>,
+    /// Sections of a kernel in a slab's width, the places within a slab where it may begin: a power of two up to 256, the default.
+    pub(super) kernel_sections: Option<u32>,
+    /// Precision of the sums of voxels in a slab and of slabs in a pixel, "f32" (default) or "f16".
+    pub(super) accumulation: RawAccumulation,
+    /// Where normals come from, "sheets" (default), differences of neighbouring pixels and slabs, or "volume", differences at voxels.
+    pub(super) gradients: RawGradients,
     /// A pixel is finished when its transmittance is below this, from 0 to below 1; default 1/1024.
     pub(super) transmittance_cutoff: Option<f64>,
+}
+
+/// Where normals come from.
+#[derive(Debug, Default, Clone, Copy, PartialEq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+#[schemars(rename = "Gradients")]
+pub(super) enum RawGradients {
+    #[default]
+    Sheets,
+    Volume,
 }
 
 /// What slabs lie across.

@@ -108,6 +108,12 @@ pub struct SheetsSettings {
     pub kernel_extent: f64,
     /// Standard deviation of the kernel, steps of the lattice, in [extent/8, extent].
     pub kernel_sigma: f64,
+    /// Sections of the kernel in a slab's width, the places within a slab where it may begin: a power of two up to 256.
+    pub kernel_sections: u32,
+    /// Precision of the sums of voxels in a slab and of slabs in a pixel; that of half precision takes at most 2048 slabs.
+    pub accumulation: Accumulation,
+    /// Whether normals come from central differences at voxels, interpolated, in the place of those of neighbouring pixels and slabs.
+    pub gradient_volume: bool,
     /// A pixel is finished when its transmittance falls below this, in [0, 1).
     pub transmittance_cutoff: f64,
 }

@@ -4,17 +4,19 @@ use crate::aligned::{Slant, plane_step};
 use crate::classify::Classifier;
 use crate::counts::SheetCounts;
 use crate::error::cancelled;
+use crate::gradient_volume::GradientVolume;
 use crate::kept::Kept;
 use crate::lattice::Lattice;
 use crate::light::Lamp;
 use crate::near_eye;
+use crate::neighbours::Receivers;
 use crate::params::{Aligned, Classify};
 use crate::preclassified::Preclassified;
 use crate::rays::LatticeRays;
 use crate::ring::{Ring, Splatter, Taper};
 use crate::sections::SectionTable;
 use crate::segments::Segments;
-use crate::shadows::{Receivers, Shadows};
+use crate::shadows::Shadows;
 use crate::sheets::Sheets;
 use crate::slabs::{Kernels, Slabs};
 use crate::tile::{self, AREA, FoldTile, Scratch, TILE};
@@ -41,11 +43,15 @@ pub(crate) struct Prepared<'a> {
     pub(crate) sections: SectionTable,
     kernel: Kernel,
     taper: Taper,
+    /// Whether sums are rounded to half precision.
+    half: bool,
     pub(crate) classify: Classify,
     pub(crate) classifier: Classifier,
     pub(crate) rays: LatticeRays,
     pub(crate) voxels: Voxels,
     pub(crate) shadows: Option<Shadows>,
+    /// Where normals come from that.
+    pub(crate) gradients: Option<GradientVolume>,
     /// Its slabs that lack kernels, because these lie behind the eye.
     pub(crate) lacking: Option<Range<u32>>,
     pub(crate) segments: Segments,
@@ -86,8 +92,10 @@ pub fn prepare<'a>(input: SheetInput<'a>, params: &Params, progress: Option<&Pro
     let mut volumes = Vec::with_capacity(input.volumes.len());
     for volume in &input.volumes {
         let mut prepared = Prepared::new(*volume, &input, params, (&slabs, slant), tiles);
-        needed += Shadows::bytes(prepared.voxels.count(), &input.lights);
+        let count = prepared.voxels.count();
+        needed += Shadows::bytes(count, &input.lights) + GradientVolume::bytes(count, volume, params);
         check(needed, params)?;
+        prepared.gradients = GradientVolume::new(&prepared.receivers(), &prepared.lattice, params);
         prepared.shadows = Shadows::new(&prepared.receivers(), &input.lights, input.shadow_origin, progress)?;
         volumes.push(prepared);
         progress.tick(1).map_err(cancelled)?;
@@ -121,7 +129,9 @@ pub(crate) fn slabs_of(input: &SheetInput<'_>, params: &Params, slant: Slant) ->
     }
     let width = params.slab_width.unwrap_or(spacing);
     let kernels = |v: &Volume<'_>| Kernels { reach: reach(v, input, params), stride: stride(v, input, params, width) };
-    Slabs::for_kernels(near, far, width, &input.volumes.iter().map(kernels).collect::<Vec<_>>())
+    let slabs = Slabs::for_kernels(near, far, width, &input.volumes.iter().map(kernels).collect::<Vec<_>>())?;
+    params.check_slabs(slabs.count)?;
+    Ok(slabs)
 }
 
 /// Steps of a volume along the view.
@@ -192,7 +202,7 @@ impl<'a> Prepared<'a> {
         let slabs = &slabs.wider(stride);
         let viewed = Viewed::new(&volume, camera, slabs, params, slant);
         let lacking = near_eye::lacking(&volume, camera, slabs, viewed.reach);
-        let reach = viewed.lattice_reach(camera, slabs, volume.normals);
+        let reach = viewed.lattice_reach(camera, slabs, params.compares_sheets(&volume));
         let lattice = Lattice::new(grid, volume.packing, reach);
         let viewed = viewed.with_rim(lattice.rim);
         let transfer = &volume.seen();
@@ -210,6 +220,7 @@ impl<'a> Prepared<'a> {
             sections: SectionTable::new(viewed.reach / slabs.width, &footprint),
             taper: Taper::new(0.5 * cutoff * cutoff),
             kernel: Kernel::new(&footprint),
+            half: params.is_half(),
             classify: params.classify,
             classifier: Classifier::new(transfer, volume.extinction_scale, base),
             rays: LatticeRays::new(&volume, camera, slabs.origin),
@@ -217,6 +228,7 @@ impl<'a> Prepared<'a> {
             viewed,
             voxels,
             shadows: None,
+            gradients: None,
             lacking,
             segments,
             base,
@@ -239,6 +251,7 @@ impl<'a> Prepared<'a> {
             kernel: &self.kernel,
             taper: self.taper,
             sections: &self.sections,
+            half: self.half,
             footprint: self.footprint,
         }
     }

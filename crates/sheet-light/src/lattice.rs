@@ -58,6 +58,9 @@ impl<'a> Lattice<'a> {
 
     /// The value at a lattice point.
     pub(crate) fn value(&self, i: usize, j: usize, k: usize) -> f32 {
+        if let Some(value) = self.inside(i..i + 1, j, k) {
+            return value[0];
+        }
         let [nx, ny, _] = self.grid.dims;
         let mut sum = 0.0;
         for (c, k) in self.terms(2, k) {

@@ -1,7 +1,9 @@
 //! What the caller chooses: slab width, kernel, when a pixel is done, memory.
 
-use crate::Error;
+use crate::sections::PHASES;
+use crate::{Error, Volume};
 use splat_core::Limits;
+use splat_core::raster::Accumulation;
 
 /// The reconstruction kernel, in spacings of the lattice: a Gaussian less its Taylor polynomial at the rim
 /// ([`splat_core::Footprint`]), across the view as a footprint, along it as sections.
@@ -41,6 +43,17 @@ pub enum Aligned {
     Axis,
 }
 
+/// Where the normals of volumes that have them come from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Gradients {
+    /// Differences of neighbouring pixels and sheets (the paper, section 4.2): of the values that are seen, blurred by kernels.
+    #[default]
+    Sheets,
+    /// A gradient volume: central differences at the voxels, interpolated trilinearly; 12 bytes a voxel that is needed. So ray casters have it, and
+    /// normals know nothing of kernels, slabs and pixels.
+    Volume,
+}
+
 /// Parameters of image-aligned sheets.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Params {
@@ -48,6 +61,15 @@ pub struct Params {
     pub slab_width: Option<f64>,
     /// The kernel.
     pub kernel: KernelShape,
+    /// Sections that are known of a kernel in each slab's width: the places within a slab at which kernels may begin, which theirs are rounded to.
+    /// A power of two up to [`PHASES`](crate::sections::PHASES), the default; 64 in the paper.
+    pub sections: u32,
+    /// Precision of what is summed over voxels in a sheet, and over slabs in the eye's image and the light's: single, or the 11 bits of half precision, as
+    /// in buffers of 16 bits whose exponents suit what they hold. Those stall where a slab adds less than half of the last bit, so that they take at
+    /// most [`Params::MOST_F16_SLABS`] slabs.
+    pub accumulation: Accumulation,
+    /// Where normals come from.
+    pub gradients: Gradients,
     /// When values become colours; of slabs across the view alone.
     pub classify: Classify,
     /// What slabs lie along; of slabs across the view alone.
@@ -63,6 +85,9 @@ impl Params {
     /// "Usually 0.98" opacity (section 4.4).
     pub const PAPERS_CUTOFF: f32 = 0.02;
 
+    /// Most slabs that sums of 11 bits take: what a slab adds to as many equal ones is half of their sum's last bit or more.
+    pub const MOST_F16_SLABS: u32 = 2048;
+
     /// What [`Params::check_any_mode`] does, and that no mode but the paper's is asked for.
     pub(crate) fn check(&self) -> Result<(), Error> {
         self.check_any_mode()?;
@@ -75,6 +100,30 @@ impl Params {
         Ok(())
     }
 
+    /// Whether the gradients of a volume are told from neighbouring sheets.
+    pub(crate) fn compares_sheets(&self, volume: &Volume<'_>) -> bool {
+        volume.normals && self.gradients == Gradients::Sheets
+    }
+
+    /// Whether sums are rounded to half precision.
+    pub(crate) fn is_half(&self) -> bool {
+        self.accumulation == Accumulation::F16
+    }
+
+    /// How much farther kernels reach by the rounding of their places than they do at the default, slabs.
+    pub(crate) fn rounding(&self) -> f64 {
+        0.5 / f64::from(self.sections) - 0.5 / f64::from(PHASES)
+    }
+
+    /// That sums do not stall in so many slabs.
+    pub(crate) fn check_slabs(&self, count: u32) -> Result<(), Error> {
+        if !self.is_half() || count <= Self::MOST_F16_SLABS {
+            return Ok(());
+        }
+        let hint = "choose wider slabs or sums of single precision".to_owned();
+        Err(Error::limit("accumulation in half precision", count.into(), Self::MOST_F16_SLABS.into(), "slabs", hint))
+    }
+
     pub(crate) fn check_any_mode(&self) -> Result<(), Error> {
         let KernelShape { extent, sigma } = self.kernel;
         if !(0.5..=8.0).contains(&extent) {
@@ -82,6 +131,9 @@ impl Params {
         }
         if !(1.0..=8.0).contains(&(extent / sigma)) {
             return Err(Error::parameter("kernel.sigma", sigma, "an eighth of the extent to the whole"));
+        }
+        if !(self.sections.is_power_of_two() && self.sections <= PHASES) {
+            return Err(Error::parameter("sections", self.sections, "a power of two up to 256"));
         }
         if !(0.0..1.0).contains(&self.transmittance_cutoff) {
             return Err(Error::parameter("transmittance_cutoff", self.transmittance_cutoff, "0 to below 1"));
@@ -107,6 +159,9 @@ impl Default for Params {
         Self {
             slab_width: None,
             kernel: KernelShape::default(),
+            sections: PHASES,
+            accumulation: Accumulation::F32,
+            gradients: Gradients::default(),
             classify: Classify::default(),
             aligned: Aligned::default(),
             transmittance_cutoff: 1e-3,

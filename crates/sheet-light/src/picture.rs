@@ -3,6 +3,8 @@
 //! Front to back: weight = T·(1 − e^−τ), C ← C + weight·L, 1 − e^−τ by a series; T is e^−τ of all so far. Optical depth and radiance are summed with
 //! their rounding errors kept (Kahan), so slabs by the hundred thousand cost no digits.
 
+use crate::Params;
+use crate::precision::rounded;
 use crate::tile::{SIDE, TILE};
 use splat_core::raster::lanes::{Lanes, MAX_LANES, exp_neg};
 use splat_core::raster::pulp::Simd;
@@ -45,6 +47,8 @@ pub(crate) struct Picture {
     depth: Vec<DepthProfile>,
     object: Vec<u32>,
     cutoff: f32,
+    /// Whether sums are rounded to half precision.
+    half: bool,
     /// Pixels of each row of the tile with its rim that are seen through.
     pub(crate) open: [u64; SIDE],
     /// Of these, those where volumes may be seen: what is opaque lies behind.
@@ -53,7 +57,7 @@ pub(crate) struct Picture {
 
 impl Picture {
     /// The tile at `corner` as it is so far.
-    pub(crate) fn load(from: &Accumulator, corner: [usize; 2], cutoff: f32) -> Self {
+    pub(crate) fn load(from: &Accumulator, corner: [usize; 2], params: &Params) -> Self {
         let (planes, channels) = (from.optical_depth.len(), from.channels.len());
         let inside = [0, 1].map(|a| (from.size[a] as usize - corner[a]).min(TILE));
         let mut tile = Self {
@@ -69,7 +73,8 @@ impl Picture {
             value_excess: vec![0.0; channels * PIXELS],
             depth: if from.depth.is_empty() { Vec::new() } else { vec![DepthProfile::default(); PIXELS] },
             object: if from.object.is_empty() { Vec::new() } else { vec![u32::MAX; PIXELS] },
-            cutoff,
+            cutoff: params.transmittance_cutoff,
+            half: params.is_half(),
             open: [0; SIDE],
             lit: [0; SIDE],
         };
@@ -175,14 +180,14 @@ impl Picture {
             if p == self.planes / 2 {
                 before = sum;
             }
-            let new = add(simd, &mut self.optical_depth[plane..], &mut self.excess[plane..], tau);
+            let new = add(simd, [&mut self.optical_depth[plane..], &mut self.excess[plane..]], tau, self.half);
             new.exp_neg().store(&mut self.transmittance[plane..]);
         }
         for c in 0..self.channels {
             let weight = weights[ChannelLayout::plane_of(c, self.channels, self.planes)];
             let channel = c * PIXELS + at;
             let term = weight * Lanes::load(simd, &of.values[c]);
-            add(simd, &mut self.values[channel..], &mut self.value_excess[channel..], term);
+            add(simd, [&mut self.values[channel..], &mut self.value_excess[channel..]], term, self.half);
         }
         if !(self.depth.is_empty() && self.object.is_empty()) {
             let mut nearer = [0.0; MAX_LANES];
@@ -211,10 +216,15 @@ impl Picture {
     }
 }
 
-/// Adds to sums that are too large by `excess`; the new sums.
+/// Adds to sums that are too large by `excess`, or that are of half precision; the new sums.
 #[inline(always)]
-pub(crate) fn add<S: Simd>(simd: S, sums: &mut [f32], excess: &mut [f32], term: Lanes<S>) -> Lanes<S> {
+pub(crate) fn add<S: Simd>(simd: S, [sums, excess]: [&mut [f32]; 2], term: Lanes<S>, half: bool) -> Lanes<S> {
     let sum = Lanes::load(simd, sums);
+    if half {
+        let new = rounded(simd, sum + term);
+        new.store(sums);
+        return new;
+    }
     let term = term - Lanes::load(simd, excess);
     let new = sum + term;
     ((new - sum) - term).store(excess);

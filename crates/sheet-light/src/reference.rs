@@ -2,9 +2,10 @@
 
 use crate::aligned::Slant;
 use crate::fold::{slabs_of, stride};
+use crate::gradient_volume::differences;
 use crate::lattice::Lattice;
 use crate::near_eye::{LEAST_APART, eye_of, lacking};
-use crate::params::Classify;
+use crate::params::{Classify, Gradients};
 use crate::rays::LatticeRays;
 use crate::sections::{PHASES, sections};
 use crate::slabs::Slabs;
@@ -104,7 +105,7 @@ impl Sheets {
             size,
         };
         let viewed = Viewed::new(volume, camera, slabs, params, slant);
-        let reach = viewed.lattice_reach(camera, slabs, volume.normals);
+        let reach = viewed.lattice_reach(camera, slabs, params.compares_sheets(volume));
         let lattice = Lattice::new(volume.grid, volume.packing, reach);
         let viewed = viewed.with_rim(lattice.rim);
         let [nx, ny, nz] = lattice.dims;
@@ -212,13 +213,18 @@ impl Sheets {
         let (from, along) = input.camera.view_ray(x, y);
         let extinction = class * volume.extinction_scale * f64::from(volume.material.extinction_rgb[1]);
         let tau = extinction * (far - near) * along.length();
-        let normal = if volume.normals { self.normal(of, own, at, along) } else { Vec3::ZERO };
         let viewed = Viewed::new(volume, input.camera, &self.slabs, params, slant);
         let depth = slabs.origin + 0.5 * (begin + end) - slant.offset(from.x, from.y);
         let axes = input.camera.axes;
         let world = |v: DVec3| axes[0] * v.x + axes[1] * v.y + axes[2] * v.z;
+        let position = input.camera.position + world(from + along * depth);
+        let normal = match params.gradients {
+            _ if !volume.normals => Vec3::ZERO,
+            Gradients::Sheets => self.normal(of, own, at, along),
+            Gradients::Volume => normal_of_volume(volume, position),
+        };
         let point = Point {
-            position: input.camera.position + world(from + along * depth),
+            position,
             radius: viewed.reach as f32,
             normal,
             to_eye: -world(along).normalize().as_vec3(),
@@ -266,4 +272,25 @@ fn radiance(input: &SheetInput<'_>, volume: &Volume<'_>, point: &Point<'_>) -> [
     });
     let effects = radiance.effects();
     [0, 1, 2].map(|c| effects.iter().map(|effect| f64::from(effect[c])).sum())
+}
+
+/// −∇v/|∇v| of a gradient volume at a world position: central differences at the lattice points around it, linear along each axis.
+pub(crate) fn normal_of_volume(volume: &Volume<'_>, at: DVec3) -> Vec3 {
+    let lattice = Lattice::new(volume.grid, volume.packing, [usize::MAX; 3]);
+    let inverse = volume.axes().inverse();
+    let place = inverse * (at - volume.origin()) + DVec3::from_array(lattice.rim.map(|n| n as f64));
+    // Two neighbours along an axis, and their shares.
+    let two =
+        |place: f64| [(place.floor(), 1.0 - (place - place.floor())), (place.floor() + 1.0, place - place.floor())];
+    let mut gradient = DVec3::ZERO;
+    for (k, deep) in two(place.z) {
+        let shift = volume.packing.shift(k as usize + lattice.rim[2] % 2);
+        for (j, high) in two(place.y - shift) {
+            for (i, wide) in two(place.x - shift) {
+                let own = differences(&lattice, [i as usize, j as usize, k as usize]);
+                gradient += deep * high * wide * DVec3::from_array(own);
+            }
+        }
+    }
+    -(inverse.transpose() * gradient).normalize_or_zero().as_vec3()
 }

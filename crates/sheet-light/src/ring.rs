@@ -6,6 +6,7 @@
 //! batches of four, half a line; five sections that begin in one half end in the other. Kernels that touch more slabs have as many
 //! lines a pixel as they need.
 
+use crate::precision::rounded;
 use crate::sections::{PHASES, SectionTable};
 use crate::sheets::Sheets;
 use crate::slabs::BATCH;
@@ -56,6 +57,8 @@ pub(crate) struct Splatter<'a> {
     pub(crate) kernel: &'a Kernel,
     pub(crate) taper: Taper,
     pub(crate) sections: &'a SectionTable,
+    /// Whether sums are rounded to half precision.
+    pub(crate) half: bool,
     /// The footprint of all voxels, where rays are parallel.
     pub(crate) footprint: Option<PixelFootprint>,
 }
@@ -140,8 +143,12 @@ impl Ring {
         let mut line = first / SLABS;
         while line <= last / SLABS {
             let (sums, plane) = self.line(of.sections, record, line);
-            let lines = &mut self.lines[plane + y0 * SIDE + x0..plane + (y1 - 1) * SIDE + x1];
+            let covered = plane + y0 * SIDE + x0..plane + (y1 - 1) * SIDE + x1;
+            let lines = &mut self.lines[covered.clone()];
             rows = Covered { lines, weights: &self.weights, wanted, span }.add(simd, &sums, x1 - x0);
+            if of.half {
+                round(simd, &mut self.lines[covered], x1 - x0);
+            }
             // With one line a pixel, what runs over its end went on at its beginning.
             line += if self.count == 1 { 2 } else { 1 };
         }
@@ -349,6 +356,18 @@ impl Covered<'_> {
             }
         }
         rows
+    }
+}
+
+/// Rounds the lines of the first pixels of each row to half precision.
+#[inline(always)]
+fn round<S: Simd>(simd: S, lines: &mut [Line], width: usize) {
+    for row in lines.chunks_mut(SIDE) {
+        for line in &mut row[..width] {
+            for part in line.0.chunks_exact_mut(Lanes::<S>::COUNT) {
+                rounded(simd, Lanes::load(simd, part)).store(part);
+            }
+        }
     }
 }
 

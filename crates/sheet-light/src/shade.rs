@@ -195,7 +195,13 @@ impl Shader<'_> {
 
     /// Where light is asked for: the middle of the medium.
     #[inline(always)]
-    fn spots<S: Simd>(&self, simd: S, of: &Reconstructed<'_>, place: Place, medium: &Medium<S>) -> Spots<S> {
+    fn spots<S: Simd>(
+        &self,
+        simd: S,
+        of: &Reconstructed<'_>,
+        place: Place,
+        (medium, wanted): (&Medium<S>, u32),
+    ) -> Spots<S> {
         let of_all = |v: f32| Lanes::splat(simd, v);
         let (zero, half) = (of_all(0.0), of_all(0.5));
         let middle = (medium.near + medium.far) * half;
@@ -206,9 +212,12 @@ impl Shader<'_> {
             let [u, v] = self.slopes(simd, place);
             [u * towards, v * towards, towards]
         };
-        let (normal, is_normal) =
-            if of.prepared.volume.normals { unit(simd, &self.gradient(simd, of, place)) } else { ([zero; 3], zero) };
         let at = self.slopes.places(simd, [place.x, place.y], middle);
+        let (normal, is_normal) = match &of.prepared.gradients {
+            Some(gradients) => unit(simd, &gradients.at(simd, &of.prepared.voxels, &at, wanted)),
+            None if of.prepared.volume.normals => unit(simd, &self.gradient(simd, of, place)),
+            None => ([zero; 3], zero),
+        };
         Spots { at, to_eye, normal, is_normal, color: medium.color }
     }
 
@@ -264,7 +273,8 @@ impl Shader<'_> {
         for lane in 0..Lanes::<S>::COUNT {
             wanted |= u32::from(tau[lane] > 0.0) << lane;
         }
-        self.channels(simd, of, &self.spots(simd, of, place, medium), wanted & of.open, values);
+        let wanted = wanted & of.open;
+        self.channels(simd, of, &self.spots(simd, of, place, (medium, wanted)), wanted, values);
         for c in 0..self.layout.count() {
             // What is not seen may be no number.
             let (zero, value) = (Lanes::splat(simd, 0.0), Lanes::load(simd, &values[c]));
@@ -287,7 +297,7 @@ impl Shader<'_> {
         let mut lit = Lit::dark(simd);
         if volume.material.shading != Shading::Unlit {
             let shadows = of.prepared.shadows.as_ref();
-            let shadows = shadows.map(|s| (s, s.cells(simd, &of.prepared.voxels, &spots.at, wanted)));
+            let shadows = shadows.map(|s| (s, s.neighbours.cells(simd, &of.prepared.voxels, &spots.at, wanted)));
             let mut through = [Lanes::splat(simd, 1.0); 3];
             for (rank, lamp) in self.lamps.iter().enumerate() {
                 if let Some((shadows, cells)) = &shadows {

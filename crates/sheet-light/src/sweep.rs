@@ -40,7 +40,7 @@ impl VolumeScratch {
     fn finish<S: Simd>(&mut self, simd: S, of: &Prepared<'_>, picture: &Picture, counts: &mut SheetCounts) {
         let batch = self.batches.start;
         self.batches.start += 1;
-        let (splatter, wanted) = (of.splatter(), picture.wanted(of.volume.normals));
+        let (splatter, wanted) = (of.splatter(), picture.wanted(of.volume.normals && of.gradients.is_none()));
         let is_near = |lacking: &Range<u32>| batch <= lacking.end / BATCH;
         let mut near_eye = self.near_eye.as_deref_mut().filter(|_| of.lacking.as_ref().is_some_and(is_near));
         for record in self.queue.take(of, batch, picture.corner) {

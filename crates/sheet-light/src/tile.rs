@@ -102,7 +102,7 @@ impl pulp::WithSimd for FoldTile<'_> {
         let mut counts = SheetCounts::default();
         let of = self.of;
         let corner = [self.t % of.tiles[0] * TILE, self.t / of.tiles[0] * TILE];
-        let mut picture = Picture::load(self.into, corner, of.params.transmittance_cutoff);
+        let mut picture = Picture::load(self.into, corner, &of.params);
         if picture.open.iter().all(|row| *row == 0) {
             counts.tiles_skipped = 1;
             return (None, counts);

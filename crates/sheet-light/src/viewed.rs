@@ -75,6 +75,11 @@ pub(crate) struct Viewed {
     /// View depth of the first slab, for perspective.
     origin: Option<f64>,
     pub(crate) width: f64,
+    /// Places within a slab at which kernels begin, and how many 256ths of a slab they are apart.
+    starts: f64,
+    apart: u32,
+    /// How much farther kernels reach by that than with all 256, world units.
+    rounding: f64,
 }
 
 /// Steps of a lattice in view space.
@@ -152,6 +157,9 @@ impl Viewed {
             center: camera.size.map(|s| 0.5 * f64::from(s)),
             origin: (!camera.is_orthographic()).then_some(slabs.origin),
             width: slabs.width,
+            starts: f64::from(params.sections),
+            apart: PHASES / params.sections,
+            rounding: params.rounding() * slabs.width,
         }
     }
 
@@ -176,7 +184,7 @@ impl Viewed {
     #[inline(always)]
     pub(crate) fn place(&self, depth: f32) -> Option<u32> {
         let slabs = (f64::from(depth) - self.reach) / self.width;
-        (slabs >= 0.0).then_some((slabs * f64::from(PHASES) + 0.5) as u32)
+        (slabs >= 0.0).then_some((slabs * self.starts + 0.5) as u32 * self.apart)
     }
 
     /// The depth of the middle of a kernel that begins there.
@@ -193,7 +201,7 @@ impl Viewed {
         for i in 0..8 {
             let at = start + self.axes.x_axis * i as f64;
             let slabs = (f64::from(at.z as f32) - self.reach) / self.width;
-            out.places[i] = (slabs * f64::from(PHASES) + 0.5).trunc();
+            out.places[i] = (slabs * self.starts + 0.5).trunc() * f64::from(self.apart);
             let z = origin + out.places[i] * (self.width / f64::from(PHASES)) + self.reach;
             let is_near = self.origin.is_some() && z < NEAREST * self.reach;
             out.is_before_the_eye[i] = slabs >= 0.0 && !is_near;
@@ -247,7 +255,7 @@ impl Viewed {
         let [xx, xy, yy] = self.extent_px(scale).map(|m| m / (scale * scale));
         let pixel = neighbour / scale;
         // A sheet holds means over its slab, whose middle may lie beyond a volume's face; values there are in part those of the next sheet.
-        let along = self.reach + (1.5 + neighbour) * slabs.width;
+        let along = self.reach + (1.5 + neighbour) * slabs.width + self.rounding;
         let [width, height] = camera.size.map(f64::from);
         let corners = [[0.0, 0.0], [width, 0.0], [0.0, height], [width, height]];
         let inverse = self.axes.inverse();

@@ -1,7 +1,7 @@
 //! Half-vector sheets: closed forms, hard cases, invariances, the slow twin.
 
 mod closed_forms;
-mod common;
+pub(crate) mod common;
 mod cut;
 mod hard_cases;
 mod invariances;
@@ -14,4 +14,4 @@ mod soft_polygons;
 mod soft_splats;
 mod splats;
 mod splats_scattered;
-mod twin;
+pub(crate) mod twin;

@@ -16,6 +16,9 @@ const ALONG: Params = Params { aligned: Aligned::Axis, ..EXACT };
 const EXACT: Params = Params {
     slab_width: None,
     kernel: sheet_light::KernelShape { extent: 2.0, sigma: 0.7 },
+    sections: 256,
+    accumulation: splat_core::raster::Accumulation::F32,
+    gradients: sheet_light::Gradients::Sheets,
     classify: Classify::After,
     aligned: Aligned::View,
     transmittance_cutoff: 0.0,

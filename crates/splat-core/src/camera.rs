@@ -215,6 +215,19 @@ mod tests {
     use super::*;
 
     #[test]
+    fn offsets_are_seen_where_their_places_are() {
+        let (eye, origin) = (DVec3::new(3.0, 1.0, 5.0), DVec3::new(0.5, -0.25, 1.0));
+        let camera =
+            Camera::look_at(eye, DVec3::ZERO, DVec3::Y, Projection::Perspective { fov_y: 0.6 }, [4, 4]).unwrap();
+        let view = camera.view_from_offset(origin);
+        for offset in [Vec3::ZERO, Vec3::new(1.0, -2.0, 0.5)] {
+            let expected = camera.view_from_world(origin + offset.as_dvec3()).as_vec3();
+            assert!((view.apply(offset) - expected).length() < 1e-6, "{offset}");
+            assert!((view.depth(offset) - expected.z).abs() < 1e-6, "{offset}");
+        }
+    }
+
+    #[test]
     fn ou2_impossible_cameras_are_refused() {
         let p = Projection::Perspective { fov_y: 0.6 };
         let look = |target, projection, size| Camera::look_at(DVec3::ZERO, target, DVec3::Y, projection, size);

@@ -246,6 +246,15 @@ mod tests {
     }
 
     #[test]
+    fn what_is_flat_has_the_normal_of_the_side_that_it_shines_to() {
+        let (center, normal) = (DVec3::ONE, DVec3::NEG_Y);
+        let disk = LightShape::Disk { center, normal, radius: 0.5 };
+        let rect = LightShape::Rect { center, u: DVec3::X * 2.0, v: DVec3::Z };
+        assert_eq!([disk.normal(), rect.normal()], [Some(normal); 2]);
+        assert_eq!(LightShape::Point { position: center }.normal(), None);
+    }
+
+    #[test]
     fn ts01_a_splat_at_the_light_receives_a_finite_mean() {
         let light = light(LightShape::Point { position: DVec3::ONE });
         for offset in [0.0, 1e-12, 1e-3] {

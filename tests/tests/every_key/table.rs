@@ -440,6 +440,9 @@ fn render() -> Vec<Entry> {
         of(BALL_AND_SURFACE, "render.sheets.kernel_sigma", "render.sheets.kernel_sigma=1")
             .by(SHEETS)
             .but(These(&["implicit"]), NO_VOXELS),
+        of(BALL, "render.sheets.kernel_sections", "render.sheets.kernel_sections=1").by(SHEETS),
+        of(VOLUME, "render.sheets.gradients", "render.sheets.gradients='volume'").by(SHEETS).with(PHONG),
+        of(BALL_AND_SURFACE, "render.sheets.accumulation", "render.sheets.accumulation='f16'").by(SHEETS),
         of(BALL, "render.sheets.transmittance_cutoff", "render.sheets.transmittance_cutoff=0.9")
             .by(SHEETS)
             .with(&["object.it.transform.scale=4"]),
@@ -472,7 +475,6 @@ const MOVING: &[&str] = &["animation={frames=3, track=[{set='object.it.transform
      keys=[{frame=0, value=[0, 0, 0]}, {frame=1, value=[0.1, 0, 0]}, {frame=2, value=[0.4, 0.3, 0]}]}]}"];
 const HALF: &[&str] = &["animation={frames=5, track=[{set='object.it.transform.translate', \
      keys=[{frame=0, value=[0, 0, 0]}, {frame=4, value=[0.4, 0.3, 0]}]}]}"];
-
 const BENT: &[&str] = &["animation={frames=5, track=[{set='object.it.transform.translate', \
      keys=[{frame=0, value=[0, 0, 0]}, {frame=2, value=[0.3, 0, 0]}, {frame=4, value=[0, 0.2, 0]}]}]}"];
 

@@ -114,16 +114,12 @@ fn shadow(render: &RenderSettings, all: &mut Vec<Stated>) {
 
 fn points(render: &RenderSettings, all: &mut Vec<Stated>) {
     let points = &render.points;
-    let accumulation = match points.accumulation {
-        Accumulation::F16 => "f16",
-        Accumulation::F32 => "f32",
-    };
     let mut add = |key, value| all.push(("render.points", key, value));
     add("slice_thickness", points.slice_thickness.map_or_else(|| quoted("auto"), number));
     add("exact", points.exact.to_string());
     add("transmittance_cutoff", number(points.transmittance_cutoff));
     add("resampling_filter", points.resampling_filter.to_string());
-    add("accumulation", quoted(accumulation));
+    add("accumulation", precision(points.accumulation));
 }
 
 fn particles(render: &RenderSettings, all: &mut Vec<Stated>) {
@@ -159,6 +155,9 @@ fn sheets(render: &RenderSettings, all: &mut Vec<Stated>) {
     add("slab_width", sheets.slab_width.map_or_else(|| quoted("auto"), number));
     add("kernel_extent", number(sheets.kernel_extent));
     add("kernel_sigma", number(sheets.kernel_sigma));
+    add("kernel_sections", sheets.kernel_sections.to_string());
+    add("accumulation", precision(sheets.accumulation));
+    add("gradients", quoted(if sheets.gradient_volume { "volume" } else { "sheets" }));
     add("transmittance_cutoff", number(sheets.transmittance_cutoff));
     let Slicing::HalfVector { light_pixels, scattering, soft_shadows, .. } = sheets.slicing else {
         add("classify", quoted(if sheets.classify == Classify::Before { "before" } else { "after" }));
@@ -219,6 +218,10 @@ fn surfels(render: &RenderSettings, all: &mut Vec<Stated>) {
         Coverage::Bound => "bound",
     };
     add("coverage", quoted(coverage));
+}
+
+fn precision(of: Accumulation) -> String {
+    quoted(if of == Accumulation::F16 { "f16" } else { "f32" })
 }
 
 fn quoted(word: &str) -> String {

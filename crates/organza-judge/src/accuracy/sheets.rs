@@ -3,7 +3,8 @@
 use super::points::{absorbance_cut, cells, choice, cutoffs, finer, samples, step};
 use super::{Facts, Knob, Options, Request, Skipped, Sweep, Theory};
 use organza::scene::{Classify, LayerChoice, Scattering, Scene, SceneObject, Slicing, SoftShadows, Source, Technique};
-use splat_core::Packing;
+use splat_core::raster::Accumulation;
+use splat_core::{Packing, Shading};
 
 /// Knobs of `sheets` in this scene, whose slabs are `slab_width` wide by its own setting; or why there are none.
 ///
@@ -27,6 +28,9 @@ pub fn sheets(scene: &Scene, slab_width: Option<f64>, facts: &Facts, options: &O
         ("slab width", Ok(slabs(own, options))),
         ("kernel radius", Ok(radius())),
         ("kernel deviation", Ok(deviation())),
+        ("kernel sections", Ok(sections(options))),
+        ("buffer format", Ok(buffers())),
+        ("gradients", gradients(scene)),
         ("shadow table cells", cells(facts, options)),
         ("absorbance cut", absorbance_cut(facts, options)),
         ("transmittance cut", Ok(transmittance_cut(options))),
@@ -190,8 +194,11 @@ fn lattice(scene: &Scene) -> Result<Knob, String> {
 }
 
 fn may_be_packed(object: &SceneObject) -> bool {
-    let is_drawn = object.visible && object.technique.is_none_or(|t| t == Technique::Sheets);
-    is_drawn && object.clip.is_empty() && matches!(object.source, Source::Volume(_))
+    is_drawn(object) && object.clip.is_empty() && matches!(object.source, Source::Volume(_))
+}
+
+fn is_drawn(object: &SceneObject) -> bool {
+    object.visible && object.technique.is_none_or(|t| t == Technique::Sheets)
 }
 
 /// A knob whose steps are no sizes.
@@ -217,6 +224,48 @@ fn radius() -> Knob {
 fn deviation() -> Knob {
     let set = |request: &mut Request, value| request.scene.render.sheets.kernel_sigma = value;
     choices("kernel deviation", set, &[0.5, 0.7, 1.0].map(steps_of_the_lattice))
+}
+
+/// Places within a slab at which kernels begin; the paper has 64.
+fn sections(options: &Options) -> Knob {
+    let counts: &[f64] = if options.quick { &[1.0, 4.0, 16.0] } else { &[1.0, 2.0, 4.0, 8.0, 16.0, 64.0] };
+    let at = |n: f64| step(format!("{n} a slab"), n.recip(), n);
+    Knob {
+        name: "kernel sections",
+        size_meaning: "1 / sections in a slab's width",
+        set: |request, value| request.scene.render.sheets.kernel_sections = value as u32,
+        steps: counts.iter().map(|n| at(*n)).collect(),
+        ends: vec![at(256.0)],
+        end_is_exact: false,
+        theory: Some(Theory {
+            low: 0.5,
+            high: 2.0,
+            why: "kernels are moved along the view by up to half of what places are apart: 1, more where neighbours make up for it; 1/2 \
+                  where few pixels, at the borders of what is seen, change altogether",
+        }),
+        joint: true,
+    }
+}
+
+/// What is summed over voxels in a slab and over slabs in a pixel, in single precision or in buffers of 16 bits.
+fn buffers() -> Knob {
+    let set = |request: &mut Request, value| {
+        request.scene.render.sheets.accumulation = if value > 0.0 { Accumulation::F32 } else { Accumulation::F16 };
+    };
+    choices("buffer format", set, &[("f16", 0.0), ("f32", 1.0)])
+}
+
+/// Where the normals of volumes come from.
+fn gradients(scene: &Scene) -> Result<Knob, String> {
+    let reflects = |o: &SceneObject| {
+        let is_volume = matches!(o.source, Source::Volume(_) | Source::Density(_) | Source::Cloud(_));
+        is_volume && is_drawn(o) && scene.materials[o.material].material.shading == Shading::Phong
+    };
+    if scene.lights.is_empty() || !scene.objects.iter().any(reflects) {
+        return Err("no volume reflects about its gradient".into());
+    }
+    let set = |request: &mut Request, value| request.scene.render.sheets.gradient_volume = value > 0.0;
+    Ok(choices("gradients", set, &[("of neighbouring sheets", 0.0), ("a gradient volume", 1.0)]))
 }
 
 fn steps_of_the_lattice(steps: f64) -> (String, f64) {

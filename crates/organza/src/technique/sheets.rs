@@ -18,7 +18,7 @@ use crate::statistics::{ObjectData, ObjectStatistics};
 use crate::technique::{Fold, Session};
 use crate::work::{self, Translucent, cost};
 use crate::{CostRecord, Error, RenderOptions, stage};
-use sheet_light::{Aligned, Classify, KernelShape, Params, SheetInput, Sheeted, Splats, Volume, prepare};
+use sheet_light::{Aligned, Classify, Gradients, KernelShape, Params, SheetInput, Sheeted, Splats, Volume, prepare};
 use splat_core::{Accumulator, Direction, Limits, Packing, SliceOrder};
 use std::ops::Range;
 
@@ -151,15 +151,12 @@ fn params(scene: &Scene, exponent: i32, options: &RenderOptions) -> Params {
     let unit = libm::exp2(f64::from(-exponent));
     Params {
         slab_width: settings.slab_width.map(|width| width * unit),
-        classify: match settings.classify {
-            scene::Classify::After => Classify::After,
-            scene::Classify::Before => Classify::Before,
-        },
-        aligned: match settings.aligned {
-            scene::Aligned::View => Aligned::View,
-            scene::Aligned::Axis => Aligned::Axis,
-        },
+        classify: if settings.classify == scene::Classify::Before { Classify::Before } else { Classify::After },
+        aligned: if settings.aligned == scene::Aligned::Axis { Aligned::Axis } else { Aligned::View },
         kernel: KernelShape { extent: settings.kernel_extent, sigma: settings.kernel_sigma },
+        sections: settings.kernel_sections,
+        accumulation: settings.accumulation,
+        gradients: if settings.gradient_volume { Gradients::Volume } else { Gradients::Sheets },
         transmittance_cutoff: settings.transmittance_cutoff as f32,
         limits: Limits::bytes(options.max_memory),
     }

@@ -41,13 +41,15 @@ pub(crate) struct Pixels {
     values: Vec<Vec<f32>>,
     /// What the values are too large by.
     value_excess: Vec<Vec<f32>>,
+    /// Whether sums are rounded to half precision.
+    half: bool,
     pub(crate) depth: Vec<DepthProfile>,
     pub(crate) object: Vec<u32>,
 }
 
 impl Pixels {
-    /// Nothing seen yet, in the form of `of`.
-    pub(crate) fn new(band: &Band, of: &Accumulator) -> Self {
+    /// Nothing seen yet, in the form of `of`; whether sums are rounded to half precision.
+    pub(crate) fn new(band: &Band, of: &Accumulator, half: bool) -> Self {
         let (n, planes, channels) = (band.stored * band.stride, of.optical_depth.len(), of.channels.len());
         let plane = |fill: f32| vec![fill; n];
         let has = |kept: bool| if kept { n } else { 0 };
@@ -59,6 +61,7 @@ impl Pixels {
             transmittance: vec![plane(1.0); planes],
             values: vec![plane(0.0); channels],
             value_excess: vec![plane(0.0); channels],
+            half,
             depth: vec![DepthProfile::default(); has(!of.depth.is_empty())],
             object: vec![u32::MAX; has(!of.object.is_empty())],
         }
@@ -106,7 +109,7 @@ impl Pixels {
         for c in 0..self.channels {
             let weight = weights[ChannelLayout::plane_of(c, self.channels, self.planes)];
             let term = weight * Lanes::load(simd, &of.values[c]);
-            add(simd, &mut self.values[c][k..], &mut self.value_excess[c][k..], term);
+            add(simd, [&mut self.values[c][k..], &mut self.value_excess[c][k..]], term, self.half);
         }
         self.add_objects(simd, k, of, false);
     }
@@ -123,7 +126,7 @@ impl Pixels {
             let weight = weights[ChannelLayout::plane_of(c, self.channels, self.planes)];
             let sum = &mut self.values[c][k..];
             let term = (Lanes::load(simd, &of.values[c]) - Lanes::load(simd, sum)) * weight;
-            add(simd, sum, &mut self.value_excess[c][k..], term);
+            add(simd, [sum, &mut self.value_excess[c][k..]], term, self.half);
         }
         self.add_objects(simd, k, of, true);
     }
@@ -132,7 +135,7 @@ impl Pixels {
     #[inline(always)]
     fn sum<S: Simd>(&mut self, simd: S, p: usize, k: usize, of: &Fragments) -> Lanes<S> {
         let term = Lanes::load(simd, &of.optical_depth[p]);
-        add(simd, &mut self.optical_depth[p][k..], &mut self.excess[p][k..], term)
+        add(simd, [&mut self.optical_depth[p][k..], &mut self.excess[p][k..]], term, self.half)
     }
 
     #[inline(always)]

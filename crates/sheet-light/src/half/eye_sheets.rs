@@ -6,11 +6,11 @@ use super::illuminate::Asked;
 use super::light_depth::LightDepths;
 use super::light_path::{Places, stored};
 use super::lit_part::LitPart;
+use super::placed::Placed;
 use super::shade::{Lit, Through};
 use super::sheet::{Sheet, Splatter, is_any};
 use super::splats::SplatSheets;
-use super::sweep::Sweep;
-use crate::Volume;
+use super::sweep::{Known, Sweep};
 use crate::lines::Lines;
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::raster::lanes::{Lanes, MAX_LANES};
@@ -72,8 +72,8 @@ struct Chunk {
 }
 
 impl EyeBand {
-    pub(crate) fn new(band: Band, volumes: &[Volume<'_>], pixels: Pixels) -> Self {
-        let kept = |v: &Volume<'_>| if v.normals { KEPT } else { 1 };
+    pub(crate) fn new(band: Band, volumes: &[Placed<'_>], pixels: Pixels) -> Self {
+        let kept = |v: &Placed<'_>| if v.compares { KEPT } else { 1 };
         let sheets = volumes.iter().map(|v| (0..kept(v)).map(|_| Sheet::new(&band)).collect()).collect();
         Self { band, sheets, pixels, extinction: vec![[0.0; MAX_LANES]; volumes.len()], others: Vec::new() }
     }
@@ -111,13 +111,13 @@ impl pulp::WithSimd for OneSlab<'_> {
     fn with_simd<S: Simd>(mut self, simd: S) -> u64 {
         let mut fragments = 0;
         // What gradients are taken from is wanted beside pixels that are done.
-        let may_close = self.of.cutoff > 0.0 && !self.of.volumes.iter().any(|v| v.normals);
+        let may_close = self.of.params.transmittance_cutoff > 0.0 && !self.of.placed.iter().any(|v| v.compares);
         if may_close && !self.of.frame.back_to_front && self.slab.is_multiple_of(CLOSING) {
-            self.eye.close(self.of.cutoff);
+            self.eye.close(self.of.params.transmittance_cutoff);
         }
         for v in 0..self.of.placed.len() {
             // Gradients need the sheet behind; the first one is made with it.
-            let is_ahead = self.of.volumes[v].normals && self.step == Step::Draw;
+            let is_ahead = self.of.placed[v].compares && self.step == Step::Draw;
             if !is_ahead || self.slab == 0 {
                 fragments += self.reconstruct(simd, v, self.slab);
             }
@@ -162,7 +162,8 @@ impl OneSlab<'_> {
     fn draw<S: Simd>(&mut self, simd: S, chunk: &Chunk) {
         let (k, of) = (chunk.k, |v: f32| Lanes::splat(simd, v));
         let planes = self.eye.pixels.planes;
-        let closed = of(1.0).where_less_or(self.eye.pixels.most(simd, k), of(self.of.cutoff), of(0.0));
+        let closed =
+            of(1.0).where_less_or(self.eye.pixels.most(simd, k), of(self.of.params.transmittance_cutoff), of(0.0));
         let stretch = Lanes::load(simd, &self.eye.band.stretch[k..]);
         let mut all = [of(0.0); 3];
         let (mut near, mut far) = (of(f32::INFINITY), of(f32::NEG_INFINITY));
@@ -249,7 +250,7 @@ impl OneSlab<'_> {
             (extinction * depth * stretch).store(&mut tau);
             let [_, red, green, blue] = self.eye.sheet(v, self.slab).classify(simd, &of.placed[v], chunk.k);
             let color = stored(&[red, green, blue]);
-            let normals = self.normals(simd, v, chunk);
+            let normals = self.normals(simd, v, chunk, (&at, &wanted));
             self.find_others(simd, v, &at, &wanted, &mut others);
             for lane in 0..Lanes::<S>::COUNT {
                 if wanted[lane] > 0.0 && tau[lane] > 0.0 {
@@ -314,16 +315,25 @@ impl OneSlab<'_> {
         others: &mut Vec<Through>,
     ) {
         others.clear();
-        let Some((voxels, shadows)) = &self.of.shadows[v] else { return };
-        let lanes = wanted.iter().enumerate().filter(|(_, wanted)| **wanted > 0.0);
-        let cells = shadows.cells(simd, voxels, at, lanes.fold(0, |bits, (lane, _)| bits | 1 << lane));
+        let Known { voxels, shadows: Some(shadows), .. } = &self.of.known[v] else { return };
+        let cells = shadows.neighbours.cells(simd, voxels, at, bits(wanted));
         for light in 0..self.of.light.iter().len() + self.of.mapped.len() {
             others.push(stored(&shadows.at(simd, &cells, light)));
         }
     }
 
     #[inline(always)]
-    fn normals<S: Simd>(&self, simd: S, v: usize, chunk: &Chunk) -> [Vec3; MAX_LANES] {
+    fn normals<S: Simd>(
+        &self,
+        simd: S,
+        v: usize,
+        chunk: &Chunk,
+        (at, wanted): (&Places<S>, &[f32; MAX_LANES]),
+    ) -> [Vec3; MAX_LANES] {
+        let Known { voxels, gradients, .. } = &self.of.known[v];
+        if let Some(gradients) = gradients {
+            return self.of.gradients.world(&stored(&gradients.at(simd, voxels, at, bits(wanted))));
+        }
         if !self.of.volumes[v].normals {
             return [Vec3::ZERO; MAX_LANES];
         }
@@ -401,4 +411,9 @@ impl OneSlab<'_> {
             }
         }
     }
+}
+
+/// Lanes above 0, a bit each.
+fn bits(wanted: &[f32; MAX_LANES]) -> u32 {
+    wanted.iter().rev().fold(0, |bits, lane| bits << 1 | u32::from(*lane > 0.0))
 }

@@ -17,6 +17,7 @@ use super::soft_buffer::SoftBuffer;
 use super::splats::Lamps;
 use super::sweep::Sweep;
 use super::{HalfInput, HalfParams, HalfSplats, MOST_SAMPLES, Scattering, lamp};
+use crate::gradient_volume::GradientVolume;
 use crate::lattice::Lattice;
 use crate::visible::Voxels;
 use crate::{Error, Params, Volume};
@@ -342,7 +343,7 @@ pub fn bytes<'l>(
     let of_splats = bodies.splats.map_or(0, |_| 4 * (3 + MAX_CHANNELS as u64));
     let of_a_pixel = 4 * (5 + 12 * volumes.len() as u64) + of_splats;
     let [width, height] = camera.size.map(u64::from);
-    let sheets: usize = if volumes.iter().any(|v| v.normals) { 3 } else { 1 };
+    let sheets: usize = if volumes.iter().any(|v| params.sheets.compares_sheets(v)) { 3 } else { 1 };
     let eye = width
         * height
         * (of_a_pixel + 4 * (6 * sheets * volumes.len() + MAX_CHANNELS) as u64 + 160)
@@ -353,7 +354,8 @@ pub fn bytes<'l>(
         // A record once in the order of the lattice and once for each image, with its bucket.
         // The shadows of what is not carried, of the light of a sweep and of those without one.
         let of_a_voxel = 3 * 16 + 24 + 8 * (1 + mapped as u64);
-        Voxels::bytes(dims) + dims.iter().map(|n| *n as u64).product::<u64>() * of_a_voxel
+        let count = dims.iter().map(|n| *n as u64).product::<u64>();
+        Voxels::bytes(dims) + count * of_a_voxel + GradientVolume::bytes(count, v, &params.sheets)
     };
     let cells: u64 = if params.scattering == Scattering::None {
         0

@@ -56,6 +56,7 @@ impl Frame {
         let depths = || bodies.corners().map(|corner| frame.point(corner).z);
         let (near, far) = (depths().fold(f64::INFINITY, f64::min), depths().fold(f64::NEG_INFINITY, f64::max));
         frame.slabs = Slabs::new(near, far, params.slab_width.unwrap_or(spacing), reach)?;
+        params.check_slabs(frame.slabs.count)?;
         Ok(frame)
     }
 

@@ -70,8 +70,13 @@ impl Gradients {
         for n in 0..3 {
             gradient[n].store(&mut parts[n]);
         }
+        self.world(&parts)
+    }
+
+    /// −∇v/|∇v| of gradients in slab coordinates.
+    pub(crate) fn world(&self, gradients: &[[f32; MAX_LANES]; 3]) -> [Vec3; MAX_LANES] {
         std::array::from_fn(|lane| {
-            let [a, b, s] = parts.map(|part| part[lane]);
+            let [a, b, s] = gradients.map(|part| part[lane]);
             -(self.axes[0] * a + self.axes[1] * b + self.axes[2] * s).normalize_or_zero()
         })
     }

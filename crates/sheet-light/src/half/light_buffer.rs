@@ -16,6 +16,7 @@ use super::sight::{Shape, Sight};
 use super::soft_buffer::SoftBuffer;
 use super::splat_light::SplatLight;
 use crate::Volume;
+use crate::precision::rounded_one;
 use rayon::prelude::*;
 use splat_core::Camera;
 use splat_core::raster::lanes::{Lanes, MAX_LANES};
@@ -205,7 +206,7 @@ impl pulp::WithSimd for OneBand<'_> {
                     let tau = extinction * length;
                     let row = &mut self.sums[y * band.width * placed_count(self.of)..];
                     let count = Lanes::<S>::COUNT.min(band.width.saturating_sub(x));
-                    add(tau, length, row, [x, count, v, placed_count(self.of)]);
+                    add([tau, length], row, [x, count, v, placed_count(self.of)], placed.half);
                     if planes > 0 {
                         let to = &mut depths[(y * band.width + x) * planes..];
                         add_depth(extinction * depth, to, [count, planes], placed.volume.material.extinction_rgb);
@@ -241,15 +242,19 @@ fn placed_count(of: &Attenuate<'_>) -> usize {
     of.placed.len()
 }
 
-/// Adds to `count` pixels of a row from `x` on, to volume `v` of `volumes`.
+/// Adds optical depths and lengths to `count` pixels of a row from `x` on, to volume `v` of `volumes`.
 #[inline(always)]
-fn add<S: Simd>(tau: Lanes<S>, length: Lanes<S>, row: &mut [Sums], [x, count, v, volumes]: [usize; 4]) {
+fn add<S: Simd>(terms: [Lanes<S>; 2], row: &mut [Sums], [x, count, v, volumes]: [usize; 4], half: bool) {
     let mut parts = [[0.0; MAX_LANES]; 2];
-    tau.store(&mut parts[0]);
-    length.store(&mut parts[1]);
+    terms[0].store(&mut parts[0]);
+    terms[1].store(&mut parts[1]);
     for lane in 0..count {
         let sums = &mut row[(x + lane) * volumes + v];
         for n in 0..2 {
+            if half {
+                sums[n] = rounded_one(sums[n] + parts[n][lane]);
+                continue;
+            }
             let term = parts[n][lane] - sums[2 + n];
             let new = sums[n] + term;
             sums[2 + n] = (new - sums[n]) - term;

@@ -4,8 +4,8 @@ use super::frame::Frame;
 use crate::classify::Classifier;
 use crate::fold::extremes;
 use crate::lattice::Lattice;
+use crate::neighbours::Receivers;
 use crate::sections::{PHASES, SectionTable};
-use crate::shadows::Receivers;
 use crate::visible::Voxels;
 use crate::{Params, Volume};
 use splat_core::Footprint;
@@ -30,7 +30,16 @@ pub(crate) struct Placed<'a> {
     pub(crate) classifier: Classifier,
     /// What values are taken relative to.
     pub(crate) base: f64,
+    /// Whether gradients are told from neighbouring sheets.
+    pub(crate) compares: bool,
+    /// Whether sums are rounded to half precision.
+    pub(crate) half: bool,
     width: f64,
+    /// Places within a slab at which kernels begin, and how many 256ths of a slab they are apart.
+    starts: f64,
+    apart: u32,
+    /// How much farther kernels reach by that than with all 256, slabs.
+    rounding: f64,
 }
 
 impl<'a> Placed<'a> {
@@ -54,7 +63,12 @@ impl<'a> Placed<'a> {
             kernel: Kernel::new(&footprint),
             classifier: Classifier::new(&volume.seen(), volume.extinction_scale, base),
             base,
+            compares: params.compares_sheets(volume),
+            half: params.is_half(),
             width: frame.slabs.width,
+            starts: f64::from(params.sections),
+            apart: PHASES / params.sections,
+            rounding: params.rounding(),
         }
     }
 
@@ -63,16 +77,16 @@ impl<'a> Placed<'a> {
     #[inline(always)]
     pub(crate) fn place(&self, depth: f64) -> u32 {
         // `Slabs` begin before the first kernel.
-        ((depth - self.reach) / self.width * f64::from(PHASES) + 0.5).max(0.0) as u32
+        ((depth - self.reach) / self.width * self.starts + 0.5).max(0.0) as u32 * self.apart
     }
 
     /// Lattice steps along each axis within which lie all voxels that shape what a pixel has of a slab, for footprints of
     /// `extent`; `gradient` adds the neighbours that gradients are taken from, a pixel being at most `pixel` wide in a slab.
     pub(crate) fn lattice_reach(&self, extent: [f64; 3], pixel: f64) -> [usize; 3] {
         let [aa, ab, bb] = extent;
-        let neighbour = if self.volume.normals { 1.0 } else { 0.0 };
+        let neighbour = if self.compares { 1.0 } else { 0.0 };
         // A sheet holds means over its slab, and where a face cuts it part of the next one's.
-        let across = self.reach + (1.5 + neighbour) * self.width;
+        let across = self.reach + (1.5 + neighbour + self.rounding) * self.width;
         let inverse = self.axes.inverse();
         [0, 1, 2].map(|axis| {
             let row = inverse.row(axis);

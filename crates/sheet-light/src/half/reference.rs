@@ -1,9 +1,13 @@
 //! The slow form in f64: the same sheets pixel by pixel, voxel by voxel, without bands, buckets, vectors, bounds or skipped voxels,
 //! and light on the way through a slab summed step by step.
 //!
-//! Gradients are left out: volumes are lit as if they had no normals. Light that is scattered more than once is that of `scatter.rs`.
+//! Normals are those of `normal.rs`, splats those of `splats.rs`, opaque polygons those of `polygons.rs`. Light that is scattered more than once is that of
+//! `scatter.rs`, of volumes alone.
 
+mod normal;
+mod polygons;
 mod scatter;
+mod splats;
 
 use super::axis::HalfVector;
 use super::frame::{Frame, Ray};
@@ -15,9 +19,11 @@ use crate::lattice::Lattice;
 use crate::reference::Picture;
 use crate::sections::{PHASES, sections};
 use crate::{Error, Volume};
+use polygons::{Hit, Triangles};
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::shade::{LitBy, Point};
 use splat_core::{Camera, Footprint, Light};
+use splats::Splats;
 
 /// Steps on the way of a ray through a slab.
 const STEPS: usize = 200;
@@ -35,6 +41,7 @@ struct View<'a> {
     frame: Frame,
     placed: Vec<Placed<'a>>,
     voxels: Vec<Vec<Voxel>>,
+    polygons: Triangles<'a>,
     diffuse: Option<scatter::Diffuse>,
 }
 
@@ -42,6 +49,8 @@ struct View<'a> {
 struct Image {
     camera: Camera,
     shapes: Vec<Shape>,
+    /// View depths at which its rays end; or nothing.
+    ends: Vec<f64>,
 }
 
 /// What a ray has of a volume in a slab.
@@ -54,7 +63,10 @@ struct Part {
 /// Optical depth and length so far, by volume and pixel of the light.
 type Sums = Vec<Vec<[f64; 2]>>;
 
-/// Draws all volumes under all lights, extended ones as that many points, green extinction for all channels, without the shadows of others and without [`HalfInput::mapped`]. Time grows as voxels times
+/// What light has come through: its image, the volumes' sums there, the splats.
+type Carried<'c, 'a> = (&'c Image, &'c Sums, Option<&'c Splats<'a>>);
+
+/// Draws all volumes, splats and polygons under all lights, extended ones as that many points, green extinction for all channels, without the shadows of others and without [`HalfInput::mapped`]. Time grows as voxels times
 /// pixels times slabs under a kernel.
 ///
 /// # Errors
@@ -123,47 +135,84 @@ impl<'a> View<'a> {
             places.map(voxel).collect()
         };
         let voxels = placed.iter().map(of).collect();
-        Ok(Self { input, params, frame, placed, voxels, diffuse: scatter::Diffuse::new(volumes, lit, params) })
+        let (polygons, diffuse) = (Triangles::new(input.polygons), scatter::Diffuse::new(volumes, lit, params));
+        Ok(Self { input, params, frame, placed, voxels, polygons, diffuse })
     }
 
     fn image(&self, camera: Camera) -> Image {
         let sight = Sight::new(&self.frame, camera);
-        Image { camera, shapes: self.placed.iter().map(|p| sight.shape(&self.frame, p)).collect() }
+        Image { camera, shapes: self.placed.iter().map(|p| sight.shape(&self.frame, p)).collect(), ends: Vec::new() }
     }
 
     fn draw(&self, lit: &LitBy<'_>, with_ambient: bool) -> Picture {
         let camera = self.input.sheets.camera;
-        let eye = self.image(*camera);
+        let mut eye = self.image(*camera);
         let light = self.image(lamp::camera_of(&self.input.bodies(), &lit.light, self.params));
         let pixels = |camera: &Camera| camera.size.map(|s| s as usize).iter().product();
         let mut sums: Sums = vec![vec![[0.0; 2]; pixels(&light.camera)]; self.placed.len()];
         let n: usize = pixels(camera);
+        let opaque = |at: usize| self.input.opaque.get(at).map_or(f64::INFINITY, |depth| f64::from(*depth));
+        let seen = |at: usize| self.polygons.seen(&eye, at).filter(|hit| hit.depth < opaque(at));
+        let hits: Vec<Option<Hit>> = (0..n).map(seen).collect();
+        eye.ends = hits.iter().enumerate().map(|(at, hit)| hit.map_or(opaque(at), |hit| hit.depth)).collect();
+        let mut polygons = vec![[0.0; 3]; n];
+        let mut splats = self.input.splats.as_ref().map(|splats| Splats::new(splats, self, &light));
         let mut out = Picture { optical_depth: vec![0.0; n], color: vec![[0.0; 3]; n] };
         for slab in 0..self.frame.slabs.count {
-            let voxels = self.voxels_of(slab);
-            for at in 0..n {
-                let (tau, color) = self.fragment(&eye, &light, &voxels, &sums, (slab, at, lit, with_ambient));
-                let (through, opacity) = (libm::exp(-out.optical_depth[at]), -libm::expm1(-tau));
-                for c in 0..3 {
-                    let sum = &mut out.color[at][c];
-                    *sum = if self.frame.back_to_front {
-                        opacity * color[c] + libm::exp(-tau) * *sum
-                    } else {
-                        *sum + through * opacity * color[c]
-                    };
-                }
-                out.optical_depth[at] += tau;
+            // Of the slab before, the slab and the one behind.
+            let around =
+                [-1, 0, 1].map(|n| slab.checked_add_signed(n).map(|slab| self.voxels_of(slab)).unwrap_or_default());
+            let mut shown = Vec::new();
+            if let Some(splats) = &mut splats {
+                splats.enter(slab, self, (&light, &sums), lit);
+                shown = splats.radiance(slab, self, (lit, with_ambient));
             }
-            for (v, sums) in sums.iter_mut().enumerate() {
-                for (at, sums) in sums.iter_mut().enumerate() {
-                    if let Some(part) = self.part(&light, &voxels[v], v, slab, at) {
-                        let length = (part.far - part.near) * self.stretch(&light.camera, at);
-                        *sums = [sums[0] + self.extinction(v, part.value) * length, sums[1] + length];
-                    }
+            let carried = (&light, &sums, splats.as_ref());
+            for at in 0..n {
+                let mut fragment = self.fragment(&eye, carried, &around, (slab, at, lit, with_ambient));
+                if let Some(splats) = &splats {
+                    fragment = splats.mix((&eye, at), &shown, fragment);
+                }
+                self.composite(fragment, (&mut out.optical_depth[at], &mut out.color[at]));
+            }
+            self.light_polygons((&hits, slab), carried, (lit, with_ambient), &mut polygons);
+            self.attenuate(&light, &around[1], slab, &mut sums);
+        }
+        let last = self.frame.slabs.count;
+        if let Some(splats) = &mut splats {
+            splats.enter(last, self, (&light, &sums), lit);
+        }
+        self.light_polygons((&hits, last), (&light, &sums, splats.as_ref()), (lit, with_ambient), &mut polygons);
+        for (at, shown) in polygons.iter().enumerate() {
+            let through = libm::exp(-out.optical_depth[at]);
+            (0..3).for_each(|c| out.color[at][c] += through * shown[c]);
+        }
+        out
+    }
+
+    /// Adds a slab to a pixel of the eye.
+    fn composite(&self, (tau, color): (f64, [f64; 3]), (optical_depth, sums): (&mut f64, &mut [f64; 3])) {
+        let (through, opacity) = (libm::exp(-*optical_depth), -libm::expm1(-tau));
+        for (sum, color) in sums.iter_mut().zip(color) {
+            *sum = if self.frame.back_to_front {
+                opacity * color + libm::exp(-tau) * *sum
+            } else {
+                *sum + through * opacity * color
+            };
+        }
+        *optical_depth += tau;
+    }
+
+    /// Adds a slab to the light's image.
+    fn attenuate(&self, light: &Image, voxels: &[Vec<Reaching>], slab: u32, sums: &mut Sums) {
+        for (v, sums) in sums.iter_mut().enumerate() {
+            for (at, sums) in sums.iter_mut().enumerate() {
+                if let Some(part) = self.part(light, &voxels[v], v, slab, at) {
+                    let length = (part.far - part.near) * self.stretch(&light.camera, at);
+                    *sums = [sums[0] + self.extinction(v, part.value) * length, sums[1] + length];
                 }
             }
         }
-        out
     }
 
     /// Voxels whose kernels reach a slab or one of its neighbours.
@@ -200,19 +249,20 @@ impl<'a> View<'a> {
     }
 
     /// Depths across the slabs between which a ray is in the cells of a volume, before the eye.
-    fn crossing(&self, volume: &Volume<'_>, camera: &Camera, at: usize) -> Option<[f64; 2]> {
-        let ray = self.ray(camera, at);
+    fn crossing(&self, volume: &Volume<'_>, image: &Image, at: usize) -> Option<[f64; 2]> {
+        let ray = self.ray(&image.camera, at);
         let inverse = self.frame.steps(volume).inverse();
         let origin = self.frame.point(volume.origin());
-        let ends = clip(volume, inverse * (ray.from - origin), inverse * ray.along)?;
+        let [near, far] = clip(volume, inverse * (ray.from - origin), inverse * ray.along)?;
+        let ends = [near, far.min(image.ends.get(at).copied().unwrap_or(f64::INFINITY))];
         let [one, other] = ends.map(|z| ray.from.z + ray.along.z * z.max(0.0));
-        (ends[1] > 0.0).then(|| [one.min(other), one.max(other)])
+        (ends[1] > ends[0].max(0.0)).then(|| [one.min(other), one.max(other)])
     }
 
     /// What a pixel's ray has of a volume in a slab.
     fn part(&self, image: &Image, voxels: &[Reaching], v: usize, slab: u32, at: usize) -> Option<Part> {
         let width = self.frame.slabs.width;
-        let [near, far] = self.crossing(self.placed[v].volume, &image.camera, at)?;
+        let [near, far] = self.crossing(self.placed[v].volume, image, at)?;
         let (near, far) = (near.max(f64::from(slab) * width), far.min(f64::from(slab + 1) * width));
         if far <= near {
             return None;
@@ -243,11 +293,11 @@ impl<'a> View<'a> {
     fn fragment(
         &self,
         eye: &Image,
-        light: &Image,
-        voxels: &[Vec<Reaching>],
-        sums: &Sums,
+        (light, sums, splats): Carried<'_, '_>,
+        around: &[Vec<Vec<Reaching>>; 3],
         (slab, at, lit, with_ambient): (u32, usize, &LitBy<'_>, bool),
     ) -> (f64, [f64; 3]) {
+        let voxels = &around[1];
         let parts: Vec<Option<Part>> =
             (0..self.placed.len()).map(|v| self.part(eye, &voxels[v], v, slab, at)).collect();
         let extinction: Vec<f64> = parts
@@ -268,23 +318,29 @@ impl<'a> View<'a> {
         let [first, last] = ends.map(|depth| self.place(&eye.camera, at, depth));
         let middle = 0.5 * (first + last);
         let means = self.means(light, sums, middle, &extinction);
+        let before = splats.map_or(0.0, |splats| splats.before(self, light, (middle, slab))[0]);
         let mut arrives = 0.0;
         for n in 0..STEPS {
             let x = (n as f64 + 0.5) / STEPS as f64;
-            let way = self.light_depth(&lit.light, first + (last - first) * x, slab, &means, &extinction);
+            let place = first + (last - first) * x;
+            if !self.polygons.sees(&lit.light, self.frame.world(place), None) {
+                continue;
+            }
+            let way = before + self.light_depth(&lit.light, place, slab, &means, &extinction);
             arrives += all * libm::exp(-all * x - way) / STEPS as f64;
         }
         let mean = arrives / -libm::expm1(-all);
         let mut color = [0.0; 3];
         for v in (0..parts.len()).filter(|v| tau(*v) > 0.0) {
-            let own = self.radiance(v, &parts[v], (middle, at), lit, (mean, with_ambient));
+            let normal = self.normal((eye, around), (v, slab, at), middle);
+            let own = self.radiance(v, (&parts[v], normal), (middle, at), lit, (mean, with_ambient));
             (0..3).for_each(|c| color[c] += own[c] * tau(v) / all);
         }
         (all, color)
     }
 
-    /// Mean extinctions on the way of light to the present slab, by volume.
-    fn means(&self, light: &Image, sums: &Sums, at: DVec3, extinction: &[f64]) -> Vec<f64> {
+    /// The four pixels of the light about a place, and their weights; at a border those inside.
+    fn around(&self, light: &Image, at: DVec3) -> [(usize, f64); 4] {
         let camera = &light.camera;
         let view = camera.view_from_world(self.frame.world(at));
         let scale = camera.focal_px() / if camera.is_orthographic() { 1.0 } else { view.z };
@@ -294,15 +350,27 @@ impl<'a> View<'a> {
         let y = clamp(0.5 * height as f64 - view.y * scale, height);
         let (i, j) = ((x as usize).min(width - 2), (y as usize).min(height - 2));
         let (u, v) = (x - i as f64, y - j as f64);
+        [(i, j, (1.0 - u) * (1.0 - v)), (i + 1, j, u * (1.0 - v)), (i, j + 1, (1.0 - u) * v), (i + 1, j + 1, u * v)]
+            .map(|(i, j, weight)| (j * width + i, weight))
+    }
+
+    /// Mean extinctions on the way of light to the present slab, by volume.
+    fn means(&self, light: &Image, sums: &Sums, at: DVec3, extinction: &[f64]) -> Vec<f64> {
+        let around = self.around(light, at);
         let mean = |(sums, own): (&Vec<[f64; 2]>, &f64)| {
-            let at = |i: usize, j: usize, n: usize| sums[j * width + i][n];
-            let [tau, length] = [0, 1].map(|n| {
-                (at(i, j, n) * (1.0 - u) + at(i + 1, j, n) * u) * (1.0 - v)
-                    + (at(i, j + 1, n) * (1.0 - u) + at(i + 1, j + 1, n) * u) * v
-            });
+            let [tau, length] = [0, 1].map(|n| around.iter().map(|(at, weight)| weight * sums[*at][n]).sum::<f64>());
             if length > 0.0 { tau / length } else { *own }
         };
         sums.iter().zip(extinction).map(mean).collect()
+    }
+
+    /// Optical depth of the volumes on the way of light to a place in a slab, whose own extinction there counts in it.
+    fn through_volumes(&self, (light, sums): (&Image, &Sums), lamp: &Light, (place, slab): (DVec3, u32)) -> f64 {
+        let world = self.frame.world(place);
+        let own = |volume: &Volume<'_>| volume.extinction_at(world) * f64::from(volume.material.extinction_rgb[1]);
+        let extinction: Vec<f64> = self.placed.iter().map(|placed| own(placed.volume)).collect();
+        let means = self.means(light, sums, place, &extinction);
+        self.light_depth(lamp, place, slab, &means, &extinction)
     }
 
     /// Optical depth towards the light at a place in a slab.
@@ -330,7 +398,7 @@ impl<'a> View<'a> {
     fn radiance(
         &self,
         v: usize,
-        part: &Option<Part>,
+        (part, normal): (&Option<Part>, Vec3),
         (at, pixel): (DVec3, usize),
         lit: &LitBy<'_>,
         (mean, with_ambient): (f64, bool),
@@ -343,7 +411,7 @@ impl<'a> View<'a> {
         let point = Point {
             position: self.frame.world(at),
             radius: self.placed[v].reach as f32,
-            normal: Vec3::ZERO,
+            normal,
             to_eye: -(right * along.x + up * along.y + forward * along.z).normalize().as_vec3(),
             color: volume.transfer.at(value as f32).color,
             material: volume.material,

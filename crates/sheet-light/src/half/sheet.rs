@@ -11,6 +11,7 @@ use super::band::Band;
 use super::buckets::{Buckets, Record};
 use super::placed::Placed;
 use super::sight::{Shape, Sight};
+use crate::precision::rounded;
 use crate::sections::PHASES;
 use crate::sheets::LEAST_WEIGHT;
 use splat_core::raster::lanes::{Lanes, MAX_LANES};
@@ -170,7 +171,10 @@ impl Sheet {
                 ..to(bottom).saturating_sub(band.top).min(self.rows.end);
             let columns = from(left)..to(right).min(band.width);
             if !rows.is_empty() && !columns.is_empty() {
-                fragments += self.add(simd, of, (band.stride, record, sections), rows, columns);
+                fragments += self.add(simd, of, (band.stride, record, sections), rows.clone(), columns.clone());
+                if of.placed.half {
+                    self.round(simd, band.stride, rows, columns);
+                }
             }
         }
         fragments
@@ -219,6 +223,21 @@ impl Sheet {
             }
         }
         fragments
+    }
+
+    /// Rounds the sums of a rectangle's pixels to half precision.
+    #[inline(always)]
+    fn round<S: Simd>(&mut self, simd: S, stride: usize, rows: Range<usize>, columns: Range<usize>) {
+        for y in rows {
+            let (mut x, end) = (columns.start.max(self.spans[y].start), columns.end.min(self.spans[y].end));
+            while x < end {
+                for sums in [&mut self.values, &mut self.weights] {
+                    let sums = &mut sums[y * stride + x..];
+                    rounded(simd, Lanes::load(simd, sums)).store(sums);
+                }
+                x += Lanes::<S>::COUNT;
+            }
+        }
     }
 
     /// Divides by kernel sums.

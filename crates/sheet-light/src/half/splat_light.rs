@@ -213,7 +213,13 @@ const LEAST_COSINE: f64 = 0.3;
 
 /// Where a splat asks for light, in slabs: a medium at its centre; a surface before the centres of all discs that cover a pixel about it, if
 /// the surface is flat.
-fn asks_at(of: &HalfSplats<'_>, frame: &Frame, (camera, around_px): (&Camera, f64), i: usize, place: Vec3) -> f32 {
+pub(crate) fn asks_at(
+    of: &HalfSplats<'_>,
+    frame: &Frame,
+    (camera, around_px): (&Camera, f64),
+    i: usize,
+    place: Vec3,
+) -> f32 {
     let lift = if of.cloud.kind[i] == SplatKind::Medium {
         0.0
     } else {

@@ -25,14 +25,24 @@ use super::splat_light::SplatLight;
 use super::splats::{Lamps, SplatSheets};
 use super::{HalfInput, HalfParams, HalfSplats, fold, lamp};
 use crate::error::cancelled;
+use crate::gradient_volume::GradientVolume;
 use crate::shadows::Shadows;
 use crate::visible::Voxels;
-use crate::{Error, Volume};
+use crate::{Error, Params, Volume};
 use rayon::prelude::*;
 use splat_core::glam::Vec3;
 use splat_core::raster::pulp;
 use splat_core::shade::{ChannelLayout, LitBy};
 use splat_core::{Accumulator, Light, LightShape, Progress, Transmittance};
+
+/// What is known of a volume at the voxels that matter.
+pub(crate) struct Known {
+    pub(crate) voxels: Voxels,
+    /// Shadows of what light is not carried through, where a light has any.
+    pub(crate) shadows: Option<Shadows>,
+    /// Where normals come from that.
+    pub(crate) gradients: Option<GradientVolume>,
+}
 
 /// Everything that is the same for all slabs, and the light buffer.
 pub(crate) struct Sweep<'a> {
@@ -56,10 +66,10 @@ pub(crate) struct Sweep<'a> {
     polygons: Option<&'a EyePolygons<'a>>,
     /// Polygons that keep the light of the sweep from others.
     pub(crate) depths: Option<LightDepths>,
-    /// By volume: shadows of what light is not carried through, of the lights that have any, at the voxels that matter.
-    pub(crate) shadows: Vec<Option<(Voxels, Shadows)>>,
+    /// By volume.
+    pub(crate) known: Vec<Known>,
     pub(crate) ambient: [f32; 3],
-    pub(crate) cutoff: f32,
+    pub(crate) params: Params,
     /// Whether light depends on where a point is.
     pub(crate) is_lit_by_place: bool,
     /// Whether ambient and emitted light belong to another sweep.
@@ -111,9 +121,9 @@ impl<'a> Sweep<'a> {
                 .map_or_else(Vec::new, |lit| volumes.iter().map(|v| LightPath::new(v, &lit.light, &frame)).collect()),
             polygons,
             depths: None,
-            shadows: Vec::new(),
+            known: Vec::new(),
             ambient: sheets.ambient,
-            cutoff: params.sheets.transmittance_cutoff,
+            params: params.sheets,
             is_lit_by_place: light.iter().chain(mapped).any(by_place),
             light_alone,
             input,
@@ -165,7 +175,8 @@ impl<'a> Sweep<'a> {
                 let lists = Buckets::new(&records, placed, &self.frame, &buffer.sight, buffer.shape(v));
                 buffer.push(lists);
             }
-            self.shadows.push(shadows.map(|shadows| (voxels, shadows)));
+            let gradients = GradientVolume::new(&receivers, &lattice, &self.params);
+            self.known.push(Known { voxels, shadows, gradients });
         }
         Ok(())
     }
@@ -315,14 +326,14 @@ impl<'a> Sweep<'a> {
 
     fn bands(&self, form: &Accumulator) -> Vec<EyeBand> {
         let (camera, opaque) = (&self.sight.camera, self.input.opaque);
-        let rim = usize::from(self.volumes.iter().any(|v| v.normals));
+        let rim = usize::from(self.placed.iter().any(|v| v.compares));
         let one = |b: usize| {
             let mut band = Band::new(b, rim, &self.frame, camera, self.volumes);
             if !opaque.is_empty() {
                 band.end_at(opaque, &self.frame, camera);
             }
-            let pixels = Pixels::new(&band, form);
-            EyeBand::new(band, self.volumes, pixels)
+            let pixels = Pixels::new(&band, form, self.params.is_half());
+            EyeBand::new(band, &self.placed, pixels)
         };
         (0..(camera.size[1] as usize).div_ceil(ROWS)).into_par_iter().map(one).collect()
     }

@@ -294,3 +294,21 @@ fn splats_that_sweeps_cannot_take_are_refused() {
     let among = draw(&with(&pair, input(&[], &camera, &[lamp])), &exact(None)).err().unwrap().to_string();
     assert!(among.contains("lies among the splats"), "{among}");
 }
+
+#[test]
+fn an_edge_of_translucent_discs_is_as_wide_as_their_kernels() {
+    let camera = parallel([0.0, 0.0, 9.0], 0.02, [120, 2]);
+    let (step, tau, pixel) = (0.125, 0.7, 0.01);
+    let mut cloud = Cloud::new(DVec3::ZERO);
+    plane(&mut cloud, (DVec3::new(-1.0, 0.0, 0.0), DVec3::Z), 1.0, tau, &Splat::default());
+    let shown = Shown::new(cloud, &camera, vec![lambert()], 0.1);
+    let out = draw(&with(&shown, input(&[], &camera, &[])), &exact(None)).unwrap().0;
+    let row = &out.optical_depth[0][..120];
+    // The outermost discs stand for half a step on either side of their centres, which lie at 0: a triangle would end there.
+    for (share, expected) in [(0.9, -0.31), (0.5, 0.5), (0.1, 1.31)] {
+        let k = row.iter().position(|t| f64::from(*t) < share * tau).unwrap();
+        let [one, other] = [k - 1, k].map(|k| f64::from(row[k]) / tau);
+        let at = (k as f64 - 0.5 + (one - share) / (one - other) - 60.0) * pixel / step;
+        assert!((at - expected).abs() < 0.01, "{share} of τ is {at} steps from the centres");
+    }
+}

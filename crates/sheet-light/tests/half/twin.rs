@@ -1,13 +1,15 @@
 //! Bands, buckets, bounds, lanes and closed forms of light against the slow form in f64.
 
 use super::common::{draw, exact, input, lamp, scattering, sun};
-use crate::common::{cubic, grid, noise, parallel, perspective, transfer, unlit, volume};
-use sheet_light::half::{HalfInput, HalfParams, Scattering, reference};
+use super::polygons::{polygons, wall, white};
+use super::splats::{Shown, lambert, plane, with};
+use crate::common::{BEAUTY, cubic, grid, noise, parallel, perspective, transfer, unlit, volume};
+use sheet_light::half::{HalfInput, HalfParams, Scattering, fold, reference};
 use splat_core::glam::{DMat3, DVec3};
-use splat_core::{Light, Material};
+use splat_core::{Accumulator, Camera, Cloud, Light, Material, Splat, SplatKind, rng};
 
 /// Greatest differences from the twin: optical depth, colour times 4π.
-pub(super) fn differences(input: &HalfInput<'_>, params: &HalfParams) -> [f64; 2] {
+pub(crate) fn differences(input: &HalfInput<'_>, params: &HalfParams) -> [f64; 2] {
     let (found, counts) = draw(input, params).unwrap();
     let twin = reference::draw(input, params).unwrap();
     let mut worst = [0.0f64; 2];
@@ -95,6 +97,92 @@ fn ms_scattered_light_is_that_of_the_twin() {
             let [one, more] = [once, params].map(|params| draw(&input, &params).unwrap().0);
             let seen = |out: &splat_core::Accumulator| out.channels[1].iter().sum::<f32>();
             assert!(seen(&more) > 1.01 * seen(&one), "{mode:?}, g {asymmetry}: nothing was scattered again");
+        }
+    }
+}
+
+/// A slanted layer of discs, and a cloud of a medium beside it and before it, some of which cast no shadow.
+fn discs_and_matter(camera: &Camera) -> Shown {
+    let mut cloud = Cloud::new(DVec3::ZERO);
+    let at = (DVec3::new(0.4, -0.2, 0.5), DVec3::new(0.3, 0.5, 1.0).normalize());
+    plane(&mut cloud, at, 1.2, 0.7, &Splat::default());
+    for n in 0..60 {
+        let side = |a: u64| (rng::unit(11, a, n, 0) - 0.5) as f32;
+        let position = [3.0 * side(0), 3.0 * side(1), 2.5 * side(2) + 0.5].into();
+        let (radius, cross_section) = (0.45, 0.12);
+        let (kind, object, material) = (SplatKind::Medium, 1 + (n % 2) as u32, 1);
+        cloud.push(&Splat { position, radius, cross_section, kind, object, material, ..Splat::default() });
+    }
+    let medium = Material { asymmetry: 0.3, extinction_rgb: [1.0; 3], ..scattering() };
+    let mut shown = Shown::new(cloud, camera, vec![lambert(), medium], 0.2);
+    shown.objects[2].casts_shadow = false;
+    shown.objects[1].shadow_coefficient = 0.6;
+    shown
+}
+
+#[test]
+fn hv_splats_among_volumes_are_those_of_the_twin() {
+    let (tf, material) = (transfer(&[(0.2, 0.0), (0.5, 0.4), (0.8, 0.1), (0.9, 1.5)]), scattering());
+    let grid = grid([8, 7, 6], cubic(0.5), noise);
+    let volumes = [volume(&grid, &tf, &material)];
+    let mut bright = lamp([6.0, 8.0, 7.0]);
+    bright.light = Light { intensity: [100.0; 3], ..bright.light };
+    for camera in [parallel([3.0, 2.0, 8.0], 5.0, [26, 22]), perspective([2.0, 3.0, 8.0], 35.0, [22, 26])] {
+        let shown = discs_and_matter(&camera);
+        for volumes in [&volumes[..], &[]] {
+            for (light, slab_width) in
+                [(sun([1.0, 3.0, 2.0]), None), (sun([-1.0, 2.0, -3.0]), Some(0.3)), (bright, Some(0.4))]
+            {
+                let lights = [light];
+                let of = with(&shown, input(volumes, &camera, &lights));
+                let [tau, color] = differences(&of, &exact(slab_width));
+                let what = (volumes.len(), slab_width, light.light.shape);
+                assert!(tau < 1e-5 && color < 2e-4, "{what:?}: {tau:e} {color:e}");
+            }
+        }
+    }
+}
+
+#[test]
+fn hv_polygons_among_volumes_are_those_of_the_twin_but_at_the_edges_of_shadows() {
+    let tf = transfer(&[(0.2, 0.0), (0.6, 0.5), (1.2, 0.1), (1.5, 1.0)]);
+    let (medium, material) = (scattering(), white());
+    let field = |p: DVec3| (1.3 * p.x).sin() + (0.9 * p.y + p.z).cos() + 0.2 * p.z;
+    let grid = grid([8, 7, 6], cubic(0.5), field);
+    let volumes = [volume(&grid, &tf, &medium)];
+    let (floor, pane) = (
+        wall([0.0, -1.3, 0.0], [2.5, 0.1, 0.0], [0.0, 0.1, -2.5]),
+        wall([-0.4, 0.3, 0.4], [0.5, 0.2, 0.1], [0.1, -0.1, 0.6]),
+    );
+    let all = [polygons(&floor, &material), polygons(&pane, &material)];
+    let mut bright = lamp([3.0, 8.0, 5.0]);
+    bright.light = Light { intensity: [80.0; 3], ..bright.light };
+    for camera in [parallel([3.0, 4.0, 8.0], 5.0, [40, 36]), perspective([2.0, 5.0, 8.0], 38.0, [36, 40])] {
+        for (light, slab_width) in [(sun([1.0, 3.0, 2.0]), None), (bright, Some(0.3))] {
+            let lights = [light];
+            let of = HalfInput { polygons: &all, ..input(&volumes, &camera, &lights) };
+            let params = HalfParams { most_light_pixels: 1024, ..exact(slab_width) };
+            let mut out = Accumulator::new(camera.size, 1, 3, false, false);
+            let drawn = fold(&of, &params, &BEAUTY, &mut out, None).unwrap();
+            let twin = reference::draw(&of, &params).unwrap();
+            let behind = &drawn.polygons.channels[1];
+            let (mut apart, mut shown) = (Vec::new(), 0);
+            for (at, expected) in twin.color.iter().enumerate() {
+                let tau = f64::from(out.optical_depth[0][at]);
+                // At the edges of polygons one form sees them, the other does not.
+                if (tau - twin.optical_depth[at]).abs() < 1e-3 {
+                    let color = f64::from(out.channels[1][at]) + (-tau).exp() * f64::from(behind[at]);
+                    apart.push((color - expected[1]).abs());
+                    shown += usize::from(behind[at] > 0.05);
+                }
+            }
+            let size = apart.len();
+            apart.sort_by(f64::total_cmp);
+            // A white wall in full light shows 1/π. Edges of shadows are pixels of the light's z-buffer.
+            let (most, edges) = (apart[size * 97 / 100], apart.iter().filter(|d| **d > 2e-3).count());
+            assert!(shown > 200 && size > twin.color.len() * 98 / 100, "{shown} pixels of polygons, {size} in all");
+            let worst = apart[size - 1];
+            assert!(most < 1e-5 && edges < 6, "{:?}: {most:e}, {edges} edges, {worst:e}", light.light.shape);
         }
     }
 }

@@ -1,0 +1,169 @@
+//! Splats of a sweep: each whole in the slab of its centre, lit by what lies before it in the light's image, pixel by pixel.
+//!
+//! Footprints in both images, and where a splat asks for light, are the functions of the fast form; discs and media without images, special
+//! discs and Gaussians, and without what hides them from the eye.
+
+use super::{Image, Sums, View};
+use crate::half::HalfSplats;
+use crate::half::splat_light::asks_at;
+use splat_core::glam::DVec3;
+use splat_core::raster::Projected;
+use splat_core::shade::{LitBy, ShadeInput, shade_splat};
+use splat_core::{Receiver, SplatKind, Transmittance};
+
+/// The splats, and what is known of them.
+pub(super) struct Splats<'a> {
+    of: HalfSplats<'a>,
+    /// Slab coordinates of the centres; their slabs.
+    places: Vec<DVec3>,
+    slabs: Vec<u32>,
+    /// Where each asks for light, in slabs.
+    asks: Vec<f64>,
+    /// Share of the light that comes to each.
+    through: Vec<f32>,
+    seen_by_light: Projected,
+    /// By pixel of the light: optical depth of the slabs before, that of the present one, and its depths in the slab times it.
+    pixels: Vec<[f64; 3]>,
+}
+
+/// What is carried to splats, and what all else lets through.
+struct Carried<'a> {
+    through: &'a [f32],
+    others: Option<&'a dyn Transmittance>,
+}
+
+impl Transmittance for Carried<'_> {
+    fn transmittance(&self, receiver: &Receiver) -> [f32; 3] {
+        self.others.map_or([1.0; 3], |others| others.transmittance(receiver))
+    }
+
+    fn at_splat(&self, splat: usize, receiver: &Receiver) -> [f32; 3] {
+        self.transmittance(receiver).map(|t| t * self.through[splat])
+    }
+}
+
+impl<'a> Splats<'a> {
+    pub(super) fn new(of: &HalfSplats<'a>, view: &View<'_>, light: &Image) -> Self {
+        let cloud = of.cloud;
+        let (frame, camera) = (&view.frame, &light.camera);
+        let world = |p: &splat_core::glam::Vec3| cloud.origin + p.as_dvec3();
+        let places: Vec<DVec3> = cloud.position.iter().map(|p| frame.point(world(p))).collect();
+        let slab = |depth: f64| ((depth / frame.slabs.width).max(0.0) as u32).min(frame.slabs.count - 1);
+        let asks_at = |(i, p): (usize, &DVec3)| f64::from(asks_at(of, frame, (camera, 1.0), i, p.as_vec3()));
+        Self {
+            slabs: places.iter().map(|p| slab(p.z)).collect(),
+            asks: places.iter().enumerate().map(asks_at).collect(),
+            places,
+            through: vec![1.0; cloud.len()],
+            seen_by_light: of.seen_by(camera),
+            pixels: vec![[0.0; 3]; camera.size.iter().map(|s| *s as usize).product()],
+            of: *of,
+        }
+    }
+
+    /// Green optical depth of a splat in a pixel.
+    fn optical_depth(&self, seen: &Projected, image: &Image, i: usize, at: usize) -> f64 {
+        if !seen.is_visible(i) {
+            return 0.0;
+        }
+        let (splat, width) = (&seen.splats[i], image.camera.size[0] as usize);
+        let [x, y] = [at % width, at / width].map(|v| v as f64 + 0.5);
+        let [dx, dy] = [x - f64::from(splat.center_px[0]), y - f64::from(splat.center_px[1])];
+        let [a, b, c] = splat.conic.map(f64::from);
+        let mut s = a * dx * dx + b * dx * dy + c * dy * dy;
+        if splat.kind == SplatKind::Medium && !image.camera.is_orthographic() {
+            s /= image.camera.view_ray(x, y).1.length_squared();
+        }
+        let profile = self.of.footprints.layers()[usize::from(splat.footprint)].profile(s);
+        f64::from(splat.peak) * profile * f64::from(self.of.materials[usize::from(splat.material)].extinction_rgb[1])
+    }
+
+    /// Comes to a slab: what its splats keep from those behind them, and what comes to those that ask there.
+    pub(super) fn enter(&mut self, slab: u32, view: &View<'_>, (light, sums): (&Image, &Sums), lit: &LitBy<'_>) {
+        let mut pixels = std::mem::take(&mut self.pixels);
+        for (at, [before, own, depths]) in pixels.iter_mut().enumerate() {
+            *before += *own;
+            (*own, *depths) = (0.0, 0.0);
+            for i in self.of_slab(slab).filter(|i| self.casts(*i)) {
+                let tau = self.optical_depth(&self.seen_by_light, light, i, at);
+                *own += tau;
+                *depths += tau * (self.places[i].z / view.frame.slabs.width - f64::from(slab));
+            }
+        }
+        self.pixels = pixels;
+        for i in (0..self.places.len()).filter(|i| (self.asks[*i] as u32).min(view.frame.slabs.count - 1) == slab) {
+            let is_medium = self.of.cloud.kind[i] == SplatKind::Medium;
+            let depth = if is_medium { self.asks[i] - f64::from(slab) } else { f64::NEG_INFINITY };
+            let pixels = view.around(light, self.places[i]);
+            let through = pixels.map(|(at, weight)| weight * libm::exp(-self.of_pixel(at, depth)));
+            self.through[i] *= through.iter().sum::<f64>() as f32;
+        }
+        for i in self.of_slab(slab).collect::<Vec<_>>() {
+            let tau = view.through_volumes((light, sums), &lit.light, (self.places[i], slab));
+            let seen = view.polygons.sees(&lit.light, view.frame.world(self.places[i]), None);
+            self.through[i] *= if seen { libm::exp(-tau) as f32 } else { 0.0 };
+        }
+    }
+
+    fn of_slab(&self, slab: u32) -> impl Iterator<Item = usize> + use<'_, 'a> {
+        (0..self.places.len()).filter(move |i| self.slabs[*i] == slab)
+    }
+
+    fn casts(&self, i: usize) -> bool {
+        self.of.objects[self.of.cloud.object[i] as usize].casts_shadow
+    }
+
+    /// Optical depth of what a pixel of the light has up to a depth in the present slab, in slabs: that slab's as if it lay spread over a slab's width
+    /// about its mean depth.
+    fn of_pixel(&self, at: usize, depth: f64) -> f64 {
+        let [before, own, depths] = self.pixels[at];
+        let mean = depths / own.max(f64::MIN_POSITIVE);
+        before + own * (depth - mean + 0.5).clamp(0.0, 1.0)
+    }
+
+    /// Mean optical depth, and mean transmittance, of the splats before a place in the present slab.
+    pub(super) fn before(&self, view: &View<'_>, light: &Image, (place, slab): (DVec3, u32)) -> [f64; 2] {
+        let depth = place.z / view.frame.slabs.width - f64::from(slab);
+        let pixels = view.around(light, place).map(|(at, weight)| (self.of_pixel(at, depth), weight));
+        let mean = |of: fn(f64) -> f64| pixels.iter().map(|(tau, weight)| weight * of(*tau)).sum::<f64>();
+        [mean(|tau| tau), mean(|tau| libm::exp(-tau))]
+    }
+
+    /// Radiance of the splats of a slab, each with its place in the cloud.
+    pub(super) fn radiance(
+        &self,
+        slab: u32,
+        view: &View<'_>,
+        (lit, with_ambient): (&LitBy<'_>, bool),
+    ) -> Vec<(usize, [f64; 3])> {
+        let HalfSplats { cloud, materials, objects, .. } = self.of;
+        let carried = Carried { through: &self.through, others: lit.shadow };
+        let lights = [LitBy { shadow: Some(&carried), ..*lit }];
+        let (ambient, camera) = (view.input.sheets.ambient, view.input.sheets.camera);
+        let input = ShadeInput { cloud, materials, objects, lights: &lights, ambient, camera };
+        let radiance = |i: usize| {
+            let mut own = shade_splat(&input, i).0;
+            if !with_ambient {
+                (own.ambient, own.emission) = ([0.0; 3], [0.0; 3]);
+            }
+            (i, [0, 1, 2].map(|c| own.effects().iter().map(|effect| f64::from(effect[c])).sum()))
+        };
+        self.of_slab(slab).map(radiance).collect()
+    }
+
+    /// Mixes the splats of a slab with what volumes have of it in a pixel of the eye: extinctions add, and colours weigh by them.
+    pub(super) fn mix(
+        &self,
+        (eye, at): (&Image, usize),
+        shown: &[(usize, [f64; 3])],
+        (tau, color): (f64, [f64; 3]),
+    ) -> (f64, [f64; 3]) {
+        let (mut all, mut sum) = (tau, color.map(|c| c * tau));
+        for (i, radiance) in shown {
+            let own = self.optical_depth(self.of.projected, eye, *i, at);
+            all += own;
+            (0..3).for_each(|c| sum[c] += own * radiance[c]);
+        }
+        if all > 0.0 { (all, sum.map(|c| c / all)) } else { (0.0, [0.0; 3]) }
+    }
+}

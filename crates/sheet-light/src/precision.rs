@@ -1,0 +1,23 @@
+//! Sums that are rounded to half precision, to see what buffers of 16 bits do.
+
+use splat_core::raster::lanes::Lanes;
+use splat_core::raster::pulp::Simd;
+
+/// 2¹³ + 1: Veltkamp's splitting keeps 11 of 24 bits.
+const SPLIT: f32 = 8193.0;
+
+/// Sums that are larger would overflow on the way, and stay.
+const LARGEST: f32 = 1e34;
+
+/// Rounded to 11 bits, whatever their size.
+#[inline(always)]
+pub(crate) fn rounded<S: Simd>(simd: S, sums: Lanes<S>) -> Lanes<S> {
+    let scaled = sums * Lanes::splat(simd, SPLIT);
+    (scaled - (scaled - sums)).where_less_or(sums.abs(), Lanes::splat(simd, LARGEST), sums)
+}
+
+/// The same of one number.
+pub(crate) fn rounded_one(sum: f32) -> f32 {
+    let scaled = sum * SPLIT;
+    if sum.abs() < LARGEST { scaled - (scaled - sum) } else { sum }
+}
