@@ -1,10 +1,10 @@
 //! The surface that a light of a scene sees first, straight from its shadow map (Gunjee 2007, Figure 15 a).
 
 use glam::{DVec3, Vec3};
-use organza::scene::{Scene, ShadowMapping};
-use organza::{Error, Loaded, Progress, RenderOptions};
-use splat_core::{Light, LightShape, Limits};
-use tsm::{MappingChoice, Params, Resolution, ShadowMap};
+use organza::scene::Scene;
+use organza::{Error, Loaded, Progress, RenderOptions, shadow_params};
+use splat_core::{Light, LightShape};
+use tsm::{Params, ShadowMap};
 
 /// Greatest absorbance that may be asked for: lists of a map go somewhat farther.
 const MOST: f32 = 10.0;
@@ -59,7 +59,8 @@ impl Seen {
         // From the scale of the cloud to that of the scene: a power of two.
         loaded.cloud.scale_world(2f64.powi(loaded.exponent));
         let casters = tsm::Scene { cloud: &loaded.cloud, materials: &loaded.materials, objects: &loaded.objects };
-        let params = params(scene, &loaded, options);
+        let left = options.max_memory.saturating_sub(loaded.cloud.bytes());
+        let params = shadow_params(&scene.render, &loaded, Params::default().tolerance, left);
         let map = ShadowMap::build(&casters, &self.light, &params, Some(progress)).map_err(|e| self.refused(&e))?;
         let points = map.first_surface(self.absorbance);
         if points.is_empty() {
@@ -79,20 +80,5 @@ impl Seen {
             tsm::Error::Core(splat_core::Error::Cancelled) => Error::Cancelled,
             other => Error::input(what, other.to_string(), ""),
         }
-    }
-}
-
-fn params(scene: &Scene, loaded: &Loaded, options: &RenderOptions) -> Params {
-    let shadow = &scene.render.shadow;
-    Params {
-        mapping: match shadow.mapping {
-            ShadowMapping::Auto => MappingChoice::Auto,
-            ShadowMapping::Octahedral => MappingChoice::Octahedral,
-            ShadowMapping::Polar => MappingChoice::PolarAzimuth,
-        },
-        resolution: shadow.cells.map_or(Resolution::Auto, Resolution::Cells),
-        footprints: loaded.footprints.clone(),
-        limits: Limits::bytes(options.max_memory.saturating_sub(loaded.cloud.bytes())),
-        ..Params::default()
     }
 }

@@ -68,7 +68,7 @@ pub use organza_scene::{escape_controls, printable, shown};
 pub use prepare::{Explanation, explain, explain_from, load, plan_loaded, same_splats};
 pub use render::{Render, render, render_from};
 pub use sequence::Sequence;
-pub use shadows::ShadowTable;
+pub use shadows::{ShadowTable, shadow_params};
 pub use splat_core::{CostRecord, Layers, Progress};
 pub use statistics::SplatCount;
 pub use technique::Sets;

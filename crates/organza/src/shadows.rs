@@ -27,7 +27,7 @@ pub struct ShadowTable {
 impl ShadowTable {
     /// What it is built by, where it and those after it may take so many bytes.
     pub(crate) fn params(&self, settings: &RenderSettings, loaded: &Loaded, left: u64) -> Params {
-        params(settings, loaded, self.tolerance, self.max_bytes.min(left))
+        shadow_params(settings, loaded, self.tolerance, self.max_bytes.min(left))
     }
 
     /// Absorbance at which lists stop.
@@ -43,8 +43,8 @@ impl ShadowTable {
     }
 }
 
-/// Parameters of a map with this tolerance, which may take `max_bytes`.
-fn params(settings: &RenderSettings, loaded: &Loaded, tolerance: f32, max_bytes: u64) -> Params {
+/// Parameters of a map with this tolerance, the transmittance at which its lists stop, which may take `max_bytes`.
+pub fn shadow_params(settings: &RenderSettings, loaded: &Loaded, tolerance: f32, max_bytes: u64) -> Params {
     let shadow = &settings.shadow;
     Params {
         mapping: match shadow.mapping {
@@ -119,7 +119,7 @@ fn tables_within(
         let Some((point, objects)) = wanted else { return Ok(None) };
         let light = &point.light;
         let tolerance = tolerance(settings, loaded, point, maps);
-        let params = params(settings, loaded, tolerance, max_bytes);
+        let params = shadow_params(settings, loaded, tolerance, max_bytes);
         let scene = tsm::Scene { cloud: &loaded.cloud, materials: &loaded.materials, objects };
         let predicted = Deposits::predict(&scene, light, &params).map_err(|e| shadow_error(point, &e))?;
         Ok(Some(ShadowTable { predicted, tolerance, max_bytes }))

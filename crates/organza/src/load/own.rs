@@ -97,7 +97,7 @@ impl Own {
         let depth = factor * optics::optical_depth(prepared.input.opacity().unwrap_or(0.0));
         let bounded = prepared.bounded.take().filter(|_| source == Form::Field);
         let Some((body, bounds, spacing)) = data(prepared, bounded, source, context)? else { return Ok(None) };
-        let table_bytes = table_bytes(&body, bounds, prepared.prediction.splats);
+        let table_bytes = table_bytes(&body, source, bounds, prepared.prediction.splats);
         let radius = f64::from(splat.profile.cutoff) * f64::from(Footprint::SIGMA_OVER_SPACING) * spacing;
         Ok(Some(Self {
             object: context.id,
@@ -178,12 +178,12 @@ impl Own {
 
 /// Bytes of the tables of a sampler, about: of cells with extinction, of triangles, of cubes that a surface meets; a lattice's isosurface
 /// has as many splats as there are steps across it.
-fn table_bytes(body: &Body, bounds: DAabb, splats: u64) -> u64 {
+fn table_bytes(body: &Body, form: Form, bounds: DAabb, splats: u64) -> u64 {
     match body {
         Body::Cells { grid, transfer, .. } => {
             // Chains find cells by an index of each voxel.
-            4 * grid.values.len() as u64
-                + 32 * grid.values.par_iter().filter(|v| transfer.at(**v).extinction > 0.0).count() as u64
+            let index = if form == Form::Chains { 4 * grid.values.len() as u64 } else { 0 };
+            index + 32 * grid.values.par_iter().filter(|v| transfer.at(**v).extinction > 0.0).count() as u64
         }
         Body::Lattice { .. } => 32 * splats,
         Body::Triangles(mesh) => 16 * mesh.triangles.len() as u64,
