@@ -13,8 +13,12 @@ use splat_core::Exceeded;
 use std::fs;
 
 const SIZE: [usize; 2] = [24, 16];
-
+/// A scene without lights.
+const FEW: Facts = Facts { slice_thickness: Some(0.1), cells: None, bytes_per_splat: None };
+/// One with all that a knob may need.
+const ALL: Facts = Facts { slice_thickness: Some(0.1), cells: Some(64), bytes_per_splat: Some([48.0, 15.7]) };
 const OPTIONS: Options = Options { quick: true, finer: 0, seed: 1 };
+const THOROUGH: Options = Options { quick: false, ..OPTIONS };
 
 const SCENE: &str = r#"version = 1
 [camera]
@@ -70,7 +74,7 @@ fn sweep() -> Sweep {
     let slabs = |n: f64| step(1.0 / n, n);
     Sweep {
         technique: "slabs",
-        base: Request { scene, oversample: 8 },
+        base: Request { scene, oversample: 8, packed: false },
         base_label: "the scene's own".into(),
         knobs: vec![
             Knob {
@@ -208,8 +212,7 @@ fn what_was_not_measured_is_null() {
 
 /// A sweep of repeat levels from `sweep`'s scene.
 fn repeats() -> Sweep {
-    let facts = Facts { slice_thickness: Some(0.1), cells: None };
-    particles(&scene(), &facts, &OPTIONS).unwrap()
+    particles(&scene(), &FEW, &OPTIONS).unwrap()
 }
 
 /// The exact picture with noise of variance 0.01/`repeat level`, which `seed_of` chooses; `bias` is added everywhere.
@@ -378,20 +381,18 @@ fn knobs_that_cannot_matter_are_left_alone() {
         "shadow table mapping",
         "absorbance cut",
         "transmittance cut",
+        "packed splats",
         "accumulation",
         "footprint table size",
     ];
     assert_eq!(skipped, expected);
-    let thorough = Options { quick: false, ..OPTIONS };
-    let all = points(&scene(), &Facts { slice_thickness: Some(0.1), cells: Some(64) }, &thorough);
+    let all = points(&scene(), &ALL, &THOROUGH);
     assert_eq!(all.skipped.len(), 1);
-    assert_eq!(all.knobs.len(), 10);
+    assert_eq!(all.knobs.len(), 11);
 }
 
 #[test]
 fn what_a_report_says_to_write_gives_the_scene_that_it_drew() {
-    let facts = Facts { slice_thickness: Some(0.1), cells: Some(64) };
-    let thorough = Options { quick: false, ..OPTIONS };
     let ball = "implicit = { expression = \"x^2 + y^2 + z^2 - 0.25\", box = [[-1, -1, -1], [1, 1, 1]], spacing = 0.1 }";
     let volume =
         "[[object]]\nname = 'v'\nvolume = 'v.nii'\ntransfer = [{ value = 0, color = [1, 1, 1], extinction = 1 }]";
@@ -411,10 +412,10 @@ fn what_a_report_says_to_write_gives_the_scene_that_it_drew() {
         let own: Vec<String> = own.iter().map(|s| (*s).to_owned()).collect();
         let written = parsed(&own);
         let sweeps = [
-            points(&written, &facts, &thorough),
-            particles(&written, &facts, &thorough).unwrap(),
-            sheets(&written, Some(0.1), &facts, &thorough).unwrap(),
-            surfels(&written, &facts, &thorough),
+            points(&written, &ALL, &THOROUGH),
+            particles(&written, &ALL, &THOROUGH).unwrap(),
+            sheets(&written, Some(0.1), &ALL, &THOROUGH).unwrap(),
+            surfels(&written, &ALL, &THOROUGH),
         ];
         for (sweep, knob) in sweeps.iter().flat_map(|sweep| sweep.knobs.iter().map(move |knob| (sweep, knob))) {
             for step in &knob.steps {
@@ -443,19 +444,18 @@ fn what_a_report_says_to_write_gives_the_scene_that_it_drew() {
 
 #[test]
 fn the_samplers_of_implicit_surfaces_are_knobs_of_particles() {
-    let facts = Facts { slice_thickness: Some(0.1), cells: None };
     let names = |sweep: &Sweep| sweep.knobs.iter().map(|k| k.name).collect::<Vec<_>>();
     // Media alone have none, but one of their own.
-    let sweep = particles(&scene(), &facts, &OPTIONS).unwrap();
+    let sweep = particles(&scene(), &FEW, &OPTIONS).unwrap();
     assert_eq!(names(&sweep), ["repeat level", "volume sampler"]);
     assert!(sweep.skipped.iter().any(|s| s.knob == "surface sampler" && s.reason.contains("implicit")));
 
     let ball = "implicit = { expression = \"x^2 + y^2 + z^2 - 0.25\", box = [[-1, -1, -1], [1, 1, 1]], spacing = 0.1 }";
     let text = format!("{SCENE}[[object]]\nname = \"ball\"\n{ball}\nopacity = 0.5\n");
     let with_ball = scene::parse("s.toml".as_ref(), text.as_bytes(), &Default::default()).unwrap();
-    let quick = particles(&with_ball, &facts, &Options { quick: true, ..OPTIONS }).unwrap();
+    let quick = particles(&with_ball, &FEW, &OPTIONS).unwrap();
     assert_eq!(names(&quick), ["repeat level", "surface sampler", "volume sampler"]);
-    let sweep = particles(&with_ball, &facts, &Options { quick: false, ..OPTIONS }).unwrap();
+    let sweep = particles(&with_ball, &FEW, &THOROUGH).unwrap();
     assert_eq!(names(&sweep), ["repeat level", "surface sampler", "Brownian step", "volume sampler"]);
     let turned = |knob: &Knob| -> Vec<scene::SurfaceSampler> {
         knob.steps.iter().map(|s| sweep.turned(knob, s).scene.render.particles.surface_sampler).collect()

@@ -208,3 +208,89 @@ fn files_are_read_once_while_they_fit() {
     let refused = sequence.render(&scenes[1], &short, &progress).unwrap_err();
     assert!(refused.to_string().contains("t.ply"), "{refused}");
 }
+
+/// The names of the passes that make splats and their shadows, as far as they ran.
+fn made_anew(drawn: &organza::Render) -> Vec<&str> {
+    let names = drawn.cost.stages.iter().map(|stage| stage.name.as_str());
+    names.filter(|name| ["read", "convert", "tsm build"].contains(name)).collect()
+}
+
+#[test]
+fn a_camera_that_moves_alone_sees_what_was_made_for_the_frame_before() {
+    use organza::{Progress, RenderOptions, Sequence, render, scene};
+    const MATTER: &str = r#"[[object]]
+name = "pane"
+rectangle = { center = [0, 0, -0.7], u = [1.5, 0, 0], v = [0, 1.5, 0], spacing = 0.15 }
+opacity = 0.6
+[[object]]
+name = "wall"
+rectangle = { center = [0, 0, -1.5], u = [3, 0, 0], v = [0, 3, 0], spacing = 0.2 }
+[[light]]
+kind = "point"
+position = [1, 3, 3]
+intensity = [30, 10, 20]
+[[light]]
+kind = "directional"
+direction = [0.2, -1, -1]
+irradiance = [1, 2, 1]
+"#;
+    // The camera turns in frames 1 and 3, the pane in frame 2.
+    const TRACKS: &str = r#"[animation]
+frames = 4
+[[animation.track]]
+set = "camera.position"
+keys = [{ frame = 0, value = [0, 0, 4] }, { frame = 1, value = [2, 1, 3] }, { frame = 2, value = [2, 1, 3] }, { frame = 3, value = [-1, 0, 4] }]
+[[animation.track]]
+set = "object.pane.transform.translate"
+keys = [{ frame = 1, value = [0, 0, 0] }, { frame = 2, value = [0.3, 0, 0] }]
+"#;
+    let (options, progress) = (RenderOptions::default(), Progress::new());
+    for settings in [
+        "[render]\ntechnique = 'points'\n",
+        "[render]\ntechnique = 'points'\nshadow = { cells = 9 }\n",
+        "[render]\ntechnique = 'surfels'\n",
+        "[render]\ntechnique = 'sheets'\n",
+        "[render]\ntechnique = 'particles'\nparticles = { repeat_level = 4 }\n",
+    ] {
+        let objects = if settings.contains("surfels") { "" } else { OBJECTS };
+        let text = [SMALL_SCENE, objects, MATTER, TRACKS, settings].concat();
+        let frame = |k| {
+            let options = scene::LoadOptions { frame: Some(k), ..Default::default() };
+            scene::parse("s.toml".as_ref(), text.as_bytes(), &options).unwrap_or_else(|e| panic!("{settings}: {e}"))
+        };
+        let scenes = [0, 1, 2, 3].map(frame);
+        let mut sequence = Sequence::new(&scenes);
+        let drawn = scenes.each_ref().map(|s| sequence.render(s, &options, &progress).unwrap());
+        for (k, (drawn, scene)) in drawn.iter().zip(&scenes).enumerate() {
+            let alone = render(scene, &options, &progress).unwrap();
+            // Sets of particles are as fine as any frame needs them.
+            assert!(settings.contains("particles") || drawn.layers == alone.layers, "{settings}: frame {k}");
+            assert_eq!(drawn.plan, alone.plan, "{settings}: frame {k}");
+        }
+        let [first, turned, moved, again] = drawn.each_ref().map(made_anew);
+        assert!(first.len() > 2 && first == moved, "{settings}: {first:?} {moved:?}");
+        assert!(turned.is_empty() && again.is_empty(), "{settings}: {turned:?} {again:?}");
+        assert_ne!(drawn[0].layers, drawn[1].layers, "{settings}");
+    }
+}
+
+#[test]
+fn what_a_camera_decides_is_made_for_each() {
+    use organza::{Progress, RenderOptions, Sequence, render, scene};
+    let place = Place::new("");
+    place.write("p.xyz", (0..200).map(|i| format!("{} {} 0\n", i % 20, i / 20)).collect::<String>());
+    let text = format!(
+        "{SMALL_SCENE}[[object]]\nname = 'p'\npoints = 'p.xyz'\npoint_size = {{ pixels = 3 }}\ntransform = {{ scale = 0.1 }}\n\
+         [animation]\nframes = 2\n[[animation.track]]\nset = 'camera.position'\n\
+         keys = [{{ frame = 0, value = [1, 1, 3] }}, {{ frame = 1, value = [1, 1, 9] }}]\n"
+    );
+    let frame = |k| {
+        let options = scene::LoadOptions { frame: Some(k), ..Default::default() };
+        scene::parse(&place.path("s.toml"), text.as_bytes(), &options).unwrap()
+    };
+    let (scenes, options, progress) = ([frame(0), frame(1)], RenderOptions::default(), Progress::new());
+    let mut sequence = Sequence::new(&scenes);
+    let drawn = scenes.each_ref().map(|s| sequence.render(s, &options, &progress).unwrap());
+    assert!(made_anew(&drawn[1]).contains(&"convert"));
+    assert_eq!(drawn[1].layers, render(&scenes[1], &options, &progress).unwrap().layers);
+}

@@ -8,7 +8,7 @@ mod light;
 mod on_device;
 mod splats;
 
-use light::Maps;
+pub(crate) use light::Maps;
 pub(crate) use on_device::Chained;
 pub use splats::Shaded;
 pub(crate) use splats::record;
@@ -44,6 +44,8 @@ pub struct Frame<'a> {
     pub(crate) progress: &'a Progress,
     /// Groups of discs, which serve all frames of an animation.
     pub(crate) groups: RefCell<grouped::KeptInFrames>,
+    /// Whether frames follow that ask for the same light again.
+    remembers: bool,
     /// `None` inside where all splats are drawn.
     drawn: OnceCell<Option<Cloud>>,
     light_points: OnceCell<Vec<LightPoint>>,
@@ -66,6 +68,7 @@ impl<'a> Frame<'a> {
             device_composites: false,
             progress,
             groups: RefCell::default(),
+            remembers: false,
             drawn: OnceCell::new(),
             light_points: OnceCell::new(),
             maps: OnceCell::new(),
@@ -79,6 +82,18 @@ impl<'a> Frame<'a> {
         self.helper = device.map(|(helper, _)| helper);
         self.device_composites = device.is_some_and(|(_, composites)| composites);
         self
+    }
+
+    /// With the shadow maps of the frame before it, and whether what arrives through them is remembered.
+    pub(crate) fn following(mut self, maps: Option<Maps>, remembers: bool) -> Self {
+        self.maps = maps.map_or_else(OnceCell::new, OnceCell::from);
+        self.remembers = remembers;
+        self
+    }
+
+    /// Whether there are shadow maps already.
+    pub(crate) fn has_maps(&self) -> bool {
+        self.maps.get().is_some()
     }
 
     /// What techniques draw.

@@ -67,10 +67,11 @@ pub struct Loaded {
 }
 
 impl Loaded {
-    /// Takes the size of the picture and the slice thickness from a scene that differs from the loaded one in those and in
+    /// Takes the camera and the slice thickness from a scene that differs from the loaded one in those and in
     /// other render settings alone: its splats are these.
     pub fn retarget(&mut self, scene: &Scene) {
-        self.camera.size = scene.camera.size;
+        self.camera = scene.camera;
+        self.camera.scale_world(libm::exp2(f64::from(self.exponent)).recip());
         self.slice_thickness = scaled_thickness(scene, self.exponent);
     }
 

@@ -15,6 +15,7 @@ use crate::statistics::{ObjectData, ObjectStatistics, Statistics};
 use crate::technique::Row;
 use crate::work::Translucent;
 use crate::{CostRecord, Error, Progress, RenderOptions, SplatCount, doubts, lights, shadows};
+use convert::DiscSize;
 use splat_core::shade::Census;
 use splat_core::{Exceeded, Material, SplatKind};
 
@@ -58,7 +59,7 @@ pub fn explain_from(
     files: &Files,
 ) -> Result<Explanation, Error> {
     let (scene, found) = fitted(scene, options, progress, files)?;
-    let (_, mut explanation, _) = prepare(&scene, options, progress, files)?;
+    let (_, mut explanation, _) = prepare(&scene, options, progress, files, None)?;
     explanation.found = found;
     explanation.warnings.extend(doubts::of_shadows(explanation.plan.tables()));
     explanation.warnings.extend(doubts::of_scattering(&explanation.plan));
@@ -66,16 +67,24 @@ pub fn explain_from(
     Ok(explanation)
 }
 
+/// Loads and plans; `made` is what was loaded of another scene that [`turned`] says serves this one.
 pub(crate) fn prepare(
     scene: &Scene,
     options: &RenderOptions,
     progress: &Progress,
     files: &Files,
+    made: Option<Loaded>,
 ) -> Result<(Loaded, Explanation, Memory), Error> {
     let mut cost = CostRecord::default();
     memory::check("the image", memory::image_bytes(scene), options.max_memory)?;
     check_samples(scene)?;
-    let loaded = load_measured(scene, options, progress, files, &mut cost)?;
+    let loaded = match made {
+        Some(mut loaded) => {
+            loaded.retarget(scene);
+            loaded
+        }
+        None => load_measured(scene, options, progress, files, &mut cost)?,
+    };
     let (plan, memory) = plan_counted(scene, &loaded, options)?;
     let (splats, notes) = (loaded.splats.clone(), loaded.notes.clone());
     let mut warnings = loaded.warnings.clone();
@@ -101,6 +110,17 @@ pub fn same_splats(a: &Scene, b: &Scene) -> bool {
         && a.render.particles.volume_sampler == b.render.particles.volume_sampler
         && a.render.layers == b.render.layers
         && a.render.max_points == b.render.max_points
+}
+
+/// Whether what is loaded of one frame serves the other, after [`Loaded::retarget`]: whether they differ in the camera alone, and it
+/// decides nothing of what is made of an object.
+pub(crate) fn turned(a: &Scene, b: &Scene) -> bool {
+    // The frame's number is part of the hash.
+    let other = Scene { camera: a.camera, target: a.target, sha256: a.sha256.clone(), ..b.clone() };
+    let by_pixels = |object: &SceneObject| matches!(object.points.size, Some(DiscSize::Pixels(_)));
+    // Discs as large as some pixels; splats that no shadow map needs, as light is carried for this view.
+    let of_view = || carried::of_scene(b).is_some() || visible(b).any(by_pixels);
+    *a == other && (a.camera == b.camera || !of_view())
 }
 
 /// Plans the render of a loaded scene. `scene` may differ from the one that was loaded in its render settings; whether the same

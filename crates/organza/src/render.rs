@@ -3,16 +3,17 @@
 use crate::choose::{row, techniques};
 use crate::device::Helper;
 use crate::draw::draw;
-use crate::frame::Frame;
 use crate::frame::grouped::KeptInFrames;
+use crate::frame::{Frame, Maps};
 use crate::load::files::Files;
-use crate::load::fitted;
+use crate::load::{Loaded, fitted};
 use crate::plan::Plan;
-use crate::prepare::{Explanation, prepare};
+use crate::prepare::{Explanation, prepare, turned};
 use crate::scene::{FoundCamera, Scene};
 use crate::technique::{Checkpoint, Kept, Session, Sets};
 use crate::{CostRecord, Error, Layers, Progress, RenderOptions, doubts};
 use convert::ColorScale;
+use splat_core::Arrived;
 use std::path::PathBuf;
 
 /// A finished render.
@@ -62,8 +63,16 @@ pub(crate) struct Left {
     pub(crate) files: Files,
     pub(crate) sets: Kept,
     groups: KeptInFrames,
+    made: Option<Made>,
     /// Whether no other frame comes.
     is_still: bool,
+}
+
+/// What was made of the last frame's scene.
+struct Made {
+    scene: Scene,
+    loaded: Loaded,
+    maps: Option<Maps>,
 }
 
 impl Left {
@@ -74,13 +83,21 @@ impl Left {
         }
     }
 
-    /// Share of the allowed memory that files may take.
-    const FILES: u64 = 4;
+    /// Share of the allowed memory that files may take, and light that is remembered.
+    const SHARE: u64 = 4;
+
+    /// Bytes of the light that arrives at splats, where the next frame is to find it: not where they are more than its share, or than is
+    /// left beside `other`.
+    fn remembers(&self, loaded: &Loaded, plan: &Plan, max_memory: u64, other: u64) -> Option<u64> {
+        let bytes = Arrived::bytes_of(loaded.cloud.len()).saturating_mul(plan.tables().count() as u64);
+        let fits = bytes <= (max_memory / Self::SHARE).min(max_memory.saturating_sub(other));
+        (!self.is_still && fits).then_some(bytes)
+    }
 
     /// Lets files go that take more than their share, or than is left beside `other` bytes, or that no frame needs; sets may take what
     /// is then left.
     fn fit(&mut self, max_memory: u64, other: u64) {
-        if self.is_still || self.files.bytes() > (max_memory / Self::FILES).min(max_memory.saturating_sub(other)) {
+        if self.is_still || self.files.bytes() > (max_memory / Self::SHARE).min(max_memory.saturating_sub(other)) {
             self.files = Files::default();
         }
         self.sets.allow(max_memory, other + self.files.bytes());
@@ -105,14 +122,19 @@ pub(crate) fn render_keeping(
     };
     let mut checkpoint = options.checkpoint.as_ref().map(open).transpose()?;
     let helper = options.device.as_deref().map(Helper::new);
-    let (loaded, explanation, memory) = prepare(scene, options, progress, &left.files)?;
-    left.fit(options.max_memory, memory.total());
+    // What serves no longer makes room.
+    let made = left.made.take().filter(|made| turned(&made.scene, scene));
+    let (made, maps) = made.map_or((None, None), |made| (Some(made.loaded), made.maps));
+    let (loaded, explanation, memory) = prepare(scene, options, progress, &left.files, made)?;
+    let remembers = left.remembers(&loaded, &explanation.plan, options.max_memory, memory.total());
+    left.fit(options.max_memory, memory.total() + remembers.unwrap_or(0));
     let Explanation { plan, mut cost, mut warnings, notes, .. } = explanation;
     // A reason that is told already is enough.
     let is_empty = loaded.cloud.is_empty() && loaded.own.is_empty();
     let doubtful = is_empty || warnings.len() > loaded.warnings.len();
     let device = helper.as_ref().map(|helper| (helper, options.device_composites));
-    let frame = Frame::new(scene, &loaded, &plan, progress).helped_by(device);
+    let maps = maps.filter(|maps| maps.serve(&plan));
+    let frame = Frame::new(scene, &loaded, &plan, progress).helped_by(device).following(maps, remembers.is_some());
     frame.groups.replace(std::mem::take(&mut left.groups));
     let kept = (!left.is_still).then_some(&mut left.sets);
     let checkpoint = checkpoint.as_mut();
@@ -120,6 +142,7 @@ pub(crate) fn render_keeping(
     let layers = draw(&frame, &mut session, &mut cost)?;
     let sets = session.sets;
     left.groups = frame.groups.take();
+    let maps = frame.into_maps();
     let backend = helper.as_ref().map_or_else(|| "cpu".to_owned(), |helper| helper.name());
     if !doubtful {
         warnings.extend(doubts::of_picture(scene, &layers));
@@ -127,5 +150,7 @@ pub(crate) fn render_keeping(
     warnings.extend(doubts::of_shadows(plan.tables()));
     warnings.extend(doubts::of_scattering(&plan));
     warnings.extend(helper.map(|helper| helper.said()).unwrap_or_default());
-    Ok(Render { layers, cost, plan, sets, warnings, notes, scales: loaded.scales, found, backend })
+    let scales = loaded.scales.clone();
+    left.made = (!left.is_still).then(|| Made { scene: scene.clone(), loaded, maps });
+    Ok(Render { layers, cost, plan, sets, warnings, notes, scales, found, backend })
 }

@@ -36,6 +36,7 @@
 //! ```
 #![forbid(unsafe_code)]
 
+mod arrived;
 mod camera;
 mod canonical;
 mod clip;
@@ -74,6 +75,7 @@ pub mod raster;
 #[cfg(feature = "raster")]
 pub mod shade;
 
+pub use arrived::{Arrived, Remembered};
 pub use camera::{Camera, Projection, ViewTransform};
 pub use clip::Clip;
 pub use cloud::{Cloud, Splat, SplatKind, Unfit};

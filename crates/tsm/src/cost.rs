@@ -3,6 +3,7 @@
 use crate::appearance::Appearance;
 use crate::mapping::Octahedral;
 use crate::survey::Survey;
+use crate::table::BLOCK;
 use splat_core::SplatKind;
 use std::fmt;
 
@@ -77,14 +78,16 @@ pub(crate) fn predict(
 ) -> Prediction {
     let cells = size[0] * size[1];
     let entries = look.entries(cell, cells);
-    let knot = if survey.coloured { 16.0 } else { 8.0 };
+    let channels = if survey.coloured { 3.0 } else { 1.0 };
+    // A distance, its sum, and its part of a block's moment.
+    let knot = 4.0 + 4.0 * channels * (1.0 + 1.0 / BLOCK as f64);
     let kinds = survey.kinds;
     let lists = u64::from(kinds[SplatKind::Medium as usize] > 0) + u64::from(kinds[SplatKind::Surface as usize] > 0);
     let depth = 4.0 * u64::from(kinds[SplatKind::Opaque as usize] > 0) as f64;
     let directions = if octahedral { Octahedral::bytes(size[0] as u32) as f64 } else { 0.0 };
     let map = cells * (8.0 * lists as f64 + depth) + directions + entries * knot;
     // Before they stand in the lists, entries stand with their cells, parted by ranges.
-    let peak = map + entries * (knot + 4.0);
+    let peak = map + entries * (8.0 + 4.0 * channels);
     let [bytes, map_bytes] = [peak, map].map(|bytes| bytes.min(u64::MAX as f64) as u64);
     Prediction { size: size.map(|n| n as u64), limit, entries, bytes, map_bytes }
 }

@@ -13,7 +13,7 @@ use crate::ShadowMap;
 use crate::deposit::plane_distance;
 use crate::mapping::{Mapping, floor, with_mapping};
 use crate::shadow_map::{Absorbances, Matter};
-use crate::table::List;
+use crate::table::{BLOCK, List, Lists};
 use glam::{Vec2, Vec3};
 use splat_core::{Receiver, SplatKind, Transmittance, glam};
 
@@ -42,6 +42,7 @@ struct Target {
 
 impl Target {
     /// Distances along the ray of a cell: for media, and for surfaces. `None` where the cell does not see the plane.
+    #[inline(always)]
     fn distances<M: Mapping>(&self, mapping: &M, cell: u32) -> Option<[f32; 2]> {
         if !self.is_surface {
             return Some([self.distance; 2]);
@@ -78,15 +79,20 @@ impl ShadowMap {
         };
         let at = if mapping.is_creased(place.at, Vec2::ONE) { met_at(mapping, p, place.at) } else { place.at };
         let Patch { cells, weights, .. } = Patch::at(mapping, at);
-        let distances = cells.map(|cell| match cell {
-            None => Some([place.distance; 2]),
-            Some(cell) => target.distances(mapping, cell),
-        });
-        let through = self.through(matter, cells, distances.map(Option::unwrap_or_default));
+        let (mut distances, mut weighs) = ([[place.distance; 2]; 4], weights);
+        for k in 0..4 {
+            match cells[k].map(|cell| target.distances(mapping, cell)) {
+                Some(Some(of_cell)) => distances[k] = of_cell,
+                // It sees nothing of the receiver.
+                Some(None) => weighs[k] = 0.0,
+                None => {}
+            }
+        }
+        let through = self.through(matter, cells, distances);
         let (mut light, mut seen) = ([0.0; C], 0.0);
-        for k in (0..4).filter(|k| distances[*k].is_some()) {
-            (0..C).for_each(|c| light[c] += weights[k] * through[k][c]);
-            seen += weights[k];
+        for k in 0..4 {
+            (0..C).for_each(|c| light[c] += weighs[k] * through[k][c]);
+            seen += weighs[k];
         }
         if seen > 0.0 { light.map(|l| (l / seen).min(1.0)) } else { self.grazing(mapping, matter, &target, place.at) }
     }
@@ -112,28 +118,35 @@ impl ShadowMap {
         cells: [Option<u32>; 4],
         distances: [[f32; 2]; 4],
     ) -> [[f32; C]; 4] {
-        let is_dark =
-            |k: usize| cells[k].and_then(|c| self.opaque.get(c as usize)).is_some_and(|d| *d < distances[k][1]);
         let mut absorbance = [[0.0; C]; 4];
+        let [media, surfaces] = [0, 1].map(|of| distances.map(|both: [f32; 2]| both[of]));
+        let is_dark: [bool; 4] = std::array::from_fn(|k| {
+            cells[k].and_then(|c| self.opaque.get(c as usize)).is_some_and(|d| *d < surfaces[k])
+        });
+        // Nothing counts behind what is opaque.
+        let spans = |lists: &Lists<C>| -> [[u32; 2]; 4] {
+            std::array::from_fn(|k| match cells[k] {
+                Some(cell) if !is_dark[k] => lists.span(cell),
+                _ => [0, 0],
+            })
+        };
         if let Some(lists) = &matter.media {
-            let lists = cells.map(|c| c.map_or(List::NONE, |c| lists.list(c)));
-            let nearest = distances.map(|[medium, _]| medium - self.ramp);
-            let begin = places(lists.map(|l| l.distance), nearest, |d, nearest| d <= nearest);
+            let spans = spans(lists);
+            let begin = lists.places(spans, media.map(|d| d - self.ramp), |d, nearest| d <= nearest);
             for k in 0..4 {
-                absorbance[k] = continuous(lists[k], begin[k], distances[k][0], self.ramp);
+                absorbance[k] = continuous(lists.list_at(spans[k]), begin[k], media[k], self.ramp);
             }
         }
         if let Some(lists) = &matter.surfaces {
-            let lists = cells.map(|c| c.map_or(List::NONE, |c| lists.list(c)));
-            let before =
-                places(lists.map(|l| l.distance), distances.map(|[_, surface]| surface), |d, surface| d < surface);
+            let spans = spans(lists);
+            let before = lists.places(spans, surfaces, |d, surface| d < surface);
             for k in 0..4 {
-                let step = lists[k].total_of(before[k]);
+                let step = lists.list_at(spans[k]).total_of(before[k]);
                 (0..C).for_each(|c| absorbance[k][c] += step[c]);
             }
         }
         let light = |a: f32| if self.dark_from.is_some_and(|limit| a > limit) { 0.0 } else { libm::expf(-a) };
-        std::array::from_fn(|k| if is_dark(k) { [0.0; C] } else { absorbance[k].map(light) })
+        std::array::from_fn(|k| if is_dark[k] { [0.0; C] } else { absorbance[k].map(light) })
     }
 }
 
@@ -150,11 +163,11 @@ impl Patch {
         let (column, row) = (floor(at.x - 0.5), floor(at.y - 0.5));
         let part = at - 0.5 - Vec2::new(column as f32, row as f32);
         let rest = Vec2::ONE - part;
-        Self {
-            cells: [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(i, j)| mapping.wrap(column + i, row + j)),
-            part,
-            weights: [rest.x * rest.y, part.x * rest.y, rest.x * part.y, part.x * part.y],
+        let mut cells = [None; 4];
+        for (k, cell) in (0..).zip(&mut cells) {
+            *cell = mapping.wrap(column + (k & 1), row + (k >> 1));
         }
+        Self { cells, part, weights: [rest.x * rest.y, part.x * rest.y, rest.x * part.y, part.x * part.y] }
     }
 }
 
@@ -186,40 +199,35 @@ fn met_at<M: Mapping>(mapping: &M, p: Vec3, at: Vec2) -> Vec2 {
     met
 }
 
-/// How many numbers of each rising list come before a bound. All four are searched at once: a search by halves waits for
-/// memory at every step, four of them wait together.
-#[inline]
-fn places(lists: [&[f32]; 4], bounds: [f32; 4], is_before: impl Fn(f32, f32) -> bool) -> [usize; 4] {
-    let mut begin = [0; 4];
-    let mut size = lists.map(<[f32]>::len);
-    while size.iter().any(|n| *n > 0) {
-        for k in 0..4 {
-            let half = size[k].div_ceil(2);
-            let is_before = lists[k].get((begin[k] + half).wrapping_sub(1)).is_some_and(|x| is_before(*x, bounds[k]));
-            begin[k] += if is_before { half } else { 0 };
-            size[k] -= half;
-        }
-    }
-    begin
-}
-
-/// Most parts into which the entries about a distance are taken; beyond, neighbours share the distance of one.
-const MOST_PARTS: usize = 64;
-
 /// Absorbance at `distance`, every entry spread evenly over `ramp` to either side of its own distance; those before `begin`
-/// lie wholly before it.
-#[inline]
+/// lie wholly before it. Of a block of entries about it their sum and [moment](List::moment) are enough.
+#[inline(always)]
 fn continuous<const C: usize>(list: List<'_, C>, begin: usize, distance: f32, ramp: f32) -> [f32; C] {
-    let mut sum = list.total_of(begin);
-    let (inverse, farthest, mut before) = (0.5 / ramp, distance + ramp, sum);
-    let about = list.distance[begin..].iter().take(MOST_PARTS + 1).take_while(|d| **d < farthest).count();
-    let about = if about <= MOST_PARTS { about } else { list.distance[begin..].partition_point(|d| *d < farthest) };
-    let stride = about.div_ceil(MOST_PARTS).max(1);
-    for first in (begin..begin + about).step_by(stride) {
-        let last = (first + stride).min(begin + about) - 1;
-        let share = (distance - list.distance[first + (last - first) / 2]) * inverse + 0.5;
-        (0..C).for_each(|c| sum[c] += (list.total[last][c] - before[c]) * share);
-        before = list.total[last];
+    let (len, inverse, farthest) = (list.distance.len(), 0.5 / ramp, distance + ramp);
+    let share = |n: usize| (distance - list.distance[n]) * inverse + 0.5;
+    let mut before = list.total_of(begin);
+    let (mut sum, mut n) = (before, begin);
+    let mut add = |sum: &mut [f32; C], total: [f32; C], share: f32| {
+        (0..C).for_each(|c| sum[c] += (total[c] - before[c]) * share);
+        before = total;
+    };
+    let block = list.next_block(begin).min(len);
+    while n < block && list.distance[n] < farthest {
+        add(&mut sum, list.total[n], share(n));
+        n += 1;
+    }
+    if n < block {
+        return sum;
+    }
+    while n + BLOCK <= len && list.distance[n + BLOCK - 1] < farthest {
+        add(&mut sum, list.total[n + BLOCK - 1], share(n));
+        let moment = list.moment(n);
+        (0..C).for_each(|c| sum[c] -= moment[c] * inverse);
+        n += BLOCK;
+    }
+    while n < len && list.distance[n] < farthest {
+        add(&mut sum, list.total[n], share(n));
+        n += 1;
     }
     sum
 }
@@ -227,27 +235,27 @@ fn continuous<const C: usize>(list: List<'_, C>, begin: usize, distance: f32, ra
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::entries::Entries;
+    use crate::table::{Parted, Ranges};
 
-    /// Distances and running sums.
-    fn sums(entries: &[(f32, f32)]) -> (Vec<f32>, Vec<[f32; 1]>) {
-        let mut sum = 0.0;
-        let sums = entries.iter().map(|&(distance, a)| {
-            sum += a;
-            (distance, [sum])
-        });
-        sums.unzip()
+    /// Lists of cells from entries of a cell, a distance and an absorbance each.
+    fn lists(cells: usize, entries: &[(u32, f32, f32)]) -> Lists<1> {
+        let mut all = Entries::<1>::default();
+        entries.iter().for_each(|&(cell, distance, a)| all.push(cell, distance, a, &[1.0; 3]));
+        let ranges = Ranges::new(cells, entries.len() as f64);
+        Lists::new(&[Parted::new(&all, ranges)], ranges, 1e6)
     }
 
-    fn absorbance(list: List<'_, 1>, distance: f32, ramp: f32) -> f32 {
-        let [begin, ..] = places([list.distance; 4], [distance - ramp; 4], |d, nearest| d <= nearest);
-        continuous(list, begin, distance, ramp)[0]
+    fn absorbance(lists: &Lists<1>, cell: u32, distance: f32, ramp: f32) -> f32 {
+        let spans = [lists.span(cell); 4];
+        let [begin, ..] = lists.places(spans, [distance - ramp; 4], |d, nearest| d <= nearest);
+        continuous(lists.list_at(spans[0]), begin, distance, ramp)[0]
     }
 
     #[test]
     fn media_absorb_continuously_and_by_half_at_their_own_distance() {
-        let (distance, total) = sums(&[(1.0, 0.4), (2.0, 0.2), (9.0, 1.0)]);
-        let list = List { distance: &distance, total: &total };
-        let at = |d: f32| absorbance(list, d, 1.0);
+        let lists = lists(1, &[(0, 1.0, 0.4), (0, 2.0, 0.2), (0, 9.0, 1.0)]);
+        let at = |d: f32| absorbance(&lists, 0, d, 1.0);
         for (d, a) in [(0.0, 0.0), (1.0, 0.2), (1.5, 0.35), (2.0, 0.5), (3.0, 0.6), (5.0, 0.6), (9.0, 1.1), (10.0, 1.6)]
         {
             assert!((at(d) - a).abs() < 1e-6, "A({d}) = {}, not {a}", at(d));
@@ -263,48 +271,60 @@ mod tests {
     #[test]
     fn equal_distances_that_rounding_parts_absorb_as_one() {
         let part = f32::EPSILON;
-        let (one, many) = (sums(&[(1.0, 0.9)]), sums(&[(1.0, 0.3), (1.0 + part, 0.3), (1.0 + 2.0 * part, 0.3)]));
-        let (one, many) = (List { distance: &one.0, total: &one.1 }, List { distance: &many.0, total: &many.1 });
+        let one = lists(1, &[(0, 1.0, 0.9)]);
+        let many = lists(1, &[(0, 1.0, 0.3), (0, 1.0 + part, 0.3), (0, 1.0 + 2.0 * part, 0.3)]);
         for i in 0..400 {
             let d = i as f32 * 0.005;
-            let (a, b) = (absorbance(one, d, 0.5), absorbance(many, d, 0.5));
+            let (a, b) = (absorbance(&one, 0, d, 0.5), absorbance(&many, 0, d, 0.5));
             assert!((a - b).abs() < 1e-6, "A({d}) = {a} or {b}");
         }
     }
 
     #[test]
-    fn crowds_of_entries_are_taken_in_parts() {
-        let entries: Vec<(f32, f32)> = (0..10_000).map(|i| (1.0 + i as f32 * 1e-5, 1e-4)).collect();
-        let (distance, total) = sums(&entries);
-        let list = List { distance: &distance, total: &total };
-        for i in 0..300 {
-            let d = 0.8 + i as f32 * 0.001;
-            let exact: f64 =
-                entries.iter().map(|e| f64::from(e.1) * f64::from((d - e.0) / 0.2 + 0.5).clamp(0.0, 1.0)).sum();
-            let a = f64::from(absorbance(list, d, 0.1));
-            assert!((a - exact).abs() < 2e-4, "A({d}) = {a}, not {exact}");
+    fn blocks_of_entries_absorb_as_each_of_them_does() {
+        // Lists of all lengths, so that blocks begin anywhere in them, and one of thousands, in many ranges of cells.
+        let unit = |i: u64, of: u64| splat_core::rng::unit_f32(9, 1, i, of);
+        let lengths: Vec<u64> = (0..400).map(|cell| if cell == 77 { 10_000 } else { cell % 45 }).collect();
+        let entries: Vec<(u32, f32, f32)> = lengths
+            .iter()
+            .zip(0..)
+            .flat_map(|(n, cell)| (0..*n).map(move |i| (cell, 1.0 + unit(i, u64::from(cell)), 1.0 / *n as f32)))
+            .collect();
+        let lists = lists(lengths.len(), &entries);
+        let mut of_cell = vec![Vec::new(); lengths.len()];
+        entries.iter().for_each(|(cell, d, a)| of_cell[*cell as usize].push((f64::from(*d), f64::from(*a))));
+        for (cell, of_cell) in (0..).zip(&of_cell) {
+            for i in 0..40 {
+                let (d, ramp) = (0.8 + i as f32 * 0.04, [0.02, 0.1, 0.7][i % 3]);
+                let share = |at: f64| ((f64::from(d) - at) / f64::from(2.0 * ramp) + 0.5).clamp(0.0, 1.0);
+                let exact: f64 = of_cell.iter().map(|(at, a)| a * share(*at)).sum();
+                let a = f64::from(absorbance(&lists, cell, d, ramp));
+                assert!((a - exact).abs() < 2e-6, "cell {cell}: A({d}) = {a}, not {exact}");
+            }
         }
     }
 
     #[test]
     fn surfaces_are_steps_behind_their_distance() {
-        let (distance, total) = sums(&[(1.0, 0.4), (2.0, 0.2)]);
-        let list = List { distance: &distance, total: &total };
+        let lists = lists(1, &[(0, 1.0, 0.4), (0, 2.0, 0.2)]);
         for (d, a) in [(0.5, 0.0), (1.0, 0.0), (1.001, 0.4), (2.0, 0.4), (7.0, 0.6)] {
-            let [before, ..] = places([list.distance; 4], [d; 4], |entry, d| entry < d);
-            assert!((list.total_of(before)[0] - a).abs() < 1e-6);
+            let [before, ..] = lists.places([lists.span(0); 4], [d; 4], |entry, d| entry < d);
+            assert!((lists.list(0).total_of(before)[0] - a).abs() < 1e-6);
         }
     }
 
     #[test]
     fn four_searches_at_once_find_what_each_finds() {
-        let numbers: Vec<f32> = (0..200).map(|i| (i / 3) as f32).collect();
-        for (i, lengths) in [[0, 1, 2, 3], [7, 64, 0, 200], [199, 5, 128, 1]].into_iter().enumerate() {
-            let lists = lengths.map(|n| &numbers[..n]);
-            for step in 0..150 {
-                let bounds = [0, 1, 2, 3].map(|k| 0.5 * (step + k * i) as f32 - 1.0);
-                for (found, k) in places(lists, bounds, |d, bound| d < bound).into_iter().zip(0..) {
-                    assert_eq!(found, lists[k].partition_point(|d| *d < bounds[k]));
+        let lengths = [0, 1, 2, 3, 7, 64, 0, 200, 199, 5, 128, 1];
+        let entries: Vec<(u32, f32, f32)> =
+            (0..).zip(lengths).flat_map(|(cell, n)| (0..n).map(move |i| (cell, 1.0 + i as f32, 0.1))).collect();
+        let lists = lists(lengths.len(), &entries);
+        for cells in [[0, 1, 2, 3], [4, 5, 6, 7], [8, 9, 10, 11], [6, 11, 0, 10]] {
+            for step in 0..420 {
+                let bounds = [0, 1, 2, 3].map(|k: u32| 0.5 * (step + k) as f32);
+                let spans = cells.map(|cell| lists.span(cell));
+                for (found, k) in lists.places(spans, bounds, |d, bound| d < bound).into_iter().zip(0..) {
+                    assert_eq!(found, lists.list(cells[k]).distance.partition_point(|d| *d < bounds[k]));
                 }
             }
         }

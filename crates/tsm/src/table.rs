@@ -5,8 +5,11 @@
 //! insertion lists are O(n²). Sums are 64-bit fixed point, so that neither the order of equal distances nor the thread
 //! count changes a bit, and 10⁶ absorbances of 10⁻⁶ add up to 1.
 
+mod list;
+
 use crate::entries::Entries;
 use crate::sort::sort;
+pub(crate) use list::List;
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -14,6 +17,8 @@ use std::ops::Range;
 const FIXED: f64 = (1u64 << 44) as f64;
 /// Entries of a range that a core's cache holds while they are sorted.
 const RANGE_ENTRIES: f64 = 32_768.0;
+/// Entries whose [moment](List::moment) is kept.
+pub(crate) const BLOCK: usize = 8;
 /// Least and greatest number of ranges.
 const RANGES: [f64; 2] = [64.0, 1024.0];
 
@@ -113,25 +118,6 @@ impl<const C: usize> Parted<C> {
     }
 }
 
-/// The sorted entries of one cell: equal distances are one, and nothing follows the visible limit.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct List<'a, const C: usize> {
-    pub(crate) distance: &'a [f32],
-    /// Absorbance up to and with each.
-    pub(crate) total: &'a [[f32; C]],
-}
-
-impl<const C: usize> List<'_, C> {
-    /// Of a cell that is covered by nothing.
-    pub(crate) const NONE: Self = List { distance: &[], total: &[] };
-
-    /// Absorbance of the first `n` entries.
-    #[inline(always)]
-    pub(crate) fn total_of(&self, n: usize) -> [f32; C] {
-        n.checked_sub(1).and_then(|last| self.total.get(last)).copied().unwrap_or([0.0; C])
-    }
-}
-
 /// Sorted lists of every cell.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Lists<const C: usize> {
@@ -139,6 +125,8 @@ pub(crate) struct Lists<const C: usize> {
     span: Vec<[u32; 2]>,
     distance: Vec<f32>,
     total: Vec<[f32; C]>,
+    /// Of each block of entries that lies within one list.
+    moment: Vec<[f32; C]>,
     kept: u64,
 }
 
@@ -149,15 +137,20 @@ impl<const C: usize> Lists<C> {
         let all: usize = parted.iter().map(Parted::len).sum();
         let mut span = vec![[0u32; 2]; ranges.cells];
         let (mut distance, mut total) = (vec![0f32; all], vec![[0f32; C]; all]);
+        let mut moment = vec![[0f32; C]; all.div_ceil(BLOCK)];
         let mut tasks = Vec::with_capacity(ranges.count);
         let (mut distances, mut totals) = (distance.as_mut_slice(), total.as_mut_slice());
+        let mut moments = moment.as_mut_slice();
         let mut first = 0u32;
         for (range, span) in span.chunks_mut(1 << ranges.shift).enumerate() {
             let n: usize = parted.iter().map(|p| p.range(range).len()).sum();
-            let (distance, total);
+            let (distance, total, moment);
             (distance, distances) = distances.split_at_mut(n);
             (total, totals) = totals.split_at_mut(n);
-            tasks.push(Task { range, first, span, distance, total });
+            // A block of two ranges is no list's.
+            let blocks = (first as usize + n).div_ceil(BLOCK) - (first as usize).div_ceil(BLOCK);
+            (moment, moments) = moments.split_at_mut(blocks);
+            tasks.push(Task { range, first, span, distance, total, moment });
             first = first.wrapping_add(n as u32);
         }
         let stop = stop_of(limit);
@@ -165,7 +158,7 @@ impl<const C: usize> Lists<C> {
             pulp::Arch::new().dispatch(Run { task, parted, shift: ranges.shift, stop, gathered })
         };
         let kept = tasks.into_par_iter().map_init(Gathered::default, run).sum();
-        Self { span, distance, total, kept }
+        Self { span, distance, total, moment, kept }
     }
 
     /// Lists that were sorted and summed elsewhere; `None` where a cell's list is not among the entries.
@@ -174,21 +167,22 @@ impl<const C: usize> Lists<C> {
         let fits =
             |[begin, kept]: &[u32; 2]| begin.checked_add(*kept).is_some_and(|end| end as usize <= distance.len());
         let known = span.iter().all(fits) && total.len() == distance.len();
+        if !known {
+            return None;
+        }
+        let mut moment = vec![[0.0; C]; distance.len().div_ceil(BLOCK)];
+        for [start, kept] in span.iter().map(|span| span.map(|n| n as usize)) {
+            let list = start..start + kept;
+            weigh(start, &distance[list.clone()], &total[list], 0, &mut moment);
+        }
         let kept = span.iter().map(|[_, kept]| u64::from(*kept)).sum();
-        known.then_some(Self { span, distance, total, kept })
+        Some(Self { span, distance, total, moment, kept })
     }
 
     /// First entry and number of knots of each cell, distances, totals.
     #[cfg(feature = "gpu")]
     pub(crate) fn parts(&self) -> (&[[u32; 2]], &[f32], &[[f32; C]]) {
         (&self.span, &self.distance, &self.total)
-    }
-
-    /// The sorted entries of a cell.
-    #[inline]
-    pub(crate) fn list(&self, cell: u32) -> List<'_, C> {
-        let [start, kept] = self.span[cell as usize].map(|n| n as usize);
-        List { distance: &self.distance[start..start + kept], total: &self.total[start..start + kept] }
     }
 
     /// Entries before equal distances were merged and lists were cut.
@@ -203,7 +197,8 @@ impl<const C: usize> Lists<C> {
 
     /// Bytes held.
     pub(crate) fn bytes(&self) -> u64 {
-        (self.distance.len() * (size_of::<f32>() + size_of::<[f32; C]>()) + size_of_val(&*self.span)) as u64
+        let lists = size_of_val(&*self.distance) + size_of_val(&*self.total) + size_of_val(&*self.moment);
+        (lists + size_of_val(&*self.span)) as u64
     }
 }
 
@@ -224,6 +219,7 @@ struct Task<'a, const C: usize> {
     span: &'a mut [[u32; 2]],
     distance: &'a mut [f32],
     total: &'a mut [[f32; C]],
+    moment: &'a mut [[f32; C]],
 }
 
 /// The work on one range, in the form that [`pulp`] compiles once per instruction set.
@@ -279,9 +275,12 @@ impl<const C: usize> Task<'_, C> {
             let end = *start as usize;
             let begin = end - *kept as usize;
             sort(&mut key[begin..end], spare);
-            *kept = sum_up(&key[begin..end], own, stop, &mut self.distance[begin..end], &mut self.total[begin..end]);
+            let (distance, total) = (&mut self.distance[begin..end], &mut self.total[begin..end]);
+            *kept = sum_up(&key[begin..end], own, stop, distance, total);
+            let (kept, place) = (*kept as usize, self.first as usize + begin);
+            weigh(place, &distance[..kept], &total[..kept], (self.first as usize).div_ceil(BLOCK), self.moment);
             *start = (begin as u32).wrapping_add(self.first);
-            all += u64::from(*kept);
+            all += kept as u64;
         }
         all
     }
@@ -312,6 +311,22 @@ fn sum_up<const C: usize>(
         }
     }
     kept as u32
+}
+
+/// Moments of the blocks that lie within a list, whose first entry is at `start` among all; `moment` begins with block `first`.
+#[inline(always)]
+fn weigh<const C: usize>(start: usize, distance: &[f32], total: &[[f32; C]], first: usize, moment: &mut [[f32; C]]) {
+    let begin = start.next_multiple_of(BLOCK) - start;
+    let of_blocks = distance.get(begin..).unwrap_or_default().chunks_exact(BLOCK);
+    let totals = total.get(begin..).unwrap_or_default().chunks_exact(BLOCK);
+    let moments = moment.iter_mut().skip((start + begin) / BLOCK - first);
+    for ((distance, total), moment) in of_blocks.zip(totals).zip(moments) {
+        *moment = [0.0; C];
+        for i in 1..BLOCK {
+            let depth = distance[i] - distance[0];
+            (0..C).for_each(|c| moment[c] += (total[i][c] - total[i - 1][c]) * depth);
+        }
+    }
 }
 
 /// A key to sort by: the distance in the upper half; in the lower half the absorbance if there is one, else its slot.

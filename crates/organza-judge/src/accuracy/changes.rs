@@ -74,6 +74,9 @@ pub fn lines(as_written: &Scene, request: &Request) -> String {
     if let Some(factor) = spacing_factor(as_written, &request.scene) {
         text += &format!("# the spacing of every object times {factor:?}, or its resolution divided by that\n");
     }
+    if request.packed {
+        text += "# organza convert --packed keeps the splats, and `points` reads them\n";
+    }
     text
 }
 

@@ -9,6 +9,8 @@ pub struct Request {
     pub scene: Scene,
     /// The picture is drawn so many times larger and averaged down: samples beyond `render.antialias`.
     pub oversample: u32,
+    /// Splats are packed and unpacked before they are drawn: as they are once a file has kept them.
+    pub packed: bool,
 }
 
 /// One position of a knob.

@@ -6,7 +6,7 @@ use organza::{
     CostRecord, Error, Files, Loaded, Planned, Progress, RenderOptions, draw_loaded, load, plan_loaded, same_splats,
 };
 use reference::metrics::{Display, Errors, Image, Linear, Viewing, compare, epsilon_8_bit, flip, psnr};
-use splat_core::SplatKind;
+use splat_core::{Cloud, PackedCloud, SplatKind};
 use std::time::Instant;
 use tsm::mapping::{Mapping, Table};
 
@@ -131,9 +131,13 @@ impl<'a> Renderer<'a> {
         scene.camera.size = scene.camera.size.map(|s| s.saturating_mul(request.oversample));
         let (options, progress) = (self.options, self.progress);
         let (loaded, convert_seconds) = self.load(&scene)?;
-        let plan = plan_loaded(&scene, loaded, options)?;
+        let plain = request.packed.then(|| pack(&mut loaded.cloud)).transpose()?;
         let mut cost = CostRecord::default();
-        let layers = draw_loaded(&Planned { scene: &scene, loaded, plan: &plan, options }, progress, &mut cost)?;
+        let layers = plan_loaded(&scene, loaded, options).and_then(|plan| {
+            draw_loaded(&Planned { scene: &scene, loaded, plan: &plan, options }, progress, &mut cost)
+        });
+        plain.into_iter().for_each(|plain| loaded.cloud = plain);
+        let layers = layers?;
         let beauty = layers.rgb("beauty").ok_or_else(|| Error::Internal("a render has no beauty layer".into()))?;
         let image = Image::from_layer(layers.size, beauty).map_err(|e| Error::Internal(e.to_string()))?;
         Ok(Frame {
@@ -170,6 +174,7 @@ impl<'a> Renderer<'a> {
         Ok(Facts {
             slice_thickness: visible.then(|| order.thickness * f64::from(loaded.exponent).exp2()),
             cells: maps.iter().flatten().map(|m| longest_side(m.table())).max(),
+            bytes_per_splat: bytes_per_splat(&loaded.cloud),
         })
     }
 
@@ -216,7 +221,7 @@ impl<'a> Renderer<'a> {
     }
 
     /// The splats of a scene, converted now unless those at hand are the same; with the seconds that took.
-    fn load(&mut self, scene: &Scene) -> Result<(&Loaded, Option<f64>), Error> {
+    fn load(&mut self, scene: &Scene) -> Result<(&mut Loaded, Option<f64>), Error> {
         let mut seconds = None;
         let at = self.loaded.iter().position(|(of, _)| same_splats(of, scene));
         let at = match at {
@@ -236,6 +241,17 @@ impl<'a> Renderer<'a> {
     }
 }
 
+fn bytes_per_splat(cloud: &Cloud) -> Option<[f64; 2]> {
+    let packed = PackedCloud::new(cloud).ok().filter(|packed| !packed.is_empty())?;
+    Some([cloud.bytes(), packed.bytes()].map(|bytes| bytes as f64 / cloud.len() as f64))
+}
+
+/// Splats as they are after they were packed, in the place of those that they were made of, which are given back.
+fn pack(cloud: &mut Cloud) -> Result<Cloud, Error> {
+    let packed = PackedCloud::new(cloud).map_err(|e| Error::Internal(e.to_string()))?;
+    Ok(std::mem::replace(cloud, packed.unpack()))
+}
+
 fn longest_side(table: &Table) -> u32 {
     let [columns, rows] = match table {
         Table::Octahedral(m) => m.size(),
@@ -243,4 +259,36 @@ fn longest_side(table: &Table) -> u32 {
         Table::Planar(m) => m.size(),
     };
     columns.max(rows)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn packed_splats_are_drawn_a_little_otherwise_and_leave_the_others_as_they_were() {
+        let text = br#"
+            version = 1
+            [camera]
+            position = [0.3, 0.2, 4]
+            target = [0, 0, 0]
+            size = [24, 16]
+            [[light]]
+            kind = "point"
+            position = [2, 4, 1]
+            intensity = [20, 20, 20]
+            [[object]]
+            name = "fog"
+            medium_ball = { center = [0, 0, 0], radius = 1, extinction = 2, spacing = 0.1 }
+        "#;
+        let scene = organza::scene::parse("s.toml".as_ref(), text, &Default::default()).unwrap();
+        let (options, progress) = (RenderOptions::default(), Progress::new());
+        let mut renderer = Renderer::new(&options, &progress);
+        let mut draw = |packed| renderer.draw(&Request { scene: scene.clone(), oversample: 1, packed }).unwrap().image;
+        let [plain, packed, again] = [false, true, false].map(&mut draw);
+        assert!(plain == again && plain != packed);
+        assert!(compare(&packed, &plain).unwrap().rmse < 2e-4);
+        let [bytes, packed] = renderer.facts(&scene).unwrap().bytes_per_splat.unwrap();
+        assert!(packed < 17.0 && bytes >= 40.0, "{bytes} {packed}");
+    }
 }

@@ -41,7 +41,7 @@ pub fn particles(scene: &Scene, facts: &Facts, options: &Options) -> Result<Swee
     }
     Ok(Sweep {
         technique: "particles",
-        base: Request { scene, oversample: 1 },
+        base: Request { scene, oversample: 1, packed: false },
         base_label: if cut { format!("the scene's own, but {finest} of {own} sets") } else { "the scene's own".into() },
         knobs,
         skipped,

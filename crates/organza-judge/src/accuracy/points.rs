@@ -11,6 +11,8 @@ pub struct Facts {
     pub slice_thickness: Option<f64>,
     /// Most cells along a side of a shadow table as the scene's own setting gives them; `None` where no light gets one.
     pub cells: Option<u32>,
+    /// Bytes of a splat as they are and packed; `None` without splats, or where they cannot be packed.
+    pub bytes_per_splat: Option<[f64; 2]>,
 }
 
 /// Most cells along a side of a shadow table.
@@ -21,7 +23,7 @@ const MOST_ANTIALIAS: f64 = 8.0;
 
 /// Knobs of `points` in this scene.
 pub fn points(scene: &Scene, facts: &Facts, options: &Options) -> Sweep {
-    let base = Request { scene: in_points(scene), oversample: 1 };
+    let base = Request { scene: in_points(scene), oversample: 1, packed: false };
     let joint_levels = if options.quick { 2 } else { 5 };
     let mut sweep = Sweep {
         technique: "points",
@@ -42,6 +44,7 @@ pub fn points(scene: &Scene, facts: &Facts, options: &Options) -> Sweep {
         ("samples", samples(options)),
         ("resampling filter", Ok(resampling_filter())),
         ("splat spacing", spacing(scene, options)),
+        ("packed splats", packed(facts)),
         ("accumulation", accumulation(facts)),
     ];
     for (name, knob) in knobs {
@@ -291,6 +294,24 @@ pub(super) fn spacing(scene: &Scene, options: &Options) -> Result<Knob, String> 
             high: 2.0,
             why: "2 for smooth fields; less where a field has detail below the spacing, or surfaces end",
         }),
+        joint: false,
+    })
+}
+
+/// Splats as `organza convert --packed` writes them.
+fn packed(facts: &Facts) -> Result<Knob, String> {
+    let [plain, packed] = facts.bytes_per_splat.ok_or("there are no splats, or 3D Gaussians, which are not packed")?;
+    Ok(Knob {
+        name: "packed splats",
+        size_meaning: "",
+        set: |request, value| request.packed = value > 0.0,
+        steps: vec![
+            choice(&format!("no ({plain:.1} bytes each)"), 0.0),
+            choice(&format!("yes ({packed:.1} bytes each)"), 1.0),
+        ],
+        ends: Vec::new(),
+        end_is_exact: false,
+        theory: None,
         joint: false,
     })
 }

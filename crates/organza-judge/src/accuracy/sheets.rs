@@ -14,7 +14,7 @@ use splat_core::{Packing, Shading};
 /// Why the technique has nothing to show.
 pub fn sheets(scene: &Scene, slab_width: Option<f64>, facts: &Facts, options: &Options) -> Result<Sweep, String> {
     let own = slab_width.ok_or("nothing is translucent: the picture is that of `points`")?;
-    let mut base = Request { scene: in_sheets(scene), oversample: 1 };
+    let mut base = Request { scene: in_sheets(scene), oversample: 1, packed: false };
     base.scene.render.layers = LayerChoice::default();
     let mut sweep = Sweep {
         technique: "sheets",

@@ -8,7 +8,7 @@ use organza::scene::{Collisions, Coverage, Grouping, LayerChoice, Scene, SurfelG
 ///
 /// What surfels show has a limit of its own: discs of a layer are averaged, where points composite each.
 pub fn surfels(scene: &Scene, facts: &Facts, options: &Options) -> Sweep {
-    let mut base = Request { scene: in_surfels(scene), oversample: 1 };
+    let mut base = Request { scene: in_surfels(scene), oversample: 1, packed: false };
     base.scene.render.layers = LayerChoice::default();
     let mut sweep = Sweep {
         technique: "surfels",

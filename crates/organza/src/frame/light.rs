@@ -4,18 +4,37 @@ use super::Frame;
 use crate::device;
 use crate::lights::{self, LightPoint};
 use crate::pass;
+use crate::plan::Plan;
 use crate::shadows::{ShadowTable, shadow_error};
 use crate::{CostRecord, Error, work};
 use splat_core::shade::{LitBy, ShadeInput};
-use splat_core::{Object, Transmittance};
+use splat_core::{Arrived, Object, Remembered, Transmittance};
 use tsm::{Deposits, ShadowMap};
 
-/// The shadow maps of a frame, for each point of a light.
-pub(super) struct Maps {
+/// The shadow maps of a frame, for each point of a light. They serve other frames of the same splats, whatever the camera.
+pub(crate) struct Maps {
     /// Of all casters.
     all: Vec<Option<ShadowMap>>,
     /// Of those that no light is carried through.
     of_others: Vec<Option<ShadowMap>>,
+    /// What arrived through each of `all` at the splats that are drawn.
+    arrived: Vec<Arrived>,
+    made_as: Vec<MadeAs>,
+}
+
+/// The size of a table and the transmittance at which its lists stop.
+type MadeAs = Option<(tsm::Prediction, f32)>;
+
+impl Maps {
+    /// Whether they are those of another plan for the same splats.
+    pub(crate) fn serve(&self, plan: &Plan) -> bool {
+        self.made_as == Self::made_as(plan)
+    }
+
+    fn made_as(plan: &Plan) -> Vec<MadeAs> {
+        let tables = plan.shadow_tables.iter().chain(&plan.other_tables);
+        tables.map(|table| table.map(|table| (table.predicted, table.tolerance))).collect()
+    }
 }
 
 /// Maps that were built, and the bytes that are left for others.
@@ -51,7 +70,20 @@ impl<'a> Frame<'a> {
         let mut done = Done { maps: 0, left: plan.shadow_bytes };
         let all = self.shadow_maps(&plan.shadow_tables, &self.loaded.objects, &mut done, cost)?;
         let of_others = self.shadow_maps(&plan.other_tables, &others, &mut done, cost)?;
-        Ok(self.maps.get_or_init(|| Maps { all, of_others }))
+        let remembered = if self.remembers { self.drawn().len() } else { 0 };
+        let arrived = all.iter().map(|map| Arrived::new(map.as_ref().map_or(0, |_| remembered))).collect();
+        Ok(self.maps.get_or_init(|| Maps { all, of_others, arrived, made_as: Maps::made_as(plan) }))
+    }
+
+    /// The maps of a frame that is drawn, for the next.
+    pub(crate) fn into_maps(self) -> Option<Maps> {
+        self.maps.into_inner()
+    }
+
+    /// Shadows of the points of all lights by which splats are shaded that are drawn.
+    pub(super) fn shadows_of_drawn(&self, cost: &mut CostRecord) -> Result<Vec<Option<Remembered<'_>>>, Error> {
+        let Maps { all, arrived, .. } = self.all_maps(cost)?;
+        Ok(all.iter().zip(arrived).map(|(map, arrived)| Some(arrived.through(map.as_ref()?))).collect())
     }
 
     fn shadow_maps(
@@ -94,10 +126,10 @@ impl<'a> Frame<'a> {
         Ok(maps)
     }
 
-    /// The points of lights that have an intensity, with their maps.
-    pub(crate) fn lit_by<'b>(&'b self, maps: &'b [Option<ShadowMap>]) -> Vec<LitBy<'b>> {
-        let shadow = |map: Option<&'b ShadowMap>| map.map(|map| map as &dyn Transmittance);
-        self.shining(maps).map(|(lit, map)| LitBy { shadow: shadow(map), ..lit }).collect()
+    /// The points of lights that have an intensity, with their shadows.
+    pub(crate) fn lit_by<'b>(&'b self, shadows: &'b [Option<impl Transmittance>]) -> Vec<LitBy<'b>> {
+        let shadows = shadows.iter().map(|shadow| shadow.as_ref().map(|shadow| shadow as &dyn Transmittance));
+        self.with_light(shadows).map(|(lit, shadow)| LitBy { shadow, ..lit }).collect()
     }
 
     /// What shading the drawn splats reads.

@@ -44,12 +44,12 @@ impl Frame<'_> {
         if let Some(shaded) = self.shaded.get() {
             return Ok(shaded);
         }
-        let maps = self.maps(cost)?;
+        let shadows = self.shadows_of_drawn(cost)?;
         let projected = self.project(cost)?;
         let layout = self.layout();
         self.progress.begin(stage::SHADE);
         let values = cost.measure(pass::SHADE, |stage| {
-            let lights = self.lit_by(maps);
+            let lights = self.lit_by(&shadows);
             let (bends, progress) = (self.plan.bends, Some(self.progress));
             let values = shade_some(&self.shading(&lights), |i| bends || projected.is_visible(i), &layout, progress);
             let values = values.map_err(|e| Error::from_core("shading", e))?;
