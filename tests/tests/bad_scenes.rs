@@ -2,6 +2,7 @@
 
 mod footprints;
 mod points;
+mod seen;
 
 use organza::Error;
 use organza::scene::{self, LoadOptions, MAX_SCENE_BYTES, Override, Scene};

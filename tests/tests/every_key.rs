@@ -8,6 +8,7 @@ mod footprints;
 mod lights;
 mod scenes;
 mod schema;
+mod seen;
 mod surfels;
 mod table;
 
@@ -181,7 +182,10 @@ fn the_axis_that_points_up_is_that_of_the_format_unless_the_scene_says_another()
     assert_eq!(shown(&[body]), z);
     assert_eq!(shown(&[body, &up("auto")]), z);
     assert_eq!(shown(&[]), y);
-    // What is not drawn is not opened.
+    // What is not drawn is not opened, unless a light is to see it.
+    let hidden =
+        [body.to_owned(), "object.it.visible=false".into(), "object.1={name='seen', extract={objects=['it']}}".into()];
+    assert_eq!(folder.scene("volume", &hidden, None).unwrap().objects[2].up.axis.name(), z.0);
     assert_eq!(
         folder.scene("volume", &[body.into(), "object.it.visible=false".into()], None).unwrap().objects.len(),
         3

@@ -1,7 +1,9 @@
-//! `organza extract`: the surface that a light sees first, and what is asked for in vain.
+//! The surface that a light sees first, by `organza extract` and as an object; where things stop; and what is asked for in vain.
 
 use convert::read::{Loaded, ReadParams, file};
+use organza::scene;
 use organza_tests::Place;
+use serde_json::Value;
 
 /// A ball of fog before a wall that casts no shadow, one light from above and one from the side.
 const SCENE: &str = "version = 1\n[camera]\nposition = [0, 2, 5]\ntarget = [0, 0, 0]\nsize = [24, 18]\n\
@@ -31,7 +33,8 @@ fn a_light_sees_a_ball_of_fog_where_it_is_as_thick_as_is_asked_for() {
             // Straight in, in the middle of what the light sees: the way into the ball is absorbance / extinction.
             if p.reject_from(axis).length() < 0.2 {
                 let depth = (1.0 - p.reject_from(axis).length_squared()).sqrt() - p.dot(axis);
-                assert!((depth - absorbance / 8.0).abs() < 0.06, "light {light}: {depth}");
+                // A tenth of the spacing.
+                assert!((depth - absorbance / 8.0).abs() < 0.005, "light {light}: {depth}");
                 assert!(normal.as_dvec3().dot(axis) > 0.8, "light {light}: {normal}");
                 near += 1;
             }
@@ -64,4 +67,84 @@ fn what_no_light_sees_is_refused_and_nothing_is_written() {
         assert!(!place.path("seen.ply").exists(), "{arguments:?}");
     }
     place.expect(2, &["extract", "s.toml", "-o", "seen.png"], "expected a name that ends in .ply");
+}
+
+/// What a scene is drawn as, 24 by 18 pixels.
+fn drawn(text: &str, frame: Option<u32>) -> Result<Vec<[f32; 3]>, organza::Error> {
+    let options = scene::LoadOptions { frame, ..Default::default() };
+    let scene = scene::parse("s.toml".as_ref(), text.as_bytes(), &options)?;
+    let render = organza::render(&scene, &organza::RenderOptions::default(), &organza::Progress::new())?;
+    Ok(render.layers.rgb("beauty").unwrap().to_vec())
+}
+
+#[test]
+fn an_extraction_is_drawn_as_its_points_are_by_every_technique() {
+    let scene = SCENE.replace("[0, 2, 5]", "[1000, 2, 5]").replace("target = [0, 0, 0]", "target = [1000, 0, 0]");
+    let place = Place::new(&scene);
+    place.expect(0, &["extract", "s.toml", "--light", "1", "--absorbance", "2", "-o", "1.ply"], "");
+    let hidden = scene.replace("name = 'fog'", "name = 'fog'\nvisible = false");
+    for (technique, opacity) in
+        [("points", 1.0), ("particles", 0.5), ("surfels", 0.5), ("sheets", 1.0), ("reference", 1.0)]
+    {
+        let with = |source: &str| {
+            format!(
+                "{hidden}[[object]]\nname = 'seen'\n{source}\nopacity = {opacity}\n[render]\ntechnique = '{technique}'\n"
+            )
+        };
+        let seen = with("extract = { light = 1, absorbance = 2.0, objects = ['fog'] }");
+        place.write("a.toml", &seen);
+        place.write("b.toml", with("points = '1.ply'"));
+        for name in ["a", "b"] {
+            place.expect(0, &["render", &format!("{name}.toml"), "-o", &format!("{name}.{technique}.png")], "");
+        }
+        let [a, b] = ["a", "b"].map(|name| place.pixels(&format!("{name}.{technique}.png")));
+        assert!(a == b, "{technique}");
+        // It has the colours of its object, and what casts no shadow is not seen.
+        assert_ne!(drawn(&seen, None).unwrap(), drawn(&hidden, None).unwrap(), "{technique}");
+    }
+    let explained = place.run(&["explain", "a.toml"]);
+    assert!(String::from_utf8_lossy(&explained.stdout).contains("seen"), "{explained:?}");
+    let info = place.run(&["info", "a.toml"]);
+    assert!(String::from_utf8_lossy(&info.stdout).contains("extract"), "{info:?}");
+    // What lights look at counts as memory.
+    let explained: Value = serde_json::from_slice(&place.run(&["explain", "a.toml", "--json"]).stdout).unwrap();
+    let bytes = explained["memory_bytes"].to_string();
+    place.expect(0, &["render", "a.toml", "-o", "c.exr", "--max-memory", &bytes], "");
+    place.expect(5, &["render", "a.toml", "-o", "d.exr", "--max-memory", "1000000"], "");
+    place.write("a.toml", format!("{hidden}[[object]]\nname = 'seen'\nextract = {{ objects = ['wall'] }}\n"));
+    place.expect(3, &["render", "a.toml", "-o", "c.png"], "light 0: none of its rays meets an absorbance of 1");
+    assert!(!place.path("c.png").exists());
+}
+
+/// A ball that falls through a table, seen by a light from above.
+const FALLING: &str = "version = 1\n[camera]\nposition = [0, 0.5, 5]\ntarget = [0, 0, 0]\nsize = [24, 18]\n\
+    [[light]]\nkind = 'directional'\ndirection = [0.1, -1, -0.2]\nirradiance = [2, 2, 2]\n\
+    [[object]]\nname = 'table'\nrectangle = { center = [0, -0.5, 0], u = [1, 0, 0], v = [0, 0, -1], spacing = 0.05 }\n\
+    [[object]]\nname = 'ball'\nimplicit = { expression = 'x^2 + y^2 + z^2 - 0.04', \
+    box = [[-0.3, -0.3, -0.3], [0.3, 0.3, 0.3]], spacing = 0.04 }\n\
+    [animation]\nframes = 9\n[[animation.track]]\nset = 'object.ball.transform.translate'\n\
+    keys = [{ frame = 0, value = [0, 1, 0] }, { frame = 8, value = [0, -1, 0] }]\nstop = { radius = 0.2 }\n";
+
+#[test]
+fn what_falls_stops_where_the_light_sees_it_meet_the_table_in_whatever_frames_are_drawn() {
+    // It touches the table when its middle is at −0.3: at frame 5.2, within a hundredth of a frame.
+    let held = |y: f64| {
+        let still = FALLING.split("[animation]").next().unwrap().to_owned();
+        drawn(&format!("{still}transform = {{ translate = [0, {y}, 0] }}\n"), None).unwrap()
+    };
+    let far = |a: &[[f32; 3]], b: &[[f32; 3]]| {
+        a.iter().flatten().zip(b.iter().flatten()).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max)
+    };
+    let frames: Vec<_> = (0..9).map(|k| drawn(FALLING, Some(k)).unwrap()).collect();
+    assert!(frames[5] == held(-0.25));
+    assert!(far(&frames[8], &held(-0.3)) < 0.02 && frames[6] == frames[8]);
+    assert!(far(&frames[8], &held(-0.25)) > 0.05, "{}", far(&frames[8], &held(-0.25)));
+    // A frame alone, and among others that were drawn before it.
+    let place = Place::new(FALLING);
+    place.expect(0, &["render", "s.toml", "-o", "all.png", "--frames"], "object 'ball' stops at frame 5.2");
+    place.expect(0, &["render", "s.toml", "-o", "one.png", "--frames=7-7"], "object 'ball' stops at frame 5.2");
+    assert!(place.bytes("all.0007.png") == place.bytes("one.0007.png"));
+    // Without its light's table it falls on.
+    let through = FALLING.replace("stop = { radius = 0.2 }", "");
+    assert!(drawn(&through, Some(5)).unwrap() == frames[5] && drawn(&through, Some(8)).unwrap() != frames[8]);
 }

@@ -216,6 +216,24 @@ fn a_trilinear_isosurface_is_the_same_by_lines_along_its_lattice_and_by_random_o
 }
 
 #[test]
+fn a_trilinear_isosurface_by_marching_cubes_is_the_surface_that_lines_meet() {
+    let folder = data();
+    let object = "material = 'a'\nisosurface = { volume = 'hill.nrrd', level = 0.4 }\n";
+    let by = |by: &str, more: &str| {
+        sampled(folder.path(), &format!("{object}{more}"), 24, &format!("surface_sampler = '{by}'"))
+    };
+    let (cubes, lines) = (by("triangles", ""), by("auto", ""));
+    // Of so few sets the error is itself uncertain: random lines say by how much.
+    let [_, expected, _] = apart(&by("lines", ""), &lines);
+    let [n, square, mean] = apart(&cubes, &lines);
+    assert!(n > 300.0 && (0.85..1.15).contains(&(square / expected)) && mean.abs() < 2e-3, "{n} {square} {mean}");
+    // Another level is told apart; with a spacing of its own the surface has another mesh.
+    let other = sampled(folder.path(), &object.replace("0.4", "0.45"), 24, "surface_sampler = 'triangles'");
+    assert!(apart(&other, &lines)[1] > 2.0);
+    assert!(by("triangles", "spacing = 0.0401\n")[0] != cubes[0]);
+}
+
+#[test]
 fn a_brownian_motion_that_counts_too_much_area_says_so() {
     let said = |expression: &str| {
         let folder = tempfile::tempdir().unwrap();

@@ -188,6 +188,34 @@ fn points_and_sheets_agree_with_path_tracing_of_volumes_that_reflect_about_their
 }
 
 #[test]
+fn points_agree_with_path_tracing_of_a_solid_of_solids() {
+    let folder = tempfile::tempdir().unwrap();
+    let medium = "medium_box = { min = [-0.5, -0.4, -0.4], max = [0.5, 0.4, 0.4], extinction = 2.5, spacing = 0.03 }\nmaterial = \"fog\"";
+    let part = |expression: &str, side: f64| {
+        format!(
+            "{{ implicit = {{ expression = '{expression}', box = [[-{side}, -{side}, -{side}], [{side}, {side}, {side}]], spacing = 0.02 }} }}"
+        )
+    };
+    let (block, ball) = (
+        part("max(abs(x) - 0.5, max(abs(y), abs(z)) - 0.4)", 0.55),
+        part("sqrt((x - 0.4)^2 + (y - 0.3)^2 + (z - 0.3)^2) - 0.45", 1.0),
+    );
+    let solid = |how: &str| {
+        let source = format!("{how} = [{block}, {ball}]\ncolor = [0.8, 0.5, 0.3]");
+        mixed(folder.path(), &[[medium, &source]])
+    };
+    let (carved, whole) = (solid("difference"), solid("union"));
+    let truth = traced(&carved).unwrap();
+    let exact = squares(truth.image.pixels(), [96, 64]);
+    let error = rmse(&squares(&drawn(&carved), [96, 64]), &exact);
+    let noise = truth.rms_standard_error() / SIDE as f64;
+    println!("RMSE {error:.5}, truth's standard error {noise:.5}");
+    assert!(error < 0.005 && noise < 0.002, "RMSE {error}, truth's standard error {noise}");
+    // The comparison can fail: another set of the same solids is told apart.
+    assert!(rmse(&squares(&drawn(&whole), [96, 64]), &exact) > 5.0 * error);
+}
+
+#[test]
 fn what_has_no_truth_is_named() {
     let folder = tempfile::tempdir().unwrap();
     let scattering = mixed(folder.path(), &[["color = [0.7, 0.7, 0.7]", "material = \"fog\""]]);

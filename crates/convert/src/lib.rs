@@ -68,6 +68,7 @@ mod neighbours;
 #[cfg(feature = "surfels")]
 mod orient;
 #[cfg(feature = "read")]
+mod outline;
 mod outwards;
 mod params;
 mod pieces;
@@ -142,6 +143,7 @@ pub use mesh_points::{MeshParams, MeshReport, flatten_leaning, mesh_to_points, m
 pub use mpu::{MpuField, MpuParams, MpuReport, points_to_field};
 #[cfg(feature = "surfels")]
 pub use orient::Orientation;
+pub use outline::Outline;
 pub use params::{Density, SplatParams};
 #[cfg(feature = "surfels")]
 pub use point_cells::with_cells;

@@ -73,14 +73,13 @@ impl Solid {
         if bounds.is_empty() {
             return Err(Error::invalid("intersection", 0, "parts", bounds, "parts whose boxes have a place in common"));
         }
-        let mut fields = parts.into_iter().map(Self::into_field);
+        let mut fields: Vec<SharedField> = parts.into_iter().map(Self::into_field).collect();
         let field = match combination {
-            Combination::Union => CombinedField::union(fields.collect())?,
-            Combination::Intersection => CombinedField::intersection(fields.collect())?,
+            Combination::Union => CombinedField::union(fields)?,
+            Combination::Intersection => CombinedField::intersection(fields)?,
             Combination::Difference => {
-                let first =
-                    fields.next().ok_or_else(|| Error::invalid("combination", 0, "parts", 0, "at least two"))?;
-                CombinedField::difference(first, Arc::new(CombinedField::union(fields.collect())?))
+                let first = fields.remove(0);
+                CombinedField::difference(first, Arc::new(CombinedField::union(fields)?))
             }
         };
         let bounds = DAabb::new(bounds.min - step, bounds.max + step);

@@ -8,24 +8,14 @@ use super::session::{parse_scene, path_text, processor_only, render_options};
 use ::convert::{packed_splats_to_ply, splats_to_ply};
 use organza::output::{Target, Targets};
 use organza::scene::{Scene, Technique};
-use organza::{Error, Loaded, printable, shown};
+use organza::{Error, Files, Loaded, printable, shown};
 use serde_json::{Value, json};
 use splat_core::{Cloud, Shading};
 use std::path::Path;
 
-/// Makes splats of a scene or of data files and writes them as rendering-oriented points. An output that is in the way is told before
-/// anything is read.
+/// Makes splats of a scene or of data files and writes them as rendering-oriented points.
 pub(super) fn run(arguments: &ConvertArguments) -> Result<(), Error> {
-    processor_only(&arguments.scene)?;
-    refuse_of_pictures(&arguments.scene)?;
-    let path = check_name(&arguments.output)?;
-    Target::new(path, arguments.force)?;
-    let (given, files) = given(&arguments.scene, None)?;
-    let mut scene = parse_scene(&arguments.scene, &given, None, None)?;
-    let mut targets = Targets::default();
-    targets.add_inputs(&scene.files());
-    let target = targets.add(path, arguments.force)?;
-    as_splats(&mut scene);
+    let (scene, files, target) = begin(&arguments.scene, &arguments.output, arguments.force)?;
     let options = render_options(&arguments.scene);
     let (loaded, bytes) = with_bar(|progress| {
         let mut loaded = organza::load(&scene, &options, progress, &files)?;
@@ -59,13 +49,24 @@ pub(super) fn run(arguments: &ConvertArguments) -> Result<(), Error> {
     ))
 }
 
-/// Every object as splats, whatever draws it, with the values that their points have.
-pub(super) fn as_splats(scene: &mut Scene) {
+/// A scene of which a file of points is made, what was read of its files, and where the points go. An output that is in the way is told
+/// before anything is read. Every object is one of splats, whatever draws it, with the values that their points have.
+pub(super) fn begin(arguments: &SceneArguments, output: &Path, force: bool) -> Result<(Scene, Files, Target), Error> {
+    processor_only(arguments)?;
+    refuse_of_pictures(arguments)?;
+    let path = check_name(output)?;
+    Target::new(path, force)?;
+    let (given, files) = given(arguments, None)?;
+    let mut scene = parse_scene(arguments, &given, None, None)?;
+    let mut targets = Targets::default();
+    targets.add_inputs(&scene.files());
+    let target = targets.add(path, force)?;
     scene.render.technique = Technique::Points;
     for object in &mut scene.objects {
         object.technique = None;
         object.points.keeps_values = true;
     }
+    Ok((scene, files, target))
 }
 
 fn names(loaded: &Loaded) -> Vec<String> {
@@ -132,7 +133,7 @@ fn said_of_unlit(loaded: &Loaded) -> Option<String> {
 }
 
 /// Splats are written as PLY: another name would be read as something else.
-pub(super) fn check_name(path: &Path) -> Result<&Path, Error> {
+fn check_name(path: &Path) -> Result<&Path, Error> {
     match path.extension() {
         Some(extension) if extension.eq_ignore_ascii_case("ply") => Ok(path),
         _ => Err(Error::usage(format!("{}: expected a name that ends in .ply", printable(path)), "")),
@@ -140,7 +141,7 @@ pub(super) fn check_name(path: &Path) -> Result<&Path, Error> {
 }
 
 /// What is said of pictures says nothing of splats.
-pub(super) fn refuse_of_pictures(scene: &SceneArguments) -> Result<(), Error> {
+fn refuse_of_pictures(scene: &SceneArguments) -> Result<(), Error> {
     let all = [
         ("--technique", scene.technique.is_some()),
         ("--target-error", scene.target_error.is_some()),

@@ -62,6 +62,7 @@ fn source_name(source: &Source) -> &'static str {
     match source {
         Source::Mesh(_) => "mesh",
         Source::Points(_) | Source::Matter(_) => "points",
+        Source::Extract(_) => "extract",
         Source::Volume(_) => "volume",
         Source::Implicit(_) => "implicit",
         Source::Isosurface(_) => "isosurface",

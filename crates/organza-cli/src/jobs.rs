@@ -75,7 +75,7 @@ impl<'a> Jobs<'a> {
         if self.is_still() {
             targets.add_inputs(&self.still.files());
             self.places(None, |path, replace| targets.add(path, replace))?;
-            return Ok(Drawing::Still(files));
+            return Ok(Drawing::Still(files.into()));
         }
         let mut sequence = Sequence::of_files(files);
         for frame in self.frames() {
@@ -146,7 +146,7 @@ fn parsed(arguments: &RenderArguments, given: &Given, frame: Option<u32>) -> Res
 /// What draws the pictures of a run.
 pub(super) enum Drawing {
     /// One picture, from files of which some were read.
-    Still(Files),
+    Still(Box<Files>),
     /// Frames, of which each takes from the others what it can.
     Frames(Box<Sequence>),
 }
@@ -168,7 +168,7 @@ impl Drawing {
         progress: &Progress,
     ) -> Result<Render, Error> {
         match self {
-            Self::Still(files) => organza::render_from(scene, options, progress, std::mem::take(files)),
+            Self::Still(files) => organza::render_from(scene, options, progress, std::mem::take(&mut **files)),
             Self::Frames(sequence) => sequence.render(scene, options, progress),
         }
     }

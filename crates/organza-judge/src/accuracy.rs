@@ -34,6 +34,7 @@ mod settings;
 mod sheets;
 mod study;
 mod surfels;
+mod tables;
 mod verdict;
 
 pub use changes::{Change, changes, lines};

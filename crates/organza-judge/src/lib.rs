@@ -3,8 +3,7 @@
 //! ```text
 //! scene ─┬─► accuracy   a technique's knobs are turned ─► error and time of every setting ─► frontier
 //!        ├─► orders     the same splats by every ordering, against each pixel's exact order
-//!        ├─► truth      the scene path-traced without splats
-//!        └─► seen       what one light sees first, from its shadow map
+//!        └─► truth      the scene path-traced without splats
 //! ```
 //! Pictures are drawn by [`organza`] as any render is, by the processor alone; what is true comes from [`mod@reference`], in f64.
 //! A technique joins by a [`accuracy::Sweep`] of its own in `accuracy/`.
@@ -12,7 +11,6 @@
 
 pub mod accuracy;
 pub mod orders;
-pub mod seen;
 pub mod truth;
 
 /// The page's example compiles and holds.

@@ -81,7 +81,7 @@ pub(super) fn apply(document: &mut Document<'_>, frame: u32) -> Result<(), Error
     Ok(())
 }
 
-fn path_of(track: &RawTrack) -> Result<Vec<String>, String> {
+pub(super) fn path_of(track: &RawTrack) -> Result<Vec<String>, String> {
     let path = split_path(&track.set)?;
     if path[0] == "animation" || path[0] == "version" {
         return Err(format!("expected a value of the scene, found `{}`", crate::shown(&path[0])));
@@ -89,18 +89,18 @@ fn path_of(track: &RawTrack) -> Result<Vec<String>, String> {
     Ok(path)
 }
 
-fn entry<'a>(node: &'a Node, key: &str) -> Option<&'a Node> {
+pub(super) fn entry<'a>(node: &'a Node, key: &str) -> Option<&'a Node> {
     let Value::Table(entries) = &node.value else { return None };
     entries.iter().find(|e| e.key == key).map(|e| &e.node)
 }
 
-fn items(node: &Node) -> &[Node] {
+pub(super) fn items(node: &Node) -> &[Node] {
     let Value::List(items) = &node.value else { return &[] };
     items
 }
 
-/// The first key that counts at a frame, and the weights of it and of those after it; `frames` increase.
-fn weights(frames: &[f64], frame: f64, blend: Blend) -> (usize, Vec<f64>) {
+/// The first key that counts at a frame, which may be between two,, and the weights of it and of those after it; `frames` increase.
+pub(super) fn weights(frames: &[f64], frame: f64, blend: Blend) -> (usize, Vec<f64>) {
     let after = frames.partition_point(|f| *f <= frame);
     if after == 0 || after == frames.len() || frames[after - 1] == frame {
         return (after.saturating_sub(1), vec![1.0]);

@@ -4,6 +4,7 @@ use super::animation::{check_animation, deforms, moves};
 use super::check_background::check_background;
 use super::check_camera::check_camera;
 use super::check_drawn::check_drawn;
+use super::check_extract::check_extracts;
 use super::check_footprint::check_footprints;
 use super::check_light::check_light;
 use super::check_material::{check_listed, check_materials, unknown_material};
@@ -13,7 +14,8 @@ use super::load::Turn;
 use super::paths::{Paths, ROOT_KEY};
 use super::raw::{RawAnimation, RawScene};
 use super::raw_object::RawObject;
-use super::tree::{Document, Step};
+use super::stops::check_stops;
+use super::tree::{Document, Node, Step};
 use super::{Aligned, RenderSettings, Scene, SceneObject};
 use crate::Error;
 use glam::DVec3;
@@ -63,6 +65,11 @@ impl<'a> At<'a> {
     pub(super) fn error_in_text(&self, value: &str, column: usize, message: String, hint: &str) -> Error {
         let place = self.document.place_in_text(self.document.place_of(&self.path), value, column);
         self.document.error(place, message, hint)
+    }
+
+    /// The value that is written here, or the deepest on the way to it that is.
+    pub(super) fn node(&self) -> &'a Node {
+        self.document.node_of(&self.path)
     }
 
     /// The place in words.
@@ -164,9 +171,14 @@ pub(super) fn scene(
     let paths = Paths::new(&at.key(ROOT_KEY), document.file, raw.root.as_deref(), allow_path)?;
     let footprints = check_footprints(&at.key("footprints"), raw.footprints.as_deref(), &paths)?;
     let materials = check_materials(&at.key("material"), &raw.material, (&paths, &footprints.stack))?;
-    let named = Named { materials: &materials, footprints: &footprints.stack, paths: &paths };
+    let extracts = raw.object.iter().filter_map(|object| object.extract.as_ref()?.objects.clone());
+    let tracks = raw.animation.iter().flat_map(|animation| &animation.track);
+    let stops = tracks.filter_map(|track| track.stop.as_ref()?.objects.clone());
+    let seen = extracts.chain(stops).flatten().collect();
+    let named = Named { materials: &materials, footprints: &footprints.stack, paths: &paths, seen: &seen };
     let at_objects = at.key("object");
     let objects = check_objects(&at_objects, raw.object, raw.animation.as_ref(), &named)?;
+    check_extracts(&at_objects, &objects, raw.light.len())?;
     let mut render = check_render(&at.key("render"), &raw.render)?;
     let layers = (&at.key("render").key("layers"), raw.render.layers.as_slice());
     check_drawn(&at_objects, &objects, &materials, layers, &mut render)?;
@@ -176,13 +188,15 @@ pub(super) fn scene(
     let (background, environment) = check_background(&at.key("background"), &raw.background, &paths)?;
     let at_lights = at.key("light");
     let lights = raw.light.iter().enumerate().map(|(i, l)| check_light(&at_lights.index(i), l, &paths));
+    let at_animation = at.key("animation");
+    let frames = raw.animation.as_ref().map(|a| check_animation(&at_animation, a)).transpose()?;
+    let stops = raw.animation.as_ref().map(|a| check_stops(&at_animation, a, &objects, raw.light.len())).transpose()?;
     Ok(Scene {
         file: document.file.to_owned(),
         sha256,
-        frames: match turn {
-            Some(turn) => Some(turn.frames),
-            None => raw.animation.as_ref().map(|a| check_animation(&at.key("animation"), a)).transpose()?,
-        },
+        frames: turn.map(|turn| turn.frames).or(frames),
+        stops: stops.unwrap_or_default(),
+        start: None,
         camera: seen.camera,
         target: seen.target,
         fit: seen.fit,
@@ -224,7 +238,8 @@ fn check_objects(
         let listed = check_listed(&at, &object, materials, of_name)?;
         let named_one = object.material.as_deref().map(|name| of_name(&at.key("material"), name)).transpose()?;
         let material = named_one.or(listed.first().copied()).unwrap_or(0);
-        let deforms = animation.is_some_and(|animation| deforms(animation, i, &object.name));
+        // What is extracted changes with what it is extracted from.
+        let deforms = animation.is_some_and(|a| object.extract.is_some() || deforms(a, i, &object.name));
         objects.push(SceneObject { deforms, materials: listed, ..check_object(&at, object, material, named)? });
     }
     Ok(objects)

@@ -13,6 +13,7 @@ use crate::Error;
 use convert::read::{UpAxis, up_axis};
 use glam::{DQuat, DVec3};
 use splat_core::{FootprintStack, Packing, Similarity};
+use std::collections::HashSet;
 use std::sync::Arc;
 
 /// What objects refer to.
@@ -20,6 +21,8 @@ pub(super) struct Named<'a> {
     pub(super) materials: &'a [SceneMaterial],
     pub(super) footprints: &'a FootprintStack,
     pub(super) paths: &'a Paths,
+    /// Objects that lights are asked for: they are read even where they are invisible.
+    pub(super) seen: &'a HashSet<String>,
 }
 
 /// Checks one object whose material is known.
@@ -39,8 +42,10 @@ pub(super) fn check_object(
     let of_material = named.materials[material].footprint;
     let footprints = check_choice(at, raw.footprint.as_ref(), of_material, (named.footprints, &source))?;
     let up = match raw.transform.up {
-        // An invisible object is not even read.
-        RawUp::Auto if raw.visible == Some(false) => Up { axis: UpAxis::Y, by_file: false },
+        // An invisible object is not even read, unless a light is to see it.
+        RawUp::Auto if raw.visible == Some(false) && !named.seen.contains(&raw.name) => {
+            Up { axis: UpAxis::Y, by_file: false }
+        }
         RawUp::Auto => up_of_files(at, &source)?,
         RawUp::Y => Up { axis: UpAxis::Y, by_file: false },
         RawUp::Z => Up { axis: UpAxis::Z, by_file: false },

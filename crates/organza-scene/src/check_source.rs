@@ -1,6 +1,7 @@
 //! Checks of the source of an object.
 
 use super::check::{At, LARGEST, SMALLEST};
+use super::check_extract::check_extract;
 use super::check_field::{check_combined, check_isosurface, check_level_set, check_slice};
 use super::check_light::check_half_axes;
 use super::check_transfer::{Beside, beside_of_points, check_transfer};
@@ -16,10 +17,11 @@ use splat_core::DAabb;
 use std::path::PathBuf;
 
 /// The keys that name a source.
-const SOURCES: [&str; 15] = [
+const SOURCES: [&str; 16] = [
     "mesh",
     "volume",
     "points",
+    "extract",
     "implicit",
     "isosurface",
     "level_set",
@@ -37,11 +39,12 @@ const SOURCES: [&str; 15] = [
 /// Longest expression, bytes.
 const LONGEST_EXPRESSION: usize = 4096;
 
-fn present(raw: &RawObject) -> [bool; 15] {
+fn present(raw: &RawObject) -> [bool; 16] {
     [
         raw.mesh.is_some(),
         raw.volume.is_some(),
         raw.points.is_some(),
+        raw.extract.is_some(),
         raw.implicit.is_some(),
         raw.isosurface.is_some(),
         raw.level_set.is_some(),
@@ -77,6 +80,9 @@ pub(super) fn check_source(
     }
     if let Some(path) = &raw.points {
         return check_raw_points(at, raw, paths.resolve(&at_source, path)?, fallback);
+    }
+    if let Some(extract) = &raw.extract {
+        return check_extract(&at_source, extract).map(Source::Extract);
     }
     if let Some(path) = &raw.volume {
         let path = paths.resolve(&at_source, path)?;

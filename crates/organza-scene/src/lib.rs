@@ -15,6 +15,7 @@ mod check;
 mod check_background;
 mod check_camera;
 mod check_drawn;
+mod check_extract;
 mod check_field;
 mod check_footprint;
 mod check_light;
@@ -31,6 +32,7 @@ mod de;
 mod error;
 mod fit;
 mod layer_choice;
+mod light_points;
 mod lights;
 mod lit;
 mod load;
@@ -53,6 +55,7 @@ mod read_toml;
 mod settings;
 mod shown;
 mod source;
+mod stops;
 mod tree;
 
 pub use convert::read::UpAxis;
@@ -60,6 +63,7 @@ pub use convert::{ColorMap, ColorScale, Combination, PointColors, ScaleNumbers};
 pub use error::Error;
 pub use fit::{CameraFit, DEFAULT_AZIMUTH, DEFAULT_FILL, DEFAULT_SIZE, EachPoint, FoundCamera};
 pub use layer_choice::{LAYER_NAMES, LayerChoice};
+pub use light_points::{LightPoint, light_points};
 pub use lights::{SceneLight, SlideSource};
 pub use load::{LoadOptions, MAX_SCENE_BYTES, MAX_SCENE_DEPTH, load, parse, read, schema};
 pub use model::{EnvironmentSource, Scene, SceneMaterial, SceneObject, Up};
@@ -73,9 +77,10 @@ pub use settings::{
 };
 pub use shown::{escape_controls, place, printable, shown};
 pub use source::{
-    CloudSource, CombinedSource, DensitySource, ImplicitSource, IsosurfaceSource, LevelSetSource, MatterSource,
-    SliceSource, Source, VolumeSource,
+    CloudSource, CombinedSource, DensitySource, ExtractSource, ImplicitSource, IsosurfaceSource, LevelSetSource,
+    MOST_ABSORBANCE, MatterSource, SliceSource, Source, VolumeSource,
 };
+pub use stops::{Path, Stop};
 
 /// The page's example compiles and holds.
 #[cfg(doctest)]

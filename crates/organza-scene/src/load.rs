@@ -9,6 +9,7 @@ use sha2::{Digest, Sha256};
 use splat_core::Exceeded;
 use std::io::Read;
 use std::path::Path;
+use std::sync::Arc;
 
 /// Largest scene file, bytes.
 pub const MAX_SCENE_BYTES: u64 = 16 << 20;
@@ -99,7 +100,16 @@ pub fn parse(file: &Path, bytes: &[u8], options: &LoadOptions) -> Result<Scene, 
         let message = format!("--turntable: {} has an animation of its own", crate::printable(file));
         return Err(Error::usage(message, "draw it with --frames"));
     }
-    check::scene(&document, raw, options.allow_path, turn, hash(bytes, options))
+    let mut scene = check::scene(&document, raw, options.allow_path, turn, hash(bytes, options))?;
+    // At frame 0 everything is where it begins.
+    let frame = options.frame.filter(|frame| turn.is_none() && *frame > 0);
+    if let (Some(frame), false) = (frame, scene.stops.is_empty()) {
+        scene.stops.iter_mut().for_each(|stop| stop.frame = frame);
+        scene.start = Some(Arc::new(parse(file, bytes, &LoadOptions { frame: Some(0), ..options.clone() })?));
+    } else {
+        scene.stops.clear();
+    }
+    Ok(scene)
 }
 
 fn decode<'a>(file: &Path, bytes: &'a [u8]) -> Result<&'a str, Error> {

@@ -1,6 +1,6 @@
 //! The checked scene: everything a render needs, in radians and f64 world units.
 
-use super::{CameraFit, PointsLook, RenderSettings, SceneLight, Source, Technique};
+use super::{CameraFit, PointsLook, RenderSettings, SceneLight, Source, Stop, Technique};
 use crate::Error;
 use convert::read::UpAxis;
 use convert::{Clip, FootprintChoice};
@@ -22,6 +22,10 @@ pub struct Scene {
     pub sha256: String,
     /// Number of frames of its animation, if it has one.
     pub frames: Option<u32>,
+    /// Objects that stop on their way, where it is a frame of its animation and they may have: they are still where their tracks have them.
+    pub stops: Vec<Stop>,
+    /// The scene at frame 0, where there are stops: what they stop at is as it is then.
+    pub start: Option<Arc<Scene>>,
     /// The camera with the image size; where [`Self::fit`] is there, its place is still to be found.
     pub camera: Camera,
     /// The point in the middle of the picture that the scene names, or that was found.
@@ -49,6 +53,15 @@ pub struct Scene {
 }
 
 impl Scene {
+    /// A part of it that becomes splats: the objects that `has` says, as they stand, visible or not.
+    #[must_use]
+    pub fn part(&self, has: impl Fn(&SceneObject) -> bool) -> Self {
+        let mut scene = Self { stops: Vec::new(), ..self.clone() };
+        scene.render.technique = Technique::Points;
+        scene.objects.iter_mut().for_each(|o| (o.visible, o.technique) = (has(o), None));
+        scene
+    }
+
     /// Every file that the scene is made of, its own first.
     pub fn files(&self) -> Vec<PathBuf> {
         let data = self.objects.iter().flat_map(|o| o.source.paths());

@@ -3,14 +3,14 @@
 use super::raw_footprint::RawChoice;
 use super::raw_points::{RawColorBy, RawDiscShape, RawPointForm, RawPointSize};
 use super::raw_source::{
-    RawClip, RawCloud, RawDensity, RawImplicit, RawIsosurface, RawLevelSet, RawMediumBall, RawMediumBox, RawPart,
-    RawRectangle, RawSlice, RawTransferPoint,
+    RawClip, RawCloud, RawDensity, RawExtract, RawImplicit, RawIsosurface, RawLevelSet, RawMediumBall, RawMediumBox,
+    RawPart, RawRectangle, RawSlice, RawTransferPoint,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
 use std::collections::BTreeMap;
 
-/// An object: a name, exactly one source (`mesh`, `volume`, `points`, `implicit`, `isosurface`, `level_set`, `union`,
+/// An object: a name, exactly one source (`mesh`, `volume`, `points`, `extract`, `implicit`, `isosurface`, `level_set`, `union`,
 /// `intersection`, `difference`, `slice`, `density`, `cloud`, `rectangle`, `medium_box` or `medium_ball`), and how it looks.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, expecting = "a table")]
@@ -26,6 +26,8 @@ pub(super) struct RawObject {
     pub(super) frame: Option<u32>,
     /// Path of a raw point cloud.
     pub(super) points: Option<String>,
+    /// What a light sees first of other objects.
+    pub(super) extract: Option<RawExtract>,
     /// The zero set of an expression.
     pub(super) implicit: Option<RawImplicit>,
     /// The surface in a volume on which its value is a given one.

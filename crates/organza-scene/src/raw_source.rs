@@ -119,6 +119,20 @@ pub(super) struct RawClip {
     pub(super) bounds: Option<[[f64; 3]; 2]>,
 }
 
+/// What a light sees first of other objects.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, expecting = "a table")]
+#[schemars(rename = "Extract")]
+pub(super) struct RawExtract {
+    /// Index of the light, from 0.
+    #[serde(default)]
+    pub(super) light: u32,
+    /// Absorbance up to the surface, above 0, at most 10; default 1.
+    pub(super) absorbance: Option<f64>,
+    /// Names of the objects, visible or not; default all that are visible.
+    pub(super) objects: Option<Vec<String>>,
+}
+
 /// An expression in x, y, z as a density.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, expecting = "a table")]

@@ -1,12 +1,13 @@
 //! Where an object's data comes from, checked: files, expressions and shapes.
 
-use crate::Error;
+use crate::{Error, SceneObject};
 use convert::{
-    CloudShape, Combination, Ellipsoid, ExpressionField, HomogeneousMedium, Inside, Interpolation, Rectangle,
+    CloudShape, Combination, Ellipsoid, ExpressionField, HomogeneousMedium, Inside, Interpolation, RawPoints, Rectangle,
 };
 use glam::DVec3;
 use splat_core::{DAabb, TransferFunction};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// Where an object's data comes from.
 #[derive(Debug, Clone, PartialEq)]
@@ -17,6 +18,8 @@ pub enum Source {
     Points(PathBuf),
     /// A raw point cloud in a file, as matter.
     Matter(MatterSource),
+    /// What a light sees first of other objects.
+    Extract(ExtractSource),
     /// A regular volume in a file.
     Volume(VolumeSource),
     /// The zero set of an expression.
@@ -93,6 +96,32 @@ pub struct MatterSource {
     pub path: PathBuf,
     /// Extinction σ_t within the points, 1/world unit (after the object's transform).
     pub extinction: f64,
+}
+
+/// Where a light sees other objects first, by its shadow map of them alone: points of a surface, in the world.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ExtractSource {
+    /// Index into [`Scene::lights`](super::Scene::lights).
+    pub light: usize,
+    /// Absorbance up to them, in (0, [`MOST_ABSORBANCE`]].
+    pub absorbance: f32,
+    /// Names of the objects, visible or not; empty for all that are visible and made of data.
+    pub objects: Vec<String>,
+    /// The points, once they are found.
+    pub points: Option<Arc<RawPoints>>,
+}
+
+/// Greatest absorbance up to which a light is asked what it sees: lists of a shadow map go somewhat farther.
+pub const MOST_ABSORBANCE: f32 = 10.0;
+
+impl ExtractSource {
+    /// Whether the light is to see an object.
+    pub fn sees(&self, object: &SceneObject) -> bool {
+        match self.objects.is_empty() {
+            true => object.visible && !matches!(object.source, Source::Extract(_)),
+            false => self.objects.contains(&object.name),
+        }
+    }
 }
 
 /// A volume file and how its values become colour and extinction.

@@ -132,6 +132,11 @@ impl Document<'_> {
 
     /// The place of the deepest value on a path that exists.
     pub(super) fn place_of(&self, path: &[Step<'_>]) -> Place {
+        self.node_of(path).place
+    }
+
+    /// That value.
+    pub(super) fn node_of(&self, path: &[Step<'_>]) -> &Node {
         let mut node = &self.root;
         for step in path {
             let next = match (step, &node.value) {
@@ -142,7 +147,7 @@ impl Document<'_> {
             let Some(next) = next else { break };
             node = next;
         }
-        node.place
+        node
     }
 }
 

@@ -3,11 +3,10 @@
 use crate::Error;
 use crate::choose::{row, techniques};
 use crate::form::{Form, PlannedObject};
-use crate::lights::{self, LightPoint};
 use crate::load::Loaded;
 use crate::matter::{Carries, CarriesLight, Matter};
 use crate::plan::{Effect, Plan};
-use crate::scene::{Scene, SceneLight};
+use crate::scene::{LightPoint, Scene, SceneLight, light_points};
 use crate::shadows::Wanted;
 use crate::shown;
 use crate::statistics::ObjectStatistics;
@@ -30,7 +29,7 @@ pub(crate) fn is_all(
     if matter.planned.iter().any(|planned| planned.form == Form::Splats) {
         return Ok(false);
     }
-    let points = lights::points(lights);
+    let points = light_points(lights);
     let answers = carries(matter, &points)?.points;
     let is_no_shadow = |point: &LightPoint| !lights[point.of].shadow || point.light.intensity == [0.0; 3];
     let receives = |(o, planned): (&ObjectStatistics, &PlannedObject)| o.receives && !planned.form.is_own();

@@ -14,11 +14,10 @@ pub use splats::Shaded;
 pub(crate) use splats::record;
 
 use crate::device::Helper;
-use crate::lights::LightPoint;
 use crate::load::Loaded;
 use crate::matter::Matter;
 use crate::plan::Plan;
-use crate::scene::{RenderSettings, Scene, Technique};
+use crate::scene::{LightPoint, RenderSettings, Scene, Technique};
 use crate::{Error, Progress};
 use splat_core::raster::{self, Background, OpaqueImage};
 use splat_core::shade::ChannelLayout;

@@ -17,7 +17,7 @@ use crate::{CostRecord, Error, Progress, RenderOptions, SplatCount, pass, work};
 pub(crate) use context::BYTES_PER_SPLAT;
 use convert::ColorScale;
 use files::Files;
-pub use fit::fitted;
+pub(crate) use fit::placed;
 use glam::DVec3;
 use images::Images;
 use loading::Loading;
@@ -160,7 +160,7 @@ impl Inputs<'_> {
         }
         let mut splats = loading.counts(&prepared, &planned)?;
         let materials = materials(scene, &prepared);
-        let points = lights.iter().map(crate::lights::count).sum();
+        let points = lights.iter().map(SceneLight::count).sum();
         progress.plan(work::of_counts(scene, &splats, &planned, points, sets));
         let mut own = early.map_or_else(|| loading.own(&mut prepared, &planned, &mut warnings), Ok)?;
         let converted = planned.iter().filter(|p| p.splats.is_some()).count();

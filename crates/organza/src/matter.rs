@@ -2,9 +2,8 @@
 
 use crate::Error;
 use crate::form::PlannedObject;
-use crate::lights::LightPoint;
 use crate::load::own::Own;
-use crate::scene::Scene;
+use crate::scene::{LightPoint, Scene};
 use splat_core::{Camera, Cloud};
 
 /// What techniques draw.

@@ -5,9 +5,8 @@
 //! shows it.
 
 pub use crate::form::{Form, PlannedObject};
-use crate::lights::LightPoint;
 use crate::pass;
-use crate::scene::Technique;
+use crate::scene::{LightPoint, Technique};
 use crate::shadows::ShadowTable;
 
 /// One effect of the scene: simulated or not, and why.

@@ -1,21 +1,24 @@
 //! From a scene to what drawing reads: read, choose, convert, plan.
 
+mod seen;
+
 use crate::carried;
 use crate::choose::{choose, plan, row, same_forms, technique_of, techniques, unshown};
 use crate::form::PlannedObject;
 use crate::load::files::Files;
 use crate::load::own::Own;
-use crate::load::{self, Loaded, Spare, fitted, light_statistics};
+use crate::load::{self, Loaded, Spare, light_statistics};
 use crate::matter::Matter;
 use crate::memory::{self, Memory};
 use crate::pass;
 use crate::plan::Plan;
-use crate::scene::{FoundCamera, Scene, SceneLight, SceneObject, Technique};
+use crate::scene::{FoundCamera, Scene, SceneLight, SceneObject, Source, Technique, light_points};
 use crate::statistics::{ObjectData, ObjectStatistics, Statistics};
 use crate::technique::Row;
 use crate::work::Translucent;
-use crate::{CostRecord, Error, Progress, RenderOptions, SplatCount, doubts, lights, shadows};
+use crate::{CostRecord, Error, Progress, RenderOptions, SplatCount, doubts, shadows};
 use convert::DiscSize;
+pub use seen::{fitted, seen};
 use splat_core::shade::Census;
 use splat_core::{Exceeded, Material, SplatKind};
 
@@ -92,7 +95,7 @@ pub(crate) fn prepare(
     warnings.extend(unshown(scene));
     warnings.extend(carried::unshadowed(scene, &loaded));
     let inputs = cost.stages.iter().filter(|s| s.name == pass::READ).map(|s| s.bytes).sum();
-    let most = memory.total().max(memory::loading_bytes(&loaded, inputs));
+    let most = memory.total().max(memory::loading_bytes(&loaded, inputs)).max(files.most.get());
     Ok((loaded, Explanation { plan, cost, memory: most, splats, warnings, notes, found: None }, memory))
 }
 
@@ -109,6 +112,8 @@ pub fn same_splats(a: &Scene, b: &Scene) -> bool {
         && a.render.particles.surface_sampler == b.render.particles.surface_sampler
         && a.render.particles.volume_sampler == b.render.particles.volume_sampler
         && a.render.layers == b.render.layers
+        // Of the cells of shadow maps, what is extracted.
+        && (a.render.shadow == b.render.shadow || !a.objects.iter().any(|o| matches!(o.source, Source::Extract(_))))
         && a.render.max_points == b.render.max_points
 }
 
@@ -198,7 +203,7 @@ fn plan_counted(scene: &Scene, loaded: &Loaded, options: &RenderOptions) -> Resu
     all.iter().for_each(|t| (row(*t).plans)(scene, loaded, &mut plan));
     let used = all.iter().filter(|t| statistics.translucent_of(**t).is_some() || row(**t).meets_discs);
     // They take turns, and each keeps what it has.
-    let points = lights::points(&loaded.lights);
+    let points = light_points(&loaded.lights);
     let camera = loaded.camera.with_samples(scene.render.antialias);
     let matter =
         Matter { scene, own: &loaded.own, planned: &plan.objects, cloud: Some(&loaded.cloud), camera: &camera };

@@ -1,9 +1,8 @@
 //! What shadow maps are built by: shared by the plan, which tells their size beforehand, and the drawing.
 
 use crate::Error;
-use crate::lights::LightPoint;
 use crate::load::Loaded;
-use crate::scene::{RenderSettings, ShadowMapping};
+use crate::scene::{LightPoint, RenderSettings, ShadowMapping};
 use splat_core::{Limits, Object};
 use tsm::{Deposits, Params};
 
@@ -121,15 +120,15 @@ fn tables_within(
         let tolerance = tolerance(settings, loaded, point, maps);
         let params = shadow_params(settings, loaded, tolerance, max_bytes);
         let scene = tsm::Scene { cloud: &loaded.cloud, materials: &loaded.materials, objects };
-        let predicted = Deposits::predict(&scene, light, &params).map_err(|e| shadow_error(point, &e))?;
+        let predicted = Deposits::predict(&scene, light, &params).map_err(|e| shadow_error(&point.name(), &e))?;
         Ok(Some(ShadowTable { predicted, tolerance, max_bytes }))
     };
     wanted.iter().map(table).collect()
 }
 
-/// What went wrong with the map of a point of a light.
-pub(crate) fn shadow_error(point: &LightPoint, error: &tsm::Error) -> Error {
-    let what = format!("the shadow map of {}", point.name());
+/// What went wrong with the map of a light, or a point of one, of this name.
+pub(crate) fn shadow_error(light: &str, error: &tsm::Error) -> Error {
+    let what = format!("the shadow map of {light}");
     match error {
         tsm::Error::Limit(exceeded) => {
             let hint = "use fewer lights or samples of lights, fewer cells in render.shadow, or a larger --max-memory";

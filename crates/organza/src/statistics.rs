@@ -1,7 +1,6 @@
 //! Statistics of a loaded scene, from which the plan is made.
 
 use crate::form::PlannedObject;
-use crate::lights;
 use crate::scene::{SceneLight, SurfaceSampler, Technique, VolumeSampler};
 use convert::cost::Prediction;
 use splat_core::Material;
@@ -192,6 +191,6 @@ impl LightStatistics {
     /// Statistics of one light.
     pub fn of_light(light: &SceneLight) -> Self {
         let is_dark = light.light.intensity.iter().all(|i| *i == 0.0);
-        Self { wants_shadow: light.shadow, is_dark, points: lights::count(light) }
+        Self { wants_shadow: light.shadow, is_dark, points: light.count() }
     }
 }

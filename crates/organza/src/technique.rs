@@ -16,12 +16,11 @@ pub(crate) mod surfels;
 
 use crate::form::{DRAWN, Form};
 use crate::frame::Frame;
-use crate::lights::LightPoint;
 use crate::load::Loaded;
 use crate::matter::{CarriesLight, Matter};
 use crate::pass;
 use crate::plan::Plan;
-use crate::scene::{Scene, Technique};
+use crate::scene::{LightPoint, Scene, Technique};
 use crate::stage;
 use crate::statistics::ObjectStatistics;
 use crate::work::{Translucent, cost};

@@ -137,6 +137,17 @@ pub struct Light {
 }
 
 impl Light {
+    /// The light without its extent, in its middle: it shines to the same side.
+    #[must_use]
+    pub fn middle(&self) -> Self {
+        let shape = match (self.shape.place(), self.shape.normal()) {
+            (Some(position), Some(normal)) => LightShape::Patch { position, normal },
+            (Some(position), None) if self.shape.is_extended() => LightShape::Point { position },
+            _ => self.shape,
+        };
+        Self { shape, ..*self }
+    }
+
     /// Checks that everything is finite, intensities are ≥ 0, directions are of unit length, and extents above 0.
     ///
     /// # Errors

@@ -202,7 +202,7 @@ fn met_at<M: Mapping>(mapping: &M, p: Vec3, at: Vec2) -> Vec2 {
 /// Absorbance at `distance`, every entry spread evenly over `ramp` to either side of its own distance; those before `begin`
 /// lie wholly before it. Of a block of entries about it their sum and [moment](List::moment) are enough.
 #[inline(always)]
-fn continuous<const C: usize>(list: List<'_, C>, begin: usize, distance: f32, ramp: f32) -> [f32; C] {
+pub(crate) fn continuous<const C: usize>(list: List<'_, C>, begin: usize, distance: f32, ramp: f32) -> [f32; C] {
     let (len, inverse, farthest) = (list.distance.len(), 0.5 / ramp, distance + ramp);
     let share = |n: usize| (distance - list.distance[n]) * inverse + 0.5;
     let mut before = list.total_of(begin);

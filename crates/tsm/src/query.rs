@@ -1,12 +1,18 @@
 //! Queries beside shadow: lists, first hit, collision with a sphere, isosurface points (Gunjee 2007, Figure 15a).
 
 use crate::ShadowMap;
+use crate::lookup::continuous;
 use crate::mapping::{Mapping, Ray, with_mapping};
 use crate::shadow_map::{Absorbances, Matter};
 use crate::table::List;
 use glam::Vec3;
 use rayon::prelude::*;
 use splat_core::glam;
+
+/// Most looks at a moving sphere from one whole time to the next.
+const MOST_STEPS: f32 = 1024.0;
+/// How often the time of a collision is halved.
+const HALVINGS: usize = 16;
 
 /// A point where the absorbance seen from the light first reaches a threshold.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -49,14 +55,21 @@ impl ShadowMap {
         running.collect()
     }
 
+    /// Bytes that building it took, about at most, and asking for [`Self::first_surface`]: predictions may be half of what is needed.
+    pub fn peak_bytes(&self) -> u64 {
+        let of_cell = size_of::<Option<f32>>() + 2 * size_of::<SurfacePoint>();
+        self.prediction().bytes * 3 / 2 + u64::from(self.cells()) * of_cell as u64
+    }
+
     /// Cells of the table.
     pub fn cells(&self) -> u32 {
         let [columns, rows] = with_mapping!(&self.table, m => m.size());
         columns * rows
     }
 
-    /// Distance from the light, world units, at which the absorbance of a cell reaches `absorbance` in every channel;
-    /// for parallel light the distance from the plane where the table starts. `None` if it never does.
+    /// Distance from the light, world units, at which the absorbance of a cell reaches `absorbance` in every channel, as
+    /// look-ups on its ray have it: a medium absorbs continuously, a surface at once. For parallel light it is the
+    /// distance from the plane where the table starts. `None` if it never does.
     pub fn first_hit(&self, cell: u32, absorbance: f32) -> Option<f64> {
         self.hit_in_frame(cell, absorbance).map(|d| self.frame.world_length(d))
     }
@@ -77,8 +90,8 @@ impl ShadowMap {
             return None;
         }
         let solid = match &self.absorbances {
-            Absorbances::Mono(matter) => first(matter, cell, absorbance),
-            Absorbances::Rgb(matter) => first(matter, cell, absorbance),
+            Absorbances::Mono(matter) => first(matter, cell, absorbance, self.ramp),
+            Absorbances::Rgb(matter) => first(matter, cell, absorbance, self.ramp),
         };
         let opaque = self.opaque.get(cell as usize).copied().filter(|d| d.is_finite());
         match (solid, opaque) {
@@ -111,14 +124,38 @@ impl ShadowMap {
         })
     }
 
+    /// The last time from 0 to `end` up to which a sphere that moves never [collides](Self::collides): 0 where it does so from the
+    /// beginning, and `end` where it meets nothing. `center` gives its centre by the time, relative to the cloud's origin. It is
+    /// looked at wherever it has gone half its radius between whole times, along a straight way, 1024 times at most.
+    pub fn free_until(&self, center: &dyn Fn(f64) -> Vec3, radius: f32, end: u32) -> f64 {
+        let is_free = |time: f64| !self.collides(center(time), radius);
+        if !is_free(0.0) {
+            return 0.0;
+        }
+        for begin in (0..end).map(f64::from) {
+            let steps = ((center(begin + 1.0) - center(begin)).length() / (0.5 * radius)).ceil().min(MOST_STEPS);
+            let mut times = (0..steps as u32).map(|k| [k, k + 1].map(|k| begin + f64::from(k) / f64::from(steps)));
+            if let Some([mut free, mut met]) = times.find(|[_, to]| !is_free(*to)) {
+                for _ in 0..HALVINGS {
+                    let middle = 0.5 * (free + met);
+                    *if is_free(middle) { &mut free } else { &mut met } = middle;
+                }
+                return free;
+            }
+        }
+        f64::from(end)
+    }
+
     /// The surface that the light sees: for each cell whose absorbance reaches `absorbance`, the point where it first
     /// does (Gunjee 2007, Figure 15a). Normals come from the points of neighbouring cells; a point whose neighbours
     /// all miss faces the light.
     pub fn first_surface(&self, absorbance: f32) -> Vec<SurfacePoint> {
+        let cells = (0..self.cells()).into_par_iter().with_min_len(4096);
+        let hits: Vec<Option<f32>> = cells.clone().map(|cell| self.hit_in_frame(cell, absorbance)).collect();
         with_mapping!(&self.table, m => {
             let hit = |cell: u32| -> Option<Vec3> {
                 let Ray { base, direction } = m.cell_ray(cell);
-                Some(base + direction * self.hit_in_frame(cell, absorbance)?)
+                Some(base + direction * hits[cell as usize]?)
             };
             let point = |cell: u32| -> Option<SurfacePoint> {
                 let p = hit(cell)?;
@@ -139,7 +176,7 @@ impl ShadowMap {
                     area: area as f32,
                 })
             };
-            (0..self.cells()).into_par_iter().with_min_len(4096).filter_map(point).collect()
+            cells.filter_map(point).collect()
         })
     }
 }
@@ -160,20 +197,26 @@ fn own_absorbances<const C: usize>(matter: &Matter<C>, cell: u32, cells: u32) ->
     own
 }
 
-fn first<const C: usize>(matter: &Matter<C>, cell: u32, absorbance: f32) -> Option<f32> {
-    let lists: Vec<_> = [&matter.media, &matter.surfaces].into_iter().flatten().map(|l| l.list(cell)).collect();
-    let total = |distance: f32| -> f32 {
-        let sums = lists.iter().map(|list| {
-            let n = list.distance.partition_point(|d| *d <= distance);
-            if n == 0 { 0.0 } else { list.total[n - 1].iter().copied().fold(f32::INFINITY, f32::min) }
-        });
-        sums.sum()
+/// Where the absorbance of a cell first reaches `absorbance` in every channel: the entries of media, each spread evenly over
+/// `ramp` to either side of its distance, and those of surfaces, which are steps.
+fn first<const C: usize>(matter: &Matter<C>, cell: u32, absorbance: f32, ramp: f32) -> Option<f32> {
+    let [media, surfaces] =
+        [&matter.media, &matter.surfaces].map(|lists| lists.as_ref().map_or(List::NONE, |lists| lists.list(cell)));
+    let is_reached = |distance: f32| {
+        let steps = surfaces.total_of(surfaces.distance.partition_point(|d| *d <= distance));
+        let begin = media.distance.partition_point(|d| *d <= distance - ramp);
+        let within = continuous(media, begin, distance, ramp);
+        (0..C).all(|c| steps[c] + within[c] >= absorbance)
     };
-    let candidate = |list: &List<'_, C>| {
-        let n = list.distance.partition_point(|d| total(*d) < absorbance);
-        list.distance.get(n).copied()
-    };
-    lists.iter().filter_map(candidate).min_by(f32::total_cmp)
+    let ends = [media.distance.last().map(|d| d + ramp), surfaces.distance.last().copied()];
+    let end = ends.into_iter().flatten().reduce(f32::max).filter(|end| is_reached(*end))?;
+    // Distances are positive, and their bits in their order.
+    let (mut before, mut reached) = (0, end.to_bits());
+    while reached - before > 1 {
+        let middle = before + (reached - before) / 2;
+        *if is_reached(f32::from_bits(middle)) { &mut reached } else { &mut before } = middle;
+    }
+    Some(f32::from_bits(reached))
 }
 
 fn any_between<const C: usize>(matter: &Matter<C>, cell: u32, from: f32, to: f32) -> bool {

@@ -203,6 +203,70 @@ fn queries_find_what_the_light_meets() {
 }
 
 #[test]
+fn a_moving_sphere_is_free_until_it_meets_what_the_light_sees() {
+    let cloud = plane(Vec3::Z * 3.0, Vec3::NEG_Z, 20, 0.05, SplatKind::Opaque, 1.0);
+    let map = build(&cloud, &point_light(DVec3::ZERO), &Params::default());
+    let (along, radius) = (|time: f64| Vec3::new(0.05, 0.02, 1.0 + 0.35 * time as f32), 0.1);
+    // It touches the plane when its centre is at 2.9: the middle of its fifth step and a bit.
+    let met = map.free_until(&along, radius, 9);
+    assert!((met - 1.9 / 0.35).abs() < 0.02 && !map.collides(along(met), radius), "{met}");
+    assert!(map.collides(along(met + 0.02), radius));
+    // A long step does not lead through the plane.
+    let far = |time: f64| Vec3::new(0.05, 0.02, 1.0 + 50.0 * time as f32);
+    assert!((map.free_until(&far, radius, 3) - 1.9 / 50.0).abs() < 1e-3);
+    assert_eq!(map.free_until(&|time| along(-time), radius, 3), 3.0);
+    assert_eq!(map.free_until(&|_| Vec3::Z * 3.0, radius, 3), 0.0);
+}
+
+#[test]
+fn a_hit_is_where_a_look_up_on_its_ray_has_the_absorbance() {
+    let mut cloud = smooth_ball(0.1, 6.0, 1.0);
+    cloud.append(&plane(Vec3::Z * 0.4, Vec3::NEG_Z, 20, 0.05, SplatKind::Surface, 0.8));
+    let resolution = Resolution::Cells(64);
+    let map = build(&cloud, &directional(DVec3::NEG_Z), &Params { resolution, ..Params::default() });
+    let (mut within, mut at_plane) = (0, 0);
+    for absorbance in [0.05, 0.4, 1.0, 1.7, 3.0] {
+        for p in map.first_surface(absorbance) {
+            if p.position.truncate().length() > 0.7 {
+                continue;
+            }
+            // Media absorb continuously; the surface at once, and there the hit is between less and more.
+            let [before, behind] = [1e-3, -1e-3].map(|z| -light_at(&map, p.position + Vec3::Z * z).ln());
+            assert!(before <= absorbance + 1e-3 && absorbance <= behind + 1e-3, "{before} {absorbance} {behind}");
+            let is_at_plane = (p.position.z - 0.4).abs() < 1e-3;
+            assert!(behind - before < 0.03 || is_at_plane, "{before} {absorbance} {behind} {p:?}");
+            *if is_at_plane { &mut at_plane } else { &mut within } += 1;
+        }
+    }
+    assert!(within > 1000 && at_plane > 100, "{within} {at_plane}");
+}
+
+/// Greatest error of the depth to which light comes into a ball of fog, within `reach` of the light's axis, in spacings.
+fn greatest_error(h: f32, absorbance: f32, light: &Light, reach: f32) -> f32 {
+    let sigma_t = 2.0;
+    let map = build(&smooth_ball(h, sigma_t, 1.0), light, &Params::default());
+    let points = map.first_surface(absorbance);
+    let near = points.iter().filter(|p| p.position.truncate().length() < reach);
+    let errors = near.map(|p| {
+        let depth = (1.0 - p.position.truncate().length_squared()).sqrt() - p.position.z;
+        (depth - absorbance / sigma_t).abs() / h
+    });
+    assert!(errors.clone().count() > 500);
+    errors.fold(0.0, f32::max)
+}
+
+#[test]
+fn a_ball_of_fog_is_met_where_it_is_as_thick_as_is_asked_for() {
+    for h in [0.06, 0.03] {
+        for absorbance in [0.2, 1.0] {
+            let error = greatest_error(h, absorbance, &directional(DVec3::NEG_Z), 0.7);
+            println!("h {h}, absorbance {absorbance}: {error} spacings");
+            assert!(error < 0.1, "{error} spacings at {h}");
+        }
+    }
+}
+
+#[test]
 fn first_surface_is_the_isosurface_that_the_light_sees() {
     let h = 0.04;
     let cloud = medium([26; 3], h, 40.0, |p| p.length() < 1.0);

@@ -100,6 +100,7 @@ pub(crate) fn heading(table: &str) -> &'static str {
         "object.part" => "#### Solids from solids",
         "object.part.isosurface" | "object.part.level_set" => "### Surfaces of fields",
         "object.clip" => "### `clip`",
+        "object.extract" => "### What a light sees",
         "object.color_by" | "object.point_size" => "### Raw points",
         "material" | "material.medium" | "material.absorption" | "material.cauchy" | "material.bump" => {
             "`[material.NAME]`"
@@ -110,7 +111,7 @@ pub(crate) fn heading(table: &str) -> &'static str {
         "render.particles" => "`[render.particles]`",
         "render.sheets" => "`[render.sheets]`",
         "render.surfels" => "`[render.surfels]`",
-        "animation" | "animation.track" | "animation.track.keys" => "`[animation]`",
+        "animation" | "animation.track" | "animation.track.keys" | "animation.track.stop" => "`[animation]`",
         _ if table.starts_with("light") => "`[[light]]`",
         _ if table.starts_with("object.") => "### Generated sources",
         _ => "no section",

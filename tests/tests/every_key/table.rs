@@ -1,7 +1,7 @@
 //! A value for every key that must change what is seen, and where it must not, with the reason.
 
 use super::scenes::SOURCES;
-use super::{fields, footprints, lights, surfels};
+use super::{fields, footprints, lights, seen, surfels};
 
 /// Where a change is looked for.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -106,7 +106,7 @@ impl Entry {
         Self { techniques, ..self }
     }
 
-    fn at(self, frame: u32) -> Self {
+    pub(super) fn at(self, frame: u32) -> Self {
         Self { frame: Some(frame), ..self }
     }
 
@@ -134,7 +134,8 @@ pub(super) fn one(key: &'static str, set: &'static str) -> Entry {
 
 pub(crate) fn entries() -> Vec<Entry> {
     let first = [scene(), footprints::entries(), lights::entries(), objects()];
-    let others = [sources(), fields::entries(), materials(), render(), surfels::entries(), animation()];
+    let others =
+        [sources(), fields::entries(), seen::entries(), materials(), render(), surfels::entries(), animation()];
     first.into_iter().chain(others).flatten().collect()
 }
 

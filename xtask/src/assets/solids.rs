@@ -1,4 +1,4 @@
-//! Small solids by tables: a mushroom, a dart and an aeroplane, as OFF text with colours. Nobody's models, so nobody's terms.
+//! Small solids by tables: a mushroom, a dart, an aeroplane and a probe, as OFF text with colours. Nobody's models, so nobody's terms.
 //!
 //! Each part is drawn over ellipses that follow one another along a direction, as planks are laid over the ribs of a boat; bodies of revolution have circles.
 
@@ -31,11 +31,12 @@ struct Solid {
 }
 
 /// The files by name.
-pub(super) fn files() -> [(&'static str, String); 3] {
+pub(super) fn files() -> [(&'static str, String); 4] {
     [
         ("mushroom.off", mushroom().off("A mushroom, 0.94 high, that stands on y = 0")),
         ("dart.off", dart().off("A dart, 1.63 long, that flies towards +x")),
         ("aeroplane.off", aeroplane().off("An aeroplane, 2 long, that flies towards +x with +y above")),
+        ("probe.off", probe().off("A surgeon's probe, 1.4 long, whose tip at the origin points down")),
     ]
 }
 
@@ -126,6 +127,18 @@ fn aeroplane() -> Solid {
         );
     }
     solid.blade(Y, [0.0; 3], &[(0.05, -0.8, 0.17, 0.014), (0.34, -0.98, 0.08, 0.008), (0.36, -0.99, 0.04, 0.003)], red);
+    solid
+}
+
+fn probe() -> Solid {
+    let mut solid = Solid::default();
+    let (steel, grip, dark) = ([176, 182, 188], [60, 110, 120], [46, 50, 56]);
+    let shaft = [(0.0, 0.002), (0.01, 0.009), (0.05, 0.013), (0.75, 0.013), (0.76, 0.02), (0.79, 0.02), (0.8, 0.028)];
+    let rings = [0.84, 0.9, 0.96, 1.02, 1.08, 1.14];
+    let ringed =
+        rings.iter().flat_map(|y| [(y - 0.02, 0.046), (y + 0.02, 0.046), (y + 0.026, 0.04), (y + 0.034, 0.04)]);
+    let handle: Vec<(f64, f64)> = ringed.collect();
+    solid.turned(Y, [0.0; 3], &[(&shaft, steel), (&handle, grip), (&[(1.2, 0.04), (1.37, 0.03), (1.4, 0.012)], dark)]);
     solid
 }
 

@@ -2,6 +2,7 @@
 
 use super::Request;
 use super::points::spacing_factor;
+use super::tables;
 use organza::scene::{
     Classify, Collisions, Coverage, Grouping, RenderSettings, Scene, ShadowMapping, Slicing, SoftShadows,
     SurfaceSampler, SurfelLayers, VolumeSampler,
@@ -70,6 +71,11 @@ pub fn lines(as_written: &Scene, request: &Request) -> String {
             None => text += &format!("# without {key}\n"),
         }
         open = table;
+    }
+    if let Some(texels) = tables::texels(as_written, &request.scene) {
+        text += &format!(
+            "# the Gaussians of translucent surfaces as images of {texels} texels a side; lights without shadows\n"
+        );
     }
     if let Some(factor) = spacing_factor(as_written, &request.scene) {
         text += &format!("# the spacing of every object times {factor:?}, or its resolution divided by that\n");

@@ -1,5 +1,6 @@
 //! The knobs of the technique `points` (Gunjee 2007).
 
+use super::tables::{self, footprint_tables};
 use super::{Knob, Options, Request, Skipped, Step, Sweep, Theory};
 use organza::scene::{Scene, SceneObject, ShadowMapping, Source, Technique};
 use splat_core::{LightShape, raster::Accumulation};
@@ -46,6 +47,7 @@ pub fn points(scene: &Scene, facts: &Facts, options: &Options) -> Sweep {
         ("splat spacing", spacing(scene, options)),
         ("packed splats", packed(facts)),
         ("accumulation", accumulation(facts)),
+        (tables::NAME, footprint_tables(scene, options)),
     ];
     for (name, knob) in knobs {
         match knob {
@@ -53,9 +55,6 @@ pub fn points(scene: &Scene, facts: &Facts, options: &Options) -> Sweep {
             Err(reason) => sweep.skipped.push(Skipped { knob: name, reason }),
         }
     }
-    let formula = "not applicable: Gaussians are evaluated by formula; what their tables would be off by, `splat-core`'s example \
-                   `footprint_tables` tells";
-    sweep.skipped.push(Skipped { knob: "footprint table size", reason: formula.into() });
     sweep
 }
 
@@ -346,6 +345,6 @@ fn spacing_of(object: &mut SceneObject) -> Option<&mut f64> {
         Source::Rectangle(rectangle) => Some(&mut rectangle.spacing),
         Source::Medium(medium) => Some(&mut medium.spacing),
         // What lies between points is no field that finer ones would approach.
-        Source::Points(_) | Source::Matter(_) => None,
+        Source::Points(_) | Source::Matter(_) | Source::Extract(_) => None,
     }
 }

@@ -1,18 +1,20 @@
 //! One object as the path tracer takes it: a density or a mesh in the world.
 
 use super::medium::{MediumBody, medium};
-use convert::SplatParams;
 use convert::read::{Loaded as FileData, ReadParams};
+use convert::{Solid, SplatParams};
 use glam::Vec3;
 use organza::scene::{Scene, SceneMaterial, SceneObject, Source};
 use organza::{Error, RenderOptions};
 use reference::{Density, Dielectric, Liberty, Medium, Surface, SurfaceKind, SurfaceMaterial};
-use splat_core::{Mesh, Shading, Similarity, optics};
+use splat_core::{DAabb, Mesh, ScalarField, Shading, Similarity, optics};
 use std::path::Path;
 use std::sync::Arc;
 
 /// Steps of the truth to one step of the splats.
 pub(super) const FINER: f64 = 0.5;
+/// The same for solids of several, whose edges are cut off within a step.
+const FINER_EDGES: f64 = 0.25;
 /// An object of the scene, with what the tracer borrows.
 pub(super) enum Body {
     /// A medium.
@@ -43,15 +45,17 @@ pub(super) fn body(
         Source::Matter(_) => {
             return no("points that are a medium are not path-traced: nobody knows what lies between them");
         }
+        Source::Extract(_) => return no("what a light sees first is not path-traced: it is points of a shadow map"),
         Source::Isosurface(_) | Source::LevelSet(_) | Source::Slice(_) => {
             return no("surfaces of measured fields are not path-traced");
         }
-        Source::Combined(_) => {
-            return no(
-                "unions, intersections and differences are not path-traced: an `implicit` of `min` and `max` is",
-            );
+        Source::Implicit(_) | Source::Combined(_) if !object.clip.is_empty() => {
+            return no("open surfaces are not path-traced");
         }
-        Source::Implicit(_) if !object.clip.is_empty() => return no("open surfaces are not path-traced"),
+        Source::Combined(_) => match solid(&object.source)? {
+            Some(solid) => mesh_of(solid.field.as_ref(), solid.bounds, solid.step * FINER_EDGES, object)?,
+            None => return no("solids with parts of measured fields are not path-traced: those of expressions are"),
+        },
         Source::Mesh(path) => match read(path, 0, options)? {
             FileData::Mesh(mesh) => mesh,
             _ => {
@@ -62,11 +66,7 @@ pub(super) fn body(
                 ));
             }
         },
-        Source::Implicit(i) => {
-            let field = i.field()?;
-            let params = SplatParams { object_name: object.name.clone(), ..SplatParams::default() };
-            convert::field_to_mesh(&field, i.bounds, i.spacing * FINER, &params, None)?
-        }
+        Source::Implicit(i) => mesh_of(&i.field()?, i.bounds, i.spacing * FINER, object)?,
         Source::Rectangle(r) => Mesh::rectangle(r.center, r.u, r.v),
         Source::Medium(_) | Source::Volume(_) | Source::Density(_) | Source::Cloud(_) => {
             return medium(scene, object, options).map(|body| Ok(Body::Medium(body)));
@@ -101,6 +101,28 @@ impl Body {
         let Self::Surface(mesh, material) = self else { return None };
         Some(Surface { mesh, material: *material })
     }
+}
+
+/// The surface of a field with steps so wide.
+fn mesh_of(field: &dyn ScalarField, bounds: DAabb, step: f64, object: &SceneObject) -> Result<Mesh, Error> {
+    let params = SplatParams { object_name: object.name.clone(), ..SplatParams::default() };
+    Ok(convert::field_to_mesh(field, bounds, step, &params, None)?)
+}
+
+/// The solid of an expression, or of several; `None` where a part is of measured data.
+fn solid(source: &Source) -> Result<Option<Solid>, Error> {
+    Ok(match source {
+        Source::Implicit(i) => {
+            let (field, walls) = (Arc::new(i.field()?), Vec::new());
+            Some(Solid { field, walls, bounds: i.bounds, step: i.spacing }.closed())
+        }
+        Source::Combined(source) => {
+            let parts: Option<Vec<Solid>> = source.parts.iter().map(solid).collect::<Result<_, _>>()?;
+            let combined = |parts| Solid::combined(source.combination, parts);
+            parts.map(combined).transpose().map_err(|e| Error::from_core("a solid", e))?
+        }
+        _ => None,
+    })
 }
 
 /// Ambient radiance reaches splats unshadowed, so to the eye it is emission.

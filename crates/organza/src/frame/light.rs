@@ -2,9 +2,9 @@
 
 use super::Frame;
 use crate::device;
-use crate::lights::{self, LightPoint};
 use crate::pass;
 use crate::plan::Plan;
+use crate::scene::{LightPoint, light_points};
 use crate::shadows::{ShadowTable, shadow_error};
 use crate::{CostRecord, Error, work};
 use splat_core::shade::{LitBy, ShadeInput};
@@ -46,7 +46,7 @@ struct Done {
 impl<'a> Frame<'a> {
     /// The points of all lights, by which techniques light what they draw.
     pub(crate) fn light_points(&self) -> &[LightPoint] {
-        self.light_points.get_or_init(|| lights::points(&self.loaded.lights))
+        self.light_points.get_or_init(|| light_points(&self.loaded.lights))
     }
 
     /// One shadow map for each point of a light that the plan gives one, `None` for the others. What building them took is added to `cost`.
@@ -112,7 +112,7 @@ impl<'a> Frame<'a> {
                     &params,
                     Some(self.progress),
                 )
-                .map_err(|e| shadow_error(point, &e))?;
+                .map_err(|e| shadow_error(&point.name(), &e))?;
                 let helped = self.helper.and_then(|helper| device::shadow_map(helper, &deposits));
                 let map = helped.unwrap_or_else(|| deposits.into_map());
                 stage.items_in = l.cloud.len() as u64;

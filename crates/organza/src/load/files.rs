@@ -1,10 +1,11 @@
 //! What was read from files, shared by all objects and frames that are made from it: a file is read once.
 
 use crate::Error;
+use crate::scene::{Scene, Stop};
 use convert::read::{Loaded, Mended, Notes, ReadParams};
 use convert::{ColorScale, RawPoints, SharedField};
 use splat_core::{DAabb, Grid, Mesh, Progress, RadianceImage};
-use std::cell::RefCell;
+use std::cell::{Cell, RefCell};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -28,6 +29,9 @@ type Read = (FileData, Notes);
 /// The level set of scattered points, and its bounds.
 pub(super) type Fitted = (SharedField, DAabb);
 
+/// What was made, beside what it was made of.
+type Made<K, V> = RefCell<Vec<(K, V)>>;
+
 /// The files of a scene that were read, so that whoever looked at them before can hand them to [`crate::render_from`].
 #[derive(Default)]
 pub struct Files {
@@ -35,8 +39,12 @@ pub struct Files {
     read: RefCell<HashMap<(PathBuf, u64), (ReadParams, Read)>>,
     /// What there is to say of them, one sentence each.
     notes: RefCell<Vec<String>>,
-    /// Fits take longer than reading: with their tolerance and the bytes that they take.
-    fitted: RefCell<Vec<(PathBuf, f64, u64, Fitted)>>,
+    /// Fits take longer than reading: by path and tolerance, with the bytes that they take.
+    pub(super) fitted: Made<(PathBuf, f64), (Fitted, u64)>,
+    /// Until when objects are free on their way in a scene that begins so.
+    pub(crate) stopped: Made<(Stop, Arc<Scene>), f64>,
+    /// Most bytes that parts of the scene took while lights looked at them.
+    pub(crate) most: Cell<u64>,
     /// What was mended in them, or is doubtful.
     mended: RefCell<Vec<String>>,
     /// What the colours of the objects that were read last stand for.
@@ -65,7 +73,7 @@ impl Files {
     }
 
     /// What was made of a file beside what its reader says.
-    pub(super) fn note(&self, path: &Path, said: impl IntoIterator<Item = impl std::fmt::Display>) {
+    pub(crate) fn note(&self, path: &Path, said: impl IntoIterator<Item = impl std::fmt::Display>) {
         add(&self.notes, said.into_iter().map(|said| format!("{}: {said}", crate::printable(path))));
     }
 
@@ -75,7 +83,7 @@ impl Files {
     }
 
     /// What the files hold that is not drawn, and what was made of them, one sentence each.
-    pub(super) fn notes(&self) -> Vec<String> {
+    pub fn notes(&self) -> Vec<String> {
         self.notes.borrow().clone()
     }
 
@@ -110,28 +118,25 @@ impl Files {
         Ok((data, notes))
     }
 
-    /// The level set of a file's points unless it was fitted with the same tolerance; `fit` also says how many bytes it takes.
-    pub(super) fn fitted(
-        &self,
-        path: &Path,
-        tolerance: f64,
-        fit: impl FnOnce() -> Result<(Fitted, u64), Error>,
-    ) -> Result<Fitted, Error> {
-        let known =
-            |(p, t, _, fitted): &(PathBuf, f64, u64, Fitted)| (p == path && *t == tolerance).then(|| fitted.clone());
-        if let Some(fitted) = self.fitted.borrow().iter().find_map(known) {
-            return Ok(fitted);
-        }
-        let (fitted, bytes) = fit()?;
-        self.fitted.borrow_mut().push((path.to_owned(), tolerance, bytes, fitted.clone()));
-        Ok(fitted)
-    }
-
     /// Bytes that it holds.
     pub(crate) fn bytes(&self) -> u64 {
         let read: u64 = self.read.borrow().values().map(|(_, (data, _))| data.bytes()).sum();
-        read + self.fitted.borrow().iter().map(|(_, _, bytes, _)| bytes).sum::<u64>()
+        read + self.fitted.borrow().iter().map(|(_, (_, bytes))| bytes).sum::<u64>()
     }
+}
+
+/// What was made of this already, or makes it.
+pub(crate) fn once<K: PartialEq, V: Clone>(
+    made: &Made<K, V>,
+    of: K,
+    make: impl FnOnce() -> Result<V, Error>,
+) -> Result<V, Error> {
+    if let Some((_, known)) = made.borrow().iter().find(|(known, _)| *known == of) {
+        return Ok(known.clone());
+    }
+    let value = make()?;
+    made.borrow_mut().push((of, value.clone()));
+    Ok(value)
 }
 
 /// A file under the one name that the system knows it by, whichever way it was named.

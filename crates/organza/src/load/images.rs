@@ -1,6 +1,7 @@
 //! The images of a scene, from their files: its environment, what lights shine through, and the heights of bumps.
 
 use super::files::FileData;
+use super::input::refuse;
 use super::loading::Loading;
 use crate::scene::SceneLight;
 use crate::{Error, work};
@@ -79,8 +80,4 @@ impl Loading<'_> {
         Exceeded::check(what, needed, self.options.max_memory, "bytes", hint).map_err(Error::Limit)?;
         Ok(image)
     }
-}
-
-fn refuse(path: &Path, error: &splat_core::Error, hint: &str) -> Error {
-    Error::input(crate::printable(path), error.to_string(), hint)
 }

@@ -1,7 +1,7 @@
 //! What an object is made from: files read, formulas parsed, with the parameters of the conversion.
 
 use super::context::Context;
-use super::files::{FileData, Fitted};
+use super::files::{FileData, Fitted, once};
 use crate::Error;
 use crate::scene::{
     CombinedSource, DensitySource, LevelSetSource, MatterSource, SceneObject, SliceSource, Source, SurfaceSampler,
@@ -9,9 +9,9 @@ use crate::scene::{
 };
 use crate::statistics::ObjectData;
 use convert::{
-    Clip, ClippedField, CloudShape, Density, DensityParams, GridField, HomogeneousMedium, Interpolation, MatterParams,
-    MediumBody, MeshParams, MpuParams, RawPoints, Section, SharedField, ShownPoints, Solid, SplatParams, SurfelParams,
-    VolumeParams,
+    Clip, ClippedField, CloudShape, Density, DensityParams, GridField, HomogeneousMedium, Inside, Interpolation,
+    MatterParams, MediumBody, MeshParams, MpuParams, RawPoints, Section, SharedField, ShownPoints, Solid, SplatParams,
+    SurfelParams, VolumeParams,
 };
 use pbsr::{BoundedExtinction, Matter};
 use splat_core::{DAabb, Grid, Mesh, TransferFunction};
@@ -28,8 +28,8 @@ pub(super) enum Input<'a> {
     Points(&'a Path, Arc<RawPoints>, SurfelParams),
     Matter(&'a Path, Arc<RawPoints>, MatterParams),
     Volume(Arc<Grid>, &'a TransferFunction, VolumeParams),
-    /// The zero set of a field in a box; of a trilinear one that nothing clips with its volume and level.
-    Surface(SharedField, DAabb, MeshParams, Option<(Arc<Grid>, f32)>),
+    /// The zero set of a field in a box; of a trilinear one that nothing clips with its volume.
+    Surface(SharedField, DAabb, MeshParams, Trilinear),
     Density(SharedField, DAabb, DensityParams),
     Procedural(CloudShape, f64, VolumeParams),
     Medium(HomogeneousMedium, SplatParams, &'a [Clip]),
@@ -134,7 +134,20 @@ pub(super) fn input<'a>(object: &'a SceneObject, context: &Context<'_>) -> Resul
             }
             Input::Mesh(crate::printable(path).to_string(), mesh, MeshParams { splat, density, opacity })
         }
-        Source::Points(path) | Source::Matter(MatterSource { path, .. }) => raw_points(path, object, splat, context)?,
+        Source::Points(path) | Source::Matter(MatterSource { path, .. }) => match context.read(path)? {
+            FileData::Points(points) => raw_points(path, points, object, splat, context)?,
+            _ => {
+                return Err(Error::wrong_kind(
+                    path,
+                    "points without faces",
+                    "use `mesh = ` or `volume = ` for this file",
+                ));
+            }
+        },
+        Source::Extract(source) => {
+            let points = source.points.clone().unwrap_or_default();
+            raw_points("what a light sees".as_ref(), points, object, splat, context)?
+        }
         Source::Volume(VolumeSource { path, frame, transfer }) => {
             let grid = read_grid(path, *frame, context)?;
             let at = |spacing: f64| convert::resampled(&grid, spacing / splat.transform.scale, &splat).map(Arc::new);
@@ -181,8 +194,8 @@ fn slice<'a>(
     Ok(Input::Mesh(name, mesh, MeshParams { splat, density, opacity }))
 }
 
-/// The lattice and the level that a surface comes of, where that is all.
-type Trilinear = Option<(Arc<Grid>, f32)>;
+/// The lattice, the level and the inside that a surface comes of, where that is all.
+type Trilinear = Option<(Arc<Grid>, f32, Inside)>;
 
 /// What a field and where it is known make; its step is the distance of its splats where the object states none.
 fn solid(source: &Source, object: &SceneObject, context: &Context<'_>) -> Result<(Solid, Trilinear), Error> {
@@ -193,9 +206,9 @@ fn solid(source: &Source, object: &SceneObject, context: &Context<'_>) -> Result
             let grid = read_grid(&source.path, source.frame, context)?;
             let step = grid.shortest_step();
             let is_trilinear = source.interpolation == Interpolation::Trilinear;
-            let trilinear = is_trilinear.then(|| (grid.clone(), source.level as f32));
+            let trilinear = is_trilinear.then(|| (grid.clone(), source.level as f32, source.inside));
             let field = GridField::new(grid, source.interpolation, source.level, source.inside)
-                .map_err(|e| refuse_data(&source.path, &e))?;
+                .map_err(|e| refuse(&source.path, &e, ""))?;
             let (walls, bounds) = (field.walls(), field.bounds());
             (Solid { field: Arc::new(field), walls, bounds, step }, trilinear)
         }
@@ -233,20 +246,21 @@ fn surface<'a>(
     Ok(Input::Surface(field, bounds, MeshParams { splat, density, opacity }, trilinear))
 }
 
-fn refuse_data(path: &Path, error: &splat_core::Error) -> Error {
-    Error::input(crate::printable(path), error.to_string(), "")
+pub(super) fn refuse(path: &Path, error: &splat_core::Error, hint: &str) -> Error {
+    Error::input(crate::printable(path), error.to_string(), hint)
 }
 
 /// The field that scattered points lie on, and its bounds.
 fn level_set(source: &LevelSetSource, object: &SceneObject, context: &Context<'_>) -> Result<Fitted, Error> {
-    context.files.fitted(&source.path, source.tolerance, || {
+    let fit = || {
         let params =
             MpuParams { object_name: object.name.clone(), tolerance: source.tolerance, ..MpuParams::default() };
         let points = read_scattered(&source.path, context)?;
         let (field, _) = convert::points_to_field(&points, &params, Some(context.progress))?;
         let (bounds, bytes) = (field.bounds(), field.bytes());
         Ok(((Arc::new(field) as SharedField, bounds), bytes))
-    })
+    };
+    once(&context.files.fitted, (source.path.clone(), source.tolerance), fit).map(|fitted| fitted.0)
 }
 
 /// Scattered points with normals where the file has some; of a mesh its vertices.
@@ -257,7 +271,7 @@ fn read_scattered(path: &Path, context: &Context<'_>) -> Result<Arc<RawPoints>, 
             Ok(points)
         }
         FileData::Mesh(mesh) => {
-            mesh.validate().map_err(|e| refuse_data(path, &e))?;
+            mesh.validate().map_err(|e| refuse(path, &e, ""))?;
             Ok(RawPoints::of_vertices(&mesh).into())
         }
         _ => Err(Error::wrong_kind(path, "points", "use `volume = ` or `isosurface = ` for this file")),
@@ -274,13 +288,11 @@ fn read_mesh(path: &Path, context: &Context<'_>) -> Result<Arc<Mesh>, Error> {
 /// Points as samples of a surface, or as matter.
 fn raw_points<'a>(
     path: &'a Path,
+    points: Arc<RawPoints>,
     object: &SceneObject,
     splat: SplatParams,
     context: &Context<'_>,
 ) -> Result<Input<'a>, Error> {
-    let FileData::Points(points) = context.read(path)? else {
-        return Err(Error::wrong_kind(path, "points without faces", "use `mesh = ` or `volume = ` for this file"));
-    };
     let ShownPoints { points, said, scale } = convert::shown_points(points, &object.points_shown(), &splat)?;
     context.files.note(path, said);
     context.files.scales.borrow_mut().extend(scale);

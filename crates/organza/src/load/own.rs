@@ -219,13 +219,19 @@ fn data(
         Input::Rectangle(r, ..) => meshed(Mesh::rectangle(r.center, r.u, r.v)),
         Input::Surface(field, bounds, params, lattice) => {
             let spacing = world_spacing(&params.density) / params.splat.transform.scale;
+            let stated = context.scene.objects[context.id].spacing;
+            if let (Form::Triangles, Some((grid, level, inside)), None) = (source, lattice, stated) {
+                // Marching cubes on the volume's own steps, as the paper has it (section 5).
+                let mesh = convert::isosurface_to_mesh(grid, f64::from(*level), *inside);
+                return Ok(meshed(mesh.map_err(|e| Error::from_core("an isosurface", e))?));
+            }
             if source == Form::Triangles {
                 let mesh =
                     convert::surface_to_mesh(field.as_ref(), *bounds, spacing, &params.splat, Some(context.progress));
                 return Ok(meshed(mesh?));
             }
             let bounds = prepared.search.as_ref().map_or(*bounds, |s| s.bounds);
-            if let (Form::Lattice, Some((grid, level))) = (source, lattice) {
+            if let (Form::Lattice, Some((grid, level, _))) = (source, lattice) {
                 return Ok(Some((Body::Lattice { grid: grid.clone(), level: *level }, bounds, spacing)));
             }
             let domain = field.clone();

@@ -9,11 +9,10 @@ mod half;
 
 use crate::form::Form;
 use crate::frame::{Frame, Shaded};
-use crate::lights::LightPoint;
 use crate::load::own::Body;
 use crate::matter::Matter;
 use crate::pass;
-use crate::scene::{self, Scene, Technique};
+use crate::scene::{self, LightPoint, Scene, Technique};
 use crate::statistics::{ObjectData, ObjectStatistics};
 use crate::technique::{Fold, Session};
 use crate::work::{self, Translucent, cost};

@@ -6,10 +6,9 @@ mod plans;
 
 use crate::frame::discs::{disc_input, params, refuse, with_shown};
 use crate::frame::{Frame, grouped};
-use crate::lights::LightPoint;
 use crate::matter::Matter;
 use crate::pass;
-use crate::scene::{Scene, SurfelGroups, SurfelLayers, Technique};
+use crate::scene::{LightPoint, Scene, SurfelGroups, SurfelLayers, Technique};
 use crate::technique::{Fold, Session, points};
 use crate::{CostRecord, Error, RenderOptions, stage};
 use deferred_blend::grouping::Membership;

@@ -15,6 +15,9 @@ pub(crate) struct List<'a, const C: usize> {
 }
 
 impl<const C: usize> List<'_, C> {
+    /// Of a cell that is covered by nothing.
+    pub(crate) const NONE: Self = List { distance: &[], total: &[], start: 0, moment: &[] };
+
     /// Where the next block of entries begins, at or behind entry `n`; past the list where none does.
     #[inline(always)]
     pub(crate) fn next_block(&self, n: usize) -> usize {

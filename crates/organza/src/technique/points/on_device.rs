@@ -106,7 +106,7 @@ impl Points<'_> {
                     helper.leave(why);
                     return Ok(None);
                 }
-                Err(e) => return Err(shadow_error(point, &e)),
+                Err(e) => return Err(shadow_error(&point.name(), &e)),
             }
         }
         Ok(Some(castings))

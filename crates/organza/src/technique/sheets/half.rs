@@ -8,10 +8,9 @@ mod splats;
 use super::{params, refuse, volumes};
 use crate::form::{Form, PlannedObject};
 use crate::frame::Frame;
-use crate::lights::LightPoint;
 use crate::matter::{Carries, CarriesLight, Matter};
 use crate::pass;
-use crate::scene::{self, Scene, Slicing, SoftShadows, Technique};
+use crate::scene::{self, LightPoint, Scene, Slicing, SoftShadows, Technique};
 use crate::technique::Session;
 use crate::{CostRecord, Error, RenderOptions, stage};
 use sheet_light::half::{

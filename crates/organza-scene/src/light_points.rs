@@ -1,31 +1,31 @@
 //! Points of the lights of a scene, for who lights by points.
 
-use crate::scene::SceneLight;
+use crate::SceneLight;
 use splat_core::Light;
 
 /// A light without extent, or one of the points of a light with one.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct LightPoint {
+pub struct LightPoint {
     /// What it gives.
-    pub(crate) light: Light,
+    pub light: Light,
     /// The light that it is of.
-    pub(crate) whole: Light,
-    /// The place of its whole light in [`Loaded::lights`](crate::Loaded::lights).
-    pub(crate) of: usize,
+    pub whole: Light,
+    /// The place of its whole light in the list that it is from.
+    pub of: usize,
     /// Which of its points it is, and how many there are.
-    pub(crate) rank: [usize; 2],
+    pub rank: [usize; 2],
 }
 
 impl LightPoint {
     /// How it is called.
-    pub(crate) fn name(&self) -> String {
+    pub fn name(&self) -> String {
         let Self { of, rank: [k, all], .. } = self;
         if *all > 1 { format!("point {k} of light {of}") } else { format!("light {of}") }
     }
 }
 
 /// The points of all lights, sorted by their bits so that the order of the file does not matter.
-pub(crate) fn points(lights: &[SceneLight]) -> Vec<LightPoint> {
+pub fn light_points(lights: &[SceneLight]) -> Vec<LightPoint> {
     let of_light = |(of, light): (usize, &SceneLight)| {
         let points = light.light.points(light.samples);
         let (all, whole) = (points.len(), light.light);
@@ -36,9 +36,11 @@ pub(crate) fn points(lights: &[SceneLight]) -> Vec<LightPoint> {
     all
 }
 
-/// How many points that are.
-pub(crate) fn count(light: &SceneLight) -> usize {
-    if light.light.shape.is_extended() { light.samples as usize } else { 1 }
+impl SceneLight {
+    /// How many points it is taken for.
+    pub fn count(&self) -> usize {
+        if self.light.shape.is_extended() { self.samples as usize } else { 1 }
+    }
 }
 
 #[cfg(test)]
@@ -58,12 +60,12 @@ mod tests {
         let disk = LightShape::Disk { center: DVec3::Y, normal: DVec3::NEG_Y, radius: 0.5 };
         let lamp = LightShape::Point { position: DVec3::Y };
         let lights = [light(disk, 3, true), light(lamp, 1, true), light(lamp, 1, false)];
-        let found = points(&lights);
-        assert_eq!(found.len(), lights.iter().map(count).sum::<usize>());
+        let found = light_points(&lights);
+        assert_eq!(found.len(), lights.iter().map(SceneLight::count).sum::<usize>());
         let names: Vec<String> = found.iter().map(LightPoint::name).collect();
         assert_eq!(names[..2], ["light 2", "light 1"]);
         assert!(names[2..].iter().all(|name| name.ends_with(" of light 0")), "{names:?}");
-        let others = points(&[2, 0, 1].map(|k: usize| lights[k].clone()));
+        let others = light_points(&[2, 0, 1].map(|k: usize| lights[k].clone()));
         let same = |a: &LightPoint, b: &LightPoint| a.light == b.light;
         assert!(found.iter().zip(&others).all(|(a, b)| same(a, b)));
     }

@@ -1,0 +1,95 @@
+//! What a scene leaves to what lights see of its parts, where things stop and what is extracted, and the camera that then sees all.
+
+use super::load;
+use crate::load::files::{Files, once};
+use crate::load::placed;
+use crate::memory::loading_bytes;
+use crate::scene::{ExtractSource, FoundCamera, Scene, SceneObject, Source, Stop};
+use crate::shadows::{shadow_error, shadow_params};
+use crate::{Error, Progress, RenderOptions};
+use convert::RawPoints;
+use glam::DVec3;
+use std::borrow::Cow;
+use tsm::{Params, ShadowMap};
+
+/// The scene with what it leaves to its data: objects that stop stand where they do, what is extracted is found, the camera sees all; and that camera.
+///
+/// # Errors
+/// As [`crate::render`] for data that cannot be read, and as [`seen`].
+pub fn fitted<'s>(
+    scene: &'s Scene,
+    options: &RenderOptions,
+    progress: &Progress,
+    files: &Files,
+) -> Result<(Cow<'s, Scene>, Option<FoundCamera>), Error> {
+    let mut settled = Cow::Borrowed(scene);
+    for (stop, start) in scene.stops.iter().zip(scene.start.iter().cycle()) {
+        let find = || stop_time(stop, &Eye { scene: start, options, progress, files });
+        let time = once(&files.stopped, (Stop { frame: 0, ..stop.clone() }, start.clone()), find)?;
+        settled.to_mut().objects[stop.object].transform.translation = stop.path.at(time.min(stop.frame.into()));
+    }
+    for (i, object) in scene.objects.iter().enumerate().filter(|(_, object)| object.visible) {
+        let Source::Extract(source @ ExtractSource { points: None, .. }) = &object.source else { continue };
+        let points = Some(seen(&settled, source, options, progress, files)?.into());
+        settled.to_mut().objects[i].source = Source::Extract(ExtractSource { points, ..source.clone() });
+    }
+    placed(settled, options, progress, files)
+}
+
+/// The surface that a light, or its middle, sees first of some objects, by its shadow map of them alone (Gunjee 2007, Figure 15 a), in the world.
+///
+/// # Errors
+/// As [`crate::render`]; [`Error::Input`] where no ray meets the absorbance.
+pub fn seen(
+    scene: &Scene,
+    source: &ExtractSource,
+    options: &RenderOptions,
+    progress: &Progress,
+    files: &Files,
+) -> Result<RawPoints, Error> {
+    let (map, origin) = Eye { scene, options, progress, files }.map(source.light, &|o| source.sees(o))?;
+    let points = map.first_surface(source.absorbance);
+    if points.is_empty() {
+        let message = format!("none of its rays meets an absorbance of {}", source.absorbance);
+        let hint = "ask for less, or look whether objects cast shadows";
+        return Err(Error::input(format!("light {}", source.light), message, hint));
+    }
+    let (position, normal) = points.iter().map(|p| (p.position, p.normal)).unzip();
+    Ok(RawPoints { origin, position, normal, ..RawPoints::default() })
+}
+
+/// The last time on an object's way at which its ball is free of what it stops at, in frames.
+fn stop_time(stop: &Stop, eye: &Eye<'_>) -> Result<f64, Error> {
+    let (map, origin) = eye.map(stop.light, &|o| stop.objects.contains(&o.name))?;
+    let center = |time| (stop.path.at(time) + stop.offset - origin).as_vec3();
+    let time = map.free_until(&center, stop.radius as f32, stop.last);
+    eye.files.note(&eye.scene.file, stop.said(eye.scene, time));
+    Ok(time)
+}
+
+/// Who looks at a scene from its lights.
+struct Eye<'a> {
+    scene: &'a Scene,
+    options: &'a RenderOptions,
+    progress: &'a Progress,
+    files: &'a Files,
+}
+
+impl Eye<'_> {
+    /// The shadow map of a light of some objects alone, and the world position that its places are relative to.
+    fn map(&self, light: usize, sees: &dyn Fn(&SceneObject) -> bool) -> Result<(ShadowMap, DVec3), Error> {
+        let Self { options, progress, files, .. } = *self;
+        let scene = self.scene.part(sees);
+        let mut loaded = load(&scene, options, progress, files)?;
+        let loading = loading_bytes(&loaded, files.bytes());
+        // From the scale of the cloud to that of the scene: a power of two.
+        loaded.cloud.scale_world(libm::exp2(loaded.exponent.into()));
+        let casters = tsm::Scene { cloud: &loaded.cloud, materials: &loaded.materials, objects: &loaded.objects };
+        let left = options.max_memory.saturating_sub(loaded.cloud.bytes());
+        let params = shadow_params(&scene.render, &loaded, Params::default().tolerance, left);
+        let map = ShadowMap::build(&casters, &scene.lights[light].light.middle(), &params, Some(progress));
+        let map = map.map_err(|e| shadow_error(&format!("light {light}"), &e))?;
+        files.most.set(files.most.get().max(loading).max(loaded.cloud.bytes() + map.peak_bytes()));
+        Ok((map, loaded.cloud.origin))
+    }
+}
