@@ -4,7 +4,7 @@
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use rdst::RadixSort;
 use splat_core::glam::{DVec3, Vec3};
-use splat_core::{Cloud, Light, LightShape, Limits, Receiver, Transmittance, rng};
+use splat_core::{Cloud, Light, LightShape, Limits, Receiver, SplatKind, Transmittance, rng};
 use std::hint::black_box;
 use tsm::{Params, Scene, ShadowMap};
 
@@ -59,8 +59,9 @@ fn benches(c: &mut Criterion) {
     for points in SIZES {
         let (cloud, _) = organza_benches::outdoor_cloud(points);
         let mut group = c.benchmark_group(format!("tsm/{points}"));
-        group.sample_size(10).throughput(Throughput::Elements(cloud.len() as u64));
+        group.sample_size(10);
         for (name, light) in lights(&cloud) {
+            group.throughput(Throughput::Elements(cloud.len() as u64));
             let map = build(&cloud, &light);
             let counts = map.counts();
             let per_splat = counts.entries as f64 / counts.translucent.max(1) as f64;
@@ -75,8 +76,19 @@ fn benches(c: &mut Criterion) {
             group.bench_function(BenchmarkId::new("rdst", name), |b| {
                 b.iter_batched_ref(|| unsorted.clone(), |k| k.radix_sort_unstable(), criterion::BatchSize::LargeInput);
             });
-            group.bench_function(BenchmarkId::new("look up", name), |b| b.iter(|| black_box(look_up(&map, &cloud))));
+            for (of, kinds) in [
+                ("all", &[SplatKind::Medium, SplatKind::Surface, SplatKind::Opaque][..]),
+                ("media", &[SplatKind::Medium]),
+                ("translucent surfaces", &[SplatKind::Surface]),
+                ("opaque surfaces", &[SplatKind::Opaque]),
+            ] {
+                let ids: Vec<usize> = (0..cloud.len()).filter(|i| kinds.contains(&cloud.kind[*i])).collect();
+                group.throughput(Throughput::Elements(ids.len() as u64));
+                let id = BenchmarkId::new(format!("look up {of}"), name);
+                group.bench_function(id, |b| b.iter(|| black_box(look_up(&map, &cloud, &ids))));
+            }
         }
+        group.throughput(Throughput::Elements(cloud.len() as u64));
         let ray = on_one_ray(&cloud);
         let light = lights(&cloud)[2].1;
         group.bench_function("build/one ray", |b| b.iter(|| build(&ray, &light)));
@@ -84,8 +96,8 @@ fn benches(c: &mut Criterion) {
     }
 }
 
-fn look_up(map: &ShadowMap, cloud: &Cloud) -> f32 {
-    let at = |i: usize| {
+fn look_up(map: &ShadowMap, cloud: &Cloud, ids: &[usize]) -> f32 {
+    let at = |&i: &usize| {
         map.transmittance(&Receiver {
             position: cloud.position[i],
             normal: cloud.normal_of(i),
@@ -93,7 +105,7 @@ fn look_up(map: &ShadowMap, cloud: &Cloud) -> f32 {
             kind: cloud.kind[i],
         })[0]
     };
-    (0..cloud.len()).map(at).sum()
+    ids.iter().map(at).sum()
 }
 
 /// Growth: light from inside and the sun, 1 to 16 million splats.

@@ -222,6 +222,47 @@ fn what_points_are_judged_by_is_known_of_scenes_that_make_no_splats_for_sheets()
     assert_eq!(sheets.cells, None);
 }
 
+/// Six panes about a medium, which tint it and the floor, and each other.
+#[test]
+fn a_cube_of_translucent_triangles_agrees_with_points_and_stays_discs_for_a_footprint() {
+    let corners = (0..8).map(|c| [0, 1, 2].map(|a| if c >> a & 1 == 0 { -0.6 } else { 0.6 }));
+    let corners: String = corners.map(|[x, y, z]| format!("{x} {y} {z}\n")).collect();
+    let faces = "4 0 2 3 1\n4 4 5 7 6\n4 0 1 5 4\n4 2 6 7 3\n4 1 3 7 5\n4 0 4 6 2\n";
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("cube.off"), format!("OFF\n8 6 0\n{corners}{faces}")).unwrap();
+    let objects = "footprints = [3, 2]\n\
+         [material.glass]\ncolor = [0.4, 0.7, 0.6]\nopacity = 0.4\ntransmission = 0.3\nextinction_rgb = [1, 0.4, 0.7]\n\
+         [[object]]\nname = 'cube'\nmaterial = 'glass'\nmesh = 'cube.off'\nspacing = 0.012\n\
+         transform = { rotate = [25, 35, 0] }\n\
+         [[object]]\nname = 'fog'\nmedium_box = { min = [-0.4, -0.4, -0.4], max = [0.4, 0.4, 0.4], extinction = 1, spacing = 0.04 }\n\
+         [[object]]\nname = 'floor'\n\
+         rectangle = { center = [0, -1.1, 0], u = [1.2, 0, 0], v = [0, 0.4, -1.2], spacing = 0.012 }\n";
+    let scene = objects.split_at("footprints = [3, 2]\n".len());
+    let scene = scene.0.to_owned()
+        + &parallel_view(2.6, 64)
+        + &sun("[-0.4, -1, -0.6]").replace("[1, 1, 1]", "[3, 3, 3]")
+        + scene.1;
+    // Triangles have sharp edges, and splats have none.
+    let smooth = ["--set", "render.antialias=4"];
+    let fine = "[render]\nshadow = { cells = 256 }\n";
+    let points = organza_tests::draw_in(folder.path(), &(scene.clone() + fine), &smooth);
+    let half = organza_tests::draw_in(folder.path(), &scene, &[&HALF[..], &smooth].concat());
+    for channel in ["R", "G", "B", "A"] {
+        let (a, b) = (points.channel(channel), half.channel(channel));
+        let mean = a.iter().sum::<f64>() / a.len() as f64;
+        println!("{channel}: RMSE {:.5} of {mean:.4}", rmse(&a, &b));
+        assert!(rmse(&a, &b) < 0.01 && mean > 0.1, "{channel}: RMSE {} of {mean}", rmse(&a, &b));
+    }
+    let said = |more: &[&str]| {
+        std::fs::write(folder.path().join("scene.toml"), &scene).unwrap();
+        let out = organza().args(["explain", "scene.toml"]).args(HALF).args(more).current_dir(&folder).output();
+        String::from_utf8(out.unwrap().stdout).unwrap()
+    };
+    assert!(said(&[]).contains("translucent triangles are seen, and tint light, where they are"), "{}", said(&[]));
+    let discs = said(&["--set", "object.cube.footprint=1"]);
+    assert!(discs.contains("footprints are seen on discs alone"), "{discs}");
+}
+
 /// What takes long and rarely fails where the others hold.
 #[cfg(feature = "deep")]
 mod deep {
@@ -279,8 +320,8 @@ mod deep {
         std::fs::write(folder.path().join("dust.xyz"), dust.collect::<String>()).unwrap();
         let more = "[material.tinted]\ncolor = [0.9, 0.5, 0.4]\nextinction_rgb = [0.4, 0.8, 1]\n\
              [[object]]\nname = 'dust'\npoints = 'dust.xyz'\nopacity = 0.5\n\
-             [[object]]\nname = 'veil'\nmaterial = 'tinted'\nopacity = 0.6\n\
-             rectangle = { center = [0.5, 0.95, 0.1], u = [0.5, 0, 0], v = [0, 0.1, -0.5], spacing = 0.03 }\n\
+             [[object]]\nname = 'veil'\nmaterial = 'tinted'\nopacity = 0.6\ncolor = [0.5, 0.3, 0.2]\n\
+             rectangle = { center = [0.5078125, 0.9546875, 0.1], u = [0.5078125, 0, 0], v = [0, 0.1015625, -0.5], spacing = 0.03 }\n\
              [[object]]\nname = 'ball'\nmaterial = 'tinted'\nopacity = 0.4\n\
              implicit = { expression = '(x - 0.7)^2 + (y + 0.3)^2 + (z - 0.9)^2 - 0.16', box = [[0.2, -0.8, 0.4], [1.2, 0.2, 1.4]], spacing = 0.03 }\n[render]\n";
         let scene = |light: &str| parallel_view(2.6, 64) + light + &MIXED.replace("[render]\n", more);
@@ -289,7 +330,9 @@ mod deep {
             // The blind's shadow has edges that are finer than a map's cells; it is looked at above.
             let blind = ["--set", "object.blind.casts_shadow=false"];
             let drawn = |scene: &str, by: &[&str]| draw_in(folder.path(), scene, &[by, &blind, &SMOOTH].concat());
-            let [points, half] = [drawn(&finer(&scene), &["--technique", "points"]), drawn(&scene, &HALF)];
+            // Points have edges as wide as their spacing and a sample; those of the veil lie between pixels.
+            let finer = finer(&scene).replace("-0.5], spacing = 0.03", "-0.5], spacing = 0.004");
+            let [points, half] = [drawn(&finer, &["--technique", "points"]), drawn(&scene, &HALF)];
             for channel in ["R", "G", "B", "A", "scatter1.R", "direct.G"] {
                 let (a, b) = (points.channel(channel), half.channel(channel));
                 let mean = a.iter().sum::<f64>() / a.len() as f64;

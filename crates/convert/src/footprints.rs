@@ -40,6 +40,11 @@ impl FootprintChoice {
         self.of.len() == 1 && !self.has_images(false)
     }
 
+    /// Whether all discs have the usual footprint, the first, and that is no image.
+    pub fn is_usual(&self) -> bool {
+        self.of == [0] && self.is_one_formula()
+    }
+
     /// Whether some of those that are chosen from are images.
     pub(crate) fn has_images(&self, by_column: bool) -> bool {
         if by_column {

@@ -62,8 +62,8 @@ pub(crate) fn same_forms(a: Technique, b: Technique) -> bool {
 }
 
 /// The form in which its technique takes each of these visible objects, and whether it becomes splats: only where splats are
-/// drawn, or are what there is, or where a shadow map may need them. `keeps_polygons` says whether opaque
-/// triangles stay triangles.
+/// drawn, or are what there is, or where a shadow map may need them. `keeps_polygons` says whether triangles
+/// stay triangles.
 pub(crate) fn choose<'a>(
     objects: impl Iterator<Item = (&'a ObjectStatistics, Technique)> + Clone,
     lights: &[LightStatistics],
@@ -73,10 +73,11 @@ pub(crate) fn choose<'a>(
     let shadows = shining && objects.clone().any(|(o, _)| o.receives);
     let one = |(object, technique): (&ObjectStatistics, Technique)| {
         let row = row(technique);
-        let is_mesh = object.data == ObjectData::Triangles;
+        let stays = object.data == ObjectData::Triangles && keeps_polygons(row);
         let (form, reason) = match row.form {
-            _ if object.opaque && is_mesh && keeps_polygons(row) => {
-                (Form::Polygons, "opaque triangles end light and view rays where they are")
+            _ if object.opaque && stays => (Form::Polygons, "opaque triangles end light and view rays where they are"),
+            _ if stays && object.is_plain => {
+                (Form::Panes, "translucent triangles are seen, and tint light, where they are")
             }
             _ if object.opaque => (Form::Opaque, "an opaque surface is drawn exactly"),
             Some(form) => form(object),
@@ -104,7 +105,8 @@ mod tests {
 
     fn object(data: ObjectData) -> ObjectStatistics {
         let (name, volumes_by) = ("a".into(), VolumeSampler::Auto);
-        ObjectStatistics { name, data, opaque: false, by_gradient: false, volumes_by, casts: true, receives: true }
+        let [opaque, by_gradient, is_plain, casts, receives] = [false, false, true, true, true];
+        ObjectStatistics { name, data, opaque, by_gradient, is_plain, volumes_by, casts, receives }
     }
 
     const SUN: LightStatistics = LightStatistics { wants_shadow: true, is_dark: false, points: 1 };

@@ -23,6 +23,8 @@ pub enum Form {
     Field,
     /// Opaque triangles, which their technique lights itself.
     Polygons,
+    /// Translucent triangles, which part the slabs that they lie in.
+    Panes,
     /// Splats.
     Splats,
 }
@@ -39,7 +41,7 @@ impl Form {
             Self::Cells => "cells",
             Self::Chains => "metropolis",
             Self::Field => "field",
-            Self::Polygons => "polygons",
+            Self::Polygons | Self::Panes => "polygons",
             Self::Splats => "splats",
         }
     }

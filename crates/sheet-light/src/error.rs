@@ -51,9 +51,13 @@ impl Error {
         Self::Parameter { name, found: format!("{found:?}"), expected }
     }
 
-    /// What is wrong with polygons, or that nobody waits for them.
+    /// What is wrong with polygons, or that they take too much, or that nobody waits for them.
     pub(crate) fn of_polygons(error: splat_core::Error) -> Self {
-        if error == splat_core::Error::Cancelled { Self::Cancelled } else { Self::Polygons(error) }
+        match error {
+            splat_core::Error::Cancelled => Self::Cancelled,
+            splat_core::Error::Limit(exceeded) => Self::Limit(exceeded),
+            other => Self::Polygons(other),
+        }
     }
 
     pub(crate) fn limit(what: &'static str, needed: u64, limit: u64, unit: &'static str, hint: String) -> Self {

@@ -18,8 +18,9 @@
 //! | 18: map each pixel to the shadow buffer | `illuminate.rs`, `light_path.rs` |
 //! | 21: classify and composite into the shadow buffer | `light_buffer.rs` |
 //! | 1, 2: polygons with respect to the eye and to the light | `polygons.rs`, `light_depth.rs`, `light_views.rs` |
-//! | 7, 22, 25: light on polygons of the three regions | `polygon_light.rs` |
-//! | 22, 23: translucent polygons, as discs, for eye and light | `splats.rs`, `splat_light.rs` |
+//! | 7, 22, 25: light on polygons of the three regions | `polygon_light.rs`, `lit_part.rs` |
+//! | 22, 23: translucent polygons for eye and light | `pane_sheets.rs`, `parted.rs`, `light_layers.rs`, `lit_way.rs` |
+//! | 22, 23: what enters as discs | `splats.rs`, `splat_light.rs` |
 //! | the loop over slabs | `sweep.rs` |
 //! | section 5: soft shadows | `penumbra.rs`, `moved.rs`, `soft_buffer.rs` |
 //! | section 3: light that is scattered more than once | `scatter.rs` |
@@ -69,11 +70,15 @@ mod illuminate;
 mod lamp;
 mod light_buffer;
 mod light_depth;
+mod light_layers;
 mod light_path;
 mod light_views;
 mod lit_part;
+mod lit_way;
 mod moved;
+mod pane_sheets;
 mod params;
+mod parted;
 mod penumbra;
 mod placed;
 mod polygon_light;

@@ -26,6 +26,10 @@ pub(crate) struct Lines {
     has_depths: bool,
 }
 
+/// Optical depths and values that splats are added to, and the share of them that is.
+pub(crate) type Blended<'a> =
+    (&'a mut [[f32; MAX_LANES]; 3], &'a mut [[f32; MAX_LANES]; MAX_CHANNELS], &'a [f32; MAX_LANES]);
+
 /// One splat, and what it shows.
 pub(crate) struct Shown<'a> {
     pub(crate) source: Source<'a>,
@@ -139,18 +143,17 @@ impl Lines {
         Lanes::load(simd, &row)
     }
 
-    /// Adds the pixels from (x, y) on to the optical depths and values of what is there already, where anything is. The share that splats
-    /// then have of green.
+    /// Adds a share of the pixels from (x, y) on to the optical depths and values of what is there already, where anything is. The share that
+    /// splats then have of green.
     #[inline(always)]
     pub(crate) fn blend<S: Simd>(
         &self,
         simd: S,
         at: [usize; 2],
         is_any: bool,
-        optical_depth: &mut [[f32; MAX_LANES]; 3],
-        values: &mut [[f32; MAX_LANES]; MAX_CHANNELS],
+        (optical_depth, values, part): Blended<'_>,
     ) -> [f32; MAX_LANES] {
-        let zero = Lanes::splat(simd, 0.0);
+        let (zero, part) = (Lanes::splat(simd, 0.0), Lanes::load(simd, part));
         let mut before = [zero; 3];
         if is_any {
             (0..self.planes).for_each(|p| before[p] = Lanes::load(simd, &optical_depth[p]));
@@ -158,18 +161,18 @@ impl Lines {
         let least = Lanes::splat(simd, f32::MIN_POSITIVE);
         let mut inverse = [zero; 3];
         for p in 0..self.planes {
-            let all = before[p] + self.row(simd, p, at);
+            let all = before[p] + self.row(simd, p, at) * part;
             all.store(&mut optical_depth[p]);
             inverse[p] = Lanes::splat(simd, 1.0) / all.max(least);
         }
         for c in 0..self.channels {
             let p = ChannelLayout::plane_of(c, self.channels, self.planes);
-            let own = self.row(simd, self.planes + c, at);
+            let own = self.row(simd, self.planes + c, at) * part;
             let others = if is_any { before[p] * Lanes::load(simd, &values[c]) } else { zero };
             ((own + others) * inverse[p]).store(&mut values[c]);
         }
         let (green, mut share) = (self.planes / 2, [0.0; MAX_LANES]);
-        (self.row(simd, green, at) * inverse[green]).store(&mut share);
+        (self.row(simd, green, at) * part * inverse[green]).store(&mut share);
         share
     }
 

@@ -199,7 +199,7 @@ impl Sums {
             return;
         }
         let Fragments { any, optical_depth, values, .. } = fragments;
-        let share = self.lines.blend(simd, at, *any, optical_depth, values);
+        let share = self.lines.blend(simd, at, *any, (optical_depth, values, &[1.0; MAX_LANES]));
         if self.lines.has_extras() {
             self.extras::<S>(simd, at, (&share, origin), fragments);
         }

@@ -5,6 +5,7 @@ pub(crate) mod common;
 mod cut;
 mod hard_cases;
 mod invariances;
+mod panes;
 mod paths;
 mod polygons;
 mod polygons_scattered;

@@ -1,7 +1,9 @@
 //! Triangles of meshes: coverage without gaps, depth and attributes by the rays themselves.
 
 use splat_core::glam::{DQuat, DVec3, Vec3};
-use splat_core::raster::triangles::{PlacedMesh, TriangleHit, TriangleImage, resolve, resolve_depth};
+use splat_core::raster::triangles::{
+    PlacedMesh, TriangleHit, TriangleImage, TriangleLayer, resolve, resolve_depth, resolve_layers,
+};
 use splat_core::{Camera, Error, Mesh, Progress, Projection, Similarity, rng};
 
 fn camera(from: DVec3, at: DVec3, projection: Projection, size: [u32; 2]) -> Camera {
@@ -267,4 +269,42 @@ fn what_is_no_mesh_is_refused_and_what_has_no_area_is_not_seen() {
     let stopped = Progress::new();
     stopped.cancel();
     assert_eq!(resolve(&placed(&room()), &camera, Some(&stopped)).unwrap_err(), Error::Cancelled);
+}
+
+#[test]
+fn hv11_layers_are_what_each_triangle_shows_by_itself_nearest_first() {
+    // A heap, some of it twice: equally near ones keep the order of the mesh.
+    let corner = |k: u32| {
+        let unit = |axis: u64| 5.0 * (rng::unit_f32(9, 1, u64::from(k), axis) - 0.5);
+        Vec3::new(unit(0), unit(1), unit(2))
+    };
+    let mut triangles: Vec<[u32; 3]> = (0..40).map(|n| [3 * n, 3 * n + 1, 3 * n + 2]).collect();
+    triangles.extend_from_within(..10);
+    let heap = mesh((0..120).map(corner).collect(), triangles);
+    for projection in [LENS, PARALLEL] {
+        let camera = camera(DVec3::new(0.3, 0.2, 7.0), DVec3::ZERO, projection, [37, 41]);
+        let of = |hidden: &[f32], most: u64| {
+            let none = (f32::INFINITY, u32::MAX);
+            let keep = |_: usize, at: &TriangleLayer| (at.depth, at.hit.triangle);
+            resolve_layers(&placed(&heap), &camera, (hidden, most), (none, keep), None)
+        };
+        let (all, nearest, counts) = (of(&[], u64::MAX).unwrap(), seen(&heap, &camera), coverage(&heap, &camera));
+        let hidden: Vec<f32> = nearest.depth.iter().map(|depth| depth + 1.0).collect();
+        let before = of(&hidden, u64::MAX).unwrap();
+        let (mut most, mut sum) = (0, 0);
+        for (k, count) in counts.iter().enumerate() {
+            let own = all.of(k);
+            assert_eq!(own.len() as u32, *count, "pixel {k}");
+            assert!(own.windows(2).all(|w| w[0].0 < w[1].0 || (w[0].0 == w[1].0 && w[0].1 < w[1].1)), "{own:?}");
+            assert_eq!(own.first().map_or(f32::INFINITY, |first| first.0), nearest.depth[k]);
+            let expected: Vec<_> = own.iter().copied().filter(|layer| layer.0 < hidden[k]).collect();
+            assert_eq!(before.of(k), expected, "pixel {k}");
+            (most, sum) = (most.max(own.len()), sum + own.len());
+        }
+        assert!(most > 8 && sum > 2000, "{most} {sum}");
+        // One byte less is refused before it is taken.
+        assert!(of(&[], 8 * sum as u64).is_ok());
+        let Err(Error::Limit(said)) = of(&[], 8 * sum as u64 - 1) else { panic!("not refused") };
+        assert_eq!((said.needed, said.limit), (8 * sum as u64, Some(8 * sum as u64 - 1)));
+    }
 }

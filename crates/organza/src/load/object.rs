@@ -128,6 +128,7 @@ impl Prepared<'_> {
             data: self.input.data(self.bounded.is_some(), looseness, context.scene.render.particles.surface_sampler),
             opaque: self.input.opacity() == Some(1.0),
             by_gradient: self.input.by_gradient(),
+            is_plain: object.footprints.is_usual(),
             volumes_by: context.scene.render.particles.volume_sampler,
             casts: object.casts_shadow && extinct,
             receives: !self.as_it_is && material.shading != Shading::Unlit && object.shadow_coefficient > 0.0,

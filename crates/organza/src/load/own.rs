@@ -149,17 +149,11 @@ impl Own {
         }
     }
 
-    /// Whether it lets no light through.
-    pub(crate) fn is_opaque(&self) -> bool {
-        self.opacity >= 1.0
-    }
-
-    /// Optical depth that no ray through its cells can exceed, of the channel that absorbs most; that of opaque polygons; 0 for other bodies.
+    /// Optical depth that no ray through its cells can exceed, of the channel that absorbs most; without end for triangles; 0 for other bodies.
     pub(crate) fn optical_depth(&self) -> f64 {
-        if self.is_opaque() {
-            return f64::INFINITY;
-        }
-        let Body::Cells { transfer, .. } = &self.body else { return 0.0 };
+        let Body::Cells { transfer, .. } = &self.body else {
+            return if matches!(self.body, Body::Triangles(_)) { f64::INFINITY } else { 0.0 };
+        };
         let most = transfer.points().iter().map(|p| p.extinction).fold(0.0, f32::max);
         f64::from(most) * self.extinction_scale * self.bounds.diagonal()
     }

@@ -29,6 +29,7 @@ pub(crate) fn form(object: &ObjectStatistics) -> (Form, &'static str) {
     match object.data {
         ObjectData::Volume => (Form::Cells, "sheets classify what they reconstruct"),
         ObjectData::Density { .. } => (Form::Cells, "sheets reconstruct it from a lattice"),
+        ObjectData::Triangles if !object.is_plain => (Form::Splats, "footprints are seen on discs alone"),
         ObjectData::Points | ObjectData::Gaussians | ObjectData::Triangles | ObjectData::Surface { .. } => {
             (Form::Splats, "what is no lattice is splatted into the slabs that it lies in")
         }
@@ -230,7 +231,7 @@ fn refuse<'a>(frame: &'a Frame<'a>, error: sheet_light::Error) -> Error {
     match error {
         sheet_light::Error::Cancelled => Error::Cancelled,
         sheet_light::Error::Limit(exceeded) => {
-            let hint = "use a larger render.sheets.slab_width, a coarser volume or a larger --max-memory";
+            let hint = "use a larger render.sheets.slab_width, a coarser volume, fewer translucent meshes or a larger --max-memory";
             Error::Limit(exceeded.of("the scene", hint))
         }
         sheet_light::Error::Volume { volume, source } => {

@@ -5,7 +5,8 @@ use super::eye_buffer::{Fragments, Pixels};
 use super::illuminate::Asked;
 use super::light_depth::LightDepths;
 use super::light_path::{Places, stored};
-use super::lit_part::LitPart;
+use super::lit_part::LitParts;
+use super::pane_sheets::PaneSheets;
 use super::placed::Placed;
 use super::shade::{Lit, Through};
 use super::sheet::{Sheet, Splatter, is_any};
@@ -16,9 +17,13 @@ use splat_core::glam::{DVec3, Vec3};
 use splat_core::raster::lanes::{Lanes, MAX_LANES};
 use splat_core::raster::pulp::{self, Simd};
 use splat_core::shade::{ChannelLayout, MAX_CHANNELS};
+use std::ops::Range;
 
 /// Sheets kept of a volume whose gradients are asked for: the present one and its neighbours.
 const KEPT: u32 = 3;
+
+/// Depths across the slabs between which all of a ray lies.
+pub(crate) const WHOLE: [[f32; MAX_LANES]; 2] = [[f32::NEG_INFINITY; MAX_LANES], [f32::INFINITY; MAX_LANES]];
 
 /// Slabs after which pixels that are done are looked for.
 const CLOSING: u32 = 8;
@@ -51,24 +56,28 @@ pub(crate) struct OneSlab<'a> {
     pub(crate) layout: &'a ChannelLayout,
     /// Those of the slab.
     pub(crate) splats: Option<&'a SplatSheets<'a>>,
+    /// Those of the slab.
+    pub(crate) panes: Option<&'a PaneSheets<'a>>,
     /// Polygons in the way of the light.
     pub(crate) depths: Option<&'a LightDepths>,
     pub(crate) index: usize,
     pub(crate) slab: u32,
     pub(crate) step: Step,
     pub(crate) eye: &'a mut EyeBand,
+    /// Depths across the slabs between which rays are being lit and composited: translucent polygons part them.
+    pub(crate) part: [[f32; MAX_LANES]; 2],
 }
 
-/// Splats of neighbouring pixels: their sums, and the place there.
-type Splatted<'a> = Option<(&'a Lines, [usize; 2])>;
+/// Splats of neighbouring pixels: their sums, the place there, and how much of them lies in the part.
+type Splatted<'a> = Option<(&'a Lines, [usize; 2], [f32; MAX_LANES])>;
 
 /// Neighbouring pixels being lit.
-struct Chunk {
+pub(super) struct Chunk {
     /// In the image.
-    x: usize,
-    y: usize,
+    pub(super) x: usize,
+    pub(super) y: usize,
     /// In the planes of the band.
-    k: usize,
+    pub(super) k: usize,
 }
 
 impl EyeBand {
@@ -111,11 +120,12 @@ impl pulp::WithSimd for OneSlab<'_> {
     fn with_simd<S: Simd>(mut self, simd: S) -> u64 {
         let mut fragments = 0;
         // What gradients are taken from is wanted beside pixels that are done.
+        let volumes = self.volumes();
         let may_close = self.of.params.transmittance_cutoff > 0.0 && !self.of.placed.iter().any(|v| v.compares);
         if may_close && !self.of.frame.back_to_front && self.slab.is_multiple_of(CLOSING) {
             self.eye.close(self.of.params.transmittance_cutoff);
         }
-        for v in 0..self.of.placed.len() {
+        for v in volumes.clone() {
             // Gradients need the sheet behind; the first one is made with it.
             let is_ahead = self.of.placed[v].compares && self.step == Step::Draw;
             if !is_ahead || self.slab == 0 {
@@ -127,16 +137,21 @@ impl pulp::WithSimd for OneSlab<'_> {
         }
         let (top, own) = (self.eye.band.top, self.eye.band.rows.clone());
         for y in own.start - top..own.end - top {
-            let spans = || (0..self.of.placed.len()).map(|v| &self.eye.sheet(v, self.slab).spans[y]);
+            let spans = || volumes.clone().map(|v| &self.eye.sheet(v, self.slab).spans[y]);
             let splats = self.splats.and_then(|splats| splats.squares.span(top + y));
-            let inside = || spans().filter(|span| !span.is_empty()).chain(&splats);
+            let panes = self.panes.and_then(|panes| panes.span(top + y));
+            let inside = || spans().filter(|span| !span.is_empty()).chain(&splats).chain(&panes);
             let (Some(first), Some(last)) = (inside().map(|s| s.start).min(), inside().map(|s| s.end).max()) else {
                 continue;
             };
             let count = Lanes::<S>::COUNT;
             for x in (first / count * count..last).step_by(count) {
                 let k = y * self.eye.band.stride + x;
-                self.draw(simd, &Chunk { x, y: top + y, k });
+                let chunk = Chunk { x, y: top + y, k };
+                match self.panes.filter(|_| panes.as_ref().is_some_and(|span| span.start < x + count && x < span.end)) {
+                    None => self.draw(simd, &chunk, [1.0; MAX_LANES]),
+                    Some(panes) => self.draw_parted(simd, &chunk, panes),
+                }
             }
         }
         fragments
@@ -157,9 +172,24 @@ impl OneSlab<'_> {
         fragments
     }
 
-    /// Lights and composites neighbouring pixels.
+    /// Volumes of the slab: none behind the last.
+    fn volumes(&self) -> Range<usize> {
+        0..if self.slab < self.of.frame.slabs.count { self.of.placed.len() } else { 0 }
+    }
+
+    /// Whether what comes lies before what was drawn.
+    pub(super) fn prepends(&self) -> bool {
+        self.of.frame.back_to_front && self.step == Step::Draw
+    }
+
+    /// Whether depths are summed now.
+    pub(super) fn keeps_depths(&self) -> bool {
+        !self.eye.pixels.depth.is_empty() && !self.prepends()
+    }
+
+    /// Lights and composites neighbouring pixels, with so much of their splats.
     #[inline(always)]
-    fn draw<S: Simd>(&mut self, simd: S, chunk: &Chunk) {
+    pub(super) fn draw<S: Simd>(&mut self, simd: S, chunk: &Chunk, of_splats: [f32; MAX_LANES]) {
         let (k, of) = (chunk.k, |v: f32| Lanes::splat(simd, v));
         let planes = self.eye.pixels.planes;
         let closed =
@@ -167,7 +197,8 @@ impl OneSlab<'_> {
         let stretch = Lanes::load(simd, &self.eye.band.stretch[k..]);
         let mut all = [of(0.0); 3];
         let (mut near, mut far) = (of(f32::INFINITY), of(f32::NEG_INFINITY));
-        for v in 0..self.of.placed.len() {
+        let [lower, upper] = [0, 1].map(|end| Lanes::load(simd, &self.part[end]));
+        for v in self.volumes() {
             let Some([extinction, length]) = self.extinction(simd, v, k) else {
                 self.eye.extinction[v] = [0.0; MAX_LANES];
                 continue;
@@ -178,12 +209,14 @@ impl OneSlab<'_> {
                 all[p] = tau.mul_add(of(self.of.volumes[v].material.extinction_rgb[p]), all[p]);
             }
             let sheet = self.eye.sheet(v, self.slab);
-            let (from, to) = (Lanes::load(simd, &sheet.near[k..]), Lanes::load(simd, &sheet.far[k..]));
+            let (from, to) =
+                (Lanes::load(simd, &sheet.near[k..]).max(lower), Lanes::load(simd, &sheet.far[k..]).min(upper));
             near = near.min(from.where_less_or(of(0.0), tau, near));
             far = far.max(to.where_less_or(of(0.0), tau, far));
         }
         let most = all[0].max(all[1]).max(all[2]);
         let splats = self.splats.and_then(|splats| splats.squares.at([chunk.x, chunk.y], Lanes::<S>::COUNT));
+        let splats = splats.map(|(lines, at)| (lines, at, of_splats));
         let is_medium = is_any(most);
         if !is_medium && splats.is_none() {
             return;
@@ -209,7 +242,7 @@ impl OneSlab<'_> {
             return None;
         }
         let [extinction, ..] = sheet.classify(simd, &self.of.placed[v], k);
-        Some([extinction, sheet.depth(simd, k)])
+        Some([extinction, sheet.depth(simd, k, &self.part)])
     }
 
     /// Slab coordinates of rays at a depth.
@@ -292,15 +325,17 @@ impl OneSlab<'_> {
         let (extinction, planes) = (&self.eye.extinction[..], self.eye.pixels.planes);
         let splats = self.splats.and_then(|splats| splats.light.as_ref());
         let light = self.of.illumination(buffer, self.slab, splats);
-        let part = self.depths.and_then(|depths| LitPart::new(simd, (depths, &self.of.frame), &ends, wanted));
-        let Some(part) = part else {
+        let parts = self.depths.and_then(|depths| LitParts::new(simd, (depths, &self.of.frame), &ends, wanted));
+        let Some(parts) = parts else {
             let asked = Asked { ends, extinction, optical_depth: &of.optical_depth, lit: &[] };
             return light.transmittance(simd, &asked, wanted, planes);
         };
-        let optical_depth = &part.optical_depth(&of.optical_depth);
-        let asked = Asked { ends: part.ends(simd, &ends), extinction, optical_depth, lit: &part.by_point };
-        let mut through = light.transmittance(simd, &asked, wanted, planes);
-        part.weigh(&of.optical_depth, &mut through);
+        let mut through = [[0.0; MAX_LANES]; 3];
+        for part in parts.parts() {
+            let optical_depth = &part.optical_depth(&of.optical_depth);
+            let asked = Asked { ends: part.ends(simd, &ends), extinction, optical_depth, lit: &parts.by_point };
+            part.add(&of.optical_depth, &light.transmittance(simd, &asked, wanted, planes), &mut through);
+        }
         through
     }
 
@@ -370,29 +405,30 @@ impl OneSlab<'_> {
         splats: Splatted<'_>,
         fragments: &mut Fragments,
     ) {
+        let (is_last_first, keeps_depths) = (self.prepends(), self.keeps_depths());
         let (of, eye) = (self.of, &mut *self.eye);
         let mut before = [0.0; MAX_LANES];
         eye.pixels.so_far(simd, chunk.k).store(&mut before);
         let mut share = [0.0; MAX_LANES];
-        if let Some((lines, at)) = splats {
+        if let Some((lines, at, part)) = splats {
             let Fragments { optical_depth, values, object } = fragments;
-            share = lines.blend(simd, at, true, optical_depth, values);
+            share = lines.blend(simd, at, true, (optical_depth, values, &part));
             for lane in (0..Lanes::<S>::COUNT).filter(|lane| share[*lane] > 0.5) {
                 object[lane] = lines.object([at[0] + lane, at[1]]).unwrap_or(object[lane]);
             }
         }
-        match (of.frame.back_to_front, self.step) {
-            (true, Step::Draw) => eye.pixels.prepend(simd, chunk.k, fragments),
-            _ => eye.pixels.append(simd, chunk.k, fragments),
+        match is_last_first {
+            true => eye.pixels.prepend(simd, chunk.k, fragments),
+            false => eye.pixels.append(simd, chunk.k, fragments),
         }
-        if eye.pixels.depth.is_empty() || (of.frame.back_to_front && self.step == Step::Draw) {
+        if !keeps_depths {
             return;
         }
         let mut ends = [[0.0; MAX_LANES]; 2];
         near.store(&mut ends[0]);
         far.store(&mut ends[1]);
         let (green, mut splatted) = (eye.pixels.planes / 2, [[0.0; MAX_LANES]; 3]);
-        if let Some((lines, at)) = splats {
+        if let Some((lines, at, _)) = splats {
             splatted = lines.depths(simd, at);
         }
         for lane in 0..Lanes::<S>::COUNT.min(eye.band.width.saturating_sub(chunk.x)) {

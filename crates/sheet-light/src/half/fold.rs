@@ -8,9 +8,10 @@ use super::eye_sheets::EyeBand;
 use super::frame::Frame;
 use super::light_buffer::planes;
 use super::light_depth::LightDepths;
+use super::pane_sheets::PanesInTheOpen;
 use super::penumbra::Penumbra;
 use super::polygon_light::{PolygonImage, PolygonLight};
-use super::polygons::EyePolygons;
+use super::polygons::{Eye, EyePanes};
 use super::scatter::{self, Scattered, Scene, balance::Balance};
 use super::serves::{axis_of_view, other_axis, serves, serves_extended};
 use super::soft_buffer::SoftBuffer;
@@ -36,8 +37,8 @@ pub struct Drawn {
 
 /// Draws all volumes in slabs across the half vector of each light, with the shadows that they cast on themselves and each other.
 /// `into` becomes a segment of its own, of all depths: what it held is gone, its planes and channels say what is kept, and the
-/// caller appends it behind what lies before. Polygons end the rays that meet them, and are a picture of their own. One tick a slab, and
-/// one for each band of rows of polygons.
+/// caller appends it behind what lies before. Opaque polygons end the rays that meet them, and are a picture of their own; translucent ones are
+/// composited where they lie. One tick a slab, and one for each band of rows of polygons.
 ///
 /// Each light is a sweep, or two that are mixed where its half vector is about to turn over; their images add, and optical depth, depths,
 /// objects, normals and the share of shadow come from one light. Sweeps are in an order of the lights' own, so the order of the input changes
@@ -71,22 +72,23 @@ pub fn fold(
     *into = Accumulator::new(size, planes, layout.count(), depth, object);
     let quiet = Progress::new();
     let progress = progress.unwrap_or(&quiet);
-    let eye = EyePolygons::new(input, progress)?;
-    let mut image = eye.as_ref().map(|eye| PolygonImage::new(eye, layout));
-    let opaque = eye.as_ref().map_or(input.opaque, |eye| &eye.opaque);
+    let eye = Eye::new(input, params.sheets.limits.max_bytes.saturating_sub(needed(input, params)), progress)?;
+    let mut image = eye.solid.as_ref().map(|solid| PolygonImage::new(solid, layout));
+    let opaque = eye.solid.as_ref().map_or(input.opaque, |solid| &solid.opaque);
     let input = &HalfInput { opaque, ..input.clone() };
     let mut lights: Vec<(&LitBy<'_>, u32)> = carried(input).collect();
     lights.sort_by_key(|(lit, samples)| (lit.light.bits(), *samples));
     let mut counts = HalfCounts::default();
     if !input.bodies().is_empty() {
-        counts = sweeps(input, params, (&lights, eye.as_ref()), (layout, into, image.as_mut()), progress)?;
-    } else if let (Some(eye), Some(image)) = (&eye, &mut image) {
-        counts.polygon_pixels[0] = eye.pixels.len() as u64;
-        in_the_open(input, params, (&lights, eye), image, progress)?;
+        counts = sweeps(input, params, (&lights, &eye), (layout, into, image.as_mut()), progress)?;
+    } else if eye.solid.is_some() || eye.panes.is_some() {
+        counts.polygon_pixels[0] = eye.solid.as_ref().map_or(0, |solid| solid.seen.count() as u64);
+        counts.bytes += in_the_open(input, params, (&lights, &eye), (layout, into, image.as_mut()), progress)?;
     }
-    let polygons = eye.as_ref().zip(image).map(|(eye, image)| {
+    counts.bytes += eye.panes.as_ref().map_or(0, EyePanes::bytes);
+    let polygons = eye.solid.as_ref().zip(image).map(|(solid, image)| {
         counts.bytes += image.bytes() + polygon_bytes(input.sheets.camera, most_samples(input), params);
-        image.finish(eye, into)
+        image.finish(solid, into)
     });
     Ok(Drawn { counts, polygons: polygons.unwrap_or_default() })
 }
@@ -98,7 +100,7 @@ type Into<'i> = (&'i ChannelLayout, &'i mut Accumulator, Option<&'i mut PolygonI
 struct Sweeps<'a, 's> {
     input: &'a HalfInput<'a>,
     params: &'s HalfParams,
-    eye: Option<&'a EyePolygons<'a>>,
+    eye: &'a Eye<'a>,
     layout: &'s ChannelLayout,
     progress: &'s Progress,
 }
@@ -107,7 +109,7 @@ struct Sweeps<'a, 's> {
 fn sweeps<'a>(
     input: &'a HalfInput<'a>,
     params: &HalfParams,
-    (lights, eye): (&[(&'a LitBy<'a>, u32)], Option<&'a EyePolygons<'a>>),
+    (lights, eye): (&[(&'a LitBy<'a>, u32)], &'a Eye<'a>),
     (layout, into, mut image): Into<'_>,
     progress: &Progress,
 ) -> Result<HalfCounts, Error> {
@@ -153,7 +155,7 @@ impl<'a> Sweeps<'a, '_> {
         let other = lit.and_then(|(lit, samples)| other_axis(&bodies, self.input.sheets.camera, (&lit.light, samples)));
         let Some((axis, share)) = other else { return sweep.run(self.layout, form, image, self.progress) };
         let light_alone = sweep.light_alone;
-        let blank = || self.eye.map(|eye| PolygonImage::new(eye, self.layout));
+        let blank = || self.eye.solid.as_ref().map(|solid| PolygonImage::new(solid, self.layout));
         let (mut own_image, mut other_image) = (blank(), blank());
         let (mut bands, counts) = sweep.run(self.layout, form, own_image.as_mut(), self.progress)?;
         let form = Accumulator { depth: Vec::new(), object: Vec::new(), ..form.clone() };
@@ -168,15 +170,17 @@ impl<'a> Sweeps<'a, '_> {
     }
 }
 
-/// Light on polygons where there is nothing else (Table 1: the z-buffer alone).
+/// Light on polygons where there is nothing else (Table 1: the images of the light alone). Bytes.
 fn in_the_open<'a>(
     input: &'a HalfInput<'a>,
     params: &HalfParams,
-    (lights, eye): (&[(&'a LitBy<'a>, u32)], &'a EyePolygons<'a>),
-    image: &mut PolygonImage,
+    (lights, eye): (&[(&'a LitBy<'a>, u32)], &'a Eye<'a>),
+    (layout, into, mut image): Into<'_>,
     progress: &Progress,
-) -> Result<(), Error> {
-    let sheets = &input.sheets;
+) -> Result<u64, Error> {
+    let (sheets, camera) = (&input.sheets, input.sheets.camera);
+    let mut panes = eye.panes.as_ref().map(|panes| PanesInTheOpen::new(panes, layout));
+    let mut bytes = panes.as_ref().map_or(0, PanesInTheOpen::bytes);
     let lights: Vec<Option<(&LitBy<'a>, u32)>> = match lights {
         [] => vec![None],
         lights => lights.iter().copied().map(Some).collect(),
@@ -185,10 +189,20 @@ fn in_the_open<'a>(
         let depths = light_depths(input, params, (light, eye), progress)?;
         let carried = light.map(|(lit, _)| *lit);
         let mapped = if n == 0 { &input.mapped[..] } else { &[] };
-        let lamps = Lamps { carried, mapped, ambient: sheets.ambient, camera: sheets.camera, light_alone: n > 0 };
-        PolygonLight::new(eye, sheets.camera, depths.as_ref()).shade(&lamps, sheets.shadow_origin, None, image);
+        let lamps = Lamps { carried, mapped, ambient: sheets.ambient, camera, light_alone: n > 0 };
+        if let (Some(solid), Some(image)) = (&eye.solid, &mut image) {
+            let light = PolygonLight::new(&solid.seen, camera, depths.as_ref());
+            light.shade(&lamps, sheets.shadow_origin, None, image);
+        }
+        if let Some(panes) = &mut panes {
+            panes.shade(camera, depths.as_ref(), &lamps, sheets.shadow_origin);
+        }
+        bytes = bytes.max(depths.as_ref().map_or(0, LightDepths::bytes));
     }
-    Ok(())
+    if let Some(panes) = panes {
+        panes.store(camera, into);
+    }
+    Ok(bytes)
 }
 
 /// What so many points of a light see of the polygons that cast shadows, for all that receives its light; `None` where there is no light
@@ -196,13 +210,18 @@ fn in_the_open<'a>(
 pub(crate) fn light_depths(
     input: &HalfInput<'_>,
     params: &HalfParams,
-    (lit, eye): (Option<(&LitBy<'_>, u32)>, &EyePolygons<'_>),
+    (lit, eye): (Option<(&LitBy<'_>, u32)>, &Eye<'_>),
     progress: &Progress,
 ) -> Result<Option<LightDepths>, Error> {
-    let Some((lit, samples)) = lit else { return Ok(None) };
+    let (Some((lit, samples)), casters) = (lit, eye.casters()) else { return Ok(None) };
+    if casters.is_empty() {
+        return Ok(None);
+    }
     let mut receivers = eye.places(input.sheets.camera);
     receivers.extend(input.bodies().corners());
-    LightDepths::new(&eye.casters(), (&lit.light, samples), &receivers, params.most_light_pixels, progress)
+    let taken = needed(input, params) + eye.panes.as_ref().map_or(0, EyePanes::bytes);
+    let most = (params.most_light_pixels, params.sheets.limits.max_bytes.saturating_sub(taken));
+    LightDepths::new(&casters, (&lit.light, samples), &receivers, most, progress)
 }
 
 /// Width of the slabs of the sweep for `light`, or of that without one; world units. Infinite without bodies.
@@ -286,6 +305,10 @@ fn check_polygons(input: &HalfInput<'_>) -> Result<(), Error> {
             let error = splat_core::Error::invalid("mesh", index, "shadow_coefficient", share, "a number in [0, 1]");
             return Err(Error::Polygons(error));
         }
+        if polygons.optical_depth.is_nan() || polygons.optical_depth < 0.0 {
+            let (found, expected) = (polygons.optical_depth, "a number >= 0, or infinity");
+            return Err(Error::Polygons(splat_core::Error::invalid("mesh", index, "optical_depth", found, expected)));
+        }
     }
     Ok(())
 }
@@ -309,6 +332,16 @@ fn check_splats(input: &HalfInput<'_>, splats: &HalfSplats<'_>) -> Result<(), Er
 
 /// Refuses what takes more than it may, before it does.
 fn check_memory(input: &HalfInput<'_>, params: &HalfParams) -> Result<(), Error> {
+    let (needed, limit) = (needed(input, params), params.sheets.limits.max_bytes);
+    let hint = || {
+        "use fewer voxels, a smaller picture, fewer pixels of the light buffer or fewer points of an extended light"
+            .to_owned()
+    };
+    if needed > limit { Err(Error::limit("half-vector sheets", needed, limit, "bytes", hint())) } else { Ok(()) }
+}
+
+/// Bytes of everything but lists of translucent polygons, which are counted when they are made.
+fn needed(input: &HalfInput<'_>, params: &HalfParams) -> u64 {
     let camera = input.sheets.camera;
     let needed = bytes(
         &input.bodies(),
@@ -317,13 +350,7 @@ fn check_memory(input: &HalfInput<'_>, params: &HalfParams) -> Result<(), Error>
         input.mapped.len(),
         params,
     );
-    let polygons = if input.polygons.is_empty() { 0 } else { polygon_bytes(camera, most_samples(input), params) };
-    let (needed, limit) = (needed + polygons, params.sheets.limits.max_bytes);
-    let hint = || {
-        "use fewer voxels, a smaller picture, fewer pixels of the light buffer or fewer points of an extended light"
-            .to_owned()
-    };
-    if needed > limit { Err(Error::limit("half-vector sheets", needed, limit, "bytes", hint())) } else { Ok(()) }
+    needed + if input.polygons.is_empty() { 0 } else { polygon_bytes(camera, most_samples(input), params) }
 }
 
 /// Bytes that [`fold`] takes at most for such lights, of which sweeps follow one another: each with the points that stand for it, 1 for

@@ -233,15 +233,17 @@ impl pulp::WithSimd for ThroughVolumes<'_> {
         let chunks = places.chunks(Lanes::<S>::COUNT).zip(out.chunks_mut(Lanes::<S>::COUNT));
         for (chunk, (places, out)) in chunks.enumerate() {
             let (at, wanted) = lanes(simd, places);
-            for (lane, place) in places.iter().enumerate() {
-                let world = frame.world(place.as_dvec3());
-                extinction.iter_mut().zip(of.volumes).for_each(|(e, v)| e[lane] = v.extinction_at(world) as f32);
-            }
             let mut optical = [[Lanes::splat(simd, 0.0); NODES]; 3];
             for v in 0..of.volumes.len() {
+                let ways = of.paths[v].ways(simd, &at, of.face);
+                let mut beyond = [0.0; MAX_LANES];
+                ways.beyond(simd).store(&mut beyond);
+                for (lane, place) in places.iter().enumerate() {
+                    let inside = frame.world(of.paths[v].before(*place, beyond[lane]).as_dvec3());
+                    extinction[v][lane] = of.volumes[v].extinction_at(inside) as f32;
+                }
                 let mean = of.means(simd, v, &at, &extinction, &wanted);
                 let own = Lanes::load(simd, &extinction[v]);
-                let ways = of.paths[v].ways(simd, &at, of.face);
                 of.add(simd, (&ways, mean, own), &None, [v, 0], &mut optical);
             }
             for p in 0..3 {

@@ -8,6 +8,7 @@
 use super::HalfSplats;
 use super::band::{Band, ROWS};
 use super::buckets::Buckets;
+use super::eye_sheets::WHOLE;
 use super::frame::Frame;
 use super::penumbra::Penumbra;
 use super::placed::Placed;
@@ -200,7 +201,7 @@ impl pulp::WithSimd for OneBand<'_> {
                 let mut x = sheet.spans[y].start;
                 while x < sheet.spans[y].end {
                     let k = y * band.stride + x;
-                    let depth = sheet.depth(simd, k);
+                    let depth = sheet.depth(simd, k, &WHOLE);
                     let length = depth * Lanes::load(simd, &band.stretch[k..]);
                     let extinction = sheet.classify(simd, placed, k)[0];
                     let tau = extinction * length;

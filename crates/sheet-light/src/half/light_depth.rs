@@ -1,4 +1,5 @@
-//! Light depths: the z-buffer of opaque polygons as a light sees them (step 2 of the pseudocode), and what it says of any place.
+//! Light depths: the z-buffer of opaque polygons as a light sees them (step 2 of the pseudocode), the lists of translucent ones before that
+//! ([`super::light_layers`]), and what both say of any place.
 //!
 //! A pixel has the depth of the nearest polygon and the plane that it lies in. A place is hidden where the plane of a pixel about it
 //! lies nearer to the light at the place itself, not at the pixel's middle: so a wall hides what is behind its foot. A place on
@@ -9,8 +10,11 @@
 //! paper keeps one z-buffer of the light's centre, fills what lies behind it with a thickness guessed from its gradient and convolves that.
 //! Points see the polygons themselves, so nothing has to be guessed: an edge at d1 casts a penumbra 2R·d2/d1 wide at d2 behind it.
 
+use super::light_layers::{BLOCK, LightLayers};
 use super::light_views::views;
+use super::lit_way::{LitWay, WayPart};
 use super::penumbra::received;
+use super::polygons::Polygons;
 use crate::Error;
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::raster::triangles::{DepthPlanes, PlacedMesh, resolve_depth};
@@ -26,15 +30,17 @@ const SAFETY: f64 = 10.0;
 const STEEPEST: f32 = 8.0;
 
 /// Most parts in which a way is looked at, and pixels of one.
-const PARTS: f32 = 16.0;
+const PARTS: usize = 16;
 const PIXELS: f32 = 8.0;
 
-/// Side of a block of pixels, and most blocks that are asked whether all of a way is lit, or none.
-const BLOCK: usize = 16;
+/// Most blocks that are asked whether all of a way is lit, or none.
 const MOST_BLOCKS: usize = 36;
 
 /// How far from its ends a way is looked at, as a share of it.
 const INSET: f32 = 1.0 / 1024.0;
+
+/// Least difference of shares of the light that is a step.
+const STEP: f32 = 1e-3;
 
 /// Halvings that find where light ends on a way.
 const HALVINGS: usize = 10;
@@ -63,6 +69,8 @@ struct PointDepths {
 /// One image of the light.
 struct View {
     planes: DepthPlanes,
+    /// Translucent ones, if any cast shadows.
+    layers: Option<LightLayers>,
     /// Least and greatest depth of each block.
     blocks: Vec<[f32; 2]>,
     transform: ViewTransform,
@@ -80,12 +88,13 @@ struct Sighted<'a> {
 
 impl LightDepths {
     /// Of as many points of a light, for what receives at any of these places, of which there is at least one, in images that have
-    /// together no more pixels than one of `most` a side; `None` where nothing casts shadows.
+    /// together no more pixels than one of `most_pixels` a side, with lists of translucent polygons that take at most `most_bytes`; `None` where
+    /// nothing casts shadows.
     pub(crate) fn new(
-        casters: &[PlacedMesh<'_>],
+        casters: &[&Polygons<'_>],
         (light, samples): (&Light, u32),
         receivers: &[DVec3],
-        most: u32,
+        (most_pixels, most_bytes): (u32, u64),
         progress: &Progress,
     ) -> Result<Option<Self>, Error> {
         if casters.is_empty() || receivers.is_empty() {
@@ -96,14 +105,18 @@ impl LightDepths {
         let origin = low + 0.5 * (high - low);
         let lights = Light { intensity: [1.0; 3], ..*light }.points(samples);
         let (shares, _) = received(light, &lights, origin);
-        let (mut points, mut farthest) = (Vec::with_capacity(lights.len()), 0.0f64);
+        let placed: Vec<PlacedMesh<'_>> = casters.iter().map(|p| p.placed).collect();
+        let (mut points, mut farthest, mut bytes) = (Vec::with_capacity(lights.len()), 0.0f64, 0);
         for (light, share) in lights.iter().zip(shares) {
-            let cameras = views(light, origin, casters, (receivers, side(most, lights.len() as u32)))?;
+            let cameras = views(light, origin, &placed, (receivers, side(most_pixels, lights.len() as u32)))?;
+            let mut all = Vec::with_capacity(cameras.len());
             for camera in &cameras {
                 farthest = receivers.iter().map(|p| camera.view_from_world(*p).z).fold(farthest, f64::max);
+                let view = View::new(casters, camera, (origin, most_bytes.saturating_sub(bytes)), progress)?;
+                bytes += view.layers.as_ref().map_or(0, LightLayers::bytes);
+                all.push(view);
             }
-            let view = |camera| View::new(casters, camera, origin, progress);
-            points.push(PointDepths { views: cameras.iter().map(view).collect::<Result<_, Error>>()?, share });
+            points.push(PointDepths { views: all, share });
         }
         let rounding = ROUNDING[0] * (high - low).length() + ROUNDING[1] * farthest;
         Ok(Some(Self { points, origin, bias: (SAFETY * rounding) as f32, rounding: rounding as f32 }))
@@ -119,22 +132,28 @@ impl LightDepths {
     /// Bytes of the images.
     pub(crate) fn bytes(&self) -> u64 {
         let views = self.points.iter().flat_map(|point| &point.views);
-        views.map(|view| 12 * view.planes.depth.len() as u64).sum()
+        let one =
+            |view: &View| 12 * view.planes.depth.len() as u64 + view.layers.as_ref().map_or(0, LightLayers::bytes);
+        views.map(one).sum()
     }
 
-    /// Share of the light that polygons let through to a world position, which lies on a surface of this normal or in the open.
-    pub(crate) fn visibility(&self, world: DVec3, face: Option<Vec3>) -> f32 {
-        self.visible(world, face).sum()
+    /// Share of the light that polygons let through to a world position, by channel, which lies on a surface of this normal or in the open.
+    pub(crate) fn visibility(&self, world: DVec3, face: Option<Vec3>) -> [f32; 3] {
+        self.each(world, face).fold(Vec3::ZERO, |sum, own| sum + own).to_array()
     }
 
-    /// The same by the points of the light.
+    /// The same by the points of the light, of all channels together.
     pub(crate) fn visible(&self, world: DVec3, face: Option<Vec3>) -> impl Iterator<Item = f32> {
+        self.each(world, face).map(mean)
+    }
+
+    fn each(&self, world: DVec3, face: Option<Vec3>) -> impl Iterator<Item = Vec3> {
         let place = (world - self.origin).as_vec3();
         self.points.iter().map(move |point| point.share * self.at(point, place, face))
     }
 
-    fn at(&self, point: &PointDepths, place: Vec3, face: Option<Vec3>) -> f32 {
-        let Some(sighted) = point.views.iter().find_map(|view| view.sight(place)) else { return 1.0 };
+    fn at(&self, point: &PointDepths, place: Vec3, face: Option<Vec3>) -> Vec3 {
+        let Some(sighted) = point.views.iter().find_map(|view| view.sight(place)) else { return Vec3::ONE };
         // In the open nothing lies on a surface but what is behind it: the end of a way.
         let bias = if face.is_some() { self.bias } else { -self.rounding };
         sighted.visibility(bias, face.map(|face| sighted.view.turned(face)))
@@ -145,13 +164,16 @@ impl LightDepths {
         self.points.len()
     }
 
-    /// Which part of a way between world positions light reaches: shares at which that begins and ends. Where it is reached here
+    /// Which parts of a way between world positions light reaches. Before opaque polygons that is one: where it is reached here
     /// and there, or by some of the light's points, a part as long as all these, about their middle. How much of it each point reaches, times its
     /// share of the light, is added to `by_point` where there are several.
-    pub(crate) fn lit(&self, ends: [DVec3; 2], by_point: &mut Vec<f32>) -> [f32; 2] {
+    pub(crate) fn lit(&self, ends: [DVec3; 2], by_point: &mut Vec<f32>) -> LitWay {
         let ends = ends.map(|p| (p - self.origin).as_vec3());
+        if self.points.iter().flat_map(|point| &point.views).any(|view| view.layers.is_some()) {
+            return self.lit_through(ends, by_point);
+        }
         if let [point] = &self.points[..] {
-            return self.lit_by(point, ends);
+            return LitWay::one(self.lit_by(point, ends));
         }
         let (mut sum, mut moment, mut is_whole) = (0.0, 0.0, true);
         for point in &self.points {
@@ -161,19 +183,65 @@ impl LightDepths {
             sum += point.share * (to - from);
             moment += point.share * 0.5 * (to - from) * (from + to);
         }
-        if is_whole { [0.0, 1.0] } else { part_of(sum, moment) }
+        LitWay::one(if is_whole { [0.0, 1.0] } else { part_of(sum, moment) })
+    }
+
+    /// Behind translucent polygons, whose shadows end in steps.
+    fn lit_through(&self, ends: [Vec3; 2], by_point: &mut Vec<f32>) -> LitWay {
+        let is_one = self.points.len() == 1;
+        if is_one && let Some(is_lit) = self.is_whole(&self.points[0], ends) {
+            return if is_lit { LitWay::one([0.0, 1.0]) } else { LitWay::DARK };
+        }
+        let length = self.points.iter().map(|point| pixels(point, ends)).fold(0.0, f32::max);
+        // Its ends tell what a short way has.
+        let count = (2.0 * length / PIXELS).ceil().clamp(1.0, PARTS as f32) as usize;
+        let share_at = |n: usize| n as f32 / count as f32;
+        let at = |point: &PointDepths, share: f32| {
+            let place = ends[0] + (ends[1] - ends[0]) * share.clamp(INSET, 1.0 - INSET);
+            point.share * self.at(point, place, None)
+        };
+        let mut nodes = [Vec3::ZERO; PARTS + 1];
+        for point in &self.points {
+            let mut reached = 0.0;
+            for (n, node) in nodes[..=count].iter_mut().enumerate() {
+                let own = at(point, share_at(n));
+                *node += own;
+                reached += mean(own) * if n == 0 || n == count { 0.5 } else { 1.0 } / count as f32;
+            }
+            if !is_one {
+                by_point.push(reached);
+            }
+        }
+        let mut way = LitWay::DARK;
+        for n in 0..count {
+            let ([from, to], [here, next]) = ([share_at(n), share_at(n + 1)], [nodes[n], nodes[n + 1]]);
+            // Penumbras are smooth.
+            if !is_one || (here - next).abs().max_element() < STEP {
+                way.push(WayPart { from, to, through: 0.5 * (here + next) });
+                continue;
+            }
+            let edge = edge(&|share| at(&self.points[0], share), [from, to], [here, next]);
+            way.push(WayPart { from, to: edge, through: here });
+            way.push(WayPart { from: edge, to, through: next });
+        }
+        way
+    }
+
+    /// Whether all of a way is lit by a point, or none, where blocks of pixels tell.
+    fn is_whole(&self, point: &PointDepths, ends: [Vec3; 2]) -> Option<bool> {
+        let [from, to] = ends;
+        let seen = point.views.iter().find_map(|view| Some([view.sight(from)?, view.sight(to)?]))?;
+        seen[0].view.whole(&seen, self.rounding)
     }
 
     /// The same of one point, from its origin.
     fn lit_by(&self, point: &PointDepths, [from, to]: [Vec3; 2]) -> [f32; 2] {
-        let at = |share: f32| self.at(point, from + (to - from) * share, None);
-        let seen = point.views.iter().find_map(|view| Some([view.sight(from)?, view.sight(to)?]));
-        if let Some(is_lit) = seen.as_ref().and_then(|ends| ends[0].view.whole(ends, self.rounding)) {
+        // Before opaque polygons all channels are alike.
+        let at = |share: f32| self.at(point, from + (to - from) * share, None).x;
+        if let Some(is_lit) = self.is_whole(point, [from, to]) {
             return [0.0, if is_lit { 1.0 } else { 0.0 }];
         }
-        let length =
-            seen.map_or(f32::INFINITY, |[a, b]| (a.pixel[0] - b.pixel[0]).abs().max((a.pixel[1] - b.pixel[1]).abs()));
-        let parts = (length / PIXELS).ceil().clamp(2.0, PARTS);
+        let parts = (pixels(point, [from, to]) / PIXELS).ceil().clamp(2.0, PARTS as f32);
         // Ends lie on polygons that end the way: whether these are in the light is asked before them.
         let looked = |share: f32| at(share.clamp(INSET, 1.0 - INSET));
         let (mut sum, mut moment, mut here) = (0.0, 0.0, looked(0.0));
@@ -182,7 +250,10 @@ impl LightDepths {
             let [low, high] = [part, part + 1].map(|n| n as f32 / parts);
             let next = looked(high);
             // Lit to some extent up to the edge, and to another from there on.
-            let edge = if here == next { high } else { edge(&looked, [low, high], [here, next]) };
+            let edge = match here == next {
+                true => high,
+                false => edge(&|share| Vec3::splat(looked(share)), [low, high], [here, next].map(Vec3::splat)),
+            };
             for (lit, [from, to]) in [(here, [low, edge]), (next, [edge, high])] {
                 sum += lit * (to - from);
                 moment += lit * (to - from) * 0.5 * (from + to);
@@ -210,21 +281,42 @@ fn part_of(sum: f32, moment: f32) -> [f32; 2] {
 }
 
 /// Where light changes from what it is at one end of a part to what it is at the other.
-fn edge(at: &impl Fn(f32) -> f32, [low, high]: [f32; 2], [here, next]: [f32; 2]) -> f32 {
+fn edge(at: &impl Fn(f32) -> Vec3, [low, high]: [f32; 2], [here, next]: [Vec3; 2]) -> f32 {
     let (mut before, mut behind) = (low, high);
     for _ in 0..HALVINGS {
         let middle = 0.5 * (before + behind);
         let seen = at(middle);
-        if (seen - here).abs() < (seen - next).abs() { before = middle } else { behind = middle }
+        let difference = |to: Vec3| (seen - to).abs().max_element();
+        if difference(here) < difference(next) { before = middle } else { behind = middle }
     }
     0.5 * (before + behind)
 }
 
+/// Mean of the channels.
+fn mean(of: Vec3) -> f32 {
+    // Of equal ones that is one of them, to the bit.
+    if of.x == of.y && of.y == of.z { of.x } else { of.element_sum() / 3.0 }
+}
+
+/// Pixels of a point's image that a way crosses.
+fn pixels(point: &PointDepths, [from, to]: [Vec3; 2]) -> f32 {
+    let seen = point.views.iter().find_map(|view| Some([view.sight(from)?, view.sight(to)?]));
+    seen.map_or(f32::INFINITY, |[a, b]| (a.pixel[0] - b.pixel[0]).abs().max((a.pixel[1] - b.pixel[1]).abs()))
+}
+
 impl View {
-    fn new(casters: &[PlacedMesh<'_>], camera: &Camera, origin: DVec3, progress: &Progress) -> Result<Self, Error> {
-        let planes = resolve_depth(casters, camera, Some(progress)).map_err(Error::of_polygons)?;
+    fn new(
+        casters: &[&Polygons<'_>],
+        camera: &Camera,
+        (origin, most): (DVec3, u64),
+        progress: &Progress,
+    ) -> Result<Self, Error> {
+        let (solid, panes): (Vec<&Polygons<'_>>, Vec<_>) = casters.iter().copied().partition(|p| p.is_opaque());
+        let solid: Vec<PlacedMesh<'_>> = solid.iter().map(|p| p.placed).collect();
+        let planes = resolve_depth(&solid, camera, Some(progress)).map_err(Error::of_polygons)?;
         let size = camera.size.map(|s| s as usize);
         Ok(Self {
+            layers: LightLayers::new(&panes, camera, most, progress)?,
             blocks: blocks(&planes.depth, size),
             planes,
             transform: camera.view_from_offset(origin),
@@ -263,8 +355,10 @@ impl View {
         }
         let (mut is_lit, mut is_dark) = (true, true);
         for y in rows {
-            for [least, most] in &self.blocks[y * self.size[0].div_ceil(BLOCK)..][columns.clone()] {
-                (is_lit, is_dark) = (is_lit && *least > far + reach, is_dark && *most < near - reach);
+            for block in columns.clone().map(|x| y * self.size[0].div_ceil(BLOCK) + x) {
+                let [least, most] = self.blocks[block];
+                let least = self.layers.as_ref().map_or(least, |layers| least.min(layers.nearest(block)));
+                (is_lit, is_dark) = (is_lit && least > far + reach, is_dark && most < near - reach);
             }
         }
         (is_lit || is_dark).then_some(is_lit)
@@ -278,33 +372,40 @@ impl View {
 }
 
 impl Sighted<'_> {
-    fn visibility(&self, bias: f32, face: Option<Vec3>) -> f32 {
-        let View { planes, size, is_parallel, .. } = self.view;
+    fn visibility(&self, bias: f32, face: Option<Vec3>) -> Vec3 {
+        let View { planes, layers, size, is_parallel, .. } = self.view;
         let (mut low, mut share) = ([0; 2], [0.0; 2]);
         for a in 0..2 {
             let place = (self.pixel[a] - 0.5).clamp(0.0, (size[a] - 1) as f32);
             low[a] = (place as usize).min(size[a].saturating_sub(2));
             share[a] = place - low[a] as f32;
         }
-        let width = self.view.width(self.at.z);
-        let (mut hidden, mut count) = (0.0, 0);
+        let reach = STEEPEST * self.view.width(self.at.z);
+        let (mut hidden, mut count, mut through) = (0.0, 0, Vec3::ZERO);
         for corner in 0..4 {
             let at = [corner & 1, corner >> 1];
             let [x, y] = [0, 1].map(|a| (low[a] + at[a]).min(size[a] - 1));
             let weight = [0, 1].map(|a| if at[a] == 0 { 1.0 - share[a] } else { share[a] });
+            let weight = weight[0] * weight[1];
             let middle = [x as f32 + 0.5, y as f32 + 0.5];
             let k = y * size[0] + x;
             let there = planes.depth[k];
-            let beside = planes.at(k, [self.pixel[0] - middle[0], self.pixel[1] - middle[1]], *is_parallel);
-            let reach = STEEPEST * width;
-            let is_before = beside.clamp(there - reach, there + reach) < self.at.z - bias
-                && face.is_none_or(|face| there < self.plane_at(face, middle) - bias);
-            if is_before {
-                (hidden, count) = (hidden + weight[0] * weight[1], count + 1);
+            let step = [self.pixel[0] - middle[0], self.pixel[1] - middle[1]];
+            let beside = planes.at(k, step, *is_parallel);
+            let is_other = |there: f32| face.is_none_or(|face| there < self.plane_at(face, middle) - bias);
+            if beside.clamp(there - reach, there + reach) < self.at.z - bias && is_other(there) {
+                (hidden, count) = (hidden + weight, count + 1);
+            } else if let Some(layers) = layers {
+                let share = layers.through(k, (step, reach, *is_parallel), self.at.z - bias, is_other);
+                through += weight * share;
             }
         }
-        // Nothing is lit by rounding.
-        if count == 4 { 0.0 } else { (1.0f32 - hidden).max(0.0) }
+        match layers {
+            Some(_) => through,
+            // Nothing is lit by rounding.
+            None if count == 4 => Vec3::ZERO,
+            None => Vec3::splat((1.0f32 - hidden).max(0.0)),
+        }
     }
 
     /// Depth of the plane through the place, of this normal, at the middle of a pixel.
@@ -341,9 +442,10 @@ pub(crate) struct Beside<'a> {
 impl Transmittance for Beside<'_> {
     fn transmittance(&self, receiver: &Receiver) -> [f32; 3] {
         let visible = self.depths.visibility(self.origin + receiver.position.as_dvec3(), None);
-        if visible == 0.0 {
-            return [0.0; 3];
+        if visible == [0.0; 3] {
+            return visible;
         }
-        self.others.map_or([1.0; 3], |others| others.transmittance(receiver)).map(|t| t * visible)
+        let others = self.others.map_or([1.0; 3], |others| others.transmittance(receiver));
+        [0, 1, 2].map(|c| others[c] * visible[c])
     }
 }

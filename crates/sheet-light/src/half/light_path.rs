@@ -34,8 +34,8 @@ pub(crate) struct LightPath {
     planes: Vec<(Vec3, f32)>,
     /// Lattice steps per unit of length, for directional light.
     direction: Vec3,
-    /// Depth across the slabs per unit of length, for directional light.
-    across: f32,
+    /// Slab coordinates per unit of length, for directional light.
+    travel: Vec3,
     /// Slab and lattice coordinates of a lamp.
     pub(crate) lamp: Option<[Vec3; 2]>,
 }
@@ -68,9 +68,15 @@ impl LightPath {
             highest: volume.ends()[1].as_vec3(),
             planes: volume.planes().map(|(normal, offset)| (normal.as_vec3(), offset as f32)).collect(),
             direction: (inverse * direction).as_vec3(),
-            across: frame.direction(direction).z as f32,
+            travel: frame.direction(direction).as_vec3(),
             lamp: lamp.map(|p| [frame.point(p).as_vec3(), lattice(p).as_vec3()]),
         }
+    }
+
+    /// The place that light passes so far before it comes to a place; slab coordinates.
+    pub(crate) fn before(&self, place: Vec3, distance: f32) -> Vec3 {
+        let travel = self.lamp.map_or(self.travel, |[lamp, _]| (place - lamp).normalize_or_zero());
+        place - travel * distance
     }
 
     /// The ways of light in the volume up to each place, of which the slab begins at depth `face`.
@@ -123,7 +129,7 @@ impl LightPath {
         let of = |v: f32| Lanes::splat(simd, v);
         let [x, y, z] = self.direction.to_array();
         let Some([slab, lattice]) = self.lamp else {
-            return (of(1.0), [of(x), of(y), of(z)], of(self.across));
+            return (of(1.0), [of(x), of(y), of(z)], of(self.travel.z));
         };
         let (mut from, mut towards) = ([of(0.0); 3], [of(0.0); 3]);
         for a in 0..3 {
@@ -179,6 +185,13 @@ impl<S: Simd> Ways<S> {
         let (zero, own) = (Lanes::splat(simd, 0.0), self.enters[SLAB]);
         let before = (self.entered() - self.leaves.max(own)).max(zero);
         [before, (self.entered().min(own) - self.leaves).max(zero)]
+    }
+
+    /// How far before a place that is beyond the volume light is amidst its way in the slab; 0 in the volume.
+    #[inline(always)]
+    pub(crate) fn beyond(&self, simd: S) -> Lanes<S> {
+        let [_, own] = self.lengths(simd);
+        own.mul_add(Lanes::splat(simd, 0.5), self.leaves).where_less(Lanes::splat(simd, 0.0), self.leaves)
     }
 
     /// Optical depth towards the light, of one extinction before the slab and another within it.

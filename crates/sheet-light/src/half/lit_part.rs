@@ -1,25 +1,35 @@
-//! Partial slabs for the light: of a ray's part in a slab, what a polygon lets light come to (section 4.1, Figure 7).
+//! Partial slabs for the light: of a ray's part in a slab, what polygons let light come to (section 4.1, Figure 7).
 //!
-//! Only that scatters light: of τ·∫₀¹ e^(−τx)·… dx the part from a to b is left, a ray's part of its own behind the optical depth
-//! τ·a, and what it has is weighed by the opacity of the whole.
+//! Only that scatters light: of τ·∫₀¹ e^(−τx)·… dx the parts from a to b are left, each a ray's part of its own behind the optical depth
+//! τ·a, and what they have is weighed by the opacity of the whole.
 
 use super::frame::Frame;
 use super::light_depth::LightDepths;
 use super::light_path::{Places, stored};
+use super::lit_way::{MOST_PARTS, WayPart};
 use splat_core::glam::DVec3;
 use splat_core::raster::lanes::{Lanes, MAX_LANES};
 use splat_core::raster::pulp::Simd;
 
-/// Shares of the way of neighbouring pixels' rays through a slab at which light begins and ends, from the end that is nearer to the eye.
-pub(crate) struct LitPart {
-    from: [f32; MAX_LANES],
-    to: [f32; MAX_LANES],
+/// What of the way of neighbouring pixels' rays through a slab light reaches.
+pub(crate) struct LitParts {
+    parts: [LitPart; MOST_PARTS],
+    /// Most parts of a ray.
+    count: usize,
     /// How much of the way each point of the light reaches, ray by ray, times its share of the light; 0 for all where each reaches all. Empty for a
     /// light of one point.
     pub(crate) by_point: Vec<f32>,
 }
 
-impl LitPart {
+/// A part of each ray's way: shares at which it begins and ends, from the end that is nearer to the eye, and what comes to it, by channel.
+#[derive(Clone, Copy)]
+pub(crate) struct LitPart {
+    from: [f32; MAX_LANES],
+    to: [f32; MAX_LANES],
+    through: [[f32; MAX_LANES]; 3],
+}
+
+impl LitParts {
     /// Of rays between two ends; `None` where all of them are lit, of those that are wanted.
     #[inline(always)]
     pub(crate) fn new<S: Simd>(
@@ -29,25 +39,44 @@ impl LitPart {
         wanted: &[f32; MAX_LANES],
     ) -> Option<Self> {
         let ends = [stored(nearer), stored(farther)];
-        let mut part = Self { from: [0.0; MAX_LANES], to: [1.0; MAX_LANES], by_point: Vec::new() };
+        let mut out = Self { parts: [LitPart::DARK; MOST_PARTS], count: 1, by_point: Vec::new() };
+        // Rays that nobody wants are of no meaning, but are numbers.
+        out.parts[0] = LitPart { to: [1.0; MAX_LANES], through: [[1.0; MAX_LANES]; 3], ..LitPart::DARK };
         let points = depths.points();
         let mut is_whole = true;
         for lane in (0..Lanes::<S>::COUNT).filter(|lane| wanted[*lane] > 0.0) {
             let world =
                 |end: &[[f32; MAX_LANES]; 3]| frame.world(DVec3::from_array([0, 1, 2].map(|a| end[a][lane].into())));
-            part.by_point.resize(lane * points, 0.0);
-            let [from, to] = depths.lit([world(&ends[0]), world(&ends[1])], &mut part.by_point);
-            (part.from[lane], part.to[lane]) = (from, to);
-            if from <= 0.0 && to >= 1.0 {
-                part.by_point.truncate(lane * points);
-            } else {
-                is_whole = false;
+            out.by_point.resize(lane * points, 0.0);
+            let way = depths.lit([world(&ends[0]), world(&ends[1])], &mut out.by_point);
+            if way.is_whole() {
+                out.by_point.truncate(lane * points);
+                continue;
+            }
+            is_whole = false;
+            out.count = out.count.max(way.parts().len());
+            for (n, part) in out.parts.iter_mut().enumerate() {
+                part.set(lane, way.parts().get(n));
             }
         }
-        (!is_whole).then_some(part)
+        (!is_whole).then_some(out)
     }
 
-    /// Where the lit part begins and ends.
+    /// The parts.
+    pub(crate) fn parts(&self) -> &[LitPart] {
+        &self.parts[..self.count]
+    }
+}
+
+impl LitPart {
+    const DARK: Self = Self { from: [0.0; MAX_LANES], to: [0.0; MAX_LANES], through: [[0.0; MAX_LANES]; 3] };
+
+    fn set(&mut self, lane: usize, of: Option<&WayPart>) {
+        (self.from[lane], self.to[lane]) = of.map_or((0.0, 0.0), |of| (of.from, of.to));
+        (0..3).for_each(|p| self.through[p][lane] = of.map_or(0.0, |of| of.through[p]));
+    }
+
+    /// Where the part begins and ends.
     #[inline(always)]
     pub(crate) fn ends<S: Simd>(&self, simd: S, [nearer, farther]: &[Places<S>; 2]) -> [Places<S>; 2] {
         let shares = [Lanes::load(simd, &self.from), Lanes::load(simd, &self.to)];
@@ -60,7 +89,7 @@ impl LitPart {
         out
     }
 
-    /// Optical depth of the lit part, by plane.
+    /// Optical depth of the part, by plane.
     pub(crate) fn optical_depth(&self, whole: &[[f32; MAX_LANES]; 3]) -> [[f32; MAX_LANES]; 3] {
         let mut own = *whole;
         for plane in &mut own {
@@ -69,15 +98,21 @@ impl LitPart {
         own
     }
 
-    /// Turns mean transmittances of the lit part into those of the whole: e^(−τa)·(1 − e^(−τ(b − a)))/(1 − e^(−τ)).
-    pub(crate) fn weigh(&self, whole: &[[f32; MAX_LANES]; 3], through: &mut [[f32; MAX_LANES]; 3]) {
-        for (through, tau) in through.iter_mut().zip(whole) {
+    /// Adds mean transmittances of the part to those of the whole: e^(−τa)·(1 − e^(−τ(b − a)))/(1 − e^(−τ)), times what comes to it.
+    pub(crate) fn add(
+        &self,
+        whole: &[[f32; MAX_LANES]; 3],
+        own: &[[f32; MAX_LANES]; 3],
+        to: &mut [[f32; MAX_LANES]; 3],
+    ) {
+        for p in 0..3 {
             for lane in 0..MAX_LANES {
-                let (tau, length) = (tau[lane].max(f32::MIN_POSITIVE), self.to[lane] - self.from[lane]);
+                let (tau, length) = (whole[p][lane].max(f32::MIN_POSITIVE), self.to[lane] - self.from[lane]);
                 let share = libm::expm1f(-tau * length) / libm::expm1f(-tau);
                 // What is too thin for a quotient is lit by its length.
                 let share = if share.is_finite() { share } else { length };
-                through[lane] *= libm::expf(-tau * self.from[lane]) * share;
+                let through = libm::expf(-tau * self.from[lane]) * share * self.through[p][lane];
+                to[p][lane] += own[p][lane] * through;
             }
         }
     }

@@ -1,4 +1,4 @@
-//! Light of one sweep on polygons, slab by slab (steps 7, 22 and 25 of the pseudocode, Table 1).
+//! Light of one sweep on polygons, opaque and translucent ones, slab by slab (steps 7, 22 and 25 of the pseudocode, Table 1).
 //!
 //! Before the first slab there is nothing but polygons between a place and the light; among the slabs what lies before the present one is known
 //! by the light buffer, and its own slab counts as far as light has come in it; behind the last slab all of them count. A polygon
@@ -7,7 +7,7 @@
 use super::frame::Frame;
 use super::illuminate::{Around, Illumination, ThroughVolumes};
 use super::light_depth::LightDepths;
-use super::polygons::{EyePolygons, Seen};
+use super::polygons::{EyePolygons, Seen, Surfaces};
 use super::scatter::SurfaceLight;
 use super::splat_light::SplatLight;
 use super::splat_squares::BySlab;
@@ -15,32 +15,33 @@ use super::splats::Lamps;
 use rayon::prelude::*;
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::raster::{OpaqueImage, pulp};
-use splat_core::shade::{ChannelLayout, LitBy, MAX_CHANNELS, arriving};
+use splat_core::shade::{ChannelLayout, LitBy, MAX_CHANNELS, Point, Radiance, arriving};
 use splat_core::{Accumulator, Camera};
 
 /// Pixels of one task.
 const CHUNK: usize = 256;
 
-/// What of a light reaches the pixels that show polygons.
+/// What of a light reaches the places on polygons that pixels show.
 pub(crate) struct PolygonLight<'a> {
-    of: &'a EyePolygons<'a>,
+    of: &'a Surfaces<'a>,
     camera: &'a Camera,
     depths: Option<&'a LightDepths>,
-    /// By pixel: share by channel; all of it before the sweep comes to it.
+    /// By place: share by channel; all of it before the sweep comes to it.
     through: Vec<[f32; 3]>,
 }
 
-/// The pixels that show polygons by the slab that these lie in.
+/// The places on polygons that pixels show by the slab that they lie in.
 pub(crate) struct PolygonSlabs {
-    places: Vec<Vec3>,
+    /// Slab coordinates.
+    pub(crate) places: Vec<Vec3>,
     /// Those behind the last slab are in one more.
-    by_slab: BySlab,
-    /// Pixels before the first body, among them, and behind the last.
+    pub(crate) by_slab: BySlab,
+    /// Places before the first body, among them, and behind the last.
     pub(crate) regions: [u64; 3],
 }
 
 impl PolygonSlabs {
-    pub(crate) fn new(of: &EyePolygons<'_>, frame: &Frame, camera: &Camera, [near, far]: [f32; 2]) -> Self {
+    pub(crate) fn new(of: &Surfaces<'_>, frame: &Frame, camera: &Camera, [near, far]: [f32; 2]) -> Self {
         let place = |world: DVec3| frame.point(world).as_vec3();
         let places: Vec<Vec3> = of.places(camera).into_par_iter().map(place).collect();
         let (count, width) = (frame.slabs.count, frame.slabs.width as f32);
@@ -58,12 +59,12 @@ impl PolygonSlabs {
 
 impl<'a> PolygonLight<'a> {
     /// Light that comes to all of them, but for polygons in its way.
-    pub(crate) fn new(of: &'a EyePolygons<'a>, camera: &'a Camera, depths: Option<&'a LightDepths>) -> Self {
-        let mut through = vec![[1.0; 3]; of.pixels.len()];
+    pub(crate) fn new(of: &'a Surfaces<'a>, camera: &'a Camera, depths: Option<&'a LightDepths>) -> Self {
+        let mut through = vec![[1.0; 3]; of.count()];
         if let Some(depths) = depths {
-            through.par_iter_mut().zip(&of.pixels).for_each(|(through, pixel)| {
-                let Seen { world, face, .. } = of.seen(*pixel, camera);
-                *through = [depths.visibility(world, Some(face)); 3];
+            through.par_iter_mut().enumerate().for_each(|(rank, through)| {
+                let Seen { world, face, .. } = of.seen(rank, camera);
+                *through = depths.visibility(world, Some(face));
             });
         }
         Self { of, camera, depths, through }
@@ -110,7 +111,7 @@ impl<'a> PolygonLight<'a> {
     fn visible(&self, ranks: &[u32]) -> Vec<f32> {
         let Some(depths) = self.depths else { return Vec::new() };
         let of = |rank: &u32| {
-            let Seen { world, face, .. } = self.of.seen(self.of.pixels[*rank as usize], self.camera);
+            let Seen { world, face, .. } = self.of.seen(*rank as usize, self.camera);
             depths.visible(world, Some(face))
         };
         ranks.iter().flat_map(of).collect()
@@ -130,13 +131,9 @@ impl<'a> PolygonLight<'a> {
         chunks.enumerate().for_each(|(chunk, (values, received))| {
             for (k, (values, received)) in values.chunks_exact_mut(channels).zip(received).enumerate() {
                 let rank = chunk * CHUNK + k;
-                let seen = self.of.seen(self.of.pixels[rank], self.camera);
+                let seen = self.of.seen(rank, self.camera);
                 self.add(&seen, rank, (lamps, &lights, origin), (&layout, values, received));
-                if let (Some(diffuse), Some(lit), Some(first)) = (diffuse, &lamps.carried, layout.multiple()) {
-                    let (point, of) = (seen.point(), seen.of.material);
-                    let shown = diffuse.reflected(seen.world, point.normal.as_dvec3(), (of, point.color), &lit.light);
-                    (0..3).for_each(|c| values[first + c] += shown[c]);
-                }
+                add_diffuse(diffuse, &lamps.carried, &seen, &layout, values);
             }
         });
     }
@@ -149,6 +146,26 @@ impl<'a> PolygonLight<'a> {
         (lamps, lights, origin): (&Lamps<'_>, &[LitBy<'_>], DVec3),
         (layout, values, received): (&ChannelLayout, &mut [f32], &mut [f32; 2]),
     ) {
+        let (point, radiance) = self.radiance(seen, rank, (lamps, lights, origin));
+        if seen.of.is_lit() {
+            let all: f32 = lights.iter().map(|lit| point.irradiance(lit).1[1]).sum();
+            *received = [received[0] + radiance.shadow * all, received[1] + all];
+        }
+        let mut own = [0.0; MAX_CHANNELS];
+        radiance.write(point.normal, layout, &mut own);
+        let colors = layout.colors();
+        (0..colors).for_each(|c| values[c] += own[c]);
+        // The normal is the same under all lights, and the shadow is found at the end.
+        values[colors..].copy_from_slice(&own[colors..layout.count()]);
+    }
+
+    /// What one place shows of the lights of the sweep, the carried one first.
+    pub(crate) fn radiance<'s>(
+        &self,
+        seen: &Seen<'s>,
+        rank: usize,
+        (lamps, lights, origin): (&Lamps<'_>, &[LitBy<'_>], DVec3),
+    ) -> (Point<'s>, Radiance) {
         let (point, is_carried) = (seen.point(), lamps.carried.is_some());
         let mut radiance = point.radiance(lamps.ambient, lights.iter(), |light, irradiance| {
             let own = if is_carried && light == 0 { self.through[rank] } else { [1.0; 3] };
@@ -158,19 +175,25 @@ impl<'a> PolygonLight<'a> {
             };
             arriving(irradiance, seen.of.shadow_coefficient, Some(shadow))
         });
-        if seen.of.is_lit() {
-            let all: f32 = lights.iter().map(|lit| point.irradiance(lit).1[1]).sum();
-            *received = [received[0] + radiance.shadow * all, received[1] + all];
-        }
         if lamps.light_alone {
             (radiance.ambient, radiance.emission) = ([0.0; 3], [0.0; 3]);
         }
-        let mut own = [0.0; MAX_CHANNELS];
-        radiance.write(point.normal, layout, &mut own);
-        let colors = layout.colors();
-        (0..colors).for_each(|c| values[c] += own[c]);
-        // The normal is the same under all lights, and the shadow is found at the end.
-        values[colors..].copy_from_slice(&own[colors..layout.count()]);
+        (point, radiance)
+    }
+}
+
+/// Adds what a place shows of light that is scattered to surfaces.
+pub(crate) fn add_diffuse(
+    diffuse: Option<&SurfaceLight>,
+    carried: &Option<LitBy<'_>>,
+    seen: &Seen<'_>,
+    layout: &ChannelLayout,
+    values: &mut [f32],
+) {
+    if let (Some(diffuse), Some(lit), Some(first)) = (diffuse, carried, layout.multiple()) {
+        let (point, of) = (seen.point(), seen.of.material);
+        let shown = diffuse.reflected(seen.world, point.normal.as_dvec3(), (of, point.color), &lit.light);
+        (0..3).for_each(|c| values[first + c] += shown[c]);
     }
 }
 
@@ -185,7 +208,7 @@ pub(crate) struct PolygonImage {
 
 impl PolygonImage {
     pub(crate) fn new(of: &EyePolygons<'_>, layout: &ChannelLayout) -> Self {
-        let pixels = of.pixels.len();
+        let pixels = of.seen.count();
         Self { layout: *layout, values: vec![0.0; pixels * layout.count()], received: vec![[0.0; 2]; pixels] }
     }
 
@@ -210,16 +233,16 @@ impl PolygonImage {
             channels: vec![vec![0.0; pixels]; channels],
             object: if keeps { vec![u32::MAX; pixels] } else { Vec::new() },
         };
-        for (rank, pixel) in of.pixels.iter().enumerate() {
-            let k = *pixel as usize;
-            image.depth[k] = of.depth(*pixel);
+        for rank in 0..of.seen.count() {
+            let k = of.seen.pixel(rank) as usize;
+            image.depth[k] = of.seen.depth(rank);
             (0..channels).for_each(|c| image.channels[c][k] = self.values[rank * channels + c]);
             if let Some(shadow) = self.layout.shadow() {
                 let [received, all] = self.received[rank];
                 image.channels[shadow][k] = if all > 0.0 { received / all } else { 1.0 };
             }
             if keeps {
-                image.object[k] = of.object(*pixel);
+                image.object[k] = of.seen.polygons(rank).object;
             }
         }
         image

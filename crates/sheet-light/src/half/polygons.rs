@@ -1,17 +1,20 @@
-//! Opaque polygons: triangles that stay triangles, and the buffers of the eye (steps 1, 7 and 25 of the pseudocode).
+//! Polygons: triangles that stay triangles, and the buffers of the eye (steps 1, 7 and 25 of the pseudocode).
 //!
-//! They are rasterized once for the eye: depth, normal and colour of the nearest. Nothing that is drawn in slabs lies behind them, so
-//! rays end there, and what they show is seen behind all else. What light they show is found when a sweep has come to them.
+//! They are rasterized once for the eye. Of opaque ones the nearest counts: nothing that is drawn in slabs lies behind it, so rays end there, and
+//! what it shows is seen behind all else. Of translucent ones all count that lie before it, in a list a pixel ([`EyePanes`]). What light they show is
+//! found when a sweep has come to them.
 
 use super::HalfInput;
 use crate::Error;
 use rayon::prelude::*;
 use splat_core::glam::{DVec3, Vec3};
-use splat_core::raster::triangles::{PlacedMesh, TriangleHit, TriangleImage, resolve};
+use splat_core::optics::SurfaceOpacity;
+use splat_core::raster::triangles::{PlacedMesh, TriangleHit, TriangleLayer, resolve, resolve_layers};
 use splat_core::shade::{Point, facing};
 use splat_core::{Camera, Material, Progress, Receiver, Shading, SplatKind};
+use std::ops::Range;
 
-/// A mesh of opaque polygons.
+/// A mesh of polygons.
 #[derive(Debug, Clone, Copy)]
 pub struct Polygons<'a> {
     /// The triangles, with normals and colours where these are known.
@@ -20,6 +23,9 @@ pub struct Polygons<'a> {
     pub material: &'a Material,
     /// Linear Rec.709; a factor on the colours of the mesh where it has any.
     pub color: [f32; 3],
+    /// Optical depth of one crossing of a triangle, times [`Material::extinction_rgb`] by channel and, of a thin slab, 1/|cos θ|; ≥ 0, +∞ for what
+    /// is opaque.
+    pub optical_depth: f32,
     /// Id of the object.
     pub object: u32,
     /// Share of shadows that it takes, in \[0, 1\].
@@ -31,13 +37,41 @@ pub struct Polygons<'a> {
 }
 
 /// What the eye sees of polygons.
-pub(crate) struct EyePolygons<'a> {
+pub(crate) struct Eye<'a> {
     of: &'a [Polygons<'a>],
-    image: TriangleImage,
+    /// Opaque ones.
+    pub(crate) solid: Option<EyePolygons<'a>>,
+    /// Translucent ones.
+    pub(crate) panes: Option<EyePanes<'a>>,
+}
+
+/// What the eye sees of opaque polygons.
+pub(crate) struct EyePolygons<'a> {
+    pub(crate) seen: Surfaces<'a>,
     /// View depth of whatever hides things behind it.
     pub(crate) opaque: Vec<f32>,
-    /// Pixels that show a polygon, ascending.
-    pub(crate) pixels: Vec<u32>,
+}
+
+/// What the eye sees of translucent polygons: pixel by pixel, nearest first.
+pub(crate) struct EyePanes<'a> {
+    pub(crate) seen: Surfaces<'a>,
+    /// Where those of each pixel begin; and the end.
+    starts: Vec<u32>,
+}
+
+/// Places on polygons that pixels show.
+pub(crate) struct Surfaces<'a> {
+    of: Vec<&'a Polygons<'a>>,
+    hits: Vec<Hit>,
+}
+
+/// A place on a polygon.
+#[derive(Debug, Clone, Copy)]
+struct Hit {
+    pixel: u32,
+    /// View depth.
+    depth: f32,
+    on: TriangleHit,
 }
 
 /// A place on a polygon that a pixel shows.
@@ -53,28 +87,48 @@ pub(crate) struct Seen<'a> {
 }
 
 impl Polygons<'_> {
+    /// Whether no light comes through.
+    pub fn is_opaque(&self) -> bool {
+        self.optical_depth == f32::INFINITY
+    }
+
     /// Whether it asks for light at all.
     pub(crate) fn is_lit(&self) -> bool {
         self.material.shading != Shading::Unlit
     }
+
+    /// Optical depth by channel of one crossing, at this cosine of the ray to the normal, which few ask for.
+    pub(crate) fn crossing(&self, cosine: impl FnOnce() -> f32) -> [f32; 3] {
+        let slanted = match self.material.surface_opacity {
+            SurfaceOpacity::PerCrossing => 1.0,
+            law @ SurfaceOpacity::ThinSlab => law.optical_depth_factor(cosine()),
+        };
+        self.material.extinction_rgb.map(|factor| self.optical_depth * slanted * factor)
+    }
+
+    /// Unit normal of a triangle in the world.
+    pub(crate) fn face(&self, on: &TriangleHit) -> Vec3 {
+        self.placed.transform.rotate(on.face(self.placed.mesh).as_dvec3()).as_vec3()
+    }
 }
 
-impl<'a> EyePolygons<'a> {
-    /// Those of an input; `None` without any.
-    pub(crate) fn new(input: &HalfInput<'a>, progress: &Progress) -> Result<Option<Self>, Error> {
-        if input.polygons.is_empty() {
-            return Ok(None);
-        }
-        let meshes: Vec<PlacedMesh<'_>> = input.polygons.iter().map(|p| p.placed).collect();
-        let image = resolve(&meshes, input.sheets.camera, Some(progress)).map_err(Error::of_polygons)?;
-        let hides = |k: usize| input.opaque.get(k).copied().unwrap_or(f32::INFINITY);
-        let is_seen = |k: &u32| {
-            let k = *k as usize;
-            image.hits[k] != TriangleHit::NONE && image.depth[k] < hides(k)
+impl<'a> Eye<'a> {
+    /// That of an input, whose lists of translucent polygons may take `most` bytes.
+    pub(crate) fn new(input: &HalfInput<'a>, most: u64, progress: &Progress) -> Result<Self, Error> {
+        let of = |opaque: bool| input.polygons.iter().filter(|p| p.is_opaque() == opaque).collect::<Vec<_>>();
+        let (solid, panes, camera) = (of(true), of(false), input.sheets.camera);
+        let solid = match solid.is_empty() {
+            true => None,
+            false => Some(EyePolygons::new(solid, (camera, input.opaque), progress)?),
         };
-        let pixels: Vec<u32> = (0..image.depth.len() as u32).filter(is_seen).collect();
-        let opaque = (0..image.depth.len()).map(|k| image.depth[k].min(hides(k))).collect();
-        Ok(Some(Self { of: input.polygons, image, opaque, pixels }))
+        let panes = match panes.is_empty() {
+            true => None,
+            false => {
+                let opaque = solid.as_ref().map_or(input.opaque, |solid| &solid.opaque);
+                Some(EyePanes::new(panes, (camera, opaque), most, progress)?)
+            }
+        };
+        Ok(Self { of: input.polygons, solid, panes })
     }
 
     /// Whether any asks for light.
@@ -83,43 +137,107 @@ impl<'a> EyePolygons<'a> {
     }
 
     /// Those that cast shadows.
-    pub(crate) fn casters(&self) -> Vec<PlacedMesh<'a>> {
-        self.of.iter().filter(|p| p.casts_shadow).map(|p| p.placed).collect()
+    pub(crate) fn casters(&self) -> Vec<&'a Polygons<'a>> {
+        self.of.iter().filter(|p| p.casts_shadow).collect()
     }
 
-    /// View depth of the polygon that a pixel shows.
-    pub(crate) fn depth(&self, pixel: u32) -> f32 {
-        self.image.depth[pixel as usize]
-    }
-
-    /// Object of the polygon that a pixel shows.
-    pub(crate) fn object(&self, pixel: u32) -> u32 {
-        self.of[self.image.hits[pixel as usize].mesh as usize].object
-    }
-
-    /// A box around all that is seen of them; world.
+    /// All places that are seen of them; world.
     pub(crate) fn places(&self, camera: &Camera) -> Vec<DVec3> {
-        self.pixels.par_iter().map(|pixel| self.seen(*pixel, camera).world).collect()
+        let all = self.solid.iter().map(|solid| &solid.seen).chain(self.panes.iter().map(|panes| &panes.seen));
+        all.flat_map(|seen| seen.places(camera)).collect()
+    }
+}
+
+impl<'a> EyePolygons<'a> {
+    fn new(of: Vec<&'a Polygons<'a>>, (camera, opaque): (&Camera, &[f32]), progress: &Progress) -> Result<Self, Error> {
+        let meshes: Vec<PlacedMesh<'_>> = of.iter().map(|p| p.placed).collect();
+        let image = resolve(&meshes, camera, Some(progress)).map_err(Error::of_polygons)?;
+        let hides = |k: usize| opaque.get(k).copied().unwrap_or(f32::INFINITY);
+        let hit = |k: usize| {
+            let (on, depth) = (image.hits[k], image.depth[k]);
+            (on != TriangleHit::NONE && depth < hides(k)).then_some(Hit { pixel: k as u32, depth, on })
+        };
+        let hits = (0..image.depth.len()).filter_map(hit).collect();
+        let opaque = (0..image.depth.len()).map(|k| image.depth[k].min(hides(k))).collect();
+        Ok(Self { seen: Surfaces { of, hits }, opaque })
+    }
+}
+
+impl<'a> EyePanes<'a> {
+    fn new(
+        of: Vec<&'a Polygons<'a>>,
+        (camera, opaque): (&Camera, &[f32]),
+        most: u64,
+        progress: &Progress,
+    ) -> Result<Self, Error> {
+        let meshes: Vec<PlacedMesh<'_>> = of.iter().map(|p| p.placed).collect();
+        let hit = |k: usize, at: &TriangleLayer| Hit { pixel: k as u32, depth: at.depth, on: at.hit };
+        let none = Hit { pixel: 0, depth: 0.0, on: TriangleHit::NONE };
+        // What else is kept of each takes as much again and more.
+        let most = most / (BYTES_OF_A_PANE / size_of::<Hit>() as u64);
+        let layers = resolve_layers(&meshes, camera, (opaque, most), (none, hit), Some(progress));
+        let (starts, hits) = layers.map_err(Error::of_polygons)?.into_lists();
+        Ok(Self { seen: Surfaces { of, hits }, starts })
     }
 
-    /// What a pixel shows, one of [`EyePolygons::pixels`].
-    pub(crate) fn seen(&self, pixel: u32, camera: &Camera) -> Seen<'a> {
-        let (hit, width) = (&self.image.hits[pixel as usize], camera.size[0]);
-        let of = &self.of[hit.mesh as usize];
+    /// Ranks of those that a pixel shows, nearest first.
+    #[inline]
+    pub(crate) fn of_pixel(&self, pixel: usize) -> Range<u32> {
+        self.starts[pixel]..self.starts[pixel + 1]
+    }
+
+    /// Bytes of the lists, and of what sweeps keep of them.
+    pub(crate) fn bytes(&self) -> u64 {
+        4 * self.starts.len() as u64 + BYTES_OF_A_PANE * self.seen.count() as u64
+    }
+}
+
+/// Bytes of a place on a translucent polygon: itself, where it lies in slabs, its light.
+const BYTES_OF_A_PANE: u64 = 72;
+
+impl<'a> Surfaces<'a> {
+    /// Places.
+    pub(crate) fn count(&self) -> usize {
+        self.hits.len()
+    }
+
+    /// Pixel that shows a place.
+    pub(crate) fn pixel(&self, rank: usize) -> u32 {
+        self.hits[rank].pixel
+    }
+
+    /// View depth of a place.
+    pub(crate) fn depth(&self, rank: usize) -> f32 {
+        self.hits[rank].depth
+    }
+
+    /// What a place lies on.
+    pub(crate) fn polygons(&self, rank: usize) -> &'a Polygons<'a> {
+        self.of[self.hits[rank].on.mesh as usize]
+    }
+
+    /// All places; world.
+    pub(crate) fn places(&self, camera: &Camera) -> Vec<DVec3> {
+        (0..self.count()).into_par_iter().map(|rank| self.seen(rank, camera).world).collect()
+    }
+
+    /// What a pixel shows.
+    pub(crate) fn seen(&self, rank: usize, camera: &Camera) -> Seen<'a> {
+        let (Hit { pixel, depth, on }, width) = (&self.hits[rank], camera.size[0]);
+        let of = self.of[on.mesh as usize];
         let PlacedMesh { mesh, transform } = of.placed;
-        let turned = |n: Vec3| transform.rotate(n.as_dvec3()).as_vec3();
-        let (normal, face) = (turned(hit.normal(mesh)), turned(hit.face(mesh)));
+        let (normal, face) = (transform.rotate(on.normal(mesh).as_dvec3()).as_vec3(), of.face(on));
         let (from, along) = camera.view_ray(f64::from(pixel % width) + 0.5, f64::from(pixel / width) + 0.5);
         let [right, up, forward] = camera.axes;
         let world = |v: DVec3| right * v.x + up * v.y + forward * v.z;
         let (from, along) = (camera.position + world(from), world(along));
         // By the plane of the triangle, in more digits than the depth has.
-        let corner = mesh.position[mesh.triangles[hit.triangle as usize][0] as usize].as_dvec3();
-        let plane = transform.rotate(exact_face(hit, of));
+        let corner = mesh.position[mesh.triangles[on.triangle as usize][0] as usize].as_dvec3();
+        let plane = transform.rotate(exact_face(on, of));
         let exact = (transform.apply(mesh.origin + corner) - from).dot(plane) / along.dot(plane);
-        let depth = f64::from(self.image.depth[pixel as usize]);
+        let depth = f64::from(*depth);
         let depth = if (exact - depth).abs() <= 1e-4 * depth { exact } else { depth };
-        let of_mesh = hit.color(mesh).unwrap_or([1.0; 3]);
+        let of_mesh = on.color(mesh).unwrap_or([1.0; 3]);
         Seen {
             of,
             world: from + along * depth,
@@ -132,19 +250,23 @@ impl<'a> EyePolygons<'a> {
 }
 
 /// Normal of a triangle in its mesh's own space, in double precision.
-fn exact_face(hit: &TriangleHit, of: &Polygons<'_>) -> DVec3 {
+fn exact_face(on: &TriangleHit, of: &Polygons<'_>) -> DVec3 {
     let mesh = of.placed.mesh;
-    let [p, q, r] = mesh.triangles[hit.triangle as usize].map(|v| mesh.position[v as usize].as_dvec3());
+    let [p, q, r] = mesh.triangles[on.triangle as usize].map(|v| mesh.position[v as usize].as_dvec3());
     (q - p).cross(r - p).normalize_or_zero()
 }
 
 impl<'a> Seen<'a> {
+    fn kind(&self) -> SplatKind {
+        if self.of.is_opaque() { SplatKind::Opaque } else { SplatKind::Surface }
+    }
+
     /// The place as it is shaded.
     pub(crate) fn point(&self) -> Point<'a> {
         Point {
             position: self.world,
             radius: 0.0,
-            normal: facing(SplatKind::Opaque, self.face, self.normal, self.to_eye),
+            normal: facing(self.kind(), self.face, self.normal, self.to_eye),
             to_eye: self.to_eye,
             color: self.color,
             material: self.of.material,
@@ -154,6 +276,11 @@ impl<'a> Seen<'a> {
     /// The place as it asks shadow maps for light.
     pub(crate) fn receiver(&self, origin: DVec3) -> Receiver {
         let position = (self.world - origin).as_vec3();
-        Receiver { position, normal: self.face, radius: self.of.radius, kind: SplatKind::Opaque }
+        Receiver { position, normal: self.face, radius: self.of.radius, kind: self.kind() }
+    }
+
+    /// Optical depth by channel that it has for the eye.
+    pub(crate) fn crossing(&self) -> [f32; 3] {
+        self.of.crossing(|| self.to_eye.dot(self.face))
     }
 }

@@ -1,7 +1,7 @@
 //! The slow form in f64: the same sheets pixel by pixel, voxel by voxel, without bands, buckets, vectors, bounds or skipped voxels,
 //! and light on the way through a slab summed step by step.
 //!
-//! Normals are those of `normal.rs`, splats those of `splats.rs`, opaque polygons those of `polygons.rs`. Light that is scattered more than once is that of
+//! Normals are those of `normal.rs`, splats those of `splats.rs`, polygons those of `polygons.rs`. Light that is scattered more than once is that of
 //! `scatter.rs`, of volumes alone.
 
 mod normal;
@@ -152,9 +152,10 @@ impl<'a> View<'a> {
         let mut sums: Sums = vec![vec![[0.0; 2]; pixels(&light.camera)]; self.placed.len()];
         let n: usize = pixels(camera);
         let opaque = |at: usize| self.input.opaque.get(at).map_or(f64::INFINITY, |depth| f64::from(*depth));
-        let seen = |at: usize| self.polygons.seen(&eye, at).filter(|hit| hit.depth < opaque(at));
+        let seen = |at: usize| self.polygons.nearest(&eye, at).filter(|hit| hit.depth < opaque(at));
         let hits: Vec<Option<Hit>> = (0..n).map(seen).collect();
         eye.ends = hits.iter().enumerate().map(|(at, hit)| hit.map_or(opaque(at), |hit| hit.depth)).collect();
+        let panes: Vec<Vec<Hit>> = (0..n).map(|at| self.polygons.before(&eye, at)).collect();
         let mut polygons = vec![[0.0; 3]; n];
         let mut splats = self.input.splats.as_ref().map(|splats| Splats::new(splats, self, &light));
         let mut out = Picture { optical_depth: vec![0.0; n], color: vec![[0.0; 3]; n] };
@@ -169,11 +170,14 @@ impl<'a> View<'a> {
             }
             let carried = (&light, &sums, splats.as_ref());
             for at in 0..n {
-                let mut fragment = self.fragment(&eye, carried, &around, (slab, at, lit, with_ambient));
-                if let Some(splats) = &splats {
-                    fragment = splats.mix((&eye, at), &shown, fragment);
+                let own: Vec<&Hit> = panes[at].iter().filter(|hit| self.slab_of(hit) == slab).collect();
+                let fragments = self.parted(&own, (slab, carried, (lit, with_ambient)), |part| {
+                    let own = self.fragment(&eye, carried, &around, (slab, at, lit, with_ambient), part);
+                    splats.as_ref().map_or(own, |splats| splats.mix((&eye, at), &shown, (part, own)))
+                });
+                for fragment in fragments {
+                    self.composite(fragment, (&mut out.optical_depth[at], &mut out.color[at]));
                 }
-                self.composite(fragment, (&mut out.optical_depth[at], &mut out.color[at]));
             }
             self.light_polygons((&hits, slab), carried, (lit, with_ambient), &mut polygons);
             self.attenuate(&light, &around[1], slab, &mut sums);
@@ -182,7 +186,9 @@ impl<'a> View<'a> {
         if let Some(splats) = &mut splats {
             splats.enter(last, self, (&light, &sums), lit);
         }
-        self.light_polygons((&hits, last), (&light, &sums, splats.as_ref()), (lit, with_ambient), &mut polygons);
+        let carried = (&light, &sums, splats.as_ref());
+        self.light_polygons((&hits, last), carried, (lit, with_ambient), &mut polygons);
+        self.add_behind(&panes, (last, carried, (lit, with_ambient)), &mut out);
         for (at, shown) in polygons.iter().enumerate() {
             let through = libm::exp(-out.optical_depth[at]);
             (0..3).for_each(|c| out.color[at][c] += through * shown[c]);
@@ -289,17 +295,20 @@ impl<'a> View<'a> {
         ray.from + ray.along * ((depth - ray.from.z) / ray.along.z)
     }
 
-    /// Optical depth of a pixel in a slab and its radiance.
+    /// Optical depth of a pixel in a slab between two depths, and its radiance.
     fn fragment(
         &self,
         eye: &Image,
         (light, sums, splats): Carried<'_, '_>,
         around: &[Vec<Vec<Reaching>>; 3],
         (slab, at, lit, with_ambient): (u32, usize, &LitBy<'_>, bool),
+        [low, high]: [f64; 2],
     ) -> (f64, [f64; 3]) {
         let voxels = &around[1];
-        let parts: Vec<Option<Part>> =
-            (0..self.placed.len()).map(|v| self.part(eye, &voxels[v], v, slab, at)).collect();
+        // All parts of a slab have its value.
+        let cut = |part: Part| Part { near: part.near.max(low), far: part.far.min(high), ..part };
+        let part = |v: usize| self.part(eye, &voxels[v], v, slab, at).map(cut).filter(|part| part.near < part.far);
+        let parts: Vec<Option<Part>> = (0..self.placed.len()).map(part).collect();
         let extinction: Vec<f64> = parts
             .iter()
             .enumerate()
@@ -323,11 +332,12 @@ impl<'a> View<'a> {
         for n in 0..STEPS {
             let x = (n as f64 + 0.5) / STEPS as f64;
             let place = first + (last - first) * x;
-            if !self.polygons.sees(&lit.light, self.frame.world(place), None) {
+            let seen = self.polygons.through(&lit.light, self.frame.world(place), None);
+            if seen == 0.0 {
                 continue;
             }
             let way = before + self.light_depth(&lit.light, place, slab, &means, &extinction);
-            arrives += all * libm::exp(-all * x - way) / STEPS as f64;
+            arrives += seen * all * libm::exp(-all * x - way) / STEPS as f64;
         }
         let mean = arrives / -libm::expm1(-all);
         let mut color = [0.0; 3];
@@ -367,7 +377,16 @@ impl<'a> View<'a> {
     /// Optical depth of the volumes on the way of light to a place in a slab, whose own extinction there counts in it.
     fn through_volumes(&self, (light, sums): (&Image, &Sums), lamp: &Light, (place, slab): (DVec3, u32)) -> f64 {
         let world = self.frame.world(place);
-        let own = |volume: &Volume<'_>| volume.extinction_at(world) * f64::from(volume.material.extinction_rgb[1]);
+        let back = -super::serves::travel(lamp, world);
+        let begins = (place.z - f64::from(slab) * self.frame.slabs.width).max(0.0) / -self.frame.direction(back).z;
+        let own = |volume: &Volume<'_>| {
+            let inverse = volume.axes().inverse();
+            let way =
+                clip(volume, inverse * (world - volume.origin()), inverse * back).filter(|[leaves, _]| *leaves > 0.0);
+            // Beyond the volume that amidst the way in the slab.
+            let beyond = way.map_or(0.0, |[leaves, enters]| leaves + 0.5 * (enters.min(begins) - leaves).max(0.0));
+            volume.extinction_at(world + back * beyond) * f64::from(volume.material.extinction_rgb[1])
+        };
         let extinction: Vec<f64> = self.placed.iter().map(|placed| own(placed.volume)).collect();
         let means = self.means(light, sums, place, &extinction);
         self.light_depth(lamp, place, slab, &means, &extinction)

@@ -262,10 +262,12 @@ impl Sheet {
         [extinction.where_less(Lanes::splat(simd, LEAST_WEIGHT), weight), red, green, blue]
     }
 
-    /// Depth of what each ray from pixel `k` on has of slab and volume, 0 for none.
+    /// Depth of what each ray from pixel `k` on has of slab and volume between two depths, 0 for none.
     #[inline(always)]
-    pub(crate) fn depth<S: Simd>(&self, simd: S, k: usize) -> Lanes<S> {
-        (Lanes::load(simd, &self.far[k..]) - Lanes::load(simd, &self.near[k..])).max(Lanes::splat(simd, 0.0))
+    pub(crate) fn depth<S: Simd>(&self, simd: S, k: usize, [lower, upper]: &[[f32; MAX_LANES]; 2]) -> Lanes<S> {
+        let near = Lanes::load(simd, &self.near[k..]).max(Lanes::load(simd, lower));
+        let far = Lanes::load(simd, &self.far[k..]).min(Lanes::load(simd, upper));
+        (far - near).max(Lanes::splat(simd, 0.0))
     }
 }
 

@@ -38,7 +38,8 @@ pub struct HalfSplats<'a> {
     pub objects: &'a [Object],
     /// Footprints by id.
     pub footprints: &'a FootprintStack,
-    /// Their footprints in the eye's image, with depths where something opaque hides them or depths are asked for, with objects where these are.
+    /// Their footprints in the eye's image, with depths where something opaque hides them, polygons are translucent or depths are asked for, with
+    /// objects where these are.
     pub projected: &'a Projected,
     /// Width of the slabs where neither the parameters nor a volume give one, world units, > 0.
     pub slab_width: f64,
@@ -185,7 +186,7 @@ impl<'a> SplatSheets<'a> {
                 let Some(depths) = depths else { return };
                 for (out, place) in out.iter_mut().zip(&places) {
                     let visible = depths.visibility(frame.world(place.as_dvec3()), None);
-                    *out = out.map(|t| t * visible);
+                    *out = [0, 1, 2].map(|c| out[c] * visible[c]);
                 }
             });
             if is_soft { light.set(ids, &volumes) } else { light.attenuate(ids, &volumes) }

@@ -6,17 +6,18 @@ use super::bodies::Bodies;
 use super::buckets::{Buckets, records};
 use super::counts::HalfCounts;
 use super::eye_buffer::Pixels;
-use super::eye_sheets::{EyeBand, OneSlab, Step};
+use super::eye_sheets::{EyeBand, OneSlab, Step, WHOLE};
 use super::frame::Frame;
 use super::gradient::Gradients;
 use super::illuminate::Illumination;
 use super::light_buffer::{LightBuffer, planes};
 use super::light_depth::{Beside, LightDepths};
 use super::light_path::LightPath;
+use super::pane_sheets::PaneSheets;
 use super::penumbra::Penumbra;
 use super::placed::Placed;
 use super::polygon_light::{PolygonImage, PolygonLight, PolygonSlabs};
-use super::polygons::EyePolygons;
+use super::polygons::Eye;
 use super::scatter::{self, Scattered, Scene, SurfaceLight};
 use super::serves::axis_of_view;
 use super::shade::{is_lit, reflects};
@@ -63,7 +64,7 @@ pub(crate) struct Sweep<'a> {
     pub(crate) scattered: Option<Scattered>,
     /// By volume.
     pub(crate) paths: Vec<LightPath>,
-    polygons: Option<&'a EyePolygons<'a>>,
+    eye: &'a Eye<'a>,
     /// Polygons that keep the light of the sweep from others.
     pub(crate) depths: Option<LightDepths>,
     /// By volume.
@@ -83,15 +84,13 @@ impl<'a> Sweep<'a> {
     pub(crate) fn new(
         input: &'a HalfInput<'a>,
         params: &HalfParams,
-        (carried, polygons): (Option<(&'a LitBy<'a>, u32)>, Option<&'a EyePolygons<'a>>),
+        (carried, eye): (Option<(&'a LitBy<'a>, u32)>, &'a Eye<'a>),
         (axis, light_alone): (Option<HalfVector>, bool),
         progress: &Progress,
     ) -> Result<Self, Error> {
         let sheets = &input.sheets;
         let (bodies, volumes, camera) = (&input.bodies(), &sheets.volumes[..], sheets.camera);
-        let is_lit = volumes.iter().any(is_lit)
-            || input.splats.is_some_and(|splats| splats.are_lit())
-            || polygons.is_some_and(EyePolygons::are_lit);
+        let is_lit = volumes.iter().any(is_lit) || input.splats.is_some_and(|splats| splats.are_lit()) || eye.are_lit();
         let carried = carried.filter(|_| is_lit);
         let mapped = if is_lit && !light_alone { &input.mapped[..] } else { &[] };
         let axis = axis.unwrap_or_else(|| axis_of_view(bodies, camera, carried.map(|(lit, _)| &lit.light)));
@@ -119,7 +118,7 @@ impl<'a> Sweep<'a> {
             paths: light
                 .as_ref()
                 .map_or_else(Vec::new, |lit| volumes.iter().map(|v| LightPath::new(v, &lit.light, &frame)).collect()),
-            polygons,
+            eye,
             depths: None,
             known: Vec::new(),
             ambient: sheets.ambient,
@@ -133,10 +132,8 @@ impl<'a> Sweep<'a> {
             sight,
         };
         sweep.sort_voxels(progress)?;
-        if let Some(eye) = polygons {
-            let lit = sweep.light.as_ref().zip(carried.map(|c| c.1));
-            sweep.depths = fold::light_depths(input, params, (lit, eye), progress)?;
-        }
+        let lit = sweep.light.as_ref().zip(carried.map(|c| c.1));
+        sweep.depths = fold::light_depths(input, params, (lit, eye), progress)?;
         sweep.scattered = sweep.scatter(params);
         Ok(sweep)
     }
@@ -149,9 +146,8 @@ impl<'a> Sweep<'a> {
         let shadow = beside.as_ref().map(|beside| beside as &dyn Transmittance).or(lit.shadow);
         let splats = self.input.splats.as_ref().filter(|splats| !splats.cloud.is_empty());
         let scene = Scene::new((self.volumes, splats), &LitBy { shadow, ..*lit }, params, origin);
-        let lights_surfaces = self.polygons.is_some_and(EyePolygons::are_lit)
-            || splats.is_some_and(HalfSplats::have_surfaces)
-            || self.volumes.iter().any(reflects);
+        let lights_surfaces =
+            self.eye.are_lit() || splats.is_some_and(HalfSplats::have_surfaces) || self.volumes.iter().any(reflects);
         Some(Scattered::new(&scene, params.scattering, lights_surfaces))
     }
 
@@ -193,12 +189,9 @@ impl<'a> Sweep<'a> {
         let mut splats = self.splats(form);
         let mut counts = self.counts(&bands);
         let depths = self.depths.take();
-        let mut polygons = self.polygons.map(|of| {
-            let slabs = PolygonSlabs::new(of, &self.frame, self.input.sheets.camera, self.inside());
-            counts.polygon_pixels = slabs.regions;
-            counts.bytes += slabs.bytes() + depths.as_ref().map_or(0, LightDepths::bytes);
-            (PolygonLight::new(of, self.input.sheets.camera, depths.as_ref()), slabs)
-        });
+        counts.bytes += depths.as_ref().map_or(0, LightDepths::bytes);
+        let mut polygons = self.solid(depths.as_ref(), &mut counts);
+        let mut panes = self.panes(depths.as_ref());
         for slab in 0..self.frame.slabs.count {
             progress.tick(1).map_err(cancelled)?;
             if let Some(buffer) = &mut self.light_buffer {
@@ -211,20 +204,27 @@ impl<'a> Sweep<'a> {
                 (counts.eye_fragments, counts.light_fragments) =
                     (counts.eye_fragments + eye, counts.light_fragments + light);
             }
-            counts.eye_fragments +=
-                self.pass(&mut bands, layout, (slab, Step::Draw), (splats.as_ref(), depths.as_ref()));
+            if let Some(panes) = &mut panes {
+                self.enter_panes(panes, slab, splats.as_ref(), layout);
+            }
+            let drawn = (splats.as_ref(), panes.as_ref(), depths.as_ref());
+            counts.eye_fragments += self.pass(&mut bands, layout, (slab, Step::Draw), drawn);
             if let Some(polygons) = &mut polygons {
                 self.light_polygons(polygons, slab, splats.as_ref());
             }
             if let Some(buffer) = &mut self.light_buffer {
-                counts.light_fragments += {
-                    let splats = splats.as_ref().and_then(|splats| splats.light.as_ref());
-                    buffer.attenuate(slab, &self.frame, &self.placed, splats)
-                };
+                let splats = splats.as_ref().and_then(|splats| splats.light.as_ref());
+                counts.light_fragments += buffer.attenuate(slab, &self.frame, &self.placed, splats);
             }
             if let Some(splats) = &mut splats {
                 splats.leave();
             }
+        }
+        if let Some(panes) = &mut panes {
+            let behind = self.frame.slabs.count;
+            self.enter_panes(panes, behind, splats.as_ref(), layout);
+            self.pass(&mut bands, layout, (behind, Step::Draw), (None, Some(panes), depths.as_ref()));
+            counts.bytes += panes.bytes();
         }
         if let (Some(mut polygons), Some(image)) = (polygons, image) {
             self.light_polygons(&mut polygons, self.frame.slabs.count, splats.as_ref());
@@ -249,11 +249,17 @@ impl<'a> Sweep<'a> {
         progress: &Progress,
     ) -> Result<u64, Error> {
         let form = Accumulator { channels: Vec::new(), ..form.clone() };
-        let (mut drawn, mut splats, mut fragments) = (self.bands(&form), self.splats(&form), 0);
-        for slab in (0..self.frame.slabs.count).rev() {
+        let (mut drawn, mut splats, mut panes, mut fragments) =
+            (self.bands(&form), self.splats(&form), self.panes(None), 0);
+        for slab in (0..=self.frame.slabs.count).rev() {
             progress.tick(0).map_err(cancelled)?;
-            fragments += splats.as_mut().map_or(0, |splats| splats.draw(slab));
-            fragments += self.pass(&mut drawn, layout, (slab, Step::Depths), (splats.as_ref(), None));
+            let splats = splats.as_mut().filter(|_| slab < self.frame.slabs.count);
+            let splats = splats.map(|splats| {
+                fragments += splats.draw(slab);
+                &*splats
+            });
+            panes.iter_mut().for_each(|panes| panes.draw(slab));
+            fragments += self.pass(&mut drawn, layout, (slab, Step::Depths), (splats, panes.as_ref(), None));
         }
         for (band, drawn) in bands.iter_mut().zip(drawn) {
             band.pixels.depth = drawn.pixels.depth;
@@ -274,6 +280,45 @@ impl<'a> Sweep<'a> {
         }
     }
 
+    /// Opaque polygons of the sweep, if there are any.
+    fn solid<'b>(
+        &self,
+        depths: Option<&'b LightDepths>,
+        counts: &mut HalfCounts,
+    ) -> Option<(PolygonLight<'b>, PolygonSlabs)>
+    where
+        'a: 'b,
+    {
+        let (of, camera) = (&self.eye.solid.as_ref()?.seen, self.input.sheets.camera);
+        let slabs = PolygonSlabs::new(of, &self.frame, camera, self.inside());
+        counts.polygon_pixels = slabs.regions;
+        counts.bytes += slabs.bytes();
+        Some((PolygonLight::new(of, camera, depths), slabs))
+    }
+
+    /// Translucent polygons of the sweep, if any are seen.
+    fn panes<'b>(&self, depths: Option<&'b LightDepths>) -> Option<PaneSheets<'b>>
+    where
+        'a: 'b,
+    {
+        let of = self.eye.panes.as_ref()?;
+        Some(PaneSheets::new(of, &self.frame, self.input.sheets.camera, (depths, self.inside())))
+    }
+
+    /// Takes up those of a slab, or of what is behind the last, with the light of the sweep.
+    fn enter_panes(
+        &self,
+        panes: &mut PaneSheets<'_>,
+        slab: u32,
+        splats: Option<&SplatSheets<'_>>,
+        layout: &ChannelLayout,
+    ) {
+        let splats = splats.and_then(|splats| splats.light.as_ref());
+        let volumes = self.light_buffer.as_ref().map(|buffer| self.illumination(buffer, slab, None));
+        let lit = (&self.lamps(), self.input.sheets.shadow_origin, self.at_surfaces());
+        panes.enter(slab, &self.frame, volumes.as_ref().map(|volumes| (volumes, splats)), lit, layout);
+    }
+
     /// Depths across the slabs between which all bodies lie.
     fn inside(&self) -> [f32; 2] {
         let depths = || self.input.bodies().corners().map(|corner| self.frame.point(corner).z).collect::<Vec<f64>>();
@@ -288,10 +333,22 @@ impl<'a> Sweep<'a> {
         bands: &mut [EyeBand],
         layout: &ChannelLayout,
         (slab, step): (u32, Step),
-        (splats, depths): (Option<&SplatSheets<'_>>, Option<&LightDepths>),
+        (splats, panes, depths): (Option<&SplatSheets<'_>>, Option<&PaneSheets<'_>>, Option<&LightDepths>),
     ) -> u64 {
         let one = |(index, eye): (usize, &mut EyeBand)| {
-            pulp::Arch::new().dispatch(OneSlab { of: self, layout, splats, depths, index, slab, step, eye })
+            let part = WHOLE;
+            pulp::Arch::new().dispatch(OneSlab {
+                of: self,
+                layout,
+                splats,
+                panes,
+                depths,
+                index,
+                slab,
+                step,
+                eye,
+                part,
+            })
         };
         bands.par_iter_mut().enumerate().map(one).sum()
     }
@@ -299,6 +356,10 @@ impl<'a> Sweep<'a> {
     /// The splats of the sweep, if there are any.
     fn splats(&self, form: &Accumulator) -> Option<SplatSheets<'a>> {
         let of = self.input.splats.as_ref().filter(|splats| !splats.cloud.is_empty())?;
+        // Which of them lie before a translucent polygon their depths say.
+        let depth = self.eye.panes.is_some() || !form.depth.is_empty();
+        let (planes, channels) = (form.optical_depth.len(), form.channels.len());
+        let form = &Accumulator::new([1, 1], planes, channels, depth, !form.object.is_empty());
         Some(SplatSheets::new(of, &self.frame, self.light_buffer.as_ref(), self.input.opaque, form))
     }
 

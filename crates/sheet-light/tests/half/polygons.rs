@@ -24,8 +24,17 @@ pub(super) fn wall(center: [f64; 3], u: [f32; 3], v: [f32; 3]) -> Mesh {
 
 pub(super) fn polygons<'a>(mesh: &'a Mesh, material: &'a Material) -> Polygons<'a> {
     let placed = PlacedMesh { mesh, transform: Similarity::default() };
-    let (color, object) = ([1.0; 3], 7);
-    Polygons { placed, material, color, object, shadow_coefficient: 1.0, casts_shadow: true, radius: 0.0 }
+    let (color, object, optical_depth) = ([1.0; 3], 7, f32::INFINITY);
+    Polygons {
+        placed,
+        material,
+        color,
+        optical_depth,
+        object,
+        shadow_coefficient: 1.0,
+        casts_shadow: true,
+        radius: 0.0,
+    }
 }
 
 fn draw(input: &HalfInput<'_>, params: &HalfParams) -> (Accumulator, Drawn) {

@@ -8,6 +8,8 @@
 //! 4. Where a ray meets the triangle itself, not what it was rounded to, says depth and barycentric coordinates, so these are right
 //!    in perspective too (`crossing.rs`).
 //!
+//! [`resolve_layers`] keeps all of them, nearest first, where they let light through.
+//!
 //! Rows of pixels are cut into bands, each a task of its own; of equally near triangles the first is seen. So no bit depends on
 //! the number of threads.
 //!
@@ -33,12 +35,14 @@
 mod bands;
 mod clip;
 mod crossing;
+mod layers;
 mod piece;
 mod view;
 
 use crate::{Camera, Error, Mesh, Progress, Similarity};
 use crossing::Crossing;
 use glam::Vec3;
+pub use layers::{TriangleLayer, TriangleLayers, resolve_layers};
 use view::Meshes;
 
 /// A mesh, and its place in the world.
@@ -166,12 +170,17 @@ impl DepthPlanes {
     /// none, and where the plane lies behind the eye.
     #[inline]
     pub fn at(&self, k: usize, [right, down]: [f32; 2], is_parallel: bool) -> f32 {
-        let (depth, [x, y]) = (self.depth[k], self.slope[k]);
-        let step = x * right + y * down;
-        if is_parallel {
-            return depth + step;
-        }
-        let share = 1.0 + step;
-        if share > 0.0 { depth / share } else { f32::INFINITY }
+        depth_beside(self.depth[k], self.slope[k], [right, down], is_parallel)
     }
+}
+
+/// View depth at which the plane of a triangle lies beside the middle of a pixel, where it has this depth and slope.
+#[inline]
+pub fn depth_beside(depth: f32, slope: [f32; 2], [right, down]: [f32; 2], is_parallel: bool) -> f32 {
+    let step = slope[0] * right + slope[1] * down;
+    if is_parallel {
+        return depth + step;
+    }
+    let share = 1.0 + step;
+    if share > 0.0 { depth / share } else { f32::INFINITY }
 }

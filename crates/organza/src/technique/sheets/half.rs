@@ -120,12 +120,8 @@ pub(super) fn draw(
     cost: &mut CostRecord,
 ) -> Result<(), Error> {
     let polygons = polygons::polygons(frame);
-    // Opaque splats alone, where polygons are added to them.
-    let alone = (!polygons.is_empty()).then(|| frame.solid(cost)).transpose()?;
-    let solid = match &alone {
-        Some(alone) => alone,
-        None => frame.opaque(cost)?,
-    };
+    // Opaque splats alone, to which polygons are added.
+    let solid = frame.solid(cost)?;
     let (means, splats) = (mean_shadows(frame, cost)?, OwnSplats::of(frame));
     let mut input = input(frame, &solid.depth, &means, cost)?;
     input.polygons = &polygons;
@@ -148,9 +144,7 @@ pub(super) fn draw(
         Ok::<_, Error>(polygons)
     })?;
     drop(input);
-    if let Some(alone) = alone {
-        frame.set_opaque(alone.joined(seen));
-    }
+    frame.set_opaque(solid.joined(seen));
     Ok(())
 }
 

@@ -1,9 +1,10 @@
-//! Opaque polygons: every ray against every triangle.
+//! Polygons: every ray against every triangle.
 //!
-//! Where the fast form has z-buffers of the light, of pixels, a ray is followed to the light here. Triangles are flat and of one colour.
+//! Where the fast form has z-buffers and lists of the light, of pixels, a ray is followed to the light here. Triangles are flat and of one colour.
 
 use super::{Carried, Image, View};
 use crate::half::{Polygons, serves};
+use crate::reference::Picture;
 use crate::slabs::Slabs;
 use splat_core::Light;
 use splat_core::glam::DVec3;
@@ -20,7 +21,7 @@ pub(super) struct Triangles<'a> {
 pub(super) struct Hit {
     /// View depth.
     pub(super) depth: f64,
-    world: DVec3,
+    pub(super) world: DVec3,
     triangle: usize,
 }
 
@@ -47,28 +48,62 @@ impl<'a> Triangles<'a> {
         is_inside.then(|| v.dot(start.cross(u)) / determinant)
     }
 
-    /// The nearest of them in a pixel of the eye.
-    pub(super) fn seen(&self, eye: &Image, at: usize) -> Option<Hit> {
+    /// Those in a pixel of the eye that are opaque, or those that are not; nearest first.
+    fn seen(&self, eye: &Image, at: usize, opaque: bool) -> Vec<Hit> {
         let (camera, width) = (&eye.camera, eye.camera.size[0] as usize);
         let (from, along) = camera.view_ray((at % width) as f64 + 0.5, (at / width) as f64 + 0.5);
         let [right, up, forward] = camera.axes;
         let world = |v: DVec3| right * v.x + up * v.y + forward * v.z;
         let (from, along) = (camera.position + world(from), world(along));
-        let hits = (0..self.all.len()).filter_map(|triangle| {
-            let depth = self.meets(triangle, from, along).filter(|depth| *depth > 0.0)?;
-            Some(Hit { depth, world: from + along * depth, triangle })
-        });
-        hits.min_by(|a, b| a.depth.total_cmp(&b.depth))
+        let mut hits: Vec<Hit> = (0..self.all.len())
+            .filter(|triangle| self.mesh(*triangle).is_opaque() == opaque)
+            .filter_map(|triangle| {
+                let depth = self.meets(triangle, from, along).filter(|depth| *depth > 0.0)?;
+                Some(Hit { depth, world: from + along * depth, triangle })
+            })
+            .collect();
+        hits.sort_by(|a, b| a.depth.total_cmp(&b.depth));
+        hits
     }
 
-    /// Whether the light's centre sees a place, which may lie on one of them.
-    pub(super) fn sees(&self, light: &Light, world: DVec3, own: Option<usize>) -> bool {
+    /// The nearest opaque one in a pixel of the eye.
+    pub(super) fn nearest(&self, eye: &Image, at: usize) -> Option<Hit> {
+        self.seen(eye, at, true).first().copied()
+    }
+
+    /// The translucent ones in a pixel of the eye before the end of its ray.
+    pub(super) fn before(&self, eye: &Image, at: usize) -> Vec<Hit> {
+        let mut all = self.seen(eye, at, false);
+        all.retain(|hit| hit.depth < eye.ends[at]);
+        all
+    }
+
+    fn mesh(&self, triangle: usize) -> &'a Polygons<'a> {
+        &self.of[self.all[triangle].1]
+    }
+
+    /// Unit normal of a triangle.
+    fn face(&self, triangle: usize) -> DVec3 {
+        let [p, q, r] = self.all[triangle].0;
+        (q - p).cross(r - p).normalize()
+    }
+
+    /// Green optical depth of one crossing along a direction.
+    fn crossing(&self, triangle: usize, along: DVec3) -> f64 {
+        let (of, cosine) = (self.mesh(triangle), along.normalize().dot(self.face(triangle)));
+        let factor = of.material.surface_opacity.optical_depth_factor(cosine as f32) * of.material.extinction_rgb[1];
+        f64::from(of.optical_depth) * f64::from(factor)
+    }
+
+    /// Share of the light of the centre that comes to a place, which may lie on one of them.
+    pub(super) fn through(&self, light: &Light, world: DVec3, own: Option<usize>) -> f64 {
         let travel = serves::travel(light, world);
         let reach = light.shape.place().map_or(f64::INFINITY, |place| place.distance(world));
-        (0..self.all.len()).all(|t| {
-            let casts = Some(t) != own && self.of[self.all[t].1].casts_shadow;
-            !casts || self.meets(t, world, -travel).is_none_or(|way| way <= 0.0 || way >= reach)
-        })
+        let hides = |t: &usize| {
+            let casts = Some(*t) != own && self.mesh(*t).casts_shadow;
+            casts && self.meets(*t, world, -travel).is_some_and(|way| way > 0.0 && way < reach)
+        };
+        libm::exp(-(0..self.all.len()).filter(hides).map(|t| self.crossing(t, travel)).sum::<f64>())
     }
 }
 
@@ -81,11 +116,65 @@ impl View<'_> {
         light: (&LitBy<'_>, bool),
         out: &mut [[f64; 3]],
     ) {
-        let Slabs { width, count, .. } = self.frame.slabs;
         for (out, hit) in out.iter_mut().zip(hits).filter_map(|(out, hit)| Some((out, hit.as_ref()?))) {
-            let own = (self.frame.point(hit.world).z / width).max(0.0) as u32;
-            if own.min(count) == slab {
+            if self.slab_of(hit) == slab {
                 *out = self.polygon(hit, slab, carried, light);
+            }
+        }
+    }
+
+    /// Slab of a place, or one more for what lies behind the last.
+    pub(super) fn slab_of(&self, hit: &Hit) -> u32 {
+        let Slabs { width, count, .. } = self.frame.slabs;
+        ((self.frame.point(hit.world).z / width).max(0.0) as u32).min(count)
+    }
+
+    /// Optical depth and radiance of a translucent polygon that a pixel shows.
+    pub(super) fn pane(
+        &self,
+        hit: &Hit,
+        slab: u32,
+        carried: Carried<'_, '_>,
+        light: (&LitBy<'_>, bool),
+    ) -> (f64, [f64; 3]) {
+        let eye = self.input.sheets.camera;
+        let along = if eye.is_orthographic() { eye.axes[2] } else { hit.world - eye.position };
+        (self.polygons.crossing(hit.triangle, along), self.polygon(hit, slab, carried, light))
+    }
+
+    /// The translucent polygons of a pixel in a slab, given nearest first, and what the slab has between them: optical depths and radiance in the
+    /// order in which they are composited.
+    pub(super) fn parted(
+        &self,
+        panes: &[&Hit],
+        (slab, carried, light): (u32, Carried<'_, '_>, (&LitBy<'_>, bool)),
+        between: impl Fn([f64; 2]) -> (f64, [f64; 3]),
+    ) -> Vec<(f64, [f64; 3])> {
+        let mut all = Vec::new();
+        for n in 0..=panes.len() {
+            let depth = |n: usize| panes.get(n).map(|hit| self.frame.point(hit.world).z);
+            let [nearer, farther] = [n.checked_sub(1).and_then(depth), depth(n)];
+            let [low, high] = if self.frame.back_to_front { [farther, nearer] } else { [nearer, farther] };
+            all.push(between([low.unwrap_or(f64::NEG_INFINITY), high.unwrap_or(f64::INFINITY)]));
+            all.extend(panes.get(n).map(|hit| self.pane(hit, slab, carried, light)));
+        }
+        if self.frame.back_to_front {
+            all.reverse();
+        }
+        all
+    }
+
+    /// Adds the translucent polygons behind the last slab.
+    pub(super) fn add_behind(
+        &self,
+        panes: &[Vec<Hit>],
+        (last, carried, light): (u32, Carried<'_, '_>, (&LitBy<'_>, bool)),
+        out: &mut Picture,
+    ) {
+        for (at, panes) in panes.iter().enumerate() {
+            let own: Vec<&Hit> = panes.iter().filter(|hit| self.slab_of(hit) == last).collect();
+            for fragment in self.parted(&own, (last, carried, light), |_| (0.0, [0.0; 3])) {
+                self.composite(fragment, (&mut out.optical_depth[at], &mut out.color[at]));
             }
         }
     }
@@ -98,17 +187,14 @@ impl View<'_> {
         (light, sums, splats): Carried<'_, '_>,
         (lit, with_ambient): (&LitBy<'_>, bool),
     ) -> [f64; 3] {
-        let ([p, q, r], mesh) = self.polygons.all[hit.triangle];
-        let (of, place) = (&self.polygons.of[mesh], self.frame.point(hit.world));
+        let (of, place) = (self.polygons.mesh(hit.triangle), self.frame.point(hit.world));
         let eye = self.input.sheets.camera;
         let to_eye = if eye.is_orthographic() { -eye.axes[2] } else { (eye.position - hit.world).normalize() };
-        let face = (q - p).cross(r - p).normalize();
+        let face = self.polygons.face(hit.triangle);
         let normal = if face.dot(to_eye) < 0.0 { -face } else { face };
         let mut through = libm::exp(-self.through_volumes((light, sums), &lit.light, (place, slab)));
         through *= splats.map_or(1.0, |splats| splats.before(self, light, (place, slab))[1]);
-        if !self.polygons.sees(&lit.light, hit.world, Some(hit.triangle)) {
-            through = 0.0;
-        }
+        through *= self.polygons.through(&lit.light, hit.world, Some(hit.triangle));
         let point = Point {
             position: hit.world,
             radius: 0.0,

@@ -100,8 +100,8 @@ impl<'a> Splats<'a> {
         }
         for i in self.of_slab(slab).collect::<Vec<_>>() {
             let tau = view.through_volumes((light, sums), &lit.light, (self.places[i], slab));
-            let seen = view.polygons.sees(&lit.light, view.frame.world(self.places[i]), None);
-            self.through[i] *= if seen { libm::exp(-tau) as f32 } else { 0.0 };
+            let seen = view.polygons.through(&lit.light, view.frame.world(self.places[i]), None);
+            self.through[i] *= (seen * libm::exp(-tau)) as f32;
         }
     }
 
@@ -151,16 +151,23 @@ impl<'a> Splats<'a> {
         self.of_slab(slab).map(radiance).collect()
     }
 
-    /// Mixes the splats of a slab with what volumes have of it in a pixel of the eye: extinctions add, and colours weigh by them.
+    /// Mixes the splats of a slab with what volumes have of it in a pixel of the eye: extinctions add, and colours weigh by them. Of a slab that
+    /// translucent polygons part the splats lie in the part of their mean depth.
     pub(super) fn mix(
         &self,
         (eye, at): (&Image, usize),
         shown: &[(usize, [f64; 3])],
-        (tau, color): (f64, [f64; 3]),
+        (part, (tau, color)): ([f64; 2], (f64, [f64; 3])),
     ) -> (f64, [f64; 3]) {
+        let own = |i: usize| self.optical_depth(self.of.projected, eye, i, at);
+        let sum = |of: &dyn Fn(usize) -> f64| shown.iter().map(|(i, _)| own(*i) * of(*i)).sum::<f64>();
+        let mean = sum(&|i| self.places[i].z) / sum(&|_| 1.0).max(f64::MIN_POSITIVE);
+        if !(part[0] <= mean && mean < part[1]) {
+            return (tau, color);
+        }
         let (mut all, mut sum) = (tau, color.map(|c| c * tau));
         for (i, radiance) in shown {
-            let own = self.optical_depth(self.of.projected, eye, *i, at);
+            let own = own(*i);
             all += own;
             (0..3).for_each(|c| sum[c] += own * radiance[c]);
         }

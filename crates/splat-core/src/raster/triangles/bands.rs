@@ -7,7 +7,7 @@ use crate::{Error, Progress};
 use rayon::prelude::*;
 
 /// Rows of a band.
-const ROWS: usize = 16;
+pub(super) const ROWS: usize = 16;
 
 /// Triangles that are clipped by one task.
 const CHUNK: usize = 1 << 12;
@@ -22,8 +22,7 @@ pub(super) fn resolve<T: Copy + Send>(
     let quiet = Progress::new();
     let progress = progress.unwrap_or(&quiet);
     let [width, height] = of.camera.size.map(|s| s as usize);
-    let pieces = pieces(of);
-    let lists = Lists::new(&pieces, of.camera.size[1]);
+    let found = Found::new(of);
     progress.add_total(height.div_ceil(ROWS) as u64);
     let (mut depth, mut kept) = (vec![f32::INFINITY; width * height], vec![none; width * height]);
     let bands = depth.par_chunks_mut(width * ROWS).zip(kept.par_chunks_mut(width * ROWS)).enumerate();
@@ -32,22 +31,44 @@ pub(super) fn resolve<T: Copy + Send>(
             return;
         }
         let mut nearest = vec![f64::INFINITY; depth.len()];
-        for piece in lists.of(b).iter().map(|id| &pieces[*id as usize]) {
-            let plane = Plane::new(of, of.triangle(piece.mesh, piece.triangle));
-            let rows = piece.rows(of.camera.size[1]);
-            for y in rows.start.max(b * ROWS)..rows.end.min((b + 1) * ROWS) {
-                for x in piece.span(y, of.camera.size[0]) {
-                    let (k, at) = ((y - b * ROWS) * width + x, plane.at([x, y]));
-                    if at.depth < nearest[k] {
-                        (nearest[k], kept[k]) = (at.depth, keep(piece.mesh, piece.triangle, &at));
-                    }
-                }
+        found.meet(of, b, |k, (_, piece), at| {
+            if at.depth < nearest[k] {
+                (nearest[k], kept[k]) = (at.depth, keep(piece.mesh, piece.triangle, at));
             }
-        }
+        });
         depth.iter_mut().zip(nearest).for_each(|(to, nearest)| *to = nearest as f32);
     });
     progress.tick(0)?;
     Ok((depth, kept))
+}
+
+/// What bands of rows meet of the triangles.
+pub(super) struct Found {
+    pieces: Vec<Piece>,
+    lists: Lists,
+}
+
+impl Found {
+    pub(super) fn new(of: &Meshes<'_>) -> Self {
+        let pieces = pieces(of);
+        Self { lists: Lists::new(&pieces, of.camera.size[1]), pieces }
+    }
+
+    /// Hands on all that rays of a band meet, triangle by triangle in their order: the pixel in the band, the piece of a triangle and its rank, the place.
+    #[inline]
+    pub(super) fn meet(&self, of: &Meshes<'_>, band: usize, mut hand_on: impl FnMut(usize, (u32, &Piece), &Crossing)) {
+        let [width, height] = of.camera.size;
+        for id in self.lists.of(band) {
+            let piece = &self.pieces[*id as usize];
+            let plane = Plane::new(of, of.triangle(piece.mesh, piece.triangle));
+            let rows = piece.rows(height);
+            for y in rows.start.max(band * ROWS)..rows.end.min((band + 1) * ROWS) {
+                for x in piece.span(y, width) {
+                    hand_on((y - band * ROWS) * width as usize + x, (*id, piece), &plane.at([x, y]));
+                }
+            }
+        }
+    }
 }
 
 /// All pieces of all triangles, in their order.

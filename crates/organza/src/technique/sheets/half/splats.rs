@@ -4,7 +4,7 @@ use crate::frame::Frame;
 use crate::matter::Matter;
 use sheet_light::half::{HalfSplats, SplatBounds};
 use splat_core::glam::Vec3;
-use splat_core::raster::{self, ProjectInput, Projected};
+use splat_core::raster::{self, Detail, ProjectInput, Projected};
 use splat_core::{Aabb, Cloud, DAabb, SplatKind};
 
 /// Most slabs where splats alone say how wide they are.
@@ -52,7 +52,7 @@ impl OwnSplats {
             footprints: &frame.loaded.footprints,
             materials: &frame.loaded.materials,
             params: &frame.raster_params(),
-            detail: frame.detail(),
+            detail: Detail { depth: true, ..frame.detail() },
         });
         Some(Self { cloud, projected, slab_width })
     }
