@@ -94,7 +94,8 @@ pub(crate) fn prepare(
     warnings.extend(doubts::of_scene(scene, &loaded));
     warnings.extend(unshown(scene));
     warnings.extend(carried::unshadowed(scene, &loaded));
-    let inputs = cost.stages.iter().filter(|s| s.name == pass::READ).map(|s| s.bytes).sum();
+    // Of fields of a file the file alone knows what it holds.
+    let inputs = cost.stages.iter().filter(|s| s.name == pass::READ).map(|s| s.bytes).sum::<u64>().max(files.bytes());
     let most = memory.total().max(memory::loading_bytes(&loaded, inputs)).max(files.most.get());
     Ok((loaded, Explanation { plan, cost, memory: most, splats, warnings, notes, found: None }, memory))
 }
