@@ -8,7 +8,7 @@ use crate::convert_error::check_cancelled;
 use crate::mesh_points::{corners, mesh_to_points_into};
 use crate::params::{Density, SplatParams};
 use crate::surface_nets::{Lattice, surface_nets};
-use crate::volume_points::{check_lattice, volume_to_points};
+use crate::volume_points::{most_lattice_points, volume_to_points};
 use crate::{ConvertError, MeshParams, MeshReport, VolumeParams, VolumeReport, subdivide};
 use rayon::prelude::*;
 use splat_core::{
@@ -21,6 +21,8 @@ const CELL_OVER_SPACING: f64 = std::f64::consts::SQRT_2;
 /// Cells along the longest side where no spacing is asked for, and of the first look at a surface's area.
 const AUTO_CELLS: f64 = 256.0;
 const COARSE_CELLS: f64 = 48.0;
+/// Points of that lattice: none is kept, and blocks whose bound excludes zero are not looked at; more take minutes.
+const MOST_LOOKED_AT: u64 = u32::MAX as u64;
 
 /// Meshes the zero set of a field inside a box, cells of about `cell` (object units).
 ///
@@ -47,7 +49,7 @@ pub fn field_to_mesh<F: ScalarField + ?Sized>(
     splat: &SplatParams,
     progress: Option<&Progress>,
 ) -> Result<Mesh, ConvertError> {
-    let lattice = lattice(bounds, cell, splat)?;
+    let lattice = lattice(bounds, cell, splat, MOST_LOOKED_AT)?;
     surface_nets(field, &lattice, &splat.object_name, progress.unwrap_or(&Progress::new()))
 }
 
@@ -101,7 +103,7 @@ pub fn surface_to_points<F: ScalarField + ?Sized>(
     let p = &params.splat;
     p.check()?;
     let spacing = surface_spacing(field, bounds, params)?;
-    let lattice = lattice(bounds, spacing * CELL_OVER_SPACING, p)?;
+    let lattice = lattice(bounds, spacing * CELL_OVER_SPACING, p, MOST_LOOKED_AT)?;
     let mesh = surface_nets(field, &lattice, &p.object_name, progress)?;
     let density = Density::Spacing(spacing * p.transform.scale);
     let mesh_params = MeshParams { density, ..params.clone() };
@@ -124,7 +126,7 @@ pub(crate) fn surface_lattice<F: ScalarField + ?Sized>(
     bounds: DAabb,
     params: &MeshParams,
 ) -> Result<Lattice, ConvertError> {
-    lattice(bounds, surface_spacing(field, bounds, params)? * CELL_OVER_SPACING, &params.splat)
+    lattice(bounds, surface_spacing(field, bounds, params)? * CELL_OVER_SPACING, &params.splat, MOST_LOOKED_AT)
 }
 
 /// Spacing of the splats of a zero set, object units.
@@ -229,7 +231,7 @@ pub(crate) fn density_lattice(bounds: DAabb, params: &DensityParams) -> Result<L
         Density::Splats(n) => libm::cbrt(sides.x * sides.y * sides.z / n.max(1) as f64),
         Density::Auto => sides.max_element() / 128.0,
     };
-    lattice(bounds, spacing, p)
+    lattice(bounds, spacing, p, most_lattice_points(p))
 }
 
 /// Samples a field at the middles of cells of about `spacing` (object units) that fill a box. Cells are reported to `progress`,
@@ -245,7 +247,8 @@ pub fn field_to_grid<F: ScalarField + ?Sized>(
     splat: &SplatParams,
     progress: Option<&Progress>,
 ) -> Result<Grid, ConvertError> {
-    sample(field, &lattice(bounds, spacing, splat)?, splat, progress.unwrap_or(&Progress::new()))
+    let lattice = lattice(bounds, spacing, splat, most_lattice_points(splat))?;
+    sample(field, &lattice, splat, progress.unwrap_or(&Progress::new()))
 }
 
 /// A density as extinction, 1/world unit, at the middles of cells that fill its box, and the transfer function that takes it as
@@ -316,8 +319,8 @@ fn sample<F: ScalarField + ?Sized>(
     Ok(Grid { origin, axes: DMat3::from_diagonal(step), dims, values })
 }
 
-/// The lattice of cells of at most `cell` that fills a box.
-fn lattice(bounds: DAabb, cell: f64, splat: &SplatParams) -> Result<Lattice, ConvertError> {
+/// The lattice of cells of at most `cell` that fills a box, of at most so many points.
+fn lattice(bounds: DAabb, cell: f64, splat: &SplatParams, most: u64) -> Result<Lattice, ConvertError> {
     let sides = bounds.size();
     if !bounds.is_solid() {
         return Err(splat.bad(
@@ -329,7 +332,7 @@ fn lattice(bounds: DAabb, cell: f64, splat: &SplatParams) -> Result<Lattice, Con
     let cell = splat.check_spacing(cell)?;
     // A side of n cells may come out as n·(1 + ε).
     let cells = sides.to_array().map(|s| (s / cell - 1e-9).ceil().max(1.0));
-    check_lattice(splat, cells)?;
+    splat.check_limit(cells.iter().product(), most, "lattice points")?;
     let step = sides / DVec3::from_array(cells);
     Ok(Lattice { low: bounds.min, step, cells: cells.map(|n| n as usize) })
 }

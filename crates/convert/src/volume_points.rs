@@ -154,10 +154,14 @@ pub(crate) fn lattice_factors(grid: &Grid, params: &VolumeParams) -> Result<[usi
     Ok(factors)
 }
 
-/// Refuses lattices that no budget can mean: eight lattice points a splat.
+/// Refuses lattices of more than [`most_lattice_points`].
 pub(crate) fn check_lattice(p: &SplatParams, dims: [f64; 3]) -> Result<(), ConvertError> {
-    let limit = p.limits.max_elements.saturating_mul(8).min(u32::MAX.into());
-    p.check_limit(dims[0] * dims[1] * dims[2], limit, "lattice points")
+    p.check_limit(dims[0] * dims[1] * dims[2], most_lattice_points(p), "lattice points")
+}
+
+/// More values than that no budget can mean to keep: eight a splat.
+pub(crate) fn most_lattice_points(p: &SplatParams) -> u64 {
+    p.limits.max_elements.saturating_mul(8).min(u32::MAX.into())
 }
 
 fn convert(
