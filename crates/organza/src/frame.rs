@@ -19,10 +19,11 @@ use crate::matter::Matter;
 use crate::plan::Plan;
 use crate::scene::{LightPoint, RenderSettings, Scene, Technique};
 use crate::{Error, Progress};
+use rayon::prelude::*;
 use splat_core::raster::{self, Background, OpaqueImage};
 use splat_core::shade::ChannelLayout;
 use splat_core::{Accumulator, Camera, Cloud, LayerSet, SplatKind};
-use std::cell::{OnceCell, RefCell};
+use std::cell::{Cell, OnceCell, RefCell};
 
 /// One frame of a loaded scene: what techniques read, each part made once, when it is first asked for.
 ///
@@ -45,12 +46,23 @@ pub struct Frame<'a> {
     pub(crate) groups: RefCell<grouped::KeptInFrames>,
     /// Whether frames follow that ask for the same light again.
     remembers: bool,
+    /// Those of the frame before it, whose memory is used again.
+    before: Cell<Shaded>,
     /// `None` inside where all splats are drawn.
     drawn: OnceCell<Option<Cloud>>,
     light_points: OnceCell<Vec<LightPoint>>,
     maps: OnceCell<Maps>,
     shaded: OnceCell<Shaded>,
     opaque: OnceCell<OpaqueImage>,
+}
+
+/// What a frame leaves for the next of the same splats.
+#[derive(Default)]
+pub(crate) struct Leaves {
+    pub(crate) maps: Option<Maps>,
+    drawn: Option<Option<Cloud>>,
+    /// For the memory that it takes.
+    shaded: Shaded,
 }
 
 impl<'a> Frame<'a> {
@@ -68,6 +80,7 @@ impl<'a> Frame<'a> {
             progress,
             groups: RefCell::default(),
             remembers: false,
+            before: Cell::default(),
             drawn: OnceCell::new(),
             light_points: OnceCell::new(),
             maps: OnceCell::new(),
@@ -83,11 +96,19 @@ impl<'a> Frame<'a> {
         self
     }
 
-    /// With the shadow maps of the frame before it, and whether what arrives through them is remembered.
-    pub(crate) fn following(mut self, maps: Option<Maps>, remembers: bool) -> Self {
-        self.maps = maps.map_or_else(OnceCell::new, OnceCell::from);
+    /// With what was made for the frame before it, and whether what arrives through shadow maps is remembered.
+    pub(crate) fn following(mut self, before: Leaves, remembers: bool) -> Self {
+        self.maps = before.maps.map_or_else(OnceCell::new, OnceCell::from);
+        self.drawn = before.drawn.map_or_else(OnceCell::new, OnceCell::from);
+        self.before = Cell::new(before.shaded);
         self.remembers = remembers;
         self
+    }
+
+    /// What it leaves when it is drawn.
+    pub(crate) fn leaves(self) -> Leaves {
+        let (maps, drawn) = (self.maps.into_inner(), self.drawn.into_inner());
+        Leaves { maps, drawn, shaded: self.shaded.into_inner().unwrap_or_default() }
     }
 
     /// Whether there are shadow maps already.
@@ -151,10 +172,12 @@ impl<'a> Frame<'a> {
     pub fn translucent(&self, cloud: &Cloud, technique: Technique) -> Vec<u32> {
         let takes: Vec<bool> =
             self.plan.by.iter().zip(&self.plan.is_own).map(|(by, is_own)| *by == technique && !is_own).collect();
-        let is_one = |i: &u32| {
-            let (kind, object) = (cloud.kind[*i as usize], cloud.object[*i as usize] as usize);
-            kind != SplatKind::Opaque && takes[object]
-        };
-        (0..cloud.len() as u32).filter(is_one).collect()
+        splats_of(cloud, |kind, object| kind != SplatKind::Opaque && takes[object])
     }
+}
+
+/// Ids of the splats of a cloud whose kind and object are some, ascending.
+fn splats_of(cloud: &Cloud, are: impl Fn(SplatKind, usize) -> bool + Sync) -> Vec<u32> {
+    let is_one = |i: &u32| are(cloud.kind[*i as usize], cloud.object[*i as usize] as usize);
+    (0..cloud.len() as u32).into_par_iter().with_min_len(1 << 14).filter(is_one).collect()
 }

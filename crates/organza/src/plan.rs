@@ -75,7 +75,7 @@ pub struct Plan {
 
 impl Plan {
     /// All tables of shadow maps.
-    pub fn tables(&self) -> impl Iterator<Item = &ShadowTable> {
+    pub fn tables(&self) -> impl Iterator<Item = &ShadowTable> + Clone {
         self.shadow_tables.iter().chain(&self.other_tables).flatten()
     }
 
@@ -97,5 +97,12 @@ impl Plan {
             self.passes.splice(at..at, made);
         }
         (self.shadow_tables, self.other_tables, self.shadow_bytes) = (tables, others, bytes);
+    }
+
+    /// The bytes that its shadow maps may take together, where their tables are the same within them.
+    pub(crate) fn allow_shadows(&mut self, bytes: u64) {
+        let tables = self.shadow_tables.iter_mut().chain(&mut self.other_tables).flatten();
+        tables.for_each(|table| table.max_bytes = bytes);
+        self.shadow_bytes = bytes;
     }
 }

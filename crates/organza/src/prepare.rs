@@ -62,7 +62,7 @@ pub fn explain_from(
     files: &Files,
 ) -> Result<Explanation, Error> {
     let (scene, found) = fitted(scene, options, progress, files)?;
-    let (_, mut explanation, _) = prepare(&scene, options, progress, files, None)?;
+    let (_, _, mut explanation) = prepare(&scene, options, progress, files, None)?;
     explanation.found = found;
     explanation.warnings.extend(doubts::of_shadows(explanation.plan.tables()));
     explanation.warnings.extend(doubts::of_scattering(&explanation.plan));
@@ -70,25 +70,33 @@ pub fn explain_from(
     Ok(explanation)
 }
 
-/// Loads and plans; `made` is what was loaded of another scene that [`turned`] says serves this one.
+/// A plan, what it follows from, and the bytes that it takes.
+pub(crate) struct Planned {
+    pub(crate) plan: Plan,
+    pub(crate) memory: Memory,
+    statistics: Statistics,
+}
+
+/// Loads and plans; `made` is what was loaded and planned of another scene that [`turned`] says serves this one.
 pub(crate) fn prepare(
     scene: &Scene,
     options: &RenderOptions,
     progress: &Progress,
     files: &Files,
-    made: Option<Loaded>,
-) -> Result<(Loaded, Explanation, Memory), Error> {
+    made: Option<(Loaded, Planned)>,
+) -> Result<(Loaded, Planned, Explanation), Error> {
     let mut cost = CostRecord::default();
     memory::check("the image", memory::image_bytes(scene), options.max_memory)?;
     check_samples(scene)?;
-    let loaded = match made {
-        Some(mut loaded) => {
+    let (loaded, planned) = match made {
+        Some((mut loaded, planned)) => {
             loaded.retarget(scene);
-            loaded
+            (loaded, Some(planned))
         }
-        None => load_measured(scene, options, progress, files, &mut cost)?,
+        None => (load_measured(scene, options, progress, files, &mut cost)?, None),
     };
-    let (plan, memory) = plan_counted(scene, &loaded, options)?;
+    let planned = plan_counted(scene, &loaded, options, planned)?;
+    let (plan, memory) = (planned.plan.clone(), planned.memory);
     let (splats, notes) = (loaded.splats.clone(), loaded.notes.clone());
     let mut warnings = loaded.warnings.clone();
     warnings.extend(doubts::of_scene(scene, &loaded));
@@ -97,7 +105,7 @@ pub(crate) fn prepare(
     // Of fields of a file the file alone knows what it holds.
     let inputs = cost.stages.iter().filter(|s| s.name == pass::READ).map(|s| s.bytes).sum::<u64>().max(files.bytes());
     let most = memory.total().max(memory::loading_bytes(&loaded, inputs)).max(files.most.get());
-    Ok((loaded, Explanation { plan, cost, memory: most, splats, warnings, notes, found: None }, memory))
+    Ok((loaded, planned, Explanation { plan, cost, memory: most, splats, warnings, notes, found: None }))
 }
 
 /// Whether what is loaded of one scene serves the other, after [`Loaded::retarget`]: whether they differ in the size of the
@@ -135,7 +143,7 @@ pub(crate) fn turned(a: &Scene, b: &Scene) -> bool {
 /// # Errors
 /// [`Error::Input`] where the technique cannot draw the scene; [`Error::Limit`] where it needs more than `options` allow.
 pub fn plan_loaded(scene: &Scene, loaded: &Loaded, options: &RenderOptions) -> Result<Plan, Error> {
-    plan_counted(scene, loaded, options).map(|(plan, _)| plan)
+    plan_counted(scene, loaded, options, None).map(|planned| planned.plan)
 }
 
 /// Refuses 3D Gaussians, images as footprints, and splats of media that a file has beside others, where a technique leaves them out.
@@ -159,9 +167,49 @@ fn check_splats(scene: &Scene, loaded: &Loaded) -> Result<(), Error> {
     medium.map_or(Ok(()), |(_, object)| refuse(&scene.objects[*object as usize], what))
 }
 
-/// The plan of a loaded scene, and the bytes that it takes.
-fn plan_counted(scene: &Scene, loaded: &Loaded, options: &RenderOptions) -> Result<(Plan, Memory), Error> {
+/// The plan of a loaded scene; `before` is that of another one that [`turned`] says serves this one.
+fn plan_counted(
+    scene: &Scene,
+    loaded: &Loaded,
+    options: &RenderOptions,
+    before: Option<Planned>,
+) -> Result<Planned, Error> {
     check_samples(scene)?;
+    let is_new = before.is_none();
+    let (statistics, mut plan) = match before {
+        Some(before) => (before.statistics, before.plan),
+        None => plan_effects(scene, loaded)?,
+    };
+    let all = techniques(scene);
+    let used = all.iter().filter(|t| statistics.translucent_of(**t).is_some() || row(**t).meets_discs);
+    // They take turns, and each keeps what it has.
+    let points = light_points(&loaded.lights);
+    let camera = loaded.camera.with_samples(scene.render.antialias);
+    let matter =
+        Matter { scene, own: &loaded.own, planned: &plan.objects, cloud: Some(&loaded.cloud), camera: &camera };
+    let own = used.map(|t| (row(*t).bytes)(&matter, &points, statistics.counts.colored_extinction, options)).sum();
+    let memory = Memory::new(scene, loaded, own);
+    memory::check("rendering", memory.total(), options.max_memory)?;
+    // Shadow maps share what is left.
+    let left = options.max_memory - memory.total();
+    if is_new {
+        carried::plan(scene, loaded, &points, &mut plan)?;
+    }
+    if is_new || !shadows::fit(plan.tables(), left) {
+        let others = loaded.opaque_objects();
+        let wanted = carried::wanted_maps(loaded, &points, &others, &plan);
+        let tables = shadows::tables(&scene.render, loaded, &wanted, left)?;
+        plan.set_shadow_tables(&points, tables, left);
+    } else {
+        plan.allow_shadows(left);
+    }
+    let memory = memory.with_maps(shadows::bytes(plan.tables()));
+    memory::check("rendering", memory.total(), options.max_memory)?;
+    Ok(Planned { plan, memory, statistics })
+}
+
+/// The plan of a loaded scene but for its shadow maps, and what it follows from.
+fn plan_effects(scene: &Scene, loaded: &Loaded) -> Result<(Statistics, Plan), Error> {
     check_splats(scene, loaded)?;
     let planned: Vec<PlannedObject> = visible(scene)
         .zip(&loaded.planned)
@@ -200,27 +248,8 @@ fn plan_counted(scene: &Scene, loaded: &Loaded, options: &RenderOptions) -> Resu
     loaded.own.iter().for_each(|own| plan.is_own[own.object] = true);
     let draws = |by: &Technique| row(*by).draws_splats && !statistics.lit_as_drawn;
     plan.draws = plan.by.iter().zip(&plan.is_own).map(|(by, own)| draws(by) && !own).collect();
-    let all = techniques(scene);
-    all.iter().for_each(|t| (row(*t).plans)(scene, loaded, &mut plan));
-    let used = all.iter().filter(|t| statistics.translucent_of(**t).is_some() || row(**t).meets_discs);
-    // They take turns, and each keeps what it has.
-    let points = light_points(&loaded.lights);
-    let camera = loaded.camera.with_samples(scene.render.antialias);
-    let matter =
-        Matter { scene, own: &loaded.own, planned: &plan.objects, cloud: Some(&loaded.cloud), camera: &camera };
-    let own = used.map(|t| (row(*t).bytes)(&matter, &points, statistics.counts.colored_extinction, options)).sum();
-    let memory = Memory::new(scene, loaded, own);
-    memory::check("rendering", memory.total(), options.max_memory)?;
-    let left = options.max_memory - memory.total();
-    // Shadow maps share what is left.
-    let others = loaded.opaque_objects();
-    carried::plan(scene, loaded, &points, &mut plan)?;
-    let wanted = carried::wanted_maps(loaded, &points, &others, &plan);
-    let tables = shadows::tables(&scene.render, loaded, &wanted, left)?;
-    plan.set_shadow_tables(&points, tables, left);
-    let memory = memory.with_maps(shadows::bytes(plan.tables()));
-    memory::check("rendering", memory.total(), options.max_memory)?;
-    Ok((plan, memory))
+    techniques(scene).into_iter().for_each(|t| (row(t).plans)(scene, loaded, &mut plan));
+    Ok((statistics, plan))
 }
 
 /// Footprints keep their pixel rectangles in 16 bits.

@@ -4,11 +4,11 @@ use crate::choose::{row, techniques};
 use crate::device::Helper;
 use crate::draw::draw;
 use crate::frame::grouped::KeptInFrames;
-use crate::frame::{Frame, Maps};
+use crate::frame::{Frame, Leaves};
 use crate::load::Loaded;
 use crate::load::files::Files;
 use crate::plan::Plan;
-use crate::prepare::{Explanation, fitted, prepare, turned};
+use crate::prepare::{Explanation, Planned, fitted, prepare, turned};
 use crate::scene::{FoundCamera, Scene};
 use crate::technique::{Checkpoint, Kept, Session, Sets};
 use crate::{CostRecord, Error, Layers, Progress, RenderOptions, doubts};
@@ -72,7 +72,8 @@ pub(crate) struct Left {
 struct Made {
     scene: Scene,
     loaded: Loaded,
-    maps: Option<Maps>,
+    planned: Planned,
+    leaves: Leaves,
 }
 
 impl Left {
@@ -124,17 +125,18 @@ pub(crate) fn render_keeping(
     let helper = options.device.as_deref().map(Helper::new);
     // What serves no longer makes room.
     let made = left.made.take().filter(|made| turned(&made.scene, scene));
-    let (made, maps) = made.map_or((None, None), |made| (Some(made.loaded), made.maps));
-    let (loaded, explanation, memory) = prepare(scene, options, progress, &left.files, made)?;
-    let remembers = left.remembers(&loaded, &explanation.plan, options.max_memory, memory.total());
-    left.fit(options.max_memory, memory.total() + remembers.unwrap_or(0));
-    let Explanation { plan, mut cost, mut warnings, notes, .. } = explanation;
+    let (made, mut leaves) = made.map_or_else(Default::default, |m| (Some((m.loaded, m.planned)), m.leaves));
+    let (loaded, planned, explanation) = prepare(scene, options, progress, &left.files, made)?;
+    let (plan, bytes) = (&planned.plan, planned.memory.total());
+    let remembers = left.remembers(&loaded, plan, options.max_memory, bytes);
+    left.fit(options.max_memory, bytes + remembers.unwrap_or(0));
+    let Explanation { mut cost, mut warnings, notes, .. } = explanation;
     // A reason that is told already is enough.
     let is_empty = loaded.cloud.is_empty() && loaded.own.is_empty();
     let doubtful = is_empty || warnings.len() > loaded.warnings.len();
     let device = helper.as_ref().map(|helper| (helper, options.device_composites));
-    let maps = maps.filter(|maps| maps.serve(&plan));
-    let frame = Frame::new(scene, &loaded, &plan, progress).helped_by(device).following(maps, remembers.is_some());
+    leaves.maps = leaves.maps.filter(|maps| maps.serve(plan));
+    let frame = Frame::new(scene, &loaded, plan, progress).helped_by(device).following(leaves, remembers.is_some());
     frame.groups.replace(std::mem::take(&mut left.groups));
     let kept = (!left.is_still).then_some(&mut left.sets);
     let checkpoint = checkpoint.as_mut();
@@ -142,15 +144,15 @@ pub(crate) fn render_keeping(
     let layers = draw(&frame, &mut session, &mut cost)?;
     let sets = session.sets;
     left.groups = frame.groups.take();
-    let maps = frame.into_maps();
+    let leaves = frame.leaves();
     let backend = helper.as_ref().map_or_else(|| "cpu".to_owned(), |helper| helper.name());
     if !doubtful {
         warnings.extend(doubts::of_picture(scene, &layers));
     }
     warnings.extend(doubts::of_shadows(plan.tables()));
-    warnings.extend(doubts::of_scattering(&plan));
+    warnings.extend(doubts::of_scattering(plan));
     warnings.extend(helper.map(|helper| helper.said()).unwrap_or_default());
-    let scales = loaded.scales.clone();
-    left.made = (!left.is_still).then(|| Made { scene: scene.clone(), loaded, maps });
+    let (scales, plan) = (loaded.scales.clone(), plan.clone());
+    left.made = (!left.is_still).then(|| Made { scene: scene.clone(), loaded, planned, leaves });
     Ok(Render { layers, cost, plan, sets, warnings, notes, scales, found, backend })
 }

@@ -85,6 +85,11 @@ pub(crate) fn bytes<'a>(tables: impl Iterator<Item = &'a ShadowTable>) -> u64 {
     predicted.saturating_add(predicted / 2)
 }
 
+/// Whether these tables would be chosen again where all may take so many bytes: memory has made none of them coarser, nor would it.
+pub(crate) fn fit<'a>(tables: impl Iterator<Item = &'a ShadowTable> + Clone, max_bytes: u64) -> bool {
+    tables.clone().all(|table| table.predicted.limit != tsm::Limit::Memory) && bytes(tables) <= max_bytes
+}
+
 /// A point of a light, and the objects whose splats cast shadows of it.
 pub(crate) type Wanted<'a> = (&'a LightPoint, &'a [Object]);
 

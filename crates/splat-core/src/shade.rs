@@ -74,26 +74,30 @@ pub fn shade(
     progress: Option<&Progress>,
 ) -> Result<Vec<f32>, Error> {
     assert_eq!(projected.splats.len(), input.cloud.len(), "invariant: one footprint a splat");
-    shade_some(input, |i| projected.is_visible(i), layout, progress)
+    let mut values = Vec::new();
+    shade_into(&mut values, input, |i| projected.is_visible(i), layout, progress)?;
+    Ok(values)
 }
 
-/// [`shade`] of those splats that `is_one` says, wherever they are seen.
+/// [`shade`] of those splats that `is_one` says, wherever they are seen; `values` may hold those of another frame, whose memory is
+/// used again.
 ///
 /// # Errors
 /// [`Error::Cancelled`].
 ///
 /// # Panics
 /// If a material or object of the cloud is out of range.
-pub fn shade_some(
+pub fn shade_into(
+    values: &mut Vec<f32>,
     input: &ShadeInput<'_>,
     is_one: impl Fn(usize) -> bool + Sync,
     layout: &ChannelLayout,
     progress: Option<&Progress>,
-) -> Result<Vec<f32>, Error> {
+) -> Result<(), Error> {
     let quiet = Progress::new();
     let progress = progress.unwrap_or(&quiet);
     let channels = layout.count();
-    let mut values = vec![0.0; input.cloud.len() * channels];
+    values.resize(input.cloud.len() * channels, 0.0);
     progress.add_total(input.cloud.len().div_ceil(CHUNK) as u64);
     values.par_chunks_mut(CHUNK * channels).enumerate().for_each(|(chunk, values)| {
         if progress.tick(1).is_err() {
@@ -104,11 +108,12 @@ pub fn shade_some(
             if is_one(i) {
                 let (radiance, normal) = shade_splat(input, i);
                 radiance.write(normal, layout, out);
+            } else {
+                out.fill(0.0);
             }
         }
     });
-    progress.tick(0)?;
-    Ok(values)
+    progress.tick(0)
 }
 
 /// Radiance of splat `i` towards the viewer, and the unit normal that it was shaded by: for who knows its light only when it is drawn.

@@ -75,11 +75,6 @@ impl<'a> Frame<'a> {
         Ok(self.maps.get_or_init(|| Maps { all, of_others, arrived, made_as: Maps::made_as(plan) }))
     }
 
-    /// The maps of a frame that is drawn, for the next.
-    pub(crate) fn into_maps(self) -> Option<Maps> {
-        self.maps.into_inner()
-    }
-
     /// Shadows of the points of all lights by which splats are shaded that are drawn.
     pub(super) fn shadows_of_drawn(&self, cost: &mut CostRecord) -> Result<Vec<Option<Remembered<'_>>>, Error> {
         let Maps { all, arrived, .. } = self.all_maps(cost)?;

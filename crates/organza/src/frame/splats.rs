@@ -1,16 +1,17 @@
 //! Splats of a frame: those that are drawn, their footprints and radiance, and the opaque ones as an image.
 
-use super::Frame;
 use super::discs::opaque;
+use super::{Frame, splats_of};
 use crate::pass;
 use crate::{CostRecord, Error, stage};
 use splat_core::raster::{
     self, Detail, FinishInput, GlassImage, OpaqueImage, OpaqueInput, ProjectInput, Projected, RasterCounts,
 };
-use splat_core::shade::shade_some;
+use splat_core::shade::shade_into;
 use splat_core::{Accumulator, Cloud, Layers, SplatKind, StageCost};
 
 /// The drawn splats, ready to be composited, by id.
+#[derive(Default)]
 pub struct Shaded {
     pub(crate) projected: Projected,
     /// Radiance by effect, and whatever else a splat brings to a pixel: [`Shaded::channels`] numbers a splat.
@@ -25,11 +26,9 @@ impl Frame<'_> {
     pub fn drawn(&self) -> &Cloud {
         let cloud = &self.loaded.cloud;
         let some = self.drawn.get_or_init(|| {
-            let is_drawn = |i: &u32| {
-                let (kind, object) = (cloud.kind[*i as usize], cloud.object[*i as usize] as usize);
-                (kind == SplatKind::Opaque && !self.plan.is_own[object]) || self.plan.draws[object]
-            };
-            let drawn: Vec<u32> = (0..cloud.len() as u32).filter(is_drawn).collect();
+            let (is_own, draws) = (&self.plan.is_own, &self.plan.draws);
+            let is_drawn = |kind, object: usize| (kind == SplatKind::Opaque && !is_own[object]) || draws[object];
+            let drawn = splats_of(cloud, is_drawn);
             (drawn.len() < cloud.len()).then(|| cloud.gather(&drawn))
         });
         some.as_ref().unwrap_or(cloud)
@@ -45,18 +44,20 @@ impl Frame<'_> {
             return Ok(shaded);
         }
         let shadows = self.shadows_of_drawn(cost)?;
-        let projected = self.project(cost)?;
+        let Shaded { projected, mut values, .. } = self.before.take();
+        let projected = self.project(projected, cost)?;
         let layout = self.layout();
         self.progress.begin(stage::SHADE);
-        let values = cost.measure(pass::SHADE, |stage| {
+        cost.measure(pass::SHADE, |stage| {
             let lights = self.lit_by(&shadows);
             let (bends, progress) = (self.plan.bends, Some(self.progress));
-            let values = shade_some(&self.shading(&lights), |i| bends || projected.is_visible(i), &layout, progress);
-            let values = values.map_err(|e| Error::from_core("shading", e))?;
+            let is_one = |i| bends || projected.is_visible(i);
+            shade_into(&mut values, &self.shading(&lights), is_one, &layout, progress)
+                .map_err(|e| Error::from_core("shading", e))?;
             stage.items_in = if bends { self.drawn().len() as u64 } else { projected.visible() };
             stage.items_out = stage.items_in;
             stage.bytes = 4 * values.len() as u64;
-            Ok::<_, Error>(values)
+            Ok::<_, Error>(())
         })?;
         self.tick()?;
         Ok(self.shaded.get_or_init(|| Shaded { projected, values, channels: layout.count() }))
@@ -68,13 +69,12 @@ impl Frame<'_> {
         Detail { depth: opaque || self.layers.depth || self.layers.object, object: self.layers.object }
     }
 
-    /// Footprints of the drawn splats.
-    fn project(&self, cost: &mut CostRecord) -> Result<Projected, Error> {
+    /// Footprints of the drawn splats, in the memory of those of another frame.
+    fn project(&self, mut projected: Projected, cost: &mut CostRecord) -> Result<Projected, Error> {
         self.progress.begin(stage::PROJECT);
         self.tick()?;
         let (l, cloud) = (self.loaded, self.drawn());
-        let projected = cost.measure(pass::PROJECT, |stage| {
-            let mut projected = Projected::default();
+        cost.measure(pass::PROJECT, |stage| {
             let (params, detail) = (self.raster_params(), self.detail());
             raster::project_into(
                 &mut projected,
@@ -90,7 +90,7 @@ impl Frame<'_> {
             stage.items_in = cloud.len() as u64;
             stage.items_out = projected.visible();
             stage.bytes = projected.bytes();
-            Ok::<_, Error>(projected)
+            Ok::<_, Error>(())
         })?;
         self.tick()?;
         Ok(projected)
@@ -98,10 +98,8 @@ impl Frame<'_> {
 
     /// The opaque ones of the drawn splats, those that rays meet exactly, or the others.
     fn solid_of(&self, exact: bool) -> Vec<u32> {
-        let cloud = self.drawn();
-        let is_one =
-            |i: &usize| cloud.kind[*i] == SplatKind::Opaque && self.plan.exact[cloud.object[*i] as usize] == exact;
-        (0..cloud.len()).filter(is_one).map(|i| i as u32).collect()
+        let are = &self.plan.exact;
+        splats_of(self.drawn(), |kind, object| kind == SplatKind::Opaque && are[object] == exact)
     }
 
     /// The opaque splats that are drawn as such.

@@ -17,6 +17,19 @@ pub struct TileRays {
     is_perspective: bool,
     /// Depth of the opaque surface, +∞ without; empty when no pixel has one.
     opaque: Vec<f32>,
+    /// The least and the largest of these depths.
+    ends: [f32; 2],
+}
+
+/// Where a splat lies by the opaque surfaces of a tile.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Place {
+    /// Before all of them, or there are none.
+    Before,
+    /// Before some, or through them.
+    Among,
+    /// Behind all.
+    Behind,
 }
 
 /// One splat, ready for fragments.
@@ -29,6 +42,8 @@ pub struct Source<'a> {
     /// Only defined where the projection has depths.
     pub(crate) depth: ProjectedDepth,
     pub(crate) kernel: &'a Kernel,
+    /// Whether the opaque surfaces of a tile, if it has any, may hide a part of it.
+    pub(crate) is_met: bool,
 }
 
 impl TileRays {
@@ -39,7 +54,30 @@ impl TileRays {
         if opaque.iter().all(|d| *d == f32::INFINITY) {
             opaque.clear();
         }
-        Self { factors: projected.ray_factors(corner), is_perspective: projected.is_perspective(), opaque }
+        let ends = [f32::min, f32::max].map(|of| opaque.iter().copied().reduce(of).unwrap_or(f32::INFINITY));
+        Self { factors: projected.ray_factors(corner), is_perspective: projected.is_perspective(), opaque, ends }
+    }
+
+    /// Where a splat lies, as far as it is told without a look at pixels: what a kernel or a plane tells of each of them is the same.
+    #[inline(always)]
+    pub(crate) fn place(&self, source: &Source<'_>) -> Place {
+        let (ProjectedDepth { center, slope, extent, .. }, [near, far]) = (source.depth, self.ends);
+        let splat = source.splat;
+        let (before, behind) = if self.opaque.is_empty() {
+            (true, false)
+        } else if source.special.is_some() || splat.is_gaussian() {
+            (false, false)
+        } else if splat.kind == SplatKind::Medium {
+            let [near, far] = [near, far].map(|opaque| (opaque - center) * slope[0]);
+            (near >= 1.0, far <= -1.0 && slope[1] >= 1.0)
+        } else {
+            (center + extent < near, center - extent >= far)
+        };
+        match (before, behind) {
+            (true, _) => Place::Before,
+            (_, true) => Place::Behind,
+            _ => Place::Among,
+        }
     }
 
     /// Whether nothing opaque is in the tile.
@@ -63,6 +101,7 @@ impl<'a> Source<'a> {
             special: projected.special_disc(splat, i),
             depth: projected.depths.get(i as usize).copied().unwrap_or_default(),
             kernel: projected.kernel(splat),
+            is_met: true,
         }
     }
 
@@ -77,17 +116,30 @@ impl<'a> Source<'a> {
         }
     }
 
+    /// Whether [`Source::of_kernel`] tells τ.
+    #[inline(always)]
+    pub(crate) fn is_plain(&self) -> bool {
+        self.special.is_none() && !self.splat.is_gaussian() && !self.is_met
+    }
+
+    /// τ by the kernel alone.
+    #[inline(always)]
+    pub(crate) fn of_kernel<S: Simd>(&self, simd: S, run: Run<S>, rays: &TileRays) -> Lanes<S> {
+        let of = |v: f32| Lanes::splat(simd, v);
+        let mut s = run.distance_sq(simd, self.splat);
+        if self.splat.kind == SplatKind::Medium {
+            s = s * rays.factors(simd, run);
+        }
+        let t = (of(1.0) - s).max(of(0.0));
+        of(self.splat.peak) * self.kernel.profile(simd, t)
+    }
+
     #[inline(always)]
     fn before_the_eye<S: Simd>(&self, simd: S, run: Run<S>, rays: &TileRays) -> Lanes<S> {
         let of = |v: f32| Lanes::splat(simd, v);
         let medium = self.splat.kind == SplatKind::Medium;
-        let mut s = run.distance_sq(simd, self.splat);
-        if medium {
-            s = s * rays.factors(simd, run);
-        }
-        let t = (of(1.0) - s).max(of(0.0));
-        let mut tau = of(self.splat.peak) * self.kernel.profile(simd, t);
-        if !rays.opaque.is_empty() {
+        let mut tau = self.of_kernel(simd, run, rays);
+        if self.is_met && !rays.opaque.is_empty() {
             let opaque = Lanes::load(simd, &rays.opaque[run.pixel()..]);
             tau = if medium {
                 // What is seen is the part between the eye and the surface, as a share of all before the eye.

@@ -10,7 +10,7 @@
 use super::bins::{Bins, bin};
 use super::lanes::{Lanes, MAX_LANES, SMALL, exp_neg};
 use super::projected::{Projected, ProjectedDepth, ProjectedSplat};
-use super::source::{Source, TileRays};
+use super::source::{Place, Source, TileRays};
 use super::tile::{BATCH, BLOCKS, Line, PIXELS, Run, Runs, for_each_span, tile_of};
 use super::{Accumulation, OpaqueImage, Params, RasterCounts};
 use crate::depth_profile::DepthFragment;
@@ -35,6 +35,17 @@ struct Tile {
     depth: Vec<DepthProfile>,
     object: Vec<u32>,
     fragments: u64,
+    /// A bit for each block that is finished.
+    done: u64,
+}
+
+/// One bit for each block of a tile.
+const _: () = assert!(BLOCKS == u64::BITS as usize, "a bit for each block");
+
+/// Whether block `k` is one of some.
+#[inline(always)]
+fn is_in(blocks: u64, k: usize) -> bool {
+    blocks >> k & 1 == 1
 }
 
 /// What is folded.
@@ -162,7 +173,7 @@ impl FoldTile<'_> {
     fn fold<S: Simd, const FRONT: bool, const HALF: bool, const PLANES: usize, const CHANNELS: usize>(self, simd: S) {
         let channels = if CHANNELS > 0 { CHANNELS } else { self.tile.channels };
         let FoldInput { projected, values: of_splats, materials, params, .. } = *self.input;
-        let deep = self.tile.needs_depth();
+        let (deep, names) = (self.tile.needs_depth(), !self.tile.object.is_empty());
         let mut records = [ProjectedSplat::default(); BATCH];
         let mut depths = [ProjectedDepth::default(); BATCH];
         let mut values = vec![0.0; BATCH * channels];
@@ -179,15 +190,20 @@ impl FoldTile<'_> {
                     let splat = &records[k];
                     let extinction = materials[splat.material as usize].extinction_rgb;
                     let most = extinction[0].max(extinction[1]).max(extinction[2]);
-                    let source = Source {
+                    let mut source = Source {
                         splat,
                         special: projected.special_disc(splat, j),
                         depth: depths[k],
                         kernel: &projected.kernels[splat.footprint as usize],
+                        is_met: true,
                     };
+                    match self.tile.rays.place(&source) {
+                        Place::Behind => continue,
+                        place => source.is_met = place == Place::Among,
+                    }
                     let splat = Splat {
                         source,
-                        object: if deep { projected.object(j as usize) } else { u32::MAX },
+                        object: if names { projected.object(j as usize) } else { u32::MAX },
                         extinction,
                         // A slab across the eye plane is met at many angles, the profile of an image is above 1, and the peak of a
                         // Gaussian is no optical depth.
@@ -196,7 +212,7 @@ impl FoldTile<'_> {
                     };
                     self.tile.splat::<S, FRONT, HALF, PLANES, CHANNELS>(simd, &splat);
                 }
-                if FRONT && self.tile.is_done(params.transmittance_cutoff) {
+                if FRONT && self.tile.finish_blocks(params.transmittance_cutoff) {
                     return;
                 }
             }
@@ -221,6 +237,7 @@ impl Tile {
             depth,
             object,
             fragments: 0,
+            done: 0,
         };
         tile.load_lines(acc);
         tile
@@ -265,9 +282,15 @@ impl Tile {
         !(self.rays.are_free() && self.depth.is_empty() && self.object.is_empty())
     }
 
-    fn is_done(&self, cutoff: f32) -> bool {
-        let blocks = self.lines.chunks_exact(2 * self.planes + self.channels);
-        blocks.flat_map(|lines| &lines[self.planes..2 * self.planes]).all(|t| t.0.iter().all(|t| *t < cutoff))
+    /// Marks the blocks of which all transmittances are below the cut-off. Returns whether all blocks are done.
+    fn finish_blocks(&mut self, cutoff: f32) -> bool {
+        let stride = 2 * self.planes + self.channels;
+        let before = self.done;
+        for (k, lines) in self.lines.chunks_exact(stride).enumerate().filter(|(k, _)| !is_in(before, *k)) {
+            let is_done = lines[self.planes..2 * self.planes].iter().all(|t| t.0.iter().all(|t| *t < cutoff));
+            self.done |= u64::from(is_done) << k;
+        }
+        self.done == u64::MAX
     }
 
     #[inline(always)]
@@ -278,14 +301,34 @@ impl Tile {
     ) {
         let runs = Runs::new(simd, splat.source.splat, self.size, [self.x, self.y]);
         self.fragments += runs.pixels();
+        let done = if FRONT { self.done } else { 0 };
+        // A loop of its own for what most splats are.
+        if splat.thin && splat.source.is_plain() {
+            for run in runs {
+                if !is_in(done, run.block) {
+                    let tau = splat.source.of_kernel(simd, run, &self.rays);
+                    self.composite::<S, FRONT, HALF, true, PLANES, CHANNELS>(simd, splat, run, tau);
+                }
+            }
+            return;
+        }
         for run in runs {
-            let tau = splat.source.optical_depth(simd, run, &self.rays);
-            self.composite::<S, FRONT, HALF, PLANES, CHANNELS>(simd, splat, run, tau);
+            if !is_in(done, run.block) {
+                let tau = splat.source.optical_depth(simd, run, &self.rays);
+                self.composite::<S, FRONT, HALF, false, PLANES, CHANNELS>(simd, splat, run, tau);
+            }
         }
     }
 
     #[inline(always)]
-    fn composite<S: Simd, const FRONT: bool, const HALF: bool, const PLANES: usize, const CHANNELS: usize>(
+    fn composite<
+        S: Simd,
+        const FRONT: bool,
+        const HALF: bool,
+        const THIN: bool,
+        const PLANES: usize,
+        const CHANNELS: usize,
+    >(
         &mut self,
         simd: S,
         splat: &Splat<'_>,
@@ -306,7 +349,7 @@ impl Tile {
             }
             let sum = rounded::<S, HALF>(before + step);
             sum.store(plane);
-            let opacity = if splat.thin { step.opacity_of_small() } else { step.opacity() };
+            let opacity = if THIN || splat.thin { step.opacity_of_small() } else { step.opacity() };
             let plane = &mut lines[PLANES + p].0[run.lane..];
             let before = Lanes::load(simd, plane);
             let after = if HALF { sum.exp_neg() } else { opacity.negate_mul_add(before, before) };
