@@ -51,4 +51,5 @@ mod surfels;
 mod surfels_opaque;
 mod techniques;
 mod textured_lights;
+mod triangles;
 mod truth;

@@ -235,7 +235,7 @@ fn compare_particles(shape: Shape, forms: &[Form], solid: bool) {
     }
 }
 
-/// Sheets come to the closed form as points do, and at the finest within 0.01 of points.
+/// Sheets come to the closed form as points do, and at the finest within 0.01 of points, and of particles but for their noise.
 fn compare_sheets(shape: Shape, forms: &[Form], solid: bool) {
     for &form in forms {
         let mut errors = Vec::new();
@@ -246,6 +246,13 @@ fn compare_sheets(shape: Shape, forms: &[Form], solid: bool) {
             errors.push(rmse(&image, &exact));
             let apart = rmse(&image, &points);
             assert!(size < SIZES[2] || apart < 0.01, "{shape:?} {form:?} {size}: {apart} from points");
+            if size == SIZES[2] {
+                let (particles, variance) = object.squares_of_particles(3);
+                let noise = variance.iter().sum::<f64>() / variance.len() as f64;
+                let by_particles = (rmse(&image, &particles).powi(2) - noise).max(0.0).sqrt();
+                println!("{shape:?} {form:?} in sheets: {apart:.5} from points, {by_particles:.5} from particles");
+                assert!(by_particles < 0.01, "{shape:?} {form:?} {size}: {by_particles} from particles");
+            }
         }
         let order = 0.5 * (errors[0] / errors[2]).log2();
         println!("{shape:?} {form:?} in sheets: RMSE {errors:.5?}, order {order:.2}");
@@ -296,9 +303,11 @@ fn compare_surfels(shape: Shape) {
 }
 
 #[test]
-fn sheets_of_solids() {
+fn sheets_of_solids_and_of_a_mesh() {
     compare_sheets(Shape::Ball, &[Form::Lattice], true);
     compare_sheets(Shape::Gyroid, &SOLIDS, true);
+    // Its triangles stay what they are.
+    compare_sheets(Shape::Ball, &[Form::Mesh], false);
 }
 
 #[test]

@@ -78,6 +78,9 @@ fn exact_order_is_the_truth_and_disorder_costs_accuracy() {
     let mut names: Vec<_> = fs::read_dir(folder.path().join("o")).unwrap().map(|e| e.unwrap().file_name()).collect();
     names.sort();
     assert_eq!(names, ["orders.csv", "orders.html", "orders.json", "orders.png"]);
+    let html = fs::read_to_string(folder.path().join("o/orders.html")).unwrap();
+    // A dot for each thickness across the view, an axis and the half vector.
+    assert!(html.contains("<h2>Popping</h2>") && html.matches("<circle").count() == 12);
     let png = fs::read(folder.path().join("o/orders.png")).unwrap();
     assert_eq!(png[..8], *b"\x89PNG\r\n\x1a\n");
     let again = organza().args(["orders", "s.toml", "--out", "o"]).current_dir(&folder).output().unwrap();

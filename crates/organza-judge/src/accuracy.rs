@@ -54,7 +54,7 @@ pub use study::{Draw, Outcome, Study, least_seconds, study};
 pub use surfels::{in_surfels, surfels};
 pub use verdict::verdict;
 
-pub(crate) use plot::escaped;
+pub(crate) use plot::{COLORS, Mark, Plot, Series, escaped};
 pub(crate) use report_pictures::{data_uri, difference, png};
 
 pub use crate::truth::Truth;

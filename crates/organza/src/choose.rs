@@ -62,23 +62,19 @@ pub(crate) fn same_forms(a: Technique, b: Technique) -> bool {
 }
 
 /// The form in which its technique takes each of these visible objects, and whether it becomes splats: only where splats are
-/// drawn, or are what there is, or where a shadow map may need them. `keeps_polygons` says whether triangles
-/// stay triangles.
+/// drawn, or are what there is, or where a shadow map may need them.
 pub(crate) fn choose<'a>(
     objects: impl Iterator<Item = (&'a ObjectStatistics, Technique)> + Clone,
     lights: &[LightStatistics],
-    keeps_polygons: impl Fn(&Row) -> bool,
 ) -> Vec<PlannedObject> {
     let shining = lights.iter().any(|l| l.wants_shadow && !l.is_dark);
     let shadows = shining && objects.clone().any(|(o, _)| o.receives);
     let one = |(object, technique): (&ObjectStatistics, Technique)| {
         let row = row(technique);
-        let stays = object.data == ObjectData::Triangles && keeps_polygons(row);
+        let stays = object.data == ObjectData::Triangles && row.polygons && object.is_plain;
         let (form, reason) = match row.form {
-            _ if object.opaque && stays => (Form::Polygons, "opaque triangles end light and view rays where they are"),
-            _ if stays && object.is_plain => {
-                (Form::Panes, "translucent triangles are seen, and tint light, where they are")
-            }
+            _ if stays && object.opaque => (Form::Polygons, "opaque triangles end light and view rays where they are"),
+            _ if stays => (Form::Panes, "translucent triangles are seen, and tint light, where they are"),
             _ if object.opaque => (Form::Opaque, "an opaque surface is drawn exactly"),
             Some(form) => form(object),
             None => (Form::Splats, DRAWN),
@@ -100,7 +96,7 @@ mod tests {
     use crate::scene::{SurfaceSampler, VolumeSampler};
 
     fn chosen(objects: &[ObjectStatistics], lights: &[LightStatistics]) -> Vec<PlannedObject> {
-        choose(objects.iter().map(|o| (o, Technique::Particles)), lights, |_| false)
+        choose(objects.iter().map(|o| (o, Technique::Particles)), lights)
     }
 
     fn object(data: ObjectData) -> ObjectStatistics {

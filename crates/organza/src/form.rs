@@ -46,6 +46,11 @@ impl Form {
         }
     }
 
+    /// Whether triangles stay what they are.
+    pub fn is_polygons(self) -> bool {
+        matches!(self, Self::Polygons | Self::Panes)
+    }
+
     /// Whether it is the object's own data, not its splats.
     pub fn is_own(self) -> bool {
         !matches!(self, Self::Opaque | Self::Splats)

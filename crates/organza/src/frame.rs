@@ -1,11 +1,11 @@
-//! One frame: what all techniques share. The camera of samples, lights and their shadow maps, the splats that are drawn with
-//! their footprints and radiance, the opaque image, the device, progress. Whatever is made for it is made once, when it is first
-//! asked for.
+//! One frame: what all techniques share. The camera of samples, lights and their shadow maps, the splats that are drawn with their footprints and
+//! radiance, the opaque image, the device, progress. Whatever is made for it is made once, when it is first asked for.
 
 pub(crate) mod discs;
 pub(crate) mod grouped;
 mod light;
 mod on_device;
+mod polygons;
 mod splats;
 
 pub(crate) use light::Maps;

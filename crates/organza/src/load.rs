@@ -107,8 +107,7 @@ pub(crate) struct Inputs<'a> {
 pub(crate) type Spare<'a> =
     dyn Fn(&[Own], &[PlannedObject], &[ObjectStatistics], &[SceneLight]) -> Result<bool, Error> + 'a;
 
-/// Reads every visible object once and counts its splats; `looks` says of which objects it is asked how they could be drawn from
-/// their own data.
+/// Reads every visible object once and counts its splats; `looks` says of which objects it is asked how they could be drawn from their own data.
 pub(crate) fn read<'a>(
     scene: &'a Scene,
     options: &'a RenderOptions,

@@ -55,7 +55,7 @@ impl Memory {
 }
 
 /// The channels that a render has at most.
-fn layout(scene: &Scene) -> ChannelLayout {
+pub(crate) fn layout(scene: &Scene) -> ChannelLayout {
     let layout = ChannelLayout::new(&scene.render.layers.set());
     if scene.render.sheets.scattering().is_some() { layout.with_multiple() } else { layout }
 }

@@ -1,8 +1,7 @@
 //! What will be done for a scene: the effects to simulate, the passes to run, what draws each object.
 //!
-//! Each effect that is left out carries a bound on how much any displayed pixel (0 to 1) could differ with it; their sum
-//! stays below the tolerance. A pass that is not in the plan does not run, and its buffers are not allocated: the cost record
-//! shows it.
+//! Each effect that is left out carries a bound on how much any displayed pixel (0 to 1) could differ with it; their sum stays below the tolerance. A
+//! pass that is not in the plan does not run, and its buffers are not allocated: the cost record shows it.
 
 pub use crate::form::{Form, PlannedObject};
 use crate::pass;

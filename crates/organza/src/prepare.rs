@@ -29,9 +29,8 @@ pub struct Explanation {
     pub plan: Plan,
     /// What loading cost.
     pub cost: CostRecord,
-    /// Bytes that rendering will take at its peak, see [`Explanation::plan`] for the passes that take them. Shadow maps are
-    /// predicted from the sizes of their casters as a light sees them; together they are held to what is allowed when they are
-    /// built.
+    /// Bytes that rendering will take at its peak, see [`Explanation::plan`] for the passes that take them. Shadow maps are predicted from the sizes
+    /// of their casters as a light sees them; together they are held to what is allowed when they are built.
     pub memory: u64,
     /// Splats of every visible object, as predicted from its input and as made.
     pub splats: Vec<SplatCount>,
@@ -269,8 +268,7 @@ pub fn load(scene: &Scene, options: &RenderOptions, progress: &Progress, files: 
     load_measured(&scene, options, progress, files, &mut CostRecord::default())
 }
 
-/// [`load`] with entries in the cost record: reading, and conversion where something is
-/// converted.
+/// [`load`] with entries in the cost record: reading, and conversion where something is converted.
 fn load_measured(
     scene: &Scene,
     options: &RenderOptions,
@@ -281,8 +279,7 @@ fn load_measured(
     let looks = |object: &SceneObject| row(technique_of(object, scene)).form.is_some();
     let inputs = load::read(scene, options, progress, files, &looks, cost)?;
     let by = visible(scene).map(|o| technique_of(o, scene));
-    let keeps = |row: &Row| (row.polygons)(scene);
-    let planned = choose(inputs.statistics.iter().zip(by), &inputs.light_statistics(), keeps);
+    let planned = choose(inputs.statistics.iter().zip(by), &inputs.light_statistics());
     // Of what comes beside splats nothing is known but that there is some.
     let some = Translucent { splats: 0.0, fragments: 0.0, any: true };
     let steps = techniques(scene).into_iter().flat_map(|t| row(t).steps);

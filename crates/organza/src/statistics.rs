@@ -28,9 +28,8 @@ pub enum ObjectData {
     Triangles,
     /// The zero set of a field.
     Surface {
-        /// Cells of a lattice that may hold the surface by the field's bound, over its area in cells: 2 to 3 for a tight
-        /// bound; infinite without a bound, 0 where a first look finds no
-        /// surface, and for measured data, whose fields have tight bounds.
+        /// Cells of a lattice that may hold the surface by the field's bound, over its area in cells: 2 to 3 for a tight bound; infinite without a
+        /// bound, 0 where a first look finds no surface, and for measured data, whose fields have tight bounds.
         looseness: f64,
         /// Whether it is the isosurface of a volume that is interpolated trilinearly, and nothing clips it.
         trilinear: bool,
@@ -96,8 +95,7 @@ pub struct Statistics {
     pub techniques: Vec<Technique>,
     /// By technique: translucent splats that it draws or samples, and objects that it draws from their own data, opaque ones among them.
     pub translucent_by: Vec<(Technique, [u64; 2])>,
-    /// The splats, translucent ones as far as they are drawn; and among those that cast and receive shadows whole objects that have no
-    /// splats.
+    /// The splats, translucent ones as far as they are drawn; and among those that cast and receive shadows whole objects that have no splats.
     pub counts: Census,
     /// Objects whose surfaces mirror and bend light, drawn by a technique that can, by name.
     pub bent: Vec<String>,

@@ -1,5 +1,4 @@
-//! The table of techniques: what each states before anything is converted, and how it begins. Nothing else in this crate knows
-//! their names.
+//! The table of techniques: what each states before anything is converted, and how it begins. Nothing else in this crate knows their names.
 //!
 //! A technique folds what is translucent into an accumulator, front to back: all of it at once, or one range of depths after the
 //! other, in turns with other techniques. What it cannot fold in order, such as an average of random sets, fills a segment of its
@@ -45,8 +44,8 @@ pub(crate) struct Row {
     pub(crate) by_channel: Option<&'static str>,
     /// The form in which it takes an object, and why; `None` for splats, whatever an object is.
     pub(crate) form: Option<FormOf>,
-    /// Whether opaque triangles stay what they are in a scene: it draws and lights them, and light that it carries ends at them.
-    pub(crate) polygons: fn(&Scene) -> bool,
+    /// Whether triangles stay what they are.
+    pub(crate) polygons: bool,
     /// What it makes of splats, in words.
     pub(crate) of_splats: &'static str,
     /// Whether it mirrors and bends light where surfaces bound matter, and that absorbs; or what to do so that this is shown.
@@ -158,7 +157,7 @@ pub(crate) static TABLE: [Row; 5] = [
         is_offered: |_| false,
         how: "are composited in slabs, volumes classified after reconstruction",
         form: Some(sheets::form),
-        polygons: sheets::keeps_polygons,
+        polygons: true,
         steps: &[Step { pass: pass::SHEETS, stage: stage::SHEETS, seconds: sheets::seconds }],
         bytes: sheets::bytes,
         carries: sheets::carries,
@@ -205,7 +204,7 @@ const POINTS: Row = Row {
     how: "are composited in order",
     by_channel: None,
     form: None,
-    polygons: |_| false,
+    polygons: false,
     of_splats: DRAWN,
     bends: |_| Err("use `surfels`"),
     bumps: |_| Err("use `surfels`"),

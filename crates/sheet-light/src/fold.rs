@@ -10,6 +10,7 @@ use crate::lattice::Lattice;
 use crate::light::Lamp;
 use crate::near_eye;
 use crate::neighbours::Receivers;
+use crate::panes::Panes;
 use crate::params::{Aligned, Classify};
 use crate::preclassified::Preclassified;
 use crate::rays::LatticeRays;
@@ -71,6 +72,8 @@ pub struct Sheeted<'a> {
     pub(crate) lamps: Vec<Lamp<'a>>,
     /// Lists of splats by square of the image.
     pub(crate) bins: Option<Bins>,
+    /// Translucent polygons.
+    pub(crate) panes: Option<Panes<'a>>,
     pub(crate) tiles: [usize; 2],
 }
 
@@ -102,7 +105,7 @@ pub fn prepare<'a>(input: SheetInput<'a>, params: &Params, progress: Option<&Pro
     }
     let bins = input.splats.as_ref().map(Splats::bin);
     let lamps = Lamp::all(&input, slabs.origin);
-    Ok(Sheeted { input, params: *params, slabs, slant, volumes, lamps, bins, tiles })
+    Ok(Sheeted { input, params: *params, slabs, slant, volumes, lamps, bins, panes: None, tiles })
 }
 
 /// Slabs between the nearest corner of a volume, or the nearest splat, before the eye and the farthest, as narrow as the finest
@@ -280,7 +283,7 @@ impl Sheeted<'_> {
     /// Bytes of what was prepared.
     pub fn bytes(&self) -> u64 {
         let volumes: u64 = self.volumes.iter().map(|v| v.segments.bytes() + Voxels::bytes(v.lattice.dims) / 4).sum();
-        volumes + self.bins.as_ref().map_or(0, Bins::bytes)
+        volumes + self.bins.as_ref().map_or(0, Bins::bytes) + self.panes.as_ref().map_or(0, Panes::bytes)
     }
 
     /// Folds what lies at view depths in `range`, front to back, behind all that `into` holds. Ranges that meet share nothing and

@@ -62,6 +62,7 @@ mod light;
 mod lines;
 mod near_eye;
 mod neighbours;
+mod panes;
 mod params;
 mod picture;
 mod precision;

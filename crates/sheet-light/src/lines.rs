@@ -39,10 +39,10 @@ pub(crate) struct Shown<'a> {
 }
 
 impl Lines {
-    /// Nothing yet, of `blocks` blocks in rows of `columns`, for what `into` keeps.
-    pub(crate) fn resize(&mut self, blocks: usize, columns: usize, into: &Accumulator) {
+    /// Nothing yet, of `blocks` blocks in rows of `columns`, for what `into` keeps, and with depths where these are asked for.
+    pub(crate) fn resize(&mut self, blocks: usize, columns: usize, (into, depths): (&Accumulator, bool)) {
         (self.planes, self.channels, self.columns) = (into.optical_depth.len(), into.channels.len(), columns);
-        self.has_depths = !into.depth.is_empty();
+        self.has_depths = depths || !into.depth.is_empty();
         self.stride = self.planes + self.channels + if self.has_depths { 2 } else { 0 };
         self.lines.clear();
         self.lines.resize(blocks * self.stride, Line([0.0; PIXELS]));

@@ -52,6 +52,8 @@ pub(crate) struct Reconstructed<'a> {
     pub(crate) preclassified: Option<&'a Preclassified>,
     /// View depths between which each pixel of the tile without its rim may have light, counted from the first slab.
     pub(crate) limits: [&'a [f32]; 2],
+    /// The same of the part of each of the pixels that is shaded, where there are several.
+    pub(crate) part: Option<&'a [[f32; MAX_LANES]; 2]>,
     /// Depths between which the volume is shaded, counted from the first slab.
     pub(crate) faces: [f32; 2],
     /// Whether that is not the whole of its own slab.
@@ -141,6 +143,9 @@ impl Shader<'_> {
         let near =
             Lanes::load(simd, &of.crossings.near[at..]).max(limit(of.limits[0])).max(Lanes::splat(simd, faces[0]));
         let far = Lanes::load(simd, &of.crossings.far[at..]).min(limit(of.limits[1])).min(Lanes::splat(simd, faces[1]));
+        let [near, far] = of
+            .part
+            .map_or([near, far], |[from, to]| [near.max(Lanes::load(simd, from)), far.min(Lanes::load(simd, to))]);
         let length = (far - near).max(Lanes::splat(simd, 0.0));
         let [value, weight] = self.amid(simd, of, place);
         let [extinction, red, green, blue] = match of.preclassified {

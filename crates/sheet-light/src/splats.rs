@@ -14,7 +14,7 @@ use splat_core::raster::lanes::{Lanes, MAX_LANES};
 use splat_core::raster::pulp::Simd;
 use splat_core::raster::source::{Source, TileRays};
 use splat_core::raster::tile::{PIXELS, Runs, position};
-use splat_core::{Accumulator, Material};
+use splat_core::{Accumulator, Material, SliceOrder};
 use std::ops::Range;
 
 /// Splats, projected and shaded.
@@ -35,6 +35,14 @@ pub struct Splats<'a> {
 }
 
 impl Splats<'_> {
+    /// Width of slabs for splats in order: that of their slices, but not so little that most slabs are empty.
+    pub fn slab_width(order: &SliceOrder) -> f64 {
+        /// Most slabs where nothing says how wide they are.
+        const MOST: f64 = 65536.0;
+        let whole = f64::from(order.far) - f64::from(order.near);
+        order.thickness.max(whole / MOST).max(f64::MIN_POSITIVE)
+    }
+
     /// View depths of the nearest and the farthest centre.
     pub(crate) fn reach(&self) -> [f64; 2] {
         let depths = self.order.iter().map(|i| self.depths[*i as usize]);
@@ -88,7 +96,13 @@ impl SplatSheet {
     }
 
     /// Finds the splats of the tile at `corner` whose centres lie in a range of depths. Whether there are any.
-    pub(crate) fn begin(&mut self, of: Drawn<'_>, corner: [usize; 2], range: &Range<f64>, into: &Accumulator) -> bool {
+    pub(crate) fn begin(
+        &mut self,
+        of: Drawn<'_>,
+        corner: [usize; 2],
+        range: &Range<f64>,
+        (into, depths): (&Accumulator, bool),
+    ) -> bool {
         let size = into.size.map(|s| s as usize);
         let columns = size[0].div_ceil(bins::TILE);
         let squares = |a: usize| corner[a] / bins::TILE..(corner[a] + TILE).min(size[a]).div_ceil(bins::TILE);
@@ -104,7 +118,7 @@ impl SplatSheet {
             }
         }
         let any = !self.squares.is_empty();
-        self.sums.resize(if any { COLUMNS * COLUMNS } else { 0 }, into);
+        self.sums.resize(if any { COLUMNS * COLUMNS } else { 0 }, (into, depths));
         any
     }
 
@@ -145,7 +159,7 @@ impl SplatSheet {
 }
 
 impl Sums {
-    fn resize(&mut self, blocks: usize, into: &Accumulator) {
+    fn resize(&mut self, blocks: usize, into: (&Accumulator, bool)) {
         self.lines.resize(blocks, COLUMNS, into);
         (self.tags, self.is_empty) = ([0; SIDE], true);
     }
@@ -191,15 +205,43 @@ impl Sums {
         fragments
     }
 
-    /// Adds the splats of the pixels from (x, y) on to what volumes have there; nothing where there are none.
+    /// Shares of the pixels' splats from (x, y) on that lie between two depths of each, counted from the first slab.
     #[inline(always)]
-    pub(crate) fn add<S: Simd>(&self, simd: S, at: [usize; 2], origin: f64, fragments: &mut Fragments) {
+    pub(crate) fn between<S: Simd>(
+        &self,
+        simd: S,
+        at: [usize; 2],
+        origin: f64,
+        ends: &[[f32; MAX_LANES]; 2],
+    ) -> [f32; MAX_LANES] {
+        let mut shares = [0.0; MAX_LANES];
+        if self.lines.is_empty() {
+            return shares;
+        }
+        let [_, depth, thickness] = self.lines.depths(simd, at);
+        for lane in 0..Lanes::<S>::COUNT {
+            let middle = (f64::from(depth[lane]) - origin) as f32;
+            let [from, to] = [0, 1].map(|n| share_before(ends[n][lane], middle, thickness[lane]));
+            shares[lane] = to - from;
+        }
+        shares
+    }
+
+    /// Adds a part of the splats of the pixels from (x, y) on to what volumes have there; nothing where there are none.
+    #[inline(always)]
+    pub(crate) fn add<S: Simd>(
+        &self,
+        simd: S,
+        at: [usize; 2],
+        (origin, part): (f64, &[f32; MAX_LANES]),
+        fragments: &mut Fragments,
+    ) {
         let bits = ((1 << Lanes::<S>::COUNT) - 1) << (at[0] + 1);
         if self.tags[at[1] + 1] & bits == 0 {
             return;
         }
         let Fragments { any, optical_depth, values, .. } = fragments;
-        let share = self.lines.blend(simd, at, *any, (optical_depth, values, &[1.0; MAX_LANES]));
+        let share = self.lines.blend(simd, at, *any, (optical_depth, values, part));
         if self.lines.has_extras() {
             self.extras::<S>(simd, at, (&share, origin), fragments);
         }
@@ -227,5 +269,15 @@ impl Sums {
                 fragments.object[lane] = object;
             }
         }
+    }
+}
+
+/// Share of what is as thick as this around a depth that lies before a place.
+#[inline]
+pub(crate) fn share_before(place: f32, depth: f32, thickness: f32) -> f32 {
+    if thickness == 0.0 {
+        f32::from(u8::from(depth < place))
+    } else {
+        ((place - depth) / thickness + 0.5).clamp(0.0, 1.0)
     }
 }

@@ -6,13 +6,14 @@
 //! and where it shares them its values and its light are those of its own slab, over the length of each part.
 
 use crate::counts::SheetCounts;
-use crate::fold::Prepared;
-use crate::picture::Picture;
+use crate::fold::{Prepared, Sheeted};
+use crate::picture::{Fragments, Picture};
 use crate::rays::Slopes;
 use crate::shade::{Place, Reconstructed, Shader};
 use crate::slabs::BATCH;
+use crate::splats::SplatSheet;
 use crate::tile::{FoldTile, Scratch, TILE, VolumeScratch};
-use splat_core::raster::lanes::Lanes;
+use splat_core::raster::lanes::{Lanes, MAX_LANES};
 use splat_core::raster::pulp::Simd;
 use std::ops::Range;
 
@@ -145,11 +146,11 @@ impl FoldTile<'_> {
         counts: &mut SheetCounts,
     ) {
         let (of, drawn) = (self.of, self.drawn());
-        let Scratch { volumes, splats, near, far, fragments } = &mut *self.scratch;
+        let Scratch { volumes, splats, panes, near, far, fragments } = &mut *self.scratch;
         if let Some(drawn) = drawn {
             counts.splat_fragments += splats.fill(simd, drawn, (&of.slabs, step.end - 1), picture);
         }
-        let faces = [of.slabs.face(step.start), of.slabs.face(step.end)];
+        let (faces, polygons) = ([of.slabs.face(step.start), of.slabs.face(step.end)], of.panes.as_ref());
         for y in 1..=TILE {
             let mut tags = 0;
             for (prepared, scratch) in of.volumes.iter().zip(volumes.iter()) {
@@ -158,30 +159,75 @@ impl FoldTile<'_> {
             counts.touched += u64::from((tags & INTERIOR).count_ones());
             let tags = tags & picture.lit[y] | splats.sums.tags[y] & picture.open[y];
             for x in (1..=TILE).step_by(Lanes::<S>::COUNT) {
-                if tags >> x & ((1 << Lanes::<S>::COUNT) - 1) == 0 {
-                    continue;
-                }
-                counts.shaded += Lanes::<S>::COUNT as u64;
-                fragments.any = false;
-                for (prepared, scratch) in of.volumes.iter().zip(volumes.iter_mut()) {
-                    let Some(slab) = scratch.own(prepared, step.start) else { continue };
-                    let VolumeScratch { sheets, crossings, kept, preclassified, .. } = scratch;
-                    let is_part = step.len() < prepared.stride as usize;
-                    let limits = [&near[..], &far[..]];
-                    let open = (picture.open[y] >> x) as u32;
-                    let preclassified = preclassified.as_deref();
-                    let reconstructed =
-                        Reconstructed { prepared, crossings, sheets, preclassified, limits, faces, is_part, open };
-                    shader.add(simd, &reconstructed, Place { slab, y, x }, picture, (kept, fragments));
-                }
-                splats.sums.add(simd, [x - 1, y - 1], of.slabs.origin, fragments);
-                if fragments.any {
-                    if of.slant.is_any() {
-                        shader.slopes.unshear([x, y], [&mut fragments.near, &mut fragments.far]);
+                let (at, is_any) = ([x - 1, y - 1], tags >> x & ((1 << Lanes::<S>::COUNT) - 1) != 0);
+                // Polygons are composited in order, with what lies before, among and behind them.
+                let most = panes.most::<S>(polygons, at, faces[1]);
+                for n in 0..=most {
+                    if is_any {
+                        let part = polygons.filter(|_| most > 0).map(|of| panes.part::<S>(of, at, n, faces[1]));
+                        let limits = Limits { near, far, part: part.as_ref(), faces };
+                        counts.shaded += Lanes::<S>::COUNT as u64;
+                        let mut between = Between { of, volumes, splats, fragments, shader, picture };
+                        between.shade(simd, [x, y], &step, &limits);
                     }
-                    picture.composite(simd, y - 1, x - 1, fragments, of.slabs.origin);
+                    if let Some(of) = polygons.filter(|_| n < most) {
+                        panes.composite(simd, of, (at, n, faces[1]), (fragments, picture));
+                    }
                 }
             }
+            if let Some(of) = polygons {
+                panes.pass(of, y - 1, faces[1]);
+            }
+        }
+    }
+}
+
+/// Depths, counted from the first slab, between which neighbouring pixels are shaded.
+struct Limits<'a> {
+    /// Of each pixel of the tile.
+    near: &'a [f32],
+    far: &'a [f32],
+    /// Of each of the neighbours, where polygons part what they have.
+    part: Option<&'a [[f32; MAX_LANES]; 2]>,
+    faces: [f32; 2],
+}
+
+/// What lies between two faces.
+struct Between<'a, 'b> {
+    of: &'a Sheeted<'b>,
+    volumes: &'a mut [VolumeScratch],
+    splats: &'a SplatSheet,
+    fragments: &'a mut Fragments,
+    shader: &'a Shader<'a>,
+    picture: &'a mut Picture,
+}
+
+impl Between<'_, '_> {
+    /// Shades and composites it in neighbouring pixels of the tile with its rim.
+    #[inline(always)]
+    fn shade<S: Simd>(&mut self, simd: S, [x, y]: [usize; 2], step: &Range<u32>, limits: &Limits<'_>) {
+        let Self { of, volumes, splats, fragments, shader, picture } = self;
+        let Limits { near, far, part, faces } = *limits;
+        let (origin, open) = (of.slabs.origin, (picture.open[y] >> x) as u32);
+        fragments.any = false;
+        for (prepared, scratch) in of.volumes.iter().zip(volumes.iter_mut()) {
+            let Some(slab) = scratch.own(prepared, step.start) else { continue };
+            let VolumeScratch { sheets, crossings, kept, preclassified, .. } = scratch;
+            // What polygons part is lit part by part.
+            let is_part = part.is_none() && step.len() < prepared.stride as usize;
+            let (limits, preclassified) = ([near, far], preclassified.as_deref());
+            let reconstructed =
+                Reconstructed { prepared, crossings, sheets, preclassified, limits, part, faces, is_part, open };
+            shader.add(simd, &reconstructed, Place { slab, y, x }, picture, (kept, fragments));
+        }
+        let at = [x - 1, y - 1];
+        let share = part.map_or([1.0; MAX_LANES], |ends| splats.sums.between(simd, at, origin, ends));
+        splats.sums.add(simd, at, (origin, &share), fragments);
+        if fragments.any {
+            if of.slant.is_any() {
+                shader.slopes.unshear([x, y], [&mut fragments.near, &mut fragments.far]);
+            }
+            picture.composite(simd, y - 1, x - 1, fragments, origin);
         }
     }
 }

@@ -4,6 +4,7 @@ use crate::counts::SheetCounts;
 use crate::fold::{Prepared, Sheeted};
 use crate::kept::Kept;
 use crate::near_eye::NearEye;
+use crate::panes::Waiting;
 use crate::params::Classify;
 use crate::picture::{Fragments, Picture};
 use crate::preclassified::Preclassified;
@@ -32,6 +33,7 @@ pub(crate) const AREA: usize = SIDE * SIDE;
 pub(crate) struct Scratch {
     pub(crate) volumes: Vec<VolumeScratch>,
     pub(crate) splats: SplatSheet,
+    pub(crate) panes: Waiting,
     /// View depths between which there may be light, counted from the first slab.
     pub(crate) near: Vec<f32>,
     pub(crate) far: Vec<f32>,
@@ -67,6 +69,7 @@ impl Scratch {
         Self {
             volumes: volumes.iter().map(of).collect(),
             splats: SplatSheet::new(),
+            panes: Waiting::new(),
             near: vec![0.0; TILE * TILE],
             far: vec![0.0; TILE * TILE],
             fragments: Fragments {
@@ -113,9 +116,11 @@ impl pulp::WithSimd for FoldTile<'_> {
             scratch.batches = batches(prepared, &(span.start..span.end.min(before)));
             scratch.queue.fill(prepared, self.t, &scratch.batches);
         }
-        let has_splats =
-            self.drawn().is_some_and(|drawn| self.scratch.splats.begin(drawn, corner, &self.range, self.into));
-        if !has_splats && self.scratch.volumes.iter().all(|v| v.queue.is_empty()) {
+        let has_splats = self.drawn().is_some_and(|drawn| {
+            self.scratch.splats.begin(drawn, corner, &self.range, (self.into, of.panes.is_some()))
+        });
+        let has_panes = self.scratch.panes.begin(of.panes.as_ref(), corner, &self.range);
+        if !has_splats && !has_panes && self.scratch.volumes.iter().all(|v| v.queue.is_empty()) {
             counts.tiles_skipped = 1;
             return (None, counts);
         }
@@ -127,6 +132,8 @@ impl pulp::WithSimd for FoldTile<'_> {
             scratch.begin(prepared, &slopes);
         }
         self.sweep(simd, &slopes, span, &mut picture, &mut counts);
+        let Scratch { panes, fragments, .. } = &mut *self.scratch;
+        panes.finish(simd, of.panes.as_ref(), (fragments, &mut picture));
         (Some(picture), counts)
     }
 }

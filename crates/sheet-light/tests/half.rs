@@ -7,7 +7,7 @@ mod hard_cases;
 mod invariances;
 mod panes;
 mod paths;
-mod polygons;
+pub(crate) mod polygons;
 mod polygons_scattered;
 mod scattering;
 mod soft;

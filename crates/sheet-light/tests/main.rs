@@ -11,6 +11,7 @@ mod half;
 mod hard_cases;
 mod invariances;
 mod modes;
+mod panes;
 mod precision;
 mod splats;
 mod strides;

@@ -13,7 +13,7 @@ const EVERYWHERE: std::ops::Range<f32> = f32::NEG_INFINITY..f32::INFINITY;
 const LAYERS: LayerSet = LayerSet { effects: false, shadow: false, normal: false, depth: true, object: true };
 
 /// Splats as sheets take them.
-struct Shown {
+pub(crate) struct Shown {
     cloud: Cloud,
     projected: Projected,
     depths: Vec<f32>,
@@ -23,7 +23,7 @@ struct Shown {
 }
 
 impl Shown {
-    fn new(cloud: Cloud, camera: &Camera, materials: Vec<Material>) -> Self {
+    pub(crate) fn new(cloud: Cloud, camera: &Camera, materials: Vec<Material>) -> Self {
         let projected = projected(&cloud, camera, &materials);
         let place = camera.view_from_offset(cloud.origin);
         let depths: Vec<f32> = cloud.position.iter().map(|p| place.depth(*p)).collect();
@@ -33,7 +33,7 @@ impl Shown {
         Self { cloud, projected, depths, order, values, materials }
     }
 
-    fn splats(&self, slab_width: f64) -> Splats<'_> {
+    pub(crate) fn splats(&self, slab_width: f64) -> Splats<'_> {
         let Self { projected, depths, order, values, materials, .. } = self;
         Splats { projected, depths: depths.clone(), order: order.clone(), values, materials, slab_width }
     }
@@ -69,7 +69,7 @@ fn sheets(input: &SheetInput<'_>, opaque: &[f32], ranges: &[f32], planes: usize)
     out
 }
 
-fn alone<'a>(splats: Splats<'a>, camera: &'a Camera) -> SheetInput<'a> {
+pub(crate) fn alone<'a>(splats: Splats<'a>, camera: &'a Camera) -> SheetInput<'a> {
     SheetInput {
         volumes: Vec::new(),
         splats: Some(splats),

@@ -2,7 +2,7 @@
 
 use splat_core::glam::{DQuat, DVec3, Vec3};
 use splat_core::raster::triangles::{
-    PlacedMesh, TriangleHit, TriangleImage, TriangleLayer, resolve, resolve_depth, resolve_layers,
+    PlacedMesh, TriangleHit, TriangleImage, TriangleLayer, count_layers, resolve, resolve_depth, resolve_layers,
 };
 use splat_core::{Camera, Error, Mesh, Progress, Projection, Similarity, rng};
 
@@ -302,6 +302,7 @@ fn hv11_layers_are_what_each_triangle_shows_by_itself_nearest_first() {
             (most, sum) = (most.max(own.len()), sum + own.len());
         }
         assert!(most > 8 && sum > 2000, "{most} {sum}");
+        assert_eq!(count_layers(&placed(&heap), &camera).unwrap(), sum as u64);
         // One byte less is refused before it is taken.
         assert!(of(&[], 8 * sum as u64).is_ok());
         let Err(Error::Limit(said)) = of(&[], 8 * sum as u64 - 1) else { panic!("not refused") };

@@ -3,12 +3,12 @@
 use std::fmt::Write;
 
 /// Colours of series, told apart on light and on dark ground.
-pub(super) const COLORS: [&str; 8] =
+pub(crate) const COLORS: [&str; 8] =
     ["#4e79a7", "#f28e2b", "#59a14f", "#e15759", "#b07aa1", "#3aa6a0", "#d4a72c", "#9c755f"];
 
 /// How points are joined.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Mark {
+pub(crate) enum Mark {
     /// Dots alone.
     Dots,
     /// A thin dashed line without dots.
@@ -20,21 +20,21 @@ pub(super) enum Mark {
 }
 
 /// Points of one colour.
-pub(super) struct Series {
-    pub(super) color: String,
-    pub(super) mark: Mark,
+pub(crate) struct Series {
+    pub(crate) color: String,
+    pub(crate) mark: Mark,
     /// x, y, and what is shown when the pointer rests on it.
-    pub(super) points: Vec<([f64; 2], String)>,
+    pub(crate) points: Vec<([f64; 2], String)>,
 }
 
 /// A plot with logarithmic axes.
-pub(super) struct Plot {
-    pub(super) size: [f64; 2],
-    pub(super) x_label: String,
-    pub(super) y_label: String,
+pub(crate) struct Plot {
+    pub(crate) size: [f64; 2],
+    pub(crate) x_label: String,
+    pub(crate) y_label: String,
     /// A level below which nothing can be shown.
-    pub(super) floor: Option<(f64, String)>,
-    pub(super) series: Vec<Series>,
+    pub(crate) floor: Option<(f64, String)>,
+    pub(crate) series: Vec<Series>,
 }
 
 const LEFT: f64 = 58.0;
@@ -79,7 +79,7 @@ impl Axis {
 
 impl Plot {
     /// The SVG element.
-    pub(super) fn svg(&self) -> String {
+    pub(crate) fn svg(&self) -> String {
         let [width, height] = self.size;
         let points = || self.series.iter().flat_map(|s| s.points.iter().map(|p| p.0));
         let x = Axis::over(points().map(|p| p[0]), LEFT, width - RIGHT);

@@ -1,8 +1,8 @@
 //! The files of a comparison of orderings: JSON, CSV, a contact sheet, and a page.
 
 use super::{Comparison, Ordered};
+use crate::accuracy::{COLORS, Mark, Plot, Series, data_uri, difference, escaped, png};
 use crate::accuracy::{Distance, Machine};
-use crate::accuracy::{data_uri, difference, escaped, png};
 use organza::output::{Target, Targets};
 use organza::scene::Scene;
 use organza::{Error, printable};
@@ -233,9 +233,11 @@ impl OrdersReport {
                 o.bytes
             );
         }
+        html += "</table></div>\n";
+        self.pops_by_thickness(&mut html);
         let _ = writeln!(
             html,
-            "</table></div>\n<h2>Pictures</h2>\n<p>Click a picture to flip between the ordering, the truth and their \
+            "<h2>Pictures</h2>\n<p>Click a picture to flip between the ordering, the truth and their \
              difference.</p>\n<img hidden id=\"truth\" alt=\"\" src=\"{}\">",
             data_uri(&exact)?
         );
@@ -248,6 +250,38 @@ impl OrdersReport {
         let _ =
             write!(html, "</div></main>\n<script>\n{}</script></body></html>\n", include_str!("../accuracy/report.js"));
         Ok(html)
+    }
+
+    /// How much sheets pop, by their thickness and by what they lie across.
+    fn pops_by_thickness(&self, html: &mut String) {
+        let mut series: Vec<(&str, Series)> = Vec::new();
+        for o in &self.comparison.orderings {
+            let (Some(pop), Some(thickness)) = (o.pop, o.thickness) else { continue };
+            let (across, _) = o.name.split_once(", ").unwrap_or((&o.name, ""));
+            let point = ([thickness, pop], format!("{}: {pop:.2}", o.name));
+            match series.iter_mut().find(|(name, _)| *name == across) {
+                Some((_, series)) => series.points.push(point),
+                None => {
+                    let color = COLORS[series.len() % COLORS.len()].to_owned();
+                    series.push((across, Series { color, mark: Mark::Dots, points: vec![point] }));
+                }
+            }
+        }
+        if series.is_empty() {
+            return;
+        }
+        let legend: String = series
+            .iter()
+            .map(|(name, of)| format!("<span><i style=\"background:{}\"></i>{name}</span>", of.color))
+            .collect();
+        let plot = Plot {
+            size: [640.0, 320.0],
+            x_label: "thickness of a sheet, world units".into(),
+            y_label: "largest step between frames, over that of exact order".into(),
+            floor: None,
+            series: series.into_iter().map(|(_, series)| series).collect(),
+        };
+        let _ = writeln!(html, "<h2>Popping</h2>\n<figure>{}<div class=\"legend\">{legend}</div></figure>", plot.svg());
     }
 
     /// Each picture, which flips to what it is judged by and to their difference.

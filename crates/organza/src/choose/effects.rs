@@ -1,5 +1,4 @@
-//! The effects that a scene calls for, each with its reason and the bound of what it could change, and the passes that simulate
-//! them.
+//! The effects that a scene calls for, each with its reason and the bound of what it could change, and the passes that simulate them.
 
 use super::row;
 use crate::form::Form;
@@ -134,15 +133,19 @@ fn translucency(statistics: &Statistics) -> Effect {
 }
 
 fn opaque_surfaces(statistics: &Statistics) -> Effect {
+    match what_is_opaque(statistics) {
+        None => effect("opaque surfaces", false, "nothing is opaque"),
+        Some(all) => effect("opaque surfaces", true, format!("{all} hide what lies behind")),
+    }
+}
+
+/// What is opaque, in words.
+fn what_is_opaque(statistics: &Statistics) -> Option<String> {
     let meshes = statistics.planned.iter().filter(|object| object.form == Form::Polygons).count();
     let of = |count: u64, what: &str| (count > 0).then(|| format!("{count} {what}"));
-    let kinds =
-        [of(statistics.counts.opaque, "opaque splats"), of(meshes as u64, "opaque meshes, which stay triangles,")];
+    let kinds = [of(statistics.counts.opaque, "opaque splats"), of(meshes as u64, "opaque meshes of triangles")];
     let all: Vec<String> = kinds.into_iter().flatten().collect();
-    if all.is_empty() {
-        return effect("opaque surfaces", false, "no splat is opaque");
-    }
-    effect("opaque surfaces", true, format!("{} hide what lies behind", all.join(" and ")))
+    (!all.is_empty()).then(|| all.join(" and "))
 }
 
 fn kept_layers(statistics: &Statistics) -> Effect {
@@ -184,8 +187,8 @@ fn passes(statistics: &Statistics, shadow_maps: &[bool]) -> Vec<PlannedPass> {
         pass(pass::PROJECT, format!("{which} splats"));
         pass(pass::SHADE, format!("{which} splats in view"));
     }
-    if opaque > 0 {
-        pass(pass::OPAQUE, format!("{opaque} opaque splats"));
+    if let Some(all) = what_is_opaque(statistics).filter(|_| opaque > 0 || !statistics.lit_as_drawn) {
+        pass(pass::OPAQUE, all);
     }
     for (row, what) in rows() {
         row.steps.last().into_iter().for_each(|step| what.iter().for_each(|what| pass(step.pass, what.clone())));

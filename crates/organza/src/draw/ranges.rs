@@ -2,8 +2,7 @@
 //!
 //! Where one technique is alone at a depth, or none, there is nothing to take turns for. Where several lie at the same depths,
 //! `render.depth_ranges` says into how many ranges these are cut: inside of a range one technique's share hides the next one's
-//! whole, so their order is right to a range's thickness. Opacity is right whatever the number: transmittances multiply in any
-//! order.
+//! whole, so their order is right to a range's thickness. Opacity is right whatever the number: transmittances multiply in any order.
 
 use crate::frame::Frame;
 use crate::scene::Technique;

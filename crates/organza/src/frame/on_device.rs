@@ -56,8 +56,7 @@ impl Frame<'_> {
         suits(&self.shading(&self.lit_by(maps))).map_err(|why| helper.leave(why)).is_ok()
     }
 
-    /// Translucent splats and opaque ones by the device, lit by lights whose shadows it is given, or makes of castings. Gives
-    /// the opaque ones.
+    /// Translucent splats and opaque ones by the device, lit by lights whose shadows it is given, or makes of castings. Gives the opaque ones.
     pub(crate) fn chain(
         &self,
         helper: &Helper<'_>,

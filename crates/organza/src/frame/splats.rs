@@ -63,9 +63,9 @@ impl Frame<'_> {
         Ok(self.shaded.get_or_init(|| Shaded { projected, values, channels: layout.count() }))
     }
 
-    /// Depths are for opaque splats and what they hide, for depth layers, and for telling objects apart.
+    /// Depths are for opaque splats and what they hide, for what polygons part, for depth layers, and for telling objects apart.
     pub(crate) fn detail(&self) -> Detail {
-        let opaque = self.drawn().kind.contains(&SplatKind::Opaque);
+        let opaque = self.has_polygons() || self.drawn().kind.contains(&SplatKind::Opaque);
         Detail { depth: opaque || self.layers.depth || self.layers.object, object: self.layers.object }
     }
 
@@ -107,19 +107,18 @@ impl Frame<'_> {
         self.solid_of(false)
     }
 
-    /// Whether all are.
+    /// Whether all that is opaque is.
     pub(crate) fn draws_all_solid(&self) -> bool {
-        self.solid_of(true).is_empty()
+        self.solid_of(true).is_empty() && !self.has_polygons()
     }
 
-    /// The nearest opaque surface of every sample; an empty image where nothing is opaque. The passes that were run for it are added
-    /// to `cost`.
+    /// The nearest opaque surface of every sample; an empty image where nothing is opaque. The passes that were run for it are added to `cost`.
     ///
     /// # Errors
     /// [`Error::Cancelled`], and those of [`Frame::maps`].
     pub fn opaque(&self, cost: &mut CostRecord) -> Result<&OpaqueImage, Error> {
         if self.opaque.get().is_none() {
-            self.set_opaque(self.solid(cost)?);
+            self.set_opaque(self.solid(cost)?.joined(self.solid_polygons(cost)?));
         }
         Ok(self.opaque.get().expect("invariant: it was set above"))
     }

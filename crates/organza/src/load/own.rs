@@ -12,6 +12,7 @@ use convert::{Clip, RegionField, SharedField, VolumeParams, extinct_bounds};
 use glam::DVec3;
 use pbsr::{BoundedExtinction, LineParams};
 use rayon::prelude::*;
+use splat_core::raster::triangles::PlacedMesh;
 use splat_core::{BccGrid, DAabb, Footprint, Grid, Mesh, Packing, Similarity, SplatKind, TransferFunction, optics};
 use std::sync::Arc;
 
@@ -24,6 +25,8 @@ pub(crate) struct Own {
     pub(crate) object: usize,
     /// What draws it.
     pub(crate) technique: Technique,
+    /// As what.
+    pub(crate) form: Form,
     /// Its data.
     pub(crate) body: Body,
     /// Its material.
@@ -102,6 +105,7 @@ impl Own {
         Ok(Some(Self {
             object: context.id,
             technique: planned.technique,
+            form: source,
             material: usize::from(splat.material),
             opacity: optics::opacity(depth),
             extinction_scale: factor * splat.transform.scale,
@@ -134,6 +138,12 @@ impl Own {
             Body::Cells { grid, .. } | Body::Lattice { grid, .. } => Some(grid),
             _ => None,
         }
+    }
+
+    /// Triangles, and where they are.
+    pub(crate) fn placed(&self) -> Option<PlacedMesh<'_>> {
+        let Body::Triangles(mesh) = &self.body else { return None };
+        Some(PlacedMesh { mesh, transform: self.transform })
     }
 
     /// Bytes of the data.

@@ -105,8 +105,7 @@ impl Frame<'_> {
     }
 }
 
-/// Composites the splats of an order whose centres lie at view depths in `range` in front of the opaque ones, behind all that the
-/// accumulator holds.
+/// Composites the splats of an order whose centres lie at view depths in `range` in front of the opaque ones, behind all that the accumulator holds.
 fn composite(
     frame: &Frame<'_>,
     order: &SliceOrder,

@@ -1,6 +1,5 @@
-//! The `sheets` technique (Neophytou and Mueller 2005): slabs across the view, front to back. Volumes are splatted value by value,
-//! and classified and shaded when a slab is complete, so zooms show no blur. What is no volume comes as splats, each in the slab of
-//! its centre, where extinctions add.
+//! The `sheets` technique (Neophytou and Mueller 2005): slabs across the view, front to back. Volumes are splatted value by value, and classified and
+//! shaded when a slab is complete, so zooms show no blur. What is no volume comes as splats, each in the slab of its centre, where extinctions add.
 //!
 //! Light comes from the same shadow maps as for all techniques; or, in slabs across the half vector of light and view, through these
 //! slabs themselves ([`half`]).
@@ -9,16 +8,17 @@ mod half;
 
 use crate::form::Form;
 use crate::frame::{Frame, Shaded};
-use crate::load::own::Body;
+use crate::load::own::{Body, Own};
 use crate::matter::Matter;
 use crate::pass;
 use crate::scene::{self, LightPoint, Scene, Technique};
 use crate::statistics::{ObjectData, ObjectStatistics};
 use crate::technique::{Fold, Session};
 use crate::work::{self, Translucent, cost};
-use crate::{CostRecord, Error, RenderOptions, stage};
+use crate::{CostRecord, Error, RenderOptions, memory, stage};
+use sheet_light::half::{HalfParams, pane_bytes, polygon_bytes};
 use sheet_light::{Aligned, Classify, Gradients, KernelShape, Params, SheetInput, Sheeted, Splats, Volume, prepare};
-use splat_core::{Accumulator, Direction, Limits, Packing, SliceOrder};
+use splat_core::{Accumulator, Direction, Limits, Packing};
 use std::ops::Range;
 
 /// Seconds of a sample of a picture of sheets, whatever is in them.
@@ -42,11 +42,19 @@ pub(crate) fn seconds(scene: &Scene, all: &Translucent) -> f64 {
     sheets + cost::FRAGMENT * all.fragments
 }
 
-pub(crate) use half::{carries, is_asked as keeps_polygons};
+pub(crate) use half::carries;
 
-/// Bytes of sheets of all slabs at once, and of lists of voxels; those across the view count theirs when they make them.
+/// Bytes of sheets of all slabs at once, of lists of voxels, and of polygons; slabs across the view count theirs when they make them.
 pub(crate) fn bytes(matter: &Matter<'_>, points: &[LightPoint], _: bool, options: &RenderOptions) -> u64 {
-    if half::is_asked(matter.scene) { half::bytes(matter, points, options) } else { 0 }
+    let panes: Vec<_> = matter.own.iter().filter(|own| own.form == Form::Panes).filter_map(Own::placed).collect();
+    let others = match half::is_asked(matter.scene) {
+        true => half::bytes(matter, &panes, points, options),
+        false if matter.own.iter().any(|own| own.form.is_polygons()) => {
+            polygon_bytes(matter.camera, 0, &HalfParams::default())
+        }
+        false => 0,
+    };
+    others + pane_bytes(&panes, matter.camera, &memory::layout(matter.scene))
 }
 
 /// Begins a frame.
@@ -98,20 +106,17 @@ impl Fold for Sheets<'_> {
 /// The volumes and splats of a frame that are the technique's own.
 fn sheeted<'a>(frame: &'a Frame<'a>, options: &RenderOptions, cost: &mut CostRecord) -> Result<Sheeted<'a>, Error> {
     let maps = frame.maps(cost)?;
-    let splats = splats(frame, cost)?;
+    let (splats, opaque) = (splats(frame, cost)?, frame.opaque(cost)?);
     frame.progress.begin(stage::SHEETS);
-    let input = SheetInput {
-        volumes: volumes(&frame.matter()).collect(),
-        splats,
-        camera: &frame.camera,
-        lights: frame.lit_by(maps),
-        shadow_origin: frame.loaded.cloud.origin,
-        ambient: frame.scene.ambient,
-    };
+    let volumes = volumes(&frame.matter()).collect();
+    let input = SheetInput { splats, ..frame.sheet_input(volumes, frame.lit_by(maps)) };
     let params = params(frame.scene, frame.loaded.exponent, options);
     cost.measure(pass::SHEETS, |stage| {
         stage.items_in = input.volumes.iter().map(|v| v.grid.values.len() as u64).sum();
         let sheeted = prepare(input, &params, Some(frame.progress)).map_err(|e| refuse(frame, e))?;
+        let (polygons, layout) = (frame.polygons(), frame.layout());
+        let sheeted = sheeted.with_polygons(&polygons, &opaque.depth, &layout, Some(frame.progress));
+        let sheeted = sheeted.map_err(|e| refuse(frame, e))?;
         stage.bytes = sheeted.bytes();
         Ok(sheeted)
     })
@@ -211,19 +216,11 @@ fn splats<'a>(frame: &'a Frame<'a>, cost: &mut CostRecord) -> Result<Option<Spla
     Ok(Some(Splats {
         projected,
         depths: cloud.position.iter().map(|p| place.depth(*p)).collect(),
-        slab_width: slab_width(&order),
+        slab_width: Splats::slab_width(&order),
         order: order.input_from_sorted,
         values,
         materials: &frame.loaded.materials,
     }))
-}
-
-/// Slabs as wide as slices would be, but not so many that most are empty.
-fn slab_width(order: &SliceOrder) -> f64 {
-    /// Most slabs where nothing says how wide they are.
-    const MOST: f64 = 65536.0;
-    let whole = f64::from(order.far) - f64::from(order.near);
-    order.thickness.max(whole / MOST).max(f64::MIN_POSITIVE)
 }
 
 /// What went wrong with sheets: a limit, or a volume that they do not take.

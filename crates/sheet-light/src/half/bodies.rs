@@ -2,8 +2,11 @@
 
 use super::frame::world_corners;
 use crate::Volume;
-use splat_core::DAabb;
-use splat_core::glam::DVec3;
+use splat_core::glam::{DVec3, Vec3};
+use splat_core::{Aabb, Cloud, DAabb};
+
+/// Most slabs where splats alone say how wide they are.
+const MOST_SLABS: f64 = 65536.0;
 
 /// What slabs hold.
 #[derive(Debug, Clone, Copy, Default)]
@@ -23,6 +26,22 @@ pub struct SplatBounds {
     pub slab_width: f64,
     /// How many there are.
     pub count: u64,
+}
+
+impl SplatBounds {
+    /// Those of some splats of a cloud, in slabs of half their mean radius, for neighbours are about as far apart; `None` without any.
+    pub fn of(cloud: &Cloud, ids: impl Iterator<Item = u32>) -> Option<Self> {
+        let (mut all, mut radii, mut count) = (Aabb::EMPTY, 0.0f64, 0u64);
+        for id in ids {
+            let (at, radius) = (cloud.position[id as usize], cloud.radius[id as usize]);
+            all = all.union(Aabb { min: at, max: at });
+            (radii, count) = (radii + f64::from(radius), count + 1);
+        }
+        let place = |p: Vec3| cloud.origin + p.as_dvec3();
+        let bounds = (count > 0).then(|| DAabb::new(place(all.min), place(all.max)))?;
+        let least = (bounds.diagonal() / MOST_SLABS).max(f64::MIN_POSITIVE);
+        Some(Self { bounds, slab_width: (0.5 * radii / count as f64).max(least), count })
+    }
 }
 
 impl<'a> Bodies<'a> {

@@ -11,7 +11,7 @@ use super::light_depth::LightDepths;
 use super::pane_sheets::PanesInTheOpen;
 use super::penumbra::Penumbra;
 use super::polygon_light::{PolygonImage, PolygonLight};
-use super::polygons::{Eye, EyePanes};
+use super::polygons::{Eye, EyePanes, EyePolygons, Polygons};
 use super::scatter::{self, Scattered, Scene, balance::Balance};
 use super::serves::{axis_of_view, other_axis, serves, serves_extended};
 use super::soft_buffer::SoftBuffer;
@@ -21,7 +21,7 @@ use super::{HalfInput, HalfParams, HalfSplats, MOST_SAMPLES, Scattering, lamp};
 use crate::gradient_volume::GradientVolume;
 use crate::lattice::Lattice;
 use crate::visible::Voxels;
-use crate::{Error, Params, Volume};
+use crate::{Error, Params, SheetInput, Volume};
 use splat_core::raster::OpaqueImage;
 use splat_core::shade::{ChannelLayout, LitBy, MAX_CHANNELS};
 use splat_core::{Accumulator, Camera, Light, Progress};
@@ -72,7 +72,8 @@ pub fn fold(
     *into = Accumulator::new(size, planes, layout.count(), depth, object);
     let quiet = Progress::new();
     let progress = progress.unwrap_or(&quiet);
-    let eye = Eye::new(input, params.sheets.limits.max_bytes.saturating_sub(needed(input, params)), progress)?;
+    let left = params.sheets.limits.max_bytes.saturating_sub(needed(input, params));
+    let eye = Eye::new(input, (left, layout), progress)?;
     let mut image = eye.solid.as_ref().map(|solid| PolygonImage::new(solid, layout));
     let opaque = eye.solid.as_ref().map_or(input.opaque, |solid| &solid.opaque);
     let input = &HalfInput { opaque, ..input.clone() };
@@ -88,7 +89,7 @@ pub fn fold(
     counts.bytes += eye.panes.as_ref().map_or(0, EyePanes::bytes);
     let polygons = eye.solid.as_ref().zip(image).map(|(solid, image)| {
         counts.bytes += image.bytes() + polygon_bytes(input.sheets.camera, most_samples(input), params);
-        image.finish(solid, into)
+        image.finish(solid, !into.object.is_empty())
     });
     Ok(Drawn { counts, polygons: polygons.unwrap_or_default() })
 }
@@ -205,6 +206,28 @@ fn in_the_open<'a>(
     Ok(bytes)
 }
 
+/// What is seen of opaque polygons under the lights of `of`, whose shadows are known: a picture of their own, with objects where these are asked for. Nothing
+/// else of `of` plays a part. One tick a band of rows.
+///
+/// # Errors
+/// [`Error::Polygons`] or [`Error::Cancelled`].
+pub fn opaque_polygons(
+    of: &SheetInput<'_>,
+    polygons: &[Polygons<'_>],
+    layout: &ChannelLayout,
+    objects: bool,
+    progress: Option<&Progress>,
+) -> Result<OpaqueImage, Error> {
+    polygons.iter().enumerate().try_for_each(|(index, polygons)| polygons.check(index))?;
+    let (quiet, camera) = (Progress::new(), of.camera);
+    let solid = polygons.iter().filter(|p| p.is_opaque()).copied().collect();
+    let solid = EyePolygons::new(solid, (camera, &[]), progress.unwrap_or(&quiet))?;
+    let mut image = PolygonImage::new(&solid, layout);
+    let lamps = Lamps { carried: None, mapped: &of.lights, ambient: of.ambient, camera, light_alone: false };
+    PolygonLight::new(&solid.seen, camera, None).shade(&lamps, of.shadow_origin, None, &mut image);
+    Ok(image.finish(&solid, objects))
+}
+
 /// What so many points of a light see of the polygons that cast shadows, for all that receives its light; `None` where there is no light
 /// or no such polygon.
 pub(crate) fn light_depths(
@@ -292,25 +315,8 @@ fn check(input: &HalfInput<'_>, params: &HalfParams) -> Result<(), Error> {
     for (light, served) in points.chain(extended).enumerate() {
         served.map_err(|reason| Error::HalfVector { light, reason })?;
     }
-    check_polygons(input)?;
+    input.polygons.iter().enumerate().try_for_each(|(index, polygons)| polygons.check(index))?;
     check_memory(input, params)
-}
-
-/// Refuses polygons that sweeps cannot take.
-fn check_polygons(input: &HalfInput<'_>) -> Result<(), Error> {
-    for (index, polygons) in input.polygons.iter().enumerate() {
-        polygons.placed.mesh.validate().map_err(Error::Polygons)?;
-        let share = polygons.shadow_coefficient;
-        if !(0.0..=1.0).contains(&share) {
-            let error = splat_core::Error::invalid("mesh", index, "shadow_coefficient", share, "a number in [0, 1]");
-            return Err(Error::Polygons(error));
-        }
-        if polygons.optical_depth.is_nan() || polygons.optical_depth < 0.0 {
-            let (found, expected) = (polygons.optical_depth, "a number >= 0, or infinity");
-            return Err(Error::Polygons(splat_core::Error::invalid("mesh", index, "optical_depth", found, expected)));
-        }
-    }
-    Ok(())
 }
 
 /// Bytes of a splat in one sweep: its footprint in the light's image, places, slabs, and lists of squares.
@@ -407,7 +413,8 @@ pub fn bytes<'l>(
         + volumes.iter().map(voxels).sum::<u64>()
 }
 
-/// Bytes that [`fold`] takes at most for polygons beside [`bytes`]: buffers of the eye and of one light, of at most so many points.
+/// Bytes that [`fold`] takes at most for polygons beside [`bytes`]: buffers of the eye and of one light, of at most so many points; 0 for no
+/// light. Lists of translucent ones are [`super::pane_bytes`] and [`super::light_list_bytes`].
 pub fn polygon_bytes(camera: &Camera, samples: u32, params: &HalfParams) -> u64 {
     let pixels: u64 = camera.size.into_iter().map(u64::from).product();
     // Depths, hits, the picture; lists, places, and sums of what is seen, of two sweeps beside those of all where they are mixed.

@@ -124,6 +124,9 @@ impl LightDepths {
 
     /// Bytes of the images of one light with so many points at most.
     pub(crate) fn bytes_of(most: u32, samples: u32) -> u64 {
+        if samples == 0 {
+            return 0;
+        }
         let pixels = u64::from(side(most, samples)).pow(2);
         // Of six views each has half as many pixels a side; while one is made it has depths in double precision too.
         u64::from(samples) * pixels * 3 / 2 * 12 + pixels * 8
@@ -266,7 +269,7 @@ impl LightDepths {
 }
 
 /// Pixels along a side of the image of each of so many points.
-fn side(most: u32, points: u32) -> u32 {
+pub(super) fn side(most: u32, points: u32) -> u32 {
     let each = (f64::from(most) / f64::from(points.max(1)).sqrt()) as u32;
     each.max(LEAST_SIDE.min(most))
 }

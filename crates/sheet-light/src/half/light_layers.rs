@@ -98,6 +98,11 @@ impl LightLayers {
         }
     }
 
+    /// Bytes of so many crossings in so many pixels.
+    pub(super) fn bytes_of(pixels: u64, crossings: u64) -> u64 {
+        4 * pixels + size_of::<Layer>() as u64 * crossings
+    }
+
     /// Bytes of the lists.
     pub(super) fn bytes(&self) -> u64 {
         self.layers.bytes() + 4 * self.nearest.len() as u64

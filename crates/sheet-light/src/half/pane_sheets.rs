@@ -159,6 +159,11 @@ impl<'a> PanesInTheOpen<'a> {
         4 * self.values.len() as u64
     }
 
+    /// Channels of each place.
+    pub(crate) fn into_values(self) -> Vec<f32> {
+        self.values
+    }
+
     /// Adds what they show of some lights; normals and shadows are those of the first.
     pub(crate) fn shade(&mut self, camera: &Camera, depths: Option<&LightDepths>, lamps: &Lamps<'_>, origin: DVec3) {
         let (light, channels) = (PolygonLight::new(&self.of.seen, camera, depths), self.layout.count());

@@ -4,6 +4,7 @@
 use super::eye_buffer::Fragments;
 use super::eye_sheets::{Chunk, OneSlab, WHOLE};
 use super::pane_sheets::{OfPixel, PaneSheets};
+use crate::splats::share_before;
 use splat_core::raster::lanes::{Lanes, MAX_LANES};
 use splat_core::raster::pulp::Simd;
 
@@ -32,10 +33,7 @@ impl OneSlab<'_> {
                 self.part[0][lane] = nearer.filter(|_| is_there).unwrap_or(WHOLE[usize::from(!is_there)][lane]);
                 self.part[1][lane] = farther.filter(|_| is_there).unwrap_or(WHOLE[usize::from(is_there)][lane]);
                 let [_, depth, thickness] = [0, 1, 2].map(|of| splatted[of][lane]);
-                let before = |view: f32| match thickness {
-                    0.0 => f32::from(u8::from(depth < view)),
-                    thickness => ((view - depth) / thickness + 0.5).clamp(0.0, 1.0),
-                };
+                let before = |view: f32| share_before(view, depth, thickness);
                 let [from, to] = [view[0].map_or(0.0, before), view[1].map_or(1.0, before)];
                 splats[lane] = if is_there { to - from } else { 0.0 };
             }

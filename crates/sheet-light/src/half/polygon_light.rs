@@ -13,10 +13,10 @@ use super::splat_light::SplatLight;
 use super::splat_squares::BySlab;
 use super::splats::Lamps;
 use rayon::prelude::*;
+use splat_core::Camera;
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::raster::{OpaqueImage, pulp};
 use splat_core::shade::{ChannelLayout, LitBy, MAX_CHANNELS, Point, Radiance, arriving};
-use splat_core::{Accumulator, Camera};
 
 /// Pixels of one task.
 const CHUNK: usize = 256;
@@ -224,10 +224,9 @@ impl PolygonImage {
         4 * (self.values.len() + 2 * self.received.len()) as u64
     }
 
-    /// The picture, with objects where `form` keeps them.
-    pub(crate) fn finish(self, of: &EyePolygons<'_>, form: &Accumulator) -> OpaqueImage {
+    /// The picture, with objects where these are kept.
+    pub(crate) fn finish(self, of: &EyePolygons<'_>, keeps: bool) -> OpaqueImage {
         let (pixels, channels) = (of.opaque.len(), self.layout.count());
-        let keeps = !form.object.is_empty();
         let mut image = OpaqueImage {
             depth: vec![f32::INFINITY; pixels],
             channels: vec![vec![0.0; pixels]; channels],

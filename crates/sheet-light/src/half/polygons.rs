@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::optics::SurfaceOpacity;
 use splat_core::raster::triangles::{PlacedMesh, TriangleHit, TriangleLayer, resolve, resolve_layers};
-use splat_core::shade::{Point, facing};
+use splat_core::shade::{ChannelLayout, Point, facing};
 use splat_core::{Camera, Material, Progress, Receiver, Shading, SplatKind};
 use std::ops::Range;
 
@@ -61,7 +61,7 @@ pub(crate) struct EyePanes<'a> {
 
 /// Places on polygons that pixels show.
 pub(crate) struct Surfaces<'a> {
-    of: Vec<&'a Polygons<'a>>,
+    of: Vec<Polygons<'a>>,
     hits: Vec<Hit>,
 }
 
@@ -92,6 +92,21 @@ impl Polygons<'_> {
         self.optical_depth == f32::INFINITY
     }
 
+    /// Refuses what cannot be drawn, at the place `index` of an input.
+    pub(crate) fn check(&self, index: usize) -> Result<(), Error> {
+        self.placed.mesh.validate().map_err(Error::Polygons)?;
+        let refuse = |what, found, expected| {
+            Err(Error::Polygons(splat_core::Error::invalid("mesh", index, what, found, expected)))
+        };
+        if !(0.0..=1.0).contains(&self.shadow_coefficient) {
+            return refuse("shadow_coefficient", self.shadow_coefficient, "a number in [0, 1]");
+        }
+        if self.optical_depth.is_nan() || self.optical_depth < 0.0 {
+            return refuse("optical_depth", self.optical_depth, "a number >= 0, or infinity");
+        }
+        Ok(())
+    }
+
     /// Whether it asks for light at all.
     pub(crate) fn is_lit(&self) -> bool {
         self.material.shading != Shading::Unlit
@@ -114,8 +129,12 @@ impl Polygons<'_> {
 
 impl<'a> Eye<'a> {
     /// That of an input, whose lists of translucent polygons may take `most` bytes.
-    pub(crate) fn new(input: &HalfInput<'a>, most: u64, progress: &Progress) -> Result<Self, Error> {
-        let of = |opaque: bool| input.polygons.iter().filter(|p| p.is_opaque() == opaque).collect::<Vec<_>>();
+    pub(crate) fn new(
+        input: &HalfInput<'a>,
+        (most, layout): (u64, &ChannelLayout),
+        progress: &Progress,
+    ) -> Result<Self, Error> {
+        let of = |opaque: bool| input.polygons.iter().filter(|p| p.is_opaque() == opaque).copied().collect::<Vec<_>>();
         let (solid, panes, camera) = (of(true), of(false), input.sheets.camera);
         let solid = match solid.is_empty() {
             true => None,
@@ -125,7 +144,7 @@ impl<'a> Eye<'a> {
             true => None,
             false => {
                 let opaque = solid.as_ref().map_or(input.opaque, |solid| &solid.opaque);
-                Some(EyePanes::new(panes, (camera, opaque), most, progress)?)
+                Some(EyePanes::new(panes, (camera, opaque), (most, layout), progress)?)
             }
         };
         Ok(Self { of: input.polygons, solid, panes })
@@ -149,7 +168,11 @@ impl<'a> Eye<'a> {
 }
 
 impl<'a> EyePolygons<'a> {
-    fn new(of: Vec<&'a Polygons<'a>>, (camera, opaque): (&Camera, &[f32]), progress: &Progress) -> Result<Self, Error> {
+    pub(crate) fn new(
+        of: Vec<Polygons<'a>>,
+        (camera, opaque): (&Camera, &[f32]),
+        progress: &Progress,
+    ) -> Result<Self, Error> {
         let meshes: Vec<PlacedMesh<'_>> = of.iter().map(|p| p.placed).collect();
         let image = resolve(&meshes, camera, Some(progress)).map_err(Error::of_polygons)?;
         let hides = |k: usize| opaque.get(k).copied().unwrap_or(f32::INFINITY);
@@ -164,17 +187,17 @@ impl<'a> EyePolygons<'a> {
 }
 
 impl<'a> EyePanes<'a> {
-    fn new(
-        of: Vec<&'a Polygons<'a>>,
+    pub(crate) fn new(
+        of: Vec<Polygons<'a>>,
         (camera, opaque): (&Camera, &[f32]),
-        most: u64,
+        (most, layout): (u64, &ChannelLayout),
         progress: &Progress,
     ) -> Result<Self, Error> {
         let meshes: Vec<PlacedMesh<'_>> = of.iter().map(|p| p.placed).collect();
         let hit = |k: usize, at: &TriangleLayer| Hit { pixel: k as u32, depth: at.depth, on: at.hit };
         let none = Hit { pixel: 0, depth: 0.0, on: TriangleHit::NONE };
         // What else is kept of each takes as much again and more.
-        let most = most / (BYTES_OF_A_PANE / size_of::<Hit>() as u64);
+        let most = most / bytes_of_a_pane(layout) * size_of::<Hit>() as u64;
         let layers = resolve_layers(&meshes, camera, (opaque, most), (none, hit), Some(progress));
         let (starts, hits) = layers.map_err(Error::of_polygons)?.into_lists();
         Ok(Self { seen: Surfaces { of, hits }, starts })
@@ -195,6 +218,11 @@ impl<'a> EyePanes<'a> {
 /// Bytes of a place on a translucent polygon: itself, where it lies in slabs, its light.
 const BYTES_OF_A_PANE: u64 = 72;
 
+/// The same with what it shows.
+pub(crate) fn bytes_of_a_pane(layout: &ChannelLayout) -> u64 {
+    BYTES_OF_A_PANE + 4 * layout.count() as u64
+}
+
 impl<'a> Surfaces<'a> {
     /// Places.
     pub(crate) fn count(&self) -> usize {
@@ -212,8 +240,8 @@ impl<'a> Surfaces<'a> {
     }
 
     /// What a place lies on.
-    pub(crate) fn polygons(&self, rank: usize) -> &'a Polygons<'a> {
-        self.of[self.hits[rank].on.mesh as usize]
+    pub(crate) fn polygons(&self, rank: usize) -> &Polygons<'a> {
+        &self.of[self.hits[rank].on.mesh as usize]
     }
 
     /// All places; world.
@@ -222,9 +250,9 @@ impl<'a> Surfaces<'a> {
     }
 
     /// What a pixel shows.
-    pub(crate) fn seen(&self, rank: usize, camera: &Camera) -> Seen<'a> {
+    pub(crate) fn seen(&self, rank: usize, camera: &Camera) -> Seen<'_> {
         let (Hit { pixel, depth, on }, width) = (&self.hits[rank], camera.size[0]);
-        let of = self.of[on.mesh as usize];
+        let of = &self.of[on.mesh as usize];
         let PlacedMesh { mesh, transform } = of.placed;
         let (normal, face) = (transform.rotate(on.normal(mesh).as_dvec3()).as_vec3(), of.face(on));
         let (from, along) = camera.view_ray(f64::from(pixel % width) + 0.5, f64::from(pixel / width) + 0.5);

@@ -161,7 +161,7 @@ impl pulp::WithSimd for OneSquare<'_> {
         let (channels, mut fragments) = (form.channels.len(), 0);
         for id in own {
             if square.lines.is_empty() {
-                square.lines.resize(BLOCKS, COLUMNS, form);
+                square.lines.resize(BLOCKS, COLUMNS, (form, false));
             }
             let rank = of.ids.partition_point(|other| *other < id);
             let object = of.projected.objects.get(id as usize).copied().unwrap_or_default();

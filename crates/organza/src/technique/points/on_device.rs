@@ -59,7 +59,9 @@ impl Points<'_> {
         } else if points.accumulation != Accumulation::F32 {
             Some("splats are composited in half precision by the processor")
         } else if !self.frame.draws_all_solid() {
-            Some("opaque discs of `surfels`, and what lies before them, are drawn by the processor")
+            Some(
+                "opaque discs of `surfels`, polygons of `sheets`, and what lies before them, are drawn by the processor",
+            )
         } else {
             None
         }
@@ -72,8 +74,7 @@ impl Points<'_> {
         self.frame.with_light(shadows).map(|(lit, shadow)| LitBy { shadow, ..lit }).collect()
     }
 
-    /// What throws the shadow of each light that has one, or `None` where no light has, and where a device does not make all of
-    /// them.
+    /// What throws the shadow of each light that has one, or `None` where no light has, and where a device does not make all of them.
     fn castings(&self, helper: &Helper<'_>, cost: &mut CostRecord) -> Result<Option<Vec<Casting>>, Error> {
         let (frame, l) = (self.frame, self.frame.loaded);
         if !frame.plan.shadow_maps.contains(&true) {

@@ -2,7 +2,6 @@
 //!
 //! Light that no half vector serves has a shadow map, as in slabs across the view, and joins the first sweep.
 
-mod polygons;
 mod splats;
 
 use super::{params, refuse, volumes};
@@ -13,13 +12,14 @@ use crate::pass;
 use crate::scene::{self, LightPoint, Scene, Slicing, SoftShadows, Technique};
 use crate::technique::Session;
 use crate::{CostRecord, Error, RenderOptions, stage};
+use sheet_light::Params;
 use sheet_light::half::{
-    self, Bodies, Drawn, Extended, HalfInput, HalfParams, MOST_SAMPLES, Reason, Scattering, fold, penumbra_widening,
-    polygon_bytes, serves, serves_extended, slab_width,
+    self, Bodies, Drawn, Extended, HalfInput, HalfParams, MOST_SAMPLES, Reason, Scattering, fold, light_list_bytes,
+    penumbra_widening, polygon_bytes, serves_extended, slab_width,
 };
-use sheet_light::{Params, SheetInput};
+use splat_core::raster::triangles::PlacedMesh;
 use splat_core::shade::LitBy;
-use splat_core::{Accumulator, Camera, Light, MeanTransmittance};
+use splat_core::{Accumulator, Light, MeanTransmittance};
 use splats::{OwnSplats, splat_bounds};
 
 /// What a user can do where half vectors cannot.
@@ -30,7 +30,7 @@ pub(crate) fn carries(scene: &Scene) -> Option<CarriesLight> {
     is_asked(scene).then_some(points_served as CarriesLight)
 }
 
-/// Whether slabs lie across half vectors, where opaque triangles stay triangles.
+/// Whether slabs lie across half vectors.
 pub(crate) fn is_asked(scene: &Scene) -> bool {
     matches!(scene.render.sheets.slicing, Slicing::HalfVector { .. })
 }
@@ -62,7 +62,7 @@ fn points_served(matter: &Matter<'_>, points: &[LightPoint]) -> Result<Carries, 
         (_, samples) if samples > MOST_SAMPLES => {
             Err(format!("it has {samples} points, expected at most {MOST_SAMPLES} in one sweep"))
         }
-        lamp => serve(&bodies, matter.camera, lamp).map_err(words),
+        (light, samples) => serves_extended(&bodies, matter.camera, light, samples).map_err(words),
     };
     Ok(Carries {
         widening: points.iter().map(|point| penumbra_widening(&bodies, &point.whole)).collect(),
@@ -91,25 +91,26 @@ fn swept<'p>(scene: &Scene, point: &'p LightPoint) -> Option<(&'p Light, u32)> {
     (!is_whole(scene, point) || point.rank[0] == 0).then(|| lamp(scene, point))
 }
 
-/// Whether half vectors serve a light with so many points.
-fn serve(bodies: &Bodies<'_>, camera: &Camera, (light, samples): (&Light, u32)) -> Result<(), Reason> {
-    match light.shape.is_extended() {
-        true => serves_extended(bodies, camera, light, samples),
-        false => serves(bodies, camera, light),
-    }
-}
-
-/// Bytes of the largest sweep.
-pub(super) fn bytes(matter: &Matter<'_>, points: &[LightPoint], options: &RenderOptions) -> u64 {
+/// Bytes of the largest sweep, among such translucent polygons.
+pub(super) fn bytes(
+    matter: &Matter<'_>,
+    panes: &[PlacedMesh<'_>],
+    points: &[LightPoint],
+    options: &RenderOptions,
+) -> u64 {
     let (volumes, splats) = (volumes(matter).collect::<Vec<_>>(), splat_bounds(matter));
     let bodies = Bodies { volumes: &volumes, splats };
     // Of counts alone: no length among the parameters plays a part.
     let params = half_params(matter.scene, params(matter.scene, 0, options));
     let lamps = points.iter().filter_map(|point| swept(matter.scene, point));
-    let (served, mapped): (Vec<_>, Vec<_>) = lamps.partition(|lamp| serve(&bodies, matter.camera, *lamp).is_ok());
+    let (served, mapped): (Vec<_>, Vec<_>) =
+        lamps.partition(|lamp| serves_extended(&bodies, matter.camera, lamp.0, lamp.1).is_ok());
     let samples = served.iter().map(|(_, samples)| *samples).max().unwrap_or(1);
-    let polygons = if polygons::any(matter) { polygon_bytes(matter.camera, samples, &params) } else { 0 };
-    polygons + half::bytes(&bodies, matter.camera, served.into_iter(), mapped.len(), &params)
+    let has_polygons = matter.own.iter().any(|own| own.form.is_polygons());
+    let polygons = if has_polygons { polygon_bytes(matter.camera, samples, &params) } else { 0 };
+    let of_light = |lamp: &(&Light, u32)| light_list_bytes(panes, &bodies, *lamp, params.most_light_pixels);
+    let lists = served.iter().map(of_light).max().unwrap_or(0);
+    lists + polygons + half::bytes(&bodies, matter.camera, served.into_iter(), mapped.len(), &params)
 }
 
 /// Draws all that is translucent into a segment of its own.
@@ -119,7 +120,7 @@ pub(super) fn draw(
     session: &mut Session<'_>,
     cost: &mut CostRecord,
 ) -> Result<(), Error> {
-    let polygons = polygons::polygons(frame);
+    let polygons = frame.polygons();
     // Opaque splats alone, to which polygons are added.
     let solid = frame.solid(cost)?;
     let (means, splats) = (mean_shadows(frame, cost)?, OwnSplats::of(frame));
@@ -197,14 +198,7 @@ fn input<'a>(
             (true, true) => {}
         }
     }
-    let sheets = SheetInput {
-        volumes: volumes(&frame.matter()).collect(),
-        splats: None,
-        camera: &frame.camera,
-        lights,
-        shadow_origin: frame.loaded.cloud.origin,
-        ambient: frame.scene.ambient,
-    };
+    let sheets = frame.sheet_input(volumes(&frame.matter()).collect(), lights);
     Ok(HalfInput { sheets, splats: None, polygons: &[], extended, mapped, opaque })
 }
 

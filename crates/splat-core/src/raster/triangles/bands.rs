@@ -69,6 +69,17 @@ impl Found {
             }
         }
     }
+
+    /// How many of them there are in a band.
+    pub(super) fn count(&self, of: &Meshes<'_>, band: usize) -> u64 {
+        let [width, height] = of.camera.size;
+        let rows = |piece: &Piece| {
+            let rows = piece.rows(height);
+            rows.start.max(band * ROWS)..rows.end.min((band + 1) * ROWS)
+        };
+        let of_piece = |piece: &Piece| rows(piece).map(|y| piece.span(y, width).len() as u64).sum::<u64>();
+        self.lists.of(band).iter().map(|id| of_piece(&self.pieces[*id as usize])).sum()
+    }
 }
 
 /// All pieces of all triangles, in their order.

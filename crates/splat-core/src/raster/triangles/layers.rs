@@ -109,6 +109,16 @@ pub fn resolve_layers<T: Copy + Send + Sync>(
     Ok(TriangleLayers { starts, all })
 }
 
+/// How many triangles the rays of all pixels meet: as long are the lists of [`resolve_layers`] together, where nothing hides any.
+///
+/// # Errors
+/// As [`super::resolve`].
+pub fn count_layers(meshes: &[PlacedMesh<'_>], camera: &Camera) -> Result<u64, Error> {
+    let of = &Meshes::new(meshes, camera)?;
+    let found = bands::Found::new(of);
+    Ok((0..(camera.size[1] as usize).div_ceil(ROWS)).into_par_iter().map(|band| found.count(of, band)).sum())
+}
+
 fn layer(piece: &Piece, at: &Crossing) -> TriangleLayer {
     let [_, b, c] = at.barycentric.map(|v| v as f32);
     let hit = TriangleHit { mesh: piece.mesh, triangle: piece.triangle, barycentric: [b, c] };

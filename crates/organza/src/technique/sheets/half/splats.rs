@@ -3,27 +3,12 @@
 use crate::frame::Frame;
 use crate::matter::Matter;
 use sheet_light::half::{HalfSplats, SplatBounds};
-use splat_core::glam::Vec3;
 use splat_core::raster::{self, Detail, ProjectInput, Projected};
-use splat_core::{Aabb, Cloud, DAabb, SplatKind};
-
-/// Most slabs where splats alone say how wide they are.
-const MOST_SLABS: f64 = 65536.0;
+use splat_core::{Cloud, SplatKind};
 
 /// Where the splats are that sweeps draw; `None` without any, and before they are made.
 pub(super) fn splat_bounds(matter: &Matter<'_>) -> Option<SplatBounds> {
-    let cloud = matter.cloud?;
-    let (mut all, mut radii, mut count) = (Aabb::EMPTY, 0.0f64, 0u64);
-    for id in own_splats(matter) {
-        let (at, radius) = (cloud.position[id as usize], cloud.radius[id as usize]);
-        all = all.union(Aabb { min: at, max: at });
-        (radii, count) = (radii + f64::from(radius), count + 1);
-    }
-    let place = |p: Vec3| cloud.origin + p.as_dvec3();
-    let bounds = (count > 0).then(|| DAabb::new(place(all.min), place(all.max)))?;
-    // Neighbours are about half a radius apart.
-    let least = (bounds.diagonal() / MOST_SLABS).max(f64::MIN_POSITIVE);
-    Some(SplatBounds { bounds, slab_width: (0.5 * radii / count as f64).max(least), count })
+    SplatBounds::of(matter.cloud?, own_splats(matter))
 }
 
 /// Ids of the translucent splats of objects that become nothing else.
