@@ -148,3 +148,42 @@ fn what_falls_stops_where_the_light_sees_it_meet_the_table_in_whatever_frames_ar
     let through = FALLING.replace("stop = { radius = 0.2 }", "");
     assert!(drawn(&through, Some(5)).unwrap() == frames[5] && drawn(&through, Some(8)).unwrap() != frames[8]);
 }
+
+/// A ball of fog that goes away from frame 2 on, what a light sees of it, and a camera that moves.
+const SEEN_MOVING: &str = "version = 1\n[camera]\nposition = [0, 0.5, 5]\ntarget = [0, 0, 0]\nsize = [24, 18]\n\
+    [[light]]\nkind = 'directional'\ndirection = [0, -1, -0.3]\nirradiance = [2, 2, 2]\n\
+    [[object]]\nname = 'fog'\nvisible = false\nmedium_ball = { center = [0, 0, 0], radius = 1, extinction = 8, spacing = 0.1 }\n\
+    [[object]]\nname = 'seen'\nextract = { objects = ['fog'] }\n\
+    [[object]]\nname = 'aside'\nrectangle = { center = [0, -1, 0], u = [1, 0, 0], v = [0, 0, -1], spacing = 0.1 }\n\
+    [animation]\nframes = 4\n[[animation.track]]\nset = 'camera.position'\n\
+    keys = [{ frame = 0, value = [0, 0.5, 5] }, { frame = 3, value = [1, 0.5, 5] }]\n\
+    [[animation.track]]\nset = 'object.aside.transform.translate'\n\
+    keys = [{ frame = 0, value = [0, 0, 0] }, { frame = 3, value = [0, -1, 0] }]\n\
+    [[animation.track]]\nset = 'object.fog.transform.translate'\n\
+    keys = [{ frame = 1, value = [0, 0, 0] }, { frame = 3, value = [-0.5, 0, 0] }]\n";
+
+#[test]
+fn what_a_light_sees_is_kept_while_it_stays_and_frames_are_as_those_alone() {
+    let frame = |frame| {
+        let options = scene::LoadOptions { frame: Some(frame), ..Default::default() };
+        scene::parse("s.toml".as_ref(), SEEN_MOVING.as_bytes(), &options).unwrap()
+    };
+    let (options, progress) = (organza::RenderOptions::default(), organza::Progress::new());
+    let frames = [0, 1, 2, 3].map(frame);
+    let files = organza::Files::default();
+    let points = frames.each_ref().map(|frame| {
+        let (fitted, _) = organza::fitted(frame, &options, &progress, &files).unwrap();
+        let scene::Source::Extract(source) = &fitted.objects[1].source else { panic!() };
+        source.points.clone().unwrap()
+    });
+    // Camera and table move, what the light sees does not; then it does.
+    assert!(std::sync::Arc::ptr_eq(&points[0], &points[1]));
+    let places = points.each_ref().map(|p| (p.origin, &p.position));
+    assert!(places[1] != places[2] && places[2] != places[3]);
+    let mut sequence = organza::Sequence::new(&frames);
+    let picture = |render: organza::Render| render.layers.rgb("beauty").unwrap().to_vec();
+    for frame in &frames {
+        let alone = picture(organza::render(frame, &options, &progress).unwrap());
+        assert!(picture(sequence.render(frame, &options, &progress).unwrap()) == alone);
+    }
+}

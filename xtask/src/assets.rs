@@ -1,5 +1,6 @@
 //! `cargo xtask assets`: what lies under `assets/`, and where the larger inputs of the benchmarks come from.
 
+mod dose;
 mod lines;
 mod meadow;
 mod png;
@@ -42,6 +43,13 @@ pub(crate) fn run(repo: &Repo) -> Outcome {
 /// Writes the environment that is made by formula.
 pub(crate) fn write_sky(repo: &Repo) -> Outcome {
     let (path, bytes) = (repo.root.join("assets/environment/sky.hdr"), sky::hdr());
+    std::fs::write(&path, &bytes).map_err(|e| format!("{}: {e}", path.display()))?;
+    Ok(format!("{} bytes in {}", bytes.len(), path.display()))
+}
+
+/// Writes the volume that is made by formula.
+pub(crate) fn write_dose(repo: &Repo) -> Outcome {
+    let (path, bytes) = (repo.root.join("assets/dose/dose.nrrd"), dose::nrrd());
     std::fs::write(&path, &bytes).map_err(|e| format!("{}: {e}", path.display()))?;
     Ok(format!("{} bytes in {}", bytes.len(), path.display()))
 }

@@ -34,6 +34,7 @@ usage: cargo xtask COMMAND
   papers --check   fails where docs/papers.md is stale or names code or a test that does not exist
   assets           lists the files under assets/, their credit files, and where the larger inputs come from
   assets sky       writes assets/environment/sky.hdr, an environment by formula
+  assets dose      writes assets/dose/dose.nrrd, the dose of three beams by formula
   assets points    writes assets/points/lines.csv, lines of a scan by formula
   assets solids    writes assets/meshes/*.off, a mushroom, a dart and an aeroplane by tables
   shaders          compiles shaders/glsl to shaders/spirv and writes the manifest; builds glslang first (C++, minutes)
@@ -61,6 +62,7 @@ fn main() -> ExitCode {
         ["papers", "--check"] => Repo::open().and_then(|repo| papers::check(&repo)),
         ["assets"] => Repo::open().and_then(|repo| assets::run(&repo)),
         ["assets", "sky"] => Repo::open().and_then(|repo| assets::write_sky(&repo)),
+        ["assets", "dose"] => Repo::open().and_then(|repo| assets::write_dose(&repo)),
         ["assets", "points"] => Repo::open().and_then(|repo| assets::write_points(&repo)),
         ["assets", "solids"] => Repo::open().and_then(|repo| assets::write_solids(&repo)),
         ["shaders"] => Repo::open().and_then(|repo| shaders::run(&repo, false)),

@@ -146,6 +146,12 @@ impl GridField {
         [rows.x_axis, rows.y_axis, rows.z_axis].into_iter().zip(self.last.to_array()).flat_map(sides).collect()
     }
 
+    /// Whether a place is within half a step of the lattice, which voxels fill.
+    pub(crate) fn fills(&self, p: DVec3) -> bool {
+        let u = self.lattice_coordinate(p);
+        (u - u.clamp(DVec3::ZERO, self.last)).abs().cmple(self.rounding + 0.5).all()
+    }
+
     #[inline(always)]
     fn lattice_coordinate(&self, p: DVec3) -> DVec3 {
         self.lattice_from_object * (p - self.grid().origin)

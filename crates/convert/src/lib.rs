@@ -95,6 +95,7 @@ mod sobel;
 mod solids;
 mod srgb;
 mod subdivide;
+mod surface_field;
 mod surface_nets;
 #[cfg(feature = "surfels")]
 mod surfels;
@@ -160,10 +161,11 @@ pub use shown_points::{PointsShown, ShownPoints, shown_points};
 pub use sobel::{sobel_gradient, sobel_gradient_into};
 pub use solids::{Combination, Solid};
 pub use splat_core::Clip;
+pub use surface_field::SurfaceField;
 #[cfg(feature = "surfels")]
 pub use surfels::{SurfelParams, SurfelReport, raw_to_surfels};
 #[cfg(feature = "surfels")]
 pub use thin::thinned;
-pub use vertex_normals::vertex_normals;
+pub use vertex_normals::{smooth, vertex_normals};
 pub use volume_points::{VolumeParams, VolumeReport, volume_to_points};
 pub use write_splats::{packed_splats_to_ply, splats_to_ply};

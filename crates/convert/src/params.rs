@@ -77,6 +77,13 @@ pub enum Density {
     Auto,
 }
 
+impl Density {
+    /// The length that it states, world units; 0 for other ways.
+    pub fn spacing(self) -> f64 {
+        if let Self::Spacing(h) = self { h } else { 0.0 }
+    }
+}
+
 impl SplatParams {
     /// Checks the transform and the colour.
     pub(crate) fn check(&self) -> Result<(), ConvertError> {

@@ -31,6 +31,8 @@ pub struct PointsShown<'a> {
     pub has_size: bool,
     /// Whether the object states an opacity.
     pub has_opacity: bool,
+    /// Whether what becomes of them shows a field.
+    pub has_field: bool,
     /// Whether points that have the colours of a column have its numbers as their values.
     pub keeps_values: bool,
     /// Where `height` grows.
@@ -69,9 +71,7 @@ pub fn shown_points(
         true => unused_by_matter(&points),
         false => unused_by_discs(&points, shown.has_size, shown.shape, splat),
     };
-    if !points.ready.cloud.is_empty() {
-        check_ready(shown, splat)?;
-    }
+    check_ready(&points, shown, splat)?;
     if !(shown.keep.is_empty() && shown.clip.is_empty()) {
         let all = points.len();
         if shown.as_matter {
@@ -119,8 +119,16 @@ pub fn shown_points(
     Ok(ShownPoints { points, said, scale })
 }
 
-/// Refuses what would change the optics of splats, which are what they are.
-fn check_ready(shown: &PointsShown<'_>, splat: &SplatParams) -> Result<(), ConvertError> {
+/// Refuses what would change the optics of splats, which are what they are, and fields upon what is no surface.
+fn check_ready(points: &RawPoints, shown: &PointsShown<'_>, splat: &SplatParams) -> Result<(), ConvertError> {
+    let is_ready = !points.ready.cloud.is_empty();
+    if shown.has_field && (is_ready || !points.gaussians.is_empty()) {
+        let expected = "none: 3D Gaussians, and splats of a file, are no samples of a surface";
+        return Err(splat.bad_text("field", "stated".to_owned(), expected));
+    }
+    if !is_ready {
+        return Ok(());
+    }
     let expected = "none: splats of a file have opacities of their own";
     match shown.color_by.map(|by| &by.colors) {
         _ if shown.has_opacity => Err(splat.bad_text("opacity", "stated".to_owned(), expected)),

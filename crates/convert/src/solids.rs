@@ -1,9 +1,12 @@
 //! Solids from solids: what lies inside of a field and within walls, which close it, and one of several by sets.
 
-use crate::{CombinedField, SharedField};
+use crate::{CombinedField, GridField, Inside, Interpolation, SharedField};
 use splat_core::glam::{DMat3, DVec3};
-use splat_core::{Clip, DAabb, Error, ScalarField};
+use splat_core::{Clip, DAabb, Error, Grid, ScalarField};
 use std::sync::Arc;
+
+/// Steps along a box around scattered points, one for each splat of the surface.
+const LEVEL_SET_STEPS: f64 = 192.0;
 
 /// What becomes of several solids.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -84,6 +87,23 @@ impl Solid {
         };
         let bounds = DAabb::new(bounds.min - step, bounds.max + step);
         Ok(Self { field: Arc::new(field), walls: Vec::new(), bounds, step })
+    }
+
+    /// What lies inside of an isosurface of a volume, within the volume.
+    ///
+    /// # Errors
+    /// As [`GridField::new`].
+    pub fn of_volume(grid: Arc<Grid>, interpolation: Interpolation, level: f64, inside: Inside) -> Result<Self, Error> {
+        let step = grid.shortest_step();
+        let field = GridField::new(grid, interpolation, level, inside)?;
+        let (walls, bounds) = (field.walls(), field.bounds());
+        Ok(Self { field: Arc::new(field), walls, bounds, step })
+    }
+
+    /// What lies inside of the surface through scattered points, within the box of the field that was laid through them.
+    pub fn of_points(field: SharedField, bounds: DAabb) -> Self {
+        let step = bounds.size().max_element() / LEVEL_SET_STEPS;
+        Self { field, walls: Vec::new(), bounds, step }.closed()
     }
 
     /// The same with its box as walls.

@@ -44,6 +44,16 @@ pub fn vertex_normals(mesh: &Mesh) -> Vec<Vec3> {
     sum.par_iter().with_min_len(CHUNK).map(|n| unit(*n)).collect()
 }
 
+/// Gives a mesh that has no normals those of [`vertex_normals`].
+///
+/// # Panics
+/// As there.
+pub fn smooth(mesh: &mut Mesh) {
+    if mesh.normal.is_empty() {
+        mesh.normal = vertex_normals(mesh);
+    }
+}
+
 fn corner_normals(p: [Vec3; 3]) -> [DVec3; 3] {
     let v = p.map(|p| p.as_dvec3());
     let cross = robust_cross(v[1] - v[0], v[2] - v[0]);

@@ -56,3 +56,4 @@ mod read_vti;
 mod read_vtk;
 mod readme;
 mod splat_files;
+mod surface_field;

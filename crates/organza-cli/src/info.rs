@@ -7,7 +7,7 @@ use super::given::is_scene;
 use super::session::path_text;
 use super::{console, memory};
 use organza::Error;
-use organza::scene::{self, Combination, LoadOptions, Scene, Source, UpAxis};
+use organza::scene::{self, Combination, LoadOptions, Scene, SceneObject, Source, UpAxis};
 use organza_survey::{Facts, Histogram, facts};
 use serde_json::{Value, json};
 use splat_core::LightShape;
@@ -32,7 +32,7 @@ fn scene_document(scene: &Scene) -> Value {
         json!({
             "name": o.name,
             "source": source_name(&o.source),
-            "path": source_path(&o.source),
+            "path": source_path(o),
             "up": o.up.axis.name(),
             "material": scene.materials[o.material].name,
             "materials": o.material_ids().map(|id| &scene.materials[id].name).collect::<Vec<_>>(),
@@ -81,8 +81,8 @@ fn source_name(source: &Source) -> &'static str {
 }
 
 /// The file that it reads, or all of them.
-fn source_path(source: &Source) -> Option<String> {
-    let paths: Vec<String> = source.paths().into_iter().map(path_text).collect();
+fn source_path(object: &SceneObject) -> Option<String> {
+    let paths: Vec<String> = object.paths().map(path_text).collect();
     (!paths.is_empty()).then(|| paths.join(", "))
 }
 

@@ -1,12 +1,16 @@
-//! Checks of the surfaces of fields: isosurfaces, level sets, slices, and where they end.
+//! Checks of the surfaces of fields: isosurfaces, level sets, slices, and where they end; and of fields that surfaces show.
 
 use super::check::{At, LARGEST};
 use super::check_source::{check_box, check_implicit};
+use super::check_transfer::{Beside, beside_of_points, check_transfer};
 use super::paths::Paths;
-use super::raw_source::{RawClip, RawInside, RawInterpolation, RawIsosurface, RawLevelSet, RawPart, RawSlice};
-use super::{CombinedSource, IsosurfaceSource, LevelSetSource, SliceSource, Source};
+use super::raw_object::RawObject;
+use super::raw_source::{
+    RawClip, RawField, RawInside, RawInterpolation, RawIsosurface, RawLevelSet, RawPart, RawSlice,
+};
+use super::{CombinedSource, FieldSource, IsosurfaceSource, LevelSetSource, SliceSource, Source};
 use crate::Error;
-use convert::{Clip, Combination, Inside, Interpolation, MpuParams};
+use convert::{Classified, Clip, Combination, Inside, Interpolation, MpuParams};
 use splat_core::TransferFunction;
 
 pub(super) fn check_isosurface(at: &At<'_>, raw: &RawIsosurface, paths: &Paths) -> Result<IsosurfaceSource, Error> {
@@ -14,10 +18,7 @@ pub(super) fn check_isosurface(at: &At<'_>, raw: &RawIsosurface, paths: &Paths) 
         path: paths.resolve(&at.key("volume"), &raw.volume)?,
         frame: raw.frame.into(),
         level: at.number("level", raw.level, -LARGEST..=LARGEST)?,
-        interpolation: match raw.interpolation {
-            RawInterpolation::Trilinear => Interpolation::Trilinear,
-            RawInterpolation::CatmullRom => Interpolation::CatmullRom,
-        },
+        interpolation: interpolation(raw.interpolation),
         inside: match raw.inside {
             RawInside::Above => Inside::Above,
             RawInside::Below => Inside::Below,
@@ -88,6 +89,47 @@ pub(super) fn check_slice(
         center: at.vector("center", raw.center)?,
         normal: at.direction("normal", raw.normal)?,
     })
+}
+
+/// A field that a surface shows.
+pub(super) fn check_shown_field(
+    at: &At<'_>,
+    raw: &RawObject,
+    field: &RawField,
+    (source, paths): (&Source, &Paths),
+) -> Result<FieldSource, Error> {
+    let at_field = at.key("field");
+    if source.is_medium() {
+        return Err(at_field.error("`field` belongs to surfaces", "a medium has the values of its own source"));
+    }
+    if matches!(source, Source::Slice(_)) {
+        return Err(at_field.error("a slice shows the values of its own volume", "leave `field` out"));
+    }
+    for (key, on) in [("color", raw.color.is_some()), ("color_by", raw.color_by.is_some())] {
+        if on {
+            let message = format!("`field` and `{key}` exclude each other");
+            return Err(at_field.error(message, "colours are those of `transfer`"));
+        }
+    }
+    if raw.transfer.is_none() {
+        let hint = "such as transfer = [{ value = 0, color = [0, 0, 1] }, { value = 1, color = [1, 0, 0] }]";
+        return Err(at.error("a `field` needs a key `transfer`, found none", hint));
+    }
+    let beside = beside_of_points(raw, false);
+    Ok(FieldSource {
+        path: paths.resolve(&at_field.key("volume"), &field.volume)?,
+        frame: field.frame.into(),
+        interpolation: interpolation(field.interpolation),
+        transfer: check_transfer(at, raw, beside)?,
+        classified: if beside == Beside::Opacity { Classified::Opacity } else { Classified::No },
+    })
+}
+
+fn interpolation(raw: RawInterpolation) -> Interpolation {
+    match raw {
+        RawInterpolation::Trilinear => Interpolation::Trilinear,
+        RawInterpolation::CatmullRom => Interpolation::CatmullRom,
+    }
 }
 
 pub(super) fn check_clip(at: &At<'_>, raw: &RawClip) -> Result<Clip, Error> {

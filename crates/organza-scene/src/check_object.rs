@@ -1,14 +1,14 @@
 //! Checks of objects: what all of them have, whatever their source.
 
 use super::check::At;
-use super::check_field::check_clip;
+use super::check_field::{check_clip, check_shown_field};
 use super::check_footprint::check_choice;
 use super::check_points::check_points;
 use super::check_render::check_technique;
 use super::check_source::check_source;
 use super::paths::Paths;
 use super::raw_object::{RawLattice, RawObject, RawTransform, RawUp};
-use super::{SceneMaterial, SceneObject, Source, Technique, Up};
+use super::{FieldSource, SceneMaterial, SceneObject, Source, Technique, Up};
 use crate::Error;
 use convert::read::{UpAxis, up_axis};
 use glam::{DQuat, DVec3};
@@ -41,12 +41,14 @@ pub(super) fn check_object(
     refuse_what_does_not_apply(at, &raw, &source)?;
     let of_material = named.materials[material].footprint;
     let footprints = check_choice(at, raw.footprint.as_ref(), of_material, (named.footprints, &source))?;
+    let field =
+        raw.field.as_ref().map(|field| check_shown_field(at, &raw, field, (&source, named.paths))).transpose()?;
     let up = match raw.transform.up {
         // An invisible object is not even read, unless a light is to see it.
         RawUp::Auto if raw.visible == Some(false) && !named.seen.contains(&raw.name) => {
             Up { axis: UpAxis::Y, by_file: false }
         }
-        RawUp::Auto => up_of_files(at, &source)?,
+        RawUp::Auto => up_of_files(at, &source, field.as_ref())?,
         RawUp::Y => Up { axis: UpAxis::Y, by_file: false },
         RawUp::Z => Up { axis: UpAxis::Z, by_file: false },
         RawUp::MinusY => Up { axis: UpAxis::MinusY, by_file: false },
@@ -63,6 +65,7 @@ pub(super) fn check_object(
             None | Some(RawLattice::Cartesian) => Packing::Cartesian,
             Some(RawLattice::Bcc) => Packing::BodyCentred,
         },
+        field,
         points: check_points(at, &raw)?,
         clip: raw
             .clip
@@ -82,9 +85,10 @@ pub(super) fn check_object(
     })
 }
 
-/// The axis that points up by the source's files, which have to agree.
-fn up_of_files(at: &At<'_>, source: &Source) -> Result<Up, Error> {
-    let mut axes = source.paths().into_iter().map(|path| (path, up_axis(path)));
+/// The axis that points up by the source's files and the field's, which have to agree.
+fn up_of_files(at: &At<'_>, source: &Source, field: Option<&FieldSource>) -> Result<Up, Error> {
+    let of_field = field.map(|field| &*field.path);
+    let mut axes = source.paths().into_iter().chain(of_field).map(|path| (path, up_axis(path)));
     let Some((first, axis)) = axes.next() else { return Ok(Up { axis: UpAxis::Y, by_file: false }) };
     if let Some((other, another)) = axes.find(|(_, another)| *another != axis) {
         let [first, other] = [first, other].map(crate::printable);
@@ -131,8 +135,9 @@ fn refuse_what_does_not_apply(at: &At<'_>, raw: &RawObject, source: &Source) -> 
         }
     }
     let is_classified = raw.volume.is_some() || raw.slice.is_some();
-    if raw.transfer.is_some() && !is_classified && raw.color_by.is_none() {
-        let message = "`transfer` belongs to a `volume` or `slice`, and to `points` with `color_by`";
+    if raw.transfer.is_some() && !is_classified && raw.color_by.is_none() && raw.field.is_none() {
+        let message =
+            "`transfer` belongs to a `volume` or `slice`, to a surface with a `field`, and to `points` with `color_by`";
         return Err(at.key("transfer").error(message, ""));
     }
     let is_matter = matches!(source, Source::Matter(_)) && raw.transfer.is_some();

@@ -17,7 +17,7 @@ pub(super) enum Beside {
     Opacity,
 }
 
-/// What those have that give points their colours: nothing, or what classifies points, if one of them has it.
+/// What those have that give points or surfaces their colours: nothing, or what classifies them, if one of them has it.
 pub(super) fn beside_of_points(raw: &RawObject, is_medium: bool) -> Beside {
     let any = raw.transfer.iter().flatten().any(|p| p.extinction.is_some() || p.opacity.is_some());
     match (any, is_medium) {
@@ -27,7 +27,7 @@ pub(super) fn beside_of_points(raw: &RawObject, is_medium: bool) -> Beside {
     }
 }
 
-/// The transfer function of a volume, a slice, or of points, whose control points have that `beside` a colour.
+/// The transfer function of a volume, a slice, a surface with a field, or of points, whose control points have that `beside` a colour.
 pub(super) fn check_transfer(at: &At<'_>, raw: &RawObject, beside: Beside) -> Result<TransferFunction, Error> {
     let Some(points) = &raw.transfer else {
         if beside == Beside::Nothing {
@@ -70,8 +70,8 @@ fn no_extinction(at: &At<'_>, p: &RawTransferPoint) -> Result<(), Error> {
 /// The opacity of one crossing of a surface, by which that of its object is multiplied.
 fn crossing_opacity(at: &At<'_>, p: &RawTransferPoint) -> Result<f64, Error> {
     if p.extinction.is_some() {
-        let hint = "give `opacity`, that of one crossing, or make them a medium by as = \"medium\"";
-        return Err(at.key("extinction").error("points of a surface have no extinction", hint));
+        let hint = "give `opacity`, that of one crossing; points are a medium by as = \"medium\"";
+        return Err(at.key("extinction").error("a surface has no extinction", hint));
     }
     match p.opacity {
         Some(opacity) => at.number("opacity", opacity, 0.0..=1.0),

@@ -10,7 +10,7 @@ impl SceneObject {
             Source::Volume(VolumeSource { transfer, .. }) | Source::Slice(SliceSource { transfer, .. }) => {
                 Some(ColorScale::of_values(&self.name, transfer))
             }
-            _ => None,
+            _ => self.field.as_ref().map(|field| ColorScale::of_values(&self.name, &field.transfer)),
         }
     }
 

@@ -77,8 +77,8 @@ pub use settings::{
 };
 pub use shown::{escape_controls, place, printable, shown};
 pub use source::{
-    CloudSource, CombinedSource, DensitySource, ExtractSource, ImplicitSource, IsosurfaceSource, LevelSetSource,
-    MOST_ABSORBANCE, MatterSource, SliceSource, Source, VolumeSource,
+    CloudSource, CombinedSource, DensitySource, ExtractSource, FieldSource, ImplicitSource, IsosurfaceSource,
+    LevelSetSource, MOST_ABSORBANCE, MatterSource, SliceSource, Source, VolumeSource,
 };
 pub use stops::{Path, Stop};
 

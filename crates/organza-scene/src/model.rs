@@ -1,12 +1,12 @@
 //! The checked scene: everything a render needs, in radians and f64 world units.
 
-use super::{CameraFit, PointsLook, RenderSettings, SceneLight, Source, Stop, Technique};
+use super::{CameraFit, FieldSource, PointsLook, RenderSettings, SceneLight, Source, Stop, Technique};
 use crate::Error;
 use convert::read::UpAxis;
-use convert::{Clip, FootprintChoice};
+use convert::{Clip, DiscSize, FootprintChoice};
 use glam::DVec3;
 use sha2::{Digest, Sha256};
-use splat_core::{Camera, FootprintStack, Material, Packing, Similarity};
+use splat_core::{Camera, FootprintStack, Material, Packing, Projection, Similarity};
 use std::collections::BTreeSet;
 use std::fs::File;
 use std::io::Read;
@@ -53,18 +53,26 @@ pub struct Scene {
 }
 
 impl Scene {
-    /// A part of it that becomes splats: the objects that `has` says, as they stand, visible or not.
+    /// A part of it that becomes splats for a light to see: the objects that `has` says, as they stand, visible or not, and that light. Parts of
+    /// two frames are equal where nothing of them changes, wherever they are seen from, unless points are as large as some pixels.
     #[must_use]
-    pub fn part(&self, has: impl Fn(&SceneObject) -> bool) -> Self {
-        let mut scene = Self { stops: Vec::new(), ..self.clone() };
+    pub fn part(&self, light: usize, has: impl Fn(&SceneObject) -> bool) -> Self {
+        let lights = self.lights.get(light).cloned().into_iter().collect();
+        let mut scene = Self { sha256: String::new(), stops: Vec::new(), start: None, lights, ..self.clone() };
         scene.render.technique = Technique::Points;
-        scene.objects.iter_mut().for_each(|o| (o.visible, o.technique) = (has(o), None));
+        scene.objects.retain(has);
+        scene.objects.iter_mut().for_each(|o| (o.visible, o.technique) = (true, None));
+        if !scene.objects.iter().any(|o| matches!(o.points.size, Some(DiscSize::Pixels(_)))) {
+            let (position, axes) = (DVec3::ZERO, [DVec3::X, DVec3::Y, -DVec3::Z]);
+            let (projection, size) = (Projection::Orthographic { height: 1.0 }, [1, 1]);
+            (scene.camera, scene.target, scene.fit) = (Camera { position, axes, projection, size }, DVec3::ZERO, None);
+        }
         scene
     }
 
     /// Every file that the scene is made of, its own first.
     pub fn files(&self) -> Vec<PathBuf> {
-        let data = self.objects.iter().flat_map(|o| o.source.paths());
+        let data = self.objects.iter().flat_map(SceneObject::paths);
         let footprints = self.footprint_files.iter().map(PathBuf::as_path);
         std::iter::once(&*self.file).chain(data).chain(self.images()).chain(footprints).map(Path::to_owned).collect()
     }
@@ -148,6 +156,8 @@ pub struct SceneObject {
     pub opacity: Option<f64>,
     /// How the planes of the lattice lie that a volume is drawn on: of the file's, or of the body-centred one of the same spectrum.
     pub packing: Packing,
+    /// The field that it shows, a surface alone.
+    pub field: Option<FieldSource>,
     /// How raw points look.
     pub points: PointsLook,
     /// Regions that it is kept in, before the object's transform.
@@ -168,6 +178,13 @@ pub struct SceneObject {
     pub technique: Option<Technique>,
     /// Whether a track of the animation changes more of it than its place, its looks, and what draws it.
     pub deforms: bool,
+}
+
+impl SceneObject {
+    /// The files that it reads.
+    pub fn paths(&self) -> impl Iterator<Item = &Path> {
+        self.source.paths().into_iter().chain(self.field.iter().map(|field| &*field.path))
+    }
 }
 
 /// The axis of a source that points up.

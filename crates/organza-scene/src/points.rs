@@ -72,6 +72,7 @@ impl SceneObject {
             shape: self.points.shape,
             has_size: self.points.size.is_some(),
             has_opacity: self.opacity.is_some(),
+            has_field: self.field.is_some(),
             keeps_values: self.points.keeps_values,
             up: self.up.axis.direction(),
         }
@@ -80,7 +81,7 @@ impl SceneObject {
     /// Whether its points are drawn without light: as the scene says, else those that have colours of their own, which no material and no
     /// other colours are put in the place of. Photographs hold the light of their day already; a medium is lit.
     pub fn is_unlit(&self, has_colors: bool) -> bool {
-        let is_bare = self.material == 0 && self.color.is_none() && self.points.color_by.is_none();
+        let is_bare = self.material == 0 && self.color.is_none() && !self.has_scale();
         self.points.unlit.unwrap_or(is_bare && has_colors && !self.source.is_medium())
     }
 }

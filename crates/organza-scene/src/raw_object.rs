@@ -3,8 +3,8 @@
 use super::raw_footprint::RawChoice;
 use super::raw_points::{RawColorBy, RawDiscShape, RawPointForm, RawPointSize};
 use super::raw_source::{
-    RawClip, RawCloud, RawDensity, RawExtract, RawImplicit, RawIsosurface, RawLevelSet, RawMediumBall, RawMediumBox,
-    RawPart, RawRectangle, RawSlice, RawTransferPoint,
+    RawClip, RawCloud, RawDensity, RawExtract, RawField, RawImplicit, RawIsosurface, RawLevelSet, RawMediumBall,
+    RawMediumBox, RawPart, RawRectangle, RawSlice, RawTransferPoint,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -70,7 +70,9 @@ pub(super) struct RawObject {
     /// Regions that it is kept in, but for homogeneous media; surfaces end open at their borders, volumes show their values there.
     #[serde(default)]
     pub(super) clip: Vec<RawClip>,
-    /// Control points of the transfer function of a `volume`, `slice` or `points` with `color_by`, by rising value.
+    /// A volume whose values a surface shows by the colours, and the opacities if it has some, of `transfer`.
+    pub(super) field: Option<RawField>,
+    /// Control points of the transfer function of a `volume`, `slice`, surface with a `field` or `points` with `color_by`, by rising value.
     pub(super) transfer: Option<Vec<RawTransferPoint>>,
     /// World length that opacities of `transfer` refer to.
     pub(super) unit_length: Option<f64>,

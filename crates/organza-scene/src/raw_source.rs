@@ -105,6 +105,21 @@ pub(super) struct RawSlice {
     pub(super) normal: [f64; 3],
 }
 
+/// A volume whose values a surface shows.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, expecting = "a table")]
+#[schemars(rename = "Field")]
+pub(super) struct RawField {
+    /// Path of a regular volume, in the coordinates of the object before its transform.
+    pub(super) volume: String,
+    /// Which volume of a series, from 0; default 0.
+    #[serde(default)]
+    pub(super) frame: u32,
+    /// Values between lattice points; default "trilinear".
+    #[serde(default)]
+    pub(super) interpolation: RawInterpolation,
+}
+
 /// A half-space or a box; exactly one of them.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, expecting = "a table")]

@@ -2,7 +2,8 @@
 
 use crate::{Error, SceneObject};
 use convert::{
-    CloudShape, Combination, Ellipsoid, ExpressionField, HomogeneousMedium, Inside, Interpolation, RawPoints, Rectangle,
+    Classified, CloudShape, Combination, Ellipsoid, ExpressionField, HomogeneousMedium, Inside, Interpolation,
+    RawPoints, Rectangle,
 };
 use glam::DVec3;
 use splat_core::{DAabb, TransferFunction};
@@ -206,6 +207,21 @@ pub struct SliceSource {
     pub center: DVec3,
     /// Unit normal.
     pub normal: DVec3,
+}
+
+/// A volume whose values a surface shows, in the coordinates of its source: before its transform.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FieldSource {
+    /// The file.
+    pub path: PathBuf,
+    /// Which volume of a series, from 0.
+    pub frame: u64,
+    /// Values between lattice points.
+    pub interpolation: Interpolation,
+    /// Value → colour, and extinctions that are what `classified` says.
+    pub transfer: TransferFunction,
+    /// Whether the surface has a share of its opacity by the values.
+    pub classified: Classified,
 }
 
 /// A medium whose density is an expression in x, y, z, negative values counting as 0. Lengths are before the object's

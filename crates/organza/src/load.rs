@@ -124,7 +124,7 @@ pub(crate) fn read<'a>(
         let images = loading.images(&lights)?;
         stage.items_in = prepared.len() as u64;
         stage.items_out = stage.items_in;
-        let of_objects: u64 = prepared.iter().map(|p| p.input.bytes()).sum();
+        let of_objects: u64 = prepared.iter().map(|p| p.input.bytes()[0]).sum();
         // What was read of images is no more than what was made of it.
         stage.bytes = of_objects + 2 * images.bytes();
         Ok::<_, Error>((prepared, images))

@@ -56,7 +56,7 @@ pub struct ObjectStatistics {
     pub opaque: bool,
     /// Whether the gradients of its values shade it or fill a layer.
     pub by_gradient: bool,
-    /// Whether its discs have the usual footprint, as far as objects and materials say.
+    /// Whether its discs have the usual footprint, as far as objects and materials say, and it shows no field.
     pub is_plain: bool,
     /// How the scene has media sampled.
     pub volumes_by: VolumeSampler,

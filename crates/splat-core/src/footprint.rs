@@ -5,8 +5,8 @@
 //!
 //! w(s) = e^(−qs) − e^(−q)·(1 + x + x²/2), x = q(1 − s), q = cutoff²/2, s = ρ²/R² ∈ \[0, 1\]
 //!
-//! It is positive, integrates in closed form, and a lattice of spacing h ≈ R/2.4 sums to a constant within 1.1·10⁻⁴ at
-//! the default cutoff: a plain cut Gaussian ripples ten times more. Gunjee 2007 (section 4.3) samples Gaussians into
+//! It is positive, integrates in closed form, and a lattice of spacing h ≈ R/2.4 sums to a constant within 1.5·10⁻⁴ at
+//! the default cutoff: a plain cut Gaussian is off fifty times as far. Gunjee 2007 (section 4.3) samples Gaussians into
 //! a stack of textures; a profile by formula has no table error and costs less than the look-up. What no formula says, such as a leaf,
 //! is an image in the stack: see [`FootprintImage`].
 
@@ -34,7 +34,7 @@ impl Default for Footprint {
 }
 
 impl Footprint {
-    /// Radius over lattice spacing at which the footprints of a square lattice sum to a constant within 1.1·10⁻⁴ at
+    /// Radius over lattice spacing at which the footprints of a square lattice sum to a constant within 1.5·10⁻⁴ at
     /// the default cutoff; wider cutoffs keep σ = 0.8 spacings.
     pub const SIGMA_OVER_SPACING: f32 = 0.8;
 

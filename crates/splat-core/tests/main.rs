@@ -5,6 +5,7 @@ mod accumulation;
 mod environment;
 mod extended_lights;
 mod image_footprints;
+mod lattice;
 mod opaque_rim;
 mod packed;
 #[cfg(feature = "gpu")]

@@ -24,6 +24,23 @@ fn ts05_cells_sum_to_the_sphere() {
 }
 
 #[test]
+fn ts05_cells_of_equal_angles_differ_by_115_to_1() {
+    let table = PolarAzimuth::new(360, 180, PolarRange::SPHERE);
+    let of_row = |row: u32| table.measure(row * 360);
+    let (least, most) = (0..180).map(of_row).fold((f64::MAX, 0.0f64), |(a, b), m| (a.min(m), b.max(m)));
+    assert_eq!((most / least).round(), 115.0, "{}", most / least);
+}
+
+#[test]
+fn ts04_the_papers_index_leaves_its_table_where_angles_are_degrees() {
+    // Eq. 2 with φ from 0 to 180 degrees in k = 180 columns.
+    let index = |phi: f64| (phi - 0.0) * 180.0 * 180.0 / (PI * (180.0 - 0.0));
+    assert_eq!(index(180.0).round(), 10_313.0);
+    let place = PolarAzimuth::new(360, 180, PolarRange::SPHERE).locate(Vec3::NEG_Z).unwrap();
+    assert!(place.at.y.floor() <= 180.0, "{}", place.at);
+}
+
+#[test]
 fn ts05_octahedral_cells_have_equal_solid_angle() {
     // Uniform directions: each of 24² cells gets its share; χ² with 575 degrees of freedom exceeds 683 with p = 1e-3.
     let table = Octahedral::new(24);

@@ -20,10 +20,13 @@ fn how_points_look_is_checked() {
     refused("color_by = { column = \"z\" }\ncolor = [1, 0, 0]", "`color` and `color_by` exclude each other");
     let transfer = "transfer = [{ value = 0, color = [1, 1, 1] }]";
     refused(&format!("color_by = {{ column = \"z\", map = \"grey\" }}\n{transfer}"), "exclude each other");
-    refused(transfer, "`transfer` belongs to a `volume` or `slice`, and to `points` with `color_by`");
+    refused(
+        transfer,
+        "`transfer` belongs to a `volume` or `slice`, to a surface with a `field`, and to `points` with `color_by`",
+    );
     refused(
         "color_by = { column = \"z\" }\ntransfer = [{ value = 0, color = [1, 1, 1], extinction = 0.5 }]",
-        "points of a surface have no extinction",
+        "a surface has no extinction",
     );
     refused(
         "color_by = { column = \"z\" }\ntransfer = [{ value = 0, color = [1, 1, 1], opacity = 0.5 }, { value = 1, color = [1, 1, 1] }]",
@@ -46,6 +49,34 @@ fn how_points_look_is_checked() {
     refused("point_size = { pixels = 0 }", "`pixels`: expected a number above 0, up to 1024, found 0");
     refused("point_size = { world = -1 }", "`world`: expected a number above 0");
     refused("unlit = true\nmaterial = \"glass\"", "`unlit` and `material` exclude each other");
+}
+
+#[test]
+fn fields_are_shown_by_surfaces_that_say_how() {
+    let field = "field = { volume = \"b.nii\" }";
+    let ramp = "transfer = [{ value = 0, color = [1, 1, 1] }]";
+    let surface =
+        |keys: &str, expected: &str| refused("mesh = \"a.ply\"", &format!("mesh = \"a.ply\"\n{keys}"), expected);
+    surface(field, "a `field` needs a key `transfer`, found none");
+    surface(&format!("{field}\n{ramp}\ncolor = [1, 0, 0]"), "13:9: `field` and `color` exclude each other");
+    surface(&format!("field = {{}}\n{ramp}"), "expected a key `volume` here");
+    surface(&format!("field = {{ volume = \"b.nii\", level = 2 }}\n{ramp}"), "unknown key `level`");
+    surface(
+        &format!("field = {{ volume = \"b.nii\", interpolation = \"cubic\" }}\n{ramp}"),
+        "expected one of \"trilinear\", \"catmull-rom\", found \"cubic\"",
+    );
+    surface(&format!("field = {{ volume = \"../../b.nii\" }}\n{ramp}"), "b.nii");
+    let extinct = "transfer = [{ value = 0, color = [1, 1, 1], extinction = 1 }]";
+    surface(&format!("{field}\n{extinct}"), "a surface has no extinction");
+    surface(&format!("{field}\n{ramp}\nunit_length = 1"), "`unit_length` belongs to");
+    let of =
+        |source: &str, expected: &str| refused("mesh = \"a.ply\"", &format!("{source}\n{field}\n{ramp}"), expected);
+    of(
+        "medium_ball = { center = [0, 0, 0], radius = 1, extinction = 1, spacing = 0.1 }",
+        "`field` belongs to surfaces",
+    );
+    of("slice = { volume = \"b.nii\", center = [0, 0, 0], normal = [0, 0, 1] }", "a slice shows the values of its own");
+    of("points = \"a.las\"\ncolor_by = { column = \"z\" }", "`field` and `color_by` exclude each other");
 }
 
 #[test]

@@ -9,6 +9,23 @@ const UNION: Which = These(&["union"]);
 const SPACED: &[&str] = &[
     "object.it.implicit={expression='x^2 + y^2 + 2*z^2 - 0.3', box=[[-0.9, -0.9, -0.9], [0.9, 0.9, 0.9]], spacing=0.1}",
 ];
+const SURFACES: Which = These(&[
+    "mesh",
+    "plain mesh",
+    "points",
+    "plain points",
+    "implicit",
+    "isosurface",
+    "level_set",
+    "union",
+    "rectangle",
+]);
+/// A surface that shows a field.
+const SHOWN: &[&str] = &[
+    "object.it.field={volume='grid.nrrd'}",
+    "object.it.transfer=[{value=0, color=[1, 0, 0], opacity=0.1}, {value=1, color=[0, 0.5, 1], opacity=1}]",
+];
+const SHOWN_SERIES: &[&str] = &["object.it.field={volume='series.nrrd'}", SHOWN[1]];
 const SERIES: &[&str] = &["object.it.union.0.isosurface.volume='series.nrrd'"];
 /// A ball through points instead of the isosurface.
 const POINTS: &[&str] = &["object.it.union.0={level_set={points='ball.xyz'}}", "object.it.spacing=0.1"];
@@ -34,6 +51,10 @@ pub(super) fn entries() -> Vec<Entry> {
         of(ISOSURFACE, "object.isosurface.level", "object.it.isosurface.level=0.75"),
         of(ISOSURFACE, "object.isosurface.interpolation", "object.it.isosurface.interpolation='catmull-rom'"),
         of(ISOSURFACE, "object.isosurface.inside", "object.it.isosurface.inside='below'"),
+        of(SURFACES, "object.field", "object.it.field={volume='other.nrrd'}").with(SHOWN),
+        of(SURFACES, "object.field.volume", "object.it.field.volume='other.nrrd'").with(SHOWN),
+        of(SURFACES, "object.field.frame", "object.it.field.frame=1").with(SHOWN_SERIES),
+        of(SURFACES, "object.field.interpolation", "object.it.field.interpolation='catmull-rom'").with(SHOWN),
         of(LEVEL_SET, "object.level_set", "object.it.level_set={points='larger.xyz'}"),
         of(LEVEL_SET, "object.level_set.points", "object.it.level_set.points='larger.xyz'"),
         of(LEVEL_SET, "object.level_set.tolerance", "object.it.level_set.tolerance=0.05"),

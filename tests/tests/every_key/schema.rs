@@ -100,6 +100,7 @@ pub(crate) fn heading(table: &str) -> &'static str {
         "object.part" => "#### Solids from solids",
         "object.part.isosurface" | "object.part.level_set" => "### Surfaces of fields",
         "object.clip" => "### `clip`",
+        "object.field" => "### Fields that surfaces show",
         "object.extract" => "### What a light sees",
         "object.color_by" | "object.point_size" => "### Raw points",
         "material" | "material.medium" | "material.absorption" | "material.cauchy" | "material.bump" => {

@@ -178,7 +178,7 @@ const RAW: Which = These(&["points", "plain points"]);
 const HOT: &[&str] = &["object.it.points='hot.xyz'", "object.it.color_by={column='heat'}"];
 const MATTER: &[&str] = &["object.it.as='medium'", "object.it.extinction=3"];
 const OWN_SPACING: Expected = Refused(2, "states its own spacing");
-const NO_TRANSFER: Expected = Refused(2, "belongs to a `volume` or `slice`, and to `points` with `color_by`");
+const NO_TRANSFER: Expected = Refused(2, "belongs to a `volume` or `slice`, to a surface with a `field`, and");
 pub(super) const OPEN: Which = These(&["implicit", "isosurface", "level_set", "union"]);
 
 fn objects() -> Vec<Entry> {

@@ -2,7 +2,7 @@
 
 use super::medium::{MediumBody, medium};
 use convert::read::{Loaded as FileData, ReadParams};
-use convert::{Solid, SplatParams};
+use convert::{MpuParams, RawPoints, Solid, SplatParams};
 use glam::Vec3;
 use organza::scene::{Scene, SceneMaterial, SceneObject, Source};
 use organza::{Error, RenderOptions};
@@ -15,6 +15,8 @@ use std::sync::Arc;
 pub(super) const FINER: f64 = 0.5;
 /// The same for solids of several, whose edges are cut off within a step.
 const FINER_EDGES: f64 = 0.25;
+/// Lattice points on which a solid is looked for, at most: parts of measured data may be finer than the whole can be.
+const MOST_POINTS: f64 = 2e8;
 /// An object of the scene, with what the tracer borrows.
 pub(super) enum Body {
     /// A medium.
@@ -35,6 +37,9 @@ pub(super) fn body(
     if material.material.bounds_matter() && object.opacity.unwrap_or(material.opacity) > 0.0 {
         return no("surfaces that bound matter and have an opacity of their own are not path-traced");
     }
+    if object.field.is_some() {
+        return no("surfaces that show a field are not path-traced");
+    }
     let mesh = match &object.source {
         Source::Points(_) => {
             return no(
@@ -52,10 +57,7 @@ pub(super) fn body(
         Source::Implicit(_) | Source::Combined(_) if !object.clip.is_empty() => {
             return no("open surfaces are not path-traced");
         }
-        Source::Combined(_) => match solid(&object.source)? {
-            Some(solid) => mesh_of(solid.field.as_ref(), solid.bounds, solid.step * FINER_EDGES, object)?,
-            None => return no("solids with parts of measured fields are not path-traced: those of expressions are"),
-        },
+        Source::Combined(_) => combined(object, options)?,
         Source::Mesh(path) => match read(path, 0, options)? {
             FileData::Mesh(mesh) => mesh,
             _ => {
@@ -109,20 +111,49 @@ fn mesh_of(field: &dyn ScalarField, bounds: DAabb, step: f64, object: &SceneObje
     Ok(convert::field_to_mesh(field, bounds, step, &params, None)?)
 }
 
-/// The solid of an expression, or of several; `None` where a part is of measured data.
-fn solid(source: &Source) -> Result<Option<Solid>, Error> {
-    Ok(match source {
+/// The surface of a solid of several, by steps finer than those of its splats.
+fn combined(object: &SceneObject, options: &RenderOptions) -> Result<Mesh, Error> {
+    let solid = solid(&object.source, object, options)?;
+    let step = object.spacing.map_or(solid.step, |spacing| spacing / object.transform.scale);
+    let least = libm::cbrt(solid.bounds.size().element_product() / MOST_POINTS);
+    mesh_of(solid.field.as_ref(), solid.bounds, (step * FINER_EDGES).max(least), object)
+}
+
+/// The solid of a field, by the field itself, or of several.
+fn solid(source: &Source, object: &SceneObject, options: &RenderOptions) -> Result<Solid, Error> {
+    let refused = |e| Error::from_core("a solid", e);
+    match source {
         Source::Implicit(i) => {
             let (field, walls) = (Arc::new(i.field()?), Vec::new());
-            Some(Solid { field, walls, bounds: i.bounds, step: i.spacing }.closed())
+            Ok(Solid { field, walls, bounds: i.bounds, step: i.spacing }.closed())
+        }
+        Source::Isosurface(i) => match read(&i.path, i.frame, options)? {
+            FileData::Grid(grid) => Solid::of_volume(grid.into(), i.interpolation, i.level, i.inside).map_err(refused),
+            _ => Err(Error::wrong_kind(&i.path, "a volume", "use `mesh = ` or `points = ` for this file")),
+        },
+        Source::LevelSet(l) => {
+            let points = match read(&l.path, 0, options)? {
+                FileData::Points(points) => points,
+                FileData::Mesh(mesh) => RawPoints::of_vertices(&mesh),
+                _ => {
+                    return Err(Error::wrong_kind(
+                        &l.path,
+                        "points",
+                        "use `volume = ` or `isosurface = ` for this file",
+                    ));
+                }
+            };
+            let params = MpuParams { object_name: object.name.clone(), tolerance: l.tolerance, ..MpuParams::default() };
+            let (field, _) = convert::points_to_field(&points, &params, None)?;
+            let bounds = field.bounds();
+            Ok(Solid::of_points(Arc::new(field), bounds))
         }
         Source::Combined(source) => {
-            let parts: Option<Vec<Solid>> = source.parts.iter().map(solid).collect::<Result<_, _>>()?;
-            let combined = |parts| Solid::combined(source.combination, parts);
-            parts.map(combined).transpose().map_err(|e| Error::from_core("a solid", e))?
+            let parts = source.parts.iter().map(|part| solid(part, object, options)).collect::<Result<_, _>>()?;
+            Solid::combined(source.combination, parts).map_err(refused)
         }
-        _ => None,
-    })
+        _ => Err(Error::Internal("a solid is of a source that has no field".into())),
+    }
 }
 
 /// Ambient radiance reaches splats unshadowed, so to the eye it is emission.
@@ -195,9 +226,7 @@ pub(super) fn read(path: &Path, frame: u64, options: &RenderOptions) -> Result<F
 /// Moves a mesh into the world; without normals it gets smooth ones between sharp edges, as its splats do.
 fn place(mesh: &mut Mesh, t: &Similarity) {
     convert::part_at_creases(mesh);
-    if mesh.normal.is_empty() {
-        mesh.normal = convert::vertex_normals(mesh);
-    }
+    convert::smooth(mesh);
     mesh.origin = t.apply(mesh.origin);
     let (turn, scale) = (t.rotation.as_quat(), t.scale as f32);
     mesh.position.iter_mut().for_each(|p: &mut Vec3| *p = turn * (*p * scale));

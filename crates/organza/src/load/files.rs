@@ -1,7 +1,7 @@
 //! What was read from files, shared by all objects and frames that are made from it: a file is read once.
 
 use crate::Error;
-use crate::scene::{Scene, Stop};
+use crate::scene::{ExtractSource, Scene, Stop};
 use convert::read::{Loaded, Mended, Notes, ReadParams};
 use convert::{ColorScale, RawPoints, SharedField};
 use splat_core::{DAabb, Grid, Mesh, Progress, RadianceImage};
@@ -43,6 +43,8 @@ pub struct Files {
     pub(super) fitted: Made<(PathBuf, f64), (Fitted, u64)>,
     /// Until when objects are free on their way in a scene that begins so.
     pub(crate) stopped: Made<(Stop, Arc<Scene>), f64>,
+    /// What lights see of parts of the scene.
+    pub(crate) seen: Made<(ExtractSource, Scene), Arc<RawPoints>>,
     /// Most bytes that parts of the scene took while lights looked at them.
     pub(crate) most: Cell<u64>,
     /// What was mended in them, or is doubtful.
@@ -121,7 +123,8 @@ impl Files {
     /// Bytes that it holds.
     pub(crate) fn bytes(&self) -> u64 {
         let read: u64 = self.read.borrow().values().map(|(_, (data, _))| data.bytes()).sum();
-        read + self.fitted.borrow().iter().map(|(_, (_, bytes))| bytes).sum::<u64>()
+        let seen: u64 = self.seen.borrow().iter().map(|(_, points)| points.bytes()).sum();
+        read + seen + self.fitted.borrow().iter().map(|(_, (_, bytes))| bytes).sum::<u64>()
     }
 }
 

@@ -4,22 +4,19 @@ use super::context::Context;
 use super::files::{FileData, Fitted, once};
 use crate::Error;
 use crate::scene::{
-    CombinedSource, DensitySource, LevelSetSource, MatterSource, SceneObject, SliceSource, Source, SurfaceSampler,
-    VolumeSource,
+    CombinedSource, DensitySource, FieldSource, LevelSetSource, MatterSource, SceneObject, SliceSource, Source,
+    SurfaceSampler, VolumeSource,
 };
 use crate::statistics::ObjectData;
 use convert::{
-    Clip, ClippedField, CloudShape, Density, DensityParams, GridField, HomogeneousMedium, Inside, Interpolation,
-    MatterParams, MediumBody, MeshParams, MpuParams, RawPoints, Section, SharedField, ShownPoints, Solid, SplatParams,
+    Clip, ClippedField, CloudShape, Density, DensityParams, HomogeneousMedium, Inside, Interpolation, MatterParams,
+    MediumBody, MeshParams, MpuParams, RawPoints, Section, SharedField, ShownPoints, Solid, SplatParams, SurfaceField,
     SurfelParams, VolumeParams,
 };
 use pbsr::{BoundedExtinction, Matter};
 use splat_core::{DAabb, Grid, Mesh, TransferFunction};
 use std::path::Path;
 use std::sync::Arc;
-
-/// Steps along a box around scattered points, one for each splat of the surface.
-const LEVEL_SET_STEPS: f64 = 192.0;
 
 /// The data of one object with the parameters of its conversion.
 pub(super) enum Input<'a> {
@@ -37,25 +34,15 @@ pub(super) enum Input<'a> {
 }
 
 impl Input<'_> {
-    /// Bytes that it holds.
-    pub(super) fn bytes(&self) -> u64 {
-        match self {
-            Self::Mesh(_, mesh, _) => mesh.bytes(),
-            Self::Points(_, points, _) | Self::Matter(_, points, _) => points.bytes(),
-            Self::Volume(grid, ..) => grid.bytes(),
-            _ => 0,
-        }
-    }
-
-    /// Bytes that it alone holds: what files hold is shared with [`super::files::Files`].
-    pub(super) fn own_bytes(&self) -> u64 {
-        let is_shared = match self {
-            Self::Mesh(_, mesh, _) => Arc::strong_count(mesh) > 1,
-            Self::Points(_, points, _) | Self::Matter(_, points, _) => Arc::strong_count(points) > 1,
-            Self::Volume(grid, ..) => Arc::strong_count(grid) > 1,
-            _ => false,
+    /// Bytes that it holds, and those of them that [`super::files::Files`] does not hold too.
+    pub(super) fn bytes(&self) -> [u64; 2] {
+        let (bytes, holders) = match self {
+            Self::Mesh(_, mesh, _) => (mesh.bytes(), Arc::strong_count(mesh)),
+            Self::Points(_, points, _) | Self::Matter(_, points, _) => (points.bytes(), Arc::strong_count(points)),
+            Self::Volume(grid, ..) => (grid.bytes(), Arc::strong_count(grid)),
+            _ => (0, 1),
         };
-        if is_shared { 0 } else { self.bytes() }
+        [bytes, if holders > 1 { 0 } else { bytes }]
     }
 
     /// Its attributes and limits.
@@ -199,22 +186,21 @@ type Trilinear = Option<(Arc<Grid>, f32, Inside)>;
 
 /// What a field and where it is known make; its step is the distance of its splats where the object states none.
 fn solid(source: &Source, object: &SceneObject, context: &Context<'_>) -> Result<(Solid, Trilinear), Error> {
-    let boxed = |field, bounds, step| (Solid { field, walls: Vec::new(), bounds, step }.closed(), None);
     Ok(match source {
-        Source::Implicit(source) => boxed(Arc::new(source.field()?), source.bounds, source.spacing),
+        Source::Implicit(source) => {
+            let (field, walls) = (Arc::new(source.field()?), Vec::new());
+            (Solid { field, walls, bounds: source.bounds, step: source.spacing }.closed(), None)
+        }
         Source::Isosurface(source) => {
             let grid = read_grid(&source.path, source.frame, context)?;
-            let step = grid.shortest_step();
             let is_trilinear = source.interpolation == Interpolation::Trilinear;
             let trilinear = is_trilinear.then(|| (grid.clone(), source.level as f32, source.inside));
-            let field = GridField::new(grid, source.interpolation, source.level, source.inside)
-                .map_err(|e| refuse(&source.path, &e, ""))?;
-            let (walls, bounds) = (field.walls(), field.bounds());
-            (Solid { field: Arc::new(field), walls, bounds, step }, trilinear)
+            let solid = Solid::of_volume(grid, source.interpolation, source.level, source.inside);
+            (solid.map_err(|e| refuse(&source.path, &e, ""))?, trilinear)
         }
         Source::LevelSet(source) => {
             let (field, bounds) = level_set(source, object, context)?;
-            boxed(field, bounds, bounds.size().max_element() / LEVEL_SET_STEPS)
+            (Solid::of_points(field, bounds), None)
         }
         Source::Combined(CombinedSource { combination, parts }) => {
             let parts = parts.iter().map(|part| Ok(solid(part, object, context)?.0)).collect::<Result<_, Error>>()?;
@@ -300,6 +286,13 @@ fn raw_points<'a>(
         Some(params) => Input::Matter(path, points, params),
         None => Input::Points(path, points, context.surfel_params(object, splat)),
     })
+}
+
+/// The field that a surface shows.
+pub(super) fn shown_field(object: &SceneObject, context: &Context<'_>) -> Result<Option<SurfaceField>, Error> {
+    let Some(FieldSource { path, frame, interpolation, transfer, classified }) = &object.field else { return Ok(None) };
+    let field = SurfaceField::new(read_grid(path, *frame, context)?, *interpolation, transfer.clone(), *classified);
+    field.map(Some).map_err(|e| refuse(path, &e, ""))
 }
 
 fn read_grid(path: &Path, frame: u64, context: &Context<'_>) -> Result<Arc<Grid>, Error> {

@@ -82,7 +82,7 @@ impl<'a> Loading<'a> {
             // Estimates count half, so that nothing is refused that would fit.
             needed += if count.exact { count.predicted } else { count.predicted / 2 };
             splats.push(count);
-            held += p.input.own_bytes();
+            held += p.input.bytes()[1];
             check_total(self.scene, self.options, [held, needed], &splats)?;
         }
         Ok(splats)

@@ -1,19 +1,18 @@
 //! One object → its cloud.
 
 use super::context::Context;
-use super::input::{Input, input};
+use super::input::{Input, input, shown_field};
 use super::own::{Body, Own};
 use crate::Error;
 use crate::scene::{SceneObject, Source};
-use crate::statistics::ObjectStatistics;
+use crate::statistics::{ObjectData, ObjectStatistics};
 use convert::cost::{self, Prediction};
 use convert::{
-    CloudShape, ConvertError, Density, DensityParams, MatterParams, MeshParams, RawPoints, SplatParams, SurfelParams,
+    CloudShape, ConvertError, DensityParams, MatterParams, MeshParams, SplatParams, SurfaceField, SurfelParams,
     VolumeParams, ZeroSearch,
 };
 use pbsr::BoundedExtinction;
 use splat_core::{Cloud, Exceeded, Grid, Object, Shading, TransferFunction};
-use std::path::Path;
 
 /// Most operations of an expression on its way to splats: some minutes of two cores.
 const MOST_OPERATIONS: f64 = 1e11;
@@ -30,6 +29,8 @@ pub(super) struct Prepared<'a> {
     pub(super) bounded: Option<BoundedExtinction>,
     /// Where a surface may lie, where particles could be sampled from it.
     pub(super) search: Option<ZeroSearch>,
+    /// The field that it shows.
+    pub(super) field: Option<SurfaceField>,
 }
 
 /// The object's row of the object table.
@@ -69,7 +70,8 @@ pub(super) fn prepare<'a>(
         }
         prediction => (prediction?, None),
     };
-    Ok(Prepared { input, prediction, as_it_is, too_many, bounded, search })
+    let field = shown_field(object, context)?;
+    Ok(Prepared { input, prediction, as_it_is, too_many, bounded, search, field })
 }
 
 /// Refuses an expression that would be worked at for many minutes before anything is drawn.
@@ -109,9 +111,8 @@ impl Prepared<'_> {
     /// See [`crate::statistics::ObjectData::Surface`].
     fn looseness(&self) -> f64 {
         let (Some(search), Input::Surface(_, _, params, _)) = (&self.search, &self.input) else { return f64::INFINITY };
-        let Density::Spacing(spacing) = params.density else { return f64::INFINITY };
-        let area =
-            self.prediction.splats as f64 / cost::ZERO_SET_EXCESS * (spacing / params.splat.transform.scale).powi(2);
+        let step = params.density.spacing() / params.splat.transform.scale;
+        let area = self.prediction.splats as f64 / cost::ZERO_SET_EXCESS * step.powi(2);
         // A surface that touches its level without crossing it has no triangles: lines may find it.
         if area > 0.0 { search.area / area } else { 0.0 }
     }
@@ -122,13 +123,18 @@ impl Prepared<'_> {
         // Fields of measured data have tight bounds.
         let looseness =
             if matches!(object.source, Source::Implicit(_) | Source::Combined(_)) { self.looseness() } else { 0.0 };
-        let extinct = material.extinction_rgb.iter().any(|e| *e > 0.0) || self.input.opacity() == Some(1.0);
+        let share = self.field.as_ref().map_or(1.0, SurfaceField::least_share);
+        let opaque = self.input.opacity().is_some_and(|opacity| opacity * share == 1.0);
+        let extinct = material.extinction_rgb.iter().any(|e| *e > 0.0) || opaque;
         ObjectStatistics {
             name: object.name.clone(),
-            data: self.input.data(self.bounded.is_some(), looseness, context.scene.render.particles.surface_sampler),
-            opaque: self.input.opacity() == Some(1.0),
+            data: match self.field {
+                Some(_) if self.input.opacity() == Some(1.0) => ObjectData::Points,
+                _ => self.input.data(self.bounded.is_some(), looseness, context.scene.render.particles.surface_sampler),
+            },
+            opaque,
             by_gradient: self.input.by_gradient(),
-            is_plain: object.footprints.is_usual(),
+            is_plain: object.footprints.is_usual() && self.field.is_none(),
             volumes_by: context.scene.render.particles.volume_sampler,
             casts: object.casts_shadow && extinct,
             receives: !self.as_it_is && material.shading != Shading::Unlit && object.shadow_coefficient > 0.0,
@@ -153,7 +159,9 @@ pub(super) fn convert(
             made.inspect(|(_, of)| warnings.extend(of.said().map(|said| format!("{name}: {said}")))).map(|c| c.0)
         }
         Input::Points(path, points, params) => {
-            surfels(path, points, &SurfelParams { splat, ..params.clone() }, context, warnings)
+            let made = convert::raw_to_surfels(points, &SurfelParams { splat, ..params.clone() }, Some(progress));
+            let named = |said| format!("{}: {said} (--merge-duplicates)", crate::printable(path));
+            made.inspect(|(_, of)| warnings.extend(of.said().map(named))).map(|c| c.0)
         }
         Input::Matter(path, points, params) => {
             let made = convert::raw_to_matter(points, &MatterParams { splat, ..params.clone() }, Some(progress));
@@ -184,19 +192,12 @@ pub(super) fn convert(
         Input::Medium(medium, _, clip) => convert::medium(medium, clip, &splat),
         Input::Rectangle(r, opacity, _) => convert::rectangle(r, *opacity, &splat),
     };
-    Ok(cloud?)
-}
-
-fn surfels(
-    path: &Path,
-    points: &RawPoints,
-    params: &SurfelParams,
-    context: &Context<'_>,
-    warnings: &mut Vec<String>,
-) -> Result<Cloud, ConvertError> {
-    let (cloud, report) = convert::raw_to_surfels(points, params, Some(context.progress))?;
-    let named = |said| format!("{}: {said} (--merge-duplicates)", crate::printable(path));
-    warnings.extend(report.said().map(named));
+    let (mut cloud, object) = (cloud?, &context.scene.objects[context.id]);
+    if let (Some(field), Some(source)) = (&prepared.field, &object.field) {
+        let said = field.show(&mut cloud, prepared.input.splat(), object.points.keeps_values);
+        let said = said.map_err(|e| Error::input(crate::printable(&source.path), e.to_string(), ""))?;
+        warnings.extend(said.map(|said| format!("object '{}': {said}", crate::shown(&object.name))));
+    }
     Ok(cloud)
 }
 

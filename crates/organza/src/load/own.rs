@@ -8,7 +8,7 @@ use super::object::{Prepared, procedural};
 use crate::Error;
 use crate::form::{Form, PlannedObject};
 use crate::scene::{SurfaceSampler, Technique};
-use convert::{Clip, RegionField, SharedField, VolumeParams, extinct_bounds};
+use convert::{Clip, RegionField, SharedField, SurfaceField, VolumeParams, extinct_bounds};
 use glam::DVec3;
 use pbsr::{BoundedExtinction, LineParams};
 use rayon::prelude::*;
@@ -37,6 +37,8 @@ pub(crate) struct Own {
     pub(crate) extinction_scale: f64,
     /// Colour where the data has none.
     pub(crate) color: [f32; 3],
+    /// The field that a surface shows, and the opacity of one crossing without it.
+    pub(crate) field: Option<(SurfaceField, f64)>,
     /// From the object to the normalized world.
     pub(crate) transform: Similarity,
     /// Bounds of what can be seen, object units.
@@ -102,19 +104,17 @@ impl Own {
         let Some((body, bounds, spacing)) = data(prepared, bounded, source, context)? else { return Ok(None) };
         let table_bytes = table_bytes(&body, source, bounds, prepared.prediction.splats);
         let radius = f64::from(splat.profile.cutoff) * f64::from(Footprint::SIGMA_OVER_SPACING) * spacing;
+        let has_colors = matches!(&body, Body::Triangles(mesh) if !mesh.color.is_empty());
         Ok(Some(Self {
             object: context.id,
             technique: planned.technique,
             form: source,
             material: usize::from(splat.material),
             opacity: optics::opacity(depth),
+            field: prepared.field.clone().zip(prepared.input.opacity()),
             extinction_scale: factor * splat.transform.scale,
             // The technique multiplies the data's colours by it.
-            color: if matches!(&body, Body::Triangles(mesh) if !mesh.color.is_empty()) {
-                [1.0; 3]
-            } else {
-                splat.color
-            },
+            color: if has_colors { [1.0; 3] } else { splat.color },
             body,
             transform: splat.transform,
             bounds,
@@ -148,14 +148,12 @@ impl Own {
 
     /// Bytes of the data.
     pub(crate) fn bytes(&self) -> u64 {
+        let of_grid = self.grid().map_or(0, Grid::bytes);
         match &self.body {
             Body::Triangles(mesh) => mesh.bytes(),
-            Body::Cells { grid, body_centred, .. } => {
-                grid.bytes() + body_centred.as_ref().map_or(0, |bcc| bcc.planes.bytes())
-            }
-            Body::Lattice { grid, .. } => grid.bytes(),
+            Body::Cells { body_centred: Some(bcc), .. } => of_grid + bcc.planes.bytes(),
             Body::Field(field) => field.bytes(),
-            Body::Surface { .. } => 0,
+            _ => of_grid,
         }
     }
 
@@ -222,7 +220,7 @@ fn data(
         Input::Mesh(_, mesh, _) => meshed(Mesh::clone(mesh)),
         Input::Rectangle(r, ..) => meshed(Mesh::rectangle(r.center, r.u, r.v)),
         Input::Surface(field, bounds, params, lattice) => {
-            let spacing = world_spacing(&params.density) / params.splat.transform.scale;
+            let spacing = params.density.spacing() / params.splat.transform.scale;
             let stated = context.scene.objects[context.id].spacing;
             if let (Form::Triangles, Some((grid, level, inside)), None) = (source, lattice, stated) {
                 // Marching cubes on the volume's own steps, as the paper has it (section 5).
@@ -265,7 +263,7 @@ fn data(
 /// A field of extinction, if there is any.
 fn field_data(prepared: &Prepared<'_>, field: BoundedExtinction) -> Option<Data> {
     let spacing = match &prepared.input {
-        Input::Density(_, _, params) => world_spacing(&params.density) / params.volume.splat.transform.scale,
+        Input::Density(_, _, params) => params.density.spacing() / params.volume.splat.transform.scale,
         Input::Medium(medium, ..) => medium.spacing,
         _ => 0.0,
     };
@@ -290,18 +288,9 @@ fn volume(
     Ok((body, bounds, spacing))
 }
 
-fn world_spacing(density: &convert::Density) -> f64 {
-    match density {
-        convert::Density::Spacing(h) => *h,
-        _ => 0.0,
-    }
-}
-
 /// A mesh with normals; smooth ones where the file has none, as its splats have.
 fn triangles(mut mesh: Mesh, splats: u64, form: Form) -> Option<Data> {
-    if mesh.normal.is_empty() {
-        mesh.normal = convert::vertex_normals(&mesh);
-    }
+    convert::smooth(&mut mesh);
     let (area, bounds) = (mesh.area(), mesh.bounds());
     // Particles are thinned by the angle at which they are seen: of faces, not of normals that lean from them.
     let piece = area / splats.max(1) as f64;

@@ -10,6 +10,7 @@ use crate::{Error, Progress, RenderOptions};
 use convert::RawPoints;
 use glam::DVec3;
 use std::borrow::Cow;
+use std::sync::Arc;
 use tsm::{Params, ShadowMap};
 
 /// The scene with what it leaves to its data: objects that stop stand where they do, what is extracted is found, the camera sees all; and that camera.
@@ -30,8 +31,11 @@ pub fn fitted<'s>(
     }
     for (i, object) in scene.objects.iter().enumerate().filter(|(_, object)| object.visible) {
         let Source::Extract(source @ ExtractSource { points: None, .. }) = &object.source else { continue };
-        let points = Some(seen(&settled, source, options, progress, files)?.into());
-        settled.to_mut().objects[i].source = Source::Extract(ExtractSource { points, ..source.clone() });
+        let part = settled.part(source.light, |o| source.sees(o));
+        files.seen.borrow_mut().retain(|((of, by), _)| of != source || *by == part);
+        let find = || seen(&settled, source, options, progress, files).map(Arc::new);
+        let points = once(&files.seen, (source.clone(), part), find)?;
+        settled.to_mut().objects[i].source = Source::Extract(ExtractSource { points: Some(points), ..source.clone() });
     }
     placed(settled, options, progress, files)
 }
@@ -79,7 +83,7 @@ impl Eye<'_> {
     /// The shadow map of a light of some objects alone, and the world position that its places are relative to.
     fn map(&self, light: usize, sees: &dyn Fn(&SceneObject) -> bool) -> Result<(ShadowMap, DVec3), Error> {
         let Self { options, progress, files, .. } = *self;
-        let scene = self.scene.part(sees);
+        let scene = self.scene.part(light, sees);
         let mut loaded = load(&scene, options, progress, files)?;
         let loading = loading_bytes(&loaded, files.bytes());
         // From the scale of the cloud to that of the scene: a power of two.
@@ -87,7 +91,7 @@ impl Eye<'_> {
         let casters = tsm::Scene { cloud: &loaded.cloud, materials: &loaded.materials, objects: &loaded.objects };
         let left = options.max_memory.saturating_sub(loaded.cloud.bytes());
         let params = shadow_params(&scene.render, &loaded, Params::default().tolerance, left);
-        let map = ShadowMap::build(&casters, &scene.lights[light].light.middle(), &params, Some(progress));
+        let map = ShadowMap::build(&casters, &self.scene.lights[light].light.middle(), &params, Some(progress));
         let map = map.map_err(|e| shadow_error(&format!("light {light}"), &e))?;
         files.most.set(files.most.get().max(loading).max(loaded.cloud.bytes() + map.peak_bytes()));
         Ok((map, loaded.cloud.origin))

@@ -236,10 +236,10 @@ impl pulp::WithSimd for ThroughVolumes<'_> {
             let mut optical = [[Lanes::splat(simd, 0.0); NODES]; 3];
             for v in 0..of.volumes.len() {
                 let ways = of.paths[v].ways(simd, &at, of.face);
-                let mut beyond = [0.0; MAX_LANES];
-                ways.beyond(simd).store(&mut beyond);
+                let mut amidst = [0.0; MAX_LANES];
+                ways.amidst(simd).store(&mut amidst);
                 for (lane, place) in places.iter().enumerate() {
-                    let inside = frame.world(of.paths[v].before(*place, beyond[lane]).as_dvec3());
+                    let inside = frame.world(of.paths[v].before(*place, amidst[lane]).as_dvec3());
                     extinction[v][lane] = of.volumes[v].extinction_at(inside) as f32;
                 }
                 let mean = of.means(simd, v, &at, &extinction, &wanted);

@@ -187,11 +187,11 @@ impl<S: Simd> Ways<S> {
         [before, (self.entered().min(own) - self.leaves).max(zero)]
     }
 
-    /// How far before a place that is beyond the volume light is amidst its way in the slab; 0 in the volume.
+    /// How far before a place light is amidst its way through the volume in the slab.
     #[inline(always)]
-    pub(crate) fn beyond(&self, simd: S) -> Lanes<S> {
+    pub(crate) fn amidst(&self, simd: S) -> Lanes<S> {
         let [_, own] = self.lengths(simd);
-        own.mul_add(Lanes::splat(simd, 0.5), self.leaves).where_less(Lanes::splat(simd, 0.0), self.leaves)
+        own.mul_add(Lanes::splat(simd, 0.5), self.leaves)
     }
 
     /// Optical depth towards the light, of one extinction before the slab and another within it.

@@ -374,18 +374,19 @@ impl<'a> View<'a> {
         sums.iter().zip(extinction).map(mean).collect()
     }
 
-    /// Optical depth of the volumes on the way of light to a place in a slab, whose own extinction there counts in it.
+    /// Optical depth of the volumes on the way of light to a place in a slab, in which the extinction amidst that way counts.
     fn through_volumes(&self, (light, sums): (&Image, &Sums), lamp: &Light, (place, slab): (DVec3, u32)) -> f64 {
         let world = self.frame.world(place);
         let back = -super::serves::travel(lamp, world);
         let begins = (place.z - f64::from(slab) * self.frame.slabs.width).max(0.0) / -self.frame.direction(back).z;
         let own = |volume: &Volume<'_>| {
             let inverse = volume.axes().inverse();
-            let way =
-                clip(volume, inverse * (world - volume.origin()), inverse * back).filter(|[leaves, _]| *leaves > 0.0);
-            // Beyond the volume that amidst the way in the slab.
-            let beyond = way.map_or(0.0, |[leaves, enters]| leaves + 0.5 * (enters.min(begins) - leaves).max(0.0));
-            volume.extinction_at(world + back * beyond) * f64::from(volume.material.extinction_rgb[1])
+            let way = clip(volume, inverse * (world - volume.origin()), inverse * back);
+            let amidst = way.map_or(0.0, |[leaves, enters]| {
+                let leaves = leaves.max(0.0);
+                leaves + 0.5 * (enters.min(begins) - leaves).max(0.0)
+            });
+            volume.extinction_at(world + back * amidst) * f64::from(volume.material.extinction_rgb[1])
         };
         let extinction: Vec<f64> = self.placed.iter().map(|placed| own(placed.volume)).collect();
         let means = self.means(light, sums, place, &extinction);

@@ -209,8 +209,10 @@ fn a_ball_of_triangles_is_shaded_without_a_speck_of_its_own_shadow() {
 #[test]
 fn hv12_walls_before_among_and_behind_slabs_and_on_their_faces_are_lit_once() {
     let sigma = 0.4;
-    let grid = grid([12, 12, 12], cubic(0.5), |_| 1.0);
-    let (tf, medium, material) = (constant(sigma as f32), scattering(), white());
+    // Denser towards the eye, so that a slab is told from its neighbour; σ in the mean.
+    let grid = grid([12, 12, 12], cubic(0.5), |p| sigma * (1.0 + 0.25 * p.z));
+    let tf = crate::common::transfer(&[(0.0, 0.0), (1.0, 1.0)]);
+    let (medium, material) = (scattering(), white());
     let volumes = [volume(&grid, &tf, &medium)];
     let camera = parallel([0.0, 0.0, 20.0], 2.0, [8, 8]);
     for (from, before) in [([0.0, 0.0, 1.0], [0, 64, 0]), ([0.0, 0.0, -1.0], [0, 64, 0])] {

@@ -15,7 +15,9 @@ pub(crate) fn form(object: &ObjectStatistics) -> (Form, &'static str) {
         return (Form::Opaque, "an opaque surface is drawn exactly");
     }
     match object.data {
-        ObjectData::Points | ObjectData::Gaussians => (Form::Splats, "there is nothing between raw points"),
+        ObjectData::Points | ObjectData::Gaussians => {
+            (Form::Splats, "raw points have nothing between them, and fields are shown by splats")
+        }
         ObjectData::Triangles => (Form::Triangles, "a uniform place on a triangle is exact"),
         ObjectData::Surface { looseness, trilinear, by } => surface(looseness, trilinear, by),
         ObjectData::Volume | ObjectData::Density { .. } if object.volumes_by != VolumeSampler::Auto => {

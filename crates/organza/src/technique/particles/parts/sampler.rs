@@ -5,8 +5,8 @@ use crate::load::own::{Body, Own};
 use crate::scene::VolumeSampler;
 use pbsr::{
     BoundedExtinction, BrownianParams, BrownianSampler, Density, FieldVolumeSampler, GridSampler, ImplicitSurface,
-    LatticeSampler, LineParams, LineSampler, MeshSampler, MetropolisParams, MetropolisSampler, Sampler, SurfaceParams,
-    VolumeParams,
+    LatticeSampler, LineParams, LineSampler, MeshSampler, MetropolisParams, MetropolisSampler, Sampler, ShownSampler,
+    SurfaceParams, VolumeParams,
 };
 
 /// Optical depth of a surface that is not quite opaque, at most.
@@ -18,6 +18,13 @@ impl<'a> Source<'a> {
         own: &'a Own,
         warnings: &mut Vec<String>,
     ) -> Result<Box<dyn Sampler + 'a>, pbsr::Error> {
+        let bare = self.bare(own, warnings)?;
+        let Some((field, opacity)) = &own.field else { return Ok(bare) };
+        Ok(Box::new(ShownSampler::new(bare, Box::new(|place| field.at(place, *opacity)), self.seed)))
+    }
+
+    /// The same without a field that it shows.
+    fn bare(&self, own: &'a Own, warnings: &mut Vec<String>) -> Result<Box<dyn Sampler + 'a>, pbsr::Error> {
         let named = |doubt: String| format!("object '{}': {doubt}", crate::shown(&self.name));
         Ok(match &own.body {
             Body::Surface { field, inside, spacing, step } => {
