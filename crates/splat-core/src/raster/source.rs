@@ -202,3 +202,74 @@ impl<'a> Source<'a> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::raster::bins::bin;
+    use crate::raster::tile::Runs;
+    use crate::raster::{Detail, Params, ProjectInput, project};
+    use crate::{Camera, Cloud, FootprintStack, Material, Projection, Splat, rng};
+    use glam::{DVec3, Vec3};
+
+    /// Bits of the optical depths of a splat in a tile.
+    struct Depths<'a>(Source<'a>, &'a TileRays, [usize; 2], [u32; 2]);
+
+    impl pulp::WithSimd for Depths<'_> {
+        type Output = Vec<u32>;
+
+        fn with_simd<S: Simd>(self, simd: S) -> Vec<u32> {
+            let Self(source, rays, corner, size) = self;
+            let mut all = Vec::new();
+            for run in Runs::new(simd, source.splat, size, corner) {
+                let mut tau = vec![0.0; Lanes::<S>::COUNT];
+                source.optical_depth(simd, run, rays).store(&mut tau);
+                all.extend(tau.into_iter().map(f32::to_bits));
+            }
+            all
+        }
+    }
+
+    #[test]
+    fn what_lies_before_or_behind_all_that_is_opaque_is_what_each_pixel_finds() {
+        let size = [96, 64];
+        let unit = |i: usize, of: u64| rng::unit_f32(3, of, i as u64, 0);
+        let mut cloud = Cloud::new(DVec3::ZERO);
+        for i in 0..8000 {
+            let [x, y, z, u, v] = [0, 1, 2, 3, 4].map(|of| unit(i, of) - 0.5);
+            let (kind, normal) = match i % 2 {
+                0 => (SplatKind::Medium, Vec3::ZERO),
+                _ => (SplatKind::Surface, Vec3::new(u, v, 0.3).normalize()),
+            };
+            let position = Vec3::new(3.0 * x, 2.0 * y, 3.0 * z);
+            cloud.push(&Splat { position, radius: 0.15, cross_section: 0.01, kind, normal, ..Splat::default() });
+        }
+        for view in [Projection::Perspective { fov_y: 0.8 }, Projection::Orthographic { height: 2.0 }] {
+            let camera = Camera::look_at(DVec3::Z * 3.0, DVec3::ZERO, DVec3::Y, view, size).unwrap();
+            let (footprints, materials) = (&FootprintStack::default(), &[Material::default()]);
+            let (cloud, camera, params, detail) = (&cloud, &camera, &Params::default(), Detail::ALL);
+            let projected = project(&ProjectInput { cloud, camera, footprints, materials, params, detail });
+            // A slope with a hole.
+            let depth = |i: u32| if i % size[0] < 40 { f32::INFINITY } else { 2.5 + (i / size[0]) as f32 / 64.0 };
+            let opaque: Vec<f32> = (0..size[0] * size[1]).map(depth).collect();
+            let ids: Vec<u32> = (0..cloud.len() as u32).collect();
+            let bins = bin(&projected, &ids);
+            let mut found = [0; 3];
+            for t in 0..bins.tiles() {
+                let rays = TileRays::new(&projected, &opaque, bins.corner(t));
+                for id in bins.tile(t).flatten() {
+                    let source = Source::new(&projected, *id);
+                    let depths = |source| pulp::Arch::new().dispatch(Depths(source, &rays, bins.corner(t), size));
+                    let (place, each) = (rays.place(&source), depths(source));
+                    found[place as usize] += 1;
+                    match place {
+                        Place::Before => assert_eq!(each, depths(Source { is_met: false, ..source }), "splat {id}"),
+                        Place::Behind => assert!(each.iter().all(|tau| *tau == 0), "splat {id}"),
+                        Place::Among => {}
+                    }
+                }
+            }
+            assert!(found.iter().all(|n| *n > 100), "{found:?} before, among and behind");
+        }
+    }
+}
