@@ -130,7 +130,7 @@ pub(crate) fn render_keeping(
     let (plan, bytes) = (&planned.plan, planned.memory.total());
     let remembers = left.remembers(&loaded, plan, options.max_memory, bytes);
     left.fit(options.max_memory, bytes + remembers.unwrap_or(0));
-    let Explanation { mut cost, mut warnings, notes, .. } = explanation;
+    let Explanation { plan: shown, mut cost, mut warnings, notes, .. } = explanation;
     // A reason that is told already is enough.
     let is_empty = loaded.cloud.is_empty() && loaded.own.is_empty();
     let doubtful = is_empty || warnings.len() > loaded.warnings.len();
@@ -152,7 +152,7 @@ pub(crate) fn render_keeping(
     warnings.extend(doubts::of_shadows(plan.tables()));
     warnings.extend(doubts::of_scattering(plan));
     warnings.extend(helper.map(|helper| helper.said()).unwrap_or_default());
-    let (scales, plan) = (loaded.scales.clone(), plan.clone());
+    let scales = loaded.scales.clone();
     left.made = (!left.is_still).then(|| Made { scene: scene.clone(), loaded, planned, leaves });
-    Ok(Render { layers, cost, plan, sets, warnings, notes, scales, found, backend })
+    Ok(Render { layers, cost, plan: shown, sets, warnings, notes, scales, found, backend })
 }

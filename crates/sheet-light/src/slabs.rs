@@ -5,6 +5,9 @@
 
 use crate::Error;
 
+/// Most slabs where splats alone say how wide they are.
+pub(crate) const MOST_BY_SPLATS: f64 = 65536.0;
+
 /// Most slabs.
 const MOST_SLABS: u32 = 1 << 20;
 

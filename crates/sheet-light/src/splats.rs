@@ -6,7 +6,7 @@
 
 use crate::lines::{BLOCK, Lines, Shown};
 use crate::picture::{Fragments, Picture};
-use crate::slabs::Slabs;
+use crate::slabs::{MOST_BY_SPLATS, Slabs};
 use crate::tile::{SIDE, TILE};
 use splat_core::raster::Projected;
 use splat_core::raster::bins::{self, Bins};
@@ -37,10 +37,8 @@ pub struct Splats<'a> {
 impl Splats<'_> {
     /// Width of slabs for splats in order: that of their slices, but not so little that most slabs are empty.
     pub fn slab_width(order: &SliceOrder) -> f64 {
-        /// Most slabs where nothing says how wide they are.
-        const MOST: f64 = 65536.0;
         let whole = f64::from(order.far) - f64::from(order.near);
-        order.thickness.max(whole / MOST).max(f64::MIN_POSITIVE)
+        order.thickness.max(whole / MOST_BY_SPLATS).max(f64::MIN_POSITIVE)
     }
 
     /// View depths of the nearest and the farthest centre.

@@ -2,11 +2,9 @@
 
 use super::frame::world_corners;
 use crate::Volume;
+use crate::slabs::MOST_BY_SPLATS;
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::{Aabb, Cloud, DAabb};
-
-/// Most slabs where splats alone say how wide they are.
-const MOST_SLABS: f64 = 65536.0;
 
 /// What slabs hold.
 #[derive(Debug, Clone, Copy, Default)]
@@ -39,7 +37,7 @@ impl SplatBounds {
         }
         let place = |p: Vec3| cloud.origin + p.as_dvec3();
         let bounds = (count > 0).then(|| DAabb::new(place(all.min), place(all.max)))?;
-        let least = (bounds.diagonal() / MOST_SLABS).max(f64::MIN_POSITIVE);
+        let least = (bounds.diagonal() / MOST_BY_SPLATS).max(f64::MIN_POSITIVE);
         Some(Self { bounds, slab_width: (0.5 * radii / count as f64).max(least), count })
     }
 }
