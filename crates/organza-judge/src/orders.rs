@@ -113,7 +113,7 @@ pub fn compare(scene: &Scene, options: &RenderOptions, progress: &Progress) -> R
     let sorter = Sorter {
         loaded: &loaded,
         camera: frame.camera,
-        translucent: frame.translucent(frame.drawn(), Technique::Points),
+        translucent: frame.translucent(Technique::Points).to_vec(),
         margin_px: frame.filter_reach_px(),
     };
     let auto = sorter.slices(Thickness::Auto, false)?;

@@ -4,11 +4,13 @@
 pub(crate) mod discs;
 pub(crate) mod grouped;
 mod light;
+mod lists;
 mod on_device;
 mod polygons;
 mod splats;
 
 pub(crate) use light::Maps;
+use lists::Lists;
 pub(crate) use on_device::Chained;
 pub use splats::Shaded;
 pub(crate) use splats::record;
@@ -17,12 +19,11 @@ use crate::device::Helper;
 use crate::load::Loaded;
 use crate::matter::Matter;
 use crate::plan::Plan;
-use crate::scene::{LightPoint, RenderSettings, Scene, Technique};
+use crate::scene::{LightPoint, RenderSettings, Scene};
 use crate::{Error, Progress};
-use rayon::prelude::*;
 use splat_core::raster::{self, Background, OpaqueImage};
 use splat_core::shade::ChannelLayout;
-use splat_core::{Accumulator, Camera, Cloud, LayerSet, SplatKind};
+use splat_core::{Accumulator, Camera, LayerSet};
 use std::cell::{Cell, OnceCell, RefCell};
 
 /// One frame of a loaded scene: what techniques read, each part made once, when it is first asked for.
@@ -48,8 +49,7 @@ pub struct Frame<'a> {
     remembers: bool,
     /// Those of the frame before it, whose memory is used again.
     before: Cell<Shaded>,
-    /// `None` inside where all splats are drawn.
-    drawn: OnceCell<Option<Cloud>>,
+    lists: Lists,
     light_points: OnceCell<Vec<LightPoint>>,
     maps: OnceCell<Maps>,
     shaded: OnceCell<Shaded>,
@@ -60,7 +60,7 @@ pub struct Frame<'a> {
 #[derive(Default)]
 pub(crate) struct Leaves {
     pub(crate) maps: Option<Maps>,
-    drawn: Option<Option<Cloud>>,
+    lists: Lists,
     /// For the memory that it takes.
     shaded: Shaded,
 }
@@ -81,7 +81,7 @@ impl<'a> Frame<'a> {
             groups: RefCell::default(),
             remembers: false,
             before: Cell::default(),
-            drawn: OnceCell::new(),
+            lists: Lists::default(),
             light_points: OnceCell::new(),
             maps: OnceCell::new(),
             shaded: OnceCell::new(),
@@ -99,7 +99,7 @@ impl<'a> Frame<'a> {
     /// With what was made for the frame before it, and whether what arrives through shadow maps is remembered.
     pub(crate) fn following(mut self, before: Leaves, remembers: bool) -> Self {
         self.maps = before.maps.map_or_else(OnceCell::new, OnceCell::from);
-        self.drawn = before.drawn.map_or_else(OnceCell::new, OnceCell::from);
+        self.lists = before.lists;
         self.before = Cell::new(before.shaded);
         self.remembers = remembers;
         self
@@ -107,8 +107,8 @@ impl<'a> Frame<'a> {
 
     /// What it leaves when it is drawn.
     pub(crate) fn leaves(self) -> Leaves {
-        let (maps, drawn) = (self.maps.into_inner(), self.drawn.into_inner());
-        Leaves { maps, drawn, shaded: self.shaded.into_inner().unwrap_or_default() }
+        let (maps, shaded) = (self.maps.into_inner(), self.shaded.into_inner().unwrap_or_default());
+        Leaves { maps, lists: self.lists, shaded }
     }
 
     /// Whether there are shadow maps already.
@@ -166,18 +166,4 @@ impl<'a> Frame<'a> {
             None => Background::Color(self.scene.background),
         }
     }
-
-    /// Ids of the translucent ones of some splats that a technique draws or samples, ascending; not those of objects that are
-    /// drawn from their own data.
-    pub fn translucent(&self, cloud: &Cloud, technique: Technique) -> Vec<u32> {
-        let takes: Vec<bool> =
-            self.plan.by.iter().zip(&self.plan.is_own).map(|(by, is_own)| *by == technique && !is_own).collect();
-        splats_of(cloud, |kind, object| kind != SplatKind::Opaque && takes[object])
-    }
-}
-
-/// Ids of the splats of a cloud whose kind and object are some, ascending.
-fn splats_of(cloud: &Cloud, are: impl Fn(SplatKind, usize) -> bool + Sync) -> Vec<u32> {
-    let is_one = |i: &u32| are(cloud.kind[*i as usize], cloud.object[*i as usize] as usize);
-    (0..cloud.len() as u32).into_par_iter().with_min_len(1 << 14).filter(is_one).collect()
 }

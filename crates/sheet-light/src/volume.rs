@@ -4,7 +4,7 @@ use crate::fold::extremes;
 use crate::visible::without_extinction;
 use crate::{Error, Splats};
 use splat_core::glam::{DMat3, DVec3};
-use splat_core::optics::TRACE;
+use splat_core::optics::{FAINTEST, TRACE};
 use splat_core::shade::LitBy;
 use splat_core::{Camera, Clip, Grid, Material, Packing, Similarity, TransferFunction};
 
@@ -65,12 +65,12 @@ impl Volume<'_> {
         !without_extinction(&self.seen()).iter().any(|[low, high]| *low <= least && greatest <= *high)
     }
 
-    /// The transfer function without what can not be seen ([`TRACE`]): extinctions of which no ray through the whole volume gathers more, and
-    /// colours.
+    /// The transfer function without what can not be seen: extinctions of which no ray through the whole volume gathers more than
+    /// [`FAINTEST`], and colours that are a [`TRACE`].
     pub(crate) fn seen(&self) -> TransferFunction {
         let (axes, [nx, ny, nz]) = (self.axes(), self.grid.dims.map(|n| n as f64));
         let longest = axes.x_axis.length() * nx + axes.y_axis.length() * ny + axes.z_axis.length() * nz;
-        self.transfer.without_traces((f64::from(TRACE) / (self.extinction_scale * longest)) as f32, TRACE)
+        self.transfer.without_traces((f64::from(FAINTEST) / (self.extinction_scale * longest)) as f32, TRACE)
     }
 
     /// Extinction about a world position, 1/world unit; 0 outside.

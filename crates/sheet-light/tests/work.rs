@@ -61,7 +61,7 @@ fn x6_traces_of_matter_and_light_are_not_drawn() {
     let (nothing, trace) = (of(0.0, 1.0), of(1e-36, 1.0));
     assert!(trace == nothing && trace.2 > 0);
     // Matter that is not yet a trace takes all voxels.
-    assert!(of(1e-20, 1.0).2 > trace.2);
+    assert!(of(1e-12, 1.0).2 > trace.2);
     assert_eq!(of(0.0, 1e-39).1, of(0.0, 0.0).1);
     assert!(nothing.1.iter().flatten().any(|v| *v > 0.0));
 }

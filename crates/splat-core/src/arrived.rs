@@ -2,7 +2,7 @@
 //! again.
 
 use crate::{Receiver, Transmittance};
-use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
 /// What arrived of one light at each splat of a cloud, as far as it was asked for.
 ///
@@ -20,20 +20,34 @@ use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 /// assert_eq!(arrived.through(&Fog).at_splat(0, &splat), Fog.transmittance(&splat));
 /// ```
 pub struct Arrived {
-    /// Bits of what arrives at each splat by channel; not a number where nobody asked yet.
-    of: Vec<[AtomicU32; 3]>,
+    /// Bits of what arrives at each splat: of red and green, and of blue; [`UNKNOWN`] where nobody asked yet. In this form a share is
+    /// written as it is read, eight bytes and four: a load that takes two stores together waits for both to leave the processor.
+    of: Vec<[AtomicU64; 2]>,
+}
+
+/// No bits of shares, which are numbers.
+const UNKNOWN: u64 = u64::MAX;
+
+fn packed([r, g, b]: [f32; 3]) -> [u64; 2] {
+    let [r, g, b] = [r, g, b].map(|share| u64::from(share.to_bits()));
+    [r | g << 32, b]
+}
+
+#[inline]
+fn unpacked([red_green, blue]: [u64; 2]) -> [f32; 3] {
+    [red_green as u32, (red_green >> 32) as u32, blue as u32].map(f32::from_bits)
 }
 
 impl Arrived {
     /// Nothing known yet of a cloud's first `splats` splats. Of others nothing is remembered.
     pub fn new(splats: usize) -> Self {
-        let unknown = || AtomicU32::new(f32::NAN.to_bits());
-        Self { of: std::iter::repeat_with(|| [unknown(), unknown(), unknown()]).take(splats).collect() }
+        let unknown = || [AtomicU64::new(UNKNOWN), AtomicU64::new(UNKNOWN)];
+        Self { of: std::iter::repeat_with(unknown).take(splats).collect() }
     }
 
     /// Bytes that it takes of so many splats.
     pub fn bytes_of(splats: usize) -> u64 {
-        (splats as u64).saturating_mul(size_of::<[AtomicU32; 3]>() as u64)
+        (splats as u64).saturating_mul(size_of::<[AtomicU64; 2]>() as u64)
     }
 
     /// A shadow that is asked once for each splat. It must be that of the same light among the same casters each time.
@@ -56,13 +70,13 @@ impl Transmittance for Remembered<'_> {
 
     fn at_splat(&self, splat: usize, receiver: &Receiver) -> [f32; 3] {
         let Some(of) = self.arrived.of.get(splat) else { return self.shadow.at_splat(splat, receiver) };
-        let known = [0, 1, 2].map(|c: usize| f32::from_bits(of[c].load(Relaxed)));
-        if !known.iter().any(|share| share.is_nan()) {
-            return known;
+        let known = [of[0].load(Relaxed), of[1].load(Relaxed)];
+        if known[0] != UNKNOWN && known[1] != UNKNOWN {
+            return unpacked(known);
         }
         // Whoever asks at the same time finds the same numbers.
         let share = self.shadow.at_splat(splat, receiver);
-        of.iter().zip(share).for_each(|(of, share)| of.store(share.to_bits(), Relaxed));
+        of.iter().zip(packed(share)).for_each(|(of, bits)| of.store(bits, Relaxed));
         share
     }
 }
@@ -99,6 +113,6 @@ mod tests {
         assert_eq!(shadow.0.load(Relaxed), 5);
         assert_eq!(remembered.transmittance(&receiver(0.75)), [0.25, 0.5, 0.75]);
         assert_eq!(shadow.0.load(Relaxed), 6);
-        assert_eq!(Arrived::bytes_of(2), 24);
+        assert_eq!(Arrived::bytes_of(2), 32);
     }
 }

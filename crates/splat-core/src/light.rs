@@ -213,6 +213,7 @@ impl Light {
     ///
     /// A light with an extent counts as one point at its centre. That is exact outside of a sphere that is seen whole, and
     /// far from what is flat; who lights what is nearer asks for [`Light::points`].
+    #[inline]
     pub fn irradiance(&self, p: DVec3, spread: f64) -> (DVec3, [f32; 3]) {
         let from_point = |position: DVec3| {
             let to_light = position - p;

@@ -6,6 +6,7 @@ mod channels;
 #[cfg(feature = "gpu")]
 pub mod gpu;
 mod point;
+mod scattering;
 
 pub use census::Census;
 pub use channels::{ChannelLayout, MAX_CHANNELS, MAX_SHADED_CHANNELS};
@@ -16,6 +17,7 @@ use crate::raster::Projected;
 use crate::{Camera, Cloud, Error, Light, Material, Object, Progress, Receiver, Slide, Transmittance};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
+use scattering::{Batch, Scattering};
 
 /// Splats shaded by one task.
 const CHUNK: usize = 4096;
@@ -99,21 +101,51 @@ pub fn shade_into(
     let channels = layout.count();
     values.resize(input.cloud.len() * channels, 0.0);
     progress.add_total(input.cloud.len().div_ceil(CHUNK) as u64);
+    let scattering = Scattering::new(input);
     values.par_chunks_mut(CHUNK * channels).enumerate().for_each(|(chunk, values)| {
-        if progress.tick(1).is_err() {
-            return;
-        }
-        for (k, out) in values.chunks_exact_mut(channels).enumerate() {
-            let i = chunk * CHUNK + k;
-            if is_one(i) {
-                let (radiance, normal) = shade_splat(input, i);
-                radiance.write(normal, layout, out);
-            } else {
-                out.fill(0.0);
-            }
+        if progress.tick(1).is_ok() {
+            let scattering = scattering.as_ref();
+            let chunk = ShadeChunk { input, scattering, first: chunk * CHUNK, is_one: &is_one, layout, values };
+            pulp::Arch::new().dispatch(chunk);
         }
     });
     progress.tick(0)
+}
+
+/// One chunk's work, in the form that [`pulp`] compiles once per instruction set.
+struct ShadeChunk<'a, F> {
+    input: &'a ShadeInput<'a>,
+    scattering: Option<&'a Scattering<'a>>,
+    first: usize,
+    is_one: &'a F,
+    layout: &'a ChannelLayout,
+    values: &'a mut [f32],
+}
+
+impl<F: Fn(usize) -> bool> pulp::WithSimd for ShadeChunk<'_, F> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, simd: S) {
+        let Self { input, scattering, first, is_one, layout, values } = self;
+        let channels = layout.count();
+        let mut batch = Batch::default();
+        let end = first + values.len() / channels;
+        let mut i = first;
+        while i < end {
+            let together = scattering.map_or(0, |by| by.together(i, end));
+            let out = &mut values[(i - first) * channels..][..together.max(1) * channels];
+            match scattering {
+                Some(by) if together > 0 => by.shade(simd, i, is_one, layout, &mut batch, out),
+                _ if is_one(i) => {
+                    let (radiance, normal) = shade_splat(input, i);
+                    radiance.write(normal, layout, out);
+                }
+                _ => out.fill(0.0),
+            }
+            i += together.max(1);
+        }
+    }
 }
 
 /// Radiance of splat `i` towards the viewer, and the unit normal that it was shaded by: for who knows its light only when it is drawn.
@@ -121,56 +153,49 @@ pub fn shade_into(
 /// # Panics
 /// If there is no such splat, or its material or object is out of range.
 pub fn shade_splat(input: &ShadeInput<'_>, i: usize) -> (Radiance, Vec3) {
-    let splat = LitSplat::new(input, i);
-    (splat.shade(input), splat.point.normal)
+    let point = point_of(input, i);
+    let radiance = point.radiance(input.ambient, input.lights.iter(), |rank, irradiance| {
+        received(input, i, input.lights[rank].shadow, irradiance)
+    });
+    (radiance, point.normal)
 }
 
 /// How much of a shadow splat `i` takes.
+#[inline]
 fn shadow_share(input: &ShadeInput<'_>, i: usize) -> f32 {
     input.cloud.shadow_coefficient_of(i) * input.objects[input.cloud.object[i] as usize].shadow_coefficient
 }
 
-/// One splat being shaded.
-struct LitSplat<'a> {
-    /// Its place in the cloud.
-    splat: usize,
-    receiver: Receiver,
-    point: Point<'a>,
-    shadow_coefficient: f32,
+/// Share of a light of this irradiance, with this shadow, that arrives at splat `i`.
+#[inline]
+fn received(input: &ShadeInput<'_>, i: usize, shadow: Option<&dyn Transmittance>, irradiance: [f32; 3]) -> [f32; 3] {
+    let cloud = input.cloud;
+    let shadow = shadow.map(|shadow| {
+        move || {
+            let (position, normal) = (cloud.position[i], cloud.normal_of(i));
+            shadow.at_splat(i, &Receiver { position, normal, radius: cloud.radius[i], kind: cloud.kind[i] })
+        }
+    });
+    arriving(irradiance, shadow_share(input, i), shadow)
 }
 
-impl<'a> LitSplat<'a> {
-    fn new(input: &ShadeInput<'a>, i: usize) -> Self {
-        let cloud = input.cloud;
-        let position = cloud.position[i];
-        let eye = (input.camera.position - cloud.origin).as_vec3();
-        let to_eye = if input.camera.is_orthographic() {
-            -input.camera.axes[2].as_vec3()
-        } else {
-            (eye - position).normalize_or_zero()
-        };
-        let (own, kind, radius) = (cloud.normal_of(i), cloud.kind[i], cloud.radius[i]);
-        let point = Point {
-            position: cloud.origin + position.as_dvec3(),
-            radius,
-            normal: facing(kind, own, cloud.shading_normal_of(i), to_eye),
-            to_eye,
-            color: cloud.color_along(i, -to_eye),
-            material: &input.materials[cloud.material[i] as usize],
-        };
-        let receiver = Receiver { position, normal: own, radius, kind };
-        Self { splat: i, receiver, point, shadow_coefficient: shadow_share(input, i) }
-    }
-
-    fn shade(&self, input: &ShadeInput<'_>) -> Radiance {
-        self.point.radiance(input.ambient, input.lights.iter(), |rank, irradiance| {
-            self.transmittance(input.lights[rank].shadow, irradiance)
-        })
-    }
-
-    /// Share of a light that this splat receives.
-    fn transmittance(&self, shadow: Option<&dyn Transmittance>, irradiance: [f32; 3]) -> [f32; 3] {
-        let shadow = shadow.map(|shadow| move || shadow.at_splat(self.splat, &self.receiver));
-        arriving(irradiance, self.shadow_coefficient, shadow)
+/// The point that splat `i` is shaded as.
+#[inline]
+fn point_of<'a>(input: &ShadeInput<'a>, i: usize) -> Point<'a> {
+    let cloud = input.cloud;
+    let position = cloud.position[i];
+    let eye = (input.camera.position - cloud.origin).as_vec3();
+    let to_eye = if input.camera.is_orthographic() {
+        -input.camera.axes[2].as_vec3()
+    } else {
+        (eye - position).normalize_or_zero()
+    };
+    Point {
+        position: cloud.origin + position.as_dvec3(),
+        radius: cloud.radius[i],
+        normal: facing(cloud.kind[i], cloud.normal_of(i), cloud.shading_normal_of(i), to_eye),
+        to_eye,
+        color: cloud.color_along(i, -to_eye),
+        material: &input.materials[cloud.material[i] as usize],
     }
 }

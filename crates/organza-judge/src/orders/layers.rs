@@ -70,7 +70,7 @@ fn truth(scene: &Scene, loaded: &Loaded, options: &RenderOptions, progress: &Pro
         gap: settings.gap as f32,
         transmittance_cutoff: settings.transmittance_cutoff as f32,
     };
-    let ids = frame.translucent(cloud, Technique::Surfels);
+    let ids = frame.translucent(Technique::Surfels);
     let (footprints, materials) = (&loaded.footprints, &loaded.materials);
     let input = DiscInput { cloud, ids: &ids, camera: &frame.camera, footprints, materials };
     let mut accumulator = frame.accumulator();

@@ -1,14 +1,14 @@
 //! Splats of a frame: those that are drawn, their footprints and radiance, and the opaque ones as an image.
 
+use super::Frame;
 use super::discs::opaque;
-use super::{Frame, splats_of};
 use crate::pass;
 use crate::{CostRecord, Error, stage};
 use splat_core::raster::{
     self, Detail, FinishInput, GlassImage, OpaqueImage, OpaqueInput, ProjectInput, Projected, RasterCounts,
 };
 use splat_core::shade::shade_into;
-use splat_core::{Accumulator, Cloud, Layers, SplatKind, StageCost};
+use splat_core::{Accumulator, Layers, SplatKind, StageCost};
 
 /// The drawn splats, ready to be composited, by id.
 #[derive(Default)]
@@ -21,19 +21,6 @@ pub struct Shaded {
 }
 
 impl Frame<'_> {
-    /// The splats that are drawn as they are: opaque ones, and those of techniques that draw splats. Ids of what is shaded, sorted
-    /// and composited are places in this cloud.
-    pub fn drawn(&self) -> &Cloud {
-        let cloud = &self.loaded.cloud;
-        let some = self.drawn.get_or_init(|| {
-            let (is_own, draws) = (&self.plan.is_own, &self.plan.draws);
-            let is_drawn = |kind, object: usize| (kind == SplatKind::Opaque && !is_own[object]) || draws[object];
-            let drawn = splats_of(cloud, is_drawn);
-            (drawn.len() < cloud.len()).then(|| cloud.gather(&drawn))
-        });
-        some.as_ref().unwrap_or(cloud)
-    }
-
     /// Footprints and radiance of the drawn splats in view; of those out of view the radiance is 0, but where bent rays may see them. The
     /// passes that were run for it are added to `cost`.
     ///
@@ -96,22 +83,6 @@ impl Frame<'_> {
         Ok(projected)
     }
 
-    /// The opaque ones of the drawn splats, those that rays meet exactly, or the others.
-    fn solid_of(&self, exact: bool) -> Vec<u32> {
-        let are = &self.plan.exact;
-        splats_of(self.drawn(), |kind, object| kind == SplatKind::Opaque && are[object] == exact)
-    }
-
-    /// The opaque splats that are drawn as such.
-    pub(crate) fn solid_ids(&self) -> Vec<u32> {
-        self.solid_of(false)
-    }
-
-    /// Whether all that is opaque is.
-    pub(crate) fn draws_all_solid(&self) -> bool {
-        self.solid_of(true).is_empty() && !self.has_polygons()
-    }
-
     /// The nearest opaque surface of every sample; an empty image where nothing is opaque. The passes that were run for it are added to `cost`.
     ///
     /// # Errors
@@ -130,14 +101,14 @@ impl Frame<'_> {
             return Ok(image);
         }
         self.progress.begin(stage::OPAQUE);
-        Ok(image.joined(opaque(self, &ids, cost)?))
+        Ok(image.joined(opaque(self, ids, cost)?))
     }
 
     fn solid_splats(&self, cost: &mut CostRecord) -> Result<OpaqueImage, Error> {
         let ids = self.solid_ids();
         // Beside translucent splats they have been shaded already.
         let alone = self.shaded.get().is_none() && !ids.is_empty();
-        let by_device = if alone { self.solid_by_device(&ids, cost)? } else { None };
+        let by_device = if alone { self.solid_by_device(ids, cost)? } else { None };
         let mut image = by_device.unwrap_or_default();
         if !ids.is_empty() && image.depth.is_empty() {
             let Shaded { projected, values, channels } = self.shaded(cost)?;
@@ -145,7 +116,7 @@ impl Frame<'_> {
             image = cost.measure(pass::OPAQUE, |stage| {
                 stage.items_in = ids.len() as u64;
                 let objects = self.layers.object;
-                let input = OpaqueInput { projected, ids: &ids, values, channels: *channels as u32, objects };
+                let input = OpaqueInput { projected, ids, values, channels: *channels as u32, objects };
                 let resolved = raster::resolve_opaque(&input, Some(self.progress));
                 let (image, counts) = resolved.map_err(|e| Error::from_core("opaque splats", e))?;
                 record(stage, &counts);

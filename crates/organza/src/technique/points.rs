@@ -62,16 +62,16 @@ pub(super) fn sorted(
     cost: &mut CostRecord,
 ) -> Result<SliceOrder, Error> {
     let (cloud, camera) = (frame.drawn(), &frame.camera);
-    let translucent: Vec<u32> = frame.translucent(cloud, technique);
+    let translucent = frame.translucent(technique);
     if translucent.is_empty() {
         return Ok(SliceOrder::default());
     }
     frame.progress.begin(stage::SORT);
     frame.tick()?;
     cost.measure(pass::SORT, |stage| {
-        let helped = frame.helper.and_then(|helper| device::order(helper, cloud, &translucent, camera, params));
+        let helped = frame.helper.and_then(|helper| device::order(helper, cloud, translucent, camera, params));
         let order = helped.map_or_else(
-            || hbsort::slice_cloud(cloud, Some(&translucent), camera, params, &mut hbsort::Scratch::default()),
+            || hbsort::slice_cloud(cloud, Some(translucent), camera, params, &mut hbsort::Scratch::default()),
             Ok,
         );
         let order = order.map_err(|e| Error::Internal(e.to_string()))?;

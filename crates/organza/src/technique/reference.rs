@@ -49,7 +49,7 @@ impl Fold for Exact<'_> {
         let opaque = frame.opaque(cost)?;
         let narrowing = &self.narrowing;
         let (cloud, values) = self.own.get_or_insert_with(|| {
-            let ids = frame.translucent(frame.drawn(), Technique::Reference);
+            let ids = frame.translucent(Technique::Reference);
             let of = ids.iter().flat_map(|i| &values[*i as usize * channels..][..*channels]);
             (frame.drawn().gather(&ids), of.copied().collect())
         });

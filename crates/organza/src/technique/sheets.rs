@@ -137,8 +137,7 @@ impl<'a> Frame<'a> {
     /// # Errors
     /// Those of [`Frame::maps`]; [`Error::Limit`] where there would be too many slabs, or too much memory.
     pub fn slab_width(&'a self, options: &RenderOptions, cost: &mut CostRecord) -> Result<Option<f64>, Error> {
-        let none =
-            volumes(&self.matter()).next().is_none() && self.translucent(self.drawn(), Technique::Sheets).is_empty();
+        let none = volumes(&self.matter()).next().is_none() && self.translucent(Technique::Sheets).is_empty();
         let unit = libm::exp2(f64::from(self.loaded.exponent));
         Ok(match none {
             true => None,
@@ -199,7 +198,7 @@ fn volumes<'a>(matter: &Matter<'a>) -> impl Iterator<Item = Volume<'a>> + use<'a
 /// The splats of a frame that are the technique's own, sorted; `None` without any.
 fn splats<'a>(frame: &'a Frame<'a>, cost: &mut CostRecord) -> Result<Option<Splats<'a>>, Error> {
     let (cloud, camera) = (frame.drawn(), &frame.camera);
-    let translucent = frame.translucent(cloud, Technique::Sheets);
+    let translucent = frame.translucent(Technique::Sheets);
     if translucent.is_empty() {
         return Ok(None);
     }

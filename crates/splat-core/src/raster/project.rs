@@ -21,7 +21,7 @@ use super::kernel::Kernel;
 use super::lanes::Lanes;
 use super::projected::{Coverage, Detail, Projected, ProjectedDepth, ProjectedSplat, SpecialDisc};
 use super::shapes::{Image, Shapes};
-use crate::optics::TRACE;
+use crate::optics::FAINTEST;
 use crate::{Camera, Cloud, FootprintStack, Material, ViewTransform};
 use glam::Vec2;
 use pulp::Simd;
@@ -446,7 +446,7 @@ impl Projector<'_> {
                 ..ProjectedSplat::default()
             };
             splat.set_half_extent([image.half_extent[0][l], image.half_extent[1][l]]);
-            let shown = splat.peak > TRACE;
+            let shown = splat.peak > FAINTEST;
             *coverage = if shown { Coverage::of(splat.bounds(self.size)) } else { Coverage::NONE };
         }
     }

@@ -122,23 +122,23 @@ impl<'a> Source<'a> {
         self.special.is_none() && !self.splat.is_gaussian() && !self.is_met
     }
 
-    /// τ by the kernel alone.
+    /// τ by the kernel alone, from s as [`Run::distance_sq`] has it.
     #[inline(always)]
-    pub(crate) fn of_kernel<S: Simd>(&self, simd: S, run: Run<S>, rays: &TileRays) -> Lanes<S> {
+    pub(crate) fn of_kernel<S: Simd>(&self, simd: S, s: Lanes<S>, run: Run<S>, rays: &TileRays) -> Lanes<S> {
         let of = |v: f32| Lanes::splat(simd, v);
-        let mut s = run.distance_sq(simd, self.splat);
-        if self.splat.kind == SplatKind::Medium {
-            s = s * rays.factors(simd, run);
-        }
-        let t = (of(1.0) - s).max(of(0.0));
-        of(self.splat.peak) * self.kernel.profile(simd, t)
+        let t = if self.splat.kind == SplatKind::Medium {
+            s.negate_mul_add(rays.factors(simd, run), of(1.0))
+        } else {
+            of(1.0) - s
+        };
+        of(self.splat.peak) * self.kernel.profile(simd, t.max(of(0.0)))
     }
 
     #[inline(always)]
     fn before_the_eye<S: Simd>(&self, simd: S, run: Run<S>, rays: &TileRays) -> Lanes<S> {
         let of = |v: f32| Lanes::splat(simd, v);
         let medium = self.splat.kind == SplatKind::Medium;
-        let mut tau = self.of_kernel(simd, run, rays);
+        let mut tau = self.of_kernel(simd, run.distance_sq(simd, self.splat), run, rays);
         if self.is_met && !rays.opaque.is_empty() {
             let opaque = Lanes::load(simd, &rays.opaque[run.pixel()..]);
             tau = if medium {

@@ -135,6 +135,46 @@ impl<S: Simd> Runs<S> {
     }
 }
 
+/// What the columns and rows of blocks under a footprint give to s at their pixels, so that [`Run::distance_sq_by`] takes two steps.
+pub(crate) struct Conic {
+    dx: [Line; COLUMNS],
+    /// The conic's second number times dy.
+    mixed: [Line; COLUMNS],
+    /// Its third times dy².
+    square: [Line; COLUMNS],
+}
+
+impl Conic {
+    pub(crate) const fn new() -> Self {
+        const EMPTY: [Line; COLUMNS] = [Line([0.0; PIXELS]); COLUMNS];
+        Self { dx: EMPTY, mixed: EMPTY, square: EMPTY }
+    }
+
+    /// Of a splat, where its runs are.
+    #[inline(always)]
+    pub(crate) fn fill<S: Simd>(&mut self, simd: S, splat: &ProjectedSplat, runs: &Runs<S>) {
+        let of = |v: f32| Lanes::splat(simd, v);
+        let rows = runs.y..runs.y + runs.blocks / (runs.x1 - runs.x0).max(1);
+        for lane in (0..PIXELS).step_by(Lanes::<S>::COUNT) {
+            for x in runs.x0..runs.x1 {
+                offset(simd, runs.origin[0], x, &X[lane..]).store(&mut self.dx[x % COLUMNS].0[lane..]);
+            }
+            for y in rows.clone() {
+                let dy = offset(simd, runs.origin[1], y, &Y[lane..]);
+                (of(splat.conic[1]) * dy).store(&mut self.mixed[y % COLUMNS].0[lane..]);
+                (of(splat.conic[2]) * dy * dy).store(&mut self.square[y % COLUMNS].0[lane..]);
+            }
+        }
+    }
+}
+
+/// Distances of some pixels of the `block`-th column or row from a splat's centre, from that of the tile's first pixel.
+#[inline(always)]
+fn offset<S: Simd>(simd: S, origin: f32, block: usize, within: &[f32]) -> Lanes<S> {
+    let place = Lanes::splat(simd, (BLOCK * block) as f32) + Lanes::load(simd, within);
+    Lanes::splat(simd, origin) + place
+}
+
 impl<S: Simd> Iterator for Runs<S> {
     type Item = Run<S>;
 
@@ -144,9 +184,8 @@ impl<S: Simd> Iterator for Runs<S> {
             return None;
         }
         let (simd, lane) = (self.simd, self.lane);
-        let x = Lanes::splat(simd, (BLOCK * self.x) as f32) + Lanes::load(simd, &X[lane..]);
-        let y = Lanes::splat(simd, (BLOCK * self.y) as f32) + Lanes::load(simd, &Y[lane..]);
-        let (dx, dy) = (Lanes::splat(simd, self.origin[0]) + x, Lanes::splat(simd, self.origin[1]) + y);
+        let dx = offset(simd, self.origin[0], self.x, &X[lane..]);
+        let dy = offset(simd, self.origin[1], self.y, &Y[lane..]);
         let run = Run { block: self.y * COLUMNS + self.x, lane, dx, dy };
         self.lane = (lane + Lanes::<S>::COUNT) % PIXELS;
         if self.lane == 0 {
@@ -177,8 +216,18 @@ impl<S: Simd> Run<S> {
     #[inline(always)]
     pub fn distance_sq(&self, simd: S, splat: &ProjectedSplat) -> Lanes<S> {
         let of = |v: f32| Lanes::splat(simd, v);
-        let along = of(splat.conic[0]) * self.dx + of(splat.conic[1]) * self.dy;
+        let along = of(splat.conic[0]).mul_add(self.dx, of(splat.conic[1]) * self.dy);
         along.mul_add(self.dx, of(splat.conic[2]) * self.dy * self.dy)
+    }
+
+    /// [`Run::distance_sq`] of the splat that `conic` was made of, bit for bit.
+    #[inline(always)]
+    pub(crate) fn distance_sq_by(&self, simd: S, splat: &ProjectedSplat, conic: &Conic) -> Lanes<S> {
+        let (column, row) = (self.block % COLUMNS, self.block / COLUMNS % COLUMNS);
+        let [dx, mixed, square] = [&conic.dx[column], &conic.mixed[row], &conic.square[row]]
+            .map(|line| Lanes::load(simd, &line.0[self.lane..]));
+        let along = Lanes::splat(simd, splat.conic[0]).mul_add(dx, mixed);
+        along.mul_add(dx, square)
     }
 
     /// s and view depths of a special disc. Where it lies behind the eye, s is 1 and the depth the largest number.

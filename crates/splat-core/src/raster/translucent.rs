@@ -11,7 +11,7 @@ use super::bins::{Bins, bin};
 use super::lanes::{Lanes, MAX_LANES, SMALL, exp_neg};
 use super::projected::{Projected, ProjectedDepth, ProjectedSplat};
 use super::source::{Place, Source, TileRays};
-use super::tile::{BATCH, BLOCKS, Line, PIXELS, Run, Runs, for_each_span, tile_of};
+use super::tile::{BATCH, BLOCKS, Conic, Line, PIXELS, Run, Runs, for_each_span, tile_of};
 use super::{Accumulation, OpaqueImage, Params, RasterCounts};
 use crate::depth_profile::DepthFragment;
 use crate::shade::ChannelLayout;
@@ -177,6 +177,7 @@ impl FoldTile<'_> {
         let mut records = [ProjectedSplat::default(); BATCH];
         let mut depths = [ProjectedDepth::default(); BATCH];
         let mut values = vec![0.0; BATCH * channels];
+        let mut conic = Conic::new();
         for list in self.bins.tile(self.t) {
             for batch in list.chunks(BATCH) {
                 for ((&j, record), value) in batch.iter().zip(&mut records).zip(values.chunks_exact_mut(channels)) {
@@ -210,7 +211,7 @@ impl FoldTile<'_> {
                         thin: splat.peak * most <= SMALL && !splat.is_special() && !splat.is_gaussian(),
                         value: &values[k * channels..][..channels],
                     };
-                    self.tile.splat::<S, FRONT, HALF, PLANES, CHANNELS>(simd, &splat);
+                    self.tile.splat::<S, FRONT, HALF, PLANES, CHANNELS>(simd, &splat, &mut conic);
                 }
                 if FRONT && self.tile.finish_blocks(params.transmittance_cutoff) {
                     return;
@@ -298,15 +299,18 @@ impl Tile {
         &mut self,
         simd: S,
         splat: &Splat<'_>,
+        conic: &mut Conic,
     ) {
         let runs = Runs::new(simd, splat.source.splat, self.size, [self.x, self.y]);
         self.fragments += runs.pixels();
         let done = if FRONT { self.done } else { 0 };
         // A loop of its own for what most splats are.
         if splat.thin && splat.source.is_plain() {
+            conic.fill(simd, splat.source.splat, &runs);
             for run in runs {
                 if !is_in(done, run.block) {
-                    let tau = splat.source.of_kernel(simd, run, &self.rays);
+                    let s = run.distance_sq_by(simd, splat.source.splat, conic);
+                    let tau = splat.source.of_kernel(simd, s, run, &self.rays);
                     self.composite::<S, FRONT, HALF, true, PLANES, CHANNELS>(simd, splat, run, tau);
                 }
             }

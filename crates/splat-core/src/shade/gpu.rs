@@ -19,7 +19,7 @@
 //! assert_eq!(recorded.recording.bytes() / 1_000_000, 76);
 //! ```
 
-use super::{CHUNK, ChannelLayout, LitBy, LitSplat, ShadeInput, shadow_share};
+use super::{CHUNK, ChannelLayout, LitBy, ShadeInput, point_of, shadow_share};
 use crate::light::rect_normal;
 use crate::raster::gpu::{AttributeBuffers, AttributeRoom, Attributes};
 use crate::{Error, Light, LightShape, Material, Progress, Shading};
@@ -145,9 +145,8 @@ pub fn received(input: &ShadeInput<'_>, ids: &[u32], progress: Option<&Progress>
                 return;
             }
             for (to, &i) in to.iter_mut().zip(ids) {
-                let splat = LitSplat::new(input, i as usize);
-                let (_, irradiance) = splat.point.irradiance(lit);
-                *to = splat.transmittance(lit.shadow, irradiance);
+                let (_, irradiance) = point_of(input, i as usize).irradiance(lit);
+                *to = super::received(input, i as usize, lit.shadow, irradiance);
             }
         });
         all.append(&mut column);

@@ -51,7 +51,7 @@ pub fn facing(kind: SplatKind, face: Vec3, shading: Vec3, to_eye: Vec3) -> Vec3 
 
 /// Share of a light that arrives at a point that takes the share `coefficient`, in \[0, 1\], of its shadow, which is not asked
 /// where there is nothing to attenuate.
-#[inline]
+#[inline(always)]
 pub fn arriving(irradiance: [f32; 3], coefficient: f32, shadow: Option<impl FnOnce() -> [f32; 3]>) -> [f32; 3] {
     match shadow {
         Some(shadow) if coefficient > 0.0 && irradiance != [0.0; 3] => shadow().map(|t| 1.0 - coefficient * (1.0 - t)),
@@ -78,33 +78,14 @@ impl Point<'_> {
         transmittance: impl Fn(usize, [f32; 3]) -> [f32; 3],
     ) -> Radiance {
         let m = self.material;
-        let dark = [0.0; 3];
-        let mut out = Radiance { ambient: dark, emission: m.emission, direct: dark, scatter1: dark, shadow: 1.0 };
-        if m.shading == Shading::Unlit {
-            (0..3).for_each(|c| out.emission[c] += self.color[c]);
-            return out;
-        }
         let by_phase = m.shading == Shading::Phase || self.normal == Vec3::ZERO;
-        let reflectance = if by_phase { m.single_scattering_albedo } else { m.diffuse };
-        out.ambient = std::array::from_fn(|c| ambient[c] * self.color[c] * reflectance * m.ambient);
-        let mut lit = dark;
-        let (mut received, mut unshadowed) = (0.0, 0.0);
-        for (rank, lit_by) in lights.enumerate() {
-            let (to_light, irradiance) = self.irradiance(lit_by);
+        let incoming = lights.map(|lit| {
+            let (to_light, irradiance) = self.irradiance(lit);
             let (diffuse, specular) =
                 if by_phase { (self.scatter(to_light), 0.0) } else { m.reflect(self.normal, to_light, self.to_eye) };
-            let transmittance = transmittance(rank, irradiance);
-            for c in 0..3 {
-                lit[c] += irradiance[c] * transmittance[c] * (self.color[c] * diffuse + specular);
-            }
-            received += irradiance[1] * transmittance[1];
-            unshadowed += irradiance[1];
-        }
-        if unshadowed > 0.0 {
-            out.shadow = received / unshadowed;
-        }
-        *(if by_phase { &mut out.scatter1 } else { &mut out.direct }) = lit;
-        out
+            Incoming { irradiance, diffuse, specular }
+        });
+        Radiance::of(m, self.color, by_phase, ambient, incoming, transmittance)
     }
 
     /// Single scattering per unit irradiance: the factor on the colour.
@@ -116,7 +97,51 @@ impl Point<'_> {
     }
 }
 
+/// Light as it comes to a point.
+pub(super) struct Incoming {
+    /// Irradiance without shadow.
+    pub(super) irradiance: [f32; 3],
+    /// How much of it leaves to the viewer: as a factor on the colour, and beside that.
+    pub(super) diffuse: f32,
+    pub(super) specular: f32,
+}
+
 impl Radiance {
+    /// Of a colour and a material that scatter or reflect what comes to them; `transmittance` is asked as by [`Point::radiance`].
+    #[inline]
+    pub(super) fn of(
+        m: &Material,
+        color: [f32; 3],
+        by_phase: bool,
+        ambient: [f32; 3],
+        lights: impl Iterator<Item = Incoming>,
+        transmittance: impl Fn(usize, [f32; 3]) -> [f32; 3],
+    ) -> Self {
+        let dark = [0.0; 3];
+        let mut out = Self { ambient: dark, emission: m.emission, direct: dark, scatter1: dark, shadow: 1.0 };
+        if m.shading == Shading::Unlit {
+            (0..3).for_each(|c| out.emission[c] += color[c]);
+            return out;
+        }
+        let reflectance = if by_phase { m.single_scattering_albedo } else { m.diffuse };
+        out.ambient = std::array::from_fn(|c| ambient[c] * color[c] * reflectance * m.ambient);
+        let mut lit = dark;
+        let (mut received, mut unshadowed) = (0.0, 0.0);
+        for (rank, Incoming { irradiance, diffuse, specular }) in lights.enumerate() {
+            let transmittance = transmittance(rank, irradiance);
+            for c in 0..3 {
+                lit[c] += irradiance[c] * transmittance[c] * (color[c] * diffuse + specular);
+            }
+            received += irradiance[1] * transmittance[1];
+            unshadowed += irradiance[1];
+        }
+        if unshadowed > 0.0 {
+            out.shadow = received / unshadowed;
+        }
+        *(if by_phase { &mut out.scatter1 } else { &mut out.direct }) = lit;
+        out
+    }
+
     /// Each of [`SHADED_EFFECTS`].
     #[inline]
     pub fn effects(&self) -> [[f32; 3]; SHADED_EFFECTS.len()] {
@@ -127,7 +152,7 @@ impl Radiance {
     ///
     /// # Panics
     /// If `out` has fewer numbers than the layout.
-    #[inline]
+    #[inline(always)]
     pub fn write(&self, normal: Vec3, layout: &ChannelLayout, out: &mut [f32]) {
         let effects = self.effects();
         if layout.is_apart() {

@@ -146,7 +146,7 @@ fn of_splats<'a>(frame: &Frame<'a>) -> Vec<Source<'a>> {
     let Loaded { cloud, objects, materials, footprints, .. } = frame.loaded;
     let camera = &frame.camera;
     let mut of_object: BTreeMap<(u32, bool), Vec<u32>> = BTreeMap::new();
-    for i in frame.translucent(cloud, Technique::Particles) {
+    for i in frame.translucent_in(cloud, Technique::Particles) {
         let k = i as usize;
         if cloud.cross_section[k] > 0.0 {
             of_object.entry((cloud.object[k], cloud.kind[k] == SplatKind::Surface)).or_default().push(i);

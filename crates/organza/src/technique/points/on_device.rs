@@ -123,10 +123,10 @@ impl Points<'_> {
         cost: &mut CostRecord,
     ) -> Result<bool, Error> {
         let frame = self.frame;
-        let (ids, solid) = (frame.translucent(frame.drawn(), Technique::Points), frame.solid_ids());
+        let (ids, solid) = (frame.translucent(Technique::Points), frame.solid_ids());
         let sort = sort_params(frame);
         let (lights, castings) = lit;
-        let chained = Chained { lights, castings, ids: &ids, solid: &solid, sort: &sort };
+        let chained = Chained { lights, castings, ids, solid, sort: &sort };
         let done = stages.measure(pass::SPLAT, |stage| frame.chain(helper, &chained, into, stage))?;
         let Some(opaque) = done else { return Ok(false) };
         cost.stages.extend(stages.stages);
