@@ -72,6 +72,11 @@ impl Frame {
         bytes as f64 / cloud.len() as f64
     }
 
+    /// Splats of the cloud.
+    pub fn splats(&self) -> u64 {
+        self.cloud.len() as u64
+    }
+
     /// Slices front to back.
     pub fn sort(&mut self) {
         self.scratch.recycle(std::mem::take(&mut self.order));

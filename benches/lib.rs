@@ -8,10 +8,12 @@
 mod device;
 mod dragon;
 mod frame;
+mod record;
 
 pub use device::device;
 pub use dragon::{disc_scale, dragon, mean_degree, overlap_graph};
 pub use frame::Frame;
+pub use record::record;
 
 use organza::{Files, Loaded, Progress, RenderOptions, load, scene};
 use splat_core::{Camera, Cloud, glam::Vec3, rng};

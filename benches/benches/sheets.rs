@@ -10,7 +10,7 @@
 
 use convert::read::{self, Loaded, ReadParams};
 use convert::{SplatParams, body_centred};
-use organza_benches::processor_ms;
+use organza_benches::{processor_ms, record};
 use sheet_light::{Aligned, Classify, Params, SheetCounts, SheetInput, Volume, prepare};
 use splat_core::glam::{DMat3, DVec3};
 use splat_core::shade::{ChannelLayout, LitBy};
@@ -31,6 +31,8 @@ struct Method<'a> {
     packing: Packing,
     classify: Classify,
     aligned: Aligned,
+    /// Transmittance below which a pixel is done.
+    cutoff: f32,
 }
 
 impl<'a> Method<'a> {
@@ -138,11 +140,13 @@ fn main() {
         packing: Packing::Cartesian,
         classify: Classify::After,
         aligned: Aligned::View,
+        cutoff: Params::PAPERS_CUTOFF,
     };
     let methods = [
         Method { name: " bcc", grid: &bcc.planes, packing: Packing::BodyCentred, ..paper },
         Method { name: " before", classify: Classify::Before, ..paper },
         Method { name: " axis", aligned: Aligned::Axis, ..paper },
+        Method { name: " all pixels", cutoff: 0.0, ..paper },
     ];
     println!(
         "{:>28} {:>12} {:>12} {:>7} {:>9} {:>7} {:>11} {:>10} {:>8}",
@@ -185,24 +189,27 @@ fn row(name: &str, [method, paper]: [&Method<'_>; 2], transfer: &TransferFunctio
     let params = Params {
         classify: method.classify,
         aligned: method.aligned,
-        transmittance_cutoff: Params::PAPERS_CUTOFF,
+        transmittance_cutoff: method.cutoff,
         ..Params::default()
     };
     let layout = ChannelLayout::new(&LayerSet::default());
     let mut out = Accumulator::new(camera.size, 1, 3, false, false);
     let (mut best, mut counts) = ([[f64::INFINITY; 2]; 2], SheetCounts::default());
+    let mut clock = Vec::new();
     for _ in 0..REPEATS {
         let (start, busy) = (Instant::now(), processor_ms());
         let sheeted = prepare(input.clone(), &params, None).expect("a volume that can be drawn");
         let (middle, middle_busy) = (Instant::now(), processor_ms());
         out = Accumulator::new(camera.size, 1, 3, false, false);
         counts = sheeted.fold(ALL, &[], &layout, &mut out, None).expect("nobody cancels");
+        clock.push(start.elapsed().as_secs_f64() * 1e3);
         let times = [(middle - start, middle_busy - busy), (middle.elapsed(), processor_ms() - middle_busy)];
         for (best, (wall, busy)) in best.iter_mut().zip(times) {
             best[0] = best[0].min(wall.as_secs_f64() * 1e3);
             best[1] = best[1].min(busy);
         }
     }
+    record(&format!("sheets/{name}"), &clock, counts.visible);
     let fine = fine(SheetInput { volumes: vec![paper.volume(transfer, &material, lit)], ..input }, &layout);
     let million = |n: u64| n as f64 * 1e-6;
     let [prepared, folded] = best.map(|[wall, busy]| format!("{wall:.1} {busy:.0}"));

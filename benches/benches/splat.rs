@@ -1,10 +1,11 @@
 //! Sort, project and fold translucent splats at 600x500: the outdoor camera, and random splats of 3x3 pixels.
 //!
 //! A plain table of minima: other work on the machine only ever adds time. The second number of each part is the time of
-//! all threads on processors, which other work adds less to. `-- N` runs one number of points.
+//! all threads on processors, which other work adds less to. `-- N` runs one number of points. `cargo xtask papers --times` takes the
+//! means by the clock.
 #![allow(missing_docs, clippy::expect_used, reason = "a benchmark")]
 
-use organza_benches::{Frame, TABLE_1, processor_ms};
+use organza_benches::{Frame, TABLE_1, processor_ms, record};
 use std::time::Instant;
 
 /// Runs each part this often.
@@ -40,16 +41,21 @@ fn growth() {
 
 fn row(name: &str, frame: &mut Frame) -> [f64; 2] {
     let mut best = [[f64::INFINITY; 2]; 3];
+    let mut clock = [const { Vec::new() }; 3];
     let mut fragments = 0;
     for _ in 0..REPEATS {
         let steps: [&mut dyn FnMut(&mut Frame); 3] =
             [&mut |f| f.sort(), &mut |f| f.project(), &mut |f| fragments = f.fold().fragments];
-        for (step, best) in steps.into_iter().zip(&mut best) {
+        for (k, (step, best)) in steps.into_iter().zip(&mut best).enumerate() {
             let (start, busy) = (Instant::now(), processor_ms());
             step(frame);
-            best[0] = best[0].min(start.elapsed().as_secs_f64() * 1e3);
+            clock[k].push(start.elapsed().as_secs_f64() * 1e3);
+            best[0] = best[0].min(clock[k][clock[k].len() - 1]);
             best[1] = best[1].min(processor_ms() - busy);
         }
+    }
+    for (step, ms) in ["sort", "project", "fold"].iter().zip(&clock) {
+        record(&format!("splat/{name}/{step}"), ms, frame.splats());
     }
     let sum = [0, 1].map(|k| best.iter().map(|b| b[k]).sum::<f64>());
     let rate = fragments as f64 / best[2][0] * 1e-3;

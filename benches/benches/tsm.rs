@@ -1,10 +1,13 @@
 //! Shadow maps of the outdoor scene at the paper's three sizes, beside `rdst` sorting as many (cell, distance) keys as
-//! the map deposits; and the same number of points on one ray.
+//! the map deposits; the same number of points on one ray; and the paper's kinds of models alone, a dragon and a cloud.
 
+use convert::{CloudShape, SplatParams, VolumeParams, procedural_cloud, volume_to_points};
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use rdst::RadixSort;
 use splat_core::glam::{DVec3, Vec3};
-use splat_core::{Cloud, Light, LightShape, Limits, Receiver, SplatKind, Transmittance, rng};
+use splat_core::{
+    Cloud, Light, LightShape, Limits, Receiver, SplatKind, TransferFunction, TransferPoint, Transmittance, rng,
+};
 use std::hint::black_box;
 use tsm::{Params, Scene, ShadowMap};
 
@@ -108,6 +111,26 @@ fn look_up(map: &ShadowMap, cloud: &Cloud, ids: &[usize]) -> f32 {
     ids.iter().map(at).sum()
 }
 
+/// A dragon of as many discs as the paper's has points, opaque and translucent, and a cloud, a medium.
+fn alone(c: &mut Criterion) {
+    let dragon = organza_benches::dragon(SIZES[0] as u64);
+    let mut translucent = dragon.clone();
+    translucent.kind.fill(SplatKind::Surface);
+    let grid = procedural_cloud(&CloudShape::default(), 0.03, &SplatParams::default(), None).expect("a cloud");
+    let point = |value: f32| TransferPoint { value, color: [1.0; 3], extinction: value };
+    let transfer = TransferFunction::new(vec![point(0.0), point(12.0)]).expect("values rise");
+    let (cloud, _) = volume_to_points(&grid, &transfer, &VolumeParams::default(), None).expect("splats of it");
+    let mut group = c.benchmark_group("tsm/alone");
+    group.sample_size(10);
+    for (name, cloud) in [("opaque dragon", &dragon), ("translucent dragon", &translucent), ("cloud", &cloud)] {
+        println!("{name}: {} splats", cloud.len());
+        let (_, sun) = lights(cloud)[2];
+        group.throughput(Throughput::Elements(cloud.len() as u64));
+        group.bench_function(name, |b| b.iter(|| build(cloud, &sun)));
+    }
+    group.finish();
+}
+
 /// Growth: light from inside and the sun, 1 to 16 million splats.
 fn growth(c: &mut Criterion) {
     for millions in [1, 2, 4, 8, 16] {
@@ -127,5 +150,5 @@ fn growth(c: &mut Criterion) {
     }
 }
 
-criterion_group!(tsm_benches, benches, growth);
+criterion_group!(tsm_benches, benches, alone, growth);
 criterion_main!(tsm_benches);

@@ -123,7 +123,7 @@ const FALLING: &str = "version = 1\n[camera]\nposition = [0, 0.5, 5]\ntarget = [
     [[object]]\nname = 'ball'\nimplicit = { expression = 'x^2 + y^2 + z^2 - 0.04', \
     box = [[-0.3, -0.3, -0.3], [0.3, 0.3, 0.3]], spacing = 0.04 }\n\
     [animation]\nframes = 9\n[[animation.track]]\nset = 'object.ball.transform.translate'\n\
-    keys = [{ frame = 0, value = [0, 1, 0] }, { frame = 8, value = [0, -1, 0] }]\nstop = { radius = 0.2 }\n";
+    keys = [{ frame = 0, value = [0, 1, 0] }, { frame = 8, value = [0, -1, 0] }]\nstop = {}\n";
 
 #[test]
 fn what_falls_stops_where_the_light_sees_it_meet_the_table_in_whatever_frames_are_drawn() {
@@ -145,7 +145,7 @@ fn what_falls_stops_where_the_light_sees_it_meet_the_table_in_whatever_frames_ar
     place.expect(0, &["render", "s.toml", "-o", "one.png", "--frames=7-7"], "object 'ball' stops at frame 5.2");
     assert!(place.bytes("all.0007.png") == place.bytes("one.0007.png"));
     // Without its light's table it falls on.
-    let through = FALLING.replace("stop = { radius = 0.2 }", "");
+    let through = FALLING.replace("stop = {}", "");
     assert!(drawn(&through, Some(5)).unwrap() == frames[5] && drawn(&through, Some(8)).unwrap() != frames[8]);
 }
 

@@ -106,6 +106,18 @@ fn x8_light_is_additive_and_layers_sum_to_beauty() {
     assert!(largest <= 1e-6 * brightest, "twice the light: {largest:e} of {brightest}");
 }
 
+/// A pixel of eight by eight samples is their mean, by points; the picture of eight by eight pixels has the same samples.
+#[test]
+fn ou1_one_pixel_is_the_mean_of_a_fine_picture() {
+    let of = |keys: &str| draw(&scene(1.0, 0.0, false).replace("size = [80, 60]\n[render]\nantialias = 2", keys), &[]);
+    let [one, fine] = ["size = [1, 1]\n[render]\nantialias = 8", "size = [8, 8]\n[render]\nantialias = 1"].map(of);
+    for name in ["R", "G", "B", "A"] {
+        let (one, fine) = (one.channel(name), fine.channel(name));
+        let mean = fine.iter().sum::<f64>() / 64.0;
+        assert!(one.len() == 1 && mean > 0.01 && (one[0] / mean - 1.0).abs() < 0.01, "{name}: {one:?}, not {mean}");
+    }
+}
+
 #[test]
 fn x8_two_scenes_apart_add_up() {
     let head = "version = 1\n[camera]\nposition = [0, 0, 4]\ntarget = [0, 0, 0]\nfov_y = 35\nsize = [48, 24]\n[render]\n\

@@ -2,7 +2,7 @@
 //!
 //! `docs/papers/*.toml` hold one row per numbered equation and per quantitative claim; `docs/papers.md` is made from
 //! them. A row names code and tests, and a name that no longer exists is an error; so is a verdict that no test and no benchmark
-//! stands for. Times are named, and taken from what benchmarks wrote. Hard cases need a test that bears their id.
+//! stands for. Times are named, and taken from what benchmarks wrote: one by hand is an error, and a benchmark that never ran. Hard cases need a test that bears their id.
 
 mod hard_cases;
 mod ledger;
@@ -44,6 +44,9 @@ fn read(repo: &Repo) -> Result<Vec<Ledger>, String> {
     let with_times = |(path, text): (&str, &str)| {
         let (mut ledger, times) = (Ledger::parse(path, text)?, Times::of(repo, path)?);
         for row in &mut ledger.rows {
+            if let Some(why) = times::by_hand(row) {
+                return Err(format!("{path}: {}: {why}", row.id));
+            }
             let fill = |text: &str| times.fill(text).map_err(|why| format!("{path}: {}: {why}", row.id));
             (row.ours, row.reason) = (fill(&row.ours)?, fill(&row.reason)?);
         }
@@ -85,13 +88,19 @@ mod tests {
 
     #[test]
     fn times_come_from_the_file_beside_the_ledger() {
-        let csv = ("docs/papers/t-times.csv", "what,low_ms,mean_ms,high_ms\n\"sort/1\",1,2,3\n");
+        let csv = ("docs/papers/t-times.csv", "what,low_ms,mean_ms,high_ms,elements\n\"sort/1\",1,2,3,\n");
         let data = DATA.replace("ours = \"1\"", "ours = \"{sort/1}\"");
         let ours = |files: &[(&str, &str)]| read(&Repo::of(files)).map(|ledgers| ledgers[0].rows[0].ours.clone());
         let ledger = ("docs/papers/t.toml", data.as_str());
         assert_eq!(ours(&[ledger, csv]), Ok("2.00 ms".to_owned()));
         let why = "docs/papers/t.toml: Eq. 1: no benchmark {sort/1} in its -times.csv";
         assert_eq!(ours(&[ledger]), Err(why.to_owned()));
+        let by_hand = DATA.replace("ours = \"1\"", "ours = \"sorted, in 2 ms; often\"");
+        let why = "docs/papers/t.toml: Eq. 1: has a time that stands in no -times.csv";
+        assert_eq!(ours(&[("docs/papers/t.toml", &by_hand)]), Err(why.to_owned()));
+        let never_ran = DATA.replace("src/a.rs::f", "benches/benches/a.rs");
+        let why = "docs/papers/t.toml: Eq. 1: names a benchmark, and no time that it left";
+        assert_eq!(ours(&[("docs/papers/t.toml", &never_ran)]), Err(why.to_owned()));
     }
 
     #[test]

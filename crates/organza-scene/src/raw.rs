@@ -70,7 +70,7 @@ pub(super) struct RawTrack {
     pub(super) stop: Option<RawStop>,
 }
 
-/// Where an object stops: at the first place where a light sees a ball about it meet others.
+/// Where an object stops: at the first place where a light sees it meet others.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, expecting = "a table")]
 #[schemars(rename = "Stop")]
@@ -78,11 +78,6 @@ pub(super) struct RawStop {
     /// Index of the light, from 0.
     #[serde(default)]
     pub(super) light: u32,
-    /// Radius of the ball, world units.
-    pub(super) radius: f64,
-    /// From the object's `translate` to the middle of the ball, world units; default zero.
-    #[serde(default)]
-    pub(super) offset: [f64; 3],
     /// Names of the objects that it stops at, visible or not; default all visible ones that no track changes.
     pub(super) objects: Option<Vec<String>>,
 }

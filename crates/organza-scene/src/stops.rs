@@ -22,10 +22,6 @@ pub struct Stop {
     pub frame: u32,
     /// The light whose shadow map tells what is met.
     pub light: usize,
-    /// Radius of the ball about it, world units, > 0.
-    pub radius: f64,
-    /// From its place to the middle of the ball, world units.
-    pub offset: DVec3,
     /// Names of what may be met; no track changes them or the light.
     pub objects: Vec<String>,
 }
@@ -79,8 +75,13 @@ fn check_stop(
         let message = format!("`stop`: expected a track of an object's place, found `{}`", shown(&raw.track[i].set));
         return Err(at.error(message, "such as set = \"object.ball.transform.translate\""));
     };
-    if (0..raw.track.len()).any(|k| k != i && tracks.change(k, object, &["transform", "translate"])) {
-        return Err(at.error("`stop`: another track moves the object too", "let one track move it"));
+    if matches!(objects[object].source, Source::Extract(_)) {
+        return Err(at.error("`stop`: an extraction is found where others stand, and meets nothing", "let them stop"));
+    }
+    if (0..raw.track.len()).any(|k| k != i && tracks.change(k, object, &["transform"])) {
+        return Err(
+            at.error("`stop`: another track moves the object too", "let one track move it, and none turn or scale it")
+        );
     }
     let light = stop.light as usize;
     check_light_index(&at, light, lights)?;
@@ -98,8 +99,6 @@ fn check_stop(
         last: raw.frames.saturating_sub(1),
         frame: 0,
         light,
-        radius: at.length("radius", stop.radius)?,
-        offset: at.vector("offset", stop.offset)?,
         objects: met(&at, stop, &tracks)?,
     })
 }

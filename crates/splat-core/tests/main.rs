@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod accumulation;
+mod closed_forms;
 mod environment;
 mod extended_lights;
 mod image_footprints;

@@ -62,12 +62,15 @@ fn x6_traces_of_matter_are_not_drawn() {
 #[test]
 fn x5_numbers_below_the_normal_ones_give_pictures_of_numbers() {
     type Poison = fn(&mut Cloud, f32);
-    let columns: [(&str, Poison); 5] = [
+    let columns: [(&str, Poison); 8] = [
         ("position", |cloud, v| cloud.position[7] = Vec3::new(v, -v, 1.0)),
         ("radius", |cloud, v| cloud.radius[7] = v),
         ("cross_section", |cloud, v| cloud.cross_section[7] = v),
         ("color", |cloud, v| cloud.color[7] = [v, 0.5, v]),
         ("tangent", |cloud, v| cloud.tangent = vec![Vec3::X * v; cloud.len()]),
+        ("normal", |cloud, v| cloud.normal[6] = Vec3::new(v, -v, 1.0)),
+        ("value", |cloud, v| cloud.value = vec![v; cloud.len()]),
+        ("shadow_coefficient", |cloud, v| cloud.shadow_coefficient = vec![v; cloud.len()]),
     ];
     for (name, poison) in columns {
         for number in [1e-45, 1e-40, f32::MIN_POSITIVE, 1e-20] {

@@ -1,4 +1,4 @@
-//! Queries beside shadow: lists, first hit, collision with a sphere, isosurface points (Gunjee 2007, Figure 15a).
+//! Queries beside shadow: lists, first hit, collision, isosurface points (Gunjee 2007, Figure 15a).
 
 use crate::ShadowMap;
 use crate::lookup::continuous;
@@ -9,8 +9,8 @@ use glam::Vec3;
 use rayon::prelude::*;
 use splat_core::glam;
 
-/// Most looks at a moving sphere from one whole time to the next.
-const MOST_STEPS: f32 = 1024.0;
+/// Most looks at what moves from one whole time to the next.
+const MOST_STEPS: f32 = 256.0;
 /// How often the time of a collision is halved.
 const HALVINGS: usize = 16;
 
@@ -115,35 +115,63 @@ impl ShadowMap {
                 return false;
             }
             let half = chord_sq.sqrt();
-            let span = along - half..=along + half;
-            let inside = match &self.absorbances {
-                Absorbances::Mono(matter) => any_between(matter, cell, *span.start(), *span.end()),
-                Absorbances::Rgb(matter) => any_between(matter, cell, *span.start(), *span.end()),
-            };
-            inside || self.opaque.get(cell as usize).is_some_and(|d| span.contains(d))
+            self.is_met(cell, along - half, along + half)
         })
     }
 
-    /// The last time from 0 to `end` up to which a sphere that moves never [collides](Self::collides): 0 where it does so from the
-    /// beginning, and `end` where it meets nothing. `center` gives its centre by the time, relative to the cloud's origin. It is
-    /// looked at wherever it has gone half its radius between whole times, along a straight way, 1024 times at most.
-    pub fn free_until(&self, center: &dyn Fn(f64) -> Vec3, radius: f32, end: u32) -> f64 {
-        let is_free = |time: f64| !self.collides(center(time), radius);
-        if !is_free(0.0) {
-            return 0.0;
-        }
-        for begin in (0..end).map(f64::from) {
-            let steps = ((center(begin + 1.0) - center(begin)).length() / (0.5 * radius)).ceil().min(MOST_STEPS);
-            let mut times = (0..steps as u32).map(|k| [k, k + 1].map(|k| begin + f64::from(k) / f64::from(steps)));
-            if let Some([mut free, mut met]) = times.find(|[_, to]| !is_free(*to)) {
-                for _ in 0..HALVINGS {
-                    let middle = 0.5 * (free + met);
-                    *if is_free(middle) { &mut free } else { &mut met } = middle;
+    /// Whether a cell has an entry between two distances in the frame.
+    fn is_met(&self, cell: u32, from: f32, to: f32) -> bool {
+        let inside = match &self.absorbances {
+            Absorbances::Mono(matter) => any_between(matter, cell, from, to),
+            Absorbances::Rgb(matter) => any_between(matter, cell, from, to),
+        };
+        inside || self.opaque.get(cell as usize).is_some_and(|d| (from..=to).contains(d))
+    }
+
+    /// The last time from 0 to `end` up to which none of some places that move together has come past an entry of the cell that it lies in: behind
+    /// it by no more than two widths of that cell. 0 where one has from the beginning, and `end` where none ever does. `places` are those at time
+    /// 0, relative to the cloud's origin, and `moved` is how far they have gone. Between whole times they are looked at, along a straight way,
+    /// wherever they have gone a cell's width, but 256 times at most; where these steps are longer than a cell is wide, it is behind by no more than two of them.
+    pub fn free_until(&self, places: &[Vec3], moved: &dyn Fn(f64) -> Vec3, end: u32) -> f64 {
+        let mut free = 0.0;
+        for begin in (0..=end).map(f64::from) {
+            let from = moved(begin);
+            let way =
+                if begin < f64::from(end) { self.frame.length((moved(begin + 1.0) - from).length()) } else { 0.0 };
+            let widths = places.par_iter().filter_map(|place| Some(self.place_of(*place + from)?.2));
+            let steps = (way / widths.reduce_with(f32::min).unwrap_or(f32::MIN_POSITIVE)).ceil().clamp(1.0, MOST_STEPS);
+            let has_met = |time: f64| {
+                let by = moved(time);
+                places.par_iter().any(|place| self.is_past(*place + by, way / steps))
+            };
+            for k in 0..if way > 0.0 { steps as u32 } else { 1 } {
+                let mut met = begin + f64::from(k) / f64::from(steps);
+                if has_met(met) {
+                    for _ in 0..HALVINGS {
+                        let middle = 0.5 * (free + met);
+                        *if has_met(middle) { &mut met } else { &mut free } = middle;
+                    }
+                    return free;
                 }
-                return free;
+                free = met;
             }
         }
-        f64::from(end)
+        free
+    }
+
+    /// Whether a place lies behind an entry of its cell by no more than two widths of that, or two steps of that length in the frame.
+    fn is_past(&self, place: Vec3, step: f32) -> bool {
+        self.place_of(place)
+            .is_some_and(|(cell, distance, width)| self.is_met(cell, distance - 2.0 * width.max(step), distance))
+    }
+
+    /// The cell of a place, its distance from the light and the width of the cell there, both in the frame.
+    fn place_of(&self, place: Vec3) -> Option<(u32, f32, f32)> {
+        let (cell, p) = (self.cell_of(place)?, self.frame.position(place));
+        with_mapping!(&self.table, m => {
+            let (distance, spread) = if m.is_parallel() { (p.z, 1.0) } else { (p.length(), p.length()) };
+            Some((cell, distance, spread * m.measure(cell).sqrt() as f32))
+        })
     }
 
     /// The surface that the light sees: for each cell whose absorbance reaches `absorbance`, the point where it first

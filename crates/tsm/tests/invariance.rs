@@ -202,20 +202,46 @@ fn queries_find_what_the_light_meets() {
     assert!(map.list(u32::MAX).is_empty() && map.first_hit(u32::MAX, 0.1).is_none());
 }
 
+/// Places on the sides of a box around 0, half its least half extent apart.
+fn bar(half: Vec3) -> Vec<Vec3> {
+    let step = half.min_element() / 2.0;
+    let n = (half / step).round().as_ivec3();
+    let mut places = Vec::new();
+    for x in -n.x..=n.x {
+        for y in -n.y..=n.y {
+            for z in -n.z..=n.z {
+                if x.abs() == n.x || y.abs() == n.y || z.abs() == n.z {
+                    places.push(Vec3::new(x as f32, y as f32, z as f32) * step);
+                }
+            }
+        }
+    }
+    places
+}
+
 #[test]
-fn a_moving_sphere_is_free_until_it_meets_what_the_light_sees() {
+fn bars_that_fall_flat_or_upright_are_free_until_their_own_sides_touch_the_plane() {
     let cloud = plane(Vec3::Z * 3.0, Vec3::NEG_Z, 20, 0.05, SplatKind::Opaque, 1.0);
-    let map = build(&cloud, &point_light(DVec3::ZERO), &Params::default());
-    let (along, radius) = (|time: f64| Vec3::new(0.05, 0.02, 1.0 + 0.35 * time as f32), 0.1);
-    // It touches the plane when its centre is at 2.9: the middle of its fifth step and a bit.
-    let met = map.free_until(&along, radius, 9);
-    assert!((met - 1.9 / 0.35).abs() < 0.02 && !map.collides(along(met), radius), "{met}");
-    assert!(map.collides(along(met + 0.02), radius));
-    // A long step does not lead through the plane.
-    let far = |time: f64| Vec3::new(0.05, 0.02, 1.0 + 50.0 * time as f32);
-    assert!((map.free_until(&far, radius, 3) - 1.9 / 50.0).abs() < 1e-3);
-    assert_eq!(map.free_until(&|time| along(-time), radius, 3), 3.0);
-    assert_eq!(map.free_until(&|_| Vec3::Z * 3.0, radius, 3), 0.0);
+    let (flat, upright) = (Vec3::new(0.4, 0.04, 0.04), Vec3::new(0.04, 0.04, 0.4));
+    for light in [directional(DVec3::Z), point_light(DVec3::ZERO), directional(DVec3::new(0.4, 0.1, 1.0).normalize())] {
+        // A slanted ray finds the plane within half a cell.
+        let map = build(&cloud, &light, &Params { resolution: Resolution::Cells(512), ..Params::default() });
+        for half in [flat, upright] {
+            let from = 1.0f32;
+            let way = |speed: f32| move |time: f64| Vec3::new(0.03, 0.02, from + speed * time as f32);
+            for speed in [0.35, 50.0] {
+                let met = map.free_until(&bar(half), &way(speed), 9);
+                let stood = from + speed * met as f32;
+                assert!((stood - (3.0 - half.z)).abs() < 2e-3, "{:?} {half}: stops at {stood}", light.shape);
+            }
+            // Beside the plane, away from it and behind it nothing is met; where it is met from the beginning there is no way.
+            let aside = |time: f64| way(0.35)(time) + Vec3::X * 3.0;
+            assert_eq!(map.free_until(&bar(half), &aside, 9), 9.0);
+            assert_eq!(map.free_until(&bar(half), &|time| way(0.35)(-time), 2), 2.0);
+            assert_eq!(map.free_until(&bar(half), &|time| way(0.35)(time) + Vec3::Z * 3.0, 9), 9.0);
+            assert_eq!(map.free_until(&bar(half), &|_| Vec3::Z * 3.001, 3), 0.0);
+        }
+    }
 }
 
 #[test]

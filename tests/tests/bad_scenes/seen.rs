@@ -36,23 +36,27 @@ fn stops_that_no_light_could_tell_are_refused() {
     let keys = "keys = [{ frame = 0, value = [0, 0, 0] }, { frame = 8, value = [1, 0, 0] }]";
     let track = format!("set = \"object.a.transform.translate\"\n{keys}");
     let other = |set: &str| format!("[[animation.track]]\nset = \"{set}\"\nkeys = [{{ frame = 0, value = 0 }}]\n");
-    assert_eq!(scene(&track, "radius = 0.1", ""), Ok(()));
-    assert_eq!(scene(&track.replace("object.a", "object.0"), "radius = 0.1, objects = [\"b\"]", ""), Ok(()));
+    assert_eq!(scene(&track, "", ""), Ok(()));
+    assert_eq!(scene(&track.replace("object.a", "object.0"), "objects = [\"b\"]", ""), Ok(()));
     for (track, stop, more, expected) in [
-        (track.clone(), "light = 0", String::new(), "expected a key `radius` here"),
-        (track.clone(), "radius = 0", String::new(), "27:19: `radius`: expected a number above 0"),
-        (track.clone(), "radius = 1, light = 3", String::new(), "`light`: expected a light below 1, found 3"),
-        (track.clone(), "radius = 1, objects = [\"x\"]", String::new(), "expected the name of an object, found `x`"),
-        (track.clone(), "radius = 1, objects = [\"a\"]", String::new(), "`objects`: `a` is changed by a track"),
-        (track.clone(), "radius = 1, objects = [\"b\"]", other("object.b.visible"), "`b` is changed by a track"),
-        (track.clone(), "radius = 1", other("object.b.visible"), "27:8: `stop`: there is nothing to stop at"),
-        (track.clone(), "radius = 1", other("light.0.intensity"), "`light`: a track changes it"),
-        (track.clone(), "radius = 1", other("object.0.transform"), "another track moves the object too"),
-        (track.replace("translate", "rotate"), "radius = 1", String::new(), "expected a track of an object's place"),
-        (track.replace("object.a", "object.z"), "radius = 1", String::new(), "expected a track of an object's place"),
-        (track.replace("[1, 0, 0]", "[1, 0]"), "radius = 1", String::new(), "`value`: expected three numbers"),
+        (track.clone(), "radius = 1", String::new(), "unknown key `radius`"),
+        (track.clone(), "", other("object.a.transform.scale"), "another track moves the object too"),
+        (track.clone(), "light = 3", String::new(), "`light`: expected a light below 1, found 3"),
+        (track.clone(), "objects = [\"x\"]", String::new(), "expected the name of an object, found `x`"),
+        (track.clone(), "objects = [\"a\"]", String::new(), "`objects`: `a` is changed by a track"),
+        (track.clone(), "objects = [\"b\"]", other("object.b.visible"), "`b` is changed by a track"),
+        (track.clone(), "", other("object.b.visible"), "27:8: `stop`: there is nothing to stop at"),
+        (track.clone(), "", other("light.0.intensity"), "`light`: a track changes it"),
+        (track.clone(), "", other("object.0.transform"), "another track moves the object too"),
+        (track.replace("translate", "rotate"), "", String::new(), "expected a track of an object's place"),
+        (track.replace("object.a", "object.z"), "", String::new(), "expected a track of an object's place"),
+        (track.replace("[1, 0, 0]", "[1, 0]"), "", String::new(), "`value`: expected three numbers"),
     ] {
         let (error, hint) = scene(&track, stop, &more).unwrap_err();
         assert!(error.contains(expected), "{track}\n{stop}\n{more}\nexpected: {expected}\nfound: {error} ({hint})");
     }
+    let of_extraction = SCENE.replace("mesh = \"a.ply\"", "extract = {}")
+        + &format!("[animation]\nframes = 9\n[[animation.track]]\n{track}\nstop = {{}}\n");
+    let error = try_toml(&of_extraction).unwrap_err().to_string();
+    assert!(error.contains("`stop`: an extraction is found where others stand"), "{error}");
 }

@@ -15,7 +15,7 @@ const THROUGH: &[&str] = &[
     "animation={frames=3, track=[{set='object.it.transform.translate', \
      keys=[{frame=0, value=[0, 0, 0]}, {frame=2, value=[0.1, 0, -2.4]}]}]}",
 ];
-const STOPPING: &[&str] = &[THROUGH[0], THROUGH[1], "animation.track.0.stop={radius=0.3}"];
+const STOPPING: &[&str] = &[THROUGH[0], THROUGH[1], "animation.track.0.stop={}"];
 
 pub(super) fn entries() -> Vec<Entry> {
     vec![
@@ -23,10 +23,8 @@ pub(super) fn entries() -> Vec<Entry> {
         one("object.extract.light", "object.it.extract.light=1").with(SEEN),
         one("object.extract.absorbance", "object.it.extract.absorbance=0.4").with(SEEN),
         one("object.extract.objects", "object.it.extract.objects=['blocker']").with(SEEN),
-        one("animation.track.stop", "animation.track.0.stop={radius=0.3}").at(2).with(THROUGH),
+        one("animation.track.stop", "animation.track.0.stop={}").at(2).with(THROUGH),
         one("animation.track.stop.light", "animation.track.0.stop.light=1").at(2).with(STOPPING),
-        one("animation.track.stop.radius", "animation.track.0.stop.radius=0.5").at(2).with(STOPPING),
-        one("animation.track.stop.offset", "animation.track.0.stop.offset=[0, 0, -0.2]").at(2).with(STOPPING),
         one("animation.track.stop.objects", "animation.track.0.stop.objects=['blocker']").at(2).with(STOPPING),
     ]
 }

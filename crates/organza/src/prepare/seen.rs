@@ -1,6 +1,6 @@
 //! What a scene leaves to what lights see of its parts, where things stop and what is extracted, and the camera that then sees all.
 
-use super::load;
+use super::{Loaded, load};
 use crate::load::files::{Files, once};
 use crate::load::placed;
 use crate::memory::loading_bytes;
@@ -62,11 +62,12 @@ pub fn seen(
     Ok(RawPoints { origin, position, normal, ..RawPoints::default() })
 }
 
-/// The last time on an object's way at which its ball is free of what it stops at, in frames.
+/// The last time on an object's way at which none of its splats has come past what it stops at, in frames.
 fn stop_time(stop: &Stop, eye: &Eye<'_>) -> Result<f64, Error> {
     let (map, origin) = eye.map(stop.light, &|o| stop.objects.contains(&o.name))?;
-    let center = |time| (stop.path.at(time) + stop.offset - origin).as_vec3();
-    let time = map.free_until(&center, stop.radius as f32, stop.last);
+    let own = eye.splats(stop.light, &|o| o.name == eye.scene.objects[stop.object].name)?.cloud;
+    let start = own.origin - origin - stop.path.at(0.0);
+    let time = map.free_until(&own.position, &|time| (start + stop.path.at(time)).as_vec3(), stop.last);
     eye.files.note(&eye.scene.file, stop.said(eye.scene, time));
     Ok(time)
 }
@@ -82,18 +83,23 @@ struct Eye<'a> {
 impl Eye<'_> {
     /// The shadow map of a light of some objects alone, and the world position that its places are relative to.
     fn map(&self, light: usize, sees: &dyn Fn(&SceneObject) -> bool) -> Result<(ShadowMap, DVec3), Error> {
-        let Self { options, progress, files, .. } = *self;
-        let scene = self.scene.part(light, sees);
-        let mut loaded = load(&scene, options, progress, files)?;
-        let loading = loading_bytes(&loaded, files.bytes());
+        let loaded = self.splats(light, sees)?;
+        let casters = tsm::Scene { cloud: &loaded.cloud, materials: &loaded.materials, objects: &loaded.objects };
+        let left = self.options.max_memory.saturating_sub(loaded.cloud.bytes());
+        let params = shadow_params(&self.scene.render, &loaded, Params::default().tolerance, left);
+        let map = ShadowMap::build(&casters, &self.scene.lights[light].light.middle(), &params, Some(self.progress));
+        let map = map.map_err(|e| shadow_error(&format!("light {light}"), &e))?;
+        self.files.most.set(self.files.most.get().max(loaded.cloud.bytes() + map.peak_bytes()));
+        Ok((map, loaded.cloud.origin))
+    }
+
+    /// The splats of some objects alone, in the scale of the scene.
+    fn splats(&self, light: usize, has: &dyn Fn(&SceneObject) -> bool) -> Result<Loaded, Error> {
+        let scene = self.scene.part(light, has);
+        let mut loaded = load(&scene, self.options, self.progress, self.files)?;
+        self.files.most.set(self.files.most.get().max(loading_bytes(&loaded, self.files.bytes())));
         // From the scale of the cloud to that of the scene: a power of two.
         loaded.cloud.scale_world(libm::exp2(loaded.exponent.into()));
-        let casters = tsm::Scene { cloud: &loaded.cloud, materials: &loaded.materials, objects: &loaded.objects };
-        let left = options.max_memory.saturating_sub(loaded.cloud.bytes());
-        let params = shadow_params(&scene.render, &loaded, Params::default().tolerance, left);
-        let map = ShadowMap::build(&casters, &self.scene.lights[light].light.middle(), &params, Some(progress));
-        let map = map.map_err(|e| shadow_error(&format!("light {light}"), &e))?;
-        files.most.set(files.most.get().max(loading).max(loaded.cloud.bytes() + map.peak_bytes()));
-        Ok((map, loaded.cloud.origin))
+        Ok(loaded)
     }
 }
