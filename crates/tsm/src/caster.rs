@@ -136,11 +136,13 @@ impl<'a> Casters<'a> {
 }
 
 impl Casters<'_> {
-    /// Whether splat `i` throws a shadow at all.
+    /// Whether splat `i` throws a shadow at all: its optical depth, within a factor of two of its cross-section over its radius², is not
+    /// too faint to be seen.
     #[inline(always)]
     pub(crate) fn casts(&self, i: usize) -> bool {
         let casts = |object: u32| self.objects.get(object as usize).is_none_or(|o| o.casts_shadow);
-        self.cloud.cross_section[i] > 0.0 && (!self.may_spare || casts(self.cloud.object[i]))
+        let (radius, cross_section) = (self.cloud.radius[i], self.cloud.cross_section[i]);
+        cross_section > optics::FAINTEST * radius * radius && (!self.may_spare || casts(self.cloud.object[i]))
     }
 
     /// Whether splat `i` throws its shadow as a disc of its area.

@@ -2,7 +2,8 @@
 
 use splat_core::{Cloud, Material, Object};
 
-/// Splats that throw shadows. Those of objects that cast none, and those of no cross-section, leave no trace in a map.
+/// Splats that throw shadows. Those of objects that cast none, and those that are too faint to be seen
+/// ([`splat_core::optics::FAINTEST`]), leave no trace in a map.
 #[derive(Debug, Clone, Copy)]
 pub struct Scene<'a> {
     /// The splats.

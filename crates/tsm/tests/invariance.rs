@@ -2,6 +2,7 @@
 
 use crate::common::*;
 use splat_core::glam::{DVec3, Vec3};
+use splat_core::optics::FAINTEST;
 use splat_core::{Cloud, Exceeded, Light, LightShape, Limits, SplatKind, Transmittance};
 use tsm::{Deposits, Error, MappingChoice, Params, Resolution, Scene, ShadowMap};
 
@@ -32,6 +33,22 @@ fn x1_thread_counts_change_no_bit() {
             pool.install(|| build(&cloud, &light, &Params::default()))
         });
         assert!(maps.iter().all(|m| *m == maps[0]));
+    }
+}
+
+#[test]
+fn x6_matter_too_faint_to_be_seen_leaves_no_trace() {
+    let (mut faint, mut thin) = (mixed(9000, DVec3::ZERO), mixed(9000, DVec3::ZERO));
+    for (cloud, of) in [(&mut faint, FAINTEST), (&mut thin, 4.0 * FAINTEST)] {
+        cloud.kind.fill(SplatKind::Medium);
+        cloud.cross_section.iter_mut().zip(&cloud.radius).for_each(|(k, radius)| *k = of * radius * radius);
+    }
+    for light in lights() {
+        let entries = |cloud: &Cloud| {
+            let deposits = Deposits::new(&Scene::from(cloud), &light, &Params::default(), None).unwrap();
+            deposits.entries().iter().sum::<u64>()
+        };
+        assert!(entries(&faint) == 0 && entries(&thin) > 9000);
     }
 }
 
