@@ -209,7 +209,8 @@ impl<'a> Prepared<'a> {
         let lattice = Lattice::new(grid, volume.packing, reach);
         let viewed = viewed.with_rim(lattice.rim);
         let transfer = &volume.seen();
-        let voxels = Voxels::needed(&lattice, transfer, reach);
+        let near = viewed.near(camera, slabs, &params.kernel, [params.compares_sheets(&volume), lacking.is_some()]);
+        let voxels = Voxels::needed(&lattice, transfer, &near);
         let segments = Segments::new(&viewed, slabs, &voxels, lattice.dims, tiles);
         let cutoff = params.kernel.extent / params.kernel.sigma;
         let footprint = Footprint { cutoff: cutoff as f32 };
@@ -270,7 +271,17 @@ impl<'a> Prepared<'a> {
 pub(crate) fn extremes(values: &[f32]) -> (f32, f32) {
     let none = (f32::INFINITY, f32::NEG_INFINITY);
     let join = |a: (f32, f32), b: (f32, f32)| (a.0.min(b.0), a.1.max(b.1));
-    let of = |chunk: &[f32]| chunk.iter().fold(none, |all, v| join(all, (*v, *v)));
+    let of = |chunk: &[f32]| {
+        // Side by side, so that vectors are compared.
+        let (mut least, mut greatest) = ([none.0; 16], [none.1; 16]);
+        for values in chunk.chunks(16) {
+            for ((least, greatest), v) in least.iter_mut().zip(&mut greatest).zip(values) {
+                *least = if *v < *least { *v } else { *least };
+                *greatest = if *v > *greatest { *v } else { *greatest };
+            }
+        }
+        least.into_iter().zip(greatest).fold(none, join)
+    };
     values.par_chunks(1 << 16).map(of).reduce(|| none, join)
 }
 
@@ -282,7 +293,7 @@ impl Sheeted<'_> {
 
     /// Bytes of what was prepared.
     pub fn bytes(&self) -> u64 {
-        let volumes: u64 = self.volumes.iter().map(|v| v.segments.bytes() + Voxels::bytes(v.lattice.dims) / 4).sum();
+        let volumes: u64 = self.volumes.iter().map(|v| v.segments.bytes() + v.voxels.held()).sum();
         volumes + self.bins.as_ref().map_or(0, Bins::bytes) + self.panes.as_ref().map_or(0, Panes::bytes)
     }
 

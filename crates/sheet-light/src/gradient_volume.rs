@@ -94,6 +94,7 @@ pub(crate) fn differences(lattice: &Lattice<'_>, at: [usize; 3]) -> [f64; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::near::Near;
     use splat_core::glam::{DMat3, DQuat};
     use splat_core::raster::pulp;
     use splat_core::{Grid, Material, Similarity, TransferFunction, TransferPoint, rng};
@@ -125,7 +126,7 @@ mod tests {
             casts_shadow: true,
         };
         let lattice = Lattice::new(&grid, packing, [3, 3, 6]);
-        let voxels = Voxels::needed(&lattice, &transfer, [1; 3]);
+        let voxels = Voxels::needed(&lattice, &transfer, &Near::block([2; 3]));
         // Places are those of the field.
         let inverse = axes.inverse();
         let rows = [0, 1, 2].map(|a| [inverse.row(a).x, inverse.row(a).y, inverse.row(a).z, middle[a]]);

@@ -60,6 +60,7 @@ mod kept;
 mod lattice;
 mod light;
 mod lines;
+mod near;
 mod near_eye;
 mod neighbours;
 mod panes;

@@ -81,29 +81,28 @@ impl Chunk {
         tiles: [usize; 2],
         planes: std::ops::Range<usize>,
     ) -> Self {
+        let mut found = Vec::new();
+        for (row, (k, j)) in planes.flat_map(|k| (0..dims[1]).map(move |j| (k, j))).enumerate() {
+            for eighth in (0..dims[0].div_ceil(SEGMENT)).filter(|e| voxels.eight(*e, j, k) != 0) {
+                let reached = tiles_of(viewed, slabs, Segment { eighth, j, k }, tiles);
+                found.extend(reached.map(|reached| ((row as u32) << PLACE_BITS | eighth as u32, reached)));
+            }
+        }
+        let each = |[first, last]: [[u16; 2]; 2]| {
+            let row = move |y: u16| (first[0]..=last[0]).map(move |x| usize::from(y) * tiles[0] + usize::from(x));
+            (first[1]..=last[1]).flat_map(row)
+        };
         // starts[t + 2] first counts, then starts[t + 1] is the running end of tile t.
         let mut starts = vec![0u32; tiles[0] * tiles[1] + 2];
-        let rows = || planes.clone().flat_map(|k| (0..dims[1]).map(move |j| (k, j)));
-        let visit = |each: &mut dyn FnMut(u32, usize)| {
-            for (row, (k, j)) in rows().enumerate() {
-                for eighth in (0..dims[0].div_ceil(SEGMENT)).filter(|e| voxels.eight(*e, j, k) != 0) {
-                    let Some([first, last]) = tiles_of(viewed, slabs, Segment { eighth, j, k }, tiles) else {
-                        continue;
-                    };
-                    let entry = (row as u32) << PLACE_BITS | eighth as u32;
-                    for y in first[1]..=last[1] {
-                        (first[0]..=last[0]).for_each(|x| each(entry, y * tiles[0] + x));
-                    }
-                }
-            }
-        };
-        visit(&mut |_, t| starts[t + 2] += 1);
+        found.iter().flat_map(|(_, reached)| each(*reached)).for_each(|t| starts[t + 2] += 1);
         (2..starts.len()).for_each(|t| starts[t] += starts[t - 1]);
         let mut entries = vec![0; starts.last().map_or(0, |n| *n as usize)];
-        visit(&mut |entry, t| {
-            entries[starts[t + 1] as usize] = entry;
-            starts[t + 1] += 1;
-        });
+        for (entry, reached) in found {
+            for t in each(reached) {
+                entries[starts[t + 1] as usize] = entry;
+                starts[t + 1] += 1;
+            }
+        }
         starts.pop();
         Self { starts, entries }
     }
@@ -111,7 +110,7 @@ impl Chunk {
 
 /// First and last tile that a segment may reach.
 #[inline(always)]
-fn tiles_of(viewed: &Viewed, slabs: &Slabs, segment: Segment, tiles: [usize; 2]) -> Option<[[usize; 2]; 2]> {
+fn tiles_of(viewed: &Viewed, slabs: &Slabs, segment: Segment, tiles: [usize; 2]) -> Option<[[u16; 2]; 2]> {
     let Segment { eighth, j, k } = segment;
     let first = viewed.position(eighth * SEGMENT, j, k);
     let ends = [first, first + viewed.axes.x_axis * (SEGMENT - 1) as f64];
@@ -121,7 +120,7 @@ fn tiles_of(viewed: &Viewed, slabs: &Slabs, segment: Segment, tiles: [usize; 2])
     if viewed.scale(ends[0].z.max(ends[1].z) + slabs.width).is_none() || nearest > far {
         return None;
     }
-    let all = Some([[0; 2], tiles.map(|n| n - 1)]);
+    let all = Some([[0; 2], tiles.map(|n| (n - 1) as u16)]);
     let Some(scale) = viewed.scale(nearest) else { return all };
     // One pixel for neighbours of gradients, one for rounding.
     let half = viewed.footprint(scale).half.map(|h| h + 2.0);
@@ -136,7 +135,7 @@ fn tiles_of(viewed: &Viewed, slabs: &Slabs, segment: Segment, tiles: [usize; 2])
     }
     let inside = |a: usize| high[a] >= 0.0 && low[a] < (tiles[a] * TILE) as f32;
     (inside(0) && inside(1)).then(|| {
-        let tile = |v: f32, a: usize| ((v.max(0.0) / TILE as f32) as usize).min(tiles[a] - 1);
+        let tile = |v: f32, a: usize| ((v.max(0.0) / TILE as f32) as usize).min(tiles[a] - 1) as u16;
         [[tile(low[0], 0), tile(low[1], 1)], [tile(high[0], 0), tile(high[1], 1)]]
     })
 }

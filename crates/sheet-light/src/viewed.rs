@@ -10,10 +10,11 @@
 //! In perspective the kernel is sheared along the ray through its voxel, so that one footprint serves all slabs.
 
 use crate::aligned::{Slant, plane_step};
+use crate::near::Near;
 use crate::params::Aligned;
 use crate::sections::PHASES;
 use crate::slabs::Slabs;
-use crate::{Params, Volume};
+use crate::{KernelShape, Params, Volume};
 use splat_core::glam::{DMat3, DVec3, Vec3};
 use splat_core::{Camera, Packing};
 
@@ -25,6 +26,9 @@ const UPRIGHT: f64 = 1e-9;
 
 /// Share of its reach that a voxel must lie before the eye: nearer ones have footprints without bounds.
 const NEAREST: f64 = 1.0 / 64.0;
+
+/// Directions across the view in which kernels are measured.
+const AROUND: u32 = 8;
 
 /// A footprint in pixels: s = conic·(dx², 2·dx·dy, dy²), 1 at the rim.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -256,19 +260,62 @@ impl Viewed {
         let pixel = neighbour / scale;
         // A sheet holds means over its slab, whose middle may lie beyond a volume's face; values there are in part those of the next sheet.
         let along = self.reach + (1.5 + neighbour) * slabs.width + self.rounding;
-        let [width, height] = camera.size.map(f64::from);
-        let corners = [[0.0, 0.0], [width, 0.0], [0.0, height], [width, height]];
-        let inverse = self.axes.inverse();
+        let (inverse, rays) = (self.axes.inverse(), corner_rays(camera));
         [0, 1, 2].map(|a| {
             let row = inverse.row(a);
             // Rows of pixels run down, view space up.
             let across = libm::sqrt((row.x * row.x * xx - 2.0 * row.x * row.y * xy + row.y * row.y * yy).max(0.0));
-            let slant = |[x, y]: [f64; 2]| row.dot(camera.view_ray(x, y).1).abs();
-            let slanted = corners.into_iter().map(slant).fold(0.0, f64::max);
+            let slanted = most_along(row, &rays);
             let steps = across + (row.x.abs() + row.y.abs()) * pixel + slanted * along;
             // From any place of a cell; half a step more between planes that are shifted and such that are not.
             let shift = if self.shift.is_some() && a < 2 { 0.5 } else { 0.0 };
             (steps + 0.5 + shift).min(1e6) as usize
         })
     }
+
+    /// Voxels that have a share in anything that a voxel shapes: both have one in a place where a pixel's ray crosses a slab, or in one of those before
+    /// and behind it, which tell how values go on at faces and which gradients are taken from; with `gradient` one of the two in the neighbouring
+    /// pixels, too. Where values near the eye are told from two sheets, both have a share in these.
+    pub(crate) fn near(
+        &self,
+        camera: &Camera,
+        slabs: &Slabs,
+        kernel: &KernelShape,
+        [gradient, is_near]: [bool; 2],
+    ) -> Near {
+        /// Half a slab and the next one, for either of the two; depths are rounded to phases.
+        const SLABS: f64 = 3.0 + 4.0 / PHASES as f64;
+        let far = slabs.width * f64::from(slabs.count);
+        let scale = self.scale(far).unwrap_or(self.focal);
+        let [xx, xy, yy] = self.extent_px(scale).map(|m| m / (scale * scale));
+        let pixel = if gradient { 1.0 / scale } else { 0.0 };
+        let along = 2.0 * (self.reach + self.rounding) + (SLABS + if is_near { 2.0 } else { 0.0 }) * slabs.width;
+        // Kernels, and the corners of a cell, between which shadows are interpolated.
+        let twice = 1.0 + (libm::sqrt(3.0) / kernel.extent).max(1.0);
+        let rays = corner_rays(camera);
+        let reach = |n: DVec3| {
+            // Rows of pixels run down, view space up.
+            let across = libm::sqrt((n.x * n.x * xx - 2.0 * n.x * n.y * xy + n.y * n.y * yy).max(0.0));
+            let slanted = most_along(n, &rays);
+            let shifted = self.shift.map_or(0.0, |shift| n.dot(shift).abs());
+            twice * across + n.x.abs().max(n.y.abs()) * pixel + slanted * along + shifted
+        };
+        let around = |a: u32| {
+            let (sin, cos) = libm::sincos(f64::from(a) * (std::f64::consts::PI / f64::from(AROUND)));
+            DVec3::new(cos, sin, 0.0)
+        };
+        let directions: Vec<_> = (0..AROUND).map(around).chain([DVec3::Z]).collect();
+        Near::within(&self.axes, &directions, reach)
+    }
+}
+
+/// Directions of the rays through the corners of the picture, a unit of view depth long.
+fn corner_rays(camera: &Camera) -> [DVec3; 4] {
+    let [width, height] = camera.size.map(f64::from);
+    [[0.0, 0.0], [width, 0.0], [0.0, height], [width, height]].map(|[x, y]| camera.view_ray(x, y).1)
+}
+
+/// How far any of them leads along a direction.
+fn most_along(direction: DVec3, rays: &[DVec3]) -> f64 {
+    rays.iter().map(|ray| direction.dot(*ray).abs()).fold(0.0, f64::max)
 }

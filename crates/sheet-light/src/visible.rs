@@ -1,11 +1,11 @@
 //! Which voxels are splatted: those that the transfer function may show, and their neighbours that shape them.
 //!
 //! What a sheet holds is a mean of the voxels whose kernels reach there. Where all of these lie within one interval of values
-//! that has no extinction, so does the mean, and nothing is seen. So a point is hidden exactly where its neighbourhood is
-//! inside one such interval, and a voxel is needed where a point of its neighbourhood is not hidden. Both are erosions of
-//! sets of voxels by a box, done on 64 voxels at once.
+//! that has no extinction, so does the mean, and nothing is seen. So a voxel is not needed where all that have a share in any place
+//! that it shapes are inside one such interval: an erosion of a set of voxels by a neighbourhood ([`Near`]), done on 64 voxels at once.
 
 use crate::lattice::Lattice;
+use crate::near::Near;
 use rayon::prelude::*;
 use splat_core::TransferFunction;
 
@@ -22,29 +22,26 @@ pub(crate) struct Voxels {
 }
 
 impl Voxels {
-    /// The voxels of `lattice` whose kernels may matter, each reaching `reach` steps along the axes.
-    pub(crate) fn needed(lattice: &Lattice<'_>, transfer: &TransferFunction, reach: [usize; 3]) -> Self {
-        let mut hidden: Option<Self> = None;
+    /// The voxels of `lattice` whose kernels may matter, `near` being the voxels that have a share in anything that one of them shapes.
+    pub(crate) fn needed(lattice: &Lattice<'_>, transfer: &TransferFunction, near: &Near) -> Self {
+        let (dims, words) = (lattice.dims, lattice.dims[0].div_ceil(64));
+        let mut needed = Self { dims, words, bits: vec![!0; words * dims[1] * dims[2]] };
         for interval in without_extinction(transfer).into_iter().take(MOST_INTERVALS) {
             let mut inside = Self::within(lattice, interval);
-            inside.erode(reach);
-            match &mut hidden {
-                None => hidden = Some(inside),
-                Some(hidden) => hidden.bits.iter_mut().zip(&inside.bits).for_each(|(h, i)| *h |= i),
-            }
+            inside.erode(near);
+            needed.bits.iter_mut().zip(&inside.bits).for_each(|(needed, hidden)| *needed &= !hidden);
         }
-        let Some(mut hidden) = hidden else {
-            let (dims, words) = (lattice.dims, lattice.dims[0].div_ceil(64));
-            return Self { dims, words, bits: vec![!0; words * dims[1] * dims[2]] };
-        };
-        hidden.erode(reach);
-        hidden.bits.iter_mut().for_each(|word| *word = !*word);
-        hidden
+        needed
     }
 
-    /// Bytes that finding them takes.
-    pub(crate) fn bytes(dims: [usize; 3]) -> u64 {
-        4 * 8 * dims[0].div_ceil(64) as u64 * dims[1] as u64 * dims[2] as u64
+    /// Bytes that finding them takes: three sets, and two with a word before and behind each row.
+    pub(crate) fn bytes([nx, ny, nz]: [usize; 3]) -> u64 {
+        8 * (5 * nx.div_ceil(64) as u64 + 4) * ny as u64 * nz as u64
+    }
+
+    /// Bytes that they take.
+    pub(crate) fn held(&self) -> u64 {
+        8 * self.bits.len() as u64
     }
 
     /// Voxels 8·`eighth` to 8·`eighth` + 7 of a row, a bit each.
@@ -105,16 +102,67 @@ impl Voxels {
         rows.for_each_init(Vec::new, |values: &mut Vec<f32>, (row, bits)| {
             lattice.row(row % dims[1], row / dims[1], values);
             for (word, values) in bits.iter_mut().zip(values.chunks(64)) {
-                *word = (values.iter().rev()).fold(0, |w, v| w << 1 | u64::from((*v >= low) & (*v <= high)));
+                let mut is = [1u8; 64];
                 // What lies outside hides nothing.
-                *word |= (!0u64).checked_shl(values.len() as u32).unwrap_or(0);
+                is.iter_mut().zip(values).for_each(|(is, v)| *is = u8::from((*v >= low) & (*v <= high)));
+                // The lowest bits of eight bytes, beside each other.
+                let bits = |eight: &[u8; 8]| u64::from_le_bytes(*eight).wrapping_mul(0x0102_0408_1020_4080) >> 56;
+                *word = is.as_chunks().0.iter().rev().fold(0, |word, eight| word << 8 | bits(eight));
             }
         });
         Self { dims, words, bits }
     }
 
     /// Leaves those whose whole neighbourhood, as far as the lattice goes, is in the set.
-    fn erode(&mut self, reach: [usize; 3]) {
+    fn erode(&mut self, near: &Near) {
+        if near.rows.is_empty() { self.erode_block(near.block) } else { self.erode_rows(near) }
+    }
+
+    /// Run by run, those of one length after the other: what begins a run that is longer by one begins this run, and one voxel more is in the set.
+    fn erode_rows(&mut self, near: &Near) {
+        // What a block leaves needs no closer look.
+        let mut sure = self.clone();
+        sure.erode_block(near.block);
+        let [_, ny, nz] = self.dims.map(|n| n as isize);
+        let (words, pad) = (self.words, near.block[0] / 32 + 1);
+        // Ones before and behind each row.
+        let stride = words + 2 * pad;
+        let mut all = vec![!0u64; stride * self.dims[1] * self.dims[2]];
+        for (to, from) in all.chunks_exact_mut(stride).zip(self.bits.chunks_exact(words)) {
+            to[pad..pad + words].copy_from_slice(from);
+        }
+        let mut begins = all.clone();
+        self.bits.fill(!0);
+        let longest = near.rows.iter().map(|run| run.length).max().unwrap_or(0);
+        for length in 1..=longest {
+            if length > 1 {
+                let rows = begins.par_chunks_exact_mut(stride).zip(all.par_chunks_exact(stride)).with_min_len(256);
+                rows.for_each(|(begins, all)| {
+                    (0..stride - pad).for_each(|w| begins[w] &= behind(&all[w..], length as isize - 1));
+                });
+            }
+            let begins = &begins;
+            let runs: Vec<_> = near.rows.iter().filter(|run| run.length == length).collect();
+            let rows = self.bits.par_chunks_exact_mut(words).zip(sure.bits.par_chunks_exact(words)).enumerate();
+            rows.with_min_len(256).for_each(|(row, (out, sure))| {
+                let (j, k) = (row as isize % ny, row as isize / ny);
+                for w in (0..words).filter(|w| sure[*w] != !0) {
+                    for run in &runs {
+                        let (j, k) = (j + run.j, k + run.k);
+                        if out[w] == 0 {
+                            break;
+                        }
+                        if (0..ny).contains(&j) && (0..nz).contains(&k) {
+                            let row = &begins[(k * ny + j) as usize * stride..][..stride];
+                            out[w] &= behind(&row[w..], 64 * pad as isize + run.first);
+                        }
+                    }
+                }
+            });
+        }
+    }
+
+    fn erode_block(&mut self, reach: [usize; 3]) {
         let words = self.words;
         self.bits.par_chunks_mut(words).with_min_len(256).for_each_init(Vec::new, |old: &mut Vec<u64>, row| {
             old.clear();
@@ -140,6 +188,13 @@ impl Voxels {
         let old = self.bits.clone();
         along(&mut self.bits, &old, plane, nz, reach[2]);
     }
+}
+
+/// The word that begins `step` bits behind the beginning of a row.
+#[inline(always)]
+fn behind(row: &[u64], step: isize) -> u64 {
+    let (word, bit) = (step as usize / 64, step as usize % 64);
+    row[word] >> bit | row[word + 1] << 1 << (63 - bit)
 }
 
 /// Word `w` of a row moved by `step` bits to higher places, ones from outside.
@@ -189,7 +244,7 @@ mod tests {
     #[test]
     fn needed_voxels_are_those_of_the_definition() {
         let tf = transfer(&[(0.25, 0.0), (0.3, 1.0), (0.35, 0.0), (0.995, 0.0), (1.0, 1.0)]);
-        let (dims, reach) = ([70, 9, 11], [2usize, 1, 3]);
+        let (dims, steps) = ([70, 13, 15], DMat3::from_cols(DVec3::X, DVec3::new(0.4, 0.9, 0.0), DVec3::Z));
         let [nx, ny, nz] = dims;
         // Few that are shown, in much of two intervals that are not.
         let value = |i: usize| match rng::unit_f32(7, 0, i as u64, 0) {
@@ -199,24 +254,36 @@ mod tests {
         };
         let values = (0..nx * ny * nz).map(value).collect();
         let grid = Grid { origin: DVec3::ZERO, axes: DMat3::IDENTITY, dims, values };
-        let around = |c: [usize; 3]| {
-            let range = move |a: usize| c[a].saturating_sub(reach[a])..=(c[a] + reach[a]).min(dims[a] - 1);
-            range(2).flat_map(move |k| range(1).flat_map(move |j| range(0).map(move |i| [i, j, k])))
-        };
         let value = |[i, j, k]: [usize; 3]| grid.values[(k * ny + j) * nx + i];
-        let hidden = |c: [usize; 3]| {
-            let within = |[low, high]: [f32; 2]| around(c).all(|v| (low..=high).contains(&value(v)));
-            without_extinction(&tf).into_iter().any(within)
-        };
-        let found =
-            Voxels::needed(&Lattice { grid: &grid, packing: Packing::Cartesian, rim: [0; 3], dims }, &tf, reach);
-        let mut count = 0;
-        for (k, j, i) in (0..nz).flat_map(|k| (0..ny).flat_map(move |j| (0..nx).map(move |i| (k, j, i)))) {
-            let expected = around([i, j, k]).any(|c| !hidden(c));
-            assert_eq!(found.eight(i / 8, j, k) >> (i % 8) & 1 == 1, expected, "{i} {j} {k}");
-            count += u64::from(expected);
+        // A ball along a way.
+        let directions = [DVec3::X, DVec3::Y, DVec3::Z, DVec3::new(0.6, 0.0, -0.8), DVec3::new(0.6, -0.64, 0.48)];
+        let reach = |n: DVec3| 1.3 * n.length() + 1.5 * n.dot(DVec3::new(0.5, -0.3, 0.8)).abs();
+        let slanted = Near::within(&steps, &directions, reach);
+        let is_slanted = |d: DVec3| directions.iter().all(|n| n.dot(steps * d).abs() <= reach(*n));
+        let is_block = |d: DVec3| d.x.abs() <= 2.0 && d.y.abs() <= 1.0 && d.z.abs() <= 3.0;
+        type IsNear<'a> = &'a dyn Fn(DVec3) -> bool;
+        let cases: [(Near, IsNear<'_>); 2] = [(Near::block([2, 1, 3]), &is_block), (slanted, &is_slanted)];
+        let lattice = Lattice { grid: &grid, packing: Packing::Cartesian, rim: [0; 3], dims };
+        for (near, is_near) in cases {
+            let all = |first: [usize; 3], end: [usize; 3]| {
+                let range = move |a: usize| first[a]..end[a].min(dims[a]);
+                range(2).flat_map(move |k| range(1).flat_map(move |j| range(0).map(move |i| [i, j, k])))
+            };
+            let is_hidden = |c: [usize; 3]| {
+                let apart = |v: [usize; 3]| DVec3::from_array([0, 1, 2].map(|a| v[a] as f64 - c[a] as f64));
+                let around = || all(c.map(|n| n.saturating_sub(4)), c.map(|n| n + 5)).filter(|v| is_near(apart(*v)));
+                let within = |[low, high]: [f32; 2]| around().all(|v| (low..=high).contains(&value(v)));
+                without_extinction(&tf).into_iter().any(within)
+            };
+            let found = Voxels::needed(&lattice, &tf, &near);
+            let mut count = 0;
+            for c in all([0; 3], dims) {
+                let [i, j, k] = c;
+                assert_eq!(found.has(i, j, k), !is_hidden(c), "{c:?}");
+                count += u64::from(!is_hidden(c));
+            }
+            assert_eq!(found.count(), count);
+            assert!(count > 0 && count < (nx * ny * nz) as u64, "{count}");
         }
-        assert_eq!(found.count(), count);
-        assert!(count > 0 && count < (nx * ny * nz) as u64, "{count}");
     }
 }

@@ -4,6 +4,7 @@ use super::frame::Frame;
 use crate::classify::Classifier;
 use crate::fold::extremes;
 use crate::lattice::Lattice;
+use crate::near::Near;
 use crate::neighbours::Receivers;
 use crate::sections::{PHASES, SectionTable};
 use crate::visible::Voxels;
@@ -100,7 +101,7 @@ impl<'a> Placed<'a> {
     /// The lattice with the rim that kernels reach, and the voxels of it that may matter.
     pub(crate) fn voxels(&self, reach: [usize; 3]) -> (Lattice<'a>, Voxels) {
         let lattice = Lattice::new(self.volume.grid, self.volume.packing, reach);
-        let voxels = Voxels::needed(&lattice, &self.volume.seen(), reach);
+        let voxels = Voxels::needed(&lattice, &self.volume.seen(), &Near::block(reach.map(|n| 2 * n)));
         (lattice, voxels)
     }
 
