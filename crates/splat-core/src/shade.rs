@@ -136,7 +136,10 @@ impl<F: Fn(usize) -> bool> pulp::WithSimd for ShadeChunk<'_, F> {
             let together = scattering.map_or(0, |by| by.together(i, end));
             let out = &mut values[(i - first) * channels..][..together.max(1) * channels];
             match scattering {
-                Some(by) if together > 0 => by.shade(simd, i, is_one, layout, &mut batch, out),
+                Some(by) if together > 0 => {
+                    by.light(simd, i..i + together, &mut batch);
+                    by.shade(i, is_one, layout, &mut batch, out);
+                }
                 _ if is_one(i) => {
                     let (radiance, normal) = shade_splat(input, i);
                     radiance.write(normal, layout, out);

@@ -72,7 +72,7 @@ fn truth(scene: &Scene, loaded: &Loaded, options: &RenderOptions, progress: &Pro
     };
     let ids = frame.translucent(Technique::Surfels);
     let (footprints, materials) = (&loaded.footprints, &loaded.materials);
-    let input = DiscInput { cloud, ids: &ids, camera: &frame.camera, footprints, materials };
+    let input = DiscInput { cloud, ids, camera: &frame.camera, footprints, materials };
     let mut accumulator = frame.accumulator();
     let sizes = [accumulator.optical_depth.len(), accumulator.channels.len()];
     let opaque = &frame.opaque(&mut cost)?.depth;

@@ -51,7 +51,7 @@ impl Fold for Exact<'_> {
         let (cloud, values) = self.own.get_or_insert_with(|| {
             let ids = frame.translucent(Technique::Reference);
             let of = ids.iter().flat_map(|i| &values[*i as usize * channels..][..*channels]);
-            (frame.drawn().gather(&ids), of.copied().collect())
+            (frame.drawn().gather(ids), of.copied().collect())
         });
         if cloud.is_empty() {
             return Ok(());

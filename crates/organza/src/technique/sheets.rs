@@ -209,7 +209,7 @@ fn splats<'a>(frame: &'a Frame<'a>, cost: &mut CostRecord) -> Result<Option<Spla
         margin_px: frame.filter_reach_px(),
         ..hbsort::Params::default()
     };
-    let order = hbsort::slice_cloud(cloud, Some(&translucent), camera, &params, &mut hbsort::Scratch::default());
+    let order = hbsort::slice_cloud(cloud, Some(translucent), camera, &params, &mut hbsort::Scratch::default());
     let order = order.map_err(|e| Error::Internal(e.to_string()))?;
     let place = camera.view_from_offset(cloud.origin);
     Ok(Some(Splats {

@@ -84,7 +84,7 @@ impl<'a> Fold for Surfels<'a> {
         if self.discs.is_none() {
             if let Some(groups) = frame.settings.surfels.layers.groups() {
                 let ids = frame.translucent(Technique::Surfels);
-                self.members = Some(grouped::members(frame, groups, &ids, false, cost)?);
+                self.members = Some(grouped::members(frame, groups, ids, false, cost)?);
             }
             self.discs = Some(project(frame, &params, self.members.as_ref(), cost)?);
         }

@@ -5,7 +5,7 @@ use super::point::Incoming;
 use super::{ChannelLayout, LitBy, Radiance, ShadeInput, facing, received};
 use crate::optics::TRACE;
 use crate::raster::lanes::{Lanes, MAX_LANES};
-use crate::{LightShape, Material, Shading};
+use crate::{LightShape, Shading};
 use glam::{DVec3, Vec3};
 use pulp::Simd;
 use std::f32::consts::PI;
@@ -84,12 +84,11 @@ impl<'a> Scattering<'a> {
         materials.iter().take_while(|other| **other == id).count()
     }
 
-    /// Values of the splats from `first` on that `is_one` says, 0 for the others: as many as `out` has room for, which
-    /// [`Scattering::together`] tells.
+    /// Values of the splats from `first` on that `is_one` says, 0 for the others: as many as `out` has room for, of which `batch` has the
+    /// [`Scattering::light`].
     #[inline(always)]
-    pub(super) fn shade<S: Simd>(
+    pub(super) fn shade(
         &self,
-        simd: S,
         first: usize,
         is_one: &impl Fn(usize) -> bool,
         layout: &ChannelLayout,
@@ -100,7 +99,6 @@ impl<'a> Scattering<'a> {
         let material = &input.materials[input.cloud.material[first] as usize];
         let channels = layout.count();
         let splats = first..first + out.len() / channels;
-        self.light(simd, splats.clone(), material, batch);
         // Light by light: what is remembered of one is not waited for before the next is asked for.
         for (lit, of) in input.lights.iter().zip(&mut batch.lights) {
             for (k, i) in splats.clone().enumerate().filter(|(_, i)| is_one(*i)) {
@@ -125,9 +123,11 @@ impl<'a> Scattering<'a> {
         }
     }
 
+    /// What some splats need of their light: as many as [`Scattering::together`] tells.
     #[inline(always)]
-    fn light<S: Simd>(&self, simd: S, splats: Range<usize>, material: &Material, batch: &mut Batch) {
+    pub(super) fn light<S: Simd>(&self, simd: S, splats: Range<usize>, batch: &mut Batch) {
         let cloud = self.input.cloud;
+        let material = &self.input.materials[cloud.material[splats.start] as usize];
         let mut columns = [[0.0; MAX_LANES]; 4];
         for (k, i) in splats.enumerate() {
             let [x, y, z] = cloud.position[i].to_array();
