@@ -131,6 +131,38 @@ fn the_back_shows_the_mirror_image() {
     assert!(mirrored < 1e-6, "{mirrored:e}");
 }
 
+/// Of a slanted disc at the side of the picture each ray shows what lies where it meets the disc.
+#[test]
+fn a_slanted_disc_off_the_axis_shows_its_image_where_rays_meet_it() {
+    let view = Projection::Perspective { fov_y: 1.4 };
+    let camera = &Camera::look_at(DVec3::ZERO, -DVec3::Z, DVec3::Y, view, [SIZE, SIZE]).unwrap();
+    let (position, normal) = (Vec3::new(-1.8, 1.6, -3.0), Vec3::new(0.6, 0.0, 0.8));
+    let (tangent, across) = (Vec3::new(0.64, 0.6, -0.48) * 0.5, normal.cross(Vec3::new(0.64, 0.6, -0.48)) * 0.5);
+    let mut cloud = Cloud::new(DVec3::ZERO);
+    cloud.push(&Splat { position, normal, tangent, ..disc(0.5, tangent) });
+    // The right half.
+    let half = image([64, 64], |x, _| f64::from(u8::from(x > 0.5)));
+    let footprints = &FootprintStack::default().with_image(0, half.into());
+    let (params, materials, cloud) = (&Params::default(), &[Material::default()], &cloud);
+    let projected = &project(&ProjectInput { cloud, camera, footprints, materials, params, detail: Detail::ALL });
+    let mut seen = Accumulator::new([SIZE; 2], 1, 3, false, false);
+    let (opaque, direction) = (&OpaqueImage::default(), Direction::FrontToBack);
+    let input = FoldInput { projected, order: &[0], values: &[1.0; 3], materials, opaque, direction, params };
+    fold(&input, &mut seen, None).unwrap();
+    let mut shown = [0, 0];
+    for (k, depth) in seen.optical_depth[0].iter().enumerate() {
+        let at = [k as u32 % SIZE, k as u32 / SIZE].map(|v| f64::from(v) + 0.5);
+        let ray = camera.direction(at[0], at[1]).0.as_vec3();
+        let place = ray * (normal.dot(position) / normal.dot(ray)) - position;
+        let [x, y] = [tangent, across].map(|axis| place.dot(axis) / axis.length_squared());
+        if x.abs() > 0.3 && x.abs() < 0.7 && y.abs() < 0.7 {
+            shown[usize::from(x > 0.0)] += 1;
+            assert_eq!(*depth > 0.0, x > 0.0, "{x} {y}: {depth}");
+        }
+    }
+    assert!(shown.into_iter().all(|n| n > 20), "{shown:?}");
+}
+
 /// The table of a formula gives its picture; the error falls with the square of the texels' width.
 #[test]
 fn a_tabulated_formula_comes_to_the_formula_with_second_order() {

@@ -3,6 +3,7 @@
 
 mod accumulation;
 mod closed_forms;
+mod drawn;
 mod environment;
 mod extended_lights;
 mod image_footprints;
