@@ -147,7 +147,8 @@ impl Recorded {
         let id = |place: usize| ids.map_or(place, |ids| ids[place] as usize);
         let places = || (0..needed as usize).map(id);
         let positions: Vec<f32> = places().flat_map(|i| cloud.position[i].to_array()).collect();
-        let radii: Vec<f32> = places().flat_map(|i| [cloud.radius[i], bounding_radius(cloud, i)]).collect();
+        let radii: Vec<f32> =
+            places().flat_map(|i| [cloud.radius[i], bounding_radius(cloud.radius[i], cloud.tangent_of(i))]).collect();
         let view = view_bytes(cloud.origin, needed as u32, camera, params);
         let bytes = |floats: &[f32]| bytemuck::cast_slice(floats).to_vec();
         Ok(Uploads { view, positions: bytes(&positions), radii: bytes(&radii) })

@@ -87,10 +87,10 @@ impl Extremes {
     }
 }
 
-/// Cutoff radius of the sphere around splat `i`.
+/// Cutoff radius of the sphere around a splat, the longer semi-axis of a disc.
 #[inline(always)]
-pub(crate) fn bounding_radius(cloud: &Cloud, i: usize) -> f32 {
-    cloud.radius[i].max(cloud.tangent_of(i).length())
+pub(crate) fn bounding_radius(radius: f32, tangent: Vec3) -> f32 {
+    radius.max(tangent.length())
 }
 
 /// The view of one cloud.
@@ -129,8 +129,8 @@ impl<'a> Projector<'a> {
             None if self.cloud.tangent.is_empty() => {
                 self.project_columns(&self.cloud.position[range.clone()], &self.cloud.radius[range], out)
             }
-            None => self.project_each(range, out),
-            Some(ids) => self.project_each(ids[range].iter().map(|&i| i as usize), out),
+            None => self.project_each(|k| begin + k, out),
+            Some(ids) => self.project_each(|k| ids[begin + k] as usize, out),
         }
     }
 
@@ -152,13 +152,28 @@ impl<'a> Projector<'a> {
         extremes
     }
 
-    /// The general form: a subset, or elliptical discs.
+    /// The general form: a subset, or elliptical discs. What a block needs is gathered first; the rest is done in vectors.
     #[inline(always)]
-    fn project_each(&self, splats: impl Iterator<Item = usize>, out: &mut [u32]) -> Extremes {
+    fn project_each(&self, id: impl Fn(usize) -> usize, out: &mut [u32]) -> Extremes {
         let mut extremes = Extremes::NONE;
-        for (k, (out, i)) in out.iter_mut().zip(splats).enumerate() {
-            let (p, r) = (self.cloud.position[i], self.cloud.radius[i]);
-            *out = self.one(k % LANES, p, r, bounding_radius(self.cloud, i), &mut extremes);
+        for (block, out) in out.chunks_mut(LANES).enumerate() {
+            // Lanes without a splat are culled, and change nothing.
+            let (mut places, mut tangents) = ([[f32::NAN; LANES]; 3], [[0.0f32; LANES]; 3]);
+            let mut radius = [f32::INFINITY; LANES];
+            for l in 0..out.len() {
+                let i = id(block * LANES + l);
+                let (place, tangent) = (self.cloud.position[i], self.cloud.tangent_of(i));
+                (places[0][l], places[1][l], places[2][l]) = (place.x, place.y, place.z);
+                (tangents[0][l], tangents[1][l], tangents[2][l]) = (tangent.x, tangent.y, tangent.z);
+                radius[l] = self.cloud.radius[i];
+            }
+            let mut depth_bits = [0; LANES];
+            for l in 0..LANES {
+                let place = Vec3::new(places[0][l], places[1][l], places[2][l]);
+                let tangent = Vec3::new(tangents[0][l], tangents[1][l], tangents[2][l]);
+                depth_bits[l] = self.one(l, place, radius[l], bounding_radius(radius[l], tangent), &mut extremes);
+            }
+            out.copy_from_slice(&depth_bits[..out.len()]);
         }
         extremes
     }
