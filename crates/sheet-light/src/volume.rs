@@ -4,7 +4,7 @@ use crate::fold::extremes;
 use crate::visible::without_extinction;
 use crate::{Error, Splats};
 use splat_core::glam::{DMat3, DVec3};
-use splat_core::optics::{FAINTEST, TRACE};
+use splat_core::optics::{TRACE, faintest};
 use splat_core::shade::LitBy;
 use splat_core::{Camera, Clip, Grid, Material, Packing, Similarity, TransferFunction};
 
@@ -66,11 +66,12 @@ impl Volume<'_> {
     }
 
     /// The transfer function without what can not be seen: extinctions of which no ray through the whole volume gathers more than
-    /// [`FAINTEST`], and colours that are a [`TRACE`].
+    /// [`splat_core::optics::FAINTEST`], and colours that are a [`TRACE`].
     pub(crate) fn seen(&self) -> TransferFunction {
         let (axes, [nx, ny, nz]) = (self.axes(), self.grid.dims.map(|n| n as f64));
         let longest = axes.x_axis.length() * nx + axes.y_axis.length() * ny + axes.z_axis.length() * nz;
-        self.transfer.without_traces((f64::from(FAINTEST) / (self.extinction_scale * longest)) as f32, TRACE)
+        let faintest = f64::from(faintest(std::slice::from_ref(self.material)));
+        self.transfer.without_traces((faintest / (self.extinction_scale * longest)) as f32, TRACE)
     }
 
     /// Extinction about a world position, 1/world unit; 0 outside.

@@ -83,6 +83,13 @@ impl Default for Material {
 }
 
 impl Material {
+    /// Extinction of the channel that is absorbed most, relative to the splat's cross-section.
+    #[inline(always)]
+    pub fn greatest_extinction(&self) -> f32 {
+        let [r, g, b] = self.extinction_rgb;
+        r.max(g).max(b)
+    }
+
     /// Whether its surfaces bend light, or bound matter that absorbs.
     pub fn bounds_matter(&self) -> bool {
         self.index != [1.0; 3] || self.absorption_inside != [0.0; 3]

@@ -9,6 +9,8 @@
 //!
 //! Source: Gunjee 2007, Eqs. 4-9 (Beer's law); the forms here do not cancel for small τ or α.
 
+use crate::Material;
+
 /// Light that is no more than this, 2⁻⁹⁰ (8·10⁻²⁸), is a trace: an irradiance or a radiance that changes no picture. Its products
 /// with opacities and colours would be numbers below the normal ones of f32, whose arithmetic takes many times as long.
 pub const TRACE: f32 = f32::from_bits((127 - 90) << 23);
@@ -16,6 +18,12 @@ pub const TRACE: f32 = f32::from_bits((127 - 90) << 23);
 /// Matter of an optical depth that is no more than this, 2⁻⁴⁰ (9·10⁻¹³), is not drawn: even a million times as much is an opacity of
 /// less than 10⁻⁶. The square of what a profile leaves of it, of which opacities are made, would be below the normal numbers of f32.
 pub const FAINTEST: f32 = f32::from_bits((127 - 40) << 23);
+
+/// [`FAINTEST`] for optical depths that are yet to be multiplied with [`Material::extinction_rgb`]: less where one of these materials
+/// has a factor above 1.
+pub fn faintest(materials: &[Material]) -> f32 {
+    FAINTEST / materials.iter().map(Material::greatest_extinction).fold(1.0, f32::max)
+}
 
 /// How the opacity of a translucent surface depends on the angle at which it is crossed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

@@ -60,6 +60,18 @@ fn x6_traces_of_matter_are_not_drawn() {
 }
 
 #[test]
+fn x6_matter_is_as_faint_as_its_material_makes_it() {
+    let (faint, camera) = (cloud(&[1e-3 * FAINTEST]), camera());
+    let visible = |factor: f32| {
+        let materials = &[Material { extinction_rgb: [0.0, factor, 0.0], ..Material::default() }];
+        let (footprints, params) = (&FootprintStack::default(), &Params::default());
+        let input = ProjectInput { cloud: &faint, camera: &camera, footprints, materials, params, detail: Detail::ALL };
+        project(&input).visible()
+    };
+    assert!(visible(1.0) == 0 && visible(1e6) > 30);
+}
+
+#[test]
 fn x5_numbers_below_the_normal_ones_give_pictures_of_numbers() {
     type Poison = fn(&mut Cloud, f32);
     let columns: [(&str, Poison); 8] = [

@@ -110,6 +110,8 @@ pub(crate) struct Caster {
 pub(crate) struct Casters<'a> {
     pub(crate) cloud: &'a Cloud,
     pub(crate) extinctions: Vec<Extinction>,
+    /// What has no more of its cross-section over its radius² casts no shadow.
+    faintest: f32,
     pub(crate) objects: &'a [Object],
     pub(crate) kernels: Vec<Kernel>,
     pub(crate) params: &'a Params,
@@ -131,6 +133,7 @@ impl<'a> Casters<'a> {
             may_spare: objects.iter().any(|o| !o.casts_shadow),
             may_colour: extinctions.iter().any(is_coloured) || is_coloured(&Extinction::default()),
             extinctions,
+            faintest: optics::faintest(materials),
         }
     }
 }
@@ -142,7 +145,7 @@ impl Casters<'_> {
     pub(crate) fn casts(&self, i: usize) -> bool {
         let casts = |object: u32| self.objects.get(object as usize).is_none_or(|o| o.casts_shadow);
         let (radius, cross_section) = (self.cloud.radius[i], self.cloud.cross_section[i]);
-        cross_section > optics::FAINTEST * radius * radius && (!self.may_spare || casts(self.cloud.object[i]))
+        cross_section > self.faintest * radius * radius && (!self.may_spare || casts(self.cloud.object[i]))
     }
 
     /// Whether splat `i` throws its shadow as a disc of its area.

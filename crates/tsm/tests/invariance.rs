@@ -3,7 +3,7 @@
 use crate::common::*;
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::optics::FAINTEST;
-use splat_core::{Cloud, Exceeded, Light, LightShape, Limits, SplatKind, Transmittance};
+use splat_core::{Cloud, Exceeded, Light, LightShape, Limits, Material, SplatKind, Transmittance};
 use tsm::{Deposits, Error, MappingChoice, Params, Resolution, Scene, ShadowMap};
 
 fn lights() -> [Light; 4] {
@@ -44,11 +44,14 @@ fn x6_matter_too_faint_to_be_seen_leaves_no_trace() {
         cloud.cross_section.iter_mut().zip(&cloud.radius).for_each(|(k, radius)| *k = of * radius * radius);
     }
     for light in lights() {
-        let entries = |cloud: &Cloud| {
-            let deposits = Deposits::new(&Scene::from(cloud), &light, &Params::default(), None).unwrap();
+        let entries = |scene: &Scene<'_>| {
+            let deposits = Deposits::new(scene, &light, &Params::default(), None).unwrap();
             deposits.entries().iter().sum::<u64>()
         };
-        assert!(entries(&faint) == 0 && entries(&thin) > 9000);
+        assert!(entries(&Scene::from(&faint)) == 0 && entries(&Scene::from(&thin)) > 9000);
+        // A material may make more of it.
+        let materials = &[Material { extinction_rgb: [0.0, 4.0, 0.0], ..Material::default() }];
+        assert!(entries(&Scene { materials, ..Scene::from(&faint) }) > 9000);
     }
 }
 

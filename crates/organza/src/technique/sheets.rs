@@ -172,7 +172,7 @@ fn volumes<'a>(matter: &Matter<'a>) -> impl Iterator<Item = Volume<'a>> + use<'a
     own.iter().filter_map(move |own| {
         let object = &scene.objects[own.object];
         let material = &scene.materials[own.material].material;
-        let factor = f64::from(material.extinction_rgb.into_iter().fold(0.0, f32::max));
+        let factor = f64::from(material.greatest_extinction());
         let Body::Cells { grid, transfer, normals, body_centred, .. } = &own.body else { return None };
         let (grid, packing) = match body_centred {
             Some(bcc) => (&bcc.planes, Packing::BodyCentred),

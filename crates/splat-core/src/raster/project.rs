@@ -21,7 +21,7 @@ use super::kernel::Kernel;
 use super::lanes::Lanes;
 use super::projected::{Coverage, Detail, Projected, ProjectedDepth, ProjectedSplat, SpecialDisc};
 use super::shapes::{Image, Shapes};
-use crate::optics::FAINTEST;
+use crate::optics::faintest;
 use crate::{Camera, Cloud, FootprintStack, Material, ViewTransform};
 use glam::Vec2;
 use pulp::Simd;
@@ -98,6 +98,7 @@ pub fn project_into(out: &mut Projected, input: &ProjectInput<'_>) {
         size: camera.size,
         filter_sigma_px: params.resampling_sigma_px,
         has_images: footprints.has_images(),
+        faintest: faintest(materials),
     };
     let mut depths: Vec<&mut [ProjectedDepth]> = out.depths.chunks_mut(CHUNK).collect();
     depths.resize_with(cloud.len().div_ceil(CHUNK), Default::default);
@@ -126,6 +127,8 @@ pub(super) struct Projector<'a> {
     pub(super) filter_sigma_px: f32,
     /// Whether some footprint is an image.
     pub(super) has_images: bool,
+    /// Splats whose peak is no more are not drawn.
+    faintest: f32,
 }
 
 /// One chunk's work, in the form that [`pulp`] compiles once per instruction set.
@@ -446,7 +449,7 @@ impl Projector<'_> {
                 ..ProjectedSplat::default()
             };
             splat.set_half_extent([image.half_extent[0][l], image.half_extent[1][l]]);
-            let shown = splat.peak > FAINTEST;
+            let shown = splat.peak > self.faintest;
             *coverage = if shown { Coverage::of(splat.bounds(self.size)) } else { Coverage::NONE };
         }
     }

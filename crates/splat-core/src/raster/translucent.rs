@@ -189,8 +189,7 @@ impl FoldTile<'_> {
                 }
                 for (k, &j) in batch.iter().enumerate() {
                     let splat = &records[k];
-                    let extinction = materials[splat.material as usize].extinction_rgb;
-                    let most = extinction[0].max(extinction[1]).max(extinction[2]);
+                    let material = &materials[splat.material as usize];
                     let mut source = Source {
                         splat,
                         special: projected.special_disc(splat, j),
@@ -205,10 +204,12 @@ impl FoldTile<'_> {
                     let splat = Splat {
                         source,
                         object: if names { projected.object(j as usize) } else { u32::MAX },
-                        extinction,
+                        extinction: material.extinction_rgb,
                         // A slab across the eye plane is met at many angles, the profile of an image is above 1, and the peak of a
                         // Gaussian is no optical depth.
-                        thin: splat.peak * most <= SMALL && !splat.is_special() && !splat.is_gaussian(),
+                        thin: splat.peak * material.greatest_extinction() <= SMALL
+                            && !splat.is_special()
+                            && !splat.is_gaussian(),
                         value: &values[k * channels..][..channels],
                     };
                     self.tile.splat::<S, FRONT, HALF, PLANES, CHANNELS>(simd, &splat, &mut conic);

@@ -39,7 +39,7 @@ impl Census {
             census.translucent += u64::from(!opaque);
             let coefficient = object.shadow_coefficient * cloud.shadow_coefficient_of(i);
             census.receivers += u64::from(material.shading != Shading::Unlit && coefficient > 0.0);
-            let largest = material.extinction_rgb.into_iter().fold(0.0, f32::max);
+            let largest = material.greatest_extinction();
             if object.casts_shadow && cloud.cross_section[i] > 0.0 && (opaque || largest > 0.0) {
                 census.casters += 1;
                 census.opaque_casters += u64::from(opaque);

@@ -157,7 +157,7 @@ fn of_splats<'a>(frame: &Frame<'a>) -> Vec<Source<'a>> {
         let kind = cloud.kind[first];
         let mut splats = cloud.gather(&ids);
         let material = materials[cloud.material[first] as usize];
-        let most = material.extinction_rgb.into_iter().fold(0.0, f32::max);
+        let most = material.greatest_extinction();
         splats.cross_section.iter_mut().for_each(|k| *k *= most);
         let radius = splats.radius.iter().map(|r| f64::from(*r)).sum::<f64>() / splats.len() as f64;
         let bounds = splats.bounds();
