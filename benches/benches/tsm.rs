@@ -3,10 +3,12 @@
 
 use convert::{CloudShape, SplatParams, VolumeParams, procedural_cloud, volume_to_points};
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
+use rayon::prelude::*;
 use rdst::RadixSort;
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::{
-    Cloud, Light, LightShape, Limits, Receiver, SplatKind, TransferFunction, TransferPoint, Transmittance, rng,
+    Cloud, Light, LightShape, Limits, Receiver, SplatKind, TOGETHER, TransferFunction, TransferPoint, Transmittance,
+    rng,
 };
 use std::hint::black_box;
 use tsm::{Params, Scene, ShadowMap};
@@ -89,6 +91,8 @@ fn benches(c: &mut Criterion) {
                 group.throughput(Throughput::Elements(ids.len() as u64));
                 let id = BenchmarkId::new(format!("look up {of}"), name);
                 group.bench_function(id, |b| b.iter(|| black_box(look_up(&map, &cloud, &ids))));
+                let id = BenchmarkId::new(format!("look up {of} together, all threads"), name);
+                group.bench_function(id, |b| b.iter(|| black_box(look_up_together(&map, &cloud, &ids))));
             }
         }
         group.throughput(Throughput::Elements(cloud.len() as u64));
@@ -99,16 +103,21 @@ fn benches(c: &mut Criterion) {
     }
 }
 
+fn receiver(cloud: &Cloud, i: usize) -> Receiver {
+    Receiver { position: cloud.position[i], normal: cloud.normal_of(i), radius: cloud.radius[i], kind: cloud.kind[i] }
+}
+
+/// One by one, by one thread.
 fn look_up(map: &ShadowMap, cloud: &Cloud, ids: &[usize]) -> f32 {
-    let at = |&i: &usize| {
-        map.transmittance(&Receiver {
-            position: cloud.position[i],
-            normal: cloud.normal_of(i),
-            radius: cloud.radius[i],
-            kind: cloud.kind[i],
-        })[0]
+    ids.iter().map(|i| map.transmittance(&receiver(cloud, *i))[0]).sum()
+}
+
+fn look_up_together(map: &ShadowMap, cloud: &Cloud, ids: &[usize]) -> f32 {
+    let of = |ids: &[usize]| -> f32 {
+        let light = map.at_splats(ids, &|i| receiver(cloud, i));
+        light[..ids.len()].iter().map(|[red, ..]| red).sum()
     };
-    ids.iter().map(at).sum()
+    ids.par_chunks(TOGETHER).with_min_len(256).map(of).sum()
 }
 
 /// A dragon of as many discs as the paper's has points, opaque and translucent, and a cloud, a medium.

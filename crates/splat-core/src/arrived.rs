@@ -1,7 +1,7 @@
 //! Light that arrived at splats, remembered: it does not depend on the viewer, so when he alone moves it need not be looked up
 //! again.
 
-use crate::{Receiver, Transmittance};
+use crate::{Receiver, TOGETHER, Transmittance};
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
 /// What arrived of one light at each splat of a cloud, as far as it was asked for.
@@ -50,6 +50,21 @@ impl Arrived {
         (splats as u64).saturating_mul(size_of::<[AtomicU64; 2]>() as u64)
     }
 
+    #[inline]
+    fn known(&self, splat: usize) -> Option<[f32; 3]> {
+        let of = self.of.get(splat)?;
+        let known = [of[0].load(Relaxed), of[1].load(Relaxed)];
+        known.iter().all(|bits| *bits != UNKNOWN).then(|| unpacked(known))
+    }
+
+    /// Whoever asks at the same time finds the same numbers.
+    #[inline]
+    fn remember(&self, splat: usize, share: [f32; 3]) {
+        if let Some(of) = self.of.get(splat) {
+            of.iter().zip(packed(share)).for_each(|(of, bits)| of.store(bits, Relaxed));
+        }
+    }
+
     /// A shadow that is asked once for each splat. It must be that of the same light among the same casters each time.
     pub fn through<'a>(&'a self, shadow: &'a dyn Transmittance) -> Remembered<'a> {
         Remembered { arrived: self, shadow }
@@ -69,15 +84,32 @@ impl Transmittance for Remembered<'_> {
     }
 
     fn at_splat(&self, splat: usize, receiver: &Receiver) -> [f32; 3] {
-        let Some(of) = self.arrived.of.get(splat) else { return self.shadow.at_splat(splat, receiver) };
-        let known = [of[0].load(Relaxed), of[1].load(Relaxed)];
-        if known[0] != UNKNOWN && known[1] != UNKNOWN {
-            return unpacked(known);
+        self.arrived.known(splat).unwrap_or_else(|| {
+            let share = self.shadow.at_splat(splat, receiver);
+            self.arrived.remember(splat, share);
+            share
+        })
+    }
+
+    fn at_splats(&self, splats: &[usize], receiver: &dyn Fn(usize) -> Receiver) -> [[f32; 3]; TOGETHER] {
+        let mut light = [[0.0; 3]; TOGETHER];
+        let (mut asked, mut places, mut unknown) = ([0; TOGETHER], [0; TOGETHER], 0);
+        for (place, splat) in splats.iter().enumerate() {
+            if let Some(known) = self.arrived.known(*splat) {
+                light[place] = known;
+            } else {
+                (asked[unknown], places[unknown]) = (*splat, place);
+                unknown += 1;
+            }
         }
-        // Whoever asks at the same time finds the same numbers.
-        let share = self.shadow.at_splat(splat, receiver);
-        of.iter().zip(packed(share)).for_each(|(of, bits)| of.store(bits, Relaxed));
-        share
+        if unknown > 0 {
+            let shares = self.shadow.at_splats(&asked[..unknown], receiver);
+            for ((splat, place), share) in asked[..unknown].iter().zip(places).zip(shares) {
+                self.arrived.remember(*splat, share);
+                light[place] = share;
+            }
+        }
+        light
     }
 }
 
@@ -114,5 +146,28 @@ mod tests {
         assert_eq!(remembered.transmittance(&receiver(0.75)), [0.25, 0.5, 0.75]);
         assert_eq!(shadow.0.load(Relaxed), 6);
         assert_eq!(Arrived::bytes_of(2), 32);
+    }
+
+    #[test]
+    fn splats_together_are_asked_for_where_they_are_not_known() {
+        let shadow = Counted(AtomicUsize::new(0));
+        let arrived = Arrived::new(6);
+        let receiver = |i: usize| Receiver {
+            position: Vec3::X * i as f32,
+            normal: Vec3::ZERO,
+            radius: 0.0,
+            kind: SplatKind::Medium,
+        };
+        let remembered = arrived.through(&shadow);
+        for splat in [4, 1] {
+            remembered.at_splat(splat, &receiver(splat));
+        }
+        // Splats 1 and 4 are known by now, splat 7 will never be.
+        for (splats, asked) in [([0, 1, 4, 7, 2], 3), ([0, 1, 4, 7, 2], 1), ([5, 4, 3, 2, 1], 2)] {
+            let before = shadow.0.load(Relaxed);
+            let together = remembered.at_splats(&splats, &receiver);
+            assert_eq!(together[..5], splats.map(|i| [0.25, 0.5, i as f32]));
+            assert_eq!(shadow.0.load(Relaxed) - before, asked);
+        }
     }
 }

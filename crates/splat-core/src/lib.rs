@@ -101,5 +101,5 @@ pub use progress::Progress;
 pub use slice_order::{Direction, SliceOrder};
 pub use space::{Aabb, DAabb, Similarity};
 pub use transfer::{TransferFunction, TransferPoint};
-pub use transmittance::{MeanTransmittance, Receiver, Transmittance};
+pub use transmittance::{MeanTransmittance, Receiver, TOGETHER, Transmittance};
 pub use turns::turns;

@@ -172,14 +172,14 @@ fn shadow_share(input: &ShadeInput<'_>, i: usize) -> f32 {
 /// Share of a light of this irradiance, with this shadow, that arrives at splat `i`.
 #[inline]
 fn received(input: &ShadeInput<'_>, i: usize, shadow: Option<&dyn Transmittance>, irradiance: [f32; 3]) -> [f32; 3] {
-    let cloud = input.cloud;
-    let shadow = shadow.map(|shadow| {
-        move || {
-            let (position, normal) = (cloud.position[i], cloud.normal_of(i));
-            shadow.at_splat(i, &Receiver { position, normal, radius: cloud.radius[i], kind: cloud.kind[i] })
-        }
-    });
+    let shadow = shadow.map(|shadow| move || shadow.at_splat(i, &receiver(input.cloud, i)));
     arriving(irradiance, shadow_share(input, i), shadow)
+}
+
+/// Splat `i` as it receives light.
+#[inline]
+fn receiver(cloud: &Cloud, i: usize) -> Receiver {
+    Receiver { position: cloud.position[i], normal: cloud.normal_of(i), radius: cloud.radius[i], kind: cloud.kind[i] }
 }
 
 /// The point that splat `i` is shaded as.

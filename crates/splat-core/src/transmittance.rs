@@ -1,6 +1,7 @@
 //! How much light arrives: the noun between shadow maps and shading.
 
 use crate::SplatKind;
+use crate::raster::lanes::MAX_LANES;
 use glam::Vec3;
 
 /// What receives light.
@@ -16,6 +17,9 @@ pub struct Receiver {
     pub kind: SplatKind,
 }
 
+/// The most splats whose light is asked for together.
+pub const TOGETHER: usize = MAX_LANES;
+
 /// Mean transmittance of several, as to the points of one light; at least one.
 pub struct MeanTransmittance<'a>(pub Vec<&'a dyn Transmittance>);
 
@@ -27,6 +31,15 @@ impl Transmittance for MeanTransmittance<'_> {
         });
         sum.map(|v: f32| v / self.0.len() as f32)
     }
+
+    fn at_splats(&self, splats: &[usize], receiver: &dyn Fn(usize) -> Receiver) -> [[f32; 3]; TOGETHER] {
+        let mut sum = [[0.0; 3]; TOGETHER];
+        for one in &self.0 {
+            let own = one.at_splats(splats, receiver);
+            sum.as_flattened_mut().iter_mut().zip(own.as_flattened()).for_each(|(sum, own)| *sum += own);
+        }
+        sum.map(|sum| sum.map(|v: f32| v / self.0.len() as f32))
+    }
 }
 
 /// Transmittance from one light to any point.
@@ -37,5 +50,41 @@ pub trait Transmittance: Sync {
     /// The same for a splat of the cloud that is shaded, by its place there: for who knows the light at splats beforehand.
     fn at_splat(&self, _splat: usize, receiver: &Receiver) -> [f32; 3] {
         self.transmittance(receiver)
+    }
+
+    /// The same, to the bit, for some splats, at most [`TOGETHER`], in their order: of many this takes less time. `receiver` tells each.
+    fn at_splats(&self, splats: &[usize], receiver: &dyn Fn(usize) -> Receiver) -> [[f32; 3]; TOGETHER] {
+        let mut light = [[0.0; 3]; TOGETHER];
+        light.iter_mut().zip(splats).for_each(|(light, splat)| *light = self.at_splat(*splat, &receiver(*splat)));
+        light
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A shadow that tells places apart, and no two of its channels are alike.
+    struct Haze(f32);
+
+    impl Transmittance for Haze {
+        fn transmittance(&self, receiver: &Receiver) -> [f32; 3] {
+            [1.0, 0.5, 0.25].map(|share| share * (-self.0 * receiver.position.x).exp())
+        }
+    }
+
+    #[test]
+    fn a_mean_of_splats_together_has_the_bits_of_each() {
+        let mean = MeanTransmittance(vec![&Haze(0.1), &Haze(0.7), &Haze(2.3)]);
+        let receiver = |i: usize| Receiver {
+            position: Vec3::X * i as f32,
+            normal: Vec3::ZERO,
+            radius: 0.0,
+            kind: SplatKind::Medium,
+        };
+        let splats = [3, 1, 0, 8];
+        let together = mean.at_splats(&splats, &receiver);
+        assert_eq!(together[..4], splats.map(|i| mean.at_splat(i, &receiver(i))));
+        assert!((together[1][1] - 0.5 * ((-0.1f32).exp() + (-0.7f32).exp() + (-2.3f32).exp()) / 3.0).abs() < 1e-6);
     }
 }

@@ -3,7 +3,6 @@
 use crate::appearance::Appearance;
 use crate::mapping::Octahedral;
 use crate::survey::Survey;
-use crate::table::BLOCK;
 use splat_core::SplatKind;
 use std::fmt;
 
@@ -79,8 +78,8 @@ pub(crate) fn predict(
     let cells = size[0] * size[1];
     let entries = look.entries(cell, cells);
     let channels = if survey.coloured { 3.0 } else { 1.0 };
-    // A distance, its sum, and its part of a block's moment.
-    let knot = 4.0 + 4.0 * channels * (1.0 + 1.0 / BLOCK as f64);
+    // A distance and its sum.
+    let knot = 4.0 + 4.0 * channels;
     let kinds = survey.kinds;
     let lists = u64::from(kinds[SplatKind::Medium as usize] > 0) + u64::from(kinds[SplatKind::Surface as usize] > 0);
     let depth = 4.0 * u64::from(kinds[SplatKind::Opaque as usize] > 0) as f64;

@@ -7,7 +7,7 @@ use crate::media::Target;
 use crate::plan::{Plan, plan};
 use crate::shadow_map::{Absorbances, Matter, head};
 use crate::survey::{CHUNK, Survey};
-use crate::table::{BLOCK, Lists, Parted, Ranges};
+use crate::table::{Lists, Parted, Ranges};
 use crate::{Error, Params, Prediction, Scene, ShadowMap};
 use rayon::prelude::*;
 use splat_core::{Light, Limits, Progress, SplatKind};
@@ -156,7 +156,7 @@ pub(crate) fn check_entries<const C: usize>(entries: u64, limits: &Limits) -> Re
         return Err(Error::limit("the set of lists", entries, most, "entries"));
     }
     let absorbance = size_of::<[f32; C]>() as u64;
-    let needed = entries * (2 * absorbance + 12) + entries.div_ceil(BLOCK as u64) * absorbance;
+    let needed = entries * (2 * absorbance + 12);
     if needed > limits.max_bytes {
         return Err(Error::limit("the set of lists", needed, limits.max_bytes, "bytes"));
     }

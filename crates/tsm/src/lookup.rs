@@ -11,22 +11,60 @@
 
 use crate::ShadowMap;
 use crate::deposit::plane_distance;
-use crate::mapping::{Mapping, floor, with_mapping};
+use crate::mapping::{Mapping, Place, floor, with_mapping};
 use crate::shadow_map::{Absorbances, Matter};
-use crate::table::{BLOCK, List, Lists};
-use glam::{Vec2, Vec3};
-use splat_core::{Receiver, SplatKind, Transmittance, glam};
+use crate::table::{List, Lists, WINDOW};
+use glam::{Vec2, Vec3, Vec4};
+use pulp::{Simd, WithSimd};
+use splat_core::raster::lanes::{Lanes, exp_neg};
+use splat_core::{Receiver, SplatKind, TOGETHER, Transmittance, glam};
 
 /// Least lift over the distance: f32 planes agree to about 2⁻²⁰.
 const ROUNDING: f32 = 1.0 / 262_144.0;
 
+/// A number for each of the four cells about each of some receivers.
+type Four<T, const R: usize> = [[T; 4]; R];
+
 impl Transmittance for ShadowMap {
     fn transmittance(&self, receiver: &Receiver) -> [f32; 3] {
-        let p = self.frame.position(receiver.position);
-        with_mapping!(&self.table, m => match &self.absorbances {
-            Absorbances::Mono(matter) => [self.look_up(m, matter, receiver, p)[0]; 3],
-            Absorbances::Rgb(matter) => self.look_up(m, matter, receiver, p),
-        })
+        let [light] = pulp::Arch::new().dispatch(LookUp { map: self, receivers: &[*receiver] });
+        light
+    }
+
+    // While one waits for memory, others are worked on.
+    fn at_splats(&self, splats: &[usize], receiver: &dyn Fn(usize) -> Receiver) -> [[f32; 3]; TOGETHER] {
+        const NONE: Receiver =
+            Receiver { position: Vec3::ZERO, normal: Vec3::ZERO, radius: 0.0, kind: SplatKind::Medium };
+        let mut receivers = [NONE; TOGETHER];
+        receivers.iter_mut().zip(splats).for_each(|(of, splat)| *of = receiver(*splat));
+        pulp::Arch::new().dispatch(LookUp::<TOGETHER> { map: self, receivers: &receivers[..splats.len()] })
+    }
+}
+
+/// Look-ups of at most `R` receivers, in the form that [`pulp`] compiles once per instruction set.
+struct LookUp<'a, const R: usize> {
+    map: &'a ShadowMap,
+    receivers: &'a [Receiver],
+}
+
+impl<const R: usize> WithSimd for LookUp<'_, R> {
+    type Output = [[f32; 3]; R];
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> [[f32; 3]; R] {
+        let Self { map, receivers } = self;
+        let mut light = [[0.0; 3]; R];
+        with_mapping!(&map.table, m => match &map.absorbances {
+            Absorbances::Mono(matter) => {
+                let mono = map.look_up::<S, _, 1, R>(simd, m, matter, receivers);
+                light.iter_mut().zip(&mono).for_each(|(light, [one])| *light = [*one; 3]);
+            }
+            Absorbances::Rgb(matter) => {
+                let rgb = map.look_up::<S, _, 3, R>(simd, m, matter, receivers);
+                light.iter_mut().zip(&rgb).for_each(|(light, rgb)| *light = *rgb);
+            }
+        });
+        light
     }
 }
 
@@ -62,91 +100,143 @@ impl Target {
 }
 
 impl ShadowMap {
-    fn look_up<M: Mapping, const C: usize>(
+    #[inline(always)]
+    fn look_up<S: Simd, M: Mapping, const C: usize, const R: usize>(
         &self,
+        simd: S,
         mapping: &M,
         matter: &Matter<C>,
-        receiver: &Receiver,
-        p: Vec3,
-    ) -> [f32; C] {
-        let Some(place) = mapping.locate(p) else { return [1.0; C] };
+        receivers: &[Receiver],
+    ) -> [[f32; C]; R] {
+        let mut cells: Four<_, R> = [[None; 4]; R];
+        let (mut distances, mut weights): (Four<_, R>, Four<_, R>) = ([[[0.0; 2]; 4]; R], [[0.0; 4]; R]);
+        for (r, receiver) in receivers.iter().enumerate() {
+            let Some((target, place)) = self.target(mapping, receiver) else { continue };
+            let is_creased = mapping.is_creased(place.at, Vec2::ONE);
+            let at = if is_creased { met_at(mapping, target.position, place.at) } else { place.at };
+            let patch = Patch::at(mapping, at);
+            (cells[r], weights[r]) = (patch.cells, patch.weights);
+            for k in 0..4 {
+                distances[r][k] = [place.distance; 2];
+                if let Some(cell) = patch.cells[k] {
+                    match target.distances(mapping, cell) {
+                        Some(of_cell) => distances[r][k] = of_cell,
+                        // It sees nothing of the receiver.
+                        None => weights[r][k] = 0.0,
+                    }
+                }
+            }
+        }
+        let through = self.through(simd, matter, &cells, &distances, receivers.len());
+        let mut light = [[1.0; C]; R];
+        for (r, receiver) in receivers.iter().enumerate() {
+            let (mut sum, mut seen) = ([0.0; C], 0.0);
+            for k in 0..4 {
+                (0..C).for_each(|c| sum[c] += weights[r][k] * through[r][k][c]);
+                seen += weights[r][k];
+            }
+            if seen > 0.0 {
+                (0..C).for_each(|c| light[r][c] = (sum[c] / seen).min(1.0));
+            } else if let Some((target, place)) = self.target(mapping, receiver) {
+                light[r] = self.grazing(simd, mapping, matter, &target, place.at);
+            }
+        }
+        light
+    }
+
+    /// A receiver in the light's frame, and its place in the table; `None` outside of that.
+    #[inline(always)]
+    fn target<M: Mapping>(&self, mapping: &M, receiver: &Receiver) -> Option<(Target, Place)> {
+        let position = self.frame.position(receiver.position);
+        let place = mapping.locate(position)?;
         let target = Target {
-            position: p,
+            position,
             normal: self.frame.turn(receiver.normal),
             distance: place.distance,
             lift: (self.frame.length(receiver.radius) * self.bias).max(place.distance * ROUNDING),
             is_surface: receiver.kind != SplatKind::Medium,
         };
-        let at = if mapping.is_creased(place.at, Vec2::ONE) { met_at(mapping, p, place.at) } else { place.at };
-        let Patch { cells, weights, .. } = Patch::at(mapping, at);
-        let (mut distances, mut weighs) = ([[place.distance; 2]; 4], weights);
-        for k in 0..4 {
-            match cells[k].map(|cell| target.distances(mapping, cell)) {
-                Some(Some(of_cell)) => distances[k] = of_cell,
-                // It sees nothing of the receiver.
-                Some(None) => weighs[k] = 0.0,
-                None => {}
-            }
-        }
-        let through = self.through(matter, cells, distances);
-        let (mut light, mut seen) = ([0.0; C], 0.0);
-        for k in 0..4 {
-            (0..C).for_each(|c| light[c] += weighs[k] * through[k][c]);
-            seen += weighs[k];
-        }
-        if seen > 0.0 { light.map(|l| (l / seen).min(1.0)) } else { self.grazing(mapping, matter, &target, place.at) }
+        Some((target, place))
     }
 
     /// A plane that no near cell sees, being almost parallel to the light: it gets next to none, and no surface can be
     /// told to be before or behind it, so media alone shadow it.
-    fn grazing<M: Mapping, const C: usize>(
+    fn grazing<S: Simd, M: Mapping, const C: usize>(
         &self,
+        simd: S,
         mapping: &M,
         matter: &Matter<C>,
         target: &Target,
         at: Vec2,
     ) -> [f32; C] {
         let cell = mapping.wrap(floor(at.x), floor(at.y));
-        self.through(matter, [cell, None, None, None], [[target.distance, 0.0]; 4])[0]
+        self.through(simd, matter, &[[cell, None, None, None]], &[[[target.distance, 0.0]; 4]], 1)[0][0]
     }
 
-    /// Transmittance of four cells, each up to its distances for media and for surfaces; 1 outside of the table.
-    #[inline]
-    fn through<const C: usize>(
+    /// Transmittance of the cells about the first `n` receivers, each up to its distances for media and for surfaces; 1 outside of the table.
+    #[inline(always)]
+    fn through<S: Simd, const C: usize, const R: usize>(
         &self,
+        simd: S,
         matter: &Matter<C>,
-        cells: [Option<u32>; 4],
-        distances: [[f32; 2]; 4],
-    ) -> [[f32; C]; 4] {
-        let mut absorbance = [[0.0; C]; 4];
-        let [media, surfaces] = [0, 1].map(|of| distances.map(|both: [f32; 2]| both[of]));
-        let is_dark: [bool; 4] = std::array::from_fn(|k| {
-            cells[k].and_then(|c| self.opaque.get(c as usize)).is_some_and(|d| *d < surfaces[k])
-        });
+        cells: &Four<Option<u32>, R>,
+        distances: &Four<[f32; 2], R>,
+        n: usize,
+    ) -> Four<[f32; C], R> {
+        let mut absorbance: Four<_, R> = [[[0.0; C]; 4]; R];
+        let (mut nearest, mut surfaces): (Four<_, R>, Four<_, R>) = ([[0.0; 4]; R], [[0.0; 4]; R]);
+        let mut is_dark: Four<_, R> = [[false; 4]; R];
+        for r in 0..n {
+            for k in 0..4 {
+                let [medium, surface] = distances[r][k];
+                (nearest[r][k], surfaces[r][k]) = (medium - self.ramp, surface);
+                let opaque = cells[r][k].and_then(|cell| self.opaque.get(cell as usize));
+                is_dark[r][k] = opaque.is_some_and(|d| *d < surface);
+            }
+        }
         // Nothing counts behind what is opaque.
-        let spans = |lists: &Lists<C>| -> [[u32; 2]; 4] {
-            std::array::from_fn(|k| match cells[k] {
-                Some(cell) if !is_dark[k] => lists.span(cell),
-                _ => [0, 0],
-            })
+        let spans = |lists: &Lists<C>| {
+            let mut spans: Four<_, R> = [[[0; 2]; 4]; R];
+            for r in 0..n {
+                for k in 0..4 {
+                    if let Some(cell) = cells[r][k].filter(|_| !is_dark[r][k]) {
+                        spans[r][k] = lists.span(cell);
+                    }
+                }
+            }
+            spans
         };
         if let Some(lists) = &matter.media {
             let spans = spans(lists);
-            let begin = lists.places(spans, media.map(|d| d - self.ramp), |d, nearest| d <= nearest);
-            for k in 0..4 {
-                absorbance[k] = continuous(lists.list_at(spans[k]), begin[k], media[k], self.ramp);
+            let begin = lists.places(&spans, &nearest, n, |d, nearest| d <= nearest);
+            for r in 0..n {
+                for k in 0..4 {
+                    let list = lists.list_at(spans[r][k]);
+                    absorbance[r][k] = continuous(simd, list, begin[r][k], distances[r][k][0], self.ramp);
+                }
             }
         }
         if let Some(lists) = &matter.surfaces {
             let spans = spans(lists);
-            let before = lists.places(spans, surfaces, |d, surface| d < surface);
-            for k in 0..4 {
-                let step = lists.list_at(spans[k]).total_of(before[k]);
-                (0..C).for_each(|c| absorbance[k][c] += step[c]);
+            let begin = lists.places(&spans, &surfaces, n, |d, surface| d < surface);
+            for r in 0..n {
+                for k in 0..4 {
+                    let step = steps(lists.list_at(spans[r][k]), begin[r][k], surfaces[r][k]);
+                    (0..C).for_each(|c| absorbance[r][k][c] += step[c]);
+                }
             }
         }
-        let light = |a: f32| if self.dark_from.is_some_and(|limit| a > limit) { 0.0 } else { libm::expf(-a) };
-        std::array::from_fn(|k| if is_dark[k] { [0.0; C] } else { absorbance[k].map(light) })
+        let mut through: Four<_, R> = [[[0.0; C]; 4]; R];
+        for r in 0..n {
+            for k in 0..4 {
+                for c in 0..C {
+                    let a = absorbance[r][k][c];
+                    let is_dark = is_dark[r][k] || self.dark_from.is_some_and(|limit| a > limit);
+                    through[r][k][c] = if is_dark { 0.0 } else { exp_neg(a) };
+                }
+            }
+        }
+        through
     }
 }
 
@@ -199,37 +289,89 @@ fn met_at<M: Mapping>(mapping: &M, p: Vec3, at: Vec2) -> Vec2 {
     met
 }
 
+/// Places in a window.
+const INDEX: [f32; WINDOW + 1] = {
+    let (mut index, mut n) = ([0.0; WINDOW + 1], 0);
+    while n <= WINDOW {
+        index[n] = n as f32;
+        n += 1;
+    }
+    index
+};
+
 /// Absorbance at `distance`, every entry spread evenly over `ramp` to either side of its own distance; those before `begin`
-/// lie wholly before it. Of a block of entries about it their sum and [moment](List::moment) are enough.
+/// lie wholly before it. With s_n the share of entry n before the distance, and A_n the absorbance up to and with it, that is
+/// Σ A_n·(s_n − s_{n+1}).
 #[inline(always)]
-pub(crate) fn continuous<const C: usize>(list: List<'_, C>, begin: usize, distance: f32, ramp: f32) -> [f32; C] {
-    let (len, inverse, farthest) = (list.distance.len(), 0.5 / ramp, distance + ramp);
-    let share = |n: usize| (distance - list.distance[n]) * inverse + 0.5;
-    let mut before = list.total_of(begin);
-    let (mut sum, mut n) = (before, begin);
-    let mut add = |sum: &mut [f32; C], total: [f32; C], share: f32| {
-        (0..C).for_each(|c| sum[c] += (total[c] - before[c]) * share);
-        before = total;
-    };
-    let block = list.next_block(begin).min(len);
-    while n < block && list.distance[n] < farthest {
-        add(&mut sum, list.total[n], share(n));
-        n += 1;
+pub(crate) fn continuous<S: Simd, const C: usize>(
+    simd: S,
+    list: List<'_, C>,
+    begin: usize,
+    distance: f32,
+    ramp: f32,
+) -> [f32; C] {
+    let of = |v| Lanes::splat(simd, v);
+    let (place, half, inverse, none, whole) = (of(distance), of(0.5), of(0.5 / ramp), of(0.0), of(1.0));
+    let mut sums = [[0.0; WINDOW]; C];
+    // The last that lies wholly before stands for all before it.
+    let mut n = begin.saturating_sub(1);
+    while n < list.len() {
+        let (at, total) = list.window(n);
+        let left = of((list.len() - n).min(2 * WINDOW) as f32);
+        for l in (0..WINDOW).step_by(Lanes::<S>::COUNT) {
+            let share = |l: usize| {
+                // Nothing of what follows the list.
+                let most = whole.min(left - Lanes::load(simd, &INDEX[l..]));
+                ((place - Lanes::load(simd, &at[l..])) * inverse + half).min(most).max(none)
+            };
+            let part = share(l) - share(l + 1);
+            for c in 0..C {
+                let total = column(simd, total, l, c);
+                (Lanes::load(simd, &sums[c][l..]) + total * part).store(&mut sums[c][l..]);
+            }
+        }
+        n += WINDOW;
+        if at[WINDOW] >= distance + ramp {
+            break;
+        }
     }
-    if n < block {
-        return sum;
-    }
-    while n + BLOCK <= len && list.distance[n + BLOCK - 1] < farthest {
-        add(&mut sum, list.total[n + BLOCK - 1], share(n));
-        let moment = list.moment(n);
-        (0..C).for_each(|c| sum[c] -= moment[c] * inverse);
-        n += BLOCK;
-    }
-    while n < len && list.distance[n] < farthest {
-        add(&mut sum, list.total[n], share(n));
-        n += 1;
-    }
+    let mut sum = [0.0; C];
+    (0..C).for_each(|c| sum[c] = added(&sums[c]));
     sum
+}
+
+/// A channel of some absorbances.
+#[inline(always)]
+fn column<S: Simd, const C: usize>(simd: S, of: &[[f32; C]; WINDOW], from: usize, c: usize) -> Lanes<S> {
+    if C == 1 {
+        return Lanes::load(simd, &of.as_flattened()[from..]);
+    }
+    let mut column = [0.0; WINDOW];
+    (0..Lanes::<S>::COUNT).for_each(|l| column[l] = of[from + l][c]);
+    Lanes::load(simd, &column)
+}
+
+/// Sum of all, in the same order on every machine.
+#[inline(always)]
+fn added(of: &[f32; WINDOW]) -> f32 {
+    let mut four = Vec4::ZERO;
+    for l in (0..WINDOW).step_by(4) {
+        four += Vec4::from_slice(&of[l..]);
+    }
+    (four.x + four.z) + (four.y + four.w)
+}
+
+/// Absorbance of all entries before `distance`, of which those before `begin` are.
+#[inline(always)]
+fn steps<const C: usize>(list: List<'_, C>, begin: usize, distance: f32) -> [f32; C] {
+    if begin == list.len() {
+        return list.total_of(begin);
+    }
+    let (at, _) = list.window(begin);
+    let left = (list.len() - begin).min(WINDOW) as i32;
+    let mut before = 0;
+    (0..WINDOW).for_each(|l| before += i32::from(((l as i32) < left) & (at[l] < distance)));
+    list.total_of(begin + before as usize)
 }
 
 #[cfg(test)]
@@ -246,10 +388,26 @@ mod tests {
         Lists::new(&[Parted::new(&all, ranges)], ranges, 1e6)
     }
 
+    /// [`continuous`] by whatever the machine has.
+    struct Continuous<'a>(List<'a, 1>, usize, [f32; 2]);
+
+    impl WithSimd for Continuous<'_> {
+        type Output = f32;
+
+        fn with_simd<S: Simd>(self, simd: S) -> f32 {
+            let Self(list, begin, [distance, ramp]) = self;
+            continuous(simd, list, begin, distance, ramp)[0]
+        }
+    }
+
+    /// The same bits by the widest vectors and by none.
     fn absorbance(lists: &Lists<1>, cell: u32, distance: f32, ramp: f32) -> f32 {
         let spans = [lists.span(cell); 4];
-        let [begin, ..] = lists.places(spans, [distance - ramp; 4], |d, nearest| d <= nearest);
-        continuous(lists.list_at(spans[0]), begin, distance, ramp)[0]
+        let [begin, ..] = lists.places(&[spans], &[[distance - ramp; 4]], 1, |d, nearest| d <= nearest)[0];
+        let of = || Continuous(lists.list_at(spans[0]), begin, [distance, ramp]);
+        let [widest, none] = [pulp::Arch::new().dispatch(of()), of().with_simd(pulp::Scalar::new())];
+        assert_eq!(widest.to_bits(), none.to_bits());
+        widest
     }
 
     #[test]
@@ -281,8 +439,8 @@ mod tests {
     }
 
     #[test]
-    fn blocks_of_entries_absorb_as_each_of_them_does() {
-        // Lists of all lengths, so that blocks begin anywhere in them, and one of thousands, in many ranges of cells.
+    fn windows_of_entries_absorb_as_each_of_them_does() {
+        // Lists of all lengths, so that windows end anywhere in them, and one of thousands, in many ranges of cells.
         let unit = |i: u64, of: u64| splat_core::rng::unit_f32(9, 1, i, of);
         let lengths: Vec<u64> = (0..400).map(|cell| if cell == 77 { 10_000 } else { cell % 45 }).collect();
         let entries: Vec<(u32, f32, f32)> = lengths
@@ -308,8 +466,8 @@ mod tests {
     fn surfaces_are_steps_behind_their_distance() {
         let lists = lists(1, &[(0, 1.0, 0.4), (0, 2.0, 0.2)]);
         for (d, a) in [(0.5, 0.0), (1.0, 0.0), (1.001, 0.4), (2.0, 0.4), (7.0, 0.6)] {
-            let [before, ..] = lists.places([lists.span(0); 4], [d; 4], |entry, d| entry < d);
-            assert!((lists.list(0).total_of(before)[0] - a).abs() < 1e-6);
+            let [begin, ..] = lists.places(&[[lists.span(0); 4]], &[[d; 4]], 1, |entry, d| entry < d)[0];
+            assert!((steps(lists.list(0), begin, d)[0] - a).abs() < 1e-6);
         }
     }
 
@@ -323,8 +481,12 @@ mod tests {
             for step in 0..420 {
                 let bounds = [0, 1, 2, 3].map(|k: u32| 0.5 * (step + k) as f32);
                 let spans = cells.map(|cell| lists.span(cell));
-                for (found, k) in lists.places(spans, bounds, |d, bound| d < bound).into_iter().zip(0..) {
-                    assert_eq!(found, lists.list(cells[k]).distance.partition_point(|d| *d < bounds[k]));
+                let [found] = lists.places(&[spans], &[bounds], 1, |d, bound| d < bound);
+                for (found, k) in found.into_iter().zip(0..) {
+                    let list = lists.list(cells[k]);
+                    let before = list.distance().partition_point(|d| *d < bounds[k]);
+                    assert!((found..=found + WINDOW).contains(&before), "{found} for {before}");
+                    assert_eq!(steps(list, found, bounds[k]), list.total_of(before));
                 }
             }
         }

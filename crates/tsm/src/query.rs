@@ -6,6 +6,7 @@ use crate::mapping::{Mapping, Ray, with_mapping};
 use crate::shadow_map::{Absorbances, Matter};
 use crate::table::List;
 use glam::Vec3;
+use pulp::{Simd, WithSimd};
 use rayon::prelude::*;
 use splat_core::glam;
 
@@ -90,8 +91,10 @@ impl ShadowMap {
             return None;
         }
         let solid = match &self.absorbances {
-            Absorbances::Mono(matter) => first(matter, cell, absorbance, self.ramp),
-            Absorbances::Rgb(matter) => first(matter, cell, absorbance, self.ramp),
+            Absorbances::Mono(matter) => {
+                pulp::Arch::new().dispatch(First { matter, cell, absorbance, ramp: self.ramp })
+            }
+            Absorbances::Rgb(matter) => pulp::Arch::new().dispatch(First { matter, cell, absorbance, ramp: self.ramp }),
         };
         let opaque = self.opaque.get(cell as usize).copied().filter(|d| d.is_finite());
         match (solid, opaque) {
@@ -217,7 +220,7 @@ fn own_absorbances<const C: usize>(matter: &Matter<C>, cell: u32, cells: u32) ->
     for lists in [&matter.media, &matter.surfaces].into_iter().flatten() {
         let mut before = [0.0; C];
         let list = lists.list(cell);
-        for (distance, total) in list.distance.iter().zip(list.total) {
+        for (distance, total) in list.distance().iter().zip(list.total()) {
             own.push((*distance, std::array::from_fn(|c| total[c.min(C - 1)] - before[c.min(C - 1)])));
             before = *total;
         }
@@ -227,29 +230,42 @@ fn own_absorbances<const C: usize>(matter: &Matter<C>, cell: u32, cells: u32) ->
 
 /// Where the absorbance of a cell first reaches `absorbance` in every channel: the entries of media, each spread evenly over
 /// `ramp` to either side of its distance, and those of surfaces, which are steps.
-fn first<const C: usize>(matter: &Matter<C>, cell: u32, absorbance: f32, ramp: f32) -> Option<f32> {
-    let [media, surfaces] =
-        [&matter.media, &matter.surfaces].map(|lists| lists.as_ref().map_or(List::NONE, |lists| lists.list(cell)));
-    let is_reached = |distance: f32| {
-        let steps = surfaces.total_of(surfaces.distance.partition_point(|d| *d <= distance));
-        let begin = media.distance.partition_point(|d| *d <= distance - ramp);
-        let within = continuous(media, begin, distance, ramp);
-        (0..C).all(|c| steps[c] + within[c] >= absorbance)
-    };
-    let ends = [media.distance.last().map(|d| d + ramp), surfaces.distance.last().copied()];
-    let end = ends.into_iter().flatten().reduce(f32::max).filter(|end| is_reached(*end))?;
-    // Distances are positive, and their bits in their order.
-    let (mut before, mut reached) = (0, end.to_bits());
-    while reached - before > 1 {
-        let middle = before + (reached - before) / 2;
-        *if is_reached(f32::from_bits(middle)) { &mut reached } else { &mut before } = middle;
+struct First<'a, const C: usize> {
+    matter: &'a Matter<C>,
+    cell: u32,
+    absorbance: f32,
+    ramp: f32,
+}
+
+impl<const C: usize> WithSimd for First<'_, C> {
+    type Output = Option<f32>;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> Option<f32> {
+        let Self { matter, cell, absorbance, ramp } = self;
+        let [media, surfaces] =
+            [&matter.media, &matter.surfaces].map(|lists| lists.as_ref().map_or(List::NONE, |lists| lists.list(cell)));
+        let is_reached = |distance: f32| {
+            let steps = surfaces.total_of(surfaces.distance().partition_point(|d| *d <= distance));
+            let begin = media.distance().partition_point(|d| *d <= distance - ramp);
+            let within = continuous(simd, media, begin, distance, ramp);
+            (0..C).all(|c| steps[c] + within[c] >= absorbance)
+        };
+        let ends = [media.distance().last().map(|d| d + ramp), surfaces.distance().last().copied()];
+        let end = ends.into_iter().flatten().reduce(f32::max).filter(|end| is_reached(*end))?;
+        // Distances are positive, and their bits in their order.
+        let (mut before, mut reached) = (0, end.to_bits());
+        while reached - before > 1 {
+            let middle = before + (reached - before) / 2;
+            *if is_reached(f32::from_bits(middle)) { &mut reached } else { &mut before } = middle;
+        }
+        Some(f32::from_bits(reached))
     }
-    Some(f32::from_bits(reached))
 }
 
 fn any_between<const C: usize>(matter: &Matter<C>, cell: u32, from: f32, to: f32) -> bool {
     [&matter.media, &matter.surfaces].into_iter().flatten().any(|lists| {
-        let list = lists.list(cell).distance;
+        let list = lists.list(cell).distance();
         list.get(list.partition_point(|d| *d < from)).is_some_and(|d| *d <= to)
     })
 }

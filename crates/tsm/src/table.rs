@@ -11,14 +11,15 @@ use crate::entries::Entries;
 use crate::sort::sort;
 pub(crate) use list::List;
 use rayon::prelude::*;
+use splat_core::raster::lanes::MAX_LANES;
 use std::ops::Range;
 
 /// Fixed point: 2⁴⁴ units an absorbance of 1.
 const FIXED: f64 = (1u64 << 44) as f64;
 /// Entries of a range that a core's cache holds while they are sorted.
 const RANGE_ENTRIES: f64 = 32_768.0;
-/// Entries whose [moment](List::moment) is kept.
-pub(crate) const BLOCK: usize = 8;
+/// Entries that are looked at together.
+pub(crate) const WINDOW: usize = MAX_LANES;
 /// Least and greatest number of ranges.
 const RANGES: [f64; 2] = [64.0, 1024.0];
 
@@ -123,10 +124,9 @@ impl<const C: usize> Parted<C> {
 pub(crate) struct Lists<const C: usize> {
     /// First entry of each cell, and number of entries kept.
     span: Vec<[u32; 2]>,
+    /// Of all entries, and a [`WINDOW`] and one more.
     distance: Vec<f32>,
     total: Vec<[f32; C]>,
-    /// Of each block of entries that lies within one list.
-    moment: Vec<[f32; C]>,
     kept: u64,
 }
 
@@ -136,21 +136,16 @@ impl<const C: usize> Lists<C> {
     pub(crate) fn new(parted: &[Parted<C>], ranges: Ranges, limit: f32) -> Self {
         let all: usize = parted.iter().map(Parted::len).sum();
         let mut span = vec![[0u32; 2]; ranges.cells];
-        let (mut distance, mut total) = (vec![0f32; all], vec![[0f32; C]; all]);
-        let mut moment = vec![[0f32; C]; all.div_ceil(BLOCK)];
+        let (mut distance, mut total) = (vec![0f32; all + WINDOW + 1], vec![[0f32; C]; all + WINDOW + 1]);
         let mut tasks = Vec::with_capacity(ranges.count);
         let (mut distances, mut totals) = (distance.as_mut_slice(), total.as_mut_slice());
-        let mut moments = moment.as_mut_slice();
         let mut first = 0u32;
         for (range, span) in span.chunks_mut(1 << ranges.shift).enumerate() {
             let n: usize = parted.iter().map(|p| p.range(range).len()).sum();
-            let (distance, total, moment);
+            let (distance, total);
             (distance, distances) = distances.split_at_mut(n);
             (total, totals) = totals.split_at_mut(n);
-            // A block of two ranges is no list's.
-            let blocks = (first as usize + n).div_ceil(BLOCK) - (first as usize).div_ceil(BLOCK);
-            (moment, moments) = moments.split_at_mut(blocks);
-            tasks.push(Task { range, first, span, distance, total, moment });
+            tasks.push(Task { range, first, span, distance, total });
             first = first.wrapping_add(n as u32);
         }
         let stop = stop_of(limit);
@@ -158,36 +153,34 @@ impl<const C: usize> Lists<C> {
             pulp::Arch::new().dispatch(Run { task, parted, shift: ranges.shift, stop, gathered })
         };
         let kept = tasks.into_par_iter().map_init(Gathered::default, run).sum();
-        Self { span, distance, total, moment, kept }
+        Self { span, distance, total, kept }
     }
 
     /// Lists that were sorted and summed elsewhere; `None` where a cell's list is not among the entries.
     #[cfg(feature = "gpu")]
-    pub(crate) fn from_parts(span: Vec<[u32; 2]>, distance: Vec<f32>, total: Vec<[f32; C]>) -> Option<Self> {
+    pub(crate) fn from_parts(span: Vec<[u32; 2]>, mut distance: Vec<f32>, mut total: Vec<[f32; C]>) -> Option<Self> {
         let fits =
             |[begin, kept]: &[u32; 2]| begin.checked_add(*kept).is_some_and(|end| end as usize <= distance.len());
         let known = span.iter().all(fits) && total.len() == distance.len();
         if !known {
             return None;
         }
-        let mut moment = vec![[0.0; C]; distance.len().div_ceil(BLOCK)];
-        for [start, kept] in span.iter().map(|span| span.map(|n| n as usize)) {
-            let list = start..start + kept;
-            weigh(start, &distance[list.clone()], &total[list], 0, &mut moment);
-        }
+        distance.extend([0.0; WINDOW + 1]);
+        total.extend([[0.0; C]; WINDOW + 1]);
         let kept = span.iter().map(|[_, kept]| u64::from(*kept)).sum();
-        Some(Self { span, distance, total, moment, kept })
+        Some(Self { span, distance, total, kept })
     }
 
     /// First entry and number of knots of each cell, distances, totals.
     #[cfg(feature = "gpu")]
     pub(crate) fn parts(&self) -> (&[[u32; 2]], &[f32], &[[f32; C]]) {
-        (&self.span, &self.distance, &self.total)
+        let entries = self.entries() as usize;
+        (&self.span, &self.distance[..entries], &self.total[..entries])
     }
 
     /// Entries before equal distances were merged and lists were cut.
     pub(crate) fn entries(&self) -> u64 {
-        self.distance.len() as u64
+        (self.distance.len() - (WINDOW + 1)) as u64
     }
 
     /// Entries after that.
@@ -197,7 +190,7 @@ impl<const C: usize> Lists<C> {
 
     /// Bytes held.
     pub(crate) fn bytes(&self) -> u64 {
-        let lists = size_of_val(&*self.distance) + size_of_val(&*self.total) + size_of_val(&*self.moment);
+        let lists = size_of_val(&*self.distance) + size_of_val(&*self.total);
         (lists + size_of_val(&*self.span)) as u64
     }
 }
@@ -219,7 +212,6 @@ struct Task<'a, const C: usize> {
     span: &'a mut [[u32; 2]],
     distance: &'a mut [f32],
     total: &'a mut [[f32; C]],
-    moment: &'a mut [[f32; C]],
 }
 
 /// The work on one range, in the form that [`pulp`] compiles once per instruction set.
@@ -277,10 +269,8 @@ impl<const C: usize> Task<'_, C> {
             sort(&mut key[begin..end], spare);
             let (distance, total) = (&mut self.distance[begin..end], &mut self.total[begin..end]);
             *kept = sum_up(&key[begin..end], own, stop, distance, total);
-            let (kept, place) = (*kept as usize, self.first as usize + begin);
-            weigh(place, &distance[..kept], &total[..kept], (self.first as usize).div_ceil(BLOCK), self.moment);
             *start = (begin as u32).wrapping_add(self.first);
-            all += kept as u64;
+            all += u64::from(*kept);
         }
         all
     }
@@ -311,22 +301,6 @@ fn sum_up<const C: usize>(
         }
     }
     kept as u32
-}
-
-/// Moments of the blocks that lie within a list, whose first entry is at `start` among all; `moment` begins with block `first`.
-#[inline(always)]
-fn weigh<const C: usize>(start: usize, distance: &[f32], total: &[[f32; C]], first: usize, moment: &mut [[f32; C]]) {
-    let begin = start.next_multiple_of(BLOCK) - start;
-    let of_blocks = distance.get(begin..).unwrap_or_default().chunks_exact(BLOCK);
-    let totals = total.get(begin..).unwrap_or_default().chunks_exact(BLOCK);
-    let moments = moment.iter_mut().skip((start + begin) / BLOCK - first);
-    for ((distance, total), moment) in of_blocks.zip(totals).zip(moments) {
-        *moment = [0.0; C];
-        for i in 1..BLOCK {
-            let depth = distance[i] - distance[0];
-            (0..C).for_each(|c| moment[c] += (total[i][c] - total[i - 1][c]) * depth);
-        }
-    }
 }
 
 /// A key to sort by: the distance in the upper half; in the lower half the absorbance if there is one, else its slot.
@@ -363,7 +337,7 @@ mod tests {
                 paper.insert(0, distance, 1e-3);
             }
             let lists = build(&entries, 1, 1e9);
-            let ours: Vec<f32> = lists.list(0).distance.to_vec();
+            let ours: Vec<f32> = lists.list(0).distance().to_vec();
             let theirs: Vec<f32> = paper.list(0).iter().map(|e| e.0).collect();
             assert_eq!(ours, theirs);
             // The paper's insertion steps over n²/4 elements on average; sorting needs n log₂ n comparisons.
@@ -383,7 +357,7 @@ mod tests {
                 entries.push(0, distance, absorbance, &[1.0; 3]);
                 paper.insert(0, distance, absorbance);
             }
-            assert_eq!(build(&entries, 1, 2.0).list(0).distance, [0.5]);
+            assert_eq!(build(&entries, 1, 2.0).list(0).distance(), [0.5]);
             // One step a point: near O(n), as the paper says of its lists.
             assert_eq!((paper.list(0).len(), paper.steps()), (1, n));
         }
@@ -397,11 +371,7 @@ mod tests {
                 entries.push(0, 1.0 + i as f32, 2.0 / n as f32, &[1.0; 3]);
             }
             entries.push(0, 1e6, 1.0, &[1.0; 3]);
-            assert_eq!(
-                build(&entries, 1, 2.0).list(0).distance.len() as u32,
-                n,
-                "{n} parts of 2.0 reach the limit of 2.0"
-            );
+            assert_eq!(build(&entries, 1, 2.0).list(0).len() as u32, n, "{n} parts of 2.0 reach the limit of 2.0");
         }
     }
 
@@ -413,10 +383,10 @@ mod tests {
             entries.push(3, 1.0 + i as f32, 1e-6, &[1.0; 3]);
         }
         let lists = build(&entries, 5, 1e9);
-        let total = lists.list(3).total.last().unwrap()[0];
+        let total = lists.list(3).total().last().unwrap()[0];
         let expected = f64::from(1e-6f32) * f64::from(n);
         assert!((f64::from(total) / expected - 1.0).abs() < 1e-6, "{total}");
-        assert_eq!(lists.list(2).distance.len() + lists.list(4).distance.len(), 0);
+        assert_eq!(lists.list(2).len() + lists.list(4).len(), 0);
     }
 
     #[test]
@@ -429,6 +399,6 @@ mod tests {
         };
         let sorted = build([0, 1, 2, 3]);
         assert_eq!(sorted, build([3, 2, 1, 0]));
-        assert_eq!(sorted.list(0).distance, [1.0, 2.0]);
+        assert_eq!(sorted.list(0).distance(), [1.0, 2.0]);
     }
 }

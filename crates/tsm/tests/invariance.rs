@@ -3,7 +3,7 @@
 use crate::common::*;
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::optics::FAINTEST;
-use splat_core::{Cloud, Exceeded, Light, LightShape, Limits, Material, SplatKind, Transmittance};
+use splat_core::{Cloud, Exceeded, Light, LightShape, Limits, Material, SplatKind, TOGETHER, Transmittance};
 use tsm::{Deposits, Error, MappingChoice, Params, Resolution, Scene, ShadowMap};
 
 fn lights() -> [Light; 4] {
@@ -33,6 +33,29 @@ fn x1_thread_counts_change_no_bit() {
             pool.install(|| build(&cloud, &light, &Params::default()))
         });
         assert!(maps.iter().all(|m| *m == maps[0]));
+    }
+}
+
+#[test]
+fn splats_that_are_looked_up_together_get_the_bits_of_each() {
+    let cloud = mixed(9000, DVec3::ZERO);
+    let [thin, red] = [[1.0; 3], [1.0, 0.4, 0.1]];
+    let lit = |light: &Light, extinction_rgb| {
+        let scene = Scene { materials: &[Material { extinction_rgb, ..Material::default() }], ..Scene::from(&cloud) };
+        ShadowMap::build(&scene, light, &Params::default(), None).unwrap()
+    };
+    // Some lie out of the spot's table, and some discs graze the light.
+    let ids: Vec<usize> = (0..cloud.len()).rev().collect();
+    for (light, extinction_rgb) in lights().into_iter().zip([thin, red, thin, red]) {
+        let map = lit(&light, extinction_rgb);
+        for several in [1, 5, TOGETHER] {
+            for ids in ids.chunks(several) {
+                let together = map.at_splats(ids, &|i| receiver(&cloud, i));
+                for (i, light) in ids.iter().zip(together) {
+                    assert_eq!(light, map.transmittance(&receiver(&cloud, *i)));
+                }
+            }
+        }
     }
 }
 

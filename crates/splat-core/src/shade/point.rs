@@ -54,9 +54,21 @@ pub fn facing(kind: SplatKind, face: Vec3, shading: Vec3, to_eye: Vec3) -> Vec3 
 #[inline(always)]
 pub fn arriving(irradiance: [f32; 3], coefficient: f32, shadow: Option<impl FnOnce() -> [f32; 3]>) -> [f32; 3] {
     match shadow {
-        Some(shadow) if coefficient > 0.0 && irradiance != [0.0; 3] => shadow().map(|t| 1.0 - coefficient * (1.0 - t)),
+        Some(shadow) if is_attenuated(irradiance, coefficient) => passing(shadow(), coefficient),
         _ => [1.0; 3],
     }
+}
+
+/// Whether there is something to attenuate.
+#[inline(always)]
+pub(super) fn is_attenuated(irradiance: [f32; 3], coefficient: f32) -> bool {
+    coefficient > 0.0 && irradiance != [0.0; 3]
+}
+
+/// Share of a light that arrives through a shadow of this transmittance, of which a point takes the share `coefficient`.
+#[inline(always)]
+pub(super) fn passing(transmittance: [f32; 3], coefficient: f32) -> [f32; 3] {
+    transmittance.map(|t| 1.0 - coefficient * (1.0 - t))
 }
 
 impl Point<'_> {

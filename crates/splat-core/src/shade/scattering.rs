@@ -1,8 +1,8 @@
 //! Splats that scatter by the phase function, under light of lamps and parallel light, as many at a time as there are lanes: what
 //! [`Point::radiance`](super::Point::radiance) says of each, within rounding, by itself and whatever its neighbours are.
 
-use super::point::Incoming;
-use super::{ChannelLayout, LitBy, Radiance, ShadeInput, facing, received};
+use super::point::{Incoming, is_attenuated, passing};
+use super::{ChannelLayout, LitBy, Radiance, ShadeInput, facing, receiver, shadow_share};
 use crate::optics::TRACE;
 use crate::raster::lanes::{Lanes, MAX_LANES};
 use crate::{LightShape, Shading};
@@ -38,6 +38,8 @@ pub(super) struct Scattering<'a> {
 pub(super) struct Batch {
     to_eye: [Column; 3],
     lights: Vec<OfLight>,
+    /// Those that ask one of them for its shadow.
+    asked: Vec<usize>,
 }
 
 /// One light at some splats.
@@ -100,11 +102,22 @@ impl<'a> Scattering<'a> {
         let channels = layout.count();
         let splats = first..first + out.len() / channels;
         // Light by light: what is remembered of one is not waited for before the next is asked for.
-        for (lit, of) in input.lights.iter().zip(&mut batch.lights) {
+        let Batch { to_eye, lights, asked } = batch;
+        for (lit, of) in input.lights.iter().zip(&mut *lights) {
+            asked.clear();
             for (k, i) in splats.clone().enumerate().filter(|(_, i)| is_one(*i)) {
                 let arriving = lit.light.intensity.map(|intensity| intensity * of.falloff[k]);
                 of.irradiance[k] = arriving.map(|e| if e > TRACE { e } else { 0.0 });
-                of.share[k] = received(input, i, lit.shadow, of.irradiance[k]);
+                of.share[k] = [1.0; 3];
+                if is_attenuated(of.irradiance[k], shadow_share(input, i)) {
+                    asked.push(i);
+                }
+            }
+            if let Some(shadow) = lit.shadow {
+                let through = shadow.at_splats(asked, &|i| receiver(input.cloud, i));
+                for (i, through) in asked.iter().zip(through) {
+                    of.share[i - first] = passing(through, shadow_share(input, *i));
+                }
             }
         }
         for ((k, i), out) in splats.enumerate().zip(out.chunks_exact_mut(channels)) {
@@ -114,10 +127,10 @@ impl<'a> Scattering<'a> {
             }
             let incoming =
                 |of: &OfLight| Incoming { irradiance: of.irradiance[k], diffuse: of.leaving[k], specular: 0.0 };
-            let (lights, color) = (batch.lights.iter().map(incoming), input.cloud.color[i]);
+            let (incoming, color) = (lights.iter().map(incoming), input.cloud.color[i]);
             let radiance =
-                Radiance::of(material, color, true, input.ambient, lights, |rank, _| batch.lights[rank].share[k]);
-            let (cloud, to_eye) = (input.cloud, Vec3::from_array(batch.to_eye.map(|axis| axis[k])));
+                Radiance::of(material, color, true, input.ambient, incoming, |rank, _| lights[rank].share[k]);
+            let (cloud, to_eye) = (input.cloud, Vec3::from_array(to_eye.map(|axis| axis[k])));
             let normal = facing(cloud.kind[i], cloud.normal_of(i), cloud.shading_normal_of(i), to_eye);
             radiance.write(normal, layout, out);
         }
