@@ -117,12 +117,14 @@ impl<M: Mapping, const C: usize> Deposit<'_, M, C> {
         let spread = Spread::new(caster, self.mapping.gradients(caster.position));
         let half = spread.half_extents();
         let [least, most] = [half.min_element(), half.max_element()];
-        let wide = self.weight(caster, through(WIDE, least));
-        let corner = (1.0 - through(CLEAR, self.mapping.clearance(at, half))) * through(SMALL, least);
-        let bent = self.weight(caster, through(BENT, most * angle).max(corner)) * (1.0 - wide);
+        let near = 1.0 - through(CLEAR, self.mapping.clearance(at, half));
+        let corner = self.weight(caster, near * through(SMALL, least));
+        let many = self.weight(caster, through(WIDE, least));
+        let bent = self.weight(caster, through(BENT, most * angle)).max(corner) * (1.0 - many) + corner * many;
+        let wide = many * (1.0 - corner);
         let mut rest = 1.0 - wide - bent;
-        // Between two powers of two, both numbers of rays are taken in part.
-        let octave = if bent > 0.0 { libm::log2f(between(RAYS / least, 1.0, FINE)) } else { 0.0 };
+        // Between two powers of two, both numbers of rays are taken in part; at a corner one ray a cell is never enough.
+        let octave = if bent > 0.0 { libm::log2f(between(RAYS / least, 1.0, FINE)).max(corner) } else { 0.0 };
         let finer = self.weight(caster, octave.fract());
         let rays = 1 << octave as u32;
         for (weight, samples) in [(wide, 1), (bent * (1.0 - finer), rays), (bent * finer, 2 * rays)] {

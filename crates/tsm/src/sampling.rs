@@ -6,7 +6,7 @@
 
 use crate::caster::Caster;
 use crate::mapping::{Mapping, Ray};
-use crate::rays::Rays;
+use crate::rays::{Rays, place};
 use crate::reference::erf;
 use glam::{Vec2, Vec3};
 use splat_core::optics::SurfaceOpacity;
@@ -42,9 +42,9 @@ impl Sampled {
         // each ray instead.
         let exact = f64::from(footprint_area(caster));
         let unresolved = f64::from(RESOLVED / (half.min_element() * samples as f32)).max(1.0);
-        // Rays about a pole do not add up either, but miss nothing.
-        let pole = if mapping.is_folded() { 1.0 } else { (1.5 / mapping.clearance(at, half)).max(1.0) };
-        let slack = TORN * (unresolved * f64::from(pole)).powi(16);
+        // Rays about a pole or a corner do not add up either, but miss nothing.
+        let pole = f64::from((1.5 / mapping.clearance(at, half)).max(1.0));
+        let slack = TORN * (unresolved * pole).powi(16);
         let norm = norm.max((1.0 - slack).max(1e-3) * exact).min((1.0 + slack) * exact);
         self.scale = (f64::from(caster.cross_section) / norm) as f32;
     }
@@ -99,8 +99,8 @@ pub(crate) fn sample_disc<M: Mapping>(mapping: &M, caster: &Caster, cell: u32, s
     let corner = Vec2::new((cell % columns) as f32, (cell / columns) as f32);
     let (mut weight, mut area, mut distance, mut total) = (0.0, 0.0, 0.0, 0.0);
     for k in 0..samples * samples {
-        let step = Vec2::new((k % samples) as f32 + 0.5, (k / samples) as f32 + 0.5);
-        let ray = mapping.ray(corner + step / samples as f32);
+        let step = Vec2::new(place(k % samples, samples), place(k / samples, samples));
+        let ray = mapping.ray(corner + step);
         let density = mapping.density(&ray);
         total += density;
         let Some(s) = meet_disc(caster, &ray, parallel) else { continue };
