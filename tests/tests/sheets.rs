@@ -106,16 +106,23 @@ fn a_volume_without_extinction_is_told() {
     let folder = tempfile::tempdir().unwrap();
     let grid = "NRRD0004\ntype: float\ndimension: 3\nsizes: 4 4 4\nencoding: ascii\n\n".to_owned() + &"0.5 ".repeat(64);
     std::fs::write(folder.path().join("grid.nrrd"), grid).unwrap();
-    let scene = parallel_view(6.0, 16)
-        + "[[object]]\nname = 'nothing'\nvolume = 'grid.nrrd'\ntransfer = [{ value = 0, color = [1, 1, 1], extinction = 0 }, \
-           { value = 0.6, color = [1, 1, 1], extinction = 0 }, { value = 1, color = [1, 1, 1], extinction = 2 }]\n";
-    std::fs::write(folder.path().join("scene.toml"), scene).unwrap();
-    let mut command = organza();
-    command.args(["render", "scene.toml", "--technique", "sheets", "-o", "a.exr"]).current_dir(&folder);
-    let out = command.output().unwrap();
-    let said = String::from_utf8(out.stderr).unwrap();
-    assert!(out.status.success(), "{said}");
-    assert!(said.contains("object 'nothing' shows nothing: its transfer function gives no value extinction"), "{said}");
+    let scene = |extinction: &str| {
+        let objects = "[[object]]\nname = 'nothing'\nvolume = 'grid.nrrd'\ntransfer = [{ value = 0, color = [1, 1, 1], extinction = E }, \
+             { value = 0.6, color = [1, 1, 1], extinction = E }, { value = 1, color = [1, 1, 1], extinction = 2 }]\n";
+        parallel_view(6.0, 16) + &objects.replace("= E", &format!("= {extinction}"))
+    };
+    let told = "shows nothing: its transfer function gives no value extinction";
+    let faint = "is too faint to be seen: no splat has an optical depth above";
+    for (technique, extinction, expected) in
+        [("sheets", "0", told), ("sheets", "1e-14", told), ("points", "0", "has no splats"), ("points", "1e-14", faint)]
+    {
+        std::fs::write(folder.path().join("scene.toml"), scene(extinction)).unwrap();
+        let mut command = organza();
+        let command = command.args(["render", "scene.toml", "--force", "--technique", technique, "-o", "a.exr"]);
+        let out = command.current_dir(&folder).output().unwrap();
+        let said = String::from_utf8(out.stderr).unwrap();
+        assert!(out.status.success() && said.contains(&format!("object 'nothing' {expected}")), "{technique}: {said}");
+    }
 }
 
 #[test]

@@ -180,6 +180,10 @@ impl Inputs<'_> {
         if cloud.is_empty() && own.is_empty() {
             warnings.push("the scene has no splats: only the background is drawn".into());
         }
+        for object in splat_core::optics::too_faint(&cloud, &materials, scene.objects.len()) {
+            let name = crate::shown(&scene.objects[object].name);
+            warnings.push(format!("object '{name}' is too faint to be seen: no splat has an optical depth above 2⁻⁴⁰"));
+        }
         Ok(Loaded {
             cloud,
             own,

@@ -9,7 +9,7 @@
 //!
 //! Source: Gunjee 2007, Eqs. 4-9 (Beer's law); the forms here do not cancel for small τ or α.
 
-use crate::Material;
+use crate::{Cloud, Material, SplatKind};
 
 /// Light that is no more than this, 2⁻⁹⁰ (8·10⁻²⁸), is a trace: an irradiance or a radiance that changes no picture. Its products
 /// with opacities and colours would be numbers below the normal ones of f32, whose arithmetic takes many times as long.
@@ -23,6 +23,23 @@ pub const FAINTEST: f32 = f32::from_bits((127 - 40) << 23);
 /// has a factor above 1.
 pub fn faintest(materials: &[Material]) -> f32 {
     FAINTEST / materials.iter().map(Material::greatest_extinction).fold(1.0, f32::max)
+}
+
+/// Which of so many objects nothing is seen of, by rising id: they have splats, all are translucent, and none has a mean optical depth
+/// above [`faintest`].
+///
+/// # Panics
+/// If an object of the cloud is out of range.
+pub fn too_faint(cloud: &Cloud, materials: &[Material], objects: usize) -> Vec<usize> {
+    let faintest = faintest(materials);
+    // Whether an object has splats, and one that is seen.
+    let mut of = vec![[false; 2]; objects];
+    for i in 0..cloud.len() {
+        let is_seen = cloud.kind[i] == SplatKind::Opaque || cloud.cross_section[i] > faintest * cloud.radius[i].powi(2);
+        let [has_splats, is_one_seen] = &mut of[cloud.object[i] as usize];
+        (*has_splats, *is_one_seen) = (true, *is_one_seen | is_seen);
+    }
+    (0..objects).filter(|object| of[*object] == [true, false]).collect()
 }
 
 /// How the opacity of a translucent surface depends on the angle at which it is crossed.

@@ -1,7 +1,7 @@
 //! Matter and light of which there is next to nothing: they change no picture, and cost no arithmetic of numbers below the normal ones.
 
 use glam::{DVec3, Vec3};
-use splat_core::optics::{FAINTEST, TRACE};
+use splat_core::optics::{FAINTEST, TRACE, too_faint};
 use splat_core::raster::{Detail, FoldInput, OpaqueImage, Params, ProjectInput, Projected, fold, project};
 use splat_core::shade::{ChannelLayout, LitBy, ShadeInput, shade};
 use splat_core::{Accumulator, Camera, Cloud, Direction, FootprintStack, Gaussians, LayerSet, Light, LightShape};
@@ -69,6 +69,17 @@ fn x6_matter_is_as_faint_as_its_material_makes_it() {
         project(&input).visible()
     };
     assert!(visible(1.0) == 0 && visible(1e6) > 30);
+}
+
+#[test]
+fn x6_objects_that_nothing_is_seen_of_are_named() {
+    let mut cloud = cloud(&[1e-2 * FAINTEST]);
+    // Object 1 has no splats, 3 a thin one, and 4 an opaque one.
+    (0..cloud.len()).for_each(|i| cloud.object[i] = [0, 2, 3, 4][i % 4]);
+    (cloud.cross_section[2], cloud.kind[3]) = (1e-6, SplatKind::Opaque);
+    assert_eq!(too_faint(&cloud, &[Material::default()], 9), [0, 2]);
+    assert_eq!(too_faint(&cloud, &[Material { extinction_rgb: [0.0, 0.0, 1e6], ..Material::default() }], 5), [0; 0]);
+    assert_eq!(too_faint(&Cloud::default(), &[Material::default()], 0), [0; 0]);
 }
 
 #[test]
