@@ -25,8 +25,8 @@ pub fn faintest(materials: &[Material]) -> f32 {
     FAINTEST / materials.iter().map(Material::greatest_extinction).fold(1.0, f32::max)
 }
 
-/// Which of so many objects nothing is seen of, by rising id: they have splats, all are translucent, and none has a mean optical depth
-/// above [`faintest`].
+/// Which of so many objects nothing is seen of, by rising id: they have splats, all of media, and none has a mean optical depth above
+/// [`faintest`]. Surfaces may be clear and yet bend light.
 ///
 /// # Panics
 /// If an object of the cloud is out of range.
@@ -35,7 +35,7 @@ pub fn too_faint(cloud: &Cloud, materials: &[Material], objects: usize) -> Vec<u
     // Whether an object has splats, and one that is seen.
     let mut of = vec![[false; 2]; objects];
     for i in 0..cloud.len() {
-        let is_seen = cloud.kind[i] == SplatKind::Opaque || cloud.cross_section[i] > faintest * cloud.radius[i].powi(2);
+        let is_seen = cloud.kind[i] != SplatKind::Medium || cloud.cross_section[i] > faintest * cloud.radius[i].powi(2);
         let [has_splats, is_one_seen] = &mut of[cloud.object[i] as usize];
         (*has_splats, *is_one_seen) = (true, *is_one_seen | is_seen);
     }

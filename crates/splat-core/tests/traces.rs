@@ -74,9 +74,10 @@ fn x6_matter_is_as_faint_as_its_material_makes_it() {
 #[test]
 fn x6_objects_that_nothing_is_seen_of_are_named() {
     let mut cloud = cloud(&[1e-2 * FAINTEST]);
-    // Object 1 has no splats, 3 a thin one, and 4 an opaque one.
+    // Object 1 has no splats, 3 a thin one, and 4 a clear surface.
+    cloud.kind.fill(SplatKind::Medium);
     (0..cloud.len()).for_each(|i| cloud.object[i] = [0, 2, 3, 4][i % 4]);
-    (cloud.cross_section[2], cloud.kind[3]) = (1e-6, SplatKind::Opaque);
+    (cloud.cross_section[2], cloud.kind[3]) = (1e-6, SplatKind::Surface);
     assert_eq!(too_faint(&cloud, &[Material::default()], 9), [0, 2]);
     assert_eq!(too_faint(&cloud, &[Material { extinction_rgb: [0.0, 0.0, 1e6], ..Material::default() }], 5), [0; 0]);
     assert_eq!(too_faint(&Cloud::default(), &[Material::default()], 0), [0; 0]);
