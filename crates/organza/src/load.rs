@@ -177,13 +177,7 @@ impl Inputs<'_> {
         let exponent = normalize(&mut cloud, &mut own, &mut camera, (&mut lights, &mut images.slides));
         cloud.canonicalize();
         cloud.validate().map_err(|e| out_of_range(scene, &cloud, e))?;
-        if cloud.is_empty() && own.is_empty() {
-            warnings.push("the scene has no splats: only the background is drawn".into());
-        }
-        for object in splat_core::optics::too_faint(&cloud, &materials, scene.objects.len()) {
-            let name = crate::shown(&scene.objects[object].name);
-            warnings.push(format!("object '{name}' is too faint to be seen: no splat has an optical depth above 2⁻⁴⁰"));
-        }
+        warnings.extend(unseen(scene, &cloud, &materials, own.is_empty()));
         Ok(Loaded {
             cloud,
             own,
@@ -230,6 +224,16 @@ fn materials(scene: &Scene, prepared: &[Prepared<'_>]) -> Vec<Material> {
 /// What the planner asks of all lights.
 pub(crate) fn light_statistics(lights: &[SceneLight]) -> Vec<LightStatistics> {
     lights.iter().map(LightStatistics::of_light).collect()
+}
+
+/// What to say of splats that nothing is seen of, where there may be nothing else.
+fn unseen(scene: &Scene, cloud: &Cloud, materials: &[Material], is_all: bool) -> Vec<String> {
+    if cloud.is_empty() && is_all {
+        return vec!["the scene has no splats: only the background is drawn".into()];
+    }
+    let faint = splat_core::optics::too_faint(cloud, materials, scene.objects.len());
+    let names = faint.into_iter().map(|object| crate::shown(&scene.objects[object].name));
+    names.map(|it| format!("object '{it}' is too faint to be seen: no splat has an optical depth above 2⁻⁴⁰")).collect()
 }
 
 /// One cloud around the least of all origins: a place that does not depend on the order of objects, and that moves with

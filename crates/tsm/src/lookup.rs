@@ -194,20 +194,8 @@ impl ShadowMap {
                 is_dark[r][k] = opaque.is_some_and(|d| *d < surface);
             }
         }
-        // Nothing counts behind what is opaque.
-        let spans = |lists: &Lists<C>| {
-            let mut spans: Four<_, R> = [[[0; 2]; 4]; R];
-            for r in 0..n {
-                for k in 0..4 {
-                    if let Some(cell) = cells[r][k].filter(|_| !is_dark[r][k]) {
-                        spans[r][k] = lists.span(cell);
-                    }
-                }
-            }
-            spans
-        };
         if let Some(lists) = &matter.media {
-            let spans = spans(lists);
+            let spans = spans(lists, cells, &is_dark, n);
             let begin = lists.places(&spans, &nearest, n, |d, nearest| d <= nearest);
             for r in 0..n {
                 for k in 0..4 {
@@ -217,7 +205,7 @@ impl ShadowMap {
             }
         }
         if let Some(lists) = &matter.surfaces {
-            let spans = spans(lists);
+            let spans = spans(lists, cells, &is_dark, n);
             let begin = lists.places(&spans, &surfaces, n, |d, surface| d < surface);
             for r in 0..n {
                 for k in 0..4 {
@@ -238,6 +226,25 @@ impl ShadowMap {
         }
         through
     }
+}
+
+/// The lists of the cells about the first `n` receivers: nothing counts behind what is opaque.
+#[inline(always)]
+fn spans<const C: usize, const R: usize>(
+    lists: &Lists<C>,
+    cells: &Four<Option<u32>, R>,
+    is_dark: &Four<bool, R>,
+    n: usize,
+) -> Four<[u32; 2], R> {
+    let mut spans = [[[0; 2]; 4]; R];
+    for r in 0..n {
+        for k in 0..4 {
+            if let Some(cell) = cells[r][k].filter(|_| !is_dark[r][k]) {
+                spans[r][k] = lists.span(cell);
+            }
+        }
+    }
+    spans
 }
 
 /// The four cells about a place, and their bilinear weights.
@@ -355,9 +362,7 @@ fn column<S: Simd, const C: usize>(simd: S, of: &[[f32; C]; WINDOW], from: usize
 #[inline(always)]
 fn added(of: &[f32; WINDOW]) -> f32 {
     let mut four = Vec4::ZERO;
-    for l in (0..WINDOW).step_by(4) {
-        four += Vec4::from_slice(&of[l..]);
-    }
+    (0..WINDOW).step_by(4).for_each(|l| four += Vec4::from_slice(&of[l..]));
     (four.x + four.z) + (four.y + four.w)
 }
 
