@@ -13,7 +13,7 @@ use crate::ShadowMap;
 use crate::deposit::plane_distance;
 use crate::mapping::{Mapping, Place, floor, with_mapping};
 use crate::shadow_map::{Absorbances, Matter};
-use crate::table::{List, Lists, WINDOW};
+use crate::table::{ENOUGH, List, Lists, WINDOW};
 use glam::{Vec2, Vec3, Vec4};
 use pulp::{Simd, WithSimd};
 use splat_core::raster::lanes::{Lanes, exp_neg};
@@ -373,10 +373,8 @@ fn steps<const C: usize>(list: List<'_, C>, begin: usize, distance: f32) -> [f32
         return list.total_of(begin);
     }
     let (at, _) = list.window(begin);
-    let left = (list.len() - begin).min(WINDOW) as i32;
-    let mut before = 0;
-    (0..WINDOW).for_each(|l| before += i32::from(((l as i32) < left) & (at[l] < distance)));
-    list.total_of(begin + before as usize)
+    let before = |l: &usize| (*l < list.len() - begin) & (at[*l] < distance);
+    list.total_of(begin + (0..ENOUGH).filter(before).count())
 }
 
 #[cfg(test)]
@@ -490,7 +488,7 @@ mod tests {
                 for (found, k) in found.into_iter().zip(0..) {
                     let list = lists.list(cells[k]);
                     let before = list.distance().partition_point(|d| *d < bounds[k]);
-                    assert!((found..=found + WINDOW).contains(&before), "{found} for {before}");
+                    assert!((found..=found + ENOUGH).contains(&before), "{found} for {before}");
                     assert_eq!(steps(list, found, bounds[k]), list.total_of(before));
                 }
             }

@@ -9,7 +9,7 @@ mod list;
 
 use crate::entries::Entries;
 use crate::sort::sort;
-pub(crate) use list::List;
+pub(crate) use list::{ENOUGH, List};
 use rayon::prelude::*;
 use splat_core::raster::lanes::MAX_LANES;
 use std::ops::Range;

@@ -4,7 +4,7 @@ use super::{Lists, WINDOW};
 use std::hint::select_unpredictable;
 
 /// Entries among which a place need not be told: so few of a [`WINDOW`] that what a receiver is within most often lies in it too.
-const ENOUGH: u32 = 4;
+pub(crate) const ENOUGH: usize = 4;
 
 /// The sorted entries of one cell: equal distances are one, and nothing follows the visible limit.
 #[derive(Debug, Clone, Copy)]
@@ -72,7 +72,7 @@ impl<const C: usize> Lists<C> {
     }
 
     /// Places in the lists of four cells about each of `n` receivers, so that every entry before one comes before the bound of its
-    /// list, and none does from [`WINDOW`] entries behind it on. All are searched at once and without branches: a search by halves
+    /// list, and none does from [`ENOUGH`] entries behind it on. All are searched at once and without branches: a search by halves
     /// waits for memory at every step, all of them wait together, and where they go on cannot be foreseen.
     #[inline(always)]
     pub(crate) fn places<const R: usize>(
@@ -90,7 +90,7 @@ impl<const C: usize> Lists<C> {
                 most = most.max(size[r][k]);
             }
         }
-        while most > ENOUGH {
+        while most > ENOUGH as u32 {
             for r in 0..n {
                 let mut middle = [0.0; 4];
                 for k in 0..4 {
