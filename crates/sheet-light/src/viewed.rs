@@ -289,9 +289,9 @@ impl Viewed {
         let scale = self.scale(far).unwrap_or(self.focal);
         let [xx, xy, yy] = self.extent_px(scale).map(|m| m / (scale * scale));
         let pixel = if gradient { 1.0 / scale } else { 0.0 };
-        let along = 2.0 * (self.reach + self.rounding) + (SLABS + if is_near { 2.0 } else { 0.0 }) * slabs.width;
         // Kernels, and the corners of a cell, between which shadows are interpolated.
         let twice = 1.0 + (libm::sqrt(3.0) / kernel.extent).max(1.0);
+        let along = twice * self.reach + 2.0 * self.rounding + (SLABS + if is_near { 2.0 } else { 0.0 }) * slabs.width;
         let rays = corner_rays(camera);
         let reach = |n: DVec3| {
             // Rows of pixels run down, view space up.

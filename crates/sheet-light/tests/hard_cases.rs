@@ -14,7 +14,9 @@ fn ia02_a_flat_field_is_flat() {
     // Sums of kernels ripple by some percent, and colour and extinction follow the value: what is left of it shows.
     let (tf, material) = (transfer(&[(0.0, 0.0), (1.0, 0.5), (2.0, 0.1)]), unlit());
     let camera = parallel([1.0, 2.0, 12.0], 2.0, [64, 64]);
-    let (cartesian, bcc) = (grid([16; 3], cubic(0.5), |_| 0.6), body_centred([11, 11, 22], 8.0, |_| 0.6));
+    let (mut cartesian, mut bcc) = (grid([16; 3], cubic(0.5), |_| 0.6), body_centred([11, 11, 22], 8.0, |_| 0.6));
+    // Far beside the picture values are others: sums are of differences to the middle of all, which else were 0.
+    (cartesian.values[0], bcc.planes.values[0]) = (2.0, 2.0);
     for volume in [volume(&cartesian, &tf, &material), bcc_volume(&bcc, &tf, &material)] {
         for sigma in [0.5, 0.7, 1.0] {
             let params = Params { kernel: KernelShape { extent: 2.0, sigma }, ..exact() };

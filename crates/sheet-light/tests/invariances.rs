@@ -1,8 +1,8 @@
 //! What must not change a picture.
 
 use crate::common::{
-    BEAUTY, apart, constant, cubic, draw, exact, grid, input, moved_noise, noise, parallel, perspective, transfer,
-    unlit, volume,
+    BEAUTY, apart, constant, cubic, draw, exact, grid, input, largest, moved_noise, noise, parallel, perspective,
+    transfer, unlit, volume,
 };
 use sheet_light::{Params, prepare};
 use splat_core::glam::{DMat3, DQuat, DVec3};
@@ -105,6 +105,27 @@ fn ia10_a_volume_that_turns_with_the_camera_looks_the_same() {
     let still = turned(0.0);
     assert!(apart(&still, &turned(90.0)) < 1e-3, "{}", apart(&still, &turned(90.0)));
     assert!(apart(&still, &turned(37.0)) < 1e-3, "{}", apart(&still, &turned(37.0)));
+}
+
+/// Rows of pixels run down and columns to the right: what is told of one must hold of the other.
+#[test]
+fn ia10_a_camera_that_rolls_sees_the_picture_turned() {
+    let (tf, material) = (transfer(&[(0.3, 0.0), (0.5, 0.4), (0.9, 2.5)]), Material::default());
+    let grid = grid([16, 16, 16], cubic(0.5), noise);
+    let mut volumes = [volume(&grid, &tf, &material)];
+    volumes[0].normals = true;
+    let (n, lights) = (60, [sun()]);
+    for upright in [perspective([2.0, 3.0, 9.0], 50.0, [60, 60]), parallel([2.0, 3.0, 9.0], 8.0, [60, 60])] {
+        let rolled =
+            Camera::look_at(upright.position, DVec3::ZERO, upright.axes[0], upright.projection, [60, 60]).unwrap();
+        let [one, other] =
+            [&upright, &rolled].map(|camera| draw(&input(&volumes, camera, &lights), &exact()).unwrap().0);
+        for c in 0..3 {
+            let turned: Vec<f32> = (0..n * n).map(|at| one.channels[c][at % n * n + n - 1 - at / n]).collect();
+            let off = largest(&turned, &other.channels[c]);
+            assert!(off < 1e-4, "channel {c}: {off:e}");
+        }
+    }
 }
 
 #[test]

@@ -13,6 +13,7 @@ mod invariances;
 mod modes;
 mod panes;
 mod precision;
+mod skipped;
 mod splats;
 mod strides;
 mod twin;

@@ -29,6 +29,8 @@ pub(crate) mod scene;
 pub(crate) mod slant;
 pub(crate) mod streams;
 mod surface;
+#[cfg(test)]
+mod tests;
 mod through_splats;
 
 use super::{HalfParams, Scattering};

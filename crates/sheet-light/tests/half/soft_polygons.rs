@@ -102,6 +102,20 @@ fn hv09_penumbras_of_a_volume_on_polygons_are_as_wide_as_similar_triangles_say_w
     }
 }
 
+/// Points of the light look for the volume far beside its images.
+#[test]
+fn hv08_polygons_beside_a_volume_keep_all_their_light() {
+    let (blocks, floor) =
+        (&[block([-0.3, -0.3, 1.9], [0.3, 0.3, 2.1], 0.1)][..], wall([0.0; 3], [1.6, 0.0, 0.0], [0.0, 0.4, 0.0]));
+    let bench = Bench { blocks, walls: &[], haze: None, floor: Some(&floor) };
+    for kind in 0..3 {
+        let profile = bench.profile(&extended(above(kind, 0.3), 32), &from_aside(), &fine(50.0));
+        let (beside, below): (Vec<[f64; 2]>, Vec<[f64; 2]>) = profile.iter().partition(|[x, _]| x.abs() > 0.8);
+        assert!(beside.len() > 30 && beside.iter().all(|[_, light]| (light - 1.0).abs() < 1e-6), "{kind}: {beside:?}");
+        assert!(below.iter().any(|[_, light]| *light < 0.1), "{kind}: {below:?}");
+    }
+}
+
 #[test]
 fn hv09_penumbras_of_polygons_on_polygons_are_as_wide_as_similar_triangles_say() {
     let (walls, floor) = (&[half_plane()][..], wall([0.0; 3], [1.6, 0.0, 0.0], [0.0, 0.4, 0.0]));

@@ -208,6 +208,23 @@ mod tests {
     }
 
     #[test]
+    fn ms03_what_comes_through_a_layer_fades_with_its_depth_until_it_is_next_to_nothing() {
+        for (omega, g) in [(0.0, 0.0), (0.5, 0.3), (0.9, -0.2), (0.999, 0.5)] {
+            let own = Layer::new(&Optics { tau: 1e4, omega, asymmetry: g }).own;
+            let sum = 2.0 * (1.0 - omega) + 2.0 * back(omega, g);
+            let k = libm::sqrt(2.0 * (1.0 - omega) * sum);
+            for depth in [12.0, 20.0, 40.0, 79.9] {
+                let found = Layer::new(&Optics { tau: depth / k, omega, asymmetry: g });
+                // Y/sinh kτ where the other power of e is no more.
+                let expected = 2.0 * k / sum * exp(-depth);
+                assert!((found.through / expected - 1.0).abs() < 1e-9, "kτ {depth}: {found:?}, not {expected:e}");
+                assert!((found.own / own - 1.0).abs() < 1e-9, "kτ {depth}: {found:?}, not {own}");
+            }
+            assert_eq!(Layer::new(&Optics { tau: 80.1 / k, omega, asymmetry: g }).through, 0.0);
+        }
+    }
+
+    #[test]
     fn what_is_scattered_out_of_a_beam_is_all_there_without_absorption() {
         for tau in [1e-7, 1e-4, 1e-3, 0.1, 1.0, 30.0, 1e4] {
             let layer = Layer::new(&Optics { tau, omega: 1.0, asymmetry: 0.4 });
