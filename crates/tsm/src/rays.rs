@@ -28,6 +28,9 @@ pub(crate) struct Rays<'a, M: Mapping> {
     pub(crate) cells: &'a mut Vec<(u32, f32, f32)>,
 }
 
+/// Most rays along a side of a cell.
+pub(crate) const MOST_SAMPLES: u32 = 32;
+
 /// Place of a ray along the side of a cell that has so many. An even number of them lie in pairs, each as two points of Gauss's rule:
 /// where the table is creased along edges of cells, rays at even distances would miss a share of a footprint that goes as the square of these.
 #[inline(always)]
@@ -90,13 +93,15 @@ impl<M: Mapping> Rays<'_, M> {
         let per_cell = (self.samples * self.samples) as usize;
         let total = self.window.len() * per_cell;
         let mut window = self.window.iter();
+        let mut places = [0.0; MOST_SAMPLES as usize];
+        (0..self.samples).for_each(|k| places[k as usize] = place(k, self.samples));
         // Density, weight, area and weighted distance of the cell that is being summed, and how many rays it has so far.
         let (mut sums, mut count) = ([0.0f32; 4], 0);
         for begin in (0..total).step_by(LANES) {
             let rays = if self.samples == 1 {
                 self.rays_of_centres(begin)
             } else {
-                self.rays_within(begin / per_cell, begin % per_cell)
+                self.rays_within(&places, begin / per_cell, begin % per_cell)
             };
             let found = self.look(&rays);
             for l in 0..LANES.min(total - begin) {
@@ -135,7 +140,7 @@ impl<M: Mapping> Rays<'_, M> {
 
     /// Rays on a lattice within each cell, from a ray of a cell of the window on.
     #[inline(always)]
-    fn rays_within(&self, mut cell: usize, ray: usize) -> RayLanes {
+    fn rays_within(&self, places: &[f32; MOST_SAMPLES as usize], mut cell: usize, ray: usize) -> RayLanes {
         let samples = self.samples as usize;
         let (mut i, mut j) = (ray % samples, ray / samples);
         let mut corner = [[0.0; LANES]; 2];
@@ -143,7 +148,7 @@ impl<M: Mapping> Rays<'_, M> {
         for l in 0..LANES {
             let [_, column, row] = self.window[cell.min(self.window.len() - 1)];
             (corner[0][l], corner[1][l]) = (column as f32, row as f32);
-            (step[0][l], step[1][l]) = (place(i as u32, self.samples), place(j as u32, self.samples));
+            (step[0][l], step[1][l]) = (places[i], places[j]);
             i += 1;
             (i, j) = if i == samples { (0, j + 1) } else { (i, j) };
             (j, cell) = if j == samples { (0, cell + 1) } else { (j, cell) };

@@ -6,7 +6,7 @@
 
 use crate::caster::Caster;
 use crate::mapping::{Mapping, Ray};
-use crate::rays::{Rays, place};
+use crate::rays::{MOST_SAMPLES, Rays, place};
 use crate::reference::erf;
 use glam::{Vec2, Vec3};
 use splat_core::optics::SurfaceOpacity;
@@ -76,7 +76,7 @@ impl Sampled {
     pub(crate) fn sweep<M: Mapping>(&mut self, mapping: &M, caster: &Caster) {
         let [columns, rows] = mapping.size();
         let side = (mapping.measure((rows / 2) * columns + columns / 2).max(0.0) as f32).sqrt();
-        let samples = (RESOLVED * side / NEAR).ceil().clamp(1.0, 32.0) as u32;
+        let samples = (RESOLVED * side / NEAR).ceil().clamp(1.0, MOST_SAMPLES as f32) as u32;
         self.window.clear();
         self.window.extend((0..columns * rows).map(|cell| [cell, cell % columns, cell / columns]));
         self.cells.clear();
