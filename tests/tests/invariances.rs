@@ -95,9 +95,20 @@ fn x2_shifting_by_ten_million_changes_nothing_visible() {
 fn x8_light_is_additive_and_layers_sum_to_beauty() {
     let text = scene(1.0, 0.0, false);
     let all = draw(&text, &[]);
+    // Drawn as one colour, which nobody summed.
+    let plain = draw(&text.replace("layers = ['effects', 'depth', 'shadow']\n", ""), &[]);
     for c in ["R", "G", "B"] {
-        let largest = largest_difference(&sum_of_effects(&all, c), &all.channel(c));
+        let largest = largest_difference(&sum_of_effects(&all, c), &plain.channel(c));
         assert!(largest < 1e-5, "channel {c}: {largest:e}");
+    }
+    let objects = text.find("[[object]]").unwrap();
+    let lamps: Vec<&str> = text[..objects].split("[[light]]").collect();
+    let [first, second] = [1, 2].map(|k| draw(&format!("{}[[light]]{}{}", lamps[0], lamps[k], &text[objects..]), &[]));
+    for effect in ["direct.G", "scatter1.G"] {
+        let both: Vec<f64> = first.channel(effect).iter().zip(second.channel(effect)).map(|(a, b)| a + b).collect();
+        let brightest = both.iter().copied().fold(0.0, f64::max);
+        let largest = largest_difference(&both, &all.channel(effect));
+        assert!(largest <= 1e-6 * brightest, "{effect} of two lights: {largest:e} of {brightest}");
     }
     let brighter = text.replace("20.0, 20.0, 20.0", "40.0, 40.0, 40.0").replace("0.5, 0.5, 0.5", "1.0, 1.0, 1.0");
     let twice: Vec<f64> = all.channel("direct.G").iter().map(|v| 2.0 * v).collect();

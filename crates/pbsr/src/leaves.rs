@@ -40,11 +40,15 @@ const CLEAR: f64 = 0.5 * TURN;
 /// The largest 1/|n_k| in a graph; √3 on a plane.
 const STEEPEST: f64 = 2.5;
 
-/// The most times that a cube is halved, that a graph is for one evaluation a line, and the number of leaves beyond which
-/// none is.
+/// The most times that a cube is halved, that a graph is for one evaluation a line, and the number of leaves beyond which no open leaf
+/// is; beyond half of it no graph is.
 const LEVELS: u32 = 5;
 const GRAPH_LEVELS: u32 = 2;
 const LEAVES: usize = 1 << 18;
+
+/// That number where a set has as many lines. A rough surface, such as one through the
+/// points of a scan, would have most of its lines in open leaves otherwise, where each is searched.
+const MOST_LEAVES: usize = 1 << 20;
 
 /// Places in a cube where the gradient is looked at beside its corners, on no lattice.
 const INSIDE: [DVec3; 4] = [
@@ -114,16 +118,19 @@ fn along(axis: u8, p: DVec3) -> f64 {
 
 impl Leaf {
     /// All leaves of some cells, level by level, those of larger cubes first; and the cubes, as open leaves, that were
-    /// taken for empty though no bound says so.
-    pub(crate) fn all(surface: &ImplicitSurface<'_>, cells: &Cells) -> (Vec<Self>, Vec<Self>) {
+    /// taken for empty though no bound says so. A set has so many particles on a unit of area.
+    pub(crate) fn all(surface: &ImplicitSurface<'_>, cells: &Cells, per_area: f64) -> (Vec<Self>, Vec<Self>) {
         let (mut leaves, mut empty) = (Vec::new(), Vec::new());
         let (mut cubes, mut side) = (cells.active.clone(), cells.side);
+        let open = Self { corner: DVec3::ZERO, side, graph: None };
+        let lines = open.reach() * per_area * cubes.len() as f64;
+        let most = (lines as usize).clamp(LEAVES, MOST_LEAVES);
         for level in 0..=LEVELS {
             let looks: Vec<Look> = cubes.par_iter().map(|corner| look(surface, *corner, side)).collect();
             let poor = |error: f64| looks.iter().filter(|l| l.is_poor(error)).count();
             let some = looks.iter().filter(|l| !matches!(l, Look::Empty)).count();
             // A surface meets four in eight cubes or so.
-            let room = |error: f64| if error == GOOD { LEAVES / 2 } else { LEAVES };
+            let room = |error: f64| if error == GOOD { LEAVES / 2 } else { most };
             let fits = |error: &f64| level < LEVELS && leaves.len() + some + 3 * poor(*error) <= room(*error);
             // Where graphs would become too many, open leaves alone are divided: their lines cost the most.
             let wanted = [GOOD, USABLE].into_iter().skip(usize::from(level >= GRAPH_LEVELS));
@@ -340,4 +347,49 @@ fn foot(surface: &ImplicitSurface<'_>, middle: DVec3, side: f64) -> Option<(DVec
         }
     }
     None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use splat_core::{DAabb, ScalarField};
+
+    /// A plane folded into ridges that are 0.01 apart along x and along y.
+    struct Ridges;
+
+    /// The distance to the nearest multiple of 0.02, and its slope.
+    fn ridge(x: f64) -> (f64, f64) {
+        let off = x - 0.02 * (x / 0.02).round();
+        (off.abs(), off.signum())
+    }
+
+    impl ScalarField for Ridges {
+        fn value(&self, p: DVec3) -> f64 {
+            p.z - ridge(p.x).0 - ridge(p.y).0
+        }
+        fn gradient(&self, p: DVec3) -> DVec3 {
+            DVec3::new(-ridge(p.x).1, -ridge(p.y).1, 1.0)
+        }
+        fn hessian(&self, _: DVec3) -> DMat3 {
+            DMat3::ZERO
+        }
+        fn bound(&self, p: DVec3, radius: f64) -> Option<(f64, f64)> {
+            Some((p.z - radius - 0.02, p.z + radius))
+        }
+    }
+
+    #[test]
+    fn rough_surfaces_are_divided_as_far_as_a_set_has_lines() {
+        let bounds = DAabb::around(DVec3::ZERO, DVec3::ONE);
+        let surface = ImplicitSurface { field: &Ridges, level: 0.0, bounds, inside: None };
+        let cells = Cells::new(&surface, 24);
+        let of = |per_area: f64| {
+            let (leaves, _) = Leaf::all(&surface, &cells, per_area);
+            (leaves.len(), leaves.iter().filter(|leaf| leaf.graph.is_some()).count())
+        };
+        let (few, many) = (of(1e3), of(1e6));
+        assert!(few.0 <= LEAVES && (LEAVES..=MOST_LEAVES).contains(&many.0), "{few:?}, {many:?}");
+        // Between the ridges there are graphs.
+        assert!(few.1 < 100 && many.1 > 100_000, "{few:?}, {many:?}");
+    }
 }

@@ -142,9 +142,9 @@ impl<'a> LineSampler<'a> {
         let cells = Cells::new(surface, resolution);
         let empty = |reason| Error::Empty { what: "an implicit surface", reason };
         let origin = cells.middle().ok_or(empty("the field's bound excludes the level in the whole box"))?;
-        let (leaves, empty_cubes) = Leaf::all(surface, &cells);
         // A density factor multiplies optical depth.
         let per_area = params.particles_per_area() * density.as_ref().map_or(1.0, |d| d.max);
+        let (leaves, empty_cubes) = Leaf::all(surface, &cells, per_area);
         let blocks = Blocks::new(leaves.len(), |l| leaves[l].reach() * per_area)?;
         let mut sum = 0.0;
         let reaches: Vec<f64> = leaves.iter().map(|l| (sum += l.reach(), sum).1).collect();
