@@ -36,7 +36,7 @@ pub(crate) const MOST_SAMPLES: u32 = 32;
 #[inline(always)]
 pub(crate) fn place(ray: u32, of: u32) -> f32 {
     const FROM_MIDDLE: f32 = 0.577_350_26;
-    let ray_of_pair = if ray % 2 == 0 { -FROM_MIDDLE } else { FROM_MIDDLE };
+    let ray_of_pair = if ray.is_multiple_of(2) { -FROM_MIDDLE } else { FROM_MIDDLE };
     let in_pairs = ((ray / 2 * 2 + 1) as f32 + ray_of_pair) / of as f32;
     if of.is_multiple_of(2) { in_pairs } else { (ray as f32 + 0.5) / of as f32 }
 }
