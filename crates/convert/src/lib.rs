@@ -69,6 +69,7 @@ mod neighbours;
 mod orient;
 #[cfg(feature = "read")]
 mod outline;
+#[cfg(feature = "read")]
 mod outwards;
 mod params;
 mod pieces;
@@ -144,6 +145,7 @@ pub use mesh_points::{MeshParams, MeshReport, flatten_leaning, mesh_to_points, m
 pub use mpu::{MpuField, MpuParams, MpuReport, points_to_field};
 #[cfg(feature = "surfels")]
 pub use orient::Orientation;
+#[cfg(feature = "read")]
 pub use outline::Outline;
 pub use params::{Density, SplatParams};
 #[cfg(feature = "surfels")]

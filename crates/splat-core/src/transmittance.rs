@@ -1,7 +1,6 @@
 //! How much light arrives: the noun between shadow maps and shading.
 
 use crate::SplatKind;
-use crate::raster::lanes::MAX_LANES;
 use glam::Vec3;
 
 /// What receives light.
@@ -18,7 +17,7 @@ pub struct Receiver {
 }
 
 /// The most splats whose light is asked for together.
-pub const TOGETHER: usize = MAX_LANES;
+pub const TOGETHER: usize = 16;
 
 /// Mean transmittance of several, as to the points of one light; at least one.
 pub struct MeanTransmittance<'a>(pub Vec<&'a dyn Transmittance>);

@@ -5,11 +5,14 @@ use super::point::{Incoming, is_attenuated, passing};
 use super::{ChannelLayout, LitBy, Radiance, ShadeInput, facing, receiver, shadow_share};
 use crate::optics::TRACE;
 use crate::raster::lanes::{Lanes, MAX_LANES};
-use crate::{LightShape, Shading};
+use crate::{LightShape, Shading, TOGETHER};
 use glam::{DVec3, Vec3};
 use pulp::Simd;
 use std::f32::consts::PI;
 use std::ops::Range;
+
+// A batch is asked for at once.
+const _: () = assert!(MAX_LANES <= TOGETHER);
 
 /// One number for each splat of a batch.
 type Column = [f32; MAX_LANES];
