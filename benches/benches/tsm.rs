@@ -103,18 +103,14 @@ fn benches(c: &mut Criterion) {
     }
 }
 
-fn receiver(cloud: &Cloud, i: usize) -> Receiver {
-    Receiver { position: cloud.position[i], normal: cloud.normal_of(i), radius: cloud.radius[i], kind: cloud.kind[i] }
-}
-
 /// One by one, by one thread.
 fn look_up(map: &ShadowMap, cloud: &Cloud, ids: &[usize]) -> f32 {
-    ids.iter().map(|i| map.transmittance(&receiver(cloud, *i))[0]).sum()
+    ids.iter().map(|i| map.transmittance(&Receiver::of_splat(cloud, *i))[0]).sum()
 }
 
 fn look_up_together(map: &ShadowMap, cloud: &Cloud, ids: &[usize]) -> f32 {
     let of = |ids: &[usize]| -> f32 {
-        let light = map.at_splats(ids, &|i| receiver(cloud, i));
+        let light = map.at_splats(ids, &|i| Receiver::of_splat(cloud, i));
         light[..ids.len()].iter().map(|[red, ..]| red).sum()
     };
     ids.par_chunks(TOGETHER).with_min_len(256).map(of).sum()

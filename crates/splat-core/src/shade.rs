@@ -172,14 +172,8 @@ fn shadow_share(input: &ShadeInput<'_>, i: usize) -> f32 {
 /// Share of a light of this irradiance, with this shadow, that arrives at splat `i`.
 #[inline]
 fn received(input: &ShadeInput<'_>, i: usize, shadow: Option<&dyn Transmittance>, irradiance: [f32; 3]) -> [f32; 3] {
-    let shadow = shadow.map(|shadow| move || shadow.at_splat(i, &receiver(input.cloud, i)));
+    let shadow = shadow.map(|shadow| move || shadow.at_splat(i, &Receiver::of_splat(input.cloud, i)));
     arriving(irradiance, shadow_share(input, i), shadow)
-}
-
-/// Splat `i` as it receives light.
-#[inline]
-fn receiver(cloud: &Cloud, i: usize) -> Receiver {
-    Receiver { position: cloud.position[i], normal: cloud.normal_of(i), radius: cloud.radius[i], kind: cloud.kind[i] }
 }
 
 /// The point that splat `i` is shaded as.

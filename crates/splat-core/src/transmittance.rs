@@ -1,6 +1,6 @@
 //! How much light arrives: the noun between shadow maps and shading.
 
-use crate::SplatKind;
+use crate::{Cloud, SplatKind};
 use glam::Vec3;
 
 /// What receives light.
@@ -14,6 +14,17 @@ pub struct Receiver {
     pub radius: f32,
     /// A medium shadows itself, a surface does not.
     pub kind: SplatKind,
+}
+
+impl Receiver {
+    /// Splat `i` of a cloud as it receives light.
+    ///
+    /// # Panics
+    /// If there is no such splat.
+    #[inline]
+    pub fn of_splat(cloud: &Cloud, i: usize) -> Self {
+        Self { position: cloud.position[i], normal: cloud.normal_of(i), radius: cloud.radius[i], kind: cloud.kind[i] }
+    }
 }
 
 /// The most splats whose light is asked for together.
@@ -52,6 +63,9 @@ pub trait Transmittance: Sync {
     }
 
     /// The same, to the bit, for some splats, at most [`TOGETHER`], in their order: of many this takes less time. `receiver` tells each.
+    ///
+    /// # Panics
+    /// It may, if there are more.
     fn at_splats(&self, splats: &[usize], receiver: &dyn Fn(usize) -> Receiver) -> [[f32; 3]; TOGETHER] {
         let mut light = [[0.0; 3]; TOGETHER];
         light.iter_mut().zip(splats).for_each(|(light, splat)| *light = self.at_splat(*splat, &receiver(*splat)));

@@ -169,7 +169,7 @@ fn ts13_objects_that_cast_no_shadow_leave_no_trace() {
 fn ts16_deposits_keep_the_cross_section_in_any_table() {
     for (k, kind) in [SplatKind::Medium, SplatKind::Surface].into_iter().enumerate() {
         for n in [1, 3, 64, 200, 513, 1024, 4096] {
-            // The largest table takes most of the time: a corner of the octahedron, and two other places.
+            // The largest table takes most of the time: places beside three corners of the octahedron, and another one.
             for seed in if n > 1024 { 9..13 } else { 0..18 } {
                 let p = directions(10 * seed + k as u64) * 2.0;
                 let mut cloud = Cloud::new(DVec3::ZERO);

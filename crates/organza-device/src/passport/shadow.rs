@@ -62,13 +62,7 @@ impl ShadowInput {
         )
         .expect(valid);
         let map = deposits.clone().into_map();
-        let receiver = |i: usize| Receiver {
-            position: cloud.position[i],
-            normal: cloud.normal_of(i),
-            radius: cloud.radius[i],
-            kind: cloud.kind[i],
-        };
-        let receivers = (0..cloud.len()).map(receiver).collect();
+        let receivers = (0..cloud.len()).map(|i| Receiver::of_splat(&cloud, i)).collect();
         Self { cloud, casting, deposits, map, receivers, light }
     }
 

@@ -2,10 +2,10 @@
 //! [`Point::radiance`](super::Point::radiance) says of each, within rounding, by itself and whatever its neighbours are.
 
 use super::point::{Incoming, is_attenuated, passing};
-use super::{ChannelLayout, LitBy, Radiance, ShadeInput, facing, receiver, shadow_share};
+use super::{ChannelLayout, LitBy, Radiance, ShadeInput, facing, shadow_share};
 use crate::optics::TRACE;
 use crate::raster::lanes::{Lanes, MAX_LANES};
-use crate::{LightShape, Shading, TOGETHER};
+use crate::{LightShape, Receiver, Shading, TOGETHER};
 use glam::{DVec3, Vec3};
 use pulp::Simd;
 use std::f32::consts::PI;
@@ -117,7 +117,7 @@ impl<'a> Scattering<'a> {
                 }
             }
             if let Some(shadow) = lit.shadow {
-                let through = shadow.at_splats(asked, &|i| receiver(input.cloud, i));
+                let through = shadow.at_splats(asked, &|i| Receiver::of_splat(input.cloud, i));
                 for (i, through) in asked.iter().zip(through) {
                     of.share[i - first] = passing(through, shadow_share(input, *i));
                 }

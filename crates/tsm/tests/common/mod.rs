@@ -92,7 +92,7 @@ pub(crate) fn plane(centre: Vec3, normal: Vec3, n: i32, h: f32, kind: SplatKind,
 }
 
 pub(crate) fn receiver(cloud: &Cloud, i: usize) -> Receiver {
-    Receiver { position: cloud.position[i], normal: cloud.normal_of(i), radius: cloud.radius[i], kind: cloud.kind[i] }
+    Receiver::of_splat(cloud, i)
 }
 
 /// Random unit vector.
