@@ -124,73 +124,80 @@ impl<'a> Projector<'a> {
 
     #[inline(always)]
     fn project_chunk(&self, begin: usize, out: &mut [u32]) -> Extremes {
-        let range = begin..begin + out.len();
+        let mut extremes = Extremes::NONE;
         match self.ids {
-            None if self.cloud.tangent.is_empty() => {
-                self.project_columns(&self.cloud.position[range.clone()], &self.cloud.radius[range], out)
+            None => {
+                let (position, _) = self.cloud.position[begin..].as_chunks();
+                let (radius, _) = self.cloud.radius[begin..].as_chunks();
+                let (blocks, rest) = out.as_chunks_mut();
+                let mut id = begin;
+                for ((out, position), radius) in blocks.iter_mut().zip(position).zip(radius) {
+                    *out = self.project_block(position, radius, |l| Some(id + l), &mut extremes);
+                    id += LANES;
+                }
+                let last = id + rest.len();
+                self.project_gathered(|l| (id + l < last).then_some(id + l), rest, &mut extremes);
             }
-            None => self.project_each(|k| begin + k, out),
-            Some(ids) => self.project_each(|k| ids[begin + k] as usize, out),
-        }
-    }
-
-    /// The fast form: all splats, circular, columns as they lie.
-    #[inline(always)]
-    fn project_columns(&self, position: &[Vec3], radius: &[f32], out: &mut [u32]) -> Extremes {
-        let mut extremes = Extremes::NONE;
-        let (blocks, rest) = out.as_chunks_mut::<LANES>();
-        let (p, p_rest) = position.as_chunks::<LANES>();
-        let (r, r_rest) = radius.as_chunks::<LANES>();
-        for ((out, p), r) in blocks.iter_mut().zip(p).zip(r) {
-            for l in 0..LANES {
-                out[l] = self.one(l, p[l], r[l], r[l], &mut extremes);
+            Some(ids) => {
+                for (ids, out) in ids[begin..].chunks(LANES).zip(out.chunks_mut(LANES)) {
+                    self.project_gathered(|l| ids.get(l).map(|id| *id as usize), out, &mut extremes);
+                }
             }
-        }
-        for (l, ((out, p), r)) in rest.iter_mut().zip(p_rest).zip(r_rest).enumerate() {
-            *out = self.one(l, *p, *r, *r, &mut extremes);
         }
         extremes
     }
 
-    /// The general form: a subset, or elliptical discs. What a block needs is gathered first; the rest is done in vectors.
+    /// A block whose splats do not lie side by side, or are fewer than [`LANES`].
     #[inline(always)]
-    fn project_each(&self, id: impl Fn(usize) -> usize, out: &mut [u32]) -> Extremes {
-        let mut extremes = Extremes::NONE;
-        for (block, out) in out.chunks_mut(LANES).enumerate() {
-            // Lanes without a splat are culled, and change nothing.
-            let (mut places, mut tangents) = ([[f32::NAN; LANES]; 3], [[0.0f32; LANES]; 3]);
-            let mut radius = [f32::INFINITY; LANES];
-            for l in 0..out.len() {
-                let i = id(block * LANES + l);
-                let (place, tangent) = (self.cloud.position[i], self.cloud.tangent_of(i));
-                (places[0][l], places[1][l], places[2][l]) = (place.x, place.y, place.z);
-                (tangents[0][l], tangents[1][l], tangents[2][l]) = (tangent.x, tangent.y, tangent.z);
-                radius[l] = self.cloud.radius[i];
+    fn project_gathered(&self, id: impl Fn(usize) -> Option<usize>, out: &mut [u32], extremes: &mut Extremes) {
+        // Lanes without a splat are culled, and change nothing.
+        let (mut position, mut radius) = ([Vec3::NAN; LANES], [f32::INFINITY; LANES]);
+        for l in 0..LANES {
+            if let Some(id) = id(l) {
+                (position[l], radius[l]) = (self.cloud.position[id], self.cloud.radius[id]);
             }
-            let mut depth_bits = [0; LANES];
-            for l in 0..LANES {
-                let place = Vec3::new(places[0][l], places[1][l], places[2][l]);
-                let tangent = Vec3::new(tangents[0][l], tangents[1][l], tangents[2][l]);
-                depth_bits[l] = self.one(l, place, radius[l], bounding_radius(radius[l], tangent), &mut extremes);
-            }
-            out.copy_from_slice(&depth_bits[..out.len()]);
         }
-        extremes
+        let depth_bits = self.project_block(&position, &radius, id, extremes);
+        out.copy_from_slice(&depth_bits[..out.len()]);
+    }
+
+    /// A block in vectors. The radii of most splats keep them already, and the tangents of those are not read.
+    #[inline(always)]
+    fn project_block(
+        &self,
+        position: &[Vec3; LANES],
+        radius: &[f32; LANES],
+        id: impl Fn(usize) -> Option<usize>,
+        extremes: &mut Extremes,
+    ) -> [u32; LANES] {
+        let view = std::array::from_fn(|l| self.view_of(position[l]));
+        let mut depth = self.depths(&view, radius);
+        if !self.cloud.tangent.is_empty() && depth.iter().any(|d| d.is_nan()) {
+            let tangent = |l| id(l).map_or(Vec3::ZERO, |id| self.cloud.tangent_of(id));
+            depth = self.depths(&view, &std::array::from_fn(|l| bounding_radius(radius[l], tangent(l))));
+        }
+        for l in 0..LANES {
+            extremes.take(l, depth[l], radius[l]);
+        }
+        depth.map(f32::to_bits)
+    }
+
+    /// Depths of the splats that their bounding radii keep, [`CULLED`] for the others.
+    #[inline(always)]
+    fn depths(&self, view: &[Vec3; LANES], bound: &[f32; LANES]) -> [f32; LANES] {
+        // + 0.0 turns −0 into +0: equal depths have equal bits.
+        std::array::from_fn(|l| if self.frustum.keeps(view[l], bound[l]) { view[l].z + 0.0 } else { CULLED })
     }
 
     #[inline(always)]
-    fn one(&self, lane: usize, p: Vec3, radius: f32, bound: f32, extremes: &mut Extremes) -> u32 {
+    fn view_of(&self, p: Vec3) -> Vec3 {
         let (m, t) = (&self.view.rotation, self.view.translation);
         // The order of operations of ViewTransform::depth, so that the bits agree.
-        let view = Vec3::new(
+        Vec3::new(
             m.x_axis.x * p.x + m.y_axis.x * p.y + m.z_axis.x * p.z + t.x,
             m.x_axis.y * p.x + m.y_axis.y * p.y + m.z_axis.y * p.z + t.y,
             m.x_axis.z * p.x + m.y_axis.z * p.y + m.z_axis.z * p.z + t.z,
-        );
-        // + 0.0 turns −0 into +0: equal depths have equal bits.
-        let depth = if self.frustum.keeps(view, bound) { view.z + 0.0 } else { CULLED };
-        extremes.take(lane, depth, radius);
-        depth.to_bits()
+        )
     }
 }
 
