@@ -22,7 +22,7 @@ pub fn bucket_bytes(method: Method, n: usize, buckets: usize, threads: usize) ->
     }) as u64
 }
 
-/// First-level buckets: N = ⌈√slices⌉ (Eq. 11), or ranges of about 4096 splats by depth bits.
+/// First-level buckets: N = ⌈√slices⌉ (Eq. 11), or ranges of about 16384 splats by depth bits.
 pub fn buckets(method: Method, n: usize, slices: u64) -> usize {
     match method {
         Method::None => 0,

@@ -21,9 +21,9 @@ pub(crate) const DIGITS: usize = 1 << DIGIT_BITS;
 /// Digits of the widest range, 32 bits.
 pub(crate) const MOST_PASSES: usize = 3;
 
-/// Entries that a leaf holds for `n` splats: several times the average range.
+/// Entries that a leaf holds for `n` splats: twice the average range.
 pub(crate) fn leaf_capacity(n: usize, buckets: usize) -> usize {
-    (4 * n / buckets).max(1 << 14).min(n)
+    (2 * n / buckets).max(1 << 14).min(n)
 }
 
 /// One sort by depth bits.

@@ -18,8 +18,9 @@ pub(crate) const SAMPLERS: usize = 4;
 /// One of so many splats is sampled.
 const SAMPLE: usize = 8;
 
-/// Splats in a range on average.
-const TARGET: usize = 4096;
+/// Splats in a range on average: few enough for the second-level cache, and so many that the ends of all ranges that a chunk writes to fit
+/// the first-level one.
+const TARGET: usize = 16384;
 
 /// The monotone map from relative keys to first-level buckets.
 #[derive(Debug, Clone, Copy)]

@@ -452,3 +452,46 @@ impl Transmittance for Beside<'_> {
         [0, 1, 2].map(|c| others[c] * visible[c])
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use splat_core::{LightShape, Material, Mesh, Similarity, rng};
+
+    /// Steep triangles everywhere: what is asked beside a polygon's edge follows its plane beyond the edge.
+    #[test]
+    fn blocks_say_of_a_way_what_each_of_its_places_says() {
+        let place = |k: u64| Vec3::from_array([0, 1, 2].map(|axis| rng::unit_f32(14, axis, k, 0) - 0.5));
+        let mut mesh = Mesh { triangles: (0..40).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect(), ..Mesh::default() };
+        mesh.position = (0..120).map(|k| place(k / 3) + Vec3::new(0.1, 0.1, 1.0) * 0.5 * place(1000 + k)).collect();
+        // And a wall behind most of them, so that something is dark altogether.
+        mesh.triangles.push([120, 121, 122]);
+        mesh.position.extend([[-9.0, -9.0, -0.2], [9.0, -9.0, -0.2], [0.0, 9.0, -0.2]].map(Vec3::from_array));
+        let placed = PlacedMesh { mesh: &mesh, transform: Similarity::default() };
+        let (color, optical_depth, material) = ([1.0; 3], f32::INFINITY, &Material::default());
+        let (object, shadow_coefficient, casts_shadow, radius) = (0, 1.0, true, 0.0);
+        let mesh =
+            Polygons { placed, material, color, optical_depth, object, shadow_coefficient, casts_shadow, radius };
+        for shape in [
+            LightShape::Directional { direction: DVec3::NEG_Z },
+            LightShape::Point { position: DVec3::new(0.1, 0.2, 3.0) },
+        ] {
+            let receivers = [DVec3::splat(-1.0), DVec3::ONE];
+            let light = Light { shape, intensity: [1.0; 3] };
+            let depths = LightDepths::new(&[&mesh], (&light, 1), &receivers, (128, 0), &Progress::new());
+            let depths = depths.unwrap().unwrap();
+            let mut told = [0; 2];
+            for k in 0..20_000 {
+                let from = place(5000 + k);
+                let ends = [from, from + 0.1 * place(50_000 + k)];
+                let Some(is_lit) = depths.is_whole(&depths.points[0], ends) else { continue };
+                told[usize::from(is_lit)] += 1;
+                for share in [0.0, 0.25, 0.5, 0.75, 1.0] {
+                    let seen = depths.at(&depths.points[0], ends[0] + share * (ends[1] - ends[0]), None).x;
+                    assert_eq!(seen, f32::from(u8::from(is_lit)), "{ends:?} at {share}");
+                }
+            }
+            assert!(told[0] > 50 && told[1] > 1000, "{told:?}");
+        }
+    }
+}
