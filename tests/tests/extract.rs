@@ -61,7 +61,11 @@ fn what_no_light_sees_is_refused_and_nothing_is_written() {
         (["--light", "2"], 2, "--light: expected a light below 2, found 2"),
         (["--absorbance", "0"], 2, "--absorbance: expected a number above 0, at most 10, found 0"),
         (["--absorbance", "nan"], 2, "--absorbance: expected a number above 0, at most 10, found NaN"),
-        (["--set", "object.fog.casts_shadow=false"], 3, "light 0: none of its rays meets an absorbance of 1"),
+        (
+            ["--set", "object.fog.casts_shadow=false"],
+            3,
+            "s.toml: `absorbance`: expected matter on rays of light 0 in all that is visible, found none",
+        ),
     ] {
         place.expect(code, &[&["extract", "s.toml", "-o", "seen.ply"], &arguments[..]].concat(), said);
         assert!(!place.path("seen.ply").exists(), "{arguments:?}");
@@ -112,8 +116,43 @@ fn an_extraction_is_drawn_as_its_points_are_by_every_technique() {
     place.expect(0, &["render", "a.toml", "-o", "c.exr", "--max-memory", &bytes], "");
     place.expect(5, &["render", "a.toml", "-o", "d.exr", "--max-memory", "1000000"], "");
     place.write("a.toml", format!("{hidden}[[object]]\nname = 'seen'\nextract = {{ objects = ['wall'] }}\n"));
-    place.expect(3, &["render", "a.toml", "-o", "c.png"], "light 0: none of its rays meets an absorbance of 1");
+    place.expect(
+        3,
+        &["render", "a.toml", "-o", "c.png"],
+        "object `seen`: `absorbance`: expected matter on rays of light 0 in `wall`, found none",
+    );
     assert!(!place.path("c.png").exists());
+}
+
+#[test]
+fn too_great_an_absorbance_is_refused_where_it_is_written_with_what_there_is() {
+    let thin = SCENE.replace("extinction = 8", "extinction = 1");
+    let head = thin.lines().count();
+    let place = Place::new(&thin);
+    place.write(
+        "a.toml",
+        format!("{thin}[[object]]\nname = 'seen'\nextract = {{ absorbance = 5, objects = ['fog'] }}\n"),
+    );
+    let output = place.run(&["render", "a.toml", "-o", "a.png"]);
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    let begin = format!("a.toml:{}:26: object `seen`: `absorbance`: expected at most ", head + 3);
+    let most = said
+        .split_once(&begin)
+        .and_then(|(_, rest)| rest.split_once(", which is all that a ray of light 0 meets in `fog`, found 5"));
+    let most = most.unwrap_or_else(|| panic!("{said}")).0.to_owned();
+    // Through its middle the ball is two radii thick.
+    assert!((most.parse::<f64>().unwrap() / 2.0 - 1.0).abs() < 0.1, "{most}");
+    // As much as that is seen, and a little more is not, wherever it is asked for.
+    let set = |absorbance: f64| format!("object.seen.extract.absorbance={absorbance}");
+    let absorbance: f64 = most.parse().unwrap();
+    place.expect(0, &["render", "a.toml", "-o", "a.png", "--set", &set(absorbance)], "");
+    let more = set(absorbance * 1.01);
+    let said = format!("--set {more}: object `seen`: `absorbance`: expected at most {most}");
+    place.expect(2, &["render", "a.toml", "-o", "b.png", "--set", &more], &said);
+    let said = format!(
+        "s.toml: `absorbance`: expected at most {most}, which is all that a ray of light 0 meets in all that is visible, found 6"
+    );
+    place.expect(3, &["extract", "s.toml", "--absorbance", "6", "-o", "b.ply"], &said);
 }
 
 /// A ball that falls through a table, seen by a light from above.

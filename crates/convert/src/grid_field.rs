@@ -186,6 +186,7 @@ impl GridField {
     }
 
     /// Range of the volume over a box of lattice coordinates that lies in the lattice.
+    #[inline(always)]
     fn range(&self, low: DVec3, high: DVec3) -> [f64; 2] {
         let dims = self.grid().dims;
         let cells = |u: DVec3| [0, 1, 2].map(|a| (u[a] as usize).min(dims[a].saturating_sub(2)));
@@ -208,16 +209,20 @@ impl GridField {
     }
 
     /// Range over the part of one cell that lies in a box.
+    #[inline(always)]
     fn cell_range(&self, cell: [usize; 3], low: DVec3, high: DVec3) -> [f64; 2] {
-        let grid = self.grid();
-        let stretch = |a: usize| [low[a], high[a]].map(|u| (u - cell[a] as f64).clamp(0.0, 1.0));
+        let (grid, [nx, ny, nz]) = (self.grid(), self.grid().dims);
+        let first = DVec3::from_array(cell.map(|c| c as f64));
+        let [from, to] = [low, high].map(|u| (u - first).clamp(DVec3::ZERO, DVec3::ONE));
+        let ([x, y, z], [i, j, k]) = ([[from.x, to.x], [from.y, to.y], [from.z, to.z]], cell);
         match self.interpolation {
             Interpolation::Trilinear => {
-                control_range(grid, &[0, 1, 2].map(|a| Control::<2>::linear(cell[a], stretch(a), grid.dims[a])))
+                control_range(grid, &[Control::linear(i, x, nx), Control::linear(j, y, ny), Control::linear(k, z, nz)])
             }
-            Interpolation::CatmullRom => {
-                control_range(grid, &[0, 1, 2].map(|a| Control::<4>::catmull_rom(cell[a], stretch(a), grid.dims[a])))
-            }
+            Interpolation::CatmullRom => control_range(
+                grid,
+                &[Control::catmull_rom(i, x, nx), Control::catmull_rom(j, y, ny), Control::catmull_rom(k, z, nz)],
+            ),
         }
     }
 }
@@ -235,6 +240,22 @@ impl pulp::NullaryFnOnce for Slopes<'_> {
     #[inline(always)]
     fn call(self) {
         self.at.iter().zip(self.out).for_each(|(p, out)| *out = self.field.slope(*p));
+    }
+}
+
+/// The range over a box, compiled likewise.
+struct Over<'a> {
+    field: &'a GridField,
+    low: DVec3,
+    high: DVec3,
+}
+
+impl pulp::NullaryFnOnce for Over<'_> {
+    type Output = [f64; 2];
+
+    #[inline(always)]
+    fn call(self) -> [f64; 2] {
+        self.field.range(self.low, self.high)
     }
 }
 
@@ -278,7 +299,8 @@ impl ScalarField for GridField {
             return None;
         }
         let clamp = |u: DVec3| u.clamp(DVec3::ZERO, self.last);
-        let [low, high] = self.range(clamp(u - half), clamp(u + half)).map(|v| self.sign * (v - self.isovalue));
+        let over = Over { field: self, low: clamp(u - half), high: clamp(u + half) };
+        let [low, high] = pulp::Arch::new().dispatch(over).map(|v| self.sign * (v - self.isovalue));
         Some((low.min(high), low.max(high)))
     }
 

@@ -45,7 +45,7 @@ fn source(arguments: &ExtractArguments, scene: &Scene) -> Result<ExtractSource, 
         let message = format!("--light: expected a light below {}, found {light}", scene.lights.len());
         return Err(Error::usage(message, "lights are counted from 0, in the order of the scene"));
     }
-    Ok(ExtractSource { light, absorbance, objects: Vec::new(), points: None })
+    Ok(ExtractSource { light, absorbance, objects: Vec::new(), written: None, points: None })
 }
 
 /// Places in f64, for what lies far from the origin.

@@ -102,6 +102,8 @@ mod tests {
     fn ou4_hostile_values_are_displayable() {
         let cases = [(-1e-9, 0), (-1e30, 0), (f32::NAN, 0), (1e30, 255), (f32::INFINITY, 255), (0.0, 0), (1.0, 255)];
         for (linear, expected) in cases {
+            // Without clamping, what is beyond bytes would only be cut by the conversion to them.
+            assert!((0.0..=1.0).contains(&encoded(linear)), "{linear}: {}", encoded(linear));
             assert_eq!(displayed(linear), expected, "{linear}");
         }
         // 18 % grey is 117.6 in sRGB.

@@ -17,7 +17,7 @@ use super::raw_object::RawObject;
 use super::stops::check_stops;
 use super::tree::{Document, Node, Step};
 use super::{Aligned, RenderSettings, Scene, SceneObject};
-use crate::Error;
+use crate::{Error, Written};
 use glam::DVec3;
 use splat_core::Camera;
 use std::collections::HashMap;
@@ -70,6 +70,11 @@ impl<'a> At<'a> {
     /// The value that is written here, or the deepest on the way to it that is.
     pub(super) fn node(&self) -> &'a Node {
         self.document.node_of(&self.path)
+    }
+
+    /// The place as it is told once the document is gone.
+    pub(super) fn written(&self) -> Written {
+        self.document.written(self.document.place_of(&self.path))
     }
 
     /// The place in words.

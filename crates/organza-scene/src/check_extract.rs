@@ -21,6 +21,7 @@ pub(super) fn check_extract(at: &At<'_>, raw: &RawExtract) -> Result<ExtractSour
         light: raw.light as usize,
         absorbance: absorbance as f32,
         objects: raw.objects.clone().unwrap_or_default(),
+        written: Some(at.key("absorbance").written()),
         points: None,
     })
 }

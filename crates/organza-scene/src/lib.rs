@@ -57,6 +57,7 @@ mod shown;
 mod source;
 mod stops;
 mod tree;
+mod written;
 
 pub use convert::read::UpAxis;
 pub use convert::{ColorMap, ColorScale, Combination, PointColors, ScaleNumbers};
@@ -81,6 +82,7 @@ pub use source::{
     LevelSetSource, MOST_ABSORBANCE, MatterSource, SliceSource, Source, VolumeSource,
 };
 pub use stops::{Path, Stop};
+pub use written::Written;
 
 /// The page's example compiles and holds.
 #[cfg(doctest)]

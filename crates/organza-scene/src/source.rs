@@ -1,6 +1,6 @@
 //! Where an object's data comes from, checked: files, expressions and shapes.
 
-use crate::{Error, SceneObject};
+use crate::{Error, SceneObject, Written};
 use convert::{
     Classified, CloudShape, Combination, Ellipsoid, ExpressionField, HomogeneousMedium, Inside, Interpolation,
     RawPoints, Rectangle,
@@ -108,6 +108,8 @@ pub struct ExtractSource {
     pub absorbance: f32,
     /// Names of the objects, visible or not; empty for all that are visible and made of data.
     pub objects: Vec<String>,
+    /// Where the scene asks for that absorbance, or for the extraction without one; `None` where no scene does.
+    pub written: Option<Written>,
     /// The points, once they are found.
     pub points: Option<Arc<RawPoints>>,
 }

@@ -1,6 +1,6 @@
 //! A value tree in which everything knows its place, the same for TOML, JSON and overrides.
 
-use crate::{Error, shown};
+use crate::{Error, Written, shown};
 use std::path::Path;
 
 /// Where a value was written.
@@ -89,32 +89,31 @@ pub(super) fn error_at(
     hint: impl Into<String>,
 ) -> Error {
     let (line, column) = line_and_column(text, byte);
-    let message = crate::escape_controls(&message.into()).into_owned();
-    let hint = crate::escape_controls(&hint.into()).into_owned();
-    Error::Scene { file: file.to_owned(), line, column, message, hint }
+    Written::File(line, column).error(file, &message.into(), &hint.into())
 }
 
 impl Document<'_> {
     /// An error at a place: of the scene file, or of the command line when an override is at fault.
     pub(super) fn error(&self, place: Place, message: impl Into<String>, hint: impl Into<String>) -> Error {
+        self.written(place).error(self.file, &message.into(), &hint.into())
+    }
+
+    /// A place as it is told once the document is gone.
+    pub(super) fn written(&self, place: Place) -> Written {
         match place {
-            Place::Byte(byte) => error_at(self.file, self.text, byte, message, hint),
-            Place::Flag(index) => {
-                let message = format!("{}: {}", shown(&self.flags[index]), message.into());
-                let escape = |text: &str| crate::escape_controls(text).into_owned();
-                Error::usage(escape(&message), escape(&hint.into()))
+            Place::Byte(byte) => {
+                let (line, column) = line_and_column(self.text, byte);
+                Written::File(line, column)
             }
+            Place::Flag(index) => Written::Flag(shown(&self.flags[index])),
         }
     }
 
     /// A place in words, for messages that name a second place.
     pub(super) fn name_place(&self, place: Place) -> String {
-        match place {
-            Place::Byte(byte) => {
-                let (line, column) = line_and_column(self.text, byte);
-                format!("line {line}, column {column}")
-            }
-            Place::Flag(index) => shown(&self.flags[index]),
+        match self.written(place) {
+            Written::File(line, column) => format!("line {line}, column {column}"),
+            Written::Flag(flag) => flag,
         }
     }
 

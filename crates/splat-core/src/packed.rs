@@ -1,4 +1,4 @@
-//! A cloud in 16 bytes a splat, for what is kept and not drawn just now (Gunjee 2007, section 6, leaves compressed attributes for later).
+//! A cloud in 13 to 25 bytes a splat, for what is kept and not drawn just now (Gunjee 2007, section 6, leaves compressed attributes for later).
 //!
 //! Splats stay in their order, in blocks of 256; in canonical order a block is small. What a number is counted in is its block's own:
 //!
@@ -10,10 +10,12 @@
 //! | cross-section, crossing depth | 16 | even in the square root, 1/65535 of the block's range |
 //! | colour | 3 × 8 | even in the square root, 1/255 of the block's brightest |
 //! | value | 16 | even, 1/65535 of the block's range |
+//! | shading normal | 2 × 8 | as the normal; none stays none |
+//! | tangent | 2 × 8, 8 | direction as the normal; length as the radius, those without a tangent left out |
+//! | shadow coefficient | 8 | even, 1/255 of the block's range |
 //! | kind, material, footprint, object | 8 | none: a place in the block's list of those that occur together |
 //!
-//! A number is off by half a step at most, and by rounding to f32. What a block has one of is kept exactly. Columns that are empty stay so;
-//! tangents, shading normals and shadow coefficients are kept as they are.
+//! A number is off by half a step at most, and by rounding to f32. What a block has one of is kept exactly. Columns that are empty stay so.
 
 mod block;
 mod bytes;
@@ -55,10 +57,13 @@ pub struct PackedCloud {
     normal: Vec<[i8; 2]>,
     value: Vec<u16>,
     crossing_depth: Vec<u16>,
-    shading_normal: Vec<Vec3>,
-    tangent: Vec<Vec3>,
-    shadow_coefficient: Vec<f32>,
+    shading_normal: Vec<[i8; 2]>,
+    tangent: Vec<Tangent>,
+    shadow_coefficient: Vec<u8>,
 }
+
+/// Direction and length of a tangent.
+type Tangent = ([i8; 2], u8);
 
 impl PackedCloud {
     /// Packs a cloud; the same bits for any number of threads.
@@ -93,9 +98,13 @@ impl PackedCloud {
             normal: by_block(&blocks, &cloud.normal, |_, n| octahedral::steps(*n)),
             value: by_block(&blocks, &cloud.value, |b, v| b.value.step_of(*v)),
             crossing_depth: by_block(&blocks, &cloud.crossing_depth, |b, v| b.crossing_depth.step_of(*v)),
-            shading_normal: cloud.shading_normal.clone(),
-            tangent: cloud.tangent.clone(),
-            shadow_coefficient: cloud.shadow_coefficient.clone(),
+            shading_normal: by_block(&blocks, &cloud.shading_normal, |_, n| octahedral::steps_if_any(*n)),
+            tangent: by_block(&blocks, &cloud.tangent, |b, t| {
+                (octahedral::steps_if_any(*t), b.tangent.step_of(t.length()) as u8)
+            }),
+            shadow_coefficient: by_block(&blocks, &cloud.shadow_coefficient, |b, v| {
+                b.shadow_coefficient.step_of(*v) as u8
+            }),
             blocks,
             looks,
         })
@@ -117,9 +126,13 @@ impl PackedCloud {
             normal: by_block(blocks, &self.normal, |_, n| octahedral::normal(*n)),
             value: by_block(blocks, &self.value, |b, v| b.value.value(f32::from(*v))),
             crossing_depth: by_block(blocks, &self.crossing_depth, |b, v| b.crossing_depth.value(f32::from(*v))),
-            shading_normal: self.shading_normal.clone(),
-            tangent: self.tangent.clone(),
-            shadow_coefficient: self.shadow_coefficient.clone(),
+            shading_normal: by_block(blocks, &self.shading_normal, |_, n| octahedral::normal_if_any(*n)),
+            tangent: by_block(blocks, &self.tangent, |b, (direction, length)| {
+                octahedral::normal_if_any(*direction) * b.tangent.value(f32::from(*length))
+            }),
+            shadow_coefficient: by_block(blocks, &self.shadow_coefficient, |b, v| {
+                b.shadow_coefficient.value(f32::from(*v))
+            }),
             ..Cloud::new(self.origin)
         };
         if self.looks.iter().any(|l| !l.has_normal) {

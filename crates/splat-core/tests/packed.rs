@@ -34,6 +34,10 @@ fn cloud(n: u64) -> Cloud {
             normal: if kind == SplatKind::Medium { Vec3::ZERO } else { direction(i) },
             value: 1000.0 + unit(i, 8),
             crossing_depth: unit(i, 9),
+            // Some discs are round, and some have no normal of their own for light.
+            tangent: if i % 5 == 0 { Vec3::ZERO } else { direction(i + n) * (0.01 + 0.1 * unit(i, 12)) },
+            shading_normal: if i % 3 == 0 { Vec3::ZERO } else { direction(i + 2 * n) },
+            shadow_coefficient: 0.5 + 0.5 * unit(i, 13),
             ..Splat::default()
         });
     }
@@ -83,16 +87,27 @@ fn every_number_is_off_by_half_a_step_of_its_block_at_most() {
         check("radius", &pairs(&|c, i| c.radius[i]), 255.0, root);
         check("cross_section", &pairs(&|c, i| c.cross_section[i]), 65535.0, root);
         check("value", &pairs(&|c, i| c.value[i]), 65535.0, even);
+        check("shadow_coefficient", &pairs(&|c, i| c.shadow_coefficient[i]), 255.0, even);
+        let lengths = pairs(&|c, i| c.tangent[i].length()).into_iter().filter(|(given, _)| *given > 0.0);
+        check("length of the tangent", &lengths.collect::<Vec<_>>(), 255.0, root);
         check("crossing_depth", &pairs(&|c, i| c.crossing_depth[i]), 65535.0, root);
         // Colours from 0 to the brightest number of the block.
         let colors = block.iter().flat_map(|i| cloud.color[*i].into_iter().zip(found.color[*i]));
         check("color", &colors.chain([(0.0, 0.0)]).collect::<Vec<_>>(), 255.0, root);
     }
-    // The least angle between steps makes the cosine's own rounding count.
-    let off = |i: &usize| f64::from(cloud.normal[*i].cross(found.normal[*i]).length()).asin().to_degrees();
-    assert!(all.iter().all(|i| (cloud.normal[*i] == Vec3::ZERO) == (found.normal[*i] == Vec3::ZERO)));
-    let worst = all.iter().map(off).fold(0.0, f64::max);
-    assert!((0.3..0.64).contains(&worst), "{worst}°");
+    for (name, of) in [
+        ("normal", (|c, i| c.normal[i]) as fn(&Cloud, usize) -> Vec3),
+        ("shading normal", |c, i| c.shading_normal[i]),
+        ("tangent", |c, i| c.tangent[i]),
+    ] {
+        let pair = |i: &usize| [of(&cloud, *i), of(&found, *i)].map(|v| v.as_dvec3().normalize_or_zero());
+        let pairs: Vec<_> = all.iter().map(pair).collect();
+        assert!(pairs.iter().all(|[a, b]| a.length() == 0.0 || a.dot(*b) > 0.0), "{name}");
+        assert!(pairs.iter().all(|[a, b]| (*a == DVec3::ZERO) == (*b == DVec3::ZERO)), "{name}");
+        // The least angle between steps makes the cosine's own rounding count.
+        let worst = pairs.iter().map(|[a, b]| a.cross(*b).length().asin().to_degrees()).fold(0.0, f64::max);
+        assert!((0.3..0.64).contains(&worst), "{name}: {worst}°");
+    }
 }
 
 #[test]
@@ -115,12 +130,22 @@ fn what_a_block_has_one_of_is_exact_and_empty_columns_stay_empty() {
 
 #[test]
 fn a_splat_with_a_normal_takes_less_than_sixteen_bytes() {
-    let mut cloud = cloud(30_000);
-    (cloud.value, cloud.crossing_depth) = (Vec::new(), Vec::new());
-    let packed = PackedCloud::new(&cloud).unwrap();
-    let [bytes, before] = [packed.bytes(), cloud.bytes()].map(|b| b as f64 / cloud.len() as f64);
-    println!("{bytes:.2} bytes a splat in place of {before}");
-    assert!(bytes <= 16.0 && before >= 52.0, "{bytes} in place of {before}");
+    let bytes = |cloud: &Cloud| {
+        let packed = PackedCloud::new(cloud).unwrap();
+        let [bytes, before] = [packed.bytes(), cloud.bytes()].map(|b| b as f64 / cloud.len() as f64);
+        println!("{bytes:.2} bytes a splat in place of {before}");
+        [bytes, before]
+    };
+    let all = cloud(30_000);
+    let mut cloud = all.clone();
+    (cloud.value, cloud.crossing_depth, cloud.shading_normal) = (Vec::new(), Vec::new(), Vec::new());
+    let [bytes_of_ellipses, before] = bytes(&cloud);
+    assert!(bytes_of_ellipses <= 20.0 && before >= 68.0, "with tangents and shadow coefficients");
+    (cloud.tangent, cloud.shadow_coefficient) = (Vec::new(), Vec::new());
+    let [of_normals, before] = bytes(&cloud);
+    assert!(of_normals <= 16.0 && before >= 52.0);
+    let [of_all, before] = bytes(&all);
+    assert!(of_all <= 26.0 && before >= 88.0);
 }
 
 #[test]
@@ -160,8 +185,7 @@ fn bytes_are_the_packed_cloud_again_and_no_others() {
     for n in [0, 1, 257, 700] {
         let mut all = cloud(n);
         if n == 257 {
-            all.shadow_coefficient = (0..257).map(|i| unit(i, 12)).collect();
-            all.tangent = vec![Vec3::X; 257];
+            (all.value, all.tangent) = (Vec::new(), Vec::new());
         }
         let packed = PackedCloud::new(&all).unwrap();
         let bytes = packed.to_bytes();
@@ -182,7 +206,7 @@ fn bytes_are_the_packed_cloud_again_and_no_others() {
         bytes[at] = byte;
         PackedCloud::from_bytes(&bytes).map(|_| ()).unwrap_err().to_string()
     };
-    let looks = 48 + 84;
+    let looks = 48 + 104;
     assert!(with(7, 255).contains("as many as its counts say"));
     assert!(with(looks + 7, 3).contains("look 0: kind"), "{}", with(looks + 7, 3));
     assert!(with(looks + 7 * 8, 200).contains("splat 0: look is 200"), "{}", with(looks + 56, 200));

@@ -177,6 +177,18 @@ impl ShadowMap {
         })
     }
 
+    /// The greatest absorbance that a cell has in every channel, up to which [`Self::first_surface`] has points: infinite with opaque discs, 0
+    /// without anything.
+    pub fn most_absorbance(&self) -> f32 {
+        let of_cell = |cell| match &self.absorbances {
+            Absorbances::Mono(matter) => whole_absorbance(matter, cell),
+            Absorbances::Rgb(matter) => whole_absorbance(matter, cell),
+        };
+        let opaque = self.opaque.iter().any(|d| d.is_finite());
+        let most = (0..self.cells()).into_par_iter().with_min_len(4096).map(of_cell).reduce(|| 0.0, f32::max);
+        if opaque { f32::INFINITY } else { most }
+    }
+
     /// The surface that the light sees: for each cell whose absorbance reaches `absorbance`, the point where it first
     /// does (Gunjee 2007, Figure 15a). Normals come from the points of neighbouring cells; a point whose neighbours
     /// all miss faces the light.
@@ -210,6 +222,15 @@ impl ShadowMap {
             cells.filter_map(point).collect()
         })
     }
+}
+
+/// Absorbance of all that a cell lists, in the channel that has least.
+fn whole_absorbance<const C: usize>(matter: &Matter<C>, cell: u32) -> f32 {
+    let [media, surfaces] = [&matter.media, &matter.surfaces].map(|lists| {
+        let list = lists.as_ref().map_or(List::NONE, |lists| lists.list(cell));
+        list.total_of(list.len())
+    });
+    (0..C).map(|c| media[c] + surfaces[c]).fold(f32::INFINITY, f32::min)
 }
 
 fn own_absorbances<const C: usize>(matter: &Matter<C>, cell: u32, cells: u32) -> Vec<(f32, [f32; 3])> {

@@ -310,6 +310,29 @@ fn a_hit_is_where_a_look_up_on_its_ray_has_the_absorbance() {
     assert!(within > 1000 && at_plane > 100, "{within} {at_plane}");
 }
 
+#[test]
+fn the_greatest_absorbance_is_that_up_to_which_something_is_seen() {
+    let mut cloud = smooth_ball(0.1, 2.0, 1.0);
+    let params = Params { resolution: Resolution::Cells(64), ..Params::default() };
+    let most = |cloud: &Cloud| {
+        let map = build(cloud, &directional(DVec3::NEG_Z), &params);
+        let most = map.most_absorbance();
+        if most.is_finite() {
+            assert!(map.first_surface(most * 1.0001).is_empty(), "{most}");
+        }
+        assert!(!map.first_surface((most * 0.9999).min(9.0)).is_empty(), "{most}");
+        most
+    };
+    // Through the middle the ball is two radii thick.
+    let ball = most(&cloud);
+    assert!((ball / 4.0 - 1.0).abs() < 0.05, "{ball}");
+    cloud.append(&plane(Vec3::Z * 2.0, Vec3::NEG_Z, 20, 0.05, SplatKind::Surface, 0.8));
+    let both = most(&cloud);
+    assert!((both / (ball + 0.8) - 1.0).abs() < 0.05, "{both} {ball}");
+    cloud.append(&plane(Vec3::Z * 3.0, Vec3::NEG_Z, 20, 0.05, SplatKind::Opaque, 1.0));
+    assert_eq!(most(&cloud), f32::INFINITY);
+}
+
 /// Greatest error of the depth to which light comes into a ball of fog, within `reach` of the light's axis, in spacings.
 fn greatest_error(h: f32, absorbance: f32, light: &Light, reach: f32) -> f32 {
     let sigma_t = 2.0;

@@ -85,21 +85,49 @@ pub(super) fn hessian<const N: usize>(grid: &Grid, at: &[Stencil<N>; 3]) -> DMat
     )
 }
 
-/// Least and greatest control point on a stretch of one cell; the interpolation stays between them.
+/// Least and greatest control point on a stretch of one cell; the interpolation stays between them. `N` control points that follow
+/// one another along x are made side by side.
+#[inline(always)]
 pub(super) fn control_range<const N: usize>(grid: &Grid, at: &[Control<N>; 3]) -> [f64; 2] {
     let block = gather(grid, [&at[0].index, &at[1].index, &at[2].index]);
-    let along_x = block.map(|plane| plane.map(|row| at[0].row.map(|weights| dot(&row, &weights))));
-    let mut range = [f64::INFINITY, f64::NEG_INFINITY];
-    let along_y: [[[f64; N]; N]; N] =
-        along_x.map(|plane| at[1].row.map(|w| std::array::from_fn(|i| dot(&std::array::from_fn(|j| plane[j][i]), &w))));
-    for w in &at[2].row {
-        for j in 0..N {
-            for i in 0..N {
-                let column: [f64; N] = std::array::from_fn(|k| along_y[k][j][i]);
-                let control = dot(&column, w);
-                range = [range[0].min(control), range[1].max(control)];
+    let [x, y, z] = [&at[0].row, &at[1].row, &at[2].row];
+    let mut columns = [[0.0; N]; N];
+    for e in 0..N {
+        for i in 0..N {
+            columns[i][e] = x[e][i];
+        }
+    }
+    let (mut low, mut high) = ([f64::INFINITY; N], [f64::NEG_INFINITY; N]);
+    for c in 0..N {
+        let mut plane = [[0.0; N]; N];
+        for k in 0..N {
+            for j in 0..N {
+                for i in 0..N {
+                    plane[j][i] += block[k][j][i] * z[c][k];
+                }
             }
         }
+        for d in 0..N {
+            let (mut row, mut control) = ([0.0; N], [0.0; N]);
+            for j in 0..N {
+                for i in 0..N {
+                    row[i] += plane[j][i] * y[d][j];
+                }
+            }
+            for i in 0..N {
+                for e in 0..N {
+                    control[e] += row[i] * columns[i][e];
+                }
+            }
+            for e in 0..N {
+                low[e] = if control[e] < low[e] { control[e] } else { low[e] };
+                high[e] = if control[e] > high[e] { control[e] } else { high[e] };
+            }
+        }
+    }
+    let mut range = [f64::INFINITY, f64::NEG_INFINITY];
+    for e in 0..N {
+        range = [range[0].min(low[e]), range[1].max(high[e])];
     }
     range
 }

@@ -70,6 +70,7 @@ impl Stencil<4> {
 
 impl Control<2> {
     /// The ends of the stretch `a` ≤ `b` of a cell, both 0 to 1.
+    #[inline(always)]
     pub(super) fn linear(cell: usize, [a, b]: [f64; 2], n: usize) -> Self {
         Self { index: [cell, (cell + 1).min(n - 1)], row: [[1.0 - a, a], [1.0 - b, b]] }
     }
@@ -77,16 +78,21 @@ impl Control<2> {
 
 impl Control<4> {
     /// Bernstein control points of the cubic on the stretch `a` ≤ `b` of a cell, both 0 to 1.
+    #[inline(always)]
     pub(super) fn catmull_rom(cell: usize, [a, b]: [f64; 2], n: usize) -> Self {
         if n < 2 {
             return Self { index: [0; 4], row: [[0.0, 1.0, 0.0, 0.0]; 4] };
         }
-        let row = [blossom(a, a, a), blossom(a, a, b), blossom(a, b, b), blossom(b, b, b)].map(|w| fold(w, cell, n));
+        let mut row = [blossom(a, a, a), blossom(a, a, b), blossom(a, b, b), blossom(b, b, b)];
+        for weights in &mut row {
+            *weights = fold(*weights, cell, n);
+        }
         Self { index: indices(cell, n), row }
     }
 }
 
 /// The polar form of the cell's cubic: the value at t for r = s = t, the control points for r, s, t among two numbers.
+#[inline(always)]
 fn blossom(r: f64, s: f64, t: f64) -> [f64; 4] {
     let (p, q, o) = (1.0 - r, 1.0 - s, 1.0 - t);
     let b = [p * q * o, r * q * o + p * s * o + p * q * t, p * s * t + r * q * t + r * s * o, r * s * t];

@@ -6,7 +6,7 @@ use crate::load::placed;
 use crate::memory::loading_bytes;
 use crate::scene::{ExtractSource, FoundCamera, Scene, SceneObject, Source, Stop};
 use crate::shadows::{shadow_error, shadow_params};
-use crate::{Error, Progress, RenderOptions};
+use crate::{Error, Progress, RenderOptions, printable, shown};
 use convert::RawPoints;
 use glam::DVec3;
 use std::borrow::Cow;
@@ -32,9 +32,11 @@ pub fn fitted<'s>(
     for (i, object) in scene.objects.iter().enumerate().filter(|(_, object)| object.visible) {
         let Source::Extract(source @ ExtractSource { points: None, .. }) = &object.source else { continue };
         let part = settled.part(source.light, |o| source.sees(o));
-        files.seen.borrow_mut().retain(|((of, by), _)| of != source || *by == part);
+        // Wherever it is written.
+        let what = ExtractSource { written: None, ..source.clone() };
+        files.seen.borrow_mut().retain(|((of, by), _)| *of != what || *by == part);
         let find = || seen(&settled, source, options, progress, files).map(Arc::new);
-        let points = once(&files.seen, (source.clone(), part), find)?;
+        let points = once(&files.seen, (what, part), find)?;
         settled.to_mut().objects[i].source = Source::Extract(ExtractSource { points: Some(points), ..source.clone() });
     }
     placed(settled, options, progress, files)
@@ -54,12 +56,41 @@ pub fn seen(
     let (map, origin) = Eye { scene, options, progress, files }.map(source.light, &|o| source.sees(o))?;
     let points = map.first_surface(source.absorbance);
     if points.is_empty() {
-        let message = format!("none of its rays meets an absorbance of {}", source.absorbance);
-        let hint = "ask for less, or look whether objects cast shadows";
-        return Err(Error::input(format!("light {}", source.light), message, hint));
+        return Err(unseen(scene, source, map.most_absorbance()));
     }
     let (position, normal) = points.iter().map(|p| (p.position, p.normal)).unzip();
     Ok(RawPoints { origin, position, normal, ..RawPoints::default() })
+}
+
+/// What is said where no ray of a light meets the absorbance asked for, but `most`.
+fn unseen(scene: &Scene, source: &ExtractSource, most: f32) -> Error {
+    let ExtractSource { light, absorbance, objects, written, .. } = source;
+    let named: Vec<String> = objects.iter().map(|name| format!("`{}`", shown(name))).collect();
+    let seen = if named.is_empty() { "all that is visible".to_owned() } else { named.join(", ") };
+    let (expected, found, hint) = if most > 0.0 {
+        let most = format!("at most {}, which is all that a ray of light {light} meets in {seen}", rounded_down(most));
+        (most, absorbance.to_string(), "ask for less, or look whether all of it casts shadows")
+    } else {
+        (format!("matter on rays of light {light} in {seen}"), "none".to_owned(), "look whether it casts shadows")
+    };
+    let message = format!("`absorbance`: expected {expected}, found {found}");
+    let own = |object: &&SceneObject| matches!(&object.source, Source::Extract(of) if of == source);
+    match (written, scene.objects.iter().find(own)) {
+        (Some(written), Some(own)) => {
+            written.error(&scene.file, &format!("object `{}`: {message}", shown(&own.name)), hint).into()
+        }
+        _ => Error::input(printable(&scene.file), message, hint),
+    }
+}
+
+/// A positive number below 10 with three digits, which is not above it.
+fn rounded_down(x: f32) -> String {
+    let mut digits = 2;
+    let mut scaled = 100.0 * f64::from(x);
+    while scaled < 100.0 {
+        (digits, scaled) = (digits + 1, 10.0 * scaled);
+    }
+    format!("{:.digits$}", scaled.floor() / 10f64.powi(digits as i32))
 }
 
 /// The last time on an object's way at which none of its splats has come past what it stops at, in frames.

@@ -34,8 +34,8 @@ pub(super) struct Even {
 }
 
 impl Even {
-    fn new([low, high]: [f32; 2]) -> Self {
-        Self { low, step: ((f64::from(high) - f64::from(low)) / 65535.0) as f32 }
+    fn new([low, high]: [f32; 2], steps: f64) -> Self {
+        Self { low, step: ((f64::from(high) - f64::from(low)) / steps) as f32 }
     }
 
     /// The nearest step.
@@ -88,6 +88,9 @@ pub(super) struct Block {
     pub(super) color: Rooted,
     pub(super) value: Even,
     pub(super) crossing_depth: Rooted,
+    /// Of lengths, where there is a tangent.
+    pub(super) tangent: Rooted,
+    pub(super) shadow_coefficient: Even,
     /// Where its looks begin in the list of all.
     pub(super) first_look: u32,
 }
@@ -102,14 +105,17 @@ impl Block {
     pub(super) fn of(cloud: &Cloud, splats: Range<usize>) -> (Self, Vec<Look>) {
         let range = |column: &[f32]| range_of(column.get(splats.clone()).unwrap_or(&[]).iter().copied());
         let box_of = Aabb::of_points(&cloud.position[splats.clone()]);
+        let lengths = cloud.tangent.get(splats.clone()).unwrap_or(&[]).iter().map(|t| t.length());
         let [_, brightest] = range_of(cloud.color[splats.clone()].as_flattened().iter().copied());
         let block = Self {
-            position: [0, 1, 2].map(|a| Even::new([box_of.min[a], box_of.max[a]])),
+            position: [0, 1, 2].map(|a| Even::new([box_of.min[a], box_of.max[a]], 65535.0)),
             radius: Rooted::new(range(&cloud.radius), 255.0),
             cross_section: Rooted::new(range(&cloud.cross_section), 65535.0),
             color: Rooted::new([0.0, brightest], 255.0),
-            value: Even::new(range(&cloud.value)),
+            value: Even::new(range(&cloud.value), 65535.0),
             crossing_depth: Rooted::new(range(&cloud.crossing_depth), 65535.0),
+            tangent: Rooted::new(range_of(lengths.filter(|l| *l > 0.0)), 255.0),
+            shadow_coefficient: Even::new(range(&cloud.shadow_coefficient), 255.0),
             first_look: 0,
         };
         let mut looks = Vec::new();

@@ -3,14 +3,14 @@
 use super::block::{Block, Even, Look, Rooted};
 use super::{BLOCK, PackedCloud};
 use crate::{Error, SplatKind};
-use glam::{DVec3, Vec3};
+use glam::DVec3;
 
 /// Columns that a cloud may lack, in the order of the bits that say so.
 const OPTIONAL: usize = 6;
 /// Bit of a look's kind that says that its splats have a normal.
 const HAS_NORMAL: u8 = 0x80;
 /// Numbers of a block that are f32.
-const BLOCK_NUMBERS: usize = 20;
+const BLOCK_NUMBERS: usize = 25;
 
 impl PackedCloud {
     /// The cloud as bytes: counts, the origin, blocks, looks, and the columns that it has.
@@ -39,10 +39,9 @@ impl PackedCloud {
         out.extend(self.normal.as_flattened().iter().map(|v| *v as u8));
         out.extend(self.value.iter().flat_map(|v| v.to_le_bytes()));
         out.extend(self.crossing_depth.iter().flat_map(|v| v.to_le_bytes()));
-        for column in [&self.shading_normal, &self.tangent] {
-            out.extend(column.iter().flat_map(|v| v.to_array()).flat_map(f32::to_le_bytes));
-        }
-        out.extend(self.shadow_coefficient.iter().flat_map(|v| v.to_le_bytes()));
+        out.extend(self.shading_normal.as_flattened().iter().map(|v| *v as u8));
+        out.extend(self.tangent.iter().flat_map(|([a, b], length)| [*a as u8, *b as u8, *length]));
+        out.extend(&self.shadow_coefficient);
         out
     }
 
@@ -68,10 +67,7 @@ impl PackedCloud {
         };
         let looks = looks.map(known).collect::<Result<_, _>>()?;
         let short = |[a, b]: [u8; 2]| u16::from_le_bytes([a, b]);
-        let vector = |row: [u8; 12]| {
-            let (words, _) = row.as_chunks::<4>();
-            Vec3::from_array(std::array::from_fn(|k| f32::from_le_bytes(words[k])))
-        };
+        let direction = |row: [u8; 2]| row.map(|b| b as i8);
         let packed = Self {
             origin,
             look: rest.rows(count, |[b]: [u8; 1]| b)?,
@@ -79,12 +75,12 @@ impl PackedCloud {
             radius: rest.rows(count, |[b]: [u8; 1]| b)?,
             cross_section: rest.rows(count, short)?,
             color: rest.rows(count, |color: [u8; 3]| color)?,
-            normal: rest.rows(has(0), |row: [u8; 2]| row.map(|b| b as i8))?,
+            normal: rest.rows(has(0), direction)?,
             value: rest.rows(has(1), short)?,
             crossing_depth: rest.rows(has(2), short)?,
-            shading_normal: rest.rows(has(3), vector)?,
-            tangent: rest.rows(has(4), vector)?,
-            shadow_coefficient: rest.rows(has(5), f32::from_le_bytes)?,
+            shading_normal: rest.rows(has(3), direction)?,
+            tangent: rest.rows(has(4), |[a, b, length]: [u8; 3]| (direction([a, b]), length))?,
+            shadow_coefficient: rest.rows(has(5), |[b]: [u8; 1]| b)?,
             blocks,
             looks,
         };
@@ -134,11 +130,11 @@ impl Block {
         let [x, y, z] = self.position;
         let even = |e: Even| [e.low, e.step];
         let rooted = |r: Rooted| [r.low, r.root, r.step];
-        let evens = [x, y, z, self.value].map(even);
-        let roots = [self.radius, self.cross_section, self.color, self.crossing_depth].map(rooted);
+        let evens = [x, y, z, self.value, self.shadow_coefficient].map(even);
+        let roots = [self.radius, self.cross_section, self.color, self.crossing_depth, self.tangent].map(rooted);
         let mut all = [0.0; BLOCK_NUMBERS];
-        all[..8].copy_from_slice(evens.as_flattened());
-        all[8..].copy_from_slice(roots.as_flattened());
+        all[..10].copy_from_slice(evens.as_flattened());
+        all[10..].copy_from_slice(roots.as_flattened());
         all
     }
 
@@ -148,10 +144,12 @@ impl Block {
         Self {
             position: [even(0), even(2), even(4)],
             value: even(6),
-            radius: rooted(8),
-            cross_section: rooted(11),
-            color: rooted(14),
-            crossing_depth: rooted(17),
+            shadow_coefficient: even(8),
+            radius: rooted(10),
+            cross_section: rooted(13),
+            color: rooted(16),
+            crossing_depth: rooted(19),
+            tangent: rooted(22),
             first_look,
         }
     }

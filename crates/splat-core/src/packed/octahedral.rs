@@ -18,6 +18,20 @@ pub(super) fn steps(n: Vec3) -> [i8; 2] {
     candidates.into_iter().max_by(|a, b| along(a).total_cmp(&along(b))).unwrap_or_default()
 }
 
+/// Steps that no direction has.
+const NONE: [i8; 2] = [i8::MIN; 2];
+
+/// The same, or a mark of what has no direction.
+pub(super) fn steps_if_any(v: Vec3) -> [i8; 2] {
+    if v == Vec3::ZERO { NONE } else { steps(v) }
+}
+
+/// The unit vector at these steps, zero at the mark.
+#[inline]
+pub(super) fn normal_if_any(steps: [i8; 2]) -> Vec3 {
+    if steps == NONE { Vec3::ZERO } else { normal(steps) }
+}
+
 /// The unit vector at these steps.
 #[inline]
 pub(super) fn normal(steps: [i8; 2]) -> Vec3 {
