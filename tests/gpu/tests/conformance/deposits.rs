@@ -182,7 +182,7 @@ fn tolerance() -> f32 {
 }
 
 #[test]
-fn maps_are_the_cpu_s() {
+fn ou6_maps_are_the_cpu_s() {
     let mut device = open().unwrap();
     for (name, least, case) in cases() {
         let casters = case.casting.casters();
