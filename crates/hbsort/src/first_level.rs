@@ -82,6 +82,9 @@ impl<const BACK: bool> pulp::NullaryFnOnce for Split<'_, BACK> {
 }
 
 /// Distributes the keys of one chunk into `entries`, stably; where the buckets begin goes into `row`.
+///
+/// The halves of the chunk advance side by side, each with cursors of its own: neighbours often share a bucket, and
+/// one cursor would have to wait for its own last step.
 #[inline(always)]
 pub(crate) fn distribute_chunk<E>(
     keys: &[u32],
@@ -91,19 +94,34 @@ pub(crate) fn distribute_chunk<E>(
     entries: &mut [E],
 ) {
     let slot = |key: u32| bucket_of(key) as usize & MOST_BUCKETS;
-    let mut cursors = [0u32; MOST_BUCKETS + 1];
-    for &key in keys {
-        cursors[slot(key)] += 1;
+    let half = keys.len() / 2;
+    let (first, second) = keys.split_at(half);
+    let mut cursors = [[0u32; 2]; MOST_BUCKETS + 1];
+    for (&a, &b) in first.iter().zip(second) {
+        cursors[slot(a)][0] += 1;
+        cursors[slot(b)][1] += 1;
+    }
+    // The second half is one longer when the length is odd.
+    for &b in &second[half..] {
+        cursors[slot(b)][1] += 1;
     }
     let mut start = 0;
-    for (cursor, row) in cursors.iter_mut().zip(row) {
+    for ([a, b], row) in cursors.iter_mut().zip(row) {
         *row = start;
-        start += std::mem::replace(cursor, start);
+        start += std::mem::replace(a, start);
+        start += std::mem::replace(b, start);
     }
-    for (place, &key) in keys.iter().enumerate() {
-        let cursor = &mut cursors[slot(key)];
+    let mut place_entry = |half: usize, key: u32, place: usize| {
+        let cursor = &mut cursors[slot(key)][half];
         entries[*cursor as usize] = entry_of(key, place as u32);
         *cursor += 1;
+    };
+    for (place, (&a, &b)) in first.iter().zip(second).enumerate() {
+        place_entry(0, a, place);
+        place_entry(1, b, half + place);
+    }
+    for &b in &second[half..] {
+        place_entry(1, b, 2 * half);
     }
 }
 

@@ -100,7 +100,10 @@ impl PackedCloud {
             crossing_depth: by_block(&blocks, &cloud.crossing_depth, |b, v| b.crossing_depth.step_of(*v)),
             shading_normal: by_block(&blocks, &cloud.shading_normal, |_, n| octahedral::steps_if_any(*n)),
             tangent: by_block(&blocks, &cloud.tangent, |b, t| {
-                (octahedral::steps_if_any(*t), b.tangent.step_of(t.length()) as u8)
+                // One whose length no number holds is that of a round disc.
+                let length = t.length();
+                let direction = if length > 0.0 { *t } else { Vec3::ZERO };
+                (octahedral::steps_if_any(direction), b.tangent.step_of(length) as u8)
             }),
             shadow_coefficient: by_block(&blocks, &cloud.shadow_coefficient, |b, v| {
                 b.shadow_coefficient.step_of(*v) as u8

@@ -129,6 +129,21 @@ fn what_a_block_has_one_of_is_exact_and_empty_columns_stay_empty() {
 }
 
 #[test]
+fn numbers_stay_within_those_of_their_block() {
+    // From these least numbers on, 255 steps that are rounded to f32 lead beyond 1.
+    for least in [0.002_246_144_5f32, 0.002_943_646_4, 0.003_199_537_3, 0.000_920_137_33] {
+        let mut cloud = Cloud::new(DVec3::ZERO);
+        for (shadow_coefficient, tangent) in [(least, Vec3::X), (1.0, Vec3::Y * 1e-30), (0.5, Vec3::ZERO)] {
+            cloud.push(&Splat { radius: 0.1, shadow_coefficient, tangent, ..Splat::default() });
+        }
+        let found = PackedCloud::new(&cloud).unwrap().unpack();
+        assert!(found.shadow_coefficient.iter().all(|share| (least..=1.0).contains(share)), "{found:?}");
+        // What is too short for its length to be a number is a round disc, before and behind.
+        assert_eq!(found.tangent, [Vec3::X, Vec3::ZERO, Vec3::ZERO]);
+    }
+}
+
+#[test]
 fn a_splat_with_a_normal_takes_less_than_sixteen_bytes() {
     let bytes = |cloud: &Cloud| {
         let packed = PackedCloud::new(cloud).unwrap();

@@ -35,7 +35,13 @@ pub(super) struct Even {
 
 impl Even {
     fn new([low, high]: [f32; 2], steps: f64) -> Self {
-        Self { low, step: ((f64::from(high) - f64::from(low)) / steps) as f32 }
+        let mut even = Self { low, step: ((f64::from(high) - f64::from(low)) / steps) as f32 };
+        // Rounded up, the last step may be beyond the greatest number, and a share of shadows beyond 1.
+        let last = |even: Self| even.value(steps as f32);
+        while last(even) > high && last(even).is_finite() {
+            even.step = even.step.next_down();
+        }
+        even
     }
 
     /// The nearest step.
