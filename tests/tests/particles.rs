@@ -73,7 +73,11 @@ fn particles_differ_from_points_by_their_standard_error() {
 /// Objects that particles sample from their own data, each before a light whose shadow falls on all.
 const OWN: [(&str, &str, &str); 13] = [
     ("lattice lines", "a", "isosurface = { volume = 'hill.nrrd', level = 0.4 }\nspacing = 0.02"),
-    ("lines", "a", "isosurface = { volume = 'hill.nrrd', level = 0.4, interpolation = 'catmull-rom' }\nspacing = 0.02"),
+    (
+        "lattice lines",
+        "a",
+        "isosurface = { volume = 'hill.nrrd', level = 0.4, interpolation = 'catmull-rom' }\nspacing = 0.02",
+    ),
     ("lines", "a", "level_set = { points = 'ball.xyz' }\nspacing = 0.02"),
     (
         "triangles",

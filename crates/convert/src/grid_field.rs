@@ -17,19 +17,9 @@ mod stencil;
 use jet::{Slope, control_range, hessian, slope};
 use ranges::{Ranges, widen};
 use splat_core::glam::{BVec3, DMat3, DVec3};
-use splat_core::{Clip, DAabb, Error, Grid, ScalarField};
+use splat_core::{Clip, DAabb, Error, Grid, Interpolation, ScalarField};
 use std::sync::Arc;
 use stencil::{Control, Stencil};
-
-/// How values between lattice points come about.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
-pub enum Interpolation {
-    /// From the eight corners of the cell; creases at the faces of cells.
-    #[default]
-    Trilinear,
-    /// From 64 lattice points by cubics; continuous gradients, values may overshoot.
-    CatmullRom,
-}
 
 /// Which side of an isosurface is inside, where the field is negative.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]

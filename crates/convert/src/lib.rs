@@ -131,7 +131,7 @@ pub use field_points::{
     surface_to_mesh, surface_to_points,
 };
 pub use footprints::FootprintChoice;
-pub use grid_field::{GridField, Inside, Interpolation};
+pub use grid_field::{GridField, Inside};
 pub use keep_points::{Kept, Within, kept};
 #[cfg(feature = "lids")]
 pub use lid::{LidReport, lidded_mesh};
@@ -162,7 +162,7 @@ pub use shapes::{HomogeneousMedium, MediumBody, Rectangle, medium, medium_to_gri
 pub use shown_points::{PointsShown, ShownPoints, shown_points};
 pub use sobel::{sobel_gradient, sobel_gradient_into};
 pub use solids::{Combination, Solid};
-pub use splat_core::Clip;
+pub use splat_core::{Clip, Interpolation};
 pub use surface_field::SurfaceField;
 #[cfg(feature = "surfels")]
 pub use surfels::{SurfelParams, SurfelReport, raw_to_surfels};

@@ -31,8 +31,8 @@ pub enum ObjectData {
         /// Cells of a lattice that may hold the surface by the field's bound, over its area in cells: 2 to 3 for a tight bound; infinite without a
         /// bound, 0 where a first look finds no surface, and for measured data, whose fields have tight bounds.
         looseness: f64,
-        /// Whether it is the isosurface of a volume that is interpolated trilinearly, and nothing clips it.
-        trilinear: bool,
+        /// Whether it is the isosurface of a volume, and nothing clips it.
+        on_lattice: bool,
         /// What the scene asks for.
         by: SurfaceSampler,
     },

@@ -1,8 +1,9 @@
-//! Isosurfaces of regular volumes by lines along the axes of their lattice, each with one crossing in closed form.
+//! Isosurfaces of regular volumes by lines along the axes of their lattice, whose crossings are those of a polynomial.
 //!
 //! In a cell the trilinear value is linear along each step a_k of the lattice: the line through the place (u, v) of a face
-//! meets f = c at t = (c − f₀)/(f₁ − f₀) where its ends lie on both sides of c, and nowhere else. N lines along each of the
-//! three axes, uniform on the faces, meet a piece of area A and normal n in N·A·Σ|n·a_k|/V places, V the volume of a cell.
+//! meets f = c at t = (c − f₀)/(f₁ − f₀) where its ends lie on both sides of c, and nowhere else. With Catmull-Rom
+//! interpolation it is a cubic, with three crossings at most (`cubic.rs`). N lines along each of the three axes, uniform on
+//! the faces, meet a piece of area A and normal n in N·A·Σ|n·a_k|/V places, V the volume of a cell.
 //! With g the gradient in steps of the lattice, n·a_k = g_k/|∇f|. Of the crossings the share
 //!
 //! |∇f|/(W·Σ|g_k|), W the greatest length of a column of the inverse transposed steps
@@ -10,7 +11,10 @@
 //! is kept. It is at most 1: of all n the least Σ|n·a_k| is 1/W. So N = λ·V·W lines leave λ·A particles, λ = τ/s, whatever
 //! the place and direction of the piece.
 //!
-//! This is `lines.rs` without a search, for fields that are trilinear: nothing is missed, and crossings are independent.
+//! This is `lines.rs` without a search, for fields on a lattice: nothing is missed. Crossings of a trilinear field are
+//! independent; up to three of a cubic lie on the same line.
+
+mod cubic;
 
 use crate::blocks::Blocks;
 #[cfg(feature = "gpu")]
@@ -23,16 +27,17 @@ use crate::{Error, PackedNormal, Particles, SurfaceParams};
 use glam::{Mat3, Vec3};
 use rayon::prelude::*;
 use splat_core::optics::SurfaceOpacity;
-use splat_core::{Grid, glam};
+use splat_core::{Grid, Interpolation, glam};
 #[cfg(feature = "gpu")]
 use splat_shaders::layouts::ParticleSource;
 
 /// Lines that the area is estimated by.
 const SURVEY_LINES: u32 = 1 << 16;
 
-/// Particles on an isosurface of a volume, interpolated trilinearly.
+/// Particles on an isosurface of a volume.
 pub struct LatticeSampler<'a> {
     grid: &'a Grid,
+    interpolation: Interpolation,
     level: f32,
     params: SurfaceParams,
     /// Lattice index of the first corner of each cell that holds a piece.
@@ -51,7 +56,12 @@ impl<'a> LatticeSampler<'a> {
     /// # Errors
     /// [`Error::Parameter`] for numbers out of range, [`Error::Core`] for a grid that breaks a promise, [`Error::Empty`] for
     /// a level that no cell has, [`Error::Limit`] for more than 4·10⁹ lattice points, or lines a set.
-    pub fn new(grid: &'a Grid, level: f32, params: &SurfaceParams) -> Result<Self, Error> {
+    pub fn new(
+        grid: &'a Grid,
+        interpolation: Interpolation,
+        level: f32,
+        params: &SurfaceParams,
+    ) -> Result<Self, Error> {
         params.validate()?;
         grid.validate()?;
         crate::error::check(level.is_finite(), "level", level, "a finite number")?;
@@ -59,7 +69,7 @@ impl<'a> LatticeSampler<'a> {
             let needed = grid.values.len() as u64;
             return Err(Error::limit("a volume", needed, u32::MAX.into(), "lattice points"));
         }
-        let cells = passed(grid, level);
+        let cells = passed(grid, interpolation, level);
         if cells.is_empty() {
             return Err(Error::Empty { what: "an isosurface", reason: "no cell has the level" });
         }
@@ -71,7 +81,7 @@ impl<'a> LatticeSampler<'a> {
         let blocks = Blocks::new(cells.len(), |_| per_cell)?;
         let sets = PoissonSets::new(grid.origin, params.cross_section, blocks);
         let (axes, gradient, weight) = (grid.axes.as_mat3(), inverse.as_mat3(), weight as f32);
-        let mut sampler = Self { grid, level, params: *params, cells, sets, axes, gradient, weight };
+        let mut sampler = Self { grid, interpolation, level, params: *params, cells, sets, axes, gradient, weight };
         sampler.sets.share = sampler.survey();
         Ok(sampler)
     }
@@ -92,21 +102,24 @@ impl<'a> LatticeSampler<'a> {
         self.sets.blocks.bytes() + 4 * self.cells.len() as u64
     }
 
-    /// Share of the lines that leave a particle.
+    /// Particles that a line leaves, in the mean.
     fn survey(&self) -> f64 {
         let kept = |i: u32| {
             let mut stream = Stream::new(self.params.seed, Stage::Survey, 2, u64::from(i));
             let cell = u64::from(i) * self.cells.len() as u64 / u64::from(SURVEY_LINES);
-            u64::from(self.crossing(self.cells[cell as usize], &mut stream).is_some())
+            let mut kept = 0;
+            self.crossings(self.cells[cell as usize], &mut stream, |_, _| kept += 1);
+            kept
         };
         let kept: u64 = (0..SURVEY_LINES).into_par_iter().with_min_len(1024).map(kept).sum();
         // None is no proof that there is nothing.
         kept.max(1) as f64 / f64::from(SURVEY_LINES)
     }
 
-    /// Place in the cell and world gradient where a random line of it meets the surface and is kept.
+    /// Hands over the places in the cell, and the world gradients there, where a random line of it meets the surface and is
+    /// kept.
     #[inline]
-    fn crossing(&self, at: u32, stream: &mut Stream) -> Option<([f32; 3], Vec3)> {
+    fn crossings(&self, at: u32, stream: &mut Stream, mut emit: impl FnMut([f32; 3], Vec3)) {
         let [u, v, _] = stream.triple();
         let [choice, lot] = stream.pair();
         let axis = ((3.0 * choice) as usize).min(2);
@@ -115,32 +128,51 @@ impl<'a> LatticeSampler<'a> {
             1 => [v, t, u],
             _ => [u, v, t],
         };
+        let mut keep = |f: [f32; 3], g: Vec3, lot: f32| {
+            let world = self.gradient * g;
+            let bound = lot * self.weight * (g.x.abs() + g.y.abs() + g.z.abs());
+            if bound * bound < world.length_squared() {
+                emit(f, world);
+            }
+        };
+        if self.interpolation == Interpolation::CatmullRom {
+            let block = cubic::gather(self.grid, at, self.level);
+            let mut lot = Some(lot);
+            cubic::roots(&cubic::along(&block, axis, on_line(0.0)), &mut |t| {
+                let f = on_line(t);
+                keep(f, cubic::gradient(&block, f), lot.take().unwrap_or_else(|| stream.pair()[0]));
+            });
+            return;
+        }
         let values = corners(self.grid, at);
         // Not by a closure over both: one that is not inlined mixes gradients that nobody asks for.
         let (low, high) = (interpolate(values, on_line(0.0)).0, interpolate(values, on_line(1.0)).0);
-        if (low < self.level) == (high < self.level) {
-            return None;
+        if (low < self.level) != (high < self.level) {
+            let f = on_line((self.level - low) / (high - low));
+            keep(f, interpolate(values, f).1, lot);
         }
-        let f = on_line((self.level - low) / (high - low));
-        let (_, g) = interpolate(values, f);
-        let world = self.gradient * g;
-        let bound = lot * self.weight * (g.x.abs() + g.y.abs() + g.z.abs());
-        (bound * bound < world.length_squared()).then_some((f, world))
     }
 }
 
-/// First corners of the cells of which some corners are below the level and some are not.
-fn passed(grid: &Grid, level: f32) -> Vec<u32> {
+/// First corners of the cells that the surface passes: of a trilinear field those of which some corners are below the level
+/// and some are not, of a cubic one those whose control points are.
+fn passed(grid: &Grid, interpolation: Interpolation, level: f32) -> Vec<u32> {
     let [nx, ny, nz] = grid.dims;
-    let row = |row: usize| {
-        let first = (row / (ny - 1) * ny + row % (ny - 1)) * nx;
+    let rows = if nx > 1 { ny.saturating_sub(1) * nz.saturating_sub(1) } else { 0 };
+    let place = |row: usize| [row % (ny - 1), row / (ny - 1)];
+    let trilinear = |row: usize| {
+        let [j, k] = place(row);
+        let first = (k * ny + j) * nx;
         let below = move |i: usize| {
             [i, i + nx, i + nx * ny, i + nx * ny + nx].into_iter().filter(|i| grid.values[*i] < level).count()
         };
         (first..first + nx - 1).filter(move |i| !matches!(below(*i) + below(*i + 1), 0 | 8)).map(|i| i as u32)
     };
-    let rows = if nx > 1 { ny.saturating_sub(1) * nz.saturating_sub(1) } else { 0 };
-    (0..rows).into_par_iter().with_min_len(16).flat_map_iter(row).collect()
+    let rows = (0..rows).into_par_iter().with_min_len(16);
+    match interpolation {
+        Interpolation::Trilinear => rows.flat_map_iter(trilinear).collect(),
+        Interpolation::CatmullRom => rows.flat_map_iter(|row| cubic::passed_in_row(grid, level, place(row))).collect(),
+    }
 }
 
 impl Poisson for LatticeSampler<'_> {
@@ -154,18 +186,22 @@ impl Poisson for LatticeSampler<'_> {
         let per_crossing = self.params.surface_opacity == SurfaceOpacity::PerCrossing;
         self.sets.blocks.arrivals(self.params.seed, Stage::Lattice, set, chunk, |c, stream| {
             let at = self.cells[c];
-            let Some((f, gradient)) = self.crossing(at, stream) else { return };
-            let corner = [at % nx, at / nx % ny, at / nx / ny];
-            let lattice = Vec3::from_array(std::array::from_fn(|k| corner[k] as f32 + f[k]));
-            let normal = PackedNormal::new(gradient);
-            let normal = if per_crossing { normal.per_crossing() } else { normal };
-            let place = self.axes * lattice;
-            particles.push(place, normal, color.at(place));
+            self.crossings(at, stream, |f, gradient| {
+                let corner = [at % nx, at / nx % ny, at / nx / ny];
+                let lattice = Vec3::from_array(std::array::from_fn(|k| corner[k] as f32 + f[k]));
+                let normal = PackedNormal::new(gradient);
+                let normal = if per_crossing { normal.per_crossing() } else { normal };
+                let place = self.axes * lattice;
+                particles.push(place, normal, color.at(place));
+            });
         });
     }
 
     #[cfg(feature = "gpu")]
     fn tables(&self) -> Option<Twin> {
+        if self.interpolation != Interpolation::Trilinear {
+            return None;
+        }
         let ([axis_x, axis_y, axis_z], [gradient_x, gradient_y, gradient_z]) =
             (columns(&self.axes), columns(&self.gradient));
         let per_crossing = self.params.surface_opacity == SurfaceOpacity::PerCrossing;
@@ -210,8 +246,10 @@ mod tests {
         grid
     }
 
+    const BOTH: [Interpolation; 2] = [Interpolation::Trilinear, Interpolation::CatmullRom];
+
     fn params(seed: u64) -> SurfaceParams {
-        SurfaceParams { opacity: 0.5, cross_section: 2e-5, seed, ..SurfaceParams::default() }
+        SurfaceParams { opacity: 0.5, cross_section: 8e-5, seed, ..SurfaceParams::default() }
     }
 
     fn particles(sampler: &LatticeSampler<'_>, sets: u64) -> Particles {
@@ -224,15 +262,14 @@ mod tests {
 
     #[test]
     fn planes_of_any_direction_have_the_same_density() {
-        for (k, normal) in [DVec3::X, DVec3::Y, DVec3::Z, DVec3::new(1.0, 2.0, -3.0), DVec3::new(-0.3, 1.0, 0.1)]
-            .into_iter()
-            .enumerate()
-        {
+        let normals = [DVec3::X, DVec3::Y, DVec3::Z, DVec3::new(1.0, 2.0, -3.0), DVec3::new(-0.3, 1.0, 0.1)];
+        let planes = normals.into_iter().enumerate();
+        for ((k, normal), interpolation) in planes.flat_map(|plane| BOTH.map(|of| (plane, of))) {
             let n = normal.normalize();
-            // A linear field is trilinear on any lattice.
+            // A linear field stays one on any lattice, by both.
             let grid = lattice(|p| p.dot(n));
             let params = params(k as u64);
-            let sampler = LatticeSampler::new(&grid, 0.01, &params).unwrap();
+            let sampler = LatticeSampler::new(&grid, interpolation, 0.01, &params).unwrap();
             let all = particles(&sampler, 8);
             let middle = grid.axes * DVec3::new(13.0, 16.0, 10.0);
             let inside = all.position.iter().filter(|p| {
@@ -251,19 +288,21 @@ mod tests {
     #[test]
     fn a_ball_has_its_area_and_so_have_its_halves() {
         let grid = lattice(|p| p.length());
-        let sampler = LatticeSampler::new(&grid, 0.55, &params(9)).unwrap();
-        let all = particles(&sampler, 8);
-        let area = 4.0 * std::f64::consts::PI * 0.55 * 0.55;
-        // Trilinear pieces of a ball are flatter by half a percent or so.
-        let expected = 8.0 * area * params(9).particles_per_area();
-        assert!((all.len() as f64 / expected - 1.0).abs() < 0.02, "{} of {expected}", all.len());
-        assert!((sampler.area() / area - 1.0).abs() < 0.03 && sampler.active_cells() > 500);
-        assert!((sampler.expected_particles() * 8.0 / all.len() as f64 - 1.0).abs() < 0.02);
         let middle = (grid.axes * DVec3::new(13.0, 16.0, 10.0)).as_vec3();
-        for axis in 0..3 {
-            let above = all.position.iter().filter(|p| p[axis] > middle[axis]).count() as f64;
-            let half = all.len() as f64 / 2.0;
-            assert!((above / half - 1.0).abs() < 0.01, "{axis}: {above} of {half}");
+        let area = 4.0 * std::f64::consts::PI * 0.55 * 0.55;
+        let expected = 8.0 * area * params(9).particles_per_area();
+        // Trilinear pieces of a ball are flatter by half a percent or so.
+        for (interpolation, off) in BOTH.into_iter().zip([0.02, 0.006]) {
+            let sampler = LatticeSampler::new(&grid, interpolation, 0.55, &params(9)).unwrap();
+            let all = particles(&sampler, 8);
+            assert!((all.len() as f64 / expected - 1.0).abs() < off, "{} of {expected}", all.len());
+            assert!((sampler.area() / area - 1.0).abs() < 0.03 && sampler.active_cells() > 500);
+            assert!((sampler.expected_particles() * 8.0 / all.len() as f64 - 1.0).abs() < 0.02);
+            for axis in 0..3 {
+                let above = all.position.iter().filter(|p| p[axis] > middle[axis]).count() as f64;
+                let half = all.len() as f64 / 2.0;
+                assert!((above / half - 1.0).abs() < 0.01, "{axis}: {above} of {half}");
+            }
         }
     }
 
@@ -273,15 +312,17 @@ mod tests {
         let axes = DMat3::from_diagonal(DVec3::splat(0.25));
         let values = (0..125).map(|i| (i / 25) as f32).collect();
         let grid = Grid { origin: DVec3::ZERO, axes, dims: [5; 3], values };
-        let sampler = LatticeSampler::new(&grid, 2.0, &params(3)).unwrap();
-        let all = particles(&sampler, 4);
-        let expected = 4.0 * params(3).particles_per_area();
-        assert!((all.len() as f64 - expected).abs() < 4.0 * expected.sqrt(), "{} of {expected}", all.len());
-        for level in [-1.0, 0.0, 4.5] {
-            assert!(matches!(LatticeSampler::new(&grid, level, &params(1)), Err(Error::Empty { .. })), "{level}");
-        }
-        assert!(LatticeSampler::new(&grid, f32::NAN, &params(1)).is_err());
         let thin = Grid { dims: [125, 1, 1], ..grid.clone() };
-        assert!(matches!(LatticeSampler::new(&thin, 2.0, &params(1)), Err(Error::Empty { .. })));
+        let expected = 4.0 * params(3).particles_per_area();
+        for interpolation in BOTH {
+            let new = |grid, level| LatticeSampler::new(grid, interpolation, level, &params(3));
+            let all = particles(&new(&grid, 2.0).unwrap(), 4);
+            assert!((all.len() as f64 - expected).abs() < 4.0 * expected.sqrt(), "{} of {expected}", all.len());
+            for level in [-1.0, 0.0, 4.5] {
+                assert!(matches!(new(&grid, level), Err(Error::Empty { .. })), "{level}");
+            }
+            assert!(new(&grid, f32::NAN).is_err());
+            assert!(matches!(new(&thin, 2.0), Err(Error::Empty { .. })));
+        }
     }
 }

@@ -7,7 +7,7 @@ use pbsr::{
     Sampler, SplatParams, SplatSampler, SurfaceParams, VolumeParams, pixel_area,
 };
 use splat_core::glam::{DMat3, DVec3, Vec3};
-use splat_core::{Cloud, DAabb, Grid, Splat, SplatKind, TransferFunction, TransferPoint, rng};
+use splat_core::{Cloud, DAabb, Grid, Interpolation, Splat, SplatKind, TransferFunction, TransferPoint, rng};
 
 /// Far from what nine bits hold: nearest rounding changes the channels by 8·10⁻⁴, 10⁻³ and 6·10⁻³ of themselves.
 const COLOR: [f32; 3] = [0.950_01, 0.5005, 0.0511];
@@ -70,7 +70,7 @@ fn every_sampler_gives_its_colour_in_the_mean() {
         ("triangles", Box::new(MeshSampler::new(&mesh, &surface(), None).unwrap())),
         ("colours of vertices", Box::new(MeshSampler::new(&colored, &surface(), None).unwrap())),
         ("lines", Box::new(LineSampler::new(&ball, &LineParams { resolution: 24 }, &fine, None).unwrap())),
-        ("lattice lines", Box::new(LatticeSampler::new(&grid, 200.5, &surface()).unwrap())),
+        ("lattice lines", Box::new(LatticeSampler::new(&grid, Interpolation::CatmullRom, 200.5, &surface()).unwrap())),
         ("walk", Box::new(BrownianSampler::new(&ball, &walk, &fine).unwrap())),
         ("cells", Box::new(GridSampler::new(&grid, &transfer, &volume, None).unwrap())),
         ("chains", Box::new(MetropolisSampler::new(&grid, &transfer, &volume, &few, None).unwrap())),

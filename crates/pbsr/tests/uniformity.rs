@@ -8,7 +8,7 @@ use pbsr::{
     ShownSampler, SplatParams, SplatSampler, SurfaceParams, VolumeParams,
 };
 use splat_core::glam::{DMat3, DVec3, Vec3};
-use splat_core::{Cloud, DAabb, Grid, Splat, SplatKind, TransferFunction, TransferPoint};
+use splat_core::{Cloud, DAabb, Grid, Interpolation, Splat, SplatKind, TransferFunction, TransferPoint};
 
 /// Sets in which a count is taken.
 const SETS: u64 = 400;
@@ -164,7 +164,9 @@ fn pb13_pb14_lattice_lines() {
     let axes = DMat3::from_diagonal(DVec3::splat(f64::from(step)));
     let grid = Grid { origin: DVec3::splat(-1.0), axes, dims: [N; 3], values: (0..N * N * N).map(value).collect() };
     let grid = Box::leak(Box::new(grid));
-    check(&|s| Box::new(LatticeSampler::new(grid, 0.0, &half(s)).unwrap()), in_cube, 2);
+    for by in [Interpolation::Trilinear, Interpolation::CatmullRom] {
+        check(&|s| Box::new(LatticeSampler::new(grid, by, 0.0, &half(s)).unwrap()), in_cube, 2);
+    }
 }
 
 #[test]

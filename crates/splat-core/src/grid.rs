@@ -66,6 +66,16 @@ impl Grid {
     }
 }
 
+/// How values between lattice points come about.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum Interpolation {
+    /// From the eight corners of the cell; creases at the faces of cells.
+    #[default]
+    Trilinear,
+    /// From 64 lattice points by cubics; continuous gradients, values may overshoot.
+    CatmullRom,
+}
+
 /// How the planes of a lattice lie, k = 0, 1, 2 …
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Packing {

@@ -87,7 +87,7 @@ pub use field::ScalarField;
 pub use footprint::{Footprint, FootprintImage, FootprintStack, MOST_TEXELS};
 pub use gaussians::Gaussians;
 pub use glam;
-pub use grid::{BccGrid, Grid, Packing};
+pub use grid::{BccGrid, Grid, Interpolation, Packing};
 pub use height_image::HeightImage;
 pub use layers::{ADDITIVE_LAYERS, Accumulator, LayerData, LayerSet, Layers, SHADED_EFFECTS};
 pub use light::{Framing, Light, LightShape, Slide, SlideProjection};

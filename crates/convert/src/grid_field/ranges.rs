@@ -3,9 +3,8 @@
 //! A node of the finest level covers 2×2×2 cells, a node of the next 2×2×2 nodes. A box is answered from the level where
 //! it meets at most three nodes along each axis: 27 look-ups however large it is, 1.15 bytes a voxel.
 
-use super::Interpolation;
 use rayon::prelude::*;
-use splat_core::Grid;
+use splat_core::{Grid, Interpolation};
 
 /// Added to each end, times the larger end: rounding of control points and of values. Interpolated values are sums
 /// of at most 64 lattice values that are below 2200 times the largest control point.

@@ -25,8 +25,8 @@ pub(super) enum Input<'a> {
     Points(&'a Path, Arc<RawPoints>, SurfelParams),
     Matter(&'a Path, Arc<RawPoints>, MatterParams),
     Volume(Arc<Grid>, &'a TransferFunction, VolumeParams),
-    /// The zero set of a field in a box; of a trilinear one that nothing clips with its volume.
-    Surface(SharedField, DAabb, MeshParams, Trilinear),
+    /// The zero set of a field in a box; of an isosurface that nothing clips with its volume.
+    Surface(SharedField, DAabb, MeshParams, Option<Isosurface>),
     Density(SharedField, DAabb, DensityParams),
     Procedural(CloudShape, f64, VolumeParams),
     Medium(HomogeneousMedium, SplatParams, &'a [Clip]),
@@ -99,7 +99,7 @@ impl Input<'_> {
             Self::Points(_, points, _) if !points.gaussians.is_empty() => ObjectData::Gaussians,
             Self::Points(..) | Self::Matter(..) => ObjectData::Points,
             Self::Mesh(..) | Self::Rectangle(..) => ObjectData::Triangles,
-            Self::Surface(.., lattice) => ObjectData::Surface { looseness, trilinear: lattice.is_some(), by },
+            Self::Surface(.., isosurface) => ObjectData::Surface { looseness, on_lattice: isosurface.is_some(), by },
             Self::Volume(..) | Self::Procedural(..) => ObjectData::Volume,
             Self::Density(..) | Self::Medium(..) => ObjectData::Density { bounded },
         }
@@ -181,11 +181,16 @@ fn slice<'a>(
     Ok(Input::Mesh(name, mesh, MeshParams { splat, density, opacity }))
 }
 
-/// The lattice, the level and the inside that a surface comes of, where that is all.
-type Trilinear = Option<(Arc<Grid>, f32, Inside)>;
+/// The lattice that a surface comes of, where that is all.
+pub(super) struct Isosurface {
+    pub(super) grid: Arc<Grid>,
+    pub(super) interpolation: Interpolation,
+    pub(super) level: f32,
+    pub(super) inside: Inside,
+}
 
 /// What a field and where it is known make; its step is the distance of its splats where the object states none.
-fn solid(source: &Source, object: &SceneObject, context: &Context<'_>) -> Result<(Solid, Trilinear), Error> {
+fn solid(source: &Source, object: &SceneObject, context: &Context<'_>) -> Result<(Solid, Option<Isosurface>), Error> {
     Ok(match source {
         Source::Implicit(source) => {
             let (field, walls) = (Arc::new(source.field()?), Vec::new());
@@ -193,10 +198,10 @@ fn solid(source: &Source, object: &SceneObject, context: &Context<'_>) -> Result
         }
         Source::Isosurface(source) => {
             let grid = read_grid(&source.path, source.frame, context)?;
-            let is_trilinear = source.interpolation == Interpolation::Trilinear;
-            let trilinear = is_trilinear.then(|| (grid.clone(), source.level as f32, source.inside));
-            let solid = Solid::of_volume(grid, source.interpolation, source.level, source.inside);
-            (solid.map_err(|e| refuse(&source.path, &e, ""))?, trilinear)
+            let (interpolation, inside) = (source.interpolation, source.inside);
+            let solid = Solid::of_volume(grid.clone(), interpolation, source.level, inside);
+            let of = Isosurface { grid, interpolation, level: source.level as f32, inside };
+            (solid.map_err(|e| refuse(&source.path, &e, ""))?, Some(of))
         }
         Source::LevelSet(source) => {
             let (field, bounds) = level_set(source, object, context)?;
@@ -215,7 +220,7 @@ fn solid(source: &Source, object: &SceneObject, context: &Context<'_>) -> Result
 
 /// A surface of a field.
 fn surface<'a>(
-    (solid, trilinear): (Solid, Trilinear),
+    (solid, isosurface): (Solid, Option<Isosurface>),
     object: &SceneObject,
     splat: SplatParams,
     opacity: f64,
@@ -228,8 +233,8 @@ fn surface<'a>(
         let clipped = ClippedField::new(field, object.clip.clone());
         Arc::new(clipped.map_err(|e| Error::Internal(e.to_string()))?)
     };
-    let trilinear = trilinear.filter(|_| object.clip.is_empty());
-    Ok(Input::Surface(field, bounds, MeshParams { splat, density, opacity }, trilinear))
+    let isosurface = isosurface.filter(|_| object.clip.is_empty());
+    Ok(Input::Surface(field, bounds, MeshParams { splat, density, opacity }, isosurface))
 }
 
 pub(super) fn refuse(path: &Path, error: &splat_core::Error, hint: &str) -> Error {

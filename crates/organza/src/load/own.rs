@@ -3,7 +3,7 @@
 //! Lengths and places are the object's own, so nothing is rounded where it lies far away; a transform leads to the world.
 
 use super::context::Context;
-use super::input::Input;
+use super::input::{Input, Isosurface};
 use super::object::{Prepared, procedural};
 use crate::Error;
 use crate::form::{Form, PlannedObject};
@@ -13,7 +13,9 @@ use glam::DVec3;
 use pbsr::{BoundedExtinction, LineParams};
 use rayon::prelude::*;
 use splat_core::raster::triangles::PlacedMesh;
-use splat_core::{BccGrid, DAabb, Footprint, Grid, Mesh, Packing, Similarity, SplatKind, TransferFunction, optics};
+use splat_core::{
+    BccGrid, DAabb, Footprint, Grid, Interpolation, Mesh, Packing, Similarity, SplatKind, TransferFunction, optics,
+};
 use std::sync::Arc;
 
 /// Which zeros belong to a surface.
@@ -63,8 +65,8 @@ pub(crate) enum Body {
         /// Step of a Brownian motion over the longest side of the bounds; without one, lines find particles.
         step: Option<f64>,
     },
-    /// An isosurface of a volume, interpolated trilinearly.
-    Lattice { grid: Arc<Grid>, level: f32 },
+    /// An isosurface of a volume.
+    Lattice { grid: Arc<Grid>, interpolation: Interpolation, level: f32 },
     /// Triangles with normals.
     Triangles(Mesh),
     /// Extinction by a transfer function, 1/world unit before normalization.
@@ -219,12 +221,13 @@ fn data(
         Input::Points(..) | Input::Matter(..) => None,
         Input::Mesh(_, mesh, _) => meshed(Mesh::clone(mesh)),
         Input::Rectangle(r, ..) => meshed(Mesh::rectangle(r.center, r.u, r.v)),
-        Input::Surface(field, bounds, params, lattice) => {
+        Input::Surface(field, bounds, params, isosurface) => {
             let spacing = params.density.spacing() / params.splat.transform.scale;
             let stated = context.scene.objects[context.id].spacing;
-            if let (Form::Triangles, Some((grid, level, inside)), None) = (source, lattice, stated) {
+            let trilinear = isosurface.as_ref().filter(|of| of.interpolation == Interpolation::Trilinear);
+            if let (Form::Triangles, Some(of), None) = (source, trilinear, stated) {
                 // Marching cubes on the volume's own steps, as the paper has it (section 5).
-                let mesh = convert::isosurface_to_mesh(grid, f64::from(*level), *inside);
+                let mesh = convert::isosurface_to_mesh(&of.grid, f64::from(of.level), of.inside);
                 return Ok(meshed(mesh.map_err(|e| Error::from_core("an isosurface", e))?));
             }
             if source == Form::Triangles {
@@ -233,8 +236,9 @@ fn data(
                 return Ok(meshed(mesh?));
             }
             let bounds = prepared.search.as_ref().map_or(*bounds, |s| s.bounds);
-            if let (Form::Lattice, Some((grid, level, _))) = (source, lattice) {
-                return Ok(Some((Body::Lattice { grid: grid.clone(), level: *level }, bounds, spacing)));
+            if let (Form::Lattice, Some(Isosurface { grid, interpolation, level, .. })) = (source, isosurface) {
+                let body = Body::Lattice { grid: grid.clone(), interpolation: *interpolation, level: *level };
+                return Ok(Some((body, bounds, spacing)));
             }
             let domain = field.clone();
             let inside: Inside = Box::new(move |p| domain.in_domain(p));

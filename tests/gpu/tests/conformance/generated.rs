@@ -10,8 +10,8 @@ use pbsr::{
 use splat_core::glam::{DMat3, DQuat, DVec3, Vec3};
 use splat_core::optics::SurfaceOpacity;
 use splat_core::{
-    Camera, Cloud, Grid, Material, Mesh, Projection, Shading, Similarity, Splat, SplatKind, TransferFunction,
-    TransferPoint, rng,
+    Camera, Cloud, Grid, Interpolation, Material, Mesh, Projection, Shading, Similarity, Splat, SplatKind,
+    TransferFunction, TransferPoint, rng,
 };
 use splat_shaders::Overflow;
 use std::collections::BTreeSet;
@@ -131,7 +131,7 @@ impl World {
             seed: seed + 3,
             ..SurfaceParams::default()
         };
-        LatticeSampler::new(&self.grid, 0.4, &params).unwrap()
+        LatticeSampler::new(&self.grid, Interpolation::Trilinear, 0.4, &params).unwrap()
     }
 
     /// Of the cloud.

@@ -19,7 +19,7 @@ pub(crate) fn form(object: &ObjectStatistics) -> (Form, &'static str) {
             (Form::Splats, "raw points have nothing between them, and fields are shown by splats")
         }
         ObjectData::Triangles => (Form::Triangles, "a uniform place on a triangle is exact"),
-        ObjectData::Surface { looseness, trilinear, by } => surface(looseness, trilinear, by),
+        ObjectData::Surface { looseness, on_lattice, by } => surface(looseness, on_lattice, by),
         ObjectData::Volume | ObjectData::Density { .. } if object.volumes_by != VolumeSampler::Auto => {
             let by_cells = object.volumes_by == VolumeSampler::Cells;
             (if by_cells { Form::Cells } else { Form::Chains }, "the scene asks for it")
@@ -35,10 +35,10 @@ pub(crate) fn form(object: &ObjectStatistics) -> (Form, &'static str) {
     }
 }
 
-fn surface(looseness: f64, trilinear: bool, by: SurfaceSampler) -> (Form, &'static str) {
+fn surface(looseness: f64, on_lattice: bool, by: SurfaceSampler) -> (Form, &'static str) {
     match by {
-        SurfaceSampler::Auto if trilinear => {
-            (Form::Lattice, "lines along a lattice meet a trilinear surface in closed form")
+        SurfaceSampler::Auto if on_lattice => {
+            (Form::Lattice, "lines along a lattice meet an isosurface in the roots of a polynomial")
         }
         SurfaceSampler::Auto if looseness > LOOSEST => {
             (Form::Triangles, "its field has a loose bound, so that lines would search long: it is meshed")

@@ -43,7 +43,9 @@ impl<'a> Source<'a> {
                 warnings.extend(sampler.report().doubts().map(named));
                 Box::new(sampler)
             }
-            Body::Lattice { grid, level } => Box::new(LatticeSampler::new(grid, *level, &self.surface(own))?),
+            Body::Lattice { grid, interpolation, level } => {
+                Box::new(LatticeSampler::new(grid, *interpolation, *level, &self.surface(own))?)
+            }
             Body::Triangles(mesh) => Box::new(MeshSampler::new(mesh, &self.surface(own), None)?),
             Body::Cells { grid, transfer, normals, cut, .. } => {
                 let params = VolumeParams {
