@@ -11,8 +11,9 @@
 //! is kept. It is at most 1: of all n the least Σ|n·a_k| is 1/W. So N = λ·V·W lines leave λ·A particles, λ = τ/s, whatever
 //! the place and direction of the piece.
 //!
-//! This is `lines.rs` without a search, for fields on a lattice: nothing is missed. Crossings of a trilinear field are
-//! independent; up to three of a cubic lie on the same line.
+//! This is `lines.rs` without a search, for fields on a lattice: nothing is missed but pairs
+//! of roots of a cubic nearer than 2⁻¹² of a cell. Crossings of a trilinear field are independent; up to three of a cubic
+//! lie on the same line.
 
 mod cubic;
 

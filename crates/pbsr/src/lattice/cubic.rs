@@ -235,7 +235,7 @@ fn may_pass(block: &Block) -> bool {
     below && above
 }
 
-/// Appends those of a row of cells that the surface may pass; (j, k) is that of its first corners.
+/// First corners of the cells of a row that the surface may pass; (j, k) is that of its first corners.
 pub(super) fn passed_in_row(grid: &Grid, level: f32, [j, k]: [usize; 2]) -> Vec<u32> {
     let [nx, ny, nz] = grid.dims;
     let (mut low, mut high) = (vec![f32::INFINITY; nx], vec![f32::NEG_INFINITY; nx]);
@@ -248,9 +248,10 @@ pub(super) fn passed_in_row(grid: &Grid, level: f32, [j, k]: [usize; 2]) -> Vec<
     }
     let near = |i: usize| {
         let around = i.saturating_sub(1)..(i + 3).min(nx);
-        let least = low[around.clone()].iter().copied().fold(f32::INFINITY, f32::min);
-        let most = high[around].iter().copied().fold(f32::NEG_INFINITY, f32::max);
-        (level - 0.5 * (least + most)).abs() <= OVERSHOOT * 0.5 * (most - least)
+        // Less the level first: values beside it lose no digit to the middle of the range.
+        let least = low[around.clone()].iter().copied().fold(f32::INFINITY, f32::min) - level;
+        let most = high[around].iter().copied().fold(f32::NEG_INFINITY, f32::max) - level;
+        (least + most).abs() <= OVERSHOOT * (most - least)
     };
     let first = (k * ny + j) * nx;
     let cells = (0..nx - 1).filter(|i| near(*i)).map(|i| (first + i) as u32);
@@ -422,5 +423,14 @@ mod tests {
             }
             assert!(left_out > 0 || dims[0] == 2, "nothing is told apart");
         }
+    }
+
+    #[test]
+    fn a_step_of_one_rounding_is_passed() {
+        let (low, high) = (1000.0f32, 1000.0f32.next_up());
+        let values = (0..5 * 5 * 5).map(|i| if i / 25 < 2 { low } else { high }).collect();
+        let grid = Grid { values, ..grid([5; 3], 1) };
+        let passed = (0..4).map(|k| passed_in_row(&grid, high, [1, k]).len());
+        assert_eq!(passed.collect::<Vec<_>>()[1], 4);
     }
 }
