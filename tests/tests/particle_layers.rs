@@ -233,12 +233,12 @@ fn x1_layers_and_coloured_particles_have_the_same_bits_for_any_threads_and_after
             let arguments = ["--repeat-level", levels, "--threads", threads, "--layers", layers];
             draw_in(folder.path(), &text, &[&arguments[..], more].concat())
         };
-        let whole = run("400", "1", &[]);
-        assert!(run("400", "3", &[]) == whole);
+        let whole = run("150", "1", &[]);
+        assert!(run("150", "3", &[]) == whole);
         let file = folder.path().join("sums");
         let checkpoint = ["--checkpoint", file.to_str().unwrap()];
-        run("190", "2", &checkpoint);
-        assert!(run("400", "2", &checkpoint) == whole);
+        run("70", "2", &checkpoint);
+        assert!(run("150", "2", &checkpoint) == whole);
         std::fs::remove_file(&file).unwrap();
         let early = run("4000", "2", &["--target-error", "0.004"]);
         assert!(early != whole && early.channel("depth.median.Z").iter().any(|d| d.is_finite()));

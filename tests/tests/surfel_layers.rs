@@ -99,7 +99,8 @@ fn orders_has_the_papers_errors_of_layers() {
 
 #[test]
 fn what_has_no_layers_is_said() {
-    let with = |more: &str| compare(&scene(&(balls("") + more), None), &RenderOptions::default(), &Progress::new());
+    let few = balls("").replace("[48, 36]", "[8, 6]").replace("spacing = 0.09", "spacing = 0.3");
+    let with = |more: &str| compare(&scene(&(few.clone() + more), None), &RenderOptions::default(), &Progress::new());
     let fog =
         "[[object]]\nname = 'fog'\nmedium_ball = { center = [0, 0, 0], radius = 0.3, extinction = 1, spacing = 0.1 }\n";
     assert_eq!(with(fog).unwrap().layers.unwrap_err(), "`fog` is a medium");

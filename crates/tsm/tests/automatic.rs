@@ -34,7 +34,7 @@ fn shine(cloud: &Cloud, light: &Light, s: f64) -> Vec<f32> {
 fn ts12_tables_do_not_depend_on_the_unit_of_length() {
     // A square slab, whose table is a whole number of cells wide but for rounding, and random media.
     let slab = medium([30, 30, 4], 0.05, 3.0, |_| true);
-    let mut random = mixed(10_000, DVec3::ZERO);
+    let mut random = mixed(4000, DVec3::ZERO);
     random.kind.fill(splat_core::SplatKind::Medium);
     let lights = [
         directional(DVec3::Z),

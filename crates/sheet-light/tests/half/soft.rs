@@ -176,8 +176,8 @@ fn beside_two_edges(x: f64, r: f64) -> f64 {
 fn hv07_hv08_what_is_constant_stays_so_after_a_thousand_slabs_and_at_borders() {
     let grid = block([-3.0, -3.0, -1.0], [3.0, 3.0, 1.0], 0.25);
     let (thin, material) = (constant(0.5), scattering());
-    let camera = parallel([0.0, 0.0, 9.0], 5.6, [32, 32]);
-    let disk = extended(LightShape::Disk { center: DVec3::Z * 1e3, normal: DVec3::NEG_Z, radius: 30.0 }, 16);
+    let camera = parallel([0.0, 0.0, 9.0], 5.6, [20, 20]);
+    let disk = extended(LightShape::Disk { center: DVec3::Z * 1e3, normal: DVec3::NEG_Z, radius: 30.0 }, 8);
     let point = LitBy {
         slide: None,
         light: Light { shape: lamp([0.0, 0.0, 1e3]).light.shape, ..disk.lit.light },
@@ -192,9 +192,9 @@ fn hv07_hv08_what_is_constant_stays_so_after_a_thousand_slabs_and_at_borders() {
     };
     // Nothing attenuates: 1 everywhere, at the borders too, to the bit.
     let ((open, counts), (hard, _)) = (with(false, true), with(false, false));
-    assert!(counts.slabs > 1000 && counts.soft_passes >= 1000 * 16, "{counts:?}");
+    assert!(counts.slabs > 1000 && counts.soft_passes >= 1000 * 8, "{counts:?}");
     // All points together give the middle a little less than the centre does.
-    let gain = open.channels[0][528] / hard.channels[0][528];
+    let gain = open.channels[0][210] / hard.channels[0][210];
     let worst = open.channels[0].iter().zip(&hard.channels[0]).map(|(a, b)| (a / b / gain - 1.0).abs());
     let worst = worst.fold(0.0, f32::max);
     assert!((gain - 1.0).abs() < 1e-3, "{gain}");
@@ -202,11 +202,11 @@ fn hv07_hv08_what_is_constant_stays_so_after_a_thousand_slabs_and_at_borders() {
     // A constant medium lets through what it does of the centre's light, but beside the faces that light comes in at the sides.
     let ((soft, _), (hard, _)) = (with(true, true), with(true, false));
     let apart = |at: usize| {
-        let [x, y] = [at % 32, at / 32].map(|v| (v as f64 + 0.5) / 32.0 * 5.6 - 2.8);
+        let [x, y] = [at % 20, at / 20].map(|v| (v as f64 + 0.5) / 20.0 * 5.6 - 2.8);
         let scale = open.channels[0][at];
         (x.abs().max(y.abs()) < 2.6).then(|| (soft.channels[0][at] - gain * hard.channels[0][at]).abs() / scale)
     };
-    let worst = (0..1024).filter_map(apart).fold(0.0, f32::max);
+    let worst = (0..400).filter_map(apart).fold(0.0, f32::max);
     assert!(worst < 1e-5, "{worst:e}");
 }
 
@@ -306,7 +306,7 @@ fn a_cloud_under_an_extended_light_is_that_under_many_points_of_it() {
         ];
         let is_behind = at[2] < 0.0;
         for shape in shapes.into_iter().filter(|s| is_behind == matches!(s, LightShape::Sphere { .. })) {
-            let camera = perspective([1.0, 2.0, 12.0], 24.0, [32, 32]);
+            let camera = perspective([1.0, 2.0, 12.0], 24.0, [24, 24]);
             let [rmse, hard, mean] = against_points(&extended(shape, 32), 64, &camera);
             assert!(rmse < most * mean && rmse < 0.9 * hard, "{rmse:e} and {hard:e} of {mean:e}: {shape:?}");
         }
