@@ -128,6 +128,10 @@ impl ScalarField for CombinedField {
         all
     }
 
+    fn steepest(&self, p: DVec3, radius: f64) -> Option<f64> {
+        self.parts.iter().try_fold(0.0, |most: f64, part| Some(most.max(part.field.steepest(p, radius)?)))
+    }
+
     /// Of the part whose value counts.
     fn in_domain(&self, p: DVec3) -> bool {
         self.active(p).0.field.in_domain(p)
@@ -207,6 +211,10 @@ impl ScalarField for ClippedField {
 
     fn bound(&self, p: DVec3, radius: f64) -> Option<(f64, f64)> {
         self.field.bound(p, radius)
+    }
+
+    fn steepest(&self, p: DVec3, radius: f64) -> Option<f64> {
+        self.field.steepest(p, radius)
     }
 
     fn in_domain(&self, p: DVec3) -> bool {

@@ -194,6 +194,13 @@ impl MpuField {
         DAabb::around(self.origin + self.octree.center, DVec3::splat(self.octree.half))
     }
 
+    /// A radius with what covers the rounding of positions; `None` for a ball of no numbers.
+    fn reach(&self, p: DVec3, radius: f64) -> Option<f64> {
+        let far = p.abs().max_element() + self.origin.abs().max_element() + radius;
+        let reach = radius + 8.0 * f64::EPSILON * far;
+        (p.is_finite() && reach.is_finite() && radius >= 0.0).then_some(reach)
+    }
+
     /// The place of the cube that stands for `p`, relative to the origin, and 1 for each axis on which it is `p`.
     fn local(&self, p: DVec3) -> (DVec3, DVec3) {
         let (p, center, half) = (p - self.origin, self.octree.center, self.octree.half);
@@ -224,14 +231,13 @@ impl ScalarField for MpuField {
     }
 
     fn bound(&self, p: DVec3, radius: f64) -> Option<(f64, f64)> {
-        // The last term covers the rounding of positions.
-        let far = p.abs().max_element() + self.origin.abs().max_element() + radius;
-        let reach = radius + 8.0 * f64::EPSILON * far;
-        if !(p.is_finite() && reach.is_finite() && radius >= 0.0) {
-            return None;
-        }
-        let [low, high] = self.octree.over_ball(self.local(p).0, reach);
+        let [low, high] = self.octree.over_ball(self.local(p).0, self.reach(p, radius)?);
         Some((low, high))
+    }
+
+    fn steepest(&self, p: DVec3, radius: f64) -> Option<f64> {
+        let slope = self.octree.steepest(self.local(p).0, self.reach(p, radius)?);
+        slope.is_finite().then_some(slope)
     }
 
     fn in_domain(&self, p: DVec3) -> bool {

@@ -206,6 +206,10 @@ impl ScalarField for ClosedField {
         self.field.bound(p, radius).map(scaled)
     }
 
+    fn steepest(&self, p: DVec3, radius: f64) -> Option<f64> {
+        self.field.steepest(p, radius).map(|slope| (self.scale * slope).max(1.0))
+    }
+
     /// All of its walls, and the field's own domain elsewhere.
     fn in_domain(&self, p: DVec3) -> bool {
         Self::is_wall(self.scale * self.field.value(p), self.beyond(p).0) || self.field.in_domain(p)

@@ -26,6 +26,9 @@ impl ScalarField for Ball {
         let d = p.distance(self.0);
         (d < 40.0).then_some(((d - radius).max(0.0) - self.1, d + radius - self.1))
     }
+    fn steepest(&self, p: DVec3, radius: f64) -> Option<f64> {
+        self.bound(p, radius).map(|_| 1.0)
+    }
     fn in_domain(&self, p: DVec3) -> bool {
         p.x < 2.0
     }
@@ -92,7 +95,9 @@ fn bounds_contain_every_value() {
             }
             assert!(high - low <= 2.0 * radius + 1e-12);
         }
+        assert_eq!(f.steepest(DVec3::Z, 0.1), Some(1.0));
         assert!(f.bound(DVec3::Z * 45.0, 0.1).is_none(), "unknown stays unknown");
+        assert!(f.steepest(DVec3::Z * 45.0, 0.1).is_none());
         assert!(f.value(DVec3::Z * 60.0).is_nan());
     }
 }

@@ -114,21 +114,30 @@ fn derivatives_agree_with_finite_differences() {
     }
 }
 
-/// Checks that bounds hold; returns their mean width over the mean spread of values.
-fn check_bounds(f: &MpuField, radius: f64, balls: u64) -> f64 {
-    let (mut width, mut spread) = (0.0, 0.0);
+/// Checks that bounds hold; returns their mean width over the mean spread of values, and the greatest slope that was met over that
+/// which bounds it.
+fn check_bounds(f: &MpuField, radius: f64, balls: u64) -> (f64, f64) {
+    let (mut width, mut spread, mut steep) = (0.0, 0.0, 0.0f64);
     for i in 0..balls {
         let center = signed(i) * 1.4;
         let (low, high) = f.bound(center, radius).unwrap();
         let (mut least, mut most) = (f64::INFINITY, f64::NEG_INFINITY);
+        let steepest = f.steepest(center, radius);
+        assert!(steepest.is_some() || radius > 0.01, "{center}, {radius}");
+        let mut before = (center, f.value(center));
         for j in 0..100 {
-            let v = f.value(center + signed(1000 * i + j).normalize() * (radius * unit(j, 9).cbrt()));
+            let p = center + signed(1000 * i + j).normalize() * (radius * unit(j, 9).cbrt());
+            let v = f.value(p);
             assert!(low <= v && v <= high, "{v} outside {low}..{high} at {center}, {radius}");
             (least, most) = (least.min(v), most.max(v));
+            let (way, change) = (p.distance(before.0), (v - before.1).abs());
+            let slope = steepest.unwrap_or(f64::INFINITY);
+            assert!(change <= slope * way + 1e-13, "{change} over {way}, {slope} at most, at {center}, {radius}");
+            (before, steep) = ((p, v), steep.max(change / way / slope));
         }
         (width, spread) = (width + (high - low), spread + (most - least));
     }
-    width / spread
+    (width / spread, steep)
 }
 
 #[test]
@@ -136,8 +145,10 @@ fn bounds_contain_every_value_and_close_onto_it() {
     for points in [cloud(on_torus, 3000), cloud(on_box, 3000)] {
         let (f, _) = field(&points, 1e-3);
         let ratios = [1e-6, 1e-3, 0.02, 0.2, 1.0].map(|r| check_bounds(&f, r, 150));
-        println!("bounds over spreads {ratios:?}");
-        assert!(ratios.iter().all(|r| *r < 7.0), "{ratios:?}");
+        println!("widths of bounds over spreads, slopes over the steepest {ratios:?}");
+        assert!(ratios.iter().all(|r| r.0 < 7.0), "{ratios:?}");
+        // Where the ball is small the bound of the gradient closes onto it.
+        assert!(ratios[..2].iter().all(|r| r.1 > 0.9), "{ratios:?}");
     }
 }
 

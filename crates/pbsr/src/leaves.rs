@@ -81,6 +81,8 @@ pub(crate) struct Leaf {
     pub(crate) side: f64,
     /// `None` for an open leaf.
     pub(crate) graph: Option<Graph>,
+    /// Greatest |∇f| in an open leaf; infinite where none is known.
+    pub(crate) steepest: f32,
 }
 
 /// t = h(u, v) over a face; all lengths in sides of the cube.
@@ -122,7 +124,7 @@ impl Leaf {
     pub(crate) fn all(surface: &ImplicitSurface<'_>, cells: &Cells, per_area: f64) -> (Vec<Self>, Vec<Self>) {
         let (mut leaves, mut empty) = (Vec::new(), Vec::new());
         let (mut cubes, mut side) = (cells.active.clone(), cells.side);
-        let open = Self { corner: DVec3::ZERO, side, graph: None };
+        let open = Self::open(DVec3::ZERO, side);
         let lines = open.reach() * per_area * cubes.len() as f64;
         let most = (lines as usize).clamp(LEAVES, MOST_LEAVES);
         for level in 0..=LEVELS {
@@ -141,7 +143,7 @@ impl Leaf {
             let kept = all().filter(|(_, look)| !(divide && look.is_poor(error)));
             leaves.extend(kept.filter_map(|(corner, look)| look.leaf(corner, side)));
             let nothing = all().filter(|(_, look)| matches!(look, Look::Empty));
-            empty.extend(nothing.map(|(corner, _)| Self { corner, side, graph: None }));
+            empty.extend(nothing.map(|(corner, _)| Self::open(corner, side)));
             if !divide || poor == 0 {
                 break;
             }
@@ -153,7 +155,17 @@ impl Leaf {
             };
             cubes = large.into_par_iter().flat_map_iter(parts).collect();
         }
+        leaves.par_iter_mut().filter(|leaf| leaf.graph.is_none()).for_each(|leaf| {
+            let radius = 0.75f64.sqrt() * leaf.side * (1.0 + 1e-12);
+            let steepest = surface.field.steepest(leaf.corner + 0.5 * leaf.side, radius);
+            leaf.steepest = steepest.map_or(f32::INFINITY, |slope| (slope as f32).next_up());
+        });
         (leaves, empty)
+    }
+
+    /// An open leaf of which no bound is known.
+    fn open(corner: DVec3, side: f64) -> Self {
+        Self { corner, side, graph: None, steepest: f32::INFINITY }
     }
 
     /// Lines times area over the surface's density: a line of the leaf meets a flat piece of area A with probability
@@ -237,7 +249,7 @@ impl Look {
             Self::Graph(graph, error) => Some(*graph).filter(|_| *error <= USABLE),
             Self::Unknown => None,
         };
-        Some(Leaf { corner, side, graph })
+        Some(Leaf { graph, ..Leaf::open(corner, side) })
     }
 }
 
@@ -286,7 +298,7 @@ impl Graph {
         let axis = if size.x >= size.y.max(size.z) { 0 } else { 1 + u8::from(size.z > size.y) };
         let mut graph = Self::taylor(axis, (foot - corner) / side, gradient, surface.field.hessian(foot) * side);
         let mut error = 0.0f64;
-        let leaf = Leaf { corner, side, graph: None };
+        let leaf = Leaf::open(corner, side);
         graph.slack = 0.1;
         for uv in TRIED {
             let Some(p) = leaf.start(&graph, uv.map(|x| x as f32)) else { continue };

@@ -205,7 +205,8 @@ impl<'a> LineSampler<'a> {
                     let root = leaf.start(graph, [u, v]).and_then(|p| self.root(leaf, graph, p));
                     let root = root.filter(|(p, _)| self.surface.contains(*p));
                     let [a, b] = leaf.ends(graph, [u, v]);
-                    let line = Line { surface: self.surface, o: a, d: (b - a) / leaf.side };
+                    let d = (b - a) / leaf.side;
+                    let line = Line { surface: self.surface, o: a, d, steepest: f64::INFINITY };
                     let area = root.map_or(0.0, |(_, g)| g.length() / f64::from(graph.weight));
                     (line, u64::from(root.is_some()), area)
                 }
@@ -297,7 +298,8 @@ impl<'a> LineSampler<'a> {
         let [a, b] = across(d);
         let r = 0.75f64.sqrt() * leaf.side * stream.unit().sqrt();
         let (sin, cos) = libm::sincos(TAU * stream.unit());
-        Line { surface: self.surface, o: leaf.corner + 0.5 * leaf.side + (a * cos + b * sin) * r, d }
+        let o = leaf.corner + 0.5 * leaf.side + (a * cos + b * sin) * r;
+        Line { surface: self.surface, o, d, steepest: f64::from(leaf.steepest) }
     }
 
     /// All roots of a line in a leaf and in the box, searched in `parts` parts.

@@ -1,6 +1,6 @@
 //! All roots of f − c on a piece of a line.
 //!
-//! A piece is dropped when the field's `bound` over the ball around it excludes c. Where the ends differ in sign and the
+//! A piece is dropped when a bound of the field's gradient, or its own over the ball around the piece, excludes c. Where the ends differ in sign and the
 //! cubic with the values and slopes of both ends is monotone (slopes at most 3 times the chord's: de Boor and Swartz), there
 //! is one root, found by bracketing (Illinois). Otherwise slopes tell: where f runs towards
 //! c from both ends there is an extremum between, which is looked for; it either shows two roots, or a double root where
@@ -28,6 +28,8 @@ pub(crate) struct Line<'a> {
     pub(crate) surface: ImplicitSurface<'a>,
     pub(crate) o: DVec3,
     pub(crate) d: DVec3,
+    /// Greatest |∇f| where it is searched; infinite where none is known.
+    pub(crate) steepest: f64,
 }
 
 /// What the search along a piece found.
@@ -62,7 +64,7 @@ impl Line<'_> {
     /// `slopes` are those at both ends, where they are known.
     fn search(&self, [a, b]: [At; 2], slopes: [Option<f64>; 2], depth: u32, found: &mut Found) {
         let crosses = (a.f < 0.0) != (b.f < 0.0);
-        if !crosses && self.excluded(a.t, b.t) {
+        if !crosses && self.excluded(a, b, depth) {
             return;
         }
         let [ga, gb] = [(slopes[0], a), (slopes[1], b)].map(|(slope, at)| slope.unwrap_or_else(|| self.slope(at.t)));
@@ -93,9 +95,16 @@ impl Line<'_> {
         self.search([m, b], [None, Some(gb)], depth + 1, found);
     }
 
-    /// Whether the bound shows that f ≠ c between two places.
-    fn excluded(&self, a: f64, b: f64) -> bool {
-        let (middle, half) = (self.o + self.d * (0.5 * (a + b)), 0.5 * (b - a) * (1.0 + 1e-12));
+    /// Whether a bound shows that f ≠ c between two places: of the gradient, which costs nothing more, or of the values, which costs
+    /// as much as three of them, where no other is known or the piece is not halved any more.
+    fn excluded(&self, a: At, b: At, depth: u32) -> bool {
+        if a.f.abs() + b.f.abs() > self.steepest * (b.t - a.t) * (1.0 + 1e-12) {
+            return true;
+        }
+        if self.steepest.is_finite() && depth < DEPTH {
+            return false;
+        }
+        let (middle, half) = (self.o + self.d * (0.5 * (a.t + b.t)), 0.5 * (b.t - a.t) * (1.0 + 1e-12));
         let level = self.surface.level;
         self.surface.field.bound(middle, half).is_some_and(|(low, high)| low > level || high < level)
     }
@@ -196,18 +205,34 @@ mod tests {
         }
     }
 
-    fn found(field: &Roots, from: f64, to: f64) -> Found {
+    /// `steepest` bounds the slope there.
+    fn found_with(field: &Roots, [from, to]: [f64; 2], steepest: f64) -> Found {
         let surface = ImplicitSurface {
             field,
             level: 0.0,
             bounds: DAabb::new(DVec3::splat(-9.0), DVec3::splat(9.0)),
             inside: None,
         };
-        let line = Line { surface, o: DVec3::ZERO, d: DVec3::X };
+        let line = Line { surface, o: DVec3::ZERO, d: DVec3::X, steepest };
         let mut found = Found::default();
         line.roots(line.at(from), line.at(to), &mut found);
         found.roots.sort_by(|a, b| a.0.total_cmp(&b.0));
         found
+    }
+
+    fn found(field: &Roots, from: f64, to: f64) -> Found {
+        found_with(field, [from, to], f64::INFINITY)
+    }
+
+    #[test]
+    fn a_bound_of_the_gradient_proves_what_halving_does_not_and_loses_no_root() {
+        let (apart, near) = (&Roots(&[1.5, 2.5]), &Roots(&[1.000_1, 1.000_2]));
+        assert!(found(apart, 0.0, 1.0).unproven > 0);
+        assert_eq!(found_with(apart, [0.0, 1.0], 4.0).unproven, 0);
+        // f′ is −2.0003 at 0.
+        assert!(found_with(near, [0.0, 1.0], 2.01).unproven > 0);
+        let pair = &Roots(&[0.499_9, 0.500_1]);
+        assert_eq!(found_with(pair, [0.0, 1.0], 1.0).roots.len(), 2);
     }
 
     #[test]

@@ -56,6 +56,12 @@ pub trait ScalarField: Sync {
     /// An interval that contains every value within `radius` of `p`, or `None` where no bound is known.
     fn bound(&self, p: DVec3, radius: f64) -> Option<(f64, f64)>;
 
+    /// A bound of |f(a) − f(b)| over |a − b| for places within `radius` of `p`, and so of |∇f| there; `None` where none is known. Where
+    /// many lines of a small ball are searched, one such bound tells of most of them what [`ScalarField::bound`] would.
+    fn steepest(&self, _p: DVec3, _radius: f64) -> Option<f64> {
+        None
+    }
+
     /// Whether a zero at `p` belongs to the surface: false beyond the border of an open surface. The field itself has
     /// values there too.
     fn in_domain(&self, _p: DVec3) -> bool {

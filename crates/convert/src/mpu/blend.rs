@@ -109,14 +109,36 @@ impl Octree {
                 }
             }
             Node::Leaf(leaf) => {
-                let [low, high] = self.over_part(leaf, nearest, radius);
+                let [low, high] = self.over_part(leaf, nearest, radius).0;
                 *range = union(*range, &[low.max(stored[0]), high.min(stored[1])]);
             }
         }
     }
 
-    /// Range over the part of a leaf's cell within `radius` of `p`, which lies in the cell.
-    fn over_part(&self, leaf: usize, p: DVec3, radius: f64) -> [f64; 2] {
+    /// Greatest gradient within `radius` of a place in the cube; infinite where the ball is so large that it is not worth its search.
+    pub(super) fn steepest(&self, p: DVec3, radius: f64) -> f64 {
+        self.steepest_below(0, (self.center, self.half), (p, radius))
+    }
+
+    /// The same in a node's cell within a ball.
+    fn steepest_below(&self, node: usize, (center, half): (DVec3, f64), (p, radius): (DVec3, f64)) -> f64 {
+        let nearest = p.clamp(center - half, center + half);
+        if nearest.distance_squared(p) > radius * radius * (1.0 + 1e-12) {
+            return 0.0;
+        }
+        match self.node(node) {
+            _ if 4.0 * half <= radius => f64::INFINITY,
+            Node::Inner(first) => {
+                let child =
+                    |c| self.steepest_below(first + c, (child_center(center, half, c), 0.5 * half), (p, radius));
+                (0..8).map(child).fold(0.0, f64::max)
+            }
+            Node::Leaf(leaf) => self.over_part(leaf, nearest, radius).1,
+        }
+    }
+
+    /// Range and greatest gradient over the part of a leaf's cell within `radius` of `p`, which lies in the cell.
+    fn over_part(&self, leaf: usize, p: DVec3, radius: f64) -> ([f64; 2], f64) {
         let (mut hull, mut steepest_shape) = (EMPTY, 0.0f64);
         let (mut sum, mut total) = (0.0, 0.0);
         let (mut least_total, mut slope_total) = (0.0, 0.0);
@@ -141,6 +163,7 @@ impl Octree {
         let slope = steepest_shape + (hull[1] - hull[0]) * slope_total / least_total;
         // 1e-14: rounding of the sums; the hull has its own slack.
         let (value, reach) = (sum / total, slope * radius + 1e-14 * hull[0].abs().max(hull[1].abs()));
-        if reach.is_finite() { [hull[0].max(value - reach), hull[1].min(value + reach)] } else { hull }
+        let range = if reach.is_finite() { [hull[0].max(value - reach), hull[1].min(value + reach)] } else { hull };
+        (range, if slope.is_nan() { f64::INFINITY } else { slope })
     }
 }
