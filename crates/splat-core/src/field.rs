@@ -58,6 +58,19 @@ pub trait ScalarField: Sync {
 
     /// A bound of |f(a) − f(b)| over |a − b| for places within `radius` of `p`, and so of |∇f| there; `None` where none is known. Where
     /// many lines of a small ball are searched, one such bound tells of most of them what [`ScalarField::bound`] would.
+    ///
+    /// ```
+    /// use splat_core::{ScalarField, glam::DVec3};
+    /// struct Ball;
+    /// impl ScalarField for Ball {
+    ///     fn value(&self, p: DVec3) -> f64 { p.length_squared() - 1.0 }
+    ///     fn gradient(&self, p: DVec3) -> DVec3 { 2.0 * p }
+    ///     fn bound(&self, _: DVec3, _: f64) -> Option<(f64, f64)> { None }
+    ///     fn steepest(&self, p: DVec3, radius: f64) -> Option<f64> { Some(2.0 * (p.length() + radius)) }
+    /// }
+    /// // From 0.21 in the middle of the ball to 0 is farther than the ball reaches.
+    /// assert!(Ball.value(DVec3::X * 1.1) > Ball.steepest(DVec3::X * 1.1, 0.08).unwrap() * 0.08);
+    /// ```
     fn steepest(&self, _p: DVec3, _radius: f64) -> Option<f64> {
         None
     }
