@@ -324,7 +324,7 @@ fn soft_light_is_that_of_the_twin() {
         (parallel([3.0, 2.0, 8.0], 5.0, [20, 16]), [2.0, 9.0, 6.0]),
         (perspective([2.0, 3.0, 8.0], 40.0, [16, 20]), [-2.0, 4.0, -9.0]),
     ] {
-        let light = extended(LightShape::Sphere { center: DVec3::from_array(at), radius: 1.0 }, 8);
+        let light = extended(LightShape::Sphere { center: DVec3::from_array(at), radius: 1.0 }, 4);
         let input = soft(&volumes, &camera, vec![light]);
         let found = draw(&input, &params).unwrap().0;
         let twin = reference::draw(&input, &params).unwrap();
