@@ -73,7 +73,7 @@ fn less_memory_than_a_scene_needs_is_exit_5_and_never_an_abort() {
         let arguments = [&["render", "s.toml", "--force", "--size", "1600x1000", "--threads", "1"], &more[..]].concat();
         let (out, peak) = run_measured(organza().current_dir(place.folder()).args(&arguments));
         assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
-        for percent in [50, 90] {
+        for percent in [50, 75, 90] {
             let kib = peak.address_space / 100 * percent / 1024;
             let mut shell = Command::new("sh");
             shell.current_dir(place.folder()).arg("-c").arg(format!("ulimit -v {kib}; exec \"$0\" \"$@\""));

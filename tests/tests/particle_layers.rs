@@ -209,7 +209,7 @@ fn coloured_media_and_surfaces_differ_from_points_by_their_noise() {
     for back in ["", WALL] {
         let text = fog_and_plane(back);
         let points = draw_in(folder.path(), &text, &["--technique", "points", "--set", "render.antialias=2"]);
-        let picture = particles(folder.path(), &text, 800, "std_error");
+        let picture = particles(folder.path(), &text, 1500, "std_error");
         let error = middle(&picture, "std_error.A");
         assert!(error.iter().all(|e| *e > 1e-4), "noise everywhere");
         for (c, weight) in [("R", 0.2126), ("G", 0.7152), ("B", 0.0722)] {

@@ -1,9 +1,9 @@
 //! All roots of f − c on a piece of a line.
 //!
-//! A piece is dropped when a bound of the field's gradient, or its own over the ball around the piece, excludes c. Where the ends differ in sign and the
-//! cubic with the values and slopes of both ends is monotone (slopes at most 3 times the chord's: de Boor and Swartz), there
-//! is one root, found by bracketing (Illinois). Otherwise slopes tell: where f runs towards
-//! c from both ends there is an extremum between, which is looked for; it either shows two roots, or a double root where
+//! A piece is dropped when a bound of the field's gradient, or its own over the ball around the piece, excludes c. Where the
+//! ends differ in sign and the cubic with the values and slopes of both ends is monotone (slopes at most 3 times the chord's:
+//! de Boor and Swartz), there is one root, found by bracketing (Illinois). Otherwise slopes tell: where f runs towards c from
+//! both ends there is an extremum between, which is looked for; it either shows two roots, or a double root where
 //! it touches c, or none. What is left is halved, and after [`DEPTH`] halvings counted as unproven.
 
 use crate::implicit::ImplicitSurface;
@@ -96,7 +96,7 @@ impl Line<'_> {
     }
 
     /// Whether a bound shows that f ≠ c between two places: of the gradient, which costs nothing more, or of the values, which costs
-    /// as much as three of them, where no other is known or the piece is not halved any more.
+    /// as much as several of them, where no other is known or the piece is not halved any more.
     fn excluded(&self, a: At, b: At, depth: u32) -> bool {
         if a.f.abs() + b.f.abs() > self.steepest * (b.t - a.t) * (1.0 + 1e-12) {
             return true;

@@ -343,13 +343,13 @@ fn the_fast_path_sees_what_the_slow_one_sees() {
         let objects = objects(&[&sampler]);
         let scene = scene(&camera, &objects);
         let mut slow = vec![0u32; 70 * 60];
-        for set in 0..5 {
+        for set in 0..10 {
             let nearest = pbsr::reference::nearest(&scene, set);
             slow.iter_mut().zip(&nearest).for_each(|(n, hit)| *n += u32::from(hit.is_some()));
         }
-        let fast = all_hits(&fold(&scene, 5));
+        let fast = all_hits(&fold(&scene, 10));
         let differ = fast.iter().zip(&slow).filter(|(a, b)| a != b).count();
-        assert!(slow.iter().sum::<u32>() > 1000);
+        assert!(slow.iter().sum::<u32>() > 2000);
         assert!(differ <= 2, "s {s}: {differ} pixels differ");
     }
     assert!((pbsr::reference::equation_1(0.01, 1.0, 100) - pbsr::opacity::opacity(100.0, 0.01)).abs() < 1e-12);
