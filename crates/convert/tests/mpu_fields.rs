@@ -153,6 +153,22 @@ fn bounds_contain_every_value_and_close_onto_it() {
 }
 
 #[test]
+fn the_bound_of_the_gradient_is_near_on_a_rough_surface() {
+    // Samples are as far off the torus as apart.
+    let rough = |i: u64| (on_torus(i).0 + on_torus(i).1 * 0.02 * (unit(i, 5) - 0.5), on_torus(i).1);
+    let (position, normal) = (0..12_000).map(|i| (rough(i).0.as_vec3(), rough(i).1.as_vec3())).unzip();
+    let (f, _) = field(&RawPoints { position, normal, ..RawPoints::default() }, 1e-3);
+    let over = |i: u64| {
+        let p = on_torus(3_000_000 + i).0;
+        f.steepest(p, 0.003).unwrap() / f.gradient(p).length()
+    };
+    let mut over: Vec<f64> = (0..1000).map(over).collect();
+    over.sort_by(f64::total_cmp);
+    println!("bound over gradient: median {}, ninth tenth {}", over[500], over[900]);
+    assert!(over[500] < 3.0, "{}", over[500]);
+}
+
+#[test]
 fn threads_order_and_copies_do_not_matter() {
     let points = cloud(on_torus, 5000);
     let mut other = points.clone();

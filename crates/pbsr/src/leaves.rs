@@ -46,9 +46,10 @@ const LEVELS: u32 = 5;
 const GRAPH_LEVELS: u32 = 2;
 const LEAVES: usize = 1 << 18;
 
-/// That number where a set has as many lines. A rough surface, such as one through the
+/// That number where an open leaf has more than [`WORTH`] lines in a set. A rough surface, such as one through the
 /// points of a scan, would have most of its lines in open leaves otherwise, where each is searched.
 const MOST_LEAVES: usize = 1 << 20;
+const WORTH: f64 = 0.25;
 
 /// Places in a cube where the gradient is looked at beside its corners, on no lattice.
 const INSIDE: [DVec3; 4] = [
@@ -124,14 +125,13 @@ impl Leaf {
     pub(crate) fn all(surface: &ImplicitSurface<'_>, cells: &Cells, per_area: f64) -> (Vec<Self>, Vec<Self>) {
         let (mut leaves, mut empty) = (Vec::new(), Vec::new());
         let (mut cubes, mut side) = (cells.active.clone(), cells.side);
-        let open = Self::open(DVec3::ZERO, side);
-        let lines = open.reach() * per_area * cubes.len() as f64;
-        let most = (lines as usize).clamp(LEAVES, MOST_LEAVES);
         for level in 0..=LEVELS {
             let looks: Vec<Look> = cubes.par_iter().map(|corner| look(surface, *corner, side)).collect();
             let poor = |error: f64| looks.iter().filter(|l| l.is_poor(error)).count();
             let some = looks.iter().filter(|l| !matches!(l, Look::Empty)).count();
             // A surface meets four in eight cubes or so.
+            let lines = Self::open(DVec3::ZERO, side).reach() * per_area;
+            let most = if lines > WORTH { MOST_LEAVES } else { LEAVES };
             let room = |error: f64| if error == GOOD { LEAVES / 2 } else { most };
             let fits = |error: &f64| level < LEVELS && leaves.len() + some + 3 * poor(*error) <= room(*error);
             // Where graphs would become too many, open leaves alone are divided: their lines cost the most.
@@ -399,7 +399,7 @@ mod tests {
             let (leaves, _) = Leaf::all(&surface, &cells, per_area);
             (leaves.len(), leaves.iter().filter(|leaf| leaf.graph.is_some()).count())
         };
-        let (few, many) = (of(1e3), of(1e6));
+        let (few, many) = (of(1e2), of(1e6));
         assert!(few.0 <= LEAVES && (LEAVES..=MOST_LEAVES).contains(&many.0), "{few:?}, {many:?}");
         // Between the ridges there are graphs.
         assert!(few.1 < 100 && many.1 > 100_000, "{few:?}, {many:?}");

@@ -4,8 +4,12 @@
 //! ball of its own cell, at most 1/(2α) of the radius from the middle.
 //!
 //! Range: f is a convex combination of the Qᵢ with weight, so it stays in the hull of their ranges. For small balls that
-//! hull does not close onto the value; then |∇f| ≤ max|∇Qᵢ| + width of the hull · Σ|∇wᵢ|/Σwᵢ closes it, each part bounded
-//! over the ball. Both hold, so their intersection does.
+//! hull does not close onto the value c in the middle, but f − c = Σ wᵢ(Qᵢ − c)/W does, with each |Qᵢ − c| under the greatest weight that
+//! it has in the ball: shapes are far off where their weight ends, and there they count for little. Likewise
+//!
+//! |∇f| ≤ (Σ wᵢ|∇Qᵢ| + Σ |∇wᵢ||Qᵢ − c| + |f − c|·Σ |∇wᵢ|)/W,
+//!
+//! each part bounded over the ball, and |∇f| times the radius bounds |f − c| too. All hold, so their intersection does.
 
 use super::octree::{EMPTY, Node, Octree, child_center, union};
 use super::quadric::{active_piece, shape_over_ball};
@@ -46,10 +50,15 @@ impl Octree {
 
     /// Derivatives up to order `D` ≤ 2 at a place in the cube.
     pub(super) fn blend<const D: usize>(&self, p: DVec3) -> Blend {
+        self.blend_of::<D>(self.leaf_at(p), p)
+    }
+
+    /// The same in the cell of a leaf.
+    fn blend_of<const D: usize>(&self, leaf: usize, p: DVec3) -> Blend {
         let (mut sum, mut total) = (0.0, 0.0);
         let (mut sum_slope, mut total_slope) = (DVec3::ZERO, DVec3::ZERO);
         let (mut sum_bend, mut total_bend) = (DMat3::ZERO, DMat3::ZERO);
-        for &id in self.listed(self.leaf_at(p)) {
+        for &id in self.listed(leaf) {
             let support = &self.supports[id as usize];
             let y = (p - support.center) * support.inverse;
             let r2 = y.length_squared();
@@ -139,9 +148,11 @@ impl Octree {
 
     /// Range and greatest gradient over the part of a leaf's cell within `radius` of `p`, which lies in the cell.
     fn over_part(&self, leaf: usize, p: DVec3, radius: f64) -> ([f64; 2], f64) {
+        let value = self.blend_of::<0>(leaf, p).value;
         let (mut hull, mut steepest_shape) = (EMPTY, 0.0f64);
-        let (mut sum, mut total) = (0.0, 0.0);
-        let (mut least_total, mut slope_total) = (0.0, 0.0);
+        // Sums of least and greatest weights and of greatest |∇wᵢ|, and of the latter two with greatest |Qᵢ − value|.
+        let (mut least, mut most_slope, mut slopes) = (0.0, 0.0, 0.0);
+        let (mut off, mut slopes_off) = (0.0, 0.0);
         for &id in self.listed(leaf) {
             let support = &self.supports[id as usize];
             let (y, reach) = ((p - support.center) * support.inverse, radius * support.inverse);
@@ -152,17 +163,22 @@ impl Octree {
             let r = r2.sqrt();
             let (pieces, joint) = self.function(id);
             let (range, slope) = shape_over_ball(pieces, joint, y, reach);
+            let far = (range[1] - value).max(value - range[0]);
+            let (near, most) = ((r - reach).max(0.0), steepest(r - reach, r + reach) * support.inverse);
+            let most_weight = weight(near * near);
             hull = union(hull, &range);
             steepest_shape = steepest_shape.max(slope * support.inverse);
-            slope_total += steepest(r - reach, r + reach) * support.inverse;
-            least_total += weight((r + reach) * (r + reach));
-            let w = weight(r2);
-            sum += w * active_piece(pieces, joint, y).value(y);
-            total += w;
+            least += weight((r + reach) * (r + reach));
+            most_slope += most_weight * slope * support.inverse;
+            off += most_weight * far;
+            slopes += most;
+            slopes_off += most * far;
         }
-        let slope = steepest_shape + (hull[1] - hull[0]) * slope_total / least_total;
+        let width = hull[1] - hull[0];
+        let blended = slopes_off + (off / least).min(width) * slopes;
+        let slope = (most_slope / least).min(steepest_shape) + blended.min(width * slopes) / least;
         // 1e-14: rounding of the sums; the hull has its own slack.
-        let (value, reach) = (sum / total, slope * radius + 1e-14 * hull[0].abs().max(hull[1].abs()));
+        let reach = (off / least).min(slope * radius) + 1e-14 * hull[0].abs().max(hull[1].abs());
         let range = if reach.is_finite() { [hull[0].max(value - reach), hull[1].min(value + reach)] } else { hull };
         (range, if slope.is_nan() { f64::INFINITY } else { slope })
     }
