@@ -33,6 +33,8 @@ struct Method<'a> {
     aligned: Aligned,
     /// Transmittance below which a pixel is done.
     cutoff: f32,
+    /// Width of slabs over the lattice's step along the view.
+    width: f64,
 }
 
 impl<'a> Method<'a> {
@@ -141,12 +143,14 @@ fn main() {
         classify: Classify::After,
         aligned: Aligned::View,
         cutoff: Params::PAPERS_CUTOFF,
+        width: 1.0,
     };
     let methods = [
         Method { name: " bcc", grid: &bcc.planes, packing: Packing::BodyCentred, ..paper },
         Method { name: " before", classify: Classify::Before, ..paper },
         Method { name: " axis", aligned: Aligned::Axis, ..paper },
         Method { name: " all pixels", cutoff: 0.0, ..paper },
+        Method { name: " 2 wide", width: 2.0, ..paper },
     ];
     println!(
         "{:>28} {:>12} {:>12} {:>7} {:>9} {:>7} {:>11} {:>10} {:>8}",
@@ -192,6 +196,9 @@ fn row(name: &str, [method, paper]: [&Method<'_>; 2], transfer: &TransferFunctio
         transmittance_cutoff: method.cutoff,
         ..Params::default()
     };
+    let step = || prepare(input.clone(), &params, None).expect("a volume that can be drawn").slabs().1;
+    let slab_width = (method.width != 1.0).then(|| method.width * step());
+    let params = Params { slab_width, ..params };
     let layout = ChannelLayout::new(&LayerSet::default());
     let mut out = Accumulator::new(camera.size, 1, 3, false, false);
     let (mut best, mut counts) = ([[f64::INFINITY; 2]; 2], SheetCounts::default());

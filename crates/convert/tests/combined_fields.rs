@@ -313,6 +313,43 @@ fn a_part_that_reaches_its_walls_ends_flat_there() {
     }
 }
 
+/// The distance from a plane, times a slope.
+struct Ramp(f64);
+
+impl ScalarField for Ramp {
+    fn value(&self, p: DVec3) -> f64 {
+        self.0 * p.x
+    }
+    fn gradient(&self, _: DVec3) -> DVec3 {
+        DVec3::X * self.0
+    }
+    fn bound(&self, p: DVec3, radius: f64) -> Option<(f64, f64)> {
+        Some((self.value(p) - self.0 * radius, self.value(p) + self.0 * radius))
+    }
+    fn steepest(&self, _: DVec3, _: f64) -> Option<f64> {
+        Some(self.0)
+    }
+}
+
+#[test]
+fn a_closed_field_is_as_steep_as_the_steeper_of_field_and_walls() {
+    // Scaled by 1, by a half and by a quarter.
+    for (slope, steepest) in [(1.3, 1.3), (2.6, 1.3), (3.0, 1.0)] {
+        let bounds = DAabb::around(DVec3::ZERO, DVec3::splat(1.0));
+        let closed = Solid { field: Arc::new(Ramp(slope)), walls: Vec::new(), bounds, step: 0.03 }.closed();
+        let far = Solid { field: Arc::new(Ball(DVec3::splat(9.0), 0.1)), ..closed.clone() };
+        let field = Solid::combined(Combination::Union, vec![closed, far]).unwrap().field;
+        let (mut most, mut found) = (0.0f64, 0.0f64);
+        for i in 0..500 {
+            let center = place(i);
+            most = most.max(field.steepest(center, 0.1).unwrap());
+            let d = DVec3::from_array([0, 1, 2].map(|k| 2.0 * rng::unit(36, 0, i, k) - 1.0)).normalize() * 0.1;
+            found = found.max((field.value(center + d) - field.value(center - d)).abs() / 0.2);
+        }
+        assert!(found <= most + 1e-12 && most == steepest && found > 0.9 * most, "{slope}: {found}, {most}");
+    }
+}
+
 /// Values of a scan rise by hundreds within a step, where a wall is some steps away.
 #[test]
 fn parts_of_unlike_scales_keep_their_surfaces() {
