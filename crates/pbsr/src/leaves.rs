@@ -40,14 +40,15 @@ const CLEAR: f64 = 0.5 * TURN;
 /// The largest 1/|n_k| in a graph; √3 on a plane.
 const STEEPEST: f64 = 2.5;
 
-/// The most times that a cube is halved, that a graph is for one evaluation a line, and the number of leaves beyond which no open leaf
+/// The most times that a graph is halved for one evaluation a line, that an open leaf is, and the number of leaves beyond which no open leaf
 /// is; beyond half of it no graph is.
-const LEVELS: u32 = 5;
 const GRAPH_LEVELS: u32 = 2;
+const LEVELS: u32 = 5;
 const LEAVES: usize = 1 << 18;
 
-/// That number where an open leaf has more than [`WORTH`] lines in a set. A rough surface, such as one through the
+/// Both of open leaves that have more than [`WORTH`] lines in a set. A rough surface, such as one through the
 /// points of a scan, would have most of its lines in open leaves otherwise, where each is searched.
+const MOST_LEVELS: u32 = 8;
 const MOST_LEAVES: usize = 1 << 20;
 const WORTH: f64 = 0.25;
 
@@ -125,15 +126,15 @@ impl Leaf {
     pub(crate) fn all(surface: &ImplicitSurface<'_>, cells: &Cells, per_area: f64) -> (Vec<Self>, Vec<Self>) {
         let (mut leaves, mut empty) = (Vec::new(), Vec::new());
         let (mut cubes, mut side) = (cells.active.clone(), cells.side);
-        for level in 0..=LEVELS {
+        for level in 0..=MOST_LEVELS {
             let looks: Vec<Look> = cubes.par_iter().map(|corner| look(surface, *corner, side)).collect();
             let poor = |error: f64| looks.iter().filter(|l| l.is_poor(error)).count();
             let some = looks.iter().filter(|l| !matches!(l, Look::Empty)).count();
             // A surface meets four in eight cubes or so.
             let lines = Self::open(DVec3::ZERO, side).reach() * per_area;
-            let most = if lines > WORTH { MOST_LEAVES } else { LEAVES };
+            let (deepest, most) = if lines > WORTH { (MOST_LEVELS, MOST_LEAVES) } else { (LEVELS, LEAVES) };
             let room = |error: f64| if error == GOOD { LEAVES / 2 } else { most };
-            let fits = |error: &f64| level < LEVELS && leaves.len() + some + 3 * poor(*error) <= room(*error);
+            let fits = |error: &f64| level < deepest && leaves.len() + some + 3 * poor(*error) <= room(*error);
             // Where graphs would become too many, open leaves alone are divided: their lines cost the most.
             let wanted = [GOOD, USABLE].into_iter().skip(usize::from(level >= GRAPH_LEVELS));
             let error = wanted.into_iter().find(fits).unwrap_or(f64::INFINITY);
