@@ -49,7 +49,7 @@ const LEAVES: usize = 1 << 18;
 /// Both of open leaves that have more than [`WORTH`] lines in a set. A rough surface, such as one through the
 /// points of a scan, would have most of its lines in open leaves otherwise, where each is searched.
 const MOST_LEVELS: u32 = 8;
-const MOST_LEAVES: usize = 1 << 20;
+const MOST_LEAVES: usize = 1 << 21;
 const WORTH: f64 = 0.25;
 
 /// Places in a cube where the gradient is looked at beside its corners, on no lattice.
@@ -126,15 +126,19 @@ impl Leaf {
     pub(crate) fn all(surface: &ImplicitSurface<'_>, cells: &Cells, per_area: f64) -> (Vec<Self>, Vec<Self>) {
         let (mut leaves, mut empty) = (Vec::new(), Vec::new());
         let (mut cubes, mut side) = (cells.active.clone(), cells.side);
+        // Cubes of the level before that were divided.
+        let mut divided = 0;
         for level in 0..=MOST_LEVELS {
             let looks: Vec<Look> = cubes.par_iter().map(|corner| look(surface, *corner, side)).collect();
             let poor = |error: f64| looks.iter().filter(|l| l.is_poor(error)).count();
             let some = looks.iter().filter(|l| !matches!(l, Look::Empty)).count();
-            // A surface meets four in eight cubes or so.
+            // Of the eighths of a cube so many hold some of the surface: four of a smooth one, fewer of a rough one.
+            let held = if divided == 0 { 4.0 } else { some as f64 / divided as f64 };
+            let more = |poor: usize| ((held - 1.0).max(0.0) * poor as f64) as usize;
             let lines = Self::open(DVec3::ZERO, side).reach() * per_area;
             let (deepest, most) = if lines > WORTH { (MOST_LEVELS, MOST_LEAVES) } else { (LEVELS, LEAVES) };
             let room = |error: f64| if error == GOOD { LEAVES / 2 } else { most };
-            let fits = |error: &f64| level < deepest && leaves.len() + some + 3 * poor(*error) <= room(*error);
+            let fits = |error: &f64| level < deepest && leaves.len() + some + more(poor(*error)) <= room(*error);
             // Where graphs would become too many, open leaves alone are divided: their lines cost the most.
             let wanted = [GOOD, USABLE].into_iter().skip(usize::from(level >= GRAPH_LEVELS));
             let error = wanted.into_iter().find(fits).unwrap_or(f64::INFINITY);
@@ -154,6 +158,7 @@ impl Leaf {
                 let part = move |k| corner + corner_of(k) * side;
                 (0..8).map(part).filter(|part| !surface.excludes(*part, side).0).collect::<Vec<_>>()
             };
+            divided = large.len();
             cubes = large.into_par_iter().flat_map_iter(parts).collect();
         }
         leaves.par_iter_mut().filter(|leaf| leaf.graph.is_none()).for_each(|leaf| {
