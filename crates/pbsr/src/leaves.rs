@@ -52,6 +52,9 @@ const MOST_LEVELS: u32 = 8;
 const MOST_LEAVES: usize = 1 << 21;
 const WORTH: f64 = 0.25;
 
+/// Cubes that are looked at before what was found of them is put together: memory would hold it twice otherwise.
+const CHUNK: usize = 1 << 16;
+
 /// Places in a cube where the gradient is looked at beside its corners, on no lattice.
 const INSIDE: [DVec3; 4] = [
     DVec3::new(0.31, 0.17, 0.58),
@@ -121,45 +124,46 @@ fn along(axis: u8, p: DVec3) -> f64 {
 }
 
 impl Leaf {
-    /// All leaves of some cells, level by level, those of larger cubes first; and the cubes, as open leaves, that were
-    /// taken for empty though no bound says so. A set has so many particles on a unit of area.
-    pub(crate) fn all(surface: &ImplicitSurface<'_>, cells: &Cells, per_area: f64) -> (Vec<Self>, Vec<Self>) {
+    /// Bytes of the most leaves, and of what is known of their cubes and of empty ones while they are looked for.
+    pub(crate) const MOST_BYTES: usize = MOST_LEAVES * (size_of::<Self>() + size_of::<Cube>() + 2 * size_of::<DVec3>());
+
+    /// All leaves of some cells, level by level, those of larger cubes first; and the cubes that were taken for empty though no bound says
+    /// so. A set has so many particles on a unit of area.
+    pub(crate) fn all(surface: &ImplicitSurface<'_>, cells: &Cells, per_area: f64) -> (Vec<Self>, Vec<Empty>) {
         let (mut leaves, mut empty) = (Vec::new(), Vec::new());
-        let (mut cubes, mut side) = (cells.active.clone(), cells.side);
+        let (mut corners, mut side) = (cells.active.clone(), cells.side);
         // Cubes of the level before that were divided.
         let mut divided = 0;
         for level in 0..=MOST_LEVELS {
-            let looks: Vec<Look> = cubes.par_iter().map(|corner| look(surface, *corner, side)).collect();
-            let poor = |error: f64| looks.iter().filter(|l| l.is_poor(error)).count();
-            let some = looks.iter().filter(|l| !matches!(l, Look::Empty)).count();
+            let (cubes, nothing) = looks(surface, &corners, side);
+            drop(corners);
+            empty.push(Empty { corners: nothing, side });
+            let poor = |error: f64| cubes.iter().filter(|cube| cube.is_poor(error)).count();
             // Of the eighths of a cube so many hold some of the surface: four of a smooth one, fewer of a rough one.
-            let held = if divided == 0 { 4.0 } else { some as f64 / divided as f64 };
+            let held = if divided == 0 { 4.0 } else { cubes.len() as f64 / divided as f64 };
             let more = |poor: usize| ((held - 1.0).max(0.0) * poor as f64) as usize;
             let lines = Self::open(DVec3::ZERO, side).reach() * per_area;
             let (deepest, most) = if lines > WORTH { (MOST_LEVELS, MOST_LEAVES) } else { (LEVELS, LEAVES) };
             let room = |error: f64| if error == GOOD { LEAVES / 2 } else { most };
-            let fits = |error: &f64| level < deepest && leaves.len() + some + more(poor(*error)) <= room(*error);
+            let fits = |error: &f64| level < deepest && leaves.len() + cubes.len() + more(poor(*error)) <= room(*error);
             // Where graphs would become too many, open leaves alone are divided: their lines cost the most.
             let wanted = [GOOD, USABLE].into_iter().skip(usize::from(level >= GRAPH_LEVELS));
             let error = wanted.into_iter().find(fits).unwrap_or(f64::INFINITY);
-            let divide = error < f64::INFINITY;
-            let poor = poor(error);
-            let all = || cubes.iter().zip(&looks).map(|(corner, look)| (*corner, look));
-            let kept = all().filter(|(_, look)| !(divide && look.is_poor(error)));
-            leaves.extend(kept.filter_map(|(corner, look)| look.leaf(corner, side)));
-            let nothing = all().filter(|(_, look)| matches!(look, Look::Empty));
-            empty.extend(nothing.map(|(corner, _)| Self::open(corner, side)));
-            if !divide || poor == 0 {
+            let is_divided = |cube: &Cube| error < f64::INFINITY && cube.is_poor(error);
+            let large: Vec<DVec3> = cubes.iter().filter(|cube| is_divided(cube)).map(|cube| cube.corner).collect();
+            leaves.reserve_exact(cubes.len() - large.len());
+            leaves.extend(cubes.iter().filter(|cube| !is_divided(cube)).map(|cube| cube.leaf(side)));
+            if large.is_empty() {
                 break;
             }
-            let large: Vec<DVec3> = all().filter(|(_, look)| look.is_poor(error)).map(|(corner, _)| corner).collect();
+            divided = large.len();
             side *= 0.5;
             let parts = |corner: DVec3| {
                 let part = move |k| corner + corner_of(k) * side;
                 (0..8).map(part).filter(|part| !surface.excludes(*part, side).0).collect::<Vec<_>>()
             };
-            divided = large.len();
-            cubes = large.into_par_iter().flat_map_iter(parts).collect();
+            corners = Vec::new();
+            large.chunks(CHUNK).for_each(|large| corners.par_extend(large.par_iter().copied().flat_map_iter(parts)));
         }
         leaves.par_iter_mut().filter(|leaf| leaf.graph.is_none()).for_each(|leaf| {
             let radius = 0.75f64.sqrt() * leaf.side * (1.0 + 1e-12);
@@ -170,7 +174,7 @@ impl Leaf {
     }
 
     /// An open leaf of which no bound is known.
-    fn open(corner: DVec3, side: f64) -> Self {
+    pub(crate) fn open(corner: DVec3, side: f64) -> Self {
         Self { corner, side, graph: None, steepest: f32::INFINITY }
     }
 
@@ -229,33 +233,31 @@ impl Leaf {
     }
 }
 
-/// What is known about a cube.
-enum Look {
-    /// The surface is not in it.
-    Empty,
-    /// A graph, and its largest error found.
-    Graph(Graph, f64),
-    Unknown,
+/// Cubes of a level that were taken for empty.
+pub(crate) struct Empty {
+    /// Lowest corners.
+    pub(crate) corners: Vec<DVec3>,
+    pub(crate) side: f64,
 }
 
-impl Look {
+/// A cube that may hold some of the surface.
+struct Cube {
+    /// Lowest corner.
+    corner: DVec3,
+    /// A graph, and its largest error found.
+    graph: Option<(Graph, f64)>,
+}
+
+impl Cube {
     /// Whether smaller cubes are wanted, where a graph may have this error.
     fn is_poor(&self, most: f64) -> bool {
-        match self {
-            Self::Empty => false,
-            Self::Graph(_, error) => *error > most,
-            Self::Unknown => true,
-        }
+        self.graph.is_none_or(|(_, error)| error > most)
     }
 
     /// The leaf of a cube that stays as it is.
-    fn leaf(&self, corner: DVec3, side: f64) -> Option<Leaf> {
-        let graph = match self {
-            Self::Empty => return None,
-            Self::Graph(graph, error) => Some(*graph).filter(|_| *error <= USABLE),
-            Self::Unknown => None,
-        };
-        Some(Leaf { graph, ..Leaf::open(corner, side) })
+    fn leaf(&self, side: f64) -> Leaf {
+        let graph = self.graph.filter(|(_, error)| *error <= USABLE).map(|(graph, _)| graph);
+        Leaf { graph, ..Leaf::open(self.corner, side) }
     }
 }
 
@@ -264,8 +266,19 @@ fn corner_of(k: usize) -> DVec3 {
     DVec3::new((k & 1) as f64, (k >> 1 & 1) as f64, (k >> 2) as f64)
 }
 
-/// Looks at a cube.
-fn look(surface: &ImplicitSurface<'_>, corner: DVec3, side: f64) -> Look {
+/// What cubes hold, and those that are empty.
+fn looks(surface: &ImplicitSurface<'_>, corners: &[DVec3], side: f64) -> (Vec<Cube>, Vec<DVec3>) {
+    let (mut cubes, mut nothing) = (Vec::new(), Vec::new());
+    for corners in corners.chunks(CHUNK) {
+        let looks: Vec<Option<Cube>> = corners.par_iter().map(|corner| look(surface, *corner, side)).collect();
+        nothing.extend(corners.iter().zip(&looks).filter(|(_, look)| look.is_none()).map(|(corner, _)| *corner));
+        cubes.extend(looks.into_iter().flatten());
+    }
+    (cubes, nothing)
+}
+
+/// Looks at a cube; `None` where the surface is not in it.
+fn look(surface: &ImplicitSurface<'_>, corner: DVec3, side: f64) -> Option<Cube> {
     let middle = surface.field.gradient((corner + 0.5 * side).clamp(surface.bounds.min, surface.bounds.max));
     let limit = TURN * TURN * middle.length_squared();
     // False for what is not a number.
@@ -276,18 +289,18 @@ fn look(surface: &ImplicitSurface<'_>, corner: DVec3, side: f64) -> Look {
         let p = (corner + place * side).clamp(surface.bounds.min, surface.bounds.max);
         let (f, gradient) = surface.field.value_gradient(p);
         if !steady(gradient) {
-            return Look::Unknown;
+            return Some(Cube { corner, graph: None });
         }
         above &= f - surface.level > clear;
         below &= f - surface.level < -clear;
     }
     if above || below {
-        return Look::Empty;
+        return None;
     }
     let foot = foot(surface, (corner + 0.5 * side).clamp(surface.bounds.min, surface.bounds.max), side)
         .filter(|(_, gradient)| steady(*gradient));
     let graph = foot.and_then(|(foot, gradient)| Graph::new(surface, corner, side, foot, gradient, &steady));
-    graph.map_or(Look::Unknown, |(graph, error)| Look::Graph(graph, error))
+    Some(Cube { corner, graph })
 }
 
 impl Graph {

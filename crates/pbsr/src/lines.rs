@@ -25,7 +25,7 @@
 use crate::blocks::Blocks;
 use crate::error::check;
 use crate::implicit::{CellCounts, Cells, ImplicitSurface};
-use crate::leaves::{Graph, Leaf};
+use crate::leaves::{Empty, Graph, Leaf};
 use crate::particles::Steps;
 use crate::roots::{Found, Line};
 use crate::sampler::{Poisson, PoissonSets};
@@ -177,6 +177,10 @@ impl<'a> LineSampler<'a> {
         self.sets.blocks.total()
     }
 
+    /// Bytes that the search for a rough surface, such as one through scattered points, and its tables take at most; smooth ones take a tenth and
+    /// less.
+    pub const MOST_BYTES: u64 = Leaf::MOST_BYTES as u64;
+
     /// Bytes of the tables.
     pub fn bytes(&self) -> u64 {
         (self.leaves.len() * (size_of::<Leaf>() + 8)) as u64 + self.sets.blocks.bytes()
@@ -238,18 +242,24 @@ impl<'a> LineSampler<'a> {
     }
 
     /// Area in cubes that were taken for empty, as lines meet it that are spread evenly over them.
-    fn strays(&self, empty: &[Leaf]) -> f64 {
-        let mut sum = 0.0;
-        let reaches: Vec<f64> = empty.iter().map(|l| (sum += l.reach(), sum).1).collect();
+    fn strays(&self, empty: &[Empty]) -> f64 {
+        let reach = |side| Leaf::open(DVec3::ZERO, side).reach();
+        let sum: f64 = empty.iter().map(|level| level.corners.len() as f64 * reach(level.side)).sum();
         let one = |i: u32| {
             let mut stream = Stream::new(self.params.seed, Stage::Survey, 1, u64::from(i));
-            let share = sum * (f64::from(i) + stream.unit()) / f64::from(STRAY_LINES);
-            let leaf = &empty[reaches.partition_point(|r| *r < share).min(empty.len() - 1)];
-            let (line, mut found) = (self.line(leaf, &mut stream), Found::default());
-            self.search(leaf, &line, 16, &mut found);
-            self.inside(&line, &found)
+            let mut share = sum * (f64::from(i) + stream.unit()) / f64::from(STRAY_LINES);
+            for Empty { corners, side } in empty {
+                if let Some(corner) = corners.get((share / reach(*side)) as usize) {
+                    let leaf = Leaf::open(*corner, *side);
+                    let (line, mut found) = (self.line(&leaf, &mut stream), Found::default());
+                    self.search(&leaf, &line, 16, &mut found);
+                    return self.inside(&line, &found);
+                }
+                share -= corners.len() as f64 * reach(*side);
+            }
+            0
         };
-        let lines = if empty.is_empty() { 0 } else { STRAY_LINES };
+        let lines = if sum > 0.0 { STRAY_LINES } else { 0 };
         let roots: u64 = (0..lines).into_par_iter().with_min_len(64).map(one).sum();
         roots as f64 / f64::from(STRAY_LINES) * sum
     }

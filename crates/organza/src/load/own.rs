@@ -10,7 +10,7 @@ use crate::form::{Form, PlannedObject};
 use crate::scene::{SurfaceSampler, Technique};
 use convert::{Clip, RegionField, SharedField, SurfaceField, VolumeParams, extinct_bounds};
 use glam::DVec3;
-use pbsr::{BoundedExtinction, LineParams};
+use pbsr::{BoundedExtinction, LineParams, LineSampler};
 use rayon::prelude::*;
 use splat_core::raster::triangles::PlacedMesh;
 use splat_core::{
@@ -192,6 +192,8 @@ fn table_bytes(body: &Body, form: Form, bounds: DAabb, splats: u64) -> u64 {
         Body::Lattice { .. } => 32 * splats,
         Body::Triangles(mesh) => 16 * mesh.triangles.len() as u64,
         Body::Field(field) => 8 * u64::from(field.cells()).pow(3),
+        // Of these fields alone a bound of the gradient is known: those through scattered points.
+        Body::Surface { field, .. } if field.steepest(bounds.center(), 0.0).is_some() => LineSampler::MOST_BYTES,
         Body::Surface { spacing, .. } => {
             let lines = LineParams::for_spacing(bounds.size().max_element(), *spacing);
             96 * 6 * u64::from(lines.resolution).pow(2)
