@@ -46,7 +46,7 @@ const GRAPH_LEVELS: u32 = 2;
 const LEVELS: u32 = 5;
 const LEAVES: usize = 1 << 18;
 
-/// Both of open leaves that have more than [`WORTH`] lines in a set. A rough surface, such as one through the
+/// Both of open leaves that have more than [`WORTH`] lines in a set, each and in the mean of all. A rough surface, such as one through the
 /// points of a scan, would have most of its lines in open leaves otherwise, where each is searched.
 const MOST_LEVELS: u32 = 8;
 const MOST_LEAVES: usize = 1 << 21;
@@ -134,6 +134,8 @@ impl Leaf {
         let (mut corners, mut side) = (cells.active.clone(), cells.side);
         // Cubes of the level before that were divided.
         let mut divided = 0;
+        let lines_of = |side| Self::open(DVec3::ZERO, side).reach() * per_area;
+        let worth = (lines_of(side) * corners.len() as f64 / WORTH) as usize;
         for level in 0..=MOST_LEVELS {
             let (cubes, nothing) = looks(surface, &corners, side);
             drop(corners);
@@ -142,8 +144,9 @@ impl Leaf {
             // Of the eighths of a cube so many hold some of the surface: four of a smooth one, fewer of a rough one.
             let held = if divided == 0 { 4.0 } else { cubes.len() as f64 / divided as f64 };
             let more = |poor: usize| ((held - 1.0).max(0.0) * poor as f64) as usize;
-            let lines = Self::open(DVec3::ZERO, side).reach() * per_area;
-            let (deepest, most) = if lines > WORTH { (MOST_LEVELS, MOST_LEAVES) } else { (LEVELS, LEAVES) };
+            let is_worth = lines_of(side) > WORTH;
+            let (deepest, most) =
+                if is_worth { (MOST_LEVELS, worth.clamp(LEAVES, MOST_LEAVES)) } else { (LEVELS, LEAVES) };
             let room = |error: f64| if error == GOOD { LEAVES / 2 } else { most };
             let fits = |error: &f64| level < deepest && leaves.len() + cubes.len() + more(poor(*error)) <= room(*error);
             // Where graphs would become too many, open leaves alone are divided: their lines cost the most.
@@ -416,9 +419,13 @@ mod tests {
         let cells = Cells::new(&surface, 24);
         let of = |per_area: f64| {
             let (leaves, _) = Leaf::all(&surface, &cells, per_area);
+            let least = leaves.iter().map(|leaf| leaf.side).fold(f64::INFINITY, f64::min);
+            // What was divided last.
+            let lines = Leaf::open(DVec3::ZERO, 2.0 * least).reach() * per_area;
+            assert!(leaves.len() <= if lines > WORTH { MOST_LEAVES } else { LEAVES }, "{}, {lines}", leaves.len());
             (leaves.len(), leaves.iter().filter(|leaf| leaf.graph.is_some()).count())
         };
-        let (few, many) = (of(1e2), of(1e6));
+        let (few, many) = (of(1e3), of(1e6));
         assert!(few.0 <= LEAVES && (LEAVES..=MOST_LEAVES).contains(&many.0), "{few:?}, {many:?}");
         // Between the ridges there are graphs.
         assert!(few.1 < 100 && many.1 > 100_000, "{few:?}, {many:?}");
