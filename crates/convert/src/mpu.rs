@@ -18,6 +18,7 @@ mod octree;
 mod quadric;
 mod samples;
 mod sharp;
+mod side;
 mod solve;
 mod weight;
 

@@ -3,7 +3,8 @@
 
 use convert::read::{self, Loaded, ReadParams};
 use convert::{
-    MpuField, MpuParams, MpuReport, Orientation, RawPoints, SplatParams, field_to_mesh, points_to_field, vertex_normals,
+    MpuField, MpuParams, MpuReport, Orientation, RawPoints, SplatParams, field_to_mesh, part_at_creases,
+    points_to_field, vertex_normals,
 };
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::{DAabb, ScalarField, rng};
@@ -315,6 +316,62 @@ fn what_is_no_surface_is_refused() {
         (MpuParams { support: 0.5, ..default }, "support"),
     ] {
         says(&good, &params, needle);
+    }
+}
+
+/// A plate thinner than samples are apart, whose rim nobody sampled, and its upper side alone.
+#[test]
+fn beside_the_rim_of_a_thin_plate_is_outside() {
+    fn plate(i: u64) -> (DVec3, DVec3) {
+        let (r, a) = (unit(i, 0).sqrt(), TAU * unit(i, 1));
+        let side = if unit(i, 2) < 0.5 { DVec3::Z } else { DVec3::NEG_Z };
+        (DVec3::new(r * a.cos(), r * a.sin(), 0.0) + 0.01 * side, side)
+    }
+    let (both, _) = field(&cloud(plate, 6000), 1e-3);
+    let (upper, _) = field(&cloud(|i| (plate(i).0 * DVec3::new(1.0, 1.0, 0.0), DVec3::Z), 3000), 1e-3);
+    let (turned, _) = field(&cloud(|i| (plate(i).0, -plate(i).1), 6000), 1e-3);
+    let mut beside = 0;
+    for i in 0..20_000 {
+        let p = signed(i) * 1.2;
+        let r = p.truncate().length();
+        if r > 1.1 || p.z.abs() > 0.06 {
+            beside += u32::from(r > 1.1 && p.z.abs() < 0.2);
+            assert!(both.value(p) > 0.0 && turned.value(p) < 0.0, "{} at {p}", both.value(p));
+        }
+        // An open surface goes on beyond its rim.
+        if r < 0.9 && p.z.abs() > 0.06 || r < 1.15 && p.z.abs() > 0.2 {
+            assert!(upper.value(p) * p.z > 0.0, "{} at {p}", upper.value(p));
+        }
+    }
+    assert!(beside > 500);
+}
+
+/// A scan with creases and thin parts: no bubbles beside them, at two densities.
+#[test]
+fn the_zero_set_of_a_noisy_scan_stays_by_its_samples() {
+    for (file, step) in [("dragon_res3.ply.gz", 11), ("dragon_res4.ply.gz", 7)] {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/stanford-dragon").join(file);
+        let Loaded::Mesh(mut mesh) = read::file(&path, &ReadParams::default(), None).unwrap().0 else {
+            panic!("no mesh")
+        };
+        let corners = |t: &[u32; 3]| t.map(|i| mesh.position[i as usize].as_dvec3());
+        let area = mesh.triangles.iter().map(corners).map(|[a, b, c]| 0.5 * (b - a).cross(c - a).length()).sum::<f64>();
+        part_at_creases(&mut mesh);
+        let points = RawPoints::of_vertices(&mesh);
+        let apart = (area / points.len() as f64).sqrt();
+        let (f, _) = field(&points, 1e-3);
+        let zero_set =
+            field_to_mesh(&f, f.bounds(), f.bounds().size().x / 200.0, &SplatParams::default(), None).unwrap();
+        let nearest = |p: &Vec3| {
+            let p = p.as_dvec3() + zero_set.origin - points.origin;
+            let squared = points.position.iter().map(|q| q.as_dvec3().distance_squared(p));
+            squared.fold(f64::INFINITY, f64::min).sqrt() / apart
+        };
+        let mut far: Vec<f64> = zero_set.position.iter().step_by(step).map(nearest).collect();
+        far.sort_by(f64::total_cmp);
+        let (n, most) = (far.len(), far[far.len() - 1]);
+        println!("{file}: {} {} {} {most} of {n}", far[n / 2], far[n * 99 / 100], far[n * 999 / 1000]);
+        assert!(n > 5000 && far[n * 999 / 1000] < 2.5 && most < 3.5, "{file}: {most}");
     }
 }
 

@@ -111,7 +111,11 @@ fn duration(ms: f64) -> String {
 }
 
 fn rate(a_second: f64) -> String {
-    if a_second < 1e6 { significant(a_second) } else { format!("{} million", significant(1e-6 * a_second)) }
+    match a_second {
+        1e6.. => format!("{} million", significant(1e-6 * a_second)),
+        1e5.. => format!("{} thousand", significant(1e-3 * a_second)),
+        _ => significant(a_second),
+    }
 }
 
 /// Three digits, and no fewer than an integer has.

@@ -11,7 +11,9 @@
 //! normal.
 //!
 //! Deviations: the height field is tried first wherever it can be, edges and corners and quadrics only where it misses
-//! the tolerance, and the best of them is kept; a cell without samples of its own gets a plane.
+//! the tolerance, and the best of them is kept; a shape whose values run away where the ball has no samples is not
+//! taken ([`Ball::believes`]); a cell without samples of its own gets a plane or a constant of the sign that
+//! [`mod@super::side`] finds.
 
 use super::quadric::{Quadric, Shape, active_piece};
 use super::samples::{Sample, SampleTree};
@@ -26,6 +28,15 @@ const RIDGE: f64 = 1e-7;
 const JUDGES: usize = 6;
 /// Fewer samples than this get a plane.
 const FEWEST_FOR_CURVES: usize = 8;
+
+/// The largest value of a shape over the distance of the nearest sample.
+const FARTHEST: f64 = 2.0;
+/// What a value may be beyond that, and on the wrong side.
+const SLACK: f64 = 0.02;
+/// Samples that must agree on the side for a shape to have to.
+const WITNESSES: usize = 3;
+/// How far the plane of samples around a cell may be off its distance, over that of the nearest.
+const AGREES: f64 = 0.25;
 
 /// A ball of samples in its local coordinates.
 pub(super) struct Ball {
@@ -83,9 +94,59 @@ impl Ball {
         worst
     }
 
+    /// A shape and its error, infinite where it cannot be believed.
     fn fit(&self, shape: Shape, enough: f64) -> Fit {
         let error = self.error(&shape, enough);
-        Fit { shape, error }
+        let believed = error > enough || self.believes(&shape);
+        Fit { shape, error: if believed { error } else { f64::INFINITY } }
+    }
+
+    /// Corners of the cube in the support and its middle.
+    fn places(&self) -> impl Iterator<Item = DVec3> {
+        let corner = (self.counted / 3.0).sqrt();
+        let sign = move |q: usize, a: usize| if q >> a & 1 == 0 { -corner } else { corner };
+        (0..9).map(move |q| if q == 8 { DVec3::ZERO } else { DVec3::new(sign(q, 0), sign(q, 1), sign(q, 2)) })
+    }
+
+    /// Whether a shape has values of a distance to the samples, and their side, at these places: samples that cover a part
+    /// of the ball let quadratic terms run away in the rest.
+    fn believes(&self, shape: &Shape) -> bool {
+        self.places().all(|y| {
+            let value = active_piece(&shape.pieces, shape.joint, y).value(y);
+            let (nearest, low, high) = self.heights(y);
+            value.abs() <= FARTHEST * nearest + SLACK
+                && (value >= 0.0 || low <= SLACK)
+                && (value <= 0.0 || high >= -SLACK)
+        })
+    }
+
+    /// The shape of a ball that was enlarged because its cell has no samples, `distance` from them at its middle: their
+    /// plane where that agrees, within a part of how far the nearest is, and a constant elsewhere.
+    pub(super) fn beside(&self, distance: f64, nearest: f64) -> Shape {
+        let all: Vec<usize> = (0..self.samples.len()).collect();
+        let plane = Shape::smooth(self.height(&all, false));
+        let off = (plane.pieces[0].constant - distance).abs();
+        if off <= AGREES * nearest && self.believes(&plane) {
+            plane
+        } else {
+            Shape::smooth(Quadric { constant: distance, ..Quadric::default() })
+        }
+    }
+
+    /// Distance of the nearest sample, least and greatest n·(y − p) of the nearest [`WITNESSES`].
+    fn heights(&self, y: DVec3) -> (f64, f64, f64) {
+        let mut near = [(f64::INFINITY, 0.0); WITNESSES];
+        for s in &self.samples {
+            let mut new = (s.position.distance_squared(y), s.normal.dot(y - s.position));
+            for held in &mut near {
+                if new.0 < held.0 {
+                    std::mem::swap(held, &mut new);
+                }
+            }
+        }
+        let found = near.iter().filter(|n| n.0 < f64::INFINITY).map(|n| n.1);
+        let (low, high) = found.fold((f64::INFINITY, f64::NEG_INFINITY), |a, h| (a.0.min(h), a.1.max(h)));
+        (near[0].0.sqrt(), low, high)
     }
 
     /// Weighted mean of normals, or the first sample's where they cancel.
@@ -186,7 +247,7 @@ impl Ball {
         let over = self.turns_over(self.mean_normal(&all));
         let mut best: Option<Fit> = None;
         let mut offer = |fit: Fit| {
-            if best.as_ref().is_none_or(|b| fit.error < b.error) {
+            if fit.error < best.as_ref().map_or(f64::INFINITY, |b| b.error) {
                 best = Some(fit);
             }
             best.as_ref().is_some_and(|b| b.error <= tolerance)
@@ -205,6 +266,10 @@ impl Ball {
             sharp::shapes(self).into_iter().for_each(|shape| {
                 offer(self.fit(shape, enough));
             });
+        }
+        if best.is_none() && (few || last) {
+            let shape = Shape::smooth(self.height(&all, false));
+            best = Some(Fit { error: self.error(&shape, f64::INFINITY), shape });
         }
         best
     }

@@ -1,12 +1,12 @@
 //! The adaptive octree (Ohtake et al. 2003, section 3): a cell whose shape misses the tolerance is divided.
 //!
 //! A cell of diagonal d has a support ball of radius R = αd around its middle. With fewer than N_min samples in it, the
-//! shape is fitted in a larger ball that holds N_min, and the cell is not divided: smaller cells would see the same
-//! samples. Subtrees are built in parallel and joined in order.
+//! shape is fitted in a larger ball that holds N_min, and the cell is not divided where these are about as far apart as
+//! the ball is large: smaller cells would see the same samples. Subtrees are built in parallel and joined in order.
 //!
 //! Deviations: the paper divides on unless the ball is empty; and it gives the larger ball the weight too, so that shapes
-//! of empty cells reach the surface. Here weight ends at αd: cells without samples do not touch those with them,
-//! which is nearer to the samples and three times as fast.
+//! of empty cells reach the surface. Here weight ends at αd: what is set where there are no samples has no weight at
+//! samples, which is nearer to them and three times as fast.
 //!
 //! For evaluation each leaf cell lists the functions whose balls meet it, so that a place is answered by one descent and
 //! one list, and each node keeps the range of the blend over its cell.
@@ -14,6 +14,7 @@
 use super::fit::{Ball, Scratch};
 use super::quadric::{Joint, Quadric, Shape, shape_over_ball};
 use super::samples::SampleTree;
+use super::side::Sides;
 use super::{MpuReport, Tolerances};
 use crate::ConvertError;
 use crate::convert_error::check_cancelled;
@@ -25,6 +26,8 @@ use splat_core::glam::DVec3;
 const PARALLEL_LEVELS: u32 = 4;
 /// Over the distance of the N_min-th sample, so that it has weight too.
 const ENLARGED: f64 = 1.125;
+/// Radius of a support with few samples over how far these are apart, above which it only grazes the surface.
+const GRAZES: f64 = 2.5;
 /// Marks an entry of `Octree::nodes` as a leaf.
 const LEAF: u32 = 1 << 31;
 
@@ -77,6 +80,7 @@ enum Part {
 /// What all cells share.
 struct Build<'a> {
     tree: &'a SampleTree,
+    sides: Sides<'a>,
     asked: &'a Tolerances,
     progress: &'a Progress,
 }
@@ -104,14 +108,12 @@ impl Build<'_> {
             self.tree.within(center, radius, &mut scratch.ids);
         }
         let ball = Ball::new(self.tree, &scratch.ids, center, radius, before);
-        let last = own < self.asked.samples || depth >= self.asked.depth;
+        let grazes = || own > 0 && before > GRAZES * self.sides.spacing(scratch.nearest[0].1);
+        let last = own < self.asked.samples && !grazes() || depth >= self.asked.depth;
         if own == 0 {
-            let all: Vec<usize> = (0..ball.samples.len()).collect();
-            return Part::Leaf {
-                support,
-                shape: rescaled(Shape::smooth(ball.height(&all, false)), radius, before),
-                error: 0.0,
-            };
+            let distance = self.sides.distance(center, &scratch.nearest);
+            let shape = ball.beside(distance / radius, scratch.nearest[0].0.sqrt() / radius);
+            return Part::Leaf { support, shape: rescaled(shape, radius, before), error: 0.0 };
         }
         match ball.best(self.tree, half, self.asked, last, scratch) {
             Some(fit) if last || fit.error * radius <= self.asked.error => {
@@ -157,7 +159,8 @@ impl Octree {
         asked: &Tolerances,
         progress: &Progress,
     ) -> Result<(Self, MpuReport), ConvertError> {
-        let root = Build { tree, asked, progress }.cell(center, half, 0, &mut Scratch::default());
+        let build = Build { tree, sides: Sides::new(tree, progress), asked, progress };
+        let root = build.cell(center, half, 0, &mut Scratch::default());
         // Cells that were left out have no children.
         check_cancelled(progress)?;
         let mut octree = Self {

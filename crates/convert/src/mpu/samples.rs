@@ -8,6 +8,7 @@ use crate::{ConvertError, RawPoints, SplatParams, SurfelParams, raw_to_surfels};
 use rayon::prelude::*;
 use splat_core::{DAabb, Progress, glam::DVec3};
 use std::cmp::Ordering;
+use std::ops::Range;
 
 /// Samples in a leaf of the tree, at most.
 const LEAF: usize = 16;
@@ -98,6 +99,17 @@ impl SampleTree {
             };
         }
         Self { samples, boxes }
+    }
+
+    /// One more than the last node; the children of node i are 2i and 2i + 1, as long as there are such.
+    pub(super) fn nodes(&self) -> usize {
+        self.boxes.len()
+    }
+
+    /// The samples of a node from 1 on; all for 0.
+    pub(super) fn span(&self, node: usize) -> Range<usize> {
+        let (from, to) = range(node.max(1), self.samples.len());
+        from..to
     }
 
     /// Calls `leaf` with the samples of each leaf that is nearer to `p` than `limit(state)`, nearer halves first.
