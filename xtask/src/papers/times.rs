@@ -195,7 +195,7 @@ mod tests {
         assert_eq!(fill("{sort/1, exact} and {sort/3}, no more"), Ok("2.00 ms and 2.35 s, no more".to_owned()));
         assert_eq!(fill("{1 / sort/2} a second"), Ok("123 a second".to_owned()));
         assert_eq!(fill("{all / sort/1, exact} and {sort/1, exact / all}"), Ok("2.00 million and 500 ns".to_owned()));
-        assert_eq!(fill("{sort/3 / all}, {all / sort/3}"), Ok("2.35 µs, 426330".to_owned()));
+        assert_eq!(fill("{sort/3 / all}, {all / sort/3}"), Ok("2.35 µs, 426 thousand".to_owned()));
         assert_eq!(fill("{all / sort/2}"), Err("{sort/2} does not say of how many elements".to_owned()));
         assert_eq!(fill("{sort/2 / sort/1, exact} times"), Ok("4.06 times".to_owned()));
         assert_eq!(fill("none"), Ok("none".to_owned()));
