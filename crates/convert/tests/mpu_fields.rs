@@ -371,7 +371,7 @@ fn the_zero_set_of_a_noisy_scan_stays_by_its_samples() {
         far.sort_by(f64::total_cmp);
         let (n, most) = (far.len(), far[far.len() - 1]);
         println!("{file}: {} {} {} {most} of {n}", far[n / 2], far[n * 99 / 100], far[n * 999 / 1000]);
-        assert!(n > 5000 && far[n * 999 / 1000] < 2.5 && most < 3.5, "{file}: {most}");
+        assert!(n > 5000 && far[n * 999 / 1000] < 2.5 && most < 3.0, "{file}: {most}");
     }
 }
 

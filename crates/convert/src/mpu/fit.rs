@@ -64,6 +64,12 @@ pub(super) struct Scratch {
     pub(super) nearest: Vec<(f64, u32)>,
 }
 
+/// Corner 0 to 7 of the cube around 0, or its middle.
+fn corner_or_middle(half: f64, q: usize) -> DVec3 {
+    let sign = |a: usize| if q >> a & 1 == 0 { -half } else { half };
+    if q == 8 { DVec3::ZERO } else { DVec3::new(sign(0), sign(1), sign(2)) }
+}
+
 impl Ball {
     pub(super) fn new(tree: &SampleTree, ids: &[u32], center: DVec3, radius: f64, before: f64) -> Self {
         let inverse = 1.0 / radius;
@@ -103,9 +109,8 @@ impl Ball {
 
     /// Corners of the cube in the support and its middle.
     fn places(&self) -> impl Iterator<Item = DVec3> {
-        let corner = (self.counted / 3.0).sqrt();
-        let sign = move |q: usize, a: usize| if q >> a & 1 == 0 { -corner } else { corner };
-        (0..9).map(move |q| if q == 8 { DVec3::ZERO } else { DVec3::new(sign(q, 0), sign(q, 1), sign(q, 2)) })
+        let half = (self.counted / 3.0).sqrt();
+        (0..9).map(move |q| corner_or_middle(half, q))
     }
 
     /// Whether a shape has values of a distance to the samples, and their side, at these places: samples that cover a part
@@ -211,8 +216,7 @@ impl Ball {
 
     /// Corner 0 to 7 or middle of the cell in local coordinates and its distance, if the samples agree on its side.
     fn auxiliary(&self, tree: &SampleTree, half: f64, q: usize, nearest: &mut Vec<(f64, u32)>) -> Option<(DVec3, f64)> {
-        let sign = |a: usize| if q >> a & 1 == 0 { -half } else { half };
-        let at = self.center + if q == 8 { DVec3::ZERO } else { DVec3::new(sign(0), sign(1), sign(2)) };
+        let at = self.center + corner_or_middle(half, q);
         tree.nearest(at, JUDGES, nearest);
         let distance = |e: &(f64, u32)| {
             let s = &tree.samples[e.1 as usize];

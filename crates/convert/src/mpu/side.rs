@@ -20,6 +20,8 @@ use std::f64::consts::PI;
 
 /// Neighbours by which a sample knows its area.
 const AROUND: usize = 6;
+/// Cosine of the angle between normals down to which samples are of one side of a thin sheet.
+const ONE_SIDE: f64 = -0.5;
 /// n·(x − p) over the distance, above which the nearest samples know the side.
 const SURE: f64 = 0.5;
 /// Samples that are asked whether the surface is closed, at most about.
@@ -61,8 +63,7 @@ impl<'a> Sides<'a> {
             }
             let own = &tree.samples[i];
             tree.nearest(own.position, 2 * AROUND + 1, found);
-            // Not those of the other side of something thin.
-            found.retain(|e| tree.samples[e.1 as usize].normal.dot(own.normal) > -0.5);
+            found.retain(|e| tree.samples[e.1 as usize].normal.dot(own.normal) > ONE_SIDE);
             found.truncate(AROUND + 1);
             // The farthest lies on the rim of the disc.
             found.last().map_or(0.0, |e: &(f64, u32)| PI * e.0 / (found.len() as f64 - 0.5))
@@ -80,7 +81,7 @@ impl<'a> Sides<'a> {
         let mut sides = Self { tree, areas, patches, level: 0.0 };
         let asked = tree.samples.iter().step_by(tree.samples.len().div_ceil(ASKED));
         let mean = asked.clone().map(|s| sides.winding(s.position)).sum::<f64>() / asked.len() as f64;
-        sides.level = if mean.abs() > 0.25 { 0.5f64.copysign(mean) } else { 0.0 };
+        sides.level = 0.5 * (2.0 * mean).round().clamp(-1.0, 1.0);
         sides
     }
 
