@@ -321,7 +321,7 @@ fn what_is_no_surface_is_refused() {
 
 /// A plate thinner than samples are apart, whose rim nobody sampled, and its upper side alone.
 #[test]
-fn beside_the_rim_of_a_thin_plate_is_outside() {
+fn cv13_beside_the_rim_of_a_thin_plate_is_outside() {
     fn plate(i: u64) -> (DVec3, DVec3) {
         let (r, a) = (unit(i, 0).sqrt(), TAU * unit(i, 1));
         let side = if unit(i, 2) < 0.5 { DVec3::Z } else { DVec3::NEG_Z };
@@ -348,7 +348,7 @@ fn beside_the_rim_of_a_thin_plate_is_outside() {
 
 /// A scan with creases and thin parts: no bubbles beside them, at two densities.
 #[test]
-fn the_zero_set_of_a_noisy_scan_stays_by_its_samples() {
+fn cv14_the_zero_set_of_a_noisy_scan_stays_by_its_samples() {
     for (file, step) in [("dragon_res3.ply.gz", 11), ("dragon_res4.ply.gz", 7)] {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/stanford-dragon").join(file);
         let Loaded::Mesh(mut mesh) = read::file(&path, &ReadParams::default(), None).unwrap().0 else {
