@@ -8,11 +8,13 @@
 mod device;
 mod dragon;
 mod frame;
+mod head;
 mod record;
 
 pub use device::device;
 pub use dragon::{disc_scale, dragon, mean_degree, overlap_graph};
 pub use frame::Frame;
+pub use head::HeadLike;
 pub use record::record;
 
 use organza::{Files, Loaded, Progress, RenderOptions, load, scene};

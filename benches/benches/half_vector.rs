@@ -1,11 +1,12 @@
 //! Half-vector sheets of a procedural cloud at 400², the sun before and behind it: without light, with shadows, scattered ahead,
 //! back and forth, and under a disk in one sweep; beside image-aligned sheets without light.
 //!
-//! A plain table of minima, as that of `sheets`: by the clock and in processor time of all threads.
+//! A plain table of minima, as that of `sheets`: by the clock and in processor time of all threads. `-- head` draws the translucent head
+//! of `sheets` instead, `-- dense` or `-- FILE` other volumes as the head, which `benches/peers/vtk_scattering.py` draws too.
 #![allow(missing_docs, clippy::expect_used, reason = "a benchmark")]
 
 use convert::{CloudShape, SplatParams, procedural_cloud};
-use organza_benches::processor_ms;
+use organza_benches::{HeadLike, processor_ms, record};
 use sheet_light::half::{Extended, HalfInput, HalfParams, Scattering, fold};
 use sheet_light::{Params, SheetInput, Volume, prepare};
 use splat_core::glam::DVec3;
@@ -14,6 +15,7 @@ use splat_core::{
     Accumulator, Camera, Grid, LayerSet, Light, LightShape, Material, Packing, Projection, Shading, Similarity,
     TransferFunction, TransferPoint,
 };
+use std::path::Path;
 use std::time::Instant;
 
 /// Runs each part this often.
@@ -22,50 +24,77 @@ const REPEATS: usize = 5;
 const SIZE: [u32; 2] = [400, 400];
 
 fn main() {
-    let shape = CloudShape::default();
     println!("{:>24} {:>8} {:>10} {:>10} {:>10} {:>10}", "ms", "clock", "processor", "M visible", "M eye", "M light");
-    for spacing in [4.0 / 128.0, 4.0 / 192.0] {
-        let grid = procedural_cloud(&shape, spacing, &SplatParams::default(), None).expect("a cloud");
-        println!("{:?} = {:.2} M voxels", grid.dims, grid.values.len() as f64 * 1e-6);
-        across_the_view(&grid);
-        half_vectors("without light", &grid, None, Scattering::None);
-        for (from, direction) in [("before", [0.3, -0.5, -1.0]), ("behind", [0.3, -0.5, 1.0])] {
-            for (how, scattering) in
-                [("shadow", Scattering::None), ("ahead", Scattering::Forward), ("back", Scattering::ForwardAndBack)]
-            {
-                half_vectors(&format!("{how}, sun {from}"), &grid, Some(direction), scattering);
+    match std::env::args().skip(1).find(|a| !a.starts_with('-')) {
+        Some(volume) => {
+            let like = HeadLike::new(Some(volume.as_str()).filter(|&v| v != "head"));
+            let (transfer, camera) = (like.transfer(HeadLike::SEMI), like.camera(SIZE[0], false));
+            let name = Path::new(&volume).file_stem().unwrap_or_default().to_string_lossy().into_owned();
+            let sun = DVec3::new(0.6, -0.5, -0.6);
+            rows(&Setting { name, grid: &like.grid, transfer, camera, suns: [sun, -sun] }, false);
+        }
+        None => {
+            for spacing in [4.0 / 128.0, 4.0 / 192.0] {
+                let shape = CloudShape::default();
+                let grid = procedural_cloud(&shape, spacing, &SplatParams::default(), None).expect("a cloud");
+                rows(&Setting::cloud(&grid), true);
             }
-            soft(&format!("soft, disk {from}"), &grid, direction);
         }
     }
 }
 
-/// The cloud as extinction, and its view.
-struct Setting {
-    transfer: TransferFunction,
-    material: Material,
-    camera: Camera,
+/// All rows of a volume; what stands under a disk is as wide as the cloud.
+fn rows(setting: &Setting<'_>, disk: bool) {
+    println!("{:?} = {:.2} M voxels", setting.grid.dims, setting.grid.values.len() as f64 * 1e-6);
+    across_the_view(setting);
+    half_vectors("without light", setting, None, Scattering::None);
+    for (from, direction) in [("before", setting.suns[0]), ("behind", setting.suns[1])] {
+        for (how, scattering) in
+            [("shadow", Scattering::None), ("ahead", Scattering::Forward), ("back", Scattering::ForwardAndBack)]
+        {
+            half_vectors(&format!("{how}, sun {from}"), setting, Some(direction), scattering);
+        }
+        if disk {
+            soft(&format!("soft, disk {from}"), setting, direction);
+        }
+    }
 }
 
-impl Setting {
-    fn new(shading: Shading) -> Self {
+/// A volume, how it is seen, and the ways of light that comes from before and from behind it.
+struct Setting<'a> {
+    name: String,
+    grid: &'a Grid,
+    transfer: TransferFunction,
+    camera: Camera,
+    suns: [DVec3; 2],
+}
+
+fn material(shading: Shading) -> Material {
+    Material { shading, single_scattering_albedo: 0.99, asymmetry: 0.7, ..Material::default() }
+}
+
+impl<'a> Setting<'a> {
+    /// A cloud, whose values are extinctions.
+    fn cloud(grid: &'a Grid) -> Self {
         let point = |value: f32| TransferPoint { value, color: [1.0; 3], extinction: value };
         let view = Projection::Perspective { fov_y: 0.5 };
         Self {
+            name: format!("cloud of {:.1} M", grid.values.len() as f64 * 1e-6),
+            grid,
             transfer: TransferFunction::new(vec![point(0.0), point(12.0)]).expect("values rise"),
-            material: Material { shading, single_scattering_albedo: 0.99, asymmetry: 0.7, ..Material::default() },
             camera: Camera::look_at(DVec3::new(0.0, 0.6, 8.0), DVec3::Y * 0.5, DVec3::Y, view, SIZE).expect("a camera"),
+            suns: [DVec3::new(0.3, -0.5, -1.0), DVec3::new(0.3, -0.5, 1.0)],
         }
     }
 
-    fn input<'a>(&'a self, grid: &'a Grid, lights: Vec<LitBy<'a>>) -> SheetInput<'a> {
+    fn input<'b>(&'b self, material: &'b Material, lights: Vec<LitBy<'b>>) -> SheetInput<'b> {
         let volume = Volume {
-            grid,
+            grid: self.grid,
             packing: Packing::Cartesian,
             transform: Similarity::default(),
             transfer: &self.transfer,
             extinction_scale: 1.0,
-            material: &self.material,
+            material,
             normals: false,
             object: 0,
             clip: &[],
@@ -77,69 +106,80 @@ impl Setting {
     }
 }
 
-/// Least milliseconds, by the clock and of processors, and what was made.
-fn least<T>(mut run: impl FnMut() -> T) -> ([f64; 2], T) {
-    let mut best = [f64::INFINITY; 2];
-    let mut last = None;
-    for _ in 0..REPEATS {
-        let (start, busy) = (Instant::now(), processor_ms());
-        last = Some(run());
-        best = [best[0].min(start.elapsed().as_secs_f64() * 1e3), best[1].min(processor_ms() - busy)];
-    }
-    (best, last.expect("it ran"))
+/// What something took, milliseconds by the clock of each run and of processors at least, and what was made.
+struct Ran<T> {
+    clock: Vec<f64>,
+    processor: f64,
+    made: T,
 }
 
-fn across_the_view(grid: &Grid) {
-    let setting = Setting::new(Shading::Unlit);
+fn ran<T>(mut run: impl FnMut() -> T) -> Ran<T> {
+    let mut clock = Vec::new();
+    let mut processor = f64::INFINITY;
+    loop {
+        let (start, busy) = (Instant::now(), processor_ms());
+        let made = run();
+        clock.push(start.elapsed().as_secs_f64() * 1e3);
+        processor = processor.min(processor_ms() - busy);
+        if clock.len() == REPEATS {
+            return Ran { clock, processor, made };
+        }
+    }
+}
+
+fn across_the_view(setting: &Setting<'_>) {
+    let material = material(Shading::Unlit);
     let layout = ChannelLayout::new(&LayerSet::default());
-    let (best, counts) = least(|| {
+    let ran = ran(|| {
         let mut out = Accumulator::new(SIZE, 1, 3, false, false);
-        let sheeted = prepare(setting.input(grid, Vec::new()), &Params::default(), None).expect("it can be drawn");
+        let input = setting.input(&material, Vec::new());
+        let sheeted = prepare(input, &Params::default(), None).expect("it can be drawn");
         sheeted.fold(f32::NEG_INFINITY..f32::INFINITY, &[], &layout, &mut out, None).expect("nobody cancels")
     });
-    row("across the view", best, [counts.visible, counts.fragments, 0]);
+    row(setting, "across the view", &ran, |c| [c.visible, c.fragments, 0]);
 }
 
-fn half_vectors(name: &str, grid: &Grid, direction: Option<[f64; 3]>, scattering: Scattering) {
-    let setting = Setting::new(if direction.is_some() { Shading::Phase } else { Shading::Unlit });
-    let sun = |d: [f64; 3]| {
-        let shape = LightShape::Directional { direction: DVec3::from_array(d).normalize() };
+fn half_vectors(name: &str, setting: &Setting<'_>, direction: Option<DVec3>, scattering: Scattering) {
+    let material = material(if direction.is_some() { Shading::Phase } else { Shading::Unlit });
+    let sun = |d: DVec3| {
+        let shape = LightShape::Directional { direction: d.normalize() };
         LitBy { slide: None, light: Light { shape, intensity: [3.0; 3] }, shadow: None }
     };
-    let sheets = setting.input(grid, direction.map(sun).into_iter().collect());
-    sweep(
-        name,
-        &HalfInput { sheets, splats: None, polygons: &[], extended: Vec::new(), mapped: Vec::new(), opaque: &[] },
-        scattering,
-    );
+    let sheets = setting.input(&material, direction.map(sun).into_iter().collect());
+    sweep(name, setting, sheets, Vec::new(), scattering);
 }
 
 /// Sixteen points of a disk as wide as the cloud is high, in one sweep.
-fn soft(name: &str, grid: &Grid, direction: [f64; 3]) {
-    let setting = Setting::new(Shading::Phase);
-    let normal = DVec3::from_array(direction).normalize();
+fn soft(name: &str, setting: &Setting<'_>, direction: DVec3) {
+    let material = material(Shading::Phase);
+    let normal = direction.normalize();
     let shape = LightShape::Disk { center: DVec3::Y * 0.5 - normal * 10.0, normal, radius: 0.6 };
     let lit = LitBy { slide: None, light: Light { shape, intensity: [300.0; 3] }, shadow: None };
     let extended = vec![Extended { lit, samples: 16 }];
-    let sheets = setting.input(grid, Vec::new());
-    sweep(
-        name,
-        &HalfInput { sheets, splats: None, polygons: &[], extended, mapped: Vec::new(), opaque: &[] },
-        Scattering::None,
-    );
+    sweep(name, setting, setting.input(&material, Vec::new()), extended, Scattering::None);
 }
 
-fn sweep(name: &str, input: &HalfInput<'_>, scattering: Scattering) {
+fn sweep(
+    name: &str,
+    setting: &Setting<'_>,
+    sheets: SheetInput<'_>,
+    extended: Vec<Extended<'_>>,
+    scattering: Scattering,
+) {
+    let input = HalfInput { sheets, splats: None, polygons: &[], extended, mapped: Vec::new(), opaque: &[] };
     let params = HalfParams { scattering, ..HalfParams::default() };
     let layout = ChannelLayout::new(&LayerSet::default());
-    let (best, counts) = least(|| {
+    let ran = ran(|| {
         let mut out = Accumulator::new(SIZE, 1, 3, false, false);
-        fold(input, &params, &layout, &mut out, None).expect("half vectors serve it").counts
+        fold(&input, &params, &layout, &mut out, None).expect("half vectors serve it").counts
     });
-    row(name, best, [counts.visible, counts.eye_fragments, counts.light_fragments]);
+    row(setting, name, &ran, |c| [c.visible, c.eye_fragments, c.light_fragments]);
 }
 
-fn row(name: &str, [clock, processor]: [f64; 2], counts: [u64; 3]) {
+fn row<T>(setting: &Setting<'_>, name: &str, ran: &Ran<T>, counts: impl Fn(&T) -> [u64; 3]) {
+    let counts = counts(&ran.made);
+    record(&format!("half_vector/{}, {name}", setting.name), &ran.clock, counts[0]);
     let [visible, eye, light] = counts.map(|n| n as f64 * 1e-6);
-    println!("{name:>24} {clock:8.0} {processor:10.0} {visible:10.2} {eye:10.1} {light:10.1}");
+    let least = ran.clock.iter().copied().fold(f64::INFINITY, f64::min);
+    println!("{name:>24} {least:8.0} {:10.0} {visible:10.2} {eye:10.1} {light:10.1}", ran.processor);
 }

@@ -8,15 +8,13 @@
 //! that are all visible: views, transfer functions and extinctions are the head's, stretched over the range of its values and by its diagonal.
 #![allow(missing_docs, clippy::expect_used, reason = "a benchmark")]
 
-use convert::read::{self, Loaded, ReadParams};
 use convert::{SplatParams, body_centred};
-use organza_benches::{processor_ms, record};
+use organza_benches::{HeadLike, processor_ms, record};
 use sheet_light::{Aligned, Classify, Params, SheetCounts, SheetInput, Volume, prepare};
-use splat_core::glam::{DMat3, DVec3};
+use splat_core::glam::DVec3;
 use splat_core::shade::{ChannelLayout, LitBy};
 use splat_core::{
-    Accumulator, Camera, Grid, LayerSet, Light, LightShape, Material, Packing, Projection, Shading, Similarity,
-    TransferFunction, TransferPoint,
+    Accumulator, Camera, Grid, LayerSet, Light, LightShape, Material, Packing, Shading, Similarity, TransferFunction,
 };
 use std::path::Path;
 use std::time::Instant;
@@ -58,77 +56,18 @@ impl<'a> Method<'a> {
 /// All depths.
 const ALL: std::ops::Range<f32> = f32::NEG_INFINITY..f32::INFINITY;
 
-fn read(path: &Path) -> Grid {
-    match read::file(path, &ReadParams::default(), None).expect("a volume that can be read") {
-        (Loaded::Grid(grid), _) => grid,
-        _ => panic!("{} is no volume", path.display()),
-    }
-}
-
-/// Three waves whose values are 40 to 240: the head's transfer functions show all of them.
-fn dense() -> Grid {
-    let wave = |n: usize| (n as f64 / 256.0 * std::f64::consts::TAU * 3.0).sin();
-    let value = |i: usize| (140.0 + 100.0 / 3.0 * (wave(i % 256) + wave(i / 256 % 256) + wave(i >> 16))).round();
-    let values = (0..256 * 256 * 256).map(|i| value(i) as f32).collect();
-    Grid { origin: DVec3::ZERO, axes: DMat3::IDENTITY, dims: [256; 3], values }
-}
-
-/// What a volume is to the head: the value in the place of 0, that of one step of its 255, and its diagonal over the head's.
-struct Likeness {
-    lowest: f32,
-    step: f32,
-    length: f64,
-}
-
-impl Likeness {
-    fn new(grid: &Grid, bytes: bool) -> Self {
-        const HEAD: DVec3 = DVec3::new(197.0, 233.0, 189.0);
-        let range = |least: f32, of: fn(f32, f32) -> f32| grid.values.iter().copied().fold(least, of);
-        let (lowest, highest) =
-            if bytes { (0.0, 255.0) } else { (range(f32::MAX, f32::min), range(f32::MIN, f32::max)) };
-        let diagonal = (grid.axes * DVec3::from_array(grid.dims.map(|n| n as f64))).length();
-        Self { lowest, step: (highest - lowest) / 255.0, length: diagonal / HEAD.length() }
-    }
-
-    /// Extinction in 1/mm of the head at its values of 0 to 255.
-    fn transfer(&self, points: &[(f32, f32)]) -> TransferFunction {
-        let point = |&(value, extinction): &(f32, f32)| {
-            let t = value / 255.0;
-            let color = [0.4 + 0.6 * t, 0.9 * t, 0.8 - 0.6 * t];
-            let extinction = extinction / self.length as f32;
-            TransferPoint { value: self.lowest + self.step * value, color, extinction }
-        };
-        TransferFunction::new(points.iter().map(point).collect()).expect("values rise")
-    }
-
-    fn camera(&self, grid: &Grid, pixels: u32, perspective: bool) -> Camera {
-        let middle = grid.origin + grid.axes * DVec3::from_array(grid.dims.map(|n| 0.5 * n as f64));
-        let projection = if perspective {
-            Projection::Perspective { fov_y: 0.54 }
-        } else {
-            Projection::Orthographic { height: 240.0 * self.length }
-        };
-        let eye = middle + self.length * DVec3::new(-260.0, 260.0, 100.0);
-        Camera::look_at(eye, middle, DVec3::Z, projection, [pixels; 2]).expect("a camera")
-    }
-}
-
 fn main() {
     let words: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with('-')).collect();
     let (files, words): (Vec<_>, Vec<_>) =
         words.into_iter().partition(|word| Path::new(word).is_file() || word == "dense");
     let only = words.concat();
-    let asset = Path::new(env!("CARGO_MANIFEST_DIR")).join("../assets/mni152/mni152_t1.nii.gz");
-    let grid = match files.first() {
-        Some(file) if file == "dense" => dense(),
-        Some(file) => read(Path::new(file)),
-        None => read(&asset),
-    };
-    let like = Likeness::new(&grid, files.first().is_none_or(|file| file == "dense"));
-    let semi = like.transfer(&[(30.0, 0.0), (80.0, 0.004), (150.0, 0.01), (200.0, 0.05), (255.0, 0.08)]);
-    let iso = like.transfer(&[(90.0, 0.0), (110.0, 2.0)]);
+    let file = files.first().map(String::as_str);
+    let volume = file.and_then(|f| Path::new(f).file_stem()?.to_str()).map(|f| format!("{f} ")).unwrap_or_default();
+    let like = HeadLike::new(file);
+    let grid = &like.grid;
+    let (semi, iso) = (like.transfer(HeadLike::SEMI), like.transfer(HeadLike::ISO));
     let start = Instant::now();
-    let bcc = body_centred(&grid, &SplatParams::default()).expect("a volume");
+    let bcc = body_centred(grid, &SplatParams::default()).expect("a volume");
     let share = bcc.planes.values.len() as f64 / grid.values.len() as f64;
     println!(
         "{:?} resampled to {:?}, {share:.4} of the points, in {:.0?}",
@@ -138,7 +77,7 @@ fn main() {
     );
     let paper = Method {
         name: "",
-        grid: &grid,
+        grid,
         packing: Packing::Cartesian,
         classify: Classify::After,
         aligned: Aligned::View,
@@ -163,9 +102,9 @@ fn main() {
                     let lens = if perspective { "pinhole" } else { "parallel" };
                     let light = if lit { "shaded" } else { "unlit" };
                     for method in std::iter::once(&paper).chain(&methods) {
-                        let name = format!("{pixels} {class} {light} {lens}{}", method.name);
+                        let name = format!("{volume}{pixels} {class} {light} {lens}{}", method.name);
                         if name.contains(&only) && !(perspective && method.aligned == Aligned::Axis) {
-                            row(&name, [method, &paper], tf, lit, &like.camera(&grid, pixels, perspective));
+                            row(&name, [method, &paper], tf, lit, &like.camera(pixels, perspective));
                         }
                     }
                 }

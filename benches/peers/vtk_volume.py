@@ -156,4 +156,5 @@ def main():
                     print(f"{label:>28} {best * 1e3:6.0f} {busy * 1e3:6.0f} ms, RMSE {rmse:.5f}, mean {fine.mean():.4f}", flush=True)
 
 
-main()
+if __name__ == "__main__":
+    main()
