@@ -274,6 +274,20 @@ fn nothing_is_cut_off_in_any_frame_of_a_turntable_of_a_file_and_init_writes_its_
 }
 
 #[test]
+fn the_discs_of_a_few_points_are_seen_whole() {
+    let place = Place::new("");
+    let fraction = |x: f64| x - x.floor();
+    for n in [2, 3, 6, 30] {
+        let point =
+            |i: i32| format!("{} {} 0\n", fraction(f64::from(i) * 0.754_877), fraction(f64::from(i) * 0.569_84));
+        place.write("few.xyz", (0..n).map(point).collect::<String>());
+        place.expect(0, &[&["render", "few.xyz", "-o", "few.exr", "--force"][..], &SIZE].concat(), "");
+        let most = reach(&picture_of(&place.path("few.exr"))).into_iter().fold(0.0, f64::max);
+        assert!((0.6..0.99).contains(&most), "{n}: {most}");
+    }
+}
+
+#[test]
 fn what_stands_on_the_plane_of_its_other_axes_points_up_along_the_third() {
     let place = Place::new("");
     let text = |file: &str| String::from_utf8(place.expect(0, &["info", file], "").stdout).unwrap();

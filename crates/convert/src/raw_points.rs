@@ -5,7 +5,7 @@ use crate::point_attributes::attribute;
 use crate::ready_splats::ReadySplats;
 use crate::vertex_normals::vertex_normals;
 use splat_core::glam::{DVec3, Vec3};
-use splat_core::{Aabb, DAabb, Error, Gaussians, Mesh, SplatKind};
+use splat_core::{DAabb, Error, Gaussians, Mesh, SplatKind};
 
 /// Raw points as columns; all but the positions may be empty.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -95,18 +95,6 @@ impl RawPoints {
             normal: known.iter().map(|i| normal[*i]).collect(),
             ..Self::default()
         }
-    }
-
-    /// About how far the disc of a point reaches where there are no more than ten thousand, as points of a surface lie apart; `None` for
-    /// more, of which each is small, and where all lie at one place.
-    pub fn sparse_reach(&self) -> Option<f64> {
-        /// Most points whose discs are looked at.
-        const FEW: usize = 10_000;
-        /// Reach over the distance at which so many points lie apart on a square.
-        const REACH: f64 = 0.8;
-        let bounds = Aabb::of_points(&self.position);
-        let size = (bounds.max - bounds.min).as_dvec3().max_element();
-        (self.len() <= FEW && size > 0.0).then(|| REACH * size / (self.len() as f64).sqrt())
     }
 
     /// Bounds of what is seen of nearly all Gaussians: two deviations around each, without the farthest hundredth to every side, which in

@@ -1,13 +1,16 @@
-//! Where the camera is that sees all of a scene: known once the data is read, before anything is converted.
+//! Where the camera is that sees all of a scene: known once the data is read, before it is converted.
 
 use super::files::Files;
 use super::input::Input;
 use super::loading::Loading;
 use crate::scene::{FoundCamera, Scene};
 use crate::{Error, Progress, RenderOptions};
-use convert::{Outline, visible_ends};
-use splat_core::DAabb;
+use convert::{ConvertError, Outline, RawPoints, raw_to_matter, raw_to_surfels, visible_ends};
+use splat_core::{Cloud, DAabb, Similarity};
 use std::borrow::Cow;
+
+/// Most points of an object whose splats are looked at: of more each is a pixel or two.
+const FEW: usize = 10_000;
 
 /// The scene with a camera that sees all visible objects, where it leaves the camera's place to the data, and that camera.
 pub(crate) fn placed<'s>(
@@ -18,7 +21,7 @@ pub(crate) fn placed<'s>(
 ) -> Result<(Cow<'s, Scene>, Option<FoundCamera>), Error> {
     let Some(fit) = scene.fit else { return Ok((scene, None)) };
     let inputs = Loading { scene: &scene, options, progress, files }.inputs()?;
-    let outlines: Vec<_> = inputs.iter().map(|input| (outline(input), input.splat().transform)).collect();
+    let outlines: Vec<_> = inputs.iter().map(outline).collect();
     let found = fit.camera(&scene.camera, &|add| outlines.iter().for_each(|(outline, to)| outline.each(to, add)));
     let Some(found) = found else {
         let message = "`camera`: there is nothing to see for a camera that is placed by itself";
@@ -29,11 +32,18 @@ pub(crate) fn placed<'s>(
     Ok((Cow::Owned(scene), Some(found)))
 }
 
-/// Points around what is seen of an object.
-fn outline<'i>(input: &'i Input<'i>) -> Outline<'i> {
-    match input {
+/// Points around what is seen of an object, and what leads them to the world.
+fn outline<'i>(input: &'i Input<'i>) -> (Outline<'i>, Similarity) {
+    let outline = match input {
         Input::Mesh(_, mesh, _) => Outline::Mesh(mesh),
-        Input::Points(_, points, _) | Input::Matter(_, points, _) => Outline::of_points(points),
+        Input::Points(_, points, params) if params.size.is_none() => {
+            return of_points(input, points, || raw_to_surfels(points, params, None).map(|(cloud, _)| cloud));
+        }
+        Input::Matter(_, points, params) => {
+            return of_points(input, points, || raw_to_matter(points, params, None).map(|(cloud, _)| cloud));
+        }
+        // A size in pixels waits for the camera.
+        Input::Points(_, points, _) => Outline::of_points(points),
         Input::Volume(grid, transfer, params) => {
             Outline::Places(visible_ends(grid, transfer, params.splat.transform.scale, &params.clip))
         }
@@ -46,5 +56,20 @@ fn outline<'i>(input: &'i Input<'i>) -> Outline<'i> {
             let corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
             Outline::Places(corners.map(|(s, t)| r.center + r.u * s + r.v * t).to_vec())
         }
+    };
+    (outline, input.splat().transform)
+}
+
+/// Of a few points what they become, which lies in the world already.
+fn of_points<'i>(
+    input: &Input<'_>,
+    points: &'i RawPoints,
+    converted: impl FnOnce() -> Result<Cloud, ConvertError>,
+) -> (Outline<'i>, Similarity) {
+    let is_few = points.len() <= FEW && points.gaussians.is_empty();
+    // What cannot be converted is refused where everything is.
+    match is_few.then(converted) {
+        Some(Ok(cloud)) => (Outline::of_splats(&cloud), Similarity::default()),
+        _ => (Outline::of_points(points), input.splat().transform),
     }
 }
