@@ -387,6 +387,23 @@ fn papers_model_goes_dark_at_an_absorbance_of_two() {
     }
 }
 
+#[test]
+fn papers_model_takes_the_opacity_of_a_balls_centre() {
+    let footprint = splat_core::Footprint::default();
+    for (radius, cross_section) in [(0.5f32, 0.1f32), (2.0, 0.1), (2.0, 1.0)] {
+        let mut cloud = Cloud::new(DVec3::ZERO);
+        cloud.push(&Splat { position: Vec3::Z * 20.0, radius, cross_section, ..Splat::default() });
+        let params =
+            Params { absorbance: AbsorbanceModel::Paper, resolution: Resolution::Cells(64), ..Params::default() };
+        let map = build(&cloud, &point_light(DVec3::ZERO), &params);
+        let [size, k] = [radius, cross_section].map(f64::from);
+        // Eq. 6: A = l·c.
+        let absorbance = size * (1.0 - libm::exp(-k * footprint.norm() / (size * size)));
+        let light = f64::from(light_at(&map, Vec3::Z * 30.0));
+        assert!((light - libm::exp(-absorbance)).abs() < 1e-5, "{radius}, {cross_section}: {light}");
+    }
+}
+
 /// Light behind a cloud of smooth, overlapping splats, by tables of ever more cells, against the sum of their kernels along each ray.
 #[test]
 fn smooth_shadows_converge_in_second_order() {
