@@ -84,6 +84,41 @@ fn opaque_sheets_have_no_holes() {
 }
 
 #[test]
+fn an_opaque_disc_of_any_number_of_cells_hides_as_far_as_its_dilated_area_and_no_farther() {
+    let params = Params { resolution: Resolution::Cells(64), ..Params::default() };
+    // The table is no wider than the diagonal between two small splats.
+    let cell = 8f32.sqrt() / 64.0;
+    // Upright, and seen from the side, so that it is three times as wide as high, or as high as wide.
+    for (across, seen) in (2..30).flat_map(|n| [[1.0f32, 1.0], [1.0, 0.3], [0.3, 1.0]].map(|seen| (n, seen))) {
+        let shadow = 0.5 * across as f32 * cell;
+        let least = seen[0].min(seen[1]);
+        let lean = (1.0 - least * least).sqrt();
+        let normal = if seen[0] < 1.0 { Vec3::new(lean, 0.0, least) } else { Vec3::new(0.0, lean, least) };
+        let splat = |position, shadow: f32| splat_core::Splat {
+            position,
+            radius: shadow,
+            normal,
+            cross_section: std::f32::consts::PI * (shadow / params.opaque_dilation).powi(2),
+            kind: SplatKind::Opaque,
+            ..splat_core::Splat::default()
+        };
+        let mut cloud = splat_core::Cloud::new(DVec3::ZERO);
+        cloud.push(&splat(Vec3::new(0.01, 0.017, 0.0), shadow));
+        [-1.0, 1.0].iter().for_each(|at| cloud.push(&splat(Vec3::new(*at, *at, 0.0), 1e-3)));
+        let map = build(&cloud, &directional(-DVec3::Z), &params);
+        for i in 0..2000 {
+            let u = |k| 1.8 * (splat_core::rng::unit_f32(6, across, i, k) - 0.5);
+            let place = Vec3::new(u(0), u(1), -1.0);
+            let from_middle = place - cloud.position[0];
+            let beyond = (from_middle.x / seen[0]).hypot(from_middle.y / seen[1]) - shadow;
+            let (light, expected) = (light_at(&map, place), if beyond > 0.0 { 1.0 } else { 0.0 });
+            let what = || format!("{across} cells, {seen:?}, {beyond} beyond its rim: {light}");
+            assert!(beyond.abs() * least < cell || light == expected, "{}", what());
+        }
+    }
+}
+
+#[test]
 fn a_sphere_of_discs_is_lit_before_the_terminator_and_dark_behind() {
     let mut cloud = splat_core::Cloud::new(DVec3::ZERO);
     let n = 20_000u64;
