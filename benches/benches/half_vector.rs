@@ -43,7 +43,7 @@ fn main() {
     }
 }
 
-/// All rows of a volume; what stands under a disk is as wide as the cloud.
+/// All rows of a volume; with `disk` also those under a disk, whose place and size are those of the cloud.
 fn rows(setting: &Setting<'_>, disk: bool) {
     println!("{:?} = {:.2} M voxels", setting.grid.dims, setting.grid.values.len() as f64 * 1e-6);
     across_the_view(setting);

@@ -277,13 +277,37 @@ fn nothing_is_cut_off_in_any_frame_of_a_turntable_of_a_file_and_init_writes_its_
 fn the_discs_of_a_few_points_are_seen_whole() {
     let place = Place::new("");
     let fraction = |x: f64| x - x.floor();
-    for n in [2, 3, 6, 30] {
+    let few = |n: i32| {
         let point =
             |i: i32| format!("{} {} 0\n", fraction(f64::from(i) * 0.754_877), fraction(f64::from(i) * 0.569_84));
         place.write("few.xyz", (0..n).map(point).collect::<String>());
-        place.expect(0, &[&["render", "few.xyz", "-o", "few.exr", "--force"][..], &SIZE].concat(), "");
+    };
+    let seen = |what: &str| {
+        place.expect(0, &[&["render", what, "-o", "few.exr", "--force"][..], &SIZE].concat(), "");
         let most = reach(&picture_of(&place.path("few.exr"))).into_iter().fold(0.0, f64::max);
-        assert!((0.6..0.99).contains(&most), "{n}: {most}");
+        assert!((0.6..0.99).contains(&most), "{what}: {most}");
+        most
+    };
+    for n in [2, 3, 6, 30] {
+        few(n);
+        seen("few.xyz");
+    }
+    few(6);
+    for (name, keys) in [
+        ("translucent", "opacity = 0.4"),
+        ("medium", "as = \"medium\"\nextinction = 3.0"),
+        ("sized", "point_size = { world = 0.7 }"),
+    ] {
+        let scene = |keys: &str| {
+            let file = format!("{name}.toml");
+            place.write(&file, auto("camera = \"auto\"").replace("mesh = \"mesh.obj\"", keys));
+            seen(&file)
+        };
+        let own = scene(&format!("points = \"few.xyz\"\n{keys}"));
+        // In another unit of length, a size in the world with it, what is seen is as wide.
+        let (keys, unit) = (keys.replace("0.7", "0.91"), "transform = { scale = 1.3, translate = [5, -7, 1e6] }");
+        let scaled = scene(&format!("points = \"few.xyz\"\n{unit}\n{}", keys.replace("3.0", "2.307_692_3")));
+        assert!((own - scaled).abs() < 0.03, "{name}: {own} {scaled}");
     }
 }
 

@@ -2,7 +2,7 @@
 
 use crate::RawPoints;
 use splat_core::glam::{DVec3, Vec3};
-use splat_core::{Cloud, DAabb, Footprint, Mesh, Similarity};
+use splat_core::{Cloud, DAabb, Footprint, Mesh, Similarity, SplatKind};
 
 /// Points around data, in its own coordinates.
 #[derive(Debug)]
@@ -21,10 +21,9 @@ impl<'a> Outline<'a> {
         points.bulk().map_or(Self::Points(points), |bulk| Self::of_boxes([bulk]))
     }
 
-    /// Of splats the corners of boxes around the cores of discs and of balls.
+    /// Of splats: octagons around discs, cubes around balls, as far as they are seen.
     pub fn of_splats(cloud: &Cloud) -> Self {
-        let middle = |i: usize| cloud.origin + cloud.position[i].as_dvec3();
-        Self::of_boxes((0..cloud.len()).map(|i| DAabb::around(middle(i), reach(cloud, i).as_dvec3())))
+        Self::Places((0..cloud.len()).flat_map(|i| around(cloud, i)).collect())
     }
 
     /// Of boxes their corners.
@@ -46,19 +45,24 @@ impl<'a> Outline<'a> {
     }
 }
 
-/// How far the core of a splat reaches along each axis.
-fn reach(cloud: &Cloud, i: usize) -> Vec3 {
-    let (radius, of) = (cloud.radius[i], |column: &[Vec3]| column.get(i).copied().unwrap_or_default());
-    let (normal, tangent) = (of(&cloud.normal), of(&cloud.tangent));
-    let squares = if normal == Vec3::ZERO {
-        Vec3::splat(radius * radius)
-    } else if tangent == Vec3::ZERO {
-        radius * radius * (Vec3::ONE - normal * normal)
-    } else {
-        let across = radius * normal.cross(tangent.normalize());
-        tangent * tangent + across * across
-    };
-    Footprint::CORE * squares.max(Vec3::ZERO).map(f32::sqrt)
+/// Deviations of a translucent splat beyond which next to nothing is seen of it.
+const SEEN: f32 = 2.0;
+
+/// Corners around what is seen of a splat: of an opaque disc its core.
+fn around(cloud: &Cloud, i: usize) -> [DVec3; 8] {
+    let middle = cloud.origin + cloud.position[i].as_dvec3();
+    let share = if cloud.kind[i] == SplatKind::Opaque { Footprint::CORE } else { SEEN / Footprint::default().cutoff };
+    let (normal, tangent, radius) = (cloud.normal_of(i), cloud.tangent_of(i), share * cloud.radius[i]);
+    if normal == Vec3::ZERO {
+        return DAabb::around(middle, DVec3::splat(radius.into())).corners();
+    }
+    let is_round = tangent == Vec3::ZERO;
+    let first = if is_round { normal.any_orthonormal_vector() * radius } else { share * tangent };
+    let second = normal.cross(first.normalize()) * radius;
+    let (sin, cos) = (std::f32::consts::FRAC_1_SQRT_2, libm::cosf(std::f32::consts::FRAC_PI_8));
+    let corners =
+        [(1.0, 0.0), (sin, sin), (0.0, 1.0), (-sin, sin), (-1.0, 0.0), (-sin, -sin), (0.0, -1.0), (sin, -sin)];
+    corners.map(|(s, t)| middle + ((s * first + t * second) / cos).as_dvec3())
 }
 
 #[cfg(test)]
@@ -66,23 +70,27 @@ mod tests {
     use super::*;
     use splat_core::Splat;
 
-    /// Half the size of the box around a splat, over its core.
+    /// Half the sizes along the axes of what holds a splat, over the share of it that is seen.
     fn half_size(splat: Splat) -> Vec3 {
         let mut cloud = Cloud::new(DVec3::splat(1e6));
         cloud.push(&splat);
         let mut bounds = DAabb::EMPTY;
         Outline::of_splats(&cloud).each(&Similarity::default(), &mut |p| bounds = bounds.union(DAabb::new(p, p)));
         assert!((bounds.center() - DVec3::splat(1e6)).length() < 1e-6);
-        (0.5 * bounds.size()).as_vec3() / Footprint::CORE
+        (0.5 * bounds.size()).as_vec3() / if splat.kind == SplatKind::Opaque { Footprint::CORE } else { 2.0 / 3.0 }
     }
 
     #[test]
-    fn boxes_hold_discs_ellipses_and_balls() {
-        let disc = Splat { radius: 2.0, normal: Vec3::new(0.6, 0.0, 0.8), ..Splat::default() };
-        assert!((half_size(disc) - Vec3::new(1.6, 2.0, 1.2)).length() < 1e-5);
-        let ellipse = Splat { radius: 1.0, normal: Vec3::Z, tangent: Vec3::new(3.0, 3.0, 0.0), ..Splat::default() };
-        assert!((half_size(ellipse) - Vec3::new(9.5f32.sqrt(), 9.5f32.sqrt(), 0.0)).length() < 1e-5);
-        let ball = Splat { radius: 2.0, normal: Vec3::ZERO, ..Splat::default() };
-        assert!((half_size(ball) - Vec3::splat(2.0)).length() < 1e-5);
+    fn corners_hold_discs_ellipses_and_balls_and_little_more() {
+        let holds = |splat, expected: Vec3| {
+            let over = half_size(splat) - expected;
+            assert!(over.min_element() > -1e-5 && over.max_element() < 0.09 * expected.max_element(), "{over}");
+        };
+        let disc = Splat { radius: 2.0, normal: Vec3::new(0.6, 0.0, 0.8), kind: SplatKind::Opaque, ..Splat::default() };
+        holds(disc, Vec3::new(1.6, 2.0, 1.2));
+        let (normal, tangent) = (Vec3::Z, Vec3::new(3.0, 3.0, 0.0));
+        let ellipse = Splat { radius: 1.0, normal, tangent, kind: SplatKind::Surface, ..Splat::default() };
+        holds(ellipse, Vec3::new(9.5f32.sqrt(), 9.5f32.sqrt(), 0.0));
+        holds(Splat { radius: 2.0, kind: SplatKind::Medium, ..Splat::default() }, Vec3::splat(2.0));
     }
 }

@@ -5,7 +5,7 @@ use super::input::Input;
 use super::loading::Loading;
 use crate::scene::{FoundCamera, Scene};
 use crate::{Error, Progress, RenderOptions};
-use convert::{ConvertError, Outline, RawPoints, raw_to_matter, raw_to_surfels, visible_ends};
+use convert::{ConvertError, DiscSize, Outline, RawPoints, SurfelParams, raw_to_matter, raw_to_surfels, visible_ends};
 use splat_core::{Cloud, DAabb, Similarity};
 use std::borrow::Cow;
 
@@ -36,14 +36,14 @@ pub(crate) fn placed<'s>(
 fn outline<'i>(input: &'i Input<'i>) -> (Outline<'i>, Similarity) {
     let outline = match input {
         Input::Mesh(_, mesh, _) => Outline::Mesh(mesh),
-        Input::Points(_, points, params) if params.size.is_none() => {
+        // A size in pixels waits for the camera.
+        Input::Points(_, points, SurfelParams { size: Some(DiscSize::Pixels(_)), .. }) => Outline::of_points(points),
+        Input::Points(_, points, params) => {
             return of_points(input, points, || raw_to_surfels(points, params, None).map(|(cloud, _)| cloud));
         }
         Input::Matter(_, points, params) => {
             return of_points(input, points, || raw_to_matter(points, params, None).map(|(cloud, _)| cloud));
         }
-        // A size in pixels waits for the camera.
-        Input::Points(_, points, _) => Outline::of_points(points),
         Input::Volume(grid, transfer, params) => {
             Outline::Places(visible_ends(grid, transfer, params.splat.transform.scale, &params.clip))
         }
