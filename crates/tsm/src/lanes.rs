@@ -107,6 +107,7 @@ impl<const F: usize> Queues<F> {
                 }
                 continue;
             }
+            debug_assert!(side <= MOST, "invariant: {side} cells a side go one by one");
             let queue = &mut self.queue[SIDES.iter().filter(|most| side > **most).count().min(SIDES.len() - 1)];
             let to = queue.len % (2 * LANES);
             (0..F).for_each(|f| queue.column[f][to] = from.column[f][l]);

@@ -31,14 +31,14 @@ pub(crate) struct Rays<'a, M: Mapping> {
 /// Most rays along a side of a cell.
 pub(crate) const MOST_SAMPLES: u32 = 32;
 
-/// Place of a ray along the side of a cell that has so many. An even number of them lie in pairs, each as two points of Gauss's rule:
-/// where the table is creased along edges of cells, rays at even distances would miss a share of a footprint that goes as the square of these.
+/// Place of a ray along the side of a cell that has so many: one, or an even number. These lie in pairs, each as two points of Gauss's
+/// rule: where the table is creased along edges of cells, rays at even distances would miss a share of a footprint that goes as the
+/// square of these.
 #[inline(always)]
 pub(crate) fn place(ray: u32, of: u32) -> f32 {
     const FROM_MIDDLE: f32 = 0.577_350_26;
     let ray_of_pair = if ray.is_multiple_of(2) { -FROM_MIDDLE } else { FROM_MIDDLE };
-    let in_pairs = ((ray / 2 * 2 + 1) as f32 + ray_of_pair) / of as f32;
-    if of.is_multiple_of(2) { in_pairs } else { (ray as f32 + 0.5) / of as f32 }
+    if of == 1 { 0.5 } else { ((ray / 2 * 2 + 1) as f32 + ray_of_pair) / of as f32 }
 }
 
 /// Rays by component: base, then direction.
@@ -187,5 +187,71 @@ impl<M: Mapping> Rays<'_, M> {
             }
         }
         found
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::caster::Casters;
+    use crate::frame::Frame;
+    use crate::mapping::Octahedral;
+    use crate::sampling::Sampled;
+    use crate::{Params, Scene};
+    use splat_core::glam::DVec3;
+    use splat_core::{Cloud, Splat};
+
+    /// What a ball holds ahead of the light along one ray, and its mean distance, summed in 400 steps along the chord.
+    fn along_ray(caster: &Caster, ray: &Ray) -> [f64; 2] {
+        let [centre, direction] = [caster.position, ray.direction].map(Vec3::as_dvec3);
+        let [radius, sigma] = [1.0, caster.kernel.cutoff].map(|part| f64::from(caster.radius / part));
+        let along = centre.dot(direction);
+        let s = (centre - direction * along).length_squared() / (radius * radius);
+        if s >= 1.0 {
+            return [0.0; 2];
+        }
+        let half = radius * (1.0 - s).sqrt();
+        let (mut whole, mut held, mut moment) = (0.0, 0.0, 0.0);
+        for k in 0..400 {
+            let t = along + half * ((k as f64 + 0.5) / 200.0 - 1.0);
+            let density = libm::exp(-0.5 * ((t - along) / sigma).powi(2));
+            whole += density;
+            if t > 0.0 {
+                held += density;
+                moment += density * t;
+            }
+        }
+        let weight = f64::from(caster.kernel.profile(s as f32)) / whole;
+        [weight * held, weight * moment]
+    }
+
+    #[test]
+    fn a_cell_meets_a_ball_about_the_light_at_the_mean_distance_of_its_rays() {
+        let mut cloud = Cloud::new(DVec3::ZERO);
+        let position = Vec3::new(0.1, -0.2, 0.15);
+        cloud.push(&Splat { position, radius: 0.5, cross_section: 0.1, kind: SplatKind::Medium, ..Splat::default() });
+        let params = Params::default();
+        let frame = Frame::new(DVec3::ZERO, [DVec3::X, DVec3::Y, DVec3::Z], 1.0);
+        let caster = Casters::new(&Scene::from(&cloud), &params).get(0, &frame, false);
+        // Cells so wide that they take 6 and 4 rays a side.
+        for n in [4, 8] {
+            let mapping = Octahedral::new(n);
+            let mut sampled = Sampled::default();
+            sampled.sweep(&mapping, &caster);
+            assert_eq!(sampled.cells.len(), (n * n) as usize);
+            for &(cell, weight, distance) in &sampled.cells {
+                let corner = Vec2::new((cell % n) as f32, (cell / n) as f32);
+                let (mut density, mut held, mut moment) = (0.0, 0.0, 0.0);
+                for k in 0..64 * 64 {
+                    let ray = mapping.ray(corner + (Vec2::new((k % 64) as f32, (k / 64) as f32) + 0.5) / 64.0);
+                    let here = f64::from(mapping.density(&ray));
+                    let [h, m] = along_ray(&caster, &ray);
+                    (density, held, moment) = (density + here, held + here * h, moment + here * m);
+                }
+                let off = |found: f32, truth: f64| (f64::from(found) / truth - 1.0).abs();
+                let errors = [off(weight, held / density), off(distance, moment / held)];
+                assert!(errors.iter().all(|e| *e < 3e-3), "cell {cell} of {n}²: {errors:?}");
+            }
+        }
     }
 }

@@ -77,6 +77,8 @@ impl Sampled {
         let [columns, rows] = mapping.size();
         let side = (mapping.measure((rows / 2) * columns + columns / 2).max(0.0) as f32).sqrt();
         let samples = (RESOLVED * side / NEAR).ceil().clamp(1.0, MOST_SAMPLES as f32) as u32;
+        // Several go in pairs, see [`place`].
+        let samples = if samples == 1 { 1 } else { samples.next_multiple_of(2) };
         self.window.clear();
         self.window.extend((0..columns * rows).map(|cell| [cell, cell % columns, cell / columns]));
         self.cells.clear();
