@@ -26,7 +26,7 @@ usage: cargo xtask COMMAND
   deny             licences and sources of all dependencies, by cargo-deny
   fuzz [--seconds N] [--record] [TARGET…]
                    all kinds of bytes as files, scenes and formulas, by cargo-fuzz on nightly; --record writes docs/robustness.md
-  mutants [--every N] [CRATE…]
+  mutants [--shard K/N] [CRATE…]
                    plants every hundredth fault that cargo-mutants knows in the stages, and says which no test sees
   tidy             the rules that the compiler does not know: heads, sizes, dependency direction, assets
   papers           writes docs/papers.md from docs/papers/*.toml

@@ -1,6 +1,6 @@
 //! `cargo xtask mutants`: faults planted in the stages one at a time, by cargo-mutants; a test must fail of each.
 //!
-//! A fixed sample, every n-th of all faults that it knows in these crates, and the tests of the crate that a fault lies in, without those of its
+//! A fixed sample, every n-th of all faults that it knows in these crates from one of the first n on, and the tests of the crate that a fault lies in, without those of its
 //! documentation. Each fault is a build, so this is no part of `cargo xtask ci`.
 
 use crate::repo::{Outcome, Repo};
@@ -17,17 +17,32 @@ const CRATES: [(&str, &str); 5] = [
     ("organza-reference", ""),
 ];
 
-/// One fault of so many is planted.
-const EVERY: usize = 100;
+/// Which faults are planted, unless asked otherwise: the first of each hundred.
+const SHARD: Shard = Shard { from: 0, every: 100 };
 /// Share of the faults that may survive.
 const MOST_SURVIVORS: f64 = 0.1;
 
-const USAGE: &str = "usage: cargo xtask mutants [--every N] [CRATE…]";
+const USAGE: &str = "usage: cargo xtask mutants [--shard K/N] [CRATE…]; K is less than N";
+
+/// Every n-th fault, from one of the first n on: two of the same n share none.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Shard {
+    from: usize,
+    every: usize,
+}
+
+impl Shard {
+    fn parse(word: &str) -> Option<Self> {
+        let (from, every) = word.split_once('/')?;
+        let shard = Self { from: from.parse().ok()?, every: every.parse().ok()? };
+        (shard.from < shard.every).then_some(shard)
+    }
+}
 
 /// What is asked for.
 #[derive(Debug, PartialEq)]
 struct Plan<'a> {
-    every: usize,
+    shard: Shard,
     /// Packages with their features.
     crates: Vec<(&'a str, &'a str)>,
 }
@@ -35,11 +50,11 @@ struct Plan<'a> {
 impl<'a> Plan<'a> {
     /// The words behind the command; `None` for what is none of them.
     fn parse(words: &[&'a str]) -> Option<Self> {
-        let mut plan = Self { every: EVERY, crates: Vec::new() };
+        let mut plan = Self { shard: SHARD, crates: Vec::new() };
         let mut words = words.iter();
         while let Some(word) = words.next() {
             match *word {
-                "--every" => plan.every = words.next()?.parse().ok().filter(|n| *n > 0)?,
+                "--shard" => plan.shard = Shard::parse(words.next()?)?,
                 name => plan.crates.push(*CRATES.iter().find(|(package, _)| *package == name)?),
             }
         }
@@ -58,8 +73,9 @@ pub(crate) fn run(repo: &Repo, words: &[&str]) -> Outcome {
         return Ok(format!("mutants: SKIPPED, missing: cargo-mutants; {install}"));
     }
     let mut all = Found::default();
+    let shard = format!("{}/{}", plan.shard.from, plan.shard.every);
     for (package, features) in plan.crates {
-        let (shard, to) = (format!("0/{}", plan.every), format!("target/mutants/{package}"));
+        let to = format!("target/mutants/{package}");
         fs::create_dir_all(repo.root.join(&to)).map_err(|e| format!("{to}: {e}"))?;
         let what = ["--package", package, "--features", features, "--shard", &shard, "--sharding", "round-robin"];
         let how = ["--no-shuffle", "--output", &to, "--", "--lib", "--tests"];
@@ -121,10 +137,12 @@ mod tests {
 
     #[test]
     fn words_are_understood_or_refused() {
-        assert_eq!(Plan::parse(&[]), Some(Plan { every: EVERY, crates: CRATES.to_vec() }));
-        let one = Plan { every: 7, crates: vec![CRATES[1]] };
-        assert_eq!(Plan::parse(&["--every", "7", "organza-hbsort"]), Some(one));
-        for wrong in [&["--every"][..], &["--every", "0"], &["hbsort"], &["--all"]] {
+        assert_eq!(Plan::parse(&[]), Some(Plan { shard: SHARD, crates: CRATES.to_vec() }));
+        let one = Plan { shard: Shard { from: 3, every: 7 }, crates: vec![CRATES[1]] };
+        assert_eq!(Plan::parse(&["--shard", "3/7", "organza-hbsort"]), Some(one));
+        for wrong in
+            [&["--shard"][..], &["--shard", "0"], &["--shard", "7/7"], &["--shard", "-1/7"], &["hbsort"], &["--all"]]
+        {
             assert_eq!(Plan::parse(wrong), None, "{wrong:?}");
         }
     }

@@ -41,6 +41,8 @@ struct View<'a> {
     frame: Frame,
     placed: Vec<Placed<'a>>,
     voxels: Vec<Vec<Voxel>>,
+    /// By volume and phase.
+    sections: Vec<Vec<Vec<f64>>>,
     polygons: Triangles<'a>,
     diffuse: Option<scatter::Diffuse>,
 }
@@ -135,8 +137,12 @@ impl<'a> View<'a> {
             places.map(voxel).collect()
         };
         let voxels = placed.iter().map(of).collect();
+        let kernel = params.sheets.kernel;
+        let footprint = Footprint { cutoff: (kernel.extent / kernel.sigma) as f32 };
+        let of_phases = |reach: f64| (0..PHASES).map(|phase| sections(phase, reach, &footprint)).collect();
+        let sections = placed.iter().map(|placed| of_phases(placed.reach / frame.slabs.width)).collect();
         let (polygons, diffuse) = (Triangles::new(input.polygons), scatter::Diffuse::new(volumes, lit, params));
-        Ok(Self { input, params, frame, placed, voxels, polygons, diffuse })
+        Ok(Self { input, params, frame, placed, voxels, sections, polygons, diffuse })
     }
 
     fn image(&self, camera: Camera) -> Image {
@@ -223,18 +229,16 @@ impl<'a> View<'a> {
 
     /// Voxels whose kernels reach a slab or one of its neighbours.
     fn voxels_of(&self, slab: u32) -> Vec<Vec<Reaching>> {
-        let kernel = self.params.sheets.kernel;
-        let footprint = Footprint { cutoff: (kernel.extent / kernel.sigma) as f32 };
-        let of = |(placed, voxels): (&Placed<'_>, &Vec<Voxel>)| {
+        let of = |(sections, voxels): (&Vec<Vec<f64>>, &Vec<Voxel>)| {
             let around = |place: u32| {
-                let all = sections(place % PHASES, placed.reach / self.frame.slabs.width, &footprint);
+                let all = &sections[(place % PHASES) as usize];
                 let of = |slab: u32| slab.checked_sub(place / PHASES).and_then(|behind| all.get(behind as usize));
                 let three = [slab.checked_sub(1).and_then(of), of(slab), of(slab + 1)];
                 three.iter().any(Option::is_some).then(|| three.map(|section| section.copied().unwrap_or(0.0)))
             };
             voxels.iter().filter_map(|(a, b, place, v)| Some((*a, *b, around(*place)?, *v))).collect()
         };
-        self.placed.iter().zip(&self.voxels).map(of).collect()
+        self.sections.iter().zip(&self.voxels).map(of).collect()
     }
 
     fn ray(&self, camera: &Camera, at: usize) -> Ray {
