@@ -146,7 +146,7 @@ impl Blocks {
 
     /// Bytes of the tables.
     pub(crate) fn bytes(&self) -> u64 {
-        (self.slots.len() * 8 + self.chunks.len() * 16) as u64
+        (size_of_val(&*self.slots) + size_of_val(&*self.chunks)) as u64
     }
 }
 
@@ -218,6 +218,7 @@ mod tests {
             assert!(matches!(refused, Some(Error::Parameter { .. })), "{broken}: {refused:?}");
         }
         let most = Blocks::new(2000, |_| 1.9e6).unwrap();
+        assert_eq!(most.bytes(), 8 * 2000 + 16 * most.chunks() as u64);
         assert!(most.bytes() < 16 << 20, "{}", most.bytes());
     }
 

@@ -365,6 +365,40 @@ fn a_patch_casts_the_shadows_of_a_point_and_whole_lights_are_refused() {
     assert!(refused.is_err_and(|e| e.to_string().contains("Light::points")));
 }
 
+/// Discs of the slow form: their optical depth summed over their plane is their cross-section, on rays of any angle; an opaque one ends rays on
+/// the area that it stands for.
+#[test]
+fn a_disc_of_the_reference_keeps_its_cross_section() {
+    let footprints = Params::default().footprints;
+    let normal = Vec3::new(0.6, 0.0, 0.8);
+    let tangent = Vec3::new(-0.8, 0.0, 0.6) * 0.5;
+    // Rays of a lattice meet an edge to within the root of their number.
+    for (kind, tangent, error) in [
+        (SplatKind::Surface, Vec3::ZERO, 1e-5),
+        (SplatKind::Surface, tangent, 1e-5),
+        (SplatKind::Opaque, Vec3::ZERO, 5e-4),
+        (SplatKind::Opaque, tangent, 5e-4),
+    ] {
+        let mut cloud = Cloud::new(DVec3::ZERO);
+        let position = Vec3::new(0.1, -0.2, 0.3);
+        cloud.push(&Splat { position, radius: 0.25, cross_section: 0.1, kind, normal, tangent, ..Splat::default() });
+        for along in [DVec3::Z, DVec3::new(0.3, 0.4, 0.8).normalize()] {
+            let [u, v] = [along.any_orthonormal_vector(), along.cross(along.any_orthonormal_vector())];
+            let (n, cell) = (400, 1.4 / 400.0);
+            let depth = |k: usize| {
+                let [x, y] = [k % n, k / n].map(|i| (i as f64 + 0.5) * cell - 0.7);
+                let middle = position.as_dvec3() + u * x + v * y;
+                tsm::reference::optical_depth(&cloud, &footprints, middle - along, middle + along)
+            };
+            let depths = (0..n * n).map(depth);
+            let sum: f64 = depths.map(|tau| if tau.is_infinite() { 1.0 } else { tau }).sum();
+            // The plane's area in the area across the rays.
+            let found = sum * cell * cell / along.dot(normal.as_dvec3());
+            assert!((found - 0.1).abs() < error, "{kind:?}, {tangent}, {along}: {found}");
+        }
+    }
+}
+
 #[test]
 fn papers_model_goes_dark_at_an_absorbance_of_two() {
     // Discs on one ray, each of size 1 and opacity 1 − e^−1: A = 0.632 each; light ends after the fourth (2.53 > 2).

@@ -60,6 +60,43 @@ fn look_ups_refuse_what_they_have_no_room_for() {
 }
 
 #[test]
+fn the_lists_that_look_ups_are_given_are_those_of_the_map() {
+    let map = deposits().into_map();
+    let recorded = record_look_up(Room::of(&map, 1).unwrap());
+    let uploads = recorded.map(&map).unwrap();
+    let receivers = recorded.receivers(&map, &uploads, &[]).unwrap();
+    let given = recorded.inputs(Some(&uploads), &receivers);
+    let [.., spans, distances, totals, opaque, _] = &given[..] else { panic!("{} buffers", given.len()) };
+    let numbers = |bytes: &[u8]| bytes.as_chunks::<4>().0.iter().map(|b| f32::from_le_bytes(*b)).collect::<Vec<_>>();
+    let spans: Vec<usize> = spans.1.as_chunks::<4>().0.iter().map(|b| u32::from_le_bytes(*b) as usize).collect();
+    let [distances, totals, opaque] = [distances, totals, opaque].map(|(_, bytes)| numbers(bytes));
+    let (channels, cells) = (map.channels(), map.cells() as usize);
+    assert_eq!((spans.len(), opaque.len(), totals.len()), (4 * cells, cells, channels * distances.len()));
+    let (mut listed, mut unit) = (0, 0.0);
+    for cell in 0..cells {
+        // Lists of media, then of surfaces, and where an opaque disc ends them.
+        let lists = [cell, cells + cell].map(|list| spans[2 * list]..spans[2 * list] + spans[2 * list + 1]);
+        let mut found: Vec<f64> = lists.iter().flat_map(|l| &distances[l.clone()]).map(|d| f64::from(*d)).collect();
+        found.sort_by(f64::total_cmp);
+        found.extend(Some(f64::from(opaque[cell])).filter(|d| d.is_finite()));
+        let expected = map.list(cell as u32);
+        assert_eq!(found.len(), expected.len(), "cell {cell}");
+        for (found, (expected, _)) in found.iter().zip(&expected) {
+            let ratio = expected / found;
+            assert!(unit == 0.0 || unit == ratio, "cell {cell}: {expected} in units of {unit}, not {found}");
+            unit = ratio;
+        }
+        let whole: f64 =
+            lists.iter().filter(|l| !l.is_empty()).map(|l| f64::from(totals[channels * (l.end - 1)])).sum();
+        let expected =
+            expected.iter().rev().find(|(_, sum)| sum[0].is_finite()).map_or(0.0, |(_, sum)| f64::from(sum[0]));
+        assert!((whole - expected).abs() <= 1e-5 * expected, "cell {cell}: {whole}, not {expected}");
+        listed += lists.iter().map(|l| l.len()).min().unwrap_or(0);
+    }
+    assert!(listed > 100, "{listed} entries beside others of the same cell");
+}
+
+#[test]
 fn they_are_without_fault_for_any_room() {
     for entries in [0, 1, 1023, 1025, 5_000_000, 100_000_000, u32::MAX] {
         for cells in [0, 1, 2, 257, 1 << 21] {
