@@ -150,3 +150,16 @@ pub(crate) fn resize<T: Clone + Default>(buffer: &mut Vec<T>, n: usize) -> Resul
     buffer.resize(n, T::default());
     Ok(())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_buffer_that_no_memory_holds_is_refused_and_empty() {
+        let mut buffer = vec![1u64; 8];
+        let refused = resize(&mut buffer, 1 << 60).unwrap_err();
+        assert!(matches!(refused, Error::Limit(Exceeded { needed: 0x8000_0000_0000_0000, .. })), "{refused}");
+        assert!(buffer.is_empty());
+    }
+}

@@ -44,6 +44,16 @@ fn bs01_papers_two_levels_disagree_where_one_index_does_not() {
     }
 }
 
+/// Where the slices are a square, both of the paper's levels are ten wide, and its buckets are slices.
+#[test]
+fn bs01_papers_two_levels_agree_where_slices_are_a_square() {
+    let depth: Vec<f64> = (0..1000).map(|i| (37 * i % 100) as f64 + 0.25 + 0.0005 * f64::from(i)).collect();
+    let paper = reference::paper_buckets(&depth, 0.0, 100.0, 1.0);
+    let mut expected: Vec<u32> = (0..1000).collect();
+    expected.sort_by_key(|i| (depth[*i as usize] as u32, *i));
+    assert_eq!(paper, reference::PaperBuckets { buckets: 10, out_of_range: 0, order: expected });
+}
+
 #[test]
 fn bs01_the_papers_example_has_9990_slices_in_twice_100_buckets() {
     // From 0.01 to 10 by 0.001; the number below 10 that an f32 holds, so that rounding up does not find one slice more.
@@ -144,6 +154,33 @@ fn bs04_crowded_depths_need_no_more_memory() {
         let slices = params(1e10, direction, false);
         assert_eq!(agrees(&depth, &slices, &mut scratch), Method::DepthBits);
         assert_eq!(agrees(&depth[..200_000], &slices, &mut scratch), Method::TwoLevels);
+    }
+}
+
+#[test]
+fn bs04_crowds_of_few_keys_have_slices_too() {
+    // Four crowds that no leaf holds among neighbouring keys, and as many splats on the keys around.
+    let depth: Vec<f32> = (0..600_000u64)
+        .map(|i| {
+            let key = if i % 2 == 0 { 1000 + i / 2 % 4 } else { rng::bits(8, 2, i, 0) % 3000 };
+            f32::from_bits(1.0f32.to_bits() + key as u32)
+        })
+        .collect();
+    let mut scratch = Scratch::new();
+    for (direction, keys) in DIRECTIONS.into_iter().zip([2.0, 700.0]) {
+        let thickness = keys * f64::from(f32::EPSILON);
+        assert_eq!(agrees(&depth, &params(thickness, direction, true), &mut scratch), Method::DepthBits);
+    }
+}
+
+#[test]
+fn bs04_more_than_half_of_the_splats_are_a_crowd() {
+    // A hundred slices in ten buckets, the first of which has a share of all.
+    for (share, expected) in [(0.35, Method::TwoLevels), (0.6, Method::DepthBits)] {
+        let at = |i: u64| rng::unit_f32(8, 3, i, 0) * if rng::unit_f32(8, 4, i, 0) < share { 9.0 } else { 100.0 };
+        let depth: Vec<f32> = (0..300_000).map(at).collect();
+        let params = params(1.0, Direction::FrontToBack, false);
+        assert_eq!(agrees(&depth, &params, &mut Scratch::new()), expected, "{share}");
     }
 }
 
