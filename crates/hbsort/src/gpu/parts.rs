@@ -151,7 +151,10 @@ fn merged(parts: &[Sorted]) -> Vec<u64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use splat_core::rng;
+    use crate::radix::key_of;
+    use crate::{Direction, Scratch, slice_cloud};
+    use splat_core::glam::{DVec3, Vec3};
+    use splat_core::{Camera, Projection, Splat, rng};
 
     #[test]
     fn parts_of_any_size_are_merged() {
@@ -168,6 +171,47 @@ mod tests {
             expected.sort_unstable();
             assert_eq!(merged(&parts), expected, "{sizes:?}");
         }
+    }
+
+    /// The bytes that a run would give for the splats `ids` of a cloud of which the camera at 0 sees all, along −z.
+    fn read_back(cloud: &Cloud, ids: &[u32]) -> [Vec<u8>; 3] {
+        let depth = |place: &u32| -cloud.position[ids[*place as usize] as usize].z;
+        let mut places: Vec<u32> = (0..ids.len() as u32).collect();
+        places.sort_by(|a, b| depth(a).total_cmp(&depth(b)));
+        let keys: Vec<u32> = places.iter().map(|place| key_of(depth(place))).collect();
+        let smallest = ids.iter().map(|id| cloud.radius[*id as usize]).fold(f32::INFINITY, f32::min);
+        let (kept, [near_key, far_key]) = (keys.len() as u32, [keys[0], keys[keys.len() - 1]]);
+        let state = SortState { kept, near_key, far_key, radius_key: key_of(smallest), ..bytemuck::Zeroable::zeroed() };
+        [bytemuck::bytes_of(&state), bytemuck::cast_slice(&keys), bytemuck::cast_slice(&places)].map(<[u8]>::to_vec)
+    }
+
+    #[test]
+    fn what_devices_read_back_is_joined_to_the_order_of_the_processor() {
+        let mut cloud = Cloud::new(DVec3::ZERO);
+        for i in 0..3000 {
+            let at = |k| rng::unit_f32(9, 1, i, k) - 0.5;
+            // Many are equally deep.
+            let position = Vec3::new(at(0), at(1), -1.0 - (200.0 * (at(2) + 0.5)).floor() / 64.0);
+            cloud.push(&Splat { position, radius: 0.05 + 0.01 * at(3), ..Splat::default() });
+        }
+        let sight = Projection::Orthographic { height: 4.0 };
+        let camera = Camera::look_at(DVec3::ZERO, DVec3::NEG_Z, DVec3::Y, sight, [64, 64]).unwrap();
+        let params = Params { direction: Direction::FrontToBack, exact: true, ..Params::default() };
+        let ids: Vec<u32> = (0..3000).filter(|i| i % 7 != 3).collect();
+        let expected = slice_cloud(&cloud, Some(&ids), &camera, &params, &mut Scratch::new()).unwrap();
+        let recorded = record(Capacities { splats: 3000, kept: 3000 });
+        for sizes in [&[ids.len()][..], &[1000, 1, ids.len() - 1001]] {
+            let mut rest = &ids[..];
+            let part = |size: &usize| {
+                let (own, others) = rest.split_at(*size);
+                rest = others;
+                let bytes = read_back(&cloud, own);
+                recorded.sorted([&bytes[0], &bytes[1], &bytes[2]], &cloud, Some(own)).unwrap()
+            };
+            let parts: Vec<Sorted> = sizes.iter().map(part).collect();
+            assert_eq!(join(&parts, &cloud, Some(&ids), &params).unwrap(), expected, "{sizes:?}");
+        }
+        assert!(expected.slice_indices.len() > 20 && expected.slices > 20);
     }
 
     #[test]
