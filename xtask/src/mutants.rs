@@ -1,7 +1,7 @@
 //! `cargo xtask mutants`: faults planted in the stages one at a time, by cargo-mutants; a test must fail of each.
 //!
-//! A fixed sample, every n-th of all faults that it knows in these crates from one of the first n on, and the tests of the crate that a fault lies in, without those of its
-//! documentation. Each fault is a build, so this is no part of `cargo xtask ci`.
+//! A fixed sample, every n-th of all faults that it knows in these crates from one of the first n on, and the tests of the crate that a fault
+//! lies in, without those of its documentation. Each fault is a build, so this is no part of `cargo xtask ci`.
 
 use crate::repo::{Outcome, Repo};
 use std::fs;

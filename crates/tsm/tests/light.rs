@@ -372,7 +372,7 @@ fn a_disc_of_the_reference_keeps_its_cross_section() {
     let footprints = Params::default().footprints;
     let normal = Vec3::new(0.6, 0.0, 0.8);
     let tangent = Vec3::new(-0.8, 0.0, 0.6) * 0.5;
-    // Rays of a lattice meet an edge to within the root of their number.
+    // Cells that an opaque edge cuts count whole or not at all.
     for (kind, tangent, error) in [
         (SplatKind::Surface, Vec3::ZERO, 1e-5),
         (SplatKind::Surface, tangent, 1e-5),
@@ -390,8 +390,8 @@ fn a_disc_of_the_reference_keeps_its_cross_section() {
                 let middle = position.as_dvec3() + u * x + v * y;
                 tsm::reference::optical_depth(&cloud, &footprints, middle - along, middle + along)
             };
-            let depths = (0..n * n).map(depth);
-            let sum: f64 = depths.map(|tau| if tau.is_infinite() { 1.0 } else { tau }).sum();
+            let covered = |tau: f64| if tau.is_infinite() { 1.0 } else { tau };
+            let sum: f64 = (0..n * n).map(depth).map(covered).sum();
             // The plane's area in the area across the rays.
             let found = sum * cell * cell / along.dot(normal.as_dvec3());
             assert!((found - 0.1).abs() < error, "{kind:?}, {tangent}, {along}: {found}");

@@ -41,7 +41,7 @@ struct View<'a> {
     frame: Frame,
     placed: Vec<Placed<'a>>,
     voxels: Vec<Vec<Voxel>>,
-    /// By volume and phase.
+    /// Of the kernels, by volume and phase.
     sections: Vec<Vec<Vec<f64>>>,
     polygons: Triangles<'a>,
     diffuse: Option<scatter::Diffuse>,
@@ -165,10 +165,9 @@ impl<'a> View<'a> {
         let mut polygons = vec![[0.0; 3]; n];
         let mut splats = self.input.splats.as_ref().map(|splats| Splats::new(splats, self, &light));
         let mut out = Picture { optical_depth: vec![0.0; n], color: vec![[0.0; 3]; n] };
+        // Of the slab before, the slab and the one behind.
+        let mut around = [Vec::new(), self.voxels_of(0), self.voxels_of(1)];
         for slab in 0..self.frame.slabs.count {
-            // Of the slab before, the slab and the one behind.
-            let around =
-                [-1, 0, 1].map(|n| slab.checked_add_signed(n).map(|slab| self.voxels_of(slab)).unwrap_or_default());
             let mut shown = Vec::new();
             if let Some(splats) = &mut splats {
                 splats.enter(slab, self, (&light, &sums), lit);
@@ -187,6 +186,8 @@ impl<'a> View<'a> {
             }
             self.light_polygons((&hits, slab), carried, (lit, with_ambient), &mut polygons);
             self.attenuate(&light, &around[1], slab, &mut sums);
+            around.rotate_left(1);
+            around[2] = self.voxels_of(slab + 2);
         }
         let last = self.frame.slabs.count;
         if let Some(splats) = &mut splats {
