@@ -36,6 +36,11 @@ impl Picture {
         values.iter().map(|v| f64::from(*v)).collect()
     }
 
+    /// Opacity of what lies before the background: `A`, or `opacity.A` where the background is part of the picture.
+    pub fn opacity(&self) -> Vec<f64> {
+        self.channel(if self.channels.contains_key("opacity.A") { "opacity.A" } else { "A" })
+    }
+
     /// Names of all channels in alphabetical order.
     pub fn names(&self) -> Vec<String> {
         self.channels.keys().cloned().collect()

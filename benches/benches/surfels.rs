@@ -56,7 +56,7 @@ impl Scene {
         let order = hbsort::slice_cloud(&cloud, None, &camera, &params, &mut hbsort::Scratch::default());
         let ids = order.expect("an order").input_from_sorted;
         let values = cloud.normal.iter().flat_map(|n| (*n * 0.5 + 0.5).to_array()).collect();
-        let materials = vec![Material { index: [index; 3], ..Material::default() }];
+        let materials = vec![Material { index: Some([index; 3]), ..Material::default() }];
         Self { cloud, camera, ids, values, footprints: FootprintStack::default(), materials }
     }
 

@@ -472,7 +472,6 @@ fn the_samplers_of_implicit_surfaces_are_knobs_of_particles() {
 }
 
 /// What takes long and rarely fails where the others hold.
-#[cfg(feature = "deep")]
 mod deep {
     use super::*;
 

@@ -49,14 +49,14 @@ fn a_disc_with_a_tangent_has_the_opacity_of_its_ellipse_in_every_pixel() {
         })
         .collect();
     for technique in ["points", "reference", "sheets"] {
-        let alpha = draw_in(folder.path(), &scene(3.0, keys), &["--technique", technique]).channel("A");
+        let alpha = draw_in(folder.path(), &scene(3.0, keys), &["--technique", technique]).opacity();
         let off = largest_difference(&alpha, &expected);
         assert!(off < 2e-5, "{technique}: {off:e}");
     }
     // By surfels and by particles it is as long and as narrow: second moments of what is covered, in its own axes.
     for technique in ["surfels", "particles"] {
         let more = ["--technique", technique, "--set", "render.particles.repeat_level=400"];
-        let alpha = draw_in(folder.path(), &scene(3.0, keys), &more).channel("A");
+        let alpha = draw_in(folder.path(), &scene(3.0, keys), &more).opacity();
         let moments = |alpha: &[f64]| {
             let (mut all, mut sums) = (0.0, [0.0; 3]);
             for (k, a) in alpha.iter().enumerate() {
@@ -82,7 +82,7 @@ fn ellipses_of_cells_keep_lines_of_a_scan_sharp_and_their_plane_even() {
     write(folder.path(), &text);
     let keys = "opacity = 0.6\nunlit = true\ndiscs = 'elliptical'";
     let elliptical = draw_in(folder.path(), &scene(1.0, keys), &[]);
-    let (mean, ripple) = mean_and_ripple(&window(&elliptical.channel("A"), 48, 8..40, 8..40));
+    let (mean, ripple) = mean_and_ripple(&window(&elliptical.opacity(), 48, 8..40, 8..40));
     assert!((mean - 0.6).abs() < 1e-3 && ripple < 2e-3, "{mean}, {ripple:e}");
     // Of a thin plane the colour in a pixel is the mean of those of points by their kernels, 0.8 steps wide along and across.
     let thin = |keys: &str| {
@@ -178,7 +178,7 @@ fn a_transfer_function_makes_points_opaque_and_thick_by_a_column() {
         )
     };
     let halves = |keys: &str, technique: &str| {
-        let alpha = draw_in(folder.path(), &scene(2.0, keys), &["--technique", technique]).channel("A");
+        let alpha = draw_in(folder.path(), &scene(2.0, keys), &["--technique", technique]).opacity();
         [4..18, 30..44].map(|columns| mean_and_ripple(&window(&alpha, 48, columns, 8..40)).0)
     };
     for technique in ["points", "reference", "sheets", "surfels"] {
@@ -225,7 +225,7 @@ fn masses_of_a_simulation_absorb_alike_however_dense_they_lie() {
         }
         write(folder.path(), &text);
         let picture = draw_in(folder.path(), &scene(2.0, "as = 'medium'\nextinction = 0.5"), &[]);
-        picture.channel("A").iter().map(|a| -(1.0 - a).ln()).sum::<f64>() * (2.0f64 / 48.0).powi(2)
+        picture.opacity().iter().map(|a| -(1.0 - a).ln()).sum::<f64>() * (2.0f64 / 48.0).powi(2)
     };
     // Σ τ·(area of a pixel) = κ·Σ m, however much room they have.
     for size in [0.5, 1.0, 1.4] {

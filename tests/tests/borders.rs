@@ -16,7 +16,7 @@ fn covered(objects: &str, technique: &str) -> f64 {
          [render]\nantialias = 2\ntechnique = '{technique}'\n{objects}"
     );
     let side = HEIGHT / f64::from(SIZE);
-    draw(&text, &[]).channel("A").iter().sum::<f64>() * side * side
+    draw(&text, &[]).opacity().iter().sum::<f64>() * side * side
 }
 
 #[test]
@@ -72,7 +72,7 @@ fn nothing_shows_between_a_silhouette_and_the_wall_behind() {
              [[object]]\nname = 'wall'\n\
              rectangle = {{ center = [0, 0, -2], u = [2, 0, 0], v = [0, 2, 0], spacing = 0.1 }}\n"
         );
-        let least = draw(&scene, &[]).channel("A").into_iter().fold(1.0, f64::min);
+        let least = draw(&scene, &[]).opacity().into_iter().fold(1.0, f64::min);
         assert!(least > 0.999, "h {spacing}: {least}");
     }
 }
@@ -107,7 +107,7 @@ fn a_coarse_translucent_mesh_hides_what_its_faces_hide() {
                  [[object]]\nname = 'octahedron'\nmesh = '{}'\nspacing = 0.02\nopacity = 0.5\n",
                 path.display()
             );
-            let alpha = draw(&scene, &[]).channel("A");
+            let alpha = draw(&scene, &[]).opacity();
             let mean = alpha.iter().sum::<f64>() / alpha.len() as f64;
             let expected = 1.0 - 0.5f64.powi(crossings);
             assert!((mean - expected).abs() < bound, "{technique}, {crossings} crossings: {mean}");
@@ -134,7 +134,7 @@ fn a_coarse_mesh_with_smooth_normals_has_no_holes() {
             let cosines = faces.map(|n| (splat_core::glam::DVec3::from_array(n) / 3f64.sqrt()).dot(towards).abs());
             let area = 0.5 * cosines.sum::<f64>() * 0.75f64.sqrt();
             let side = 2.6 / f64::from(SIZE);
-            let found = image.channel("A").iter().sum::<f64>() * side * side;
+            let found = image.opacity().iter().sum::<f64>() * side * side;
             // Discs reach beyond sharp edges, half a spacing at most; about four edges of √2 bound the silhouette.
             let rim = 4.0 * 2f64.sqrt();
             assert!(found > area - 0.1 * side * rim, "h {spacing} from {position:?}: {found}, not {area}");

@@ -19,7 +19,7 @@ fn slab_has_the_transmittance_of_its_optical_depth() {
     for (footprint, most) in [(0, 1e-3), (2, 1e-5)] {
         for tau in [0.01f64, 1.0, 5.0] {
             let picture = draw(&slab(tau, footprint), &[]);
-            let alpha = window(&picture.channel("A"), 96, 24..72, 24..72);
+            let alpha = window(&picture.opacity(), 96, 24..72, 24..72);
             let (mean, ripple) = mean_and_ripple(&alpha);
             let error = (1.0 - mean - (-tau).exp()).abs();
             assert!(error < 1e-5, "τ {tau}, footprint {footprint}: mean off by {error:e}");
@@ -32,7 +32,7 @@ fn slab_has_the_transmittance_of_its_optical_depth() {
 fn slab_in_perspective_follows_the_length_of_its_rays() {
     let text = slab(1.0, 0).replace("orthographic = 2.0", "fov_y = 30");
     let picture = draw(&text, &[]);
-    let alpha = picture.channel("A");
+    let alpha = picture.opacity();
     let focal = 48.0 / 15f64.to_radians().tan();
     for y in 10..86u32 {
         for x in 10..86u32 {
@@ -40,36 +40,6 @@ fn slab_in_perspective_follows_the_length_of_its_rays() {
             let exact = 1.0 - (-(1.0 + u * u + v * v).sqrt()).exp();
             let error = (alpha[(y * 96 + x) as usize] - exact).abs();
             assert!(error < 1e-3, "pixel {x} {y}: {error:e}");
-        }
-    }
-}
-
-/// A border across cells, and one beside all that is seen.
-#[test]
-fn what_a_cut_leaves_of_a_slab_and_a_ball_has_its_optical_depth_by_every_technique() {
-    let clip = "clip = [{ normal = [0, 0, 2], point = [9, 0, 0.0875] }, { box = [[-1.5, -1.5, -9], [1.5, 1.5, 9]] }]\n";
-    let ball = format!(
-        "{}[[object]]\nname = 'ball'\n\
-         medium_ball = {{ center = [0, 0, 0], radius = 8, extinction = 0.25, spacing = 0.4 }}\n",
-        parallel_view(2.0, 96)
-    );
-    // Of a ball so large its chord hardly differs among the pixels; cells at its rim count by samples.
-    let chord = |at: usize| {
-        let [x, y] = [at % 48, at / 48].map(|k| (k as f64 - 23.5) / 48.0);
-        (64.0 - x * x - y * y).sqrt() + 0.0875
-    };
-    let through: f64 = (0..48 * 48).map(|at| (-0.25 * chord(at)).exp()).sum::<f64>() / (48.0 * 48.0);
-    let cases = [(slab(2.0, 0), (-4.0 * 0.3375f64).exp(), 0.0, "the slab"), (ball, through, 1e-3, "the ball")];
-    for (text, exact, least, what) in cases {
-        for (technique, most) in [("points", 2e-5), ("reference", 2e-5), ("sheets", 1e-3), ("particles", 4e-3)] {
-            // Most of so large a ball lies beside the picture.
-            if technique == "particles" && least > 0.0 {
-                continue;
-            }
-            let picture = draw(&format!("{text}{clip}[render]\ntechnique = '{technique}'\n"), &[]);
-            let (mean, _) = mean_and_ripple(&window(&picture.channel("A"), 96, 24..72, 24..72));
-            let error = (1.0 - mean - exact).abs();
-            assert!(error < f64::max(most, least), "{technique}: {what} is off by {error:e}");
         }
     }
 }
@@ -177,7 +147,7 @@ fn ball_has_the_chord_convolved_with_its_kernel() {
         parallel_view(2.6, 96)
     );
     let picture = draw(&text, &[]);
-    let alpha = picture.channel("A");
+    let alpha = picture.opacity();
     let reach = f64::from(Footprint::default().radius_for_spacing(spacing as f32));
     let (mut errors, mut inside, mut rim) = (Vec::new(), 0.0f64, 0.0f64);
     for y in 0..96u32 {
@@ -202,10 +172,46 @@ fn fig_10_the_first_slices_alone_are_the_farthest_part() {
     // Ten lattice layers, ten slices; the first five from the back hold half of the optical depth.
     let text = slab(1.0, 0)
         + "[render]\npoints = { direction = 'back_to_front', slice_thickness = 0.0499, first_slices = 5 }\n";
-    let alpha = window(&draw(&text, &[]).channel("A"), 96, 24..72, 24..72);
+    let alpha = window(&draw(&text, &[]).opacity(), 96, 24..72, 24..72);
     let (mean, _) = mean_and_ripple(&alpha);
     assert!((1.0 - mean - (-0.5f64).exp()).abs() < 1e-5, "mean {mean}");
     let depth = draw(&(text.replace("'back_to_front'", "'front_to_back'")), &["--layers", "depth"]);
     let (nearest, _) = mean_and_ripple(&window(&depth.channel("depth.mean.Z"), 96, 24..72, 24..72));
     assert!((nearest - (5.0 - 0.125)).abs() < 0.02, "front to back the first slices are the near half: {nearest}");
+}
+
+/// What takes long and rarely fails where the others hold: `cargo xtask deep`.
+mod deep {
+    use super::*;
+
+    /// A border across cells, and one beside all that is seen.
+    #[test]
+    fn what_a_cut_leaves_of_a_slab_and_a_ball_has_its_optical_depth_by_every_technique() {
+        let clip =
+            "clip = [{ normal = [0, 0, 2], point = [9, 0, 0.0875] }, { box = [[-1.5, -1.5, -9], [1.5, 1.5, 9]] }]\n";
+        let ball = format!(
+            "{}[[object]]\nname = 'ball'\n\
+             medium_ball = {{ center = [0, 0, 0], radius = 8, extinction = 0.25, spacing = 0.4 }}\n",
+            parallel_view(2.0, 96)
+        );
+        // Of a ball so large its chord hardly differs among the pixels; cells at its rim count by samples.
+        let chord = |at: usize| {
+            let [x, y] = [at % 48, at / 48].map(|k| (k as f64 - 23.5) / 48.0);
+            (64.0 - x * x - y * y).sqrt() + 0.0875
+        };
+        let through: f64 = (0..48 * 48).map(|at| (-0.25 * chord(at)).exp()).sum::<f64>() / (48.0 * 48.0);
+        let cases = [(slab(2.0, 0), (-4.0 * 0.3375f64).exp(), 0.0, "the slab"), (ball, through, 1e-3, "the ball")];
+        for (text, exact, least, what) in cases {
+            for (technique, most) in [("points", 2e-5), ("reference", 2e-5), ("sheets", 1e-3), ("particles", 4e-3)] {
+                // Most of so large a ball lies beside the picture.
+                if technique == "particles" && least > 0.0 {
+                    continue;
+                }
+                let picture = draw(&format!("{text}{clip}[render]\ntechnique = '{technique}'\n"), &[]);
+                let (mean, _) = mean_and_ripple(&window(&picture.opacity(), 96, 24..72, 24..72));
+                let error = (1.0 - mean - exact).abs();
+                assert!(error < f64::max(most, least), "{technique}: {what} is off by {error:e}");
+            }
+        }
+    }
 }

@@ -420,7 +420,6 @@ fn messages_repeat_200_characters_at_most_of_the_command_line() {
 }
 
 /// What takes long and rarely fails where the others hold.
-#[cfg(feature = "deep")]
 mod deep {
     use super::*;
 

@@ -140,3 +140,26 @@ fn a_picture_of_one_colour_is_told_with_an_exposure() {
     let bright = LAMP.replace("9, 9, 9", "1e9, 1e9, 1e9") + "[background]\ncolor = [9, 9, 9]\n";
     one(&scene(AHEAD, &bright, ""), "the picture is all white: its darkest radiance is");
 }
+
+#[test]
+fn objects_that_are_smaller_than_a_pixel_are_told_with_what_to_do() {
+    // A head in metres beside a stadium.
+    let far = "target = [0, 0, 0]\nfov_y = 35";
+    let small = scene(far, LAMP, "").replace("radius = 0.5, spacing = 0.1", "radius = 0.005, spacing = 0.001");
+    one(&small, "object 'fog' is 0.1");
+    one(&small, "cannot be seen: it is 0.02");
+    one(&small, "and 'wall' 3.1; scale it by about 1");
+    // Alone there is no other to stand beside.
+    let alone = small.replace("[[object]]\nname = 'wall'", "[[object]]\nname = 'wall'\nvisible = false");
+    let found = warnings(&alone);
+    assert!(found.iter().any(|w| w.contains("move the camera nearer, or set camera = \"auto\"")), "{found:?}");
+}
+
+#[test]
+fn a_picture_of_one_colour_is_told() {
+    let text =
+        scene(AHEAD, "[background]\ncolor = [0.2, 0.3, 0.4]\n[material.x]\nshading = 'unlit'\n", "material = 'x'");
+    let even = text.replace("spacing = 0.1 }\n", "spacing = 0.1 }\ncolor = [0.2, 0.3, 0.4]\n");
+    let even = even.replace("[[object]]\nname = 'fog'", "[[object]]\nname = 'fog'\nvisible = false");
+    one(&even, "the picture is all of one colour");
+}

@@ -45,7 +45,7 @@ fn db15_a_constant_map_is_that_colour_bit_for_bit_in_every_technique() {
         let by = |background: &str| drawn(folder.path(), background, OBJECTS, &arguments);
         let (color, map) = (by("color = [0.5, 0.25, 1.25]"), by("environment = 'constant.hdr'\nrotate = 77"));
         assert_eq!(map, color, "{technique}");
-        assert!(map.channel("A").contains(&0.0) && map.channel("background.B").contains(&1.25), "{technique}");
+        assert!(map.opacity().contains(&0.0) && map.channel("background.B").contains(&1.25), "{technique}");
     }
     let error = ["--technique", "particles", "--layers", "std_error", "--set", "render.particles.target_error=0.05"];
     let by = |background: &str| drawn(folder.path(), background, OBJECTS, &error);
@@ -63,7 +63,7 @@ fn ou10_lights_alone_and_objects_without_a_point_leave_the_background_as_it_is()
     for technique in TECHNIQUES {
         for objects in ["", lamp, &points] {
             let picture = drawn(folder.path(), "color = [0.5, 0.25, 1.25]", objects, &["--technique", technique]);
-            for (channel, expected) in [("R", 0.5), ("G", 0.25), ("B", 1.25), ("A", 0.0)] {
+            for (channel, expected) in [("R", 0.5), ("G", 0.25), ("B", 1.25), ("opacity.A", 0.0)] {
                 assert_eq!(picture.channel(channel), vec![expected; 24 * 18], "{technique}: {channel}, {objects}");
             }
         }
@@ -99,7 +99,7 @@ fn each_pixel_sees_its_own_direction_with_its_footprint() {
         let off = largest_difference(&picture.channel(channel), &exact);
         assert!(off < 1e-6, "{channel}: {off:e}");
     }
-    assert!(picture.channel("A").iter().all(|a| *a == 0.0));
+    assert!(picture.opacity().iter().all(|a| *a == 0.0));
 }
 
 #[test]

@@ -207,7 +207,6 @@ fn a_material_does_not_tint_data_with_colours_by_either_technique() {
 }
 
 /// What takes long and rarely fails where the others hold.
-#[cfg(feature = "deep")]
 mod deep {
     #[test]
     fn each_changes_what_is_seen_or_is_refused_by_every_technique() {

@@ -39,7 +39,7 @@ fn fog(extinction: f64, spacing: f64) -> String {
 }
 
 fn alpha(picture: &Picture) -> Vec<f64> {
-    picture.channel("A")
+    picture.opacity()
 }
 
 /// Largest relative error of the transmittance from the eye at `z` to the end of the fog.
@@ -145,7 +145,6 @@ fn a_plane_through_the_eye_plane_is_seen_before_it() {
 }
 
 /// What takes long and rarely fails where the others hold.
-#[cfg(feature = "deep")]
 mod deep {
     use super::*;
 

@@ -84,7 +84,7 @@ fn the_scene_that_init_writes_gives_the_bytes_that_render_gives_of_the_file() {
 
 /// Rows and columns beside which nothing is seen, as shares of the picture.
 fn reach(picture: &organza_tests::Picture) -> [f64; 2] {
-    let alpha = picture.channel("A");
+    let alpha = picture.opacity();
     let (width, height) = (picture.size[0] as usize, picture.size[1] as usize);
     let seen = |i: &usize| alpha[*i] > 0.05;
     let from_middle = |at: usize, n: usize| ((at as f64 + 0.5) / n as f64 - 0.5).abs() * 2.0;
@@ -104,7 +104,7 @@ fn every_kind_of_data_is_seen_whole_large_in_the_middle_and_neither_black_nor_wh
         let [x, y] = reach(&picture);
         let most = x.max(y);
         assert!((0.7..0.99).contains(&most), "{file}: {x} {y}");
-        let (green, alpha) = (picture.channel("G"), picture.channel("A"));
+        let (green, alpha) = (picture.channel("G"), picture.opacity());
         let solid: Vec<f64> = green.iter().zip(&alpha).filter(|(_, a)| **a > 0.9).map(|(g, _)| *g).collect();
         assert!(solid.len() > 100, "{file}: {} solid pixels", solid.len());
         let mean = solid.iter().sum::<f64>() / solid.len() as f64;
@@ -172,7 +172,7 @@ fn data_without_extent_is_drawn_all_the_same() {
     place.write("flat.nrrd", ball_volume(|_| 7.0));
     for file in ["one.xyz", "same.xyz", "line.xyz", "plane.obj", "flat.nrrd"] {
         place.expect(0, &["render", file, "-o", "a.exr", "--force", "--size", "30x20"], "");
-        let seen = picture_of(&place.path("a.exr")).channel("A").iter().filter(|a| **a > 0.3).count();
+        let seen = picture_of(&place.path("a.exr")).opacity().iter().filter(|a| **a > 0.3).count();
         assert!((10..600).contains(&seen), "{file}: {seen} pixels");
     }
 }

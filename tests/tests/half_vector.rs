@@ -264,7 +264,6 @@ fn a_cube_of_translucent_triangles_agrees_with_points_and_stays_discs_for_a_foot
 }
 
 /// What takes long and rarely fails where the others hold.
-#[cfg(feature = "deep")]
 mod deep {
     use super::*;
 

@@ -28,7 +28,7 @@ fn effects_sum_to_the_beauty_of_a_picture_without_them() {
     let text = parallel_view(2.0, 40) + EVERY_EFFECT;
     for technique in TECHNIQUES {
         let plain = draw(&text, technique);
-        assert_eq!(plain.names(), ["A", "B", "G", "R"]);
+        assert_eq!(plain.names(), ["A", "B", "G", "R", "opacity.A"]);
         let apart = draw(&text, &[technique, &["--layers", "effects"]].concat());
         for c in ["R", "G", "B"] {
             let largest = largest_difference(&sum_of_effects(&apart, c), &plain.channel(c));
@@ -177,36 +177,41 @@ fn normals(picture: &Picture) -> Vec<DVec3> {
     (0..x.len()).map(|k| DVec3::new(x[k], y[k], z[k])).collect()
 }
 
-#[test]
-fn a_wall_s_normal_keeps_its_direction_behind_coloured_extinction() {
-    // Optical depth 1 in green, 2 in red, ¼ in blue; a normal is no colour and takes green's weight as a whole.
-    let head = parallel_view(1.0, 32) + "[material.red]\nextinction_rgb = [2, 1, 0.25]\n";
-    let wall = "[[object]]\nname = 'wall'\n\
-                rectangle = { center = [0, 0, -1], u = [1.5, 0, 0.5], v = [0, 1.5, 0.3], spacing = 0.025 }\n";
-    let slanted = DVec3::new(1.5, 0.0, 0.5).cross(DVec3::new(0.0, 1.5, 0.3)).normalize();
-    let through = (-1f64).exp();
-    let fog = "medium_box = { min = [-1, -1, -0.25], max = [1, 1, 0.25], extinction = 2.0, spacing = 0.05 }";
-    let sheet = format!(
-        "opacity = {:?}\nrectangle = {{ center = [0, 0, 0], u = [1, 0, 0], v = [0, 1, 0], spacing = 0.025 }}",
-        1.0 - through
-    );
-    for (front, own) in [(fog, DVec3::ZERO), (&sheet, DVec3::Z)] {
-        let text = format!("{head}[[object]]\nname = 'front'\nmaterial = 'red'\nfootprint = 2\n{front}\n{wall}");
-        for layers in ["normal", "normal,effects,shadow"] {
-            let seen = normals(&draw(&text, &["--layers", layers]));
-            let expected = own * (1.0 - through) + slanted * through;
-            let off = seen.iter().map(|n| (*n - expected).length()).fold(0.0, f64::max);
-            assert!(off < 1e-3, "points, {layers}, {front}: off by {off}, {} for {expected}", seen[0]);
-            // Each particle picture has its own share of green, and nothing across the plane of both normals.
-            let arguments = ["--technique", "particles", "--repeat-level", "400", "--layers", layers];
-            let seen = normals(&draw(&text, &arguments));
-            let across = own.cross(slanted);
-            let across = if across == DVec3::ZERO { slanted.any_orthonormal_vector() } else { across.normalize() };
-            let off = seen.iter().map(|n| n.dot(across).abs()).fold(0.0, f64::max);
-            let mean = seen.iter().sum::<DVec3>() / seen.len() as f64;
-            assert!(off < 1e-3, "particles, {layers}, {front}: across by {off}");
-            // 256 pixels of four samples of 400 sets: five standard errors are 4·10⁻³.
-            assert!((mean - expected).length() < 4e-3, "particles, {layers}, {front}: {mean} for {expected}");
+/// What takes long and rarely fails where the others hold: `cargo xtask deep`.
+mod deep {
+    use super::*;
+
+    #[test]
+    fn a_wall_s_normal_keeps_its_direction_behind_coloured_extinction() {
+        // Optical depth 1 in green, 2 in red, ¼ in blue; a normal is no colour and takes green's weight as a whole.
+        let head = parallel_view(1.0, 32) + "[material.red]\nextinction_rgb = [2, 1, 0.25]\n";
+        let wall = "[[object]]\nname = 'wall'\n\
+                    rectangle = { center = [0, 0, -1], u = [1.5, 0, 0.5], v = [0, 1.5, 0.3], spacing = 0.025 }\n";
+        let slanted = DVec3::new(1.5, 0.0, 0.5).cross(DVec3::new(0.0, 1.5, 0.3)).normalize();
+        let through = (-1f64).exp();
+        let fog = "medium_box = { min = [-1, -1, -0.25], max = [1, 1, 0.25], extinction = 2.0, spacing = 0.05 }";
+        let sheet = format!(
+            "opacity = {:?}\nrectangle = {{ center = [0, 0, 0], u = [1, 0, 0], v = [0, 1, 0], spacing = 0.025 }}",
+            1.0 - through
+        );
+        for (front, own) in [(fog, DVec3::ZERO), (&sheet, DVec3::Z)] {
+            let text = format!("{head}[[object]]\nname = 'front'\nmaterial = 'red'\nfootprint = 2\n{front}\n{wall}");
+            for layers in ["normal", "normal,effects,shadow"] {
+                let seen = normals(&draw(&text, &["--layers", layers]));
+                let expected = own * (1.0 - through) + slanted * through;
+                let off = seen.iter().map(|n| (*n - expected).length()).fold(0.0, f64::max);
+                assert!(off < 1e-3, "points, {layers}, {front}: off by {off}, {} for {expected}", seen[0]);
+                // Each particle picture has its own share of green, and nothing across the plane of both normals.
+                let arguments = ["--technique", "particles", "--repeat-level", "400", "--layers", layers];
+                let seen = normals(&draw(&text, &arguments));
+                let across = own.cross(slanted);
+                let across = if across == DVec3::ZERO { slanted.any_orthonormal_vector() } else { across.normalize() };
+                let off = seen.iter().map(|n| n.dot(across).abs()).fold(0.0, f64::max);
+                let mean = seen.iter().sum::<DVec3>() / seen.len() as f64;
+                assert!(off < 1e-3, "particles, {layers}, {front}: across by {off}");
+                // 256 pixels of four samples of 400 sets: five standard errors are 4·10⁻³.
+                assert!((mean - expected).length() < 4e-3, "particles, {layers}, {front}: {mean} for {expected}");
+            }
         }
     }
 }

@@ -6,16 +6,16 @@ mod animation;
 mod attributes;
 mod bad_scenes;
 mod borders;
+mod bright_and_dim;
 mod brownian_steps;
 mod cache;
 mod closed_forms;
 mod command;
+mod compositing;
 mod converted;
 mod doubts;
 mod environment;
 mod every_key;
-#[cfg(all(target_os = "linux", feature = "deep"))]
-mod every_scene;
 mod exact_particles;
 mod extract;
 mod eye_inside;
@@ -36,6 +36,7 @@ mod meshes;
 mod only_what_is_called_for;
 mod orders;
 mod output;
+mod pairs_of_techniques;
 mod particle_layers;
 mod particles;
 mod point_columns;
@@ -55,3 +56,9 @@ mod techniques;
 mod textured_lights;
 mod triangles;
 mod truth;
+
+/// What takes long and rarely fails where the others hold: `cargo xtask deep`.
+mod deep {
+    #[cfg(target_os = "linux")]
+    mod every_scene;
+}

@@ -91,7 +91,7 @@ impl Object {
     fn seen(self) -> Vec<f64> {
         let folder = tempfile::tempdir().unwrap();
         let scene = parallel_view(HEIGHT, self.size) + &self.source(folder.path(), [0.0, 0.0]);
-        draw_in(folder.path(), &scene, &[]).channel("A").iter().map(|a| 1.0 - a).collect()
+        draw_in(folder.path(), &scene, &[]).opacity().iter().map(|a| 1.0 - a).collect()
     }
 
     /// Share of light that arrives at a wall behind the object.
@@ -116,7 +116,7 @@ impl Object {
         let scene = parallel_view(HEIGHT, self.size) + &self.source(folder.path(), [0.0, 0.0]);
         techniques.map(|technique| {
             let picture = draw_in(folder.path(), &scene, &["--technique", technique]);
-            picture.channel("A").iter().map(|a| 1.0 - a).collect()
+            picture.opacity().iter().map(|a| 1.0 - a).collect()
         })
     }
 
@@ -133,7 +133,7 @@ impl Object {
             &scene,
             &["--technique", "particles", "--set", &sets, "--seed", &seed, "--layers", "std_error"],
         );
-        (picture.channel("A").iter().map(|a| 1.0 - a).collect(), picture.channel("std_error.A"))
+        (picture.opacity().iter().map(|a| 1.0 - a).collect(), picture.channel("std_error.A"))
     }
 
     /// [`squares`] of [`Object::seen_as_particles`], and the variance of each.
@@ -303,19 +303,6 @@ fn compare_surfels(shape: Shape) {
 }
 
 #[test]
-fn sheets_of_solids_and_of_a_mesh() {
-    compare_sheets(Shape::Ball, &[Form::Lattice], true);
-    compare_sheets(Shape::Gyroid, &SOLIDS, true);
-    // Its triangles stay what they are.
-    compare_sheets(Shape::Ball, &[Form::Mesh], false);
-}
-
-#[test]
-fn surfels_of_a_ball() {
-    compare_surfels(Shape::Ball);
-}
-
-#[test]
 fn particles_of_a_ball() {
     compare_particles(Shape::Ball, &[Form::Lattice], true);
 }
@@ -332,16 +319,6 @@ fn a_tenth_less_extinction_is_told_apart_from_particles() {
 }
 
 #[test]
-fn shells_of_a_ball() {
-    compare(Shape::Ball, &SHELLS, false);
-}
-
-#[test]
-fn solid_balls() {
-    compare(Shape::Ball, &[Form::Grid, Form::Density, Form::Lattice], true);
-}
-
-#[test]
 fn another_object_is_told_apart() {
     let image = |shape| squares(&Object { shape, form: Form::Density, size: SIZES[0] }.seen(), SIZES[0]);
     let (ball, gyroid) = (image(Shape::Ball), image(Shape::Gyroid));
@@ -350,13 +327,7 @@ fn another_object_is_told_apart() {
     assert!(rmse(&ball, &thinner) > 0.01, "a tenth less extinction is told apart");
 }
 
-#[test]
-fn solid_tori() {
-    compare(Shape::Torus, &SOLIDS, true);
-}
-
 /// What takes long and rarely fails where the others hold.
-#[cfg(feature = "deep")]
 mod deep {
     use super::*;
 
@@ -395,5 +366,33 @@ mod deep {
     #[test]
     fn surfels_of_a_torus() {
         compare_surfels(Shape::Torus);
+    }
+
+    #[test]
+    fn sheets_of_solids_and_of_a_mesh() {
+        compare_sheets(Shape::Ball, &[Form::Lattice], true);
+        compare_sheets(Shape::Gyroid, &SOLIDS, true);
+        // Its triangles stay what they are.
+        compare_sheets(Shape::Ball, &[Form::Mesh], false);
+    }
+
+    #[test]
+    fn shells_of_a_ball() {
+        compare(Shape::Ball, &SHELLS, false);
+    }
+
+    #[test]
+    fn surfels_of_a_ball() {
+        compare_surfels(Shape::Ball);
+    }
+
+    #[test]
+    fn solid_balls() {
+        compare(Shape::Ball, &[Form::Grid, Form::Density, Form::Lattice], true);
+    }
+
+    #[test]
+    fn solid_tori() {
+        compare(Shape::Torus, &SOLIDS, true);
     }
 }

@@ -31,7 +31,7 @@ fn scene(keys: &str) -> String {
 }
 
 fn alpha(picture: &Picture) -> Vec<f64> {
-    window(&picture.channel("A"), 48, 12..36, 12..36)
+    window(&picture.opacity(), 48, 12..36, 12..36)
 }
 
 #[test]
@@ -76,7 +76,7 @@ fn a_radius_of_the_file_blurs_the_picture_and_keeps_the_sum_of_its_optical_depth
     let depths = |name: &str, head: &str, further: &str, keys: &str| {
         std::fs::write(folder.path().join("slab.xyz"), slab(head, further, 0.3, false)).unwrap();
         let picture = draw_in(folder.path(), &scene(&format!("extinction = 0.5\n{keys}")), &[]);
-        let depths: Vec<f64> = picture.channel("A").iter().map(|a| -(1.0 - a).ln()).collect();
+        let depths: Vec<f64> = picture.opacity().iter().map(|a| -(1.0 - a).ln()).collect();
         assert!(depths.iter().all(|d| d.is_finite()), "{name}");
         depths
     };
@@ -119,7 +119,7 @@ fn neither_the_order_of_points_nor_threads_nor_a_power_of_two_changes_a_bit() {
         .replace("[0, 0, 0]\northographic", "[1e7, 1e7, 1e7]\northographic")
         .replace("translate = [0, 0, 0]", "translate = [1e7, 1e7, 1e7]");
     let found = run(&slab("", "", 1.0, false), &shifted, &[]);
-    let largest = largest_difference(&found.channel("A"), &plain.channel("A"));
+    let largest = largest_difference(&found.opacity(), &plain.opacity());
     assert!(largest < 1e-4, "far away: {largest:e}");
 }
 

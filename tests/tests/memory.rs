@@ -86,7 +86,6 @@ fn less_memory_than_a_scene_needs_is_exit_5_and_never_an_abort() {
 }
 
 /// What takes long and rarely fails where the others hold.
-#[cfg(feature = "deep")]
 mod deep {
     use super::*;
 

@@ -75,7 +75,6 @@ mod resident {
     }
 
     /// What takes long and rarely fails where the others hold.
-    #[cfg(feature = "deep")]
     mod deep {
         #[test]
         fn the_least_limit_for_a_slice_and_a_mesh_holds() {

@@ -76,7 +76,7 @@ fn x7_layers_that_nobody_asked_for_are_not_in_the_file() {
 fn bs09_an_empty_scene_is_the_background_exactly() {
     let text = parallel_view(2.0, 8) + "[background]\ncolor = [0.25, 0.5, 1.5]\n";
     let picture = draw(&text, &[]);
-    for (channel, value) in [("R", 0.25), ("G", 0.5), ("B", 1.5), ("A", 0.0)] {
+    for (channel, value) in [("R", 0.25), ("G", 0.5), ("B", 1.5), ("opacity.A", 0.0)] {
         assert!(picture.channel(channel).iter().all(|v| *v == value), "{channel}");
     }
 }

@@ -73,48 +73,6 @@ const WALL: &str = "[[object]]\nname = 'wall'\n\
                     rectangle = { center = [0, 0, -2], u = [1, 0, 0], v = [0, 1, 0], spacing = 0.025 }\n";
 
 #[test]
-fn depths_and_objects_of_two_layers_are_theirs_whatever_they_are_made_of() {
-    const LEVELS: u32 = 900;
-    let folder = planes();
-    for source in PLANES {
-        for (a, b, wall) in [(0.3, 0.6, false), (0.6, 0.3, false), (0.1, 0.2, true)] {
-            let mut text = view("") + &plane(source, "near", 0.5, a, "") + &plane(source, "far", -0.5, b, "");
-            if wall {
-                text += WALL;
-            }
-            let picture = particles(folder.path(), &text, LEVELS, "depth,object");
-            let weights = [a, (1.0 - a) * b, if wall { (1.0 - a) * (1.0 - b) } else { 0.0 }];
-            let total: f64 = weights.iter().sum();
-            let at = [4.5, 5.5, 7.0];
-            let moment = |p: i32, around: f64| {
-                weights.iter().zip(at).map(|(w, z)| w / total * (z - around).powi(p)).sum::<f64>()
-            };
-            let mean = moment(1, 0.0);
-            let (variance, fourth, n) = (moment(2, mean), moment(4, mean), total * f64::from(LEVELS));
-            let median = if wall {
-                7.0
-            } else if a > 0.5 {
-                4.5
-            } else {
-                5.5
-            };
-            let expected = [
-                [4.5, 0.0],
-                [median, 0.0],
-                [mean, (variance / n).sqrt()],
-                [variance.sqrt(), ((fourth - variance * variance) / (4.0 * variance * n)).sqrt()],
-            ];
-            for (name, expected) in ["first", "median", "mean", "sigma"].into_iter().zip(expected) {
-                let what = format!("{source}, {a}, {b}, wall {wall}, depth.{name}");
-                agree(&middle(&picture, &format!("depth.{name}.Z")), expected, &what);
-            }
-            // The nearest of all sets.
-            assert!(middle(&picture, "object.id").iter().all(|o| *o == 0.0), "{source}, {a}, {b}");
-        }
-    }
-}
-
-#[test]
 fn what_no_particle_hits_has_the_depth_and_the_object_of_the_wall() {
     let folder = planes();
     let half = "rectangle = { center = [-1, 0, 0], u = [1, 0, 0], v = [0, 1, 0], spacing = 0.025 }";
@@ -173,7 +131,7 @@ fn transmission_is_that_of_each_channel_whatever_absorbs() {
             alpha += (1.0 - t) / 3.0;
             assert!(largest_difference(&sum_of_effects(&picture, name), &picture.channel(name)) < 1e-5, "{object}");
         }
-        let found = middle(&picture, "A");
+        let found = middle(&picture, "opacity.A");
         assert!((found.iter().sum::<f64>() / found.len() as f64 - alpha).abs() < 0.004, "{object}");
         // The picture's own estimate of the error of its luminance.
         let weights = [0.2126, 0.7152, 0.0722];
@@ -201,48 +159,6 @@ fn fog_and_plane(back: &str) -> String {
          [[object]]\nname = 'plane'\nmaterial = 'glass'\nopacity = 0.5\n\
          rectangle = { center = [0, 0, -0.2], u = [1, 0, 0], v = [0, 1, 0], spacing = 0.025 }\n"
         + back
-}
-
-#[test]
-fn coloured_media_and_surfaces_differ_from_points_by_their_noise() {
-    let folder = tempfile::tempdir().unwrap();
-    for back in ["", WALL] {
-        let text = fog_and_plane(back);
-        let points = draw_in(folder.path(), &text, &["--technique", "points", "--set", "render.antialias=2"]);
-        let picture = particles(folder.path(), &text, 1500, "std_error");
-        let error = middle(&picture, "std_error.A");
-        assert!(error.iter().all(|e| *e > 1e-4), "noise everywhere");
-        for (c, weight) in [("R", 0.2126), ("G", 0.7152), ("B", 0.0722)] {
-            let (found, exact) = (middle(&picture, c), middle(&points, c));
-            let mean = |v: &[f64]| v.iter().sum::<f64>() / v.len() as f64;
-            let (a, b) = (mean(&found), mean(&exact));
-            let spread = found.iter().map(|v| (v - a).powi(2)).sum::<f64>() / (found.len() as f64).powi(2);
-            // Splats are lit by their centres and blur the fog's shadow: 0.5 % beside the noise.
-            let allowed = LIMIT * spread.sqrt() + 0.005 * b;
-            assert!((a - b).abs() < allowed, "{c} (weight {weight}): {a} and {b}, allowed {allowed}");
-        }
-    }
-}
-
-#[test]
-fn x1_layers_and_coloured_particles_have_the_same_bits_for_any_threads_and_after_a_stop() {
-    let folder = tempfile::tempdir().unwrap();
-    let layers = "effects,shadow,normal,depth,object,std_error";
-    for text in [fog_and_plane(WALL), fog_and_plane(WALL).replace("extinction_rgb", "# ")] {
-        let run = |levels: &str, threads: &str, more: &[&str]| {
-            let arguments = ["--repeat-level", levels, "--threads", threads, "--layers", layers];
-            draw_in(folder.path(), &text, &[&arguments[..], more].concat())
-        };
-        let whole = run("150", "1", &[]);
-        assert!(run("150", "3", &[]) == whole);
-        let file = folder.path().join("sums");
-        let checkpoint = ["--checkpoint", file.to_str().unwrap()];
-        run("70", "2", &checkpoint);
-        assert!(run("150", "2", &checkpoint) == whole);
-        std::fs::remove_file(&file).unwrap();
-        let early = run("4000", "2", &["--target-error", "0.004"]);
-        assert!(early != whole && early.channel("depth.median.Z").iter().any(|d| d.is_finite()));
-    }
 }
 
 #[test]
@@ -318,7 +234,6 @@ fn frames_of_kept_sets_have_layers_and_the_same_bits_for_any_threads() {
 }
 
 /// What takes long and rarely fails where the others hold.
-#[cfg(feature = "deep")]
 mod deep {
     use super::*;
 
@@ -392,5 +307,89 @@ mod deep {
         found[2] = [from + mean, (variance / n).sqrt()];
         found[3] = [variance.sqrt(), ((fourth - variance * variance) / (4.0 * variance * n)).sqrt()];
         found
+    }
+
+    #[test]
+    fn coloured_media_and_surfaces_differ_from_points_by_their_noise() {
+        let folder = tempfile::tempdir().unwrap();
+        for back in ["", WALL] {
+            let text = fog_and_plane(back);
+            let points = draw_in(folder.path(), &text, &["--technique", "points", "--set", "render.antialias=2"]);
+            let picture = particles(folder.path(), &text, 1500, "std_error");
+            let error = middle(&picture, "std_error.A");
+            assert!(error.iter().all(|e| *e > 1e-4), "noise everywhere");
+            for (c, weight) in [("R", 0.2126), ("G", 0.7152), ("B", 0.0722)] {
+                let (found, exact) = (middle(&picture, c), middle(&points, c));
+                let mean = |v: &[f64]| v.iter().sum::<f64>() / v.len() as f64;
+                let (a, b) = (mean(&found), mean(&exact));
+                let spread = found.iter().map(|v| (v - a).powi(2)).sum::<f64>() / (found.len() as f64).powi(2);
+                // Splats are lit by their centres and blur the fog's shadow: 0.5 % beside the noise.
+                let allowed = LIMIT * spread.sqrt() + 0.005 * b;
+                assert!((a - b).abs() < allowed, "{c} (weight {weight}): {a} and {b}, allowed {allowed}");
+            }
+        }
+    }
+
+    #[test]
+    fn depths_and_objects_of_two_layers_are_theirs_whatever_they_are_made_of() {
+        const LEVELS: u32 = 900;
+        let folder = planes();
+        for source in PLANES {
+            for (a, b, wall) in [(0.3, 0.6, false), (0.6, 0.3, false), (0.1, 0.2, true)] {
+                let mut text = view("") + &plane(source, "near", 0.5, a, "") + &plane(source, "far", -0.5, b, "");
+                if wall {
+                    text += WALL;
+                }
+                let picture = particles(folder.path(), &text, LEVELS, "depth,object");
+                let weights = [a, (1.0 - a) * b, if wall { (1.0 - a) * (1.0 - b) } else { 0.0 }];
+                let total: f64 = weights.iter().sum();
+                let at = [4.5, 5.5, 7.0];
+                let moment = |p: i32, around: f64| {
+                    weights.iter().zip(at).map(|(w, z)| w / total * (z - around).powi(p)).sum::<f64>()
+                };
+                let mean = moment(1, 0.0);
+                let (variance, fourth, n) = (moment(2, mean), moment(4, mean), total * f64::from(LEVELS));
+                let median = if wall {
+                    7.0
+                } else if a > 0.5 {
+                    4.5
+                } else {
+                    5.5
+                };
+                let expected = [
+                    [4.5, 0.0],
+                    [median, 0.0],
+                    [mean, (variance / n).sqrt()],
+                    [variance.sqrt(), ((fourth - variance * variance) / (4.0 * variance * n)).sqrt()],
+                ];
+                for (name, expected) in ["first", "median", "mean", "sigma"].into_iter().zip(expected) {
+                    let what = format!("{source}, {a}, {b}, wall {wall}, depth.{name}");
+                    agree(&middle(&picture, &format!("depth.{name}.Z")), expected, &what);
+                }
+                // The nearest of all sets.
+                assert!(middle(&picture, "object.id").iter().all(|o| *o == 0.0), "{source}, {a}, {b}");
+            }
+        }
+    }
+
+    #[test]
+    fn x1_layers_and_coloured_particles_have_the_same_bits_for_any_threads_and_after_a_stop() {
+        let folder = tempfile::tempdir().unwrap();
+        let layers = "effects,shadow,normal,depth,object,std_error";
+        for text in [fog_and_plane(WALL), fog_and_plane(WALL).replace("extinction_rgb", "# ")] {
+            let run = |levels: &str, threads: &str, more: &[&str]| {
+                let arguments = ["--repeat-level", levels, "--threads", threads, "--layers", layers];
+                draw_in(folder.path(), &text, &[&arguments[..], more].concat())
+            };
+            let whole = run("150", "1", &[]);
+            assert!(run("150", "3", &[]) == whole);
+            let file = folder.path().join("sums");
+            let checkpoint = ["--checkpoint", file.to_str().unwrap()];
+            run("70", "2", &checkpoint);
+            assert!(run("150", "2", &checkpoint) == whole);
+            std::fs::remove_file(&file).unwrap();
+            let early = run("4000", "2", &["--target-error", "0.004"]);
+            assert!(early != whole && early.channel("depth.median.Z").iter().any(|d| d.is_finite()));
+        }
     }
 }

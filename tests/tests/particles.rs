@@ -403,7 +403,7 @@ fn what_particles_cannot_do_is_said() {
 fn bs09_an_empty_scene_is_the_background_and_opaque_things_have_no_noise() {
     let empty = parallel_view(2.0, 8) + "[background]\ncolor = [0.25, 0.5, 1.5]\n";
     let picture = particles(&empty, 4, 1, "std_error");
-    for (channel, value) in [("R", 0.25), ("G", 0.5), ("B", 1.5), ("A", 0.0), ("std_error.A", 0.0)] {
+    for (channel, value) in [("R", 0.25), ("G", 0.5), ("B", 1.5), ("opacity.A", 0.0), ("std_error.A", 0.0)] {
         assert!(picture.channel(channel).iter().all(|v| *v == value), "{channel}");
     }
     let wall = scene([2, 2, 2]).replacen("'wall'", "'a'", 1).replacen("'wall'", "'b'", 1);
@@ -414,7 +414,6 @@ fn bs09_an_empty_scene_is_the_background_and_opaque_things_have_no_noise() {
 }
 
 /// What takes long and rarely fails where the others hold.
-#[cfg(feature = "deep")]
 mod deep {
     use super::*;
 

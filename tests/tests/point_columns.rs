@@ -63,7 +63,7 @@ fn what_is_kept_is_drawn_and_nothing_else() {
         ("clip = [{ normal = [-1, 0, 0], point = [0, 0, 0] }]\n", [0.0, 1.0, 0.0, 1.0]),
         ("clip = [{ box = [[-9, -9, -1], [0, 0, 1]] }]\n", [1.0, 0.0, 0.0, 0.0]),
     ] {
-        let alpha = draw_in(folder.path(), &scene(keys), &[]).channel("A");
+        let alpha = draw_in(folder.path(), &scene(keys), &[]).opacity();
         for (expected, x, y) in [(left_below, 0, 1), (right_below, 1, 1), (left_above, 0, 0), (right_above, 1, 0)] {
             let part = |half: u32| 24 * half + 4..24 * half + 20;
             assert!(
@@ -99,7 +99,7 @@ fn a_disc_has_the_diameter_that_is_asked_for() {
     let lone = "x y z nx ny nz\n0 0 0 0 0 1\n0.7 0.7 -3 0 0 1\n";
     std::fs::write(folder.path().join("plane.xyz"), lone).unwrap();
     for (keys, diameter) in [("point_size = { world = 0.5 }\n", 0.5), ("point_size = { pixels = 12 }\n", 0.5)] {
-        let alpha = draw_in(folder.path(), &scene(keys), &[]).channel("A");
+        let alpha = draw_in(folder.path(), &scene(keys), &[]).opacity();
         let pixel = 2.0 / 48.0;
         let covered = alpha.iter().sum::<f64>() * pixel * pixel;
         let expected = 2.0 * std::f64::consts::PI * (0.5 * diameter) * (0.5 * diameter);
@@ -133,13 +133,13 @@ fn a_volume_that_is_cut_has_the_optical_depth_of_what_is_left() {
         ("clip = [{ box = [[-9, -9, -0.33], [9, 9, 0.2]] }]\n", 0.53),
     ] {
         for technique in ["points", "sheets", "reference"] {
-            let alpha = draw_in(folder.path(), &scene(clip), &["--technique", technique]).channel("A");
+            let alpha = draw_in(folder.path(), &scene(clip), &["--technique", technique]).opacity();
             let (mean, _) = mean_and_ripple(&window(&alpha, 24, 7..17, 7..17));
             let found = -(1.0 - mean).log2();
             assert!((found - depth).abs() < 0.01, "{technique}, {clip}: {found}");
         }
         let sets = ["--technique", "particles", "--set", "render.particles.repeat_level=100"];
-        let alpha = draw_in(folder.path(), &scene(clip), &sets).channel("A");
+        let alpha = draw_in(folder.path(), &scene(clip), &sets).opacity();
         let inner = window(&alpha, 24, 7..17, 7..17);
         let transmitted = 1.0 - mean_and_ripple(&inner).0;
         // Four samples a pixel, 100 sets: five deviations.
@@ -160,7 +160,7 @@ fn surfaces_end_where_they_are_cut() {
         for technique in ["points", "surfels"] {
             let clip = "clip = [{ normal = [1, 0, 0], point = [0.25, 0, 0] }, { box = [[-9, -0.5, -1], [9, 9, 1]] }]";
             let scene = format!("{}[[object]]\nname = 'it'\n{source}\n{clip}\n", parallel_view(2.0, 48));
-            let alpha = draw_in(folder.path(), &scene, &["--technique", technique]).channel("A");
+            let alpha = draw_in(folder.path(), &scene, &["--technique", technique]).opacity();
             let area = alpha.iter().sum::<f64>() * (2.0f64 / 48.0).powi(2);
             assert!((area - 1.25 * 1.5).abs() < 0.03 * area, "{technique}, {source}: {area}");
         }

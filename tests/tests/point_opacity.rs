@@ -20,7 +20,7 @@ fn scene(more: &str) -> String {
 
 /// Transmittance of the plane in the pixels of its left and right half, but for those near the middle and the border of the picture.
 fn seen(folder: &Path, more: &str, arguments: &[&str]) -> [Vec<f64>; 2] {
-    let alpha = draw_in(folder, &scene(more), arguments).channel("A");
+    let alpha = draw_in(folder, &scene(more), arguments).opacity();
     [4..18, 30..44].map(|columns| window(&alpha, 48, columns, 4..44).iter().map(|a| 1.0 - a).collect())
 }
 

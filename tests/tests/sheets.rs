@@ -21,7 +21,7 @@ fn a_slab_of_fog_has_its_transmittance_at_any_width_of_slabs() {
         );
         for width in ["'auto'", "0.033", "0.7", "3"] {
             let picture = in_sheets(&scene, &["--set", &format!("render.sheets.slab_width={width}")]);
-            let seen = window(&picture.channel("A"), 32, 4..28, 4..28);
+            let seen = window(&picture.opacity(), 32, 4..28, 4..28);
             let through: Vec<f64> = seen.iter().map(|a| 1.0 - a).collect();
             assert!(off(&through, (-tau).exp()) < 1e-5, "{tau}, slabs {width}: {:e}", off(&through, (-tau).exp()));
         }
@@ -33,7 +33,7 @@ fn rays_of_a_wide_lens_are_as_long_as_they_are() {
     let scene = "version = 1\n[camera]\nposition = [0, 0, 3]\ntarget = [0, 0, 0]\nfov_y = 90\nsize = [32, 32]\n\
                  [[object]]\nname = 'fog'\nmedium_box = { min = [-9, -9, -0.5], max = [9, 9, 0.5], \
                  extinction = 0.6, spacing = 0.25 }\n[render]\nantialias = 1\n";
-    let alpha = in_sheets(scene, &[]).channel("A");
+    let alpha = in_sheets(scene, &[]).opacity();
     for (k, alpha) in alpha.iter().enumerate() {
         let at = |i: usize| (i as f64 + 0.5) / 16.0 - 1.0;
         let [x, y] = [at(k % 32), at(k / 32)];

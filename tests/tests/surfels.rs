@@ -25,7 +25,7 @@ fn panes_let_through_what_their_materials_do_in_every_pixel() {
         }
         scene += "[render.surfels]\ntransmittance_cutoff = 0\n";
         for set in ["render.surfels.gap=0.1", "render.surfels.gap=1", "render.surfels.disc_scale=0.45"] {
-            let alpha = by_surfels(&scene, &["--set", set]).channel("A");
+            let alpha = by_surfels(&scene, &["--set", set]).opacity();
             let through: Vec<f64> = window(&alpha, 32, 4..28, 4..28).iter().map(|a| 1.0 - a).collect();
             let exact = 0.5f64.powi(panes);
             assert!(off(&through, exact) < 1e-6, "{panes} panes, {set}: {:e}", off(&through, exact));
@@ -42,7 +42,7 @@ fn panes_that_cross_or_coincide_are_two_layers() {
              [[object]]\nname = 'b'\nopacity = 0.4\nrectangle = {{ center = {far}, v = [0, 3, 0], spacing = 0.1 }}\n",
             parallel_view(2.0, 32)
         );
-        let alpha = by_surfels(&scene, &[]).channel("A");
+        let alpha = by_surfels(&scene, &[]).opacity();
         let seen = window(&alpha, 32, 4..28, 4..28);
         assert!(off(&seen, 0.7) < 1e-6, "{far}: {:e}", off(&seen, 0.7));
     }
@@ -108,7 +108,7 @@ fn a_scan_without_order_has_the_opacity_of_its_material() {
     std::fs::write(folder.path().join("scan.xyz"), points).unwrap();
     let scene = format!("{}[[object]]\nname = 'scan'\npoints = 'scan.xyz'\nopacity = 0.3\n", parallel_view(2.0, 48));
     let [by_points, surfels] = ["points", "surfels"].map(|t| {
-        let alpha = draw_in(folder.path(), &scene, &["--technique", t]).channel("A");
+        let alpha = draw_in(folder.path(), &scene, &["--technique", t]).opacity();
         let seen = window(&alpha, 48, 4..44, 4..44);
         (seen.iter().map(|a| (a - 0.3).powi(2)).sum::<f64>() / seen.len() as f64).sqrt()
     });

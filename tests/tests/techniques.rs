@@ -30,7 +30,7 @@ fn fog_by_points_glass_by_particles_and_a_slab_by_reference_multiply() {
     for order in [[0, 1, 2], [2, 1, 0], [1, 0, 2], [1, 1, 1]] {
         for apart in [2.0, 0.3] {
             let picture = draw(&three(order, apart), &[]);
-            let seen = window(&picture.channel("A"), 32, 8..24, 8..24);
+            let seen = window(&picture.opacity(), 32, 8..24, 8..24);
             let off: Vec<f64> = seen.iter().map(|alpha| (1.0 - alpha - exact) / error).collect();
             // 256 pixels: one of 370 is beyond three standard errors. The rest of the picture is off by at most 0.05 of one.
             let beyond = off.iter().filter(|z| z.abs() > 3.0).count();

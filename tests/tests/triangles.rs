@@ -22,7 +22,7 @@ fn in_slabs(scene: &str, slicing: &str, more: &[&str]) -> Picture {
 fn both_slicings_have_the_same_edges_opacities_and_depths_and_nearly_the_same_light() {
     let scene = parallel_view(2.4, 72) + SCENE;
     let [view, half] = ["view", "half_vector"].map(|slicing| in_slabs(&scene, slicing, &[]));
-    let (a, b) = (view.channel("A"), half.channel("A"));
+    let (a, b) = (view.opacity(), half.opacity());
     let worst = a.iter().zip(&b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
     assert!(worst < 1e-5, "A: {worst:e}");
     let apart = view.channel("object.id").iter().zip(half.channel("object.id")).filter(|(a, b)| **a != *b).count();
@@ -44,7 +44,7 @@ fn both_slicings_have_the_same_edges_opacities_and_depths_and_nearly_the_same_li
         "--set",
         "object.other.visible=false",
     ];
-    let alpha = in_slabs(&scene, "view", &alone).channel("A");
+    let alpha = in_slabs(&scene, "view", &alone).opacity();
     assert!(alpha.iter().all(|a| *a == 0.0 || *a == 1.0) && alpha.contains(&1.0));
     for channel in ["R", "G", "B", "direct.R"] {
         let (a, b) = (view.channel(channel), half.channel(channel));
@@ -75,7 +75,7 @@ fn effects_sum_to_beauty_other_techniques_lie_among_them_and_threads_change_no_b
         }
     }
     // Who draws haze and pane changes little, for both lie where they did.
-    let [sheets, points] = [&[][..], &mixed].map(|more| in_slabs(&scene, "view", more).channel("A"));
+    let [sheets, points] = [&[][..], &mixed].map(|more| in_slabs(&scene, "view", more).opacity());
     let square = sheets.iter().zip(&points).map(|(a, b)| (a - b).powi(2)).sum::<f64>() / sheets.len() as f64;
     assert!(square.sqrt() < 0.03, "RMSE {}", square.sqrt());
 }

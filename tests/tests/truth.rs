@@ -363,7 +363,6 @@ fn traced_glass_is_nearer_to_path_tracing_than_the_papers_heuristics() {
 }
 
 /// What takes long and rarely fails where the others hold.
-#[cfg(feature = "deep")]
 mod deep {
     use super::*;
     use organza::scene::SceneLight;

@@ -3,7 +3,7 @@
 //! Format, rules and clippy of everything, and the tests of the crates that differ from main, in the working tree too. Tests of
 //! the whole command and of devices are `cargo xtask ci`'s, unless they changed themselves.
 
-use crate::ci::{FEATURES, Step, Work, clippy, follow, split};
+use crate::ci::{DEEP, FEATURES, Step, Work, clippy, follow, split};
 use crate::repo::{Outcome, Repo};
 use crate::{papers, tidy};
 use std::collections::BTreeSet;
@@ -32,6 +32,7 @@ fn steps(packages: &BTreeSet<String>) -> Vec<Step> {
         if !features.is_empty() {
             line.push_str(&format!(" --features {}", features.join(",")));
         }
+        line.push_str(&format!(" -- --skip {DEEP}"));
         steps.push(Step { name: "tests", work: cargo(line) });
     }
     steps
@@ -89,7 +90,7 @@ mod tests {
         let Work::Cargo(runs, _) = &steps(&found).pop().expect("steps").work else { panic!("tests are run by cargo") };
         assert_eq!(
             runs[0].join(" "),
-            "test --package gpu-conformance --package organza-tsm --features organza-tsm/gpu"
+            "test --package gpu-conformance --package organza-tsm --features organza-tsm/gpu -- --skip deep::"
         );
         assert_eq!(steps(&BTreeSet::new()).last().map(|step| step.name), Some("clippy"));
     }

@@ -11,10 +11,6 @@ pub(crate) struct Function<'a> {
     pub(crate) name: &'a str,
     /// Line of its `fn`, from 1.
     pub(crate) line: usize,
-    /// Lines of code from `fn` to the closing brace: blank lines and comments do not count.
-    pub(crate) lines_of_code: usize,
-    /// Stands in a module under `#[cfg(test)]`.
-    pub(crate) in_test_module: bool,
 }
 
 /// The same text with comments as blanks and the contents of strings and characters as `x`. Line ends stay.
@@ -161,41 +157,28 @@ pub(crate) fn calls<'a>(code: &'a str, name: &'a str) -> impl Iterator<Item = &'
 
 /// The functions with a body, nested ones too, in code without comments.
 pub(crate) fn functions(code: &str) -> Vec<Function<'_>> {
-    let tests = test_modules(code);
-    let mut found = Vec::new();
-    for at in words(code, "fn") {
+    let with_body = words(code, "fn").filter_map(|at| {
         let name = code[at + 2..].trim_start();
         let name = &name[..name.bytes().take_while(|b| is_word(*b)).count()];
-        let Some(open) = body(code, at).filter(|_| !name.is_empty()) else { continue };
-        let lines = code[at..closing(code, open)].lines();
-        found.push(Function {
-            name,
-            line: line_of(code, at),
-            lines_of_code: lines.filter(|l| !l.trim().is_empty()).count(),
-            in_test_module: tests.iter().any(|t| t.contains(&at)),
-        });
-    }
-    found
+        let is_whole = !name.is_empty() && has_body(code, at);
+        is_whole.then(|| Function { name, line: line_of(code, at) })
+    });
+    with_body.collect()
 }
 
-/// The `{` of the item that begins at `at`; `None` when `;` ends it before.
-fn body(code: &str, at: usize) -> Option<usize> {
+/// Whether the item that begins at `at` has a body, no `;` before it.
+fn has_body(code: &str, at: usize) -> bool {
     let bytes = code.as_bytes();
     let mut here = at;
     while here < bytes.len() {
         match bytes[here] {
-            b'{' => return Some(here),
-            b';' => return None,
+            b'{' => return true,
+            b';' => return false,
             b'(' | b'[' => here = closing(code, here),
             _ => here += 1,
         }
     }
-    None
-}
-
-fn test_modules(code: &str) -> Vec<Range<usize>> {
-    let heads = attributes(code).into_iter().filter(|a| code[a.clone()].starts_with("#[cfg(test)]"));
-    heads.filter_map(|a| Some(a.start..closing(code, body(code, a.end)?))).collect()
+    false
 }
 
 #[cfg(test)]
@@ -219,19 +202,12 @@ mod tests {
     }
 
     #[test]
-    fn functions_end_at_their_brace() {
+    fn functions_without_a_body_are_left_out() {
         let text =
             "trait T { fn none(x: [u8; 3]); }\nfn one() {}\nfn two(f: fn(u8) -> u8) {\n    // why\n\n    f(1);\n}\n";
         let code = code_only(text);
-        let seen: Vec<_> = functions(&code).iter().map(|f| (f.name, f.line, f.lines_of_code)).collect();
-        assert_eq!(seen, [("one", 2, 1), ("two", 3, 3)]);
-    }
-
-    #[test]
-    fn functions_know_their_test_module() {
-        let code = "fn a() {}\n#[cfg(test)]\nmod tests {\n    fn b() {}\n}\nfn c() {}\n";
-        let seen: Vec<_> = functions(code).iter().map(|f| f.in_test_module).collect();
-        assert_eq!(seen, [false, true, false]);
+        let seen: Vec<_> = functions(&code).iter().map(|f| (f.name, f.line)).collect();
+        assert_eq!(seen, [("one", 2), ("two", 3)]);
     }
 
     #[test]

@@ -5,7 +5,6 @@ mod assets;
 mod dependencies;
 mod floors;
 mod functions;
-mod size;
 mod text;
 
 use crate::repo::{Outcome, Repo};
@@ -13,14 +12,12 @@ pub(crate) use assets::{MAX_BYTES, credit_of, in_assets};
 
 type Rule = fn(&Repo) -> Vec<String>;
 
-const RULES: [(&str, Rule); 11] = [
+const RULES: [(&str, Rule); 9] = [
     ("heads", text::heads),
     ("foreign paths", text::foreign_paths),
     ("ignored tests", text::ignored_tests),
     ("reasons", text::reasons),
     ("crate pages", text::crate_pages),
-    ("file size", size::files),
-    ("function size", size::functions),
     ("dependency direction", dependencies::direction),
     ("floors", floors::upward),
     ("functions of the platform", functions::platform),

@@ -51,6 +51,7 @@ mod from_splats;
 #[cfg(feature = "surfels")]
 mod gaussian_points;
 mod grid_field;
+mod isosurface_spacing;
 mod keep;
 mod keep_points;
 #[cfg(feature = "lids")]
@@ -132,6 +133,7 @@ pub use field_points::{
 };
 pub use footprints::FootprintChoice;
 pub use grid_field::{GridField, Inside};
+pub use isosurface_spacing::isosurface_spacing;
 pub use keep_points::{Kept, Within, kept};
 #[cfg(feature = "lids")]
 pub use lid::{LidReport, lidded_mesh};

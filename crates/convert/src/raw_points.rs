@@ -97,9 +97,13 @@ impl RawPoints {
         }
     }
 
-    /// Bounds of what is seen of nearly all Gaussians: two deviations around each, without the farthest hundredth to every side, which in
-    /// captured scenes lies anywhere; `None` for points that are none.
+    /// Bounds of what a camera that finds its place looks at, where that is not all points. Of Gaussians two deviations around each, without
+    /// the farthest hundredth to every side, which in captured scenes lies anywhere; of splats of several objects those that stand on a ground.
     pub fn bulk(&self) -> Option<DAabb> {
+        self.bulk_of_gaussians().or_else(|| self.ready.on_ground())
+    }
+
+    fn bulk_of_gaussians(&self) -> Option<DAabb> {
         /// Gaussians of which one may lie outside, to every side.
         const ONE_OF: usize = 100;
         let g = &self.gaussians;

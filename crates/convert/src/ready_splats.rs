@@ -1,6 +1,7 @@
 //! Points that are splats already: what a file of rendering-oriented points holds (Gunjee 2007, section 3), one column an attribute.
 
-use splat_core::{Cloud, Splat, SplatKind};
+use splat_core::{Cloud, DAabb, Splat, SplatKind, glam::DVec3};
+use std::collections::BTreeMap;
 
 /// Splats as a file has them, and the kernels that their radii are of.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -158,7 +159,32 @@ pub(crate) static COLUMNS: [SplatColumns; 11] = [
     },
 ];
 
+/// Thickness of a ground at most, over its own size.
+const FLAT: f64 = 1e-3;
+/// Size of a ground at least, over that of all that stands on it.
+const WIDE: f64 = 2.0;
+
 impl ReadySplats {
+    /// Bounds of all objects but the ground, a flat one at least twice as large as all others together; `None` where there is none.
+    pub(crate) fn on_ground(&self) -> Option<DAabb> {
+        let cloud = &self.cloud;
+        let mut middles: BTreeMap<u32, DAabb> = BTreeMap::new();
+        let mut whole: BTreeMap<u32, DAabb> = BTreeMap::new();
+        for ((object, position), radius) in cloud.object.iter().zip(&cloud.position).zip(&cloud.radius) {
+            let place = cloud.origin + position.as_dvec3();
+            let middle = middles.entry(*object).or_insert(DAabb::EMPTY);
+            *middle = middle.union(DAabb::new(place, place));
+            let around = whole.entry(*object).or_insert(DAabb::EMPTY);
+            *around = around.union(DAabb::around(place, DVec3::splat(f64::from(*radius))));
+        }
+        let ground = middles.iter().max_by(|a, b| a.1.diagonal().total_cmp(&b.1.diagonal()))?;
+        let others = whole.iter().filter(|other| other.0 != ground.0).map(|other| *other.1);
+        let others = others.fold(DAabb::EMPTY, DAabb::union);
+        let is_flat = ground.1.size().min_element() <= FLAT * ground.1.diagonal();
+        let is_wide = !others.is_empty() && ground.1.diagonal() >= WIDE * others.diagonal();
+        (is_flat && is_wide).then_some(others)
+    }
+
     /// Numbers of a column beside places, by its name in a file.
     pub(crate) fn column(&self, name: &str) -> Option<Vec<f64>> {
         let of = self.columns().find(|column| column.name == name)?;
@@ -192,5 +218,36 @@ impl ReadySplats {
         let mut counts = [0; 3];
         self.cloud.kind.iter().for_each(|kind| counts[*kind as usize] += 1);
         counts
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use splat_core::glam::Vec3;
+
+    /// Splats of one object along a diagonal of a box.
+    fn add(ready: &mut ReadySplats, object: u32, low: Vec3, high: Vec3) {
+        for k in 0..5 {
+            let position = low.lerp(high, k as f32 / 4.0);
+            ready.cloud.push(&Splat { position, object, radius: 0.5, ..Splat::default() });
+        }
+    }
+
+    #[test]
+    fn a_wide_flat_object_is_the_ground_of_the_others() {
+        let mut ready = ReadySplats::default();
+        add(&mut ready, 0, Vec3::new(-1.0, 0.0, -1.0), Vec3::new(1.0, 3.0, 1.0));
+        assert_eq!(ready.on_ground(), None, "it stands alone");
+        add(&mut ready, 1, Vec3::new(-40.0, 0.0, -40.0), Vec3::new(40.0, 0.0, 40.0));
+        let bounds = ready.on_ground().expect("it stands on the second");
+        assert_eq!((bounds.min, bounds.max), (DVec3::new(-1.5, -0.5, -1.5), DVec3::new(1.5, 3.5, 1.5)));
+        // A wall as large as what stands before it, and a hill, are seen.
+        let mut wall = ReadySplats::default();
+        add(&mut wall, 0, Vec3::splat(-1.0), Vec3::splat(1.0));
+        add(&mut wall, 1, Vec3::new(-1.0, -1.0, 0.0), Vec3::new(1.0, 1.0, 0.0));
+        assert_eq!(wall.on_ground(), None);
+        add(&mut wall, 2, Vec3::new(-40.0, 0.0, -40.0), Vec3::new(40.0, 2.0, 40.0));
+        assert_eq!(wall.on_ground(), None);
     }
 }

@@ -46,6 +46,11 @@ impl SurfaceField {
         if self.classified == Classified::Opacity { shares.fold(1.0, f64::min) } else { 1.0 }
     }
 
+    /// The largest channel of the colours that it gives.
+    pub fn brightest(&self) -> f32 {
+        self.transfer.brightest()
+    }
+
     /// What the surface looks like at a place in its own coordinates, when one crossing of it has this opacity, below 1: its colour, and
     /// the share of its optical depth that is left to it, in \[0, 1\]. `None` where the field is not known.
     pub fn at(&self, place: DVec3, opacity: f64) -> Option<([f32; 3], f64)> {

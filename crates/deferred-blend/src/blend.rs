@@ -29,7 +29,8 @@ pub struct BlendInput<'a> {
     pub range: Range<f32>,
     /// How discs become layers.
     pub layering: Layering<'a>,
-    /// How matter is drawn that surfaces bound, by [`Layering::Gaps`] and [`Layering::Peeled`]; `None` where no material bounds any.
+    /// How matter is drawn that surfaces bound; `None` where no material bounds any. By [`Layering::Algorithm1`] and [`Layering::Algorithm2`] light is
+    /// mirrored and bent at the nearest layer alone.
     pub glass: Option<Glass<'a>>,
 }
 
@@ -107,7 +108,7 @@ pub fn blend(
             let visit = |k: usize, fragments: &mut [Fragment]| {
                 rule.split(discs, fragments, &mut layers);
                 match &floor {
-                    Some(floor) => tile.floored(k, fragments, input, (floor, rule)),
+                    Some(floor) => tile.floored(k, fragments, &layers, input, (floor, rule)),
                     None => tile.pixel(k, fragments, &layers[..most.min(layers.len())], (input, params)),
                 }
             };

@@ -87,6 +87,16 @@ pub(crate) struct Passage {
 impl Passage {
     /// Nothing.
     pub(crate) const CLEAR: Self = Self { reflectance: [0.0; 3], mirrored: [0.0; 3], inside: [0.0; 3] };
+
+    /// Both as one, `next` behind this.
+    pub(crate) fn before(&self, next: &Self) -> Self {
+        let through: [f32; 3] = std::array::from_fn(|c| (1.0 - self.reflectance[c]) * libm::expf(-next.inside[c]));
+        Self {
+            reflectance: std::array::from_fn(|c| 1.0 - (1.0 - self.reflectance[c]) * (1.0 - next.reflectance[c])),
+            mirrored: std::array::from_fn(|c| self.mirrored[c] + through[c] * next.mirrored[c]),
+            inside: std::array::from_fn(|c| self.inside[c] + next.inside[c]),
+        }
+    }
 }
 
 /// The way of a pixel's ray through its layers.
@@ -116,7 +126,7 @@ impl<'m> Path<'m> {
 
     /// The index where the ray is.
     fn index(&self, channel: usize) -> f32 {
-        self.inside.last().map_or(1.0, |(_, material, _)| material.index[channel])
+        self.inside.last().map_or(1.0, |(_, material, _)| material.index_inside()[channel])
     }
 
     /// Whether a layer that bounds matter is met by the bent ray, where it lies there, and not by the straight one.
@@ -134,7 +144,7 @@ impl<'m> Path<'m> {
             }
             None => self.inside.push((layer.object, layer.material, layer.distance)),
         }
-        let index = layer.material.index;
+        let index = layer.material.index_inside();
         if index == [1.0; 3] || layer.rank > 0 {
             return;
         }

@@ -184,7 +184,7 @@ impl<'a> Surfaces<'a> {
 
     /// Whether an index differs by channel.
     pub(crate) fn disperses(&self) -> bool {
-        self.materials.iter().any(|m| m.index != [m.index[0]; 3])
+        self.materials.iter().map(Material::index_inside).any(|index| index != [index[0]; 3])
     }
 
     /// The nearest layer from a place along a unit vector; `None` where there is none.

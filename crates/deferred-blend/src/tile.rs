@@ -2,6 +2,7 @@
 
 use crate::BlendInput;
 use crate::Params;
+use crate::disc::Ray;
 use crate::floored::Floor;
 use crate::fragments::Fragment;
 use crate::glass::{Bound, Glass, Passage, Path};
@@ -82,7 +83,7 @@ impl Tile {
                 if path.leaves_out(glass) {
                     continue;
                 }
-                let (rank, of_object) = count(own[0].object, layer.start, limit, (fragments, layers));
+                let [rank, of_object] = count(own[0].object, layer.start, limit, (fragments, layers));
                 let (place, distance) = (ray.at(blended.depth), ray.length * blended.depth);
                 let ((normal, curvature), object, cone) = (normal(own, input), own[0].object, ray.cone.after(distance));
                 let layers = of_object;
@@ -101,25 +102,76 @@ impl Tile {
     }
 
     /// A pixel as the paper has it, of whose fragments those that are hidden or lie outside the range are left out.
+    ///
+    /// Light is mirrored and bent at the nearest layer that bounds matter (section 5.2.3). `layers` are the ranges of fragments that gaps tell
+    /// apart: their number bends light by [`Bending::Power`], and between them matter absorbs.
     pub(crate) fn floored(
         &mut self,
         k: usize,
         fragments: &mut [Fragment],
+        layers: &[Range<usize>],
         input: &BlendInput<'_>,
         (floor, rule): (&Floor<'_>, GapRule),
     ) {
         let limit = self.opaque.get(k).copied().unwrap_or(f32::INFINITY);
         let [x, y] = self.corner;
         let ray = input.discs.ray(position(k, x, y));
-        let sizes = [self.optical_depth.len(), self.channels.len()];
+        let mut way = input.glass.as_ref().map(|glass| (glass, Path::begin(ray.along, glass)));
+        // The ranges of layers hold for this order of the fragments alone.
+        let crossed = match &mut way {
+            Some((glass, path)) => cross_layers(path, glass, input, &ray, limit, (fragments, layers)),
+            None => Crossed::default(),
+        };
         fragments.sort_by(|a, b| a.depth.total_cmp(&b.depth));
-        let seen = |f: &&Fragment| f.depth < limit && input.range.contains(&f.depth);
-        let own: Vec<Fragment> = fragments.iter().filter(seen).copied().collect();
-        let Some(nearest) = own.first() else { return };
-        let blended = floor.blend(&own, input, rule, (&ray, sizes));
+        let mut seen: Vec<Fragment> = fragments.iter().filter(|f| f.depth < limit).copied().collect();
+        let bounds = |f: &Fragment| bound_matter(std::slice::from_ref(f), input).is_some();
+        let first = way.as_ref().and_then(|_| seen.iter().position(bounds));
+        let mut segment = |fragments: &[Fragment], passage: &Option<(f32, Passage)>| {
+            self.floored_segment(k, fragments, passage.as_ref(), input, &ray, (floor, rule));
+        };
+        match first {
+            None => segment(&seen, &None),
+            Some(first) => {
+                let is_behind = |f: &Fragment| !rule.joins(input.discs, &seen[first], f);
+                let after = seen[first..].iter().position(is_behind).map_or(seen.len(), |n| first + n);
+                let mut rest = seen.split_off(after);
+                if way.as_ref().is_some_and(|(glass, path)| path.leaves_out(glass)) {
+                    // The bent ray meets them where they lie there.
+                    rest.retain(|f| !bounds(f));
+                }
+                segment(&seen[..first], &None);
+                segment(&seen[first..], &crossed.nearest);
+                segment(&rest, &crossed.others);
+            }
+        }
+        if let Some((glass, path)) = way {
+            self.end(k, glass, &path, (limit, ray.length), &input.range);
+        }
+    }
+
+    /// Fragments that lie near to far, those in the range, as one layer behind all so far, with what a layer at a depth does to light.
+    fn floored_segment(
+        &mut self,
+        k: usize,
+        fragments: &[Fragment],
+        passage: Option<&(f32, Passage)>,
+        input: &BlendInput<'_>,
+        ray: &Ray,
+        (floor, rule): (&Floor<'_>, GapRule),
+    ) {
+        let sizes = [self.optical_depth.len(), self.channels.len()];
+        let inside: Vec<Fragment> = fragments.iter().filter(|f| input.range.contains(&f.depth)).copied().collect();
+        // In one range of depths alone.
+        let passage = passage.filter(|(depth, _)| input.range.contains(depth));
+        let (depth, object) = match (inside.first(), passage) {
+            (Some(nearest), _) => (nearest.depth, nearest.object),
+            (None, Some((depth, _))) => (*depth, u32::MAX),
+            (None, None) => return,
+        };
+        let blended = floor.blend(&inside, input, rule, (ray, sizes));
         let opacity = blended.through.map(|t| (1.0 - t).clamp(0.0, 1.0));
-        let layer = Layer { depth: nearest.depth, opacity, values: blended.values };
-        self.add(k, &layer, &Passage::CLEAR, nearest.object);
+        let layer = Layer { depth, opacity, values: blended.values };
+        self.add(k, &layer, passage.map_or(&Passage::CLEAR, |(_, passage)| passage), object);
         self.layers += 1;
     }
 
@@ -192,12 +244,52 @@ impl Tile {
     }
 }
 
+/// What the layers of a pixel that bound matter do to light, each with a depth: the nearest of them, and all others together.
+#[derive(Default)]
+struct Crossed {
+    nearest: Option<(f32, Passage)>,
+    others: Option<(f32, Passage)>,
+}
+
+/// Goes through the layers that bound matter, up to an opaque surface or to where the ray is bent for good.
+fn cross_layers<'m>(
+    path: &mut Path<'m>,
+    glass: &Glass<'m>,
+    input: &BlendInput<'m>,
+    ray: &Ray,
+    limit: f32,
+    (fragments, layers): (&[Fragment], &[Range<usize>]),
+) -> Crossed {
+    let mut crossed = Crossed::default();
+    for layer in layers {
+        let of_layer = &fragments[layer.clone()];
+        let (depth, object) = (mean_depth(of_layer), of_layer[0].object);
+        if depth >= limit || path.leaves_out(glass) {
+            break;
+        }
+        let Some(material) = bound_matter(of_layer, input) else { continue };
+        let [rank, layers] = count(object, layer.start, limit, (fragments, layers));
+        let (normal, curvature) = normal(of_layer, input);
+        let distance = ray.length * depth;
+        let (cone, place) = (ray.cone.after(distance), ray.at(depth));
+        let bound = Bound { material, object, rank, layers, normal, curvature, cone, place, distance };
+        let mut passage = Passage::CLEAR;
+        path.cross(&bound, glass, &mut passage);
+        match (&crossed.nearest, &mut crossed.others) {
+            (None, _) => crossed.nearest = Some((depth, passage)),
+            (Some(_), None) => crossed.others = Some((depth, passage)),
+            (Some(_), Some((_, others))) => *others = others.before(&passage),
+        }
+    }
+    crossed
+}
+
 /// How many layers of an object lie before the one that starts at a fragment, and how many before an opaque surface.
-fn count(object: u32, start: usize, limit: f32, (fragments, layers): (&[Fragment], &[Range<usize>])) -> (u32, u32) {
+fn count(object: u32, start: usize, limit: f32, (fragments, layers): (&[Fragment], &[Range<usize>])) -> [u32; 2] {
     let of_object = layers.iter().filter(|l| fragments[l.start].object == object);
     let rank = of_object.clone().take_while(|l| l.start != start).count() as u32;
     let all = of_object.take_while(|l| mean_depth(&fragments[(*l).clone()]) < limit).count() as u32;
-    (rank, all)
+    [rank, all]
 }
 
 /// The channel that stands for a plane of optical depth.

@@ -27,7 +27,7 @@ impl<'m> Inside<'m> {
     }
 
     fn index(&self, channel: usize) -> f32 {
-        self.0.last().map_or(1.0, |(_, material)| material.index[channel])
+        self.0.last().map_or(1.0, |(_, material)| material.index_inside()[channel])
     }
 
     /// Through a surface of an object: out of it, or into it.

@@ -1,7 +1,8 @@
 //! Matter that surfaces bound: what is mirrored, bent and absorbed.
 
+use crate::floored::by_turns;
 use crate::scenes::{Asked, Scene, camera, disc, parallel, plane, sphere};
-use deferred_blend::{Bending, Params};
+use deferred_blend::{Bending, Floors, Layering, Params};
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::{Accumulator, Cloud, Material, Splat, SplatKind};
 
@@ -19,7 +20,7 @@ fn clear(mut cloud: Cloud, index: [f32; 3], view: splat_core::Camera) -> Scene {
     cloud.crossing_depth.fill(0.0);
     cloud.cross_section.fill(0.0);
     let mut scene = Scene::new(cloud, view);
-    scene.materials = vec![Material { index, ..Material::default() }];
+    scene.materials = vec![Material { index: Some(index), ..Material::default() }];
     scene
 }
 
@@ -70,6 +71,61 @@ fn clear_glass_in_a_white_world_is_not_seen() {
     }
 }
 
+/// Figures 18 c, 18 d and 20 of the paper: mirrored and bent by its own algorithms.
+#[test]
+fn glass_is_drawn_by_the_papers_algorithms_as_by_gaps() {
+    let view = camera(DVec3::new(0.2, 0.1, 3.0), [33, 24]);
+    for layers in [1, 2, 3] {
+        let mut cloud = Cloud::new(DVec3::ZERO);
+        for l in 0..layers {
+            plane(&mut cloud, Vec3::Z * (-0.5 * l as f32), Vec3::Z, 60, &disc(Vec3::ZERO, Vec3::Z, 0.1, 0.3));
+        }
+        let mut scene = Scene::new(cloud, view);
+        let absorption_inside = [0.1, 0.2, 0.3];
+        scene.materials = vec![Material { index: Some([1.3, 1.35, 1.4]), absorption_inside, ..Material::default() }];
+        let groups = by_turns(&scene.cloud, 1);
+        let floors = Floors { groups: &groups, steps: 1000 };
+        for bending in MODES {
+            let asked = in_sky(bending, &|d, _| d.into());
+            let (gaps, bent) = scene.draw_glass(&WHOLE, &asked, &[]);
+            for layering in [Layering::Algorithm1(floors), Layering::Algorithm2(floors)] {
+                let (picture, glass) = scene.draw_glass_by(&WHOLE, layering, &asked, &[]);
+                for k in 0..33 * 24 {
+                    let what = format!("{layers} layers, {bending:?}, {layering:?}, pixel {k}");
+                    let apart = |a: [f32; 3], b: [f32; 3]| (Vec3::from(a) - Vec3::from(b)).length();
+                    assert!(apart(glass.behind[k], bent.behind[k]) < 1e-6, "{what}: behind");
+                    assert!(apart(glass.mirrored[k], bent.mirrored[k]) < 1e-6, "{what}: mirrored");
+                    for c in 0..3 {
+                        let [found, expected] = [through(&picture, c, k), through(&gaps, c, k)];
+                        assert!((found - expected).abs() < 1e-5, "{what}: {found} for {expected}");
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn clear_glass_in_a_white_world_is_not_seen_by_the_papers_algorithms() {
+    let view = camera(DVec3::new(0.3, 0.4, 4.0), [48, 36]);
+    let scene = clear(ball(0.0), [1.4, 1.45, 1.5], view);
+    let groups = by_turns(&scene.cloud, 4);
+    let floors = Floors { groups: &groups, steps: 16 };
+    for layering in [Layering::Algorithm1(floors), Layering::Algorithm2(floors)] {
+        for bending in MODES {
+            let (picture, glass) = scene.draw_glass_by(&WHOLE, layering, &in_sky(bending, &|_, _| [1.0; 3]), &[]);
+            assert!(glass.mirrored.iter().any(|mirrored| mirrored[1] > 0.5), "rims mirror nearly all");
+            for k in 0..48 * 36 {
+                for c in 0..3 {
+                    let behind = if glass.behind[k][c].is_nan() { 1.0 } else { glass.behind[k][c] };
+                    let sum = f64::from(glass.mirrored[k][c]) + through(&picture, c, k) * f64::from(behind);
+                    assert!((sum - 1.0).abs() < 1e-6, "{layering:?} {bending:?} pixel {k}: {sum}");
+                }
+            }
+        }
+    }
+}
+
 #[test]
 fn an_index_of_one_changes_no_bit() {
     let view = camera(DVec3::new(0.3, 0.4, 4.0), [48, 36]);
@@ -81,7 +137,7 @@ fn an_index_of_one_changes_no_bit() {
     for bending in MODES {
         let mut scene = Scene::new(ball(0.4), view);
         // Another material bends, so that the way of each ray is followed.
-        scene.materials = vec![Material::default(), Material { index: [1.5; 3], ..Material::default() }];
+        scene.materials = vec![Material::default(), Material { index: Some([1.5; 3]), ..Material::default() }];
         let (picture, glass) = scene.draw_glass(&WHOLE, &in_sky(bending, &|_, _| [7.0; 3]), &[]);
         assert_eq!((&picture.optical_depth, &picture.channels), (&plain.optical_depth, &plain.channels));
         assert!(glass.behind.iter().all(|b| b[0].is_nan()) && glass.mirrored.iter().all(|m| *m == [0.0; 3]));
@@ -120,7 +176,7 @@ fn layers_of_the_paper_bend_by_a_power() {
             plane(&mut cloud, Vec3::Z * (-0.5 * l as f32), Vec3::Z, 60, &disc(Vec3::ZERO, Vec3::Z, 0.1, 0.3));
         }
         let mut scene = Scene::new(cloud, view);
-        scene.materials = vec![Material { index: [index; 3], ..Material::default() }];
+        scene.materials = vec![Material { index: Some([index; 3]), ..Material::default() }];
         let (picture, glass) = scene.draw_glass(&WHOLE, &in_sky(Bending::Power, &|d, _| d.into()), &[]);
         for (k, behind) in glass.behind.iter().enumerate() {
             let (_, along) = view.view_ray((k % 33) as f64 + 0.5, (k / 33) as f64 + 0.5);
@@ -144,7 +200,7 @@ fn opacities_of_one_object_are_those_of_its_nearest_layer_by_power_alone() {
     cloud.crossing_depth[half..].fill(0.0);
     cloud.cross_section[half..].fill(0.0);
     let mut scene = Scene::new(cloud, view);
-    scene.materials = vec![Material { index: [1.0; 3], absorption_inside: [1e-9; 3], ..Material::default() }];
+    scene.materials = vec![Material { absorption_inside: [1e-9; 3], ..Material::default() }];
     for (bending, expected) in [(Bending::Traced, 0.7), (Bending::Nearest, 0.7), (Bending::Power, 0.49)] {
         let (picture, _) = scene.draw_glass(&WHOLE, &in_sky(bending, &|_, _| [1.0; 3]), &[]);
         assert!((through(&picture, 1, 27) - expected).abs() < 1e-6, "{bending:?}: {}", through(&picture, 1, 27));

@@ -31,7 +31,7 @@ fn db7_layers_of_no_opacity_of_half_and_of_all_and_no_layers() {
             let mut pictures: Vec<Accumulator> =
                 [Layering::Gaps, Layering::Algorithm1(floors), Layering::Algorithm2(floors)].map(by).into();
             // As glass of index 1, by Eqs. 15 and 16.
-            scene.materials = vec![Material { index: [1.0; 3], absorption_inside: [1e-9; 3], ..Material::default() }];
+            scene.materials = vec![Material { absorption_inside: [1e-9; 3], ..Material::default() }];
             let sky = |_: Vec3, _: f32| [1.0; 3];
             let asked = Asked { bending: Bending::Power, sky: &sky, straight: false, unit: 1.0 };
             let (picture, glass) = scene.draw_glass(&params, &asked, &[]);

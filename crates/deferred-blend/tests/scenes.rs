@@ -52,6 +52,17 @@ impl Scene {
 
     /// The picture, with what was mirrored and bent.
     pub(crate) fn draw_glass(&self, params: &Params, glass: &Asked<'_>, opaque: &[f32]) -> (Accumulator, GlassImage) {
+        self.draw_glass_by(params, Layering::Gaps, glass, opaque)
+    }
+
+    /// The same by some way to tell layers apart.
+    pub(crate) fn draw_glass_by(
+        &self,
+        params: &Params,
+        layering: Layering<'_>,
+        glass: &Asked<'_>,
+        opaque: &[f32],
+    ) -> (Accumulator, GlassImage) {
         let mut accumulator = Accumulator::new(self.camera.size, 3, 3, false, false);
         let discs = Discs::project(&self.input(), params);
         let is_met = |i: &u32| self.cloud.kind[*i as usize] != SplatKind::Opaque || !glass.straight;
@@ -60,7 +71,7 @@ impl Scene {
         let surfaces = Surfaces::new(&DiscInput { ids: &met, ..self.input() }, &self.values, layout);
         let Asked { bending, sky, straight, unit } = *glass;
         let glass = Some(Glass { bending, sky, surfaces: &surfaces, straight, unit });
-        let (range, layering) = (0.0..f32::INFINITY, Layering::Gaps);
+        let range = 0.0..f32::INFINITY;
         let input = BlendInput { discs: &discs, shown: Shown::Discs(&self.values), opaque, range, layering, glass };
         let made = blend(&input, params, &mut accumulator, None).expect("nobody cancels");
         (accumulator, made.glass.expect("asked for"))

@@ -228,7 +228,7 @@ pub(super) struct RenderArguments {
     /// Draw so many frames in a circle around all, to numbered files
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
     pub(super) turntable: Option<u32>,
-    /// Write PNG files with the opacity of each pixel in the place of the background
+    /// Write files with the opacity of each pixel in the place of the background: premultiplied in EXR, straight in PNG
     #[arg(long)]
     pub(super) transparent: bool,
     /// Draw into PNG files what colours stand for: the maps of points by a column, the transfer functions of volumes

@@ -136,7 +136,7 @@ impl<'a> Jobs<'a> {
     }
 }
 
-/// The scene with the options of the command line, and with the layer that PNG files without a background are made with.
+/// The scene with the options of the command line, and with the layer that files without a background are made with.
 fn parsed(arguments: &RenderArguments, given: &Given, frame: Option<u32>) -> Result<Scene, Error> {
     let mut scene = parse_scene(&arguments.scene, given, frame, arguments.turntable)?;
     let has_all = !arguments.transparent || scene.render.layers.add("background");
@@ -216,8 +216,7 @@ fn outputs(arguments: &RenderArguments) -> Result<Vec<PathBuf>, Error> {
         };
         outputs.push(Path::new(name.file_stem().unwrap_or("picture".as_ref())).with_added_extension("exr"));
     }
-    let options =
-        [("--transparent", arguments.transparent), ("--deep", arguments.deep), ("--legend", arguments.legend)];
+    let options = [("--deep", arguments.deep), ("--legend", arguments.legend)];
     let is_png = |path: &PathBuf| Format::of_path(path).is_ok_and(|format| format == Format::Png);
     if let Some((option, _)) = options.iter().find(|option| option.1)
         && !outputs.iter().any(is_png)

@@ -5,8 +5,8 @@ use crate::displayed;
 /// Middle grey, which an exposure is proposed for.
 const GREY: f64 = 0.18;
 
-/// Why a picture is of one colour, all black or all white, and what to do, one sentence; `None` for any other. `beauty` is radiance,
-/// `exposure` in stops.
+/// Why a picture is of one colour, and what to do, one sentence; `None` for any other, and for a single pixel that is neither black nor white.
+/// `beauty` is radiance, `exposure` in stops.
 pub fn doubt(beauty: &[[f32; 3]], exposure: f64) -> Option<String> {
     let gain = libm::exp2(exposure) as f32;
     let all = |byte: u8| beauty.iter().flatten().all(|v| displayed(v * gain) == byte);
@@ -25,10 +25,19 @@ pub fn doubt(beauty: &[[f32; 3]], exposure: f64) -> Option<String> {
                 .to_owned()
         });
     }
-    all(255).then(|| {
+    if all(255) {
         let darkest = beauty.iter().flatten().fold(f32::INFINITY, |least, v| f32::min(least, *v));
         let stops = if darkest.is_finite() { stops(darkest) } else { -60.0 };
-        format!("the picture is all white: its darkest radiance is {darkest:.1e}; try --exposure {stops}")
+        return Some(format!(
+            "the picture is all white: its darkest radiance is {darkest:.1e}; try --exposure {stops}"
+        ));
+    }
+    let shown = |pixel: &[f32; 3]| pixel.map(|v| displayed(v * gain));
+    let is_even = beauty.len() > 1 && beauty.iter().all(|pixel| shown(pixel) == shown(&beauty[0]));
+    is_even.then(|| {
+        "the picture is all of one colour: no object stands out from what is behind it; look whether objects lie in the view, are large \
+         enough, and have colours or light of their own"
+            .to_owned()
     })
 }
 
@@ -40,12 +49,15 @@ mod tests {
     fn pictures_of_one_colour_are_told_with_an_exposure_that_shows_them() {
         assert_eq!(doubt(&[], 0.0), None);
         assert_eq!(doubt(&[[0.0; 3], [0.2; 3]], 0.0), None);
+        assert_eq!(doubt(&[[0.2; 3]], 0.0), None);
+        assert!(doubt(&[[0.2, 0.3, 0.4]; 2], 0.0).unwrap().contains("one colour"));
+        assert!(doubt(&[[0.2, 0.3, 0.4], [0.20001, 0.3, 0.4]], 0.0).unwrap().contains("one colour"));
         assert!(doubt(&[[0.0; 3]; 2], 0.0).unwrap().contains("no light comes"));
         for (radiance, exposure, what) in [(1e-5, 0.0, "black"), (50.0, 0.0, "white"), (0.2, -20.0, "black")] {
             let said = doubt(&[[radiance; 3]; 2], exposure).unwrap();
             assert!(said.contains(what), "{said}");
             let proposed: f64 = said.rsplit(' ').next().unwrap().parse().unwrap();
-            assert_eq!(doubt(&[[radiance; 3]; 2], proposed), None, "{said}");
+            assert_eq!(doubt(&[[radiance; 3]; 1], proposed), None, "{said}");
         }
     }
 }

@@ -5,9 +5,12 @@
 //! | beauty, alpha | R G B, A | | depth.first | Z and depth.first.Z |
 //! | normal | N.X N.Y N.Z | | other depths | depth.median.Z … |
 //! | shadow | shadow.A | | object | object.id (u32) |
-//! | direct … | direct.R direct.G direct.B | | | |
+//! | direct … | direct.R direct.G direct.B | | opacity before a background | opacity.A |
+//!
+//! `R G B` are premultiplied with `A`, as the format has it: both are of the objects alone, or, where a background is part of the picture,
+//! `A` is 1.
 
-use super::{Metadata, WriteReport, texts};
+use super::{Metadata, Params, WriteReport, texts};
 use crate::Error;
 use exr::prelude::*;
 use splat_core::{LayerData, Layers};
@@ -23,12 +26,23 @@ const TEXT: &str = "string";
 pub(super) fn encode(
     layers: &Layers,
     metadata: &Metadata,
-    half: bool,
+    params: &Params,
     report: &mut WriteReport,
 ) -> std::result::Result<Vec<u8>, crate::Error> {
     let mut channels = SmallVec::new();
     for (name, data) in &layers.images {
-        push_channels(&mut channels, name, data, half, report);
+        match (*name, data) {
+            ("beauty", LayerData::Rgb(_)) if params.transparent => {
+                let objects = LayerData::Rgb(before_background(layers)?);
+                push_channels(&mut channels, name, &objects, params.half, report);
+            }
+            ("alpha", LayerData::Scalar(opacity)) if params.has_background && !params.transparent => {
+                let whole = LayerData::Scalar(vec![1.0; opacity.len()]);
+                push_channels(&mut channels, name, &whole, params.half, report);
+                push_channels(&mut channels, "opacity", data, params.half, report);
+            }
+            _ => push_channels(&mut channels, name, data, params.half, report),
+        }
     }
     let fail = |e: exr::error::Error| Error::Internal(format!("EXR encoder: {e}"));
     let mut attributes = LayerAttributes::default();
@@ -46,6 +60,14 @@ pub(super) fn encode(
     let mut bytes = bytes.into_inner();
     sort_attributes(&mut bytes).ok_or_else(|| Error::Internal("the EXR header cannot be read back".into()))?;
     Ok(bytes)
+}
+
+/// Radiance of what lies before the background, premultiplied. The difference of equal numbers is 0; rounding leaves no negative light.
+fn before_background(layers: &Layers) -> std::result::Result<Vec<[f32; 3]>, crate::Error> {
+    let layer = |name: &str| layers.rgb(name).ok_or_else(|| Error::Internal(format!("a render has no {name} layer")));
+    let (beauty, background) = (layer("beauty")?, layer("background")?);
+    let difference = |(seen, behind): (&[f32; 3], &[f32; 3])| [0, 1, 2].map(|c| (seen[c] - behind[c]).max(0.0));
+    Ok(beauty.iter().zip(background).map(difference).collect())
 }
 
 /// A text as an attribute, in UTF-8: the encoder's own texts are Latin, and of 255 bytes at most.
@@ -153,7 +175,8 @@ mod tests {
     #[test]
     fn ou3_nothing_but_depth_is_infinite_and_nothing_is_nan() {
         let mut report = WriteReport::default();
-        let bytes = encode(&tiny(), &Metadata::default(), true, &mut report).unwrap();
+        let bytes =
+            encode(&tiny(), &Metadata::default(), &Params { half: true, ..Params::default() }, &mut report).unwrap();
         assert_eq!((report.not_a_number, report.clamped), (1, 2));
         let image =
             read().no_deep_data().largest_resolution_level().all_channels().first_valid_layer().all_attributes();
@@ -171,7 +194,7 @@ mod tests {
     #[test]
     fn the_same_layers_give_the_same_bytes_and_any_text_is_taken() {
         let metadata = Metadata { scene: "ügly\n".repeat(1000), backend: "雪".into(), ..Metadata::default() };
-        let encoded = || encode(&tiny(), &metadata, false, &mut WriteReport::default()).unwrap();
+        let encoded = || encode(&tiny(), &metadata, &Params::default(), &mut WriteReport::default()).unwrap();
         let first = encoded();
         assert!((0..8).all(|_| encoded() == first));
         let has = |text: &str| first.windows(text.len()).any(|bytes| bytes == text.as_bytes());

@@ -65,9 +65,12 @@ pub struct Params {
     pub half: bool,
     /// Whether a PNG file has 16 bits a channel, not 8.
     pub deep: bool,
-    /// Whether a PNG file has the opacity of its pixels (straight alpha) in the place of what lies behind everything: the layer
-    /// `background` is taken off.
+    /// Whether files have the opacity of their pixels in the place of what lies behind everything: the layer `background` is taken off.
+    /// EXR files then hold premultiplied colours, PNG files straight ones.
     pub transparent: bool,
+    /// Whether beauty holds a background that is not black. An EXR file with one is opaque: its `A` is 1, and the opacity of what lies before
+    /// the background is `opacity.A`, so that no compositing program adds the background twice.
+    pub has_background: bool,
     /// What colours stand for: a PNG file has a legend of each over its right border, as large as the picture asks for.
     pub legend: Vec<ColorScale>,
 }
@@ -123,7 +126,7 @@ impl Format {
 pub fn write(layers: &Layers, metadata: &Metadata, target: &Target, params: &Params) -> Result<WriteReport, Error> {
     let mut report = WriteReport::default();
     let bytes = match Format::of_path(target.path())? {
-        Format::Exr => exr_file::encode(layers, metadata, params.half, &mut report)?,
+        Format::Exr => exr_file::encode(layers, metadata, params, &mut report)?,
         Format::Png => png_file::encode(layers, metadata, params, &mut report)?,
     };
     report.bytes = bytes.len() as u64;

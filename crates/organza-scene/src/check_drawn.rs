@@ -76,7 +76,7 @@ fn check_sampled(at: &At<'_>, objects: &[SceneObject], render: &RenderSettings) 
 /// Whether an object bends light: `surfels` draw it, and `auto` gives it to them.
 fn is_bent(object: &SceneObject, materials: &[SceneMaterial], technique: Technique) -> bool {
     let by_surfels = matches!(object.technique.unwrap_or(technique), Technique::Auto | Technique::Surfels);
-    object.visible && by_surfels && materials[object.material].material.index != [1.0; 3]
+    object.visible && by_surfels && materials[object.material].material.index.is_some()
 }
 
 /// `reflection` and `refraction` are two of the effects where rays are bent, and else they are refused.

@@ -166,17 +166,18 @@ fn check_bump(at: &At<'_>, raw: &RawBump, paths: &Paths) -> Result<(Bump, Option
 /// Dominant wavelengths of the primaries of Rec.709, µm.
 const WAVELENGTHS: [f64; 3] = [0.6114, 0.5491, 0.4642];
 
-/// The refractive index per channel.
-fn check_index(at: &At<'_>, raw: &RawMaterial) -> Result<[f32; 3], Error> {
+/// The refractive index per channel, where there is one.
+fn check_index(at: &At<'_>, raw: &RawMaterial) -> Result<Option<[f32; 3]>, Error> {
     let Some(cauchy) = &raw.cauchy else {
-        return Ok([at.number("ior", raw.ior.unwrap_or(1.0), 0.1..=10.0)? as f32; 3]);
+        let index = raw.ior.map(|ior| at.number("ior", ior, 0.1..=10.0)).transpose()?;
+        return Ok(index.map(|index| [index as f32; 3]));
     };
     if raw.ior.is_some() {
         return Err(at.key("ior").error("expected one of `ior` and `cauchy`, found both", "`cauchy` gives the index"));
     }
     let at = at.key("cauchy");
     let (a, b) = (at.number("a", cauchy.a, 0.1..=10.0)?, at.number("b", cauchy.b, 0.0..=1.0)?);
-    Ok(WAVELENGTHS.map(|wavelength| (a + b / (wavelength * wavelength)) as f32))
+    Ok(Some(WAVELENGTHS.map(|wavelength| (a + b / (wavelength * wavelength)) as f32)))
 }
 
 /// Extinction of a medium, and its ratio per channel.

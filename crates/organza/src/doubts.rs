@@ -1,10 +1,12 @@
 //! What a picture would fail to show, and what to change: a scene without light, things outside the view, a picture of one
 //! colour. None is an error, and none is said of an [animation]: there things come into view and fade.
 
+mod small;
+
 use crate::load::{Loaded, own::Own};
 use crate::plan::Plan;
 use crate::scene::place;
-use crate::scene::{Scene, SceneLight};
+use crate::scene::{Scene, SceneLight, SceneObject};
 use crate::{Layers, ShadowTable, escape_controls};
 use glam::DVec3;
 use splat_core::DAabb;
@@ -19,7 +21,22 @@ pub(crate) fn of_scene(scene: &Scene, loaded: &Loaded) -> Vec<String> {
     if scene.frames.is_some() {
         return dark.collect();
     }
-    dark.chain(turned_away(loaded)).chain(outside(scene, loaded)).collect()
+    let seen = seen(loaded);
+    let unseen = outside(scene, loaded, &seen).into_iter().chain(small::too_small(scene, loaded, &seen));
+    dark.chain(turned_away(loaded)).chain(unseen).chain(clear_shadows(scene, loaded)).collect()
+}
+
+/// Objects that absorb inside, and lie in a light that casts shadows, which are those of surfaces alone.
+fn clear_shadows<'a>(scene: &'a Scene, loaded: &'a Loaded) -> impl Iterator<Item = String> + 'a {
+    let is_lit = loaded.lights.iter().any(|light| light.shadow && light.light.intensity != [0.0; 3]);
+    let absorbs = |object: &&SceneObject| {
+        let material = &scene.materials[object.material].material;
+        object.visible && object.casts_shadow && material.absorption_inside != [0.0; 3]
+    };
+    scene.objects.iter().filter(move |_| is_lit).filter(absorbs).map(|object| {
+        let name = escape_controls(&object.name);
+        format!("object '{name}' absorbs light inside, but its shadow is that of its `opacity` alone: raise that, or set casts_shadow = false")
+    })
 }
 
 /// What a finished picture shows too little of.
@@ -60,9 +77,8 @@ fn turned_away(loaded: &Loaded) -> Vec<String> {
 }
 
 /// Objects of which nothing lies in the view.
-fn outside(scene: &Scene, loaded: &Loaded) -> Vec<String> {
-    let seen = seen(loaded);
-    let mut lost: Vec<(usize, DAabb)> = bounds(loaded, &seen);
+fn outside(scene: &Scene, loaded: &Loaded, seen: &[bool]) -> Vec<String> {
+    let mut lost: Vec<(usize, DAabb)> = bounds(loaded, seen);
     // Back into the scene's unit.
     let unit = libm::exp2(f64::from(loaded.exponent));
     lost.iter_mut().for_each(|(_, b)| *b = DAabb::new(b.min * unit, b.max * unit));

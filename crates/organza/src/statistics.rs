@@ -145,9 +145,9 @@ impl Statistics {
     /// Takes in an object whose surfaces bound matter, drawn by a technique that bends light.
     pub fn add_bound(&mut self, name: &str, material: &Material) {
         let unequal = |of: [f32; 3]| of != [of[0]; 3];
-        if material.index != [1.0; 3] {
+        if material.bends_light() {
             self.bent.push(name.to_owned());
-            self.disperses |= unequal(material.index);
+            self.disperses |= unequal(material.index_inside());
         }
         if material.absorption_inside != [0.0; 3] {
             self.absorbing.push(name.to_owned());

@@ -168,7 +168,7 @@ pub(crate) static TABLE: [Row; 5] = [
         technique: Technique::Surfels,
         is_offered: Material::bounds_matter,
         how: "are discs, which are averaged in each layer of a surface, and layers are composited in order",
-        bends: surfels::bends,
+        bends: |_| Ok(()),
         bumps: surfels::bumps,
         gaussians: false,
         meets_discs: true,

@@ -9,7 +9,7 @@ use crate::ensemble::{Apart, Ensemble, EnsembleParams, NearestObject};
 use crate::error::Error;
 
 const MAGIC: [u8; 4] = *b"PBSR";
-const VERSION: u32 = 3;
+const VERSION: u32 = 4;
 const HEADER: usize = 4 + 4 + 32 + 8 + 4 + 4 + 8 + 4;
 
 impl Ensemble {

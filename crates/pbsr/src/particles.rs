@@ -65,16 +65,21 @@ impl PackedNormal {
     }
 }
 
-/// A linear colour in 32 bits: three mantissas of nine bits and one exponent, 2⁻²⁴ to 65408, relative error at most
-/// 1/512 of the largest channel where it is rounded to the nearest.
+/// A linear colour in 32 bits: three mantissas of nine bits and one exponent of five, a power of four. Channels go up to 2⁴², steps are
+/// 2⁻²⁹ at least. The relative error is at most 1/256 of the largest channel where it is rounded to the nearest, 1/512 from a half to 1.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct PackedColor(u32);
 
+/// The power of two that the exponent 0 stands for: channels of such a colour are below it.
+const LEAST_POWER: i32 = -20;
+/// The largest channel, 511 steps of the largest exponent: 511·2³³, so that rounding up stays within nine bits.
+const LARGEST: f32 = 511.0 * (1u64 << 33) as f32;
+
 impl PackedColor {
     /// White.
-    pub const WHITE: Self = Self(256 | 256 << 9 | 256 << 18 | 16 << 27);
+    pub const WHITE: Self = Self(128 | 128 << 9 | 128 << 18 | 11 << 27);
 
-    /// Packs a colour, rounded to the nearest; negative and not finite channels count as 0, large ones as 65408.
+    /// Packs a colour, rounded to the nearest; negative channels and those that are not numbers count as 0, too large ones as the largest.
     #[inline]
     pub fn new(color: [f32; 3]) -> Self {
         // The number before 511.5: what is rounded stays below 512.
@@ -97,7 +102,8 @@ impl PackedColor {
     /// The colour.
     #[inline]
     pub fn get(self) -> [f32; 3] {
-        let scale = f32::from_bits(((self.0 >> 27) + 127 - 15 - 9) << 23);
+        // A step is 2^(power − 9).
+        let scale = f32::from_bits((2 * (self.0 >> 27) + 98) << 23);
         [self.0, self.0 >> 9, self.0 >> 18].map(|v| (v & 511) as f32 * scale)
     }
 }
@@ -119,16 +125,17 @@ impl Steps {
     /// Of which the largest is at most `most`, 256 or more.
     #[inline]
     fn up_to(color: [f32; 3], most: f32) -> Self {
-        let c = color.map(|v| if v > 0.0 { v.min(65408.0) } else { 0.0 });
+        let c = color.map(|v| if v > 0.0 { v.min(LARGEST) } else { 0.0 });
         let largest = c[0].max(c[1]).max(c[2]);
-        // Exponent of two above the largest channel, from its bits; rounding may carry into the next.
-        let mut exponent = ((largest.to_bits() >> 23) as i32 - 126).max(-15);
-        let scale = |e: i32| f32::from_bits(((9 - e + 127) as u32) << 23);
-        if largest * scale(exponent) > most {
-            exponent += 1;
+        // A power of two above the largest channel, from its bits; rounding may carry into the next of four.
+        let above = (largest.to_bits() >> 23) as i32 - 126;
+        let mut power = (above + (above & 1)).max(LEAST_POWER);
+        let scale = |power: i32| f32::from_bits(((9 - power + 127) as u32) << 23);
+        if largest * scale(power) > most {
+            power += 2;
         }
-        let s = scale(exponent);
-        Self { channels: c.map(|v| v * s), exponent: (exponent + 15) as u32 }
+        let s = scale(power);
+        Self { channels: c.map(|v| v * s), exponent: ((power - LEAST_POWER) >> 1) as u32 }
     }
 
     /// Whole steps below what the channels are with `more`.
@@ -236,16 +243,19 @@ mod tests {
     }
 
     #[test]
-    fn colours_come_back_within_a_512th() {
+    fn colours_come_back_within_a_256th_of_their_largest_channel() {
         assert_eq!(PackedColor::WHITE.get(), [1.0; 3]);
         assert_eq!(PackedColor::new([1.0; 3]), PackedColor::WHITE);
         assert_eq!(PackedColor::new([0.0; 3]).get(), [0.0; 3]);
-        assert_eq!(PackedColor::new([f32::NAN, -1.0, f32::INFINITY]).get()[2], 65408.0);
+        assert_eq!(PackedColor::default().get(), [0.0; 3]);
+        assert_eq!(PackedColor::new([f32::NAN, -1.0, f32::INFINITY]).get(), [0.0, 0.0, LARGEST]);
+        assert_eq!(PackedColor::new([f32::MAX, 0.0, f32::MAX]).get(), [LARGEST, 0.0, LARGEST]);
         for i in 0..20_000 {
-            let c: [f32; 3] = std::array::from_fn(|k| (rng::unit_f32(2, 1, i, k as u64) * 20.0 - 10.0).exp2());
+            let middle = rng::unit_f32(2, 1, i, 3) * 52.0 - 15.0;
+            let c: [f32; 3] = std::array::from_fn(|k| (rng::unit_f32(2, 1, i, k as u64) * 10.0 - 5.0 + middle).exp2());
             let back = PackedColor::new(c).get();
             let largest = c[0].max(c[1]).max(c[2]);
-            assert!((0..3).all(|k| (back[k] - c[k]).abs() <= largest / 512.0), "{c:?} → {back:?}");
+            assert!((0..3).all(|k| (back[k] - c[k]).abs() <= largest / 256.0), "{c:?} → {back:?}");
         }
     }
 }

@@ -40,8 +40,9 @@ pub struct Material {
     pub extinction_rgb: [f32; 3],
     /// How the opacity of a translucent surface grows at grazing angles.
     pub surface_opacity: crate::optics::SurfaceOpacity,
-    /// Refractive index of the matter that a surface bounds, by channel, > 0; 1 bends no light. Around it the index is 1.
-    pub index: [f32; 3],
+    /// Refractive index of the matter that a surface bounds, by channel, > 0; `None` for a surface that bounds none. Around it the index is
+    /// 1: matter of index 1 bends no light, and is as clear as any other.
+    pub index: Option<[f32; 3]>,
     /// What that matter absorbs, by channel, 1 / world unit, ≥ 0.
     pub absorption_inside: [f32; 3],
     /// How its surfaces are rough to light.
@@ -75,7 +76,7 @@ impl Default for Material {
             emission: [0.0; 3],
             extinction_rgb: [1.0; 3],
             surface_opacity: crate::optics::SurfaceOpacity::PerCrossing,
-            index: [1.0; 3],
+            index: None,
             absorption_inside: [0.0; 3],
             bump: Bump::default(),
         }
@@ -90,9 +91,20 @@ impl Material {
         r.max(g).max(b)
     }
 
-    /// Whether its surfaces bend light, or bound matter that absorbs.
+    /// Whether its surfaces bound matter, which has an index or absorbs.
     pub fn bounds_matter(&self) -> bool {
-        self.index != [1.0; 3] || self.absorption_inside != [0.0; 3]
+        self.index.is_some() || self.absorption_inside != [0.0; 3]
+    }
+
+    /// The refractive index of what its surfaces bound, by channel: 1 where nothing else is known.
+    #[inline]
+    pub fn index_inside(&self) -> [f32; 3] {
+        self.index.unwrap_or([1.0; 3])
+    }
+
+    /// Whether its surfaces mirror and bend light.
+    pub fn bends_light(&self) -> bool {
+        self.index_inside() != [1.0; 3]
     }
 
     /// Reflection of a surface per unit irradiance on a plane that faces the light: the factor on its colour, and what is

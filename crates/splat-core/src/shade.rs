@@ -14,7 +14,7 @@ pub use point::{Point, Radiance, arriving, facing};
 
 use crate::optics::TRACE;
 use crate::raster::Projected;
-use crate::{Camera, Cloud, Error, Light, Material, Object, Progress, Receiver, Slide, Transmittance};
+use crate::{Camera, Cloud, DAabb, Error, Light, Material, Object, Progress, Receiver, Slide, Transmittance};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 use scattering::{Batch, Scattering};
@@ -43,6 +43,13 @@ impl LitBy<'_> {
         let passing = self.slide.map_or([1.0; 3], |slide| slide.passing(p, spread));
         let arriving = |c: usize| irradiance[c] * passing[c];
         (to_light, std::array::from_fn(|c| if arriving(c) > TRACE { arriving(c) } else { 0.0 }))
+    }
+
+    /// The most of it that a point in a box of the world could receive without shadows, in the channel that has most, W/m²; `spread` as for
+    /// [`LitBy::irradiance`]. Infinite where the light may lie at such a point and `spread` is 0.
+    pub fn brightest_in(&self, bounds: &DAabb, spread: f64) -> f64 {
+        let passing = self.slide.map_or(1.0, |slide| f64::from(slide.brightest()));
+        passing * self.light.brightest_in(bounds, DVec3::ZERO, spread)
     }
 }
 

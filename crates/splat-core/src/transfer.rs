@@ -78,6 +78,11 @@ impl TransferFunction {
         Self { points: self.points.iter().map(kept).collect() }
     }
 
+    /// The largest channel of all colours.
+    pub fn brightest(&self) -> f32 {
+        self.points.iter().flat_map(|p| p.color).fold(0.0, f32::max)
+    }
+
     /// The control points.
     pub fn points(&self) -> &[TransferPoint] {
         &self.points

@@ -10,7 +10,7 @@ const uint PER_CROSSING = 1u << 31;
 
 // As `PackedColor::get`.
 vec3 unpack_color(uint packed) {
-    float scale = uintBitsToFloat(((packed >> 27) + 103u) << 23);
+    float scale = uintBitsToFloat((2u * (packed >> 27) + 98u) << 23);
     return vec3(float(packed & 511u), float((packed >> 9) & 511u), float((packed >> 18) & 511u)) * scale;
 }
 

@@ -188,7 +188,7 @@ fn surface(scene: &Scene, object: &SceneObject, mut mesh: Mesh) -> Body {
     mesh.color.iter_mut().for_each(|c| *c = c.map(|v| (f64::from(v) * scale) as f32));
     let opacity = object.opacity.unwrap_or(material.opacity);
     let kind = if m.bounds_matter() {
-        let (eta, absorption) = (m.index.map(f64::from), m.absorption_inside.map(f64::from));
+        let (eta, absorption) = (m.index_inside().map(f64::from), m.absorption_inside.map(f64::from));
         SurfaceKind::Dielectric(Dielectric { eta, absorption })
     } else if opacity < 1.0 {
         let tau = optics::optical_depth(opacity);

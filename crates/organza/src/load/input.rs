@@ -226,7 +226,15 @@ fn surface<'a>(
     opacity: f64,
 ) -> Result<Input<'a>, Error> {
     let Solid { field, bounds, step, .. } = solid;
-    let density = Density::Spacing(object.spacing.unwrap_or(step * splat.transform.scale));
+    let spacing = match (object.spacing, &isosurface) {
+        (Some(spacing), _) => spacing,
+        (None, None) => step * splat.transform.scale,
+        (None, Some(Isosurface { grid, level, inside, .. })) => {
+            let spacing = convert::isosurface_spacing(grid, f64::from(*level), *inside);
+            spacing.map_err(|e| Error::from_core("an isosurface", e))? * splat.transform.scale
+        }
+    };
+    let density = Density::Spacing(spacing);
     let field = if object.clip.is_empty() {
         field
     } else {

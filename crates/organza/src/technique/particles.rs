@@ -14,6 +14,7 @@ mod ensemble;
 mod form;
 mod kept;
 mod parts;
+mod unit;
 
 use crate::frame::Frame;
 use crate::pass;

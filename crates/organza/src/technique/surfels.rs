@@ -32,20 +32,12 @@ const GLASS_BYTES: u64 = 24;
 /// Bytes of the discs, and of what bent rays meet and see.
 pub(crate) fn bytes(matter: &Matter<'_>, _: &[LightPoint], _: bool, _: &RenderOptions) -> u64 {
     let discs = matter.cloud.map_or(0, |cloud| cloud.len() as u64);
-    let bounds = bends(matter.scene).is_ok() && matter.scene.materials.iter().any(|m| m.material.bounds_matter());
+    let bounds = matter.scene.materials.iter().any(|m| m.material.bounds_matter());
     let glass = if bounds { Surfaces::bytes(discs) + GLASS_BYTES * matter.camera.pixels() } else { 0 };
     let groups = grouped::bytes(matter.scene, discs, matter.cloud.map_or(0, |cloud| cloud.bytes()));
     let is_solid = |cloud: &Cloud| cloud.kind.contains(&SplatKind::Opaque);
     let opaque = if matter.cloud.is_some_and(is_solid) { OPAQUE_BYTES * matter.camera.pixels() } else { 0 };
     DISC_BYTES * discs + glass + groups + opaque
-}
-
-/// Whether light is mirrored and bent, or what to set so that it is.
-pub(crate) fn bends(scene: &Scene) -> Result<(), &'static str> {
-    match scene.render.surfels.layers {
-        SurfelLayers::Gaps | SurfelLayers::Peeled(_) => Ok(()),
-        SurfelLayers::Algorithm1(_) | SurfelLayers::Algorithm2(_) => Err("set render.surfels.layers = \"gaps\""),
-    }
 }
 
 /// Whether light falls on bumps, or what to set so that it does.

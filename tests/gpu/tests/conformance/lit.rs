@@ -375,7 +375,6 @@ fn too_little_room_and_other_lights_are_refused() {
 }
 
 /// What takes long and rarely fails where the others hold.
-#[cfg(feature = "deep")]
 mod deep {
     use super::*;
 

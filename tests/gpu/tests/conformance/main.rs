@@ -3,16 +3,10 @@
 
 mod canary;
 mod chained;
-#[cfg(feature = "deep")]
-mod composited;
 mod deposits;
 mod generated;
 mod kernels;
-#[cfg(feature = "deep")]
-mod layered;
 mod lit;
-#[cfg(feature = "deep")]
-mod means;
 mod order;
 mod particles;
 mod picture;
@@ -21,6 +15,13 @@ mod resolved;
 mod shaded;
 mod shadow;
 mod splat;
+
+/// What takes long and rarely fails where the others hold: `cargo xtask deep`.
+mod deep {
+    mod composited;
+    mod layered;
+    mod means;
+}
 
 use gpu_conformance::{adapter, backend};
 use organza::device::DeviceChoice;

@@ -168,7 +168,6 @@ fn particles_that_a_device_cannot_fold_are_the_processor_s() {
 }
 
 /// What takes long and rarely fails where the others hold.
-#[cfg(feature = "deep")]
 mod deep {
     use super::*;
     use organza::device::Agreement;

@@ -214,7 +214,6 @@ fn look_ups_are_the_cpu_s_within_the_tolerance() {
 }
 
 /// What takes long and rarely fails where the others hold.
-#[cfg(feature = "deep")]
 mod deep {
     use super::*;
 

@@ -2,6 +2,7 @@
 
 use super::checkpoint::Checkpoint;
 use super::parts::{Part, named};
+use super::unit::radiance_unit;
 use super::{fault, refuse};
 use crate::device::{Folding, Goal, Helper};
 use crate::frame::Frame;
@@ -35,7 +36,9 @@ pub(super) fn fold(
     let scene = pbsr::Scene { objects: &objects, lights: &lights, shadow_origin: origin, ambient, camera, occluder };
     let colored = frame.plan.optical_depth_planes == 3;
     let corners = parts.iter().flat_map(|part| part.corners());
+    let radiance_unit = radiance_unit(frame, parts);
     let kept = EnsembleParams::of_layers(&frame.layers, colored, depth_range(corners, camera));
+    let kept = EnsembleParams { radiance_unit, ..kept };
     let checkpoint = &mut session.checkpoint;
     let ensemble = match checkpoint.as_deref_mut().and_then(Checkpoint::take) {
         Some(found) => found,

@@ -6,6 +6,7 @@
 mod sampler;
 
 use super::refuse;
+use super::unit::brightest_color;
 use crate::Error;
 use crate::frame::Frame;
 use crate::load::Loaded;
@@ -37,6 +38,8 @@ pub(super) struct Source<'a> {
     of: u32,
     /// A box in the world that holds it.
     bounds: DAabb,
+    /// The largest channel of its colours.
+    brightest_color: f32,
 }
 
 enum Data<'a> {
@@ -49,10 +52,13 @@ pub(super) struct Part<'a> {
     name: String,
     pub(super) particles: Particles<'a>,
     transform: Similarity,
-    look: Appearance,
+    pub(super) look: Appearance,
     /// Rank of the object in the scene.
     pub(super) of: u32,
-    bounds: DAabb,
+    /// A box in the world that holds it.
+    pub(super) bounds: DAabb,
+    /// The largest channel of its colours.
+    pub(super) brightest_color: f32,
 }
 
 /// Where the particles of an object come from.
@@ -103,8 +109,9 @@ pub(super) fn sources<'a>(frame: &Frame<'a>) -> Vec<Source<'a>> {
         let (n, sum) = &mut splats[*object as usize];
         (*n, *sum) = (*n + 1, *sum + f64::from(*radius));
     }
-    let own = loaded.own.iter().map(|o| of_own(o, splats[o.object], frame));
-    own.chain(of_splats(frame)).collect()
+    // What other techniques draw from data of its own is not drawn again.
+    let own = loaded.own.iter().filter(|own| own.technique == Technique::Particles);
+    own.map(|own| of_own(own, splats[own.object], frame)).chain(of_splats(frame)).collect()
 }
 
 /// The finest cross-section that a camera needs of an object, units² of the object.
@@ -138,6 +145,7 @@ fn of_own<'a>(own: &'a Own, (n, sum): (u32, f64), frame: &Frame<'a>) -> Source<'
         volumes_by: frame.settings.particles.volume_sampler,
         of: own.object as u32,
         bounds: own.world_box(),
+        brightest_color: brightest_color(own),
     }
 }
 
@@ -159,6 +167,7 @@ fn of_splats<'a>(frame: &Frame<'a>) -> Vec<Source<'a>> {
         let material = materials[cloud.material[first] as usize];
         let most = material.greatest_extinction();
         splats.cross_section.iter_mut().for_each(|k| *k *= most);
+        let brightest_color = splats.color.as_flattened().iter().copied().fold(0.0, f32::max);
         let radius = splats.radius.iter().map(|r| f64::from(*r)).sum::<f64>() / splats.len() as f64;
         let bounds = splats.bounds();
         let center = splats.origin + bounds.center().as_dvec3();
@@ -180,7 +189,7 @@ fn of_splats<'a>(frame: &Frame<'a>) -> Vec<Source<'a>> {
         let data = Data::Splats(Box::new((splats, params)));
         let name = objects[object as usize].name.clone();
         let (transform, volumes_by) = (Similarity::default(), VolumeSampler::Auto);
-        Source { name, data, transform, look, cross_section, seed, volumes_by, of: object, bounds }
+        Source { name, data, transform, look, cross_section, seed, volumes_by, of: object, bounds, brightest_color }
     };
     of_object.into_iter().map(part).collect()
 }
@@ -238,6 +247,7 @@ impl<'a> Source<'a> {
             look: self.look,
             of: self.of,
             bounds: self.bounds,
+            brightest_color: self.brightest_color,
         }
     }
 }

@@ -1,6 +1,5 @@
 //! What the technique adds to a plan, and what it does without.
 
-use super::bends;
 use crate::load::Loaded;
 use crate::pass;
 use crate::plan::{Effect, Plan, PlannedPass};
@@ -17,7 +16,7 @@ pub(crate) fn plans(scene: &Scene, loaded: &Loaded, plan: &mut Plan) {
     let is_solid = |i: usize| cloud.kind[i] == SplatKind::Opaque && !plan.is_own[object(i)];
     let has_solid = (0..cloud.len()).any(|i| is_ours(i) && is_solid(i));
     let ours = scene.objects.iter().zip(&by).filter(|(o, by)| o.visible && **by == Technique::Surfels);
-    let bent = bends(scene).is_ok() && ours.clone().any(|(o, _)| loaded.materials[o.material].bounds_matter());
+    let bent = ours.clone().any(|(o, _)| loaded.materials[o.material].bounds_matter());
     let others = (0..cloud.len()).any(|i| !is_ours(i) && (is_solid(i) || draws[object(i)]));
     let deforms = ours.clone().any(|(o, _)| o.deforms);
     if settings.lights_pixels && !bent && !others {

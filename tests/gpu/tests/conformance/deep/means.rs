@@ -1,6 +1,6 @@
 //! Means of particles that a device makes: the CPU's of other seeds, to a stated level.
 
-use super::generated::{ROOM, World, by_device, by_processor, pixels, splats};
+use crate::generated::{ROOM, World, by_device, by_processor, pixels, splats};
 use gpu_conformance::open;
 use pbsr::{Ensemble, MeshSampler, SurfaceParams};
 

@@ -1,6 +1,6 @@
 //! Depths and objects of composited splats: the CPU's, within a stated tolerance.
 
-use super::splat::{Both, SIZE, Scene, TOLERANCE, VIEWS, discs, media, unit};
+use crate::splat::{Both, SIZE, Scene, TOLERANCE, VIEWS, discs, media, unit};
 use gpu_conformance::open;
 use splat_core::glam::DVec3;
 use splat_core::raster::OpaqueImage;

@@ -1,0 +1,71 @@
+//! The unit in which the sets of a frame sum radiance, so that no light is cut and none is lost, however bright or dim a scene is.
+//!
+//! Sums have steps of 2⁻²⁴ of the unit, and end at 2¹⁶ of it ([`pbsr::EnsembleParams::radiance_unit`]). The unit lies 2¹² below a bound of the
+//! radiance of any particle: the brightest light that could reach the box of an object, at the peak of its material. What is seen may be a
+//! million times dimmer, as where a lamp stands in the box, and still has steps of 1/60,000 of it.
+
+use super::parts::Part;
+use crate::frame::Frame;
+use crate::load::own::{Body, Own};
+use pbsr::Appearance;
+use splat_core::{DAabb, Material, Shading};
+use std::f64::consts::PI;
+
+/// How many powers of two the unit lies below the bound.
+const BELOW_BOUND: i32 = 12;
+/// Powers of two that a unit may be: its steps and its largest sums are normal numbers of f32.
+const LEAST_POWER: i32 = -100;
+const MOST_POWER: i32 = 100;
+/// How near a lamp comes to particles without a radius, over the diagonal of their box.
+const NEAREST: f64 = 1e-4;
+
+/// The unit, a power of two.
+pub(super) fn radiance_unit(frame: &Frame<'_>, parts: &[&Part<'_>]) -> f32 {
+    let brightest = parts.iter().map(|part| brightest(frame, part)).fold(0.0, f64::max);
+    if brightest == 0.0 {
+        return 1.0;
+    }
+    let (_, power) = libm::frexp(brightest);
+    libm::exp2(f64::from((power - BELOW_BOUND).clamp(LEAST_POWER, MOST_POWER))) as f32
+}
+
+/// No particle of an object has more radiance in any channel.
+fn brightest(frame: &Frame<'_>, part: &Part<'_>) -> f64 {
+    let Appearance { material, radius, .. } = part.look;
+    let greatest = |channels: [f32; 3]| f64::from(channels.into_iter().fold(0.0, f32::max));
+    let color = f64::from(part.brightest_color);
+    let emission = greatest(material.emission);
+    if material.shading == Shading::Unlit {
+        return emission + color;
+    }
+    let spread = (f64::from(radius) / 3.0).max(NEAREST * part.bounds.diagonal());
+    let received = |bounds: &DAabb| -> f64 {
+        let points = frame.light_points().iter();
+        points.map(|point| frame.lit(point).brightest_in(bounds, spread)).sum()
+    };
+    let ambient = greatest(frame.scene.ambient) * f64::from(material.ambient) * color;
+    emission + ambient + received(&part.bounds) * (color * diffuse_peak(&material) + specular_peak(&material))
+}
+
+/// The most that a material sends on of what it receives, as a factor on its colour: Lambert's or the peak of its phase function, 1/sr.
+fn diffuse_peak(material: &Material) -> f64 {
+    let g = f64::from(material.asymmetry.abs());
+    let phase = (1.0 + g) / (4.0 * PI * (1.0 - g) * (1.0 - g));
+    (f64::from(material.diffuse) / PI).max(f64::from(material.single_scattering_albedo) * phase)
+}
+
+/// The same of a highlight, whatever the colour.
+fn specular_peak(material: &Material) -> f64 {
+    f64::from(material.specular) * (f64::from(material.shininess) + 2.0) / (2.0 * PI)
+}
+
+/// The largest channel of the colours of an object's own data.
+pub(super) fn brightest_color(own: &Own) -> f32 {
+    let greatest = |colors: &[[f32; 3]]| colors.as_flattened().iter().copied().fold(0.0, f32::max);
+    let data = match &own.body {
+        Body::Cells { transfer, .. } => transfer.brightest(),
+        Body::Triangles(mesh) if !mesh.color.is_empty() => greatest(&mesh.color) * greatest(&[own.color]),
+        Body::Triangles(_) | Body::Surface { .. } | Body::Lattice { .. } | Body::Field(_) => greatest(&[own.color]),
+    };
+    own.field.as_ref().map_or(data, |(field, _)| data.max(field.brightest()))
+}
