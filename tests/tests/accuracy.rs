@@ -1,5 +1,7 @@
 //! `organza accuracy`: a technique of known order, the same one broken, one that does not converge, and the command.
 
+mod random;
+
 use organza::scene::{self, Scene};
 use organza::{Error, Progress, RenderOptions};
 use organza_judge::accuracy::{
@@ -210,80 +212,9 @@ fn what_was_not_measured_is_null() {
     );
 }
 
-/// A sweep of repeat levels from `sweep`'s scene.
-fn repeats() -> Sweep {
-    particles(&scene(), &FEW, &OPTIONS).unwrap()
-}
-
-/// The exact picture with noise of variance 0.01/`repeat level`, which `seed_of` chooses; `bias` is added everywhere.
-fn noisy(seed_of: fn(u64, u32) -> u64, bias: f64) -> Study {
-    let limit = run(0.5).unwrap().limit;
-    let mut draw = |request: &Request| {
-        let (render, level) = (&request.scene.render, request.scene.render.particles.repeat_level);
-        let seed = seed_of(render.seed, level);
-        let deviation = 0.1 / f64::from(level).sqrt();
-        let value =
-            |k: usize, c: u64| 12f64.sqrt() * (splat_core::rng::unit(seed, 1, k as u64, c) - 0.5) * deviation + bias;
-        let pixel = |(k, p): (usize, &[f64; 3])| [p[0] + value(k, 0), p[1] + value(k, 1), p[2] + value(k, 2)];
-        let pixels = exact_image().pixels().iter().enumerate().map(pixel).collect();
-        Ok(frame(Image::from_radiance(SIZE, pixels).unwrap(), 1e-3 * f64::from(level)))
-    };
-    random_study(
-        &repeats(),
-        Yardsticks { limit: &limit, truth: Err("a test".into()) },
-        &OPTIONS,
-        &Progress::new(),
-        &mut draw,
-    )
-    .unwrap()
-}
-
-#[test]
-fn a_random_technique_has_intervals_and_its_noise_falls_with_the_root_of_the_repeat_level() {
-    let study = noisy(|seed, level| seed + 1000 * u64::from(level), 0.0);
-    let (order, half) = order_of(&study, "repeat level");
-    assert!((order - 0.5).abs() < 0.03 && half < 0.06, "{order} ± {half}");
-    assert!(verdict(&study, &study.curves[0]).contains("as theory says: 0.47 to 0.53"));
-    // Nothing is refused, and the intervals hold what is known.
-    assert!(study.outcomes.iter().all(|o| o.drawn));
-    for o in &study.outcomes {
-        let (sampled, level) = (o.sampled.unwrap(), o.setting.request.scene.render.particles.repeat_level);
-        let deviation = 0.1 / f64::from(level).sqrt();
-        assert!((sampled.noise / deviation - 1.0).abs() < 0.05, "{level}: {sampled:?}");
-        assert!((sampled.from_limit.mean - deviation).abs() <= sampled.from_limit.half_width, "{level}: {sampled:?}");
-        // 1152 numbers in five pictures: four standard errors.
-        assert!(sampled.bias.is_none_or(|b| b < 0.19 * deviation), "{level}: {sampled:?}");
-        assert_eq!((sampled.seeds, o.timed.seconds.len()), (5, 6), "five seeds, and a round that the frontier held");
-    }
-    let bias = noisy(|seed, level| seed + 1000 * u64::from(level), 0.05);
-    assert!(bias.outcomes.iter().all(|o| (o.sampled.unwrap().bias.unwrap() / 0.05 - 1.0).abs() < 0.1));
-    assert!((order_of(&bias, "repeat level").0 - 0.5).abs() < 0.03, "bias is no noise");
-}
-
-#[test]
-fn sets_that_are_not_independent_show_up_in_the_report() {
-    // Twice the level adds nothing: what is drawn is that of level 2, but the noise that comes with it.
-    let limit = run(0.5).unwrap().limit;
-    let mut draw = |request: &Request| {
-        let seed = request.scene.render.seed;
-        let value = |k: usize| [0.5 + 0.1 * splat_core::rng::unit(seed, 1, k as u64, 0); 3];
-        let image = Image::from_radiance(SIZE, (0..SIZE[0] * SIZE[1]).map(value).collect()).unwrap();
-        Ok(frame(image, 1e-3))
-    };
-    let study = random_study(
-        &repeats(),
-        Yardsticks { limit: &limit, truth: Err("a test".into()) },
-        &OPTIONS,
-        &Progress::new(),
-        &mut draw,
-    )
-    .unwrap();
-    assert!(verdict(&study, &study.curves[0]).contains("theory says otherwise"));
-}
-
 #[test]
 fn techniques_share_one_frontier_and_what_is_absent_is_named() {
-    let (points, random) = (run(0.5).unwrap(), noisy(|seed, level| seed + 1000 * u64::from(level), 0.0));
+    let (points, random) = (run(0.5).unwrap(), random::noisy(|seed, level| seed + 1000 * u64::from(level), 0.0));
     let report = Report::new(&scene(), OPTIONS, vec![points, random], Vec::new());
     let error = |[s, o]: &[usize; 2]| report.studies[*s].outcomes[*o].from_limit.as_ref().unwrap().linear.rmse;
     let seconds = |[s, o]: &[usize; 2]| least_seconds(&report.studies[*s].outcomes[*o]).unwrap();
@@ -371,6 +302,29 @@ fn the_command_writes_three_files_or_none() {
 }
 
 #[test]
+fn translucent_triangles_are_judged_by_sheets() {
+    let folder = tempfile::tempdir().unwrap();
+    let fog = SCENE.find("[[object]]").unwrap();
+    let pane = "[[object]]\nname = 'pane'\nopacity = 0.4\n\
+                rectangle = { center = [0, 0, 0], u = [0.8, 0, 0.3], v = [0, 0.6, 0], spacing = 0.2 }\n";
+    let text = SCENE[..fog].replace("size = [24, 16]", "size = [12, 8]") + pane;
+    fs::write(folder.path().join("s.toml"), text).unwrap();
+    let arguments = ["accuracy", "s.toml", "--quick", "--out", "r"];
+    let out = organza().args(arguments).current_dir(&folder).output().unwrap();
+    assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+    let written: Value = serde_json::from_slice(&fs::read(folder.path().join("r/accuracy.json")).unwrap()).unwrap();
+    let techniques = written["techniques"].as_array().unwrap();
+    let sheets =
+        techniques.iter().find(|t| t["technique"] == "sheets").unwrap_or_else(|| panic!("{}", written["absent"]));
+    // No slab holds anything, so nothing is to be turned of slabs and kernels; the rest is.
+    let skipped = sheets["skipped"].as_array().unwrap();
+    let reason =
+        |knob: &str| skipped.iter().find(|s| s["knob"] == knob).map(|s| s["reason"].as_str().unwrap().to_owned());
+    assert!(reason("slab width").is_some_and(|reason| reason.contains("triangles")), "{skipped:?}");
+    assert!(sheets["curves"].as_array().unwrap().iter().any(|curve| curve["knob"] == "samples"), "{sheets}");
+}
+
+#[test]
 fn knobs_that_cannot_matter_are_left_alone() {
     let sweep = points(&scene(), &Facts::default(), &OPTIONS);
     let skipped: Vec<&str> = sweep.skipped.iter().map(|s| s.knob).collect();
@@ -414,7 +368,7 @@ fn what_a_report_says_to_write_gives_the_scene_that_it_drew() {
         let sweeps = [
             points(&written, &ALL, &THOROUGH),
             particles(&written, &ALL, &THOROUGH).unwrap(),
-            sheets(&written, Some(0.1), &ALL, &THOROUGH).unwrap(),
+            sheets(&written, Some(0.1), &ALL, &THOROUGH),
             surfels(&written, &ALL, &THOROUGH),
         ];
         for (sweep, knob) in sweeps.iter().flat_map(|sweep| sweep.knobs.iter().map(move |knob| (sweep, knob))) {

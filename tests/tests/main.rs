@@ -27,6 +27,7 @@ mod interrupts;
 mod invariances;
 mod layers;
 mod legends;
+mod levels;
 mod loading;
 mod many_forms;
 mod matter;

@@ -2,7 +2,7 @@
 //!
 //! `docs/papers/*.toml` hold one row per numbered equation and per quantitative claim; `docs/papers.md` is made from
 //! them. A row names code and tests, and a name that no longer exists is an error; so is a verdict that no test and no benchmark
-//! stands for. Times are named, and taken from what benchmarks wrote: one by hand is an error, and a benchmark that never ran. Hard cases need a test that bears their id.
+//! stands for, and a test of what is not built. Times are named, and taken from what benchmarks wrote: one by hand is an error, and a benchmark that never ran. Hard cases need a test that bears their id.
 
 mod hard_cases;
 mod ledger;
@@ -79,7 +79,7 @@ mod tests {
         let code = "fn f() {}\nfn f_holds() {}\n";
         assert_eq!(
             check(&repo(&page, code)),
-            Ok("papers: 1 rows: 1 holds, 0 differs, 0 not reproducible, 0 not measured".to_owned())
+            Ok("papers: 1 rows: 1 holds, 0 differs, 0 not built, 0 not reproducible, 0 not measured".to_owned())
         );
         assert!(check(&repo(&page.replace("\n", "\r\n"), code)).is_ok());
         let stale = check(&repo(&format!("{page}more\n"), code)).expect_err("stale");

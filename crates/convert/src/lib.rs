@@ -173,3 +173,8 @@ pub use thin::thinned;
 pub use vertex_normals::{smooth, vertex_normals};
 pub use volume_points::{VolumeParams, VolumeReport, volume_to_points};
 pub use write_splats::{packed_splats_to_ply, splats_to_ply};
+
+/// The page's example compiles and holds.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Page;

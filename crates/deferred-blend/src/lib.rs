@@ -34,3 +34,8 @@ pub use opaque::{Opaque, OpaqueInput, Passes, resolve_opaque};
 pub use params::Params;
 pub use shade::{Light, Shown};
 pub use surfaces::Surfaces;
+
+/// The page's example compiles and holds.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Page;

@@ -44,3 +44,8 @@ pub use backend::backend;
 pub use device::Device;
 pub use prepared::Prepared;
 pub use splat_shaders::{Adapter, AdapterKind, Choice, DeviceError, Inputs, PassTime, Run, Validation};
+
+/// The page's example compiles and holds.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Page;

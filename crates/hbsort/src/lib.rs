@@ -66,3 +66,8 @@ pub use params::{Params, Thickness};
 pub use scratch::{Method, Scratch, SortInfo, ThicknessRule};
 pub use sort::{slice_cloud, slice_depths};
 pub use splat_core::{Direction, SliceOrder};
+
+/// The page's example compiles and holds.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Page;

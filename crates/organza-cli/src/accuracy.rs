@@ -124,15 +124,15 @@ fn sheets(
     if let Some(reason) = renderer.refused(&drawn)? {
         return absent(reason);
     }
+    if !renderer.runs(&drawn, organza::pass::SHEETS)? {
+        return absent("nothing is translucent, so the picture is that of `points`".into());
+    }
     let slab_width = match renderer.slab_width(&drawn) {
         Err(limit @ Error::Limit(_)) => return absent(limit.to_string()),
         found => found?,
     };
     let facts = renderer.facts(&drawn)?;
-    match accuracy::sheets(scene, slab_width, &facts, options) {
-        Ok(sweep) => by_own_limit(&sweep, options, points, renderer, progress),
-        Err(reason) => absent(reason),
-    }
+    by_own_limit(&accuracy::sheets(scene, slab_width, &facts, options), options, points, renderer, progress)
 }
 
 /// The study of `surfels`, by a limit of its own and the truth of `points`; or why there is none.

@@ -91,3 +91,8 @@ impl From<tsm::Error> for Failure {
         }
     }
 }
+
+/// The page's example compiles and holds.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Page;

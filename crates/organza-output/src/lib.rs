@@ -133,3 +133,8 @@ pub fn write(layers: &Layers, metadata: &Metadata, target: &Target, params: &Par
     target.write(&bytes)?;
     Ok(report)
 }
+
+/// The page's example compiles and holds.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Page;

@@ -110,3 +110,8 @@ pub use splats::{SplatParams, SplatSampler};
 pub use volume::{GridSampler, VolumeParams};
 pub use volume_field::{FieldVolumeParams, FieldVolumeSampler};
 pub use walk::Walk;
+
+/// The page's example compiles and holds.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Page;

@@ -2,12 +2,14 @@
 
 use crate::common::*;
 use pbsr::{
-    Density, FieldVolumeParams, FieldVolumeSampler, GridSampler, MeshSampler, MetropolisParams, MetropolisSampler,
-    Particles, Sampler, SplatParams, SplatSampler, SurfaceParams, VolumeParams, pixel_area,
+    Density, FieldVolumeParams, FieldVolumeSampler, GridSampler, LatticeSampler, MeshSampler, MetropolisParams,
+    MetropolisSampler, Particles, Sampler, SplatParams, SplatSampler, SurfaceParams, VolumeParams, pixel_area,
 };
 use splat_core::glam::{DMat3, DVec3, Vec3};
 use splat_core::optics::SurfaceOpacity;
-use splat_core::{Cloud, DAabb, Footprint, Grid, Projection, Splat, SplatKind, TransferFunction, TransferPoint};
+use splat_core::{
+    Cloud, DAabb, Footprint, Grid, Interpolation, Projection, Splat, SplatKind, TransferFunction, TransferPoint,
+};
 
 fn surface(opacity: f64, cross_section: f64, seed: u64) -> SurfaceParams {
     SurfaceParams { opacity, cross_section, seed, ..SurfaceParams::default() }
@@ -32,6 +34,37 @@ fn a_stack_of_planes_has_the_product_of_their_transmittances() {
     assert!(found.none(), "{found:?}");
     // The same picture against a wrong opacity.
     assert!(!bias(&ensemble, &|_, _| Some(alpha * 1.005)).none());
+}
+
+/// Figure 3, left: five isosurfaces of the trilinear field x·y·z within one cell. A ray along z at (x, y) meets that of the level v
+/// once, at z = v/(x·y), where |v| ≤ |x·y|.
+#[test]
+fn five_isosurfaces_within_one_trilinear_cell_have_the_opacity_of_those_that_a_ray_meets() {
+    const LEVELS: [f64; 5] = [-0.5, -0.25, 0.125, 0.375, 0.625];
+    let sign = |i: usize, axis: usize| if i >> axis & 1 == 1 { 1.0 } else { -1.0 };
+    let values = (0..8).map(|i| sign(i, 0) * sign(i, 1) * sign(i, 2)).collect();
+    let axes = DMat3::from_diagonal(DVec3::splat(2.0));
+    let grid = Grid { origin: DVec3::splat(-1.0), axes, dims: [2; 3], values };
+    let camera = front(32);
+    let s = pixel_area(&camera, DVec3::Z);
+    let sampler = |level: f64, seed: u64| {
+        let params = SurfaceParams { surface_opacity: SurfaceOpacity::PerCrossing, ..surface(0.1, s, seed) };
+        LatticeSampler::new(&grid, Interpolation::Trilinear, level as f32, &params).unwrap()
+    };
+    let samplers: Vec<LatticeSampler<'_>> = LEVELS.into_iter().zip(1..).map(|(v, seed)| sampler(v, seed)).collect();
+    let five: Vec<&dyn Sampler> = samplers.iter().map(|s| s as &dyn Sampler).collect();
+    let crossings = |x: f64, y: f64| LEVELS.iter().filter(|v| v.abs() <= (x * y).abs()).count() as f64;
+    let expected = |x: u32, y: u32| {
+        const N: u32 = 32;
+        let place = |pixel: u32, k: u32| (f64::from(pixel) + (f64::from(k) + 0.5) / f64::from(N)) / 16.0 - 1.0;
+        let sum: f64 = (0..N * N).map(|k| crossings(place(x, k % N), place(y, k / N))).sum();
+        Some(1.0 - 0.9f64.powf(sum / f64::from(N * N)))
+    };
+    let found = bias(&render(&camera, &five, 1500), &expected);
+    assert!(found.none(), "{found:?}");
+    // A picture that lacks one of the surfaces is told from it.
+    let found = bias(&render(&camera, &five[1..], 1500), &expected);
+    assert!(!found.none(), "{found:?}");
 }
 
 /// The sets of another sampler, several numbers standing for one set.

@@ -92,3 +92,8 @@ pub use scene::Scene;
 pub use slide::Slide;
 pub use surface::{Surface, SurfaceKind, SurfaceMaterial};
 pub use visibility::{Hit, Visibility};
+
+/// The page's example compiles and holds.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Page;

@@ -91,3 +91,8 @@ pub use fold::{Sheeted, prepare};
 pub use params::{Aligned, Classify, Gradients, KernelShape, Params};
 pub use splats::Splats;
 pub use volume::{SheetInput, Volume};
+
+/// The page's examples compile and hold.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Page;

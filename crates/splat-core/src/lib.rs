@@ -103,3 +103,8 @@ pub use space::{Aabb, DAabb, Similarity};
 pub use transfer::{TransferFunction, TransferPoint};
 pub use transmittance::{MeanTransmittance, Receiver, TOGETHER, Transmittance};
 pub use turns::turns;
+
+/// The page's example compiles and holds.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Page;

@@ -63,3 +63,8 @@ pub use params::{MappingChoice, Params, Resolution};
 pub use query::SurfacePoint;
 pub use scene::Scene;
 pub use shadow_map::ShadowMap;
+
+/// The page's example compiles and holds.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Page;

@@ -7,17 +7,21 @@ use crate::toml_lines::{lines, string};
 pub(crate) enum Verdict {
     Holds,
     Differs,
+    /// Nothing of the kind exists here, such as a pass of a graphics board.
+    NotBuilt,
     NotReproducible,
     NotMeasured,
 }
 
 impl Verdict {
-    pub(crate) const ALL: [Self; 4] = [Self::Holds, Self::Differs, Self::NotReproducible, Self::NotMeasured];
+    pub(crate) const ALL: [Self; 5] =
+        [Self::Holds, Self::Differs, Self::NotBuilt, Self::NotReproducible, Self::NotMeasured];
 
     pub(crate) fn words(self) -> &'static str {
         match self {
             Self::Holds => "holds",
             Self::Differs => "differs",
+            Self::NotBuilt => "not built",
             Self::NotReproducible => "not reproducible",
             Self::NotMeasured => "not measured",
         }
@@ -130,6 +134,16 @@ mod tests {
         assert_eq!(ledger.rows.len(), 2);
         let row = &ledger.rows[1];
         assert_eq!((row.code.len(), row.tests.len(), row.verdict), (2, 0, Verdict::NotMeasured));
+    }
+
+    #[test]
+    fn every_verdict_is_read_by_its_words() {
+        for verdict in Verdict::ALL {
+            let text = [HEAD, &ROW.replace("not measured", verdict.words())].concat();
+            assert_eq!(Ledger::parse("p", &text).expect("well formed").rows[0].verdict, verdict);
+        }
+        let words = Verdict::ALL.map(Verdict::words);
+        assert_eq!(words, ["holds", "differs", "not built", "not reproducible", "not measured"]);
     }
 
     #[test]

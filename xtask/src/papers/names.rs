@@ -1,4 +1,5 @@
-//! Whether what the rows name exists: files, items in them, tests; and whether a verdict has one of these or a benchmark.
+//! Whether what the rows name exists: files, items in them, tests; and whether a verdict has one of these or a benchmark, and what is
+//! not built has none.
 
 use super::ledger::{Ledger, Row, Verdict};
 use crate::repo::Repo;
@@ -46,7 +47,10 @@ fn tests(known: &HashSet<String>, row: &Row) -> Vec<String> {
     let is_decided = matches!(row.verdict, Verdict::Holds | Verdict::Differs);
     let is_shown = !row.tests.is_empty() || row.code.iter().any(|place| RAN.iter().any(|of| place.starts_with(of)));
     let bare = (is_decided && !is_shown).then(|| format!("{}: no test and no benchmark shows what is said", row.id));
-    unknown.chain(bare).collect()
+    let is_named = !row.tests.is_empty() || !row.code.is_empty();
+    let built = (row.verdict == Verdict::NotBuilt && is_named)
+        .then(|| format!("{}: not built, but names code or a test of it", row.id));
+    unknown.chain(bare).chain(built).collect()
 }
 
 #[cfg(test)]
@@ -54,13 +58,18 @@ mod tests {
     use super::*;
 
     fn found(code: &str, test: &str) -> Vec<String> {
+        found_of(code, test, Verdict::Holds)
+    }
+
+    fn found_of(code: &str, test: &str, verdict: Verdict) -> Vec<String> {
+        let list = |name: &str| if name.is_empty() { Vec::new() } else { vec![name.to_owned()] };
         let row = Row {
             id: "Eq. 9".to_owned(),
             claim: "c".to_owned(),
-            code: vec![code.to_owned()],
-            tests: if test.is_empty() { Vec::new() } else { vec![test.to_owned()] },
+            code: list(code),
+            tests: list(test),
             ours: "—".to_owned(),
-            verdict: Verdict::Holds,
+            verdict,
             reason: "r".to_owned(),
         };
         let none = String::new;
@@ -79,6 +88,16 @@ mod tests {
     fn a_verdict_needs_a_test_or_a_benchmark() {
         assert_eq!(found("src/map.rs", ""), ["Eq. 9: no test and no benchmark shows what is said"]);
         assert_eq!(found("benches/benches/map.rs", ""), ["Eq. 9: no file benches/benches/map.rs"]);
+    }
+
+    #[test]
+    fn what_is_not_built_has_neither_code_nor_tests() {
+        assert!(found_of("", "", Verdict::NotBuilt).is_empty());
+        let names_some = ["Eq. 9: not built, but names code or a test of it"];
+        assert_eq!(found_of("src/map.rs::Map", "", Verdict::NotBuilt), names_some);
+        assert_eq!(found_of("", "ts01_holds", Verdict::NotBuilt), names_some);
+        // What depends on hardware may have a part that is here.
+        assert!(found_of("src/map.rs::Map", "ts01_holds", Verdict::NotReproducible).is_empty());
     }
 
     #[test]

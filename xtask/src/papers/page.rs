@@ -11,7 +11,8 @@ pub(crate) fn page(ledgers: &[Ledger]) -> String {
          Every numbered equation and every claim with a number in it, of each paper that Organza is made from: where it\n\
          stands in the code, which test holds it, what we measure, and the verdict. *Holds*: as the paper says, within the\n\
          test's tolerance. *Differs*: implemented in another way, or found to be otherwise; the reason says why.\n\
-         *Not reproducible*: it depends on hardware or data that nobody else has. *Not measured*: still open.\n",
+         *Not built*: nothing of the kind exists here, so that nothing could be compared. *Not reproducible*: it depends on\n\
+         hardware or data that nobody else has. *Not measured*: still open.\n",
     );
     for ledger in ledgers {
         let _ = write!(out, "\n## {} ({}): {}\n\n{}\n\n", ledger.authors, ledger.year, ledger.title, ledger.note);

@@ -56,7 +56,7 @@ fn attributes_where(repo: &Repo, bad: impl Fn(&str) -> bool, complaint: &str) ->
     found
 }
 
-/// Each crate has a page that says what it is, and what each of its features is for.
+/// Each crate has a page that says what it is, and what each of its features is for. Examples on it are compiled as doctests.
 pub(crate) fn crate_pages(repo: &Repo) -> Vec<String> {
     repo.crate_folders().into_iter().flat_map(|folder| crate_page(repo, folder)).collect()
 }
@@ -69,10 +69,25 @@ fn crate_page(repo: &Repo, folder: &str) -> Vec<String> {
     let manifest = lines(repo.text(&format!("{folder}/Cargo.toml")).unwrap_or_default());
     let features =
         manifest.iter().filter(|line| line.table == "features" && line.key != "default").map(|line| line.key);
-    features
-        .filter(|feature| !text.contains(&format!("`{feature}`")))
-        .map(|feature| format!("{page} does not say what the feature `{feature}` is for"))
-        .collect()
+    let unnamed = features.filter(|feature| !text.contains(&format!("`{feature}`")));
+    let unnamed = unnamed.map(|feature| format!("{page} does not say what the feature `{feature}` is for"));
+    unnamed.chain(uncompiled_example(repo, folder, text)).collect()
+}
+
+/// The marker of an example, up to its attributes.
+const EXAMPLE: &str = "```rust";
+
+/// Why no test compiles an example of a crate's page.
+fn uncompiled_example(repo: &Repo, folder: &str, page: &str) -> Option<String> {
+    let example = page.lines().find(|line| line.starts_with(EXAMPLE))?;
+    if page.lines().any(|line| line.starts_with(EXAMPLE) && line.contains("ignore")) {
+        return Some(format!("{folder}/README.md has an example that is ignored: expected {EXAMPLE}"));
+    }
+    let library = repo.text(&format!("{folder}/src/lib.rs")).unwrap_or_default();
+    let is_included = library.contains("#[cfg(doctest)]\n#[doc = include_str!(\"../README.md\")]");
+    (!is_included).then(|| {
+        format!("{folder}/README.md has {example}, and {folder}/src/lib.rs does not include the page as a doctest")
+    })
 }
 
 #[cfg(test)]
@@ -123,6 +138,22 @@ mod tests {
         let repo =
             Repo::of(&[("crates/a/Cargo.toml", ""), ("crates/b/Cargo.toml", ""), ("crates/a/README.md", "# a\n")]);
         assert_eq!(crate_pages(&repo), ["crates/b/README.md is missing"]);
+    }
+
+    #[test]
+    fn an_example_that_no_test_compiles_is_found() {
+        let found = |page: &str, library: &str| {
+            let files = [("crates/a/Cargo.toml", ""), ("crates/a/README.md", page), ("crates/a/src/lib.rs", library)];
+            crate_pages(&Repo::of(&files))
+        };
+        let page = "# a\n```rust\nlet a = 1;\n```\n```toml\n[dependencies]\n```\n";
+        let library = "//! A.\n/// The page.\n#[cfg(doctest)]\n#[doc = include_str!(\"../README.md\")]\nstruct Page;\n";
+        assert!(found(page, library).is_empty());
+        assert!(found("# a\n```sh\nls\n```\n", "//! A.\n").is_empty());
+        let without = "crates/a/README.md has ```rust, and crates/a/src/lib.rs does not include the page as a doctest";
+        assert_eq!(found(page, "//! A.\n"), [without]);
+        let ignored = "crates/a/README.md has an example that is ignored: expected ```rust";
+        assert_eq!(found(&page.replace("```rust", "```rust,ignore"), library), [ignored]);
     }
 
     #[test]

@@ -54,6 +54,22 @@ fn db12_enlarged_radii_end_and_cover() {
     }
 }
 
+/// Figure 16: more groups have less overlap within each, and each covers less, so that its radii have to grow more.
+#[test]
+fn groups_of_eight_overlap_less_and_cover_less_than_groups_of_four() {
+    let cloud = ball();
+    let graph = OverlapGraph::build(&cloud, &GraphParams::default(), None).expect("a valid cloud");
+    let [four, eight] = [4, 8].map(|count| {
+        let params = WeightedParams { groups: count, ..WeightedParams::default() };
+        let groups = weighted_coloring(&graph, &params, None).expect("in range");
+        let enlarged = enlarged_radii(&cloud, &groups, &EnlargeParams::default(), None).expect("in range");
+        let factor = enlarged.iter().map(|of_group| of_group.factor).sum::<f64>() / enlarged.len() as f64;
+        (graph.mean_overlap(&groups), factor)
+    });
+    println!("mean overlap and factor of the radii: {four:?} of four, {eight:?} of eight");
+    assert!(eight.0 < 0.5 * four.0 && eight.1 > 1.1 * four.1, "{four:?} {eight:?}");
+}
+
 /// All discs in one group cover what all discs cover, with the radii that they have.
 #[test]
 fn one_group_of_all_keeps_its_radii() {

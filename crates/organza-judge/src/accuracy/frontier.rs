@@ -1,8 +1,9 @@
 //! The frontier: settings that nothing more accurate comes near in time.
 //!
 //! From the most accurate on, a setting is on the frontier if it is faster than the last one on it by more than times can
-//! be told apart. Errors that are equal to two digits count as one, and the first setting in the report's order stands for
-//! those that are nearly as fast; so the scene's own does for knobs that change nothing.
+//! be told apart. Errors that are equal to two digits count as one, and so do errors of random settings that differ by no more
+//! than their noise. The first setting in the report's order stands for those that are nearly as fast; so the scene's own does
+//! for knobs that change nothing.
 //!
 //! A setting's time is the least of its repeats: other work of the machine adds to a repeat and never takes from it. Errors
 //! are the same in every run, so a frontier changes with the times alone: what it hangs on is repeated until it has held for
@@ -22,6 +23,8 @@ pub struct Candidate {
     pub id: usize,
     /// Its error, > 0.
     pub error: f64,
+    /// Half of the 95 % interval of the error; 0 of what is not random.
+    pub half_width: f64,
     /// Least of its times, seconds.
     pub seconds: f64,
 }
@@ -30,14 +33,32 @@ pub struct Candidate {
 pub fn frontier(candidates: &[Candidate]) -> Vec<usize> {
     let mut last = f64::INFINITY;
     let mut on_it = Vec::new();
-    for equal in sorted(candidates).chunk_by(|a, b| two_digits(a.error) == two_digits(b.error)) {
+    for equal in alike(&sorted(candidates)) {
         let fastest = equal.iter().map(|c| c.seconds).fold(f64::INFINITY, f64::min);
         if fastest * TOLD_APART < last || on_it.is_empty() {
             last = fastest;
-            on_it.extend(equal.iter().find(|c| c.seconds <= fastest * NEAR).map(|c| c.id));
+            on_it.extend(equal.iter().filter(|c| c.seconds <= fastest * NEAR).map(|c| c.id).min());
         }
     }
     on_it
+}
+
+/// Runs of candidates whose errors cannot be told from that of the first of their run, of a list by rising error.
+fn alike(sorted: &[Candidate]) -> Vec<&[Candidate]> {
+    let mut runs = Vec::new();
+    let mut rest = sorted;
+    while let Some(first) = rest.first() {
+        let length = rest.iter().take_while(|candidate| is_equal(first, candidate)).count();
+        let (run, behind) = rest.split_at(length);
+        runs.push(run);
+        rest = behind;
+    }
+    runs
+}
+
+/// Whether two errors are equal to two digits, or differ by less than the 95 % interval of their difference.
+fn is_equal(a: &Candidate, b: &Candidate) -> bool {
+    two_digits(a.error) == two_digits(b.error) || (a.error - b.error).abs() < a.half_width.hypot(b.half_width)
 }
 
 /// Exponent and two digits of an error > 0.
@@ -110,7 +131,7 @@ mod tests {
     use std::convert::Infallible;
 
     fn candidate(id: usize, error: f64, seconds: f64) -> Candidate {
-        Candidate { id, error, seconds }
+        Candidate { id, error, half_width: 0.0, seconds }
     }
 
     #[test]
@@ -138,6 +159,19 @@ mod tests {
         // What follows has to be faster than the fastest of them.
         assert_eq!(frontier(&[slow, equal[0], equal[2], candidate(4, 1e-2, 4.5)]), [0, 1]);
         assert_eq!([9.94e-3, 9.96e-3, 0.01, 1.0].map(two_digits), [(-3, 99), (-3, 100), (-2, 10), (0, 10)]);
+    }
+
+    #[test]
+    fn errors_that_differ_by_their_noise_count_as_one() {
+        let noisy = |id, error, seconds| Candidate { half_width: 2e-4, ..candidate(id, error, seconds) };
+        let all = [noisy(0, 2.61e-3, 5.0), noisy(1, 2.4e-3, 9.0), noisy(2, 2.53e-3, 1.0)];
+        assert_eq!(frontier(&all), [2], "2.4, 2.53 and 2.61 are equal, and the third takes a fifth of the time");
+        // 2.75e-3 is 3.5e-4 from the most accurate, whose difference is known within 2.8e-4.
+        let [first, second, third] = all;
+        assert_eq!(frontier(&[first, second, third, noisy(3, 2.75e-3, 0.5)]), [2, 3]);
+        // The same errors without noise differ.
+        let exact = all.map(|c| Candidate { half_width: 0.0, ..c });
+        assert_eq!(frontier(&exact), [1, 2]);
     }
 
     #[test]

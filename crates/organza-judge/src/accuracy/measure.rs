@@ -178,7 +178,7 @@ impl<'a> Renderer<'a> {
         })
     }
 
-    /// Width of the slabs that a scene by `sheets` has by its own setting, world units; `None` where nothing is translucent.
+    /// Width of the slabs that a scene by `sheets` has by its own setting, world units; `None` if no slab holds a volume or a splat.
     ///
     /// # Errors
     /// As [`Renderer::draw`].

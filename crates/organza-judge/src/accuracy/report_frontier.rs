@@ -8,7 +8,7 @@ use std::fmt::Write;
 
 /// What lies on a frontier, beside a plot that shows one.
 pub(super) const RULE: &str = "The pale line is the frontier: from the most accurate setting on, what is faster than the last one on it \
-                               by more than 10 %. Errors that are equal to two digits count as one.";
+                               by more than 10 %. Errors that are equal to two digits, or within the noise of random settings, count as one.";
 
 /// Rows of settings, from the most accurate to the fastest; `error` is what they are judged by.
 pub(super) fn to_copy<'a>(

@@ -133,7 +133,7 @@ fn knob_plots(html: &mut String, study: &Study) {
     let _ = write!(
         html,
         "<h2>Convergence of each knob</h2>\n<p>One knob is turned, the others stay as in the scene; {error}. The dashed line is \
-         the fitted order.</p>\n<div class=\"grid\">\n"
+         the fitted order, where its interval is narrower than itself.</p>\n<div class=\"grid\">\n"
     );
     for curve in study.curves.iter().filter(|c| c.points.iter().any(|p| p.size.is_some())) {
         let knob = study.knobs.iter().find(|k| k.name == curve.knob);
@@ -159,7 +159,7 @@ fn knob_plot(study: &Study, curve: &Curve, meaning: &str) -> Option<Plot> {
         .collect();
     let (first, last) = (points.first()?.0[0], points.last()?.0[0]);
     let mut series = Vec::new();
-    if let Some(fit) = curve.settled.fit {
+    if let Some(fit) = curve.settled.order() {
         let own = if curve.end_size.is_some() { curve.settled.own_error } else { 0.0 };
         let at = |k: usize| first * (last / first).powf(k as f64 / 24.0);
         let line = (0..=24).map(at).map(|x| ([x, (fit.log_factor + fit.order * x.ln()).exp() - own], String::new()));

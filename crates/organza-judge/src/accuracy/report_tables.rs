@@ -67,7 +67,8 @@ fn study(scene: &Scene, study: &Study) -> Value {
 fn curve(study: &Study, curve: &Curve) -> Value {
     let knob = study.knobs.iter().find(|k| k.name == curve.knob);
     let theory = knob.and_then(|k| k.theory);
-    let fit = curve.settled.fit;
+    let order = curve.settled.order();
+    let slope = curve.settled.fit;
     let points = curve.points.iter().map(|p| {
         json!({
             "setting": study.outcomes[p.setting].setting.label, "size": p.size, "rmse": p.error, "drawn": p.drawn,
@@ -79,8 +80,10 @@ fn curve(study: &Study, curve: &Curve) -> Value {
         "end": curve.end.label,
         "end_own_error": finite(curve.settled.own_error),
         "end_seconds": curve.end_seconds,
-        "order": fit.map(|f| f.order),
-        "order_half_width_95": fit.and_then(|f| f.half_width),
+        "order": order.map(|f| f.order),
+        "order_half_width_95": order.and_then(|f| f.half_width),
+        "slope": slope.map(|f| f.order),
+        "slope_half_width_95": slope.and_then(|f| f.half_width),
         "order_in_theory": theory.map(|t| json!({ "low": t.low, "high": t.high, "why": t.why })),
         "points": points.collect::<Value>(),
     })

@@ -54,7 +54,7 @@ pub struct Curve {
 pub struct Settled {
     /// RMSE that the end itself is away from the true limit, estimated.
     pub own_error: f64,
-    /// Fitted order of convergence, of the errors that can be drawn.
+    /// Power law fitted to the errors that can be drawn; [`Settled::order`] decides whether its slope is an order.
     pub fit: Option<Fit>,
     /// The careful order that `own_error` was computed with; `None` where the end is exact.
     pub careful_order: Option<f64>,
@@ -64,6 +64,12 @@ impl Settled {
     /// The least error that may be drawn.
     pub fn least_drawn(&self) -> f64 {
         MARGIN * self.own_error
+    }
+
+    /// The fit, if its slope is an order of convergence: the 95 % interval has to be narrower than the slope itself. Two points
+    /// have no interval, because any line fits them, so their slope is no order.
+    pub fn order(&self) -> Option<Fit> {
+        self.fit.filter(|fit| fit.half_width.is_some_and(|half_width| 2.0 * half_width < fit.order.abs()))
     }
 }
 
@@ -126,6 +132,18 @@ mod tests {
         // The finest of order 2 are drawn, of order 1/2 only the coarse ones would be ten times above.
         assert!(settle(&law(2.0, 0.125), Some(0.125), 0.0).fit.unwrap().points == 4);
         assert!(settle(&law(0.5, 0.125), Some(0.125), 0.0).fit.is_none());
+    }
+
+    #[test]
+    fn a_slope_whose_interval_is_wider_than_itself_is_no_order() {
+        let order = |points: &[[f64; 2]]| settle(points, None, 0.0).order().map(|fit| fit.order);
+        let exact = [[4.0, 4e-3], [2.0, 2e-3], [1.0, 1e-3]];
+        assert!((order(&exact).unwrap() - 1.0).abs() < 1e-9);
+        // Slopes of 3 and of 0.2: a mean of 1.6, and t(1) = 12.7 times its standard error of 0.8.
+        let bent = [[4.0, 8.0 * 1.149e-3], [2.0, 1.149e-3], [1.0, 1e-3]];
+        assert_eq!(order(&bent), None);
+        assert!(settle(&bent, None, 0.0).fit.unwrap().half_width.unwrap() > 10.0);
+        assert_eq!(order(&exact[..2]), None, "any line fits two points");
     }
 
     #[test]

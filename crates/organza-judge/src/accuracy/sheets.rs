@@ -6,14 +6,13 @@ use organza::scene::{Classify, LayerChoice, Scattering, Scene, SceneObject, Slic
 use splat_core::raster::Accumulation;
 use splat_core::{Packing, Shading};
 
-/// Knobs of `sheets` in this scene, whose slabs are `slab_width` wide by its own setting; or why there are none.
+/// Knobs of `sheets` in this scene.
 ///
-/// What sheets show has a limit of its own: other kernels than those of splats, classified after reconstruction.
-///
-/// # Errors
-/// Why the technique has nothing to show.
-pub fn sheets(scene: &Scene, slab_width: Option<f64>, facts: &Facts, options: &Options) -> Result<Sweep, String> {
-    let own = slab_width.ok_or("nothing is translucent: the picture is that of `points`")?;
+/// `slab_width` is that of the scene's own setting, world units; `None` if no slab holds a volume or a splat, as of translucent
+/// triangles, which are drawn as they are. Sheets have a limit of their own, because they have other kernels than splats and
+/// classify after reconstruction.
+pub fn sheets(scene: &Scene, slab_width: Option<f64>, facts: &Facts, options: &Options) -> Sweep {
+    let in_slabs = |knob: &dyn Fn(f64) -> Knob| slab_width.map(knob).ok_or_else(|| NO_SLABS.to_owned());
     let mut base = Request { scene: in_sheets(scene), oversample: 1, packed: false };
     base.scene.render.layers = LayerChoice::default();
     let mut sweep = Sweep {
@@ -25,10 +24,10 @@ pub fn sheets(scene: &Scene, slab_width: Option<f64>, facts: &Facts, options: &O
         joint_levels: if options.quick { 2 } else { 5 },
     };
     let knobs = [
-        ("slab width", Ok(slabs(own, options))),
-        ("kernel radius", Ok(radius())),
-        ("kernel deviation", Ok(deviation())),
-        ("kernel sections", Ok(sections(options))),
+        ("slab width", in_slabs(&|own| slabs(own, options))),
+        ("kernel radius", in_slabs(&|_| radius())),
+        ("kernel deviation", in_slabs(&|_| deviation())),
+        ("kernel sections", in_slabs(&|_| sections(options))),
         ("buffer format", Ok(buffers())),
         ("gradients", gradients(scene)),
         ("shadow table cells", cells(facts, options)),
@@ -48,8 +47,11 @@ pub fn sheets(scene: &Scene, slab_width: Option<f64>, facts: &Facts, options: &O
             Err(reason) => sweep.skipped.push(Skipped { knob: name, reason }),
         }
     }
-    Ok(sweep)
+    sweep
 }
+
+/// Why a scene has no knobs of slabs and kernels.
+const NO_SLABS: &str = "no volume and no splat lies in slabs: translucent triangles are drawn as they are";
 
 /// The scene by this technique.
 pub fn in_sheets(scene: &Scene) -> Scene {

@@ -182,19 +182,26 @@ fn unresolved(message: impl Into<String>, hint: impl Into<String>) -> Error {
 /// What may be on a frontier by the limit; ids are places in `outcomes`.
 pub(super) fn candidates<'a>(outcomes: impl Iterator<Item = &'a Outcome>) -> Vec<Candidate> {
     let error = |o: &Outcome| Some(o.from_limit.as_ref().filter(|_| o.drawn)?.linear.rmse);
-    candidates_by(outcomes, error)
+    let half_width = |o: &Outcome| o.sampled.map(|s| s.from_limit.half_width);
+    candidates_by(outcomes, error, half_width)
 }
 
 /// The same by physical truth.
 pub(super) fn candidates_by_truth<'a>(outcomes: impl Iterator<Item = &'a Outcome>) -> Vec<Candidate> {
-    candidates_by(outcomes, |o| Some(o.from_truth.as_ref()?.linear.rmse))
+    let error = |o: &Outcome| Some(o.from_truth.as_ref()?.linear.rmse);
+    let half_width = |o: &Outcome| Some(o.sampled?.from_truth?.half_width);
+    candidates_by(outcomes, error, half_width)
 }
 
 fn candidates_by<'a>(
     outcomes: impl Iterator<Item = &'a Outcome>,
     error: impl Fn(&Outcome) -> Option<f64>,
+    half_width: impl Fn(&Outcome) -> Option<f64>,
 ) -> Vec<Candidate> {
-    let candidate = |(id, o): (usize, &Outcome)| Some(Candidate { id, error: error(o)?, seconds: least_seconds(o)? });
+    let candidate = |(id, o): (usize, &Outcome)| {
+        let (error, seconds) = (error(o)?, least_seconds(o)?);
+        Some(Candidate { id, error, half_width: half_width(o).unwrap_or(0.0), seconds })
+    };
     outcomes.enumerate().filter_map(candidate).collect()
 }
 

@@ -1,6 +1,7 @@
 //! What is said of a knob's curve, in words.
 
 use super::{Curve, CurvePoint, Step, Study, least_seconds};
+use reference::statistics::Fit;
 use std::fmt::Write;
 
 /// The steps of a knob that has no order, each with its RMSE and time.
@@ -23,18 +24,27 @@ pub fn verdict(study: &Study, curve: &Curve) -> String {
     }
     let theory = study.knobs.iter().find(|k| k.name == curve.knob).and_then(|k| k.theory);
     let drawn = curve.points.iter().filter(|p| p.drawn).count();
-    let mut text = match curve.settled.fit {
-        Some(fit) => {
-            let interval = fit.half_width.map_or_else(|| " (two points: no interval)".into(), |h| format!(" ± {h:.2}"));
-            format!("Order {:.2}{interval}, from {drawn} points", fit.order)
+    let order = curve.settled.order();
+    let mut text = match (order, curve.settled.fit) {
+        (Some(fit), _) => {
+            format!("Order {:.2} ± {:.2}, from {drawn} points", fit.order, fit.half_width.unwrap_or_default())
         }
-        None => format!("No order: {drawn} points can be drawn"),
+        (None, Some(Fit { order: slope, half_width: Some(half_width), .. })) => {
+            format!("No order: slope {slope:.2} ± {half_width:.2}, from {drawn} points")
+        }
+        (None, Some(fit)) => format!("No order: slope {:.2} of two points, which have no interval", fit.order),
+        (None, None) => format!("No order: {drawn} points can be drawn"),
     };
     if let (Some(t), Some(fit)) = (theory, curve.settled.fit) {
-        let half = fit.half_width.unwrap_or(0.0);
+        let half = fit.half_width.unwrap_or(f64::INFINITY);
         let inside = fit.order + half >= t.low && fit.order - half <= t.high;
+        let agrees = match (inside, order) {
+            (true, Some(_)) => "as theory says",
+            // An interval that holds nearly everything supports nothing.
+            (true, None) => "too uncertain to compare with theory",
+            (false, _) => "theory says otherwise",
+        };
         let range = if t.low == t.high { format!("{}", t.low) } else { format!("{} to {}", t.low, t.high) };
-        let agrees = if inside { "as theory says" } else { "theory says otherwise" };
         let _ = write!(text, "; {agrees}: {range} ({})", t.why);
     }
     if study.is_random() {
