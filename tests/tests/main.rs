@@ -55,6 +55,7 @@ mod surfels;
 mod surfels_opaque;
 mod techniques;
 mod textured_lights;
+mod thick_media;
 mod triangles;
 mod truth;
 

@@ -7,13 +7,19 @@ use crate::load::{Loaded, own::Own};
 use crate::plan::Plan;
 use crate::scene::place;
 use crate::scene::{Scene, SceneLight, SceneObject};
+use crate::shadows::thickness_of;
 use crate::{Layers, ShadowTable, escape_controls};
 use glam::DVec3;
-use splat_core::DAabb;
 use splat_core::raster::objects_in_view;
+use splat_core::shade::joint::MediumSpacing;
+use splat_core::{DAabb, Object};
 
 /// Most objects outside the view that are told one by one.
 const TOLD: usize = 4;
+/// Optical depth of a spacing up to which the light of layers of splats is held to closed forms.
+const THICKEST: f32 = 16.0;
+/// Optical depth up to which one splat alone tells how light falls off in it: its middle is right within a hundredth.
+const LONE: f32 = 0.25;
 
 /// What can be told of a scene before it is drawn, one sentence each.
 pub(crate) fn of_scene(scene: &Scene, loaded: &Loaded) -> Vec<String> {
@@ -23,7 +29,7 @@ pub(crate) fn of_scene(scene: &Scene, loaded: &Loaded) -> Vec<String> {
     }
     let seen = seen(loaded);
     let unseen = outside(scene, loaded, &seen).into_iter().chain(small::too_small(scene, loaded, &seen));
-    dark.chain(turned_away(loaded)).chain(unseen).chain(clear_shadows(scene, loaded)).collect()
+    dark.chain(turned_away(loaded)).chain(unseen).chain(clear_shadows(scene, loaded)).chain(too_thick(scene, loaded)).collect()
 }
 
 /// Objects that absorb inside, and lie in a light that casts shadows, which are those of surfaces alone.
@@ -74,6 +80,69 @@ fn turned_away(loaded: &Loaded) -> Vec<String> {
         })
     };
     loaded.lights.iter().filter_map(one).collect()
+}
+
+/// What is known of the medium of an object.
+#[derive(Clone, Copy)]
+struct Thickness {
+    /// Greatest optical depth of a spacing, and that spacing.
+    optical_depth: f32,
+    spacing: f32,
+    /// Of the middles of splats.
+    bounds: DAabb,
+}
+
+/// Media drawn as splats that are so thick that splats do not tell their light.
+fn too_thick(scene: &Scene, loaded: &Loaded) -> Vec<String> {
+    if scene.lacks_light() {
+        return Vec::new();
+    }
+    let none = Thickness { optical_depth: 0.0, spacing: 0.0, bounds: DAabb::EMPTY };
+    let mut media = vec![none; loaded.objects.len()];
+    for i in 0..loaded.cloud.len() {
+        let Some(spacing) = MediumSpacing::of_splat(&loaded.cloud, &loaded.footprints, i) else { continue };
+        let medium = &mut media[loaded.cloud.object[i] as usize];
+        let place = loaded.cloud.position[i].as_dvec3();
+        medium.bounds = medium.bounds.union(DAabb::new(place, place));
+        let optical_depth = thickness_of(loaded, i);
+        if optical_depth > medium.optical_depth {
+            medium.optical_depth = optical_depth;
+            medium.spacing = spacing.width;
+        }
+    }
+    let unit = libm::exp2(f64::from(loaded.exponent));
+    let as_splats = |name: &str| loaded.planned.iter().any(|o| o.object == name && o.is_drawn_as_splats());
+    let told = |(object, medium): (&Object, &Thickness)| {
+        let is_lone = medium.is_lone() && medium.optical_depth > LONE;
+        let most = if is_lone { LONE } else { THICKEST };
+        (medium.optical_depth > most && as_splats(&object.name)).then(|| {
+            let spacing = f64::from(medium.spacing) * unit;
+            let better = spacing * f64::from(most / medium.optical_depth);
+            format!(
+                "object '{}' has an optical depth of {:.3} in a spacing of {}, {}: spacing = {} tells how its light falls off",
+                escape_controls(&object.name),
+                medium.optical_depth,
+                rounded(spacing),
+                if is_lone { "and is no wider than that" } else { "which is too much for its splats" },
+                rounded(better),
+            )
+        })
+    };
+    loaded.objects.iter().zip(&media).filter_map(told).collect()
+}
+
+impl Thickness {
+    /// Whether there is no more than a row of splats.
+    fn is_lone(&self) -> bool {
+        let size = (self.bounds.max - self.bounds.min).to_array();
+        size.iter().filter(|side| **side < 1.5 * f64::from(self.spacing)).count() > 1
+    }
+}
+
+/// Three digits of a length.
+fn rounded(length: f64) -> f64 {
+    let unit = libm::pow(10.0, 2.0 - libm::floor(libm::log10(length)));
+    if unit.is_finite() { libm::round(length * unit) / unit } else { length }
 }
 
 /// Objects of which nothing lies in the view.

@@ -83,8 +83,9 @@ fn stages(frame: &Frame<'_>) -> Stages {
     let all = loaded.cloud.len() as f64;
     let opaque = expected(frame, None);
     let of: Vec<(Technique, Expected)> = plan.techniques.iter().map(|t| (*t, expected(frame, Some(*t)))).collect();
-    let built = if frame.has_maps() { 0 } else { maps };
-    let mut stages: Stages = (1..=built).map(|k| (work::shadow_map(k, maps), cost::CAST * all)).collect();
+    // The last is the eye's, which is another in each view.
+    let kept = if frame.has_maps() { maps - usize::from(plan.eye_table.is_some()) } else { 0 };
+    let mut stages: Stages = (kept + 1..=maps).map(|k| (work::shadow_map(k, maps), cost::CAST * all)).collect();
     let mut add = |name: &str, seconds: f64| stages.push((name.to_owned(), seconds));
     let mut drawn = opaque.splats;
     let mut last = Vec::new();

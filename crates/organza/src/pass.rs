@@ -6,6 +6,8 @@ pub const READ: &str = "read";
 pub const CONVERT: &str = "convert";
 /// A shadow map is built.
 pub const SHADOW_MAP: &str = "tsm build";
+/// The map of the eye is built, for media whose spacing is optically thick.
+pub const EYE_MAP: &str = "eye map";
 /// Translucent splats are culled and sliced.
 pub const SORT: &str = "hbsort";
 /// Splats get their footprints.

@@ -58,6 +58,8 @@ pub struct Plan {
     pub carried: Vec<bool>,
     /// For each point whose light is carried: the table of its map of all other casters, if there are any. Empty where none is.
     pub other_tables: Vec<Option<ShadowTable>>,
+    /// The table of the eye's map, which tells the light within media whose spacing is optically thick, if there are any.
+    pub eye_table: Option<ShadowTable>,
     /// Bytes that all shadow maps together may take.
     pub shadow_bytes: u64,
     /// What draws each visible object, and from what.
@@ -75,7 +77,7 @@ pub struct Plan {
 impl Plan {
     /// All tables of shadow maps.
     pub fn tables(&self) -> impl Iterator<Item = &ShadowTable> + Clone {
-        self.shadow_tables.iter().chain(&self.other_tables).flatten()
+        self.shadow_tables.iter().chain(&self.other_tables).flatten().chain(&self.eye_table)
     }
 
     /// Takes the tables in that were chosen, one for each point of a light, then one more for each of casters that no light is
@@ -96,6 +98,17 @@ impl Plan {
             self.passes.splice(at..at, made);
         }
         (self.shadow_tables, self.other_tables, self.shadow_bytes) = (tables, others, bytes);
+    }
+
+    /// Takes in the table of the eye's map, which is built when splats are to be shaded.
+    pub(crate) fn set_eye_table(&mut self, table: Option<ShadowTable>) {
+        self.passes.retain(|p| p.name != pass::EYE_MAP);
+        if let Some(table) = &table {
+            let reason = table.describe("thick media send what light and eye share of each cell");
+            let at = self.passes.iter().position(|p| p.name == pass::SHADE).unwrap_or(self.passes.len());
+            self.passes.insert(at, PlannedPass { name: pass::EYE_MAP.into(), reason });
+        }
+        self.eye_table = table;
     }
 
     /// The bytes that its shadow maps may take together, where their tables are the same within them.

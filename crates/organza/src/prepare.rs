@@ -202,6 +202,13 @@ fn plan_counted(
     } else {
         plan.allow_shadows(left);
     }
+    // Of the view, which may be another than that of the maps.
+    plan.set_eye_table(None);
+    let left = left.saturating_sub(shadows::bytes(plan.tables()));
+    if plan.shadow_maps.contains(&true) {
+        let eye = shadows::eye_table(&scene.render, loaded, &plan.draws, left)?;
+        plan.set_eye_table(eye);
+    }
     let memory = memory.with_maps(shadows::bytes(plan.tables()));
     memory::check("rendering", memory.total(), options.max_memory)?;
     Ok(Planned { plan, memory, statistics })

@@ -3,7 +3,8 @@
 use crate::Error;
 use crate::load::Loaded;
 use crate::scene::{LightPoint, RenderSettings, ShadowMapping};
-use splat_core::{Limits, Object};
+use splat_core::shade::joint::MediumSpacing;
+use splat_core::{Camera, Light, LightShape, Limits, Object};
 use tsm::{Deposits, Params};
 
 /// Share of the tolerance that the ends of lists may take, of all lights together. Absorbance grows with its logarithm only, so
@@ -11,6 +12,16 @@ use tsm::{Deposits, Params};
 pub(crate) const CUT_SHARE: f64 = 1.0 / 16.0;
 /// Largest slope of a displayed value by radiance, at black: sRGB's.
 const DISPLAY_SLOPE: f64 = 12.92;
+
+/// Optical depth of a spacing that a scene needs the eye's map for: up to it light and view at 60° send 1.5 % too little by the middles of splats,
+/// and at right angles a fifth of a per cent.
+const SEEN: f32 = 0.125;
+/// The eye's map, in messages.
+pub(crate) const EYE: &str = "the eye";
+/// Absorbance toward the eye beyond which nothing is seen: e^−8 is a third of a thousandth.
+const EYE_CUT: f64 = 8.0;
+/// Straight optical depths of a thick cell that lists go on for: as many as it has along the most slanted light.
+const CELLS_BEHIND: f64 = 5.0;
 
 /// The table of one light's shadow map, as it was chosen before any work.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -59,9 +70,70 @@ pub fn shadow_params(settings: &RenderSettings, loaded: &Loaded, tolerance: f32,
     }
 }
 
+/// Greatest optical depth of a spacing among the media of a loaded scene; 0 where it is thin everywhere.
+fn thickest(loaded: &Loaded) -> f64 {
+    let thickest = (0..loaded.cloud.len()).map(|i| thickness_of(loaded, i)).fold(0.0, f32::max);
+    if thickest > SEEN { f64::from(thickest) } else { 0.0 }
+}
+
+/// Optical depth of a spacing about a splat, in the channel that has most; 0 of what is no medium.
+pub(crate) fn thickness_of(loaded: &Loaded, i: usize) -> f32 {
+    let material = &loaded.materials[loaded.cloud.material[i] as usize];
+    let spacing = MediumSpacing::of_splat(&loaded.cloud, &loaded.footprints, i);
+    spacing.map_or(0.0, |spacing| spacing.optical_depth * material.greatest_extinction())
+}
+
+/// The eye as a light: what a map of it has is the transmittance to the viewer.
+pub(crate) fn eye(camera: &Camera) -> Light {
+    let shape = if camera.is_orthographic() {
+        LightShape::Directional { direction: camera.axes[2] }
+    } else {
+        LightShape::Point { position: camera.position }
+    };
+    Light { shape, intensity: [1.0; 3] }
+}
+
+/// The objects that the eye's map is of: those with media whose spacing is optically thick. What else there is hides a thick cell as a whole.
+pub(crate) fn thick_objects(loaded: &Loaded) -> Vec<Object> {
+    let mut objects: Vec<Object> =
+        loaded.objects.iter().map(|object| Object { casts_shadow: false, ..object.clone() }).collect();
+    for (i, object) in loaded.cloud.object.iter().enumerate() {
+        let object = &mut objects[*object as usize];
+        object.casts_shadow = object.casts_shadow || thickness_of(loaded, i) > SEEN;
+    }
+    objects
+}
+
+/// The table of the eye's map, within so many bytes; `None` where all media that receive shadows and are drawn as splats, which `draws` says of
+/// each object, are thin.
+///
+/// # Errors
+/// Where the table cannot be chosen.
+pub(crate) fn eye_table(
+    settings: &RenderSettings,
+    loaded: &Loaded,
+    draws: &[bool],
+    max_bytes: u64,
+) -> Result<Option<ShadowTable>, Error> {
+    let cloud = &loaded.cloud;
+    let is_lit_within = |i: usize| {
+        let object = cloud.object[i] as usize;
+        draws[object] && loaded.objects[object].shadow_coefficient > 0.0 && thickness_of(loaded, i) > SEEN
+    };
+    if !(0..cloud.len()).any(is_lit_within) {
+        return Ok(None);
+    }
+    let tolerance = libm::exp(-EYE_CUT - CELLS_BEHIND * thickest(loaded)).max(f64::from(f32::MIN_POSITIVE)) as f32;
+    let params = shadow_params(settings, loaded, tolerance, max_bytes);
+    let objects = thick_objects(loaded);
+    let scene = tsm::Scene { cloud, materials: &loaded.materials, objects: &objects };
+    let predicted = Deposits::predict(&scene, &eye(&loaded.camera), &params).map_err(|e| shadow_error(EYE, &e))?;
+    Ok(Some(ShadowTable { predicted, tolerance, max_bytes }))
+}
+
 /// Transmittance e^(−A_cut) below which the light of one lamp is lost in the picture: its brightest light times that changes no
-/// displayed value by more than the lamp's part of the tolerance.
-fn tolerance(settings: &RenderSettings, loaded: &Loaded, point: &LightPoint, maps: u64) -> f32 {
+/// displayed value by more than the lamp's part of the tolerance. Thick cells are lit by what is left behind them, too.
+fn tolerance(settings: &RenderSettings, loaded: &Loaded, point: &LightPoint, maps: u64, thickest: f64) -> f32 {
     let of_lights = || {
         let passing = loaded.images.slides[point.of].as_ref().map_or(1.0, |slide| f64::from(slide.brightest()));
         let brightest = passing * point.light.brightest_on(&loaded.cloud);
@@ -69,7 +141,8 @@ fn tolerance(settings: &RenderSettings, loaded: &Loaded, point: &LightPoint, map
         CUT_SHARE * settings.tolerance / (gain * maps as f64)
     };
     let asked = settings.shadow.absorbance_cut.map(|cut| libm::exp(-cut));
-    asked.unwrap_or_else(of_lights).clamp(f64::from(f32::MIN_POSITIVE), 0.5) as f32
+    let behind = libm::exp(-CELLS_BEHIND * thickest);
+    (asked.unwrap_or_else(of_lights) * behind).clamp(f64::from(f32::MIN_POSITIVE), 0.5) as f32
 }
 
 /// Bytes of shadow maps, which live at once: all finished, and what building one takes beside it. With a half more, for casters that
@@ -119,10 +192,11 @@ fn tables_within(
     max_bytes: u64,
 ) -> Result<Vec<Option<ShadowTable>>, Error> {
     let maps = wanted.iter().flatten().count().max(1) as u64;
+    let thickest = thickest(loaded);
     let table = |wanted: &Option<Wanted<'_>>| {
         let Some((point, objects)) = wanted else { return Ok(None) };
         let light = &point.light;
-        let tolerance = tolerance(settings, loaded, point, maps);
+        let tolerance = tolerance(settings, loaded, point, maps, thickest);
         let params = shadow_params(settings, loaded, tolerance, max_bytes);
         let scene = tsm::Scene { cloud: &loaded.cloud, materials: &loaded.materials, objects };
         let predicted = Deposits::predict(&scene, light, &params).map_err(|e| shadow_error(&point.name(), &e))?;

@@ -23,6 +23,7 @@ use crate::slabs::{Kernels, Slabs};
 use crate::tile::{self, AREA, FoldTile, Scratch, TILE};
 use crate::viewed::{PixelFootprint, Viewed, corners, spacing_along, view_steps};
 use crate::visible::Voxels;
+use crate::within::Within;
 use crate::{Error, Params, SheetInput, Splats, Volume};
 use rayon::prelude::*;
 use splat_core::raster::bins::Bins;
@@ -51,6 +52,8 @@ pub(crate) struct Prepared<'a> {
     pub(crate) rays: LatticeRays,
     pub(crate) voxels: Voxels,
     pub(crate) shadows: Option<Shadows>,
+    /// Of one whose spacing is optically thick.
+    pub(crate) within: Option<Within>,
     /// Where normals come from that.
     pub(crate) gradients: Option<GradientVolume>,
     /// Its slabs that lack kernels, because these lie behind the eye.
@@ -96,10 +99,12 @@ pub fn prepare<'a>(input: SheetInput<'a>, params: &Params, progress: Option<&Pro
     for volume in &input.volumes {
         let mut prepared = Prepared::new(*volume, &input, params, (&slabs, slant), tiles);
         let count = prepared.voxels.count();
-        needed += Shadows::bytes(count, &input.lights) + GradientVolume::bytes(count, volume, params);
+        needed += Shadows::bytes(count, &input.lights) + Within::bytes(&prepared.receivers(), count, &input.lights);
+        needed += GradientVolume::bytes(count, volume, params);
         check(needed, params)?;
         prepared.gradients = GradientVolume::new(&prepared.receivers(), &prepared.lattice, params);
         prepared.shadows = Shadows::new(&prepared.receivers(), &input.lights, input.shadow_origin, progress)?;
+        prepared.within = Within::new(&prepared.receivers(), &input.lights, input.shadow_origin, progress)?;
         volumes.push(prepared);
         progress.tick(1).map_err(cancelled)?;
     }
@@ -232,6 +237,7 @@ impl<'a> Prepared<'a> {
             viewed,
             voxels,
             shadows: None,
+            within: None,
             gradients: None,
             lacking,
             segments,

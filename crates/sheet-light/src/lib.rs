@@ -84,6 +84,7 @@ mod tile;
 mod viewed;
 mod visible;
 mod volume;
+mod within;
 
 pub use counts::SheetCounts;
 pub use error::Error;

@@ -9,6 +9,7 @@ use crate::rays::{Crossings, Slopes};
 use crate::sheets::{LEAST_WEIGHT, Sheets, difference};
 use crate::tile::{SIDE, TILE};
 use crate::volume::{SheetInput, Volume};
+use crate::within::RayPart;
 use splat_core::Shading;
 use splat_core::glam::Vec3;
 use splat_core::optics::TRACE;
@@ -279,7 +280,7 @@ impl Shader<'_> {
             wanted |= u32::from(tau[lane] > 0.0) << lane;
         }
         let wanted = wanted & of.open;
-        self.channels(simd, of, &self.spots(simd, of, place, (medium, wanted)), wanted, values);
+        self.channels(simd, of, &self.spots(simd, of, place, (medium, wanted)), (medium, wanted), values);
         for c in 0..self.layout.count() {
             // What is not seen may be no number.
             let (zero, value) = (Lanes::splat(simd, 0.0), Lanes::load(simd, &values[c]));
@@ -290,7 +291,14 @@ impl Shader<'_> {
 
     /// The channels of the spots: effects, normals, shadows. Of the lanes that are not `wanted` anything.
     #[inline(always)]
-    fn channels<S: Simd>(&self, simd: S, of: &Reconstructed<'_>, spots: &Spots<S>, wanted: u32, values: &mut Values) {
+    fn channels<S: Simd>(
+        &self,
+        simd: S,
+        of: &Reconstructed<'_>,
+        spots: &Spots<S>,
+        (medium, wanted): (&Medium<S>, u32),
+        values: &mut Values,
+    ) {
         let volume = &of.prepared.volume;
         let radius = of.prepared.viewed.reach as f32 / 3.0;
         let reflector = Reflector {
@@ -304,9 +312,16 @@ impl Shader<'_> {
             let shadows = of.prepared.shadows.as_ref();
             let shadows = shadows.map(|s| (s, s.neighbours.cells(simd, &of.prepared.voxels, &spots.at, wanted)));
             let mut through = [Lanes::splat(simd, 1.0); 3];
+            let within = of.prepared.within.as_ref().zip(shadows.as_ref());
+            let within = within.map(|(within, (shadows, cells))| {
+                (within, cells, parts(shadows.neighbours.lattice_from_place, spots, medium))
+            });
             for (rank, lamp) in self.lamps.iter().enumerate() {
                 if let Some((shadows, cells)) = &shadows {
                     through = shadows.at(simd, cells, rank);
+                }
+                if let Some((within, cells, parts)) = &within {
+                    through = within_lanes(simd, through, |shares| within.replace(cells, rank, parts, shares));
                 }
                 reflector.add(simd, lamp, spots, &through, &mut lit);
             }
@@ -375,4 +390,45 @@ fn mix<S: Simd>(simd: S, own: &Shaded<'_>, medium: &Medium<S>, fragments: &mut F
     let is = medium.far.where_less_or(of(0.0), tau_here, far);
     let both = far.max(is);
     is.where_less_or(first, half, both).store(&mut fragments.far);
+}
+
+/// The parts of the rays of some pixels in their slab, as thick volumes need them.
+#[inline(always)]
+fn parts<S: Simd>(lattice: [[f32; 4]; 3], spots: &Spots<S>, medium: &Medium<S>) -> [RayPart; MAX_LANES] {
+    let mut places = [[0.0; MAX_LANES]; 3];
+    let mut ways = [[0.0; MAX_LANES]; 3];
+    let mut lengths = [0.0; MAX_LANES];
+    let mut depths = [0.0; MAX_LANES];
+    for axis in 0..3 {
+        spots.at[axis].store(&mut places[axis]);
+        spots.to_eye[axis].store(&mut ways[axis]);
+    }
+    ((medium.far - medium.near) * medium.secant).store(&mut lengths);
+    medium.depth.store(&mut depths);
+    std::array::from_fn(|lane| {
+        let place = Vec3::new(places[0][lane], places[1][lane], places[2][lane]);
+        let way = Vec3::new(ways[0][lane], ways[1][lane], ways[2][lane]) * lengths[lane];
+        let row = |axis: usize| Vec3::new(lattice[axis][0], lattice[axis][1], lattice[axis][2]);
+        RayPart {
+            middle: Vec3::from_array([0, 1, 2].map(|axis: usize| row(axis).dot(place) + lattice[axis][3])),
+            to_eye: Vec3::from_array([0, 1, 2].map(|axis: usize| row(axis).dot(way))),
+            length: lengths[lane],
+            optical_depth: depths[lane],
+        }
+    })
+}
+
+/// Shares of some pixels, changed one by one.
+#[inline(always)]
+fn within_lanes<S: Simd>(
+    simd: S,
+    through: [Lanes<S>; 3],
+    change: impl FnOnce(&mut [[f32; MAX_LANES]; 3]),
+) -> [Lanes<S>; 3] {
+    let mut shares = [[0.0; MAX_LANES]; 3];
+    for channel in 0..3 {
+        through[channel].store(&mut shares[channel]);
+    }
+    change(&mut shares);
+    [Lanes::load(simd, &shares[0]), Lanes::load(simd, &shares[1]), Lanes::load(simd, &shares[2])]
 }

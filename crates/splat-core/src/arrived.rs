@@ -83,6 +83,10 @@ impl Transmittance for Remembered<'_> {
         self.shadow.transmittance(receiver)
     }
 
+    fn absorbance(&self, receiver: &Receiver) -> [f32; 3] {
+        self.shadow.absorbance(receiver)
+    }
+
     fn at_splat(&self, splat: usize, receiver: &Receiver) -> [f32; 3] {
         self.arrived.known(splat).unwrap_or_else(|| {
             let share = self.shadow.at_splat(splat, receiver);

@@ -5,17 +5,21 @@ mod census;
 mod channels;
 #[cfg(feature = "gpu")]
 pub mod gpu;
+pub mod joint;
 mod point;
 mod scattering;
 
 pub use census::Census;
 pub use channels::{ChannelLayout, MAX_CHANNELS, MAX_SHADED_CHANNELS};
+pub use joint::Within;
 pub use point::{Point, Radiance, arriving, facing};
 
 use crate::optics::TRACE;
 use crate::raster::Projected;
 use crate::{Camera, Cloud, DAabb, Error, Light, Material, Object, Progress, Receiver, Slide, Transmittance};
 use glam::{DVec3, Vec3};
+use joint::ThickSplat;
+use point::{is_attenuated, passing};
 use rayon::prelude::*;
 use scattering::{Batch, Scattering};
 
@@ -69,6 +73,14 @@ pub struct ShadeInput<'a> {
     pub camera: &'a Camera,
 }
 
+/// What is shaded, and how.
+#[derive(Clone, Copy)]
+struct Shaded<'a> {
+    input: &'a ShadeInput<'a>,
+    /// What tells the light within thick splats; `None` to light all by their middles.
+    within: Option<Within<'a>>,
+}
+
 /// Values of all splats that `projected` shows, `layout.count()` numbers each, by id; 0 for the others. One tick for each 2¹⁴ splats or so.
 ///
 /// # Errors
@@ -103,16 +115,44 @@ pub fn shade_into(
     layout: &ChannelLayout,
     progress: Option<&Progress>,
 ) -> Result<(), Error> {
+    shade_all(values, Shaded { input, within: None }, is_one, layout, progress)
+}
+
+/// [`shade_into`], where media whose spacing is optically thick are lit within, by [`joint`].
+///
+/// # Errors
+/// [`Error::Cancelled`].
+///
+/// # Panics
+/// If a material, an object or a footprint of the cloud is out of range.
+pub fn shade_within(
+    values: &mut Vec<f32>,
+    within: &Within<'_>,
+    is_one: impl Fn(usize) -> bool + Sync,
+    layout: &ChannelLayout,
+    progress: Option<&Progress>,
+) -> Result<(), Error> {
+    shade_all(values, Shaded { input: within.input, within: Some(*within) }, is_one, layout, progress)
+}
+
+fn shade_all(
+    values: &mut Vec<f32>,
+    shaded: Shaded<'_>,
+    is_one: impl Fn(usize) -> bool + Sync,
+    layout: &ChannelLayout,
+    progress: Option<&Progress>,
+) -> Result<(), Error> {
+    let input = shaded.input;
     let quiet = Progress::new();
     let progress = progress.unwrap_or(&quiet);
     let channels = layout.count();
     values.resize(input.cloud.len() * channels, 0.0);
     progress.add_total(input.cloud.len().div_ceil(CHUNK) as u64);
-    let scattering = Scattering::new(input);
+    let scattering = Scattering::new(shaded);
     values.par_chunks_mut(CHUNK * channels).enumerate().for_each(|(chunk, values)| {
         if progress.tick(1).is_ok() {
             let scattering = scattering.as_ref();
-            let chunk = ShadeChunk { input, scattering, first: chunk * CHUNK, is_one: &is_one, layout, values };
+            let chunk = ShadeChunk { shaded, scattering, first: chunk * CHUNK, is_one: &is_one, layout, values };
             pulp::Arch::new().dispatch(chunk);
         }
     });
@@ -121,7 +161,7 @@ pub fn shade_into(
 
 /// One chunk's work, in the form that [`pulp`] compiles once per instruction set.
 struct ShadeChunk<'a, F> {
-    input: &'a ShadeInput<'a>,
+    shaded: Shaded<'a>,
     scattering: Option<&'a Scattering<'a>>,
     first: usize,
     is_one: &'a F,
@@ -134,7 +174,7 @@ impl<F: Fn(usize) -> bool> pulp::WithSimd for ShadeChunk<'_, F> {
 
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, simd: S) {
-        let Self { input, scattering, first, is_one, layout, values } = self;
+        let Self { shaded, scattering, first, is_one, layout, values } = self;
         let channels = layout.count();
         let mut batch = Batch::default();
         let end = first + values.len() / channels;
@@ -148,7 +188,7 @@ impl<F: Fn(usize) -> bool> pulp::WithSimd for ShadeChunk<'_, F> {
                     by.shade(i, is_one, layout, &mut batch, out);
                 }
                 _ if is_one(i) => {
-                    let (radiance, normal) = shade_splat(input, i);
+                    let (radiance, normal) = shaded.splat(i);
                     radiance.write(normal, layout, out);
                 }
                 _ => out.fill(0.0),
@@ -163,11 +203,21 @@ impl<F: Fn(usize) -> bool> pulp::WithSimd for ShadeChunk<'_, F> {
 /// # Panics
 /// If there is no such splat, or its material or object is out of range.
 pub fn shade_splat(input: &ShadeInput<'_>, i: usize) -> (Radiance, Vec3) {
-    let point = point_of(input, i);
-    let radiance = point.radiance(input.ambient, input.lights.iter(), |rank, irradiance| {
-        received(input, i, input.lights[rank].shadow, irradiance)
-    });
-    (radiance, point.normal)
+    Shaded { input, within: None }.splat(i)
+}
+
+impl Shaded<'_> {
+    /// Radiance of splat `i` towards the viewer, and the unit normal that it was shaded by.
+    fn splat(&self, i: usize) -> (Radiance, Vec3) {
+        let input = self.input;
+        let point = point_of(input, i);
+        let thick = self.within.as_ref().and_then(|within| ThickSplat::new(within, i));
+        let radiance = point.radiance(input.ambient, input.lights.iter(), |rank, irradiance| match &thick {
+            Some(thick) => received_within(input, i, rank, irradiance, thick),
+            None => received(input, i, input.lights[rank].shadow, irradiance),
+        });
+        (radiance, point.normal)
+    }
 }
 
 /// How much of a shadow splat `i` takes.
@@ -183,17 +233,42 @@ fn received(input: &ShadeInput<'_>, i: usize, shadow: Option<&dyn Transmittance>
     arriving(irradiance, shadow_share(input, i), shadow)
 }
 
+/// The same of a light by its rank at a splat that is lit by the joint integral.
+#[inline]
+fn received_within(
+    input: &ShadeInput<'_>,
+    i: usize,
+    rank: usize,
+    irradiance: [f32; 3],
+    thick: &ThickSplat,
+) -> [f32; 3] {
+    let coefficient = shadow_share(input, i);
+    match input.lights[rank].shadow {
+        Some(shadow) if is_attenuated(irradiance, coefficient) => {
+            let through = shadow.at_splat(i, &Receiver::of_splat(input.cloud, i));
+            thick.received(input, i, rank, through, coefficient)
+        }
+        _ => [1.0; 3],
+    }
+}
+
+/// Unit direction from splat `i` to the viewer, or zero at the eye itself.
+#[inline]
+fn to_eye(input: &ShadeInput<'_>, i: usize) -> Vec3 {
+    if input.camera.is_orthographic() {
+        -input.camera.axes[2].as_vec3()
+    } else {
+        let eye = (input.camera.position - input.cloud.origin).as_vec3();
+        (eye - input.cloud.position[i]).normalize_or_zero()
+    }
+}
+
 /// The point that splat `i` is shaded as.
 #[inline]
 fn point_of<'a>(input: &ShadeInput<'a>, i: usize) -> Point<'a> {
     let cloud = input.cloud;
     let position = cloud.position[i];
-    let eye = (input.camera.position - cloud.origin).as_vec3();
-    let to_eye = if input.camera.is_orthographic() {
-        -input.camera.axes[2].as_vec3()
-    } else {
-        (eye - position).normalize_or_zero()
-    };
+    let to_eye = to_eye(input, i);
     Point {
         position: cloud.origin + position.as_dvec3(),
         radius: cloud.radius[i],

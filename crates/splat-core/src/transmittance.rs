@@ -57,7 +57,13 @@ pub trait Transmittance: Sync {
     /// Share of the light that arrives at the receiver per channel, in \[0, 1\].
     fn transmittance(&self, receiver: &Receiver) -> [f32; 3];
 
-    /// The same for a splat of the cloud that is shaded, by its place there: for who knows the light at splats beforehand.
+    /// Its absorbance −ln T per channel, for whoever tells how fast light falls off: at most 87.4, where f32 tells T from 0. A table that has it
+    /// interpolates it as it is; means of e^−A between rays would be those of the brightest.
+    fn absorbance(&self, receiver: &Receiver) -> [f32; 3] {
+        self.transmittance(receiver).map(|through| -through.clamp(f32::MIN_POSITIVE, 1.0).ln())
+    }
+
+    /// The same as [`Transmittance::transmittance`] for a splat of the cloud that is shaded, by its place there: for who knows the light at splats beforehand.
     fn at_splat(&self, _splat: usize, receiver: &Receiver) -> [f32; 3] {
         self.transmittance(receiver)
     }

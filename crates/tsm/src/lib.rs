@@ -43,6 +43,7 @@ mod media;
 mod opaque;
 mod overlap;
 mod params;
+mod patch;
 mod plan;
 mod query;
 mod rays;

@@ -12,6 +12,7 @@
 use crate::ShadowMap;
 use crate::deposit::plane_distance;
 use crate::mapping::{Mapping, Place, floor, with_mapping};
+use crate::patch::{Patch, met_at};
 use crate::shadow_map::{Absorbances, Matter};
 use crate::table::{ENOUGH, List, Lists, WINDOW};
 use glam::{Vec2, Vec3, Vec4};
@@ -19,6 +20,8 @@ use pulp::{Simd, WithSimd};
 use splat_core::raster::lanes::{Lanes, exp_neg};
 use splat_core::{Receiver, SplatKind, TOGETHER, Transmittance, glam};
 
+/// Greatest absorbance that is told: the transmittance is the least normal number of f32.
+const MOST: f32 = 87.33655;
 /// Least lift over the distance: f32 planes agree to about 2⁻²⁰.
 const ROUNDING: f32 = 1.0 / 262_144.0;
 
@@ -27,8 +30,13 @@ type Four<T, const R: usize> = [[T; 4]; R];
 
 impl Transmittance for ShadowMap {
     fn transmittance(&self, receiver: &Receiver) -> [f32; 3] {
-        let [light] = pulp::Arch::new().dispatch(LookUp { map: self, receivers: &[*receiver] });
+        let [light] = pulp::Arch::new().dispatch(LookUp::<1, false> { map: self, receivers: &[*receiver] });
         light
+    }
+
+    fn absorbance(&self, receiver: &Receiver) -> [f32; 3] {
+        let [absorbance] = pulp::Arch::new().dispatch(LookUp::<1, true> { map: self, receivers: &[*receiver] });
+        absorbance
     }
 
     // While one waits for memory, others are worked on.
@@ -37,17 +45,17 @@ impl Transmittance for ShadowMap {
             Receiver { position: Vec3::ZERO, normal: Vec3::ZERO, radius: 0.0, kind: SplatKind::Medium };
         let mut receivers = [NONE; TOGETHER];
         receivers.iter_mut().zip(splats).for_each(|(of, splat)| *of = receiver(*splat));
-        pulp::Arch::new().dispatch(LookUp::<TOGETHER> { map: self, receivers: &receivers[..splats.len()] })
+        pulp::Arch::new().dispatch(LookUp::<TOGETHER, false> { map: self, receivers: &receivers[..splats.len()] })
     }
 }
 
-/// Look-ups of at most `R` receivers, in the form that [`pulp`] compiles once per instruction set.
-struct LookUp<'a, const R: usize> {
+/// Look-ups of at most `R` receivers, of transmittances or of absorbances, in the form that [`pulp`] compiles once per instruction set.
+struct LookUp<'a, const R: usize, const ABSORBANCE: bool> {
     map: &'a ShadowMap,
     receivers: &'a [Receiver],
 }
 
-impl<const R: usize> WithSimd for LookUp<'_, R> {
+impl<const R: usize, const ABSORBANCE: bool> WithSimd for LookUp<'_, R, ABSORBANCE> {
     type Output = [[f32; 3]; R];
 
     #[inline(always)]
@@ -56,11 +64,11 @@ impl<const R: usize> WithSimd for LookUp<'_, R> {
         let mut light = [[0.0; 3]; R];
         with_mapping!(&map.table, m => match &map.absorbances {
             Absorbances::Mono(matter) => {
-                let mono = map.look_up::<S, _, 1, R>(simd, m, matter, receivers);
+                let mono = map.look_up::<S, _, 1, R, ABSORBANCE>(simd, m, matter, receivers);
                 light.iter_mut().zip(&mono).for_each(|(light, [one])| *light = [*one; 3]);
             }
             Absorbances::Rgb(matter) => {
-                let rgb = map.look_up::<S, _, 3, R>(simd, m, matter, receivers);
+                let rgb = map.look_up::<S, _, 3, R, ABSORBANCE>(simd, m, matter, receivers);
                 light.iter_mut().zip(&rgb).for_each(|(light, rgb)| *light = *rgb);
             }
         });
@@ -101,7 +109,7 @@ impl Target {
 
 impl ShadowMap {
     #[inline(always)]
-    fn look_up<S: Simd, M: Mapping, const C: usize, const R: usize>(
+    fn look_up<S: Simd, M: Mapping, const C: usize, const R: usize, const ABSORBANCE: bool>(
         &self,
         simd: S,
         mapping: &M,
@@ -127,18 +135,21 @@ impl ShadowMap {
                 }
             }
         }
-        let through = self.through(simd, matter, &cells, &distances, receivers.len());
-        let mut light = [[1.0; C]; R];
+        let absorbed = self.absorbed(simd, matter, &cells, &distances, receivers.len());
+        let number = |absorbed: f32| if ABSORBANCE { absorbed.min(MOST) } else { passing(absorbed) };
+        // Outside of the table all passes.
+        let mut light = [[if ABSORBANCE { 0.0 } else { 1.0 }; C]; R];
         for (r, receiver) in receivers.iter().enumerate() {
             let (mut sum, mut seen) = ([0.0; C], 0.0);
             for k in 0..4 {
-                (0..C).for_each(|c| sum[c] += weights[r][k] * through[r][k][c]);
+                (0..C).for_each(|c| sum[c] += weights[r][k] * number(absorbed[r][k][c]));
                 seen += weights[r][k];
             }
             if seen > 0.0 {
-                (0..C).for_each(|c| light[r][c] = (sum[c] / seen).min(1.0));
+                let most = if ABSORBANCE { MOST } else { 1.0 };
+                (0..C).for_each(|c| light[r][c] = (sum[c] / seen).min(most));
             } else if let Some((target, place)) = self.target(mapping, receiver) {
-                light[r] = self.grazing(simd, mapping, matter, &target, place.at);
+                light[r] = self.grazing(simd, mapping, matter, &target, place.at).map(number);
             }
         }
         light
@@ -170,12 +181,13 @@ impl ShadowMap {
         at: Vec2,
     ) -> [f32; C] {
         let cell = mapping.wrap(floor(at.x), floor(at.y));
-        self.through(simd, matter, &[[cell, None, None, None]], &[[[target.distance, 0.0]; 4]], 1)[0][0]
+        self.absorbed(simd, matter, &[[cell, None, None, None]], &[[[target.distance, 0.0]; 4]], 1)[0][0]
     }
 
-    /// Transmittance of the cells about the first `n` receivers, each up to its distances for media and for surfaces; 1 outside of the table.
+    /// Absorbance of the cells about the first `n` receivers, each up to its distances for media and for surfaces: 0 outside of the table, infinite
+    /// behind what is opaque.
     #[inline(always)]
-    fn through<S: Simd, const C: usize, const R: usize>(
+    fn absorbed<S: Simd, const C: usize, const R: usize>(
         &self,
         simd: S,
         matter: &Matter<C>,
@@ -214,18 +226,23 @@ impl ShadowMap {
                 }
             }
         }
-        let mut through: Four<_, R> = [[[0.0; C]; 4]; R];
         for r in 0..n {
             for k in 0..4 {
-                for c in 0..C {
-                    let a = absorbance[r][k][c];
-                    let is_dark = is_dark[r][k] || self.dark_from.is_some_and(|limit| a > limit);
-                    through[r][k][c] = if is_dark { 0.0 } else { exp_neg(a) };
+                for a in &mut absorbance[r][k] {
+                    if is_dark[r][k] || self.dark_from.is_some_and(|limit| *a > limit) {
+                        *a = f32::INFINITY;
+                    }
                 }
             }
         }
-        through
+        absorbance
     }
+}
+
+/// Transmittance of an absorbance.
+#[inline(always)]
+fn passing(absorbance: f32) -> f32 {
+    if absorbance == f32::INFINITY { 0.0 } else { exp_neg(absorbance) }
 }
 
 /// The lists of the cells about the first `n` receivers: nothing counts behind what is opaque.
@@ -245,55 +262,6 @@ fn spans<const C: usize, const R: usize>(
         }
     }
     spans
-}
-
-/// The four cells about a place, and their bilinear weights.
-struct Patch {
-    cells: [Option<u32>; 4],
-    part: Vec2,
-    weights: [f32; 4],
-}
-
-impl Patch {
-    #[inline(always)]
-    fn at<M: Mapping>(mapping: &M, at: Vec2) -> Self {
-        let (column, row) = (floor(at.x - 0.5), floor(at.y - 0.5));
-        let part = at - 0.5 - Vec2::new(column as f32, row as f32);
-        let rest = Vec2::ONE - part;
-        let mut cells = [None; 4];
-        for (k, cell) in (0..).zip(&mut cells) {
-            *cell = mapping.wrap(column + (k & 1), row + (k >> 1));
-        }
-        Self { cells, part, weights: [rest.x * rest.y, part.x * rest.y, rest.x * part.y, part.x * part.y] }
-    }
-}
-
-/// Newton steps of [`met_at`]; across an edge the first makes up for it and the second for the first's slope.
-const STEPS: usize = 3;
-/// Least solid angle of four rays, in cells, that says where to go: at the corners of octants two of them may be one.
-const LEAST_SPREAD: f32 = 0.1;
-
-/// Where the rays of the four nearest cells, weighted bilinearly, meet `p`: from its place `at` in the table by Newton
-/// steps, each with the slopes of the rays that it finds there.
-fn met_at<M: Mapping>(mapping: &M, p: Vec3, at: Vec2) -> Vec2 {
-    let (mut met, towards) = (at, p.normalize());
-    for _ in 0..STEPS {
-        let Patch { cells: [Some(a), Some(b), Some(c), Some(d)], part, weights } = Patch::at(mapping, met) else {
-            return at;
-        };
-        let [a, b, c, d] = [a, b, c, d].map(|cell| mapping.cell_ray(cell).direction);
-        let ray = a * weights[0] + b * weights[1] + c * weights[2] + d * weights[3];
-        let along_x = (b - a) * (1.0 - part.y) + (d - c) * part.y;
-        let along_y = (c - a) * (1.0 - part.x) + (d - b) * part.x;
-        // ray + x·along_x + y·along_y is to be along p.
-        let area = along_x.cross(along_y).dot(towards);
-        if area.abs() < LEAST_SPREAD * mapping.measure(0) as f32 {
-            return at;
-        }
-        let step = Vec2::new(along_y.cross(ray).dot(towards), ray.cross(along_x).dot(towards)) / area;
-        met += step.clamp(Vec2::NEG_ONE, Vec2::ONE);
-    }
-    met
 }
 
 /// Places in a window.

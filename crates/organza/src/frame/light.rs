@@ -5,7 +5,7 @@ use crate::device;
 use crate::pass;
 use crate::plan::Plan;
 use crate::scene::{LightPoint, light_points};
-use crate::shadows::{ShadowTable, shadow_error};
+use crate::shadows::{EYE, ShadowTable, eye, shadow_error, thick_objects};
 use crate::{CostRecord, Error, work};
 use splat_core::shade::{LitBy, ShadeInput};
 use splat_core::{Arrived, Object, Remembered, Transmittance};
@@ -119,6 +119,27 @@ impl<'a> Frame<'a> {
             maps.push(Some(map));
         }
         Ok(maps)
+    }
+
+    /// The map of the eye, where the plan has one.
+    pub(super) fn eye_map(&self, cost: &mut CostRecord) -> Result<Option<ShadowMap>, Error> {
+        let Some(table) = &self.plan.eye_table else { return Ok(None) };
+        let l = self.loaded;
+        let count = self.plan.tables().count();
+        self.progress.begin(&work::shadow_map(count, count));
+        self.tick()?;
+        let params = table.params(self.settings, l, table.max_bytes);
+        let objects = thick_objects(l);
+        cost.measure(pass::EYE_MAP, |stage| {
+            let cloud = self.drawn();
+            let scene = tsm::Scene { cloud, materials: &l.materials, objects: &objects };
+            let map = ShadowMap::build(&scene, &eye(&self.camera), &params, Some(self.progress));
+            let map = map.map_err(|e| shadow_error(EYE, &e))?;
+            stage.items_in = cloud.len() as u64;
+            stage.items_out = map.counts().kept;
+            stage.bytes = map.counts().bytes;
+            Ok(Some(map))
+        })
     }
 
     /// The points of lights that have an intensity, with their shadows.

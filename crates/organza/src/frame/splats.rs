@@ -7,7 +7,7 @@ use crate::{CostRecord, Error, stage};
 use splat_core::raster::{
     self, Detail, FinishInput, GlassImage, OpaqueImage, OpaqueInput, ProjectInput, Projected, RasterCounts,
 };
-use splat_core::shade::shade_into;
+use splat_core::shade::{Within, shade_into, shade_within};
 use splat_core::{Accumulator, Layers, SplatKind, StageCost};
 
 /// The drawn splats, ready to be composited, by id.
@@ -33,14 +33,22 @@ impl Frame<'_> {
         let shadows = self.shadows_of_drawn(cost)?;
         let Shaded { projected, mut values, .. } = self.before.take();
         let projected = self.project(projected, cost)?;
+        let eye = self.eye_map(cost)?;
         let layout = self.layout();
         self.progress.begin(stage::SHADE);
         cost.measure(pass::SHADE, |stage| {
             let lights = self.lit_by(&shadows);
             let (bends, progress) = (self.plan.bends, Some(self.progress));
             let is_one = |i| bends || projected.is_visible(i);
-            shade_into(&mut values, &self.shading(&lights), is_one, &layout, progress)
-                .map_err(|e| Error::from_core("shading", e))?;
+            let input = &self.shading(&lights);
+            let shaded = match &eye {
+                Some(eye) => {
+                    let within = Within { input, eye, footprints: &self.loaded.footprints };
+                    shade_within(&mut values, &within, is_one, &layout, progress)
+                }
+                None => shade_into(&mut values, input, is_one, &layout, progress),
+            };
+            shaded.map_err(|e| Error::from_core("shading", e))?;
             stage.items_in = if bends { self.drawn().len() as u64 } else { projected.visible() };
             stage.items_out = stage.items_in;
             stage.bytes = 4 * values.len() as u64;

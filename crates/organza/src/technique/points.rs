@@ -87,8 +87,12 @@ fn sort_params(frame: &Frame<'_>) -> hbsort::Params {
     hbsort::Params {
         direction: points.direction,
         thickness: frame.loaded.slice_thickness.map_or(hbsort::Thickness::Auto, hbsort::Thickness::World),
-        // Depths are made from splats in order, not from slices, and Gaussians were fitted to pictures in order.
-        exact: points.exact || frame.layers.depth || !frame.loaded.cloud.gaussians.is_empty(),
+        // Depths are made from splats in order, not from slices, and Gaussians were fitted to pictures in order. Of thick media the first splats
+        // hide the others of their slice.
+        exact: points.exact
+            || frame.layers.depth
+            || frame.plan.eye_table.is_some()
+            || !frame.loaded.cloud.gaussians.is_empty(),
         margin_px: frame.filter_reach_px(),
         ..hbsort::Params::default()
     }

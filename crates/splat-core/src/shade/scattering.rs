@@ -1,8 +1,9 @@
 //! Splats that scatter by the phase function, under light of lamps and parallel light, as many at a time as there are lanes: what
 //! [`Point::radiance`](super::Point::radiance) says of each, within rounding, by itself and whatever its neighbours are.
 
+use super::joint::{ThickSplat, Within};
 use super::point::{Incoming, is_attenuated, passing};
-use super::{ChannelLayout, LitBy, Radiance, ShadeInput, facing, shadow_share};
+use super::{ChannelLayout, LitBy, Radiance, ShadeInput, Shaded, facing, shadow_share};
 use crate::optics::TRACE;
 use crate::raster::lanes::{Lanes, MAX_LANES};
 use crate::{LightShape, Receiver, Shading, TOGETHER};
@@ -29,6 +30,7 @@ enum Source {
 /// Lights that take no more than [`Source`] to tell what arrives of them.
 pub(super) struct Scattering<'a> {
     input: &'a ShadeInput<'a>,
+    within: Option<Within<'a>>,
     sources: Vec<Source>,
     /// Relative to the cloud's origin.
     eye: Vec3,
@@ -61,7 +63,8 @@ struct OfLight {
 impl<'a> Scattering<'a> {
     /// `None` where each splat has to ask for its light: behind a slide, of spots and of what is flat; and where colours depend on
     /// who sees them.
-    pub(super) fn new(input: &'a ShadeInput<'a>) -> Option<Self> {
+    pub(super) fn new(shaded: Shaded<'a>) -> Option<Self> {
+        let Shaded { input, within } = shaded;
         let source = |lit: &LitBy<'_>| match lit.light.shape {
             _ if lit.slide.is_some() => None,
             LightShape::Directional { direction } => Some(Source::Parallel(-direction.as_vec3())),
@@ -76,7 +79,7 @@ impl<'a> Scattering<'a> {
         let camera = input.camera;
         let to_eye = camera.is_orthographic().then(|| -camera.axes[2].as_vec3());
         let eye = (camera.position - input.cloud.origin).as_vec3();
-        input.cloud.gaussians.is_empty().then_some(Self { input, sources, eye, to_eye })
+        input.cloud.gaussians.is_empty().then_some(Self { input, within, sources, eye, to_eye })
     }
 
     /// How many splats from `first` on, before `end`, can be shaded together: none, or up to as many as a vector has lanes at most.
@@ -106,7 +109,13 @@ impl<'a> Scattering<'a> {
         let splats = first..first + out.len() / channels;
         // Light by light: what is remembered of one is not waited for before the next is asked for.
         let Batch { to_eye, lights, asked } = batch;
-        for (lit, of) in input.lights.iter().zip(&mut *lights) {
+        let mut thick: [Option<ThickSplat>; MAX_LANES] = [None; MAX_LANES];
+        if let Some(within) = &self.within {
+            for (k, i) in splats.clone().enumerate().filter(|(_, i)| is_one(*i)) {
+                thick[k] = ThickSplat::new(within, i);
+            }
+        }
+        for (rank, (lit, of)) in input.lights.iter().zip(&mut *lights).enumerate() {
             asked.clear();
             for (k, i) in splats.clone().enumerate().filter(|(_, i)| is_one(*i)) {
                 let arriving = lit.light.intensity.map(|intensity| intensity * of.falloff[k]);
@@ -119,7 +128,11 @@ impl<'a> Scattering<'a> {
             if let Some(shadow) = lit.shadow {
                 let through = shadow.at_splats(asked, &|i| Receiver::of_splat(input.cloud, i));
                 for (i, through) in asked.iter().zip(through) {
-                    of.share[i - first] = passing(through, shadow_share(input, *i));
+                    let coefficient = shadow_share(input, *i);
+                    of.share[i - first] = match &thick[i - first] {
+                        Some(splat) => splat.received(input, *i, rank, through, coefficient),
+                        None => passing(through, coefficient),
+                    };
                 }
             }
         }

@@ -54,6 +54,8 @@ impl Points<'_> {
         // Depths are made from splats in order, not from slices.
         if !(points.exact || self.frame.layers.depth) {
             Some("slices without order inside (render.points.exact = false) are made and composited by the processor")
+        } else if self.frame.plan.eye_table.is_some() {
+            Some("media whose spacing is optically thick are lit by the processor")
         } else if points.first_slices.is_some() {
             Some("the first slices alone (render.points.first_slices) are composited by the processor")
         } else if points.accumulation != Accumulation::F32 {
