@@ -11,7 +11,7 @@ use convert::ExpressionField;
 use convert::read::{Loaded, ReadParams, bytes, panic_is_input_error};
 use organza_scene::LoadOptions;
 use splat_core::glam::DVec3;
-use splat_core::{Limits, ScalarField};
+use splat_core::{MemoryAccount, ScalarField};
 use std::path::Path;
 use std::sync::Once;
 
@@ -32,7 +32,7 @@ pub fn read(name: &str, data: &[u8]) {
     });
     // Levels of detail are looked at where there are some.
     let most_points = Some(16);
-    let params = ReadParams { limits: Limits::bytes(MEMORY), most_points, ranges: true, ..ReadParams::default() };
+    let params = ReadParams { memory: MemoryAccount::new(MEMORY), most_points, ranges: true, ..ReadParams::default() };
     let Ok((loaded, _)) = bytes(name, data, &params, None) else { return };
     let valid = match &loaded {
         Loaded::Mesh(mesh) => mesh.validate(),

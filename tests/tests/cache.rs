@@ -38,6 +38,15 @@ fn a_cache_is_read_the_second_time_and_changes_no_picture_whatever_is_in_it() {
     fs::write(&file, bytes).unwrap();
     let (damaged, said) = drawn(folder, &with);
     assert!(said.contains("is damaged; normals and areas of object 'hills' are found anew"), "{said}");
+    #[cfg(unix)]
+    {
+        // Nobody waits for a pipe under its name.
+        fs::remove_file(&file).unwrap();
+        std::process::Command::new("mkfifo").arg(&file).status().unwrap();
+        let (piped, said) = drawn(folder, &with);
+        assert!(said.contains("is no regular file; normals and areas of object 'hills' are found anew"), "{said}");
+        assert_eq!(piped, plain);
+    }
     let mesh = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
     fs::write(folder.join("mesh.obj"), mesh).unwrap();
     let mut command = organza();

@@ -74,12 +74,13 @@ impl Cache {
         said
     }
 
-    /// The numbers of a key: those that are kept where they are valid, else those that `make` makes, which are kept then. `what` names them.
+    /// Returns the `count` cached values of `key`. On a miss, or where the file holds another number of them, calls `make` and stores its
+    /// result. `what` is the label in messages.
     pub(crate) fn get<T: Pod, E>(
         &self,
         what: &str,
         key: Key,
-        is_valid: impl Fn(&[T]) -> bool,
+        count: usize,
         make: impl FnOnce() -> Result<Vec<T>, E>,
     ) -> Result<Vec<T>, E> {
         let key: [u8; 32] = key.0.finalize().into();
@@ -87,13 +88,12 @@ impl Cache {
             .folder
             .join(key[..16].iter().map(|b| format!("{b:02x}")).collect::<String>())
             .with_extension(EXTENSION);
-        let broken = match read(&file, &key) {
-            Ok(Some(numbers)) if is_valid(&numbers) => {
+        let broken = match read(&file, &key, count) {
+            Ok(Some(numbers)) => {
                 self.say(format!("{what} were read from {}", shown(&file)));
                 return Ok(numbers);
             }
             Ok(None) => None,
-            Ok(Some(_)) => Some("holds something else".to_owned()),
             Err(e) => Some(e.to_string()),
         };
         if let Some(broken) = broken {
@@ -156,15 +156,21 @@ impl Cache {
     }
 }
 
-/// The numbers of a file; `None` where there is none.
-fn read<T: Pod>(file: &Path, key: &[u8; 32]) -> io::Result<Option<Vec<T>>> {
-    let mut opened = match File::open(file) {
+/// The `count` numbers of a file; `None` where there is none.
+fn read<T: Pod>(file: &Path, key: &[u8; 32], count: usize) -> io::Result<Option<Vec<T>>> {
+    let refused = |why: &str| io::Error::new(io::ErrorKind::InvalidData, why.to_owned());
+    let length = match fs::metadata(file) {
         Err(e) if e.kind() == io::ErrorKind::NotFound => return Ok(None),
-        opened => opened?,
+        // Asked before opening: opening a pipe waits for its writer.
+        Ok(meta) if !meta.is_file() => return Err(refused("is no regular file")),
+        meta => meta?.len(),
     };
-    let bytes = usize::try_from(opened.metadata()?.len()).map_err(io::Error::other)?;
-    let damaged = || io::Error::new(io::ErrorKind::InvalidData, "is damaged");
-    let count = bytes.checked_sub(HEAD).filter(|n| n % size_of::<T>() == 0).ok_or_else(damaged)? / size_of::<T>();
+    let damaged = || refused("is damaged");
+    // As many as the caller makes room for, whatever the file has.
+    if length != HEAD as u64 + size_of::<T>() as u64 * count as u64 {
+        return Err(damaged());
+    }
+    let mut opened = File::open(file)?;
     let (mut head, mut numbers) = ([0; HEAD], bytemuck::try_zeroed_vec::<T>(count).map_err(|()| damaged())?);
     opened.read_exact(&mut head)?;
     opened.read_exact(bytemuck::cast_slice_mut(&mut numbers))?;

@@ -1,5 +1,6 @@
 //! Why a file was refused: whose fault it is, where, what was expected, what was found and what to do about it.
 
+use splat_core::Exceeded;
 use std::fmt;
 use std::path::Path;
 
@@ -118,6 +119,17 @@ impl ReadError {
     /// The same error with the name of the file, which must be escaped already.
     pub(crate) fn in_file(self, file: &str) -> Self {
         Self { file: file.to_owned(), ..self }
+    }
+}
+
+impl From<Exceeded> for ReadError {
+    fn from(e: Exceeded) -> Self {
+        let limit =
+            e.limit.map_or_else(|| "as many bytes as there are".to_owned(), |limit| format!("at most {limit} bytes"));
+        let hint = "raise the memory limit (--max-memory), or thin out the data";
+        let found = format!("{} for {}", e.needed, e.what);
+        let expected = format!("{limit} of memory for all that is read");
+        Self::limit(expected, found, hint)
     }
 }
 

@@ -120,7 +120,7 @@ pub use color_map::ColorMap;
 pub use color_scale::{ColorScale, ScaleNumbers};
 pub use combine::{ClippedField, CombinedField, RegionField, SharedField};
 pub use convert_error::ConvertError;
-pub use creases::part_at_creases;
+pub use creases::{crease_bytes, part_at_creases};
 #[cfg(feature = "surfels")]
 pub use discs::{DiscShape, DiscSize};
 #[cfg(feature = "read")]

@@ -129,14 +129,15 @@ use format::{Format, format_of, is_raw};
 use input::Stream;
 use reading::Reading;
 use splat_core::glam::DVec3;
-use splat_core::{Grid, Limits, Mesh, Progress, RadianceImage};
+use splat_core::{Grid, MemoryAccount, Mesh, Progress, RadianceImage};
 use std::path::Path;
 
 /// How much a file may ask for, and what happens to what is wrong in it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ReadParams {
-    /// Bytes that the file, its decompressed form and the columns made from it may each take; elements are not counted.
-    pub limits: Limits,
+    /// Bytes that reading takes at a time: files that are read whole, what comes out of packed ones, images, and what is made of them. All
+    /// come back when the file is read; whoever keeps what it holds takes [`Loaded::bytes`] for that.
+    pub memory: MemoryAccount,
     /// Whether points of a cloud with a coordinate that is not finite are left out and counted in
     /// [`RawPoints::dropped`] instead of refused. Vertices of a mesh are always refused.
     pub drop_invalid: bool,
@@ -168,7 +169,7 @@ impl Default for ReadParams {
     /// display.
     fn default() -> Self {
         Self {
-            limits: Limits::bytes(4 << 30),
+            memory: MemoryAccount::default(),
             drop_invalid: false,
             strict: false,
             frame: 0,
@@ -205,6 +206,18 @@ pub enum Loaded {
     Image(RadianceImage),
 }
 
+impl Loaded {
+    /// Bytes that it holds.
+    pub fn bytes(&self) -> u64 {
+        match self {
+            Self::Mesh(mesh) => mesh.bytes(),
+            Self::Points(points) => points.bytes(),
+            Self::Grid(grid) => grid.bytes(),
+            Self::Image(image) => image.bytes(),
+        }
+    }
+}
+
 /// Reads a regular file, and says what there is to say of it; its first bytes tell the format, its extension only words the
 /// error if they do not. Reading stops where `progress` is cancelled.
 ///
@@ -213,6 +226,7 @@ pub enum Loaded {
 /// [`Fault::Cancelled`](crate::Fault::Cancelled).
 pub fn file(path: &Path, params: &ReadParams, progress: Option<&Progress>) -> Result<(Loaded, Notes), ReadError> {
     let name = escaped_path(path);
+    let params = &ReadParams { memory: params.memory.part(), ..params.clone() };
     let mut reading = Reading::new(params, progress);
     let stream = Stream::open(path, params);
     let loaded = stream.and_then(|stream| whole(path, stream, Some(path), &mut reading));
@@ -230,10 +244,14 @@ pub fn bytes(
     progress: Option<&Progress>,
 ) -> Result<(Loaded, Notes), ReadError> {
     let shown = escaped(name.as_bytes(), usize::MAX);
+    let params = &ReadParams { memory: params.memory.part(), ..params.clone() };
     let mut reading = Reading::new(params, progress);
     let loaded = whole(Path::new(name), Stream::of(content, params), None, &mut reading);
     Ok((loaded.map_err(|e| e.in_file(&shown))?, reading.finish(&shown)))
 }
+
+/// Most bytes that [`crate::outwards`] takes for a vertex, each of three in a part of its own.
+const BYTES_PER_PART: u64 = 13 + 48;
 
 /// The content with meshes turned outwards.
 fn whole(
@@ -251,6 +269,7 @@ fn whole(
         check_columns(points, reading)?;
     }
     if let Loaded::Mesh(mut mesh) = loaded {
+        input::hold("which parts the triangles make", mesh.position.len() as u64 * BYTES_PER_PART, reading.params)?;
         for _ in 0..crate::outwards::turn_outwards(&mut mesh) {
             reading.mend((Fix::InsideOut, Place::File, None), || {
                 let hint = "turn the faces around, or leave out --strict";
@@ -371,14 +390,20 @@ fn not_compiled_in(format: Format) -> ReadError {
 /// Longest side of an image, pixels.
 const LONGEST_SIDE: u32 = 65536;
 
-/// Bytes of an image of a size that may be read.
+/// Bytes of an image of a size that may be read, as colours.
 fn check_image(size: [u32; 2], params: &ReadParams) -> Result<u64, ReadError> {
+    check_sides(size)?;
+    let bytes = size.iter().map(|s| u64::from(*s)).product::<u64>() * size_of::<[f32; 3]>() as u64;
+    input::hold("the image", bytes, params)?;
+    Ok(bytes)
+}
+
+/// Refuses an image without pixels, and one that is longer than any.
+fn check_sides(size: [u32; 2]) -> Result<(), ReadError> {
     if !size.iter().all(|side| (1..=LONGEST_SIDE).contains(side)) {
         let expected = format!("an image of 1 to {LONGEST_SIDE} pixels a side");
         let found = format!("{} x {}", size[0], size[1]);
         return Err(ReadError::input(Place::File, expected, found, "the header is damaged, or make the image smaller"));
     }
-    let bytes = size.iter().map(|s| u64::from(*s)).product::<u64>() * size_of::<[f32; 3]>() as u64;
-    input::check_bytes("the image", bytes, params)?;
-    Ok(bytes)
+    Ok(())
 }

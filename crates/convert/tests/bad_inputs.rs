@@ -4,7 +4,7 @@
 use crate::read_samples::{NIFTI_F32, NIFTI_U8, gzip, las, load, nifti, ply_ascii, ply_binary};
 use convert::read::{ReadParams, bytes, file};
 use convert::{Fault, Place, ReadError, escaped_path};
-use splat_core::Limits;
+use splat_core::MemoryAccount;
 use std::path::{Path, PathBuf};
 
 fn refused(name: &str, content: &[u8]) -> ReadError {
@@ -232,19 +232,21 @@ fn ba15_gzip_bombs_stop_at_the_ratio_and_at_the_limit() {
     let bomb = gzip(&vec![b' '; 40 << 20]);
     let error = refused("a.xyz.gz", &bomb);
     assert_eq!((error.fault, error.fault.exit_code()), (Fault::Limit, 5), "{error}");
-    let limits = ReadParams { limits: Limits::bytes(1 << 20), ..ReadParams::default() };
+    let limits = ReadParams { memory: MemoryAccount::new(1 << 20), ..ReadParams::default() };
     let error = bytes("a.xyz.gz", &gzip(&vec![b' '; 2 << 20]), &limits, None).unwrap_err();
     assert_eq!(error.fault, Fault::Limit, "{error}");
     // A volume's header comes first: what it does not announce is not unpacked.
     refused_with("a.nii.gz", &bomb, "a.nii.gz@0: expected a header size of 348");
     let volume = nifti(NIFTI_U8, false);
     assert_eq!(
-        bytes("a.nii", &volume, &ReadParams { limits: Limits::bytes(47), ..limits.clone() }, None).unwrap_err().fault,
+        bytes("a.nii", &volume, &ReadParams { memory: MemoryAccount::new(47), ..limits.clone() }, None)
+            .unwrap_err()
+            .fault,
         Fault::Limit
     );
-    assert!(bytes("a.nii", &volume, &ReadParams { limits: Limits::bytes(48), ..limits.clone() }, None).is_ok());
+    assert!(bytes("a.nii", &volume, &ReadParams { memory: MemoryAccount::new(48), ..limits.clone() }, None).is_ok());
     let cloud = las(3, 100, true);
-    let error = bytes("a.laz", &cloud, &ReadParams { limits: Limits::bytes(3_000), ..limits }, None).unwrap_err();
+    let error = bytes("a.laz", &cloud, &ReadParams { memory: MemoryAccount::new(3_000), ..limits }, None).unwrap_err();
     assert_eq!(error.fault, Fault::Limit, "{error}");
 }
 

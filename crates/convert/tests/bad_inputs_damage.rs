@@ -30,10 +30,11 @@
 mod every_sample;
 mod read_samples;
 
+use convert::Fault;
 use convert::read::{Loaded, ReadParams, bytes};
 use every_sample::{bodies, samples, text_samples, textured};
 use read_samples::{e57, gzip, las, load, square_gltf};
-use splat_core::Limits;
+use splat_core::MemoryAccount;
 use std::process::Command;
 
 const LIMITED: &str = "CONVERT_TEST_LIMITED";
@@ -133,7 +134,7 @@ fn every_flipped_bit_of_a_texture_gives_an_error_or_a_valid_object() {
 
 /// With room for little.
 fn few_bytes() -> ReadParams {
-    ReadParams { limits: Limits::bytes(1 << 20), ..ReadParams::default() }
+    ReadParams { memory: MemoryAccount::new(1 << 20), ..ReadParams::default() }
 }
 
 /// Flips each bit of a part of a file; gives how often something valid was read.
@@ -159,7 +160,7 @@ fn every_flipped_bit_of_bodies_gives_an_error_or_a_valid_object() {
     }
     for (name, content) in bodies() {
         let error = bytes(name, &content, &few_bytes(), None).unwrap_err().to_string();
-        assert!(error.contains("bytes for the voxels"), "{error}");
+        assert!(error.contains("for the voxels"), "{error}");
         flip_each_bit(name, &content, 0..content.len(), &few_bytes());
     }
 }
@@ -374,4 +375,20 @@ fn a_volume_is_in_memory_once() {
     let ratio = (peak() - before) as f64 / 200e6;
     println!("{ratio:.2} of the voxels");
     assert!(ratio < 1.3, "{ratio:.2} of the voxels");
+}
+
+#[test]
+fn memory_is_asked_for_before_it_is_taken_and_comes_back() {
+    let all = samples().into_iter().chain(text_samples()).chain(textured().into_iter().map(|(name, of, _)| (name, of)));
+    for (name, content) in all.chain(bodies()) {
+        let within = |bytes: u64| ReadParams { memory: MemoryAccount::new(bytes), ..ReadParams::default() };
+        let ample = within(1 << 30);
+        let (loaded, _) = bytes(name, &content, &ample, None).unwrap_or_else(|e| panic!("{name}: {e}"));
+        let (peak, held) = (ample.memory.peak(), loaded.bytes());
+        assert!(peak >= held && ample.memory.used() == 0, "{name}: {peak} bytes at a time for {held}");
+        // As much is enough, and less than what is given is not.
+        assert_eq!(bytes(name, &content, &within(peak), None).unwrap().0, loaded, "{name} within {peak}");
+        let error = bytes(name, &content, &within(held - 1), None).unwrap_err();
+        assert_eq!(error.fault, Fault::Limit, "{name} within {}: {error}", held - 1);
+    }
 }

@@ -33,6 +33,8 @@ mod read_images;
 mod read_las;
 #[cfg(feature = "obj")]
 mod read_materials;
+#[cfg(feature = "obj")]
+mod read_memory;
 mod read_mended;
 mod read_metaimage;
 mod read_more;

@@ -6,7 +6,7 @@ use crate::read_samples::{gzip, load};
 use convert::Fault;
 use convert::read::{Loaded, Notes, ReadParams, bytes};
 use splat_core::glam::{DVec3, Vec3};
-use splat_core::{Grid, Mesh};
+use splat_core::{Grid, MemoryAccount, Mesh};
 
 fn read(name: &str, content: &[u8]) -> (Loaded, Notes) {
     bytes(name, content, &ReadParams::default(), None).unwrap_or_else(|e| panic!("{e}"))
@@ -244,10 +244,13 @@ fn what_is_wrong_in_one_of_several_pieces_is_named() {
     let (before, rest) = surface.split_once("<Piece").unwrap();
     let (piece, after) = rest.rsplit_once("</Piece>").unwrap();
     let many = format!("{before}{}{after}", format!("<Piece{piece}</Piece>").repeat(20));
-    let limits = ReadParams { limits: splat_core::Limits::bytes(3000), ..ReadParams::default() };
+    let within = |bytes: u64| ReadParams { memory: MemoryAccount::new(bytes), ..ReadParams::default() };
+    let ample = within(1 << 20);
+    assert!(bytes("a.vtp", &vtp_pieces(), &ample, None).is_ok());
+    let limits = within(ample.memory.peak() + many.len() as u64);
     assert!(bytes("a.vtp", &vtp_pieces(), &limits, None).is_ok());
     let error = bytes("a.vtp", many.as_bytes(), &limits, None).unwrap_err();
-    assert!(error.to_string().contains("at most 3000 bytes for the points of all pieces"), "{error}");
+    assert!(error.to_string().contains("bytes of memory for all that is read"), "{error}");
 }
 
 #[test]

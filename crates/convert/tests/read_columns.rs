@@ -4,7 +4,7 @@
 use crate::read_samples::{las, ply_ascii};
 use convert::RawPoints;
 use convert::read::{Loaded, NamedColumn, Notes, ReadParams, bytes};
-use splat_core::Limits;
+use splat_core::MemoryAccount;
 use splat_core::glam::DVec3;
 
 fn asking(columns: &[&str]) -> ReadParams {
@@ -150,7 +150,7 @@ fn extra_bytes_of_las_become_numbers_with_their_scale_and_gaps() {
 
 #[test]
 fn the_memory_of_columns_counts() {
-    let limits = ReadParams { limits: Limits::bytes(3 * (68 + 4)), ..asking(&[]) };
+    let limits = ReadParams { memory: MemoryAccount::new(CSV.len() as u64 + 3 * (68 + 4)), ..asking(&[]) };
     assert!(bytes("a.csv", CSV, &limits, None).is_ok());
     let more = ReadParams { columns: vec!["heat".into()], ..limits };
     assert!(bytes("a.csv", CSV, &more, None).unwrap_err().to_string().contains("the points"));

@@ -5,7 +5,7 @@ use crate::read_samples::{gzip, load};
 use convert::read::{Loaded, ReadParams, bytes, file};
 use convert::{Fault, RawPoints};
 use splat_core::glam::{DMat3, DVec3, Vec3};
-use splat_core::{Grid, Limits, Mesh};
+use splat_core::{Grid, MemoryAccount, Mesh};
 use std::path::{Path, PathBuf};
 
 const CORNERS: [[f32; 3]; 6] =
@@ -129,7 +129,7 @@ fn ba13_stl_is_binary_or_text_by_its_size() {
     }
     refused("a.stl", bad("    endloop\n", ""), "a.stl:7: expected 'endloop', found 'endfacet'");
     refused("a.stl", bad("endsolid", "solid"), "a.stl:16: expected 'facet normal X Y Z' or 'endsolid'");
-    let limits = ReadParams { limits: Limits::bytes(239), ..ReadParams::default() };
+    let limits = ReadParams { memory: MemoryAccount::new(stl_text().len() as u64 + 239), ..ReadParams::default() };
     assert_eq!(bytes("a.stl", &stl_binary(b"a"), &limits, None).unwrap_err().fault, Fault::Limit);
     assert_eq!(bytes("a.stl", stl_text().as_bytes(), &limits, None).unwrap_err().fault, Fault::Limit);
 }
@@ -197,7 +197,7 @@ fn ba11_obj_indices_are_checked() {
     // A face of a million corners, all of them there: a fan of triangles without area, within the limit.
     let many = format!("v 0 0 0\nf{}\n", " 1".repeat(500_000));
     assert_eq!(mesh("a.obj", many.as_bytes()).triangles.len(), 499_998);
-    let limits = ReadParams { limits: Limits::bytes(2 << 20), ..ReadParams::default() };
+    let limits = ReadParams { memory: MemoryAccount::new(2 << 20), ..ReadParams::default() };
     assert_eq!(bytes("a.obj", many.as_bytes(), &limits, None).unwrap_err().fault, Fault::Limit);
     let long = format!("v 0 0 0\nf{}\n", " 1".repeat(600_000));
     refused("a.obj", long, "a.obj:2: expected a line of at most 1 MiB");

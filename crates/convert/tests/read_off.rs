@@ -4,7 +4,7 @@ use crate::read_samples::{gzip, load, off};
 use convert::read::{Fix, Loaded, ReadParams, bytes};
 use convert::{Fault, RawPoints};
 use splat_core::glam::{DVec3, Vec3};
-use splat_core::{Limits, Mesh};
+use splat_core::{MemoryAccount, Mesh};
 
 fn mesh(content: &str) -> Mesh {
     match load("a.off", content.as_bytes()).unwrap() {
@@ -92,7 +92,7 @@ fn faults_are_told_with_their_places() {
     refused("COFF\n1 0 0\n0 0 0 256 0 0\n", "a.off:3:7: expected a colour from 0 to 255, found '256'");
     refused("COFF\n1 0 0\n0 0 0 2 0.5 0\n", "a.off:3:7: expected a colour from 0 to 1, as others have a point");
     refused("OFF\n2 0 0\n1 2 3\n1 2 1e308\n", "a.off: expected coordinates that fit 32-bit floats once");
-    let limits = ReadParams { limits: Limits::bytes(60), ..ReadParams::default() };
+    let limits = ReadParams { memory: MemoryAccount::new(60), ..ReadParams::default() };
     assert_eq!(bytes("a.off", SQUARE.as_bytes(), &limits, None).unwrap_err().fault, Fault::Limit);
 }
 

@@ -3,7 +3,7 @@
 use crate::read_samples::{gzip, load, pcd, pcd_header};
 use convert::read::{Loaded, Notes, ReadParams, bytes};
 use convert::{Fault, RawPoints};
-use splat_core::Limits;
+use splat_core::MemoryAccount;
 use splat_core::glam::{DVec3, Vec3};
 
 fn read(content: &[u8]) -> (RawPoints, Notes) {
@@ -128,7 +128,7 @@ fn headers_that_lie_are_refused_before_anything_is_allocated() {
     refused(&text("x y z", "4 4 1", "F F U", "1 2 256\n"), "a.pcd:9:5: expected an integer from 0 to 255, found '256'");
     let many = text("x y z opacity", "4 4 4 4", "F F F F", "1 2 3 1.5\n");
     refused(&many, "a.pcd:9:7: expected an opacity from 0 to 1, found '1.5'");
-    let limits = ReadParams { limits: Limits::bytes(100), ..ReadParams::default() };
+    let limits = ReadParams { memory: MemoryAccount::new(100), ..ReadParams::default() };
     for data in ["ascii", "binary", "binary_compressed"] {
         assert_eq!(bytes("a.pcd", &pcd(data), &limits, None).unwrap_err().fault, Fault::Limit, "{data}");
     }

@@ -205,8 +205,11 @@ pub(super) struct SceneArguments {
     #[arg(long)]
     pub(super) merge_duplicates: bool,
     /// Allow data outside the scene's root folder
-    #[arg(long)]
+    #[arg(long, conflicts_with = "sandbox")]
     pub(super) allow_path: bool,
+    /// Forbid data outside the scene's root folder even where the scene allows it by its key `root`: for scenes of strangers
+    #[arg(long)]
+    pub(super) sandbox: bool,
     #[command(flatten)]
     pub(super) common: CommonArguments,
 }
@@ -348,8 +351,11 @@ pub(super) struct InfoArguments {
     #[arg(long)]
     pub(super) strict: bool,
     /// Allow data outside the scene's root folder
-    #[arg(long)]
+    #[arg(long, conflicts_with = "sandbox")]
     pub(super) allow_path: bool,
+    /// Forbid data outside the scene's root folder even where the scene allows it by its key `root`: for scenes of strangers
+    #[arg(long)]
+    pub(super) sandbox: bool,
     /// Print one JSON document on stdout
     #[arg(long)]
     pub(super) json: bool,

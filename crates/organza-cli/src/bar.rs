@@ -1,6 +1,6 @@
-//! Progress on stderr, a bar on a terminal and else a line now and then, and the interrupt.
+//! Progress on stderr, a bar on a terminal and else a line now and then.
 
-use super::console;
+use super::{console, signals};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use organza::{Error, Progress};
 use std::io::IsTerminal;
@@ -15,13 +15,10 @@ const LINES: Duration = Duration::from_secs(10);
 /// Steps of the bar.
 const STEPS: f64 = 1000.0;
 
-/// Time that the work has to hear of an interrupt: where it asks for none so long, it is ended as by a second one.
-const PATIENCE: Duration = Duration::from_millis(1500);
-
 /// Runs `work` and shows how far it is; an interrupt stops it at its next tick, or within two seconds, a second one at once.
 pub(super) fn with_bar<T>(work: impl FnOnce(&Progress) -> Result<T, Error>) -> Result<T, Error> {
     let progress = Arc::new(Progress::new());
-    cancel_on_interrupt(&progress)?;
+    signals::stops(&progress);
     let finished = AtomicBool::new(false);
     std::thread::scope(|scope| {
         let watcher = scope.spawn(|| {
@@ -36,32 +33,6 @@ pub(super) fn with_bar<T>(work: impl FnOnce(&Progress) -> Result<T, Error>) -> R
         watcher.thread().unpark();
         out.unwrap_or_else(|panic| std::panic::resume_unwind(panic))
     })
-}
-
-fn cancel_on_interrupt(progress: &Arc<Progress>) -> Result<(), Error> {
-    let progress = Arc::clone(progress);
-    let asked = AtomicBool::new(false);
-    let handler = move || {
-        if asked.swap(true, Ordering::Relaxed) {
-            end_at_once();
-        }
-        progress.cancel();
-        let progress = Arc::clone(&progress);
-        std::thread::spawn(move || {
-            std::thread::sleep(PATIENCE);
-            if !progress.is_heard() {
-                end_at_once();
-            }
-        });
-    };
-    ctrlc::set_handler(handler).map_err(|e| Error::Internal(format!("interrupt handler: {e}")))
-}
-
-/// Outputs are whole or not there at any time.
-fn end_at_once() -> ! {
-    console::note("error: interrupted\n");
-    organza::output::abandon();
-    std::process::exit(i32::from(Error::Cancelled.exit_code()))
 }
 
 fn draw_bar(progress: &Progress, finished: &AtomicBool) {

@@ -2,7 +2,7 @@
 
 use organza::{Error, escape_controls};
 use serde_json::json;
-use std::io::{self, ErrorKind, Write};
+use std::io::{self, ErrorKind, IsTerminal, Write};
 use std::path::Path;
 
 /// Writes to stdout. A reader that went away, as `head` does, is no error.
@@ -12,6 +12,14 @@ pub(super) fn out(text: &str) -> Result<(), Error> {
         Err(e) if e.kind() != ErrorKind::BrokenPipe => Err(Error::io(Path::new("stdout"), "cannot write", e)),
         _ => Ok(()),
     }
+}
+
+/// Writes to stdout while a bar of progress may stand on stderr.
+pub(super) fn out_between(text: &str) -> Result<(), Error> {
+    if io::stderr().is_terminal() {
+        note("\r\x1b[2K");
+    }
+    out(text)
 }
 
 /// Writes to stderr, as far as that is possible.

@@ -10,12 +10,14 @@ use organza::Error;
 use organza::scene::{self, Combination, LoadOptions, Scene, SceneObject, Source, UpAxis};
 use organza_survey::{Facts, Histogram, facts};
 use serde_json::{Value, json};
-use splat_core::LightShape;
+use splat_core::{LightShape, MemoryAccount};
 
 /// Describes a scene or a data file.
 pub(super) fn run(arguments: &InfoArguments) -> Result<(), Error> {
     if is_scene(&arguments.file) {
-        let options = LoadOptions { allow_path: arguments.allow_path, ..LoadOptions::default() };
+        let InfoArguments { allow_path, sandbox, .. } = *arguments;
+        let memory = MemoryAccount::new(memory::default_limit());
+        let options = LoadOptions { allow_path, sandbox, memory, ..LoadOptions::default() };
         let document = scene_document(&scene::load(&arguments.file, &options)?);
         return console::out(&if arguments.json { format!("{document:#}\n") } else { text::lines(&document) });
     }

@@ -24,6 +24,7 @@ mod passport;
 mod render;
 mod report;
 mod session;
+mod signals;
 
 use args::{Arguments, Command};
 use clap::Parser;
@@ -32,6 +33,7 @@ use std::panic::{self, AssertUnwindSafe};
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
+    signals::block_ignored();
     ExitCode::from(guard(|| {
         let arguments = match Arguments::try_parse() {
             Ok(arguments) => arguments,
@@ -61,6 +63,7 @@ fn without_floods(message: &str) -> String {
 
 /// The exit code of a command that has said what it had to say.
 fn run(command: Command) -> Result<u8, Error> {
+    signals::listen()?;
     match command {
         Command::Render(arguments) => return render::run(&arguments),
         Command::Init(arguments) => init::run(&arguments),

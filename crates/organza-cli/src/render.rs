@@ -9,6 +9,7 @@ use organza::output::{self, Metadata, Target, WriteReport};
 use organza::scene::{FoundCamera, Scene};
 use organza::{Error, Progress, Render, RenderOptions, Sets, printable};
 use serde_json::{Value, json};
+use splat_core::{MemoryAccount, Reservation};
 use std::path::{Path, PathBuf};
 
 /// Stages of a picture; those of the first have names of their own.
@@ -32,11 +33,81 @@ struct Job<'a> {
 
 /// What a finished picture has to say.
 struct Done {
-    text: String,
-    json: Value,
+    /// Its own account, as text or as a JSON document.
+    report: String,
     warnings: Vec<String>,
     notes: Vec<String>,
     sets: Option<Sets>,
+}
+
+/// What pictures have said so far. An animation may have a million: each sentence is kept once, the text of a frame is printed at once, and
+/// documents of frames, which are printed as one at the end, draw on the account of memory.
+#[derive(Default)]
+struct Said {
+    warnings: Vec<String>,
+    notes: Vec<String>,
+    /// What is printed at the end.
+    reports: Vec<String>,
+    held: Option<Reservation>,
+    sets: Option<Sets>,
+}
+
+impl Said {
+    /// Takes what a picture says; `memory` is the account of an animation.
+    fn add(&mut self, done: Done, is_json: bool, memory: Option<MemoryAccount>) -> Result<(), Error> {
+        self.sets = done.sets;
+        add_new(&mut self.warnings, done.warnings);
+        add_new(&mut self.notes, done.notes);
+        match memory {
+            Some(_) if !is_json => return console::out_between(&done.report),
+            Some(memory) => {
+                let bytes = self.held.as_ref().map_or(0, Reservation::bytes) + done.report.len() as u64;
+                let what = "the documents of all frames, which --json prints at the end,";
+                if self.held.is_none() {
+                    self.held = Some(memory.take(what, 0).map_err(Error::Limit)?);
+                }
+                self.held.iter_mut().try_for_each(|held| held.set(what, bytes)).map_err(Error::Limit)?;
+            }
+            None => {}
+        }
+        self.reports.push(done.report);
+        Ok(())
+    }
+
+    /// Prints warnings and notes.
+    fn print_sentences(&self) {
+        self.warnings.iter().for_each(|warning| console::warn(warning));
+        self.notes.iter().for_each(|note| console::remark(note));
+    }
+
+    /// Prints what is not printed yet.
+    fn print_reports(&self, is_json: bool, is_still: bool) -> Result<(), Error> {
+        match (is_json, is_still) {
+            (false, _) => self.reports.iter().try_for_each(|report| console::out(report)),
+            (true, true) => self.reports.iter().try_for_each(|report| console::out(&format!("{report}\n"))),
+            (true, false) => self.print_frames(),
+        }
+    }
+
+    /// A list of the documents of frames, as one document.
+    fn print_frames(&self) -> Result<(), Error> {
+        console::out("{\n  \"frames\": [")?;
+        for (i, report) in self.reports.iter().enumerate() {
+            let before = if i == 0 { "\n" } else { ",\n" };
+            let lines: Vec<String> = report.lines().map(|line| format!("    {line}")).collect();
+            console::out(&format!("{before}{}", lines.join("\n")))?;
+        }
+        console::out(if self.reports.is_empty() { "]\n}\n" } else { "\n  ]\n}\n" })
+    }
+}
+
+/// Adds the sentences that are not among them yet.
+fn add_new(known: &mut Vec<String>, sentences: Vec<String>) {
+    for sentence in sentences {
+        if !known.contains(&sentence) {
+            known.push(sentence);
+        }
+    }
 }
 
 /// Renders and writes, and gives the exit code. Whatever can be refused is refused before any work.
@@ -44,7 +115,8 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<u8, Error> {
     let (jobs, files) = Jobs::new(arguments)?;
     let mut drawing = jobs.check(files)?;
     let options = RenderOptions { device: open_device(&arguments.scene)?, ..render_options(&arguments.scene) };
-    let mut done: Vec<Done> = Vec::new();
+    let is_json = arguments.scene.common.json;
+    let mut said = Said::default();
     let outcome = with_bar(|progress| {
         let count = jobs.frames().count();
         for (at, frame) in jobs.frames().enumerate() {
@@ -58,32 +130,20 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<u8, Error> {
             let one = job.run(arguments, &options, &mut drawing, progress)?;
             progress.leave();
             let interrupted = one.sets.is_some_and(|s| s.interrupted);
-            done.push(one);
+            said.add(one, is_json, drawing.sequence().map(|sequence| sequence.files().memory(&options)))?;
             if interrupted {
                 break;
             }
         }
         Ok(())
     });
-    let mut said: Vec<&String> = Vec::new();
-    for warning in done.iter().flat_map(|d| &d.warnings) {
-        if !said.contains(&warning) {
-            console::warn(warning);
-            said.push(warning);
-        }
-    }
-    let mut noted: Vec<&String> = Vec::new();
-    for note in done.iter().flat_map(|d| &d.notes) {
-        if !noted.contains(&note) {
-            console::remark(note);
-            noted.push(note);
-        }
-    }
-    if outcome.is_ok() || !arguments.scene.common.json {
-        console::out(&summary(&jobs, &done, arguments))?;
+    // Of pictures before the one that failed what they say is worth knowing, but no document.
+    said.print_sentences();
+    if outcome.is_ok() || !is_json {
+        said.print_reports(is_json, jobs.is_still())?;
     }
     outcome?;
-    Ok(match done.last().and_then(|d| d.sets) {
+    Ok(match said.sets {
         Some(Sets { averaged, asked, interrupted: true }) => {
             console::warn(&format!("interrupted: the picture is the average of {averaged} of {asked} sets"));
             Error::Cancelled.exit_code()
@@ -119,8 +179,11 @@ impl Job<'_> {
             target.write(format!("{:#}\n", report::cost_json(&render.cost)).as_bytes())?;
         }
         progress.finish();
-        let (text, json) = (self.text(&render, &written), self.json(&render, &written));
-        Ok(Done { text, json, warnings, notes: render.notes, sets: render.sets })
+        let report = match arguments.scene.common.json {
+            true => format!("{:#}", self.json(&render, &written)),
+            false => self.text(&render, &written),
+        };
+        Ok(Done { report, warnings, notes: render.notes, sets: render.sets })
     }
 
     fn metadata(&self, render: &Render) -> Metadata {
@@ -215,17 +278,5 @@ impl Job<'_> {
             document["frame"] = frame.into();
         }
         document
-    }
-}
-
-/// Of one picture its own account, of frames a list of them.
-fn summary(jobs: &Jobs<'_>, done: &[Done], arguments: &RenderArguments) -> String {
-    if !arguments.scene.common.json {
-        return done.iter().map(|d| d.text.as_str()).collect();
-    }
-    let mut documents = done.iter().map(|d| &d.json);
-    match (jobs.is_still(), documents.next()) {
-        (true, Some(document)) => format!("{document:#}\n"),
-        _ => format!("{:#}\n", json!({ "frames": done.iter().map(|d| &d.json).collect::<Vec<_>>() })),
     }
 }

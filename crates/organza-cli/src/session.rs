@@ -6,6 +6,7 @@ use super::memory;
 use organza::device::{Choice, Device, DeviceChoice};
 use organza::scene::{self, LoadOptions, Override, Scene};
 use organza::{Cache, Error, Progress, RenderOptions, printable};
+use splat_core::MemoryAccount;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -24,7 +25,9 @@ pub(super) fn parse_scene(
     turntable: Option<u32>,
 ) -> Result<Scene, Error> {
     let overrides = overrides(arguments, given.is_made)?;
-    let options = LoadOptions { allow_path: arguments.allow_path, overrides, frame, turntable };
+    let SceneArguments { allow_path, sandbox, .. } = *arguments;
+    let memory = MemoryAccount::new(reading_options(&arguments.common).max_memory);
+    let options = LoadOptions { allow_path, sandbox, memory, overrides, frame, turntable };
     Ok(scene::parse(&given.file, &given.bytes, &options)?)
 }
 

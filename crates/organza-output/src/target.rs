@@ -5,10 +5,10 @@ use std::fs::{self, File};
 use std::io::{self, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
-use tempfile::{Builder, NamedTempFile, TempPath};
+use tempfile::{Builder, NamedTempFile, TempDir, TempPath};
 
 /// Names of temporary files and folders begin so.
-pub(super) const PREFIX: &str = ".organza-";
+const PREFIX: &str = ".organza-";
 
 /// Where an output goes: a regular file, or a name that is free.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -94,7 +94,7 @@ impl Target {
     }
 
     fn publish(&self, bytes: &[u8]) -> io::Result<()> {
-        let (mut file, _listed) = temporary_beside(&self.real)?;
+        let Listed { made: mut file, listing: _listed } = temporary_beside(&self.real)?;
         file.as_file_mut().write_all(bytes)?;
         file.as_file().sync_all()?;
         let temporary = file.into_temp_path();
@@ -125,15 +125,17 @@ fn folder_of(path: &Path) -> &Path {
     }
 }
 
-/// Temporary files that are being written.
+/// Temporary files that are being written, and folders in which names are tried.
 static BEING_WRITTEN: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 
-/// Removes the temporary files of outputs that are being written and makes no further ones: for a process that ends at
-/// once, in the middle.
+/// Removes the temporary files of outputs that are being written, and the folders in which names are tried, and makes no further ones: for a
+/// process that ends at once, in the middle.
 pub fn abandon() {
     let mut being_written = being_written();
     for path in being_written.drain(..) {
-        let _ = fs::remove_file(path);
+        // A name that is tried meanwhile keeps its folder: once more without it.
+        let gone = |_: &usize| fs::remove_file(&path).is_ok() || fs::remove_dir_all(&path).is_ok() || !path.exists();
+        let _ = (0..ATTEMPTS).find(gone);
     }
     // Whoever would make another waits for the end.
     std::mem::forget(being_written);
@@ -143,17 +145,28 @@ fn being_written() -> MutexGuard<'static, Vec<PathBuf>> {
     BEING_WRITTEN.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Takes a path from [`BEING_WRITTEN`] when it is dropped.
-struct Listed(PathBuf);
+/// Attempts to remove a folder in which names are tried.
+const ATTEMPTS: usize = 100;
 
-impl Drop for Listed {
+/// A temporary file or folder that [`abandon`] removes.
+#[derive(Debug)]
+pub(super) struct Listed<T> {
+    pub(super) made: T,
+    listing: Listing,
+}
+
+/// Takes a path from [`BEING_WRITTEN`] when it is dropped.
+#[derive(Debug)]
+struct Listing(PathBuf);
+
+impl Drop for Listing {
     fn drop(&mut self) {
         being_written().retain(|path| *path != self.0);
     }
 }
 
 /// A file of our own that is gone when it is dropped. Its name is random: numbers of processes are shared by containers.
-fn temporary_beside(real: &Path) -> io::Result<(NamedTempFile, Listed)> {
+fn temporary_beside(real: &Path) -> io::Result<Listed<NamedTempFile>> {
     let mut builder = Builder::new();
     builder.prefix(PREFIX).suffix(".tmp").rand_bytes(12);
     #[cfg(unix)]
@@ -161,8 +174,17 @@ fn temporary_beside(real: &Path) -> io::Result<(NamedTempFile, Listed)> {
     let mut being_written = being_written();
     let file = builder.tempfile_in(folder_of(real)).map_err(without_name)?;
     being_written.push(file.path().to_owned());
-    let listed = Listed(file.path().to_owned());
-    Ok((file, listed))
+    let listing = Listing(file.path().to_owned());
+    Ok(Listed { made: file, listing })
+}
+
+/// A folder of our own in a folder, that is gone with all in it when it is dropped.
+pub(super) fn temporary_folder_in(folder: &Path) -> io::Result<Listed<TempDir>> {
+    let mut being_written = being_written();
+    let made = Builder::new().prefix(PREFIX).rand_bytes(12).tempdir_in(folder)?;
+    being_written.push(made.path().to_owned());
+    let listing = Listing(made.path().to_owned());
+    Ok(Listed { made, listing })
 }
 
 /// An error of making something with a random name, which nobody asked for, without it.

@@ -1,6 +1,6 @@
 //! All outputs of a run, checked together before any work.
 
-use super::target::{PREFIX, Target, without_name};
+use super::target::{Listed, Target, temporary_folder_in, without_name};
 use crate::Error;
 use std::collections::hash_map::Entry;
 use std::collections::{HashMap, HashSet};
@@ -18,7 +18,7 @@ pub struct Targets {
     there: HashSet<Identity>,
     /// For each folder one of our own in it, with an empty file for each output: only the file system itself knows which
     /// names it takes, and which for the same.
-    folders: HashMap<Identity, TempDir>,
+    folders: HashMap<Identity, Listed<TempDir>>,
 }
 
 impl Targets {
@@ -50,11 +50,10 @@ impl Targets {
         let folder = match self.folders.entry(identity(target.folder()).map_err(fail)?) {
             Entry::Occupied(entry) => entry.into_mut(),
             Entry::Vacant(entry) => {
-                let made = tempfile::Builder::new().prefix(PREFIX).rand_bytes(12).tempdir_in(target.folder());
-                entry.insert(made.map_err(|e| fail(without_name(e)))?)
+                entry.insert(temporary_folder_in(target.folder()).map_err(|e| fail(without_name(e)))?)
             }
         };
-        match File::create_new(folder.path().join(target.name())) {
+        match File::create_new(folder.made.path().join(target.name())) {
             Ok(_) => Ok(target),
             Err(e) if e.kind() == ErrorKind::AlreadyExists => refuse(TWICE),
             Err(e) => Err(fail(e)),

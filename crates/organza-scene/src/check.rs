@@ -10,7 +10,7 @@ use super::check_light::check_light;
 use super::check_material::{check_listed, check_materials, unknown_material};
 use super::check_object::{Named, check_object};
 use super::check_render::check_render;
-use super::load::Turn;
+use super::load::{LoadOptions, Turn};
 use super::paths::{Paths, ROOT_KEY};
 use super::raw::{RawAnimation, RawScene};
 use super::raw_object::RawObject;
@@ -164,7 +164,7 @@ impl<'a> At<'a> {
 pub(super) fn scene(
     document: &Document<'_>,
     raw: RawScene,
-    allow_path: bool,
+    options: &LoadOptions,
     turn: Option<Turn>,
     sha256: String,
 ) -> Result<Scene, Error> {
@@ -173,8 +173,9 @@ pub(super) fn scene(
         let message = format!("`version`: expected 1, found {}", raw.version);
         return Err(at.key("version").error(message, "this version of Organza reads scenes of version 1"));
     }
-    let paths = Paths::new(&at.key(ROOT_KEY), document.file, raw.root.as_deref(), allow_path)?;
-    let footprints = check_footprints(&at.key("footprints"), raw.footprints.as_deref(), &paths)?;
+    let paths = Paths::new(&at.key(ROOT_KEY), document.file, raw.root.as_deref(), options)?;
+    let at_footprints = at.key("footprints");
+    let footprints = check_footprints(&at_footprints, raw.footprints.as_deref(), &paths, &options.memory)?;
     let materials = check_materials(&at.key("material"), &raw.material, (&paths, &footprints.stack))?;
     let extracts = raw.object.iter().filter_map(|object| object.extract.as_ref()?.objects.clone());
     let tracks = raw.animation.iter().flat_map(|animation| &animation.track);

@@ -7,7 +7,8 @@ use super::raw_footprint::{NumberOr, RawChoice, RawChosen, RawFootprint, RawImag
 use crate::{Error, printable, shown};
 use convert::FootprintChoice;
 use convert::read::{Loaded, ReadParams, file};
-use splat_core::{Footprint, FootprintImage, FootprintStack, Limits};
+use convert::{Fault, ReadError};
+use splat_core::{Exceeded, Footprint, FootprintImage, FootprintStack, MemoryAccount};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -26,7 +27,12 @@ pub(super) struct Footprints {
 }
 
 /// Reads the images of a list of footprints.
-pub(super) fn check_footprints(at: &At<'_>, raw: Option<&[RawFootprint]>, paths: &Paths) -> Result<Footprints, Error> {
+pub(super) fn check_footprints(
+    at: &At<'_>,
+    raw: Option<&[RawFootprint]>,
+    paths: &Paths,
+    memory: &MemoryAccount,
+) -> Result<Footprints, Error> {
     let Some(raw) = raw else { return Ok(Footprints::default()) };
     let (mut layers, mut images, mut files) = (Vec::new(), Vec::new(), Vec::new());
     for (i, footprint) in raw.iter().enumerate() {
@@ -40,7 +46,7 @@ pub(super) fn check_footprints(at: &At<'_>, raw: Option<&[RawFootprint]>, paths:
                 let layer = check_cutoff(&at.key("cutoff"), of.cutoff.unwrap_or(3.0))?;
                 for (path, place) in check_paths(&at, of, paths)? {
                     layers.push(layer);
-                    images.push(Some(read_image(&place, &path)?));
+                    images.push(Some(read_image(&place, &path, memory)?));
                     files.push(path);
                 }
             }
@@ -111,11 +117,21 @@ fn images_in(folder: &Path) -> std::io::Result<Vec<String>> {
     Ok(names)
 }
 
-fn read_image(at: &At<'_>, path: &Path) -> Result<Arc<FootprintImage>, Error> {
-    let most = u64::from(LONGEST_SIDE) * u64::from(LONGEST_SIDE) * 16;
-    let params = ReadParams { is_coverage: true, limits: Limits::bytes(most), ..ReadParams::default() };
-    let (loaded, _) = file(path, &params, None)
-        .map_err(|e| at.error(format!("{}{}: expected {}, found {}", e.file, e.place, e.expected, e.found), e.hint))?;
+/// An image that takes more memory than there may be; the reader says first how many bytes.
+fn too_large(error: &ReadError, limit: u64) -> Error {
+    let needed = error.found.split(' ').next().and_then(|bytes| bytes.parse().ok()).unwrap_or(u64::MAX);
+    let what = format!("the image of a footprint {}", error.file).into();
+    Error::Limit(Exceeded { what, needed, limit: Some(limit), unit: "bytes", hint: error.hint.into() })
+}
+
+fn read_image(at: &At<'_>, path: &Path, memory: &MemoryAccount) -> Result<Arc<FootprintImage>, Error> {
+    let params = ReadParams { is_coverage: true, memory: memory.clone(), ..ReadParams::default() };
+    let (loaded, _) = file(path, &params, None).map_err(|e| match e.fault {
+        Fault::Limit => too_large(&e, memory.limit()),
+        _ => at.error(format!("{}{}: expected {}, found {}", e.file, e.place, e.expected, e.found), e.hint),
+    })?;
+    // While means are taken of it.
+    let _held = memory.take(&printable(path), loaded.bytes()).map_err(Error::Limit)?;
     let refuse = |found: String, hint: &str| {
         Err(at.error(format!("expected an image of coverage, {} has {found}", printable(path)), hint))
     };

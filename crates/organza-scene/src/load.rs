@@ -6,13 +6,17 @@ use super::tree::{Document, error_at};
 use super::{Scene, animation, check, de, raw_camera, read_json, read_toml};
 use crate::Error;
 use sha2::{Digest, Sha256};
-use splat_core::Exceeded;
+use splat_core::{Exceeded, MemoryAccount};
 use std::io::Read;
 use std::path::Path;
 use std::sync::Arc;
 
 /// Largest scene file, bytes.
 pub const MAX_SCENE_BYTES: u64 = 16 << 20;
+
+/// Bytes that a character of a scene takes while it is read, at most: a digit and a comma are a value with its place, in a list with
+/// room for as many again.
+const BYTES_PER_CHARACTER: u64 = 96;
 
 /// Most levels of lists and tables inside each other.
 pub const MAX_SCENE_DEPTH: usize = 64;
@@ -23,6 +27,10 @@ pub struct LoadOptions {
     /// Allow data outside the scene's root folder: the folder above the scene's folder (or the scene's folder itself
     /// where that would be the root of the file system).
     pub allow_path: bool,
+    /// Forbid that the scene's own word, its key `root`, allows data outside the scene's root folder: for scenes of strangers.
+    pub sandbox: bool,
+    /// What the text of the scene and the images of its footprints take while they are read, together with all else on the same account.
+    pub memory: MemoryAccount,
     /// Changes from the command line, applied in order before anything is checked.
     pub overrides: Vec<Override>,
     /// The frame of the scene's animation; `None` loads the scene as it is written.
@@ -83,6 +91,8 @@ pub fn parse(file: &Path, bytes: &[u8], options: &LoadOptions) -> Result<Scene, 
     let (what, hint) =
         (format!("the scene file {}", crate::printable(file)), "put data into files that the scene names");
     Exceeded::check(what, bytes.len() as u64, MAX_SCENE_BYTES, "bytes", hint).map_err(Error::Limit)?;
+    let what = format!("the scene {}", crate::printable(file));
+    let _held = options.memory.take(&what, bytes.len() as u64 * BYTES_PER_CHARACTER).map_err(Error::Limit)?;
     let text = decode(file, bytes)?;
     let is_json = file.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
     let root = if is_json { read_json::read_json(file, text)? } else { read_toml::read_toml(file, text)? };
@@ -100,7 +110,7 @@ pub fn parse(file: &Path, bytes: &[u8], options: &LoadOptions) -> Result<Scene, 
         let message = format!("--turntable: {} has an animation of its own", crate::printable(file));
         return Err(Error::usage(message, "draw it with --frames"));
     }
-    let mut scene = check::scene(&document, raw, options.allow_path, turn, hash(bytes, options))?;
+    let mut scene = check::scene(&document, raw, options, turn, hash(bytes, options))?;
     // At frame 0 everything is where it begins.
     let frame = options.frame.filter(|frame| turn.is_none() && *frame > 0);
     if let (Some(frame), false) = (frame, scene.stops.is_empty()) {

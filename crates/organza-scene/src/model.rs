@@ -109,7 +109,12 @@ impl Scene {
     pub fn digest_of_data(&self) -> Result<[u8; 32], Error> {
         let mut hasher = Sha256::new();
         for path in self.files().into_iter().skip(1) {
-            let copied = File::open(&path).and_then(|mut file| {
+            // Asked before opening: opening a pipe waits for its writer.
+            let regular = std::fs::metadata(&path).and_then(|meta| match meta.is_file() {
+                true => Ok(()),
+                false => Err(std::io::Error::other("not a regular file")),
+            });
+            let copied = regular.and_then(|()| File::open(&path)).and_then(|mut file| {
                 let mut buffer = vec![0; 1 << 20];
                 loop {
                     match file.read(&mut buffer)? {

@@ -1,5 +1,6 @@
 //! Paths of data: relative to the scene file, inside the scene's root folder, or inside the one that it names, unless allowed.
 
+use super::LoadOptions;
 use super::check::At;
 use crate::{Error, printable, shown};
 use std::path::{Component, Path, PathBuf};
@@ -24,11 +25,19 @@ impl Paths {
         at_named: &At<'_>,
         scene_file: &Path,
         named: Option<&str>,
-        allow_path: bool,
+        options: &LoadOptions,
     ) -> Result<Self, Error> {
         let folder = folder_of(scene_file);
         let named = named.map(|named| check_named(at_named, &folder, named)).transpose()?;
-        let root = if allow_path { None } else { Some(default_root(&folder)?) };
+        let root = if options.allow_path { None } else { Some(default_root(&folder)?) };
+        if let (true, Some(named)) = (options.sandbox, &named) {
+            let root = default_root(&folder)?;
+            if !root.canonicalize().is_ok_and(|root| named.starts_with(root)) {
+                let message =
+                    format!("`{ROOT_KEY}`: {} lies outside the root folder {}", printable(named), printable(&root));
+                return Err(at_named.error(message, "leave out --sandbox if you trust the scene"));
+            }
+        }
         Ok(Self { folder, root, named })
     }
 

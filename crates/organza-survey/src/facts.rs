@@ -8,7 +8,8 @@ use convert::RawPoints;
 use convert::read::{Loaded, Mended, NamedColumn, ReadParams, UpAxis, stated_up_axis, up_axis};
 use organza::Error;
 use splat_core::glam::{DVec3, Vec3};
-use splat_core::{Aabb, DAabb, Grid, Limits, Mesh, RadianceImage};
+use splat_core::{Aabb, DAabb, Grid, MemoryAccount, Mesh, RadianceImage};
+use std::collections::HashSet;
 use std::path::Path;
 
 /// Bins of a histogram of values.
@@ -68,7 +69,7 @@ pub struct Facts {
 /// [`Error::Io`] for the file system, [`Error::Input`] for a file that is not what its name says, [`Error::Limit`] for
 /// one that would take more than `max_bytes`.
 pub fn facts(path: &Path, max_bytes: u64, strict: bool) -> Result<Facts, Error> {
-    let params = ReadParams { limits: Limits::bytes(max_bytes), strict, ranges: true, ..ReadParams::default() };
+    let params = ReadParams { memory: MemoryAccount::new(max_bytes), strict, ranges: true, ..ReadParams::default() };
     let read = convert::read::file(path, &params, None);
     let (data, notes) = read.map_err(|e| Error::from_read(path, &e))?;
     let bytes = std::fs::metadata(path).map_err(|e| Error::io(path, "cannot read", e))?.len();
@@ -80,7 +81,8 @@ pub fn facts(path: &Path, max_bytes: u64, strict: bool) -> Result<Facts, Error> 
         _ => return Err(Error::Internal("a reader gave data of no known kind".into())),
     };
     // What a scene can ask for by name is no longer without use.
-    let is_column = |name: &String| notes.columns.iter().any(|column| column.name == *name);
+    let columns: HashSet<&str> = notes.columns.iter().map(|column| column.name.as_str()).collect();
+    let is_column = |name: &String| columns.contains(name.as_str());
     let unused = notes.unused.iter().filter(|name| !is_column(name)).cloned().collect();
     let remarks = notes.remarks.into_iter().chain(facts.remarks).collect();
     let mended = notes.mended.iter().map(Mended::to_string).collect();

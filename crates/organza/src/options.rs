@@ -2,14 +2,14 @@
 
 use crate::device::Device;
 use convert::{Cache, read::ReadParams};
-use splat_core::Limits;
+use splat_core::MemoryAccount;
 use std::path::PathBuf;
 use std::sync::Arc;
 
 /// What a render may take and how it treats doubtful input.
 #[derive(Debug, Clone)]
 pub struct RenderOptions {
-    /// Bytes that all buffers together may take.
+    /// Bytes that all buffers together may take: files while they are read and what is kept of them, images, checkpoints, splats, pictures.
     pub max_memory: u64,
     /// Leave out records with values that are not finite instead of refusing the file.
     pub drop_invalid: bool,
@@ -47,7 +47,7 @@ impl Default for RenderOptions {
 impl RenderOptions {
     /// What a file may ask for when it is read.
     pub fn read_params(&self) -> ReadParams {
-        let limits = Limits::bytes(self.max_memory);
-        ReadParams { limits, drop_invalid: self.drop_invalid, strict: self.strict, ..ReadParams::default() }
+        let memory = MemoryAccount::new(self.max_memory);
+        ReadParams { memory, drop_invalid: self.drop_invalid, strict: self.strict, ..ReadParams::default() }
     }
 }

@@ -5,6 +5,7 @@ mod seen;
 use crate::carried;
 use crate::choose::{choose, plan, row, same_forms, technique_of, techniques, unshown};
 use crate::form::PlannedObject;
+use crate::frame::Frame;
 use crate::load::files::Files;
 use crate::load::own::Own;
 use crate::load::{self, Loaded, Spare, light_statistics};
@@ -61,7 +62,9 @@ pub fn explain_from(
     files: &Files,
 ) -> Result<Explanation, Error> {
     let (scene, found) = fitted(scene, options, progress, files)?;
-    let (_, _, mut explanation) = prepare(&scene, options, progress, files, None)?;
+    let (loaded, planned, mut explanation) = prepare(&scene, options, progress, files, None)?;
+    let frame = Frame::new(&scene, &loaded, &planned.plan, progress);
+    techniques(&scene).into_iter().try_for_each(|technique| (row(technique).check)(&frame, options))?;
     explanation.found = found;
     explanation.warnings.extend(doubts::of_shadows(explanation.plan.tables()));
     explanation.warnings.extend(doubts::of_scattering(&explanation.plan));
@@ -103,7 +106,7 @@ pub(crate) fn prepare(
     warnings.extend(carried::unshadowed(scene, &loaded));
     // Of fields of a file the file alone knows what it holds.
     let inputs = cost.stages.iter().filter(|s| s.name == pass::READ).map(|s| s.bytes).sum::<u64>().max(files.bytes());
-    let most = memory.total().max(memory::loading_bytes(&loaded, inputs)).max(files.most.get());
+    let most = memory.total().max(memory::loading_bytes(&loaded, inputs)).max(files.most.get()).max(files.peak());
     Ok((loaded, planned, Explanation { plan, cost, memory: most, splats, warnings, notes, found: None }))
 }
 

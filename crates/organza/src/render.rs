@@ -99,7 +99,7 @@ impl Left {
     /// is then left.
     fn fit(&mut self, max_memory: u64, other: u64) {
         if self.is_still || self.files.bytes() > (max_memory / Self::SHARE).min(max_memory.saturating_sub(other)) {
-            self.files = Files::default();
+            self.files = self.files.emptied();
         }
         self.sets.allow(max_memory, other + self.files.bytes());
     }
@@ -119,7 +119,8 @@ pub(crate) fn render_keeping(
             let message = "only the technique `particles` is drawn in sets that a checkpoint can keep";
             return Err(Error::usage(message, "use --technique particles, or no --checkpoint"));
         }
-        Checkpoint::open(path, scene, options, (!left.is_still).then_some(&left.sets))
+        let (kept, memory) = ((!left.is_still).then_some(&left.sets), left.files.memory(options));
+        Checkpoint::open(path, scene, options, kept, &memory)
     };
     let mut checkpoint = options.checkpoint.as_ref().map(open).transpose()?;
     let helper = options.device.as_deref().map(Helper::new);

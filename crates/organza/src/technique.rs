@@ -68,6 +68,8 @@ pub(crate) struct Row {
     pub(crate) carries: fn(&Scene) -> Option<CarriesLight>,
     /// Adds effects and passes of its own to the plan of a scene that it draws, and takes out what it does not need.
     pub(crate) plans: fn(&Scene, &Loaded, &mut Plan),
+    /// Refuses what its fold would refuse, without drawing.
+    pub(crate) check: for<'a> fn(&'a Frame<'a>, &RenderOptions) -> Result<(), Error>,
     /// Begins a frame.
     pub(crate) begin: for<'a> fn(&'a Frame<'a>) -> Box<dyn Fold + 'a>,
 }
@@ -149,6 +151,7 @@ pub(crate) static TABLE: [Row; 5] = [
         steps: &[Step { pass: pass::PARTICLES, stage: stage::PARTICLES, seconds: particles::seconds }],
         is_random: true,
         bytes: |matter, _, colored, options| particles::bytes(matter.scene, colored, options),
+        check: particles::check,
         begin: particles::begin,
         ..POINTS
     },
@@ -216,5 +219,6 @@ const POINTS: Row = Row {
     bytes: |_, _, _, _| 0,
     carries: |_| None,
     plans: |_, _, _| {},
+    check: |_, _| Ok(()),
     begin: points::begin,
 };

@@ -249,6 +249,23 @@ pub(crate) struct Plan {
     focal: f64,
 }
 
+impl FoldParams {
+    /// Refuses sets of so many expected particles, as folding them would.
+    ///
+    /// # Errors
+    /// [`Error::Limit`] for more bytes or particles than [`FoldParams::limits`].
+    pub fn check_set(&self, expected: f64) -> Result<(), Error> {
+        let needed = (expected * BYTES_IN_BATCH as f64) as u64;
+        let Limits { max_bytes, max_elements } = self.limits;
+        for (needed, limit, unit) in [(needed, max_bytes, "bytes"), (expected as u64, max_elements, "particles")] {
+            if needed > limit {
+                return Err(Error::limit("one set of particles", needed, limit, unit));
+            }
+        }
+        Ok(())
+    }
+}
+
 impl Plan {
     fn new(scene: &Scene<'_>, ensemble: &Ensemble, params: &FoldParams) -> Result<Self, Error> {
         let levels = params.levels;
@@ -262,13 +279,8 @@ impl Plan {
         }
         check(ensemble.levels.checked_add(levels).is_some(), "levels", levels, "at most 2³² − 1 in all")?;
         let expected: f64 = scene.objects.iter().map(|o| o.sampler.expected_particles()).sum();
-        let needed = (expected * BYTES_IN_BATCH as f64) as u64;
+        params.check_set(expected)?;
         let Limits { max_bytes, max_elements } = params.limits;
-        for (needed, limit, unit) in [(needed, max_bytes, "bytes"), (expected as u64, max_elements, "particles")] {
-            if needed > limit {
-                return Err(Error::limit("one set of particles", needed, limit, unit));
-            }
-        }
         let budget = (max_bytes / BYTES_IN_BATCH).min(params.batch_particles).min(max_elements) as f64;
         let axes = scene.camera.axes;
         let of_object = |(o, object): (usize, &Object<'_>)| {

@@ -29,7 +29,7 @@ pub(crate) struct Classifier {
 
 impl Classifier {
     /// Extinction is multiplied by `scale`.
-    pub(crate) fn new(transfer: &TransferFunction, scale: f64, base: f64) -> Self {
+    pub(crate) fn new(transfer: &TransferFunction, scale: f64, base: Base) -> Self {
         let points = transfer.points();
         let four = |i: usize| {
             let p = points[i];
@@ -38,8 +38,13 @@ impl Classifier {
         let piece = |i: usize| {
             let (at, next) = (four(i), four((i + 1).min(points.len() - 1)));
             let width = points.get(i + 1).map_or(1.0, |next| f64::from(next.value) - f64::from(points[i].value));
-            let slope = |c: usize| ((f64::from(next[c]) - f64::from(at[c])) / width) as f32;
-            Piece { value: relative(points[i].value, base), at, slope: std::array::from_fn(slope) }
+            // A jump steeper than single precision has it stays a number: times no step at all it is nothing.
+            let steepest = f64::from(f32::MAX);
+            let slope = |c: usize| {
+                let rise = (f64::from(next[c]) - f64::from(at[c])) / (width * base.factor);
+                rise.clamp(-steepest, steepest) as f32
+            };
+            Piece { value: base.relative(points[i].value), at, slope: std::array::from_fn(slope) }
         };
         Self { first: four(0), pieces: (0..points.len()).map(piece).collect() }
     }
@@ -86,9 +91,44 @@ impl Classifier {
     }
 }
 
-/// A value less the base.
-pub(crate) fn relative(value: f32, base: f64) -> f32 {
-    (f64::from(value) - base) as f32
+/// What values are taken relative to: the middle of a volume's values, and a power of two by which they are multiplied, so that neither they
+/// nor slopes between them leave single precision.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Base {
+    middle: f64,
+    factor: f64,
+}
+
+/// Differences of values from 2⁻⁹⁰ to 2⁹⁰ are taken as they are: colours and extinctions over them are single-precision numbers.
+const MOST_EXPONENT: i32 = 90;
+
+impl Base {
+    /// For values from `low` to `high` and the control points of their transfer function.
+    pub(crate) fn new([low, high]: [f32; 2], transfer: &TransferFunction) -> Self {
+        let middle = 0.5 * (f64::from(low) + f64::from(high));
+        let widths = transfer.points().windows(2).map(|pair| f64::from(pair[1].value) - f64::from(pair[0].value));
+        let least = widths.fold(f64::INFINITY, f64::min);
+        let ends =
+            transfer.points().iter().map(|point| f64::from(point.value)).chain([f64::from(low), f64::from(high)]);
+        let most = ends.map(|end| (end - middle).abs()).fold(0.0, f64::max);
+        let exponent = |x: f64| if x > 0.0 && x.is_finite() { libm::ilogb(x) } else { 0 };
+        // Widened for the least step, as far as the largest value allows it.
+        let wider = (-MOST_EXPONENT - exponent(least)).max(0);
+        let factor = wider.min(MOST_EXPONENT - exponent(most));
+        Self { middle, factor: libm::exp2(factor.into()) }
+    }
+
+    /// A value less the middle, in the unit of the base.
+    #[inline(always)]
+    pub(crate) fn relative(self, value: f32) -> f32 {
+        ((f64::from(value) - self.middle) * self.factor) as f32
+    }
+
+    /// A base of which values keep their unit.
+    #[cfg(test)]
+    pub(crate) fn at(middle: f64) -> Self {
+        Self { middle, factor: 1.0 }
+    }
 }
 
 #[cfg(test)]
@@ -111,6 +151,41 @@ mod tests {
         }
     }
 
+    /// Found by attack: values below 1e-36 have slopes beyond single precision, and infinity times nothing is no number.
+    #[test]
+    fn values_of_any_size_are_classified() {
+        for exponent in [-140, -100, 0, 100, 127] {
+            let unit = libm::exp2(f64::from(exponent));
+            let point = |share: f64, extinction: f32| {
+                let color = [0.25, 1.0, extinction];
+                TransferPoint { value: (share * unit) as f32, color, extinction }
+            };
+            let tf = TransferFunction::new(vec![point(-0.5, 0.0), point(0.0, 1.0), point(1.0, 3.0)]).unwrap();
+            let base = Base::new([point(-1.0, 0.0).value, point(1.5, 0.0).value], &tf);
+            let classifier = Classifier::new(&tf, 1.0, base);
+            for (share, expected) in
+                [(-1.0, 0.0), (-0.5, 0.0), (-0.25, 0.5), (0.0, 1.0), (0.5, 2.0), (1.0, 3.0), (1.25, 3.0)]
+            {
+                let found = pulp::Arch::new().dispatch(At(&classifier, base.relative((share * unit) as f32)));
+                let of = format!("{share} times 2^{exponent}: {found:?}");
+                assert!((found[0] - expected).abs() < 1e-3 && (found[3] - expected).abs() < 1e-3, "{of}");
+                assert_eq!(found[1], 0.25, "{of}");
+            }
+        }
+        // A jump between neighbours, far below the range of the values.
+        let point = |value: f32, extinction: f32| TransferPoint { value, color: [1.0; 3], extinction };
+        let tf = TransferFunction::new(vec![point(0.0, 0.0), point(1e-43, 1.0)]).unwrap();
+        for high in [1e-43, 1.0, f32::MAX] {
+            let base = Base::new([0.0, high], &tf);
+            let classifier = Classifier::new(&tf, 1.0, base);
+            for value in [0.0, 1e-43, 0.5 * high, high] {
+                let found = classifier.one(base.relative(value));
+                assert!(found.iter().all(|v| v.is_finite()), "{value} of {high}: {found:?}");
+                assert!(value <= 1e-43 || found[0] == 1.0, "{value} of {high}: {found:?}");
+            }
+        }
+    }
+
     #[test]
     fn ia08_control_points_are_hit_exactly_and_nothing_lies_outside() {
         for count in [5u16, 256] {
@@ -120,8 +195,9 @@ mod tests {
             };
             let tf = TransferFunction::new((0..count).map(point).collect()).unwrap();
             for base in [0.0, 0.5, 0.123] {
+                let base = Base::at(base);
                 let classifier = Classifier::new(&tf, 1.0, base);
-                let at = |v: f32| pulp::Arch::new().dispatch(At(&classifier, relative(v, base)));
+                let at = |v: f32| pulp::Arch::new().dispatch(At(&classifier, base.relative(v)));
                 for p in tf.points() {
                     assert_eq!(at(p.value), [p.extinction, p.color[0], p.color[1], p.color[2]], "{p:?}");
                 }

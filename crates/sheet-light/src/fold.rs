@@ -1,7 +1,7 @@
 //! From volumes and a view to sheets, and their fold over a range of depths.
 
 use crate::aligned::{Slant, plane_step};
-use crate::classify::Classifier;
+use crate::classify::{Base, Classifier};
 use crate::counts::SheetCounts;
 use crate::error::cancelled;
 use crate::gradient_volume::GradientVolume;
@@ -60,7 +60,7 @@ pub(crate) struct Prepared<'a> {
     pub(crate) lacking: Option<Range<u32>>,
     pub(crate) segments: Segments,
     /// What values are taken relative to.
-    pub(crate) base: f64,
+    pub(crate) base: Base,
     /// The footprint of all voxels, where rays are parallel.
     footprint: Option<PixelFootprint>,
 }
@@ -219,8 +219,7 @@ impl<'a> Prepared<'a> {
         let segments = Segments::new(&viewed, slabs, &voxels, lattice.dims, tiles);
         let cutoff = params.kernel.extent / params.kernel.sigma;
         let footprint = Footprint { cutoff: cutoff as f32 };
-        let (low, high) = extremes(&grid.values);
-        let base = 0.5 * (f64::from(low) + f64::from(high));
+        let base = Base::new(extremes(&grid.values).into(), transfer);
         Self {
             volume,
             slabs: *slabs,

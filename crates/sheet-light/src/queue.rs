@@ -129,7 +129,7 @@ impl Queue {
             let center = [eight.x[i] - (corner[0] as f32 - 1.0), eight.y[i] - (corner[1] as f32 - 1.0)];
             let inside = |a: usize| center[a] + half[a] > 0.5 && center[a] - half[a] < SIDE as f32 - 0.5;
             if inside(0) && inside(1) {
-                let value = crate::classify::relative(values[i], of.base);
+                let value = of.base.relative(values[i]);
                 self.voxels[begins as usize % slots].push(Record { center, value, place });
             }
         }

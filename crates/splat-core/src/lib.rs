@@ -56,6 +56,7 @@ mod layers;
 mod light;
 mod limits;
 mod material;
+mod memory_account;
 mod mesh;
 pub mod optics;
 mod packed;
@@ -93,6 +94,7 @@ pub use layers::{ADDITIVE_LAYERS, Accumulator, LayerData, LayerSet, Layers, SHAD
 pub use light::{Framing, Light, LightShape, Slide, SlideProjection};
 pub use limits::{Exceeded, Limits};
 pub use material::{Bump, Material, MaterialTable, Object, ObjectTable, Shading};
+pub use memory_account::{MemoryAccount, Reservation};
 pub use mesh::Mesh;
 pub use packed::PackedCloud;
 pub use phase::henyey_greenstein;

@@ -58,7 +58,10 @@ impl TransferFunction {
         }
         let a = self.points[upper - 1];
         let Some(b) = self.points.get(upper) else { return a };
-        let t = (value - a.value) / (b.value - a.value);
+        let width = b.value - a.value;
+        let wide = || ((f64::from(value) - f64::from(a.value)) / (f64::from(b.value) - f64::from(a.value))) as f32;
+        // Two values may lie farther apart than single precision reaches.
+        let t = if width.is_finite() { (value - a.value) / width } else { wide() };
         let mix = |x: f32, y: f32| x + (y - x) * t;
         TransferPoint {
             value,

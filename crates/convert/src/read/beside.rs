@@ -29,6 +29,11 @@ impl<'a> Beside<'a> {
         })
     }
 
+    /// The file of this name as the system knows it, whichever way it is named; `None` for one that is not there.
+    pub(super) fn real(&self, name: &str) -> Option<PathBuf> {
+        self.find(name).ok()?.canonicalize().ok()
+    }
+
     /// Where the file of this name is, or what was expected in its place.
     pub(super) fn find(&self, name: &str) -> Result<PathBuf, &'static str> {
         let within = |c: Component<'_>| matches!(c, Component::Normal(_) | Component::CurDir);

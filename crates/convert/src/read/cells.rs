@@ -8,7 +8,7 @@ use super::direction::unit;
 use super::fans::Fans;
 use super::reading::Reading;
 use super::selection::Selection;
-use super::{Loaded, Notes, input, origin};
+use super::{Loaded, input, origin};
 use crate::counted::counted;
 use crate::error::{Place, ReadError};
 use crate::raw_points::RawPoints;
@@ -16,10 +16,14 @@ use crate::srgb::linear_from_srgb;
 use kind::{Kind, Shape};
 pub(super) use lists::Lists;
 use resample::Body;
-use splat_core::Mesh;
 use splat_core::glam::{DVec3, Vec3};
+use splat_core::{Mesh, Reservation};
+use std::ops::Deref;
 
 const HINT: &str = "the file is damaged, or its header states other sizes";
+
+/// Bytes of a vertex of a surface: its place, its normal and its colour.
+const BYTES_PER_VERTEX: u64 = 3 * 12;
 
 /// Numbers of VTK's kinds of cells that a surface has.
 pub(super) const VERTICES: u8 = 2;
@@ -67,7 +71,8 @@ pub(super) struct PointColumns {
 }
 
 /// Points out of their coordinates.
-pub(super) fn places(numbers: &[f64], place: Place) -> Result<Vec<DVec3>, ReadError> {
+pub(super) fn places(numbers: &[f64], place: Place, reading: &Reading<'_>) -> Result<Vec<DVec3>, ReadError> {
+    input::hold("the points of a piece", size_of_val(numbers) as u64, reading.params)?;
     let points: Vec<DVec3> = numbers.as_chunks::<3>().0.iter().map(|p| DVec3::from_array(*p)).collect();
     match points.iter().position(|p| !p.is_finite()) {
         None => Ok(points),
@@ -107,9 +112,11 @@ pub(super) fn field(
     (numbers, selection): (&[f64], &Selection),
     (name, of_points): (&str, bool),
     place: Place,
-    notes: &mut Notes,
+    reading: &mut Reading<'_>,
 ) -> Result<Field, ReadError> {
+    let (params, notes) = (reading.params, &mut reading.notes);
     let tuples = numbers.chunks_exact(selection.numbers as usize);
+    input::hold("the field", 8 * tuples.len() as u64, params)?;
     let values: Vec<f64> = tuples.map(|tuple| selection.value.of(|i| tuple[i])).collect();
     if let Some(i) = values.iter().position(|v| !(*v as f32).is_finite()) {
         let (expected, found) =
@@ -142,12 +149,13 @@ impl Cells {
     /// The points and the cells of another piece of the same dataset behind these.
     pub(super) fn join(&mut self, other: Self, reading: &Reading<'_>) -> Result<(), ReadError> {
         let points = (self.points.len() + other.points.len()) as u64;
-        input::check_bytes("the points of all pieces", points * size_of::<DVec3>() as u64, reading.params)?;
+        input::hold("the points of all pieces", points * size_of::<DVec3>() as u64, reading.params)?;
         let Some(first) = u32::try_from(points).ok().and(u32::try_from(self.points.len()).ok()) else {
             let expected = format!("at most {} points in all pieces", u32::MAX);
             return Err(ReadError::input(other.place, expected, points.to_string(), HINT));
         };
-        input::check_bytes("the cells of all pieces", self.lists.bytes() + other.lists.bytes(), reading.params)?;
+        let cells = (self.kinds.len() + other.kinds.len()) as u64;
+        input::hold("the cells of all pieces", self.lists.bytes() + other.lists.bytes() + cells, reading.params)?;
         input::reserve(&mut self.points, other.points.len())?;
         self.points.extend(other.points);
         self.lists.append(&other.lists, first);
@@ -196,6 +204,8 @@ impl Cells {
             if matches!(field, Field::One) {
                 reading.notes.remarks.push("cells without a field of numbers: they are full of 1".to_owned());
             }
+            let count = self.bodies().count() as u64;
+            input::hold("the bodies", count * size_of::<Body<'_>>() as u64, reading.params)?;
             let bodies: Vec<Body<'_>> = self.bodies().collect();
             return resample::grid((&self.points, &bodies, self.place), &field, reading).map(Loaded::Grid);
         }
@@ -204,6 +214,7 @@ impl Cells {
         if lines > 0 {
             reading.notes.not_used([counted(lines as u64, "line").as_bytes()]);
         }
+        input::hold("the vertices", self.points.len() as u64 * BYTES_PER_VERTEX, reading.params)?;
         let (origin, position) = origin::relative(&self.points, self.place, |i| format!("point {i}"))?;
         let Some(fans) = fans else {
             return Ok(Loaded::Points(RawPoints { origin, position, normal, color, ..RawPoints::default() }));
@@ -248,10 +259,42 @@ impl Cells {
     }
 }
 
-/// Room for so many numbers of the file, which is known to hold them.
-pub(super) fn room(count: u64, reading: &Reading<'_>) -> Result<Vec<f64>, ReadError> {
-    let mut numbers = Vec::new();
-    input::check_bytes("the cells", count.saturating_mul(size_of::<f64>() as u64), reading.params)?;
-    input::reserve(&mut numbers, count as usize)?;
-    Ok(numbers)
+/// Numbers of an array, with the memory that they take.
+pub(super) struct Numbers {
+    pub(super) all: Vec<f64>,
+    held: Reservation,
+}
+
+impl Numbers {
+    /// Room for so many numbers of the file, which is known to hold them.
+    pub(super) fn room(count: u64, reading: &Reading<'_>) -> Result<Self, ReadError> {
+        let held = reading.params.memory.take(NUMBERS, 0)?;
+        let mut numbers = Self { all: Vec::new(), held };
+        numbers.reserve(count)?;
+        Ok(numbers)
+    }
+
+    /// Room for so many more.
+    pub(super) fn reserve(&mut self, more: u64) -> Result<(), ReadError> {
+        let count = (self.all.len() as u64).saturating_add(more);
+        self.held.set(NUMBERS, count.saturating_mul(size_of::<f64>() as u64))?;
+        input::reserve(&mut self.all, more as usize)
+    }
+}
+
+impl Deref for Numbers {
+    type Target = [f64];
+
+    fn deref(&self) -> &[f64] {
+        &self.all
+    }
+}
+
+/// What memory is taken for by [`Numbers`].
+const NUMBERS: &str = "the numbers of an array";
+
+/// Memory of the cells of a piece: so many cells with so many points of cells.
+pub(super) fn hold_lists(cells: usize, corners: usize, reading: &Reading<'_>) -> Result<(), ReadError> {
+    let bytes = cells * (size_of::<usize>() + size_of::<u8>()) + corners * size_of::<u32>();
+    input::hold("the cells of a piece", bytes as u64, reading.params)
 }

@@ -10,6 +10,7 @@ mod document;
 mod packets;
 mod pages;
 
+use super::input::Content;
 use super::reading::Reading;
 use crate::counted::counted;
 use crate::error::{Place, ReadError};
@@ -21,7 +22,7 @@ use pages::Pages;
 const HINT: &str = "the file is truncated or damaged; fetch it again";
 
 /// Reads an E57 file.
-pub(super) fn read(content: Vec<u8>, reading: &mut Reading<'_>) -> Result<RawPoints, ReadError> {
+pub(super) fn read(content: Content, reading: &mut Reading<'_>) -> Result<RawPoints, ReadError> {
     let pages = Pages::new(content, reading)?;
     let document = Document::parse(&pages)?;
     if document.images > 0 {

@@ -32,7 +32,7 @@ struct Extra {
 }
 
 impl Extras {
-    /// Of the columns of a file those that `params` ask for; `spare` says which have a meaning already, and are there only if they are
+    /// Of the columns of a file, in the order of their ranks, those that `params` ask for; `spare` says which have a meaning already, and are there only if they are
     /// asked for by name.
     pub(super) fn new<'a>(columns: impl IntoIterator<Item = (usize, &'a [u8], bool)>, params: &ReadParams) -> Self {
         let extra = |(rank, name, spare): (usize, &[u8], bool)| {
@@ -53,7 +53,12 @@ impl Extras {
 
     /// Whether the column of a rank is kept.
     pub(super) fn keeps(&self, rank: usize) -> bool {
-        self.all.iter().any(|e| e.rank == rank && e.is_kept)
+        self.rank(rank).is_some_and(|i| self.all[i].is_kept)
+    }
+
+    /// Where the column of a rank is: they are in the order of their ranks, and a file may have very many.
+    fn rank(&self, rank: usize) -> Option<usize> {
+        self.all.binary_search_by_key(&rank, |e| e.rank).ok()
     }
 
     /// Bytes that a point takes in the columns that are kept.
@@ -68,7 +73,7 @@ impl Extras {
 
     /// What was expected in the place of a point's number in the column of a rank, where an attribute cannot have it.
     pub(super) fn unfit(&self, rank: usize, number: f64) -> Option<&'static str> {
-        let extra = self.all.iter().find(|e| e.rank == rank && e.is_attribute)?;
+        let extra = self.rank(rank).map(|i| &self.all[i]).filter(|e| e.is_attribute)?;
         expected(&extra.column.name, number)
     }
 
@@ -79,7 +84,7 @@ impl Extras {
 
     /// Takes the numbers of many points of the column of a rank.
     pub(super) fn extend(&mut self, rank: usize, numbers: impl Iterator<Item = f64>) {
-        let Some(extra) = self.all.iter_mut().find(|e| e.rank == rank) else { return };
+        let Some(extra) = self.rank(rank).map(|i| &mut self.all[i]) else { return };
         for number in numbers {
             let Column { name, values } = &extra.column;
             let expected = if extra.is_attribute { expected(name, number) } else { None };

@@ -1,18 +1,26 @@
 //! Faces as they are read, one after the other: fans of triangles until all vertices are known.
 
-use super::input;
+use super::input::{self, Growing};
 use super::polygon::{self, Polygon};
 use super::reading::{Fix, Reading};
 use crate::error::{Place, ReadError};
 use splat_core::Mesh;
 
 /// The faces so far.
-#[derive(Default)]
 pub(super) struct Fans {
     triangles: Vec<[u32; 3]>,
     /// Faces of more than three corners, and where they are.
     polygons: Vec<Polygon>,
     places: Vec<Place>,
+    /// Memory of the triangles, and of what is known of larger faces.
+    held: Growing,
+}
+
+impl Default for Fans {
+    fn default() -> Self {
+        let held = Growing::new("the triangles");
+        Self { triangles: Vec::new(), polygons: Vec::new(), places: Vec::new(), held }
+    }
 }
 
 impl Fans {
@@ -32,7 +40,7 @@ impl Fans {
         };
         let polygons = self.polygons.len() * (size_of::<Polygon>() + size_of::<Place>());
         let bytes = (self.triangles.len() + count) * size_of::<[u32; 3]>() + polygons;
-        input::check_bytes("the triangles", bytes as u64, reading.params)?;
+        self.held.hold(bytes as u64, reading.params)?;
         input::reserve(&mut self.triangles, count)?;
         if count > 1 {
             input::reserve(&mut self.polygons, 1)?;

@@ -57,7 +57,7 @@ impl Gathered {
         let mut points = RawPoints { gaussians: Gaussians { degree, ..Gaussians::default() }, ..RawPoints::default() };
         let g = &mut points.gaussians;
         let each = (size_of::<DVec3>() + 2 * size_of::<[f32; 3]>()) as u64 + Gaussians::bytes_each(degree);
-        input::check_bytes("the Gaussians", each.saturating_mul(count as u64), params)?;
+        input::hold("the Gaussians", each.saturating_mul(count as u64), params)?;
         let mut positions = Vec::new();
         input::reserve(&mut positions, count)?;
         input::reserve(&mut points.color, count)?;

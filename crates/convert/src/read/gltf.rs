@@ -14,6 +14,7 @@ mod primitive;
 
 use super::Loaded;
 use super::beside::Beside;
+use super::input;
 use super::origin;
 use super::reading::Reading;
 use crate::error::{Place, ReadError, escaped};
@@ -73,6 +74,9 @@ pub(super) fn read(content: &[u8], place: Option<&Path>, reading: &mut Reading<'
     let primitives = primitives(&document, &instances)?;
     // An empty scene is an empty mesh.
     let is_mesh = primitives.is_empty() || primitives.iter().any(|(p, _)| p.mode != Some(POINTS));
+    // Many nodes may show one mesh: together they are refused before the first is read.
+    let vertices = primitives.iter().fold(0u64, |n, (p, _)| n.saturating_add(primitive::vertices_of(p, &buffers)));
+    input::hold("the vertices", vertices.saturating_mul(primitive::BYTES_PER_VERTEX), reading.params)?;
     let mut paints = Paints::new(&document, &buffers, &beside);
     let mut surface = Surface::default();
     for (primitive, instance) in primitives {

@@ -3,9 +3,10 @@
 use super::ReadParams;
 use super::unpacked::Unpacked;
 use crate::error::{Place, ReadError};
+use splat_core::{Exceeded, Reservation};
 use std::fs::File;
 use std::io::{self, Read};
-use std::ops::Range;
+use std::ops::{Deref, Range};
 use std::path::Path;
 
 /// Most bytes asked from the allocator at once.
@@ -13,6 +14,8 @@ const STEP: usize = 64 << 20;
 /// Most decompressed bytes per compressed byte, past the first [`FREE`] bytes.
 const MAX_RATIO: u64 = 1000;
 const FREE: u64 = 16 << 20;
+/// Most bytes that deflate, the packing of PNG and of ZIP in OpenEXR, makes of one.
+const MAX_DEFLATED: u64 = 1032;
 /// Longest header in text; real ones have some hundred bytes.
 const MAX_HEADER: usize = 16 << 20;
 
@@ -75,13 +78,13 @@ impl<'a> Stream<'a> {
     /// gzip, the bytes of the file itself decide how much may come out.
     pub(super) fn gunzip(self) -> Stream<'a> {
         let (stored, params) = (self.stored, self.params.clone());
-        Stream::new(Unpacked::gzip(self, stored, params.clone()), None, stored, &params)
+        Stream::new(Unpacked::gzip(self, stored), None, stored, &params)
     }
 
     /// The same of one zlib stream.
     pub(super) fn inflate(self) -> Stream<'a> {
         let (stored, params) = (self.stored, self.params.clone());
-        Stream::new(Unpacked::zlib(self, stored, params.clone()), None, stored, &params)
+        Stream::new(Unpacked::zlib(self, stored), None, stored, &params)
     }
 
     /// Up to `n` of the bytes to come, without taking them; fewer only at the end.
@@ -135,14 +138,18 @@ impl<'a> Stream<'a> {
         io::copy(&mut self.by_ref().take(n), &mut io::sink()).map_err(failed)
     }
 
-    /// All that is left.
-    pub(super) fn rest(mut self) -> Result<Vec<u8>, ReadError> {
-        let mut content = Vec::new();
+    /// All that is left, taken from the account of memory as long as it is there.
+    pub(super) fn rest(mut self) -> Result<Content, ReadError> {
+        let mut held = self.params.memory.take(CONTENT, 0)?;
+        let mut bytes = Vec::new();
         loop {
             let step = self.left().map_or(1 << 18, |left| (left + 1).min(STEP as u64));
-            reserve(&mut content, step as usize)?;
-            if self.by_ref().take(step).read_to_end(&mut content).map_err(failed)? == 0 {
-                return Ok(content);
+            // One byte more is asked for than there should be, to see the end.
+            held.set(CONTENT, (bytes.len() as u64).saturating_add(self.left().map_or(step, |left| left.min(step))))?;
+            reserve(&mut bytes, step as usize)?;
+            if self.by_ref().take(step).read_to_end(&mut bytes).map_err(failed)? == 0 {
+                held.set(CONTENT, bytes.len() as u64)?;
+                return Ok(Content { bytes, held });
             }
         }
     }
@@ -160,6 +167,35 @@ impl<'a> Stream<'a> {
     /// Refuses what cannot come, before memory is taken for it.
     pub(super) fn expect(&self, bytes: u64) -> Result<(), ReadError> {
         if self.length.is_none() { check_ratio(bytes, self.stored) } else { Ok(()) }
+    }
+}
+
+/// What memory is taken for by [`Stream::rest`].
+const CONTENT: &str = "the content of the file";
+
+/// Bytes that are in memory whole.
+pub(super) struct Content {
+    bytes: Vec<u8>,
+    held: Reservation,
+}
+
+impl Content {
+    /// Bytes for which memory was taken before.
+    pub(super) fn new(bytes: Vec<u8>, held: Reservation) -> Self {
+        Self { bytes, held }
+    }
+
+    /// The bytes, and for how long they count.
+    pub(super) fn into_parts(self) -> (Vec<u8>, Reservation) {
+        (self.bytes, self.held)
+    }
+}
+
+impl Deref for Content {
+    type Target = [u8];
+
+    fn deref(&self) -> &[u8] {
+        &self.bytes
     }
 }
 
@@ -221,35 +257,72 @@ pub(super) fn check_ratio(bytes: u64, stored: u64) -> Result<(), ReadError> {
 
 /// Refuses more bytes than `stored` bytes of something packed may stand for.
 pub(super) fn check_packed(bytes: u64, stored: u64, packed: &str) -> Result<(), ReadError> {
-    if bytes <= FREE || bytes / MAX_RATIO <= stored {
+    check_ratio_of(bytes, stored, MAX_RATIO, packed)
+}
+
+/// Refuses more bytes than deflate can have packed into `stored` bytes: of one colour throughout, images are packed as far.
+pub(super) fn check_deflated(bytes: u64, stored: u64, packed: &str) -> Result<(), ReadError> {
+    check_ratio_of(bytes, stored, MAX_DEFLATED, packed)
+}
+
+fn check_ratio_of(bytes: u64, stored: u64, most: u64, packed: &str) -> Result<(), ReadError> {
+    if bytes <= FREE || bytes / most <= stored {
         return Ok(());
     }
     Err(ReadError::limit(
-        format!("at most {MAX_RATIO} decompressed bytes for each byte of {packed}"),
+        format!("at most {most} decompressed bytes for each byte of {packed}"),
         format!("{bytes} from {stored}"),
         "decompress the file yourself if it is to be trusted",
     ))
 }
 
-/// Refuses sizes above the limit.
+/// Refuses sizes above the limit, of what is not in memory at a time.
 pub(super) fn check_bytes(what: &str, bytes: u64, params: &ReadParams) -> Result<(), ReadError> {
-    if bytes <= params.limits.max_bytes {
-        return Ok(());
+    let limit = params.memory.limit();
+    Exceeded::check(what.to_owned(), bytes, limit, "bytes", "").map_err(ReadError::from)
+}
+
+/// Says how much memory something takes by now, before it does, until the file is read. Of what has one name in a file the last
+/// word counts.
+pub(super) fn hold(what: &str, bytes: u64, params: &ReadParams) -> Result<(), ReadError> {
+    Ok(params.memory.hold(what, bytes)?)
+}
+
+/// Memory of something that grows bit by bit, for which the account is asked now and then.
+pub(super) struct Growing {
+    what: &'static str,
+    held: u64,
+}
+
+impl Growing {
+    pub(super) fn new(what: &'static str) -> Self {
+        Self { what, held: 0 }
     }
-    Err(ReadError::limit(
-        format!("at most {} bytes for {what}", params.limits.max_bytes),
-        format!("{bytes}"),
-        "raise the memory limit, or thin out the data",
-    ))
+
+    /// Says that it will take so many bytes.
+    pub(super) fn hold(&mut self, bytes: u64, params: &ReadParams) -> Result<(), ReadError> {
+        if bytes <= self.held {
+            return Ok(());
+        }
+        // A sixteenth more, so that it is asked for a few hundred times at most; exactly where there is not as much.
+        let ample = bytes.saturating_add(bytes / 16);
+        self.held = if params.memory.hold(self.what, ample).is_ok() {
+            ample
+        } else {
+            hold(self.what, bytes, params)?;
+            bytes
+        };
+        Ok(())
+    }
 }
 
 /// Room for `more` elements, or the limit error where the allocator has none.
 pub(super) fn reserve<T>(column: &mut Vec<T>, more: usize) -> Result<(), ReadError> {
-    column.try_reserve(more).map_err(|_| {
-        ReadError::limit(
-            format!("memory for {more} more elements of {} bytes", size_of::<T>()),
-            "none left",
-            "free memory, or thin out the data",
-        )
-    })
+    let refused = |_| none_left(&format!("{more} more elements of {} bytes", size_of::<T>()));
+    column.try_reserve(more).map_err(refused)
+}
+
+/// The error where the allocator has no room.
+pub(super) fn none_left(what: &str) -> ReadError {
+    ReadError::limit(format!("memory for {what}"), "none left", "free memory, or thin out the data")
 }

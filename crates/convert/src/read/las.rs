@@ -4,6 +4,7 @@ mod further;
 
 use super::copc::Levels;
 use super::extras::{Extras, UNFIT_HINT};
+use super::input::Content;
 use super::{Notes, ReadParams, input, laz};
 use crate::error::{Place, ReadError};
 use crate::raw_points::{PointLattice, RawPoints};
@@ -49,7 +50,7 @@ impl Layout {
 }
 
 /// Reads a LAS or LAZ file.
-pub(super) fn read(content: Vec<u8>, params: &ReadParams, notes: &mut Notes) -> Result<RawPoints, ReadError> {
+pub(super) fn read(content: Content, params: &ReadParams, notes: &mut Notes) -> Result<RawPoints, ReadError> {
     let mut layout = layout(&content)?;
     if let Some(most) = params.most_points.filter(|most| layout.compressed && *most < layout.count) {
         layout.levels = Levels::within(&content, &layout, most)?;
@@ -70,7 +71,7 @@ pub(super) fn read(content: Vec<u8>, params: &ReadParams, notes: &mut Notes) -> 
     let asked: Vec<usize> = extras.read().collect();
     let selection = further::selection(asked.iter().map(|rank| &fields[*rank]));
     let bytes = BYTES_PER_POINT + extras.bytes_per_point();
-    input::check_bytes("the points", layout.read().saturating_mul(bytes), params)?;
+    input::hold("the points", layout.read().saturating_mul(bytes), params)?;
     notes.not_used(unused(&content, &layout).iter().map(String::as_bytes));
     let mut columns = Columns::default();
     let mut take = |records: Vec<u8>| {
@@ -84,7 +85,11 @@ pub(super) fn read(content: Vec<u8>, params: &ReadParams, notes: &mut Notes) -> 
         columns.append(&data, &layout)
     };
     match plain {
-        Some(records) => records.chunks(BLOCK * layout.record as usize).try_for_each(|block| take(block.to_vec()))?,
+        Some(records) => {
+            let block = BLOCK * layout.record as usize;
+            input::hold("a block of records", block.min(records.len()) as u64, params)?;
+            records.chunks(block).try_for_each(|block| take(block.to_vec()))?;
+        }
         None => laz::decompress(&content, &layout, params, selection, take)?,
     }
     // Before the columns are converted: the file takes about as much as they do.

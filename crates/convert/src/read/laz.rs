@@ -54,7 +54,6 @@ pub(super) fn decompress(
     let chunks = of_levels(chunks, layout)?;
     let total = layout.read().saturating_mul(layout.record);
     let stored = chunks.iter().map(|c| c.bytes.len() as u64).sum::<u64>();
-    input::check_bytes("the decompressed points", total, params)?;
     if total > FREE && total / MAX_RATIO > stored {
         return Err(ReadError::limit(
             format!("at most {MAX_RATIO} decompressed bytes for each byte of LAZ"),
@@ -63,6 +62,8 @@ pub(super) fn decompress(
         ));
     }
     for wave in chunks.chunks(WAVE) {
+        let bytes = wave.iter().fold(0u64, |n, c| n.saturating_add(c.points.saturating_mul(layout.record)));
+        input::hold("the decompressed points", bytes, params)?;
         let parts: Result<Vec<Vec<u8>>, ReadError> =
             wave.par_iter().map(|c| c.decode(&items, layout, selection)).collect();
         parts?.into_iter().try_for_each(&mut take)?;

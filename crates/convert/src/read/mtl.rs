@@ -4,13 +4,19 @@
 //! rest is read. `Kd` is a linear colour, as that of vertices is; a texture is multiplied by it.
 
 use super::beside::Beside;
+use super::input::{self, Content, Growing};
 use super::paint::Paint;
 use super::reading::Reading;
 use super::text::{Line, Lines, Word};
 use super::texture::Texture;
 use crate::error::{Fault, ReadError, escaped};
-use std::collections::HashMap;
-use std::path::Path;
+use std::collections::{HashMap, HashSet};
+use std::path::{Path, PathBuf};
+
+/// Bytes that a material or a name takes beside its text: two paints, two names of textures, and entries of tables.
+const BYTES_PER_ENTRY: u64 = 320;
+/// Lines between two looks at whether to stop.
+const LOOK: u64 = 1 << 14;
 
 const WHITE: Paint = Paint { factor: [1.0; 4], texture: None, cutoff: None };
 
@@ -23,8 +29,14 @@ pub(super) struct Materials<'a> {
     rank: HashMap<Vec<u8>, usize>,
     /// Name of the texture of each paint, until the material is used.
     maps: Vec<Option<String>>,
-    /// Ranks of textures by name; `None` for those that are not there.
+    /// Ranks of textures by name, and by the file that the name stands for; `None` for those that are not there.
     decoded: HashMap<String, Option<usize>>,
+    files: HashMap<PathBuf, usize>,
+    /// Material files that were read.
+    libraries: HashSet<PathBuf>,
+    /// Memory of materials and of what is known of names.
+    held: Growing,
+    bytes: u64,
     current: usize,
     /// Whether a material of a file was chosen.
     pub(super) is_used: bool,
@@ -40,6 +52,10 @@ impl<'a> Materials<'a> {
             rank: HashMap::new(),
             maps: vec![None; 2],
             decoded: HashMap::new(),
+            files: HashMap::new(),
+            libraries: HashSet::new(),
+            held: Growing::new("the materials"),
+            bytes: 0,
             current: 0,
             is_used: false,
         }
@@ -75,18 +91,31 @@ impl<'a> Materials<'a> {
         if let Some(known) = self.decoded.get(&name) {
             return Ok(*known);
         }
-        let mut found = None;
-        if let Some(content) = self.content(&name, "the texture", reading)? {
+        let file = self.beside.real(&name);
+        let mut found = file.as_ref().and_then(|file| self.files.get(file).copied());
+        if found.is_none()
+            && let Some(content) = self.content(&name, "the texture", reading)?
+        {
             let what = format!("texture '{}'", escaped(name.as_bytes(), 60));
             self.textures.push(Texture::decode(&content, &what, reading)?);
             found = Some(self.textures.len() - 1);
         }
+        if let (Some(file), Some(rank)) = (file, found) {
+            self.files.insert(file, rank);
+        }
+        self.hold(2 * name.len(), reading)?;
         self.decoded.insert(name, found);
         Ok(found)
     }
 
+    /// Counts another name or material, with so many bytes of text.
+    fn hold(&mut self, text: usize, reading: &Reading<'_>) -> Result<(), ReadError> {
+        self.bytes += BYTES_PER_ENTRY + text as u64;
+        self.held.hold(self.bytes, reading.params)
+    }
+
     /// The content of a file that is named, or a remark why it is left out.
-    fn content(&self, name: &str, what: &str, reading: &mut Reading<'_>) -> Result<Option<Vec<u8>>, ReadError> {
+    fn content(&self, name: &str, what: &str, reading: &mut Reading<'_>) -> Result<Option<Content>, ReadError> {
         match self.beside.open(name, what, reading.params) {
             Ok(stream) => stream.rest().map(Some),
             Err(error) if error.fault == Fault::Limit => Err(error),
@@ -103,6 +132,14 @@ impl<'a> Materials<'a> {
         let several = whole.contains(char::is_whitespace) && self.beside.open(&whole, "", reading.params).is_err();
         let names: Vec<&str> = if several { whole.split_whitespace().collect() } else { vec![whole.as_str()] };
         for name in names {
+            reading.go_on()?;
+            // What it holds is known already, whichever way it is named.
+            if let Some(file) = self.beside.real(name)
+                && !self.libraries.insert(file)
+            {
+                continue;
+            }
+            self.hold(2 * name.len(), reading)?;
             let Some(content) = self.content(name, "the material file", reading)? else { continue };
             let folder = name.rsplit_once('/').map_or(String::new(), |(folder, _)| format!("{folder}/"));
             self.take(&content, &folder, reading).map_err(|e| {
@@ -118,11 +155,14 @@ impl<'a> Materials<'a> {
         let mut lines = Lines::new(content);
         let mut rank = None;
         while let Some(line) = lines.next()? {
+            if line.number.is_multiple_of(LOOK) {
+                reading.go_on()?;
+            }
             let mut words = line.words(false).take_while(|w| !w.text.starts_with(b"#"));
             let Some(keyword) = words.next() else { continue };
             let values: Vec<Word<'_>> = words.collect();
             match (keyword.text, rank) {
-                (b"newmtl", _) => rank = Some(self.add(rest(line))),
+                (b"newmtl", _) => rank = Some(self.add(rest(line), reading)?),
                 (b"Kd", Some(rank)) => {
                     if let Some([r, g, b]) = color(keyword, &values)? {
                         let of_both: &mut [Paint] = &mut self.paints[rank..rank + 2];
@@ -131,7 +171,11 @@ impl<'a> Materials<'a> {
                         reading.notes.not_used([&b"Kd of a spectrum"[..]]);
                     }
                 }
-                (b"map_Kd", Some(rank)) => self.maps[rank] = map(line, &values, folder, reading),
+                (b"map_Kd", Some(rank)) => {
+                    let name = map(line, &values, folder, reading);
+                    self.hold(name.as_ref().map_or(0, String::len), reading)?;
+                    self.maps[rank] = name;
+                }
                 (other, _) => reading.notes.not_used([other]),
             }
         }
@@ -139,12 +183,15 @@ impl<'a> Materials<'a> {
     }
 
     /// Rank of a new material; one of a name that is known takes its place.
-    fn add(&mut self, name: &[u8]) -> usize {
+    fn add(&mut self, name: &[u8], reading: &Reading<'_>) -> Result<usize, ReadError> {
         let rank = self.paints.len();
+        self.hold(name.len(), reading)?;
+        input::reserve(&mut self.paints, 2)?;
+        input::reserve(&mut self.maps, 2)?;
         self.paints.extend([WHITE; 2]);
         self.maps.extend([None, None]);
         self.rank.insert(name.to_vec(), rank);
-        rank
+        Ok(rank)
     }
 }
 

@@ -33,7 +33,7 @@ pub(super) fn read(
     let (kind, big_endian, scaling) = (header.kind, header.big_endian, (1.0, 0.0));
     let stored = Stored { kind, big_endian, dims: axes.sizes, selection: selection(&header, params, notes)?, scaling };
     stored.check(axes.place_of_sizes, HINT)?;
-    input::check_bytes("the voxels", stored.count() * size_of::<f32>() as u64, params)?;
+    input::hold("the voxels", stored.count() * size_of::<f32>() as u64, params)?;
     if let Some(space) = axes.converted_from {
         notes.remarks.push(format!("space: {space}, converted to right-anterior-superior"));
     }

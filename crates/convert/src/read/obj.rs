@@ -9,6 +9,7 @@ mod painted;
 use super::ReadParams;
 use super::direction::unit;
 use super::fans::Fans;
+use super::input::Growing;
 use super::mtl::Materials;
 use super::reading::{Fix, Reading};
 use super::text::{Line, Lines, Word};
@@ -22,7 +23,7 @@ use std::path::Path;
 
 /// Bytes that a vertex and a corner take while they are read and converted.
 const BYTES_PER_VERTEX: u64 = 24 + 12 + 12 + 12;
-const BYTES_PER_CORNER: u64 = 56;
+const BYTES_PER_CORNER: u64 = 16 + 48 + 48;
 
 /// Statements without a meaning here.
 pub(super) const READ_OVER: [&[u8]; 19] = [
@@ -65,6 +66,15 @@ struct Content<'a> {
     /// The first corner that names a normal before there is any.
     without_normal: Option<ReadError>,
     materials: Materials<'a>,
+    held: Held,
+}
+
+/// Memory of what is read.
+struct Held {
+    vertices: Growing,
+    normals: Growing,
+    places: Growing,
+    corners: Growing,
 }
 
 const NONE: u32 = u32::MAX;
@@ -88,6 +98,12 @@ pub(super) fn read(content: &[u8], place: Option<&Path>, reading: &mut Reading<'
         face: Vec::new(),
         without_normal: None,
         materials: Materials::new(place),
+        held: Held {
+            vertices: Growing::new("the vertices"),
+            normals: Growing::new("the normals"),
+            places: Growing::new("the texture coordinates"),
+            corners: Growing::new("the corners"),
+        },
     };
     let mut continued = false;
     while let Some(line) = lines.next()? {
@@ -138,7 +154,7 @@ impl Content<'_> {
             let found = format!("{} numbers", words.len());
             return Err(ReadError::input(keyword.place(), "v X Y Z, or v X Y Z R G B", found, "complete the vertex"));
         }
-        input::check_bytes("the vertices", (self.positions.len() as u64 + 1) * BYTES_PER_VERTEX, params)?;
+        self.held.vertices.hold((self.positions.len() as u64 + 1) * BYTES_PER_VERTEX, params)?;
         let mut numbers = [0.0; 6];
         for (number, word) in numbers.iter_mut().zip(&words) {
             *number = word.number()?;
@@ -170,7 +186,7 @@ impl Content<'_> {
             return Err(ReadError::input(keyword.place(), "vn X Y Z", found, "complete the normal"));
         };
         let n = DVec3::new(x.number()?, y.number()?, z.number()?);
-        input::check_bytes("the normals", (self.normals.len() as u64 + 1) * 12, params)?;
+        self.held.normals.hold((self.normals.len() as u64 + 1) * 12, params)?;
         input::reserve(&mut self.normals, 1)?;
         self.normals.push(unit(n));
         Ok(())
@@ -183,7 +199,7 @@ impl Content<'_> {
     ) -> Result<(), ReadError> {
         let mut number = |missing| words.next().map_or(Some(missing), Word::decimal).unwrap_or(f64::NAN) as f32;
         let (u, v) = (number(f64::NAN), number(0.0));
-        input::check_bytes("the texture coordinates", (self.places.len() as u64 + 1) * 8, params)?;
+        self.held.places.hold((self.places.len() as u64 + 1) * 8, params)?;
         input::reserve(&mut self.places, 1)?;
         // Rows of an image are counted from the top.
         self.places.push([u, 1.0 - v]);
@@ -230,8 +246,9 @@ impl Content<'_> {
         if let Some(&known) = self.of_corner.get(&key) {
             return Ok(known);
         }
-        input::check_bytes("the corners", (self.corners.len() as u64 + 1) * BYTES_PER_CORNER, reading.params)?;
+        self.held.corners.hold((self.corners.len() as u64 + 1) * BYTES_PER_CORNER, reading.params)?;
         input::reserve(&mut self.corners, 1)?;
+        self.of_corner.try_reserve(1).map_err(|_| input::none_left("corners"))?;
         let new = self.corners.len() as u32;
         self.corners.push(key);
         self.of_corner.insert(key, new);
@@ -276,6 +293,7 @@ impl Content<'_> {
             let color = if colored { self.colors } else { Vec::new() };
             return Ok(Loaded::Points(RawPoints { origin, position: offsets, color, ..RawPoints::default() }));
         }
+        drop(self.of_corner);
         let of = |c: &Corner| self.normals.get(c[1] as usize).copied().unwrap_or(Vec3::ZERO);
         let normals: Vec<Vec3> = self.corners.iter().map(of).collect();
         let vertices = Mesh {

@@ -28,7 +28,7 @@ pub(super) fn read(content: &[u8], reading: &mut Reading<'_>) -> Result<Loaded, 
     let mut text = Text { lines: Lines::new(content), ahead: None };
     let form = text.form()?;
     let [vertices, faces] = text.counts(content.len() as u64)?;
-    input::check_bytes("the vertices", vertices.saturating_mul(BYTES_PER_VERTEX), reading.params)?;
+    input::hold("the vertices", vertices.saturating_mul(BYTES_PER_VERTEX), reading.params)?;
     let mut columns = Columns::new(form, vertices as usize)?;
     for vertex in 0..vertices {
         look(vertex, reading)?;

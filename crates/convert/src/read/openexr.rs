@@ -2,7 +2,7 @@
 //! resolutions the largest.
 
 use super::check_image;
-use super::input::{check_packed, reserve};
+use super::input::{check_deflated, check_packed, hold, reserve};
 use super::reading::Reading;
 use crate::error::{Place, ReadError, escaped};
 use ::exr::math::Vec2;
@@ -16,6 +16,8 @@ const CHANNELS: [&str; 3] = ["R", "G", "B"];
 const ALPHA: &str = "A";
 /// How bright red, green and blue of Rec.709 are.
 const LUMINANCE: [f32; 3] = [0.2126, 0.7152, 0.0722];
+/// Blocks that are in memory at a time, at most.
+const BLOCKS_AT_ONCE: u64 = 64;
 /// Images of longer sides than this are decoded by several threads.
 const LONGEST_ALONE: u32 = 1024;
 
@@ -23,7 +25,12 @@ pub(super) fn read(content: &[u8], reading: &mut Reading<'_>) -> Result<Radiance
     let meta = MetaData::read_from_buffered(Cursor::new(content), false).map_err(damaged)?;
     let header = first_in_color(&meta)?;
     let (size, has_alpha) = (checked_size(header)?, header.channels.list.iter().any(|c| c.name.to_string() == ALPHA));
-    check_packed(check_image(size, reading.params)?, content.len() as u64, "the packed image")?;
+    check_image(size, reading.params)?;
+    let stored = u64::from(size[0]) * u64::from(size[1]) * header.channels.bytes_per_pixel as u64;
+    check_deflated(stored, content.len() as u64, "the packed image")?;
+    // Blocks are decoded one by one, or some at a time.
+    let blocks = meta.headers.iter().map(block_bytes).max().unwrap_or(0).saturating_mul(BLOCKS_AT_ONCE);
+    hold("blocks of the image", blocks.min(2 * stored), reading.params)?;
     meta.headers
         .iter()
         .try_for_each(|header| check_packed(block_bytes(header), content.len() as u64, "a packed tile"))?;

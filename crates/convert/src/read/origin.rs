@@ -1,5 +1,6 @@
 //! f64 coordinates → an f64 origin and f32 offsets.
 
+use super::input;
 use crate::error::{Place, ReadError};
 use splat_core::glam::{DVec3, Vec3};
 
@@ -10,13 +11,13 @@ const FAR: f64 = 4.0;
 ///
 /// Points near zero keep their coordinates; points that lie farther from zero than [`FAR`] times their diagonal are
 /// taken relative to the middle of their bounds. The rule has no absolute length, so it scales with the input.
-fn split(positions: &[DVec3]) -> Result<(DVec3, Vec<Vec3>), usize> {
-    let Some(&first) = positions.first() else { return Ok((DVec3::ZERO, Vec::new())) };
+fn split(positions: &[DVec3], mut offsets: Vec<Vec3>) -> Result<(DVec3, Vec<Vec3>), usize> {
+    let Some(&first) = positions.first() else { return Ok((DVec3::ZERO, offsets)) };
     let (min, max) = positions.iter().fold((first, first), |(lo, hi), p| (lo.min(*p), hi.max(*p)));
     let extent = max - min;
     let far = min.abs().max(max.abs()).max_element() > FAR * extent.max_element();
     let origin = if far { min + extent * 0.5 } else { DVec3::ZERO };
-    let offsets: Vec<Vec3> = positions.iter().map(|p| (*p - origin).as_vec3()).collect();
+    offsets.extend(positions.iter().map(|p| (*p - origin).as_vec3()));
     match offsets.iter().position(|p| !p.is_finite()) {
         Some(i) => Err(i),
         None => Ok((origin, offsets)),
@@ -29,7 +30,9 @@ pub(super) fn relative(
     place: Place,
     named: impl FnOnce(usize) -> String,
 ) -> Result<(DVec3, Vec<Vec3>), ReadError> {
-    split(positions).map_err(|i| {
+    let mut room = Vec::new();
+    input::reserve(&mut room, positions.len())?;
+    split(positions, room).map_err(|i| {
         let expected = "coordinates that fit 32-bit floats once the middle is subtracted";
         let found = format!("{} at {}", positions[i], named(i));
         ReadError::input(place, expected, found, "scale the data, or remove outliers")
@@ -39,6 +42,10 @@ pub(super) fn relative(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn split(positions: &[DVec3]) -> Result<(DVec3, Vec<Vec3>), usize> {
+        super::split(positions, Vec::new())
+    }
 
     #[test]
     fn near_points_keep_their_coordinates_and_far_points_keep_their_distances() {

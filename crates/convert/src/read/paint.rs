@@ -6,10 +6,14 @@
 
 mod refine;
 
+use super::input;
 use super::reading::Reading;
 use super::texture::Texture;
 use crate::error::ReadError;
 use splat_core::Mesh;
+
+/// Bytes of the colour and opacity of a vertex, and of its colour in the mesh.
+const BYTES_PER_COLOR: u64 = 16 + 12;
 
 /// What a surface is painted with.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -51,6 +55,7 @@ impl Painting {
 
     /// The mesh with its colours; where a paint says so, what is too thin to be there is left out.
     pub(super) fn paint(mut self, mut mesh: Mesh, reading: &mut Reading<'_>) -> Result<Mesh, ReadError> {
+        input::hold("the colours of vertices", mesh.position.len() as u64 * BYTES_PER_COLOR, reading.params)?;
         if !self.textures.is_empty() {
             refine::refine(&mut mesh, &mut self, reading)?;
         }

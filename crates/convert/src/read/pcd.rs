@@ -76,7 +76,7 @@ fn unpacked(body: &[u8], header: &Header, reading: &Reading<'_>) -> Result<Vec<u
         let expected = format!("at most {} bytes unpacked from each", lzf::MAX_RATIO);
         return Err(ReadError::input(at, expected, format!("{needed} from {stored}"), TRUNCATED));
     }
-    input::check_bytes("the unpacked points", needed, reading.params)?;
+    input::hold("the unpacked points", needed, reading.params)?;
     let mut unpacked = Vec::new();
     input::reserve(&mut unpacked, needed as usize)?;
     lzf::unpack(packed, &mut unpacked, needed as usize).map_err(|byte| {

@@ -2,7 +2,7 @@
 //! samples are no colours but numbers, they stay what they are, over the largest.
 
 use super::check_image;
-use super::input::{check_packed, reserve};
+use super::input::{check_deflated, hold, reserve};
 use super::reading::Reading;
 use crate::error::{Place, ReadError, escaped};
 use crate::srgb::linear_from_srgb;
@@ -20,7 +20,13 @@ const DAMAGED: &str = "the file is truncated or damaged; save it anew, as PNG of
 pub(super) fn read(content: &[u8], reading: &mut Reading<'_>) -> Result<RadianceImage, ReadError> {
     let decoder = PngDecoder::new(Cursor::new(content)).map_err(damaged)?;
     let (width, height) = decoder.dimensions();
-    check_packed(check_image([width, height], reading.params)?, content.len() as u64, "the packed image")?;
+    check_image([width, height], reading.params)?;
+    // What is packed are rows of whole bytes: a mask of black and white has a bit a pixel.
+    let row = u64::from(width) * u64::from(decoder.original_color_type().bits_per_pixel());
+    check_deflated(row.div_ceil(8) * u64::from(height), content.len() as u64, "the packed image")?;
+    // As it is decoded, and with four channels of 16 bits.
+    let pixels = u64::from(width) * u64::from(height);
+    hold("the decoded image", decoder.total_bytes().saturating_add(8 * pixels), reading.params)?;
     let mut pixels = Vec::new();
     reserve(&mut pixels, width as usize * height as usize)?;
     reading.go_on()?;

@@ -28,8 +28,14 @@ const NOTHING: f64 = f64::from_bits((1023 - 100) << 52); // 2⁻¹⁰⁰
 /// Corners of a crossing polygon whose inside is looked for: every triangle asks every edge.
 const MOST_CROSSING: usize = 4096;
 
+/// Places of a polygon up to which all are triangulated at once.
+const MOST_AT_BULK: usize = 512;
+
 /// Bytes that a corner takes while its polygon is triangulated.
 const BYTES_PER_CORNER: u64 = 512;
+
+/// Corners of a polygon beside which no other is triangulated.
+const MOST_AT_ONCE: usize = 1 << 14;
 
 /// A face of more than three corners, held as a fan: `[c0, c1, c2], [c0, c2, c3], …`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -57,17 +63,14 @@ pub(super) fn triangulate(
     reading: &mut Reading<'_>,
     place: impl Fn(usize) -> Place,
 ) -> Result<(), ReadError> {
-    let shared: &Reading<'_> = reading;
-    let outcomes: Vec<Outcome> = polygons
-        .par_iter()
-        .with_min_len(256)
-        .map(|p| outcome(mesh, p, shared).unwrap_or_else(Outcome::Refused))
-        .collect();
+    let outcomes = outcomes(mesh, polygons, reading)?;
     reading.go_on()?;
     if outcomes.iter().all(|o| matches!(o, Outcome::Fan)) {
         return Ok(());
     }
-    let mut triangles = Vec::with_capacity(mesh.triangles.len());
+    let mut triangles = Vec::new();
+    input::hold("the triangles of larger faces", size_of_val(mesh.triangles.as_slice()) as u64, reading.params)?;
+    input::reserve(&mut triangles, mesh.triangles.len())?;
     let mut copied = 0;
     for (rank, (polygon, outcome)) in polygons.iter().zip(outcomes).enumerate() {
         let better = match outcome {
@@ -92,6 +95,21 @@ pub(super) fn triangulate(
     Ok(())
 }
 
+/// What becomes of all polygons: side by side of small ones, one after the other of large ones, so that the memory that they take
+/// does not depend on the number of threads.
+fn outcomes(mesh: &Mesh, polygons: &[Polygon], reading: &Reading<'_>) -> Result<Vec<Outcome>, ReadError> {
+    let largest = polygons.iter().map(|p| p.count as u64 + 2).max().unwrap_or(0);
+    let bytes = largest * BYTES_PER_CORNER + size_of_val(polygons) as u64 * 4;
+    input::hold("the corners of a face", bytes, reading.params)?;
+    let is_large = |p: &Polygon| p.count > MOST_AT_ONCE;
+    let made = |p: &Polygon| outcome(mesh, p, reading).unwrap_or_else(Outcome::Refused);
+    let small = |p: &Polygon| if is_large(p) { Outcome::Fan } else { made(p) };
+    let mut outcomes: Vec<Outcome> = polygons.par_iter().with_min_len(256).map(small).collect();
+    let large = outcomes.iter_mut().zip(polygons).filter(|(_, p)| is_large(p));
+    large.for_each(|(outcome, p)| *outcome = made(p));
+    Ok(outcomes)
+}
+
 fn outcome(mesh: &Mesh, polygon: &Polygon, reading: &Reading<'_>) -> Result<Outcome, ReadError> {
     reading.go_on()?;
     let fan = &mesh.triangles[polygon.first..polygon.first + polygon.count];
@@ -101,7 +119,6 @@ fn outcome(mesh: &Mesh, polygon: &Polygon, reading: &Reading<'_>) -> Result<Outc
     if is_strictly_convex(&flat) {
         return Ok(Outcome::Fan);
     }
-    input::check_bytes("the corners of a face", corners.len() as u64 * BYTES_PER_CORNER, reading.params)?;
     let Some(flat) = Flat::new(&corners, flat, reading)? else { return Ok(Outcome::Fan) };
     Ok(match flat.by_parity() {
         Some(triangles) => Outcome::Triangles(triangles),
@@ -192,7 +209,8 @@ impl Flat {
             }));
         }
         let count = places.len();
-        let Ok(mut plane) = Plane::bulk_load(places) else { return Ok(None) };
+        let plane = if count <= MOST_AT_BULK { Plane::bulk_load(places).ok() } else { inserted(&places, reading)? };
+        let Some(mut plane) = plane else { return Ok(None) };
         let mut handles: Vec<Option<FixedVertexHandle>> = vec![None; count];
         plane.vertices().for_each(|v| handles[v.data().rank] = Some(v.fix()));
         let mut times = vec![0u32; plane.num_undirected_edges()];
@@ -234,6 +252,34 @@ impl Flat {
         };
         self.plane.inner_faces().filter_map(|f| turned(f.vertices().map(|v| *v.data()))).collect()
     }
+}
+
+/// The triangulation of many places, one after the other, each looked for beside its nearest neighbour in the polygon so far. All at once,
+/// those that lie on a line with others take as many steps as there are places. `None` where all lie on a line.
+fn inserted(places: &[Corner], reading: &Reading<'_>) -> Result<Option<Plane>, ReadError> {
+    let at = |i: usize| DVec2::new(places[i].at.x, places[i].at.y);
+    let most = |measure: &dyn Fn(usize) -> f64| (0..places.len()).max_by(|a, b| measure(*a).total_cmp(&measure(*b)));
+    let far = most(&|i| at(i).distance_squared(at(0))).unwrap_or(0);
+    // With these three it has a triangle before anything else is looked for.
+    let off = most(&|i| turn(at(0), at(far), at(i)).abs()).filter(|i| turn(at(0), at(far), at(*i)) != 0.0);
+    let Some(off) = off else { return Ok(None) };
+    let mut plane = Plane::new();
+    let mut handles: Vec<Option<FixedVertexHandle>> = vec![None; places.len()];
+    for i in [0, far, off].into_iter().chain(scattered(places.len())) {
+        if handles[i].is_some() {
+            continue;
+        }
+        reading.go_on()?;
+        // Without its lowest digit the number of a place is that of one that came before.
+        let before = handles[i & i.saturating_sub(1)];
+        let handle = match before {
+            Some(hint) => plane.insert_with_hint(places[i], hint),
+            None => plane.insert(places[i]),
+        };
+        let Ok(handle) = handle else { return Ok(None) };
+        handles[i] = Some(handle);
+    }
+    Ok(Some(plane))
 }
 
 /// 0 to n − 1, halves before quarters before eighths: an edge of the polygon crosses the triangles between its nearest

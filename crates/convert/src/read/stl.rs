@@ -85,7 +85,7 @@ fn binary(content: &[u8], reading: &Reading<'_>) -> Result<Mesh, ReadError> {
 }
 
 fn reserved(facets: usize, params: &ReadParams) -> Result<Vec<DVec3>, ReadError> {
-    input::check_bytes("the facets", facets as u64 * BYTES_PER_FACET, params)?;
+    input::hold("the facets", facets as u64 * BYTES_PER_FACET, params)?;
     let mut corners = Vec::new();
     input::reserve(&mut corners, 3 * facets)?;
     Ok(corners)
@@ -144,6 +144,7 @@ fn text(content: &[u8], reading: &Reading<'_>) -> Result<Mesh, ReadError> {
     let mut text = Text { lines: Lines::new(content) };
     let mut corners: Vec<DVec3> = Vec::new();
     let mut inside = false;
+    let mut held = input::Growing::new("the facets");
     loop {
         let (line, words) = match text.next("'endsolid'") {
             Ok(found) => found,
@@ -161,7 +162,7 @@ fn text(content: &[u8], reading: &Reading<'_>) -> Result<Mesh, ReadError> {
                 if corners.len().is_multiple_of(3 * LOOK) {
                     reading.go_on()?;
                 }
-                input::check_bytes("the facets", (corners.len() as u64 / 3 + 1) * BYTES_PER_FACET, reading.params)?;
+                held.hold((corners.len() as u64 / 3 + 1) * BYTES_PER_FACET, reading.params)?;
                 input::reserve(&mut corners, 3)?;
                 facet_corners(&mut text, &mut corners)?;
             }

@@ -1,12 +1,13 @@
 //! Textures: PNG and JPEG images as linear colours between their texels.
 
 use super::reading::Reading;
-use super::{check_image, input};
+use super::{check_sides, input};
 use crate::error::{Place, ReadError};
 use crate::srgb::linear_from_srgb;
 use image::{ImageDecoder, ImageFormat, ImageReader, Limits};
+use splat_core::Reservation;
 use std::io::Cursor;
-use std::sync::LazyLock;
+use std::sync::{Arc, LazyLock};
 
 /// What lies beyond the border.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -17,13 +18,20 @@ pub(super) enum Wrap {
 }
 
 /// An image that surfaces are painted with.
+#[derive(Clone)]
 pub(super) struct Texture {
     size: [u32; 2],
     /// sRGB and opacity, row by row from the top.
-    texels: Vec<[u8; 4]>,
+    texels: Arc<Texels>,
     wrap: [Wrap; 2],
     /// Whether texels are squares of one colour.
     is_nearest: bool,
+}
+
+/// Texels that several textures may share, with the memory that they take.
+struct Texels {
+    all: Vec<[u8; 4]>,
+    _held: Reservation,
 }
 
 static LINEAR: LazyLock<[f32; 256]> = LazyLock::new(|| std::array::from_fn(|i| linear_from_srgb(i as f64 / 255.0)));
@@ -43,22 +51,31 @@ impl Texture {
         };
         let mut reader = ImageReader::with_format(Cursor::new(content), format);
         let mut limits = Limits::default();
-        limits.max_alloc = Some(reading.params.limits.max_bytes);
+        limits.max_alloc = Some(reading.params.memory.left());
         reader.limits(limits);
         let decoder = reader.into_decoder().map_err(|e| wrong(e.to_string()))?;
         let (width, height) = decoder.dimensions();
-        check_image([width, height], reading.params)?;
+        check_sides([width, height])?;
         // A damaged size is not made room for.
-        input::check_packed(decoder.total_bytes(), content.len() as u64, "an image")?;
+        let stored = content.len() as u64;
+        if format == ImageFormat::Png {
+            let row = u64::from(width) * u64::from(decoder.original_color_type().bits_per_pixel());
+            input::check_deflated(row.div_ceil(8) * u64::from(height), stored, "an image")?;
+        } else {
+            input::check_packed(decoder.total_bytes(), stored, "an image")?;
+        }
+        let bytes = 4 * u64::from(width) * u64::from(height);
+        let mut held = reading.params.memory.take(what, bytes.saturating_add(decoder.total_bytes()))?;
         let decoded = image::DynamicImage::from_decoder(decoder).map_err(|e| wrong(e.to_string()))?;
-        let texels = decoded.into_rgba8().into_raw();
-        let texels = bytemuck::allocation::cast_vec(texels);
+        let all = bytemuck::allocation::cast_vec(decoded.into_rgba8().into_raw());
+        held.set(what, bytes)?;
+        let texels = Arc::new(Texels { all, _held: held });
         Ok(Self { size: [width, height], texels, wrap: [Wrap::Repeat; 2], is_nearest: false })
     }
 
-    /// The same with other rules of what lies beyond its border and between its texels.
-    pub(super) fn sampled(self, wrap: [Wrap; 2], is_nearest: bool) -> Self {
-        Self { wrap, is_nearest, ..self }
+    /// The same image with other rules of what lies beyond its border and between its texels.
+    pub(super) fn sampled(&self, wrap: [Wrap; 2], is_nearest: bool) -> Self {
+        Self { wrap, is_nearest, ..self.clone() }
     }
 
     /// Columns and rows.
@@ -100,7 +117,7 @@ impl Texture {
                 }
             }
         });
-        let [r, g, b, alpha] = self.texels[j as usize * self.size[0] as usize + i as usize];
+        let [r, g, b, alpha] = self.texels.all[j as usize * self.size[0] as usize + i as usize];
         let linear: &[f32; 256] = &LINEAR;
         let [r, g, b] = [r, g, b].map(|c| linear[usize::from(c)]);
         [r, g, b, f32::from(alpha) / 255.0]

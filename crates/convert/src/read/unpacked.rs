@@ -1,8 +1,7 @@
 //! What comes out of gzip or zlib, no more of it than the packed file may stand for.
 
-use super::ReadParams;
 use super::inflate::Inflate;
-use super::input::{Stream, check_bytes, check_ratio};
+use super::input::{Stream, check_ratio};
 use crate::error::{Place, ReadError};
 use flate2::bufread::MultiGzDecoder;
 use std::io::{self, BufReader, Read};
@@ -22,20 +21,19 @@ pub(super) struct Unpacked<'a> {
     given: u64,
     /// Bytes of the file that all is packed in.
     stored: u64,
-    params: ReadParams,
 }
 
 impl<'a> Unpacked<'a> {
     /// Of gzip of one or several members.
-    pub(super) fn gzip(packed: Stream<'a>, stored: u64, params: ReadParams) -> Self {
+    pub(super) fn gzip(packed: Stream<'a>, stored: u64) -> Self {
         let packed = BufReader::with_capacity(AT_ONCE, packed);
-        Self { decoder: Decoder::Gzip(MultiGzDecoder::new(packed)), given: 0, stored, params }
+        Self { decoder: Decoder::Gzip(MultiGzDecoder::new(packed)), given: 0, stored }
     }
 
     /// Of one zlib stream.
-    pub(super) fn zlib(packed: Stream<'a>, stored: u64, params: ReadParams) -> Self {
+    pub(super) fn zlib(packed: Stream<'a>, stored: u64) -> Self {
         let packed = BufReader::with_capacity(AT_ONCE, packed);
-        Self { decoder: Decoder::Zlib(Inflate::new(packed)), given: 0, stored, params }
+        Self { decoder: Decoder::Zlib(Inflate::new(packed)), given: 0, stored }
     }
 
     /// The packed bytes, and what they should be.
@@ -61,7 +59,6 @@ impl Read for Unpacked<'_> {
             io::Error::other(e.downcast::<ReadError>().unwrap_or_else(damaged))
         })?;
         self.given += n as u64;
-        check_bytes("the decompressed file", self.given, &self.params).map_err(io::Error::other)?;
         check_ratio(self.given, self.stored).map_err(io::Error::other)?;
         Ok(n)
     }

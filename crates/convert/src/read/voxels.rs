@@ -196,7 +196,7 @@ pub(super) fn behind(
 /// Room for the values of the volume.
 fn room(stored: &Stored, params: &ReadParams) -> Result<Vec<f32>, ReadError> {
     let mut values = Vec::new();
-    input::check_bytes("the voxels", stored.count() * size_of::<f32>() as u64, params)?;
+    input::hold("the voxels", stored.count() * size_of::<f32>() as u64, params)?;
     input::reserve(&mut values, stored.count() as usize)?;
     Ok(values)
 }

@@ -6,6 +6,7 @@
 mod data;
 mod piece;
 
+use super::input;
 use super::reading::Reading;
 use super::selection::Selection;
 use super::voxels::{Kind, Stored};
@@ -27,6 +28,7 @@ const DATASETS: [&str; 3] = ["ImageData", "UnstructuredGrid", "PolyData"];
 /// Reads a file.
 pub(super) fn read(content: &[u8], reading: &mut Reading<'_>) -> Result<Loaded, ReadError> {
     let (appended, text) = Appended::split(content)?;
+    input::hold("the description", if appended.is_some() { text.len() as u64 } else { 0 }, reading.params)?;
     let document = xml::parse(&text, MAX_NODES).map_err(|e| {
         let line = e.line.map(|(line, column)| Place::Line { line: line.into(), column: column.into() });
         ReadError::input(line.unwrap_or(Place::Byte(e.byte as u64)), e.expected, e.found, HINT)

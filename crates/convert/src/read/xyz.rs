@@ -43,6 +43,7 @@ pub(super) fn read(content: &[u8], params: &ReadParams, notes: &mut Notes) -> Re
     let mut columns: Option<Vec<Option<usize>>> = None;
     let (mut count, mut positions, mut points) = (None, Vec::new(), RawPoints::default());
     let mut extras = Extras::default();
+    let mut held = input::Growing::new("the points");
     while let Some(line) = lines.next()? {
         let comment = |w: &Word<'_>| w.text.starts_with(b"#") || w.text.starts_with(b"//");
         let words: Vec<Word<'_>> = line.words(true).take_while(|w| !comment(w)).collect();
@@ -70,7 +71,7 @@ pub(super) fn read(content: &[u8], params: &ReadParams, notes: &mut Notes) -> Re
             return Err(ReadError::input(line.place(), expected, found, "every line has the same columns"));
         }
         let bytes = (positions.len() as u64 + 1) * (BYTES_PER_POINT + extras.bytes_per_point());
-        input::check_bytes("the points", bytes, params)?;
+        held.hold(bytes, params)?;
         input::reserve(&mut positions, 1)?;
         if point(&words, columns, params, &mut positions, &mut points)? {
             further(&words, &mut extras)?;

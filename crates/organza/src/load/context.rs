@@ -6,8 +6,9 @@ use crate::{Error, RenderOptions};
 use convert::read::ReadParams;
 use convert::{Orientation, SplatParams, SurfelParams, VolumeParams};
 use glam::DVec3;
-use splat_core::{Limits, Progress, Shading};
+use splat_core::{Limits, Progress, Reservation, Shading};
 use std::path::Path;
+use std::sync::Arc;
 
 /// Bytes that a splat takes from its conversion to the finished picture, at most.
 pub(crate) const BYTES_PER_SPLAT: u64 = 256;
@@ -62,7 +63,7 @@ impl Context<'_> {
 
     /// What earlier objects have left of memory and of the scene's own limit.
     fn limit(&self, params: &mut SplatParams) {
-        let fits = self.options.max_memory.saturating_sub(self.used) / BYTES_PER_SPLAT;
+        let fits = self.files.memory(self.options).left().saturating_sub(self.used) / BYTES_PER_SPLAT;
         let asked = self.scene.render.max_points.map_or(u64::MAX, |most| most.saturating_sub(self.made));
         params.limits = Limits::elements(fits.min(asked).min(u64::from(u32::MAX)));
     }
@@ -111,7 +112,7 @@ impl Context<'_> {
     }
 
     /// The same of a file that nothing but what is made from it needs.
-    pub(super) fn read_once(&self, path: &Path) -> Result<FileData, Error> {
+    pub(super) fn read_once(&self, path: &Path) -> Result<(FileData, Arc<Reservation>), Error> {
         self.files.read_once(path, &self.options.read_params(), self.progress)
     }
 

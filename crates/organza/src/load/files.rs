@@ -1,10 +1,10 @@
 //! What was read from files, shared by all objects and frames that are made from it: a file is read once.
 
-use crate::Error;
 use crate::scene::{ExtractSource, Scene, Stop};
+use crate::{Error, RenderOptions};
 use convert::read::{Loaded, Mended, Notes, ReadParams};
 use convert::{ColorScale, RawPoints, SharedField};
-use splat_core::{DAabb, Grid, Mesh, Progress, RadianceImage};
+use splat_core::{DAabb, Grid, MemoryAccount, Mesh, Progress, RadianceImage, Reservation};
 use std::cell::{Cell, RefCell};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -23,8 +23,8 @@ pub enum FileData {
     Image(Arc<RadianceImage>),
 }
 
-/// What was read of a file, and what there is to say of it.
-type Read = (FileData, Notes);
+/// What was read of a file, what there is to say of it, and the memory that it takes as long as anybody has it from here.
+type Read = (FileData, Notes, Arc<Reservation>);
 
 /// The level set of scattered points, and its bounds.
 pub(super) type Fitted = (SharedField, DAabb);
@@ -33,8 +33,9 @@ pub(super) type Fitted = (SharedField, DAabb);
 type Made<K, V> = RefCell<Vec<(K, V)>>;
 
 /// The files of a scene that were read, so that whoever looked at them before can hand them to [`crate::render_from`].
-#[derive(Default)]
 pub struct Files {
+    /// Memory that files take, while they are read and as long as they are kept.
+    memory: MemoryAccount,
     /// By path and frame.
     read: RefCell<HashMap<(PathBuf, u64), (ReadParams, Read)>>,
     /// What there is to say of them, one sentence each.
@@ -53,11 +54,34 @@ pub struct Files {
     pub(super) scales: RefCell<Vec<ColorScale>>,
 }
 
+impl Default for Files {
+    /// None yet. How much memory they may take is said with each that is read.
+    fn default() -> Self {
+        Self {
+            memory: MemoryAccount::new(u64::MAX),
+            read: RefCell::default(),
+            notes: RefCell::default(),
+            fitted: RefCell::default(),
+            stopped: RefCell::default(),
+            seen: RefCell::default(),
+            most: Cell::default(),
+            mended: RefCell::default(),
+            scales: RefCell::default(),
+        }
+    }
+}
+
 impl Files {
+    /// The account that all files draw on together, with what a render may take as its limit; for whoever keeps something beside them.
+    pub fn memory(&self, options: &RenderOptions) -> MemoryAccount {
+        self.memory.up_to(options.max_memory)
+    }
+
     /// Reads a file unless it was read with the same limits, and keeps what it holds.
     ///
     /// # Errors
-    /// [`Error::Io`], [`Error::Input`] or [`Error::TooLarge`] as its reader has them.
+    /// [`Error::Io`], [`Error::Input`] or [`Error::TooLarge`] as its reader has them; too large is also what would take more memory
+    /// than `limits` allow beside the files that are kept.
     pub fn read(&self, path: &Path, limits: &ReadParams, progress: &Progress) -> Result<FileData, Error> {
         let read = self.known_or_read(path, limits, progress)?;
         self.read.borrow_mut().insert((real(path), limits.frame), (limits.clone(), read.clone()));
@@ -65,8 +89,13 @@ impl Files {
     }
 
     /// The same without keeping it: for whoever keeps what is made from it.
-    pub(super) fn read_once(&self, path: &Path, limits: &ReadParams, progress: &Progress) -> Result<FileData, Error> {
-        self.known_or_read(path, limits, progress).map(|read| read.0)
+    pub(super) fn read_once(
+        &self,
+        path: &Path,
+        limits: &ReadParams,
+        progress: &Progress,
+    ) -> Result<(FileData, Arc<Reservation>), Error> {
+        self.known_or_read(path, limits, progress).map(|read| (read.0, read.2))
     }
 
     /// Forgets what there is to say of files, for whoever looked at them before a scene asks for what they hold.
@@ -104,11 +133,16 @@ impl Files {
     }
 
     fn read_anew(&self, path: &Path, limits: &ReadParams, progress: &Progress) -> Result<Read, Error> {
-        let read = convert::read::file(path, limits, Some(progress));
+        let memory = self.memory.up_to(limits.memory.limit());
+        let params = ReadParams { memory: memory.clone(), ..limits.clone() };
+        let read = convert::read::file(path, &params, Some(progress));
         let (data, notes) = read.map_err(|e| Error::from_read(path, &e))?;
+        let what = crate::printable(path);
+        let mut held = memory.take(&what, data.bytes()).map_err(Error::Limit)?;
         add(&self.mended, notes.mended.iter().map(Mended::to_string));
         let data = match data {
             Loaded::Mesh(mut mesh) => {
+                let _parted = memory.take(&what, convert::crease_bytes(&mesh)).map_err(Error::Limit)?;
                 convert::part_at_creases(&mut mesh);
                 FileData::Mesh(mesh.into())
             }
@@ -117,12 +151,23 @@ impl Files {
             Loaded::Image(image) => FileData::Image(image.into()),
             _ => return Err(Error::Internal("a kind of file that scenes do not know".into())),
         };
-        Ok((data, notes))
+        held.set(&what, data.bytes()).map_err(Error::Limit)?;
+        Ok((data, notes, held.into()))
+    }
+
+    /// None any more, on the same account.
+    pub(crate) fn emptied(&self) -> Self {
+        Self { memory: self.memory.clone(), ..Self::default() }
+    }
+
+    /// Most bytes that files and images took at a time, while they were read too.
+    pub(crate) fn peak(&self) -> u64 {
+        self.memory.peak()
     }
 
     /// Bytes that it holds.
     pub(crate) fn bytes(&self) -> u64 {
-        let read: u64 = self.read.borrow().values().map(|(_, (data, _))| data.bytes()).sum();
+        let read: u64 = self.read.borrow().values().map(|(_, read)| read.0.bytes()).sum();
         let seen: u64 = self.seen.borrow().iter().map(|(_, points)| points.bytes()).sum();
         read + seen + self.fitted.borrow().iter().map(|(_, (_, bytes))| bytes).sum::<u64>()
     }

@@ -6,7 +6,7 @@ use super::loading::Loading;
 use crate::scene::SceneLight;
 use crate::{Error, work};
 use convert::read::ReadParams;
-use splat_core::{Environment, Exceeded, HeightImage, RadianceImage, Slide};
+use splat_core::{Environment, Exceeded, HeightImage, RadianceImage, Reservation, Slide};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -19,6 +19,8 @@ pub(crate) struct Images {
     pub(crate) slides: Vec<Option<Slide>>,
     /// The heights of each material's bumps, where an image has them.
     pub(crate) heights: Vec<Option<HeightImage>>,
+    /// The memory of all of them.
+    _held: Vec<Reservation>,
 }
 
 impl Images {
@@ -33,28 +35,28 @@ impl Images {
 impl Loading<'_> {
     /// All of them; slides for these lights.
     pub(super) fn images(&self, lights: &[SceneLight]) -> Result<Images, Error> {
-        let heights = |path: &PathBuf| {
-            let image = self.image(path, "as heights of bumps", true, HeightImage::bytes_of)?;
+        let mut held = Vec::new();
+        let environment = self.environment(&mut held)?;
+        let slides = lights.iter().map(|light| self.slide(light, &mut held)).collect::<Result<_, _>>()?;
+        let mut height = |path: &PathBuf| {
+            let image = self.image(path, "as heights of bumps", true, HeightImage::bytes_of, &mut held)?;
             HeightImage::new(&image).map_err(|e| refuse(path, &e, "make its heights smaller"))
         };
         let materials = self.scene.materials.iter().map(|material| material.bump_image.as_ref());
-        Ok(Images {
-            environment: self.environment()?,
-            slides: lights.iter().map(|light| self.slide(light)).collect::<Result<_, _>>()?,
-            heights: materials.map(|path| path.map(heights).transpose()).collect::<Result<_, _>>()?,
-        })
+        let heights = materials.map(|path| path.map(&mut height).transpose()).collect::<Result<_, _>>()?;
+        Ok(Images { environment, slides, heights, _held: held })
     }
 
-    fn environment(&self) -> Result<Option<Environment>, Error> {
+    fn environment(&self, held: &mut Vec<Reservation>) -> Result<Option<Environment>, Error> {
         let Some(source) = &self.scene.environment else { return Ok(None) };
-        let image = self.image(&source.path, "as an environment", false, Environment::bytes_of)?;
+        let image = self.image(&source.path, "as an environment", false, Environment::bytes_of, held)?;
         let made = Environment::new(&image, source.turns, source.scale);
         made.map(Some).map_err(|e| refuse(&source.path, &e, "use a smaller background.scale"))
     }
 
-    fn slide(&self, light: &SceneLight) -> Result<Option<Slide>, Error> {
+    fn slide(&self, light: &SceneLight, held: &mut Vec<Reservation>) -> Result<Option<Slide>, Error> {
         let Some(source) = &light.slide else { return Ok(None) };
-        let image = self.image(&source.path, "as the texture of a light", false, Slide::bytes_of)?;
+        let image = self.image(&source.path, "as the texture of a light", false, Slide::bytes_of, held)?;
         let made = Slide::new(&image, &light.light.shape, &source.framing);
         let hint = "place it in another way, by the keys that begin with `texture_`";
         made.map(Some).map_err(|e| refuse(&source.path, &e, hint))
@@ -67,6 +69,7 @@ impl Loading<'_> {
         what: &str,
         is_data: bool,
         bytes_of: fn([u32; 2]) -> u64,
+        held: &mut Vec<Reservation>,
     ) -> Result<Arc<RadianceImage>, Error> {
         self.progress.begin(&work::reading_file(path));
         let params = ReadParams { is_data, ..self.options.read_params() };
@@ -74,10 +77,10 @@ impl Loading<'_> {
             let hint = "name a Radiance HDR, OpenEXR or PNG file";
             return Err(Error::wrong_kind(path, "an image of radiance", hint));
         };
-        let needed = image.bytes().saturating_add(bytes_of(image.size));
-        let (what, hint) =
-            (format!("{} {what}", crate::printable(path)), "use a smaller image, or a larger --max-memory");
-        Exceeded::check(what, needed, self.options.max_memory, "bytes", hint).map_err(Error::Limit)?;
+        let hint = "use a smaller image, or a larger --max-memory";
+        let made =
+            self.files.memory(self.options).take(&format!("{} {what}", crate::printable(path)), bytes_of(image.size));
+        held.push(made.map_err(|e| Error::Limit(Exceeded { hint: hint.into(), ..e }))?);
         Ok(image)
     }
 }

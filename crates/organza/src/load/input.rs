@@ -14,7 +14,7 @@ use convert::{
     SurfelParams, VolumeParams,
 };
 use pbsr::{BoundedExtinction, Matter};
-use splat_core::{DAabb, Grid, Mesh, TransferFunction};
+use splat_core::{DAabb, Grid, Mesh, Reservation, TransferFunction};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -114,11 +114,7 @@ pub(super) fn input<'a>(object: &'a SceneObject, context: &Context<'_>) -> Resul
     Ok(match &object.source {
         Source::Mesh(path) => {
             let density = object.spacing.map_or(Density::Auto, Density::Spacing);
-            let (mut mesh, lids) = convert::lidded_mesh(read_mesh(path, context)?, &object.clip);
-            context.files.warn(path, lids.said());
-            if object.color.is_some() && !mesh.color.is_empty() {
-                mesh = Mesh { color: Vec::new(), ..Mesh::clone(&mesh) }.into();
-            }
+            let mesh = own_mesh(path, object, context)?;
             Input::Mesh(crate::printable(path).to_string(), mesh, MeshParams { splat, density, opacity })
         }
         Source::Points(path) | Source::Matter(MatterSource { path, .. }) => match context.read(path)? {
@@ -162,6 +158,19 @@ pub(super) fn input<'a>(object: &'a SceneObject, context: &Context<'_>) -> Resul
             Input::Mesh(object.name.clone(), mesh, MeshParams { splat, density, opacity })
         }
     })
+}
+
+/// The mesh of an object, cut and closed again, in the colours that it has.
+fn own_mesh(path: &Path, object: &SceneObject, context: &Context<'_>) -> Result<Arc<Mesh>, Error> {
+    let mesh = read_mesh(path, context)?;
+    // While it is cut, or parted from its colours, there is another one.
+    let is_changed = !object.clip.is_empty() || object.color.is_some() && !mesh.color.is_empty();
+    let more = if is_changed { 2 * mesh.bytes() } else { 0 };
+    let _held = context.files.memory(context.options).take(&crate::printable(path), more).map_err(Error::Limit)?;
+    let (mesh, lids) = convert::lidded_mesh(mesh, &object.clip);
+    context.files.warn(path, lids.said());
+    let has_others = object.color.is_some() && !mesh.color.is_empty();
+    Ok(if has_others { Mesh { color: Vec::new(), ..Mesh::clone(&mesh) }.into() } else { mesh })
 }
 
 /// A plane through a volume, with the volume's colours.
@@ -249,29 +258,37 @@ pub(super) fn refuse(path: &Path, error: &splat_core::Error, hint: &str) -> Erro
     Error::input(crate::printable(path), error.to_string(), hint)
 }
 
+/// Bytes that a point takes while a field is fitted to it, beside the field.
+const BYTES_PER_FITTED_POINT: u64 = 128;
+
 /// The field that scattered points lie on, and its bounds.
 fn level_set(source: &LevelSetSource, object: &SceneObject, context: &Context<'_>) -> Result<Fitted, Error> {
     let fit = || {
         let params =
             MpuParams { object_name: object.name.clone(), tolerance: source.tolerance, ..MpuParams::default() };
-        let points = read_scattered(&source.path, context)?;
+        let (points, _held) = read_scattered(&source.path, context)?;
+        let what = format!("the level set of {}", crate::printable(&source.path));
+        let memory = context.files.memory(context.options);
+        let _fitting = memory.take(&what, points.len() as u64 * BYTES_PER_FITTED_POINT).map_err(Error::Limit)?;
         let (field, _) = convert::points_to_field(&points, &params, Some(context.progress))?;
         let (bounds, bytes) = (field.bounds(), field.bytes());
+        memory.hold(&what, bytes).map_err(Error::Limit)?;
         Ok(((Arc::new(field) as SharedField, bounds), bytes))
     };
     once(&context.files.fitted, (source.path.clone(), source.tolerance), fit).map(|fitted| fitted.0)
 }
 
 /// Scattered points with normals where the file has some; of a mesh its vertices.
-fn read_scattered(path: &Path, context: &Context<'_>) -> Result<Arc<RawPoints>, Error> {
-    match context.read_once(path)? {
+fn read_scattered(path: &Path, context: &Context<'_>) -> Result<(Arc<RawPoints>, Arc<Reservation>), Error> {
+    let (data, held) = context.read_once(path)?;
+    match data {
         FileData::Points(points) => {
             context.files.note(path, points.unused_by_fields());
-            Ok(points)
+            Ok((points, held))
         }
         FileData::Mesh(mesh) => {
             mesh.validate().map_err(|e| refuse(path, &e, ""))?;
-            Ok(RawPoints::of_vertices(&mesh).into())
+            Ok((RawPoints::of_vertices(&mesh).into(), held))
         }
         _ => Err(Error::wrong_kind(path, "points", "use `volume = ` or `isosurface = ` for this file")),
     }

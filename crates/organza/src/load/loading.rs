@@ -46,7 +46,12 @@ impl<'a> Loading<'a> {
             if let Some(reading) = work::reading(object) {
                 self.progress.begin(&reading);
             }
-            object::prepare(object, &self.context(id, 0, 0), looks(object)).map_err(|e| self.named(object, e))
+            let prepared = object::prepare(object, &self.context(id, 0, 0), looks(object));
+            let mut prepared = prepared.map_err(|e| self.named(object, e))?;
+            let what = format!("object '{}'", crate::shown(&object.name));
+            let held = self.files.memory(self.options).take(&what, prepared.input.bytes()[1]);
+            prepared.held = Some(held.map_err(Error::Limit)?);
+            Ok(prepared)
         };
         self.visible().map(one).collect()
     }
@@ -73,7 +78,7 @@ impl<'a> Loading<'a> {
         planned: &[PlannedObject],
     ) -> Result<Vec<SplatCount>, Error> {
         let mut splats: Vec<SplatCount> = Vec::new();
-        let (mut held, mut needed) = (self.files.bytes(), 0);
+        let (left, mut needed) = (self.files.memory(self.options).left(), 0);
         for ((object, p), plan) in self.visible().map(|v| v.1).zip(prepared).zip(planned) {
             let mut count = SplatCount::predicted(&object.name, &p.prediction);
             if plan.splats.is_none() {
@@ -82,8 +87,7 @@ impl<'a> Loading<'a> {
             // Estimates count half, so that nothing is refused that would fit.
             needed += if count.exact { count.predicted } else { count.predicted / 2 };
             splats.push(count);
-            held += p.input.bytes()[1];
-            check_total(self.scene, self.options, [held, needed], &splats)?;
+            check_total(self.scene, left, needed, &splats)?;
         }
         Ok(splats)
     }
@@ -144,15 +148,10 @@ impl<'a> Loading<'a> {
     }
 }
 
-/// Refuses a scene whose objects together make too many splats, `needed`, for the memory beside the inputs, of `held` bytes,
-/// or for the scene's own limit.
-fn check_total(
-    scene: &Scene,
-    options: &RenderOptions,
-    [held, needed]: [u64; 2],
-    splats: &[SplatCount],
-) -> Result<(), Error> {
-    let fits = options.max_memory.saturating_sub(held) / BYTES_PER_SPLAT;
+/// Refuses a scene whose objects together make too many splats, `needed`, for the memory that is left beside the inputs, or for the scene's
+/// own limit.
+fn check_total(scene: &Scene, left: u64, needed: u64, splats: &[SplatCount]) -> Result<(), Error> {
+    let fits = left / BYTES_PER_SPLAT;
     let limit = scene.render.max_points.map_or(fits, |asked| asked.min(fits));
     let most = splats.iter().max_by_key(|s| s.predicted);
     let named = most.map(|s| format!(", most of them '{}' with {}", crate::shown(&s.object), s.predicted));

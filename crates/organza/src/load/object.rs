@@ -12,7 +12,7 @@ use convert::{
     VolumeParams, ZeroSearch,
 };
 use pbsr::BoundedExtinction;
-use splat_core::{Cloud, Exceeded, Grid, Object, Shading, TransferFunction};
+use splat_core::{Cloud, Exceeded, Grid, Object, Reservation, Shading, TransferFunction};
 
 /// Most operations of an expression on its way to splats: some minutes of two cores.
 const MOST_OPERATIONS: f64 = 1e11;
@@ -31,6 +31,8 @@ pub(super) struct Prepared<'a> {
     pub(super) search: Option<ZeroSearch>,
     /// The field that it shows.
     pub(super) field: Option<SurfaceField>,
+    /// Memory of what was made of files for it: a mesh that is cut, a volume of another spacing.
+    pub(super) held: Option<Reservation>,
 }
 
 /// The object's row of the object table.
@@ -71,7 +73,7 @@ pub(super) fn prepare<'a>(
         prediction => (prediction?, None),
     };
     let field = shown_field(object, context)?;
-    Ok(Prepared { input, prediction, as_it_is, too_many, bounded, search, field })
+    Ok(Prepared { input, prediction, as_it_is, too_many, bounded, search, field, held: None })
 }
 
 /// Refuses an expression that would be worked at for many minutes before anything is drawn.

@@ -18,11 +18,11 @@ mod unit;
 
 use crate::frame::Frame;
 use crate::pass;
-use crate::scene::Scene;
+use crate::scene::{Scene, SurfaceSampler};
 use crate::technique::{EVERYWHERE, Finished, Fold, Session};
 use crate::{CostRecord, Error, RenderOptions, Sets};
 pub(crate) use checkpoint::Checkpoint;
-use ensemble::{Average, average_bytes, fold};
+use ensemble::{Average, average_bytes, fold, fold_params};
 pub(crate) use form::form;
 pub(crate) use kept::Kept;
 use parts::{Part, sources};
@@ -43,6 +43,22 @@ pub(crate) fn seconds(scene: &Scene, all: &crate::work::Translucent) -> f64 {
 pub(crate) fn bytes(scene: &Scene, colored_extinction: bool, options: &RenderOptions) -> u64 {
     let size = scene.camera.size.map(|s| u64::from(s) * u64::from(scene.render.antialias));
     average_bytes(size, &scene.render.layers.set(), colored_extinction, options)
+}
+
+/// Refuses sets of more particles than may be in memory. Surfaces by Brownian motion are not asked: it counts by a run as long as some sets.
+pub(crate) fn check<'a>(frame: &'a Frame<'a>, options: &RenderOptions) -> Result<(), Error> {
+    if matches!(frame.settings.particles.surface_sampler, SurfaceSampler::Brownian { .. }) {
+        return Ok(());
+    }
+    // Drawing tells them.
+    let mut warnings = Vec::new();
+    let mut parts = Vec::new();
+    for mut source in sources(frame) {
+        parts.extend(source.part(&mut warnings)?);
+    }
+    let parts: Vec<&Part<'_>> = parts.iter().collect();
+    let expected = parts.iter().map(|part| part.object().sampler.expected_particles()).sum();
+    fold_params(options).check_set(expected).map_err(|e| refuse(&parts::named(&parts), e))
 }
 
 /// Begins a frame.

@@ -37,7 +37,7 @@ pub(crate) fn records(placed: &Placed<'_>, lattice: &Lattice<'_>, voxels: &Voxel
                 let i = eighth * SEGMENT + bits.trailing_zeros() as usize;
                 bits &= bits - 1;
                 let p = placed.position(lattice.rim, [i, j, k]);
-                let value = crate::classify::relative(lattice.value(i, j, k), placed.base);
+                let value = placed.base.relative(lattice.value(i, j, k));
                 out.push(Record { at: [p.x as f32, p.y as f32], value, place: placed.place(p.z) });
             }
         }

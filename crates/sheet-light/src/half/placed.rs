@@ -1,7 +1,7 @@
 //! A lattice in slab coordinates, with what its kernels, its values and its classes need.
 
 use super::frame::Frame;
-use crate::classify::Classifier;
+use crate::classify::{Base, Classifier};
 use crate::fold::extremes;
 use crate::lattice::Lattice;
 use crate::near::Near;
@@ -30,7 +30,7 @@ pub(crate) struct Placed<'a> {
     pub(crate) kernel: Kernel,
     pub(crate) classifier: Classifier,
     /// What values are taken relative to.
-    pub(crate) base: f64,
+    pub(crate) base: Base,
     /// Whether gradients are told from neighbouring sheets.
     pub(crate) compares: bool,
     /// Whether sums are rounded to half precision.
@@ -51,8 +51,7 @@ impl<'a> Placed<'a> {
         let reach = libm::sqrt(m.z_axis.z);
         let cutoff = params.kernel.extent / params.kernel.sigma;
         let footprint = Footprint { cutoff: cutoff as f32 };
-        let (low, high) = extremes(&volume.grid.values);
-        let base = 0.5 * (f64::from(low) + f64::from(high));
+        let base = Base::new(extremes(&volume.grid.values).into(), &volume.seen());
         Self {
             volume,
             start: frame.point(volume.origin()),

@@ -18,6 +18,8 @@ use splat_core::glam::{DMat3, DVec3, DVec4};
 /// Voxels of the volume: no fewer in its bounds, and no more.
 const FEWEST: f64 = 64.0 * 64.0 * 64.0;
 const MOST: f64 = 256.0 * 256.0 * 256.0;
+/// Voxels along an axis, at most: of cells in a row that is far longer they are so long that the volume is refused.
+const MOST_ALONG: f64 = 65536.0;
 /// Voxels of a body of mean size, between those.
 const VOXELS_PER_BODY: f64 = 8.0;
 /// Samples of a voxel along an axis.
@@ -27,6 +29,10 @@ const SAMPLES: usize = 2;
 const SHARE: f64 = 0.5 / (SAMPLES * SAMPLES * SAMPLES) as f64;
 /// Parts of the volume that are filled side by side, whatever the number of threads.
 const PARTS: usize = 16;
+/// Rows of samples that are looked at, and samples, for each sample that there is, at most; and how many in any case. Cells that lie side
+/// by side stay far below; such as lie on each other a thousandfold would take minutes.
+const MOST_WORK: f64 = 256.0;
+const FREE_WORK: f64 = (1u64 << 28) as f64;
 /// How far outside a tetrahedron a sample may lie, in barycentric coordinates: between two neighbours nothing is left out.
 const SLACK: f64 = 1e-9;
 
@@ -97,6 +103,7 @@ pub(super) fn grid(
     let least = bodies.iter().flat_map(|body| body.corners.iter().map(|corner| field.at(body.cell, *corner)));
     let outside = least.fold(0.0, f64::min);
     let lattice = Lattice { low: bounds.low, sample: step / SAMPLES as f64, dims, outside };
+    lattice.check_work((points, bodies), bounds.volume)?;
     let values = lattice.filled((points, bodies), field, reading)?;
     let ([x, y, z], cells) = (dims, counted(bodies.len() as u64, "cell"));
     let remarks = &mut reading.notes.remarks;
@@ -150,7 +157,7 @@ impl Bounds {
         loop {
             let dims = (self.size / step).round().max(DVec3::ONE);
             // Along a short side there is one voxel more than would be its share.
-            if dims.element_product() <= 1.1 * MOST {
+            if dims.element_product() <= 1.1 * MOST && dims.max_element() <= MOST_ALONG {
                 return dims.to_array().map(|n| n as usize);
             }
             step *= 1.25;
@@ -191,7 +198,7 @@ impl Lattice {
         let [nx, ny, nz] = self.dims;
         let count = nx * ny * nz;
         let bytes = count * (size_of::<f32>() + size_of::<u8>());
-        input::check_bytes("the voxels", bytes as u64, reading.params)?;
+        input::hold("the voxels", bytes as u64, reading.params)?;
         let (mut sums, mut taken) = (Vec::new(), Vec::new());
         input::reserve(&mut sums, count)?;
         input::reserve(&mut taken, count)?;
@@ -212,13 +219,39 @@ impl Lattice {
                     body.part(&corner, |t| self.fill(t, &mut part));
                 }
             }
-            Ok(())
+            Ok::<(), ReadError>(())
         })?;
         drop(taken);
         // A sum that was rounded may lie a little beyond the largest value.
         let (low, high) = (f64::from(f32::MIN), f64::from(f32::MAX));
         sums.par_iter_mut().for_each(|v| *v = (self.outside + 2.0 * f64::from(*v)).clamp(low, high) as f32);
         Ok(sums)
+    }
+
+    /// Refuses bodies of that volume together which overlap so often that most of the work would be for nothing.
+    fn check_work(&self, (points, bodies): (&[DVec3], &[Body<'_>]), volume: f64) -> Result<(), ReadError> {
+        let place = |corner: u32| (points[corner as usize] - self.low, 0.0);
+        let mut rows = 0.0;
+        for body in bodies {
+            body.part(&place, |t| {
+                let (low, high) = t.iter().fold((t[0].0, t[0].0), |(l, h), (p, _)| (l.min(*p), h.max(*p)));
+                let across = ((high - low) / self.sample).ceil() + 1.0;
+                rows += across.y * across.z;
+            });
+        }
+        let all = self.dims.iter().map(|n| (n * SAMPLES) as f64).product::<f64>();
+        let work = rows + volume / self.sample.element_product();
+        if work <= FREE_WORK.max(MOST_WORK * all) {
+            return Ok(());
+        }
+        let bounds = self.sample.element_product() * all;
+        let found = format!(
+            "{} whose volumes are {:.0} times that of their bounds",
+            counted(bodies.len() as u64, "cell"),
+            volume / bounds
+        );
+        let hint = "remove the cells that lie on others, or draw pieces of the dataset one by one";
+        Err(ReadError::limit("cells that lie side by side", found, hint))
     }
 
     /// Takes the samples that lie within a tetrahedron and in no body before it.

@@ -112,7 +112,7 @@ impl Columns {
         let all = scans.iter().try_fold(0u64, |n, scan| n.checked_add(scan.points)).unwrap_or(u64::MAX);
         let some = has.iter().zip([12, 12, 4]).filter(|(has, _)| **has).map(|(_, bytes)| bytes).sum::<u64>();
         let bytes = 36 + extras.bytes_per_point() + some;
-        input::check_bytes("the points", all.saturating_mul(bytes), reading.params)?;
+        input::hold("the points", all.saturating_mul(bytes), reading.params)?;
         let (positions, points) = (Vec::new(), RawPoints::default());
         Ok(Self { extras, names, positions, points, has, scans: 0, without: [0; 3] })
     }

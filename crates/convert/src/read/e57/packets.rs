@@ -35,6 +35,7 @@ pub(super) fn streams(scan: &Scan, pages: &Pages, reading: &Reading<'_>) -> Resu
     let end = end.filter(|end| *end <= bytes.len());
     let end = end.ok_or_else(|| damaged(at, "a section within the file", format!("one of {} bytes", number(8))))?;
     let mut packet = pages.place(number(16), at)?;
+    let mut held = input::Growing::new("the bits of a scan");
     // Every packet brings bytes, and they are taken once: the fields have no more together than the file.
     while lacks(scan, &streams) {
         let head = bytes[..end].get(packet..).and_then(|rest| rest.first_chunk::<HEAD>());
@@ -45,7 +46,11 @@ pub(super) fn streams(scan: &Scan, pages: &Pages, reading: &Reading<'_>) -> Resu
             damaged(pages.byte(packet), "a packet within its section", format!("one of {length} bytes"))
         })?;
         match head[0] {
-            DATA => take(whole, pages.byte(packet), &mut streams, reading)?,
+            DATA => {
+                let before: usize = streams.iter().map(Vec::len).sum();
+                held.hold((before + whole.len()) as u64, reading.params)?;
+                take(whole, pages.byte(packet), &mut streams)?;
+            }
             INDEX | IGNORED => {}
             other => return Err(damaged(pages.byte(packet), "a packet of kind 0, 1 or 2", other.to_string())),
         }
@@ -74,7 +79,7 @@ fn lacking(scan: &Scan, streams: &[Vec<u8>], byte: u64) -> ReadError {
 }
 
 /// Takes the pieces of a packet.
-fn take(packet: &[u8], byte: u64, streams: &mut [Vec<u8>], reading: &Reading<'_>) -> Result<(), ReadError> {
+fn take(packet: &[u8], byte: u64, streams: &mut [Vec<u8>]) -> Result<(), ReadError> {
     let count = packet.get(4..HEAD).map_or(0, |n| usize::from(n[0]) | usize::from(n[1]) << 8);
     if count != streams.len() {
         return Err(damaged(byte, format!("a packet of {} fields", streams.len()), count.to_string()));
@@ -84,7 +89,6 @@ fn take(packet: &[u8], byte: u64, streams: &mut [Vec<u8>], reading: &Reading<'_>
         let size = packet.get(HEAD + 2 * i..HEAD + 2 * i + 2).map(|n| usize::from(n[0]) | usize::from(n[1]) << 8);
         let piece = size.and_then(|size| packet.get(at..at + size));
         let piece = piece.ok_or_else(|| damaged(byte, format!("field {i} within its packet"), "a longer one"))?;
-        input::check_bytes("the points", (stream.len() + piece.len()) as u64, reading.params)?;
         input::reserve(stream, piece.len())?;
         stream.extend_from_slice(piece);
         at += piece.len();

@@ -2,9 +2,10 @@
 
 use super::damaged;
 use crate::error::ReadError;
-use crate::read::input;
+use crate::read::input::{self, Content};
 use crate::read::reading::Reading;
 use rayon::prelude::*;
+use splat_core::Reservation;
 
 /// Bytes of the header of the file.
 const HEADER: usize = 48;
@@ -12,6 +13,8 @@ const HEADER: usize = 48;
 const SUM: usize = 4;
 /// Sizes of pages that are taken; writers write 1024.
 const SIZES: std::ops::RangeInclusive<usize> = 64..=1 << 20;
+/// Bytes that a byte of the description takes as a tree, at most.
+const DESCRIBED: u64 = 16;
 /// Pages that one task checks.
 const TASK: usize = 64;
 
@@ -22,11 +25,14 @@ pub(super) struct Pages {
     size: usize,
     /// Where the description lies in the bytes.
     pub(super) description: std::ops::Range<usize>,
+    /// For as long as the bytes are there.
+    _held: Reservation,
 }
 
 impl Pages {
     /// Checks the header and the sums of a file.
-    pub(super) fn new(mut content: Vec<u8>, reading: &Reading<'_>) -> Result<Self, ReadError> {
+    pub(super) fn new(content: Content, reading: &Reading<'_>) -> Result<Self, ReadError> {
+        let (mut content, held) = content.into_parts();
         let Some(header) = content.first_chunk::<HEADER>() else {
             return Err(damaged(0, format!("a header of {HEADER} bytes"), format!("{} bytes", content.len())));
         };
@@ -58,7 +64,7 @@ impl Pages {
             content.copy_within(page * size..(page + 1) * size - SUM, page * (size - SUM));
         }
         content.truncate(pages * (size - SUM));
-        let mut all = Self { bytes: content, size, description: 0..0 };
+        let mut all = Self { bytes: content, size, description: 0..0, _held: held };
         let start = all.place(place, 24)?;
         let end = usize::try_from(description).ok().and_then(|n| start.checked_add(n));
         let end = end.filter(|end| *end <= all.bytes.len());
@@ -67,7 +73,7 @@ impl Pages {
             ..end.ok_or_else(|| {
                 damaged(32, format!("a description of at most {left} bytes"), description.to_string())
             })?;
-        input::check_bytes("the description", description, reading.params)?;
+        input::hold("the description", description.saturating_mul(DESCRIBED), reading.params)?;
         Ok(all)
     }
 

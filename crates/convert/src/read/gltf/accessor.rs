@@ -4,8 +4,9 @@ use super::document::{Accessor, Document, Stored};
 use super::{HINT, wrong};
 use crate::error::ReadError;
 use crate::read::beside::{self, Beside};
-use crate::read::input;
+use crate::read::input::{self, Content};
 use crate::read::reading::Reading;
+use splat_core::Reservation;
 use std::borrow::Cow;
 
 const I8: u32 = 5120;
@@ -21,6 +22,8 @@ pub(super) struct Buffers<'a> {
     bytes: Vec<Cow<'a, [u8]>>,
     /// Bytes of all of them.
     total: u64,
+    /// Memory of those that were fetched.
+    held: Vec<Reservation>,
 }
 
 /// Numbers of an accessor as they lie in its buffer.
@@ -39,13 +42,17 @@ impl<'a> Buffers<'a> {
         beside: &Beside<'_>,
         reading: &Reading<'_>,
     ) -> Result<Self, ReadError> {
-        let mut buffers = Self { document, bytes: Vec::new(), total: 0 };
+        let mut buffers = Self { document, bytes: Vec::new(), total: 0, held: Vec::new() };
         for (i, buffer) in document.buffers.iter().enumerate() {
             reading.go_on()?;
             let mut bytes = match (&buffer.uri, binary) {
                 (None, Some(binary)) if i == 0 => Cow::Borrowed(binary),
                 (None, _) => return Err(wrong(format!("bytes of buffer {i}"), "neither a chunk nor a uri".into())),
-                (Some(uri), _) => Cow::Owned(fetch(uri, &format!("buffer {i}"), beside, reading)?),
+                (Some(uri), _) => {
+                    let (fetched, held) = fetch(uri, &format!("buffer {i}"), beside, reading)?.into_parts();
+                    buffers.held.push(held);
+                    Cow::Owned(fetched)
+                }
             };
             if bytes.len() < buffer.byte_length {
                 let expected = format!("buffer {i} of {} bytes", buffer.byte_length);
@@ -56,7 +63,6 @@ impl<'a> Buffers<'a> {
                 Cow::Owned(all) => all.truncate(buffer.byte_length),
             }
             buffers.total += bytes.len() as u64;
-            input::check_bytes("the buffers", buffers.total, reading.params)?;
             buffers.bytes.push(bytes);
         }
         Ok(buffers)
@@ -77,6 +83,13 @@ impl<'a> Buffers<'a> {
     fn accessor(&self, index: usize) -> Result<&'a Accessor, ReadError> {
         let all = &self.document.accessors;
         all.get(index).ok_or_else(|| missing("accessor", index, all.len()))
+    }
+
+    /// Entries that the accessor says that it has; none of one that is not there, or of which its reader says that the file cannot have as
+    /// many.
+    pub(super) fn count(&self, index: usize) -> u64 {
+        let count = self.document.accessors.get(index).map_or(0, |accessor| accessor.count as u64);
+        if input::check_packed(count, self.total, "glTF").is_ok() { count } else { 0 }
     }
 
     /// Numbers an entry of the accessor has.
@@ -191,7 +204,7 @@ impl<'a> Buffers<'a> {
 }
 
 /// The bytes that a uri stands for: base64 in itself, or a file in the folder of the description.
-pub(super) fn fetch(uri: &str, what: &str, beside: &Beside<'_>, reading: &Reading<'_>) -> Result<Vec<u8>, ReadError> {
+pub(super) fn fetch(uri: &str, what: &str, beside: &Beside<'_>, reading: &Reading<'_>) -> Result<Content, ReadError> {
     use base64::Engine as _;
     use base64::engine::general_purpose::STANDARD;
     let Some(data) = uri.strip_prefix("data:") else {
@@ -199,8 +212,12 @@ pub(super) fn fetch(uri: &str, what: &str, beside: &Beside<'_>, reading: &Readin
     };
     let encoded = data.split_once(";base64,").map(|(_, encoded)| encoded);
     let encoded = encoded.ok_or_else(|| wrong(format!("base64 in the uri of {what}"), "another encoding".into()))?;
-    input::check_bytes(what, encoded.len() as u64, reading.params)?;
-    STANDARD.decode(encoded).map_err(|e| wrong(format!("base64 in the uri of {what}"), e.to_string()))
+    let held = reading.params.memory.take(what, encoded.len() as u64)?;
+    let mut bytes = Vec::new();
+    input::reserve(&mut bytes, encoded.len())?;
+    let decoded = STANDARD.decode_vec(encoded, &mut bytes);
+    decoded.map_err(|e| wrong(format!("base64 in the uri of {what}"), e.to_string()))?;
+    Ok(Content::new(bytes, held))
 }
 
 pub(super) fn missing(what: &str, index: usize, count: usize) -> ReadError {

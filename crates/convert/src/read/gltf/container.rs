@@ -13,6 +13,8 @@ const JSON: &[u8; 4] = b"JSON";
 const BINARY: &[u8; 4] = b"BIN\0";
 /// Most bytes that an object of the JSON takes as a value of [`Document`].
 const BYTES_PER_OBJECT: u64 = 512;
+/// Bytes that a character of it takes at most: a digit and a comma are a number of 8 bytes in a list with room for as many again.
+const BYTES_PER_CHARACTER: u64 = 8;
 
 /// The description, and the bytes that come with it.
 pub(super) fn open<'a>(content: &'a [u8], params: &ReadParams) -> Result<(Document, Option<&'a [u8]>), ReadError> {
@@ -68,8 +70,8 @@ fn chunk(content: &[u8], at: usize) -> Result<(&[u8; 4], &[u8]), ReadError> {
 /// Parses the JSON that begins at byte `start` of the file, 0 where it is all of it.
 fn document(json: &[u8], start: usize, params: &ReadParams) -> Result<Document, ReadError> {
     let objects = json.iter().filter(|b| **b == b'{').count() as u64;
-    let bytes = objects.saturating_mul(BYTES_PER_OBJECT).saturating_add(json.len() as u64);
-    input::check_bytes("the description", bytes, params)?;
+    let bytes = objects.saturating_mul(BYTES_PER_OBJECT).saturating_add(json.len() as u64 * BYTES_PER_CHARACTER);
+    input::hold("the description", bytes, params)?;
     let text = json.strip_prefix(b"\xef\xbb\xbf").unwrap_or(json);
     let document: Document = serde_json::from_slice(text).map_err(|e| {
         let (line, column) = (e.line(), e.column());

@@ -1,15 +1,16 @@
 //! Materials: base colour, its texture, and what of them a mesh has no place for.
 
 use super::accessor::{Buffers, fetch, missing};
-use super::document::{Document, Material, TextureOf};
+use super::document::{Document, Image, Material, TextureOf};
 use super::wrong;
 use crate::error::{Fault, ReadError};
-use crate::read::beside::Beside;
+use crate::read::beside::{self, Beside};
 use crate::read::paint::Paint;
 use crate::read::reading::Reading;
 use crate::read::texture::{Texture, Wrap};
 use splat_core::glam::{Mat2, Vec2};
 use std::collections::BTreeMap;
+use std::path::PathBuf;
 
 const NEAREST: u32 = 9728;
 const CLAMP: u32 = 33_071;
@@ -42,12 +43,25 @@ pub(super) struct Paints<'a> {
     known: BTreeMap<Option<usize>, (u32, Option<Coordinates>)>,
     /// Ranks of textures; `None` for those that are not there.
     decoded: BTreeMap<usize, Option<usize>>,
+    /// Images that were decoded, by where their bytes come from.
+    images: BTreeMap<Origin<'a>, Texture>,
+}
+
+/// Where the bytes of an image come from, whatever refers to them.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+enum Origin<'a> {
+    /// A buffer, the first byte and the length.
+    Buffer(usize, usize, usize),
+    /// Written into the description.
+    Text(&'a str),
+    File(PathBuf),
 }
 
 impl<'a> Paints<'a> {
     pub(super) fn new(document: &'a Document, buffers: &'a Buffers<'a>, beside: &'a Beside<'a>) -> Self {
         let (paints, textures) = (Vec::new(), Vec::new());
-        Self { document, buffers, beside, paints, textures, known: BTreeMap::new(), decoded: BTreeMap::new() }
+        let (known, decoded, images) = (BTreeMap::new(), BTreeMap::new(), BTreeMap::new());
+        Self { document, buffers, beside, paints, textures, known, decoded, images }
     }
 
     /// Rank of the paint of a material, which the same without its texture follows; and the coordinates of the texture.
@@ -127,10 +141,14 @@ impl<'a> Paints<'a> {
     }
 
     /// The decoded image; `None` where its file is missing, which a remark says.
-    fn image(&self, index: usize, reading: &mut Reading<'_>) -> Result<Option<Texture>, ReadError> {
+    fn image(&mut self, index: usize, reading: &mut Reading<'_>) -> Result<Option<Texture>, ReadError> {
         let all = &self.document.images;
         let image = all.get(index).ok_or_else(|| missing("image", index, all.len()))?;
         let what = format!("image {index}");
+        let origin = self.origin(image);
+        if let Some(known) = origin.as_ref().and_then(|origin| self.images.get(origin)) {
+            return Ok(Some(known.clone()));
+        }
         let decoded = match (&image.uri, image.buffer_view) {
             (_, Some(view)) => Texture::decode(self.buffers.view(view)?, &what, reading)?,
             (Some(uri), None) => match fetch(uri, &what, self.beside, reading) {
@@ -143,7 +161,23 @@ impl<'a> Paints<'a> {
             },
             (None, None) => return Err(wrong(format!("bytes of {what}"), "neither a uri nor a buffer view".into())),
         };
+        if let Some(origin) = origin {
+            self.images.insert(origin, decoded.clone());
+        }
         Ok(Some(decoded))
+    }
+
+    /// Where the bytes of an image come from; `None` where they are not there, which fetching them says.
+    fn origin(&self, image: &'a Image) -> Option<Origin<'a>> {
+        match (&image.uri, image.buffer_view) {
+            (_, Some(view)) => {
+                let view = self.document.buffer_views.get(view)?;
+                Some(Origin::Buffer(view.buffer, view.byte_offset, view.byte_length))
+            }
+            (Some(uri), None) if uri.starts_with("data:") => Some(Origin::Text(uri)),
+            (Some(uri), None) => self.beside.real(&beside::from_uri(uri)).map(Origin::File),
+            (None, None) => None,
+        }
     }
 }
 

@@ -17,8 +17,11 @@ const STRIP: u32 = 5;
 const FAN: u32 = 6;
 
 /// Bytes that a vertex and a triangle take while they are read and converted.
-const BYTES_PER_VERTEX: u64 = 24 + 12 + 12 + 4 + 16 + 8 + 12;
+pub(super) const BYTES_PER_VERTEX: u64 = 24 + 12 + 12 + 4 + 16 + 8 + 12;
 const BYTES_PER_TRIANGLE: u64 = 12;
+/// Bytes that a vertex and an index of one primitive take beside them: as stored and as they are in the scene.
+const BYTES_PER_OWN_VERTEX: u64 = (12 + 24) + 2 * (12 + 16 + 8);
+const BYTES_PER_INDEX: u64 = 4 + 12;
 
 /// All triangles or points of a scene, in its coordinates.
 #[derive(Default)]
@@ -50,6 +53,10 @@ impl Surface {
         paints: &mut Paints<'_>,
         reading: &mut Reading<'_>,
     ) -> Result<(), ReadError> {
+        let counts = primitive.attributes.values().map(|index| buffers.count(*index));
+        let of_vertices = counts.max().unwrap_or(0).saturating_mul(BYTES_PER_OWN_VERTEX);
+        let of_indices = primitive.indices.map_or(0, |index| buffers.count(index).saturating_mul(BYTES_PER_INDEX));
+        let _held = reading.params.memory.take("a primitive", of_vertices.saturating_add(of_indices))?;
         let vertices = vertices(primitive, scene_from_mesh, buffers, paints, reading)?;
         let mode = primitive.mode.unwrap_or(TRIANGLES);
         let count = vertices.position.len();
@@ -69,7 +76,7 @@ impl Surface {
             triangles.iter_mut().for_each(|t| t.swap(1, 2));
         }
         let room = (self.triangles.len() + triangles.len()) as u64 * BYTES_PER_TRIANGLE;
-        input::check_bytes("the triangles", room, reading.params)?;
+        input::hold("the triangles", room, reading.params)?;
         input::reserve(&mut self.triangles, triangles.len())?;
         if vertices.normal.is_some() {
             let first = self.append(&vertices, 0..count as u32, reading)?;
@@ -97,7 +104,7 @@ impl Surface {
     ) -> Result<u32, ReadError> {
         let first = self.position.len();
         let count = order.clone().count();
-        input::check_bytes("the vertices", (first + count) as u64 * BYTES_PER_VERTEX, reading.params)?;
+        input::hold("the vertices", (first + count) as u64 * BYTES_PER_VERTEX, reading.params)?;
         if first + count > u32::MAX as usize {
             return Err(wrong("fewer than 2^32 vertices".into(), (first + count).to_string()));
         }
@@ -118,6 +125,14 @@ impl Surface {
         self.is_tinted |= vertices.tint.is_some();
         Ok(first as u32)
     }
+}
+
+/// Vertices that a primitive says that it adds to a scene.
+pub(super) fn vertices_of(primitive: &Primitive, buffers: &Buffers<'_>) -> u64 {
+    let stored = primitive.attributes.get("POSITION").map_or(0, |index| buffers.count(*index));
+    let indices = primitive.indices.map_or(stored, |index| buffers.count(index));
+    // Without normals each triangle has corners of its own; strips and fans have more of them than indices.
+    if primitive.attributes.contains_key("NORMAL") { stored } else { indices }
 }
 
 fn vertices(

@@ -11,6 +11,10 @@ use splat_core::Mesh;
 use splat_core::glam::Vec3;
 use std::collections::HashMap;
 
+/// Bytes that a vertex and a triangle of the surface without materials take, while it is parted at sharp edges and its normals are found.
+const BYTES_PER_WHOLE_VERTEX: u64 = 12 + 25 + 12;
+const BYTES_PER_WHOLE_TRIANGLE: u64 = 12 + 48 + 3 * 36;
+
 /// The mesh with the colours of its materials.
 pub(super) fn painted(
     mut mesh: Mesh,
@@ -38,12 +42,14 @@ pub(super) fn painted(
 /// sharp edge becomes several.
 fn smooth(mesh: &mut Mesh, corners: &mut Vec<Corner>, reading: &Reading<'_>) -> Result<(), ReadError> {
     let count = corners.iter().map(|c| c[0] as usize + 1).max().unwrap_or(0);
+    let bytes = count as u64 * BYTES_PER_WHOLE_VERTEX + mesh.triangles.len() as u64 * BYTES_PER_WHOLE_TRIANGLE;
+    input::hold("the surface without materials", bytes, reading.params)?;
     let mut whole = Mesh { position: vec![Vec3::ZERO; count], ..Mesh::default() };
     corners.iter().zip(&mesh.position).for_each(|(c, p)| whole.position[c[0] as usize] = *p);
     whole.triangles = mesh.triangles.iter().map(|t| t.map(|v| corners[v as usize][0])).collect();
     part_at_creases(&mut whole);
     let more = 3 * (whole.position.len() - count) as u64;
-    input::check_bytes("the corners", (corners.len() as u64 + more) * BYTES_PER_CORNER, reading.params)?;
+    input::hold("the corners", (corners.len() as u64 + more) * BYTES_PER_CORNER, reading.params)?;
     let mut side_of: Vec<Option<u32>> = vec![None; mesh.position.len()];
     let mut further: HashMap<[u32; 2], u32> = HashMap::new();
     for (ids, sides) in mesh.triangles.iter_mut().zip(&whole.triangles) {

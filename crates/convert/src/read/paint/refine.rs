@@ -24,6 +24,8 @@ const TOLERANCE: f32 = 1.0 / 32.0;
 const MOST: usize = 2 << 20;
 /// Bytes that a triangle takes meanwhile, its share of vertices included.
 const BYTES_PER_TRIANGLE: u64 = 120;
+/// Bytes that a vertex of a divided mesh takes in the end, its place, normal, tint, place in the texture, paint and colours.
+const BYTES_PER_VERTEX: u64 = 12 + 12 + 16 + 8 + 4 + super::BYTES_PER_COLOR;
 /// Triangles looked at by one task.
 const CHUNK: usize = 256;
 
@@ -44,7 +46,7 @@ pub(super) fn refine(mesh: &mut Mesh, painting: &mut Painting, reading: &mut Rea
         }
         let count: usize = mesh.triangles.iter().map(|t| 1 + halved(t, &edges).iter().flatten().count()).sum();
         let bytes = (count as u64).saturating_mul(BYTES_PER_TRIANGLE);
-        if count > MOST || input::check_bytes("the triangles", bytes, reading.params).is_err() {
+        if count > MOST || input::hold("the divided triangles", bytes, reading.params).is_err() {
             break Some(too_long.unwrap_or(longest));
         }
         add_middles(mesh, painting, &edges);
@@ -52,6 +54,10 @@ pub(super) fn refine(mesh: &mut Mesh, painting: &mut Painting, reading: &mut Rea
         (edges, longest) = wanted(mesh, painting, &is_new);
     };
     let after = mesh.triangles.len();
+    if after > before {
+        let bytes = after as u64 * 12 + mesh.position.len() as u64 * BYTES_PER_VERTEX;
+        input::hold("the divided triangles", bytes, reading.params)?;
+    }
     if after > before {
         reading
             .notes

@@ -36,6 +36,8 @@ pub(super) struct Columns {
     /// Points that the file marks as none.
     without_place: u64,
     place: Place,
+    /// Memory of points that come one by one.
+    held: input::Growing,
 }
 
 impl Columns {
@@ -88,6 +90,7 @@ impl Columns {
             has_alpha: false,
             without_place: 0,
             place: header.place_of_fields,
+            held: input::Growing::new("the points"),
         })
     }
 
@@ -99,7 +102,7 @@ impl Columns {
 
     /// Room for all points, which the file is known to hold.
     pub(super) fn reserve(&mut self, points: u64, reading: &Reading<'_>) -> Result<(), ReadError> {
-        input::check_bytes("the points", points.saturating_mul(self.bytes_per_point()), reading.params)?;
+        input::hold("the points", points.saturating_mul(self.bytes_per_point()), reading.params)?;
         let n = points as usize;
         let of = |has: bool| if has { n } else { 0 };
         self.extras.reserve(n)?;
@@ -112,7 +115,7 @@ impl Columns {
 
     /// Room for one point after `before`.
     pub(super) fn reserve_one(&mut self, before: u64, reading: &Reading<'_>) -> Result<(), ReadError> {
-        input::check_bytes("the points", (before + 1).saturating_mul(self.bytes_per_point()), reading.params)?;
+        self.held.hold((before + 1).saturating_mul(self.bytes_per_point()), reading.params)?;
         input::reserve(&mut self.positions, 1)
     }
 

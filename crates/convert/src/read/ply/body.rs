@@ -88,7 +88,7 @@ fn read_vertices<S: Source>(
     columns: &mut Columns,
     reading: &Reading<'_>,
 ) -> Result<(), ReadError> {
-    input::check_bytes("the vertices", element.count.saturating_mul(columns.bytes_per_vertex()), reading.params)?;
+    input::hold("the vertices", element.count.saturating_mul(columns.bytes_per_vertex()), reading.params)?;
     columns.reserve(element.count as usize)?;
     for record in 0..element.count {
         look(record, reading)?;

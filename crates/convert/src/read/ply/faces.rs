@@ -27,6 +27,8 @@ pub(super) struct Faces {
     line: u64,
     /// Vertices of the file.
     vertices: u64,
+    /// Memory of the triangles.
+    held: input::Growing,
 }
 
 /// The number after which a strip begins anew, also as an unsigned number of 32 bits.
@@ -34,7 +36,13 @@ const RESTART: [f64; 2] = [-1.0, u32::MAX as f64];
 
 impl Faces {
     pub(super) fn new(vertices: u64) -> Self {
-        Self { triangles: Vec::new(), polygons: Vec::new(), line: 0, vertices }
+        Self {
+            triangles: Vec::new(),
+            polygons: Vec::new(),
+            line: 0,
+            vertices,
+            held: input::Growing::new("the triangles"),
+        }
     }
 
     /// Reads one element of faces.
@@ -58,8 +66,7 @@ impl Faces {
             return Err(ReadError::input(at_line(indices.line), "a list of integers", "another type", hint));
         }
         if form == Form::Polygons {
-            input::check_bytes("the faces", element.count.saturating_mul(12), reading.params)?;
-            input::reserve(&mut self.triangles, element.count as usize)?;
+            self.room(element.count, reading)?;
             self.line = element.line;
         }
         for record in 0..element.count {
@@ -166,7 +173,7 @@ impl Faces {
     fn room(&mut self, more: u64, reading: &Reading<'_>) -> Result<(), ReadError> {
         let total = (self.triangles.len() as u64).saturating_add(more);
         let bytes = total.saturating_mul(12).saturating_add((self.polygons.len() * size_of::<Polygon>()) as u64);
-        input::check_bytes("the triangles", bytes, reading.params)?;
+        self.held.hold(bytes, reading.params)?;
         input::reserve(&mut self.triangles, more as usize)
     }
 

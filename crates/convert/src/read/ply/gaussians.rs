@@ -85,7 +85,7 @@ impl Slots {
 fn place_of(name: &[u8]) -> Option<usize> {
     if let Some(number) = name.strip_prefix(REST) {
         let number: usize = std::str::from_utf8(number).ok()?.parse().ok()?;
-        return (number < MOST_REST).then_some(NAMES.len() + number);
+        return (number < MOST_REST).then(|| NAMES.len() + number);
     }
     NAMES.iter().position(|n| n.as_bytes() == name)
 }
@@ -155,7 +155,8 @@ fn table<S: Source, T>(
     reading.notes.not_used(unused.map(|(p, _)| p.name.as_slice()));
     let mut all = Vec::new();
     let each = (size_of::<T>() * names.len()) as u64;
-    input::check_bytes("packed Gaussians", element.count.saturating_mul(each), reading.params)?;
+    let what = format!("the packed element '{}'", crate::error::escaped(&element.name, 40));
+    input::hold(&what, element.count.saturating_mul(each), reading.params)?;
     input::reserve(&mut all, element.count as usize * names.len())?;
     let mut row = vec![0.0; names.len()];
     for i in 0..element.count {

@@ -153,7 +153,7 @@ fn splats<S: Source>(
 ) -> Result<RawPoints, ReadError> {
     let columns = columns(element)?;
     let each = (2 * size_of::<Splat>()) as u64;
-    input::check_bytes("the splats", element.count.saturating_mul(each), reading.params)?;
+    input::hold("the splats", element.count.saturating_mul(each), reading.params)?;
     let mut cloud = Cloud::new(said.origin);
     let mut dropped = 0;
     for record in 0..element.count {
@@ -216,8 +216,9 @@ fn packed<S: Source>(
     };
     // A splat of the least bytes that one is packed into becomes a whole one.
     let most = element.count.div_ceil(LEAST_PACKED).saturating_mul(2 * size_of::<Splat>() as u64);
-    input::check_bytes("the splats", most, reading.params)?;
-    let mut bytes = Vec::with_capacity(element.count as usize);
+    input::hold("the splats", most.saturating_add(element.count), reading.params)?;
+    let mut bytes = Vec::new();
+    input::reserve(&mut bytes, element.count as usize)?;
     for record in 0..element.count {
         look(record, reading)?;
         source.begin_record()?;

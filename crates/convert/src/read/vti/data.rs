@@ -3,12 +3,13 @@
 use super::{HINT, place, wrong};
 use crate::counted::counted;
 use crate::error::{Place, ReadError};
+use crate::read::ReadParams;
+use crate::read::cells::Numbers;
 use crate::read::inflate::Inflate;
 use crate::read::input::{self, Stream};
 use crate::read::reading::Reading;
 use crate::read::text::Words;
 use crate::read::voxels::{self, Stored};
-use crate::read::{ReadParams, cells};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use roxmltree::Node;
@@ -130,23 +131,18 @@ impl<'a> Encoding<'a> {
     }
 
     /// So many numbers of an array, which has no more.
-    pub(super) fn numbers(
-        &self,
-        array: Node<'_, '_>,
-        count: u64,
-        reading: &Reading<'_>,
-    ) -> Result<Vec<f64>, ReadError> {
+    pub(super) fn numbers(&self, array: Node<'_, '_>, count: u64, reading: &Reading<'_>) -> Result<Numbers, ReadError> {
         let kind = super::kind(array)?;
         // Writers leave out the text of an array of none.
         if count == 0 {
-            return Ok(Vec::new());
+            return Numbers::room(0, reading);
         }
         let fits = count.checked_mul(kind.size()).filter(|bytes| *bytes <= MOST_BYTES);
         let bytes = fits.ok_or_else(|| wrong(array, "a number of values within the file", &count.to_string()))?;
         let mut words = match self.content_of(array, bytes, reading.params)? {
             Content::Bytes(bytes) => {
-                let mut numbers = cells::room(count, reading)?;
-                numbers.extend(kind.numbers(&bytes, self.big_endian));
+                let mut numbers = Numbers::room(count, reading)?;
+                numbers.all.extend(kind.numbers(&bytes, self.big_endian));
                 return Ok(numbers);
             }
             Content::Text(words) => words,
@@ -155,9 +151,9 @@ impl<'a> Encoding<'a> {
         if count > (words.left() as u64).div_ceil(2) {
             return Err(wrong(array, &counted(count, "number"), &words.count().to_string()));
         }
-        let mut numbers = cells::room(count, reading)?;
+        let mut numbers = Numbers::room(count, reading)?;
         for word in words.by_ref().take(count as usize) {
-            numbers.push(word.number()?);
+            numbers.all.push(word.number()?);
         }
         let (found, more) = (numbers.len() as u64, words.count() as u64);
         if found == count && more == 0 {
@@ -170,6 +166,11 @@ impl<'a> Encoding<'a> {
     fn content_of(&self, array: Node<'_, '_>, size: u64, params: &ReadParams) -> Result<Content<'a>, ReadError> {
         let format = array.attribute("format").unwrap_or("ascii");
         let is_appended = format == "appended";
+        if is_base64(format, self.appended.as_ref()) {
+            // The characters without blanks, and what they stand for.
+            let most = (self.content.len() as u64).min(size.saturating_mul(2));
+            input::hold("an array in base64", 2 * most, params)?;
+        }
         let mut source = match format {
             "ascii" | "binary" => {
                 let left = inline(array)?;
@@ -256,7 +257,7 @@ impl<'a> Encoding<'a> {
         let packed_bytes = sizes[3..].iter().try_fold(0u64, |n, s| n.checked_add(*s));
         let packed_bytes = packed_bytes.ok_or_else(|| source.wrong("blocks within the data", "longer ones"))?;
         let packed = source.take(packed_bytes)?;
-        input::check_bytes("the unpacked array", bytes, params)?;
+        input::hold("the unpacked array", bytes, params)?;
         input::check_packed(bytes, packed_bytes, "zlib")?;
         let mut unpacked = Vec::new();
         input::reserve(&mut unpacked, bytes as usize)?;
@@ -276,6 +277,11 @@ impl<'a> Encoding<'a> {
         }
         Ok(unpacked.into())
     }
+}
+
+/// Whether an array of that format is in base64.
+fn is_base64(format: &str, appended: Option<&(Range<usize>, bool)>) -> bool {
+    format == "binary" || format == "appended" && appended.is_some_and(|(_, is_base64)| *is_base64)
 }
 
 impl<'a> Source<'a> {

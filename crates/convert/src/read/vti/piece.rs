@@ -5,8 +5,7 @@ use super::{arrays, child, chosen, components, kind, name, not_used, place, sele
 use crate::counted::counted;
 use crate::error::ReadError;
 use crate::read::Loaded;
-use crate::read::cells::{self, Cells, Field, Lists, PointColumns};
-use crate::read::input;
+use crate::read::cells::{self, Cells, Field, Lists, Numbers, PointColumns};
 use crate::read::reading::Reading;
 use crate::read::voxels::Kind;
 use roxmltree::Node;
@@ -55,7 +54,7 @@ pub(super) fn read(
             let selection = selection(array, reading.params, &mut reading.notes)?;
             let numbers = joined(&pieces, array, &mut used, reading)?;
             let told = (name(array), !of_cells);
-            field = cells::field((&numbers, &selection), (&told.0, told.1), place(array), &mut reading.notes)?;
+            field = cells::field((&numbers, &selection), (&told.0, told.1), place(array), reading)?;
         }
     } else {
         let data = || pieces.iter().filter_map(|piece| child(piece.node, "PointData"));
@@ -76,9 +75,9 @@ fn joined<'a, 'i>(
     array: Node<'a, 'i>,
     used: &mut Vec<Node<'a, 'i>>,
     reading: &Reading<'_>,
-) -> Result<Vec<f64>, ReadError> {
+) -> Result<Numbers, ReadError> {
     let of = array.parent_element().map_or("", |data| data.tag_name().name());
-    let mut all = Vec::new();
+    let mut all = Numbers::room(0, reading)?;
     for piece in pieces {
         reading.go_on()?;
         let tuples = if of == "PointData" { piece.points } else { piece.cells };
@@ -103,13 +102,8 @@ fn joined<'a, 'i>(
             return Err(wrong(own, &expected, &found));
         }
         let more = piece.numbers(own, tuples, reading)?;
-        input::check_bytes(
-            "an array of all pieces",
-            ((all.len() + more.len()) * size_of::<f64>()) as u64,
-            reading.params,
-        )?;
-        input::reserve(&mut all, more.len())?;
-        all.extend(more);
+        all.reserve(more.len() as u64)?;
+        all.all.extend(&more.all);
     }
     Ok(all)
 }
@@ -143,7 +137,7 @@ impl<'a, 'i> Piece<'_, 'a, 'i> {
     }
 
     /// All numbers of an array of so many tuples.
-    fn numbers(&self, array: Node<'_, '_>, tuples: u64, reading: &Reading<'_>) -> Result<Vec<f64>, ReadError> {
+    fn numbers(&self, array: Node<'_, '_>, tuples: u64, reading: &Reading<'_>) -> Result<Numbers, ReadError> {
         let count = components(array)?.checked_mul(tuples);
         let count = count.ok_or_else(|| wrong(array, "a number of values within the file", &tuples.to_string()))?;
         self.encoding.numbers(array, count, reading)
@@ -162,7 +156,9 @@ impl<'a, 'i> Piece<'_, 'a, 'i> {
             return Err(wrong(points, "3 components of points", &components(points)?.to_string()));
         }
         used.push(points);
-        let places = cells::places(&self.numbers(points, self.count("NumberOfPoints")?, reading)?, place(points))?;
+        let numbers = self.numbers(points, self.count("NumberOfPoints")?, reading)?;
+        let places = cells::places(&numbers, place(points), reading)?;
+        drop(numbers);
         let mut cells = Cells { points: places, lists: Lists::default(), kinds: Vec::new(), place: place(self.node) };
         if self.node.parent_element().is_some_and(|dataset| dataset.has_tag_name("UnstructuredGrid")) {
             let element = child(self.node, "Cells").ok_or_else(|| wrong(self.node, "an element Cells", "none"))?;
@@ -202,6 +198,7 @@ impl<'a, 'i> Piece<'_, 'a, 'i> {
         // A negative one is 0 here, and refused as an end.
         let count = ends.last().map_or(0, |end| *end as u64);
         let corners = self.numbers(connectivity, count, reading)?;
+        cells::hold_lists(ends.len(), corners.len(), reading)?;
         Lists::ending(&ends, &corners, points, place(offsets))
     }
 }

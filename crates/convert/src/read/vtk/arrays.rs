@@ -3,7 +3,7 @@
 use super::{HINT, next, wrong};
 use crate::counted::counted;
 use crate::error::{Place, ReadError, escaped};
-use crate::read::cells;
+use crate::read::cells::Numbers;
 use crate::read::reading::Reading;
 use crate::read::text::{Line, Lines, Word, Words};
 use crate::read::voxels::Kind;
@@ -68,16 +68,16 @@ impl Array {
     }
 
     /// Its numbers.
-    pub(super) fn read(&self, content: &[u8], is_binary: bool, reading: &Reading<'_>) -> Result<Vec<f64>, ReadError> {
+    pub(super) fn read(&self, content: &[u8], is_binary: bool, reading: &Reading<'_>) -> Result<Numbers, ReadError> {
         // It was found to lie in the file.
         let count = self.numbers * self.tuples;
-        let mut numbers = cells::room(count, reading)?;
+        let mut numbers = Numbers::room(count, reading)?;
         if is_binary {
-            numbers.extend(self.kind.numbers(&content[self.data.clone()], true));
+            numbers.all.extend(self.kind.numbers(&content[self.data.clone()], true));
             return Ok(numbers);
         }
         for word in Words::new(content, self.data.start, self.line).take(count as usize) {
-            numbers.push(word.number()?);
+            numbers.all.push(word.number()?);
         }
         Ok(numbers)
     }

@@ -5,7 +5,7 @@ use super::arrays::{Array, Arrays, Of, Part, kind, whole};
 use super::{Dataset, HINT, next, wrong};
 use crate::error::{Place, ReadError, escaped};
 use crate::read::Loaded;
-use crate::read::cells::{self, Cells, Field, Lists, PointColumns};
+use crate::read::cells::{self, Cells, Field, Lists, Numbers, PointColumns};
 use crate::read::reading::Reading;
 use crate::read::selection::Selection;
 use crate::read::text::{Line, Lines, Word};
@@ -112,7 +112,7 @@ pub(super) fn read(
 }
 
 impl Source<'_> {
-    fn numbers(&self, array: &Array, reading: &Reading<'_>) -> Result<Vec<f64>, ReadError> {
+    fn numbers(&self, array: &Array, reading: &Reading<'_>) -> Result<Numbers, ReadError> {
         array.read(self.content, self.is_binary, reading)
     }
 
@@ -123,7 +123,7 @@ impl Source<'_> {
 
     fn cells(&self, dataset: Dataset, reading: &Reading<'_>) -> Result<Cells, ReadError> {
         let array = self.needed("POINTS")?;
-        let points = cells::places(&self.numbers(array, reading)?, array.place)?;
+        let points = cells::places(&self.numbers(array, reading)?, array.place, reading)?;
         let mut cells = Cells { points, lists: Lists::default(), kinds: Vec::new(), place: array.place };
         if dataset == Dataset::UnstructuredGrid {
             let lists = self.lists("CELLS", cells.points.len(), reading)?;
@@ -146,6 +146,7 @@ impl Source<'_> {
     fn lists(&self, name: &str, points: usize, reading: &Reading<'_>) -> Result<Option<(Lists, Place)>, ReadError> {
         if let Some(array) = self.arrays.part(name) {
             let numbers = self.numbers(array, reading)?;
+            cells::hold_lists(array.cells as usize, numbers.len(), reading)?;
             return Ok(Some((Lists::counted(&numbers, array.cells, points, array.place)?, array.place)));
         }
         let [ends, corners] = BY_ENDS.map(|part| self.arrays.part(&format!("{name}.{part}")));
@@ -158,12 +159,14 @@ impl Source<'_> {
                 Some(first) => Err(ReadError::input(ends.place, "OFFSETS from 0", first.to_string(), HINT)),
             };
         };
-        let lists = Lists::ending(rest, &self.numbers(corners, reading)?, points, corners.place)?;
+        let of_cells = self.numbers(corners, reading)?;
+        cells::hold_lists(rest.len(), of_cells.len(), reading)?;
+        let lists = Lists::ending(rest, &of_cells, points, corners.place)?;
         Ok(Some((lists, corners.place)))
     }
 
     /// The numbers of an array that has as many tuples as there are points.
-    fn of_points(&self, array: &Array, cells: &Cells, reading: &Reading<'_>) -> Result<Vec<f64>, ReadError> {
+    fn of_points(&self, array: &Array, cells: &Cells, reading: &Reading<'_>) -> Result<Numbers, ReadError> {
         cells::check_count((array.tuples, cells.points.len(), "points"), array.place)?;
         self.numbers(array, reading)
     }
@@ -183,9 +186,9 @@ impl Source<'_> {
         let mut numbers = self.numbers(array, reading)?;
         if self.is_of_shares(array) {
             // Shares have few digits, and stand for whole numbers.
-            numbers.iter_mut().for_each(|n| *n = (255.0 * *n).round());
+            numbers.all.iter_mut().for_each(|n| *n = (255.0 * *n).round());
         }
         let name = escaped(array.name.as_bytes(), 40);
-        cells::field((&numbers, &selection), (&name, of_points), array.place, &mut reading.notes)
+        cells::field((&numbers, &selection), (&name, of_points), array.place, reading)
     }
 }

@@ -10,7 +10,9 @@ use crate::scene::{RenderSettings, Scene};
 use crate::{Error, RenderOptions, printable};
 use pbsr::Ensemble;
 use sha2::{Digest, Sha256};
-use std::io;
+use splat_core::{Exceeded, MemoryAccount, Reservation};
+use std::fs::File;
+use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -36,15 +38,13 @@ impl Checkpoint {
         scene: &Scene,
         options: &RenderOptions,
         kept: Option<&Kept>,
+        memory: &MemoryAccount,
     ) -> Result<Self, Error> {
         // One that is there is replaced by what goes on from it.
         let target = Target::new(path, true)?;
         let tag = tag(scene, options, kept)?;
-        let found = match std::fs::read(path) {
-            Ok(bytes) => Some(Ensemble::from_bytes(&bytes, &tag).map_err(|e| foreign(path, &e))?),
-            Err(e) if e.kind() == io::ErrorKind::NotFound => None,
-            Err(e) => return Err(Error::io(path, "cannot read the checkpoint", e)),
-        };
+        let found = read(path, memory)?.map(|(bytes, _held)| Ensemble::from_bytes(&bytes, &tag));
+        let found = found.transpose().map_err(|e| foreign(path, &e))?;
         Ok(Self { target, tag, found, written: Instant::now(), pause: INTERVAL })
     }
 
@@ -66,6 +66,27 @@ impl Checkpoint {
         self.pause = INTERVAL.max(PATIENCE * start.elapsed());
         Ok(())
     }
+}
+
+/// The bytes of the file, for which and for whose sums memory is taken; `None` where there is none.
+fn read(path: &Path, memory: &MemoryAccount) -> Result<Option<(Vec<u8>, Reservation)>, Error> {
+    let fail = |e| Error::io(path, "cannot read the checkpoint", e);
+    let length = match std::fs::metadata(path) {
+        Err(e) if e.kind() == io::ErrorKind::NotFound => return Ok(None),
+        // A pipe or a device could block or never end.
+        Ok(meta) if !meta.is_file() => return Err(fail(io::Error::other("not a regular file"))),
+        meta => meta.map_err(fail)?.len(),
+    };
+    let what = format!("the checkpoint {}", printable(path));
+    let held = memory.take(&what, length.saturating_mul(2)).map_err(Error::Limit)?;
+    let mut bytes = Vec::new();
+    let none_left = |_| {
+        let hint = "name another --checkpoint, or use a smaller image".into();
+        Error::Limit(Exceeded { what: what.clone().into(), needed: length, limit: None, unit: "bytes", hint })
+    };
+    bytes.try_reserve_exact(length as usize).map_err(none_left)?;
+    File::open(path).and_then(|file| file.take(length).read_to_end(&mut bytes)).map_err(fail)?;
+    Ok(Some((bytes, held)))
 }
 
 fn foreign(path: &Path, error: &pbsr::Error) -> Error {

@@ -90,7 +90,7 @@ fn behind(frame: &Frame<'_>) -> Vec<Vec<[f32; 3]>> {
     (0..height).into_par_iter().map(row).collect()
 }
 
-fn fold_params(options: &RenderOptions) -> FoldParams {
+pub(super) fn fold_params(options: &RenderOptions) -> FoldParams {
     FoldParams { limits: Limits::bytes(options.max_memory / BATCH_SHARE), ..FoldParams::default() }
 }
 
