@@ -37,7 +37,8 @@ pub fn read(name: &str, data: &[u8]) {
     let valid = match &loaded {
         Loaded::Mesh(mesh) => mesh.validate(),
         Loaded::Points(points) => points.validate(),
-        Loaded::Grid(grid) => grid.validate(),
+        // Voxels may be NaN, which draws nothing.
+        Loaded::Grid(grid) => convert::gaps_of_value(grid, 0.0).as_ref().unwrap_or(grid).validate(),
         Loaded::Image(image) => image.validate(),
         _ => panic!("a kind that is not checked"),
     };

@@ -123,13 +123,13 @@ fn files_that_no_picture_can_be_made_of_are_refused_with_a_reason() {
     place.write("old.toml", "version = 1\n");
     std::fs::create_dir(place.path("folder")).unwrap();
     for (code, arguments, stderr) in [
-        (
-            4,
-            &["render", "missing.ply", "-o", "a.png"][..],
-            "missing.ply: cannot read: expected a file that can be read",
-        ),
+        (4, &["render", "missing.ply", "-o", "a.png"][..], "missing.ply: cannot read: no such file"),
         (4, &["render", "folder", "-o", "a.png"], "folder: cannot read: expected a regular file, found a directory"),
-        (3, &["render", "other.dat", "-o", "a.png"], "other.dat@0: expected 'ply'"),
+        (
+            3,
+            &["render", "other.dat", "-o", "a.png"],
+            "other.dat@0: expected a file of a format that is read, found a text of a format that neither",
+        ),
         (3, &["render", "nothing.ply", "-o", "a.png"], "nothing.ply@0: expected"),
         (3, &["render", "empty.xyz", "-o", "a.png"], "empty.xyz"),
         (3, &["render", "nan.xyz", "-o", "a.png"], "nan.xyz:"),
@@ -316,7 +316,7 @@ fn what_stands_on_the_plane_of_its_other_axes_points_up_along_the_third() {
     let place = Place::new("");
     let text = |file: &str| String::from_utf8(place.expect(0, &["info", file], "").stdout).unwrap();
     place.write("cone.obj", "v -1 -1 0\nv 1 -1 0\nv 0 1 0\nv 0 0 3\nf 1 2 4\nf 2 3 4\nf 3 1 4\nf 3 2 1\n");
-    assert!(text("cone.obj").contains("it stands on z = 0, so a first scene has z point up"));
+    assert!(text("cone.obj").contains("it stands along z, so a first scene has z point up"));
     place.expect(0, &["init", "cone.obj", "-o", "cone.toml"], "");
     assert!(String::from_utf8(place.bytes("cone.toml")).unwrap().contains("transform = { up = \"z\" }"));
     place.expect(0, &["init", "cone.obj", "--up", "y", "-o", "lying.toml"], "");
@@ -326,7 +326,7 @@ fn what_stands_on_the_plane_of_its_other_axes_points_up_along_the_third() {
     place.expect(0, &["init", "cone.obj", "beside.obj", "-o", "both.toml"], "");
     assert!(!String::from_utf8(place.bytes("both.toml")).unwrap().contains("up = "));
     place.write("hanging.obj", "v -1 -1 1\nv 1 -1 1\nv 0 1 1\nv 0 0 3\nf 1 2 4\nf 2 3 4\nf 3 1 4\nf 3 2 1\n");
-    assert!(text("hanging.obj").contains("y, which a scene takes unless it says another\n"));
+    assert!(text("hanging.obj").contains("y, as nothing in the file says another; --up of render and init turns it\n"));
 }
 
 #[test]

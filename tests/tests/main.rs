@@ -60,6 +60,7 @@ mod textured_lights;
 mod thick_media;
 mod triangles;
 mod truth;
+mod whole_fields;
 
 /// What takes long and rarely fails where the others hold: `cargo xtask deep`.
 mod deep {

@@ -67,3 +67,13 @@ fn objects_and_shadow_maps_are_stages_of_their_own() {
     ];
     assert_eq!(names, expected);
 }
+
+/// Grouping may take longer than all else: it is no part of the conversion before it.
+#[test]
+fn grouping_is_a_stage_of_its_own() {
+    let grouped = format!("{GLASS}[render.surfels]\nlayers = 'algorithm1'\ngroups = 4\ncoverage = 'enlarged'\n");
+    let names: Vec<String> =
+        stages(&grouped.replace("resolution = 48", "resolution = 12"), "surfels").into_iter().map(|s| s.0).collect();
+    let [converted, grouped] = ["converting glass", "grouping discs"].map(|name| names.iter().position(|n| n == name));
+    assert!(converted.is_some() && grouped == converted.map(|at| at + 1), "{names:?}");
+}

@@ -88,6 +88,9 @@ pub struct ReadError {
     pub fault: Fault,
 }
 
+/// What is expected under the name of a file that is not there.
+const A_FILE: &str = "a file";
+
 impl ReadError {
     /// The content is wrong; the file's name is added by [`ReadError::in_file`].
     pub(crate) fn input(
@@ -114,6 +117,16 @@ impl ReadError {
     /// The file system refused.
     pub(crate) fn file_system(expected: &str, found: impl Into<String>, hint: &'static str) -> Self {
         Self { fault: Fault::FileSystem, ..Self::input(Place::File, expected, found, hint) }
+    }
+
+    /// There is no file of that name.
+    pub(crate) fn missing() -> Self {
+        Self::file_system(A_FILE, "no such file", "check its name and folder")
+    }
+
+    /// Whether it is that there is no file of that name, and not one that the file names.
+    pub fn is_missing_file(&self) -> bool {
+        self.fault == Fault::FileSystem && self.expected == A_FILE
     }
 
     /// The same error with the name of the file, which must be escaped already.

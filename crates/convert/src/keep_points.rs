@@ -53,6 +53,7 @@ pub fn kept(points: &RawPoints, by: &[Kept], clips: &[Clip], up: DVec3) -> RawPo
         normal: chosen(&points.normal, &keeps),
         color: chosen(&points.color, &keeps),
         value: chosen(&points.value, &keeps),
+        is_intensity: points.is_intensity,
         opacity: chosen(&points.opacity, &keeps),
         classification: chosen(&points.classification, &keeps),
         columns: points

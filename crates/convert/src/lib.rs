@@ -36,6 +36,7 @@ mod convert_error;
 pub mod cost;
 mod counted;
 mod creases;
+mod degrees;
 #[cfg(feature = "surfels")]
 mod discs;
 mod domain;
@@ -48,6 +49,7 @@ mod field_points;
 mod footprints;
 #[cfg(feature = "surfels")]
 mod from_splats;
+mod gaps;
 #[cfg(feature = "surfels")]
 mod gaussian_points;
 mod grid_field;
@@ -121,6 +123,7 @@ pub use color_scale::{ColorScale, ScaleNumbers};
 pub use combine::{ClippedField, CombinedField, RegionField, SharedField};
 pub use convert_error::ConvertError;
 pub use creases::{crease_bytes, part_at_creases};
+pub use degrees::{looks_like_degrees, metres_of_degrees};
 #[cfg(feature = "surfels")]
 pub use discs::{DiscShape, DiscSize};
 #[cfg(feature = "read")]
@@ -132,6 +135,7 @@ pub use field_points::{
     surface_to_mesh, surface_to_points,
 };
 pub use footprints::FootprintChoice;
+pub use gaps::{gaps_of_value, gaps_outside, transparent_gaps};
 pub use grid_field::{GridField, Inside};
 pub use isosurface_spacing::isosurface_spacing;
 pub use keep_points::{Kept, Within, kept};

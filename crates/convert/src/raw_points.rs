@@ -20,6 +20,8 @@ pub struct RawPoints {
     pub color: Vec<[f32; 3]>,
     /// Physical values (intensity, temperature …), any finite number.
     pub value: Vec<f32>,
+    /// Whether the values are how much light came back, as LAS, LAZ, E57 and PCD have it: [`RawPoints::value_name`].
+    pub is_intensity: bool,
     /// Opacities of one crossing of the surface that the points are samples of, in \[0, 1\]; 1 is opaque.
     pub opacity: Vec<f32>,
     /// Classes as the file numbers them (LAS: 2 is ground, 5 high vegetation …).
@@ -159,10 +161,15 @@ impl RawPoints {
         }
     }
 
+    /// What its values are called in sentences and legends: `intensity` or `value`. [`RawPoints::column`] takes both names.
+    pub fn value_name(&self) -> &'static str {
+        if self.is_intensity { "intensity" } else { "value" }
+    }
+
     /// Which of the columns that are read in any case nobody asks for: `asked` are names as [`RawPoints::column`] takes them.
     pub fn not_asked_for<'a>(&'a self, asked: &'a [String]) -> impl Iterator<Item = &'static str> + 'a {
-        let columns = [("value", self.value.is_empty()), ("classification", self.classification.is_empty())];
-        let is_asked = |name: &str| asked.iter().any(|asked| unaliased(asked) == name);
+        let columns = [(self.value_name(), self.value.is_empty()), ("classification", self.classification.is_empty())];
+        let is_asked = |name: &str| asked.iter().any(|asked| unaliased(asked) == unaliased(name));
         columns.into_iter().filter(move |(name, is_empty)| !is_empty && !is_asked(name)).map(|(name, _)| name)
     }
 
@@ -179,7 +186,7 @@ impl RawPoints {
     /// Names that [`RawPoints::column`] knows for these points.
     pub fn column_names(&self) -> impl Iterator<Item = &str> {
         let some = [
-            ("value", !self.value.is_empty()),
+            (self.value_name(), !self.value.is_empty()),
             ("classification", !self.classification.is_empty()),
             ("opacity", !self.opacity.is_empty()),
         ];

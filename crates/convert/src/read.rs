@@ -120,13 +120,16 @@ mod xyz;
 #[cfg(feature = "las")]
 pub use laz::panic_is_input_error;
 pub use reading::{Fix, Mended, NamedColumn, Notes};
+pub use unread::is_foreign_json;
 pub use up::{UpAxis, stated_up_axis, up_axis};
 
+use crate::counted;
 use crate::error::{Place, ReadError, escaped, escaped_path};
 use crate::raw_points::RawPoints;
 use extras::LONGEST_NAME;
 use format::{Format, format_of, is_raw};
 use input::Stream;
+use rayon::prelude::*;
 use reading::Reading;
 use splat_core::glam::DVec3;
 use splat_core::{Grid, MemoryAccount, Mesh, Progress, RadianceImage};
@@ -151,6 +154,9 @@ pub struct ReadParams {
     /// Columns of points that are kept in [`RawPoints::columns`] beside those that have a meaning, each by its name in the file or by one
     /// that [`RawPoints::column`] knows. One that a file of points has not is an error that names those that it has.
     pub columns: Vec<String>,
+    /// Name of the array of a VTK file that is the volume's field; `None` for the one that the file names, else the first of one number a
+    /// point or cell. One that the file has not is an error that names those that it has, as one of another format is.
+    pub array: Option<String>,
     /// Whether points may become a medium: columns `smoothing_length`, `extinction` and `mass` are kept too, beside those that are kept of all
     /// points where there are such, `radius`, `tx`, `ty`, `tz`, `shadow_coefficient`, `footprint` and `material`. Numbers that these cannot have are refused, see
     /// [`crate::raw_to_matter`] and [`crate::raw_to_surfels`].
@@ -165,7 +171,7 @@ pub struct ReadParams {
 }
 
 impl Default for ReadParams {
-    /// 4 GiB, nothing dropped, what can be mended is mended, the first of a series, all points, no further columns, pictures in colours of a
+    /// 4 GiB, nothing dropped, what can be mended is mended, the first of a series, all points, no further columns, the first array, pictures in colours of a
     /// display.
     fn default() -> Self {
         Self {
@@ -175,6 +181,7 @@ impl Default for ReadParams {
             frame: 0,
             most_points: None,
             columns: Vec::new(),
+            array: None,
             matter: false,
             ranges: false,
             is_data: false,
@@ -265,8 +272,16 @@ fn whole(
         let (expected, found) = ("a series of volumes", "a file of another kind");
         return Err(ReadError::input(Place::File, expected, found, "leave out `frame`"));
     }
+    let has_array = matches!(loaded, Loaded::Grid(_)) && ["Vtk", "VtkXml"].contains(&reading.notes.format.as_str());
+    if let (Some(name), false) = (&reading.params.array, has_array) {
+        let found = format!("the array '{}', and a file without arrays", escaped(name.as_bytes(), LONGEST_NAME));
+        return Err(ReadError::input(Place::File, "a volume of VTK", found, "leave out `array`"));
+    }
     if let Loaded::Points(points) = &loaded {
         check_columns(points, reading)?;
+    }
+    if let Loaded::Grid(grid) = &loaded {
+        remark_gaps(grid, reading)?;
     }
     if let Loaded::Mesh(mut mesh) = loaded {
         input::hold("which parts the triangles make", mesh.position.len() as u64 * BYTES_PER_PART, reading.params)?;
@@ -279,6 +294,22 @@ fn whole(
         return Ok(Loaded::Mesh(mesh));
     }
     Ok(loaded)
+}
+
+/// Says how many voxels have no value, and refuses a volume of nothing else.
+fn remark_gaps(grid: &Grid, reading: &mut Reading<'_>) -> Result<(), ReadError> {
+    let gaps = grid.values.par_iter().filter(|value| value.is_nan()).count();
+    if gaps == 0 {
+        return Ok(());
+    }
+    let voxels = grid.values.len();
+    if gaps == voxels {
+        let hint = "the values are missing: write the file anew";
+        return Err(ReadError::input(Place::File, "a voxel with a value", "NaN in all of them", hint));
+    }
+    let of = counted::counted(voxels as u64, "voxel");
+    reading.notes.remark(format!("{gaps} of {of} are NaN: they draw nothing, and a slice has its first colour there"));
+    Ok(())
 }
 
 /// Refuses columns that were asked for and are not there; what is kept is no longer named as not used.
@@ -298,7 +329,7 @@ fn check_columns(points: &RawPoints, reading: &mut Reading<'_>) -> Result<(), Re
 }
 
 /// Bytes that tell the format.
-const MARK: usize = 512;
+const MARK: usize = 4096;
 
 /// `place` is where the file lies, for those that name another one.
 fn parse(

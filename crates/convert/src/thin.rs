@@ -58,6 +58,7 @@ pub fn thinned(points: &RawPoints, spacing: f64, params: &SplatParams) -> Result
         normal: mean(&points.normal).into_iter().map(Vec3::normalize_or_zero).collect(),
         color: mean(&color).into_iter().map(|c| c.to_array()).collect(),
         value: numbers(&points.value),
+        is_intensity: points.is_intensity,
         opacity: numbers(&points.opacity),
         classification: if points.classification.is_empty() { Vec::new() } else { ranges.iter().map(first).collect() },
         columns: points.columns.iter().map(column).collect(),

@@ -40,7 +40,7 @@ fn ba01_missing_files_directories_pipes_and_devices_are_the_file_systems_fault()
     let _ = std::fs::remove_file(&pipe);
     assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
     for (path, found) in [
-        (folder.join("missing.ply"), "No such file"),
+        (folder.join("missing.ply"), "no such file"),
         (folder.clone(), "a directory"),
         (pipe, "a pipe, socket or device"),
         (PathBuf::from("/dev/zero"), "a pipe, socket or device"),
@@ -61,7 +61,7 @@ fn ba02_empty_one_byte_and_header_only() {
     refused_with(
         "a.dat",
         b"1 2 3",
-        "a.dat@0: expected 'ply', 'LASF', 'ASTM-E57', 'NRRD', 'glTF', '# .PCD', '#?', a NIfTI-1, OpenEXR or PNG header, or the extension",
+        "a.dat@0: expected a file of a format that is read, found a text of a format that neither its name nor its beginning tells",
     );
     let text = ply_ascii();
     let header = text.split_inclusive("end_header\n").next().unwrap();
@@ -173,14 +173,14 @@ fn ba17_las_headers_that_contradict_themselves() {
 }
 
 #[test]
-fn ba18_one_nan_vertex_or_voxel_is_named() {
+fn ba18_one_nan_vertex_or_infinite_voxel_is_named() {
     let mut content = ply_binary(false);
     let body = content.windows(11).position(|w| w == b"end_header\n").unwrap() + 11;
     content[body + 1..body + 5].copy_from_slice(&f32::NAN.to_le_bytes());
     refused_with("a.ply", &content, &format!("a.ply@{}: expected a finite number, found NaN", body + 1));
     let mut content = nifti(NIFTI_F32, false);
-    content[352 + 8..352 + 12].copy_from_slice(&f32::NAN.to_le_bytes());
-    refused_with("a.nii", &content, "a.nii@360: expected finite values that fit 32-bit floats, found NaN at voxel 2");
+    content[352 + 8..352 + 12].copy_from_slice(&f32::INFINITY.to_le_bytes());
+    refused_with("a.nii", &content, "a.nii@360: expected values that fit 32-bit floats, found inf at voxel 2");
 }
 
 #[test]

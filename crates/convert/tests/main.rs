@@ -59,3 +59,4 @@ mod read_vtk;
 mod readme;
 mod splat_files;
 mod surface_field;
+mod true_words;

@@ -43,7 +43,7 @@ fn columns_of_text_are_kept_by_name_and_no_longer_unused() {
 #[test]
 fn a_column_that_is_not_there_is_refused_with_those_that_are() {
     let error = refused("a.csv", CSV, &["heat", "hue"]);
-    assert!(error.contains("expected a column among value, x, y, z, height, heat, label, found `hue`"), "{error}");
+    assert!(error.contains("expected a column among intensity, x, y, z, height, heat, label, found `hue`"), "{error}");
     let error = refused("a.csv", CSV, &["label"]);
     assert!(error.starts_with("a.csv:2:14: expected a number, found 'tree'"), "{error}");
     let error = refused("a.laz", &las(1, 9, true), &["gps_time"]);

@@ -94,6 +94,11 @@ fn every_reader_refuses_the_same_words_with_their_place() {
             if word == "#3" && matches!(name, "a.xyz" | "a.csv" | "a.obj") {
                 continue;
             }
+            // Voxels may be gaps, and a volume of nothing else is refused as a whole.
+            if word.ends_with("nan") && matches!(name, "a.nrrd" | "a.mha" | "a.vti" | "a.vtk") {
+                assert!(load(name, file(word, "\n").as_bytes()).unwrap_err().found.starts_with("NaN in all"), "{name}");
+                continue;
+            }
             let error = load(name, file(word, "\n").as_bytes()).unwrap_err();
             assert_eq!(error.place, Place::Line { line, column }, "{name}: {word}: {error}");
         }

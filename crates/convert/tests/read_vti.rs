@@ -40,7 +40,9 @@ fn the_active_array_is_read_else_the_first_and_others_are_named() {
     assert_eq!((grid.values, notes.unused), (vec![7.0; 12], vec!["density".to_owned()]));
     let (grid, notes) = read(&with(&[("Scalars=\"density\"", "Scalars=\"other\"")]));
     assert_eq!(grid.values, [7.0; 12]);
-    assert_eq!(notes.remarks, ["there is no array 'other', which Scalars names: the first one is read"]);
+    assert_eq!(notes.remarks[0], "there is no array 'other', which Scalars names: another is read");
+    let said = "the array mask is drawn; `array` of a scene or --color-by chooses another: density";
+    assert_eq!(notes.remarks[1..], [said]);
     let more =
         "</PointData>\n<CellData><DataArray type=\"Int8\" Name=\"c\" format=\"ascii\">1 2</DataArray></CellData>";
     let (_, notes) = read(&with(&[("</PointData>", more)]));
@@ -52,7 +54,7 @@ fn values_of_cells_lie_at_their_middles_and_are_said_to() {
     let content = with(&[("PointData", "CellData"), ("0 2 0 1 0 1", "5 8 -1 1 2 4")]);
     let (grid, notes) = read(&content);
     assert_eq!((grid.dims, &grid.values), ([3, 2, 2], &values()));
-    assert_eq!(notes.remarks, ["values of cells (density): they lie at the middles"]);
+    assert_eq!(notes.remarks[1..], ["values of cells (density): they lie at the middles"]);
     // Indices 5.5, −0.5 and 2.5 of steps (0, 3, 0), (−2, 0, 0) and (0, 0, 4).
     assert_eq!(grid.origin, DVec3::new(10.0 + 1.0, 20.0 + 16.5, -30.0 + 10.0));
     // An image of one slice has cells in its plane.
@@ -97,7 +99,7 @@ fn what_is_wrong_in_a_file_is_named() {
             "expected an element AppendedData at the end of the file",
         ),
         ("format=\"ascii\"", "format=\"octal\"", "expected format ascii, binary or appended"),
-        ("-1 -0.5", "-1 nan", "expected a finite decimal number, found 'nan'"),
+        ("-1 -0.5", "-1 inf", "expected a finite decimal number, found 'inf'"),
         ("-1 -0.5", "-1 1e39", "expected a value that fits a 32-bit float"),
         ("<?xml version=\"1.0\"?>", "<!DOCTYPE a [<!ENTITY b \"c\">]>", "expected XML"),
     ] {

@@ -49,7 +49,7 @@ impl Instance {
             info = info.enabled_layer_names(&layers).enabled_extension_names(&extensions).push_next(&mut features);
         }
         // SAFETY: everything that `info` points to outlives the call.
-        let raw = unsafe { entry.create_instance(&info, None) }.map_err(failure::of("vkCreateInstance"))?;
+        let raw = unsafe { entry.create_instance(&info, None) }.map_err(without_driver)?;
         let mut instance = Self { raw, watch: None, _entry: entry };
         if watched {
             instance.watch = Some(Watch::new(&instance._entry, &instance.raw)?);
@@ -61,6 +61,14 @@ impl Instance {
     pub(crate) fn take_messages(&self) -> Vec<String> {
         let Some(watch) = &self.watch else { return Vec::new() };
         std::mem::take(&mut *watch.messages.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+}
+
+/// A loader without any driver is as good as none.
+fn without_driver(result: vk::Result) -> DeviceError {
+    match result {
+        vk::Result::ERROR_INCOMPATIBLE_DRIVER => DeviceError::NoDevice { why: "no Vulkan driver".to_owned() },
+        result => failure::of("vkCreateInstance")(result),
     }
 }
 
@@ -115,5 +123,16 @@ impl Drop for Instance {
             }
             self.raw.destroy_instance(None);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_loader_without_drivers_is_no_failure_of_one() {
+        assert!(matches!(without_driver(vk::Result::ERROR_INCOMPATIBLE_DRIVER), DeviceError::NoDevice { .. }));
+        assert!(matches!(without_driver(vk::Result::ERROR_INITIALIZATION_FAILED), DeviceError::Driver { .. }));
     }
 }

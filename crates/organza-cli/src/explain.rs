@@ -5,7 +5,7 @@ use super::bar::with_bar;
 use super::given::given;
 use super::session::{parse_scene, path_text, processor_only, render_options};
 use super::{console, report};
-use organza::scene::{Scene, SceneObject};
+use organza::scene::{Scene, SceneObject, UpBy};
 use organza::{Error, escape_controls};
 use serde_json::{Value, json};
 
@@ -51,7 +51,7 @@ pub(super) fn run(arguments: &ExplainArguments) -> Result<(), Error> {
     }
     if let Some((memory, splats)) = prepared {
         text += &format!("\n{}\n", report::splats_text(&splats));
-        text += &format!("rendering takes at most {memory} bytes\n");
+        text += &format!("rendering takes at most {} of memory\n", report::bytes_text(memory));
     }
     console::out(&text)
 }
@@ -62,14 +62,21 @@ fn from_files(scene: &Scene) -> impl Iterator<Item = &SceneObject> {
 }
 
 fn up_json(scene: &Scene) -> Value {
-    from_files(scene).map(|o| json!({ "object": o.name, "axis": o.up.axis.name(), "by_file": o.up.by_file })).collect()
+    from_files(scene).map(|o| json!({ "object": o.name, "axis": o.up.axis.name(), "by_file": o.up.by == UpBy::File, "by": up_by(o.up.by) })).collect()
+}
+
+/// What says which axis points up, for people.
+fn up_by(by: UpBy) -> &'static str {
+    match by {
+        UpBy::File => "by its file",
+        UpBy::Scene => "as the scene says",
+        UpBy::Nothing => "as nothing says another: transform = { up = \"z\" } of the object turns it",
+    }
 }
 
 fn up_text(scene: &Scene) -> String {
-    let line = |o: &SceneObject| {
-        let by = if o.up.by_file { "by its file" } else { "as the scene says" };
-        format!("{}: {} points up, {by}\n", escape_controls(&o.name), o.up.axis.name())
-    };
+    let line =
+        |o: &SceneObject| format!("{}: {} points up, {}\n", escape_controls(&o.name), o.up.axis.name(), up_by(o.up.by));
     let lines: String = from_files(scene).map(line).collect();
     if lines.is_empty() { lines } else { format!("\n{lines}") }
 }

@@ -1,7 +1,9 @@
 //! What a command is given: a scene, or data files of which a first scene is made in memory.
 
 use super::args::{Axis, FirstArguments, SceneArguments};
+use super::console;
 use super::session::{check_backend, render_options, start_threads};
+use convert::read::is_foreign_json;
 use organza::scene::{self, DEFAULT_FILL, DEFAULT_SIZE, Override, UpAxis};
 use organza::{Error, FileData, Files, Progress, RenderOptions, printable};
 use organza_survey::{DataFile, Preset, Wish, Written, first_scene};
@@ -57,11 +59,16 @@ pub(super) fn write_first(
 ) -> Result<Written, Error> {
     let progress = Progress::new();
     let read = inputs.iter().map(|path| DataFile::read(path, wish, (files, options, &progress)));
-    let data = read.collect::<Result<Vec<_>, _>>()?;
-    if wish.color_by.is_some() && !data.iter().any(|d| matches!(d.data, FileData::Points(_))) {
-        return Err(Error::usage("--color-by is for points, and no file has points without faces", "leave it out"));
+    let mut data = read.collect::<Result<Vec<_>, _>>()?;
+    if wish.color_by.is_some() && !data.iter().any(|d| matches!(d.data, FileData::Points(_)) || d.array.is_some()) {
+        if let Some(error) = data.iter_mut().find_map(|d| d.array_error.take()) {
+            return Err(error);
+        }
+        let hint = "leave it out, or in a scene give the surface a `field`, the volume whose values it shows";
+        return Err(Error::usage("--color-by is for points and for arrays of VTK volumes, and no file has such", hint));
     }
     let written = first_scene(&data, scene_file, wish, (files, options, &progress))?;
+    written.remarks.iter().for_each(|remark| console::remark(remark));
     // The scene says what it uses of the files.
     files.forget_notes();
     Ok(written)
@@ -115,17 +122,21 @@ fn scene_among(inputs: &[PathBuf]) -> Result<Option<&PathBuf>, Error> {
     Ok(Some(scene))
 }
 
-/// Whether a file is a scene: by its extension, or by a line `version = …` near its beginning.
+/// Whether a file is a scene: by its extension, unless it is JSON of another program, or by a line `version = …` near its beginning.
 pub(super) fn is_scene(path: &Path) -> bool {
-    if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml") || e.eq_ignore_ascii_case("json")) {
+    let has_extension = |name: &str| path.extension().is_some_and(|e| e.eq_ignore_ascii_case(name));
+    if has_extension("toml") {
         return true;
     }
     // Asked before opening: opening a pipe waits for its writer.
     if !std::fs::metadata(path).is_ok_and(|meta| meta.is_file()) {
-        return false;
+        return has_extension("json");
     }
     let mut beginning = Vec::new();
     let read = std::fs::File::open(path).and_then(|file| file.take(BEGINNING).read_to_end(&mut beginning));
+    if has_extension("json") {
+        return !is_foreign_json(&beginning);
+    }
     let is_version =
         |line: &[u8]| line.strip_prefix(b"version").is_some_and(|rest| rest.trim_ascii_start().starts_with(b"="));
     read.is_ok() && beginning.split(|b| *b == b'\n').any(is_version)

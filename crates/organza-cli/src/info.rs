@@ -132,6 +132,7 @@ fn file_document(facts: &Facts) -> Value {
         "remarks": facts.remarks,
         "mended": facts.mended,
         "up": facts.up.name(),
+        "up_is_stated": facts.is_up_stated,
         "stands_along": facts.stands.map(UpAxis::name),
     })
 }

@@ -96,10 +96,13 @@ fn object_json(o: &PlannedObject) -> Value {
 pub(super) fn plan_text(plan: &Plan) -> String {
     let effects = plan.effects.iter().map(|e| {
         let called = if e.called_for { "yes" } else { "no" };
-        [e.name.clone(), called.to_owned(), format!("{:.3e}", e.bound), e.reason.clone()]
+        // What is simulated was not measured as if it were not.
+        let without = if e.called_for && e.bound == 0.0 { "-".to_owned() } else { share_text(e.bound) };
+        [e.name.clone(), called.to_owned(), without, e.reason.clone()]
     });
     let mut text = format!("technique: {}\n\n", plan.technique);
-    text += &table(["effect", "called for", "bound", "why"], "lrrl", effects);
+    text += &table(["effect", "called for", "without it", "why"], "lrrl", effects);
+    text += "without it: how much a pixel as it is displayed could change at most, of black to white\n";
     text.push('\n');
     let passes = plan.passes.iter().map(|p| [p.name.clone(), p.reason.clone()]);
     text += &table(["pass", "what for"], "ll", passes);
@@ -112,6 +115,29 @@ pub(super) fn plan_text(plan: &Plan) -> String {
         text += &table(["object", "technique", "from", "why", "becomes splats"], "lllll", objects);
     }
     text
+}
+
+/// A change of a displayed pixel, 0 to 1, as percent.
+fn share_text(share: f64) -> String {
+    let percent = 100.0 * share;
+    match percent {
+        p if p <= 0.0 => "nothing".to_owned(),
+        p if p < 0.01 => "below 0.01 %".to_owned(),
+        p if p < 10.0 => format!("{} %", organza_survey::rounded(p, 0.01)),
+        p => format!("{} %", organza_survey::rounded(p, 1.0)),
+    }
+}
+
+/// Bytes in the largest unit that they have one of.
+pub(super) fn bytes_text(bytes: u64) -> String {
+    const UNITS: [&str; 5] = ["bytes", "KiB", "MiB", "GiB", "TiB"];
+    let mut rank = 0;
+    while rank + 1 < UNITS.len() && bytes >> (10 * (rank + 1)) > 0 {
+        rank += 1;
+    }
+    let size = bytes as f64 / f64::from(1u32 << (10 * rank.min(3))) / if rank > 3 { 1024.0 } else { 1.0 };
+    let unit = if size < 10.0 && rank > 0 { 0.1 } else { 1.0 };
+    format!("{} {}", organza_survey::rounded(size, unit), UNITS[rank])
 }
 
 /// The cost record as a table, with the sum of times.
@@ -155,6 +181,14 @@ fn table<const N: usize>(head: [&str; N], align: &str, rows: impl Iterator<Item 
 
 #[cfg(test)]
 mod tests {
+    #[test]
+    fn shares_and_bytes_are_for_people() {
+        let share = super::share_text;
+        assert_eq!([0.0, 4e-6, 0.0123, 1.0].map(share), ["nothing", "below 0.01 %", "1.23 %", "100 %"]);
+        let bytes = [999, 1 << 10, 302_992_911, 5 << 30, 3 << 40].map(super::bytes_text);
+        assert_eq!(bytes, ["999 bytes", "1 KiB", "289 MiB", "5 GiB", "3 TiB"]);
+    }
+
     #[test]
     fn columns_line_up() {
         let rows = [["ä".to_owned(), "10".to_owned()], ["bcd".to_owned(), "9".to_owned()]];

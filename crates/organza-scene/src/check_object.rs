@@ -8,9 +8,9 @@ use super::check_render::check_technique;
 use super::check_source::check_source;
 use super::paths::Paths;
 use super::raw_object::{RawLattice, RawObject, RawTransform, RawUp};
-use super::{FieldSource, SceneMaterial, SceneObject, Source, Technique, Up};
+use super::{FieldSource, SceneMaterial, SceneObject, Source, Technique, Up, UpBy};
 use crate::Error;
-use convert::read::{UpAxis, up_axis};
+use convert::read::{UpAxis, stated_up_axis, up_axis};
 use glam::{DQuat, DVec3};
 use splat_core::{FootprintStack, Packing, Similarity};
 use std::collections::HashSet;
@@ -45,13 +45,11 @@ pub(super) fn check_object(
         raw.field.as_ref().map(|field| check_shown_field(at, &raw, field, (&source, named.paths))).transpose()?;
     let up = match raw.transform.up {
         // An invisible object is not even read, unless a light is to see it.
-        RawUp::Auto if raw.visible == Some(false) && !named.seen.contains(&raw.name) => {
-            Up { axis: UpAxis::Y, by_file: false }
-        }
+        RawUp::Auto if raw.visible == Some(false) && !named.seen.contains(&raw.name) => by_scene(UpAxis::Y),
         RawUp::Auto => up_of_files(at, &source, field.as_ref())?,
-        RawUp::Y => Up { axis: UpAxis::Y, by_file: false },
-        RawUp::Z => Up { axis: UpAxis::Z, by_file: false },
-        RawUp::MinusY => Up { axis: UpAxis::MinusY, by_file: false },
+        RawUp::Y => by_scene(UpAxis::Y),
+        RawUp::Z => by_scene(UpAxis::Z),
+        RawUp::MinusY => by_scene(UpAxis::MinusY),
     };
     Ok(SceneObject {
         transform: check_transform(&at.key("transform"), &raw.transform, up.axis)?,
@@ -65,6 +63,8 @@ pub(super) fn check_object(
             None | Some(RawLattice::Cartesian) => Packing::Cartesian,
             Some(RawLattice::Bcc) => Packing::BodyCentred,
         },
+        array: raw.array.clone(),
+        degrees: raw.degrees.unwrap_or(false),
         field,
         points: check_points(at, &raw)?,
         clip: raw
@@ -85,11 +85,16 @@ pub(super) fn check_object(
     })
 }
 
+/// An axis that the scene states, or the coordinates of the scene itself.
+fn by_scene(axis: UpAxis) -> Up {
+    Up { axis, by: UpBy::Scene }
+}
+
 /// The axis that points up by the source's files and the field's, which have to agree.
 fn up_of_files(at: &At<'_>, source: &Source, field: Option<&FieldSource>) -> Result<Up, Error> {
     let of_field = field.map(|field| &*field.path);
     let mut axes = source.paths().into_iter().chain(of_field).map(|path| (path, up_axis(path)));
-    let Some((first, axis)) = axes.next() else { return Ok(Up { axis: UpAxis::Y, by_file: false }) };
+    let Some((first, axis)) = axes.next() else { return Ok(by_scene(UpAxis::Y)) };
     if let Some((other, another)) = axes.find(|(_, another)| *another != axis) {
         let [first, other] = [first, other].map(crate::printable);
         let message = format!(
@@ -99,7 +104,8 @@ fn up_of_files(at: &At<'_>, source: &Source, field: Option<&FieldSource>) -> Res
         );
         return Err(at.key("transform").error(message, "say which one counts: `transform = { up = \"z\" }`"));
     }
-    Ok(Up { axis, by_file: true })
+    let is_stated = source.paths().into_iter().chain(of_field).any(|path| stated_up_axis(path).is_some());
+    Ok(Up { axis, by: if is_stated { UpBy::File } else { UpBy::Nothing } })
 }
 
 /// The technique that an object names; "auto" is that of the scene.
@@ -133,6 +139,14 @@ fn refuse_what_does_not_apply(at: &At<'_>, raw: &RawObject, source: &Source) -> 
         if raw.volume.is_none() && on {
             return Err(at.key(key).error(format!("`{key}` belongs to a `volume`"), ""));
         }
+    }
+    if raw.degrees.is_some() && raw.points.is_none() {
+        return Err(at.key("degrees").error("`degrees` belongs to `points`", ""));
+    }
+    let has_volume = raw.volume.is_some() || raw.isosurface.is_some() || raw.slice.is_some() || raw.field.is_some();
+    if raw.array.is_some() && !has_volume {
+        let message = "`array` belongs to a `volume`, an `isosurface`, a `slice` and a surface with a `field`";
+        return Err(at.key("array").error(message, ""));
     }
     let is_classified = raw.volume.is_some() || raw.slice.is_some();
     if raw.transfer.is_some() && !is_classified && raw.color_by.is_none() && raw.field.is_none() {

@@ -62,7 +62,8 @@ pub(super) fn check_points(at: &At<'_>, raw: &RawObject) -> Result<PointsLook, E
         return Err(at.key("unlit").error("`unlit` and `material` exclude each other", hint));
     }
     if let (Some(_), Some(_)) = (&raw.color_by, raw.color) {
-        return Err(at.key("color").error("`color` and `color_by` exclude each other", "leave one of them out"));
+        let hint = "remove the key `color` of the object, or `color_by`";
+        return Err(at.key("color").error("`color` and `color_by` exclude each other", hint));
     }
     let keep = raw.keep.iter().flatten().map(|(column, numbers)| check_kept(&at.key("keep"), column, numbers));
     Ok(PointsLook {

@@ -37,7 +37,9 @@ pub(super) fn check_transfer(at: &At<'_>, raw: &RawObject, beside: Beside) -> Re
         let hint = "such as transfer = [{ value = 0, color = [1, 1, 1], extinction = 0 }, …]";
         return Err(at.error("a volume needs a key `transfer`, found none", hint));
     };
-    let unit_length = raw.unit_length.map(|l| at.length("unit_length", l)).transpose()?;
+    // In the unit of the data, so that what is scaled looks the same.
+    let scale = raw.transform.scale.unwrap_or(1.0);
+    let unit_length = raw.unit_length.map(|l| Ok(at.length("unit_length", l)? * scale)).transpose()?;
     let at = at.key("transfer");
     let mut checked: Vec<TransferPoint> = Vec::with_capacity(points.len());
     for (i, p) in points.iter().enumerate() {
@@ -91,7 +93,7 @@ fn point_extinction(at: &At<'_>, p: &RawTransferPoint, unit_length: Option<f64>)
                 return Err(at.key("opacity").error(message, ""));
             }
             let Some(unit_length) = unit_length else {
-                let hint = "the world length over which a point has its opacity";
+                let hint = "the length over which a point has its opacity, in the unit of the data";
                 return Err(at.key("opacity").error("`opacity` needs the object's `unit_length`, found none", hint));
             };
             at.number("opacity", optics::optical_depth(opacity) / unit_length, 0.0..=LARGEST)

@@ -67,7 +67,7 @@ pub use layer_choice::{LAYER_NAMES, LayerChoice};
 pub use light_points::{LightPoint, light_points};
 pub use lights::{SceneLight, SlideSource};
 pub use load::{LoadOptions, MAX_SCENE_BYTES, MAX_SCENE_DEPTH, load, parse, read, schema};
-pub use model::{EnvironmentSource, Scene, SceneMaterial, SceneObject, Up};
+pub use model::{EnvironmentSource, Scene, SceneMaterial, SceneObject, Up, UpBy};
 pub use overrides::Override;
 pub use paths::{ROOT_KEY, relative_path, root_for};
 pub use points::PointsLook;

@@ -161,6 +161,10 @@ pub struct SceneObject {
     pub opacity: Option<f64>,
     /// How the planes of the lattice lie that a volume is drawn on: of the file's, or of the body-centred one of the same spectrum.
     pub packing: Packing,
+    /// Which array of a VTK file its volume is; `None` for the one that the file names, else the first of one number.
+    pub array: Option<String>,
+    /// Whether x and y of its points are degrees, which become metres.
+    pub degrees: bool,
     /// The field that it shows, a surface alone.
     pub field: Option<FieldSource>,
     /// How raw points look.
@@ -197,8 +201,19 @@ impl SceneObject {
 pub struct Up {
     /// The axis.
     pub axis: UpAxis,
-    /// Whether the file's format told it; else the scene, or it is the default of what has no file.
-    pub by_file: bool,
+    /// What says so.
+    pub by: UpBy,
+}
+
+/// What says which axis of a source points up.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum UpBy {
+    /// The format of its file, or what the file says of its space.
+    File,
+    /// The scene; of what has no file its coordinates are those of the scene.
+    Scene,
+    /// Nothing: y is taken.
+    Nothing,
 }
 
 /// A named material.

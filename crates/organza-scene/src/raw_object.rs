@@ -24,6 +24,9 @@ pub(super) struct RawObject {
     pub(super) volume: Option<String>,
     /// Which volume of a series `volume` is, from 0; default 0.
     pub(super) frame: Option<u32>,
+    /// Which array of a VTK file a `volume`, `isosurface`, `slice` or `field` is; default the one that the file names, else the first of one
+    /// number.
+    pub(super) array: Option<String>,
     /// Path of a raw point cloud.
     pub(super) points: Option<String>,
     /// What a light sees first of other objects.
@@ -61,6 +64,9 @@ pub(super) struct RawObject {
     pub(super) color_by: Option<RawColorBy>,
     /// Which `points` are drawn: classes by a list, other columns by their lowest and highest number.
     pub(super) keep: Option<BTreeMap<String, Vec<f64>>>,
+    /// Whether x and y of `points` are degrees of longitude and latitude, which become metres east and north of their middle, beside heights in
+    /// metres; default false.
+    pub(super) degrees: Option<bool>,
     /// Whether `points` are drawn without light; default true where their file has colours and nothing else says how they look.
     pub(super) unlit: Option<bool>,
     /// Diameter of the discs of `points`; default from their neighbours.
@@ -74,7 +80,7 @@ pub(super) struct RawObject {
     pub(super) field: Option<RawField>,
     /// Control points of the transfer function of a `volume`, `slice`, surface with a `field` or `points` with `color_by`, by rising value.
     pub(super) transfer: Option<Vec<RawTransferPoint>>,
-    /// World length that opacities of `transfer` refer to.
+    /// Length that opacities of `transfer` refer to, in the unit of the data: it grows with `transform.scale`.
     pub(super) unit_length: Option<f64>,
     /// What a `volume` is drawn on, "cartesian" (default), the file's, or "bcc", a body-centred cubic lattice; `sheets` alone has that.
     pub(super) lattice: Option<RawLattice>,

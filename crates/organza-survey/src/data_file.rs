@@ -2,13 +2,13 @@
 
 use crate::facts::bounds_of;
 use crate::preset::Wish;
-use crate::stands::stands_along;
+use crate::stands::{cloud_stands_along, extent, lies_flat_along, stands_along};
 use convert::read::{ReadParams, UpAxis, stated_up_axis};
 use organza::{Error, FileData, Files, Progress, RenderOptions, printable};
 use std::path::{Path, PathBuf};
 
 /// A data file that was read.
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 pub struct DataFile {
     /// The file, as it was named.
     pub path: PathBuf,
@@ -18,6 +18,12 @@ pub struct DataFile {
     pub stated_up: Option<UpAxis>,
     /// Which one points up by how it stands, where its format says nothing of that.
     pub stands: Option<UpAxis>,
+    /// Whether x and y of its points look like degrees.
+    pub degrees: bool,
+    /// The array of a VTK volume that was asked for.
+    pub array: Option<String>,
+    /// Why a volume has no such array.
+    pub array_error: Option<Error>,
 }
 
 impl DataFile {
@@ -31,7 +37,16 @@ impl DataFile {
         (files, options, progress): (&Files, &RenderOptions, &Progress),
     ) -> Result<Self, Error> {
         let columns = wish.color_by.iter().cloned().collect();
-        let data = files.read(path, &ReadParams { columns, ..options.read_params() }, progress)?;
+        let mut data = files.read(path, &ReadParams { columns, ..options.read_params() }, progress)?;
+        let (mut array, mut array_error) = (None, None);
+        if let (FileData::Grid(_), Some(name)) = (&data, &wish.color_by) {
+            let params = ReadParams { array: Some(name.clone()), ..options.read_params() };
+            match files.read(path, &params, progress) {
+                Ok(of_array) => (data, array) = (of_array, Some(name.clone())),
+                Err(Error::Cancelled) => return Err(Error::Cancelled),
+                Err(error) => array_error = Some(error),
+            }
+        }
         let refuse = |message: &str, hint: &str| Err(Error::input(printable(path), message, hint));
         match &data {
             FileData::Mesh(mesh) if mesh.triangles.is_empty() => refuse("expected at least one face, found none", ""),
@@ -42,13 +57,17 @@ impl DataFile {
             }
             _ => {
                 let stated_up = stated_up_axis(path);
-                let bounds = match &data {
-                    FileData::Mesh(mesh) => Some(mesh.bounds()),
-                    FileData::Points(points) => bounds_of(points.origin, &points.position),
-                    _ => None,
+                let stands = match &data {
+                    FileData::Mesh(mesh) => stands_along(mesh.bounds()),
+                    FileData::Points(points) => bounds_of(points.origin, &points.position).and_then(cloud_stands_along),
+                    FileData::Grid(grid) => lies_flat_along(extent(grid)),
+                    FileData::Image(_) => None,
                 };
-                let stands = bounds.filter(|_| stated_up.is_none()).and_then(stands_along);
-                Ok(Self { path: path.to_owned(), data, stated_up, stands })
+                let degrees = matches!(&data, FileData::Points(points) if convert::looks_like_degrees(points));
+                // Heights are along z then.
+                let stands = if degrees { Some(UpAxis::Z) } else { stands };
+                let stands = stands.filter(|_| stated_up.is_none() && wish.up.is_none());
+                Ok(Self { path: path.to_owned(), data, stated_up, stands, degrees, array, array_error })
             }
         }
     }
@@ -104,7 +123,15 @@ mod tests {
     fn colours_that_are_all_black_are_none() {
         let file = |color: Vec<[f32; 3]>| {
             let points = RawPoints { position: vec![Default::default(); color.len()], color, ..RawPoints::default() };
-            DataFile { path: "a.las".into(), data: FileData::Points(points.into()), stated_up: None, stands: None }
+            DataFile {
+                path: "a.las".into(),
+                data: FileData::Points(points.into()),
+                stated_up: None,
+                stands: None,
+                degrees: false,
+                array: None,
+                array_error: None,
+            }
         };
         let black = file(vec![[0.0; 3]; 3]);
         assert!(black.is_black() && !black.is_colored() && black.luminance().is_none());
@@ -117,7 +144,16 @@ mod tests {
     fn objects_are_named_after_files_without_what_parts_paths() {
         let name = |path: &str| {
             let data = FileData::Points(RawPoints::default().into());
-            DataFile { path: path.into(), data, stated_up: None, stands: None }.name()
+            DataFile {
+                path: path.into(),
+                data,
+                stated_up: None,
+                stands: None,
+                degrees: false,
+                array: None,
+                array_error: None,
+            }
+            .name()
         };
         assert_eq!(name("a/bun_zipper.ply.gz"), "bun_zipper");
         assert_eq!(name("head v1.2.nii"), "head-v1-2");

@@ -3,9 +3,9 @@
 use crate::histogram::Histogram;
 use crate::mesh_faults::{MeshFaults, mesh_faults};
 use crate::spacing::{duplicates, median_spacing};
-use crate::stands::stands_along;
-use convert::RawPoints;
+use crate::stands::{cloud_stands_along, lies_flat_along, stands_along};
 use convert::read::{Loaded, Mended, NamedColumn, ReadParams, UpAxis, stated_up_axis, up_axis};
+use convert::{RawPoints, looks_like_degrees};
 use organza::Error;
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::{Aabb, DAabb, Grid, MemoryAccount, Mesh, RadianceImage};
@@ -59,6 +59,8 @@ pub struct Facts {
     pub mended: Vec<String>,
     /// The axis that points up where a scene says `up = "auto"`.
     pub up: UpAxis,
+    /// Whether the file's format says so; else it is y, as nothing says another.
+    pub is_up_stated: bool,
     /// The axis that a first scene has point up in its place, where the format says nothing of it and the data stands along that axis.
     pub stands: Option<UpAxis>,
 }
@@ -87,10 +89,15 @@ pub fn facts(path: &Path, max_bytes: u64, strict: bool) -> Result<Facts, Error> 
     let remarks = notes.remarks.into_iter().chain(facts.remarks).collect();
     let mended = notes.mended.iter().map(Mended::to_string).collect();
     let stated = stated_up_axis(path);
-    let may_stand = stated.is_none() && matches!(facts.kind, "mesh" | "points");
-    let stands = facts.bounds.filter(|_| may_stand).and_then(stands_along);
+    let stands = facts.bounds.filter(|_| stated.is_none()).and_then(|bounds| match facts.kind {
+        "mesh" => stands_along(bounds),
+        "points" => cloud_stands_along(bounds),
+        "volume" => lies_flat_along(bounds),
+        _ => None,
+    });
     let up = stated.unwrap_or_default();
-    Ok(Facts { bytes, format: notes.format, unused, remarks, mended, up, stands, ..facts })
+    let is_up_stated = stated.is_some();
+    Ok(Facts { bytes, format: notes.format, unused, remarks, mended, up, is_up_stated, stands, ..facts })
 }
 
 impl Facts {
@@ -137,6 +144,10 @@ fn of_mesh(mesh: &Mesh) -> Facts {
     }
 }
 
+/// What is said of points whose x and y are no lengths.
+const DEGREES: &str =
+    "x and y look like degrees beside heights in metres: `degrees = true` of an object makes metres of them";
+
 /// What is said of points with colours.
 const AS_THEY_ARE: &str = "colours are drawn as they are, without light, unless the scene names a material";
 
@@ -164,20 +175,25 @@ fn of_points(points: &RawPoints, further: &[NamedColumn], up: UpAxis) -> Facts {
         attributes: present(&[
             ("normal", !points.normal.is_empty()),
             ("color", !points.color.is_empty()),
-            ("value", !points.value.is_empty()),
+            (points.value_name(), !points.value.is_empty()),
             ("opacity", !points.opacity.is_empty() || !points.gaussians.is_empty()),
             ("classification", !points.classification.is_empty()),
         ]),
-        remarks: [(!points.color.is_empty()).then(|| AS_THEY_ARE.to_owned()), of_gaussians(points), of_splats(points)]
-            .into_iter()
-            .flatten()
-            .collect(),
+        remarks: [
+            (!points.color.is_empty()).then(|| AS_THEY_ARE.to_owned()),
+            of_gaussians(points),
+            of_splats(points),
+            looks_like_degrees(points).then(|| DEGREES.to_owned()),
+        ]
+        .into_iter()
+        .flatten()
+        .collect(),
         bounds,
         spacing: median_spacing(&points.position),
         duplicates: Some(duplicates(&points.position)),
         columns: ranges([
             ("color", points.color.iter().flatten().copied().collect()),
-            ("value", points.value.clone()),
+            (points.value_name(), points.value.clone()),
             ("opacity", [&points.opacity[..], &points.gaussians.opacity].concat()),
             ("deviation", points.gaussians.axes.iter().flatten().map(|axis| axis.length()).collect()),
             ("classification", points.classification.iter().map(|c| f32::from(*c)).collect()),

@@ -10,7 +10,7 @@ use crate::data_file::DataFile;
 use crate::lamps::lamps;
 use crate::number::{color, list, rounded, significant};
 use crate::preset::{Preset, Wish};
-use look::{Object, drawn_steps, objects};
+use look::{Object, all_stand, drawn_steps, objects};
 use organza::scene::{DEFAULT_AZIMUTH, FoundCamera, LoadOptions, ROOT_KEY, parse, relative_path, root_for};
 use organza::{Error, FileData, Files, Progress, RenderOptions, printable};
 use splat_core::glam::DVec3;
@@ -43,6 +43,8 @@ pub struct Written {
     pub text: String,
     /// Where its camera is.
     pub found: FoundCamera,
+    /// What was decided that a user may want otherwise, one sentence each.
+    pub remarks: Vec<String>,
 }
 
 /// Writes a first scene of data files, as the text of `scene_file`, which paths are relative to. `files` are those that were read.
@@ -89,7 +91,27 @@ pub fn first_scene(
         text += &ground(&found);
     }
     text += &drawn;
-    Ok(Written { text, found })
+    Ok(Written { text, found, remarks: up_remarks(data, wish).chain(degree_remarks(data)).collect() })
+}
+
+/// What is said of the axis that points up, of each file that says nothing of it.
+fn up_remarks<'a>(data: &'a [DataFile], wish: &'a Wish) -> impl Iterator<Item = String> + 'a {
+    let stand = all_stand(data);
+    let one = move |file: &DataFile| {
+        let by = match file.stands.filter(|_| stand) {
+            Some(axis) => format!("{} does, along which it stands: --up y turns it", axis.name()),
+            None => "y does: --up z turns it".to_owned(),
+        };
+        format!("{}: nothing in it says which axis points up, so {by}", printable(&file.path))
+    };
+    let unsaid = |file: &&DataFile| file.stated_up.is_none() && wish.up.is_none();
+    data.iter().filter(unsaid).map(one)
+}
+
+/// What is said of files whose points are drawn in metres.
+fn degree_remarks(data: &[DataFile]) -> impl Iterator<Item = String> + '_ {
+    let said = "x and y look like degrees beside heights in metres, and are drawn as metres; without `degrees` a scene keeps them";
+    data.iter().filter(|file| file.degrees).map(move |file| format!("{}: {said}", printable(&file.path)))
 }
 
 /// How it is drawn, where that is not as everything is: volumes alone by sheets, whose smooth edges need no more than one sample a pixel.
@@ -189,7 +211,15 @@ mod tests {
         let file = |steps: DVec3| {
             let grid =
                 Grid { origin: DVec3::ZERO, axes: DMat3::from_diagonal(steps), dims: [2; 3], values: vec![0.0; 8] };
-            DataFile { path: "a.nrrd".into(), data: FileData::Grid(grid.into()), stated_up: None, stands: None }
+            DataFile {
+                path: "a.nrrd".into(),
+                data: FileData::Grid(grid.into()),
+                stated_up: None,
+                stands: None,
+                degrees: false,
+                array: None,
+                array_error: None,
+            }
         };
         let text = |files: &[DataFile]| render_text(files, &Wish::default());
         assert!(text(&[file(DVec3::new(0.7, 0.7, 2.5))]).contains("\nslab_width = 0.35 "));

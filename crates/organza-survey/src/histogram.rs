@@ -5,7 +5,7 @@ use rayon::prelude::*;
 /// Values counted together before counts are added.
 const CHUNK: usize = 1 << 16;
 
-/// Counts of values in bins of equal width; values outside count in the outer bins.
+/// Counts of values in bins of equal width; values outside count in the outer bins, and those that are NaN nowhere.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Histogram {
     /// Lower end of the first bin.
@@ -24,7 +24,7 @@ impl Histogram {
         let bin = |v: f32| (((f64::from(v) - low) * scale).max(0.0) as usize).min(bins - 1);
         let count = |part: &[f32]| {
             let mut counts = vec![0u64; bins];
-            part.iter().for_each(|v| counts[bin(*v)] += 1);
+            part.iter().filter(|v| !v.is_nan()).for_each(|v| counts[bin(*v)] += 1);
             counts
         };
         let sum = |mut a: Vec<u64>, b: Vec<u64>| {
@@ -96,7 +96,7 @@ impl Histogram {
     }
 }
 
-/// The value below which a share of some values lies; `values` are put in order. 0 without values.
+/// The value below which a share of some values lies, none of which is NaN; `values` are put in order. 0 without values.
 pub(crate) fn quantile_of(values: &mut [f32], share: f64) -> f64 {
     if values.is_empty() {
         return 0.0;

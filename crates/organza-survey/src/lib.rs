@@ -11,6 +11,7 @@ mod data_file;
 mod facts;
 mod first_scene;
 mod histogram;
+mod labels;
 mod lamps;
 mod matter;
 mod mesh_faults;

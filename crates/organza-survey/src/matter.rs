@@ -2,7 +2,8 @@
 //!
 //! What is around a scanned body is quiet and lies at the border of the volume: the median of the border's values is that of air, as far
 //! as they differ little from it. A threshold by Otsu parts matter from it, on the side of it where more values lie. A volume
-//! whose border is not quiet is matter all through; then its higher values show.
+//! whose border is not quiet is matter all through; then its higher values show. A field of both signs around a quiet or mean value near 0 is
+//! matter to both sides of it. Voxels that are NaN are nothing: where they are what is around, all others are matter.
 
 use crate::histogram::{Histogram, quantile_of};
 use splat_core::Grid;
@@ -15,6 +16,8 @@ const QUIET: f64 = 0.2;
 const OUTLIERS: f64 = 0.0005;
 /// Most values that are looked at for outliers.
 const SAMPLE: usize = 1 << 20;
+/// How far below the lowest value matter begins to show where gaps are around it, over the spread of the values.
+const FOOT_OF_GAPS: f64 = 0.25;
 /// Where between air and the threshold matter begins to show.
 const FOOT: f64 = 0.6;
 
@@ -29,7 +32,16 @@ pub(crate) struct Matter {
     pub(crate) first: f64,
     /// The value of the densest matter; below [`Self::first`] where matter has lower values than air.
     pub(crate) last: f64,
+    /// First and last value of the matter on the other side of 0, of a field of both signs.
+    pub(crate) opposite: Option<[f64; 2]>,
 }
+
+/// The lesser of both ends of the values over the larger, from which a field has both signs.
+const BOTH_SIGNS: f64 = 0.1;
+/// The distance of what is around from 0 over the spread of the values, up to which it is 0.
+const ABOUT_ZERO: f64 = 0.05;
+/// Share of the values on the side where fewer lie, of those on the other, from which both sides are matter.
+const BOTH_SIDES: f64 = 0.01;
 
 /// Hounsfield units between which values are taken for such.
 const UNITS: [f64; 2] = [-500.0, 100.0];
@@ -40,29 +52,35 @@ impl Matter {
         let range = usual_range(&grid.values)?;
         let histogram = Histogram::new(&grid.values, range, BINS);
         let spread = histogram.high - histogram.low;
-        let mut border = border(grid);
-        let [low, air, high] = [0.1, 0.5, 0.9].map(|share| quantile_of(&mut border, share));
-        if high - low >= QUIET * spread {
-            let (first, last) = (histogram.quantile(0.4), histogram.quantile(0.998));
-            let last = if last > first { last } else { histogram.high };
-            return Some(Self { histogram, air: None, first, last });
+        let (mut border, gaps) = border(grid);
+        if gaps > border.len() {
+            // What is around has no value: all that has one is matter, the lowest of it thin.
+            let (first, last) = (histogram.low - FOOT_OF_GAPS * spread, histogram.high);
+            return Some(Self { histogram, air: None, first, last, opposite: None });
         }
-        let middle = histogram.bin(air);
+        let [low, air, high] = [0.1, 0.5, 0.9].map(|share| quantile_of(&mut border, share));
+        let has_air = high - low < QUIET * spread;
+        let is_signed = histogram.low < 0.0 && histogram.high > 0.0 && has_both_signs(&histogram);
+        if !has_air {
+            let last = histogram.quantile(0.998);
+            if is_signed {
+                let opposite = Some([0.0, histogram.quantile(0.002).min(-histogram.width())]);
+                return Some(Self { air: None, first: 0.0, last: last.max(histogram.width()), opposite, histogram });
+            }
+            let first = histogram.quantile(0.4);
+            let last = if last > first { last } else { histogram.high };
+            return Some(Self { histogram, air: None, first, last, opposite: None });
+        }
         // Farther away than air scatters by itself.
         let (low, high) = (histogram.bin(low), histogram.bin(high));
         let above = sum(&histogram.counts[(2 * high - low + 1).min(BINS)..]);
         let below = sum(&histogram.counts[..(2 * low).saturating_sub(high)]);
-        let (first, last) = if above >= below {
-            let parting = histogram.parting(middle..BINS);
-            (air + FOOT * (parting - air), densest(&histogram, histogram.bin(parting)..BINS, 0.99))
-        } else {
-            let parting = histogram.parting(0..middle + 1);
-            (air + FOOT * (parting - air), densest(&histogram, 0..histogram.bin(parting) + 1, 0.01))
-        };
-        // Matter of one value is a step, not a ramp.
-        let least = histogram.width() * if above >= below { 1.0 } else { -1.0 };
-        let last = if (last - first) / least < 1.0 { first + least } else { last };
-        Some(Self { histogram, air: Some(air), first, last })
+        let is_above = above >= below;
+        let [first, last] = side(&histogram, air, is_above);
+        let is_about_zero = is_signed && air.abs() <= ABOUT_ZERO * spread;
+        let has_both = is_about_zero && above.min(below) as f64 >= BOTH_SIDES * above.max(below) as f64;
+        let opposite = has_both.then(|| side(&histogram, air, !is_above));
+        Some(Self { histogram, air: Some(air), first, last, opposite })
     }
 
     /// Whether values look like Hounsfield units, of air to bone.
@@ -86,6 +104,25 @@ impl Matter {
     }
 }
 
+/// Whether both ends of the values lie about as far from 0, and they are no Hounsfield units.
+fn has_both_signs(histogram: &Histogram) -> bool {
+    let [low, high] = [histogram.low.abs(), histogram.high.abs()];
+    low.min(high) >= BOTH_SIGNS * low.max(high) && !(histogram.low < UNITS[0] && histogram.high > UNITS[1])
+}
+
+/// First and last value of the matter above or below air.
+fn side(histogram: &Histogram, air: f64, is_above: bool) -> [f64; 2] {
+    let middle = histogram.bin(air);
+    let (bins, dense) = if is_above { (middle..BINS, 0.99) } else { (0..middle + 1, 0.01) };
+    let parting = histogram.parting(bins);
+    let first = air + FOOT * (parting - air);
+    let of_dense = if is_above { histogram.bin(parting)..BINS } else { 0..histogram.bin(parting) + 1 };
+    let last = densest(histogram, of_dense, dense);
+    // Matter of one value is a step, not a ramp.
+    let least = histogram.width() * if is_above { 1.0 } else { -1.0 };
+    [first, if (last - first) / least < 1.0 { first + least } else { last }]
+}
+
 fn sum(counts: &[u64]) -> u64 {
     counts.iter().sum()
 }
@@ -103,7 +140,7 @@ fn densest(histogram: &Histogram, bins: std::ops::Range<usize>, share: f64) -> f
 /// Lowest and highest value without outliers; `None` where they are one.
 fn usual_range(values: &[f32]) -> Option<[f64; 2]> {
     let step = values.len().div_ceil(SAMPLE).max(1);
-    let mut some: Vec<f32> = values.iter().copied().step_by(step).collect();
+    let mut some: Vec<f32> = values.iter().copied().step_by(step).filter(|v| !v.is_nan()).collect();
     let usual = [quantile_of(&mut some, OUTLIERS), quantile_of(&mut some, 1.0 - OUTLIERS)];
     if usual[1] > usual[0] {
         return Some(usual);
@@ -112,8 +149,8 @@ fn usual_range(values: &[f32]) -> Option<[f64; 2]> {
     (high > low).then(|| [f64::from(low), f64::from(high)])
 }
 
-/// The values on the six sides of a volume.
-fn border(grid: &Grid) -> Vec<f32> {
+/// The values on the six sides of a volume, and the number of voxels there that have none.
+fn border(grid: &Grid) -> (Vec<f32>, usize) {
     let [nx, ny, nz] = grid.dims;
     let mut all = Vec::new();
     for (row, values) in grid.values.chunks(nx).enumerate() {
@@ -124,7 +161,10 @@ fn border(grid: &Grid) -> Vec<f32> {
             all.extend([values[0], values[nx - 1]]);
         }
     }
-    all
+    let voxels = all.len();
+    all.retain(|value| !value.is_nan());
+    let gaps = voxels - all.len();
+    (all, gaps)
 }
 
 #[cfg(test)]
@@ -165,6 +205,40 @@ mod tests {
             );
             assert!((matter.bulk() - f).abs() < 0.02 * (c - a).abs(), "{}", matter.bulk());
         }
+    }
+
+    #[test]
+    fn a_field_of_both_signs_is_matter_on_both_sides_of_zero() {
+        // Balls of +1 and −1 around which there is nothing.
+        let (plus, minus) = (ball(0.0, 60.0, 100.0), ball(0.0, 60.0, 100.0));
+        let values = plus.values.iter().chain(&minus.values).enumerate();
+        let values = values.map(|(i, v)| if i < plus.values.len() { *v } else { -*v }).collect();
+        let both = Grid { dims: [32, 32, 64], values, ..plus };
+        let matter = Matter::of(&both).unwrap();
+        let [first, last] = matter.opposite.unwrap();
+        assert!(matter.first * first < 0.0 && matter.last * last < 0.0, "{matter:?}");
+        assert!((matter.first + first).abs() < 5.0 && (matter.last + last).abs() < 5.0, "{matter:?}");
+        // Without air too.
+        let values = (0..4096).map(|i| (i % 16) as f32 - 7.5).collect();
+        let ramp = Grid { origin: DVec3::ZERO, axes: DMat3::IDENTITY, dims: [16; 3], values };
+        let matter = Matter::of(&ramp).unwrap();
+        assert!(matter.first == 0.0 && matter.last > 7.0 && matter.opposite.unwrap()[1] < -7.0, "{matter:?}");
+        // Hounsfield units have both signs and are none of those.
+        assert_eq!(Matter::of(&ball(-1000.0, 40.0, 900.0)).unwrap().opposite, None);
+    }
+
+    #[test]
+    fn what_has_no_value_is_nothing_and_all_else_is_matter() {
+        let mut grid = ball(f32::NAN, 100.0, 200.0);
+        let matter = Matter::of(&grid).unwrap();
+        assert!(matter.air.is_none() && matter.first < 100.0 && matter.last > 199.0, "{matter:?}");
+        assert_eq!(matter.histogram.total(), grid.values.iter().filter(|v| !v.is_nan()).count() as u64);
+        // A gap within changes nothing.
+        grid = ball(0.0, 100.0, 200.0);
+        let whole = Matter::of(&grid).unwrap();
+        grid.values[16 * 32 * 32 + 16 * 32 + 16] = f32::NAN;
+        let matter = Matter::of(&grid).unwrap();
+        assert!((matter.first - whole.first).abs() < 1.0 && (matter.last - whole.last).abs() < 1.0);
     }
 
     #[test]

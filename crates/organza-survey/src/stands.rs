@@ -1,12 +1,38 @@
-//! Which axis of data points up, where its format says nothing of it: things stand on the plane that their coordinates begin at.
+//! Which axis of data points up, where its format says nothing of it: things stand on the plane that their coordinates begin at, and points and
+//! layers of the ground or the sky are far wider than high.
 
 use convert::read::UpAxis;
-use splat_core::DAabb;
+use splat_core::glam::DVec3;
+use splat_core::{DAabb, Grid};
 
 /// Distance of the lowest point from 0 over the height, of what stands there.
 const ON: f64 = 0.01;
 /// Distance of the middle from 0 over the size, of what was placed about 0.
 const ABOUT: f64 = 0.1;
+
+/// Height over the lesser width, up to which points and volumes are a layer that lies flat.
+const FLAT: f64 = 0.25;
+
+/// z where a box is far wider along x and y than high along z, and y is no thinner; `None` where it is not, and for what has no height.
+pub(crate) fn lies_flat_along(bounds: DAabb) -> Option<UpAxis> {
+    let size = bounds.size();
+    (size.z > 0.0 && size.z <= FLAT * size.x.min(size.y)).then_some(UpAxis::Z)
+}
+
+/// The same of points, which may stand as meshes do.
+pub(crate) fn cloud_stands_along(bounds: DAabb) -> Option<UpAxis> {
+    stands_along(bounds).or_else(|| lies_flat_along(bounds))
+}
+
+/// The box of the cells of a volume.
+pub(crate) fn extent(grid: &Grid) -> DAabb {
+    let count = grid.dims.map(|n| n as f64);
+    let corner = |k: usize| {
+        let index = DVec3::from_array(std::array::from_fn(|a| if k >> a & 1 == 0 { -0.5 } else { count[a] - 0.5 }));
+        grid.origin + grid.axes * index
+    };
+    DAabb::of_points((0..8).map(corner))
+}
 
 /// z where the data's box begins at z = 0 and lies about 0 along x and y, as printable and drawn things mostly do; `None` where it does not.
 pub(crate) fn stands_along(bounds: DAabb) -> Option<UpAxis> {
@@ -19,7 +45,20 @@ pub(crate) fn stands_along(bounds: DAabb) -> Option<UpAxis> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use splat_core::glam::DVec3;
+
+    #[test]
+    fn layers_lie_flat_and_stand_along_their_thin_side() {
+        let of = |size: [f64; 3]| {
+            lies_flat_along(DAabb::new(DVec3::splat(7.0), DVec3::splat(7.0) + DVec3::from_array(size)))
+        };
+        // A terrain, a layer of clouds; a body, a wall that faces z, a layer along y, a plane.
+        assert_eq!([of([900.0, 700.0, 60.0]), of([64.0, 64.0, 16.0])], [Some(UpAxis::Z); 2]);
+        assert_eq!([of([2.0, 2.0, 1.8]), of([9.0, 1.0, 0.4]), of([9.0, 0.5, 9.0]), of([9.0, 9.0, 0.0])], [None; 4]);
+        assert_eq!(
+            cloud_stands_along(DAabb::new(DVec3::new(-1.0, -1.0, 0.0), DVec3::new(1.0, 1.0, 4.0))),
+            Some(UpAxis::Z)
+        );
+    }
 
     #[test]
     fn things_stand_where_they_begin_at_zero_and_lie_about_it() {

@@ -1,6 +1,7 @@
 //! Transfer functions of volumes that are seen for the first time: colours by a preset, extinction so that a view ray through
 //! matter loses about as much light as the preset wants, whatever the volume's size, steps and values are.
 
+use crate::labels::Labels;
 use crate::matter::Matter;
 use crate::preset::Look;
 use convert::ColorMap;
@@ -52,7 +53,11 @@ impl Transfer {
         Self { points, extinction: std::f64::consts::LN_2 / width }
     }
 
+    /// Extinction over the largest one; 0 of a gap.
     pub(crate) fn weight(&self, value: f64) -> f64 {
+        if value.is_nan() {
+            return 0.0;
+        }
         let above = self.points.partition_point(|p| p.value <= value);
         match (above.checked_sub(1).map(|i| self.points[i]), self.points.get(above)) {
             (Some(a), Some(b)) => a.weight + (b.weight - a.weight) * (value - a.value) / (b.value - a.value),
@@ -90,6 +95,14 @@ const SHOWS: f64 = 0.02;
 fn points(matter: &Matter, look: Option<&Look>) -> (Vec<Point>, f64) {
     let at = |place: f64| matter.first + place * (matter.last - matter.first);
     let of_body = |place: f64, color: [f32; 3], weight: f64| Point { value: at(place), color, weight };
+    if let Some(opposite) = matter.opposite {
+        match look {
+            None => return (of_both_signs(matter, opposite, ColorMap::VIRIDIS), 8.0),
+            Some(Look::Map(map)) => return (of_both_signs(matter, opposite, *map), 8.0),
+            Some(Look::Field(map)) => return (of_both_signs(matter, opposite, *map), 4.0),
+            Some(_) => {}
+        }
+    }
     match look {
         None | Some(Look::Mri) => {
             let [low, middle, high] = PLAIN;
@@ -98,6 +111,7 @@ fn points(matter: &Matter, look: Option<&Look>) -> (Vec<Point>, f64) {
         }
         Some(Look::Cloud) => (vec![of_body(0.0, DROPLETS, 0.0), of_body(1.0, DROPLETS, 1.0)], 5.0),
         Some(Look::Map(map)) => (of_map(*map, of_body), 8.0),
+        Some(Look::Labels(map, labels)) => (of_labels(*map, labels), 8.0),
         Some(Look::Field(map)) => (of_map(*map, of_body), 4.0),
         Some(Look::CtBone) => {
             let [low, high] = BONE;
@@ -138,6 +152,37 @@ fn of_map(map: ColorMap, of_body: impl Fn(f64, [f32; 3], f64) -> Point) -> Vec<P
     };
     (0..=steps).map(point).collect()
 }
+
+/// The colours of a map over values of both signs, of which those farther from 0 are denser; the middle of the map is 0.
+fn of_both_signs(matter: &Matter, opposite: [f64; 2], map: ColorMap) -> Vec<Point> {
+    const STEPS: usize = 8;
+    let sides = [[matter.first, matter.last], opposite];
+    let one = |side: usize, step: usize| {
+        let ([first, last], place) = (sides[side], step as f64 / STEPS as f64);
+        let sign = if last > first { 1.0 } else { -1.0 };
+        Point { value: first + place * (last - first), color: map.at(0.5 + 0.5 * sign * place), weight: place * place }
+    };
+    (0..2).flat_map(|side| (0..=STEPS).map(move |step| (side, step))).map(|(side, step)| one(side, step)).collect()
+}
+
+/// Labels that are as dense as each other, each with its colour by rank; what has none, 0, is nothing.
+fn of_labels(map: ColorMap, labels: &Labels) -> Vec<Point> {
+    /// How far beyond nothing a label begins.
+    const EDGE: f64 = 0.5;
+    let known: Vec<f64> = labels.0.iter().copied().filter(|label| *label > 0.0).collect();
+    let last = known.len().saturating_sub(1).max(1);
+    let every = known.len().div_ceil(MOST_LABELS).max(1);
+    let color = |rank: usize| map.at(rank as f64 / last as f64);
+    let nothing =
+        labels.0.first().filter(|label| **label == 0.0).map(|_| Point { value: 0.0, color: color(0), weight: 0.0 });
+    let edge = nothing.map(|nothing| Point { value: EDGE, weight: 1.0, ..nothing });
+    let of_known = known.iter().enumerate().filter(|(rank, _)| rank % every == 0 || rank + 1 == known.len());
+    let of_known = of_known.map(|(rank, label)| Point { value: *label, color: color(rank), weight: 1.0 });
+    nothing.into_iter().chain(edge).chain(of_known).collect()
+}
+
+/// Labels up to which each is written with its colour.
+const MOST_LABELS: usize = 64;
 
 /// Values at places between two.
 fn between(from: f64, to: f64, places: [f64; 4]) -> [f64; 4] {
@@ -184,6 +229,28 @@ mod tests {
                 assert_eq!(transfer.weight(0.0), 0.0);
             }
         }
+    }
+
+    #[test]
+    fn both_signs_and_all_labels_show_and_gaps_do_not() {
+        let mut grid = cube(1.0);
+        // Half of the cube has the other sign.
+        (0..24 * 24 * 12).for_each(|i| grid.values[i] = -grid.values[i]);
+        let matter = Matter::of(&grid).unwrap();
+        for look in [None, Some(Look::Map(ColorMap::VIRIDIS)), Some(Look::Field(ColorMap::VIRIDIS))] {
+            let transfer = Transfer::new(&grid, Some(&matter), look.as_ref());
+            assert!(transfer.points.windows(2).all(|w| w[0].value < w[1].value), "{transfer:?}");
+            let [plus, minus, zero] = [100.0, -100.0, 0.0].map(|value| transfer.weight(value));
+            assert!(plus > 0.9 && minus > 0.9 && zero == 0.0, "{plus} {minus} {zero}");
+            assert_eq!(transfer.weight(f64::NAN), 0.0);
+        }
+        let labels = Labels(vec![0.0, 1.0, 2.0, 3.0, 11.0]);
+        let points = of_labels(ColorMap::VIRIDIS, &labels);
+        let transfer = Transfer { points: rising(points), extinction: 1.0 };
+        assert!([1.0, 2.0, 3.0, 11.0].iter().all(|label| transfer.weight(*label) == 1.0));
+        assert_eq!(transfer.weight(0.0), 0.0);
+        let colors: Vec<[f32; 3]> = transfer.points[2..].iter().map(|p| p.color).collect();
+        assert!((1..colors.len()).all(|i| !colors[..i].contains(&colors[i])), "{colors:?}");
     }
 
     #[test]

@@ -23,13 +23,19 @@ const LONE: f32 = 0.25;
 
 /// What can be told of a scene before it is drawn, one sentence each.
 pub(crate) fn of_scene(scene: &Scene, loaded: &Loaded) -> Vec<String> {
-    let dark = without_light(scene).into_iter();
+    // Points in the colours of their file are drawn without light, by a material behind those of the scene.
+    let is_shown = loaded.materials.len() > scene.materials.len();
+    let dark = without_light(scene).filter(|_| !is_shown).into_iter();
     if scene.frames.is_some() {
         return dark.collect();
     }
     let seen = seen(loaded);
     let unseen = outside(scene, loaded, &seen).into_iter().chain(small::too_small(scene, loaded, &seen));
-    dark.chain(turned_away(loaded)).chain(unseen).chain(clear_shadows(scene, loaded)).chain(too_thick(scene, loaded)).collect()
+    dark.chain(turned_away(loaded))
+        .chain(unseen)
+        .chain(clear_shadows(scene, loaded))
+        .chain(too_thick(scene, loaded))
+        .collect()
 }
 
 /// Objects that absorb inside, and lie in a light that casts shadows, which are those of surfaces alone.

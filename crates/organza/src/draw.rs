@@ -100,6 +100,7 @@ fn stages(frame: &Frame<'_>) -> Stages {
         last.extend(steps.pop());
         steps.into_iter().for_each(|(name, seconds)| add(name, seconds));
     }
+    add(stage::GROUP, crate::frame::grouped::seconds(scene, all));
     add(stage::PROJECT, cost::PROJECT * drawn);
     add(stage::SHADE, drawn * (cost::SHADE + maps as f64 * cost::LOOK_UP));
     add(stage::OPAQUE, cost::FRAGMENT * opaque.fragments);

@@ -114,7 +114,12 @@ impl Error {
         let what = format!("{}{}", printable(Path::new(&error.file)), error.place);
         let message = format!("expected {}, found {}", error.expected, shown(&error.found));
         match error.fault {
-            convert::Fault::FileSystem => Self::io(path, "cannot read", std::io::Error::other(message)),
+            convert::Fault::FileSystem if error.is_missing_file() => {
+                Self::io(path, "cannot read", std::io::Error::new(std::io::ErrorKind::NotFound, error.found.as_str()))
+            }
+            convert::Fault::FileSystem => {
+                Self::io(path, "cannot read", std::io::Error::other(format!("{message}; {}", error.hint)))
+            }
             convert::Fault::Cancelled => Self::Cancelled,
             convert::Fault::Limit => Self::TooLarge { what, message, hint: error.hint.into() },
             _ => Self::input(what, message, error.hint),

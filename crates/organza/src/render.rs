@@ -105,6 +105,18 @@ impl Left {
     }
 }
 
+/// The techniques that no device draws, where one was asked for.
+fn left_to_processor(plan: &Plan) -> Option<String> {
+    let left: Vec<&str> = plan.techniques.iter().filter(|t| !row(**t).by_device).map(|t| t.name()).collect();
+    (!left.is_empty()).then(|| {
+        format!(
+            "what the technique {} draws is drawn by the processor: a device draws that of `points` and `particles` alone; \
+             --technique chooses one",
+            left.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(" or ")
+        )
+    })
+}
+
 /// [`render`] with what there is already.
 pub(crate) fn render_keeping(
     scene: &Scene,
@@ -152,8 +164,25 @@ pub(crate) fn render_keeping(
     }
     warnings.extend(doubts::of_shadows(plan.tables()));
     warnings.extend(doubts::of_scattering(plan));
+    warnings.extend(helper.as_ref().and_then(|_| left_to_processor(plan)));
     warnings.extend(helper.map(|helper| helper.said()).unwrap_or_default());
     let scales = loaded.scales.clone();
     left.made = (!left.is_still).then(|| Made { scene: scene.clone(), loaded, planned, leaves });
     Ok(Render { layers, cost, plan: shown, sets, warnings, notes, scales, found, backend })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Technique;
+
+    #[test]
+    fn what_no_device_draws_is_told_by_name() {
+        let said = |techniques: &[Technique]| {
+            left_to_processor(&Plan { techniques: techniques.to_vec(), ..Plan::default() }).unwrap_or_default()
+        };
+        assert_eq!(said(&[Technique::Points, Technique::Particles]), "");
+        assert!(said(&[Technique::Points, Technique::Sheets]).starts_with("what the technique `sheets` draws"));
+        assert!(said(&[Technique::Surfels, Technique::Reference]).contains("`surfels` or `reference`"));
+    }
 }

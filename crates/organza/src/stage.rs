@@ -6,6 +6,8 @@ pub(crate) const READ: &str = "reading";
 pub(crate) const DRAW: &str = "drawing";
 /// Translucent splats are culled and sliced.
 pub(crate) const SORT: &str = "sorting";
+/// Discs are parted into groups.
+pub(crate) const GROUP: &str = "grouping discs";
 /// Splats get their footprints.
 pub(crate) const PROJECT: &str = "projecting";
 /// Splats get their radiance.

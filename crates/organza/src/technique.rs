@@ -60,6 +60,8 @@ pub(crate) struct Row {
     pub(crate) meets_discs: bool,
     /// Its passes; the last one comes behind opaque surfaces, those before it come before footprints.
     pub(crate) steps: &'static [Step],
+    /// Whether a device may draw what it draws.
+    pub(crate) by_device: bool,
     /// Whether its picture is an average of random sets, which a checkpoint can keep.
     pub(crate) is_random: bool,
     /// Bytes that it takes beside what all techniques take.
@@ -161,6 +163,7 @@ pub(crate) static TABLE: [Row; 5] = [
         how: "are composited in slabs, volumes classified after reconstruction",
         form: Some(sheets::form),
         polygons: true,
+        by_device: false,
         steps: &[Step { pass: pass::SHEETS, stage: stage::SHEETS, seconds: sheets::seconds }],
         bytes: sheets::bytes,
         carries: sheets::carries,
@@ -175,6 +178,7 @@ pub(crate) static TABLE: [Row; 5] = [
         bumps: surfels::bumps,
         gaussians: false,
         meets_discs: true,
+        by_device: false,
         steps: &[SORT, Step { pass: pass::SURFELS, stage: stage::SURFELS, ..FOLD }],
         bytes: surfels::bytes,
         plans: surfels::plans,
@@ -185,6 +189,7 @@ pub(crate) static TABLE: [Row; 5] = [
         technique: Technique::Reference,
         is_offered: |_| false,
         how: "are sorted pixel by pixel, exactly, which is slow",
+        by_device: false,
         steps: &[Step {
             pass: pass::REFERENCE,
             stage: stage::REFERENCE,
@@ -215,6 +220,7 @@ const POINTS: Row = Row {
     gaussians: true,
     meets_discs: false,
     steps: &[SORT, FOLD],
+    by_device: true,
     is_random: false,
     bytes: |_, _, _, _| 0,
     carries: |_| None,

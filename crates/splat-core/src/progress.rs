@@ -58,6 +58,7 @@ impl Progress {
     /// the place of what was planned before.
     pub fn plan<S: Into<String>>(&self, stages: impl IntoIterator<Item = (S, f64)>) {
         let mut course = self.course();
+        course.is_finished = false;
         let frame = course.frame();
         frame.left = stages.into_iter().map(|(name, weight)| (name.into(), weight.max(0.0))).collect();
         frame.weight = frame.left.iter().map(|s| s.1).sum();
@@ -109,6 +110,7 @@ impl Progress {
     /// All is done, or all of the stage that was entered last.
     pub fn finish(&self) {
         let mut course = self.course();
+        course.is_finished = course.frames.len() <= 1;
         let frame = course.frame();
         (frame.left, frame.weight) = (VecDeque::new(), 0.0);
         (frame.stage.begin, frame.stage.end) = (frame.end, frame.end);
@@ -156,7 +158,7 @@ impl Progress {
     }
 
     /// The present stage, after those that it is a stage of, and the fraction of the whole that is done, 0 to 1, never less
-    /// than before.
+    /// than before; 1 after [`Progress::finish`] alone, 0.99 at most until then.
     pub fn report(&self) -> (String, f64) {
         self.look(&mut self.course())
     }
@@ -166,8 +168,9 @@ impl Progress {
         let share = if total > 0 { (done as f64 / total as f64).min(1.0) } else { 0.0 };
         let Stage { begin, end, .. } = course.frame().stage;
         course.reported = course.reported.max(begin + (end - begin) * share).min(1.0);
+        let fraction = if course.is_finished { course.reported } else { course.reported.min(MOST) };
         let names = course.frames.iter().map(|f| f.stage.name.as_str()).filter(|n| !n.is_empty());
-        (names.collect::<Vec<_>>().join(": "), course.reported)
+        (names.collect::<Vec<_>>().join(": "), fraction)
     }
 
     fn say(&self, mut course: MutexGuard<'_, Course>) {
@@ -197,7 +200,12 @@ struct Course {
     frames: Vec<Frame>,
     /// Largest fraction that was reported.
     reported: f64,
+    /// Whether all is done.
+    is_finished: bool,
 }
+
+/// Fraction of the whole that is reported at most until all is done: predictions fall short, and what is whole is over.
+const MOST: f64 = 0.99;
 
 impl Course {
     /// What was entered last.
@@ -266,6 +274,9 @@ mod tests {
         progress.tick(1).unwrap();
         assert!((progress.report().1 - (0.55 + 0.45 / 4.0)).abs() < 1e-12);
         progress.begin("not planned");
+        // All of the plan is behind it, and it is not over.
+        assert_eq!(progress.report(), ("not planned".to_owned(), MOST));
+        progress.finish();
         assert_eq!(progress.report(), ("not planned".to_owned(), 1.0));
     }
 
@@ -282,8 +293,9 @@ mod tests {
             assert_eq!(progress.report(), (format!("{frame}: draw"), begin + 0.125));
             progress.finish();
             progress.leave();
-            assert_eq!(progress.report(), (frame.to_owned(), begin + 0.5));
+            assert_eq!(progress.report(), (frame.to_owned(), (begin + 0.5).min(MOST)));
         }
+        progress.finish();
         assert_eq!(progress.report().1, 1.0);
     }
 

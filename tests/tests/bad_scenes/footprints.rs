@@ -59,7 +59,7 @@ fn images_are_read_and_refused_with_file_key_and_hint() {
         ("[{ image = \"black.png\" }]", "", "black.png has no pixel above 0", "alpha"),
         ("[{ image = \"wide.png\" }]", "", "wide.png has 4097 x 1 pixels", "make it smaller"),
         ("[{ image = \"text.png\" }]", "", "text.png", ""),
-        ("[{ image = \"text\" }]", "", "text: expected a PNG or OpenEXR image, found 'no image'", "as PNG"),
+        ("[{ image = \"text\" }]", "", "text: expected a PNG or OpenEXR image, found a text of a format", "as PNG"),
         (
             "[{ image = \"leaf.png.ply\" }]",
             "",

@@ -85,6 +85,7 @@ impl Folder {
         write("larger.xyz", &ball(0.75));
         write("grid.nrrd", &nrrd("", 1.0));
         write("other.nrrd", &nrrd("", 0.6));
+        write("arrays.vtk", &arrays());
         write("series.nrrd", &series());
         write("body.nrrd", &nrrd("space: right-anterior-superior\n", 1.0));
         Self(folder)
@@ -194,6 +195,18 @@ fn ball(radius: f64) -> String {
         writeln!(text, "{} {} {} {} {} {}", radius * x, radius * 0.7 * y, radius * z, nx / n, ny / n, nz / n).unwrap();
     }
     text
+}
+
+/// Two arrays of 3³ values on cells of 0.4.
+fn arrays() -> String {
+    let values =
+        |power: i32| (0..27).map(|i| (f64::from(i) / 26.0).powi(power).to_string()).collect::<Vec<_>>().join(" ");
+    format!(
+        "# vtk DataFile Version 3.0\narrays\nASCII\nDATASET STRUCTURED_POINTS\nDIMENSIONS 3 3 3\nORIGIN -0.4 -0.4 -0.4\n\
+         SPACING 0.4 0.4 0.4\nPOINT_DATA 27\nFIELD all 2\nfirst 1 27 float\n{}\nother 1 27 float\n{}\n",
+        values(1),
+        values(3)
+    )
 }
 
 /// A lopsided blob of 6³ values from 0 to 1 on cells of 0.2.

@@ -200,6 +200,8 @@ fn objects() -> Vec<Entry> {
         one("object.lattice", "object.it.lattice='bcc'").but(All, Refused(2, "`lattice` belongs to a `volume`")),
         of(VOLUME, "object.frame", "object.it.frame=1").with(&["object.it.volume='series.nrrd'"]),
         one("object.frame", "object.it.frame=1").but(All, Refused(2, "`frame` belongs to a `volume`")),
+        of(VOLUME, "object.array", "object.it.array='other'").with(&["object.it.volume='arrays.vtk'"]),
+        one("object.array", "object.it.array='other'").but(All, Refused(2, "`array` belongs to a `volume`")),
         of(All, "object.shadow_coefficient", "object.it.shadow_coefficient=0.2"),
         one("object.technique", "object.it.technique='reference'"),
         of(All, "object.casts_shadow", "object.it.casts_shadow=false"),
@@ -230,6 +232,8 @@ fn objects() -> Vec<Entry> {
         of(RAW, "object.unlit", "object.it.unlit=true")
             .but(All, Refused(2, "`unlit` and `material` exclude each other")),
         one("object.unlit", "object.it.unlit=true").but(All, Refused(2, "`unlit` belongs to `points`")),
+        of(RAW, "object.degrees", "object.it.degrees=true"),
+        one("object.degrees", "object.it.degrees=true").but(All, Refused(2, "`degrees` belongs to `points`")),
         of(RAW, "object.point_size", "object.it.point_size={world=0.05}"),
         one("object.point_size", "object.it.point_size={world=0.05}")
             .but(All, Refused(2, "`point_size` belongs to `points`")),

@@ -118,10 +118,10 @@ pub(super) fn field(
     let tuples = numbers.chunks_exact(selection.numbers as usize);
     input::hold("the field", 8 * tuples.len() as u64, params)?;
     let values: Vec<f64> = tuples.map(|tuple| selection.value.of(|i| tuple[i])).collect();
-    if let Some(i) = values.iter().position(|v| !(*v as f32).is_finite()) {
-        let (expected, found) =
-            ("finite values that fit 32-bit floats", format!("{} at value {i} of {name}", values[i]));
-        return Err(ReadError::input(place, expected, found, "replace NaN by the background value first"));
+    if let Some(i) = values.iter().position(|v| (*v as f32).is_infinite()) {
+        let (expected, found) = ("values that fit 32-bit floats", format!("{} at value {i} of {name}", values[i]));
+        let hint = "scale the values, or write NaN where there is none: it draws nothing";
+        return Err(ReadError::input(place, expected, found, hint));
     }
     notes.remarks.push(format!("the field is {name}, of the {}", if of_points { "points" } else { "cells" }));
     Ok(if of_points { Field::Points(values) } else { Field::Cells(values) })

@@ -89,7 +89,7 @@ impl Gathered {
     }
 
     fn checked(&mut self, one: &Gaussian, first: usize) -> Result<(), Wrong> {
-        const HINT: &str = "remove the Gaussian, or ask to drop invalid points";
+        const HINT: &str = "remove the Gaussian, or leave such points out with --drop-invalid";
         let Gaussian { position, deviation, rotation: [w, x, y, z], opacity } = *one;
         if !position.is_finite() {
             return Err(("a place of finite numbers", position.to_string(), HINT));
@@ -118,6 +118,24 @@ impl Gathered {
         self.points.color.push(constant.map(|c| linear_from_srgb((0.5 + CONSTANT * c).max(0.0))));
         self.positions.push(position);
         Ok(())
+    }
+
+    /// Whether most of them are about as large as all of them together: a trainer makes none such.
+    pub(super) fn are_as_large_as_all(&self) -> bool {
+        /// Fewer may be a test of one.
+        const FEWEST: usize = 100;
+        /// Median of the longest axes over the diagonal of the box of all places.
+        const SHARE: f64 = 0.1;
+        let longest = |axes: &[splat_core::glam::Vec3; 3]| axes.iter().map(|axis| axis.length()).fold(0.0, f32::max);
+        let mut longest: Vec<f32> = self.points.gaussians.axes.iter().map(longest).collect();
+        if longest.len() < FEWEST {
+            return false;
+        }
+        let middle = longest.len() / 2;
+        let median = f64::from(*longest.select_nth_unstable_by(middle, f32::total_cmp).1);
+        let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        self.positions.iter().for_each(|place| (low, high) = (low.min(*place), high.max(*place)));
+        median >= SHARE * (high - low).length()
     }
 
     /// All of them; `place` is where they begin in the file.

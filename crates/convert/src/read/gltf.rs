@@ -30,9 +30,14 @@ use std::path::Path;
 
 const HINT: &str = "the file is damaged, or was written wrongly; try a glTF validator";
 
-/// Extensions that may be required: those that are read, and those that change neither shapes nor base colours.
-const UNDERSTOOD: [&str; 20] = [
+/// Extensions that may be required: those that are read, those that change neither shapes nor base colours, and kinds of images, without
+/// which surfaces have the factors of their colours.
+const UNDERSTOOD: [&str; 24] = [
     "KHR_mesh_quantization",
+    "KHR_texture_basisu",
+    "EXT_texture_webp",
+    "EXT_texture_avif",
+    "MSFT_texture_dds",
     "KHR_texture_transform",
     "KHR_animation_pointer",
     "KHR_lights_punctual",
@@ -55,9 +60,11 @@ const UNDERSTOOD: [&str; 20] = [
 ];
 
 /// Extensions of which more is to be said than that they are not read.
-const COMPRESSED: [&str; 4] =
-    ["KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression", "KHR_texture_basisu"];
+const DRACO: &str = "KHR_draco_mesh_compression";
+const MESHOPT: [&str; 2] = ["EXT_meshopt_compression", "KHR_meshopt_compression"];
 const SPLATS: &str = "KHR_gaussian_splatting";
+const SPLATS_HINT: &str =
+    "3D Gaussians are read from PLY, compressed PLY, .splat and SPZ: save them so, such as with SuperSplat";
 
 fn wrong(expected: String, found: String) -> ReadError {
     ReadError::input(Place::File, expected, found, HINT)
@@ -82,8 +89,7 @@ pub(super) fn read(content: &[u8], place: Option<&Path>, reading: &mut Reading<'
     for (primitive, instance) in primitives {
         reading.go_on()?;
         if primitive.extensions.contains_key(SPLATS) {
-            let hint = "3D Gaussian splats are not drawn; use a mesh or points";
-            return Err(ReadError::input(Place::File, "triangles or points", SPLATS, hint));
+            return Err(ReadError::input(Place::File, "triangles or points", SPLATS, SPLATS_HINT));
         }
         match primitive.mode {
             Some(1..=3) => reading.notes.not_used([&b"lines"[..]]),
@@ -118,8 +124,11 @@ fn check_required(document: &Document) -> Result<(), ReadError> {
         return Ok(());
     };
     let hint = match name.as_str() {
-        SPLATS => "3D Gaussian splats are not drawn; use a mesh or points",
-        other if COMPRESSED.contains(&other) => "open it in Blender and export it without compression",
+        other if other.starts_with(SPLATS) => SPLATS_HINT,
+        DRACO => "import it into Blender, and export it as glTF with Compression switched off",
+        other if MESHOPT.contains(&other) => {
+            "export it without mesh compression: gltfpack without -c and -cc, gltf-transform with --compress false"
+        }
         _ => "export it without this extension",
     };
     let found = format!("{}, which the file requires", escaped(name.as_bytes(), 60));

@@ -41,8 +41,11 @@ impl<'a> Stream<'a> {
         // Asked before opening: opening a FIFO waits for its writer.
         let kind = std::fs::metadata(path).map_err(refused)?;
         if !kind.is_file() {
-            let found = if kind.is_dir() { "a directory" } else { "a pipe, socket or device" };
-            return Err(ReadError::file_system("a regular file", found, "name a file; copy a stream into one first"));
+            if kind.is_dir() {
+                return Err(super::unread::folder(path));
+            }
+            let hint = "copy what comes of it into a file first";
+            return Err(ReadError::file_system("a regular file", "a pipe, socket or device", hint));
         }
         let file = File::open(path).map_err(refused)?;
         let length = file.metadata().map_err(refused)?.len();
@@ -242,6 +245,9 @@ impl Read for Measured {
 }
 
 fn refused(e: &io::Error) -> ReadError {
+    if e.kind() == io::ErrorKind::NotFound {
+        return ReadError::missing();
+    }
     ReadError::file_system("a file that can be read", e.to_string(), "check the path and its permissions")
 }
 

@@ -157,14 +157,22 @@ fn damaged(byte: usize, expected: &str, found: &str) -> ReadError {
     ReadError::input(Place::Byte(byte as u64), expected, found, HINT)
 }
 
+/// Refuses other versions before their header is parsed, whose length may be another.
+fn check_version(content: &[u8]) -> Result<(), ReadError> {
+    let Some([major, minor]) = content.get(24..26) else { return Ok(()) };
+    if *major == 1 && *minor <= 4 {
+        return Ok(());
+    }
+    let hint = "save it as LAS 1.4 from the program that it comes from";
+    Err(ReadError { hint, ..damaged(24, "LAS version 1.0 to 1.4", &format!("{major}.{minor}")) })
+}
+
 /// Parses the header and checks it against the file.
 fn layout(content: &[u8]) -> Result<Layout, ReadError> {
+    check_version(content)?;
     let header = raw::Header::read_from(content)
         .map_err(|e| damaged(0, "'LASF' at byte 0 and a complete LAS header", &e.to_string()))?;
     let version = header.version;
-    if version.major != 1 || version.minor > 4 {
-        return Err(damaged(24, "LAS version 1.0 to 1.4", &format!("{}.{}", version.major, version.minor)));
-    }
     let points = header.offset_to_point_data as usize;
     if header.header_size < version.header_size() || points < usize::from(header.header_size) || points > content.len()
     {
@@ -234,7 +242,8 @@ fn plain_records<'a>(content: &'a [u8], layout: &Layout) -> Result<&'a [u8], Rea
                 return Ok(records);
             }
             let found = format!("{spare} bytes more than that before the next part of the file");
-            Err(damaged(107, &format!("{} points, as the header says", layout.count), &found))
+            let hint = "the header announces fewer points than the file holds: write the file anew, such as with `pdal translate`";
+            Err(ReadError { hint, ..damaged(107, &format!("{} points, as the header says", layout.count), &found) })
         }
         None => {
             let whole = stored.len() as u64 / layout.record;
@@ -301,7 +310,8 @@ impl Columns {
         }
         let lattice = Some(PointLattice { offset: layout.offset, scale: layout.scale, steps });
         let color = linear_colors(&rgb)?;
-        Ok(RawPoints { origin, position, color, value, classification, lattice, ..RawPoints::default() })
+        let is_intensity = true;
+        Ok(RawPoints { origin, position, color, value, is_intensity, classification, lattice, ..RawPoints::default() })
     }
 }
 

@@ -86,6 +86,13 @@ impl<'a> Materials<'a> {
         Ok(())
     }
 
+    /// Says where material files state materials, and no face has one of them.
+    pub(super) fn remark_unused(&self, reading: &mut Reading<'_>) {
+        if !self.is_used && !self.rank.is_empty() {
+            reading.notes.remark("its material file is not used: no face names one of its materials by `usemtl`");
+        }
+    }
+
     /// Rank of the texture of that name; `None` where it is not there, which a remark says.
     fn texture(&mut self, name: String, reading: &mut Reading<'_>) -> Result<Option<usize>, ReadError> {
         if let Some(known) = self.decoded.get(&name) {
@@ -97,6 +104,10 @@ impl<'a> Materials<'a> {
             && let Some(content) = self.content(&name, "the texture", reading)?
         {
             let what = format!("texture '{}'", escaped(name.as_bytes(), 60));
+            if Texture::is_left_out(&content, &what, reading) {
+                self.decoded.insert(name, None);
+                return Ok(None);
+            }
             self.textures.push(Texture::decode(&content, &what, reading)?);
             found = Some(self.textures.len() - 1);
         }

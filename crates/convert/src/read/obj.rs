@@ -305,6 +305,7 @@ impl Content<'_> {
             triangles: Vec::new(),
         };
         let mesh = self.fans.into_mesh(vertices, reading)?;
+        self.materials.remark_unused(reading);
         if self.materials.is_used && colored {
             reading.notes.not_used([&b"Kd"[..]]);
         }

@@ -3,7 +3,7 @@
 //! Kept are `x y z`, `normal_x normal_y normal_z`, `rgb` or `rgba`, `intensity` and `opacity`; other fields are named. The
 //! parser is our own: counts of a header are checked against the file before anything is allocated, and places down to
 //! the column are asked of it. Points without a place, which depth cameras write as NaN where they see nothing, are left
-//! out and counted; an infinite coordinate is refused.
+//! out and counted; an infinite coordinate is refused. Zeros behind the last point, up to a whole page, are PCL's own padding.
 
 mod body;
 mod columns;
@@ -19,6 +19,8 @@ use columns::Columns;
 use header::{Data, Header};
 
 const TRUNCATED: &str = "the file is truncated or damaged; fetch it again";
+const LONGER: &str =
+    "the header announces fewer points, or smaller ones, than the file holds: mend POINTS, SIZE or COUNT";
 
 /// Reads a PCD file.
 pub(super) fn read(content: &[u8], reading: &mut Reading<'_>) -> Result<RawPoints, ReadError> {
@@ -29,7 +31,7 @@ pub(super) fn read(content: &[u8], reading: &mut Reading<'_>) -> Result<RawPoint
         Data::Text => Text::new(content, &header).read(&header, &mut columns, reading)?,
         Data::Binary => {
             let (record, needed) = (header.record(), header.bytes()?);
-            if body.len() as u64 != needed {
+            if !is_padded(body, needed) {
                 return Err(other_length(&header, needed, body.len()));
             }
             let layout = header.fields.iter().map(|f| [f.offset, record]).collect();
@@ -48,7 +50,14 @@ pub(super) fn read(content: &[u8], reading: &mut Reading<'_>) -> Result<RawPoint
 
 fn other_length(header: &Header, needed: u64, found: usize) -> ReadError {
     let expected = format!("{needed} bytes, {} points of {} each", header.points, header.record());
-    ReadError::input(Place::Byte(header.body as u64), expected, found.to_string(), TRUNCATED)
+    let hint = if found as u64 > needed { LONGER } else { TRUNCATED };
+    ReadError::input(Place::Byte(header.body as u64), expected, found.to_string(), hint)
+}
+
+/// Whether so many bytes are there, with nothing but zeros behind them: PCL fills its files up to whole pages of memory.
+fn is_padded(bytes: &[u8], needed: u64) -> bool {
+    let padding = usize::try_from(needed).ok().and_then(|needed| bytes.get(needed..));
+    padding.is_some_and(|padding| padding.iter().all(|byte| *byte == 0))
 }
 
 /// The bytes of all points out of their compressed form: its length, that of the points, then LZF.
@@ -64,10 +73,12 @@ fn unpacked(body: &[u8], header: &Header, reading: &Reading<'_>) -> Result<Vec<u
         return Err(ReadError::input(at, expected, announced.to_string(), TRUNCATED));
     }
     let packed = &body[8..];
-    if packed.len() as u64 != stored {
+    if !is_padded(packed, stored) {
         let expected = format!("{stored} bytes, as announced");
-        return Err(ReadError::input(at, expected, packed.len().to_string(), TRUNCATED));
+        let hint = if packed.len() as u64 > stored { LONGER } else { TRUNCATED };
+        return Err(ReadError::input(at, expected, packed.len().to_string(), hint));
     }
+    let packed = &packed[..stored as usize];
     // An empty cloud may be written without anything.
     if needed == 0 {
         return Ok(Vec::new());

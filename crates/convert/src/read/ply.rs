@@ -15,7 +15,7 @@ mod splats;
 
 use super::reading::Reading;
 use super::{Loaded, ReadParams};
-use crate::error::ReadError;
+use crate::error::{Place, ReadError};
 use ascii::Ascii;
 use binary::Binary;
 use body::Source;
@@ -37,6 +37,12 @@ fn elements<S: Source>(source: S, header: &Header, reading: &mut Reading<'_>) ->
     }
     if let Some(kind) = header.gaussians() {
         return gaussians::read(source, header, kind, reading).map(Loaded::Points);
+    }
+    if header.has_gaussians_without_harmonics() {
+        let hint = "write f_dc_0 to f_dc_2 = (colour / 255 − 0.5) / 0.2820948 in the place of red, green and blue, or draw points without \
+            scale_* and rot_*";
+        let (expected, found) = ("Gaussians with their colours as f_dc_0 to f_dc_2", "Gaussians without such");
+        return Err(ReadError::input(Place::File, expected, found, hint));
     }
     let loaded = body::read(source, header, reading)?;
     reading.notes.not_used(unused(header, reading.params)?.iter().map(Vec::as_slice));

@@ -26,6 +26,62 @@ impl Value {
     }
 }
 
+/// What is known of an array among which one is chosen.
+#[cfg(any(feature = "vti", feature = "vtk"))]
+pub(super) struct Candidate {
+    /// As it may be shown.
+    pub(super) name: String,
+    /// Numbers of a tuple, and their type.
+    pub(super) numbers: u64,
+    pub(super) kind: Option<Kind>,
+    /// Whether the file says that it is the one to show.
+    pub(super) is_named: bool,
+}
+
+#[cfg(any(feature = "vti", feature = "vtk"))]
+impl Candidate {
+    /// Whether it is a field of numbers, or of colours.
+    fn is_field(&self) -> bool {
+        let is_color = matches!(self.numbers, 3 | 4) && matches!(self.kind, Some(Kind::U8 | Kind::U16));
+        self.numbers == 1 || is_color
+    }
+}
+
+/// Rank of the array that is the field: the one that `params` name, else the one that the file does, else the first of one number a tuple, or of
+/// colours. Says what else could be chosen. `None` without arrays.
+#[cfg(any(feature = "vti", feature = "vtk"))]
+pub(super) fn chosen_array(
+    all: &[Candidate],
+    place: Place,
+    params: &ReadParams,
+    notes: &mut Notes,
+) -> Result<Option<usize>, ReadError> {
+    let names = |but: usize| {
+        let others = all.iter().enumerate().filter(|(rank, array)| *rank != but && array.is_field());
+        others.map(|(_, array)| array.name.as_str()).collect::<Vec<_>>().join(", ")
+    };
+    if let Some(name) = &params.array {
+        let rank = all.iter().position(|array| array.name == crate::error::escaped(name.as_bytes(), 40));
+        return rank.map(Some).ok_or_else(|| {
+            let expected = format!("an array among {}", names(all.len()));
+            let found = format!("'{}'", crate::error::escaped(name.as_bytes(), 40));
+            ReadError::input(place, expected, found, "choose one of these; `organza info` names all arrays")
+        });
+    }
+    let named = all.iter().position(|array| array.is_named);
+    let Some(rank) =
+        named.or_else(|| all.iter().position(Candidate::is_field)).or(if all.is_empty() { None } else { Some(0) })
+    else {
+        return Ok(None);
+    };
+    let others = names(rank);
+    if !others.is_empty() {
+        let shown = &all[rank].name;
+        notes.remark(format!("the array {shown} is drawn; `array` of a scene or --color-by chooses another: {others}"));
+    }
+    Ok(Some(rank))
+}
+
 /// The part of the stored numbers that is read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Selection {
@@ -81,7 +137,7 @@ impl Selection {
         if !(matches!(numbers, 3 | 4) && stands_for_color) {
             let expected = "one number a voxel, or a colour: three or four unsigned integers of 8 or 16 bits";
             let found = format!("{numbers} numbers of {} bytes a voxel", kind.size());
-            let hint = "write one component, or the length of the vectors, as a volume of its own";
+            let hint = "write one component, or the length of the vectors, as an array or a volume of its own";
             return Err(ReadError::input(place, expected, found, hint));
         }
         let alpha = if numbers == 4 { "; alpha is not used" } else { "" };

@@ -38,7 +38,12 @@ pub(super) fn read(content: &[u8], reading: &mut Reading<'_>) -> Result<RawPoint
     let bytes = HEADER as u128 + count as u128 * widths.iter().sum::<usize>() as u128;
     if content.len() as u128 != bytes {
         let expected = format!("{bytes} bytes for {count} Gaussians of degree {degree}");
-        let hint = "the file is truncated or damaged; fetch it again";
+        let is_longer = content.len() as u128 > bytes;
+        let hint = if is_longer {
+            "the file holds more than its header announces: save it anew, such as with SuperSplat"
+        } else {
+            "the file is truncated or damaged; fetch it again"
+        };
         return Err(ReadError::input(Place::Byte(content.len() as u64), expected, format!("{}", content.len()), hint));
     }
     let mut gathered = Gathered::new(count, degree, reading.params)?;

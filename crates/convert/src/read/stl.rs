@@ -21,6 +21,9 @@ const LOOK: usize = 1 << 14;
 /// Bytes that a facet takes while it is read and converted.
 const BYTES_PER_FACET: u64 = 3 * (24 + 12) + 12;
 
+/// What is wrong with a file that is longer than it says.
+const LONGER: &str = "the file holds more than the facets that its header counts: the count is wrong, or it is no STL";
+
 /// Reads an STL file.
 pub(super) fn read(content: &[u8], reading: &mut Reading<'_>) -> Result<Mesh, ReadError> {
     let announced = content.get(80..HEADER).map(|b| u64::from(u32::from_le_bytes([b[0], b[1], b[2], b[3]])));
@@ -41,7 +44,9 @@ pub(super) fn read(content: &[u8], reading: &mut Reading<'_>) -> Result<Mesh, Re
             _ => "a binary STL of at least 84 bytes, or a text that begins with 'solid'".to_owned(),
         };
         let found = format!("{length} bytes");
-        ReadError::input(Place::Byte(80), expected, found, "the file is truncated, damaged or not STL")
+        let is_longer = needed.is_some_and(|needed| needed < length);
+        let hint = if is_longer { LONGER } else { "the file is truncated, damaged or not STL" };
+        ReadError::input(Place::Byte(80), expected, found, hint)
     };
     match needed {
         // Less than a facet more is padding; more, and the number of facets is not to be believed.
@@ -63,8 +68,14 @@ pub(super) fn is_text(content: &[u8]) -> bool {
 }
 
 /// The facets after the header.
-fn binary(content: &[u8], reading: &Reading<'_>) -> Result<Mesh, ReadError> {
+fn binary(content: &[u8], reading: &mut Reading<'_>) -> Result<Mesh, ReadError> {
     let facets = content.as_chunks::<FACET>().0;
+    if facets.iter().any(|facet| facet[48..] != [0; 2]) {
+        reading.notes.remark(
+            "its facets have attribute bytes, which some programs use as colours: they are not drawn; colours are read \
+             from PLY, OBJ and glTF",
+        );
+    }
     let mut corners = reserved(facets.len(), reading.params)?;
     for (n, facet) in facets.iter().enumerate() {
         if n.is_multiple_of(LOOK) {

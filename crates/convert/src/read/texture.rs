@@ -36,7 +36,28 @@ struct Texels {
 
 static LINEAR: LazyLock<[f32; 256]> = LazyLock::new(|| std::array::from_fn(|i| linear_from_srgb(i as f64 / 255.0)));
 
+/// Kinds of images that are not read, by bytes at an offset.
+const UNREAD: [(usize, &[u8], &str); 7] = [
+    (0, b"\xabKTX ", "KTX2"),
+    (8, b"WEBP", "WebP"),
+    (4, b"ftypavif", "AVIF"),
+    (0, b"DDS ", "DDS"),
+    (0, b"BM", "BMP"),
+    (0, b"II*\0", "TIFF"),
+    (0, b"MM\0*", "TIFF"),
+];
+
 impl Texture {
+    /// Whether an image is of a kind that is known and not read, so that its surfaces have their colours without it; a remark says so.
+    pub(super) fn is_left_out(content: &[u8], what: &str, reading: &mut Reading<'_>) -> bool {
+        let has = |at: usize, mark: &[u8]| content.get(at..).is_some_and(|rest| rest.starts_with(mark));
+        let Some((.., kind)) = UNREAD.iter().find(|(at, mark, _)| has(*at, mark)) else { return false };
+        let remark =
+            format!("{what} is {kind}, which is not read: surfaces are drawn without it; save it as PNG or JPEG");
+        reading.notes.remark(remark);
+        true
+    }
+
     /// Decodes a PNG or JPEG image; `what` names it in messages.
     pub(super) fn decode(content: &[u8], what: &str, reading: &Reading<'_>) -> Result<Self, ReadError> {
         reading.go_on()?;

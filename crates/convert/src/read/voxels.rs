@@ -11,6 +11,8 @@ use rayon::prelude::*;
 const CHUNK: usize = 1 << 16;
 /// Bytes read at once, about, and the most of one voxel.
 const BLOCK: u64 = 8 << 20;
+/// What is wrong with a file that has more voxels than were announced.
+const LONGER: &str = "the file holds more than its header or its name states: the sizes, the type or the number of frames are other ones";
 /// Most numbers in a file.
 const MAX_NUMBERS: u64 = 1 << 45;
 
@@ -135,12 +137,12 @@ pub(super) fn read(
     hint: &'static str,
 ) -> Result<Vec<f32>, ReadError> {
     let (needed, at) = (stored.bytes(), stream.position());
-    let wrong = |found: String| {
+    let wrong = |found: String, hint: &'static str| {
         let expected = format!("{needed} bytes of voxels ({} x {} bytes)", stored.shown(), stored.kind.size());
         Err(ReadError::input(Place::Byte(at), expected, found, hint))
     };
     if let Some(left) = stream.left().filter(|left| *left != needed) {
-        return wrong(left.to_string());
+        return wrong(left.to_string(), if left > needed { LONGER } else { hint });
     }
     stream.expect(needed)?;
     let mut values = room(stored, params)?;
@@ -154,15 +156,15 @@ pub(super) fn read(
         got += stream.skip(needed - got + 1)?;
     }
     match got {
-        n if n < needed => return wrong(n.to_string()),
-        n if n > needed => return wrong(format!("more than {needed}")),
+        n if n < needed => return wrong(n.to_string(), hint),
+        n if n > needed => return wrong(format!("more than {needed}"), LONGER),
         _ => {}
     }
-    if let Some(i) = values.par_iter().position_first(|v| !v.is_finite()) {
+    if let Some(i) = values.par_iter().position_first(|v| v.is_infinite()) {
         let place = Place::Byte(at + start + i as u64 * stored.voxel_bytes());
         let found = format!("{} at voxel {i}", values[i]);
-        let hint = "replace NaN by the background value first";
-        return Err(ReadError::input(place, "finite values that fit 32-bit floats", found, hint));
+        let hint = "scale the values, or write NaN where there is none: it draws nothing";
+        return Err(ReadError::input(place, "values that fit 32-bit floats", found, hint));
     }
     Ok(values)
 }
@@ -270,13 +272,14 @@ pub(super) fn text(
     let mut voxel = Vec::new();
     for i in 0..needed {
         let Some(word) = words.next() else { return wrong(i as usize) };
-        voxel.push(word.number()?);
+        // NaN is a voxel without a value.
+        voxel.push(word.decimal().filter(|v| v.is_nan()).map_or_else(|| word.number(), Ok)?);
         if (voxel.len() as u64) < numbers {
             continue;
         }
         if i / (stored.count() * numbers) == frame {
             let value = stored.value(|i| voxel[i]);
-            if !value.is_finite() {
+            if value.is_infinite() {
                 let expected = "a value that fits a 32-bit float";
                 return Err(ReadError::input(word.place(), expected, word.shown(), "scale the values"));
             }
@@ -297,6 +300,6 @@ pub(super) fn whole_text(
     let values = text(&mut words, stored, params, hint)?;
     match words.next() {
         None => Ok(values),
-        Some(word) => Err(ReadError::input(word.place(), "the end of the voxels", word.shown(), hint)),
+        Some(word) => Err(ReadError::input(word.place(), "the end of the voxels", word.shown(), LONGER)),
     }
 }

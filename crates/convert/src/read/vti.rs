@@ -1,14 +1,14 @@
 //! VTK files in XML: images (`.vti`) and cells (`.vtu`) → a volume of scalars, of colours their luma; surfaces (`.vtp`) → a mesh.
 //!
-//! Arrays as text, in base64 or appended, raw or in base64, each also in blocks of zlib. Read is the array that `Scalars` names,
-//! else the first, of the points, else of the cells; others are named.
+//! Arrays as text, in base64 or appended, raw or in base64, each also in blocks of zlib. Read is the array that is asked for, else the one
+//! that `Scalars` names, else the first of one number, of the points, else of the cells; others are named.
 
 mod data;
 mod piece;
 
 use super::input;
 use super::reading::Reading;
-use super::selection::Selection;
+use super::selection::{Candidate, Selection, chosen_array};
 use super::voxels::{Kind, Stored};
 use super::{Loaded, Notes, ReadParams, lattice, xml};
 use crate::error::{Place, ReadError, escaped};
@@ -18,6 +18,9 @@ use splat_core::Grid;
 use splat_core::glam::{DMat3, DVec3};
 
 const HINT: &str = "the file is truncated or damaged, or its header states other sizes";
+
+/// What to do with datasets that are not read.
+const OTHER_DATASETS: &str = "other datasets of VTK are not read: in ParaView, Resample To Image and save it as .vti, or Append Datasets and save it as .vtu";
 
 /// Most elements, attributes and texts of a file; real ones have some dozens.
 const MAX_NODES: u32 = 10_000;
@@ -53,7 +56,7 @@ fn image(
     if extent(piece, "Extent")? != extent(image, "WholeExtent")? {
         return Err(wrong(piece, "the WholeExtent in one Piece", piece.attribute("Extent").unwrap_or_default()));
     }
-    let chosen = chosen(piece, notes);
+    let chosen = chosen(piece, params, notes)?;
     let (array, is_of_cells) = chosen.ok_or_else(|| wrong(piece, "a DataArray in PointData or CellData", "none"))?;
     not_used(image, &[array], notes);
     let (mut origin, mut sizes) = (lattice.origin, lattice.points);
@@ -87,13 +90,28 @@ fn dataset<'a, 'i>(document: &'a Document<'i>) -> Result<Node<'a, 'i>, ReadError
     let root = document.root_element();
     let kind = root.attribute("type").unwrap_or_default();
     if !root.has_tag_name("VTKFile") || !DATASETS.contains(&kind) {
-        let hint = "other datasets of VTK are not read: resample to an image, or write cells as an unstructured grid";
-        return Err(ReadError {
-            hint,
-            ..wrong(root, "a VTKFile of type ImageData, UnstructuredGrid or PolyData", kind)
-        });
+        return Err(other_dataset(root, kind));
     }
     child(root, kind).ok_or_else(|| wrong(root, &format!("an element {kind}"), "none"))
+}
+
+/// The error for a dataset that is not read: of one that names files its pieces, else its kind.
+fn other_dataset(root: Node<'_, '_>, kind: &str) -> ReadError {
+    /// Most pieces that are named.
+    const MOST: usize = 4;
+    let expected = "a VTKFile of type ImageData, UnstructuredGrid or PolyData";
+    let of = |node: Node<'_, '_>| node.attribute("Source").or_else(|| node.attribute("file")).map(str::to_owned);
+    let pieces: Vec<String> = root.descendants().filter_map(of).collect();
+    if pieces.is_empty() {
+        return ReadError { hint: OTHER_DATASETS, ..wrong(root, expected, kind) };
+    }
+    let mut named: Vec<String> = pieces.iter().take(MOST).map(|piece| escaped(piece.as_bytes(), 60)).collect();
+    if pieces.len() > MOST {
+        named.push(format!("{} more", pieces.len() - MOST));
+    }
+    let found = format!("a {} of the pieces {}", escaped(kind.as_bytes(), 40), named.join(", "));
+    let hint = "draw its pieces: give the .vti, .vtu or .vtp files that it names to `organza render` together";
+    ReadError { hint, found, ..wrong(root, expected, kind) }
 }
 
 /// The piece of an image, which has to be the only one.
@@ -158,19 +176,32 @@ fn arrays<'a, 'i>(data: Node<'a, 'i>) -> impl Iterator<Item = Node<'a, 'i>> + Cl
     data.children().filter(|c| c.has_tag_name("DataArray"))
 }
 
-/// The array that is read, and whether it belongs to the cells.
-fn chosen<'a, 'i>(piece: Node<'a, 'i>, notes: &mut Notes) -> Option<(Node<'a, 'i>, bool)> {
-    let of = ["PointData", "CellData"].map(|name| child(piece, name));
-    let (array, data) = of.into_iter().flatten().find_map(|data| {
+/// The array that is read, and whether it belongs to the cells: of the points where one of them is a field, else of the cells.
+fn chosen<'a, 'i>(
+    piece: Node<'a, 'i>,
+    params: &ReadParams,
+    notes: &mut Notes,
+) -> Result<Option<(Node<'a, 'i>, bool)>, ReadError> {
+    let data: Vec<_> = ["PointData", "CellData"].into_iter().filter_map(|name| child(piece, name)).collect();
+    let mut all = Vec::new();
+    let first = data.iter().find(|data| arrays(**data).next().is_some()).copied();
+    for data in &data {
         let named = data.attribute("Scalars");
-        let active = arrays(data).find(|a| named.is_some() && a.attribute("Name") == named);
-        active.or_else(|| arrays(data).next()).map(|a| (a, data))
-    })?;
-    if let Some(named) = data.attribute("Scalars").filter(|name| Some(*name) != array.attribute("Name")) {
-        let named = escaped(named.as_bytes(), 40);
-        notes.remarks.push(format!("there is no array '{named}', which Scalars names: the first one is read"));
+        let is_there = arrays(*data).any(|array| array.attribute("Name") == named);
+        if let Some(named) = named.filter(|_| !is_there && arrays(*data).next().is_some()) {
+            let named = escaped(named.as_bytes(), 40);
+            notes.remark(format!("there is no array '{named}', which Scalars names: another is read"));
+        }
+        for array in arrays(*data) {
+            let is_named = first == Some(*data) && named.is_some() && array.attribute("Name") == named;
+            let (name, kind) = (name(array), kind(array).ok());
+            all.push((array, Candidate { name, numbers: components(array)?, kind, is_named }));
+        }
     }
-    Some((array, data.has_tag_name("CellData")))
+    let (nodes, candidates): (Vec<_>, Vec<_>) = all.into_iter().unzip();
+    let rank = chosen_array(&candidates, place(piece), params, notes)?;
+    let is_of_cells = |array: Node<'_, '_>| array.parent_element().is_some_and(|of| of.has_tag_name("CellData"));
+    Ok(rank.map(|rank| (nodes[rank], is_of_cells(nodes[rank]))))
 }
 
 /// Names the arrays that are not used.

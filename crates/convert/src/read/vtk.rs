@@ -1,7 +1,7 @@
 //! Legacy VTK files (`.vtk`) of structured points, of cells and of polygons → a volume of scalars, of colours their luma; a mesh.
 //!
-//! Text, or binary in big endian. Read is the first `SCALARS` or `COLOR_SCALARS` of the points, else their first array of a `FIELD`, else the same
-//! of the cells. Other arrays are named, other datasets refused by name.
+//! Text, or binary in big endian. Read is the first `SCALARS` or `COLOR_SCALARS` of the points, else their first array of one number of a `FIELD`, else the
+//! same of the cells, unless one is asked for by name. Other arrays are named, other datasets refused by name.
 
 mod arrays;
 mod parts;
@@ -18,6 +18,9 @@ use splat_core::Grid;
 use splat_core::glam::{DMat3, DVec3};
 
 const HINT: &str = "the file is truncated or damaged, or its header states other sizes";
+
+/// What to do with datasets that are not read.
+const OTHER_DATASETS: &str = "other datasets of VTK are not read: in ParaView, Resample To Image and save it as .vti, or Append Datasets and save it as .vtu";
 
 /// What the points of a file hang together by.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -58,7 +61,9 @@ fn image<'a>(
         }
     }
     let (dims, place) = points.dims.ok_or_else(|| missing(&lines, "DIMENSIONS"))?;
-    let array = arrays.chosen().ok_or_else(|| missing(&lines, "SCALARS, or an array of a FIELD, of POINT_DATA"))?;
+    let array = arrays
+        .chosen(params, notes)?
+        .ok_or_else(|| missing(&lines, "SCALARS, or an array of a FIELD, of POINT_DATA"))?;
     notes.not_used(arrays.all().filter(|a| a.place != array.place).map(|a| a.name.as_bytes()));
     let axes = DMat3::from_diagonal(points.spacing);
     lattice::check(points.origin, &axes, points.place, HINT)?;
@@ -94,8 +99,7 @@ fn head(lines: &mut Lines<'_>) -> Result<(bool, Dataset), ReadError> {
         [b"DATASET", b"UNSTRUCTURED_GRID"] => Dataset::UnstructuredGrid,
         [b"DATASET", b"POLYDATA"] => Dataset::PolyData,
         _ => {
-            let hint =
-                "other datasets of VTK are not read: resample to an image, or write cells as an unstructured grid";
+            let hint = OTHER_DATASETS;
             let expected = "DATASET STRUCTURED_POINTS, UNSTRUCTURED_GRID or POLYDATA";
             return Err(ReadError { hint, ..wrong(dataset, expected) });
         }

@@ -42,6 +42,9 @@ pub(super) fn read(content: &[u8], params: &ReadParams, notes: &mut Notes) -> Re
     let mut lines = Lines::new(content);
     let mut columns: Option<Vec<Option<usize>>> = None;
     let (mut count, mut positions, mut points) = (None, Vec::new(), RawPoints::default());
+    let is_intensity = |words: &[Word<'_>], roles: &[Option<usize>]| {
+        words.iter().zip(roles).any(|(w, role)| *role == Some(VALUE) && bare(w).eq_ignore_ascii_case(b"intensity"))
+    };
     let mut extras = Extras::default();
     let mut held = input::Growing::new("the points");
     while let Some(line) = lines.next()? {
@@ -55,6 +58,7 @@ pub(super) fn read(content: &[u8], params: &ReadParams, notes: &mut Notes) -> Re
             }
             if first.number().is_err() {
                 let roles = named(line, &words)?;
+                points.is_intensity = is_intensity(&words, &roles);
                 notes.not_used(words.iter().zip(&roles).filter(|(_, r)| r.is_none()).map(|(w, _)| bare(w)));
                 let others = words.iter().zip(&roles).enumerate().map(|(i, (w, role))| (i, bare(w), role.is_some()));
                 extras = Extras::new(others, params);
@@ -80,13 +84,14 @@ pub(super) fn read(content: &[u8], params: &ReadParams, notes: &mut Notes) -> Re
     if let Some((announced, place)) = count
         && announced != positions.len() as u64 + points.dropped
     {
-        let found = counted(positions.len() as u64 + points.dropped, "point");
-        return Err(ReadError::input(
-            place,
-            format!("{}, as announced", counted(announced, "point")),
-            found,
-            "the file is truncated",
-        ));
+        let held = positions.len() as u64 + points.dropped;
+        let hint = if held > announced {
+            "the file holds more points than its first line counts: mend the count, or remove it"
+        } else {
+            "the file is truncated"
+        };
+        let expected = format!("{}, as announced", counted(announced, "point"));
+        return Err(ReadError::input(place, expected, counted(held, "point"), hint));
     }
     let (origin, position) = origin::relative(&positions, Place::File, |i| format!("point {i}"))?;
     Ok(RawPoints { origin, position, columns: extras.finish(notes), ..points })
@@ -151,7 +156,9 @@ fn named(line: Line<'_>, words: &[Word<'_>]) -> Result<Vec<Option<usize>>, ReadE
 
 /// Roles of columns without names.
 fn guessed(line: Line<'_>, words: &[Word<'_>]) -> Result<Vec<Option<usize>>, ReadError> {
-    let numbers: Vec<f64> = words.iter().map(|w| w.number()).collect::<Result<_, _>>()?;
+    // One that is not finite is refused, or left out, with the point.
+    let number = |w: &Word<'_>| w.decimal().map_or_else(|| w.number(), Ok);
+    let numbers: Vec<f64> = words.iter().map(number).collect::<Result<_, _>>()?;
     let roles = match numbers.as_slice() {
         [_, _, _] => vec![0, 1, 2],
         [_, _, _, _] => vec![0, 1, 2, VALUE],
@@ -186,6 +193,10 @@ fn point(
             Err(_) if params.drop_invalid && is_float(*word) => {
                 points.dropped += 1;
                 return Ok(false);
+            }
+            Err(error) if is_float(*word) => {
+                let hint = "remove the point, or leave such points out with --drop-invalid";
+                return Err(ReadError { hint, ..error });
             }
             Err(error) => return Err(error),
         }

@@ -66,9 +66,16 @@ pub(super) fn of_facts(file: &Path, facts: &Facts) -> String {
     faults(facts, &mut text);
     if facts.kind != "image" {
         let stands = facts.stands.map(UpAxis::name);
-        let stands = stands.map(|axis| format!("; it stands on {axis} = 0, so a first scene has {axis} point up"));
-        let axis = facts.up.name();
-        text.add("up", format!("{axis}, which a scene takes unless it says another{}", stands.unwrap_or_default()));
+        let stands = stands.map(|axis| format!("; it stands along {axis}, so a first scene has {axis} point up"));
+        let (axis, stands) = (facts.up.name(), stands.unwrap_or_default());
+        text.add(
+            "up",
+            if facts.is_up_stated {
+                format!("{axis}, as the file says")
+            } else {
+                format!("{axis}, as nothing in the file says another{stands}; --up of render and init turns it")
+            },
+        );
     }
     if !facts.unused.is_empty() {
         text.add("not used", facts.unused.join(", "));

@@ -191,11 +191,13 @@ fn shape(object: &SceneObject, reflects: Option<[f32; 3]>, options: &RenderOptio
             (Shape::Field { field: Arc::new(field), bounds, majorant }, d.extinction)
         }
         Source::Volume(VolumeSource { path, frame, transfer }) => {
-            let FileData::Grid(grid) = read(path, *frame, options)? else {
+            let FileData::Grid(grid) = read(path, *frame, object.array.as_ref(), options)? else {
                 return Err(Error::wrong_kind(path, "a volume", "use `mesh = ` or `points = ` for this file"));
             };
+            let gapless = convert::transparent_gaps(&grid, transfer);
+            let (grid, transfer) = gapless.map_or((grid, transfer.clone()), |(grid, transfer)| (grid.into(), transfer));
             grid.validate().map_err(|e| Error::input(printable(path), e.to_string(), ""))?;
-            (Shape::Volume(Arc::new(Classified::new(grid, transfer.clone(), &t))), 1.0)
+            (Shape::Volume(Arc::new(Classified::new(grid, transfer, &t))), 1.0)
         }
         _ => return Err(Error::Internal("a surface is no medium".into())),
     })

@@ -58,7 +58,7 @@ pub(super) fn body(
             return no("open surfaces are not path-traced");
         }
         Source::Combined(_) => combined(object, options)?,
-        Source::Mesh(path) => match read(path, 0, options)? {
+        Source::Mesh(path) => match read(path, 0, None, options)? {
             FileData::Mesh(mesh) => mesh,
             _ => {
                 return Err(Error::wrong_kind(
@@ -127,12 +127,15 @@ fn solid(source: &Source, object: &SceneObject, options: &RenderOptions) -> Resu
             let (field, walls) = (Arc::new(i.field()?), Vec::new());
             Ok(Solid { field, walls, bounds: i.bounds, step: i.spacing }.closed())
         }
-        Source::Isosurface(i) => match read(&i.path, i.frame, options)? {
-            FileData::Grid(grid) => Solid::of_volume(grid.into(), i.interpolation, i.level, i.inside).map_err(refused),
+        Source::Isosurface(i) => match read(&i.path, i.frame, object.array.as_ref(), options)? {
+            FileData::Grid(grid) => {
+                let grid = convert::gaps_outside(&grid, i.level as f32, i.inside).unwrap_or(grid);
+                Solid::of_volume(grid.into(), i.interpolation, i.level, i.inside).map_err(refused)
+            }
             _ => Err(Error::wrong_kind(&i.path, "a volume", "use `mesh = ` or `points = ` for this file")),
         },
         Source::LevelSet(l) => {
-            let points = match read(&l.path, 0, options)? {
+            let points = match read(&l.path, 0, None, options)? {
                 FileData::Points(points) => points,
                 FileData::Mesh(mesh) => RawPoints::of_vertices(&mesh),
                 _ => {
@@ -218,8 +221,13 @@ fn surface(scene: &Scene, object: &SceneObject, mut mesh: Mesh) -> Body {
 }
 
 /// The data of a file; of a series of volumes that of one frame.
-pub(super) fn read(path: &Path, frame: u64, options: &RenderOptions) -> Result<FileData, Error> {
-    let params = ReadParams { frame, ..options.read_params() };
+pub(super) fn read(
+    path: &Path,
+    frame: u64,
+    array: Option<&String>,
+    options: &RenderOptions,
+) -> Result<FileData, Error> {
+    let params = ReadParams { frame, array: array.cloned(), ..options.read_params() };
     convert::read::file(path, &params, None).map(|read| read.0).map_err(|e| Error::from_read(path, &e))
 }
 

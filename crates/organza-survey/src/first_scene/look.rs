@@ -3,9 +3,11 @@
 use super::point_colors::point_colors;
 use super::quoted;
 use crate::data_file::DataFile;
+use crate::labels::Labels;
 use crate::matter::Matter;
 use crate::number::{color, grouped, rounded, significant};
 use crate::preset::{Look, Preset, Wish};
+use crate::stands::extent;
 use crate::transfer::Transfer;
 use convert::ColorMap;
 use organza::FileData;
@@ -66,8 +68,7 @@ pub(super) fn objects(data: &[DataFile], paths: &[String], wish: &Wish) -> Vec<O
     let mut names: BTreeMap<String, usize> = BTreeMap::new();
     let mut materials: Vec<&str> = Vec::new();
     let mut clays = CLAYS.iter().cycle();
-    // Files that belong together have one system of coordinates: all of them stand in it, or none is stood up.
-    let all_stand = data.iter().all(|file| file.stands.or(file.stated_up).is_some());
+    let all_stand = all_stand(data);
     let mut one = |(file, path): (&DataFile, &String)| {
         let mut name = file.name();
         let count = names.entry(name.clone()).or_insert(0);
@@ -82,8 +83,19 @@ pub(super) fn objects(data: &[DataFile], paths: &[String], wish: &Wish) -> Vec<O
         };
         let bare = if file.is_colored() || colors.is_some() { None } else { clays.next() };
         let mut object = object(file, wish.preset.as_ref(), colors);
+        if file.degrees {
+            object.keys = format!("degrees = true     # x and y are longitude and latitude, z metres\n{}", object.keys);
+        }
+        if let Some(array) = &file.array {
+            object.keys = format!("array = {}\n{}", quoted(array), object.keys);
+        }
         if let Some(up) = wish.up.or(file.stands.filter(|_| all_stand)) {
             object.keys = format!("transform = {{ up = \"{}\" }}\n{}", up.name(), object.keys);
+        } else if file.stated_up.is_none() {
+            object.keys = format!(
+                "# Nothing in the file says which axis points up, so y does; `--up z` of init turns it.\n{}",
+                object.keys
+            );
         }
         if let (Some(clay), false) = (bare, matches!(file.data, FileData::Grid(_))) {
             object.keys = format!("color = {}\n{}", color(*clay), object.keys);
@@ -99,6 +111,11 @@ pub(super) fn objects(data: &[DataFile], paths: &[String], wish: &Wish) -> Vec<O
         Object { name, source: (object.source.0, path.clone()), ..object }
     };
     data.iter().zip(paths).map(&mut one).collect()
+}
+
+/// Whether all files stand: those that belong together have one system of coordinates, in which all do, or none is stood up.
+pub(super) fn all_stand(data: &[DataFile]) -> bool {
+    data.iter().all(|file| file.stands.or(file.stated_up).is_some())
 }
 
 fn object(file: &DataFile, preset: Option<&Preset>, colors: Option<String>) -> Object {
@@ -157,12 +174,19 @@ fn object(file: &DataFile, preset: Option<&Preset>, colors: Option<String>) -> O
     }
 }
 
-/// How a volume looks: a computed field in the colours of a map, unless its look has a name. What scanners measure comes in whole numbers, in
+/// How a volume looks: a computed field in the colours of a map and labels in such, unless its look has a name. What scanners measure comes in whole numbers, in
 /// Hounsfield units, or in formats that state how the patient lies.
 fn volume_look(grid: &Grid, matter: Option<&Matter>, preset: Option<&Preset>, is_scan: bool) -> Option<Look> {
     let is_field =
         || !is_scan && !matter.is_some_and(Matter::has_units) && grid.values.iter().any(|value| value.fract() != 0.0);
-    match preset.map(|preset| &preset.0) {
+    let look = preset.map(|preset| &preset.0);
+    if let (false, None | Some(Look::Map(_)), Some(labels)) =
+        (matter.is_some_and(Matter::has_units), look, Labels::of(grid))
+    {
+        let map = if let Some(Look::Map(map)) = look { *map } else { ColorMap::VIRIDIS };
+        return Some(Look::Labels(map, labels));
+    }
+    match look {
         None if is_field() => Some(Look::Field(ColorMap::VIRIDIS)),
         Some(Look::Map(map)) if is_field() => Some(Look::Field(*map)),
         look => look.cloned(),
@@ -174,18 +198,6 @@ fn sides(bounds: DAabb) -> String {
     let size = bounds.size().to_array();
     let largest = size.iter().copied().fold(0.0, f64::max);
     format!("{} world units", size.map(|s| rounded(s, 1e-3 * largest.max(1e-300))).join(" × "))
-}
-
-fn extent(grid: &Grid) -> DAabb {
-    let n = grid.dims.map(|n| n as f64);
-    let corner = |k: usize| {
-        let index =
-            splat_core::glam::DVec3::from_array(std::array::from_fn(
-                |a| if k >> a & 1 == 0 { -0.5 } else { n[a] - 0.5 },
-            ));
-        grid.origin + grid.axes * index
-    };
-    DAabb::of_points((0..8).map(corner))
 }
 
 /// The least step of the lattice that a volume is drawn on, world units, and the largest one.
@@ -213,6 +225,13 @@ fn volume_keys(grid: &Grid, matter: Option<&Matter>, look: Option<&Look>) -> Str
             "spacing = {}     # coarser than the file, for speed; leave it out for all voxels",
             significant(spacing, 3)
         );
+    }
+    match (look, matter.and_then(|m| m.opposite)) {
+        (Some(Look::Labels(..)), _) => {
+            text += "# Whole numbers that name regions: each has the colour of its rank, and all are as dense; 0 is nothing.\n"
+        }
+        (_, Some(_)) => text += "# Values of both signs: those near 0 do not show.\n",
+        _ => {}
     }
     if let Some(air) = matter.and_then(|m| m.air) {
         let _ = writeln!(text, "# Around it the values are about {}.", significant(air, 3));

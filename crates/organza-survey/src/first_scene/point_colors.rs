@@ -39,7 +39,7 @@ fn telling(points: &RawPoints) -> Option<&'static str> {
         return Some("classification");
     }
     let first = points.value.first()?;
-    points.value.iter().any(|value| value != first).then_some("value")
+    points.value.iter().any(|value| value != first).then_some(points.value_name())
 }
 
 /// How many points have which class.

@@ -1,9 +1,9 @@
 //! Groups of discs, as the algorithms of the paper ask for: found once for each object, and kept while it only moves.
 
 use super::Frame;
-use crate::pass;
 use crate::scene::{Collisions, Coverage, Grouping, Scene, SceneObject, SurfelGroups};
 use crate::{CostRecord, Error, escape_controls};
+use crate::{pass, stage as stages};
 use deferred_blend::grouping::{self, GroupsOfObjects, KeptGroups, Membership, Method, Recipe};
 
 /// How the discs of an object are grouped, seen by some camera.
@@ -49,6 +49,7 @@ pub(crate) fn members(
 ) -> Result<Membership, Error> {
     let (transforms, objects) = (super::discs::transforms(frame), &frame.scene.objects);
     let of = |rank: usize| (transforms[rank], recipe(groups, frame, &objects[rank]));
+    frame.progress.begin(stages::GROUP);
     cost.measure(pass::GROUP, |stage| {
         let kept = &mut frame.groups.borrow_mut()[usize::from(are_opaque)];
         let made = kept.members_of_all((frame.drawn(), ids), of, Some(frame.progress));
@@ -66,6 +67,15 @@ fn refuse(object: &SceneObject, error: deferred_blend::Error) -> Error {
         )),
         other => super::discs::refuse(other),
     }
+}
+
+/// Seconds of grouping so many discs, about; those that are enlarged look at all discs beside each.
+pub(crate) fn seconds(scene: &Scene, discs: f64) -> f64 {
+    const GROUPED: f64 = 1e-5;
+    const ENLARGED: f64 = 1e-3;
+    let settings = &scene.render.surfels;
+    let of = |groups: &SurfelGroups| if groups.coverage == Coverage::Enlarged { ENLARGED } else { GROUPED };
+    discs * [settings.layers.groups(), settings.opaque.groups()].into_iter().flatten().map(of).sum::<f64>()
 }
 
 /// Bytes of grouping so many discs, of a cloud of these bytes.

@@ -108,7 +108,8 @@ impl Context<'_> {
 
     /// The same of one volume of a series.
     pub(super) fn read_frame(&self, path: &Path, frame: u64) -> Result<FileData, Error> {
-        self.files.read(path, &ReadParams { frame, ..self.options.read_params() }, self.progress)
+        let array = self.scene.objects.get(self.id).and_then(|object| object.array.clone());
+        self.files.read(path, &ReadParams { frame, array, ..self.options.read_params() }, self.progress)
     }
 
     /// The same of a file that nothing but what is made from it needs.

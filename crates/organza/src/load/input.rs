@@ -15,6 +15,7 @@ use convert::{
 };
 use pbsr::{BoundedExtinction, Matter};
 use splat_core::{DAabb, Grid, Mesh, Reservation, TransferFunction};
+use std::borrow::Cow;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -24,7 +25,7 @@ pub(super) enum Input<'a> {
     Mesh(String, Arc<Mesh>, MeshParams),
     Points(&'a Path, Arc<RawPoints>, SurfelParams),
     Matter(&'a Path, Arc<RawPoints>, MatterParams),
-    Volume(Arc<Grid>, &'a TransferFunction, VolumeParams),
+    Volume(Arc<Grid>, Cow<'a, TransferFunction>, VolumeParams),
     /// The zero set of a field in a box; of an isosurface that nothing clips with its volume.
     Surface(SharedField, DAabb, MeshParams, Option<Isosurface>),
     Density(SharedField, DAabb, DensityParams),
@@ -118,7 +119,7 @@ pub(super) fn input<'a>(object: &'a SceneObject, context: &Context<'_>) -> Resul
             Input::Mesh(crate::printable(path).to_string(), mesh, MeshParams { splat, density, opacity })
         }
         Source::Points(path) | Source::Matter(MatterSource { path, .. }) => match context.read(path)? {
-            FileData::Points(points) => raw_points(path, points, object, splat, context)?,
+            FileData::Points(points) => raw_points(path, in_metres(points, object), object, splat, context)?,
             _ => {
                 return Err(Error::wrong_kind(
                     path,
@@ -132,7 +133,7 @@ pub(super) fn input<'a>(object: &'a SceneObject, context: &Context<'_>) -> Resul
             raw_points("what a light sees".as_ref(), points, object, splat, context)?
         }
         Source::Volume(VolumeSource { path, frame, transfer }) => {
-            let grid = read_grid(path, *frame, context)?;
+            let (grid, transfer) = without_gaps(read_grid(path, *frame, context)?, transfer);
             let at = |spacing: f64| convert::resampled(&grid, spacing / splat.transform.scale, &splat).map(Arc::new);
             let grid = object.spacing.map_or_else(|| Ok(grid.clone()), at)?;
             Input::Volume(grid, transfer, context.volume_params(splat))
@@ -181,7 +182,7 @@ fn slice<'a>(
     opacity: f64,
     context: &Context<'_>,
 ) -> Result<Input<'a>, Error> {
-    let grid = read_grid(&source.path, source.frame, context)?;
+    let grid = with_first_value(read_grid(&source.path, source.frame, context)?, &source.transfer);
     let spacing = object.spacing.map_or_else(|| grid.shortest_step(), |s| s / splat.transform.scale);
     let section = Section { center: source.center, normal: source.normal, spacing };
     let mesh = convert::volume_section(grid, &source.transfer, &section, &splat, Some(context.progress))?;
@@ -208,6 +209,7 @@ fn solid(source: &Source, object: &SceneObject, context: &Context<'_>) -> Result
         Source::Isosurface(source) => {
             let grid = read_grid(&source.path, source.frame, context)?;
             let (interpolation, inside) = (source.interpolation, source.inside);
+            let grid = convert::gaps_outside(&grid, source.level as f32, inside).map_or(grid, Arc::new);
             let solid = Solid::of_volume(grid.clone(), interpolation, source.level, inside);
             let of = Isosurface { grid, interpolation, level: source.level as f32, inside };
             (solid.map_err(|e| refuse(&source.path, &e, ""))?, Some(of))
@@ -301,6 +303,11 @@ fn read_mesh(path: &Path, context: &Context<'_>) -> Result<Arc<Mesh>, Error> {
     }
 }
 
+/// Points whose degrees became metres, where the object says that they have such.
+fn in_metres(points: Arc<RawPoints>, object: &SceneObject) -> Arc<RawPoints> {
+    if object.degrees { convert::metres_of_degrees(&points).into() } else { points }
+}
+
 /// Points as samples of a surface, or as matter.
 fn raw_points<'a>(
     path: &'a Path,
@@ -321,8 +328,23 @@ fn raw_points<'a>(
 /// The field that a surface shows.
 pub(super) fn shown_field(object: &SceneObject, context: &Context<'_>) -> Result<Option<SurfaceField>, Error> {
     let Some(FieldSource { path, frame, interpolation, transfer, classified }) = &object.field else { return Ok(None) };
-    let field = SurfaceField::new(read_grid(path, *frame, context)?, *interpolation, transfer.clone(), *classified);
+    let grid = with_first_value(read_grid(path, *frame, context)?, transfer);
+    let field = SurfaceField::new(grid, *interpolation, transfer.clone(), *classified);
     field.map(Some).map_err(|e| refuse(path, &e, ""))
+}
+
+/// A volume whose voxels without a value draw nothing.
+fn without_gaps<'t>(grid: Arc<Grid>, transfer: &'t TransferFunction) -> (Arc<Grid>, Cow<'t, TransferFunction>) {
+    match convert::transparent_gaps(&grid, transfer) {
+        Some((grid, transfer)) => (grid.into(), Cow::Owned(transfer)),
+        None => (grid, Cow::Borrowed(transfer)),
+    }
+}
+
+/// A volume whose voxels without a value have the first colour of a transfer function.
+fn with_first_value(grid: Arc<Grid>, transfer: &TransferFunction) -> Arc<Grid> {
+    let first = transfer.points().first().map_or(0.0, |point| point.value);
+    convert::gaps_of_value(&grid, first).map_or(grid, Arc::new)
 }
 
 fn read_grid(path: &Path, frame: u64, context: &Context<'_>) -> Result<Arc<Grid>, Error> {

@@ -198,7 +198,7 @@ impl Columns {
                 self.points.dropped += 1;
                 return Ok(());
             }
-            let hint = "remove the point, or ask to drop invalid points";
+            let hint = "remove the point, or leave such points out with --drop-invalid";
             let found = format!("{own} at point {point}");
             return Err(ReadError { hint, ..damaged(scan.place, "finite coordinates", found) });
         }
@@ -253,7 +253,8 @@ impl Columns {
             remarks.push(format!("{} without an intensity: it is 0", counted(no_intensity, "point")));
         }
         let (origin, position) = origin::relative(&self.positions, Place::File, |i| format!("point {i}"))?;
-        Ok(RawPoints { origin, position, columns: self.extras.finish(&mut reading.notes), ..self.points })
+        let is_intensity = !self.points.value.is_empty();
+        Ok(RawPoints { origin, position, is_intensity, columns: self.extras.finish(&mut reading.notes), ..self.points })
     }
 }
 

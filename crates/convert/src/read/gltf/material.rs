@@ -44,7 +44,7 @@ pub(super) struct Paints<'a> {
     /// Ranks of textures; `None` for those that are not there.
     decoded: BTreeMap<usize, Option<usize>>,
     /// Images that were decoded, by where their bytes come from.
-    images: BTreeMap<Origin<'a>, Texture>,
+    images: BTreeMap<Origin<'a>, Option<Texture>>,
 }
 
 /// Where the bytes of an image come from, whatever refers to them.
@@ -118,9 +118,9 @@ impl<'a> Paints<'a> {
         let found = match texture.source {
             Some(image) => self.image(image, reading)?,
             None => {
-                reading
-                    .notes
-                    .remark(format!("texture {index} is in no format that is read (PNG, JPEG): it is left out"));
+                reading.notes.remark(format!(
+                    "texture {index} is in no format that is read: surfaces are drawn without it; save it as PNG or JPEG"
+                ));
                 None
             }
         };
@@ -147,12 +147,12 @@ impl<'a> Paints<'a> {
         let what = format!("image {index}");
         let origin = self.origin(image);
         if let Some(known) = origin.as_ref().and_then(|origin| self.images.get(origin)) {
-            return Ok(Some(known.clone()));
+            return Ok(known.clone());
         }
         let decoded = match (&image.uri, image.buffer_view) {
-            (_, Some(view)) => Texture::decode(self.buffers.view(view)?, &what, reading)?,
+            (_, Some(view)) => decoded(self.buffers.view(view)?, &what, reading)?,
             (Some(uri), None) => match fetch(uri, &what, self.beside, reading) {
-                Ok(content) => Texture::decode(&content, &what, reading)?,
+                Ok(content) => decoded(&content, &what, reading)?,
                 Err(error) if error.fault == Fault::FileSystem => {
                     reading.notes.remark(format!("{} ({}): the texture is left out", error.expected, error.found));
                     return Ok(None);
@@ -164,7 +164,7 @@ impl<'a> Paints<'a> {
         if let Some(origin) = origin {
             self.images.insert(origin, decoded.clone());
         }
-        Ok(Some(decoded))
+        Ok(decoded)
     }
 
     /// Where the bytes of an image come from; `None` where they are not there, which fetching them says.
@@ -179,6 +179,14 @@ impl<'a> Paints<'a> {
             (None, None) => None,
         }
     }
+}
+
+/// An image; `None` for one of a kind that is left out, which a remark says.
+fn decoded(content: &[u8], what: &str, reading: &mut Reading<'_>) -> Result<Option<Texture>, ReadError> {
+    if Texture::is_left_out(content, what, reading) {
+        return Ok(None);
+    }
+    Texture::decode(content, what, reading).map(Some)
 }
 
 fn coordinates_of(of: &TextureOf) -> Result<Coordinates, ReadError> {

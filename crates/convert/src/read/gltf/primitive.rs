@@ -135,6 +135,10 @@ pub(super) fn vertices_of(primitive: &Primitive, buffers: &Buffers<'_>) -> u64 {
     if primitive.attributes.contains_key("NORMAL") { stored } else { indices }
 }
 
+/// What is said of vertices that fade.
+const OPACITIES: &str =
+    "opacities of vertices (COLOR_0) are not drawn: a surface has one opacity, the key `opacity` of its object";
+
 fn vertices(
     primitive: &Primitive,
     scene_from_mesh: &DMat4,
@@ -167,6 +171,9 @@ fn vertices(
     let tint = attribute("COLOR_0").map(|index| colors(index, buffers, reading)).transpose()?;
     if let Some(tint) = &tint {
         alike(tint.len(), "COLOR_0")?;
+        if tint.iter().any(|color| color[3] < 1.0) && paints.paints[paint as usize].cutoff.is_none() {
+            reading.notes.remark(OPACITIES);
+        }
     }
     let place = coordinates.map(|c| places(c, attribute, buffers, reading)).transpose()?.flatten();
     if let Some(place) = &place {

@@ -1,8 +1,8 @@
 //! The points of a PCD file, from text or bytes.
 
-use super::TRUNCATED;
 use super::columns::{Columns, Number};
 use super::header::{Field, Header, Kind};
+use super::{LONGER, TRUNCATED};
 use crate::counted::counted;
 use crate::error::{Place, ReadError};
 use crate::read::reading::Reading;
@@ -92,7 +92,8 @@ impl<'a> Text<'a> {
                 let expected =
                     if count == points { "the end of the file".into() } else { counted(numbers as u64, "number") };
                 let found = format!("{} on the line", words.len());
-                return Err(ReadError::input(line.place(), expected, found, TRUNCATED));
+                let hint = if count == points || words.len() > numbers { LONGER } else { TRUNCATED };
+                return Err(ReadError::input(line.place(), expected, found, hint));
             }
             look(count, reading)?;
             // What the file cannot hold is not made room for: a line at a time.

@@ -60,6 +60,7 @@ impl Columns {
         let normal = if let [Some(x), Some(y), Some(z)] = normal { Some([x, y, z]) } else { None };
         let color = of(&["rgb", "rgba"]).filter(|i| fields[*i].size == 4);
         let value = of(&["intensity", "value", "i"]);
+        let is_intensity = of(&["intensity", "i"]).is_some_and(|rank| value == Some(rank));
         let top = |i: usize| match (fields[i].kind, fields[i].size) {
             (Kind::Float, _) => 1.0,
             (_, 2) => 65_535.0,
@@ -85,7 +86,7 @@ impl Columns {
             opacity,
             extras,
             positions: Vec::new(),
-            points: RawPoints::default(),
+            points: RawPoints { is_intensity, ..RawPoints::default() },
             drop_invalid: reading.params.drop_invalid,
             has_alpha: false,
             without_place: 0,
@@ -133,7 +134,7 @@ impl Columns {
                 self.points.dropped += 1;
                 return Ok(());
             }
-            let hint = "remove the point, or ask to drop invalid points";
+            let hint = "remove the point, or leave such points out with --drop-invalid";
             return Err((self.position[axis], "a finite number".to_owned(), hint));
         }
         let value = self.value.map(|i| (i, number(i).value as f32));

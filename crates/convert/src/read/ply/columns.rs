@@ -44,7 +44,8 @@ pub(super) struct Columns {
     record: [f64; 11],
     positions: Vec<DVec3>,
     points: RawPoints,
-    drop_invalid: bool,
+    /// Whether points that are not finite are left out; `None` for the corners of a mesh, which cannot be.
+    drop_invalid: Option<bool>,
     line: u64,
 }
 
@@ -88,9 +89,14 @@ impl Columns {
         let last = extras.read().max().unwrap_or(0).max(of_roles);
         let further = vec![0.0; if extras.read().next().is_some() { kept.len() } else { 0 }];
         let has = [NORMAL, COLOR, VALUE, OPACITY].map(|role| kept.iter().flatten().any(|(r, _)| *r == role));
-        let (record, positions, points) = ([0.0; 11], Vec::new(), RawPoints::default());
-        let drop_invalid = params.drop_invalid && !mesh;
-        Ok(Self { kept, extras, further, last, has, record, positions, points, drop_invalid, line: vertex.line })
+        let is_intensity = kept.iter().zip(&vertex.properties).any(|(kept, property)| {
+            let name = property.name.to_ascii_lowercase();
+            kept.is_some_and(|(role, _)| role == VALUE) && name.ends_with(b"intensity")
+        });
+        let points = RawPoints { is_intensity, ..RawPoints::default() };
+        let drop_invalid = (!mesh).then_some(params.drop_invalid);
+        let (record, positions, line) = ([0.0; 11], Vec::new(), vertex.line);
+        Ok(Self { kept, extras, further, last, has, record, positions, points, drop_invalid, line })
     }
 
     /// Names of the properties of `vertex` that are read over.
@@ -142,8 +148,12 @@ impl Columns {
                 "an opacity",
                 "opacities are 0 to 255, or 0.0 to 1.0 as float; or rename the column",
             )?,
-            _ if !value.is_finite() && !self.drop_invalid => {
-                return Err(("a finite number".to_owned(), "remove the record, or ask to drop invalid points"));
+            _ if !value.is_finite() && self.drop_invalid != Some(true) => {
+                let hint = match self.drop_invalid {
+                    None => "remove the vertex and its faces, or mend its number",
+                    Some(_) => "remove the record, or leave such points out with --drop-invalid",
+                };
+                return Err(("a finite number".to_owned(), hint));
             }
             _ => value,
         })

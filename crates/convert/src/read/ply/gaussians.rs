@@ -24,6 +24,10 @@ const REST: &[u8] = b"f_rest_";
 /// Most of them: 15 of each colour.
 const MOST_REST: usize = 45;
 
+/// What is said where exponentials of the deviations are as large as the scene.
+const LINEAR: &str = "its Gaussians are as large as the scene: scale_0 to scale_2 are read as natural logarithms of deviations, and look like \
+    the deviations themselves; write their logarithms";
+
 /// Reads all elements of a file of Gaussians.
 pub(super) fn read<S: Source>(
     mut source: S,
@@ -114,6 +118,9 @@ fn trained<S: Source>(source: &mut S, element: &Element, reading: &mut Reading<'
     }
     let unused = element.properties.iter().zip(&kept).filter(|(_, slot)| slot.is_none());
     reading.notes.not_used(unused.map(|(p, _)| p.name.as_slice()));
+    if gathered.are_as_large_as_all() {
+        reading.notes.remark(LINEAR);
+    }
     gathered.finish(at_line(element.line))
 }
 

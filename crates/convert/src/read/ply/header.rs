@@ -127,6 +127,13 @@ impl Header {
         self.elements.iter().any(|e| matches!(e.name.as_slice(), b"face" | b"tristrips") && e.count > 0)
     }
 
+    /// Whether its vertices are Gaussians whose colours are no harmonics: those of other programs than trainers.
+    pub(super) fn has_gaussians_without_harmonics(&self) -> bool {
+        let Some(vertex) = self.elements.iter().find(|e| e.name == b"vertex") else { return false };
+        let has = |name: &[u8]| vertex.properties.iter().any(|p| p.name == name);
+        has(b"scale_0") && has(b"rot_0") && has(b"opacity") && !has(b"f_dc_0")
+    }
+
     /// How its vertices are Gaussians, if they are.
     pub(super) fn gaussians(&self) -> Option<GaussianKind> {
         let vertex = self.elements.iter().find(|e| e.name == b"vertex")?;

@@ -197,7 +197,7 @@ fn is_valid<S: Source>(
         Err(_) if reading.params.drop_invalid => Ok(false),
         Err(e) => {
             let expected = format!("{} of splat {record}: {}", e.attribute, e.expected);
-            let hint = "remove the splat, or ask to drop invalid points";
+            let hint = "remove the splat, or leave such points out with --drop-invalid";
             Err(ReadError::input(source.place(), expected, e.found, hint))
         }
     }

@@ -153,7 +153,8 @@ impl<'a> Encoding<'a> {
         }
         let mut numbers = Numbers::room(count, reading)?;
         for word in words.by_ref().take(count as usize) {
-            numbers.all.push(word.number()?);
+            // NaN is a gap in a field; places and counts refuse it where they are made.
+            numbers.all.push(word.decimal().filter(|v| v.is_nan()).map_or_else(|| word.number(), Ok)?);
         }
         let (found, more) = (numbers.len() as u64, words.count() as u64);
         if found == count && more == 0 {

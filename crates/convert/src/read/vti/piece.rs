@@ -50,7 +50,14 @@ pub(super) fn read(
     let cells = all.ok_or_else(|| wrong(dataset, "a Piece", "none"))?;
     let (mut field, mut columns) = (Field::One, PointColumns::default());
     if cells.has_bodies() {
-        if let Some((array, of_cells)) = pieces.iter().find_map(|piece| chosen(piece.node, &mut reading.notes)) {
+        // Pieces without points or cells have no arrays.
+        let mut found = None;
+        for piece in &pieces {
+            if found.is_none() && child(piece.node, "PointData").or(child(piece.node, "CellData")).is_some() {
+                found = chosen(piece.node, reading.params, &mut reading.notes)?;
+            }
+        }
+        if let Some((array, of_cells)) = found {
             let selection = selection(array, reading.params, &mut reading.notes)?;
             let numbers = joined(&pieces, array, &mut used, reading)?;
             let told = (name(array), !of_cells);

@@ -5,8 +5,10 @@ use crate::counted::counted;
 use crate::error::{Place, ReadError, escaped};
 use crate::read::cells::Numbers;
 use crate::read::reading::Reading;
+use crate::read::selection::{Candidate, chosen_array};
 use crate::read::text::{Line, Lines, Word, Words};
 use crate::read::voxels::Kind;
+use crate::read::{Notes, ReadParams};
 use std::ops::Range;
 
 /// Most arrays, each name of which is held against all others; real files have some dozens.
@@ -77,7 +79,8 @@ impl Array {
             return Ok(numbers);
         }
         for word in Words::new(content, self.data.start, self.line).take(count as usize) {
-            numbers.all.push(word.number()?);
+            // NaN is a gap in a field; places and counts refuse it where they are made.
+            numbers.all.push(word.decimal().filter(|v| v.is_nan()).map_or_else(|| word.number(), Ok)?);
         }
         Ok(numbers)
     }
@@ -123,13 +126,21 @@ impl<'a> Arrays<'a> {
         colors().find(|array| array.role == Role::Colors).or_else(|| colors().next())
     }
 
-    /// The array that is read.
-    pub(super) fn chosen(&self) -> Option<&Array> {
-        let of = |of: Of| self.found.iter().filter(move |array| array.of == of);
-        [Of::Points, Of::Cells].into_iter().find_map(|data| {
-            let scalars = of(data).find(|array| matches!(array.role, Role::Scalars | Role::Colors));
-            scalars.or_else(|| of(data).find(|array| array.role == Role::Field))
-        })
+    /// The array that is read: of the points where there are scalars or a field, else of the cells.
+    pub(super) fn chosen(&self, params: &ReadParams, notes: &mut Notes) -> Result<Option<&Array>, ReadError> {
+        let is_field = |array: &&Array| matches!(array.role, Role::Scalars | Role::Colors | Role::Field);
+        let of = |of: Of| self.found.iter().filter(move |array| array.of == of).filter(is_field);
+        let all: Vec<&Array> = of(Of::Points).chain(of(Of::Cells)).collect();
+        let first = all.first().map(|array| array.of);
+        let candidate = |array: &&Array| Candidate {
+            name: array.name.clone(),
+            numbers: array.numbers,
+            kind: Some(array.kind),
+            is_named: Some(array.of) == first && matches!(array.role, Role::Scalars | Role::Colors),
+        };
+        let candidates: Vec<Candidate> = all.iter().map(candidate).collect();
+        let place = all.first().map_or(Place::File, |array| array.place);
+        Ok(chosen_array(&candidates, place, params, notes)?.map(|rank| all[rank]))
     }
 
     /// Takes a line, and passes over the arrays that it announces.

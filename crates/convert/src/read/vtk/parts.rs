@@ -92,7 +92,7 @@ pub(super) fn read(
     cells.check()?;
     let (mut field, mut columns, mut used) = (Field::One, PointColumns::default(), Vec::new());
     if cells.has_bodies() {
-        if let Some(array) = arrays.chosen() {
+        if let Some(array) = arrays.chosen(reading.params, &mut reading.notes)? {
             used.push(array.place);
             field = source.field(array, &cells, reading)?;
         }

@@ -1,0 +1,96 @@
+//! Volumes of labels: whole numbers that name regions, 0 what belongs to none. Their values are no amounts: none of them is thinner than another.
+
+use splat_core::Grid;
+use std::collections::BTreeSet;
+
+/// Share of neighbours that have the same label, of those of which one has a label: regions are larger than their borders.
+const SAME: f64 = 0.7;
+/// Share of other neighbours whose numbers are no successors: measured values rise by steps, labels of regions that touch do not.
+const JUMPS: f64 = 0.25;
+/// Numbers from which a volume of few values has labels, whatever these are; fewer ones have to follow each other.
+const MANY: usize = 5;
+/// Most labels that are counted.
+const MOST: usize = 4096;
+
+/// The labels of a volume, by rising number; 0 among them where some voxels have none.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Labels(pub(crate) Vec<f64>);
+
+impl Labels {
+    /// `None` for a volume whose values are amounts.
+    pub(crate) fn of(grid: &Grid) -> Option<Self> {
+        let is_label = |value: &f32| value.is_nan() || (*value >= 0.0 && value.fract() == 0.0);
+        if !grid.values.iter().all(is_label) {
+            return None;
+        }
+        let [columns, rows, _] = grid.dims;
+        let (mut touching, mut same, mut jumps) = (0u64, 0u64, 0u64);
+        let mut count = |a: f32, b: f32| {
+            if a.max(b) > 0.0 {
+                touching += 1;
+                same += u64::from(a == b);
+                jumps += u64::from((a - b).abs() >= 2.0);
+            }
+        };
+        for (row, values) in grid.values.chunks(columns).enumerate() {
+            values.windows(2).for_each(|pair| count(pair[0], pair[1]));
+            if row % rows > 0 {
+                let before = &grid.values[(row - 1) * columns..row * columns];
+                before.iter().zip(values).for_each(|(a, b)| count(*a, *b));
+            }
+        }
+        let others = touching - same;
+        let are_regions = same as f64 >= SAME * touching as f64 && jumps as f64 >= JUMPS * others as f64;
+        if touching == 0 || others == 0 || !are_regions {
+            return None;
+        }
+        let mut known = BTreeSet::new();
+        let mut last = -1.0;
+        for value in grid.values.iter().filter(|value| !value.is_nan()) {
+            if *value != last {
+                last = *value;
+                known.insert(last as u64);
+            }
+            if known.len() > MOST {
+                return None;
+            }
+        }
+        let highest = known.last().copied().unwrap_or(0) as usize;
+        let are_numbered = known.len() >= MANY || (known.len() >= 3 && highest < 2 * known.len());
+        are_numbered.then(|| Self(known.into_iter().map(|label| label as f64).collect()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use splat_core::glam::{DMat3, DVec3};
+
+    fn volume(value: impl Fn(usize, usize, usize) -> f32) -> Grid {
+        let values = (0..20 * 20 * 20).map(|i| value(i % 20, i / 20 % 20, i / 400)).collect();
+        Grid { origin: DVec3::ZERO, axes: DMat3::IDENTITY, dims: [20; 3], values }
+    }
+
+    /// Four bars, each of the label that `label` gives its rank.
+    fn bars(label: impl Fn(usize) -> f32) -> Grid {
+        volume(|x, y, _| {
+            let is_inside = (2..8).contains(&(x % 10)) && (2..8).contains(&(y % 10));
+            if is_inside { label(1 + x / 10 + 2 * (y / 10)) } else { 0.0 }
+        })
+    }
+
+    #[test]
+    fn regions_of_one_number_are_labels_and_amounts_are_none() {
+        assert_eq!(Labels::of(&bars(|rank| rank as f32)), Some(Labels(vec![0.0, 1.0, 2.0, 3.0, 4.0])));
+        assert_eq!(Labels::of(&bars(|rank| (rank * rank * 100) as f32)).map(|l| l.0.len()), Some(5));
+        assert_eq!(Labels::of(&bars(|rank| rank.min(2) as f32)).map(|l| l.0.len()), Some(3));
+        // A mask, a phantom of two amounts, a fraction, a negative number.
+        assert_eq!(Labels::of(&bars(|_| 255.0)), None);
+        assert_eq!(Labels::of(&bars(|rank| if rank > 2 { 200.0 } else { 100.0 })), None);
+        assert_eq!(Labels::of(&bars(|rank| rank as f32 + 0.5)), None);
+        assert_eq!(Labels::of(&bars(|rank| -(rank as f32))), None);
+        // What rises by steps, and what scatters.
+        assert_eq!(Labels::of(&volume(|x, y, z| ((x + y + z) / 4) as f32)), None);
+        assert_eq!(Labels::of(&volume(|x, y, z| ((x * 7919 + y * 104_729 + z * 31) % 251) as f32)), None);
+    }
+}

@@ -1,0 +1,244 @@
+//! Fields are drawn whole: both signs, all labels, what lies around gaps, and the array that a file has; what was decided is said.
+
+use organza_tests::{Place, picture_of};
+use std::fmt::Write;
+
+/// Values of a lattice of so many voxels by their places, 0 to 1 along each axis.
+fn nrrd(kind: &str, sizes: [usize; 3], value: impl Fn([f64; 3]) -> f64) -> String {
+    let [x, y, z] = sizes;
+    let mut text = format!("NRRD0004\ntype: {kind}\ndimension: 3\nsizes: {x} {y} {z}\nencoding: ascii\n\n");
+    for i in 0..x * y * z {
+        let at = [i % x, i / x % y, i / (x * y)];
+        writeln!(text, "{}", value(std::array::from_fn(|a| (at[a] as f64 + 0.5) / sizes[a] as f64))).unwrap();
+    }
+    text
+}
+
+fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
+}
+
+/// What a command says, notes and warnings.
+fn said(place: &Place, arguments: &[&str]) -> String {
+    String::from_utf8_lossy(&place.expect(0, arguments, "").stderr).into_owned()
+}
+
+/// Opacities of a small picture, seen along −z, and what was said.
+fn seen(place: &Place, file: &str, more: &[&str]) -> (Vec<f64>, String) {
+    let view = [
+        "render",
+        file,
+        "-o",
+        "a.exr",
+        "--force",
+        "--size",
+        "24x24",
+        "--azimuth",
+        "0",
+        "--elevation",
+        "0",
+        "--up",
+        "y",
+    ];
+    let said = said(place, &[&view[..], more].concat());
+    (picture_of(&place.path("a.exr")).channel("A"), said)
+}
+
+/// The most opaque pixel of the left and of the right half of a picture of 24 columns.
+fn halves(alpha: &[f64]) -> [f64; 2] {
+    let half = |right: bool| {
+        alpha.iter().enumerate().filter(|(i, _)| (i % 24 >= 12) == right).map(|(_, a)| *a).fold(0.0, f64::max)
+    };
+    [half(false), half(true)]
+}
+
+#[test]
+fn a_field_of_both_signs_shows_both() {
+    let place = Place::new("");
+    let ball = |p, x| (1.0 - distance(p, [x, 0.5, 0.5]) / 0.2).max(0.0);
+    place.write("both.nrrd", nrrd("float", [16; 3], |p| ball(p, 0.75) - ball(p, 0.25)));
+    let alpha = seen(&place, "both.nrrd", &[]).0;
+    let ([left, right], between) = (halves(&alpha), alpha[12 * 24 + 12]);
+    // One ball alone would stand in the middle of the picture.
+    assert!(between < 0.1, "{between}");
+    assert!(left > 0.3 && (left - right).abs() < 0.02, "{left} {right}");
+}
+
+#[test]
+fn voxels_without_a_value_draw_nothing_and_are_counted() {
+    let place = Place::new("");
+    let ball = |p| if distance(p, [0.5; 3]) < 0.3 { 1.0 + p[0] } else { f64::NAN };
+    place.write("gaps.nrrd", nrrd("float", [16; 3], ball));
+    for technique in ["sheets", "points", "particles"] {
+        let (alpha, said) = seen(&place, "gaps.nrrd", &["--technique", technique, "--repeat-level", "4"]);
+        assert!(said.contains("of 4096 voxels are NaN: they draw nothing"), "{said}");
+        // A ball of its diameter, and nothing in the corners of its box.
+        let count = alpha.iter().filter(|a| **a > 0.05).count();
+        assert!(alpha.iter().all(|a| a.is_finite()) && alpha[12 * 24 + 12] > 0.3, "{technique}");
+        assert!((150..480).contains(&count), "{technique}: {count}");
+    }
+    // A scene whose transfer function is nowhere clear.
+    place.write(
+        "s.toml",
+        "version = 1\n[camera]\nposition = [7.5, 7.5, 60]\ntarget = [7.5, 7.5, 7.5]\nfov_y = 20\nsize = [24, 24]\n[[object]]\nname = 'v'\n\
+         volume = 'gaps.nrrd'\ntransfer = [{ value = 0, color = [1, 1, 1], extinction = 1 }]\n[ambient]\ncolor = [1, 1, 1]\n",
+    );
+    for technique in ["sheets", "points", "particles", "reference"] {
+        place.expect(0, &["render", "s.toml", "--technique", technique, "-o", "b.exr", "--force"], "");
+        let alpha = picture_of(&place.path("b.exr")).channel("A");
+        assert!(
+            alpha[12 * 24 + 12] > 0.9 && alpha[4 * 24 + 4] < 0.05,
+            "{technique}: {} {}",
+            alpha[12 * 24 + 12],
+            alpha[4 * 24 + 4]
+        );
+    }
+}
+
+#[test]
+fn no_label_is_thinner_than_another() {
+    let place = Place::new("");
+    // Four bars along z with the labels 1, 2, 3 and 40.
+    let label = |p: [f64; 3]| {
+        let inside = |c: f64| (0.2..0.8).contains(&(2.0 * c).fract());
+        let rank = usize::from(p[0] > 0.5) + 2 * usize::from(p[1] > 0.5);
+        if inside(p[0]) && inside(p[1]) { [1.0, 2.0, 3.0, 40.0][rank] } else { 0.0 }
+    };
+    place.write("labels.nrrd", nrrd("short", [20, 20, 8], label));
+    let (alpha, _) = seen(&place, "labels.nrrd", &[]);
+    let quarter = |right: bool, low: bool| {
+        let here = |i: usize| (i % 24 >= 12) == right && (i / 24 >= 12) == low;
+        alpha.iter().enumerate().filter(|(i, _)| here(*i)).map(|(_, a)| *a).fold(0.0, f64::max)
+    };
+    let all = [quarter(false, false), quarter(true, false), quarter(false, true), quarter(true, true)];
+    // One bar alone would stand in the middle of the picture.
+    assert!(all.iter().all(|a| *a > 0.8) && alpha[12 * 24 + 12] < 0.1, "{all:?} {}", alpha[12 * 24 + 12]);
+}
+
+const FOAM: &str = "# vtk DataFile Version 3.0\nx\nASCII\nDATASET STRUCTURED_POINTS\nDIMENSIONS 2 2 2\nORIGIN 0 0 0\nSPACING 1 1 1\n\
+    POINT_DATA 8\nFIELD a 3\nU 3 8 float\n0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0\np 1 8 float\n0.5 1 2 3 4 5 6 7\n\
+    T 1 8 float\n7 6 5 4 3 2 1 0.5\n";
+
+#[test]
+fn an_array_of_a_vtk_file_is_drawn_said_and_can_be_chosen() {
+    let place = Place::new("");
+    place.write("foam.vtk", FOAM);
+    let (first, told) = seen(&place, "foam.vtk", &[]);
+    assert!(told.contains("the array p is drawn; `array` of a scene or --color-by chooses another: T"), "{told}");
+    let (other, _) = seen(&place, "foam.vtk", &["--color-by", "T"]);
+    assert!(first != other);
+    place.expect(0, &["init", "foam.vtk", "--color-by", "T", "-o", "t.toml"], "");
+    assert!(String::from_utf8(place.bytes("t.toml")).unwrap().contains("\narray = \"T\"\n"));
+    place.expect(
+        3,
+        &["render", "foam.vtk", "--color-by", "q", "-o", "q.png"],
+        "expected an array among p, T, found 'q'",
+    );
+    place.expect(
+        3,
+        &["render", "t.toml", "--set", "object.foam.array='U'", "-o", "q.png"],
+        "3 numbers of 4 bytes a voxel",
+    );
+}
+
+/// What is scaled is as dense as it was.
+#[test]
+fn the_opacity_of_a_volume_follows_its_scale() {
+    let place = Place::new("");
+    place.write("box.nrrd", nrrd("float", [8; 3], |_| 1.0));
+    let alpha = |scale: f64| {
+        place.write(
+            "s.toml",
+            format!(
+                "version = 1\n[camera]\nposition = [0, 0, {}]\ntarget = [0, 0, 0]\nsize = [9, 9]\nfov_y = 20\n[ambient]\ncolor = [1, 1, 1]\n\
+                 [[object]]\nname = 'box'\nvolume = 'box.nrrd'\nunit_length = 8\n\
+                 transfer = [{{ value = 0, color = [1, 1, 1], opacity = 0.5 }}]\n\
+                 transform = {{ scale = {scale}, translate = [{t}, {t}, {t}] }}\n",
+                60.0 * scale,
+                t = -3.5 * scale
+            ),
+        );
+        place.expect(0, &["render", "s.toml", "--technique", "sheets", "-o", "a.exr", "--force"], "");
+        picture_of(&place.path("a.exr")).channel("A")[4 * 9 + 4]
+    };
+    for scale in [1.0, 0.01, 30.0] {
+        // Half of the light over its eight steps.
+        assert!((alpha(scale) - 0.5).abs() < 0.01, "{scale}: {}", alpha(scale));
+    }
+}
+
+#[test]
+fn which_axis_points_up_is_said_where_nothing_says_it() {
+    let place = Place::new("");
+    place.write(
+        "ground.xyz",
+        (0..400).map(|i| format!("{} {} {}\n", i % 20, i / 20, f64::from(i % 7) * 0.1)).collect::<String>(),
+    );
+    place.write("cone.obj", "v -1 -1 3\nv 1 -1 3\nv 0 1 3\nv 0 0 6\nf 1 2 4\nf 2 3 4\nf 3 1 4\nf 3 2 1\n");
+    let told = |file: &str, more: &[&str]| {
+        said(&place, &[&["render", file, "-o", "a.png", "--force", "--size", "8x6"][..], more].concat())
+    };
+    let lying = told("ground.xyz", &[]);
+    assert!(
+        lying.contains(
+            "ground.xyz: nothing in it says which axis points up, so z does, along which it stands: --up y turns it"
+        ),
+        "{lying}"
+    );
+    let standing = told("cone.obj", &[]);
+    assert!(
+        standing.contains("cone.obj: nothing in it says which axis points up, so y does: --up z turns it"),
+        "{standing}"
+    );
+    assert!(!told("cone.obj", &["--up", "z"]).contains("points up"));
+    place.write(
+        "s.toml",
+        "version = 1\ncamera = \"auto\"\n[ambient]\ncolor = [1, 1, 1]\n[[object]]\nname = 'cone'\nmesh = 'cone.obj'\n",
+    );
+    let explained = place.expect(0, &["explain", "s.toml"], "");
+    let text = String::from_utf8_lossy(&explained.stdout).into_owned();
+    assert!(text.contains("cone: y points up, as nothing says another: transform = { up = \"z\" }"), "{text}");
+    assert!(text.contains("of memory") && !text.contains("e0"), "{text}");
+}
+
+#[test]
+fn points_in_degrees_beside_heights_in_metres_are_seen_and_said() {
+    let place = Place::new("");
+    let mut text = String::new();
+    for i in 0..900 {
+        let (x, y) = (f64::from(i % 30) * 1e-5, f64::from(i / 30) * 1e-5);
+        writeln!(text, "{:.8} {:.8} {:.3}", -71.05 + x, 42.36 + y, 2.0 + 2.0 * (9e4 * x).sin()).unwrap();
+    }
+    place.write("degrees.xyz", text);
+    let told = said(&place, &["render", "degrees.xyz", "-o", "a.exr", "--size", "24x24"]);
+    assert!(told.contains("x and y look like degrees beside heights in metres"), "{told}");
+    assert!(!told.contains("the picture is"), "{told}");
+    let alpha = picture_of(&place.path("a.exr")).channel("A");
+    let count = alpha.iter().filter(|a| **a > 0.5).count();
+    assert!(count > 100, "{count}");
+    // A pole in metres, as high as it is thin.
+    let pole: String = (0..200)
+        .map(|i| format!("{} {} {}\n", 3.0 + f64::from(i % 3) * 0.5, 4.0 + f64::from(i % 2) * 0.5, f64::from(i)))
+        .collect();
+    place.write("pole.xyz", pole);
+    assert!(!said(&place, &["render", "pole.xyz", "-o", "b.png", "--size", "8x6"]).contains("degrees"));
+}
+
+#[test]
+fn colours_of_points_without_light_are_no_scene_without_light() {
+    let place = Place::new("");
+    place.write(
+        "p.xyz",
+        "x y z red green blue\n0 0 0 200 100 50\n1 0 0 200 100 50\n0 1 0 200 100 50\n1 1 0 200 100 50\n",
+    );
+    let scene = "version = 1\ncamera = \"auto\"\n[[object]]\nname = 'p'\npoints = 'p.xyz'\n";
+    place.write("s.toml", scene);
+    let told = |scene: &str| said(&place, &["render", scene, "-o", "a.png", "--force", "--set", "camera.size=[8, 6]"]);
+    assert!(!told("s.toml").contains("the scene has no light"), "{}", told("s.toml"));
+    place.write("lit.toml", format!("{scene}unlit = false\n"));
+    assert!(told("lit.toml").contains("the scene has no light"));
+    place.write("t.json", "{\"asset\": {\"version\": \"1.0\"}, \"geometricError\": 500, \"root\": {}}");
+    place.expect(3, &["render", "t.json", "-o", "t.png"], "a tileset of 3D Tiles, which is not read");
+    place.write("color.toml", format!("{scene}color = [1, 0, 0]\ncolor_by = {{ column = \"z\" }}\n"));
+    place.expect(3, &["render", "color.toml", "-o", "c.png"], "remove the key `color` of the object");
+}
