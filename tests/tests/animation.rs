@@ -180,7 +180,7 @@ fn large_file() -> String {
 fn files_are_read_once_while_they_fit() {
     use organza::{Progress, RenderOptions, Sequence, render, scene};
     let place = Place::new("");
-    let files = ["t.ply", "u.ply"];
+    let files = ["t.ply", "u.ply", "v.ply", "w.ply"];
     let write = || files.iter().for_each(|file| place.write(file, large_file()));
     let remove = || files.iter().for_each(|file| fs::remove_file(place.path(file)).unwrap());
     write();
@@ -201,7 +201,7 @@ fn files_are_read_once_while_they_fit() {
 
     // A quarter of this is less than the files take.
     write();
-    let short = RenderOptions { max_memory: 20 << 20, ..plenty };
+    let short = RenderOptions { max_memory: 50 << 20, ..plenty };
     let mut sequence = Sequence::new(&scenes);
     assert_eq!(sequence.render(&scenes[0], &short, &progress).unwrap().layers, alone[0]);
     remove();

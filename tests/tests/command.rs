@@ -154,7 +154,7 @@ fn outputs_that_are_links_to_devices_or_one_file_twice_are_refused_before_any_wo
     link(".", "here");
     // The memory limit would be the next error.
     let refused = |more: &[&str], stderr: &str| {
-        place.expect(4, &[&["render", "s.toml", "--max-memory", "1", "--force"], more].concat(), stderr);
+        place.expect(4, &[&["render", "s.toml", "--max-memory", "100K", "--force"], more].concat(), stderr);
     };
     refused(&["-o", "x.png"], "x.png: this is a device, a pipe or a socket");
     refused(&["-o", "y.png"], "y.png: this link points to nothing");
@@ -167,7 +167,7 @@ fn outputs_that_are_links_to_devices_or_one_file_twice_are_refused_before_any_wo
     for command in ["accuracy", "orders"] {
         link("pipe", &format!("{command}.json"));
         let message = format!("{command}.json: this is a device, a pipe or a socket");
-        place.expect(4, &[command, "s.toml", "--max-memory", "1", "--force"], &message);
+        place.expect(4, &[command, "s.toml", "--max-memory", "100K", "--force"], &message);
     }
     assert_eq!(place.made(), ["accuracy.json", "here", "orders.json", "pipe", "x.png", "y.png"]);
 }
@@ -176,7 +176,7 @@ fn outputs_that_are_links_to_devices_or_one_file_twice_are_refused_before_any_wo
 #[test]
 fn bi31_a_folder_that_cannot_be_written_is_refused() {
     // /proc takes no files, from root either.
-    place().expect(4, &["render", "s.toml", "--max-memory", "1", "-o", "/proc/a.exr"], "cannot write here");
+    place().expect(4, &["render", "s.toml", "--max-memory", "100K", "-o", "/proc/a.exr"], "cannot write here");
 }
 
 #[test]

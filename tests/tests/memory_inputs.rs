@@ -5,7 +5,6 @@ use crate::memory::PROGRAM;
 use organza_tests::{Place, SMALL_SCENE, organza, run_measured};
 use std::fmt::Write as _;
 use std::io::Write as _;
-use std::process::Command;
 
 const MIB: u64 = 1 << 20;
 
@@ -132,23 +131,6 @@ fn an_image_that_many_lights_shine_through_is_counted_for_each() {
     let place = Place::new(&text);
     place.write("slide.png", picture(1024, 7));
     assert_eq!(explain(&place, 64 * MIB).0, 5);
-}
-
-#[test]
-fn a_system_with_less_memory_than_inputs_need_is_exit_5() {
-    let place = place(Inputs { volumes: 3, side: 48, slides: 1, textures: 3, ..Inputs::default() });
-    let (out, peak) = run_measured(organza().current_dir(place.folder()).args(["explain", "s.toml", "--threads", "1"]));
-    assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
-    for percent in [60, 75, 90] {
-        let mut shell = Command::new("sh");
-        let kib = peak.address_space / 100 * percent / 1024;
-        shell.current_dir(place.folder()).arg("-c").arg(format!("ulimit -v {kib}; exec \"$0\" \"$@\""));
-        shell.arg(organza().get_program()).args(["explain", "s.toml", "--threads", "1"]);
-        let out = shell.output().unwrap();
-        let code = out.status.code();
-        let text = String::from_utf8_lossy(&out.stderr);
-        assert!(matches!(code, Some(0 | 5)), "{percent} % of {}: {code:?}, {text}", peak.address_space);
-    }
 }
 
 #[test]

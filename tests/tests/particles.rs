@@ -409,7 +409,7 @@ fn bs09_an_empty_scene_is_the_background_and_opaque_things_have_no_noise() {
     let wall = scene([2, 2, 2]).replacen("'wall'", "'a'", 1).replacen("'wall'", "'b'", 1);
     let (solid, points) = (draw(&wall, &["--technique", "particles"]), draw(&wall, &[]));
     // Nobody asked for the error.
-    assert_eq!(solid.names(), ["A", "B", "G", "R"]);
+    assert_eq!(solid.names(), ["A", "B", "G", "R", "opacity.A"]);
     assert_eq!(solid, points);
 }
 

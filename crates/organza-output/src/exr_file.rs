@@ -19,6 +19,8 @@ use splat_core::{LayerData, Layers};
 const LARGEST_HALF: f32 = 65504.0;
 /// Pictures of longer sides than this are packed by several threads.
 const LONGEST_ALONE: u32 = 256;
+/// What the sum of a pixel's samples may differ by, over the sum.
+const ROUNDING: f32 = 8.0 * f32::EPSILON;
 /// Type of a text in the file layout of OpenEXR, which limits neither its length nor its bytes.
 const TEXT: &str = "string";
 
@@ -62,12 +64,16 @@ pub(super) fn encode(
     Ok(bytes)
 }
 
-/// Radiance of what lies before the background, premultiplied. The difference of equal numbers is 0; rounding leaves no negative light.
+/// Radiance of what lies before the background, premultiplied. What rounding makes of a bright background is no light.
 fn before_background(layers: &Layers) -> std::result::Result<Vec<[f32; 3]>, crate::Error> {
     let layer = |name: &str| layers.rgb(name).ok_or_else(|| Error::Internal(format!("a render has no {name} layer")));
     let (beauty, background) = (layer("beauty")?, layer("background")?);
-    let difference = |(seen, behind): (&[f32; 3], &[f32; 3])| [0, 1, 2].map(|c| (seen[c] - behind[c]).max(0.0));
-    Ok(beauty.iter().zip(background).map(difference).collect())
+    let light = |seen: f32, behind: f32| {
+        let difference = seen - behind;
+        if difference <= ROUNDING * behind { 0.0 } else { difference }
+    };
+    let of_pixel = |(seen, behind): (&[f32; 3], &[f32; 3])| std::array::from_fn(|c| light(seen[c], behind[c]));
+    Ok(beauty.iter().zip(background).map(of_pixel).collect())
 }
 
 /// A text as an attribute, in UTF-8: the encoder's own texts are Latin, and of 255 bytes at most.

@@ -219,7 +219,7 @@ mod tests {
         let path = folder.path().join("a.exr");
         for take in [take_free_name, take_free_name_by_placeholder] {
             let temporary = || {
-                let (mut file, listed) = temporary_beside(&path).unwrap();
+                let Listed { made: mut file, listing: listed } = temporary_beside(&path).unwrap();
                 file.write_all(b"new").unwrap();
                 (file.into_temp_path(), listed)
             };

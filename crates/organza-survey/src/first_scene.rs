@@ -167,7 +167,8 @@ fn ground(found: &FoundCamera) -> String {
     let right = found.camera.axes[0];
     format!(
         "\n[[object]]\nname = \"ground\"\n\
-         rectangle = {{ center = {}, u = {}, v = {}, spacing = {} }}\ncolor = {}\n",
+         rectangle = {{ center = {}, u = {}, v = {}, spacing = {} }}\ncolor = {}\n\
+         technique = \"sheets\"     # lit in every pixel, so that shadows on it are sharp\n",
         list(center.to_array(), unit),
         list((right * half).to_array(), unit),
         list((DVec3::Y.cross(right) * half).to_array(), unit),

@@ -79,13 +79,14 @@ pub fn draw_loaded(planned: &Planned<'_>, progress: &Progress, cost: &mut CostRe
 /// Stages with their weights, after everything was loaded.
 fn stages(frame: &Frame<'_>) -> Stages {
     let (loaded, plan, scene) = (frame.loaded, frame.plan, frame.scene);
-    let maps = plan.tables().count();
+    let maps = plan.shadow_maps_built();
     let all = loaded.cloud.len() as f64;
     let opaque = expected(frame, None);
     let of: Vec<(Technique, Expected)> = plan.techniques.iter().map(|t| (*t, expected(frame, Some(*t)))).collect();
-    // The last is the eye's, which is another in each view.
-    let kept = if frame.has_maps() { maps - usize::from(plan.eye_table.is_some()) } else { 0 };
-    let mut stages: Stages = (kept + 1..=maps).map(|k| (work::shadow_map(k, maps), cost::CAST * all)).collect();
+    let built = if frame.has_maps() { 0 } else { maps };
+    let mut stages: Stages = (1..=built).map(|k| (work::shadow_map(k, maps), cost::CAST * all)).collect();
+    // The eye's is another in each view.
+    stages.extend(plan.eye_table.iter().map(|_| (stage::EYE_MAP.to_owned(), cost::CAST * all)));
     let mut add = |name: &str, seconds: f64| stages.push((name.to_owned(), seconds));
     let mut drawn = opaque.splats;
     let mut last = Vec::new();

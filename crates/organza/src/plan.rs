@@ -80,6 +80,11 @@ impl Plan {
         self.shadow_tables.iter().chain(&self.other_tables).flatten().chain(&self.eye_table)
     }
 
+    /// How many shadow maps of lights there are.
+    pub(crate) fn shadow_maps_built(&self) -> usize {
+        self.shadow_tables.iter().chain(&self.other_tables).flatten().count()
+    }
+
     /// Takes the tables in that were chosen, one for each point of a light, then one more for each of casters that no light is
     /// carried through, and the bytes that their maps may take together.
     pub(crate) fn set_shadow_tables(&mut self, points: &[LightPoint], tables: Vec<Option<ShadowTable>>, bytes: u64) {

@@ -10,6 +10,8 @@ pub(crate) const SORT: &str = "sorting";
 pub(crate) const GROUP: &str = "grouping discs";
 /// Splats get their footprints.
 pub(crate) const PROJECT: &str = "projecting";
+/// What lies between the eye and thick media is found.
+pub(crate) const EYE_MAP: &str = "map of the eye";
 /// Splats get their radiance.
 pub(crate) const SHADE: &str = "shading";
 /// Opaque splats are resolved.

@@ -81,7 +81,7 @@ impl Within {
             let part = &parts[lane];
             let weight = thickness(part.optical_depth * greatest * self.width / part.length);
             // Of no length nothing is seen, and the weight is no number.
-            if !(weight > 0.0) {
+            if weight.is_nan() || weight <= 0.0 {
                 continue;
             }
             let Some(about) = self.mean(slopes, &cells.ranks[lane], &cells.weights[lane]) else { continue };
@@ -215,12 +215,12 @@ impl<'a, 'v> VoxelDepths<'a, 'v> {
 fn share(middle: f32, growth: f32, optical_depth: f32) -> f32 {
     let least = (middle - 0.5 * growth.abs()).max(0.0);
     if growth >= 0.0 {
-        return (-least).exp() * mean(growth + optical_depth) / mean(optical_depth);
+        return libm::expf(-least) * mean(growth + optical_depth) / mean(optical_depth);
     }
     // e^−x·M(e − x), x the absorbance from the far end to the near one: M of what is negative is e^… of what is positive.
     let back = -growth;
     let nearer = back.min(optical_depth);
-    (-least - nearer).exp() * mean((back - optical_depth).abs()) / mean(optical_depth)
+    libm::expf(-least - nearer) * mean((back - optical_depth).abs()) / mean(optical_depth)
 }
 
 #[cfg(test)]

@@ -60,7 +60,7 @@ pub trait Transmittance: Sync {
     /// Its absorbance −ln T per channel, for whoever tells how fast light falls off: at most 87.4, where f32 tells T from 0. A table that has it
     /// interpolates it as it is; means of e^−A between rays would be those of the brightest.
     fn absorbance(&self, receiver: &Receiver) -> [f32; 3] {
-        self.transmittance(receiver).map(|through| -through.clamp(f32::MIN_POSITIVE, 1.0).ln())
+        self.transmittance(receiver).map(|through| -libm::logf(through.clamp(f32::MIN_POSITIVE, 1.0)))
     }
 
     /// The same as [`Transmittance::transmittance`] for a splat of the cloud that is shaded, by its place there: for who knows the light at splats beforehand.

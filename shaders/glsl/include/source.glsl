@@ -51,9 +51,9 @@ uint hash_of(vec3 place) {
     return scramble((bits.x * 0x9e3779b1u) ^ (bits.y * 0x85ebca77u) ^ (bits.z * 0xc2b2ae3du));
 }
 
-// The largest channel, 511 * 2^33, and the power of two that the exponent 0 stands for, as in `particles.rs`.
-const float LARGEST = 4389456576512.0;
-const int LEAST_POWER = -20;
+// The largest channel, 2^39, and the power of two that the exponent 0 stands for, as in `particles.rs`.
+const float LARGEST = 549755813888.0;
+const int LEAST_POWER = -23;
 
 // As `PackedColor::at`.
 uint pack_color(vec3 color, vec3 place) {
@@ -62,11 +62,10 @@ uint pack_color(vec3 color, vec3 place) {
         color.y > 0.0 ? min(color.y, LARGEST) : 0.0,
         color.z > 0.0 ? min(color.z, LARGEST) : 0.0);
     float largest = max(max(c.x, c.y), c.z);
-    int above = int(floatBitsToUint(largest) >> 23) - 126;
-    int power = max(above + (above & 1), LEAST_POWER);
-    precise float most = largest * color_scale(power);
-    power += most > 511.0 ? 2 : 0;
+    int power = max(int(floatBitsToUint(largest) >> 23) - 126, LEAST_POWER);
+    precise vec3 most = c * color_scale(power);
+    power += int(max(most.x, most.y) > 511.0 || most.z > 510.0);
     precise float more = (float(hash_of(place) >> 18) + 0.5) * (1.0 / 16384.0);
-    precise vec3 steps = c * color_scale(power) + more;
-    return uint(steps.x) | (uint(steps.y) << 9) | (uint(steps.z) << 18) | (uint((power - LEAST_POWER) >> 1) << 27);
+    precise vec3 steps = c * (color_scale(power) * vec3(1.0, 1.0, 0.5)) + more;
+    return uint(steps.x) | (uint(steps.y) << 9) | (uint(steps.z) << 18) | (uint(power - LEAST_POWER) << 26);
 }

@@ -387,10 +387,10 @@ fn render() -> Vec<Entry> {
         of(BALL, "render.points", "render.points={first_slices=1}").but_by(BUT_POINTS, POINTS_ONLY),
         of(BALL, "render.points.slice_thickness", "render.points.slice_thickness=0.5")
             .by(POINTS)
-            .with(&["render.points.exact=false"]),
+            .with(&["render.points.exact=false", "material.m.medium.extinction=0.8"]),
         of(BALL, "render.points.exact", "render.points.exact=false")
             .by(POINTS)
-            .with(&["render.points.slice_thickness=0.5"]),
+            .with(&["render.points.slice_thickness=0.5", "material.m.medium.extinction=0.8"]),
         of(BALL, "render.points.direction", "render.points.direction='back_to_front'")
             .look(Look::Work)
             .by(POINTS)

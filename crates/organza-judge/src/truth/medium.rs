@@ -195,7 +195,7 @@ fn shape(object: &SceneObject, reflects: Option<[f32; 3]>, options: &RenderOptio
                 return Err(Error::wrong_kind(path, "a volume", "use `mesh = ` or `points = ` for this file"));
             };
             let gapless = convert::transparent_gaps(&grid, transfer);
-            let (grid, transfer) = gapless.map_or((grid, transfer.clone()), |(grid, transfer)| (grid.into(), transfer));
+            let (grid, transfer) = gapless.map_or((grid, transfer.clone()), |(grid, transfer)| (grid, transfer));
             grid.validate().map_err(|e| Error::input(printable(path), e.to_string(), ""))?;
             (Shape::Volume(Arc::new(Classified::new(grid, transfer, &t))), 1.0)
         }

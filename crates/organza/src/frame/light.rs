@@ -6,7 +6,7 @@ use crate::pass;
 use crate::plan::Plan;
 use crate::scene::{LightPoint, light_points};
 use crate::shadows::{EYE, ShadowTable, eye, shadow_error, thick_objects};
-use crate::{CostRecord, Error, work};
+use crate::{CostRecord, Error, stage, work};
 use splat_core::shade::{LitBy, ShadeInput};
 use splat_core::{Arrived, Object, Remembered, Transmittance};
 use tsm::{Deposits, ShadowMap};
@@ -89,7 +89,7 @@ impl<'a> Frame<'a> {
         cost: &mut CostRecord,
     ) -> Result<Vec<Option<ShadowMap>>, Error> {
         let mut maps = Vec::new();
-        let count = self.plan.tables().count();
+        let count = self.plan.shadow_maps_built();
         for (point, table) in self.light_points().iter().zip(tables) {
             self.tick()?;
             let Some(table) = table else {
@@ -125,8 +125,7 @@ impl<'a> Frame<'a> {
     pub(super) fn eye_map(&self, cost: &mut CostRecord) -> Result<Option<ShadowMap>, Error> {
         let Some(table) = &self.plan.eye_table else { return Ok(None) };
         let l = self.loaded;
-        let count = self.plan.tables().count();
-        self.progress.begin(&work::shadow_map(count, count));
+        self.progress.begin(stage::EYE_MAP);
         self.tick()?;
         let params = table.params(self.settings, l, table.max_bytes);
         let objects = thick_objects(l);

@@ -17,7 +17,7 @@
 //! form of the slab, μ₀/(μ₀ + μ)·(1 − e^(−T(1/μ + 1/μ₀))). Where spacings are thin L is e^−a to second order, which needs no more than the middle.
 //!
 //! **Slanted views.** Splats are flat across the view and come in the order of their middles, so an eye that looks along layers aslant sees some of the
-//! deeper ones before all of the first: it misses the share δ of that, which [`early`] has by a fit to a lattice of splats. What is lost of the
+//! deeper ones before all of the first: it misses the share δ of that, which `early` has by a fit to a lattice of splats. What is lost of the
 //! light so is δ·(1 − e^−g) of what the first layer sends, g the growth of A_l along g_e; [`joint`] gives it back.
 //!
 //! Depths come from two maps, the light's and one of the eye, each looked up at the middle of the cell and of its six faces. They are interpolated as
@@ -197,7 +197,7 @@ pub fn joint_aslant(light: &DepthAbout, eye: &DepthAbout, to_eye: Vec3) -> f32 {
     let cosine = normal.dot(to_eye).clamp(0.0, 1.0);
     // Over what it is of the first layer, the share of all layers of an endless slab.
     let first = if growth > 0.0 { depth * mean(depth) / ((depth + growth) * mean(depth + growth)) } else { 1.0 };
-    let lost = early(depth, 1.0 - cosine * cosine) * -(-growth.max(-1.0)).exp_m1() / first;
+    let lost = early(depth, 1.0 - cosine * cosine) * -libm::expm1f(-growth.max(-1.0)) / first;
     (sent * (1.0 + lost)).min(1.0)
 }
 
@@ -208,12 +208,12 @@ pub fn joint(light: &DepthAbout, eye: &DepthAbout) -> f32 {
     let both = (light.across + eye.across).length();
     // Never negative: a side of a triangle is no longer than the two others.
     let lost = light.before + 0.5 * (light_alone + eye_alone - both).max(0.0);
-    (-lost).exp() * mean(both) / mean(eye_alone)
+    libm::expf(-lost) * mean(both) / mean(eye_alone)
 }
 
 /// Mean of e^−t over t from 0 to `depth`.
 pub fn mean(depth: f32) -> f32 {
-    if depth < 1e-3 { 1.0 - 0.5 * depth } else { -(-depth).exp_m1() / depth }
+    if depth < 1e-3 { 1.0 - 0.5 * depth } else { -libm::expm1f(-depth) / depth }
 }
 
 /// How much of the joint integral counts at an optical depth of a spacing.
