@@ -17,7 +17,7 @@ const SCENE: &str = r#"
     intensity = [30, 30, 30]
     [[object]]
     name = "fog"
-    medium_box = { min = [-1, -1, -1], max = [1, 1, 1], extinction = 1.5, spacing = 0.1 }
+    medium_box = { min = [-1, -1, -1], max = [1, 1, 1], extinction = 1.2, spacing = 0.1 }
     [[object]]
     name = "pane"
     rectangle = { center = [0, 0, 1.2], u = [0.8, 0, 0.2], v = [0, 0.8, 0], spacing = 0.05 }
