@@ -36,7 +36,8 @@ fn objects_over_another_background_are_the_picture_that_is_drawn_before_it() {
             let empty = alpha.iter().enumerate().filter(|(_, a)| **a == 0.0).map(|(pixel, _)| pixel);
             for (channel, plate) in ["R", "G", "B"].into_iter().zip(plate) {
                 let light = objects.channel(channel);
-                assert!(empty.clone().count() > 50 && empty.clone().all(|pixel| light[pixel] == 0.0));
+                // An opacity of less than half a unit in the last place of 1 is 0, and still has some light.
+                assert!(empty.clone().count() > 50 && empty.clone().all(|pixel| light[pixel] < 1e-7));
                 let over: Vec<f64> = light.iter().zip(&alpha).map(|(light, a)| light + (1.0 - a) * plate).collect();
                 let off = largest_difference(&over, &whole.channel(channel));
                 assert!(off < 4e-6, "{technique}, {background}, {channel}: {off:e}");
