@@ -28,7 +28,7 @@ void main() {
         uint object = particles[word + 6u];
         ParticleObject o = objects[object];
         tables = object | (uint(o.share.z) << 24);
-        color = unpack_color(particles[word + 4u]);
+        color = unpack_color(particles[word + 4u]) * o.emission.w;
         radius = o.share.y;
         share = o.share.w;
     }

@@ -196,7 +196,7 @@ layouts! {
         pub rotation_y: [f32; 4],
         /// Third column.
         pub rotation_z: [f32; 4],
-        /// Radiance that it emits.
+        /// Radiance that it emits; the unit of its particles' colours.
         pub emission: [f32; 4],
         /// s·f² in view units; radius near lights and in shadows; kind of splat; share of a shadow that is received.
         pub share: [f32; 4],

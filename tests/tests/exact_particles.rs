@@ -50,7 +50,7 @@ fn discs(n: u64, cross_section: f32) -> Vec<Splat> {
     let at = |i| {
         let u = |k| 2.0 * rng::unit_f32(7, 1, i, k) - 1.0;
         let normal = Vec3::new(1.2 * u(3), 1.2 * u(4), 1.0);
-        // Eighths: a particle's colour has eight or nine bits.
+        // Eighths: a particle's colour has nine bits.
         let color = [u(5), u(6), u(7)].map(|c| (4.0 + 3.0 * c).round() / 8.0);
         disc(Vec3::new(u(0), u(1), u(2)), normal, 0.7 + 0.2 * u(8), cross_section * (1.0 + 0.5 * u(9)), color)
     };

@@ -346,6 +346,17 @@ fn data_outside_the_root_folder_needs_the_line_that_the_error_offers_and_init_wr
     );
     place.write("a/b/s.toml", scene.replace("version = 1", "version = 1\nroot = \"../../data\""));
     place.expect(0, &arguments, "");
+    // A stranger's scene grants itself nothing.
+    let sandbox = [&arguments[..], &["--sandbox"]].concat();
+    place.expect(3, &sandbox, "a/b/s.toml:2:8: `root`: ");
+    place.expect(3, &["info", "a/b/s.toml", "--sandbox"], "lies outside the root folder");
+    place.write(
+        "a/b/s.toml",
+        scene.replace("version = 1", "version = 1\nroot = \"../c\"").replace("../../data", "../c"),
+    );
+    std::fs::create_dir(place.path("a/c")).unwrap();
+    std::fs::copy(place.path("mesh.obj"), place.path("a/c/mesh.obj")).unwrap();
+    place.expect(0, &sandbox, "");
     place.write("a/b/s.toml", scene.replace("version = 1", "version = 1\nroot = \"../../nowhere\""));
     place.expect(3, &arguments, "`root`: expected a folder, found \"../../nowhere\"");
     place.expect(0, &["init", "data/mesh.obj", "-o", "a/b/first.toml", "--size", "8x6"], "");

@@ -102,3 +102,22 @@ fn lists_of_solids_are_checked_at_their_place() {
         assert!(refused.starts_with(&format!("s.toml:{line}:")) && refused.contains(expected), "{source}: {refused}");
     }
 }
+
+/// An isosurface of three beams in steps of 8 mm, of which single pieces are no larger than a step or two.
+#[test]
+fn an_isosurface_of_a_coarse_volume_keeps_its_opacity_where_no_spacing_is_stated() {
+    let assets = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../assets").canonicalize().unwrap();
+    let scene = format!(
+        "version = 1\nroot = '{assets}'\n[camera]\nauto = true\nazimuth = 140\nsize = [96, 96]\n[ambient]\ncolor = [1, 1, 1]\n\
+         [[object]]\nname = 'it'\nopacity = 0.3\n\
+         isosurface = {{ volume = '{assets}/dose/dose.nrrd', level = 3000, interpolation = 'catmull-rom' }}\n",
+        assets = assets.display()
+    );
+    let folder = tempfile::tempdir().unwrap();
+    let opacity = |arguments: &[&str]| -> f64 { draw_in(folder.path(), &scene, arguments).opacity().iter().sum() };
+    let fine = opacity(&["--set", "object.it.spacing=1"]);
+    for technique in ["points", "reference"] {
+        let found = opacity(&["--technique", technique]) / fine;
+        assert!((found - 1.0).abs() < 0.02, "{technique}: {found} of the opacity");
+    }
+}

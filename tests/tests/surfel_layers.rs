@@ -170,6 +170,18 @@ fn glass_is_drawn_by_gaps_and_by_the_algorithms() {
     );
     assert!(effect(&gaps, "layers of surfaces").reason.contains("gaps in depth"));
     assert!(gaps.plan.passes.iter().all(|p| p.name != "group"));
+    // Coloured glass in a light with shadows: its absorption casts none, which a note says.
+    const LAMP: &str = "[[light]]\nkind = 'point'\nposition = [2, 2, 2]\nintensity = [9, 9, 9]\n";
+    let told = |text: String| {
+        let explained = explain(&scene(&text, None), &RenderOptions::default(), &Progress::new()).unwrap();
+        explained
+            .notes
+            .iter()
+            .any(|note| note.contains("'ball' absorbs light inside, but its shadow is that of its `opacity`"))
+    };
+    let colored = text.replace("ior = 1.5\n", "ior = 1.5\nabsorption_inside = [0.1, 0.5, 1]\n");
+    assert!(told(colored.clone() + LAMP));
+    assert!(!told(colored) && !told(text.clone() + LAMP));
     assert!(by.memory > gaps.memory, "groups are counted");
 }
 

@@ -20,7 +20,8 @@ const WIDEST: f64 = 5.0;
 /// flat once they are metres.
 pub fn looks_like_degrees(points: &RawPoints) -> bool {
     let Some(bounds) = bounds(points).filter(|_| points.len() >= FEWEST) else { return false };
-    let (size, far) = (bounds.size(), bounds.min.abs().max(bounds.max.abs()));
+    let size = bounds.size();
+    let far = bounds.min.abs().max(bounds.max.abs());
     let width = size.x.max(size.y);
     let is_within = far.x <= 180.0 && far.y <= 90.0 && size.x > 0.0 && size.y > 0.0 && width <= WIDEST;
     is_within && size.z >= STEEP * width && size.z <= width * LONGITUDE

@@ -88,7 +88,7 @@ pub struct ReadError {
     pub fault: Fault,
 }
 
-/// What is expected under the name of a file that is not there.
+/// The expectation in the error of a missing file.
 const A_FILE: &str = "a file";
 
 impl ReadError {

@@ -74,7 +74,8 @@ fn clear_ranges(transfer: &TransferFunction) -> Vec<[f32; 2]> {
 
 /// The transfer function with a value without extinction below all values of the volume and its own.
 fn continued(grid: &Grid, transfer: &TransferFunction) -> TransferFunction {
-    let (first, last) = (transfer.points()[0], transfer.points()[transfer.points().len() - 1]);
+    let first = transfer.points()[0];
+    let last = transfer.points()[transfer.points().len() - 1];
     let lowest = finite(grid).fold(first.value, f32::min);
     let highest = finite(grid).fold(last.value, f32::max);
     let step = (BELOW * (highest - lowest)).max(f32::EPSILON * lowest.abs().max(highest.abs())).max(f32::MIN_POSITIVE);
@@ -89,7 +90,8 @@ fn filled(grid: &Grid, value: impl Fn(Option<f32>) -> f32) -> Grid {
     let [columns, rows, _] = grid.dims;
     let steps = [1, columns, columns * rows];
     let beside = |voxel: usize| {
-        let (mut sum, mut count) = (0.0, 0u32);
+        let mut sum = 0.0;
+        let mut count = 0u32;
         for (axis, step) in steps.into_iter().enumerate() {
             let at = voxel / step % grid.dims[axis];
             let before = (at > 0).then(|| grid.values[voxel - step]);

@@ -161,7 +161,7 @@ impl RawPoints {
         }
     }
 
-    /// What its values are called in sentences and legends: `intensity` or `value`. [`RawPoints::column`] takes both names.
+    /// The name of its values in messages and legends: `intensity` or `value`. [`RawPoints::column`] takes both.
     pub fn value_name(&self) -> &'static str {
         if self.is_intensity { "intensity" } else { "value" }
     }

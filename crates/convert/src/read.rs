@@ -307,8 +307,10 @@ fn remark_gaps(grid: &Grid, reading: &mut Reading<'_>) -> Result<(), ReadError> 
         let hint = "the values are missing: write the file anew";
         return Err(ReadError::input(Place::File, "a voxel with a value", "NaN in all of them", hint));
     }
-    let of = counted::counted(voxels as u64, "voxel");
-    reading.notes.remark(format!("{gaps} of {of} are NaN: they draw nothing, and a slice has its first colour there"));
+    let total = counted::counted(voxels as u64, "voxel");
+    reading
+        .notes
+        .remark(format!("{gaps} of {total} are NaN: they draw nothing, and a slice has its first colour there"));
     Ok(())
 }
 

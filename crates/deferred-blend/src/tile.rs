@@ -119,18 +119,18 @@ impl Tile {
         let mut way = input.glass.as_ref().map(|glass| (glass, Path::begin(ray.along, glass)));
         // The ranges of layers hold for this order of the fragments alone.
         let crossed = match &mut way {
-            Some((glass, path)) => cross_layers(path, glass, input, &ray, limit, (fragments, layers)),
+            Some((glass, path)) => cross_layers(path, glass, input, &ray, limit, fragments, layers),
             None => Crossed::default(),
         };
         fragments.sort_by(|a, b| a.depth.total_cmp(&b.depth));
         let mut seen: Vec<Fragment> = fragments.iter().filter(|f| f.depth < limit).copied().collect();
         let bounds = |f: &Fragment| bound_matter(std::slice::from_ref(f), input).is_some();
         let first = way.as_ref().and_then(|_| seen.iter().position(bounds));
-        let mut segment = |fragments: &[Fragment], passage: &Option<(f32, Passage)>| {
-            self.floored_segment(k, fragments, passage.as_ref(), input, &ray, (floor, rule));
+        let mut segment = |fragments: &[Fragment], crossing: Option<&Crossing>| {
+            self.floored_segment(k, fragments, crossing, input, &ray, floor, rule);
         };
         match first {
-            None => segment(&seen, &None),
+            None => segment(&seen, None),
             Some(first) => {
                 let is_behind = |f: &Fragment| !rule.joins(input.discs, &seen[first], f);
                 let after = seen[first..].iter().position(is_behind).map_or(seen.len(), |n| first + n);
@@ -139,9 +139,9 @@ impl Tile {
                     // The bent ray meets them where they lie there.
                     rest.retain(|f| !bounds(f));
                 }
-                segment(&seen[..first], &None);
-                segment(&seen[first..], &crossed.nearest);
-                segment(&rest, &crossed.others);
+                segment(&seen[..first], None);
+                segment(&seen[first..], crossed.nearest.as_ref());
+                segment(&rest, crossed.others.as_ref());
             }
         }
         if let Some((glass, path)) = way {
@@ -149,29 +149,30 @@ impl Tile {
         }
     }
 
-    /// Fragments that lie near to far, those in the range, as one layer behind all so far, with what a layer at a depth does to light.
+    /// Adds the fragments in the range, which lie near to far, as one layer behind all so far; `crossing` says what its surface does to light.
     fn floored_segment(
         &mut self,
         k: usize,
         fragments: &[Fragment],
-        passage: Option<&(f32, Passage)>,
+        crossing: Option<&Crossing>,
         input: &BlendInput<'_>,
         ray: &Ray,
-        (floor, rule): (&Floor<'_>, GapRule),
+        floor: &Floor<'_>,
+        rule: GapRule,
     ) {
         let sizes = [self.optical_depth.len(), self.channels.len()];
         let inside: Vec<Fragment> = fragments.iter().filter(|f| input.range.contains(&f.depth)).copied().collect();
-        // In one range of depths alone.
-        let passage = passage.filter(|(depth, _)| input.range.contains(depth));
-        let (depth, object) = match (inside.first(), passage) {
+        // A surface is crossed in one range of depths alone.
+        let crossing = crossing.filter(|crossing| input.range.contains(&crossing.depth));
+        let (depth, object) = match (inside.first(), crossing) {
             (Some(nearest), _) => (nearest.depth, nearest.object),
-            (None, Some((depth, _))) => (*depth, u32::MAX),
+            (None, Some(crossing)) => (crossing.depth, u32::MAX),
             (None, None) => return,
         };
         let blended = floor.blend(&inside, input, rule, (ray, sizes));
         let opacity = blended.through.map(|t| (1.0 - t).clamp(0.0, 1.0));
         let layer = Layer { depth, opacity, values: blended.values };
-        self.add(k, &layer, passage.map_or(&Passage::CLEAR, |(_, passage)| passage), object);
+        self.add(k, &layer, crossing.map_or(&Passage::CLEAR, |crossing| &crossing.passage), object);
         self.layers += 1;
     }
 
@@ -244,11 +245,17 @@ impl Tile {
     }
 }
 
-/// What the layers of a pixel that bound matter do to light, each with a depth: the nearest of them, and all others together.
+/// A surface that bounds matter, as a ray crosses it.
+struct Crossing {
+    depth: f32,
+    passage: Passage,
+}
+
+/// The surfaces of a pixel that bound matter: the nearest, and all others together.
 #[derive(Default)]
 struct Crossed {
-    nearest: Option<(f32, Passage)>,
-    others: Option<(f32, Passage)>,
+    nearest: Option<Crossing>,
+    others: Option<Crossing>,
 }
 
 /// Goes through the layers that bound matter, up to an opaque surface or to where the ray is bent for good.
@@ -258,12 +265,14 @@ fn cross_layers<'m>(
     input: &BlendInput<'m>,
     ray: &Ray,
     limit: f32,
-    (fragments, layers): (&[Fragment], &[Range<usize>]),
+    fragments: &[Fragment],
+    layers: &[Range<usize>],
 ) -> Crossed {
     let mut crossed = Crossed::default();
     for layer in layers {
         let of_layer = &fragments[layer.clone()];
-        let (depth, object) = (mean_depth(of_layer), of_layer[0].object);
+        let depth = mean_depth(of_layer);
+        let object = of_layer[0].object;
         if depth >= limit || path.leaves_out(glass) {
             break;
         }
@@ -271,14 +280,14 @@ fn cross_layers<'m>(
         let [rank, layers] = count(object, layer.start, limit, (fragments, layers));
         let (normal, curvature) = normal(of_layer, input);
         let distance = ray.length * depth;
-        let (cone, place) = (ray.cone.after(distance), ray.at(depth));
-        let bound = Bound { material, object, rank, layers, normal, curvature, cone, place, distance };
+        let cone = ray.cone.after(distance);
+        let bound = Bound { material, object, rank, layers, normal, curvature, cone, place: ray.at(depth), distance };
         let mut passage = Passage::CLEAR;
         path.cross(&bound, glass, &mut passage);
         match (&crossed.nearest, &mut crossed.others) {
-            (None, _) => crossed.nearest = Some((depth, passage)),
-            (Some(_), None) => crossed.others = Some((depth, passage)),
-            (Some(_), Some((_, others))) => *others = others.before(&passage),
+            (None, _) => crossed.nearest = Some(Crossing { depth, passage }),
+            (Some(_), None) => crossed.others = Some(Crossing { depth, passage }),
+            (Some(_), Some(others)) => others.passage = others.passage.before(&passage),
         }
     }
     crossed

@@ -31,15 +31,11 @@ pub(crate) fn of_scene(scene: &Scene, loaded: &Loaded) -> Vec<String> {
     }
     let seen = seen(loaded);
     let unseen = outside(scene, loaded, &seen).into_iter().chain(small::too_small(scene, loaded, &seen));
-    dark.chain(turned_away(loaded))
-        .chain(unseen)
-        .chain(clear_shadows(scene, loaded))
-        .chain(too_thick(scene, loaded))
-        .collect()
+    dark.chain(turned_away(loaded)).chain(unseen).chain(too_thick(scene, loaded)).collect()
 }
 
 /// Objects that absorb inside, and lie in a light that casts shadows, which are those of surfaces alone.
-fn clear_shadows<'a>(scene: &'a Scene, loaded: &'a Loaded) -> impl Iterator<Item = String> + 'a {
+pub(crate) fn clear_shadows<'a>(scene: &'a Scene, loaded: &'a Loaded) -> impl Iterator<Item = String> + 'a {
     let is_lit = loaded.lights.iter().any(|light| light.shadow && light.light.intensity != [0.0; 3]);
     let absorbs = |object: &&SceneObject| {
         let material = &scene.materials[object.material].material;
@@ -47,7 +43,7 @@ fn clear_shadows<'a>(scene: &'a Scene, loaded: &'a Loaded) -> impl Iterator<Item
     };
     scene.objects.iter().filter(move |_| is_lit).filter(absorbs).map(|object| {
         let name = escape_controls(&object.name);
-        format!("object '{name}' absorbs light inside, but its shadow is that of its `opacity` alone: raise that, or set casts_shadow = false")
+        format!("object '{name}' absorbs light inside, but its shadow is that of its `opacity` alone")
     })
 }
 

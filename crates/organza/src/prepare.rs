@@ -99,7 +99,9 @@ pub(crate) fn prepare(
     };
     let planned = plan_counted(scene, &loaded, options, planned)?;
     let (plan, memory) = (planned.plan.clone(), planned.memory);
-    let (splats, notes) = (loaded.splats.clone(), loaded.notes.clone());
+    let splats = loaded.splats.clone();
+    let mut notes = loaded.notes.clone();
+    notes.extend(doubts::clear_shadows(scene, &loaded));
     let mut warnings = loaded.warnings.clone();
     warnings.extend(doubts::of_scene(scene, &loaded));
     warnings.extend(unshown(scene));

@@ -3,7 +3,7 @@
 use crate::Error;
 use crate::load::Loaded;
 use crate::scene::{LightPoint, RenderSettings, ShadowMapping};
-use splat_core::shade::joint::MediumSpacing;
+use splat_core::shade::joint::{HIDDEN, MediumSpacing};
 use splat_core::{Camera, Light, LightShape, Limits, Object};
 use tsm::{Deposits, Params};
 
@@ -18,8 +18,6 @@ const DISPLAY_SLOPE: f64 = 12.92;
 const SEEN: f32 = 0.125;
 /// The eye's map, in messages.
 pub(crate) const EYE: &str = "the eye";
-/// Absorbance toward the eye beyond which nothing is seen: e^−8 is a third of a thousandth.
-const EYE_CUT: f64 = 8.0;
 /// Straight optical depths of a thick cell that lists go on for: as many as it has along the most slanted light.
 const CELLS_BEHIND: f64 = 5.0;
 
@@ -123,7 +121,8 @@ pub(crate) fn eye_table(
     if !(0..cloud.len()).any(is_lit_within) {
         return Ok(None);
     }
-    let tolerance = libm::exp(-EYE_CUT - CELLS_BEHIND * thickest(loaded)).max(f64::from(f32::MIN_POSITIVE)) as f32;
+    let tolerance =
+        libm::exp(-f64::from(HIDDEN) - CELLS_BEHIND * thickest(loaded)).max(f64::from(f32::MIN_POSITIVE)) as f32;
     let params = shadow_params(settings, loaded, tolerance, max_bytes);
     let objects = thick_objects(loaded);
     let scene = tsm::Scene { cloud, materials: &loaded.materials, objects: &objects };

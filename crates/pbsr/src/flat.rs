@@ -22,6 +22,14 @@ const HITS: u32 = 56;
 #[repr(align(32))]
 struct Row([u64; 4]);
 
+/// What all particles of an object that is shown as it is have.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Shown {
+    pub(crate) emission: [f32; 3],
+    /// Times which their colours are.
+    pub(crate) color_unit: f32,
+}
+
 /// Sums of a tile.
 pub(crate) struct Flat {
     rows: Vec<Row>,
@@ -33,11 +41,11 @@ impl Flat {
         Self { rows: vec![Row::default(); AREA], touched: false }
     }
 
-    /// Adds a hit to each of the pixels, of a colour of its own and an emission that all have. Whole blocks of colours
+    /// Adds a hit to each of the pixels, of a colour of its own and what all have. Whole blocks of colours
     /// are read: there must be [`BLOCK`] more.
-    pub(crate) fn add(&mut self, pixels: &[u32], colors: &[PackedColor], emission: [f32; 3], inverse_unit: f32) {
+    pub(crate) fn add(&mut self, pixels: &[u32], colors: &[PackedColor], shown: Shown, inverse_unit: f32) {
         self.touched |= !pixels.is_empty();
-        pulp::Arch::new().dispatch(Add { pixels, colors, emission, inverse_unit, rows: &mut self.rows });
+        pulp::Arch::new().dispatch(Add { pixels, colors, shown, inverse_unit, rows: &mut self.rows });
     }
 
     /// Moves all to the sums of the ensemble.
@@ -64,7 +72,7 @@ impl Flat {
 struct Add<'a> {
     pixels: &'a [u32],
     colors: &'a [PackedColor],
-    emission: [f32; 3],
+    shown: Shown,
     inverse_unit: f32,
     rows: &'a mut [Row],
 }
@@ -74,14 +82,15 @@ impl pulp::NullaryFnOnce for Add<'_> {
 
     #[inline(always)]
     fn call(self) {
-        let Self { pixels, colors, emission, inverse_unit, rows } = self;
+        let Self { pixels, colors, shown, inverse_unit, rows } = self;
+        let Shown { emission, color_unit } = shown;
         let mut converted = [[0; 4]; BLOCK];
         for (pixels, colors) in pixels.chunks(BLOCK).zip(colors.as_chunks::<BLOCK>().0) {
             for (to, color) in converted.iter_mut().zip(colors) {
                 let color = color.get();
                 let mut luminance = 0.0;
                 let [r, g, b] = [0, 1, 2].map(|c| {
-                    let v = ((color[c] + emission[c]) * inverse_unit).clamp(-BRIGHTEST, BRIGHTEST);
+                    let v = ((color[c] * color_unit + emission[c]) * inverse_unit).clamp(-BRIGHTEST, BRIGHTEST);
                     luminance += v * LUMINANCE[c];
                     fixed(v) as u64
                 });

@@ -349,7 +349,7 @@ fn object_of(scene: &Scene<'_>, object: &Object<'_>) -> ParticleObject {
         rotation_x,
         rotation_y,
         rotation_z,
-        emission: wide(m.emission.into()),
+        emission: glam::Vec3::from(m.emission).extend(object.look.color_unit).to_array(),
         share: [projector.share, object.look.radius, f32::from(kind), object.look.shadow_coefficient],
     }
 }

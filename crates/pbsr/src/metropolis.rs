@@ -21,6 +21,7 @@ use crate::{Density, Error, GridSampler, Particles, Sampler};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 use splat_core::{Grid, TransferFunction, TransferPoint, glam};
+use std::borrow::Cow;
 
 /// Particles of a chunk, in the mean.
 const CHUNK: f64 = 4096.0;
@@ -78,15 +79,41 @@ impl<'a> MetropolisSampler<'a> {
         chains: &MetropolisParams,
         density: Option<Density<'a>>,
     ) -> Result<Self, Error> {
+        Self::of(grid, Cow::Borrowed(transfer), params, chains, density)
+    }
+
+    /// The same by a transfer function that it keeps.
+    ///
+    /// # Errors
+    /// As [`MetropolisSampler::new`].
+    pub fn owning(
+        grid: &'a Grid,
+        transfer: TransferFunction,
+        params: &VolumeParams,
+        chains: &MetropolisParams,
+        density: Option<Density<'a>>,
+    ) -> Result<Self, Error> {
+        Self::of(grid, Cow::Owned(transfer), params, chains, density)
+    }
+
+    fn of(
+        grid: &'a Grid,
+        transfer: Cow<'a, TransferFunction>,
+        params: &VolumeParams,
+        chains: &MetropolisParams,
+        density: Option<Density<'a>>,
+    ) -> Result<Self, Error> {
         check(chains.particles_per_chain >= 1, "particles_per_chain", chains.particles_per_chain, "at least 1")?;
         check(chains.stride >= 1, "stride", chains.stride, "at least 1")?;
-        let cells = GridSampler::new(grid, transfer, params, None)?;
+        let cells = GridSampler::of(grid, transfer, params, None)?;
         const POINTS: [f32; 2] = [0.211_324_87, 0.788_675_1];
         let of_cell = |&Cell { at, .. }: &Cell| {
             let lattice = cells.lattice();
             let at_point = |k: usize| {
                 let share = [POINTS[k & 1], POINTS[k >> 1 & 1], POINTS[k >> 2]];
-                f64::from(transfer.at(cells.interpolate(at, lattice.within(lattice.corner(at), share)).0).extinction)
+                f64::from(
+                    cells.transfer.at(cells.interpolate(at, lattice.within(lattice.corner(at), share)).0).extinction,
+                )
             };
             f64::from(lattice.volume(at)) * (0..8).map(at_point).sum::<f64>() / 8.0
         };

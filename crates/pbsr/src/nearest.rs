@@ -3,7 +3,7 @@
 use crate::PackedColor;
 use crate::bins::{AREA, Record, TILE, Task};
 use crate::ensemble::TileSums;
-use crate::flat::{self, Flat};
+use crate::flat::{self, Flat, Shown};
 use crate::render::{Resolve, solid};
 use splat_core::shade::MAX_CHANNELS;
 
@@ -74,8 +74,9 @@ impl Nearest {
                 self.shade(n, task, t, all, sums);
             } else {
                 let n = self.see(records, |_, record| record.pixel() as u32);
-                let emission = all.scene.objects[task.object as usize].look.material.emission;
-                self.flat.add(&self.seen[..n], &self.colors, emission, sums.inverse_unit);
+                let look = &all.scene.objects[task.object as usize].look;
+                let shown = Shown { emission: look.material.emission, color_unit: look.color_unit };
+                self.flat.add(&self.seen[..n], &self.colors, shown, sums.inverse_unit);
             }
         }
     }

@@ -65,23 +65,17 @@ impl PackedNormal {
     }
 }
 
-/// A linear colour in 32 bits: mantissas of nine, nine and eight bits and one exponent of six. Channels go up to 2³⁹, steps are 2⁻³² at least.
-/// The relative error is at most 1/510 of the largest channel where it is rounded to the nearest, in blue, of which least is seen, 1/255.
+/// A linear colour in 32 bits: three mantissas of nine bits and one exponent, 2⁻²⁴ to 65408, relative error at most
+/// 1/512 of the largest channel where it is rounded to the nearest. Objects whose colours lie elsewhere have a
+/// [`color_unit`](crate::Appearance::color_unit).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct PackedColor(u32);
 
-/// The power of two that the exponent 0 stands for: channels of such a colour are below it.
-const LEAST_POWER: i32 = -23;
-/// The largest channel.
-const LARGEST: f32 = (1u64 << 39) as f32;
-/// Steps of red and green up to which blue, in steps twice as large, has room to be rounded up.
-const MOST_BLUE: f32 = 510.0;
-
 impl PackedColor {
     /// White.
-    pub const WHITE: Self = Self(256 | 256 << 9 | 128 << 18 | 24 << 26);
+    pub const WHITE: Self = Self(256 | 256 << 9 | 256 << 18 | 16 << 27);
 
-    /// Packs a colour, rounded to the nearest; negative channels and those that are not numbers count as 0, too large ones as the largest.
+    /// Packs a colour, rounded to the nearest; negative and not finite channels count as 0, large ones as 65408.
     #[inline]
     pub fn new(color: [f32; 3]) -> Self {
         // The number before 511.5: what is rounded stays below 512.
@@ -104,16 +98,15 @@ impl PackedColor {
     /// The colour.
     #[inline]
     pub fn get(self) -> [f32; 3] {
-        // A step is 2^(power − 9).
-        let scale = f32::from_bits(((self.0 >> 26) + 95) << 23);
-        [self.0 & 511, self.0 >> 9 & 511, self.0 >> 17 & 510].map(|v| v as f32 * scale)
+        let scale = f32::from_bits(((self.0 >> 27) + 127 - 15 - 9) << 23);
+        [self.0, self.0 >> 9, self.0 >> 18].map(|v| (v & 511) as f32 * scale)
     }
 }
 
 /// A colour in steps of its packed form, not rounded yet.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Steps {
-    /// Of red and green below 512, of blue below 256.
+    /// Of each channel, below 512.
     channels: [f32; 3],
     exponent: u32,
 }
@@ -124,26 +117,26 @@ impl Steps {
         Self::up_to(color, 511.0)
     }
 
-    /// Of which red and green are at most `most`, 256 or more.
+    /// Of which the largest is at most `most`, 256 or more.
     #[inline]
     fn up_to(color: [f32; 3], most: f32) -> Self {
-        let c = color.map(|v| if v > 0.0 { v.min(LARGEST) } else { 0.0 });
+        let c = color.map(|v| if v > 0.0 { v.min(65408.0) } else { 0.0 });
         let largest = c[0].max(c[1]).max(c[2]);
-        // Power of two above the largest channel, from its bits; rounding may carry into the next.
-        let mut power = ((largest.to_bits() >> 23) as i32 - 126).max(LEAST_POWER);
-        let scale = |power: i32| f32::from_bits(((9 - power + 127) as u32) << 23);
-        if c[0].max(c[1]) * scale(power) > most || c[2] * scale(power) > MOST_BLUE {
-            power += 1;
+        // Exponent of two above the largest channel, from its bits; rounding may carry into the next.
+        let mut exponent = ((largest.to_bits() >> 23) as i32 - 126).max(-15);
+        let scale = |e: i32| f32::from_bits(((9 - e + 127) as u32) << 23);
+        if largest * scale(exponent) > most {
+            exponent += 1;
         }
-        let s = scale(power);
-        Self { channels: [c[0] * s, c[1] * s, c[2] * (0.5 * s)], exponent: (power - LEAST_POWER) as u32 }
+        let s = scale(exponent);
+        Self { channels: c.map(|v| v * s), exponent: (exponent + 15) as u32 }
     }
 
     /// Whole steps below what the channels are with `more`.
     #[inline]
     fn rounded(self, more: f32) -> PackedColor {
         let [r, g, b] = self.channels.map(|v| (v + more) as i32 as u32);
-        PackedColor(r | g << 9 | b << 18 | self.exponent << 26)
+        PackedColor(r | g << 9 | b << 18 | self.exponent << 27)
     }
 
     /// See [`PackedColor::at`].
@@ -244,20 +237,16 @@ mod tests {
     }
 
     #[test]
-    fn colours_come_back_within_a_510th_and_blue_within_a_255th() {
+    fn colours_come_back_within_a_512th() {
         assert_eq!(PackedColor::WHITE.get(), [1.0; 3]);
         assert_eq!(PackedColor::new([1.0; 3]), PackedColor::WHITE);
         assert_eq!(PackedColor::new([0.0; 3]).get(), [0.0; 3]);
-        assert_eq!(PackedColor::default().get(), [0.0; 3]);
-        assert_eq!(PackedColor::new([f32::NAN, -1.0, f32::INFINITY]).get(), [0.0, 0.0, LARGEST]);
-        assert_eq!(PackedColor::new([f32::MAX, 0.0, f32::MAX]).get(), [LARGEST, 0.0, LARGEST]);
+        assert_eq!(PackedColor::new([f32::NAN, -1.0, f32::INFINITY]).get()[2], 65408.0);
         for i in 0..20_000 {
-            let middle = rng::unit_f32(2, 1, i, 3) * 50.0 - 16.0;
-            let c: [f32; 3] = std::array::from_fn(|k| (rng::unit_f32(2, 1, i, k as u64) * 10.0 - 5.0 + middle).exp2());
+            let c: [f32; 3] = std::array::from_fn(|k| (rng::unit_f32(2, 1, i, k as u64) * 20.0 - 10.0).exp2());
             let back = PackedColor::new(c).get();
             let largest = c[0].max(c[1]).max(c[2]);
-            let allowed = [510.0, 510.0, 255.0].map(|steps| largest / steps);
-            assert!((0..3).all(|k| (back[k] - c[k]).abs() <= allowed[k]), "{c:?} → {back:?}");
+            assert!((0..3).all(|k| (back[k] - c[k]).abs() <= largest / 512.0), "{c:?} → {back:?}");
         }
     }
 }

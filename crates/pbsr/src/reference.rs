@@ -46,7 +46,7 @@ pub fn nearest(scene: &Scene<'_>, set: u64) -> Vec<Option<Nearest>> {
                 }
                 let scale = scene.camera.focal_px() / if scene.camera.is_orthographic() { 1.0 } else { view.z };
                 let at = [0.5 * w as f64 + view.x * scale, 0.5 * h as f64 - view.y * scale];
-                let color = particles.color[i].get();
+                let color = particles.color[i].get().map(|c| c * object.look.color_unit);
                 // Of a wider particle each pixel asks with its own area.
                 let side = |pixel: [f64; 2]| {
                     let (_, ray) = scene.camera.view_ray(pixel[0], pixel[1]);

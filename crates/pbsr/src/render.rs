@@ -204,7 +204,8 @@ impl<'a> Resolve<'a> {
         let normal = self.plan.turns[o] * normal.get();
         let from_eye = self.plan.behind_pixel(self.scene.camera, at_px, record.depth);
         let look = &self.scene.objects[o].look;
-        let seen = Seen { look, from_eye, normal, color: record.color.get() };
+        let color = record.color.get().map(|c| c * look.color_unit);
+        let seen = Seen { look, from_eye, normal, color };
         self.shader.shade(&seen, values);
     }
 

@@ -18,11 +18,19 @@ pub struct Appearance {
     pub radius: f32,
     /// Share of the shadow that is received, in \[0, 1\].
     pub shadow_coefficient: f32,
+    /// A power of two, times which the colours of its particles are: for objects whose colours do not lie between 2⁻²⁴ and 65408.
+    pub color_unit: f32,
 }
 
 impl Default for Appearance {
     fn default() -> Self {
-        Self { material: Material::default(), kind: SplatKind::Surface, radius: 0.0, shadow_coefficient: 1.0 }
+        Self {
+            material: Material::default(),
+            kind: SplatKind::Surface,
+            radius: 0.0,
+            shadow_coefficient: 1.0,
+            color_unit: 1.0,
+        }
     }
 }
 

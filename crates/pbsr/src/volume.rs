@@ -34,6 +34,7 @@ use rayon::prelude::*;
 use splat_core::{Grid, TransferFunction, glam};
 #[cfg(feature = "gpu")]
 use splat_shaders::layouts::ParticleSource;
+use std::borrow::Cow;
 
 /// What a sampler of volumes needs.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -80,7 +81,7 @@ pub(crate) struct Cell {
 /// Particles in a regular volume.
 pub struct GridSampler<'a> {
     pub(crate) grid: &'a Grid,
-    pub(crate) transfer: &'a TransferFunction,
+    pub(crate) transfer: Cow<'a, TransferFunction>,
     pub(crate) params: VolumeParams,
     density: Option<Density<'a>>,
     /// Each cell with extinction.
@@ -104,6 +105,28 @@ impl<'a> GridSampler<'a> {
         params: &VolumeParams,
         density: Option<Density<'a>>,
     ) -> Result<Self, Error> {
+        Self::of(grid, Cow::Borrowed(transfer), params, density)
+    }
+
+    /// The same by a transfer function that it keeps.
+    ///
+    /// # Errors
+    /// As [`GridSampler::new`].
+    pub fn owning(
+        grid: &'a Grid,
+        transfer: TransferFunction,
+        params: &VolumeParams,
+        density: Option<Density<'a>>,
+    ) -> Result<Self, Error> {
+        Self::of(grid, Cow::Owned(transfer), params, density)
+    }
+
+    pub(crate) fn of(
+        grid: &'a Grid,
+        transfer: Cow<'a, TransferFunction>,
+        params: &VolumeParams,
+        density: Option<Density<'a>>,
+    ) -> Result<Self, Error> {
         params.validate()?;
         grid.validate()?;
         density.as_ref().map_or(Ok(()), Density::validate)?;
@@ -112,12 +135,12 @@ impl<'a> GridSampler<'a> {
             return Err(Error::limit("a volume", needed, u32::MAX.into(), "lattice points"));
         }
         let [nx, ny, nz] = grid.dims;
-        let pieces = Pieces::new(transfer);
+        let pieces = Pieces::new(&transfer);
         let rows = cells(ny);
         let cells: Vec<Cell> = (0..rows * cells(nz))
             .into_par_iter()
             .with_min_len(16)
-            .flat_map_iter(|row| row_of_cells(grid, transfer, &pieces, (row / rows * ny + row % rows) * nx))
+            .flat_map_iter(|row| row_of_cells(grid, &transfer, &pieces, (row / rows * ny + row % rows) * nx))
             .collect();
         let most = density.as_ref().map_or(1.0, |d| d.max);
         let per_cell = grid.cell_volume() / params.cross_section * params.extinction_scale * most;

@@ -1,4 +1,4 @@
-//! Colours of particles have eight or nine bits each, and no bias: what is seen of many is the colour itself.
+//! Colours of particles have nine bits each, and no bias: what is seen of many is the colour itself.
 
 use crate::common::*;
 use pbsr::{
@@ -116,15 +116,9 @@ fn colours_are_within_a_step_and_exact_where_they_need_no_rounding() {
         let color: [f32; 3] = std::array::from_fn(|k| (u(k as u64) * 20.0 - 10.0).exp2());
         let (largest, back) = (color.iter().fold(0.0f32, |m, c| m.max(*c)), PackedColor::at(color, place).get());
         for k in 0..3 {
-            assert!((back[k] - color[k]).abs() <= largest / [255.5, 255.5, 127.5][k], "{color:?} → {back:?}");
+            assert!((back[k] - color[k]).abs() <= largest / 255.5, "{color:?} → {back:?}");
         }
-        for exact in [
-            [1.0, 0.5, 0.0],
-            [0.375, 0.125, 0.25],
-            [2f32.powi(38), 2f32.powi(32), 0.0],
-            [2f32.powi(-20), 0.0, 2f32.powi(-26)],
-            [0.0; 3],
-        ] {
+        for exact in [[1.0, 0.5, 0.0], [0.375, 0.125, 0.25], [65408.0, 128.0, 0.0], [0.0; 3]] {
             assert_eq!(PackedColor::at(exact, place).get(), exact, "{place}");
         }
     }

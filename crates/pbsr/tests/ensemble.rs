@@ -249,7 +249,7 @@ fn light_and_shadow_make_the_radiance_of_a_lambertian() {
     for k in 0..256 {
         let near = |name: &str, expected: [f32; 3]| {
             let found = layers.rgb(name).unwrap()[k];
-            // Colours have eight or nine bits: the mean of twenty.
+            // Colours have nine bits: the mean of twenty.
             assert!((0..3).all(|c| (found[c] - expected[c]).abs() < 3e-3), "{name} {k}: {found:?} for {expected:?}");
         };
         let e = 3.0 * 0.5 * 0.8 / std::f32::consts::PI;

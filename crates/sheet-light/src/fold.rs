@@ -11,7 +11,7 @@ use crate::light::Lamp;
 use crate::near_eye;
 use crate::neighbours::Receivers;
 use crate::panes::Panes;
-use crate::params::{Aligned, Classify};
+use crate::params::{Aligned, Classify, Lighting};
 use crate::preclassified::Preclassified;
 use crate::rays::LatticeRays;
 use crate::ring::{Ring, Splatter, Taper};
@@ -99,12 +99,17 @@ pub fn prepare<'a>(input: SheetInput<'a>, params: &Params, progress: Option<&Pro
     for volume in &input.volumes {
         let mut prepared = Prepared::new(*volume, &input, params, (&slabs, slant), tiles);
         let count = prepared.voxels.count();
-        needed += Shadows::bytes(count, &input.lights) + Within::bytes(&prepared.receivers(), count, &input.lights);
+        needed += Shadows::bytes(count, &input.lights);
+        if params.lighting == Lighting::Joint {
+            needed += Within::bytes(&prepared.receivers(), count, &input.lights);
+        }
         needed += GradientVolume::bytes(count, volume, params);
         check(needed, params)?;
         prepared.gradients = GradientVolume::new(&prepared.receivers(), &prepared.lattice, params);
         prepared.shadows = Shadows::new(&prepared.receivers(), &input.lights, input.shadow_origin, progress)?;
-        prepared.within = Within::new(&prepared.receivers(), &input.lights, input.shadow_origin, progress)?;
+        if params.lighting == Lighting::Joint {
+            prepared.within = Within::new(&prepared.receivers(), &input.lights, input.shadow_origin, progress)?;
+        }
         volumes.push(prepared);
         progress.tick(1).map_err(cancelled)?;
     }

@@ -89,7 +89,7 @@ mod within;
 pub use counts::SheetCounts;
 pub use error::Error;
 pub use fold::{Sheeted, prepare};
-pub use params::{Aligned, Classify, Gradients, KernelShape, Params};
+pub use params::{Aligned, Classify, Gradients, KernelShape, Lighting, Params};
 pub use splats::Splats;
 pub use volume::{SheetInput, Volume};
 

@@ -54,6 +54,17 @@ pub enum Gradients {
     Volume,
 }
 
+/// Where the part of a ray in a slab takes the light that comes through shadows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Lighting {
+    /// All along it, with what is left on the way to the eye: the joint integral of [`splat_core::shade::joint`], where a spacing is optically
+    /// thick.
+    #[default]
+    Joint,
+    /// In its middle (the paper): thick media are too dark.
+    Middle,
+}
+
 /// Parameters of image-aligned sheets.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Params {
@@ -70,6 +81,8 @@ pub struct Params {
     pub accumulation: Accumulation,
     /// Where normals come from.
     pub gradients: Gradients,
+    /// Where light is taken; of slabs across the view alone.
+    pub lighting: Lighting,
     /// When values become colours; of slabs across the view alone.
     pub classify: Classify,
     /// What slabs lie along; of slabs across the view alone.
@@ -162,6 +175,7 @@ impl Default for Params {
             sections: PHASES,
             accumulation: Accumulation::F32,
             gradients: Gradients::default(),
+            lighting: Lighting::default(),
             classify: Classify::default(),
             aligned: Aligned::default(),
             transmittance_cutoff: 1e-3,

@@ -280,7 +280,7 @@ impl Shader<'_> {
             wanted |= u32::from(tau[lane] > 0.0) << lane;
         }
         let wanted = wanted & of.open;
-        self.channels(simd, of, &self.spots(simd, of, place, (medium, wanted)), (medium, wanted), values);
+        self.channels(simd, of, &self.spots(simd, of, place, (medium, wanted)), medium, wanted, values);
         for c in 0..self.layout.count() {
             // What is not seen may be no number.
             let (zero, value) = (Lanes::splat(simd, 0.0), Lanes::load(simd, &values[c]));
@@ -296,7 +296,8 @@ impl Shader<'_> {
         simd: S,
         of: &Reconstructed<'_>,
         spots: &Spots<S>,
-        (medium, wanted): (&Medium<S>, u32),
+        medium: &Medium<S>,
+        wanted: u32,
         values: &mut Values,
     ) {
         let volume = &of.prepared.volume;

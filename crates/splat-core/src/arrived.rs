@@ -1,7 +1,7 @@
 //! Light that arrived at splats, remembered: it does not depend on the viewer, so when he alone moves it need not be looked up
 //! again.
 
-use crate::{Receiver, TOGETHER, Transmittance};
+use crate::{ABOUT, Receiver, TOGETHER, Transmittance};
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
 /// What arrived of one light at each splat of a cloud, as far as it was asked for.
@@ -85,6 +85,10 @@ impl Transmittance for Remembered<'_> {
 
     fn absorbance(&self, receiver: &Receiver) -> [f32; 3] {
         self.shadow.absorbance(receiver)
+    }
+
+    fn absorbances_about(&self, receivers: &[Receiver; ABOUT]) -> [[f32; 3]; ABOUT] {
+        self.shadow.absorbances_about(receivers)
     }
 
     fn at_splat(&self, splat: usize, receiver: &Receiver) -> [f32; 3] {

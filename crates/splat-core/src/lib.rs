@@ -103,7 +103,7 @@ pub use progress::Progress;
 pub use slice_order::{Direction, SliceOrder};
 pub use space::{Aabb, DAabb, Similarity};
 pub use transfer::{TransferFunction, TransferPoint};
-pub use transmittance::{MeanTransmittance, Receiver, TOGETHER, Transmittance};
+pub use transmittance::{ABOUT, MeanTransmittance, Receiver, TOGETHER, Transmittance};
 pub use turns::turns;
 
 /// The page's example compiles and holds.

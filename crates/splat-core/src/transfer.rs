@@ -81,6 +81,13 @@ impl TransferFunction {
         Self { points: self.points.iter().map(kept).collect() }
     }
 
+    /// The same with colours times a factor, ≥ 0.
+    #[must_use]
+    pub fn with_colors_times(&self, factor: f32) -> Self {
+        let point = |p: &TransferPoint| TransferPoint { color: p.color.map(|c| c * factor), ..*p };
+        Self { points: self.points.iter().map(point).collect() }
+    }
+
     /// The largest channel of all colours.
     pub fn brightest(&self) -> f32 {
         self.points.iter().flat_map(|p| p.color).fold(0.0, f32::max)

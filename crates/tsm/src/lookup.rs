@@ -18,7 +18,7 @@ use crate::table::{ENOUGH, List, Lists, WINDOW};
 use glam::{Vec2, Vec3, Vec4};
 use pulp::{Simd, WithSimd};
 use splat_core::raster::lanes::{Lanes, exp_neg};
-use splat_core::{Receiver, SplatKind, TOGETHER, Transmittance, glam};
+use splat_core::{ABOUT, Receiver, SplatKind, TOGETHER, Transmittance, glam};
 
 /// Greatest absorbance that is told: the transmittance is the least normal number of f32.
 const MOST: f32 = 87.33655;
@@ -40,6 +40,10 @@ impl Transmittance for ShadowMap {
     }
 
     // While one waits for memory, others are worked on.
+    fn absorbances_about(&self, receivers: &[Receiver; ABOUT]) -> [[f32; 3]; ABOUT] {
+        pulp::Arch::new().dispatch(LookUp::<ABOUT, true> { map: self, receivers })
+    }
+
     fn at_splats(&self, splats: &[usize], receiver: &dyn Fn(usize) -> Receiver) -> [[f32; 3]; TOGETHER] {
         const NONE: Receiver =
             Receiver { position: Vec3::ZERO, normal: Vec3::ZERO, radius: 0.0, kind: SplatKind::Medium };

@@ -10,8 +10,8 @@ const uint PER_CROSSING = 1u << 31;
 
 // As `PackedColor::get`.
 vec3 unpack_color(uint packed) {
-    float scale = uintBitsToFloat(((packed >> 26) + 95u) << 23);
-    return vec3(float(packed & 511u), float((packed >> 9) & 511u), float((packed >> 17) & 510u)) * scale;
+    float scale = uintBitsToFloat(((packed >> 27) + 103u) << 23);
+    return vec3(float(packed & 511u), float((packed >> 9) & 511u), float((packed >> 18) & 511u)) * scale;
 }
 
 // A permutation of 32 bits.

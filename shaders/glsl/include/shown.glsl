@@ -8,7 +8,8 @@ struct Shown {
 };
 
 Shown shown_by(uint word) {
-    precise vec3 radiance = unpack_color(particles[word + 4u]) + objects[particles[word + 6u]].emission.xyz;
+    vec4 emission = objects[particles[word + 6u]].emission;
+    precise vec3 radiance = unpack_color(particles[word + 4u]) * emission.w + emission.xyz;
     vec3 v = in_unit(radiance);
     return Shown(v, square_of(luminance_of(v)));
 }

@@ -41,8 +41,8 @@ uint pack_normal(vec3 n) {
     return HAS_NORMAL | uint(steps.x) | (uint(steps.y) << 15);
 }
 
-float color_scale(int power) {
-    return uintBitsToFloat(uint(136 - power) << 23);
+float color_scale(int exponent) {
+    return uintBitsToFloat(uint(136 - exponent) << 23);
 }
 
 // A hash of the bits of a place, as `particles::hash_of`.
@@ -51,21 +51,17 @@ uint hash_of(vec3 place) {
     return scramble((bits.x * 0x9e3779b1u) ^ (bits.y * 0x85ebca77u) ^ (bits.z * 0xc2b2ae3du));
 }
 
-// The largest channel, 2^39, and the power of two that the exponent 0 stands for, as in `particles.rs`.
-const float LARGEST = 549755813888.0;
-const int LEAST_POWER = -23;
-
 // As `PackedColor::at`.
 uint pack_color(vec3 color, vec3 place) {
     vec3 c = vec3(
-        color.x > 0.0 ? min(color.x, LARGEST) : 0.0,
-        color.y > 0.0 ? min(color.y, LARGEST) : 0.0,
-        color.z > 0.0 ? min(color.z, LARGEST) : 0.0);
+        color.x > 0.0 ? min(color.x, 65408.0) : 0.0,
+        color.y > 0.0 ? min(color.y, 65408.0) : 0.0,
+        color.z > 0.0 ? min(color.z, 65408.0) : 0.0);
     float largest = max(max(c.x, c.y), c.z);
-    int power = max(int(floatBitsToUint(largest) >> 23) - 126, LEAST_POWER);
-    precise vec3 most = c * color_scale(power);
-    power += int(max(most.x, most.y) > 511.0 || most.z > 510.0);
+    int exponent = max(int(floatBitsToUint(largest) >> 23) - 126, -15);
+    precise float most = largest * color_scale(exponent);
+    exponent += int(most > 511.0);
     precise float more = (float(hash_of(place) >> 18) + 0.5) * (1.0 / 16384.0);
-    precise vec3 steps = c * (color_scale(power) * vec3(1.0, 1.0, 0.5)) + more;
-    return uint(steps.x) | (uint(steps.y) << 9) | (uint(steps.z) << 18) | (uint(power - LEAST_POWER) << 26);
+    precise vec3 steps = c * color_scale(exponent) + more;
+    return uint(steps.x) | (uint(steps.y) << 9) | (uint(steps.z) << 18) | (uint(exponent + 15) << 27);
 }

@@ -119,9 +119,9 @@ pub(super) fn field(
     input::hold("the field", 8 * tuples.len() as u64, params)?;
     let values: Vec<f64> = tuples.map(|tuple| selection.value.of(|i| tuple[i])).collect();
     if let Some(i) = values.iter().position(|v| (*v as f32).is_infinite()) {
-        let (expected, found) = ("values that fit 32-bit floats", format!("{} at value {i} of {name}", values[i]));
+        let found = format!("{} at value {i} of {name}", values[i]);
         let hint = "scale the values, or write NaN where there is none: it draws nothing";
-        return Err(ReadError::input(place, expected, found, hint));
+        return Err(ReadError::input(place, "values that fit 32-bit floats", found, hint));
     }
     notes.remarks.push(format!("the field is {name}, of the {}", if of_points { "points" } else { "cells" }));
     Ok(if of_points { Field::Points(values) } else { Field::Cells(values) })
@@ -290,7 +290,7 @@ impl Deref for Numbers {
     }
 }
 
-/// What memory is taken for by [`Numbers`].
+/// The entry of [`Numbers`] in the account of memory.
 const NUMBERS: &str = "the numbers of an array";
 
 /// Memory of the cells of a piece: so many cells with so many points of cells.

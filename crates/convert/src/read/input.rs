@@ -173,7 +173,7 @@ impl<'a> Stream<'a> {
     }
 }
 
-/// What memory is taken for by [`Stream::rest`].
+/// The entry of [`Stream::rest`] in the account of memory.
 const CONTENT: &str = "the content of the file";
 
 /// Bytes that are in memory whole.

@@ -144,7 +144,7 @@ impl<'a> Materials<'a> {
         let names: Vec<&str> = if several { whole.split_whitespace().collect() } else { vec![whole.as_str()] };
         for name in names {
             reading.go_on()?;
-            // What it holds is known already, whichever way it is named.
+            // The same file may be named in several ways; its materials are read once.
             if let Some(file) = self.beside.real(name)
                 && !self.libraries.insert(file)
             {

@@ -41,8 +41,8 @@ fn elements<S: Source>(source: S, header: &Header, reading: &mut Reading<'_>) ->
     if header.has_gaussians_without_harmonics() {
         let hint = "write f_dc_0 to f_dc_2 = (colour / 255 − 0.5) / 0.2820948 in the place of red, green and blue, or draw points without \
             scale_* and rot_*";
-        let (expected, found) = ("Gaussians with their colours as f_dc_0 to f_dc_2", "Gaussians without such");
-        return Err(ReadError::input(Place::File, expected, found, hint));
+        let expected = "Gaussians with their colours as f_dc_0 to f_dc_2";
+        return Err(ReadError::input(Place::File, expected, "Gaussians without such", hint));
     }
     let loaded = body::read(source, header, reading)?;
     reading.notes.not_used(unused(header, reading.params)?.iter().map(Vec::as_slice));

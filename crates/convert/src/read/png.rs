@@ -21,10 +21,10 @@ pub(super) fn read(content: &[u8], reading: &mut Reading<'_>) -> Result<Radiance
     let decoder = PngDecoder::new(Cursor::new(content)).map_err(damaged)?;
     let (width, height) = decoder.dimensions();
     check_image([width, height], reading.params)?;
-    // What is packed are rows of whole bytes: a mask of black and white has a bit a pixel.
+    // Rows are packed in whole bytes: a mask of black and white has one bit a pixel.
     let row = u64::from(width) * u64::from(decoder.original_color_type().bits_per_pixel());
     check_deflated(row.div_ceil(8) * u64::from(height), content.len() as u64, "the packed image")?;
-    // As it is decoded, and with four channels of 16 bits.
+    // Two copies exist at a time: the decoded image, and the same with four channels of 16 bits.
     let pixels = u64::from(width) * u64::from(height);
     hold("the decoded image", decoder.total_bytes().saturating_add(8 * pixels), reading.params)?;
     let mut pixels = Vec::new();

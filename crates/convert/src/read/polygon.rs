@@ -95,8 +95,8 @@ pub(super) fn triangulate(
     Ok(())
 }
 
-/// What becomes of all polygons: side by side of small ones, one after the other of large ones, so that the memory that they take
-/// does not depend on the number of threads.
+/// Triangulates all polygons: small ones in parallel, large ones one after the other, so that the memory they take does not depend on the number
+/// of threads.
 fn outcomes(mesh: &Mesh, polygons: &[Polygon], reading: &Reading<'_>) -> Result<Vec<Outcome>, ReadError> {
     let largest = polygons.iter().map(|p| p.count as u64 + 2).max().unwrap_or(0);
     let bytes = largest * BYTES_PER_CORNER + size_of_val(polygons) as u64 * 4;

@@ -26,10 +26,10 @@ impl Value {
     }
 }
 
-/// What is known of an array among which one is chosen.
+/// An array of a file, as far as choosing one needs it.
 #[cfg(any(feature = "vti", feature = "vtk"))]
 pub(super) struct Candidate {
-    /// As it may be shown.
+    /// Its name, with control characters escaped.
     pub(super) name: String,
     /// Numbers of a tuple, and their type.
     pub(super) numbers: u64,

@@ -17,7 +17,9 @@ use crate::technique::{Fold, Session};
 use crate::work::{self, Translucent, cost};
 use crate::{CostRecord, Error, RenderOptions, memory, stage};
 use sheet_light::half::{HalfParams, pane_bytes, polygon_bytes};
-use sheet_light::{Aligned, Classify, Gradients, KernelShape, Params, SheetInput, Sheeted, Splats, Volume, prepare};
+use sheet_light::{
+    Aligned, Classify, Gradients, KernelShape, Lighting, Params, SheetInput, Sheeted, Splats, Volume, prepare,
+};
 use splat_core::{Accumulator, Direction, Limits, Packing};
 use std::ops::Range;
 
@@ -161,6 +163,7 @@ fn params(scene: &Scene, exponent: i32, options: &RenderOptions) -> Params {
         sections: settings.kernel_sections,
         accumulation: settings.accumulation,
         gradients: if settings.gradient_volume { Gradients::Volume } else { Gradients::Sheets },
+        lighting: Lighting::Joint,
         transmittance_cutoff: settings.transmittance_cutoff as f32,
         limits: Limits::bytes(options.max_memory),
     }

@@ -1,6 +1,6 @@
 //! Volumes, views and pictures for the tests.
 
-use sheet_light::{Error, Params, SheetCounts, SheetInput, Volume, prepare};
+use sheet_light::{Error, Lighting, Params, SheetCounts, SheetInput, Volume, prepare};
 use splat_core::glam::{DMat3, DVec3, Vec3};
 use splat_core::raster::{self, Detail, ProjectInput, Projected, project};
 use splat_core::shade::{ChannelLayout, LitBy};
@@ -128,6 +128,11 @@ pub(crate) const BEAUTY: ChannelLayout =
 /// No pixel is done before its end.
 pub(crate) fn exact() -> Params {
     Params { transmittance_cutoff: 0.0, ..Params::default() }
+}
+
+/// The same with light as the twin takes it.
+pub(crate) fn lit_in_middles() -> Params {
+    Params { lighting: Lighting::Middle, ..exact() }
 }
 
 /// Beauty and one plane of optical depth.

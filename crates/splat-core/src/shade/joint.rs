@@ -42,6 +42,9 @@ const BLUR: f32 = 0.3;
 const CLEAR: f32 = 0.75;
 /// Widths of a cell from its middle toward the light, along the normal, where the kernels of its layer end: what a map has there is no blur of it.
 const BEYOND: f32 = 2.5;
+/// Optical depth before a cell from which on its light is taken at its middle: e^−8, a third of a thousandth, of it is seen. The eye's map need reach no
+/// farther than some cells behind.
+pub const HIDDEN: f32 = 8.0;
 /// Slope, over the cell's own depth, below which no direction can be told from it.
 const FLAT: f32 = 1e-3;
 
@@ -114,26 +117,26 @@ struct Looked {
 }
 
 impl MediumCell {
+    /// A point of it that takes light.
+    fn receiver(&self, offset: Vec3) -> Receiver {
+        let position = self.position + offset;
+        Receiver { position, normal: Vec3::ZERO, radius: self.radius, kind: SplatKind::Medium }
+    }
+
     /// Optical depths by channel about the cell toward what `shadow` has the transmittance of, which lies in the unit direction `towards`.
     pub fn depths(&self, shadow: &dyn Transmittance, towards: Vec3) -> [DepthAbout; 3] {
-        let look = |offset: Vec3| {
-            let position = self.position + offset;
-            let receiver = Receiver { position, normal: Vec3::ZERO, radius: self.radius, kind: SplatKind::Medium };
-            shadow.absorbance(&receiver)
-        };
-        let middle = look(Vec3::ZERO);
+        let half = 0.5 * self.width;
+        let about = [Vec3::ZERO, Vec3::NEG_X, Vec3::X, Vec3::NEG_Y, Vec3::Y, Vec3::NEG_Z, Vec3::Z];
+        let [middle, faces @ ..] = shadow.absorbances_about(&about.map(|side| self.receiver(half * side)));
         let mut slopes = [Vec3::ZERO; 3];
-        for (axis, direction) in Vec3::AXES.into_iter().enumerate() {
-            let step = direction * (0.5 * self.width);
-            let behind = look(-step);
-            let ahead = look(step);
+        for (axis, [behind, ahead]) in faces.as_chunks().0.iter().enumerate() {
             for channel in 0..3 {
                 slopes[channel][axis] = behind[channel] - ahead[channel];
             }
         }
         let strongest = slopes.into_iter().max_by(|a, b| a.length_squared().total_cmp(&b.length_squared()));
         let outward = strongest.and_then(Vec3::try_normalize).unwrap_or(towards);
-        let beyond = look(outward * (BEYOND * self.width));
+        let beyond = shadow.absorbance(&self.receiver(outward * (BEYOND * self.width)));
         let of_channel = |channel| Looked { middle: middle[channel], beyond: beyond[channel], slope: slopes[channel] };
         std::array::from_fn(|channel| self.depth(&of_channel(channel), channel, towards))
     }
@@ -250,6 +253,12 @@ impl ThickSplat {
             optical_depth: material.extinction_rgb.map(|factor| factor * spacing.optical_depth),
             absorbs: true,
         };
+        // Nothing is seen of most splats of a thick medium.
+        let before = within.eye.absorbance(&cell.receiver(Vec3::ZERO));
+        let is_hidden = |channel: usize| before[channel] - 0.5 * cell.optical_depth[channel] / LEAST_COSINE > HIDDEN;
+        if (0..3).all(is_hidden) {
+            return None;
+        }
         let to_eye = to_eye(input, i);
         let eye = cell.depths(within.eye, to_eye);
         Some(Self { cell, eye, to_eye, weight })

@@ -125,7 +125,8 @@ impl World {
         let object = |sampler, turn, kind, material, radius, shadow_coefficient| Object {
             sampler,
             transform: Similarity { rotation: DQuat::from_rotation_z(turn), ..Similarity::default() },
-            look: Appearance { material, kind, radius, shadow_coefficient },
+            // Twice the colours of its particles.
+            look: Appearance { material, kind, radius, shadow_coefficient, color_unit: 2.0 },
         };
         // An object turns around the world's origin: one far away stays as it is.
         let turn = if self.origin == DVec3::ZERO { 0.2 } else { 0.0 };

@@ -103,7 +103,7 @@ pub(super) fn grid(
     let least = bodies.iter().flat_map(|body| body.corners.iter().map(|corner| field.at(body.cell, *corner)));
     let outside = least.fold(0.0, f64::min);
     let lattice = Lattice { low: bounds.low, sample: step / SAMPLES as f64, dims, outside };
-    lattice.check_work((points, bodies), bounds.volume)?;
+    lattice.check_work(points, bodies, bounds.volume)?;
     let values = lattice.filled((points, bodies), field, reading)?;
     let ([x, y, z], cells) = (dims, counted(bodies.len() as u64, "cell"));
     let remarks = &mut reading.notes.remarks;
@@ -229,7 +229,7 @@ impl Lattice {
     }
 
     /// Refuses bodies of that volume together which overlap so often that most of the work would be for nothing.
-    fn check_work(&self, (points, bodies): (&[DVec3], &[Body<'_>]), volume: f64) -> Result<(), ReadError> {
+    fn check_work(&self, points: &[DVec3], bodies: &[Body<'_>], volume: f64) -> Result<(), ReadError> {
         let place = |corner: u32| (points[corner as usize] - self.low, 0.0);
         let mut rows = 0.0;
         for body in bodies {
@@ -239,12 +239,12 @@ impl Lattice {
                 rows += across.y * across.z;
             });
         }
-        let all = self.dims.iter().map(|n| (n * SAMPLES) as f64).product::<f64>();
+        let samples = self.dims.iter().map(|n| (n * SAMPLES) as f64).product::<f64>();
         let work = rows + volume / self.sample.element_product();
-        if work <= FREE_WORK.max(MOST_WORK * all) {
+        if work <= FREE_WORK.max(MOST_WORK * samples) {
             return Ok(());
         }
-        let bounds = self.sample.element_product() * all;
+        let bounds = self.sample.element_product() * samples;
         let found = format!(
             "{} whose volumes are {:.0} times that of their bounds",
             counted(bodies.len() as u64, "cell"),

@@ -59,9 +59,16 @@ enum Origin<'a> {
 
 impl<'a> Paints<'a> {
     pub(super) fn new(document: &'a Document, buffers: &'a Buffers<'a>, beside: &'a Beside<'a>) -> Self {
-        let (paints, textures) = (Vec::new(), Vec::new());
-        let (known, decoded, images) = (BTreeMap::new(), BTreeMap::new(), BTreeMap::new());
-        Self { document, buffers, beside, paints, textures, known, decoded, images }
+        Self {
+            document,
+            buffers,
+            beside,
+            paints: Vec::new(),
+            textures: Vec::new(),
+            known: BTreeMap::new(),
+            decoded: BTreeMap::new(),
+            images: BTreeMap::new(),
+        }
     }
 
     /// Rank of the paint of a material, which the same without its texture follows; and the coordinates of the texture.

@@ -135,7 +135,7 @@ pub(super) fn vertices_of(primitive: &Primitive, buffers: &Buffers<'_>) -> u64 {
     if primitive.attributes.contains_key("NORMAL") { stored } else { indices }
 }
 
-/// What is said of vertices that fade.
+/// The remark on vertices with opacities.
 const OPACITIES: &str =
     "opacities of vertices (COLOR_0) are not drawn: a surface has one opacity, the key `opacity` of its object";
 

@@ -95,8 +95,9 @@ impl Columns {
         });
         let points = RawPoints { is_intensity, ..RawPoints::default() };
         let drop_invalid = (!mesh).then_some(params.drop_invalid);
-        let (record, positions, line) = ([0.0; 11], Vec::new(), vertex.line);
-        Ok(Self { kept, extras, further, last, has, record, positions, points, drop_invalid, line })
+        let positions = Vec::new();
+        let record = [0.0; 11];
+        Ok(Self { kept, extras, further, last, has, record, positions, points, drop_invalid, line: vertex.line })
     }
 
     /// Names of the properties of `vertex` that are read over.

@@ -24,7 +24,7 @@ const REST: &[u8] = b"f_rest_";
 /// Most of them: 15 of each colour.
 const MOST_REST: usize = 45;
 
-/// What is said where exponentials of the deviations are as large as the scene.
+/// The remark on deviations that were probably not stored as logarithms: their exponentials are as large as the scene.
 const LINEAR: &str = "its Gaussians are as large as the scene: scale_0 to scale_2 are read as natural logarithms of deviations, and look like \
     the deviations themselves; write their logarithms";
 

@@ -6,7 +6,7 @@
 mod sampler;
 
 use super::refuse;
-use super::unit::brightest_color;
+use super::unit::{brightest_color, color_unit};
 use crate::Error;
 use crate::frame::Frame;
 use crate::load::Loaded;
@@ -128,6 +128,7 @@ fn seed(frame: &Frame<'_>, object: u32, kind: SplatKind) -> u64 {
 fn of_own<'a>(own: &'a Own, (n, sum): (u32, f64), frame: &Frame<'a>) -> Source<'a> {
     let Loaded { objects, materials, .. } = frame.loaded;
     let material = materials[own.material];
+    let brightest_color = brightest_color(own);
     // As its splats have it, where it has some.
     let radius = if n > 0 { sum / f64::from(n) } else { own.radius };
     Source {
@@ -139,13 +140,14 @@ fn of_own<'a>(own: &'a Own, (n, sum): (u32, f64), frame: &Frame<'a>) -> Source<'
             kind: own.kind(),
             radius: radius as f32,
             shadow_coefficient: objects[own.object].shadow_coefficient,
+            color_unit: color_unit(brightest_color),
         },
         cross_section: finest_area(&frame.camera, &own.transform, own.bounds),
         seed: seed(frame, own.object as u32, own.kind()),
         volumes_by: frame.settings.particles.volume_sampler,
         of: own.object as u32,
         bounds: own.world_box(),
-        brightest_color: brightest_color(own),
+        brightest_color,
     }
 }
 
@@ -185,7 +187,9 @@ fn of_splats<'a>(frame: &Frame<'a>) -> Vec<Source<'a>> {
             ..SplatParams::default()
         };
         let shadow_coefficient = objects[object as usize].shadow_coefficient * cloud.shadow_coefficient_of(first);
-        let look = Appearance { material, kind, radius: radius as f32, shadow_coefficient };
+        let color_unit = color_unit(brightest_color);
+        splats.color.as_flattened_mut().iter_mut().for_each(|c| *c /= color_unit);
+        let look = Appearance { material, kind, radius: radius as f32, shadow_coefficient, color_unit };
         let data = Data::Splats(Box::new((splats, params)));
         let name = objects[object as usize].name.clone();
         let (transform, volumes_by) = (Similarity::default(), VolumeSampler::Auto);

@@ -10,6 +10,7 @@ use crate::load::own::{Body, Own};
 use pbsr::Appearance;
 use splat_core::{DAabb, Material, Shading};
 use std::f64::consts::PI;
+use std::ops::Range;
 
 /// How many powers of two the unit lies below the bound.
 const BELOW_BOUND: i32 = 12;
@@ -57,6 +58,18 @@ fn diffuse_peak(material: &Material) -> f64 {
 /// The same of a highlight, whatever the colour.
 fn specular_peak(material: &Material) -> f64 {
     f64::from(material.specular) * (f64::from(material.shininess) + 2.0) / (2.0 * PI)
+}
+
+/// Colours that need no unit: particles hold them as they are, with all nine bits for a hundredth of the brightest, too.
+const UNITLESS: Range<f32> = 1.0 / 256.0..32_768.0;
+
+/// The unit of an object's colours by the largest channel of any, a power of two ([`Appearance::color_unit`]).
+pub(super) fn color_unit(brightest_color: f32) -> f32 {
+    if brightest_color == 0.0 || UNITLESS.contains(&brightest_color) {
+        return 1.0;
+    }
+    let (_, power) = libm::frexp(f64::from(brightest_color));
+    libm::exp2(f64::from(power.clamp(LEAST_POWER, MOST_POWER))) as f32
 }
 
 /// The largest channel of the colours of an object's own data.

@@ -20,7 +20,9 @@ impl<'a> Source<'a> {
     ) -> Result<Box<dyn Sampler + 'a>, pbsr::Error> {
         let bare = self.bare(own, warnings)?;
         let Some((field, opacity)) = &own.field else { return Ok(bare) };
-        Ok(Box::new(ShownSampler::new(bare, Box::new(|place| field.at(place, *opacity)), self.seed)))
+        let unit = self.look.color_unit;
+        let shown = move |place| field.at(place, *opacity).map(|(color, share)| (color.map(|c| c / unit), share));
+        Ok(Box::new(ShownSampler::new(bare, Box::new(shown), self.seed)))
     }
 
     /// The same without a field that it shows.
@@ -55,11 +57,12 @@ impl<'a> Source<'a> {
                     seed: self.seed,
                 };
                 let kept = cut.as_ref().map(|field| Density { field: field.as_ref(), max: 1.0 });
+                let transfer = transfer.with_colors_times(1.0 / self.look.color_unit);
                 let VolumeSampler::Metropolis { stride } = self.volumes_by else {
-                    return Ok(Box::new(GridSampler::new(grid, transfer, &params, kept)?));
+                    return Ok(Box::new(GridSampler::owning(grid, transfer, &params, kept)?));
                 };
                 let chains = MetropolisParams { stride, ..MetropolisParams::default() };
-                Box::new(MetropolisSampler::new(grid, transfer, &params, &chains, kept)?)
+                Box::new(MetropolisSampler::owning(grid, transfer, &params, &chains, kept)?)
             }
             Body::Field(field) => self.field(own, field)?,
         })
@@ -67,7 +70,9 @@ impl<'a> Source<'a> {
 
     fn field<'b>(&self, own: &Own, field: &'b BoundedExtinction) -> Result<Box<dyn Sampler + 'b>, pbsr::Error> {
         let extinction = Density { field, max: field.max() };
-        let (bounds, cells, color) = (field.bounds(), field.cells(), own.color);
+        let bounds = field.bounds();
+        let cells = field.cells();
+        let color = self.color(own);
         Ok(Box::new(FieldVolumeSampler::new(
             extinction,
             bounds,
@@ -75,12 +80,17 @@ impl<'a> Source<'a> {
         )?))
     }
 
+    /// The colour that the data's are multiplied with, in the unit of the object's colours.
+    fn color(&self, own: &Own) -> [f32; 3] {
+        own.color.map(|c| c / self.look.color_unit)
+    }
+
     fn surface(&self, own: &Own) -> SurfaceParams {
         SurfaceParams {
             opacity: own.opacity,
             cross_section: self.cross_section,
             surface_opacity: self.look.material.surface_opacity,
-            color: own.color,
+            color: self.color(own),
             opaque_optical_depth: DEEPEST,
             seed: self.seed,
         }
