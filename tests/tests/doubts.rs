@@ -156,6 +156,19 @@ fn objects_that_are_smaller_than_a_pixel_are_told_with_what_to_do() {
 }
 
 #[test]
+fn a_lens_too_wide_for_the_resampling_filter_is_told() {
+    let told = |more: &str| {
+        let text =
+            format!("{}[render]\ntechnique = 'points'\n{more}", scene("target = [0, 0, 0]\nfov_y = 170", LAMP, ""));
+        let scene = parse(Path::new("s.toml"), text.as_bytes(), &LoadOptions::default()).unwrap();
+        let found = organza::render(&scene, &RenderOptions::default(), &Progress::new()).unwrap().warnings;
+        found.iter().any(|w| w.contains("through a lens of 17") && w.contains("resampling_filter = false"))
+    };
+    assert!(told(""));
+    assert!(!told("points = { resampling_filter = false }"));
+}
+
+#[test]
 fn a_picture_of_one_colour_is_told() {
     let text =
         scene(AHEAD, "[background]\ncolor = [0.2, 0.3, 0.4]\n[material.x]\nshading = 'unlit'\n", "material = 'x'");

@@ -1,6 +1,6 @@
 //! Invariances through the whole command: threads, shuffled input, scale by powers of two, shift by 10⁷, linearity.
 
-use organza_tests::{draw, largest_difference, sum_of_effects};
+use organza_tests::{draw, draw_in, largest_difference, sum_of_effects};
 use std::fmt::Write;
 
 /// A scene with everything that the points technique does, all lengths times `scale`, moved by `shift`. Positions are
@@ -70,6 +70,33 @@ fn x4_the_order_of_lights_and_objects_does_not_matter() {
     let forward = draw(&scene(1.0, 0.0, false), &[]).sha256(1.0);
     let backward = draw(&scene(1.0, 0.0, true), &[]).sha256(1.0);
     assert_eq!(forward, backward);
+}
+
+#[test]
+fn x4_the_order_of_a_files_triangles_does_not_matter() {
+    // A tent of four triangles over a square, its corners and faces in two orders.
+    let corners = ["-1 0 -1", "1 0 -1", "1 0 1", "-1 0 1", "0 0.7 0.1"];
+    let file = |order: [usize; 5], faces: [usize; 4]| {
+        let vertices = order.map(|corner| format!("v {}\n", corners[corner])).concat();
+        let number = |corner: usize| 1 + order.iter().position(|c| *c == corner).unwrap();
+        let face = |side: usize| format!("f {} {} {}\n", number(side), number((side + 1) % 4), number(4));
+        vertices + &faces.map(face).concat()
+    };
+    for technique in ["points", "particles", "sheets", "surfels"] {
+        let scene = format!(
+            "version = 1\n[camera]\nposition = [0.3, 2, 3]\ntarget = [0, 0, 0]\nsize = [40, 30]\n\
+             [[light]]\nkind = 'point'\nposition = [1, 3, 2]\nintensity = [9, 9, 9]\n\
+             [[object]]\nname = 'tent'\nmesh = 'tent.obj'\nspacing = 0.1\nopacity = 0.5\n\
+             [render]\ntechnique = '{technique}'\nantialias = 1\n"
+        );
+        let bits = |order, faces| {
+            let folder = tempfile::tempdir().unwrap();
+            std::fs::write(folder.path().join("tent.obj"), file(order, faces)).unwrap();
+            draw_in(folder.path(), &scene, &[]).sha256(1.0)
+        };
+        let listed = bits([0, 1, 2, 3, 4], [0, 1, 2, 3]);
+        assert_eq!(bits([4, 2, 0, 3, 1], [2, 0, 3, 1]), listed, "{technique}");
+    }
 }
 
 #[test]

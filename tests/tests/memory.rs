@@ -90,6 +90,38 @@ mod deep {
     use super::*;
 
     #[test]
+    fn however_little_memory_the_system_gives_the_end_is_exit_5() {
+        let place = Place::new(&fog(0.05));
+        let arguments = ["render", "s.toml", "--force", "--size", "320x200", "--threads", "2"];
+        let (out, peak) = run_measured(organza().current_dir(place.folder()).args(arguments));
+        assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+        // Below this much the program itself does not start.
+        let least = 96 << 20;
+        for part in 0..24 {
+            let kib = (least + (peak.address_space - least) / 24 * part) / 1024;
+            let mut shell = Command::new("sh");
+            shell.current_dir(place.folder()).arg("-c").arg(format!("ulimit -v {kib}; exec \"$0\" \"$@\""));
+            let out = shell.arg(organza().get_program()).args(arguments).output().unwrap();
+            let text = String::from_utf8_lossy(&out.stderr);
+            let code = out.status.code();
+            assert!(code == Some(5) || code == Some(0), "{kib} KiB of {}: {code:?} {text}", peak.address_space);
+        }
+    }
+
+    #[test]
+    fn frames_fit_in_what_the_first_is_explained_to_take() {
+        // Its lamps stand above the border of the cloud, under which more entries are deposited than predicted.
+        let lamp = "[[light]]\nkind = \"point\"\nposition = [2.0, 3, 0.0]\nintensity = [3, 3, 3]\n\
+                    [[light]]\nkind = \"point\"\nposition = [1.081, 3, 1.683]\nintensity = [3, 3, 3]\n";
+        let track = "[animation]\nframes = 40\n[[animation.track]]\nset = \"object.fog.transform.translate\"\n\
+                     keys = [{ frame = 0, value = [0, 0, 0] }, { frame = 39, value = [1, 0, 0] }]\n";
+        let place = Place::new(&format!("{}{lamp}{track}", fog(0.06)));
+        let limit = explained(place.folder(), "s.toml", &[]);
+        let (out, _) = render_within(place.folder(), "s.toml", limit, &["--frames=0-11"]);
+        assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+    }
+
+    #[test]
     fn frames_that_wait_take_little_memory() {
         let place = Place::new(&fog(0.25));
         let track = "[[animation.track]]\nset = \"object.fog.transform.translate\"\n\

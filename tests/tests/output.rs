@@ -196,6 +196,25 @@ fn targets_are_checked_without_touching_them() {
 }
 
 #[test]
+fn nothing_is_there_while_frames_are_checked() {
+    // Not even kill -9 then leaves anything.
+    let folder = tempfile::tempdir().unwrap();
+    let mut targets = Targets::default();
+    for name in ["f.0000.exr", "f.0001.exr", "f.0001.png", "F.0002.exr", "ö.0001.exr", "ö.0002.exr"] {
+        targets.add(&folder.path().join(name), false).unwrap();
+        assert!(names(folder.path()).is_empty(), "{name}");
+    }
+    for twice in ["f.0001.exr", "ö.0002.exr"] {
+        assert_eq!(targets.add(&folder.path().join(twice), false).map_err(code), Err(4), "{twice}");
+    }
+    // A name that no file system takes is refused beside others of its kind, and alone.
+    let long = "n".repeat(300);
+    assert_eq!(targets.add(&folder.path().join(&long), false).map_err(code), Err(4));
+    assert_eq!(targets.add(&folder.path().join(long + "7"), false).map_err(code), Err(4));
+    assert!(names(folder.path()).is_empty());
+}
+
+#[test]
 fn one_file_in_two_spellings_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     fs::create_dir(folder.path().join("b")).unwrap();

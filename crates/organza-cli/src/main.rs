@@ -64,6 +64,7 @@ fn without_floods(message: &str) -> String {
 /// The exit code of a command that has said what it had to say.
 fn run(command: Command) -> Result<u8, Error> {
     signals::listen()?;
+    signals::end_aborts_as_limits()?;
     match command {
         Command::Render(arguments) => return render::run(&arguments),
         Command::Init(arguments) => init::run(&arguments),

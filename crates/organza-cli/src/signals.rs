@@ -10,6 +10,10 @@ use std::time::Duration;
 /// Time that the work has to hear of an interrupt: where it asks for none so long, it is ended as by a second one.
 const PATIENCE: Duration = Duration::from_millis(1500);
 
+/// Exit code of a limit of resources, [`Error::Limit`]'s.
+#[cfg(unix)]
+const LIMIT: i32 = 5;
+
 /// The work that an interrupt stops; without any it ends the command.
 static AT_WORK: Mutex<Option<Arc<Progress>>> = Mutex::new(None);
 
@@ -33,6 +37,21 @@ pub(super) fn block_ignored() {
 
 #[cfg(not(unix))]
 pub(super) fn block_ignored() {}
+
+/// A system that refuses memory in the middle of the work ends the command with the exit code of a limit: the standard library says how much was
+/// asked for, and aborts.
+#[cfg(unix)]
+pub(super) fn end_aborts_as_limits() -> Result<(), Error> {
+    use signal_hook::{consts::SIGABRT, flag};
+    let always = Arc::new(AtomicBool::new(true));
+    let registered = flag::register_conditional_shutdown(SIGABRT, LIMIT, always);
+    registered.map(drop).map_err(|e| Error::Internal(format!("handler of aborts: {e}")))
+}
+
+#[cfg(not(unix))]
+pub(super) fn end_aborts_as_limits() -> Result<(), Error> {
+    Ok(())
+}
 
 /// The mask of ignored signals that Linux tells of a process, bit n − 1 for signal n; 0 where it tells none.
 fn ignored(status: &str) -> u64 {

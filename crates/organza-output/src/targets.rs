@@ -1,13 +1,11 @@
 //! All outputs of a run, checked together before any work.
 
-use super::target::{Listed, Target, temporary_folder_in, without_name};
+use super::target::{Target, temporary_folder_in, without_name};
 use crate::Error;
-use std::collections::hash_map::Entry;
 use std::collections::{HashMap, HashSet};
 use std::fs::{self, File};
 use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
-use tempfile::TempDir;
 
 /// Outputs that may be written: none is an input, and none is another one spelled in a second way, through links, hard
 /// links, mounts or a file system that takes `A` for `a`.
@@ -16,9 +14,45 @@ pub struct Targets {
     inputs: HashSet<Identity>,
     /// Files that are there.
     there: HashSet<Identity>,
-    /// For each folder one of our own in it, with an empty file for each output: only the file system itself knows which
-    /// names it takes, and which for the same.
-    folders: HashMap<Identity, Listed<TempDir>>,
+    folders: HashMap<Identity, Names>,
+}
+
+/// Names of outputs in one folder. Only the file system knows which names it takes, and which for the same: it is asked where it must be, by
+/// empty files in a folder of our own that is gone at once. Frames that differ by their numbers are not asked of each other.
+#[derive(Debug, Default)]
+struct Names {
+    /// By the digits in them, which no file system takes for others.
+    by_digits: HashMap<String, Vec<PathBuf>>,
+    /// Names without their digits, one of which the file system took.
+    taken_shapes: HashSet<String>,
+}
+
+impl Names {
+    /// Adds a name that the file system takes, and for none that is there; otherwise the error of making a file of it.
+    fn add(&mut self, folder: &Path, name: &Path) -> io::Result<()> {
+        let text = name.to_string_lossy();
+        let digits: String = text.chars().filter(char::is_ascii_digit).collect();
+        let shape: String = text.chars().map(|c| if c.is_ascii_digit() { '0' } else { c }).collect();
+        let namesakes = self.by_digits.entry(digits).or_default();
+        let doubtful: Vec<&PathBuf> = namesakes.iter().filter(|other| may_be_one(other, name)).collect();
+        if !self.taken_shapes.contains(&shape) || !doubtful.is_empty() {
+            let tried = temporary_folder_in(folder).map_err(without_name)?;
+            for name in doubtful.into_iter().map(PathBuf::as_path).chain([name]) {
+                File::create_new(tried.made.path().join(name))?;
+            }
+            self.taken_shapes.insert(shape);
+        }
+        namesakes.push(name.to_owned());
+        Ok(())
+    }
+}
+
+/// Whether some file system may take two names for one: other letters of ASCII are others everywhere, but for capitals.
+fn may_be_one(a: &Path, b: &Path) -> bool {
+    match (a.to_str(), b.to_str()) {
+        (Some(a), Some(b)) if a.is_ascii() && b.is_ascii() => a.eq_ignore_ascii_case(b),
+        _ => true,
+    }
 }
 
 impl Targets {
@@ -47,14 +81,9 @@ impl Targets {
             }
         }
         let target = target.unless_taken()?;
-        let folder = match self.folders.entry(identity(target.folder()).map_err(fail)?) {
-            Entry::Occupied(entry) => entry.into_mut(),
-            Entry::Vacant(entry) => {
-                entry.insert(temporary_folder_in(target.folder()).map_err(|e| fail(without_name(e)))?)
-            }
-        };
-        match File::create_new(folder.made.path().join(target.name())) {
-            Ok(_) => Ok(target),
+        let names = self.folders.entry(identity(target.folder()).map_err(fail)?).or_default();
+        match names.add(target.folder(), target.name()) {
+            Ok(()) => Ok(target),
             Err(e) if e.kind() == ErrorKind::AlreadyExists => refuse(TWICE),
             Err(e) => Err(fail(e)),
         }

@@ -3,21 +3,24 @@
 
 mod small;
 
+use crate::form::PlannedObject;
 use crate::load::{Loaded, own::Own};
 use crate::plan::Plan;
 use crate::scene::place;
 use crate::scene::{Scene, SceneLight, SceneObject};
 use crate::shadows::thickness_of;
-use crate::{Layers, ShadowTable, escape_controls};
+use crate::{Layers, escape_controls};
 use glam::DVec3;
 use splat_core::raster::objects_in_view;
 use splat_core::shade::joint::MediumSpacing;
-use splat_core::{DAabb, Object};
+use splat_core::{DAabb, Object, Projection, SplatKind};
 
 /// Most objects outside the view that are told one by one.
 const TOLD: usize = 4;
 /// Optical depth of a spacing up to which the light of layers of splats is held to closed forms.
 const THICKEST: f32 = 16.0;
+/// Full angle of a lens, degrees, beyond which a pixel in the middle of the picture is wider than most splats.
+const WIDEST_LENS: f64 = 150.0;
 /// Optical depth up to which one splat alone tells how light falls off in it: its middle is right within a hundredth.
 const LONE: f32 = 0.25;
 
@@ -31,7 +34,27 @@ pub(crate) fn of_scene(scene: &Scene, loaded: &Loaded) -> Vec<String> {
     }
     let seen = seen(loaded);
     let unseen = outside(scene, loaded, &seen).into_iter().chain(small::too_small(scene, loaded, &seen));
-    dark.chain(turned_away(loaded)).chain(unseen).chain(too_thick(scene, loaded)).collect()
+    dark.chain(turned_away(loaded))
+        .chain(unseen)
+        .chain(too_thick(scene, loaded))
+        .chain(wide_lens(scene, loaded))
+        .collect()
+}
+
+/// A lens through which the resampling filter spreads media over what is empty beside them.
+fn wide_lens(scene: &Scene, loaded: &Loaded) -> Option<String> {
+    let Projection::Perspective { fov_y } = loaded.camera.projection else { return None };
+    let [width, height] = loaded.camera.size.map(f64::from);
+    let wider = (width / height).max(1.0);
+    let angle = 2.0 * libm::atan(libm::tan(0.5 * fov_y) * wider).to_degrees();
+    let has_media =
+        loaded.cloud.kind.contains(&SplatKind::Medium) && loaded.planned.iter().any(PlannedObject::is_drawn_as_splats);
+    (angle > WIDEST_LENS && has_media && scene.render.points.resampling_filter).then(|| {
+        format!(
+            "through a lens of {angle:.0}° the resampling filter spreads media over what is empty beside them: set \
+             render.points.resampling_filter = false"
+        )
+    })
 }
 
 /// Objects that absorb inside, and lie in a light that casts shadows, which are those of surfaces alone.
@@ -220,9 +243,9 @@ pub(crate) fn of_scattering(plan: &Plan) -> Option<String> {
     Some(format!("{lights} scattered once, though render.sheets.scattering asks for more: `organza explain` says why"))
 }
 
-/// Shadow maps that memory made coarser.
-pub(crate) fn of_shadows<'a>(tables: impl Iterator<Item = &'a ShadowTable>) -> Option<String> {
-    let coarse = tables.filter(|table| table.predicted.limit == tsm::Limit::Memory).count();
+/// Shadow maps that memory made coarser, by what their cells follow from.
+pub(crate) fn of_shadows(limits: &[tsm::Limit]) -> Option<String> {
+    let coarse = limits.iter().filter(|limit| **limit == tsm::Limit::Memory).count();
     (coarse > 0).then(|| {
         let maps = if coarse == 1 { "a shadow map is" } else { "shadow maps are" };
         format!("{maps} coarser than the splats ask for, to fit the memory: a larger --max-memory makes them finer")

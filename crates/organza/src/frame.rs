@@ -65,6 +65,16 @@ pub(crate) struct Leaves {
     shaded: Shaded,
 }
 
+impl Leaves {
+    /// What the cells of each shadow map follow from: those whose entries were more than predicted are coarser than the plan has them.
+    pub(crate) fn shadow_limits(&self, plan: &Plan) -> Vec<tsm::Limit> {
+        match &self.maps {
+            Some(maps) => maps.limits().chain(plan.eye_table.map(|table| table.predicted.limit)).collect(),
+            None => plan.shadow_limits(),
+        }
+    }
+}
+
 impl<'a> Frame<'a> {
     /// A frame by the processor, with nothing made yet. `plan` is that of [`plan_loaded`](crate::plan_loaded) for the same scene.
     pub fn new(scene: &'a Scene, loaded: &'a Loaded, plan: &'a Plan, progress: &'a Progress) -> Self {

@@ -80,6 +80,11 @@ impl Plan {
         self.shadow_tables.iter().chain(&self.other_tables).flatten().chain(&self.eye_table)
     }
 
+    /// What the cells of each table follow from.
+    pub(crate) fn shadow_limits(&self) -> Vec<tsm::Limit> {
+        self.tables().map(|table| table.predicted.limit).collect()
+    }
+
     /// How many shadow maps of lights there are.
     pub(crate) fn shadow_maps_built(&self) -> usize {
         self.shadow_tables.iter().chain(&self.other_tables).flatten().count()

@@ -66,7 +66,7 @@ pub fn explain_from(
     let frame = Frame::new(&scene, &loaded, &planned.plan, progress);
     techniques(&scene).into_iter().try_for_each(|technique| (row(technique).check)(&frame, options))?;
     explanation.found = found;
-    explanation.warnings.extend(doubts::of_shadows(explanation.plan.tables()));
+    explanation.warnings.extend(doubts::of_shadows(&explanation.plan.shadow_limits()));
     explanation.warnings.extend(doubts::of_scattering(&explanation.plan));
     progress.finish();
     Ok(explanation)

@@ -162,7 +162,7 @@ pub(crate) fn render_keeping(
     if !doubtful {
         warnings.extend(doubts::of_picture(scene, &layers));
     }
-    warnings.extend(doubts::of_shadows(plan.tables()));
+    warnings.extend(doubts::of_shadows(&leaves.shadow_limits(plan)));
     warnings.extend(doubts::of_scattering(plan));
     warnings.extend(helper.as_ref().and_then(|_| left_to_processor(plan)));
     warnings.extend(helper.map(|helper| helper.said()).unwrap_or_default());

@@ -33,6 +33,9 @@ const SPHERES: usize = 100;
 /// Particles of a chunk.
 const CHUNK: u64 = 4096;
 
+/// Lines a root above which a walk's starts take longer than the walks.
+const MOST_LINES: u64 = 64;
+
 /// Sets of the pilot run have numbers from here on; no picture has so many.
 const PILOT: u64 = 1 << 40;
 
@@ -120,19 +123,27 @@ impl<'a> BrownianSampler<'a> {
     ///
     /// # Errors
     /// Those of [`LineSampler::new`]; [`Error::Parameter`] for numbers out of range; [`Error::Empty`] when no walker can
-    /// move, as on a surface that is singular everywhere.
+    /// move, as on a surface that is singular everywhere, or when fewer than one of 64 lines meets the surface, as with a
+    /// field that rounds to the level far around it.
     pub fn new(surface: &ImplicitSurface<'a>, walk: &BrownianParams, params: &SurfaceParams) -> Result<Self, Error> {
         check(walk.stride >= 1, "stride", walk.stride, "at least 1")?;
         let per_walker = walk.particles_per_walker;
         check((1..=CHUNK as u32).contains(&per_walker), "particles_per_walker", per_walker, "1 to 4096")?;
         crate::params::positive(walk.counting_radius, "counting_radius")?;
         check(walk.pilot_particles >= 1000, "pilot_particles", walk.pilot_particles, "at least 1000")?;
+        let steps = Walk::new(surface, walk.step)?;
+        let starts = LineSampler::new(surface, &LineParams { resolution: walk.resolution }, params, None)?;
+        if starts.report().lines > MOST_LINES * starts.report().roots {
+            let reason =
+                "fewer than one of 64 lines that look for starts meets the surface: sample it by lines instead";
+            return Err(Error::Empty { what: "a Brownian motion", reason });
+        }
         let mut sampler = Self {
             surface: *surface,
             params: *params,
             walk: *walk,
-            steps: Walk::new(surface, walk.step)?,
-            starts: LineSampler::new(surface, &LineParams { resolution: walk.resolution }, params, None)?,
+            steps,
+            starts,
             origin: surface.bounds.center(),
             number: f64::from(walk.pilot_particles),
             report: BrownianReport::default(),

@@ -197,3 +197,29 @@ fn what_cannot_be_walked_on_says_why() {
     let no_step = BrownianParams { step: 0.0, ..brownian };
     assert!(BrownianSampler::new(&boxed(&Field::UNIT, 1.2), &no_step, &params).is_err());
 }
+
+/// x¹⁰²⁵, which is no number other than 0 within half of its box: lines hardly find where it changes its sign.
+struct Steep;
+
+impl ScalarField for Steep {
+    fn value(&self, p: DVec3) -> f64 {
+        p.x.powi(1025)
+    }
+
+    fn gradient(&self, p: DVec3) -> DVec3 {
+        DVec3::new(1025.0 * p.x.powi(1024), 0.0, 0.0)
+    }
+
+    fn bound(&self, center: DVec3, radius: f64) -> Option<(f64, f64)> {
+        Some(((center.x - radius).powi(1025), (center.x + radius).powi(1025)))
+    }
+}
+
+#[test]
+fn a_surface_that_lines_hardly_meet_is_not_walked_on() {
+    let bounds = DAabb::new(DVec3::splat(-1.0), DVec3::splat(1.0));
+    let surface = ImplicitSurface { field: &Steep, level: 0.0, bounds, inside: None };
+    let walk = BrownianParams { step: 0.1, resolution: 8, ..BrownianParams::for_width(2.0) };
+    let refused = BrownianSampler::new(&surface, &walk, &SurfaceParams::default()).err().unwrap();
+    assert!(matches!(&refused, Error::Empty { reason, .. } if reason.contains("by lines")), "{refused}");
+}

@@ -2,6 +2,8 @@
 
 use crate::{DAabb, Error};
 use glam::{DVec3, Vec3};
+use rayon::prelude::*;
+use std::cmp::Ordering;
 
 /// Indexed triangles; vertices relative to an f64 origin.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -36,6 +38,24 @@ impl Mesh {
         let corner = |v: u32| self.position[v as usize].as_dvec3();
         let area = |t: &[u32; 3]| 0.5 * (corner(t[1]) - corner(t[0])).cross(corner(t[2]) - corner(t[0])).length();
         self.triangles.iter().map(area).sum()
+    }
+
+    /// Puts triangles in an order that follows from where their corners are, and begins each with its least corner: however a file lists the same
+    /// triangles, they come out alike. Triangles with the same corners keep the order of their indices.
+    pub fn canonicalize(&mut self) {
+        let position = &self.position;
+        let compare = |a: u32, b: u32| {
+            let (a, b) = (position[a as usize], position[b as usize]);
+            a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)).then(a.z.total_cmp(&b.z))
+        };
+        self.triangles.par_iter_mut().with_min_len(4096).for_each(|triangle| {
+            let least = (0..3).min_by(|a, b| compare(triangle[*a], triangle[*b])).unwrap_or(0);
+            triangle.rotate_left(least);
+        });
+        self.triangles.par_sort_unstable_by(|a, b| {
+            let corners = a.iter().zip(b).map(|(a, b)| compare(*a, *b));
+            corners.fold(Ordering::Equal, Ordering::then).then(a.cmp(b))
+        });
     }
 
     /// A box in the world around all vertices that triangles use.

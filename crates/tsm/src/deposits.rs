@@ -8,7 +8,7 @@ use crate::plan::{Plan, plan};
 use crate::shadow_map::{Absorbances, Matter, head};
 use crate::survey::{CHUNK, Survey};
 use crate::table::{Lists, Parted, Ranges};
-use crate::{Error, Params, Prediction, Scene, ShadowMap};
+use crate::{Error, Params, Prediction, Resolution, Scene, ShadowMap};
 use rayon::prelude::*;
 use splat_core::{Light, Limits, Progress, SplatKind};
 use std::ops::Range;
@@ -50,9 +50,21 @@ impl Deposits {
         light.validate(0)?;
         let casters = Casters::new(scene, params);
         let survey = Survey::new(&casters);
-        let plan = plan(&casters, &survey, light)?;
-        progress.add_total(scene.cloud.len() as u64);
-        with_mapping!(&plan.table, m => Self::with_mapping(&casters, &survey, &plan, m, progress))
+        let mut room = params.limits;
+        let mut refused = None;
+        loop {
+            let plan = match plan(&casters, &survey, light, &room) {
+                Ok(plan) => plan,
+                Err(error) => return Err(refused.unwrap_or(error)),
+            };
+            progress.add_total(scene.cloud.len() as u64);
+            match with_mapping!(&plan.table, m => Self::with_mapping(&casters, &survey, &plan, m, progress)) {
+                // Casters that are not spread evenly make more entries than were predicted.
+                Err(error @ Error::Limit(_)) if params.resolution == Resolution::Auto => refused = Some(error),
+                made => return made,
+            }
+            room = Limits { max_bytes: room.max_bytes / 2, max_elements: room.max_elements / 2 };
+        }
     }
 
     /// What [`Deposits::new`] will cost, by looks at the casters alone.
@@ -63,7 +75,7 @@ impl Deposits {
         params.validate()?;
         light.validate(0)?;
         let casters = Casters::new(scene, params);
-        plan(&casters, &Survey::new(&casters), light).map(|plan| plan.prediction)
+        plan(&casters, &Survey::new(&casters), light, &params.limits).map(|plan| plan.prediction)
     }
 
     fn with_mapping<M: Mapping>(

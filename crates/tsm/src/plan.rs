@@ -40,8 +40,8 @@ enum Kind {
 /// Cells are numbered with 31 bits, and their columns and rows are found exactly in single precision.
 const MOST_CELLS_OF_A_SIDE: u64 = 1 << 22;
 
-/// Chooses frame, kind and size.
-pub(crate) fn plan(casters: &Casters<'_>, survey: &Survey, light: &Light) -> Result<Plan, Error> {
+/// Chooses frame, kind and size, of what is predicted to fit `room`.
+pub(crate) fn plan(casters: &Casters<'_>, survey: &Survey, light: &Light, room: &Limits) -> Result<Plan, Error> {
     let (kind, frame) = frame_of(casters, survey, light)?;
     let apparent = match kind {
         Kind::Octahedral => Apparent::Angle,
@@ -52,11 +52,11 @@ pub(crate) fn plan(casters: &Casters<'_>, survey: &Survey, light: &Light) -> Res
     let look = Appearance::new(casters, &frame, apparent);
     let shape = Extent::of(&kind, &look);
     let (cell, limit) = match casters.params.resolution {
-        Resolution::Auto => automatic_cell(casters, survey, &look, &shape),
+        Resolution::Auto => automatic_cell(casters, survey, &look, &shape, room),
         Resolution::Cells(n) => (shape.side / f64::from(n), Limit::Asked),
     };
     let prediction = cost::predict(&look, survey, cell, shape.size(cell), limit, shape.is_octahedral());
-    let most_bytes = casters.params.limits.max_bytes;
+    let most_bytes = room.max_bytes;
     if prediction.bytes > most_bytes {
         return Err(Error::limit("the table", prediction.bytes, most_bytes, "bytes"));
     }
@@ -250,12 +250,18 @@ fn fit(look: &Appearance) -> PolarRange {
 }
 
 /// Cells of half a median spacing, made coarser until cells, entries and bytes fit.
-fn automatic_cell(casters: &Casters<'_>, survey: &Survey, look: &Appearance, extent: &Extent) -> (f64, Limit) {
+fn automatic_cell(
+    casters: &Casters<'_>,
+    survey: &Survey,
+    look: &Appearance,
+    extent: &Extent,
+    room: &Limits,
+) -> (f64, Limit) {
     let Some(spacing) = look.median_spacing() else { return (extent.side / 16.0, Limit::Spacing) };
     let finest = (0.5 * spacing).min(extent.side);
     let most_cells = (4.0 * casters.cloud.len() as f64).clamp(65_536.0, 16_777_216.0);
     let most_entries = budget(casters, look.casters() as f64);
-    let Limits { max_bytes, max_elements } = casters.params.limits;
+    let Limits { max_bytes, max_elements } = *room;
     let has_cells = |cell: f64| cell >= extent.side / MAX_SIDE && extent.cells(cell) <= most_cells;
     let has_entries = |cell: f64| look.covered(cell, extent.cells(cell)) <= most_entries;
     let has_bytes = |cell: f64| {

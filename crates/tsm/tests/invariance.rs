@@ -4,7 +4,7 @@ use crate::common::*;
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::optics::FAINTEST;
 use splat_core::{Cloud, Exceeded, Light, LightShape, Limits, Material, SplatKind, TOGETHER, Transmittance};
-use tsm::{Deposits, Error, MappingChoice, Params, Resolution, Scene, ShadowMap};
+use tsm::{Deposits, Error, Limit, MappingChoice, Params, Resolution, Scene, ShadowMap};
 
 fn lights() -> [Light; 4] {
     let position = DVec3::new(0.25, -0.5, 0.125);
@@ -170,6 +170,10 @@ fn what_maps_cost_together_is_known_before_any_is_built_and_held_while_they_are(
         let short = Params { resolution, limits: Limits::bytes(10 * entries), ..params.clone() };
         let held = ShadowMap::build(&Scene::from(&cloud), light, &short, None);
         assert!(matches!(held, Err(Error::Limit(_))));
+        // Cells that nobody asked for become coarser until their entries fit.
+        let room = Params { limits: Limits { max_elements: entries - 1, ..params.limits }, ..params.clone() };
+        let coarser = ShadowMap::build(&Scene::from(&cloud), light, &room, None).unwrap();
+        assert!(coarser.counts().entries < entries && coarser.prediction().limit == Limit::Memory, "{coarser:?}");
     }
 }
 

@@ -31,6 +31,11 @@ impl Maps {
         self.made_as == Self::made_as(plan)
     }
 
+    /// What the cells of each map follow from.
+    pub(crate) fn limits(&self) -> impl Iterator<Item = tsm::Limit> {
+        self.all.iter().chain(&self.of_others).flatten().map(|map| map.prediction().limit)
+    }
+
     fn made_as(plan: &Plan) -> Vec<MadeAs> {
         let tables = plan.shadow_tables.iter().chain(&plan.other_tables);
         tables.map(|table| table.map(|table| (table.predicted, table.tolerance))).collect()

@@ -294,8 +294,10 @@ fn volume(
     Ok((body, bounds, spacing))
 }
 
-/// A mesh with normals; smooth ones where the file has none, as its splats have.
+/// A mesh with normals; smooth ones where the file has none, as its splats have. In whatever order the file has its triangles, their particles
+/// are the same.
 fn triangles(mut mesh: Mesh, splats: u64, form: Form) -> Option<Data> {
+    mesh.canonicalize();
     convert::smooth(&mut mesh);
     let (area, bounds) = (mesh.area(), mesh.bounds());
     // Particles are thinned by the angle at which they are seen: of faces, not of normals that lean from them.

@@ -80,7 +80,7 @@ impl Casting {
         light.validate(0)?;
         let casters = Casters::new(scene, params);
         let survey = Survey::new(&casters);
-        let plan = plan(&casters, &survey, light)?;
+        let plan = plan(&casters, &survey, light, &params.limits)?;
         let refused = |why| Err(Error::Processor { why });
         if matches!(plan.table, Table::PolarAzimuth(_)) {
             return refused("shadow maps of polar angles are the processor's");
