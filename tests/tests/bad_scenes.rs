@@ -75,7 +75,7 @@ fn bi23_unknown_keys_suggest_the_nearest() {
             "position = [2",
             "radius = 1\nposition = [2",
             "8:1: unknown key `radius`",
-            "known here: position, intensity, shadow",
+            "known here: name, position, intensity, shadow",
         ),
         ("[render]", "[rendr]", "20:2: unknown key `rendr`", "did you mean `render`?"),
     ];

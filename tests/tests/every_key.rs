@@ -39,7 +39,9 @@ fn look(folder: &Folder, source: &str, entry: &Entry, technique: &str, set: &[&s
         }
         Look::Sets => format!("{:?}", render()?.sets),
         Look::Told => {
-            format!("{:?} {:?}", organza::explain(&scene, &options, &progress).map_err(refused)?.splats, scene.frames)
+            let explanation = organza::explain(&scene, &options, &progress).map_err(refused)?;
+            let effects: Vec<&str> = explanation.plan.effects.iter().map(|effect| effect.name.as_str()).collect();
+            format!("{:?} {:?} {effects:?}", explanation.splats, scene.frames)
         }
     })
 }

@@ -5,7 +5,7 @@ use organza::{Progress, RenderOptions};
 use std::path::Path;
 use std::sync::{Arc, Mutex};
 
-const FOG_AND_WALL: &str = "version = 1\n[camera]\nposition = [0, 0, 4]\ntarget = [0, 0, 0]\nsize = [48, 36]\n\
+const FOG_AND_WALL: &str = "version = 1\n[camera]\nposition = [0, 0, 4]\ntarget = [0, 0, 0]\nsize = [96, 72]\n\
     [[light]]\nkind = 'point'\nposition = [1, 2, 3]\nintensity = [9, 9, 9]\n\
     [[light]]\nkind = 'point'\nposition = [-1, 2, 3]\nintensity = [9, 9, 9]\n\
     [[object]]\nname = 'fog'\nmaterial = 'fog'\n\

@@ -396,7 +396,7 @@ mod deep {
     fn without_cosine(whole: &SceneLight) -> Vec<SceneLight> {
         let bare = |point: Light| {
             let shape = LightShape::Point { position: point.shape.place().unwrap() };
-            SceneLight { light: Light { shape, ..point }, slide: None, samples: 1, shadow: true }
+            SceneLight { label: "0".to_owned(), light: Light { shape, ..point }, slide: None, samples: 1, shadow: true }
         };
         whole.light.points(whole.samples).into_iter().map(bare).collect()
     }

@@ -165,6 +165,9 @@ pub(super) struct SceneArguments {
     /// Change a value of the scene before it is checked, such as render.points.exact=true or object.cloud.visible=false
     #[arg(long = "set", value_name = "PATH=VALUE")]
     pub(super) set: Vec<String>,
+    /// Switch an effect that `organza explain` lists on or off whatever it changes, such as shadow.sun=off
+    #[arg(long = "effect", value_name = "NAME=on|off")]
+    pub(super) effect: Vec<String>,
     /// Technique: auto, points, particles, sheets, surfels or reference
     #[arg(long, value_name = "NAME")]
     pub(super) technique: Option<String>,

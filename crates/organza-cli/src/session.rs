@@ -140,7 +140,8 @@ pub(super) fn overrides(a: &SceneArguments, is_made: bool) -> Result<Vec<Overrid
     }
     let options = options.into_iter().map(|(flag, path, value)| Override::from_option(flag, path, &value));
     let mut all = if is_made { Vec::new() } else { camera_overrides(&a.first)? };
-    for change in options.chain(a.set.iter().map(|text| Override::parse(text))) {
+    let effects = a.effect.iter().map(|text| Override::of_effect(text));
+    for change in options.chain(a.set.iter().map(|text| Override::parse(text))).chain(effects) {
         all.push(change?);
     }
     Ok(all)

@@ -4,9 +4,10 @@ use super::animation::{check_animation, deforms, moves};
 use super::check_background::check_background;
 use super::check_camera::check_camera;
 use super::check_drawn::check_drawn;
+use super::check_effects::check_effects;
 use super::check_extract::check_extracts;
 use super::check_footprint::check_footprints;
-use super::check_light::check_light;
+use super::check_light::check_lights;
 use super::check_material::{check_listed, check_materials, unknown_material};
 use super::check_object::{Named, check_object};
 use super::check_render::check_render;
@@ -192,8 +193,8 @@ pub(super) fn scene(
     let seen = check_camera(&at.key("camera"), &raw.camera, turn, goes_around)?;
     check_aligned(&at.key("render").key("sheets").key("aligned"), &seen.camera, &render)?;
     let (background, environment) = check_background(&at.key("background"), &raw.background, &paths)?;
-    let at_lights = at.key("light");
-    let lights = raw.light.iter().enumerate().map(|(i, l)| check_light(&at_lights.index(i), l, &paths));
+    let lights = check_lights(&at.key("light"), &raw.light, &paths)?;
+    render.effects = check_effects(&at.key("render").key("effects"), &raw.render.effects, &lights)?;
     let at_animation = at.key("animation");
     let frames = raw.animation.as_ref().map(|a| check_animation(&at_animation, a)).transpose()?;
     let stops = raw.animation.as_ref().map(|a| check_stops(&at_animation, a, &objects, raw.light.len())).transpose()?;
@@ -209,7 +210,7 @@ pub(super) fn scene(
         background,
         environment,
         ambient: at.key("ambient").color("color", raw.ambient.color)?,
-        lights: lights.collect::<Result<_, _>>()?,
+        lights,
         objects,
         render,
         materials,

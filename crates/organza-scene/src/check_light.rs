@@ -5,23 +5,59 @@ use super::check::{At, LARGEST};
 use super::check_slide::{SlideKeys, check_slide};
 use super::paths::Paths;
 use super::raw_light::RawLight;
-use crate::Error;
+use crate::{Error, shown};
 use glam::DVec3;
 use splat_core::{Light, LightShape};
+use std::collections::HashMap;
 
 /// Most points that an extended light may be taken for.
 const MOST_LIGHT_SAMPLES: u32 = 1_000_000;
 
-/// Checks one light.
-pub(super) fn check_light(at: &At<'_>, raw: &RawLight, paths: &Paths) -> Result<SceneLight, Error> {
-    let of =
-        |shape, intensity, shadow| SceneLight { light: Light { shape, intensity }, slide: None, samples: 1, shadow };
+/// Checks all lights.
+pub(super) fn check_lights(at_lights: &At<'_>, raw: &[RawLight], paths: &Paths) -> Result<Vec<SceneLight>, Error> {
+    let mut first_of: HashMap<&str, usize> = HashMap::new();
+    let mut lights = Vec::with_capacity(raw.len());
+    for (i, light) in raw.iter().enumerate() {
+        let at = at_lights.index(i);
+        if let Some(name) = light.name() {
+            check_name(&at, name)?;
+            if let Some(first) = first_of.insert(name, i) {
+                let first = at_lights.index(first).key("name").name();
+                let message = format!("duplicate light name `{}`, first at {first}", shown(name));
+                return Err(at.key("name").error(message, "each light that has a name needs one of its own"));
+            }
+        }
+        let label = light.name().map_or_else(|| i.to_string(), str::to_owned);
+        lights.push(SceneLight { label, ..check_light(&at, light, paths)? });
+    }
+    Ok(lights)
+}
+
+/// Refuses names that an effect could not be called by.
+fn check_name(at: &At<'_>, name: &str) -> Result<(), Error> {
+    let is_index = name.chars().all(|c| c.is_ascii_digit());
+    if is_index {
+        let message = format!("`name`: expected a name with a letter in it, found \"{}\"", shown(name));
+        return Err(at.key("name").error(message, "a light without a name is called by its index"));
+    }
+    Ok(())
+}
+
+/// Checks one light, without its label.
+fn check_light(at: &At<'_>, raw: &RawLight, paths: &Paths) -> Result<SceneLight, Error> {
+    let of = |shape, intensity, shadow| SceneLight {
+        label: String::new(),
+        light: Light { shape, intensity },
+        slide: None,
+        samples: 1,
+        shadow,
+    };
     let extended = |shape, intensity, samples, shadow| {
         let samples = at.whole("samples", samples, 1..=MOST_LIGHT_SAMPLES)?;
         Ok(SceneLight { samples, ..of(shape, at.color("intensity", intensity)?, shadow) })
     };
     match *raw {
-        RawLight::Point { position, intensity, shadow } => {
+        RawLight::Point { position, intensity, shadow, .. } => {
             let position = at.vector("position", position)?;
             Ok(of(LightShape::Point { position }, at.color("intensity", intensity)?, shadow))
         }
@@ -35,16 +71,16 @@ pub(super) fn check_light(at: &At<'_>, raw: &RawLight, paths: &Paths) -> Result<
             let slide = check_slide(at, &slide_keys(raw), &shape, paths)?;
             Ok(SceneLight { slide, ..of(shape, at.color("intensity", intensity)?, shadow) })
         }
-        RawLight::Sphere { position, radius, intensity, samples, shadow } => {
+        RawLight::Sphere { position, radius, intensity, samples, shadow, .. } => {
             let (center, radius) = (at.vector("position", position)?, at.length("radius", radius)?);
             extended(LightShape::Sphere { center, radius }, intensity, samples, shadow)
         }
-        RawLight::Disk { position, normal, radius, intensity, samples, shadow } => {
+        RawLight::Disk { position, normal, radius, intensity, samples, shadow, .. } => {
             let (center, normal) = (at.vector("position", position)?, at.direction("normal", normal)?);
             let radius = at.length("radius", radius)?;
             extended(LightShape::Disk { center, normal, radius }, intensity, samples, shadow)
         }
-        RawLight::Rect { position, u, v, intensity, samples, shadow } => {
+        RawLight::Rect { position, u, v, intensity, samples, shadow, .. } => {
             let (u, v) = check_half_axes(at, u, v)?;
             let center = at.vector("position", position)?;
             extended(LightShape::Rect { center, u, v }, intensity, samples, shadow)

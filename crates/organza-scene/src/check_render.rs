@@ -33,6 +33,8 @@ pub(super) fn check_render(at: &At<'_>, raw: &RawRender) -> Result<RenderSetting
         exposure: at.number("exposure", raw.exposure.unwrap_or(0.0), -60.0..=60.0)?,
         depth_ranges: at.whole("depth_ranges", raw.depth_ranges.unwrap_or(16), 1..=1024)?,
         layers: check_layers(&at.key("layers"), &raw.layers, technique)?,
+        // They name lights, which are checked later.
+        effects: Vec::new(),
         seed: raw.seed.unwrap_or(0),
         max_points: raw.max_points,
         shadow: check_shadow(&at.key("shadow"), &raw.shadow)?,

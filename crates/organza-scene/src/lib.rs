@@ -15,6 +15,7 @@ mod check;
 mod check_background;
 mod check_camera;
 mod check_drawn;
+mod check_effects;
 mod check_extract;
 mod check_field;
 mod check_footprint;
@@ -72,9 +73,9 @@ pub use overrides::Override;
 pub use paths::{ROOT_KEY, relative_path, root_for};
 pub use points::PointsLook;
 pub use settings::{
-    Aligned, Bending, Classify, Collisions, Coverage, Grouping, OpaqueSurfels, ParticlesSettings, PointsSettings,
-    RenderSettings, Scattering, ShadowMapping, ShadowSettings, SheetsSettings, Slicing, SoftShadows, SurfaceSampler,
-    SurfelGroups, SurfelLayers, SurfelsSettings, Technique, VolumeSampler,
+    Aligned, Bending, Classify, Collisions, Coverage, Grouping, LightEffect, OpaqueSurfels, ParticlesSettings,
+    PointsSettings, RenderSettings, Scattering, ShadowMapping, ShadowSettings, SheetsSettings, Slicing, SoftShadows,
+    SurfaceSampler, SurfelGroups, SurfelLayers, SurfelsSettings, SwitchedEffect, Technique, VolumeSampler,
 };
 pub use shown::{escape_controls, place, printable, shown};
 pub use source::{

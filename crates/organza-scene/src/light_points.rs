@@ -4,8 +4,10 @@ use crate::SceneLight;
 use splat_core::Light;
 
 /// A light without extent, or one of the points of a light with one.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct LightPoint {
+    /// How its whole light is called.
+    pub label: String,
     /// What it gives.
     pub light: Light,
     /// The light that it is of.
@@ -19,19 +21,21 @@ pub struct LightPoint {
 impl LightPoint {
     /// How it is called.
     pub fn name(&self) -> String {
-        let Self { of, rank: [k, all], .. } = self;
-        if *all > 1 { format!("point {k} of light {of}") } else { format!("light {of}") }
+        let Self { label, rank: [k, all], .. } = self;
+        if *all > 1 { format!("point {k} of light {label}") } else { format!("light {label}") }
     }
 }
 
 /// The points of all lights, sorted by their bits so that the order of the file does not matter.
 pub fn light_points(lights: &[SceneLight]) -> Vec<LightPoint> {
-    let of_light = |(of, light): (usize, &SceneLight)| {
-        let points = light.light.points(light.samples);
-        let (all, whole) = (points.len(), light.light);
-        points.into_iter().enumerate().map(move |(k, light)| LightPoint { light, whole, of, rank: [k, all] })
-    };
-    let mut all: Vec<LightPoint> = lights.iter().enumerate().flat_map(of_light).collect();
+    let mut all = Vec::new();
+    for (of, whole) in lights.iter().enumerate() {
+        let points = whole.light.points(whole.samples);
+        let count = points.len();
+        let point =
+            |(k, light)| LightPoint { label: whole.label.clone(), light, whole: whole.light, of, rank: [k, count] };
+        all.extend(points.into_iter().enumerate().map(point));
+    }
     all.sort_by_cached_key(|point| (point.light.bits(), lights[point.of].shadow));
     all
 }
@@ -51,7 +55,8 @@ mod tests {
 
     #[test]
     fn points_do_not_depend_on_the_order_of_lights_and_know_theirs() {
-        let light = |shape, samples, shadow| SceneLight {
+        let light = |label: &str, shape, samples, shadow| SceneLight {
+            label: label.to_owned(),
             light: Light { shape, intensity: [6.0; 3] },
             slide: None,
             samples,
@@ -59,11 +64,11 @@ mod tests {
         };
         let disk = LightShape::Disk { center: DVec3::Y, normal: DVec3::NEG_Y, radius: 0.5 };
         let lamp = LightShape::Point { position: DVec3::Y };
-        let lights = [light(disk, 3, true), light(lamp, 1, true), light(lamp, 1, false)];
+        let lights = [light("0", disk, 3, true), light("key", lamp, 1, true), light("fill", lamp, 1, false)];
         let found = light_points(&lights);
         assert_eq!(found.len(), lights.iter().map(SceneLight::count).sum::<usize>());
         let names: Vec<String> = found.iter().map(LightPoint::name).collect();
-        assert_eq!(names[..2], ["light 2", "light 1"]);
+        assert_eq!(names[..2], ["light fill", "light key"]);
         assert!(names[2..].iter().all(|name| name.ends_with(" of light 0")), "{names:?}");
         let others = light_points(&[2, 0, 1].map(|k: usize| lights[k].clone()));
         let same = |a: &LightPoint, b: &LightPoint| a.light == b.light;

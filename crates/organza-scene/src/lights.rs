@@ -6,6 +6,8 @@ use std::path::PathBuf;
 /// One light of the scene, whole.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SceneLight {
+    /// How it is called: by the name that the scene gives it, or by its place in the scene's list, from 0.
+    pub label: String,
     /// Where it comes from and how strong it is.
     pub light: Light,
     /// What it shines through; spots and parallel light alone.

@@ -56,6 +56,21 @@ impl Override {
         Ok(Self { path: path.split('.').map(str::to_owned).collect(), value, flag })
     }
 
+    /// From `NAME=on` or `NAME=off` of an effect, whose name may have dots in it.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] naming what is wrong.
+    pub fn of_effect(text: &str) -> Result<Self, Error> {
+        let flag = format!("--effect {text}");
+        let (name, switch) = text.rsplit_once('=').unwrap_or((text, ""));
+        if name.is_empty() || !["on", "off", "auto"].contains(&switch) {
+            let message = format!("{}: expected NAME=on, NAME=off or NAME=auto", shown(&flag));
+            return Err(Error::usage(message, "`organza explain` lists the effects of a scene by name"));
+        }
+        let path = ["render", "effects", name].map(str::to_owned).to_vec();
+        Ok(Self { flag, path, value: Value::Text(switch.to_owned()) })
+    }
+
     /// The option as it was written on the command line.
     pub fn flag(&self) -> &str {
         &self.flag

@@ -19,6 +19,8 @@ fn sixteen() -> u32 {
 pub(super) enum RawLight {
     /// Radiates equally in all directions from a point.
     Point {
+        /// Name by which effects of this light are called, such as "sun" in "shadow.sun"; default its index, from 0.
+        name: Option<String>,
         /// World position.
         position: [f64; 3],
         /// Radiant intensity per channel, W/sr or relative.
@@ -29,6 +31,8 @@ pub(super) enum RawLight {
     },
     /// Parallel light.
     Directional {
+        /// Name by which effects of this light are called, such as "sun" in "shadow.sun"; default its index, from 0.
+        name: Option<String>,
         /// Direction of travel, away from the light; any length.
         direction: [f64; 3],
         /// Irradiance per channel on a plane that faces the light, W/m² or relative.
@@ -47,6 +51,8 @@ pub(super) enum RawLight {
     },
     /// A cone of light.
     Spot {
+        /// Name by which effects of this light are called, such as "sun" in "shadow.sun"; default its index, from 0.
+        name: Option<String>,
         /// World position.
         position: [f64; 3],
         /// A point on the axis; or `direction`.
@@ -72,6 +78,8 @@ pub(super) enum RawLight {
     },
     /// A sphere that shines outwards.
     Sphere {
+        /// Name by which effects of this light are called, such as "sun" in "shadow.sun"; default its index, from 0.
+        name: Option<String>,
         /// World position of the centre.
         position: [f64; 3],
         /// Radius, world units.
@@ -87,6 +95,8 @@ pub(super) enum RawLight {
     },
     /// A flat disc that shines to the side of its normal.
     Disk {
+        /// Name by which effects of this light are called, such as "sun" in "shadow.sun"; default its index, from 0.
+        name: Option<String>,
         /// World position of the centre.
         position: [f64; 3],
         /// Normal; any length.
@@ -104,6 +114,8 @@ pub(super) enum RawLight {
     },
     /// A flat parallelogram that shines to the side of u × v.
     Rect {
+        /// Name by which effects of this light are called, such as "sun" in "shadow.sun"; default its index, from 0.
+        name: Option<String>,
         /// World position of the centre.
         position: [f64; 3],
         /// First half-axis, world units.
@@ -119,4 +131,18 @@ pub(super) enum RawLight {
         #[serde(default = "yes")]
         shadow: bool,
     },
+}
+
+impl RawLight {
+    /// As it is written.
+    pub(super) fn name(&self) -> Option<&str> {
+        match self {
+            Self::Point { name, .. }
+            | Self::Directional { name, .. }
+            | Self::Spot { name, .. }
+            | Self::Sphere { name, .. }
+            | Self::Disk { name, .. }
+            | Self::Rect { name, .. } => name.as_deref(),
+        }
+    }
 }

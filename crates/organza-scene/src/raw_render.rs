@@ -3,6 +3,7 @@
 use super::raw_surfels::RawSurfels;
 use schemars::JsonSchema;
 use serde::Deserialize;
+use std::collections::BTreeMap;
 
 /// How to render.
 #[derive(Debug, Default, Deserialize, JsonSchema)]
@@ -21,6 +22,8 @@ pub(super) struct RawRender {
     pub(super) depth_ranges: Option<u32>,
     /// Images to keep besides beauty and alpha.
     pub(super) layers: Vec<String>,
+    /// Effects that are simulated whatever they change, "on", or never, "off", by name, such as "shadow.sun"; "auto" leaves it to the plan.
+    pub(super) effects: BTreeMap<String, RawSwitch>,
     /// Seed of everything random; default 0.
     pub(super) seed: Option<u64>,
     /// Most splats that the scene may become.
@@ -30,6 +33,16 @@ pub(super) struct RawRender {
     pub(super) particles: RawParticles,
     pub(super) sheets: RawSheets,
     pub(super) surfels: RawSurfels,
+}
+
+/// Whether an effect is simulated.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+#[schemars(rename = "Switch")]
+pub(super) enum RawSwitch {
+    On,
+    Off,
+    Auto,
 }
 
 /// Settings of the `particles` technique.

@@ -19,6 +19,8 @@ pub struct RenderSettings {
     pub depth_ranges: u32,
     /// Images to keep.
     pub layers: LayerChoice,
+    /// Effects that the scene switches on or off; the plan decides about all others.
+    pub effects: Vec<SwitchedEffect>,
     /// Seed of everything random.
     pub seed: u64,
     /// Most splats that the scene may become; more is a resource error.
@@ -33,6 +35,44 @@ pub struct RenderSettings {
     pub sheets: SheetsSettings,
     /// Settings of the `surfels` technique.
     pub surfels: SurfelsSettings,
+}
+
+/// An effect of one light that a scene can switch.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum LightEffect {
+    /// The light itself.
+    Light,
+    /// Its shadow.
+    Shadow,
+}
+
+impl LightEffect {
+    /// All of them.
+    pub const ALL: [Self; 2] = [Self::Light, Self::Shadow];
+
+    /// The first part of its name, before that of the light.
+    pub fn kind(self) -> &'static str {
+        match self {
+            Self::Light => "light",
+            Self::Shadow => "shadow",
+        }
+    }
+
+    /// What the effect of a light of this label is called, such as `shadow.sun`.
+    pub fn name(self, label: &str) -> String {
+        format!("{}.{label}", self.kind())
+    }
+}
+
+/// An effect that a scene switches on or off.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct SwitchedEffect {
+    /// Which.
+    pub effect: LightEffect,
+    /// The label of the light that it is of.
+    pub light: String,
+    /// Whether it is simulated.
+    pub is_on: bool,
 }
 
 /// What draws the picture.

@@ -168,7 +168,8 @@ fn ground(found: &FoundCamera) -> String {
     format!(
         "\n[[object]]\nname = \"ground\"\n\
          rectangle = {{ center = {}, u = {}, v = {}, spacing = {} }}\ncolor = {}\n\
-         technique = \"sheets\"     # lit in every pixel, so that shadows on it are sharp\n",
+         technique = \"sheets\"     # lit in every pixel, so that shadows on it are sharp\n\
+         casts_shadow = false     # nothing lies below it: the cells of shadow maps are left to what stands on it\n",
         list(center.to_array(), unit),
         list((right * half).to_array(), unit),
         list((DVec3::Y.cross(right) * half).to_array(), unit),

@@ -6,7 +6,7 @@ use crate::form::{Form, PlannedObject};
 use crate::load::Loaded;
 use crate::matter::{Carries, CarriesLight, Matter};
 use crate::plan::{Effect, Plan};
-use crate::scene::{LightPoint, Scene, SceneLight, light_points};
+use crate::scene::{LightEffect, LightPoint, Scene, SceneLight, light_points};
 use crate::shadows::Wanted;
 use crate::shown;
 use crate::statistics::ObjectStatistics;
@@ -62,12 +62,14 @@ pub(crate) fn plan(scene: &Scene, loaded: &Loaded, points: &[LightPoint], plan: 
             let own: Vec<_> =
                 points.iter().zip(carries).filter(|(point, _)| point.of == light).map(|(_, c)| c).collect();
             let (called_for, reason) = way(&own, plan.shadow_maps[light], scatters_again);
-            let through = Effect { name: format!("light {light} through volumes"), called_for, reason, bound: 0.0 };
-            std::iter::once(through).chain(softness(light, points, &asked, called_for))
+            let label = &loaded.lights[light].label;
+            let through = Effect { name: format!("carried.{label}"), called_for, reason, bound: 0.0 };
+            std::iter::once(through).chain(softness(light, label, points, &asked, called_for))
         })
         .collect();
-    let lights = plan.shadow_maps.len();
-    plan.effects.splice(lights..lights, effects);
+    // Behind the light itself and its shadow.
+    let behind = LightEffect::ALL.len() * plan.shadow_maps.len();
+    plan.effects.splice(behind..behind, effects);
     Ok(())
 }
 
@@ -89,7 +91,7 @@ fn way(points: &[&Result<(), String>], has_shadow: bool, scatters_again: bool) -
 }
 
 /// Whether the shadow of a light with an extent is soft, and how, in words; `None` for a light without one.
-fn softness(light: usize, points: &[LightPoint], asked: &Carries, is_carried: bool) -> Option<Effect> {
+fn softness(light: usize, label: &str, points: &[LightPoint], asked: &Carries, is_carried: bool) -> Option<Effect> {
     let k = points.iter().position(|point| point.of == light && point.whole.shape.is_extended())?;
     let [_, all] = points[k].rank;
     let way = match (is_carried, asked.together) {
@@ -98,7 +100,7 @@ fn softness(light: usize, points: &[LightPoint], asked: &Carries, is_carried: bo
         (false, _) => format!("a shadow map for each of {all} points of it"),
     };
     let reason = format!("{way}; penumbras widen by {:.3} of the distance to what casts them", asked.widening[k]);
-    Some(Effect { name: format!("softness of light {light}"), called_for: all > 1, reason, bound: 0.0 })
+    Some(Effect { name: format!("softness.{label}"), called_for: all > 1, reason, bound: 0.0 })
 }
 
 /// Objects with opaque discs beside translucent ones: where light is carried through these, maps of opaque objects leave both out.
@@ -113,26 +115,32 @@ pub(crate) fn unshadowed(scene: &Scene, loaded: &Loaded) -> impl Iterator<Item =
     mixed.map(move |name| format!("object '{}' has {what}: put them into a file of their own", shown(name)))
 }
 
-/// The maps that are wanted: one for each point of a light, of all casters, and where light is carried one for each point, of
-/// `others`, the objects that it is not carried through.
+/// The maps that are wanted: one for each point of a light, of the objects that cast its shadows, and one for each point of [`Plan::others`], if there
+/// are any.
 pub(crate) fn wanted_maps<'a>(
-    loaded: &'a Loaded,
+    loaded: &Loaded,
     points: &'a [LightPoint],
-    others: &'a [Object],
+    casting: &'a [Vec<Object>],
+    others: Option<&'a [Object]>,
     plan: &Plan,
 ) -> Vec<Option<Wanted<'a>>> {
     let called_for = |point: &LightPoint| plan.shadow_maps[point.of];
-    if !plan.carried.contains(&true) {
-        return points.iter().map(|point| called_for(point).then_some((point, &loaded.objects[..]))).collect();
-    }
+    let Some(others) = others else {
+        let of_all = points.iter().zip(casting);
+        return of_all.map(|(point, objects)| called_for(point).then_some((point, &objects[..]))).collect();
+    };
     // Who receives light beside what it is carried through, and who casts shadows there.
     let beside = Census::of(&loaded.cloud, &loaded.materials, others, &loaded.footprints);
-    let all = points.iter().zip(&plan.carried).map(|(point, carried)| {
-        let wanted = called_for(point) && (!carried || beside.receivers > 0);
-        wanted.then_some((point, &loaded.objects[..]))
+    let is_carried = !plan.carried.is_empty();
+    let receives = if is_carried { beside.receivers > 0 } else { loaded.receives_beside_polygons() };
+    // Without a technique that carries light, all light on triangles has a z-buffer.
+    let asks_others = |k: usize| if is_carried { plan.carried[k] } else { called_for(&points[k]) };
+    let all = points.iter().zip(casting).enumerate().map(|(k, (point, objects))| {
+        let wanted = called_for(point) && (!asks_others(k) || receives);
+        wanted.then_some((point, &objects[..]))
     });
-    let of_others = points.iter().zip(&plan.carried).map(|(point, carried)| {
-        let wanted = *carried && beside.casters > 0;
+    let of_others = points.iter().enumerate().map(|(k, point)| {
+        let wanted = asks_others(k) && beside.casters > 0;
         wanted.then_some((point, others))
     });
     all.chain(of_others).collect()

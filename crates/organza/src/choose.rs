@@ -67,7 +67,7 @@ pub(crate) fn choose<'a>(
     objects: impl Iterator<Item = (&'a ObjectStatistics, Technique)> + Clone,
     lights: &[LightStatistics],
 ) -> Vec<PlannedObject> {
-    let shining = lights.iter().any(|l| l.wants_shadow && !l.is_dark);
+    let shining = lights.iter().any(LightStatistics::may_shadow);
     let shadows = shining && objects.clone().any(|(o, _)| o.receives);
     let one = |(object, technique): (&ObjectStatistics, Technique)| {
         let row = row(technique);
@@ -105,7 +105,9 @@ mod tests {
         ObjectStatistics { name, data, opaque, by_gradient, is_plain, volumes_by, casts, receives }
     }
 
-    const SUN: LightStatistics = LightStatistics { wants_shadow: true, is_dark: false, points: 1 };
+    fn sun() -> LightStatistics {
+        LightStatistics { casts_shadows: true, points: 1, ..LightStatistics::default() }
+    }
 
     #[test]
     fn every_kind_of_data_has_its_sampler() {
@@ -140,12 +142,17 @@ mod tests {
             chosen(objects, lights).iter().map(|s| s.splats.is_some()).collect()
         };
         let shy = ObjectStatistics { casts: false, ..mesh.clone() };
-        assert_eq!(splats(&[mesh.clone(), shy.clone()], &[SUN]), [true, false]);
+        assert_eq!(splats(&[mesh.clone(), shy.clone()], &[sun()]), [true, false]);
         assert_eq!(splats(&[mesh.clone(), shy.clone()], &[]), [false, false]);
-        for light in [LightStatistics { is_dark: true, ..SUN }, LightStatistics { wants_shadow: false, ..SUN }] {
+        for light in [
+            LightStatistics { is_dark: true, ..sun() },
+            LightStatistics { casts_shadows: false, ..sun() },
+            LightStatistics { is_on: Some(false), ..sun() },
+            LightStatistics { has_shadow: Some(false), ..sun() },
+        ] {
             assert_eq!(splats(&[mesh.clone(), shy.clone()], &[light]), [false, false]);
         }
         let deaf = ObjectStatistics { receives: false, ..mesh };
-        assert_eq!(splats(&[deaf.clone(), deaf], &[SUN]), [false, false]);
+        assert_eq!(splats(&[deaf.clone(), deaf], &[sun()]), [false, false]);
     }
 }

@@ -8,13 +8,21 @@ use crate::load::{Loaded, own::Own};
 use crate::plan::Plan;
 use crate::scene::place;
 use crate::scene::{Scene, SceneLight, SceneObject};
-use crate::shadows::thickness_of;
-use crate::{Layers, escape_controls};
+use crate::shadows::{Coarse, thickness_of};
+use crate::{Layers, ShadowTable, escape_controls};
 use glam::DVec3;
 use splat_core::raster::objects_in_view;
 use splat_core::shade::joint::MediumSpacing;
 use splat_core::{DAabb, Object, Projection, SplatKind};
 
+/// Share of splats in view that may be lit through cells that are too coarse for them, before that is told; and what cells are proposed for.
+const MANY: f64 = 0.1;
+const FEW: f64 = 0.05;
+/// Most cells of a side that a scene may ask for.
+const MOST_CELLS: f64 = 16384.0;
+/// Entries of a shadow map that take some seconds to build, and how many times those of the automatic resolution are told.
+const COSTLY: f64 = 2e7;
+const TIMES: f64 = 4.0;
 /// Most objects outside the view that are told one by one.
 const TOLD: usize = 4;
 /// Optical depth of a spacing up to which the light of layers of splats is held to closed forms.
@@ -243,11 +251,41 @@ pub(crate) fn of_scattering(plan: &Plan) -> Option<String> {
     Some(format!("{lights} scattered once, though render.sheets.scattering asks for more: `organza explain` says why"))
 }
 
+/// Shadow maps whose cells are seen in the picture.
+pub(crate) fn of_cells(coarse: Coarse) -> Option<String> {
+    let Coarse { share, cells } = coarse;
+    // Edges of shadows are as wide as a cell, so the share goes with its width.
+    let better = libm::ceil(f64::from(cells) * share / FEW / 64.0) * 64.0;
+    (share > MANY).then(|| {
+        let percent = libm::round(100.0 * share);
+        let advice = if better <= MOST_CELLS {
+            format!("[render.shadow] with cells = {better} would do")
+        } else {
+            "more cells than a table may have would do".to_owned()
+        };
+        format!("shadows are coarse: about {percent} % of what splats show is lit off by more than the tolerance, by {cells} cells a side: {advice}")
+    })
+}
+
 /// Shadow maps that memory made coarser, by what their cells follow from.
 pub(crate) fn of_shadows(limits: &[tsm::Limit]) -> Option<String> {
     let coarse = limits.iter().filter(|limit| **limit == tsm::Limit::Memory).count();
     (coarse > 0).then(|| {
         let maps = if coarse == 1 { "a shadow map is" } else { "shadow maps are" };
         format!("{maps} coarser than the splats ask for, to fit the memory: a larger --max-memory makes them finer")
+    })
+}
+
+/// The most costly table whose cells a scene asks for.
+pub(crate) fn of_costly<'a>(tables: impl Iterator<Item = &'a ShadowTable>) -> Option<String> {
+    let table = tables.max_by(|a, b| a.predicted.entries.total_cmp(&b.predicted.entries))?;
+    let entries = table.predicted.entries;
+    let times = entries / table.automatic_entries.max(1.0);
+    (entries >= COSTLY && times >= TIMES).then(|| {
+        let [millions, times] = [1e-6 * entries, times].map(libm::round);
+        format!(
+            "the cells of [render.shadow] make {millions} million entries of a shadow map, {times} times those of cells = \"auto\", \
+             and take as much longer to build"
+        )
     })
 }

@@ -84,7 +84,9 @@ fn stages(frame: &Frame<'_>) -> Stages {
     let opaque = expected(frame, None);
     let of: Vec<(Technique, Expected)> = plan.techniques.iter().map(|t| (*t, expected(frame, Some(*t)))).collect();
     let built = if frame.has_maps() { 0 } else { maps };
-    let mut stages: Stages = (1..=built).map(|k| (work::shadow_map(k, maps), cost::CAST * all)).collect();
+    let entries = plan.shadow_tables.iter().chain(&plan.other_tables).flatten().map(|table| table.predicted.entries);
+    let map = |(k, entries)| (work::shadow_map(k, maps, entries), cost::CAST * all + cost::ENTRY * entries);
+    let mut stages: Stages = (1..=built).zip(entries).map(map).collect();
     // The eye's is another in each view.
     stages.extend(plan.eye_table.iter().map(|_| (stage::EYE_MAP.to_owned(), cost::CAST * all)));
     let mut add = |name: &str, seconds: f64| stages.push((name.to_owned(), seconds));

@@ -1,6 +1,7 @@
 //! One frame: what all techniques share. The camera of samples, lights and their shadow maps, the splats that are drawn with their footprints and
 //! radiance, the opaque image, the device, progress. Whatever is made for it is made once, when it is first asked for.
 
+mod coarse;
 pub(crate) mod discs;
 pub(crate) mod grouped;
 mod light;

@@ -30,6 +30,7 @@
 //! ```
 #![forbid(unsafe_code)]
 
+mod brightness;
 mod carried;
 mod choose;
 mod doubts;

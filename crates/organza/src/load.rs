@@ -10,8 +10,8 @@ mod normalize;
 pub(crate) mod object;
 pub(crate) mod own;
 
-use crate::form::PlannedObject;
-use crate::scene::{Scene, SceneLight, SceneObject};
+use crate::form::{Form, PlannedObject};
+use crate::scene::{Scene, SceneLight, SceneObject, SwitchedEffect};
 use crate::statistics::{LightStatistics, ObjectStatistics};
 use crate::{CostRecord, Error, Progress, RenderOptions, SplatCount, pass, work};
 pub(crate) use context::BYTES_PER_SPLAT;
@@ -24,6 +24,7 @@ use loading::Loading;
 use normalize::normalize;
 use object::Prepared;
 use own::Own;
+use splat_core::shade::Census;
 use splat_core::{Camera, Cloud, FootprintStack, Material, Object, Shading, SplatKind};
 use std::cmp::Ordering;
 
@@ -85,6 +86,26 @@ impl Loaded {
         kinds.filter(|(kind, _)| **kind != SplatKind::Opaque).for_each(|(_, object)| hide(*object as usize));
         objects
     }
+
+    /// The objects, of which opaque triangles cast no shadow; `None` where none of these casts one.
+    pub(crate) fn beside_polygons(&self) -> Option<Vec<Object>> {
+        let mut objects = self.objects.clone();
+        let mut casts = false;
+        for triangles in self.own.iter().filter(|data| data.form == Form::Polygons) {
+            casts |= objects[triangles.object].casts_shadow;
+            objects[triangles.object].casts_shadow = false;
+        }
+        casts.then_some(objects)
+    }
+
+    /// Whether anything but opaque triangles receives shadows.
+    pub(crate) fn receives_beside_polygons(&self) -> bool {
+        let mut objects = self.objects.clone();
+        let (polygons, others): (Vec<&Own>, Vec<&Own>) = self.own.iter().partition(|data| data.form == Form::Polygons);
+        polygons.iter().for_each(|data| objects[data.object].shadow_coefficient = 0.0);
+        others.iter().any(|data| objects[data.object].shadow_coefficient > 0.0)
+            || Census::of(&self.cloud, &self.materials, &objects, &self.footprints).receivers > 0
+    }
 }
 
 fn scaled_thickness(scene: &Scene, exponent: i32) -> Option<f64> {
@@ -136,7 +157,7 @@ pub(crate) fn read<'a>(
 impl Inputs<'_> {
     /// What the planner asks of all lights.
     pub(crate) fn light_statistics(&self) -> Vec<LightStatistics> {
-        light_statistics(&self.lights)
+        light_statistics(&self.lights, &self.loading.scene.render.effects)
     }
 
     /// Converts every object to the form that was chosen for it, and to splats where they are needed: `spare` is asked whether
@@ -222,8 +243,8 @@ fn materials(scene: &Scene, prepared: &[Prepared<'_>]) -> Vec<Material> {
 }
 
 /// What the planner asks of all lights.
-pub(crate) fn light_statistics(lights: &[SceneLight]) -> Vec<LightStatistics> {
-    lights.iter().map(LightStatistics::of_light).collect()
+pub(crate) fn light_statistics(lights: &[SceneLight], switched: &[SwitchedEffect]) -> Vec<LightStatistics> {
+    lights.iter().map(|light| LightStatistics::of_light(light, switched)).collect()
 }
 
 /// What to say of splats that nothing is seen of, where there may be nothing else.

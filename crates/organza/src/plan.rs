@@ -4,14 +4,16 @@
 //! pass that is not in the plan does not run, and its buffers are not allocated: the cost record shows it.
 
 pub use crate::form::{Form, PlannedObject};
+use crate::load::Loaded;
 use crate::pass;
 use crate::scene::{LightPoint, Technique};
 use crate::shadows::ShadowTable;
+use splat_core::Object;
 
 /// One effect of the scene: simulated or not, and why.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Effect {
-    /// What it is, such as `shadow of light 1`.
+    /// What it is, such as `shadow.sun`.
     pub name: String,
     /// Whether it is simulated.
     pub called_for: bool,
@@ -43,7 +45,9 @@ pub struct Plan {
     pub passes: Vec<PlannedPass>,
     /// Planes of optical depth, or depth buffers of particles: 1 when all materials absorb red, green and blue alike, else 3.
     pub optical_depth_planes: usize,
-    /// For each light, by its place in [`Loaded::lights`](crate::Loaded::lights): whether its points get shadow maps.
+    /// For each light, by its place in [`Loaded::lights`](crate::Loaded::lights): whether it shines.
+    pub lights: Vec<bool>,
+    /// For each of these lights: whether its points get shadow maps.
     pub shadow_maps: Vec<bool>,
     /// For each point of each light, in the order of the frame's points: the table of its shadow map, if it gets one. Chosen by
     /// a look at the splats, when all else is planned.
@@ -56,10 +60,15 @@ pub struct Plan {
     pub scattered_once: usize,
     /// For each point of each light: whether a technique carries its light through what it draws by itself.
     pub carried: Vec<bool>,
-    /// For each point whose light is carried: the table of its map of all other casters, if there are any. Empty where none is.
+    /// For each point whose light is carried: the table of its map of all other casters, if there are any. Where no technique carries light and opaque triangles
+    /// cast shadows: for each point, the table of its map of the casters beside these. Else empty.
     pub other_tables: Vec<Option<ShadowTable>>,
     /// The table of the eye's map, which tells the light within media whose spacing is optically thick, if there are any.
     pub eye_table: Option<ShadowTable>,
+    /// For each object, by its rank: whether the picture may show it. All in an animation, and where rays are bent or light is carried.
+    pub shown: Vec<bool>,
+    /// For each point of each light, for each object: whether it may shadow one that is shown, so that the point's map is of it.
+    pub casters: Vec<Vec<bool>>,
     /// Bytes that all shadow maps together may take.
     pub shadow_bytes: u64,
     /// What draws each visible object, and from what.
@@ -75,9 +84,24 @@ pub struct Plan {
 }
 
 impl Plan {
+    /// Whether the picture shows light that was out of the view before.
+    pub(crate) fn leaves_view(&self) -> bool {
+        self.bends || self.scatters_again || self.carried.contains(&true)
+    }
+
     /// All tables of shadow maps.
     pub fn tables(&self) -> impl Iterator<Item = &ShadowTable> + Clone {
         self.shadow_tables.iter().chain(&self.other_tables).flatten().chain(&self.eye_table)
+    }
+
+    /// The objects of which second maps are made: where light is carried, those that it is not carried through; else those beside opaque triangles,
+    /// which shadow each other by z-buffers of their own. `None` where all that receives light asks the same maps.
+    pub(crate) fn others(&self, loaded: &Loaded) -> Option<Vec<Object>> {
+        match &self.carried[..] {
+            [] => loaded.beside_polygons(),
+            // A technique that carries light asks the maps of all casters where it does not.
+            points => points.contains(&true).then(|| loaded.opaque_objects()),
+        }
     }
 
     /// What the cells of each table follow from.
@@ -90,11 +114,12 @@ impl Plan {
         self.shadow_tables.iter().chain(&self.other_tables).flatten().count()
     }
 
-    /// Takes the tables in that were chosen, one for each point of a light, then one more for each of casters that no light is
-    /// carried through, and the bytes that their maps may take together.
+    /// Takes the tables in that were chosen, one for each point of a light, then those of [`Plan::other_tables`], and the bytes that their maps may
+    /// take together.
     pub(crate) fn set_shadow_tables(&mut self, points: &[LightPoint], tables: Vec<Option<ShadowTable>>, bytes: u64) {
         let mut tables = tables;
-        let (others, beside) = (tables.split_off(points.len().min(tables.len())), ", of what is opaque");
+        let others = tables.split_off(points.len().min(tables.len()));
+        let beside = if self.carried.is_empty() { ", beside opaque triangles" } else { ", of what is opaque" };
         let of = |tables: &[Option<ShadowTable>], beside: &str| -> Vec<PlannedPass> {
             let one = |(table, point): (&Option<ShadowTable>, &LightPoint)| {
                 let reason = table.as_ref()?.describe(&(point.name() + beside));

@@ -2,6 +2,7 @@
 
 mod seen;
 
+use crate::brightness;
 use crate::carried;
 use crate::choose::{choose, plan, row, same_forms, technique_of, techniques, unshown};
 use crate::form::PlannedObject;
@@ -14,6 +15,7 @@ use crate::memory::{self, Memory};
 use crate::pass;
 use crate::plan::Plan;
 use crate::scene::{FoundCamera, Scene, SceneLight, SceneObject, Source, Technique, light_points};
+use crate::shadows::Shadowing;
 use crate::statistics::{ObjectData, ObjectStatistics, Statistics};
 use crate::technique::Row;
 use crate::work::Translucent;
@@ -67,6 +69,7 @@ pub fn explain_from(
     techniques(&scene).into_iter().try_for_each(|technique| (row(technique).check)(&frame, options))?;
     explanation.found = found;
     explanation.warnings.extend(doubts::of_shadows(&explanation.plan.shadow_limits()));
+    explanation.warnings.extend(doubts::of_costly(explanation.plan.tables()));
     explanation.warnings.extend(doubts::of_scattering(&explanation.plan));
     progress.finish();
     Ok(explanation)
@@ -199,9 +202,15 @@ fn plan_counted(
     if is_new {
         carried::plan(scene, loaded, &points, &mut plan)?;
     }
-    if is_new || !shadows::fit(plan.tables(), left) {
-        let others = loaded.opaque_objects();
-        let wanted = carried::wanted_maps(loaded, &points, &others, &plan);
+    let shadowing = Shadowing::new(scene, loaded, plan.leaves_view());
+    let casters: Vec<_> = points.iter().map(|point| shadowing.casters(&point.light)).collect();
+    let is_cast_alike = casters == plan.casters;
+    plan.casters = casters;
+    plan.shown = shadowing.shown().to_vec();
+    if is_new || !is_cast_alike || !shadows::fit(plan.tables(), left) {
+        let casting: Vec<_> = plan.casters.iter().map(|kept| shadows::casting(&loaded.objects, kept)).collect();
+        let others = plan.others(loaded);
+        let wanted = carried::wanted_maps(loaded, &points, &casting, others.as_deref(), &plan);
         let tables = shadows::tables(&scene.render, loaded, &wanted, left)?;
         plan.set_shadow_tables(&points, tables, left);
     } else {
@@ -211,7 +220,7 @@ fn plan_counted(
     plan.set_eye_table(None);
     let left = left.saturating_sub(shadows::bytes(plan.tables()));
     if plan.shadow_maps.contains(&true) {
-        let eye = shadows::eye_table(&scene.render, loaded, &plan.draws, left)?;
+        let eye = shadows::eye_table(loaded, &plan.shown, &plan.draws, left)?;
         plan.set_eye_table(eye);
     }
     let memory = memory.with_maps(shadows::bytes(plan.tables()));
@@ -229,7 +238,13 @@ fn plan_effects(scene: &Scene, loaded: &Loaded) -> Result<(Statistics, Plan), Er
     let made: Vec<u64> = loaded.splats.iter().map(|s| s.made).collect();
     let counts = Census::of(&loaded.cloud, &loaded.materials, &loaded.objects, &loaded.footprints);
     let mut statistics = Statistics { counts, ..Statistics::default() };
-    statistics.lights = light_statistics(&loaded.lights);
+    statistics.lights = light_statistics(&loaded.lights, &scene.render.effects);
+    // Of light that is scattered again and again no bound is known.
+    if scene.render.sheets.scattering().is_none() {
+        let radiances = brightness::of_lights(loaded);
+        statistics.lights.iter_mut().zip(radiances).for_each(|(light, radiance)| light.radiance = radiance);
+    }
+    statistics.exposure = scene.render.exposure;
     statistics.normals_needed = loaded.normals;
     statistics.layers = scene.render.layers.names().map(str::to_owned).collect();
     statistics.tolerance = scene.render.tolerance;

@@ -157,12 +157,16 @@ pub(crate) fn render_keeping(
     let layers = draw(&frame, &mut session, &mut cost)?;
     let sets = session.sets;
     left.groups = frame.groups.take();
+    let is_judged = !doubtful && scene.frames.is_none();
+    let coarse = is_judged.then(|| frame.coarse()).flatten().and_then(doubts::of_cells);
     let leaves = frame.leaves();
     let backend = helper.as_ref().map_or_else(|| "cpu".to_owned(), |helper| helper.name());
     if !doubtful {
         warnings.extend(doubts::of_picture(scene, &layers));
     }
     warnings.extend(doubts::of_shadows(&leaves.shadow_limits(plan)));
+    warnings.extend(doubts::of_costly(plan.tables()));
+    warnings.extend(coarse);
     warnings.extend(doubts::of_scattering(plan));
     warnings.extend(helper.as_ref().and_then(|_| left_to_processor(plan)));
     warnings.extend(helper.map(|helper| helper.said()).unwrap_or_default());

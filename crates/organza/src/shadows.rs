@@ -1,5 +1,7 @@
 //! What shadow maps are built by: shared by the plan, which tells their size beforehand, and the drawing.
 
+mod casters;
+
 use crate::Error;
 use crate::load::Loaded;
 use crate::scene::{LightPoint, RenderSettings, ShadowMapping};
@@ -7,11 +9,13 @@ use splat_core::shade::joint::{HIDDEN, MediumSpacing};
 use splat_core::{Camera, Light, LightShape, Limits, Object};
 use tsm::{Deposits, Params};
 
+pub(crate) use casters::{Shadowing, casting};
+
 /// Share of the tolerance that the ends of lists may take, of all lights together. Absorbance grows with its logarithm only, so
 /// a small share costs little.
 pub(crate) const CUT_SHARE: f64 = 1.0 / 16.0;
 /// Largest slope of a displayed value by radiance, at black: sRGB's.
-const DISPLAY_SLOPE: f64 = 12.92;
+pub(crate) const DISPLAY_SLOPE: f64 = 12.92;
 
 /// Optical depth of a spacing that a scene needs the eye's map for: up to it light and view at 60° send 1.5 % too little by the middles of splats,
 /// and at right angles a fifth of a per cent.
@@ -20,6 +24,15 @@ const SEEN: f32 = 0.125;
 pub(crate) const EYE: &str = "the eye";
 /// Straight optical depths of a thick cell that lists go on for: as many as it has along the most slanted light.
 const CELLS_BEHIND: f64 = 5.0;
+
+/// What the cells of the shadow maps of a frame are too coarse for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Coarse {
+    /// Share of what splats show in the picture whose displayed light is off by more than the tolerance, estimated.
+    pub(crate) share: f64,
+    /// Cells along the longer side of the largest table.
+    pub(crate) cells: u32,
+}
 
 /// The table of one light's shadow map, as it was chosen before any work.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -30,6 +43,8 @@ pub struct ShadowTable {
     pub tolerance: f32,
     /// Bytes within which its cells were chosen.
     pub max_bytes: u64,
+    /// Entries that the automatic resolution would have, where a scene asks for cells; else those of `predicted`.
+    pub automatic_entries: f64,
 }
 
 impl ShadowTable {
@@ -68,6 +83,12 @@ pub fn shadow_params(settings: &RenderSettings, loaded: &Loaded, tolerance: f32,
     }
 }
 
+/// Parameters of the eye's map. `render.shadow` is about lights: its cells would cost the eye, which is near what it sees, many times more.
+pub(crate) fn eye_params(loaded: &Loaded, tolerance: f32, max_bytes: u64) -> Params {
+    let (footprints, limits) = (loaded.footprints.clone(), Limits::bytes(max_bytes));
+    Params { tolerance, footprints, limits, ..Params::default() }
+}
+
 /// Greatest optical depth of a spacing among the media of a loaded scene; 0 where it is thin everywhere.
 fn thickest(loaded: &Loaded) -> f64 {
     let thickest = (0..loaded.cloud.len()).map(|i| thickness_of(loaded, i)).fold(0.0, f32::max);
@@ -91,43 +112,48 @@ pub(crate) fn eye(camera: &Camera) -> Light {
     Light { shape, intensity: [1.0; 3] }
 }
 
-/// The objects that the eye's map is of: those with media whose spacing is optically thick. What else there is hides a thick cell as a whole.
-pub(crate) fn thick_objects(loaded: &Loaded) -> Vec<Object> {
+/// The objects that the eye's map is of: those that are `shown` with media whose spacing is optically thick. What else there is hides a thick cell as
+/// a whole.
+pub(crate) fn thick_objects(loaded: &Loaded, shown: &[bool]) -> Vec<Object> {
     let mut objects: Vec<Object> =
         loaded.objects.iter().map(|object| Object { casts_shadow: false, ..object.clone() }).collect();
     for (i, object) in loaded.cloud.object.iter().enumerate() {
+        let is_shown = shown[*object as usize];
         let object = &mut objects[*object as usize];
-        object.casts_shadow = object.casts_shadow || thickness_of(loaded, i) > SEEN;
+        object.casts_shadow = object.casts_shadow || is_shown && thickness_of(loaded, i) > SEEN;
     }
     objects
 }
 
-/// The table of the eye's map, within so many bytes; `None` where all media that receive shadows and are drawn as splats, which `draws` says of
-/// each object, are thin.
+/// The table of the eye's map, within so many bytes; `None` where all media that receive shadows, are `shown` and are drawn as splats, which `draws`
+/// says of each object, are thin.
 ///
 /// # Errors
 /// Where the table cannot be chosen.
 pub(crate) fn eye_table(
-    settings: &RenderSettings,
     loaded: &Loaded,
+    shown: &[bool],
     draws: &[bool],
     max_bytes: u64,
 ) -> Result<Option<ShadowTable>, Error> {
     let cloud = &loaded.cloud;
     let is_lit_within = |i: usize| {
         let object = cloud.object[i] as usize;
-        draws[object] && loaded.objects[object].shadow_coefficient > 0.0 && thickness_of(loaded, i) > SEEN
+        draws[object]
+            && shown[object]
+            && loaded.objects[object].shadow_coefficient > 0.0
+            && thickness_of(loaded, i) > SEEN
     };
     if !(0..cloud.len()).any(is_lit_within) {
         return Ok(None);
     }
     let tolerance =
         libm::exp(-f64::from(HIDDEN) - CELLS_BEHIND * thickest(loaded)).max(f64::from(f32::MIN_POSITIVE)) as f32;
-    let params = shadow_params(settings, loaded, tolerance, max_bytes);
-    let objects = thick_objects(loaded);
+    let params = eye_params(loaded, tolerance, max_bytes);
+    let objects = thick_objects(loaded, shown);
     let scene = tsm::Scene { cloud, materials: &loaded.materials, objects: &objects };
     let predicted = Deposits::predict(&scene, &eye(&loaded.camera), &params).map_err(|e| shadow_error(EYE, &e))?;
-    Ok(Some(ShadowTable { predicted, tolerance, max_bytes }))
+    Ok(Some(ShadowTable { predicted, tolerance, max_bytes, automatic_entries: predicted.entries }))
 }
 
 /// Transmittance e^(−A_cut) below which the light of one lamp is lost in the picture: its brightest light times that changes no
@@ -198,8 +224,16 @@ fn tables_within(
         let tolerance = tolerance(settings, loaded, point, maps, thickest);
         let params = shadow_params(settings, loaded, tolerance, max_bytes);
         let scene = tsm::Scene { cloud: &loaded.cloud, materials: &loaded.materials, objects };
-        let predicted = Deposits::predict(&scene, light, &params).map_err(|e| shadow_error(&point.name(), &e))?;
-        Ok(Some(ShadowTable { predicted, tolerance, max_bytes }))
+        let predict =
+            |params: &Params| Deposits::predict(&scene, light, params).map_err(|e| shadow_error(&point.name(), &e));
+        let predicted = predict(&params)?;
+        let automatic_entries = match params.resolution {
+            tsm::Resolution::Auto => predicted.entries,
+            tsm::Resolution::Cells(_) => {
+                predict(&Params { resolution: tsm::Resolution::Auto, ..params.clone() })?.entries
+            }
+        };
+        Ok(Some(ShadowTable { predicted, tolerance, max_bytes, automatic_entries }))
     };
     wanted.iter().map(table).collect()
 }

@@ -1,20 +1,28 @@
 //! Statistics of a loaded scene, from which the plan is made.
 
 use crate::form::PlannedObject;
-use crate::scene::{SceneLight, SurfaceSampler, Technique, VolumeSampler};
+use crate::scene::{LightEffect, SceneLight, SurfaceSampler, SwitchedEffect, Technique, VolumeSampler};
 use convert::cost::Prediction;
 use splat_core::Material;
 use splat_core::shade::Census;
 
 /// What the planner knows of one light.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct LightStatistics {
-    /// Whether its shadows are wanted.
-    pub wants_shadow: bool,
+    /// How effects call it.
+    pub label: String,
+    /// Whether it may cast shadows.
+    pub casts_shadows: bool,
     /// Whether it has no intensity.
     pub is_dark: bool,
     /// Points that it is for who lights by points, each with a shadow map of its own.
     pub points: usize,
+    /// Whether the scene switches the light on or off.
+    pub is_on: Option<bool>,
+    /// Whether the scene switches its shadow on or off.
+    pub has_shadow: Option<bool>,
+    /// The most radiance that anything can send of its light, in the channel that has most, W·m⁻²·sr⁻¹; infinite where none is known.
+    pub radiance: f64,
 }
 
 /// What an object is made of.
@@ -115,6 +123,8 @@ pub struct Statistics {
     pub layers: Vec<String>,
     /// Largest change of a displayed pixel that may be left out.
     pub tolerance: f64,
+    /// Exposure of the displayed picture, stops.
+    pub exposure: f64,
 }
 
 impl Statistics {
@@ -188,9 +198,22 @@ impl Statistics {
 }
 
 impl LightStatistics {
-    /// Statistics of one light.
-    pub fn of_light(light: &SceneLight) -> Self {
-        let is_dark = light.light.intensity.iter().all(|i| *i == 0.0);
-        Self { wants_shadow: light.shadow, is_dark, points: light.count() }
+    /// Statistics of a light, of whose radiance nothing is known, and that some effects of a scene may switch.
+    pub fn of_light(light: &SceneLight, switched: &[SwitchedEffect]) -> Self {
+        let switch = |effect| switched.iter().find(|s| s.effect == effect && s.light == light.label).map(|s| s.is_on);
+        Self {
+            label: light.label.clone(),
+            casts_shadows: light.shadow,
+            is_dark: light.light.intensity.iter().all(|i| *i == 0.0),
+            points: light.count(),
+            is_on: switch(LightEffect::Light),
+            has_shadow: switch(LightEffect::Shadow),
+            radiance: f64::INFINITY,
+        }
+    }
+
+    /// Whether it may get shadow maps.
+    pub fn may_shadow(&self) -> bool {
+        self.casts_shadows && !self.is_dark && self.is_on != Some(false) && self.has_shadow != Some(false)
     }
 }

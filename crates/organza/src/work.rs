@@ -18,6 +18,8 @@ const CONVERT: f64 = 1e-6;
 pub(crate) mod cost {
     /// A splat of each pass.
     pub(crate) const CAST: f64 = 5e-7;
+    /// An entry of a shadow map.
+    pub(crate) const ENTRY: f64 = 1.2e-7;
     pub(crate) const SORT: f64 = 1e-7;
     pub(crate) const PROJECT: f64 = 1e-7;
     pub(crate) const SHADE: f64 = 1e-7;
@@ -48,9 +50,13 @@ pub(crate) fn converting(name: &str) -> String {
     format!("converting {}", escape_controls(name))
 }
 
-/// The stage of one of the shadow maps, counted from 1.
-pub(crate) fn shadow_map(k: usize, of: usize) -> String {
-    format!("shadow map {k} of {of}")
+/// Entries of a shadow map from which on its stage has their number: tens of seconds.
+const MANY_ENTRIES: f64 = 5e7;
+
+/// The stage of one of the shadow maps, counted from 1, of so many predicted entries.
+pub(crate) fn shadow_map(k: usize, of: usize, entries: f64) -> String {
+    let many = (entries >= MANY_ENTRIES).then(|| format!(", {:.0} million entries", 1e-6 * entries));
+    format!("shadow map {k} of {of}{}", many.unwrap_or_default())
 }
 
 /// Before anything is read. What comes after is unknown but at least as much.
@@ -96,4 +102,15 @@ pub(crate) struct Translucent {
     pub(crate) fragments: f64,
     /// Whether there is anything, splats or objects by their own data.
     pub(crate) any: bool,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_shadow_map_of_many_entries_tells_them_before_it_is_built() {
+        assert_eq!(shadow_map(1, 2, 3e6), "shadow map 1 of 2");
+        assert_eq!(shadow_map(1, 2, 1.16e8), "shadow map 1 of 2, 116 million entries");
+    }
 }

@@ -99,7 +99,7 @@ mod sweep;
 pub use axis::HalfVector;
 pub use bodies::{Bodies, SplatBounds};
 pub use counts::HalfCounts;
-pub use fold::{Drawn, balance, bytes, fold, opaque_polygons, polygon_bytes, slab_width};
+pub use fold::{Drawn, PolygonLamp, PolygonView, balance, bytes, fold, opaque_polygons, polygon_bytes, slab_width};
 pub use list_bytes::{light_list_bytes, pane_bytes};
 pub(crate) use pane_sheets::PanesInTheOpen;
 pub use params::{Extended, HalfInput, HalfParams, MOST_SAMPLES, Scattering};

@@ -91,6 +91,24 @@ impl Material {
         r.max(g).max(b)
     }
 
+    /// The most radiance that it sends in any direction of an irradiance of 1 on a plane that faces the light, 1/sr, where the largest channel of
+    /// its colour is `color`: at the peak of the phase function, or, where it may have a normal, by Lambert and the peak of the highlight. An unlit
+    /// one sends none.
+    pub fn brightest(&self, color: f64, may_have_normal: bool) -> f64 {
+        if self.shading == Shading::Unlit {
+            return 0.0;
+        }
+        let pi = f64::from(PI);
+        let g = f64::from(self.asymmetry.abs());
+        let phase = (1.0 + g) / (4.0 * pi * (1.0 - g) * (1.0 - g));
+        let scattered = color * f64::from(self.single_scattering_albedo) * phase;
+        if self.shading == Shading::Phase || !may_have_normal {
+            return scattered;
+        }
+        let highlight = f64::from(self.specular) * (f64::from(self.shininess) + 2.0) / (2.0 * pi);
+        scattered.max(color * f64::from(self.diffuse) / pi + highlight)
+    }
+
     /// Whether its surfaces bound matter, which has an index or absorbs.
     pub fn bounds_matter(&self) -> bool {
         self.index.is_some() || self.absorption_inside != [0.0; 3]

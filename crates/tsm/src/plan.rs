@@ -259,7 +259,7 @@ fn automatic_cell(
 ) -> (f64, Limit) {
     let Some(spacing) = look.median_spacing() else { return (extent.side / 16.0, Limit::Spacing) };
     let finest = (0.5 * spacing).min(extent.side);
-    let most_cells = (4.0 * casters.cloud.len() as f64).clamp(65_536.0, 16_777_216.0);
+    let most_cells = (4.0 * survey.casters as f64).clamp(65_536.0, 16_777_216.0);
     let most_entries = budget(casters, look.casters() as f64);
     let Limits { max_bytes, max_elements } = *room;
     let has_cells = |cell: f64| cell >= extent.side / MAX_SIDE && extent.cells(cell) <= most_cells;

@@ -4,6 +4,7 @@
 mod automatic;
 mod common;
 mod continuity;
+mod estimate;
 mod folds;
 mod invariance;
 mod light;

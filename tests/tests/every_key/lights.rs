@@ -1,6 +1,6 @@
 //! Keys of lights.
 
-use super::table::{Entry, SPOT, SUN, one};
+use super::table::{Entry, Look, SPOT, SUN, one};
 
 pub(crate) fn entries() -> Vec<Entry> {
     let mut all = vec![
@@ -23,6 +23,12 @@ pub(crate) fn entries() -> Vec<Entry> {
         one("light.rect.u", "light.0.u=[0.1, 0, -0.6]").with(RECT),
         one("light.rect.v", "light.0.v=[0.6, -0.2, 0]").with(RECT),
     ];
+    for (kind, with) in
+        [("directional", SUN), ("point", &[][..]), ("spot", SPOT), ("sphere", SPHERE), ("disk", DISK), ("rect", RECT)]
+    {
+        let key: &'static str = format!("light.{kind}.name").leak();
+        all.push(one(key, "light.0.name='key'").with(with).look(Look::Told));
+    }
     for (kind, with) in [("point", &[][..]), ("spot", SPOT), ("sphere", SPHERE), ("disk", DISK), ("rect", RECT)] {
         let key = |name: &str| -> &'static str { format!("light.{kind}.{name}").leak() };
         all.push(one(key("position"), "light.0.position=[2, 2.9, 2]").with(with));

@@ -16,7 +16,7 @@ pub(crate) enum Look {
     Work,
     /// Sets of particles that were averaged.
     Sets,
-    /// Objects and frames, as `explain` names them.
+    /// Objects, frames and effects, as `explain` names them.
     Told,
 }
 
@@ -98,7 +98,7 @@ impl Entry {
         Self { with, ..self }
     }
 
-    fn look(self, look: Look) -> Self {
+    pub(super) fn look(self, look: Look) -> Self {
         Self { look, ..self }
     }
 
@@ -382,6 +382,7 @@ fn render() -> Vec<Entry> {
         of(BALL, "render.tolerance", "render.tolerance=1").look(Look::Work).with(THIN),
         one("render.exposure", "render.exposure=1").look(Look::Displayed),
         one("render.layers", "render.layers=['depth']").look(Look::Layers),
+        one("render.effects", "render.effects={'shadow.0'='off'}").with(SUN),
         one("render.seed", "render.seed=5").but_by(BUT_PARTICLES, Nothing("nothing of it is random")),
         of(All, "render.max_points", "render.max_points=3").but(All, Refused(5, "max_points")),
         of(BALL, "render.points", "render.points={first_slices=1}").but_by(BUT_POINTS, POINTS_ONLY),

@@ -12,7 +12,7 @@ const FLOORS: [&[&str]; 14] = [
     &["statistics"],
     &["options", "work"],
     &["load"],
-    &["matter", "memory", "shadows"],
+    &["brightness", "matter", "memory", "shadows"],
     &["plan"],
     &["doubts", "frame"],
     &["technique"],

@@ -1,5 +1,7 @@
 //! The effects that a scene calls for, each with its reason and the bound of what it could change, and the passes that simulate them.
 
+mod lights;
+
 use super::row;
 use crate::form::Form;
 use crate::pass;
@@ -7,7 +9,7 @@ use crate::plan::{Effect, Plan, PlannedPass};
 use crate::scene::Technique;
 use crate::shadows::CUT_SHARE;
 use crate::shown;
-use crate::statistics::{LightStatistics, Statistics};
+use crate::statistics::Statistics;
 use crate::technique::Row;
 
 /// Chooses effects and passes.
@@ -17,16 +19,10 @@ pub(crate) fn plan(statistics: &Statistics) -> Plan {
     let mut plan =
         Plan { technique: names.join(" and "), techniques: statistics.techniques.clone(), ..Plan::default() };
     // What ends lists of shadow maps takes the rest.
-    let tolerance = statistics.tolerance * (1.0 - CUT_SHARE);
-    let mut skipped = 0.0;
-    for (i, light) in statistics.lights.iter().enumerate() {
-        let effect = shadow_effect(i, light, statistics, tolerance - skipped);
-        if !effect.called_for {
-            skipped += effect.bound;
-        }
-        plan.shadow_maps.push(effect.called_for);
-        plan.effects.push(effect);
-    }
+    let lights = lights::plan(statistics, statistics.tolerance * (1.0 - CUT_SHARE));
+    plan.effects = lights.effects;
+    plan.lights = lights.shine;
+    plan.shadow_maps = lights.shadow_maps;
     plan.effects.push(colored_extinction(statistics));
     plan.effects.push(bending(statistics));
     plan.effects.push(dispersion(statistics));
@@ -44,36 +40,6 @@ pub(crate) fn plan(statistics: &Statistics) -> Plan {
 
 fn effect(name: impl Into<String>, called_for: bool, reason: impl Into<String>) -> Effect {
     Effect { name: name.into(), called_for, reason: reason.into(), bound: 0.0 }
-}
-
-fn shadow_effect(i: usize, light: &LightStatistics, statistics: &Statistics, allowance: f64) -> Effect {
-    let name = format!("shadow of light {i}");
-    if !light.wants_shadow {
-        return effect(name, false, "the light has shadow = false");
-    }
-    if light.is_dark {
-        return effect(name, false, "the light has no intensity");
-    }
-    if statistics.counts.receivers == 0 {
-        return effect(name, false, "nothing can receive it: no lit splat with a shadow coefficient");
-    }
-    if statistics.counts.casters == 0 {
-        return effect(name, false, "nothing can cast it");
-    }
-    // A displayed pixel is at most 1, so what a shadow can take away is at most its opacity.
-    let bound =
-        if statistics.counts.opaque_casters > 0 { 1.0 } else { -libm::expm1(-statistics.counts.caster_optical_depth) };
-    let called_for = bound > allowance;
-    let reason = if called_for {
-        let from = if light.points > 1 { format!(", from {} points", light.points) } else { String::new() };
-        format!(
-            "{} splats or whole objects cast and {} receive it{from}",
-            statistics.counts.casters, statistics.counts.receivers
-        )
-    } else {
-        format!("no ray could lose more than {bound:.1e} of its light")
-    };
-    Effect { name, called_for, reason, bound }
 }
 
 fn colored_extinction(statistics: &Statistics) -> Effect {
@@ -165,8 +131,8 @@ fn passes(statistics: &Statistics, shadow_maps: &[bool]) -> Vec<PlannedPass> {
     if statistics.counts.splats > 0 || statistics.own() == 0 {
         pass(pass::CONVERT, format!("{} splats", statistics.counts.splats));
     }
-    for (i, light) in statistics.lights.iter().enumerate().filter(|(i, _)| shadow_maps[*i]) {
-        (0..light.points).for_each(|_| pass(pass::SHADOW_MAP, format!("light {i}")));
+    for (light, _) in statistics.lights.iter().zip(shadow_maps).filter(|(_, has_map)| **has_map) {
+        (0..light.points).for_each(|_| pass(pass::SHADOW_MAP, format!("light {}", light.label)));
     }
     for (row, what) in rows() {
         let before = row.steps.split_last().map_or(&[][..], |(_, before)| before);
@@ -200,10 +166,17 @@ fn passes(statistics: &Statistics, shadow_maps: &[bool]) -> Vec<PlannedPass> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::statistics::LightStatistics;
     use splat_core::shade::Census;
 
     fn scene() -> Statistics {
-        let light = LightStatistics { wants_shadow: true, is_dark: false, points: 1 };
+        let light = LightStatistics {
+            label: "0".into(),
+            casts_shadows: true,
+            points: 1,
+            radiance: f64::INFINITY,
+            ..LightStatistics::default()
+        };
         Statistics {
             counts: Census {
                 translucent: 10,
@@ -233,7 +206,7 @@ mod tests {
             |s: &mut Statistics| s.counts.casters = 0,
             |s: &mut Statistics| s.counts.receivers = 0,
             |s: &mut Statistics| s.lights[0].is_dark = true,
-            |s: &mut Statistics| s.lights[0].wants_shadow = false,
+            |s: &mut Statistics| s.lights[0].casts_shadows = false,
             |s: &mut Statistics| s.lights.clear(),
         ] {
             let mut statistics = scene();
@@ -245,12 +218,12 @@ mod tests {
     #[test]
     fn every_point_of_a_light_gets_a_map() {
         let mut s = scene();
-        let light = LightStatistics { points: 3, ..s.lights[0] };
-        s.lights = vec![light, LightStatistics { wants_shadow: false, ..light }];
+        let light = LightStatistics { points: 3, ..s.lights[0].clone() };
+        s.lights = vec![light.clone(), LightStatistics { casts_shadows: false, ..light }];
         let plan = plan(&s);
         assert_eq!(plan.shadow_maps, [true, false]);
         assert_eq!(plan.passes.iter().filter(|p| p.name == pass::SHADOW_MAP).count(), 3);
-        assert!(plan.effects[0].reason.ends_with("receive it, from 3 points"), "{}", plan.effects[0].reason);
+        assert!(plan.effects[1].reason.ends_with("receive it, from 3 points"), "{}", plan.effects[1].reason);
     }
 
     #[test]
@@ -258,12 +231,19 @@ mod tests {
         let mut s = scene();
         s.counts.opaque_casters = 0;
         s.counts.caster_optical_depth = 0.003;
-        s.lights = vec![s.lights[0]; 2];
-        let plan = plan(&s);
-        // Two of 0.003 are above 1/255 together, so the second one is simulated.
-        assert_eq!(plan.shadow_maps, [false, true]);
-        let skipped: f64 = plan.effects.iter().filter(|e| !e.called_for).map(|e| e.bound).sum();
-        assert!(skipped <= s.tolerance);
+        let maps = |radiances: [f64; 2]| {
+            let mut s = s.clone();
+            s.lights = radiances.map(|radiance| LightStatistics { radiance, ..s.lights[0].clone() }).to_vec();
+            let plan = plan(&s);
+            let skipped: f64 = plan.effects.iter().filter(|e| !e.called_for).map(|e| e.bound).sum();
+            assert!(skipped <= s.tolerance);
+            plan.shadow_maps
+        };
+        // Two of 0.003 are above 1/255 together. Of two that are alike none goes: the order of a file would choose.
+        assert_eq!(maps([1.0, 1.0]), [true, true]);
+        assert_eq!(maps([0.06, 1.0]), [false, true]);
+        assert_eq!(maps([1.0, 0.06]), [true, false]);
+        assert_eq!(maps([0.02, 0.02]), [true, true]);
     }
 
     #[test]

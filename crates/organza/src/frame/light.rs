@@ -5,7 +5,7 @@ use crate::device;
 use crate::pass;
 use crate::plan::Plan;
 use crate::scene::{LightPoint, light_points};
-use crate::shadows::{EYE, ShadowTable, eye, shadow_error, thick_objects};
+use crate::shadows::{EYE, ShadowTable, casting, eye, eye_params, shadow_error, thick_objects};
 use crate::{CostRecord, Error, stage, work};
 use splat_core::shade::{LitBy, ShadeInput};
 use splat_core::{Arrived, Object, Remembered, Transmittance};
@@ -14,16 +14,22 @@ use tsm::{Deposits, ShadowMap};
 /// The shadow maps of a frame, for each point of a light. They serve other frames of the same splats, whatever the camera.
 pub(crate) struct Maps {
     /// Of all casters.
-    all: Vec<Option<ShadowMap>>,
-    /// Of those that no light is carried through.
+    pub(super) all: Vec<Option<ShadowMap>>,
+    /// Of [`Plan::others`].
     of_others: Vec<Option<ShadowMap>>,
     /// What arrived through each of `all` at the splats that are drawn.
     arrived: Vec<Arrived>,
-    made_as: Vec<MadeAs>,
+    made_as: MadeAs,
 }
 
-/// The size of a table and the transmittance at which its lists stop.
-type MadeAs = Option<(tsm::Prediction, f32)>;
+/// What maps of the same splats follow from.
+#[derive(PartialEq)]
+struct MadeAs {
+    /// For each table its size and the transmittance at which its lists stop.
+    tables: Vec<Option<(tsm::Prediction, f32)>>,
+    /// [`Plan::casters`].
+    casters: Vec<Vec<bool>>,
+}
 
 impl Maps {
     /// Whether they are those of another plan for the same splats.
@@ -36,9 +42,10 @@ impl Maps {
         self.all.iter().chain(&self.of_others).flatten().map(|map| map.prediction().limit)
     }
 
-    fn made_as(plan: &Plan) -> Vec<MadeAs> {
+    fn made_as(plan: &Plan) -> MadeAs {
         let tables = plan.shadow_tables.iter().chain(&plan.other_tables);
-        tables.map(|table| table.map(|table| (table.predicted, table.tolerance))).collect()
+        let tables = tables.map(|table| table.map(|table| (table.predicted, table.tolerance))).collect();
+        MadeAs { tables, casters: plan.casters.clone() }
     }
 }
 
@@ -49,9 +56,15 @@ struct Done {
 }
 
 impl<'a> Frame<'a> {
-    /// The points of all lights, by which techniques light what they draw.
+    /// The points of all lights, by which techniques light what they draw. Those of lights that the plan leaves out have no intensity.
     pub(crate) fn light_points(&self) -> &[LightPoint] {
-        self.light_points.get_or_init(|| light_points(&self.loaded.lights))
+        self.light_points.get_or_init(|| {
+            let mut points = light_points(&self.loaded.lights);
+            for point in points.iter_mut().filter(|point| !self.plan.lights[point.of]) {
+                point.light.intensity = [0.0; 3];
+            }
+            points
+        })
     }
 
     /// One shadow map for each point of a light that the plan gives one, `None` for the others. What building them took is added to `cost`.
@@ -62,7 +75,8 @@ impl<'a> Frame<'a> {
         Ok(&self.all_maps(cost)?.all)
     }
 
-    /// The same of the casters that no light is carried through; empty where none is.
+    /// The same of the casters that no light is carried through, or of those beside opaque triangles ([`Plan::others`]); empty where there are no
+    /// such maps.
     pub(crate) fn maps_of_others(&self, cost: &mut CostRecord) -> Result<&[Option<ShadowMap>], Error> {
         Ok(&self.all_maps(cost)?.of_others)
     }
@@ -71,13 +85,20 @@ impl<'a> Frame<'a> {
         if let Some(maps) = self.maps.get() {
             return Ok(maps);
         }
-        let (plan, others) = (self.plan, self.loaded.opaque_objects());
+        let plan = self.plan;
+        let others = plan.others(self.loaded).unwrap_or_default();
         let mut done = Done { maps: 0, left: plan.shadow_bytes };
-        let all = self.shadow_maps(&plan.shadow_tables, &self.loaded.objects, &mut done, cost)?;
-        let of_others = self.shadow_maps(&plan.other_tables, &others, &mut done, cost)?;
+        let casting = |point: usize| self.casting(point);
+        let all = self.shadow_maps(&plan.shadow_tables, &casting, &mut done, cost)?;
+        let of_others = self.shadow_maps(&plan.other_tables, &|_| others.clone(), &mut done, cost)?;
         let remembered = if self.remembers { self.drawn().len() } else { 0 };
         let arrived = all.iter().map(|map| Arrived::new(map.as_ref().map_or(0, |_| remembered))).collect();
         Ok(self.maps.get_or_init(|| Maps { all, of_others, arrived, made_as: Maps::made_as(plan) }))
+    }
+
+    /// The objects, of which those cast shadows that the picture could show of a point of a light.
+    pub(crate) fn casting(&self, point: usize) -> Vec<Object> {
+        casting(&self.loaded.objects, &self.plan.casters[point])
     }
 
     /// Shadows of the points of all lights by which splats are shaded that are drawn.
@@ -89,25 +110,25 @@ impl<'a> Frame<'a> {
     fn shadow_maps(
         &self,
         tables: &[Option<ShadowTable>],
-        objects: &[Object],
+        casting: &dyn Fn(usize) -> Vec<Object>,
         done: &mut Done,
         cost: &mut CostRecord,
     ) -> Result<Vec<Option<ShadowMap>>, Error> {
         let mut maps = Vec::new();
         let count = self.plan.shadow_maps_built();
-        for (point, table) in self.light_points().iter().zip(tables) {
+        for (rank, (point, table)) in self.light_points().iter().zip(tables).enumerate() {
             self.tick()?;
             let Some(table) = table else {
                 maps.push(None);
                 continue;
             };
             done.maps += 1;
-            self.progress.begin(&work::shadow_map(done.maps, count));
+            self.progress.begin(&work::shadow_map(done.maps, count, table.predicted.entries));
             let params = table.params(self.settings, self.loaded, done.left);
             let map = cost.measure(pass::SHADOW_MAP, |stage| {
-                let l = self.loaded;
+                let (l, objects) = (self.loaded, casting(rank));
                 let deposits = Deposits::new(
-                    &tsm::Scene { cloud: &l.cloud, materials: &l.materials, objects },
+                    &tsm::Scene { cloud: &l.cloud, materials: &l.materials, objects: &objects },
                     &point.light,
                     &params,
                     Some(self.progress),
@@ -132,8 +153,8 @@ impl<'a> Frame<'a> {
         let l = self.loaded;
         self.progress.begin(stage::EYE_MAP);
         self.tick()?;
-        let params = table.params(self.settings, l, table.max_bytes);
-        let objects = thick_objects(l);
+        let params = eye_params(l, table.tolerance, table.max_bytes);
+        let objects = thick_objects(l, &self.plan.shown);
         cost.measure(pass::EYE_MAP, |stage| {
             let cloud = self.drawn();
             let scene = tsm::Scene { cloud, materials: &l.materials, objects: &objects };

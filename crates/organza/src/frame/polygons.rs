@@ -3,7 +3,7 @@
 use super::Frame;
 use crate::load::own::Own;
 use crate::{CostRecord, Error, pass, stage};
-use sheet_light::half::{Polygons, opaque_polygons};
+use sheet_light::half::{PolygonLamp, PolygonView, Polygons, opaque_polygons};
 use sheet_light::{SheetInput, Volume};
 use splat_core::raster::OpaqueImage;
 use splat_core::{optics, shade::LitBy};
@@ -41,16 +41,36 @@ impl<'a> Frame<'a> {
         if polygons.is_empty() {
             return Ok(OpaqueImage::default());
         }
-        let input = self.sheet_input(Vec::new(), self.lit_by(self.maps(cost)?));
+        let lamps = self.polygon_lamps(cost)?;
+        let view = PolygonView {
+            camera: &self.camera,
+            polygons: &polygons,
+            lamps: &lamps,
+            ambient: self.scene.ambient,
+            shadow_origin: self.loaded.cloud.origin,
+            keeps_objects: self.layers.object,
+        };
         self.progress.begin(stage::OPAQUE);
         cost.measure(pass::OPAQUE, |stage| {
             stage.items_in = polygons.len() as u64;
-            let (layout, objects) = (self.layout(), self.layers.object);
-            let seen = opaque_polygons(&input, &polygons, &layout, objects, Some(self.progress));
+            let seen = opaque_polygons(&view, &self.layout(), Some(self.progress));
             seen.map_err(|e| {
                 if e == sheet_light::Error::Cancelled { Error::Cancelled } else { Error::Internal(e.to_string()) }
             })
         })
+    }
+
+    /// The points of lights that have an intensity, as opaque triangles receive them. Of light that slabs carry, these ask the maps of all casters.
+    fn polygon_lamps(&self, cost: &mut CostRecord) -> Result<Vec<PolygonLamp<'_>>, Error> {
+        let plan = self.plan;
+        let has_z_buffers = plan.carried.is_empty() && self.loaded.beside_polygons().is_some();
+        let maps = if has_z_buffers { self.maps_of_others(cost)? } else { self.maps(cost)? };
+        let points = self.light_points().iter().enumerate().filter(|(_, point)| point.light.intensity != [0.0; 3]);
+        let lamps = points.map(|(k, point)| PolygonLamp {
+            lit: LitBy { shadow: maps.get(k).and_then(Option::as_ref).map(|map| map as _), ..self.lit(point) },
+            points: (has_z_buffers && plan.shadow_maps[point.of]).then_some(point.rank[1] as u32),
+        });
+        Ok(lamps.collect())
     }
 
     /// Volumes in slabs, in the light of some lights.

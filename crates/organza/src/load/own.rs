@@ -173,6 +173,19 @@ impl Own {
         DAabb::of_points(self.bounds.corners().map(|p| self.transform.apply(p)))
     }
 
+    /// The largest channel of the colours of its data.
+    pub(crate) fn brightest_color(&self) -> f32 {
+        let greatest = |colors: &[[f32; 3]]| colors.as_flattened().iter().copied().fold(0.0, f32::max);
+        let data = match &self.body {
+            Body::Cells { transfer, .. } => transfer.brightest(),
+            Body::Triangles(mesh) if !mesh.color.is_empty() => greatest(&mesh.color) * greatest(&[self.color]),
+            Body::Triangles(_) | Body::Surface { .. } | Body::Lattice { .. } | Body::Field(_) => {
+                greatest(&[self.color])
+            }
+        };
+        self.field.as_ref().map_or(data, |(field, _)| data.max(field.brightest()))
+    }
+
     /// Scales the world, not the object.
     pub(crate) fn scale_world(&mut self, scale: f64) {
         self.transform = self.transform.scaled(scale);

@@ -52,7 +52,9 @@ pub(crate) fn bytes(matter: &Matter<'_>, points: &[LightPoint], _: bool, options
     let others = match half::is_asked(matter.scene) {
         true => half::bytes(matter, &panes, points, options),
         false if matter.own.iter().any(|own| own.form.is_polygons()) => {
-            polygon_bytes(matter.camera, 0, &HalfParams::default())
+            // One z-buffer lives at a time.
+            let z_buffers = points.iter().any(|point| point.light.intensity != [0.0; 3]);
+            polygon_bytes(matter.camera, u32::from(z_buffers), &HalfParams::default())
         }
         false => 0,
     };

@@ -7,7 +7,7 @@ use super::counts::HalfCounts;
 use super::eye_sheets::EyeBand;
 use super::frame::Frame;
 use super::light_buffer::planes;
-use super::light_depth::LightDepths;
+use super::light_depth::{LightDepths, side};
 use super::pane_sheets::PanesInTheOpen;
 use super::penumbra::Penumbra;
 use super::polygon_light::{PolygonImage, PolygonLight};
@@ -21,7 +21,8 @@ use super::{HalfInput, HalfParams, HalfSplats, MOST_SAMPLES, Scattering, lamp};
 use crate::gradient_volume::GradientVolume;
 use crate::lattice::Lattice;
 use crate::visible::Voxels;
-use crate::{Error, Params, SheetInput, Volume};
+use crate::{Error, Params, Volume};
+use splat_core::glam::DVec3;
 use splat_core::raster::OpaqueImage;
 use splat_core::shade::{ChannelLayout, LitBy, MAX_CHANNELS};
 use splat_core::{Accumulator, Camera, Light, Progress};
@@ -206,26 +207,62 @@ fn in_the_open<'a>(
     Ok(bytes)
 }
 
-/// What is seen of opaque polygons under the lights of `of`, whose shadows are known: a picture of their own, with objects where these are asked for. Nothing
-/// else of `of` plays a part. One tick a band of rows.
+/// A light on opaque polygons.
+#[derive(Clone, Copy)]
+pub struct PolygonLamp<'a> {
+    /// The light. Its shadow is that of everything but the opaque polygons that cast one; of these too where `points` is `None`.
+    pub lit: LitBy<'a>,
+    /// How many points stand for the same light: their z-buffers of the opaque polygons share [`HalfParams::most_light_pixels`]. `None` for a light
+    /// that needs no z-buffer.
+    pub points: Option<u32>,
+}
+
+/// Opaque polygons as the eye sees them.
+pub struct PolygonView<'a> {
+    /// The eye.
+    pub camera: &'a Camera,
+    /// The polygons, of which those that are translucent play no part.
+    pub polygons: &'a [Polygons<'a>],
+    /// The lights.
+    pub lamps: &'a [PolygonLamp<'a>],
+    /// Ambient radiance, the same from everywhere.
+    pub ambient: [f32; 3],
+    /// What positions of receivers of shadows are relative to, world.
+    pub shadow_origin: DVec3,
+    /// Whether the picture keeps objects.
+    pub keeps_objects: bool,
+}
+
+/// Draws opaque polygons into a picture of their own. Every pixel asks the z-buffer of each light for the shadows of the polygons themselves: splats
+/// that stand for them in a shadow map lie beside their edges. One tick a band of rows.
 ///
 /// # Errors
-/// [`Error::Polygons`] or [`Error::Cancelled`].
+/// [`Error::Polygons`], [`Error::Light`] or [`Error::Cancelled`].
 pub fn opaque_polygons(
-    of: &SheetInput<'_>,
-    polygons: &[Polygons<'_>],
+    view: &PolygonView<'_>,
     layout: &ChannelLayout,
-    objects: bool,
     progress: Option<&Progress>,
 ) -> Result<OpaqueImage, Error> {
+    let PolygonView { camera, polygons, lamps, ambient, shadow_origin, keeps_objects } = *view;
     polygons.iter().enumerate().try_for_each(|(index, polygons)| polygons.check(index))?;
-    let (quiet, camera) = (Progress::new(), of.camera);
-    let solid = polygons.iter().filter(|p| p.is_opaque()).copied().collect();
-    let solid = EyePolygons::new(solid, (camera, &[]), progress.unwrap_or(&quiet))?;
+    let quiet = Progress::new();
+    let progress = progress.unwrap_or(&quiet);
+    let solid: Vec<Polygons<'_>> = polygons.iter().filter(|p| p.is_opaque()).copied().collect();
+    let casters: Vec<&Polygons<'_>> = polygons.iter().filter(|p| p.is_opaque() && p.casts_shadow).collect();
+    let solid = EyePolygons::new(solid, (camera, &[]), progress)?;
     let mut image = PolygonImage::new(&solid, layout);
-    let lamps = Lamps { carried: None, mapped: &of.lights, ambient: of.ambient, camera, light_alone: false };
-    PolygonLight::new(&solid.seen, camera, None).shade(&lamps, of.shadow_origin, None, &mut image);
-    Ok(image.finish(&solid, objects))
+    let mapped: Vec<LitBy<'_>> = lamps.iter().filter(|lamp| lamp.points.is_none()).map(|lamp| lamp.lit).collect();
+    let first = Lamps { carried: None, mapped: &mapped, ambient, camera, light_alone: false };
+    PolygonLight::new(&solid.seen, camera, None).shade(&first, shadow_origin, None, &mut image);
+    let places = solid.seen.places(camera);
+    for PolygonLamp { lit, points } in lamps {
+        let Some(points) = points else { continue };
+        let most_pixels = side(HalfParams::default().most_light_pixels, *points);
+        let depths = LightDepths::new(&casters, (&lit.light, 1), &places, (most_pixels, 0), progress)?;
+        let lamps = Lamps { carried: Some(*lit), mapped: &[], ambient, camera, light_alone: true };
+        PolygonLight::new(&solid.seen, camera, depths.as_ref()).shade(&lamps, shadow_origin, None, &mut image);
+    }
+    Ok(image.finish(&solid, keeps_objects))
 }
 
 /// What so many points of a light see of the polygons that cast shadows, for all that receives its light; `None` where there is no light

@@ -6,7 +6,7 @@
 mod sampler;
 
 use super::refuse;
-use super::unit::{brightest_color, color_unit};
+use super::unit::color_unit;
 use crate::Error;
 use crate::frame::Frame;
 use crate::load::Loaded;
@@ -128,7 +128,7 @@ fn seed(frame: &Frame<'_>, object: u32, kind: SplatKind) -> u64 {
 fn of_own<'a>(own: &'a Own, (n, sum): (u32, f64), frame: &Frame<'a>) -> Source<'a> {
     let Loaded { objects, materials, .. } = frame.loaded;
     let material = materials[own.material];
-    let brightest_color = brightest_color(own);
+    let brightest_color = own.brightest_color();
     // As its splats have it, where it has some.
     let radius = if n > 0 { sum / f64::from(n) } else { own.radius };
     Source {

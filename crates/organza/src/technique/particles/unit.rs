@@ -6,10 +6,8 @@
 
 use super::parts::Part;
 use crate::frame::Frame;
-use crate::load::own::{Body, Own};
 use pbsr::Appearance;
-use splat_core::{DAabb, Material, Shading};
-use std::f64::consts::PI;
+use splat_core::{DAabb, Shading};
 use std::ops::Range;
 
 /// How many powers of two the unit lies below the bound.
@@ -45,19 +43,7 @@ fn brightest(frame: &Frame<'_>, part: &Part<'_>) -> f64 {
         points.map(|point| frame.lit(point).brightest_in(bounds, spread)).sum()
     };
     let ambient = greatest(frame.scene.ambient) * f64::from(material.ambient) * color;
-    emission + ambient + received(&part.bounds) * (color * diffuse_peak(&material) + specular_peak(&material))
-}
-
-/// The most that a material sends on of what it receives, as a factor on its colour: Lambert's or the peak of its phase function, 1/sr.
-fn diffuse_peak(material: &Material) -> f64 {
-    let g = f64::from(material.asymmetry.abs());
-    let phase = (1.0 + g) / (4.0 * PI * (1.0 - g) * (1.0 - g));
-    (f64::from(material.diffuse) / PI).max(f64::from(material.single_scattering_albedo) * phase)
-}
-
-/// The same of a highlight, whatever the colour.
-fn specular_peak(material: &Material) -> f64 {
-    f64::from(material.specular) * (f64::from(material.shininess) + 2.0) / (2.0 * PI)
+    emission + ambient + received(&part.bounds) * material.brightest(color, true)
 }
 
 /// Colours that need no unit: particles hold them as they are, with all nine bits for a hundredth of the brightest, too.
@@ -70,15 +56,4 @@ pub(super) fn color_unit(brightest_color: f32) -> f32 {
     }
     let (_, power) = libm::frexp(f64::from(brightest_color));
     libm::exp2(f64::from(power.clamp(LEAST_POWER, MOST_POWER))) as f32
-}
-
-/// The largest channel of the colours of an object's own data.
-pub(super) fn brightest_color(own: &Own) -> f32 {
-    let greatest = |colors: &[[f32; 3]]| colors.as_flattened().iter().copied().fold(0.0, f32::max);
-    let data = match &own.body {
-        Body::Cells { transfer, .. } => transfer.brightest(),
-        Body::Triangles(mesh) if !mesh.color.is_empty() => greatest(&mesh.color) * greatest(&[own.color]),
-        Body::Triangles(_) | Body::Surface { .. } | Body::Lattice { .. } | Body::Field(_) => greatest(&[own.color]),
-    };
-    own.field.as_ref().map_or(data, |(field, _)| data.max(field.brightest()))
 }

@@ -87,15 +87,16 @@ impl Points<'_> {
             return Ok(None);
         }
         let mut castings = Vec::new();
-        for (point, table) in frame.light_points().iter().zip(&frame.plan.shadow_tables) {
+        for (rank, (point, table)) in frame.light_points().iter().zip(&frame.plan.shadow_tables).enumerate() {
             let light = &point.light;
             let Some(table) = table.filter(|_| light.intensity != [0.0; 3]) else { continue };
             let params = table.params(frame.settings, l, frame.plan.shadow_bytes);
             frame.tick()?;
             let made = cost.measure(pass::SHADOW_MAP, |stage| {
                 stage.items_in = l.cloud.len() as u64;
+                let objects = frame.casting(rank);
                 let casting = Casting::new(
-                    &tsm::Scene { cloud: &l.cloud, materials: &l.materials, objects: &l.objects },
+                    &tsm::Scene { cloud: &l.cloud, materials: &l.materials, objects: &objects },
                     light,
                     &params,
                     Some(frame.progress),

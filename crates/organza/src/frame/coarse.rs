@@ -1,0 +1,134 @@
+//! How much of what is seen the cells of shadow maps are too coarse for.
+
+use super::Frame;
+use crate::output::displayed;
+use crate::shadows::Coarse;
+use glam::DVec3;
+use rayon::prelude::*;
+use splat_core::shade::{LitBy, ShadeInput, shade_splat};
+use splat_core::{Receiver, SplatKind, Transmittance};
+use std::f64::consts::PI;
+use tsm::ShadowMap;
+
+/// Splats that are looked at, at most: a share of a tenth is found within a hundredth.
+const LOOKED_AT: usize = 2048;
+/// Splats among which those are sought that are seen: one in sixteen may be.
+const CANDIDATES: usize = 16 * LOOKED_AT;
+
+/// The same light at every place.
+#[derive(Clone, Copy)]
+struct Even([f32; 3]);
+
+impl Transmittance for Even {
+    fn transmittance(&self, _: &Receiver) -> [f32; 3] {
+        self.0
+    }
+}
+
+/// A splat that is seen.
+struct Sample {
+    splat: usize,
+    /// Samples of the picture that it stands for, times its opacity.
+    area: f64,
+    /// Pixels of a length of one at its centre.
+    px_per_world: f64,
+}
+
+/// Light of a frame, and from which error on it is displayed off.
+struct Look<'a> {
+    input: ShadeInput<'a>,
+    lit: Vec<(LitBy<'a>, Option<&'a ShadowMap>)>,
+    /// Factor of the exposure.
+    gain: f32,
+    /// Levels of a byte.
+    tolerance: f64,
+}
+
+impl Frame<'_> {
+    /// Estimates what the cells of the shadow maps are too coarse for, where maps were made, from splats at even distances in the list.
+    pub(crate) fn coarse(&self) -> Option<Coarse> {
+        let maps = &self.maps.get()?.all;
+        let sides = maps.iter().flatten().flat_map(|map| map.prediction().size);
+        let cells = sides.max()? as u32;
+        let splats = self.drawn().len();
+        let candidates = (0..splats).step_by(splats.div_ceil(CANDIDATES).max(1));
+        let candidates = candidates.filter_map(|i| self.sample(i));
+        let seen: Vec<Sample> = candidates.collect();
+        let samples: Vec<&Sample> = seen.iter().step_by(seen.len().div_ceil(LOOKED_AT).max(1)).collect();
+        let look = Look {
+            input: self.shading(&[]),
+            lit: self.shining(maps).collect(),
+            gain: libm::exp2(self.settings.exposure) as f32,
+            // Rounding to bytes moves each by half a level.
+            tolerance: (255.0 * self.settings.tolerance).max(1.0),
+        };
+        // In the order of the list, so that the sum does not depend on threads.
+        let is_off: Vec<bool> = samples.par_iter().map(|sample| look.is_off(sample)).collect();
+        let off = samples.iter().zip(is_off).filter(|(_, is_off)| *is_off).map(|(sample, _)| sample.area).sum::<f64>();
+        let area = samples.iter().map(|sample| sample.area).sum::<f64>();
+        (area > 0.0).then_some(Coarse { share: off / area, cells })
+    }
+
+    /// A splat as it is seen; `None` where its centre is out of the view or behind opaque surfaces.
+    fn sample(&self, i: usize) -> Option<Sample> {
+        let (cloud, camera) = (self.drawn(), &self.camera);
+        let centre = camera.view_from_offset(cloud.origin).apply(cloud.position[i]).as_dvec3();
+        if centre.z <= 0.0 || !camera.may_see(centre, 0.0) {
+            return None;
+        }
+        let (radius, depth) = (f64::from(cloud.radius[i]), if camera.is_orthographic() { 1.0 } else { centre.z });
+        let px_per_world = camera.focal_px() / depth;
+        let [column, row] = [(centre.x, camera.size[0]), (-centre.y, camera.size[1])]
+            .map(|(at, size)| (px_per_world * at + 0.5 * f64::from(size)).clamp(0.0, f64::from(size - 1)) as usize);
+        let surface = self.opaque.get().and_then(|opaque| opaque.depth.get(row * camera.size[0] as usize + column));
+        if surface.is_some_and(|nearest| f64::from(*nearest) < centre.z - radius) {
+            return None;
+        }
+        let towards = if camera.is_orthographic() { DVec3::Z } else { centre.normalize() };
+        let normal = camera.view_from_offset(cloud.origin).rotation * cloud.normal_of(i);
+        let slant = if cloud.kind[i] == SplatKind::Medium { 1.0 } else { normal.as_dvec3().dot(towards).abs() };
+        let area = f64::from(cloud.cross_section[i]).min(PI * radius * radius);
+        let area = slant * area * px_per_world * px_per_world;
+        Some(Sample { splat: i, area, px_per_world: px_per_world / f64::from(self.settings.antialias) })
+    }
+}
+
+impl Look<'_> {
+    /// Whether the light of a splat is displayed off by more than the tolerance.
+    fn is_off(&self, sample: &Sample) -> bool {
+        let splat = sample.splat;
+        let receiver = Receiver::of_splat(self.input.cloud, splat);
+        let arrives = |map: &Option<&ShadowMap>| Even(map.map_or([1.0; 3], |map| map.transmittance(&receiver)));
+        let through: Vec<Even> = self.lit.iter().map(|(_, map)| arrives(map)).collect();
+        let expected = self.radiance(splat, &through);
+        // Lights err by themselves: their squares add up.
+        let mut variance = [0.0; 3];
+        for (rank, (_, map)) in self.lit.iter().enumerate() {
+            // What is finer than a pixel is not seen.
+            let is_seen = |map: &&ShadowMap| map.cell_width(receiver.position) * sample.px_per_world >= 1.0;
+            let error = map.filter(is_seen).map_or(0.0, |map| map.interpolation_error(&receiver));
+            if error == 0.0 {
+                continue;
+            }
+            let mut other = through.clone();
+            other[rank] = Even(through[rank].0.map(|t| if t > 0.5 { t - error } else { t + error }.clamp(0.0, 1.0)));
+            let radiance = self.radiance(splat, &other);
+            (0..3).for_each(|c| variance[c] += (radiance[c] - expected[c]).powi(2));
+        }
+        let byte = |radiance: f32| f64::from(displayed(radiance.max(0.0) * self.gain));
+        (0..3).any(|c| byte(expected[c] + variance[c].sqrt()) - byte(expected[c]) > self.tolerance)
+    }
+
+    /// Radiance of a splat by such shares of each light.
+    fn radiance(&self, splat: usize, through: &[Even]) -> [f32; 3] {
+        let lights: Vec<LitBy<'_>> = self
+            .lit
+            .iter()
+            .zip(through)
+            .map(|((lit, map), through)| LitBy { shadow: map.map(|_| through as &dyn Transmittance), ..*lit })
+            .collect();
+        let (radiance, _) = shade_splat(&ShadeInput { lights: &lights, ..self.input }, splat);
+        let parts = [radiance.ambient, radiance.emission, radiance.direct, radiance.scatter1];
+        [0, 1, 2].map(|c| parts.iter().map(|part| part[c]).sum())
+    }
+}

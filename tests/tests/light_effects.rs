@@ -1,0 +1,221 @@
+//! A light and its shadow are left out where nobody sees it, and only there: each family crosses the threshold, and what was left out is forced on.
+
+use organza::scene::{LoadOptions, Override, Scene, parse};
+use organza::{Progress, Render, RenderOptions};
+use organza_tests::{Place, draw};
+use std::path::Path;
+
+/// Fog over a ground, of which a spot lights a part; `lamp` and `more` are further lights and objects.
+fn scene(lamp: &str, more: &str) -> String {
+    format!(
+        "version = 1\n[camera]\nposition = [0, 1, 4]\ntarget = [0, 0, 0]\nsize = [32, 24]\n\
+         [[light]]\nname = 'key'\nkind = 'spot'\nposition = [1, 3, 1]\ntarget = [0.3, 0, 0]\nouter = 15\nintensity = [9, 9, 9]\n{lamp}\
+         [[object]]\nname = 'ground'\n\
+         rectangle = {{ center = [0, -0.6, 0], u = [2, 0, 0], v = [0, 0, -2], spacing = 0.05 }}\n\
+         [[object]]\nname = 'fog'\nmaterial = 'fog'\n\
+         medium_ball = {{ center = [0, 0, 0], radius = 0.5, spacing = 0.1, extinction = 3 }}\n{more}\
+         [material.fog]\nmedium = {{ albedo = 0.9 }}\n[render]\nantialias = 1\n"
+    )
+}
+
+const FILL: &str = "[[light]]\nname = 'fill'\nkind = 'point'\nposition = [-1, 2, 2]\nintensity = [1, 1, 1]\n";
+const PANE: &str = "[[object]]\nname = 'pane'\nopacity = 0.5\n\
+                    rectangle = { center = [0.7, 1.6, 0.5], u = [0.4, 0, 0], v = [0, 0, -0.4], spacing = 0.4 }\n";
+
+fn loaded(text: &str, changes: &[String]) -> Scene {
+    let overrides = changes.iter().map(|change| match change.strip_prefix("effect ") {
+        Some(effect) => Override::of_effect(effect).unwrap(),
+        None => Override::parse(change).unwrap(),
+    });
+    let options = LoadOptions { overrides: overrides.collect(), ..LoadOptions::default() };
+    parse(Path::new("s.toml"), text.as_bytes(), &options).unwrap()
+}
+
+fn render(scene: &Scene) -> Render {
+    organza::render(scene, &RenderOptions::default(), &Progress::new()).unwrap()
+}
+
+/// Values of a picture as they are displayed.
+fn displayed(render: &Render, scene: &Scene) -> Vec<f64> {
+    let gain = scene.render.exposure.exp2();
+    let encode = |v: f64| if v <= 0.0031308 { 12.92 * v } else { 1.055 * v.powf(1.0 / 2.4) - 0.055 };
+    let beauty = render.layers.rgb("beauty").unwrap();
+    beauty.iter().flatten().map(|v| encode((gain * f64::from(*v)).clamp(0.0, 1.0))).collect()
+}
+
+fn largest_change(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+}
+
+/// What a family showed.
+#[derive(Debug)]
+struct Crossed {
+    least_visible: f64,
+    most_skipped: f64,
+}
+
+/// Draws a family whose effect grows from invisible to plain, as planned, with the effect on and with it off; `bare` is the scene without its cause.
+#[track_caller]
+fn crosses_its_threshold(
+    text: &str,
+    name: &str,
+    key: &str,
+    sizes: &[f64],
+    settings: &[String],
+    bare: Option<&str>,
+) -> Crossed {
+    let mut crossed = Crossed { least_visible: f64::INFINITY, most_skipped: 0.0 };
+    for size in sizes {
+        let with = |more: &[String]| {
+            let size = key.replace("SIZE", &format!("{size:e}"));
+            loaded(text, &[settings, &[size], more].concat())
+        };
+        let planned_scene = with(&[]);
+        let tolerance = planned_scene.render.tolerance;
+        let planned = render(&planned_scene);
+        let effect = planned.plan.effects.iter().find(|effect| effect.name == name).unwrap();
+        let on = render(&with(&[format!("effect {name}=on")]));
+        let off = render(&with(&[format!("effect {name}=off")]));
+        let truth = displayed(&on, &planned_scene);
+        let seen = largest_change(&displayed(&off, &planned_scene), &truth);
+        assert!(seen <= effect.bound, "{name} at {size}: {seen} beyond the bound {}", effect.bound);
+        if effect.called_for {
+            assert_eq!(planned.layers, on.layers, "{name} at {size}");
+        } else {
+            let change = largest_change(&displayed(&planned, &planned_scene), &truth);
+            assert!(change <= tolerance, "{name} at {size}: {change} left out");
+            assert_eq!(planned.layers, off.layers, "{name} at {size}");
+            if let Some(bare) = bare {
+                let bare = render(&loaded(bare, settings));
+                assert_eq!(planned.layers, bare.layers, "{name} at {size}: its cause leaves a trace");
+                let maps = |render: &Render| render.cost.stages.iter().filter(|s| s.name == "tsm build").count();
+                assert_eq!(maps(&planned), maps(&bare), "{name} at {size}: a map of it was built");
+            }
+            crossed.most_skipped = crossed.most_skipped.max(*size);
+        }
+        if seen > tolerance {
+            crossed.least_visible = crossed.least_visible.min(*size);
+        }
+    }
+    assert!(crossed.most_skipped > 0.0 && crossed.least_visible.is_finite(), "{name}: {crossed:?}");
+    crossed
+}
+
+/// Sizes from one end to the other, each 1.4 times the last.
+fn sizes(from: f64, to: f64) -> Vec<f64> {
+    std::iter::successors(Some(from), |size| Some(size * 1.4)).take_while(|size| *size <= to).collect()
+}
+
+fn settings(list: &[&str]) -> Vec<String> {
+    list.iter().map(|setting| (*setting).to_owned()).collect()
+}
+
+/// A lamp that grows, beside a brighter one that lights another part of the ground.
+#[track_caller]
+fn a_lamp_crosses_its_threshold(list: &[&str], from: f64) {
+    let (with, without) = (scene(FILL, ""), scene("", ""));
+    let key = "light.fill.intensity=[SIZE, SIZE, SIZE]";
+    let crossed =
+        crosses_its_threshold(&with, "light.fill", key, &sizes(from, 300.0 * from), &settings(list), Some(&without));
+    println!("{list:?}: {crossed:?}");
+    assert!(crossed.most_skipped >= 0.1 * crossed.least_visible, "{list:?}: {crossed:?}");
+}
+
+/// A pane whose opacity grows, in the light of the key; nothing else casts a shadow.
+#[track_caller]
+fn a_shadow_crosses_its_threshold(list: &[&str]) {
+    let text = scene("", PANE);
+    let alone = ["object.fog.casts_shadow=false", "object.ground.casts_shadow=false"];
+    let settings = settings(&[&alone[..], list].concat());
+    let crossed =
+        crosses_its_threshold(&text, "shadow.key", "object.pane.opacity=SIZE", &sizes(3e-5, 0.5), &settings, None);
+    println!("{list:?}: {crossed:?}");
+    // The bound takes the ground to be black where the pane's shadow falls, and sRGB to be as steep as there.
+    assert!(crossed.most_skipped >= 0.03 * crossed.least_visible, "{list:?}: {crossed:?}");
+}
+
+#[test]
+fn x7_a_light_that_nobody_sees_is_left_out() {
+    a_lamp_crosses_its_threshold(&[], 3e-4);
+}
+
+#[test]
+fn x7_a_shadow_that_nobody_sees_is_left_out() {
+    a_shadow_crosses_its_threshold(&[]);
+}
+
+/// What takes long and rarely fails where the others hold.
+mod deep {
+    use super::*;
+
+    #[test]
+    fn x7_a_light_that_nobody_sees_is_left_out_by_any_technique_and_tolerance() {
+        for (list, from) in [
+            (&["render.exposure=6"][..], 5e-6),
+            (&["render.exposure=-4", "render.tolerance=0.0625", "light.key.intensity=[1000, 1000, 1000]"], 0.1),
+            (&["render.tolerance=0.0009"], 7e-5),
+            (&["render.technique=particles"], 3e-4),
+            (&["render.technique=sheets"], 3e-4),
+            (&["render.technique=surfels", "object.fog.technique=sheets"], 3e-4),
+        ] {
+            a_lamp_crosses_its_threshold(list, from);
+        }
+    }
+
+    #[test]
+    fn x7_a_shadow_that_nobody_sees_is_left_out_by_any_technique_and_exposure() {
+        for list in [&["render.exposure=3"], &["render.technique=particles"], &["render.technique=sheets"]] {
+            a_shadow_crosses_its_threshold(list);
+        }
+    }
+}
+
+#[test]
+fn the_only_light_is_not_left_out_however_dim() {
+    let text = scene("", "");
+    let dim = loaded(&text, &["light.key.intensity=[1e-9, 1e-9, 1e-9]".to_owned()]);
+    let picture = render(&dim);
+    assert!(picture.plan.lights == [true] && picture.layers.rgb("beauty").unwrap().iter().flatten().any(|v| *v > 0.0));
+}
+
+#[test]
+fn lights_are_called_by_their_names_wherever_they_stand() {
+    let text = scene(FILL, "");
+    let effects = |text: &str| -> Vec<(String, bool)> {
+        let plan = render(&loaded(text, &["effect light.fill=off".to_owned()])).plan;
+        let mut effects: Vec<_> = plan.effects.into_iter().map(|effect| (effect.name, effect.called_for)).collect();
+        effects.sort();
+        effects
+    };
+    let key_at = text.find("[[light]]").unwrap();
+    let fill_at = text.find(FILL).unwrap();
+    let key = &text[key_at..fill_at];
+    let exchanged = text.replace(FILL, "").replace(key, &format!("{FILL}{key}"));
+    assert_eq!(effects(&text), effects(&exchanged));
+    assert!(effects(&text).contains(&("shadow.fill".to_owned(), false)));
+    assert!(effects(&text).contains(&("shadow.key".to_owned(), true)));
+}
+
+#[test]
+fn effects_that_cannot_be_switched_are_refused_with_their_place() {
+    let place = Place::new(&scene(FILL, ""));
+    let refused = |effect: &str, code: i32, expected: &str| {
+        place.expect(code, &["explain", "s.toml", "--effect", effect], expected);
+    };
+    refused("shadow.sun=off", 2, "there is no effect `shadow.sun` that can be switched");
+    refused("shadow.fil=off", 2, "did you mean `shadow.fill`?");
+    refused("shadow.fill=perhaps", 2, "expected NAME=on, NAME=off or NAME=auto");
+    refused("=off", 2, "expected NAME=on");
+    place.write("t.toml", scene(&FILL.replace("'fill'", "'key'"), ""));
+    place.expect(3, &["explain", "t.toml"], "duplicate light name `key`");
+    place.write("t.toml", scene(&FILL.replace("'fill'", "'7'"), ""));
+    place.expect(3, &["explain", "t.toml"], "expected a name with a letter in it");
+    let contrary = FILL.to_owned() + "shadow = false\n";
+    place.write("t.toml", scene(&contrary, ""));
+    place.expect(2, &["explain", "t.toml", "--effect", "shadow.fill=on"], "the light has shadow = false");
+    // The scene's own table.
+    let written = scene(FILL, "") + "effects = { 'shadow.fill' = 'off' }\n";
+    let plain = draw(&scene(FILL, ""), &["--effect", "shadow.fill=off"]).sha256(1.0);
+    assert_eq!(draw(&written, &[]).sha256(1.0), plain);
+    assert_ne!(draw(&scene(FILL, ""), &[]).sha256(1.0), plain);
+}
