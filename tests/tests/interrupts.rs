@@ -117,6 +117,23 @@ fn an_interrupt_leaves_the_picture_so_far_and_a_checkpoint() {
 }
 
 #[test]
+fn a_made_up_checkpoint_of_another_image_is_refused() {
+    let place = place();
+    let small = ["-o", "a.exr", "--repeat-level", "2", "--checkpoint", "sums"];
+    place.expect(0, &render(&small), "");
+    let mut bytes = place.bytes("sums");
+    // The width of the image, behind the tag; its tiles are as many as before.
+    bytes[40] += 1;
+    let end = bytes.len() - 4;
+    let mut sum = flate2::Crc::new();
+    sum.update(&bytes[..end]);
+    bytes[end..].copy_from_slice(&sum.sum().to_le_bytes());
+    place.write("sums", &bytes);
+    place.expect(3, &render(&small), "of an image of another size or other channels");
+    assert_eq!(place.bytes("sums"), bytes, "a file that is refused is not touched");
+}
+
+#[test]
 fn a_checkpoint_of_something_else_is_refused() {
     let place = place();
     let small = ["-o", "a.exr", "--repeat-level", "2", "--checkpoint", "sums"];

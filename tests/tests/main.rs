@@ -21,6 +21,7 @@ mod extract;
 mod eye_inside;
 mod first_scene;
 mod footprints;
+mod fuzz_seeds;
 mod gaussians;
 mod half_vector;
 mod interrupts;

@@ -6,7 +6,7 @@
 use crate::repo::{Outcome, Repo};
 use crate::toml_lines::lines;
 use crate::vulkan::TESTS;
-use crate::{deny, papers, shaders, tidy, vulkan};
+use crate::{deny, fuzz, papers, shaders, tidy, vulkan};
 use std::process::Command;
 use std::time::{Duration, Instant};
 
@@ -114,7 +114,7 @@ pub(crate) fn clippy() -> String {
 /// What takes minutes and rarely breaks where [`run`] holds, to be run before a release: kernels
 /// compiled anew, where tests hold the hashes of what they were compiled from; each crate by itself, with none of its features
 /// and with each of them; recordings by every executor under every validation; every scene drawn, forms
-/// that take long, and every bit of small files flipped.
+/// that take long, every bit of small files flipped, and a minute of each target of fuzzing.
 pub(crate) fn deep(repo: &Repo) -> Outcome {
     // Of the whole workspace, so that what other steps have compiled serves this one.
     let slow = format!("{TESTS} --features {FEATURES},{DRIVER} --test tests --test end-to-end -- {DEEP}");
@@ -127,6 +127,7 @@ pub(crate) fn deep(repo: &Repo) -> Outcome {
         Step { name: "vulkan", work: Work::Task(vulkan::run) },
         Step { name: "deep tests", work: Work::Cargo(vec![split(&slow)], &[]) },
         Step { name: "damage", work: Work::Cargo(vec![split(&damage)], &[("ORGANZA_DEEP", "1")]) },
+        Step { name: "fuzz", work: Work::Task(|repo| fuzz::run(repo, &[])) },
     ];
     follow(&steps, repo)
 }

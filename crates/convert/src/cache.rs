@@ -74,13 +74,14 @@ impl Cache {
         said
     }
 
-    /// Returns the `count` cached values of `key`. On a miss, or where the file holds another number of them, calls `make` and stores its
-    /// result. `what` is the label in messages.
+    /// Returns the `count` cached values of `key`. On a miss, where the file holds another number of them, or one that is not valid, calls
+    /// `make` and stores its result. `what` is the label in messages.
     pub(crate) fn get<T: Pod, E>(
         &self,
         what: &str,
         key: Key,
         count: usize,
+        is_valid: fn(&T) -> bool,
         make: impl FnOnce() -> Result<Vec<T>, E>,
     ) -> Result<Vec<T>, E> {
         let key: [u8; 32] = key.0.finalize().into();
@@ -89,6 +90,8 @@ impl Cache {
             .join(key[..16].iter().map(|b| format!("{b:02x}")).collect::<String>())
             .with_extension(EXTENSION);
         let broken = match read(&file, &key, count) {
+            // Its hash holds for what is made up, too.
+            Ok(Some(numbers)) if !numbers.iter().all(is_valid) => Some("holds what no points have".to_owned()),
             Ok(Some(numbers)) => {
                 self.say(format!("{what} were read from {}", shown(&file)));
                 return Ok(numbers);

@@ -33,6 +33,19 @@ pub(crate) struct Place {
     pub(crate) across: f32,
 }
 
+#[cfg(feature = "cache")]
+impl Place {
+    /// Whether a place of finite points can be so.
+    pub(crate) fn is_valid(&self) -> bool {
+        let is_length = |length: f64| length.is_finite() && length >= 0.0;
+        let lengths = [self.area, self.spacing, f64::from(self.across)];
+        (self.normal.is_normalized() || self.normal == Vec3::ZERO)
+            && self.plane <= 1
+            && lengths.into_iter().all(is_length)
+            && self.long.is_finite()
+    }
+}
+
 /// The neighbours of every place, as many of each.
 #[derive(Debug, Default)]
 pub(crate) struct Neighbours {

@@ -183,7 +183,7 @@ fn turned_places(
     if let Some(cache) = &params.splat.cache {
         let key = place_key(distinct, origin, params);
         let what = format!("normals and areas of object '{}'", params.splat.object_name);
-        return cache.get(&what, key, distinct.len(), find);
+        return cache.get(&what, key, distinct.len(), Place::is_valid, find);
     }
     find()
 }

@@ -79,6 +79,28 @@ fn damaged_and_foreign_files_are_made_anew() {
 }
 
 #[test]
+fn what_no_points_have_is_made_anew_whatever_its_hash() {
+    use sha2::{Digest, Sha256};
+    let folder = tempfile::tempdir().unwrap();
+    let (points, params) = (hills(200), SurfelParams::default());
+    let (plain, _) = converted(&points, &params, folder.path(), 1 << 20);
+    let file = files(folder.path()).pop().unwrap();
+    let good = fs::read(&file).unwrap();
+    // Behind mark, key and hash the first place: a normal, whether it has a plane, an area, a spacing, two more lengths.
+    let changes = [(0, 9.0f32.to_bits()), (8, f32::NAN.to_bits()), (12, 2), (20, 0xfff0_0000), (28, 0x7ff0_0000)];
+    for (at, word) in changes.into_iter().chain([(32, f32::INFINITY.to_bits()), (44, (-1.0f32).to_bits())]) {
+        let mut made_up = good.clone();
+        made_up[80 + at..84 + at].copy_from_slice(&word.to_le_bytes());
+        let hash = Sha256::digest(&made_up[80..]);
+        made_up[48..80].copy_from_slice(&hash);
+        fs::write(&file, made_up).unwrap();
+        let (cloud, said) = converted(&points, &params, folder.path(), 1 << 20);
+        assert!(cloud == plain && said.contains("holds what no points have; normals and areas"), "{at}: {said}");
+        assert_eq!(fs::read(&file).unwrap(), good);
+    }
+}
+
+#[test]
 fn a_folder_that_is_none_is_said_and_stops_nothing() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("file");

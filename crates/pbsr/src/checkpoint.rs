@@ -83,6 +83,9 @@ impl Ensemble {
         for v in &mut ensemble.hits {
             *v = read.u32()?;
         }
+        if ensemble.hits.iter().any(|hits| *hits > levels) {
+            return Err(bad("damaged: a pixel has more hits than there are sets"));
+        }
         for v in &mut ensemble.sums {
             *v = i64::from_le_bytes(read.take()?);
         }
@@ -209,5 +212,11 @@ mod tests {
             broken[at] ^= 16;
             assert!(Ensemble::from_bytes(&broken, &[7; 32]).is_err(), "byte {at}");
         }
+        let mut hit = Ensemble::new([3, 5], &params).unwrap();
+        (hit.levels, hit.hits[4]) = (1, 1);
+        assert_eq!(Ensemble::from_bytes(&hit.to_bytes(&[7; 32]), &[7; 32]).unwrap(), hit);
+        hit.hits[4] = 2;
+        let error = Ensemble::from_bytes(&hit.to_bytes(&[7; 32]), &[7; 32]).unwrap_err();
+        assert!(error.to_string().contains("more hits than there are sets"), "{error}");
     }
 }

@@ -60,7 +60,7 @@ const MAY_KNOW: [(&str, &[&str]); 23] = [
         ],
     ),
     ("gpu-conformance", &["splat-core", "tsm", "hbsort", "pbsr", "splat-shaders", "gpu-ash", "gpu-wgpu", "organza"]),
-    ("organza-fuzz", &["splat-core", "convert", "organza-scene"]),
+    ("organza-fuzz", &["splat-core", "convert", "organza-scene", "organza"]),
     ("xtask", &[]),
 ];
 

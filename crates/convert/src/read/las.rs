@@ -328,9 +328,29 @@ fn middle(steps: &[[i32; 3]]) -> [i64; 3] {
 fn linear_colors(rgb: &[[u16; 3]]) -> Result<Vec<[f32; 3]>, ReadError> {
     let largest = rgb.iter().flatten().copied().max().unwrap_or(0);
     let top = if largest <= 255 { 255.0 } else { 65_535.0 };
-    let table: Vec<f32> = (0..=largest).map(|c| linear_from_srgb(f64::from(c) / top)).collect();
+    let linear = |c: u16| linear_from_srgb(f64::from(c) / top);
+    // The table of a small file would take longer than its colours.
+    let entries = if 3 * rgb.len() > usize::from(largest) { 0..=largest } else { 0..=0 };
+    let table: Vec<f32> = entries.map(linear).collect();
     let mut color = Vec::new();
     input::reserve(&mut color, rgb.len())?;
-    color.extend(rgb.iter().map(|c| c.map(|v| table[usize::from(v)])));
+    color.extend(rgb.iter().map(|c| c.map(|v| table.get(usize::from(v)).copied().unwrap_or_else(|| linear(v)))));
     Ok(color)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn few_colours_are_those_of_many() {
+        for top in [255, 65_535] {
+            let many: Vec<[u16; 3]> = (0..=top).map(|c| [c, top - c, top]).collect();
+            let linear = linear_colors(&many).unwrap();
+            for c in (0..=top).step_by(51) {
+                let few = linear_colors(&[many[usize::from(c)]]).unwrap();
+                assert_eq!(few, [linear[usize::from(c)]], "{c} of {top}");
+            }
+        }
+    }
 }

@@ -6,8 +6,14 @@ use crate::error::{Place, ReadError};
 use flate2::bufread::MultiGzDecoder;
 use std::io::{self, BufReader, Read};
 
-/// Packed bytes read at once.
-const AT_ONCE: usize = 1 << 18;
+/// Packed bytes read at once, at most, and at least: the buffer of a small file would take longer to make than the file to unpack.
+const AT_ONCE: u64 = 1 << 18;
+const LEAST_AT_ONCE: u64 = 1 << 12;
+
+/// The packed bytes by way of a buffer that a file of `stored` bytes fills.
+fn buffered(packed: Stream<'_>, stored: u64) -> BufReader<Stream<'_>> {
+    BufReader::with_capacity(stored.clamp(LEAST_AT_ONCE, AT_ONCE) as usize, packed)
+}
 
 enum Decoder<'a> {
     Gzip(MultiGzDecoder<BufReader<Stream<'a>>>),
@@ -26,14 +32,14 @@ pub(super) struct Unpacked<'a> {
 impl<'a> Unpacked<'a> {
     /// Of gzip of one or several members.
     pub(super) fn gzip(packed: Stream<'a>, stored: u64) -> Self {
-        let packed = BufReader::with_capacity(AT_ONCE, packed);
-        Self { decoder: Decoder::Gzip(MultiGzDecoder::new(packed)), given: 0, stored }
+        let decoder = Decoder::Gzip(MultiGzDecoder::new(buffered(packed, stored)));
+        Self { decoder, given: 0, stored }
     }
 
     /// Of one zlib stream.
     pub(super) fn zlib(packed: Stream<'a>, stored: u64) -> Self {
-        let packed = BufReader::with_capacity(AT_ONCE, packed);
-        Self { decoder: Decoder::Zlib(Inflate::new(packed)), given: 0, stored }
+        let decoder = Decoder::Zlib(Inflate::new(buffered(packed, stored)));
+        Self { decoder, given: 0, stored }
     }
 
     /// The packed bytes, and what they should be.

@@ -48,9 +48,15 @@ impl Checkpoint {
         Ok(Self { target, tag, found, written: Instant::now(), pause: INTERVAL })
     }
 
-    /// The sums that were found, once.
-    pub(super) fn take(&mut self) -> Option<Ensemble> {
-        self.found.take()
+    /// The sums that were found, once; those of an image of another size or other channels than `empty` are refused. The tag says as
+    /// much, but a file that is made up may have the right one.
+    pub(super) fn take(&mut self, empty: &Ensemble) -> Result<Option<Ensemble>, Error> {
+        let found = self.found.take();
+        if found.as_ref().is_some_and(|found| found.size() != empty.size() || found.params() != empty.params()) {
+            let error = pbsr::Error::Checkpoint("of an image of another size or other channels".to_owned());
+            return Err(foreign(self.target.path(), &error));
+        }
+        Ok(found)
     }
 
     /// Writes the sums if the last writing was long enough ago.

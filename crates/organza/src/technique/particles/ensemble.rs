@@ -1,6 +1,5 @@
 //! Sets of particles → means of the pixels, and their error.
 
-use super::checkpoint::Checkpoint;
 use super::parts::{Part, named};
 use super::unit::radiance_unit;
 use super::{fault, refuse};
@@ -40,10 +39,9 @@ pub(super) fn fold(
     let kept = EnsembleParams::of_layers(&frame.layers, colored, depth_range(corners, camera));
     let kept = EnsembleParams { radiance_unit, ..kept };
     let checkpoint = &mut session.checkpoint;
-    let ensemble = match checkpoint.as_deref_mut().and_then(Checkpoint::take) {
-        Some(found) => found,
-        None => Ensemble::new(camera.size, &kept).map_err(fault)?,
-    };
+    let empty = Ensemble::new(camera.size, &kept).map_err(fault)?;
+    let found = checkpoint.as_deref_mut().map(|checkpoint| checkpoint.take(&empty)).transpose()?;
+    let ensemble = found.flatten().unwrap_or(empty);
     let mut average = Average { ensemble, particles: 0, interrupted: false };
     let params = FoldParams { depths: [range.start, range.end], ..fold_params(session.options) };
     let settings = &frame.settings.particles;
