@@ -414,7 +414,7 @@ mod deep {
         assert_eq!(threads.channel("R"), soft.channel("R"));
         let said = explained(&scene, &ONE_SWEEP);
         assert!(
-            said.contains("softness of light 0") && said.contains("one sweep sees each slab from 12 points"),
+            said.contains("softness.0") && said.contains("one sweep sees each slab from 12 points"),
             "{said}"
         );
         let said = explained(&scene, &[]);

@@ -3,12 +3,14 @@
 
 use super::console;
 use organza::{Error, Progress};
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// Time that the work has to hear of an interrupt: where it asks for none so long, it is ended as by a second one.
 const PATIENCE: Duration = Duration::from_millis(1500);
+
+/// Interrupts so soon after the first are the same one: a terminal sends it to a program and to the one that started it, which passes it on.
+const TOGETHER: Duration = Duration::from_millis(300);
 
 /// Exit code of a limit of resources, [`Error::Limit`]'s.
 #[cfg(unix)]
@@ -43,6 +45,7 @@ pub(super) fn block_ignored() {}
 #[cfg(unix)]
 pub(super) fn end_aborts_as_limits() -> Result<(), Error> {
     use signal_hook::{consts::SIGABRT, flag};
+    use std::sync::atomic::AtomicBool;
     let always = Arc::new(AtomicBool::new(true));
     let registered = flag::register_conditional_shutdown(SIGABRT, LIMIT, always);
     registered.map(drop).map_err(|e| Error::Internal(format!("handler of aborts: {e}")))
@@ -60,12 +63,17 @@ fn ignored(status: &str) -> u64 {
 }
 
 /// From now on an interrupt stops the work at its next tick, or ends the command where there is none, where the work does not hear of it
-/// within two seconds, and the second time.
+/// within two seconds, and the second time, if that is not [`TOGETHER`] with the first.
 pub(super) fn listen() -> Result<(), Error> {
-    let asked = AtomicBool::new(false);
+    let first: Mutex<Option<Instant>> = Mutex::new(None);
     let handler = move || {
-        let work = at_work().clone();
-        let Some(progress) = work.filter(|_| !asked.swap(true, Ordering::Relaxed)) else { end_at_once() };
+        let Some(progress) = at_work().clone() else { end_at_once() };
+        let mut first = first.lock().unwrap_or_else(PoisonError::into_inner);
+        match *first {
+            None => *first = Some(Instant::now()),
+            Some(then) if then.elapsed() < TOGETHER => return,
+            Some(_) => end_at_once(),
+        }
         progress.cancel();
         std::thread::spawn(move || {
             std::thread::sleep(PATIENCE);

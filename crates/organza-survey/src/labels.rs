@@ -7,6 +7,9 @@ use std::collections::BTreeSet;
 const SAME: f64 = 0.7;
 /// Share of other neighbours whose numbers are no successors: measured values rise by steps, labels of regions that touch do not.
 const JUMPS: f64 = 0.25;
+/// The share of [`SAME`], and most numbers, of labels whatever touches what: regions that lie within each other may rise by steps, too.
+const NESTED: f64 = 0.9;
+const FEW: usize = 64;
 /// Numbers from which a volume of few values has labels, whatever these are; fewer ones have to follow each other.
 const MANY: usize = 5;
 /// Most labels that are counted.
@@ -40,8 +43,7 @@ impl Labels {
             }
         }
         let others = touching - same;
-        let are_regions = same as f64 >= SAME * touching as f64 && jumps as f64 >= JUMPS * others as f64;
-        if touching == 0 || others == 0 || !are_regions {
+        if touching == 0 || others == 0 || (same as f64) < SAME * touching as f64 {
             return None;
         }
         let mut known = BTreeSet::new();
@@ -54,6 +56,11 @@ impl Labels {
             if known.len() > MOST {
                 return None;
             }
+        }
+        let jump = jumps as f64 >= JUMPS * others as f64;
+        let are_nested = same as f64 >= NESTED * touching as f64 && known.len() <= FEW;
+        if !jump && !are_nested {
+            return None;
         }
         let highest = known.last().copied().unwrap_or(0) as usize;
         let are_numbered = known.len() >= MANY || (known.len() >= 3 && highest < 2 * known.len());
@@ -79,6 +86,17 @@ mod tests {
         })
     }
 
+    /// Each voxel so many times along each axis.
+    fn finer(grid: &Grid, times: usize) -> Grid {
+        let [columns, rows, layers] = grid.dims.map(|n| n * times);
+        let value = |i: usize| {
+            let [x, y, z] = [i % columns, i / columns % rows, i / (columns * rows)].map(|n| n / times);
+            grid.values[x + grid.dims[0] * (y + grid.dims[1] * z)]
+        };
+        let values = (0..columns * rows * layers).map(value).collect();
+        Grid { dims: [columns, rows, layers], values, ..grid.clone() }
+    }
+
     #[test]
     fn regions_of_one_number_are_labels_and_amounts_are_none() {
         assert_eq!(Labels::of(&bars(|rank| rank as f32)), Some(Labels(vec![0.0, 1.0, 2.0, 3.0, 4.0])));
@@ -89,6 +107,13 @@ mod tests {
         assert_eq!(Labels::of(&bars(|rank| if rank > 2 { 200.0 } else { 100.0 })), None);
         assert_eq!(Labels::of(&bars(|rank| rank as f32 + 0.5)), None);
         assert_eq!(Labels::of(&bars(|rank| -(rank as f32))), None);
+        // Shells around each other.
+        let shell = |x: usize, y: usize, z: usize| {
+            let from_middle = [x, y, z].map(|n| n.abs_diff(10)).into_iter().max().unwrap_or(0);
+            if from_middle < 9 { (5 - from_middle.min(8) / 2) as f32 } else { 0.0 }
+        };
+        let shells = Grid { dims: [20; 3], ..volume(shell) };
+        assert_eq!(Labels::of(&finer(&shells, 4)).map(|l| l.0.len()), Some(6));
         // What rises by steps, and what scatters.
         assert_eq!(Labels::of(&volume(|x, y, z| ((x + y + z) / 4) as f32)), None);
         assert_eq!(Labels::of(&volume(|x, y, z| ((x * 7919 + y * 104_729 + z * 31) % 251) as f32)), None);
