@@ -179,6 +179,17 @@ fn the_only_light_is_not_left_out_however_dim() {
 }
 
 #[test]
+fn a_dim_light_beside_one_that_is_switched_off_is_the_only_one() {
+    let text = scene(FILL, "");
+    let dim = "light.fill.intensity=[1e-9, 1e-9, 1e-9]".to_owned();
+    let beside = render(&loaded(&text, std::slice::from_ref(&dim)));
+    let alone = render(&loaded(&text, &[dim, "effect light.key=off".to_owned()]));
+    let shines = |picture: &Render| picture.plan.effects.iter().any(|e| e.name == "light.fill" && e.called_for);
+    assert!(!shines(&beside) && shines(&alone));
+    assert!(alone.layers.rgb("beauty").unwrap().iter().flatten().any(|v| *v > 0.0));
+}
+
+#[test]
 fn lights_are_called_by_their_names_wherever_they_stand() {
     let text = scene(FILL, "");
     let effects = |text: &str| -> Vec<(String, bool)> {

@@ -136,9 +136,11 @@ fn mean_cubes(bounds: &[[Lanes; 3]], rays: &[Vec3; PAIRS]) -> Lanes {
     // that f32 rounds short sums.
     let (mut all, mut half) = ([[0.0; WIDTH]; 2], [[0.0; WIDTH]; 2]);
     for orbit in rays.chunks_exact(ORBIT) {
-        let (mut all_of_orbit, mut half_of_orbit) = ([[0.0; WIDTH]; 2], [[0.0; WIDTH]; 2]);
+        let mut all_of_orbit = [[0.0; WIDTH]; 2];
+        let mut half_of_orbit = [[0.0; WIDTH]; 2];
         for ray in orbit {
-            let (mut ahead, mut behind) = ([0.0; WIDTH], [0.0; WIDTH]);
+            let mut ahead = [0.0; WIDTH];
+            let mut behind = [0.0; WIDTH];
             for bound in bounds {
                 for i in 0..WIDTH {
                     let along = ray.x * bound[0][i] + ray.y * bound[1][i] + ray.z * bound[2][i];

@@ -28,16 +28,16 @@ impl LightPoint {
 
 /// The points of all lights, sorted by their bits so that the order of the file does not matter.
 pub fn light_points(lights: &[SceneLight]) -> Vec<LightPoint> {
-    let mut all = Vec::new();
+    let mut light_points = Vec::new();
     for (of, whole) in lights.iter().enumerate() {
         let points = whole.light.points(whole.samples);
         let count = points.len();
         let point =
             |(k, light)| LightPoint { label: whole.label.clone(), light, whole: whole.light, of, rank: [k, count] };
-        all.extend(points.into_iter().enumerate().map(point));
+        light_points.extend(points.into_iter().enumerate().map(point));
     }
-    all.sort_by_cached_key(|point| (point.light.bits(), lights[point.of].shadow));
-    all
+    light_points.sort_by_cached_key(|point| (point.light.bits(), lights[point.of].shadow));
+    light_points
 }
 
 impl SceneLight {

@@ -134,7 +134,7 @@ pub(super) enum RawLight {
 }
 
 impl RawLight {
-    /// As it is written.
+    /// The name that the scene gives it.
     pub(super) fn name(&self) -> Option<&str> {
         match self {
             Self::Point { name, .. }

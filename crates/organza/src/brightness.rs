@@ -12,7 +12,7 @@ const LEAST_DEVIATION: f64 = 0.25;
 /// Splats that one thread looks at.
 const CHUNK: usize = 1 << 14;
 
-/// What receives light: an object.
+/// An object that receives light.
 #[derive(Clone, Copy)]
 struct Receiver {
     /// Where it may lie, in the world.
@@ -37,12 +37,12 @@ impl Receiver {
 /// nearest place of what receives it, all points of the light together, times the peak of its material. Infinite where a lamp may lie on a point
 /// without extent.
 pub(crate) fn of_lights(loaded: &Loaded) -> Vec<f64> {
-    let own = loaded.own.iter().map(|own| Receiver {
-        bounds: own.world_box(),
+    let as_they_are = loaded.own.iter().map(|data| Receiver {
+        bounds: data.world_box(),
         spread: 0.0,
-        response: loaded.materials[own.material].brightest(f64::from(own.brightest_color()), true),
+        response: loaded.materials[data.material].brightest(f64::from(data.brightest_color()), true),
     });
-    let receivers: Vec<Receiver> = splats(loaded).into_iter().chain(own).filter(|r| r.response > 0.0).collect();
+    let receivers: Vec<Receiver> = splats(loaded).into_iter().chain(as_they_are).filter(|r| r.response > 0.0).collect();
     let points = light_points(&loaded.lights);
     let mut brightest: Vec<f64> = vec![0.0; loaded.lights.len()];
     for receiver in &receivers {
@@ -84,10 +84,14 @@ fn splat(loaded: &Loaded, i: usize) -> Receiver {
     let has_normal = cloud.kind[i] != SplatKind::Medium || cloud.shading_normal_of(i) != Vec3::ZERO;
     // Colours of Gaussians depend on where they are seen from.
     let is_known = cloud.gaussians.is_empty();
-    let color = if is_known { f64::from(cloud.color[i].into_iter().fold(0.0, f32::max)) } else { f64::INFINITY };
+    let color = if is_known { cloud.color[i].into_iter().fold(0.0, f32::max) } else { f32::MAX };
     Receiver {
         bounds: DAabb::around(position, DVec3::splat(radius)),
         spread: LEAST_DEVIATION * radius,
-        response: if material.shading == Shading::Unlit { 0.0 } else { material.brightest(color, has_normal) },
+        response: if material.shading == Shading::Unlit {
+            0.0
+        } else {
+            material.brightest(f64::from(color), has_normal)
+        },
     }
 }

@@ -104,7 +104,7 @@ impl Plan {
         }
     }
 
-    /// What the cells of each table follow from.
+    /// The limit that the cells of each table end at.
     pub(crate) fn shadow_limits(&self) -> Vec<tsm::Limit> {
         self.tables().map(|table| table.predicted.limit).collect()
     }

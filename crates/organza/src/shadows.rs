@@ -25,7 +25,7 @@ pub(crate) const EYE: &str = "the eye";
 /// Straight optical depths of a thick cell that lists go on for: as many as it has along the most slanted light.
 const CELLS_BEHIND: f64 = 5.0;
 
-/// What the cells of the shadow maps of a frame are too coarse for.
+/// The part of a picture for which the cells of its shadow maps are too coarse.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Coarse {
     /// Share of what splats show in the picture whose displayed light is off by more than the tolerance, estimated.
@@ -85,8 +85,7 @@ pub fn shadow_params(settings: &RenderSettings, loaded: &Loaded, tolerance: f32,
 
 /// Parameters of the eye's map. `render.shadow` is about lights: its cells would cost the eye, which is near what it sees, many times more.
 pub(crate) fn eye_params(loaded: &Loaded, tolerance: f32, max_bytes: u64) -> Params {
-    let (footprints, limits) = (loaded.footprints.clone(), Limits::bytes(max_bytes));
-    Params { tolerance, footprints, limits, ..Params::default() }
+    Params { tolerance, footprints: loaded.footprints.clone(), limits: Limits::bytes(max_bytes), ..Params::default() }
 }
 
 /// Greatest optical depth of a spacing among the media of a loaded scene; 0 where it is thin everywhere.

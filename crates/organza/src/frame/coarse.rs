@@ -71,12 +71,14 @@ impl Frame<'_> {
 
     /// A splat as it is seen; `None` where its centre is out of the view or behind opaque surfaces.
     fn sample(&self, i: usize) -> Option<Sample> {
-        let (cloud, camera) = (self.drawn(), &self.camera);
+        let cloud = self.drawn();
+        let camera = &self.camera;
         let centre = camera.view_from_offset(cloud.origin).apply(cloud.position[i]).as_dvec3();
         if centre.z <= 0.0 || !camera.may_see(centre, 0.0) {
             return None;
         }
-        let (radius, depth) = (f64::from(cloud.radius[i]), if camera.is_orthographic() { 1.0 } else { centre.z });
+        let radius = f64::from(cloud.radius[i]);
+        let depth = if camera.is_orthographic() { 1.0 } else { centre.z };
         let px_per_world = camera.focal_px() / depth;
         let [column, row] = [(centre.x, camera.size[0]), (-centre.y, camera.size[1])]
             .map(|(at, size)| (px_per_world * at + 0.5 * f64::from(size)).clamp(0.0, f64::from(size - 1)) as usize);
@@ -104,7 +106,7 @@ impl Look<'_> {
         // Lights err by themselves: their squares add up.
         let mut variance = [0.0; 3];
         for (rank, (_, map)) in self.lit.iter().enumerate() {
-            // What is finer than a pixel is not seen.
+            // Nobody sees cells that are finer than a pixel.
             let is_seen = |map: &&ShadowMap| map.cell_width(receiver.position) * sample.px_per_world >= 1.0;
             let error = map.filter(is_seen).map_or(0.0, |map| map.interpolation_error(&receiver));
             if error == 0.0 {

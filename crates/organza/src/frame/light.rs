@@ -22,7 +22,7 @@ pub(crate) struct Maps {
     made_as: MadeAs,
 }
 
-/// What maps of the same splats follow from.
+/// The choices by which maps of the same splats were made.
 #[derive(PartialEq)]
 struct MadeAs {
     /// For each table its size and the transmittance at which its lists stop.
@@ -37,7 +37,7 @@ impl Maps {
         self.made_as == Self::made_as(plan)
     }
 
-    /// What the cells of each map follow from.
+    /// The limit that the cells of each map ended at.
     pub(crate) fn limits(&self) -> impl Iterator<Item = tsm::Limit> {
         self.all.iter().chain(&self.of_others).flatten().map(|map| map.prediction().limit)
     }
@@ -126,7 +126,8 @@ impl<'a> Frame<'a> {
             self.progress.begin(&work::shadow_map(done.maps, count, table.predicted.entries));
             let params = table.params(self.settings, self.loaded, done.left);
             let map = cost.measure(pass::SHADOW_MAP, |stage| {
-                let (l, objects) = (self.loaded, casting(rank));
+                let l = self.loaded;
+                let objects = casting(rank);
                 let deposits = Deposits::new(
                     &tsm::Scene { cloud: &l.cloud, materials: &l.materials, objects: &objects },
                     &point.light,

@@ -59,8 +59,9 @@ impl Shadowing {
 
 /// Objects of which only those cast shadows that are `kept`.
 pub(crate) fn casting(objects: &[Object], kept: &[bool]) -> Vec<Object> {
-    let of = |(object, kept): (&Object, &bool)| Object { casts_shadow: object.casts_shadow && *kept, ..object.clone() };
-    objects.iter().zip(kept).map(of).collect()
+    let casting =
+        |(object, kept): (&Object, &bool)| Object { casts_shadow: object.casts_shadow && *kept, ..object.clone() };
+    objects.iter().zip(kept).map(casting).collect()
 }
 
 /// The same view, wider on all sides.

@@ -16,7 +16,7 @@ use crate::scene::LightEffect;
 use crate::shadows::DISPLAY_SLOPE;
 use crate::statistics::{LightStatistics, Statistics};
 
-/// What is decided of the lights.
+/// The decisions about all lights.
 #[derive(Debug, Default)]
 pub(super) struct Lights {
     /// Two of each light, in their order.
@@ -55,7 +55,7 @@ pub(super) fn plan(statistics: &Statistics, allowance: f64) -> Lights {
     Lights { effects, shine, shadow_maps }
 }
 
-/// What may be decided of one effect.
+/// An effect before the allowance is spent.
 #[derive(Debug)]
 enum Choice {
     /// The scene, or what it has, decides.
@@ -100,7 +100,10 @@ fn decide(choices: &[Choice], allowance: f64) -> (Vec<bool>, f64) {
 
 /// How much a displayed value grows with radiance, at most.
 fn gain(lights: &[LightStatistics], exposure: f64) -> f64 {
-    let brightest = lights.iter().map(|light| light.radiance).fold(0.0, f64::max);
+    let may_shine = |light: &&LightStatistics| !light.is_dark && light.is_on != Some(false);
+    // Of a light whose radiance has no bound, white is not known.
+    let radiances = lights.iter().filter(may_shine).map(|light| light.radiance).filter(|radiance| radiance.is_finite());
+    let brightest = radiances.fold(0.0, f64::max);
     let white = if brightest > 0.0 { brightest.recip() } else { 0.0 };
     DISPLAY_SLOPE * libm::exp2(exposure).max(white)
 }
