@@ -131,6 +131,65 @@ fn what_a_volume_does_not_cast_or_does_not_receive_is_left_out() {
     }
 }
 
+#[test]
+fn the_ground_beside_a_cloud_is_lit_by_it_without_a_step() {
+    let scene = "version = 1\n[camera]\nposition = [0, 1.5, 6]\ntarget = [0, 0.5, 0]\nfov_y = 35\nsize = [240, 180]\n\
+         [[light]]\nkind = 'directional'\ndirection = [-1, -1, -0.5]\nirradiance = [3, 3, 3]\n\
+         [[object]]\nname = 'ground'\nrectangle = { center = [0, 0, 0], u = [3, 0, 0], v = [0, 0, -3], spacing = 0.03 }\ncolor = [0.5, 0.5, 0.5]\n\
+         [[object]]\nname = 'fog'\nmaterial = 'fog'\nmedium_ball = { center = [0, 0.9, 0], radius = 0.8, extinction = 4, spacing = 0.05 }\n\
+         [material.fog]\nmedium = { extinction = 4.0, albedo = 0.98, asymmetry = 0.3 }\n";
+    let again = ["--set", "render.sheets.scattering='forward_and_back'", "--layers", "effects"];
+    let more = in_half_vectors(scene, &again).channel("scatterN.G");
+    // Ground alone, from the shadow of the ball to the near end.
+    let at = |x: usize, y: usize| more[240 * y + x];
+    for (x, y) in (124..150).flat_map(|y| (20..220).map(move |x| (x, y))) {
+        let step = (at(x, y) - at(x + 1, y)).abs().max((at(x, y) - at(x, y + 1)).abs());
+        assert!(at(x, y) > 1e-3 && step < 1.0 / 255.0, "{x}, {y}: {}, a step of {step}", at(x, y));
+    }
+    // 4·10⁶ photons through the ball, each weighed by its albedo, times the ground's colour over π.
+    for (x, y, expected) in [(60, 124, 0.01042), (180, 124, 0.01700), (60, 140, 0.00631), (180, 140, 0.00734)] {
+        assert!((at(x, y) / expected - 1.0).abs() < 0.12, "{x}, {y}: {}, not {expected}", at(x, y));
+    }
+}
+
+/// Radiance along the normal of slabs lit along it with an irradiance of 1, by 60,000 paths: τ, albedo, asymmetry.
+const PATHS: [(f64, f64, f64, f64); 3] =
+    [(20.0, 0.5, 0.0, 0.03116), (20.0, 0.9, 0.0, 0.12269), (20.0, 0.99, 0.0, 0.23901)];
+
+#[test]
+fn slabs_whose_voxels_are_optically_thick_are_as_bright_as_by_paths() {
+    for (tau, albedo, asymmetry, expected) in PATHS {
+        let scene = parallel_view(0.5, 4)
+            + &sun("[0, 0, -1]")
+            + &fog(tau)
+            + &format!("[material.m]\nmedium = {{ albedo = {albedo}, asymmetry = {asymmetry} }}\n");
+        let again = ["--set", "object.fog.material='m'", "--set", "render.sheets.scattering='forward_and_back'"];
+        let seen = in_half_vectors(&scene, &again).channel("G")[5];
+        assert!((seen / expected - 1.0).abs() < 0.07, "τ {tau}, ω {albedo}, g {asymmetry}: {seen}, not {expected}");
+    }
+}
+
+#[test]
+fn no_medium_that_is_black_or_invisible_is_said_to_scatter_again_and_again() {
+    let medium = |extinction: &str, albedo: &str| {
+        parallel_view(2.0, 16)
+            + &sun("[0, 0, -1]")
+            + &fog(1.0).replace("extinction = 1.0", &format!("extinction = {extinction}"))
+            + &format!("[material.m]\nmedium = {{ albedo = {albedo} }}\n")
+            + "[[object]]\nname = 'wall'\nrectangle = { center = [0, 0, -2], u = [1, 0, 0], v = [0, 1, 0], spacing = 0.2 }\n"
+    };
+    let said = |scene: &str| {
+        let arguments = ["--set", "object.fog.material='m'", "--set", "render.sheets.scattering='forward_and_back'"];
+        explained(scene, &arguments)
+    };
+    let again = "scattered there again and again";
+    assert!(said(&medium("1.0", "0.9")).contains(again));
+    for scene in [medium("1.0", "0.0"), medium("1e-20", "0.9")] {
+        let said = said(&scene);
+        assert!(said.contains("no medium that is seen scatters it") && !said.contains(again), "{said}");
+    }
+}
+
 /// What is said of a scene that is refused with this exit code; no picture is left.
 fn refused(folder: &Path, scene: &str, arguments: &[&str], code: i32) -> String {
     std::fs::write(folder.join("scene.toml"), scene).unwrap();

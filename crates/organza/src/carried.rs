@@ -43,10 +43,17 @@ pub(crate) fn plan(scene: &Scene, loaded: &Loaded, points: &[LightPoint], plan: 
     let cloud = Some(&loaded.cloud);
     let matter = Matter { scene, own: &loaded.own, planned: &plan.objects, cloud, camera: &loaded.camera };
     let asked = carries(&matter, points)?;
-    let (carries, scatters_again) = (&asked.points, asked.scatters_again);
+    let carries = &asked.points;
+    let scattering = match (asked.scatters_again, asked.has_scattering_media) {
+        (true, true) => Scattering::Again,
+        (true, false) => Scattering::NoMedium,
+        (false, _) => Scattering::Once,
+    };
+    let scatters_again = scattering == Scattering::Again;
     let called_for = |point: &LightPoint| plan.shadow_maps[point.of];
     plan.carried = points.iter().zip(carries).map(|(point, carries)| called_for(point) && carries.is_ok()).collect();
-    plan.scatters_again = scatters_again;
+    // The layer is there even where nothing fills it.
+    plan.scatters_again = asked.scatters_again;
     let missing = loaded.own.iter().any(|own| !own.has_splats && loaded.objects[own.object].casts_shadow);
     if missing && points.iter().zip(carries).any(|(point, carries)| called_for(point) && carries.is_err()) {
         return Err(Error::Internal("splats that a shadow map needs were not made".into()));
@@ -61,7 +68,7 @@ pub(crate) fn plan(scene: &Scene, loaded: &Loaded, points: &[LightPoint], plan: 
         .flat_map(|light| {
             let own: Vec<_> =
                 points.iter().zip(carries).filter(|(point, _)| point.of == light).map(|(_, c)| c).collect();
-            let (called_for, reason) = way(&own, plan.shadow_maps[light], scatters_again);
+            let (called_for, reason) = way(&own, plan.shadow_maps[light], scattering);
             let label = &loaded.lights[light].label;
             let through = Effect { name: format!("carried.{label}"), called_for, reason, bound: 0.0 };
             std::iter::once(through).chain(softness(light, label, points, &asked, called_for))
@@ -73,8 +80,17 @@ pub(crate) fn plan(scene: &Scene, loaded: &Loaded, points: &[LightPoint], plan: 
     Ok(())
 }
 
+/// How often the media scatter light.
+#[derive(Clone, Copy, PartialEq)]
+enum Scattering {
+    Once,
+    /// More is requested, and no visible medium scatters.
+    NoMedium,
+    Again,
+}
+
 /// Whether any of the points of a light is carried, and how its light comes through volumes, in words.
-fn way(points: &[&Result<(), String>], has_shadow: bool, scatters_again: bool) -> (bool, String) {
+fn way(points: &[&Result<(), String>], has_shadow: bool, scattering: Scattering) -> (bool, String) {
     if !has_shadow {
         return (false, "its shadow is left out, and so it is scattered once".into());
     }
@@ -82,10 +98,14 @@ fn way(points: &[&Result<(), String>], has_shadow: bool, scatters_again: bool) -
     let of_all = if points.len() > 1 { format!("{carried} of {} points; ", points.len()) } else { String::new() };
     let reason = match points.iter().find_map(|carries| carries.as_ref().err()) {
         Some(why) => format!("a shadow map has it, scattered once: {why}"),
-        None if scatters_again => {
-            "it comes through slabs that light and view share, and is scattered there again and again".into()
+        None => {
+            let more = match scattering {
+                Scattering::Once => "",
+                Scattering::NoMedium => "; no medium that is seen scatters it",
+                Scattering::Again => ", and is scattered there again and again",
+            };
+            format!("it comes through slabs that light and view share{more}")
         }
-        None => "it comes through slabs that light and view share".into(),
     };
     (carried > 0, of_all + &reason)
 }

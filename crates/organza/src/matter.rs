@@ -23,8 +23,10 @@ pub(crate) struct Matter<'a> {
 pub(crate) struct Carries {
     /// For each point of a light: whether it does, or why not.
     pub(crate) points: Vec<Result<(), String>>,
-    /// Whether light is scattered more than once on its way.
+    /// Whether the scene asks for light that is scattered more than once on its way.
     pub(crate) scatters_again: bool,
+    /// Whether any medium does so: one that is seen and whose single-scattering albedo is above 0.
+    pub(crate) has_scattering_media: bool,
     /// Whether the points of a light with an extent go through it together.
     pub(crate) together: bool,
     /// For each point of a light: how wide penumbras of the whole light become per distance behind what casts them, among what is

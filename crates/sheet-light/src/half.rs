@@ -106,6 +106,7 @@ pub use params::{Extended, HalfInput, HalfParams, MOST_SAMPLES, Scattering};
 pub(crate) use polygons::EyePanes;
 pub use polygons::Polygons;
 pub use scatter::balance::Balance;
+pub use scatter::scatters;
 pub use serves::{LEAST_COSINE, MOST_DEPTH, Reason, penumbra_widening, serves, serves_extended};
 pub use splats::HalfSplats;
 pub(crate) use splats::Lamps;

@@ -274,6 +274,12 @@ impl OneSlab<'_> {
         let middle = (near + far) * Lanes::splat(simd, 0.5);
         let at = self.places(simd, chunk.k, middle);
         let places = stored(&at);
+        let seen = self.of.scattered.is_some().then(|| {
+            let [first, last] = if of.frame.back_to_front { [far, near] } else { [near, far] };
+            let share = out.optical_depth[planes / 2].map(mean_depth);
+            let depth = first + (last - first) * Lanes::load(simd, &share);
+            stored(&self.places(simd, chunk.k, depth))
+        });
         let stretch = Lanes::load(simd, &self.eye.band.stretch[chunk.k..]);
         let mut others = std::mem::take(&mut self.eye.others);
         let mut so_far = [[0.0; MAX_LANES]; 3];
@@ -302,7 +308,8 @@ impl OneSlab<'_> {
                         others: &others,
                         lane,
                     };
-                    self.mix(&lit, [chunk.x + lane, chunk.y], at, share, (lane, out));
+                    let seen = seen.as_ref().map(|seen| [0, 1, 2].map(|a| f64::from(seen[a][lane])).into());
+                    self.mix(&lit, [chunk.x + lane, chunk.y], (at, seen), share, (lane, out));
                 }
             }
         }
@@ -377,11 +384,20 @@ impl OneSlab<'_> {
         self.of.gradients.normals(simd, sheets, self.eye.band.stride, chunk.k)
     }
 
-    /// Mixes the radiance of one point of a volume, with its share of the optical depth so far, into a lane of the fragments.
-    fn mix(&self, lit: &Lit<'_>, pixel: [usize; 2], at: DVec3, share: [f32; 3], (lane, out): (usize, &mut Fragments)) {
+    /// Mixes the radiance of one point of a volume, with its share of the optical depth so far, into a lane of the fragments; light that is scattered
+    /// more than once is that of the place `seen`.
+    fn mix(
+        &self,
+        lit: &Lit<'_>,
+        pixel: [usize; 2],
+        (at, seen): (DVec3, Option<DVec3>),
+        share: [f32; 3],
+        (lane, out): (usize, &mut Fragments),
+    ) {
         let mut values = [0.0; MAX_CHANNELS];
         lit.radiance(self.of, pixel, at).write(lit.normal, self.layout, &mut values);
-        if let (Some(first), Some(scattered)) = (self.layout.multiple(), lit.scattered(self.of, pixel, at)) {
+        if let (Some(first), Some(seen)) = (self.layout.multiple(), seen) {
+            let scattered = lit.scattered(self.of, pixel, seen).unwrap_or([0.0; 3]);
             (0..3).for_each(|c| values[first + c] += scattered[c]);
         }
         let (count, planes) = (self.layout.count(), self.eye.pixels.planes);
@@ -447,6 +463,16 @@ impl OneSlab<'_> {
             }
         }
     }
+}
+
+/// Mean depth of what is seen of an optical depth, as a share of it from the eye on: 1/τ − 1/(e^τ − 1). Radiance that is linear along a ray has its
+/// mean there.
+pub(crate) fn mean_depth(optical_depth: f32) -> f32 {
+    // The closed form loses its digits.
+    if optical_depth < 0.01 {
+        return 0.5 - optical_depth / 12.0;
+    }
+    optical_depth.recip() - libm::expm1f(optical_depth).recip()
 }
 
 /// Lanes above 0, a bit each.

@@ -12,7 +12,7 @@ use super::pane_sheets::PanesInTheOpen;
 use super::penumbra::Penumbra;
 use super::polygon_light::{PolygonImage, PolygonLight};
 use super::polygons::{Eye, EyePanes, EyePolygons, Polygons};
-use super::scatter::{self, Scattered, Scene, balance::Balance};
+use super::scatter::{self, Scattered, Scene, balance::Balance, medium::MOST_THIN};
 use super::serves::{axis_of_view, other_axis, serves, serves_extended};
 use super::soft_buffer::SoftBuffer;
 use super::splats::Lamps;
@@ -432,7 +432,7 @@ pub fn bytes<'l>(
     } else {
         // Media, two streams of one channel, what is kept of all, for media and for polygons.
         let all: u64 = volumes.iter().map(|v| v.grid.values.len() as u64).sum();
-        2 * (all / u64::from(params.voxels_per_cell) + 1) * 480
+        2 * (all / u64::from(params.voxels_per_cell) + 1).max(MOST_THIN) * 480
     };
     let splats = bodies.splats.map_or(0, |splats| splats.count * BYTES_A_SPLAT);
     let lights: Vec<(&Light, u32)> = lights.collect();

@@ -77,7 +77,7 @@ pub struct HalfParams {
     /// Half angle of the cone that light spreads into where it is scattered ahead, radians, in \[0, π/2); `None` for that of the
     /// mean cosine of what the media's phase functions leave ahead.
     pub cone: Option<f64>,
-    /// Voxels for each cell of scattered light, 1 to 2²⁰.
+    /// Voxels for each cell of scattered light, 1 to 2²⁰. Layers of cells above an optical depth of 1/2 are cut into thinner ones, up to 2¹⁶ cells.
     pub voxels_per_cell: u32,
 }
 

@@ -10,6 +10,7 @@ mod scatter;
 mod splats;
 
 use super::axis::HalfVector;
+use super::eye_sheets::mean_depth;
 use super::frame::{Frame, Ray};
 use super::placed::Placed;
 use super::serves::{axis_of_view, other_axis};
@@ -348,7 +349,8 @@ impl<'a> View<'a> {
         let mut color = [0.0; 3];
         for v in (0..parts.len()).filter(|v| tau(*v) > 0.0) {
             let normal = self.normal((eye, around), (v, slab, at), middle);
-            let own = self.radiance(v, (&parts[v], normal), (middle, at), lit, (mean, with_ambient));
+            let seen = first + (last - first) * f64::from(mean_depth(all as f32));
+            let own = self.radiance(v, (&parts[v], normal), ([middle, seen], at), lit, (mean, with_ambient));
             (0..3).for_each(|c| color[c] += own[c] * tau(v) / all);
         }
         (all, color)
@@ -424,7 +426,7 @@ impl<'a> View<'a> {
         &self,
         v: usize,
         (part, normal): (&Option<Part>, Vec3),
-        (at, pixel): (DVec3, usize),
+        ([at, seen], pixel): ([DVec3; 2], usize),
         lit: &LitBy<'_>,
         (mean, with_ambient): (f64, bool),
     ) -> [f64; 3] {
@@ -445,7 +447,8 @@ impl<'a> View<'a> {
         let radiance = point.radiance(self.input.sheets.ambient, std::iter::once(lit), |_, _| [share; 3]);
         let [ambient, emission, direct, scatter] = radiance.effects();
         let others = if with_ambient { 1.0 } else { 0.0 };
-        let more = |d: &scatter::Diffuse| d.radiance(volume, &lit.light, point.position, point.to_eye, point.color);
+        let more =
+            |d: &scatter::Diffuse| d.radiance(volume, &lit.light, self.frame.world(seen), point.to_eye, point.color);
         let more = self.diffuse.as_ref().map_or([0.0; 3], more);
         [0, 1, 2].map(|c| f64::from(others * (ambient[c] + emission[c]) + direct[c] + scatter[c]) + more[c])
     }

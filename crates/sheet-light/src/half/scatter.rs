@@ -14,7 +14,7 @@
 //! | … added from the far side to the light, and back | `adding.rs` |
 //! | where the power stays | `balance.rs` |
 //! | Eq. 2: radiance towards the eye | [`Scattered::radiance`] |
-//! | … towards polygons and translucent surfaces | `surface.rs` |
+//! | … towards polygons and translucent surfaces | `surface.rs`, `open.rs` |
 //! | translucent surfaces and points in the light's way | `through_splats.rs` |
 
 pub(crate) mod adding;
@@ -24,6 +24,7 @@ mod blur;
 pub(crate) mod grid;
 mod layer;
 pub(crate) mod medium;
+mod open;
 pub(crate) mod phase;
 pub(crate) mod scene;
 pub(crate) mod slant;
@@ -72,11 +73,22 @@ pub(crate) struct Scattered {
     pub(crate) passes: u64,
 }
 
+/// What the two streams get, and what leaves them.
+struct Given {
+    /// By cell, where surfaces are lit: power that the beam scatters, per volume and channel.
+    sources: Vec<[f64; 3]>,
+    /// Power that leaves the cells, by channel.
+    leaving: [f64; 3],
+}
+
+/// Whether a volume scatters light from all sides: it is seen, and its material has a phase function and a single-scattering albedo above 0.
+pub fn scatters(volume: &Volume<'_>) -> bool {
+    medium::scatters(volume) && volume.is_seen()
+}
+
 /// Whether there is anything to do.
 pub(crate) fn is_wanted(volumes: &[Volume<'_>], light: &Light, params: &HalfParams) -> bool {
-    params.scattering != Scattering::None
-        && volumes.iter().any(medium::scatters)
-        && light.intensity.iter().any(|i| *i > 0.0)
+    params.scattering != Scattering::None && light.intensity.iter().any(|i| *i > 0.0) && volumes.iter().any(scatters)
 }
 
 impl Scattered {
@@ -89,17 +101,19 @@ impl Scattered {
             balance: Balance::default(),
             passes: 0,
         };
-        let mut sources = vec![[0.0; 3]; if lights_surfaces { scene.grid.cells() } else { 0 }];
+        let cells = if lights_surfaces { scene.grid.cells() } else { 0 };
+        let mut given = Given { sources: vec![[0.0; 3]; cells], leaving: [0.0; 3] };
         for channel in 0..3 {
             match (0..channel).find(|other| scene.is_like(channel, *other)) {
                 Some(other) => {
                     out.copy(other, channel);
-                    sources.iter_mut().for_each(|source| source[channel] = source[other]);
+                    given.sources.iter_mut().for_each(|source| source[channel] = source[other]);
+                    given.leaving[channel] = given.leaving[other];
                 }
-                None => out.fill(scene, scattering, channel, &mut sources),
+                None => out.fill(scene, scattering, channel, &mut given),
             }
         }
-        out.at_surfaces = lights_surfaces.then(|| SurfaceLight::new(scene, &out.faces, &sources));
+        out.at_surfaces = lights_surfaces.then(|| SurfaceLight::new(scene, &out.faces, &given));
         out.weigh(&scene.cells);
         for axis in 0..3 {
             out.soften(axis);
@@ -117,8 +131,8 @@ impl Scattered {
         self.grid.cells() as u64
     }
 
-    /// One channel, and what cells give to two streams there, per volume, where that is kept.
-    fn fill(&mut self, scene: &Scene, scattering: Scattering, channel: usize, sources: &mut [[f64; 3]]) {
+    /// One channel.
+    fn fill(&mut self, scene: &Scene, scattering: Scattering, channel: usize, given: &mut Given) {
         let grid = &scene.grid;
         let (beam, psi, streams) = if scattering == Scattering::Forward {
             let beam = scene.path().march(channel);
@@ -131,7 +145,10 @@ impl Scattered {
             self.passes += solution.passes;
             self.balance.add_beam(channel, &beam);
             self.balance.add_streams(channel, (grid, &scene.cells), &beam, &streams, &solution.psi);
-            for (at, source) in sources.iter_mut().enumerate() {
+            let Balance { reflected, transmitted, sides, .. } = &self.balance;
+            given.leaving[channel] = reflected[channel] + transmitted[channel] + sides[channel];
+            given.leaving[channel] -= beam.transmitted + beam.sides;
+            for (at, source) in given.sources.iter_mut().enumerate() {
                 let (lost, omega) = balance::lost(grid, &scene.cells[at], (at, channel), &beam);
                 let layer = (at / grid.columns[0] % grid.layers) as f64 + 0.5;
                 source[channel] = lost * omega / (grid.area(layer) * grid.depth);

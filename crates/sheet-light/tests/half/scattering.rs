@@ -211,7 +211,7 @@ fn ms07_a_cone_from_nothing_to_the_half_space() {
 }
 
 #[test]
-fn ms08_a_dense_medium_makes_no_numbers_that_are_not_normal_and_no_more_work() {
+fn ms08_a_dense_medium_makes_no_numbers_that_are_not_normal_and_no_more_work_a_cell() {
     let (grid, material) = (grid([24, 24, 24], cubic(0.25), |_| 1.0), medium(0.9, 0.5));
     let camera = parallel([0.0, 0.0, -10.0], 5.0, [24, 24]);
     let with = |sigma: f32| {
@@ -222,12 +222,15 @@ fn ms08_a_dense_medium_makes_no_numbers_that_are_not_normal_and_no_more_work() {
             &HalfParams { voxels_per_cell: 8, ..params(BOTH) },
         )
     };
+    let passes_a_cell = |counts: &HalfCounts| counts.scatter_passes as f64 / counts.scatter_cells as f64;
     let (thin, counts) = with(0.5);
     assert!(thin.channels[MORE].iter().any(|v| *v > 1e-3));
     for sigma in [20.0, 2000.0, 1e6] {
         let (dense, more) = with(sigma);
         assert!(dense.channels.iter().flatten().all(|v| v.is_finite() && !v.is_subnormal()), "σ {sigma}");
-        assert!(more.scatter_passes as f64 <= 1.5 * counts.scatter_passes as f64, "σ {sigma}: {more:?}, {counts:?}");
+        // Thick layers are cut into thinner ones, and each is blurred: more cells, up to a bound, of no more work.
+        assert!(more.scatter_cells <= 1 << 16, "σ {sigma}: {more:?}");
+        assert!(passes_a_cell(&more) <= passes_a_cell(&counts), "σ {sigma}: {more:?}, {counts:?}");
         assert!(dense.channels[MORE].iter().all(|v| *v < 1e-12), "σ {sigma}");
     }
 }
@@ -326,7 +329,7 @@ fn hv13_scattered_light_is_linear_in_powers_of_two() {
 
 #[test]
 fn cells_are_few_and_no_more_at_800_slabs_than_at_50() {
-    let (tf, material) = (constant(0.5), medium(0.9, 0.5));
+    let (tf, material) = (constant(0.25), medium(0.9, 0.5));
     let camera = parallel([0.0, 0.0, 12.0], 8.0, [8, 8]);
     let [along, aslant, lamp] = [sun([0.0, 0.0, 1.0]), sun([1.0, 2.0, 3.0]), lamp([20.0, 30.0, 30.0])];
     for (dims, lights) in [
@@ -371,10 +374,11 @@ fn colours_are_albedos_and_extinction_by_channel_is_its_own() {
         assert!((all.reflected[c] / one.reflected[0] - 1.0).abs() < 1e-5, "{c}: {all:?}");
     }
     assert!(all.reflected[0] > all.reflected[1] && all.reflected[1] > all.reflected[2]);
+    // No layer is above an optical depth of 1/2, so channels have the same cells alone and together.
     let thick = Material { extinction_rgb: [0.5, 1.0, 2.0], ..medium(0.9, 0.3) };
-    let all = with(&constant(4.0), &thick);
+    let all = with(&constant(0.5), &thick);
     for (c, factor) in thick.extinction_rgb.into_iter().enumerate() {
-        let one = with(&constant(4.0 * factor), &medium(0.9, 0.3));
+        let one = with(&constant(0.5 * factor), &medium(0.9, 0.3));
         assert!((all.transmitted[c] / one.transmitted[0] - 1.0).abs() < 1e-5, "{c}: {all:?}");
     }
 }

@@ -68,6 +68,7 @@ fn points_served(matter: &Matter<'_>, points: &[LightPoint]) -> Result<Carries, 
         widening: points.iter().map(|point| penumbra_widening(&bodies, &point.whole)).collect(),
         points: points.iter().map(is_served).collect(),
         scatters_again,
+        has_scattering_media: volumes.iter().any(half::scatters),
         together: is_one_sweep(matter.scene),
     })
 }

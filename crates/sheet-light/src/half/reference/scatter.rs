@@ -49,12 +49,8 @@ impl Diffuse {
         if !scatter::is_wanted(volumes, &lit.light, params) {
             return None;
         }
-        let grid = LightGrid::new(
-            volumes,
-            &lamp::camera_of(&Bodies::volumes(volumes), &lit.light, params),
-            params.voxels_per_cell,
-        );
-        let cells = medium::cells(&grid, volumes, params.scattering);
+        let camera = lamp::camera_of(&Bodies::volumes(volumes), &lit.light, params);
+        let (grid, cells) = medium::resolved(volumes, &camera, params);
         let cone =
             params.cone.unwrap_or_else(|| scatter::phase::cone_of(params.scattering, medium::mean_asymmetry(&cells)));
         let [width, height] = grid.columns;

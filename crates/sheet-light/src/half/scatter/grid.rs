@@ -71,6 +71,11 @@ impl LightGrid {
         }
     }
 
+    /// The same columns with so many layers in the place of each.
+    pub(super) fn with_layers_times(self, factor: usize) -> Self {
+        Self { layers: self.layers * factor, depth: self.depth / factor as f64, ..self }
+    }
+
     /// Number of cells.
     pub(crate) fn cells(&self) -> usize {
         self.columns[0] * self.columns[1] * self.layers
@@ -103,6 +108,17 @@ impl LightGrid {
         let along = |v: f64, a: usize| (self.corner[a] + (v + 0.5) * self.step[a]) * spread;
         let [right, up, forward] = self.axes;
         self.position + right * along(x, 0) + up * along(y, 1) + forward * z
+    }
+
+    /// Unit direction of the light at a world position.
+    pub(crate) fn travel(&self, world: DVec3) -> DVec3 {
+        if self.is_lamp { (world - self.position).normalize_or_zero() } else { self.axes[2] }
+    }
+
+    /// Sides of a cell at a face, world units.
+    pub(crate) fn sides(&self, face: f64) -> [f64; 3] {
+        let spread = self.spread(face).abs();
+        [self.step[0] * spread, self.step[1] * spread, self.depth]
     }
 
     /// Factor on the widths of columns at a face.

@@ -5,11 +5,12 @@
 
 use super::grid::LightGrid;
 use super::phase::share_ahead;
+use super::streams::optics;
 use crate::Volume;
-use crate::half::Scattering;
+use crate::half::{HalfParams, Scattering};
 use rayon::prelude::*;
 use splat_core::glam::{DMat3, DVec3};
-use splat_core::{Shading, TransferPoint};
+use splat_core::{Camera, Shading, TransferPoint};
 
 /// Places in a cell along its width, its height and its depth: one a voxel.
 const PLACES: [usize; 3] = [4, 4, 2];
@@ -66,8 +67,30 @@ impl<'a> Lattice<'a> {
     }
 }
 
+/// Greatest optical depth of a layer, that of light that stays ahead left out: fluence is taken as linear within one.
+const THICKEST: f64 = 0.5;
+
+/// Most cells that thin layers may make: 31 MiB.
+pub(crate) const MOST_THIN: u64 = 1 << 16;
+
+/// The cells of a light, and their media: layers that are optically thick are cut into thinner ones, as far as [`MOST_THIN`] allows.
+pub(crate) fn resolved(volumes: &[Volume<'_>], camera: &Camera, params: &HalfParams) -> (LightGrid, Vec<Cell>) {
+    let grid = LightGrid::new(volumes, camera, params.voxels_per_cell);
+    let media = cells(&grid, volumes, params.scattering);
+    let thickness = |cell: &Cell| (0..3).map(|c| optics(cell, c, grid.depth).tau).fold(0.0, f64::max);
+    let thickest = media.iter().map(thickness).fold(0.0, f64::max);
+    let most = MOST_THIN as usize / grid.cells();
+    let factor = (libm::ceil(thickest / THICKEST * (1.0 - 1e-6)) as usize).min(most);
+    if factor <= 1 {
+        return (grid, media);
+    }
+    let grid = grid.with_layers_times(factor);
+    let media = cells(&grid, volumes, params.scattering);
+    (grid, media)
+}
+
 /// The cells of a light, row by row, layer by layer in a row.
-pub(crate) fn cells(grid: &LightGrid, volumes: &[Volume<'_>], scattering: Scattering) -> Vec<Cell> {
+fn cells(grid: &LightGrid, volumes: &[Volume<'_>], scattering: Scattering) -> Vec<Cell> {
     // What casts no shadow takes no light that others would get.
     let casters = volumes.iter().filter(|volume| volume.casts_shadow);
     let lattices: Vec<Lattice<'_>> = casters.map(|volume| Lattice::new(volume, scattering)).collect();

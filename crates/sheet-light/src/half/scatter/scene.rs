@@ -39,8 +39,7 @@ impl Scene {
         shadow_origin: DVec3,
     ) -> Self {
         let camera = lamp::camera_of(&Bodies::volumes(volumes), &lit.light, params);
-        let grid = LightGrid::new(volumes, &camera, params.voxels_per_cell);
-        let cells = medium::cells(&grid, volumes, params.scattering);
+        let (grid, cells) = medium::resolved(volumes, &camera, params);
         let ([width, height], layers) = (grid.columns, grid.layers);
         let one = Light { intensity: [1.0; 3], ..lit.light };
         let (area, lit_by_one) = (grid.area(0.0), LitBy { light: one, ..*lit });

@@ -8,22 +8,33 @@
 //! ahead, with the cosine. φ and J are known at faces of cells, of which those behind the surface are dark or belong to its other side; so the
 //! faces before it count alone, the more, the farther they are before it, and each is carried on to the surface: by Fick's law,
 //! ∇φ = −3σ_tr·J, and J along the light grows by what is scattered out of the beam on the way. A surface within a cell is as far from its
-//! face, and a black one counts as if it stood at the far face: an error of the first order in the depth of cells. What has left the cells is not
-//! followed: its light fades out within a cell about them.
+//! face, and a black one counts as if it stood at the far face: an error of the first order in the depth of cells.
+//!
+//! A surface outside of the media receives what their cells emit (`open.rs`), and light that goes ahead. Both forms fade into each other within a
+//! quarter of a cell about the media.
 
 use super::grid::LightGrid;
+use super::medium::Cell;
+use super::open::{Emission, Emitters};
 use super::scene::Scene;
 use super::streams::transport;
-use super::{FLUENCE, FLUX, NUMBERS};
+use super::{FLUENCE, FLUX, Given, NUMBERS};
 use crate::half::serves::travel;
 use splat_core::glam::DVec3;
 use splat_core::{Light, Material, Shading};
 use std::f32::consts::PI;
 
+/// Optical depth of a cell from which it belongs to the media: thinner ones leave light as it is.
+const FILLED: f32 = 0.02;
+
 /// What arrives at faces of cells, as it is: neither weighed nor softened.
 pub(crate) struct SurfaceLight {
     grid: LightGrid,
     faces: Vec<Face>,
+    /// By cell: 1 in the media, 0 in the open.
+    filled: Vec<f32>,
+    /// What the open receives; `None` for nothing.
+    emitters: Option<Emitters>,
 }
 
 /// By channel, per unit of the light's intensity.
@@ -40,8 +51,9 @@ struct Face {
 }
 
 impl SurfaceLight {
-    /// `sources`: by cell, per volume and channel.
-    pub(crate) fn new(scene: &Scene, faces: &[[f32; NUMBERS]], sources: &[[f64; 3]]) -> Self {
+    /// `faces` are neither weighed nor softened.
+    pub(super) fn new(scene: &Scene, faces: &[[f32; NUMBERS]], given: &Given) -> Self {
+        let Given { sources, leaving } = given;
         let Scene { grid, cells, .. } = scene;
         let (width, layers) = (grid.columns[0], grid.layers);
         let one = |(at, face): (usize, &[f32; NUMBERS])| {
@@ -57,24 +69,39 @@ impl SurfaceLight {
                 sources: sides.map(|cell| sources[cell]),
             }
         };
-        Self { grid: *grid, faces: faces.iter().enumerate().map(one).collect() }
+        let emission = Emission { grid, cells, faces, sources, leaving: *leaving };
+        Self {
+            grid: *grid,
+            faces: faces.iter().enumerate().map(one).collect(),
+            filled: filled(grid, cells),
+            emitters: Emitters::new(&emission),
+        }
     }
 
     /// Bytes of the faces.
     pub(crate) fn bytes(&self) -> u64 {
-        size_of_val(self.faces.as_slice()) as u64
+        let kept = size_of_val(self.faces.as_slice()) + size_of_val(self.filled.as_slice());
+        kept as u64 + self.emitters.as_ref().map_or(0, Emitters::bytes)
     }
 
     /// Irradiance of the side of a surface with this unit normal, by channel, per unit of the light's intensity; `travel` is the
     /// unit direction in which light comes there.
     fn irradiance(&self, world: DVec3, normal: DVec3, travel: DVec3) -> [f32; 3] {
-        let (within, place) = (self.within(world), self.grid.place(world + normal * self.half_a_cell(normal, world)));
+        let within = self.within(world);
+        let inside = if within > 0.0 { self.inside(world, normal, travel) } else { [0.0; 3] };
+        let outside = if within < 1.0 { self.outside(world, normal, travel) } else { [0.0; 3] };
+        [0, 1, 2].map(|c| (within * inside[c] + (1.0 - within) * outside[c]) as f32)
+    }
+
+    /// The same in the media.
+    fn inside(&self, world: DVec3, normal: DVec3, travel: DVec3) -> [f64; 3] {
+        let place = self.grid.place(world + normal * self.half_a_cell(normal, world));
         let ([width, height], layers) = (self.grid.columns, self.grid.layers);
         let counts = [width, height, layers + 1];
         let (mut sum, mut weights) = ([0.0; 3], 0.0);
         let ahead = (-travel.dot(normal)).max(0.0);
         for corner in 0..8 {
-            let (mut weight, mut at) = (within, [0; 3]);
+            let (mut weight, mut at) = (1.0, [0; 3]);
             for a in 0..3 {
                 let low = place[a].floor();
                 let is_next = corner >> a & 1 == 1;
@@ -95,8 +122,43 @@ impl SurfaceLight {
             }
             weights += weight;
         }
-        // Of places out of the cells no face has a part.
-        if weights > 0.0 { sum.map(|v| (within * v / weights) as f32) } else { [0.0; 3] }
+        // Where no face lies before the surface none has a part.
+        if weights > 0.0 { sum.map(|v| v / weights) } else { [0.0; 3] }
+    }
+
+    /// The same in the open: what all cells emit, and what goes ahead.
+    fn outside(&self, world: DVec3, normal: DVec3, travel: DVec3) -> [f64; 3] {
+        let mut sum = self.emitters.as_ref().map_or([0.0; 3], |emitters| emitters.irradiance(world, normal));
+        let cosine = (-travel.dot(normal)).max(0.0);
+        if cosine > 0.0 {
+            let ahead = self.ahead(world);
+            (0..3).for_each(|c| sum[c] += cosine * ahead[c]);
+        }
+        sum
+    }
+
+    /// Irradiance of light that goes ahead, across its way: none beside the columns, and behind the last face what arrives there.
+    fn ahead(&self, world: DVec3) -> [f64; 3] {
+        let place = self.grid.place(world);
+        let counts = [self.grid.columns[0], self.grid.columns[1], self.grid.layers + 1];
+        let face = place[2].clamp(0.0, self.grid.layers as f64);
+        let low = [place[0].floor(), place[1].floor(), face.floor()];
+        let share = [place[0] - low[0], place[1] - low[1], face - low[2]];
+        let mut sum = [0.0; 3];
+        for corner in 0..8 {
+            let next = [0, 1, 2].map(|a| f64::from(u8::from(corner >> a & 1 == 1)));
+            let at = [0, 1, 2].map(|a| low[a] + next[a]);
+            if (0..3).any(|a| at[a] < 0.0 || at[a] >= counts[a] as f64) {
+                continue;
+            }
+            let weight: f64 = (0..3).map(|a| if next[a] > 0.0 { share[a] } else { 1.0 - share[a] }).product();
+            let [x, y, z] = at.map(|n| n as usize);
+            let ahead = self.faces[(y * counts[2] + z) * counts[0] + x].ahead;
+            (0..3).for_each(|c| sum[c] += weight * f64::from(ahead[c]));
+        }
+        // Columns of a lamp grow wider.
+        let spread = self.grid.spread(face) / self.grid.spread(place[2]);
+        sum.map(|v| v * spread * spread)
     }
 
     /// Radiance that a surface of a material and colour shows of it, on the side of this unit normal.
@@ -119,20 +181,51 @@ impl SurfaceLight {
         [0, 1, 2].map(|c| light.intensity[c] * color[c] * m.diffuse / PI * (front[c] + back[c]))
     }
 
-    /// 1 in the cells, and less within one of them about it; 0 farther away.
+    /// 1 in the media and at their faces, 0 from a quarter of a cell beside them on.
     fn within(&self, world: DVec3) -> f64 {
-        let ([x, y, face], [width, height]) = (self.grid.place(world), self.grid.columns);
-        let [columns, rows, layers] = [width, height, self.grid.layers].map(|n| n as f64);
-        let beside = |v: f64, low: f64, high: f64| (low - v).max(v - high).max(0.0);
-        let outside = [beside(x, -0.5, columns - 0.5), beside(y, -0.5, rows - 0.5), beside(face, 0.0, layers)];
-        outside.into_iter().map(|v| (1.0 - v).max(0.0)).product()
+        let [x, y, face] = self.grid.place(world);
+        // Whole numbers at the middles of cells.
+        let place = [x, y, face - 0.5];
+        let counts = [self.grid.columns[0], self.grid.columns[1], self.grid.layers];
+        let mut mean = 0.0;
+        for corner in 0..8 {
+            let next = [0, 1, 2].map(|a| f64::from(u8::from(corner >> a & 1 == 1)));
+            let at = [0, 1, 2].map(|a| place[a].floor() + next[a]);
+            if (0..3).any(|a| at[a] < 0.0 || at[a] >= counts[a] as f64) {
+                continue;
+            }
+            let share: f64 = (0..3).map(|a| 1.0 - (at[a] - place[a]).abs()).product();
+            let [x, y, layer] = at.map(|n| n as usize);
+            mean += share * f64::from(self.filled[(y * counts[2] + layer) * counts[0] + x]);
+        }
+        // Half of what is about a face of the media is filled, a quarter of what is half as far from it as the middle of a cell.
+        (4.0 * mean - 1.0).clamp(0.0, 1.0)
     }
 
     /// How far a cell goes on along a direction, half of it; world units.
     fn half_a_cell(&self, along: DVec3, world: DVec3) -> f64 {
-        let spread = self.grid.spread(self.grid.place(world)[2]).abs();
-        let sides = [self.grid.step[0] * spread, self.grid.step[1] * spread, self.grid.depth];
+        let sides = self.grid.sides(self.grid.place(world)[2]);
         let cells = self.grid.axes.iter().zip(sides).map(|(axis, side)| axis.dot(along).abs() / side);
         0.5 / cells.fold(f64::MIN_POSITIVE, f64::max)
     }
+}
+
+/// How much of each cell belongs to the media: its optical depth as a share of the greatest among its neighbours, of which little is next to nothing.
+fn filled(grid: &LightGrid, cells: &[Cell]) -> Vec<f32> {
+    let ([width, height], layers) = (grid.columns, grid.layers);
+    let optical_depth = |cell: &Cell| cell.extinction.into_iter().fold(0.0, f32::max) * grid.depth as f32;
+    let own: Vec<f32> = cells.iter().map(optical_depth).collect();
+    let mut most = own.clone();
+    let mut line = Vec::new();
+    for (count, step) in [(width, 1), (layers, width), (height, layers * width)] {
+        for start in (0..most.len()).filter(|at| (at / step).is_multiple_of(count)) {
+            line.clear();
+            line.extend((0..count).map(|i| most[start + i * step]));
+            for i in 0..count {
+                let near = &line[i.saturating_sub(1)..(i + 2).min(count)];
+                most[start + i * step] = near.iter().copied().fold(0.0, f32::max);
+            }
+        }
+    }
+    own.iter().zip(&most).map(|(own, most)| own / most.max(FILLED)).collect()
 }
