@@ -3,6 +3,7 @@
 use organza::scene::{LoadOptions, Override, Scene, parse};
 use organza::{Progress, Render, RenderOptions};
 use organza_tests::{Place, draw};
+use splat_core::rng;
 use std::path::Path;
 
 /// Fog over a ground, of which a spot lights a part; `lamp` and `more` are further lights and objects.
@@ -144,6 +145,130 @@ fn x7_a_shadow_that_nobody_sees_is_left_out() {
     a_shadow_crosses_its_threshold(&[]);
 }
 
+/// Fog over the ground whose extinction grows: thousands of splats, of which a ray of the light meets a few.
+#[track_caller]
+fn the_shadow_of_fog_crosses_its_threshold(list: &[&str]) {
+    let text = scene("", "");
+    let settings =
+        settings(&[&["object.ground.casts_shadow=false", "object.fog.medium_ball.spacing=0.05"][..], list].concat());
+    let key = "object.fog.medium_ball.extinction=SIZE";
+    let crossed = crosses_its_threshold(&text, "shadow.key", key, &sizes(3e-5, 1.0), &settings, None);
+    println!("{list:?}: {crossed:?}");
+    assert!(crossed.most_skipped >= 0.02 * crossed.least_visible, "{list:?}: {crossed:?}");
+}
+
+#[test]
+fn x7_the_shadow_of_thin_fog_is_left_out() {
+    the_shadow_of_fog_crosses_its_threshold(&[]);
+}
+
+/// The effect of this name, of a picture drawn as planned; where it is left out the picture is within its bound of the one with it.
+#[track_caller]
+fn is_called_for(text: &str, changes: &[String], name: &str) -> bool {
+    let planned_scene = loaded(text, changes);
+    let planned = render(&planned_scene);
+    let effect = planned.plan.effects.iter().find(|effect| effect.name == name).unwrap();
+    let on = render(&loaded(text, &[changes, &[format!("effect {name}=on")]].concat()));
+    let change = largest_change(&displayed(&planned, &planned_scene), &displayed(&on, &planned_scene));
+    assert!(effect.called_for || change <= effect.bound, "{name}: {change} beyond {}", effect.bound);
+    effect.called_for
+}
+
+#[test]
+fn x7_a_shadow_that_falls_on_nothing_that_is_seen_is_left_out() {
+    let plate = |place: &str| {
+        format!(
+            "[[object]]\nname = 'plate'\nrectangle = {{ center = {place}, u = [0.3, 0, 0], v = [0, 0, -0.3], spacing = 0.05 }}\n"
+        )
+    };
+    let text = |place: &str| {
+        let whole = scene("", &plate(place)).replace("outer = 15", "outer = 60");
+        let fog = whole.find("[[object]]\nname = 'fog'").unwrap();
+        let end = whole.find("[[object]]\nname = 'plate'").unwrap();
+        whole[..fog].to_owned() + &whole[end..]
+    };
+    let settings =
+        settings(&["object.ground.casts_shadow=false", "object.plate.shadow_coefficient=0", "camera.fov_y=15"]);
+    for (place, expected) in [
+        // Over the ground, below it, and where its shadow falls beside the ground that is seen.
+        ("[0, 0, 0]", true),
+        ("[0, -1.5, 0]", false),
+        ("[-1.8, -0.4, 1.7]", false),
+    ] {
+        assert_eq!(is_called_for(&text(place), &settings, "shadow.key"), expected, "{place}");
+    }
+    // A mirror would show it.
+    let glass = "[[object]]\nname = 'glass'\nmaterial = 'glass'\nopacity = 0.1\ntechnique = 'surfels'\n\
+                 implicit = { expression = 'x^2 + y^2 + z^2 - 0.04', box = [[-0.21, -0.21, -0.21], [0.21, 0.21, 0.21]], spacing = 0.05 }\n\
+                 [material.glass]\nior = 1.5\n";
+    let with_glass = text("[-1.8, -0.4, 1.7]").replace("[material.fog]", &format!("{glass}[material.fog]"));
+    assert!(is_called_for(&with_glass, &settings, "shadow.key"));
+}
+
+/// Objects and lights by chance, of which no shadow changes a pixel by more than its bound.
+#[track_caller]
+fn no_shadow_exceeds_its_bound(seeds: std::ops::Range<u64>) {
+    let mut left_out = 0;
+    for seed in seeds {
+        let mut drawn = 0;
+        let mut number = |low: f64, high: f64| {
+            drawn += 1;
+            low + (high - low) * rng::unit(seed, 0, drawn, 0)
+        };
+        let mut text = "version = 1\n[camera]\nposition = [0, 1, 4]\ntarget = [0, 0, 0]\nsize = [24, 24]\n[render]\nantialias = 1\n".to_owned();
+        for name in ["a", "b"] {
+            let position = format!("[{}, {}, {}]", number(-3.0, 3.0), number(0.5, 3.0), number(-3.0, 3.0));
+            text += &match number(0.0, 3.0) as u32 {
+                0 => format!(
+                    "[[light]]\nname = '{name}'\nkind = 'directional'\ndirection = [{}, -1, {}]\nirradiance = [2, 2, 2]\n",
+                    number(-1.0, 1.0),
+                    number(-1.0, 1.0)
+                ),
+                1 => format!(
+                    "[[light]]\nname = '{name}'\nkind = 'point'\nposition = {position}\nintensity = [9, 9, 9]\n"
+                ),
+                _ => format!(
+                    "[[light]]\nname = '{name}'\nkind = 'sphere'\nposition = {position}\nradius = 0.3\nsamples = 3\nintensity = [9, 9, 9]\n"
+                ),
+            };
+        }
+        text += "[[object]]\nname = 'ground'\ncasts_shadow = false\nrectangle = { center = [0, -0.6, 0], u = [2, 0, 0], v = [0, 0, -2], spacing = 0.08 }\n";
+        let faint = 10f64.powf(number(-4.5, 0.0));
+        for k in 0..3 {
+            let center = format!("[{}, {}, {}]", number(-1.5, 1.5), number(-0.5, 1.5), number(-1.5, 1.5));
+            let size = number(0.1, 0.6);
+            text += &match number(0.0, 2.0) as u32 {
+                0 => format!(
+                    "[[object]]\nname = 'o{k}'\nmedium_ball = {{ center = {center}, radius = {size}, extinction = {}, spacing = {} }}\n",
+                    faint / size,
+                    0.2 * size
+                ),
+                _ => format!(
+                    "[[object]]\nname = 'o{k}'\nopacity = {}\nrectangle = {{ center = {center}, u = [{size}, 0, 0], v = [0, {}, -{size}], spacing = {} }}\n",
+                    faint.min(0.9),
+                    number(-0.4, 0.4),
+                    0.2 * size
+                ),
+            };
+        }
+        for name in ["shadow.a", "shadow.b"] {
+            let whole = loaded(&text, &[]);
+            let [on, off] = ["on", "off"].map(|way| render(&loaded(&text, &[format!("effect {name}={way}")])));
+            let change = largest_change(&displayed(&on, &whole), &displayed(&off, &whole));
+            let effects = render(&whole).plan.effects;
+            let effect = effects.iter().find(|effect| effect.name == name).unwrap();
+            left_out += u32::from(!effect.called_for);
+            assert!(change <= effect.bound, "seed {seed}, {name}: {change} beyond {}\n{text}", effect.bound);
+        }
+    }
+    assert!(left_out > 0);
+}
+
+#[test]
+fn no_shadow_of_scenes_by_chance_exceeds_its_bound() {
+    no_shadow_exceeds_its_bound(0..12);
+}
+
 /// What takes long and rarely fails where the others hold.
 mod deep {
     use super::*;
@@ -160,6 +285,11 @@ mod deep {
         ] {
             a_lamp_crosses_its_threshold(list, from);
         }
+    }
+
+    #[test]
+    fn no_shadow_of_many_scenes_by_chance_exceeds_its_bound() {
+        no_shadow_exceeds_its_bound(12..120);
     }
 
     #[test]

@@ -58,7 +58,7 @@ pub(super) fn plan_json(plan: &Plan) -> Value {
     let effects = plan
         .effects
         .iter()
-        .map(|e| json!({ "name": e.name, "called_for": e.called_for, "reason": e.reason, "bound": e.bound }));
+        .map(|e| json!({ "name": e.name, "called_for": e.called_for, "lacking": e.is_lacking, "reason": e.reason, "bound": e.bound }));
     let passes = plan.passes.iter().map(|p| json!({ "name": p.name, "reason": p.reason }));
     json!({
         "technique": plan.technique,
@@ -95,7 +95,11 @@ fn object_json(o: &PlannedObject) -> Value {
 /// The plan as a table.
 pub(super) fn plan_text(plan: &Plan) -> String {
     let effects = plan.effects.iter().map(|e| {
-        let called = if e.called_for { "yes" } else { "no" };
+        let called = match (e.called_for, e.is_lacking) {
+            (true, true) => "lacking",
+            (true, false) => "yes",
+            (false, _) => "no",
+        };
         // What is simulated was not measured as if it were not.
         let without = if e.called_for && e.bound == 0.0 { "-".to_owned() } else { share_text(e.bound) };
         [e.name.clone(), called.to_owned(), without, e.reason.clone()]

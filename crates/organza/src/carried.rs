@@ -70,7 +70,8 @@ pub(crate) fn plan(scene: &Scene, loaded: &Loaded, points: &[LightPoint], plan: 
                 points.iter().zip(carries).filter(|(point, _)| point.of == light).map(|(_, c)| c).collect();
             let (called_for, reason) = way(&own, plan.shadow_maps[light], scattering);
             let label = &loaded.lights[light].label;
-            let through = Effect { name: format!("carried.{label}"), called_for, reason, bound: 0.0 };
+            let through =
+                Effect { name: format!("carried.{label}"), called_for, reason, bound: 0.0, is_lacking: false };
             std::iter::once(through).chain(softness(light, label, points, &asked, called_for))
         })
         .collect();
@@ -120,7 +121,7 @@ fn softness(light: usize, label: &str, points: &[LightPoint], asked: &Carries, i
         (false, _) => format!("a shadow map for each of {all} points of it"),
     };
     let reason = format!("{way}; penumbras widen by {:.3} of the distance to what casts them", asked.widening[k]);
-    Some(Effect { name: format!("softness.{label}"), called_for: all > 1, reason, bound: 0.0 })
+    Some(Effect { name: format!("softness.{label}"), called_for: all > 1, reason, bound: 0.0, is_lacking: false })
 }
 
 /// Objects with opaque discs beside translucent ones: where light is carried through these, maps of opaque objects leave both out.

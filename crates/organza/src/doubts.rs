@@ -78,6 +78,20 @@ pub(crate) fn clear_shadows<'a>(scene: &'a Scene, loaded: &'a Loaded) -> impl It
     })
 }
 
+/// Effects that are called for and that no technique of the scene has.
+pub(crate) fn lacking(plan: &Plan) -> impl Iterator<Item = String> + '_ {
+    let lacking = plan.effects.iter().filter(|effect| effect.is_lacking);
+    lacking.map(|effect| {
+        // The whole of what is displayed is no bound.
+        let most = if effect.bound < 1.0 {
+            format!(", which changes no displayed pixel by more than {:.2} %", 100.0 * effect.bound)
+        } else {
+            String::new()
+        };
+        effect.reason.clone() + &most
+    })
+}
+
 /// What a finished picture shows too little of.
 pub(crate) fn of_picture(scene: &Scene, layers: &Layers) -> Option<String> {
     let beauty = layers.rgb("beauty").filter(|_| scene.frames.is_none())?;

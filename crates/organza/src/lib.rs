@@ -40,6 +40,7 @@ mod form;
 mod frame;
 mod load;
 mod matter;
+mod media;
 mod memory;
 mod options;
 pub mod pass;

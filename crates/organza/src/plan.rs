@@ -15,12 +15,14 @@ use splat_core::Object;
 pub struct Effect {
     /// What it is, such as `shadow.sun`.
     pub name: String,
-    /// Whether it is simulated.
+    /// Whether it is simulated, or would be if a technique of the scene had it.
     pub called_for: bool,
     /// Why or why not.
     pub reason: String,
     /// Largest change of a displayed pixel (0 to 1) if it is left out.
     pub bound: f64,
+    /// Whether it is called for and no technique of the scene has it, so that the picture lacks it.
+    pub is_lacking: bool,
 }
 
 /// One pass that will run.

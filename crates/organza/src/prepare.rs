@@ -11,11 +11,12 @@ use crate::load::files::Files;
 use crate::load::own::Own;
 use crate::load::{self, Loaded, Spare, light_statistics};
 use crate::matter::Matter;
+use crate::media;
 use crate::memory::{self, Memory};
 use crate::pass;
 use crate::plan::Plan;
 use crate::scene::{FoundCamera, Scene, SceneLight, SceneObject, Source, Technique, light_points};
-use crate::shadows::Shadowing;
+use crate::shadows::{Probe, Shadowing};
 use crate::statistics::{ObjectData, ObjectStatistics, Statistics};
 use crate::technique::Row;
 use crate::work::Translucent;
@@ -105,6 +106,7 @@ pub(crate) fn prepare(
     let splats = loaded.splats.clone();
     let mut notes = loaded.notes.clone();
     notes.extend(doubts::clear_shadows(scene, &loaded));
+    notes.extend(doubts::lacking(&plan));
     let mut warnings = loaded.warnings.clone();
     warnings.extend(doubts::of_scene(scene, &loaded));
     warnings.extend(unshown(scene));
@@ -182,6 +184,8 @@ fn plan_counted(
     before: Option<Planned>,
 ) -> Result<Planned, Error> {
     check_samples(scene)?;
+    // Shadows are judged by what a view shows, in an animation by all that there is.
+    let before = before.filter(|_| scene.frames.is_some());
     let is_new = before.is_none();
     let (statistics, mut plan) = match before {
         Some(before) => (before.statistics, before.plan),
@@ -239,8 +243,10 @@ fn plan_effects(scene: &Scene, loaded: &Loaded) -> Result<(Statistics, Plan), Er
     let counts = Census::of(&loaded.cloud, &loaded.materials, &loaded.objects, &loaded.footprints);
     let mut statistics = Statistics { counts, ..Statistics::default() };
     statistics.lights = light_statistics(&loaded.lights, &scene.render.effects);
+    statistics.media = media::of_scene(scene, loaded);
+    statistics.scatters_again = carried::of_scene(scene).is_some() && scene.render.sheets.scattering().is_some();
     // Of light that is scattered again and again no bound is known.
-    if scene.render.sheets.scattering().is_none() {
+    if !statistics.scatters_again {
         let radiances = brightness::of_lights(loaded);
         statistics.lights.iter_mut().zip(radiances).for_each(|(light, radiance)| light.radiance = radiance);
     }
@@ -266,8 +272,10 @@ fn plan_effects(scene: &Scene, loaded: &Loaded) -> Result<(Statistics, Plan), Er
         statistics.add_bound(&object.name, &loaded.materials[object.material]);
     }
     statistics.lit_as_drawn = carried::of_scene(scene).is_some();
+    let is_bent = visible(scene).filter(bends).any(|o| loaded.materials[o.material].bounds_matter());
+    probe_shadows(scene, loaded, is_bent, &mut statistics);
     let mut plan = plan(&statistics);
-    plan.bends = visible(scene).filter(bends).any(|o| loaded.materials[o.material].bounds_matter());
+    plan.bends = is_bent;
     plan.by = scene.objects.iter().map(|o| technique_of(o, scene)).collect();
     plan.exact = plan.by.iter().map(|by| row(*by).meets_discs).collect();
     plan.is_own = vec![false; scene.objects.len()];
@@ -276,6 +284,18 @@ fn plan_effects(scene: &Scene, loaded: &Loaded) -> Result<(Statistics, Plan), Er
     plan.draws = plan.by.iter().zip(&plan.is_own).map(|(by, own)| draws(by) && !own).collect();
     techniques(scene).into_iter().for_each(|t| (row(t).plans)(scene, loaded, &mut plan));
     Ok((statistics, plan))
+}
+
+/// Finds how much each light can lose, where it may cast shadows.
+fn probe_shadows(scene: &Scene, loaded: &Loaded, is_bent: bool, statistics: &mut Statistics) {
+    // Bent light, and light that slabs carry, comes from what is out of view; other frames of an animation have other views.
+    let leaves_view = is_bent || statistics.lit_as_drawn || scene.frames.is_some();
+    let probe = Probe::new(loaded, leaves_view);
+    let points = light_points(&loaded.lights);
+    for (k, light) in statistics.lights.iter_mut().enumerate().filter(|(_, light)| light.may_shadow()) {
+        let opacities = points.iter().filter(|point| point.of == k).map(|point| probe.greatest_opacity(&point.light));
+        light.opacity = opacities.fold(0.0, f64::max);
+    }
 }
 
 /// Footprints keep their pixel rectangles in 16 bits.

@@ -1,6 +1,7 @@
 //! What shadow maps are built by: shared by the plan, which tells their size beforehand, and the drawing.
 
 mod casters;
+mod probe;
 
 use crate::Error;
 use crate::load::Loaded;
@@ -10,6 +11,7 @@ use splat_core::{Camera, Light, LightShape, Limits, Object};
 use tsm::{Deposits, Params};
 
 pub(crate) use casters::{Shadowing, casting};
+pub(crate) use probe::Probe;
 
 /// Share of the tolerance that the ends of lists may take, of all lights together. Absorbance grows with its logarithm only, so
 /// a small share costs little.

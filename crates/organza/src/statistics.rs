@@ -23,6 +23,19 @@ pub struct LightStatistics {
     pub has_shadow: Option<bool>,
     /// The most radiance that anything can send of its light, in the channel that has most, W·m⁻²·sr⁻¹; infinite where none is known.
     pub radiance: f64,
+    /// The greatest share of its light that a shadow can take from anything that is seen, 0 to 1.
+    pub opacity: f64,
+}
+
+/// What the planner knows of a medium that scatters light by a phase function.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MediumStatistics {
+    /// Name of its object.
+    pub object: String,
+    /// Greatest share of the light that it takes which it scatters, in the channel that has most.
+    pub albedo: f64,
+    /// An optical depth that no line through it exceeds.
+    pub optical_depth: f64,
 }
 
 /// What an object is made of.
@@ -119,6 +132,10 @@ pub struct Statistics {
     pub lit_as_drawn: bool,
     /// Lights, whole.
     pub lights: Vec<LightStatistics>,
+    /// Media that scatter light.
+    pub media: Vec<MediumStatistics>,
+    /// Whether the scene asks for light that is scattered again and again, of techniques that have it.
+    pub scatters_again: bool,
     /// Layers asked for beside beauty and alpha.
     pub layers: Vec<String>,
     /// Largest change of a displayed pixel that may be left out.
@@ -198,7 +215,7 @@ impl Statistics {
 }
 
 impl LightStatistics {
-    /// Statistics of a light, of whose radiance nothing is known, and that some effects of a scene may switch.
+    /// Statistics of a light, of whose radiance and shadows nothing is known, and that some effects of a scene may switch.
     pub fn of_light(light: &SceneLight, switched: &[SwitchedEffect]) -> Self {
         let switch = |effect| switched.iter().find(|s| s.effect == effect && s.light == light.label).map(|s| s.is_on);
         Self {
@@ -209,6 +226,7 @@ impl LightStatistics {
             is_on: switch(LightEffect::Light),
             has_shadow: switch(LightEffect::Shadow),
             radiance: f64::INFINITY,
+            opacity: 1.0,
         }
     }
 

@@ -68,6 +68,8 @@ pub(crate) struct Row {
     pub(crate) bytes: fn(&Matter<'_>, &[LightPoint], colored_extinction: bool, &RenderOptions) -> u64,
     /// How it carries light through what it draws by itself, where a scene asks for that; `None` where shadow maps have all light.
     pub(crate) carries: fn(&Scene) -> Option<CarriesLight>,
+    /// How a scene asks it for light that media scatter again and again; `None` where it has none.
+    pub(crate) scatters_by: Option<&'static str>,
     /// Adds effects and passes of its own to the plan of a scene that it draws, and takes out what it does not need.
     pub(crate) plans: fn(&Scene, &Loaded, &mut Plan),
     /// Refuses what its fold would refuse, without drawing.
@@ -167,6 +169,9 @@ pub(crate) static TABLE: [Row; 5] = [
         steps: &[Step { pass: pass::SHEETS, stage: stage::SHEETS, seconds: sheets::seconds }],
         bytes: sheets::bytes,
         carries: sheets::carries,
+        scatters_by: Some(
+            "technique = \"sheets\" with [render.sheets] slicing = \"half_vector\" and scattering = \"forward_and_back\"",
+        ),
         begin: sheets::begin,
         ..POINTS
     },
@@ -224,6 +229,7 @@ const POINTS: Row = Row {
     is_random: false,
     bytes: |_, _, _, _| 0,
     carries: |_| None,
+    scatters_by: None,
     plans: |_, _, _| {},
     check: |_, _| Ok(()),
     begin: points::begin,

@@ -12,7 +12,7 @@ const FLOORS: [&[&str]; 14] = [
     &["statistics"],
     &["options", "work"],
     &["load"],
-    &["brightness", "matter", "memory", "shadows"],
+    &["brightness", "matter", "media", "memory", "shadows"],
     &["plan"],
     &["doubts", "frame"],
     &["technique"],

@@ -1,6 +1,7 @@
 //! The effects that a scene calls for, each with its reason and the bound of what it could change, and the passes that simulate them.
 
 mod lights;
+mod scattering;
 
 use super::row;
 use crate::form::Form;
@@ -19,10 +20,12 @@ pub(crate) fn plan(statistics: &Statistics) -> Plan {
     let mut plan =
         Plan { technique: names.join(" and "), techniques: statistics.techniques.clone(), ..Plan::default() };
     // What ends lists of shadow maps takes the rest.
-    let lights = lights::plan(statistics, statistics.tolerance * (1.0 - CUT_SHARE));
+    let allowance = statistics.tolerance * (1.0 - CUT_SHARE);
+    let lights = lights::plan(statistics, allowance);
     plan.effects = lights.effects;
     plan.lights = lights.shine;
     plan.shadow_maps = lights.shadow_maps;
+    plan.effects.push(scattering::plan(statistics, allowance - lights.spent));
     plan.effects.push(colored_extinction(statistics));
     plan.effects.push(bending(statistics));
     plan.effects.push(dispersion(statistics));
@@ -39,7 +42,7 @@ pub(crate) fn plan(statistics: &Statistics) -> Plan {
 }
 
 fn effect(name: impl Into<String>, called_for: bool, reason: impl Into<String>) -> Effect {
-    Effect { name: name.into(), called_for, reason: reason.into(), bound: 0.0 }
+    Effect { name: name.into(), called_for, reason: reason.into(), bound: 0.0, is_lacking: false }
 }
 
 fn colored_extinction(statistics: &Statistics) -> Effect {
@@ -175,6 +178,7 @@ mod tests {
             casts_shadows: true,
             points: 1,
             radiance: f64::INFINITY,
+            opacity: 1.0,
             ..LightStatistics::default()
         };
         Statistics {

@@ -65,7 +65,7 @@ pub(crate) fn casting(objects: &[Object], kept: &[bool]) -> Vec<Object> {
 }
 
 /// The same view, wider on all sides.
-fn wider(camera: &Camera) -> Camera {
+pub(super) fn wider(camera: &Camera) -> Camera {
     let projection = match camera.projection {
         Projection::Perspective { fov_y } => {
             Projection::Perspective { fov_y: 2.0 * libm::atan(WIDER * libm::tan(0.5 * fov_y)) }

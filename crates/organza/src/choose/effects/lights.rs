@@ -8,7 +8,8 @@
 //! L is the most radiance that anything in the scene can send of this light, in any channel ([`LightStatistics::radiance`]). A pixel is a mean of
 //! radiances with weights that sum to 1 at most, and a displayed value grows with radiance by the gain g = 12.92·2^E at most: 12.92 is the greatest
 //! slope of sRGB, E the exposure in stops. A picture that is dark at that exposure is meant for another: g is no less than what makes the
-//! brightest light white. τ is the greatest optical depth that a ray of the light can meet, infinite beside opaque casters.
+//! brightest light white. τ is the greatest optical depth that a ray of the light can meet on its way to anything that receives shadows and that the
+//! view may show ([`LightStatistics::opacity`]).
 
 use super::effect;
 use crate::plan::Effect;
@@ -25,6 +26,8 @@ pub(super) struct Lights {
     pub(super) shine: Vec<bool>,
     /// Whether each light gets shadow maps.
     pub(super) shadow_maps: Vec<bool>,
+    /// Sum of the bounds of what is left out.
+    pub(super) spent: f64,
 }
 
 /// Decides about all lights; together, what is left out changes no displayed pixel by more than `allowance`.
@@ -33,15 +36,16 @@ pub(super) fn plan(statistics: &Statistics, allowance: f64) -> Lights {
     let gain = gain(lights, statistics.exposure);
     let brightness: Vec<f64> = lights.iter().map(|light| displayed(light.radiance, gain)).collect();
     let dim: Vec<Choice> = lights.iter().zip(&brightness).map(|(light, bound)| of_light(light, *bound)).collect();
-    let (shine, spent) = decide(&dim, allowance);
-    let opacity = greatest_opacity(statistics);
+    let (shine, spent_on_lights) = decide(&dim, allowance);
     let shadows: Vec<Choice> = lights
         .iter()
         .zip(&brightness)
         .zip(&shine)
-        .map(|((light, bound), shines)| of_shadow(light, *shines, bound * opacity, statistics))
+        .map(|((light, bound), shines)| {
+            of_shadow(light, *shines, bound * greatest_opacity(light, statistics), statistics)
+        })
         .collect();
-    let (shadow_maps, _) = decide(&shadows, allowance - spent);
+    let (shadow_maps, spent_on_shadows) = decide(&shadows, allowance - spent_on_lights);
     let effects = lights
         .iter()
         .enumerate()
@@ -52,7 +56,7 @@ pub(super) fn plan(statistics: &Statistics, allowance: f64) -> Lights {
             ]
         })
         .collect();
-    Lights { effects, shine, shadow_maps }
+    Lights { effects, shine, shadow_maps, spent: spent_on_lights + spent_on_shadows }
 }
 
 /// An effect before the allowance is spent.
@@ -99,7 +103,7 @@ fn decide(choices: &[Choice], allowance: f64) -> (Vec<bool>, f64) {
 }
 
 /// How much a displayed value grows with radiance, at most.
-fn gain(lights: &[LightStatistics], exposure: f64) -> f64 {
+pub(super) fn gain(lights: &[LightStatistics], exposure: f64) -> f64 {
     let may_shine = |light: &&LightStatistics| !light.is_dark && light.is_on != Some(false);
     // Of a light whose radiance has no bound, white is not known.
     let radiances = lights.iter().filter(may_shine).map(|light| light.radiance).filter(|radiance| radiance.is_finite());
@@ -109,15 +113,16 @@ fn gain(lights: &[LightStatistics], exposure: f64) -> f64 {
 }
 
 /// The most that this radiance can add to a displayed pixel.
-fn displayed(radiance: f64, gain: f64) -> f64 {
+pub(super) fn displayed(radiance: f64, gain: f64) -> f64 {
     // Nothing is shown of no radiance, however large the gain.
     if radiance == 0.0 { 0.0 } else { (gain * radiance).min(1.0) }
 }
 
-/// The greatest share of its light that a shadow takes from anything.
-fn greatest_opacity(statistics: &Statistics) -> f64 {
+/// The greatest share of its light that a shadow takes from anything that is seen.
+fn greatest_opacity(light: &LightStatistics, statistics: &Statistics) -> f64 {
     let counts = &statistics.counts;
-    if counts.opaque_casters > 0 { 1.0 } else { -libm::expm1(-counts.caster_optical_depth) }
+    let everything = if counts.opaque_casters > 0 { 1.0 } else { -libm::expm1(-counts.caster_optical_depth) };
+    everything.min(light.opacity)
 }
 
 fn settled(is_on: bool, reason: &str) -> Choice {
@@ -156,14 +161,23 @@ fn of_shadow(light: &LightStatistics, shines: bool, bound: f64, statistics: &Sta
     if counts.casters == 0 {
         return settled(false, "nothing can cast it");
     }
+    let opacity = greatest_opacity(light, statistics);
+    if opacity == 0.0 && light.has_shadow.is_none() {
+        return settled(false, "nothing that is seen and could receive it lies behind what casts it");
+    }
     let from = if light.points > 1 { format!(", from {} points", light.points) } else { String::new() };
-    let on = format!("{} splats or whole objects cast and {} receive it{from}", counts.casters, counts.receivers);
+    let casters = format!("{} splats or whole objects cast and {} receive it{from}", counts.casters, counts.receivers);
+    let taken = 100.0 * opacity;
+    let on = if opacity < 1.0 {
+        format!("it takes at most {taken:.2} % of its light from anything that is seen; {casters}")
+    } else {
+        casters
+    };
     if light.has_shadow == Some(true) {
         return Choice::Settled { is_on: true, reason: format!("the scene switches it on; {on}"), bound };
     }
     if statistics.layers.iter().any(|layer| layer == "shadow") {
         return Choice::Settled { is_on: true, reason: format!("the layer `shadow` shows it; {on}"), bound };
     }
-    let taken = 100.0 * greatest_opacity(statistics);
-    Choice::Open { bound, on, off: format!("no ray could lose more than {taken:.2} % of its light") }
+    Choice::Open { bound, on, off: format!("nothing that is seen could lose more than {taken:.2} % of its light") }
 }

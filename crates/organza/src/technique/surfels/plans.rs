@@ -24,7 +24,7 @@ pub(crate) fn plans(scene: &Scene, loaded: &Loaded, plan: &mut Plan) {
     }
     let mut add = |at: &str, name: &str, reason: String, groups: bool| {
         let Some(at) = plan.passes.iter().position(|p| p.name == at) else { return };
-        plan.effects.push(Effect { name: name.into(), called_for: true, reason, bound: 0.0 });
+        plan.effects.push(Effect { name: name.into(), called_for: true, reason, bound: 0.0, is_lacking: false });
         if groups {
             let reason = "groups of discs that hardly overlap".into();
             plan.passes.insert(at, PlannedPass { name: pass::GROUP.into(), reason });
