@@ -8,24 +8,30 @@
 //! Every tile first learns how far behind it something receives shadows that the view may show. Each caster that begins before that adds, to all
 //! tiles under its footprint, the most that its footprint has there, so no ray in a tile can have more optical depth than the tile's sum. Footprints
 //! are taken as balls: one that is seen aslant, or is longer than wide, covers less. Sums are whole numbers, which know no order of threads.
+//!
+//! Most shadows are plain, and all light is a bound of what they take: a look at some splats in a few large tiles finds these first.
 
 use super::casters::wider;
 use crate::load::Loaded;
 use glam::DVec3;
 use rayon::prelude::*;
 use splat_core::{Camera, Cloud, DAabb, Footprint, Light, LightShape, Shading, SplatKind};
-use std::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_4};
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 
 /// Splats of a task.
 const CHUNK: usize = 1 << 12;
-/// Splats that the size of tiles is chosen by.
-const SAMPLES: usize = 1 << 10;
+/// Splats that are looked at first.
+const SAMPLES: usize = 1 << 13;
+/// Large tiles along a side, for these.
+const LARGE_TILES: f64 = 24.0;
+/// Mean optical depth of a large tile from which on a shadow is plain.
+const PLAIN: f64 = 0.5;
 /// Tiles along a side of the plane or of a face.
 const LEAST_TILES: f64 = 4.0;
 const MOST_TILES: f64 = 192.0;
-/// Tiles by which what receives is taken to reach farther: look-ups in a shadow map interpolate between its cells.
-const MARGIN: f64 = 2.0;
+/// Tiles by which what receives is taken to reach farther: look-ups in a shadow map interpolate between its cells. Faces of a cube reach beyond
+/// their edges by as many.
+const MARGIN: usize = 2;
 /// Optical depth from which on everything is taken.
 const OPAQUE: f64 = 16.0;
 /// A unit of optical depth in the sums, which hold that of 2³⁰ opaque splats.
@@ -83,29 +89,32 @@ impl<'a> Probe<'a> {
         }
     }
 
-    /// The greatest share of its light that a ray of one point of a light can lose on the way to anything that receives shadows and may be seen.
+    /// A bound of the share of its light that a ray of one point of a light can lose on the way to anything that receives shadows and may be seen: 1 where
+    /// some rays lose much of it.
     pub(crate) fn greatest_opacity(&self, light: &Light) -> f64 {
         if self.bounds.is_empty() {
             return 0.0;
         }
+        if self.is_plain(&light.shape) {
+            return 1.0;
+        }
         let tiles = Tiles::new(&light.shape, &self.bounds, self.mean_reach(&light.shape));
-        let count = tiles.count();
         // Nothing is behind what is nowhere.
-        let farthest: Vec<AtomicU32> = (0..count).map(|_| AtomicU32::new(0)).collect();
-        let margin = MARGIN * tiles.side;
+        let farthest: Vec<AtomicU32> = (0..tiles.count()).map(|_| AtomicU32::new(0)).collect();
         self.each_receiver(&|ball| {
             let back = ordered((tiles.depth(ball.center) + ball.reach) as f32);
-            tiles.each_under(&ball, margin, |tile, _| {
+            tiles.each_under(&ball, |tile, _| {
                 farthest[tile].fetch_max(back, Ordering::Relaxed);
             });
         });
+        let farthest = tiles.widened(farthest.into_iter().map(AtomicU32::into_inner).collect());
         let is_opaque = AtomicBool::new(false);
-        let sums: Vec<AtomicU64> = (0..count).map(|_| AtomicU64::new(0)).collect();
+        let sums: Vec<AtomicU64> = (0..tiles.count()).map(|_| AtomicU64::new(0)).collect();
         self.each_caster(&is_opaque, &|ball, optical_depth, profile| {
             let front = ordered((tiles.depth(ball.center) - ball.reach) as f32);
             let per_area = (ball.reach * ball.reach).recip();
-            tiles.each_under(&ball, 0.0, |tile, distance_sq| {
-                if front >= farthest[tile].load(Ordering::Relaxed) {
+            tiles.each_under(&ball, |tile, distance_sq| {
+                if front >= farthest[tile] {
                     return;
                 }
                 let share = profile.map_or(1.0, |profile| profile.at(distance_sq * per_area));
@@ -121,6 +130,34 @@ impl<'a> Probe<'a> {
         }
         let most = sums.into_iter().map(AtomicU64::into_inner).max().unwrap_or(0);
         -libm::expm1(-(most as f64) / UNIT)
+    }
+
+    /// Whether some splats tell that a shadow is plain: the mean optical depth before a receiver in a large tile is more than a half.
+    fn is_plain(&self, shape: &LightShape) -> bool {
+        let tiles = Tiles::large(shape, &self.bounds);
+        let cloud = &self.loaded.cloud;
+        let step = cloud.len().div_ceil(SAMPLES).max(1);
+        let samples = || (0..cloud.len()).step_by(step);
+        let mut farthest = vec![f64::NEG_INFINITY; tiles.count()];
+        for ball in samples().filter(|i| self.receives(*i)).map(|i| self.ball(i)).filter(|ball| self.may_be_seen(ball))
+        {
+            let (tile, _) = tiles.of_center(ball.center);
+            farthest[tile] = farthest[tile].max(tiles.depth(ball.center));
+        }
+        let mut sums = vec![0.0; tiles.count()];
+        for i in samples().filter(|i| self.casts(*i)) {
+            let ball = self.ball(i);
+            let (tile, area) = tiles.of_center(ball.center);
+            if tiles.depth(ball.center) < farthest[tile] {
+                let extinction = self.loaded.materials[cloud.material[i] as usize].greatest_extinction();
+                let cross_section = match cloud.kind[i] {
+                    SplatKind::Opaque => f64::from(Footprint::CORE * cloud.radius[i]).powi(2),
+                    _ => f64::from(cloud.cross_section[i]) * f64::from(extinction),
+                };
+                sums[tile] += step as f64 * cross_section / area;
+            }
+        }
+        sums.into_iter().any(|optical_depth| optical_depth > PLAIN)
     }
 
     fn ball(&self, i: usize) -> Ball {
@@ -150,28 +187,32 @@ impl<'a> Probe<'a> {
         if casters > 0 { sum / f64::from(casters) } else { 0.0 }
     }
 
+    fn receives(&self, i: usize) -> bool {
+        let (loaded, cloud) = (self.loaded, &self.loaded.cloud);
+        let object = &loaded.objects[cloud.object[i] as usize];
+        object.shadow_coefficient * cloud.shadow_coefficient_of(i) > 0.0
+            && loaded.materials[cloud.material[i] as usize].shading != Shading::Unlit
+    }
+
+    fn may_be_seen(&self, ball: &Ball) -> bool {
+        self.view.is_none_or(|view| view.may_see(view.view_from_world(ball.center), ball.reach))
+    }
+
     /// Hands on whatever receives shadows and may be seen.
     fn each_receiver(&self, visit: &(dyn Fn(Ball) + Sync)) {
         let (loaded, cloud) = (self.loaded, &self.loaded.cloud);
-        let receives = |i: usize| {
-            let coefficient =
-                loaded.objects[cloud.object[i] as usize].shadow_coefficient * cloud.shadow_coefficient_of(i);
-            coefficient > 0.0 && loaded.materials[cloud.material[i] as usize].shading != Shading::Unlit
-        };
-        let may_be_seen =
-            |ball: &Ball| self.view.is_none_or(|view| view.may_see(view.view_from_world(ball.center), ball.reach));
         let chunks = (0..cloud.len().div_ceil(CHUNK)).into_par_iter();
         chunks.for_each(|chunk| {
-            for i in (chunk * CHUNK..cloud.len().min((chunk + 1) * CHUNK)).filter(|i| receives(*i)) {
+            for i in (chunk * CHUNK..cloud.len().min((chunk + 1) * CHUNK)).filter(|i| self.receives(*i)) {
                 let ball = self.ball(i);
-                if may_be_seen(&ball) {
+                if self.may_be_seen(&ball) {
                     visit(ball);
                 }
             }
         });
         for own in loaded.own.iter().filter(|own| loaded.objects[own.object].shadow_coefficient > 0.0) {
             let ball = about(&own.world_box());
-            if may_be_seen(&ball) {
+            if self.may_be_seen(&ball) {
                 visit(ball);
             }
         }
@@ -247,7 +288,7 @@ impl Tiles {
     fn new(shape: &LightShape, bounds: &DAabb, reach: f64) -> Self {
         if let Some(center) = shape.place() {
             let count = (2.0 / reach).clamp(LEAST_TILES, MOST_TILES) as usize;
-            return Self { shape: Shape::Cube { center }, counts: [count; 2], side: 2.0 / count as f64 };
+            return Self { shape: Shape::Cube { center }, counts: [count + 2 * MARGIN; 2], side: 2.0 / count as f64 };
         }
         let along = match shape {
             LightShape::Directional { direction } => *direction,
@@ -265,6 +306,12 @@ impl Tiles {
         let side = longest / (longest / reach).clamp(LEAST_TILES, MOST_TILES).floor();
         let counts = spans.map(|[_, length]| (libm::ceil(length / side) as usize).max(1));
         Self { shape: Shape::Plane { axes: [x, y, along], corner: spans.map(|[low, _]| low) }, counts, side }
+    }
+
+    /// A few large ones.
+    fn large(shape: &LightShape, bounds: &DAabb) -> Self {
+        let side = if shape.place().is_some() { 2.0 } else { bounds.size().length() };
+        Self::new(shape, bounds, side / LARGE_TILES)
     }
 
     fn count(&self) -> usize {
@@ -290,66 +337,112 @@ impl Tiles {
         first.min(self.counts[axis])..end.min(self.counts[axis])
     }
 
-    /// Hands on each tile that a ball may cover, or that lies no farther than `margin` beside such a tile, and the square of a distance: no ray as near
-    /// to the tile passes the ball's centre nearer.
-    fn each_under(&self, ball: &Ball, margin: f64, mut visit: impl FnMut(usize, f64)) {
+    /// The place of a direction on a face, in its plane from the first tile on, from its middle.
+    fn offset(&self, place: f64) -> f64 {
+        place + 1.0 + MARGIN as f64 * self.side
+    }
+
+    /// The tile of a place, and its area at the place's depth, across the light.
+    fn of_center(&self, center: DVec3) -> (usize, f64) {
+        let tile = |places: [f64; 2]| {
+            let [x, y] = [0, 1].map(|a: usize| ((places[a] / self.side).max(0.0) as usize).min(self.counts[a] - 1));
+            y * self.counts[0] + x
+        };
+        match &self.shape {
+            Shape::Plane { axes, corner } => {
+                (tile([0, 1].map(|a: usize| axes[a].dot(center) - corner[a])), self.side * self.side)
+            }
+            Shape::Cube { center: light } => {
+                let towards = center - *light;
+                let axis = towards.abs().max_position();
+                let z = towards[axis].abs().max(f64::MIN_POSITIVE);
+                let face = 2 * axis + usize::from(towards[axis] < 0.0);
+                let places = [1, 2].map(|a| self.offset(towards[(axis + a) % 3] / z));
+                let across = self.side * z;
+                (face * self.counts[0] * self.counts[1] + tile(places), across * across * z / towards.length().max(z))
+            }
+        }
+    }
+
+    /// The greatest of the numbers of a tile and of those that lie up to [`MARGIN`] beside it.
+    fn widened(&self, numbers: Vec<u32>) -> Vec<u32> {
+        let [width, height] = self.counts;
+        let mut numbers = numbers;
+        let mut line = Vec::new();
+        for (count, step) in [(width, 1), (height, width)] {
+            for start in (0..numbers.len()).filter(|at| (at / step).is_multiple_of(count)) {
+                line.clear();
+                line.extend((0..count).map(|k| numbers[start + k * step]));
+                for k in 0..count {
+                    let near = &line[k.saturating_sub(MARGIN)..(k + MARGIN + 1).min(count)];
+                    numbers[start + k * step] = near.iter().copied().max().unwrap_or(0);
+                }
+            }
+        }
+        numbers
+    }
+
+    /// Hands on each tile that a ball may cover, and the square of a distance: no ray in the tile passes the ball's centre nearer.
+    fn each_under(&self, ball: &Ball, mut visit: impl FnMut(usize, f64)) {
+        let reach_sq = ball.reach * ball.reach;
         match &self.shape {
             Shape::Plane { axes, corner } => {
                 let place = [0, 1].map(|a: usize| axes[a].dot(ball.center) - corner[a]);
-                let reach = ball.reach + margin;
-                let [columns, rows] = [0, 1].map(|a| self.between(a, place[a] - reach, place[a] + reach));
+                let [columns, rows] = [0, 1].map(|a| self.between(a, place[a] - ball.reach, place[a] + ball.reach));
                 for row in rows {
+                    let beside = self.beside(row, place[1]).powi(2);
                     for column in columns.clone() {
-                        let beside = [self.beside(column, place[0], margin), self.beside(row, place[1], margin)];
-                        let distance_sq = beside[0] * beside[0] + beside[1] * beside[1];
-                        if distance_sq < ball.reach * ball.reach {
+                        let distance_sq = beside + self.beside(column, place[0]).powi(2);
+                        if distance_sq < reach_sq {
                             visit(row * self.counts[0] + column, distance_sq);
                         }
                     }
                 }
             }
             Shape::Cube { center } => {
-                let towards = ball.center - *center;
-                for face in 0..6 {
-                    self.each_on_face(face, &Ball { center: towards, reach: ball.reach }, margin, &mut visit);
-                }
+                let seen = Ball { center: ball.center - *center, reach: ball.reach };
+                (0..6).for_each(|face| self.each_on_face(face, &seen, &mut visit));
             }
         }
     }
 
     /// The same on one face of the cube, of a ball whose centre is as seen from that of the cube.
-    fn each_on_face(&self, face: usize, ball: &Ball, margin: f64, visit: &mut impl FnMut(usize, f64)) {
-        let towards = ball.center;
-        let distance = towards.length();
+    fn each_on_face(&self, face: usize, ball: &Ball, visit: &mut impl FnMut(usize, f64)) {
         let axis = face / 2;
-        let z = if face.is_multiple_of(2) { towards[axis] } else { -towards[axis] };
-        let across = [towards[(axis + 1) % 3], towards[(axis + 2) % 3]];
-        let reach = ball.reach + margin * (distance + ball.reach);
-        if across.iter().any(|x| (x.abs() - z) * FRAC_1_SQRT_2 > reach) {
+        let z = if face.is_multiple_of(2) { ball.center[axis] } else { -ball.center[axis] };
+        let across = [ball.center[(axis + 1) % 3], ball.center[(axis + 2) % 3]];
+        // A face ends beyond its edges.
+        let end = 1.0 + MARGIN as f64 * self.side;
+        let beyond = ball.reach * libm::hypot(1.0, end);
+        if across.iter().any(|x| x.abs() - end * z > beyond) {
             return;
         }
         let tiles = |a: usize| {
-            let distance = libm::hypot(across[a], z);
-            if distance <= reach {
+            let distance_sq = across[a] * across[a] + z * z;
+            let tangent_sq = distance_sq - ball.reach * ball.reach;
+            if tangent_sq <= 0.0 {
                 return 0..self.counts[a];
             }
-            let middle = libm::atan2(across[a], z);
-            let half = libm::asin(reach / distance);
-            let ends = [middle - half, middle + half].map(|angle| libm::tan(angle.clamp(-FRAC_PI_4, FRAC_PI_4)) + 1.0);
-            self.between(a, ends[0], ends[1])
+            // The tangents of the ball from the light, as turned vectors: sine and cosine of half its angle, times the squared distance.
+            let (sine, cosine) = (ball.reach, libm::sqrt(tangent_sq));
+            let tangent = |x: f64, z: f64| if z > 0.0 { x / z } else { f64::INFINITY.copysign(across[a]) };
+            let low = tangent(across[a] * cosine - z * sine, z * cosine + across[a] * sine);
+            let high = tangent(across[a] * cosine + z * sine, z * cosine - across[a] * sine);
+            self.between(a, self.offset(low.min(end)), self.offset(high.max(-end)))
         };
         let [columns, rows] = [0, 1].map(tiles);
+        let distance = ball.center.length();
         // Where the centre meets the plane of the face, if it does, and how long the way to there is.
-        let is_before = z > reach;
-        let place = across.map(|x| if is_before { x / z } else { 0.0 });
+        let is_before = z > ball.reach;
+        let place = across.map(|x| self.offset(if is_before { x / z } else { 0.0 }));
         let slant = if is_before { distance / z } else { 1.0 };
         for row in rows {
             for column in columns.clone() {
-                let beside = [self.beside(column, place[0] + 1.0, margin), self.beside(row, place[1] + 1.0, margin)];
+                let beside_sq = self.beside(column, place[0]).powi(2) + self.beside(row, place[1]).powi(2);
                 // The area between two ways to the plane is at least half of the distance in it: no line there comes nearer to the light than 1.
-                let farthest = 1.0 + self.farthest_sq(column, margin) + self.farthest_sq(row, margin);
-                let near = distance * libm::hypot(beside[0], beside[1]) / (slant * libm::sqrt(farthest));
-                let distance_sq = if is_before { near * near } else { 0.0 };
+                let farthest_sq = 1.0 + self.farthest_sq(column) + self.farthest_sq(row);
+                let distance_sq =
+                    if is_before { distance * distance * beside_sq / (slant * slant * farthest_sq) } else { 0.0 };
                 if distance_sq < ball.reach * ball.reach {
                     visit((face * self.counts[1] + row) * self.counts[0] + column, distance_sq);
                 }
@@ -357,15 +450,15 @@ impl Tiles {
         }
     }
 
-    /// How far a place lies beside a tile that is wider by `margin` on either side, along an axis.
-    fn beside(&self, tile: usize, place: f64, margin: f64) -> f64 {
+    /// How far a place lies beside a tile, along an axis.
+    fn beside(&self, tile: usize, place: f64) -> f64 {
         let low = tile as f64 * self.side;
-        (low - place).max(place - low - self.side).max(margin) - margin
+        (low - place).max(place - low - self.side).max(0.0)
     }
 
-    /// The farthest that such a tile of a face reaches from the middle of the face along an axis, squared.
-    fn farthest_sq(&self, tile: usize, margin: f64) -> f64 {
-        let low = tile as f64 * self.side - 1.0;
-        (low.abs().max((low + self.side).abs()) + margin).powi(2)
+    /// The farthest that a tile of a face reaches from the middle of the face along an axis, squared.
+    fn farthest_sq(&self, tile: usize) -> f64 {
+        let low = tile as f64 * self.side - self.offset(0.0);
+        low.abs().max((low + self.side).abs()).powi(2)
     }
 }
