@@ -83,12 +83,67 @@ fn exit_2_is_for_the_command_line() {
             "the layer `refraction` is of light that surfaces mirror and bend, and none does",
         ),
         (vec!["render", "s.toml", "--layers", "effects,reflection"], "the layer `reflection` is of light"),
+        (
+            vec!["render", "s.toml", "-o", "a.png", "--layers", "depth"],
+            "--layers is for EXR files, and no output is one",
+        ),
+        (vec!["render", "s.toml", "-o", "a.png", "--half"], "--half is for EXR files, and no output is one"),
+        (vec!["render", "s.toml", "--cache-size", "1G"], "--cache <DIR>"),
+        (vec!["render", "s.toml", "--merge-duplicates"], "--merge-duplicates is for `points`"),
+        (vec!["convert", "s.toml", "-o", "a.ply", "--layers", "depth"], "--layers is for pictures"),
+        (vec!["orders", "s.toml", "--technique", "points"], "--technique changes nothing that `organza orders` does"),
+        (vec!["accuracy", "s.toml", "--layers", "depth"], "--layers changes nothing that `organza accuracy` does"),
+        (
+            vec![
+                "render",
+                "s.toml",
+                "--set",
+                "light.0={kind='directional', direction=[0, -1, 0], irradiance=[1, 1, 1]}",
+                "--set",
+                "render.shadow.mapping=polar",
+            ],
+            "directions around a place are for lights that have one, and light `0` is directional",
+        ),
+        (vec!["render", "s.toml", "--set", "camera.fov_y=1e99"], "expected degrees between 0 and 180, found 1e99"),
         (vec!["render", "s.toml", "--technique", "splats"], "found \"splats\""),
         (vec!["render", "s.toml", "--max-memory", "0"], "expected a number of bytes above 0"),
     ] {
         place.expect(2, &arguments, stderr);
     }
     assert!(place.made().is_empty());
+}
+
+#[test]
+fn options_of_particles_are_warned_of_where_none_are_drawn() {
+    let place = place();
+    let words = "warning: --repeat-level changes nothing: no object is drawn by the technique `particles`";
+    place.expect(0, &["render", "s.toml", "-o", "a.exr", "--repeat-level", "4"], words);
+    place.expect(0, &["explain", "s.toml", "--repeat-level", "4"], words);
+    let particles = ["render", "s.toml", "-o", "b.exr", "--technique", "particles", "--repeat-level", "4"];
+    assert!(!String::from_utf8_lossy(&place.expect(0, &particles, "").stderr).contains("changes nothing"));
+}
+
+#[test]
+fn a_camera_that_has_nothing_to_see_names_the_object_whose_points_are_left_out() {
+    let place = Place::new(
+        "version = 1\ncamera = { auto = true, size = [8, 8] }\n[ambient]\ncolor = [1, 1, 1]\n\
+         [[object]]\nname = 'cloud'\npoints = 'p.csv'\nkeep = { heat = [7, 9] }\n",
+    );
+    place.write("p.csv", "x,y,z,heat\n0,0,0,1\n1,0,0,2\n0,1,0,3\n");
+    place.expect(
+        3,
+        &["render", "s.toml"],
+        "placed by itself: object 'cloud' is left without points\nhint: widen its `keep`",
+    );
+}
+
+#[test]
+fn a_printed_command_can_be_copied_whatever_the_name_of_its_file() {
+    let place = Place::new("");
+    place.write("a b.xyz", "0 0 0\n1 0 0\n0 1 0\n");
+    let out = place.expect(0, &["init", "a b.xyz", "-o", "it's new.toml"], "");
+    let text = String::from_utf8_lossy(&out.stdout).into_owned();
+    assert!(text.ends_with("draw it: organza render 'it'\\''s new.toml' -o picture.png\n"), "{text}");
 }
 
 #[test]

@@ -150,7 +150,10 @@ fn files_that_no_picture_can_be_made_of_are_refused_with_a_reason() {
             "--preset bone: there is no such preset\nhint: there are ct-bone",
         ),
         (4, &["render", "mesh.obj", "--preset", "bone.json"], "bone.json: cannot read the preset"),
-        (2, &["render", "mesh.obj", "--fit", "0"], "--fit 0: expected a number from 0.01 to 1"),
+        (2, &["render", "mesh.obj", "--fit", "0"], "--fit 0: expected a number above 0, at most 1"),
+        (2, &["render", "mesh.obj", "--fit", "1e99"], "--fit 1e99: expected a number above 0, at most 1"),
+        (2, &["render", "mesh.obj", "--preset", "ct-bone"], "--preset is for volumes"),
+        (2, &["render", "scan.xyz", "--preset", "turbo"], "--preset is for volumes"),
         (2, &["render", "mesh.obj", "--size", "0x9"], "--size 0x9: `size`: expected 1 to 65536 pixels a side, found 0"),
         (2, &["render", "mesh.obj", "--turntable", "0"], "0 is not in 1..=100000"),
     ] {

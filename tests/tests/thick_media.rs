@@ -149,6 +149,15 @@ fn two_lights_add_and_light_against_the_view_is_the_same_everywhere_in_a_slab() 
     }
 }
 
+#[test]
+fn slabs_are_bright_up_to_grazing_views_however_thick_a_spacing_is() {
+    for (view, tau) in [(80.0, 4.0), (80.0, 14.0)] {
+        let slab = Slab { technique: "points", tau, view, light: 60.0, azimuth: 90.0 };
+        let ratio = mean(&draw(&slab.scene("", ""), &[]), "G") / slab.radiance(1.0);
+        assert!((0.9..1.05).contains(&ratio), "view at {view}°, tau {tau}: {ratio}");
+    }
+}
+
 fn warnings(text: &str) -> Vec<String> {
     let scene = parse(Path::new("s.toml"), text.as_bytes(), &LoadOptions::default()).unwrap();
     let warnings = organza::render(&scene, &RenderOptions::default(), &Progress::new()).unwrap().warnings;
@@ -163,6 +172,11 @@ fn what_splats_cannot_tell_is_told_with_the_spacing_that_would_do() {
     let told = warnings(&slab(40.0));
     assert!(told.len() == 1 && told[0].contains("an optical depth of 40.000 in a spacing of 1"), "{told:?}");
     assert!(told[0].contains("spacing = 0.4 tells"), "{told:?}");
+    let by_sheets = |tau| Slab { technique: "sheets", tau, view: 0.0, light: 0.0, azimuth: 0.0 }.scene("", "");
+    assert_eq!(warnings(&by_sheets(4.0)), [""; 0]);
+    let told = warnings(&by_sheets(8.0));
+    assert!(told.len() == 1 && told[0].contains("by which sheets show dark frames along its edges"), "{told:?}");
+    assert!(told[0].contains("spacing = 0.5 tells"), "{told:?}");
     let lone = |extinction: f64| {
         let [text, rest] = [0, 1].map(|part| slab(1.0).split("medium_box").nth(part).unwrap().to_owned());
         let (_, rest) = rest.split_once('\n').unwrap();

@@ -96,6 +96,62 @@ fn voxels_without_a_value_draw_nothing_and_are_counted() {
 }
 
 #[test]
+fn a_fill_value_is_told_taken_as_nothing_and_written_by_init() {
+    let place = Place::new("");
+    // A ball whose values rise along x and y, in nothing.
+    let value = |p: [f64; 3]| 1.0 + p[0] + 0.1 * p[1];
+    let ball = |nothing: f64| move |p: [f64; 3]| if distance(p, [0.5; 3]) < 0.3 { value(p) } else { nothing };
+    place.write("gaps.nrrd", nrrd("float", [16; 3], ball(f64::NAN)));
+    let expected = seen(&place, "gaps.nrrd", &[]).0;
+    for fill in ["-9999", "1e20", "9.96921e36"] {
+        place.write("fill.nrrd", nrrd("float", [16; 3], ball(fill.parse().unwrap())));
+        let (alpha, told) = seen(&place, "fill.nrrd", &[]);
+        assert!(alpha == expected, "{fill}");
+        assert!(
+            told.contains("of 4096 voxels have the value of `nodata`") && told.contains("they draw nothing"),
+            "{told}"
+        );
+        place.expect(0, &["init", "fill.nrrd", "-o", "s.toml", "--force"], "");
+        let text = String::from_utf8(place.bytes("s.toml")).unwrap();
+        let line = text.lines().find(|line| line.starts_with("nodata = ")).unwrap().to_owned();
+        // A scene without the key is warned of it.
+        place.write("without.toml", text.replace(&line, ""));
+        let told = said(&place, &["render", "without.toml", "--size", "8x8", "-o", "b.exr", "--force"]);
+        let key = line.split(' ').take(3).collect::<Vec<_>>().join(" ");
+        assert!(
+            told.contains("warning: fill.nrrd: ") && told.contains(&format!("it looks like a fill value; {key} in")),
+            "{told}"
+        );
+    }
+    let told =
+        said(&place, &["render", "s.toml", "--set", "object.fill.nodata=7", "--size", "8x8", "-o", "b.exr", "--force"]);
+    assert!(told.contains("no voxel has the value of `nodata`, 7"), "{told}");
+}
+
+#[test]
+fn a_hot_voxel_is_told_and_takes_no_digits_of_the_others() {
+    let place = Place::new("");
+    let field = |hot: f64| {
+        let value = move |p: [f64; 3]| {
+            if p.iter().all(|c| *c < 0.04) { hot } else { (-8.0 * distance(p, [0.5; 3]).powi(2)).exp() }
+        };
+        nrrd("float", [32; 3], value)
+    };
+    place.write("hot.nrrd", field(0.0));
+    place.expect(0, &["init", "hot.nrrd", "-o", "s.toml", "--size", "48x48", "--force"], "");
+    let draw = |output: &str| said(&place, &["render", "s.toml", "-o", output, "--technique", "sheets"]);
+    draw("plain.exr");
+    place.write("hot.nrrd", field(1e6));
+    let told = draw("hot.exr");
+    assert!(told.contains("1 of 32768 voxels lies far from all others, with 1000000"), "{told}");
+    let [plain, hot] = ["plain.exr", "hot.exr"].map(|name| picture_of(&place.path(name)).opacity());
+    // Its own corner is seen at the lower left; at the upper right noise in the rim was up to 0.23.
+    let differences = (2..20).flat_map(|y| (26..46).map(move |x| y * 48 + x)).map(|i| (plain[i] - hot[i]).abs());
+    let most = differences.fold(0.0, f64::max);
+    assert!(most < 1e-3 && plain[24 * 48 + 24] > 0.1, "{most}");
+}
+
+#[test]
 fn no_label_is_thinner_than_another() {
     let place = Place::new("");
     // Four bars along z with the labels 1, 2, 3 and 40.

@@ -68,6 +68,7 @@ mod mesh_points;
 mod mpu;
 #[cfg(feature = "surfels")]
 mod neighbours;
+mod odd_values;
 #[cfg(feature = "surfels")]
 mod orient;
 #[cfg(feature = "read")]
@@ -149,6 +150,7 @@ pub use matter::{MatterParams, MatterReport, raw_to_matter};
 pub use mesh_points::{MeshParams, MeshReport, flatten_leaning, mesh_to_points, mesh_to_points_into};
 #[cfg(feature = "surfels")]
 pub use mpu::{MpuField, MpuParams, MpuReport, points_to_field};
+pub use odd_values::{FillValue, Strays, without_value, written_value};
 #[cfg(feature = "surfels")]
 pub use orient::Orientation;
 #[cfg(feature = "read")]

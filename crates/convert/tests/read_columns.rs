@@ -29,6 +29,25 @@ fn refused(name: &str, content: &[u8], columns: &[&str]) -> String {
 const CSV: &[u8] = b"x,y,z,intensity,heat,label\n0,0,1,5,20.5,tree\n1,0,2,6,nan,wall\n2,0,4,7,-3e2,tree\n";
 
 #[test]
+fn empty_cells_and_decimal_commas_are_told_with_their_place() {
+    for (content, expected) in [
+        ("x,y,z,t\n1,2,3,4\n1,2,,5\n", "a.csv:3:5: expected a number in each column, found an empty cell, the 3. of 4"),
+        ("x,y,z,t\n1,2,3,\n", "a.csv:2:7: expected a number in each column, found an empty cell, the 4. of 4"),
+        ("x;y;z\n1;;3\n", "a.csv:2:3: expected a number in each column, found an empty cell, the 2. of 3"),
+        ("x;y;z\n1,5;2,5;3\n", "a.csv:2:1: expected numbers with a decimal point, found '1,5', whose comma"),
+        ("1;2,5;3,1\n", "a.csv:1:3: expected numbers with a decimal point, found '2,5', whose comma"),
+        ("1,5 2,5 3,1\n", "a.csv:1:1: expected numbers with a decimal point, found '1,5', whose comma"),
+    ] {
+        let error = bytes("a.csv", content.as_bytes(), &ReadParams::default(), None).unwrap_err().to_string();
+        assert!(error.starts_with(expected), "{content}: {error}");
+    }
+    // Other mixtures of separators are columns as before.
+    for content in ["1,2,3;255,0,0\n", "1, 2, 3\n", "1,2,3,\n", "1;2;3\n", "1 2 3\n"] {
+        assert!(bytes("a.csv", content.as_bytes(), &ReadParams::default(), None).is_ok(), "{content}");
+    }
+}
+
+#[test]
 fn columns_of_text_are_kept_by_name_and_no_longer_unused() {
     let (points, notes) = read("a.csv", CSV, &["heat", "intensity"]);
     let heat = column(&points, "heat");

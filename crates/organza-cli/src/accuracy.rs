@@ -3,7 +3,7 @@
 use super::args::AccuracyArguments;
 use super::bar::with_bar;
 use super::console;
-use super::session::{in_folder, load_scene, path_text, processor_only, render_options};
+use super::session::{in_folder, load_scene, path_text, processor_only, refuse_technique_and_layers, render_options};
 use organza::output::Target;
 use organza::scene::Scene;
 use organza::{Error, Progress, RenderOptions, printable};
@@ -25,6 +25,7 @@ const STAGES: [(&str, f64); 6] = [
 /// Sweeps the knobs, judges, writes the report. Whatever can be refused is refused before any work.
 pub(super) fn run(arguments: &AccuracyArguments) -> Result<(), Error> {
     processor_only(&arguments.scene)?;
+    refuse_technique_and_layers("accuracy", &arguments.scene)?;
     let mut scene = load_scene(&arguments.scene)?;
     let options = Options { quick: arguments.quick, finer: arguments.finer, seed: scene.render.seed };
     if arguments.scene.common.size.is_none() {

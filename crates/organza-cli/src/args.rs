@@ -120,7 +120,7 @@ pub(super) struct FirstArguments {
     #[arg(long, value_name = "NAME")]
     pub(super) preset: Option<String>,
     /// Column that points take their colours from, one of those that `organza info` lists, or array of a VTK volume; --preset names the
-    /// colour map [default: the file's colours, else its classes or values]
+    /// colour map [default: the file's colours; of a LAS file without colours its classes where most points have one, else its values]
     #[arg(long, value_name = "COLUMN")]
     pub(super) color_by: Option<String>,
     /// Axis of the data that points up [default: what the format of each file says, else y]
@@ -202,7 +202,7 @@ pub(super) struct SceneArguments {
     #[arg(long, value_name = "DIR")]
     pub(super) cache: Option<PathBuf>,
     /// Bytes that the files of --cache may take; those that were not used for longest go first
-    #[arg(long, value_name = "BYTES", default_value = "8G", value_parser = parse_bytes)]
+    #[arg(long, value_name = "BYTES", default_value = "8G", value_parser = parse_bytes, requires = "cache")]
     pub(super) cache_size: u64,
     /// Make points of a `points` object at one place one
     #[arg(long)]

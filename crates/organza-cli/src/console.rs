@@ -1,6 +1,6 @@
 //! stdout and stderr that survive a closed pipe.
 
-use organza::{Error, escape_controls};
+use organza::{Error, escape_controls, printable};
 use serde_json::json;
 use std::io::{self, ErrorKind, IsTerminal, Write};
 use std::path::Path;
@@ -20,6 +20,13 @@ pub(super) fn out_between(text: &str) -> Result<(), Error> {
         note("\r\x1b[2K");
     }
     out(text)
+}
+
+/// A path as a shell takes it in a command that is printed to be copied: in quotes where it has more than letters, digits and a few marks.
+pub(super) fn argument(path: &Path) -> String {
+    let path = printable(path);
+    let is_plain = |c: char| c.is_alphanumeric() || "._/-+=@%,:".contains(c);
+    if !path.is_empty() && path.chars().all(is_plain) { path } else { format!("'{}'", path.replace('\'', "'\\''")) }
 }
 
 /// Writes to stderr, as far as that is possible.

@@ -43,9 +43,10 @@ pub(super) fn run(arguments: &ConvertArguments) -> Result<(), Error> {
         return console::out(&format!("{:#}\n", document(&loaded, target.path(), bytes)));
     }
     let path = printable(target.path());
+    let argument = console::argument(target.path());
     let count = loaded.cloud.len();
     console::out(&format!(
-        "wrote {path} ({bytes} bytes, {count} splats); draw it: organza render {path} -o picture.png\n"
+        "wrote {path} ({bytes} bytes, {count} splats); draw it: organza render {argument} -o picture.png\n"
     ))
 }
 
@@ -147,6 +148,8 @@ fn refuse_of_pictures(scene: &SceneArguments) -> Result<(), Error> {
         ("--target-error", scene.target_error.is_some()),
         ("--repeat-level", scene.repeat_level.is_some()),
         ("--exposure", scene.exposure.is_some()),
+        ("--layers", scene.layers.is_some()),
+        ("--effect", !scene.effect.is_empty()),
     ];
     let named = all.into_iter().find(|(_, on)| *on);
     named.map_or(Ok(()), |(name, _)| {

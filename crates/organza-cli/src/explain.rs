@@ -3,7 +3,7 @@
 use super::args::ExplainArguments;
 use super::bar::with_bar;
 use super::given::given;
-use super::session::{parse_scene, path_text, processor_only, render_options};
+use super::session::{parse_scene, path_text, processor_only, render_options, without_effect};
 use super::{console, report};
 use organza::scene::{Scene, SceneObject, UpBy};
 use organza::{Error, escape_controls};
@@ -15,7 +15,7 @@ pub(super) fn run(arguments: &ExplainArguments) -> Result<(), Error> {
     let (given, files) = given(&arguments.scene, None)?;
     let scene = parse_scene(&arguments.scene, &given, None, None)?;
     let options = render_options(&arguments.scene);
-    let (plan, cost, prepared, (warnings, notes, found)) = with_bar(|progress| {
+    let (plan, cost, prepared, (mut warnings, notes, found)) = with_bar(|progress| {
         if arguments.measure {
             let render = organza::render_from(&scene, &options, progress, files)?;
             return Ok((render.plan, render.cost, None, (render.warnings, render.notes, render.found)));
@@ -24,6 +24,7 @@ pub(super) fn run(arguments: &ExplainArguments) -> Result<(), Error> {
         let organza::Explanation { plan, cost, memory, splats, warnings, notes, found } = explanation;
         Ok((plan, cost, Some((memory, splats)), (warnings, notes, found)))
     })?;
+    warnings.extend(without_effect(&arguments.scene, &scene));
     for warning in &warnings {
         console::warn(warning);
     }

@@ -31,7 +31,8 @@ pub(super) fn run(arguments: &ExtractArguments) -> Result<(), Error> {
         return console::out(&format!("{document:#}\n"));
     }
     let path = printable(target.path());
-    console::out(&format!("wrote {path} ({count} points); draw it: organza render {path} -o picture.png\n"))
+    let argument = console::argument(target.path());
+    console::out(&format!("wrote {path} ({count} points); draw it: organza render {argument} -o picture.png\n"))
 }
 
 /// What a light of the scene sees of all its objects.

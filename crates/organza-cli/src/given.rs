@@ -4,7 +4,7 @@ use super::args::{Axis, FirstArguments, SceneArguments};
 use super::console;
 use super::session::{check_backend, render_options, start_threads};
 use convert::read::is_foreign_json;
-use organza::scene::{self, DEFAULT_FILL, DEFAULT_SIZE, Override, UpAxis};
+use organza::scene::{self, DEFAULT_FILL, DEFAULT_SIZE, Override, UpAxis, short};
 use organza::{Error, FileData, Files, Progress, RenderOptions, printable};
 use organza_survey::{DataFile, Preset, Wish, Written, first_scene};
 use std::io::Read;
@@ -44,7 +44,11 @@ pub(super) fn camera_overrides(first: &FirstArguments) -> Result<Vec<Override>, 
     let options = [("azimuth", first.azimuth), ("elevation", first.elevation), ("fit", first.fit)];
     let some = options.into_iter().filter_map(|(name, value)| Some((name, value?)));
     let one = |(name, value): (&str, f64)| {
-        Ok(Override::from_option(format!("--{name} {value}"), &format!("camera.{name}"), &format!("{value:?}"))?)
+        Ok(Override::from_option(
+            format!("--{name} {}", short(value)),
+            &format!("camera.{name}"),
+            &format!("{value:?}"),
+        )?)
     };
     some.map(one).collect()
 }
@@ -78,11 +82,14 @@ pub(super) fn write_first(
 pub(super) fn wish(first: &FirstArguments, size: Option<[i64; 2]>, turntable: Option<u32>) -> Result<Wish, Error> {
     let check = |name: &str, value: Option<f64>, low: f64, high: f64| match value {
         Some(v) if !(low..=high).contains(&v) => {
-            Err(Error::usage(format!("--{name} {v}: expected a number from {low} to {high}"), ""))
+            Err(Error::usage(format!("--{name} {}: expected a number from {low} to {high}", short(v)), ""))
         }
         _ => Ok(value),
     };
-    let fit = check("fit", first.fit, 0.01, 1.0)?;
+    if let Some(fit) = first.fit.filter(|fit| !(*fit > 0.0 && *fit <= 1.0)) {
+        let message = format!("--fit {}: expected a number above 0, at most 1", short(fit));
+        return Err(Error::usage(message, "the share of the picture's width or height that is filled"));
+    }
     let side = |side: i64| u32::try_from(side).ok().filter(|s| (1..=65536).contains(s));
     let size = match size {
         None => DEFAULT_SIZE,
@@ -98,7 +105,7 @@ pub(super) fn wish(first: &FirstArguments, size: Option<[i64; 2]>, turntable: Op
     Ok(Wish {
         azimuth: check("azimuth", first.azimuth, -360.0, 360.0)?,
         elevation: check("elevation", first.elevation, -90.0, 90.0)?,
-        fill: fit.unwrap_or(DEFAULT_FILL),
+        fill: first.fit.unwrap_or(DEFAULT_FILL),
         turntable,
         size,
         preset: first.preset.as_deref().map(Preset::named).transpose()?,

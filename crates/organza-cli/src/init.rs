@@ -36,7 +36,8 @@ pub(super) fn run(arguments: &InitArguments) -> Result<(), Error> {
     match &target {
         Some(target) => {
             let path = printable(target.path());
-            console::out(&format!("wrote {path}; draw it: organza render {path} -o picture.png\n"))
+            let argument = console::argument(target.path());
+            console::out(&format!("wrote {path}; draw it: organza render {argument} -o picture.png\n"))
         }
         None => console::out(&written.text),
     }

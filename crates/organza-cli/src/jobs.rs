@@ -3,7 +3,7 @@
 
 use super::args::{Frames, RenderArguments};
 use super::given::{Given, given};
-use super::session::{overrides, parse_scene, render_options};
+use super::session::{Flag, overrides, parse_scene, render_options};
 use organza::output::{self, Format, Target, Targets};
 use organza::scene::{FoundCamera, Scene};
 use organza::{Error, Files, Progress, Render, RenderOptions, Sequence, printable};
@@ -51,6 +51,11 @@ impl<'a> Jobs<'a> {
         let asked = arguments.frames.or(arguments.turntable.map(|_| Frames::All));
         let frames = asked.map(|frames| range(frames, &still)).transpose()?;
         Ok((Self { arguments, given, still, outputs, frames }, files))
+    }
+
+    /// The scene as it is written.
+    pub(super) fn still(&self) -> &Scene {
+        &self.still
     }
 
     /// The scene's file, or the data files that one was made of.
@@ -216,13 +221,14 @@ fn outputs(arguments: &RenderArguments) -> Result<Vec<PathBuf>, Error> {
         };
         outputs.push(Path::new(name.file_stem().unwrap_or("picture".as_ref())).with_added_extension("exr"));
     }
-    let options = [("--deep", arguments.deep), ("--legend", arguments.legend)];
-    let is_png = |path: &PathBuf| Format::of_path(path).is_ok_and(|format| format == Format::Png);
-    if let Some((option, _)) = options.iter().find(|option| option.1)
-        && !outputs.iter().any(is_png)
-    {
-        return Err(Error::usage(format!("{option} is for PNG files, and no output is one"), "add -o NAME.png"));
-    }
+    let of_png =
+        [Flag { name: "--deep", is_given: arguments.deep }, Flag { name: "--legend", is_given: arguments.legend }];
+    refuse_options_of(Format::Png, &of_png, &outputs)?;
+    let of_exr = [
+        Flag { name: "--layers", is_given: arguments.scene.layers.is_some() },
+        Flag { name: "--half", is_given: arguments.half },
+    ];
+    refuse_options_of(Format::Exr, &of_exr, &outputs)?;
     for (i, path) in outputs.iter().enumerate() {
         Format::of_path(path)?;
         let others = [&arguments.cost, &arguments.checkpoint];
@@ -231,6 +237,19 @@ fn outputs(arguments: &RenderArguments) -> Result<Vec<PathBuf>, Error> {
         }
     }
     Ok(outputs)
+}
+
+/// Refuses options of one format where no output has it: they would change nothing.
+fn refuse_options_of(format: Format, options: &[Flag], outputs: &[PathBuf]) -> Result<(), Error> {
+    let has_format = |path: &PathBuf| Format::of_path(path).is_ok_and(|found| found == format);
+    let given = options.iter().find(|option| option.is_given).filter(|_| !outputs.iter().any(has_format));
+    let Some(Flag { name, .. }) = given else { return Ok(()) };
+    let kind = match format {
+        Format::Png => "PNG",
+        Format::Exr => "EXR",
+    };
+    let hint = format!("add -o NAME.{}", kind.to_ascii_lowercase());
+    Err(Error::usage(format!("{name} is for {kind} files, and no output is one"), hint))
 }
 
 #[cfg(test)]

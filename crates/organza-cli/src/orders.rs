@@ -3,7 +3,7 @@
 use super::args::OrdersArguments;
 use super::bar::with_bar;
 use super::console;
-use super::session::{in_folder, load_scene, path_text, processor_only, render_options};
+use super::session::{in_folder, load_scene, path_text, processor_only, refuse_technique_and_layers, render_options};
 use organza::{Error, printable};
 use organza_judge::accuracy;
 use organza_judge::orders::{self, OrdersReport};
@@ -12,6 +12,7 @@ use serde_json::json;
 /// Draws by every ordering and writes the comparison. Whatever can be refused is refused before any work.
 pub(super) fn run(arguments: &OrdersArguments) -> Result<(), Error> {
     processor_only(&arguments.scene)?;
+    refuse_technique_and_layers("orders", &arguments.scene)?;
     let mut scene = load_scene(&arguments.scene)?;
     if arguments.scene.common.size.is_none() {
         accuracy::shrink(&mut scene, orders::LONGEST_SIDE);

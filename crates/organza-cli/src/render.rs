@@ -3,7 +3,7 @@
 use super::args::RenderArguments;
 use super::bar::with_bar;
 use super::jobs::{Drawing, Jobs, Places};
-use super::session::{open_device, path_text, render_options};
+use super::session::{open_device, path_text, render_options, without_effect};
 use super::{console, report};
 use organza::output::{self, Metadata, Target, WriteReport};
 use organza::scene::{FoundCamera, Scene};
@@ -117,6 +117,7 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<u8, Error> {
     let options = RenderOptions { device: open_device(&arguments.scene)?, ..render_options(&arguments.scene) };
     let is_json = arguments.scene.common.json;
     let mut said = Said::default();
+    add_new(&mut said.warnings, without_effect(&arguments.scene, jobs.still()).into_iter().collect());
     let outcome = with_bar(|progress| {
         let count = jobs.frames().count();
         for (at, frame) in jobs.frames().enumerate() {
@@ -227,6 +228,14 @@ impl Job<'_> {
             if report.not_a_number > 0 {
                 let count = report.not_a_number;
                 warnings.push(format!("{}: {count} values were not numbers; this is a bug", printable(path)));
+            }
+            if report.too_bright > 0 {
+                let count = report.too_bright;
+                warnings.push(format!(
+                    "{}: {count} translucent pixels are brighter than a straight colour with their opacity can be, and lose light: write an \
+                     .exr, which keeps it, or lower --exposure",
+                    printable(path)
+                ));
             }
             if report.without_room > 0 {
                 let (path, count) = (printable(path), report.without_room);

@@ -4,7 +4,7 @@ use super::args::{Backend, CommonArguments, SceneArguments};
 use super::given::{Given, camera_overrides, given};
 use super::memory;
 use organza::device::{Choice, Device, DeviceChoice};
-use organza::scene::{self, LoadOptions, Override, Scene};
+use organza::scene::{self, LoadOptions, Override, Scene, Source, Technique, short};
 use organza::{Cache, Error, Progress, RenderOptions, printable};
 use splat_core::MemoryAccount;
 use std::path::Path;
@@ -28,7 +28,43 @@ pub(super) fn parse_scene(
     let SceneArguments { allow_path, sandbox, .. } = *arguments;
     let memory = MemoryAccount::new(reading_options(&arguments.common).max_memory);
     let options = LoadOptions { allow_path, sandbox, memory, overrides, frame, turntable };
-    Ok(scene::parse(&given.file, &given.bytes, &options)?)
+    let scene = scene::parse(&given.file, &given.bytes, &options)?;
+    if arguments.merge_duplicates && !scene.objects.iter().any(|object| matches!(object.source, Source::Points(_))) {
+        let message = "--merge-duplicates is for `points`, and no object is made of such";
+        return Err(Error::usage(message, "leave it out"));
+    }
+    Ok(scene)
+}
+
+/// Options of the technique `particles` where nothing is drawn by it, which would pass silently otherwise.
+pub(super) fn without_effect(arguments: &SceneArguments, scene: &Scene) -> Option<String> {
+    let techniques = scene.objects.iter().filter(|object| object.visible).filter_map(|object| object.technique);
+    let has_particles = techniques.chain([scene.render.technique]).any(|technique| technique == Technique::Particles);
+    let options =
+        [("--target-error", arguments.target_error.is_some()), ("--repeat-level", arguments.repeat_level.is_some())];
+    let (option, _) = options.into_iter().find(|option| option.1).filter(|_| !has_particles)?;
+    Some(format!(
+        "{option} changes nothing: no object is drawn by the technique `particles`; add --technique particles"
+    ))
+}
+
+/// An option of the command line.
+pub(super) struct Flag {
+    /// As the user writes it.
+    pub(super) name: &'static str,
+    pub(super) is_given: bool,
+}
+
+/// Refuses options of a picture where a command draws by every technique, with the layers that it needs.
+pub(super) fn refuse_technique_and_layers(command: &str, arguments: &SceneArguments) -> Result<(), Error> {
+    let options = [
+        Flag { name: "--technique", is_given: arguments.technique.is_some() },
+        Flag { name: "--layers", is_given: arguments.layers.is_some() },
+    ];
+    let given = options.iter().find(|option| option.is_given);
+    given.map_or(Ok(()), |option| {
+        Err(Error::usage(format!("{} changes nothing that `organza {command}` does", option.name), "leave it out"))
+    })
 }
 
 /// What reading may take and how it treats doubtful input.
@@ -123,16 +159,20 @@ pub(super) fn overrides(a: &SceneArguments, is_made: bool) -> Result<Vec<Overrid
         options.push((format!("--seed {seed}"), "render.seed", seed.to_string()));
     }
     if let Some(tolerance) = a.tolerance {
-        options.push((format!("--tolerance {tolerance}"), "render.tolerance", format!("{tolerance:?}")));
+        options.push((format!("--tolerance {}", short(tolerance)), "render.tolerance", format!("{tolerance:?}")));
     }
     if let Some(error) = a.target_error {
-        options.push((format!("--target-error {error}"), "render.particles.target_error", format!("{error:?}")));
+        options.push((
+            format!("--target-error {}", short(error)),
+            "render.particles.target_error",
+            format!("{error:?}"),
+        ));
     }
     if let Some(levels) = a.repeat_level {
         options.push((format!("--repeat-level {levels}"), "render.particles.repeat_level", levels.to_string()));
     }
     if let Some(exposure) = a.exposure {
-        options.push((format!("--exposure {exposure}"), "render.exposure", format!("{exposure:?}")));
+        options.push((format!("--exposure {}", short(exposure)), "render.exposure", format!("{exposure:?}")));
     }
     if let Some(layers) = &a.layers {
         let list = layers.iter().map(|l| quote(l)).collect::<Vec<_>>().join(", ");

@@ -84,6 +84,8 @@ pub struct WriteReport {
     pub clamped: u64,
     /// Values that were not a number, written as 0.
     pub not_a_number: u64,
+    /// Pixels whose light is brighter than their opacity holds as a straight colour: what is beyond is lost.
+    pub too_bright: u64,
     /// Legends that the picture has no room for.
     pub without_room: u64,
 }

@@ -61,6 +61,10 @@ fn transparent(layers: &Layers, gain: f32, report: &mut WriteReport) -> Result<V
     let mut samples = Vec::with_capacity(4 * beauty.len());
     for ((beauty, behind), alpha) in beauty.iter().zip(behind).zip(alpha) {
         report.not_a_number += beauty.iter().filter(|v| v.is_nan()).count() as u64;
+        // One step of 8 bits is lost by rounding alone.
+        let lost = |c: usize| (beauty[c] - behind[c]) * gain - alpha.max(0.0) > 1.0 / 255.0;
+        // What hides the background as a whole is as bright in any picture.
+        report.too_bright += u64::from(*alpha < 1.0 - 1.0 / 255.0 && (0..3).any(lost));
         let straight = gain / alpha.max(f32::MIN_POSITIVE);
         let seen = alpha.is_finite() && *alpha > 0.0;
         samples.extend([0, 1, 2].map(|c| if seen { encoded((beauty[c] - behind[c]) * straight) } else { 0.0 }));
@@ -136,6 +140,19 @@ mod tests {
         let (info, pixels) = encode_with(&Params { transparent: true, ..Params::default() });
         assert_eq!((info.color_type, info.bit_depth), (ColorType::Rgba, BitDepth::Eight));
         assert_eq!(pixels, [118, 0, 255, 64, 0, 0, 0, 0]);
+    }
+
+    #[test]
+    fn light_beyond_its_opacity_is_counted() {
+        let count = |exposure: f64| {
+            let metadata = Metadata { exposure, ..Metadata::default() };
+            let params = Params { transparent: true, ..Params::default() };
+            let mut report = WriteReport::default();
+            encode(&layers(), &metadata, &params, &mut report).unwrap();
+            report.too_bright
+        };
+        // Its blue is as bright as its opacity at most, then twice as bright.
+        assert_eq!([count(0.0), count(1.0)], [0, 1]);
     }
 
     #[test]

@@ -17,10 +17,10 @@ use super::raw::{RawAnimation, RawScene};
 use super::raw_object::RawObject;
 use super::stops::check_stops;
 use super::tree::{Document, Node, Step};
-use super::{Aligned, RenderSettings, Scene, SceneObject};
-use crate::{Error, Written};
+use super::{Aligned, RenderSettings, Scene, SceneLight, SceneObject, ShadowMapping};
+use crate::{Error, Written, short};
 use glam::DVec3;
-use splat_core::Camera;
+use splat_core::{Camera, LightShape};
 use std::collections::HashMap;
 use std::ops::RangeInclusive;
 
@@ -92,9 +92,9 @@ impl<'a> At<'a> {
         let expected = match (*low, *high) {
             (SMALLEST, LARGEST) => format!("a number above 0, from {SMALLEST:e} to {LARGEST:e}"),
             (0.0, LARGEST) => format!("a number from 0 to {LARGEST:e}"),
-            _ => format!("a number from {low} to {high}"),
+            _ => format!("a number from {} to {}", short(*low), short(*high)),
         };
-        Err(self.key(key).error(format!("`{key}`: expected {expected}, found {value}"), ""))
+        Err(self.key(key).error(format!("`{key}`: expected {expected}, found {}", short(value)), ""))
     }
 
     /// A whole number in a range.
@@ -115,7 +115,7 @@ impl<'a> At<'a> {
     pub(super) fn vector(&self, key: &'a str, value: [f64; 3]) -> Result<DVec3, Error> {
         for x in value {
             if x.abs() > LARGEST {
-                let message = format!("`{key}`: expected numbers from -{LARGEST:e} to {LARGEST:e}, found {x}");
+                let message = format!("`{key}`: expected numbers from -{LARGEST:e} to {LARGEST:e}, found {}", short(x));
                 return Err(self.key(key).error(message, ""));
             }
         }
@@ -142,7 +142,7 @@ impl<'a> At<'a> {
     pub(super) fn colors_up_to(&self, key: &'a str, value: [f64; 3], most: f64) -> Result<[f32; 3], Error> {
         for (i, x) in value.into_iter().enumerate() {
             if !(0.0..=most).contains(&x) {
-                let message = format!("`{key}`: expected numbers from 0 to {most:e}, found {x}");
+                let message = format!("`{key}`: expected numbers from 0 to {most:e}, found {}", short(x));
                 return Err(self.key(key).index(i).error(message, ""));
             }
         }
@@ -195,6 +195,7 @@ pub(super) fn scene(
     let (background, environment) = check_background(&at.key("background"), &raw.background, &paths)?;
     let lights = check_lights(&at.key("light"), &raw.light, &paths)?;
     render.effects = check_effects(&at.key("render").key("effects"), &raw.render.effects, &lights)?;
+    check_mapping(&at.key("render").key("shadow").key("mapping"), &render, &lights)?;
     let at_animation = at.key("animation");
     let frames = raw.animation.as_ref().map(|a| check_animation(&at_animation, a)).transpose()?;
     let stops = raw.animation.as_ref().map(|a| check_stops(&at_animation, a, &objects, raw.light.len())).transpose()?;
@@ -250,6 +251,18 @@ fn check_objects(
         objects.push(SceneObject { deforms, materials: listed, ..check_object(&at, object, material, named)? });
     }
     Ok(objects)
+}
+
+/// Refuses maps around a place for light that comes from none.
+fn check_mapping(at: &At<'_>, render: &RenderSettings, lights: &[SceneLight]) -> Result<(), Error> {
+    let is_parallel = |light: &&SceneLight| light.shadow && matches!(light.light.shape, LightShape::Directional { .. });
+    let parallel = lights.iter().find(is_parallel).filter(|_| render.shadow.mapping != ShadowMapping::Auto);
+    let Some(light) = parallel else { return Ok(()) };
+    let message = format!(
+        "`mapping`: directions around a place are for lights that have one, and light `{}` is directional",
+        crate::shown(&light.label)
+    );
+    Err(at.error(message, "leave `mapping` out, or set shadow = false for that light"))
 }
 
 /// Refuses slabs along a lattice that are seen in perspective.

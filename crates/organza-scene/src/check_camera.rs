@@ -29,7 +29,7 @@ pub(super) fn check_camera(at: &At<'_>, raw: &RawCamera, turn: Option<Turn>, goe
         let elevation = raw.elevation.map(|e| at.number("elevation", e, -90.0..=90.0)).transpose()?;
         let fill = raw.fit.unwrap_or(DEFAULT_FILL);
         if !(fill > 0.0 && fill <= 1.0) {
-            let message = format!("`fit`: expected a number above 0, at most 1, found {fill}");
+            let message = format!("`fit`: expected a number above 0, at most 1, found {}", crate::short(fill));
             return Err(at.key("fit").error(message, "the share of the picture that is filled"));
         }
         let fit = CameraFit {
@@ -86,7 +86,7 @@ fn check_projection(at: &At<'_>, raw: &RawCamera) -> Result<Projection, Error> {
     match (raw.fov_y, raw.orthographic) {
         (Some(fov_y), None) => {
             if !(fov_y > 0.0 && fov_y < 180.0) {
-                let message = format!("`fov_y`: expected degrees between 0 and 180, found {fov_y}");
+                let message = format!("`fov_y`: expected degrees between 0 and 180, found {}", crate::short(fov_y));
                 return Err(at.key("fov_y").error(message, ""));
             }
             Ok(Projection::Perspective { fov_y: fov_y.to_radians() })

@@ -10,7 +10,10 @@ use crate::{Error, shown};
 pub(super) fn check_extract(at: &At<'_>, raw: &RawExtract) -> Result<ExtractSource, Error> {
     let absorbance = raw.absorbance.unwrap_or(1.0);
     if !(absorbance > 0.0 && absorbance <= f64::from(MOST_ABSORBANCE)) {
-        let message = format!("`absorbance`: expected a number above 0, at most {MOST_ABSORBANCE}, found {absorbance}");
+        let message = format!(
+            "`absorbance`: expected a number above 0, at most {MOST_ABSORBANCE}, found {}",
+            crate::short(absorbance)
+        );
         return Err(at.key("absorbance").error(message, "lists of a shadow map go no farther"));
     }
     if raw.objects.as_ref().is_some_and(Vec::is_empty) {

@@ -29,7 +29,7 @@ pub(super) fn check_isosurface(at: &At<'_>, raw: &RawIsosurface, paths: &Paths) 
 pub(super) fn check_level_set(at: &At<'_>, raw: &RawLevelSet, paths: &Paths) -> Result<LevelSetSource, Error> {
     let tolerance = raw.tolerance.unwrap_or(MpuParams::default().tolerance);
     if !(tolerance > 0.0 && tolerance <= 1.0) {
-        let message = format!("`tolerance`: expected a number above 0, up to 1, found {tolerance}");
+        let message = format!("`tolerance`: expected a number above 0, up to 1, found {}", crate::short(tolerance));
         return Err(at.key("tolerance").error(message, "it is a share of the diagonal of the points' box"));
     }
     Ok(LevelSetSource { path: paths.resolve(&at.key("points"), &raw.points)?, tolerance })

@@ -70,7 +70,7 @@ fn check_cutoff(at: &At<'_>, cutoff: f64) -> Result<Footprint, Error> {
     if (1.0..=8.0).contains(&cutoff) {
         return Ok(Footprint { cutoff: cutoff as f32 });
     }
-    Err(at.error(format!("expected a number from 1 to 8, found {cutoff}"), ""))
+    Err(at.error(format!("expected a number from 1 to 8, found {}", crate::short(cutoff)), ""))
 }
 
 /// The files that a table names, and where it does.

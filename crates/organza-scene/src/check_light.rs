@@ -118,7 +118,7 @@ fn spot_shape(at: &At<'_>, raw: &RawLight) -> Result<LightShape, Error> {
         (None, None) => return Err(at.error("expected a key `target` or `direction` here, found neither", "")),
     };
     if !(outer > 0.0 && outer < 90.0) {
-        let message = format!("`outer`: expected degrees between 0 and 90, found {outer}");
+        let message = format!("`outer`: expected degrees between 0 and 90, found {}", crate::short(outer));
         return Err(at.key("outer").error(message, "it is half of the cone's angle"));
     }
     let inner = at.number("inner", inner, 0.0..=outer)?;

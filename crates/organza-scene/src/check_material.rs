@@ -104,7 +104,7 @@ fn check_material(at: &At<'_>, name: &str, raw: &RawMaterial, paths: &Paths) -> 
     let albedo = medium.and_then(|m| m.albedo).unwrap_or(if raw.absorption.is_some() { 0.0 } else { 1.0 });
     let asymmetry = medium.and_then(|m| m.asymmetry).unwrap_or(0.0);
     if asymmetry.abs() >= 1.0 {
-        let message = format!("`asymmetry`: expected a number between -1 and 1, found {asymmetry}");
+        let message = format!("`asymmetry`: expected a number between -1 and 1, found {}", crate::short(asymmetry));
         return Err(at_medium.key("asymmetry").error(message, ""));
     }
     let bump = raw.bump.as_ref().map(|bump| check_bump(&at.key("bump"), bump, paths)).transpose()?;

@@ -16,6 +16,9 @@ use splat_core::{FootprintStack, Packing, Similarity};
 use std::collections::HashSet;
 use std::sync::Arc;
 
+/// Greatest value that a voxel may have.
+const GREATEST_VALUE: f64 = f32::MAX as f64;
+
 /// What objects refer to.
 pub(super) struct Named<'a> {
     pub(super) materials: &'a [SceneMaterial],
@@ -64,6 +67,11 @@ pub(super) fn check_object(
             Some(RawLattice::Bcc) => Packing::BodyCentred,
         },
         array: raw.array.clone(),
+        nodata: raw
+            .nodata
+            .map(|value| at.number("nodata", value, -GREATEST_VALUE..=GREATEST_VALUE))
+            .transpose()?
+            .map(|v| v as f32),
         degrees: raw.degrees.unwrap_or(false),
         field,
         points: check_points(at, &raw)?,
@@ -144,9 +152,12 @@ fn refuse_what_does_not_apply(at: &At<'_>, raw: &RawObject, source: &Source) -> 
         return Err(at.key("degrees").error("`degrees` belongs to `points`", ""));
     }
     let has_volume = raw.volume.is_some() || raw.isosurface.is_some() || raw.slice.is_some() || raw.field.is_some();
-    if raw.array.is_some() && !has_volume {
-        let message = "`array` belongs to a `volume`, an `isosurface`, a `slice` and a surface with a `field`";
-        return Err(at.key("array").error(message, ""));
+    for (key, on) in [("array", raw.array.is_some()), ("nodata", raw.nodata.is_some())] {
+        if on && !has_volume {
+            let message =
+                format!("`{key}` belongs to a `volume`, an `isosurface`, a `slice` and a surface with a `field`");
+            return Err(at.key(key).error(message, ""));
+        }
     }
     let is_classified = raw.volume.is_some() || raw.slice.is_some();
     if raw.transfer.is_some() && !is_classified && raw.color_by.is_none() && raw.field.is_none() {

@@ -19,7 +19,7 @@ use splat_core::raster::Accumulation;
 pub(super) fn check_render(at: &At<'_>, raw: &RawRender) -> Result<RenderSettings, Error> {
     let tolerance = raw.tolerance.unwrap_or(1.0 / 255.0);
     if !(tolerance > 0.0 && tolerance <= 1.0) {
-        let message = format!("`tolerance`: expected a number above 0, at most 1, found {tolerance}");
+        let message = format!("`tolerance`: expected a number above 0, at most 1, found {}", crate::short(tolerance));
         return Err(at.key("tolerance").error(message, "the default is 1/255"));
     }
     if raw.max_points == Some(0) {
@@ -244,8 +244,10 @@ fn check_scattering(at: &At<'_>, raw: &RawSheets) -> Result<Option<Scattering>, 
         None | Some(Auto::Auto) => None,
         Some(Auto::Number(degrees)) if (0.0..90.0).contains(&degrees) => Some(degrees.to_radians()),
         Some(Auto::Number(degrees)) => {
-            let message =
-                format!("`scattering_cone`: expected degrees from 0 to below 90 or \"auto\", found {degrees}");
+            let message = format!(
+                "`scattering_cone`: expected degrees from 0 to below 90 or \"auto\", found {}",
+                crate::short(degrees)
+            );
             return Err(at.key("scattering_cone").error(message, ""));
         }
     };

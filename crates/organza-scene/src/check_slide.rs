@@ -63,7 +63,7 @@ pub(super) fn check_slide(
 /// Width at a distance of 1 of a picture that is seen under this angle.
 fn before_spot(at: &At<'_>, degrees: f64) -> Result<f64, Error> {
     if !(degrees > 0.0 && degrees < 180.0) {
-        let message = format!("`texture_angle`: expected degrees between 0 and 180, found {degrees}");
+        let message = format!("`texture_angle`: expected degrees between 0 and 180, found {}", crate::short(degrees));
         return Err(at.key("texture_angle").error(message, "it is the angle across the width of the picture"));
     }
     at.number("texture_angle", 2.0 * libm::tan(0.5 * degrees.to_radians()), SMALLEST..=LARGEST)

@@ -77,7 +77,7 @@ pub use settings::{
     PointsSettings, RenderSettings, Scattering, ShadowMapping, ShadowSettings, SheetsSettings, Slicing, SoftShadows,
     SurfaceSampler, SurfelGroups, SurfelLayers, SurfelsSettings, SwitchedEffect, Technique, VolumeSampler,
 };
-pub use shown::{escape_controls, place, printable, shown};
+pub use shown::{escape_controls, place, printable, short, shown};
 pub use source::{
     CloudSource, CombinedSource, DensitySource, ExtractSource, FieldSource, ImplicitSource, IsosurfaceSource,
     LevelSetSource, MOST_ABSORBANCE, MatterSource, SliceSource, Source, VolumeSource,

@@ -163,6 +163,8 @@ pub struct SceneObject {
     pub packing: Packing,
     /// Which array of a VTK file its volume is; `None` for the one that the file names, else the first of one number.
     pub array: Option<String>,
+    /// The value that voxels of its volume have which have none, beside NaN.
+    pub nodata: Option<f32>,
     /// Whether x and y of its points are degrees, which become metres.
     pub degrees: bool,
     /// The field that it shows, a surface alone.

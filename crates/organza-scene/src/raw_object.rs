@@ -27,6 +27,8 @@ pub(super) struct RawObject {
     /// Which array of a VTK file a `volume`, `isosurface`, `slice` or `field` is; default the one that the file names, else the first of one
     /// number.
     pub(super) array: Option<String>,
+    /// The value of the voxels of a `volume`, `isosurface`, `slice` or `field` that have none, which draw nothing; default none but NaN.
+    pub(super) nodata: Option<f64>,
     /// Path of a raw point cloud.
     pub(super) points: Option<String>,
     /// What a light sees first of other objects.

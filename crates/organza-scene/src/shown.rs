@@ -35,6 +35,13 @@ pub fn printable(path: &Path) -> String {
     characters.concat()
 }
 
+/// A number as it was given, unless its zeros would fill a line: these are written as a power of ten.
+pub fn short(value: f64) -> String {
+    const LONGEST: usize = 20;
+    let plain = value.to_string();
+    if plain.len() <= LONGEST { plain } else { format!("{value:e}") }
+}
+
 /// A place or a direction for a message: four digits are enough to find it.
 pub fn place(p: DVec3) -> String {
     let digits = |v: f64| {

@@ -63,7 +63,7 @@ impl Value {
             Self::Null => "null".into(),
             Self::Bool(b) => b.to_string(),
             Self::Int(i) => format!("the number {i}"),
-            Self::Float(x) => format!("the number {x}"),
+            Self::Float(x) => format!("the number {}", crate::short(*x)),
             Self::Text(t) => format!("the text \"{}\"", shown(t)),
             Self::List(items) if items.len() == 1 => "a list of 1 value".into(),
             Self::List(items) => format!("a list of {} values", items.len()),

@@ -22,6 +22,8 @@ pub struct DataFile {
     pub degrees: bool,
     /// The array of a VTK volume that was asked for.
     pub array: Option<String>,
+    /// The value of the voxels of a volume that have none, which are NaN in [`Self::data`].
+    pub nodata: Option<f32>,
     /// Why a volume has no such array.
     pub array_error: Option<Error>,
 }
@@ -47,6 +49,13 @@ impl DataFile {
                 Err(error) => array_error = Some(error),
             }
         }
+        let mut nodata = None;
+        if let FileData::Grid(grid) = &data
+            && let Some(fill) = convert::FillValue::of_grid(grid)
+        {
+            nodata = Some(fill.value);
+            data = FileData::Grid(convert::without_value(grid, fill.value).0.into());
+        }
         let refuse = |message: &str, hint: &str| Err(Error::input(printable(path), message, hint));
         match &data {
             FileData::Mesh(mesh) if mesh.triangles.is_empty() => refuse("expected at least one face, found none", ""),
@@ -67,7 +76,7 @@ impl DataFile {
                 // Heights are along z then.
                 let stands = if degrees { Some(UpAxis::Z) } else { stands };
                 let stands = stands.filter(|_| stated_up.is_none() && wish.up.is_none());
-                Ok(Self { path: path.to_owned(), data, stated_up, stands, degrees, array, array_error })
+                Ok(Self { path: path.to_owned(), data, stated_up, stands, degrees, array, nodata, array_error })
             }
         }
     }
@@ -130,6 +139,7 @@ mod tests {
                 stands: None,
                 degrees: false,
                 array: None,
+                nodata: None,
                 array_error: None,
             }
         };
@@ -151,6 +161,7 @@ mod tests {
                 stands: None,
                 degrees: false,
                 array: None,
+                nodata: None,
                 array_error: None,
             }
             .name()

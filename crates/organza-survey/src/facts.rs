@@ -5,7 +5,7 @@ use crate::mesh_faults::{MeshFaults, mesh_faults};
 use crate::spacing::{duplicates, median_spacing};
 use crate::stands::{cloud_stands_along, lies_flat_along, stands_along};
 use convert::read::{Loaded, Mended, NamedColumn, ReadParams, UpAxis, stated_up_axis, up_axis};
-use convert::{RawPoints, looks_like_degrees};
+use convert::{FillValue, RawPoints, Strays, looks_like_degrees};
 use organza::Error;
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::{Aabb, DAabb, Grid, MemoryAccount, Mesh, RadianceImage};
@@ -222,6 +222,11 @@ fn of_grid(grid: &Grid) -> Facts {
         steps: Some([grid.axes.x_axis, grid.axes.y_axis, grid.axes.z_axis]),
         range: (!grid.values.is_empty()).then_some(range),
         histogram: wide.map(|range| Histogram::new(&grid.values, range, BINS)),
+        remarks: [FillValue::of_grid(grid).map(|fill| fill.to_string()), Strays::of_grid(grid).map(|s| s.to_string())]
+            .into_iter()
+            .flatten()
+            .take(1)
+            .collect(),
         quantiles: fine.iter().flat_map(|f| SHARES.map(|share| (share, f.quantile(share)))).collect(),
         ..Facts::default()
     }

@@ -10,7 +10,7 @@ use crate::data_file::DataFile;
 use crate::lamps::lamps;
 use crate::number::{color, list, rounded, significant};
 use crate::preset::{Preset, Wish};
-use look::{Object, all_stand, drawn_steps, objects};
+use look::{Object, all_stand, drawn_steps, objects, takes_preset};
 use organza::scene::{DEFAULT_AZIMUTH, FoundCamera, LoadOptions, ROOT_KEY, parse, relative_path, root_for};
 use organza::{Error, FileData, Files, Progress, RenderOptions, printable};
 use splat_core::glam::DVec3;
@@ -61,6 +61,10 @@ pub fn first_scene(
     let paths: Vec<String> = data.iter().map(|d| written_path(&d.path, &folder)).collect::<Result<_, _>>()?;
     let root = root_for(scene_file, data.iter().map(|d| d.path.as_path()))?;
     let root = root.map(|root| text_of(&root)).transpose()?;
+    if wish.preset.is_some() && !data.iter().any(|file| takes_preset(file, wish)) {
+        let message = "--preset is for volumes, and as a colour map for points by a column, and no file is drawn so";
+        return Err(Error::usage(message, "leave it out; in a scene `color` of an object is the colour of a mesh"));
+    }
     let objects = objects(data, &paths, wish);
     let azimuth = wish.azimuth.unwrap_or_else(|| default_azimuth(data));
     let head = |camera: &str| {
@@ -73,7 +77,7 @@ pub fn first_scene(
         let _ = writeln!(camera, "elevation = {elevation:?}");
     }
     let _ = writeln!(camera, "size = {:?}", wish.size);
-    let drawn = render_text(data, wish);
+    let drawn = render_text(data, wish, objects.iter().all(Object::is_labels));
     let seen: String = objects.iter().map(Object::material).chain(objects.iter().map(Object::text)).collect();
     let first = head(&camera) + &seen + &drawn;
     let scene =
@@ -114,8 +118,9 @@ fn degree_remarks(data: &[DataFile]) -> impl Iterator<Item = String> + '_ {
     data.iter().filter(|file| file.degrees).map(move |file| format!("{}: {said}", printable(&file.path)))
 }
 
-/// How it is drawn, where that is not as everything is: volumes alone by sheets, whose smooth edges need no more than one sample a pixel.
-fn render_text(data: &[DataFile], wish: &Wish) -> String {
+/// How it is drawn, where that is not as everything is: volumes alone by sheets, whose smooth edges need no more than one sample a pixel. Voxels of
+/// labels have their colours before these are interpolated: between two labels others would show.
+fn render_text(data: &[DataFile], wish: &Wish, are_labels: bool) -> String {
     let steps_of = |d: &DataFile| if let FileData::Grid(grid) = &d.data { Some(drawn_steps(grid)) } else { None };
     let steps: Option<Vec<[f64; 2]>> = data.iter().map(steps_of).collect();
     let is_cloud = wish.preset.as_ref().is_some_and(Preset::is_cloud);
@@ -123,12 +128,19 @@ fn render_text(data: &[DataFile], wish: &Wish) -> String {
     let mut text =
         "\n[render]\ntechnique = \"sheets\"     # sharp; \"points\" is softer and quicker\nantialias = 1\n".to_owned();
     let least = steps.iter().fold(f64::INFINITY, |least, [step, _]| least.min(*step));
+    let mut sheets = String::new();
     if steps.iter().all(|[_, most]| *most <= MOST_STEPS * least) {
         let width = significant(SLAB_WIDTH * least, 3);
-        let _ = write!(
-            text,
-            "\n[render.sheets]\nslab_width = {width}     # half a voxel: wider ones take less time, and show on flat surfaces\n"
+        let _ = writeln!(
+            sheets,
+            "slab_width = {width}     # half a voxel: wider ones take less time, and show on flat surfaces"
         );
+    }
+    if are_labels {
+        sheets += "classify = \"before\"     # each voxel in the colour of its label: after interpolation others would show between two\n";
+    }
+    if !sheets.is_empty() {
+        text += &format!("\n[render.sheets]\n{sheets}");
     }
     text
 }
@@ -220,15 +232,18 @@ mod tests {
                 stands: None,
                 degrees: false,
                 array: None,
+                nodata: None,
                 array_error: None,
             }
         };
-        let text = |files: &[DataFile]| render_text(files, &Wish::default());
+        let text = |files: &[DataFile]| render_text(files, &Wish::default(), false);
         assert!(text(&[file(DVec3::new(0.7, 0.7, 2.5))]).contains("\nslab_width = 0.35 "));
         assert!(text(&[file(DVec3::splat(4.0)), file(DVec3::ONE)]).contains("\nslab_width = 0.5 "));
         for unlike in [vec![file(DVec3::new(0.1, 0.1, 2.5))], vec![file(DVec3::ONE), file(DVec3::splat(20.0))]] {
             assert!(text(&unlike).contains("sheets") && !text(&unlike).contains("slab_width"));
         }
-        assert_eq!(render_text(&[file(DVec3::ONE)], &Wish { ground: true, ..Wish::default() }), "");
+        let labels = render_text(&[file(DVec3::ONE)], &Wish::default(), true);
+        assert!(labels.contains("\n[render.sheets]\nslab_width = 0.5 ") && labels.contains("\nclassify = \"before\" "));
+        assert_eq!(render_text(&[file(DVec3::ONE)], &Wish { ground: true, ..Wish::default() }, false), "");
     }
 }

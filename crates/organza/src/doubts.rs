@@ -7,7 +7,7 @@ use crate::form::PlannedObject;
 use crate::load::{Loaded, own::Own};
 use crate::plan::Plan;
 use crate::scene::place;
-use crate::scene::{Scene, SceneLight, SceneObject};
+use crate::scene::{Scene, SceneLight, SceneObject, Source, Technique};
 use crate::shadows::{Coarse, thickness_of};
 use crate::{Layers, ShadowTable, escape_controls};
 use glam::DVec3;
@@ -27,6 +27,8 @@ const TIMES: f64 = 4.0;
 const TOLD: usize = 4;
 /// Optical depth of a spacing up to which the light of layers of splats is held to closed forms.
 const THICKEST: f32 = 16.0;
+/// The same of a box or a ball by sheets: from about three on the maps of light, which blur by a spacing, show as dark frames along its edges.
+const THICKEST_BY_SHEETS: f32 = 4.0;
 /// Full angle of a lens, degrees, beyond which a pixel in the middle of the picture is wider than most splats.
 const WIDEST_LENS: f64 = 150.0;
 /// Optical depth up to which one splat alone tells how light falls off in it: its middle is right within a hundredth.
@@ -139,7 +141,7 @@ struct Thickness {
     bounds: DAabb,
 }
 
-/// Media drawn as splats that are so thick that splats do not tell their light.
+/// Media that are so thick that splats do not tell their light, or the maps of sheets that of their edges.
 fn too_thick(scene: &Scene, loaded: &Loaded) -> Vec<String> {
     if scene.lacks_light() {
         return Vec::new();
@@ -158,24 +160,30 @@ fn too_thick(scene: &Scene, loaded: &Loaded) -> Vec<String> {
         }
     }
     let unit = libm::exp2(f64::from(loaded.exponent));
-    let as_splats = |name: &str| loaded.planned.iter().any(|o| o.object == name && o.is_drawn_as_splats());
-    let told = |(object, medium): (&Object, &Thickness)| {
-        let is_lone = medium.is_lone() && medium.optical_depth > LONE;
-        let most = if is_lone { LONE } else { THICKEST };
-        (medium.optical_depth > most && as_splats(&object.name)).then(|| {
+    let told = |(id, (object, medium)): (usize, (&Object, &Thickness))| {
+        let planned = loaded.planned.iter().find(|planned| planned.object == object.name)?;
+        let is_body = matches!(scene.objects[id].source, Source::Medium(_));
+        let (most, what) = match (planned.is_drawn_as_splats(), planned.technique) {
+            (true, _) if medium.is_lone() && medium.optical_depth > LONE => (LONE, "and is no wider than that"),
+            (true, _) => (THICKEST, "which is too much for its splats"),
+            (false, Technique::Sheets) if is_body => {
+                (THICKEST_BY_SHEETS, "by which sheets show dark frames along its edges")
+            }
+            _ => return None,
+        };
+        (medium.optical_depth > most).then(|| {
             let spacing = f64::from(medium.spacing) * unit;
             let better = spacing * f64::from(most / medium.optical_depth);
             format!(
-                "object '{}' has an optical depth of {:.3} in a spacing of {}, {}: spacing = {} tells how its light falls off",
+                "object '{}' has an optical depth of {:.3} in a spacing of {}, {what}: spacing = {} tells how its light falls off",
                 escape_controls(&object.name),
                 medium.optical_depth,
                 rounded(spacing),
-                if is_lone { "and is no wider than that" } else { "which is too much for its splats" },
                 rounded(better),
             )
         })
     };
-    loaded.objects.iter().zip(&media).filter_map(told).collect()
+    loaded.objects.iter().zip(&media).enumerate().filter_map(told).collect()
 }
 
 impl Thickness {

@@ -104,8 +104,15 @@ const MOST_EXPONENT: i32 = 90;
 
 impl Base {
     /// For values from `low` to `high` and the control points of their transfer function.
+    ///
+    /// The middle is that of the values between the first and the last control point, where there are such: beyond these all values look alike, and a
+    /// single voxel of a million would take the digits of all others.
     pub(crate) fn new([low, high]: [f32; 2], transfer: &TransferFunction) -> Self {
-        let middle = 0.5 * (f64::from(low) + f64::from(high));
+        let points = transfer.points();
+        let least = points.first().map_or(low, |point| low.max(point.value));
+        let most = points.last().map_or(high, |point| high.min(point.value));
+        let ends = if least <= most { [least, most] } else { [low, high] };
+        let middle = 0.5 * (f64::from(ends[0]) + f64::from(ends[1]));
         let widths = transfer.points().windows(2).map(|pair| f64::from(pair[1].value) - f64::from(pair[0].value));
         let least = widths.fold(f64::INFINITY, f64::min);
         let ends =

@@ -202,6 +202,8 @@ fn objects() -> Vec<Entry> {
         one("object.frame", "object.it.frame=1").but(All, Refused(2, "`frame` belongs to a `volume`")),
         of(VOLUME, "object.array", "object.it.array='other'").with(&["object.it.volume='arrays.vtk'"]),
         one("object.array", "object.it.array='other'").but(All, Refused(2, "`array` belongs to a `volume`")),
+        of(VOLUME, "object.nodata", "object.it.nodata=1"),
+        one("object.nodata", "object.it.nodata=1").but(All, Refused(2, "`nodata` belongs to a `volume`")),
         of(All, "object.shadow_coefficient", "object.it.shadow_coefficient=0.2"),
         one("object.technique", "object.it.technique='reference'"),
         of(All, "object.casts_shadow", "object.it.casts_shadow=false"),

@@ -38,6 +38,8 @@ pub(super) struct Materials<'a> {
     held: Growing,
     bytes: u64,
     current: usize,
+    /// The least opacity of a material, which surfaces do not take: theirs is that of their object.
+    least_opacity: f64,
     /// Whether a material of a file was chosen.
     pub(super) is_used: bool,
 }
@@ -57,6 +59,7 @@ impl<'a> Materials<'a> {
             held: Growing::new("the materials"),
             bytes: 0,
             current: 0,
+            least_opacity: 1.0,
             is_used: false,
         }
     }
@@ -86,8 +89,14 @@ impl<'a> Materials<'a> {
         Ok(())
     }
 
-    /// Says where material files state materials, and no face has one of them.
+    /// Says where material files state materials, and no face has one of them, and where they state opacities.
     pub(super) fn remark_unused(&self, reading: &mut Reading<'_>) {
+        if self.least_opacity < 1.0 && self.is_used {
+            reading.notes.remark(format!(
+                "opacities of materials (`d` and `Tr`, the least {:.3}) are not used: surfaces have the `opacity` of their object",
+                self.least_opacity
+            ));
+        }
         if !self.is_used && !self.rank.is_empty() {
             reading.notes.remark("its material file is not used: no face names one of its materials by `usemtl`");
         }
@@ -131,7 +140,13 @@ impl<'a> Materials<'a> {
             Ok(stream) => stream.rest().map(Some),
             Err(error) if error.fault == Fault::Limit => Err(error),
             Err(error) => {
-                reading.notes.remark(format!("{}, found {}: it is left out", error.expected, error.found));
+                // What was expected begins with what the file is for.
+                let expected =
+                    error.expected.rsplit_once(": ").map_or(error.expected.as_str(), |(_, expected)| expected);
+                let name = escaped(name.as_bytes(), 60);
+                reading
+                    .notes
+                    .remark(format!("{what} '{name}': expected {expected}, found {}: it is left out", error.found));
                 Ok(None)
             }
         }
@@ -186,6 +201,13 @@ impl<'a> Materials<'a> {
                     let name = map(line, &values, folder, reading);
                     self.hold(name.as_ref().map_or(0, String::len), reading)?;
                     self.maps[rank] = name;
+                }
+                (b"d" | b"Tr", Some(_)) => {
+                    // Factors of a halo come before the number.
+                    let number = values.last().and_then(|word| word.decimal()).unwrap_or(f64::NAN);
+                    let opacity = if keyword.text == b"d" { number } else { 1.0 - number };
+                    self.least_opacity = self.least_opacity.min(opacity);
+                    reading.notes.not_used([keyword.text]);
                 }
                 (other, _) => reading.notes.not_used([other]),
             }

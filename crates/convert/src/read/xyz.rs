@@ -68,9 +68,14 @@ pub(super) fn read(content: &[u8], params: &ReadParams, notes: &mut Notes) -> Re
         }
         let columns = match &mut columns {
             Some(columns) => columns,
-            unknown => unknown.insert(guessed(line, &words)?),
+            unknown => {
+                refuse_decimal_commas(line)?;
+                unknown.insert(guessed(line, &words)?)
+            }
         };
         if words.len() != columns.len() {
+            refuse_decimal_commas(line)?;
+            refuse_empty_cells(line, columns.len())?;
             let (expected, found) = (format!("{} columns", columns.len()), format!("{}", words.len()));
             return Err(ReadError::input(line.place(), expected, found, "every line has the same columns"));
         }
@@ -118,6 +123,52 @@ fn whole(word: Word<'_>) -> Result<u64, ReadError> {
         let hint = "points need three columns at least";
         ReadError::input(word.place(), "x, y and z, names of columns, or a number of points", word.shown(), hint)
     })
+}
+
+/// Refuses a line whose numbers have commas in the place of points, which would be read as twice as many numbers: cells between semicolons, or all of
+/// those between blanks, with one comma between digits each.
+fn refuse_decimal_commas(line: Line<'_>) -> Result<(), ReadError> {
+    let has_semicolons = line.text.contains(&b';');
+    let parts = |byte: &u8| if has_semicolons { *byte == b';' } else { byte.is_ascii_whitespace() };
+    let cells: Vec<&[u8]> = line.text.split(parts).map(<[u8]>::trim_ascii).filter(|cell| !cell.is_empty()).collect();
+    let is_decimal = |cell: &&&[u8]| {
+        let mut pieces = cell.split(|byte| *byte == b',');
+        let ends = |piece: Option<&[u8]>, at_end: bool| {
+            piece.and_then(|piece| if at_end { piece.last() } else { piece.first() }).is_some_and(u8::is_ascii_digit)
+        };
+        ends(pieces.next(), true) && ends(pieces.next(), false) && pieces.next().is_none()
+    };
+    let decimal: Vec<&&[u8]> = cells.iter().filter(is_decimal).collect();
+    let others = cells.iter().filter(|cell| cell.contains(&b',')).count() - decimal.len();
+    let least = if has_semicolons { 1 } else { cells.len() };
+    let Some(first) = decimal.first().filter(|_| cells.len() >= 3 && others == 0 && decimal.len() >= least) else {
+        return Ok(());
+    };
+    let column = line.text.windows(first.len()).position(|part| part == **first).unwrap_or(0) as u64 + 1;
+    let found = format!("'{}', whose comma parts columns", crate::error::escaped(first, 40));
+    let hint = "write 1.5 for 1,5, as programs do in an English locale";
+    Err(ReadError::input(Place::Line { line: line.number, column }, "numbers with a decimal point", found, hint))
+}
+
+/// Refuses a line that has so many cells between separators as there are columns, of which some are empty.
+fn refuse_empty_cells(line: Line<'_>, columns: usize) -> Result<(), ReadError> {
+    let Some(separator) = [b';', b',', b'\t'].into_iter().find(|separator| line.text.contains(separator)) else {
+        return Ok(());
+    };
+    let mut column = 1;
+    let mut empty = None;
+    let mut count = 0;
+    for (rank, cell) in line.text.split(|byte| *byte == separator).enumerate() {
+        if cell.trim_ascii().is_empty() && empty.is_none() {
+            empty = Some((rank + 1, column));
+        }
+        column += cell.len() as u64 + 1;
+        count = rank + 1;
+    }
+    let Some((rank, column)) = empty.filter(|_| count == columns) else { return Ok(()) };
+    let found = format!("an empty cell, the {rank}. of {columns}");
+    let hint = "remove such points, or write nan in a column beside x, y and z that `color_by` or `keep` names";
+    Err(ReadError::input(Place::Line { line: line.number, column }, "a number in each column", found, hint))
 }
 
 /// A name without quotes.

@@ -39,6 +39,8 @@ pub(super) struct Object {
     material: Option<(&'static str, &'static str, bool)>,
     /// Further keys.
     keys: String,
+    /// Whether it is a volume of labels.
+    is_labels: bool,
 }
 
 impl Object {
@@ -47,6 +49,11 @@ impl Object {
         let Self { about, name, source: (key, path), keys, .. } = self;
         let material = self.material.map_or_else(String::new, |(name, ..)| format!("material = \"{name}\"\n"));
         format!("\n[[object]]\nname = {}\n# {about}\n{key} = {}\n{material}{keys}", quoted(name), quoted(path))
+    }
+
+    /// Whether it is a volume of labels.
+    pub(super) fn is_labels(&self) -> bool {
+        self.is_labels
     }
 
     /// The table of its material, where it is the first that has it.
@@ -86,6 +93,13 @@ pub(super) fn objects(data: &[DataFile], paths: &[String], wish: &Wish) -> Vec<O
         if file.degrees {
             object.keys = format!("degrees = true     # x and y are longitude and latitude, z metres\n{}", object.keys);
         }
+        if let Some(nodata) = file.nodata {
+            let value = convert::written_value(nodata);
+            object.keys = format!(
+                "nodata = {value}     # far from all other values: voxels without one, which draw nothing\n{}",
+                object.keys
+            );
+        }
         if let Some(array) = &file.array {
             object.keys = format!("array = {}\n{}", quoted(array), object.keys);
         }
@@ -113,6 +127,16 @@ pub(super) fn objects(data: &[DataFile], paths: &[String], wish: &Wish) -> Vec<O
     data.iter().zip(paths).map(&mut one).collect()
 }
 
+/// Whether a preset changes how a file looks.
+pub(super) fn takes_preset(file: &DataFile, wish: &Wish) -> bool {
+    let is_map = wish.preset.as_ref().is_some_and(|preset| preset.map().is_some());
+    match &file.data {
+        FileData::Grid(_) => true,
+        FileData::Points(points) => is_map && point_colors(points, file.has_colors(), wish).is_some(),
+        FileData::Mesh(_) | FileData::Image(_) => false,
+    }
+}
+
 /// Whether all files stand: those that belong together have one system of coordinates, in which all do, or none is stood up.
 pub(super) fn all_stand(data: &[DataFile]) -> bool {
     data.iter().all(|file| file.stands.or(file.stated_up).is_some())
@@ -126,6 +150,7 @@ fn object(file: &DataFile, preset: Option<&Preset>, colors: Option<String>) -> O
         source: (key, String::new()),
         material,
         keys,
+        is_labels: false,
     };
     match &file.data {
         FileData::Mesh(mesh) => {
@@ -162,12 +187,9 @@ fn object(file: &DataFile, preset: Option<&Preset>, colors: Option<String>) -> O
             };
             let about =
                 format!("{} × {} × {} voxels; {}", grid.dims[0], grid.dims[1], grid.dims[2], sides(extent(grid)));
-            of(
-                "volume",
-                about,
-                Some((material.0, material.1, false)),
-                volume_keys(grid, matter.as_ref(), look.as_ref()),
-            )
+            let keys = volume_keys(grid, matter.as_ref(), look.as_ref());
+            let is_labels = matches!(look, Some(Look::Labels(..)));
+            Object { is_labels, ..of("volume", about, Some((material.0, material.1, false)), keys) }
         }
         // Images are refused when they are read.
         FileData::Image(_) => of("environment", String::new(), None, String::new()),

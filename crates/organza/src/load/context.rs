@@ -112,6 +112,11 @@ impl Context<'_> {
         self.files.read(path, &ReadParams { frame, array, ..self.options.read_params() }, self.progress)
     }
 
+    /// The value of voxels without one, where the object states it.
+    pub(super) fn nodata(&self) -> Option<f32> {
+        self.scene.objects.get(self.id).and_then(|object| object.nodata)
+    }
+
     /// The same of a file that nothing but what is made from it needs.
     pub(super) fn read_once(&self, path: &Path) -> Result<(FileData, Arc<Reservation>), Error> {
         self.files.read_once(path, &self.options.read_params(), self.progress)

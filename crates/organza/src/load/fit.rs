@@ -24,8 +24,19 @@ pub(crate) fn placed<'s>(
     let outlines: Vec<_> = inputs.iter().map(outline).collect();
     let found = fit.camera(&scene.camera, &|add| outlines.iter().for_each(|(outline, to)| outline.each(to, add)));
     let Some(found) = found else {
-        let message = "`camera`: there is nothing to see for a camera that is placed by itself";
-        let hint = "add a visible object, or give the camera a position";
+        let nothing = "`camera`: there is nothing to see for a camera that is placed by itself";
+        let is_empty = |input: &&Input<'_>| match input {
+            Input::Points(_, points, _) | Input::Matter(_, points, _) => points.is_empty(),
+            _ => false,
+        };
+        let empty = inputs.iter().find(is_empty).map(|input| crate::shown(&input.splat().object_name));
+        let (message, hint) = match empty {
+            Some(name) => (
+                format!("{nothing}: object '{name}' is left without points"),
+                "widen its `keep` (`organza info` lists the ranges of its columns), or give the camera a position",
+            ),
+            None => (nothing.to_owned(), "add a visible object, or give the camera a position"),
+        };
         return Err(Error::input(crate::printable(&scene.file), message, hint));
     };
     let scene = Scene { camera: found.camera, target: found.target, fit: None, ..Scene::clone(&scene) };

@@ -349,7 +349,39 @@ fn with_first_value(grid: Arc<Grid>, transfer: &TransferFunction) -> Arc<Grid> {
 
 fn read_grid(path: &Path, frame: u64, context: &Context<'_>) -> Result<Arc<Grid>, Error> {
     match context.read_frame(path, frame)? {
-        FileData::Grid(grid) => Ok(grid),
+        FileData::Grid(grid) => with_known_values(grid, path, context),
         _ => Err(Error::wrong_kind(path, "a volume", "use `mesh = ` or `points = ` for this file")),
     }
+}
+
+/// A volume whose voxels of the value `nodata` have none. Values that look like such are warned of.
+fn with_known_values(grid: Arc<Grid>, path: &Path, context: &Context<'_>) -> Result<Arc<Grid>, Error> {
+    let Some(nodata) = context.nodata() else {
+        let fill = convert::FillValue::of_grid(&grid);
+        // What stands apart as a fill value is no stray as well.
+        let strays = if fill.is_none() { convert::Strays::of_grid(&grid) } else { None };
+        context.files.warn(path, fill);
+        context.files.warn(path, strays);
+        return Ok(grid);
+    };
+    let _held =
+        context.files.memory(context.options).take(&crate::printable(path), grid.bytes()).map_err(Error::Limit)?;
+    let (grid, count) = convert::without_value(&grid, nodata);
+    let (voxels, value) = (grid.values.len() as u64, convert::written_value(nodata));
+    if count == voxels {
+        let message = format!("expected a voxel with a value, found `nodata`, {value}, in all of them");
+        return Err(Error::input(crate::printable(path), message, "leave `nodata` out"));
+    }
+    if count == 0 {
+        context.files.warn(
+            path,
+            [format!("no voxel has the value of `nodata`, {value}: `organza info` has the range of the values")],
+        );
+    } else {
+        context
+            .files
+            .note(path, [format!("{count} of {voxels} voxels have the value of `nodata`, {value}: they draw nothing")]);
+    }
+    context.files.warn(path, convert::Strays::of_grid(&grid));
+    Ok(grid.into())
 }

@@ -123,6 +123,14 @@ impl MediumCell {
         Receiver { position, normal: Vec3::ZERO, radius: self.radius, kind: SplatKind::Medium }
     }
 
+    /// Whether nothing is seen of it from `eye`, nor of what lies around it up to where no kernel of its layer reaches. An eye that looks along a face of
+    /// a thick medium has a great depth even before the outermost cells, by which alone they would count as hidden.
+    fn is_hidden(&self, eye: &dyn Transmittance) -> bool {
+        let around = [Vec3::ZERO, Vec3::NEG_X, Vec3::X, Vec3::NEG_Y, Vec3::Y, Vec3::NEG_Z, Vec3::Z];
+        let depths = eye.absorbances_about(&around.map(|side| self.receiver(BEYOND * self.width * side)));
+        depths.iter().flatten().all(|depth| *depth > HIDDEN)
+    }
+
     /// Optical depths by channel about the cell toward what `shadow` has the transmittance of, which lies in the unit direction `towards`.
     pub fn depths(&self, shadow: &dyn Transmittance, towards: Vec3) -> [DepthAbout; 3] {
         let half = 0.5 * self.width;
@@ -255,8 +263,8 @@ impl ThickSplat {
         };
         // Nothing is seen of most splats of a thick medium.
         let before = within.eye.absorbance(&cell.receiver(Vec3::ZERO));
-        let is_hidden = |channel: usize| before[channel] - 0.5 * cell.optical_depth[channel] / LEAST_COSINE > HIDDEN;
-        if (0..3).all(is_hidden) {
+        let is_deep = |channel: usize| before[channel] - 0.5 * cell.optical_depth[channel] / LEAST_COSINE > HIDDEN;
+        if (0..3).all(is_deep) && cell.is_hidden(within.eye) {
             return None;
         }
         let to_eye = to_eye(input, i);
