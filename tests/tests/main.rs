@@ -46,6 +46,7 @@ mod particles;
 mod point_columns;
 mod point_materials;
 mod point_opacity;
+mod predicted;
 mod progress;
 mod reading;
 mod scan_shadows;

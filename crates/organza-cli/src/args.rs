@@ -62,6 +62,11 @@ pub(super) enum Command {
         after_help = "Examples:\n  organza info bunny.ply\n  organza info head.nii.gz --json\n  organza info scene.toml"
     )]
     Info(InfoArguments),
+    /// Measures how long each kind of work takes on this machine, for predicted times; takes less than a minute.
+    #[command(
+        after_help = "Examples:\n  organza calibrate -o machine.json\n  organza explain scene.toml --machine machine.json"
+    )]
+    Calibrate(CalibrateArguments),
     /// Lists the GPUs that --backend can use, and the drivers that play one.
     #[command(after_help = "Examples:\n  organza devices\n  organza devices --json")]
     Devices(DevicesArguments),
@@ -85,6 +90,7 @@ impl Command {
             Self::Accuracy(a) => a.scene.common.json,
             Self::Orders(a) => a.scene.common.json,
             Self::Info(a) => a.json,
+            Self::Calibrate(a) => a.json,
             Self::Devices(a) => a.json,
             Self::Passport(a) => a.json,
             Self::Schema => false,
@@ -246,6 +252,9 @@ pub(super) struct RenderArguments {
     /// Store colours, alpha and shadow of EXR files in 16 bits
     #[arg(long)]
     pub(super) half: bool,
+    /// Figures of this machine for predicted times, as `organza calibrate` wrote them [default: built-in figures]
+    #[arg(long, value_name = "FILE")]
+    pub(super) machine: Option<PathBuf>,
     /// Write what the render cost to a JSON file
     #[arg(long, value_name = "FILE.json")]
     pub(super) cost: Option<PathBuf>,
@@ -314,6 +323,9 @@ pub(super) struct ExplainArguments {
     /// Render too, and say what each pass cost
     #[arg(long)]
     pub(super) measure: bool,
+    /// Figures of this machine for predicted times, as `organza calibrate` wrote them [default: built-in figures]
+    #[arg(long, value_name = "FILE")]
+    pub(super) machine: Option<PathBuf>,
 }
 
 #[derive(Debug, Args)]
@@ -359,6 +371,19 @@ pub(super) struct InfoArguments {
     /// Forbid data outside the scene's root folder even where the scene allows it by its key `root`: for scenes of strangers
     #[arg(long)]
     pub(super) sandbox: bool,
+    /// Print one JSON document on stdout
+    #[arg(long)]
+    pub(super) json: bool,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct CalibrateArguments {
+    /// File for the figures, JSON
+    #[arg(short, long = "output", value_name = "FILE")]
+    pub(super) output: PathBuf,
+    /// Replace an output that exists
+    #[arg(long)]
+    pub(super) force: bool,
     /// Print one JSON document on stdout
     #[arg(long)]
     pub(super) json: bool,

@@ -15,7 +15,7 @@ const LINES: Duration = Duration::from_secs(10);
 /// Steps of the bar.
 const STEPS: f64 = 1000.0;
 
-/// Runs `work` and shows how far it is; an interrupt stops it at its next tick, or within two seconds, a second one at once.
+/// Runs `work`, shows how far it is, and prints what it announces; an interrupt stops it at its next tick, or within two seconds, a second one at once.
 pub(super) fn with_bar<T>(work: impl FnOnce(&Progress) -> Result<T, Error>) -> Result<T, Error> {
     let progress = Arc::new(Progress::new());
     signals::stops(&progress);
@@ -41,12 +41,18 @@ fn draw_bar(progress: &Progress, finished: &AtomicBool) {
         bar.set_style(style.progress_chars("=> "));
     }
     while !finished.load(Ordering::Relaxed) {
+        bar.suspend(|| print_announced(progress));
         let (stage, fraction) = progress.report();
         bar.set_message(stage);
         bar.set_position((STEPS * fraction) as u64);
         std::thread::park_timeout(INTERVAL);
     }
     bar.finish_and_clear();
+}
+
+/// Prints what the work has left to be said, as it goes on.
+fn print_announced(progress: &Progress) {
+    progress.take_announced().iter().for_each(|sentence| console::remark(sentence));
 }
 
 fn print_lines(progress: &Progress, finished: &AtomicBool) {
@@ -58,7 +64,8 @@ fn print_lines(progress: &Progress, finished: &AtomicBool) {
             console::note(&line(start.elapsed(), &stage, fraction));
             next += LINES;
         }
-        std::thread::park_timeout(next.saturating_sub(start.elapsed()));
+        print_announced(progress);
+        std::thread::park_timeout(INTERVAL.min(next.saturating_sub(start.elapsed())));
     }
 }
 

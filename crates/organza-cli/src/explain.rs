@@ -3,38 +3,51 @@
 use super::args::ExplainArguments;
 use super::bar::with_bar;
 use super::given::given;
+use super::machine::rates;
 use super::session::{parse_scene, path_text, processor_only, render_options, without_effect};
 use super::{console, report};
 use organza::scene::{Scene, SceneObject, UpBy};
-use organza::{Error, escape_controls};
+use organza::{Error, RenderOptions, escape_controls};
 use serde_json::{Value, json};
 
 /// Prints the plan; with `--measure` renders too and prints what it cost.
 pub(super) fn run(arguments: &ExplainArguments) -> Result<(), Error> {
     processor_only(&arguments.scene)?;
+    let rates = rates(arguments.machine.as_deref())?;
     let (given, files) = given(&arguments.scene, None)?;
     let scene = parse_scene(&arguments.scene, &given, None, None)?;
-    let options = render_options(&arguments.scene);
-    let (plan, cost, prepared, (mut warnings, notes, found)) = with_bar(|progress| {
+    let options = RenderOptions { rates, ..render_options(&arguments.scene) };
+    let (plan, cost, predicted, prepared, (mut warnings, notes, found)) = with_bar(|progress| {
         if arguments.measure {
             let render = organza::render_from(&scene, &options, progress, files)?;
-            return Ok((render.plan, render.cost, None, (render.warnings, render.notes, render.found)));
+            return Ok((
+                render.plan,
+                render.cost,
+                render.predicted,
+                None,
+                (render.warnings, render.notes, render.found),
+            ));
         }
         let explanation = organza::explain_from(&scene, &options, progress, &files)?;
-        let organza::Explanation { plan, cost, memory, splats, warnings, notes, found } = explanation;
-        Ok((plan, cost, Some((memory, splats)), (warnings, notes, found)))
+        let organza::Explanation { plan, cost, memory, predicted, splats, warnings, notes, found } = explanation;
+        Ok((plan, cost, predicted, Some((memory, splats)), (warnings, notes, found)))
     })?;
     warnings.extend(without_effect(&arguments.scene, &scene));
     for warning in &warnings {
         console::warn(warning);
     }
     notes.iter().for_each(|note| console::remark(note));
+    if !arguments.measure {
+        // A render has announced it before it began.
+        predicted.announcement(rayon::current_num_threads()).iter().for_each(|sentence| console::remark(sentence));
+    }
     if arguments.scene.common.json {
         let document = json!({
             "scene": arguments.scene.inputs.first().map(|path| path_text(path)),
             "camera": report::camera_json(&scene, found.as_ref()),
             "plan": report::plan_json(&plan),
             "cost": report::cost_json(&cost),
+            "predicted": report::predicted_json(&predicted),
             "memory_bytes": prepared.as_ref().map(|p| p.0),
             "up": up_json(&scene),
             "splats": prepared.as_ref().map(|p| report::splats_json(&p.1)),
@@ -44,6 +57,8 @@ pub(super) fn run(arguments: &ExplainArguments) -> Result<(), Error> {
         return console::out(&format!("{document:#}\n"));
     }
     let mut text = report::plan_text(&plan);
+    text.push('\n');
+    text += &report::predicted_text(&predicted);
     text.push('\n');
     text += &report::cost_text(&cost);
     text += &up_text(&scene);

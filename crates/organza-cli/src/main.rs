@@ -2,13 +2,14 @@
 //!
 //! ```text
 //! args ─► given (a scene, or one made of data files) ─► session (overrides, memory) ─► render convert extract explain accuracy orders ─► report ─► console
-//!         init info devices passport
+//!         init info calibrate devices passport
 //! ```
 #![forbid(unsafe_code)]
 
 mod accuracy;
 mod args;
 mod bar;
+mod calibrate;
 mod console;
 mod convert;
 mod devices;
@@ -18,6 +19,7 @@ mod given;
 mod info;
 mod init;
 mod jobs;
+mod machine;
 mod memory;
 mod orders;
 mod passport;
@@ -74,6 +76,7 @@ fn run(command: Command) -> Result<u8, Error> {
         Command::Accuracy(arguments) => accuracy::run(&arguments),
         Command::Orders(arguments) => orders::run(&arguments),
         Command::Info(arguments) => info::run(&arguments),
+        Command::Calibrate(arguments) => calibrate::run(&arguments),
         Command::Devices(arguments) => devices::run(&arguments),
         Command::Passport(arguments) => return passport::run(&arguments),
         Command::Schema => console::out(&(organza::scene::schema() + "\n")),

@@ -3,6 +3,7 @@
 use super::args::RenderArguments;
 use super::bar::with_bar;
 use super::jobs::{Drawing, Jobs, Places};
+use super::machine::rates;
 use super::session::{open_device, path_text, render_options, without_effect};
 use super::{console, report};
 use organza::output::{self, Metadata, Target, WriteReport};
@@ -112,9 +113,10 @@ fn add_new(known: &mut Vec<String>, sentences: Vec<String>) {
 
 /// Renders and writes, and gives the exit code. Whatever can be refused is refused before any work.
 pub(super) fn run(arguments: &RenderArguments) -> Result<u8, Error> {
+    let rates = rates(arguments.machine.as_deref())?;
     let (jobs, files) = Jobs::new(arguments)?;
     let mut drawing = jobs.check(files)?;
-    let options = RenderOptions { device: open_device(&arguments.scene)?, ..render_options(&arguments.scene) };
+    let options = RenderOptions { device: open_device(&arguments.scene)?, rates, ..render_options(&arguments.scene) };
     let is_json = arguments.scene.common.json;
     let mut said = Said::default();
     add_new(&mut said.warnings, without_effect(&arguments.scene, jobs.still()).into_iter().collect());
@@ -279,6 +281,7 @@ impl Job<'_> {
             "outputs": outputs.collect::<Value>(),
             "plan": report::plan_json(&render.plan),
             "cost": report::cost_json(&render.cost),
+            "predicted": report::predicted_json(&render.predicted),
             "sets": render.sets.map(sets),
             "warnings": render.warnings,
             "notes": render.notes,

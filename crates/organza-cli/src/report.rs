@@ -1,5 +1,6 @@
 //! Plans and costs as tables and as JSON.
 
+use organza::cost::{CountedPass, Prediction, duration_text};
 use organza::plan::{Plan, PlannedObject};
 use organza::scene::{FoundCamera, Scene};
 use organza::{CostRecord, ShadowTable, SplatCount};
@@ -35,6 +36,51 @@ pub(super) fn camera_text(found: &FoundCamera) -> String {
     let unit = 1e-4 * found.camera.position.distance(found.target);
     let list = |v: DVec3| v.to_array().map(|x| organza_survey::rounded(x, unit)).join(", ");
     format!("camera = auto: position = [{}], target = [{}]\n", list(found.camera.position), list(found.target))
+}
+
+/// Threads that draw, as all stages share them.
+fn threads() -> usize {
+    rayon::current_num_threads()
+}
+
+/// Counted work of each pass with its predicted time, as JSON.
+pub(super) fn predicted_json(predicted: &Prediction) -> Value {
+    let threads = threads();
+    let pass = |p: &CountedPass| {
+        let counts = p.counts.iter().map(|c| (c.item.name().to_owned(), json!(c.number)));
+        json!({
+            "name": p.pass, "stage": p.stage, "counts": counts.collect::<serde_json::Map<_, _>>(),
+            "seconds_of_one_core": p.seconds(&predicted.rates, 1), "seconds": p.seconds(&predicted.rates, threads),
+        })
+    };
+    json!({
+        "by": predicted.rates.source(),
+        "threads": threads,
+        "passes": predicted.passes().map(pass).collect::<Value>(),
+        "seconds_of_one_core": predicted.seconds(1),
+        "seconds": predicted.seconds(threads),
+        "announcement": predicted.announcement(threads),
+    })
+}
+
+/// Counted work of each pass with its predicted time, as a table, and the total in one line.
+pub(super) fn predicted_text(predicted: &Prediction) -> String {
+    let threads = threads();
+    let ms = |seconds: f64| format!("{:.1}", 1e3 * seconds);
+    let passes = predicted.joined();
+    let rows = passes.iter().filter(|pass| pass.seconds(&predicted.rates, 1) > 0.0).map(|pass| {
+        let [one, many] = [1, threads].map(|threads| ms(pass.seconds(&predicted.rates, threads)));
+        [pass.pass.to_owned(), one, many, pass.work(&predicted.rates)]
+    });
+    let by_threads = if threads == 1 { "ms".to_owned() } else { format!("ms, {threads} threads") };
+    let mut text = table(["pass, predicted", "ms of one core", &by_threads, "most of it"], "lrrl", rows);
+    text += &format!(
+        "a render takes about {} on {threads} thread{}, by {}\n",
+        duration_text(predicted.seconds(threads)),
+        if threads == 1 { "" } else { "s" },
+        predicted.rates.source(),
+    );
+    text
 }
 
 /// Splats by object as JSON.

@@ -1,28 +1,25 @@
 //! Drawing: techniques in turns, front to back, into one accumulator.
 
-mod ranges;
-
 use crate::choose::row;
+use crate::cost::Prediction;
 use crate::frame::Frame;
 use crate::load::Loaded;
 use crate::plan::Plan;
-use crate::scene::{Scene, Technique};
+use crate::predict::prediction;
+use crate::ranges::ranges;
+use crate::scene::Scene;
 use crate::technique::{Finished, Fold, Session};
-use crate::work::{self, Stages, Translucent, cost};
-use crate::{CostRecord, Error, Layers, Progress, RenderOptions, stage};
-use splat_core::SplatKind;
-use splat_core::raster::{self, Expected};
+use crate::{CostRecord, Error, Layers, Progress, RenderOptions};
 use std::ops::Range;
 
 /// Runs the planned passes of a frame, and keeps the layers that its scene asks for.
 pub(crate) fn draw(frame: &Frame<'_>, session: &mut Session<'_>, cost: &mut CostRecord) -> Result<Layers, Error> {
-    frame.progress.plan(stages(frame));
-    let layers = draw_ranges(frame, &ranges::ranges(frame), session, cost)?;
+    let layers = draw_ranges(frame, &ranges(frame), session, cost)?;
     frame.progress.finish();
     Ok(layers)
 }
 
-/// The same in these ranges of depth, which follow each other.
+/// The same in these ranges of depth, which follow each other. A long drawing is announced before it begins.
 pub(crate) fn draw_ranges(
     frame: &Frame<'_>,
     ranges: &[Range<f32>],
@@ -31,6 +28,13 @@ pub(crate) fn draw_ranges(
 ) -> Result<Layers, Error> {
     let mut folds: Vec<Box<dyn Fold + '_>> =
         frame.plan.techniques.iter().map(|technique| (row(*technique).begin)(frame)).collect();
+    folds.iter_mut().try_for_each(|fold| fold.prepare(session, cost))?;
+    let predicted = prediction(frame, &folds, ranges, session.options);
+    frame.progress.plan(session.options.rates.stages(&predicted.drawing));
+    if let Some(sentence) = predicted.announcement(rayon::current_num_threads()) {
+        frame.progress.announce(&sentence);
+    }
+    session.predicted = predicted;
     let mut accumulator = frame.accumulator();
     for range in ranges {
         for fold in &mut folds {
@@ -71,54 +75,16 @@ pub struct Planned<'a> {
 pub fn draw_loaded(planned: &Planned<'_>, progress: &Progress, cost: &mut CostRecord) -> Result<Layers, Error> {
     let Planned { scene, loaded, plan, options } = *planned;
     let frame = Frame::new(scene, loaded, plan, progress);
-    let mut session = Session { options, checkpoint: None, kept: None, warnings: &mut Vec::new(), sets: None };
+    let mut session = Session {
+        options,
+        checkpoint: None,
+        kept: None,
+        warnings: &mut Vec::new(),
+        sets: None,
+        predicted: Prediction::default(),
+    };
     let layers = draw(&frame, &mut session, cost)?;
     if session.sets.is_some_and(|sets| sets.interrupted) { Err(Error::Cancelled) } else { Ok(layers) }
-}
-
-/// Stages with their weights, after everything was loaded.
-fn stages(frame: &Frame<'_>) -> Stages {
-    let (loaded, plan, scene) = (frame.loaded, frame.plan, frame.scene);
-    let maps = plan.shadow_maps_built();
-    let all = loaded.cloud.len() as f64;
-    let opaque = expected(frame, None);
-    let of: Vec<(Technique, Expected)> = plan.techniques.iter().map(|t| (*t, expected(frame, Some(*t)))).collect();
-    let built = if frame.has_maps() { 0 } else { maps };
-    let entries = plan.shadow_tables.iter().chain(&plan.other_tables).flatten().map(|table| table.predicted.entries);
-    let map = |(k, entries)| (work::shadow_map(k, maps, entries), cost::CAST * all + cost::ENTRY * entries);
-    let mut stages: Stages = (1..=built).zip(entries).map(map).collect();
-    // The eye's is another in each view.
-    stages.extend(plan.eye_table.iter().map(|_| (stage::EYE_MAP.to_owned(), cost::CAST * all)));
-    let mut add = |name: &str, seconds: f64| stages.push((name.to_owned(), seconds));
-    let mut drawn = opaque.splats;
-    let mut last = Vec::new();
-    for (technique, count) in of {
-        let row = row(technique);
-        let is_drawn = plan.by.iter().zip(&plan.draws).any(|(by, draws)| *by == technique && *draws);
-        drawn += if is_drawn { count.splats } else { 0.0 };
-        let any = plan.passes.iter().any(|p| row.steps.last().is_some_and(|step| step.pass == p.name));
-        let translucent = Translucent { splats: count.splats, fragments: count.fragments, any };
-        let mut steps: Vec<(&str, f64)> =
-            row.steps.iter().map(|step| (step.stage, (step.seconds)(scene, &translucent))).collect();
-        last.extend(steps.pop());
-        steps.into_iter().for_each(|(name, seconds)| add(name, seconds));
-    }
-    add(stage::GROUP, crate::frame::grouped::seconds(scene, all));
-    add(stage::PROJECT, cost::PROJECT * drawn);
-    add(stage::SHADE, drawn * (cost::SHADE + maps as f64 * cost::LOOK_UP));
-    add(stage::OPAQUE, cost::FRAGMENT * opaque.fragments);
-    last.into_iter().for_each(|(name, seconds)| add(name, seconds));
-    add(stage::FINISH, work::samples(scene) * cost::SAMPLE);
-    stages
-}
-
-/// The opaque splats in view, or the translucent ones of a technique, and the fragments of their footprints, about.
-fn expected(frame: &Frame<'_>, technique: Option<Technique>) -> Expected {
-    let cloud = &frame.loaded.cloud;
-    raster::expected(cloud, &frame.camera, |i| match technique {
-        None => cloud.kind[i] == SplatKind::Opaque,
-        Some(t) => cloud.kind[i] != SplatKind::Opaque && frame.plan.by[cloud.object[i] as usize] == t,
-    })
 }
 
 #[cfg(test)]
@@ -168,8 +134,14 @@ mod tests {
         let cuts = ends.iter().map(|end| end * unit);
         let cuts: Vec<f32> = [f32::NEG_INFINITY].into_iter().chain(cuts).chain([f32::INFINITY]).collect();
         let ranges: Vec<Range<f32>> = cuts.windows(2).map(|w| w[0]..w[1]).collect();
-        let mut session =
-            Session { options: &options, checkpoint: None, kept: None, warnings: &mut Vec::new(), sets: None };
+        let mut session = Session {
+            options: &options,
+            checkpoint: None,
+            kept: None,
+            warnings: &mut Vec::new(),
+            sets: None,
+            predicted: Prediction::default(),
+        };
         draw_ranges(&frame, &ranges, &mut session, &mut CostRecord::default()).unwrap()
     }
 

@@ -3,6 +3,7 @@
 
 mod coarse;
 pub(crate) mod discs;
+mod extent;
 pub(crate) mod grouped;
 mod light;
 mod lists;
@@ -10,6 +11,7 @@ mod on_device;
 mod polygons;
 mod splats;
 
+pub(crate) use extent::Extent;
 pub(crate) use light::Maps;
 use lists::Lists;
 pub(crate) use on_device::Chained;

@@ -33,6 +33,7 @@
 mod brightness;
 mod carried;
 mod choose;
+pub mod cost;
 mod doubts;
 mod draw;
 mod error;
@@ -45,14 +46,15 @@ mod memory;
 mod options;
 pub mod pass;
 pub mod plan;
+mod predict;
 mod prepare;
+mod ranges;
 mod render;
 mod sequence;
 mod shadows;
 mod stage;
 pub mod statistics;
 mod technique;
-mod work;
 
 pub use convert::Cache;
 pub use draw::{Planned, draw_loaded};

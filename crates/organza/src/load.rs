@@ -10,10 +10,11 @@ mod normalize;
 pub(crate) mod object;
 pub(crate) mod own;
 
+use crate::cost::{Count, before_conversion};
 use crate::form::{Form, PlannedObject};
 use crate::scene::{Scene, SceneLight, SceneObject, SwitchedEffect};
 use crate::statistics::{LightStatistics, ObjectStatistics};
-use crate::{CostRecord, Error, Progress, RenderOptions, SplatCount, pass, work};
+use crate::{CostRecord, Error, Progress, RenderOptions, SplatCount, pass};
 pub(crate) use context::BYTES_PER_SPLAT;
 use convert::ColorScale;
 use files::Files;
@@ -59,6 +60,8 @@ pub struct Loaded {
     pub exponent: i32,
     /// Splats of every visible object, as predicted and as made.
     pub splats: Vec<SplatCount>,
+    /// Splats that every visible object would become, whether or not it does.
+    pub(crate) convertible: Vec<u64>,
     /// What a user should know of the input, one sentence each.
     pub warnings: Vec<String>,
     /// What files hold that is not drawn, and what was made of them, one sentence each.
@@ -128,20 +131,22 @@ pub(crate) struct Inputs<'a> {
 pub(crate) type Spare<'a> =
     dyn Fn(&[Own], &[PlannedObject], &[ObjectStatistics], &[SceneLight]) -> Result<bool, Error> + 'a;
 
-/// Reads every visible object once and counts its splats; `looks` says of which objects it is asked how they could be drawn from their own data.
+/// Reads every visible object once and counts its splats; `looks` says of which objects it is asked how they could be drawn from their own data. `beside` is what techniques will make
+/// beside splats.
 pub(crate) fn read<'a>(
     scene: &'a Scene,
     options: &'a RenderOptions,
     progress: &'a Progress,
     files: &'a Files,
     looks: &dyn Fn(&SceneObject) -> bool,
+    beside: &[Count],
     cost: &mut CostRecord,
 ) -> Result<Inputs<'a>, Error> {
     let loading = Loading { scene, options, progress, files };
     let lights = lights(scene);
     files.scales.take();
     let (prepared, images) = cost.measure(pass::READ, |stage| {
-        let prepared = loading.prepare(looks)?;
+        let prepared = loading.prepare(looks, beside)?;
         let images = loading.images(&lights)?;
         stage.items_in = prepared.len() as u64;
         stage.items_out = stage.items_in;
@@ -161,12 +166,12 @@ impl Inputs<'_> {
     }
 
     /// Converts every object to the form that was chosen for it, and to splats where they are needed: `spare` is asked whether
-    /// those of objects that are drawn from their own data are. `sets` are the seconds of what techniques will make beside splats.
+    /// those of objects that are drawn from their own data are. `beside` is what techniques will make beside splats.
     pub(crate) fn convert(
         self,
         mut planned: Vec<PlannedObject>,
         spare: Option<&Spare<'_>>,
-        sets: f64,
+        beside: &[Count],
         cost: &mut CostRecord,
     ) -> Result<Loaded, Error> {
         let Self { loading, mut prepared, mut images, mut lights, mut warnings, statistics } = self;
@@ -179,9 +184,11 @@ impl Inputs<'_> {
             own.iter_mut().for_each(|own| own.has_splats = false);
         }
         let mut splats = loading.counts(&prepared, &planned)?;
+        let convertible = prepared.iter().map(|p| p.prediction.splats).collect();
         let materials = materials(scene, &prepared);
         let points = lights.iter().map(SceneLight::count).sum();
-        progress.plan(work::of_counts(scene, &splats, &planned, points, sets));
+        let work = before_conversion(scene, &splats, &planned, points, beside);
+        progress.plan(options.rates.stages(&work));
         let mut own = early.map_or_else(|| loading.own(&mut prepared, &planned, &mut warnings), Ok)?;
         let converted = planned.iter().filter(|p| p.splats.is_some()).count();
         let mut cloud = Cloud::default();
@@ -214,6 +221,7 @@ impl Inputs<'_> {
             normals: scene.objects.iter().any(|o| o.visible && context::needs_gradients(o, scene)),
             exponent,
             splats,
+            convertible,
             warnings,
             scales: files.scales.take(),
             notes: files.notes().into_iter().chain(options.cache.iter().flat_map(|cache| cache.said())).collect(),

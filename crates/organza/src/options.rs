@@ -1,5 +1,6 @@
 //! What a render may take, and how it treats doubtful input.
 
+use crate::cost::Rates;
 use crate::device::Device;
 use convert::{Cache, read::ReadParams};
 use splat_core::MemoryAccount;
@@ -27,6 +28,8 @@ pub struct RenderOptions {
     /// Whether the device composites the splats too: beauty then differs from the processor's by rounding, up to 10⁻⁵ of
     /// the brightest splat.
     pub device_composites: bool,
+    /// Time of each kind of work, for predictions; it changes no picture.
+    pub rates: Rates,
 }
 
 impl Default for RenderOptions {
@@ -40,6 +43,7 @@ impl Default for RenderOptions {
             cache: None,
             device: None,
             device_composites: false,
+            rates: Rates::default(),
         }
     }
 }

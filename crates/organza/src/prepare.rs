@@ -5,6 +5,7 @@ mod seen;
 use crate::brightness;
 use crate::carried;
 use crate::choose::{choose, plan, row, same_forms, technique_of, techniques, unshown};
+use crate::cost::{Count, Prediction, Translucent};
 use crate::form::PlannedObject;
 use crate::frame::Frame;
 use crate::load::files::Files;
@@ -15,11 +16,12 @@ use crate::media;
 use crate::memory::{self, Memory};
 use crate::pass;
 use crate::plan::Plan;
+use crate::predict::prediction;
+use crate::ranges::ranges;
 use crate::scene::{FoundCamera, Scene, SceneLight, SceneObject, Source, Technique, light_points};
 use crate::shadows::{Probe, Shadowing};
 use crate::statistics::{ObjectData, ObjectStatistics, Statistics};
-use crate::technique::Row;
-use crate::work::Translucent;
+use crate::technique::{Fold, Row};
 use crate::{CostRecord, Error, Progress, RenderOptions, SplatCount, doubts, shadows};
 use convert::DiscSize;
 pub use seen::{fitted, seen};
@@ -36,6 +38,8 @@ pub struct Explanation {
     /// Bytes that rendering will take at its peak, see [`Explanation::plan`] for the passes that take them. Shadow maps are predicted from the sizes
     /// of their casters as a light sees them; together they are held to what is allowed when they are built.
     pub memory: u64,
+    /// Counted work of a render, and its time.
+    pub predicted: Prediction,
     /// Splats of every visible object, as predicted from its input and as made.
     pub splats: Vec<SplatCount>,
     /// What a user should know of the input.
@@ -67,7 +71,10 @@ pub fn explain_from(
     let (scene, found) = fitted(scene, options, progress, files)?;
     let (loaded, planned, mut explanation) = prepare(&scene, options, progress, files, None)?;
     let frame = Frame::new(&scene, &loaded, &planned.plan, progress);
-    techniques(&scene).into_iter().try_for_each(|technique| (row(technique).check)(&frame, options))?;
+    let mut folds: Vec<Box<dyn Fold + '_>> =
+        planned.plan.techniques.iter().map(|technique| (row(*technique).begin)(&frame)).collect();
+    folds.iter_mut().try_for_each(|fold| fold.check(options))?;
+    explanation.predicted = prediction(&frame, &folds, &ranges(&frame), options);
     explanation.found = found;
     explanation.warnings.extend(doubts::of_shadows(&explanation.plan.shadow_limits()));
     explanation.warnings.extend(doubts::of_costly(explanation.plan.tables()));
@@ -114,7 +121,20 @@ pub(crate) fn prepare(
     // Of fields of a file the file alone knows what it holds.
     let inputs = cost.stages.iter().filter(|s| s.name == pass::READ).map(|s| s.bytes).sum::<u64>().max(files.bytes());
     let most = memory.total().max(memory::loading_bytes(&loaded, inputs)).max(files.most.get()).max(files.peak());
-    Ok((loaded, planned, Explanation { plan, cost, memory: most, splats, warnings, notes, found: None }))
+    Ok((
+        loaded,
+        planned,
+        Explanation {
+            plan,
+            cost,
+            memory: most,
+            predicted: Prediction::default(),
+            splats,
+            warnings,
+            notes,
+            found: None,
+        },
+    ))
 }
 
 /// Whether what is loaded of one scene serves the other, after [`Loaded::retarget`]: whether they differ in the size of the
@@ -324,13 +344,13 @@ fn load_measured(
     cost: &mut CostRecord,
 ) -> Result<Loaded, Error> {
     let looks = |object: &SceneObject| row(technique_of(object, scene)).form.is_some();
-    let inputs = load::read(scene, options, progress, files, &looks, cost)?;
+    // The work on forms other than splats is not known yet; assume that each is present.
+    let unknown = Translucent::unknown(scene);
+    let steps = techniques(scene).into_iter().flat_map(|t| row(t).steps);
+    let beside: Vec<Count> = steps.flat_map(|step| (step.counts)(scene, &unknown)).collect();
+    let inputs = load::read(scene, options, progress, files, &looks, &beside, cost)?;
     let by = visible(scene).map(|o| technique_of(o, scene));
     let planned = choose(inputs.statistics.iter().zip(by), &inputs.light_statistics());
-    // Of what comes beside splats nothing is known but that there is some.
-    let some = Translucent { splats: 0.0, fragments: 0.0, any: true };
-    let steps = techniques(scene).into_iter().flat_map(|t| row(t).steps);
-    let beside = steps.map(|step| (step.seconds)(scene, &some)).sum();
     let spare = carried::of_scene(scene).map(|carries| {
         move |own: &[Own], planned: &[PlannedObject], statistics: &[ObjectStatistics], lights: &[SceneLight]| {
             carried::is_all(
@@ -341,7 +361,7 @@ fn load_measured(
             )
         }
     });
-    inputs.convert(planned, spare.as_ref().map(|spare| spare as &Spare<'_>), beside, cost)
+    inputs.convert(planned, spare.as_ref().map(|spare| spare as &Spare<'_>), &beside, cost)
 }
 
 fn visible(scene: &Scene) -> impl Iterator<Item = &SceneObject> + Clone {

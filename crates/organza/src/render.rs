@@ -1,6 +1,7 @@
 //! From a scene to images: prepare, draw.
 
 use crate::choose::{row, techniques};
+use crate::cost::Prediction;
 use crate::device::Helper;
 use crate::draw::draw;
 use crate::frame::grouped::KeptInFrames;
@@ -25,6 +26,8 @@ pub struct Render {
     pub cost: CostRecord,
     /// What was done and why.
     pub plan: Plan,
+    /// Counted work and its time, from before the drawing.
+    pub predicted: Prediction,
     /// Sets that were averaged; `None` when the picture is not an average.
     pub sets: Option<Sets>,
     /// What a user should know of the input, one sentence each.
@@ -153,9 +156,10 @@ pub(crate) fn render_keeping(
     frame.groups.replace(std::mem::take(&mut left.groups));
     let kept = (!left.is_still).then_some(&mut left.sets);
     let checkpoint = checkpoint.as_mut();
-    let mut session = Session { options, checkpoint, kept, warnings: &mut warnings, sets: None };
+    let mut session =
+        Session { options, checkpoint, kept, warnings: &mut warnings, sets: None, predicted: Prediction::default() };
     let layers = draw(&frame, &mut session, &mut cost)?;
-    let sets = session.sets;
+    let Session { sets, predicted, .. } = session;
     left.groups = frame.groups.take();
     let is_judged = !doubtful && scene.frames.is_none();
     let coarse = is_judged.then(|| frame.coarse()).flatten().and_then(doubts::of_cells);
@@ -172,7 +176,7 @@ pub(crate) fn render_keeping(
     warnings.extend(helper.map(|helper| helper.said()).unwrap_or_default());
     let scales = loaded.scales.clone();
     left.made = (!left.is_still).then(|| Made { scene: scene.clone(), loaded, planned, leaves });
-    Ok(Render { layers, cost, plan: shown, sets, warnings, notes, scales, found, backend })
+    Ok(Render { layers, cost, plan: shown, predicted, sets, warnings, notes, scales, found, backend })
 }
 
 #[cfg(test)]

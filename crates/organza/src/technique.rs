@@ -13,6 +13,7 @@ pub(crate) mod reference;
 pub(crate) mod sheets;
 pub(crate) mod surfels;
 
+use crate::cost::{Count, Item, Prediction, Translucent, samples};
 use crate::form::{DRAWN, Form};
 use crate::frame::Frame;
 use crate::load::Loaded;
@@ -22,7 +23,6 @@ use crate::plan::Plan;
 use crate::scene::{LightPoint, Scene, Technique};
 use crate::stage;
 use crate::statistics::ObjectStatistics;
-use crate::work::{Translucent, cost};
 use crate::{CostRecord, Error, Layers, RenderOptions};
 pub(crate) use particles::{Checkpoint, Kept};
 use splat_core::raster::{GlassImage, OpaqueImage};
@@ -72,8 +72,8 @@ pub(crate) struct Row {
     pub(crate) scatters_by: Option<&'static str>,
     /// Adds effects and passes of its own to the plan of a scene that it draws, and takes out what it does not need.
     pub(crate) plans: fn(&Scene, &Loaded, &mut Plan),
-    /// Refuses what its fold would refuse, without drawing.
-    pub(crate) check: for<'a> fn(&'a Frame<'a>, &RenderOptions) -> Result<(), Error>,
+    /// What repeats its last pass, in words; empty where nothing does.
+    pub(crate) repeats: fn(&Scene) -> String,
     /// Begins a frame.
     pub(crate) begin: for<'a> fn(&'a Frame<'a>) -> Box<dyn Fold + 'a>,
 }
@@ -84,12 +84,27 @@ pub(crate) struct Step {
     pub(crate) pass: &'static str,
     /// Its name for those who wait.
     pub(crate) stage: &'static str,
-    /// Seconds of one core, about.
-    pub(crate) seconds: fn(&Scene, &Translucent) -> f64,
+    /// Its counted work.
+    pub(crate) counts: fn(&Scene, &Translucent) -> Vec<Count>,
 }
 
 /// A technique at work on a frame.
 pub(crate) trait Fold {
+    /// Makes what it draws its own objects from, once, before anything is drawn.
+    fn prepare(&mut self, _: &mut Session<'_>, _: &mut CostRecord) -> Result<(), Error> {
+        Ok(())
+    }
+
+    /// Refuses what its fold would refuse, without drawing.
+    fn check(&mut self, _: &RenderOptions) -> Result<(), Error> {
+        Ok(())
+    }
+
+    /// Counted work on objects that are drawn from their own data, in these ranges of depth.
+    fn own_work(&self, _: &[Range<f32>]) -> OwnWork {
+        OwnWork::default()
+    }
+
     /// Folds what is its own at view depths in `range`, behind all that the accumulator holds.
     fn fold(
         &mut self,
@@ -108,6 +123,17 @@ pub(crate) trait Fold {
     fn finish(&mut self, _: &mut Finished<'_>) {}
 }
 
+/// Counted work of a technique on objects that it draws from their own data.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct OwnWork {
+    /// Particles of one set, or fragments of voxels.
+    pub(crate) items: f64,
+    /// Samples that slabs cover, for each light.
+    pub(crate) slab_samples: f64,
+    /// Ranges of depth that it draws in; `None` where it does not pass over any.
+    pub(crate) ranges: Option<usize>,
+}
+
 /// All depths.
 pub(crate) const EVERYWHERE: Range<f32> = f32::NEG_INFINITY..f32::INFINITY;
 
@@ -121,6 +147,8 @@ pub(crate) struct Session<'s> {
     pub(crate) warnings: &'s mut Vec<String>,
     /// Sets that were averaged, where some were.
     pub(crate) sets: Option<Sets>,
+    /// What was predicted of the drawing.
+    pub(crate) predicted: Prediction,
 }
 
 /// Sets of particles in a picture.
@@ -152,10 +180,10 @@ pub(crate) static TABLE: [Row; 5] = [
         of_splats: "particles are sampled from them",
         draws_splats: false,
         gaussians: false,
-        steps: &[Step { pass: pass::PARTICLES, stage: stage::PARTICLES, seconds: particles::seconds }],
+        steps: &[Step { pass: pass::PARTICLES, stage: stage::PARTICLES, counts: particles::counts }],
         is_random: true,
+        repeats: |scene| format!("{} sets", scene.render.particles.repeat_level),
         bytes: |matter, _, colored, options| particles::bytes(matter.scene, colored, options),
-        check: particles::check,
         begin: particles::begin,
         ..POINTS
     },
@@ -166,7 +194,7 @@ pub(crate) static TABLE: [Row; 5] = [
         form: Some(sheets::form),
         polygons: true,
         by_device: false,
-        steps: &[Step { pass: pass::SHEETS, stage: stage::SHEETS, seconds: sheets::seconds }],
+        steps: &[Step { pass: pass::SHEETS, stage: stage::SHEETS, counts: sheets::counts }],
         bytes: sheets::bytes,
         carries: sheets::carries,
         scatters_by: Some(
@@ -184,7 +212,7 @@ pub(crate) static TABLE: [Row; 5] = [
         gaussians: false,
         meets_discs: true,
         by_device: false,
-        steps: &[SORT, Step { pass: pass::SURFELS, stage: stage::SURFELS, ..FOLD }],
+        steps: &[SORT, Step { pass: pass::SURFELS, stage: stage::SURFELS, counts: surfels::counts }],
         bytes: surfels::bytes,
         plans: surfels::plans,
         begin: surfels::begin,
@@ -198,7 +226,7 @@ pub(crate) static TABLE: [Row; 5] = [
         steps: &[Step {
             pass: pass::REFERENCE,
             stage: stage::REFERENCE,
-            seconds: |_, all| cost::EXACT_FRAGMENT * all.fragments,
+            counts: |_, all| vec![Count::new(Item::ExactFragment, all.fragments)],
         }],
         bytes: |matter, _, _, _| reference::bytes(matter.scene),
         begin: reference::begin,
@@ -206,10 +234,19 @@ pub(crate) static TABLE: [Row; 5] = [
     },
 ];
 
-const SORT: Step = Step { pass: pass::SORT, stage: stage::SORT, seconds: |_, all| cost::SORT * all.splats };
+const SORT: Step =
+    Step { pass: pass::SORT, stage: stage::SORT, counts: |_, all| vec![Count::new(Item::SortedSplat, all.splats)] };
 
-const FOLD: Step =
-    Step { pass: pass::SPLAT, stage: stage::COMPOSITE, seconds: |_, all| cost::FRAGMENT * all.fragments };
+const FOLD: Step = Step { pass: pass::SPLAT, stage: stage::COMPOSITE, counts: composited };
+
+/// Splats whose fragments are composited, range by range.
+fn composited(scene: &Scene, all: &Translucent) -> Vec<Count> {
+    vec![
+        Count::new(Item::BlendedFragment, all.fragments),
+        Count::new(Item::BlendedSplat, all.splats),
+        Count::new(Item::RangeSample, samples(scene) * all.ranges),
+    ]
+}
 
 const POINTS: Row = Row {
     technique: Technique::Points,
@@ -231,6 +268,6 @@ const POINTS: Row = Row {
     carries: |_| None,
     scatters_by: None,
     plans: |_, _, _| {},
-    check: |_, _| Ok(()),
+    repeats: |_| String::new(),
     begin: points::begin,
 };

@@ -30,6 +30,7 @@ pub struct Progress {
     cancelled: AtomicBool,
     heard: AtomicBool,
     course: Mutex<Course>,
+    announced: Mutex<Vec<String>>,
     on_stage: Option<OnStage>,
 }
 
@@ -116,6 +117,16 @@ impl Progress {
         (frame.stage.begin, frame.stage.end) = (frame.end, frame.end);
         self.reset();
         self.say(course);
+    }
+
+    /// Leaves a sentence for whoever watches, while the work goes on.
+    pub fn announce(&self, sentence: &str) {
+        self.announced.lock().unwrap_or_else(PoisonError::into_inner).push(sentence.to_owned());
+    }
+
+    /// Takes the sentences that were left since the last call, in order.
+    pub fn take_announced(&self) -> Vec<String> {
+        std::mem::take(&mut *self.announced.lock().unwrap_or_else(PoisonError::into_inner))
     }
 
     /// Announces `n` more units of work of the present stage.

@@ -7,17 +7,19 @@ use crate::source::{code_only, line_of};
 const HOUSE: &str = "crates/organza/src/";
 
 /// The modules of each floor, from the ground up.
-const FLOORS: [&[&str]; 14] = [
+const FLOORS: [&[&str]; 16] = [
     &["error", "form", "pass", "stage"],
     &["statistics"],
-    &["options", "work"],
+    &["cost"],
+    &["options"],
     &["load"],
     &["brightness", "matter", "media", "memory", "shadows"],
     &["plan"],
     &["doubts", "frame"],
     &["technique"],
     &["choose"],
-    &["carried"],
+    &["carried", "ranges"],
+    &["predict"],
     &["draw", "prepare"],
     &["render"],
     &["sequence"],

@@ -1,6 +1,7 @@
 //! Groups of discs, as the algorithms of the paper ask for: found once for each object, and kept while it only moves.
 
 use super::Frame;
+use crate::cost::{Count, Item};
 use crate::scene::{Collisions, Coverage, Grouping, Scene, SceneObject, SurfelGroups};
 use crate::{CostRecord, Error, escape_controls};
 use crate::{pass, stage as stages};
@@ -69,13 +70,14 @@ fn refuse(object: &SceneObject, error: deferred_blend::Error) -> Error {
     }
 }
 
-/// Seconds of grouping so many discs, about; those that are enlarged look at all discs beside each.
-pub(crate) fn seconds(scene: &Scene, discs: f64) -> f64 {
-    const GROUPED: f64 = 1e-5;
-    const ENLARGED: f64 = 1e-3;
+/// Work of grouping so many discs; those that are enlarged look at all discs beside each.
+pub(crate) fn counts(scene: &Scene, discs: f64) -> Vec<Count> {
     let settings = &scene.render.surfels;
-    let of = |groups: &SurfelGroups| if groups.coverage == Coverage::Enlarged { ENLARGED } else { GROUPED };
-    discs * [settings.layers.groups(), settings.opaque.groups()].into_iter().flatten().map(of).sum::<f64>()
+    let item = |groups: &SurfelGroups| {
+        if groups.coverage == Coverage::Enlarged { Item::EnlargedDisc } else { Item::GroupedDisc }
+    };
+    let groups = [settings.layers.groups(), settings.opaque.groups()].into_iter().flatten();
+    groups.map(|groups| Count::new(item(groups), discs)).collect()
 }
 
 /// Bytes of grouping so many discs, of a cloud of these bytes.

@@ -6,7 +6,7 @@ use crate::pass;
 use crate::plan::Plan;
 use crate::scene::{LightPoint, light_points};
 use crate::shadows::{EYE, ShadowTable, casting, eye, eye_params, shadow_error, thick_objects};
-use crate::{CostRecord, Error, stage, work};
+use crate::{CostRecord, Error, cost as predicted, stage};
 use splat_core::shade::{LitBy, ShadeInput};
 use splat_core::{Arrived, Object, Remembered, Transmittance};
 use tsm::{Deposits, ShadowMap};
@@ -123,7 +123,7 @@ impl<'a> Frame<'a> {
                 continue;
             };
             done.maps += 1;
-            self.progress.begin(&work::shadow_map(done.maps, count, table.predicted.entries));
+            self.progress.begin(&predicted::shadow_map(done.maps, count, table.predicted.entries));
             let params = table.params(self.settings, self.loaded, done.left);
             let map = cost.measure(pass::SHADOW_MAP, |stage| {
                 let l = self.loaded;

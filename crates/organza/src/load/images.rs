@@ -4,7 +4,7 @@ use super::files::FileData;
 use super::input::refuse;
 use super::loading::Loading;
 use crate::scene::SceneLight;
-use crate::{Error, work};
+use crate::{Error, cost};
 use convert::read::ReadParams;
 use splat_core::{Environment, Exceeded, HeightImage, RadianceImage, Reservation, Slide};
 use std::path::{Path, PathBuf};
@@ -71,7 +71,7 @@ impl Loading<'_> {
         bytes_of: fn([u32; 2]) -> u64,
         held: &mut Vec<Reservation>,
     ) -> Result<Arc<RadianceImage>, Error> {
-        self.progress.begin(&work::reading_file(path));
+        self.progress.begin(&cost::reading_file(path));
         let params = ReadParams { is_data, ..self.options.read_params() };
         let FileData::Image(image) = self.files.read(path, &params, self.progress)? else {
             let hint = "name a Radiance HDR, OpenEXR or PNG file";

@@ -5,10 +5,11 @@ use super::files::Files;
 use super::input::{Input, input};
 use super::object::{self, Prepared};
 use super::own::Own;
+use crate::cost::{self, Count};
 use crate::form::PlannedObject;
 use crate::scene::{Scene, SceneObject};
 use crate::statistics::ObjectStatistics;
-use crate::{Error, Progress, RenderOptions, SplatCount, stage, work};
+use crate::{Error, Progress, RenderOptions, SplatCount, stage};
 use splat_core::{Cloud, Exceeded};
 
 /// What loading reads.
@@ -37,13 +38,18 @@ impl<'a> Loading<'a> {
 
     /// Reads every object and counts its splats, so that a scene that does not fit is refused before anything is
     /// converted.
-    pub(super) fn prepare(&self, looks: &dyn Fn(&SceneObject) -> bool) -> Result<Vec<Prepared<'a>>, Error> {
-        self.progress.plan(work::of_scene(self.scene));
+    pub(super) fn prepare(
+        &self,
+        looks: &dyn Fn(&SceneObject) -> bool,
+        beside: &[Count],
+    ) -> Result<Vec<Prepared<'a>>, Error> {
+        let work = cost::before_reading(self.scene, beside);
+        self.progress.plan(self.options.rates.stages(&work));
         self.progress.begin(stage::READ);
         self.progress.add_total(self.visible().count() as u64);
         let one = |(id, object): (usize, &'a SceneObject)| {
             self.progress.tick(1).map_err(|_| Error::Cancelled)?;
-            if let Some(reading) = work::reading(object) {
+            if let Some(reading) = cost::reading(object) {
                 self.progress.begin(&reading);
             }
             let prepared = object::prepare(object, &self.context(id, 0, 0), looks(object));
@@ -134,7 +140,7 @@ impl<'a> Loading<'a> {
             if plan.splats.is_none() {
                 continue;
             }
-            self.progress.begin(&work::converting(&object.name));
+            self.progress.begin(&cost::converting(&object.name));
             let cloud = object::convert(&p, of, &self.context(id, used, made), warnings);
             let cloud = cloud.map_err(|e| self.named(object, e))?;
             if cloud.is_empty() {

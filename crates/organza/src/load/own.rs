@@ -142,6 +142,11 @@ impl Own {
         }
     }
 
+    /// Voxels with extinction; 0 where it is not drawn as cells.
+    pub(crate) fn voxels(&self) -> u64 {
+        if self.form == Form::Cells { self.table_bytes / BYTES_PER_VOXEL } else { 0 }
+    }
+
     /// Triangles, and where they are.
     pub(crate) fn placed(&self) -> Option<PlacedMesh<'_>> {
         let Body::Triangles(mesh) = &self.body else { return None };
@@ -193,6 +198,9 @@ impl Own {
     }
 }
 
+/// Bytes of a voxel with extinction in the table of a sampler, about.
+const BYTES_PER_VOXEL: u64 = 32;
+
 /// Bytes of the tables of a sampler, about: of cells with extinction, of triangles, of cubes that a surface meets; a lattice's isosurface
 /// has as many splats as there are steps across it.
 fn table_bytes(body: &Body, form: Form, bounds: DAabb, splats: u64) -> u64 {
@@ -200,7 +208,8 @@ fn table_bytes(body: &Body, form: Form, bounds: DAabb, splats: u64) -> u64 {
         Body::Cells { grid, transfer, .. } => {
             // Chains find cells by an index of each voxel.
             let index = if form == Form::Chains { 4 * grid.values.len() as u64 } else { 0 };
-            index + 32 * grid.values.par_iter().filter(|v| transfer.at(**v).extinction > 0.0).count() as u64
+            index
+                + BYTES_PER_VOXEL * grid.values.par_iter().filter(|v| transfer.at(**v).extinction > 0.0).count() as u64
         }
         Body::Lattice { .. } => 32 * splats,
         Body::Triangles(mesh) => 16 * mesh.triangles.len() as u64,

@@ -16,10 +16,11 @@ mod kept;
 mod parts;
 mod unit;
 
+use crate::cost::{Count, Item, Translucent, samples};
 use crate::frame::Frame;
 use crate::pass;
 use crate::scene::{Scene, SurfaceSampler};
-use crate::technique::{EVERYWHERE, Finished, Fold, Session};
+use crate::technique::{EVERYWHERE, Finished, Fold, OwnWork, Session};
 use crate::{CostRecord, Error, RenderOptions, Sets};
 pub(crate) use checkpoint::Checkpoint;
 use ensemble::{Average, average_bytes, fold, fold_params};
@@ -30,35 +31,20 @@ use splat_core::raster::OpaqueImage;
 use splat_core::{Accumulator, LayerData};
 use std::ops::Range;
 
-/// Seconds of a sample of a set.
-const SET: f64 = 4e-7;
-
-/// Seconds of one core that the sets of a scene take, about.
-pub(crate) fn seconds(scene: &Scene, all: &crate::work::Translucent) -> f64 {
-    let sets = SET * crate::work::samples(scene) * f64::from(scene.render.particles.repeat_level);
-    if all.any { sets } else { 0.0 }
+/// Particles and samples of all sets.
+pub(crate) fn counts(scene: &Scene, all: &Translucent) -> Vec<Count> {
+    let sets = f64::from(scene.render.particles.repeat_level);
+    let is_there = f64::from(u8::from(all.any));
+    vec![
+        Count::new(Item::Particle, all.of_own_data * sets),
+        Count::new(Item::SetSample, samples(scene) * sets * all.ranges * is_there),
+    ]
 }
 
 /// Bytes of averaging the picture of a scene.
 pub(crate) fn bytes(scene: &Scene, colored_extinction: bool, options: &RenderOptions) -> u64 {
     let size = scene.camera.size.map(|s| u64::from(s) * u64::from(scene.render.antialias));
     average_bytes(size, &scene.render.layers.set(), colored_extinction, options)
-}
-
-/// Refuses sets of more particles than may be in memory. Surfaces by Brownian motion are not asked: it counts by a run as long as some sets.
-pub(crate) fn check<'a>(frame: &'a Frame<'a>, options: &RenderOptions) -> Result<(), Error> {
-    if matches!(frame.settings.particles.surface_sampler, SurfaceSampler::Brownian { .. }) {
-        return Ok(());
-    }
-    // Drawing tells them.
-    let mut warnings = Vec::new();
-    let mut parts = Vec::new();
-    for mut source in sources(frame) {
-        parts.extend(source.part(&mut warnings)?);
-    }
-    let parts: Vec<&Part<'_>> = parts.iter().collect();
-    let expected = parts.iter().map(|part| part.object().sampler.expected_particles()).sum();
-    fold_params(options).check_set(expected).map_err(|e| refuse(&parts::named(&parts), e))
 }
 
 /// Begins a frame.
@@ -69,13 +55,47 @@ pub(crate) fn begin<'a>(frame: &'a Frame<'a>) -> Box<dyn Fold + 'a> {
 /// What particles are sampled from, and what they left.
 struct Particles<'a> {
     frame: &'a Frame<'a>,
-    /// Once they were made.
+    /// Once they were prepared.
     parts: Option<Vec<Part<'a>>>,
     /// The sets of the last range.
     average: Option<Average>,
 }
 
 impl Fold for Particles<'_> {
+    fn prepare(&mut self, session: &mut Session<'_>, cost: &mut CostRecord) -> Result<(), Error> {
+        self.parts = Some(parts(self.frame, session, cost)?);
+        Ok(())
+    }
+
+    /// Refuses sets of more particles than may be in memory. Surfaces by Brownian motion are not asked: it counts by a run as long as some sets.
+    fn check(&mut self, options: &RenderOptions) -> Result<(), Error> {
+        if matches!(self.frame.settings.particles.surface_sampler, SurfaceSampler::Brownian { .. }) {
+            return Ok(());
+        }
+        // Drawing tells them.
+        let mut warnings = Vec::new();
+        let mut made = Vec::new();
+        for mut source in sources(self.frame) {
+            made.extend(source.part(&mut warnings)?);
+        }
+        let parts: Vec<&Part<'_>> = made.iter().collect();
+        let expected = parts.iter().map(|part| part.object().sampler.expected_particles()).sum();
+        fold_params(options).check_set(expected).map_err(|e| refuse(&parts::named(&parts), e))?;
+        self.parts = Some(made);
+        Ok(())
+    }
+
+    /// Every range samples whole sets of the objects that reach into it, and is passed over without any.
+    fn own_work(&self, ranges: &[Range<f32>]) -> OwnWork {
+        let parts = self.parts.as_deref().unwrap_or_default();
+        let of_range = |range: &Range<f32>| {
+            let inside = parts.iter().filter(|part| part.reaches(range, &self.frame.camera));
+            inside.map(|part| part.object().sampler.expected_particles()).sum::<f64>()
+        };
+        let of_ranges: Vec<f64> = ranges.iter().map(of_range).filter(|particles| *particles > 0.0).collect();
+        OwnWork { items: of_ranges.iter().sum(), ranges: Some(of_ranges.len()), ..OwnWork::default() }
+    }
+
     /// An interrupt after two sets leaves the picture of the sets so far.
     fn fold(
         &mut self,
@@ -86,9 +106,6 @@ impl Fold for Particles<'_> {
     ) -> Result<(), Error> {
         let frame = self.frame;
         let opaque = frame.opaque(cost)?;
-        if self.parts.is_none() {
-            self.parts = Some(parts(frame, session, cost)?);
-        }
         let parts = self.parts.as_deref().unwrap_or_default();
         let inside: Vec<&Part<'_>> = parts.iter().filter(|part| part.reaches(&range, &frame.camera)).collect();
         if inside.is_empty() {

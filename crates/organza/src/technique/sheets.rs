@@ -6,15 +6,15 @@
 
 mod half;
 
+use crate::cost::{Count, Item, Translucent};
 use crate::form::Form;
-use crate::frame::{Frame, Shaded};
+use crate::frame::{Extent, Frame, Shaded};
 use crate::load::own::{Body, Own};
 use crate::matter::Matter;
 use crate::pass;
 use crate::scene::{self, LightPoint, Scene, Technique};
 use crate::statistics::{ObjectData, ObjectStatistics};
-use crate::technique::{Fold, Session};
-use crate::work::{self, Translucent, cost};
+use crate::technique::{Fold, OwnWork, Session};
 use crate::{CostRecord, Error, RenderOptions, memory, stage};
 use sheet_light::half::{HalfParams, pane_bytes, polygon_bytes};
 use sheet_light::{
@@ -22,9 +22,6 @@ use sheet_light::{
 };
 use splat_core::{Accumulator, Direction, Limits, Packing};
 use std::ops::Range;
-
-/// Seconds of a sample of a picture of sheets, whatever is in them.
-const SHEETS: f64 = 2e-6;
 
 /// The form in which an object is taken.
 pub(crate) fn form(object: &ObjectStatistics) -> (Form, &'static str) {
@@ -38,10 +35,41 @@ pub(crate) fn form(object: &ObjectStatistics) -> (Form, &'static str) {
     }
 }
 
-/// Seconds of one core, about.
-pub(crate) fn seconds(scene: &Scene, all: &Translucent) -> f64 {
-    let sheets = if all.any { SHEETS * work::samples(scene) } else { 0.0 };
-    sheets + cost::FRAGMENT * all.fragments
+/// Fragments in slabs, and the samples that slabs cover.
+pub(crate) fn counts(_: &Scene, all: &Translucent) -> Vec<Count> {
+    vec![
+        Count::new(Item::SheetFragment, all.fragments + all.of_own_data),
+        Count::new(Item::SlabSample, all.slab_samples),
+    ]
+}
+
+/// Voxels with extinction, as slabs across the view meet them; half-vector slicing sweeps them once for each light, for the eye and for the light.
+fn own_work(frame: &Frame<'_>) -> OwnWork {
+    let shining = frame.light_points().iter().filter(|point| point.light.intensity != [0.0; 3]);
+    let is_half = half::is_asked(frame.scene);
+    let lights = shining.filter(|point| !is_half || half::is_swept(frame.scene, point)).count() as f64;
+    let sweeps = if is_half { 2.0 * lights.max(1.0) } else { 1.0 };
+    let lit = if is_half { 1.0 } else { lights };
+    let extent = frame.settings.sheets.kernel_extent;
+    let one = |own: &Own| {
+        let Body::Cells { grid, .. } = &own.body else { return OwnWork::default() };
+        let seen = Extent::new(&own.world_box(), &frame.camera);
+        let step = grid.shortest_step() * own.transform.scale;
+        let radius = extent * step * seen.samples_per_unit;
+        let voxels = own.voxels() as f64 * seen.share;
+        let slabs = own.world_box().diagonal() / step;
+        OwnWork {
+            items: sweeps * voxels * (std::f64::consts::PI * radius * radius).max(1.0),
+            slab_samples: sweeps * seen.samples * slabs * (1.0 + lit),
+            ranges: None,
+        }
+    };
+    let volumes = frame.loaded.own.iter().filter(|own| own.technique == Technique::Sheets).map(one);
+    volumes.fold(OwnWork::default(), |sum, work| OwnWork {
+        items: sum.items + work.items,
+        slab_samples: sum.slab_samples + work.slab_samples,
+        ranges: None,
+    })
 }
 
 pub(crate) use half::carries;
@@ -74,6 +102,10 @@ struct Sheets<'a> {
 }
 
 impl Fold for Sheets<'_> {
+    fn own_work(&self, _: &[Range<f32>]) -> OwnWork {
+        own_work(self.frame)
+    }
+
     fn fold(
         &mut self,
         range: Range<f32>,

@@ -4,6 +4,7 @@
 mod glass;
 mod plans;
 
+use crate::cost::{Count, Item, Translucent, samples};
 use crate::frame::discs::{disc_input, params, refuse, with_shown};
 use crate::frame::{Frame, grouped};
 use crate::matter::Matter;
@@ -43,6 +44,16 @@ pub(crate) fn bytes(matter: &Matter<'_>, _: &[LightPoint], _: bool, _: &RenderOp
 /// Whether light falls on bumps, or what to set so that it does.
 pub(crate) fn bumps(scene: &Scene) -> Result<(), &'static str> {
     scene.render.surfels.lights_pixels.then_some(()).ok_or("set render.surfels.shading = \"pixels\"")
+}
+
+/// Discs whose fragments are averaged and composited, range by range, and rays that are bent.
+pub(crate) fn counts(scene: &Scene, all: &Translucent) -> Vec<Count> {
+    let bends = scene.materials.iter().any(|m| m.material.bounds_matter());
+    vec![
+        Count::new(Item::SurfelFragment, all.fragments),
+        Count::new(Item::SurfelSample, samples(scene) * all.ranges),
+        Count::new(Item::BentSample, if bends { samples(scene) } else { 0.0 }),
+    ]
 }
 
 /// Begins a frame.

@@ -92,6 +92,11 @@ fn swept<'p>(scene: &Scene, point: &'p LightPoint) -> Option<(&'p Light, u32)> {
     (!is_whole(scene, point) || point.rank[0] == 0).then(|| lamp(scene, point))
 }
 
+/// Whether a point has a sweep of its own, or stands for its whole light.
+pub(super) fn is_swept(scene: &Scene, point: &LightPoint) -> bool {
+    swept(scene, point).is_some()
+}
+
 /// Bytes of the largest sweep, among such translucent polygons.
 pub(super) fn bytes(
     matter: &Matter<'_>,

@@ -14,7 +14,7 @@ use std::ops::Range;
 const ROUNDING: f32 = 4e-6;
 
 /// Ranges that follow each other and hold all depths.
-pub(super) fn ranges(frame: &Frame<'_>) -> Vec<Range<f32>> {
+pub(crate) fn ranges(frame: &Frame<'_>) -> Vec<Range<f32>> {
     if frame.plan.techniques.len() < 2 {
         return vec![EVERYWHERE];
     }

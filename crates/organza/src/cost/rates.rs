@@ -1,0 +1,227 @@
+//! Nanoseconds of one item on one core, and the share of its time that threads divide.
+
+use super::{Count, CountedPass};
+use crate::pass;
+
+/// Where the built-in figures were measured.
+pub const BUILT_IN_MACHINE: &str = "AMD EPYC, one core, profile dev";
+
+/// A kind of item that a pass handles. The time of a pass is the sum over its kinds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Item {
+    /// A byte of a file that is read.
+    FileByte,
+    /// An object without a file, looked at on a coarse lattice.
+    GeneratedObject,
+    /// A splat that is converted.
+    ConvertedSplat,
+    /// A splat that is offered to a shadow table.
+    CastSplat,
+    /// An opaque splat that is offered to a shadow table, where it ends rays.
+    OpaqueCaster,
+    /// An entry of a shadow table: a splat in a cell.
+    ShadowEntry,
+    /// An entry of the shadow table of a lamp, which has a place: splats near it cover many cells.
+    LampEntry,
+    /// A splat that is culled and sorted.
+    SortedSplat,
+    /// A disc that is given to a group of discs that hardly overlap.
+    GroupedDisc,
+    /// The same where discs are enlarged until their group covers the surface.
+    EnlargedDisc,
+    /// A splat that gets its footprint.
+    ProjectedSplat,
+    /// A splat that gets its radiance.
+    ShadedSplat,
+    /// A look-up of one splat in one shadow table.
+    ShadowLookUp,
+    /// An opaque splat that is resolved by depth.
+    OpaqueSplat,
+    /// A fragment of an opaque splat.
+    OpaqueFragment,
+    /// A fragment of a translucent splat that is composited.
+    BlendedFragment,
+    /// A translucent splat that is composited.
+    BlendedSplat,
+    /// A sample of the accumulator, once for each range of depth.
+    RangeSample,
+    /// A particle of one set.
+    Particle,
+    /// A sample of one set of particles.
+    SetSample,
+    /// A fragment of a voxel or splat in a slab.
+    SheetFragment,
+    /// A sample that a slab covers, for each light.
+    SlabSample,
+    /// A fragment of a disc in a layer.
+    SurfelFragment,
+    /// A sample of a picture of layers of discs.
+    SurfelSample,
+    /// A sample through which rays are mirrored and bent.
+    BentSample,
+    /// A fragment that is sorted in its pixel and composited in f64.
+    ExactFragment,
+    /// A sample that becomes part of a pixel.
+    FinishedSample,
+}
+
+/// What is known of a kind of item.
+struct Row {
+    item: Item,
+    /// Its name in files of a machine.
+    name: &'static str,
+    /// In sentences.
+    words: &'static str,
+    /// The pass that handles it.
+    pass: &'static str,
+    /// Nanoseconds of one core.
+    ns: f64,
+    /// Share of that time which threads divide, 0 to 1.
+    parallel: f64,
+}
+
+const fn row(item: Item, name: &'static str, words: &'static str, pass: &'static str, ns: f64, parallel: f64) -> Row {
+    Row { item, name, words, pass, ns, parallel }
+}
+
+/// The built-in figures, measured on [`BUILT_IN_MACHINE`] by the command in benches/README.md, in the order of [`Item`]. Enlarged and grouped discs
+/// and exact fragments are of older benchmarks; parallel shares are estimates.
+static TABLE: [Row; 27] = [
+    row(Item::FileByte, "file_byte", "bytes", pass::READ, 80.0, 0.0),
+    row(Item::GeneratedObject, "generated_object", "objects", pass::READ, 1.5e7, 0.5),
+    row(Item::ConvertedSplat, "converted_splat", "splats", pass::CONVERT, 400.0, 0.5),
+    row(Item::CastSplat, "cast_splat", "splats", pass::SHADOW_MAP, 30.0, 0.9),
+    row(Item::OpaqueCaster, "opaque_caster", "opaque splats", pass::SHADOW_MAP, 420.0, 0.9),
+    row(Item::ShadowEntry, "shadow_entry", "entries of a shadow table", pass::SHADOW_MAP, 47.0, 0.9),
+    row(Item::LampEntry, "lamp_entry", "entries of a lamp's shadow table", pass::SHADOW_MAP, 290.0, 0.9),
+    row(Item::SortedSplat, "sorted_splat", "splats", pass::SORT, 17.0, 0.5),
+    row(Item::GroupedDisc, "grouped_disc", "discs", pass::GROUP, 1e4, 0.5),
+    row(Item::EnlargedDisc, "enlarged_disc", "enlarged discs", pass::GROUP, 1e6, 0.9),
+    row(Item::ProjectedSplat, "projected_splat", "splats", pass::PROJECT, 85.0, 0.9),
+    row(Item::ShadedSplat, "shaded_splat", "splats", pass::SHADE, 100.0, 0.9),
+    row(Item::ShadowLookUp, "shadow_look_up", "look-ups in shadow tables", pass::SHADE, 210.0, 0.9),
+    row(Item::OpaqueSplat, "opaque_splat", "splats", pass::OPAQUE, 95.0, 0.9),
+    row(Item::OpaqueFragment, "opaque_fragment", "fragments", pass::OPAQUE, 1.0, 0.9),
+    row(Item::BlendedFragment, "blended_fragment", "fragments", pass::SPLAT, 1.0, 0.9),
+    row(Item::BlendedSplat, "blended_splat", "splats", pass::SPLAT, 100.0, 0.9),
+    row(Item::RangeSample, "range_sample", "samples", pass::SPLAT, 20.0, 0.9),
+    row(Item::Particle, "particle", "particles", pass::PARTICLES, 50.0, 0.95),
+    row(Item::SetSample, "set_sample", "samples of sets", pass::PARTICLES, 250.0, 0.95),
+    row(Item::SheetFragment, "sheet_fragment", "fragments", pass::SHEETS, 20.0, 0.9),
+    row(Item::SlabSample, "slab_sample", "samples of slabs", pass::SHEETS, 50.0, 0.9),
+    row(Item::SurfelFragment, "surfel_fragment", "fragments", pass::SURFELS, 25.0, 0.9),
+    row(Item::SurfelSample, "surfel_sample", "samples", pass::SURFELS, 500.0, 0.9),
+    row(Item::BentSample, "bent_sample", "samples with bent rays", pass::SURFELS, 1.3e4, 0.9),
+    row(Item::ExactFragment, "exact_fragment", "fragments", pass::REFERENCE, 1000.0, 0.9),
+    row(Item::FinishedSample, "finished_sample", "samples", pass::FINISH, 80.0, 0.5),
+];
+
+impl Item {
+    /// Every kind, in the order of [`Item`].
+    pub fn every() -> impl Iterator<Item = Self> {
+        TABLE.iter().map(|row| row.item)
+    }
+
+    /// Its name in files of a machine.
+    pub fn name(self) -> &'static str {
+        TABLE[self as usize].name
+    }
+
+    /// Its name in sentences, plural.
+    pub fn words(self) -> &'static str {
+        TABLE[self as usize].words
+    }
+
+    /// The pass whose time it makes up.
+    pub fn pass(self) -> &'static str {
+        TABLE[self as usize].pass
+    }
+}
+
+/// Nanoseconds of each kind of item, built in or measured on a machine.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Rates {
+    ns: Vec<f64>,
+    source: String,
+}
+
+impl Default for Rates {
+    fn default() -> Self {
+        Self { ns: TABLE.iter().map(|row| row.ns).collect(), source: "built-in figures".to_owned() }
+    }
+}
+
+impl Rates {
+    /// The built-in figures with other nanoseconds of one core, each finite and ≥ 0; `source` names them in reports.
+    pub fn measured(ns: impl Fn(Item) -> f64, source: String) -> Self {
+        Self { ns: Item::every().map(ns).collect(), source }
+    }
+
+    /// Nanoseconds of one core that an item takes.
+    pub fn ns(&self, item: Item) -> f64 {
+        self.ns[item as usize]
+    }
+
+    /// Where they are from.
+    pub fn source(&self) -> &str {
+        &self.source
+    }
+
+    /// Stages of progress with their predicted seconds, on the threads that run them. Passes that take turns have a stage in each round.
+    pub(crate) fn stages(&self, passes: &[CountedPass]) -> Vec<(String, f64)> {
+        let threads = rayon::current_num_threads();
+        let mut stages = Vec::new();
+        for taking_turns in passes.chunk_by(|a, b| a.rounds == b.rounds) {
+            let rounds = taking_turns[0].rounds;
+            let stage = |pass: &CountedPass| (pass.stage.clone(), pass.seconds(self, threads) / rounds as f64);
+            (0..rounds).for_each(|_| stages.extend(taking_turns.iter().map(stage)));
+        }
+        stages
+    }
+
+    /// Seconds of so many items on so many threads, at least one.
+    pub(super) fn seconds(&self, count: &Count, threads: usize) -> f64 {
+        let parallel = TABLE[count.item as usize].parallel;
+        let share = 1.0 - parallel + parallel / threads.max(1) as f64;
+        1e-9 * self.ns(count.item) * count.number * share
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_kind_has_its_own_row() {
+        for (rank, item) in Item::every().enumerate() {
+            assert_eq!(item as usize, rank, "{}", item.name());
+        }
+        let mut names: Vec<&str> = Item::every().map(Item::name).collect();
+        names.sort_unstable();
+        names.dedup();
+        assert_eq!(names.len(), TABLE.len());
+        assert!(TABLE.iter().all(|row| row.ns > 0.0 && (0.0..=1.0).contains(&row.parallel)));
+    }
+
+    #[test]
+    fn passes_that_take_turns_have_a_stage_in_each_round() {
+        let pass = |stage: &str, rounds| {
+            let counts = vec![Count::new(Item::FinishedSample, 1e6)];
+            CountedPass { rounds, ..CountedPass::new(pass::FINISH, stage.to_owned(), counts) }
+        };
+        let stages = Rates::default().stages(&[pass("sort", 1), pass("a", 2), pass("b", 2), pass("finish", 1)]);
+        let names: Vec<&str> = stages.iter().map(|(name, _)| name.as_str()).collect();
+        assert_eq!(names, ["sort", "a", "b", "a", "b", "finish"]);
+        assert!((stages[0].1 - stages[1].1 - stages[3].1).abs() < 1e-12);
+    }
+
+    #[test]
+    fn threads_divide_the_parallel_share_alone() {
+        let rates = Rates::default();
+        let count = Count::new(Item::Particle, 1e9);
+        let [one, many] = [1, 1 << 20].map(|threads| rates.seconds(&count, threads));
+        assert!((one - rates.ns(Item::Particle)).abs() < 1e-9 * one);
+        let serial = 1.0 - TABLE[Item::Particle as usize].parallel;
+        assert!((many / one - serial).abs() < 1e-5);
+    }
+}

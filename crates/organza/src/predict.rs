@@ -1,0 +1,237 @@
+//! Counted work of a frame, before it is drawn, and the keys of its scene that would change it.
+
+use crate::choose::{row, technique_of};
+use crate::cost::{Change, Count, CountedPass, Item, Prediction, Translucent, before_reading, samples, shadow_map};
+use crate::frame::{Extent, Frame, grouped};
+use crate::scene::{LightPoint, SceneObject, Technique};
+use crate::technique::{EVERYWHERE, Fold, OwnWork, TABLE};
+use crate::{RenderOptions, ShadowTable, pass, stage};
+use splat_core::SplatKind;
+use splat_core::raster::{self, Expected};
+use std::ops::Range;
+
+/// What the camera sees of a loaded scene, counted once for all predictions of it.
+struct Seen {
+    /// Opaque splats.
+    opaque: Expected,
+    /// By each technique of the plan.
+    translucent: Vec<BySeen>,
+    ranges: f64,
+}
+
+/// What one technique draws.
+#[derive(Clone, Copy)]
+struct BySeen {
+    technique: Technique,
+    splats: Expected,
+    own: OwnWork,
+}
+
+impl Seen {
+    /// That of a frame whose techniques have been prepared or checked, in these ranges of depth.
+    fn new(frame: &Frame<'_>, folds: &[Box<dyn Fold + '_>], ranges: &[Range<f32>]) -> Self {
+        let of_each = frame.plan.techniques.iter().zip(folds);
+        let translucent = of_each.map(|(technique, fold)| BySeen {
+            technique: *technique,
+            splats: expected(frame, Some(*technique)),
+            own: fold.own_work(ranges),
+        });
+        let translucent = translucent.collect();
+        Self { opaque: expected(frame, None), translucent, ranges: ranges.len() as f64 }
+    }
+}
+
+/// The opaque splats in view, or the translucent ones of a technique, and the fragments of their footprints, about.
+fn expected(frame: &Frame<'_>, technique: Option<Technique>) -> Expected {
+    let cloud = &frame.loaded.cloud;
+    raster::expected(cloud, &frame.camera, |i| match technique {
+        None => cloud.kind[i] == SplatKind::Opaque,
+        Some(t) => {
+            let object = cloud.object[i] as usize;
+            cloud.kind[i] != SplatKind::Opaque && frame.plan.by[object] == t && !frame.plan.is_own[object]
+        }
+    })
+}
+
+/// Passes that draw a frame, in the order of running.
+fn of_frame(frame: &Frame<'_>, seen: &Seen) -> Vec<CountedPass> {
+    let mut passes = light(frame);
+    passes.extend(surfaces(frame, seen));
+    passes
+}
+
+/// Shadow maps of lights, where they are not there from another frame, and the eye's.
+fn light(frame: &Frame<'_>) -> Vec<CountedPass> {
+    let plan = frame.plan;
+    let maps = plan.shadow_maps_built();
+    let built = if frame.has_maps() { 0 } else { maps };
+    let map = |(rank, (table, point)): (usize, (&ShadowTable, &LightPoint))| {
+        let entries = table.predicted.entries;
+        CountedPass::new(pass::SHADOW_MAP, shadow_map(rank, maps, entries), cast(frame, point, entries))
+    };
+    let mut passes: Vec<CountedPass> = (1..=built).zip(tables(frame)).map(map).collect();
+    // The eye's is another in each view, of media alone.
+    let number = frame.loaded.cloud.len() as f64;
+    let counts = |entries| vec![Count::new(Item::CastSplat, number), Count::new(Item::ShadowEntry, entries)];
+    let eye = |entries| CountedPass::new(pass::EYE_MAP, stage::EYE_MAP.to_owned(), counts(entries));
+    passes.extend(plan.eye_table.iter().map(|table| eye(table.predicted.entries)));
+    passes
+}
+
+/// The tables of all shadow maps of lights, each with its point.
+fn tables<'b>(frame: &'b Frame<'_>) -> impl Iterator<Item = (&'b ShadowTable, &'b LightPoint)> {
+    let with_points = |tables: &'b [Option<ShadowTable>]| tables.iter().zip(frame.light_points());
+    let each = with_points(&frame.plan.shadow_tables).chain(with_points(&frame.plan.other_tables));
+    each.filter_map(|(table, point)| Some((table.as_ref()?, point)))
+}
+
+/// Work of a shadow map of so many entries.
+fn cast(frame: &Frame<'_>, point: &LightPoint, entries: f64) -> Vec<Count> {
+    let entry = if point.light.shape.place().is_some() { Item::LampEntry } else { Item::ShadowEntry };
+    let cloud = &frame.loaded.cloud;
+    let opaque = cloud.kind.iter().filter(|kind| **kind == SplatKind::Opaque).count() as f64;
+    vec![
+        Count::new(Item::CastSplat, cloud.len() as f64 - opaque),
+        Count::new(Item::OpaqueCaster, opaque),
+        Count::new(entry, entries),
+    ]
+}
+
+/// All passes behind the shadow maps.
+fn surfaces(frame: &Frame<'_>, seen: &Seen) -> Vec<CountedPass> {
+    let (plan, scene) = (frame.plan, frame.scene);
+    let maps = plan.shadow_maps_built() as f64;
+    let mut passes = Vec::new();
+    let mut drawn = seen.opaque.splats;
+    let mut last = Vec::new();
+    for by in &seen.translucent {
+        let row = row(by.technique);
+        let is_drawn = plan.by.iter().zip(&plan.draws).any(|(by_object, draws)| *by_object == by.technique && *draws);
+        drawn += if is_drawn { by.splats.splats } else { 0.0 };
+        let ranges = by.own.ranges.map_or(seen.ranges, |ranges| ranges as f64);
+        let translucent = Translucent {
+            splats: by.splats.splats,
+            fragments: by.splats.fragments,
+            of_own_data: by.own.items,
+            slab_samples: by.own.slab_samples,
+            ranges,
+            any: plan.passes.iter().any(|p| row.steps.last().is_some_and(|step| step.pass == p.name)),
+        };
+        let mut repeats = (row.repeats)(scene);
+        if ranges > 1.0 && !repeats.is_empty() {
+            repeats += &format!(" in {ranges} ranges of depth");
+        }
+        let counted = |step: &crate::technique::Step| {
+            CountedPass::new(step.pass, step.stage.to_owned(), (step.counts)(scene, &translucent))
+        };
+        let mut steps: Vec<CountedPass> = row.steps.iter().map(counted).collect();
+        last.extend(steps.pop().map(|pass| CountedPass { repeats, rounds: seen.ranges as usize, ..pass }));
+        passes.extend(steps);
+    }
+    let mut add = |pass, stage: &str, counts: Vec<Count>| passes.push(CountedPass::new(pass, stage.to_owned(), counts));
+    add(pass::GROUP, stage::GROUP, grouped::counts(scene, frame.loaded.cloud.len() as f64));
+    add(pass::PROJECT, stage::PROJECT, vec![Count::new(Item::ProjectedSplat, drawn)]);
+    // Thick media look up the eye's map too, and share both over each cell.
+    let of_eye = if plan.eye_table.is_some() { 2.0 } else { 0.0 };
+    let look_ups = Count::new(Item::ShadowLookUp, drawn * (maps + of_eye));
+    add(pass::SHADE, stage::SHADE, vec![Count::new(Item::ShadedSplat, drawn), look_ups]);
+    add(
+        pass::OPAQUE,
+        stage::OPAQUE,
+        vec![
+            Count::new(Item::OpaqueSplat, seen.opaque.splats),
+            Count::new(Item::OpaqueFragment, seen.opaque.fragments),
+        ],
+    );
+    passes.extend(last);
+    passes.push(CountedPass::new(
+        pass::FINISH,
+        stage::FINISH.to_owned(),
+        vec![Count::new(Item::FinishedSample, samples(scene))],
+    ));
+    passes
+}
+
+/// The prediction of a frame in these ranges of depth, whose techniques have been prepared or checked: reading, conversion and drawing.
+pub(crate) fn prediction(
+    frame: &Frame<'_>,
+    folds: &[Box<dyn Fold + '_>],
+    ranges: &[Range<f32>],
+    options: &RenderOptions,
+) -> Prediction {
+    let seen = Seen::new(frame, folds, ranges);
+    let mut loading: Vec<CountedPass> =
+        before_reading(frame.scene, &[]).into_iter().filter(|pass| pass.pass == pass::READ).collect();
+    let converted = frame.loaded.splats.iter().map(|splats| splats.predicted as f64).sum();
+    loading.push(conversion(converted));
+    let whole = || Seen::new(frame, folds, &[EVERYWHERE]);
+    let changes = [automatic_cells(frame, &seen), one_range(frame, &seen, whole), preferred(frame, &seen)];
+    Prediction {
+        loading,
+        drawing: of_frame(frame, &seen),
+        changes: changes.into_iter().flatten().collect(),
+        rates: options.rates.clone(),
+    }
+}
+
+fn conversion(splats: f64) -> CountedPass {
+    CountedPass::new(pass::CONVERT, pass::CONVERT.to_owned(), vec![Count::new(Item::ConvertedSplat, splats)])
+}
+
+/// Shadow tables of the automatic resolution, where the scene asks for cells.
+fn automatic_cells(frame: &Frame<'_>, seen: &Seen) -> Option<Change> {
+    frame.settings.shadow.cells?;
+    let counts = tables(frame).flat_map(|(table, point)| cast(frame, point, table.automatic_entries));
+    let mut passes = surfaces(frame, seen);
+    passes.push(CountedPass::new(pass::SHADOW_MAP, pass::SHADOW_MAP.to_owned(), counts.collect()));
+    Some(Change { key: "render.shadow.cells = \"auto\"".to_owned(), passes })
+}
+
+/// One range of depth, where techniques take turns in several.
+fn one_range(frame: &Frame<'_>, seen: &Seen, whole: impl FnOnce() -> Seen) -> Option<Change> {
+    (seen.ranges > 1.0).then(|| Change { key: "render.depth_ranges = 1".to_owned(), passes: of_frame(frame, &whole()) })
+}
+
+/// All translucent objects by the first technique of the table, as splats; `None` where it draws them already, or shows less of them.
+fn preferred(frame: &Frame<'_>, seen: &Seen) -> Option<Change> {
+    let (loaded, scene, plan) = (frame.loaded, frame.scene, frame.plan);
+    let first = &TABLE[0];
+    let visible = || scene.objects.iter().zip(0..).filter(|(object, _)| object.visible);
+    let shows = |object: &SceneObject| (first.is_offered)(&scene.materials[object.material].material);
+    let is_other = |by: &BySeen| by.technique != first.technique;
+    let is_named = scene.render.technique != Technique::Auto
+        && visible().all(|(object, _)| technique_of(object, scene) == scene.render.technique);
+    if !is_named || !seen.translucent.iter().any(is_other) || !visible().all(|(object, _)| shows(object)) {
+        return None;
+    }
+    let sum = |total: Expected, part: Expected| Expected {
+        splats: total.splats + part.splats,
+        fragments: total.fragments + part.fragments,
+    };
+    let mut splats = seen.translucent.iter().map(|by| by.splats).fold(Expected::default(), sum);
+    // Objects from their own data become splats of that radius.
+    let mut converted = 0.0;
+    for own in &loaded.own {
+        let rank = visible().position(|(_, object)| object == own.object)?;
+        let number = loaded.convertible[rank] as f64;
+        converted += number;
+        let extent = Extent::new(&own.world_box(), &frame.camera);
+        let radius = own.radius * extent.samples_per_unit;
+        let footprint = (std::f64::consts::PI * radius * radius).clamp(4.0, samples(scene));
+        let fragments = number * extent.share * footprint;
+        splats = sum(splats, Expected { splats: number, fragments });
+    }
+    let by = BySeen { technique: first.technique, splats, own: OwnWork::default() };
+    let drawn = splats.splats;
+    let maps = plan.shadow_maps_built() as f64;
+    let all = Seen { opaque: seen.opaque, translucent: vec![by], ranges: 1.0 };
+    let mut passes = of_frame(frame, &all);
+    let shading = vec![
+        Count::new(Item::ProjectedSplat, drawn),
+        Count::new(Item::ShadedSplat, drawn),
+        Count::new(Item::ShadowLookUp, drawn * maps),
+    ];
+    passes.push(CountedPass::new(pass::SHADE, stage::SHADE.to_owned(), shading));
+    passes.push(conversion(converted));
+    Some(Change { key: format!("render.technique = \"{}\"", first.technique.name()), passes })
+}
