@@ -269,6 +269,31 @@ fn no_shadow_of_scenes_by_chance_exceeds_its_bound() {
     no_shadow_exceeds_its_bound(0..12);
 }
 
+#[test]
+fn x7_light_that_fog_scatters_again_stays_within_its_bound_and_is_told_where_it_lacks() {
+    let text = scene("", "");
+    let once = ["render.technique=sheets", "render.sheets.slicing=half_vector"];
+    let mut said = [0, 0];
+    for extinction in [1e-5, 1e-4, 0.03, 1.0, 8.0] {
+        let fog = format!("object.fog.medium_ball.extinction={extinction:e}");
+        let with = |more: &[&str]| loaded(&text, &settings(&[&once[..], &[&fog], more].concat()));
+        let planned_scene = with(&[]);
+        let planned = render(&planned_scene);
+        let again = render(&with(&["render.sheets.scattering=forward_and_back"]));
+        let effect = planned.plan.effects.iter().find(|effect| effect.name == "scatter").unwrap();
+        let change = largest_change(&displayed(&planned, &planned_scene), &displayed(&again, &planned_scene));
+        assert!(change <= effect.bound, "extinction {extinction}: {change} beyond {}", effect.bound);
+        assert_eq!(effect.is_lacking, effect.bound > planned_scene.render.tolerance, "extinction {extinction}");
+        assert_eq!(effect.called_for, effect.is_lacking);
+        let notes = planned.notes.iter().filter(|note| note.contains("'fog' may scatter light again and again"));
+        assert_eq!(notes.count(), usize::from(effect.is_lacking), "{:?}", planned.notes);
+        said[usize::from(effect.is_lacking)] += 1;
+        let asked = again.plan.effects.iter().find(|effect| effect.name == "scatter").unwrap();
+        assert!(asked.called_for && !asked.is_lacking);
+    }
+    assert!(said[0] > 1 && said[1] > 1, "{said:?}");
+}
+
 /// What takes long and rarely fails where the others hold.
 mod deep {
     use super::*;

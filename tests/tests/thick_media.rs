@@ -175,7 +175,7 @@ fn what_splats_cannot_tell_is_told_with_the_spacing_that_would_do() {
     let by_sheets = |tau| Slab { technique: "sheets", tau, view: 0.0, light: 0.0, azimuth: 0.0 }.scene("", "");
     assert_eq!(warnings(&by_sheets(4.0)), [""; 0]);
     let told = warnings(&by_sheets(8.0));
-    assert!(told.len() == 1 && told[0].contains("by which sheets show dark frames along its edges"), "{told:?}");
+    assert!(told.len() == 1 && told[0].contains("by which `sheets` shows dark frames along its edges"), "{told:?}");
     assert!(told[0].contains("spacing = 0.5 tells"), "{told:?}");
     let lone = |extinction: f64| {
         let [text, rest] = [0, 1].map(|part| slab(1.0).split("medium_box").nth(part).unwrap().to_owned());

@@ -5,6 +5,7 @@ mod assets;
 mod dependencies;
 mod floors;
 mod functions;
+mod techniques;
 mod text;
 
 use crate::repo::{Outcome, Repo};
@@ -12,7 +13,7 @@ pub(crate) use assets::{MAX_BYTES, credit_of, in_assets};
 
 type Rule = fn(&Repo) -> Vec<String>;
 
-const RULES: [(&str, Rule); 9] = [
+const RULES: [(&str, Rule); 10] = [
     ("heads", text::heads),
     ("foreign paths", text::foreign_paths),
     ("ignored tests", text::ignored_tests),
@@ -20,6 +21,7 @@ const RULES: [(&str, Rule); 9] = [
     ("crate pages", text::crate_pages),
     ("dependency direction", dependencies::direction),
     ("floors", floors::upward),
+    ("techniques", techniques::named),
     ("functions of the platform", functions::platform),
     ("assets", assets::assets),
 ];

@@ -18,7 +18,7 @@ pub(crate) fn technique_of(object: &SceneObject, scene: &Scene) -> Technique {
     match object.technique.unwrap_or(scene.render.technique) {
         Technique::Auto => {
             let offered = TABLE.iter().find(|row| (row.is_offered)(&scene.materials[object.material].material));
-            offered.map_or(Technique::Points, |row| row.technique)
+            offered.unwrap_or(&TABLE[0]).technique
         }
         named => named,
     }

@@ -3,11 +3,12 @@
 
 mod small;
 
+use crate::choose::row;
 use crate::form::PlannedObject;
 use crate::load::{Loaded, own::Own};
 use crate::plan::Plan;
 use crate::scene::place;
-use crate::scene::{Scene, SceneLight, SceneObject, Source, Technique};
+use crate::scene::{Scene, SceneLight, SceneObject, Source};
 use crate::shadows::{Coarse, thickness_of};
 use crate::{Layers, ShadowTable, escape_controls};
 use glam::DVec3;
@@ -27,8 +28,6 @@ const TIMES: f64 = 4.0;
 const TOLD: usize = 4;
 /// Optical depth of a spacing up to which the light of layers of splats is held to closed forms.
 const THICKEST: f32 = 16.0;
-/// The same of a box or a ball by sheets: from about three on the maps of light, which blur by a spacing, show as dark frames along its edges.
-const THICKEST_BY_SHEETS: f32 = 4.0;
 /// Full angle of a lens, degrees, beyond which a pixel in the middle of the picture is wider than most splats.
 const WIDEST_LENS: f64 = 150.0;
 /// Optical depth up to which one splat alone tells how light falls off in it: its middle is right within a hundredth.
@@ -163,13 +162,13 @@ fn too_thick(scene: &Scene, loaded: &Loaded) -> Vec<String> {
     let told = |(id, (object, medium)): (usize, (&Object, &Thickness))| {
         let planned = loaded.planned.iter().find(|planned| planned.object == object.name)?;
         let is_body = matches!(scene.objects[id].source, Source::Medium(_));
-        let (most, what) = match (planned.is_drawn_as_splats(), planned.technique) {
-            (true, _) if medium.is_lone() && medium.optical_depth > LONE => (LONE, "and is no wider than that"),
-            (true, _) => (THICKEST, "which is too much for its splats"),
-            (false, Technique::Sheets) if is_body => {
-                (THICKEST_BY_SHEETS, "by which sheets show dark frames along its edges")
-            }
-            _ => return None,
+        let (most, what) = if !planned.is_drawn_as_splats() {
+            let thickest = row(planned.technique).thickest_body.filter(|_| is_body)?;
+            (thickest, format!("by which `{}` shows dark frames along its edges", planned.technique.name()))
+        } else if medium.is_lone() && medium.optical_depth > LONE {
+            (LONE, "and is no wider than that".to_owned())
+        } else {
+            (THICKEST, "which is too much for its splats".to_owned())
         };
         (medium.optical_depth > most).then(|| {
             let spacing = f64::from(medium.spacing) * unit;

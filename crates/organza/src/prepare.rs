@@ -143,12 +143,11 @@ pub fn same_splats(a: &Scene, b: &Scene) -> bool {
     let mut other = b.clone();
     other.camera.size = a.camera.size;
     other.render = a.render.clone();
+    let are_alike = |technique: Technique| (row(technique).makes_alike)(&a.render, &b.render);
     // Layers decide whether volumes get normals, the most points whether a scene is refused.
     *a == other
         && a.objects.iter().zip(&b.objects).all(|(of_a, of_b)| same_forms(technique_of(of_a, a), technique_of(of_b, b)))
-        && a.render.sheets.slicing == b.render.sheets.slicing
-        && a.render.particles.surface_sampler == b.render.particles.surface_sampler
-        && a.render.particles.volume_sampler == b.render.particles.volume_sampler
+        && techniques(a).into_iter().chain(techniques(b)).all(are_alike)
         && a.render.layers == b.render.layers
         // Of the cells of shadow maps, what is extracted.
         && (a.render.shadow == b.render.shadow || !a.objects.iter().any(|o| matches!(o.source, Source::Extract(_))))

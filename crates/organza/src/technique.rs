@@ -20,7 +20,7 @@ use crate::load::Loaded;
 use crate::matter::{CarriesLight, Matter};
 use crate::pass;
 use crate::plan::Plan;
-use crate::scene::{LightPoint, Scene, Technique};
+use crate::scene::{LightPoint, RenderSettings, Scene, Technique};
 use crate::stage;
 use crate::statistics::ObjectStatistics;
 use crate::{CostRecord, Error, Layers, RenderOptions};
@@ -44,8 +44,13 @@ pub(crate) struct Row {
     pub(crate) by_channel: Option<&'static str>,
     /// The form in which it takes an object, and why; `None` for splats, whatever an object is.
     pub(crate) form: Option<FormOf>,
+    /// Whether what it takes of objects is the same by the settings of one render and of another.
+    pub(crate) makes_alike: fn(&RenderSettings, &RenderSettings) -> bool,
     /// Whether triangles stay what they are.
     pub(crate) polygons: bool,
+    /// Optical depth of a spacing up to which a box or a ball of a medium that it draws from its own data shows no dark frames along its edges; `None`
+    /// for any.
+    pub(crate) thickest_body: Option<f32>,
     /// What it makes of splats, in words.
     pub(crate) of_splats: &'static str,
     /// Whether it mirrors and bends light where surfaces bound matter, and that absorbs; or what to do so that this is shown.
@@ -177,6 +182,10 @@ pub(crate) static TABLE: [Row; 5] = [
         how: "become particles",
         by_channel: Some("a particle hides each channel by chance"),
         form: Some(particles::form),
+        makes_alike: |a, b| {
+            a.particles.surface_sampler == b.particles.surface_sampler
+                && a.particles.volume_sampler == b.particles.volume_sampler
+        },
         of_splats: "particles are sampled from them",
         draws_splats: false,
         gaussians: false,
@@ -192,6 +201,8 @@ pub(crate) static TABLE: [Row; 5] = [
         is_offered: |_| false,
         how: "are composited in slabs, volumes classified after reconstruction",
         form: Some(sheets::form),
+        makes_alike: |a, b| a.sheets.slicing == b.sheets.slicing,
+        thickest_body: Some(4.0),
         polygons: true,
         by_device: false,
         steps: &[Step { pass: pass::SHEETS, stage: stage::SHEETS, counts: sheets::counts }],
@@ -254,7 +265,9 @@ const POINTS: Row = Row {
     how: "are composited in order",
     by_channel: None,
     form: None,
+    makes_alike: |_, _| true,
     polygons: false,
+    thickest_body: None,
     of_splats: DRAWN,
     bends: |_| Err("use `surfels`"),
     bumps: |_| Err("use `surfels`"),
