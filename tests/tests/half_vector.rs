@@ -454,6 +454,7 @@ mod deep {
             warned.contains("a light is scattered once, though render.sheets.scattering asks for more"),
             "{warned}"
         );
+        assert!(warned.lines().any(|line| line.starts_with("scatter ") && line.contains(" lacking ")), "{warned}");
         assert!(said.contains("a shadow map has it, scattered once: the lamp lies inside object 'cloud'"), "{said}");
         assert!(said.contains("it comes through slabs that light and view share"), "{said}");
     }

@@ -103,7 +103,7 @@ fn a_fill_value_is_told_taken_as_nothing_and_written_by_init() {
     let ball = |nothing: f64| move |p: [f64; 3]| if distance(p, [0.5; 3]) < 0.3 { value(p) } else { nothing };
     place.write("gaps.nrrd", nrrd("float", [16; 3], ball(f64::NAN)));
     let expected = seen(&place, "gaps.nrrd", &[]).0;
-    for fill in ["-9999", "1e20", "9.96921e36"] {
+    for fill in ["-9999", "1e20", "9.96921e36", "-3.4028235e38"] {
         place.write("fill.nrrd", nrrd("float", [16; 3], ball(fill.parse().unwrap())));
         let (alpha, told) = seen(&place, "fill.nrrd", &[]);
         assert!(alpha == expected, "{fill}");

@@ -105,7 +105,8 @@ fn compared(predicted: &Prediction, cost: &CostRecord) -> Vec<Pass> {
         predicted: pass.seconds(&predicted.rates, 1),
         measured: measured(pass.pass),
     });
-    both.filter(|pass| pass.predicted > 0.0 && pass.measured > 0.0).collect()
+    // The scenes have no files.
+    both.filter(|pass| pass.predicted > 0.0 && pass.measured > 0.0 && pass.name != organza::pass::READ).collect()
 }
 
 fn add(sum: &mut Vec<Pass>, passes: Vec<Pass>) {

@@ -75,7 +75,7 @@ pub(super) fn predicted_text(predicted: &Prediction) -> String {
     let by_threads = if threads == 1 { "ms".to_owned() } else { format!("ms, {threads} threads") };
     let mut text = table(["pass, predicted", "ms of one core", &by_threads, "most of it"], "lrrl", rows);
     text += &format!(
-        "a render takes about {} on {threads} thread{}, by {}\n",
+        "a picture takes about {} on {threads} thread{}, by {}\n",
         duration_text(predicted.seconds(threads)),
         if threads == 1 { "" } else { "s" },
         predicted.rates.source(),

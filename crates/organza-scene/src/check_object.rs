@@ -16,8 +16,8 @@ use splat_core::{FootprintStack, Packing, Similarity};
 use std::collections::HashSet;
 use std::sync::Arc;
 
-/// Greatest value that a voxel may have.
-const GREATEST_VALUE: f64 = f32::MAX as f64;
+/// Greatest value that a voxel may have, in the digits that single precision is written with: they round to it.
+const GREATEST_VALUE: f64 = 3.402_823_5e38;
 
 /// What objects refer to.
 pub(super) struct Named<'a> {

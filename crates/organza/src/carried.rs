@@ -1,7 +1,7 @@
 //! Light that a technique carries through what it draws: no shadow map need have that, and which maps are left to build.
 
 use crate::Error;
-use crate::choose::{row, techniques};
+use crate::choose::{SCATTER, row, techniques};
 use crate::form::{Form, PlannedObject};
 use crate::load::Loaded;
 use crate::matter::{Carries, CarriesLight, Matter};
@@ -62,6 +62,12 @@ pub(crate) fn plan(scene: &Scene, loaded: &Loaded, points: &[LightPoint], plan: 
         plan.shadow_maps[light] && points.iter().zip(carries).any(|(point, c)| point.of == light && c.is_err())
     };
     plan.scattered_once = if scatters_again { (0..plan.shadow_maps.len()).filter(|l| is_left(*l)).count() } else { 0 };
+    if let Some(scatter) =
+        plan.effects.iter_mut().find(|effect| effect.name == SCATTER).filter(|_| plan.scattered_once > 0)
+    {
+        scatter.is_lacking = true;
+        scatter.reason += "; of lights that are not carried it is scattered once all the same";
+    }
     let told = |light: usize| plan.shadow_maps[light] || scatters_again;
     let effects: Vec<Effect> = (0..plan.shadow_maps.len())
         .filter(|light| told(*light))

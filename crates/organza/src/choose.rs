@@ -5,7 +5,7 @@
 
 mod effects;
 
-pub(crate) use effects::plan;
+pub(crate) use effects::{SCATTER, plan};
 
 use crate::escape_controls;
 use crate::form::{DRAWN, Form, PlannedObject};

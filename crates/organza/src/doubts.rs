@@ -81,7 +81,8 @@ pub(crate) fn clear_shadows<'a>(scene: &'a Scene, loaded: &'a Loaded) -> impl It
 
 /// Effects that are called for and that no technique of the scene has.
 pub(crate) fn lacking(plan: &Plan) -> impl Iterator<Item = String> + '_ {
-    let lacking = plan.effects.iter().filter(|effect| effect.is_lacking);
+    // Of lights that are scattered once a warning tells.
+    let lacking = plan.effects.iter().filter(|effect| effect.is_lacking && plan.scattered_once == 0);
     lacking.map(|effect| {
         // The whole of what is displayed is no bound.
         let most = if effect.bound < 1.0 {

@@ -12,6 +12,7 @@ use crate::shadows::CUT_SHARE;
 use crate::shown;
 use crate::statistics::Statistics;
 use crate::technique::Row;
+pub(crate) use scattering::SCATTER;
 
 /// Chooses effects and passes.
 pub(crate) fn plan(statistics: &Statistics) -> Plan {
@@ -52,7 +53,7 @@ fn colored_extinction(statistics: &Statistics) -> Effect {
         let how = how.iter().map(|how| format!(": {how}")).collect::<String>();
         effect("transmittance per channel", true, format!("{UNEQUAL}{how}"))
     } else {
-        effect("transmittance per channel", false, "all materials absorb red, green and blue alike")
+        effect("transmittance per channel", false, "what all objects consist of absorbs red, green and blue alike")
     }
 }
 

@@ -11,26 +11,29 @@ use crate::plan::Effect;
 use crate::statistics::{LightStatistics, MediumStatistics, Statistics};
 use crate::technique::TABLE;
 
+/// The name of the effect.
+pub(crate) const SCATTER: &str = "scatter";
+
 /// Decides about light of higher orders; left out it changes no displayed pixel by more than `allowance`.
 pub(super) fn plan(statistics: &Statistics, allowance: f64) -> Effect {
-    const NAME: &str = "scatter";
     let media = &statistics.media;
     if media.is_empty() {
-        return effect(NAME, false, "no medium scatters light");
+        return effect(SCATTER, false, "no medium scatters light");
     }
     let bound = bound(media, statistics);
     let names = super::named(&media.iter().map(|medium| medium.object.clone()).collect::<Vec<_>>());
     if statistics.scatters_again {
         let reason = format!("the scene asks for it: {names} may scatter light again and again");
-        return Effect { bound, ..effect(NAME, true, reason) };
+        return Effect { bound, ..effect(SCATTER, true, reason) };
     }
     if bound <= allowance {
-        return Effect { bound, ..effect(NAME, false, format!("{names} would scatter too little light again")) };
+        return Effect { bound, ..effect(SCATTER, false, format!("{names} would scatter too little light again")) };
     }
     let drawing = statistics.techniques.iter().map(|technique| format!("`{}`", technique.name())).collect::<Vec<_>>();
-    let way = TABLE.iter().find_map(|row| row.scatters_by).map(|way| format!(": {way} shows it")).unwrap_or_default();
+    let way =
+        TABLE.iter().find_map(|row| row.scatters_by).map(|way| format!(": {way} asks for it")).unwrap_or_default();
     let reason = format!("{names} may scatter light again and again, which {} leaves out{way}", drawing.join(" and "));
-    Effect { is_lacking: true, bound, ..effect(NAME, true, reason) }
+    Effect { is_lacking: true, bound, ..effect(SCATTER, true, reason) }
 }
 
 /// The most that all orders from the second on add to a displayed pixel.
