@@ -18,6 +18,8 @@ pub const SHADE: &str = "shade";
 pub const OPAQUE: &str = "opaque";
 /// Translucent splats are composited.
 pub const SPLAT: &str = "splat";
+/// What particles are sampled from is prepared: surfaces are searched by lines, areas and optical depths summed.
+pub const SAMPLERS: &str = "samplers";
 /// Sets of particles are made that serve many frames.
 pub const SAMPLE: &str = "sample";
 /// Translucent objects become particles, which are projected and averaged.

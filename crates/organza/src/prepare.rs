@@ -73,7 +73,7 @@ pub fn explain_from(
     let frame = Frame::new(&scene, &loaded, &planned.plan, progress);
     let mut folds: Vec<Box<dyn Fold + '_>> =
         planned.plan.techniques.iter().map(|technique| (row(*technique).begin)(&frame)).collect();
-    folds.iter_mut().try_for_each(|fold| fold.check(options))?;
+    folds.iter_mut().try_for_each(|fold| fold.check(options, &mut explanation.cost))?;
     explanation.predicted = prediction(&frame, &folds, &ranges(&frame), options);
     explanation.found = found;
     explanation.warnings.extend(doubts::of_shadows(&explanation.plan.shadow_limits()));

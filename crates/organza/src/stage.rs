@@ -18,6 +18,8 @@ pub(crate) const SHADE: &str = "shading";
 pub(crate) const OPAQUE: &str = "opaque surfaces";
 /// Translucent splats are composited.
 pub(crate) const COMPOSITE: &str = "compositing";
+/// What particles are sampled from is prepared.
+pub(crate) const SAMPLERS: &str = "preparing particles";
 /// Sets of particles are drawn and averaged.
 pub(crate) const PARTICLES: &str = "particles";
 /// Volumes and splats are composited in slabs.

@@ -63,6 +63,8 @@ pub(crate) struct Row {
     pub(crate) gaussians: bool,
     /// Whether rays meet the opaque discs of its objects exactly; else the frame draws these as splats.
     pub(crate) meets_discs: bool,
+    /// The pass that [`Fold::prepare`] and [`Fold::check`] run, before all others, where something is its own.
+    pub(crate) prepares: Option<&'static str>,
     /// Its passes; the last one comes behind opaque surfaces, those before it come before footprints.
     pub(crate) steps: &'static [Step],
     /// Whether a device may draw what it draws.
@@ -101,7 +103,7 @@ pub(crate) trait Fold {
     }
 
     /// Refuses what its fold would refuse, without drawing.
-    fn check(&mut self, _: &RenderOptions) -> Result<(), Error> {
+    fn check(&mut self, _: &RenderOptions, _: &mut CostRecord) -> Result<(), Error> {
         Ok(())
     }
 
@@ -189,6 +191,7 @@ pub(crate) static TABLE: [Row; 5] = [
         of_splats: "particles are sampled from them",
         draws_splats: false,
         gaussians: false,
+        prepares: Some(pass::SAMPLERS),
         steps: &[Step { pass: pass::PARTICLES, stage: stage::PARTICLES, counts: particles::counts }],
         is_random: true,
         repeats: |scene| format!("{} sets", scene.render.particles.repeat_level),
@@ -274,6 +277,7 @@ const POINTS: Row = Row {
     draws_splats: true,
     gaussians: true,
     meets_discs: false,
+    prepares: None,
     steps: &[SORT, FOLD],
     by_device: true,
     is_random: false,

@@ -135,6 +135,9 @@ fn passes(statistics: &Statistics, shadow_maps: &[bool]) -> Vec<PlannedPass> {
     if statistics.counts.splats > 0 || statistics.own() == 0 {
         pass(pass::CONVERT, format!("{} splats", statistics.counts.splats));
     }
+    for (row, what) in rows() {
+        row.prepares.into_iter().for_each(|name| what.iter().for_each(|what| pass(name, what.clone())));
+    }
     for (light, _) in statistics.lights.iter().zip(shadow_maps).filter(|(_, has_map)| **has_map) {
         (0..light.points).for_each(|_| pass(pass::SHADOW_MAP, format!("light {}", light.label)));
     }

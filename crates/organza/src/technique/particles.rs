@@ -21,12 +21,12 @@ use crate::frame::Frame;
 use crate::pass;
 use crate::scene::{Scene, SurfaceSampler};
 use crate::technique::{EVERYWHERE, Finished, Fold, OwnWork, Session};
-use crate::{CostRecord, Error, RenderOptions, Sets};
+use crate::{CostRecord, Error, RenderOptions, Sets, stage};
 pub(crate) use checkpoint::Checkpoint;
 use ensemble::{Average, average_bytes, fold, fold_params};
 pub(crate) use form::form;
 pub(crate) use kept::Kept;
-use parts::{Part, sources};
+use parts::{Part, Source, sources};
 use splat_core::raster::OpaqueImage;
 use splat_core::{Accumulator, LayerData};
 use std::ops::Range;
@@ -68,16 +68,13 @@ impl Fold for Particles<'_> {
     }
 
     /// Refuses sets of more particles than may be in memory. Surfaces by Brownian motion are not asked: it counts by a run as long as some sets.
-    fn check(&mut self, options: &RenderOptions) -> Result<(), Error> {
+    fn check(&mut self, options: &RenderOptions, cost: &mut CostRecord) -> Result<(), Error> {
         if matches!(self.frame.settings.particles.surface_sampler, SurfaceSampler::Brownian { .. }) {
             return Ok(());
         }
         // Drawing tells them.
         let mut warnings = Vec::new();
-        let mut made = Vec::new();
-        for mut source in sources(self.frame) {
-            made.extend(source.part(&mut warnings)?);
-        }
+        let made = prepared(self.frame, sources(self.frame), None, &mut warnings, cost)?;
         let parts: Vec<&Part<'_>> = made.iter().collect();
         let expected = parts.iter().map(|part| part.object().sampler.expected_particles()).sum();
         fold_params(options).check_set(expected).map_err(|e| refuse(&parts::named(&parts), e))?;
@@ -152,15 +149,34 @@ fn parts<'a>(frame: &'a Frame<'a>, session: &mut Session<'_>, cost: &mut CostRec
     if let Some(kept) = session.kept.as_deref_mut() {
         kept.sample(&mut sources, frame, cost, session.warnings)?;
     }
-    let mut parts = Vec::with_capacity(sources.len());
-    for mut source in sources {
-        let sets = session.kept.as_deref().and_then(|kept| kept.of(source.own_object()?));
-        match sets {
-            Some(sets) => parts.push(source.part_of(parts::Particles::Kept(sets))),
-            None => parts.extend(source.part(session.warnings)?),
-        }
+    prepared(frame, sources, session.kept.as_deref(), session.warnings, cost)
+}
+
+/// The same of these sources.
+fn prepared<'a>(
+    frame: &'a Frame<'a>,
+    sources: Vec<Source<'a>>,
+    kept: Option<&Kept>,
+    warnings: &mut Vec<String>,
+    cost: &mut CostRecord,
+) -> Result<Vec<Part<'a>>, Error> {
+    if sources.is_empty() {
+        return Ok(Vec::new());
     }
-    Ok(parts)
+    frame.progress.begin(stage::SAMPLERS);
+    cost.measure(pass::SAMPLERS, |stage| {
+        stage.items_in = sources.len() as u64;
+        let mut parts = Vec::with_capacity(sources.len());
+        for mut source in sources {
+            let sets = kept.and_then(|kept| kept.of(source.own_object()?));
+            match sets {
+                Some(sets) => parts.push(source.part_of(parts::Particles::Kept(sets))),
+                None => parts.extend(source.part(warnings)?),
+            }
+        }
+        stage.items_out = parts.len() as u64;
+        Ok(parts)
+    })
 }
 
 /// What hides particles.
