@@ -66,13 +66,9 @@ impl<'a> Probe<'a> {
     /// Of what the camera of the scene may see, or of everything where the picture shows light that `leaves_view`, or other views follow.
     pub(crate) fn new(loaded: &'a Loaded, leaves_view: bool) -> Self {
         let footprints = &loaded.footprints;
-        let profile = |(id, footprint): (usize, &Footprint)| Profile {
+        let profile = |footprint: &Footprint| Profile {
             norm: footprint.norm(),
-            // An image may have its most anywhere.
-            from: std::array::from_fn(|step| match footprints.image(id) {
-                Some(_) => 1.0,
-                None => footprint.profile(step as f64 / STEPS as f64),
-            }),
+            from: std::array::from_fn(|step| footprint.profile(step as f64 / STEPS as f64)),
         };
         let splats = loaded.cloud.bounds();
         let origin = loaded.cloud.origin;
@@ -84,7 +80,7 @@ impl<'a> Probe<'a> {
         Self {
             loaded,
             view: (!leaves_view).then(|| wider(&loaded.camera)),
-            profiles: footprints.layers().iter().enumerate().map(profile).collect(),
+            profiles: footprints.layers().iter().map(profile).collect(),
             bounds,
         }
     }
@@ -234,12 +230,12 @@ impl<'a> Probe<'a> {
                 let radius = f64::from(cloud.radius[i]);
                 let peak = f64::from(cloud.cross_section[i]) * profile.norm / (radius * radius);
                 let extinction = loaded.materials[cloud.material[i] as usize].greatest_extinction();
-                let optical_depth = match cloud.kind[i] {
-                    SplatKind::Opaque => f64::INFINITY,
-                    _ => peak * f64::from(extinction),
-                };
+                // A few texels of an image may hold all of its cross-section.
+                let is_image = loaded.footprints.image(usize::from(cloud.footprint[i])).is_some();
+                let hides = is_image || cloud.kind[i] == SplatKind::Opaque;
+                let optical_depth = if hides { f64::INFINITY } else { peak * f64::from(extinction) };
                 // All of an opaque splat is: its profile is cut where it hides what lies behind.
-                let profile = (cloud.kind[i] != SplatKind::Opaque).then_some(profile);
+                let profile = (!hides).then_some(profile);
                 visit(self.ball(i), optical_depth, profile);
             }
         });
