@@ -205,6 +205,17 @@ fn x7_a_shadow_that_falls_on_nothing_that_is_seen_is_left_out() {
     assert!(is_called_for(&with_glass, &settings, "shadow.key"));
 }
 
+#[test]
+fn x7_a_lamp_far_away_shadows_as_a_sun_does() {
+    let text = scene("", PANE);
+    let settings = settings(&[
+        "object.fog.casts_shadow=false",
+        "object.ground.casts_shadow=false",
+        "light.key={name='key', kind='point', position=[7e8, 1.6e9, 5e8], intensity=[1e19, 1e19, 1e19]}",
+    ]);
+    assert!(is_called_for(&text, &settings, "shadow.key"));
+}
+
 /// Objects and lights by chance, of which no shadow changes a pixel by more than its bound.
 #[track_caller]
 fn no_shadow_exceeds_its_bound(seeds: std::ops::Range<u64>) {

@@ -11,7 +11,7 @@ const VERSION: u64 = 1;
 const MOST_BYTES: u64 = 1 << 16;
 /// Nanoseconds of one item at most: a minute.
 const MOST_NS: f64 = 6e10;
-/// What to do about a file that is refused.
+/// The hint beside a refused file.
 const HINT: &str = "measure this machine with `organza calibrate -o FILE`, or leave out --machine";
 
 /// The name of this machine's processor.
@@ -52,7 +52,7 @@ fn read(path: &Path) -> Result<Rates, Error> {
     })
 }
 
-/// What is wrong with a file.
+/// A fault of a machine file.
 #[derive(Debug, PartialEq)]
 struct Wrong {
     place: String,

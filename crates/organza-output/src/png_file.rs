@@ -63,7 +63,7 @@ fn transparent(layers: &Layers, gain: f32, report: &mut WriteReport) -> Result<V
         report.not_a_number += beauty.iter().filter(|v| v.is_nan()).count() as u64;
         // One step of 8 bits is lost by rounding alone.
         let lost = |c: usize| (beauty[c] - behind[c]) * gain - alpha.max(0.0) > 1.0 / 255.0;
-        // What hides the background as a whole is as bright in any picture.
+        // Opaque pixels are clamped alike in a picture with a background.
         report.too_bright += u64::from(*alpha < 1.0 - 1.0 / 255.0 && (0..3).any(lost));
         let straight = gain / alpha.max(f32::MIN_POSITIVE);
         let seen = alpha.is_finite() && *alpha > 0.0;

@@ -12,7 +12,7 @@ use splat_core::{DAabb, Material, Shading, SplatKind};
 /// Splats that one thread looks at.
 const CHUNK: usize = 1 << 14;
 
-/// What is known of the medium of an object.
+/// The medium of one object.
 #[derive(Clone, Copy)]
 struct Medium {
     bounds: DAabb,

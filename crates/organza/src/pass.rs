@@ -18,7 +18,7 @@ pub const SHADE: &str = "shade";
 pub const OPAQUE: &str = "opaque";
 /// Translucent splats are composited.
 pub const SPLAT: &str = "splat";
-/// What particles are sampled from is prepared: surfaces are searched by lines, areas and optical depths summed.
+/// Samplers of particles are prepared: lines search surfaces, and areas and optical depths are summed.
 pub const SAMPLERS: &str = "samplers";
 /// Sets of particles are made that serve many frames.
 pub const SAMPLE: &str = "sample";

@@ -10,7 +10,7 @@ use splat_core::SplatKind;
 use splat_core::raster::{self, Expected};
 use std::ops::Range;
 
-/// What the camera sees of a loaded scene, counted once for all predictions of it.
+/// Splats and objects in view of a loaded scene, counted once for all predictions.
 struct Seen {
     /// Opaque splats.
     opaque: Expected,
@@ -99,7 +99,8 @@ fn cast(frame: &Frame<'_>, point: &LightPoint, entries: f64) -> Vec<Count> {
 
 /// All passes behind the shadow maps.
 fn surfaces(frame: &Frame<'_>, seen: &Seen) -> Vec<CountedPass> {
-    let (plan, scene) = (frame.plan, frame.scene);
+    let plan = frame.plan;
+    let scene = frame.scene;
     let maps = plan.shadow_maps_built() as f64;
     let mut passes = Vec::new();
     let mut drawn = seen.opaque.splats;
@@ -194,7 +195,9 @@ fn one_range(frame: &Frame<'_>, seen: &Seen, whole: impl FnOnce() -> Seen) -> Op
 
 /// All translucent objects by the first technique of the table, as splats; `None` where it draws them already, or shows less of them.
 fn preferred(frame: &Frame<'_>, seen: &Seen) -> Option<Change> {
-    let (loaded, scene, plan) = (frame.loaded, frame.scene, frame.plan);
+    let loaded = frame.loaded;
+    let scene = frame.scene;
+    let plan = frame.plan;
     let first = &TABLE[0];
     let visible = || scene.objects.iter().zip(0..).filter(|(object, _)| object.visible);
     let shows = |object: &SceneObject| (first.is_offered)(&scene.materials[object.material].material);
@@ -224,8 +227,8 @@ fn preferred(frame: &Frame<'_>, seen: &Seen) -> Option<Change> {
     let by = BySeen { technique: first.technique, splats, own: OwnWork::default() };
     let drawn = splats.splats;
     let maps = plan.shadow_maps_built() as f64;
-    let all = Seen { opaque: seen.opaque, translucent: vec![by], ranges: 1.0 };
-    let mut passes = of_frame(frame, &all);
+    let as_splats = Seen { opaque: seen.opaque, translucent: vec![by], ranges: 1.0 };
+    let mut passes = of_frame(frame, &as_splats);
     let shading = vec![
         Count::new(Item::ProjectedSplat, drawn),
         Count::new(Item::ShadedSplat, drawn),

@@ -140,7 +140,7 @@ impl<'a> Materials<'a> {
             Ok(stream) => stream.rest().map(Some),
             Err(error) if error.fault == Fault::Limit => Err(error),
             Err(error) => {
-                // What was expected begins with what the file is for.
+                // The text before the colon names the purpose of the file, which the remark has already.
                 let expected =
                     error.expected.rsplit_once(": ").map_or(error.expected.as_str(), |(_, expected)| expected);
                 let name = escaped(name.as_bytes(), 60);

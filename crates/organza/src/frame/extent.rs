@@ -19,9 +19,10 @@ pub(crate) struct Extent {
 }
 
 impl Extent {
-    /// That of a box by a camera of samples.
+    /// How a box lies in the view of a camera whose pixels are samples.
     pub(crate) fn new(bounds: &DAabb, camera: &Camera) -> Self {
-        let (size, focal) = (bounds.max - bounds.min, camera.focal_px());
+        let size = bounds.max - bounds.min;
+        let focal = camera.focal_px();
         let half = camera.size.map(|s| 0.5 * f64::from(s));
         let place = |k: u32| (f64::from(k) + 0.5) / f64::from(SIDE);
         let mut seen = 0.0;

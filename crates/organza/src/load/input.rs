@@ -358,7 +358,7 @@ fn read_grid(path: &Path, frame: u64, context: &Context<'_>) -> Result<Arc<Grid>
 fn with_known_values(grid: Arc<Grid>, path: &Path, context: &Context<'_>) -> Result<Arc<Grid>, Error> {
     let Some(nodata) = context.nodata() else {
         let fill = convert::FillValue::of_grid(&grid);
-        // What stands apart as a fill value is no stray as well.
+        // A fill value is not told as a stray too.
         let strays = if fill.is_none() { convert::Strays::of_grid(&grid) } else { None };
         context.files.warn(path, fill);
         context.files.warn(path, strays);
@@ -367,7 +367,8 @@ fn with_known_values(grid: Arc<Grid>, path: &Path, context: &Context<'_>) -> Res
     let _held =
         context.files.memory(context.options).take(&crate::printable(path), grid.bytes()).map_err(Error::Limit)?;
     let (grid, count) = convert::without_value(&grid, nodata);
-    let (voxels, value) = (grid.values.len() as u64, convert::written_value(nodata));
+    let voxels = grid.values.len() as u64;
+    let value = convert::written_value(nodata);
     if count == voxels {
         let message = format!("expected a voxel with a value, found `nodata`, {value}, in all of them");
         return Err(Error::input(crate::printable(path), message, "leave `nodata` out"));

@@ -98,7 +98,8 @@ impl<'a> Probe<'a> {
         // Nothing is behind what is nowhere.
         let farthest: Vec<AtomicU32> = (0..tiles.count()).map(|_| AtomicU32::new(0)).collect();
         self.each_receiver(&|ball| {
-            let back = ordered((tiles.depth(ball.center) + ball.reach) as f32);
+            // Rounded outwards: far from a lamp single precision is coarser than splats.
+            let back = ordered(((tiles.depth(ball.center) + ball.reach) as f32).next_up());
             tiles.each_under(&ball, |tile, _| {
                 farthest[tile].fetch_max(back, Ordering::Relaxed);
             });
@@ -107,7 +108,7 @@ impl<'a> Probe<'a> {
         let is_opaque = AtomicBool::new(false);
         let sums: Vec<AtomicU64> = (0..tiles.count()).map(|_| AtomicU64::new(0)).collect();
         self.each_caster(&is_opaque, &|ball, optical_depth, profile| {
-            let front = ordered((tiles.depth(ball.center) - ball.reach) as f32);
+            let front = ordered(((tiles.depth(ball.center) - ball.reach) as f32).next_down());
             let per_area = (ball.reach * ball.reach).recip();
             tiles.each_under(&ball, |tile, distance_sq| {
                 if front >= farthest[tile] {
@@ -162,7 +163,8 @@ impl<'a> Probe<'a> {
     }
 
     fn casts(&self, i: usize) -> bool {
-        let (loaded, cloud) = (self.loaded, &self.loaded.cloud);
+        let loaded = self.loaded;
+        let cloud = &loaded.cloud;
         let material = &loaded.materials[cloud.material[i] as usize];
         loaded.objects[cloud.object[i] as usize].casts_shadow
             && cloud.cross_section[i] > 0.0
@@ -184,7 +186,8 @@ impl<'a> Probe<'a> {
     }
 
     fn receives(&self, i: usize) -> bool {
-        let (loaded, cloud) = (self.loaded, &self.loaded.cloud);
+        let loaded = self.loaded;
+        let cloud = &loaded.cloud;
         let object = &loaded.objects[cloud.object[i] as usize];
         object.shadow_coefficient * cloud.shadow_coefficient_of(i) > 0.0
             && loaded.materials[cloud.material[i] as usize].shading != Shading::Unlit
@@ -196,7 +199,8 @@ impl<'a> Probe<'a> {
 
     /// Hands on whatever receives shadows and may be seen.
     fn each_receiver(&self, visit: &(dyn Fn(Ball) + Sync)) {
-        let (loaded, cloud) = (self.loaded, &self.loaded.cloud);
+        let loaded = self.loaded;
+        let cloud = &loaded.cloud;
         let chunks = (0..cloud.len().div_ceil(CHUNK)).into_par_iter();
         chunks.for_each(|chunk| {
             for i in (chunk * CHUNK..cloud.len().min((chunk + 1) * CHUNK)).filter(|i| self.receives(*i)) {
@@ -216,7 +220,8 @@ impl<'a> Probe<'a> {
 
     /// Hands on whatever casts shadows, with the optical depth of its middle and its profile, until something is opaque.
     fn each_caster(&self, is_opaque: &AtomicBool, visit: &(dyn Fn(Ball, f64, Option<&Profile>) + Sync)) {
-        let (loaded, cloud) = (self.loaded, &self.loaded.cloud);
+        let loaded = self.loaded;
+        let cloud = &loaded.cloud;
         for own in loaded.own.iter().filter(|own| !own.has_splats && loaded.objects[own.object].casts_shadow) {
             visit(about(&own.world_box()), own.optical_depth(), None);
         }
@@ -258,7 +263,7 @@ fn about(bounds: &DAabb) -> Ball {
     Ball { center: 0.5 * (bounds.min + bounds.max), reach: 0.5 * bounds.size().length() }
 }
 
-/// Bits of a number that are ordered as it is, above 0.
+/// Bits of a number, above 0, in the order of numbers.
 fn ordered(depth: f32) -> u32 {
     let bits = depth.to_bits();
     if bits >> 31 == 1 { !bits } else { bits | 1 << 31 }
