@@ -342,7 +342,7 @@ fn knobs_that_cannot_matter_are_left_alone() {
     assert_eq!(skipped, expected);
     let all = points(&scene(), &ALL, &THOROUGH);
     assert_eq!(all.skipped.len(), 1);
-    assert_eq!(all.knobs.len(), 11);
+    assert_eq!(all.knobs.len(), 12);
 }
 
 #[test]

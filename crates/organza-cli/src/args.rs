@@ -320,7 +320,7 @@ pub(super) struct ExtractArguments {
 pub(super) struct ExplainArguments {
     #[command(flatten)]
     pub(super) scene: SceneArguments,
-    /// Render too, and say what each pass cost
+    /// Render too, and say what each pass cost, and what each effect changes and takes: one picture more for each
     #[arg(long)]
     pub(super) measure: bool,
     /// Figures of this machine for predicted times, as `organza calibrate` wrote them [default: built-in figures]

@@ -1,75 +1,137 @@
 //! `organza explain`.
 
-use super::args::ExplainArguments;
+use super::args::{ExplainArguments, SceneArguments};
 use super::bar::with_bar;
-use super::given::given;
+use super::given::{Given, given};
 use super::machine::rates;
-use super::session::{parse_scene, path_text, processor_only, render_options, without_effect};
+use super::session::{parse_scene, parse_switched, path_text, processor_only, render_options, without_effect};
 use super::{console, report};
-use organza::scene::{Scene, SceneObject, UpBy};
-use organza::{Error, RenderOptions, escape_controls};
+use organza::cost::Prediction;
+use organza::plan::Plan;
+use organza::scene::{FoundCamera, Scene, SceneObject, UpBy};
+use organza::{CostRecord, Error, Files, Progress, RenderOptions, SplatCount, escape_controls};
+use organza_judge::effects::{self, Measured, Switch};
 use serde_json::{Value, json};
 
-/// Prints the plan; with `--measure` renders too and prints what it cost.
+/// Stages of a measured scene.
+const PICTURE: &str = "the picture as planned";
+const EFFECTS: &str = "each effect the other way";
+
+/// What a render or its preparation has said.
+struct Explained {
+    plan: Plan,
+    cost: CostRecord,
+    predicted: Prediction,
+    /// Bytes and splats, where nothing was drawn.
+    prepared: Option<Prepared>,
+    /// Effects drawn with and without, where all was drawn.
+    measured: Option<Measured>,
+    warnings: Vec<String>,
+    notes: Vec<String>,
+    found: Option<FoundCamera>,
+}
+
+/// What is known before anything is drawn.
+struct Prepared {
+    memory: u64,
+    splats: Vec<SplatCount>,
+}
+
+/// Prints the plan; with `--measure` renders too and prints what it cost, and what each effect changes.
 pub(super) fn run(arguments: &ExplainArguments) -> Result<(), Error> {
     processor_only(&arguments.scene)?;
     let rates = rates(arguments.machine.as_deref())?;
     let (given, files) = given(&arguments.scene, None)?;
     let scene = parse_scene(&arguments.scene, &given, None, None)?;
     let options = RenderOptions { rates, ..render_options(&arguments.scene) };
-    let (plan, cost, predicted, prepared, (mut warnings, notes, found)) = with_bar(|progress| {
+    let mut explained = with_bar(|progress| {
         if arguments.measure {
-            let render = organza::render_from(&scene, &options, progress, files)?;
-            return Ok((
-                render.plan,
-                render.cost,
-                render.predicted,
-                None,
-                (render.warnings, render.notes, render.found),
-            ));
+            return drawn(&arguments.scene, &given, &scene, &options, progress, files);
         }
         let explanation = organza::explain_from(&scene, &options, progress, &files)?;
         let organza::Explanation { plan, cost, memory, predicted, splats, warnings, notes, found } = explanation;
-        Ok((plan, cost, predicted, Some((memory, splats)), (warnings, notes, found)))
+        let prepared = Some(Prepared { memory, splats });
+        Ok(Explained { plan, cost, predicted, prepared, measured: None, warnings, notes, found })
     })?;
-    warnings.extend(without_effect(&arguments.scene, &scene));
-    for warning in &warnings {
+    explained.warnings.extend(without_effect(&arguments.scene, &scene));
+    for warning in &explained.warnings {
         console::warn(warning);
     }
-    notes.iter().for_each(|note| console::remark(note));
+    explained.notes.iter().for_each(|note| console::remark(note));
     if !arguments.measure {
         // A render has announced it before it began.
-        predicted.announcement(rayon::current_num_threads()).iter().for_each(|sentence| console::remark(sentence));
+        let sentence = explained.predicted.announcement(rayon::current_num_threads());
+        sentence.iter().for_each(|sentence| console::remark(sentence));
     }
     if arguments.scene.common.json {
         let document = json!({
             "scene": arguments.scene.inputs.first().map(|path| path_text(path)),
-            "camera": report::camera_json(&scene, found.as_ref()),
-            "plan": report::plan_json(&plan),
-            "cost": report::cost_json(&cost),
-            "predicted": report::predicted_json(&predicted),
-            "memory_bytes": prepared.as_ref().map(|p| p.0),
+            "camera": report::camera_json(&scene, explained.found.as_ref()),
+            "plan": report::plan_json(&explained.plan),
+            "cost": report::cost_json(&explained.cost),
+            "predicted": report::predicted_json(&explained.predicted),
+            "measured": explained.measured.as_ref().map(report::measured_json),
+            "memory_bytes": explained.prepared.as_ref().map(|p| p.memory),
             "up": up_json(&scene),
-            "splats": prepared.as_ref().map(|p| report::splats_json(&p.1)),
-            "warnings": warnings,
-            "notes": notes,
+            "splats": explained.prepared.as_ref().map(|p| report::splats_json(&p.splats)),
+            "warnings": explained.warnings,
+            "notes": explained.notes,
         });
         return console::out(&format!("{document:#}\n"));
     }
-    let mut text = report::plan_text(&plan);
+    let mut text = report::plan_text(&explained.plan);
     text.push('\n');
-    text += &report::predicted_text(&predicted);
+    text += &report::predicted_text(&explained.predicted);
     text.push('\n');
-    text += &report::cost_text(&cost);
+    text += &report::cost_text(&explained.cost);
+    if let Some(measured) = &explained.measured {
+        text += &format!("\n{}", report::measured_text(measured, &explained.plan, scene.render.tolerance));
+    }
     text += &up_text(&scene);
-    if let Some(found) = &found {
+    if let Some(found) = &explained.found {
         text += &format!("\n{}", report::camera_text(found));
     }
-    if let Some((memory, splats)) = prepared {
+    if let Some(Prepared { memory, splats }) = explained.prepared {
         text += &format!("\n{}\n", report::splats_text(&splats));
         text += &format!("rendering takes at most {} of memory\n", report::bytes_text(memory));
     }
     console::out(&text)
+}
+
+/// The scene drawn as planned, then with each of its effects switched the other way.
+fn drawn(
+    arguments: &SceneArguments,
+    given: &Given,
+    scene: &Scene,
+    options: &RenderOptions,
+    progress: &Progress,
+    files: Files,
+) -> Result<Explained, Error> {
+    progress.plan([(PICTURE, 1.0), (EFFECTS, 4.0)]);
+    progress.begin(PICTURE);
+    let fitted = organza::fitted(scene, options, progress, &files)?.0.into_owned();
+    progress.enter();
+    let render = organza::render_from(scene, options, progress, files)?;
+    progress.leave();
+    progress.begin(EFFECTS);
+    progress.enter();
+    let switched = |switches: &[Switch]| {
+        let words = |switch: &Switch| format!("{}={}", switch.name, if switch.is_on { "on" } else { "off" });
+        let effects: Vec<String> = switches.iter().map(words).collect();
+        parse_switched(arguments, given, &Files::default(), &effects)
+    };
+    let measured = effects::measure(&render.plan, &fitted, &switched, options, progress)?;
+    progress.leave();
+    Ok(Explained {
+        plan: render.plan,
+        cost: render.cost,
+        predicted: render.predicted,
+        prepared: None,
+        measured: Some(measured),
+        warnings: render.warnings,
+        notes: render.notes,
+        found: render.found,
+    })
 }
 
 /// Visible objects from files, whose data has an axis that points up.

@@ -1,9 +1,10 @@
 //! Plans and costs as tables and as JSON.
 
 use organza::cost::{CountedPass, Prediction, duration_text};
-use organza::plan::{Plan, PlannedObject};
+use organza::plan::{Effect, Plan, PlannedObject};
 use organza::scene::{FoundCamera, Scene};
 use organza::{CostRecord, ShadowTable, SplatCount};
+use organza_judge::effects::{EffectChange, FixedEffect, Measured};
 use serde_json::{Value, json};
 use splat_core::glam::DVec3;
 use std::fmt::Write;
@@ -146,9 +147,7 @@ pub(super) fn plan_text(plan: &Plan) -> String {
             (true, false) => "yes",
             (false, _) => "no",
         };
-        // What is simulated was not measured as if it were not.
-        let without = if e.called_for && e.bound == 0.0 { "-".to_owned() } else { share_text(e.bound) };
-        [e.name.clone(), called.to_owned(), without, e.reason.clone()]
+        [e.name.clone(), called.to_owned(), bound_text(e), e.reason.clone()]
     });
     let mut text = format!("technique: {}\n\n", plan.technique);
     text += &table(["effect", "called for", "without it", "why"], "lrrl", effects);
@@ -165,6 +164,53 @@ pub(super) fn plan_text(plan: &Plan) -> String {
         text += &table(["object", "technique", "from", "why", "becomes splats"], "lllll", objects);
     }
     text
+}
+
+/// What each effect changes and takes, as JSON.
+pub(super) fn measured_json(measured: &Measured) -> Value {
+    let change = |change: &EffectChange| {
+        json!({
+            "name": change.name, "largest_change": change.largest, "share_beyond_tolerance": change.beyond_tolerance,
+            "seconds_with": change.seconds_with, "seconds_without": change.seconds_without,
+        })
+    };
+    let fixed = |fixed: &FixedEffect| json!({ "name": fixed.name, "reason": fixed.reason });
+    json!({
+        "effects": measured.changes.iter().map(change).collect::<Value>(),
+        "not_switched": measured.fixed.iter().map(fixed).collect::<Value>(),
+        "left_out_together": measured.left_out_together,
+    })
+}
+
+/// The same as a table, beside the bounds of the plan.
+pub(super) fn measured_text(measured: &Measured, plan: &Plan, tolerance: f64) -> String {
+    let ms = |seconds: f64| format!("{:.1}", 1e3 * seconds);
+    let rows = measured.changes.iter().map(|change| {
+        let effect = plan.effects.iter().find(|effect| effect.name == change.name);
+        [
+            change.name.clone(),
+            share_text(change.largest),
+            effect.map_or_else(String::new, bound_text),
+            share_text(change.beyond_tolerance),
+            ms(change.seconds_with),
+            ms(change.seconds_without),
+        ]
+    });
+    let head = ["effect, measured", "changes", "at most", "pixels", "ms with it", "ms without it"];
+    let mut text = table(head, "lrrrrr", rows);
+    text += &format!(
+        "changes: the most of any displayed pixel, of black to white; at most: its bound; pixels: those that change by more than {}; ms of drawing\n",
+        share_text(tolerance)
+    );
+    if let Some(change) = measured.left_out_together {
+        text += &format!("all that is left out, simulated together, changes {}\n", share_text(change));
+    }
+    text
+}
+
+/// How much a pixel could change without an effect; what is simulated was not always bounded.
+fn bound_text(effect: &Effect) -> String {
+    if effect.called_for && effect.bound == 0.0 { "-".to_owned() } else { share_text(effect.bound) }
 }
 
 /// A change of a displayed pixel, 0 to 1, as percent.

@@ -5,7 +5,7 @@ use super::given::{Given, camera_overrides, given};
 use super::memory;
 use organza::device::{Choice, Device, DeviceChoice};
 use organza::scene::{self, LoadOptions, Override, Scene, Source, Technique, short};
-use organza::{Cache, Error, Progress, RenderOptions, printable};
+use organza::{Cache, Error, Files, Progress, RenderOptions, printable};
 use splat_core::MemoryAccount;
 use std::path::Path;
 use std::sync::Arc;
@@ -24,7 +24,29 @@ pub(super) fn parse_scene(
     frame: Option<u32>,
     turntable: Option<u32>,
 ) -> Result<Scene, Error> {
-    let overrides = overrides(arguments, given.is_made)?;
+    parse_changed(arguments, given, frame, turntable, Vec::new())
+}
+
+/// The same with these effects switched, each `NAME=on` or `NAME=off`, behind all other options, and a camera that has its place.
+pub(super) fn parse_switched(
+    arguments: &SceneArguments,
+    given: &Given,
+    files: &Files,
+    effects: &[String],
+) -> Result<Scene, Error> {
+    let changes = effects.iter().map(|effect| Override::of_effect(effect)).collect::<Result<Vec<_>, _>>()?;
+    let scene = parse_changed(arguments, given, None, None, changes)?;
+    Ok(organza::fitted(&scene, &render_options(arguments), &Progress::new(), files)?.0.into_owned())
+}
+
+fn parse_changed(
+    arguments: &SceneArguments,
+    given: &Given,
+    frame: Option<u32>,
+    turntable: Option<u32>,
+    changes: Vec<Override>,
+) -> Result<Scene, Error> {
+    let overrides = [overrides(arguments, given.is_made)?, changes].concat();
     let SceneArguments { allow_path, sandbox, .. } = *arguments;
     let memory = MemoryAccount::new(reading_options(&arguments.common).max_memory);
     let options = LoadOptions { allow_path, sandbox, memory, overrides, frame, turntable };

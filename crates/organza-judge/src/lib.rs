@@ -1,15 +1,17 @@
-//! What Organza's pictures are worth: judged by a technique's own limit, by the exact order, by physics.
+//! What Organza's pictures are worth: judged by a technique's own limit, by the exact order, by physics, by what each effect adds.
 //!
 //! ```text
 //! scene ─┬─► accuracy   a technique's knobs are turned ─► error and time of every setting ─► frontier
 //!        ├─► orders     the same splats by every ordering, against each pixel's exact order
-//!        └─► truth      the scene path-traced without splats
+//!        ├─► truth      the scene path-traced without splats
+//!        └─► effects    the picture with each effect and without it
 //! ```
 //! Pictures are drawn by [`organza`] as any render is, by the processor alone; what is true comes from [`mod@reference`], in f64.
 //! A technique joins by a [`accuracy::Sweep`] of its own in `accuracy/`.
 #![forbid(unsafe_code)]
 
 pub mod accuracy;
+pub mod effects;
 pub mod orders;
 pub mod truth;
 

@@ -22,6 +22,12 @@ pub(super) fn check_render(at: &At<'_>, raw: &RawRender) -> Result<RenderSetting
         let message = format!("`tolerance`: expected a number above 0, at most 1, found {}", crate::short(tolerance));
         return Err(at.key("tolerance").error(message, "the default is 1/255"));
     }
+    let splat_share = raw.splat_share.unwrap_or(1.0);
+    if !(splat_share > 0.0 && splat_share <= 1.0) {
+        let message =
+            format!("`splat_share`: expected a number above 0, at most 1, found {}", crate::short(splat_share));
+        return Err(at.key("splat_share").error(message, "the default is 1, all of them"));
+    }
     if raw.max_points == Some(0) {
         return Err(at.key("max_points").error("`max_points`: expected a whole number above 0, found 0", ""));
     }
@@ -36,6 +42,7 @@ pub(super) fn check_render(at: &At<'_>, raw: &RawRender) -> Result<RenderSetting
         // They name lights, which are checked later.
         effects: Vec::new(),
         seed: raw.seed.unwrap_or(0),
+        splat_share,
         max_points: raw.max_points,
         shadow: check_shadow(&at.key("shadow"), &raw.shadow)?,
         points: check_points(&at.key("points"), &raw.points)?,

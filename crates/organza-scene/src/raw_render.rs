@@ -26,6 +26,8 @@ pub(super) struct RawRender {
     pub(super) effects: BTreeMap<String, RawSwitch>,
     /// Seed of everything random; default 0.
     pub(super) seed: Option<u64>,
+    /// Share of the splats that are drawn, above 0, at most 1, each for as many as it stands for; default 1.
+    pub(super) splat_share: Option<f64>,
     /// Most splats that the scene may become.
     pub(super) max_points: Option<u64>,
     pub(super) shadow: RawShadow,

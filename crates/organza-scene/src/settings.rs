@@ -23,6 +23,8 @@ pub struct RenderSettings {
     pub effects: Vec<SwitchedEffect>,
     /// Seed of everything random.
     pub seed: u64,
+    /// Share of the splats that are drawn, in (0, 1]; see [`splat_core::Cloud::fewer`].
+    pub splat_share: f64,
     /// Most splats that the scene may become; more is a resource error.
     pub max_points: Option<u64>,
     /// Shadow maps, which all techniques take their light from.

@@ -204,6 +204,14 @@ impl Inputs<'_> {
         let mut camera = scene.camera;
         let exponent = normalize(&mut cloud, &mut own, &mut camera, (&mut lights, &mut images.slides));
         cloud.canonicalize();
+        if scene.render.splat_share < 1.0 {
+            let before = cloud.len();
+            cloud = cloud.fewer(scene.render.splat_share);
+            if cloud.len() == before {
+                warnings.push(UNCHANGED.to_owned());
+            }
+            count_anew(&mut splats, &cloud, scene);
+        }
         cloud.validate().map_err(|e| out_of_range(scene, &cloud, e))?;
         warnings.extend(unseen(scene, &cloud, &materials, own.is_empty()));
         Ok(Loaded {
@@ -227,6 +235,18 @@ impl Inputs<'_> {
             notes: files.notes().into_iter().chain(options.cache.iter().flat_map(|cache| cache.said())).collect(),
         })
     }
+}
+
+/// What is said of a share that leaves all splats.
+const UNCHANGED: &str = "render.splat_share changes nothing: objects of up to 64 splats, 3D Gaussians, and what is drawn from its own data \
+                         keep all that they have";
+
+/// Takes the splats that are left of each visible object as those that were made.
+fn count_anew(splats: &mut [SplatCount], cloud: &Cloud, scene: &Scene) {
+    let mut left = vec![0; scene.objects.len()];
+    cloud.object.iter().for_each(|object| left[*object as usize] += 1);
+    let visible = left.iter().zip(&scene.objects).filter(|(_, object)| object.visible);
+    splats.iter_mut().zip(visible).for_each(|(count, (left, _))| count.made = *left);
 }
 
 /// Splats beyond what their numbers hold: sizes and places of the input are.

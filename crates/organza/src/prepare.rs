@@ -151,6 +151,7 @@ pub fn same_splats(a: &Scene, b: &Scene) -> bool {
         && a.render.layers == b.render.layers
         // Of the cells of shadow maps, what is extracted.
         && (a.render.shadow == b.render.shadow || !a.objects.iter().any(|o| matches!(o.source, Source::Extract(_))))
+        && a.render.splat_share == b.render.splat_share
         && a.render.max_points == b.render.max_points
 }
 

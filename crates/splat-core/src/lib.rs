@@ -45,6 +45,7 @@ mod cost;
 mod depth_profile;
 mod environment;
 mod error;
+mod fewer;
 mod field;
 mod footprint;
 mod gaussians;

@@ -386,6 +386,7 @@ fn render() -> Vec<Entry> {
         one("render.layers", "render.layers=['depth']").look(Look::Layers),
         one("render.effects", "render.effects={'shadow.0'='off'}").with(SUN),
         one("render.seed", "render.seed=5").but_by(BUT_PARTICLES, Nothing("nothing of it is random")),
+        of(BALL, "render.splat_share", "render.splat_share=0.5").by(POINTS),
         of(All, "render.max_points", "render.max_points=3").but(All, Refused(5, "max_points")),
         of(BALL, "render.points", "render.points={first_slices=1}").but_by(BUT_POINTS, POINTS_ONLY),
         of(BALL, "render.points.slice_thickness", "render.points.slice_thickness=0.5")

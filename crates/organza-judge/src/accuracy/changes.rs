@@ -98,6 +98,7 @@ fn stated(render: &RenderSettings) -> Vec<Stated> {
     let mut all = vec![
         ("render", "technique", quoted(render.technique.name())),
         ("render", "antialias", render.antialias.to_string()),
+        ("render", "splat_share", number(render.splat_share)),
     ];
     shadow(render, &mut all);
     points(render, &mut all);

@@ -45,6 +45,7 @@ pub fn points(scene: &Scene, facts: &Facts, options: &Options) -> Sweep {
         ("samples", samples(options)),
         ("resampling filter", Ok(resampling_filter())),
         ("splat spacing", spacing(scene, options)),
+        ("share of splats", splat_share(options)),
         ("packed splats", packed(facts)),
         ("accumulation", accumulation(facts)),
         (tables::NAME, footprint_tables(scene, options)),
@@ -150,6 +151,26 @@ pub(super) fn cells(facts: &Facts, options: &Options) -> Result<Knob, String> {
                   the picture shrinks like the cells",
         }),
         joint: true,
+    })
+}
+
+/// Fewer splats, each for several.
+fn splat_share(options: &Options) -> Result<Knob, String> {
+    let parts: &[f64] = if options.quick { &[16.0, 4.0, 2.0] } else { &[64.0, 16.0, 8.0, 4.0, 2.0] };
+    let at = |part: &f64| step(format!("1/{part}"), part.sqrt(), part.recip());
+    Ok(Knob {
+        name: "share of splats",
+        size_meaning: "distance of splats over that of all",
+        set: |request, value| request.scene.render.splat_share = value,
+        steps: parts.iter().map(at).collect(),
+        ends: vec![at(&1.0)],
+        end_is_exact: false,
+        theory: Some(Theory {
+            low: 0.5,
+            high: 2.0,
+            why: "edges are as unsharp as splats are apart, and their share of the picture grows alike: 1; 2 where all is smooth",
+        }),
+        joint: false,
     })
 }
 

@@ -10,6 +10,7 @@ use std::sync::Arc;
 /// Most that beauty and alpha may differ by, as a share of the brightest pixel, and of 1.
 const TOLERANCE: f32 = 1e-5;
 
+/// Fog so thin in a spacing that a device lights it.
 const SCENE: &str = r#"
     version = 1
     [camera]
@@ -22,7 +23,7 @@ const SCENE: &str = r#"
     intensity = [30, 30, 30]
     [[object]]
     name = "fog"
-    medium_box = { min = [-1, -1, -1], max = [1, 1, 1], extinction = 1.5, spacing = 0.1 }
+    medium_box = { min = [-1, -1, -1], max = [1, 1, 1], extinction = 1.2, spacing = 0.1 }
     [[object]]
     name = "pane"
     rectangle = { center = [0, 0, 1.2], u = [0.8, 0, 0.2], v = [0, 0.8, 0], spacing = 0.05 }
@@ -67,6 +68,11 @@ fn apart(alone: &Render, helped: &Render) -> f32 {
     let brightest = beauty(alone).into_iter().fold(0.0, f32::max);
     assert!(brightest > 0.1, "a picture of something");
     most(beauty(alone), beauty(helped), brightest).max(most(alpha(alone), alpha(helped), 1.0))
+}
+
+/// Whether a device left nothing to the processor: whether cells are coarse is told of maps that the processor has, if it has them.
+fn says_no_more(helped: &Render, alone: &Render) -> bool {
+    helped.warnings.iter().all(|warning| alone.warnings.contains(warning))
 }
 
 /// A device made worse, and its count of submissions.
@@ -261,7 +267,11 @@ fn shadow_maps_stay_on_the_device() {
 fn a_small_picture_of_a_scene_is_the_processor_s() {
     // A lamp inside a cloud, a fountain, a tree of translucent leaves, opaque ground.
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes/light-inside.toml");
-    let mut scene = scene::parse(&path, &std::fs::read(&path).unwrap(), &Default::default()).unwrap();
+    // Media as thick as those of the scene are lit by the processor.
+    let thinner = ["material.cloud.medium.extinction=6", "material.water.medium.extinction=3"];
+    let overrides = thinner.map(|change| scene::Override::parse(change).unwrap()).to_vec();
+    let options = scene::LoadOptions { overrides, ..Default::default() };
+    let mut scene = scene::parse(&path, &std::fs::read(&path).unwrap(), &options).unwrap();
     scene.camera.size = [192, 144];
     // What is behind where a pixel is done counts for one and not for the other.
     scene.render.points.transmittance_cutoff = 0.0;
@@ -269,7 +279,7 @@ fn a_small_picture_of_a_scene_is_the_processor_s() {
     let device = DeviceChoice { backends: vec![backend().unwrap()], choice: adapter(), or_processor: false };
     let helped = render_of(&scene, Some(device));
     let far = apart(&alone, &helped);
-    assert!(helped.backend != "cpu" && helped.warnings == alone.warnings, "{:?}", helped.warnings);
+    assert!(helped.backend != "cpu" && says_no_more(&helped, &alone), "{:?}", helped.warnings);
     assert!(far <= TOLERANCE, "{far:e}");
 }
 
@@ -314,7 +324,7 @@ fn depth_and_object_layers_are_the_processor_s() {
         let alone = picture_of(&scene, &settings, None);
         let (name, device) = crate::named_device();
         let helped = picture_of(&scene, &settings, Some(device));
-        assert!(helped.backend.starts_with(&name) && helped.warnings == alone.warnings, "{:?}", helped.warnings);
+        assert!(helped.backend.starts_with(&name) && says_no_more(&helped, &alone), "{:?}", helped.warnings);
         assert!(apart(&alone, &helped) <= TOLERANCE);
         let LayerData::Id(expected) = &alone.layers.images["object"] else { panic!("ids") };
         let LayerData::Id(found) = &helped.layers.images["object"] else { panic!("ids") };

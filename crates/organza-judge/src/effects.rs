@@ -1,0 +1,186 @@
+//! What each effect of a scene changes in its picture, and the time that it takes: drawn with it and without it.
+//!
+//! ```text
+//! scene as planned ─► picture ◄── compared ──► picture with one effect switched the other way
+//!                        ▲
+//!                        └────── compared ──► picture with everything that was left out
+//! ```
+//! The plan of a scene leaves out what it has proved to be invisible, by bounds. This measures the changes that it bounded.
+
+use crate::accuracy::{Frame, Renderer, Request};
+use organza::plan::{Effect, Plan};
+use organza::scene::Scene;
+use organza::{Error, Progress, RenderOptions};
+use reference::metrics::{Display, Image};
+
+/// A picture is drawn again until so many seconds have gone, at most [`REPEATS`] times; the fastest counts, as other programs only slow it down.
+const LONG_ENOUGH: f64 = 0.5;
+/// Exit codes of what a user can put right.
+const USAGE: u8 = 2;
+const INPUT: u8 = 3;
+/// Most times that a picture is drawn.
+const REPEATS: usize = 3;
+
+/// One effect, drawn the other way than the plan has it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EffectChange {
+    /// Its name.
+    pub name: String,
+    /// Largest difference of a displayed channel between the pictures with it and without it, 0 to 1.
+    pub largest: f64,
+    /// Share of pixels whose displayed channels differ by more than the tolerance of the scene, 0 to 1.
+    pub beyond_tolerance: f64,
+    /// Seconds of drawing with it, loading and conversion left out.
+    pub seconds_with: f64,
+    /// Seconds of drawing without it.
+    pub seconds_without: f64,
+}
+
+/// Every effect that can be switched, measured.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Measured {
+    /// Those that could be switched, in the plan's order.
+    pub changes: Vec<EffectChange>,
+    /// Those that could not, with the reason.
+    pub fixed: Vec<FixedEffect>,
+    /// Largest difference of a displayed channel between the picture as planned and the one with everything that it leaves out; `None` where it
+    /// leaves nothing out that could be switched on.
+    pub left_out_together: Option<f64>,
+}
+
+/// An effect that was not switched.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct FixedEffect {
+    /// Its name.
+    pub name: String,
+    /// Why not.
+    pub reason: String,
+}
+
+/// An effect and whether it is on.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Switch {
+    /// Its name, as plans have it.
+    pub name: String,
+    /// Whether it is simulated.
+    pub is_on: bool,
+}
+
+/// Draws a scene as planned and with each of its effects switched the other way; `switched` is the scene with effects switched as it is told.
+///
+/// What `switched` refuses as input or usage is an effect that cannot be switched.
+///
+/// # Errors
+/// Those of drawing the scene, and of `switched` but for the above.
+pub fn measure(
+    plan: &Plan,
+    scene: &Scene,
+    switched: &dyn Fn(&[Switch]) -> Result<Scene, Error>,
+    options: &RenderOptions,
+    progress: &Progress,
+) -> Result<Measured, Error> {
+    let mut pictures = Pictures { renderer: Renderer::new(options, progress), exposure: scene.render.exposure };
+    let count = plan.effects.len() + 2;
+    progress.plan((0..count).map(|rank| (stage(plan, rank), 1.0)));
+    progress.begin(&stage(plan, 0));
+    let planned = pictures.draw(scene)?;
+    let mut measured = Measured::default();
+    let mut left_out = Vec::new();
+    for (rank, effect) in plan.effects.iter().enumerate() {
+        progress.begin(&stage(plan, rank + 1));
+        let switch = Switch { name: effect.name.clone(), is_on: !is_simulated(effect) };
+        match switched(std::slice::from_ref(&switch)) {
+            Ok(other) => {
+                let drawn = pictures.draw(&other)?;
+                measured.changes.push(planned.beside(&drawn, &switch, scene.render.tolerance));
+                left_out.extend(switch.is_on.then_some(switch));
+            }
+            Err(error) => {
+                let reason = why_not(error)?;
+                measured.fixed.push(FixedEffect { name: switch.name, reason });
+            }
+        }
+    }
+    progress.begin(&stage(plan, count - 1));
+    if !left_out.is_empty() {
+        let whole = pictures.draw(&switched(&left_out)?)?;
+        measured.left_out_together = Some(largest_difference(&planned.image, &whole.image));
+    }
+    Ok(measured)
+}
+
+/// Whether the picture as planned shows it.
+fn is_simulated(effect: &Effect) -> bool {
+    effect.called_for && !effect.is_lacking
+}
+
+/// The stages of progress: the picture as planned, one for each effect, and the one with all that was left out.
+fn stage(plan: &Plan, rank: usize) -> String {
+    match rank.checked_sub(1) {
+        None => "as planned".to_owned(),
+        Some(effect) => plan
+            .effects
+            .get(effect)
+            .map_or_else(|| "with all that was left out".to_owned(), |effect| format!("{} the other way", effect.name)),
+    }
+}
+
+/// The reason of a refusal; other errors go on.
+fn why_not(error: Error) -> Result<String, Error> {
+    if matches!(error.exit_code(), USAGE | INPUT) { Ok(error.to_string()) } else { Err(error) }
+}
+
+/// Draws pictures with a clock.
+struct Pictures<'a> {
+    renderer: Renderer<'a>,
+    exposure: f64,
+}
+
+/// A displayed picture and its time.
+struct Drawn {
+    image: Image<Display>,
+    seconds: f64,
+}
+
+impl Pictures<'_> {
+    fn draw(&mut self, scene: &Scene) -> Result<Drawn, Error> {
+        let request = Request { scene: scene.clone(), oversample: 1, packed: false };
+        let Frame { image, seconds, .. } = self.renderer.draw(&request)?;
+        let mut fastest = seconds;
+        let mut spent = seconds;
+        for _ in 1..REPEATS {
+            if spent >= LONG_ENOUGH {
+                break;
+            }
+            let again = self.renderer.draw(&request)?.seconds;
+            fastest = fastest.min(again);
+            spent += again;
+        }
+        Ok(Drawn { image: image.display(self.exposure), seconds: fastest })
+    }
+}
+
+impl Drawn {
+    /// The picture as planned beside the one with an effect switched.
+    fn beside(&self, other: &Self, switch: &Switch, tolerance: f64) -> EffectChange {
+        let pixels = self.image.pixels();
+        let beyond = pixels.iter().zip(other.image.pixels()).filter(|(a, b)| difference(a, b) > tolerance).count();
+        let (with, without) = if switch.is_on { (other, self) } else { (self, other) };
+        EffectChange {
+            name: switch.name.clone(),
+            largest: largest_difference(&self.image, &other.image),
+            beyond_tolerance: beyond as f64 / pixels.len().max(1) as f64,
+            seconds_with: with.seconds,
+            seconds_without: without.seconds,
+        }
+    }
+}
+
+fn largest_difference(image: &Image<Display>, other: &Image<Display>) -> f64 {
+    image.pixels().iter().zip(other.pixels()).map(|(a, b)| difference(a, b)).fold(0.0, f64::max)
+}
+
+/// Largest difference of a channel of two pixels.
+fn difference(pixel: &[f64; 3], other: &[f64; 3]) -> f64 {
+    pixel.iter().zip(other).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+}
