@@ -240,6 +240,11 @@ pub(super) struct RenderArguments {
     /// Draw so many frames in a circle around all, to numbered files
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
     pub(super) turntable: Option<u32>,
+    /// Draw within so many milliseconds from files read to picture finished, on the threads of --threads: samples of a pixel, splats and sets of
+    /// particles give way as far as they have to, and which did is told
+    #[arg(long, value_name = "MS", value_parser = clap::value_parser!(u64).range(1..=86_400_000),
+          conflicts_with_all = ["frames", "turntable", "checkpoint"])]
+    pub(super) budget: Option<u64>,
     /// Write files with the opacity of each pixel in the place of the background: premultiplied in EXR, straight in PNG
     #[arg(long)]
     pub(super) transparent: bool,

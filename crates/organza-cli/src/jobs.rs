@@ -6,9 +6,10 @@ use super::given::{Given, given};
 use super::session::{Flag, overrides, parse_scene, render_options};
 use organza::output::{self, Format, Target, Targets};
 use organza::scene::{FoundCamera, Scene};
-use organza::{Error, Files, Progress, Render, RenderOptions, Sequence, printable};
+use organza::{Error, Files, Progress, Render, RenderOptions, Sequence, WithinBudget, printable};
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 /// Least digits of a frame's number in a file name.
 const DIGITS: usize = 4;
@@ -157,6 +158,22 @@ pub(super) enum Drawing {
 }
 
 impl Drawing {
+    /// Draws one picture within a time.
+    pub(super) fn render_within(
+        &mut self,
+        scene: &Scene,
+        budget: Duration,
+        options: &RenderOptions,
+        progress: &Progress,
+    ) -> Result<WithinBudget, Error> {
+        match self {
+            Self::Still(files) => {
+                organza::render_within(scene, budget, options, progress, std::mem::take(&mut **files))
+            }
+            Self::Frames(_) => Err(Error::Internal("frames have no budget".into())),
+        }
+    }
+
     /// What frames take from each other.
     pub(super) fn sequence(&self) -> Option<&Sequence> {
         match self {

@@ -4,14 +4,15 @@ use super::args::RenderArguments;
 use super::bar::with_bar;
 use super::jobs::{Drawing, Jobs, Places};
 use super::machine::rates;
-use super::session::{open_device, path_text, render_options, without_effect};
+use super::session::{open_device, path_text, processor_only, render_options, without_effect};
 use super::{console, report};
 use organza::output::{self, Metadata, Target, WriteReport};
 use organza::scene::{FoundCamera, Scene};
-use organza::{Error, Progress, Render, RenderOptions, Sets, printable};
+use organza::{Error, GivenUp, Progress, Render, RenderOptions, Sets, WithinBudget, printable};
 use serde_json::{Value, json};
 use splat_core::{MemoryAccount, Reservation};
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 /// Stages of a picture; those of the first have names of their own.
 const DRAWING: &str = "";
@@ -30,6 +31,44 @@ struct Job<'a> {
     /// The camera that was placed for it.
     found: Option<FoundCamera>,
     places: &'a Places,
+}
+
+/// How a picture was drawn within a time.
+struct Budgeted {
+    budget: Duration,
+    given_up: Vec<GivenUp>,
+    expected: Duration,
+    taken: Duration,
+}
+
+impl Budgeted {
+    /// Options that draw the same picture again.
+    fn options(&self) -> impl Iterator<Item = String> + '_ {
+        self.given_up.iter().map(|setting| format!("--set {}={}", setting.key, setting.taken))
+    }
+
+    fn text(&self) -> String {
+        let [budget, expected, taken] = [self.budget, self.expected, self.taken].map(|time| time.as_millis());
+        let mut text = format!("budget of {budget} ms: expected {expected} ms, took {taken} ms");
+        if self.given_up.is_empty() {
+            return text + ", with all that the scene asks for\n";
+        }
+        for GivenUp { key, asked, taken } in &self.given_up {
+            text += &format!("\n  {key} = {taken}, where the scene has {asked}");
+        }
+        text += &format!("\n  the same picture again: {}\n", self.options().collect::<Vec<_>>().join(" "));
+        text
+    }
+
+    fn json(&self) -> Value {
+        let setting = |setting: &GivenUp| json!({ "key": setting.key, "asked": setting.asked, "taken": setting.taken });
+        json!({
+            "seconds": self.budget.as_secs_f64(),
+            "expected_seconds": self.expected.as_secs_f64(),
+            "taken_seconds": self.taken.as_secs_f64(),
+            "given_up": self.given_up.iter().map(setting).collect::<Value>(),
+        })
+    }
 }
 
 /// What a finished picture has to say.
@@ -113,6 +152,9 @@ fn add_new(known: &mut Vec<String>, sentences: Vec<String>) {
 
 /// Renders and writes, and gives the exit code. Whatever can be refused is refused before any work.
 pub(super) fn run(arguments: &RenderArguments) -> Result<u8, Error> {
+    if arguments.budget.is_some() {
+        processor_only(&arguments.scene)?;
+    }
     let rates = rates(arguments.machine.as_deref())?;
     let (jobs, files) = Jobs::new(arguments)?;
     let mut drawing = jobs.check(files)?;
@@ -173,26 +215,34 @@ impl Job<'_> {
         progress.plan([(DRAWING, 0.95), (WRITING, 0.05)]);
         progress.begin(DRAWING);
         progress.enter();
-        let render = drawing.render(self.scene, &options, progress)?;
+        let (render, budgeted) = match arguments.budget.map(Duration::from_millis) {
+            None => (drawing.render(self.scene, &options, progress)?, None),
+            Some(budget) => {
+                let within = drawing.render_within(self.scene, budget, &options, progress)?;
+                let WithinBudget { render, given_up, expected, taken } = within;
+                (render, Some(Budgeted { budget, given_up, expected, taken }))
+            }
+        };
         progress.leave();
         progress.begin(WRITING);
         let mut warnings = render.warnings.clone();
-        let written = self.write_outputs(&render, arguments, &mut warnings)?;
+        let written = self.write_outputs(&render, budgeted.as_ref(), arguments, &mut warnings)?;
         if let Some(target) = &self.places.cost {
             target.write(format!("{:#}\n", report::cost_json(&render.cost)).as_bytes())?;
         }
         progress.finish();
         let report = match arguments.scene.common.json {
-            true => format!("{:#}", self.json(&render, &written)),
-            false => self.text(&render, &written),
+            true => format!("{:#}", self.json(&render, budgeted.as_ref(), &written)),
+            false => self.text(&render, budgeted.as_ref(), &written),
         };
         Ok(Done { report, warnings, notes: render.notes, sets: render.sets })
     }
 
-    fn metadata(&self, render: &Render) -> Metadata {
+    fn metadata(&self, render: &Render, budgeted: Option<&Budgeted>) -> Metadata {
+        let changes = budgeted.into_iter().flat_map(Budgeted::options).map(|option| format!("\n# {option}"));
         Metadata {
             scene_sha256: self.scene.sha256.clone(),
-            scene: self.told.clone(),
+            scene: self.told.clone() + &changes.collect::<String>(),
             technique: render.plan.technique.clone(),
             seed: self.scene.render.seed,
             backend: render.backend.clone(),
@@ -204,10 +254,11 @@ impl Job<'_> {
     fn write_outputs(
         &self,
         render: &Render,
+        budgeted: Option<&Budgeted>,
         arguments: &RenderArguments,
         warnings: &mut Vec<String>,
     ) -> Result<Vec<(&Path, WriteReport)>, Error> {
-        let metadata = self.metadata(render);
+        let metadata = self.metadata(render, budgeted);
         let RenderArguments { half, deep, transparent, .. } = *arguments;
         let legend = if arguments.legend { render.scales.clone() } else { Vec::new() };
         if arguments.legend && legend.is_empty() {
@@ -248,12 +299,13 @@ impl Job<'_> {
         Ok(written)
     }
 
-    fn text(&self, render: &Render, written: &[(&Path, WriteReport)]) -> String {
+    fn text(&self, render: &Render, budgeted: Option<&Budgeted>, written: &[(&Path, WriteReport)]) -> String {
         let mut text = self.frame.map_or_else(String::new, |frame| format!("frame {frame}\n"));
         text += &report::cost_text(&render.cost);
         if let Some(Sets { averaged, asked, .. }) = render.sets {
             text += &format!("averaged {averaged} of {asked} sets\n");
         }
+        text += &budgeted.map_or_else(String::new, Budgeted::text);
         if let Some(found) = render.found.or(self.found) {
             text += &report::camera_text(&found);
         }
@@ -263,7 +315,7 @@ impl Job<'_> {
         text
     }
 
-    fn json(&self, render: &Render, written: &[(&Path, WriteReport)]) -> Value {
+    fn json(&self, render: &Render, budgeted: Option<&Budgeted>, written: &[(&Path, WriteReport)]) -> Value {
         let outputs = written.iter().map(|(path, r)| {
             json!({
                 "path": path_text(path), "bytes": r.bytes, "clamped": r.clamped, "not_a_number": r.not_a_number,
@@ -283,6 +335,7 @@ impl Job<'_> {
             "cost": report::cost_json(&render.cost),
             "predicted": report::predicted_json(&render.predicted),
             "sets": render.sets.map(sets),
+            "budget": budgeted.map(Budgeted::json),
             "warnings": render.warnings,
             "notes": render.notes,
         });

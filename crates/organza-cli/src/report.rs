@@ -176,6 +176,7 @@ pub(super) fn measured_json(measured: &Measured) -> Value {
     };
     let fixed = |fixed: &FixedEffect| json!({ "name": fixed.name, "reason": fixed.reason });
     json!({
+        "seconds": measured.seconds,
         "effects": measured.changes.iter().map(change).collect::<Value>(),
         "not_switched": measured.fixed.iter().map(fixed).collect::<Value>(),
         "left_out_together": measured.left_out_together,

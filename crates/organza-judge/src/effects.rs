@@ -39,6 +39,8 @@ pub struct EffectChange {
 /// Every effect that can be switched, measured.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Measured {
+    /// Seconds of drawing as planned, loading and conversion left out.
+    pub seconds: f64,
     /// Those that could be switched, in the plan's order.
     pub changes: Vec<EffectChange>,
     /// Those that could not, with the reason.
@@ -84,7 +86,7 @@ pub fn measure(
     progress.plan((0..count).map(|rank| (stage(plan, rank), 1.0)));
     progress.begin(&stage(plan, 0));
     let planned = pictures.draw(scene)?;
-    let mut measured = Measured::default();
+    let mut measured = Measured { seconds: planned.seconds, ..Measured::default() };
     let mut left_out = Vec::new();
     for (rank, effect) in plan.effects.iter().enumerate() {
         progress.begin(&stage(plan, rank + 1));

@@ -68,6 +68,7 @@ pub use organza_output as output;
 pub use organza_scene as scene;
 pub use organza_scene::{escape_controls, printable, shown};
 pub use prepare::{Explanation, explain, explain_from, fitted, load, plan_loaded, same_splats, seen};
+pub use render::budget::{GivenUp, WithinBudget, render_within};
 pub use render::{Render, render, render_from};
 pub use sequence::Sequence;
 pub use shadows::{ShadowTable, shadow_params};

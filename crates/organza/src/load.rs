@@ -70,6 +70,12 @@ pub struct Loaded {
     pub scales: Vec<ColorScale>,
 }
 
+/// All splats, while a share of them stands for them.
+pub(crate) struct Everything {
+    cloud: Cloud,
+    splats: Vec<SplatCount>,
+}
+
 impl Loaded {
     /// Takes the camera and the slice thickness from a scene that differs from the loaded one in those and in
     /// other render settings alone: its splats are these.
@@ -77,6 +83,25 @@ impl Loaded {
         self.camera = scene.camera;
         self.camera.scale_world(libm::exp2(f64::from(self.exponent)).recip());
         self.slice_thickness = scaled_thickness(scene, self.exponent);
+    }
+
+    /// Keeps a share of the splats, above 0, at most 1, and gives back all of them; `None` where these stay.
+    pub(crate) fn keep_share(&mut self, share: f64) -> Option<Everything> {
+        if share >= 1.0 {
+            return None;
+        }
+        let fewer = self.cloud.fewer(share);
+        let splats = self.splats.clone();
+        count_anew(&mut self.splats, &fewer, &self.objects);
+        Some(Everything { cloud: std::mem::replace(&mut self.cloud, fewer), splats })
+    }
+
+    /// Takes back the splats of which it kept a share.
+    pub(crate) fn take_back(&mut self, everything: Option<Everything>) {
+        if let Some(Everything { cloud, splats }) = everything {
+            self.cloud = cloud;
+            self.splats = splats;
+        }
     }
 
     /// The objects, of which those that are not opaque neither cast nor receive shadows.
@@ -204,13 +229,14 @@ impl Inputs<'_> {
         let mut camera = scene.camera;
         let exponent = normalize(&mut cloud, &mut own, &mut camera, (&mut lights, &mut images.slides));
         cloud.canonicalize();
+        let objects: Vec<Object> = scene.objects.iter().map(object::entry).collect();
         if scene.render.splat_share < 1.0 {
             let before = cloud.len();
             cloud = cloud.fewer(scene.render.splat_share);
             if cloud.len() == before {
                 warnings.push(UNCHANGED.to_owned());
             }
-            count_anew(&mut splats, &cloud, scene);
+            count_anew(&mut splats, &cloud, &objects);
         }
         cloud.validate().map_err(|e| out_of_range(scene, &cloud, e))?;
         warnings.extend(unseen(scene, &cloud, &materials, own.is_empty()));
@@ -220,7 +246,7 @@ impl Inputs<'_> {
             statistics,
             planned,
             materials,
-            objects: scene.objects.iter().map(object::entry).collect(),
+            objects,
             footprints: scene.footprints.clone(),
             camera,
             images,
@@ -242,11 +268,13 @@ const UNCHANGED: &str = "render.splat_share changes nothing: objects of up to 64
                          keep all that they have";
 
 /// Takes the splats that are left of each visible object as those that were made.
-fn count_anew(splats: &mut [SplatCount], cloud: &Cloud, scene: &Scene) {
-    let mut left = vec![0; scene.objects.len()];
+fn count_anew(splats: &mut [SplatCount], cloud: &Cloud, objects: &[Object]) {
+    let mut left = vec![0; objects.len()];
     cloud.object.iter().for_each(|object| left[*object as usize] += 1);
-    let visible = left.iter().zip(&scene.objects).filter(|(_, object)| object.visible);
-    splats.iter_mut().zip(visible).for_each(|(count, (left, _))| count.made = *left);
+    for count in splats {
+        let object = objects.iter().position(|object| object.name == count.object);
+        count.made = object.map_or(0, |object| left[object]);
+    }
 }
 
 /// Splats beyond what their numbers hold: sizes and places of the input are.

@@ -26,7 +26,7 @@ use crate::{CostRecord, Error, Progress, RenderOptions, SplatCount, doubts, shad
 use convert::DiscSize;
 pub use seen::{fitted, seen};
 use splat_core::shade::Census;
-use splat_core::{Exceeded, Material, SplatKind};
+use splat_core::{Camera, Exceeded, Material, SplatKind};
 
 /// What a render would do, without doing it.
 #[derive(Debug, Clone, PartialEq)]
@@ -88,6 +88,8 @@ pub(crate) struct Planned {
     pub(crate) plan: Plan,
     pub(crate) memory: Memory,
     statistics: Statistics,
+    /// What it was planned for.
+    camera: Camera,
 }
 
 /// Loads and plans; `made` is what was loaded and planned of another scene that [`turned`] says serves this one.
@@ -175,6 +177,11 @@ pub fn plan_loaded(scene: &Scene, loaded: &Loaded, options: &RenderOptions) -> R
     plan_counted(scene, loaded, options, None).map(|planned| planned.plan)
 }
 
+/// The same with what it takes and follows from.
+pub(crate) fn plan_alone(scene: &Scene, loaded: &Loaded, options: &RenderOptions) -> Result<Planned, Error> {
+    plan_counted(scene, loaded, options, None)
+}
+
 /// Refuses 3D Gaussians, images as footprints, and splats of media that a file has beside others, where a technique leaves them out.
 fn check_splats(scene: &Scene, loaded: &Loaded) -> Result<(), Error> {
     let by = |object: &SceneObject| row(technique_of(object, scene));
@@ -205,7 +212,7 @@ fn plan_counted(
 ) -> Result<Planned, Error> {
     check_samples(scene)?;
     // Shadows are judged by what a view shows, in an animation by all that there is.
-    let before = before.filter(|_| scene.frames.is_some());
+    let before = before.filter(|before| scene.frames.is_some() || before.camera == loaded.camera);
     let is_new = before.is_none();
     let (statistics, mut plan) = match before {
         Some(before) => (before.statistics, before.plan),
@@ -249,7 +256,7 @@ fn plan_counted(
     }
     let memory = memory.with_maps(shadows::bytes(plan.tables()));
     memory::check("rendering", memory.total(), options.max_memory)?;
-    Ok(Planned { plan, memory, statistics })
+    Ok(Planned { plan, memory, statistics, camera: loaded.camera })
 }
 
 /// The plan of a loaded scene but for its shadow maps, and what it follows from.
@@ -336,7 +343,7 @@ pub fn load(scene: &Scene, options: &RenderOptions, progress: &Progress, files: 
 }
 
 /// [`load`] with entries in the cost record: reading, and conversion where something is converted.
-fn load_measured(
+pub(crate) fn load_measured(
     scene: &Scene,
     options: &RenderOptions,
     progress: &Progress,

@@ -1,5 +1,7 @@
 //! From a scene to images: prepare, draw.
 
+pub(crate) mod budget;
+
 use crate::choose::{row, techniques};
 use crate::cost::Prediction;
 use crate::device::Helper;

@@ -65,6 +65,21 @@ pub enum Item {
     FinishedSample,
 }
 
+/// What the number of items goes with, where settings of a picture change.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Growth {
+    /// Neither.
+    Fixed,
+    /// The number of splats.
+    Splats,
+    /// Samples of the picture.
+    Samples,
+    /// Samples that footprints cover.
+    Fragments,
+    /// Samples of the picture times sets of particles.
+    Sets,
+}
+
 /// What is known of a kind of item.
 struct Row {
     item: Item,
@@ -130,6 +145,35 @@ impl Item {
     /// Its name in sentences, plural.
     pub fn words(self) -> &'static str {
         TABLE[self as usize].words
+    }
+
+    /// What its number goes with.
+    pub(crate) fn growth(self) -> Growth {
+        match self {
+            Self::FileByte | Self::GeneratedObject => Growth::Fixed,
+            Self::ConvertedSplat
+            | Self::CastSplat
+            | Self::OpaqueCaster
+            | Self::ShadowEntry
+            | Self::LampEntry
+            | Self::SortedSplat
+            | Self::GroupedDisc
+            | Self::EnlargedDisc
+            | Self::ProjectedSplat
+            | Self::ShadedSplat
+            | Self::ShadowLookUp
+            | Self::OpaqueSplat
+            | Self::BlendedSplat => Growth::Splats,
+            Self::OpaqueFragment
+            | Self::BlendedFragment
+            | Self::SheetFragment
+            | Self::SurfelFragment
+            | Self::ExactFragment => Growth::Fragments,
+            Self::RangeSample | Self::SlabSample | Self::SurfelSample | Self::BentSample | Self::FinishedSample => {
+                Growth::Samples
+            }
+            Self::Particle | Self::SetSample => Growth::Sets,
+        }
     }
 
     /// The pass whose time it makes up.
