@@ -187,7 +187,9 @@ fn files_are_read_once_while_they_fit() {
     let object = |file| format!("[[object]]\nname = \"{file}\"\nmesh = \"{file}\"\nspacing = 0.05\n");
     let text = [still(), files.map(object).concat(), TRACKS.to_owned()].concat();
     let frame = |k| {
-        let options = scene::LoadOptions { frame: Some(k), ..Default::default() };
+        // What `auto` chooses would fit into plenty of memory alone.
+        let overrides = vec![scene::Override::parse("render.technique='points'").unwrap()];
+        let options = scene::LoadOptions { frame: Some(k), overrides, ..Default::default() };
         scene::parse(&place.path("s.toml"), text.as_bytes(), &options).unwrap()
     };
     let (scenes, progress) = ([frame(0), frame(6)], Progress::new());

@@ -47,7 +47,7 @@ fn slab_in_perspective_follows_the_length_of_its_rays() {
 /// A slab, cut as `clip` says, between a slanted directional light and a wall.
 fn shadow(tau: f64, cells: &str, clip: &str) -> (f64, f64) {
     let text = format!(
-        "{}[render]\nlayers = ['shadow']\n{cells}\n\
+        "{}[render]\ntechnique = 'points'\nlayers = ['shadow']\n{cells}\n\
          [[light]]\nkind = 'directional'\ndirection = [0, -1, -1]\nirradiance = [1, 1, 1]\n\
          [[object]]\nname = 'slab'\n\
          medium_box = {{ min = [-3, 0.8, 0.5], max = [3, 5, 0.9], extinction = {:?}, spacing = 0.05 }}\n{clip}\n\

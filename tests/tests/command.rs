@@ -266,8 +266,9 @@ fn exit_6_a_passport_of_no_such_device() {
 #[test]
 fn exit_0_any_gpu_there_is_or_none_gives_the_processor_s_picture() {
     let place = place();
-    place.expect(0, &["render", "s.toml", "-o", "cpu.png"], "");
-    let out = place.expect(0, &["render", "s.toml", "--backend", "auto", "-o", "auto.png", "--json"], "");
+    let points = ["render", "s.toml", "--technique", "points"];
+    place.expect(0, &[&points[..], &["-o", "cpu.png"]].concat(), "");
+    let out = place.expect(0, &[&points[..], &["--backend", "auto", "-o", "auto.png", "--json"]].concat(), "");
     let bytes = |name: &str| fs::read(place.path(name)).unwrap();
     assert_eq!(bytes("cpu.png"), bytes("auto.png"));
     // Nobody is left in doubt who drew.

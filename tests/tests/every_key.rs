@@ -155,7 +155,8 @@ fn a_color_replaces_that_of_the_data_for_points_as_for_meshes() {
 fn points_closer_than_the_spacing_become_one_and_a_volume_gets_a_lattice_with_such_steps() {
     let folder = Folder::new();
     let splats = |source: &str, spacing: f64| {
-        let scene = folder.scene(source, &[format!("object.it.spacing={spacing:?}")], None).unwrap();
+        let set = [format!("object.it.spacing={spacing:?}"), "render.technique='points'".to_owned()];
+        let scene = folder.scene(source, &set, None).unwrap();
         let explained = organza::explain(&scene, &organza::RenderOptions::default(), &organza::Progress::new());
         explained.unwrap().splats.iter().find(|s| s.object == "it").map(|s| (s.predicted, s.made)).unwrap()
     };

@@ -14,7 +14,7 @@ fn scene(scale: f64, shift: f64, reversed: bool) -> String {
     let intensity = |i: f64| format!("[{:?}, {:?}, {:?}]", i * scale * scale, i * scale * scale, i * scale * scale);
     let mut text = format!(
         "version = 1\n[camera]\nposition = {}\ntarget = {}\nfov_y = 35\nsize = [80, 60]\n[render]\nantialias = 2\n\
-         layers = ['effects', 'depth', 'shadow']\npoints = {{ exact = true }}\n[background]\ncolor = [0.1, 0.2, 0.3]\n\
+         layers = ['effects', 'depth', 'shadow']\ntechnique = 'points'\npoints = {{ exact = true }}\n[background]\ncolor = [0.1, 0.2, 0.3]\n\
          [material.tinted]\ncolor = [0.9, 0.4, 0.2]\nopacity = 0.4\nextinction_rgb = [0.5, 1, 1]\n\
          [material.solid]\ncolor = [0.6, 0.7, 0.8]\nspecular = 0.3\n",
         p(0.5, 1.0, 4.0),
@@ -186,14 +186,16 @@ fn sunny(scale: f64, technique: &str) -> String {
     let end = lamp + text[lamp..].find("[[object]]").unwrap();
     let sun = "[[light]]\nkind = 'directional'\ndirection = [0.2, -1, -0.3]\nirradiance = [2, 2, 2]\n";
     let text = format!("{}{sun}{}", &text[..lamp], &text[end..]);
-    text.replace("points = { exact = true }", technique)
+    text.replace("technique = 'points'\npoints = { exact = true }", technique)
 }
 
 #[test]
 fn x3_any_unit_of_length_gives_the_same_picture() {
     // Particles lie at places that are rounded to f32, and light is taken where they lie.
-    let techniques =
-        [("points = { exact = true }", 1.5e-5), ("technique = 'particles'\nparticles = { repeat_level = 20 }", 1e-4)];
+    let techniques = [
+        ("technique = 'points'\npoints = { exact = true }", 1.5e-5),
+        ("technique = 'particles'\nparticles = { repeat_level = 20 }", 1e-4),
+    ];
     for (technique, bound) in techniques {
         let plain = draw(&sunny(1.0, technique), &[]);
         for scale in [1.3, 0.7, 0.01] {

@@ -54,7 +54,8 @@ fn stays_within(folder: &Path, scene: &str, more: &[&str]) {
 #[test]
 fn shadow_maps_of_many_lights_are_counted_together() {
     let light = |k: i32| format!("[[light]]\nkind = \"point\"\nposition = [{k}, 4, 1]\nintensity = [1, 1, 1]\n");
-    let lights = |n: i32| (0..n).map(light).collect::<String>() + "[render.shadow]\ncells = 128\n";
+    let lights =
+        |n: i32| (0..n).map(light).collect::<String>() + "[render]\ntechnique = \"points\"\nshadow = { cells = 128 }\n";
     let place = Place::new(&format!("{}{}", fog(0.25), lights(1)));
     place.write("many.toml", format!("{}{}", fog(0.25), lights(31)));
     let (few, many) = (explained(place.folder(), "s.toml", &[]), explained(place.folder(), "many.toml", &[]));
@@ -69,7 +70,7 @@ fn shadow_maps_of_many_lights_are_counted_together() {
 #[test]
 fn less_memory_than_a_scene_needs_is_exit_5_and_never_an_abort() {
     let place = Place::new(&fog(0.1));
-    for more in [vec![], vec!["--technique", "particles", "--repeat-level", "2"]] {
+    for more in [vec!["--technique", "points"], vec!["--technique", "particles", "--repeat-level", "2"]] {
         let arguments = [&["render", "s.toml", "--force", "--size", "1600x1000", "--threads", "1"], &more[..]].concat();
         let (out, peak) = run_measured(organza().current_dir(place.folder()).args(&arguments));
         assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));

@@ -11,7 +11,7 @@ fn scene(wall: &str, fog: &str, light: &str) -> String {
              [[light]]\nkind = 'directional'\ndirection = [0, -1, -1]\nirradiance = [1, 1, 1]\n{light}\n\
              [[object]]\nname = 'wall'\nmaterial = 'wall'\n{wall}\n\
              rectangle = {{ center = [0, 0, -1], u = [1.5, 0, 0], v = [0, 1.5, 0], spacing = 0.05 }}\n\
-             [[object]]\nname = 'fog'\nmaterial = 'fog'\n{fog}\n\
+             [[object]]\nname = 'fog'\nmaterial = 'fog'\ntechnique = 'points'\n{fog}\n\
              medium_box = {{ min = [-3, -3, 0], max = [3, 3, 0.3], extinction = 2.0, spacing = 0.1 }}\n"
         )
 }

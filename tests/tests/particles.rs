@@ -50,7 +50,7 @@ const CALM: f64 = 0.002;
 #[test]
 fn particles_differ_from_points_by_their_standard_error() {
     let text = scene([0, 1, 2]);
-    let exact = luminance(&draw(&text, &["--set", "render.points.exact=true"]));
+    let exact = luminance(&draw(&text, &["--technique", "points", "--set", "render.points.exact=true"]));
     let picture = particles(&text, 400, 1, "std_error");
     let (found, error) = (luminance(&picture), picture.channel("std_error.A"));
     let noisy = smooth_and_noisy(&exact, &error);

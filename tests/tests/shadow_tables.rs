@@ -15,7 +15,7 @@ fn scene(fog: &str, more: &str) -> String {
          [[object]]\nname = 'floor'\nrectangle = {{ center = [0, 0, 0], u = [3, 0, 0], v = [0, 0, -3], spacing = 0.06 }}\n\
          [[object]]\nname = 'ball'\n\
          implicit = {{ expression = '(x+0.9)^2 + (y-0.6)^2 + z^2 - 0.36', box = [[-1.6, -0.1, -0.7], [-0.2, 1.3, 0.7]], resolution = 32 }}\n\
-         [[object]]\nname = 'fog'\nmaterial = 'fog'\n\
+         [[object]]\nname = 'fog'\nmaterial = 'fog'\ntechnique = 'points'\n\
          medium_ball = {{ center = {fog}, radius = 0.6, extinction = 3, spacing = 0.1 }}\n\
          [material.fog]\nmedium = {{ albedo = 0.95 }}\n{more}"
     )

@@ -150,7 +150,7 @@ fn keys_of_groups_are_refused_where_they_mean_nothing_or_are_out_of_range() {
 #[test]
 fn glass_is_drawn_by_gaps_and_by_the_algorithms() {
     let text = format!(
-        "{}[material.glass]\nior = 1.5\n[[object]]\nname = 'ball'\nmaterial = 'glass'\nimplicit = {{ expression = 'x^2 + y^2 + z^2 - 0.25', \
+        "{}[background]\ncolor = [0.5, 0.5, 0.5]\n[material.glass]\nior = 1.5\n[[object]]\nname = 'ball'\nmaterial = 'glass'\nimplicit = {{ expression = 'x^2 + y^2 + z^2 - 0.25', \
          box = [[-0.6, -0.6, -0.6], [0.6, 0.6, 0.6]], spacing = 0.1 }}\n",
         parallel_view(1.6, 16)
     );
@@ -161,13 +161,11 @@ fn glass_is_drawn_by_gaps_and_by_the_algorithms() {
     assert!(!by.warnings.iter().any(|w| w.contains("leaves out")), "{:?}", by.warnings);
     let effect =
         |e: &organza::Explanation, name: &str| e.plan.effects.iter().find(|e| e.name == name).cloned().unwrap();
-    assert!(effect(&by, "reflection and refraction").called_for);
+    assert!(effect(&by, "bending.ball").called_for);
     assert!(effect(&by, "layers of surfaces").reason.contains("4 groups by weighted colouring"));
     assert!(by.plan.passes.iter().any(|p| p.name == "group"));
     let gaps = planned("");
-    assert!(
-        effect(&gaps, "reflection and refraction").called_for && !gaps.warnings.iter().any(|w| w.contains("bounds"))
-    );
+    assert!(effect(&gaps, "bending.ball").called_for && !gaps.warnings.iter().any(|w| w.contains("bounds")));
     assert!(effect(&gaps, "layers of surfaces").reason.contains("gaps in depth"));
     assert!(gaps.plan.passes.iter().all(|p| p.name != "group"));
     // Coloured glass in a light with shadows: its absorption casts none, which a note says.

@@ -228,5 +228,5 @@ fn a_technique_that_does_not_bend_light_says_so_and_auto_takes_one_that_does() {
     assert!(said.contains("all of one colour") && !said.contains("leaves out") && !said.contains("no light"), "{said}");
     let out = organza().args(["explain", "scene.toml"]).current_dir(&folder).output().unwrap();
     let said = String::from_utf8(out.stdout).unwrap();
-    assert!(said.contains("technique: surfels") && said.contains("surfaces of 'ball' bound matter"), "{said}");
+    assert!(said.contains("technique: surfels") && said.contains("its surfaces bound matter with an index"), "{said}");
 }

@@ -218,7 +218,8 @@ fn the_path_tracer_has_the_same_light() {
     let fog = "[[object]]\nname = 'fog'\nmedium_box = { min = [-1, -1, 0.1], max = [1, 1, 0.7], extinction = 0.8, spacing = 0.1 }\n";
     let spot = spot("texture = 'checker.hdr'\ntexture_up = [1, 1, 0]\ntexture_angle = 70");
     // Splats of a sixth of a pixel: what is left of their blur at the edges of squares is little.
-    let text = parallel_view(2.0, 16) + &spot + fog + &wall(1.0).replace("0.04", "0.02");
+    let points = "[render]\ntechnique = 'points'\n";
+    let text = parallel_view(2.0, 16) + points + &spot + fog + &wall(1.0).replace("0.04", "0.02");
     let path = folder.path().join("scene.toml");
     std::fs::write(&path, text).unwrap();
     let scene = organza::scene::load(&path, &Default::default()).unwrap();

@@ -21,8 +21,14 @@ fn traced(scene: &Scene) -> Result<Truth, String> {
     truth(scene, &RenderOptions::default(), Orders::One, SAMPLES, &Progress::new()).unwrap()
 }
 
+/// The picture, media by points where the scene names nothing else: they scatter light once, as the truth here.
 fn drawn(scene: &Scene) -> Vec<[f64; 3]> {
-    let image = render(scene, &RenderOptions::default(), &Progress::new()).unwrap();
+    let mut scene = scene.clone();
+    if scene.render.technique == Technique::Auto {
+        let media = scene.objects.iter_mut().filter(|object| object.source.is_medium());
+        media.for_each(|object| _ = object.technique.get_or_insert(Technique::Points));
+    }
+    let image = render(&scene, &RenderOptions::default(), &Progress::new()).unwrap();
     image.layers.rgb("beauty").unwrap().iter().map(|p| p.map(f64::from)).collect()
 }
 

@@ -3,6 +3,7 @@
 mod assets;
 mod ci;
 mod deny;
+mod effects;
 mod fuzz;
 mod mutants;
 mod papers;
@@ -32,6 +33,7 @@ usage: cargo xtask COMMAND
   papers           writes docs/papers.md from docs/papers/*.toml
   papers --times   takes what benchmarks of `cargo bench` measured last into docs/papers/*-times.csv, then writes the page
   papers --check   fails where docs/papers.md is stale or names code or a test that does not exist
+  effects          draws every scene with each of its effects and without it, and writes docs/effects.csv and docs/effects.md
   assets           lists the files under assets/, their credit files, and where the larger inputs come from
   assets sky       writes assets/environment/sky.hdr, an environment by formula
   assets dose      writes assets/dose/dose.nrrd, the dose of three beams by formula
@@ -60,6 +62,7 @@ fn main() -> ExitCode {
             Ok(format!("{said}\n{}", papers::write(&Repo::open()?)?))
         }),
         ["papers", "--check"] => Repo::open().and_then(|repo| papers::check(&repo)),
+        ["effects"] => Repo::open().and_then(|repo| effects::run(&repo)),
         ["assets"] => Repo::open().and_then(|repo| assets::run(&repo)),
         ["assets", "sky"] => Repo::open().and_then(|repo| assets::write_sky(&repo)),
         ["assets", "dose"] => Repo::open().and_then(|repo| assets::write_dose(&repo)),

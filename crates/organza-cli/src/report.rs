@@ -1,7 +1,7 @@
 //! Plans and costs as tables and as JSON.
 
 use organza::cost::{CountedPass, Prediction, duration_text};
-use organza::plan::{Effect, Plan, PlannedObject};
+use organza::plan::{Effect, Estimate, Plan, PlannedObject};
 use organza::scene::{FoundCamera, Scene};
 use organza::{CostRecord, ShadowTable, SplatCount};
 use organza_judge::effects::{EffectChange, FixedEffect, Measured};
@@ -105,17 +105,52 @@ pub(super) fn plan_json(plan: &Plan) -> Value {
     let effects = plan
         .effects
         .iter()
-        .map(|e| json!({ "name": e.name, "called_for": e.called_for, "lacking": e.is_lacking, "reason": e.reason, "bound": e.bound }));
+        .map(|e| json!({
+            "name": e.name, "what": e.what, "called_for": e.called_for, "lacking": e.is_lacking, "in_scene": !e.is_absent,
+            "reason": e.reason, "bound": e.bound.number(),
+        }));
     let passes = plan.passes.iter().map(|p| json!({ "name": p.name, "reason": p.reason }));
     json!({
         "technique": plan.technique,
         "effects": effects.collect::<Value>(),
+        "estimates": plan.estimates.iter().map(|e| estimate_json(plan, e)).collect::<Value>(),
         "passes": passes.collect::<Value>(),
         "optical_depth_planes": plan.optical_depth_planes,
         "shadow_maps": plan.shadow_maps,
         "shadow_tables": plan.shadow_tables.iter().map(|t| t.as_ref().map(table_json)).collect::<Value>(),
         "samplers": chosen(plan).iter().map(object_json).collect::<Value>(),
     })
+}
+
+fn estimate_json(plan: &Plan, estimate: &Estimate) -> Value {
+    let error = estimate.displayed_error;
+    json!({
+        "technique": estimate.technique.name(), "object": estimate.of_object, "what": estimate.what,
+        // JSON has no infinity: an error that is not known is none.
+        "displayed_error": error.is_finite().then_some(error),
+        "draws": is_drawn(plan, estimate), "reason": estimate.words,
+    })
+}
+
+/// Whether an estimate is of the technique that draws its object.
+fn is_drawn(plan: &Plan, estimate: &Estimate) -> bool {
+    plan.objects.iter().any(|o| o.object == estimate.of_object && o.technique == estimate.technique)
+}
+
+/// What techniques err by as a table; nothing where nothing is known to be wrong.
+fn estimates_text(plan: &Plan) -> String {
+    if plan.estimates.is_empty() {
+        return String::new();
+    }
+    let rows = plan.estimates.iter().map(|estimate| {
+        let by = if is_drawn(plan, estimate) { "yes" } else { "no" };
+        let error = estimate.displayed_error;
+        let share = if error.is_finite() { share_text(error) } else { "not known".to_owned() };
+        let technique = estimate.technique.name().to_owned();
+        [technique, by.to_owned(), share, estimate.of_object.clone(), estimate.words.clone()]
+    });
+    let text = table(["technique", "draws it", "errs by about", "of", "why"], "llrll", rows);
+    text + "errs by about: an estimate of the change of a pixel as it is displayed, of black to white; it is no bound\n\n"
 }
 
 fn table_json(t: &ShadowTable) -> Value {
@@ -141,7 +176,8 @@ fn object_json(o: &PlannedObject) -> Value {
 
 /// The plan as a table.
 pub(super) fn plan_text(plan: &Plan) -> String {
-    let effects = plan.effects.iter().map(|e| {
+    let present = plan.effects.iter().filter(|e| !e.is_absent);
+    let effects = present.map(|e| {
         let called = match (e.called_for, e.is_lacking) {
             (true, true) => "lacking",
             (true, false) => "yes",
@@ -151,8 +187,13 @@ pub(super) fn plan_text(plan: &Plan) -> String {
     });
     let mut text = format!("technique: {}\n\n", plan.technique);
     text += &table(["effect", "called for", "without it", "why"], "lrrl", effects);
-    text += "without it: how much a pixel as it is displayed could change at most, of black to white\n";
+    let absent: Vec<&str> = plan.effects.iter().filter(|e| e.is_absent).map(|e| e.name.as_str()).collect();
+    if !absent.is_empty() {
+        let _ = writeln!(text, "not in this scene: {}", absent.join(", "));
+    }
+    text += "without it: how much a pixel as it is displayed could change at most, of black to white; - where no bound is known\n";
     text.push('\n');
+    text += &estimates_text(plan);
     let passes = plan.passes.iter().map(|p| [p.name.clone(), p.reason.clone()]);
     text += &table(["pass", "what for"], "ll", passes);
     if !chosen(plan).is_empty() {
@@ -209,9 +250,9 @@ pub(super) fn measured_text(measured: &Measured, plan: &Plan, tolerance: f64) ->
     text
 }
 
-/// How much a pixel could change without an effect; what is simulated was not always bounded.
+/// How much a pixel could change without an effect, at most.
 fn bound_text(effect: &Effect) -> String {
-    if effect.called_for && effect.bound == 0.0 { "-".to_owned() } else { share_text(effect.bound) }
+    effect.bound.number().map_or_else(|| "-".to_owned(), share_text)
 }
 
 /// A change of a displayed pixel, 0 to 1, as percent.

@@ -7,10 +7,9 @@
 //! ```
 //! The plan of a scene leaves out what it has proved to be invisible, by bounds. This measures the changes that it bounded.
 
-use crate::accuracy::{Frame, Renderer, Request};
 use organza::plan::{Effect, Plan};
-use organza::scene::Scene;
-use organza::{Error, Progress, RenderOptions};
+use organza::scene::{EffectKind, Scene};
+use organza::{Error, Files, Progress, RenderOptions, pass};
 use reference::metrics::{Display, Image};
 
 /// A picture is drawn again until so many seconds have gone, at most [`REPEATS`] times; the fastest counts, as other programs only slow it down.
@@ -81,7 +80,9 @@ pub fn measure(
     options: &RenderOptions,
     progress: &Progress,
 ) -> Result<Measured, Error> {
-    let mut pictures = Pictures { renderer: Renderer::new(options, progress), exposure: scene.render.exposure };
+    let pictures = Pictures { options, progress };
+    let (settled, _) = organza::settled(scene, options, progress, &Files::default())?;
+    let switched = |switches: &[Switch]| switched(switches).map(|other| by_techniques_of(&settled, other));
     let count = plan.effects.len() + 2;
     progress.plan((0..count).map(|rank| (stage(plan, rank), 1.0)));
     progress.begin(&stage(plan, 0));
@@ -91,6 +92,11 @@ pub fn measure(
     for (rank, effect) in plan.effects.iter().enumerate() {
         progress.begin(&stage(plan, rank + 1));
         let switch = Switch { name: effect.name.clone(), is_on: !is_simulated(effect) };
+        if switch.is_on && switch.name == EffectKind::Scatter.word() {
+            let reason = "another technique draws it, which differs in more than that".to_owned();
+            measured.fixed.push(FixedEffect { name: switch.name, reason });
+            continue;
+        }
         match switched(std::slice::from_ref(&switch)) {
             Ok(other) => {
                 let drawn = pictures.draw(&other)?;
@@ -109,6 +115,20 @@ pub fn measure(
         measured.left_out_together = Some(largest_difference(&planned.image, &whole.image));
     }
     Ok(measured)
+}
+
+/// The scene drawn by the techniques of another one that differs in effects alone: a technique that is chosen anew errs otherwise.
+fn by_techniques_of(settled: &Scene, mut scene: Scene) -> Scene {
+    let scattering = EffectKind::Scatter;
+    let is_of_scattering = scene.render.effects.iter().any(|effect| effect.kind == scattering);
+    if !is_of_scattering {
+        scene.render.sheets = settled.render.sheets;
+    }
+    scene.render.technique = settled.render.technique;
+    for (object, settled) in scene.objects.iter_mut().zip(&settled.objects) {
+        object.technique = settled.technique;
+    }
+    scene
 }
 
 /// Whether the picture as planned shows it.
@@ -132,10 +152,10 @@ fn why_not(error: Error) -> Result<String, Error> {
     if matches!(error.exit_code(), USAGE | INPUT) { Ok(error.to_string()) } else { Err(error) }
 }
 
-/// Draws pictures with a clock.
+/// Draws pictures with a clock, as `organza render` does.
 struct Pictures<'a> {
-    renderer: Renderer<'a>,
-    exposure: f64,
+    options: &'a RenderOptions,
+    progress: &'a Progress,
 }
 
 /// A displayed picture and its time.
@@ -145,20 +165,31 @@ struct Drawn {
 }
 
 impl Pictures<'_> {
-    fn draw(&mut self, scene: &Scene) -> Result<Drawn, Error> {
-        let request = Request { scene: scene.clone(), oversample: 1, packed: false };
-        let Frame { image, seconds, .. } = self.renderer.draw(&request)?;
-        let mut fastest = seconds;
-        let mut spent = seconds;
+    fn draw(&self, scene: &Scene) -> Result<Drawn, Error> {
+        let mut drawn = self.draw_once(scene)?;
+        let mut spent = drawn.seconds;
         for _ in 1..REPEATS {
             if spent >= LONG_ENOUGH {
                 break;
             }
-            let again = self.renderer.draw(&request)?.seconds;
-            fastest = fastest.min(again);
-            spent += again;
+            let again = self.draw_once(scene)?;
+            spent += again.seconds;
+            drawn.seconds = drawn.seconds.min(again.seconds);
         }
-        Ok(Drawn { image: image.display(self.exposure), seconds: fastest })
+        Ok(drawn)
+    }
+
+    fn draw_once(&self, scene: &Scene) -> Result<Drawn, Error> {
+        self.progress.enter();
+        let render = organza::render(scene, self.options, self.progress)?;
+        self.progress.leave();
+        let beauty =
+            render.layers.rgb("beauty").ok_or_else(|| Error::Internal("a render has no beauty layer".into()))?;
+        let image = Image::from_layer(render.layers.size, beauty).map_err(|e| Error::Internal(e.to_string()))?;
+        let is_drawing = |name: &str| name != pass::READ && name != pass::CONVERT;
+        let drawing = render.cost.stages.iter().filter(|stage| is_drawing(&stage.name));
+        let seconds = drawing.map(|stage| stage.seconds).sum();
+        Ok(Drawn { image: image.display(scene.render.exposure), seconds })
     }
 }
 

@@ -4,7 +4,7 @@ use super::animation::{check_animation, deforms, moves};
 use super::check_background::check_background;
 use super::check_camera::check_camera;
 use super::check_drawn::check_drawn;
-use super::check_effects::check_effects;
+use super::check_effects::{Causes, check_effects};
 use super::check_extract::check_extracts;
 use super::check_footprint::check_footprints;
 use super::check_light::check_lights;
@@ -16,8 +16,9 @@ use super::paths::{Paths, ROOT_KEY};
 use super::raw::{RawAnimation, RawScene};
 use super::raw_object::RawObject;
 use super::stops::check_stops;
+use super::switched::switch;
 use super::tree::{Document, Node, Step};
-use super::{Aligned, RenderSettings, Scene, SceneLight, SceneObject, ShadowMapping};
+use super::{Aligned, EffectKind, RenderSettings, Scene, SceneLight, SceneObject, ShadowMapping, SwitchedEffect};
 use crate::{Error, Written, short};
 use glam::DVec3;
 use splat_core::{Camera, LightShape};
@@ -177,24 +178,33 @@ pub(super) fn scene(
     let paths = Paths::new(&at.key(ROOT_KEY), document.file, raw.root.as_deref(), options)?;
     let at_footprints = at.key("footprints");
     let footprints = check_footprints(&at_footprints, raw.footprints.as_deref(), &paths, &options.memory)?;
-    let materials = check_materials(&at.key("material"), &raw.material, (&paths, &footprints.stack))?;
+    let mut materials = check_materials(&at.key("material"), &raw.material, (&paths, &footprints.stack))?;
     let extracts = raw.object.iter().filter_map(|object| object.extract.as_ref()?.objects.clone());
     let tracks = raw.animation.iter().flat_map(|animation| &animation.track);
     let stops = tracks.filter_map(|track| track.stop.as_ref()?.objects.clone());
     let seen = extracts.chain(stops).flatten().collect();
     let named = Named { materials: &materials, footprints: &footprints.stack, paths: &paths, seen: &seen };
     let at_objects = at.key("object");
-    let objects = check_objects(&at_objects, raw.object, raw.animation.as_ref(), &named)?;
+    let mut objects = check_objects(&at_objects, raw.object, raw.animation.as_ref(), &named)?;
     check_extracts(&at_objects, &objects, raw.light.len())?;
     let mut render = check_render(&at.key("render"), &raw.render)?;
+    let lights = check_lights(&at.key("light"), &raw.light, &paths)?;
+    let at_effects = at.key("render").key("effects");
+    let causes = Causes { lights: &lights, objects: &objects, materials: &materials, render: &render };
+    render.effects = check_effects(&at_effects, &raw.render.effects, &causes)?;
+    if !switch(&render.effects, &mut objects, &mut materials) {
+        let message = format!("expected at most {} materials, with a copy for each effect of an object", u16::MAX);
+        return Err(at_effects.error(message, "switch fewer effects"));
+    }
+    if SwitchedEffect::find(&render.effects, EffectKind::Scatter, "") == Some(false) {
+        render.sheets.scatter_once();
+    }
     let layers = (&at.key("render").key("layers"), raw.render.layers.as_slice());
     check_drawn(&at_objects, &objects, &materials, layers, &mut render)?;
     let goes_around = raw.animation.as_ref().is_some_and(|animation| moves(animation, "camera", "azimuth"));
     let seen = check_camera(&at.key("camera"), &raw.camera, turn, goes_around)?;
     check_aligned(&at.key("render").key("sheets").key("aligned"), &seen.camera, &render)?;
     let (background, environment) = check_background(&at.key("background"), &raw.background, &paths)?;
-    let lights = check_lights(&at.key("light"), &raw.light, &paths)?;
-    render.effects = check_effects(&at.key("render").key("effects"), &raw.render.effects, &lights)?;
     check_mapping(&at.key("render").key("shadow").key("mapping"), &render, &lights)?;
     let at_animation = at.key("animation");
     let frames = raw.animation.as_ref().map(|a| check_animation(&at_animation, a)).transpose()?;

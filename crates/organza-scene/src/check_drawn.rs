@@ -134,7 +134,15 @@ fn check_scattered(
     if scatters_again && layers.iter().any(|layer| layer == "effects") {
         render.layers.add_effects(["scatterN"]);
     }
-    if !scatters_again && render.layers.names().any(|layer| layer == "scatterN") {
+    // The plan then gives the objects to a technique that fills it.
+    let may_be_sheets = |o: &SceneObject| {
+        let technique = o.technique.unwrap_or(render.technique);
+        o.visible && matches!(technique, Technique::Auto | Technique::Sheets)
+    };
+    let may_scatter = render.sheets.scattering_again().is_some()
+        && objects.iter().any(|o| o.visible && o.technique.unwrap_or(render.technique) == Technique::Auto)
+        && objects.iter().all(|o| !o.visible || may_be_sheets(o));
+    if !scatters_again && !may_scatter && render.layers.names().any(|layer| layer == "scatterN") {
         let message = "the layer `scatterN` is of light that the technique `sheets` scatters more than once";
         let hint = "use technique = \"sheets\" with render.sheets.slicing = \"half_vector\" and \
                     render.sheets.scattering = \"forward_and_back\", or leave it out";

@@ -88,6 +88,7 @@ pub(super) fn check_object(
         footprints: Arc::new(footprints),
         merge_duplicates: raw.merge_duplicates,
         technique: check_own_technique(at, raw.technique.as_deref())?,
+        is_chosen: false,
         deforms: false,
         name: raw.name,
     })

@@ -34,6 +34,7 @@ pub(super) fn check_render(at: &At<'_>, raw: &RawRender) -> Result<RenderSetting
     let technique = check_technique(at, raw.technique.as_deref().unwrap_or("auto"))?;
     Ok(RenderSettings {
         technique,
+        is_chosen: false,
         antialias: at.whole("antialias", raw.antialias.unwrap_or(2), 1..=8)?,
         tolerance,
         exposure: at.number("exposure", raw.exposure.unwrap_or(0.0), -60.0..=60.0)?,
@@ -171,6 +172,8 @@ fn check_sheets(at: &At<'_>, raw: &RawSheets) -> Result<SheetsSettings, Error> {
     let sigma = at.number("kernel_sigma", raw.kernel_sigma.unwrap_or(0.35 * extent), 0.125 * extent..=extent)?;
     Ok(SheetsSettings {
         slicing: check_slicing(at, raw)?,
+        may_slice: raw.slicing == RawSlicing::Auto,
+        may_scatter: raw.scattering == RawScattering::Auto,
         classify: match raw.classify {
             None | Some(RawClassify::After) => Classify::After,
             Some(RawClassify::Before) => Classify::Before,
@@ -225,7 +228,7 @@ fn check_slicing(at: &At<'_>, raw: &RawSheets) -> Result<Slicing, Error> {
     let given = [
         ("light_pixels", raw.light_pixels.is_some()),
         ("most_light_pixels", raw.most_light_pixels.is_some()),
-        ("scattering", raw.scattering != RawScattering::Once),
+        ("scattering", !raw.scattering.is_at_most_once()),
         ("soft_shadows", raw.soft_shadows != RawSoftShadows::Points),
     ];
     if let Some((key, _)) = given.into_iter().find(|(_, is_given)| *is_given) {
@@ -238,7 +241,7 @@ fn check_slicing(at: &At<'_>, raw: &RawSheets) -> Result<Slicing, Error> {
 fn check_scattering(at: &At<'_>, raw: &RawSheets) -> Result<Option<Scattering>, Error> {
     let given =
         [("scattering_cone", raw.scattering_cone.is_some()), ("voxels_per_cell", raw.voxels_per_cell.is_some())];
-    if raw.scattering == RawScattering::Once {
+    if raw.scattering.is_at_most_once() {
         return match given.into_iter().find(|(_, is_given)| *is_given) {
             None => Ok(None),
             Some((key, _)) => {

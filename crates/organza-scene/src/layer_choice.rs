@@ -55,6 +55,11 @@ impl LayerChoice {
         self.names.extend(names);
     }
 
+    /// Whether it keeps all effects that every technique fills, as `effects` asks.
+    pub fn has_effects(&self) -> bool {
+        ["background"].iter().chain(&SHADED_EFFECTS).all(|name| self.names.contains(name))
+    }
+
     /// What has to be accumulated so that these images can be made.
     pub fn set(&self) -> LayerSet {
         let any = |names: &[&str]| names.iter().any(|n| self.names.contains(n));

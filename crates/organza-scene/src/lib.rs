@@ -30,6 +30,7 @@ mod check_surfels;
 mod check_transfer;
 mod color_scales;
 mod de;
+mod effects;
 mod error;
 mod fit;
 mod layer_choice;
@@ -57,11 +58,13 @@ mod settings;
 mod shown;
 mod source;
 mod stops;
+mod switched;
 mod tree;
 mod written;
 
 pub use convert::read::UpAxis;
 pub use convert::{ColorMap, ColorScale, Combination, PointColors, ScaleNumbers};
+pub use effects::{EffectKind, HangsOn, SwitchedEffect};
 pub use error::Error;
 pub use fit::{CameraFit, DEFAULT_AZIMUTH, DEFAULT_FILL, DEFAULT_SIZE, EachPoint, FoundCamera};
 pub use layer_choice::{LAYER_NAMES, LayerChoice};
@@ -73,9 +76,9 @@ pub use overrides::Override;
 pub use paths::{ROOT_KEY, relative_path, root_for};
 pub use points::PointsLook;
 pub use settings::{
-    Aligned, Bending, Classify, Collisions, Coverage, Grouping, LightEffect, OpaqueSurfels, ParticlesSettings,
-    PointsSettings, RenderSettings, Scattering, ShadowMapping, ShadowSettings, SheetsSettings, Slicing, SoftShadows,
-    SurfaceSampler, SurfelGroups, SurfelLayers, SurfelsSettings, SwitchedEffect, Technique, VolumeSampler,
+    Aligned, Bending, Classify, Collisions, Coverage, Grouping, OpaqueSurfels, ParticlesSettings, PointsSettings,
+    RenderSettings, Scattering, ShadowMapping, ShadowSettings, SheetsSettings, Slicing, SoftShadows, SurfaceSampler,
+    SurfelGroups, SurfelLayers, SurfelsSettings, Technique, VolumeSampler,
 };
 pub use shown::{escape_controls, place, printable, short, shown};
 pub use source::{

@@ -70,6 +70,16 @@ impl Scene {
         scene
     }
 
+    /// The scene by a technique, but for objects that name another: what is left to the plan is drawn by it, too.
+    #[must_use]
+    pub fn drawn_by(&self, technique: Technique) -> Self {
+        let mut scene = self.clone();
+        scene.render.technique = technique;
+        let open = scene.objects.iter_mut().filter(|object| object.technique == Some(Technique::Auto));
+        open.for_each(|object| object.technique = None);
+        scene
+    }
+
     /// Every file that the scene is made of, its own first.
     pub fn files(&self) -> Vec<PathBuf> {
         let data = self.objects.iter().flat_map(SceneObject::paths);
@@ -187,6 +197,8 @@ pub struct SceneObject {
     pub merge_duplicates: bool,
     /// What draws it where it is translucent; `None` for the technique of the scene.
     pub technique: Option<Technique>,
+    /// Whether the plan chose what draws it.
+    pub is_chosen: bool,
     /// Whether a track of the animation changes more of it than its place, its looks, and what draws it.
     pub deforms: bool,
 }

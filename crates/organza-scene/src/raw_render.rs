@@ -71,7 +71,7 @@ pub(super) struct RawParticles {
 #[serde(deny_unknown_fields, default, expecting = "a table")]
 #[schemars(rename = "Sheets")]
 pub(super) struct RawSheets {
-    /// What slabs lie across, "view" (default) or "half_vector", the bisector of light and view.
+    /// What slabs lie across, "view", "half_vector", the bisector of light and view, or "auto" (default).
     pub(super) slicing: RawSlicing,
     /// With "view": when values become colours, "after" (default) they are reconstructed, or "before" they are splatted.
     pub(super) classify: Option<RawClassify>,
@@ -83,7 +83,7 @@ pub(super) struct RawSheets {
     pub(super) most_light_pixels: Option<u32>,
     /// With "half_vector": how a light with an extent is carried, "points" (default), a sweep for each of its points, or "one_sweep".
     pub(super) soft_shadows: RawSoftShadows,
-    /// With "half_vector": how often media scatter light, "once" (default), "forward", or "forward_and_back".
+    /// With "half_vector": how often media scatter light, "once", "forward", "forward_and_back", or "auto" (default).
     pub(super) scattering: RawScattering,
     /// With scattering: half angle of the cone that light spreads into ahead, degrees from 0 to below 90, or "auto" (the default).
     pub(super) scattering_cone: Option<Auto>,
@@ -121,6 +121,7 @@ pub(super) enum RawGradients {
 #[schemars(rename = "Slicing")]
 pub(super) enum RawSlicing {
     #[default]
+    Auto,
     View,
     HalfVector,
 }
@@ -159,9 +160,17 @@ pub(super) enum RawSoftShadows {
 #[schemars(rename = "Scattering")]
 pub(super) enum RawScattering {
     #[default]
+    Auto,
     Once,
     Forward,
     ForwardAndBack,
+}
+
+impl RawScattering {
+    /// Whether light is scattered once as long as the plan asks for no more.
+    pub(super) fn is_at_most_once(self) -> bool {
+        matches!(self, Self::Auto | Self::Once)
+    }
 }
 
 /// How implicit surfaces are sampled.

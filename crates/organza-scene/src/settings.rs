@@ -1,6 +1,6 @@
 //! How to render, checked: the technique and the knobs of each.
 
-use super::LayerChoice;
+use super::{LayerChoice, SwitchedEffect};
 use splat_core::Direction;
 use splat_core::raster::Accumulation;
 
@@ -9,6 +9,8 @@ use splat_core::raster::Accumulation;
 pub struct RenderSettings {
     /// The technique.
     pub technique: Technique,
+    /// Whether the plan chose the technique of some object, because the scene leaves it to the plan.
+    pub is_chosen: bool,
     /// Samples along each side of a pixel, 1 to 8.
     pub antialias: u32,
     /// How much any pixel of the displayed picture may change by what is not simulated, in (0, 1].
@@ -37,44 +39,6 @@ pub struct RenderSettings {
     pub sheets: SheetsSettings,
     /// Settings of the `surfels` technique.
     pub surfels: SurfelsSettings,
-}
-
-/// An effect of one light that a scene can switch.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum LightEffect {
-    /// The light itself.
-    Light,
-    /// Its shadow.
-    Shadow,
-}
-
-impl LightEffect {
-    /// All of them.
-    pub const ALL: [Self; 2] = [Self::Light, Self::Shadow];
-
-    /// The first part of its name, before that of the light.
-    pub fn kind(self) -> &'static str {
-        match self {
-            Self::Light => "light",
-            Self::Shadow => "shadow",
-        }
-    }
-
-    /// What the effect of a light of this label is called, such as `shadow.sun`.
-    pub fn name(self, label: &str) -> String {
-        format!("{}.{label}", self.kind())
-    }
-}
-
-/// An effect that a scene switches on or off.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct SwitchedEffect {
-    /// Which.
-    pub effect: LightEffect,
-    /// The label of the light that it is of.
-    pub light: String,
-    /// Whether it is simulated.
-    pub is_on: bool,
 }
 
 /// What draws the picture.
@@ -140,6 +104,10 @@ pub struct ParticlesSettings {
 pub struct SheetsSettings {
     /// What slabs lie across.
     pub slicing: Slicing,
+    /// Whether the scene leaves to the plan what slabs lie across; until the plan decides, they lie across the view.
+    pub may_slice: bool,
+    /// Whether the scene leaves to the plan how often media scatter light; until the plan decides, they scatter it once.
+    pub may_scatter: bool,
     /// When values become colours; after they are reconstructed in half-vector slicing.
     pub classify: Classify,
     /// What slabs lie along; the view in half-vector slicing. Slabs along a lattice take parallel rays and no width.
@@ -161,6 +129,28 @@ pub struct SheetsSettings {
 }
 
 impl SheetsSettings {
+    /// These settings with light that is scattered again and again, forward and back; `None` where the scene states otherwise.
+    #[must_use]
+    pub fn scattering_again(&self) -> Option<Self> {
+        let mut settings = *self;
+        // Half vectors know neither of the other choices.
+        if self.may_slice && self.classify == Classify::After && self.aligned == Aligned::View {
+            settings.slicing = Slicing::HALF_VECTOR;
+        }
+        let Slicing::HalfVector { scattering, .. } = &mut settings.slicing else { return None };
+        if scattering.is_none() && self.may_scatter {
+            *scattering = Some(Scattering::FORWARD_AND_BACK);
+        }
+        scattering.is_some().then_some(settings)
+    }
+
+    /// Has light scattered once only.
+    pub(super) const fn scatter_once(&mut self) {
+        if let Slicing::HalfVector { scattering, .. } = &mut self.slicing {
+            *scattering = None;
+        }
+    }
+
     /// How light is scattered more than once, where it is.
     pub const fn scattering(&self) -> Option<&Scattering> {
         match &self.slicing {
@@ -368,6 +358,16 @@ pub enum Slicing {
     },
 }
 
+impl Slicing {
+    /// Slabs across half vectors as they are where a scene states no more of them.
+    pub const HALF_VECTOR: Self = Self::HalfVector {
+        light_pixels: 1.5,
+        most_light_pixels: 2048,
+        scattering: None,
+        soft_shadows: SoftShadows::Points,
+    };
+}
+
 /// How half-vector sheets carry the light of a sphere, a disk or a rectangle.
 #[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
 pub enum SoftShadows {
@@ -387,6 +387,11 @@ pub struct Scattering {
     pub cone: Option<f64>,
     /// Voxels for each cell of scattered light, 1 to 2²⁰.
     pub voxels_per_cell: u32,
+}
+
+impl Scattering {
+    /// Light that goes on forward and back, as it does where a scene states no more of it.
+    pub const FORWARD_AND_BACK: Self = Self { back: true, cone: None, voxels_per_cell: 32 };
 }
 
 /// How the particles of implicit surfaces are found.

@@ -49,6 +49,11 @@ impl Source {
         matches!(self, Self::Matter(_) | Self::Volume(_) | Self::Density(_) | Self::Cloud(_) | Self::Medium(_))
     }
 
+    /// Whether it is made of points without faces.
+    pub fn is_of_points(&self) -> bool {
+        matches!(self, Self::Points(_) | Self::Matter(_) | Self::Extract(_))
+    }
+
     /// Whether it is the zero set of a field.
     pub fn is_of_field(&self) -> bool {
         matches!(self, Self::Implicit(_) | Self::Isosurface(_) | Self::LevelSet(_) | Self::Combined(_))

@@ -1,12 +1,12 @@
 //! Light that a technique carries through what it draws: no shadow map need have that, and which maps are left to build.
 
 use crate::Error;
-use crate::choose::{SCATTER, row, techniques};
+use crate::choose::{row, technique_effect, techniques};
 use crate::form::{Form, PlannedObject};
 use crate::load::Loaded;
 use crate::matter::{Carries, CarriesLight, Matter};
 use crate::plan::{Effect, Plan};
-use crate::scene::{LightEffect, LightPoint, Scene, SceneLight, light_points};
+use crate::scene::{EffectKind, LightPoint, Scene, SceneLight, light_points};
 use crate::shadows::Wanted;
 use crate::shown;
 use crate::statistics::ObjectStatistics;
@@ -62,8 +62,11 @@ pub(crate) fn plan(scene: &Scene, loaded: &Loaded, points: &[LightPoint], plan: 
         plan.shadow_maps[light] && points.iter().zip(carries).any(|(point, c)| point.of == light && c.is_err())
     };
     plan.scattered_once = if scatters_again { (0..plan.shadow_maps.len()).filter(|l| is_left(*l)).count() } else { 0 };
-    if let Some(scatter) =
-        plan.effects.iter_mut().find(|effect| effect.name == SCATTER).filter(|_| plan.scattered_once > 0)
+    if let Some(scatter) = plan
+        .effects
+        .iter_mut()
+        .find(|effect| effect.name == EffectKind::Scatter.word())
+        .filter(|_| plan.scattered_once > 0)
     {
         scatter.is_lacking = true;
         scatter.reason += "; of lights that are not carried it is scattered once all the same";
@@ -76,13 +79,14 @@ pub(crate) fn plan(scene: &Scene, loaded: &Loaded, points: &[LightPoint], plan: 
                 points.iter().zip(carries).filter(|(point, _)| point.of == light).map(|(_, c)| c).collect();
             let (called_for, reason) = way(&own, plan.shadow_maps[light], scattering);
             let label = &loaded.lights[light].label;
-            let through =
-                Effect { name: format!("carried.{label}"), called_for, reason, bound: 0.0, is_lacking: false };
+            let what = "light that slabs carry through what they draw, without a shadow map";
+            let through = technique_effect(format!("carried.{label}"), what, called_for, reason);
             std::iter::once(through).chain(softness(light, label, points, &asked, called_for))
         })
         .collect();
     // Behind the light itself and its shadow.
-    let behind = LightEffect::ALL.len() * plan.shadow_maps.len();
+    let is_of_lights = |effect: &Effect| effect.name.starts_with(EffectKind::Shadow.word());
+    let behind = plan.effects.iter().rposition(is_of_lights).map_or(plan.effects.len(), |last| last + 1);
     plan.effects.splice(behind..behind, effects);
     Ok(())
 }
@@ -127,7 +131,7 @@ fn softness(light: usize, label: &str, points: &[LightPoint], asked: &Carries, i
         (false, _) => format!("a shadow map for each of {all} points of it"),
     };
     let reason = format!("{way}; penumbras widen by {:.3} of the distance to what casts them", asked.widening[k]);
-    Some(Effect { name: format!("softness.{label}"), called_for: all > 1, reason, bound: 0.0, is_lacking: false })
+    Some(technique_effect(format!("softness.{label}"), "the soft shadow of a light with an extent", all > 1, reason))
 }
 
 /// Objects with opaque discs beside translucent ones: where light is carried through these, maps of opaque objects leave both out.

@@ -4,24 +4,20 @@
 //! answered by the table of techniques.
 
 mod effects;
+mod passes;
 
-pub(crate) use effects::{SCATTER, plan};
+pub(crate) use effects::{displayed, plan, technique_effect};
 
 use crate::escape_controls;
 use crate::form::{DRAWN, Form, PlannedObject};
 use crate::scene::{Scene, SceneObject, Technique};
 use crate::statistics::{LightStatistics, ObjectData, ObjectStatistics};
+pub(crate) use crate::technique::row;
 use crate::technique::{Row, TABLE};
 
-/// The technique that draws an object: its own, or the scene's; `auto` takes the first of the table that offers itself.
+/// The technique that draws an object: its own, or the scene's. `auto` alone where the scene is not settled.
 pub(crate) fn technique_of(object: &SceneObject, scene: &Scene) -> Technique {
-    match object.technique.unwrap_or(scene.render.technique) {
-        Technique::Auto => {
-            let offered = TABLE.iter().find(|row| (row.is_offered)(&scene.materials[object.material].material));
-            offered.unwrap_or(&TABLE[0]).technique
-        }
-        named => named,
-    }
+    object.technique.unwrap_or(scene.render.technique)
 }
 
 /// The techniques that draw a scene, in the order of their table; at least one.
@@ -48,12 +44,6 @@ pub(crate) fn unshown(scene: &Scene) -> impl Iterator<Item = String> + '_ {
             Some(format!("object '{name}' {what}, which `{own}` leaves out: {instead}"))
         })
     })
-}
-
-/// What a technique states.
-pub(crate) fn row(technique: Technique) -> &'static Row {
-    let known = TABLE.iter().find(|row| row.technique == technique);
-    known.expect("invariant: every technique of a scene has a row")
 }
 
 /// Whether two techniques take every object in the same form.

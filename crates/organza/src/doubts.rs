@@ -85,10 +85,11 @@ pub(crate) fn lacking(plan: &Plan) -> impl Iterator<Item = String> + '_ {
     let lacking = plan.effects.iter().filter(|effect| effect.is_lacking && plan.scattered_once == 0);
     lacking.map(|effect| {
         // The whole of what is displayed is no bound.
-        let most = if effect.bound < 1.0 {
-            format!(", which changes no displayed pixel by more than {:.2} %", 100.0 * effect.bound)
-        } else {
-            String::new()
+        let most = match effect.bound.number() {
+            Some(bound) if bound < 1.0 => {
+                format!(", which changes no displayed pixel by more than {:.2} %", 100.0 * bound)
+            }
+            _ => String::new(),
         };
         effect.reason.clone() + &most
     })

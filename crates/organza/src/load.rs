@@ -6,6 +6,7 @@ mod fit;
 mod images;
 pub(crate) mod input;
 mod loading;
+mod media_facts;
 mod normalize;
 pub(crate) mod object;
 pub(crate) mod own;
@@ -13,7 +14,7 @@ pub(crate) mod own;
 use crate::cost::{Count, before_conversion};
 use crate::form::{Form, PlannedObject};
 use crate::scene::{Scene, SceneLight, SceneObject, SwitchedEffect};
-use crate::statistics::{LightStatistics, ObjectStatistics};
+use crate::statistics::{LightStatistics, MediumFacts, ObjectStatistics};
 use crate::{CostRecord, Error, Progress, RenderOptions, SplatCount, pass};
 pub(crate) use context::BYTES_PER_SPLAT;
 use convert::ColorScale;
@@ -22,6 +23,7 @@ pub(crate) use fit::placed;
 use glam::DVec3;
 use images::Images;
 use loading::Loading;
+pub(crate) use media_facts::media_facts;
 use normalize::normalize;
 use object::Prepared;
 use own::Own;
@@ -38,6 +40,8 @@ pub struct Loaded {
     pub(crate) own: Vec<Own>,
     /// What the planner was told of every visible object.
     pub(crate) statistics: Vec<ObjectStatistics>,
+    /// What was known of media that scatter light.
+    pub(crate) media: Vec<MediumFacts>,
     /// How each of them was to be drawn.
     pub(crate) planned: Vec<PlannedObject>,
     /// Materials by id.
@@ -54,8 +58,6 @@ pub struct Loaded {
     pub lights: Vec<SceneLight>,
     /// Slice thickness asked for, in the scale of the cloud.
     pub slice_thickness: Option<f64>,
-    /// Whether normals were computed from the gradients of some volume.
-    pub normals: bool,
     /// Lengths were multiplied by 2^−exponent.
     pub exponent: i32,
     /// Splats of every visible object, as predicted and as made.
@@ -104,6 +106,29 @@ impl Loaded {
         }
     }
 
+    /// Takes out what a scene lacks which differs from the loaded one in that some objects are not visible, and in what materials say. Returns
+    /// whether splats were taken out.
+    pub(crate) fn reduce(&mut self, loaded_of: &Scene, scene: &Scene) -> bool {
+        for (material, stated) in self.materials.iter_mut().zip(&scene.materials) {
+            *material = stated.material;
+        }
+        let is_gone = |rank: usize| loaded_of.objects[rank].visible && !scene.objects[rank].visible;
+        if !(0..scene.objects.len()).any(is_gone) {
+            return false;
+        }
+        let visible = loaded_of.objects.iter().enumerate().filter(|(_, object)| object.visible);
+        let stays: Vec<bool> = visible.map(|(rank, _)| !is_gone(rank)).collect();
+        keep(&mut self.statistics, &stays);
+        keep(&mut self.planned, &stays);
+        keep(&mut self.splats, &stays);
+        keep(&mut self.convertible, &stays);
+        self.own.retain(|own| !is_gone(own.object));
+        let left: Vec<u32> =
+            (0..self.cloud.len() as u32).filter(|i| !is_gone(self.cloud.object[*i as usize] as usize)).collect();
+        self.cloud = self.cloud.gather(&left);
+        true
+    }
+
     /// The objects, of which those that are not opaque neither cast nor receive shadows.
     pub(crate) fn opaque_objects(&self) -> Vec<Object> {
         let mut objects = self.objects.clone();
@@ -136,6 +161,12 @@ impl Loaded {
     }
 }
 
+/// Keeps the entries that stay.
+fn keep<T>(entries: &mut Vec<T>, stays: &[bool]) {
+    let mut stays = stays.iter();
+    entries.retain(|_| stays.next().copied().unwrap_or(true));
+}
+
 fn scaled_thickness(scene: &Scene, exponent: i32) -> Option<f64> {
     scene.render.points.slice_thickness.map(|e| e * libm::exp2(f64::from(-exponent)))
 }
@@ -149,6 +180,7 @@ pub(crate) struct Inputs<'a> {
     warnings: Vec<String>,
     /// What is known of each visible object, in the order of the scene.
     pub(crate) statistics: Vec<ObjectStatistics>,
+    media: Vec<MediumFacts>,
 }
 
 /// Whether the splats of objects that are drawn from their own data are not needed: asked with these, how all objects are drawn, what
@@ -181,7 +213,8 @@ pub(crate) fn read<'a>(
         Ok::<_, Error>((prepared, images))
     })?;
     let statistics = loading.statistics(&prepared);
-    Ok(Inputs { loading, prepared, images, lights, warnings: files.mended(), statistics })
+    let media = media_facts(scene, options, progress, files)?;
+    Ok(Inputs { loading, prepared, images, lights, warnings: files.mended(), statistics, media })
 }
 
 impl Inputs<'_> {
@@ -199,7 +232,7 @@ impl Inputs<'_> {
         beside: &[Count],
         cost: &mut CostRecord,
     ) -> Result<Loaded, Error> {
-        let Self { loading, mut prepared, mut images, mut lights, mut warnings, statistics } = self;
+        let Self { loading, mut prepared, mut images, mut lights, mut warnings, statistics, media } = self;
         let Loading { scene, progress, files, options } = loading;
         let mut early = spare.map(|_| loading.own(&mut prepared, &planned, &mut warnings)).transpose()?;
         if let (Some(own), Some(spare)) = (&mut early, spare)
@@ -244,6 +277,7 @@ impl Inputs<'_> {
             cloud,
             own,
             statistics,
+            media,
             planned,
             materials,
             objects,
@@ -252,7 +286,6 @@ impl Inputs<'_> {
             images,
             lights,
             slice_thickness: scaled_thickness(scene, exponent),
-            normals: scene.objects.iter().any(|o| o.visible && context::needs_gradients(o, scene)),
             exponent,
             splats,
             convertible,

@@ -6,23 +6,71 @@
 pub use crate::form::{Form, PlannedObject};
 use crate::load::Loaded;
 use crate::pass;
-use crate::scene::{LightPoint, Technique};
+use crate::scene::{LightPoint, SwitchedEffect, Technique};
 use crate::shadows::ShadowTable;
 use splat_core::Object;
+
+/// How much an effect may change a displayed pixel, 0 to 1, if it is left out.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Bound {
+    /// By nothing.
+    Nothing,
+    /// By no more than this.
+    AtMost(f64),
+    /// No bound is known.
+    Unknown,
+}
+
+impl Bound {
+    /// No more than a change, which may be larger than 1; by nothing where that is 0.
+    pub fn at_most(change: f64) -> Self {
+        if change == 0.0 { Self::Nothing } else { Self::AtMost(change.min(1.0)) }
+    }
+
+    /// As a number; `None` where none is known.
+    pub const fn number(self) -> Option<f64> {
+        match self {
+            Self::Nothing => Some(0.0),
+            Self::AtMost(change) => Some(change),
+            Self::Unknown => None,
+        }
+    }
+}
 
 /// One effect of the scene: simulated or not, and why.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Effect {
     /// What it is, such as `shadow.sun`.
     pub name: String,
+    /// What effects of its kind are, in a few words.
+    pub what: &'static str,
     /// Whether it is simulated, or would be if a technique of the scene had it.
     pub called_for: bool,
     /// Why or why not.
     pub reason: String,
-    /// Largest change of a displayed pixel (0 to 1) if it is left out.
-    pub bound: f64,
+    /// Largest change of a displayed pixel if it is left out.
+    pub bound: Bound,
     /// Whether it is called for and no technique of the scene has it, so that the picture lacks it.
     pub is_lacking: bool,
+    /// Whether nothing in the scene causes an effect of its kind.
+    pub is_absent: bool,
+}
+
+/// What a technique is known to err by where it draws an object: an estimate, not a bound.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Estimate {
+    /// The technique.
+    pub technique: Technique,
+    /// What it errs in, such as `scatter`.
+    pub what: &'static str,
+    /// Name of the object.
+    pub of_object: String,
+    /// Whether an effect is left out, rather than shown inexactly.
+    pub is_left_out: bool,
+    /// Change of a displayed pixel (0 to 1) that this makes, about; infinite where it is not known.
+    pub displayed_error: f64,
+    /// Why, in words.
+    pub words: String,
 }
 
 /// One pass that will run.
@@ -43,6 +91,10 @@ pub struct Plan {
     pub techniques: Vec<Technique>,
     /// All effects that were considered.
     pub effects: Vec<Effect>,
+    /// What the techniques that draw err by, and those that `auto` may take in their place, by object.
+    pub estimates: Vec<Estimate>,
+    /// Effects of objects that are left out by their bounds: the picture is that of a scene without their causes.
+    pub left_out: Vec<SwitchedEffect>,
     /// Passes in the order of running.
     pub passes: Vec<PlannedPass>,
     /// Planes of optical depth, or depth buffers of particles: 1 when all materials absorb red, green and blue alike, else 3.

@@ -193,17 +193,17 @@ fn one_range(frame: &Frame<'_>, seen: &Seen, whole: impl FnOnce() -> Seen) -> Op
     (seen.ranges > 1.0).then(|| Change { key: "render.depth_ranges = 1".to_owned(), passes: of_frame(frame, &whole()) })
 }
 
-/// All translucent objects by the first technique of the table, as splats; `None` where it draws them already, or shows less of them.
+/// All translucent objects by the first technique of the table, as splats; `None` where it draws them already, shows less of them, or the plan has chosen.
 fn preferred(frame: &Frame<'_>, seen: &Seen) -> Option<Change> {
     let loaded = frame.loaded;
     let scene = frame.scene;
     let plan = frame.plan;
     let first = &TABLE[0];
     let visible = || scene.objects.iter().zip(0..).filter(|(object, _)| object.visible);
-    let shows = |object: &SceneObject| (first.is_offered)(&scene.materials[object.material].material);
+    let shows = |object: &SceneObject| !scene.materials[object.material].material.bounds_matter();
     let is_other = |by: &BySeen| by.technique != first.technique;
-    let is_named = scene.render.technique != Technique::Auto
-        && visible().all(|(object, _)| technique_of(object, scene) == scene.render.technique);
+    let is_named =
+        !scene.render.is_chosen && visible().all(|(object, _)| technique_of(object, scene) == scene.render.technique);
     if !is_named || !seen.translucent.iter().any(is_other) || !visible().all(|(object, _)| shows(object)) {
         return None;
     }

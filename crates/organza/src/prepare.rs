@@ -1,5 +1,6 @@
 //! From a scene to what drawing reads: read, choose, convert, plan.
 
+mod facts;
 mod seen;
 
 use crate::brightness;
@@ -15,18 +16,22 @@ use crate::matter::Matter;
 use crate::media;
 use crate::memory::{self, Memory};
 use crate::pass;
-use crate::plan::Plan;
+use crate::plan::{Effect, Plan};
 use crate::predict::prediction;
 use crate::ranges::ranges;
-use crate::scene::{FoundCamera, Scene, SceneLight, SceneObject, Source, Technique, light_points};
+use crate::scene::{
+    EffectKind, FoundCamera, Scene, SceneLight, SceneObject, Source, SwitchedEffect, Technique, light_points,
+};
+use crate::settle;
 use crate::shadows::{Probe, Shadowing};
 use crate::statistics::{ObjectData, ObjectStatistics, Statistics};
 use crate::technique::{Fold, Row};
 use crate::{CostRecord, Error, Progress, RenderOptions, SplatCount, doubts, shadows};
 use convert::DiscSize;
-pub use seen::{fitted, seen};
+pub use seen::{fitted, seen, settled};
 use splat_core::shade::Census;
-use splat_core::{Camera, Exceeded, Material, SplatKind};
+use splat_core::{Exceeded, Material, SplatKind};
+use std::borrow::Cow;
 
 /// What a render would do, without doing it.
 #[derive(Debug, Clone, PartialEq)]
@@ -68,14 +73,15 @@ pub fn explain_from(
     progress: &Progress,
     files: &Files,
 ) -> Result<Explanation, Error> {
-    let (scene, found) = fitted(scene, options, progress, files)?;
-    let (loaded, planned, mut explanation) = prepare(&scene, options, progress, files, None)?;
+    let (scene, found) = settled(scene, options, progress, files)?;
+    let Prepared { scene, loaded, planned, mut explanation } = prepare(&scene, options, progress, files, None)?;
     let frame = Frame::new(&scene, &loaded, &planned.plan, progress);
     let mut folds: Vec<Box<dyn Fold + '_>> =
         planned.plan.techniques.iter().map(|technique| (row(*technique).begin)(&frame)).collect();
     folds.iter_mut().try_for_each(|fold| fold.check(options, &mut explanation.cost))?;
     explanation.predicted = prediction(&frame, &folds, &ranges(&frame), options);
     explanation.found = found;
+    explanation.warnings.extend(settle::said(&scene, &explanation.plan.estimates).warnings);
     explanation.warnings.extend(doubts::of_shadows(&explanation.plan.shadow_limits()));
     explanation.warnings.extend(doubts::of_costly(explanation.plan.tables()));
     explanation.warnings.extend(doubts::of_scattering(&explanation.plan));
@@ -88,55 +94,113 @@ pub(crate) struct Planned {
     pub(crate) plan: Plan,
     pub(crate) memory: Memory,
     statistics: Statistics,
-    /// What it was planned for.
-    camera: Camera,
+}
+
+/// What drawing reads.
+pub(crate) struct Prepared<'a> {
+    /// The scene, without the causes of effects of objects that are left out.
+    pub(crate) scene: Cow<'a, Scene>,
+    pub(crate) loaded: Loaded,
+    pub(crate) planned: Planned,
+    pub(crate) explanation: Explanation,
 }
 
 /// Loads and plans; `made` is what was loaded and planned of another scene that [`turned`] says serves this one.
-pub(crate) fn prepare(
-    scene: &Scene,
+pub(crate) fn prepare<'a>(
+    scene: &'a Scene,
     options: &RenderOptions,
     progress: &Progress,
     files: &Files,
     made: Option<(Loaded, Planned)>,
-) -> Result<(Loaded, Planned, Explanation), Error> {
+) -> Result<Prepared<'a>, Error> {
     let mut cost = CostRecord::default();
     memory::check("the image", memory::image_bytes(scene), options.max_memory)?;
     check_samples(scene)?;
-    let (loaded, planned) = match made {
+    let (mut loaded, planned) = match made {
         Some((mut loaded, planned)) => {
             loaded.retarget(scene);
             (loaded, Some(planned))
         }
         None => (load_measured(scene, options, progress, files, &mut cost)?, None),
     };
-    let planned = plan_counted(scene, &loaded, options, planned)?;
-    let (plan, memory) = (planned.plan.clone(), planned.memory);
     let splats = loaded.splats.clone();
-    let mut notes = loaded.notes.clone();
-    notes.extend(doubts::clear_shadows(scene, &loaded));
-    notes.extend(doubts::lacking(&plan));
+    let notes_of_scene: Vec<String> = doubts::clear_shadows(scene, &loaded).collect();
     let mut warnings = loaded.warnings.clone();
     warnings.extend(doubts::of_scene(scene, &loaded));
     warnings.extend(unshown(scene));
     warnings.extend(carried::unshadowed(scene, &loaded));
     // Of fields of a file the file alone knows what it holds.
     let inputs = cost.stages.iter().filter(|s| s.name == pass::READ).map(|s| s.bytes).sum::<u64>().max(files.bytes());
-    let most = memory.total().max(memory::loading_bytes(&loaded, inputs)).max(files.most.get()).max(files.peak());
-    Ok((
-        loaded,
-        planned,
-        Explanation {
-            plan,
-            cost,
-            memory: most,
-            predicted: Prediction::default(),
-            splats,
-            warnings,
-            notes,
-            found: None,
-        },
-    ))
+    let loading = memory::loading_bytes(&loaded, inputs);
+    // Shadows are judged by what a view shows, in an animation by all that there is.
+    let planned = planned.filter(|_| scene.frames.is_some());
+    let mut scene = Cow::Borrowed(scene);
+    let mut gathering = 0;
+    let planned = match planned {
+        Some(planned) => plan_counted(&scene, &loaded, options, Effects::of(&planned), Some(planned.plan))?,
+        None => {
+            let both = loaded.cloud.bytes().saturating_mul(2);
+            let mut effects = plan_effects(&scene, &loaded, &[], 0.0, both <= options.max_memory)?;
+            let mut left_out: Vec<Effect> = Vec::new();
+            let mut switched: Vec<SwitchedEffect> = Vec::new();
+            while !effects.plan.left_out.is_empty() {
+                let is_of_object = |effect: &Effect| is_among(&effects.plan.left_out, effect);
+                left_out.extend(effects.plan.effects.iter().filter(|effect| is_of_object(effect)).cloned());
+                let reduced = without(&scene, &effects.plan.left_out);
+                switched.append(&mut effects.plan.left_out);
+                gathering = gathering.max(if loaded.reduce(&scene, &reduced) { both } else { 0 });
+                scene = Cow::Owned(reduced);
+                let spent = left_out.iter().filter_map(|effect| effect.bound.number()).sum();
+                effects = plan_effects(&scene, &loaded, &left_out, spent, both <= options.max_memory)?;
+            }
+            effects.plan.left_out = switched;
+            plan_counted(&scene, &loaded, options, effects, None)?
+        }
+    };
+    let (plan, memory) = (planned.plan.clone(), planned.memory);
+    let mut notes = loaded.notes.clone();
+    notes.extend(notes_of_scene);
+    let said = settle::said(&scene, &plan.estimates);
+    // Of a technique that the plan chose a warning tells what it lacks.
+    if said.warnings.is_empty() {
+        notes.extend(doubts::lacking(&plan));
+    }
+    notes.extend(said.notes);
+    let most = memory.total().max(loading).max(files.most.get()).max(files.peak()).max(gathering);
+    let explanation = Explanation {
+        plan,
+        cost,
+        memory: most,
+        predicted: Prediction::default(),
+        splats,
+        warnings,
+        notes,
+        found: None,
+    };
+    Ok(Prepared { scene, loaded, planned, explanation })
+}
+
+/// Whether an effect is one of those that are switched.
+fn is_among(switched: &[SwitchedEffect], effect: &Effect) -> bool {
+    switched.iter().any(|switched| switched.kind.name(&switched.label) == effect.name)
+}
+
+/// A scene without the causes of effects of objects. What a bound says of an effect it says of the technique that draws the object: that stays.
+fn without(stated: &Scene, left_out: &[SwitchedEffect]) -> Scene {
+    let mut scene = stated.clone();
+    for effect in left_out {
+        let Some(rank) = scene.objects.iter().position(|object| object.name == effect.label) else { continue };
+        let object = &mut scene.objects[rank];
+        object.technique = Some(technique_of(&stated.objects[rank], stated));
+        match effect.kind {
+            EffectKind::Object => object.visible = false,
+            kind => {
+                let material = &mut scene.materials[object.material].material;
+                *material = kind.taken_from(material);
+            }
+        }
+    }
+    scene
 }
 
 /// Whether what is loaded of one scene serves the other, after [`Loaded::retarget`]: whether they differ in the size of the
@@ -145,6 +209,9 @@ pub fn same_splats(a: &Scene, b: &Scene) -> bool {
     let mut other = b.clone();
     other.camera.size = a.camera.size;
     other.render = a.render.clone();
+    if !settle::is_settled(a) || !settle::is_settled(b) {
+        return false;
+    }
     let are_alike = |technique: Technique| (row(technique).makes_alike)(&a.render, &b.render);
     // Layers decide whether volumes get normals, the most points whether a scene is refused.
     *a == other
@@ -169,17 +236,21 @@ pub(crate) fn turned(a: &Scene, b: &Scene) -> bool {
 }
 
 /// Plans the render of a loaded scene. `scene` may differ from the one that was loaded in its render settings; whether the same
-/// splats serve them is for the caller to know.
+/// splats serve them is for the caller to know. Techniques and camera are those that [`settled`] has found.
 ///
 /// # Errors
-/// [`Error::Input`] where the technique cannot draw the scene; [`Error::Limit`] where it needs more than `options` allow.
+/// [`Error::Usage`] for a scene with an object whose technique is `auto`; [`Error::Input`] where the technique cannot draw the scene; [`Error::Limit`] where it needs more than `options` allow.
 pub fn plan_loaded(scene: &Scene, loaded: &Loaded, options: &RenderOptions) -> Result<Plan, Error> {
-    plan_counted(scene, loaded, options, None).map(|planned| planned.plan)
+    if !settle::is_settled(scene) {
+        return Err(Error::usage("the technique of an object is still to be chosen", "plan what `settled` returns"));
+    }
+    plan_alone(scene, loaded, options).map(|planned| planned.plan)
 }
 
-/// The same with what it takes and follows from.
+/// The same with what it takes and follows from. Effects of objects are kept, whatever their bounds.
 pub(crate) fn plan_alone(scene: &Scene, loaded: &Loaded, options: &RenderOptions) -> Result<Planned, Error> {
-    plan_counted(scene, loaded, options, None)
+    let effects = plan_effects(scene, loaded, &[], 0.0, false)?;
+    plan_counted(scene, loaded, options, effects, None)
 }
 
 /// Refuses 3D Gaussians, images as footprints, and splats of media that a file has beside others, where a technique leaves them out.
@@ -203,21 +274,33 @@ fn check_splats(scene: &Scene, loaded: &Loaded) -> Result<(), Error> {
     medium.map_or(Ok(()), |(_, object)| refuse(&scene.objects[*object as usize], what))
 }
 
-/// The plan of a loaded scene; `before` is that of another one that [`turned`] says serves this one.
+/// The effects of a loaded scene, and what they follow from.
+struct Effects {
+    statistics: Statistics,
+    /// The plan but for its shadow maps.
+    plan: Plan,
+    /// The objects as boxes, where the plan is of one view.
+    shadowing: Option<Shadowing>,
+}
+
+impl Effects {
+    /// Those that were planned before.
+    fn of(planned: &Planned) -> Self {
+        Self { statistics: planned.statistics.clone(), plan: planned.plan.clone(), shadowing: None }
+    }
+}
+
+/// The plan of a loaded scene with these effects; `before` is that of another one that [`turned`] says serves this one.
 fn plan_counted(
     scene: &Scene,
     loaded: &Loaded,
     options: &RenderOptions,
-    before: Option<Planned>,
+    effects: Effects,
+    before: Option<Plan>,
 ) -> Result<Planned, Error> {
     check_samples(scene)?;
-    // Shadows are judged by what a view shows, in an animation by all that there is.
-    let before = before.filter(|before| scene.frames.is_some() || before.camera == loaded.camera);
     let is_new = before.is_none();
-    let (statistics, mut plan) = match before {
-        Some(before) => (before.statistics, before.plan),
-        None => plan_effects(scene, loaded)?,
-    };
+    let Effects { statistics, mut plan, shadowing } = effects;
     let all = techniques(scene);
     let used = all.iter().filter(|t| statistics.translucent_of(**t).is_some() || row(**t).meets_discs);
     // They take turns, and each keeps what it has.
@@ -233,7 +316,10 @@ fn plan_counted(
     if is_new {
         carried::plan(scene, loaded, &points, &mut plan)?;
     }
-    let shadowing = Shadowing::new(scene, loaded, plan.leaves_view());
+    let shadowing = match shadowing.filter(|_| !plan.leaves_view()) {
+        Some(shadowing) => shadowing,
+        None => Shadowing::new(scene, loaded, plan.leaves_view()),
+    };
     let casters: Vec<_> = points.iter().map(|point| shadowing.casters(&point.light)).collect();
     let is_cast_alike = casters == plan.casters;
     plan.casters = casters;
@@ -256,11 +342,22 @@ fn plan_counted(
     }
     let memory = memory.with_maps(shadows::bytes(plan.tables()));
     memory::check("rendering", memory.total(), options.max_memory)?;
-    Ok(Planned { plan, memory, statistics, camera: loaded.camera })
+    Ok(Planned { plan, memory, statistics })
 }
 
 /// The plan of a loaded scene but for its shadow maps, and what it follows from.
-fn plan_effects(scene: &Scene, loaded: &Loaded) -> Result<(Statistics, Plan), Error> {
+/// Effects that are `left_out` of both already have spent a part of the tolerance; others of objects
+/// may be only where `objects_may_go`.
+///
+/// # Errors
+/// [`Error::Input`] where a technique cannot draw what it is to draw.
+fn plan_effects(
+    scene: &Scene,
+    loaded: &Loaded,
+    left_out: &[Effect],
+    spent: f64,
+    objects_may_go: bool,
+) -> Result<Effects, Error> {
     check_splats(scene, loaded)?;
     let planned: Vec<PlannedObject> = visible(scene)
         .zip(&loaded.planned)
@@ -272,13 +369,16 @@ fn plan_effects(scene: &Scene, loaded: &Loaded) -> Result<(Statistics, Plan), Er
     statistics.lights = light_statistics(&loaded.lights, &scene.render.effects);
     statistics.media = media::of_scene(scene, loaded);
     statistics.scatters_again = carried::of_scene(scene).is_some() && scene.render.sheets.scattering().is_some();
+    let brightness = brightness::of_scene(scene, loaded);
     // Of light that is scattered again and again no bound is known.
     if !statistics.scatters_again {
-        let radiances = brightness::of_lights(loaded);
+        let radiances = brightness.lights;
         statistics.lights.iter_mut().zip(radiances).for_each(|(light, radiance)| light.radiance = radiance);
     }
+    statistics.brightest = if statistics.scatters_again { f64::INFINITY } else { brightness.anything };
+    statistics.switched = scene.render.effects.clone();
+    statistics.spent = spent;
     statistics.exposure = scene.render.exposure;
-    statistics.normals_needed = loaded.normals;
     statistics.layers = scene.render.layers.names().map(str::to_owned).collect();
     statistics.tolerance = scene.render.tolerance;
     statistics = statistics.with_objects(&loaded.statistics, &planned, &made);
@@ -295,13 +395,22 @@ fn plan_effects(scene: &Scene, loaded: &Loaded) -> Result<(Statistics, Plan), Er
     let unequal = |m: &Material| m.extinction_rgb.iter().any(|e| *e != m.extinction_rgb[0]);
     statistics.counts.colored_extinction |= materials.into_iter().any(unequal);
     let bends = |o: &&SceneObject| (row(technique_of(o, scene)).bends)(scene).is_ok();
-    for object in visible(scene).filter(bends) {
-        statistics.add_bound(&object.name, &loaded.materials[object.material]);
-    }
     statistics.lit_as_drawn = carried::of_scene(scene).is_some();
     let is_bent = visible(scene).filter(bends).any(|o| loaded.materials[o.material].bounds_matter());
     probe_shadows(scene, loaded, is_bent, &mut statistics);
+    // Objects come into view in other frames, are carried light through, are drawn by chance, and are shown by layers whatever light they send.
+    statistics.objects_stay = !objects_may_go
+        || scene.frames.is_some()
+        || statistics.lit_as_drawn
+        || statistics.techniques.iter().any(|t| row(*t).is_random)
+        || !statistics.layers.is_empty();
+    let shadowing = Shadowing::new(scene, loaded, statistics.lit_as_drawn);
+    statistics.objects = facts::object_facts(scene, loaded, &shadowing, &brightness.objects, &statistics);
     let mut plan = plan(&statistics);
+    // Their causes are gone, which is no news.
+    let is_told = |effect: &Effect| effect.is_absent && left_out.iter().any(|old| old.what == effect.what);
+    plan.effects.retain(|effect| !is_told(effect));
+    plan.effects.splice(0..0, left_out.iter().cloned());
     plan.bends = is_bent;
     plan.by = scene.objects.iter().map(|o| technique_of(o, scene)).collect();
     plan.exact = plan.by.iter().map(|by| row(*by).meets_discs).collect();
@@ -310,7 +419,8 @@ fn plan_effects(scene: &Scene, loaded: &Loaded) -> Result<(Statistics, Plan), Er
     let draws = |by: &Technique| row(*by).draws_splats && !statistics.lit_as_drawn;
     plan.draws = plan.by.iter().zip(&plan.is_own).map(|(by, own)| draws(by) && !own).collect();
     techniques(scene).into_iter().for_each(|t| (row(t).plans)(scene, loaded, &mut plan));
-    Ok((statistics, plan))
+    plan.estimates = settle::all_estimates(scene, &loaded.media);
+    Ok(Effects { statistics, plan, shadowing: Some(shadowing) })
 }
 
 /// Finds how much each light can lose, where it may cast shadows.
@@ -338,7 +448,7 @@ fn check_samples(scene: &Scene) -> Result<(), Error> {
 /// # Errors
 /// See [`crate::render`].
 pub fn load(scene: &Scene, options: &RenderOptions, progress: &Progress, files: &Files) -> Result<Loaded, Error> {
-    let (scene, _) = fitted(scene, options, progress, files)?;
+    let (scene, _) = settled(scene, options, progress, files)?;
     load_measured(&scene, options, progress, files, &mut CostRecord::default())
 }
 

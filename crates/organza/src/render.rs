@@ -11,8 +11,9 @@ use crate::frame::{Frame, Leaves};
 use crate::load::Loaded;
 use crate::load::files::Files;
 use crate::plan::Plan;
-use crate::prepare::{Explanation, Planned, fitted, prepare, turned};
-use crate::scene::{FoundCamera, Scene};
+use crate::prepare::{Explanation, Planned, Prepared, prepare, settled, turned};
+use crate::scene::{FoundCamera, Scene, SceneObject, Technique};
+use crate::settle;
 use crate::technique::{Checkpoint, Kept, Session, Sets};
 use crate::{CostRecord, Error, Layers, Progress, RenderOptions, doubts};
 use convert::ColorScale;
@@ -69,6 +70,8 @@ pub(crate) struct Left {
     pub(crate) sets: Kept,
     groups: KeptInFrames,
     made: Option<Made>,
+    /// The technique of each object in the last frame, by rank.
+    by: Vec<Technique>,
     /// Whether no other frame comes.
     is_still: bool,
 }
@@ -122,6 +125,21 @@ fn left_to_processor(plan: &Plan) -> Option<String> {
     })
 }
 
+/// Objects that the plan draws by another technique than in the frame before: their look may change there.
+fn drawn_anew(scene: &Scene, before: &[Technique], by: &[Technique]) -> Vec<String> {
+    let changed =
+        scene.objects.iter().zip(before).zip(by).filter(|((object, before), by)| object.visible && before != by);
+    let sentence = |((object, before), by): ((&SceneObject, &Technique), &Technique)| {
+        let name = crate::shown(&object.name);
+        format!(
+            "object '{name}' is drawn by `{}` from this frame on, by `{}` before: name its technique",
+            by.name(),
+            before.name()
+        )
+    };
+    changed.filter(|((object, _), _)| object.is_chosen).map(sentence).collect()
+}
+
 /// [`render`] with what there is already.
 pub(crate) fn render_keeping(
     scene: &Scene,
@@ -129,7 +147,7 @@ pub(crate) fn render_keeping(
     progress: &Progress,
     left: &mut Left,
 ) -> Result<Render, Error> {
-    let (scene, found) = fitted(scene, options, progress, &left.files)?;
+    let (scene, found) = settled(scene, options, progress, &left.files)?;
     let scene = &*scene;
     let open = |path: &PathBuf| {
         if !matches!(techniques(scene)[..], [only] if row(only).is_random) {
@@ -144,7 +162,9 @@ pub(crate) fn render_keeping(
     // What serves no longer makes room.
     let made = left.made.take().filter(|made| turned(&made.scene, scene));
     let (made, mut leaves) = made.map_or_else(Default::default, |m| (Some((m.loaded, m.planned)), m.leaves));
-    let (loaded, planned, explanation) = prepare(scene, options, progress, &left.files, made)?;
+    let stated = scene;
+    let Prepared { scene, loaded, planned, explanation } = prepare(stated, options, progress, &left.files, made)?;
+    let scene = &*scene;
     let (plan, bytes) = (&planned.plan, planned.memory.total());
     let remembers = left.remembers(&loaded, plan, options.max_memory, bytes);
     left.fit(options.max_memory, bytes + remembers.unwrap_or(0));
@@ -152,6 +172,9 @@ pub(crate) fn render_keeping(
     // A reason that is told already is enough.
     let is_empty = loaded.cloud.is_empty() && loaded.own.is_empty();
     let doubtful = is_empty || warnings.len() > loaded.warnings.len();
+    warnings.extend(settle::said(scene, &plan.estimates).warnings);
+    warnings.extend(drawn_anew(scene, &left.by, &plan.by));
+    left.by.clone_from(&plan.by);
     let device = helper.as_ref().map(|helper| (helper, options.device_composites));
     leaves.maps = leaves.maps.filter(|maps| maps.serve(plan));
     let frame = Frame::new(scene, &loaded, plan, progress).helped_by(device).following(leaves, remembers.is_some());
@@ -177,14 +200,15 @@ pub(crate) fn render_keeping(
     warnings.extend(helper.as_ref().and_then(|_| left_to_processor(plan)));
     warnings.extend(helper.map(|helper| helper.said()).unwrap_or_default());
     let scales = loaded.scales.clone();
-    left.made = (!left.is_still).then(|| Made { scene: scene.clone(), loaded, planned, leaves });
+    // What was taken out of a scene may be in the next.
+    let is_whole = planned.plan.left_out.is_empty();
+    left.made = (!left.is_still && is_whole).then(|| Made { scene: stated.clone(), loaded, planned, leaves });
     Ok(Render { layers, cost, plan: shown, predicted, sets, warnings, notes, scales, found, backend })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::Technique;
 
     #[test]
     fn what_no_device_draws_is_told_by_name() {

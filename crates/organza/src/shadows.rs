@@ -1,6 +1,7 @@
 //! What shadow maps are built by: shared by the plan, which tells their size beforehand, and the drawing.
 
 mod casters;
+mod hiding;
 mod probe;
 
 use crate::Error;
@@ -11,6 +12,7 @@ use splat_core::{Camera, Light, LightShape, Limits, Object};
 use tsm::{Deposits, Params};
 
 pub(crate) use casters::{Shadowing, casting};
+pub(crate) use hiding::{Hiding, View, hiding};
 pub(crate) use probe::Probe;
 
 /// Share of the tolerance that the ends of lists may take, of all lights together. Absorbance grows with its logarithm only, so

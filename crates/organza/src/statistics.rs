@@ -1,9 +1,9 @@
 //! Statistics of a loaded scene, from which the plan is made.
 
 use crate::form::PlannedObject;
-use crate::scene::{LightEffect, SceneLight, SurfaceSampler, SwitchedEffect, Technique, VolumeSampler};
+use crate::scene::{EffectKind, SceneLight, SurfaceSampler, SwitchedEffect, Technique, VolumeSampler};
 use convert::cost::Prediction;
-use splat_core::Material;
+use splat_core::DAabb;
 use splat_core::shade::Census;
 
 /// What the planner knows of one light.
@@ -36,6 +36,65 @@ pub struct MediumStatistics {
     pub albedo: f64,
     /// An optical depth that no line through it exceeds.
     pub optical_depth: f64,
+}
+
+/// What is known of a medium that scatters light, before anything is converted. Lengths are in world units of the scene.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MediumFacts {
+    /// Rank of its object in the scene.
+    pub object: usize,
+    /// Share of the light that it takes which it scatters, in the channel that has most, mean over its extinction; 0 to 1.
+    pub albedo: f64,
+    /// Mean cosine of scattering, −1 to 1.
+    pub asymmetry: f64,
+    /// Greatest optical depth of the lines along its axes that were looked at.
+    pub optical_depth: f64,
+    /// Greatest optical depth of the distance between two of its splats.
+    pub spacing_optical_depth: f64,
+    /// Distance between its splats.
+    pub spacing: f64,
+    /// Splats that it becomes, about.
+    pub splats: f64,
+    /// A box around it.
+    pub bounds: DAabb,
+    /// Whether it lies on a lattice, so that slabs reconstruct it.
+    pub is_lattice: bool,
+    /// Irradiance in its middle without shadows, all lights together, in the channel that has most, W/m².
+    pub irradiance: f64,
+    /// Share of that from lights whose shadows it may receive and that lie outside of it: light that slabs can carry; 0 to 1.
+    pub outside_share: f64,
+}
+
+/// What the planner knows of the effects of one visible object, once it is loaded.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ObjectFacts {
+    /// Its name.
+    pub name: String,
+    /// The place of its material in [`Loaded::materials`](crate::Loaded::materials), where it has one alone, and no object that has several has it.
+    pub material: Option<usize>,
+    /// The kinds of effects that it is a cause of, and that its technique shows.
+    pub causes: Vec<EffectKind>,
+    /// Whether what it bounds absorbs red, green and blue unequally.
+    pub absorbs_colors: bool,
+    /// The greatest optical depth that a ray has in what it bounds, in the channel that has most.
+    pub absorption: f64,
+    /// By how much the extinction of a channel differs from the mean of all, at most, as a share of the largest.
+    pub color_spread: f64,
+    /// The most radiance that it sends of lights and ambient radiance, W·m⁻²·sr⁻¹; infinite where none is known.
+    pub radiance: f64,
+    /// Whether some of it may be in view.
+    pub is_in_view: bool,
+    /// The greatest optical depth that it has along a view ray, in the channel that has most; infinite where none is known.
+    pub view_depth: f64,
+    /// For each light: the greatest optical depth that it has on the way of the light to anything that is seen; infinite where none is known.
+    pub light_depths: Vec<f64>,
+}
+
+impl ObjectFacts {
+    /// Whether it is a cause of this kind of effects, and channels differ by it.
+    pub(crate) fn has_colored(&self, kind: EffectKind) -> bool {
+        self.causes.contains(&kind) && (kind != EffectKind::Absorption || self.absorbs_colors)
+    }
 }
 
 /// What an object is made of.
@@ -118,16 +177,16 @@ pub struct Statistics {
     pub translucent_by: Vec<(Technique, [u64; 2])>,
     /// The splats, translucent ones as far as they are drawn; and among those that cast and receive shadows whole objects that have no splats.
     pub counts: Census,
-    /// Objects whose surfaces mirror and bend light, drawn by a technique that can, by name.
-    pub bent: Vec<String>,
-    /// Whether one of them bends red, green and blue apart.
-    pub disperses: bool,
-    /// Objects that bound matter which absorbs, drawn by such a technique, by name.
-    pub absorbing: Vec<String>,
-    /// Whether that absorbs the three channels unequally.
-    pub absorbs_colors: bool,
-    /// Whether normals were computed for volumes.
-    pub normals_needed: bool,
+    /// What is known of the effects of each visible object.
+    pub objects: Vec<ObjectFacts>,
+    /// Whether the effects of objects are not left out, whatever their bounds.
+    pub objects_stay: bool,
+    /// Effects that the scene switches.
+    pub switched: Vec<SwitchedEffect>,
+    /// The most radiance that anything shows, the background among it, in the channel that has most, W·m⁻²·sr⁻¹; infinite where none is known.
+    pub brightest: f64,
+    /// The part of the tolerance that effects have which are left out of these statistics already.
+    pub spent: f64,
     /// Whether splats are lit as they are drawn, not before.
     pub lit_as_drawn: bool,
     /// Lights, whole.
@@ -169,19 +228,6 @@ impl Statistics {
         self
     }
 
-    /// Takes in an object whose surfaces bound matter, drawn by a technique that bends light.
-    pub fn add_bound(&mut self, name: &str, material: &Material) {
-        let unequal = |of: [f32; 3]| of != [of[0]; 3];
-        if material.bends_light() {
-            self.bent.push(name.to_owned());
-            self.disperses |= unequal(material.index_inside());
-        }
-        if material.absorption_inside != [0.0; 3] {
-            self.absorbing.push(name.to_owned());
-            self.absorbs_colors |= unequal(material.absorption_inside);
-        }
-    }
-
     /// Takes in an object that casts shadows without splats, of which no ray has more optical depth.
     pub fn add_caster(&mut self, optical_depth: f64) {
         self.counts.casters += 1;
@@ -217,14 +263,14 @@ impl Statistics {
 impl LightStatistics {
     /// Statistics of a light, of whose radiance and shadows nothing is known, and that some effects of a scene may switch.
     pub fn of_light(light: &SceneLight, switched: &[SwitchedEffect]) -> Self {
-        let switch = |effect| switched.iter().find(|s| s.effect == effect && s.light == light.label).map(|s| s.is_on);
+        let switch = |kind| SwitchedEffect::find(switched, kind, &light.label);
         Self {
             label: light.label.clone(),
             casts_shadows: light.shadow,
             is_dark: light.light.intensity.iter().all(|i| *i == 0.0),
             points: light.count(),
-            is_on: switch(LightEffect::Light),
-            has_shadow: switch(LightEffect::Shadow),
+            is_on: switch(EffectKind::Light),
+            has_shadow: switch(EffectKind::Shadow),
             radiance: f64::INFINITY,
             opacity: 1.0,
         }

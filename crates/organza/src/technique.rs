@@ -7,6 +7,7 @@
 //! Every technique fills the effects that shading gives; layers that one alone fills [`Technique::own_layers`] names, so that a scene
 //! is refused, at its line, where it asks another for them.
 
+mod estimates;
 pub(crate) mod particles;
 pub(crate) mod points;
 pub(crate) mod reference;
@@ -19,25 +20,38 @@ use crate::frame::Frame;
 use crate::load::Loaded;
 use crate::matter::{CarriesLight, Matter};
 use crate::pass;
-use crate::plan::Plan;
+use crate::plan::{Estimate, Plan};
 use crate::scene::{LightPoint, RenderSettings, Scene, Technique};
 use crate::stage;
-use crate::statistics::ObjectStatistics;
+use crate::statistics::{MediumFacts, ObjectStatistics};
 use crate::{CostRecord, Error, Layers, RenderOptions};
+pub(crate) use estimates::{Asked, estimates};
 pub(crate) use particles::{Checkpoint, Kept};
 use splat_core::raster::{GlassImage, OpaqueImage};
-use splat_core::{Accumulator, Material};
+use splat_core::{Accumulator, Camera};
 use std::ops::Range;
 
 /// The form in which a technique takes an object, and why.
 type FormOf = fn(&ObjectStatistics) -> (Form, &'static str);
 
 /// What a technique states.
+pub(crate) fn row(technique: Technique) -> &'static Row {
+    let known = TABLE.iter().find(|row| row.technique == technique);
+    known.expect("invariant: every technique of a settled scene has a row")
+}
+
+/// What a technique states.
 pub(crate) struct Row {
     /// As scenes name it.
     pub(crate) technique: Technique,
-    /// Whether `auto` may choose it for what is made of a material.
-    pub(crate) is_offered: fn(&Material) -> bool,
+    /// Whether `auto` may give it an object: it draws the object, and all that it is known to err by has an estimate.
+    pub(crate) is_offered: fn(&Asked<'_>) -> bool,
+    /// What it errs by where it draws an object, beside what other fields of the row tell.
+    pub(crate) estimates: fn(&Asked<'_>) -> Vec<Estimate>,
+    /// Counted work on a medium that it draws from its own data, before that is converted, with a camera whose pixels are samples.
+    pub(crate) foresees: fn(&Asked<'_>, &Camera) -> OwnWork,
+    /// Bytes that it takes at most for such media, about, beside what all techniques take.
+    pub(crate) foresees_bytes: fn(&Scene, &RenderSettings, &[MediumFacts]) -> u64,
     /// What becomes of translucent things, in words.
     pub(crate) how: &'static str,
     /// What it does where extinction differs by channel, in words; `None` where that goes without saying.
@@ -77,6 +91,9 @@ pub(crate) struct Row {
     pub(crate) carries: fn(&Scene) -> Option<CarriesLight>,
     /// How a scene asks it for light that media scatter again and again; `None` where it has none.
     pub(crate) scatters_by: Option<&'static str>,
+    /// Settings with which it scatters light again and again, if it draws alone all that is translucent; `None` where it cannot or a scene states
+    /// otherwise. `auto` takes them with the technique.
+    pub(crate) scattering_again: fn(&RenderSettings) -> Option<RenderSettings>,
     /// Adds effects and passes of its own to the plan of a scene that it draws, and takes out what it does not need.
     pub(crate) plans: fn(&Scene, &Loaded, &mut Plan),
     /// What repeats its last pass, in words; empty where nothing does.
@@ -181,6 +198,7 @@ pub(crate) static TABLE: [Row; 5] = [
     Row {
         technique: Technique::Particles,
         is_offered: |_| false,
+        estimates: |asked| estimates::of_sets(Technique::Particles, asked),
         how: "become particles",
         by_channel: Some("a particle hides each channel by chance"),
         form: Some(particles::form),
@@ -202,6 +220,9 @@ pub(crate) static TABLE: [Row; 5] = [
     Row {
         technique: Technique::Sheets,
         is_offered: |_| false,
+        estimates: |asked| estimates::of_slabs(Technique::Sheets, asked),
+        foresees: sheets::foresees,
+        foresees_bytes: sheets::foresees_bytes,
         how: "are composited in slabs, volumes classified after reconstruction",
         form: Some(sheets::form),
         makes_alike: |a, b| a.sheets.slicing == b.sheets.slicing,
@@ -214,12 +235,17 @@ pub(crate) static TABLE: [Row; 5] = [
         scatters_by: Some(
             "technique = \"sheets\" with [render.sheets] slicing = \"half_vector\" and scattering = \"forward_and_back\"",
         ),
+        scattering_again: |settings| {
+            let sheets = settings.sheets.scattering_again()?;
+            Some(RenderSettings { sheets, ..settings.clone() })
+        },
         begin: sheets::begin,
         ..POINTS
     },
     Row {
         technique: Technique::Surfels,
-        is_offered: Material::bounds_matter,
+        is_offered: |asked| !asked.object.source.is_medium() && asked.material().bounds_matter(),
+        estimates: |asked| estimates::of_one_order(Technique::Surfels, asked),
         how: "are discs, which are averaged in each layer of a surface, and layers are composited in order",
         bends: |_| Ok(()),
         bumps: surfels::bumps,
@@ -235,6 +261,7 @@ pub(crate) static TABLE: [Row; 5] = [
     Row {
         technique: Technique::Reference,
         is_offered: |_| false,
+        estimates: |asked| estimates::of_one_order(Technique::Reference, asked),
         how: "are sorted pixel by pixel, exactly, which is slow",
         by_device: false,
         steps: &[Step {
@@ -264,7 +291,10 @@ fn composited(scene: &Scene, all: &Translucent) -> Vec<Count> {
 
 const POINTS: Row = Row {
     technique: Technique::Points,
-    is_offered: |material| !material.bounds_matter(),
+    is_offered: |_| true,
+    estimates: |asked| estimates::of_one_order(Technique::Points, asked),
+    foresees: |_, _| OwnWork::default(),
+    foresees_bytes: |_, _, _| 0,
     how: "are composited in order",
     by_channel: None,
     form: None,
@@ -284,6 +314,7 @@ const POINTS: Row = Row {
     bytes: |_, _, _, _| 0,
     carries: |_| None,
     scatters_by: None,
+    scattering_again: |_| None,
     plans: |_, _, _| {},
     repeats: |_| String::new(),
     begin: points::begin,

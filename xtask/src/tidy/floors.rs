@@ -7,18 +7,19 @@ use crate::source::{code_only, line_of};
 const HOUSE: &str = "crates/organza/src/";
 
 /// The modules of each floor, from the ground up.
-const FLOORS: [&[&str]; 16] = [
+const FLOORS: [&[&str]; 17] = [
     &["error", "form", "pass", "stage"],
     &["statistics"],
     &["cost"],
     &["options"],
     &["load"],
-    &["brightness", "matter", "media", "memory", "shadows"],
+    &["brightness"],
+    &["matter", "media", "memory", "shadows"],
     &["plan"],
     &["frame"],
     &["technique"],
     &["choose"],
-    &["carried", "doubts", "ranges"],
+    &["carried", "doubts", "ranges", "settle"],
     &["predict"],
     &["draw", "prepare"],
     &["render"],

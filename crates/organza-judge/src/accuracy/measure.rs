@@ -282,6 +282,7 @@ mod tests {
             medium_ball = { center = [0, 0, 0], radius = 1, extinction = 2, spacing = 0.1 }
         "#;
         let scene = organza::scene::parse("s.toml".as_ref(), text, &Default::default()).unwrap();
+        let scene = scene.drawn_by(organza::scene::Technique::Points);
         let (options, progress) = (RenderOptions::default(), Progress::new());
         let mut renderer = Renderer::new(&options, &progress);
         let mut draw = |packed| renderer.draw(&Request { scene: scene.clone(), oversample: 1, packed }).unwrap().image;

@@ -17,8 +17,7 @@ pub fn particles(scene: &Scene, facts: &Facts, options: &Options) -> Result<Swee
     facts.slice_thickness.ok_or("no splat is translucent: the picture is that of `points`")?;
     let levels: &[u32] = if options.quick { &[2, 4, 8, 16] } else { &[2, 4, 8, 16, 32, 64, 128] };
     let finest = levels[levels.len() - 1];
-    let mut scene = scene.clone();
-    scene.render.technique = Technique::Particles;
+    let mut scene = scene.drawn_by(Technique::Particles);
     // The report looks at beauty alone.
     scene.render.layers = LayerChoice::default();
     let own = scene.render.particles.repeat_level;

@@ -77,9 +77,7 @@ const NO_MAP: &str = "no light gets a shadow map";
 
 /// The scene by this technique.
 pub fn in_points(scene: &Scene) -> Scene {
-    let mut scene = scene.clone();
-    scene.render.technique = Technique::Points;
-    scene
+    scene.drawn_by(Technique::Points)
 }
 
 fn slices(facts: &Facts, options: &Options) -> Result<Knob, String> {

@@ -55,9 +55,7 @@ const NO_SLABS: &str = "no volume and no splat lies in slabs: translucent triang
 
 /// The scene by this technique.
 pub fn in_sheets(scene: &Scene) -> Scene {
-    let mut scene = scene.clone();
-    scene.render.technique = Technique::Sheets;
-    scene
+    scene.drawn_by(Technique::Sheets)
 }
 
 fn slabs(own: f64, options: &Options) -> Knob {

@@ -44,8 +44,7 @@ pub fn surfels(scene: &Scene, facts: &Facts, options: &Options) -> Sweep {
 
 /// The scene's surfaces by this technique, and its media by points.
 pub fn in_surfels(scene: &Scene) -> Scene {
-    let mut scene = scene.clone();
-    scene.render.technique = Technique::Surfels;
+    let mut scene = scene.drawn_by(Technique::Surfels);
     for object in scene.objects.iter_mut().filter(|o| o.source.is_medium()) {
         object.technique.get_or_insert(Technique::Points);
     }

@@ -1,178 +1,153 @@
-//! The effects that a scene calls for, each with its reason and the bound of what it could change, and the passes that simulate them.
+//! The effects that a scene calls for, each with its reason and the bound of what it could change: a file for each kind, and this table of them.
 
-mod lights;
-mod scattering;
+mod absorption;
+mod bending;
+mod candidates;
+mod color;
+mod dispersion;
+mod gain;
+mod gradients;
+mod layers;
+mod light;
+mod object;
+mod opaque;
+mod scatter;
+mod shadow;
+mod translucency;
 
-use super::row;
-use crate::form::Form;
-use crate::pass;
-use crate::plan::{Effect, Plan, PlannedPass};
-use crate::scene::Technique;
+use super::passes::passes;
+use super::row as row_of_technique;
+use crate::plan::{Bound, Effect, Plan};
+use crate::scene::{EffectKind, SwitchedEffect};
 use crate::shadows::CUT_SHARE;
-use crate::shown;
-use crate::statistics::Statistics;
-use crate::technique::Row;
-pub(crate) use scattering::SCATTER;
+use crate::statistics::{ObjectFacts, Statistics};
+use candidates::{Candidate, Choice, spend};
+
+/// A kind of effects.
+pub(crate) struct Row {
+    pub(crate) kind: EffectKind,
+    /// What it is, in a few words.
+    pub(crate) what: &'static str,
+    /// What a picture without it shows instead.
+    pub(crate) without: &'static str,
+    /// The effects of this kind: whether a scene calls for each of them, or lets the bound decide. Asked of the plan so far.
+    candidates: fn(&Statistics, &Plan) -> Vec<Candidate>,
+    /// Takes the decisions into the plan, one for each candidate.
+    take: fn(&mut Plan, &[Candidate], &[bool]),
+}
+
+/// Every kind, in the order in which the tolerance is spent: what costs most goes first, and what hangs on another effect comes after it.
+pub(crate) static TABLE: [&Row; 12] = [
+    &object::ROW,
+    &light::ROW,
+    &shadow::ROW,
+    &scatter::ROW,
+    &bending::ROW,
+    &dispersion::ROW,
+    &absorption::ROW,
+    &color::ROW,
+    &gradients::ROW,
+    &translucency::ROW,
+    &opaque::ROW,
+    &layers::ROW,
+];
 
 /// Chooses effects and passes.
 pub(crate) fn plan(statistics: &Statistics) -> Plan {
-    let rows: Vec<&Row> = statistics.techniques.iter().map(|t| row(*t)).collect();
-    let names: Vec<&str> = rows.iter().map(|row| row.technique.name()).collect();
+    let names: Vec<&str> = statistics.techniques.iter().map(|technique| technique.name()).collect();
     let mut plan =
         Plan { technique: names.join(" and "), techniques: statistics.techniques.clone(), ..Plan::default() };
     // What ends lists of shadow maps takes the rest.
-    let allowance = statistics.tolerance * (1.0 - CUT_SHARE);
-    let lights = lights::plan(statistics, allowance);
-    plan.effects = lights.effects;
-    plan.lights = lights.shine;
-    plan.shadow_maps = lights.shadow_maps;
-    plan.effects.push(scattering::plan(statistics, allowance - lights.spent));
-    plan.effects.push(colored_extinction(statistics));
-    plan.effects.push(bending(statistics));
-    plan.effects.push(dispersion(statistics));
-    plan.effects.push(absorption_inside(statistics));
-    plan.effects.push(normals(statistics));
-    plan.effects.push(translucency(statistics));
-    plan.effects.push(opaque_surfaces(statistics));
-    plan.effects.push(kept_layers(statistics));
+    let mut allowance = statistics.tolerance * (1.0 - CUT_SHARE) - statistics.spent;
+    for row in TABLE {
+        let candidates = (row.candidates)(statistics, &plan);
+        let spent = spend(&candidates, allowance);
+        allowance -= spent.bound;
+        (row.take)(&mut plan, &candidates, &spent.is_on);
+        let told = candidates.iter().zip(&spent.is_on).map(|(candidate, is_on)| candidate.told(row, *is_on));
+        plan.effects.extend(told);
+    }
     plan.objects = statistics.planned.clone();
-    let by_channel = statistics.counts.colored_extinction || statistics.disperses || statistics.absorbs_colors;
+    let of_objects = |kind: EffectKind| statistics.objects.iter().any(|object| object.has_colored(kind));
+    let by_channel = statistics.counts.colored_extinction
+        || of_objects(EffectKind::Dispersion)
+        || of_objects(EffectKind::Absorption);
     plan.optical_depth_planes = if by_channel { 3 } else { 1 };
     plan.passes = passes(statistics, &plan.shadow_maps);
     plan
 }
 
-fn effect(name: impl Into<String>, called_for: bool, reason: impl Into<String>) -> Effect {
-    Effect { name: name.into(), called_for, reason: reason.into(), bound: 0.0, is_lacking: false }
+/// The most that this radiance can add to a displayed pixel, 0 to 1.
+pub(crate) fn displayed(radiance: f64, statistics: &Statistics) -> f64 {
+    gain::displayed(radiance, gain::gain(statistics))
 }
 
-fn colored_extinction(statistics: &Statistics) -> Effect {
-    const UNEQUAL: &str = "some material absorbs red, green and blue unequally";
-    if statistics.counts.colored_extinction {
-        let how: Vec<&str> = statistics.techniques.iter().filter_map(|t| row(*t).by_channel).collect();
-        let how = how.iter().map(|how| format!(": {how}")).collect::<String>();
-        effect("transmittance per channel", true, format!("{UNEQUAL}{how}"))
-    } else {
-        effect("transmittance per channel", false, "what all objects consist of absorbs red, green and blue alike")
-    }
+/// Takes effects of objects into a plan: those that are left out by their bound.
+fn leave_out(kind: EffectKind, plan: &mut Plan, candidates: &[Candidate], is_on: &[bool]) {
+    let decided = candidates.iter().zip(is_on);
+    let left_out = decided.filter(|(candidate, is_on)| matches!(candidate.choice, Choice::Open { .. }) && !**is_on);
+    plan.left_out.extend(left_out.map(|(candidate, _)| SwitchedEffect {
+        kind,
+        label: candidate.label.clone(),
+        is_on: false,
+    }));
 }
 
-fn bending(statistics: &Statistics) -> Effect {
-    let name = "reflection and refraction";
-    match statistics.bent.as_slice() {
-        [] => effect(name, false, "no surface that bends light is drawn by a technique that can"),
-        of => effect(name, true, format!("surfaces of {} bound matter with an index", named(of))),
-    }
+/// The effects of a kind that hang on objects: one for each object that has a cause, and one for each that the scene has no cause in only because it
+/// switches the effect off. `of_object` is asked for what the bound decides of an object whose effect is not switched.
+fn object_candidates(
+    row: &Row,
+    statistics: &Statistics,
+    absent: &str,
+    of_object: impl Fn(&ObjectFacts) -> Open,
+) -> Vec<Candidate> {
+    let switched_off = statistics.switched.iter().filter(|effect| effect.kind == row.kind && !effect.is_on);
+    let off = switched_off.map(|effect| Candidate::switched(&effect.label, false, row.without, Bound::Unknown));
+    let causes = statistics.objects.iter().filter(|object| object.causes.contains(&row.kind));
+    let caused = causes.map(|object| {
+        let Open { bound, on, off } = of_object(object);
+        let is_switched = SwitchedEffect::find(&statistics.switched, row.kind, &object.name).is_some();
+        // What else has the material would change with it.
+        let has_it_beside =
+            |other: &ObjectFacts| other.material == object.material && !other.causes.contains(&row.kind);
+        let is_tied = object.material.is_none() || statistics.objects.iter().any(has_it_beside);
+        let bound =
+            if statistics.objects_stay || row.kind != EffectKind::Object && is_tied { Bound::Unknown } else { bound };
+        let one = if is_switched {
+            Candidate::switched(&object.name, true, row.without, bound)
+        } else {
+            Candidate::new(&object.name, Choice::Open { bound, on, off })
+        };
+        // What a material says goes for all objects that have it.
+        Candidate { group: object.material.filter(|_| row.kind != EffectKind::Object), ..one }
+    });
+    let candidates: Vec<Candidate> = caused.chain(off).collect();
+    if candidates.is_empty() { vec![Candidate::absent(absent)] } else { candidates }
 }
 
-fn dispersion(statistics: &Statistics) -> Effect {
-    if statistics.disperses {
-        effect("dispersion", true, "an index differs by channel: each has a ray of its own")
-    } else {
-        effect("dispersion", false, "no index differs by channel")
-    }
+/// What the bound of an effect of an object decides.
+struct Open {
+    bound: Bound,
+    /// Why it is called for, if it is.
+    on: String,
+    /// Why it is left out, if it is.
+    off: String,
 }
 
-fn absorption_inside(statistics: &Statistics) -> Effect {
-    match statistics.absorbing.as_slice() {
-        [] => effect("absorption inside", false, "no surface bounds matter that absorbs"),
-        of => effect("absorption inside", true, format!("surfaces of {} bound matter that absorbs", named(of))),
-    }
-}
+/// Of an effect whose decisions the plan has no more of than that it is told.
+fn take_nothing(_: &mut Plan, _: &[Candidate], _: &[bool]) {}
 
-/// Names of objects, as they are shown.
-fn named(names: &[String]) -> String {
-    names.iter().map(|name| format!("'{}'", shown(name))).collect::<Vec<_>>().join(", ")
-}
-
-fn normals(statistics: &Statistics) -> Effect {
-    if statistics.normals_needed {
-        effect("normals of volumes", true, "a light shades a volume by its gradient, or the layer was asked for")
-    } else {
-        effect("normals of volumes", false, "no volume is shaded by its gradient, and none is asked for")
-    }
-}
-
-fn translucency(statistics: &Statistics) -> Effect {
-    let some = |t: &Technique| Some(format!("{} {}", statistics.translucent_of(*t)?, row(*t).how));
-    let all: Vec<String> = statistics.techniques.iter().filter_map(some).collect();
-    if all.is_empty() {
-        return effect("translucency", false, "nothing is translucent: nothing to sort");
-    }
-    effect("translucency", true, all.join("; "))
-}
-
-fn opaque_surfaces(statistics: &Statistics) -> Effect {
-    match what_is_opaque(statistics) {
-        None => effect("opaque surfaces", false, "nothing is opaque"),
-        Some(all) => effect("opaque surfaces", true, format!("{all} hide what lies behind")),
-    }
-}
-
-/// What is opaque, in words.
-fn what_is_opaque(statistics: &Statistics) -> Option<String> {
-    let meshes = statistics.planned.iter().filter(|object| object.form == Form::Polygons).count();
-    let of = |count: u64, what: &str| (count > 0).then(|| format!("{count} {what}"));
-    let kinds = [of(statistics.counts.opaque, "opaque splats"), of(meshes as u64, "opaque meshes of triangles")];
-    let all: Vec<String> = kinds.into_iter().flatten().collect();
-    (!all.is_empty()).then(|| all.join(" and "))
-}
-
-fn kept_layers(statistics: &Statistics) -> Effect {
-    if statistics.layers.is_empty() {
-        effect("extra layers", false, "no layer beside beauty and alpha was asked for")
-    } else {
-        effect("extra layers", true, format!("asked for: {}", statistics.layers.join(", ")))
-    }
-}
-
-fn passes(statistics: &Statistics, shadow_maps: &[bool]) -> Vec<PlannedPass> {
-    let opaque = statistics.counts.opaque;
-    let rows = || statistics.techniques.iter().map(|t| (row(*t), statistics.translucent_of(*t)));
-    let mut passes = Vec::new();
-    let mut pass = |name: &str, reason: String| passes.push(PlannedPass { name: name.into(), reason });
-    pass(pass::READ, "the objects' data".into());
-    if statistics.counts.splats > 0 || statistics.own() == 0 {
-        pass(pass::CONVERT, format!("{} splats", statistics.counts.splats));
-    }
-    for (row, what) in rows() {
-        row.prepares.into_iter().for_each(|name| what.iter().for_each(|what| pass(name, what.clone())));
-    }
-    for (light, _) in statistics.lights.iter().zip(shadow_maps).filter(|(_, has_map)| **has_map) {
-        (0..light.points).for_each(|_| pass(pass::SHADOW_MAP, format!("light {}", light.label)));
-    }
-    for (row, what) in rows() {
-        let before = row.steps.split_last().map_or(&[][..], |(_, before)| before);
-        before.iter().for_each(|step| what.iter().for_each(|what| pass(step.pass, what.clone())));
-    }
-    let as_they_are = |draws: &bool| {
-        let shaded = |t: &Technique| row(*t).draws_splats && !statistics.lit_as_drawn;
-        let of = |t: &Technique| shaded(t) == *draws && (!draws || statistics.may_have_splats(*t));
-        statistics.techniques.iter().any(of)
-    };
-    // What is not drawn as splats is projected and shaded in the pass of its technique.
-    let which = match [true, false].map(|draws| as_they_are(&draws)) {
-        [true, true] => "drawn",
-        [true, false] => "all",
-        _ => "opaque",
-    };
-    if which != "opaque" || opaque > 0 {
-        pass(pass::PROJECT, format!("{which} splats"));
-        pass(pass::SHADE, format!("{which} splats in view"));
-    }
-    if let Some(all) = what_is_opaque(statistics).filter(|_| opaque > 0 || !statistics.lit_as_drawn) {
-        pass(pass::OPAQUE, all);
-    }
-    for (row, what) in rows() {
-        row.steps.last().into_iter().for_each(|step| what.iter().for_each(|what| pass(step.pass, what.clone())));
-    }
-    pass(pass::FINISH, "samples become pixels".into());
-    passes
+/// Adds an effect of a technique's own to a plan, which no bound leaves out.
+pub(crate) fn technique_effect(name: String, what: &'static str, is_called_for: bool, reason: String) -> Effect {
+    let bound = if is_called_for { Bound::Unknown } else { Bound::Nothing };
+    Effect { name, what, called_for: is_called_for, reason, bound, is_lacking: false, is_absent: false }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::pass;
+    use crate::scene::Technique;
     use crate::statistics::LightStatistics;
     use splat_core::shade::Census;
 
@@ -196,7 +171,6 @@ mod tests {
             },
             lights: vec![light],
             tolerance: 1.0 / 255.0,
-            normals_needed: true,
             techniques: vec![Technique::Points],
             translucent_by: vec![(Technique::Points, [10, 0]), (Technique::Particles, [10, 0])],
             ..Statistics::default()
@@ -227,11 +201,13 @@ mod tests {
     fn every_point_of_a_light_gets_a_map() {
         let mut s = scene();
         let light = LightStatistics { points: 3, ..s.lights[0].clone() };
-        s.lights = vec![light.clone(), LightStatistics { casts_shadows: false, ..light }];
+        let dull = LightStatistics { label: "1".into(), casts_shadows: false, ..light.clone() };
+        s.lights = vec![light, dull];
         let plan = plan(&s);
         assert_eq!(plan.shadow_maps, [true, false]);
         assert_eq!(plan.passes.iter().filter(|p| p.name == pass::SHADOW_MAP).count(), 3);
-        assert!(plan.effects[1].reason.ends_with("receive it, from 3 points"), "{}", plan.effects[1].reason);
+        let shadow = plan.effects.iter().find(|effect| effect.name == "shadow.0").unwrap();
+        assert!(shadow.reason.contains("receive it, from 3 points"), "{}", shadow.reason);
     }
 
     #[test]
@@ -243,7 +219,7 @@ mod tests {
             let mut s = s.clone();
             s.lights = radiances.map(|radiance| LightStatistics { radiance, ..s.lights[0].clone() }).to_vec();
             let plan = plan(&s);
-            let skipped: f64 = plan.effects.iter().filter(|e| !e.called_for).map(|e| e.bound).sum();
+            let skipped: f64 = plan.effects.iter().filter(|e| !e.called_for).filter_map(|e| e.bound.number()).sum();
             assert!(skipped <= s.tolerance);
             plan.shadow_maps
         };
@@ -268,5 +244,25 @@ mod tests {
         s.techniques = vec![Technique::Particles];
         let only = plan(&s);
         assert!(has(&only, pass::PARTICLES) && ![pass::SORT, pass::PROJECT, pass::SPLAT].iter().any(|p| has(&only, p)));
+    }
+
+    /// The text of a file of the repository.
+    fn text_of(path: &str) -> String {
+        std::fs::read_to_string(std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").join(path)).unwrap()
+    }
+
+    #[test]
+    fn every_kind_of_effects_has_words_a_page_and_a_proof() {
+        let page = text_of("docs/scene.md");
+        let proofs = text_of("tests/tests/light_effects.rs") + &text_of("tests/tests/effects.rs");
+        assert!(EffectKind::ALL.iter().all(|kind| TABLE.iter().filter(|row| row.kind == *kind).count() == 1));
+        for row in TABLE {
+            let word = row.kind.word();
+            assert!(!row.what.is_empty() && !row.without.is_empty(), "{word} has no words");
+            let name = row.kind.name("NAME");
+            assert!(page.contains(&format!("| `{name}` |")), "docs/scene.md does not list `{name}`");
+            let is_switched = row.kind.fixed_because().is_none();
+            assert!(!is_switched || proofs.contains(&format!("fn x7_effect_{word}_")), "{word} has no proof");
+        }
     }
 }

@@ -1,7 +1,7 @@
 //! What reading and converting an object need to know of the scene around it.
 
 use super::files::{FileData, Files};
-use crate::scene::{Scene, SceneObject, Source};
+use crate::scene::{Scene, SceneObject};
 use crate::{Error, RenderOptions};
 use convert::read::ReadParams;
 use convert::{Orientation, SplatParams, SurfelParams, VolumeParams};
@@ -35,9 +35,8 @@ pub(super) struct Context<'a> {
 
 /// Whether the gradients of the object's volume could change the picture: lit by Phong, or in a layer of normals.
 pub(super) fn needs_gradients(object: &SceneObject, scene: &Scene) -> bool {
-    let is_volume = matches!(object.source, Source::Volume(_) | Source::Density(_) | Source::Cloud(_));
     let lit = !scene.lights.is_empty() && scene.materials[object.material].material.shading == Shading::Phong;
-    is_volume && (lit || scene.render.layers.set().normal)
+    object.source.has_gradients() && (lit || scene.render.layers.set().normal)
 }
 
 impl Context<'_> {

@@ -15,6 +15,8 @@ use std::sync::Arc;
 pub(crate) struct Images {
     /// What is seen behind everything in the place of a colour.
     pub(crate) environment: Option<Environment>,
+    /// The most radiance that this shows, in the channel that has most; 0 without it.
+    pub(crate) brightest_environment: f64,
     /// What each light shines through.
     pub(crate) slides: Vec<Option<Slide>>,
     /// The heights of each material's bumps, where an image has them.
@@ -36,7 +38,8 @@ impl Loading<'_> {
     /// All of them; slides for these lights.
     pub(super) fn images(&self, lights: &[SceneLight]) -> Result<Images, Error> {
         let mut held = Vec::new();
-        let environment = self.environment(&mut held)?;
+        let mut brightest_environment = 0.0;
+        let environment = self.environment(&mut brightest_environment, &mut held)?;
         let slides = lights.iter().map(|light| self.slide(light, &mut held)).collect::<Result<_, _>>()?;
         let mut height = |path: &PathBuf| {
             let image = self.image(path, "as heights of bumps", true, HeightImage::bytes_of, &mut held)?;
@@ -44,13 +47,16 @@ impl Loading<'_> {
         };
         let materials = self.scene.materials.iter().map(|material| material.bump_image.as_ref());
         let heights = materials.map(|path| path.map(&mut height).transpose()).collect::<Result<_, _>>()?;
-        Ok(Images { environment, slides, heights, _held: held })
+        Ok(Images { environment, brightest_environment, slides, heights, _held: held })
     }
 
-    fn environment(&self, held: &mut Vec<Reservation>) -> Result<Option<Environment>, Error> {
+    /// The environment; `brightest` becomes its most radiance.
+    fn environment(&self, brightest: &mut f64, held: &mut Vec<Reservation>) -> Result<Option<Environment>, Error> {
         let Some(source) = &self.scene.environment else { return Ok(None) };
         let image = self.image(&source.path, "as an environment", false, Environment::bytes_of, held)?;
         let made = Environment::new(&image, source.turns, source.scale);
+        // What is seen is a mean of texels.
+        *brightest = f64::from(image.pixels.as_flattened().iter().copied().fold(0.0, f32::max)) * source.scale;
         made.map(Some).map_err(|e| refuse(&source.path, &e, "use a smaller background.scale"))
     }
 

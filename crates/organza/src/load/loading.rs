@@ -22,17 +22,17 @@ pub(super) struct Loading<'a> {
 }
 
 impl<'a> Loading<'a> {
-    fn visible(&self) -> impl Iterator<Item = (usize, &'a SceneObject)> + use<'a> {
+    pub(super) fn visible(&self) -> impl Iterator<Item = (usize, &'a SceneObject)> + use<'a> {
         self.scene.objects.iter().enumerate().filter(|(_, object)| object.visible)
     }
 
-    fn context(&self, id: usize, used: u64, made: u64) -> Context<'a> {
+    pub(super) fn context(&self, id: usize, used: u64, made: u64) -> Context<'a> {
         let Self { scene, options, progress, files } = *self;
         Context { scene, options, files, progress, id, used, made }
     }
 
     /// An error of an object with the file that its data is from.
-    fn named(&self, object: &SceneObject, error: Error) -> Error {
+    pub(super) fn named(&self, object: &SceneObject, error: Error) -> Error {
         error.in_object(&self.scene.file, object.source.path())
     }
 

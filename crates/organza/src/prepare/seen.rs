@@ -5,6 +5,7 @@ use crate::load::files::{Files, once};
 use crate::load::placed;
 use crate::memory::loading_bytes;
 use crate::scene::{ExtractSource, FoundCamera, Scene, SceneObject, Source, Stop};
+use crate::settle;
 use crate::shadows::{shadow_error, shadow_params};
 use crate::{Error, Progress, RenderOptions, printable, shown};
 use convert::RawPoints;
@@ -40,6 +41,21 @@ pub fn fitted<'s>(
         settled.to_mut().objects[i].source = Source::Extract(ExtractSource { points: Some(points), ..source.clone() });
     }
     placed(settled, options, progress, files)
+}
+
+/// What [`fitted`] returns, with a named technique for every object, and the settings that the plan takes with them where the scene leaves them open:
+/// what is drawn.
+///
+/// # Errors
+/// As [`fitted`], and where a layer is asked for that no technique which `auto` may choose fills.
+pub fn settled<'s>(
+    scene: &'s Scene,
+    options: &RenderOptions,
+    progress: &Progress,
+    files: &Files,
+) -> Result<(Cow<'s, Scene>, Option<FoundCamera>), Error> {
+    let (scene, found) = fitted(scene, options, progress, files)?;
+    Ok((settle::settled(scene, options, progress, files)?, found))
 }
 
 /// The surface that a light, or its middle, sees first of some objects, by its shadow map of them alone (Gunjee 2007, Figure 15 a), in the world.

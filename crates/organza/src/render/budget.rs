@@ -16,7 +16,7 @@ use crate::load::Loaded;
 use crate::load::files::Files;
 use crate::pass;
 use crate::predict::prediction;
-use crate::prepare::{Planned, fitted, load_measured, plan_alone};
+use crate::prepare::{Planned, load_measured, plan_alone, settled};
 use crate::ranges::ranges;
 use crate::scene::Scene;
 use crate::technique::{Fold, Session};
@@ -103,11 +103,12 @@ impl Rung {
 
 /// The scene's own settings and what they give way to, each cheaper than the one before. Samples beyond two a side go first, which are hardly seen;
 /// then splats down to a quarter, which blurs; then the second sample, which frays edges; then more splats. Of an average of random sets, sets go
-/// twice as fast as the rest.
-fn ladder(scene: &Scene) -> Vec<Rung> {
+/// twice as fast as the rest. Where nothing is made of splats, all that there are stay.
+fn ladder(scene: &Scene, has_splats: bool) -> Vec<Rung> {
     let is_random = techniques(scene).into_iter().any(|technique| row(technique).is_random);
     let mut rung = Rung::of_scene(scene);
     let mut rungs = vec![rung];
+    let least_share = if has_splats { LEAST_SHARE } else { rung.splat_share };
     let mut quarter = rung.splat_share / 4.0;
     loop {
         let mut is_changed = false;
@@ -122,14 +123,14 @@ fn ladder(scene: &Scene) -> Vec<Rung> {
         }
         if rung.antialias > 2 {
             rung.antialias = rung.antialias.div_ceil(2).max(2);
-        } else if rung.splat_share > quarter.max(LEAST_SHARE) {
-            rung.splat_share = (rung.splat_share / 2.0).max(LEAST_SHARE);
+        } else if rung.splat_share > quarter.max(least_share) {
+            rung.splat_share = (rung.splat_share / 2.0).max(least_share);
         } else if rung.antialias > 1 {
             rung.antialias = 1;
             quarter = 0.0;
-        } else if rung.splat_share > LEAST_SHARE {
+        } else if rung.splat_share > least_share {
             quarter = 0.0;
-            rung.splat_share = (rung.splat_share / 2.0).max(LEAST_SHARE);
+            rung.splat_share = (rung.splat_share / 2.0).max(least_share);
         } else if !is_changed {
             return rungs;
         } else {
@@ -162,7 +163,8 @@ pub fn render_within(
     progress: &Progress,
     files: Files,
 ) -> Result<WithinBudget, Error> {
-    let (scene, found) = fitted(scene, options, progress, &files)?;
+    let stated = scene;
+    let (scene, found) = settled(stated, options, progress, &files)?;
     let mut cost = CostRecord::default();
     let begun = Instant::now();
     let asked = Rung::of_scene(&scene);
@@ -171,7 +173,14 @@ pub fn render_within(
     let mut loaded = load_measured(&everything, options, progress, &files, &mut cost)?;
     let reading = cost.stages.iter().filter(|stage| stage.name == pass::READ).map(|stage| stage.seconds).sum::<f64>();
     let spent = || begun.elapsed().as_secs_f64() - reading;
-    let rungs = ladder(&scene);
+    let mut rungs = Vec::new();
+    for rung in ladder(&scene, !loaded.cloud.is_empty()) {
+        // The settings alone have to draw the same picture again: `auto` must not choose otherwise with them.
+        let changed = rung.applied_to(stated);
+        if is_drawn_alike(&scene, &settled(&changed, options, progress, &files)?.0) {
+            rungs.push(rung);
+        }
+    }
     let trial = trial(&scene, &mut loaded, options, progress)?;
     let size = scene.camera.size;
     // What the counted work of a plan has been over what the trial told of it.
@@ -199,9 +208,12 @@ pub fn render_within(
         let resolved = rung.applied_to(&scene);
         let whole = loaded.keep_share(rung.splat_share);
         loaded.retarget(&resolved);
+        let begun = Instant::now();
         let planned = plan_alone(&resolved, &loaded, options)?;
+        let planning = begun.elapsed().as_secs_f64();
         let drawing = drawing_seconds(&resolved, &loaded, &planned, &trial.predicted.rates, options)?;
-        let expected = spent() + drawing;
+        // What is drawn is planned once more, with what its bounds leave out.
+        let expected = spent() + planning + drawing;
         scale = drawing / trial.drawing(rung, size);
         let left = budget.as_secs_f64() - spent();
         let cheap_enough = |at: &usize| scale * trial.seconds(rungs[*at], size) <= FILLED * left;
@@ -230,6 +242,13 @@ pub fn render_within(
             first = at + 1;
         }
     }
+}
+
+/// Whether two settled scenes, which differ in settings that give way, are drawn by the same techniques.
+fn is_drawn_alike(scene: &Scene, other: &Scene) -> bool {
+    scene.render.technique == other.render.technique
+        && scene.render.sheets == other.render.sheets
+        && scene.objects.iter().zip(&other.objects).all(|(object, changed)| object.technique == changed.technique)
 }
 
 /// Predicted seconds of drawing what was planned.
@@ -315,7 +334,7 @@ impl Trial {
                     Growth::Splats => splats,
                     Growth::Samples => samples,
                     // Footprints of media grow more slowly than splats become fewer.
-                    Growth::Fragments => samples * splats.cbrt(),
+                    Growth::Fragments => samples * libm::cbrt(splats),
                     Growth::Sets => samples * sets,
                 };
             }
@@ -357,8 +376,9 @@ mod tests {
             ["antialias = 8", "antialias = 1", "technique = 'particles'", "splat_share = 0.01", "antialias = 3"]
         {
             let scene = scene(render);
-            let rungs = ladder(&scene);
+            let rungs = ladder(&scene, true);
             assert_eq!(rungs[0], Rung::of_scene(&scene));
+            assert!(ladder(&scene, false).iter().all(|rung| rung.splat_share == rungs[0].splat_share));
             for pair in rungs.windows(2) {
                 let (before, after) = (pair[0], pair[1]);
                 let changed = after.given_up(before);

@@ -13,9 +13,11 @@
 
 use super::casters::wider;
 use crate::load::Loaded;
+use crate::load::own::Own;
 use glam::DVec3;
 use rayon::prelude::*;
 use splat_core::{Camera, Cloud, DAabb, Footprint, Light, LightShape, Shading, SplatKind};
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 
 /// Splats of a task.
@@ -29,6 +31,8 @@ const PLAIN: f64 = 0.5;
 /// Tiles along a side of the plane or of a face.
 const LEAST_TILES: f64 = 4.0;
 const MOST_TILES: f64 = 192.0;
+/// Width of the tiles for one object, as a share of those for all.
+const FINER: f64 = 0.25;
 /// Tiles by which what receives is taken to reach farther: look-ups in a shadow map interpolate between its cells. Faces of a cube reach beyond
 /// their edges by as many.
 const MARGIN: usize = 2;
@@ -44,8 +48,20 @@ pub(crate) struct Probe<'a> {
     loaded: &'a Loaded,
     /// The view that receivers lie in; `None` where all count.
     view: Option<Camera>,
-    profiles: Vec<Profile>,
+    profiles: Arc<[Profile]>,
     bounds: DAabb,
+    casters: Casters,
+}
+
+/// What a ray loses light to.
+#[derive(Clone, Copy, PartialEq)]
+pub(crate) enum Casters {
+    /// Everything that casts shadows.
+    All,
+    /// What casts shadows of the object of this rank.
+    Shadows(usize),
+    /// What is seen of the object of this rank, as far as it may lie in the view.
+    Seen(usize),
 }
 
 /// The most that a footprint has at a distance.
@@ -82,28 +98,48 @@ impl<'a> Probe<'a> {
             view: (!leaves_view).then(|| wider(&loaded.camera)),
             profiles: footprints.layers().iter().map(profile).collect(),
             bounds,
+            casters: Casters::All,
         }
+    }
+
+    /// The same of other casters.
+    pub(crate) fn with_casters(&self, casters: Casters) -> Self {
+        Self { profiles: Arc::clone(&self.profiles), casters, ..*self }
     }
 
     /// A bound of the share of its light that a ray of one point of a light can lose on the way to anything that receives shadows and may be seen: 1 where
     /// some rays lose much of it.
     pub(crate) fn greatest_opacity(&self, light: &Light) -> f64 {
+        let depth = self.greatest_depth(light);
+        if depth >= OPAQUE { 1.0 } else { -libm::expm1(-depth) }
+    }
+
+    /// The same as an optical depth, in the channel that has most: infinite where it is large. What is [seen](Casters::Seen) hides all that lies behind
+    /// it along the rays of this light, whose place is the eye's.
+    pub(crate) fn greatest_depth(&self, light: &Light) -> f64 {
+        let is_view = matches!(self.casters, Casters::Seen(_));
         if self.bounds.is_empty() {
             return 0.0;
         }
-        if self.is_plain(&light.shape) {
-            return 1.0;
+        if !is_view && self.is_plain(&light.shape) {
+            return f64::INFINITY;
         }
-        let tiles = Tiles::new(&light.shape, &self.bounds, self.mean_reach(&light.shape));
+        // One object has fewer splats: its tiles may be finer, and its bound nearer.
+        let share = if self.casters == Casters::All { 1.0 } else { FINER };
+        let tiles = Tiles::new(&light.shape, &self.bounds, share * self.mean_reach(&light.shape));
         // Nothing is behind what is nowhere.
-        let farthest: Vec<AtomicU32> = (0..tiles.count()).map(|_| AtomicU32::new(0)).collect();
-        self.each_receiver(&|ball| {
+        let nearest = if is_view { u32::MAX } else { 0 };
+        let farthest: Vec<AtomicU32> = (0..tiles.count()).map(|_| AtomicU32::new(nearest)).collect();
+        let receive = |ball: Ball| {
             // Rounded outwards: far from a lamp single precision is coarser than splats.
             let back = ordered(((tiles.depth(ball.center) + ball.reach) as f32).next_up());
             tiles.each_under(&ball, |tile, _| {
                 farthest[tile].fetch_max(back, Ordering::Relaxed);
             });
-        });
+        };
+        if !is_view {
+            self.each_receiver(&receive);
+        }
         let farthest = tiles.widened(farthest.into_iter().map(AtomicU32::into_inner).collect());
         let is_opaque = AtomicBool::new(false);
         let sums: Vec<AtomicU64> = (0..tiles.count()).map(|_| AtomicU64::new(0)).collect();
@@ -123,10 +159,10 @@ impl<'a> Probe<'a> {
             });
         });
         if is_opaque.into_inner() {
-            return 1.0;
+            return f64::INFINITY;
         }
         let most = sums.into_iter().map(AtomicU64::into_inner).max().unwrap_or(0);
-        -libm::expm1(-(most as f64) / UNIT)
+        most as f64 / UNIT
     }
 
     /// Whether some splats tell that a shadow is plain: the mean optical depth before a receiver in a large tile is more than a half.
@@ -166,7 +202,13 @@ impl<'a> Probe<'a> {
         let loaded = self.loaded;
         let cloud = &loaded.cloud;
         let material = &loaded.materials[cloud.material[i] as usize];
-        loaded.objects[cloud.object[i] as usize].casts_shadow
+        let object = cloud.object[i] as usize;
+        let is_among = match self.casters {
+            Casters::All => loaded.objects[object].casts_shadow,
+            Casters::Shadows(rank) => object == rank && loaded.objects[object].casts_shadow,
+            Casters::Seen(rank) => object == rank && self.may_be_seen(&self.ball(i)),
+        };
+        is_among
             && cloud.cross_section[i] > 0.0
             && (cloud.kind[i] == SplatKind::Opaque || material.greatest_extinction() > 0.0)
     }
@@ -222,7 +264,12 @@ impl<'a> Probe<'a> {
     fn each_caster(&self, is_opaque: &AtomicBool, visit: &(dyn Fn(Ball, f64, Option<&Profile>) + Sync)) {
         let loaded = self.loaded;
         let cloud = &loaded.cloud;
-        for own in loaded.own.iter().filter(|own| !own.has_splats && loaded.objects[own.object].casts_shadow) {
+        let is_among = |own: &&Own| match self.casters {
+            Casters::All => true,
+            Casters::Shadows(rank) | Casters::Seen(rank) => own.object == rank,
+        };
+        let casting = loaded.own.iter().filter(|own| !own.has_splats && loaded.objects[own.object].casts_shadow);
+        for own in casting.filter(is_among) {
             visit(about(&own.world_box()), own.optical_depth(), None);
         }
         let chunks = (0..cloud.len().div_ceil(CHUNK)).into_par_iter();

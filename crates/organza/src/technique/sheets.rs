@@ -13,15 +13,24 @@ use crate::load::own::{Body, Own};
 use crate::matter::Matter;
 use crate::pass;
 use crate::scene::{self, LightPoint, Scene, Technique};
-use crate::statistics::{ObjectData, ObjectStatistics};
-use crate::technique::{Fold, OwnWork, Session};
+use crate::statistics::{MediumFacts, ObjectData, ObjectStatistics};
+use crate::technique::{Asked, Fold, OwnWork, Session};
 use crate::{CostRecord, Error, RenderOptions, memory, stage};
 use sheet_light::half::{HalfParams, pane_bytes, polygon_bytes};
 use sheet_light::{
     Aligned, Classify, Gradients, KernelShape, Lighting, Params, SheetInput, Sheeted, Splats, Volume, prepare,
 };
-use splat_core::{Accumulator, Direction, Limits, Packing};
+use splat_core::{Accumulator, Camera, Direction, Limits, Packing};
 use std::ops::Range;
+
+/// Bytes of a sample that slabs across half vectors see or light, of a volume more there, of a cell of scattered light in both streams, and of a voxel.
+const BYTES_OF_A_SAMPLE: u64 = 300;
+const BYTES_OF_A_SHEET: u64 = 130;
+const CELL_BYTES: u64 = 960;
+const BYTES_OF_A_VOXEL: f64 = 120.0;
+/// Voxels of a cell as a scene has them by default, and the cells that thin layers may be cut into.
+const VOXELS_OF_A_CELL: u64 = 32;
+const LEAST_CELLS: u64 = 1 << 16;
 
 /// The form in which an object is taken.
 pub(crate) fn form(object: &ObjectStatistics) -> (Form, &'static str) {
@@ -41,6 +50,43 @@ pub(crate) fn counts(_: &Scene, all: &Translucent) -> Vec<Count> {
         Count::new(Item::SheetFragment, all.fragments + all.of_own_data),
         Count::new(Item::SlabSample, all.slab_samples),
     ]
+}
+
+/// The same of a medium that is not converted yet: its splats stand for the voxels.
+pub(crate) fn foresees(asked: &Asked<'_>, camera: &Camera) -> OwnWork {
+    let Some(medium) = asked.medium.filter(|medium| medium.is_lattice) else { return OwnWork::default() };
+    let is_half = matches!(asked.settings.sheets.slicing, scene::Slicing::HalfVector { .. });
+    let shining = asked.scene.lights.iter().filter(|light| light.light.intensity != [0.0; 3]);
+    let lights: f64 = shining.map(|light| light.count() as f64).sum();
+    let sweeps = if is_half { 2.0 * lights.max(1.0) } else { 1.0 };
+    let lit = if is_half { 1.0 } else { lights };
+    let seen = Extent::new(&medium.bounds, camera);
+    let radius = asked.settings.sheets.kernel_extent * medium.spacing * seen.samples_per_unit;
+    let slabs = medium.bounds.diagonal() / medium.spacing;
+    OwnWork {
+        items: sweeps * medium.splats * seen.share * (std::f64::consts::PI * radius * radius).max(1.0),
+        slab_samples: sweeps * seen.samples * slabs * (1.0 + lit),
+        ranges: None,
+    }
+}
+
+/// Bytes of slabs of media that are not converted yet: as those of [`bytes`], where lights' images are as large as a diagonal is long.
+pub(crate) fn foresees_bytes(scene: &Scene, settings: &scene::RenderSettings, media: &[MediumFacts]) -> u64 {
+    let scene::Slicing::HalfVector { light_pixels, most_light_pixels, .. } = settings.sheets.slicing else { return 0 };
+    let camera = scene.camera.with_samples(settings.antialias);
+    let lattices = || media.iter().filter(|medium| medium.is_lattice);
+    let count = lattices().count() as u64;
+    let voxels: f64 = lattices().map(|medium| medium.splats).sum();
+    let sides = lattices().map(|medium| light_pixels * medium.bounds.diagonal() / medium.spacing);
+    let side = sides.fold(16.0, f64::max).min(f64::from(most_light_pixels));
+    let of_a_sample = BYTES_OF_A_SAMPLE + BYTES_OF_A_SHEET * count;
+    let eyes = 2 * of_a_sample * camera.pixels();
+    let light = (of_a_sample as f64 * side * side) as u64;
+    let cells = CELL_BYTES * (voxels as u64 / VOXELS_OF_A_CELL).max(LEAST_CELLS);
+    let has_surfaces = scene.objects.iter().any(|object| object.visible && !object.source.is_medium());
+    let params = HalfParams { most_light_pixels, ..HalfParams::default() };
+    let polygons = if has_surfaces { polygon_bytes(&camera, 1, &params) } else { 0 };
+    eyes + light + cells + polygons + (BYTES_OF_A_VOXEL * voxels) as u64
 }
 
 /// Voxels with extinction, as slabs across the view meet them; half-vector slicing sweeps them once for each light, for the eye and for the light.

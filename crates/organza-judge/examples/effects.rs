@@ -1,0 +1,182 @@
+//! `cargo run --release -p organza-judge --example effects`: draws each scene of `scenes/` with each of its effects and without it, and writes what
+//! that changes into `docs/effects.csv`, and into the tables of `docs/effects.md`. `cargo xtask effects` runs it.
+#![allow(clippy::unwrap_used, reason = "it stops where something is wrong")]
+
+use organza::scene::{LoadOptions, Override, Scene, parse};
+use organza::{Error, Files, Progress, RenderOptions};
+use organza_judge::effects::{Switch, measure};
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+
+/// Pixels of the longer side of the pictures.
+const SIDE: u32 = 96;
+const CSV: &str = "docs/effects.csv";
+const PAGE: &str = "docs/effects.md";
+/// Between these the page holds the tables.
+const BEGIN: &str = "<!-- Made by `cargo xtask effects` from docs/effects.csv. -->\n";
+const END: &str = "<!-- End of the tables. -->\n";
+
+/// One effect of one scene.
+struct Row {
+    scene: String,
+    effect: String,
+    /// Whether it is simulated.
+    is_on: bool,
+    /// Bound of its change of a displayed pixel; `None` where none is known.
+    bound: Option<f64>,
+    /// Largest change that was measured.
+    change: f64,
+    /// Share of pixels that change by more than the tolerance.
+    beyond: f64,
+    seconds_with: f64,
+    seconds_without: f64,
+}
+
+/// One scene.
+struct Drawn {
+    name: String,
+    rows: Vec<Row>,
+    left_out_together: Option<f64>,
+    tolerance: f64,
+    predicted_seconds: f64,
+    seconds: f64,
+}
+
+fn main() {
+    let mut scenes: Vec<PathBuf> = std::fs::read_dir("scenes").unwrap().map(|entry| entry.unwrap().path()).collect();
+    scenes.retain(|path| path.extension().is_some_and(|extension| extension == "toml"));
+    scenes.sort();
+    let mut drawn = Vec::new();
+    for path in &scenes {
+        let scene = draw(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+        println!("{}: {} effects", scene.name, scene.rows.len());
+        drawn.push(scene);
+    }
+    std::fs::write(CSV, csv(&drawn)).unwrap();
+    let page = std::fs::read_to_string(PAGE).unwrap();
+    let (before, rest) = page.split_once(BEGIN).unwrap();
+    let (_, after) = rest.split_once(END).unwrap();
+    std::fs::write(PAGE, format!("{before}{BEGIN}{}{END}{after}", tables(&drawn))).unwrap();
+}
+
+/// The scene in `path`, small, with effects switched.
+fn scene(path: &Path, switches: &[Switch]) -> Result<Scene, Error> {
+    let words = switches.iter().map(|switch| format!("{}={}", switch.name, if switch.is_on { "on" } else { "off" }));
+    let overrides = words.map(|word| Override::of_effect(&word)).collect::<Result<Vec<_>, _>>()?;
+    let options = LoadOptions { overrides, ..LoadOptions::default() };
+    let mut scene = parse(path, &std::fs::read(path).unwrap(), &options)?;
+    let longest = scene.camera.size.into_iter().max().unwrap();
+    if longest > SIDE {
+        scene.camera.size = scene.camera.size.map(|side| (side * SIDE).div_ceil(longest));
+    }
+    Ok(organza::fitted(&scene, &RenderOptions::default(), &Progress::new(), &Files::default())?.0.into_owned())
+}
+
+fn draw(path: &Path) -> Result<Drawn, Error> {
+    let options = RenderOptions::default();
+    let progress = Progress::new();
+    let planned = scene(path, &[])?;
+    let explained = organza::explain(&planned, &options, &progress)?;
+    let measured = measure(&explained.plan, &planned, &|switches| scene(path, switches), &options, &progress)?;
+    let name = path.file_stem().unwrap().to_string_lossy().into_owned();
+    let effect = |name: &str| explained.plan.effects.iter().find(|effect| effect.name == name).unwrap();
+    let row = |change: &organza_judge::effects::EffectChange| {
+        let effect = effect(&change.name);
+        Row {
+            scene: name.clone(),
+            effect: change.name.clone(),
+            is_on: effect.called_for,
+            bound: effect.bound.number(),
+            change: change.largest,
+            beyond: change.beyond_tolerance,
+            seconds_with: change.seconds_with,
+            seconds_without: change.seconds_without,
+        }
+    };
+    let threads = rayon::current_num_threads();
+    let passes = explained.predicted.drawing.iter();
+    Ok(Drawn {
+        rows: measured.changes.iter().map(row).collect(),
+        left_out_together: measured.left_out_together,
+        tolerance: planned.render.tolerance,
+        predicted_seconds: passes.map(|pass| pass.seconds(&explained.predicted.rates, threads)).sum(),
+        seconds: measured.seconds,
+        name,
+    })
+}
+
+fn csv(drawn: &[Drawn]) -> String {
+    let head = "scene,effect,simulated,bound,change,share_of_pixels_beyond_tolerance,seconds_with,seconds_without\n";
+    let mut text = head.to_owned();
+    for row in drawn.iter().flat_map(|scene| &scene.rows) {
+        let Row { scene, effect, is_on, change, beyond, seconds_with, seconds_without, .. } = row;
+        let bound = row.bound.map_or_else(String::new, |bound| format!("{bound:.3e}"));
+        writeln!(
+            text,
+            "{scene},{effect},{is_on},{bound},{change:.3e},{beyond:.4},{seconds_with:.4},{seconds_without:.4}"
+        )
+        .unwrap();
+    }
+    text
+}
+
+fn percent(share: f64) -> String {
+    match 100.0 * share {
+        0.0 => "nothing".to_owned(),
+        p if p < 0.01 => "below 0.01 %".to_owned(),
+        p if p < 10.0 => format!("{p:.2} %"),
+        p => format!("{p:.0} %"),
+    }
+}
+
+fn median(values: impl Iterator<Item = f64>) -> f64 {
+    let mut values: Vec<f64> = values.collect();
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
+}
+
+fn tables(drawn: &[Drawn]) -> String {
+    let rows = || drawn.iter().flat_map(|scene| scene.rows.iter().map(move |row| (row, scene.tolerance)));
+    let off = || rows().filter(|(row, _)| !row.is_on);
+    let on = || rows().filter(|(row, _)| row.is_on);
+    let most_off = off().map(|(row, _)| row.change).fold(0.0, f64::max);
+    let beyond = off().filter(|(row, tolerance)| row.change > *tolerance).count();
+    let seen = on().filter(|(row, tolerance)| row.change > *tolerance).count();
+    let over = rows().filter(|(row, _)| row.bound.is_some_and(|bound| row.change > bound + 1e-6)).count();
+    let ratios = on().filter_map(|(row, _)| row.bound.map(|bound| bound / row.change)).filter(|r| r.is_finite());
+    let ratio = |scene: &Drawn| (scene.predicted_seconds / scene.seconds).max(scene.seconds / scene.predicted_seconds);
+    let mut text = format!(
+        "\n{} scenes, {SIDE} pixels wide at most: {} effects could be switched.\n\n\
+         - Left out: {}. Forced on, {beyond} change a pixel by more than the tolerance; the most is {}.\n\
+         - Called for: {}. Forced off, {seen} of these change some pixel by more than the tolerance.\n\
+         - {over} changed a pixel by more than their bound. The bound is {:.1} times the change, in the median.\n\
+         - Predicted and measured times of drawing differ by a factor of {:.2} in the median, {:.1} at most.\n\n",
+        drawn.len(),
+        rows().count(),
+        off().count(),
+        percent(most_off),
+        on().count(),
+        median(ratios),
+        median(drawn.iter().map(ratio)),
+        drawn.iter().map(ratio).fold(0.0, f64::max),
+    );
+    text += "| scene | left out | all of it, forced on, changes | called for, and what a pixel changes without it | s predicted | s measured |\n\
+             |---|---|---|---|---|---|\n";
+    for scene in drawn {
+        let names = |is_on: bool| scene.rows.iter().filter(move |row| row.is_on == is_on);
+        let left_out: Vec<String> = names(false).map(|row| format!("`{}`", row.effect)).collect();
+        let called_for = names(true).map(|row| format!("`{}` {}", row.effect, percent(row.change)));
+        let together = scene.left_out_together.map_or_else(String::new, percent);
+        writeln!(
+            text,
+            "| {} | {} | {together} | {} | {:.2} | {:.2} |",
+            scene.name,
+            left_out.join(", "),
+            called_for.collect::<Vec<_>>().join(", "),
+            scene.predicted_seconds,
+            scene.seconds,
+        )
+        .unwrap();
+    }
+    text + "\n"
+}

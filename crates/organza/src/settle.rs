@@ -1,0 +1,405 @@
+//! What draws the objects whose technique a scene leaves to the plan (`auto`): settled once, before anything is converted, for all that follows.
+//!
+//! Ways to draw the scene are compared: each object by the technique of the table that suits it, and for each technique that scatters light again
+//! and again, all of them by that one. What techniques err by is estimated ([`estimates`]), and their time is counted work times the built-in
+//! figures of one thread. So a scene is settled alike on every machine, by any number of threads.
+
+use crate::choose::technique_of;
+use crate::cost::{Count, CountedPass, Item, Rates, Translucent, samples};
+use crate::load::files::Files;
+use crate::load::media_facts;
+use crate::plan::Estimate;
+use crate::scene::{EffectKind, RenderSettings, Scene, SceneObject, SwitchedEffect, Technique};
+use crate::statistics::MediumFacts;
+use crate::technique::{Asked, Row, TABLE, estimates, row};
+use crate::{Error, Progress, RenderOptions, pass};
+use std::borrow::Cow;
+
+/// How many times the time of the next way a way may take.
+const MOST_TIMES: f64 = 20.0;
+/// Tolerances that the next way may err by where a way is refused for its time.
+const MOST_TOLERANCES: f64 = 10.0;
+/// Samples of the picture for each splat of a surface, and fragments for each sample: of surfaces nothing is counted before they are read.
+const SAMPLES_PER_SPLAT: f64 = 4.0;
+const FRAGMENTS_PER_SAMPLE: f64 = 4.0;
+/// Entries of a shadow map for each splat.
+const ENTRIES_PER_SPLAT: f64 = 8.0;
+
+/// The scene with a named technique for every object, and the settings that the plan takes with them where the scene leaves them open. A scene that
+/// names all techniques is returned as it is.
+///
+/// # Errors
+/// Those of reading media; [`Error::Input`] where a layer is asked for that no way fills.
+pub(crate) fn settled<'s>(
+    scene: Cow<'s, Scene>,
+    options: &RenderOptions,
+    progress: &Progress,
+    files: &Files,
+) -> Result<Cow<'s, Scene>, Error> {
+    if is_settled(&scene) {
+        return Ok(scene);
+    }
+    let media = media_facts(&scene, options, progress, files)?;
+    let switched = SwitchedEffect::find(&scene.render.effects, EffectKind::Scatter, "");
+    let has_layer = scene.render.layers.names().any(|name| name == SCATTERED);
+    let asked_for = has_layer || switched == Some(true);
+    let fits = |way: &Way| !way.scatters_again || bytes(&scene, &media, way) <= options.max_memory;
+    let is_wanted = |way: &Way| if way.scatters_again { switched != Some(false) } else { !asked_for };
+    let ways: Vec<Way> = ways(&scene, &media).filter(is_wanted).filter(fits).collect();
+    let Some(way) = chosen(&ways, scene.render.tolerance) else {
+        let what = if has_layer { "the layer `scatterN`" } else { "the effect `scatter`, which is on" };
+        let message = format!("{what}: no technique that `auto` chooses scatters light again and again here");
+        let hint = "leave it out, or let `auto` choose for all translucent objects";
+        return Err(Error::input(crate::printable(&scene.file), message, hint));
+    };
+    Ok(Cow::Owned(with(&scene, way)))
+}
+
+/// The layer of light that media scatter again.
+const SCATTERED: &str = "scatterN";
+
+/// Whether every object has a named technique.
+pub(crate) fn is_settled(scene: &Scene) -> bool {
+    let is_named = |object: &SceneObject| technique_of(object, scene) != Technique::Auto;
+    scene.render.technique != Technique::Auto && scene.objects.iter().all(is_named)
+}
+
+/// What the techniques err by that draw, and those that `auto` may take in their place, object by object.
+pub(crate) fn all_estimates(scene: &Scene, media: &[MediumFacts]) -> Vec<Estimate> {
+    let visible = scene.objects.iter().enumerate().filter(|(_, object)| object.visible);
+    let of_object = |(rank, object): (usize, &SceneObject)| {
+        let drawing = technique_of(object, scene);
+        let asked = Asked { scene, object, medium: medium_of(media, rank), settings: &scene.render };
+        let others = TABLE.iter().filter(|row| row.technique != drawing && (row.is_offered)(&asked));
+        let techniques = std::iter::once(drawing).chain(others.map(|row| row.technique));
+        techniques.flat_map(|technique| estimates(technique, &asked)).collect::<Vec<_>>()
+    };
+    visible.flat_map(of_object).collect()
+}
+
+/// A way to draw the scene.
+struct Way {
+    /// The technique of each object, by rank.
+    by: Vec<Technique>,
+    settings: RenderSettings,
+    scatters_again: bool,
+    /// The greatest estimate of a change of a displayed pixel.
+    displayed_error: f64,
+    /// Seconds of one thread by the built-in figures.
+    seconds: f64,
+}
+
+/// The ways that draw the scene, the plainest first.
+fn ways<'a>(scene: &'a Scene, media: &'a [MediumFacts]) -> impl Iterator<Item = Way> + 'a {
+    let plain = std::iter::once_with(|| {
+        let by = scene.objects.iter().enumerate().map(|(rank, object)| match technique_of(object, scene) {
+            Technique::Auto => suiting(scene, object, medium_of(media, rank)),
+            named => named,
+        });
+        way(scene, media, by.collect(), scene.render.clone())
+    });
+    let scattering = TABLE.iter().filter_map(|row| {
+        let settings = (row.scattering_again)(&scene.render)?;
+        let draws = |object: &SceneObject| match technique_of(object, scene) {
+            Technique::Auto => true,
+            named => named == row.technique || is_opaque(scene, object),
+        };
+        let named = |object: &SceneObject| match technique_of(object, scene) {
+            Technique::Auto => row.technique,
+            named => named,
+        };
+        let draws_all = scene.objects.iter().filter(|object| object.visible).all(draws);
+        let by: Vec<Technique> = scene.objects.iter().map(named).collect();
+        (draws_all && media.iter().any(|medium| medium.is_lattice && by[medium.object] == row.technique))
+            .then(|| way(scene, media, by, settings))
+    });
+    plain.chain(scattering)
+}
+
+/// Whether an object is opaque for certain: raw points may each have an opacity of their own.
+fn is_opaque(scene: &Scene, object: &SceneObject) -> bool {
+    let may_vary = object.field.is_some() || !object.materials.is_empty() || object.source.is_of_points();
+    !object.source.is_medium() && !may_vary && scene.opacity_of(object) == 1.0
+}
+
+fn medium_of(media: &[MediumFacts], rank: usize) -> Option<&MediumFacts> {
+    media.iter().find(|medium| medium.object == rank)
+}
+
+/// A technique that may draw an object by itself.
+struct Candidate {
+    technique: Technique,
+    displayed_error: f64,
+    seconds: f64,
+}
+
+/// The technique that suits an object by itself, with the settings of the scene: of those within the tolerance the fastest, else the one that errs
+/// least, and of equal ones the first of the table.
+fn suiting(scene: &Scene, object: &SceneObject, medium: Option<&MediumFacts>) -> Technique {
+    let asked = Asked { scene, object, medium, settings: &scene.render };
+    let offered = TABLE.iter().filter(|row| (row.is_offered)(&asked));
+    let candidate = |row: &Row| Candidate {
+        technique: row.technique,
+        displayed_error: greatest(&estimates(row.technique, &asked)),
+        seconds: seconds(row, &asked),
+    };
+    let candidates: Vec<Candidate> = offered.map(candidate).collect();
+    let sufficient = candidates.iter().filter(|one| one.displayed_error <= scene.render.tolerance);
+    let fastest = sufficient.min_by(|a, b| a.seconds.total_cmp(&b.seconds));
+    let best = fastest.or_else(|| candidates.iter().min_by(|a, b| a.displayed_error.total_cmp(&b.displayed_error)));
+    best.map_or(TABLE[0].technique, |one| one.technique)
+}
+
+/// Bytes that the techniques of a way take at most for media, before anything is converted.
+fn bytes(scene: &Scene, media: &[MediumFacts], way: &Way) -> u64 {
+    let used = TABLE.iter().filter(|row| way.by.contains(&row.technique));
+    used.map(|row| (row.foresees_bytes)(scene, &way.settings, media)).sum()
+}
+
+fn greatest(estimates: &[Estimate]) -> f64 {
+    estimates.iter().map(|estimate| estimate.displayed_error).fold(0.0, f64::max)
+}
+
+fn way(scene: &Scene, media: &[MediumFacts], by: Vec<Technique>, settings: RenderSettings) -> Way {
+    let mut displayed_error = 0.0f64;
+    let mut time = 0.0;
+    for (rank, object) in scene.objects.iter().enumerate().filter(|(_, object)| object.visible) {
+        let asked = Asked { scene, object, medium: medium_of(media, rank), settings: &settings };
+        displayed_error = displayed_error.max(greatest(&estimates(by[rank], &asked)));
+        time += seconds(row(by[rank]), &asked);
+    }
+    let is_by_sheets = by.iter().any(|technique| (row(*technique).scattering_again)(&settings).is_some());
+    let scatters_again = is_by_sheets && settings.sheets.scattering().is_some();
+    Way { by, settings, scatters_again, displayed_error, seconds: time }
+}
+
+/// Seconds of one thread that an object takes by a technique, counted before anything is converted.
+fn seconds(row: &Row, asked: &Asked<'_>) -> f64 {
+    let scene = asked.scene;
+    let camera = scene.camera.with_samples(asked.settings.antialias);
+    let own = (row.foresees)(asked, &camera);
+    let draws_own_data = own.items > 0.0;
+    let samples = samples(scene);
+    let maps: f64 = scene.lights.iter().filter(|light| light.shadow).map(|light| light.count() as f64).sum();
+    // What is drawn from its own data carries its light, or has splats for shadow maps.
+    let carries = (row.scattering_again)(asked.settings).is_some() && asked.settings.sheets.scattering().is_some();
+    let converted = asked.medium.map_or(samples / SAMPLES_PER_SPLAT, |medium| medium.splats);
+    let drawn = if draws_own_data { 0.0 } else { converted };
+    let fragments = if draws_own_data { 0.0 } else { samples * FRAGMENTS_PER_SAMPLE };
+    let translucent = Translucent {
+        splats: drawn,
+        fragments,
+        of_own_data: own.items,
+        slab_samples: own.slab_samples,
+        ranges: 1.0,
+        any: true,
+    };
+    let mut counts: Vec<Count> = row.steps.iter().flat_map(|step| (step.counts)(scene, &translucent)).collect();
+    if !(draws_own_data && carries) {
+        counts.push(Count::new(Item::ConvertedSplat, converted));
+        counts.push(Count::new(Item::CastSplat, converted * maps));
+        counts.push(Count::new(Item::ShadowEntry, converted * maps * ENTRIES_PER_SPLAT));
+    }
+    if row.draws_splats {
+        counts.push(Count::new(Item::ProjectedSplat, drawn));
+        counts.push(Count::new(Item::ShadedSplat, drawn));
+        counts.push(Count::new(Item::ShadowLookUp, drawn * maps));
+    }
+    CountedPass::new(pass::FINISH, String::new(), counts).seconds(&Rates::default(), 1)
+}
+
+/// The way that is taken: of those whose estimate is within the tolerance the fastest; without any, the one that errs least, unless it takes so many
+/// times longer than the fastest that errs by some tolerances.
+fn chosen(ways: &[Way], tolerance: f64) -> Option<&Way> {
+    let sufficient = ways.iter().filter(|way| way.displayed_error <= tolerance);
+    let fastest = sufficient.min_by(|a, b| a.seconds.total_cmp(&b.seconds));
+    if fastest.is_some() {
+        return fastest;
+    }
+    let best = ways.iter().min_by(|a, b| a.displayed_error.total_cmp(&b.displayed_error))?;
+    let is_near = |way: &&Way| way.displayed_error <= MOST_TOLERANCES * tolerance;
+    let near = ways.iter().filter(is_near).min_by(|a, b| a.seconds.total_cmp(&b.seconds));
+    Some(near.filter(|near| best.seconds > MOST_TIMES * near.seconds).unwrap_or(best))
+}
+
+/// The scene as a way has it.
+fn with(scene: &Scene, way: &Way) -> Scene {
+    let mut settled = scene.clone();
+    let is_open = |object: &SceneObject| technique_of(object, scene) == Technique::Auto;
+    // What most objects have in common stays a setting of the scene, as it was asked for.
+    let open = || scene.objects.iter().zip(&way.by).filter(|(object, _)| is_open(object));
+    let used = |row: &&Row| open().any(|(object, by)| object.visible && *by == row.technique);
+    let common = TABLE.iter().find(used).unwrap_or(&TABLE[0]).technique;
+    settled.render = way.settings.clone();
+    settled.render.is_chosen = true;
+    if settled.render.technique == Technique::Auto {
+        settled.render.technique = common;
+    }
+    for (object, by) in settled.objects.iter_mut().zip(&way.by) {
+        object.is_chosen = technique_of(object, scene) == Technique::Auto;
+        let has_it = object.technique.is_none() && settled.render.technique == *by;
+        if !has_it {
+            object.technique = Some(*by);
+        }
+    }
+    if way.scatters_again && scene.render.layers.has_effects() {
+        let is_layer = settled.render.layers.add(SCATTERED);
+        debug_assert!(is_layer, "invariant: the layer has a name");
+    }
+    settled
+}
+
+/// Sentences on what the plan's choice errs by: as warnings the effects that it leaves out and that are seen at once, as notes the rest.
+pub(crate) struct Said {
+    pub(crate) warnings: Vec<String>,
+    pub(crate) notes: Vec<String>,
+}
+
+/// What is said of estimates above the tolerance, of objects whose technique the plan chose.
+pub(crate) fn said(scene: &Scene, estimates: &[Estimate]) -> Said {
+    let mut said = Said { warnings: Vec::new(), notes: Vec::new() };
+    if scene.frames.is_some() {
+        return said;
+    }
+    for estimate in estimates.iter().filter(|estimate| is_of_choice(scene, estimate)) {
+        // Of what is not known by number other warnings tell.
+        if !estimate.displayed_error.is_finite() || estimate.displayed_error <= scene.render.tolerance {
+            continue;
+        }
+        let sentence = format!(
+            "object '{}': `{}` errs by about {:.0} % of white: {}",
+            crate::shown(&estimate.of_object),
+            estimate.technique.name(),
+            100.0 * estimate.displayed_error,
+            estimate.words
+        );
+        let is_much = estimate.displayed_error > MOST_TOLERANCES * scene.render.tolerance;
+        if is_much && estimate.is_left_out { said.warnings.push(sentence) } else { said.notes.push(sentence) }
+    }
+    said
+}
+
+/// Whether an estimate is of a technique that the plan chose for its object.
+fn is_of_choice(scene: &Scene, estimate: &Estimate) -> bool {
+    let object = scene.objects.iter().find(|object| object.name == estimate.of_object);
+    object.is_some_and(|object| object.is_chosen && technique_of(object, scene) == estimate.technique)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::parse;
+
+    const VIEW: &str = "version = 1\n[camera]\nposition = [0, 0, 5]\ntarget = [0, 0, 0]\nsize = [64, 48]\n\
+        [[light]]\nkind = 'directional'\ndirection = [0, -1, -1]\nirradiance = [3, 3, 3]\n\
+        [material.cloud]\nmedium = { albedo = 0.98, asymmetry = 0.3 }\n[material.soot]\nmedium = { albedo = 0 }\n\
+        [material.glass]\nior = 1.5\n";
+    const CLOUD: &str = "[[object]]\nname = 'cloud'\nmaterial = 'cloud'\n\
+        medium_ball = { center = [0, 0, 0], radius = 1, extinction = 3.2, spacing = 0.1 }\n";
+    const GLASS: &str = "[[object]]\nname = 'glass'\nmaterial = 'glass'\n\
+        implicit = { expression = 'x^2 + y^2 + z^2 - 0.25', box = [[-1, -1, -1], [1, 1, 1]], spacing = 0.1 }\n";
+    const WALL: &str = "[[object]]\nname = 'wall'\n\
+        rectangle = { center = [0, 0, -2], u = [2, 0, 0], v = [0, 2, 0], spacing = 0.1 }\n";
+
+    fn settled_with(text: &str, options: &RenderOptions) -> Result<Scene, Error> {
+        let scene = parse("s.toml".as_ref(), text.as_bytes(), &crate::scene::LoadOptions::default()).unwrap();
+        settled(Cow::Owned(scene), options, &Progress::new(), &Files::default()).map(Cow::into_owned)
+    }
+
+    fn techniques_of(parts: &[&str]) -> Vec<&'static str> {
+        let scene = settled_with(&(VIEW.to_owned() + &parts.concat()), &RenderOptions::default()).unwrap();
+        assert!(is_settled(&scene));
+        scene.objects.iter().map(|object| technique_of(object, &scene).name()).collect()
+    }
+
+    #[test]
+    fn every_kind_of_data_is_drawn_by_what_suits_it() {
+        let cloud = CLOUD;
+        let soot = CLOUD.replace("material = 'cloud'", "material = 'soot'");
+        let density = "[[object]]\nname = 'fog'\nmaterial = 'cloud'\n\
+            density = { expression = '2 - x^2', box = [[-1, -1, -1], [1, 1, 1]], spacing = 0.1, extinction = 2 }\n";
+        let puffs = "[[object]]\nname = 'puffs'\nmaterial = 'cloud'\n\
+            cloud = { ellipsoids = [{ center = [0, 0, 0], radii = [1, 1, 1] }], spacing = 0.1, extinction = 12 }\n";
+        for medium in [cloud, density, puffs] {
+            assert_eq!(techniques_of(&[medium]), ["sheets"], "{medium}");
+            assert_eq!(techniques_of(&[medium, WALL]), ["sheets", "sheets"]);
+        }
+        assert_eq!(techniques_of(&[&soot]), ["points"]);
+        assert_eq!(techniques_of(&[&cloud.replace("extinction = 3.2", "extinction = 0.01")]), ["points"]);
+        assert_eq!(techniques_of(&[WALL]), ["points"]);
+        assert_eq!(techniques_of(&[GLASS, WALL]), ["surfels", "points"]);
+        // Nothing that bends light draws fog again and again, and none of the others bends light.
+        assert_eq!(techniques_of(&[cloud, GLASS, WALL]), ["points", "surfels", "points"]);
+        // Without light nothing scatters, and volumes that reflect by their gradients do not.
+        let dark = VIEW.replace("irradiance = [3, 3, 3]", "irradiance = [0, 0, 0]");
+        let scene = settled_with(&(dark + cloud), &RenderOptions::default()).unwrap();
+        assert_eq!(scene.render.technique, TABLE[0].technique);
+        let phong =
+            density.replace("material = 'cloud'", "material = 'phong'") + "[material.phong]\nshading = 'phong'\n";
+        assert_eq!(techniques_of(&[&phong]), ["points"]);
+    }
+
+    #[test]
+    fn what_a_scene_states_is_obeyed() {
+        let named = CLOUD.replace("material = 'cloud'", "material = 'cloud'\ntechnique = 'points'");
+        assert_eq!(techniques_of(&[&named, WALL]), ["points", "points"]);
+        for sheets in [
+            "slicing = 'view'",
+            "scattering = 'once'",
+            "classify = 'before'",
+            "slicing = 'half_vector', scattering = 'once'",
+        ] {
+            assert_eq!(
+                techniques_of(&[CLOUD, &format!("[render]\nsheets = {{ {sheets} }}\n")]),
+                ["points"],
+                "{sheets}"
+            );
+        }
+        let half = "[render]\nsheets = { slicing = 'half_vector', light_pixels = 3 }\n";
+        let scene = settled_with(&(VIEW.to_owned() + CLOUD + half), &RenderOptions::default()).unwrap();
+        assert!(scene.render.sheets.scattering().is_some());
+        assert!(format!("{:?}", scene.render.sheets.slicing).contains("light_pixels: 3.0"));
+        // Named sheets lie across the view, as long as the scene states no more.
+        let scene =
+            settled_with(&(VIEW.to_owned() + CLOUD + "[render]\ntechnique = 'sheets'\n"), &RenderOptions::default());
+        assert!(scene.unwrap().render.sheets.scattering().is_none());
+    }
+
+    #[test]
+    fn a_layer_is_filled_or_refused_and_memory_is_kept_to() {
+        let thin = CLOUD.replace("extinction = 3.2", "extinction = 0.01");
+        let layer = "[render]\nlayers = ['scatterN']\n";
+        assert_eq!(techniques_of(&[&thin, layer]), ["sheets"]);
+        let asked_for = settled_with(&[VIEW, CLOUD, GLASS, layer].concat(), &RenderOptions::default());
+        // Glass is drawn without its bending where the layer asks for it.
+        assert_eq!(asked_for.unwrap().render.technique.name(), "sheets");
+        let small = RenderOptions { max_memory: 1 << 20, ..RenderOptions::default() };
+        let scene = settled_with(&(VIEW.to_owned() + CLOUD), &small).unwrap();
+        assert_eq!(scene.render.technique, TABLE[0].technique);
+        let message = settled_with(&[VIEW, CLOUD, layer].concat(), &small).unwrap_err().to_string();
+        assert!(message.contains("scatterN"), "{message}");
+        // All effects sum to beauty: the layer of what is scattered again is one of them.
+        let effects =
+            settled_with(&[VIEW, CLOUD, "[render]\nlayers = ['effects']\n"].concat(), &RenderOptions::default());
+        assert!(effects.unwrap().render.layers.names().any(|name| name == SCATTERED));
+    }
+
+    #[test]
+    fn the_fastest_that_is_enough_is_taken_else_the_best_unless_it_takes_far_too_long() {
+        let scene = settled_with(&(VIEW.to_owned() + WALL), &RenderOptions::default()).unwrap();
+        let way = |displayed_error: f64, seconds: f64| Way {
+            by: Vec::new(),
+            settings: scene.render.clone(),
+            scatters_again: false,
+            displayed_error,
+            seconds,
+        };
+        let taken = |ways: &[Way]| chosen(ways, 0.004).map(|way| way.seconds).unwrap();
+        assert_eq!(taken(&[way(0.003, 5.0), way(0.001, 7.0)]), 5.0);
+        assert_eq!(taken(&[way(0.02, 1.0), way(0.001, 30.0)]), 30.0);
+        assert_eq!(taken(&[way(0.02, 1.0), way(0.01, 19.0)]), 19.0);
+        assert_eq!(taken(&[way(0.02, 1.0), way(0.01, 21.0)]), 1.0);
+        assert_eq!(taken(&[way(0.2, 1.0), way(0.01, 21.0)]), 21.0);
+        assert!(chosen(&[], 0.004).is_none());
+    }
+}
