@@ -449,7 +449,8 @@ mod deep {
 
     /// Number of calm pixels with noise, the mean of z² over them, and the mean difference.
     fn against_points(folder: &std::path::Path, text: &str) -> (usize, f64, f64) {
-        let exact = luminance(&draw_in(folder, text, &["--set", "render.points.exact=true"]));
+        let by_points = ["--technique", "points", "--set", "render.points.exact=true"];
+        let exact = luminance(&draw_in(folder, text, &by_points));
         let arguments =
             ["--technique", "particles", "--set", "render.particles.repeat_level=144", "--layers", "std_error"];
         let picture = draw_in(folder, text, &arguments);

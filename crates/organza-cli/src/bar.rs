@@ -3,6 +3,7 @@
 use super::{console, signals};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use organza::{Error, Progress};
+use splat_core::Exceeded;
 use std::io::IsTerminal;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -21,17 +22,30 @@ pub(super) fn with_bar<T>(work: impl FnOnce(&Progress) -> Result<T, Error>) -> R
     signals::stops(&progress);
     let finished = AtomicBool::new(false);
     std::thread::scope(|scope| {
-        let watcher = scope.spawn(|| {
+        let watch = || {
             if std::io::stderr().is_terminal() {
                 draw_bar(&progress, &finished);
             } else {
                 print_lines(&progress, &finished);
             }
-        });
+        };
+        // Where there is no memory for a thread there is none for a picture.
+        let watcher = std::thread::Builder::new().spawn_scoped(scope, watch).map_err(|_| no_thread())?;
         let out = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| work(&progress)));
         finished.store(true, Ordering::Relaxed);
         watcher.thread().unpark();
         out.unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+    })
+}
+
+/// What is said where the system gives no thread.
+fn no_thread() -> Error {
+    Error::Limit(Exceeded {
+        what: "a thread that shows progress".into(),
+        needed: u64::MAX,
+        limit: None,
+        unit: "bytes",
+        hint: "let the system give more memory and threads".into(),
     })
 }
 

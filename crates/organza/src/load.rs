@@ -16,7 +16,7 @@ use crate::form::{Form, PlannedObject};
 use crate::scene::{Scene, SceneLight, SceneObject, SwitchedEffect};
 use crate::statistics::{LightStatistics, MediumFacts, ObjectStatistics};
 use crate::{CostRecord, Error, Progress, RenderOptions, SplatCount, pass};
-pub(crate) use context::BYTES_PER_SPLAT;
+pub(crate) use context::{BYTES_PER_LATTICE_POINT, BYTES_PER_SPLAT};
 use convert::ColorScale;
 use files::Files;
 pub(crate) use fit::placed;

@@ -2,14 +2,11 @@
 
 use crate::Error;
 use crate::load::own::Own;
-use crate::load::{BYTES_PER_SPLAT, Loaded};
+use crate::load::{BYTES_PER_LATTICE_POINT, BYTES_PER_SPLAT, Loaded};
 use crate::scene::Scene;
 use splat_core::raster;
 use splat_core::shade::ChannelLayout;
 use splat_core::{Camera, DepthProfile, Exceeded, Grid};
-
-/// Bytes that a point of a lattice that is made of an object is counted with.
-const BYTES_PER_LATTICE_POINT: u64 = 32;
 
 /// Bytes of a render by what takes them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

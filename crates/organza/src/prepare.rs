@@ -166,7 +166,8 @@ pub(crate) fn prepare<'a>(
         notes.extend(doubts::lacking(&plan));
     }
     notes.extend(said.notes);
-    let most = memory.total().max(loading).max(files.most.get()).max(files.peak()).max(gathering);
+    let chosen = settle::foreseen_bytes(&scene, &loaded.media);
+    let most = memory.total().max(loading).max(files.most.get()).max(files.peak()).max(gathering).max(chosen);
     let explanation = Explanation {
         plan,
         cost,

@@ -156,6 +156,16 @@ fn bytes(scene: &Scene, media: &[MediumFacts], way: &Way) -> u64 {
     used.map(|row| (row.foresees_bytes)(scene, &way.settings, media)).sum()
 }
 
+/// Bytes with which a settled scene is settled alike: with fewer the plan would choose otherwise. 0 where it chose nothing that it weighs by memory.
+pub(crate) fn foreseen_bytes(scene: &Scene, media: &[MediumFacts]) -> u64 {
+    let is_weighed = scene.render.is_chosen && scene.render.sheets.scattering().is_some();
+    let chosen = |row: &&Row| {
+        let is_of_it = |object: &SceneObject| object.is_chosen && technique_of(object, scene) == row.technique;
+        is_weighed && scene.objects.iter().any(is_of_it)
+    };
+    TABLE.iter().filter(chosen).map(|row| (row.foresees_bytes)(scene, &scene.render, media)).sum()
+}
+
 fn greatest(estimates: &[Estimate]) -> f64 {
     estimates.iter().map(|estimate| estimate.displayed_error).fold(0.0, f64::max)
 }

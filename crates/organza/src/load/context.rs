@@ -12,6 +12,8 @@ use std::sync::Arc;
 
 /// Bytes that a splat takes from its conversion to the finished picture, at most.
 pub(crate) const BYTES_PER_SPLAT: u64 = 256;
+/// The same for each point of a lattice that is made of an object: its value, and what a technique keeps for it.
+pub(crate) const BYTES_PER_LATTICE_POINT: u64 = 32;
 
 /// Largest spacing of raw points over their median: above it, leaves and wires would become petals.
 const LARGEST_SPACING: f64 = 1.7;
@@ -128,4 +130,10 @@ impl Context<'_> {
         let classification_error = CLASSIFICATION_SHARE * self.scene.render.tolerance;
         VolumeParams { splat, normals, classification_error, clip, ..VolumeParams::default() }
     }
+}
+
+/// Attributes with the limits of a lattice in the place of those of splats.
+pub(super) fn of_lattice(params: &SplatParams) -> SplatParams {
+    let points = params.limits.max_elements.saturating_mul(BYTES_PER_SPLAT / BYTES_PER_LATTICE_POINT);
+    SplatParams { limits: Limits::elements(points.min(u64::from(u32::MAX))), ..params.clone() }
 }

@@ -1,6 +1,6 @@
 //! One object → its cloud.
 
-use super::context::Context;
+use super::context::{self, Context};
 use super::input::{Input, input, shown_field};
 use super::own::{Body, Own};
 use crate::Error;
@@ -104,7 +104,8 @@ fn predict(input: &Input<'_>) -> Result<Prediction, ConvertError> {
         Input::Surface(field, bounds, params, _) => cost::surface(field.as_ref(), *bounds, params),
         Input::Density(field, bounds, params) => cost::density(field.as_ref(), *bounds, params),
         Input::Procedural(shape, spacing, params) => cost::procedural(shape, *spacing, params),
-        Input::Medium(medium, params, clip) => cost::medium(medium, clip, params),
+        // Whether its splats fit is asked once it is known to become some.
+        Input::Medium(medium, params, clip) => cost::medium(medium, clip, &context::of_lattice(params)),
         Input::Rectangle(r, opacity, params) => cost::rectangle(r, *opacity, params),
     }
 }

@@ -2,7 +2,7 @@
 //!
 //! Lengths and places are the object's own, so nothing is rounded where it lies far away; a transform leads to the world.
 
-use super::context::Context;
+use super::context::{self, Context};
 use super::input::{Input, Isosurface};
 use super::object::{Prepared, procedural};
 use crate::Error;
@@ -282,7 +282,7 @@ fn data(
             cells(grid.into(), transfer, (params.volume.normals, &params.volume.clip))
         }
         Input::Medium(medium, params, clip) => {
-            let grid = convert::medium_to_grid(medium, params)?;
+            let grid = convert::medium_to_grid(medium, &context::of_lattice(params))?;
             cells(grid.into(), convert::extinction_as_it_is(medium.extinction, params)?, (false, clip))
         }
     })
