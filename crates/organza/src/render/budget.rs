@@ -26,7 +26,7 @@ use std::time::{Duration, Instant};
 
 /// Share of the splats in the trial.
 const TRIAL_SPLATS: f64 = 1.0 / 16.0;
-/// Of the picture's width and height; where nothing is made of splats more of it, for what voxels take does not shrink with the picture.
+/// Of the picture's width and height; more of it where objects are drawn from their own data, for what voxels take does not shrink with the picture.
 const TRIAL_SIDE: u32 = 4;
 const TRIAL_SIDE_OF_VOXELS: u32 = 2;
 /// A time that is named in the place of one that is too short is so many times what was predicted, for predictions err.
@@ -276,7 +276,7 @@ fn trial(scene: &Scene, loaded: &mut Loaded, options: &RenderOptions, progress: 
     let asked = Rung::of_scene(scene);
     let rung = Rung { splat_share: asked.splat_share * TRIAL_SPLATS, sets: asked.sets.min(TRIAL_SETS), ..asked };
     let mut small = rung.applied_to(scene);
-    let part = if loaded.cloud.is_empty() { TRIAL_SIDE_OF_VOXELS } else { TRIAL_SIDE };
+    let part = if loaded.own.is_empty() { TRIAL_SIDE } else { TRIAL_SIDE_OF_VOXELS };
     small.camera.size = scene.camera.size.map(|side| side.div_ceil(part));
     let whole = loaded.keep_share(rung.splat_share);
     loaded.retarget(&small);
