@@ -150,8 +150,9 @@ struct Trial {
     rung: Rung,
     /// Samples of the picture.
     samples: f64,
-    /// Seconds of planning.
+    /// Seconds of planning, most of which goes with the splats where there are some.
     planning: f64,
+    has_splats: bool,
 }
 
 /// Renders a scene so that no more than `budget` passes from its files being read to the picture being finished, on the threads that there are.
@@ -302,7 +303,8 @@ fn trial(scene: &Scene, loaded: &mut Loaded, options: &RenderOptions, progress: 
     let [width, height] = small.camera.size.map(f64::from);
     let samples = width * height * f64::from(rung.antialias).powi(2);
     let rates = measured_rates(&predicted, &cost);
-    Ok(Trial { predicted: Prediction { rates, ..predicted }, rung, samples, planning })
+    let has_splats = !loaded.cloud.is_empty();
+    Ok(Trial { predicted: Prediction { rates, ..predicted }, rung, samples, planning, has_splats })
 }
 
 /// The rates of a prediction, those of each pass times what it took over what was predicted.
@@ -320,7 +322,8 @@ fn measured_rates(predicted: &Prediction, cost: &CostRecord) -> Rates {
 impl Trial {
     /// Seconds of planning and drawing with other settings in a picture of this size, from the trial's counts.
     fn seconds(&self, rung: Rung, size: [u32; 2]) -> f64 {
-        self.planning * rung.splat_share / self.rung.splat_share + self.drawing(rung, size)
+        let splats = if self.has_splats { rung.splat_share / self.rung.splat_share } else { 1.0 };
+        self.planning * splats + self.drawing(rung, size)
     }
 
     /// Seconds of drawing alone.
