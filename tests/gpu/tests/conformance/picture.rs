@@ -40,7 +40,7 @@ fn opened(choice: Option<DeviceChoice>) -> Option<Arc<Device>> {
 }
 
 fn picture(exact: bool, device: Option<DeviceChoice>) -> Render {
-    let text = format!("{SCENE}\n[render.points]\nexact = {exact}\n");
+    let text = format!("{SCENE}\n[render]\ntechnique = \"points\"\n[render.points]\nexact = {exact}\n");
     let scene = scene::parse("scene.toml".as_ref(), text.as_bytes(), &Default::default()).unwrap();
     render(&scene, &RenderOptions { device: opened(device), ..RenderOptions::default() }, &Progress::new()).unwrap()
 }

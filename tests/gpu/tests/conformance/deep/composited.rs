@@ -45,7 +45,10 @@ fn unshadowed(settings: &str, device: Option<DeviceChoice>) -> Render {
 
 fn picture_of(scene: &str, settings: &str, device: Option<DeviceChoice>) -> Render {
     let text = format!("{scene}\n{settings}\n");
-    let scene = scene::parse("scene.toml".as_ref(), text.as_bytes(), &Default::default()).unwrap();
+    let points = scene::Override::parse("render.technique='points'").unwrap();
+    let overrides = if settings.contains("technique") { Vec::new() } else { vec![points] };
+    let options = scene::LoadOptions { overrides, ..Default::default() };
+    let scene = scene::parse("scene.toml".as_ref(), text.as_bytes(), &options).unwrap();
     render_of(&scene, device)
 }
 
@@ -303,7 +306,9 @@ fn what_a_software_driver_would_leave_away_goes_through_it_in_parts() {
     // Opaque splats are gone through twice, so that half as many are too many.
     let wall = "rectangle = { center = [0, 0, 0], u = [1, 0, 0], v = [0, 1, 0], spacing = 0.0093 }\nopacity = 1.0";
     let (before, _) = text.split_once("medium_box").unwrap();
-    for (text, said) in [(text.to_owned(), None), (format!("{before}{wall}"), Some("a tile has more splats"))] {
+    let points = "\n[render]\ntechnique = \"points\"\n";
+    for (text, said) in [(text.to_owned() + points, None), (format!("{before}{wall}"), Some("a tile has more splats"))]
+    {
         let scene = scene::parse("scene.toml".as_ref(), text.as_bytes(), &Default::default()).unwrap();
         let alone = render_of(&scene, None);
         let (_, device) = crate::named_device();
