@@ -40,6 +40,21 @@ fn a_budget_draws_what_the_settings_draw_that_it_names() {
 }
 
 #[test]
+fn a_picture_of_a_json_scene_keeps_its_text_as_it_is() {
+    let text = "{\"version\": 1, \"camera\": {\"position\": [0, 0, 4], \"target\": [0, 0, 0], \"size\": [64, 64]},\n\
+        \"object\": [{\"name\": \"fog\", \"medium_box\": {\"min\": [-1, -1, -1], \"max\": [1, 1, 1], \"extinction\": 1, \"spacing\": 0.05}}],\n\
+        \"render\": {\"technique\": \"points\", \"antialias\": 8}}\n";
+    let place = Place::new("");
+    place.write("s.json", text);
+    let render =
+        |budget: u64| place.run(&["render", "s.json", "-o", "b.exr", "--force", "--budget", &budget.to_string()]);
+    assert!((0..24).map(|double| render(1 << double)).any(|out| out.status.success()));
+    let bytes = place.bytes("b.exr");
+    let has = |part: &[u8]| bytes.windows(part.len()).any(|window| window == part);
+    assert!(has(text.trim_end().as_bytes()) && !has(b"# --set"));
+}
+
+#[test]
 fn a_time_that_nothing_fits_is_refused_with_one_that_does() {
     let place = Place::new(&scene());
     place.expect(5, &["render", "s.toml", "-o", "b.png", "--budget", "1"], "hint: use --budget ");

@@ -47,3 +47,14 @@ fn a_share_that_leaves_all_splats_is_told_and_one_that_is_none_refused() {
         assert!(place.made().is_empty());
     }
 }
+
+#[test]
+fn what_a_light_sees_is_the_same_of_fewer_splats() {
+    let place = Place::new(&scene(""));
+    let points = |share: &str, name: &str| {
+        let set = format!("render.splat_share={share}");
+        place.expect(0, &["extract", "s.toml", "--absorbance", "0.3", "-o", name, "--set", &set], "");
+        place.bytes(name)
+    };
+    assert_eq!(points("1", "whole.ply"), points("0.25", "fewer.ply"));
+}

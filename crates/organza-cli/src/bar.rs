@@ -38,7 +38,7 @@ pub(super) fn with_bar<T>(work: impl FnOnce(&Progress) -> Result<T, Error>) -> R
     })
 }
 
-/// What is said where the system gives no thread.
+/// The refusal where the system gives no thread.
 fn no_thread() -> Error {
     Error::Limit(Exceeded {
         what: "a thread that shows progress".into(),

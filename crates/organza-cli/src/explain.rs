@@ -17,7 +17,7 @@ use serde_json::{Value, json};
 const PICTURE: &str = "the picture as planned";
 const EFFECTS: &str = "each effect the other way";
 
-/// What a render or its preparation has said.
+/// A scene as it is explained: before it is drawn, or after.
 struct Explained {
     plan: Plan,
     cost: CostRecord,
@@ -31,7 +31,7 @@ struct Explained {
     found: Option<FoundCamera>,
 }
 
-/// What is known before anything is drawn.
+/// Facts of a scene that was prepared and not drawn.
 struct Prepared {
     memory: u64,
     splats: Vec<SplatCount>,

@@ -98,7 +98,7 @@ impl<'a> Jobs<'a> {
     /// What a picture tells of its scene: the text, and in TOML the options that have changed it as comments.
     pub(super) fn told(&self, frame: Option<u32>) -> Result<String, Error> {
         let mut text = String::from_utf8_lossy(&self.given.bytes).into_owned();
-        if self.given.file.extension().is_none_or(|e| !e.eq_ignore_ascii_case("json")) {
+        if self.has_comments() {
             let changes = overrides(&self.arguments.scene, self.given.is_made)?;
             let changes = changes.iter().map(|change| change.flag().to_owned());
             let turntable = self.arguments.turntable.map(|count| format!("--turntable {count}"));
@@ -106,6 +106,11 @@ impl<'a> Jobs<'a> {
             changes.chain(turntable).chain(frame).for_each(|option| text += &format!("\n# {option}"));
         }
         Ok(text)
+    }
+
+    /// Whether the scene's text may have comments: JSON has none.
+    pub(super) fn has_comments(&self) -> bool {
+        self.given.file.extension().is_none_or(|extension| !extension.eq_ignore_ascii_case("json"))
     }
 
     /// The scene at a frame, and the camera that was placed for it from the files of a sequence.

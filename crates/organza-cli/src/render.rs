@@ -28,6 +28,8 @@ struct Job<'a> {
     inputs: &'a [PathBuf],
     /// What its files tell of the scene.
     told: String,
+    /// Whether that may have comments.
+    has_comments: bool,
     /// The camera that was placed for it.
     found: Option<FoundCamera>,
     places: &'a Places,
@@ -168,7 +170,8 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<u8, Error> {
             let (scene, found) = jobs.scene(frame, drawing.sequence())?;
             let places = jobs.places(frame, Target::new)?;
             let told = jobs.told(frame)?;
-            let job = Job { frame, scene: &scene, inputs: jobs.inputs(), told, found, places: &places };
+            let has_comments = jobs.has_comments();
+            let job = Job { frame, scene: &scene, inputs: jobs.inputs(), told, has_comments, found, places: &places };
             progress.plan([(job.stage(), 1.0), (LATER.to_owned(), (count - at - 1) as f64)]);
             progress.begin(&job.stage());
             progress.enter();
@@ -239,7 +242,8 @@ impl Job<'_> {
     }
 
     fn metadata(&self, render: &Render, budgeted: Option<&Budgeted>) -> Metadata {
-        let changes = budgeted.into_iter().flat_map(Budgeted::options).map(|option| format!("\n# {option}"));
+        let told = budgeted.filter(|_| self.has_comments).into_iter();
+        let changes = told.flat_map(Budgeted::options).map(|option| format!("\n# {option}"));
         Metadata {
             scene_sha256: self.scene.sha256.clone(),
             scene: self.told.clone() + &changes.collect::<String>(),

@@ -207,7 +207,7 @@ pub(super) fn plan_text(plan: &Plan) -> String {
     text
 }
 
-/// What each effect changes and takes, as JSON.
+/// Changes and times of effects, as JSON.
 pub(super) fn measured_json(measured: &Measured) -> Value {
     let change = |change: &EffectChange| {
         json!({
@@ -226,6 +226,9 @@ pub(super) fn measured_json(measured: &Measured) -> Value {
 
 /// The same as a table, beside the bounds of the plan.
 pub(super) fn measured_text(measured: &Measured, plan: &Plan, tolerance: f64) -> String {
+    if measured.changes.is_empty() {
+        return "no effect of this scene can be switched\n".to_owned();
+    }
     let ms = |seconds: f64| format!("{:.1}", 1e3 * seconds);
     let rows = measured.changes.iter().map(|change| {
         let effect = plan.effects.iter().find(|effect| effect.name == change.name);

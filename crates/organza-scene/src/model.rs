@@ -60,6 +60,8 @@ impl Scene {
         let lights = self.lights.get(light).cloned().into_iter().collect();
         let mut scene = Self { sha256: String::new(), stops: Vec::new(), start: None, lights, ..self.clone() };
         scene.render.technique = Technique::Points;
+        // What a light sees is data: a picture that has little time does not change it.
+        scene.render.splat_share = 1.0;
         scene.objects.retain(has);
         scene.objects.iter_mut().for_each(|o| (o.visible, o.technique) = (true, None));
         if !scene.objects.iter().any(|o| matches!(o.points.size, Some(DiscSize::Pixels(_)))) {

@@ -187,8 +187,8 @@ fn way(scene: &Scene, media: &[MediumFacts], by: Vec<Technique>, settings: Rende
 fn seconds(row: &Row, asked: &Asked<'_>) -> f64 {
     let scene = asked.scene;
     let camera = scene.camera.with_samples(asked.settings.antialias);
-    let own = (row.foresees)(asked, &camera);
-    let draws_own_data = own.items > 0.0;
+    let own_work = (row.foresees)(asked, &camera);
+    let draws_own_data = own_work.items > 0.0;
     let samples = samples(scene);
     let maps: f64 = scene.lights.iter().filter(|light| light.shadow).map(|light| light.count() as f64).sum();
     // What is drawn from its own data carries its light, or has splats for shadow maps.
@@ -199,8 +199,8 @@ fn seconds(row: &Row, asked: &Asked<'_>) -> f64 {
     let translucent = Translucent {
         splats: drawn,
         fragments,
-        of_own_data: own.items,
-        slab_samples: own.slab_samples,
+        of_own_data: own_work.items,
+        slab_samples: own_work.slab_samples,
         ranges: 1.0,
         any: true,
     };

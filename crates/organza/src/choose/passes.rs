@@ -10,10 +10,11 @@ use crate::statistics::Statistics;
 /// What is opaque, in words.
 pub(super) fn what_is_opaque(statistics: &Statistics) -> Option<String> {
     let meshes = statistics.planned.iter().filter(|object| object.form == Form::Polygons).count();
-    let of = |count: u64, what: &str| (count > 0).then(|| format!("{count} {what}"));
-    let kinds = [of(statistics.counts.opaque, "opaque splats"), of(meshes as u64, "opaque meshes of triangles")];
-    let all: Vec<String> = kinds.into_iter().flatten().collect();
-    (!all.is_empty()).then(|| all.join(" and "))
+    let counted = |count: u64, what: &str| (count > 0).then(|| format!("{count} {what}"));
+    let kinds =
+        [counted(statistics.counts.opaque, "opaque splats"), counted(meshes as u64, "opaque meshes of triangles")];
+    let present: Vec<String> = kinds.into_iter().flatten().collect();
+    (!present.is_empty()).then(|| present.join(" and "))
 }
 
 /// The passes of a scene whose lights have these shadow maps.
@@ -38,8 +39,8 @@ pub(super) fn passes(statistics: &Statistics, shadow_maps: &[bool]) -> Vec<Plann
     }
     let as_they_are = |draws: &bool| {
         let shaded = |t: &Technique| row(*t).draws_splats && !statistics.lit_as_drawn;
-        let of = |t: &Technique| shaded(t) == *draws && (!draws || statistics.may_have_splats(*t));
-        statistics.techniques.iter().any(of)
+        let is_so = |t: &Technique| shaded(t) == *draws && (!draws || statistics.may_have_splats(*t));
+        statistics.techniques.iter().any(is_so)
     };
     // What is not drawn as splats is projected and shaded in the pass of its technique.
     let which = match [true, false].map(|draws| as_they_are(&draws)) {
@@ -51,8 +52,8 @@ pub(super) fn passes(statistics: &Statistics, shadow_maps: &[bool]) -> Vec<Plann
         pass(pass::PROJECT, format!("{which} splats"));
         pass(pass::SHADE, format!("{which} splats in view"));
     }
-    if let Some(all) = what_is_opaque(statistics).filter(|_| opaque > 0 || !statistics.lit_as_drawn) {
-        pass(pass::OPAQUE, all);
+    if let Some(opaque_things) = what_is_opaque(statistics).filter(|_| opaque > 0 || !statistics.lit_as_drawn) {
+        pass(pass::OPAQUE, opaque_things);
     }
     for (row, what) in rows() {
         row.steps.last().into_iter().for_each(|step| what.iter().for_each(|what| pass(step.pass, what.clone())));

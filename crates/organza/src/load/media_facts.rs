@@ -264,7 +264,7 @@ struct LightThere {
 
 fn light_at(scene: &Scene, bounds: &DAabb) -> LightThere {
     let statistics = light_statistics(&scene.lights, &scene.render.effects);
-    let mut all = [0.0; 3];
+    let mut arriving = [0.0; 3];
     let mut outside = [0.0; 3];
     for (light, known) in scene.lights.iter().zip(&statistics).filter(|(_, known)| known.is_on != Some(false)) {
         let SceneLight { light, .. } = light;
@@ -272,13 +272,13 @@ fn light_at(scene: &Scene, bounds: &DAabb) -> LightThere {
         let is_outside = light.shape.place().is_none_or(|place| !bounds.contains(place));
         for channel in 0..3 {
             let received = f64::from(irradiance[channel]);
-            all[channel] += received;
+            arriving[channel] += received;
             outside[channel] += if is_outside && known.may_shadow() { received } else { 0.0 };
         }
     }
     let sum = |channels: [f64; 3]| channels.iter().sum::<f64>();
     LightThere {
-        irradiance: all.into_iter().fold(0.0, f64::max),
-        outside_share: if sum(all) > 0.0 { sum(outside) / sum(all) } else { 0.0 },
+        irradiance: arriving.into_iter().fold(0.0, f64::max),
+        outside_share: if sum(arriving) > 0.0 { sum(outside) / sum(arriving) } else { 0.0 },
     }
 }

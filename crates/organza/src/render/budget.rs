@@ -16,12 +16,14 @@ use crate::load::Loaded;
 use crate::load::files::Files;
 use crate::pass;
 use crate::predict::prediction;
-use crate::prepare::{Planned, load_measured, plan_alone, settled};
+use crate::prepare::{Planned, fitted, load_measured, plan_alone};
 use crate::ranges::ranges;
 use crate::scene::Scene;
+use crate::settle;
 use crate::technique::{Fold, Session};
 use crate::{CostRecord, Error, Progress, RenderOptions, draw};
 use splat_core::Exceeded;
+use std::borrow::Cow;
 use std::time::{Duration, Instant};
 
 /// Share of the splats in the trial.
@@ -167,8 +169,8 @@ pub fn render_within(
     progress: &Progress,
     files: Files,
 ) -> Result<WithinBudget, Error> {
-    let stated = scene;
-    let (scene, found) = settled(stated, options, progress, &files)?;
+    let (stated, found) = fitted(scene, options, progress, &files)?;
+    let scene = settle::settled(Cow::Borrowed(&*stated), options, progress, &files)?;
     let mut cost = CostRecord::default();
     let begun = Instant::now();
     let asked = Rung::of_scene(&scene);
@@ -180,8 +182,8 @@ pub fn render_within(
     let mut rungs = Vec::new();
     for rung in ladder(&scene, !loaded.cloud.is_empty()) {
         // The settings alone have to draw the same picture again: `auto` must not choose otherwise with them.
-        let changed = rung.applied_to(stated);
-        if is_drawn_alike(&scene, &settled(&changed, options, progress, &files)?.0) {
+        let changed = settle::settled(Cow::Owned(rung.applied_to(&stated)), options, progress, &files)?;
+        if is_drawn_alike(&scene, &changed) {
             rungs.push(rung);
         }
     }
@@ -387,7 +389,8 @@ mod tests {
             assert_eq!(rungs[0], Rung::of_scene(&scene));
             assert!(ladder(&scene, false).iter().all(|rung| rung.splat_share == rungs[0].splat_share));
             for pair in rungs.windows(2) {
-                let (before, after) = (pair[0], pair[1]);
+                let before = pair[0];
+                let after = pair[1];
                 let changed = after.given_up(before);
                 assert_eq!(changed.len(), 1, "{render}: {changed:?}");
                 let less = after.antialias <= before.antialias

@@ -48,10 +48,10 @@ const THICKEST_SPLATS: f64 = 16.0;
 /// All that a technique is known to err by where it draws an object.
 pub(crate) fn estimates(technique: Technique, asked: &Asked<'_>) -> Vec<Estimate> {
     let row = row(technique);
-    let mut all = unshown(row, asked);
-    all.extend(too_thick(row, asked));
-    all.extend((row.estimates)(asked));
-    all
+    let mut found = unshown(row, asked);
+    found.extend(too_thick(row, asked));
+    found.extend((row.estimates)(asked));
+    found
 }
 
 /// An estimate of an effect that is left out.
@@ -62,16 +62,16 @@ fn left_out(estimate: Estimate) -> Estimate {
 /// What the material has and the technique leaves out; no number is known of it.
 fn unshown(row: &Row, asked: &Asked<'_>) -> Vec<Estimate> {
     let material = asked.material();
-    let mut all = Vec::new();
+    let mut found = Vec::new();
     if material.bounds_matter() && (row.bends)(asked.scene).is_err() {
         let words = "it bounds matter that bends light or absorbs, which is left out".to_owned();
-        all.push(left_out(asked.estimate(row.technique, "bending", f64::INFINITY, words)));
+        found.push(left_out(asked.estimate(row.technique, "bending", f64::INFINITY, words)));
     }
     if material.bump.height > 0.0 && (row.bumps)(asked.scene).is_err() {
         let words = "its bumps are left out".to_owned();
-        all.push(left_out(asked.estimate(row.technique, "bumps", f64::INFINITY, words)));
+        found.push(left_out(asked.estimate(row.technique, "bumps", f64::INFINITY, words)));
     }
-    all
+    found
 }
 
 /// A medium that is too thick for the distance of its splats; no number is known of what that does.
