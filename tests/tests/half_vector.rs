@@ -476,7 +476,7 @@ mod deep {
         let threads = in_half_vectors(&scene, &[&ONE_SWEEP[..], &["--threads", "1"]].concat());
         assert_eq!(threads.channel("R"), soft.channel("R"));
         let said = explained(&scene, &ONE_SWEEP);
-        assert!(said.contains("softness.0") && said.contains("one sweep sees each slab from 12 points"), "{said}");
+        assert!(said.contains("soft.0") && said.contains("one sweep sees each slab from 12 points"), "{said}");
         let said = explained(&scene, &[]);
         assert!(said.contains("a sweep for each of 12 points of it; penumbras widen by 0.3"), "{said}");
         // What no sweep carries has its maps, as ever.

@@ -146,6 +146,55 @@ fn x7_effect_shadow_that_nobody_sees_is_left_out() {
     a_shadow_crosses_its_threshold(&[]);
 }
 
+/// A lamp with a size, and the words of the same lamp without one.
+const BULB: &str = "[[light]]\nname = 'bulb'\nkind = 'sphere'\nposition = [-1, 2, 2]\nradius = 0.4\nsamples = 9\nintensity = [3, 3, 3]\n";
+const LAMP: &str = "[[light]]\nname = 'bulb'\nkind = 'point'\nposition = [-1, 2, 2]\nintensity = [3, 3, 3]\n";
+
+#[test]
+fn x7_effect_soft_is_the_size_of_a_light() {
+    let text = scene(BULB, PANE);
+    let planned_scene = loaded(&text, &[]);
+    let planned = render(&planned_scene);
+    let sharp = render(&loaded(&text, &["effect soft.bulb=off".to_owned()]));
+    let lamp = render(&loaded(&scene(LAMP, PANE), &[]));
+    assert_eq!(sharp.layers, lamp.layers, "a light without size is a lamp in its middle");
+    let maps = |render: &Render| render.plan.tables().count();
+    assert_eq!(
+        [&planned, &sharp, &lamp].map(maps),
+        [11, 3, 3],
+        "one for each point, one for the spot, one for the eye"
+    );
+    let effect = |render: &Render, name: &str| render.plan.effects.iter().find(|effect| effect.name == name).cloned();
+    let soft = effect(&planned, "soft.bulb").unwrap();
+    let change = largest_change(&displayed(&planned, &planned_scene), &displayed(&sharp, &planned_scene));
+    assert!(soft.called_for && change > planned_scene.render.tolerance, "{soft:?}, {change}");
+    assert!(change <= soft.bound.number().unwrap(), "{soft:?}, {change}");
+    assert!(!effect(&sharp, "soft.bulb").unwrap().called_for);
+    // Of a lamp nobody can ask for what it has no cause of.
+    assert!(effect(&lamp, "soft").unwrap().is_absent);
+    let options =
+        LoadOptions { overrides: vec![Override::of_effect("soft.key=on").unwrap()], ..LoadOptions::default() };
+    let refused = parse(Path::new("s.toml"), text.as_bytes(), &options).unwrap_err().to_string();
+    assert!(refused.contains("`soft.key` is on, and the light has no size"), "{refused}");
+}
+
+#[test]
+fn x7_flat_lights_without_size_shine_from_their_middle_to_their_side() {
+    let flat = |kind: &str| format!("[[light]]\nname = 'bulb'\n{kind}\nsamples = 9\nintensity = [3, 3, 3]\n");
+    let disk = "kind = 'disk'\nposition = [-1, 2, 2]\nnormal = [1, -2, -2]\nradius = 0.3";
+    let rect = "kind = 'rect'\nposition = [-1, 2, 2]\nu = [0, 0.2, -0.2]\nv = [0.4, 0.1, 0.1]";
+    let tiny_rect = ["light.bulb.u=[0, 2e-7, -2e-7]", "light.bulb.v=[4e-7, 1e-7, 1e-7]"];
+    for (kind, tiny) in [(disk, &["light.bulb.radius=1e-6"][..]), (rect, &tiny_rect)] {
+        let with = |more: &[&str]| {
+            let scene = loaded(&scene(&flat(kind), ""), &settings(more));
+            displayed(&render(&scene), &scene)
+        };
+        let sharp = with(&["effect soft.bulb=off"]);
+        assert!(largest_change(&sharp, &with(&[])) > 1.0 / 255.0, "{kind}");
+        assert!(largest_change(&sharp, &with(tiny)) < 1e-3, "{kind}");
+    }
+}
+
 /// Fog over the ground whose extinction grows: thousands of splats, of which a ray of the light meets a few.
 #[track_caller]
 fn the_shadow_of_fog_crosses_its_threshold(list: &[&str]) {

@@ -16,12 +16,48 @@ const PAGE: &str = "docs/effects.md";
 const BEGIN: &str = "<!-- Made by `cargo xtask effects` from docs/effects.csv. -->\n";
 const END: &str = "<!-- End of the tables. -->\n";
 
+/// Between these it holds some scenes as one reads them.
+const BEGIN_READ: &str = "<!-- Made by `cargo xtask effects`. -->\n";
+const END_READ: &str = "<!-- End of the scenes. -->\n";
+
+/// A scene that the page shows beside its picture, and what one learns from it.
+struct Shown {
+    scene: &'static str,
+    lesson: &'static str,
+}
+
+const SHOWN: [Shown; 5] = [
+    Shown {
+        scene: "glass",
+        lesson: "Bending changes nearly every pixel of the bunny, and its absorption gives it its colour: both are called for. All shadows together cost one map.",
+    },
+    Shown {
+        scene: "soft",
+        lesson: "16 points stand for the size of the lamp, and one sweep through the slabs carries the light of all of them: `soft` says so, and what it costs. Light that is scattered \
+                 again and again is `lacking`, because the scene asks for a technique that scatters it once; a note says what would show it.",
+    },
+    Shown {
+        scene: "window",
+        lesson: "The wall shows only its edge, and without it no pixel of it is missed; but it is what the window is in: its shadow makes the beams.",
+    },
+    Shown {
+        scene: "eye",
+        lesson: "The vitreous body is nearly clear: without it a pixel changes by a few per cent, and what it would scatter again is estimated, not bounded, to be less than that.",
+    },
+    Shown {
+        scene: "mixed",
+        lesson: "Five kinds of data under two lights. Each light has a map of all of them, and the second light is a fill: the picture changes less without it.",
+    },
+];
+
 /// One effect of one scene.
 struct Row {
     scene: String,
     effect: String,
     /// Whether it is simulated.
     is_on: bool,
+    /// Why it is simulated or left out.
+    reason: String,
     /// Bound of its change of a displayed pixel; `None` where none is known.
     bound: Option<f64>,
     /// Largest change that was measured.
@@ -54,9 +90,39 @@ fn main() {
     }
     std::fs::write(CSV, csv(&drawn)).unwrap();
     let page = std::fs::read_to_string(PAGE).unwrap();
-    let (before, rest) = page.split_once(BEGIN).unwrap();
-    let (_, after) = rest.split_once(END).unwrap();
-    std::fs::write(PAGE, format!("{before}{BEGIN}{}{END}{after}", tables(&drawn))).unwrap();
+    let page = filled(&page, BEGIN_READ, END_READ, &read(&drawn));
+    std::fs::write(PAGE, filled(&page, BEGIN, END, &tables(&drawn))).unwrap();
+}
+
+/// A page with this text between two lines of it.
+fn filled(page: &str, begin: &str, end: &str, text: &str) -> String {
+    let (before, rest) = page.split_once(begin).unwrap();
+    let (_, after) = rest.split_once(end).unwrap();
+    format!("{before}{begin}{text}{end}{after}")
+}
+
+/// Some scenes beside their pictures, with what was measured of each effect.
+fn read(drawn: &[Drawn]) -> String {
+    let mut text = String::new();
+    for shown in SHOWN {
+        let scene = drawn.iter().find(|scene| scene.name == shown.scene).unwrap();
+        let name = shown.scene;
+        writeln!(text, "\n### `scenes/{name}.toml`\n\n![{name}](images/{name}.png)\n\n{}\n", shown.lesson).unwrap();
+        text += "| effect | simulated | without it: at most | measured | ms with and without | why |\n|---|---|---|---|---|---|\n";
+        for row in &scene.rows {
+            let Row { effect, is_on, change, reason, seconds_with, seconds_without, .. } = row;
+            let simulated = if *is_on { "yes" } else { "no" };
+            let bound = row.bound.map_or_else(|| "not known".to_owned(), percent);
+            let [with, without] = [seconds_with, seconds_without].map(|seconds| (1e3 * seconds).round());
+            writeln!(
+                text,
+                "| `{effect}` | {simulated} | {bound} | {} | {with}, {without} | {reason} |",
+                percent(*change)
+            )
+            .unwrap();
+        }
+    }
+    text + "\n"
 }
 
 /// The scene in `path`, small, with effects switched.
@@ -86,6 +152,7 @@ fn draw(path: &Path) -> Result<Drawn, Error> {
             scene: name.clone(),
             effect: change.name.clone(),
             is_on: effect.called_for,
+            reason: effect.reason.clone(),
             bound: effect.bound.number(),
             change: change.largest,
             beyond: change.beyond_tolerance,

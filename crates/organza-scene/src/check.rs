@@ -16,7 +16,7 @@ use super::paths::{Paths, ROOT_KEY};
 use super::raw::{RawAnimation, RawScene};
 use super::raw_object::RawObject;
 use super::stops::check_stops;
-use super::switched::switch;
+use super::switched::{switch, switch_lights};
 use super::tree::{Document, Node, Step};
 use super::{Aligned, EffectKind, RenderSettings, Scene, SceneLight, SceneObject, ShadowMapping, SwitchedEffect};
 use crate::{Error, Written, short};
@@ -188,7 +188,7 @@ pub(super) fn scene(
     let mut objects = check_objects(&at_objects, raw.object, raw.animation.as_ref(), &named)?;
     check_extracts(&at_objects, &objects, raw.light.len())?;
     let mut render = check_render(&at.key("render"), &raw.render)?;
-    let lights = check_lights(&at.key("light"), &raw.light, &paths)?;
+    let mut lights = check_lights(&at.key("light"), &raw.light, &paths)?;
     let at_effects = at.key("render").key("effects");
     let causes = Causes { lights: &lights, objects: &objects, materials: &materials, render: &render };
     render.effects = check_effects(&at_effects, &raw.render.effects, &causes)?;
@@ -196,6 +196,7 @@ pub(super) fn scene(
         let message = format!("expected at most {} materials, with a copy for each effect of an object", u16::MAX);
         return Err(at_effects.error(message, "switch fewer effects"));
     }
+    switch_lights(&render.effects, &mut lights);
     if SwitchedEffect::find(&render.effects, EffectKind::Scatter, "") == Some(false) {
         render.sheets.scatter_once();
     }

@@ -99,6 +99,9 @@ impl<'a> Causes<'a> {
         if kind == EffectKind::Shadow && light.is_some_and(|light| !light.shadow) {
             return Contrary::new("the light has shadow = false", "leave one of the two out");
         }
+        if kind == EffectKind::Soft && light.is_some_and(|light| !light.light.shape.is_extended()) {
+            return Contrary::new("the light has no size", "give it the kind sphere, disk or rect");
+        }
         let object = self.objects.iter().find(|object| object.name == label)?;
         match kind.hangs_on() {
             HangsOn::Object if !object.visible => {

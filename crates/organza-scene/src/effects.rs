@@ -22,6 +22,8 @@ pub enum EffectKind {
     Light,
     /// The shadow of a light.
     Shadow,
+    /// The size of a light, which softens its shadows.
+    Soft,
     /// Light that media scatter more than once.
     Scatter,
     /// Reflection and refraction at the surfaces of an object.
@@ -44,10 +46,11 @@ pub enum EffectKind {
 
 impl EffectKind {
     /// Every kind.
-    pub const ALL: [Self; 12] = [
+    pub const ALL: [Self; 13] = [
         Self::Object,
         Self::Light,
         Self::Shadow,
+        Self::Soft,
         Self::Scatter,
         Self::Bending,
         Self::Dispersion,
@@ -65,6 +68,7 @@ impl EffectKind {
             Self::Object => "object",
             Self::Light => "light",
             Self::Shadow => "shadow",
+            Self::Soft => "soft",
             Self::Scatter => "scatter",
             Self::Bending => "bending",
             Self::Dispersion => "dispersion",
@@ -80,7 +84,7 @@ impl EffectKind {
     /// What its effects hang on.
     pub const fn hangs_on(self) -> HangsOn {
         match self {
-            Self::Light | Self::Shadow => HangsOn::Light,
+            Self::Light | Self::Shadow | Self::Soft => HangsOn::Light,
             Self::Object | Self::Bending | Self::Dispersion | Self::Absorption | Self::Color | Self::Gradients => {
                 HangsOn::Object
             }

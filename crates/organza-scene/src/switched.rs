@@ -1,6 +1,6 @@
-//! Effects of objects that a scene switches: what is off is taken out of the objects and their materials, as if the scene had never said it.
+//! Effects of objects and lights that a scene switches: what is off is taken out of objects, their materials and lights, as if the scene had never said it.
 
-use super::{EffectKind, HangsOn, SceneMaterial, SceneObject, SwitchedEffect};
+use super::{EffectKind, HangsOn, SceneLight, SceneMaterial, SceneObject, SwitchedEffect};
 
 /// Takes the causes of effects that are off out of objects and materials. An object whose effect is switched has its material alone: one that
 /// others have too is copied, behind all others. Returns whether there is room for the copies: splats keep the number of their material in 16 bits.
@@ -30,6 +30,16 @@ pub(super) fn switch(
         }
     }
     materials.len() <= usize::from(u16::MAX)
+}
+
+/// Takes the size of lights whose softness is off.
+pub(super) fn switch_lights(switched: &[SwitchedEffect], lights: &mut [SceneLight]) {
+    for light in lights {
+        if SwitchedEffect::find(switched, EffectKind::Soft, &light.label) == Some(false) {
+            light.light = light.light.without_size();
+            light.samples = 1;
+        }
+    }
 }
 
 /// Gives an object a copy of a material, and returns its place.

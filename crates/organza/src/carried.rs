@@ -74,14 +74,18 @@ pub(crate) fn plan(scene: &Scene, loaded: &Loaded, points: &[LightPoint], plan: 
     let told = |light: usize| plan.shadow_maps[light] || scatters_again;
     let effects: Vec<Effect> = (0..plan.shadow_maps.len())
         .filter(|light| told(*light))
-        .flat_map(|light| {
+        .map(|light| {
             let own: Vec<_> =
                 points.iter().zip(carries).filter(|(point, _)| point.of == light).map(|(_, c)| c).collect();
             let (called_for, reason) = way(&own, plan.shadow_maps[light], scattering);
             let label = &loaded.lights[light].label;
+            let soft = EffectKind::Soft.name(label);
+            let soft = plan.effects.iter_mut().find(|effect| effect.name == soft && effect.called_for);
+            if let Some((soft, ways)) = soft.zip(softness(light, points, &asked, called_for)) {
+                soft.reason = ways;
+            }
             let what = "light that slabs carry through what they draw, without a shadow map";
-            let through = technique_effect(format!("carried.{label}"), what, called_for, reason);
-            std::iter::once(through).chain(softness(light, label, points, &asked, called_for))
+            technique_effect(format!("carried.{label}"), what, called_for, reason)
         })
         .collect();
     // Behind the light itself and its shadow.
@@ -121,8 +125,8 @@ fn way(points: &[&Result<(), String>], has_shadow: bool, scattering: Scattering)
     (carried > 0, of_all + &reason)
 }
 
-/// Whether the shadow of a light with an extent is soft, and how, in words; `None` for a light without one.
-fn softness(light: usize, label: &str, points: &[LightPoint], asked: &Carries, is_carried: bool) -> Option<Effect> {
+/// How the shadow of a light with an extent becomes soft, in words; `None` for a light without one.
+fn softness(light: usize, points: &[LightPoint], asked: &Carries, is_carried: bool) -> Option<String> {
     let k = points.iter().position(|point| point.of == light && point.whole.shape.is_extended())?;
     let [_, all] = points[k].rank;
     let way = match (is_carried, asked.together) {
@@ -130,8 +134,7 @@ fn softness(light: usize, label: &str, points: &[LightPoint], asked: &Carries, i
         (true, false) => format!("a sweep for each of {all} points of it"),
         (false, _) => format!("a shadow map for each of {all} points of it"),
     };
-    let reason = format!("{way}; penumbras widen by {:.3} of the distance to what casts them", asked.widening[k]);
-    Some(technique_effect(format!("softness.{label}"), "the soft shadow of a light with an extent", all > 1, reason))
+    Some(format!("{way}; penumbras widen by {:.3} of the distance to what casts them", asked.widening[k]))
 }
 
 /// Objects with opaque discs beside translucent ones: where light is carried through these, maps of opaque objects leave both out.

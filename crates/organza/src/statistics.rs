@@ -15,6 +15,8 @@ pub struct LightStatistics {
     pub casts_shadows: bool,
     /// Whether it has no intensity.
     pub is_dark: bool,
+    /// Whether it has a size.
+    pub is_extended: bool,
     /// Points that it is for who lights by points, each with a shadow map of its own.
     pub points: usize,
     /// Whether the scene switches the light on or off.
@@ -268,6 +270,7 @@ impl LightStatistics {
             label: light.label.clone(),
             casts_shadows: light.shadow,
             is_dark: light.light.intensity.iter().all(|i| *i == 0.0),
+            is_extended: light.light.shape.is_extended(),
             points: light.count(),
             is_on: switch(EffectKind::Light),
             has_shadow: switch(EffectKind::Shadow),

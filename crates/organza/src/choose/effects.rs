@@ -13,6 +13,7 @@ mod object;
 mod opaque;
 mod scatter;
 mod shadow;
+mod soft;
 mod translucency;
 
 use super::passes::passes;
@@ -37,10 +38,11 @@ pub(crate) struct Row {
 }
 
 /// Every kind, in the order in which the tolerance is spent: what costs most goes first, and what hangs on another effect comes after it.
-pub(crate) static TABLE: [&Row; 12] = [
+pub(crate) static TABLE: [&Row; 13] = [
     &object::ROW,
     &light::ROW,
     &shadow::ROW,
+    &soft::ROW,
     &scatter::ROW,
     &bending::ROW,
     &dispersion::ROW,

@@ -9,6 +9,18 @@ const GOLDEN: f64 = 0.618_033_988_749_894_8;
 const PLASTIC: f64 = 0.754_877_666_246_692_7;
 
 impl Light {
+    /// The light without its size: all of its intensity from a point in its middle, to the same side; any other light itself.
+    #[must_use]
+    pub fn without_size(&self) -> Self {
+        let shape = match self.shape {
+            LightShape::Sphere { center, .. } => LightShape::Point { position: center },
+            LightShape::Disk { center, normal, .. } => LightShape::Patch { position: center, normal },
+            LightShape::Rect { center, u, v } => LightShape::Patch { position: center, normal: rect_normal(u, v) },
+            shape => shape,
+        };
+        Self { shape, ..*self }
+    }
+
     /// The `n` points that stand for an extended light and share its intensity evenly; any other light itself.
     ///
     /// Points of a flat light lie evenly on it and are [`LightShape::Patch`]. Those of a sphere lie within it, so that they

@@ -13,7 +13,7 @@ const WITHOUT: &str = "its light goes through everything";
 
 pub(super) static ROW: Row = Row {
     kind: EffectKind::Shadow,
-    what: "the shadow of a light, with the colours and the softness that it has",
+    what: "the shadow of a light, with the colours that it has",
     without: WITHOUT,
     candidates,
     take: |plan, _, is_on| plan.shadow_maps = is_on.to_vec(),
