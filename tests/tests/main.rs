@@ -28,6 +28,7 @@ mod footprints;
 mod fuzz_seeds;
 mod gaussians;
 mod half_vector;
+mod in_memory;
 mod interrupts;
 mod invariances;
 mod layers;

@@ -125,6 +125,7 @@ pub use up::{UpAxis, stated_up_axis, up_axis};
 
 use crate::counted;
 use crate::error::{Place, ReadError, escaped, escaped_path};
+use crate::point_attributes::attribute;
 use crate::raw_points::RawPoints;
 use extras::LONGEST_NAME;
 use format::{Format, format_of, is_raw};
@@ -260,6 +261,41 @@ pub fn bytes(
 /// Most bytes that [`crate::outwards`] takes for a vertex, each of three in a part of its own.
 const BYTES_PER_PART: u64 = 13 + 48;
 
+/// Points that are in memory already, as [`file()`] takes them: refused where a column that was asked for is not there. `name` serves messages.
+///
+/// # Errors
+/// [`ReadError`] as [`file()`] gives it.
+pub fn points_in_memory(name: &str, points: &RawPoints, params: &ReadParams) -> Result<Notes, ReadError> {
+    let mut reading = Reading::new(params, None);
+    let unused = points.columns.iter().map(|column| column.name.as_str());
+    let unused = unused
+        .filter(|name| attribute(name, params.matter).is_none())
+        .map(|name| escaped(name.as_bytes(), LONGEST_NAME));
+    reading.notes.unused = unused.collect();
+    check_columns(points, &mut reading).map_err(|e| e.in_file(name))?;
+    Ok(reading.finish(name))
+}
+
+/// The same of a volume: refused without any value.
+///
+/// # Errors
+/// [`ReadError`] as [`file()`] gives it.
+pub fn grid_in_memory(name: &str, grid: &Grid, params: &ReadParams) -> Result<Notes, ReadError> {
+    let mut reading = Reading::new(params, None);
+    remark_gaps(grid, &mut reading).map_err(|e| e.in_file(name))?;
+    Ok(reading.finish(name))
+}
+
+/// The same of a mesh: turned outwards.
+///
+/// # Errors
+/// [`ReadError`] as [`file()`] gives it.
+pub fn mesh_in_memory(name: &str, mesh: Mesh, params: &ReadParams) -> Result<(Mesh, Notes), ReadError> {
+    let mut reading = Reading::new(params, None);
+    let mesh = outwards(mesh, &mut reading).map_err(|e| e.in_file(name))?;
+    Ok((mesh, reading.finish(name)))
+}
+
 /// The content with meshes turned outwards.
 fn whole(
     path: &Path,
@@ -277,23 +313,24 @@ fn whole(
         let found = format!("the array '{}', and a file without arrays", escaped(name.as_bytes(), LONGEST_NAME));
         return Err(ReadError::input(Place::File, "a volume of VTK", found, "leave out `array`"));
     }
-    if let Loaded::Points(points) = &loaded {
-        check_columns(points, reading)?;
+    match loaded {
+        Loaded::Points(points) => check_columns(&points, reading).map(|()| Loaded::Points(points)),
+        Loaded::Grid(grid) => remark_gaps(&grid, reading).map(|()| Loaded::Grid(grid)),
+        Loaded::Mesh(mesh) => outwards(mesh, reading).map(Loaded::Mesh),
+        Loaded::Image(image) => Ok(Loaded::Image(image)),
     }
-    if let Loaded::Grid(grid) = &loaded {
-        remark_gaps(grid, reading)?;
+}
+
+/// The mesh with parts that are inside out turned.
+fn outwards(mut mesh: Mesh, reading: &mut Reading<'_>) -> Result<Mesh, ReadError> {
+    input::hold("which parts the triangles make", mesh.position.len() as u64 * BYTES_PER_PART, reading.params)?;
+    for _ in 0..crate::outwards::turn_outwards(&mut mesh) {
+        reading.mend((Fix::InsideOut, Place::File, None), || {
+            let hint = "turn the faces around, or leave out --strict";
+            ReadError::input(Place::File, "surfaces whose faces are wound outwards", "one that is inside out", hint)
+        })?;
     }
-    if let Loaded::Mesh(mut mesh) = loaded {
-        input::hold("which parts the triangles make", mesh.position.len() as u64 * BYTES_PER_PART, reading.params)?;
-        for _ in 0..crate::outwards::turn_outwards(&mut mesh) {
-            reading.mend((Fix::InsideOut, Place::File, None), || {
-                let hint = "turn the faces around, or leave out --strict";
-                ReadError::input(Place::File, "surfaces whose faces are wound outwards", "one that is inside out", hint)
-            })?;
-        }
-        return Ok(Loaded::Mesh(mesh));
-    }
-    Ok(loaded)
+    Ok(mesh)
 }
 
 /// Says how many voxels have no value, and refuses a volume of nothing else.

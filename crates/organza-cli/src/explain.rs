@@ -10,6 +10,7 @@ use organza::cost::Prediction;
 use organza::plan::Plan;
 use organza::scene::{FoundCamera, Scene, SceneObject, UpBy};
 use organza::{CostRecord, Error, Files, Progress, RenderOptions, SplatCount, escape_controls};
+use organza_judge::documents;
 use organza_judge::effects::{self, Measured, Switch};
 use serde_json::{Value, json};
 
@@ -66,14 +67,14 @@ pub(super) fn run(arguments: &ExplainArguments) -> Result<(), Error> {
     if arguments.scene.common.json {
         let document = json!({
             "scene": arguments.scene.inputs.first().map(|path| path_text(path)),
-            "camera": report::camera_json(&scene, explained.found.as_ref()),
-            "plan": report::plan_json(&explained.plan),
-            "cost": report::cost_json(&explained.cost),
-            "predicted": report::predicted_json(&explained.predicted),
-            "measured": explained.measured.as_ref().map(report::measured_json),
+            "camera": documents::camera_json(&scene, explained.found.as_ref()),
+            "plan": documents::plan_json(&explained.plan),
+            "cost": documents::cost_json(&explained.cost),
+            "predicted": documents::predicted_json(&explained.predicted),
+            "measured": explained.measured.as_ref().map(documents::measured_json),
             "memory_bytes": explained.prepared.as_ref().map(|p| p.memory),
             "up": up_json(&scene),
-            "splats": explained.prepared.as_ref().map(|p| report::splats_json(&p.splats)),
+            "splats": explained.prepared.as_ref().map(|p| documents::splats_json(&p.splats)),
             "warnings": explained.warnings,
             "notes": explained.notes,
         });

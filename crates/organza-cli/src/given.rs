@@ -5,7 +5,7 @@ use super::console;
 use super::session::{check_backend, render_options, start_threads};
 use convert::read::is_foreign_json;
 use organza::scene::{self, DEFAULT_FILL, DEFAULT_SIZE, Override, UpAxis, short};
-use organza::{Error, FileData, Files, Progress, RenderOptions, printable};
+use organza::{Error, Files, InMemory, Progress, RenderOptions, SourceData, printable};
 use organza_survey::{DataFile, Preset, Wish, Written, first_scene};
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -64,14 +64,14 @@ pub(super) fn write_first(
     let progress = Progress::new();
     let read = inputs.iter().map(|path| DataFile::read(path, wish, (files, options, &progress)));
     let mut data = read.collect::<Result<Vec<_>, _>>()?;
-    if wish.color_by.is_some() && !data.iter().any(|d| matches!(d.data, FileData::Points(_)) || d.array.is_some()) {
+    if wish.color_by.is_some() && !data.iter().any(|d| matches!(d.data, SourceData::Points(_)) || d.array.is_some()) {
         if let Some(error) = data.iter_mut().find_map(|d| d.array_error.take()) {
             return Err(error);
         }
         let hint = "leave it out, or in a scene give the surface a `field`, the volume whose values it shows";
         return Err(Error::usage("--color-by is for points and for arrays of VTK volumes, and no file has such", hint));
     }
-    let written = first_scene(&data, scene_file, wish, (files, options, &progress))?;
+    let written = first_scene(&data, scene_file, wish, &InMemory::default(), (files, options, &progress))?;
     written.remarks.iter().for_each(|remark| console::remark(remark));
     // The scene says what it uses of the files.
     files.forget_notes();

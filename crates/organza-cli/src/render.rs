@@ -9,6 +9,7 @@ use super::{console, report};
 use organza::output::{self, Metadata, Target, WriteReport};
 use organza::scene::{FoundCamera, Scene};
 use organza::{Error, GivenUp, Progress, Render, RenderOptions, Sets, WithinBudget, printable};
+use organza_judge::documents;
 use serde_json::{Value, json};
 use splat_core::{MemoryAccount, Reservation};
 use std::path::{Path, PathBuf};
@@ -231,7 +232,7 @@ impl Job<'_> {
         let mut warnings = render.warnings.clone();
         let written = self.write_outputs(&render, budgeted.as_ref(), arguments, &mut warnings)?;
         if let Some(target) = &self.places.cost {
-            target.write(format!("{:#}\n", report::cost_json(&render.cost)).as_bytes())?;
+            target.write(format!("{:#}\n", documents::cost_json(&render.cost)).as_bytes())?;
         }
         progress.finish();
         let report = match arguments.scene.common.json {
@@ -329,15 +330,15 @@ impl Job<'_> {
         let mut document = json!({
             "scene": self.inputs.first().map(|path| path_text(path)),
             "inputs": self.inputs.iter().map(|path| path_text(path)).collect::<Value>(),
-            "camera": report::camera_json(self.scene, render.found.or(self.found).as_ref()),
+            "camera": documents::camera_json(self.scene, render.found.or(self.found).as_ref()),
             "scene_sha256": self.scene.sha256,
             "size": self.scene.camera.size,
             "seed": self.scene.render.seed,
             "backend": render.backend,
             "outputs": outputs.collect::<Value>(),
-            "plan": report::plan_json(&render.plan),
-            "cost": report::cost_json(&render.cost),
-            "predicted": report::predicted_json(&render.predicted),
+            "plan": documents::plan_json(&render.plan),
+            "cost": documents::cost_json(&render.cost),
+            "predicted": documents::predicted_json(&render.predicted),
             "sets": render.sets.map(sets),
             "budget": budgeted.map(Budgeted::json),
             "warnings": render.warnings,

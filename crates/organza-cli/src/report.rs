@@ -1,36 +1,12 @@
-//! Plans and costs as tables and as JSON.
+//! Plans and costs as tables.
 
-use organza::cost::{CountedPass, Prediction, duration_text};
-use organza::plan::{Effect, Estimate, Plan, PlannedObject};
-use organza::scene::{FoundCamera, Scene};
-use organza::{CostRecord, ShadowTable, SplatCount};
-use organza_judge::effects::{EffectChange, FixedEffect, Measured};
-use serde_json::{Value, json};
+use organza::cost::{Prediction, duration_text};
+use organza::plan::{Effect, Plan};
+use organza::scene::FoundCamera;
+use organza::{CostRecord, SplatCount};
+use organza_judge::effects::Measured;
 use splat_core::glam::DVec3;
 use std::fmt::Write;
-
-/// The cost record as JSON, a list of stages.
-pub(super) fn cost_json(cost: &CostRecord) -> Value {
-    let stage = |s: &splat_core::StageCost| {
-        json!({
-            "name": s.name, "seconds": s.seconds, "items_in": s.items_in, "items_out": s.items_out,
-            "fragments": s.fragments, "bytes": s.bytes, "passes": s.passes,
-        })
-    };
-    cost.stages.iter().map(stage).collect()
-}
-
-/// Where the camera is, and whether it was placed by itself.
-pub(super) fn camera_json(scene: &Scene, found: Option<&FoundCamera>) -> Value {
-    let (camera, target) = found.map_or((&scene.camera, scene.target), |found| (&found.camera, found.target));
-    json!({
-        "auto": found.is_some(),
-        "position": camera.position.to_array(),
-        "target": target.to_array(),
-        "forward": camera.axes[2].to_array(),
-        "up": camera.axes[1].to_array(),
-    })
-}
 
 /// The camera that was placed by itself, as a scene would say it.
 pub(super) fn camera_text(found: &FoundCamera) -> String {
@@ -42,26 +18,6 @@ pub(super) fn camera_text(found: &FoundCamera) -> String {
 /// Threads that draw, as all stages share them.
 fn threads() -> usize {
     rayon::current_num_threads()
-}
-
-/// Counted work of each pass with its predicted time, as JSON.
-pub(super) fn predicted_json(predicted: &Prediction) -> Value {
-    let threads = threads();
-    let pass = |p: &CountedPass| {
-        let counts = p.counts.iter().map(|c| (c.item.name().to_owned(), json!(c.number)));
-        json!({
-            "name": p.pass, "stage": p.stage, "counts": counts.collect::<serde_json::Map<_, _>>(),
-            "seconds_of_one_core": p.seconds(&predicted.rates, 1), "seconds": p.seconds(&predicted.rates, threads),
-        })
-    };
-    json!({
-        "by": predicted.rates.source(),
-        "threads": threads,
-        "passes": predicted.passes().map(pass).collect::<Value>(),
-        "seconds_of_one_core": predicted.seconds(1),
-        "seconds": predicted.seconds(threads),
-        "announcement": predicted.announcement(threads),
-    })
 }
 
 /// Counted work of each pass with its predicted time, as a table, and the total in one line.
@@ -84,13 +40,6 @@ pub(super) fn predicted_text(predicted: &Prediction) -> String {
     text
 }
 
-/// Splats by object as JSON.
-pub(super) fn splats_json(splats: &[SplatCount]) -> Value {
-    let object =
-        |s: &SplatCount| json!({ "object": s.object, "predicted": s.predicted, "exact": s.exact, "made": s.made });
-    splats.iter().map(object).collect()
-}
-
 /// Splats by object as a table.
 pub(super) fn splats_text(splats: &[SplatCount]) -> String {
     let rows = splats.iter().map(|s| {
@@ -100,50 +49,13 @@ pub(super) fn splats_text(splats: &[SplatCount]) -> String {
     table(["object", "splats predicted", "splats"], "lrr", rows)
 }
 
-/// The plan as JSON.
-pub(super) fn plan_json(plan: &Plan) -> Value {
-    let effects = plan
-        .effects
-        .iter()
-        .map(|e| json!({
-            "name": e.name, "what": e.what, "called_for": e.called_for, "lacking": e.is_lacking, "in_scene": !e.is_absent,
-            "reason": e.reason, "bound": e.bound.number(),
-        }));
-    let passes = plan.passes.iter().map(|p| json!({ "name": p.name, "reason": p.reason }));
-    json!({
-        "technique": plan.technique,
-        "effects": effects.collect::<Value>(),
-        "estimates": plan.estimates.iter().map(|e| estimate_json(plan, e)).collect::<Value>(),
-        "passes": passes.collect::<Value>(),
-        "optical_depth_planes": plan.optical_depth_planes,
-        "shadow_maps": plan.shadow_maps,
-        "shadow_tables": plan.shadow_tables.iter().map(|t| t.as_ref().map(table_json)).collect::<Value>(),
-        "samplers": chosen(plan).iter().map(object_json).collect::<Value>(),
-    })
-}
-
-fn estimate_json(plan: &Plan, estimate: &Estimate) -> Value {
-    let error = estimate.displayed_error;
-    json!({
-        "technique": estimate.technique.name(), "object": estimate.of_object, "what": estimate.what,
-        // JSON has no infinity: an error that is not known is none.
-        "displayed_error": error.is_finite().then_some(error),
-        "draws": is_drawn(plan, estimate), "reason": estimate.words,
-    })
-}
-
-/// Whether an estimate is of the technique that draws its object.
-fn is_drawn(plan: &Plan, estimate: &Estimate) -> bool {
-    plan.objects.iter().any(|o| o.object == estimate.of_object && o.technique == estimate.technique)
-}
-
 /// What techniques err by as a table; nothing where nothing is known to be wrong.
 fn estimates_text(plan: &Plan) -> String {
     if plan.estimates.is_empty() {
         return String::new();
     }
     let rows = plan.estimates.iter().map(|estimate| {
-        let by = if is_drawn(plan, estimate) { "yes" } else { "no" };
+        let by = if plan.is_drawn_as(estimate) { "yes" } else { "no" };
         let error = estimate.displayed_error;
         let share = if error.is_finite() { share_text(error) } else { "not known".to_owned() };
         let technique = estimate.technique.name().to_owned();
@@ -151,27 +63,6 @@ fn estimates_text(plan: &Plan) -> String {
     });
     let text = table(["technique", "draws it", "errs by about", "of", "why"], "llrll", rows);
     text + "errs by about: an estimate of the change of a pixel as it is displayed, of black to white; it is no bound\n\n"
-}
-
-fn table_json(t: &ShadowTable) -> Value {
-    let p = &t.predicted;
-    json!({
-        "columns": p.size[0], "rows": p.size[1], "cells": p.limit.to_string(), "entries": p.entries as u64, "bytes": p.bytes,
-        "absorbance_cut": t.absorbance_cut(),
-    })
-}
-
-/// What draws each object; nothing where one technique draws all of them as splats.
-fn chosen(plan: &Plan) -> &[PlannedObject] {
-    let plain = plan.techniques.len() == 1 && plan.objects.iter().all(PlannedObject::is_drawn_as_splats);
-    if plain { &[] } else { &plan.objects }
-}
-
-fn object_json(o: &PlannedObject) -> Value {
-    let (technique, source) = (o.technique.name(), o.form.name());
-    json!({
-        "object": o.object, "technique": technique, "source": source, "reason": o.reason, "becomes_splats": o.splats,
-    })
 }
 
 /// The plan as a table.
@@ -196,8 +87,8 @@ pub(super) fn plan_text(plan: &Plan) -> String {
     text += &estimates_text(plan);
     let passes = plan.passes.iter().map(|p| [p.name.clone(), p.reason.clone()]);
     text += &table(["pass", "what for"], "ll", passes);
-    if !chosen(plan).is_empty() {
-        let objects = chosen(plan).iter().map(|o| {
+    if !plan.chosen().is_empty() {
+        let objects = plan.chosen().iter().map(|o| {
             let splats = o.splats.map_or("no".to_owned(), |why| format!("yes: {why}"));
             [o.object.clone(), o.technique.name().to_owned(), o.form.name().to_owned(), o.reason.to_owned(), splats]
         });
@@ -205,23 +96,6 @@ pub(super) fn plan_text(plan: &Plan) -> String {
         text += &table(["object", "technique", "from", "why", "becomes splats"], "lllll", objects);
     }
     text
-}
-
-/// Changes and times of effects, as JSON.
-pub(super) fn measured_json(measured: &Measured) -> Value {
-    let change = |change: &EffectChange| {
-        json!({
-            "name": change.name, "largest_change": change.largest, "share_beyond_tolerance": change.beyond_tolerance,
-            "seconds_with": change.seconds_with, "seconds_without": change.seconds_without,
-        })
-    };
-    let fixed = |fixed: &FixedEffect| json!({ "name": fixed.name, "reason": fixed.reason });
-    json!({
-        "seconds": measured.seconds,
-        "effects": measured.changes.iter().map(change).collect::<Value>(),
-        "not_switched": measured.fixed.iter().map(fixed).collect::<Value>(),
-        "left_out_together": measured.left_out_together,
-    })
 }
 
 /// The same as a table, beside the bounds of the plan.

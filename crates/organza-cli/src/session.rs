@@ -5,7 +5,7 @@ use super::given::{Given, camera_overrides, given};
 use super::memory;
 use organza::device::{Choice, Device, DeviceChoice};
 use organza::scene::{self, LoadOptions, Override, Scene, Source, Technique, short};
-use organza::{Cache, Error, Files, Progress, RenderOptions, printable};
+use organza::{Cache, Error, Files, InMemory, Progress, RenderOptions, printable};
 use splat_core::MemoryAccount;
 use std::path::Path;
 use std::sync::Arc;
@@ -49,7 +49,8 @@ fn parse_changed(
     let overrides = [overrides(arguments, given.is_made)?, changes].concat();
     let SceneArguments { allow_path, sandbox, .. } = *arguments;
     let memory = MemoryAccount::new(reading_options(&arguments.common).max_memory);
-    let options = LoadOptions { allow_path, sandbox, memory, overrides, frame, turntable };
+    let options =
+        LoadOptions { allow_path, sandbox, memory, overrides, frame, turntable, in_memory: InMemory::default() };
     let scene = scene::parse(&given.file, &given.bytes, &options)?;
     if arguments.merge_duplicates && !scene.objects.iter().any(|object| matches!(object.source, Source::Points(_))) {
         let message = "--merge-duplicates is for `points`, and no object is made of such";

@@ -11,6 +11,7 @@
 #![forbid(unsafe_code)]
 
 pub mod accuracy;
+pub mod documents;
 pub mod effects;
 pub mod orders;
 pub mod truth;

@@ -126,14 +126,37 @@ impl Format {
 /// [`Error::Usage`] for an unknown extension, [`Error::Io`] and [`Error::Output`] for the file system; a file that was
 /// there before is then unchanged.
 pub fn write(layers: &Layers, metadata: &Metadata, target: &Target, params: &Params) -> Result<WriteReport, Error> {
+    let (bytes, report) = encode(layers, metadata, Format::of_path(target.path())?, params)?;
+    target.write(&bytes)?;
+    Ok(report)
+}
+
+/// The bytes of a file of this format, as [`write()`] makes it.
+///
+/// # Errors
+/// [`Error::Output`] for a picture that the format cannot hold.
+pub fn encode(
+    layers: &Layers,
+    metadata: &Metadata,
+    format: Format,
+    params: &Params,
+) -> Result<(Vec<u8>, WriteReport), Error> {
     let mut report = WriteReport::default();
-    let bytes = match Format::of_path(target.path())? {
+    let bytes = match format {
         Format::Exr => exr_file::encode(layers, metadata, params, &mut report)?,
         Format::Png => png_file::encode(layers, metadata, params, &mut report)?,
     };
     report.bytes = bytes.len() as u64;
-    target.write(&bytes)?;
-    Ok(report)
+    Ok((bytes, report))
+}
+
+/// The displayed picture, as a PNG file of 8 bits a channel has it: red, green and blue of each pixel, row by row from the top left, and its opacity where
+/// the picture is to be transparent.
+///
+/// # Errors
+/// [`Error::Internal`] for layers without `beauty`, or for a transparent picture without `alpha` and `background`.
+pub fn displayed_bytes(layers: &Layers, metadata: &Metadata, params: &Params) -> Result<Vec<u8>, Error> {
+    png_file::bytes(layers, metadata, params, &mut WriteReport::default())
 }
 
 /// The page's example compiles and holds.

@@ -12,18 +12,35 @@ pub(super) fn encode(
     params: &Params,
     report: &mut WriteReport,
 ) -> Result<Vec<u8>, Error> {
-    let gain = libm::exp2(metadata.exposure) as f32;
-    let (mut samples, color) = match params.transparent {
-        true => (transparent(layers, gain, report)?, ColorType::Rgba),
-        false => (opaque(layers, gain, report)?, ColorType::Rgb),
-    };
-    let mut canvas = legend::Canvas::new(&mut samples, layers.size[0], color.samples());
-    report.without_room += legend::draw(&mut canvas, &params.legend);
+    let samples = samples(layers, metadata, params, report)?;
+    let color = if params.transparent { ColorType::Rgba } else { ColorType::Rgb };
     let depth = if params.deep { BitDepth::Sixteen } else { BitDepth::Eight };
     let mut bytes = Vec::new();
     written(&mut bytes, layers.size, (color, depth), &quantized(&samples, depth), metadata)
         .map_err(|e| Error::Internal(format!("PNG encoder: {e}")))?;
     Ok(bytes)
+}
+
+/// The displayed picture, as a PNG file of 8 bits a channel has it: red, green and blue of each pixel, and its opacity where `params` are of a transparent
+/// one.
+pub(super) fn bytes(
+    layers: &Layers,
+    metadata: &Metadata,
+    params: &Params,
+    report: &mut WriteReport,
+) -> Result<Vec<u8>, Error> {
+    Ok(quantized(&samples(layers, metadata, params, report)?, BitDepth::Eight))
+}
+
+/// The displayed picture with its legends, 0 to 1.
+fn samples(layers: &Layers, metadata: &Metadata, params: &Params, report: &mut WriteReport) -> Result<Vec<f32>, Error> {
+    let gain = libm::exp2(metadata.exposure) as f32;
+    let mut samples =
+        if params.transparent { transparent(layers, gain, report)? } else { opaque(layers, gain, report)? };
+    let channels = if params.transparent { 4 } else { 3 };
+    let mut canvas = legend::Canvas::new(&mut samples, layers.size[0], channels);
+    report.without_room += legend::draw(&mut canvas, &params.legend);
+    Ok(samples)
 }
 
 fn written(

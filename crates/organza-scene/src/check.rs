@@ -177,7 +177,7 @@ pub(super) fn scene(
     }
     let paths = Paths::new(&at.key(ROOT_KEY), document.file, raw.root.as_deref(), options)?;
     let at_footprints = at.key("footprints");
-    let footprints = check_footprints(&at_footprints, raw.footprints.as_deref(), &paths, &options.memory)?;
+    let footprints = check_footprints(&at_footprints, raw.footprints.as_deref(), &paths, options)?;
     let mut materials = check_materials(&at.key("material"), &raw.material, (&paths, &footprints.stack))?;
     let extracts = raw.object.iter().filter_map(|object| object.extract.as_ref()?.objects.clone());
     let tracks = raw.animation.iter().flat_map(|animation| &animation.track);
@@ -228,6 +228,7 @@ pub(super) fn scene(
         materials,
         footprints: footprints.stack,
         footprint_files: footprints.files,
+        in_memory: options.in_memory.clone(),
     })
 }
 

@@ -1,14 +1,15 @@
 //! Checks of footprints: the list of a scene, whose images are read here, and what objects choose of it.
 
-use super::Source;
 use super::check::At;
+use super::in_memory::SourceData;
 use super::paths::Paths;
 use super::raw_footprint::{NumberOr, RawChoice, RawChosen, RawFootprint, RawImages};
+use super::{LoadOptions, Source};
 use crate::{Error, printable, shown};
 use convert::FootprintChoice;
 use convert::read::{Loaded, ReadParams, file};
 use convert::{Fault, ReadError};
-use splat_core::{Exceeded, Footprint, FootprintImage, FootprintStack, MemoryAccount};
+use splat_core::{Exceeded, Footprint, FootprintImage, FootprintStack};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -31,7 +32,7 @@ pub(super) fn check_footprints(
     at: &At<'_>,
     raw: Option<&[RawFootprint]>,
     paths: &Paths,
-    memory: &MemoryAccount,
+    options: &LoadOptions,
 ) -> Result<Footprints, Error> {
     let Some(raw) = raw else { return Ok(Footprints::default()) };
     let (mut layers, mut images, mut files) = (Vec::new(), Vec::new(), Vec::new());
@@ -46,7 +47,7 @@ pub(super) fn check_footprints(
                 let layer = check_cutoff(&at.key("cutoff"), of.cutoff.unwrap_or(3.0))?;
                 for (path, place) in check_paths(&at, of, paths)? {
                     layers.push(layer);
-                    images.push(Some(read_image(&place, &path, memory)?));
+                    images.push(Some(read_image(&place, &path, options)?));
                     files.push(path);
                 }
             }
@@ -124,21 +125,29 @@ fn too_large(error: &ReadError, limit: u64) -> Error {
     Error::Limit(Exceeded { what, needed, limit: Some(limit), unit: "bytes", hint: error.hint.into() })
 }
 
-fn read_image(at: &At<'_>, path: &Path, memory: &MemoryAccount) -> Result<Arc<FootprintImage>, Error> {
-    let params = ReadParams { is_coverage: true, memory: memory.clone(), ..ReadParams::default() };
-    let (loaded, _) = file(path, &params, None).map_err(|e| match e.fault {
-        Fault::Limit => too_large(&e, memory.limit()),
-        _ => at.error(format!("{}{}: expected {}, found {}", e.file, e.place, e.expected, e.found), e.hint),
-    })?;
-    // While means are taken of it.
-    let _held = memory.take(&printable(path), loaded.bytes()).map_err(Error::Limit)?;
+/// The coverage of a place by an image, of a file or in memory; all three channels of an image in memory say it.
+fn read_image(at: &At<'_>, path: &Path, options: &LoadOptions) -> Result<Arc<FootprintImage>, Error> {
+    let memory = &options.memory;
     let refuse = |found: String, hint: &str| {
         Err(at.error(format!("expected an image of coverage, {} has {found}", printable(path)), hint))
     };
-    let image = match loaded {
-        Loaded::Image(image) => image,
-        _ => return refuse("something else".into(), "name a PNG or OpenEXR image"),
+    let image = match options.in_memory.get(path) {
+        Some(SourceData::Image(image)) => image.clone(),
+        Some(_) => return refuse("something else".into(), "name an image"),
+        None => {
+            let params = ReadParams { is_coverage: true, memory: memory.clone(), ..ReadParams::default() };
+            let (loaded, _) = file(path, &params, None).map_err(|e| match e.fault {
+                Fault::Limit => too_large(&e, memory.limit()),
+                _ => at.error(format!("{}{}: expected {}, found {}", e.file, e.place, e.expected, e.found), e.hint),
+            })?;
+            match loaded {
+                Loaded::Image(image) => Arc::new(image),
+                _ => return refuse("something else".into(), "name a PNG or OpenEXR image"),
+            }
+        }
     };
+    // While means are taken of it.
+    let _held = memory.take(&printable(path), image.bytes()).map_err(Error::Limit)?;
     let [width, height] = image.size;
     if width.max(height) > LONGEST_SIDE {
         let found = format!("{width} x {height} pixels");

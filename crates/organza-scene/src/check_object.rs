@@ -6,6 +6,7 @@ use super::check_footprint::check_choice;
 use super::check_points::check_points;
 use super::check_render::check_technique;
 use super::check_source::check_source;
+use super::in_memory::name_of;
 use super::paths::Paths;
 use super::raw_object::{RawLattice, RawObject, RawTransform, RawUp};
 use super::{FieldSource, SceneMaterial, SceneObject, Source, Technique, Up, UpBy};
@@ -102,7 +103,8 @@ fn by_scene(axis: UpAxis) -> Up {
 /// The axis that points up by the source's files and the field's, which have to agree.
 fn up_of_files(at: &At<'_>, source: &Source, field: Option<&FieldSource>) -> Result<Up, Error> {
     let of_field = field.map(|field| &*field.path);
-    let mut axes = source.paths().into_iter().chain(of_field).map(|path| (path, up_axis(path)));
+    let paths = || source.paths().into_iter().chain(of_field).filter(|path| name_of(path).is_none());
+    let mut axes = paths().map(|path| (path, up_axis(path)));
     let Some((first, axis)) = axes.next() else { return Ok(by_scene(UpAxis::Y)) };
     if let Some((other, another)) = axes.find(|(_, another)| *another != axis) {
         let [first, other] = [first, other].map(crate::printable);
@@ -113,7 +115,7 @@ fn up_of_files(at: &At<'_>, source: &Source, field: Option<&FieldSource>) -> Res
         );
         return Err(at.key("transform").error(message, "say which one counts: `transform = { up = \"z\" }`"));
     }
-    let is_stated = source.paths().into_iter().chain(of_field).any(|path| stated_up_axis(path).is_some());
+    let is_stated = paths().any(|path| stated_up_axis(path).is_some());
     Ok(Up { axis, by: if is_stated { UpBy::File } else { UpBy::Nothing } })
 }
 

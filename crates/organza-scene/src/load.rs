@@ -3,7 +3,7 @@
 use super::overrides::{self, Override};
 use super::raw::RawScene;
 use super::tree::{Document, error_at};
-use super::{Scene, animation, check, de, raw_camera, read_json, read_toml};
+use super::{InMemory, Scene, animation, check, de, raw_camera, read_json, read_toml};
 use crate::Error;
 use sha2::{Digest, Sha256};
 use splat_core::{Exceeded, MemoryAccount};
@@ -31,6 +31,8 @@ pub struct LoadOptions {
     pub sandbox: bool,
     /// What the text of the scene and the images of its footprints take while they are read, together with all else on the same account.
     pub memory: MemoryAccount,
+    /// Data that the scene may name as `memory:NAME`.
+    pub in_memory: InMemory,
     /// Changes from the command line, applied in order before anything is checked.
     pub overrides: Vec<Override>,
     /// The frame of the scene's animation; `None` loads the scene as it is written.

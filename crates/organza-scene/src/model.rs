@@ -1,5 +1,6 @@
 //! The checked scene: everything a render needs, in radians and f64 world units.
 
+use super::in_memory::{InMemory, name_of};
 use super::{CameraFit, FieldSource, PointsLook, RenderSettings, SceneLight, Source, Stop, Technique};
 use crate::Error;
 use convert::read::UpAxis;
@@ -50,6 +51,8 @@ pub struct Scene {
     pub footprints: FootprintStack,
     /// The files of those that are images.
     pub footprint_files: Vec<PathBuf>,
+    /// The data that it names in the place of files.
+    pub in_memory: InMemory,
 }
 
 impl Scene {
@@ -121,6 +124,10 @@ impl Scene {
     pub fn digest_of_data(&self) -> Result<[u8; 32], Error> {
         let mut hasher = Sha256::new();
         for path in self.files().into_iter().skip(1) {
+            if name_of(&path).is_some() {
+                self.in_memory.digest(&path, &mut hasher);
+                continue;
+            }
             // Asked before opening: opening a pipe waits for its writer.
             let regular = std::fs::metadata(&path).and_then(|meta| match meta.is_file() {
                 true => Ok(()),

@@ -1,7 +1,7 @@
 //! Paths of data: relative to the scene file, inside the scene's root folder, or inside the one that it names, unless allowed.
 
-use super::LoadOptions;
 use super::check::At;
+use super::{InMemory, LoadOptions, in_memory};
 use crate::{Error, printable, shown};
 use std::path::{Component, Path, PathBuf};
 
@@ -16,6 +16,8 @@ pub(super) struct Paths {
     root: Option<PathBuf>,
     /// The folder that the scene names, as the system knows it.
     named: Option<PathBuf>,
+    /// The data that a source may name in the place of a file.
+    in_memory: InMemory,
 }
 
 impl Paths {
@@ -38,12 +40,15 @@ impl Paths {
                 return Err(at_named.error(message, "leave out --sandbox if you trust the scene"));
             }
         }
-        Ok(Self { folder, root, named })
+        Ok(Self { folder, root, named, in_memory: options.in_memory.clone() })
     }
 
     /// The path of a file named in the scene.
     pub(super) fn resolve(&self, at: &At<'_>, text: &str) -> Result<PathBuf, Error> {
         check_text(at, text)?;
+        if let Some(found) = in_memory::resolve(text, &self.in_memory) {
+            return found.map_err(|(message, hint)| at.error(message, hint));
+        }
         let path = self.folder.join(text);
         let Some(root) = &self.root else { return Ok(path) };
         let absolute = std::path::absolute(&path).map_err(|e| at.error(format!("\"{}\": {e}", shown(text)), ""))?;

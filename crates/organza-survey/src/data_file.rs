@@ -4,7 +4,7 @@ use crate::facts::bounds_of;
 use crate::preset::Wish;
 use crate::stands::{cloud_stands_along, extent, lies_flat_along, stands_along};
 use convert::read::{ReadParams, UpAxis, stated_up_axis};
-use organza::{Error, FileData, Files, Progress, RenderOptions, printable};
+use organza::{Error, Files, Progress, RenderOptions, SourceData, printable, scene};
 use std::path::{Path, PathBuf};
 
 /// A data file that was read.
@@ -13,7 +13,7 @@ pub struct DataFile {
     /// The file, as it was named.
     pub path: PathBuf,
     /// What it holds.
-    pub data: FileData,
+    pub data: SourceData,
     /// Which of its axes points up, if its format says so.
     pub stated_up: Option<UpAxis>,
     /// Which one points up by how it stands, where its format says nothing of that.
@@ -41,7 +41,7 @@ impl DataFile {
         let columns = wish.color_by.iter().cloned().collect();
         let mut data = files.read(path, &ReadParams { columns, ..options.read_params() }, progress)?;
         let (mut array, mut array_error) = (None, None);
-        if let (FileData::Grid(_), Some(name)) = (&data, &wish.color_by) {
+        if let (SourceData::Grid(_), Some(name)) = (&data, &wish.color_by) {
             let params = ReadParams { array: Some(name.clone()), ..options.read_params() };
             match files.read(path, &params, progress) {
                 Ok(of_array) => (data, array) = (of_array, Some(name.clone())),
@@ -49,52 +49,76 @@ impl DataFile {
                 Err(error) => array_error = Some(error),
             }
         }
+        let stated_up = stated_up_axis(path);
+        Ok(Self { array, array_error, ..Self::of_data(path, data, stated_up, wish)? })
+    }
+
+    /// Data that a program has in memory under this name; of points all columns are there.
+    ///
+    /// # Errors
+    /// [`Error::Input`] for a mesh without faces, no points, and an image.
+    pub fn in_memory(name: &str, data: SourceData, wish: &Wish) -> Result<Self, Error> {
+        Self::of_data(Path::new(&scene::source_in_memory(name)), data, None, wish)
+    }
+
+    /// What a first scene asks of data.
+    fn of_data(path: &Path, mut data: SourceData, stated_up: Option<UpAxis>, wish: &Wish) -> Result<Self, Error> {
         let mut nodata = None;
-        if let FileData::Grid(grid) = &data
+        if let SourceData::Grid(grid) = &data
             && let Some(fill) = convert::FillValue::of_grid(grid)
         {
             nodata = Some(fill.value);
-            data = FileData::Grid(convert::without_value(grid, fill.value).0.into());
+            data = SourceData::Grid(convert::without_value(grid, fill.value).0.into());
         }
         let refuse = |message: &str, hint: &str| Err(Error::input(printable(path), message, hint));
         match &data {
-            FileData::Mesh(mesh) if mesh.triangles.is_empty() => refuse("expected at least one face, found none", ""),
-            FileData::Points(points) if points.is_empty() => refuse("expected at least one point, found none", ""),
-            FileData::Image(_) => {
+            SourceData::Mesh(mesh) if mesh.triangles.is_empty() => refuse("expected at least one face, found none", ""),
+            SourceData::Points(points) if points.is_empty() => refuse("expected at least one point, found none", ""),
+            SourceData::Image(_) => {
                 let message = "an image of radiance is an environment, and not a thing to look at";
                 refuse(message, "name it in a scene: [background] environment = \"FILE\"")
             }
             _ => {
-                let stated_up = stated_up_axis(path);
                 let stands = match &data {
-                    FileData::Mesh(mesh) => stands_along(mesh.bounds()),
-                    FileData::Points(points) => bounds_of(points.origin, &points.position).and_then(cloud_stands_along),
-                    FileData::Grid(grid) => lies_flat_along(extent(grid)),
-                    FileData::Image(_) => None,
+                    SourceData::Mesh(mesh) => stands_along(mesh.bounds()),
+                    SourceData::Points(points) => {
+                        bounds_of(points.origin, &points.position).and_then(cloud_stands_along)
+                    }
+                    SourceData::Grid(grid) => lies_flat_along(extent(grid)),
+                    SourceData::Image(_) => None,
                 };
-                let degrees = matches!(&data, FileData::Points(points) if convert::looks_like_degrees(points));
+                let degrees = matches!(&data, SourceData::Points(points) if convert::looks_like_degrees(points));
                 // Heights are along z then.
                 let stands = if degrees { Some(UpAxis::Z) } else { stands };
                 let stands = stands.filter(|_| stated_up.is_none() && wish.up.is_none());
-                Ok(Self { path: path.to_owned(), data, stated_up, stands, degrees, array, nodata, array_error })
+                Ok(Self {
+                    path: path.to_owned(),
+                    data,
+                    stated_up,
+                    stands,
+                    degrees,
+                    array: None,
+                    nodata,
+                    array_error: None,
+                })
             }
         }
     }
 
     /// A name for its object: that of the file, with what would part a path of `--set` replaced.
     pub(crate) fn name(&self) -> String {
-        const LONGEST: usize = 60;
+        if let Some(name) = scene::name_in_memory(&self.path) {
+            return named(name);
+        }
         let name = self.path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
         let stem = name.strip_suffix(".gz").unwrap_or(&name);
         let stem = stem.rsplit_once('.').map_or(stem, |(stem, _)| stem);
-        let fits = |c: char| if c.is_alphanumeric() || c == '-' || c == '_' { c } else { '-' };
-        let name: String = stem.chars().take(LONGEST).map(fits).collect();
-        if name.trim_matches('-').is_empty() { "object".to_owned() } else { name }
+        named(stem)
     }
 
     /// Whether its data has colours of its own, those of splats too.
     pub(crate) fn is_colored(&self) -> bool {
-        self.has_colors() || matches!(&self.data, FileData::Points(points) if !points.ready.cloud.is_empty())
+        self.has_colors() || matches!(&self.data, SourceData::Points(points) if !points.ready.cloud.is_empty())
     }
 
     /// Whether its vertices or points have colours that show something.
@@ -109,8 +133,8 @@ impl DataFile {
 
     fn colors(&self) -> &[[f32; 3]] {
         match &self.data {
-            FileData::Mesh(mesh) => &mesh.color,
-            FileData::Points(points) => &points.color,
+            SourceData::Mesh(mesh) => &mesh.color,
+            SourceData::Points(points) => &points.color,
             _ => &[],
         }
     }
@@ -121,6 +145,14 @@ impl DataFile {
         let luminance = |c: &[f32; 3]| f64::from(0.2126 * c[0] + 0.7152 * c[1] + 0.0722 * c[2]);
         (!colors.is_empty()).then(|| colors.iter().map(luminance).sum::<f64>() / colors.len() as f64)
     }
+}
+
+/// A text as a name of an object.
+fn named(text: &str) -> String {
+    const LONGEST: usize = 60;
+    let fits = |c: char| if c.is_alphanumeric() || c == '-' || c == '_' { c } else { '-' };
+    let name: String = text.chars().take(LONGEST).map(fits).collect();
+    if name.trim_matches('-').is_empty() { "object".to_owned() } else { name }
 }
 
 #[cfg(test)]
@@ -134,7 +166,7 @@ mod tests {
             let points = RawPoints { position: vec![Default::default(); color.len()], color, ..RawPoints::default() };
             DataFile {
                 path: "a.las".into(),
-                data: FileData::Points(points.into()),
+                data: SourceData::Points(points.into()),
                 stated_up: None,
                 stands: None,
                 degrees: false,
@@ -153,7 +185,7 @@ mod tests {
     #[test]
     fn objects_are_named_after_files_without_what_parts_paths() {
         let name = |path: &str| {
-            let data = FileData::Points(RawPoints::default().into());
+            let data = SourceData::Points(RawPoints::default().into());
             DataFile {
                 path: path.into(),
                 data,

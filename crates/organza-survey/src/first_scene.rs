@@ -11,8 +11,10 @@ use crate::lamps::lamps;
 use crate::number::{color, list, rounded, significant};
 use crate::preset::{Preset, Wish};
 use look::{Object, all_stand, drawn_steps, objects, takes_preset};
-use organza::scene::{DEFAULT_AZIMUTH, FoundCamera, LoadOptions, ROOT_KEY, parse, relative_path, root_for};
-use organza::{Error, FileData, Files, Progress, RenderOptions, printable};
+use organza::scene::{
+    DEFAULT_AZIMUTH, FoundCamera, LoadOptions, ROOT_KEY, name_in_memory, parse, relative_path, root_for,
+};
+use organza::{Error, Files, InMemory, Progress, RenderOptions, SourceData, printable};
 use splat_core::glam::DVec3;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -47,7 +49,8 @@ pub struct Written {
     pub remarks: Vec<String>,
 }
 
-/// Writes a first scene of data files, as the text of `scene_file`, which paths are relative to. `files` are those that were read.
+/// Writes a first scene of data, as the text of `scene_file`, which paths are relative to. `in_memory` has what is in no file, `files` are those that
+/// were read.
 ///
 /// # Errors
 /// [`Error::Input`] for a name that a scene cannot write, or data that cannot be seen; as [`organza::render`] for what cannot be read.
@@ -55,11 +58,13 @@ pub fn first_scene(
     data: &[DataFile],
     scene_file: &Path,
     wish: &Wish,
+    in_memory: &InMemory,
     (files, options, progress): (&Files, &RenderOptions, &Progress),
 ) -> Result<Written, Error> {
     let folder = folder_of(scene_file)?;
     let paths: Vec<String> = data.iter().map(|d| written_path(&d.path, &folder)).collect::<Result<_, _>>()?;
-    let root = root_for(scene_file, data.iter().map(|d| d.path.as_path()))?;
+    let on_disk = data.iter().map(|d| d.path.as_path()).filter(|path| name_in_memory(path).is_none());
+    let root = root_for(scene_file, on_disk)?;
     let root = root.map(|root| text_of(&root)).transpose()?;
     if wish.preset.is_some() && !data.iter().any(|file| takes_preset(file, wish)) {
         let message = "--preset is for volumes, and as a colour map for points by a column, and no file is drawn so";
@@ -80,16 +85,20 @@ pub fn first_scene(
     let drawn = render_text(data, wish, objects.iter().all(Object::is_labels));
     let seen: String = objects.iter().map(Object::material).chain(objects.iter().map(Object::text)).collect();
     let first = head(&camera) + &seen + &drawn;
-    let scene =
-        parse(scene_file, first.as_bytes(), &LoadOptions { turntable: wish.turntable, ..LoadOptions::default() })?;
+    let load = LoadOptions { turntable: wish.turntable, in_memory: in_memory.clone(), ..LoadOptions::default() };
+    let scene = parse(scene_file, first.as_bytes(), &load)?;
     let found = organza::fitted(&scene, options, progress, files)?.1;
     let found = found.ok_or_else(|| Error::Internal("a camera that was to be placed has no place".into()))?;
     let camera = camera_text(&found, azimuth);
     let mut text =
         format!("# A first scene, written by `organza init`. Every key: docs/scene.md of Organza.\n{}", head(&camera));
     let background = if data.iter().filter_map(DataFile::luminance).any(|l| l < IS_DARK) { BRIGHT } else { DARK };
-    let _ =
-        write!(text, "\n[background]\ncolor = {}\n\n{}", color(background), lamps(&found, wish.turntable.is_some()));
+    let _ = write!(
+        text,
+        "\n[background]\ncolor = {}\n\n{}",
+        color(background),
+        lamps(&found.camera, wish.turntable.is_some())
+    );
     text += &seen;
     if wish.ground {
         text += &ground(&found);
@@ -121,7 +130,7 @@ fn degree_remarks(data: &[DataFile]) -> impl Iterator<Item = String> + '_ {
 /// How it is drawn, where that is not as everything is: volumes alone by sheets, whose smooth edges need no more than one sample a pixel. Voxels of
 /// labels have their colours before these are interpolated: between two labels others would show.
 fn render_text(data: &[DataFile], wish: &Wish, are_labels: bool) -> String {
-    let steps_of = |d: &DataFile| if let FileData::Grid(grid) = &d.data { Some(drawn_steps(grid)) } else { None };
+    let steps_of = |d: &DataFile| if let SourceData::Grid(grid) = &d.data { Some(drawn_steps(grid)) } else { None };
     let steps: Option<Vec<[f64; 2]>> = data.iter().map(steps_of).collect();
     let is_cloud = wish.preset.as_ref().is_some_and(Preset::is_cloud);
     let Some(steps) = steps.filter(|_| !is_cloud && !wish.ground) else { return String::new() };
@@ -147,7 +156,7 @@ fn render_text(data: &[DataFile], wish: &Wish, are_labels: bool) -> String {
 
 /// Scanned bodies look away from where everything else is seen.
 fn default_azimuth(data: &[DataFile]) -> f64 {
-    let is_body = |d: &DataFile| matches!(d.data, FileData::Grid(_)) && d.stated_up == Some(convert::read::UpAxis::Z);
+    let is_body = |d: &DataFile| matches!(d.data, SourceData::Grid(_)) && d.stated_up == Some(convert::read::UpAxis::Z);
     if data.iter().all(is_body) { BEFORE_A_FACE } else { DEFAULT_AZIMUTH }
 }
 
@@ -198,6 +207,9 @@ fn folder_of(scene_file: &Path) -> Result<PathBuf, Error> {
 
 /// A data file as a scene in `folder` names it.
 fn written_path(path: &Path, folder: &Path) -> Result<String, Error> {
+    if name_in_memory(path).is_some() {
+        return text_of(path);
+    }
     let real = path.canonicalize().map_err(|e| Error::io(path, "cannot find", e))?;
     text_of(&relative_path(folder, &real).unwrap_or(real))
 }
@@ -227,7 +239,7 @@ mod tests {
                 Grid { origin: DVec3::ZERO, axes: DMat3::from_diagonal(steps), dims: [2; 3], values: vec![0.0; 8] };
             DataFile {
                 path: "a.nrrd".into(),
-                data: FileData::Grid(grid.into()),
+                data: SourceData::Grid(grid.into()),
                 stated_up: None,
                 stands: None,
                 degrees: false,

@@ -2,7 +2,9 @@
 //! right without shadows, and the sky from all sides. Who goes around it sees its back, which a third one lights then.
 
 use crate::number::{color, list};
-use organza::scene::FoundCamera;
+use organza::scene::Scene;
+use organza::{Error, Files, Progress, RenderOptions};
+use splat_core::Camera;
 use splat_core::glam::DVec3;
 use std::fmt::Write;
 
@@ -17,9 +19,24 @@ const FROM_KEY: [f64; 3] = [-0.75, 1.0, 0.55];
 const FROM_FILL: [f64; 3] = [0.9, 0.15, 0.5];
 const FROM_BACK: [f64; 3] = [-0.25, 0.5, -0.9];
 
+/// The lights of a first scene for what a scene shows, as TOML: its tables `ambient` and `light`. `around` where its back is seen as well.
+///
+/// # Errors
+/// As [`organza::fitted`], which finds the camera where the scene leaves that to the data.
+pub fn lights_of(
+    scene: &Scene,
+    around: bool,
+    files: &Files,
+    options: &RenderOptions,
+    progress: &Progress,
+) -> Result<String, Error> {
+    let (scene, found) = organza::fitted(scene, options, progress, files)?;
+    Ok(lamps(&found.map_or(scene.camera, |found| found.camera), around))
+}
+
 /// The tables of the lights; `around` where the back is seen as well.
-pub(crate) fn lamps(found: &FoundCamera, around: bool) -> String {
-    let [right, up, forward] = found.camera.axes;
+pub(crate) fn lamps(camera: &Camera, around: bool) -> String {
+    let [right, up, forward] = camera.axes;
     // Level, so that the key stays above whatever the elevation; straight down it is the picture's up that is level.
     let level = DVec3::new(-forward.x, 0.0, -forward.z);
     let back =

@@ -26,6 +26,7 @@ pub use data_file::DataFile;
 pub use facts::{Facts, facts};
 pub use first_scene::{Written, first_scene};
 pub use histogram::Histogram;
+pub use lamps::lights_of;
 pub use number::{counted, grouped, rounded};
 pub use preset::{Preset, Wish};
 

@@ -62,12 +62,12 @@ pub use draw::{Planned, draw_loaded};
 pub use error::Error;
 pub use frame::{Frame, Shaded};
 pub use load::Loaded;
-pub use load::files::{FileData, Files};
+pub use load::files::Files;
 pub use options::RenderOptions;
 pub use organza_device as device;
 pub use organza_output as output;
 pub use organza_scene as scene;
-pub use organza_scene::{escape_controls, printable, shown};
+pub use organza_scene::{InMemory, SourceData, escape_controls, printable, shown};
 pub use prepare::{Explanation, explain, explain_from, fitted, load, plan_loaded, same_splats, seen, settled};
 pub use render::budget::{GivenUp, WithinBudget, render_within};
 pub use render::{Render, render, render_from};
@@ -76,3 +76,8 @@ pub use shadows::{ShadowTable, shadow_params};
 pub use splat_core::{CostRecord, Layers, Progress};
 pub use statistics::SplatCount;
 pub use technique::Sets;
+
+/// The page's example compiles and holds.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Page;

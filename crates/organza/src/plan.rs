@@ -143,6 +143,19 @@ impl Plan {
         self.bends || self.scatters_again || self.carried.contains(&true)
     }
 
+    /// Whether an estimate is of the technique that draws its object.
+    pub fn is_drawn_as(&self, estimate: &Estimate) -> bool {
+        let is_its =
+            |planned: &PlannedObject| planned.object == estimate.of_object && planned.technique == estimate.technique;
+        self.objects.iter().any(is_its)
+    }
+
+    /// What draws each object; nothing where one technique draws all of them as splats.
+    pub fn chosen(&self) -> &[PlannedObject] {
+        let is_plain = self.techniques.len() == 1 && self.objects.iter().all(PlannedObject::is_drawn_as_splats);
+        if is_plain { &[] } else { &self.objects }
+    }
+
     /// All tables of shadow maps.
     pub fn tables(&self) -> impl Iterator<Item = &ShadowTable> + Clone {
         self.shadow_tables.iter().chain(&self.other_tables).flatten().chain(&self.eye_table)

@@ -4,7 +4,7 @@ use crate::repo::Repo;
 use crate::toml_lines::{lines, string};
 
 /// For each crate of the workspace, the crates of the workspace that it may depend on, tests and benches included.
-const MAY_KNOW: [(&str, &[&str]); 23] = [
+const MAY_KNOW: [(&str, &[&str]); 24] = [
     ("splat-core", &["splat-shaders"]),
     ("convert", &["splat-core"]),
     ("tsm", &["splat-core", "splat-shaders"]),
@@ -38,6 +38,7 @@ const MAY_KNOW: [(&str, &[&str]); 23] = [
     ("organza-judge", &["splat-core", "convert", "tsm", "hbsort", "deferred-blend", "reference", "organza"]),
     ("organza-survey", &["splat-core", "convert", "organza"]),
     ("organza-cli", &["splat-core", "convert", "organza", "organza-judge", "organza-survey"]),
+    ("organza-python", &["splat-core", "convert", "organza", "organza-judge", "organza-survey"]),
     (
         "organza-tests",
         &["splat-core", "convert", "tsm", "hbsort", "pbsr", "reference", "organza", "organza-judge", "organza-survey"],

@@ -89,7 +89,7 @@ pub(super) fn medium(scene: &Scene, object: &SceneObject, options: &RenderOption
     let constant = object.color.unwrap_or(material.color);
     // Light that is reflected, or a layer of normals: what gives splats and sheets their gradients.
     let reflects = m.shading == Shading::Phong && (!scene.lights.is_empty() || scene.render.layers.set().normal);
-    let (shape, extinction) = shape(object, reflects.then_some(constant), options)?;
+    let (shape, extinction) = shape(scene, object, reflects.then_some(constant), options)?;
     let constant = constant.map(f64::from);
     let (color, brightest): (Box<dyn Fn(DVec3) -> [f64; 3] + Send + Sync>, f64) = match &shape {
         Shape::Volume(volume) => {
@@ -153,7 +153,12 @@ fn world_clips(object: &SceneObject) -> Vec<Clip> {
 }
 
 /// The density of a medium and the extinction where it is 1; a cloud that reflects about its gradient in this colour.
-fn shape(object: &SceneObject, reflects: Option<[f32; 3]>, options: &RenderOptions) -> Result<(Shape, f64), Error> {
+fn shape(
+    scene: &Scene,
+    object: &SceneObject,
+    reflects: Option<[f32; 3]>,
+    options: &RenderOptions,
+) -> Result<(Shape, f64), Error> {
     let t = object.transform;
     Ok(match &object.source {
         Source::Medium(medium) => {
@@ -191,7 +196,7 @@ fn shape(object: &SceneObject, reflects: Option<[f32; 3]>, options: &RenderOptio
             (Shape::Field { field: Arc::new(field), bounds, majorant }, d.extinction)
         }
         Source::Volume(VolumeSource { path, frame, transfer }) => {
-            let FileData::Grid(grid) = read(path, *frame, object.array.as_ref(), options)? else {
+            let FileData::Grid(grid) = read(scene, path, *frame, object.array.as_ref(), options)? else {
                 return Err(Error::wrong_kind(path, "a volume", "use `mesh = ` or `points = ` for this file"));
             };
             let gapless = convert::transparent_gaps(&grid, transfer);

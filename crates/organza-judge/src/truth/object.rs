@@ -5,9 +5,9 @@ use convert::read::{Loaded as FileData, ReadParams};
 use convert::{MpuParams, RawPoints, Solid, SplatParams};
 use glam::Vec3;
 use organza::scene::{Scene, SceneMaterial, SceneObject, Source};
-use organza::{Error, RenderOptions};
+use organza::{Error, RenderOptions, SourceData, printable};
 use reference::{Density, Dielectric, Liberty, Medium, Surface, SurfaceKind, SurfaceMaterial};
-use splat_core::{DAabb, Mesh, ScalarField, Shading, Similarity, optics};
+use splat_core::{DAabb, Grid, Mesh, RadianceImage, ScalarField, Shading, Similarity, optics};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -57,8 +57,8 @@ pub(super) fn body(
         Source::Implicit(_) | Source::Combined(_) if !object.clip.is_empty() => {
             return no("open surfaces are not path-traced");
         }
-        Source::Combined(_) => combined(object, options)?,
-        Source::Mesh(path) => match read(path, 0, None, options)? {
+        Source::Combined(_) => combined(scene, object, options)?,
+        Source::Mesh(path) => match read(scene, path, 0, None, options)? {
             FileData::Mesh(mesh) => mesh,
             _ => {
                 return Err(Error::wrong_kind(
@@ -112,22 +112,22 @@ fn mesh_of(field: &dyn ScalarField, bounds: DAabb, step: f64, object: &SceneObje
 }
 
 /// The surface of a solid of several, by steps finer than those of its splats.
-fn combined(object: &SceneObject, options: &RenderOptions) -> Result<Mesh, Error> {
-    let solid = solid(&object.source, object, options)?;
+fn combined(scene: &Scene, object: &SceneObject, options: &RenderOptions) -> Result<Mesh, Error> {
+    let solid = solid(scene, &object.source, object, options)?;
     let step = object.spacing.map_or(solid.step, |spacing| spacing / object.transform.scale);
     let least = libm::cbrt(solid.bounds.size().element_product() / MOST_POINTS);
     mesh_of(solid.field.as_ref(), solid.bounds, (step * FINER_EDGES).max(least), object)
 }
 
 /// The solid of a field, by the field itself, or of several.
-fn solid(source: &Source, object: &SceneObject, options: &RenderOptions) -> Result<Solid, Error> {
+fn solid(scene: &Scene, source: &Source, object: &SceneObject, options: &RenderOptions) -> Result<Solid, Error> {
     let refused = |e| Error::from_core("a solid", e);
     match source {
         Source::Implicit(i) => {
             let (field, walls) = (Arc::new(i.field()?), Vec::new());
             Ok(Solid { field, walls, bounds: i.bounds, step: i.spacing }.closed())
         }
-        Source::Isosurface(i) => match read(&i.path, i.frame, object.array.as_ref(), options)? {
+        Source::Isosurface(i) => match read(scene, &i.path, i.frame, object.array.as_ref(), options)? {
             FileData::Grid(grid) => {
                 let grid = convert::gaps_outside(&grid, i.level as f32, i.inside).unwrap_or(grid);
                 Solid::of_volume(grid.into(), i.interpolation, i.level, i.inside).map_err(refused)
@@ -135,7 +135,7 @@ fn solid(source: &Source, object: &SceneObject, options: &RenderOptions) -> Resu
             _ => Err(Error::wrong_kind(&i.path, "a volume", "use `mesh = ` or `points = ` for this file")),
         },
         Source::LevelSet(l) => {
-            let points = match read(&l.path, 0, None, options)? {
+            let points = match read(scene, &l.path, 0, None, options)? {
                 FileData::Points(points) => points,
                 FileData::Mesh(mesh) => RawPoints::of_vertices(&mesh),
                 _ => {
@@ -152,7 +152,8 @@ fn solid(source: &Source, object: &SceneObject, options: &RenderOptions) -> Resu
             Ok(Solid::of_points(Arc::new(field), bounds))
         }
         Source::Combined(source) => {
-            let parts = source.parts.iter().map(|part| solid(part, object, options)).collect::<Result<_, _>>()?;
+            let parts =
+                source.parts.iter().map(|part| solid(scene, part, object, options)).collect::<Result<_, _>>()?;
             Solid::combined(source.combination, parts).map_err(refused)
         }
         _ => Err(Error::Internal("a solid is of a source that has no field".into())),
@@ -220,14 +221,25 @@ fn surface(scene: &Scene, object: &SceneObject, mut mesh: Mesh) -> Body {
     Body::Surface(mesh, material)
 }
 
-/// The data of a file; of a series of volumes that of one frame.
+/// The data of a source; of a series of volumes that of one frame.
 pub(super) fn read(
+    scene: &Scene,
     path: &Path,
     frame: u64,
     array: Option<&String>,
     options: &RenderOptions,
 ) -> Result<FileData, Error> {
     let params = ReadParams { frame, array: array.cloned(), ..options.read_params() };
+    match scene.in_memory.get(path) {
+        Some(SourceData::Mesh(mesh)) => {
+            let turned = convert::read::mesh_in_memory(&printable(path), Mesh::clone(mesh), &params);
+            return turned.map(|(mesh, _)| FileData::Mesh(mesh)).map_err(|e| Error::from_read(path, &e));
+        }
+        Some(SourceData::Points(points)) => return Ok(FileData::Points(RawPoints::clone(points))),
+        Some(SourceData::Grid(grid)) => return Ok(FileData::Grid(Grid::clone(grid))),
+        Some(SourceData::Image(image)) => return Ok(FileData::Image(RadianceImage::clone(image))),
+        None => {}
+    }
     convert::read::file(path, &params, None).map(|read| read.0).map_err(|e| Error::from_read(path, &e))
 }
 

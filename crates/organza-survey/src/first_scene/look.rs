@@ -10,7 +10,7 @@ use crate::preset::{Look, Preset, Wish};
 use crate::stands::extent;
 use crate::transfer::Transfer;
 use convert::ColorMap;
-use organza::FileData;
+use organza::SourceData;
 use splat_core::{DAabb, Grid, optics};
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -83,7 +83,7 @@ pub(super) fn objects(data: &[DataFile], paths: &[String], wish: &Wish) -> Vec<O
         if *count > 1 {
             name = format!("{name}-{count}");
         }
-        let colors = if let FileData::Points(points) = &file.data {
+        let colors = if let SourceData::Points(points) = &file.data {
             point_colors(points, file.has_colors(), wish)
         } else {
             None
@@ -111,7 +111,7 @@ pub(super) fn objects(data: &[DataFile], paths: &[String], wish: &Wish) -> Vec<O
                 object.keys
             );
         }
-        if let (Some(clay), false) = (bare, matches!(file.data, FileData::Grid(_))) {
+        if let (Some(clay), false) = (bare, matches!(file.data, SourceData::Grid(_))) {
             object.keys = format!("color = {}\n{}", color(*clay), object.keys);
         }
         if file.is_black() {
@@ -131,9 +131,9 @@ pub(super) fn objects(data: &[DataFile], paths: &[String], wish: &Wish) -> Vec<O
 pub(super) fn takes_preset(file: &DataFile, wish: &Wish) -> bool {
     let is_map = wish.preset.as_ref().is_some_and(|preset| preset.map().is_some());
     match &file.data {
-        FileData::Grid(_) => true,
-        FileData::Points(points) => is_map && point_colors(points, file.has_colors(), wish).is_some(),
-        FileData::Mesh(_) | FileData::Image(_) => false,
+        SourceData::Grid(_) => true,
+        SourceData::Points(points) => is_map && point_colors(points, file.has_colors(), wish).is_some(),
+        SourceData::Mesh(_) | SourceData::Image(_) => false,
     }
 }
 
@@ -153,7 +153,7 @@ fn object(file: &DataFile, preset: Option<&Preset>, colors: Option<String>) -> O
         is_labels: false,
     };
     match &file.data {
-        FileData::Mesh(mesh) => {
+        SourceData::Mesh(mesh) => {
             let about = format!(
                 "{} triangles between {} vertices; {}",
                 grouped(mesh.triangles.len() as u64),
@@ -162,7 +162,7 @@ fn object(file: &DataFile, preset: Option<&Preset>, colors: Option<String>) -> O
             );
             of("mesh", about, clay, String::new())
         }
-        FileData::Points(points) => {
+        SourceData::Points(points) => {
             let all = points.position.iter().map(|p| points.origin + p.as_dvec3());
             let what = match (points.gaussians.is_empty(), points.ready.cloud.is_empty()) {
                 (false, _) => "3D Gaussians",
@@ -177,7 +177,7 @@ fn object(file: &DataFile, preset: Option<&Preset>, colors: Option<String>) -> O
                 None => of("points", about, None, as_they_are.to_owned()),
             }
         }
-        FileData::Grid(grid) => {
+        SourceData::Grid(grid) => {
             let matter = Matter::of(grid);
             let look = volume_look(grid, matter.as_ref(), preset, file.stated_up.is_some());
             let material = match look {
@@ -192,7 +192,7 @@ fn object(file: &DataFile, preset: Option<&Preset>, colors: Option<String>) -> O
             Object { is_labels, ..of("volume", about, Some((material.0, material.1, false)), keys) }
         }
         // Images are refused when they are read.
-        FileData::Image(_) => of("environment", String::new(), None, String::new()),
+        SourceData::Image(_) => of("environment", String::new(), None, String::new()),
     }
 }
 

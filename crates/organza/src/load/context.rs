@@ -1,7 +1,7 @@
 //! What reading and converting an object need to know of the scene around it.
 
-use super::files::{FileData, Files};
-use crate::scene::{Scene, SceneObject};
+use super::files::Files;
+use crate::scene::{Scene, SceneObject, SourceData};
 use crate::{Error, RenderOptions};
 use convert::read::ReadParams;
 use convert::{Orientation, SplatParams, SurfelParams, VolumeParams};
@@ -100,17 +100,17 @@ impl Context<'_> {
         }
     }
 
-    pub(super) fn read(&self, path: &Path) -> Result<FileData, Error> {
+    pub(super) fn read(&self, path: &Path) -> Result<SourceData, Error> {
         let (columns, matter) = (self.scene.columns_of(path), self.scene.has_matter(path));
         let most_points = self.scene.render.max_points;
         let params = ReadParams { columns, matter, most_points, ..self.options.read_params() };
-        self.files.read(path, &params, self.progress)
+        self.files.data(self.scene, path, &params, self.progress)
     }
 
     /// The same of one volume of a series.
-    pub(super) fn read_frame(&self, path: &Path, frame: u64) -> Result<FileData, Error> {
+    pub(super) fn read_frame(&self, path: &Path, frame: u64) -> Result<SourceData, Error> {
         let array = self.scene.objects.get(self.id).and_then(|object| object.array.clone());
-        self.files.read(path, &ReadParams { frame, array, ..self.options.read_params() }, self.progress)
+        self.files.data(self.scene, path, &ReadParams { frame, array, ..self.options.read_params() }, self.progress)
     }
 
     /// The value of voxels without one, where the object states it.
@@ -119,8 +119,8 @@ impl Context<'_> {
     }
 
     /// The same of a file that nothing but what is made from it needs.
-    pub(super) fn read_once(&self, path: &Path) -> Result<(FileData, Arc<Reservation>), Error> {
-        self.files.read_once(path, &self.options.read_params(), self.progress)
+    pub(super) fn read_once(&self, path: &Path) -> Result<(SourceData, Arc<Reservation>), Error> {
+        self.files.data_once(self.scene, path, &self.options.read_params(), self.progress)
     }
 
     /// Parameters of a volume: normals only where they are used.

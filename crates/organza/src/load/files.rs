@@ -1,30 +1,17 @@
 //! What was read from files, shared by all objects and frames that are made from it: a file is read once.
 
-use crate::scene::{ExtractSource, Scene, Stop};
+use crate::scene::{ExtractSource, Scene, SourceData, Stop};
 use crate::{Error, RenderOptions};
 use convert::read::{Loaded, Mended, Notes, ReadParams};
 use convert::{ColorScale, RawPoints, SharedField};
-use splat_core::{DAabb, Grid, MemoryAccount, Mesh, Progress, RadianceImage, Reservation};
+use splat_core::{DAabb, MemoryAccount, Mesh, Progress, Reservation};
 use std::cell::{Cell, RefCell};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// What a file holds.
-#[derive(Debug, Clone)]
-pub enum FileData {
-    /// Triangles.
-    Mesh(Arc<Mesh>),
-    /// Points without faces.
-    Points(Arc<RawPoints>),
-    /// A regular volume.
-    Grid(Arc<Grid>),
-    /// An image of radiance.
-    Image(Arc<RadianceImage>),
-}
-
 /// What was read of a file, what there is to say of it, and the memory that it takes as long as anybody has it from here.
-type Read = (FileData, Notes, Arc<Reservation>);
+type Read = (SourceData, Notes, Arc<Reservation>);
 
 /// The level set of scattered points, and its bounds.
 pub(super) type Fitted = (SharedField, DAabb);
@@ -38,6 +25,8 @@ pub struct Files {
     memory: MemoryAccount,
     /// By path and frame.
     read: RefCell<HashMap<(PathBuf, u64), (ReadParams, Read)>>,
+    /// Meshes that a program has in memory, as drawing takes them, beside those that they were made of.
+    taken: RefCell<Vec<(SourceData, Read)>>,
     /// What there is to say of them, one sentence each.
     notes: RefCell<Vec<String>>,
     /// Fits take longer than reading: by path and tolerance, with the bytes that they take.
@@ -60,6 +49,7 @@ impl Default for Files {
         Self {
             memory: MemoryAccount::new(u64::MAX),
             read: RefCell::default(),
+            taken: RefCell::default(),
             notes: RefCell::default(),
             fitted: RefCell::default(),
             stopped: RefCell::default(),
@@ -82,20 +72,86 @@ impl Files {
     /// # Errors
     /// [`Error::Io`], [`Error::Input`] or [`Error::TooLarge`] as its reader has them; too large is also what would take more memory
     /// than `limits` allow beside the files that are kept.
-    pub fn read(&self, path: &Path, limits: &ReadParams, progress: &Progress) -> Result<FileData, Error> {
+    pub fn read(&self, path: &Path, limits: &ReadParams, progress: &Progress) -> Result<SourceData, Error> {
         let read = self.known_or_read(path, limits, progress)?;
         self.read.borrow_mut().insert((real(path), limits.frame), (limits.clone(), read.clone()));
         Ok(read.0)
     }
 
-    /// The same without keeping it: for whoever keeps what is made from it.
-    pub(super) fn read_once(
+    /// The data of a source of a scene: what a program has in memory under that name, or [`Files::read`] of a file.
+    ///
+    /// # Errors
+    /// As [`Files::read`].
+    pub fn data(
         &self,
-        path: &Path,
+        scene: &Scene,
+        source: &Path,
         limits: &ReadParams,
         progress: &Progress,
-    ) -> Result<(FileData, Arc<Reservation>), Error> {
-        self.known_or_read(path, limits, progress).map(|read| (read.0, read.2))
+    ) -> Result<SourceData, Error> {
+        match scene.in_memory.get(source) {
+            Some(data) => self.taken(source, data, limits).map(|read| read.0),
+            None => self.read(source, limits, progress),
+        }
+    }
+
+    /// The same without keeping a file: for whoever keeps what is made from it.
+    pub(super) fn data_once(
+        &self,
+        scene: &Scene,
+        source: &Path,
+        limits: &ReadParams,
+        progress: &Progress,
+    ) -> Result<(SourceData, Arc<Reservation>), Error> {
+        let read = match scene.in_memory.get(source) {
+            Some(data) => self.taken(source, data, limits),
+            None => self.known_or_read(source, limits, progress),
+        };
+        read.map(|read| (read.0, read.2))
+    }
+
+    /// Data of a program as drawing takes it, with what there is to say of it. A mesh is copied once, as its faces are turned outwards and parted at
+    /// creases; all else is taken where it lies.
+    fn taken(&self, source: &Path, data: &SourceData, limits: &ReadParams) -> Result<Read, Error> {
+        let name = crate::printable(source);
+        if limits.frame > 0 || limits.array.is_some() {
+            let message = "expected no `frame` and no `array`: data in memory is one";
+            return Err(Error::input(name, message, "leave them out, or hand over what they name"));
+        }
+        let memory = self.memory.up_to(limits.memory.limit());
+        let from_read = |e: convert::ReadError| Error::from_read(source, &e);
+        let notes = match data {
+            SourceData::Points(points) => convert::read::points_in_memory(&name, points, limits).map_err(from_read)?,
+            SourceData::Grid(grid) => convert::read::grid_in_memory(&name, grid, limits).map_err(from_read)?,
+            SourceData::Mesh(_) | SourceData::Image(_) => Notes::default(),
+        };
+        let known = self.taken.borrow().iter().find(|(known, _)| known.is_same(data)).map(|(_, read)| read.clone());
+        let (taken, made, held) = match (known, data) {
+            (Some(known), _) => known,
+            (None, SourceData::Mesh(mesh)) => {
+                let mut held = memory.take(&name, 2 * mesh.bytes()).map_err(Error::Limit)?;
+                let params = ReadParams { memory: memory.clone(), ..limits.clone() };
+                let turned = convert::read::mesh_in_memory(&name, Mesh::clone(mesh), &params);
+                let (mut mesh, notes) = turned.map_err(from_read)?;
+                let _parted = memory.take(&name, convert::crease_bytes(&mesh)).map_err(Error::Limit)?;
+                convert::part_at_creases(&mut mesh);
+                held.set(&name, data.bytes() + mesh.bytes()).map_err(Error::Limit)?;
+                (SourceData::Mesh(mesh.into()), notes, held.into())
+            }
+            (None, _) => {
+                let held = memory.take(&name, data.bytes()).map_err(Error::Limit)?;
+                (data.clone(), Notes::default(), held.into())
+            }
+        };
+        let is_new = !self.taken.borrow().iter().any(|(known, _)| known.is_same(data));
+        if is_new {
+            self.taken.borrow_mut().push((data.clone(), (taken.clone(), made.clone(), held.clone())));
+        }
+        add(&self.mended, made.mended.iter().map(Mended::to_string));
+        let points = if let SourceData::Points(points) = data { Some(points) } else { None };
+        let unused = points.into_iter().flat_map(|points| points.not_asked_for(&limits.columns));
+        add(&self.notes, notes.sentences(&name, unused));
+        Ok((taken, notes, held))
     }
 
     /// Forgets what there is to say of files, for whoever looked at them before a scene asks for what they hold.
@@ -126,7 +182,7 @@ impl Files {
     fn known_or_read(&self, path: &Path, limits: &ReadParams, progress: &Progress) -> Result<Read, Error> {
         let known = self.read.borrow().get(&(real(path), limits.frame)).filter(|k| k.0.serves(limits)).cloned();
         let read = known.map_or_else(|| self.read_anew(path, limits, progress), |(_, read)| Ok(read))?;
-        let points = if let FileData::Points(points) = &read.0 { Some(points) } else { None };
+        let points = if let SourceData::Points(points) = &read.0 { Some(points) } else { None };
         let unused = points.into_iter().flat_map(|points| points.not_asked_for(&limits.columns));
         add(&self.notes, read.1.sentences(&crate::printable(path), unused));
         Ok(read)
@@ -144,11 +200,11 @@ impl Files {
             Loaded::Mesh(mut mesh) => {
                 let _parted = memory.take(&what, convert::crease_bytes(&mesh)).map_err(Error::Limit)?;
                 convert::part_at_creases(&mut mesh);
-                FileData::Mesh(mesh.into())
+                SourceData::Mesh(mesh.into())
             }
-            Loaded::Points(points) => FileData::Points(points.into()),
-            Loaded::Grid(grid) => FileData::Grid(grid.into()),
-            Loaded::Image(image) => FileData::Image(image.into()),
+            Loaded::Points(points) => SourceData::Points(points.into()),
+            Loaded::Grid(grid) => SourceData::Grid(grid.into()),
+            Loaded::Image(image) => SourceData::Image(image.into()),
             _ => return Err(Error::Internal("a kind of file that scenes do not know".into())),
         };
         held.set(&what, data.bytes()).map_err(Error::Limit)?;
@@ -198,17 +254,6 @@ fn add(all: &RefCell<Vec<String>>, sentences: impl IntoIterator<Item = String>) 
     for sentence in sentences {
         if !all.contains(&sentence) {
             all.push(sentence);
-        }
-    }
-}
-
-impl FileData {
-    fn bytes(&self) -> u64 {
-        match self {
-            Self::Mesh(mesh) => mesh.bytes(),
-            Self::Points(points) => points.bytes(),
-            Self::Grid(grid) => grid.bytes(),
-            Self::Image(image) => image.bytes(),
         }
     }
 }

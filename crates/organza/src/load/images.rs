@@ -1,9 +1,8 @@
 //! The images of a scene, from their files: its environment, what lights shine through, and the heights of bumps.
 
-use super::files::FileData;
 use super::input::refuse;
 use super::loading::Loading;
-use crate::scene::SceneLight;
+use crate::scene::{SceneLight, SourceData};
 use crate::{Error, cost};
 use convert::read::ReadParams;
 use splat_core::{Environment, Exceeded, HeightImage, RadianceImage, Reservation, Slide};
@@ -79,7 +78,7 @@ impl Loading<'_> {
     ) -> Result<Arc<RadianceImage>, Error> {
         self.progress.begin(&cost::reading_file(path));
         let params = ReadParams { is_data, ..self.options.read_params() };
-        let FileData::Image(image) = self.files.read(path, &params, self.progress)? else {
+        let SourceData::Image(image) = self.files.data(self.scene, path, &params, self.progress)? else {
             let hint = "name a Radiance HDR, OpenEXR or PNG file";
             return Err(Error::wrong_kind(path, "an image of radiance", hint));
         };

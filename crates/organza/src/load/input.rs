@@ -1,11 +1,11 @@
 //! What an object is made from: files read, formulas parsed, with the parameters of the conversion.
 
 use super::context::Context;
-use super::files::{FileData, Fitted, once};
+use super::files::{Fitted, once};
 use crate::Error;
 use crate::scene::{
     CombinedSource, DensitySource, FieldSource, LevelSetSource, MatterSource, SceneObject, SliceSource, Source,
-    SurfaceSampler, VolumeSource,
+    SourceData, SurfaceSampler, VolumeSource,
 };
 use crate::statistics::ObjectData;
 use convert::{
@@ -119,7 +119,7 @@ pub(super) fn input<'a>(object: &'a SceneObject, context: &Context<'_>) -> Resul
             Input::Mesh(crate::printable(path).to_string(), mesh, MeshParams { splat, density, opacity })
         }
         Source::Points(path) | Source::Matter(MatterSource { path, .. }) => match context.read(path)? {
-            FileData::Points(points) => raw_points(path, in_metres(points, object), object, splat, context)?,
+            SourceData::Points(points) => raw_points(path, in_metres(points, object), object, splat, context)?,
             _ => {
                 return Err(Error::wrong_kind(
                     path,
@@ -284,11 +284,11 @@ fn level_set(source: &LevelSetSource, object: &SceneObject, context: &Context<'_
 fn read_scattered(path: &Path, context: &Context<'_>) -> Result<(Arc<RawPoints>, Arc<Reservation>), Error> {
     let (data, held) = context.read_once(path)?;
     match data {
-        FileData::Points(points) => {
+        SourceData::Points(points) => {
             context.files.note(path, points.unused_by_fields());
             Ok((points, held))
         }
-        FileData::Mesh(mesh) => {
+        SourceData::Mesh(mesh) => {
             mesh.validate().map_err(|e| refuse(path, &e, ""))?;
             Ok((RawPoints::of_vertices(&mesh).into(), held))
         }
@@ -298,7 +298,7 @@ fn read_scattered(path: &Path, context: &Context<'_>) -> Result<(Arc<RawPoints>,
 
 fn read_mesh(path: &Path, context: &Context<'_>) -> Result<Arc<Mesh>, Error> {
     match context.read(path)? {
-        FileData::Mesh(mesh) => Ok(mesh),
+        SourceData::Mesh(mesh) => Ok(mesh),
         _ => Err(Error::wrong_kind(path, "a mesh with faces", "use `points = ` or `volume = ` for this file")),
     }
 }
@@ -349,7 +349,7 @@ fn with_first_value(grid: Arc<Grid>, transfer: &TransferFunction) -> Arc<Grid> {
 
 fn read_grid(path: &Path, frame: u64, context: &Context<'_>) -> Result<Arc<Grid>, Error> {
     match context.read_frame(path, frame)? {
-        FileData::Grid(grid) => with_known_values(grid, path, context),
+        SourceData::Grid(grid) => with_known_values(grid, path, context),
         _ => Err(Error::wrong_kind(path, "a volume", "use `mesh = ` or `points = ` for this file")),
     }
 }

@@ -1,10 +1,10 @@
 //! Facts of media that scatter light, from their data as it is and from a few places of it: cheap, and known before anything is converted.
 
 use super::context::Context;
-use super::files::{FileData, Files};
+use super::files::Files;
 use super::light_statistics;
 use super::loading::Loading;
-use crate::scene::{MatterSource, Scene, SceneLight, SceneObject, Source, VolumeSource};
+use crate::scene::{MatterSource, Scene, SceneLight, SceneObject, Source, SourceData, VolumeSource};
 use crate::statistics::MediumFacts;
 use crate::{Error, Progress, RenderOptions};
 use convert::{MediumBody, RawPoints};
@@ -200,12 +200,12 @@ fn sampled(object: &SceneObject, context: &Context<'_>) -> Result<Option<Sampled
             (!bounds.is_empty()).then(|| of_box(&bounds, cloud.spacing, &look))
         }
         Source::Volume(source) => match context.read_frame(&source.path, source.frame)? {
-            FileData::Grid(grid) => Some(of_volume(&grid, source, object)),
+            SourceData::Grid(grid) => Some(of_volume(&grid, source, object)),
             // Refused where it is read to be drawn.
             _ => None,
         },
         Source::Matter(source) => match context.read(&source.path)? {
-            FileData::Points(points) => of_points(&points, source, object, color),
+            SourceData::Points(points) => of_points(&points, source, object, color),
             _ => None,
         },
         _ => None,

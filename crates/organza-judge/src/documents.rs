@@ -1,0 +1,122 @@
+//! Plans, costs and predictions as JSON: the documents that `--json` and `--cost` write, and that programs read.
+
+use crate::effects::{EffectChange, FixedEffect, Measured};
+use organza::cost::{CountedPass, Prediction};
+use organza::plan::{Estimate, Plan, PlannedObject};
+use organza::scene::{FoundCamera, Scene};
+use organza::{CostRecord, ShadowTable, SplatCount};
+use serde_json::{Value, json};
+
+/// The cost record as JSON, a list of stages.
+pub fn cost_json(cost: &CostRecord) -> Value {
+    let stage = |s: &splat_core::StageCost| {
+        json!({
+            "name": s.name, "seconds": s.seconds, "items_in": s.items_in, "items_out": s.items_out,
+            "fragments": s.fragments, "bytes": s.bytes, "passes": s.passes,
+        })
+    };
+    cost.stages.iter().map(stage).collect()
+}
+
+/// Where the camera is, and whether it was placed by itself.
+pub fn camera_json(scene: &Scene, found: Option<&FoundCamera>) -> Value {
+    let (camera, target) = found.map_or((&scene.camera, scene.target), |found| (&found.camera, found.target));
+    json!({
+        "auto": found.is_some(),
+        "position": camera.position.to_array(),
+        "target": target.to_array(),
+        "forward": camera.axes[2].to_array(),
+        "up": camera.axes[1].to_array(),
+    })
+}
+
+/// Counted work of each pass with its predicted time, as JSON.
+pub fn predicted_json(predicted: &Prediction) -> Value {
+    let threads = rayon::current_num_threads();
+    let pass = |p: &CountedPass| {
+        let counts = p.counts.iter().map(|c| (c.item.name().to_owned(), json!(c.number)));
+        json!({
+            "name": p.pass, "stage": p.stage, "counts": counts.collect::<serde_json::Map<_, _>>(),
+            "seconds_of_one_core": p.seconds(&predicted.rates, 1), "seconds": p.seconds(&predicted.rates, threads),
+        })
+    };
+    json!({
+        "by": predicted.rates.source(),
+        "threads": threads,
+        "passes": predicted.passes().map(pass).collect::<Value>(),
+        "seconds_of_one_core": predicted.seconds(1),
+        "seconds": predicted.seconds(threads),
+        "announcement": predicted.announcement(threads),
+    })
+}
+
+/// Splats by object as JSON.
+pub fn splats_json(splats: &[SplatCount]) -> Value {
+    let object =
+        |s: &SplatCount| json!({ "object": s.object, "predicted": s.predicted, "exact": s.exact, "made": s.made });
+    splats.iter().map(object).collect()
+}
+
+/// The plan as JSON.
+pub fn plan_json(plan: &Plan) -> Value {
+    let effects = plan
+        .effects
+        .iter()
+        .map(|e| json!({
+            "name": e.name, "what": e.what, "called_for": e.called_for, "lacking": e.is_lacking, "in_scene": !e.is_absent,
+            "reason": e.reason, "bound": e.bound.number(),
+        }));
+    let passes = plan.passes.iter().map(|p| json!({ "name": p.name, "reason": p.reason }));
+    json!({
+        "technique": plan.technique,
+        "effects": effects.collect::<Value>(),
+        "estimates": plan.estimates.iter().map(|e| estimate_json(plan, e)).collect::<Value>(),
+        "passes": passes.collect::<Value>(),
+        "optical_depth_planes": plan.optical_depth_planes,
+        "shadow_maps": plan.shadow_maps,
+        "shadow_tables": plan.shadow_tables.iter().map(|t| t.as_ref().map(table_json)).collect::<Value>(),
+        "samplers": plan.chosen().iter().map(object_json).collect::<Value>(),
+    })
+}
+
+fn estimate_json(plan: &Plan, estimate: &Estimate) -> Value {
+    let error = estimate.displayed_error;
+    json!({
+        "technique": estimate.technique.name(), "object": estimate.of_object, "what": estimate.what,
+        // JSON has no infinity: an error that is not known is none.
+        "displayed_error": error.is_finite().then_some(error),
+        "draws": plan.is_drawn_as(estimate), "reason": estimate.words,
+    })
+}
+
+fn table_json(t: &ShadowTable) -> Value {
+    let p = &t.predicted;
+    json!({
+        "columns": p.size[0], "rows": p.size[1], "cells": p.limit.to_string(), "entries": p.entries as u64, "bytes": p.bytes,
+        "absorbance_cut": t.absorbance_cut(),
+    })
+}
+
+fn object_json(o: &PlannedObject) -> Value {
+    let (technique, source) = (o.technique.name(), o.form.name());
+    json!({
+        "object": o.object, "technique": technique, "source": source, "reason": o.reason, "becomes_splats": o.splats,
+    })
+}
+
+/// Changes and times of effects, as JSON.
+pub fn measured_json(measured: &Measured) -> Value {
+    let change = |change: &EffectChange| {
+        json!({
+            "name": change.name, "largest_change": change.largest, "share_beyond_tolerance": change.beyond_tolerance,
+            "seconds_with": change.seconds_with, "seconds_without": change.seconds_without,
+        })
+    };
+    let fixed = |fixed: &FixedEffect| json!({ "name": fixed.name, "reason": fixed.reason });
+    json!({
+        "seconds": measured.seconds,
+        "effects": measured.changes.iter().map(change).collect::<Value>(),
+        "not_switched": measured.fixed.iter().map(fixed).collect::<Value>(),
+        "left_out_together": measured.left_out_together,
+    })
+}
