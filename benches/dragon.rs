@@ -1,8 +1,8 @@
 //! The Stanford dragon as discs that overlap as much as those of a paper's model.
 
-use convert::read::{self, Loaded, ReadParams};
 use convert::{Density, MeshParams, mesh_to_points};
 use deferred_blend::grouping::{GraphParams, OverlapGraph, Relaxation};
+use read::{Loaded, ReadParams};
 use splat_core::Cloud;
 use std::path::PathBuf;
 

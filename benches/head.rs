@@ -1,6 +1,6 @@
 //! The MRI head of the assets, and other volumes seen as it is.
 
-use convert::read::{self, Loaded, ReadParams};
+use read::{Loaded, ReadParams};
 use splat_core::glam::{DMat3, DVec3};
 use splat_core::{Camera, Grid, Projection, TransferFunction, TransferPoint};
 use std::path::Path;

@@ -1,16 +1,16 @@
 //! Benchmark of convert: files to nouns are not timed, nouns to splats are; splats (or points, voxels) per second.
 
-use convert::read::{self, Loaded, ReadParams};
 use convert::{
-    CloudShape, Density, ExpressionField, MeshParams, RawPoints, SplatParams, SurfelParams, VolumeParams,
-    mesh_to_points, mesh_to_points_into, procedural_cloud, raw_to_surfels, sobel_gradient_into, surface_to_points,
-    volume_to_points,
+    CloudShape, Density, MeshParams, SplatParams, SurfelParams, VolumeParams, mesh_to_points, mesh_to_points_into,
+    procedural_cloud, raw_to_surfels, sobel_gradient_into, surface_to_points, volume_to_points,
 };
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
+use field::ExpressionField;
 use glam::{DMat3, DVec3, Vec3};
 use rayon::prelude::*;
+use read::{Loaded, ReadParams};
 use rstar::RTree;
-use splat_core::{Cloud, DAabb, Grid, Mesh, TransferFunction, TransferPoint, rng};
+use splat_core::{Cloud, DAabb, Grid, Mesh, RawPoints, TransferFunction, TransferPoint, rng};
 use std::path::Path;
 
 fn asset(name: &str) -> Loaded {

@@ -1,8 +1,9 @@
 //! Particles: sampling of meshes, volumes and implicit surfaces, and the projection of kept sets at the sizes of Tanaka 2012
 //! (1024²) and of a volume of 256³ at 512² with 16 repeat levels.
 
-use convert::{ExpressionField, GridField, Inside, Interpolation, MpuParams, RawPoints, points_to_field};
+use convert::points_to_field;
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
+use field::{ExpressionField, GridField, Inside, MpuParams};
 use pbsr::{
     Appearance, BrownianParams, BrownianSampler, Ensemble, EnsembleParams, FoldParams, GridSampler, ImplicitSurface,
     KeptSets, LineParams, LineSampler, MeshSampler, MetropolisParams, MetropolisSampler, Object, Particles, Renderer,
@@ -11,8 +12,8 @@ use pbsr::{
 use rayon::prelude::*;
 use splat_core::glam::{DMat3, DVec3, Vec3};
 use splat_core::{
-    Camera, Cloud, DAabb, Grid, Material, Mesh, Projection, ScalarField, Shading, Similarity, Splat, SplatKind,
-    TransferFunction, TransferPoint, rng,
+    Camera, Cloud, DAabb, Grid, Interpolation, Material, Mesh, Projection, RawPoints, ScalarField, Shading, Similarity,
+    Splat, SplatKind, TransferFunction, TransferPoint, rng,
 };
 use std::f64::consts::TAU;
 

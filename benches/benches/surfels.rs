@@ -2,7 +2,6 @@
 //! Algorithms 1 and 2, and the same dragon of glass in a white world. Opaque dragons of 0.14 to 2 M discs in 1+1 and 2+1 passes (Table 4).
 #![allow(missing_docs, clippy::expect_used, reason = "a benchmark")]
 
-use convert::read::{self, Loaded, ReadParams};
 use convert::{Density, MeshParams, SplatParams, mesh_to_points};
 use criterion::{Criterion, SamplingMode, criterion_group, criterion_main};
 use deferred_blend::grouping::{
@@ -13,6 +12,7 @@ use deferred_blend::{
     Shown, Surfaces, blend, resolve_opaque,
 };
 use organza_benches::processor_ms;
+use read::{Loaded, ReadParams};
 use splat_core::glam::DVec3;
 use splat_core::shade::ChannelLayout;
 use splat_core::{Accumulator, Camera, Cloud, FootprintStack, LayerSet, Material, Projection};

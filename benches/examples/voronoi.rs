@@ -4,14 +4,15 @@
 //! `cargo run --release -p organza-benches --example voronoi -- docs/images/voronoi.png`
 #![allow(clippy::expect_used, reason = "an example")]
 
-use convert::read::{self, Loaded, ReadParams};
-use convert::{RawPoints, SurfelParams, raw_to_surfels};
+use convert::{SurfelParams, raw_to_surfels};
 use deferred_blend::grouping::{GraphParams, OverlapGraph, Relaxation, minimum_coloring};
 use deferred_blend::{DiscInput, Discs, Light, Opaque, OpaqueInput, Params, Passes, Shown, resolve_opaque};
+use read::{Loaded, ReadParams};
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::shade::{ChannelLayout, LitBy, ShadeInput};
 use splat_core::{
-    Camera, Cloud, FootprintStack, LayerSet, Light as Sun, LightShape, Material, Object, Projection, Similarity,
+    Camera, Cloud, FootprintStack, LayerSet, Light as Sun, LightShape, Material, Object, Projection, RawPoints,
+    Similarity,
 };
 use std::f32::consts::PI;
 

@@ -4,19 +4,20 @@
 #![forbid(unsafe_code)]
 
 /// Right sums for pages of E57, which would tell nearly all damage before anything else is looked at.
-#[path = "../../crates/convert/tests/read_samples/e57.rs"]
+#[path = "../../crates/read/tests/read_samples/e57.rs"]
 #[allow(dead_code, reason = "the sample itself is a seed already")]
 mod e57;
 
-use convert::read::{self, Loaded, ReadParams, panic_is_input_error};
-use convert::{Cache, ExpressionField, RawPoints, SurfelParams, raw_to_surfels};
+use convert::{Cache, SurfelParams, raw_to_surfels};
+use field::ExpressionField;
 use organza::{Progress, RenderOptions};
 use organza_scene::{LoadOptions, Scene};
+use read::{Loaded, ReadParams, panic_is_input_error};
 use sha2::{Digest, Sha256};
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::{
-    Environment, FootprintImage, Framing, HeightImage, Layers, LightShape, MemoryAccount, RadianceImage, ScalarField,
-    Slide,
+    Environment, FootprintImage, Framing, HeightImage, Layers, LightShape, MemoryAccount, RadianceImage, RawPoints,
+    ScalarField, Slide,
 };
 use std::fs;
 use std::ops::Range;

@@ -1,9 +1,10 @@
 //! Brownian motion on a surface through scattered points, with the step of Tanaka 2012, section 5.
 
-use convert::{MpuParams, RawPoints, points_to_field};
+use convert::points_to_field;
+use field::MpuParams;
 use pbsr::{BrownianParams, BrownianSampler, ImplicitSurface, Particles, Sampler, SurfaceParams};
-use splat_core::ScalarField;
 use splat_core::glam::{DVec3, Vec3};
+use splat_core::{RawPoints, ScalarField};
 use std::f64::consts::PI;
 
 /// Points on the unit sphere, each beside its neighbours on a spiral, with their normals.

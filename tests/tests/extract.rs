@@ -1,8 +1,8 @@
 //! The surface that a light sees first, by `organza extract` and as an object; where things stop; and what is asked for in vain.
 
-use convert::read::{Loaded, ReadParams, file};
 use organza::scene;
 use organza_tests::Place;
+use read::{Loaded, ReadParams, file};
 use serde_json::Value;
 
 /// A ball of fog before a wall that casts no shadow, one light from above and one from the side.

@@ -1,9 +1,9 @@
 //! Seeds of fuzzing are what their target reads: one that is refused at its first word leads the fuzzer nowhere.
 
-use convert::ExpressionField;
-use convert::read::{Loaded, ReadParams, bytes, file};
+use field::ExpressionField;
 use organza::scene::{LoadOptions, parse};
 use organza::{Progress, RenderOptions, render};
+use read::{Loaded, ReadParams, bytes, file};
 use std::fs;
 use std::path::Path;
 

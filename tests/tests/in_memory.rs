@@ -1,6 +1,6 @@
 //! Data that a program hands over draws the picture of the file that holds the same.
 
-use convert::read::{Loaded, ReadParams};
+use read::{Loaded, ReadParams};
 use organza::scene::{LoadOptions, parse};
 use organza::{InMemory, Progress, RenderOptions, SourceData};
 use splat_core::Layers;
@@ -28,7 +28,7 @@ impl Handed {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../assets").join(self.asset);
         let columns = self.columns.iter().map(|column| (*column).to_owned()).collect();
         let params = ReadParams { columns, is_coverage: self.is_coverage, ..ReadParams::default() };
-        match convert::read::file(&path, &params, None).unwrap().0 {
+        match read::file(&path, &params, None).unwrap().0 {
             Loaded::Mesh(mesh) => SourceData::Mesh(mesh.into()),
             Loaded::Points(points) => SourceData::Points(points.into()),
             Loaded::Grid(grid) => SourceData::Grid(grid.into()),

@@ -1,8 +1,8 @@
 //! Meshes as they are found: one bad face among many, surfaces turned inside out.
 
-use convert::read::{Loaded, ReadParams};
 use glam::{DVec3, Vec3};
 use organza_tests::{Picture, Place, SMALL_SCENE, draw_in, largest_difference};
+use read::{Loaded, ReadParams};
 use splat_core::Mesh;
 use std::path::Path;
 
@@ -57,9 +57,7 @@ fn torus() -> Mesh {
 
 fn bunny() -> Mesh {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../assets/stanford-bunny/bunny.ply.gz");
-    let Loaded::Mesh(mesh) = convert::read::file(&file, &ReadParams::default(), None).unwrap().0 else {
-        panic!("no mesh")
-    };
+    let Loaded::Mesh(mesh) = read::file(&file, &ReadParams::default(), None).unwrap().0 else { panic!("no mesh") };
     mesh
 }
 
@@ -109,7 +107,7 @@ mod deep {
     /// outwards. Without being turned they had dark rims.
     #[test]
     fn a_body_turned_inside_out_looks_the_same() {
-        let with_normals = Mesh { normal: convert::vertex_normals(&torus()), ..torus() };
+        let with_normals = Mesh { normal: splat_core::vertex_normals(&torus()), ..torus() };
         let normals_alone = Mesh { triangles: torus().triangles, ..turned(&with_normals) };
         let faces_alone = Mesh { normal: with_normals.normal.clone(), ..turned(&with_normals) };
         let scan = bunny();

@@ -18,7 +18,7 @@ Larger inputs, to be fetched by hand where a benchmark is to run on them:
   Engine block CT (256x256x128, 8 bit) and other volumes:
       https://klacansky.com/open-scivis-datasets/ — terms beside each volume.
   LiDAR tiles: https://www.usgs.gov/3d-elevation-program — public domain.
-Pass them by path: `convert` reads PLY, NIfTI, LAS and LAZ.";
+Pass them by path: `read` reads PLY, NIfTI, LAS and LAZ.";
 
 /// Lists the assets; fails where the tidy rules of assets fail.
 pub(crate) fn run(repo: &Repo) -> Outcome {

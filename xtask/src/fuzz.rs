@@ -1,6 +1,6 @@
 //! `cargo xtask fuzz`: every target of `fuzz/` for a while, by cargo-fuzz on a nightly toolchain.
 //!
-//! Seeds are the small files of `convert`'s suite of damage, the scenes of the repository and `fuzz/seeds/`; what libFuzzer finds
+//! Seeds are the small files of `read`'s suite of damage, the scenes of the repository and `fuzz/seeds/`; what libFuzzer finds
 //! beside them stays in `fuzz/corpus/`, and inputs that do harm in `fuzz/artifacts/`. With `--record` what was run goes into
 //! `fuzz/runs.csv`, of which the table of docs/robustness.md is made.
 
@@ -101,10 +101,10 @@ fn missing(repo: &Repo) -> Option<String> {
     (!works(&["fuzz", "--version"])).then(|| install.to_owned())
 }
 
-/// Writes the small files of `convert` beside what was found before.
+/// Writes the small files of `read` beside what was found before.
 fn write_seeds(repo: &Repo) -> Result<(), String> {
     let program = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
-    let words = ["run", "--quiet", "--package", "organza-convert", "--example", "samples", "--", "fuzz/corpus"];
+    let words = ["run", "--quiet", "--package", "organza-read", "--example", "samples", "--", "fuzz/corpus"];
     match Command::new(program).args(words).current_dir(&repo.root).status() {
         Ok(status) if status.success() => Ok(()),
         Ok(status) => Err(format!("`cargo {}`: {status}", words.join(" "))),
@@ -180,12 +180,14 @@ mod tests {
     fn every_reader_of_a_file_has_a_target() {
         let repo = Repo::open().expect("the repository is readable");
         let targets = Plan::parse(&[]).expect("a plan").chosen(&repo).expect("targets");
-        let manifest = repo.text("crates/convert/Cargo.toml").expect("there is a crate convert");
-        let reads =
-            |line: &&crate::toml_lines::Line<'_>| line.table == "features" && line.value.starts_with("[\"read\"");
-        let features: Vec<&str> = crate::toml_lines::lines(manifest).iter().filter(reads).map(|l| l.key).collect();
-        assert!(features.len() > 15, "{features:?}");
-        let without: Vec<_> = features.iter().filter(|feature| !targets.contains(*feature)).collect();
+        let formats = repo.text("crates/read/src/format.rs").expect("there is a list of formats");
+        let list = formats.split_once("enum Format {").and_then(|(_, rest)| rest.split_once('}')).expect("the list").0;
+        let formats: Vec<String> = list.split(',').map(|name| name.trim().to_lowercase()).collect();
+        let formats: Vec<&str> = formats.iter().map(String::as_str).filter(|name| !name.is_empty()).collect();
+        assert!(formats.len() > 15, "{formats:?}");
+        // Files of VTK in XML are told by the ending that images among them have.
+        let targets_needed = formats.iter().map(|format| if *format == "vtkxml" { "vti" } else { *format });
+        let without: Vec<_> = targets_needed.filter(|target| !targets.contains(target)).collect();
         assert!(without.is_empty(), "{without:?}");
         let manifest = repo.text("fuzz/Cargo.toml").expect("there is a crate of targets");
         for target in targets {

@@ -3,10 +3,11 @@
 //! `cargo run --release -p organza-convert --example implicit`. Times are the least of several runs on one
 //! thread.
 
-use convert::read::{self, Loaded, ReadParams};
-use convert::{GridField, Inside, Interpolation, MpuParams, RawPoints, isosurface_to_mesh, points_to_field};
+use convert::points_to_field;
+use field::{GridField, Inside, MpuParams, isosurface_to_mesh};
+use read::{Loaded, ReadParams};
 use splat_core::glam::{DMat3, DVec3};
-use splat_core::{DAabb, Grid, Mesh, ScalarField, rng};
+use splat_core::{DAabb, Grid, Interpolation, Mesh, RawPoints, ScalarField, rng};
 use std::hint::black_box;
 use std::path::Path;
 use std::time::Instant;
@@ -88,7 +89,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         );
     }
     let mesh = bunny()?;
-    let normal = convert::vertex_normals(&mesh);
+    let normal = splat_core::vertex_normals(&mesh);
     let points = RawPoints { origin: mesh.origin, position: mesh.position, normal, ..RawPoints::default() };
     for tolerance in [1e-3, 3e-4, 1e-4] {
         let params = MpuParams { tolerance, ..MpuParams::default() };

@@ -3,11 +3,12 @@
 //! `cargo run -p organza-convert --example sources`
 
 use convert::{
-    CloudShape, Density, ExpressionField, MeshParams, RawPoints, SplatParams, SurfelParams, VolumeParams,
-    mesh_to_points, procedural_cloud, raw_to_surfels, surface_to_points, volume_to_points,
+    CloudShape, Density, MeshParams, SplatParams, SurfelParams, VolumeParams, mesh_to_points, procedural_cloud,
+    raw_to_surfels, surface_to_points, volume_to_points,
 };
+use field::ExpressionField;
 use splat_core::glam::{DVec3, Vec3};
-use splat_core::{DAabb, Mesh, TransferFunction, TransferPoint};
+use splat_core::{DAabb, Mesh, RawPoints, TransferFunction, TransferPoint};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mesh = Mesh { position: vec![Vec3::ZERO, Vec3::X, Vec3::Y], triangles: vec![[0, 1, 2]], ..Mesh::default() };

@@ -12,17 +12,19 @@
 //!
 //! `at_most` holds always: memory that is not to be exceeded is planned with it.
 
-use crate::borders::open_edges;
-use crate::columns::Wanted;
+use crate::common::columns::Wanted;
 use crate::field_points::{area, coarse_mesh, density_lattice, surface_lattice, surface_spacing};
-use crate::keep::Keep;
+use crate::mesh::borders::open_edges;
+use crate::mesh::mesh_points;
+use crate::points::{matter, surfels};
+use crate::volume::keep::Keep;
 #[cfg(feature = "noise")]
-use crate::procedural::CloudShape;
-use crate::shapes::{HomogeneousMedium, Lattice, MediumBody, Rectangle, rectangle_columns, rectangle_counts};
-use crate::volume_points::lattice_factors;
-use crate::{ConvertError, DensityParams, MeshParams, SplatParams, VolumeParams, mesh_points, resample, surface_nets};
-#[cfg(feature = "surfels")]
-use crate::{MatterParams, RawPoints, SurfelParams, matter, surfels};
+use crate::volume::procedural::CloudShape;
+use crate::volume::resample;
+use crate::volume::shapes::{HomogeneousMedium, Lattice, MediumBody, Rectangle, rectangle_columns, rectangle_counts};
+use crate::volume::volume_points::lattice_factors;
+use crate::{ConvertError, DensityParams, MatterParams, MeshParams, SplatParams, SurfelParams, VolumeParams};
+use splat_core::RawPoints;
 use splat_core::{
     Clip, DAabb, Grid, Mesh, ScalarField, TransferFunction,
     glam::{DMat3, DVec3},
@@ -79,7 +81,6 @@ pub fn mesh(mesh: &Mesh, params: &MeshParams) -> Result<Prediction, ConvertError
 ///
 /// # Errors
 /// As the conversion.
-#[cfg(feature = "surfels")]
 pub fn raw_points(points: &RawPoints, params: &SurfelParams) -> Result<Prediction, ConvertError> {
     surfels::check(points, params)?;
     Ok(Prediction::exact(points.len() as f64, surfels::wanted(points, params)))
@@ -89,7 +90,6 @@ pub fn raw_points(points: &RawPoints, params: &SurfelParams) -> Result<Predictio
 ///
 /// # Errors
 /// As the conversion.
-#[cfg(feature = "surfels")]
 pub fn raw_matter(points: &RawPoints, params: &MatterParams) -> Result<Prediction, ConvertError> {
     matter::check(points, params)?;
     let splats = matter::count(points, params) as f64;
@@ -147,7 +147,7 @@ pub fn surface_evaluations<F: ScalarField + ?Sized>(
     params: &MeshParams,
 ) -> Result<f64, ConvertError> {
     params.splat.check()?;
-    Ok(surface_nets::evaluations(field, &surface_lattice(field, bounds, params)?))
+    Ok(field::evaluations(field, &surface_lattice(field, bounds, params)?))
 }
 
 /// How many values of a field [`crate::density_to_points`] asks for.

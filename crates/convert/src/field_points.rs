@@ -4,12 +4,13 @@
 //! by surface nets with cells of √2·h and then goes the way of every mesh, so that its splats are as even as a
 //! mesh's; a density is sampled at the middles of lattice cells and goes the way of every volume.
 
-use crate::convert_error::check_cancelled;
-use crate::mesh_points::{corners, mesh_to_points_into};
-use crate::params::{Density, SplatParams};
-use crate::surface_nets::{Lattice, surface_nets};
-use crate::volume_points::{most_lattice_points, volume_to_points};
-use crate::{ConvertError, MeshParams, MeshReport, VolumeParams, VolumeReport, subdivide};
+use crate::common::convert_error::check_cancelled;
+use crate::common::params::{Density, SplatParams};
+use crate::mesh::mesh_points::{corners, mesh_to_points_into};
+use crate::mesh::subdivide;
+use crate::volume::volume_points::{most_lattice_points, volume_to_points};
+use crate::{ConvertError, MeshParams, MeshReport, VolumeParams, VolumeReport};
+use field::{Lattice, surface_nets};
 use rayon::prelude::*;
 use splat_core::{
     Cloud, DAabb, Grid, Mesh, Progress, ScalarField, Similarity, TransferFunction, TransferPoint,
@@ -31,7 +32,8 @@ const MOST_LOOKED_AT: u64 = u32::MAX as u64;
 /// `progress`, and work stops where that is cancelled.
 ///
 /// ```
-/// use convert::{ExpressionField, SplatParams, field_to_mesh};
+/// use field::ExpressionField;
+/// use convert::{SplatParams, field_to_mesh};
 /// use splat_core::{DAabb, glam::DVec3};
 /// let ball = ExpressionField::parse("sqrt(x^2 + y^2 + z^2) - 1").unwrap();
 /// let bounds = DAabb::around(DVec3::ZERO, DVec3::splat(1.2));
@@ -50,7 +52,7 @@ pub fn field_to_mesh<F: ScalarField + ?Sized>(
     progress: Option<&Progress>,
 ) -> Result<Mesh, ConvertError> {
     let lattice = lattice(bounds, cell, splat, MOST_LOOKED_AT)?;
-    surface_nets(field, &lattice, &splat.object_name, progress.unwrap_or(&Progress::new()))
+    Ok(surface_nets(field, &lattice, &splat.object_name, progress.unwrap_or(&Progress::new()))?)
 }
 
 /// The zero set of a field inside a box as triangles that are as fine as splats `spacing` apart (object units): cells of
@@ -58,8 +60,9 @@ pub fn field_to_mesh<F: ScalarField + ?Sized>(
 /// are left out, so an open surface ends within one triangle of it.
 ///
 /// ```
-/// use convert::{Clip, ClippedField, ExpressionField, SplatParams, surface_to_mesh};
-/// use splat_core::{DAabb, glam::DVec3};
+/// use splat_core::{Clip, DAabb, glam::DVec3};
+/// use field::{ClippedField, ExpressionField};
+/// use convert::{SplatParams, surface_to_mesh};
 /// let ball = ExpressionField::parse("sqrt(x^2 + y^2 + z^2) - 1").unwrap();
 /// let above = Clip::HalfSpace { normal: -DVec3::Y, offset: 0.0 };
 /// let dome = ClippedField::new(std::sync::Arc::new(ball), vec![above]).unwrap();
@@ -183,7 +186,8 @@ impl Default for DensityParams {
 /// Splats of a density: extinction = `extinction`·max(field, 0) inside the box (object space).
 ///
 /// ```
-/// use convert::{Density, DensityParams, ExpressionField, density_to_points};
+/// use convert::{Density, DensityParams, density_to_points};
+/// use field::ExpressionField;
 /// use splat_core::{DAabb, glam::DVec3};
 /// let fog = ExpressionField::parse("2").unwrap();
 /// let params = DensityParams { density: Density::Spacing(0.25), ..DensityParams::default() };

@@ -1,9 +1,9 @@
 //! A folder of results changes no result, whatever lies in it, and stays within its limit.
-#![cfg(all(feature = "cache", feature = "surfels"))]
+#![cfg(feature = "cache")]
 
-use convert::{Cache, Orientation, RawPoints, SurfelParams, raw_to_surfels};
+use convert::{Cache, Orientation, SurfelParams, raw_to_surfels};
 use splat_core::glam::{DVec3, Vec3};
-use splat_core::{Cloud, rng};
+use splat_core::{Cloud, RawPoints, rng};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;

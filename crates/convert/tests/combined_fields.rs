@@ -1,11 +1,9 @@
 //! Unions, intersections, differences, complements and clipped surfaces.
 
-use convert::{
-    Clip, ClippedField, Combination, CombinedField, Density, ExpressionField, GridField, Inside, Interpolation,
-    MeshParams, SharedField, Solid, SplatParams, field_to_mesh, surface_to_points,
-};
+use convert::{Density, MeshParams, SplatParams, field_to_mesh, surface_to_points};
+use field::{ClippedField, Combination, CombinedField, ExpressionField, GridField, Inside, SharedField, Solid};
 use splat_core::glam::{DMat3, DVec3};
-use splat_core::{DAabb, Grid, ScalarField, rng};
+use splat_core::{Clip, DAabb, Grid, Interpolation, ScalarField, rng};
 use std::sync::Arc;
 
 /// Distance from a ball's surface; its domain is where x < 2, its values end at |p| = 50.

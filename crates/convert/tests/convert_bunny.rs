@@ -1,8 +1,7 @@
 //! The scanned bunny: its splats cover it once.
-#![cfg(feature = "ply")]
 
-use convert::read::{self, Loaded, ReadParams};
 use convert::{Density, MeshParams, mesh_to_points, reference};
+use read::{Loaded, ReadParams};
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::{Cloud, Footprint, Mesh, optics, rng};
 use std::collections::HashMap;

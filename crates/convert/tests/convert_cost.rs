@@ -1,10 +1,13 @@
 //! Predicted splats and bytes against the counters of the conversions, and conversions that are interrupted.
-#![cfg(all(feature = "surfels", feature = "expression", feature = "noise"))]
+#![cfg(feature = "noise")]
 
 use convert::cost::{self, Prediction};
 use convert::*;
+use field::ExpressionField;
 use splat_core::glam::{DMat3, DVec3, Vec3};
-use splat_core::{Cloud, DAabb, Grid, Limits, Mesh, Progress, Similarity, TransferFunction, TransferPoint, rng};
+use splat_core::{
+    Clip, Cloud, DAabb, Grid, Limits, Mesh, Progress, RawPoints, Similarity, TransferFunction, TransferPoint, rng,
+};
 
 fn mesh() -> Mesh {
     let unit = |i: u64, a: u64| rng::unit_f32(8, 0, i, a);

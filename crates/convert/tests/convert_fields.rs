@@ -1,12 +1,14 @@
 //! Fields: formulas, derivatives, bounds, surfaces, densities, procedural clouds.
-#![cfg(all(feature = "expression", feature = "noise"))]
+#![cfg(feature = "noise")]
 
 use convert::{
-    CloudShape, ConvertError, Density, DensityParams, ExpressionField, MeshParams, SplatParams, VolumeParams,
-    density_to_points, procedural_cloud, surface_to_points,
+    CloudShape, ConvertError, Density, DensityParams, MeshParams, SplatParams, VolumeParams, density_to_points,
+    field_to_mesh, mesh_to_points, procedural_cloud, surface_to_points,
 };
-use splat_core::glam::DVec3;
-use splat_core::{DAabb, ScalarField, rng};
+use field::{ExpressionField, GridField, Inside, isosurface_to_mesh};
+use splat_core::glam::{DMat3, DVec3};
+use splat_core::{DAabb, Grid, Interpolation, ScalarField, rng};
+use std::sync::Arc;
 
 fn field(text: &str) -> ExpressionField {
     ExpressionField::parse(text).unwrap()
@@ -315,4 +317,37 @@ fn values_and_gradients_of_many_places_are_those_of_each() {
             }
         }
     }
+}
+
+/// Distances from a place on a lattice of 21 points along each axis.
+fn distances(center: DVec3) -> Grid {
+    let at = |n: usize| DVec3::new((n % 21) as f64, (n / 21 % 21) as f64, (n / 441) as f64);
+    let values = (0..21 * 21 * 21).map(|n| at(n).distance(center) as f32).collect();
+    Grid { origin: DVec3::ZERO, axes: DMat3::IDENTITY, dims: [21; 3], values }
+}
+
+#[test]
+fn a_ball_in_a_volume_becomes_the_mesh_of_a_ball() {
+    let center = DVec3::splat(10.0);
+    let grid = distances(center);
+    let f = GridField::new(Arc::new(grid), Interpolation::CatmullRom, 6.5, Inside::Below).unwrap();
+    let mesh = field_to_mesh(&f, f.bounds(), 0.7, &SplatParams::default(), None).unwrap();
+    assert!(mesh.position.len() > 1000);
+    for (p, n) in mesh.position.iter().zip(&mesh.normal) {
+        let out = p.as_dvec3() + mesh.origin - center;
+        // The interpolation error of a distance of curvature 1/6.5, not of the mesh.
+        assert!((out.length() - 6.5).abs() < 2e-3, "{}", out.length());
+        assert!(n.as_dvec3().dot(out.normalize()) > 0.999);
+    }
+}
+
+/// Whole values at the isovalue put vertices onto lattice points: triangles without area become no splats.
+#[test]
+fn a_marched_volume_with_triangles_without_area_becomes_splats() {
+    let mut grid = distances(DVec3::splat(10.0));
+    grid.values.iter_mut().for_each(|value| *value = value.floor());
+    let mesh = isosurface_to_mesh(&grid, 6.0, Inside::Below).unwrap();
+    let (cloud, report) = mesh_to_points(&mesh, &MeshParams::default(), None).unwrap();
+    assert!(cloud.len() as u64 == report.splats && report.splats > 1000);
+    assert!(report.degenerate > 0, "{report:?}");
 }

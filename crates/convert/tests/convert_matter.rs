@@ -1,11 +1,12 @@
 //! Raw points become a medium: columns of files, closed forms of lattices, mass that is kept, invariances, and what is refused.
-#![cfg(all(feature = "ply", feature = "xyz", feature = "pcd", feature = "surfels"))]
 
-use convert::read::{Loaded, Notes, ReadParams, bytes};
-use convert::{Column, ConvertError, Kept, MatterParams, MatterReport, PointsShown, RawPoints, SplatParams, Within};
-use convert::{cost, raw_to_matter, reference, shown_points};
+use convert::{
+    ConvertError, Kept, MatterParams, MatterReport, PointsShown, SplatParams, Within, cost, raw_to_matter, reference,
+    shown_points,
+};
+use read::{Loaded, Notes, ReadParams, bytes};
 use splat_core::glam::{DQuat, DVec3, Vec3};
-use splat_core::{Cloud, Footprint, Gaussians, Similarity, SplatKind, rng};
+use splat_core::{Cloud, Column, Footprint, Gaussians, RawPoints, Similarity, SplatKind, rng};
 
 const SIDE: u32 = 12;
 

@@ -1,9 +1,8 @@
 //! Raw points become surfels: hard cases CV11 and CV12, normals, areas, orientation, invariances.
-#![cfg(feature = "surfels")]
 
-use convert::{DiscShape, Orientation, RawPoints, SurfelParams, raw_to_surfels, reference};
+use convert::{DiscShape, Orientation, SurfelParams, raw_to_surfels, reference};
 use splat_core::glam::{DQuat, DVec3, Vec3};
-use splat_core::{Footprint, optics, rng};
+use splat_core::{Footprint, RawPoints, optics, rng};
 use std::f64::consts::FRAC_PI_2;
 
 fn plane(side: u32) -> RawPoints {

@@ -1,8 +1,8 @@
 //! Volumes become splats: hard cases CV7-CV9, conserved extinction, gradients, invariances.
 
-use convert::{Clip, ConvertError, SplatParams, VolumeParams, reference, sobel_gradient, volume_to_points};
+use convert::{ConvertError, SplatParams, VolumeParams, reference, sobel_gradient, volume_to_points};
 use splat_core::glam::{DMat3, DQuat, DVec3, Vec3};
-use splat_core::{DAabb, Exceeded, Footprint, Grid, Similarity, TransferFunction, TransferPoint, rng};
+use splat_core::{Clip, DAabb, Exceeded, Footprint, Grid, Similarity, TransferFunction, TransferPoint, rng};
 
 fn grid(dims: [usize; 3], steps: DVec3, value: impl Fn(usize, usize, usize) -> f32) -> Grid {
     let values = (0..dims[0] * dims[1] * dims[2])

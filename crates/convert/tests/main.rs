@@ -1,7 +1,6 @@
-//! Conversions and readers on real files, hard cases and bad inputs. One program: it is linked once, and its tests share all cores.
+//! Conversions on real files and hard cases. One program: it is linked once, and its tests share all cores.
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-mod bad_inputs;
 mod body_centred;
 mod cache;
 mod combined_fields;
@@ -12,51 +11,15 @@ mod convert_matter;
 mod convert_mesh;
 mod convert_surfels;
 mod convert_volume;
-mod grid_fields;
-mod marching_cubes;
+mod gaussian_files;
 mod mpu_fields;
 mod point_attributes;
 mod point_footprints;
 mod point_materials;
 mod point_opacity;
-mod read_assets;
-mod read_cells;
-mod read_columns;
-mod read_copc;
-mod read_e57;
-#[cfg(all(feature = "splat", feature = "spz"))]
-mod read_gaussians;
-#[cfg(all(feature = "off", feature = "pcd", feature = "gltf"))]
-mod read_gltf;
-#[cfg(all(feature = "hdr", feature = "exr", feature = "png"))]
-mod read_images;
-mod read_las;
-#[cfg(feature = "obj")]
-mod read_materials;
-#[cfg(feature = "obj")]
-mod read_memory;
-mod read_mended;
-mod read_metaimage;
-mod read_more;
-mod read_nifti;
-mod read_notes;
-mod read_numbers;
-#[cfg(all(feature = "off", feature = "pcd", feature = "gltf"))]
-mod read_off;
-#[cfg(all(feature = "off", feature = "pcd", feature = "gltf"))]
-mod read_pcd;
-mod read_ply;
-mod read_polygons;
-mod read_raw;
-#[cfg(feature = "read")]
+#[path = "../../read/tests/read_samples/mod.rs"]
 mod read_samples;
-mod read_series;
-mod read_spaces;
-mod read_unread;
-mod read_volumes;
-mod read_vti;
-mod read_vtk;
 mod readme;
+mod spaces_of_volumes;
 mod splat_files;
 mod surface_field;
-mod true_words;

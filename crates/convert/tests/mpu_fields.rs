@@ -1,13 +1,10 @@
 //! Fields of scattered points: accuracy, derivatives, bounds, sameness, and inputs that are hardly surfaces.
-#![cfg(all(feature = "surfels", feature = "ply"))]
 
-use convert::read::{self, Loaded, ReadParams};
-use convert::{
-    MpuField, MpuParams, MpuReport, Orientation, RawPoints, SplatParams, field_to_mesh, part_at_creases,
-    points_to_field, vertex_normals,
-};
+use convert::{Orientation, SplatParams, SurfelParams, field_to_mesh, points_to_field, raw_to_surfels};
+use field::{MpuField, MpuParams, MpuReport};
+use read::{Loaded, ReadParams};
 use splat_core::glam::{DVec3, Vec3};
-use splat_core::{DAabb, ScalarField, rng};
+use splat_core::{DAabb, RawPoints, ScalarField, part_at_creases, rng, vertex_normals};
 use std::f64::consts::TAU;
 use std::path::Path;
 
@@ -282,8 +279,15 @@ fn missing_normals_are_estimated() {
     assert!(mean < 0.3 && most < 1.5, "{mean} {most}");
     assert!(f.value(DVec3::ZERO) < 0.0 && f.value(DVec3::splat(0.7)) > 0.0);
     // Towards the middle: inside out.
-    let params = MpuParams { orientation: Orientation::Viewpoint(DVec3::ZERO), ..MpuParams::default() };
-    assert!(points_to_field(&points, &params, None).unwrap().0.value(DVec3::ZERO) > 0.0);
+    let params = SurfelParams { orientation: Orientation::Viewpoint(DVec3::ZERO), ..SurfelParams::default() };
+    let (surfels, _) = raw_to_surfels(&points, &params, None).unwrap();
+    let inwards = RawPoints {
+        origin: surfels.origin,
+        position: surfels.position,
+        normal: surfels.normal,
+        ..RawPoints::default()
+    };
+    assert!(points_to_field(&inwards, &MpuParams::default(), None).unwrap().0.value(DVec3::ZERO) > 0.0);
 }
 
 #[test]

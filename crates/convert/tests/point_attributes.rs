@@ -1,13 +1,12 @@
 //! What files say of single points: tangents and radii of discs, shadow coefficients, masses, and what transfer functions make of a column.
-#![cfg(feature = "surfels")]
 
-use convert::read::{Loaded, ReadParams, bytes};
 use convert::{
-    Classified, ColorBy, Column, DiscShape, DiscSize, MatterParams, PointColors, PointsShown, RawPoints, SplatParams,
-    SurfelParams, cost, raw_to_matter, raw_to_surfels, shown_points,
+    Classified, ColorBy, DiscShape, DiscSize, MatterParams, PointColors, PointsShown, SplatParams, SurfelParams, cost,
+    raw_to_matter, raw_to_surfels, shown_points,
 };
+use read::{Loaded, ReadParams, bytes};
 use splat_core::glam::{DVec2, DVec3, Vec3};
-use splat_core::{Cloud, Footprint, Similarity, TransferFunction, TransferPoint, optics, rng};
+use splat_core::{Cloud, Column, Footprint, RawPoints, Similarity, TransferFunction, TransferPoint, optics, rng};
 
 /// Points of the plane y = 0 that lie `across` apart along x and one apart along z.
 fn lines(side: u32, across: f32) -> RawPoints {

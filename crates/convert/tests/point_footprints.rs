@@ -1,13 +1,12 @@
 //! Footprints point by point: by a column, or by chance; how images lie, and what has none.
-#![cfg(feature = "surfels")]
 
 use crate::point_attributes::surfels;
 use convert::{
-    Column, FootprintChoice, MatterParams, PointsShown, RawPoints, Rectangle, SplatParams, SurfelParams, cost,
-    raw_to_matter, raw_to_surfels, rectangle, shown_points,
+    FootprintChoice, MatterParams, PointsShown, Rectangle, SplatParams, SurfelParams, cost, raw_to_matter,
+    raw_to_surfels, rectangle, shown_points,
 };
 use splat_core::glam::{DVec3, Vec3};
-use splat_core::{FootprintImage, FootprintStack, Similarity};
+use splat_core::{Column, FootprintImage, FootprintStack, RawPoints, Similarity};
 use std::sync::Arc;
 
 /// Formulas of 3, 2 and 5 deviations, an image in the place of the last.

@@ -1,13 +1,12 @@
 //! Materials point by point, by a column; and the values that splats keep.
-#![cfg(feature = "surfels")]
 
 use crate::point_attributes::surfels;
 use convert::{
-    ColorBy, ColorMap, Column, MatterParams, PointColors, PointMaterial, PointsShown, RawPoints, SplatParams,
-    SurfelParams, cost, raw_to_matter, raw_to_surfels, shown_points, thinned,
+    ColorBy, ColorMap, MatterParams, PointColors, PointMaterial, PointsShown, SplatParams, SurfelParams, cost,
+    raw_to_matter, raw_to_surfels, shown_points, thinned,
 };
-use splat_core::SplatKind;
 use splat_core::glam::Vec3;
+use splat_core::{Column, RawPoints, SplatKind};
 use std::sync::Arc;
 
 const CLAY: PointMaterial = PointMaterial { id: 4, color: [0.7, 0.3, 0.1], opacity: 1.0 };

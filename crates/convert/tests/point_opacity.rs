@@ -1,11 +1,10 @@
 //! Points that bring an opacity each: how files state it, what is refused, and the discs that come of it.
-#![cfg(all(feature = "ply", feature = "xyz", feature = "surfels"))]
 
 use crate::read_samples::load;
-use convert::read::{Loaded, ReadParams, bytes};
-use convert::{RawPoints, SurfelParams, cost, raw_to_surfels, reference};
+use convert::{SurfelParams, cost, raw_to_surfels, reference};
+use read::{Loaded, ReadParams, bytes};
 use splat_core::glam::{DVec3, Vec3};
-use splat_core::{Cloud, Footprint, SplatKind, optics};
+use splat_core::{Cloud, Footprint, RawPoints, SplatKind, optics};
 
 fn points(name: &str, content: &[u8]) -> RawPoints {
     match load(name, content).unwrap() {

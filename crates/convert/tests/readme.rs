@@ -8,8 +8,8 @@ const LIB: &str = include_str!("../src/lib.rs");
 fn every_feature_is_listed() {
     let features = MANIFEST.split("[features]").nth(1).unwrap().split("\n[").next().unwrap();
     let names: Vec<&str> = features.lines().filter_map(|l| l.split_once(" = ")).map(|(name, _)| name).collect();
-    assert!(names.len() > 9, "{names:?}");
-    for name in names.iter().filter(|n| !matches!(**n, "default" | "read")) {
+    assert!(names.len() > 3, "{names:?}");
+    for name in names.iter().filter(|name| **name != "default") {
         assert!(README.contains(&format!("`{name}`")), "{name}");
     }
 }
@@ -30,5 +30,5 @@ fn what_needs_a_feature_is_said() {
             assert!(row.contains(&format!("`{function}`")), "{function} needs {feature}");
         }
     }
-    assert_eq!(gated, 10);
+    assert_eq!(gated, 2);
 }

@@ -1,13 +1,13 @@
 //! Rendering-oriented points in files: what is written is read again bit by bit, moved, chosen and refused.
-#![cfg(all(feature = "surfels", feature = "ply"))]
 
-use convert::read::{Loaded, ReadParams, bytes};
 use convert::{
-    DiscShape, Kept, MatterParams, PointsShown, RawPoints, SplatParams, SurfelParams, Within, cost,
-    packed_splats_to_ply, raw_to_matter, raw_to_surfels, shown_points, splats_to_ply, thinned,
+    DiscShape, Kept, MatterParams, PointsShown, SplatParams, SurfelParams, Within, cost, raw_to_matter, raw_to_surfels,
+    shown_points, thinned,
 };
+use read::{Loaded, ReadParams, bytes};
 use splat_core::glam::{DQuat, DVec3, Vec3};
-use splat_core::{Cloud, Footprint, FootprintStack, PackedCloud, Similarity, Splat, SplatKind, rng};
+use splat_core::splat_file::{packed_splats_to_ply, splats_to_ply};
+use splat_core::{Cloud, Footprint, FootprintStack, PackedCloud, RawPoints, Similarity, Splat, SplatKind, rng};
 
 /// Splats of all kinds with every attribute, far from zero.
 fn cloud(count: u64) -> Cloud {

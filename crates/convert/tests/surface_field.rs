@@ -1,11 +1,15 @@
 //! Fields that surfaces show.
 
 use convert::{
-    Classified, ConvertError, Density, ExpressionField, Interpolation, MeshParams, PointsShown, RawPoints, ReadySplats,
-    SplatParams, SurfaceField, SurfelParams, mesh_to_points, raw_to_surfels, shown_points, surface_to_points,
+    Classified, ConvertError, Density, MeshParams, PointsShown, SplatParams, SurfaceField, SurfelParams,
+    mesh_to_points, raw_to_surfels, shown_points, surface_to_points,
 };
+use field::ExpressionField;
 use splat_core::glam::{DMat3, DQuat, DVec3, Vec3};
-use splat_core::{Cloud, DAabb, Grid, Mesh, Similarity, Splat, SplatKind, TransferFunction, TransferPoint};
+use splat_core::{
+    Cloud, DAabb, Grid, Interpolation, Mesh, RawPoints, ReadySplats, Similarity, Splat, SplatKind, TransferFunction,
+    TransferPoint,
+};
 use std::sync::Arc;
 
 /// A lattice of n³ points over a cube about 0 with half a side `reach`, sheared, with the values of a function.

@@ -5,11 +5,11 @@ use super::bar::with_bar;
 use super::console;
 use super::given::given;
 use super::session::{parse_scene, path_text, processor_only, render_options};
-use ::convert::{packed_splats_to_ply, splats_to_ply};
 use organza::output::{Target, Targets};
 use organza::scene::{Scene, Technique};
 use organza::{Error, Files, Loaded, printable, shown};
 use serde_json::{Value, json};
+use splat_core::splat_file::{packed_splats_to_ply, splats_to_ply};
 use splat_core::{Cloud, Shading};
 use std::path::Path;
 

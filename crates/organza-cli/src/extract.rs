@@ -5,10 +5,10 @@ use super::bar::with_bar;
 use super::console;
 use super::convert::begin;
 use super::session::{path_text, render_options};
-use ::convert::RawPoints;
 use organza::scene::{ExtractSource, MOST_ABSORBANCE, Scene};
 use organza::{Error, printable};
 use serde_json::json;
+use splat_core::RawPoints;
 use std::fmt::Write as _;
 
 /// Finds the surface and writes it as points with normals, which `points` of a scene reads.

@@ -3,10 +3,10 @@
 use super::args::{Axis, FirstArguments, SceneArguments};
 use super::console;
 use super::session::{check_backend, render_options, start_threads};
-use convert::read::is_foreign_json;
 use organza::scene::{self, DEFAULT_FILL, DEFAULT_SIZE, Override, UpAxis, short};
 use organza::{Error, Files, InMemory, Progress, RenderOptions, SourceData, printable};
 use organza_survey::{DataFile, Preset, Wish, Written, first_scene};
+use read::is_foreign_json;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 

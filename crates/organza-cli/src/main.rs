@@ -88,7 +88,7 @@ fn run(command: Command) -> Result<u8, Error> {
 fn guard(work: impl FnOnce() -> u8) -> u8 {
     panic::set_hook(Box::new(|info| {
         // A decoder that gives up on a damaged file; the reader makes an error of it.
-        if ::convert::read::panic_is_input_error() {
+        if read::panic_is_input_error() {
             return;
         }
         let version = env!("CARGO_PKG_VERSION");

@@ -190,8 +190,8 @@ fn slide(light: &SceneLight, options: &RenderOptions) -> Result<Option<reference
 }
 
 fn image(path: &Path, options: &RenderOptions) -> Result<RadianceImage, Error> {
-    let (data, _) = convert::read::file(path, &options.read_params(), None).map_err(|e| Error::from_read(path, &e))?;
-    let convert::read::Loaded::Image(image) = data else {
+    let (data, _) = read::file(path, &options.read_params(), None).map_err(|e| Error::from_read(path, &e))?;
+    let read::Loaded::Image(image) = data else {
         return Err(Error::wrong_kind(path, "an image of radiance", "name a Radiance HDR, OpenEXR or PNG file"));
     };
     Ok(image)

@@ -10,8 +10,9 @@ use super::raw_source::{
 };
 use super::{CombinedSource, FieldSource, IsosurfaceSource, LevelSetSource, SliceSource, Source};
 use crate::Error;
-use convert::{Classified, Clip, Combination, Inside, Interpolation, MpuParams};
-use splat_core::TransferFunction;
+use convert::Classified;
+use field::{Combination, Inside, MpuParams};
+use splat_core::{Clip, Interpolation, TransferFunction};
 
 pub(super) fn check_isosurface(at: &At<'_>, raw: &RawIsosurface, paths: &Paths) -> Result<IsosurfaceSource, Error> {
     Ok(IsosurfaceSource {

@@ -7,8 +7,7 @@ use super::raw_footprint::{NumberOr, RawChoice, RawChosen, RawFootprint, RawImag
 use super::{LoadOptions, Source};
 use crate::{Error, printable, shown};
 use convert::FootprintChoice;
-use convert::read::{Loaded, ReadParams, file};
-use convert::{Fault, ReadError};
+use read::{Fault, Loaded, ReadError, ReadParams, file};
 use splat_core::{Exceeded, Footprint, FootprintImage, FootprintStack};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;

@@ -11,9 +11,9 @@ use super::paths::Paths;
 use super::raw_object::{RawLattice, RawObject, RawTransform, RawUp};
 use super::{FieldSource, SceneMaterial, SceneObject, Source, Technique, Up, UpBy};
 use crate::Error;
-use convert::read::{UpAxis, stated_up_axis, up_axis};
 use glam::{DQuat, DVec3};
-use splat_core::{FootprintStack, Packing, Similarity};
+use read::{stated_up_axis, up_axis};
+use splat_core::{FootprintStack, Packing, Similarity, UpAxis};
 use std::collections::HashSet;
 use std::sync::Arc;
 

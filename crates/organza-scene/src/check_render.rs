@@ -12,8 +12,7 @@ use super::{
     ShadowMapping, ShadowSettings, SheetsSettings, Slicing, SoftShadows, SurfaceSampler, Technique, VolumeSampler,
 };
 use crate::{Error, shown};
-use splat_core::Direction;
-use splat_core::raster::Accumulation;
+use splat_core::{Accumulation, Direction};
 
 /// Checks `[render]`.
 pub(super) fn check_render(at: &At<'_>, raw: &RawRender) -> Result<RenderSettings, Error> {

@@ -1,9 +1,8 @@
 //! Data that a program has in memory: its scenes name it as `memory:NAME` where others name a file.
 
 use crate::{Error, shown};
-use convert::RawPoints;
 use sha2::{Digest, Sha256};
-use splat_core::{Grid, Mesh, RadianceImage};
+use splat_core::{Grid, Mesh, RadianceImage, RawPoints};
 use std::collections::BTreeMap;
 use std::fmt;
 use std::path::{Path, PathBuf};

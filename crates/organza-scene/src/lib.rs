@@ -63,10 +63,10 @@ mod switched;
 mod tree;
 mod written;
 
-pub use convert::read::UpAxis;
-pub use convert::{ColorMap, ColorScale, Combination, PointColors, ScaleNumbers};
+pub use convert::{ColorMap, ColorScale, PointColors, ScaleNumbers};
 pub use effects::{EffectKind, HangsOn, SwitchedEffect};
 pub use error::Error;
+pub use field::Combination;
 pub use fit::{CameraFit, DEFAULT_AZIMUTH, DEFAULT_FILL, DEFAULT_SIZE, EachPoint, FoundCamera};
 pub use in_memory::{InMemory, SourceData, name_of as name_in_memory, source_of as source_in_memory};
 pub use layer_choice::{LAYER_NAMES, LayerChoice};
@@ -87,6 +87,7 @@ pub use source::{
     CloudSource, CombinedSource, DensitySource, ExtractSource, FieldSource, ImplicitSource, IsosurfaceSource,
     LevelSetSource, MOST_ABSORBANCE, MatterSource, SliceSource, Source, VolumeSource,
 };
+pub use splat_core::UpAxis;
 pub use stops::{Path, Stop};
 pub use written::Written;
 

@@ -3,11 +3,10 @@
 use super::in_memory::{InMemory, name_of};
 use super::{CameraFit, FieldSource, PointsLook, RenderSettings, SceneLight, Source, Stop, Technique};
 use crate::Error;
-use convert::read::UpAxis;
-use convert::{Clip, DiscSize, FootprintChoice};
+use convert::{DiscSize, FootprintChoice};
 use glam::DVec3;
 use sha2::{Digest, Sha256};
-use splat_core::{Camera, FootprintStack, Material, Packing, Projection, Similarity};
+use splat_core::{Camera, Clip, FootprintStack, Material, Packing, Projection, Similarity, UpAxis};
 use std::collections::BTreeSet;
 use std::fs::File;
 use std::io::Read;

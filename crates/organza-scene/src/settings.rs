@@ -1,8 +1,7 @@
 //! How to render, checked: the technique and the knobs of each.
 
 use super::{LayerChoice, SwitchedEffect};
-use splat_core::Direction;
-use splat_core::raster::Accumulation;
+use splat_core::{Accumulation, Direction};
 
 /// How to render.
 #[derive(Debug, Clone, PartialEq)]

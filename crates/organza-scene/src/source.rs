@@ -1,12 +1,10 @@
 //! Where an object's data comes from, checked: files, expressions and shapes.
 
 use crate::{Error, SceneObject, Written};
-use convert::{
-    Classified, CloudShape, Combination, Ellipsoid, ExpressionField, HomogeneousMedium, Inside, Interpolation,
-    RawPoints, Rectangle,
-};
+use convert::{Classified, CloudShape, Ellipsoid, HomogeneousMedium, Rectangle};
+use field::{Combination, ExpressionField, Inside};
 use glam::DVec3;
-use splat_core::{DAabb, TransferFunction};
+use splat_core::{DAabb, Interpolation, RawPoints, TransferFunction};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 

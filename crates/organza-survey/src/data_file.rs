@@ -3,8 +3,9 @@
 use crate::facts::bounds_of;
 use crate::preset::Wish;
 use crate::stands::{cloud_stands_along, extent, lies_flat_along, stands_along};
-use convert::read::{ReadParams, UpAxis, stated_up_axis};
 use organza::{Error, Files, Progress, RenderOptions, SourceData, printable, scene};
+use read::{ReadParams, stated_up_axis};
+use splat_core::UpAxis;
 use std::path::{Path, PathBuf};
 
 /// A data file that was read.
@@ -158,7 +159,7 @@ fn named(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use convert::RawPoints;
+    use splat_core::RawPoints;
 
     #[test]
     fn colours_that_are_all_black_are_none() {

@@ -4,11 +4,11 @@ use crate::histogram::Histogram;
 use crate::mesh_faults::{MeshFaults, mesh_faults};
 use crate::spacing::{duplicates, median_spacing};
 use crate::stands::{cloud_stands_along, lies_flat_along, stands_along};
-use convert::read::{Loaded, Mended, NamedColumn, ReadParams, UpAxis, stated_up_axis, up_axis};
-use convert::{FillValue, RawPoints, Strays, looks_like_degrees};
+use convert::{FillValue, Strays, looks_like_degrees};
 use organza::Error;
+use read::{Loaded, Mended, NamedColumn, ReadParams, stated_up_axis, up_axis};
 use splat_core::glam::{DVec3, Vec3};
-use splat_core::{Aabb, DAabb, Grid, MemoryAccount, Mesh, RadianceImage};
+use splat_core::{Aabb, DAabb, Grid, MemoryAccount, Mesh, RadianceImage, RawPoints, UpAxis};
 use std::collections::HashSet;
 use std::path::Path;
 
@@ -72,7 +72,7 @@ pub struct Facts {
 /// one that would take more than `max_bytes`.
 pub fn facts(path: &Path, max_bytes: u64, strict: bool) -> Result<Facts, Error> {
     let params = ReadParams { memory: MemoryAccount::new(max_bytes), strict, ranges: true, ..ReadParams::default() };
-    let read = convert::read::file(path, &params, None);
+    let read = read::file(path, &params, None);
     let (data, notes) = read.map_err(|e| Error::from_read(path, &e))?;
     let bytes = std::fs::metadata(path).map_err(|e| Error::io(path, "cannot read", e))?.len();
     let facts = match data {

@@ -156,7 +156,7 @@ fn render_text(data: &[DataFile], wish: &Wish, are_labels: bool) -> String {
 
 /// Scanned bodies look away from where everything else is seen.
 fn default_azimuth(data: &[DataFile]) -> f64 {
-    let is_body = |d: &DataFile| matches!(d.data, SourceData::Grid(_)) && d.stated_up == Some(convert::read::UpAxis::Z);
+    let is_body = |d: &DataFile| matches!(d.data, SourceData::Grid(_)) && d.stated_up == Some(splat_core::UpAxis::Z);
     if data.iter().all(is_body) { BEFORE_A_FACE } else { DEFAULT_AZIMUTH }
 }
 

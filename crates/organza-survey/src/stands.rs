@@ -1,9 +1,8 @@
 //! Which axis of data points up, where its format says nothing of it: things stand on the plane that their coordinates begin at, and points and
 //! layers of the ground or the sky are far wider than high.
 
-use convert::read::UpAxis;
 use splat_core::glam::DVec3;
-use splat_core::{DAabb, Grid};
+use splat_core::{DAabb, Grid, UpAxis};
 
 /// Distance of the lowest point from 0 over the height, of what stands there.
 const ON: f64 = 0.01;

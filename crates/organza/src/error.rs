@@ -110,18 +110,18 @@ impl Error {
     }
 
     /// An error of a reader.
-    pub fn from_read(path: &Path, error: &convert::ReadError) -> Self {
+    pub fn from_read(path: &Path, error: &read::ReadError) -> Self {
         let what = format!("{}{}", printable(Path::new(&error.file)), error.place);
         let message = format!("expected {}, found {}", error.expected, shown(&error.found));
         match error.fault {
-            convert::Fault::FileSystem if error.is_missing_file() => {
+            read::Fault::FileSystem if error.is_missing_file() => {
                 Self::io(path, "cannot read", std::io::Error::new(std::io::ErrorKind::NotFound, error.found.as_str()))
             }
-            convert::Fault::FileSystem => {
+            read::Fault::FileSystem => {
                 Self::io(path, "cannot read", std::io::Error::other(format!("{message}; {}", error.hint)))
             }
-            convert::Fault::Cancelled => Self::Cancelled,
-            convert::Fault::Limit => Self::TooLarge { what, message, hint: error.hint.into() },
+            read::Fault::Cancelled => Self::Cancelled,
+            read::Fault::Limit => Self::TooLarge { what, message, hint: error.hint.into() },
             _ => Self::input(what, message, error.hint),
         }
     }

@@ -2,7 +2,8 @@
 
 use crate::cost::Rates;
 use crate::device::Device;
-use convert::{Cache, read::ReadParams};
+use convert::Cache;
+use read::ReadParams;
 use splat_core::MemoryAccount;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -14,7 +15,7 @@ pub struct RenderOptions {
     pub max_memory: u64,
     /// Leave out records with values that are not finite instead of refusing the file.
     pub drop_invalid: bool,
-    /// Refuse files with a fault that could be mended, see [`convert::read::Fix`].
+    /// Refuse files with a fault that could be mended, see [`read::Fix`].
     pub strict: bool,
     /// Make one point of points at the same place, for every object.
     pub merge_duplicates: bool,

@@ -36,6 +36,7 @@
 //! ```
 #![forbid(unsafe_code)]
 
+mod accumulation;
 mod arrived;
 mod camera;
 mod canonical;
@@ -63,21 +64,26 @@ pub mod optics;
 mod packed;
 mod phase;
 mod pixel_samples;
+pub mod points;
 mod progress;
 mod relative;
 pub mod rng;
 mod slice_order;
 mod space;
+pub mod splat_file;
 pub mod srgb;
+pub mod text;
 mod transfer;
 mod transmittance;
 mod turns;
+mod up_axis;
 
 #[cfg(feature = "raster")]
 pub mod raster;
 #[cfg(feature = "raster")]
 pub mod shade;
 
+pub use accumulation::Accumulation;
 pub use arrived::{Arrived, Remembered};
 pub use camera::{Camera, Projection, ViewTransform};
 pub use clip::Clip;
@@ -97,10 +103,11 @@ pub use light::{Framing, Light, LightShape, Slide, SlideProjection};
 pub use limits::{Exceeded, Limits};
 pub use material::{Bump, Material, MaterialTable, Object, ObjectTable, Shading};
 pub use memory_account::{MemoryAccount, Reservation};
-pub use mesh::Mesh;
+pub use mesh::{Mesh, crease_bytes, part_at_creases, robust_cross, smooth, vertex_normals};
 pub use packed::PackedCloud;
 pub use phase::henyey_greenstein;
 pub use pixel_samples::PixelSamples;
+pub use points::{Column, PointCell, PointLattice, RawPoints, ReadySplats};
 pub use progress::Progress;
 pub use relative::Relative;
 pub use slice_order::{Direction, SliceOrder};
@@ -108,6 +115,7 @@ pub use space::{Aabb, DAabb, Similarity};
 pub use transfer::{TransferFunction, TransferPoint};
 pub use transmittance::{ABOUT, MeanTransmittance, Receiver, TOGETHER, Transmittance};
 pub use turns::turns;
+pub use up_axis::UpAxis;
 
 /// The page's example compiles and holds.
 #[cfg(doctest)]

@@ -1,5 +1,13 @@
 //! Triangle meshes.
 
+mod creases;
+mod cross;
+mod vertex_normals;
+
+pub use creases::{crease_bytes, part_at_creases};
+pub use cross::robust_cross;
+pub use vertex_normals::{smooth, vertex_normals};
+
 use crate::{DAabb, Error};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;

@@ -33,6 +33,7 @@ pub mod tile;
 mod translucent;
 pub mod triangles;
 
+pub use crate::Accumulation;
 pub use cost::{Expected, expected, objects_in_view, tile_bytes};
 pub use finish::{Background, FinishInput, GlassImage, finish};
 pub use opaque::{OpaqueImage, OpaqueInput, resolve_opaque};
@@ -51,17 +52,6 @@ pub struct Params {
     pub transmittance_cutoff: f32,
     /// Precision of the running sums.
     pub accumulation: Accumulation,
-}
-
-/// Precision of the optical depth and the colours that are summed in a pixel.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Accumulation {
-    /// Single precision.
-    #[default]
-    F32,
-    /// Half precision: every sum is rounded to 11 bits after every splat, and transmittance is e^−A of the rounded sum.
-    /// To see what it costs; it saves no time here. Sums stall when a splat adds less than half a unit in the last place.
-    F16,
 }
 
 impl Default for Params {

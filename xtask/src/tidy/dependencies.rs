@@ -4,9 +4,11 @@ use crate::repo::Repo;
 use crate::toml_lines::{lines, string};
 
 /// For each crate of the workspace, the crates of the workspace that it may depend on, tests and benches included.
-const MAY_KNOW: [(&str, &[&str]); 24] = [
+const MAY_KNOW: [(&str, &[&str]); 26] = [
     ("splat-core", &["splat-shaders"]),
-    ("convert", &["splat-core"]),
+    ("read", &["splat-core"]),
+    ("field", &["splat-core"]),
+    ("convert", &["splat-core", "read", "field"]),
     ("tsm", &["splat-core", "splat-shaders"]),
     ("hbsort", &["splat-core", "splat-shaders"]),
     ("pbsr", &["splat-core", "splat-shaders"]),
@@ -16,13 +18,15 @@ const MAY_KNOW: [(&str, &[&str]); 24] = [
     ("splat-shaders", &[]),
     ("gpu-ash", &["splat-shaders"]),
     ("gpu-wgpu", &["splat-shaders"]),
-    ("organza-scene", &["splat-core", "convert"]),
+    ("organza-scene", &["splat-core", "read", "field", "convert"]),
     ("organza-output", &["splat-core", "organza-scene"]),
     ("organza-device", &["splat-core", "tsm", "hbsort", "pbsr", "splat-shaders", "gpu-ash", "gpu-wgpu"]),
     (
         "organza",
         &[
             "splat-core",
+            "read",
+            "field",
             "convert",
             "tsm",
             "hbsort",
@@ -35,18 +39,35 @@ const MAY_KNOW: [(&str, &[&str]); 24] = [
             "organza-device",
         ],
     ),
-    ("organza-judge", &["splat-core", "convert", "tsm", "hbsort", "deferred-blend", "reference", "organza"]),
-    ("organza-survey", &["splat-core", "convert", "organza"]),
-    ("organza-cli", &["splat-core", "convert", "organza", "organza-judge", "organza-survey"]),
+    (
+        "organza-judge",
+        &["splat-core", "read", "field", "convert", "tsm", "hbsort", "deferred-blend", "reference", "organza"],
+    ),
+    ("organza-survey", &["splat-core", "read", "convert", "organza"]),
+    ("organza-cli", &["splat-core", "read", "convert", "organza", "organza-judge", "organza-survey"]),
     ("organza-python", &["splat-core", "convert", "organza", "organza-judge", "organza-survey"]),
     (
         "organza-tests",
-        &["splat-core", "convert", "tsm", "hbsort", "pbsr", "reference", "organza", "organza-judge", "organza-survey"],
+        &[
+            "splat-core",
+            "read",
+            "field",
+            "convert",
+            "tsm",
+            "hbsort",
+            "pbsr",
+            "reference",
+            "organza",
+            "organza-judge",
+            "organza-survey",
+        ],
     ),
     (
         "organza-benches",
         &[
             "splat-core",
+            "read",
+            "field",
             "convert",
             "tsm",
             "hbsort",
@@ -61,7 +82,7 @@ const MAY_KNOW: [(&str, &[&str]); 24] = [
         ],
     ),
     ("gpu-conformance", &["splat-core", "tsm", "hbsort", "pbsr", "splat-shaders", "gpu-ash", "gpu-wgpu", "organza"]),
-    ("organza-fuzz", &["splat-core", "convert", "organza-scene", "organza"]),
+    ("organza-fuzz", &["splat-core", "read", "field", "convert", "organza-scene", "organza"]),
     ("xtask", &[]),
 ];
 
@@ -69,7 +90,7 @@ const MAY_KNOW: [(&str, &[&str]); 24] = [
 const ONLY_ABOVE_STAGES: [&str; 4] = ["serde", "serde_json", "toml", "clap"];
 
 /// A reader of a format that is JSON parses it as such; its types stay inside.
-const PARSES: [(&str, &str); 2] = [("convert", "serde"), ("convert", "serde_json")];
+const PARSES: [(&str, &str); 2] = [("read", "serde"), ("read", "serde_json")];
 
 /// Dependencies point from the top of the design's figure downwards.
 pub(crate) fn direction(repo: &Repo) -> Vec<String> {
@@ -165,8 +186,8 @@ mod tests {
     #[test]
     fn scene_formats_stop_at_the_orchestrator() {
         assert_eq!(found("tsm", "[dependencies]\nserde.workspace = true\n").len(), 1);
-        assert!(found("convert", "[dependencies]\nserde.workspace = true\n").is_empty());
-        assert_eq!(found("convert", "[dependencies]\ntoml.workspace = true\n").len(), 1);
+        assert!(found("read", "[dependencies]\nserde.workspace = true\n").is_empty());
+        assert_eq!(found("read", "[dependencies]\ntoml.workspace = true\n").len(), 1);
         assert!(found("organza-scene", "[dependencies]\nserde.workspace = true\n").is_empty());
     }
 

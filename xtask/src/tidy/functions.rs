@@ -4,8 +4,19 @@ use crate::repo::Repo;
 use crate::source::{code_only, line_of};
 
 /// Crates whose results reach a picture's bits. `reference` and `organza-judge` judge them, within tolerances.
-const EXACT: [&str; 9] =
-    ["splat-core", "convert", "tsm", "hbsort", "pbsr", "sheet-light", "deferred-blend", "organza-scene", "organza"];
+const EXACT: [&str; 11] = [
+    "splat-core",
+    "read",
+    "field",
+    "convert",
+    "tsm",
+    "hbsort",
+    "pbsr",
+    "sheet-light",
+    "deferred-blend",
+    "organza-scene",
+    "organza",
+];
 
 /// The standard library's functions that are not exactly rounded.
 const ROUNDED: [&str; 20] = [

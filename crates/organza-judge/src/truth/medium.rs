@@ -1,13 +1,14 @@
 //! A medium of the scene as the path tracer takes it: its density in the world, and what it does with light.
 
 use super::object::{FINER, ambient, liberty, read};
-use convert::read::Loaded as FileData;
-use convert::{Clip, ExpressionField, SplatParams};
+use convert::SplatParams;
+use field::ExpressionField;
 use glam::{DMat3, DQuat, DVec3};
 use organza::scene::{Scene, SceneObject, Source, VolumeSource};
 use organza::{Error, RenderOptions, printable};
+use read::Loaded as FileData;
 use reference::{Classified, ColorAt, Density, Facets, Lattice, Liberty, Medium, Placed, TurnedBox};
-use splat_core::{DAabb, Grid, ScalarField, Shading};
+use splat_core::{Clip, DAabb, Grid, ScalarField, Shading};
 use std::sync::Arc;
 
 /// Edges of the cells that bound a field's values, along the longest side of its box.

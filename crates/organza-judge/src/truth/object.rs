@@ -1,13 +1,14 @@
 //! One object as the path tracer takes it: a density or a mesh in the world.
 
 use super::medium::{MediumBody, medium};
-use convert::read::{Loaded as FileData, ReadParams};
-use convert::{MpuParams, RawPoints, Solid, SplatParams};
+use convert::SplatParams;
+use field::{MpuParams, Solid};
 use glam::Vec3;
 use organza::scene::{Scene, SceneMaterial, SceneObject, Source};
 use organza::{Error, RenderOptions, SourceData, printable};
+use read::{Loaded as FileData, ReadParams};
 use reference::{Density, Dielectric, Liberty, Medium, Surface, SurfaceKind, SurfaceMaterial};
-use splat_core::{DAabb, Grid, Mesh, RadianceImage, ScalarField, Shading, Similarity, optics};
+use splat_core::{DAabb, Grid, Mesh, RadianceImage, RawPoints, ScalarField, Shading, Similarity, optics};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -232,7 +233,7 @@ pub(super) fn read(
     let params = ReadParams { frame, array: array.cloned(), ..options.read_params() };
     match scene.in_memory.get(path) {
         Some(SourceData::Mesh(mesh)) => {
-            let turned = convert::read::mesh_in_memory(&printable(path), Mesh::clone(mesh), &params);
+            let turned = read::mesh_in_memory(&printable(path), Mesh::clone(mesh), &params);
             return turned.map(|(mesh, _)| FileData::Mesh(mesh)).map_err(|e| Error::from_read(path, &e));
         }
         Some(SourceData::Points(points)) => return Ok(FileData::Points(RawPoints::clone(points))),
@@ -240,13 +241,13 @@ pub(super) fn read(
         Some(SourceData::Image(image)) => return Ok(FileData::Image(RadianceImage::clone(image))),
         None => {}
     }
-    convert::read::file(path, &params, None).map(|read| read.0).map_err(|e| Error::from_read(path, &e))
+    read::file(path, &params, None).map(|read| read.0).map_err(|e| Error::from_read(path, &e))
 }
 
 /// Moves a mesh into the world; without normals it gets smooth ones between sharp edges, as its splats do.
 fn place(mesh: &mut Mesh, t: &Similarity) {
-    convert::part_at_creases(mesh);
-    convert::smooth(mesh);
+    splat_core::part_at_creases(mesh);
+    splat_core::smooth(mesh);
     mesh.origin = t.apply(mesh.origin);
     let (turn, scale) = (t.rotation.as_quat(), t.scale as f32);
     mesh.position.iter_mut().for_each(|p: &mut Vec3| *p = turn * (*p * scale));

@@ -3,7 +3,8 @@
 use super::quoted;
 use crate::number::grouped;
 use crate::preset::{Preset, Wish};
-use convert::{RawPoints, class_name};
+use convert::class_name;
+use splat_core::RawPoints;
 use std::fmt::Write;
 
 /// Least share of points that have a class with a meaning, for classes to be looked at.

@@ -3,9 +3,9 @@
 use super::files::Files;
 use crate::scene::{Scene, SceneObject, SourceData};
 use crate::{Error, RenderOptions};
-use convert::read::ReadParams;
 use convert::{Orientation, SplatParams, SurfelParams, VolumeParams};
 use glam::DVec3;
+use read::ReadParams;
 use splat_core::{Limits, Progress, Reservation, Shading};
 use std::path::Path;
 use std::sync::Arc;

@@ -2,8 +2,9 @@
 
 use crate::scene::{ExtractSource, Scene, SourceData, Stop};
 use crate::{Error, RenderOptions};
-use convert::read::{Loaded, Mended, Notes, ReadParams};
-use convert::{ColorScale, RawPoints, SharedField};
+use convert::ColorScale;
+use field::SharedField;
+use read::{Loaded, Mended, Notes, ReadParams};
 use splat_core::{DAabb, MemoryAccount, Mesh, Progress, Reservation};
 use std::cell::{Cell, RefCell};
 use std::collections::HashMap;
@@ -119,10 +120,10 @@ impl Files {
             return Err(Error::input(name, message, "leave them out, or hand over what they name"));
         }
         let memory = self.memory.up_to(limits.memory.limit());
-        let from_read = |e: convert::ReadError| Error::from_read(source, &e);
+        let from_read = |e: read::ReadError| Error::from_read(source, &e);
         let notes = match data {
-            SourceData::Points(points) => convert::read::points_in_memory(&name, points, limits).map_err(from_read)?,
-            SourceData::Grid(grid) => convert::read::grid_in_memory(&name, grid, limits).map_err(from_read)?,
+            SourceData::Points(points) => read::points_in_memory(&name, points, limits).map_err(from_read)?,
+            SourceData::Grid(grid) => read::grid_in_memory(&name, grid, limits).map_err(from_read)?,
             SourceData::Mesh(_) | SourceData::Image(_) => Notes::default(),
         };
         let known = self.taken.borrow().iter().find(|(known, _)| known.is_same(data)).map(|(_, read)| read.clone());
@@ -131,10 +132,10 @@ impl Files {
             (None, SourceData::Mesh(mesh)) => {
                 let mut held = memory.take(&name, 2 * mesh.bytes()).map_err(Error::Limit)?;
                 let params = ReadParams { memory: memory.clone(), ..limits.clone() };
-                let turned = convert::read::mesh_in_memory(&name, Mesh::clone(mesh), &params);
+                let turned = read::mesh_in_memory(&name, Mesh::clone(mesh), &params);
                 let (mut mesh, notes) = turned.map_err(from_read)?;
-                let _parted = memory.take(&name, convert::crease_bytes(&mesh)).map_err(Error::Limit)?;
-                convert::part_at_creases(&mut mesh);
+                let _parted = memory.take(&name, splat_core::crease_bytes(&mesh)).map_err(Error::Limit)?;
+                splat_core::part_at_creases(&mut mesh);
                 held.set(&name, data.bytes() + mesh.bytes()).map_err(Error::Limit)?;
                 (SourceData::Mesh(mesh.into()), notes, held.into())
             }
@@ -191,15 +192,15 @@ impl Files {
     fn read_anew(&self, path: &Path, limits: &ReadParams, progress: &Progress) -> Result<Read, Error> {
         let memory = self.memory.up_to(limits.memory.limit());
         let params = ReadParams { memory: memory.clone(), ..limits.clone() };
-        let read = convert::read::file(path, &params, Some(progress));
+        let read = read::file(path, &params, Some(progress));
         let (data, notes) = read.map_err(|e| Error::from_read(path, &e))?;
         let what = crate::printable(path);
         let mut held = memory.take(&what, data.bytes()).map_err(Error::Limit)?;
         add(&self.mended, notes.mended.iter().map(Mended::to_string));
         let data = match data {
             Loaded::Mesh(mut mesh) => {
-                let _parted = memory.take(&what, convert::crease_bytes(&mesh)).map_err(Error::Limit)?;
-                convert::part_at_creases(&mut mesh);
+                let _parted = memory.take(&what, splat_core::crease_bytes(&mesh)).map_err(Error::Limit)?;
+                splat_core::part_at_creases(&mut mesh);
                 SourceData::Mesh(mesh.into())
             }
             Loaded::Points(points) => SourceData::Points(points.into()),

@@ -5,8 +5,9 @@ use super::input::Input;
 use super::loading::Loading;
 use crate::scene::{FoundCamera, Scene};
 use crate::{Error, Progress, RenderOptions};
-use convert::{ConvertError, DiscSize, Outline, RawPoints, SurfelParams, raw_to_matter, raw_to_surfels, visible_ends};
-use splat_core::{Cloud, DAabb, Similarity};
+use convert::{ConvertError, DiscSize, Outline, SurfelParams, raw_to_matter, raw_to_surfels};
+use field::visible_ends;
+use splat_core::{Cloud, DAabb, RawPoints, Similarity};
 use std::borrow::Cow;
 
 /// Most points of an object whose splats are looked at: of more each is a pixel or two.

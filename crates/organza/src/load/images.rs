@@ -4,7 +4,7 @@ use super::input::refuse;
 use super::loading::Loading;
 use crate::scene::{SceneLight, SourceData};
 use crate::{Error, cost};
-use convert::read::ReadParams;
+use read::ReadParams;
 use splat_core::{Environment, Exceeded, HeightImage, RadianceImage, Reservation, Slide};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;

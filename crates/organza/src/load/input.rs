@@ -9,12 +9,12 @@ use crate::scene::{
 };
 use crate::statistics::ObjectData;
 use convert::{
-    Clip, ClippedField, CloudShape, Density, DensityParams, HomogeneousMedium, Inside, Interpolation, MatterParams,
-    MediumBody, MeshParams, MpuParams, RawPoints, Section, SharedField, ShownPoints, Solid, SplatParams, SurfaceField,
-    SurfelParams, VolumeParams,
+    CloudShape, Density, DensityParams, HomogeneousMedium, MatterParams, MediumBody, MeshParams, Section, ShownPoints,
+    SplatParams, SurfaceField, SurfelParams, VolumeParams,
 };
+use field::{ClippedField, Inside, MpuParams, SharedField, Solid};
 use pbsr::{BoundedExtinction, Matter};
-use splat_core::{DAabb, Grid, Mesh, Reservation, TransferFunction};
+use splat_core::{Clip, DAabb, Grid, Interpolation, Mesh, RawPoints, Reservation, TransferFunction};
 use std::borrow::Cow;
 use std::path::Path;
 use std::sync::Arc;
@@ -241,7 +241,7 @@ fn surface<'a>(
         (Some(spacing), _) => spacing,
         (None, None) => step * splat.transform.scale,
         (None, Some(Isosurface { grid, level, inside, .. })) => {
-            let spacing = convert::isosurface_spacing(grid, f64::from(*level), *inside);
+            let spacing = field::isosurface_spacing(grid, f64::from(*level), *inside);
             spacing.map_err(|e| Error::from_core("an isosurface", e))? * splat.transform.scale
         }
     };

@@ -7,9 +7,9 @@ use super::loading::Loading;
 use crate::scene::{MatterSource, Scene, SceneLight, SceneObject, Source, SourceData, VolumeSource};
 use crate::statistics::MediumFacts;
 use crate::{Error, Progress, RenderOptions};
-use convert::{MediumBody, RawPoints};
+use convert::MediumBody;
 use glam::{DMat3, DVec3};
-use splat_core::{DAabb, Grid, ScalarField, Shading};
+use splat_core::{DAabb, Grid, RawPoints, ScalarField, Shading};
 
 /// Places along each axis of a volume that are looked at: 13,824 take about two milliseconds.
 const PLACES_OF_A_VOLUME: usize = 24;

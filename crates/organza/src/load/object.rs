@@ -9,8 +9,9 @@ use crate::statistics::{ObjectData, ObjectStatistics};
 use convert::cost::{self, Prediction};
 use convert::{
     CloudShape, ConvertError, DensityParams, MatterParams, MeshParams, SplatParams, SurfaceField, SurfelParams,
-    VolumeParams, ZeroSearch,
+    VolumeParams,
 };
+use field::ZeroSearch;
 use pbsr::BoundedExtinction;
 use splat_core::{Cloud, Exceeded, Grid, Object, Reservation, Shading, TransferFunction};
 

@@ -8,13 +8,15 @@ use super::object::{Prepared, procedural};
 use crate::Error;
 use crate::form::{Form, PlannedObject};
 use crate::scene::{SurfaceSampler, Technique};
-use convert::{Clip, RegionField, SharedField, SurfaceField, VolumeParams, extinct_bounds};
+use convert::{SurfaceField, VolumeParams};
+use field::{RegionField, SharedField, extinct_bounds};
 use glam::DVec3;
 use pbsr::{BoundedExtinction, LineParams, LineSampler};
 use rayon::prelude::*;
 use splat_core::raster::triangles::PlacedMesh;
 use splat_core::{
-    BccGrid, DAabb, Footprint, Grid, Interpolation, Mesh, Packing, Similarity, SplatKind, TransferFunction, optics,
+    BccGrid, Clip, DAabb, Footprint, Grid, Interpolation, Mesh, Packing, Similarity, SplatKind, TransferFunction,
+    optics,
 };
 use std::sync::Arc;
 
@@ -251,7 +253,7 @@ fn data(
             let trilinear = isosurface.as_ref().filter(|of| of.interpolation == Interpolation::Trilinear);
             if let (Form::Triangles, Some(of), None) = (source, trilinear, stated) {
                 // Marching cubes on the volume's own steps, as the paper has it (section 5).
-                let mesh = convert::isosurface_to_mesh(&of.grid, f64::from(of.level), of.inside);
+                let mesh = field::isosurface_to_mesh(&of.grid, f64::from(of.level), of.inside);
                 return Ok(meshed(mesh.map_err(|e| Error::from_core("an isosurface", e))?));
             }
             if source == Form::Triangles {
@@ -320,7 +322,7 @@ fn volume(
 /// are the same.
 fn triangles(mut mesh: Mesh, splats: u64, form: Form) -> Option<Data> {
     mesh.canonicalize();
-    convert::smooth(&mut mesh);
+    splat_core::smooth(&mut mesh);
     let (area, bounds) = (mesh.area(), mesh.bounds());
     // Particles are thinned by the angle at which they are seen: of faces, not of normals that lean from them.
     let piece = area / splats.max(1) as f64;

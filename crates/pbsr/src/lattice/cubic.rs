@@ -3,7 +3,7 @@
 //! The interpolation is a tensor product. Where two coordinates are fixed, the 64 values around a cell leave four, v₀ to v₃, and
 //! the cubic between v₁ and v₂ has the Bernstein control points v₁, v₁ + (v₂ − v₀)/6, v₂ − (v₃ − v₁)/6, v₂. Where they
 //! do not change sign there is no root, where they change it once there is one; else the halves are looked at (de Casteljau).
-//! Beyond the border values go on along the line through the last two, as in `convert::GridField`.
+//! Beyond the border values go on along the line through the last two, as in `field::GridField`.
 
 use glam::Vec3;
 use splat_core::{Grid, glam};

@@ -1,0 +1,6 @@
+//! Colours by numbers: of a column of points, or of a volume that a surface shows.
+
+pub(crate) mod color_by;
+pub(crate) mod color_map;
+pub(crate) mod color_scale;
+pub(crate) mod surface_field;

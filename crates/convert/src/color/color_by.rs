@@ -1,0 +1,282 @@
+//! Colours of points by a column of theirs: by a map, by whole numbers, or by a transfer function, which may classify them too: say how opaque
+//! they are, or what they absorb.
+
+use crate::common::columns::CHUNK;
+use crate::{ColorMap, ConvertError, SplatParams};
+use rayon::prelude::*;
+use splat_core::glam::DVec3;
+use splat_core::srgb::linear_from_hex;
+use splat_core::{RawPoints, TransferFunction};
+
+/// Shares of a column's numbers that its map spans where no range is stated: a few strays do not make all else one colour.
+const SHARES: [f64; 2] = [0.01, 0.99];
+
+/// Most whole numbers that are told of a column.
+const MOST_PRESENT: usize = 64;
+
+/// Classes of points in LAS 1.4 (ASPRS), with their colours as 0xRRGGBB.
+const CLASSES: [(&str, u32); 19] = [
+    ("created, never classified", 0xa8a8a8),
+    ("unclassified", 0x8f8f94),
+    ("ground", 0xa67c52),
+    ("low vegetation", 0xb7d36b),
+    ("medium vegetation", 0x74b74e),
+    ("high vegetation", 0x2f7d35),
+    ("building", 0xd9533f),
+    ("low noise", 0xff2bd6),
+    ("reserved", 0xe3c65b),
+    ("water", 0x3f82d0),
+    ("rail", 0x7a57a8),
+    ("road surface", 0x55565c),
+    ("reserved", 0xcfa3c2),
+    ("wire guard", 0xf2e255),
+    ("wire conductor", 0xffc400),
+    ("transmission tower", 0x2fbfbf),
+    ("wire connector", 0xff8f2e),
+    ("bridge deck", 0x8d93ad),
+    ("high noise", 0xff2f8f),
+];
+
+/// Colours that are told apart, for whole numbers without a meaning of their own, in turns.
+const DISTINCT: [u32; 12] = [
+    0x4e79a7, 0xf28e2b, 0x59a14f, 0xe15759, 0x76b7b2, 0xedc948, 0xb07aa1, 0x9c755f, 0x86bcb6, 0xff9da7, 0x5b6abf,
+    0xb6992d,
+];
+
+/// How numbers become colours.
+#[derive(Debug, Clone, PartialEq)]
+pub enum PointColors {
+    /// A colour map over a range; without one from the 1st to the 99th percentile of the column.
+    Map(ColorMap, Option<[f64; 2]>),
+    /// Whole numbers as classes of LAS, each in a colour of its own.
+    Classes,
+    /// Whole numbers, in twelve colours in turns.
+    Distinct,
+    /// By control points, whose extinctions stand for that.
+    Transfer(TransferFunction, Classified),
+}
+
+/// What the extinctions of a transfer function stand for that gives points their colours.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Classified {
+    /// Nothing: they are not used.
+    #[default]
+    No,
+    /// Opacity of one crossing, in \[0, 1\], by which that of a surface is multiplied.
+    Opacity,
+    /// What the extinction of points that are a medium is multiplied by, ≥ 0.
+    Extinction,
+}
+
+/// A column that points take their colours from.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ColorBy {
+    /// Its name, see [`RawPoints::column`].
+    pub column: String,
+    /// What its numbers look like.
+    pub colors: PointColors,
+}
+
+/// What points look like by a column.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Colored {
+    /// Linear Rec.709, one a point.
+    pub color: Vec<[f32; 3]>,
+    /// The numbers of the column, of which gaps are not finite.
+    pub numbers: Vec<f64>,
+    /// What a transfer function that classifies says of each point; empty for others.
+    pub classified: Vec<f32>,
+    /// The numbers at the ends of a colour map.
+    pub range: Option<[f64; 2]>,
+    /// Points whose number is a gap, see [`splat_core::Column`]; they have the colour of `splat`, and are neither made transparent nor absorb.
+    pub gaps: u64,
+    /// Of [`PointColors::Classes`] and [`PointColors::Distinct`] the whole numbers that occur, rising, the least 64 of them.
+    pub present: Vec<f64>,
+}
+
+impl Colored {
+    /// Whether some point has a number.
+    pub(crate) fn has_numbers(&self) -> bool {
+        self.gaps < self.color.len() as u64
+    }
+}
+
+impl PointColors {
+    /// The colour of a number, linear Rec.709; `range` are the numbers at the ends of a map.
+    pub(crate) fn at(&self, number: f64, range: [f64; 2]) -> [f32; 3] {
+        match self {
+            Self::Map(map, _) => map.at(place(number, range)),
+            Self::Classes => class_color(number),
+            Self::Distinct => distinct(number),
+            Self::Transfer(transfer, _) => transfer.at(number as f32).color,
+        }
+    }
+}
+
+/// The name that LAS 1.4 gives a class; `None` for those that it leaves to users.
+pub fn class_name(class: u8) -> Option<&'static str> {
+    CLASSES.get(usize::from(class)).map(|(name, _)| *name)
+}
+
+/// The colours of points by a column; `up` is where `height` grows. Of `splat` the name and the colour are used.
+///
+/// ```
+/// use convert::{ColorBy, ColorMap, PointColors, SplatParams, colored};
+/// use splat_core::RawPoints;
+/// use splat_core::glam::{DVec3, Vec3};
+/// let points = RawPoints { position: vec![Vec3::ZERO, Vec3::Z * 0.5, Vec3::Z], ..RawPoints::default() };
+/// let by = ColorBy { column: "z".into(), colors: PointColors::Map(ColorMap::VIRIDIS, Some([0.0, 1.0])) };
+/// let colored = colored(&points, &by, DVec3::Z, &SplatParams::default()).unwrap();
+/// assert_eq!(colored.color[1], ColorMap::VIRIDIS.at(0.5));
+/// ```
+///
+/// # Errors
+/// [`ConvertError::Parameter`] for a column that the points have not.
+pub fn colored(points: &RawPoints, by: &ColorBy, up: DVec3, splat: &SplatParams) -> Result<Colored, ConvertError> {
+    let Some(numbers) = points.column(&by.column, up) else {
+        return Err(splat.bad("color_by", &by.column, "a column of its points"));
+    };
+    let range = match &by.colors {
+        PointColors::Map(_, range) => Some(range.unwrap_or_else(|| spread(&numbers))),
+        _ => None,
+    };
+    let color = |number: &f64| {
+        if number.is_finite() { by.colors.at(*number, range.unwrap_or_default()) } else { splat.color }
+    };
+    let classified = |number: &f64| match &by.colors {
+        PointColors::Transfer(transfer, _) if number.is_finite() => transfer.at(*number as f32).extinction,
+        PointColors::Transfer(_, Classified::Opacity) => 1.0,
+        _ => 0.0,
+    };
+    let classifies = matches!(by.colors, PointColors::Transfer(_, Classified::Opacity | Classified::Extinction));
+    let classified = if classifies { numbers.par_iter().map(classified).collect() } else { Vec::new() };
+    let gaps = numbers.iter().filter(|n| !n.is_finite()).count() as u64;
+    let is_of_whole = matches!(by.colors, PointColors::Classes | PointColors::Distinct);
+    let present = if is_of_whole { present(&numbers) } else { Vec::new() };
+    let color = numbers.par_iter().map(color).collect();
+    Ok(Colored { color, numbers, classified, range, gaps, present })
+}
+
+/// The least whole numbers that occur, rising.
+fn present(numbers: &[f64]) -> Vec<f64> {
+    let least = |mut all: Vec<f64>| {
+        all.sort_unstable_by(f64::total_cmp);
+        all.dedup();
+        all.truncate(MOST_PRESENT);
+        all
+    };
+    // −0 is 0.
+    let of_chunk = |chunk: &[f64]| least(chunk.iter().filter(|n| n.is_finite()).map(|n| n.round() + 0.0).collect());
+    let of_chunks = numbers.par_chunks(CHUNK).map(of_chunk);
+    of_chunks.reduce(Vec::new, |all, more| least([all, more].concat()))
+}
+
+/// Where in a range a number lies, from 0 to 1 within; the middle of a range without a width.
+fn place(number: f64, [low, high]: [f64; 2]) -> f64 {
+    if high > low { (number - low) / (high - low) } else { 0.5 }
+}
+
+/// The numbers below which the first and all but the last hundredth of a column lie; gaps do not count.
+fn spread(numbers: &[f64]) -> [f64; 2] {
+    let mut finite: Vec<f64> = numbers.iter().copied().filter(|n| n.is_finite()).collect();
+    if finite.is_empty() {
+        return [0.0; 2];
+    }
+    SHARES.map(|share| {
+        let rank = ((finite.len() - 1) as f64 * share).round() as usize;
+        *finite.select_nth_unstable_by(rank, f64::total_cmp).1
+    })
+}
+
+/// The colour of a class; those that LAS leaves to users have [`DISTINCT`] ones.
+fn class_color(number: f64) -> [f32; 3] {
+    let class = number.round();
+    let known = (class >= 0.0).then(|| CLASSES.get(class as usize)).flatten();
+    known.map_or_else(|| distinct(number), |(_, rgb)| linear_from_hex(*rgb))
+}
+
+fn distinct(number: f64) -> [f32; 3] {
+    let turns = DISTINCT.len() as f64;
+    linear_from_hex(DISTINCT[(number.round().rem_euclid(turns) as usize).min(DISTINCT.len() - 1)])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use splat_core::glam::Vec3;
+    use splat_core::{Column, TransferPoint};
+
+    fn points(values: Vec<f64>) -> RawPoints {
+        let columns = vec![Column { name: "it".into(), values }];
+        RawPoints { position: vec![Vec3::ZERO; columns[0].values.len()], columns, ..RawPoints::default() }
+    }
+
+    fn of(values: Vec<f64>, colors: PointColors) -> Colored {
+        let by = ColorBy { column: "it".into(), colors };
+        colored(&points(values), &by, DVec3::Y, &SplatParams { color: [0.5, 0.25, 0.125], ..SplatParams::default() })
+            .expect("a column that is there")
+    }
+
+    #[test]
+    fn a_ramp_has_the_map_s_own_colours_at_its_ends_and_in_its_middle() {
+        let map = ColorMap::VIRIDIS;
+        let of_range = of(vec![-3.0, -2.0, 0.0, 2.0, 9.0], PointColors::Map(map, Some([-2.0, 2.0])));
+        assert_eq!(of_range.color, [0.0, 0.0, 0.5, 1.0, 1.0].map(|place| map.at(place)));
+        let of_data = of((0..=100).map(f64::from).collect(), PointColors::Map(map, None));
+        assert_eq!(of_data.range, Some([1.0, 99.0]));
+        assert_eq!([of_data.color[0], of_data.color[50], of_data.color[100]], [map.at(0.0), map.at(0.5), map.at(1.0)]);
+    }
+
+    #[test]
+    fn neither_the_order_nor_a_shift_nor_a_scale_changes_a_colour() {
+        let numbers: Vec<f64> = (0..999).map(|i| f64::from(i * 37 % 999)).collect();
+        let colors = || PointColors::Map(ColorMap::TURBO, None);
+        let once = of(numbers.clone(), colors()).color;
+        let mut back = of(numbers.iter().rev().copied().collect(), colors()).color;
+        back.reverse();
+        assert_eq!(once, back);
+        assert_eq!(once, of(numbers.iter().map(|n| 1024.0 * n + 1e7).collect(), colors()).color);
+    }
+
+    #[test]
+    fn a_column_of_one_number_has_the_middle_and_gaps_have_the_object_s_colour() {
+        let found = of(vec![4.0, f64::NAN, 4.0, f64::INFINITY], PointColors::Map(ColorMap::TURBO, None));
+        let (middle, own) = (ColorMap::TURBO.at(0.5), [0.5, 0.25, 0.125]);
+        assert_eq!((found.color, found.gaps), (vec![middle, own, middle, own], 2));
+        assert_eq!(of(vec![f64::NAN], PointColors::Map(ColorMap::TURBO, None)).color, [own]);
+    }
+
+    #[test]
+    fn classes_have_colours_of_their_own_and_others_come_in_turns() {
+        let found = of(vec![2.0, 6.0, 64.0, 76.0, 255.0, -1.0, 2.2], PointColors::Classes).color;
+        assert_eq!(found[0], linear_from_hex(0xa67c52));
+        assert!(found[0] != found[1] && found[2] == found[3] && found[6] == found[0]);
+        assert_eq!([class_name(2), class_name(6), class_name(64)], [Some("ground"), Some("building"), None]);
+        let turns = of(vec![0.0, 12.0, -12.0, 1.0, 1e300], PointColors::Distinct).color;
+        assert!(turns[0] == turns[1] && turns[0] == turns[2] && turns[0] != turns[3]);
+    }
+
+    #[test]
+    fn a_transfer_function_gives_its_colours() {
+        let point = |value, red| TransferPoint { value, color: [red, 0.0, 1.0], extinction: 0.0 };
+        let transfer = TransferFunction::new(vec![point(0.0, 0.0), point(4.0, 1.0)]).expect("rising values");
+        let found = of(vec![1.0, 9.0], PointColors::Transfer(transfer, Classified::No));
+        assert_eq!((found.color, found.classified), (vec![[0.25, 0.0, 1.0], [1.0, 0.0, 1.0]], Vec::new()));
+    }
+
+    #[test]
+    fn a_transfer_function_classifies_and_gaps_stay_what_they_are() {
+        let point = |value, extinction| TransferPoint { value, color: [1.0; 3], extinction };
+        let transfer = TransferFunction::new(vec![point(0.0, 0.0), point(4.0, 1.0)]).expect("rising values");
+        let of = |by| of(vec![-1.0, 1.0, f64::NAN, 9.0], PointColors::Transfer(transfer.clone(), by)).classified;
+        assert_eq!(of(Classified::Opacity), [0.0, 0.25, 1.0, 1.0]);
+        assert_eq!(of(Classified::Extinction), [0.0, 0.25, 0.0, 1.0]);
+    }
+
+    #[test]
+    fn a_column_that_is_not_there_is_refused_by_name() {
+        let by = ColorBy { column: "heat".into(), colors: PointColors::Distinct };
+        let error = colored(&points(vec![1.0]), &by, DVec3::Y, &SplatParams::default()).expect_err("no such column");
+        assert!(error.to_string().contains("heat"), "{error}");
+    }
+}

@@ -1,0 +1,124 @@
+//! What colours of a picture stand for: numbers of a column of points, or values of a volume.
+
+use crate::{ColorBy, Colored, PointColors, class_name};
+use splat_core::TransferFunction;
+
+/// What the colours of an object stand for, as a legend beside its picture tells it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ColorScale {
+    /// Name of the object.
+    pub object: String,
+    /// The column that its points take their colours from; `None` for the values of a volume.
+    pub column: Option<String>,
+    /// What numbers look like.
+    pub colors: PointColors,
+    /// The numbers that have colours.
+    pub numbers: ScaleNumbers,
+}
+
+/// The numbers of a [`ColorScale`].
+#[derive(Debug, Clone, PartialEq)]
+pub enum ScaleNumbers {
+    /// All from one to another, which are the same where a column has one number alone.
+    Range([f64; 2]),
+    /// These whole ones, rising.
+    Each(Vec<f64>),
+}
+
+impl ColorScale {
+    /// That of points; `None` where no point has a number.
+    pub fn of_points(object: &str, by: &ColorBy, colored: &Colored) -> Option<Self> {
+        let numbers = match (&by.colors, colored.range) {
+            (PointColors::Map(..), range) => ScaleNumbers::Range(range.filter(|_| colored.has_numbers())?),
+            (PointColors::Transfer(transfer, _), _) => ScaleNumbers::Range(ends(transfer)),
+            (PointColors::Classes | PointColors::Distinct, _) => ScaleNumbers::Each(colored.present.clone()),
+        };
+        let is_empty = matches!(&numbers, ScaleNumbers::Each(present) if present.is_empty());
+        let (object, colors) = (object.to_owned(), by.colors.clone());
+        (!is_empty).then(|| Self { object, column: Some(by.column.clone()), colors, numbers })
+    }
+
+    /// That of a volume or of a plane through one: of the values between the outermost that show, if extinctions tell which do.
+    ///
+    /// ```
+    /// use convert::{ColorScale, ScaleNumbers};
+    /// use splat_core::{TransferFunction, TransferPoint};
+    /// let point = |value, extinction| TransferPoint { value, color: [1.0; 3], extinction };
+    /// let transfer = TransferFunction::new(vec![point(-1000.0, 0.0), point(20.0, 0.0), point(300.0, 2.0)]).unwrap();
+    /// assert_eq!(ColorScale::of_values("head", &transfer).numbers, ScaleNumbers::Range([20.0, 300.0]));
+    /// ```
+    pub fn of_values(object: &str, transfer: &TransferFunction) -> Self {
+        let (points, shows) = (transfer.points(), |value: f32| transfer.at(value).extinction > 0.0);
+        let first = points.iter().position(|p| shows(p.value)).unwrap_or(0);
+        let last = points.iter().rposition(|p| shows(p.value)).unwrap_or(points.len() - 1);
+        let [low, high] =
+            [first.saturating_sub(1), (last + 1).min(points.len() - 1)].map(|i| f64::from(points[i].value));
+        let (object, colors) = (object.to_owned(), PointColors::Transfer(transfer.clone(), crate::Classified::No));
+        Self { object, column: None, colors, numbers: ScaleNumbers::Range([low, high]) }
+    }
+
+    /// Linear Rec.709 of a number.
+    pub fn color(&self, number: f64) -> [f32; 3] {
+        let range = match self.numbers {
+            ScaleNumbers::Range(range) => range,
+            ScaleNumbers::Each(_) => [0.0; 2],
+        };
+        self.colors.at(number, range)
+    }
+
+    /// What a whole number means, such as `ground` for the class 2 of LAS.
+    pub fn meaning(&self, number: f64) -> Option<&'static str> {
+        let is_class = matches!(self.colors, PointColors::Classes) && (0.0..=255.0).contains(&number);
+        is_class.then(|| class_name(number as u8)).flatten()
+    }
+}
+
+/// The first and the last value that a transfer function has a control point at.
+fn ends(transfer: &TransferFunction) -> [f64; 2] {
+    let points = transfer.points();
+    [points[0], points[points.len() - 1]].map(|point| f64::from(point.value))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{ColorMap, SplatParams, colored};
+    use splat_core::glam::{DVec3, Vec3};
+    use splat_core::{RawPoints, TransferPoint};
+
+    fn of(heights: &[f32], colors: PointColors) -> Option<ColorScale> {
+        let position = heights.iter().map(|y| Vec3::Y * *y).collect();
+        let by = ColorBy { column: "height".into(), colors };
+        let points = RawPoints { position, ..RawPoints::default() };
+        let found = colored(&points, &by, DVec3::Y, &SplatParams::default()).expect("a column that is there");
+        ColorScale::of_points("survey", &by, &found)
+    }
+
+    #[test]
+    fn a_map_is_told_from_end_to_end_in_the_colours_of_the_points() {
+        let scale = of(&[2.0, 4.0, 10.0], PointColors::Map(ColorMap::TURBO, Some([2.0, 10.0]))).expect("a scale");
+        assert_eq!(scale.numbers, ScaleNumbers::Range([2.0, 10.0]));
+        assert_eq!([2.0, 4.0, 11.0].map(|n| scale.color(n)), [0.0, 0.25, 1.0].map(|place| ColorMap::TURBO.at(place)));
+        assert_eq!(of(&[f32::NAN], PointColors::Map(ColorMap::TURBO, None)), None);
+    }
+
+    #[test]
+    fn classes_are_those_that_occur_with_their_meanings() {
+        let scale = of(&[6.0, 2.0, 6.2, 70.0, 2.0], PointColors::Classes).expect("a scale");
+        assert_eq!(scale.numbers, ScaleNumbers::Each(vec![2.0, 6.0, 70.0]));
+        assert_eq!([2.0, 6.0, 70.0].map(|n| scale.meaning(n)), [Some("ground"), Some("building"), None]);
+        assert_eq!(of(&[2.0], PointColors::Distinct).expect("a scale").meaning(2.0), None);
+    }
+
+    #[test]
+    fn of_a_transfer_function_the_part_that_shows_is_told_and_all_where_nothing_tells() {
+        let of = |extinctions: &[f32]| {
+            let point = |(i, e): (usize, &f32)| TransferPoint { value: i as f32, color: [1.0; 3], extinction: *e };
+            let transfer = TransferFunction::new(extinctions.iter().enumerate().map(point).collect()).expect("rising");
+            ColorScale::of_values("head", &transfer).numbers
+        };
+        assert_eq!(of(&[0.0, 0.0, 1.0, 0.0, 0.0]), ScaleNumbers::Range([1.0, 3.0]));
+        assert_eq!(of(&[1.0, 0.0, 0.0]), ScaleNumbers::Range([0.0, 1.0]));
+        assert_eq!(of(&[0.0, 0.0, 0.0]), ScaleNumbers::Range([0.0, 2.0]));
+    }
+}

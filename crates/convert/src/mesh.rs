@@ -1,0 +1,9 @@
+//! Triangles become discs, and what is done to triangles before: cut, closed again, divided.
+
+pub(crate) mod borders;
+pub(crate) mod clipped_mesh;
+#[cfg(feature = "lids")]
+pub(crate) mod lid;
+pub(crate) mod mesh_points;
+pub(crate) mod pieces;
+pub(crate) mod subdivide;

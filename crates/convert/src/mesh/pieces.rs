@@ -1,0 +1,250 @@
+//! The pieces of a mesh's triangles, written into the columns of a cloud.
+
+use crate::common::columns::{self, CHUNK};
+use crate::common::convert_error::check_cancelled;
+use crate::mesh::mesh_points::{Plan, plane};
+use crate::mesh::subdivide::{self, Run, Split};
+use crate::{ConvertError, MeshParams};
+use rayon::prelude::*;
+use splat_core::{
+    Cloud, Mesh, Progress,
+    glam::{DQuat, Vec3},
+    optics,
+};
+use std::ops::Range;
+
+/// Most pieces along an edge whose weights are tabulated; beyond, rows are long enough to be written one by one.
+const TABULATED: u32 = 32;
+
+/// Everything that the pieces are made from.
+pub(crate) struct Pieces<'a> {
+    mesh: &'a Mesh,
+    plan: &'a Plan,
+    /// Vertices relative to the cloud's origin.
+    position: Vec<Vec3>,
+    normal: Vec<Vec3>,
+    /// Spacing in the mesh's units.
+    spacing: f64,
+    /// Factor from a share of the mesh's area to K.
+    depth: f64,
+    radius: f32,
+    color: [f32; 3],
+    rotation: DQuat,
+    /// For k pieces along an edge, the weights of corners 1 and 2 of all k² pieces, in the order of the runs.
+    weights: Vec<Vec<[f32; 2]>>,
+}
+
+/// The columns that one task writes.
+struct Target<'a> {
+    position: &'a mut [Vec3],
+    normal: &'a mut [Vec3],
+    /// Empty where no triangle has normals that lean from it.
+    shading_normal: &'a mut [Vec3],
+    cross_section: &'a mut [f32],
+    color: &'a mut [[f32; 3]],
+}
+
+impl<'a> Pieces<'a> {
+    pub(crate) fn new(mesh: &'a Mesh, params: &MeshParams, plan: &'a Plan) -> Self {
+        let t = &params.splat.transform;
+        let place = |v: &Vec3| (t.rotation * (v.as_dvec3() * t.scale)).as_vec3();
+        let turn = |n: &Vec3| columns::unit_or_zero(t.rotate(n.as_dvec3()).as_vec3());
+        let tau = if params.opacity < 1.0 { optics::optical_depth(params.opacity) } else { 1.0 };
+        Self {
+            mesh,
+            plan,
+            position: mesh.position.par_iter().with_min_len(CHUNK).map(place).collect(),
+            normal: plan.normal.par_iter().with_min_len(CHUNK).map(turn).collect(),
+            spacing: plan.report.spacing / t.scale,
+            depth: tau * t.scale * t.scale,
+            radius: plan.report.radius as f32,
+            color: params.splat.color,
+            rotation: t.rotation,
+            weights: (0..=TABULATED).map(weights).collect(),
+        }
+    }
+
+    /// An edge relative to the cloud's origin.
+    pub(crate) fn place(&self, edge: &[u32; 2]) -> [Vec3; 2] {
+        edge.map(|v| self.position[v as usize])
+    }
+
+    /// Fills the columns in tasks of [`CHUNK`] splats, wherever triangles begin: one huge triangle is shared too.
+    pub(crate) fn emit(&self, cloud: &mut Cloud, progress: &Progress) -> Result<(), ConvertError> {
+        let columns = (cloud.position.par_chunks_mut(CHUNK), cloud.normal.par_chunks_mut(CHUNK));
+        let rest = (cloud.cross_section.par_chunks_mut(CHUNK), cloud.color.par_chunks_mut(CHUNK));
+        let mut shading: Vec<&mut [Vec3]> = cloud.shading_normal.chunks_mut(CHUNK).collect();
+        shading.resize_with(cloud.radius.len().div_ceil(CHUNK), Default::default);
+        (columns.0, columns.1, shading, rest.0, rest.1, cloud.radius.par_chunks_mut(CHUNK))
+            .into_par_iter()
+            .enumerate()
+            .for_each(|(chunk, (position, normal, shading_normal, cross_section, color, radius))| {
+                if progress.tick(radius.len() as u64).is_err() {
+                    return;
+                }
+                radius.fill(self.radius);
+                if self.mesh.color.is_empty() {
+                    color.fill(self.color);
+                }
+                let target = Target { position, normal, shading_normal, cross_section, color };
+                pulp::Arch::new().dispatch(Fill { pieces: self, first: (chunk * CHUNK) as u64, target });
+            });
+        check_cancelled(progress)
+    }
+}
+
+/// The splats from number `first` on, in the form that [`pulp`] compiles once per instruction set.
+struct Fill<'a> {
+    pieces: &'a Pieces<'a>,
+    first: u64,
+    target: Target<'a>,
+}
+
+impl pulp::NullaryFnOnce for Fill<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let Self { pieces, first, mut target } = self;
+        let mut triangle = pieces.plan.starts.partition_point(|&s| s <= first) - 1;
+        let mut skip = first - pieces.plan.starts[triangle];
+        let mut written = 0;
+        while written < target.position.len() {
+            let left = (pieces.plan.starts[triangle + 1] - pieces.plan.starts[triangle] - skip) as usize;
+            let end = target.position.len().min(written + left);
+            if end > written {
+                let split = subdivide::split(&pieces.plan.measures[triangle], pieces.spacing);
+                let corner = Corners::new(pieces, triangle);
+                match split {
+                    Split::Congruent(k) if k <= TABULATED => {
+                        let weights = &pieces.weights[k as usize][skip as usize..][..end - written];
+                        corner.write_table(weights, 1.0 / f64::from(k * k), written..end, &mut target);
+                    }
+                    split => corner.write_runs(&split, skip, written..end, &mut target),
+                }
+            }
+            (written, skip) = (end, 0);
+            triangle += 1;
+        }
+    }
+}
+
+/// Weights of corners 1 and 2 of k² congruent pieces.
+fn weights(k: u32) -> Vec<[f32; 2]> {
+    let split = if k == 0 { Split::None } else { Split::Congruent(k) };
+    let runs = (0..split.runs()).map(|i| split.run(i));
+    let piece = |run: &Run, j: u32| run.start.as_vec3() + run.step.as_vec3() * j as f32;
+    runs.flat_map(|run| (0..run.count).map(move |j| piece(&run, j)).map(|w| [w.y, w.z])).collect()
+}
+
+/// One triangle as affine functions of its barycentric weights.
+struct Corners {
+    position: [Vec3; 3],
+    normal: [Vec3; 3],
+    color: Option<[Vec3; 3]>,
+    /// Normal of the plane, on the side of the vertex normals.
+    plane: Vec3,
+    /// Whether its discs lie in the plane, since normals lean.
+    is_flat: bool,
+    /// K of the whole triangle.
+    depth: f64,
+}
+
+impl Corners {
+    fn new(pieces: &Pieces<'_>, triangle: usize) -> Self {
+        let ids = pieces.mesh.triangles[triangle].map(|v| v as usize);
+        let position = ids.map(|v| pieces.position[v]);
+        let own = plane(pieces.mesh, triangle);
+        let plane = (pieces.rotation * own).as_vec3();
+        let normal = ids.map(|v| if pieces.normal[v] == Vec3::ZERO { plane } else { pieces.normal[v] });
+        let is_flat = pieces.plan.is_flat(pieces.mesh, triangle, own);
+        let plane = if normal.iter().sum::<Vec3>().dot(plane) < 0.0 { -plane } else { plane };
+        let color = (!pieces.mesh.color.is_empty()).then(|| ids.map(|v| Vec3::from(pieces.mesh.color[v])));
+        Self { position, normal, color, plane, is_flat, depth: pieces.depth * pieces.plan.measures[triangle].area }
+    }
+
+    /// Writes pieces of one share of the area, given by their weights of corners 1 and 2.
+    #[inline(always)]
+    fn write_table(&self, weights: &[[f32; 2]], share: f64, range: Range<usize>, target: &mut Target<'_>) {
+        let edges = |v: &[Vec3; 3]| (v[0], v[1] - v[0], v[2] - v[0]);
+        let (from, e1, e2) = edges(&self.position);
+        for (p, w) in target.position[range.clone()].iter_mut().zip(weights) {
+            *p = from + e1 * w[0] + e2 * w[1];
+        }
+        let (from, e1, e2) = edges(&self.normal);
+        for (n, w) in self.normals(range.clone(), target).iter_mut().zip(weights) {
+            *n = self.unit(from + e1 * w[0] + e2 * w[1]);
+        }
+        if let Some(color) = &self.color {
+            let (from, e1, e2) = edges(color);
+            for (c, w) in target.color[range.clone()].iter_mut().zip(weights) {
+                *c = (from + e1 * w[0] + e2 * w[1]).max(Vec3::ZERO).to_array();
+            }
+        }
+        target.cross_section[range].fill((self.depth * share) as f32);
+    }
+
+    /// Where interpolated normals go.
+    #[inline(always)]
+    fn normals<'t>(&self, range: Range<usize>, target: &'t mut Target<'_>) -> &'t mut [Vec3] {
+        if self.is_flat {
+            target.normal[range.clone()].fill(self.plane);
+            return &mut target.shading_normal[range];
+        }
+        if !target.shading_normal.is_empty() {
+            target.shading_normal[range.clone()].fill(Vec3::ZERO);
+        }
+        &mut target.normal[range]
+    }
+
+    /// Opposite vertex normals cancel on the way from one to the other.
+    #[inline(always)]
+    fn unit(&self, sum: Vec3) -> Vec3 {
+        let length_sq = sum.length_squared();
+        if length_sq > 1e-6 { sum * (1.0 / length_sq.sqrt()) } else { self.plane }
+    }
+
+    /// Writes the pieces of a split from piece `skip` on.
+    #[inline(always)]
+    fn write_runs(&self, split: &Split, mut skip: u64, range: Range<usize>, target: &mut Target<'_>) {
+        let mut written = range.start;
+        for i in 0..split.runs() {
+            let run = split.run(i);
+            if skip >= u64::from(run.count) {
+                skip -= u64::from(run.count);
+                continue;
+            }
+            let end = range.end.min(written + (u64::from(run.count) - skip) as usize);
+            self.write_run(&run, skip as f32, written..end, target);
+            (written, skip) = (end, 0);
+            if written == range.end {
+                break;
+            }
+        }
+    }
+
+    /// Writes the pieces of a run from piece `skip` on.
+    #[inline(always)]
+    fn write_run(&self, run: &Run, skip: f32, range: Range<usize>, target: &mut Target<'_>) {
+        let (start, step) = (run.start.as_vec3(), run.step.as_vec3());
+        let line = |v: &[Vec3; 3]| {
+            let (e1, e2) = (v[1] - v[0], v[2] - v[0]);
+            (v[0] + e1 * start.y + e2 * start.z, e1 * step.y + e2 * step.z)
+        };
+        let (from, along) = line(&self.position);
+        for (j, p) in target.position[range.clone()].iter_mut().enumerate() {
+            *p = from + along * (j as f32 + skip);
+        }
+        let (from, along) = line(&self.normal);
+        for (j, n) in self.normals(range.clone(), target).iter_mut().enumerate() {
+            *n = self.unit(from + along * (j as f32 + skip));
+        }
+        if let Some(color) = &self.color {
+            let (from, along) = line(color);
+            for (j, c) in target.color[range.clone()].iter_mut().enumerate() {
+                *c = (from + along * (j as f32 + skip)).max(Vec3::ZERO).to_array();
+            }
+        }
+        target.cross_section[range].fill((self.depth * run.share) as f32);
+    }
+}

@@ -1,0 +1,443 @@
+//! Raw points become surfels: radius from the distances of distinct neighbours, normals from their covariance.
+//!
+//! Gunjee 2007 takes points with all attributes; scanners give positions. Each distinct position gets the normal of its
+//! neighbours' plane, its Voronoi cell in that plane as area a (K = τ₁·a, or a when opaque) and the radius
+//! R = cutoff·0.8·h with h = √2 times the cell's farthest corner, between √a and 2√a: on a square lattice that is the
+//! lattice's spacing, among scattered points it bridges the gaps.
+//!
+//! Points may bring an opacity each. It is multiplied by that of the surface; a point of which 1 comes is an opaque disc, for which
+//! τ₁ is infinite, beside the translucent discs of the others.
+//!
+//! Points may bring the sizes of their discs, and a tangent each, along which a disc is an ellipse; without them ellipses may be as long and
+//! wide as the cells ([`crate::points::cell_ellipse`]). K stays: a wider disc blurs the surface and does not thicken it.
+//!
+//! Points at one place share the area of that place, so duplicates neither darken it nor shrink radii to 0.
+
+use crate::ConvertError;
+#[cfg(feature = "cache")]
+use crate::common::cache::Key;
+use crate::common::columns::{self, CHUNK, Wanted};
+use crate::common::convert_error::check_cancelled;
+use crate::common::params::SplatParams;
+use crate::points::discs::{DiscShape, DiscSize, Discs};
+use crate::points::materials::materials_of;
+use crate::points::matter::check_columns;
+use crate::points::neighbours::MAX_NEIGHBOURS;
+use crate::points::orient::{self, Orientation};
+use crate::points::places::{Place, places};
+use crate::splats::footprints::choose_footprints;
+use crate::splats::{from_splats, gaussian_points};
+use rayon::prelude::*;
+use splat_core::points::attributes::{FOOTPRINT, SHADOW_COEFFICIENT};
+use splat_core::text::counted;
+use splat_core::{
+    Camera, Cloud, Progress, SplatKind,
+    glam::{DVec3, Vec3},
+    optics,
+};
+use splat_core::{Column, RawPoints};
+use std::cmp::Ordering;
+
+/// How raw points become surfels.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SurfelParams {
+    /// Attributes and limits; `color` is for points without one.
+    pub splat: SplatParams,
+    /// Whether surfels keep the points' colours.
+    pub colors: bool,
+    /// Opacity of one crossing, in \[0, 1\]; 1 makes the surface opaque. Points with opacities of their own have these times it.
+    pub opacity: f64,
+    /// Neighbours that normals and areas come from, 3 to 32.
+    pub neighbours: usize,
+    /// Which side computed normals point to. Normals of the input stay as they are.
+    pub orientation: Orientation,
+    /// Whether points at one place become one surfel.
+    pub merge_duplicates: bool,
+    /// Whether surfels keep the points' values.
+    pub values: bool,
+    /// Largest spacing over the median spacing: lone points do not become huge discs. At least 1.
+    pub largest_spacing: f64,
+    /// Spacing of a point without any neighbour, world units.
+    pub lone_spacing: f64,
+    /// How discs lie whose points have neither a size nor a tangent.
+    pub shape: DiscShape,
+    /// The same diameter for all discs, round ones; `None` for what points say, or what bridges the gaps between neighbours.
+    pub size: Option<DiscSize>,
+    /// Whose pixels those of `size` are, in the world.
+    pub camera: Option<Camera>,
+}
+
+impl Default for SurfelParams {
+    fn default() -> Self {
+        Self {
+            splat: SplatParams::default(),
+            colors: true,
+            opacity: 1.0,
+            neighbours: 10,
+            orientation: Orientation::default(),
+            merge_duplicates: false,
+            values: false,
+            largest_spacing: 4.0,
+            lone_spacing: 1.0,
+            shape: DiscShape::Round,
+            size: None,
+            camera: None,
+        }
+    }
+}
+
+/// What the conversion of raw points did.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct SurfelReport {
+    /// Points given.
+    pub points: u64,
+    /// Points that lie where an earlier one lies.
+    pub duplicates: u64,
+    /// Surfels made.
+    pub splats: u64,
+    /// Places whose neighbours lie on a line, so that the normal is a guess.
+    pub without_plane: u64,
+    /// Places whose spacing was cut to the largest.
+    pub lone: u64,
+    /// Median spacing, world units; 0 without points.
+    pub median_spacing: f64,
+    /// Sum of the areas, world units².
+    pub area: f64,
+}
+
+impl SurfelReport {
+    /// What there is to say of it, one sentence without a full stop: that points at one place have each become a surfel.
+    pub fn said(&self) -> Option<String> {
+        let lie = if self.duplicates == 1 { "lies" } else { "lie" };
+        (self.duplicates > 0 && self.splats == self.points)
+            .then(|| format!("{} {lie} where another one lies", counted(self.duplicates, "point")))
+    }
+}
+
+/// Makes surfels of raw points. Columns of the points (`RawPoints::columns`) say more, each a number a point: `radius`, the length in units of
+/// the file within which an opaque disc hides, > 0; `tx`, `ty` and `tz`, a semi-axis of a disc that is an ellipse, as long as it hides that way,
+/// whose second one has that radius, and zero for a round disc; `shadow_coefficient`, the share of a shadow that it receives; and `footprint` and
+/// `material`, places in [`SplatParams::footprints`] and [`SplatParams::materials`]. Points that
+/// are Gaussians become splats that are seen as these, each one, also where several lie at one place; points that are splats stay what they are.
+///
+/// ```
+/// use splat_core::RawPoints;
+/// use convert::{SurfelParams, raw_to_surfels};
+/// use splat_core::glam::Vec3;
+/// let position = (0..100).map(|i| Vec3::new((i % 10) as f32, 0.0, (i / 10) as f32)).collect();
+/// let points = RawPoints { position, ..RawPoints::default() };
+/// let (cloud, report) = raw_to_surfels(&points, &SurfelParams::default(), None).unwrap();
+/// assert!((report.median_spacing - 1.0).abs() < 1e-12);
+/// assert!(cloud.normal.iter().all(|n| *n == Vec3::Y));
+/// ```
+///
+/// Places are reported to `progress`, and work stops where that is cancelled.
+///
+/// # Errors
+/// [`ConvertError::Parameter`], [`ConvertError::Input`], [`ConvertError::Limit`] or [`ConvertError::Cancelled`].
+pub fn raw_to_surfels(
+    points: &RawPoints,
+    params: &SurfelParams,
+    progress: Option<&Progress>,
+) -> Result<(Cloud, SurfelReport), ConvertError> {
+    let quiet = Progress::new();
+    let progress = progress.unwrap_or(&quiet);
+    check(points, params)?;
+    if !points.gaussians.is_empty() {
+        return gaussian_points::to_cloud(points, params).map(|cloud| {
+            let n = points.len() as u64;
+            (cloud, SurfelReport { points: n, splats: n, ..SurfelReport::default() })
+        });
+    }
+    if !points.ready.cloud.is_empty() {
+        return from_splats::to_cloud(points, params).map(|cloud| {
+            let n = points.len() as u64;
+            (cloud, SurfelReport { points: n, splats: n, ..SurfelReport::default() })
+        });
+    }
+    let order = canonical_order(points);
+    let (distinct, starts) = distinct_places(points, &order);
+    let params = &SurfelParams { orientation: known_orientation(&distinct, params)?, ..params.clone() };
+    let mut places = turned_places(&distinct, points.origin, params, progress)?;
+    let mut report = SurfelReport {
+        points: points.len() as u64,
+        duplicates: (points.len() - distinct.len()) as u64,
+        without_plane: places.par_iter().with_min_len(CHUNK).filter(|p| p.plane == 0).count() as u64,
+        ..SurfelReport::default()
+    };
+    cut_outliers(&mut places, params, &mut report);
+    let cloud = emit(points, params, &Sorted { order, starts, places }, &mut report)?;
+    Ok((cloud, report))
+}
+
+/// Places whose normals point to the side that is asked for; those that are kept of the same points, where something is.
+fn turned_places(
+    distinct: &[Vec3],
+    origin: DVec3,
+    params: &SurfelParams,
+    progress: &Progress,
+) -> Result<Vec<Place>, ConvertError> {
+    let find = || {
+        let (mut places, neighbours) = places(distinct, params, progress)?;
+        orient::orient(&mut places, distinct, origin, params.orientation, &neighbours);
+        check_cancelled(progress).map(|()| places)
+    };
+    #[cfg(feature = "cache")]
+    if let Some(cache) = &params.splat.cache {
+        let key = place_key(distinct, origin, params);
+        let what = format!("normals and areas of object '{}'", params.splat.object_name);
+        return cache.get(&what, key, distinct.len(), Place::is_valid, find);
+    }
+    find()
+}
+
+/// All that places and their normals are made from.
+#[cfg(feature = "cache")]
+fn place_key(distinct: &[Vec3], origin: DVec3, params: &SurfelParams) -> Key {
+    let (side, at) = match params.orientation {
+        Orientation::Toward(d) | Orientation::Auto(d) => (0u64, d),
+        Orientation::Viewpoint(eye) => (1, eye - origin),
+        Orientation::Propagate => (2, DVec3::ZERO),
+    };
+    let lone = params.lone_spacing / params.splat.transform.scale;
+    let numbers = [params.neighbours as u64, side, params.shape as u64];
+    Key::new("places").with(distinct).with(&numbers).with(&[at]).with(&[lone])
+}
+
+/// The orientation, where it depends on what the points enclose: told by some of them, which lie evenly among all.
+fn known_orientation(distinct: &[Vec3], params: &SurfelParams) -> Result<Orientation, ConvertError> {
+    /// Places that are enough to tell.
+    const ENOUGH: usize = 1 << 16;
+    let Orientation::Auto(up) = params.orientation else { return Ok(params.orientation) };
+    let some: Vec<Vec3> = distinct.iter().step_by(distinct.len().div_ceil(ENOUGH).max(1)).copied().collect();
+    let outwards = SurfelParams { orientation: Orientation::Propagate, ..params.clone() };
+    let (mut places, neighbours) = places(&some, &outwards, &Progress::new())?;
+    cut_outliers(&mut places, params, &mut SurfelReport::default());
+    orient::orient(&mut places, &some, DVec3::ZERO, Orientation::Propagate, &neighbours);
+    Ok(if orient::encloses(&places) { Orientation::Propagate } else { Orientation::Toward(up) })
+}
+
+pub(crate) fn check(points: &RawPoints, params: &SurfelParams) -> Result<(), ConvertError> {
+    let p = &params.splat;
+    p.check()?;
+    points.validate().and_then(|()| check_columns(points, false)).map_err(|e| p.input(e))?;
+    p.check_count(points.len() as f64)?;
+    if !(0.0..=1.0).contains(&params.opacity) {
+        return Err(p.bad("opacity", params.opacity, "a number in [0, 1]"));
+    }
+    if !(3..=MAX_NEIGHBOURS).contains(&params.neighbours) {
+        return Err(p.bad("neighbours", params.neighbours, "3 to 32"));
+    }
+    if params.largest_spacing.is_nan() || params.largest_spacing < 1.0 {
+        return Err(p.bad("largest_spacing", params.largest_spacing, "a number ≥ 1"));
+    }
+    let own = match (points.gaussians.is_empty(), points.ready.cloud.is_empty()) {
+        (true, true) => None,
+        (false, _) => Some("none: 3D Gaussians have sizes of their own"),
+        (true, false) => Some("none: splats of a file have sizes of their own"),
+    };
+    if let (Some(size), Some(expected)) = (params.size, own) {
+        return Err(p.bad("size", size, expected));
+    }
+    if let (DiscShape::Elliptical, Some(expected)) = (params.shape, own) {
+        return Err(p.bad("discs", params.shape, expected));
+    }
+    if let Some(size) = params.size.filter(|size| !size.is_length()) {
+        return Err(p.bad("size", size, "a diameter > 0"));
+    }
+    orient::check(params.orientation).map_err(|(found, expected)| p.bad("orientation", found, expected))?;
+    p.check_spacing(params.lone_spacing).map(|_| ())
+}
+
+/// Ids by place (along a Morton curve), then by attributes: the order of the file does not matter.
+pub(crate) fn canonical_order(points: &RawPoints) -> Vec<u32> {
+    let bounds = splat_core::Aabb::of_points(&points.position);
+    let extent = (bounds.max - bounds.min).max_element().max(f32::MIN_POSITIVE);
+    let mut keys: Vec<(u64, u32)> = points
+        .position
+        .par_iter()
+        .enumerate()
+        .with_min_len(CHUNK)
+        .map(|(i, p)| (morton((p.as_dvec3() - bounds.min.as_dvec3()) / f64::from(extent)), i as u32))
+        .collect();
+    keys.par_sort_unstable_by(|a, b| a.0.cmp(&b.0).then_with(|| compare(points, a.1 as usize, b.1 as usize)));
+    keys.into_iter().map(|k| k.1).collect()
+}
+
+pub(crate) fn compare(points: &RawPoints, a: usize, b: usize) -> Ordering {
+    let bits = |v: Vec3| v.to_array().map(f32::to_bits);
+    let place = |i: usize| points.position[i].to_array().map(|c| (c + 0.0).to_bits());
+    let attributes = |i: usize| {
+        let color = points.color.get(i).map(|c| c.map(f32::to_bits));
+        let number = |column: &[f32]| column.get(i).map(|v| v.to_bits());
+        (points.normal.get(i).map(|n| bits(*n)), color, number(&points.value), number(&points.opacity))
+    };
+    let further = || {
+        let differ = |c: &Column| c.values[a].total_cmp(&c.values[b]);
+        points.columns.iter().map(differ).fold(Ordering::Equal, Ordering::then)
+    };
+    place(a).cmp(&place(b)).then_with(|| attributes(a).cmp(&attributes(b))).then_with(further).then(a.cmp(&b))
+}
+
+/// 21 bits an axis of a place in the unit cube.
+fn morton(p: DVec3) -> u64 {
+    let spread = |v: f64| {
+        let mut v = ((v * f64::from(1u32 << 21)) as u64).min((1 << 21) - 1);
+        v = (v | v << 32) & 0x001f_0000_0000_ffff;
+        v = (v | v << 16) & 0x001f_0000_ff00_00ff;
+        v = (v | v << 8) & 0x100f_00f0_0f00_f00f;
+        v = (v | v << 4) & 0x10c3_0c30_c30c_30c3;
+        (v | v << 2) & 0x1249_2492_4924_9249
+    };
+    spread(p.x) | spread(p.y) << 1 | spread(p.z) << 2
+}
+
+/// The distinct places in order, and where the points of each begin in `order` (then the number of points).
+pub(crate) fn distinct_places(points: &RawPoints, order: &[u32]) -> (Vec<Vec3>, Vec<u32>) {
+    let mut distinct: Vec<Vec3> = order.par_iter().with_min_len(CHUNK).map(|i| points.position[*i as usize]).collect();
+    let is_first = |s: &usize| *s == 0 || distinct[*s] != distinct[*s - 1];
+    let mut starts: Vec<u32> = (0..order.len()).filter(is_first).map(|s| s as u32).collect();
+    starts.push(order.len() as u32);
+    distinct.dedup();
+    (distinct, starts)
+}
+
+/// Cuts spacings to a multiple of the median; sets the sums of the report.
+fn cut_outliers(places: &mut [Place], params: &SurfelParams, report: &mut SurfelReport) {
+    if places.is_empty() {
+        return;
+    }
+    let mut spacings: Vec<f64> = places.iter().map(|p| p.spacing).collect();
+    let middle = spacings.len() / 2;
+    let median = *spacings.select_nth_unstable_by(middle, f64::total_cmp).1;
+    let largest = median * params.largest_spacing;
+    for p in places.iter_mut().filter(|p| p.spacing > largest) {
+        p.area = p.area.min(largest * largest);
+        p.spacing = largest;
+        report.lone += 1;
+    }
+    for p in places.iter_mut().filter(|p| f64::from(p.long.length()) > largest) {
+        p.long *= (largest / f64::from(p.long.length())) as f32;
+        p.across = p.across.min(largest as f32);
+    }
+    let scale = params.splat.transform.scale;
+    report.median_spacing = median * scale;
+    report.area = places.iter().map(|p| p.area).sum::<f64>() * scale * scale;
+}
+
+/// Points in canonical order and what is known about their places.
+struct Sorted {
+    order: Vec<u32>,
+    starts: Vec<u32>,
+    places: Vec<Place>,
+}
+
+impl Sorted {
+    /// Place, first point and number of sharers of each surfel.
+    fn surfels(&self, merge: bool) -> Vec<(u32, u32, u32)> {
+        let mut surfels = Vec::with_capacity(self.order.len());
+        for (place, range) in self.starts.windows(2).enumerate() {
+            let sharers = range[1] - range[0];
+            if merge {
+                surfels.push((place as u32, self.order[range[0] as usize], 1));
+            } else {
+                surfels.extend((range[0]..range[1]).map(|s| (place as u32, self.order[s as usize], sharers)));
+            }
+        }
+        surfels
+    }
+}
+
+/// Which columns surfels fill.
+pub(crate) fn wanted(points: &RawPoints, params: &SurfelParams) -> Wanted {
+    if !points.gaussians.is_empty() {
+        return gaussian_points::wanted(points, params);
+    }
+    if !points.ready.cloud.is_empty() {
+        return from_splats::wanted(points);
+    }
+    Wanted {
+        normal: true,
+        tangent: Discs::new(points, params).are_elliptical() || shows_images(points, params),
+        shadow_coefficient: points.own_column(SHADOW_COEFFICIENT).is_some(),
+        value: params.values && !points.value.is_empty(),
+        crossing_depth: !is_opaque(points, params),
+        ..Wanted::default()
+    }
+}
+
+/// Whether some discs may have images as footprints, which lie along a tangent.
+fn shows_images(points: &RawPoints, params: &SurfelParams) -> bool {
+    let by_column = points.own_column(FOOTPRINT).is_some();
+    params.splat.footprints.as_ref().is_some_and(|choice| choice.has_images(by_column && choice.by_column))
+}
+
+/// Whether every disc is opaque.
+fn is_opaque(points: &RawPoints, params: &SurfelParams) -> bool {
+    params.opacity * f64::from(points.least_opacity()) >= 1.0
+}
+
+/// The optical depth of one crossing of a surface; `None` for an opaque one.
+fn crossing_depth(opacity: f64) -> Option<f64> {
+    (opacity < 1.0).then(|| optics::optical_depth(opacity))
+}
+
+fn emit(
+    points: &RawPoints,
+    params: &SurfelParams,
+    sorted: &Sorted,
+    report: &mut SurfelReport,
+) -> Result<Cloud, ConvertError> {
+    let t = &params.splat.transform;
+    let surfels = sorted.surfels(params.merge_duplicates);
+    let of_surface = crossing_depth(params.opacity);
+    let crossing = |point: u32| match points.opacity.get(point as usize) {
+        Some(own) => crossing_depth(params.opacity * f64::from(*own)),
+        None => of_surface,
+    };
+    report.splats = surfels.len() as u64;
+    let mut cloud = Cloud::new(t.apply(points.origin));
+    let wanted = wanted(points, params);
+    let kind = if wanted.crossing_depth { SplatKind::Surface } else { SplatKind::Opaque };
+    columns::size_columns(&mut cloud, surfels.len(), kind, wanted, &params.splat)?;
+    let discs = Discs::new(points, params);
+    // In the axes of the file.
+    let normal_of = |place: u32, point: u32| {
+        let given = points.normal.get(point as usize).map_or(Vec3::ZERO, |n| columns::unit_or_zero(*n));
+        if given == Vec3::ZERO { sorted.places[place as usize].normal } else { given }
+    };
+    let disc_of =
+        |place: u32, point: u32| discs.of(point as usize, &sorted.places[place as usize], normal_of(place, point));
+    let columns =
+        (&mut cloud.position, &mut cloud.normal, &mut cloud.radius, &mut cloud.cross_section, &mut cloud.color);
+    columns.into_par_iter().zip(&surfels).with_min_len(CHUNK).for_each(
+        |((position, normal, radius, cross_section, color), &(place, point, sharers))| {
+            let (disc, i) = (disc_of(place, point), point as usize);
+            *position = (t.rotation * (points.position[i].as_dvec3() * t.scale)).as_vec3();
+            *normal = t.rotate(normal_of(place, point).as_dvec3()).as_vec3();
+            *radius = disc.radius as f32;
+            *cross_section = (crossing(point).unwrap_or(1.0) * disc.area / f64::from(sharers)) as f32;
+            *color = points.color.get(i).filter(|_| params.colors).copied().unwrap_or(params.splat.color);
+        },
+    );
+    let tangents = cloud.tangent.par_iter_mut().zip(&surfels).with_min_len(CHUNK);
+    tangents.for_each(|(tangent, &(place, point, _))| *tangent = disc_of(place, point).tangent.as_vec3());
+    let optics = (&mut cloud.crossing_depth, &mut cloud.kind).into_par_iter().zip(&surfels).with_min_len(CHUNK);
+    optics.for_each(|((depth, kind), &(_, point, _))| match crossing(point) {
+        Some(tau) => *depth = tau as f32,
+        None => (*depth, *kind) = (0.0, SplatKind::Opaque),
+    });
+    let shares = points.own_column(SHADOW_COEFFICIENT).unwrap_or_default();
+    let coefficients = cloud.shadow_coefficient.par_iter_mut().zip(&surfels).with_min_len(CHUNK);
+    coefficients.for_each(|(coefficient, s)| *coefficient = shares[s.1 as usize] as f32);
+    let values = cloud.value.par_iter_mut().zip(&surfels).with_min_len(CHUNK);
+    values.for_each(|(v, s)| *v = points.value[s.1 as usize]);
+    if let Some(of) = materials_of(points, &params.splat)? {
+        cloud.material.par_iter_mut().zip(&surfels).with_min_len(CHUNK).for_each(|(id, s)| *id = of(s.1 as usize).id);
+    }
+    let ids = points.own_column(FOOTPRINT);
+    let stated = |k: usize| ids.map_or(0.0, |ids| ids[surfels[k].1 as usize]);
+    let place = |k: usize| points.position[surfels[k].1 as usize];
+    choose_footprints(&mut cloud, &params.splat, place, ids.map(|_| &stated as _))?;
+    Ok(cloud)
+}

@@ -1,0 +1,126 @@
+//! Which format a file is of.
+
+pub(crate) mod unread;
+pub(crate) mod up;
+
+use crate::meshes::stl;
+use std::path::Path;
+
+/// A format that may be read.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Format {
+    Ply,
+    Stl,
+    Obj,
+    Off,
+    Gltf,
+    Pcd,
+    Xyz,
+    Nrrd,
+    Las,
+    E57,
+    Nifti,
+    MetaImage,
+    VtkXml,
+    Vtk,
+    Raw,
+    Hdr,
+    Exr,
+    Png,
+    Splat,
+    Spz,
+}
+
+/// The format of a file by its first bytes, else by the extension of its name.
+pub(crate) fn format_of(path: &Path, content: &[u8]) -> Option<Format> {
+    let named = by_name(path);
+    // No byte of nothing but voxels is a mark.
+    if matches!(named, Some(Format::Raw)) {
+        return named;
+    }
+    let content = content.strip_prefix(b"\xef\xbb\xbf").unwrap_or(content);
+    if content.starts_with(b"ply") {
+        return Some(Format::Ply);
+    }
+    if content.starts_with(b"LASF") {
+        return Some(Format::Las);
+    }
+    if content.starts_with(b"ASTM-E57") {
+        return Some(Format::E57);
+    }
+    if content.starts_with(b"NRRD000") {
+        return Some(Format::Nrrd);
+    }
+    if content.starts_with(b"#?") {
+        return Some(Format::Hdr);
+    }
+    if content.starts_with(&[0x76, 0x2f, 0x31, 0x01]) {
+        return Some(Format::Exr);
+    }
+    if content.starts_with(b"\x89PNG\r\n\x1a\n") {
+        return Some(Format::Png);
+    }
+    if content.starts_with(b"NGSP") {
+        return Some(Format::Spz);
+    }
+    if content.starts_with(b"glTF") {
+        return Some(Format::Gltf);
+    }
+    if content.starts_with(b"# .PCD") {
+        return Some(Format::Pcd);
+    }
+    if content.get(344..347).is_some_and(|magic| magic == b"n+1" || magic == b"ni1") {
+        return Some(Format::Nifti);
+    }
+    // NIfTI-2, which its reader names.
+    if content.get(4..7).is_some_and(|magic| magic == b"n+2" || magic == b"ni2") {
+        return Some(Format::Nifti);
+    }
+    if content.starts_with(b"# vtk DataFile Version") {
+        return Some(Format::Vtk);
+    }
+    if content.windows(8).any(|window| window == b"<VTKFile") {
+        return Some(Format::VtkXml);
+    }
+    if is_metaimage(content) {
+        return Some(Format::MetaImage);
+    }
+    named.or_else(|| stl::is_text(content).then_some(Format::Stl))
+}
+
+/// It has no mark, but begins with one of two fields.
+fn is_metaimage(content: &[u8]) -> bool {
+    let field = content.iter().position(|b| *b == b'=').map_or(&[][..], |end| content[..end].trim_ascii_end());
+    [&b"ObjectType"[..], b"NDims"].contains(&field)
+}
+
+/// Whether a file is nothing but voxels by its name, not even packed.
+pub(crate) fn is_raw(path: &Path) -> bool {
+    path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("raw"))
+}
+
+/// The format that an extension stands for.
+pub(crate) fn by_name(path: &Path) -> Option<Format> {
+    let name = path.file_name()?.to_string_lossy().to_ascii_lowercase();
+    let name = name.strip_suffix(".gz").unwrap_or(&name);
+    match name.rsplit_once('.')?.1 {
+        "ply" => Some(Format::Ply),
+        "stl" => Some(Format::Stl),
+        "obj" => Some(Format::Obj),
+        "off" => Some(Format::Off),
+        "gltf" | "glb" => Some(Format::Gltf),
+        "pcd" => Some(Format::Pcd),
+        "xyz" | "csv" | "txt" | "pts" | "asc" => Some(Format::Xyz),
+        "nrrd" | "nhdr" => Some(Format::Nrrd),
+        "las" | "laz" => Some(Format::Las),
+        "e57" => Some(Format::E57),
+        "nii" | "hdr" => Some(Format::Nifti),
+        "mha" | "mhd" => Some(Format::MetaImage),
+        "vti" | "vtu" | "vtp" => Some(Format::VtkXml),
+        "vtk" => Some(Format::Vtk),
+        "raw" => Some(Format::Raw),
+        "splat" => Some(Format::Splat),
+        "spz" => Some(Format::Spz),
+        _ => None,
+    }
+}

@@ -1,0 +1,79 @@
+//! PNG (`.png`): pictures of 8 or 16 bits, grey or in colour, as displays show them (sRGB); they become linear radiance, 1 for white. Where
+//! samples are no colours but numbers, they stay what they are, over the largest.
+
+use crate::check_image;
+use crate::error::{Place, ReadError};
+use crate::reading::Reading;
+use crate::stream::input::{check_deflated, hold, reserve};
+use image::codecs::png::PngDecoder;
+use image::{DynamicImage, ImageDecoder};
+use splat_core::RadianceImage;
+use splat_core::srgb::linear_from_srgb;
+use splat_core::text::escaped;
+use std::io::Cursor;
+
+/// Chunks that say other colours, or other pictures, than are read.
+const NOT_USED: [&[u8]; 5] = [b"gAMA", b"cHRM", b"iCCP", b"cICP", b"acTL"];
+const MARK: usize = 8;
+
+const DAMAGED: &str = "the file is truncated or damaged; save it anew, as PNG of 8 or 16 bits";
+
+pub(crate) fn read(content: &[u8], reading: &mut Reading<'_>) -> Result<RadianceImage, ReadError> {
+    let decoder = PngDecoder::new(Cursor::new(content)).map_err(damaged)?;
+    let (width, height) = decoder.dimensions();
+    check_image([width, height], reading.params)?;
+    // Rows are packed in whole bytes: a mask of black and white has one bit a pixel.
+    let row = u64::from(width) * u64::from(decoder.original_color_type().bits_per_pixel());
+    check_deflated(row.div_ceil(8) * u64::from(height), content.len() as u64, "the packed image")?;
+    // Two copies exist at a time: the decoded image, and the same with four channels of 16 bits.
+    let pixels = u64::from(width) * u64::from(height);
+    hold("the decoded image", decoder.total_bytes().saturating_add(8 * pixels), reading.params)?;
+    let mut pixels = Vec::new();
+    reserve(&mut pixels, width as usize * height as usize)?;
+    reading.go_on()?;
+    let chunks = chunks(content)?;
+    reading.notes.not_used(NOT_USED.into_iter().filter(|name| chunks.contains(name)));
+    let decoded = DynamicImage::from_decoder(decoder).map_err(damaged)?;
+    reading.go_on()?;
+    if reading.params.is_coverage {
+        let whole = |v: u16| f32::from(v) / f32::from(u16::MAX);
+        match decoded.color().has_alpha() {
+            true => pixels.extend(decoded.into_rgba16().pixels().map(|p| [whole(p.0[3]); 3])),
+            false => pixels.extend(decoded.into_luma16().pixels().map(|p| [whole(p.0[0]); 3])),
+        }
+        return Ok(RadianceImage { size: [width, height], pixels });
+    }
+    let is_whole = !decoded.color().has_alpha() || decoded.to_rgba16().pixels().all(|p| p.0[3] == u16::MAX);
+    if !is_whole {
+        let hint = "an image of radiance hides nothing: flatten it onto a colour first";
+        return Err(ReadError::input(Place::File, "opaque pixels", "some that are translucent", hint));
+    }
+    let value = |v: f64| if reading.params.is_data { v as f32 } else { linear_from_srgb(v) };
+    let values: Vec<f32> = (0..=u16::MAX).map(|v| value(f64::from(v) / f64::from(u16::MAX))).collect();
+    pixels.extend(decoded.into_rgb16().pixels().map(|p| p.0.map(|v| values[v as usize])));
+    Ok(RadianceImage { size: [width, height], pixels })
+}
+
+/// Names of the chunks, of which the file is made up to the last byte.
+fn chunks(content: &[u8]) -> Result<Vec<&[u8]>, ReadError> {
+    let (mut at, mut names) = (MARK, Vec::new());
+    while names.last() != Some(&b"IEND".as_slice()) {
+        let head = content.get(at..at + 8).and_then(|head| head.split_first_chunk::<4>());
+        let next = head.map(|(length, name)| (at as u64 + 12 + u64::from(u32::from_be_bytes(*length)), name));
+        let Some((next, name)) = next.filter(|(next, _)| *next <= content.len() as u64) else {
+            let found = "the end of the file";
+            return Err(ReadError::input(Place::Byte(at as u64), "a whole chunk, the last one IEND", found, DAMAGED));
+        };
+        names.push(name);
+        at = next as usize;
+    }
+    if at < content.len() {
+        let (found, hint) = (format!("{} bytes more", content.len() - at), "something was added to the file");
+        return Err(ReadError::input(Place::Byte(at as u64), "the end of the file after IEND", found, hint));
+    }
+    Ok(names)
+}
+
+fn damaged(error: image::ImageError) -> ReadError {
+    ReadError::input(Place::File, "a complete PNG image", escaped(error.to_string().as_bytes(), 120), DAMAGED)
+}

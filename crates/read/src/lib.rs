@@ -1,0 +1,431 @@
+//! Reading files: meshes (PLY, STL, OBJ, OFF, glTF), point clouds (PLY, OBJ, OFF, PCD, glTF, XYZ, CSV, LAS, LAZ, E57), 3D Gaussians (PLY, packed
+//! PLY, .splat, SPZ), volumes (NIfTI,
+//! NRRD, MetaImage, VTK, raw) and images of radiance (Radiance HDR, OpenEXR, PNG), each also inside gzip.
+//!
+//! No input makes a reader panic or take memory that the file does not stand for: sizes that a header announces are
+//! checked against the length of the file before anything is allocated.
+
+//!
+//! ```
+//! use read::{Loaded, ReadParams};
+//! let (loaded, notes) = read::bytes("two.xyz", b"0 0 1\n2 0 1\n", &ReadParams::default(), None).unwrap();
+//! let Loaded::Points(points) = loaded else { panic!("points") };
+//! assert_eq!((points.len(), notes.format.as_str()), (2, "Xyz"));
+//! ```
+#![forbid(unsafe_code)]
+#![cfg_attr(
+    not(all(
+        feature = "ply",
+        feature = "obj",
+        feature = "off",
+        feature = "gltf",
+        feature = "las",
+        feature = "e57",
+        feature = "nifti",
+        feature = "vti",
+        feature = "vtk",
+        feature = "exr",
+        feature = "png"
+    )),
+    allow(
+        dead_code,
+        unused_imports,
+        unused_variables,
+        unused_mut,
+        reason = "fewer readers leave parts that all share unused"
+    )
+)]
+
+mod error;
+mod format;
+mod images;
+mod meshes;
+mod points;
+mod reading;
+mod stream;
+mod text;
+mod volumes;
+
+pub use error::{Fault, Place, ReadError};
+pub use format::unread::is_foreign_json;
+pub use format::up::{stated_up_axis, up_axis};
+#[cfg(feature = "las")]
+pub use points::laz::panic_is_input_error;
+pub use reading::{Fix, Mended, NamedColumn, Notes};
+
+use format::{Format, format_of, is_raw, unread};
+#[cfg(feature = "exr")]
+use images::openexr;
+#[cfg(feature = "png")]
+use images::png;
+use images::radiance;
+#[cfg(feature = "gltf")]
+use meshes::gltf;
+#[cfg(feature = "obj")]
+use meshes::obj;
+#[cfg(feature = "off")]
+use meshes::off;
+use meshes::outwards::turn_outwards;
+#[cfg(feature = "ply")]
+use meshes::ply;
+use meshes::stl;
+#[cfg(feature = "e57")]
+use points::e57;
+use points::extras::LONGEST_NAME;
+#[cfg(feature = "las")]
+use points::las;
+use points::{pcd, splat, spz, xyz};
+use rayon::prelude::*;
+use reading::Reading;
+use splat_core::glam::DVec3;
+use splat_core::points::attributes::attribute;
+use splat_core::text::{counted, escaped, escaped_path};
+use splat_core::{Grid, MemoryAccount, Mesh, Progress, RadianceImage, RawPoints};
+use std::path::Path;
+use stream::input;
+use stream::input::Stream;
+#[cfg(feature = "nifti")]
+use volumes::nifti;
+#[cfg(feature = "vti")]
+use volumes::vti;
+#[cfg(feature = "vtk")]
+use volumes::vtk;
+use volumes::{metaimage, nrrd, raw};
+
+/// How much a file may ask for, and what happens to what is wrong in it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ReadParams {
+    /// Bytes that reading takes at a time: files that are read whole, what comes out of packed ones, images, and what is made of them. All
+    /// come back when the file is read; whoever keeps what it holds takes [`Loaded::bytes`] for that.
+    pub memory: MemoryAccount,
+    /// Whether points of a cloud with a coordinate that is not finite are left out and counted in
+    /// [`RawPoints::dropped`] instead of refused. Vertices of a mesh are always refused.
+    pub drop_invalid: bool,
+    /// Whether a file with a fault that could be mended (see [`Fix`]) is refused instead.
+    pub strict: bool,
+    /// Which volume of a series is read, from 0; other files have a frame 0 alone.
+    pub frame: u64,
+    /// Points that are wanted at most. Of a file that has levels of detail (COPC) whole levels are read, coarsest first, as far as that
+    /// goes, and the coarsest in any case; other files are read whole.
+    pub most_points: Option<u64>,
+    /// Columns of points that are kept in [`RawPoints::columns`] beside those that have a meaning, each by its name in the file or by one
+    /// that [`RawPoints::column`] knows. One that a file of points has not is an error that names those that it has.
+    pub columns: Vec<String>,
+    /// Name of the array of a VTK file that is the volume's field; `None` for the one that the file names, else the first of one number a
+    /// point or cell. One that the file has not is an error that names those that it has, as one of another format is.
+    pub array: Option<String>,
+    /// Whether points may become a medium: columns `smoothing_length`, `extinction` and `mass` are kept too, beside those that are kept of all
+    /// points where there are such, `radius`, `tx`, `ty`, `tz`, `shadow_coefficient`, `footprint` and `material`. Numbers that these cannot have are refused, see
+    /// `convert::raw_to_matter` and `convert::raw_to_surfels`.
+    pub matter: bool,
+    /// Whether the ranges of all columns of points are found, kept or not, for [`Notes::columns`].
+    pub ranges: bool,
+    /// Whether the samples of a PNG are numbers, from 0 to 1 as they are stored, and no colours of a display.
+    pub is_data: bool,
+    /// Whether an image says how much of each place something covers, which all three channels then hold: the alpha of a PNG or OpenEXR, or
+    /// where it has none how bright it is, the samples of a PNG as numbers.
+    pub is_coverage: bool,
+}
+
+impl Default for ReadParams {
+    /// 4 GiB, nothing dropped, what can be mended is mended, the first of a series, all points, no further columns, the first array, pictures in colours of a
+    /// display.
+    fn default() -> Self {
+        Self {
+            memory: MemoryAccount::default(),
+            drop_invalid: false,
+            strict: false,
+            frame: 0,
+            most_points: None,
+            columns: Vec::new(),
+            array: None,
+            matter: false,
+            ranges: false,
+            is_data: false,
+            is_coverage: false,
+        }
+    }
+}
+
+impl ReadParams {
+    /// Whether what was read with these is what `others` ask for: they are alike, but for columns that are there beside those.
+    pub fn serves(&self, others: &Self) -> bool {
+        let alike = *self == Self { columns: self.columns.clone(), ..others.clone() };
+        alike && others.columns.iter().all(|name| self.columns.contains(name))
+    }
+}
+
+/// What a file holds, in the file's own axes and units. Meshes face outwards, also where the file's do not.
+#[expect(clippy::large_enum_variant, reason = "there is one a file")]
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub enum Loaded {
+    /// Vertices with faces.
+    Mesh(Mesh),
+    /// Points without faces, which may be Gaussians.
+    Points(RawPoints),
+    /// A regular volume.
+    Grid(Grid),
+    /// An image of radiance.
+    Image(RadianceImage),
+}
+
+impl Loaded {
+    /// Bytes that it holds.
+    pub fn bytes(&self) -> u64 {
+        match self {
+            Self::Mesh(mesh) => mesh.bytes(),
+            Self::Points(points) => points.bytes(),
+            Self::Grid(grid) => grid.bytes(),
+            Self::Image(image) => image.bytes(),
+        }
+    }
+}
+
+/// Reads a regular file, and says what there is to say of it; its first bytes tell the format, its extension only words the
+/// error if they do not. Reading stops where `progress` is cancelled.
+///
+/// # Errors
+/// [`ReadError`] with the file's name, the place, what was expected and what was found, and one with
+/// [`Fault::Cancelled`].
+pub fn file(path: &Path, params: &ReadParams, progress: Option<&Progress>) -> Result<(Loaded, Notes), ReadError> {
+    let name = escaped_path(path);
+    let params = &ReadParams { memory: params.memory.part(), ..params.clone() };
+    let mut reading = Reading::new(params, progress);
+    let stream = Stream::open(path, params);
+    let loaded = stream.and_then(|stream| whole(path, stream, Some(path), &mut reading));
+    Ok((loaded.map_err(|e| e.in_file(&name))?, reading.finish(&name)))
+}
+
+/// Reads a file that is in memory already; `name` serves messages and tells the format where the content does not.
+///
+/// # Errors
+/// [`ReadError`] as [`file()`] gives it.
+pub fn bytes(
+    name: &str,
+    content: &[u8],
+    params: &ReadParams,
+    progress: Option<&Progress>,
+) -> Result<(Loaded, Notes), ReadError> {
+    let shown = escaped(name.as_bytes(), usize::MAX);
+    let params = &ReadParams { memory: params.memory.part(), ..params.clone() };
+    let mut reading = Reading::new(params, progress);
+    let loaded = whole(Path::new(name), Stream::of(content, params), None, &mut reading);
+    Ok((loaded.map_err(|e| e.in_file(&shown))?, reading.finish(&shown)))
+}
+
+/// Most bytes that [`meshes::outwards`] takes for a vertex, each of three in a part of its own.
+const BYTES_PER_PART: u64 = 13 + 48;
+
+/// Points that are in memory already, as [`file()`] takes them: refused where a column that was asked for is not there. `name` serves messages.
+///
+/// # Errors
+/// [`ReadError`] as [`file()`] gives it.
+pub fn points_in_memory(name: &str, points: &RawPoints, params: &ReadParams) -> Result<Notes, ReadError> {
+    let mut reading = Reading::new(params, None);
+    let unused = points.columns.iter().map(|column| column.name.as_str());
+    let unused = unused
+        .filter(|name| attribute(name, params.matter).is_none())
+        .map(|name| escaped(name.as_bytes(), LONGEST_NAME));
+    reading.notes.unused = unused.collect();
+    check_columns(points, &mut reading).map_err(|e| e.in_file(name))?;
+    Ok(reading.finish(name))
+}
+
+/// The same of a volume: refused without any value.
+///
+/// # Errors
+/// [`ReadError`] as [`file()`] gives it.
+pub fn grid_in_memory(name: &str, grid: &Grid, params: &ReadParams) -> Result<Notes, ReadError> {
+    let mut reading = Reading::new(params, None);
+    remark_gaps(grid, &mut reading).map_err(|e| e.in_file(name))?;
+    Ok(reading.finish(name))
+}
+
+/// The same of a mesh: turned outwards.
+///
+/// # Errors
+/// [`ReadError`] as [`file()`] gives it.
+pub fn mesh_in_memory(name: &str, mesh: Mesh, params: &ReadParams) -> Result<(Mesh, Notes), ReadError> {
+    let mut reading = Reading::new(params, None);
+    let mesh = outwards(mesh, &mut reading).map_err(|e| e.in_file(name))?;
+    Ok((mesh, reading.finish(name)))
+}
+
+/// The content with meshes turned outwards.
+fn whole(
+    path: &Path,
+    stream: Stream<'_>,
+    place: Option<&Path>,
+    reading: &mut Reading<'_>,
+) -> Result<Loaded, ReadError> {
+    let loaded = parse(path, stream, place, reading)?;
+    if reading.params.frame > 0 && !matches!(loaded, Loaded::Grid(_)) {
+        let (expected, found) = ("a series of volumes", "a file of another kind");
+        return Err(ReadError::input(Place::File, expected, found, "leave out `frame`"));
+    }
+    let has_array = matches!(loaded, Loaded::Grid(_)) && ["Vtk", "VtkXml"].contains(&reading.notes.format.as_str());
+    if let (Some(name), false) = (&reading.params.array, has_array) {
+        let found = format!("the array '{}', and a file without arrays", escaped(name.as_bytes(), LONGEST_NAME));
+        return Err(ReadError::input(Place::File, "a volume of VTK", found, "leave out `array`"));
+    }
+    match loaded {
+        Loaded::Points(points) => check_columns(&points, reading).map(|()| Loaded::Points(points)),
+        Loaded::Grid(grid) => remark_gaps(&grid, reading).map(|()| Loaded::Grid(grid)),
+        Loaded::Mesh(mesh) => outwards(mesh, reading).map(Loaded::Mesh),
+        Loaded::Image(image) => Ok(Loaded::Image(image)),
+    }
+}
+
+/// The mesh with parts that are inside out turned.
+fn outwards(mut mesh: Mesh, reading: &mut Reading<'_>) -> Result<Mesh, ReadError> {
+    input::hold("which parts the triangles make", mesh.position.len() as u64 * BYTES_PER_PART, reading.params)?;
+    for _ in 0..turn_outwards(&mut mesh) {
+        reading.mend((Fix::InsideOut, Place::File, None), || {
+            let hint = "turn the faces around, or leave out --strict";
+            ReadError::input(Place::File, "surfaces whose faces are wound outwards", "one that is inside out", hint)
+        })?;
+    }
+    Ok(mesh)
+}
+
+/// Says how many voxels have no value, and refuses a volume of nothing else.
+fn remark_gaps(grid: &Grid, reading: &mut Reading<'_>) -> Result<(), ReadError> {
+    let gaps = grid.values.par_iter().filter(|value| value.is_nan()).count();
+    if gaps == 0 {
+        return Ok(());
+    }
+    let voxels = grid.values.len();
+    if gaps == voxels {
+        let hint = "the values are missing: write the file anew";
+        return Err(ReadError::input(Place::File, "a voxel with a value", "NaN in all of them", hint));
+    }
+    let total = counted(voxels as u64, "voxel");
+    reading
+        .notes
+        .remark(format!("{gaps} of {total} are NaN: they draw nothing, and a slice has its first colour there"));
+    Ok(())
+}
+
+/// Refuses columns that were asked for and are not there; what is kept is no longer named as not used.
+fn check_columns(points: &RawPoints, reading: &mut Reading<'_>) -> Result<(), ReadError> {
+    let missing = reading.params.columns.iter().find(|name| points.column(name, DVec3::Y).is_none());
+    if let Some(missing) = missing {
+        let known: Vec<&str> = points.column_names().collect();
+        let further = reading.notes.columns.iter().map(|c| c.name.as_str()).filter(|name| !known.contains(name));
+        let names: Vec<&str> = known.iter().copied().chain(further).collect();
+        let expected = format!("a column among {}", names.join(", "));
+        let found = format!("`{}`", escaped(missing.as_bytes(), LONGEST_NAME));
+        return Err(ReadError::input(Place::File, expected, found, "`organza info` says what they hold"));
+    }
+    let shown: Vec<String> = points.columns.iter().map(|c| escaped(c.name.as_bytes(), LONGEST_NAME)).collect();
+    reading.notes.unused.retain(|name| !shown.contains(name));
+    Ok(())
+}
+
+/// Bytes that tell the format.
+const MARK: usize = 4096;
+
+/// `place` is where the file lies, for those that name another one.
+fn parse(
+    path: &Path,
+    mut stream: Stream<'_>,
+    place: Option<&Path>,
+    reading: &mut Reading<'_>,
+) -> Result<Loaded, ReadError> {
+    reading.go_on()?;
+    if stream.peek(2)? == [0x1f, 0x8b] && !is_raw(path) {
+        stream = stream.gunzip();
+    }
+    let head = stream.peek(MARK)?;
+    let format = format_of(path, head);
+    if reading.params.is_coverage && !matches!(format, Some(Format::Exr | Format::Png)) {
+        return Err(unread::without_coverage(path, head, format));
+    }
+    if let Some(error) = unread::by_mark(path, head) {
+        return Err(error);
+    }
+    if head.is_empty() && matches!(format, Some(Format::Obj | Format::Xyz)) {
+        let hint = "the file is truncated, or was never written";
+        return Err(ReadError::input(Place::Byte(0), "vertices or points", "an empty file", hint));
+    }
+    let Some(format) = format else { return Err(unread::refused(path, head)) };
+    reading.notes.format = format!("{format:?}");
+    parse_as(format, stream, path, place, reading)
+}
+
+fn parse_as(
+    format: Format,
+    stream: Stream<'_>,
+    path: &Path,
+    place: Option<&Path>,
+    reading: &mut Reading<'_>,
+) -> Result<Loaded, ReadError> {
+    let params = reading.params;
+    match format {
+        #[cfg(feature = "ply")]
+        Format::Ply => ply::read(&stream.rest()?, reading),
+        Format::Stl => stl::read(&stream.rest()?, reading).map(Loaded::Mesh),
+        #[cfg(feature = "obj")]
+        Format::Obj => obj::read(&stream.rest()?, place, reading),
+        #[cfg(feature = "off")]
+        Format::Off => off::read(&stream.rest()?, reading),
+        #[cfg(feature = "gltf")]
+        Format::Gltf => gltf::read(&stream.rest()?, place, reading),
+        Format::Splat => splat::read(&stream.rest()?, reading).map(Loaded::Points),
+        Format::Spz => spz::read(&stream.rest()?, reading).map(Loaded::Points),
+        Format::Pcd => pcd::read(&stream.rest()?, reading).map(Loaded::Points),
+        Format::Xyz => xyz::read(&stream.rest()?, params, &mut reading.notes).map(Loaded::Points),
+        Format::Nrrd => nrrd::read(stream, place, params, &mut reading.notes).map(Loaded::Grid),
+        #[cfg(feature = "las")]
+        Format::Las => las::read(stream.rest()?, params, &mut reading.notes).map(Loaded::Points),
+        #[cfg(feature = "e57")]
+        Format::E57 => e57::read(stream.rest()?, reading).map(Loaded::Points),
+        #[cfg(feature = "nifti")]
+        Format::Nifti => nifti::read(stream, params, &mut reading.notes).map(Loaded::Grid),
+        Format::MetaImage => metaimage::read(stream, place, params, &mut reading.notes).map(Loaded::Grid),
+        #[cfg(feature = "vti")]
+        Format::VtkXml => vti::read(&stream.rest()?, reading),
+        #[cfg(feature = "vtk")]
+        Format::Vtk => vtk::read(&stream.rest()?, reading),
+        Format::Raw => raw::read(stream, path, params, &mut reading.notes).map(Loaded::Grid),
+        Format::Hdr => radiance::read(&stream.rest()?, reading).map(Loaded::Image),
+        #[cfg(feature = "exr")]
+        Format::Exr => openexr::read(&stream.rest()?, reading).map(Loaded::Image),
+        #[cfg(feature = "png")]
+        Format::Png => png::read(&stream.rest()?, reading).map(Loaded::Image),
+        #[allow(unreachable_patterns, reason = "reached where a reader is not compiled in")]
+        format => Err(not_compiled_in(format)),
+    }
+}
+
+fn not_compiled_in(format: Format) -> ReadError {
+    let (expected, hint) = ("a format that this build reads", "build with the feature of that name");
+    ReadError::input(Place::File, expected, format!("{format:?}"), hint)
+}
+
+/// Longest side of an image, pixels.
+const LONGEST_SIDE: u32 = 65536;
+
+/// Bytes of an image of a size that may be read, as colours.
+fn check_image(size: [u32; 2], params: &ReadParams) -> Result<u64, ReadError> {
+    check_sides(size)?;
+    let bytes = size.iter().map(|s| u64::from(*s)).product::<u64>() * size_of::<[f32; 3]>() as u64;
+    input::hold("the image", bytes, params)?;
+    Ok(bytes)
+}
+
+/// Refuses an image without pixels, and one that is longer than any.
+fn check_sides(size: [u32; 2]) -> Result<(), ReadError> {
+    if !size.iter().all(|side| (1..=LONGEST_SIDE).contains(side)) {
+        let expected = format!("an image of 1 to {LONGEST_SIDE} pixels a side");
+        let found = format!("{} x {}", size[0], size[1]);
+        return Err(ReadError::input(Place::File, expected, found, "the header is damaged, or make the image smaller"));
+    }
+    Ok(())
+}
+
+/// The page's example compiles and holds.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Page;

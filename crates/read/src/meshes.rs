@@ -1,0 +1,24 @@
+//! Meshes: a reader a format, and what these share: polygons become triangles, textures colours, and faces look outwards.
+
+#[cfg(any(feature = "obj", feature = "off", feature = "vti", feature = "vtk"))]
+pub(crate) mod fans;
+#[cfg(feature = "gltf")]
+pub(crate) mod gltf;
+#[cfg(feature = "obj")]
+pub(crate) mod mtl;
+#[cfg(feature = "obj")]
+pub(crate) mod obj;
+#[cfg(feature = "off")]
+pub(crate) mod off;
+pub(crate) mod outwards;
+#[cfg(any(feature = "obj", feature = "gltf"))]
+pub(crate) mod paint;
+#[cfg(feature = "ply")]
+pub(crate) mod ply;
+#[cfg(any(feature = "ply", feature = "obj", feature = "off", feature = "vti", feature = "vtk"))]
+pub(crate) mod polygon;
+#[cfg(feature = "obj")]
+pub(crate) mod statements;
+pub(crate) mod stl;
+#[cfg(any(feature = "obj", feature = "gltf"))]
+pub(crate) mod texture;

@@ -1,0 +1,70 @@
+//! Colours of materials on the corners of faces.
+
+use super::{BYTES_PER_CORNER, Corner};
+use crate::error::ReadError;
+use crate::meshes::mtl::Materials;
+use crate::meshes::paint::Painting;
+use crate::reading::Reading;
+use crate::stream::input;
+use splat_core::glam::Vec3;
+use splat_core::{Mesh, part_at_creases, vertex_normals};
+use std::collections::HashMap;
+
+/// Bytes that a vertex and a triangle of the surface without materials take, while it is parted at sharp edges and its normals are found.
+const BYTES_PER_WHOLE_VERTEX: u64 = 12 + 25 + 12;
+const BYTES_PER_WHOLE_TRIANGLE: u64 = 12 + 48 + 3 * 36;
+
+/// The mesh with the colours of its materials.
+pub(super) fn painted(
+    mut mesh: Mesh,
+    mut corners: Vec<Corner>,
+    places: &[[f32; 2]],
+    materials: Materials<'_>,
+    reading: &mut Reading<'_>,
+) -> Result<Mesh, ReadError> {
+    if mesh.normal.is_empty() {
+        smooth(&mut mesh, &mut corners, reading)?;
+    }
+    let Materials { paints, textures, .. } = materials;
+    let place = |c: &Corner| places.get(c[2] as usize).copied().unwrap_or_default();
+    let painting = Painting {
+        place: if textures.is_empty() { Vec::new() } else { corners.iter().map(place).collect() },
+        paint_of: corners.iter().map(|c| c[3]).collect(),
+        tint: Vec::new(),
+        paints,
+        textures,
+    };
+    painting.paint(mesh, reading)
+}
+
+/// Gives the mesh the normals that it has where materials split no vertex: a change of material is no edge. A vertex on several sides of a
+/// sharp edge becomes several.
+fn smooth(mesh: &mut Mesh, corners: &mut Vec<Corner>, reading: &Reading<'_>) -> Result<(), ReadError> {
+    let count = corners.iter().map(|c| c[0] as usize + 1).max().unwrap_or(0);
+    let bytes = count as u64 * BYTES_PER_WHOLE_VERTEX + mesh.triangles.len() as u64 * BYTES_PER_WHOLE_TRIANGLE;
+    input::hold("the surface without materials", bytes, reading.params)?;
+    let mut whole = Mesh { position: vec![Vec3::ZERO; count], ..Mesh::default() };
+    corners.iter().zip(&mesh.position).for_each(|(c, p)| whole.position[c[0] as usize] = *p);
+    whole.triangles = mesh.triangles.iter().map(|t| t.map(|v| corners[v as usize][0])).collect();
+    part_at_creases(&mut whole);
+    let more = 3 * (whole.position.len() - count) as u64;
+    input::hold("the corners", (corners.len() as u64 + more) * BYTES_PER_CORNER, reading.params)?;
+    let mut side_of: Vec<Option<u32>> = vec![None; mesh.position.len()];
+    let mut further: HashMap<[u32; 2], u32> = HashMap::new();
+    for (ids, sides) in mesh.triangles.iter_mut().zip(&whole.triangles) {
+        for (id, side) in ids.iter_mut().zip(sides) {
+            let v = *id as usize;
+            if *side_of[v].get_or_insert(*side) != *side {
+                *id = *further.entry([*id, *side]).or_insert_with(|| {
+                    mesh.position.push(mesh.position[v]);
+                    corners.push(corners[v]);
+                    side_of.push(Some(*side));
+                    side_of.len() as u32 - 1
+                });
+            }
+        }
+    }
+    let normals = vertex_normals(&whole);
+    mesh.normal = side_of.iter().map(|side| side.map_or(Vec3::ZERO, |side| normals[side as usize])).collect();
+    Ok(())
+}

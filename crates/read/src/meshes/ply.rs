@@ -1,0 +1,69 @@
+//! PLY: ascii and both binary byte orders → a mesh where there are faces, else raw points; Gaussians and splats where vertices are such.
+//!
+//! The parser is our own: places down to line and column or byte, line ends of every system, duplicate properties and
+//! sizes checked against the file before allocation are asked of it. Properties it has no use for are read over and named.
+//! Faces come as polygons (`face`), as triangle strips (`tristrips`, which −1 starts anew), or as both.
+
+mod ascii;
+mod binary;
+mod body;
+mod columns;
+mod faces;
+mod gaussians;
+mod header;
+mod splats;
+
+use crate::error::{Place, ReadError};
+use crate::reading::Reading;
+use crate::{Loaded, ReadParams};
+use ascii::Ascii;
+use binary::Binary;
+use body::Source;
+use header::{Encoding, Header};
+
+/// Reads a PLY file.
+pub(crate) fn read(content: &[u8], reading: &mut Reading<'_>) -> Result<Loaded, ReadError> {
+    let header = header::parse(content)?;
+    match header.encoding {
+        Encoding::Ascii => elements(Ascii::new(content, header.body, header.body_line), &header, reading),
+        Encoding::LittleEndian => elements(Binary::<false>::new(content, header.body), &header, reading),
+        Encoding::BigEndian => elements(Binary::<true>::new(content, header.body), &header, reading),
+    }
+}
+
+fn elements<S: Source>(source: S, header: &Header, reading: &mut Reading<'_>) -> Result<Loaded, ReadError> {
+    if splats::is_of_splats(header) {
+        return splats::read(source, header, reading).map(Loaded::Points);
+    }
+    if let Some(kind) = header.gaussians() {
+        return gaussians::read(source, header, kind, reading).map(Loaded::Points);
+    }
+    if header.has_gaussians_without_harmonics() {
+        let hint = "write f_dc_0 to f_dc_2 = (colour / 255 − 0.5) / 0.2820948 in the place of red, green and blue, or draw points without \
+            scale_* and rot_*";
+        let expected = "Gaussians with their colours as f_dc_0 to f_dc_2";
+        return Err(ReadError::input(Place::File, expected, "Gaussians without such", hint));
+    }
+    let loaded = body::read(source, header, reading)?;
+    reading.notes.not_used(unused(header, reading.params)?.iter().map(Vec::as_slice));
+    Ok(loaded)
+}
+
+/// Names of what is read over: properties of vertices, and `element.property` of others.
+fn unused(header: &Header, params: &ReadParams) -> Result<Vec<Vec<u8>>, ReadError> {
+    let is_index = |name: &[u8]| name == b"vertex_indices" || name == b"vertex_index";
+    let mut names = Vec::new();
+    for element in &header.elements {
+        let all = element.properties.iter().map(|p| p.name.as_slice());
+        match element.name.as_slice() {
+            b"vertex" => {
+                let columns = columns::Columns::new(element, header.is_mesh(), params)?;
+                names.extend(columns.unused(element).map(<[u8]>::to_vec));
+            }
+            b"tristrips" => {}
+            b"face" => names.extend(all.filter(|n| !is_index(n)).map(|n| [b"face.", n].concat())),
+            other => names.extend(all.map(|n| [other, b".", n].concat())),
+        }
+    }
+    Ok(names)
+}

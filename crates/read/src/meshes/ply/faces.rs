@@ -1,0 +1,186 @@
+//! The faces of a PLY file: polygons and triangle strips.
+
+use super::body::{Source, list_length, look, skip_list};
+use super::columns::Columns;
+use super::header::{Element, Property, Shape, Type, at_line};
+use crate::error::ReadError;
+use crate::meshes::polygon::{self, Polygon};
+use crate::reading::{Fix, Reading};
+use crate::stream::input;
+use splat_core::Mesh;
+
+/// What the list of an element stands for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Form {
+    /// The corners of one face.
+    Polygons,
+    /// Triangles of three successive corners each, every other one turned around; −1 begins a new strip.
+    Strips,
+}
+
+/// The faces so far.
+pub(super) struct Faces {
+    triangles: Vec<[u32; 3]>,
+    /// Faces of more than three corners; fans among the triangles until all vertices are known.
+    polygons: Vec<Polygon>,
+    /// Line of the header that announces the polygons.
+    line: u64,
+    /// Vertices of the file.
+    vertices: u64,
+    /// Memory of the triangles.
+    held: input::Growing,
+}
+
+/// The number after which a strip begins anew, also as an unsigned number of 32 bits.
+const RESTART: [f64; 2] = [-1.0, u32::MAX as f64];
+
+impl Faces {
+    pub(super) fn new(vertices: u64) -> Self {
+        Self {
+            triangles: Vec::new(),
+            polygons: Vec::new(),
+            line: 0,
+            vertices,
+            held: input::Growing::new("the triangles"),
+        }
+    }
+
+    /// Reads one element of faces.
+    pub(super) fn read<S: Source>(
+        &mut self,
+        source: &mut S,
+        element: &Element,
+        form: Form,
+        reading: &mut Reading<'_>,
+    ) -> Result<(), ReadError> {
+        if element.count == 0 {
+            return Ok(());
+        }
+        let is_index = |p: &Property| p.name == b"vertex_indices" || p.name == b"vertex_index";
+        let Some(indices) = element.properties.iter().find(|p| is_index(p)) else {
+            let hint = "faces without vertices cannot be drawn";
+            return Err(ReadError::input(at_line(element.line), "a list 'vertex_indices'", "none", hint));
+        };
+        if !matches!(indices.shape, Shape::List { item, .. } if item.integer_range().is_some()) {
+            let hint = "write 'property list uchar int vertex_indices'";
+            return Err(ReadError::input(at_line(indices.line), "a list of integers", "another type", hint));
+        }
+        if form == Form::Polygons {
+            self.room(element.count, reading)?;
+            self.line = element.line;
+        }
+        for record in 0..element.count {
+            look(record, reading)?;
+            source.begin_record()?;
+            for property in &element.properties {
+                match property.shape {
+                    Shape::Scalar(kind) => {
+                        source.number(kind)?;
+                    }
+                    Shape::List { count, item } if is_index(property) => match form {
+                        Form::Polygons => self.polygon(source, record, (count, item), reading)?,
+                        Form::Strips => self.strip(source, record, (count, item), reading)?,
+                    },
+                    Shape::List { count, item } => skip_list(source, count, item)?,
+                }
+            }
+            source.end_record()?;
+        }
+        Ok(())
+    }
+
+    /// A vertex number of a face or strip.
+    fn corner<S: Source>(&self, source: &S, index: f64, what: &str, record: u64) -> Result<u32, ReadError> {
+        if (0.0..self.vertices as f64).contains(&index) {
+            return Ok(index as u32);
+        }
+        let expected = format!("a vertex of {what} {record} from 0 to {}", self.vertices.saturating_sub(1));
+        Err(ReadError::input(source.place(), expected, source.shown(index), "the face list is damaged"))
+    }
+
+    /// One polygon → a fan around its first vertex, for now.
+    fn polygon<S: Source>(
+        &mut self,
+        source: &mut S,
+        face: u64,
+        (count, item): (Type, Type),
+        reading: &mut Reading<'_>,
+    ) -> Result<(), ReadError> {
+        let corners = list_length(source, count, item)?;
+        if corners < 3 {
+            let place = source.place();
+            reading.mend((Fix::TooFewCorners, place, Some(face)), || {
+                let expected = format!("3 or more corners of face {face}");
+                ReadError::input(place, expected, corners.to_string(), "remove degenerate faces")
+            })?;
+            for _ in 0..corners {
+                let index = source.number(item)?;
+                self.corner(source, index, "face", face)?;
+            }
+            return Ok(());
+        }
+        let count = corners as usize - 2;
+        self.room(corners - 2, reading)?;
+        if count > 1 {
+            input::reserve(&mut self.polygons, 1)?;
+            self.polygons.push(Polygon { face, first: self.triangles.len(), count });
+        }
+        let mut fan = [0; 2];
+        for i in 0..corners {
+            look(i + 1, reading)?;
+            let index = source.number(item)?;
+            let next = self.corner(source, index, "face", face)?;
+            if i < 2 {
+                fan[i as usize] = next;
+            } else {
+                self.triangles.push([fan[0], fan[1], next]);
+                fan[1] = next;
+            }
+        }
+        Ok(())
+    }
+
+    /// One record of strips. Triangles with a corner twice join strips and are nothing by themselves.
+    fn strip<S: Source>(
+        &mut self,
+        source: &mut S,
+        record: u64,
+        (count, item): (Type, Type),
+        reading: &Reading<'_>,
+    ) -> Result<(), ReadError> {
+        let length = list_length(source, count, item)?;
+        self.room(length.saturating_sub(2), reading)?;
+        let (mut last, mut known) = ([0; 2], 0u64);
+        for i in 0..length {
+            look(i + 1, reading)?;
+            let index = source.number(item)?;
+            if RESTART.contains(&index) {
+                known = 0;
+                continue;
+            }
+            let next = self.corner(source, index, "strip", record)?;
+            let [a, b] = last;
+            if known >= 2 && a != b && b != next && a != next {
+                self.triangles.push(if known.is_multiple_of(2) { [a, b, next] } else { [b, a, next] });
+            }
+            last = [b, next];
+            known += 1;
+        }
+        Ok(())
+    }
+
+    /// Room for `more` triangles, within the limits.
+    fn room(&mut self, more: u64, reading: &Reading<'_>) -> Result<(), ReadError> {
+        let total = (self.triangles.len() as u64).saturating_add(more);
+        let bytes = total.saturating_mul(12).saturating_add((self.polygons.len() * size_of::<Polygon>()) as u64);
+        self.held.hold(bytes, reading.params)?;
+        input::reserve(&mut self.triangles, more as usize)
+    }
+
+    /// With the vertices the mesh.
+    pub(super) fn into_mesh(self, columns: Columns, reading: &mut Reading<'_>) -> Result<Mesh, ReadError> {
+        let mut mesh = columns.into_mesh(self.triangles)?;
+        polygon::triangulate(&mut mesh, &self.polygons, reading, |_| at_line(self.line))?;
+        Ok(mesh)
+    }
+}

@@ -1,0 +1,182 @@
+//! What goes along while a file is read: its parameters, who may stop it, and what was mended in it.
+
+use super::ReadParams;
+use crate::error::{Place, ReadError};
+use crate::points::extras::LONGEST_NAME;
+use splat_core::Progress;
+use splat_core::text::escaped;
+use std::fmt;
+
+/// Most names that are said not to be used: each new one is held against all others, and a file may have millions.
+const MOST_NAMES: usize = 512;
+
+/// A fault of a file that does not stop the rest of it from being drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Fix {
+    /// A face of four corners crosses itself: it is its two triangles.
+    CrossingQuad,
+    /// A larger face crosses itself: it is what its edges go around.
+    CrossingPolygon,
+    /// A face crosses itself and has too many corners to find what its edges go around: it is left out.
+    CrossingLarge,
+    /// A face has fewer than three corners: it is left out.
+    TooFewCorners,
+    /// Faces name normals, and the file has none: they are computed.
+    MissingNormals,
+    /// A part of a mesh is wound inside out, or its normals point inwards: it is turned.
+    InsideOut,
+    /// A few bytes follow the last facet of a binary STL: they are read over.
+    TrailingBytes,
+}
+
+/// All faults of one kind that were mended in a file. Prints as one line: `FILE:LINE: 2 faces …`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Mended {
+    /// The file's name, escaped.
+    pub file: String,
+    /// What was wrong, and what became of it.
+    pub fix: Fix,
+    /// How often.
+    pub count: u64,
+    /// Where the first of them is.
+    pub place: Place,
+    /// The number of the first face, as the file's format counts; `None` for what is no fault of a face.
+    pub face: Option<u64>,
+}
+
+impl fmt::Display for Mended {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { file, fix, count, place, face } = self;
+        write!(f, "{file}{place}: {count} ")?;
+        let by = |one: &'static str, many: &'static str| if *count == 1 { one } else { many };
+        f.write_str(match fix {
+            Fix::CrossingQuad => by(
+                "face of four corners crosses itself and is drawn as two triangles",
+                "faces of four corners cross themselves and are drawn as two triangles each",
+            ),
+            Fix::CrossingPolygon => by(
+                "face crosses itself and is filled where its edges go around",
+                "faces cross themselves and are filled where their edges go around",
+            ),
+            Fix::CrossingLarge => by(
+                "face crosses itself, has too many corners to be mended, and is left out",
+                "faces cross themselves, have too many corners to be mended, and are left out",
+            ),
+            Fix::TooFewCorners => {
+                by("face of fewer than three corners is left out", "faces of fewer than three corners are left out")
+            }
+            Fix::MissingNormals => by(
+                "corner names a normal, of which the file has none: normals are computed",
+                "corners name normals, of which the file has none: normals are computed",
+            ),
+            Fix::InsideOut => by("part is inside out and is turned", "parts are inside out and are turned"),
+            Fix::TrailingBytes => {
+                by("byte after the last facet is read over", "bytes after the last facet are read over")
+            }
+        })?;
+        match face {
+            Some(face) if *count > 1 => write!(f, " (the first is face {face})"),
+            Some(face) => write!(f, " (face {face})"),
+            None => Ok(()),
+        }
+    }
+}
+
+/// A column of points that has no meaning of its own.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NamedColumn {
+    /// Its name in the file, by which [`super::ReadParams::columns`] asks for it.
+    pub name: String,
+    /// Its least and greatest finite number, where they were looked at.
+    pub range: Option<[f64; 2]>,
+}
+
+/// What a reader has to say of a file beside its data.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Notes {
+    /// The reader that read it, by the name of its format.
+    pub format: String,
+    /// Columns, fields and statements of the file that are not used, as the file names them.
+    pub unused: Vec<String>,
+    /// Columns of points that have no meaning of their own, kept or not.
+    pub columns: Vec<NamedColumn>,
+    /// What was made of the data that its user should know, one sentence without a full stop each.
+    pub remarks: Vec<String>,
+    /// What was mended in it, one entry a kind of fault.
+    pub mended: Vec<Mended>,
+}
+
+impl Notes {
+    /// All of it but what was mended, one sentence each, for a file of this name that was read; `unused` are columns that were read and
+    /// nobody asks for.
+    pub fn sentences<'u>(&self, file: &str, unused: impl IntoIterator<Item = &'u str>) -> Vec<String> {
+        let unused = unused.into_iter().map(|name| -> &str { name });
+        let unused: Vec<&str> = self.unused.iter().map(String::as_str).chain(unused).collect();
+        let unused = (!unused.is_empty()).then(|| format!("{file}: columns not used: {}", unused.join(", ")));
+        self.remarks.iter().map(|remark| format!("{file}: {remark}")).chain(unused).collect()
+    }
+
+    /// Adds a remark, once.
+    pub(crate) fn remark(&mut self, remark: impl Into<String>) {
+        let remark = remark.into();
+        if !self.remarks.contains(&remark) {
+            self.remarks.push(remark);
+        }
+    }
+
+    /// Adds names that are not used, each once, with what would steer a terminal escaped; of very many the first.
+    pub(crate) fn not_used<'a>(&mut self, names: impl IntoIterator<Item = &'a [u8]>) {
+        for name in names {
+            if self.unused.len() > MOST_NAMES {
+                return;
+            }
+            let name = escaped(name, LONGEST_NAME);
+            if !self.unused.contains(&name) {
+                let is_full = self.unused.len() == MOST_NAMES;
+                self.unused.push(if is_full { "further ones".to_owned() } else { name });
+            }
+        }
+    }
+}
+
+/// A file that is being read.
+pub(crate) struct Reading<'a> {
+    pub(crate) params: &'a ReadParams,
+    progress: Option<&'a Progress>,
+    pub(crate) notes: Notes,
+}
+
+impl<'a> Reading<'a> {
+    pub(crate) fn new(params: &'a ReadParams, progress: Option<&'a Progress>) -> Self {
+        Self { params, progress, notes: Notes::default() }
+    }
+
+    /// Counts a fault that is mended; with [`ReadParams::strict`] it is the error that it stands for.
+    pub(crate) fn mend(
+        &mut self,
+        (fix, place, face): (Fix, Place, Option<u64>),
+        error: impl FnOnce() -> ReadError,
+    ) -> Result<(), ReadError> {
+        if self.params.strict {
+            return Err(error());
+        }
+        match self.notes.mended.iter_mut().find(|m| m.fix == fix) {
+            Some(known) => known.count += 1,
+            None => self.notes.mended.push(Mended { file: String::new(), fix, count: 1, place, face }),
+        }
+        Ok(())
+    }
+
+    /// What there is to say of the file of this name.
+    pub(crate) fn finish(mut self, file: &str) -> Notes {
+        self.notes.mended.iter_mut().for_each(|m| file.clone_into(&mut m.file));
+        self.notes
+    }
+
+    /// Looks whether the reader is to stop.
+    pub(crate) fn go_on(&self) -> Result<(), ReadError> {
+        if self.progress.is_some_and(Progress::is_cancelled) { Err(ReadError::cancelled()) } else { Ok(()) }
+    }
+}

@@ -1,0 +1,301 @@
+//! Cells of VTK (`vtk`, `vti`): bodies become a volume of their field, faces a mesh, points alone a cloud.
+
+mod kind;
+mod lists;
+mod resample;
+
+use super::selection::Selection;
+use crate::Loaded;
+use crate::error::{Place, ReadError};
+use crate::meshes::fans::Fans;
+use crate::points::direction::unit;
+use crate::points::origin;
+use crate::reading::Reading;
+use crate::stream::input;
+use kind::{Kind, Shape};
+pub(crate) use lists::Lists;
+use resample::Body;
+use splat_core::glam::{DVec3, Vec3};
+use splat_core::srgb::linear_from_srgb;
+use splat_core::text::counted;
+use splat_core::{Mesh, RawPoints, Reservation};
+use std::ops::Deref;
+
+const HINT: &str = "the file is damaged, or its header states other sizes";
+
+/// Bytes of a vertex of a surface: its place, its normal and its colour.
+const BYTES_PER_VERTEX: u64 = 3 * 12;
+
+/// Numbers of VTK's kinds of cells that a surface has.
+pub(crate) const VERTICES: u8 = 2;
+pub(crate) const LINES: u8 = 4;
+pub(crate) const STRIPS: u8 = 6;
+pub(crate) const POLYGONS: u8 = 7;
+
+/// The cells of a file.
+pub(crate) struct Cells {
+    pub(crate) points: Vec<DVec3>,
+    /// Points of each cell.
+    pub(crate) lists: Lists,
+    /// What each cell is, as VTK numbers it.
+    pub(crate) kinds: Vec<u8>,
+    /// Where they are told of.
+    pub(crate) place: Place,
+}
+
+/// The numbers that a volume shows.
+pub(crate) enum Field {
+    /// One a point.
+    Points(Vec<f64>),
+    /// One a cell.
+    Cells(Vec<f64>),
+    /// None: cells are full of 1.
+    One,
+}
+
+impl Field {
+    /// The value of a cell at one of its points.
+    fn at(&self, cell: usize, corner: u32) -> f64 {
+        match self {
+            Self::Points(values) => values[corner as usize],
+            Self::Cells(values) => values[cell],
+            Self::One => 1.0,
+        }
+    }
+}
+
+/// What points of a surface have beside their places; empty where the file has none.
+#[derive(Default)]
+pub(crate) struct PointColumns {
+    pub(crate) normal: Vec<Vec3>,
+    pub(crate) color: Vec<[f32; 3]>,
+}
+
+/// Points out of their coordinates.
+pub(crate) fn places(numbers: &[f64], place: Place, reading: &Reading<'_>) -> Result<Vec<DVec3>, ReadError> {
+    input::hold("the points of a piece", size_of_val(numbers) as u64, reading.params)?;
+    let points: Vec<DVec3> = numbers.as_chunks::<3>().0.iter().map(|p| DVec3::from_array(*p)).collect();
+    match points.iter().position(|p| !p.is_finite()) {
+        None => Ok(points),
+        Some(i) => Err(ReadError::input(place, "finite coordinates", format!("{} at point {i}", points[i]), HINT)),
+    }
+}
+
+/// Kinds of cells out of their numbers.
+pub(crate) fn kinds(numbers: &[f64], place: Place) -> Result<Vec<u8>, ReadError> {
+    let kind = |(i, number): (usize, &f64)| {
+        let fits = (0.0..=255.0).contains(number) && number.fract() == 0.0;
+        let found = || format!("{number} at cell {i}");
+        if fits {
+            Ok(*number as u8)
+        } else {
+            Err(ReadError::input(place, "types of cells from 0 to 255", found(), HINT))
+        }
+    };
+    numbers.iter().enumerate().map(kind).collect()
+}
+
+/// Refuses an array that has not as many tuples as there are points or cells.
+pub(crate) fn check_count((found, count, what): (u64, usize, &str), place: Place) -> Result<(), ReadError> {
+    if found == count as u64 {
+        return Ok(());
+    }
+    Err(ReadError::input(
+        place,
+        format!("{}, one for each of the {what}", counted(count as u64, "value")),
+        found.to_string(),
+        HINT,
+    ))
+}
+
+/// The field of an array of that name, of points or of cells: one number of each tuple.
+pub(crate) fn field(
+    (numbers, selection): (&[f64], &Selection),
+    (name, of_points): (&str, bool),
+    place: Place,
+    reading: &mut Reading<'_>,
+) -> Result<Field, ReadError> {
+    let (params, notes) = (reading.params, &mut reading.notes);
+    let tuples = numbers.chunks_exact(selection.numbers as usize);
+    input::hold("the field", 8 * tuples.len() as u64, params)?;
+    let values: Vec<f64> = tuples.map(|tuple| selection.value.of(|i| tuple[i])).collect();
+    if let Some(i) = values.iter().position(|v| (*v as f32).is_infinite()) {
+        let found = format!("{} at value {i} of {name}", values[i]);
+        let hint = "scale the values, or write NaN where there is none: it draws nothing";
+        return Err(ReadError::input(place, "values that fit 32-bit floats", found, hint));
+    }
+    notes.remarks.push(format!("the field is {name}, of the {}", if of_points { "points" } else { "cells" }));
+    Ok(if of_points { Field::Points(values) } else { Field::Cells(values) })
+}
+
+/// Unit normals out of three numbers each, zero for what is none.
+pub(crate) fn normals(numbers: &[f64]) -> Vec<Vec3> {
+    let normal = |n: &[f64; 3]| if n.iter().all(|c| c.is_finite()) { unit(DVec3::from_array(*n)) } else { Vec3::ZERO };
+    numbers.as_chunks().0.iter().map(normal).collect()
+}
+
+/// Linear colours out of three or four numbers each, sRGB from 0 to `top`.
+pub(crate) fn colors(numbers: &[f64], each: u64, top: f64) -> Vec<[f32; 3]> {
+    let color = |c: &[f64]| std::array::from_fn(|i| linear_from_srgb((c[i] / top).clamp(0.0, 1.0)));
+    numbers.chunks_exact(each as usize).map(color).collect()
+}
+
+impl Cells {
+    /// Cells of one kind behind the others.
+    pub(crate) fn append(&mut self, lists: &Lists, kind: u8) {
+        self.kinds.extend(std::iter::repeat_n(kind, lists.len()));
+        self.lists.append(lists, 0);
+    }
+
+    /// The points and the cells of another piece of the same dataset behind these.
+    pub(crate) fn join(&mut self, other: Self, reading: &Reading<'_>) -> Result<(), ReadError> {
+        let points = (self.points.len() + other.points.len()) as u64;
+        input::hold("the points of all pieces", points * size_of::<DVec3>() as u64, reading.params)?;
+        let Some(first) = u32::try_from(points).ok().and(u32::try_from(self.points.len()).ok()) else {
+            let expected = format!("at most {} points in all pieces", u32::MAX);
+            return Err(ReadError::input(other.place, expected, points.to_string(), HINT));
+        };
+        let cells = (self.kinds.len() + other.kinds.len()) as u64;
+        input::hold("the cells of all pieces", self.lists.bytes() + other.lists.bytes() + cells, reading.params)?;
+        input::reserve(&mut self.points, other.points.len())?;
+        self.points.extend(other.points);
+        self.lists.append(&other.lists, first);
+        self.kinds.extend(other.kinds);
+        Ok(())
+    }
+
+    /// Whether some cell encloses a volume.
+    pub(crate) fn has_bodies(&self) -> bool {
+        self.kinds.iter().any(|number| Kind::of(*number).is_some_and(|kind| matches!(kind.shape, Shape::Body(_))))
+    }
+
+    /// Refuses cells that are not read, and those that have not as many points as their kind.
+    pub(crate) fn check(&self) -> Result<(), ReadError> {
+        if self.kinds.len() != self.lists.len() {
+            let (expected, found) = (format!("{} kinds of cells", self.lists.len()), self.kinds.len().to_string());
+            return Err(ReadError::input(self.place, expected, found, HINT));
+        }
+        for (i, (number, corners)) in self.kinds.iter().zip(self.lists.iter()).enumerate() {
+            let Some(kind) = Kind::of(*number) else {
+                let hint = "read are tetrahedra, hexahedra, voxels, wedges, pyramids and flat cells; ParaView's filter Tetrahedralize makes \
+                    such of others";
+                let found = format!("{} (type {number}) at cell {i}", kind::unread(*number));
+                return Err(ReadError::input(self.place, "cells of straight edges", found, hint));
+            };
+            if kind.corners.is_some_and(|n| n != corners.len()) {
+                let expected = format!("{} points of cell {i}, a {}", kind.corners.unwrap_or(0), kind.name);
+                return Err(ReadError::input(self.place, expected, corners.len().to_string(), HINT));
+            }
+        }
+        Ok(())
+    }
+
+    /// What the cells are: a volume, a mesh or points.
+    pub(crate) fn loaded(
+        self,
+        field: Field,
+        columns: PointColumns,
+        reading: &mut Reading<'_>,
+    ) -> Result<Loaded, ReadError> {
+        if self.has_bodies() {
+            let flat = self.kinds.len() - self.bodies().count();
+            if flat > 0 {
+                reading.notes.not_used([format!("{} without a volume", counted(flat as u64, "cell")).as_bytes()]);
+            }
+            if matches!(field, Field::One) {
+                reading.notes.remarks.push("cells without a field of numbers: they are full of 1".to_owned());
+            }
+            let count = self.bodies().count() as u64;
+            input::hold("the bodies", count * size_of::<Body<'_>>() as u64, reading.params)?;
+            let bodies: Vec<Body<'_>> = self.bodies().collect();
+            return resample::grid((&self.points, &bodies, self.place), &field, reading).map(Loaded::Grid);
+        }
+        let PointColumns { normal, color } = columns;
+        let (fans, lines) = self.fans(reading)?;
+        if lines > 0 {
+            reading.notes.not_used([counted(lines as u64, "line").as_bytes()]);
+        }
+        input::hold("the vertices", self.points.len() as u64 * BYTES_PER_VERTEX, reading.params)?;
+        let (origin, position) = origin::relative(&self.points, self.place, |i| format!("point {i}"))?;
+        let Some(fans) = fans else {
+            return Ok(Loaded::Points(RawPoints { origin, position, normal, color, ..RawPoints::default() }));
+        };
+        // Normals of which one is zero are left out: they are to be computed anew.
+        let normal = if normal.contains(&Vec3::ZERO) { Vec::new() } else { normal };
+        let vertices = Mesh { origin, position, normal, color, triangles: Vec::new() };
+        fans.into_mesh(vertices, reading).map(Loaded::Mesh)
+    }
+
+    /// The cells that enclose a volume, each with its rank among all cells.
+    fn bodies(&self) -> impl Iterator<Item = Body<'_>> {
+        self.kinds.iter().zip(self.lists.iter()).enumerate().filter_map(|(cell, (number, corners))| {
+            let Shape::Body(faces) = Kind::of(*number)?.shape else { return None };
+            Some(Body { cell, corners, faces })
+        })
+    }
+
+    /// The faces, if there are some, and the number of lines.
+    fn fans(&self, reading: &mut Reading<'_>) -> Result<(Option<Fans>, usize), ReadError> {
+        let (mut fans, mut faces, mut lines) = (Fans::default(), 0, 0);
+        for (i, (number, corners)) in self.kinds.iter().zip(self.lists.iter()).enumerate() {
+            let mut add = |corners: &[u32], reading: &mut Reading<'_>| fans.add(i as u64, corners, self.place, reading);
+            match Kind::of(*number).map(|kind| kind.shape) {
+                Some(Shape::Face) => add(corners, reading)?,
+                // Its second row runs the other way.
+                Some(Shape::Pixel) => add(&[corners[0], corners[1], corners[3], corners[2]], reading)?,
+                Some(Shape::Strip) => {
+                    for (k, t) in corners.windows(3).enumerate() {
+                        add(&if k % 2 == 0 { [t[0], t[1], t[2]] } else { [t[1], t[0], t[2]] }, reading)?;
+                    }
+                }
+                Some(Shape::Line) => {
+                    lines += 1;
+                    continue;
+                }
+                _ => continue,
+            }
+            faces += 1;
+        }
+        Ok(((faces > 0).then_some(fans), lines))
+    }
+}
+
+/// Numbers of an array, with the memory that they take.
+pub(crate) struct Numbers {
+    pub(crate) all: Vec<f64>,
+    held: Reservation,
+}
+
+impl Numbers {
+    /// Room for so many numbers of the file, which is known to hold them.
+    pub(crate) fn room(count: u64, reading: &Reading<'_>) -> Result<Self, ReadError> {
+        let held = reading.params.memory.take(NUMBERS, 0)?;
+        let mut numbers = Self { all: Vec::new(), held };
+        numbers.reserve(count)?;
+        Ok(numbers)
+    }
+
+    /// Room for so many more.
+    pub(crate) fn reserve(&mut self, more: u64) -> Result<(), ReadError> {
+        let count = (self.all.len() as u64).saturating_add(more);
+        self.held.set(NUMBERS, count.saturating_mul(size_of::<f64>() as u64))?;
+        input::reserve(&mut self.all, more as usize)
+    }
+}
+
+impl Deref for Numbers {
+    type Target = [f64];
+
+    fn deref(&self) -> &[f64] {
+        &self.all
+    }
+}
+
+/// The entry of [`Numbers`] in the account of memory.
+const NUMBERS: &str = "the numbers of an array";
+
+/// Memory of the cells of a piece: so many cells with so many points of cells.
+pub(crate) fn hold_lists(cells: usize, corners: usize, reading: &Reading<'_>) -> Result<(), ReadError> {
+    let bytes = cells * (size_of::<usize>() + size_of::<u8>()) + corners * size_of::<u32>();
+    input::hold("the cells of a piece", bytes as u64, reading.params)
+}

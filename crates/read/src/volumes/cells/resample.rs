@@ -1,0 +1,402 @@
+//! A field over bodies → a volume that tiles their bounds.
+//!
+//! A voxel is the mean of eight samples, in the middles of its eighths: those within a body have its field there, those within none
+//! the value outside. So a field that is linear over a voxel's cells has its value at the voxel's middle, and the volume has the
+//! integral of the field but for the samples that a border parts. Bodies are parted into tetrahedra around their middle and the middles of
+//! their faces, which neighbours agree on; the field is linear in each. A sample belongs to the first body that it lies in.
+
+use super::{Field, HINT};
+use crate::error::{Place, ReadError};
+use crate::reading::Reading;
+use crate::stream::input;
+use crate::volumes::lattice;
+use rayon::prelude::*;
+use splat_core::Grid;
+use splat_core::glam::{DMat3, DVec3, DVec4};
+use splat_core::text::counted;
+
+/// Voxels of the volume: no fewer in its bounds, and no more.
+const FEWEST: f64 = 64.0 * 64.0 * 64.0;
+const MOST: f64 = 256.0 * 256.0 * 256.0;
+/// Voxels along an axis, at most: of cells in a row that is far longer they are so long that the volume is refused.
+const MOST_ALONG: f64 = 65536.0;
+/// Voxels of a body of mean size, between those.
+const VOXELS_PER_BODY: f64 = 8.0;
+/// Samples of a voxel along an axis.
+const SAMPLES: usize = 2;
+/// By what a sample is multiplied in the sum of its voxel, a power of two: differences of values may be twice as large as a value, and sums of so
+/// many fit single precision nevertheless.
+const SHARE: f64 = 0.5 / (SAMPLES * SAMPLES * SAMPLES) as f64;
+/// Parts of the volume that are filled side by side, whatever the number of threads.
+const PARTS: usize = 16;
+/// Rows of samples that are looked at, and samples, for each sample that there is, at most; and how many in any case. Cells that lie side
+/// by side stay far below; such as lie on each other a thousandfold would take minutes.
+const MOST_WORK: f64 = 256.0;
+const FREE_WORK: f64 = (1u64 << 28) as f64;
+/// How far outside a tetrahedron a sample may lie, in barycentric coordinates: between two neighbours nothing is left out.
+const SLACK: f64 = 1e-9;
+
+/// A cell that encloses a volume.
+pub(super) struct Body<'a> {
+    /// Its rank among all cells.
+    pub(super) cell: usize,
+    pub(super) corners: &'a [u32],
+    /// Faces around it; a tetrahedron has none and is itself.
+    pub(super) faces: &'static [&'static [u8]],
+}
+
+/// Places and values of the corners of a tetrahedron.
+type Tetrahedron = [(DVec3, f64); 4];
+
+impl Body<'_> {
+    /// Gives the tetrahedra of the body to `take`.
+    fn part(&self, corner: &impl Fn(u32) -> (DVec3, f64), mut take: impl FnMut(&Tetrahedron)) {
+        let at = |i: u8| corner(self.corners[usize::from(i)]);
+        if self.faces.is_empty() {
+            return take(&[at(0), at(1), at(2), at(3)]);
+        }
+        let middle = mean((0..self.corners.len() as u8).map(at));
+        for face in self.faces {
+            match *face {
+                [a, b, c] => take(&[middle, at(*a), at(*b), at(*c)]),
+                _ => {
+                    let center = mean(face.iter().map(|i| at(*i)));
+                    for (i, a) in face.iter().enumerate() {
+                        take(&[middle, center, at(*a), at(face[(i + 1) % face.len()])]);
+                    }
+                }
+            }
+        }
+    }
+}
+
+fn mean(corners: impl Iterator<Item = (DVec3, f64)> + Clone) -> (DVec3, f64) {
+    let count = corners.clone().count() as f64;
+    let (place, value) = corners.fold((DVec3::ZERO, 0.0), |(p, v), (q, w)| (p + q, v + w));
+    (place / count, value / count)
+}
+
+/// Six times the volume, negative for one that is inside out.
+fn volume([a, b, c, d]: &Tetrahedron) -> f64 {
+    (b.0 - a.0).cross(c.0 - a.0).dot(d.0 - a.0)
+}
+
+/// The volume of a field over bodies, whose cells are told of at a place.
+pub(super) fn grid(
+    (points, bodies, place): (&[DVec3], &[Body<'_>], Place),
+    field: &Field,
+    reading: &mut Reading<'_>,
+) -> Result<Grid, ReadError> {
+    let bounds = Bounds::of(points, bodies).ok_or_else(|| {
+        let found = "cells that are flat, or too small or too large for their volume to be a number";
+        ReadError::input(
+            place,
+            "cells that enclose a volume",
+            found,
+            "check the places of the points, or scale the data",
+        )
+    })?;
+    let dims = bounds.dims(bodies.len() as f64);
+    let step = bounds.size / DVec3::from_array(dims.map(|n| n as f64));
+    let (origin, axes) = (bounds.low + 0.5 * step, DMat3::from_diagonal(step));
+    lattice::check(origin, &axes, place, HINT)?;
+    let least = bodies.iter().flat_map(|body| body.corners.iter().map(|corner| field.at(body.cell, *corner)));
+    let outside = least.fold(0.0, f64::min);
+    let lattice = Lattice { low: bounds.low, sample: step / SAMPLES as f64, dims, outside };
+    lattice.check_work(points, bodies, bounds.volume)?;
+    let values = lattice.filled((points, bodies), field, reading)?;
+    let ([x, y, z], cells) = (dims, counted(bodies.len() as u64, "cell"));
+    let remarks = &mut reading.notes.remarks;
+    remarks.push(format!("{cells}, sampled as {x} x {y} x {z} voxels; outside them the value is {outside}"));
+    match bounds.folded {
+        0 => {}
+        folded => remarks.push(format!("{folded} of the cells are folded; what they cover twice counts once")),
+    }
+    Ok(Grid { origin, axes, dims, values })
+}
+
+/// Where the bodies lie.
+struct Bounds {
+    low: DVec3,
+    size: DVec3,
+    /// Of all bodies together.
+    volume: f64,
+    /// Bodies of which some tetrahedra are inside out and others not.
+    folded: usize,
+}
+
+impl Bounds {
+    /// `None` without a volume, or for one that is no number.
+    fn of(points: &[DVec3], bodies: &[Body<'_>]) -> Option<Self> {
+        let place = |corner: u32| (points[corner as usize], 0.0);
+        let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        let (mut sum, mut folded) = (0.0, 0);
+        for body in bodies {
+            let (mut right, mut wrong) = (0.0, 0.0);
+            body.part(&place, |t| match volume(t) {
+                v if v < 0.0 => wrong -= v,
+                v => right += v,
+            });
+            sum += (right + wrong) / 6.0;
+            // Faces that are not quite flat may part off next to nothing.
+            folded += usize::from(f64::min(right, wrong) > 1e-6 * f64::max(right, wrong));
+            for corner in body.corners {
+                (low, high) = (low.min(place(*corner).0), high.max(place(*corner).0));
+            }
+        }
+        let size = high - low;
+        let fits = |v: f64| (1e-280..1e280).contains(&v);
+        (fits(sum) && fits(size.element_product())).then_some(Self { low, size, volume: sum, folded })
+    }
+
+    /// Voxels along each axis for so many bodies.
+    fn dims(&self, bodies: f64) -> [usize; 3] {
+        let all = self.size.element_product();
+        let of_a_body = libm::cbrt(self.volume / (bodies * VOXELS_PER_BODY));
+        let mut step = of_a_body.min(libm::cbrt(all / FEWEST)).max(libm::cbrt(all / MOST));
+        loop {
+            let dims = (self.size / step).round().max(DVec3::ONE);
+            // Along a short side there is one voxel more than would be its share.
+            if dims.element_product() <= 1.1 * MOST && dims.max_element() <= MOST_ALONG {
+                return dims.to_array().map(|n| n as usize);
+            }
+            step *= 1.25;
+        }
+    }
+}
+
+/// The samples of a volume.
+struct Lattice {
+    /// The corner of the bounds.
+    low: DVec3,
+    /// From one sample to the next.
+    sample: DVec3,
+    /// Voxels.
+    dims: [usize; 3],
+    /// Value of the samples within no body.
+    outside: f64,
+}
+
+/// Planes of voxels that are filled by one task.
+struct Part<'a> {
+    /// The first and the last sample along z.
+    samples: [f64; 2],
+    /// Sums of the samples of each voxel, above the value outside, times [`SHARE`].
+    sums: &'a mut [f32],
+    /// Samples of each voxel that lie within a body.
+    taken: &'a mut [u8],
+}
+
+impl Lattice {
+    /// The values of all voxels.
+    fn filled(
+        &self,
+        (points, bodies): (&[DVec3], &[Body<'_>]),
+        field: &Field,
+        reading: &Reading<'_>,
+    ) -> Result<Vec<f32>, ReadError> {
+        let [nx, ny, nz] = self.dims;
+        let count = nx * ny * nz;
+        let bytes = count * (size_of::<f32>() + size_of::<u8>());
+        input::hold("the voxels", bytes as u64, reading.params)?;
+        let (mut sums, mut taken) = (Vec::new(), Vec::new());
+        input::reserve(&mut sums, count)?;
+        input::reserve(&mut taken, count)?;
+        sums.resize(count, 0f32);
+        taken.resize(count, 0u8);
+        let planes = nz.div_ceil(PARTS);
+        let parts = sums.par_chunks_mut(nx * ny * planes).zip(taken.par_chunks_mut(nx * ny * planes)).enumerate();
+        parts.try_for_each(|(i, (sums, taken))| {
+            reading.go_on()?;
+            let [first, end] = [i * planes, (i + 1) * planes].map(|plane| (plane.min(nz) * SAMPLES) as f64);
+            let mut part = Part { samples: [first, end - 1.0], sums, taken };
+            for body in bodies {
+                let heights = body.corners.iter().map(|corner| points[*corner as usize].z - self.low.z);
+                let (from, to) = heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), z| (l.min(z), h.max(z)));
+                if to >= first * self.sample.z && from <= end * self.sample.z {
+                    let value = |corner: u32| field.at(body.cell, corner) - self.outside;
+                    let corner = |c: u32| (points[c as usize] - self.low, value(c));
+                    body.part(&corner, |t| self.fill(t, &mut part));
+                }
+            }
+            Ok::<(), ReadError>(())
+        })?;
+        drop(taken);
+        // A sum that was rounded may lie a little beyond the largest value.
+        let (low, high) = (f64::from(f32::MIN), f64::from(f32::MAX));
+        sums.par_iter_mut().for_each(|v| *v = (self.outside + 2.0 * f64::from(*v)).clamp(low, high) as f32);
+        Ok(sums)
+    }
+
+    /// Refuses bodies of that volume together which overlap so often that most of the work would be for nothing.
+    fn check_work(&self, points: &[DVec3], bodies: &[Body<'_>], volume: f64) -> Result<(), ReadError> {
+        let place = |corner: u32| (points[corner as usize] - self.low, 0.0);
+        let mut rows = 0.0;
+        for body in bodies {
+            body.part(&place, |t| {
+                let (low, high) = t.iter().fold((t[0].0, t[0].0), |(l, h), (p, _)| (l.min(*p), h.max(*p)));
+                let across = ((high - low) / self.sample).ceil() + 1.0;
+                rows += across.y * across.z;
+            });
+        }
+        let samples = self.dims.iter().map(|n| (n * SAMPLES) as f64).product::<f64>();
+        let work = rows + volume / self.sample.element_product();
+        if work <= FREE_WORK.max(MOST_WORK * samples) {
+            return Ok(());
+        }
+        let bounds = self.sample.element_product() * samples;
+        let found = format!(
+            "{} whose volumes are {:.0} times that of their bounds",
+            counted(bodies.len() as u64, "cell"),
+            volume / bounds
+        );
+        let hint = "remove the cells that lie on others, or draw pieces of the dataset one by one";
+        Err(ReadError::limit("cells that lie side by side", found, hint))
+    }
+
+    /// Takes the samples that lie within a tetrahedron and in no body before it.
+    fn fill(&self, tetrahedron: &Tetrahedron, part: &mut Part<'_>) {
+        let [a, b, c, d] = tetrahedron.map(|(place, _)| place);
+        let values = tetrahedron.map(|(_, value)| value);
+        let edges = DMat3::from_cols(b - a, c - a, d - a);
+        let determinant = edges.determinant();
+        if !(determinant.is_finite() && determinant != 0.0) {
+            return;
+        }
+        // Barycentric coordinates of the first sample of a row, and what each step adds.
+        let inverse = edges.inverse();
+        let weights = |w: DVec3| DVec4::new(-w.element_sum(), w.x, w.y, w.z);
+        let along = weights(inverse.x_axis * self.sample.x);
+        let (least, most) = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, m), v| (l.min(*v), m.max(*v)));
+        let [nx, ny, _] = self.dims;
+        let first = (a.min(b).min(c).min(d) / self.sample - 0.5).ceil().max(DVec3::ZERO);
+        let last = (a.max(b).max(c).max(d) / self.sample - 0.5).floor();
+        let last = last.min(DVec3::new((nx * SAMPLES - 1) as f64, (ny * SAMPLES - 1) as f64, part.samples[1]));
+        let rows = |from: f64, to: f64| if from <= to { from as usize..to as usize + 1 } else { 0..0 };
+        for k in rows(first.z.max(part.samples[0]), last.z) {
+            for j in rows(first.y, last.y) {
+                let row = (DVec3::new(0.0, j as f64, k as f64) + 0.5) * self.sample;
+                let before = DVec4::X + weights(inverse * (row - a));
+                let (from, to) = inside(before, along, (first.x, last.x));
+                let plane = k / SAMPLES - part.samples[0] as usize / SAMPLES;
+                for i in rows(from.ceil(), to.floor()) {
+                    let voxel = i / SAMPLES + nx * (j / SAMPLES + ny * plane);
+                    let bit = 1 << (i % SAMPLES + SAMPLES * (j % SAMPLES + SAMPLES * (k % SAMPLES)));
+                    if part.taken[voxel] & bit == 0 {
+                        part.taken[voxel] |= bit;
+                        let value = (before + i as f64 * along).dot(DVec4::from_array(values));
+                        part.sums[voxel] += (value.clamp(least, most) * SHARE) as f32;
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// From where to where a row lies within all four faces, of a range of it.
+fn inside(before: DVec4, along: DVec4, range: (f64, f64)) -> (f64, f64) {
+    before.to_array().into_iter().zip(along.to_array()).fold(range, |(from, to), (before, along)| {
+        let crossing = (-SLACK - before) / along;
+        match along {
+            _ if along > 0.0 => (from.max(crossing), to),
+            _ if along < 0.0 => (from, to.min(crossing)),
+            _ if before < -SLACK => (1.0, 0.0),
+            _ => (from, to),
+        }
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ReadParams;
+
+    /// A hexahedron from `low` to `high`, as VTK orders its corners.
+    const HEXAHEDRON: &[&[u8]] =
+        &[&[0, 3, 2, 1], &[4, 5, 6, 7], &[0, 1, 5, 4], &[1, 2, 6, 5], &[2, 3, 7, 6], &[3, 0, 4, 7]];
+
+    fn block(low: DVec3, high: DVec3) -> Vec<DVec3> {
+        let ends = [low, high];
+        let corners = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]];
+        corners.iter().map(|[x, y, z]| DVec3::new(ends[*x].x, ends[*y].y, ends[*z].z)).collect()
+    }
+
+    fn sampled(points: &[DVec3], bodies: &[Body<'_>], field: &Field) -> Grid {
+        grid((points, bodies, Place::File), field, &mut Reading::new(&ReadParams::default(), None)).unwrap()
+    }
+
+    fn mass(grid: &Grid) -> f64 {
+        grid.values.iter().map(|v| f64::from(*v)).sum::<f64>() * grid.cell_volume()
+    }
+
+    #[test]
+    fn a_linear_field_stays_linear_and_keeps_its_integral() {
+        for shift in [0.0, 1e7] {
+            let points = block(DVec3::splat(shift), DVec3::new(3.0, 1.0, 2.0) + shift);
+            let linear = |p: DVec3| 1.0 + (p - shift).dot(DVec3::new(2.0, -0.5, 0.25));
+            let field = Field::Points(points.iter().map(|p| linear(*p)).collect());
+            let corners: Vec<u32> = (0..8).collect();
+            let grid = sampled(&points, &[Body { cell: 0, corners: &corners, faces: HEXAHEDRON }], &field);
+            let [nx, ny, _] = grid.dims;
+            for (n, v) in grid.values.iter().enumerate() {
+                let lattice = DVec3::new((n % nx) as f64, (n / nx % ny) as f64, (n / nx / ny) as f64);
+                let expected = linear(grid.origin + grid.axes * lattice);
+                assert!((f64::from(*v) - expected).abs() < 2e-6 * 7.0, "{v} for {expected}");
+            }
+            let expected = 6.0 * linear(DVec3::new(1.5, 0.5, 1.0) + shift);
+            assert!((mass(&grid) / expected - 1.0).abs() < 1e-6, "{}", mass(&grid));
+        }
+    }
+
+    #[test]
+    fn values_as_large_as_single_precision_has_them_stay_numbers() {
+        let (points, corners) = (block(DVec3::ZERO, DVec3::ONE), (0..8).collect::<Vec<u32>>());
+        let sampled = |largest: f32| {
+            let signs = [1.0, -1.0, 1.0, 1.0, 1.0, -1.0, 1.0, 1.0];
+            let field = Field::Points(signs.map(|sign| sign * f64::from(largest)).to_vec());
+            sampled(&points, &[Body { cell: 0, corners: &corners, faces: HEXAHEDRON }], &field).values
+        };
+        let (small, large) = (sampled(1.0), sampled(f32::MAX));
+        assert!(large.iter().zip(&small).all(|(l, s)| (l / f32::MAX - s).abs() < 1e-6), "{large:?}");
+    }
+
+    /// Its border runs through voxels: of the samples that it parts half belong to it.
+    #[test]
+    fn a_tetrahedron_keeps_its_volume_inside_out_too() {
+        let points = [DVec3::ZERO, DVec3::new(1.0, 0.1, 0.0), DVec3::new(0.2, 0.9, 0.1), DVec3::new(0.3, 0.2, 1.1)];
+        let expected = volume(&points.map(|p| (p, 0.0))) / 6.0;
+        for corners in [[0, 1, 2, 3], [0, 2, 1, 3]] {
+            let body = Body { cell: 0, corners: &corners, faces: &[] };
+            let grid = sampled(&points, &[body], &Field::One);
+            assert!((mass(&grid) / expected - 1.0).abs() < 5e-3, "{} for {expected}", mass(&grid));
+            assert!(grid.values.iter().all(|v| (0.0..=1.0).contains(v)));
+        }
+    }
+
+    #[test]
+    fn cells_side_by_side_leave_no_gap_and_count_nothing_twice() {
+        let n = 5;
+        let at = |i: usize| DVec3::new((i % 6) as f64, (i / 6 % 6) as f64, (i / 36) as f64);
+        // Inner points are moved, so that faces are not flat.
+        let moved = |p: DVec3| {
+            let wave = DVec3::new(libm::sin(3.0 * p.y + p.z), libm::sin(5.0 * p.z + p.x), libm::sin(4.0 * p.x + p.y));
+            let is_inner = p.min_element() > 0.0 && p.max_element() < 5.0;
+            if is_inner { p + 0.2 * wave } else { p }
+        };
+        let points: Vec<DVec3> = (0..216).map(|i| moved(at(i))).collect();
+        let lists: Vec<[u32; 8]> = (0..n * n * n)
+            .map(|c| {
+                let first = c % n + 6 * (c / n % n) + 36 * (c / n / n);
+                [0, 1, 7, 6, 36, 37, 43, 42].map(|step| (first + step) as u32)
+            })
+            .collect();
+        let bodies = |order: &[usize]| -> Vec<Body<'_>> {
+            order.iter().map(|c| Body { cell: *c, corners: &lists[*c], faces: HEXAHEDRON }).collect()
+        };
+        let forth: Vec<usize> = (0..lists.len()).collect();
+        let grid = sampled(&points, &bodies(&forth), &Field::One);
+        assert!(grid.values.iter().all(|v| *v == 1.0));
+        let back: Vec<usize> = forth.iter().rev().copied().collect();
+        assert_eq!(sampled(&points, &bodies(&back), &Field::One), grid);
+    }
+}

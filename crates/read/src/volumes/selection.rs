@@ -1,0 +1,148 @@
+//! Which of a file's numbers are the volume: one frame of a series, and one number for each voxel.
+
+use super::voxels::Kind;
+use crate::error::{Place, ReadError};
+use crate::{Notes, ReadParams};
+
+/// Weights of red, green and blue in the luma of ITU-R BT.709.
+const LUMA: [f64; 3] = [0.2126, 0.7152, 0.0722];
+
+/// What of a voxel's numbers, which lie side by side, is its value.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Value {
+    /// One of them, counted from 0.
+    Number(u64),
+    /// The luma of the first three, as they are stored: of one grey it is the number that stands for it.
+    Luma,
+}
+
+impl Value {
+    /// The value of a voxel with these numbers.
+    pub(crate) fn of(self, number: impl Fn(usize) -> f64) -> f64 {
+        match self {
+            Self::Number(i) => number(i as usize),
+            Self::Luma => LUMA.iter().enumerate().map(|(i, weight)| weight * number(i)).sum(),
+        }
+    }
+}
+
+/// An array of a file, as far as choosing one needs it.
+#[cfg(any(feature = "vti", feature = "vtk"))]
+pub(crate) struct Candidate {
+    /// Its name, with control characters escaped.
+    pub(crate) name: String,
+    /// Numbers of a tuple, and their type.
+    pub(crate) numbers: u64,
+    pub(crate) kind: Option<Kind>,
+    /// Whether the file says that it is the one to show.
+    pub(crate) is_named: bool,
+}
+
+#[cfg(any(feature = "vti", feature = "vtk"))]
+impl Candidate {
+    /// Whether it is a field of numbers, or of colours.
+    fn is_field(&self) -> bool {
+        let is_color = matches!(self.numbers, 3 | 4) && matches!(self.kind, Some(Kind::U8 | Kind::U16));
+        self.numbers == 1 || is_color
+    }
+}
+
+/// Rank of the array that is the field: the one that `params` name, else the one that the file does, else the first of one number a tuple, or of
+/// colours. Says what else could be chosen. `None` without arrays.
+#[cfg(any(feature = "vti", feature = "vtk"))]
+pub(crate) fn chosen_array(
+    all: &[Candidate],
+    place: Place,
+    params: &ReadParams,
+    notes: &mut Notes,
+) -> Result<Option<usize>, ReadError> {
+    let names = |but: usize| {
+        let others = all.iter().enumerate().filter(|(rank, array)| *rank != but && array.is_field());
+        others.map(|(_, array)| array.name.as_str()).collect::<Vec<_>>().join(", ")
+    };
+    if let Some(name) = &params.array {
+        let rank = all.iter().position(|array| array.name == splat_core::text::escaped(name.as_bytes(), 40));
+        return rank.map(Some).ok_or_else(|| {
+            let expected = format!("an array among {}", names(all.len()));
+            let found = format!("'{}'", splat_core::text::escaped(name.as_bytes(), 40));
+            ReadError::input(place, expected, found, "choose one of these; `organza info` names all arrays")
+        });
+    }
+    let named = all.iter().position(|array| array.is_named);
+    let Some(rank) =
+        named.or_else(|| all.iter().position(Candidate::is_field)).or(if all.is_empty() { None } else { Some(0) })
+    else {
+        return Ok(None);
+    };
+    let others = names(rank);
+    if !others.is_empty() {
+        let shown = &all[rank].name;
+        notes.remark(format!("the array {shown} is drawn; `array` of a scene or --color-by chooses another: {others}"));
+    }
+    Ok(Some(rank))
+}
+
+/// The part of the stored numbers that is read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Selection {
+    /// Volumes that lie one behind the other.
+    pub(crate) frames: u64,
+    /// Which of them, from 0.
+    pub(crate) frame: u64,
+    /// Numbers of a voxel.
+    pub(crate) numbers: u64,
+    pub(crate) value: Value,
+}
+
+impl Selection {
+    /// The frame that `params` ask for, of so many volumes one behind the other; 1 where the format has no series. Says which, if there
+    /// are several.
+    pub(crate) fn of_frames(
+        frames: u64,
+        place: Place,
+        params: &ReadParams,
+        notes: &mut Notes,
+    ) -> Result<Self, ReadError> {
+        let frame = params.frame;
+        if frame >= frames {
+            let expected = match frames {
+                1 => "`frame` 0, as the file has one volume".to_owned(),
+                _ => format!("a `frame` from 0 to {}, as the file has {frames} volumes", frames.saturating_sub(1)),
+            };
+            return Err(ReadError::input(place, expected, format!("`frame` {frame}"), "choose another `frame`"));
+        }
+        if frames > 1 {
+            notes.remarks.push(format!("frame {frame} of {frames}; `frame` chooses another"));
+        }
+        Ok(Self { frames, frame, numbers: 1, value: Value::Number(0) })
+    }
+
+    /// The same frame where the voxels have the numbers of all frames side by side.
+    pub(crate) fn mingled(self) -> Self {
+        Self { frames: 1, frame: 0, numbers: self.frames, value: Value::Number(self.frame) }
+    }
+
+    /// The same with `numbers` a voxel, which is a colour if they are three or four and `declared` to be one, or unsigned
+    /// integers of 8 or 16 bits; other vectors are refused.
+    pub(crate) fn with_numbers(
+        self,
+        (numbers, kind, declared): (u64, Kind, bool),
+        place: Place,
+        notes: &mut Notes,
+    ) -> Result<Self, ReadError> {
+        if numbers == 1 {
+            return Ok(self);
+        }
+        let stands_for_color = declared || matches!(kind, Kind::U8 | Kind::U16);
+        if !(matches!(numbers, 3 | 4) && stands_for_color) {
+            let expected = "one number a voxel, or a colour: three or four unsigned integers of 8 or 16 bits";
+            let found = format!("{numbers} numbers of {} bytes a voxel", kind.size());
+            let hint = "write one component, or the length of the vectors, as an array or a volume of its own";
+            return Err(ReadError::input(place, expected, found, hint));
+        }
+        let alpha = if numbers == 4 { "; alpha is not used" } else { "" };
+        let luma = "colours: read is their luma, 0.2126 R + 0.7152 G + 0.0722 B of the numbers as they are stored";
+        notes.remarks.push(format!("{luma}{alpha}"));
+        Ok(Self { numbers, value: Value::Luma, ..self })
+    }
+}

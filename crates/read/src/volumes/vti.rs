@@ -1,0 +1,251 @@
+//! VTK files in XML: images (`.vti`) and cells (`.vtu`) → a volume of scalars, of colours their luma; surfaces (`.vtp`) → a mesh.
+//!
+//! Arrays as text, in base64 or appended, raw or in base64, each also in blocks of zlib. Read is the array that is asked for, else the one
+//! that `Scalars` names, else the first of one number, of the points, else of the cells; others are named.
+
+mod data;
+mod piece;
+
+use super::lattice;
+use super::selection::{Candidate, Selection, chosen_array};
+use super::voxels::{Kind, Stored};
+use crate::error::{Place, ReadError};
+use crate::reading::Reading;
+use crate::stream::input;
+use crate::text::xml;
+use crate::{Loaded, Notes, ReadParams};
+use data::{Appended, Encoding};
+use roxmltree::{Document, Node};
+use splat_core::Grid;
+use splat_core::glam::{DMat3, DVec3};
+use splat_core::text::escaped;
+
+const HINT: &str = "the file is truncated or damaged, or its header states other sizes";
+
+/// What to do with datasets that are not read.
+const OTHER_DATASETS: &str = "other datasets of VTK are not read: in ParaView, Resample To Image and save it as .vti, or Append Datasets and save it as .vtu";
+
+/// Most elements, attributes and texts of a file; real ones have some dozens.
+const MAX_NODES: u32 = 10_000;
+
+/// Datasets that are read.
+const DATASETS: [&str; 3] = ["ImageData", "UnstructuredGrid", "PolyData"];
+
+/// Reads a file.
+pub(crate) fn read(content: &[u8], reading: &mut Reading<'_>) -> Result<Loaded, ReadError> {
+    let (appended, text) = Appended::split(content)?;
+    input::hold("the description", if appended.is_some() { text.len() as u64 } else { 0 }, reading.params)?;
+    let document = xml::parse(&text, MAX_NODES).map_err(|e| {
+        let line = e.line.map(|(line, column)| Place::Line { line: line.into(), column: column.into() });
+        ReadError::input(line.unwrap_or(Place::Byte(e.byte as u64)), e.expected, e.found, HINT)
+    })?;
+    let dataset = dataset(&document)?;
+    let encoding = Encoding::of(document.root_element(), content, appended)?;
+    if dataset.has_tag_name("ImageData") {
+        return image(dataset, &encoding, reading.params, &mut reading.notes).map(Loaded::Grid);
+    }
+    piece::read(dataset, &encoding, reading)
+}
+
+/// Reads the volume of an image.
+fn image(
+    image: Node<'_, '_>,
+    encoding: &Encoding<'_>,
+    params: &ReadParams,
+    notes: &mut Notes,
+) -> Result<Grid, ReadError> {
+    let lattice = Lattice::of(image)?;
+    let piece = only_piece(image)?;
+    if extent(piece, "Extent")? != extent(image, "WholeExtent")? {
+        return Err(wrong(piece, "the WholeExtent in one Piece", piece.attribute("Extent").unwrap_or_default()));
+    }
+    let chosen = chosen(piece, params, notes)?;
+    let (array, is_of_cells) = chosen.ok_or_else(|| wrong(piece, "a DataArray in PointData or CellData", "none"))?;
+    not_used(image, &[array], notes);
+    let (mut origin, mut sizes) = (lattice.origin, lattice.points);
+    if is_of_cells {
+        (origin, sizes) = lattice::of_cells(origin, &lattice.axes, lattice.points);
+        notes.remarks.push(format!("values of cells ({}): they lie at the middles", name(array)));
+    }
+    let selection = selection(array, params, notes)?;
+    let stored =
+        Stored { kind: kind(array)?, big_endian: encoding.big_endian, dims: sizes, selection, scaling: (1.0, 0.0) };
+    stored.check(lattice.place, HINT)?;
+    let values = encoding.values(array, &stored, params)?;
+    Ok(Grid { origin, axes: lattice.axes, dims: sizes.map(|n| n as usize), values })
+}
+
+/// Where an element begins.
+fn place(node: Node<'_, '_>) -> Place {
+    Place::Byte(node.range().start as u64)
+}
+
+fn wrong(node: Node<'_, '_>, expected: &str, found: &str) -> ReadError {
+    ReadError::input(place(node), expected, format!("'{}'", escaped(found.as_bytes(), 60)), HINT)
+}
+
+fn child<'a, 'i>(node: Node<'a, 'i>, name: &str) -> Option<Node<'a, 'i>> {
+    node.children().find(|c| c.has_tag_name(name))
+}
+
+/// The element of the dataset.
+fn dataset<'a, 'i>(document: &'a Document<'i>) -> Result<Node<'a, 'i>, ReadError> {
+    let root = document.root_element();
+    let kind = root.attribute("type").unwrap_or_default();
+    if !root.has_tag_name("VTKFile") || !DATASETS.contains(&kind) {
+        return Err(other_dataset(root, kind));
+    }
+    child(root, kind).ok_or_else(|| wrong(root, &format!("an element {kind}"), "none"))
+}
+
+/// The error for a dataset that is not read: of one that names files its pieces, else its kind.
+fn other_dataset(root: Node<'_, '_>, kind: &str) -> ReadError {
+    /// Most pieces that are named.
+    const MOST: usize = 4;
+    let expected = "a VTKFile of type ImageData, UnstructuredGrid or PolyData";
+    let of = |node: Node<'_, '_>| node.attribute("Source").or_else(|| node.attribute("file")).map(str::to_owned);
+    let pieces: Vec<String> = root.descendants().filter_map(of).collect();
+    if pieces.is_empty() {
+        return ReadError { hint: OTHER_DATASETS, ..wrong(root, expected, kind) };
+    }
+    let mut named: Vec<String> = pieces.iter().take(MOST).map(|piece| escaped(piece.as_bytes(), 60)).collect();
+    if pieces.len() > MOST {
+        named.push(format!("{} more", pieces.len() - MOST));
+    }
+    let found = format!("a {} of the pieces {}", escaped(kind.as_bytes(), 40), named.join(", "));
+    let hint = "draw its pieces: give the .vti, .vtu or .vtp files that it names to `organza render` together";
+    ReadError { hint, found, ..wrong(root, expected, kind) }
+}
+
+/// The piece of an image, which has to be the only one.
+fn only_piece<'a, 'i>(image: Node<'a, 'i>) -> Result<Node<'a, 'i>, ReadError> {
+    let pieces: Vec<_> = image.children().filter(|c| c.has_tag_name("Piece")).collect();
+    let &[piece] = pieces.as_slice() else {
+        let hint = "write the image as one piece";
+        return Err(ReadError { hint, ..wrong(image, "one Piece", &pieces.len().to_string()) });
+    };
+    Ok(piece)
+}
+
+/// The name of an array, as it may be shown.
+fn name(array: Node<'_, '_>) -> String {
+    escaped(array.attribute("Name").unwrap_or_default().as_bytes(), 40)
+}
+
+/// So many numbers of an attribute, if there is one of this name.
+fn numbers<const N: usize>(node: Node<'_, '_>, name: &str) -> Result<Option<[f64; N]>, ReadError> {
+    let Some(text) = node.attribute(name) else { return Ok(None) };
+    let finite = |w: &str| w.parse::<f64>().ok().filter(|v| v.is_finite());
+    let numbers: Option<Vec<f64>> = text.split_ascii_whitespace().map(finite).collect();
+    let numbers = numbers.and_then(|numbers| <[f64; N]>::try_from(numbers).ok());
+    numbers.map(Some).ok_or_else(|| wrong(node, &format!("{N} finite numbers of {name}"), text))
+}
+
+/// The lattice of the points.
+struct Lattice {
+    points: [u64; 3],
+    origin: DVec3,
+    axes: DMat3,
+    place: Place,
+}
+
+impl Lattice {
+    fn of(image: Node<'_, '_>) -> Result<Self, ReadError> {
+        let extent = extent(image, "WholeExtent")?;
+        let spacing = numbers(image, "Spacing")?.map_or(DVec3::ONE, DVec3::from_array);
+        // Row by row.
+        let direction =
+            numbers(image, "Direction")?.map_or(DMat3::IDENTITY, |d| DMat3::from_cols_array(&d).transpose());
+        let axes = direction * DMat3::from_diagonal(spacing);
+        let first = DVec3::from_array([0, 1, 2].map(|i| extent[i][0] as f64));
+        let origin = numbers(image, "Origin")?.map_or(DVec3::ZERO, DVec3::from_array) + axes * first;
+        lattice::check(origin, &axes, place(image), HINT)?;
+        Ok(Self { points: extent.map(|[low, high]| (high - low + 1) as u64), origin, axes, place: place(image) })
+    }
+}
+
+/// The first and the last index along each axis.
+fn extent(node: Node<'_, '_>, name: &str) -> Result<[[i64; 2]; 3], ReadError> {
+    let text = node.attribute(name).unwrap_or_default();
+    let ends: Option<Vec<i32>> = text.split_ascii_whitespace().map(|w| w.parse().ok()).collect();
+    let extent = ends.and_then(|e| <[i32; 6]>::try_from(e).ok()).map(|e| e.map(i64::from));
+    let extent = extent.map(|[a, b, c, d, e, f]| [[a, b], [c, d], [e, f]]);
+    let rises = |extent: &[[i64; 2]; 3]| extent.iter().all(|[low, high]| low <= high);
+    extent.filter(rises).ok_or_else(|| wrong(node, &format!("six rising indices in {name}, two an axis"), text))
+}
+
+/// The arrays of a piece that belong to its points or its cells.
+fn arrays<'a, 'i>(data: Node<'a, 'i>) -> impl Iterator<Item = Node<'a, 'i>> + Clone {
+    data.children().filter(|c| c.has_tag_name("DataArray"))
+}
+
+/// The array that is read, and whether it belongs to the cells: of the points where one of them is a field, else of the cells.
+fn chosen<'a, 'i>(
+    piece: Node<'a, 'i>,
+    params: &ReadParams,
+    notes: &mut Notes,
+) -> Result<Option<(Node<'a, 'i>, bool)>, ReadError> {
+    let data: Vec<_> = ["PointData", "CellData"].into_iter().filter_map(|name| child(piece, name)).collect();
+    let mut all = Vec::new();
+    let first = data.iter().find(|data| arrays(**data).next().is_some()).copied();
+    for data in &data {
+        let named = data.attribute("Scalars");
+        let is_there = arrays(*data).any(|array| array.attribute("Name") == named);
+        if let Some(named) = named.filter(|_| !is_there && arrays(*data).next().is_some()) {
+            let named = escaped(named.as_bytes(), 40);
+            notes.remark(format!("there is no array '{named}', which Scalars names: another is read"));
+        }
+        for array in arrays(*data) {
+            let is_named = first == Some(*data) && named.is_some() && array.attribute("Name") == named;
+            let (name, kind) = (name(array), kind(array).ok());
+            all.push((array, Candidate { name, numbers: components(array)?, kind, is_named }));
+        }
+    }
+    let (nodes, candidates): (Vec<_>, Vec<_>) = all.into_iter().unzip();
+    let rank = chosen_array(&candidates, place(piece), params, notes)?;
+    let is_of_cells = |array: Node<'_, '_>| array.parent_element().is_some_and(|of| of.has_tag_name("CellData"));
+    Ok(rank.map(|rank| (nodes[rank], is_of_cells(nodes[rank]))))
+}
+
+/// Names the arrays that are not used.
+fn not_used(dataset: Node<'_, '_>, used: &[Node<'_, '_>], notes: &mut Notes) {
+    let others = dataset.document().descendants().filter(|n| n.has_tag_name("DataArray") && !used.contains(n));
+    let names: Vec<String> = others
+        .map(|other| {
+            let of = other.parent_element().map_or("", |of| of.tag_name().name());
+            let name = other.attribute("Name").unwrap_or("an array without a name");
+            if of == "PointData" { name.to_owned() } else { format!("{of}.{name}") }
+        })
+        .collect();
+    notes.not_used(names.iter().map(String::as_bytes));
+}
+
+/// The type of the numbers of an array.
+fn kind(array: Node<'_, '_>) -> Result<Kind, ReadError> {
+    let name = array.attribute("type").unwrap_or_default();
+    Ok(match name {
+        "Int8" => Kind::I8,
+        "UInt8" => Kind::U8,
+        "Int16" => Kind::I16,
+        "UInt16" => Kind::U16,
+        "Int32" => Kind::I32,
+        "UInt32" => Kind::U32,
+        "Int64" => Kind::I64,
+        "UInt64" => Kind::U64,
+        "Float32" => Kind::F32,
+        "Float64" => Kind::F64,
+        _ => return Err(wrong(array, "a DataArray of a type from Int8 to Float64", name)),
+    })
+}
+
+/// Numbers of a tuple of an array.
+fn components(array: Node<'_, '_>) -> Result<u64, ReadError> {
+    let components = array.attribute("NumberOfComponents").unwrap_or("1");
+    components.parse().map_err(|_| wrong(array, "a number of components", components))
+}
+
+/// Which of the numbers of a tuple is its value.
+fn selection(array: Node<'_, '_>, params: &ReadParams, notes: &mut Notes) -> Result<Selection, ReadError> {
+    let numbers = (components(array)?, kind(array)?, false);
+    Selection::of_frames(1, place(array), params, notes)?.with_numbers(numbers, place(array), notes)
+}

@@ -1,0 +1,39 @@
+//! Readers on real files, hard cases and bad inputs. One program: it is linked once, and its tests share all cores.
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+mod bad_inputs;
+mod read_assets;
+mod read_cells;
+mod read_columns;
+mod read_copc;
+mod read_e57;
+#[cfg(all(feature = "off", feature = "gltf"))]
+mod read_gltf;
+#[cfg(all(feature = "exr", feature = "png"))]
+mod read_images;
+mod read_las;
+#[cfg(feature = "obj")]
+mod read_materials;
+#[cfg(feature = "obj")]
+mod read_memory;
+mod read_mended;
+mod read_metaimage;
+mod read_more;
+mod read_nifti;
+mod read_notes;
+mod read_numbers;
+#[cfg(all(feature = "off", feature = "gltf"))]
+mod read_off;
+#[cfg(all(feature = "off", feature = "gltf"))]
+mod read_pcd;
+mod read_ply;
+mod read_polygons;
+mod read_raw;
+mod read_samples;
+mod read_series;
+mod read_unread;
+mod read_volumes;
+mod read_vti;
+mod read_vtk;
+mod readme;
+mod true_words;

@@ -1,0 +1,282 @@
+//! Cells of VTK become volumes, its surfaces meshes, legacy and in XML.
+#![cfg(all(feature = "vti", feature = "vtk"))]
+
+use crate::read_samples::cells::{vtk_cells, vtk_surface, vtp, vtp_pieces, vtu, vtu_pieces};
+use crate::read_samples::{gzip, load};
+use read::{Fault, Loaded, Notes, ReadParams, bytes};
+use splat_core::glam::{DVec3, Vec3};
+use splat_core::{Grid, MemoryAccount, Mesh};
+
+fn read(name: &str, content: &[u8]) -> (Loaded, Notes) {
+    bytes(name, content, &ReadParams::default(), None).unwrap_or_else(|e| panic!("{e}"))
+}
+
+fn grid(name: &str, content: &[u8]) -> (Grid, Notes) {
+    match read(name, content) {
+        (Loaded::Grid(grid), notes) => (grid, notes),
+        other => panic!("not a grid: {other:?}"),
+    }
+}
+
+fn mesh(name: &str, content: &[u8]) -> (Mesh, Notes) {
+    match read(name, content) {
+        (Loaded::Mesh(mesh), notes) => (mesh, notes),
+        other => panic!("not a mesh: {other:?}"),
+    }
+}
+
+fn mass(grid: &Grid) -> f64 {
+    grid.values.iter().map(|v| f64::from(*v)).sum::<f64>() * grid.cell_volume()
+}
+
+/// Place of voxel n.
+fn place(grid: &Grid, n: usize) -> DVec3 {
+    let [nx, ny, _] = grid.dims;
+    grid.origin + grid.axes * DVec3::new((n % nx) as f64, (n / nx % ny) as f64, (n / nx / ny) as f64)
+}
+
+#[test]
+fn a_linear_field_of_points_is_linear_inside_and_keeps_its_integral() {
+    let (grid, notes) = grid("a.vtk", &vtk_cells(false, false));
+    let low = grid.origin + grid.axes * DVec3::splat(-0.5);
+    let high = low + grid.axes * DVec3::from_array(grid.dims.map(|n| n as f64));
+    assert!(low.abs().max_element() < 1e-12 && high.distance(DVec3::new(3.0, 1.0, 1.0)) < 1e-12);
+    let mut inside = 0;
+    for (n, v) in grid.values.iter().enumerate() {
+        let p = place(&grid, n);
+        // A voxel is the mean of what lies in it: at the border of the pyramid a part of it is outside.
+        if p.x < 2.0 {
+            assert!((f64::from(*v) - (1.0 + p.x + 2.0 * p.y)).abs() < 1e-5, "{v} at {p}");
+            inside += 1;
+        } else if (p.y - 0.5).abs().max((p.z - 0.5).abs()) > 0.5 * (3.0 - p.x) + 0.02 {
+            assert_eq!(*v, 0.0, "{p}");
+        }
+    }
+    assert!(inside > 100_000, "{inside}");
+    // ∫ over the hexahedron, and a third times the field at the pyramid's centre of mass.
+    let expected = 6.0 + 4.25 / 3.0;
+    assert!((mass(&grid) / expected - 1.0).abs() < 1e-3, "{} for {expected}", mass(&grid));
+    let [nx, ny, nz] = grid.dims;
+    let sampled = format!("2 cells, sampled as {nx} x {ny} x {nz} voxels; outside them the value is 0");
+    assert_eq!(notes.remarks, ["the field is density, of the points".to_owned(), sampled]);
+    assert_eq!(notes.unused, ["1 cell without a volume"]);
+}
+
+#[test]
+fn every_way_to_write_the_cells_gives_the_same_volume() {
+    let (expected, _) = grid("a.vtk", &vtk_cells(false, false));
+    for (name, content) in [
+        ("a.vtk", vtk_cells(true, false)),
+        ("a.vtk", vtk_cells(false, true)),
+        ("a.vtk", vtk_cells(true, true)),
+        ("a.vtu", vtu("ascii", false)),
+        ("a.vtu", vtu("binary", false)),
+        ("a.vtu", vtu("binary", true)),
+        ("a.vtu.gz", gzip(&vtu("binary", true))),
+        ("a.vtu", vtu_pieces("ascii", false)),
+        ("a.vtu", vtu_pieces("binary", false)),
+        ("a.vtu", vtu_pieces("binary", true)),
+    ] {
+        assert!(grid(name, &content).0 == expected, "{name}");
+    }
+    for content in [vtu("ascii", false), vtu_pieces("ascii", false)] {
+        assert_eq!(grid("a.vtu", &content).1.unused, ["CellData.of_cells", "1 cell without a volume"]);
+    }
+}
+
+#[test]
+fn values_of_cells_fill_them_and_without_values_they_are_full_of_one() {
+    let text = String::from_utf8(vtu("ascii", false)).unwrap();
+    let (before, rest) = text.split_once("<PointData").unwrap();
+    let without = format!("{before}{}", rest.split_once("</PointData>").unwrap().1);
+    let (of_cells, _) = grid("a.vtu", without.as_bytes());
+    let expected = 6.0 + 4.25 / 3.0;
+    assert!((mass(&of_cells) / expected - 1.0).abs() < 1e-3, "{}", mass(&of_cells));
+    assert_eq!(of_cells.values.iter().copied().fold(0.0, f32::max), 4.25);
+    let (before, rest) = without.split_once("<CellData").unwrap();
+    let (full, notes) = grid("a.vtu", format!("{before}{}", rest.split_once("</CellData>").unwrap().1).as_bytes());
+    assert!((mass(&full) / (2.0 + 1.0 / 3.0) - 1.0).abs() < 1e-3, "{}", mass(&full));
+    assert!(notes.remarks.contains(&"cells without a field of numbers: they are full of 1".to_owned()));
+}
+
+/// Below 0 there is nothing that 0 could stand for.
+#[test]
+fn outside_lies_the_least_value_where_some_are_negative() {
+    let text = String::from_utf8(vtk_cells(false, false)).unwrap();
+    let (grid, notes) = grid("a.vtk", text.replace("\n1 3 5 3 1 3 5 3 5\n", "\n-7 3 5 3 1 3 5 3 5\n").as_bytes());
+    assert_eq!(grid.values.iter().copied().fold(0.0, f32::min), -7.0);
+    assert!(notes.remarks[1].ends_with("outside them the value is -7"), "{:?}", notes.remarks);
+}
+
+#[test]
+fn surfaces_are_meshes_with_normals_and_colours() {
+    for (binary, by_ends) in [(false, false), (true, false), (false, true), (true, true)] {
+        let (mesh, notes) = mesh("a.vtk", &vtk_surface(binary, by_ends));
+        assert_eq!(mesh.triangles, [[0, 1, 2], [0, 2, 3], [4, 5, 7], [7, 5, 6]]);
+        assert_eq!(mesh.normal, [Vec3::Z; 8]);
+        assert_eq!(notes.unused, ["1 line"]);
+    }
+    let (mesh, notes) = mesh("a.vtp", &vtp());
+    assert_eq!(mesh.triangles, [[0, 1, 2], [0, 2, 3]]);
+    assert_eq!(mesh.color, [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.0; 3]]);
+    assert_eq!(notes.unused, ["heat"]);
+    // Flat cells of an unstructured grid are a surface too.
+    let cells = String::from_utf8(vtk_cells(false, false)).unwrap();
+    let flat = cells.replace("12 14 5", "2 2 5");
+    assert_eq!(super::read_cells::mesh("a.vtk", flat.as_bytes()).0.triangles, [[0, 1, 2]]);
+}
+
+#[test]
+fn pieces_are_one_dataset_with_the_columns_of_all() {
+    let (mesh, notes) = mesh("a.vtp", &vtp_pieces());
+    assert_eq!(mesh.triangles, [[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]]);
+    assert_eq!((mesh.normal, mesh.color.len()), (vec![Vec3::Z; 8], 8));
+    assert_eq!(mesh.color[..4], mesh.color[4..]);
+    assert!(mesh.position.iter().enumerate().all(|(i, p)| mesh.origin.z + f64::from(p.z) == f64::from(i >= 4)));
+    assert_eq!(notes.unused, ["heat"]);
+    let text = String::from_utf8(vtp_pieces()).unwrap().replace("NumberOfPolys=\"1\"", "NumberOfPolys=\"0\"");
+    let (Loaded::Points(points), _) = read("a.vtp", text.as_bytes()) else { panic!("points") };
+    assert_eq!((points.len(), points.normal.len(), points.color.len()), (8, 8, 8));
+    // Values of cells follow the pieces too.
+    let text = String::from_utf8(vtu_pieces("ascii", false)).unwrap();
+    let of_cells = text.replace("PointData", "Other");
+    assert!((mass(&grid("a.vtu", of_cells.as_bytes()).0) / (6.0 + 4.25 / 3.0) - 1.0).abs() < 1e-3);
+}
+
+#[test]
+fn points_without_cells_are_a_cloud() {
+    let text = String::from_utf8(vtp()).unwrap().replace("NumberOfPolys=\"1\"", "NumberOfPolys=\"0\"");
+    let (Loaded::Points(points), _) = read("a.vtp", text.as_bytes()) else { panic!("points") };
+    assert_eq!((points.len(), points.color.len()), (4, 4));
+}
+
+#[track_caller]
+fn refused(name: &str, content: &str, expected: &str) {
+    let error = load(name, content.as_bytes()).unwrap_err();
+    assert_eq!(error.fault, Fault::Input, "{error}");
+    assert!(error.to_string().contains(expected), "{error}");
+}
+
+#[test]
+fn what_is_wrong_in_legacy_cells_is_named() {
+    let text = String::from_utf8(vtk_cells(false, false)).unwrap();
+    for (from, to, expected) in [
+        (
+            "8 0 1 2 3 4 5 6 7",
+            "8 0 1 2 3 4 5 6 9",
+            "a.vtk:7: expected points of cell 0 among the 9 that there are, counted from 0, found 9",
+        ),
+        ("8 0 1 2 3 4 5 6 7", "8 0 1 2 3 4 5 6 -1", "expected points of cell 0 among the 9 that there are"),
+        ("8 0 1 2 3 4 5 6 7", "8 0 1 2 3 4 5 6 .5", "expected points of cell 0 among the 9 that there are"),
+        (
+            "8 0 1 2",
+            "99 0 1 2",
+            "a.vtk:7: expected a number of points of cell 0, at most 18, and as many points, found 99",
+        ),
+        ("CELLS 3", "CELLS 4", "a.vtk:7: expected 4 cells, found 3"),
+        ("CELLS 3 19", "CELLS 3 18446744073709551615", "a.vtk:7: expected at most "),
+        ("CELL_TYPES 3", "CELL_TYPES 2", "expected SCALARS, FIELD or another keyword"),
+        ("12 14 5", "12 14", "a.vtk:9: expected 3 numbers, found 2"),
+        (
+            "12 14 5",
+            "24 14 5",
+            "a.vtk:7: expected cells of straight edges, found a quadratic tetrahedron (type 24) at cell 0",
+        ),
+        ("12 14 5", "12 14 77", "found a Bézier cell (type 77) at cell 2"),
+        ("12 14 5", "12 14 256", "a.vtk:9: expected types of cells from 0 to 255, found 256 at cell 2"),
+        ("12 14 5", "12 10 5", "a.vtk:7: expected 4 points of cell 1, a tetrahedron, found 5"),
+        ("CELL_TYPES 3\n12 14 5\n", "", "expected CELL_TYPES, found the end of the file"),
+        ("POINTS 9", "POINTS 8", "a.vtk:6: expected SCALARS, FIELD or another keyword"),
+        ("POINT_DATA 9", "CELL_DATA 9", "expected 3 values, one for each of the cells, found 9"),
+        ("POINTS 9 float\n", "POINTS 0 float\n\nPOINTS 9 float\n", "expected POINTS once"),
+        ("1 3 5 3 1", "inf 3 5 3 1", "expected a finite decimal number, found 'inf'"),
+    ] {
+        assert!(text.contains(from), "{from}");
+        refused("a.vtk", &text.replacen(from, to, 1), expected);
+    }
+    let by_ends = String::from_utf8(vtk_cells(false, true)).unwrap();
+    for (from, to, expected) in [
+        ("0 8 13 16", "1 8 13 16", "a.vtk:8: expected OFFSETS from 0, found 1"),
+        ("0 8 13 16", "0 13 8 16", "expected cell 1 to end at 13 to 16 of the points of cells, found 8"),
+        ("0 8 13 16", "0 8 13 15", "expected 16 points in the cells, as many as there are, found 15"),
+        ("CONNECTIVITY", "OFFSETS", "a.vtk:10: expected CONNECTIVITY, found 'OFFSETS vtktypeint64'"),
+    ] {
+        assert!(by_ends.contains(from), "{from}");
+        refused("a.vtk", &by_ends.replacen(from, to, 1), expected);
+    }
+    let places = text.lines().nth(5).unwrap();
+    let flat = text.replacen(places, &"0 ".repeat(27), 1);
+    refused("a.vtk", &flat, "expected cells that enclose a volume, found cells that are flat");
+}
+
+#[test]
+fn what_is_wrong_in_one_of_several_pieces_is_named() {
+    let last = |text: &str, from: &str, to: &str| {
+        let at = text.rfind(from).unwrap_or_else(|| panic!("{from}"));
+        format!("{}{to}{}", &text[..at], &text[at + from.len()..])
+    };
+    let cells = String::from_utf8(vtu_pieces("ascii", false)).unwrap();
+    for (from, to, expected) in [
+        (
+            "Name=\"density\"",
+            "Name=\"weight\"",
+            "expected an array 'density' in PointData, which another Piece has, found 'none'",
+        ),
+        (
+            "\"Float32\" Name=\"density\"",
+            "\"Float64\" Name=\"density\"",
+            "expected 1 component of type Float32, as the array has in another Piece, found '1 of Float64'",
+        ),
+        ("1 2 4 3 5 0 1 2", "1 2 4 3 6 0 1 2", "expected points of cell 0 among the 6 that there are"),
+        ("14 5", "14 42", "found a polyhedron (type 42) at cell 1"),
+        ("NumberOfPoints=\"6\"", "NumberOfPoints=\"5\"", "expected 15 numbers, found '18'"),
+    ] {
+        refused("a.vtu", &last(&cells, from, to), expected);
+    }
+    let none = cells.replace("<Piece", "<Part").replace("</Piece", "</Part");
+    refused("a.vtu", &none, "expected a Piece, found 'none'");
+    let surface = String::from_utf8(vtp_pieces()).unwrap();
+    let missing = "which another Piece has, found 'none'";
+    refused("a.vtp", &last(&surface, "Name=\"up\"", "Name=\"down\""), &format!("array 'up' in PointData, {missing}"));
+    refused("a.vtp", &last(&surface, "Name=\"paint\"", "Name=\"hue\""), &format!("'paint' in PointData, {missing}"));
+    // What all pieces hold together counts, though each is small: they may all be the same bytes.
+    let (before, rest) = surface.split_once("<Piece").unwrap();
+    let (piece, after) = rest.rsplit_once("</Piece>").unwrap();
+    let many = format!("{before}{}{after}", format!("<Piece{piece}</Piece>").repeat(20));
+    let within = |bytes: u64| ReadParams { memory: MemoryAccount::new(bytes), ..ReadParams::default() };
+    let ample = within(1 << 20);
+    assert!(bytes("a.vtp", &vtp_pieces(), &ample, None).is_ok());
+    let limits = within(ample.memory.peak() + many.len() as u64);
+    assert!(bytes("a.vtp", &vtp_pieces(), &limits, None).is_ok());
+    let error = bytes("a.vtp", many.as_bytes(), &limits, None).unwrap_err();
+    assert!(error.to_string().contains("bytes of memory for all that is read"), "{error}");
+}
+
+#[test]
+fn what_is_wrong_in_cells_of_xml_is_named() {
+    let text = String::from_utf8(vtu("ascii", false)).unwrap();
+    for (from, to, expected) in [
+        ("8 13 16", "8 13 17", "expected 17 numbers, found '16'"),
+        ("8 13 16", "8 13", "expected 3 numbers, found '2'"),
+        ("8 13 16", "8 7 16", "expected cell 1 to end at 8 to 16 of the points of cells, found 7"),
+        ("NumberOfPoints=\"9\"", "NumberOfPoints=\"-9\"", "expected a whole number as NumberOfPoints, found '-9'"),
+        (
+            "NumberOfPoints=\"9\"",
+            "NumberOfPoints=\"18446744073709551615\"",
+            "expected a number of values within the file",
+        ),
+        ("NumberOfPoints=\"9\"", "NumberOfPoints=\"6148914691236517\"", "expected a number of values within the file"),
+        ("NumberOfPoints=\"9\"", "NumberOfPoints=\"614891469\"", "expected 1844674407 numbers, found '27'"),
+        ("Name=\"types\"", "Name=\"kinds\"", "expected an array types, found 'none'"),
+        ("NumberOfComponents=\"3\"", "NumberOfComponents=\"2\"", "expected 3 components of points, found '2'"),
+        ("12 14 5", "12 42 5", "found a polyhedron (type 42) at cell 1"),
+        (
+            "type=\"UnstructuredGrid\"",
+            "type=\"StructuredGrid\"",
+            "expected a VTKFile of type ImageData, UnstructuredGrid or PolyData",
+        ),
+    ] {
+        assert!(text.contains(from), "{from}");
+        refused("a.vtu", &text.replacen(from, to, 1), expected);
+    }
+}

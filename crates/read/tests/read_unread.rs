@@ -1,0 +1,40 @@
+//! Formats that are not read are named by what they are, with what to do.
+
+use crate::read_samples::load;
+use read::Fault;
+
+#[test]
+fn formats_that_are_not_read_are_named_with_what_to_do() {
+    let dicom = [&[0; 128][..], b"DICM"].concat();
+    let tar = [&[b'a'; 257][..], b"ustar\0"].concat();
+    for (name, content, found, hint) in [
+        ("a.fbx", &b"Kaydara FBX Binary  \0"[..], "FBX", "convert it to glTF"),
+        ("a.FBX", b"; FBX 7.3.0 project file", "FBX", "convert it to glTF"),
+        ("a.usdz", b"PK\x03\x04....", "USD", "convert it to glTF"),
+        ("a.usda", b"#usda 1.0", "USD", "convert it to glTF"),
+        ("a.dae", b"<?xml version=\"1.0\"?>", "COLLADA", "convert it to glTF"),
+        ("a.3ds", b"MM\x10\0", "3DS", "convert it to glTF"),
+        ("a.x3d", b"<?xml", "X3D or VRML", "convert it to glTF"),
+        ("a.step", b"ISO-10303-21;", "STEP", "export it as STL, OBJ or glTF"),
+        ("a.vdb", b" BDV\0\0\0\0", "OpenVDB", "convert it to NRRD"),
+        ("a.ptx", b"4\n4\n", "PTX", "convert it to PLY"),
+        ("a.h5", b"\x89HDF\r\n\x1a\n", "HDF5", "convert it to NRRD"),
+        ("a.dcm", &dicom, "DICOM", "convert it to NRRD"),
+        ("a.jpg", b"\xff\xd8\xff\xe0", "a JPEG image", "convert the image"),
+        ("a.zip", b"PK\x03\x04", "a zip archive", "extract"),
+        ("a.tar.gz", &tar, "a tar archive", "extract"),
+        ("a.ksplat", b"\0\0\0\0", "a web kind of 3D Gaussian splats", "save it as PLY"),
+        ("a.mtl", b"newmtl a", "OBJ materials", "give the OBJ file"),
+        ("scene.toml", b"[camera]", "a scene", "organza render"),
+        // The content counts, whatever the name says.
+        ("a.obj", b"\xff\xd8\xff", "a JPEG image", "convert the image"),
+        ("a", b"PK\x03\x04", "a zip archive", "extract"),
+    ] {
+        let error = load(name, content).unwrap_err();
+        assert_eq!((error.fault, error.fault.exit_code()), (Fault::Input, 3));
+        let beginning =
+            format!("{name}: expected a file of a format that is read, found {found}, which is not read\nhint: ");
+        assert!(error.to_string().starts_with(&beginning), "{error}");
+        assert!(error.hint.contains(hint), "{error}");
+    }
+}
