@@ -11,84 +11,55 @@
 #![forbid(unsafe_code)]
 
 mod animation;
-mod check;
-mod check_background;
-mod check_camera;
-mod check_drawn;
-mod check_effects;
-mod check_extract;
-mod check_field;
-mod check_footprint;
-mod check_light;
-mod check_material;
-mod check_object;
-mod check_points;
-mod check_render;
-mod check_slide;
-mod check_source;
-mod check_surfels;
-mod check_transfer;
-mod color_scales;
-mod de;
+mod at;
+mod background;
+mod camera;
 mod effects;
 mod error;
-mod fit;
+mod footprint;
 mod in_memory;
-mod layer_choice;
-mod light_points;
-mod lights;
-mod lit;
+mod light;
+mod limits;
 mod load;
-mod model;
-mod overrides;
+mod material;
+mod object;
 mod paths;
-mod points;
-mod raw;
-mod raw_camera;
-mod raw_footprint;
-mod raw_light;
-mod raw_material;
-mod raw_object;
-mod raw_points;
-mod raw_render;
-mod raw_source;
-mod raw_surfels;
-mod read_json;
-mod read_toml;
-mod settings;
+mod render;
+mod scene;
 mod shown;
 mod source;
-mod stops;
-mod switched;
-mod tree;
+mod text;
 mod written;
 
+pub use animation::stops::{Path, Stop};
+pub use background::model::EnvironmentSource;
+pub use camera::fit::{CameraFit, DEFAULT_AZIMUTH, DEFAULT_FILL, DEFAULT_SIZE, EachPoint, FoundCamera};
 pub use convert::{ColorMap, ColorScale, PointColors, ScaleNumbers};
-pub use effects::{EffectKind, HangsOn, SwitchedEffect};
+pub use effects::kinds::{EffectKind, HangsOn, SwitchedEffect};
 pub use error::Error;
 pub use field::Combination;
-pub use fit::{CameraFit, DEFAULT_AZIMUTH, DEFAULT_FILL, DEFAULT_SIZE, EachPoint, FoundCamera};
 pub use in_memory::{InMemory, SourceData, name_of as name_in_memory, source_of as source_in_memory};
-pub use layer_choice::{LAYER_NAMES, LayerChoice};
-pub use light_points::{LightPoint, light_points};
-pub use lights::{SceneLight, SlideSource};
+pub use light::model::{SceneLight, SlideSource};
+pub use light::points::{LightPoint, light_points};
 pub use load::{LoadOptions, MAX_SCENE_BYTES, MAX_SCENE_DEPTH, load, parse, read, schema};
-pub use model::{EnvironmentSource, Scene, SceneMaterial, SceneObject, Up, UpBy};
-pub use overrides::Override;
+pub use material::model::SceneMaterial;
+pub use object::model::{SceneObject, Up, UpBy};
+pub use object::points_look::PointsLook;
 pub use paths::{ROOT_KEY, relative_path, root_for};
-pub use points::PointsLook;
-pub use settings::{
+pub use render::layer_choice::{LAYER_NAMES, LayerChoice};
+pub use render::settings::{
     Aligned, Bending, Classify, Collisions, Coverage, Grouping, OpaqueSurfels, ParticlesSettings, PointsSettings,
     RenderSettings, Scattering, ShadowMapping, ShadowSettings, SheetsSettings, Slicing, SoftShadows, SurfaceSampler,
     SurfelGroups, SurfelLayers, SurfelsSettings, Technique, VolumeSampler,
 };
+pub use scene::model::Scene;
 pub use shown::{escape_controls, place, printable, short, shown};
-pub use source::{
+pub use source::model::{
     CloudSource, CombinedSource, DensitySource, ExtractSource, FieldSource, ImplicitSource, IsosurfaceSource,
     LevelSetSource, MOST_ABSORBANCE, MatterSource, SliceSource, Source, VolumeSource,
 };
 pub use splat_core::UpAxis;
-pub use stops::{Path, Stop};
+pub use text::overrides::Override;
 pub use written::Written;
 
 /// The page's example compiles and holds.

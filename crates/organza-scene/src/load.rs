@@ -1,10 +1,15 @@
 //! From a file, or its bytes, to a checked scene.
 
-use super::overrides::{self, Override};
-use super::raw::RawScene;
-use super::tree::{Document, error_at};
-use super::{InMemory, Scene, animation, check, de, raw_camera, read_json, read_toml};
-use crate::Error;
+use super::{InMemory, Scene};
+use crate::animation::tracks;
+use crate::scene::check;
+use crate::scene::raw::RawScene;
+use crate::text::de;
+use crate::text::json::read_json;
+use crate::text::overrides::{self, Override};
+use crate::text::toml::read_toml;
+use crate::text::tree::{Document, error_at};
+use crate::{Error, camera};
 use sha2::{Digest, Sha256};
 use splat_core::{Exceeded, MemoryAccount};
 use std::io::Read;
@@ -44,16 +49,16 @@ pub struct LoadOptions {
 
 /// A frame of a turntable.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Turn {
+pub(crate) struct Turn {
     /// Frames of the whole circle.
-    pub(super) frames: u32,
+    pub(crate) frames: u32,
     /// This one.
-    pub(super) frame: u32,
+    pub(crate) frame: u32,
 }
 
 impl Turn {
     /// How far the camera has gone, radians.
-    pub(super) fn angle(self) -> f64 {
+    pub(crate) fn angle(self) -> f64 {
         std::f64::consts::TAU * f64::from(self.frame) / f64::from(self.frames)
     }
 }
@@ -97,16 +102,16 @@ pub fn parse(file: &Path, bytes: &[u8], options: &LoadOptions) -> Result<Scene, 
     let _held = options.memory.take(&what, bytes.len() as u64 * BYTES_PER_CHARACTER).map_err(Error::Limit)?;
     let text = decode(file, bytes)?;
     let is_json = file.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
-    let root = if is_json { read_json::read_json(file, text)? } else { read_toml::read_toml(file, text)? };
+    let root = if is_json { read_json(file, text)? } else { read_toml(file, text)? };
     let mut document = Document { file, text, flags: Vec::new(), root };
-    raw_camera::expand(&mut document.root);
+    camera::raw::expand(&mut document.root);
     overrides::apply(&mut document, &options.overrides)?;
     let turn = options.turntable.map(|frames| Turn { frames: frames.max(1), frame: options.frame.unwrap_or(0) });
     if let (Some(frame), None) = (options.frame, turn) {
-        animation::apply(&mut document, frame)?;
+        tracks::apply(&mut document, frame)?;
     }
     // An option or a track may have said it anew.
-    raw_camera::expand(&mut document.root);
+    camera::raw::expand(&mut document.root);
     let raw: RawScene = de::from_document(&document)?;
     if turn.is_some() && raw.animation.is_some() {
         let message = format!("--turntable: {} has an animation of its own", crate::printable(file));

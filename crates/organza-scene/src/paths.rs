@@ -1,7 +1,7 @@
 //! Paths of data: relative to the scene file, inside the scene's root folder, or inside the one that it names, unless allowed.
 
-use super::check::At;
 use super::{InMemory, LoadOptions, in_memory};
+use crate::at::At;
 use crate::{Error, printable, shown};
 use std::path::{Component, Path, PathBuf};
 
@@ -9,7 +9,7 @@ use std::path::{Component, Path, PathBuf};
 pub const ROOT_KEY: &str = "root";
 
 /// Where data may lie.
-pub(super) struct Paths {
+pub(crate) struct Paths {
     /// The scene's folder as it was named.
     folder: PathBuf,
     /// The root folder, absolute; `None` allows everything.
@@ -23,7 +23,7 @@ pub(super) struct Paths {
 impl Paths {
     /// The root is the folder above the scene's folder, or the scene's folder where that would be the root of the file
     /// system; `named` is a further one, relative to the scene's.
-    pub(super) fn new(
+    pub(crate) fn new(
         at_named: &At<'_>,
         scene_file: &Path,
         named: Option<&str>,
@@ -44,7 +44,7 @@ impl Paths {
     }
 
     /// The path of a file named in the scene.
-    pub(super) fn resolve(&self, at: &At<'_>, text: &str) -> Result<PathBuf, Error> {
+    pub(crate) fn resolve(&self, at: &At<'_>, text: &str) -> Result<PathBuf, Error> {
         check_text(at, text)?;
         if let Some(found) = in_memory::resolve(text, &self.in_memory) {
             return found.map_err(|(message, hint)| at.error(message, hint));

@@ -1,0 +1,213 @@
+//! Changes of the value tree by frame: a track sets one value of the scene, as `--set` does, before anything is checked.
+//!
+//! Between keys numbers are blended, one by one in lists and tables: linearly, or by the cubic through the keys whose slope
+//! at a key is that between its neighbours (Catmull and Rom 1974). Texts and switches hold until the next key. Before the
+//! first key and after the last one the value holds.
+
+use crate::Error;
+use crate::animation::raw::{Blend, RawAnimation, RawTrack};
+use crate::at::At;
+use crate::text::de::from_node;
+use crate::text::overrides::{set, split_path};
+use crate::text::tree::{Document, Entry, Node, Value};
+
+/// Most frames of an animation.
+const MOST_FRAMES: u32 = 1_000_000;
+
+/// Checks the table `animation` and gives its number of frames.
+pub(crate) fn check_animation(at: &At<'_>, raw: &RawAnimation) -> Result<u32, Error> {
+    for (i, track) in raw.track.iter().enumerate() {
+        let tracks = at.key("track");
+        let at = tracks.index(i);
+        if let Err(message) = path_of(track) {
+            return Err(at.key("set").error(format!("`set`: {message}"), "such as \"object.bunny.transform.rotate\""));
+        }
+        if track.keys.is_empty() {
+            return Err(at.key("keys").error("`keys`: expected at least one, found none", ""));
+        }
+        if let Some(k) = (1..track.keys.len()).find(|k| track.keys[*k].frame <= track.keys[k - 1].frame) {
+            let (before, found) = (track.keys[k - 1].frame, track.keys[k].frame);
+            let message = format!("`frame`: expected a frame after {before}, found {found}");
+            return Err(at.key("keys").index(k).key("frame").error(message, "keys stand in the order of their frames"));
+        }
+    }
+    at.whole("frames", raw.frames, 1..=MOST_FRAMES)
+}
+
+/// Whether a track changes a key of a table, or the whole table.
+pub(crate) fn moves(raw: &RawAnimation, table: &str, key: &str) -> bool {
+    let changes = |path: Vec<String>| path[0] == table && path.get(1).is_none_or(|of| of == key);
+    raw.track.iter().filter_map(|track| path_of(track).ok()).any(changes)
+}
+
+/// Keys of an object that leave its shape as it is.
+const LOOKS: [&str; 8] =
+    ["transform", "material", "opacity", "color", "technique", "shadow_coefficient", "casts_shadow", "visible"];
+
+/// Whether a track changes the shape of the object of this rank and name.
+pub(crate) fn deforms(raw: &RawAnimation, rank: usize, name: &str) -> bool {
+    let changes = |path: Vec<String>| {
+        let of_object = path.get(1).is_none_or(|of| of == name || *of == rank.to_string());
+        path[0] == "object" && of_object && path.get(2).is_none_or(|key| !LOOKS.contains(&key.as_str()))
+    };
+    raw.track.iter().filter_map(|track| path_of(track).ok()).any(changes)
+}
+
+/// Puts the values of a frame into the tree.
+pub(crate) fn apply(document: &mut Document<'_>, frame: u32) -> Result<(), Error> {
+    let Some(node) = entry(&document.root, "animation").cloned() else { return Ok(()) };
+    let raw: RawAnimation = from_node(document, &node)?;
+    check_animation(&At::of(document).key("animation"), &raw)?;
+    let written = entry(&node, "track").map_or(&[][..], items);
+    for (track, written) in raw.track.iter().zip(written) {
+        let keys = entry(written, "keys").map_or(&[][..], items);
+        let values: Vec<&Node> = keys.iter().filter_map(|key| entry(key, "value")).collect();
+        let frames: Vec<f64> = track.keys.iter().map(|key| f64::from(key.frame)).collect();
+        let (first, weights) = weights(&frames, f64::from(frame), track.interpolation);
+        let held = frames.iter().rposition(|f| *f <= f64::from(frame)).unwrap_or(0);
+        let terms: Vec<(&Node, f64)> =
+            values[first..].iter().copied().zip(weights).filter(|(_, w)| *w != 0.0).collect();
+        let value = blend(&terms, values[held]).map_err(|wrong| {
+            let message = format!("expected {}, as at the key beside it, found {}", wrong.0, wrong.1.value.describe());
+            document.error(wrong.1.place, message, "values of one track are alike")
+        })?;
+        let path = path_of(track).map_err(|message| document.error(written.place, message, ""))?;
+        let place = values[held].place;
+        set(&mut document.root, &path, value, place).map_err(|(message, hint)| {
+            let place = entry(written, "set").map_or(written.place, |node| node.place);
+            document.error(place, format!("`set`: {message}"), hint)
+        })?;
+    }
+    Ok(())
+}
+
+pub(crate) fn path_of(track: &RawTrack) -> Result<Vec<String>, String> {
+    let path = split_path(&track.set)?;
+    if path[0] == "animation" || path[0] == "version" {
+        return Err(format!("expected a value of the scene, found `{}`", crate::shown(&path[0])));
+    }
+    Ok(path)
+}
+
+pub(crate) fn entry<'a>(node: &'a Node, key: &str) -> Option<&'a Node> {
+    let Value::Table(entries) = &node.value else { return None };
+    entries.iter().find(|e| e.key == key).map(|e| &e.node)
+}
+
+pub(crate) fn items(node: &Node) -> &[Node] {
+    let Value::List(items) = &node.value else { return &[] };
+    items
+}
+
+/// The first key that counts at a frame, which may be between two,, and the weights of it and of those after it; `frames` increase.
+pub(crate) fn weights(frames: &[f64], frame: f64, blend: Blend) -> (usize, Vec<f64>) {
+    let after = frames.partition_point(|f| *f <= frame);
+    if after == 0 || after == frames.len() || frames[after - 1] == frame {
+        return (after.saturating_sub(1), vec![1.0]);
+    }
+    let (a, b) = (after - 1, after);
+    let length = frames[b] - frames[a];
+    let t = (frame - frames[a]) / length;
+    if blend == Blend::Linear {
+        return (a, vec![1.0 - t, t]);
+    }
+    // The cubic with these values and slopes at both ends; slopes are differences of the keys around.
+    let first = a.saturating_sub(1);
+    let mut weights = vec![0.0; (b + 2).min(frames.len()) - first];
+    let (t2, t3) = (t * t, t * t * t);
+    weights[a - first] += 2.0 * t3 - 3.0 * t2 + 1.0;
+    weights[b - first] += 3.0 * t2 - 2.0 * t3;
+    for (key, basis) in [(a, t3 - 2.0 * t2 + t), (b, t3 - t2)] {
+        let (low, high) = (key.saturating_sub(1), (key + 1).min(frames.len() - 1));
+        let slope = basis * length / (frames[high] - frames[low]);
+        weights[high - first] += slope;
+        weights[low - first] -= slope;
+    }
+    (first, weights)
+}
+
+/// The weighted sum of values, or what was expected and the value that is not alike.
+fn blend<'a>(terms: &[(&'a Node, f64)], held: &'a Node) -> Result<Value, (String, &'a Node)> {
+    let unlike = |other: &'a Node| (held.value.describe(), other);
+    match &held.value {
+        Value::Int(_) | Value::Float(_) => {
+            let mut sum = 0.0;
+            let mut whole = true;
+            for (node, weight) in terms {
+                let x = match node.value {
+                    Value::Int(i) => i as f64,
+                    Value::Float(x) => x,
+                    _ => return Err(unlike(node)),
+                };
+                whole &= matches!(node.value, Value::Int(_));
+                sum += weight * x;
+            }
+            // A count stays a count where it can.
+            Ok(if whole && sum.fract() == 0.0 { Value::Int(sum as i64) } else { Value::Float(sum) })
+        }
+        Value::List(list) => {
+            let element = |i: usize| {
+                let mut of_terms = Vec::with_capacity(terms.len());
+                for (node, weight) in terms {
+                    match &node.value {
+                        Value::List(other) if other.len() == list.len() => of_terms.push((&other[i], *weight)),
+                        _ => return Err(unlike(node)),
+                    }
+                }
+                Ok(Node { place: list[i].place, value: blend(&of_terms, &list[i])? })
+            };
+            (0..list.len()).map(element).collect::<Result<_, _>>().map(Value::List)
+        }
+        Value::Table(table) => {
+            let element = |e: &'a Entry| {
+                let mut of_terms = Vec::with_capacity(terms.len());
+                for (node, weight) in terms {
+                    of_terms.push((entry(node, &e.key).ok_or_else(|| unlike(node))?, *weight));
+                }
+                let node = Node { place: e.node.place, value: blend(&of_terms, &e.node)? };
+                Ok(Entry { key: e.key.clone(), place: e.place, node })
+            };
+            table.iter().map(element).collect::<Result<_, _>>().map(Value::Table)
+        }
+        Value::Text(_) | Value::Bool(_) | Value::Null => Ok(held.value.clone()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn at(frames: &[f64], values: &[f64], frame: f64, blend: Blend) -> f64 {
+        let (first, weights) = weights(frames, frame, blend);
+        weights.iter().zip(&values[first..]).map(|(w, v)| w * v).sum()
+    }
+
+    #[test]
+    fn both_blends_pass_the_keys_and_hold_outside() {
+        let (frames, values) = ([2.0, 5.0, 6.0, 20.0], [1.0, -3.0, 8.0, 4.0]);
+        for blend in [Blend::Linear, Blend::Smooth] {
+            for (f, v) in frames.iter().zip(values) {
+                assert_eq!(at(&frames, &values, *f, blend), v);
+            }
+            assert_eq!([at(&frames, &values, 0.0, blend), at(&frames, &values, 99.0, blend)], [1.0, 4.0]);
+            assert_eq!(at(&[7.0], &[3.0], 1.0, blend), 3.0);
+        }
+        assert_eq!(at(&frames, &values, 3.0, Blend::Linear), 1.0 - 4.0 / 3.0);
+    }
+
+    #[test]
+    fn smooth_follows_a_line_exactly_and_has_no_corners() {
+        let frames = [0.0, 10.0, 15.0, 40.0];
+        let line = frames.map(|f| 3.0 * f - 7.0);
+        for f in 0..=40 {
+            assert!((at(&frames, &line, f.into(), Blend::Smooth) - (3.0 * f64::from(f) - 7.0)).abs() < 1e-12);
+        }
+        let values = [0.0, 5.0, -2.0, 1.0];
+        for key in [10.0, 15.0] {
+            let slope = |side: f64| {
+                (at(&frames, &values, key + side, Blend::Smooth) - at(&frames, &values, key, Blend::Smooth)) / side
+            };
+            assert!((slope(1e-6) - slope(-1e-6)).abs() < 1e-4, "{key}");
+        }
+    }
+}

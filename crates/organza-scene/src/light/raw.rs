@@ -1,0 +1,148 @@
+//! Lights as they are written.
+
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+fn yes() -> bool {
+    true
+}
+
+fn sixteen() -> u32 {
+    16
+}
+
+/// A light.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, rename_all = "lowercase", expecting = "a table with a key `kind`")]
+#[schemars(tag = "kind")]
+#[schemars(rename = "Light")]
+pub(crate) enum RawLight {
+    /// Radiates equally in all directions from a point.
+    Point {
+        /// Name by which effects of this light are called, such as "sun" in "shadow.sun"; default its index, from 0.
+        name: Option<String>,
+        /// World position.
+        position: [f64; 3],
+        /// Radiant intensity per channel, W/sr or relative.
+        intensity: [f64; 3],
+        /// Whether it casts shadows; default true.
+        #[serde(default = "yes")]
+        shadow: bool,
+    },
+    /// Parallel light.
+    Directional {
+        /// Name by which effects of this light are called, such as "sun" in "shadow.sun"; default its index, from 0.
+        name: Option<String>,
+        /// Direction of travel, away from the light; any length.
+        direction: [f64; 3],
+        /// Irradiance per channel on a plane that faces the light, W/m² or relative.
+        irradiance: [f64; 3],
+        /// Path of a picture that the light shines through: PNG, Radiance HDR or OpenEXR.
+        texture: Option<String>,
+        /// World direction that is upwards in the picture; default +Y, +Z for light along the Y axis.
+        texture_up: Option<[f64; 3]>,
+        /// Width of the picture, world units.
+        texture_width: Option<f64>,
+        /// World point that the middle of the picture falls on; default the origin.
+        texture_center: Option<[f64; 3]>,
+        /// Whether it casts shadows; default true.
+        #[serde(default = "yes")]
+        shadow: bool,
+    },
+    /// A cone of light.
+    Spot {
+        /// Name by which effects of this light are called, such as "sun" in "shadow.sun"; default its index, from 0.
+        name: Option<String>,
+        /// World position.
+        position: [f64; 3],
+        /// A point on the axis; or `direction`.
+        target: Option<[f64; 3]>,
+        /// Direction of the axis; or `target`.
+        direction: Option<[f64; 3]>,
+        /// Half angle of full light, degrees; default 0.
+        #[serde(default)]
+        inner: f64,
+        /// Half angle of no light, degrees, below 90.
+        outer: f64,
+        /// Radiant intensity on the axis per channel, W/sr or relative.
+        intensity: [f64; 3],
+        /// Path of a picture that the light shines through: PNG, Radiance HDR or OpenEXR.
+        texture: Option<String>,
+        /// World direction that is upwards in the picture; default +Y, +Z for light along the Y axis.
+        texture_up: Option<[f64; 3]>,
+        /// Angle across the width of the picture, degrees, below 180; default such that the shorter side is as wide as the cone.
+        texture_angle: Option<f64>,
+        /// Whether it casts shadows; default true.
+        #[serde(default = "yes")]
+        shadow: bool,
+    },
+    /// A sphere that shines outwards.
+    Sphere {
+        /// Name by which effects of this light are called, such as "sun" in "shadow.sun"; default its index, from 0.
+        name: Option<String>,
+        /// World position of the centre.
+        position: [f64; 3],
+        /// Radius, world units.
+        radius: f64,
+        /// Radiant intensity of the whole light per channel, seen from far away, W/sr or relative.
+        intensity: [f64; 3],
+        /// Points that it is taken for by techniques that light by points; default 16.
+        #[serde(default = "sixteen")]
+        samples: u32,
+        /// Whether it casts shadows; default true.
+        #[serde(default = "yes")]
+        shadow: bool,
+    },
+    /// A flat disc that shines to the side of its normal.
+    Disk {
+        /// Name by which effects of this light are called, such as "sun" in "shadow.sun"; default its index, from 0.
+        name: Option<String>,
+        /// World position of the centre.
+        position: [f64; 3],
+        /// Normal; any length.
+        normal: [f64; 3],
+        /// Radius, world units.
+        radius: f64,
+        /// Radiant intensity of the whole light per channel, along its normal, seen from far away, W/sr or relative.
+        intensity: [f64; 3],
+        /// Points that it is taken for by techniques that light by points; default 16.
+        #[serde(default = "sixteen")]
+        samples: u32,
+        /// Whether it casts shadows; default true.
+        #[serde(default = "yes")]
+        shadow: bool,
+    },
+    /// A flat parallelogram that shines to the side of u × v.
+    Rect {
+        /// Name by which effects of this light are called, such as "sun" in "shadow.sun"; default its index, from 0.
+        name: Option<String>,
+        /// World position of the centre.
+        position: [f64; 3],
+        /// First half-axis, world units.
+        u: [f64; 3],
+        /// Second half-axis, world units.
+        v: [f64; 3],
+        /// Radiant intensity of the whole light per channel, along its normal, seen from far away, W/sr or relative.
+        intensity: [f64; 3],
+        /// Points that it is taken for by techniques that light by points; default 16.
+        #[serde(default = "sixteen")]
+        samples: u32,
+        /// Whether it casts shadows; default true.
+        #[serde(default = "yes")]
+        shadow: bool,
+    },
+}
+
+impl RawLight {
+    /// The name that the scene gives it.
+    pub(crate) fn name(&self) -> Option<&str> {
+        match self {
+            Self::Point { name, .. }
+            | Self::Directional { name, .. }
+            | Self::Spot { name, .. }
+            | Self::Sphere { name, .. }
+            | Self::Disk { name, .. }
+            | Self::Rect { name, .. } => name.as_deref(),
+        }
+    }
+}

@@ -1,0 +1,5 @@
+//! Materials: `[material.NAME]`.
+
+pub(crate) mod check;
+pub(crate) mod model;
+pub(crate) mod raw;

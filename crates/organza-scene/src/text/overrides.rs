@@ -1,0 +1,171 @@
+//! Changes of the value tree from the command line, before anything is checked.
+
+use super::de::suggest;
+use super::tree::{Document, Entry, Node, Place, Value};
+use crate::text::toml::read_toml_value;
+use crate::{Error, MAX_SCENE_DEPTH, shown};
+
+/// One change: a value at a path of keys.
+///
+/// ```
+/// use organza_scene::Override;
+/// let change = Override::parse("render.points.exact=true").unwrap();
+/// assert_eq!(change.flag(), "--set render.points.exact=true");
+/// ```
+#[derive(Debug, Clone, PartialEq)]
+pub struct Override {
+    flag: String,
+    path: Vec<String>,
+    value: Value,
+}
+
+impl Override {
+    /// From `PATH=VALUE`: keys with dots between them, in a list an index from 0 or an entry's `name`; the value in
+    /// TOML, where a plain word needs no quotes.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] naming what is wrong.
+    pub fn parse(text: &str) -> Result<Self, Error> {
+        let bad = |message: String| {
+            let message = format!("--set {}: {message}", shown(text));
+            Error::usage(message, "write PATH=VALUE, such as --set render.points.exact=true")
+        };
+        let (path, value) = text.split_once('=').ok_or_else(|| bad("expected PATH=VALUE, found no `=`".into()))?;
+        let path = split_path(path).map_err(bad)?;
+        let value = value.trim();
+        let is_word = |c: char| c.is_alphanumeric() || "_-./".contains(c);
+        let parsed = match read_toml_value(value) {
+            Ok(parsed) => parsed,
+            Err(_) if !value.is_empty() && value.chars().all(is_word) && !is_not_finite(value) => {
+                Value::Text(value.to_owned())
+            }
+            Err(message) => return Err(bad(message)),
+        };
+        Ok(Self { flag: format!("--set {text}"), path, value: parsed })
+    }
+
+    /// From an option of its own: `flag` as it is shown in messages, a path, and a value in TOML.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] if the value is not TOML.
+    pub fn from_option(flag: String, path: &str, toml: &str) -> Result<Self, Error> {
+        let bad = |message: String| Error::usage(format!("{}: {message}", shown(&flag)), "");
+        let value = read_toml_value(toml).map_err(bad)?;
+        Ok(Self { path: path.split('.').map(str::to_owned).collect(), value, flag })
+    }
+
+    /// From `NAME=on` or `NAME=off` of an effect, whose name may have dots in it.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] naming what is wrong.
+    pub fn of_effect(text: &str) -> Result<Self, Error> {
+        let flag = format!("--effect {text}");
+        let (name, switch) = text.rsplit_once('=').unwrap_or((text, ""));
+        if name.is_empty() || !["on", "off", "auto"].contains(&switch) {
+            let message = format!("{}: expected NAME=on, NAME=off or NAME=auto", shown(&flag));
+            return Err(Error::usage(message, "`organza explain` lists the effects of a scene by name"));
+        }
+        let path = ["render", "effects", name].map(str::to_owned).to_vec();
+        Ok(Self { flag, path, value: Value::Text(switch.to_owned()) })
+    }
+
+    /// The option as it was written on the command line.
+    pub fn flag(&self) -> &str {
+        &self.flag
+    }
+}
+
+/// Keys with dots between them; the error is a message alone.
+pub(crate) fn split_path(text: &str) -> Result<Vec<String>, String> {
+    let path: Vec<String> = text.trim().split('.').map(str::to_owned).collect();
+    if path.iter().any(String::is_empty) || path.len() > MAX_SCENE_DEPTH {
+        return Err(format!("expected 1 to {MAX_SCENE_DEPTH} keys with dots between them"));
+    }
+    Ok(path)
+}
+
+fn is_not_finite(word: &str) -> bool {
+    word.parse::<f64>().is_ok_and(|x| !x.is_finite())
+}
+
+/// Applies all changes in order.
+pub(crate) fn apply(document: &mut Document<'_>, overrides: &[Override]) -> Result<(), Error> {
+    for change in overrides {
+        let place = Place::Flag(document.flags.len());
+        document.flags.push(change.flag.clone());
+        let mut value = change.value.clone();
+        set_places(&mut value, place);
+        if let Err((message, hint)) = set(&mut document.root, &change.path, value, place) {
+            return Err(document.error(place, message, hint));
+        }
+    }
+    Ok(())
+}
+
+fn set_places(value: &mut Value, place: Place) {
+    match value {
+        Value::List(items) => {
+            for item in items {
+                item.place = place;
+                set_places(&mut item.value, place);
+            }
+        }
+        Value::Table(entries) => {
+            for entry in entries {
+                entry.place = place;
+                entry.node.place = place;
+                set_places(&mut entry.node.value, place);
+            }
+        }
+        _ => {}
+    }
+}
+
+/// Walks to the path's end, makes tables that are missing, and puts the value there.
+pub(crate) fn set(root: &mut Node, path: &[String], value: Value, place: Place) -> Result<(), (String, String)> {
+    let mut node = root;
+    for key in path {
+        let found = node.value.describe();
+        node = match &mut node.value {
+            Value::Table(entries) => {
+                let index = entries.iter().position(|e| e.key == *key).unwrap_or_else(|| {
+                    let empty = Node { place, value: Value::Table(Vec::new()) };
+                    entries.push(Entry { key: key.clone(), place, node: empty });
+                    entries.len() - 1
+                });
+                &mut entries[index].node
+            }
+            Value::List(items) => {
+                let index = index_in_list(items, key)?;
+                &mut items[index]
+            }
+            _ => {
+                return Err((
+                    format!("expected a table or a list before `{}`, found {found}", shown(key)),
+                    String::new(),
+                ));
+            }
+        };
+    }
+    *node = Node { place, value };
+    Ok(())
+}
+
+/// An entry of a list by index, or by its `name`.
+fn index_in_list(items: &[Node], key: &str) -> Result<usize, (String, String)> {
+    if let Ok(index) = key.parse::<usize>() {
+        let message = || (format!("expected an index below {}, found {index}", items.len()), String::new());
+        return (index < items.len()).then_some(index).ok_or_else(message);
+    }
+    let names: Vec<&str> = items.iter().map(|item| name_of(item).unwrap_or("")).collect();
+    let position = names.iter().position(|name| *name == key);
+    position.ok_or_else(|| (format!("expected an index or a name, found `{}`", shown(key)), suggest(key, &names)))
+}
+
+fn name_of(node: &Node) -> Option<&str> {
+    let Value::Table(entries) = &node.value else { return None };
+    entries.iter().find(|e| e.key == "name").and_then(|e| match &e.node.value {
+        Value::Text(name) => Some(name.as_str()),
+        _ => None,
+    })
+}
