@@ -116,6 +116,19 @@ fn exit_2_is_for_the_command_line() {
 #[test]
 fn options_of_particles_are_warned_of_where_none_are_drawn() {
     let place = place();
+    for (option, words) in [
+        (&["--seed", "7"][..], "warning: --seed changes nothing: no object is drawn by the technique `particles`"),
+        (&["--drop-invalid"], "warning: --drop-invalid changes nothing: no object is made of points"),
+        (
+            &["--set", "render.surfels.gap=0.5"],
+            "note: render.surfels.gap has no part in this picture: nothing is drawn by the technique `surfels`",
+        ),
+    ] {
+        place.expect(0, &[&["explain", "s.toml"], option].concat(), words);
+        place.expect(0, &[&["render", "s.toml", "-o", "s.png", "--force"], option].concat(), words);
+    }
+    let contrary = ["render", "s.toml", "-o", "contrary.png", "--effect", "light.0=on", "--effect", "light.0=off"];
+    place.expect(2, &contrary, "--effect light.0=on and --effect light.0=off: one of them can hold");
     let words = "warning: --repeat-level changes nothing: no object is drawn by the technique `particles`";
     place.expect(0, &["render", "s.toml", "-o", "a.exr", "--repeat-level", "4"], words);
     place.expect(0, &["explain", "s.toml", "--repeat-level", "4"], words);

@@ -26,7 +26,7 @@ const STAGES: [(&str, f64); 6] = [
 pub(super) fn run(arguments: &AccuracyArguments) -> Result<(), Error> {
     processor_only(&arguments.scene)?;
     refuse_technique_and_layers("accuracy", &arguments.scene)?;
-    let mut scene = load_scene(&arguments.scene)?;
+    let mut scene = load_scene("accuracy", &arguments.scene)?;
     let options = Options { quick: arguments.quick, finer: arguments.finer, seed: scene.render.seed };
     if arguments.scene.common.size.is_none() {
         accuracy::shrink(&mut scene, options.longest_side());

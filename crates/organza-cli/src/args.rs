@@ -3,11 +3,11 @@
 mod parse;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
-use parse::{parse_bytes, parse_device, parse_finite, parse_frames, parse_size};
+use parse::{parse_budget, parse_bytes, parse_device, parse_error_limit, parse_finite, parse_frames, parse_size};
 use std::path::PathBuf;
 
 /// Most threads that are worth a try.
-const MOST_THREADS: u64 = 1024;
+pub(super) const MOST_THREADS: u64 = 1024;
 
 /// What a first look at the command shows.
 const EXAMPLES: &str = "Examples:
@@ -223,6 +223,26 @@ pub(super) struct SceneArguments {
     pub(super) common: CommonArguments,
 }
 
+/// What a picture is to keep to, where settings may give way for it.
+#[derive(Debug, Args)]
+pub(super) struct GoalArguments {
+    /// Draw within so many milliseconds from files read to picture finished, on the threads of --threads: samples of a pixel, splats and sets of
+    /// particles give way as far as they have to, and which did is told
+    #[arg(long, value_name = "MS", value_parser = parse_budget, allow_negative_numbers = true,
+          conflicts_with_all = ["frames", "turntable", "checkpoint"])]
+    pub(super) budget: Option<u64>,
+    /// Draw as fast as an RMSE of the displayed picture of at most E allows (0 to 1, against the scene's own settings): the same settings give way.
+    /// It is an estimate from small pictures, mostly within a factor of 2: too high of fewer samples where all is smooth edges, too low of fine detail.
+    /// --tolerance is another thing, a proven bound of what is not simulated, and --target-error the noise of particles
+    #[arg(long, value_name = "E", value_parser = parse_error_limit, allow_negative_numbers = true,
+          conflicts_with_all = ["frames", "turntable", "checkpoint"])]
+    pub(super) max_rmse: Option<f64>,
+    /// The same by the mean FLIP, the difference that is seen (0 to 1); with --max-rmse and --budget all hold, or the nearest is named
+    #[arg(long, value_name = "E", value_parser = parse_error_limit, allow_negative_numbers = true,
+          conflicts_with_all = ["frames", "turntable", "checkpoint"])]
+    pub(super) max_flip: Option<f64>,
+}
+
 #[derive(Debug, Args)]
 pub(super) struct RenderArguments {
     #[command(flatten)]
@@ -240,11 +260,8 @@ pub(super) struct RenderArguments {
     /// Draw so many frames in a circle around all, to numbered files
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
     pub(super) turntable: Option<u32>,
-    /// Draw within so many milliseconds from files read to picture finished, on the threads of --threads: samples of a pixel, splats and sets of
-    /// particles give way as far as they have to, and which did is told
-    #[arg(long, value_name = "MS", value_parser = clap::value_parser!(u64).range(1..=86_400_000),
-          conflicts_with_all = ["frames", "turntable", "checkpoint"])]
-    pub(super) budget: Option<u64>,
+    #[command(flatten)]
+    pub(super) goal: GoalArguments,
     /// Write files with the opacity of each pixel in the place of the background: premultiplied in EXR, straight in PNG
     #[arg(long)]
     pub(super) transparent: bool,

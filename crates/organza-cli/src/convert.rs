@@ -4,7 +4,7 @@ use super::args::{ConvertArguments, SceneArguments};
 use super::bar::with_bar;
 use super::console;
 use super::given::given;
-use super::session::{parse_scene, path_text, processor_only, render_options};
+use super::session::{parse_scene, path_text, processor_only, render_options, unused_goal};
 use organza::output::{Target, Targets};
 use organza::scene::{Scene, Technique};
 use organza::{Error, Files, Loaded, printable, shown};
@@ -59,6 +59,7 @@ pub(super) fn begin(arguments: &SceneArguments, output: &Path, force: bool) -> R
     Target::new(path, force)?;
     let (given, files) = given(arguments, None)?;
     let mut scene = parse_scene(arguments, &given, None, None)?;
+    unused_goal(&scene.render.goal, "a file of points").iter().for_each(|sentence| console::warn(sentence));
     let mut targets = Targets::default();
     targets.add_inputs(&scene.files());
     let target = targets.add(path, force)?;

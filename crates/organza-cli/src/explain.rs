@@ -4,7 +4,9 @@ use super::args::{ExplainArguments, SceneArguments};
 use super::bar::with_bar;
 use super::given::{Given, given};
 use super::machine::rates;
-use super::session::{parse_scene, parse_switched, path_text, processor_only, render_options, without_effect};
+use super::session::{
+    parse_scene, parse_switched, path_text, processor_only, render_options, unused_goal, without_effect,
+};
 use super::{console, report};
 use organza::cost::Prediction;
 use organza::plan::Plan;
@@ -55,6 +57,9 @@ pub(super) fn run(arguments: &ExplainArguments) -> Result<(), Error> {
         Ok(Explained { plan, cost, predicted, prepared, measured: None, warnings, notes, found })
     })?;
     explained.warnings.extend(without_effect(&arguments.scene, &scene));
+    explained
+        .warnings
+        .extend(unused_goal(&scene.render.goal, "`organza explain`, which tells of the scene's own settings"));
     for warning in &explained.warnings {
         console::warn(warning);
     }

@@ -1,15 +1,17 @@
 //! The pictures that `organza render` is asked for, checked before the first is drawn. Of a frame nothing is kept but what
 //! others need of it: an animation may have a million.
 
+use super::args::Backend;
 use super::args::{Frames, RenderArguments};
 use super::given::{Given, given};
-use super::session::{Flag, overrides, parse_scene, render_options};
+use super::session::{
+    Flag, goal_keys, goal_overrides, goal_remarks, overrides, parse_changed, parse_scene, render_options, unused_goal,
+};
 use organza::output::{self, Format, Target, Targets};
-use organza::scene::{FoundCamera, Scene};
-use organza::{Error, Files, Progress, Render, RenderOptions, Sequence, WithinBudget, printable};
+use organza::scene::{FoundCamera, Goal, Scene};
+use organza::{Error, Files, Progress, Render, RenderOptions, Sequence, WithinGoal, printable};
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
-use std::time::Duration;
 
 /// Least digits of a frame's number in a file name.
 const DIGITS: usize = 4;
@@ -21,6 +23,8 @@ pub(super) struct Jobs<'a> {
     given: Given,
     /// The scene as it is written.
     still: Scene,
+    /// What it says itself of a goal, without the options of one.
+    stated_goal: Goal,
     outputs: Vec<PathBuf>,
     /// First and last frame.
     frames: Option<[u32; 2]>,
@@ -49,14 +53,45 @@ impl<'a> Jobs<'a> {
             let hint = "give points a `color_by` (data files: --color-by COLUMN), a volume is coloured by its `transfer`; or leave it out";
             return Err(Error::usage(message, hint));
         }
+        let stated_goal = parse_scene(&arguments.scene, &given, None, arguments.turntable)?.render.goal;
         let asked = arguments.frames.or(arguments.turntable.map(|_| Frames::All));
         let frames = asked.map(|frames| range(frames, &still)).transpose()?;
-        Ok((Self { arguments, given, still, outputs, frames }, files))
+        Ok((Self { arguments, given, still, stated_goal, outputs, frames }, files))
     }
 
     /// The scene as it is written.
     pub(super) fn still(&self) -> &Scene {
         &self.still
+    }
+
+    /// What the picture is to keep to; nothing where frames are drawn, a checkpoint is kept, or a device helps.
+    pub(super) fn goal(&self) -> Goal {
+        if self.why_no_goal().is_some() { Goal::default() } else { self.still.render.goal }
+    }
+
+    /// What is good to know of the goal: keys that have no part in what is drawn, and those that options overrule.
+    pub(super) fn goal_sentences(&self) -> Vec<String> {
+        match self.why_no_goal() {
+            Some(place) => unused_goal(&self.stated_goal, place),
+            None => goal_remarks(&self.arguments.goal, &self.stated_goal),
+        }
+    }
+
+    fn why_no_goal(&self) -> Option<&'static str> {
+        if !self.is_still() {
+            Some("frames")
+        } else if self.arguments.checkpoint.is_some() {
+            Some("a picture with a --checkpoint")
+        } else if self.arguments.scene.backend != Backend::Cpu {
+            Some("a picture that a --backend draws")
+        } else {
+            None
+        }
+    }
+
+    /// Options that take the scene's own goal out, so that settings that were found for it stay.
+    pub(super) fn without_goal(&self) -> impl Iterator<Item = String> {
+        goal_keys(&self.stated_goal).into_iter().map(|key| format!("--set render.{key}=none"))
     }
 
     /// The scene's file, or the data files that one was made of.
@@ -149,7 +184,8 @@ impl<'a> Jobs<'a> {
 
 /// The scene with the options of the command line, and with the layer that files without a background are made with.
 fn parsed(arguments: &RenderArguments, given: &Given, frame: Option<u32>) -> Result<Scene, Error> {
-    let mut scene = parse_scene(&arguments.scene, given, frame, arguments.turntable)?;
+    let goal = goal_overrides(&arguments.goal)?;
+    let mut scene = parse_changed(&arguments.scene, given, frame, arguments.turntable, goal)?;
     let has_all = !arguments.transparent || scene.render.layers.add("background");
     has_all.then_some(scene).ok_or_else(|| Error::Internal("there is no layer of the background".into()))
 }
@@ -163,19 +199,17 @@ pub(super) enum Drawing {
 }
 
 impl Drawing {
-    /// Draws one picture within a time.
+    /// Draws one picture that keeps to a goal.
     pub(super) fn render_within(
         &mut self,
         scene: &Scene,
-        budget: Duration,
+        goal: &Goal,
         options: &RenderOptions,
         progress: &Progress,
-    ) -> Result<WithinBudget, Error> {
+    ) -> Result<WithinGoal, Error> {
         match self {
-            Self::Still(files) => {
-                organza::render_within(scene, budget, options, progress, std::mem::take(&mut **files))
-            }
-            Self::Frames(_) => Err(Error::Internal("frames have no budget".into())),
+            Self::Still(files) => organza::render_within(scene, goal, options, progress, std::mem::take(&mut **files)),
+            Self::Frames(_) => Err(Error::Internal("frames have no goal".into())),
         }
     }
 

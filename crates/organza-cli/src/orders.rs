@@ -13,7 +13,7 @@ use serde_json::json;
 pub(super) fn run(arguments: &OrdersArguments) -> Result<(), Error> {
     processor_only(&arguments.scene)?;
     refuse_technique_and_layers("orders", &arguments.scene)?;
-    let mut scene = load_scene(&arguments.scene)?;
+    let mut scene = load_scene("orders", &arguments.scene)?;
     if arguments.scene.common.size.is_none() {
         accuracy::shrink(&mut scene, orders::LONGEST_SIDE);
     }

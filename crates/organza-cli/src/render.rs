@@ -1,14 +1,15 @@
 //! `organza render`.
 
-use super::args::RenderArguments;
+use super::args::{GoalArguments, RenderArguments};
 use super::bar::with_bar;
 use super::jobs::{Drawing, Jobs, Places};
 use super::machine::rates;
 use super::session::{open_device, path_text, processor_only, render_options, without_effect};
 use super::{console, report};
+use organza::cost::announcement_of_frames;
 use organza::output::{self, Metadata, Target, WriteReport};
-use organza::scene::{FoundCamera, Scene};
-use organza::{Error, GivenUp, Progress, Render, RenderOptions, Sets, WithinBudget, printable};
+use organza::scene::{FoundCamera, Goal, Scene, short};
+use organza::{Error, Expected, ExpectedError, GivenUp, Progress, Render, RenderOptions, Sets, WithinGoal, printable};
 use organza_judge::documents;
 use serde_json::{Value, json};
 use splat_core::{MemoryAccount, Reservation};
@@ -34,28 +35,46 @@ struct Job<'a> {
     /// The camera that was placed for it.
     found: Option<FoundCamera>,
     places: &'a Places,
+    /// What it is to keep to, and the options that take out what the scene says of that.
+    goal: Goal,
+    without_goal: Vec<String>,
 }
 
-/// How a picture was drawn within a time.
-struct Budgeted {
-    budget: Duration,
+/// How a picture was drawn that keeps to a goal.
+struct Kept {
+    goal: Goal,
     given_up: Vec<GivenUp>,
+    /// Options that take out what the scene says of a goal.
+    without_goal: Vec<String>,
     expected: Duration,
     taken: Duration,
+    error: ExpectedError,
+    ladder: Vec<Expected>,
 }
 
-impl Budgeted {
+impl Kept {
     /// Options that draw the same picture again.
     fn options(&self) -> impl Iterator<Item = String> + '_ {
-        self.given_up.iter().map(|setting| format!("--set {}={}", setting.key, setting.taken))
+        let settings = self.given_up.iter().map(|setting| format!("--set {}={}", setting.key, setting.taken));
+        settings.chain(self.without_goal.iter().cloned())
     }
 
     fn text(&self) -> String {
-        let [budget, expected, taken] = [self.budget, self.expected, self.taken].map(|time| time.as_millis());
-        let mut text = format!("budget of {budget} ms: expected {expected} ms, took {taken} ms");
+        let mut text = self.ladder_text();
+        let Goal { budget_ms, max_rmse, max_flip } = self.goal;
+        let limits = [
+            budget_ms.map(|ms| format!("{ms} ms")),
+            max_rmse.map(|error| format!("an RMSE of {}", short(error))),
+            max_flip.map(|error| format!("a FLIP of {}", short(error))),
+        ];
+        let limits = limits.into_iter().flatten().collect::<Vec<_>>().join(" and ");
+        let [expected, taken] = [self.expected, self.taken].map(|time| time.as_millis());
+        text += &format!("within {limits}: expected {expected} ms, took {taken} ms");
         if self.given_up.is_empty() {
             return text + ", with all that the scene asks for\n";
         }
+        let [rmse, flip] = [self.error.rmse, self.error.flip].map(error_text);
+        text += &format!(", errs by about {rmse} RMSE and {flip} FLIP");
         for GivenUp { key, asked, taken } in &self.given_up {
             text += &format!("\n  {key} = {taken}, where the scene has {asked}");
         }
@@ -63,15 +82,47 @@ impl Budgeted {
         text
     }
 
+    /// The settings that were weighed, as a table.
+    fn ladder_text(&self) -> String {
+        let rows = self.ladder.iter().map(|rung| {
+            [
+                rung.antialias.to_string(),
+                short(rung.splat_share),
+                rung.sets.map_or_else(|| "-".to_owned(), |sets| sets.to_string()),
+                rung.time.as_millis().to_string(),
+                error_text(rung.error.rmse),
+                error_text(rung.error.flip),
+            ]
+        });
+        report::table(["antialias", "splat_share", "sets", "ms expected", "RMSE", "FLIP"], "rrrrrr", rows)
+    }
+
     fn json(&self) -> Value {
         let setting = |setting: &GivenUp| json!({ "key": setting.key, "asked": setting.asked, "taken": setting.taken });
+        let rung = |rung: &Expected| {
+            json!({
+                "antialias": rung.antialias, "splat_share": rung.splat_share, "sets": rung.sets,
+                "seconds": rung.time.as_secs_f64(), "rmse": rung.error.rmse, "flip": rung.error.flip,
+            })
+        };
         json!({
-            "seconds": self.budget.as_secs_f64(),
+            "seconds": self.goal.budget_ms.map(|ms| Duration::from_millis(ms).as_secs_f64()),
+            "max_rmse": self.goal.max_rmse,
+            "max_flip": self.goal.max_flip,
             "expected_seconds": self.expected.as_secs_f64(),
             "taken_seconds": self.taken.as_secs_f64(),
+            "expected_rmse": self.error.rmse,
+            "expected_flip": self.error.flip,
             "given_up": self.given_up.iter().map(setting).collect::<Value>(),
+            "same_again": self.options().collect::<Value>(),
+            "ladder": self.ladder.iter().map(rung).collect::<Value>(),
         })
     }
+}
+
+/// An error as a person reads it: estimates have no third digit.
+fn error_text(error: f64) -> String {
+    if error <= 0.0 { "0".to_owned() } else { format!("{error:.1e}") }
 }
 
 /// What a finished picture has to say.
@@ -81,6 +132,8 @@ struct Done {
     warnings: Vec<String>,
     notes: Vec<String>,
     sets: Option<Sets>,
+    /// Predicted seconds of its drawing.
+    predicted_seconds: f64,
 }
 
 /// What pictures have said so far. An animation may have a million: each sentence is kept once, the text of a frame is printed at once, and
@@ -155,7 +208,8 @@ fn add_new(known: &mut Vec<String>, sentences: Vec<String>) {
 
 /// Renders and writes, and gives the exit code. Whatever can be refused is refused before any work.
 pub(super) fn run(arguments: &RenderArguments) -> Result<u8, Error> {
-    if arguments.budget.is_some() {
+    let GoalArguments { budget, max_rmse, max_flip } = arguments.goal;
+    if budget.is_some() || max_rmse.is_some() || max_flip.is_some() {
         processor_only(&arguments.scene)?;
     }
     let rates = rates(arguments.machine.as_deref())?;
@@ -164,7 +218,8 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<u8, Error> {
     let options = RenderOptions { device: open_device(&arguments.scene)?, rates, ..render_options(&arguments.scene) };
     let is_json = arguments.scene.common.json;
     let mut said = Said::default();
-    add_new(&mut said.warnings, without_effect(&arguments.scene, jobs.still()).into_iter().collect());
+    add_new(&mut said.warnings, without_effect(&arguments.scene, jobs.still()));
+    add_new(&mut said.warnings, jobs.goal_sentences());
     let outcome = with_bar(|progress| {
         let count = jobs.frames().count();
         for (at, frame) in jobs.frames().enumerate() {
@@ -172,12 +227,27 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<u8, Error> {
             let places = jobs.places(frame, Target::new)?;
             let told = jobs.told(frame)?;
             let has_comments = jobs.has_comments();
-            let job = Job { frame, scene: &scene, inputs: jobs.inputs(), told, has_comments, found, places: &places };
+            let job = Job {
+                frame,
+                scene: &scene,
+                inputs: jobs.inputs(),
+                told,
+                has_comments,
+                found,
+                places: &places,
+                goal: jobs.goal(),
+                without_goal: jobs.without_goal().collect(),
+            };
             progress.plan([(job.stage(), 1.0), (LATER.to_owned(), (count - at - 1) as f64)]);
             progress.begin(&job.stage());
             progress.enter();
             let one = job.run(arguments, &options, &mut drawing, progress)?;
             progress.leave();
+            if at == 0 && !jobs.is_still() {
+                let seconds = one.predicted_seconds;
+                let sentence = announcement_of_frames(count, seconds, &options.rates);
+                sentence.iter().for_each(|sentence| progress.announce(sentence));
+            }
             let interrupted = one.sets.is_some_and(|s| s.interrupted);
             said.add(one, is_json, drawing.sequence().map(|sequence| sequence.files().memory(&options)))?;
             if interrupted {
@@ -219,32 +289,35 @@ impl Job<'_> {
         progress.plan([(DRAWING, 0.95), (WRITING, 0.05)]);
         progress.begin(DRAWING);
         progress.enter();
-        let (render, budgeted) = match arguments.budget.map(Duration::from_millis) {
-            None => (drawing.render(self.scene, &options, progress)?, None),
-            Some(budget) => {
-                let within = drawing.render_within(self.scene, budget, &options, progress)?;
-                let WithinBudget { render, given_up, expected, taken } = within;
-                (render, Some(Budgeted { budget, given_up, expected, taken }))
-            }
+        let (render, kept) = if self.goal.is_any() {
+            let within = drawing.render_within(self.scene, &self.goal, &options, progress)?;
+            let WithinGoal { render, given_up, expected, taken, error, ladder } = within;
+            let without_goal = self.without_goal.clone();
+            (render, Some(Kept { goal: self.goal, given_up, without_goal, expected, taken, error, ladder }))
+        } else {
+            (drawing.render(self.scene, &options, progress)?, None)
         };
         progress.leave();
         progress.begin(WRITING);
         let mut warnings = render.warnings.clone();
-        let written = self.write_outputs(&render, budgeted.as_ref(), arguments, &mut warnings)?;
+        let written = self.write_outputs(&render, kept.as_ref(), arguments, &mut warnings)?;
         if let Some(target) = &self.places.cost {
             target.write(format!("{:#}\n", documents::cost_json(&render.cost)).as_bytes())?;
         }
         progress.finish();
         let report = match arguments.scene.common.json {
-            true => format!("{:#}", self.json(&render, budgeted.as_ref(), &written)),
-            false => self.text(&render, budgeted.as_ref(), &written),
+            true => format!("{:#}", self.json(&render, kept.as_ref(), &written)),
+            false => self.text(&render, kept.as_ref(), &written),
         };
-        Ok(Done { report, warnings, notes: render.notes, sets: render.sets })
+        let threads = rayon::current_num_threads();
+        let passes = render.predicted.drawing.iter();
+        let predicted_seconds = passes.map(|pass| pass.seconds(&render.predicted.rates, threads)).sum();
+        Ok(Done { report, warnings, notes: render.notes, sets: render.sets, predicted_seconds })
     }
 
-    fn metadata(&self, render: &Render, budgeted: Option<&Budgeted>) -> Metadata {
-        let told = budgeted.filter(|_| self.has_comments).into_iter();
-        let changes = told.flat_map(Budgeted::options).map(|option| format!("\n# {option}"));
+    fn metadata(&self, render: &Render, kept: Option<&Kept>) -> Metadata {
+        let told = kept.filter(|_| self.has_comments).into_iter();
+        let changes = told.flat_map(Kept::options).map(|option| format!("\n# {option}"));
         Metadata {
             scene_sha256: self.scene.sha256.clone(),
             scene: self.told.clone() + &changes.collect::<String>(),
@@ -259,11 +332,11 @@ impl Job<'_> {
     fn write_outputs(
         &self,
         render: &Render,
-        budgeted: Option<&Budgeted>,
+        kept: Option<&Kept>,
         arguments: &RenderArguments,
         warnings: &mut Vec<String>,
     ) -> Result<Vec<(&Path, WriteReport)>, Error> {
-        let metadata = self.metadata(render, budgeted);
+        let metadata = self.metadata(render, kept);
         let RenderArguments { half, deep, transparent, .. } = *arguments;
         let legend = if arguments.legend { render.scales.clone() } else { Vec::new() };
         if arguments.legend && legend.is_empty() {
@@ -304,13 +377,13 @@ impl Job<'_> {
         Ok(written)
     }
 
-    fn text(&self, render: &Render, budgeted: Option<&Budgeted>, written: &[(&Path, WriteReport)]) -> String {
+    fn text(&self, render: &Render, kept: Option<&Kept>, written: &[(&Path, WriteReport)]) -> String {
         let mut text = self.frame.map_or_else(String::new, |frame| format!("frame {frame}\n"));
         text += &report::cost_text(&render.cost);
         if let Some(Sets { averaged, asked, .. }) = render.sets {
             text += &format!("averaged {averaged} of {asked} sets\n");
         }
-        text += &budgeted.map_or_else(String::new, Budgeted::text);
+        text += &kept.map_or_else(String::new, Kept::text);
         if let Some(found) = render.found.or(self.found) {
             text += &report::camera_text(&found);
         }
@@ -320,7 +393,7 @@ impl Job<'_> {
         text
     }
 
-    fn json(&self, render: &Render, budgeted: Option<&Budgeted>, written: &[(&Path, WriteReport)]) -> Value {
+    fn json(&self, render: &Render, kept: Option<&Kept>, written: &[(&Path, WriteReport)]) -> Value {
         let outputs = written.iter().map(|(path, r)| {
             json!({
                 "path": path_text(path), "bytes": r.bytes, "clamped": r.clamped, "not_a_number": r.not_a_number,
@@ -340,7 +413,7 @@ impl Job<'_> {
             "cost": documents::cost_json(&render.cost),
             "predicted": documents::predicted_json(&render.predicted),
             "sets": render.sets.map(sets),
-            "budget": budgeted.map(Budgeted::json),
+            "budget": kept.map(Kept::json),
             "warnings": render.warnings,
             "notes": render.notes,
         });

@@ -175,7 +175,7 @@ pub(super) fn cost_text(cost: &CostRecord) -> String {
 }
 
 /// Columns as wide as they need to be; `align` has `l` or `r` for each.
-fn table<const N: usize>(head: [&str; N], align: &str, rows: impl Iterator<Item = [String; N]>) -> String {
+pub(super) fn table<const N: usize>(head: [&str; N], align: &str, rows: impl Iterator<Item = [String; N]>) -> String {
     let mut all = vec![head.map(str::to_owned)];
     all.extend(rows.map(|row| row.map(|cell| organza::escape_controls(&cell).into_owned())));
     let width = |column: usize| all.iter().map(|row| row[column].chars().count()).max().unwrap_or(0);

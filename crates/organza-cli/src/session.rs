@@ -1,19 +1,22 @@
 //! What all commands on a scene do first: options become overrides, the scene is loaded, the threads start.
 
-use super::args::{Backend, CommonArguments, SceneArguments};
+use super::args::{Backend, CommonArguments, GoalArguments, SceneArguments};
+use super::console;
 use super::given::{Given, camera_overrides, given};
 use super::memory;
 use organza::device::{Choice, Device, DeviceChoice};
-use organza::scene::{self, LoadOptions, Override, Scene, Source, Technique, short};
-use organza::{Cache, Error, Files, InMemory, Progress, RenderOptions, printable};
+use organza::scene::{self, Goal, LoadOptions, Override, Scene, Source, Technique, short};
+use organza::{Cache, Error, Files, InMemory, Progress, RenderOptions, printable, shown};
 use splat_core::MemoryAccount;
 use std::path::Path;
 use std::sync::Arc;
 
 /// The scene, or a first scene of data files, with the options of the command line and a camera that has its place.
-pub(super) fn load_scene(arguments: &SceneArguments) -> Result<Scene, Error> {
+pub(super) fn load_scene(command: &str, arguments: &SceneArguments) -> Result<Scene, Error> {
     let (given, files) = given(arguments, None)?;
     let scene = parse_scene(arguments, &given, None, None)?;
+    let place = format!("`organza {command}`");
+    unused_goal(&scene.render.goal, &place).iter().for_each(|sentence| console::warn(sentence));
     Ok(organza::fitted(&scene, &render_options(arguments), &Progress::new(), &files)?.0.into_owned())
 }
 
@@ -39,7 +42,8 @@ pub(super) fn parse_switched(
     Ok(organza::fitted(&scene, &render_options(arguments), &Progress::new(), files)?.0.into_owned())
 }
 
-fn parse_changed(
+/// The scene with these changes behind all other options.
+pub(super) fn parse_changed(
     arguments: &SceneArguments,
     given: &Given,
     frame: Option<u32>,
@@ -59,16 +63,98 @@ fn parse_changed(
     Ok(scene)
 }
 
-/// Options of the technique `particles` where nothing is drawn by it, which would pass silently otherwise.
-pub(super) fn without_effect(arguments: &SceneArguments, scene: &Scene) -> Option<String> {
+/// Options that change nothing of a scene, which would pass silently otherwise.
+pub(super) fn without_effect(arguments: &SceneArguments, scene: &Scene) -> Vec<String> {
     let techniques = scene.objects.iter().filter(|object| object.visible).filter_map(|object| object.technique);
     let has_particles = techniques.chain([scene.render.technique]).any(|technique| technique == Technique::Particles);
-    let options =
-        [("--target-error", arguments.target_error.is_some()), ("--repeat-level", arguments.repeat_level.is_some())];
-    let (option, _) = options.into_iter().find(|option| option.1).filter(|_| !has_particles)?;
-    Some(format!(
-        "{option} changes nothing: no object is drawn by the technique `particles`; add --technique particles"
-    ))
+    let has_points = scene.objects.iter().any(|object| object.visible && object.source.is_of_points());
+    let options = [
+        Flag { name: "--target-error", is_given: arguments.target_error.is_some() },
+        Flag { name: "--repeat-level", is_given: arguments.repeat_level.is_some() },
+        Flag { name: "--seed", is_given: arguments.seed.is_some() },
+    ];
+    let mut sentences: Vec<String> = options
+        .iter()
+        .filter(|option| option.is_given && !has_particles)
+        .map(|option| {
+            format!(
+                "{} changes nothing: no object is drawn by the technique `particles`; add --technique particles",
+                option.name
+            )
+        })
+        .collect();
+    if arguments.common.drop_invalid && !has_points {
+        sentences.push("--drop-invalid changes nothing: no object is made of points; leave it out".to_owned());
+    }
+    sentences
+}
+
+/// Keys of a goal where a picture does not keep to it, or is none.
+pub(super) fn unused_goal(goal: &Goal, place: &str) -> Vec<String> {
+    let keys = goal_keys(goal);
+    let sentence =
+        |key: &str| format!("render.{key} has no part in {place}: one picture by `organza render` keeps to it");
+    keys.into_iter().map(sentence).collect()
+}
+
+/// The keys of a goal that limit something.
+pub(super) fn goal_keys(goal: &Goal) -> Vec<&'static str> {
+    let is_set = [goal.budget_ms.is_some(), goal.max_rmse.is_some(), goal.max_flip.is_some()];
+    Goal::KEYS.into_iter().zip(is_set).filter(|(_, is_set)| *is_set).map(|(key, _)| key).collect()
+}
+
+/// Options of a goal as changes of the scene's keys.
+pub(super) fn goal_overrides(arguments: &GoalArguments) -> Result<Vec<Override>, Error> {
+    let GoalArguments { budget, max_rmse, max_flip } = *arguments;
+    let mut changes = Vec::new();
+    if let Some(ms) = budget {
+        changes.push(Override::from_option(format!("--budget {ms}"), "render.budget_ms", &ms.to_string())?);
+    }
+    if let Some(error) = max_rmse {
+        let flag = format!("--max-rmse {}", short(error));
+        changes.push(Override::from_option(flag, "render.max_rmse", &format!("{error:?}"))?);
+    }
+    if let Some(error) = max_flip {
+        let flag = format!("--max-flip {}", short(error));
+        changes.push(Override::from_option(flag, "render.max_flip", &format!("{error:?}"))?);
+    }
+    Ok(changes)
+}
+
+/// Options that win over other values of the scene's keys.
+pub(super) fn goal_remarks(arguments: &GoalArguments, stated: &Goal) -> Vec<String> {
+    let GoalArguments { budget, max_rmse, max_flip } = *arguments;
+    let mut remarks = Vec::new();
+    if let (Some(taken), Some(stated)) = (budget, stated.budget_ms)
+        && taken != stated
+    {
+        remarks.push(format!("--budget {taken} is taken, the scene has render.budget_ms = {stated}"));
+    }
+    let mut remark = |option: &str, key: &str, taken: Option<f64>, stated: Option<f64>| {
+        if let (Some(taken), Some(stated)) = (taken, stated)
+            && taken != stated
+        {
+            let (taken, stated) = (short(taken), short(stated));
+            remarks.push(format!("{option} {taken} is taken, the scene has render.{key} = {stated}"));
+        }
+    };
+    remark("--max-rmse", "max_rmse", max_rmse, stated.max_rmse);
+    remark("--max-flip", "max_flip", max_flip, stated.max_flip);
+    remarks
+}
+
+/// Refuses an effect that is switched both on and off.
+fn check_switches(effects: &[String]) -> Result<(), Error> {
+    for (rank, effect) in effects.iter().enumerate() {
+        let Some((name, switch)) = effect.rsplit_once('=') else { continue };
+        let contrary =
+            |before: &&String| before.rsplit_once('=').is_some_and(|(other, before)| other == name && before != switch);
+        if let Some(before) = effects[..rank].iter().find(contrary) {
+            let message = format!("--effect {} and --effect {}: one of them can hold", shown(before), shown(effect));
+            return Err(Error::usage(message, "leave one out"));
+        }
+    }
+    Ok(())
 }
 
 /// An option of the command line.
@@ -202,6 +288,7 @@ pub(super) fn overrides(a: &SceneArguments, is_made: bool) -> Result<Vec<Overrid
         options.push((format!("--layers {}", layers.join(",")), "render.layers", format!("[{list}]")));
     }
     let options = options.into_iter().map(|(flag, path, value)| Override::from_option(flag, path, &value));
+    check_switches(&a.effect)?;
     let mut all = if is_made { Vec::new() } else { camera_overrides(&a.first)? };
     let effects = a.effect.iter().map(|text| Override::of_effect(text));
     for change in options.chain(a.set.iter().map(|text| Override::parse(text))).chain(effects) {

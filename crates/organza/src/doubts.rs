@@ -1,6 +1,7 @@
 //! What a picture would fail to show, and what to change: a scene without light, things outside the view, a picture of one
 //! colour. None is an error, and none is said of an [animation]: there things come into view and fade.
 
+mod keys;
 mod small;
 
 use crate::choose::row;
@@ -12,6 +13,7 @@ use crate::scene::{Scene, SceneLight, SceneObject, Source};
 use crate::shadows::{Coarse, thickness_of};
 use crate::{Layers, ShadowTable, escape_controls};
 use glam::DVec3;
+pub(crate) use keys::without_part;
 use splat_core::raster::objects_in_view;
 use splat_core::shade::joint::MediumSpacing;
 use splat_core::{DAabb, Object, Projection, SplatKind};

@@ -69,7 +69,7 @@ pub use organza_output as output;
 pub use organza_scene as scene;
 pub use organza_scene::{InMemory, SourceData, escape_controls, printable, shown};
 pub use prepare::{Explanation, explain, explain_from, fitted, load, plan_loaded, same_splats, seen, settled};
-pub use render::budget::{GivenUp, WithinBudget, render_within};
+pub use render::budget::{Expected, ExpectedError, GivenUp, WithinGoal, render_within};
 pub use render::{Render, render, render_from};
 pub use sequence::Sequence;
 pub use shadows::{ShadowTable, shadow_params};

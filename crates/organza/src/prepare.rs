@@ -160,6 +160,7 @@ pub(crate) fn prepare<'a>(
     let (plan, memory) = (planned.plan.clone(), planned.memory);
     let mut notes = loaded.notes.clone();
     notes.extend(notes_of_scene);
+    notes.extend(doubts::without_part(&scene));
     let said = settle::said(&scene, &plan.estimates);
     // Of a technique that the plan chose a warning tells what it lacks.
     if said.warnings.is_empty() {

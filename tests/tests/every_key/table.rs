@@ -371,6 +371,7 @@ const CAUCHY: &[&str] = &["material.m.cauchy={a=1.3, b=0.1}"];
 
 const BALL: Which = These(&["medium_ball"]);
 const POINTS_ONLY: Expected = Nothing("a setting of the technique `points`");
+const COMMAND_ONLY: Expected = Nothing("a picture keeps to it by the command `organza render`, which budgets.rs tries");
 const PARTICLES_ONLY: Expected = Nothing("a setting of the technique `particles`");
 const NO_VOXELS: Expected = Nothing("a surface comes as splats, which have footprints of their own");
 const BALL_AND_SURFACE: Which = These(&["medium_ball", "implicit"]);
@@ -388,6 +389,9 @@ fn render() -> Vec<Entry> {
         one("render.seed", "render.seed=5").but_by(BUT_PARTICLES, Nothing("nothing of it is random")),
         of(BALL, "render.splat_share", "render.splat_share=0.5").by(POINTS),
         of(All, "render.max_points", "render.max_points=3").but(All, Refused(5, "max_points")),
+        one("render.budget_ms", "render.budget_ms=1").but(All, COMMAND_ONLY),
+        one("render.max_rmse", "render.max_rmse=0.5").but(All, COMMAND_ONLY),
+        one("render.max_flip", "render.max_flip=0.5").but(All, COMMAND_ONLY),
         of(BALL, "render.points", "render.points={first_slices=1}").but_by(BUT_POINTS, POINTS_ONLY),
         of(BALL, "render.points.slice_thickness", "render.points.slice_thickness=0.5")
             .by(POINTS)

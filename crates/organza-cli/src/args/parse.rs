@@ -1,6 +1,7 @@
 //! Texts of arguments → values.
 
 use super::Frames;
+use organza::scene::Goal;
 
 pub(super) fn parse_frames(text: &str) -> Result<Frames, String> {
     if text == "all" {
@@ -26,6 +27,18 @@ pub(super) fn parse_device(text: &str) -> Result<String, String> {
 
 pub(super) fn parse_finite(text: &str) -> Result<f64, String> {
     text.parse().ok().filter(|x: &f64| x.is_finite()).ok_or_else(|| "expected a finite number".into())
+}
+
+/// Milliseconds of a budget.
+pub(super) fn parse_budget(text: &str) -> Result<u64, String> {
+    let ms = text.parse().ok().filter(|ms| (1..=Goal::MOST_MS).contains(ms));
+    ms.ok_or_else(|| format!("expected a whole number of milliseconds from 1 to {}, such as 2000", Goal::MOST_MS))
+}
+
+/// The largest error of a displayed picture.
+pub(super) fn parse_error_limit(text: &str) -> Result<f64, String> {
+    let error = text.parse().ok().filter(|error: &f64| *error > 0.0 && *error <= 1.0);
+    error.ok_or_else(|| "expected a number above 0, at most 1, such as 0.004".into())
 }
 
 /// A number of bytes with an optional K, M, G or T (powers of 1024).
@@ -54,6 +67,10 @@ mod tests {
         assert_eq!([parse_frames("0-47"), parse_frames("9")], [Ok(Frames::Range(0, 47)), Ok(Frames::Range(9, 9))]);
         assert!(["", "-", "5-", "-1", "5-4", "1..4", "a"].iter().all(|t| parse_frames(t).is_err()));
         assert_eq!(parse_bytes("123"), Ok(123));
+        assert_eq!(parse_budget("2000"), Ok(2000));
+        assert!(["", "0", "-5", "nan", "1e99", "1.5", "86400001"].iter().all(|t| parse_budget(t).is_err()));
+        assert_eq!([parse_error_limit("0.004"), parse_error_limit("1")], [Ok(0.004), Ok(1.0)]);
+        assert!(["", "0", "-1", "nan", "inf", "1.01", "a"].iter().all(|t| parse_error_limit(t).is_err()));
         assert!(["", "0", "-1", "G", "1.5G", "99999999999T", "1ü"].iter().all(|t| parse_bytes(t).is_err()));
     }
 }

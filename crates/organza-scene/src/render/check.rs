@@ -3,15 +3,17 @@
 use crate::at::At;
 use crate::limits::{LARGEST, SMALLEST};
 use crate::render::raw::{
-    Auto, RawAccumulation, RawAligned, RawClassify, RawDirection, RawGradients, RawMapping, RawParticles, RawPoints,
-    RawRender, RawScattering, RawShadow, RawSheets, RawSlicing, RawSoftShadows, RawSurfaceSampler, RawVolumeSampler,
+    Auto, RawAccumulation, RawAligned, RawClassify, RawDirection, RawGoal, RawGradients, RawMapping, RawParticles,
+    RawPoints, RawRender, RawScattering, RawShadow, RawSheets, RawSlicing, RawSoftShadows, RawSurfaceSampler,
+    RawVolumeSampler,
 };
 use crate::render::surfels_check::check_surfels;
 use crate::text::de::suggest;
+use crate::text::tree::Value;
 use crate::{
-    Aligned, Classify, Error, LAYER_NAMES, LayerChoice, ParticlesSettings, PointsSettings, RenderSettings, Scattering,
-    ShadowMapping, ShadowSettings, SheetsSettings, Slicing, SoftShadows, SurfaceSampler, Technique, VolumeSampler,
-    shown,
+    Aligned, Classify, Error, Goal, LAYER_NAMES, LayerChoice, ParticlesSettings, PointsSettings, RenderSettings,
+    Scattering, ShadowMapping, ShadowSettings, SheetsSettings, Slicing, SoftShadows, SurfaceSampler, Technique,
+    TechniqueKey, VolumeSampler, shown,
 };
 use splat_core::{Accumulation, Direction};
 
@@ -45,12 +47,53 @@ pub(crate) fn check_render(at: &At<'_>, raw: &RawRender) -> Result<RenderSetting
         seed: raw.seed.unwrap_or(0),
         splat_share,
         max_points: raw.max_points,
+        goal: check_goal(at, raw)?,
         shadow: check_shadow(&at.key("shadow"), &raw.shadow)?,
+        technique_keys: technique_keys(at),
         points: check_points(&at.key("points"), &raw.points)?,
         particles: check_particles(&at.key("particles"), &raw.particles)?,
         sheets: check_sheets(&at.key("sheets"), &raw.sheets)?,
         surfels: check_surfels(&at.key("surfels"), &raw.surfels)?,
     })
+}
+
+/// The keys that are written in tables of techniques, which are called as these are.
+fn technique_keys(at: &At<'_>) -> Vec<TechniqueKey> {
+    let Value::Table(tables) = &at.node().value else { return Vec::new() };
+    let mut keys = Vec::new();
+    for table in tables {
+        let named = Technique::ALL.into_iter().find(|technique| technique.name() == table.key);
+        let (Some(technique), Value::Table(entries)) = (named, &table.node.value) else { continue };
+        let key = |entry: &str| format!("render.{}.{}", table.key, entry);
+        keys.extend(entries.iter().map(|entry| TechniqueKey { technique, key: key(&entry.key) }));
+    }
+    keys
+}
+
+/// What the picture is to keep to.
+fn check_goal(at: &At<'_>, raw: &RawRender) -> Result<Goal, Error> {
+    let budget_ms = match raw.budget_ms {
+        None | Some(RawGoal::None) => None,
+        Some(RawGoal::Number(ms)) if ms.fract() == 0.0 && (1.0..=Goal::MOST_MS as f64).contains(&ms) => Some(ms as u64),
+        Some(RawGoal::Number(ms)) => {
+            let message = format!(
+                "`budget_ms`: expected a whole number of milliseconds from 1 to {} or \"none\", found {}",
+                Goal::MOST_MS,
+                crate::short(ms)
+            );
+            return Err(at.key("budget_ms").error(message, ""));
+        }
+    };
+    let error = |key: &'static str, value: Option<RawGoal>| match value {
+        None | Some(RawGoal::None) => Ok(None),
+        Some(RawGoal::Number(error)) if error > 0.0 && error <= 1.0 => Ok(Some(error)),
+        Some(RawGoal::Number(error)) => {
+            let found = crate::short(error);
+            let message = format!("`{key}`: expected a number above 0, at most 1, or \"none\", found {found}");
+            Err(at.key(key).error(message, "1/255 is one step of a displayed picture"))
+        }
+    };
+    Ok(Goal { budget_ms, max_rmse: error("max_rmse", raw.max_rmse)?, max_flip: error("max_flip", raw.max_flip)? })
 }
 
 /// A technique by its name.

@@ -30,6 +30,12 @@ pub(crate) struct RawRender {
     pub(crate) splat_share: Option<f64>,
     /// Most splats that the scene may become.
     pub(crate) max_points: Option<u64>,
+    /// Milliseconds from files read to picture finished, 1 to 86400000, or "none" (the default): settings give way until they fit.
+    pub(crate) budget_ms: Option<RawGoal>,
+    /// Largest RMSE of the displayed picture against the scene's own settings, above 0, at most 1, or "none" (the default): settings give way as far.
+    pub(crate) max_rmse: Option<RawGoal>,
+    /// The same of the mean FLIP.
+    pub(crate) max_flip: Option<RawGoal>,
     pub(crate) shadow: RawShadow,
     pub(crate) points: RawPoints,
     pub(crate) particles: RawParticles,
@@ -259,6 +265,49 @@ pub(crate) enum RawMapping {
     Auto,
     Octahedral,
     Polar,
+}
+
+/// A number, or "none".
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum RawGoal {
+    None,
+    Number(f64),
+}
+
+impl<'de> Deserialize<'de> for RawGoal {
+    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct GoalVisitor;
+        impl serde::de::Visitor<'_> for GoalVisitor {
+            type Value = RawGoal;
+            fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                f.write_str("a number or \"none\"")
+            }
+            fn visit_i64<E: serde::de::Error>(self, v: i64) -> Result<RawGoal, E> {
+                Ok(RawGoal::Number(v as f64))
+            }
+            fn visit_f64<E: serde::de::Error>(self, v: f64) -> Result<RawGoal, E> {
+                Ok(RawGoal::Number(v))
+            }
+            fn visit_str<E: serde::de::Error>(self, v: &str) -> Result<RawGoal, E> {
+                if v == "none" {
+                    Ok(RawGoal::None)
+                } else {
+                    Err(E::invalid_value(serde::de::Unexpected::Str(v), &self))
+                }
+            }
+        }
+        deserializer.deserialize_any(GoalVisitor)
+    }
+}
+
+impl JsonSchema for RawGoal {
+    fn schema_name() -> std::borrow::Cow<'static, str> {
+        "Goal".into()
+    }
+
+    fn json_schema(_: &mut schemars::SchemaGenerator) -> schemars::Schema {
+        schemars::json_schema!({ "anyOf": [{ "type": "number" }, { "const": "none" }] })
+    }
 }
 
 /// A number, or "auto".

@@ -28,8 +28,12 @@ pub struct RenderSettings {
     pub splat_share: f64,
     /// Most splats that the scene may become; more is a resource error.
     pub max_points: Option<u64>,
+    /// What the picture is to keep to, where settings may give way for it.
+    pub goal: Goal,
     /// Shadow maps, which all techniques take their light from.
     pub shadow: ShadowSettings,
+    /// Keys that the scene writes in the tables of techniques, those too that have the value that goes without saying.
+    pub technique_keys: Vec<TechniqueKey>,
     /// Settings of the `points` technique.
     pub points: PointsSettings,
     /// Settings of the `particles` technique.
@@ -38,6 +42,40 @@ pub struct RenderSettings {
     pub sheets: SheetsSettings,
     /// Settings of the `surfels` technique.
     pub surfels: SurfelsSettings,
+}
+
+/// A key that is written in the table of a technique.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct TechniqueKey {
+    /// The technique whose table it is in.
+    pub technique: Technique,
+    /// The key with its tables, such as `render.sheets.slicing`.
+    pub key: String,
+}
+
+/// What a picture is to keep to: settings give way as far as they have to, or as far as they may. `organza::render_within` draws so;
+/// drawing itself knows nothing of it.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Goal {
+    /// Most milliseconds from files read to picture finished, 1 to 86,400,000, a day.
+    pub budget_ms: Option<u64>,
+    /// Largest root mean square error of the displayed picture against the one with the scene's own settings, in (0, 1].
+    pub max_rmse: Option<f64>,
+    /// Largest mean FLIP against that picture, in (0, 1].
+    pub max_flip: Option<f64>,
+}
+
+impl Goal {
+    /// Most milliseconds that a budget may have: a day.
+    pub const MOST_MS: u64 = 86_400_000;
+
+    /// Its keys in `[render]`.
+    pub const KEYS: [&'static str; 3] = ["budget_ms", "max_rmse", "max_flip"];
+
+    /// Whether it limits anything.
+    pub const fn is_any(&self) -> bool {
+        self.budget_ms.is_some() || self.max_rmse.is_some() || self.max_flip.is_some()
+    }
 }
 
 /// What draws the picture.

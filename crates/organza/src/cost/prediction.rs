@@ -121,6 +121,15 @@ impl Prediction {
     }
 }
 
+/// A sentence about frames that are long together, of which each is drawn in so many seconds by these figures, about. `None` for few of them, and
+/// where each is announced by itself.
+pub fn announcement_of_frames(frames: usize, seconds: f64, rates: &Rates) -> Option<String> {
+    let total = frames as f64 * seconds;
+    let is_long = frames > 1 && total >= LONG && seconds < LONG;
+    let (total, seconds) = (duration_text(total), duration_text(seconds));
+    is_long.then(|| format!("drawing {frames} frames takes about {total} by {}, {seconds} each", rates.source()))
+}
+
 /// A number in the unit that leaves two or three digits.
 fn number_text(number: f64) -> String {
     match number {
@@ -178,6 +187,16 @@ mod tests {
         assert!(long.announcement(1).is_some_and(|said| !said.contains("takes about 2 min 20 s;")));
         long.drawing = vec![particles(3e8)];
         assert_eq!(long.announcement(1), None);
+    }
+
+    #[test]
+    fn frames_are_announced_by_their_sum() {
+        let rates = Rates::default();
+        let expected = "drawing 2400 frames takes about 4 min 0 s by built-in figures, 100 ms each";
+        assert_eq!(announcement_of_frames(2400, 0.1, &rates).as_deref(), Some(expected));
+        assert_eq!(announcement_of_frames(190, 0.1, &rates), None);
+        assert_eq!(announcement_of_frames(1, 19.0, &rates), None);
+        assert_eq!(announcement_of_frames(5, 30.0, &rates), None, "each is announced");
     }
 
     #[test]

@@ -65,17 +65,13 @@ pub enum Item {
     FinishedSample,
 }
 
-/// What the number of items goes with, where settings of a picture change.
+/// What the number of items goes with, where samples of a picture and sets of particles change.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Growth {
     /// Neither.
     Fixed,
-    /// The number of splats.
-    Splats,
     /// Samples of the picture.
     Samples,
-    /// Samples that footprints cover.
-    Fragments,
     /// Samples of the picture times sets of particles.
     Sets,
 }
@@ -150,8 +146,9 @@ impl Item {
     /// What its number goes with.
     pub(crate) fn growth(self) -> Growth {
         match self {
-            Self::FileByte | Self::GeneratedObject => Growth::Fixed,
-            Self::ConvertedSplat
+            Self::FileByte
+            | Self::GeneratedObject
+            | Self::ConvertedSplat
             | Self::CastSplat
             | Self::OpaqueCaster
             | Self::ShadowEntry
@@ -163,15 +160,17 @@ impl Item {
             | Self::ShadedSplat
             | Self::ShadowLookUp
             | Self::OpaqueSplat
-            | Self::BlendedSplat => Growth::Splats,
+            | Self::BlendedSplat => Growth::Fixed,
             Self::OpaqueFragment
             | Self::BlendedFragment
+            | Self::RangeSample
             | Self::SheetFragment
+            | Self::SlabSample
             | Self::SurfelFragment
-            | Self::ExactFragment => Growth::Fragments,
-            Self::RangeSample | Self::SlabSample | Self::SurfelSample | Self::BentSample | Self::FinishedSample => {
-                Growth::Samples
-            }
+            | Self::SurfelSample
+            | Self::BentSample
+            | Self::ExactFragment
+            | Self::FinishedSample => Growth::Samples,
             Self::Particle | Self::SetSample => Growth::Sets,
         }
     }

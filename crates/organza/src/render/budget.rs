@@ -1,16 +1,23 @@
-//! A picture within a time: settings of the scene give way, one after the other, until what is left fits.
+//! A picture within a time, or within an error: settings of the scene give way as far as they have to, or as far as they may.
 //!
 //! ```text
 //! load ─► trial: a sixteenth of the splats, a quarter of the width ─► seconds of an item, by pass, here and now
+//!    └──► small pictures, one setting turned in each ──────────────► errors of settings
 //!                                                                          │
-//! ladder of settings, the scene's own first ─► counted work ─► the first that fits ─► plan ─► draw
+//! every combination ─► those that none beats in both: the ladder ─► the first that fits the time, the last within the error ─► plan ─► draw
 //! ```
 //! Counted work comes from the trial's own counts, scaled by what an item goes with: splats, samples of the picture, or fragments of both. The chosen
-//! settings are planned in full before they are drawn, and give way to the next where that tells of more work than was thought.
+//! settings are planned in full before they are drawn, and give way to the next where that tells of more work than was thought. Without a time
+//! nothing is chosen by a clock: figures of a machine take its place.
+
+mod errors;
+mod rung;
+mod small;
+mod trial;
 
 use super::{Left, Made, Render, render_keeping};
-use crate::choose::{row, techniques};
-use crate::cost::{Growth, Prediction, Rates};
+use crate::choose::row;
+use crate::cost::Rates;
 use crate::frame::{Frame, Leaves};
 use crate::load::Loaded;
 use crate::load::files::Files;
@@ -18,157 +25,130 @@ use crate::pass;
 use crate::predict::prediction;
 use crate::prepare::{Planned, fitted, load_measured, plan_alone};
 use crate::ranges::ranges;
-use crate::scene::Scene;
+use crate::scene::{FoundCamera, Goal, Scene};
 use crate::settle;
-use crate::technique::{Fold, Session};
-use crate::{CostRecord, Error, Progress, RenderOptions, draw};
+use crate::technique::Fold;
+use crate::{CostRecord, Error, Progress, RenderOptions};
+use errors::Errors;
+pub use errors::ExpectedError;
+pub use rung::GivenUp;
+use rung::{Rung, antialias_values, is_random, rungs};
+use small::Drawing;
 use splat_core::Exceeded;
 use std::borrow::Cow;
 use std::time::{Duration, Instant};
+use trial::Trial;
 
-/// Share of the splats in the trial.
-const TRIAL_SPLATS: f64 = 1.0 / 16.0;
-/// Of the picture's width and height; more of it where objects are drawn from their own data, for what voxels take does not shrink with the picture.
-const TRIAL_SIDE: u32 = 4;
-const TRIAL_SIDE_OF_VOXELS: u32 = 2;
 /// A time that is named in the place of one that is too short is so many times what was predicted, for predictions err.
 const MARGIN: f64 = 1.25;
-/// Sets of particles in the trial.
-const TRIAL_SETS: u32 = 4;
-/// A pass of the trial that took less tells nothing of its items, seconds.
-const SHORTEST: f64 = 5e-4;
 /// Share of the time that is left which the counted work may fill: predictions err.
 const FILLED: f64 = 0.9;
 /// Most times that settings are planned: the first may tell that more fits, or less.
 const MOST_PLANS: u32 = 3;
-/// Fewest splats, as a share of all.
-const LEAST_SHARE: f64 = 1.0 / 64.0;
-/// Fewest sets of particles.
-const LEAST_SETS: u32 = 2;
+/// A rung is left out that takes more than this share of the time of the one before.
+const WORTH_A_RUNG: f64 = 0.85;
 
-/// Settings that may give way to a budget.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Rung {
-    antialias: u32,
-    splat_share: f64,
-    /// Sets of particles.
-    sets: u32,
-}
-
-/// A setting of the scene that gave way.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct GivenUp {
-    /// The key, such as `render.antialias`.
-    pub key: &'static str,
-    /// Its value in the scene, as it is written there.
-    pub asked: String,
-    /// The value that the picture was drawn with.
-    pub taken: String,
-}
-
-/// A picture that was drawn within a time.
+/// One rung of the ladder: settings, and what is expected of them.
 #[derive(Debug, Clone, PartialEq)]
-pub struct WithinBudget {
+pub struct Expected {
+    /// Samples along each side of a pixel.
+    pub antialias: u32,
+    /// Share of the splats.
+    pub splat_share: f64,
+    /// Sets of particles; `None` where nothing is random.
+    pub sets: Option<u32>,
+    /// Time of planning and drawing.
+    pub time: Duration,
+    /// Against the scene's own settings.
+    pub error: ExpectedError,
+}
+
+/// A picture that keeps to a goal.
+#[derive(Debug, Clone, PartialEq)]
+pub struct WithinGoal {
     /// The picture.
     pub render: Render,
-    /// What gave way; with these values the scene is drawn again to the same bits. Empty where the scene's own settings fit.
+    /// What gave way; with these values the scene is drawn again to the same bits. Empty where the scene's own settings were taken.
     pub given_up: Vec<GivenUp>,
     /// Time that was expected, from files read to picture finished.
     pub expected: Duration,
     /// Time that it took.
     pub taken: Duration,
+    /// Error that is expected, against the scene's own settings.
+    pub error: ExpectedError,
+    /// The ladder, from the scene's own settings down.
+    pub ladder: Vec<Expected>,
 }
 
-impl Rung {
-    fn of_scene(scene: &Scene) -> Self {
-        let render = &scene.render;
-        Self { antialias: render.antialias, splat_share: render.splat_share, sets: render.particles.repeat_level }
-    }
-
-    fn applied_to(self, scene: &Scene) -> Scene {
-        let mut scene = scene.clone();
-        scene.render.antialias = self.antialias;
-        scene.render.splat_share = self.splat_share;
-        scene.render.particles.repeat_level = self.sets;
-        scene
-    }
-
-    /// What differs from the scene's own settings.
-    fn given_up(self, asked: Self) -> Vec<GivenUp> {
-        let number = organza_scene::short;
-        let settings = [
-            ("render.antialias", asked.antialias.to_string(), self.antialias.to_string()),
-            ("render.splat_share", number(asked.splat_share), number(self.splat_share)),
-            ("render.particles.repeat_level", asked.sets.to_string(), self.sets.to_string()),
-        ];
-        let gone = settings.into_iter().filter(|(_, asked, taken)| asked != taken);
-        gone.map(|(key, asked, taken)| GivenUp { key, asked, taken }).collect()
-    }
-}
-
-/// The scene's own settings and what they give way to, each cheaper than the one before. Samples beyond two a side go first, which are hardly seen;
-/// then splats down to a quarter, which blurs; then the second sample, which frays edges; then more splats. Of an average of random sets, sets go
-/// twice as fast as the rest. Where nothing is made of splats, all that there are stay.
-fn ladder(scene: &Scene, has_splats: bool) -> Vec<Rung> {
-    let is_random = techniques(scene).into_iter().any(|technique| row(technique).is_random);
-    let mut rung = Rung::of_scene(scene);
-    let mut rungs = vec![rung];
-    let least_share = if has_splats { LEAST_SHARE } else { rung.splat_share };
-    let mut quarter = rung.splat_share / 4.0;
-    loop {
-        let mut is_changed = false;
-        if is_random {
-            for _ in 0..2 {
-                if rung.sets / 2 >= LEAST_SETS {
-                    rung.sets /= 2;
-                    rungs.push(rung);
-                    is_changed = true;
-                }
-            }
-        }
-        if rung.antialias > 2 {
-            rung.antialias = rung.antialias.div_ceil(2).max(2);
-        } else if rung.splat_share > quarter.max(least_share) {
-            rung.splat_share = (rung.splat_share / 2.0).max(least_share);
-        } else if rung.antialias > 1 {
-            rung.antialias = 1;
-            quarter = 0.0;
-        } else if rung.splat_share > least_share {
-            quarter = 0.0;
-            rung.splat_share = (rung.splat_share / 2.0).max(least_share);
-        } else if !is_changed {
-            return rungs;
-        } else {
-            continue;
-        }
-        rungs.push(rung);
-    }
-}
-
-/// What a trial told.
-struct Trial {
-    /// Counted work, with the seconds of an item as they were measured.
-    predicted: Prediction,
+/// Settings with what is expected of them.
+#[derive(Debug, Clone, Copy)]
+struct Candidate {
     rung: Rung,
-    /// Samples of the picture.
-    samples: f64,
-    /// Seconds of planning, most of which goes with the splats where there are some.
-    planning: f64,
-    has_splats: bool,
+    seconds: f64,
+    error: ExpectedError,
 }
 
-/// Renders a scene so that no more than `budget` passes from its files being read to the picture being finished, on the threads that there are.
-/// Settings give way where they have to; which is told, and what is drawn is what the scene draws with the settings that were taken.
+impl Candidate {
+    fn is_within(&self, goal: &Goal) -> bool {
+        goal.max_rmse.is_none_or(|most| self.error.rmse <= most)
+            && goal.max_flip.is_none_or(|most| self.error.flip <= most)
+    }
+}
+
+/// The settings that no others beat in time and error: the scene's own first, each faster than the one before, and less exact.
+fn ladder(asked: Rung, mut candidates: Vec<Candidate>) -> Vec<Candidate> {
+    let is_other = |candidate: &Candidate| candidate.rung != asked;
+    candidates.sort_by(|a, b| {
+        let by_error = is_other(a).cmp(&is_other(b)).then(a.error.rmse.total_cmp(&b.error.rmse));
+        by_error.then(a.seconds.total_cmp(&b.seconds))
+    });
+    let mut ladder: Vec<Candidate> = Vec::new();
+    for candidate in candidates {
+        if ladder.last().is_none_or(|last| candidate.seconds <= WORTH_A_RUNG * last.seconds) {
+            ladder.push(candidate);
+        }
+    }
+    ladder
+}
+
+/// A scene that is being drawn within a goal.
+struct Search<'a> {
+    drawing: Drawing<'a>,
+    goal: Goal,
+    asked: Rung,
+    ladder: Vec<Candidate>,
+    trial: Trial,
+    loaded: Loaded,
+    cost: CostRecord,
+    found: Option<FoundCamera>,
+    begun: Instant,
+}
+
+/// Settings that were planned in full.
+struct Chosen {
+    candidate: Candidate,
+    resolved: Scene,
+    planned: Planned,
+    /// Seconds of counted work.
+    drawing: f64,
+    /// Seconds from files read to picture finished.
+    expected: f64,
+}
+
+/// Renders a scene so that it keeps to a goal, on the threads that there are: of settings within the errors those that err least and fit the time;
+/// without a time, those that take least. What is drawn is what the scene draws with the settings that were taken.
+///
+/// Errors are estimates from small pictures, against the picture with the scene's own settings: on the whole within a factor of two.
 ///
 /// # Errors
-/// [`Error::Limit`] where no settings fit, with the shortest time that does; else as [`crate::render`].
+/// [`Error::Limit`] where no settings keep to all of it, with the shortest time that does; else as [`crate::render`].
 pub fn render_within(
     scene: &Scene,
-    budget: Duration,
+    goal: &Goal,
     options: &RenderOptions,
     progress: &Progress,
     files: Files,
-) -> Result<WithinBudget, Error> {
+) -> Result<WithinGoal, Error> {
     let (stated, found) = fitted(scene, options, progress, &files)?;
     let scene = settle::settled(Cow::Borrowed(&*stated), options, progress, &files)?;
     let mut cost = CostRecord::default();
@@ -177,77 +157,170 @@ pub fn render_within(
     // All splats, of which settings that give way keep a share.
     let everything = Rung { splat_share: 1.0, ..asked }.applied_to(&scene);
     let mut loaded = load_measured(&everything, options, progress, &files, &mut cost)?;
-    let reading = cost.stages.iter().filter(|stage| stage.name == pass::READ).map(|stage| stage.seconds).sum::<f64>();
-    let spent = || begun.elapsed().as_secs_f64() - reading;
-    let mut rungs = Vec::new();
-    for rung in ladder(&scene, !loaded.cloud.is_empty()) {
-        // The settings alone have to draw the same picture again: `auto` must not choose otherwise with them.
-        let changed = settle::settled(Cow::Owned(rung.applied_to(&stated)), options, progress, &files)?;
-        if is_drawn_alike(&scene, &changed) {
-            rungs.push(rung);
-        }
+    let drawing = Drawing { scene: &scene, options, progress };
+    let mut trial = Trial::new(&drawing, &mut loaded)?;
+    let errors = Errors::new(&drawing, &mut loaded, goal.budget_ms.is_some())?;
+    errors.thinned.iter().for_each(|thinned| trial.learn(thinned));
+    // A choice by a clock would be another at each run.
+    let trial = if goal.budget_ms.is_some() { trial } else { trial.by(&options.rates) };
+    // The settings alone have to draw the same picture again: `auto` must not choose otherwise with them. Of these settings it asks for samples alone.
+    let mut alike = Vec::new();
+    for antialias in antialias_values(asked) {
+        let changed = Rung { antialias, ..asked }.applied_to(&stated);
+        let changed = settle::settled(Cow::Owned(changed), options, progress, &files)?;
+        alike.extend(is_drawn_alike(&scene, &changed).then_some(antialias));
     }
-    let trial = trial(&scene, &mut loaded, options, progress)?;
+    let possible = rungs(&scene, !loaded.cloud.is_empty()).into_iter().filter(|rung| alike.contains(&rung.antialias));
     let size = scene.camera.size;
-    // What the counted work of a plan has been over what the trial told of it.
-    let mut scale = 1.0;
-    // Rungs from here on may fit; the plan of one of them did.
-    let mut first = 0;
-    let mut fitting = None;
-    let mut attempt = 0;
-    loop {
-        attempt += 1;
-        let left = budget.as_secs_f64() - spent();
-        let cheap_enough = |at: &usize| scale * trial.seconds(rungs[*at], size) <= FILLED * left;
-        let chosen = (first..fitting.unwrap_or(rungs.len())).find(cheap_enough).or(fitting);
-        let at = match chosen {
-            Some(at) => at,
-            // Nothing is known of the last but that it was thought too long.
-            None if attempt > 1 && first < rungs.len() => rungs.len() - 1,
-            None => {
-                let shortest =
-                    rungs.iter().map(|rung| scale * trial.seconds(*rung, size)).fold(f64::INFINITY, f64::min);
-                return Err(too_short(budget, spent() + shortest / FILLED));
-            }
-        };
-        let rung = rungs[at];
-        let resolved = rung.applied_to(&scene);
-        let whole = loaded.keep_share(rung.splat_share);
-        loaded.retarget(&resolved);
+    let candidates =
+        possible.map(|rung| Candidate { rung, seconds: trial.seconds(rung, size), error: errors.of(rung) });
+    let ladder = ladder(asked, candidates.collect());
+    let mut search = Search { drawing, goal: *goal, asked, ladder, trial, loaded, cost, found, begun };
+    let chosen = match goal.budget_ms {
+        Some(ms) => search.fitting(Duration::from_millis(ms))?,
+        None => search.cheapest()?,
+    };
+    search.drawn(chosen, files)
+}
+
+impl Search<'_> {
+    /// Seconds since files were read.
+    fn spent(&self) -> f64 {
+        let reading = self.cost.stages.iter().filter(|stage| stage.name == pass::READ).map(|stage| stage.seconds);
+        self.begun.elapsed().as_secs_f64() - reading.sum::<f64>()
+    }
+
+    /// Plans settings in full, with the splats that they keep: those that they leave out are given back.
+    fn planned(&mut self, candidate: Candidate) -> Result<(Chosen, Option<crate::load::Everything>), Error> {
+        let resolved = candidate.rung.applied_to(self.drawing.scene);
+        let whole = self.loaded.keep_share(candidate.rung.splat_share);
+        self.loaded.retarget(&resolved);
         let begun = Instant::now();
-        let planned = plan_alone(&resolved, &loaded, options)?;
+        let planned = plan_alone(&resolved, &self.loaded, self.drawing.options)?;
         let planning = begun.elapsed().as_secs_f64();
-        let drawing = drawing_seconds(&resolved, &loaded, &planned, &trial.predicted.rates, options)?;
+        let rates = &self.trial.predicted.rates;
+        let seconds = drawing_seconds(&resolved, &self.loaded, &planned, rates, self.drawing.options)?;
         // What is drawn is planned once more, with what its bounds leave out.
-        let expected = spent() + planning + drawing;
-        scale = drawing / trial.drawing(rung, size);
-        let left = budget.as_secs_f64() - spent();
-        let cheap_enough = |at: &usize| scale * trial.seconds(rungs[*at], size) <= FILLED * left;
-        let is_more = attempt < MOST_PLANS && (first..at).any(|above| cheap_enough(&above));
-        if expected <= budget.as_secs_f64() && !is_more || fitting == Some(at) {
-            drop(whole);
-            let made = Made { scene: resolved.clone(), loaded, planned, leaves: Leaves::default() };
-            let mut left = Left { files, is_still: true, made: Some(made), ..Left::default() };
-            let mut render = render_keeping(&resolved, options, progress, &mut left)?;
-            let taken = spent();
-            render.cost.stages = [cost.stages, render.cost.stages].concat();
-            render.found = render.found.or(found);
-            return Ok(WithinBudget {
-                render,
-                given_up: rung.given_up(asked),
-                expected: Duration::from_secs_f64(expected),
-                taken: Duration::from_secs_f64(taken),
-            });
-        }
-        loaded.take_back(whole);
-        if expected <= budget.as_secs_f64() {
-            fitting = Some(at);
-        } else if at + 1 == rungs.len() {
-            return Err(too_short(budget, expected));
-        } else {
-            first = at + 1;
+        let expected = self.spent() + planning + self.trial.uncounted + seconds;
+        Ok((Chosen { candidate, resolved, planned, drawing: seconds, expected }, whole))
+    }
+
+    /// The settings within the errors that take least.
+    fn cheapest(&mut self) -> Result<Chosen, Error> {
+        let within = self.ladder.iter().rev().find(|candidate| candidate.is_within(&self.goal));
+        // The scene's own settings err by nothing.
+        let cheapest = *within.unwrap_or(&self.ladder[0]);
+        Ok(self.planned(cheapest)?.0)
+    }
+
+    /// The settings within the errors that err least of those that fit the time.
+    fn fitting(&mut self, budget: Duration) -> Result<Chosen, Error> {
+        let size = self.drawing.scene.camera.size;
+        let allowed: Vec<Candidate> =
+            self.ladder.iter().filter(|candidate| candidate.is_within(&self.goal)).copied().collect();
+        // What the counted work of a plan has been over what the trial told of it.
+        let mut scale = 1.0;
+        // Rungs from here on may fit; the plan of one of them did.
+        let mut first = 0;
+        let mut fitting = None;
+        let mut attempt = 0;
+        loop {
+            attempt += 1;
+            let left = budget.as_secs_f64() - self.spent();
+            let cheap_enough = |at: &usize| scale * allowed[*at].seconds <= FILLED * left;
+            let chosen = (first..fitting.unwrap_or(allowed.len())).find(cheap_enough).or(fitting);
+            let at = match chosen {
+                Some(at) => at,
+                // Nothing is known of the last but that it was thought too long.
+                None if attempt > 1 && first < allowed.len() => allowed.len() - 1,
+                None => {
+                    let shortest = allowed.last().map_or(f64::INFINITY, |last| scale * last.seconds);
+                    return Err(self.too_short(budget, self.spent() + shortest / FILLED, scale));
+                }
+            };
+            let (chosen, whole) = self.planned(allowed[at])?;
+            scale = chosen.drawing / self.trial.drawing(allowed[at].rung, size);
+            let left = budget.as_secs_f64() - self.spent();
+            let cheap_enough = |at: &usize| scale * allowed[*at].seconds <= FILLED * left;
+            let is_more = attempt < MOST_PLANS && (first..at).any(|above| cheap_enough(&above));
+            let fits = chosen.expected <= budget.as_secs_f64();
+            if fits && !is_more || fitting == Some(at) {
+                return Ok(chosen);
+            }
+            self.loaded.take_back(whole);
+            if fits {
+                fitting = Some(at);
+            } else if at + 1 == allowed.len() {
+                return Err(self.too_short(budget, chosen.expected, scale));
+            } else {
+                first = at + 1;
+            }
         }
     }
+
+    /// Draws with settings that were planned, and have their share of the splats.
+    fn drawn(self, chosen: Chosen, files: Files) -> Result<WithinGoal, Error> {
+        let Chosen { candidate, resolved, planned, expected, .. } = chosen;
+        let Drawing { scene, options, progress } = self.drawing;
+        let reading = self.cost.stages.iter().filter(|stage| stage.name == pass::READ).map(|stage| stage.seconds);
+        let reading = reading.sum::<f64>();
+        let made = Made { scene: resolved.clone(), loaded: self.loaded, planned, leaves: Leaves::default() };
+        let mut left = Left { files, is_still: true, made: Some(made), ..Left::default() };
+        let mut render = render_keeping(&resolved, options, progress, &mut left)?;
+        let taken = self.begun.elapsed().as_secs_f64() - reading;
+        render.cost.stages = [self.cost.stages, render.cost.stages].concat();
+        render.found = render.found.or(self.found);
+        let is_random = is_random(scene);
+        let rung = |candidate: &Candidate| Expected {
+            antialias: candidate.rung.antialias,
+            splat_share: candidate.rung.splat_share,
+            sets: is_random.then_some(candidate.rung.sets),
+            time: Duration::from_secs_f64(candidate.seconds),
+            error: candidate.error,
+        };
+        Ok(WithinGoal {
+            render,
+            given_up: candidate.rung.given_up(self.asked),
+            expected: Duration::from_secs_f64(expected),
+            taken: Duration::from_secs_f64(taken),
+            error: candidate.error,
+            ladder: self.ladder.iter().map(rung).collect(),
+        })
+    }
+
+    /// Refuses a time that is too short for all settings within the errors, with the shortest that is not, and the least error that the time leaves.
+    fn too_short(&self, budget: Duration, shortest: f64, scale: f64) -> Error {
+        let ms = |seconds: f64| libm::ceil(1e3 * seconds) as u64;
+        let left = budget.as_secs_f64() - self.spent();
+        let fits = |candidate: &&Candidate| scale * candidate.seconds <= FILLED * left;
+        let least = self.ladder.iter().find(fits).map(|candidate| candidate.error);
+        let number = organza_scene::short;
+        let mut other = String::new();
+        let mut what = "this picture, with the fewest samples and splats,";
+        if self.goal.max_rmse.is_some() || self.goal.max_flip.is_some() {
+            what = "this picture, with the fewest samples and splats that the errors allow,";
+            let rmse = least.filter(|_| self.goal.max_rmse.is_some());
+            let flip = least.filter(|_| self.goal.max_flip.is_some());
+            other += &rmse.map_or_else(String::new, |e| format!("--max-rmse {}, ", number(rounded_up(e.rmse))));
+            other += &flip.map_or_else(String::new, |e| format!("--max-flip {}, ", number(rounded_up(e.flip))));
+        }
+        Error::Limit(Exceeded {
+            what: what.into(),
+            needed: ms(shortest),
+            limit: Some(ms(budget.as_secs_f64())),
+            unit: "ms",
+            hint: format!("use --budget {}, {other}or a smaller --size", ms(MARGIN * shortest)).into(),
+        })
+    }
+}
+
+/// The next number of two digits.
+fn rounded_up(error: f64) -> f64 {
+    if error <= 0.0 {
+        return error;
+    }
+    let unit = libm::pow(10.0, libm::floor(libm::log10(error)) - 1.0);
+    libm::ceil(error / unit) * unit
 }
 
 /// Whether two settled scenes, which differ in settings that give way, are drawn by the same techniques.
@@ -274,143 +347,55 @@ fn drawing_seconds(
     Ok(work.iter().map(|pass| pass.seconds(rates, rayon::current_num_threads())).sum())
 }
 
-/// A small picture of a part of the splats, timed.
-fn trial(scene: &Scene, loaded: &mut Loaded, options: &RenderOptions, progress: &Progress) -> Result<Trial, Error> {
-    let asked = Rung::of_scene(scene);
-    let rung = Rung { splat_share: asked.splat_share * TRIAL_SPLATS, sets: asked.sets.min(TRIAL_SETS), ..asked };
-    let mut small = rung.applied_to(scene);
-    let part = if loaded.own.is_empty() { TRIAL_SIDE } else { TRIAL_SIDE_OF_VOXELS };
-    small.camera.size = scene.camera.size.map(|side| side.div_ceil(part));
-    let whole = loaded.keep_share(rung.splat_share);
-    loaded.retarget(&small);
-    let begun = Instant::now();
-    let planned = plan_alone(&small, loaded, options)?;
-    let planning = begun.elapsed().as_secs_f64();
-    let mut cost = CostRecord::default();
-    let mut warnings = Vec::new();
-    let predicted = {
-        let frame = Frame::new(&small, loaded, &planned.plan, progress);
-        let mut session = Session {
-            options,
-            checkpoint: None,
-            kept: None,
-            warnings: &mut warnings,
-            sets: None,
-            predicted: Prediction::default(),
-        };
-        draw::draw(&frame, &mut session, &mut cost)?;
-        session.predicted
-    };
-    loaded.take_back(whole);
-    let [width, height] = small.camera.size.map(f64::from);
-    let samples = width * height * f64::from(rung.antialias).powi(2);
-    let rates = measured_rates(&predicted, &cost);
-    let has_splats = !loaded.cloud.is_empty();
-    Ok(Trial { predicted: Prediction { rates, ..predicted }, rung, samples, planning, has_splats })
-}
-
-/// The rates of a prediction, those of each pass times what it took over what was predicted.
-fn measured_rates(predicted: &Prediction, cost: &CostRecord) -> Rates {
-    let threads = rayon::current_num_threads();
-    let ratio = |name: &str| {
-        let took = cost.stages.iter().filter(|stage| stage.name == name).map(|stage| stage.seconds).sum::<f64>();
-        let passes = predicted.drawing.iter().filter(|pass| pass.pass == name);
-        let thought = passes.map(|pass| pass.seconds(&predicted.rates, threads)).sum::<f64>();
-        if took > SHORTEST && thought > 0.0 { took / thought } else { 1.0 }
-    };
-    Rates::measured(|item| predicted.rates.ns(item) * ratio(item.pass()), "a trial".to_owned())
-}
-
-impl Trial {
-    /// Seconds of planning and drawing with other settings in a picture of this size, from the trial's counts.
-    fn seconds(&self, rung: Rung, size: [u32; 2]) -> f64 {
-        let splats = if self.has_splats { rung.splat_share / self.rung.splat_share } else { 1.0 };
-        self.planning * splats + self.drawing(rung, size)
-    }
-
-    /// Seconds of drawing alone.
-    fn drawing(&self, rung: Rung, size: [u32; 2]) -> f64 {
-        let threads = rayon::current_num_threads();
-        let splats = rung.splat_share / self.rung.splat_share;
-        let [width, height] = size.map(f64::from);
-        let samples = width * height * f64::from(rung.antialias).powi(2) / self.samples;
-        let sets = f64::from(rung.sets) / f64::from(self.rung.sets);
-        let grown = |pass: &crate::cost::CountedPass| {
-            let mut pass = pass.clone();
-            for count in &mut pass.counts {
-                count.number *= match count.item.growth() {
-                    Growth::Fixed => 1.0,
-                    Growth::Splats => splats,
-                    Growth::Samples => samples,
-                    // Footprints of media grow more slowly than splats become fewer.
-                    Growth::Fragments => samples * libm::cbrt(splats),
-                    Growth::Sets => samples * sets,
-                };
-            }
-            pass.seconds(&self.predicted.rates, threads)
-        };
-        self.predicted.drawing.iter().map(grown).sum()
-    }
-}
-
-/// Refuses a time that is too short for all settings.
-fn too_short(budget: Duration, shortest: f64) -> Error {
-    let ms = |seconds: f64| libm::ceil(1e3 * seconds) as u64;
-    Error::Limit(Exceeded {
-        what: "this picture, with the fewest samples and splats,".into(),
-        needed: ms(shortest),
-        limit: Some(ms(budget.as_secs_f64())),
-        unit: "ms",
-        hint: format!("use --budget {}, or a smaller --size", ms(MARGIN * shortest)).into(),
-    })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{LoadOptions, parse};
 
-    fn scene(render: &str) -> Scene {
-        let text = format!(
-            "version = 1\n[camera]\nposition = [0, 0, 4]\ntarget = [0, 0, 0]\nsize = [64, 48]\n\
-             [[object]]\nname = 'fog'\nmedium_box = {{ min = [-1, -1, -1], max = [1, 1, 1], extinction = 1, spacing = 0.1 }}\n\
-             [render]\n{render}\n"
-        );
-        parse("s.toml".as_ref(), text.as_bytes(), &LoadOptions::default()).unwrap()
+    const ASKED: Rung = Rung { antialias: 2, splat_share: 1.0, sets: 100 };
+
+    fn candidate(rung: Rung, seconds: f64, rmse: f64) -> Candidate {
+        Candidate { rung, seconds, error: ExpectedError { rmse, flip: 2.0 * rmse } }
+    }
+
+    fn with_share(splat_share: f64, seconds: f64, rmse: f64) -> Candidate {
+        candidate(Rung { splat_share, ..ASKED }, seconds, rmse)
     }
 
     #[test]
-    fn the_ladder_begins_with_the_scene_and_each_rung_gives_way_in_one_setting() {
-        for render in
-            ["antialias = 8", "antialias = 1", "technique = 'particles'", "splat_share = 0.01", "antialias = 3"]
-        {
-            let scene = scene(render);
-            let rungs = ladder(&scene, true);
-            assert_eq!(rungs[0], Rung::of_scene(&scene));
-            assert!(ladder(&scene, false).iter().all(|rung| rung.splat_share == rungs[0].splat_share));
-            for pair in rungs.windows(2) {
-                let before = pair[0];
-                let after = pair[1];
-                let changed = after.given_up(before);
-                assert_eq!(changed.len(), 1, "{render}: {changed:?}");
-                let less = after.antialias <= before.antialias
-                    && after.splat_share <= before.splat_share
-                    && after.sets <= before.sets;
-                assert!(less, "{render}: {changed:?}");
-            }
-            let last = rungs[rungs.len() - 1];
-            assert_eq!(last.antialias, 1, "{render}");
-            assert_eq!(last.splat_share, LEAST_SHARE.min(rungs[0].splat_share), "{render}");
-            assert_eq!(last.sets < 2 * LEAST_SETS, render.contains("particles"), "{render}");
+    fn the_ladder_begins_with_the_scene_and_each_rung_is_faster_and_less_exact() {
+        let candidates = vec![
+            with_share(0.25, 3.0, 0.02),
+            candidate(Rung { antialias: 1, ..ASKED }, 5.0, 0.01),
+            // Slower than what is more exact.
+            with_share(0.5, 6.0, 0.015),
+            candidate(ASKED, 8.0, 0.0),
+            // Nothing is wrong with it, but it is the scene's own that comes first.
+            candidate(Rung { sets: 71, ..ASKED }, 7.9, 0.0),
+            // Saves too little.
+            with_share(0.2, 2.9, 0.021),
+            with_share(0.1, 1.0, 0.04),
+        ];
+        let ladder = ladder(ASKED, candidates);
+        let seconds: Vec<f64> = ladder.iter().map(|candidate| candidate.seconds).collect();
+        assert_eq!(seconds, [8.0, 5.0, 3.0, 1.0]);
+        assert_eq!(ladder[0].rung, ASKED);
+        assert!(ladder.windows(2).all(|pair| pair[0].error.rmse < pair[1].error.rmse));
+    }
+
+    #[test]
+    fn both_errors_have_to_be_within_the_goal() {
+        let candidate = with_share(0.25, 3.0, 0.02);
+        let is_within = |max_rmse, max_flip| candidate.is_within(&Goal { budget_ms: None, max_rmse, max_flip });
+        assert!(is_within(None, None) && is_within(Some(0.02), Some(0.04)));
+        assert!(!is_within(Some(0.019), None) && !is_within(Some(0.03), Some(0.039)));
+    }
+
+    #[test]
+    fn an_error_that_is_named_is_not_below_the_one_that_it_stands_for() {
+        for error in [0.001_23, 0.0999, 0.5, 1e-9] {
+            let rounded = rounded_up(error);
+            assert!(rounded >= error * (1.0 - 1e-12) && rounded <= 1.1 * error, "{error}: {rounded}");
         }
-    }
-
-    #[test]
-    fn what_was_given_up_is_named_with_both_values() {
-        let asked = Rung { antialias: 4, splat_share: 1.0, sets: 100 };
-        assert!(asked.given_up(asked).is_empty());
-        let taken = Rung { splat_share: 0.25, ..asked };
-        let expected = GivenUp { key: "render.splat_share", asked: "1".into(), taken: "0.25".into() };
-        assert_eq!(taken.given_up(asked), [expected]);
+        assert_eq!(rounded_up(0.0), 0.0);
     }
 }

@@ -6,7 +6,7 @@
 
 use super::Kept;
 use crate::output::Target;
-use crate::scene::{RenderSettings, Scene};
+use crate::scene::{Goal, RenderSettings, Scene};
 use crate::{Error, RenderOptions, printable};
 use pbsr::Ensemble;
 use sha2::{Digest, Sha256};
@@ -105,6 +105,8 @@ fn tag(scene: &Scene, options: &RenderOptions, kept: Option<&Kept>) -> Result<[u
     (same.file, same.sha256) = (PathBuf::new(), String::new());
     let RenderSettings { particles, exposure, .. } = &mut same.render;
     (particles.repeat_level, particles.target_error, *exposure) = (0, None, 0.0);
+    same.render.goal = Goal::default();
+    same.render.technique_keys.clear();
     let mut hasher = Sha256::new();
     hasher.update(env!("CARGO_PKG_VERSION"));
     // Every number is written so that it reads back the same.
