@@ -1,8 +1,8 @@
 //! Data that a program hands over draws the picture of the file that holds the same.
 
-use read::{Loaded, ReadParams};
 use organza::scene::{LoadOptions, parse};
 use organza::{InMemory, Progress, RenderOptions, SourceData};
+use read::{Loaded, ReadParams};
 use splat_core::Layers;
 use std::path::Path;
 

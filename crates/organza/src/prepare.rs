@@ -211,6 +211,7 @@ pub fn same_splats(a: &Scene, b: &Scene) -> bool {
     let mut other = b.clone();
     other.camera.size = a.camera.size;
     other.render = a.render.clone();
+    other.technique_keys.clone_from(&a.technique_keys);
     if !settle::is_settled(a) || !settle::is_settled(b) {
         return false;
     }

@@ -49,7 +49,6 @@ pub(crate) fn check_render(at: &At<'_>, raw: &RawRender) -> Result<RenderSetting
         max_points: raw.max_points,
         goal: check_goal(at, raw)?,
         shadow: check_shadow(&at.key("shadow"), &raw.shadow)?,
-        technique_keys: technique_keys(at),
         points: check_points(&at.key("points"), &raw.points)?,
         particles: check_particles(&at.key("particles"), &raw.particles)?,
         sheets: check_sheets(&at.key("sheets"), &raw.sheets)?,
@@ -58,7 +57,7 @@ pub(crate) fn check_render(at: &At<'_>, raw: &RawRender) -> Result<RenderSetting
 }
 
 /// The keys that are written in tables of techniques, which are called as these are.
-fn technique_keys(at: &At<'_>) -> Vec<TechniqueKey> {
+pub(crate) fn technique_keys(at: &At<'_>) -> Vec<TechniqueKey> {
     let Value::Table(tables) = &at.node().value else { return Vec::new() };
     let mut keys = Vec::new();
     for table in tables {

@@ -32,8 +32,6 @@ pub struct RenderSettings {
     pub goal: Goal,
     /// Shadow maps, which all techniques take their light from.
     pub shadow: ShadowSettings,
-    /// Keys that the scene writes in the tables of techniques, those too that have the value that goes without saying.
-    pub technique_keys: Vec<TechniqueKey>,
     /// Settings of the `points` technique.
     pub points: PointsSettings,
     /// Settings of the `particles` technique.

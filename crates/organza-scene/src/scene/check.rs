@@ -17,7 +17,7 @@ use crate::object::check::{Named, check_object};
 use crate::object::drawn::check_drawn;
 use crate::object::raw::RawObject;
 use crate::paths::{Paths, ROOT_KEY};
-use crate::render::check::check_render;
+use crate::render::check::{check_render, technique_keys};
 use crate::source::extract::check_extracts;
 use crate::text::tree::Document;
 use crate::{
@@ -90,6 +90,7 @@ pub(crate) fn scene(
         objects,
         render,
         materials,
+        technique_keys: technique_keys(&at.key("render")),
         footprints: footprints.stack,
         footprint_files: footprints.files,
         in_memory: options.in_memory.clone(),

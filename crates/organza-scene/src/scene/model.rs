@@ -3,7 +3,7 @@
 use crate::in_memory::{InMemory, name_of};
 use crate::{
     CameraFit, EnvironmentSource, Error, RenderSettings, SceneLight, SceneMaterial, SceneObject, Source, Stop,
-    Technique,
+    Technique, TechniqueKey,
 };
 use convert::DiscSize;
 use glam::DVec3;
@@ -48,6 +48,8 @@ pub struct Scene {
     pub materials: Vec<SceneMaterial>,
     /// How to render.
     pub render: RenderSettings,
+    /// Keys that it writes in the tables of techniques, those too that have the value that goes without saying.
+    pub technique_keys: Vec<TechniqueKey>,
     /// The footprints that objects name by index.
     pub footprints: FootprintStack,
     /// The files of those that are images.

@@ -16,7 +16,7 @@ pub(crate) fn without_part(scene: &Scene) -> Vec<String> {
         let technique = first.technique.name();
         Some(format!("{names} {have} no part in this picture: nothing is drawn by the technique `{technique}`"))
     };
-    scene.render.technique_keys.chunk_by(|a, b| a.technique == b.technique).filter_map(sentence).collect()
+    scene.technique_keys.chunk_by(|a, b| a.technique == b.technique).filter_map(sentence).collect()
 }
 
 #[cfg(test)]

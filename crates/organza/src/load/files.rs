@@ -5,7 +5,7 @@ use crate::{Error, RenderOptions};
 use convert::ColorScale;
 use field::SharedField;
 use read::{Loaded, Mended, Notes, ReadParams};
-use splat_core::{DAabb, MemoryAccount, Mesh, Progress, Reservation};
+use splat_core::{DAabb, MemoryAccount, Mesh, Progress, RawPoints, Reservation};
 use std::cell::{Cell, RefCell};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};

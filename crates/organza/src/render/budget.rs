@@ -275,14 +275,14 @@ impl Search<'_> {
             antialias: candidate.rung.antialias,
             splat_share: candidate.rung.splat_share,
             sets: is_random.then_some(candidate.rung.sets),
-            time: Duration::from_secs_f64(candidate.seconds),
+            time: duration(candidate.seconds),
             error: candidate.error,
         };
         Ok(WithinGoal {
             render,
             given_up: candidate.rung.given_up(self.asked),
-            expected: Duration::from_secs_f64(expected),
-            taken: Duration::from_secs_f64(taken),
+            expected: duration(expected),
+            taken: duration(taken),
             error: candidate.error,
             ladder: self.ladder.iter().map(rung).collect(),
         })
@@ -312,6 +312,11 @@ impl Search<'_> {
             hint: format!("use --budget {}, {other}or a smaller --size", ms(MARGIN * shortest)).into(),
         })
     }
+}
+
+/// A time, the longest that there is where it is longer.
+fn duration(seconds: f64) -> Duration {
+    Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX)
 }
 
 /// The next number of two digits.

@@ -106,7 +106,7 @@ fn tag(scene: &Scene, options: &RenderOptions, kept: Option<&Kept>) -> Result<[u
     let RenderSettings { particles, exposure, .. } = &mut same.render;
     (particles.repeat_level, particles.target_error, *exposure) = (0, None, 0.0);
     same.render.goal = Goal::default();
-    same.render.technique_keys.clear();
+    same.technique_keys.clear();
     let mut hasher = Sha256::new();
     hasher.update(env!("CARGO_PKG_VERSION"));
     // Every number is written so that it reads back the same.
