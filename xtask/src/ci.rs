@@ -6,7 +6,7 @@
 use crate::repo::{Outcome, Repo};
 use crate::toml_lines::lines;
 use crate::vulkan::TESTS;
-use crate::{deny, fuzz, papers, shaders, tidy, vulkan};
+use crate::{deny, fuzz, papers, python, shaders, tidy, vulkan};
 use std::process::Command;
 use std::time::{Duration, Instant};
 
@@ -127,6 +127,7 @@ pub(crate) fn deep(repo: &Repo) -> Outcome {
         Step { name: "vulkan", work: Work::Task(vulkan::run) },
         Step { name: "deep tests", work: Work::Cargo(vec![split(&slow)], &[]) },
         Step { name: "damage", work: Work::Cargo(vec![split(&damage)], &[("ORGANZA_DEEP", "1")]) },
+        Step { name: "python", work: Work::Task(python::run) },
         Step { name: "fuzz", work: Work::Task(|repo| fuzz::run(repo, &[])) },
     ];
     follow(&steps, repo)
@@ -138,8 +139,11 @@ pub(crate) fn split(line: &str) -> Vec<String> {
 
 /// Library crates, each without its default features: its folder and the check of it.
 fn bare(repo: &Repo) -> Vec<(&str, Vec<String>)> {
-    // A command has no library.
-    let is_library = |folder: &&str| repo.text(&format!("{folder}/src/main.rs")).is_none();
+    // A command has no library, and the Python package is a workspace of its own.
+    let is_library = |folder: &&str| {
+        let manifest = repo.text(&format!("{folder}/Cargo.toml")).unwrap_or_default();
+        repo.text(&format!("{folder}/src/main.rs")).is_none() && !manifest.contains("\n[workspace]\n")
+    };
     let check = |folder| Some(format!("clippy --package {} --lib --no-default-features", repo.package(folder)?));
     let libraries = repo.crate_folders().into_iter().filter(is_library);
     libraries.filter_map(|folder| Some((folder, split(&check(folder)?)))).collect()

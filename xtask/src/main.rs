@@ -7,6 +7,7 @@ mod effects;
 mod fuzz;
 mod mutants;
 mod papers;
+mod python;
 mod quick;
 mod repo;
 mod shaders;
@@ -34,6 +35,7 @@ usage: cargo xtask COMMAND
   papers --times   takes what benchmarks of `cargo bench` measured last into docs/papers/*-times.csv, then writes the page
   papers --check   fails where docs/papers.md is stale or names code or a test that does not exist
   effects          draws every scene with each of its effects and without it, and writes docs/effects.csv and docs/effects.md
+  python           builds the Python package in target/python, installs and tests it there, and leaves its wheel in target/wheels
   assets           lists the files under assets/, their credit files, and where the larger inputs come from
   assets sky       writes assets/environment/sky.hdr, an environment by formula
   assets dose      writes assets/dose/dose.nrrd, the dose of three beams by formula
@@ -63,6 +65,7 @@ fn main() -> ExitCode {
         }),
         ["papers", "--check"] => Repo::open().and_then(|repo| papers::check(&repo)),
         ["effects"] => Repo::open().and_then(|repo| effects::run(&repo)),
+        ["python"] => Repo::open().and_then(|repo| python::run(&repo)),
         ["assets"] => Repo::open().and_then(|repo| assets::run(&repo)),
         ["assets", "sky"] => Repo::open().and_then(|repo| assets::write_sky(&repo)),
         ["assets", "dose"] => Repo::open().and_then(|repo| assets::write_dose(&repo)),

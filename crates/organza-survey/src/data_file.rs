@@ -54,12 +54,12 @@ impl DataFile {
         Ok(Self { array, array_error, ..Self::of_data(path, data, stated_up, wish)? })
     }
 
-    /// Data that a program has in memory under this name; of points all columns are there.
+    /// Data that a program has in memory under this name, and the axis of it that points up, where that is known; of points all columns are there.
     ///
     /// # Errors
     /// [`Error::Input`] for a mesh without faces, no points, and an image.
-    pub fn in_memory(name: &str, data: SourceData, wish: &Wish) -> Result<Self, Error> {
-        Self::of_data(Path::new(&scene::source_in_memory(name)), data, None, wish)
+    pub fn in_memory(name: &str, data: SourceData, up: Option<UpAxis>, wish: &Wish) -> Result<Self, Error> {
+        Self::of_data(Path::new(&scene::source_in_memory(name)), data, up, wish)
     }
 
     /// What a first scene asks of data.

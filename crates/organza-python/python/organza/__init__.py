@@ -1,0 +1,26 @@
+"""Draws meshes, volumes, point clouds and implicit surfaces together, translucent, lit and shadowed.
+
+>>> import organza as og
+>>> picture = og.render("head.nii.gz", preset="ct-bone")      # what `organza render FILE` draws   # doctest: +SKIP
+>>> picture.save("head.png")                                                                       # doctest: +SKIP
+
+Lengths are in the units of the data; x points right, y up, z towards the viewer. Arrays of volumes have the axes z, y, x, as numpy has them in C
+order: ``values[k, j, i]`` lies at ``origin + i * step_x + j * step_y + k * step_z``. Colours are linear Rec.709, or sRGB where an array is of bytes.
+"""
+
+from organza._organza import InputError, LimitError
+from organza.drawing import explain, render, turntable
+from organza.picture import Picture
+from organza.scene import Scene
+from organza.transfers import transfer
+
+__all__ = [
+    "InputError",
+    "LimitError",
+    "Picture",
+    "Scene",
+    "explain",
+    "render",
+    "transfer",
+    "turntable",
+]

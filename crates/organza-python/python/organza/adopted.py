@@ -1,0 +1,215 @@
+"""Data sets of other libraries, told apart by what they have; nothing of these libraries is imported unless a data set of theirs is there."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from organza._organza import Data, InputError
+from organza.transfers import transfer
+
+if TYPE_CHECKING:
+    from organza.scene import Scene
+
+
+def add(scene: Scene, thing: Any, name: str | None, keys: Mapping[str, Any]) -> None:
+    """Adds a data set to a scene."""
+    kind, own, arguments = _arguments(thing)
+    getattr(scene, f"add_{kind}")(name=name or own, **(arguments | dict(keys)))
+
+
+def data_of(thing: Any) -> tuple[str, Data, str | None]:
+    """A data set for a first scene, with a name, and the axis that points up in it, where that is known."""
+    from organza.scene import Scene
+
+    kind, name, arguments = _arguments(thing)
+    up = arguments.pop("transform", {}).get("up")
+    # What a first scene decides.
+    arguments.pop("color_by", None)
+    if kind == "volume":
+        arguments["transfer"] = transfer()
+    scene = Scene()
+    getattr(scene, f"add_{kind}")(name=name, **arguments)
+    return name, scene._data[name], up
+
+
+def _arguments(thing: Any) -> tuple[str, str, dict[str, Any]]:
+    """What a data set is, a name for it, and the arguments of ``Scene.add_…``."""
+    for look in (_vtk, _trimesh, _open3d, _nibabel, _simpleitk, _xarray, _array):
+        found = look(thing)
+        if found is not None:
+            return found
+    kind = f"{type(thing).__module__}.{type(thing).__qualname__}"
+    raise InputError(
+        f"expected a file, a scene, an array, or a data set of PyVista, VTK, trimesh, Open3D, xarray, nibabel or SimpleITK, found {kind}"
+    )
+
+
+def _vtk(thing: Any) -> tuple[str, str, dict[str, Any]] | None:
+    """PyVista's data sets, and VTK's, by way of PyVista."""
+    if not hasattr(thing, "GetClassName") or not hasattr(thing, "GetNumberOfPoints"):
+        return None
+    if not hasattr(thing, "point_data"):
+        try:
+            import pyvista
+        except ImportError:
+            raise InputError("a data set of VTK: expected the package pyvista, which reads its arrays, found none") from None
+        thing = pyvista.wrap(thing)
+    if thing.IsA("vtkImageData"):
+        scalars = thing.active_scalars
+        if scalars is None or scalars.ndim != 1:
+            raise InputError("the image: expected an active array of one number a point, found none; set `active_scalars_name`")
+        width, height, depth = thing.dimensions
+        if scalars.size != width * height * depth:
+            thing = thing.cell_data_to_point_data()
+            scalars = thing.active_scalars
+        direction = getattr(thing, "direction_matrix", None)
+        return (
+            "volume",
+            thing.active_scalars_name or "volume",
+            {
+                "values": np.asarray(scalars).reshape(depth, height, width),
+                "spacing": thing.spacing,
+                "origin": thing.origin,
+                "direction": np.eye(3) if direction is None else np.asarray(direction),
+            },
+        )
+    if not thing.IsA("vtkPolyData"):
+        if not hasattr(thing, "extract_surface"):
+            raise InputError(f"expected points, a surface or an image of VTK, found {thing.GetClassName()}")
+        thing = thing.extract_surface()
+    is_surface = thing.n_faces_strict > 0 if hasattr(thing, "n_faces_strict") else thing.n_faces > 0
+    colors = _vtk_colors(thing)
+    if is_surface and thing.n_verts == 0:
+        whole = thing.triangulate()
+        faces = np.asarray(whole.faces).reshape(-1, 4)[:, 1:]
+        colors = _vtk_colors(whole)
+        return "mesh", "mesh", {"vertices": np.asarray(whole.points), "faces": faces, "colors": colors}
+    columns = {}
+    for name, array in thing.point_data.items():
+        if np.ndim(array) == 1 and np.issubdtype(array.dtype, np.number):
+            columns[str(name)] = np.asarray(array)
+    arguments: dict[str, Any] = {"positions": np.asarray(thing.points), "colors": colors, "columns": columns}
+    active = thing.active_scalars_name
+    if colors is None and active in columns:
+        arguments["color_by"] = active
+    return "points", "points", arguments
+
+
+def _vtk_colors(thing: Any) -> np.ndarray | None:
+    """The active array, where it is colours in bytes."""
+    scalars = thing.active_scalars
+    is_colors = scalars is not None and scalars.ndim == 2 and scalars.shape[1] in (3, 4) and scalars.dtype == np.uint8
+    return np.asarray(scalars)[:, :3] if is_colors and len(scalars) == thing.n_points else None
+
+
+def _trimesh(thing: Any) -> tuple[str, str, dict[str, Any]] | None:
+    """A mesh or points of trimesh."""
+    module = type(thing).__module__
+    if not module.startswith("trimesh"):
+        return None
+    if hasattr(thing, "geometry") and hasattr(thing, "to_geometry"):
+        thing = thing.to_geometry()
+    if hasattr(thing, "faces"):
+        colors = None
+        visual = getattr(thing, "visual", None)
+        if visual is not None and visual.defined:
+            seen = visual.to_color() if visual.kind == "texture" else visual
+            colors = np.asarray(seen.vertex_colors)[:, :3]
+        return "mesh", "mesh", {"vertices": np.asarray(thing.vertices), "faces": np.asarray(thing.faces), "colors": colors}
+    if hasattr(thing, "vertices"):
+        colors = np.asarray(getattr(thing, "colors", np.empty(0)))
+        known = colors[:, :3] if colors.ndim == 2 and len(colors) == len(thing.vertices) else None
+        return "points", "points", {"positions": np.asarray(thing.vertices), "colors": known}
+    return None
+
+
+def _open3d(thing: Any) -> tuple[str, str, dict[str, Any]] | None:
+    """A mesh or points of Open3D's legacy types, whose colours are of a display."""
+    if not type(thing).__module__.startswith("open3d"):
+        return None
+
+    def part(name: str) -> np.ndarray | None:
+        array = np.asarray(getattr(thing, name, ()))
+        return array if array.size else None
+
+    def linear(colors: np.ndarray | None) -> np.ndarray | None:
+        return None if colors is None else np.round(np.clip(colors, 0.0, 1.0) * 255.0).astype(np.uint8)
+
+    if hasattr(thing, "triangles"):
+        colors = linear(part("vertex_colors"))
+        return "mesh", "mesh", {"vertices": part("vertices"), "faces": part("triangles"), "colors": colors}
+    if hasattr(thing, "points"):
+        arguments = {"positions": part("points"), "normals": part("normals"), "colors": linear(part("colors"))}
+        return "points", "points", arguments
+    return None
+
+
+def _nibabel(thing: Any) -> tuple[str, str, dict[str, Any]] | None:
+    """An image of nibabel, in its own world: x to the right of the patient, y to the front, z up."""
+    if not hasattr(thing, "affine") or not hasattr(thing, "dataobj"):
+        return None
+    values = np.asanyarray(thing.dataobj)
+    if values.ndim == 4 and values.shape[3] == 1:
+        values = values[..., 0]
+    if values.ndim != 3:
+        raise InputError(f"the image: expected three axes, found the shape {values.shape}; take one of a series")
+    affine = np.asarray(thing.affine, dtype=float)
+    steps = np.linalg.norm(affine[:3, :3], axis=0)
+    arguments = {
+        "values": values.transpose(),
+        "spacing": steps,
+        "origin": affine[:3, 3],
+        "direction": affine[:3, :3] / steps,
+        "transform": {"up": "z"},
+    }
+    return "volume", "image", arguments
+
+
+def _simpleitk(thing: Any) -> tuple[str, str, dict[str, Any]] | None:
+    """An image of SimpleITK, whose world has x to the left of the patient, y to the back, z up."""
+    library = sys.modules.get("SimpleITK")
+    if library is None or not isinstance(thing, library.Image):
+        return None
+    arguments = {
+        "values": library.GetArrayViewFromImage(thing),
+        "spacing": thing.GetSpacing(),
+        "origin": thing.GetOrigin(),
+        "direction": np.asarray(thing.GetDirection()).reshape(3, 3),
+        "transform": {"up": "z"},
+    }
+    return "volume", "image", arguments
+
+
+def _xarray(thing: Any) -> tuple[str, str, dict[str, Any]] | None:
+    """An array of xarray: by its dimensions x, y and z where they are called so, else in the order that it has."""
+    if not hasattr(thing, "dims") or not hasattr(thing, "coords") or not hasattr(thing, "values"):
+        return None
+    if len(thing.dims) != 3:
+        raise InputError(f"the array: expected three dimensions, found {tuple(thing.dims)}; take a part by `isel`")
+    if {"x", "y", "z"} <= set(thing.dims):
+        thing = thing.transpose("z", "y", "x")
+    spacing, origin = [], []
+    for dim in reversed(thing.dims):
+        places = np.asarray(thing.coords[dim].values, dtype=float) if dim in thing.coords else np.arange(float(thing.sizes[dim]))
+        steps = np.diff(places)
+        if len(steps) and not np.allclose(steps, steps[0], rtol=1e-3):
+            raise InputError(f"the coordinate {dim}: expected even steps, found {steps.min()} to {steps.max()}; interpolate it first")
+        spacing.append(float(steps[0]) if len(steps) else 1.0)
+        origin.append(float(places[0]))
+    return "volume", str(thing.name or "volume"), {"values": thing.values, "spacing": spacing, "origin": origin}
+
+
+def _array(thing: Any) -> tuple[str, str, dict[str, Any]] | None:
+    """An array: n rows of three numbers are points, three axes a volume."""
+    if not hasattr(thing, "__array__") and not isinstance(thing, (list, tuple)):
+        return None
+    array = np.asarray(thing)
+    if array.ndim == 3:
+        return "volume", "volume", {"values": array}
+    if array.ndim == 2 and array.shape[1] == 3:
+        return "points", "points", {"positions": array}
+    raise InputError(f"the array: expected the shape (n, 3) of points or (nz, ny, nx) of a volume, found {array.shape}")

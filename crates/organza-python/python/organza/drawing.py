@@ -1,0 +1,172 @@
+"""Drawing files, data and scenes."""
+
+from __future__ import annotations
+
+import json
+import warnings
+from collections.abc import Callable, Iterator
+from typing import Any
+
+from organza import _organza
+from organza.picture import Picture
+from organza.scene import Scene, scene_of
+
+Progress = Callable[[str, float], object]
+
+
+def render(
+    *what: Any,
+    size: tuple[int, int] | None = None,
+    preset: str | None = None,
+    color_by: str | None = None,
+    up: str | None = None,
+    ground: bool = False,
+    azimuth: float | None = None,
+    elevation: float | None = None,
+    fit: float | None = None,
+    effects: dict[str, str] | None = None,
+    transparent: bool = False,
+    threads: int | None = None,
+    max_memory: int | None = None,
+    drop_invalid: bool = False,
+    strict: bool = False,
+    progress: Progress | None = None,
+) -> Picture:
+    """Draws a scene, or a first scene of files and data: what ``organza render`` draws of them.
+
+    Parameters
+    ----------
+    *what
+        A :class:`Scene`, the path of a scene file, or any number of data files and data sets (see :meth:`Scene.add`).
+    size
+        Width and height, pixels; 960 x 540 where nothing says another.
+    preset, color_by, up, ground, azimuth, elevation, fit
+        Of a first scene, as the options of ``organza render FILE``: how volumes look, the column that points have their colours from, the axis that points
+        up (``"y"``, ``"z"``, ``"-y"``), a ground below, where the camera stands (degrees), and the share of the picture that is filled.
+    effects
+        Effects that are switched, such as ``{"shadow.sun": "off"}``.
+    transparent
+        Keep what ``Picture.save(…, transparent=True)`` needs.
+    threads
+        Threads that draw; as many as the machine has where it is None. Pictures are the same for any number.
+    max_memory
+        Bytes that data and buffers may take together; 8 GiB where it is None.
+    drop_invalid
+        Leave out points of files that are not finite, instead of refusing the file.
+    strict
+        Refuse files with a fault that could be mended.
+    progress
+        Called with the name of the stage and the share that is done, from 0 to 1.
+
+    Returns
+    -------
+    Picture
+
+    Raises
+    ------
+    InputError
+        Data or a scene that is wrong; the message names it, what was expected and found.
+    LimitError
+        What would take more than ``max_memory``; nothing is drawn.
+    FileNotFoundError, OSError
+        Files that cannot be read.
+    """
+    how = _how(threads, max_memory, progress, drop_invalid, strict)
+    wished = _wished(size, preset, color_by, up, ground, azimuth, elevation, fit)
+    scene = scene_of(what, wished, how)
+    picture = Picture(_organza.render(scene._given(how, effects, size, transparent), how), scene._remarks)
+    for sentence in picture.warnings:
+        warnings.warn(sentence, stacklevel=2)
+    return picture
+
+
+def explain(
+    *what: Any,
+    size: tuple[int, int] | None = None,
+    preset: str | None = None,
+    color_by: str | None = None,
+    up: str | None = None,
+    ground: bool = False,
+    effects: dict[str, str] | None = None,
+    threads: int | None = None,
+    max_memory: int | None = None,
+    drop_invalid: bool = False,
+    strict: bool = False,
+    progress: Progress | None = None,
+) -> dict[str, Any]:
+    """Says what drawing a scene would do, without drawing it: effects with reasons and bounds, passes, predicted time and memory.
+
+    Parameters are those of :func:`render`.
+
+    Returns
+    -------
+    dict
+        The document of ``organza explain --json``: ``plan``, ``predicted``, ``cost``, ``splats``, ``memory``, ``warnings``, ``notes``, ``camera``.
+    """
+    how = _how(threads, max_memory, progress, drop_invalid, strict)
+    wished = _wished(size, preset, color_by, up, ground, None, None, None)
+    scene = scene_of(what, wished, how)
+    return json.loads(_organza.explain(scene._given(how, effects, size), how))
+
+
+def turntable(
+    what: Any,
+    frames: int = 36,
+    *,
+    size: tuple[int, int] | None = None,
+    threads: int | None = None,
+    max_memory: int | None = None,
+    progress: Progress | None = None,
+) -> Iterator[Picture]:
+    """Draws a scene from all around, one picture after the other, as ``organza render --turntable`` does.
+
+    Parameters
+    ----------
+    what
+        A :class:`Scene`, a file or a data set.
+    frames
+        Pictures of the whole circle.
+    size, threads, max_memory, progress
+        As for :func:`render`.
+    """
+    how = _how(threads, max_memory, progress, False, False)
+    wished = _wished(size, None, None, None, False, None, None, None) | {"turntable": frames}
+    scene = scene_of((what,), wished, how)
+    for frame in range(frames):
+        given = scene._given(how, None, size) | {"frame": frame, "turntable": frames}
+        yield Picture(_organza.render(given, how), scene._remarks)
+
+
+def _how(
+    threads: int | None, max_memory: int | None, progress: Progress | None, drop_invalid: bool, strict: bool
+) -> dict[str, Any]:
+    return {
+        "threads": threads,
+        "max_memory": max_memory,
+        "progress": progress,
+        "drop_invalid": drop_invalid,
+        "strict": strict,
+    }
+
+
+def _wished(
+    size: tuple[int, int] | None,
+    preset: str | None,
+    color_by: str | None,
+    up: str | None,
+    ground: bool,
+    azimuth: float | None,
+    elevation: float | None,
+    fit: float | None,
+) -> dict[str, Any]:
+    return {
+        "size": size,
+        "preset": preset,
+        "color_by": color_by,
+        "up": up,
+        "ground": ground,
+        "azimuth": azimuth,
+        "elevation": elevation,
+        "fit": fit,
+        "turntable": None,
+    }

@@ -1,0 +1,128 @@
+"""A picture that was drawn."""
+
+from __future__ import annotations
+
+import json
+import os
+import warnings
+from os import PathLike
+from typing import Any
+
+import numpy as np
+
+from organza import _organza
+
+
+class Picture:
+    """A picture: layers as arrays, and what is known of how it was drawn.
+
+    ``picture.rgb`` is what is seen, ``picture["depth.median"]`` another layer, if the scene's ``render.layers`` asks for it. A notebook shows it.
+    """
+
+    def __init__(self, drawn: _organza.Picture, remarks: list[str]):
+        self._drawn = drawn
+        self._facts: dict[str, Any] = json.loads(drawn.facts)
+        self._remarks = remarks
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height, pixels."""
+        return self._drawn.size
+
+    @property
+    def layers(self) -> list[str]:
+        """Names of its layers; ``beauty`` and ``alpha`` are always there."""
+        return self._drawn.layers
+
+    @property
+    def rgb(self) -> np.ndarray:
+        """What is seen, (height, width, 3), linear Rec.709 radiance."""
+        return self["beauty"]
+
+    @property
+    def alpha(self) -> np.ndarray:
+        """Opacity of what lies before the background, (height, width), 0 to 1."""
+        return self["alpha"]
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        """A layer by its name, or one of its channels, such as ``direct.R``: an array of its own.
+
+        Raises
+        ------
+        KeyError
+            For a layer that the picture has not.
+        """
+        layer, _, channel = name.rpartition(".")
+        if layer in self.layers and channel in ("R", "G", "B"):
+            return np.ascontiguousarray(self._drawn.layer(layer)[..., "RGB".index(channel)])
+        if name not in self.layers:
+            raise KeyError(f"'{name}': the picture has {', '.join(self.layers)}; render.layers of a scene asks for others")
+        return self._drawn.layer(name)
+
+    @property
+    def camera(self) -> dict[str, Any]:
+        """Where it was seen from, and whether that place was found."""
+        return self._facts["camera"]
+
+    @property
+    def plan(self) -> dict[str, Any]:
+        """Effects and passes with their reasons, as ``organza explain --json`` has them."""
+        return self._facts["plan"]
+
+    @property
+    def cost(self) -> list[dict[str, Any]]:
+        """What each pass took, as ``organza render --cost`` writes it."""
+        return self._facts["cost"]
+
+    @property
+    def warnings(self) -> list[str]:
+        """What a user should know of the picture, one sentence each."""
+        return self._facts["warnings"]
+
+    @property
+    def notes(self) -> list[str]:
+        """What the data holds that is not shown, what was made of it, and what a first scene decided, one sentence each."""
+        return self._remarks + self._facts["notes"]
+
+    def to_srgb8(self, transparent: bool = False) -> np.ndarray:
+        """The displayed picture, bytes of sRGB as its PNG file has them: (height, width, 3), or 4 channels where ``transparent``."""
+        return self._drawn.srgb8(transparent)
+
+    def save(
+        self,
+        path: str | PathLike[str],
+        *,
+        transparent: bool = False,
+        deep: bool = False,
+        half: bool = False,
+        legend: bool = False,
+        force: bool = True,
+    ) -> None:
+        """Writes an OpenEXR file with all layers, or a PNG file of what is displayed, by the ending of the name.
+
+        Parameters
+        ----------
+        path
+            Where; the file appears whole or not at all.
+        transparent
+            Opacity in the place of the background; the picture is to be drawn with ``transparent=True``.
+        deep
+            16 bits a channel in a PNG file.
+        half
+            16 bits a channel in an OpenEXR file.
+        legend
+            What colours stand for, over the right border of a PNG file.
+        force
+            Whether a file of that name is replaced.
+        """
+        if not force and os.path.exists(path):
+            raise FileExistsError(f"{os.fspath(path)}: this file exists already; force=True replaces it")
+        for sentence in self._drawn.save(path, transparent, deep, half, legend, force):
+            warnings.warn(sentence, stacklevel=2)
+
+    def _repr_png_(self) -> bytes:
+        return self._drawn.png()
+
+    def __repr__(self) -> str:
+        width, height = self.size
+        return f"<organza.Picture {width}x{height}: {', '.join(self.layers)}>"

@@ -1,0 +1,103 @@
+//! numpy arrays → columns. An array of any number type, with any strides, is read in one pass into the column that is drawn.
+
+use crate::errors::refused;
+use numpy::{Element, PyArrayDyn, PyArrayMethods, PyUntypedArray, PyUntypedArrayMethods};
+use pyo3::prelude::*;
+use splat_core::glam::{DVec3, Vec3};
+
+/// A number that an array may hold.
+trait Number: Element + Copy {
+    fn number(self) -> f64;
+}
+
+macro_rules! numbers {
+    ($($kind:ty),*) => {$(
+        impl Number for $kind {
+            fn number(self) -> f64 {
+                self as f64
+            }
+        }
+    )*};
+}
+numbers!(f32, f64, i8, i16, i32, i64, u8, u16, u32, u64);
+
+/// All numbers of an array, in C order whatever its strides, each as `made` makes it.
+pub(crate) fn column<T>(name: &str, array: &Bound<'_, PyAny>, made: impl Fn(f64) -> T + Copy) -> PyResult<Vec<T>> {
+    macro_rules! try_kinds {
+        ($($kind:ty),*) => {$(
+            if let Ok(array) = array.cast::<PyArrayDyn<$kind>>() {
+                let array = array.try_readonly().map_err(|_| busy(name))?;
+                return Ok(array.as_array().iter().map(|value| made(value.number())).collect());
+            }
+        )*};
+    }
+    try_kinds!(f32, f64, i16, u8, i32, u16, i64, u32, i8, u64);
+    Err(refused(name, "an array of numbers", &kind_of(array)))
+}
+
+fn busy(name: &str) -> PyErr {
+    refused(name, "an array that nobody writes to meanwhile", "one that is borrowed to be written")
+}
+
+fn kind_of(array: &Bound<'_, PyAny>) -> String {
+    match array.cast::<PyUntypedArray>() {
+        Ok(array) => format!("one of type {}", array.dtype()),
+        Err(_) => array.get_type().to_string(),
+    }
+}
+
+/// The sides of an array.
+pub(crate) fn shape(name: &str, array: &Bound<'_, PyAny>) -> PyResult<Vec<usize>> {
+    let array = array.cast::<PyUntypedArray>().map_err(|_| refused(name, "an array of numpy", &kind_of(array)))?;
+    Ok(array.shape().to_vec())
+}
+
+/// The rows of an array of `rows` times `width` numbers.
+pub(crate) fn check_rows(name: &str, array: &Bound<'_, PyAny>, rows: Option<usize>, width: usize) -> PyResult<usize> {
+    let found = shape(name, array)?;
+    let is_wide = match width {
+        1 => found.len() == 1,
+        width => found.len() == 2 && found[1] == width,
+    };
+    if !is_wide || rows.is_some_and(|rows| found[0] != rows) {
+        let many = rows.map_or_else(|| "n".to_owned(), |rows| rows.to_string());
+        let expected = if width == 1 { format!("the shape ({many},)") } else { format!("the shape ({many}, {width})") };
+        return Err(refused(name, &expected, &format!("{found:?}")));
+    }
+    Ok(found[0])
+}
+
+/// Positions, an array of n times 3.
+pub(crate) fn positions(name: &str, array: &Bound<'_, PyAny>) -> PyResult<Vec<DVec3>> {
+    check_rows(name, array, None, 3)?;
+    let numbers = column(name, array, |value| value)?;
+    Ok(numbers.chunks_exact(3).map(DVec3::from_slice).collect())
+}
+
+/// Vectors of single precision, one a row.
+pub(crate) fn vectors(name: &str, array: &Bound<'_, PyAny>, rows: usize) -> PyResult<Vec<Vec3>> {
+    check_rows(name, array, Some(rows), 3)?;
+    let numbers = column(name, array, |value| value as f32)?;
+    Ok(numbers.chunks_exact(3).map(Vec3::from_slice).collect())
+}
+
+/// Colours, one a row: linear numbers, or bytes of sRGB where the array is of bytes.
+pub(crate) fn colors(name: &str, array: &Bound<'_, PyAny>, rows: usize) -> PyResult<Vec<[f32; 3]>> {
+    check_rows(name, array, Some(rows), 3)?;
+    let is_bytes = array.cast::<PyArrayDyn<u8>>().is_ok();
+    let linear = |value: f64| if is_bytes { splat_core::srgb::decoded(value / 255.0) as f32 } else { value as f32 };
+    let numbers = column(name, array, linear)?;
+    Ok(numbers.as_chunks().0.to_vec())
+}
+
+/// Indices of vertices, three a triangle; the first that no vertex has is named.
+pub(crate) fn triangles(name: &str, array: &Bound<'_, PyAny>, vertices: usize) -> PyResult<Vec<[u32; 3]>> {
+    check_rows(name, array, None, 3)?;
+    let numbers = column(name, array, |value| value)?;
+    let is_index = |value: &f64| *value >= 0.0 && *value < vertices as f64 && value.fract() == 0.0;
+    if let Some(place) = numbers.iter().position(|value| !is_index(value)) {
+        let expected = format!("indices of {vertices} vertices, from 0");
+        return Err(refused(name, &expected, &format!("{} in face {}", numbers[place], place / 3)));
+    }
+    Ok(numbers.as_chunks().0.iter().map(|face: &[f64; 3]| face.map(|index| index as u32)).collect())
+}

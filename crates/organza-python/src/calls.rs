@@ -1,0 +1,278 @@
+//! What the package calls: a first scene of data, a scene drawn, a scene explained.
+
+use crate::data::Data;
+use crate::errors::{InputError, raised, refused};
+use crate::picture::{Picture, explained};
+use crate::running::run;
+use convert::ColorMap;
+use organza::scene::{LoadOptions, Override, Scene, UpAxis, parse};
+use organza::{Error, Files, InMemory, Progress, RenderOptions};
+use organza_survey::{DataFile, Preset, Wish};
+use pyo3::prelude::*;
+use serde_json::Value;
+use splat_core::MemoryAccount;
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+
+/// The file that the text of a first scene is written for: it lies in the working folder, and is never there.
+const FIRST: &str = "scene.toml";
+
+/// How a call goes about its work; every field may be `None`.
+#[derive(FromPyObject)]
+pub(crate) struct How<'py> {
+    #[pyo3(item)]
+    threads: Option<usize>,
+    #[pyo3(item)]
+    max_memory: Option<u64>,
+    #[pyo3(item)]
+    progress: Option<Bound<'py, PyAny>>,
+    #[pyo3(item)]
+    drop_invalid: bool,
+    #[pyo3(item)]
+    strict: bool,
+}
+
+impl How<'_> {
+    fn options(&self) -> RenderOptions {
+        let defaults = RenderOptions::default();
+        RenderOptions {
+            max_memory: self.max_memory.unwrap_or(defaults.max_memory),
+            drop_invalid: self.drop_invalid,
+            strict: self.strict,
+            ..defaults
+        }
+    }
+}
+
+/// A scene as a call has it: its document in TOML, or in JSON where the name of its file ends so, and the data that it names.
+#[derive(FromPyObject)]
+pub(crate) struct Given {
+    #[pyo3(item)]
+    text: String,
+    #[pyo3(item)]
+    file: PathBuf,
+    #[pyo3(item)]
+    data: HashMap<String, Py<Data>>,
+    /// Width and height, where the scene's are not meant.
+    #[pyo3(item)]
+    size: Option<[u32; 2]>,
+    /// Whether the layer of a picture without its background is kept.
+    #[pyo3(item)]
+    transparent: bool,
+    /// Effects that are switched, such as `shadow.sun=off`.
+    #[pyo3(item)]
+    effects: Vec<String>,
+    /// The frame of an animation or a turntable.
+    #[pyo3(item)]
+    frame: Option<u32>,
+    /// Frames of a turntable.
+    #[pyo3(item)]
+    turntable: Option<u32>,
+}
+
+impl Given {
+    fn in_memory(&self) -> PyResult<InMemory> {
+        let mut in_memory = InMemory::default();
+        for (name, data) in &self.data {
+            in_memory.insert(name, data.get().data.clone()).map_err(|error| raised(&error.into()))?;
+        }
+        Ok(in_memory)
+    }
+
+    fn scene(&self, in_memory: InMemory, options: &RenderOptions) -> Result<Scene, Error> {
+        let mut overrides = Vec::new();
+        for effect in &self.effects {
+            overrides.push(Override::of_effect(effect)?);
+        }
+        if let Some([width, height]) = self.size {
+            overrides.push(Override::parse(&format!("camera.size=[{width}, {height}]"))?);
+        }
+        let load = LoadOptions {
+            allow_path: true,
+            memory: MemoryAccount::new(options.max_memory),
+            in_memory,
+            overrides,
+            frame: self.frame,
+            turntable: self.turntable,
+            ..LoadOptions::default()
+        };
+        let mut scene = parse(&self.file, self.text.as_bytes(), &load)?;
+        if self.transparent && !scene.render.layers.add("background") {
+            return Err(Error::Internal("there is no layer of the background".into()));
+        }
+        Ok(scene)
+    }
+}
+
+/// Draws a scene.
+#[pyfunction]
+pub(crate) fn render(py: Python<'_>, given: Given, how: How<'_>) -> PyResult<Picture> {
+    let options = how.options();
+    let in_memory = given.in_memory()?;
+    let work = |progress: &Progress| {
+        let scene = given.scene(in_memory, &options)?;
+        let picture = organza::render(&scene, &options, progress)?;
+        Ok(Picture::new(&scene, &given.text, picture))
+    };
+    run(py, how.threads, how.progress.as_ref(), work)
+}
+
+/// Says what drawing a scene would do, a document in JSON.
+#[pyfunction]
+pub(crate) fn explain(py: Python<'_>, given: Given, how: How<'_>) -> PyResult<String> {
+    let options = how.options();
+    let in_memory = given.in_memory()?;
+    let work = |progress: &Progress| {
+        let scene = given.scene(in_memory, &options)?;
+        let explanation = organza::explain(&scene, &options, progress)?;
+        Ok(explained(&scene, &explanation).to_string())
+    };
+    run(py, how.threads, how.progress.as_ref(), work)
+}
+
+/// The lights of a first scene for what a scene without lights shows, a document in JSON.
+#[pyfunction]
+pub(crate) fn lights_of(py: Python<'_>, given: Given, how: How<'_>) -> PyResult<String> {
+    let options = how.options();
+    let in_memory = given.in_memory()?;
+    let is_turned = given.turntable.is_some();
+    let work = |progress: &Progress| {
+        let scene = given.scene(in_memory, &options)?;
+        let lights = organza_survey::lights_of(&scene, is_turned, &Files::default(), &options, progress)?;
+        json_of_toml(&lights)
+    };
+    run(py, how.threads, None, work)
+}
+
+/// What a first scene is made of: a file, or a name, data of that name, and the axis that points up in it.
+#[derive(FromPyObject)]
+pub(crate) enum Shown {
+    #[pyo3(transparent)]
+    File(PathBuf),
+    InMemory(String, Py<Data>, Option<String>),
+}
+
+/// What a user may say of a first scene; every field may be `None`.
+#[derive(FromPyObject)]
+pub(crate) struct Wished {
+    #[pyo3(item)]
+    size: Option<[u32; 2]>,
+    #[pyo3(item)]
+    preset: Option<String>,
+    #[pyo3(item)]
+    color_by: Option<String>,
+    #[pyo3(item)]
+    up: Option<String>,
+    #[pyo3(item)]
+    ground: bool,
+    #[pyo3(item)]
+    azimuth: Option<f64>,
+    #[pyo3(item)]
+    elevation: Option<f64>,
+    #[pyo3(item)]
+    fit: Option<f64>,
+    #[pyo3(item)]
+    turntable: Option<u32>,
+}
+
+impl Wished {
+    fn wish(&self) -> PyResult<Wish> {
+        let up = self.up.as_deref().map(axis).transpose()?;
+        let defaults = Wish::default();
+        Ok(Wish {
+            azimuth: self.azimuth,
+            elevation: self.elevation,
+            fill: self.fit.unwrap_or(defaults.fill),
+            turntable: self.turntable,
+            size: self.size.unwrap_or(defaults.size),
+            preset: self.preset.as_deref().map(Preset::named).transpose().map_err(|error| raised(&error))?,
+            color_by: self.color_by.clone(),
+            up,
+            ground: self.ground,
+        })
+    }
+}
+
+/// The axis of a name.
+fn axis(name: &str) -> PyResult<UpAxis> {
+    match name {
+        "y" => Ok(UpAxis::Y),
+        "z" => Ok(UpAxis::Z),
+        "-y" => Ok(UpAxis::MinusY),
+        other => Err(refused("up", "'y', 'z' or '-y'", &format!("'{other}'"))),
+    }
+}
+
+/// A first scene of files and data: its document in JSON, and what was decided that a user may want otherwise.
+#[pyfunction]
+pub(crate) fn first_scene(
+    py: Python<'_>,
+    shown: Vec<Shown>,
+    wished: Wished,
+    how: How<'_>,
+) -> PyResult<(String, Vec<String>)> {
+    let options = how.options();
+    let wish = wished.wish()?;
+    let mut in_memory = InMemory::default();
+    let mut sources = Vec::new();
+    for shown in shown {
+        sources.push(match shown {
+            Shown::File(path) => Source::File(path),
+            Shown::InMemory(name, data, up) => {
+                let data = &data.get().data;
+                let up = up.as_deref().map(axis).transpose()?;
+                in_memory.insert(&name, data.clone()).map_err(|error| raised(&error.into()))?;
+                let file = DataFile::in_memory(&name, data.clone(), up, &wish);
+                Source::InMemory(file.map_err(|error| raised(&error))?)
+            }
+        });
+    }
+    let work = |progress: &Progress| {
+        let files = Files::default();
+        let read = |source: Source| match source {
+            Source::File(path) => DataFile::read(&path, &wish, (&files, &options, progress)),
+            Source::InMemory(data) => Ok(data),
+        };
+        let data = sources.into_iter().map(read).collect::<Result<Vec<_>, Error>>()?;
+        let surveyed = (&files, &options, progress);
+        let written = organza_survey::first_scene(&data, Path::new(FIRST), &wish, &in_memory, surveyed)?;
+        Ok((json_of_toml(&written.text)?, written.remarks))
+    };
+    run(py, how.threads, None, work)
+}
+
+/// A file to be read, or data that is there.
+enum Source {
+    File(PathBuf),
+    InMemory(DataFile),
+}
+
+/// Refuses data that no scene may name so.
+#[pyfunction]
+pub(crate) fn check(name: &str, data: &Data) -> PyResult<()> {
+    InMemory::default().insert(name, data.data.clone()).map_err(|error| raised(&error.into()))
+}
+
+/// Linear colours of a map at places from 0 to 1.
+#[pyfunction]
+pub(crate) fn map_colors(name: &str, places: Vec<f64>) -> PyResult<Vec<[f32; 3]>> {
+    let Some(map) = ColorMap::named(name) else {
+        let known: Vec<&str> = ColorMap::names().collect();
+        return Err(refused("colormap", &format!("one of {}", known.join(", ")), &format!("'{name}'")));
+    };
+    Ok(places.into_iter().map(|place| map.at(place)).collect())
+}
+
+/// A document in JSON as TOML.
+#[pyfunction]
+pub(crate) fn toml_text(document: &str) -> PyResult<String> {
+    let wrong = |error: &dyn std::fmt::Display| InputError::new_err(format!("the scene: {error}"));
+    let value: Value = serde_json::from_str(document).map_err(|error| wrong(&error))?;
+    toml::to_string_pretty(&value).map_err(|error| wrong(&error))
+}
+
+/// A document in TOML as JSON.
+fn json_of_toml(text: &str) -> Result<String, Error> {
+    let value: Value = toml::from_str(text).map_err(|error| Error::Internal(error.to_string()))?;
+    Ok(value.to_string())
+}

@@ -1,0 +1,226 @@
+//! Data from arrays: a mesh, points, a volume or an image, checked once and read where it lies.
+
+use crate::arrays;
+use crate::errors::refused;
+
+use numpy::{PyArray1, PyArrayMethods};
+use organza::SourceData;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use splat_core::glam::{DMat3, DVec3, Vec3};
+use splat_core::{Column, Grid, Mesh, RadianceImage, RawPoints, Relative};
+
+/// A mesh, points, a volume or an image in memory, which scenes name as `memory:NAME`.
+#[pyclass(frozen, module = "organza._organza")]
+pub(crate) struct Data {
+    pub(crate) data: SourceData,
+}
+
+#[pymethods]
+impl Data {
+    /// A mesh: vertices (n, 3), faces (m, 3) of indices, and by vertex normals and linear colours, or bytes of sRGB.
+    #[staticmethod]
+    #[pyo3(signature = (vertices, faces, normals=None, colors=None))]
+    fn mesh(
+        vertices: &Bound<'_, PyAny>,
+        faces: &Bound<'_, PyAny>,
+        normals: Option<&Bound<'_, PyAny>>,
+        colors: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Self> {
+        let positions = arrays::positions("vertices", vertices)?;
+        let count = positions.len();
+        let Relative { origin, offsets } = relative("vertices", &positions)?;
+        let mesh = Mesh {
+            origin,
+            position: offsets,
+            normal: unit_vectors("normals", normals, count)?,
+            color: colors.map_or_else(|| Ok(Vec::new()), |colors| arrays::colors("colors", colors, count))?,
+            triangles: arrays::triangles("faces", faces, count)?,
+        };
+        Ok(Self { data: SourceData::Mesh(mesh.into()) })
+    }
+
+    /// Points: positions (n, 3), and by point normals, linear colours or bytes of sRGB, opacities, values, and named columns of numbers.
+    #[staticmethod]
+    #[pyo3(signature = (positions, normals=None, colors=None, opacities=None, values=None, columns=None))]
+    fn points(
+        positions: &Bound<'_, PyAny>,
+        normals: Option<&Bound<'_, PyAny>>,
+        colors: Option<&Bound<'_, PyAny>>,
+        opacities: Option<&Bound<'_, PyAny>>,
+        values: Option<&Bound<'_, PyAny>>,
+        columns: Option<&Bound<'_, PyDict>>,
+    ) -> PyResult<Self> {
+        let places = arrays::positions("positions", positions)?;
+        let count = places.len();
+        let Relative { origin, offsets } = relative("positions", &places)?;
+        let numbers = |name: &str, array: Option<&Bound<'_, PyAny>>| {
+            let Some(array) = array else { return Ok(Vec::new()) };
+            arrays::check_rows(name, array, Some(count), 1)?;
+            arrays::column(name, array, |value| value as f32)
+        };
+        let mut named = Vec::new();
+        for (name, array) in columns.into_iter().flatten() {
+            let name: String = name.extract()?;
+            arrays::check_rows(&name, &array, Some(count), 1)?;
+            let values = arrays::column(&name, &array, |value| value)?;
+            named.push(Column { name, values });
+        }
+        let points = RawPoints {
+            origin,
+            position: offsets,
+            normal: unit_vectors("normals", normals, count)?,
+            color: colors.map_or_else(|| Ok(Vec::new()), |colors| arrays::colors("colors", colors, count))?,
+            opacity: numbers("opacities", opacities)?,
+            value: numbers("values", values)?,
+            columns: named,
+            ..RawPoints::default()
+        };
+        Ok(Self { data: SourceData::Points(points.into()) })
+    }
+
+    /// A volume: values (nz, ny, nx), the steps along x, y and z, the place of the first value, and the directions of the steps, the columns of a 3 x 3
+    /// matrix.
+    #[staticmethod]
+    fn grid(
+        values: &Bound<'_, PyAny>,
+        spacing: [f64; 3],
+        origin: [f64; 3],
+        direction: [[f64; 3]; 3],
+    ) -> PyResult<Self> {
+        let sides = arrays::shape("values", values)?;
+        let &[depth, height, width] = sides.as_slice() else {
+            return Err(refused("values", "the shape (nz, ny, nx)", &format!("{sides:?}")));
+        };
+        // Rows of the matrix as numpy has them.
+        let directions = DMat3::from_cols_array_2d(&direction).transpose();
+        let axes = DMat3::from_cols(
+            directions.x_axis * spacing[0],
+            directions.y_axis * spacing[1],
+            directions.z_axis * spacing[2],
+        );
+        let values = arrays::column("values", values, |value| value as f32)?;
+        let grid = Grid { origin: DVec3::from_array(origin), axes, dims: [width, height, depth], values };
+        Ok(Self { data: SourceData::Grid(grid.into()) })
+    }
+
+    /// An image of radiance: pixels (height, width, 3), linear, from the top left.
+    #[staticmethod]
+    fn image(pixels: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let sides = arrays::shape("pixels", pixels)?;
+        let &[height, width, 3] = sides.as_slice() else {
+            return Err(refused("pixels", "the shape (height, width, 3)", &format!("{sides:?}")));
+        };
+        let side = |side: usize| u32::try_from(side).map_err(|_| refused("pixels", "fewer pixels a side", "too many"));
+        let size = [side(width)?, side(height)?];
+        let numbers = arrays::column("pixels", pixels, |value| value as f32)?;
+        let image = RadianceImage { size, pixels: numbers.as_chunks().0.to_vec() };
+        Ok(Self { data: SourceData::Image(image.into()) })
+    }
+
+    /// `mesh`, `points`, `grid` or `image`.
+    #[getter]
+    fn kind(&self) -> &'static str {
+        match self.data {
+            SourceData::Mesh(_) => "mesh",
+            SourceData::Points(_) => "points",
+            SourceData::Grid(_) => "grid",
+            SourceData::Image(_) => "image",
+        }
+    }
+
+    /// Bytes that it holds.
+    #[getter]
+    fn nbytes(&self) -> u64 {
+        self.data.bytes()
+    }
+
+    /// Its arrays by the names of the arguments that make it again.
+    fn arrays<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let parts = PyDict::new(py);
+        match &self.data {
+            SourceData::Mesh(mesh) => {
+                parts.set_item("vertices", table(py, placed(mesh.origin, &mesh.position))?)?;
+                let faces: Vec<u32> = mesh.triangles.as_flattened().to_vec();
+                let count = mesh.triangles.len();
+                parts.set_item("faces", PyArray1::from_vec(py, faces).reshape([count, 3])?)?;
+                add_vectors(&parts, "normals", &mesh.normal)?;
+                add_colors(&parts, &mesh.color)?;
+            }
+            SourceData::Points(points) => {
+                parts.set_item("positions", table(py, placed(points.origin, &points.position))?)?;
+                add_vectors(&parts, "normals", &points.normal)?;
+                add_colors(&parts, &points.color)?;
+                for (name, numbers) in [("opacities", &points.opacity), ("values", &points.value)] {
+                    if !numbers.is_empty() {
+                        parts.set_item(name, PyArray1::from_slice(py, numbers))?;
+                    }
+                }
+                let columns = PyDict::new(py);
+                for column in &points.columns {
+                    columns.set_item(&column.name, PyArray1::from_slice(py, &column.values))?;
+                }
+                parts.set_item("columns", columns)?;
+            }
+            SourceData::Grid(grid) => {
+                let [width, height, depth] = grid.dims;
+                let values = PyArray1::from_slice(py, &grid.values).reshape([depth, height, width])?;
+                parts.set_item("values", values)?;
+                parts.set_item("spacing", [1.0; 3])?;
+                parts.set_item("origin", grid.origin.to_array())?;
+                parts.set_item("direction", grid.axes.transpose().to_cols_array_2d())?;
+            }
+            SourceData::Image(image) => {
+                let [width, height] = image.size.map(|side| side as usize);
+                let pixels = PyArray1::from_slice(py, image.pixels.as_flattened()).reshape([height, width, 3])?;
+                parts.set_item("pixels", pixels)?;
+            }
+        }
+        Ok(parts)
+    }
+}
+
+/// Positions as drawing has them.
+fn relative(name: &str, positions: &[DVec3]) -> PyResult<Relative> {
+    Relative::of(positions, Vec::new()).map_err(|place| {
+        let expected = "finite coordinates that fit 32-bit floats once the middle is subtracted";
+        refused(name, expected, &format!("{} in row {place}", positions[place]))
+    })
+}
+
+/// Vectors made as long as one; none stays none.
+fn unit_vectors(name: &str, array: Option<&Bound<'_, PyAny>>, rows: usize) -> PyResult<Vec<Vec3>> {
+    let Some(array) = array else { return Ok(Vec::new()) };
+    let vectors = arrays::vectors(name, array, rows)?;
+    if let Some(row) = vectors.iter().position(|vector| !vector.is_finite()) {
+        return Err(refused(name, "finite numbers", &format!("{} in row {row}", vectors[row])));
+    }
+    Ok(vectors.into_iter().map(Vec3::normalize_or_zero).collect())
+}
+
+/// Places of offsets.
+fn placed(origin: DVec3, offsets: &[Vec3]) -> Vec<f64> {
+    offsets.iter().flat_map(|offset| (origin + offset.as_dvec3()).to_array()).collect()
+}
+
+/// Rows of three numbers.
+fn table(py: Python<'_>, numbers: Vec<f64>) -> PyResult<Bound<'_, numpy::PyArray2<f64>>> {
+    let rows = numbers.len() / 3;
+    PyArray1::from_vec(py, numbers).reshape([rows, 3])
+}
+
+fn add_vectors(parts: &Bound<'_, PyDict>, name: &str, vectors: &[Vec3]) -> PyResult<()> {
+    if vectors.is_empty() {
+        return Ok(());
+    }
+    let numbers: Vec<f32> = vectors.iter().flat_map(Vec3::to_array).collect();
+    parts.set_item(name, PyArray1::from_vec(parts.py(), numbers).reshape([vectors.len(), 3])?)
+}
+
+fn add_colors(parts: &Bound<'_, PyDict>, colors: &[[f32; 3]]) -> PyResult<()> {
+    if colors.is_empty() {
+        return Ok(());
+    }
+    let numbers = colors.as_flattened().to_vec();
+    parts.set_item("colors", PyArray1::from_vec(parts.py(), numbers).reshape([colors.len(), 3])?)
+}

@@ -1,0 +1,171 @@
+//! A finished picture: its layers as arrays, its files, and what is known of how it was drawn.
+
+use crate::errors::{raised, refused};
+use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods};
+use organza::output::{self, Format, Metadata, Params, Target};
+use organza::scene::Scene;
+use organza::{Error, Render};
+use organza_judge::documents;
+use pyo3::prelude::*;
+use pyo3::types::PyBytes;
+use serde_json::{Value, json};
+use splat_core::LayerData;
+use std::path::PathBuf;
+
+/// A picture that was drawn.
+#[pyclass(frozen, module = "organza._organza")]
+pub(crate) struct Picture {
+    render: Render,
+    metadata: Metadata,
+    /// What a program may want to know, as JSON.
+    facts: String,
+    has_background: bool,
+}
+
+impl Picture {
+    pub(crate) fn new(scene: &Scene, text: &str, render: Render) -> Self {
+        let metadata = Metadata {
+            scene_sha256: scene.sha256.clone(),
+            scene: text.to_owned(),
+            technique: render.plan.technique.clone(),
+            seed: scene.render.seed,
+            backend: render.backend.clone(),
+            sets: render.sets.map(|sets| sets.averaged),
+            exposure: scene.render.exposure,
+        };
+        let facts = json!({
+            "camera": documents::camera_json(scene, render.found.as_ref()),
+            "plan": documents::plan_json(&render.plan),
+            "cost": documents::cost_json(&render.cost),
+            "predicted": documents::predicted_json(&render.predicted),
+            "warnings": render.warnings,
+            "notes": render.notes,
+        });
+        let has_background = scene.background != [0.0; 3] || scene.environment.is_some();
+        Self { metadata, facts: facts.to_string(), has_background, render }
+    }
+
+    /// A picture without its background is made from a layer that is kept if it is asked for.
+    fn check_transparent(&self, transparent: bool) -> PyResult<()> {
+        if transparent && self.render.layers.rgb("background").is_none() {
+            let found = "one that was drawn without; draw it with `transparent=True`";
+            return Err(refused("transparent", "a picture that keeps what lies behind it", found));
+        }
+        Ok(())
+    }
+
+    fn params(&self, transparent: bool, deep: bool, half: bool, legend: bool) -> Params {
+        let legend = if legend { self.render.scales.clone() } else { Vec::new() };
+        Params { half, deep, transparent, has_background: self.has_background, legend }
+    }
+}
+
+#[pymethods]
+impl Picture {
+    /// Width and height, pixels.
+    #[getter]
+    fn size(&self) -> (u32, u32) {
+        let [width, height] = self.render.layers.size;
+        (width, height)
+    }
+
+    /// Names of its layers.
+    #[getter]
+    fn layers(&self) -> Vec<&'static str> {
+        self.render.layers.images.keys().copied().collect()
+    }
+
+    /// A layer as an array of its own: (height, width, 3) or (height, width).
+    fn layer<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyAny>> {
+        let Some(layer) = self.render.layers.images.get(name) else {
+            let known = self.layers().join(", ");
+            return Err(refused("the layer", &format!("one of {known}"), &format!("'{name}'")));
+        };
+        let [width, height] = self.render.layers.size.map(|side| side as usize);
+        Ok(match layer {
+            LayerData::Rgb(pixels) => {
+                let numbers: Bound<'py, PyArray1<f32>> = PyArray1::from_slice(py, pixels.as_flattened());
+                let shaped: Bound<'py, PyArray3<f32>> = numbers.reshape([height, width, 3])?;
+                shaped.into_any()
+            }
+            LayerData::Scalar(values) => {
+                let shaped: Bound<'py, PyArray2<f32>> = PyArray1::from_slice(py, values).reshape([height, width])?;
+                shaped.into_any()
+            }
+            LayerData::Id(ids) => {
+                let shaped: Bound<'py, PyArray2<u32>> = PyArray1::from_slice(py, ids).reshape([height, width])?;
+                shaped.into_any()
+            }
+        })
+    }
+
+    /// What is known of how it was drawn, a document in JSON.
+    #[getter]
+    fn facts(&self) -> &str {
+        &self.facts
+    }
+
+    /// What is displayed, bytes of sRGB: (height, width, 3), or 4 channels where it is transparent.
+    #[pyo3(signature = (transparent=false))]
+    fn srgb8<'py>(&self, py: Python<'py>, transparent: bool) -> PyResult<Bound<'py, PyArray3<u8>>> {
+        self.check_transparent(transparent)?;
+        let params = self.params(transparent, false, false, false);
+        let bytes = py.detach(|| output::displayed_bytes(&self.render.layers, &self.metadata, &params));
+        let bytes = bytes.map_err(|error| raised(&Error::Output(error)))?;
+        let [width, height] = self.render.layers.size.map(|side| side as usize);
+        PyArray1::from_vec(py, bytes).reshape([height, width, if transparent { 4 } else { 3 }])
+    }
+
+    /// The bytes of a PNG file of it.
+    #[pyo3(signature = (transparent=false, deep=false, legend=false))]
+    fn png<'py>(&self, py: Python<'py>, transparent: bool, deep: bool, legend: bool) -> PyResult<Bound<'py, PyBytes>> {
+        self.check_transparent(transparent)?;
+        let params = self.params(transparent, deep, false, legend);
+        let encoded = py.detach(|| output::encode(&self.render.layers, &self.metadata, Format::Png, &params));
+        let (bytes, _) = encoded.map_err(|error| raised(&Error::Output(error)))?;
+        Ok(PyBytes::new(py, &bytes))
+    }
+
+    /// Writes it, as a PNG or OpenEXR file by the name.
+    #[pyo3(signature = (path, transparent=false, deep=false, half=false, legend=false, force=false))]
+    fn save(
+        &self,
+        py: Python<'_>,
+        path: PathBuf,
+        transparent: bool,
+        deep: bool,
+        half: bool,
+        legend: bool,
+        force: bool,
+    ) -> PyResult<Vec<String>> {
+        self.check_transparent(transparent)?;
+        let params = self.params(transparent, deep, half, legend);
+        let written = py.detach(|| {
+            Format::of_path(&path)?;
+            let target = Target::new(&path, force)?;
+            output::write(&self.render.layers, &self.metadata, &target, &params)
+        });
+        let report = written.map_err(|error| raised(&Error::Output(error)))?;
+        let counts = [
+            (report.clamped, "values were cut to the format's largest"),
+            (report.too_bright, "translucent pixels lose light, as they are brighter than a straight colour can be: write an .exr"),
+            (report.without_room, "legends have no room: draw a larger picture"),
+        ];
+        let told = counts.into_iter().filter(|(count, _)| *count > 0);
+        Ok(told.map(|(count, what)| format!("{}: {count} {what}", path.display())).collect())
+    }
+}
+
+/// What a render that was not drawn would do.
+pub(crate) fn explained(scene: &Scene, explanation: &organza::Explanation) -> Value {
+    json!({
+        "camera": documents::camera_json(scene, explanation.found.as_ref()),
+        "plan": documents::plan_json(&explanation.plan),
+        "cost": documents::cost_json(&explanation.cost),
+        "predicted": documents::predicted_json(&explanation.predicted),
+        "splats": documents::splats_json(&explanation.splats),
+        "memory": explanation.memory,
+        "warnings": explanation.warnings,
+        "notes": explanation.notes,
+    })
+}

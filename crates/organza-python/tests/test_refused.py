@@ -1,0 +1,98 @@
+"""What is wrong is refused by name, and never ends the interpreter."""
+
+import numpy as np
+import pytest
+
+import organza as og
+
+SMALL = (24, 18)
+PLACES = np.zeros((4, 3))
+CUBE = np.zeros((2, 2, 2))
+
+
+def scene() -> og.Scene:
+    return og.Scene()
+
+
+REFUSED = {
+    "shape of points": (lambda: scene().add_points(np.zeros((4, 2))), r"positions: expected the shape \(n, 3\)"),
+    "text for points": (lambda: scene().add_points(np.array([["a", "b", "c"]])), "positions: expected an array of numbers"),
+    "points that are not finite": (lambda: scene().add_points(np.full((2, 3), np.nan)), "row 0"),
+    "infinite points": (lambda: scene().add_points([[0, 0, 0], [np.inf, 0, 0]]), "row 1"),
+    "colours of another count": (lambda: scene().add_points(PLACES, colors=np.zeros((3, 3))), r"colors: expected the shape \(4, 3\)"),
+    "values of another count": (lambda: scene().add_points(PLACES, values=np.zeros(5)), r"values: expected the shape \(4,\)"),
+    "a map without a column": (lambda: scene().add_points(PLACES, colormap="magma"), "colormap"),
+    "opacities beyond 1": (lambda: scene().add_points(PLACES, opacities=np.full(4, 2.0)), "opacity"),
+    "an index beyond": (lambda: scene().add_mesh(PLACES, [[0, 1, 4]]), "faces: expected indices of 4 vertices, from 0, found 4 in face 0"),
+    "a negative index": (lambda: scene().add_mesh(PLACES, [[0, 1, -1]]), "found -1 in face 0"),
+    "an index with a part": (lambda: scene().add_mesh(PLACES, [[0, 1, 1.5]]), "found 1.5 in face 0"),
+    "five sides": (lambda: scene().add_mesh(PLACES, np.zeros((1, 5), int)), r"faces: expected the shape \(n, 3\)"),
+    "a flat volume": (lambda: scene().add_volume(np.zeros((2, 2))), r"values: expected the shape \(nz, ny, nx\)"),
+    "no steps": (lambda: scene().add_volume(CUBE, spacing=0, transfer=og.transfer()), "span space"),
+    "an infinite voxel": (lambda: scene().add_volume(CUBE + np.inf, transfer=og.transfer()), "voxel"),
+    "two looks": (lambda: scene().add_volume(CUBE, transfer=og.transfer(), preset="mri"), "transfer, preset"),
+    "an unknown look": (lambda: scene().add_volume(CUBE, preset="x-ray"), "there is no such preset"),
+    "an unknown map": (lambda: og.transfer("rainbow"), "colormap: expected one of"),
+    "a range that falls": (lambda: og.transfer(clim=(1, 0)), "clim"),
+    "an opacity of 2": (lambda: og.transfer(opacity=[0, 2]), "opacity"),
+    "a thing of no kind": (lambda: scene().add(object()), "expected a file, a scene, an array"),
+    "nothing": (lambda: og.render(), "what: expected"),
+    "an empty scene's light": (lambda: scene().set("light.sun.intensity", 1), "expected one of none, found 'sun'"),
+    "an object alone": (lambda: scene().set("object", 1), "its name alone"),
+    "no threads": (lambda: og.render(PLACES + np.arange(4)[:, None], size=SMALL, threads=0), "threads: expected 1 to"),
+    "a name with a line": (lambda: scene().add_points(PLACES, name="a\nb"), "control characters"),
+}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_wrong_arguments_are_named(case):
+    call, said = REFUSED[case]
+    with pytest.raises(og.InputError, match=said):
+        call()
+
+
+def test_a_missing_file_is_told():
+    with pytest.raises(FileNotFoundError, match="nothing.ply"):
+        og.render("nothing.ply")
+
+
+def test_a_wrong_scene_has_file_and_line(tmp_path):
+    (tmp_path / "a.toml").write_text("version = 1\n[camera]\npositon = [0, 0, 1]\n")
+    with pytest.raises(og.InputError, match=r"a\.toml:3"):
+        og.render(tmp_path / "a.toml")
+
+
+def test_too_much_memory_is_refused_before_anything_is_drawn():
+    scene = og.Scene()
+    scene.add_volume(np.zeros((64, 64, 64)), transfer=og.transfer())
+    with pytest.raises(og.LimitError, match="bytes"):
+        og.render(scene, size=SMALL, max_memory=1000)
+    assert issubclass(og.LimitError, MemoryError) and issubclass(og.InputError, ValueError)
+
+
+def test_a_key_that_there_is_not_is_refused():
+    scene = og.Scene()
+    scene.add_points(np.random.default_rng(0).normal(size=(10, 3)), opacty=0.5)
+    with pytest.raises(og.InputError, match="opacty"):
+        og.render(scene, size=SMALL)
+
+
+def test_malformed_calls_never_end_the_interpreter():
+    rng = np.random.default_rng(3)
+    wrong = [None, 0, -1, 1.5, np.nan, "x", b"x", [], [[]], {}, object(), np.zeros(0), np.zeros((0, 3)), np.array("x"), np.zeros((2, 2, 2, 2)), CUBE, True]
+    calls = [
+        lambda a, b: scene().add_points(a, values=b),
+        lambda a, b: scene().add_mesh(a, b),
+        lambda a, b: scene().add_volume(a, spacing=b),
+        lambda a, b: scene().camera(position=a, target=b) or 1,
+        lambda a, b: og.render(a, size=b),
+        lambda a, b: og.transfer(clim=a, opacity=b),
+        lambda a, b: scene().set(a, b),
+    ]
+    for _ in range(200):
+        call = calls[rng.integers(len(calls))]
+        one, other = (wrong[rng.integers(len(wrong))] for _ in range(2))
+        try:
+            call(one, other)
+        except (ValueError, TypeError, MemoryError, OSError, KeyError, AttributeError, IndexError):
+            pass
