@@ -29,7 +29,7 @@ struct Shown {
 const SHOWN: [Shown; 5] = [
     Shown {
         scene: "glass",
-        lesson: "Bending changes nearly every pixel of the bunny, and its absorption gives it its colour: both are called for. All shadows together cost one map.",
+        lesson: "Bending and absorption make the bunny what it is: without either, pixels change by half of white. All shadows together cost one map.",
     },
     Shown {
         scene: "soft",
@@ -38,7 +38,7 @@ const SHOWN: [Shown; 5] = [
     },
     Shown {
         scene: "window",
-        lesson: "The wall shows only its edge, and without it no pixel of it is missed; but it is what the window is in: its shadow makes the beams.",
+        lesson: "The picture that the light shines through makes the beams. The wall behind them is nearly black: without it a pixel changes by about half a per cent, hardly more than is seen.",
     },
     Shown {
         scene: "eye",

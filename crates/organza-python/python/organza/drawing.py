@@ -106,7 +106,8 @@ def explain(
     how = _how(threads, max_memory, progress, drop_invalid, strict)
     wished = _wished(size, preset, color_by, up, ground, None, None, None)
     scene = scene_of(what, wished, how)
-    return json.loads(_organza.explain(scene._given(how, effects, size), how))
+    document: dict[str, Any] = json.loads(_organza.explain(scene._given(how, effects, size), how))
+    return document
 
 
 def turntable(

@@ -62,27 +62,32 @@ class Picture:
     @property
     def camera(self) -> dict[str, Any]:
         """Where it was seen from, and whether that place was found."""
-        return self._facts["camera"]
+        camera: dict[str, Any] = self._facts["camera"]
+        return camera
 
     @property
     def plan(self) -> dict[str, Any]:
         """Effects and passes with their reasons, as ``organza explain --json`` has them."""
-        return self._facts["plan"]
+        plan: dict[str, Any] = self._facts["plan"]
+        return plan
 
     @property
     def cost(self) -> list[dict[str, Any]]:
         """What each pass took, as ``organza render --cost`` writes it."""
-        return self._facts["cost"]
+        cost: list[dict[str, Any]] = self._facts["cost"]
+        return cost
 
     @property
     def warnings(self) -> list[str]:
         """What a user should know of the picture, one sentence each."""
-        return self._facts["warnings"]
+        warnings: list[str] = self._facts["warnings"]
+        return warnings
 
     @property
     def notes(self) -> list[str]:
         """What the data holds that is not shown, what was made of it, and what a first scene decided, one sentence each."""
-        return self._remarks + self._facts["notes"]
+        notes: list[str] = self._facts["notes"]
+        return self._remarks + notes
 
     def to_srgb8(self, transparent: bool = False) -> np.ndarray:
         """The displayed picture, bytes of sRGB as its PNG file has them: (height, width, 3), or 4 channels where ``transparent``."""

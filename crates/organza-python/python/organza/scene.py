@@ -16,6 +16,9 @@ from organza._organza import Data, InputError
 from organza.transfers import Transfer
 
 _DEFAULT_SIZE = (960, 540)
+# The material of volumes that name none.
+_LIT_VOLUME = "lit volume"
+_LIT = {"shading": "phong", "specular": 0.08, "shininess": 24}
 # A scene that is made here lies nowhere: files that it names are relative to the working folder.
 _NOWHERE = "scene.json"
 
@@ -175,7 +178,7 @@ class Scene:
         preset
             Instead of ``transfer``, a look by its name, such as ``"ct-bone"``, ``"mri"``, ``"cloud"`` or a map.
         name, **keys
-            As for :meth:`add_points`.
+            As for :meth:`add_points`. Without a ``material`` a volume is lit by its gradients, as a first scene has it.
         """
         grid = _array(values)
         steps = np.broadcast_to(np.asarray(spacing, dtype=float), (3,))
@@ -186,6 +189,10 @@ class Scene:
         if transfer is not None:
             diagonal = float(np.linalg.norm(steps * (np.array(grid.shape[::-1]) - 1)))
             keys = transfer.keys(diagonal or 1.0) | keys
+            if "material" not in keys:
+                # As first scenes have it: lit by its gradients, so that its shape is seen.
+                self._document.setdefault("material", {}).setdefault(_LIT_VOLUME, _LIT)
+                keys = {"material": _LIT_VOLUME} | keys
         elif "transfer" not in keys:
             keys = self._first_keys(data, name or "volume", preset) | keys
         self._add("volume", data, name, keys)
