@@ -1,6 +1,6 @@
 //! numpy arrays → columns. An array of any number type, with any strides, is read in one pass into the column that is drawn.
 
-use crate::errors::refused;
+use crate::errors::{LimitError, refused};
 use numpy::{Element, PyArrayDyn, PyArrayMethods, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use splat_core::glam::{DVec3, Vec3};
@@ -27,12 +27,23 @@ pub(crate) fn column<T>(name: &str, array: &Bound<'_, PyAny>, made: impl Fn(f64)
         ($($kind:ty),*) => {$(
             if let Ok(array) = array.cast::<PyArrayDyn<$kind>>() {
                 let array = array.try_readonly().map_err(|_| busy(name))?;
-                return Ok(array.as_array().iter().map(|value| made(value.number())).collect());
+                let mut made_of = room(name, array.len())?;
+                made_of.extend(array.as_array().iter().map(|value| made(value.number())));
+                return Ok(made_of);
             }
         )*};
     }
     try_kinds!(f32, f64, i16, u8, i32, u16, i64, u32, i8, u64);
     Err(refused(name, "an array of numbers", &kind_of(array)))
+}
+
+/// Room for so many, or the error that there is none: nothing may end the interpreter.
+fn room<T>(name: &str, count: usize) -> PyResult<Vec<T>> {
+    let mut room = Vec::new();
+    let bytes = count as u128 * size_of::<T>() as u128;
+    let refused = |_| LimitError::new_err(format!("{name}: there is no memory of {bytes} bytes for its numbers"));
+    room.try_reserve_exact(count).map_err(refused)?;
+    Ok(room)
 }
 
 fn busy(name: &str) -> PyErr {
@@ -71,14 +82,18 @@ pub(crate) fn check_rows(name: &str, array: &Bound<'_, PyAny>, rows: Option<usiz
 pub(crate) fn positions(name: &str, array: &Bound<'_, PyAny>) -> PyResult<Vec<DVec3>> {
     check_rows(name, array, None, 3)?;
     let numbers = column(name, array, |value| value)?;
-    Ok(numbers.chunks_exact(3).map(DVec3::from_slice).collect())
+    let mut rows = room(name, numbers.len() / 3)?;
+    rows.extend(numbers.chunks_exact(3).map(DVec3::from_slice));
+    Ok(rows)
 }
 
 /// Vectors of single precision, one a row.
 pub(crate) fn vectors(name: &str, array: &Bound<'_, PyAny>, rows: usize) -> PyResult<Vec<Vec3>> {
     check_rows(name, array, Some(rows), 3)?;
     let numbers = column(name, array, |value| value as f32)?;
-    Ok(numbers.chunks_exact(3).map(Vec3::from_slice).collect())
+    let mut made = room(name, rows)?;
+    made.extend(numbers.chunks_exact(3).map(Vec3::from_slice));
+    Ok(made)
 }
 
 /// Colours, one a row: linear numbers, or bytes of sRGB where the array is of bytes.

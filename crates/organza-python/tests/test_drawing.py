@@ -178,6 +178,36 @@ def test_explain_says_what_a_picture_calls_for():
     assert next(effect for effect in off.plan["effects"] if effect["name"] == "shadow.0")["called_for"] is False
 
 
+def test_a_camera_that_was_placed_may_be_placed_anew():
+    scene = og.Scene.from_files(ASSETS / "meshes" / "dart.off", size=SMALL)
+    scene.camera(azimuth=120)
+    assert og.render(scene).alpha.max() > 0.9
+    scene.camera(position=(0, 0, 9), target=(0, 0, 0))
+    scene.camera(elevation=40)
+    assert og.render(scene).alpha.max() > 0.9
+
+
+def test_a_mask_is_a_gap():
+    values = ball()
+    masked = np.ma.masked_less(values, 0.3)
+    gaps = np.where(values < 0.3, np.nan, values)
+    first, second = (og.render(volume_scene(data), size=SMALL).rgb for data in (masked, gaps))
+    assert np.array_equal(first, second)
+
+
+def test_numbers_that_fit_no_memory_are_refused():
+    program = (
+        "import resource, numpy as np, organza as og\n"
+        "resource.setrlimit(resource.RLIMIT_AS, (4_000_000_000, 4_000_000_000))\n"
+        "try:\n"
+        "    og.Scene().add_points(np.broadcast_to(np.float32(1), (400_000_000, 3)))\n"
+        "except og.LimitError as error:\n"
+        "    print(error)\n"
+    )
+    said = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True).stdout
+    assert "positions: there is no memory of 9600000000 bytes" in said
+
+
 def test_a_turntable_goes_around():
     vertices, faces = tetrahedron()
     scene = og.Scene()

@@ -81,7 +81,7 @@ def _vtk(thing: Any) -> tuple[str, str, dict[str, Any]] | None:
         if not hasattr(thing, "extract_surface"):
             raise InputError(f"expected points, a surface or an image of VTK, found {thing.GetClassName()}")
         thing = thing.extract_surface()
-    is_surface = thing.n_faces_strict > 0 if hasattr(thing, "n_faces_strict") else thing.n_faces > 0
+    is_surface = thing.n_cells > thing.n_verts + thing.n_lines
     colors = _vtk_colors(thing)
     if is_surface and thing.n_verts == 0:
         whole = thing.triangulate()

@@ -7,7 +7,10 @@ import warnings
 from collections.abc import Callable, Iterator
 from typing import Any
 
+import numpy as np
+
 from organza import _organza
+from organza._organza import InputError
 from organza.picture import Picture
 from organza.scene import Scene, scene_of
 
@@ -130,6 +133,7 @@ def turntable(
     size, threads, max_memory, progress
         As for :func:`render`.
     """
+    frames = _whole("frames", frames) or 1
     how = _how(threads, max_memory, progress, False, False)
     wished = _wished(size, None, None, None, False, None, None, None) | {"turntable": frames}
     scene = scene_of((what,), wished, how)
@@ -142,12 +146,22 @@ def _how(
     threads: int | None, max_memory: int | None, progress: Progress | None, drop_invalid: bool, strict: bool
 ) -> dict[str, Any]:
     return {
-        "threads": threads,
-        "max_memory": max_memory,
+        "threads": _whole("threads", threads),
+        "max_memory": _whole("max_memory", max_memory),
         "progress": progress,
         "drop_invalid": drop_invalid,
         "strict": strict,
     }
+
+
+def _whole(name: str, value: Any) -> int | None:
+    """A whole number from 1 on; None stays None."""
+    if value is None:
+        return None
+    is_number = isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
+    if not is_number or not np.isfinite(value) or value != int(value) or value < 1:
+        raise InputError(f"{name}: expected a whole number from 1 on, found {value!r}")
+    return int(value)
 
 
 def _wished(
@@ -160,6 +174,10 @@ def _wished(
     elevation: float | None,
     fit: float | None,
 ) -> dict[str, Any]:
+    if size is not None:
+        sides = [_whole("size", side) for side in size] if np.ndim(size) == 1 else []
+        if len(sides) != 2:
+            raise InputError(f"size: expected a width and a height, found {size!r}")
     return {
         "size": size,
         "preset": preset,

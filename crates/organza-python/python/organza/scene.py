@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import json
+import math
 import os
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -51,6 +52,8 @@ class Scene:
         """A scene file as it is. It can be drawn and its effects switched; to change more of it, change the file."""
         scene = cls()
         scene._file = os.fspath(path)
+        if Path(path).suffix.lower() not in (".toml", ".json"):
+            raise InputError(f"{os.fspath(path)}: expected a scene, .toml or .json; Scene.from_files takes data files")
         scene._text = Path(path).read_text(encoding="utf-8")
         return scene
 
@@ -110,7 +113,7 @@ class Scene:
             count = len(positions)
             held["radius"] = np.broadcast_to(np.asarray(radius, dtype=float), (count,))
         data = Data.points(
-            _array(positions), _array(normals), _array(colors), _array(opacities), _array(values), _arrays(held)
+            _array(positions), _array(normals), _colors(colors), _array(opacities), _array(values), _arrays(held)
         )
         if color_by is None and values is not None and colors is None:
             color_by = "value"
@@ -146,7 +149,7 @@ class Scene:
         corners = _array(faces)
         if corners.ndim == 2 and corners.shape[1] == 4:
             corners = np.concatenate([corners[:, [0, 1, 2]], corners[:, [0, 2, 3]]])
-        data = Data.mesh(_array(vertices), corners, _array(normals), _array(colors))
+        data = Data.mesh(_array(vertices), corners, _array(normals), _colors(colors))
         self._add("mesh", data, name, keys)
 
     def add_volume(
@@ -181,7 +184,12 @@ class Scene:
             As for :meth:`add_points`. Without a ``material`` a volume is lit by its gradients, as a first scene has it.
         """
         grid = _array(values)
-        steps = np.broadcast_to(np.asarray(spacing, dtype=float), (3,))
+        steps = np.asarray(spacing, dtype=float)
+        if steps.shape not in ((), (3,)):
+            raise InputError(f"spacing: expected one number or three, found the shape {steps.shape}")
+        steps = np.broadcast_to(steps, (3,))
+        if transfer is not None and not isinstance(transfer, Transfer):
+            raise InputError(f"transfer: expected what organza.transfer makes, found {type(transfer).__name__}; `preset` takes a name")
         turn = np.eye(3) if direction is None else np.asarray(direction, dtype=float).reshape(3, 3)
         data = Data.grid(grid, steps.tolist(), np.asarray(origin, dtype=float).tolist(), turn.tolist())
         if transfer is not None and preset is not None:
@@ -258,9 +266,17 @@ class Scene:
             "fov_y": fov_y,
             "size": size,
         }
-        camera.update({key: _plain(value) for key, value in stated.items() if value is not None})
+        if position is not None and not (azimuth is None and elevation is None and fit is None):
+            raise InputError("camera: expected a position, or azimuth, elevation and fit, found both")
+        # One way to place it takes the place of the other.
         if position is not None:
-            camera.pop("auto", None)
+            for key in ("auto", "azimuth", "elevation", "fit"):
+                camera.pop(key, None)
+        elif not (azimuth is None and elevation is None and fit is None):
+            for key in ("position", "target", "up"):
+                camera.pop(key, None)
+            camera["auto"] = True
+        camera.update({key: _plain(value) for key, value in stated.items() if value is not None})
 
     def light(self, kind: str = "directional", *, name: str | None = None, **keys: Any) -> None:
         """Adds a light, such as ``scene.light(direction=(-1, -2, -1), irradiance=(3, 3, 3), name="sun")``; ``kind`` and keys as in docs/scene.md."""
@@ -304,6 +320,8 @@ class Scene:
 
     def _add(self, source: str, data: Data, name: str | None, keys: Mapping[str, Any]) -> None:
         self._check_open()
+        if name is not None and not isinstance(name, str):
+            raise InputError(f"name: expected a text, found {name!r}")
         label = self._free_name(name or source)
         _organza.check(label, data)
         held = label
@@ -423,9 +441,23 @@ def _array(thing: Any) -> Any:
     """An array of a kind of numbers that the extension takes; None stays None."""
     if thing is None:
         return None
-    array = np.asarray(thing)
+    if isinstance(thing, np.ma.MaskedArray) and np.ma.is_masked(thing):
+        # A gap, as NaN is.
+        thing = np.where(np.ma.getmaskarray(thing), np.nan, thing.data)
+    try:
+        array = np.asarray(thing)
+    except ValueError as error:
+        raise InputError(f"expected an array of numbers, found rows of other lengths ({error})") from None
     if array.dtype in (np.float16, np.bool_) or array.dtype.byteorder not in ("=", "|"):
         return array.astype(np.uint8 if array.dtype == np.bool_ else array.dtype.newbyteorder("=").char.replace("e", "f"))
+    return array
+
+
+def _colors(thing: Any) -> Any:
+    """Colours: linear numbers, or bytes of sRGB; whole numbers of another kind may be either."""
+    array = _array(thing)
+    if array is not None and np.issubdtype(array.dtype, np.integer) and array.dtype != np.uint8:
+        raise InputError(f"colors: expected linear numbers with a point, or bytes (uint8) of sRGB, found {array.dtype}")
     return array
 
 
@@ -438,9 +470,13 @@ def _plain(value: Any) -> Any:
     if isinstance(value, Mapping):
         return {str(key): _plain(part) for key, part in value.items()}
     if isinstance(value, np.ndarray):
-        return value.tolist()
+        return _plain(value.tolist())
     if isinstance(value, np.generic):
-        return value.item()
+        value = value.item()
+    if isinstance(value, float) and not math.isfinite(value):
+        raise InputError(f"expected finite numbers, found {value}")
+    if isinstance(value, Transfer):
+        raise InputError("a transfer: expected it as `transfer=` of add_volume, found it as a key")
     if isinstance(value, (list, tuple)):
         return [_plain(part) for part in value]
     return value

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
+
+import numpy as np
 
 from organza._organza import InputError, map_colors
 
@@ -58,9 +61,13 @@ def transfer(
     InputError
         For a map that there is not, a ``clim`` that does not grow, and opacities beyond 0 and 1.
     """
-    low, high = (float(value) for value in clim)
-    if not low < high:
+    if not isinstance(clim, (tuple, list, np.ndarray)) or len(clim) != 2:
         raise InputError(f"clim: expected two growing numbers, found {clim!r}")
+    low, high = (float(value) for value in clim)
+    if not (math.isfinite(low) and math.isfinite(high) and low < high):
+        raise InputError(f"clim: expected two growing numbers, found {clim!r}")
+    if not isinstance(opacity, (tuple, list, np.ndarray)):
+        raise InputError(f"opacity: expected two or more numbers from 0 to 1, found {opacity!r}")
     knots = [float(value) for value in opacity]
     if len(knots) < 2 or not all(0.0 <= knot <= 1.0 for knot in knots):
         raise InputError(f"opacity: expected two or more numbers from 0 to 1, found {list(opacity)!r}")
