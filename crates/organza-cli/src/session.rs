@@ -134,8 +134,7 @@ pub(super) fn goal_remarks(arguments: &GoalArguments, stated: &Goal) -> Vec<Stri
         if let (Some(taken), Some(stated)) = (taken, stated)
             && taken != stated
         {
-            let (taken, stated) = (short(taken), short(stated));
-            remarks.push(format!("{option} {taken} is taken, the scene has render.{key} = {stated}"));
+            remarks.push(format!("{option} {} is taken, the scene has render.{key} = {}", short(taken), short(stated)));
         }
     };
     remark("--max-rmse", "max_rmse", max_rmse, stated.max_rmse);

@@ -98,9 +98,9 @@ fn table_json(t: &ShadowTable) -> Value {
 }
 
 fn object_json(o: &PlannedObject) -> Value {
-    let (technique, source) = (o.technique.name(), o.form.name());
     json!({
-        "object": o.object, "technique": technique, "source": source, "reason": o.reason, "becomes_splats": o.splats,
+        "object": o.object, "technique": o.technique.name(), "source": o.form.name(), "reason": o.reason,
+        "becomes_splats": o.splats,
     })
 }
 

@@ -152,7 +152,11 @@ impl Picture {
             (report.without_room, "legends have no room: draw a larger picture"),
         ];
         let told = counts.into_iter().filter(|(count, _)| *count > 0);
-        Ok(told.map(|(count, what)| format!("{}: {count} {what}", path.display())).collect())
+        let mut said: Vec<String> = told.map(|(count, what)| format!("{}: {count} {what}", path.display())).collect();
+        if legend && params.legend.is_empty() {
+            said.push("there is no legend: nothing that is drawn has a number that its colour stands for".to_owned());
+        }
+        Ok(said)
     }
 }
 

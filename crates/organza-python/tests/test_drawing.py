@@ -187,6 +187,23 @@ def test_a_camera_that_was_placed_may_be_placed_anew():
     assert og.render(scene).alpha.max() > 0.9
 
 
+def test_options_of_another_format_are_refused(tmp_path):
+    picture = og.render(volume_scene(ball()), size=SMALL)
+    for name, options in [("a.png", {"half": True}), ("a.exr", {"deep": True}), ("a.exr", {"legend": True})]:
+        with pytest.raises(og.InputError, match="expected a file that can have it"):
+            picture.save(tmp_path / name, **options)
+    with pytest.warns(UserWarning, match="there is no legend"):
+        og.render(ASSETS / "meshes" / "dart.off", size=SMALL).save(tmp_path / "b.png", legend=True)
+
+
+def test_a_scene_is_drawn_in_another_folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(ASSETS)
+    scene = og.Scene.from_files("meshes/dart.off", size=SMALL)
+    here = og.render(scene).rgb
+    monkeypatch.chdir(tmp_path)
+    assert np.array_equal(og.render(scene).rgb, here)
+
+
 def test_a_mask_is_a_gap():
     values = ball()
     masked = np.ma.masked_less(values, 0.3)

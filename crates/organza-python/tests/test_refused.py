@@ -53,6 +53,8 @@ REFUSED = {
     "no frames": (lambda: list(og.turntable(PLACES, 0)), "frames: expected a whole number"),
     "a range that is none": (lambda: scene().add_points(PLACES, values=np.zeros(4), clim=(np.nan, 1)), "expected finite numbers, found nan"),
     "two ways to place a camera": (lambda: scene().camera(position=(0, 0, 1), azimuth=5), "found both"),
+    "no key": (lambda: scene().set("", 1), "expected a key and a value"),
+    "no value": (lambda: scene().set("render.seed", None), "expected a key and a value"),
     "data as a scene": (lambda: og.Scene.load("bunny.ply"), "Scene.from_files takes data files"),
     "a name with a line": (lambda: scene().add_points(PLACES, name="a\nb"), "control characters"),
 }

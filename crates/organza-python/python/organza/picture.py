@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from organza import _organza
+from organza._organza import InputError
 
 
 class Picture:
@@ -120,6 +121,11 @@ class Picture:
         force
             Whether a file of that name is replaced.
         """
+        is_exr = os.fspath(path).lower().endswith(".exr")
+        without_effect = [("deep", deep and is_exr), ("legend", legend and is_exr), ("half", half and not is_exr)]
+        for name, is_asked in without_effect:
+            if is_asked:
+                raise InputError(f"{name}: expected a file that can have it, found {os.fspath(path)}")
         if not force and os.path.exists(path):
             raise FileExistsError(f"{os.fspath(path)}: this file exists already; force=True replaces it")
         for sentence in self._drawn.save(path, transparent, deep, half, legend, force):

@@ -6,7 +6,7 @@ import copy
 import json
 import math
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Container, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +22,9 @@ _LIT_VOLUME = "lit volume"
 _LIT = {"shading": "phong", "specular": 0.08, "shininess": 24}
 # A scene that is made here lies nowhere: files that it names are relative to the working folder.
 _NOWHERE = "scene.json"
+# Sources of a first scene, and how one names data in memory.
+_SOURCES = ("mesh", "points", "volume")
+_MEMORY = "memory:"
 
 
 class Scene:
@@ -230,6 +233,8 @@ class Scene:
         self._check_open()
         place: Any = self._document
         parts = key.split(".")
+        if not all(parts) or value is None:
+            raise InputError(f"{key!r}: expected a key and a value, such as 'render.technique' and 'surfels', found {value!r}")
         for part, following in zip(parts, parts[1:] + [""]):
             if part in ("object", "light") and place is self._document:
                 place = place.setdefault(part, [])
@@ -324,19 +329,12 @@ class Scene:
             raise InputError(f"name: expected a text, found {name!r}")
         label = self._free_name(name or source)
         _organza.check(label, data)
-        held = label
-        self._data[held] = data
-        thing = {"name": label, source: f"memory:{held}"} | _plain(dict(keys))
+        self._data[label] = data
+        thing = {"name": label, source: _MEMORY + label} | _plain(dict(keys))
         self._document.setdefault("object", []).append(thing)
 
     def _free_name(self, name: str) -> str:
-        taken = set(self.objects)
-        if name not in taken:
-            return name
-        number = 2
-        while f"{name} {number}" in taken:
-            number += 1
-        return f"{name} {number}"
+        return _free(name, self.objects)
 
     def _first_keys(self, data: Data, name: str, preset: str | None) -> dict[str, Any]:
         """What a first scene says of a volume; its material becomes one of this scene."""
@@ -408,7 +406,7 @@ def scene_of(what: tuple[Any, ...], wished: Mapping[str, Any], how: dict[str, An
             raise InputError(f"{', '.join(wishes)}: expected data, found a scene, which states that itself")
         return what[0] if isinstance(what[0], Scene) else Scene.load(what[0])
     shown: list[Any] = []
-    held = Scene()
+    data_by_name: dict[str, Data] = {}
     for thing in what:
         if isinstance(thing, Scene) or _is_scene(thing):
             raise InputError(f"what: expected one scene, or files and data, found a scene among {len(what)}")
@@ -416,15 +414,30 @@ def scene_of(what: tuple[Any, ...], wished: Mapping[str, Any], how: dict[str, An
             shown.append(os.path.abspath(thing))
             continue
         name, data, up = adopted.data_of(thing)
-        name = held._free_name(name)
-        held._add("points", data, name, {})
+        name = _free(name, data_by_name)
+        data_by_name[name] = data
         shown.append((name, data, up))
     text, remarks = _organza.first_scene(shown, dict(wished), how)
     scene = Scene()
     scene._document = json.loads(text)
-    scene._data = held._data
+    scene._data = data_by_name
     scene._remarks = remarks
+    # A scene may be drawn in another working folder than it was made in.
+    for first in scene._document.get("object", []):
+        for source in _SOURCES:
+            if source in first and not first[source].startswith(_MEMORY):
+                first[source] = os.path.abspath(first[source])
     return scene
+
+
+def _free(name: str, taken: Container[str]) -> str:
+    """A name that is not taken."""
+    free = name
+    number = 2
+    while free in taken:
+        free = f"{name} {number}"
+        number += 1
+    return free
 
 
 def _is_scene(thing: Any) -> bool:

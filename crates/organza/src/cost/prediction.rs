@@ -126,8 +126,9 @@ impl Prediction {
 pub fn announcement_of_frames(frames: usize, seconds: f64, rates: &Rates) -> Option<String> {
     let total = frames as f64 * seconds;
     let is_long = frames > 1 && total >= LONG && seconds < LONG;
-    let (total, seconds) = (duration_text(total), duration_text(seconds));
-    is_long.then(|| format!("drawing {frames} frames takes about {total} by {}, {seconds} each", rates.source()))
+    let whole = duration_text(total);
+    let each = duration_text(seconds);
+    is_long.then(|| format!("drawing {frames} frames takes about {whole} by {}, {each} each", rates.source()))
 }
 
 /// A number in the unit that leaves two or three digits.

@@ -26,7 +26,7 @@ pub struct Files {
     memory: MemoryAccount,
     /// By path and frame.
     read: RefCell<HashMap<(PathBuf, u64), (ReadParams, Read)>>,
-    /// Meshes that a program has in memory, as drawing takes them, beside those that they were made of.
+    /// Data that a program has in memory, beside what drawing takes of it.
     taken: RefCell<Vec<(SourceData, Read)>>,
     /// What there is to say of them, one sentence each.
     notes: RefCell<Vec<String>>,
@@ -119,7 +119,6 @@ impl Files {
             let message = "expected no `frame` and no `array`: data in memory is one";
             return Err(Error::input(name, message, "leave them out, or hand over what they name"));
         }
-        let memory = self.memory.up_to(limits.memory.limit());
         let from_read = |e: read::ReadError| Error::from_read(source, &e);
         let notes = match data {
             SourceData::Points(points) => read::points_in_memory(&name, points, limits).map_err(from_read)?,
@@ -127,32 +126,37 @@ impl Files {
             SourceData::Mesh(_) | SourceData::Image(_) => Notes::default(),
         };
         let known = self.taken.borrow().iter().find(|(known, _)| known.is_same(data)).map(|(_, read)| read.clone());
-        let (taken, made, held) = match (known, data) {
-            (Some(known), _) => known,
-            (None, SourceData::Mesh(mesh)) => {
-                let mut held = memory.take(&name, 2 * mesh.bytes()).map_err(Error::Limit)?;
-                let params = ReadParams { memory: memory.clone(), ..limits.clone() };
-                let turned = read::mesh_in_memory(&name, Mesh::clone(mesh), &params);
-                let (mut mesh, notes) = turned.map_err(from_read)?;
-                let _parted = memory.take(&name, splat_core::crease_bytes(&mesh)).map_err(Error::Limit)?;
-                splat_core::part_at_creases(&mut mesh);
-                held.set(&name, data.bytes() + mesh.bytes()).map_err(Error::Limit)?;
-                (SourceData::Mesh(mesh.into()), notes, held.into())
-            }
-            (None, _) => {
-                let held = memory.take(&name, data.bytes()).map_err(Error::Limit)?;
-                (data.clone(), Notes::default(), held.into())
+        let (taken, made, held) = match known {
+            Some(known) => known,
+            None => {
+                let read = self.made_of(source, data, limits)?;
+                self.taken.borrow_mut().push((data.clone(), read.clone()));
+                read
             }
         };
-        let is_new = !self.taken.borrow().iter().any(|(known, _)| known.is_same(data));
-        if is_new {
-            self.taken.borrow_mut().push((data.clone(), (taken.clone(), made.clone(), held.clone())));
-        }
         add(&self.mended, made.mended.iter().map(Mended::to_string));
         let points = if let SourceData::Points(points) = data { Some(points) } else { None };
         let unused = points.into_iter().flat_map(|points| points.not_asked_for(&limits.columns));
         add(&self.notes, notes.sentences(&name, unused));
         Ok((taken, notes, held))
+    }
+
+    /// What drawing takes of data of a program, with its memory.
+    fn made_of(&self, source: &Path, data: &SourceData, limits: &ReadParams) -> Result<Read, Error> {
+        let name = crate::printable(source);
+        let memory = self.memory.up_to(limits.memory.limit());
+        let SourceData::Mesh(mesh) = data else {
+            let held = memory.take(&name, data.bytes()).map_err(Error::Limit)?;
+            return Ok((data.clone(), Notes::default(), held.into()));
+        };
+        let mut held = memory.take(&name, 2 * mesh.bytes()).map_err(Error::Limit)?;
+        let params = ReadParams { memory: memory.clone(), ..limits.clone() };
+        let turned = read::mesh_in_memory(&name, Mesh::clone(mesh), &params);
+        let (mut mesh, notes) = turned.map_err(|e| Error::from_read(source, &e))?;
+        let _parted = memory.take(&name, splat_core::crease_bytes(&mesh)).map_err(Error::Limit)?;
+        splat_core::part_at_creases(&mut mesh);
+        held.set(&name, data.bytes() + mesh.bytes()).map_err(Error::Limit)?;
+        Ok((SourceData::Mesh(mesh.into()), notes, held.into()))
     }
 
     /// Forgets what there is to say of files, for whoever looked at them before a scene asks for what they hold.

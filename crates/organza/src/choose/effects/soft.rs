@@ -8,7 +8,7 @@ use super::candidates::{Candidate, Choice};
 use super::gain::bound;
 use super::{Row, take_nothing};
 use crate::plan::{Bound, Plan};
-use crate::scene::EffectKind;
+use crate::scene::{EffectKind, SwitchedEffect};
 use crate::statistics::{LightStatistics, Statistics};
 
 const WITHOUT: &str = "it shines from a point in its middle";
@@ -39,8 +39,8 @@ fn candidate(light: &LightStatistics, shines: bool, statistics: &Statistics) -> 
     let bound = bound(light.radiance, statistics);
     let points = light.points;
     let stands = if points == 1 { "1 point stands".to_owned() } else { format!("{points} points stand") };
-    let is_switched =
-        statistics.switched.iter().any(|effect| effect.kind == EffectKind::Soft && effect.label == *label);
+    // Off, its size would be gone.
+    let is_switched = SwitchedEffect::find(&statistics.switched, EffectKind::Soft, label).is_some();
     let reason = if is_switched { "the scene switches it on".to_owned() } else { format!("{stands} for its size") };
     Candidate::new(label, Choice::Settled { is_on: true, reason, bound })
 }

@@ -123,24 +123,24 @@ mod tests {
         {
             let scene = scene(render);
             let asked = Rung::of_scene(&scene);
-            let all = rungs(&scene, true);
-            assert_eq!(all[0], asked);
+            let every = rungs(&scene, true);
+            assert_eq!(every[0], asked);
             assert!(rungs(&scene, false).iter().all(|rung| rung.splat_share == asked.splat_share));
-            let shares: Vec<f64> = all
+            let shares: Vec<f64> = every
                 .iter()
                 .filter(|r| r.antialias == asked.antialias && r.sets == asked.sets)
                 .map(|r| r.splat_share)
                 .collect();
             assert!(shares.windows(2).all(|pair| pair[1] < pair[0] && pair[1] > 0.6 * pair[0]), "{render}: {shares:?}");
             assert_eq!(shares.last(), Some(&LEAST_SHARE.min(asked.splat_share)), "{render}");
-            let levels: Vec<u32> = all
+            let levels: Vec<u32> = every
                 .iter()
                 .filter(|r| r.antialias == asked.antialias && r.splat_share == asked.splat_share)
                 .map(|r| r.sets)
                 .collect();
             assert_eq!(levels.len() > 1, render.contains("particles"), "{render}");
             assert!(levels.windows(2).all(|pair| pair[1] < pair[0] && 5 * pair[1] >= 3 * pair[0]), "{levels:?}");
-            assert!(all.iter().any(|rung| rung.antialias == 1), "{render}");
+            assert!(every.iter().any(|rung| rung.antialias == 1), "{render}");
         }
     }
 

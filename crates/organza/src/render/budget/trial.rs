@@ -152,16 +152,16 @@ mod tests {
         // A quarter of the splats has half of the entries, and as many voxels.
         trial.learn(&Thinned { base: counted(400.0, 80.0, 9.0, 5.0), quarter: counted(100.0, 40.0, 9.0, 5.0) });
         let threads = rayon::current_num_threads();
-        let of = |splats: f64, entries: f64, voxels: f64, samples: f64| {
+        let seconds = |splats: f64, entries: f64, voxels: f64, samples: f64| {
             counted(1e6 * splats, 1e6 * entries, 1e6 * voxels, 1e6 * samples).seconds(threads)
         };
         let near = |found: f64, expected: f64| assert!((found / expected - 1.0).abs() < 1e-9, "{found} {expected}");
         // 500 × 500 pixels of 2 × 2 samples are as many as the trial's.
-        near(trial.drawing(rung, [500, 500]), of(1.0, 1.0, 1.0, 1.0));
+        near(trial.drawing(rung, [500, 500]), seconds(1.0, 1.0, 1.0, 1.0));
         let all = Rung { splat_share: 1.0, ..rung };
-        near(trial.drawing(all, [500, 500]), of(16.0, 4.0, 1.0, 1.0));
-        near(trial.drawing(Rung { antialias: 4, ..all }, [500, 500]), of(16.0, 4.0, 4.0, 4.0));
-        near(trial.seconds(all, [500, 500]), 16.0 + 0.5 + of(16.0, 4.0, 1.0, 1.0));
+        near(trial.drawing(all, [500, 500]), seconds(16.0, 4.0, 1.0, 1.0));
+        near(trial.drawing(Rung { antialias: 4, ..all }, [500, 500]), seconds(16.0, 4.0, 4.0, 4.0));
+        near(trial.seconds(all, [500, 500]), 16.0 + 0.5 + seconds(16.0, 4.0, 1.0, 1.0));
         // Without a clock nothing of it counts.
         let by_figures = trial.by(&Rates::default());
         near(by_figures.seconds(all, [500, 500]), by_figures.drawing(all, [500, 500]));
