@@ -88,7 +88,8 @@ impl Frame {
     /// Footprints.
     pub fn project(&mut self) {
         let detail = Detail { depth: false, object: false };
-        let (footprints, materials) = (&self.footprints, &self.materials);
+        let footprints = &self.footprints;
+        let materials = &self.materials;
         project_into(
             &mut self.projected,
             &ProjectInput {

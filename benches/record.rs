@@ -10,7 +10,8 @@ pub fn record(name: &str, ms: &[f64], elements: u64) {
     let folder = home.join(name.replace('/', "_")).join("new");
     std::fs::create_dir_all(&folder).expect("a folder of times");
     let nanoseconds = |of: fn(f64, f64) -> f64, from: f64| 1e6 * ms.iter().copied().fold(from, of);
-    let (least, greatest) = (nanoseconds(f64::min, f64::INFINITY), nanoseconds(f64::max, 0.0));
+    let least = nanoseconds(f64::min, f64::INFINITY);
+    let greatest = nanoseconds(f64::max, 0.0);
     let mean = nanoseconds(|a, b| a + b, 0.0) / ms.len() as f64;
     let estimates = format!(
         "{{\"mean\":{{\"confidence_interval\":{{\"lower_bound\":{least},\"upper_bound\":{greatest}}},\"point_estimate\":{mean}}}}}"

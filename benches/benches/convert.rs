@@ -126,7 +126,8 @@ fn fields(c: &mut Criterion) {
             b.iter(|| surface_to_points(&gyroid, bounds, &params, None));
         });
     }
-    let (shape, splat) = (CloudShape::default(), SplatParams::default());
+    let shape = CloudShape::default();
+    let splat = SplatParams::default();
     if let Ok(grid) = procedural_cloud(&shape, 0.05, &splat, None) {
         group.throughput(Throughput::Elements(grid.values.len() as u64));
         group.bench_function(BenchmarkId::new("procedural cloud", grid.values.len()), |b| {
@@ -161,7 +162,8 @@ fn growth(c: &mut Criterion) {
 fn hills(n: u64) -> RawPoints {
     let side = (n as f32).sqrt();
     let point = |i: u64| {
-        let (x, z) = (side * rng::unit_f32(1, 0, i, 0), side * rng::unit_f32(1, 0, i, 1));
+        let x = side * rng::unit_f32(1, 0, i, 0);
+        let z = side * rng::unit_f32(1, 0, i, 1);
         Vec3::new(x, 9.0 * (x * 0.02).sin() * (z * 0.03).cos(), z)
     };
     RawPoints { position: (0..n).map(point).collect(), ..RawPoints::default() }

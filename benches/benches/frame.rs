@@ -36,7 +36,8 @@ const DRAGON: [&str; 6] = [
 ];
 
 fn main() {
-    let (options, progress) = (RenderOptions::default(), Progress::new());
+    let options = RenderOptions::default();
+    let progress = Progress::new();
     let mut whole = Passes::default();
     let outdoor = load("outdoor", &LoadOptions::default());
     for _ in 0..REPEATS {
@@ -54,7 +55,8 @@ fn main() {
 
 /// A scene with changes, whose camera turns: the frames behind the first.
 fn turn(name: &str, file: &str, sets: &[&str]) {
-    let (options, progress) = (RenderOptions::default(), Progress::new());
+    let options = RenderOptions::default();
+    let progress = Progress::new();
     let overrides: Vec<Override> = sets.iter().map(|set| Override::parse(set).expect("an override")).collect();
     let frame =
         |k| LoadOptions { frame: Some(k), turntable: Some(60), overrides: overrides.clone(), ..LoadOptions::default() };

@@ -28,7 +28,8 @@ fn main() {
     match std::env::args().skip(1).find(|a| !a.starts_with('-')) {
         Some(volume) => {
             let like = HeadLike::new(Some(volume.as_str()).filter(|&v| v != "head"));
-            let (transfer, camera) = (like.transfer(HeadLike::SEMI), like.camera(SIZE[0], false));
+            let transfer = like.transfer(HeadLike::SEMI);
+            let camera = like.camera(SIZE[0], false);
             let name = Path::new(&volume).file_stem().unwrap_or_default().to_string_lossy().into_owned();
             let sun = DVec3::new(0.6, -0.5, -0.6);
             rows(&Setting { name, grid: &like.grid, transfer, camera, suns: [sun, -sun] }, false);
@@ -101,7 +102,8 @@ impl<'a> Setting<'a> {
             shadow_coefficient: 1.0,
             casts_shadow: true,
         };
-        let (volumes, camera) = (vec![volume], &self.camera);
+        let volumes = vec![volume];
+        let camera = &self.camera;
         SheetInput { volumes, splats: None, camera, lights, shadow_origin: DVec3::ZERO, ambient: [0.0; 3] }
     }
 }
@@ -117,7 +119,8 @@ fn ran<T>(mut run: impl FnMut() -> T) -> Ran<T> {
     let mut clock = Vec::new();
     let mut processor = f64::INFINITY;
     loop {
-        let (start, busy) = (Instant::now(), processor_ms());
+        let start = Instant::now();
+        let busy = processor_ms();
         let made = run();
         clock.push(start.elapsed().as_secs_f64() * 1e3);
         processor = processor.min(processor_ms() - busy);

@@ -33,7 +33,9 @@ impl ScalarField for Torus {
 
     fn hessian(&self, p: DVec3) -> DMat3 {
         let r = (p.x * p.x + p.y * p.y).sqrt();
-        let (c, s, turn) = (p.x / r, p.y / r, 2.0 - 1.4 / r);
+        let c = p.x / r;
+        let s = p.y / r;
+        let turn = 2.0 - 1.4 / r;
         let xy = (2.0 - turn) * c * s;
         let x = DVec3::new(2.0 * c * c + turn * s * s, xy, 0.0);
         DMat3::from_cols(x, DVec3::new(xy, 2.0 * s * s + turn * c * c, 0.0), DVec3::new(0.0, 0.0, 2.0))
@@ -52,7 +54,8 @@ fn sheet() -> Mesh {
     let mut mesh = Mesh::default();
     for k in 0..(n + 1) * (n + 1) {
         let at = |i: u32| 2.0 * i as f32 / n as f32 - 1.0;
-        let (x, y) = (at(k % (n + 1)), at(k / (n + 1)));
+        let x = at(k % (n + 1));
+        let y = at(k / (n + 1));
         mesh.position.push(Vec3::new(x, y, 0.2 * (9.0 * x.hypot(y)).cos()));
         mesh.normal.push(Vec3::new(x, y, 4.0).normalize());
     }
@@ -67,7 +70,8 @@ fn torus_points() -> RawPoints {
     let mut points = RawPoints::default();
     for i in 0..40_000 {
         let angle = |k| TAU * rng::unit(3, 1, i, k);
-        let ((sin, cos), b) = (angle(0).sin_cos(), angle(1));
+        let (sin, cos) = angle(0).sin_cos();
+        let b = angle(1);
         let normal = DVec3::new(cos * b.cos(), sin * b.cos(), b.sin());
         let tube = 0.3 + 0.05 * (7.0 * angle(0)).sin() * (5.0 * b).cos();
         points.position.push((DVec3::new(0.7 * cos, 0.7 * sin, 0.0) + normal * tube).as_vec3());

@@ -11,7 +11,8 @@ use std::hint::black_box;
 
 /// A soft ball in the unit cube around the origin.
 fn ball() -> Grid {
-    let (n, h) = (64, 1.0 / 64.0);
+    let n = 64;
+    let h = 1.0 / 64.0;
     let place = |i: usize| (i as f64 + 0.5) * h - 0.5;
     let value = |i: usize| {
         let p = DVec3::new(place(i % n), place(i / n % n), place(i / (n * n)));

@@ -65,7 +65,8 @@ fn main() {
     let volume = file.and_then(|f| Path::new(f).file_stem()?.to_str()).map(|f| format!("{f} ")).unwrap_or_default();
     let like = HeadLike::new(file);
     let grid = &like.grid;
-    let (semi, iso) = (like.transfer(HeadLike::SEMI), like.transfer(HeadLike::ISO));
+    let semi = like.transfer(HeadLike::SEMI);
+    let iso = like.transfer(HeadLike::ISO);
     let start = Instant::now();
     let bcc = body_centred(grid, &SplatParams::default()).expect("a volume");
     let share = bcc.planes.values.len() as f64 / grid.values.len() as f64;
@@ -140,12 +141,15 @@ fn row(name: &str, [method, paper]: [&Method<'_>; 2], transfer: &TransferFunctio
     let params = Params { slab_width, ..params };
     let layout = ChannelLayout::new(&LayerSet::default());
     let mut out = Accumulator::new(camera.size, 1, 3, false, false);
-    let (mut best, mut counts) = ([[f64::INFINITY; 2]; 2], SheetCounts::default());
+    let mut best = [[f64::INFINITY; 2]; 2];
+    let mut counts = SheetCounts::default();
     let mut clock = Vec::new();
     for _ in 0..REPEATS {
-        let (start, busy) = (Instant::now(), processor_ms());
+        let start = Instant::now();
+        let busy = processor_ms();
         let sheeted = prepare(input.clone(), &params, None).expect("a volume that can be drawn");
-        let (middle, middle_busy) = (Instant::now(), processor_ms());
+        let middle = Instant::now();
+        let middle_busy = processor_ms();
         out = Accumulator::new(camera.size, 1, 3, false, false);
         counts = sheeted.fold(ALL, &[], &layout, &mut out, None).expect("nobody cancels");
         clock.push(start.elapsed().as_secs_f64() * 1e3);

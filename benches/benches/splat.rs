@@ -47,7 +47,8 @@ fn row(name: &str, frame: &mut Frame) -> [f64; 2] {
         let steps: [&mut dyn FnMut(&mut Frame); 3] =
             [&mut |f| f.sort(), &mut |f| f.project(), &mut |f| fragments = f.fold().fragments];
         for (k, (step, best)) in steps.into_iter().zip(&mut best).enumerate() {
-            let (start, busy) = (Instant::now(), processor_ms());
+            let start = Instant::now();
+            let busy = processor_ms();
             step(frame);
             clock[k].push(start.elapsed().as_secs_f64() * 1e3);
             best[0] = best[0].min(clock[k][clock[k].len() - 1]);

@@ -35,7 +35,8 @@ fn dragon(discs: u64, opacity: f64) -> Cloud {
 }
 
 fn view() -> Camera {
-    let (eye, target) = (DVec3::new(0.05, 0.16, 0.36), DVec3::new(0.0, 0.12, 0.0));
+    let eye = DVec3::new(0.05, 0.16, 0.36);
+    let target = DVec3::new(0.0, 0.12, 0.0);
     Camera::look_at(eye, target, DVec3::Y, Projection::Perspective { fov_y: 0.6 }, SIZE).expect("a view")
 }
 
@@ -51,7 +52,8 @@ struct Scene {
 
 impl Scene {
     fn new(discs: u64, opacity: f64, index: f32) -> Self {
-        let (cloud, camera) = (dragon(discs, opacity), view());
+        let cloud = dragon(discs, opacity);
+        let camera = view();
         let params = hbsort::Params { direction: splat_core::Direction::FrontToBack, ..hbsort::Params::default() };
         let order = hbsort::slice_cloud(&cloud, None, &camera, &params, &mut hbsort::Scratch::default());
         let ids = order.expect("an order").input_from_sorted;
@@ -83,7 +85,8 @@ impl Scene {
     }
 
     fn resolve(&self, discs: &Discs, passes: Passes<'_>) -> Opaque {
-        let (shown, max_bytes) = (Shown::Discs(&self.values), 1 << 32);
+        let shown = Shown::Discs(&self.values);
+        let max_bytes = 1 << 32;
         let input = OpaqueInput { discs, shown, channels: 3, objects: false, passes, max_bytes };
         resolve_opaque(&input, &Params::default(), None).expect("nobody cancels")
     }
@@ -116,7 +119,8 @@ fn opaque(criterion: &mut Criterion) {
             group.bench_function(&name, |b| b.iter(|| scene.resolve(&discs, passes)));
             let before = processor_ms();
             let picture = scene.resolve(&discs, passes);
-            let (time, (error, share)) = (processor_ms() - before, compare(&all, &picture));
+            let time = processor_ms() - before;
+            let (error, share) = compare(&all, &picture);
             println!("{name}: {time:.0} ms of processor time, RMSE {error:.1e}, {:.2} % over 1/255", 100.0 * share);
         }
     }

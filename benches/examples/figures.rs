@@ -60,7 +60,8 @@ fn drawn(scene: &Scene) -> Picture {
 fn one_group(scene: &Scene, method: Method, groups: u32) -> Picture {
     let loaded =
         organza::load(scene, &RenderOptions::default(), &Progress::new(), &Files::default()).expect("the model");
-    let (cloud, params) = (&loaded.cloud, Params::default());
+    let cloud = &loaded.cloud;
+    let params = Params::default();
     let Params { disc_scale, gap, .. } = params;
     let recipe = Recipe { method, groups, coverage: Coverage::Partial, disc_scale, gap };
     let members = recipe.group(cloud, None).expect("groups");
@@ -71,7 +72,8 @@ fn one_group(scene: &Scene, method: Method, groups: u32) -> Picture {
     let values: Vec<f32> = (0..cloud.len()).map(|i| 0.7 * cosine(i).max(0.0)).collect();
     let camera = &loaded.camera.with_samples(2);
     let input = DiscInput { cloud, ids: &ids, camera, footprints: &loaded.footprints, materials: &loaded.materials };
-    let (discs, shown) = (&Discs::project(&input, &params), Shown::Discs(&values));
+    let discs = &Discs::project(&input, &params);
+    let shown = Shown::Discs(&values);
     let passes = Passes::TwoPlusOne;
     let input = OpaqueInput { discs, shown, channels: 1, objects: false, passes, max_bytes: u64::MAX };
     let seen = resolve_opaque(&input, &params, None).expect("a picture");
@@ -87,7 +89,9 @@ fn main() {
     let to = std::env::args().nth(1).expect("a file to write");
     let bunny = |sets: &[&str]| model(NEAR, BUNNY, sets);
     let one_pass = "render.surfels.opaque='one_pass'";
-    let (plain, eight, four) = ("render.surfels.voronoi=false", "render.surfels.groups=8", "render.surfels.groups=4");
+    let plain = "render.surfels.voronoi=false";
+    let eight = "render.surfels.groups=8";
+    let four = "render.surfels.groups=4";
     let by = |grouping: &'static str| -> Vec<&'static str> {
         match grouping {
             "wgc" => vec![one_pass, "render.surfels.grouping='wgc'"],

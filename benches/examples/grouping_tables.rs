@@ -51,7 +51,9 @@ fn table_2(cloud: &Cloud, scale: f32, all: &OverlapGraph, add: &mut impl FnMut(S
         add(format!("2,dragon,{name},{GROUPS},,,{:.3}", overlap(&groups)));
     }
     for groups in [4, 8] {
-        let (method, coverage, gap) = (Method::Weighted, Coverage::Duplicates, Params::default().gap);
+        let method = Method::Weighted;
+        let coverage = Coverage::Duplicates;
+        let gap = Params::default().gap;
         let members = Recipe { method, groups, coverage, disc_scale: scale, gap }.group(cloud, None).expect("groups");
         let added: usize = (0..cloud.len()).map(|place| members.groups().further(place).len()).sum();
         add(format!("section 6.3,dragon,share of discs added,{groups},,,{:.3}", added as f64 / cloud.len() as f64));
@@ -72,7 +74,9 @@ fn main() {
         for c in FACTORS {
             let graph = overlap_graph(&cloud, scale, c);
             let groups = colored(&graph);
-            let (count, most, mean) = (groups.count(), graph.max_degree(), mean_degree(&graph));
+            let count = groups.count();
+            let most = graph.max_degree();
+            let mean = mean_degree(&graph);
             // A sum of nothing is −0.
             let overlap = all.mean_overlap(&groups).abs();
             add(format!("1,{name},MGC at c = {c},{count},{most},{mean:.1},{overlap:.3}"));

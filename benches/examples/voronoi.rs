@@ -23,11 +23,14 @@ const FACTOR: f32 = 0.4;
 fn main() {
     let to = std::env::args().nth(1).expect("a file to write");
     let cloud = bunny();
-    let (footprints, materials) = (FootprintStack::default(), [Material::default()]);
+    let footprints = FootprintStack::default();
+    let materials = [Material::default()];
     let bounds = cloud.bounds();
-    let (middle, size) = (0.5 * (bounds.min + bounds.max), (bounds.max - bounds.min).max_element());
+    let middle = 0.5 * (bounds.min + bounds.max);
+    let size = (bounds.max - bounds.min).max_element();
     let target = cloud.origin + (middle + size * Vec3::new(-0.22, 0.0, 0.14)).as_dvec3();
-    let (eye, view) = (target + f64::from(size) * DVec3::new(-0.4, -2.0, 0.5), Projection::Perspective { fov_y: 0.26 });
+    let eye = target + f64::from(size) * DVec3::new(-0.4, -2.0, 0.5);
+    let view = Projection::Perspective { fov_y: 0.26 };
     let camera = Camera::look_at(eye, target, DVec3::Z, view, SIZE).expect("a view");
     let ids: Vec<u32> = (0..cloud.len() as u32).collect();
     let params = Params::default();
@@ -43,13 +46,19 @@ fn main() {
     let direction = DVec3::new(0.4, 0.77, -0.5).normalize();
     let sun = Sun { shape: LightShape::Directional { direction }, intensity: [0.75 * PI; 3] };
     let objects = [Object { name: "bunny".into(), casts_shadow: false, shadow_coefficient: 1.0 }];
-    let (lights, materials, camera) = (&[LitBy { light: sun, slide: None, shadow: None }], &materials, &camera);
-    let (cloud, objects, ambient) = (&cloud, &objects, [0.1; 3]);
+    let lights = &[LitBy { light: sun, slide: None, shadow: None }];
+    let materials = &materials;
+    let camera = &camera;
+    let cloud = &cloud;
+    let objects = &objects;
+    let ambient = [0.1; 3];
     let input = &ShadeInput { cloud, materials, objects, lights, ambient, camera };
-    let (layout, transforms) = (ChannelLayout::new(&LayerSet::default()), &[Similarity::default()]);
+    let layout = ChannelLayout::new(&LayerSet::default());
+    let transforms = &[Similarity::default()];
     let light = Light { input, layout, transforms, heights: &[] };
     let resolve = |passes: Passes<'_>| {
-        let (shown, max_bytes) = (Shown::Pixels(light), 1 << 30);
+        let shown = Shown::Pixels(light);
+        let max_bytes = 1 << 30;
         let input = OpaqueInput { discs: &discs, shown, channels: 3, objects: false, passes, max_bytes };
         resolve_opaque(&input, &params, None).expect("a picture")
     };

@@ -22,7 +22,9 @@ pub const LONGEST: Duration = Duration::from_millis(200);
 /// ```
 pub fn batches(nanoseconds: &[f64]) -> Vec<Range<usize>> {
     let longest = LONGEST.as_nanos() as f64;
-    let (mut ranges, mut first, mut sum) = (Vec::new(), 0, 0.0);
+    let mut ranges = Vec::new();
+    let mut first = 0;
+    let mut sum = 0.0;
     for (at, took) in nanoseconds.iter().enumerate() {
         if at > first && sum + took > longest {
             ranges.push(first..at);

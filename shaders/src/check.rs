@@ -56,7 +56,8 @@ impl Recording {
     }
 
     fn check_dispatch(&self, dispatch: &Dispatch) -> Result<(), String> {
-        let (kernel, given) = (dispatch.kernel, dispatch.buffers.len());
+        let kernel = dispatch.kernel;
+        let given = dispatch.buffers.len();
         if given != kernel.bindings.len() {
             return Err(format!("{} takes {} buffers, got {given}", kernel.name, kernel.bindings.len()));
         }

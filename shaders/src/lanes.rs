@@ -128,7 +128,8 @@ mod tests {
 
     #[test]
     fn kernels_go_to_and_fro() {
-        let (portable, subgroup) = (sort(), sort().by(Lanes::Subgroup));
+        let portable = sort();
+        let subgroup = sort().by(Lanes::Subgroup);
         assert!(subgroup.check().is_ok() && portable != subgroup);
         assert_eq!(subgroup.by(Lanes::Portable), portable);
         assert_eq!(portable.by(Lanes::Portable), portable);

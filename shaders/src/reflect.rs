@@ -65,7 +65,8 @@ pub fn module(words: &[u32]) -> Option<Module> {
     let mut module = Module { version: ((version >> 16) as u8, (version >> 8) as u8), ..Module::default() };
     let mut ids = Ids::default();
     while let Some(&first) = rest.first() {
-        let (length, op) = ((first >> 16) as usize, first & 0xffff);
+        let length = (first >> 16) as usize;
+        let op = first & 0xffff;
         let instruction = rest.get(1..length.max(1))?;
         rest = rest.get(length.max(1)..)?;
         read(op, instruction, &mut ids, &mut module);

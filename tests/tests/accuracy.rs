@@ -112,7 +112,8 @@ fn frame(image: Image<reference::metrics::Linear>, seconds: f64) -> Frame {
 /// The technique with its samples `offset` behind the front of each slab; finer is slower.
 fn run(offset: f64) -> Result<Study, Error> {
     let mut draw = |request: &Request| {
-        let (n, cut) = (f64::from(request.oversample), request.scene.render.points.transmittance_cutoff);
+        let n = f64::from(request.oversample);
+        let cut = request.scene.render.points.transmittance_cutoff;
         Ok(frame(slab_image(n, offset, cut), 1e-3 * n * (2.0 - cut)))
     };
     let standard_error = vec![[1e-7; 3]; SIZE[0] * SIZE[1]];
@@ -129,7 +130,8 @@ fn order_of(study: &Study, knob: &str) -> (f64, f64) {
 #[test]
 fn a_technique_of_known_order_is_measured_as_such() {
     let study = run(0.5).unwrap();
-    let (slabs, cut) = (order_of(&study, "slabs"), order_of(&study, "cut"));
+    let slabs = order_of(&study, "slabs");
+    let cut = order_of(&study, "cut");
     assert!((slabs.0 - 2.0).abs() < 0.05 && (cut.0 - 1.0).abs() < 1e-6, "{slabs:?} {cut:?}");
     assert!(study.curves.iter().all(|c| verdict(&study, c).contains("as theory says")));
     // The limit says how wrong it is: about (1/256)² of what one slab leaves.
@@ -144,9 +146,11 @@ fn a_technique_of_known_order_is_measured_as_such() {
 #[test]
 fn a_knob_whose_ends_are_too_large_is_held_with_the_reason() {
     let mut draw = |request: &Request| {
-        let (n, cut) = (f64::from(request.oversample), request.scene.render.points.transmittance_cutoff);
+        let n = f64::from(request.oversample);
+        let cut = request.scene.render.points.transmittance_cutoff;
         if cut == 0.0 {
-            let (what, hint) = ("a picture without a cut".into(), "raise it".into());
+            let what = "a picture without a cut".into();
+            let hint = "raise it".into();
             return Err(Error::Limit(Exceeded { what, needed: 2, limit: Some(1), unit: "bytes", hint }));
         }
         Ok(frame(slab_image(n, 0.5, cut), 1e-3 * n * (2.0 - cut)))
@@ -159,7 +163,8 @@ fn a_knob_whose_ends_are_too_large_is_held_with_the_reason() {
 
 #[test]
 fn a_flipped_sign_shows_up_in_the_report() {
-    let (healthy, broken) = (run(0.5).unwrap(), run(-0.5).unwrap());
+    let healthy = run(0.5).unwrap();
+    let broken = run(-0.5).unwrap();
     let curve = broken.curves.iter().find(|c| c.knob == "slabs").unwrap();
     assert!(verdict(&broken, curve).contains("theory says otherwise"), "{}", verdict(&broken, curve));
     let (order, half_width) = order_of(&broken, "slabs");
@@ -187,9 +192,11 @@ fn what_does_not_converge_is_refused_with_what_it_would_take() {
 #[test]
 fn what_was_not_measured_is_null() {
     let mut draw = |request: &Request| {
-        let (n, cut) = (f64::from(request.oversample), request.scene.render.points.transmittance_cutoff);
+        let n = f64::from(request.oversample);
+        let cut = request.scene.render.points.transmittance_cutoff;
         if n == 16.0 {
-            let (what, hint) = ("the table".into(), "".into());
+            let what = "the table".into();
+            let hint = "".into();
             return Err(Error::Limit(Exceeded { what, needed: 9, limit: Some(1), unit: "bytes", hint }));
         }
         Ok(frame(slab_image(n, 0.5, cut), 1e-3 * n))
@@ -214,7 +221,8 @@ fn what_was_not_measured_is_null() {
 
 #[test]
 fn techniques_share_one_frontier_and_what_is_absent_is_named() {
-    let (points, random) = (run(0.5).unwrap(), random::noisy(|seed, level| seed + 1000 * u64::from(level), 0.0));
+    let points = run(0.5).unwrap();
+    let random = random::noisy(|seed, level| seed + 1000 * u64::from(level), 0.0);
     let report = Report::new(&scene(), OPTIONS, vec![points, random], Vec::new());
     let error = |[s, o]: &[usize; 2]| report.studies[*s].outcomes[*o].from_limit.as_ref().unwrap().linear.rmse;
     let seconds = |[s, o]: &[usize; 2]| least_seconds(&report.studies[*s].outcomes[*o]).unwrap();
@@ -361,7 +369,8 @@ fn what_a_report_says_to_write_gives_the_scene_that_it_drew() {
     let scattered = [half_vector, "render.sheets.scattering='forward_and_back'"];
     let algorithm = ["render.surfels.layers='algorithm2'", "render.surfels.grouping='hash'"];
     let coarse = ["render.points.slice_thickness=0.25", "render.shadow.cells=99"];
-    let (mut tried, mut told) = (0, 0);
+    let mut tried = 0;
+    let mut told = 0;
     for own in [&[][..], &[half_vector], &scattered, &algorithm, &coarse] {
         let own: Vec<String> = own.iter().map(|s| (*s).to_owned()).collect();
         let written = parsed(&own);
@@ -377,7 +386,8 @@ fn what_a_report_says_to_write_gives_the_scene_that_it_drew() {
                 let changes = changes(&written, &request);
                 let set: Vec<String> = own.iter().cloned().chain(changes.iter().filter_map(|c| c.set())).collect();
                 let at = format!("{} by {}, {}: {set:?}", knob.name, sweep.technique, step.label);
-                let (said, times) = (lines(&written, &request), format!("every object times {:?}", step.value));
+                let said = lines(&written, &request);
+                let times = format!("every object times {:?}", step.value);
                 assert!(!said.is_empty() || request.scene == written, "{at}");
                 tried += 1;
                 match knob.name {
@@ -385,7 +395,8 @@ fn what_a_report_says_to_write_gives_the_scene_that_it_drew() {
                     "footprint table size" => assert_eq!(said.contains("texels a side"), step.value > 0.0, "{at}"),
                     _ if changes.iter().any(|c| c.value.is_none()) => told += 1,
                     _ => {
-                        let (mut found, mut expected) = (parsed(&set), request.scene);
+                        let mut found = parsed(&set);
+                        let mut expected = request.scene;
                         (found.sha256, expected.render.layers) = (expected.sha256.clone(), found.render.layers.clone());
                         assert_eq!((found.render, found.objects), (expected.render, expected.objects), "{at}");
                     }
@@ -418,7 +429,8 @@ fn the_samplers_of_implicit_surfaces_are_knobs_of_particles() {
     assert_eq!(turned(&sweep.knobs[1]), [scene::SurfaceSampler::Lines, scene::SurfaceSampler::Triangles, paper]);
     assert_eq!(turned(&sweep.knobs[2]).last(), Some(&paper), "from coarse to fine");
     // What is kept from one setting for the next does not hide the difference.
-    let (options, progress) = (RenderOptions::default(), Progress::new());
+    let options = RenderOptions::default();
+    let progress = Progress::new();
     let mut renderer = Renderer::new(&options, &progress);
     let mut draw = |step: &Step| renderer.draw(&quick.turned(&quick.knobs[1], step)).unwrap().image;
     let images: Vec<_> = quick.knobs[1].steps.iter().map(&mut draw).collect();

@@ -192,7 +192,8 @@ fn files_are_read_once_while_they_fit() {
         let options = scene::LoadOptions { frame: Some(k), overrides, ..Default::default() };
         scene::parse(&place.path("s.toml"), text.as_bytes(), &options).unwrap()
     };
-    let (scenes, progress) = ([frame(0), frame(6)], Progress::new());
+    let scenes = [frame(0), frame(6)];
+    let progress = Progress::new();
     let plenty = RenderOptions::default();
     let alone = scenes.each_ref().map(|s| render(s, &plenty, &progress).unwrap().layers);
 
@@ -246,7 +247,8 @@ keys = [{ frame = 0, value = [0, 0, 4] }, { frame = 1, value = [2, 1, 3] }, { fr
 set = "object.pane.transform.translate"
 keys = [{ frame = 1, value = [0, 0, 0] }, { frame = 2, value = [0.3, 0, 0] }]
 "#;
-    let (options, progress) = (RenderOptions::default(), Progress::new());
+    let options = RenderOptions::default();
+    let progress = Progress::new();
     for settings in [
         "[render]\ntechnique = 'points'\n",
         "[render]\ntechnique = 'points'\nshadow = { cells = 9 }\n",
@@ -290,7 +292,9 @@ fn what_a_camera_decides_is_made_for_each() {
         let options = scene::LoadOptions { frame: Some(k), ..Default::default() };
         scene::parse(&place.path("s.toml"), text.as_bytes(), &options).unwrap()
     };
-    let (scenes, options, progress) = ([frame(0), frame(1)], RenderOptions::default(), Progress::new());
+    let scenes = [frame(0), frame(1)];
+    let options = RenderOptions::default();
+    let progress = Progress::new();
     let mut sequence = Sequence::new(&scenes);
     let drawn = scenes.each_ref().map(|s| sequence.render(s, &options, &progress).unwrap());
     assert!(made_anew(&drawn[1]).contains(&"convert"));

@@ -19,7 +19,8 @@ fn plane(head: &str, [across, along]: [f64; 2], further: impl Fn(f64, f64) -> St
     let count = |step: f64| (2.0 / step).ceil() as i32;
     let mut text = format!("x y z {head}\n");
     for (i, j) in (-count(across)..count(across)).flat_map(|i| (-count(along)..count(along)).map(move |j| (i, j))) {
-        let (x, y) = (across * (f64::from(i) + 0.5), along * (f64::from(j) + 0.5));
+        let x = across * (f64::from(i) + 0.5);
+        let y = along * (f64::from(j) + 0.5);
         writeln!(text, "{x:?} {y:?} 0 {}", further(x, y)).unwrap();
     }
     text
@@ -36,14 +37,17 @@ fn a_disc_with_a_tangent_has_the_opacity_of_its_ellipse_in_every_pixel() {
         &format!("x y z nx ny nz tx ty tz radius\n0 0 0 0 0 1 {:?} {:?} 0 {short}\n", long * cos, long * sin),
     );
     let keys = "opacity = 0.2\n[render]\nantialias = 1\n[render.points]\nresampling_filter = false\ntransmittance_cutoff = 0.0\n";
-    let (footprint, core) = (Footprint::default(), f64::from(Footprint::CORE));
+    let footprint = Footprint::default();
+    let core = f64::from(Footprint::CORE);
     // A point alone stands for a unit of area.
     let most = -0.8f64.ln() * footprint.norm() / (long * short / (core * core));
     let expected: Vec<f64> = (0..48 * 48)
         .map(|k| {
             let at = |i: i32| (f64::from(i) + 0.5) / 48.0 * 3.0 - 1.5;
-            let (x, y) = (at(k % 48), -at(k / 48));
-            let (u, v) = (x * cos + y * sin, y * cos - x * sin);
+            let x = at(k % 48);
+            let y = -at(k / 48);
+            let u = x * cos + y * sin;
+            let v = y * cos - x * sin;
             let square = (u * core / long).powi(2) + (v * core / short).powi(2);
             -(-most * footprint.profile(square)).exp_m1()
         })
@@ -58,17 +62,21 @@ fn a_disc_with_a_tangent_has_the_opacity_of_its_ellipse_in_every_pixel() {
         let more = ["--technique", technique, "--set", "render.particles.repeat_level=400"];
         let alpha = draw_in(folder.path(), &scene(3.0, keys), &more).opacity();
         let moments = |alpha: &[f64]| {
-            let (mut all, mut sums) = (0.0, [0.0; 3]);
+            let mut all = 0.0;
+            let mut sums = [0.0; 3];
             for (k, a) in alpha.iter().enumerate() {
                 let at = |i: usize| (i as f64 + 0.5) / 48.0 * 3.0 - 1.5;
-                let (x, y) = (at(k % 48), -at(k / 48));
-                let (u, v) = (x * cos + y * sin, y * cos - x * sin);
+                let x = at(k % 48);
+                let y = -at(k / 48);
+                let u = x * cos + y * sin;
+                let v = y * cos - x * sin;
                 all += a;
                 [u * u, v * v, u * v].iter().zip(&mut sums).for_each(|(m, sum)| *sum += a * m);
             }
             sums.map(|sum| sum / all)
         };
-        let ([u, v, mixed], [of_u, of_v, _]) = (moments(&alpha), moments(&expected));
+        let [u, v, mixed] = moments(&alpha);
+        let [of_u, of_v, _] = moments(&expected);
         let ratio = (u / v).sqrt() / (of_u / of_v).sqrt();
         assert!((ratio - 1.0).abs() < 0.08 && mixed.abs() < 0.05 * u, "{technique}: {ratio}, {mixed}");
     }
@@ -104,7 +112,8 @@ fn ellipses_of_cells_keep_lines_of_a_scan_sharp_and_their_plane_even() {
     let footprint = Footprint::default();
     let expected: Vec<f64> = (0..48)
         .map(|k| {
-            let (x, y) = ((f64::from(k) + 0.5) / 48.0 - 0.5, -0.5 / 48.0);
+            let x = (f64::from(k) + 0.5) / 48.0 - 0.5;
+            let y = -0.5 / 48.0;
             let weight = |p: &[f64; 2]| {
                 footprint.profile(((p[0] - x) / (2.4 * 0.04)).powi(2) + ((p[1] - y) / (2.4 * 0.12)).powi(2))
             };
@@ -254,8 +263,10 @@ fn puff(extinction: f64, step: f64, deviation: f64) -> f64 {
         let before = |p: &[f64; 3]| ((p[2] - z + half) / (2.0 * half)).clamp(0.0, 1.0);
         (-places.iter().map(|p| depth(p, x, y) * before(p)).sum::<f64>()).exp()
     };
-    let (mut through, mut by_place) = (1.0f64, 0.0);
-    let (count, ends) = (2000, 1.2);
+    let mut through = 1.0f64;
+    let mut by_place = 0.0;
+    let count = 2000;
+    let ends = 1.2;
     for z in (0..count).map(|k| ends - (f64::from(k) + 0.5) * 2.0 * ends / f64::from(count)) {
         let share =
             |p: &[f64; 3]| (-0.5 * ((p[2] - z) / deviation).powi(2)).exp() / (deviation * std::f64::consts::TAU.sqrt());

@@ -24,7 +24,8 @@ fn open_borders_lie_where_they_are() {
     // Turned by 20 degrees in its plane, and leaning back by 0 and 50 degrees.
     let (sin, cos) = 20f64.to_radians().sin_cos();
     for lean in [0.0f64, 50.0] {
-        let (down, away) = (lean.to_radians().cos(), lean.to_radians().sin());
+        let down = lean.to_radians().cos();
+        let away = lean.to_radians().sin();
         for spacing in [0.1, 0.05, 0.02, 0.005] {
             for technique in ["points", "particles"] {
                 let rectangle = format!(
@@ -39,7 +40,8 @@ fn open_borders_lie_where_they_are() {
                 );
                 let found = covered(&rectangle, technique);
                 // By how much each border would have to be moved outwards, in the sheet's plane.
-                let (area, rim) = (4.0 * 0.8 * 0.6 * down, 4.0 * (0.8 + 0.6) * down);
+                let area = 4.0 * 0.8 * 0.6 * down;
+                let rim = 4.0 * (0.8 + 0.6) * down;
                 let outwards = (found - area) / rim;
                 assert!(
                     outwards.abs() < 0.08 * spacing + 0.08 * SAMPLE,

@@ -18,7 +18,8 @@ fn a_cache_is_read_the_second_time_and_changes_no_picture_whatever_is_in_it() {
     let place = tempfile::tempdir().unwrap();
     let folder = place.path();
     let point = |i: u32| {
-        let (x, y) = (f64::from(i % 60) / 15.0 - 2.0, f64::from(i / 60) / 15.0 - 2.0);
+        let x = f64::from(i % 60) / 15.0 - 2.0;
+        let y = f64::from(i / 60) / 15.0 - 2.0;
         format!("{x} {y} {}\n", 0.2 * (3.0 * x).sin() * y.cos())
     };
     fs::write(folder.join("hills.xyz"), (0..3600).map(point).collect::<String>()).unwrap();

@@ -36,7 +36,8 @@ fn slab_in_perspective_follows_the_length_of_its_rays() {
     let focal = 48.0 / 15f64.to_radians().tan();
     for y in 10..86u32 {
         for x in 10..86u32 {
-            let (u, v) = ((f64::from(x) - 47.5) / focal, (f64::from(y) - 47.5) / focal);
+            let u = (f64::from(x) - 47.5) / focal;
+            let v = (f64::from(y) - 47.5) / focal;
             let exact = 1.0 - (-(1.0 + u * u + v * v).sqrt()).exp();
             let error = (alpha[(y * 96 + x) as usize] - exact).abs();
             assert!(error < 1e-3, "pixel {x} {y}: {error:e}");
@@ -76,7 +77,8 @@ fn shadow_of_a_slab_has_the_transmittance_of_its_optical_depth() {
 #[test]
 fn ripple_of_a_shadow_falls_with_the_size_of_its_table() {
     let ripple = |cells: u32| shadow(1.0, &format!("shadow = {{ cells = {cells} }}"), "").1;
-    let (coarse, fine) = (ripple(48), ripple(192));
+    let coarse = ripple(48);
+    let fine = ripple(192);
     assert!(fine < coarse && fine < 1e-2, "48 cells {coarse:e}, 192 cells {fine:e}");
 }
 
@@ -90,16 +92,19 @@ fn crossed_planes_show_four_regions_in_order() {
              rectangle = {{ center = [0, {y:?}, 0], u = [1, 0, {slope:?}], v = [0, 0.7, 0], spacing = 0.02 }}\n"
         )
     };
-    let (a, b) = (0.6, 0.3);
+    let a = 0.6;
+    let b = 0.3;
     let text =
         parallel_view(2.4, 120) + &plane("red", 0.3, 0.5, "[1, 0, 0]", a) + &plane("green", -0.3, -0.5, "[0, 1, 0]", b);
     let picture = draw(&text, &[]);
-    let (red, green) = (picture.channel("R"), picture.channel("G"));
+    let red = picture.channel("R");
+    let green = picture.channel("G");
     let region = |x: std::ops::Range<u32>, y: std::ops::Range<u32>| {
         (window(&red, 120, x.clone(), y.clone()), window(&green, 120, x, y))
     };
     // 50 pixels a unit; a splat reaches 0.048. On the right red is nearer, on the left green.
-    let (left, right) = (18..57, 63..102);
+    let left = 18..57;
+    let right = 63..102;
     for (name, x, y, expected) in [
         ("red alone", 18..102, 16..34, (a, 0.0)),
         ("green alone", 18..102, 86..104, (0.0, b)),
@@ -123,11 +128,13 @@ fn convolved_chord(rho: f64, reach: f64, cell: f64) -> f64 {
     let chord = |x: f64, y: f64| 2.0 * (1.0 - x * x - y * y).max(0.0).sqrt();
     // The cell spreads like two samples a side at ±cell/√12.
     let side = cell / 12f64.sqrt();
-    let (mut sum, mut total) = (0.0, 0.0);
+    let mut sum = 0.0;
+    let mut total = 0.0;
     const N: i32 = 60;
     for i in -N..=N {
         for j in -N..=N {
-            let (x, y) = (f64::from(i) / f64::from(N) * reach, f64::from(j) / f64::from(N) * reach);
+            let x = f64::from(i) / f64::from(N) * reach;
+            let y = f64::from(j) / f64::from(N) * reach;
             let w = footprint.profile((x * x + y * y) / (reach * reach));
             total += w;
             for (dx, dy) in [(-side, -side), (-side, side), (side, -side), (side, side)] {
@@ -140,7 +147,8 @@ fn convolved_chord(rho: f64, reach: f64, cell: f64) -> f64 {
 
 #[test]
 fn ball_has_the_chord_convolved_with_its_kernel() {
-    let (spacing, extinction) = (0.05, 1.5);
+    let spacing = 0.05;
+    let extinction = 1.5;
     let text = format!(
         "{}[render]\nantialias = 1\npoints = {{ resampling_filter = false }}\n[[object]]\nname = 'ball'\n\
          medium_ball = {{ center = [0, 0, 0], radius = 1, extinction = {extinction:?}, spacing = {spacing:?} }}\n",
@@ -149,7 +157,9 @@ fn ball_has_the_chord_convolved_with_its_kernel() {
     let picture = draw(&text, &[]);
     let alpha = picture.opacity();
     let reach = f64::from(Footprint::default().radius_for_spacing(spacing as f32));
-    let (mut errors, mut inside, mut rim) = (Vec::new(), 0.0f64, 0.0f64);
+    let mut errors = Vec::new();
+    let mut inside = 0.0f64;
+    let mut rim = 0.0f64;
     for y in 0..96u32 {
         for x in (0..96u32).filter(|x| (x + y) % 5 == 0) {
             let at = |p: u32| (f64::from(p) - 47.5) * 2.6 / 96.0;

@@ -379,7 +379,9 @@ fn bi30_threads_0_takes_all_cores_and_the_bytes_do_not_depend_on_it() {
 
 /// The longest run of one character.
 fn longest_run(text: &str) -> usize {
-    let (mut longest, mut run, mut last) = (0, 0, '\0');
+    let mut longest = 0;
+    let mut run = 0;
+    let mut last = '\0';
     for c in text.chars() {
         run = if c == last { run + 1 } else { 1 };
         (longest, last) = (longest.max(run), c);
@@ -405,7 +407,8 @@ fn expect_no_flood(place: &Place, arguments: &[&str], what: &str) {
 fn messages_repeat_200_characters_at_most_of_a_scene() {
     let place = place();
     let long = format!("\u{1b}[2J{}", "q".repeat(1 << 20)).replace('\u{1b}', "\\u001b");
-    let (word, digits) = ("q".repeat(1 << 20), "7".repeat(1 << 20));
+    let word = "q".repeat(1 << 20);
+    let digits = "7".repeat(1 << 20);
     let fog = "medium_box = { min = [-1, -1, -1], max = [1, 1, 1], extinction = 0.5, spacing = 0.25 }";
     let object = |source: String| scene().replace(fog, &source);
     let ball = "box = [[-1, -1, -1], [1, 1, 1]], spacing = 0.2 }";

@@ -39,8 +39,10 @@ const OBJECTS: [[&str; 3]; 5] = [
 fn scan() -> String {
     let mut text = "x,y,z,opacity,heat,shadow_coefficient\n".to_owned();
     for n in 0..300u32 {
-        let (i, j) = (n % 20, n / 20);
-        let (x, y) = (f64::from(i) * 0.05 - 0.5, f64::from(j) * 0.15 - 1.0);
+        let i = n % 20;
+        let j = n / 20;
+        let x = f64::from(i) * 0.05 - 0.5;
+        let y = f64::from(j) * 0.15 - 1.0;
         let z = 0.2 * (3.0 * x).sin();
         writeln!(text, "{x:.3},{y:.3},{z:.4},{},{},{}", if n % 7 == 0 { 1.0 } else { 0.6 }, n, f64::from(n % 4) / 4.0)
             .unwrap();
@@ -88,7 +90,8 @@ fn the_splats_of_a_scene_in_a_file_are_drawn_to_the_same_bits() {
         let picture = picture_of(&place.path(image));
         ["R", "G", "B"].map(|c| picture.channel(c)).concat()
     };
-    let (given, packed) = (drawn("s.toml", "given.exr"), drawn("packed.toml", "packed.exr"));
+    let given = drawn("s.toml", "given.exr");
+    let packed = drawn("packed.toml", "packed.exr");
     let square = given.iter().zip(&packed).map(|(a, b)| (a - b).powi(2)).sum::<f64>() / given.len() as f64;
     println!("{ratio:.3} of the bytes, {:.5} of radiance", square.sqrt());
     assert!(square.sqrt() < 4e-3 && given != packed, "{square}");

@@ -43,7 +43,8 @@ fn db15_a_constant_map_is_that_colour_bit_for_bit_in_every_technique() {
         let arguments =
             ["--technique", technique, "--layers", "effects,object", "--set", "render.particles.repeat_level=20"];
         let by = |background: &str| drawn(folder.path(), background, OBJECTS, &arguments);
-        let (color, map) = (by("color = [0.5, 0.25, 1.25]"), by("environment = 'constant.hdr'\nrotate = 77"));
+        let color = by("color = [0.5, 0.25, 1.25]");
+        let map = by("environment = 'constant.hdr'\nrotate = 77");
         assert_eq!(map, color, "{technique}");
         assert!(map.opacity().contains(&0.0) && map.channel("background.B").contains(&1.25), "{technique}");
     }
@@ -125,7 +126,8 @@ fn the_path_tracer_sees_the_same_environment_and_it_lights_nothing() {
     let text = scene("environment = 'smooth.hdr'\nrotate = 100\nscale = 1.25", OBJECTS);
     std::fs::write(folder.path().join("scene.toml"), text).unwrap();
     let scene = organza::scene::load(&folder.path().join("scene.toml"), &Default::default()).unwrap();
-    let (options, progress) = (organza::RenderOptions::default(), organza::Progress::new());
+    let options = organza::RenderOptions::default();
+    let progress = organza::Progress::new();
     let layers = organza::render(&scene, &options, &progress).unwrap().layers;
     let orders = organza_judge::truth::Orders::of(&scene);
     let truth = organza_judge::truth::truth(&scene, &options, orders, 400, &progress).unwrap().unwrap();
@@ -146,7 +148,8 @@ fn the_path_tracer_sees_the_same_environment_and_it_lights_nothing() {
     assert!(free.len() > 100);
     for k in free {
         for c in 0..3 {
-            let (a, b) = (f64::from(beauty[k][c]), truth.image.pixels()[k][c]);
+            let a = f64::from(beauty[k][c]);
+            let b = truth.image.pixels()[k][c];
             assert!((a - b).abs() < 0.02, "pixel {k}: {a} {b}");
         }
     }

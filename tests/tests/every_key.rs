@@ -27,7 +27,8 @@ fn look(folder: &Folder, source: &str, entry: &Entry, technique: &str, set: &[&s
     let mut overrides = vec![format!("render.technique='{technique}'")];
     overrides.extend(entry.with.iter().chain(set).map(|s| (*s).to_owned()));
     let scene = folder.scene(source, &overrides, entry.frame).map_err(refused)?;
-    let (options, progress) = (organza::RenderOptions::default(), organza::Progress::new());
+    let options = organza::RenderOptions::default();
+    let progress = organza::Progress::new();
     let render = || organza::render(&scene, &options, &progress).map_err(refused);
     Ok(match entry.look {
         Look::Picture => scenes::bits(render()?.layers.rgb("beauty").unwrap()),
@@ -78,7 +79,9 @@ fn fault(
 /// turn.
 fn try_all(by_each: bool) {
     let folder = Folder::new();
-    let (mut faults, mut tried, mut known) = (Vec::new(), 0, Before::new());
+    let mut faults = Vec::new();
+    let mut tried = 0;
+    let mut known = Before::new();
     for (at, entry) in table::entries().iter().enumerate() {
         let by = |source| entry.techniques.iter().copied().filter(|t| entry.applies_to(source, t)).collect::<Vec<_>>();
         let mut with: Vec<_> = SOURCES.iter().map(|s| (s.name, by(s.name))).filter(|(_, by)| !by.is_empty()).collect();
@@ -180,7 +183,8 @@ fn the_axis_that_points_up_is_that_of_the_format_unless_the_scene_says_another()
         (axis, scenes::bits(render.layers.rgb("beauty").unwrap()))
     };
     let (body, up) = ("object.it.volume='body.nrrd'", |axis: &str| format!("object.it.transform.up='{axis}'"));
-    let (y, z) = (shown(&[body, &up("y")]), shown(&[body, &up("z")]));
+    let y = shown(&[body, &up("y")]);
+    let z = shown(&[body, &up("z")]);
     assert_ne!(y, z);
     assert_eq!(shown(&[body]), z);
     assert_eq!(shown(&[body, &up("auto")]), z);

@@ -95,7 +95,8 @@ fn ten_scenes() -> Vec<Case> {
         let turned = |k: f32, color| disc(Vec3::new(0.3 * k, 0.0, 0.0), Vec3::new(1.0, 0.2 * k, 0.35), 0.9, 0.3, color);
         vec![turned(-1.0, RED), turned(0.0, GREEN), turned(1.0, BLUE)]
     };
-    let (crossing, slab) = (SurfaceOpacity::PerCrossing, SurfaceOpacity::ThinSlab);
+    let crossing = SurfaceOpacity::PerCrossing;
+    let slab = SurfaceOpacity::ThinSlab;
     let case = |name, splats, opacity, projection| Case { name, splats, opacity, projection };
     vec![
         case("three crossing discs", three(), crossing, FRONT),
@@ -128,7 +129,9 @@ impl Case {
 
     /// Opacity and colour of each pixel, as the compositor has them.
     fn exact(&self) -> Vec<[f64; 4]> {
-        let (cloud, camera, materials) = (self.cloud(), self.camera(), [self.material()]);
+        let cloud = self.cloud();
+        let camera = self.camera();
+        let materials = [self.material()];
         let values: Vec<f32> = cloud.color.iter().flatten().copied().collect();
         let image = composite(
             &Input {
@@ -150,7 +153,8 @@ impl Case {
 
     /// Sums over sets by `add`, one picture after the other; `paired` sets are the same two by two.
     fn moments(&self, paired: bool, add: fn(f64, f64) -> f64) -> Moments {
-        let (cloud, camera) = (self.cloud(), self.camera());
+        let cloud = self.cloud();
+        let camera = self.camera();
         // No pixel is smaller at any depth of the scene, so that no particle is widened.
         let cross_section = pbsr::finest_pixel_area(&camera, DVec3::ZERO, 3.0, 1e-3);
         let params = SplatParams { cross_section, surface_opacity: self.opacity, ..SplatParams::default() };
@@ -185,7 +189,8 @@ fn moments_of(scene: &Scene<'_>, add: fn(f64, f64) -> f64) -> Moments {
     for level in 1..=SETS {
         renderer.fold(scene, &mut ensemble, &FoldParams { levels: 1, ..FoldParams::default() }, None).unwrap();
         let layers = ensemble.read(&|_, _| [0.0; 3], None);
-        let (alpha, beauty) = (layers.scalar("alpha").unwrap(), layers.rgb("beauty").unwrap());
+        let alpha = layers.scalar("alpha").unwrap();
+        let beauty = layers.rgb("beauty").unwrap();
         for k in 0..PIXELS {
             let means = [alpha[k], beauty[k][0], beauty[k][1], beauty[k][2]];
             for c in 0..4 {
@@ -237,7 +242,8 @@ fn scores(moments: &Moments, exact: &[[f64; 4]]) -> [f64; 4] {
 fn limit(n: usize) -> f64 {
     let each = 0.001 / 4.0 / 10.0 / n as f64;
     let tail = |z: f64| 2.0 * (-0.5 * z * z).exp() / (z * (2.0 * std::f64::consts::PI).sqrt());
-    let (mut low, mut high) = (1.0, 20.0);
+    let mut low = 1.0;
+    let mut high = 20.0;
     for _ in 0..100 {
         let middle = 0.5 * (low + high);
         if tail(middle) > each { low = middle } else { high = middle }

@@ -207,7 +207,8 @@ fn what_a_light_sees_is_kept_while_it_stays_and_frames_are_as_those_alone() {
         let options = scene::LoadOptions { frame: Some(frame), ..Default::default() };
         scene::parse("s.toml".as_ref(), SEEN_MOVING.as_bytes(), &options).unwrap()
     };
-    let (options, progress) = (organza::RenderOptions::default(), organza::Progress::new());
+    let options = organza::RenderOptions::default();
+    let progress = organza::Progress::new();
     let frames = [0, 1, 2, 3].map(frame);
     let files = organza::Files::default();
     let points = frames.each_ref().map(|frame| {

@@ -26,7 +26,8 @@ fn stretch(k: usize, parallel: bool) -> f64 {
 fn stretch_of(k: usize, angle: Option<f64>) -> f64 {
     let slope = angle.map_or(0.0, |angle| (angle / 2.0).to_radians().tan() * 2.0 / f64::from(SIZE));
     let at = |v: usize| (v as f64 + 0.5 - f64::from(SIZE) / 2.0) * slope;
-    let (x, y) = (at(k % SIZE as usize), at(k / SIZE as usize));
+    let x = at(k % SIZE as usize);
+    let y = at(k / SIZE as usize);
     (1.0 + x * x + y * y).sqrt()
 }
 

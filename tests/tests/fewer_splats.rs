@@ -19,7 +19,8 @@ fn a_slab_keeps_its_opacity_and_a_wall_has_no_holes() {
     let whole = draw(&scene(""), &[]);
     for (share, most) in [("splat_share = 0.5\n", 0.03), ("splat_share = 0.125\n", 0.06)] {
         let fewer = draw(&scene(share), &[]);
-        let (before, after) = (whole.opacity(), fewer.opacity());
+        let before = whole.opacity();
+        let after = fewer.opacity();
         let left: Vec<usize> = (0..64 * 64).filter(|pixel| pixel % 64 < 28).collect();
         let mean = |opacity: &[f64]| left.iter().map(|pixel| opacity[*pixel]).sum::<f64>() / left.len() as f64;
         // 1 − e^(−0.7).

@@ -17,11 +17,13 @@ fn data() -> Place {
 
 /// Rings of a ball about a place on the x axis.
 fn ball_mesh(radius: f64, x: f64) -> String {
-    let (rings, around) = (8, 12);
+    let rings = 8;
+    let around = 12;
     let mut text = String::new();
     for i in 0..=rings {
         for k in 0..around {
-            let (theta, phi) = (std::f64::consts::PI * f64::from(i) / 8.0, std::f64::consts::TAU * f64::from(k) / 12.0);
+            let theta = std::f64::consts::PI * f64::from(i) / 8.0;
+            let phi = std::f64::consts::TAU * f64::from(k) / 12.0;
             let p = [theta.sin() * phi.cos(), theta.cos(), theta.sin() * phi.sin()].map(|c| radius * c);
             writeln!(text, "v {:.6} {:.6} {:.6}", x + p[0], p[1], p[2]).unwrap();
         }
@@ -37,7 +39,8 @@ fn ball_mesh(radius: f64, x: f64) -> String {
 fn ball_points(radius: f64, color: &str) -> String {
     let mut text = String::from(if color.is_empty() { "x y z\n" } else { "x y z red green blue\n" });
     for i in 0..300 {
-        let (y, angle) = (1.0 - (2.0 * f64::from(i) + 1.0) / 300.0, 2.399_963_229_728_653 * f64::from(i));
+        let y = 1.0 - (2.0 * f64::from(i) + 1.0) / 300.0;
+        let angle = 2.399_963_229_728_653 * f64::from(i);
         let r = (1.0 - y * y).sqrt();
         writeln!(text, "{} {} {}{color}", radius * r * angle.cos(), radius * y, radius * r * angle.sin()).unwrap();
     }
@@ -85,7 +88,8 @@ fn the_scene_that_init_writes_gives_the_bytes_that_render_gives_of_the_file() {
 /// Rows and columns beside which nothing is seen, as shares of the picture.
 fn reach(picture: &organza_tests::Picture) -> [f64; 2] {
     let alpha = picture.opacity();
-    let (width, height) = (picture.size[0] as usize, picture.size[1] as usize);
+    let width = picture.size[0] as usize;
+    let height = picture.size[1] as usize;
     let seen = |i: &usize| alpha[*i] > 0.05;
     let from_middle = |at: usize, n: usize| ((at as f64 + 0.5) / n as f64 - 0.5).abs() * 2.0;
     (0..alpha.len()).filter(seen).fold([0.0; 2], |most: [f64; 2], i| {
@@ -104,7 +108,8 @@ fn every_kind_of_data_is_seen_whole_large_in_the_middle_and_neither_black_nor_wh
         let [x, y] = reach(&picture);
         let most = x.max(y);
         assert!((0.7..0.99).contains(&most), "{file}: {x} {y}");
-        let (green, alpha) = (picture.channel("G"), picture.opacity());
+        let green = picture.channel("G");
+        let alpha = picture.opacity();
         let solid: Vec<f64> = green.iter().zip(&alpha).filter(|(_, a)| **a > 0.9).map(|(g, _)| *g).collect();
         assert!(solid.len() > 100, "{file}: {} solid pixels", solid.len());
         let mean = solid.iter().sum::<f64>() / solid.len() as f64;
@@ -308,7 +313,8 @@ fn the_discs_of_a_few_points_are_seen_whole() {
         };
         let own = scene(&format!("points = \"few.xyz\"\n{keys}"));
         // In another unit of length, a size in the world with it, what is seen is as wide.
-        let (keys, unit) = (keys.replace("0.7", "0.91"), "transform = { scale = 1.3, translate = [5, -7, 1e6] }");
+        let keys = keys.replace("0.7", "0.91");
+        let unit = "transform = { scale = 1.3, translate = [5, -7, 1e6] }";
         let scaled = scene(&format!("points = \"few.xyz\"\n{unit}\n{}", keys.replace("3.0", "2.307_692_3")));
         assert!((own - scaled).abs() < 0.03, "{name}: {own} {scaled}");
     }

@@ -16,9 +16,12 @@ fn place() -> Place {
     place.write("maple.png", std::fs::read(images.join("maple.png")).unwrap());
     let mut text = "x,y,z,nx,ny,nz,radius,footprint,opacity\n".to_owned();
     for i in 0..48 {
-        let (x, y) = (f64::from(i % 8) * 0.28 - 1.0, f64::from(i / 8) * 0.3 - 0.8);
-        let (z, n) = (0.3 * f64::from(i % 5), f64::from(i % 7) * 0.2 - 0.6);
-        let (id, opacity) = (u8::from(i % 4 > 0), if i % 3 == 0 { 1.0 } else { 0.7 });
+        let x = f64::from(i % 8) * 0.28 - 1.0;
+        let y = f64::from(i / 8) * 0.3 - 0.8;
+        let z = 0.3 * f64::from(i % 5);
+        let n = f64::from(i % 7) * 0.2 - 0.6;
+        let id = u8::from(i % 4 > 0);
+        let opacity = if i % 3 == 0 { 1.0 } else { 0.7 };
         writeln!(text, "{x:.3},{y:.3},{z:.2},{n:.2},0.1,1,0.11,{id},{opacity}").unwrap();
     }
     place.write("leaves.csv", text);

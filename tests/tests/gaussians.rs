@@ -58,7 +58,8 @@ struct Eye {
 
 impl Eye {
     fn new((at, target, fov_y): ([f64; 3], [f64; 3], f64)) -> Self {
-        let (at, target) = (DVec3::from_array(at), DVec3::from_array(target));
+        let at = DVec3::from_array(at);
+        let target = DVec3::from_array(target);
         let ahead = (target - at).normalize();
         let right = ahead.cross(DVec3::Y).normalize();
         let focal = 0.5 * SIZE[1] as f64 / (0.5 * fov_y.to_radians()).tan();
@@ -79,7 +80,8 @@ fn oracle(all: &[One], eye: &Eye) -> Vec<[f64; 3]> {
     seen.sort_by(|a, b| a.0.total_cmp(&b.0));
     let pixel = |k: usize| {
         let at = DVec2::new((k % SIZE[0]) as f64 + 0.5, (k / SIZE[0]) as f64 + 0.5);
-        let (mut left, mut sum) = (1.0, [0.0; 3]);
+        let mut left = 1.0;
+        let mut sum = [0.0; 3];
         for (_, center, inverse, opacity, color) in &seen {
             let d = at - *center;
             let alpha = (opacity * (-0.5 * d.dot(*inverse * d)).exp()).min(0.99);
@@ -106,7 +108,8 @@ fn seen(one: &One, eye: &Eye) -> Option<(f64, DVec2, DMat2, f64, [f64; 3])> {
     let view = DMat3::from_cols_array_2d(&eye.axes.map(|axis| axis.to_array())).transpose();
     // y of the image runs down.
     let down = DMat3::from_diagonal(DVec3::new(1.0, -1.0, 1.0));
-    let (c, covariance) = (down * view * (position - eye.at), down * view * axes);
+    let c = down * view * (position - eye.at);
+    let covariance = down * view * axes;
     let covariance = covariance * covariance.transpose();
     if c.z <= covariance.z_axis.z.sqrt() {
         return None;
@@ -133,7 +136,9 @@ fn seen(one: &One, eye: &Eye) -> Option<(f64, DVec2, DMat2, f64, [f64; 3])> {
 
 /// By Legendre functions and angles, with the sign (−1)^m, where the reader has polynomials.
 fn harmonics(d: DVec3) -> [f64; 16] {
-    let (cos, sin, around) = (d.z, (1.0 - d.z * d.z).sqrt(), d.y.atan2(d.x));
+    let cos = d.z;
+    let sin = (1.0 - d.z * d.z).sqrt();
+    let around = d.y.atan2(d.x);
     let legendre = |l: usize, m: usize| match (l, m) {
         (0, 0) => 1.0,
         (1, 0) => cos,
@@ -179,7 +184,8 @@ fn off(picture: &Picture, exact: &[[f64; 3]]) -> f64 {
 
 #[test]
 fn five_hundred_gaussians_are_what_an_exact_compositor_makes_of_them() {
-    let (folder, all) = (tempfile::tempdir().unwrap(), some(500));
+    let folder = tempfile::tempdir().unwrap();
+    let all = some(500);
     write(&folder.path().join("g.ply"), &all);
     // As the file says, y down; and turned, scaled and moved, where harmonics turn along.
     let down = DMat3::from_diagonal(DVec3::new(1.0, -1.0, -1.0));
@@ -207,7 +213,8 @@ fn five_hundred_gaussians_are_what_an_exact_compositor_makes_of_them() {
 
 #[test]
 fn neither_the_order_of_the_file_nor_threads_nor_a_shift_change_gaussians() {
-    let (folder, mut all) = (tempfile::tempdir().unwrap(), some(300));
+    let folder = tempfile::tempdir().unwrap();
+    let mut all = some(300);
     let path = folder.path().join("g.ply");
     write(&path, &all);
     let picture = draw_in(folder.path(), &scene(0, ""), &["--threads", "1"]);

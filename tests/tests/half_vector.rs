@@ -68,7 +68,8 @@ const MIXED: &str = "[ambient]\ncolor = [0.1, 0.1, 0.12]\n\
 
 #[test]
 fn threads_and_the_order_of_lights_change_no_bit() {
-    let (one, other) = (bright("[-0.4, -1, -0.6]"), bright("[0.3, -0.8, 0.7]"));
+    let one = bright("[-0.4, -1, -0.6]");
+    let other = bright("[0.3, -0.8, 0.7]");
     let scene = |lights: [&str; 2]| parallel_view(2.6, 40) + &lights.concat() + MIXED;
     let picture = in_half_vectors(&scene([&one, &other]), &["--threads", "1"]);
     let same = |with: &Picture| {
@@ -233,7 +234,8 @@ fn what_is_scattered_again_is_a_layer_of_its_own_and_sums_to_beauty() {
     let again = ["--set", "render.sheets.scattering='forward_and_back'"];
     let [once, many] = [in_half_vectors(&scene, &[]), in_half_vectors(&scene, &again)];
     let more = many.channel("scatterN.G");
-    let (mean, least) = (more.iter().sum::<f64>() / more.len() as f64, more.iter().copied().fold(0.0, f64::min));
+    let mean = more.iter().sum::<f64>() / more.len() as f64;
+    let least = more.iter().copied().fold(0.0, f64::min);
     assert!(mean > 0.005 && least >= 0.0, "mean {mean}, least {least}");
     for layer in ["scatter1.G", "direct.G", "ambient.G", "A", "shadow.A"] {
         assert_eq!(once.channel(layer), many.channel(layer), "{layer}");
@@ -275,7 +277,8 @@ fn what_points_are_judged_by_is_known_of_scenes_that_make_no_splats_for_sheets()
     let text = parallel_view(2.0, 16) + &sun("[-0.4, -1, -0.6]") + &fog(1.0);
     let load = scene::LoadOptions { overrides, ..Default::default() };
     let scene = scene::parse(Path::new("s.toml"), text.as_bytes(), &load).unwrap();
-    let (options, progress) = (RenderOptions::default(), Progress::new());
+    let options = RenderOptions::default();
+    let progress = Progress::new();
     let mut renderer = accuracy::Renderer::new(&options, &progress);
     let points = renderer.facts(&accuracy::in_points(&scene)).unwrap();
     assert!(points.slice_thickness.is_some() && points.cells.is_some(), "{points:?}");
@@ -310,7 +313,8 @@ fn a_cube_of_translucent_triangles_agrees_with_points_and_stays_discs_for_a_foot
     let points = organza_tests::draw_in(folder.path(), &(scene.clone() + fine), &smooth);
     let half = organza_tests::draw_in(folder.path(), &scene, &[&HALF[..], &smooth].concat());
     for channel in ["R", "G", "B", "A"] {
-        let (a, b) = (points.channel(channel), half.channel(channel));
+        let a = points.channel(channel);
+        let b = half.channel(channel);
         let mean = a.iter().sum::<f64>() / a.len() as f64;
         println!("{channel}: RMSE {:.5} of {mean:.4}", rmse(&a, &b));
         assert!(rmse(&a, &b) < 0.01 && mean > 0.1, "{channel}: RMSE {} of {mean}", rmse(&a, &b));
@@ -351,7 +355,8 @@ mod deep {
         let overrides = overrides.map(|o| scene::Override::parse(o).unwrap()).to_vec();
         let load = scene::LoadOptions { overrides, ..Default::default() };
         let scene = scene::parse(Path::new("s.toml"), text.as_bytes(), &load).unwrap();
-        let (options, progress) = (RenderOptions::default(), Progress::new());
+        let options = RenderOptions::default();
+        let progress = Progress::new();
         let size = scene.camera.size.map(|s| s as usize);
         let squares = |image: &dyn Fn(usize) -> f64| {
             let across = size[0] / SIDE;
@@ -373,7 +378,8 @@ mod deep {
     fn translucent_surfaces_volumes_and_raw_points_shadow_each_other_as_by_points() {
         // A sphere of dust, a veil and a ball of glass about two volumes and two walls.
         let dust = (0..4000).map(|i| {
-            let (z, turn) = (1.0 - (f64::from(i) + 0.5) / 2000.0, 2.399_963 * f64::from(i));
+            let z = 1.0 - (f64::from(i) + 0.5) / 2000.0;
+            let turn = 2.399_963 * f64::from(i);
             let ring = (1.0 - z * z).sqrt() * 0.4;
             format!("{} {} {}\n", ring * turn.cos() - 0.7, ring * turn.sin() + 0.75, 0.4 * z + 0.2)
         });
@@ -395,7 +401,8 @@ mod deep {
             let finer = finer(&scene).replace("-0.5], spacing = 0.03", "-0.5], spacing = 0.004");
             let [points, half] = [drawn(&finer, &["--technique", "points"]), drawn(&scene, &HALF)];
             for channel in ["R", "G", "B", "A", "scatter1.R", "direct.G"] {
-                let (a, b) = (points.channel(channel), half.channel(channel));
+                let a = points.channel(channel);
+                let b = half.channel(channel);
                 let mean = a.iter().sum::<f64>() / a.len() as f64;
                 println!("{channel}: RMSE {:.5} of {mean:.4}", rmse(&a, &b));
                 assert!(rmse(&a, &b) < 0.01 && mean > 0.01, "{channel}: RMSE {} of {mean}", rmse(&a, &b));
@@ -465,7 +472,8 @@ mod deep {
         let [points, soft] = [in_half_vectors(&scene, &[]), in_half_vectors(&scene, &ONE_SWEEP)];
         // The layer `shadow` is of one sweep: of one point, or of all.
         for channel in ["R", "G", "A", "scatter1.R", "direct.R"] {
-            let (a, b) = (points.channel(channel), soft.channel(channel));
+            let a = points.channel(channel);
+            let b = soft.channel(channel);
             let mean = a.iter().sum::<f64>() / a.len() as f64;
             println!("{channel}: RMSE {:.5} of {mean:.4}", rmse(&a, &b));
             assert!(rmse(&a, &b) < 0.01, "{channel}: RMSE {}", rmse(&a, &b));
@@ -501,7 +509,8 @@ mod deep {
             let mut errors = Vec::new();
             for scattering in ["once", "forward", "forward_and_back"] {
                 let (seen, exact, noise) = beside_truth(&text, scattering);
-                let (error, share) = (rmse(&seen, &exact), mean(&seen) / mean(&exact));
+                let error = rmse(&seen, &exact);
+                let share = mean(&seen) / mean(&exact);
                 println!(
                     "{name}, {scattering}: {share:.3} of the light, RMSE {error:.4} ± {noise:.4}, mean {:.4}",
                     mean(&exact)
@@ -527,7 +536,8 @@ mod deep {
             let [view, half] =
                 [draw(&finer(&scene), &[&HALF[..2], &SMOOTH].concat()), in_half_vectors(&scene, &SMOOTH)];
             for channel in ["R", "G", "A", "scatter1.R", "direct.R", "shadow.A"] {
-                let (a, b) = (view.channel(channel), half.channel(channel));
+                let a = view.channel(channel);
+                let b = half.channel(channel);
                 let mean = a.iter().sum::<f64>() / a.len() as f64;
                 println!("{channel}: RMSE {:.5} of {mean:.4}", rmse(&a, &b));
                 assert!(rmse(&a, &b) < 0.01, "{channel}: RMSE {}", rmse(&a, &b));

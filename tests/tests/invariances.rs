@@ -150,7 +150,8 @@ fn ou1_one_pixel_is_the_mean_of_a_fine_picture() {
     let of = |keys: &str| draw(&scene(1.0, 0.0, false).replace("size = [80, 60]\n[render]\nantialias = 2", keys), &[]);
     let [one, fine] = ["size = [1, 1]\n[render]\nantialias = 8", "size = [8, 8]\n[render]\nantialias = 1"].map(of);
     for name in ["R", "G", "B", "A"] {
-        let (one, fine) = (one.channel(name), fine.channel(name));
+        let one = one.channel(name);
+        let fine = fine.channel(name);
         let mean = fine.iter().sum::<f64>() / 64.0;
         assert!(one.len() == 1 && mean > 0.01 && (one[0] / mean - 1.0).abs() < 0.01, "{name}: {one:?}, not {mean}");
     }

@@ -125,7 +125,8 @@ fn a_cut_cube_is_closed_where_it_is_cut_and_an_open_one_is_told() {
         let picture = draw_in(place.folder(), &scene(file), &["--layers", "depth"]);
         window(&picture.channel("depth.first.Z"), 64, 20..44, 20..44)
     };
-    let (lid, floor) = (depth("cube.obj"), depth("open.obj"));
+    let lid = depth("cube.obj");
+    let floor = depth("open.obj");
     let [nearest, farthest] = [lid[0], floor[0]];
     assert!(lid.iter().all(|z| (z - nearest).abs() < 1e-4), "{lid:?}");
     // The lid is 0.7 before the face that is seen through the open cube.

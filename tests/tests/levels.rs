@@ -34,7 +34,8 @@ fn scene() -> String {
     let mut text = parallel_view(4.0, 64) + "[material.plain]\nshading = 'unlit'\n";
     for (row, color) in COLORS.iter().enumerate() {
         for (column, opacity) in OPACITIES.iter().enumerate() {
-            let (x, y) = (column as f64 - 1.0, 1.5 - row as f64);
+            let x = column as f64 - 1.0;
+            let y = 1.5 - row as f64;
             let place = format!("transform = {{ translate = [{x:?}, {y:?}, 0] }}\n");
             let source = match row {
                 0 => format!("mesh = 'square.obj'\nspacing = 0.03\nopacity = {opacity}\n{place}"),
@@ -76,12 +77,14 @@ fn three_levels_of_translucency_of_four_kinds_of_data_have_their_opacities_and_c
         let channels = ["A", "R", "G", "B"].map(|name| picture.channel(name));
         for (row, column) in (0..4).flat_map(|row| (0..3).map(move |column| (row, column))) {
             // 16 pixels a unit; the middle 6 of each object.
-            let (x, y) = (16 * column + 13, 16 * row + 5);
+            let x = 16 * column + 13;
+            let y = 16 * row + 5;
             let means = channels.each_ref().map(|channel| {
                 let seen = window(channel, 64, x..x + 6, y..y + 6);
                 seen.iter().sum::<f64>() / seen.len() as f64
             });
-            let (opacity, [red, green, blue]) = (OPACITIES[column as usize], COLORS[row as usize]);
+            let opacity = OPACITIES[column as usize];
+            let [red, green, blue] = COLORS[row as usize];
             for (found, expected) in means.into_iter().zip([1.0, red, green, blue].map(|c| c * opacity)) {
                 let what = format!("{arguments:?}, row {row}, column {column}: {means:?}");
                 assert!((found - expected).abs() < tolerance, "{what}, expected {expected}");

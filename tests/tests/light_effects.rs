@@ -115,7 +115,8 @@ pub(crate) fn settings(list: &[&str]) -> Vec<String> {
 /// A lamp that grows, beside a brighter one that lights another part of the ground.
 #[track_caller]
 fn a_lamp_crosses_its_threshold(list: &[&str], from: f64) {
-    let (with, without) = (scene(FILL, ""), scene("", ""));
+    let with = scene(FILL, "");
+    let without = scene("", "");
     let key = "light.fill.intensity=[SIZE, SIZE, SIZE]";
     let crossed =
         crosses_its_threshold(&with, "light.fill", key, &sizes(from, 300.0 * from), &settings(list), Some(&without));

@@ -50,7 +50,8 @@ impl Object {
 
     /// The object in a scene file with its middle at (0, `y`, `z`), its data written into `folder`.
     fn source(self, folder: &Path, [y, z]: [f64; 2]) -> String {
-        let (shape, h) = (self.shape, self.spacing());
+        let shape = self.shape;
+        let h = self.spacing();
         let bounds = format!("box = [[-1, -1, -1], [1, 1, 1]], spacing = {h:?}");
         let place = format!("[[object]]\nname = 'it'\ntransform = {{ up = 'y', translate = [0, {y:?}, {z:?}] }}\n");
         place
@@ -127,7 +128,8 @@ impl Object {
         let scene = parallel_view(HEIGHT, self.size)
             + "[background]\ncolor = [1, 1, 1]\n"
             + &self.source(folder.path(), [0.0, 0.0]);
-        let (sets, seed) = (format!("render.particles.repeat_level={SETS}"), seed.to_string());
+        let sets = format!("render.particles.repeat_level={SETS}");
+        let seed = seed.to_string();
         let picture = draw_in(
             folder.path(),
             &scene,
@@ -156,9 +158,11 @@ fn rmse(a: &[f64], b: &[f64]) -> f64 {
 
 /// Means over the pixels of each square of the coarsest picture.
 fn squares(image: &[f64], size: u32) -> Vec<f64> {
-    let (n, side) = (SIZES[0], size / SIZES[0]);
+    let n = SIZES[0];
+    let side = size / SIZES[0];
     let square = |k: u32| {
-        let (x, y) = (k % n * side, k / n * side);
+        let x = k % n * side;
+        let y = k / n * side;
         window(image, size, x..x + side, y..y + side).iter().sum::<f64>() / f64::from(side * side)
     };
     (0..n * n).map(square).collect()
@@ -262,7 +266,8 @@ fn compare_sheets(shape: Shape, forms: &[Form], solid: bool) {
 
 /// Deviation from the transmittance of two crossings in pixels that have nothing else around them, out to 4 pixels.
 fn ripple(image: &[f64], exact: &[f64], size: u32) -> f64 {
-    let (n, two) = (size as usize, (1.0 - OPACITY).powi(2));
+    let n = size as usize;
+    let two = (1.0 - OPACITY).powi(2);
     let near = |c: usize| c.saturating_sub(4)..(c + 5).min(n);
     let inside = |k: &usize| near(k / n).all(|y| near(k % n).all(|x| (exact[y * n + x] - two).abs() < 1e-9));
     let pixels: Vec<usize> = (0..n * n).filter(inside).collect();
@@ -282,7 +287,8 @@ fn compare_surfels(shape: Shape) {
     let (particles, variance) = object(Form::Points, size).squares_of_particles(3);
     let noise = variance.iter().sum::<f64>() / variance.len() as f64;
     for (k, form) in SHELLS.into_iter().enumerate() {
-        let (image, [surfels, points]) = (&in_squares[k], &images[k]);
+        let image = &in_squares[k];
+        let [surfels, points] = &images[k];
         let [coarse] = object(form, SIZES[0]).seen_by(["surfels"]).map(|image| rmse(&image, &coarse_exact));
         let error = rmse(image, &squares(&exact, size));
         let by_points = rmse(image, &squares(points, size));
@@ -321,7 +327,8 @@ fn a_tenth_less_extinction_is_told_apart_from_particles() {
 #[test]
 fn another_object_is_told_apart() {
     let image = |shape| squares(&Object { shape, form: Form::Density, size: SIZES[0] }.seen(), SIZES[0]);
-    let (ball, gyroid) = (image(Shape::Ball), image(Shape::Gyroid));
+    let ball = image(Shape::Ball);
+    let gyroid = image(Shape::Gyroid);
     assert!(rmse(&ball, &gyroid) > 0.1);
     let thinner: Vec<f64> = ball.iter().map(|t| t.powf(0.9)).collect();
     assert!(rmse(&ball, &thinner) > 0.01, "a tenth less extinction is told apart");

@@ -205,7 +205,8 @@ fn a_puff_of_random_points_looks_alike_by_every_technique() {
     for (technique, mean_off, channels) in [("points", 2e-3, &["R", "A"][..]), ("particles", 2e-2, &["A"])] {
         let picture = drawn(technique);
         for channel in channels {
-            let (a, b) = (picture.channel(channel), exact.channel(channel));
+            let a = picture.channel(channel);
+            let b = exact.channel(channel);
             let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
             assert!((mean(&a) / mean(&b) - 1.0).abs() < mean_off, "{technique} {channel}: {} {}", mean(&a), mean(&b));
         }

@@ -58,7 +58,8 @@ fn shadow_maps_of_many_lights_are_counted_together() {
         |n: i32| (0..n).map(light).collect::<String>() + "[render]\ntechnique = \"points\"\nshadow = { cells = 128 }\n";
     let place = Place::new(&format!("{}{}", fog(0.25), lights(1)));
     place.write("many.toml", format!("{}{}", fog(0.25), lights(31)));
-    let (few, many) = (explained(place.folder(), "s.toml", &[]), explained(place.folder(), "many.toml", &[]));
+    let few = explained(place.folder(), "s.toml", &[]);
+    let many = explained(place.folder(), "many.toml", &[]);
     assert!(many > few + 100_000_000, "{few}, {many}");
     stays_within(place.folder(), "many.toml", &[]);
     // Each would fit; together they do not, and that is known before any is built.
@@ -142,7 +143,8 @@ mod deep {
                 std::fs::remove_file(place.path(&name)).unwrap();
                 peak.resident
             };
-            let (few, many) = (peak(100), peak(9900));
+            let few = peak(100);
+            let many = peak(9900);
             let each = many.saturating_sub(few) / 9800;
             println!("{technique}: {each} bytes a frame");
             assert!(each < 1024, "{technique}: {each} bytes a frame");

@@ -37,18 +37,22 @@ fn ply(mesh: &Mesh) -> String {
 
 /// A torus: its own hole is a silhouette before its far side.
 fn torus() -> Mesh {
-    let (n, m) = (48u32, 24u32);
+    let n = 48u32;
+    let m = 24u32;
     let mut mesh = Mesh::default();
     for i in 0..n * m {
-        let (a, b) =
-            ((i / m) as f32 / n as f32 * std::f32::consts::TAU, (i % m) as f32 / m as f32 * std::f32::consts::TAU);
+        let a = (i / m) as f32 / n as f32 * std::f32::consts::TAU;
+        let b = (i % m) as f32 / m as f32 * std::f32::consts::TAU;
         let out = Vec3::new(a.cos(), 0.3 * a.sin(), a.sin()).normalize();
         mesh.position.push(Vec3::new(a.cos(), 0.3 * a.sin(), a.sin()) + (out * b.cos() + Vec3::Y * b.sin()) * 0.4);
     }
     for i in 0..n {
         for j in 0..m {
             let at = |i: u32, j: u32| i % n * m + j % m;
-            let (a, b, c, d) = (at(i, j), at(i, j + 1), at(i + 1, j + 1), at(i + 1, j));
+            let a = at(i, j);
+            let b = at(i, j + 1);
+            let c = at(i + 1, j + 1);
+            let d = at(i + 1, j);
             mesh.triangles.extend([[a, b, c], [a, c, d]]);
         }
     }
@@ -113,10 +117,12 @@ mod deep {
         let scan = bunny();
         let (low, high) =
             scan.position.iter().fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(l, h), p| (l.min(*p), h.max(*p)));
-        let (middle, reach) = (0.5 * (low + high).as_dvec3(), 0.5 * f64::from((high - low).max_element()));
+        let middle = 0.5 * (low + high).as_dvec3();
+        let reach = 0.5 * f64::from((high - low).max_element());
         for material in ["opacity = 1.0", "opacity = 0.4"] {
             let same = |a: &Mesh, b: &Mesh, center: DVec3, radius: f64| {
-                let (a, b) = (draw(a, center, radius, material), draw(b, center, radius, material));
+                let a = draw(a, center, radius, material);
+                let b = draw(b, center, radius, material);
                 let worst = ["R", "G", "B", "A"].map(|c| largest_difference(&a.channel(c), &b.channel(c)));
                 assert!(worst.iter().all(|w| *w < 1.0 / 255.0), "{material}: {worst:?}");
                 assert!(a.opacity().iter().sum::<f64>() > 500.0);

@@ -58,7 +58,8 @@ fn x7_what_was_skipped_changes_no_pixel_by_more_than_the_tolerance() {
     let thin = scene("casts_shadow = false", "", "").replace("extinction = 2.0", "extinction = 0.000005");
     let tight = thin.clone() + "[render]\ntolerance = 1e-12\n";
     assert!(!ran(&thin, "tsm build") && ran(&tight, "tsm build"));
-    let (without, with) = (draw(&thin, &[]), draw(&tight, &[]));
+    let without = draw(&thin, &[]);
+    let with = draw(&tight, &[]);
     for channel in ["R", "G", "B"] {
         let change = largest_difference(&without.channel(channel), &with.channel(channel));
         assert!(change > 0.0 && change < 1.0 / 255.0, "{channel}: {change:e}");

@@ -265,7 +265,8 @@ fn one_file_by_links_and_hard_links_is_refused() {
 fn a_link_goes_on_pointing_where_it_does() {
     let folder = tempfile::tempdir().unwrap();
     let elsewhere = tempfile::tempdir().unwrap();
-    let (real, link) = (elsewhere.path().join("real.exr"), folder.path().join("link.exr"));
+    let real = elsewhere.path().join("real.exr");
+    let link = folder.path().join("link.exr");
     fs::write(&real, "old").unwrap();
     std::os::unix::fs::symlink(&real, &link).unwrap();
     replace(&link, b"new").unwrap();

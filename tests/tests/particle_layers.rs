@@ -78,7 +78,8 @@ fn what_no_particle_hits_has_the_depth_and_the_object_of_the_wall() {
     let half = "rectangle = { center = [-1, 0, 0], u = [1, 0, 0], v = [0, 1, 0], spacing = 0.025 }";
     let text = view("") + &plane(half, "half", 0.5, 0.7, "") + WALL;
     let picture = particles(folder.path(), &text, 64, "depth,object");
-    let (first, object) = (picture.channel("depth.first.Z"), picture.channel("object.id"));
+    let first = picture.channel("depth.first.Z");
+    let object = picture.channel("object.id");
     let expected = |k: usize| if k % 32 < 16 { (4.5, 0.0) } else { (7.0, 1.0) };
     assert!((0..first.len()).all(|k| (first[k] - expected(k).0).abs() < 1e-4 && object[k] == expected(k).1));
     let points = draw_in(folder.path(), &text, &["--technique", "points", "--layers", "object"]);
@@ -229,7 +230,8 @@ fn frames_of_kept_sets_have_layers_and_the_same_bits_for_any_threads() {
         assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
         [0, 1].map(|k| std::fs::read(folder.path().join(format!("{name}.000{k}.exr"))).unwrap())
     };
-    let (one, three) = (run("a", "1"), run("b", "3"));
+    let one = run("a", "1");
+    let three = run("b", "3");
     assert!(one == three && one[0] != one[1]);
 }
 
@@ -284,12 +286,15 @@ mod deep {
     /// The four depths of a medium whose extinction along a ray is given, each with the standard error of `levels` sets.
     fn depths_of(from: f64, to: f64, levels: u32, extinction: &dyn Fn(f64) -> f64) -> [[f64; 2]; 4] {
         const STEPS: usize = 200_000;
-        let (step, all) = ((to - from) / STEPS as f64, f64::from(levels));
-        let (mut tau, mut moments) = (0.0f64, [0.0; 5]);
+        let step = (to - from) / STEPS as f64;
+        let all = f64::from(levels);
+        let mut tau = 0.0f64;
+        let mut moments = [0.0; 5];
         let mut found = [[f64::INFINITY, 0.0]; 4];
         for i in 0..STEPS {
             let z = from + step * (i as f64 + 0.5);
-            let (before, sigma) = (-(-tau).exp_m1(), extinction(z));
+            let before = -(-tau).exp_m1();
+            let sigma = extinction(z);
             tau += sigma * step;
             let after = -(-tau).exp_m1();
             let density = sigma * (-tau).exp();
@@ -302,7 +307,9 @@ mod deep {
             (0..5).for_each(|k| moments[k] += (after - before) * (z - from).powi(k as i32));
         }
         let m = moments.map(|m| m / moments[0]);
-        let (mean, variance, n) = (m[1], m[2] - m[1] * m[1], moments[0] * all);
+        let mean = m[1];
+        let variance = m[2] - m[1] * m[1];
+        let n = moments[0] * all;
         let fourth = m[4] - 4.0 * m[3] * mean + 6.0 * m[2] * mean * mean - 3.0 * mean.powi(4);
         found[2] = [from + mean, (variance / n).sqrt()];
         found[3] = [variance.sqrt(), ((fourth - variance * variance) / (4.0 * variance * n)).sqrt()];
@@ -319,9 +326,11 @@ mod deep {
             let error = middle(&picture, "std_error.A");
             assert!(error.iter().all(|e| *e > 1e-4), "noise everywhere");
             for (c, weight) in [("R", 0.2126), ("G", 0.7152), ("B", 0.0722)] {
-                let (found, exact) = (middle(&picture, c), middle(&points, c));
+                let found = middle(&picture, c);
+                let exact = middle(&points, c);
                 let mean = |v: &[f64]| v.iter().sum::<f64>() / v.len() as f64;
-                let (a, b) = (mean(&found), mean(&exact));
+                let a = mean(&found);
+                let b = mean(&exact);
                 let spread = found.iter().map(|v| (v - a).powi(2)).sum::<f64>() / (found.len() as f64).powi(2);
                 // Splats are lit by their centres and blur the fog's shadow: 0.5 % beside the noise.
                 let allowed = LIMIT * spread.sqrt() + 0.005 * b;
@@ -348,7 +357,9 @@ mod deep {
                     weights.iter().zip(at).map(|(w, z)| w / total * (z - around).powi(p)).sum::<f64>()
                 };
                 let mean = moment(1, 0.0);
-                let (variance, fourth, n) = (moment(2, mean), moment(4, mean), total * f64::from(LEVELS));
+                let variance = moment(2, mean);
+                let fourth = moment(4, mean);
+                let n = total * f64::from(LEVELS);
                 let median = if wall {
                     7.0
                 } else if a > 0.5 {

@@ -22,7 +22,8 @@ fn scene(order: [usize; 3]) -> String {
 }
 
 fn particles(scene: &str, levels: u32, seed: u32, layers: &str) -> Picture {
-    let (levels, seed) = (format!("render.particles.repeat_level={levels}"), seed.to_string());
+    let levels = format!("render.particles.repeat_level={levels}");
+    let seed = seed.to_string();
     draw(scene, &["--technique", "particles", "--set", &levels, "--seed", &seed, "--layers", layers])
 }
 
@@ -36,7 +37,8 @@ fn smooth_and_noisy(exact: &[f64], error: &[f64]) -> Vec<usize> {
     let n = SIZE as usize;
     let calm = |k: &usize| {
         let around = [(0, 1), (2, 1), (1, 0), (1, 2), (0, 0), (2, 2), (0, 2), (2, 0)];
-        let (x, y) = (k % n, k / n);
+        let x = k % n;
+        let y = k / n;
         let inside = x > 0 && y > 0 && x + 1 < n && y + 1 < n;
         let mean = || around.iter().map(|(i, j)| exact[(y + j - 1) * n + x + i - 1]).sum::<f64>() / 8.0;
         inside && (mean() - exact[*k]).abs() < CALM
@@ -52,7 +54,8 @@ fn particles_differ_from_points_by_their_standard_error() {
     let text = scene([0, 1, 2]);
     let exact = luminance(&draw(&text, &["--technique", "points", "--set", "render.points.exact=true"]));
     let picture = particles(&text, 400, 1, "std_error");
-    let (found, error) = (luminance(&picture), picture.channel("std_error.A"));
+    let found = luminance(&picture);
+    let error = picture.channel("std_error.A");
     let noisy = smooth_and_noisy(&exact, &error);
     assert!(noisy.len() > 300, "{} pixels with particles", noisy.len());
     // What points composite by splat centres, particles mix by depth, so pixels at the cut may differ by more than noise.
@@ -146,7 +149,8 @@ fn data() -> tempfile::TempDir {
     (0..4).for_each(|f| mesh += &format!("f {} {} {}\n", 3 * f + 1, 3 * f + 2, 3 * f + 3));
     std::fs::write(folder.path().join("tetrahedron.obj"), mesh).unwrap();
     let turn = |i: i32| {
-        let (y, a) = (1.0 - 2.0 * (f64::from(i) + 0.5) / 3000.0, f64::from(i) * 2.399_963);
+        let y = 1.0 - 2.0 * (f64::from(i) + 0.5) / 3000.0;
+        let a = f64::from(i) * 2.399_963;
         let n = [a.cos() * (1.0 - y * y).sqrt(), y, a.sin() * (1.0 - y * y).sqrt()];
         format!("{} {} {} {} {} {}\n", 0.6 * n[0], 0.6 * n[1], 0.6 * n[2], n[0], n[1], n[2])
     };
@@ -192,7 +196,8 @@ fn a_volume_is_the_same_cell_by_cell_and_by_metropolis_chains_cut_or_whole() {
     let clip = "clip = [{ normal = [0, 1, 1], point = [0, 0, 0.1] }]\n";
     for (object, more) in [(object.to_owned(), true), (format!("{object}{clip}"), false)] {
         let by = |by: &str| sampled(folder.path(), &object, 48, &format!("volume_sampler = {by}"));
-        let (cells, chains) = (by("'cells'"), by("'metropolis'"));
+        let cells = by("'cells'");
+        let chains = by("'metropolis'");
         let [n, square, mean] = apart(&cells, &chains);
         assert!(n > 300.0 && (0.8..1.2).contains(&square) && mean.abs() < 2e-3, "{n} {square} {mean}");
         // One step from particle to particle takes places twice, and starts of chains are more of it: that is seen.
@@ -226,7 +231,8 @@ fn a_trilinear_isosurface_by_marching_cubes_is_the_surface_that_lines_meet() {
     let by = |by: &str, more: &str| {
         sampled(folder.path(), &format!("{object}{more}"), 24, &format!("surface_sampler = '{by}'"))
     };
-    let (cubes, lines) = (by("triangles", ""), by("auto", ""));
+    let cubes = by("triangles", "");
+    let lines = by("auto", "");
     // Of so few sets the error is itself uncertain: random lines say by how much.
     let [_, expected, _] = apart(&by("lines", ""), &lines);
     let [n, square, mean] = apart(&cubes, &lines);
@@ -376,8 +382,10 @@ fn x1_particles_have_one_sha_for_any_threads_and_another_for_another_seed() {
 #[test]
 fn swapped_objects_change_nothing_beyond_noise() {
     let [a, b] = [[0, 1, 2], [2, 1, 0]].map(|order| particles(&scene(order), 400, 1, "std_error"));
-    let (ea, eb) = (a.channel("std_error.A"), b.channel("std_error.A"));
-    let (la, lb) = (luminance(&a), luminance(&b));
+    let ea = a.channel("std_error.A");
+    let eb = b.channel("std_error.A");
+    let la = luminance(&a);
+    let lb = luminance(&b);
     let noisy: Vec<usize> = (0..la.len()).filter(|&k| ea[k] > 1e-6).collect();
     let square = |&k: &usize| (la[k] - lb[k]).powi(2) / (ea[k] * ea[k] + eb[k] * eb[k]);
     let mean = noisy.iter().map(square).sum::<f64>() / noisy.len() as f64;
@@ -407,7 +415,8 @@ fn bs09_an_empty_scene_is_the_background_and_opaque_things_have_no_noise() {
         assert!(picture.channel(channel).iter().all(|v| *v == value), "{channel}");
     }
     let wall = scene([2, 2, 2]).replacen("'wall'", "'a'", 1).replacen("'wall'", "'b'", 1);
-    let (solid, points) = (draw(&wall, &["--technique", "particles"]), draw(&wall, &[]));
+    let solid = draw(&wall, &["--technique", "particles"]);
+    let points = draw(&wall, &[]);
     // Nobody asked for the error.
     assert_eq!(solid.names(), ["A", "B", "G", "R", "opacity.A"]);
     assert_eq!(solid, points);
@@ -454,7 +463,8 @@ mod deep {
         let arguments =
             ["--technique", "particles", "--set", "render.particles.repeat_level=144", "--layers", "std_error"];
         let picture = draw_in(folder, text, &arguments);
-        let (found, error) = (luminance(&picture), picture.channel("std_error.A"));
+        let found = luminance(&picture);
+        let error = picture.channel("std_error.A");
         let noisy = smooth_and_noisy(&exact, &error);
         assert!(noisy.len() > 80, "{} pixels with particles", noisy.len());
         let mean_square = noisy.iter().map(|&k| ((found[k] - exact[k]) / error[k]).powi(2)).sum::<f64>();

@@ -12,7 +12,8 @@ const HEAD: &str = "version = 1\n[camera]\nposition = [0.3, 0.2, 4]\ntarget = [0
 fn place(columns: &str) -> Place {
     let mut text = format!("x,y,z,{columns}\n");
     for i in 0..400 {
-        let (x, y) = (f64::from(i % 20) * 0.1 - 1.0, f64::from(i / 20) * 0.1 - 1.0);
+        let x = f64::from(i % 20) * 0.1 - 1.0;
+        let y = f64::from(i / 20) * 0.1 - 1.0;
         writeln!(text, "{x:.2},{y:.2},0,{},{}", u8::from(x + y > 0.05), i % 20 + 2 * (i / 20)).unwrap();
     }
     let place = Place::new(&format!("{HEAD}points = 'wall.csv'\nmaterials = ['glass', 'clay']\n"));

@@ -94,7 +94,8 @@ fn what_does_not_use_opacities_says_so_and_what_is_none_is_refused() {
     };
     let mut ball = "x,y,z,nx,ny,nz,opacity\n".to_owned();
     for (i, j) in (1..12).flat_map(|i| (0..24).map(move |j| (i, j))) {
-        let (theta, phi) = (std::f64::consts::PI * f64::from(i) / 12.0, std::f64::consts::PI * f64::from(j) / 12.0);
+        let theta = std::f64::consts::PI * f64::from(i) / 12.0;
+        let phi = std::f64::consts::PI * f64::from(j) / 12.0;
         let [x, y, z] = [theta.sin() * phi.cos(), theta.cos(), theta.sin() * phi.sin()];
         writeln!(ball, "{x},{y},{z},{x},{y},{z},0.5").unwrap();
     }

@@ -55,12 +55,14 @@ fn scene(corners: &[DVec3], triangles: &[[usize; 3]], more: &str) -> (TempDir, S
 /// Whether a triangle lies between a place and the light, beyond what rounds the place.
 fn hides(corners: [DVec3; 3], place: DVec3) -> bool {
     let [a, b, c] = corners;
-    let (along, across) = (b - a, c - a);
+    let along = b - a;
+    let across = c - a;
     let normal = along.cross(across);
     let steep = TO_LIGHT.dot(normal);
     let way = (a - place).dot(normal) / steep;
     let at = place + TO_LIGHT * way - a;
-    let (u, v) = (at.cross(across).dot(normal), along.cross(at).dot(normal));
+    let u = at.cross(across).dot(normal);
+    let v = along.cross(at).dot(normal);
     steep != 0.0 && way > 1e-5 && u >= 0.0 && v >= 0.0 && u + v <= normal.length_squared()
 }
 
@@ -76,7 +78,8 @@ fn lit(corners: &[DVec3], triangles: &[[usize; 3]], depths: &[f64]) -> Vec<bool>
 
 #[test]
 fn triangles_shadow_each_other_as_rays_to_the_light_have_it() {
-    let (corners, triangles) = (corners(), triangles());
+    let corners = corners();
+    let triangles = triangles();
     let (folder, scene) = scene(&corners, &triangles, "");
     let unshadowed = draw_in(folder.path(), &scene, &["--set", "light.0.shadow=false"]);
     let direct = unshadowed.channel("direct.G");

@@ -68,7 +68,8 @@ fn what_shadows_each_other_looks_as_by_points() {
     let scene = parallel_view(2.4, 64) + MIXED;
     let [points, sheets] = ["points", "sheets"].map(|t| draw_in(folder.path(), &scene, &["--technique", t]));
     for channel in ["R", "G", "B", "A", "direct.R", "shadow.A"] {
-        let (a, b) = (points.channel(channel), sheets.channel(channel));
+        let a = points.channel(channel);
+        let b = sheets.channel(channel);
         let square = a.iter().zip(&b).map(|(a, b)| (a - b).powi(2)).sum::<f64>() / a.len() as f64;
         let mean = a.iter().sum::<f64>() / a.len() as f64;
         println!("{channel}: RMSE {:.5}, mean {mean:.4}", square.sqrt());
@@ -153,7 +154,9 @@ fn volume(folder: &std::path::Path) -> String {
         .to_owned();
     for n in 0..34 * 34 * 34 {
         let at = |i: i32| 0.0588235294 * f64::from(i) - 0.970588235;
-        let (x, y, z) = (at(n % 34), at(n / 34 % 34), at(n / (34 * 34)));
+        let x = at(n % 34);
+        let y = at(n / 34 % 34);
+        let z = at(n / (34 * 34));
         let value = 0.5 + 0.2 * ((7.0 * x).sin() * (5.0 * y).cos() + (6.0 * z + 3.0 * x).sin());
         grid += &format!("{value:.6}\n");
     }
@@ -172,9 +175,11 @@ fn a_volume_on_a_body_centred_lattice_shows_the_same() {
     let turn = ["--set", "object.it.transform.rotate=[20, 30, 0]"];
     let bcc = ["--set", "object.it.lattice='bcc'"];
     let drawn = |arguments: &[&str]| draw_in(folder.path(), &scene, &[&turn, arguments].concat());
-    let (cartesian, body_centred) = (drawn(&[]), drawn(&bcc));
+    let cartesian = drawn(&[]);
+    let body_centred = drawn(&bcc);
     for channel in ["R", "G", "B", "A"] {
-        let (a, b) = (cartesian.channel(channel), body_centred.channel(channel));
+        let a = cartesian.channel(channel);
+        let b = body_centred.channel(channel);
         let square = a.iter().zip(&b).map(|(a, b)| (a - b).powi(2)).sum::<f64>() / a.len() as f64;
         println!("{channel}: RMSE {:.5}", square.sqrt());
         assert!(square.sqrt() < 0.005 && a != b, "{channel}: RMSE {}", square.sqrt());
@@ -199,7 +204,8 @@ fn what_the_older_methods_and_body_centred_lattices_do_not_draw_is_refused_by_na
         assert!(said.contains(words), "{set:?}: {said}");
         assert!(!folder.path().join("a.exr").exists());
     };
-    let (bcc, axis) = ("object.it.lattice='bcc'", "render.sheets.aligned='axis'");
+    let bcc = "object.it.lattice='bcc'";
+    let axis = "render.sheets.aligned='axis'";
     let half = "render.sheets.slicing='half_vector'";
     refused(&[bcc, "render.technique='points'"], 2, "the technique `points` draws no body-centred lattice");
     refused(&["object.fog.lattice='bcc'"], 2, "`lattice` belongs to a `volume`");

@@ -49,7 +49,8 @@ impl View {
         let right = forward.cross(DVec3::Y).normalize();
         let up = right.cross(forward);
         let place = |v: usize| (v as f64 + 0.5) / SIZE as f64 - 0.5;
-        let (x, y) = (place(k % SIZE), -place(k / SIZE));
+        let x = place(k % SIZE);
+        let y = -place(k / SIZE);
         let (from, along) = match self.fov {
             Some(fov) => {
                 let height = 2.0 * (0.5 * fov.to_radians()).tan();
@@ -125,7 +126,8 @@ fn depths_of_a_slanted_slab_are_its_closed_form() {
 fn depths_of_a_slanted_slab_by_particles_are_its_closed_form() {
     const LEVELS: f64 = 400.0;
     // Particles of a box are sampled from the box and not from splats: no kernel blurs its faces.
-    let (tau, spacing) = (1.5, SPACINGS[0]);
+    let tau = 1.5;
+    let spacing = SPACINGS[0];
     for towards in [STRAIGHT, DIAGONAL, GENERIC] {
         let view = View { towards, fov: None };
         let levels = LEVELS.to_string();

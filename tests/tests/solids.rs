@@ -20,7 +20,8 @@ fn scene(source: &str) -> String {
 #[test]
 fn solids_of_expressions_are_those_of_min_and_max_and_clips_cut_them_alike() {
     let folder = tempfile::tempdir().unwrap();
-    let (a, b) = ("sqrt((x - -0.25)^2 + y^2 + z^2) - 0.625", "sqrt((x - 0.5)^2 + y^2 + z^2) - 0.5");
+    let a = "sqrt((x - -0.25)^2 + y^2 + z^2) - 0.625";
+    let b = "sqrt((x - 0.5)^2 + y^2 + z^2) - 0.5";
     let parts = [ball(-0.25, 0.625), ball(0.5, 0.5)].join(", ");
     let clip = "clip = [{ normal = [0, 0, 1], point = [0, 0, 0.25] }]\n";
     let mut seen = Vec::new();

@@ -19,7 +19,9 @@ fn commands(page: &str) -> Vec<Vec<String>> {
 
 /// Words between blanks; quotes hold some together.
 fn words(line: &str) -> Vec<String> {
-    let (mut all, mut word, mut quoted) = (Vec::new(), String::new(), false);
+    let mut all = Vec::new();
+    let mut word = String::new();
+    let mut quoted = false;
     for c in line.chars() {
         match c {
             '\'' => quoted = !quoted,

@@ -90,7 +90,8 @@ fn effects_sum_to_beauty_beside_fog_and_threads_change_no_bit() {
 fn a_ball_in_fog_looks_as_by_points() {
     let [points, surfels] = ["points", "surfels"].map(|t| draw(&ball_in_fog(t, "points"), &[]));
     for channel in ["R", "G", "B", "A", "direct.R"] {
-        let (a, b) = (points.channel(channel), surfels.channel(channel));
+        let a = points.channel(channel);
+        let b = surfels.channel(channel);
         let square = a.iter().zip(&b).map(|(a, b)| (a - b).powi(2)).sum::<f64>() / a.len() as f64;
         println!("{channel}: RMSE {:.5}", square.sqrt());
         assert!(square.sqrt() < 0.01, "{channel}: RMSE {}", square.sqrt());
@@ -157,7 +158,8 @@ fn clear_glass_before_one_color_is_not_seen_and_its_effects_are() {
 #[test]
 fn glass_shows_opaque_surfaces_that_lie_out_of_view() {
     let wall = |k: usize| {
-        let (axis, side) = (k % 3, if k < 3 { 6 } else { -6 });
+        let axis = k % 3;
+        let side = if k < 3 { 6 } else { -6 };
         let along = |a: usize, v: i32| {
             let mut all = [0; 3];
             all[a] = v;

@@ -35,7 +35,8 @@ fn an_opaque_ball_ends_where_it_does_and_is_lit_up_to_there() {
         let [alpha, green, depth] = ["A", "G", "depth.first.Z"].map(|c| picture.channel(c));
         let nearest = depth.iter().copied().fold(f64::INFINITY, f64::min);
         for (k, [x, y]) in places().enumerate() {
-            let (radius, light) = (x.hypot(y), alpha[k]);
+            let radius = x.hypot(y);
+            let light = alpha[k];
             assert!(radius < 1.03 || light == 0.0, "{keys}: {light} at {radius}");
             assert!(radius > 0.97 || light == 1.0, "{keys}: {light} at {radius}");
             if radius < 0.97 {
@@ -64,7 +65,8 @@ fn what_other_techniques_draw_lies_before_and_behind_opaque_surfels() {
                medium_box = { min = [-2, -2, -0.5], max = [2, 2, 2], spacing = 0.1, extinction = 0.5 }\n";
     let [points, surfels] = ["points", "surfels"].map(|t| draw(&ball(&fog.replacen("points", t, 1)), &[]));
     for channel in ["R", "G", "B", "A"] {
-        let (a, b) = (points.channel(channel), surfels.channel(channel));
+        let a = points.channel(channel);
+        let b = surfels.channel(channel);
         let square = a.iter().zip(&b).map(|(a, b)| (a - b).powi(2)).sum::<f64>() / a.len() as f64;
         assert!(square.sqrt() < 0.01, "{channel}: RMSE {}", square.sqrt());
     }

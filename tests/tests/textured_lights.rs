@@ -47,7 +47,8 @@ fn drawn(folder: &Path, scene: &str, arguments: &[&str]) -> Picture {
 
 /// The pixels of a square of the picture, which four by four of them fill, without those at its border.
 fn inside(values: &[f64], [column, row]: [u32; 2]) -> Vec<f64> {
-    let (side, margin) = (SIZE / 4, 4);
+    let side = SIZE / 4;
+    let margin = 4;
     let along = |k: u32| k * side + margin..(k + 1) * side - margin;
     window(values, SIZE, along(column), along(row))
 }
@@ -91,9 +92,11 @@ fn a_checker_falls_where_projection_puts_it_in_every_technique() {
 /// What the red light of the spot, at a distance of 2, gives a square of the wall of opacity .6: ρ/π·I·cos θ/d² times the cone's share.
 fn mean_of_square([column, row]: [u32; 2]) -> f64 {
     let pixel = |k: u32, at: u32| -1.2 + 2.4 * (f64::from(k * SIZE / 4 + at) + 0.5) / f64::from(SIZE);
-    let (mut sum, mut count) = (0.0, 0.0);
+    let mut sum = 0.0;
+    let mut count = 0.0;
     for (x, y) in (4..8).flat_map(|x| (4..8).map(move |y| (x, y))) {
-        let (x, y) = (pixel(column, x), pixel(row, y));
+        let x = pixel(column, x);
+        let y = pixel(row, y);
         let d = (x * x + y * y + 4.0).sqrt();
         let cosine = 2.0 / d;
         let [low, high] = [45.0f64, 40.0].map(|angle| angle.to_radians().cos());
@@ -223,7 +226,8 @@ fn the_path_tracer_has_the_same_light() {
     let path = folder.path().join("scene.toml");
     std::fs::write(&path, text).unwrap();
     let scene = organza::scene::load(&path, &Default::default()).unwrap();
-    let (options, progress) = (organza::RenderOptions::default(), organza::Progress::new());
+    let options = organza::RenderOptions::default();
+    let progress = organza::Progress::new();
     let layers = organza::render(&scene, &options, &progress).unwrap().layers;
     let orders = organza_judge::truth::Orders::of(&scene);
     let truth = organza_judge::truth::truth(&scene, &options, orders, 600, &progress).unwrap().unwrap();

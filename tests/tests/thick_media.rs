@@ -112,7 +112,8 @@ fn coloured_slabs_that_scatter_forward_have_their_closed_form_and_their_layers_s
     for technique in ["points", "sheets"] {
         let slab = Slab { technique, tau: 3.0, view: 0.0, light: 30.0, azimuth: 180.0 };
         // The phase function of light that turns by 150 degrees, over that of an even one.
-        let (g, cosine) = (0.6f64, -(30f64.to_radians().cos()));
+        let g = 0.6f64;
+        let cosine = -(30f64.to_radians().cos());
         let phase = (1.0 - g * g) / (1.0 + g * g - 2.0 * g * cosine).powf(1.5);
         let text = slab.scene(", asymmetry = 0.6", "layers = ['effects', 'shadow']");
         let text =

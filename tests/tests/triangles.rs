@@ -22,16 +22,20 @@ fn in_slabs(scene: &str, slicing: &str, more: &[&str]) -> Picture {
 fn both_slicings_have_the_same_edges_opacities_and_depths_and_nearly_the_same_light() {
     let scene = parallel_view(2.4, 72) + SCENE;
     let [view, half] = ["view", "half_vector"].map(|slicing| in_slabs(&scene, slicing, &[]));
-    let (a, b) = (view.opacity(), half.opacity());
+    let a = view.opacity();
+    let b = half.opacity();
     let worst = a.iter().zip(&b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
     assert!(worst < 1e-5, "A: {worst:e}");
     let apart = view.channel("object.id").iter().zip(half.channel("object.id")).filter(|(a, b)| **a != *b).count();
     assert_eq!(apart, 0, "pixels of another object");
     // Of a triangle the depth is its own; of the haze, which the middle shows first, it is that of a part of a slab.
-    let (objects, a, b) = (view.channel("object.id"), view.channel("depth.first.Z"), half.channel("depth.first.Z"));
+    let objects = view.channel("object.id");
+    let a = view.channel("depth.first.Z");
+    let b = half.channel("depth.first.Z");
     let haze = objects[36 * 72 + 36];
     for (k, object) in objects.iter().enumerate().filter(|(k, _)| a[*k] != b[*k]) {
-        let (off, most) = ((a[k] - b[k]).abs(), if *object == haze { 0.01 } else { 1e-5 });
+        let off = (a[k] - b[k]).abs();
+        let most = if *object == haze { 0.01 } else { 1e-5 };
         assert!(off < most, "pixel {k} of object {object}: {} and {}", a[k], b[k]);
     }
     assert!(objects.iter().filter(|object| **object != haze).count() > 2000);
@@ -47,7 +51,8 @@ fn both_slicings_have_the_same_edges_opacities_and_depths_and_nearly_the_same_li
     let alpha = in_slabs(&scene, "view", &alone).opacity();
     assert!(alpha.iter().all(|a| *a == 0.0 || *a == 1.0) && alpha.contains(&1.0));
     for channel in ["R", "G", "B", "direct.R"] {
-        let (a, b) = (view.channel(channel), half.channel(channel));
+        let a = view.channel(channel);
+        let b = half.channel(channel);
         let square = a.iter().zip(&b).map(|(a, b)| (a - b).powi(2)).sum::<f64>() / a.len() as f64;
         println!("{channel}: RMSE {:.5}", square.sqrt());
         assert!(square.sqrt() < 0.01, "{channel}: RMSE {}", square.sqrt());

@@ -34,10 +34,12 @@ fn drawn(scene: &Scene) -> Vec<[f64; 3]> {
 
 /// Mean over each square of `SIDE`² pixels.
 fn squares(image: &[[f64; 3]], [width, height]: [u32; 2]) -> Vec<[f64; 3]> {
-    let (across, down) = (width as usize / SIDE, height as usize / SIDE);
+    let across = width as usize / SIDE;
+    let down = height as usize / SIDE;
     let mut out = vec![[0.0; 3]; across * down];
     for (k, pixel) in image.iter().enumerate() {
-        let (x, y) = (k % width as usize / SIDE, k / width as usize / SIDE);
+        let x = k % width as usize / SIDE;
+        let y = k / width as usize / SIDE;
         (0..3).for_each(|c| out[y * across + x][c] += pixel[c] / (SIDE * SIDE) as f64);
     }
     out
@@ -207,7 +209,8 @@ fn points_agree_with_path_tracing_of_a_solid_of_solids() {
                   space origin: (-0.2,-0.3,-0.3)\nencoding: ascii\n\n";
     std::fs::write(folder.path().join("ball.nrrd"), header.to_owned() + &distances).unwrap();
     let spiral = (0..900).map(|i| {
-        let (z, turn) = (1.0 - (2.0 * f64::from(i) + 1.0) / 900.0, 2.4 * f64::from(i));
+        let z = 1.0 - (2.0 * f64::from(i) + 1.0) / 900.0;
+        let turn = 2.4 * f64::from(i);
         let n = [turn.cos() * (1.0 - z * z).sqrt(), turn.sin() * (1.0 - z * z).sqrt(), z];
         format!("{} {} {} {} {} {}\n", 0.3 * n[0] - 0.5, 0.3 * n[1] + 0.4, 0.3 * n[2] + 0.4, n[0], n[1], n[2])
     });
@@ -225,7 +228,8 @@ fn points_agree_with_path_tracing_of_a_solid_of_solids() {
     let truth = traced(&carved).unwrap();
     let exact = squares(truth.image.pixels(), [96, 64]);
     let off = |scene: &Scene| rmse(&squares(&drawn(scene), [96, 64]), &exact);
-    let (error, noise) = (off(&carved), truth.rms_standard_error() / SIDE as f64);
+    let error = off(&carved);
+    let noise = truth.rms_standard_error() / SIDE as f64;
     println!("RMSE {error:.5}, truth's standard error {noise:.5}");
     assert!(error < 0.005 && noise < 0.002, "RMSE {error}, truth's standard error {noise}");
     // The comparison can fail: without either of the balls it is another solid.

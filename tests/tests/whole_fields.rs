@@ -58,7 +58,8 @@ fn a_field_of_both_signs_shows_both() {
     let ball = |p, x| (1.0 - distance(p, [x, 0.5, 0.5]) / 0.2).max(0.0);
     place.write("both.nrrd", nrrd("float", [16; 3], |p| ball(p, 0.75) - ball(p, 0.25)));
     let alpha = seen(&place, "both.nrrd", &[]).0;
-    let ([left, right], between) = (halves(&alpha), alpha[12 * 24 + 12]);
+    let [left, right] = halves(&alpha);
+    let between = alpha[12 * 24 + 12];
     // One ball alone would stand in the middle of the picture.
     assert!(between < 0.1, "{between}");
     assert!(left > 0.3 && (left - right).abs() < 0.02, "{left} {right}");
@@ -262,7 +263,8 @@ fn points_in_degrees_beside_heights_in_metres_are_seen_and_said() {
     let place = Place::new("");
     let mut text = String::new();
     for i in 0..900 {
-        let (x, y) = (f64::from(i % 30) * 1e-5, f64::from(i / 30) * 1e-5);
+        let x = f64::from(i % 30) * 1e-5;
+        let y = f64::from(i / 30) * 1e-5;
         writeln!(text, "{:.8} {:.8} {:.3}", -71.05 + x, 42.36 + y, 2.0 + 2.0 * (9e4 * x).sin()).unwrap();
     }
     place.write("degrees.xyz", text);

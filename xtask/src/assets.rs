@@ -42,14 +42,16 @@ pub(crate) fn run(repo: &Repo) -> Outcome {
 
 /// Writes the environment that is made by formula.
 pub(crate) fn write_sky(repo: &Repo) -> Outcome {
-    let (path, bytes) = (repo.root.join("assets/environment/sky.hdr"), sky::hdr());
+    let path = repo.root.join("assets/environment/sky.hdr");
+    let bytes = sky::hdr();
     std::fs::write(&path, &bytes).map_err(|e| format!("{}: {e}", path.display()))?;
     Ok(format!("{} bytes in {}", bytes.len(), path.display()))
 }
 
 /// Writes the volume that is made by formula.
 pub(crate) fn write_dose(repo: &Repo) -> Outcome {
-    let (path, bytes) = (repo.root.join("assets/dose/dose.nrrd"), dose::nrrd());
+    let path = repo.root.join("assets/dose/dose.nrrd");
+    let bytes = dose::nrrd();
     std::fs::write(&path, &bytes).map_err(|e| format!("{}: {e}", path.display()))?;
     Ok(format!("{} bytes in {}", bytes.len(), path.display()))
 }

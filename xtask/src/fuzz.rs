@@ -63,7 +63,8 @@ pub(crate) fn run(repo: &Repo, words: &[&str]) -> Outcome {
         return Ok(format!("fuzz: SKIPPED, missing: {missing}"));
     }
     write_seeds(repo)?;
-    let (mut runs, mut said) = (Vec::new(), Vec::new());
+    let mut runs = Vec::new();
+    let mut said = Vec::new();
     for target in targets {
         println!("==> {target}, {} s", plan.seconds);
         let run = fuzz(repo, target, plan.seconds)?;

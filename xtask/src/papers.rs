@@ -42,7 +42,8 @@ pub(crate) fn check(repo: &Repo) -> Outcome {
 fn read(repo: &Repo) -> Result<Vec<Ledger>, String> {
     let sources = repo.texts().filter(|(path, _)| path.starts_with(FOLDER) && path.ends_with(".toml"));
     let with_times = |(path, text): (&str, &str)| {
-        let (mut ledger, times) = (Ledger::parse(path, text)?, Times::of(repo, path)?);
+        let mut ledger = Ledger::parse(path, text)?;
+        let times = Times::of(repo, path)?;
         for row in &mut ledger.rows {
             if let Some(why) = times::by_hand(row) {
                 return Err(format!("{path}: {}: {why}", row.id));

@@ -16,7 +16,8 @@ pub(crate) struct Function<'a> {
 /// The same text with comments as blanks and the contents of strings and characters as `x`. Line ends stay.
 pub(crate) fn code_only(text: &str) -> String {
     let bytes = text.as_bytes();
-    let (mut out, mut at) = (bytes.to_vec(), 0);
+    let mut out = bytes.to_vec();
+    let mut at = 0;
     while at < bytes.len() {
         let (end, filler) = match literal_or_comment(bytes, at) {
             Some(found) => found,

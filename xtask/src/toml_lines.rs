@@ -18,7 +18,9 @@ pub(crate) struct Line<'a> {
 
 /// The `key = value` lines of a text.
 pub(crate) fn lines(text: &str) -> Vec<Line<'_>> {
-    let (mut table, mut heading, mut found) = ("", 0, Vec::new());
+    let mut table = "";
+    let mut heading = 0;
+    let mut found = Vec::new();
     for (at, line) in text.lines().map(str::trim).enumerate() {
         if line.starts_with('[') && line.ends_with(']') {
             table = line.trim_matches(['[', ']']);
@@ -35,7 +37,8 @@ pub(crate) fn lines(text: &str) -> Vec<Line<'_>> {
 /// The content of a basic string on one line, with its `\"` and `\\` resolved.
 pub(crate) fn string(value: &str) -> Result<String, String> {
     let body = value.strip_prefix('"').ok_or_else(|| format!("expected a string in quotes, found {value}"))?;
-    let (mut content, mut rest) = (String::new(), body.chars());
+    let mut content = String::new();
+    let mut rest = body.chars();
     while let Some(c) = rest.next() {
         match c {
             '"' => {

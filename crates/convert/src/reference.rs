@@ -10,7 +10,8 @@ pub fn layer_depth(cloud: &Cloud, profile: Footprint, p: DVec3, direction: DVec3
     let norm = profile.norm();
     let mut sum = 0.0;
     for i in 0..cloud.len() {
-        let (center, normal) = (cloud.position[i].as_dvec3(), cloud.normal_of(i).as_dvec3());
+        let center = cloud.position[i].as_dvec3();
+        let normal = cloud.normal_of(i).as_dvec3();
         let radius_sq = f64::from(cloud.radius[i]).powi(2);
         let cos = normal.dot(direction);
         if cloud.kind[i] == SplatKind::Medium || (center - p).length_squared() > 4.0 * radius_sq || cos.abs() < 0.1 {

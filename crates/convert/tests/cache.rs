@@ -10,7 +10,8 @@ use std::sync::Arc;
 
 fn hills(n: u64) -> RawPoints {
     let point = |i: u64| {
-        let (x, z) = (9.0 * rng::unit_f32(1, 0, i, 0), 9.0 * rng::unit_f32(1, 0, i, 1));
+        let x = 9.0 * rng::unit_f32(1, 0, i, 0);
+        let z = 9.0 * rng::unit_f32(1, 0, i, 1);
         Vec3::new(x, x.sin() * z.cos(), z)
     };
     RawPoints { position: (0..n).map(point).collect(), ..RawPoints::default() }
@@ -56,7 +57,8 @@ fn what_was_kept_is_read_and_gives_the_same_bits() {
 #[test]
 fn damaged_and_foreign_files_are_made_anew() {
     let folder = tempfile::tempdir().unwrap();
-    let (points, params) = (hills(200), SurfelParams::default());
+    let points = hills(200);
+    let params = SurfelParams::default();
     let (plain, _) = converted(&points, &params, folder.path(), 1 << 20);
     let file = files(folder.path()).pop().unwrap();
     let good = fs::read(&file).unwrap();
@@ -82,7 +84,8 @@ fn damaged_and_foreign_files_are_made_anew() {
 fn what_no_points_have_is_made_anew_whatever_its_hash() {
     use sha2::{Digest, Sha256};
     let folder = tempfile::tempdir().unwrap();
-    let (points, params) = (hills(200), SurfelParams::default());
+    let points = hills(200);
+    let params = SurfelParams::default();
     let (plain, _) = converted(&points, &params, folder.path(), 1 << 20);
     let file = files(folder.path()).pop().unwrap();
     let good = fs::read(&file).unwrap();
@@ -105,7 +108,8 @@ fn a_folder_that_is_none_is_said_and_stops_nothing() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("file");
     fs::write(&file, "mine").unwrap();
-    let (points, params) = (hills(50), SurfelParams::default());
+    let points = hills(50);
+    let params = SurfelParams::default();
     let (cloud, said) = converted(&points, &params, &file, 1 << 20);
     assert!(said.contains("cannot be kept here"), "{said}");
     assert!(cloud == raw_to_surfels(&points, &params, None).unwrap().0);

@@ -17,7 +17,8 @@ impl ScalarField for Ball {
         (p - self.0).normalize()
     }
     fn hessian(&self, p: DVec3) -> DMat3 {
-        let (n, r) = (self.gradient(p), p.distance(self.0));
+        let n = self.gradient(p);
+        let r = p.distance(self.0);
         (DMat3::IDENTITY - DMat3::from_cols(n * n.x, n * n.y, n * n.z)) * (1.0 / r)
     }
     fn bound(&self, p: DVec3, radius: f64) -> Option<(f64, f64)> {
@@ -52,7 +53,8 @@ fn combinations_are_sets_and_their_derivatives_those_of_the_active_part() {
     let mut seen = [[0; 2]; 4];
     for i in 0..2000 {
         let p = place(i);
-        let (x, y) = (a.value(p), b.value(p));
+        let x = a.value(p);
+        let y = b.value(p);
         let inside = [x < 0.0 || y < 0.0, x < 0.0 && y < 0.0, x < 0.0 && y >= 0.0, x >= 0.0];
         for (n, f) in all.iter().enumerate() {
             assert_eq!(f.value(p) < 0.0, inside[n], "{f:?}");
@@ -84,7 +86,8 @@ fn bounds_contain_every_value() {
         CombinedField::complement(nested),
     ] {
         for i in 0..200 {
-            let (center, radius) = (place(i), rng::unit(32, 0, i, 0));
+            let center = place(i);
+            let radius = rng::unit(32, 0, i, 0);
             let (low, high) = f.bound(center, radius).unwrap();
             for j in 0..50 {
                 let d = DVec3::from_array([0, 1, 2].map(|k| 2.0 * rng::unit(33, i, j, k) - 1.0)).clamp_length_max(1.0);
@@ -206,7 +209,8 @@ fn distances(r: f64, top: usize) -> GridField {
 }
 
 fn of_grid(field: GridField) -> Solid {
-    let (walls, bounds) = (field.walls(), field.bounds());
+    let walls = field.walls();
+    let bounds = field.bounds();
     Solid { field: Arc::new(field), walls, bounds, step: 0.03 }
 }
 
@@ -244,7 +248,8 @@ fn solids_of_an_isosurface_and_a_formula_have_their_closed_forms() {
     // Caps of the two balls beyond the plane x = c in which they meet: volumes, then areas.
     let pi = std::f64::consts::PI;
     let c = (1.0 + 0.64 - 0.49) / 1.6;
-    let (of_ball, of_small) = (1.0 - c, 0.7 - (0.8 - c));
+    let of_ball = 1.0 - c;
+    let of_small = 0.7 - (0.8 - c);
     let cap = |r: f64, h: f64| [2.0 * pi * r * h, pi * h * h * (3.0 * r - h) / 3.0];
     let whole = |r: f64| [4.0 * pi * r * r, 4.0 / 3.0 * pi * r * r * r];
     let [a, b, cap_a, cap_b] = [whole(1.0), whole(0.7), cap(1.0, of_ball), cap(0.7, of_small)];
@@ -262,8 +267,8 @@ fn solids_of_an_isosurface_and_a_formula_have_their_closed_forms() {
         // The edge is where both have their zeros, by the field itself.
         let edge = DVec3::new(c, (1.0 - c * c).sqrt(), 0.0);
         assert!(solid.field.value(edge).abs() < 1e-4);
-        let (before, after) =
-            (solid.field.gradient(edge - DVec3::X * 0.01), solid.field.gradient(edge + DVec3::X * 0.01));
+        let before = solid.field.gradient(edge - DVec3::X * 0.01);
+        let after = solid.field.gradient(edge + DVec3::X * 0.01);
         assert!(before.dot(after) < 0.8 * before.length() * after.length(), "{combination:?}: the edge is round");
     }
 }
@@ -300,7 +305,8 @@ fn a_part_that_reaches_its_walls_ends_flat_there() {
     let none = of_formula("sqrt(x - 0.9) - 0.5", DAabb::new(DVec3::ZERO, DVec3::ONE));
     assert!(Solid::combined(Combination::Union, vec![none, far()]).unwrap().field.value(DVec3::splat(0.5)).is_nan());
     for i in 0..200 {
-        let (center, radius) = (place(i), 0.4 * rng::unit(34, 0, i, 0));
+        let center = place(i);
+        let radius = 0.4 * rng::unit(34, 0, i, 0);
         let union = Solid::combined(Combination::Difference, vec![block(), of_grid(distances(0.4, 31))]).unwrap();
         let Some((low, high)) = union.field.bound(center, radius) else { continue };
         for j in 0..20 {
@@ -337,7 +343,8 @@ fn a_closed_field_is_as_steep_as_the_steeper_of_field_and_walls() {
         let closed = Solid { field: Arc::new(Ramp(slope)), walls: Vec::new(), bounds, step: 0.03 }.closed();
         let far = Solid { field: Arc::new(Ball(DVec3::splat(9.0), 0.1)), ..closed.clone() };
         let field = Solid::combined(Combination::Union, vec![closed, far]).unwrap().field;
-        let (mut most, mut found) = (0.0f64, 0.0f64);
+        let mut most = 0.0f64;
+        let mut found = 0.0f64;
         for i in 0..500 {
             let center = place(i);
             most = most.max(field.steepest(center, 0.1).unwrap());

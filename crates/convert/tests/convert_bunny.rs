@@ -31,7 +31,8 @@ fn on_the_surface(mesh: &Mesh, count: u64) -> Vec<(DVec3, DVec3)> {
     let point = |i: u64| {
         let u = |k| rng::unit(17, 0, i, k);
         let v = corner(&mesh.triangles[until.partition_point(|s| *s < u(0) * sum).min(until.len() - 1)]);
-        let (a, b) = (1.0 - u(1).sqrt(), u(2) * u(1).sqrt());
+        let a = 1.0 - u(1).sqrt();
+        let b = u(2) * u(1).sqrt();
         (v[0] * a + v[1] * b + v[2] * (1.0 - a - b), cross(v).normalize())
     };
     (0..count).map(point).collect()

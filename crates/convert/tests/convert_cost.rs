@@ -93,7 +93,8 @@ fn split_volumes_fields_and_clouds_are_predicted_closely() {
         let cloud = density_to_points(&field, bounds, &params, None).unwrap().0;
         close(cost::density(&field, bounds, &params).unwrap(), &cloud, 0.03);
     }
-    let (shape, params) = (CloudShape::default(), VolumeParams::default());
+    let shape = CloudShape::default();
+    let params = VolumeParams::default();
     let lattice = procedural_cloud(&shape, 0.06, &params.splat, None).unwrap();
     let point = |value: f32| TransferPoint { value, color: [1.0; 3], extinction: value };
     let tf = TransferFunction::new(vec![point(0.0), point(12.0)]).unwrap();
@@ -104,14 +105,16 @@ fn split_volumes_fields_and_clouds_are_predicted_closely() {
 #[test]
 fn closed_shapes_are_counted() {
     let p = SplatParams::default();
-    let (low, high) = (DVec3::ZERO, DVec3::new(2.0, 1.0, 0.3));
+    let low = DVec3::ZERO;
+    let high = DVec3::new(2.0, 1.0, 0.3);
     for extinction in [5.0, 0.0] {
         let slab = HomogeneousMedium { body: MediumBody::Box(DAabb::new(low, high)), extinction, spacing: 0.07 };
         for clips in [&[][..], &[Clip::HalfSpace { normal: DVec3::ONE, offset: 1.3 }]] {
             exact(cost::medium(&slab, clips, &p).unwrap(), &medium(&slab, clips, &p).unwrap());
         }
     }
-    let (u, v) = (DVec3::X, DVec3::Z * 2.0);
+    let u = DVec3::X;
+    let v = DVec3::Z * 2.0;
     for opacity in [0.75, 1.0] {
         let flat = Rectangle { center: low, u, v, spacing: 0.05 };
         exact(cost::rectangle(&flat, opacity, &p).unwrap(), &rectangle(&flat, opacity, &p).unwrap());
@@ -163,11 +166,13 @@ fn long_conversions_tick_and_stop() {
     let fine = MeshParams { density: Density::Spacing(0.01), ..MeshParams::default() };
     interrupted(&|p| mesh_to_points_into(&mesh(), &fine, &mut Cloud::default(), Some(p)).map(|_| ()));
     interrupted(&|p| raw_to_surfels(&points(3000), &SurfelParams::default(), Some(p)).map(|_| ()));
-    let (grid, params) = (wave([20; 3], DVec3::ONE), VolumeParams { normals: true, ..VolumeParams::default() });
+    let grid = wave([20; 3], DVec3::ONE);
+    let params = VolumeParams { normals: true, ..VolumeParams::default() };
     interrupted(&|p| volume_to_points(&grid, &transfer(), &params, Some(p)).map(|_| ()));
     interrupted(&|p| surface_to_points(&field, bounds, &fine, Some(p)).map(|_| ()));
     let density = DensityParams { density: Density::Spacing(0.1), ..DensityParams::default() };
     interrupted(&|p| density_to_points(&field, bounds, &density, Some(p)).map(|_| ()));
-    let (shape, splat) = (CloudShape::default(), SplatParams::default());
+    let shape = CloudShape::default();
+    let splat = SplatParams::default();
     interrupted(&|p| procedural_cloud(&shape, 0.2, &splat, Some(p)).map(|_| ()));
 }

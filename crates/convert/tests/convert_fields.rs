@@ -69,7 +69,8 @@ fn derivatives_agree_with_finite_differences() {
         let f = field(text);
         for i in 0..20 {
             let p = point(i, 0.9) + DVec3::new(0.01, -0.98, 0.0) * f64::from(u8::from(text.contains("^-2")));
-            let (g, hessian) = (f.gradient(p), f.hessian(p));
+            let g = f.gradient(p);
+            let hessian = f.hessian(p);
             for a in 0..3 {
                 let d = DVec3::AXES[a] * h;
                 let slope = (f.value(p + d) - f.value(p - d)) / (2.0 * h);
@@ -88,7 +89,8 @@ fn bounds_contain_every_value() {
         let f = field(text);
         let mut tight = 0;
         for i in 0..40 {
-            let (center, radius) = (point(i, 0.8), 0.15 * rng::unit(12, 0, i, 0));
+            let center = point(i, 0.8);
+            let radius = 0.15 * rng::unit(12, 0, i, 0);
             let Some((low, high)) = f.bound(center, radius) else { continue };
             tight += 1;
             for j in 0..50 {
@@ -230,7 +232,8 @@ fn a_procedural_cloud_is_bounded_smooth_and_repeatable() {
     assert!(grid != procedural_cloud(&CloudShape { seed: 2, ..shape.clone() }, 0.08, &splat, None).unwrap());
     let [nx, ny, nz] = grid.dims;
     let at = |n: usize| [n % nx, n / nx % ny, n / nx / ny];
-    let (mut core, mut rim) = (0, 0);
+    let mut core = 0;
+    let mut rim = 0;
     for (n, &v) in grid.values.iter().enumerate() {
         let [i, j, k] = at(n);
         let face = [i, j, k].contains(&0) || i + 1 == nx || j + 1 == ny || k + 1 == nz;
@@ -254,9 +257,12 @@ fn turbulence_makes_a_cauliflower_not_a_blob() {
         let grid = procedural_cloud(shape, 0.05, &SplatParams::default(), None).unwrap();
         let inside = |i: isize, j: isize, k: isize| grid.at_clamped(i, j, k) > 6.0;
         let [nx, ny, nz] = grid.dims.map(|n| n as isize);
-        let (mut faces, mut volume) = (0.0f64, 0.0f64);
+        let mut faces = 0.0f64;
+        let mut volume = 0.0f64;
         for n in 0..nx * ny * nz {
-            let (i, j, k) = (n % nx, n / nx % ny, n / nx / ny);
+            let i = n % nx;
+            let j = n / nx % ny;
+            let k = n / nx / ny;
             if inside(i, j, k) {
                 volume += 1.0;
                 for (di, dj, dk) in [(1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1)] {
@@ -266,7 +272,8 @@ fn turbulence_makes_a_cauliflower_not_a_blob() {
         }
         faces / volume.powf(2.0 / 3.0)
     };
-    let (rough, plain) = (wrinkles(&shape), wrinkles(&smooth));
+    let rough = wrinkles(&shape);
+    let plain = wrinkles(&smooth);
     assert!(rough > 1.2 * plain, "{rough} {plain}");
 }
 
@@ -308,7 +315,8 @@ fn values_and_gradients_of_many_places_are_those_of_each() {
             let mut found = vec![(0.0, DVec3::ZERO); n];
             field.value_gradients(&at[at.len() - n..], &mut found);
             for (p, (value, gradient)) in at[at.len() - n..].iter().zip(found) {
-                let (v, g) = (field.value(*p), field.gradient(*p));
+                let v = field.value(*p);
+                let g = field.gradient(*p);
                 let same = |a: f64, b: f64| a == b || (a.is_nan() && b.is_nan()) || (a - b).abs() <= 1e-13 * b.abs();
                 assert!(same(value, v), "{text} at {p}: {value} for {v}");
                 assert!((0..3).all(|a| same(gradient[a], g[a])), "{text} at {p}: {gradient} for {g}");

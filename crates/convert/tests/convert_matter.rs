@@ -63,7 +63,8 @@ fn a_lattice_has_the_extinction_of_its_points_within_and_ends_half_a_step_beyond
     let expected = 2.0 * f64::from(SIDE) * scale;
     for i in 0..64u32 {
         let p = DVec3::new(5.0 + f64::from(i % 8) / 8.0, 5.0 + f64::from(i / 8) / 8.0, 0.0) * scale;
-        let (p, along) = (transform.rotation * p, transform.rotation * DVec3::Z);
+        let p = transform.rotation * p;
+        let along = transform.rotation * DVec3::Z;
         let depth = reference::line_depth(&cloud, Footprint::default(), p, along);
         assert!((depth / expected - 1.0).abs() < 3e-3, "{depth}, expected {expected}");
     }

@@ -23,8 +23,10 @@ fn sphere(rows: u32) -> Mesh {
     let mut mesh = Mesh::default();
     for r in 0..=rows {
         for c in 0..columns {
-            let (theta, phi) = (f64::from(r) / f64::from(rows), 2.0 * f64::from(c) / f64::from(columns));
-            let (theta, phi) = (theta * std::f64::consts::PI, phi * std::f64::consts::PI);
+            let theta = f64::from(r) / f64::from(rows);
+            let phi = 2.0 * f64::from(c) / f64::from(columns);
+            let theta = theta * std::f64::consts::PI;
+            let phi = phi * std::f64::consts::PI;
             let p = DVec3::new(theta.sin() * phi.cos(), theta.cos(), -theta.sin() * phi.sin());
             mesh.position.push(p.as_vec3());
         }
@@ -39,7 +41,8 @@ fn sphere(rows: u32) -> Mesh {
 
 /// Mean and largest deviation from 1 of τ/τ₁ over a 64 x 64 sweep of the interior.
 fn coverage(cloud: &Cloud, tau: f64, side: f64) -> (f64, f64) {
-    let (mut mean, mut ripple) = (0.0, 0.0f64);
+    let mut mean = 0.0;
+    let mut ripple = 0.0f64;
     for i in 0..4096 {
         let at = |n: u32| side * (0.35 + 0.3 * (f64::from(n) + 0.5) / 64.0);
         let p = DVec3::new(at(i % 64), 0.0, at(i / 64));

@@ -77,7 +77,8 @@ fn areas_of_a_sphere_sum_to_its_area_and_normals_are_radial() {
         let (cloud, report) = raw_to_surfels(&sphere(20_000), &params, None).unwrap();
         assert!((report.area / (4.0 * std::f64::consts::PI) - 1.0).abs() < 2e-3, "{}", report.area);
         for i in 0..cloud.len() {
-            let (p, n) = (cloud.position[i].normalize(), cloud.normal[i]);
+            let p = cloud.position[i].normalize();
+            let n = cloud.normal[i];
             assert!(n.dot(p).abs() > 0.999, "{p} {n}");
             match orientation {
                 Orientation::Propagate | Orientation::Auto(_) => assert!(n.dot(p) > 0.0, "inwards at {p}"),
@@ -97,7 +98,8 @@ fn normals_point_outwards_of_bodies_and_up_from_terrain() {
         raw_to_surfels(&points, &params, None).unwrap().0
     };
     let ground = |k: usize| {
-        let (x, z) = ((k % 80) as f32, (k / 80) as f32);
+        let x = (k % 80) as f32;
+        let z = (k / 80) as f32;
         let is_house = (30.0..45.0).contains(&x) && (20.0..40.0).contains(&z);
         Vec3::new(x, 4.0 * (0.2 * x).sin() * (0.15 * z).cos() + if is_house { 12.0 } else { 0.0 }, z)
     };
@@ -122,7 +124,8 @@ fn scattered_points_cover_their_plane_once_in_the_mean() {
     let position = (0..n).map(|i| Vec3::new(rng::unit_f32(9, 0, i, 0), 0.0, rng::unit_f32(9, 0, i, 1))).collect();
     let points = RawPoints { position, ..RawPoints::default() };
     let (cloud, _) = raw_to_surfels(&points, &SurfelParams { opacity: 0.5, ..SurfelParams::default() }, None).unwrap();
-    let (mut mean, mut thinnest) = (0.0, f64::INFINITY);
+    let mut mean = 0.0;
+    let mut thinnest = f64::INFINITY;
     for i in 0..1024u32 {
         let p = DVec3::new(0.2 + 0.6 * f64::from(i % 32) / 32.0, 0.0, 0.2 + 0.6 * f64::from(i / 32) / 32.0);
         let weight = reference::layer_depth(&cloud, Footprint::default(), p, DVec3::Y) / optics::optical_depth(0.5);

@@ -23,7 +23,8 @@ fn on_sphere(i: u64) -> (DVec3, DVec3) {
 }
 
 fn on_torus(i: u64) -> (DVec3, DVec3) {
-    let (a, b) = (TAU * unit(i, 0), TAU * unit(i, 1));
+    let a = TAU * unit(i, 0);
+    let b = TAU * unit(i, 1);
     let out = DVec3::new(a.cos(), a.sin(), 0.0);
     let n = out * b.cos() + DVec3::Z * b.sin();
     (out + n * 0.4, n)
@@ -79,7 +80,8 @@ fn a_box_keeps_its_edges_where_shapes_may_be_sharp() {
     let (sharp, report) = field(&points, 1e-3);
     let rounded =
         points_to_field(&points, &MpuParams { tolerance: 1e-3, sharp: false, ..MpuParams::default() }, None).unwrap();
-    let (a, b) = (misses(on_box, &sharp, &report), misses(on_box, &rounded.0, &rounded.1));
+    let a = misses(on_box, &sharp, &report);
+    let b = misses(on_box, &rounded.0, &rounded.1);
     println!("sharp {a:?} {report:?}\nrounded {b:?} {:?}", rounded.1);
     assert!(report.sharp > 0 && rounded.1.sharp == 0);
     assert!(a.0 < 0.1 && a.0 < b.0 && report.missed < rounded.1.missed, "{a:?} {b:?}");
@@ -93,10 +95,12 @@ fn a_box_keeps_its_edges_where_shapes_may_be_sharp() {
 fn derivatives_agree_with_finite_differences() {
     for (points, h) in [(cloud(on_torus, 3000), 1e-6), (cloud(on_box, 3000), 1e-6)] {
         let (f, report) = field(&points, 1e-3);
-        let (mut checked, mut off) = (0, 0);
+        let mut checked = 0;
+        let mut off = 0;
         for i in 0..500 {
             let p = signed(i) * 1.5;
-            let (gradient, hessian) = (f.gradient(p), f.hessian(p));
+            let gradient = f.gradient(p);
+            let hessian = f.hessian(p);
             for a in 0..3 {
                 let d = DVec3::AXES[a] * h;
                 let slope = (f.value(p + d) - f.value(p - d)) / (2.0 * h);
@@ -115,11 +119,14 @@ fn derivatives_agree_with_finite_differences() {
 /// Checks that bounds hold; returns their mean width over the mean spread of values, and the greatest slope that was met over that
 /// which bounds it.
 fn check_bounds(f: &MpuField, radius: f64, balls: u64) -> (f64, f64) {
-    let (mut width, mut spread, mut steep) = (0.0, 0.0, 0.0f64);
+    let mut width = 0.0;
+    let mut spread = 0.0;
+    let mut steep = 0.0f64;
     for i in 0..balls {
         let center = signed(i) * 1.4;
         let (low, high) = f.bound(center, radius).unwrap();
-        let (mut least, mut most) = (f64::INFINITY, f64::NEG_INFINITY);
+        let mut least = f64::INFINITY;
+        let mut most = f64::NEG_INFINITY;
         let steepest = f.steepest(center, radius);
         assert!(steepest.is_some() || radius > 0.01, "{center}, {radius}");
         let mut before = (center, f.value(center));
@@ -128,7 +135,8 @@ fn check_bounds(f: &MpuField, radius: f64, balls: u64) -> (f64, f64) {
             let v = f.value(p);
             assert!(low <= v && v <= high, "{v} outside {low}..{high} at {center}, {radius}");
             (least, most) = (least.min(v), most.max(v));
-            let (way, change) = (p.distance(before.0), (v - before.1).abs());
+            let way = p.distance(before.0);
+            let change = (v - before.1).abs();
             let slope = steepest.unwrap_or(f64::INFINITY);
             assert!(change <= slope * way + 1e-13, "{change} over {way}, {slope} at most, at {center}, {radius}");
             (before, steep) = ((p, v), steep.max(change / way / slope));
@@ -172,7 +180,8 @@ fn threads_order_and_copies_do_not_matter() {
     let mut other = points.clone();
     other.position.reverse();
     other.normal.reverse();
-    let (p, n) = (other.position[17], other.normal[17]);
+    let p = other.position[17];
+    let n = other.normal[17];
     other.position.push(p);
     other.normal.push(n);
     let build = |threads: usize, points: &RawPoints| {
@@ -207,7 +216,8 @@ fn scaling_by_two_scales_exactly_and_far_away_is_like_here() {
         assert_eq!(f.gradient(p), scaled.gradient(p * 1024.0));
         assert_eq!(f.hessian(p), scaled.hessian(p * 1024.0) * 1024.0);
         assert_eq!(f.value_gradient(p), far.value_gradient(p + shift));
-        let (here, there) = (f.bound(p, 0.01).unwrap(), far.bound(p + shift, 0.01).unwrap());
+        let here = f.bound(p, 0.01).unwrap();
+        let there = far.bound(p + shift, 0.01).unwrap();
         // The radius grows by the rounding of positions out there.
         assert!((here.0 - there.0).abs() < 1e-5 && (here.1 - there.1).abs() < 1e-5, "{here:?} {there:?}");
     }
@@ -217,7 +227,8 @@ fn scaling_by_two_scales_exactly_and_far_away_is_like_here() {
 fn beyond_the_cube_the_value_stays_and_there_is_no_surface() {
     let (f, _) = field(&cloud(on_sphere, 2000), 1e-3);
     let high = f.bounds().max;
-    let (edge, out) = (DVec3::new(high.x, 0.1, 0.2), DVec3::new(high.x + 5.0, 0.1, 0.2));
+    let edge = DVec3::new(high.x, 0.1, 0.2);
+    let out = DVec3::new(high.x + 5.0, 0.1, 0.2);
     assert!(f.in_domain(edge - DVec3::X * 1e-9) && !f.in_domain(out));
     assert!((f.value(edge) - f.value(out)).abs() < 1e-12 && f.gradient(out).x == 0.0);
     let (low, high) = f.bound(out, 0.1).unwrap();
@@ -296,7 +307,8 @@ fn what_is_no_surface_is_refused() {
         let error = points_to_field(points, params, None).unwrap_err().to_string();
         assert!(error.contains(needle), "{error}");
     };
-    let (good, default) = (cloud(on_sphere, 100), MpuParams::default());
+    let good = cloud(on_sphere, 100);
+    let default = MpuParams::default();
     says(&cloud(on_sphere, 14), &default, "points is 14");
     says(&RawPoints::default(), &default, "points is 0");
     says(
@@ -327,7 +339,8 @@ fn what_is_no_surface_is_refused() {
 #[test]
 fn cv13_beside_the_rim_of_a_thin_plate_is_outside() {
     fn plate(i: u64) -> (DVec3, DVec3) {
-        let (r, a) = (unit(i, 0).sqrt(), TAU * unit(i, 1));
+        let r = unit(i, 0).sqrt();
+        let a = TAU * unit(i, 1);
         let side = if unit(i, 2) < 0.5 { DVec3::Z } else { DVec3::NEG_Z };
         (DVec3::new(r * a.cos(), r * a.sin(), 0.0) + 0.01 * side, side)
     }
@@ -373,7 +386,8 @@ fn cv14_the_zero_set_of_a_noisy_scan_stays_by_its_samples() {
         };
         let mut far: Vec<f64> = zero_set.position.iter().step_by(step).map(nearest).collect();
         far.sort_by(f64::total_cmp);
-        let (n, most) = (far.len(), far[far.len() - 1]);
+        let n = far.len();
+        let most = far[far.len() - 1];
         println!("{file}: {} {} {} {most} of {n}", far[n / 2], far[n * 99 / 100], far[n * 999 / 1000]);
         assert!(n > 5000 && far[n * 999 / 1000] < 2.5 && most < 3.0, "{file}: {most}");
     }

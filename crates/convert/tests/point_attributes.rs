@@ -42,9 +42,11 @@ fn inner(cloud: &Cloud, side: u32, across: f32) -> Vec<usize> {
 fn depth_at(cloud: &Cloud, place: DVec2) -> f64 {
     let footprint = Footprint::default();
     let of = |i: usize| {
-        let (radius, tangent) = (f64::from(cloud.radius[i]), cloud.tangent_of(i).as_dvec3());
+        let radius = f64::from(cloud.radius[i]);
+        let tangent = cloud.tangent_of(i).as_dvec3();
         let long = if tangent == DVec3::ZERO { DVec3::X * radius } else { tangent };
-        let (p, along) = (cloud.position[i].as_dvec3(), long.normalize());
+        let p = cloud.position[i].as_dvec3();
+        let along = long.normalize();
         let way = DVec3::new(place.x - p.x, 0.0, place.y - p.z);
         let square = (way.dot(along) / long.length()).powi(2) + (way.dot(along.cross(DVec3::Y)) / radius).powi(2);
         f64::from(cloud.cross_section[i]) * footprint.norm() / (radius * long.length()) * footprint.profile(square)

@@ -113,7 +113,8 @@ fn what_has_no_place_for_an_image_is_refused() {
 #[test]
 fn discs_of_surfaces_without_points_lie_as_the_predicted_bytes_say() {
     let flat = Rectangle { center: DVec3::ZERO, u: DVec3::X, v: DVec3::Y, spacing: 0.25 };
-    let (some, none) = (splat(&[2, 0], false), splat(&[0], false));
+    let some = splat(&[2, 0], false);
+    let none = splat(&[0], false);
     let cloud = rectangle(&flat, 1.0, &some).unwrap();
     let predicted = cost::rectangle(&flat, 1.0, &some).unwrap();
     assert_eq!((predicted.splats, predicted.bytes), (cloud.len() as u64, cloud.bytes()));

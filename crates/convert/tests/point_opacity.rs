@@ -138,7 +138,8 @@ fn points_of_opacity_one_are_opaque_discs_beside_the_others() {
     let mixed = surfels(&halves(1.0, 0.75), 1.0);
     let alone = surfels(&RawPoints { opacity: Vec::new(), ..halves(1.0, 1.0) }, 1.0);
     for i in 0..mixed.len() {
-        let (one, opaque) = (mixed.get(i), alone.get(i));
+        let one = mixed.get(i);
+        let opaque = alone.get(i);
         if one.position.x < 12.0 {
             assert_eq!(one, opaque, "as without the column");
         } else {

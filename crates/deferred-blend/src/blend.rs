@@ -89,7 +89,8 @@ pub fn blend(
     params.check()?;
     input.layering.check()?;
     let quiet = Progress::new();
-    let (progress, discs) = (progress.unwrap_or(&quiet), input.discs);
+    let progress = progress.unwrap_or(&quiet);
+    let discs = input.discs;
     assert_eq!(discs.size, accumulator.size, "invariant: one image size");
     let ranks: Vec<u32> = (0..discs.discs.len() as u32).collect();
     let bins = bin_rectangles(discs.size, &ranks, |i| discs.discs[i as usize].pixels);

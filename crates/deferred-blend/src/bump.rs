@@ -44,7 +44,8 @@ pub(crate) fn image_slope(bump: &Bump, image: &HeightImage, (at, normal): (DVec3
 fn noise_slope(p: DVec3, seed: u64) -> DVec3 {
     let cell = p.floor();
     let at = p - cell;
-    let (fade, fade_slope) = (at.to_array().map(fade), at.to_array().map(fade_slope));
+    let fade = at.to_array().map(fade);
+    let fade_slope = at.to_array().map(fade_slope);
     let mut sum = DVec3::ZERO;
     for corner in 0..8 {
         let is_far = [0, 1, 2].map(|axis| corner >> axis & 1 == 1);
@@ -120,7 +121,8 @@ mod tests {
 
     #[test]
     fn an_image_lies_upright_on_every_side_and_tells_its_slope() {
-        let (image, bump) = (ridges(2), Bump { height: 0.3, size: 4.0, octaves: 0, seed: 0 });
+        let image = ridges(2);
+        let bump = Bump { height: 0.3, size: 4.0, octaves: 0, seed: 0 };
         // h = 0.3·(1 − cos πx)/2 to the right of the image.
         let rises = |right: f64| 0.15 * std::f64::consts::PI * libm::sin(std::f64::consts::PI * right);
         let sides = [
@@ -145,7 +147,8 @@ mod tests {
 
     #[test]
     fn an_image_bends_around_edges_and_fades_where_pixels_cannot_show_it() {
-        let (image, bump) = (ridges(1), Bump { height: 0.3, size: 1.0, octaves: 0, seed: 0 });
+        let image = ridges(1);
+        let bump = Bump { height: 0.3, size: 1.0, octaves: 0, seed: 0 };
         let at = DVec3::new(0.2, 0.0, 0.2);
         let of = |normal: DVec3, pixel: f64| image_slope(&bump, &image, (at, normal.normalize()), pixel);
         let half = 0.5 * (of(DVec3::X, 1e-3) + of(DVec3::Z, 1e-3));

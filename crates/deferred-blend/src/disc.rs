@@ -310,10 +310,12 @@ impl<'a> View<'a> {
         // Where the disc is seen by any pixel each fragment tells which.
         let ranges = if crosses { [[f64::NEG_INFINITY, f64::INFINITY]; 2] } else { self.touching(center, axes) };
         let toward = if crosses { DVec3::Z } else { center / z };
-        let (facing, distance) = (normal.dot(toward), normal.dot(center));
+        let facing = normal.dot(toward);
+        let distance = normal.dot(center);
         let facing_slope = [normal.x / self.focal, -normal.y / self.focal];
         let of_axis = |a: DVec3| {
-            let (own, scale) = (a.dot(center), 1.0 / a.length_squared());
+            let own = a.dot(center);
+            let scale = 1.0 / a.length_squared();
             let at = if crosses { (distance * a.z - own * normal.z) * scale } else { 0.0 };
             let slope = |e: f64, n: f64| ((distance * e - own * n) * scale) as f32;
             (at as f32, [slope(a.x / self.focal, facing_slope[0]), slope(-a.y / self.focal, facing_slope[1])])
@@ -341,7 +343,8 @@ impl<'a> View<'a> {
             let root = (mixed * mixed - square * other).max(0.0).sqrt();
             [(mixed - root) / square, (mixed + root) / square]
         };
-        let ([left, right], [down, up]) = (range(0), range(1));
+        let [left, right] = range(0);
+        let [down, up] = range(1);
         let place = |axis: usize, v: f64| self.half[axis] + self.focal * v;
         [[place(0, left), place(0, right)], [place(1, -up), place(1, -down)]]
     }
@@ -404,7 +407,8 @@ pub(crate) fn into_view(input: &DiscInput<'_>) -> (DMat3, DVec3) {
 /// Semi-axes of a disc, in the cloud's space.
 pub(crate) fn axes(cloud: &Cloud, i: usize, scale: f64) -> [DVec3; 2] {
     let normal = cloud.normal_of(i).as_dvec3().normalize_or(DVec3::Z);
-    let (tangent, radius) = (cloud.tangent_of(i).as_dvec3(), f64::from(cloud.radius[i]) * scale);
+    let tangent = cloud.tangent_of(i).as_dvec3();
+    let radius = f64::from(cloud.radius[i]) * scale;
     let first = if tangent == DVec3::ZERO { normal.any_orthonormal_vector() * radius } else { tangent * scale };
     let across = normal.cross(first).normalize_or(normal.any_orthonormal_vector());
     [first, across * radius]

@@ -127,7 +127,8 @@ fn meet_block<S: Simd>(
     pixels: &mut [Vec<Fragment>; PIXELS],
 ) {
     let of = |v: f32| Lanes::splat(simd, v);
-    let (disc, look) = (&discs.discs[i as usize], &discs.looks[i as usize]);
+    let disc = &discs.discs[i as usize];
+    let look = &discs.looks[i as usize];
     let kernel = &discs.kernels[look.footprint as usize];
     let first = position(b * PIXELS, corner[0], corner[1]);
     for lane in (0..PIXELS).step_by(Lanes::<S>::COUNT) {

@@ -149,7 +149,8 @@ impl<'m> Path<'m> {
             return;
         }
         let before = self.bent.as_ref().map_or([self.along; 3], |bent| bent.along);
-        let (mut along, mut cone) = (before, layer.cone);
+        let mut along = before;
+        let mut cone = layer.cone;
         // Rays of all channels go the same way until something disperses them.
         let rays = if index == [index[0]; 3] && before == [before[0]; 3] { 1 } else { 3 };
         for ray in 0..rays {

@@ -59,7 +59,8 @@ mod tests {
                 let found = cross(ray(sine), Vec3::Z, ratio);
                 assert!((f64::from(found.bent.x) - s).abs() < 3e-7, "{ratio}, {sine}: {}", found.bent);
                 assert!((found.mirrored - Vec3::new(sine, 0.0, -ray(sine).z)).length() < 3e-7);
-                let (c, t) = ((1.0 - f64::from(sine).powi(2)).sqrt(), (1.0 - s * s).sqrt());
+                let c = (1.0 - f64::from(sine).powi(2)).sqrt();
+                let t = (1.0 - s * s).sqrt();
                 let eta = f64::from(ratio);
                 let share = 0.5 * (((eta * c - t) / (eta * c + t)).powi(2) + ((c - eta * t) / (c + eta * t)).powi(2));
                 assert!((f64::from(found.reflectance) - share).abs() < 2e-5, "{ratio}, {sine}");

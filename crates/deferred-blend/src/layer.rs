@@ -29,7 +29,8 @@ impl Layer {
         [planes, channels]: [usize; 2],
     ) -> Self {
         let optics = |f: &Fragment, p: usize| input.discs.looks[f.disc as usize].opacity(p, f.facing / ray.length);
-        let (first, mut weights) = (&fragments[0], 0.0);
+        let first = &fragments[0];
+        let mut weights = 0.0;
         let mut layer = Self { depth: mean_depth(fragments), opacity: [0.0; 3], values: [0.0; MAX_CHANNELS] };
         let own: [f32; 3] = std::array::from_fn(|p| if p < planes { optics(first, p) } else { 0.0 });
         for fragment in fragments {
@@ -83,7 +84,8 @@ fn mean_values<'v>(
     (share, plane): (impl Fn(&Fragment) -> [f32; 3], impl Fn(usize) -> usize),
     means: &mut [f32; MAX_CHANNELS],
 ) {
-    let (first, mut sums) = (of(&fragments[0]), [0.0; 3]);
+    let first = of(&fragments[0]);
+    let mut sums = [0.0; 3];
     for fragment in fragments {
         let shares = share(fragment);
         (0..3).for_each(|p| sums[p] += shares[p]);

@@ -67,7 +67,9 @@ impl GapRule {
 
 /// Depth of a layer: the average by weight. As a difference from the nearest, so that far layers keep their digits.
 pub(crate) fn mean_depth(layer: &[Fragment]) -> f32 {
-    let (mut weights, mut sum, nearest) = (0.0, 0.0, layer[0].depth);
+    let mut weights = 0.0;
+    let mut sum = 0.0;
+    let nearest = layer[0].depth;
     for fragment in layer {
         weights += fragment.weight;
         sum += fragment.weight * (fragment.depth - nearest);
@@ -89,9 +91,11 @@ mod tests {
     fn balls() -> Cloud {
         let mut cloud = Cloud::new(DVec3::ZERO);
         for k in 0..8000u32 {
-            let (ball, k) = (k / 2000, k % 2000);
+            let ball = k / 2000;
+            let k = k % 2000;
             let z = 1.0 - (2.0 * k as f32 + 1.0) / 2000.0;
-            let (around, across) = (k as f32 * 2.399_963_2, (1.0 - z * z).sqrt());
+            let around = k as f32 * 2.399_963_2;
+            let across = (1.0 - z * z).sqrt();
             let normal = Vec3::new(across * libm::cosf(around), across * libm::sinf(around), z);
             let size = 1.0 - 0.2 * ball as f32;
             let radius = 2.4 * 0.079 * size;
@@ -108,11 +112,13 @@ mod tests {
 
     /// Fragments, and comparisons that sorting them takes in all pixels.
     fn comparisons(cloud: &Cloud, ids: &[u32], camera: &Camera) -> (u64, u64) {
-        let (footprints, materials) = (&FootprintStack::default(), &[Material::default()]);
+        let footprints = &FootprintStack::default();
+        let materials = &[Material::default()];
         let discs = &Discs::project(&DiscInput { cloud, ids, camera, footprints, materials }, &Params::default());
         let ranks: Vec<u32> = (0..ids.len() as u32).collect();
         let bins = bin_rectangles(camera.size, &ranks, |i| discs.discs[i as usize].pixels);
-        let (mut fragments, mut compared) = (0, 0);
+        let mut fragments = 0;
+        let mut compared = 0;
         for t in 0..bins.tiles() {
             let mut lists = BlockLists::default();
             lists.fill(discs, &bins, t);
@@ -122,7 +128,8 @@ mod tests {
                     a.depth.total_cmp(&b.depth)
                 });
             };
-            let (lists, corner) = (&lists, bins.corner(t));
+            let lists = &lists;
+            let corner = bins.corner(t);
             fragments += pulp::Arch::new().dispatch(WalkTile { discs, lists, corner, visit });
         }
         (fragments, compared)
@@ -131,7 +138,8 @@ mod tests {
     /// Layers are sorted in each pixel whatever the order of the discs; near ones first saves comparisons, and nothing else.
     #[test]
     fn discs_that_come_near_first_are_sorted_with_fewer_comparisons() {
-        let (cloud, eye) = (balls(), DVec3::new(0.5, 0.3, 4.0));
+        let cloud = balls();
+        let eye = DVec3::new(0.5, 0.3, 4.0);
         let view = Projection::Perspective { fov_y: 0.6 };
         let camera = Camera::look_at(eye, DVec3::ZERO, DVec3::Y, view, [96, 96]).expect("a view");
         let near_first = |thickness: f32| {

@@ -181,7 +181,8 @@ struct Scratch {
 
 impl Scratch {
     fn new(input: &Averaged<'_>) -> Self {
-        let (block, images) = (Block::new(input.channels as usize), GroupImages::new(group_count(input)));
+        let block = Block::new(input.channels as usize);
+        let images = GroupImages::new(group_count(input));
         Self { lists: BlockLists::default(), block, images }
     }
 

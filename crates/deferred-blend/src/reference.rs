@@ -87,7 +87,8 @@ pub fn picture(
         y.for_each(|y| x.clone().for_each(|x| squares[(y * columns + x) as usize].push(id)));
     }
     let one = |k: u32| {
-        let (x, y) = (k % width, k / width);
+        let x = k % width;
+        let y = k / width;
         let ids = &squares[(y / SIDE * columns + x / SIDE) as usize];
         let limit = opaque.get(k as usize).map_or(f64::INFINITY, |depth| f64::from(*depth));
         let mut layers = layers(&DiscInput { ids, ..*input }, params, [x, y], values, sizes);
@@ -119,7 +120,8 @@ fn squares_of(input: &DiscInput<'_>, id: u32, params: &Params) -> [Range<u32>; 2
 
 /// Beauty and transmittance by plane of layers in order.
 pub fn composite(layers: &[Layer], planes: usize, channels: usize) -> (Vec<f64>, Vec<f64>) {
-    let (mut sums, mut through) = (vec![0.0; channels], vec![1.0; planes]);
+    let mut sums = vec![0.0; channels];
+    let mut through = vec![1.0; planes];
     for layer in layers {
         for (c, sum) in sums.iter_mut().enumerate() {
             *sum += through[ChannelLayout::plane_of(c, channels, planes)] * layer.values[c];
@@ -142,7 +144,8 @@ fn hits(input: &DiscInput<'_>, params: &Params, origin: DVec3, direction: DVec3)
     let mut hits: Vec<Hit> = Vec::new();
     for &id in input.ids {
         let i = id as usize;
-        let (center, normal) = (cloud.position[i].as_dvec3(), cloud.normal_of(i).as_dvec3());
+        let center = cloud.position[i].as_dvec3();
+        let normal = cloud.normal_of(i).as_dvec3();
         let depth = normal.dot(center - origin) / normal.dot(direction);
         let at = origin + direction * depth - center;
         let axes = axes(cloud, i, f64::from(params.disc_scale));

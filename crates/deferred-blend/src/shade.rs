@@ -46,12 +46,15 @@ pub(crate) struct Attributes {
 
 impl Attributes {
     fn of(cloud: &Cloud, i: usize) -> Self {
-        let (face, normal) = (cloud.normal_of(i), cloud.shading_normal_of(i));
+        let face = cloud.normal_of(i);
+        let normal = cloud.shading_normal_of(i);
         Self { face, normal, color: cloud.color[i], radius: cloud.radius[i] }
     }
 
     fn to_array(self) -> [f32; ATTRIBUTES] {
-        let ([a, b, c], [d, e, f], [g, h, i]) = (self.face.to_array(), self.normal.to_array(), self.color);
+        let [a, b, c] = self.face.to_array();
+        let [d, e, f] = self.normal.to_array();
+        let [g, h, i] = self.color;
         [a, b, c, d, e, f, g, h, i, self.radius]
     }
 
@@ -87,7 +90,8 @@ impl Light<'_> {
         let of = |f: &Fragment| Attributes::of(self.input.cloud, place.discs.ids[f.disc as usize] as usize);
         let first = of(&fragments[0]);
         let mut sum = Attributes { face: Vec3::ZERO, normal: Vec3::ZERO, color: [0.0; 3], radius: 0.0 };
-        let (mut weights, mut shares) = (0.0, [0.0; 3]);
+        let mut weights = 0.0;
+        let mut shares = [0.0; 3];
         for fragment in fragments {
             let own = of(fragment);
             let side = if own.face.dot(first.face) < 0.0 { -fragment.weight } else { fragment.weight };
@@ -114,9 +118,12 @@ impl Light<'_> {
     /// Writes the channels of the layout.
     fn on(&self, mean: &Attributes, place: &Place<'_>, out: &mut [f32; MAX_CHANNELS]) {
         let ShadeInput { cloud, materials, objects, lights, ambient, .. } = *self.input;
-        let (position, i) = (place.discs.place(place.ray, place.depth), place.disc);
-        let (kind, object) = (cloud.kind[i], cloud.object[i] as usize);
-        let (material, to_eye) = (&materials[cloud.material[i] as usize], self.toward_eye(position));
+        let position = place.discs.place(place.ray, place.depth);
+        let i = place.disc;
+        let kind = cloud.kind[i];
+        let object = cloud.object[i] as usize;
+        let material = &materials[cloud.material[i] as usize];
+        let to_eye = self.toward_eye(position);
         let face = mean.face.normalize_or_zero();
         let mut normal = facing(kind, face, mean.normal.normalize_or_zero(), to_eye);
         if material.bump.height > 0.0 {
@@ -139,8 +146,8 @@ impl Light<'_> {
         let (cloud, material) = (self.input.cloud, self.input.cloud.material[place.disc] as usize);
         let Similarity { scale, rotation, translation } = self.transforms[cloud.object[place.disc] as usize];
         let at = rotation.inverse() * (cloud.origin + position.as_dvec3() - translation) / scale;
-        let (bump, pixel) =
-            (&self.input.materials[material].bump, f64::from(place.discs.pixel_width(place.depth)) / scale);
+        let bump = &self.input.materials[material].bump;
+        let pixel = f64::from(place.discs.pixel_width(place.depth)) / scale;
         let slope = match self.heights.get(material).and_then(Option::as_ref) {
             Some(image) => bump::image_slope(bump, image, (at, rotation.inverse() * normal.as_dvec3()), pixel),
             None => bump::slope(bump, at, pixel),

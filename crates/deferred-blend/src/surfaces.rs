@@ -108,7 +108,8 @@ impl<'a> Surfaces<'a> {
     pub fn new(input: &DiscInput<'_>, values: &'a [f32], layout: ChannelLayout) -> Self {
         let (rotation, shift) = into_view(input);
         let surface = |&id: &u32| {
-            let (cloud, i) = (input.cloud, id as usize);
+            let cloud = input.cloud;
+            let i = id as usize;
             let [a, b] = axes(cloud, i, f64::from(DISC_SCALE)).map(|a| rotation * a);
             let center = (rotation * (cloud.position[i].as_dvec3() + shift)).as_vec3();
             Surface {
@@ -132,7 +133,8 @@ impl<'a> Surfaces<'a> {
             let most = &mut largest[disc.look.object as usize];
             *most = most.max(disc.radius);
         }
-        let (footprints, materials) = (input.footprints.clone(), input.materials.to_vec());
+        let footprints = input.footprints.clone();
+        let materials = input.materials.to_vec();
         let mut made = Self { bvh, discs, footprints, materials, values, layout, largest, around: Vec::new() };
         if !input.camera.is_orthographic() {
             made.around = made.around(Vec3::ZERO);
@@ -150,7 +152,8 @@ impl<'a> Surfaces<'a> {
     fn around(&self, place: Vec3) -> Vec<(u32, u16)> {
         let mut odd: BTreeMap<(u32, u16), usize> = BTreeMap::new();
         for way in 0..WAYS {
-            let (z, turn) = (1.0 - (2 * way + 1) as f32 / WAYS as f32, way as f32 * GOLDEN_ANGLE);
+            let z = 1.0 - (2 * way + 1) as f32 / WAYS as f32;
+            let turn = way as f32 * GOLDEN_ANGLE;
             let across = (1.0 - z * z).sqrt();
             let along = Vec3::new(across * libm::cosf(turn), across * libm::sinf(turn), z);
             for (object, count) in self.crossings(place, along) {
@@ -219,8 +222,11 @@ impl<'a> Surfaces<'a> {
         let first = &self.discs[first];
         let reach = SAME / LEAST_FACING * self.largest[first.look.object as usize];
         let ray = Ray::new(from.into(), along.into(), (nearest - reach).max(0.0), nearest + reach);
-        let (mut weights, mut distance, mut normal) = (0.0, 0.0, Vec3::ZERO);
-        let (mut opacity, mut radiance) = ([0.0; 3], [0.0; 3]);
+        let mut weights = 0.0;
+        let mut distance = 0.0;
+        let mut normal = Vec3::ZERO;
+        let mut opacity = [0.0; 3];
+        let mut radiance = [0.0; 3];
         bvh.ray_traverse_anyhit(ray, |_, i| {
             let k = bvh.primitive_indices[i] as usize;
             let disc = &self.discs[k];
@@ -273,7 +279,8 @@ impl Surface {
 
     #[inline]
     fn meet(&self, from: Vec3, along: Vec3) -> Hit {
-        let (to, cosine) = (self.center - from, self.normal.dot(along));
+        let to = self.center - from;
+        let cosine = self.normal.dot(along);
         let t = self.normal.dot(to) / cosine;
         let place = along * t - to;
         let [u, v] = self.dual.map(|axis| place.dot(axis));

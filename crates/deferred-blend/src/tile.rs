@@ -84,8 +84,11 @@ impl Tile {
                     continue;
                 }
                 let [rank, of_object] = count(own[0].object, layer.start, limit, (fragments, layers));
-                let (place, distance) = (ray.at(blended.depth), ray.length * blended.depth);
-                let ((normal, curvature), object, cone) = (normal(own, input), own[0].object, ray.cone.after(distance));
+                let place = ray.at(blended.depth);
+                let distance = ray.length * blended.depth;
+                let (normal, curvature) = normal(own, input);
+                let object = own[0].object;
+                let cone = ray.cone.after(distance);
                 let layers = of_object;
                 let bound = Bound { material, object, rank, layers, normal, curvature, cone, place, distance };
                 path.cross(&bound, glass, &mut passage);
@@ -193,7 +196,8 @@ impl Tile {
 
     /// A layer behind all so far.
     fn add(&mut self, k: usize, layer: &Layer, passage: &Passage, object: u32) {
-        let (count, planes) = (self.channels.len(), self.optical_depth.len());
+        let count = self.channels.len();
+        let planes = self.optical_depth.len();
         let before = self.optical_depth[planes / 2][k];
         for (p, plane) in self.optical_depth.iter_mut().enumerate() {
             plane[k] += passage.inside[channel_of(p, planes)];

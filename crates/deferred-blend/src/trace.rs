@@ -48,7 +48,8 @@ pub(crate) fn trace<'m>(
     (mut from, mut along, mut cone): (Vec3, Vec3, Cone),
     (mut inside, channel): (Inside<'m>, usize),
 ) -> [f32; 3] {
-    let (mut sum, mut share) = ([0.0; 3], [1.0f32; 3]);
+    let mut sum = [0.0; 3];
+    let mut share = [1.0f32; 3];
     let mut leaves = inside.0.last().map_or(u32::MAX, |(object, _)| *object);
     for _ in 0..MOST_SURFACES {
         let Some(met) = glass.surfaces.nearest(from, along, Wanted::AllBut(leaves)) else {

@@ -45,7 +45,8 @@ fn through(picture: &Accumulator, channel: usize, k: usize) -> f64 {
 
 /// The share of unpolarised light that is mirrored, by the sine of the angle and the ratio of the sine beyond to it.
 fn fresnel(eta: f64, sine: f64) -> f64 {
-    let (c, t) = ((1.0 - sine * sine).sqrt(), (1.0 - (eta * sine).powi(2)).sqrt());
+    let c = (1.0 - sine * sine).sqrt();
+    let t = (1.0 - (eta * sine).powi(2)).sqrt();
     0.5 * (((eta * c - t) / (eta * c + t)).powi(2) + ((c - eta * t) / (c + eta * t)).powi(2))
 }
 
@@ -181,7 +182,8 @@ fn layers_of_the_paper_bend_by_a_power() {
         for (k, behind) in glass.behind.iter().enumerate() {
             let (_, along) = view.view_ray((k % 33) as f64 + 0.5, (k / 33) as f64 + 0.5);
             let along = along.normalize();
-            let (sine, eta) = (along.x.hypot(along.y), (1.0 / f64::from(index)).powi(layers));
+            let sine = along.x.hypot(along.y);
+            let eta = (1.0 / f64::from(index)).powi(layers);
             let found = f64::from(behind[0]).hypot(f64::from(behind[1]));
             assert!((found - eta * sine).abs() < 1e-5, "{index} {layers} pixel {k}: {found} for {}", eta * sine);
             // Eq. 15, and what is mirrored at the nearest layer.
@@ -235,7 +237,8 @@ fn db13_glass_is_the_same_whichever_way_its_normals_point() {
         cloud.normal.iter_mut().step_by(every).for_each(|n| *n = -*n);
         clear(cloud, [1.5; 3], view).draw_glass(&WHOLE, &in_sky(Bending::Traced, &|d, _| (d + Vec3::ONE).into()), &[]).1
     };
-    let (all, third) = (drawn(1), drawn(3));
+    let all = drawn(1);
+    let third = drawn(3);
     for (a, b) in all.behind.iter().zip(&third.behind).filter(|(a, _)| !a[0].is_nan()) {
         assert!((Vec3::from(*a) - Vec3::from(*b)).length() < 1e-4, "{a:?} {b:?}");
     }
@@ -289,13 +292,15 @@ fn a_wall_behind_glass_is_seen_where_the_bent_ray_meets_it() {
     let scene = slab_before_a_wall(view);
     let opaque = [4.5; 40 * 30];
     let (_, seen) = scene.draw_glass(&WHOLE, &in_sky(Bending::Traced, &|_, _| [9.0; 3]), &opaque);
-    let (mut worst, mut straight) = (0.0f64, f64::INFINITY);
+    let mut worst = 0.0f64;
+    let mut straight = f64::INFINITY;
     for (k, behind) in seen.behind.iter().enumerate() {
         let (_, along) = view.view_ray((k % 40) as f64 + 0.5, (k / 40) as f64 + 0.5);
         let unit = along.normalize();
         let sine = unit.x.hypot(unit.y);
         // Across the slab the tangent is that of the angle within.
-        let (outside, inside) = (sine / (1.0 - sine * sine).sqrt(), sine / 1.5 / (1.0 - (sine / 1.5).powi(2)).sqrt());
+        let outside = sine / (1.0 - sine * sine).sqrt();
+        let inside = sine / 1.5 / (1.0 - (sine / 1.5).powi(2)).sqrt();
         let off = outside * (3.0 + 1.0) + inside * 0.5;
         let expected = [along.x, along.y].map(|v| off * v / along.x.hypot(along.y));
         // What is mirrored at the second surface sees the sky, which is 9 as the middle of the wall.
@@ -354,7 +359,8 @@ fn rays_leave_a_ball_where_they_do() {
     let scene = clear(cloud, [1.5; 3], view);
     let sky = |d: Vec3, _: f32| [d.x, d.y, d.z];
     let (_, seen) = scene.draw_glass(&WHOLE, &in_sky(Bending::Traced, &sky), &[]);
-    let (mut met, mut worst) = (0, 0.0f64);
+    let mut met = 0;
+    let mut worst = 0.0f64;
     for (k, behind) in seen.behind.iter().enumerate() {
         let (_, along) = view.view_ray((k % 48) as f64 + 0.5, (k / 48) as f64 + 0.5);
         let miss = (DVec3::Z * -4.0).cross(along.normalize()).length();

@@ -87,7 +87,9 @@ fn groups_told_from_outside_are_checked() {
 fn whoever_cancels_gets_no_groups() {
     let graph = OverlapGraph::build(&ball(), &GraphParams::default(), None).expect("a valid cloud");
     let groups = minimum_coloring(&graph, 256, None).expect("in range").groups;
-    let (progress, weighted, added) = (Progress::new(), WeightedParams::default(), DuplicateParams::default());
+    let progress = Progress::new();
+    let weighted = WeightedParams::default();
+    let added = DuplicateParams::default();
     progress.cancel();
     let progress = Some(&progress);
     assert_eq!(minimum_coloring(&graph, 256, progress).err(), Some(Error::Cancelled));

@@ -74,7 +74,8 @@ fn db6_opacities_of_any_layers_multiply() {
 /// Ten thousand kilometres away no pair overlaps that does not, and groups are those that they were.
 #[test]
 fn db10_edges_and_groups_far_away_are_those_at_hand() {
-    let (mut near, far) = (ball(), ball());
+    let mut near = ball();
+    let far = ball();
     near.origin = DVec3::ZERO;
     assert!(far.origin.length() > 9e6);
     let graph = |cloud: &Cloud| OverlapGraph::build(cloud, &GraphParams::default(), None).expect("a valid cloud");

@@ -172,7 +172,8 @@ fn disjoint_discs_are_equal_by_every_way() {
         cloud.push(&Splat { color: [0.02 * k as f32, 0.3, 0.9], ..one });
     }
     let scene = Scene::new(cloud, parallel(DVec3::Z * 3.0, 2.2, [96, 96]));
-    let (one, four) = (by_turns(&scene.cloud, 1), by_turns(&scene.cloud, 4));
+    let one = by_turns(&scene.cloud, 1);
+    let four = by_turns(&scene.cloud, 4);
     let expected = resolve(&scene, &Params::default(), Passes::TwoPlusOne);
     assert!(expected.disc.iter().filter(|disc| **disc != u32::MAX).count() > 300);
     for passes in [plain(&one), voronoi(&one), plain(&four), voronoi(&four)] {
@@ -193,7 +194,8 @@ fn groups_that_do_not_overlap_lose_nothing() {
     sphere(&mut cloud, Vec3::new(0.0, 0.3, 1.0), 0.4, 1500, 0.5);
     cloud.object[planes..].fill(1);
     cloud.color.iter_mut().enumerate().for_each(|(k, color)| *color = [(k % 7) as f32 / 7.0, (k % 2) as f32, 0.2]);
-    let (width, height) = (120, 90);
+    let width = 120;
+    let height = 90;
     let scene = Scene::new(cloud, camera(DVec3::new(0.0, 0.2, 4.0), [width, height].map(|s| s as u32)));
     let params = Params::default();
     let groups = minimum(&scene, &params);
@@ -234,7 +236,8 @@ fn what_is_nearest_is_told_by_disc_and_object() {
         for k in 0..64 * 64 {
             let [x, y] = [(k % 64) as f32 - 31.5, (k / 64) as f32 - 31.5].map(|v| v / 32.0);
             let square = 0.25 - x * x - y * y;
-            let (object, depth) = (picture.image.object[k], picture.image.depth[k]);
+            let object = picture.image.object[k];
+            let depth = picture.image.depth[k];
             assert_eq!(object, scene.cloud.object[picture.disc[k] as usize]);
             if square > 0.02 {
                 assert!(object == 3 && (depth - 3.0 + square.sqrt()).abs() < 0.02, "{depth}");
@@ -248,13 +251,15 @@ fn what_is_nearest_is_told_by_disc_and_object() {
 #[test]
 fn any_number_of_channels_is_taken_and_two_passes_meet_twice_as_many_fragments() {
     let scene = Scene::new(soup(300, 1.0), camera(DVec3::new(0.0, 0.0, 4.0), SIZE));
-    let (params, groups) = (Params::default(), by_turns(&scene.cloud, 4));
+    let params = Params::default();
+    let groups = by_turns(&scene.cloud, 4);
     let discs = Discs::project(&scene.input(), &params);
     let fragments = [voronoi(&groups), Passes::TwoPlusOne].map(|passes| {
         let one = resolve(&scene, &params, passes);
         for channels in [0, 1, 17] {
             let values: Vec<f32> = scene.values.chunks(3).flat_map(|v| (0..channels).map(move |c| v[c % 3])).collect();
-            let (channels, max_bytes) = (channels as u32, 1 << 24);
+            let channels = channels as u32;
+            let max_bytes = 1 << 24;
             let input = OpaqueInput {
                 discs: &discs,
                 shown: Shown::Discs(&values),
@@ -299,8 +304,10 @@ fn db16_memory_does_not_grow_with_groups_times_samples() {
         let groups = by_turns(&scene.cloud, count);
         resolve(&scene, &params, voronoi(&groups)).counts.bytes
     };
-    let (few, many) = (bytes(32, 1), bytes(32, 256));
-    let (few_of_samples, many_of_samples) = (bytes(256, 1), bytes(256, 256));
+    let few = bytes(32, 1);
+    let many = bytes(32, 256);
+    let few_of_samples = bytes(256, 1);
+    let many_of_samples = bytes(256, 256);
     let of_groups = rayon::current_num_threads() as u64 * 255 * 7 * 64;
     assert_eq!((many - few, many_of_samples - few_of_samples), (of_groups, of_groups));
     // Twelve planes of four bytes, twice five for the picture, two for the lists.
@@ -313,7 +320,8 @@ fn what_is_too_much_is_refused_and_what_is_wrong_is_named() {
     let params = Params::default();
     let discs = Discs::project(&scene.input(), &params);
     let groups = by_turns(&scene.cloud, 4);
-    let (passes, max_bytes) = (voronoi(&groups), 1 << 24);
+    let passes = voronoi(&groups);
+    let max_bytes = 1 << 24;
     let input = OpaqueInput {
         discs: &discs,
         shown: Shown::Discs(&scene.values),

@@ -33,7 +33,8 @@ impl Scene {
         cloud.validate().expect("a cloud that keeps its promises");
         let values = cloud.color.iter().flatten().copied().collect();
         let ids = (0..cloud.len() as u32).filter(|i| cloud.kind[*i as usize] != SplatKind::Opaque).collect();
-        let (footprints, materials) = (FootprintStack::default(), vec![Material::default()]);
+        let footprints = FootprintStack::default();
+        let materials = vec![Material::default()];
         Self { cloud, camera, footprints, materials, values, ids }
     }
 
@@ -144,7 +145,8 @@ pub(crate) fn sphere(cloud: &mut Cloud, center: Vec3, radius: f32, count: u32, o
     let spacing = radius * (4.0 * std::f32::consts::PI / count as f32).sqrt();
     for k in 0..count {
         let z = 1.0 - (2.0 * k as f32 + 1.0) / count as f32;
-        let (around, across) = (k as f32 * 2.399_963_2, (1.0 - z * z).sqrt());
+        let around = k as f32 * 2.399_963_2;
+        let across = (1.0 - z * z).sqrt();
         let normal = Vec3::new(across * libm::cosf(around), across * libm::sinf(around), z);
         cloud.push(&disc(center + radius * normal, normal, spacing, opacity));
     }

@@ -36,7 +36,8 @@ impl<'a> Sunny<'a> {
 
     fn input(&self) -> ShadeInput<'_> {
         let Scene { cloud, camera, materials, .. } = &self.scene;
-        let (objects, lights) = (&self.objects, &self.lights);
+        let objects = &self.objects;
+        let lights = &self.lights;
         ShadeInput { cloud, materials, objects, lights, ambient: [0.1, 0.2, 0.3], camera }
     }
 
@@ -54,17 +55,22 @@ impl<'a> Sunny<'a> {
 
     /// Channels of the translucent picture, or of the opaque one.
     fn draw(&self, pixels: bool, layout: ChannelLayout, passes: Option<Passes<'_>>) -> Vec<Vec<f32>> {
-        let (params, input, values) = (Params::default(), self.input(), self.of_discs(layout));
+        let params = Params::default();
+        let input = self.input();
+        let values = self.of_discs(layout);
         let light = Lit { input: &input, layout, transforms: &self.transforms, heights: &[] };
         let shown = if pixels { Shown::Pixels(light) } else { Shown::Discs(&values) };
-        let (discs, channels) = (&Discs::project(&self.scene.input(), &params), layout.count());
+        let discs = &Discs::project(&self.scene.input(), &params);
+        let channels = layout.count();
         if let Some(passes) = passes {
-            let (channels, max_bytes) = (channels as u32, 1 << 30);
+            let channels = channels as u32;
+            let max_bytes = 1 << 30;
             let input = OpaqueInput { discs, shown, channels, objects: false, passes, max_bytes };
             return resolve_opaque(&input, &params, None).expect("in range").image.channels;
         }
         let mut picture = Accumulator::new(self.scene.camera.size, 1, channels, false, false);
-        let (range, layering) = (0.0..f32::INFINITY, Layering::Gaps);
+        let range = 0.0..f32::INFINITY;
+        let layering = Layering::Gaps;
         let input = BlendInput { discs, shown, opaque: &[], range, layering, glass: None };
         blend(&input, &params, &mut picture, None).expect("nobody cancels");
         picture.channels
@@ -127,7 +133,8 @@ fn highlights_have_fewer_facets_where_light_falls_on_pixels() {
     // The ball itself, a disc at each pixel's place.
     let exact = |k: usize| {
         let at = |i: usize, size: u32| (i as f32 + 0.5 - 0.5 * size as f32) * 2.4 / 72.0;
-        let (x, y) = (at(k % 96, 96), -at(k / 96, 72));
+        let x = at(k % 96, 96);
+        let y = -at(k / 96, 72);
         let square = x * x + y * y;
         (square < 0.8).then(|| {
             let place = Vec3::new(x, y, (1.0 - square).sqrt());
@@ -192,7 +199,8 @@ fn bumps_tilt_normals_and_move_with_their_object() {
         cloud.normal.iter_mut().for_each(|n| *n = transform.rotate(n.as_dvec3()).as_vec3());
         let eye = transform.apply(DVec3::Z * 4.0);
         let view = splat_core::Projection::Orthographic { height: 2.0 };
-        let (target, up) = (transform.apply(DVec3::ZERO), transform.rotate(DVec3::Y));
+        let target = transform.apply(DVec3::ZERO);
+        let up = transform.rotate(DVec3::Y);
         let view = splat_core::Camera::look_at(eye, target, up, view, SIZE).expect("a view");
         let mut sunny = Sunny::new(opaque(cloud), view, bumpy(height), None);
         sunny.transforms = vec![transform];

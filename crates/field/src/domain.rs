@@ -24,7 +24,8 @@ pub(crate) fn cut<F: ScalarField + ?Sized>(field: &F, mesh: Mesh) -> Mesh {
     for triangle in &mesh.triangles {
         let mut corners = Vec::with_capacity(4);
         for k in 0..3 {
-            let (a, b) = (triangle[k] as usize, triangle[(k + 1) % 3] as usize);
+            let a = triangle[k] as usize;
+            let b = triangle[(k + 1) % 3] as usize;
             if inside[a] {
                 if index[a] == u32::MAX {
                     index[a] = push(&mut part, mesh.position[a], mesh.normal[a]);
@@ -55,7 +56,8 @@ fn push(mesh: &mut Mesh, position: Vec3, normal: Vec3) -> u32 {
 
 /// The share of the way from a place inside to one outside that is inside.
 fn border<F: ScalarField + ?Sized>(field: &F, origin: DVec3, [from, to]: [Vec3; 2]) -> f32 {
-    let (mut low, mut high) = (0.0f32, 1.0f32);
+    let mut low = 0.0f32;
+    let mut high = 1.0f32;
     for _ in 0..HALVINGS {
         let middle = 0.5 * (low + high);
         if field.in_domain(origin + from.lerp(to, middle).as_dvec3()) { low = middle } else { high = middle }

@@ -120,7 +120,8 @@ impl GridField {
     /// The box around the lattice; a sheared lattice fills it in part.
     pub fn bounds(&self) -> DAabb {
         let far = self.grid().axes * DMat3::from_diagonal(self.last);
-        let (zero, origin) = (DVec3::ZERO, self.grid().origin);
+        let zero = DVec3::ZERO;
+        let origin = self.grid().origin;
         let low = far.x_axis.min(zero) + far.y_axis.min(zero) + far.z_axis.min(zero);
         let high = far.x_axis.max(zero) + far.y_axis.max(zero) + far.z_axis.max(zero);
         DAabb::new(origin + low, origin + high)
@@ -128,7 +129,8 @@ impl GridField {
 
     /// The six sides of the lattice, between which the surface lies.
     pub fn walls(&self) -> Vec<Clip> {
-        let (rows, origin) = (self.lattice_from_object.transpose(), self.grid().origin);
+        let rows = self.lattice_from_object.transpose();
+        let origin = self.grid().origin;
         let sides = |(row, last): (DVec3, f64)| {
             let low = row.dot(origin);
             let high = Clip::HalfSpace { normal: row, offset: low + last };
@@ -151,8 +153,10 @@ impl GridField {
     /// Value and gradient of the volume with respect to lattice coordinates; constant along axes on which `u` lies outside.
     #[inline(always)]
     fn lattice_slope(&self, u: DVec3) -> Slope {
-        let (grid, inside) = (self.grid(), u.clamp(DVec3::ZERO, self.last));
-        let ([x, y, z], [nx, ny, nz]) = (inside.to_array(), grid.dims);
+        let grid = self.grid();
+        let inside = u.clamp(DVec3::ZERO, self.last);
+        let [x, y, z] = inside.to_array();
+        let [nx, ny, nz] = grid.dims;
         let (value, gradient) = match self.interpolation {
             Interpolation::Trilinear => {
                 slope(grid, &[Stencil::linear(x, nx), Stencil::linear(y, ny), Stencil::linear(z, nz)])
@@ -181,7 +185,8 @@ impl GridField {
     fn range(&self, low: DVec3, high: DVec3) -> [f64; 2] {
         let dims = self.grid().dims;
         let cells = |u: DVec3| [0, 1, 2].map(|a| (u[a] as usize).min(dims[a].saturating_sub(2)));
-        let (first, last) = (cells(low), cells(high));
+        let first = cells(low);
+        let last = cells(high);
         let coarse = self.volume.ranges.over(first, last).map(f64::from);
         let across = (coarse[0] - self.isovalue) * (coarse[1] - self.isovalue) <= 0.0;
         if !across || (0..3).any(|a| last[a] - first[a] > 1) {
@@ -205,7 +210,8 @@ impl GridField {
         let (grid, [nx, ny, nz]) = (self.grid(), self.grid().dims);
         let first = DVec3::from_array(cell.map(|c| c as f64));
         let [from, to] = [low, high].map(|u| (u - first).clamp(DVec3::ZERO, DVec3::ONE));
-        let ([x, y, z], [i, j, k]) = ([[from.x, to.x], [from.y, to.y], [from.z, to.z]], cell);
+        let [x, y, z] = [[from.x, to.x], [from.y, to.y], [from.z, to.z]];
+        let [i, j, k] = cell;
         match self.interpolation {
             Interpolation::Trilinear => {
                 control_range(grid, &[Control::linear(i, x, nx), Control::linear(j, y, ny), Control::linear(k, z, nz)])
@@ -269,7 +275,8 @@ impl ScalarField for GridField {
 
     fn hessian(&self, p: DVec3) -> DMat3 {
         let u = self.lattice_coordinate(p);
-        let (grid, inside) = (self.grid(), u.clamp(DVec3::ZERO, self.last));
+        let grid = self.grid();
+        let inside = u.clamp(DVec3::ZERO, self.last);
         let lattice = match self.interpolation {
             Interpolation::Trilinear => hessian(grid, &[0, 1, 2].map(|a| Stencil::linear(inside[a], grid.dims[a]))),
             Interpolation::CatmullRom => {

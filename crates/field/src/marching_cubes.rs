@@ -92,7 +92,8 @@ fn count(signs: &Signs) -> Result<(Vec<Row>, [usize; 2]), Error> {
     let [_, ny, nz] = signs.dims;
     let triangles: [u32; 256] = std::array::from_fn(|case| TABLE.triangles[case].len() as u32);
     let row = |n: usize| -> Row {
-        let (j, k) = (n % ny, n / ny);
+        let j = n % ny;
+        let k = n / ny;
         let mut row = [0; 4];
         for w in 0..signs.words {
             (0..3).for_each(|axis| row[axis] += signs.crossed(axis, j, k, w).count_ones());
@@ -103,7 +104,8 @@ fn count(signs: &Signs) -> Result<(Vec<Row>, [usize; 2]), Error> {
         row
     };
     let mut rows: Vec<Row> = (0..ny * nz).into_par_iter().with_min_len(256).map(row).collect();
-    let (mut vertices, mut faces) = (0u64, 0u64);
+    let mut vertices = 0u64;
+    let mut faces = 0u64;
     for row in &mut rows {
         let [x, y, z, t] = row.map(u64::from);
         // Sums that do not fit are refused below.
@@ -113,7 +115,8 @@ fn count(signs: &Signs) -> Result<(Vec<Row>, [usize; 2]), Error> {
     let limit = u64::from(u32::MAX);
     for (unit, needed) in [("vertices", vertices), ("triangles", faces)] {
         if needed > limit {
-            let (what, hint) = ("an isosurface".into(), "use a coarser grid".into());
+            let what = "an isosurface".into();
+            let hint = "use a coarser grid".into();
             return Err(Error::Limit(Exceeded { what, needed, limit: Some(limit), unit, hint }));
         }
     }
@@ -172,7 +175,8 @@ impl Writer<'_> {
     fn vertex(&self, from: [usize; 3], axis: usize) -> (Vec3, Vec3) {
         let mut to = from;
         to[axis] += 1;
-        let (a, b) = (self.value(from), self.value(to));
+        let a = self.value(from);
+        let b = self.value(to);
         let t = (self.isovalue - a) / (b - a);
         let mut at = DVec3::from_array(from.map(|c| c as f64)) - self.middle;
         at[axis] += t;
@@ -196,7 +200,8 @@ impl Writer<'_> {
     /// Central differences over lattice coordinates.
     fn gradient(&self, at: [usize; 3]) -> DVec3 {
         DVec3::from_array(std::array::from_fn(|axis| {
-            let (mut low, mut high) = (at, at);
+            let mut low = at;
+            let mut high = at;
             low[axis] = at[axis].saturating_sub(1);
             high[axis] = (at[axis] + 1).min(self.grid.dims[axis] - 1);
             let half = if high[axis] - low[axis] == 2 { 0.5 } else { 1.0 };
@@ -250,7 +255,8 @@ impl Next {
     /// The vertices on the twelve edges of a cell (those that are not crossed mean nothing); moves on to the next cell.
     fn step(&mut self, case: u8) -> [u32; 12] {
         let differ = |a: u32, b: u32| u32::from((case >> a ^ case >> b) & 1);
-        let (y, z) = ([differ(0, 2), differ(4, 6)], [differ(0, 4), differ(2, 6)]);
+        let y = [differ(0, 2), differ(4, 6)];
+        let z = [differ(0, 4), differ(2, 6)];
         let vertex = [
             self.x[0],
             self.x[1],

@@ -210,7 +210,9 @@ impl MpuField {
 
     /// The place of the cube that stands for `p`, relative to the origin, and 1 for each axis on which it is `p`.
     fn local(&self, p: DVec3) -> (DVec3, DVec3) {
-        let (p, center, half) = (p - self.origin, self.octree.center, self.octree.half);
+        let p = p - self.origin;
+        let center = self.octree.center;
+        let half = self.octree.half;
         let inside = p.clamp(center - half, center + half);
         (inside, DVec3::select(p.cmpeq(inside), DVec3::ONE, DVec3::ZERO))
     }

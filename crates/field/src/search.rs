@@ -33,7 +33,8 @@ impl ZeroSearch {
     /// Asks the field for its bound on each of at most 32³ cells of the box.
     pub fn new(field: &SharedField, whole: DAabb) -> Self {
         let cells = Cells::new(whole, SURFACE_CELLS);
-        let (mut found, mut n) = (DAabb::EMPTY, 0.0);
+        let mut found = DAabb::EMPTY;
+        let mut n = 0.0;
         for k in 0..cells.count() {
             let (middle, radius) = cells.ball(k);
             let Some((least, most)) = field.bound(middle, radius) else {
@@ -54,7 +55,8 @@ impl ZeroSearch {
 /// reach; those of all voxels where there are none.
 pub fn extinct_bounds(grid: &Grid, transfer: &TransferFunction) -> DAabb {
     let [nx, ny, _] = grid.dims;
-    let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+    let mut low = DVec3::INFINITY;
+    let mut high = DVec3::NEG_INFINITY;
     for (row, values) in grid.values.chunks(nx).enumerate() {
         let seen = |v: &f32| transfer.at(*v).extinction > 0.0;
         if let (Some(first), Some(last)) = (values.iter().position(seen), values.iter().rposition(seen)) {
@@ -62,7 +64,8 @@ pub fn extinct_bounds(grid: &Grid, transfer: &TransferFunction) -> DAabb {
             (low, high) = (low.min(at(first)), high.max(at(last)));
         }
     }
-    let (first, last) = (DVec3::splat(-0.5), DVec3::from_array(grid.dims.map(|n| n as f64 - 0.5)));
+    let first = DVec3::splat(-0.5);
+    let last = DVec3::from_array(grid.dims.map(|n| n as f64 - 0.5));
     let (low, high) =
         if low.cmple(high).all() { ((low - 1.0).max(first), (high + 1.0).min(last)) } else { (first, last) };
     DAabb::of_points(DAabb::new(low, high).corners().map(|index| grid.origin + grid.axes * index))
@@ -80,7 +83,8 @@ pub fn visible_ends(grid: &Grid, transfer: &TransferFunction, scale: f64, clips:
     let row = |(row, values): (usize, &[f32])| {
         let place = |i: usize| grid.position(i, row % ny, row / ny);
         let is_seen = |i: &usize| seen(&values[*i]) && clips.iter().all(|clip| clip.keeps(place(*i)));
-        let (first, last) = ((0..nx).find(is_seen)?, (0..nx).rfind(is_seen)?);
+        let first = (0..nx).find(is_seen)?;
+        let last = (0..nx).rfind(is_seen)?;
         Some([first, last].map(place))
     };
     let mut ends: Vec<DVec3> = grid.values.par_chunks(nx).enumerate().filter_map(row).flatten_iter().collect();

@@ -96,7 +96,8 @@ impl Solid {
     pub fn of_volume(grid: Arc<Grid>, interpolation: Interpolation, level: f64, inside: Inside) -> Result<Self, Error> {
         let step = grid.shortest_step();
         let field = GridField::new(grid, interpolation, level, inside)?;
-        let (walls, bounds) = (field.walls(), field.bounds());
+        let walls = field.walls();
+        let bounds = field.bounds();
         Ok(Self { field: Arc::new(field), walls, bounds, step })
     }
 
@@ -136,7 +137,8 @@ fn slope(field: &dyn ScalarField, bounds: DAabb) -> f64 {
     let values: Vec<f64> = places.clone().map(|[i, j, k]| field.value(at(i, j, k))).collect();
     let mut slopes: Vec<f64> = Vec::new();
     for [i, j, k] in places {
-        let (here, from) = (values[index(i, j, k)], at(i, j, k));
+        let here = values[index(i, j, k)];
+        let from = at(i, j, k);
         for [l, m, n] in [[i + 1, j, k], [i, j + 1, k], [i, j, k + 1]] {
             let there = if l < nx && m < ny && n < nz { values[index(l, m, n)] } else { here };
             if (here < 0.0) != (there < 0.0) {
@@ -176,7 +178,8 @@ impl ClosedField {
 
 impl ScalarField for ClosedField {
     fn value(&self, p: DVec3) -> f64 {
-        let (value, beyond) = (self.scale * self.field.value(p), self.beyond(p).0);
+        let value = self.scale * self.field.value(p);
+        let beyond = self.beyond(p).0;
         if Self::is_wall(value, beyond) { beyond } else { value }
     }
 
@@ -185,7 +188,8 @@ impl ScalarField for ClosedField {
     }
 
     fn value_gradient(&self, p: DVec3) -> (f64, DVec3) {
-        let ((value, gradient), (beyond, normal)) = (self.field.value_gradient(p), self.beyond(p));
+        let (value, gradient) = self.field.value_gradient(p);
+        let (beyond, normal) = self.beyond(p);
         let value = self.scale * value;
         if Self::is_wall(value, beyond) { (beyond, normal) } else { (value, self.scale * gradient) }
     }
@@ -197,7 +201,8 @@ impl ScalarField for ClosedField {
 
     fn bound(&self, p: DVec3, radius: f64) -> Option<(f64, f64)> {
         let (beyond, _) = self.beyond(p);
-        let (low, high) = (beyond - radius, beyond + radius);
+        let low = beyond - radius;
+        let high = beyond + radius;
         if low > 0.0 {
             // Surely outside, whatever the field says.
             return Some((low, f64::INFINITY));

@@ -191,12 +191,14 @@ impl<'a> Block<'a> {
 
     /// Mean of the points where the edges of a cell are crossed.
     fn mean_crossing(&self, cell: [usize; 3]) -> Option<DVec3> {
-        let (mut sum, mut count) = (DVec3::ZERO, 0.0);
+        let mut sum = DVec3::ZERO;
+        let mut count = 0.0;
         for corner in 0..8usize {
             let a = [0, 1, 2].map(|d| cell[d] + (corner >> d & 1));
             for d in (0..3).filter(|d| corner >> d & 1 == 0) {
                 let b = step(a, d);
-                let (u, v) = (self.value(a), self.value(b));
+                let u = self.value(a);
+                let v = self.value(b);
                 if (u < 0.0) != (v < 0.0) {
                     sum += DVec3::from_array(a.map(|c| c as f64)) + DVec3::AXES[d] * (u / (u - v));
                     count += 1.0;
@@ -209,8 +211,10 @@ impl<'a> Block<'a> {
 
     /// The quadrilateral around the edge of the cell's lowest corner along `axis`, when crossed and inside the box.
     fn quad(&self, cell: [usize; 3], global: [usize; 3], axis: usize, quads: &mut Vec<[u64; 4]>) {
-        let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
-        let (from, to) = (self.value(cell), self.value(step(cell, axis)));
+        let u = (axis + 1) % 3;
+        let v = (axis + 2) % 3;
+        let from = self.value(cell);
+        let to = self.value(step(cell, axis));
         if (from < 0.0) == (to < 0.0) || global[u] == 0 || global[v] == 0 {
             return;
         }
@@ -238,7 +242,8 @@ fn step(mut c: [usize; 3], axis: usize) -> [usize; 3] {
 fn project<F: ScalarField + ?Sized>(field: &F, start: DVec3, cell: f64) -> (DVec3, Vec3) {
     let mut p = start;
     for _ in 0..6 {
-        let (f, g) = (field.value(p), field.gradient(p));
+        let f = field.value(p);
+        let g = field.gradient(p);
         let move_by = g * (f / g.length_squared());
         let next = p - move_by;
         // A field without gradient keeps the lattice's crossing.

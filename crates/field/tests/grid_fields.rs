@@ -56,7 +56,8 @@ fn linear_fields_are_exact_up_to_the_border_on_any_lattice() {
 fn catmull_rom_reproduces_quadratics_away_from_the_border() {
     let f = |u: DVec3| u.x * u.x - 2.0 * u.y * u.z + 0.5 * u.z * u.z - u.x * u.y + 3.0;
     let hessian = DMat3::from_cols(DVec3::new(2.0, -1.0, 0.0), DVec3::new(-1.0, 0.0, -2.0), DVec3::new(0.0, -2.0, 1.0));
-    let (cubic, linear) = (field(&sampled([7; 3], f), Interpolation::CatmullRom), field(&sampled([7; 3], f), BOTH[0]));
+    let cubic = field(&sampled([7; 3], f), Interpolation::CatmullRom);
+    let linear = field(&sampled([7; 3], f), BOTH[0]);
     let mut worst = 0.0f64;
     for i in 0..200 {
         let p = DVec3::from_array([0, 1, 2].map(|a| 1.0 + 4.0 * rng::unit(6, 0, i, a)));
@@ -103,10 +104,12 @@ fn derivatives_agree_with_finite_differences() {
 fn beyond_the_lattice_the_value_stays_and_there_is_no_surface() {
     for interpolation in BOTH {
         let f = field(&noise([4, 4, 4], 3), interpolation);
-        let (inside, outside) = (DVec3::new(3.0, 1.3, 0.4), DVec3::new(7.0, 1.3, 0.4));
+        let inside = DVec3::new(3.0, 1.3, 0.4);
+        let outside = DVec3::new(7.0, 1.3, 0.4);
         assert_eq!(f.value(inside), f.value(outside));
         assert!(f.in_domain(inside) && !f.in_domain(outside));
-        let (g, at) = (f.gradient(outside), f.gradient(inside));
+        let g = f.gradient(outside);
+        let at = f.gradient(inside);
         assert_eq!(g, DVec3::new(0.0, at.y, at.z));
         assert_eq!(f.hessian(outside).x_axis, DVec3::ZERO);
         let (low, high) = f.bound(outside, 0.25).unwrap();
@@ -117,13 +120,15 @@ fn beyond_the_lattice_the_value_stays_and_there_is_no_surface() {
 /// Checks bounds of a volume's isosurfaces through the middles of balls against values in the balls; returns the mean
 /// width of bounds over that of values.
 fn check_bounds(f: &GridField, sizes: [f64; 2], balls: u64) -> f64 {
-    let (mut width, mut spread) = (0.0, 0.0);
+    let mut width = 0.0;
+    let mut spread = 0.0;
     for i in 0..balls {
         let center = place(f.grid(), i);
         let radius = sizes[0] + (sizes[1] - sizes[0]) * rng::unit(7, 0, i, 0);
         let f = f.with_isovalue(f.value(center), Inside::Below).unwrap();
         let (low, high) = f.bound(center, radius).unwrap();
-        let (mut least, mut most) = (f64::INFINITY, f64::NEG_INFINITY);
+        let mut least = f64::INFINITY;
+        let mut most = f64::NEG_INFINITY;
         for j in 0..100 {
             let d = DVec3::from_array([0, 1, 2].map(|a| 2.0 * rng::unit(8, i, j, a) - 1.0));
             let v = f.value(center + d.normalize() * (radius * rng::unit(8, i, j, 3).cbrt()));
@@ -186,14 +191,16 @@ fn far_away_is_like_here_and_scaling_by_two_scales_exactly() {
         far.origin = DVec3::new(1e7, -1e7, 2e7);
         let mut large = grid.clone();
         large.axes *= 1024.0;
-        let (far, large) = (field(&far, interpolation), field(&large, interpolation));
+        let far = field(&far, interpolation);
+        let large = field(&large, interpolation);
         for i in 0..100 {
             let p = place(&grid, i);
             // Places that survive the shift without rounding.
             let p = (p * 4096.0).round() / 4096.0;
             let q = p + DVec3::new(1e7, -1e7, 2e7);
             assert_eq!(f.value_gradient(p), far.value_gradient(q));
-            let (a, b) = (f.bound(p, 0.25).unwrap(), far.bound(q, 0.25).unwrap());
+            let a = f.bound(p, 0.25).unwrap();
+            let b = far.bound(q, 0.25).unwrap();
             assert!((a.0 - b.0).abs() < 1e-6 && (a.1 - b.1).abs() < 1e-6, "{a:?} {b:?}");
             assert_eq!(f.value(p), large.value(p * 1024.0));
             assert_eq!(f.gradient(p), large.gradient(p * 1024.0) * 1024.0);

@@ -148,10 +148,8 @@ fn scaling_by_two_scales_exactly() {
     let mut large = grid.clone();
     (large.axes, large.origin) = (grid.axes * 1024.0, grid.origin * 1024.0);
     large.values.iter_mut().for_each(|v| *v *= 8.0);
-    let (a, b) = (
-        isosurface_to_mesh(&grid, 0.5, Inside::Above).unwrap(),
-        isosurface_to_mesh(&large, 4.0, Inside::Above).unwrap(),
-    );
+    let a = isosurface_to_mesh(&grid, 0.5, Inside::Above).unwrap();
+    let b = isosurface_to_mesh(&large, 4.0, Inside::Above).unwrap();
     assert!(a.position.iter().zip(&b.position).all(|(p, q)| *p * 1024.0 == *q));
     assert!(a.normal == b.normal && a.triangles == b.triangles);
 }

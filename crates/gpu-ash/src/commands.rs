@@ -53,7 +53,8 @@ impl Commands<'_> {
         let barrier = [vk::MemoryBarrier::default()
             .src_access_mask(vk::AccessFlags::TRANSFER_WRITE)
             .dst_access_mask(vk::AccessFlags::HOST_READ)];
-        let (from, to) = (vk::PipelineStageFlags::TRANSFER, vk::PipelineStageFlags::HOST);
+        let from = vk::PipelineStageFlags::TRANSFER;
+        let to = vk::PipelineStageFlags::HOST;
         let flags = vk::DependencyFlags::empty();
         // SAFETY: the command buffer is being recorded.
         unsafe { self.logical.raw.cmd_pipeline_barrier(self.raw, from, to, flags, &barrier, &[], &[]) }

@@ -98,7 +98,8 @@ impl Prepared {
     }
 
     fn make_objects(&mut self, recording: &Recording, commands: usize) -> Result<(), DeviceError> {
-        let (device, family) = (&self.logical.raw, self.logical.found.family);
+        let device = &self.logical.raw;
+        let family = self.logical.found.family;
         let dispatches = || recording.steps().iter().filter_map(dispatch_of);
         let bindings = dispatches().map(|d| d.buffers.len() as u32).sum::<u32>().max(1);
         let sizes =
@@ -132,7 +133,9 @@ impl Prepared {
 
     fn write(&self, recording: &Recording, waits: &[Vec<Barrier>]) -> Result<(), DeviceError> {
         let device = &self.logical.raw;
-        let (mut uploads, mut reads, mut pipelines) = (self.uploads.iter(), self.reads.iter(), self.pipelines.iter());
+        let mut uploads = self.uploads.iter();
+        let mut reads = self.reads.iter();
+        let mut pipelines = self.pipelines.iter();
         for (at, (step, waits)) in recording.steps().iter().zip(waits).enumerate() {
             let steps_of_one = self.steps / self.commands.len();
             let raw = self.commands[at / steps_of_one];

@@ -47,7 +47,8 @@ pub(crate) fn features(adapter: &wgpu::Adapter) -> wgpu::Features {
 }
 
 pub(crate) fn describe(adapter: &wgpu::Adapter) -> Adapter {
-    let (info, limits) = (adapter.get_info(), adapter.limits());
+    let info = adapter.get_info();
+    let limits = adapter.limits();
     Adapter {
         name: info.name,
         driver: format!("{} {} through wgpu", info.driver, info.driver_info),

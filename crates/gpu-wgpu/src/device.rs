@@ -73,7 +73,8 @@ impl Device {
         let driver = |e: wgpu::RequestDeviceError| DeviceError::Driver { call: "request_device", why: e.to_string() };
         let (raw, queue) = opened.map_err(driver)?;
         let faults = Arc::new(Faults::default());
-        let (noted, lost) = (faults.clone(), faults.clone());
+        let noted = faults.clone();
+        let lost = faults.clone();
         raw.on_uncaptured_error(Arc::new(move |error: wgpu::Error| noted.note(&error)));
         raw.set_device_lost_callback(move |_, _| lost.lost.store(true, Ordering::Relaxed));
         let adapter = adapters[at].clone();

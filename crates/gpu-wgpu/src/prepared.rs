@@ -55,7 +55,9 @@ pub struct Prepared {
 impl Prepared {
     pub(crate) fn new(device: &mut Device, recording: &Recording, patience: Duration) -> Self {
         let (raw, queue, faults) = device.parts();
-        let (raw, queue, faults) = (raw.clone(), queue.clone(), faults.clone());
+        let raw = raw.clone();
+        let queue = queue.clone();
+        let faults = faults.clone();
         use wgpu::BufferUsages as Usage;
         let all = Usage::STORAGE | Usage::INDIRECT | Usage::COPY_SRC | Usage::COPY_DST;
         let buffers: Vec<_> = recording.buffers().iter().map(|b| buffer(&raw, b.name, b.bytes, all)).collect();
@@ -63,7 +65,9 @@ impl Prepared {
             let of = &recording.buffers()[id.index()];
             Met { id, name: of.name, bytes: of.bytes }
         };
-        let (mut uploads, mut given, mut actions) = (Vec::new(), Vec::new(), Vec::new());
+        let mut uploads = Vec::new();
+        let mut given = Vec::new();
+        let mut actions = Vec::new();
         for step in recording.steps() {
             match step {
                 Step::Upload(id) => {
@@ -192,7 +196,8 @@ impl Prepared {
         let half = |pair: &[u8; 16], at: usize| u64::from_ne_bytes(std::array::from_fn(|k| pair[8 * at + k]));
         let time = |pair: &[u8; 16]| half(pair, 1).saturating_sub(half(pair, 0)) as f64 * tick_ns;
         let mut times = ticks.iter().map(time);
-        let (mut passes, mut took) = (Vec::new(), Vec::with_capacity(self.actions.len()));
+        let mut passes = Vec::new();
+        let mut took = Vec::with_capacity(self.actions.len());
         for action in &self.actions {
             let nanoseconds = match action {
                 Action::Dispatch(bound) => {
@@ -246,7 +251,8 @@ fn bind(
         resource: buffers[id.index()].as_entire_binding(),
     };
     let entries: Vec<_> = (0..).zip(&dispatch.buffers).map(entry).collect();
-    let (label, layout) = (Some(dispatch.kernel.name), &pipeline.get_bind_group_layout(0));
+    let label = Some(dispatch.kernel.name);
+    let layout = &pipeline.get_bind_group_layout(0);
     device.create_bind_group(&wgpu::BindGroupDescriptor { label, layout, entries: &entries })
 }
 

@@ -29,7 +29,8 @@ pub struct SliceAxis {
 impl SliceAxis {
     /// Distance along the axis of a place `offset` from `origin`, in f64, then rounded; −0 becomes +0.
     fn distance(&self, from_axis: f64, offset: glam::Vec3) -> f32 {
-        let (d, p) = (self.direction, offset.as_dvec3());
+        let d = self.direction;
+        let p = offset.as_dvec3();
         (d.x * p.x + d.y * p.y + d.z * p.z + from_axis) as f32 + 0.0
     }
 }

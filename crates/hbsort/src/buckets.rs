@@ -39,7 +39,8 @@ pub(crate) fn for_each(
 
 /// The bucket that halves the splats of `range`; `None` for work too small to share.
 fn middle_of(range: &Range<usize>, starts: &[u32]) -> Option<usize> {
-    let (first, last) = (starts[range.start], starts[range.end]);
+    let first = starts[range.start];
+    let last = starts[range.end];
     if range.len() < 2 || ((last - first) as usize) < GRAIN {
         return None;
     }

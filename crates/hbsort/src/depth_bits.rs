@@ -61,7 +61,8 @@ impl<D: Fn(usize) -> f32 + Sync, I: Fn(u32) -> u32 + Sync> DepthBits<'_, D, I> {
         let counts = &mut leaf.counts[..MOST_PASSES * DIGITS];
         self.count(b, digits, counts);
         let (from, to) = leaf.entries.split_at_mut(self.leaf_capacity);
-        let (mut from, mut to) = (&mut from[..n], &mut to[..n]);
+        let mut from = &mut from[..n];
+        let mut to = &mut to[..n];
         let parts = self.distributed.parts(b).flat_map(|(_, part)| [part]);
         scatter(parts, |e| digits.of(e, 0), &mut counts[..DIGITS], from);
         for pass in 1..passes {

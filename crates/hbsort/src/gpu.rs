@@ -107,7 +107,8 @@ pub fn record(capacities: Capacities) -> Recorded {
     r.dispatch(&kernels::HBSORT_COMPACT, Groups::cover(blocks), &compacted, &[kept]);
     r.dispatch(&kernels::HBSORT_PREPARE, Groups::cover(1), &[block_scan, state, digit_scan], &[kept]);
     for pass in 0..4 {
-        let (from, to) = (pass % 2, 1 - pass % 2);
+        let from = pass % 2;
+        let to = 1 - pass % 2;
         sort_pass(
             r,
             SortPass {
@@ -140,7 +141,8 @@ impl Recorded {
         let len = cloud.len().min(cloud.radius.len());
         check_count(len)?;
         ids.map_or(Ok(()), |ids| check_ids(ids, len))?;
-        let (needed, had) = (ids.map_or(len, <[u32]>::len) as u64, u64::from(self.capacities.splats));
+        let needed = ids.map_or(len, <[u32]>::len) as u64;
+        let had = u64::from(self.capacities.splats);
         if needed > had {
             return Err(Error::Overflow(Overflow { what: "splats", needed, had }));
         }
@@ -179,7 +181,8 @@ impl Recorded {
 /// The bytes of [`Recorded::view`] for the first `splats` of the splats, whose positions are relative to `origin`: all that
 /// a recording takes whose positions and radii another one uploads.
 pub fn view_bytes(origin: DVec3, splats: u32, camera: &Camera, params: &Params) -> Vec<u8> {
-    let (view, frustum) = (camera.view_from_offset(origin), Frustum::new(camera, params.margin_px));
+    let view = camera.view_from_offset(origin);
+    let frustum = Frustum::new(camera, params.margin_px);
     let view = SortView {
         axis_x: view.rotation.x_axis.extend(0.0).to_array(),
         axis_y: view.rotation.y_axis.extend(0.0).to_array(),
@@ -197,7 +200,8 @@ pub fn view_bytes(origin: DVec3, splats: u32, camera: &Camera, params: &Params) 
 /// Where each slice begins among the sorted keys, then their number; and which slices these are, counted from near.
 fn slices_of(slicing: &Slicing, keys: impl ExactSizeIterator<Item = u32>) -> (Vec<u32>, Vec<u64>) {
     let end = keys.len() as u32;
-    let (mut starts, mut indices) = (Vec::new(), Vec::new());
+    let mut starts = Vec::new();
+    let mut indices = Vec::new();
     // The slice of the last key that was asked for its slice, and the keys that surely share it.
     let mut current: Option<(u64, u32)> = None;
     for (at, key) in (0u32..).zip(keys) {

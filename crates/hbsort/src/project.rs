@@ -151,7 +151,8 @@ impl<'a> Projector<'a> {
     #[inline(always)]
     fn project_gathered(&self, id: impl Fn(usize) -> Option<usize>, out: &mut [u32], extremes: &mut Extremes) {
         // Lanes without a splat are culled, and change nothing.
-        let (mut position, mut radius) = ([Vec3::NAN; LANES], [f32::INFINITY; LANES]);
+        let mut position = [Vec3::NAN; LANES];
+        let mut radius = [f32::INFINITY; LANES];
         for l in 0..LANES {
             if let Some(id) = id(l) {
                 (position[l], radius[l]) = (self.cloud.position[id], self.cloud.radius[id]);
@@ -191,7 +192,8 @@ impl<'a> Projector<'a> {
 
     #[inline(always)]
     fn view_of(&self, p: Vec3) -> Vec3 {
-        let (m, t) = (&self.view.rotation, self.view.translation);
+        let m = &self.view.rotation;
+        let t = self.view.translation;
         // The order of operations of ViewTransform::depth, so that the bits agree.
         Vec3::new(
             m.x_axis.x * p.x + m.y_axis.x * p.y + m.z_axis.x * p.z + t.x,

@@ -15,7 +15,8 @@ pub fn slices(depth: &[f32], thickness: f64, params: &Params) -> Vec<(u64, Vec<u
     let back = params.direction == Direction::BackToFront;
     let mut ids: Vec<u32> = (0..depth.len() as u32).collect();
     ids.sort_by(|&a, &b| {
-        let (x, y) = (depth[a as usize], depth[b as usize]);
+        let x = depth[a as usize];
+        let y = depth[b as usize];
         let by_slice = slice_of(x).cmp(&slice_of(y));
         // Depths are compared as numbers: −0 and +0 are equal, and the id decides.
         let by_depth = if params.exact { f64::from(x).partial_cmp(&f64::from(y)) } else { None };

@@ -116,8 +116,9 @@ impl Scratch {
     /// An order to fill, with the recycled buffers and room for `n` ids.
     pub(crate) fn take_order(&mut self, n: usize) -> Result<SliceOrder, Error> {
         let spare = std::mem::take(&mut self.spare);
-        let (mut ids, mut slice_starts, mut slice_indices) =
-            (spare.input_from_sorted, spare.slice_starts, spare.slice_indices);
+        let mut ids = spare.input_from_sorted;
+        let mut slice_starts = spare.slice_starts;
+        let mut slice_indices = spare.slice_indices;
         resize(&mut ids, n)?;
         slice_starts.clear();
         slice_indices.clear();
@@ -138,7 +139,8 @@ fn bytes_of<T>(buffer: &Vec<T>) -> u64 {
 /// Makes `buffer` `n` entries long; entries that were there keep their value, which the caller overwrites.
 pub(crate) fn resize<T: Clone + Default>(buffer: &mut Vec<T>, n: usize) -> Result<(), Error> {
     let refused = |_| {
-        let (what, hint) = ("a buffer of the sort".into(), "free memory, or sort parts of the cloud".into());
+        let what = "a buffer of the sort".into();
+        let hint = "free memory, or sort parts of the cloud".into();
         let needed = (n as u64).saturating_mul(size_of::<T>() as u64);
         Error::Limit(Exceeded { what, needed, limit: None, unit: "bytes", hint })
     };
@@ -157,7 +159,8 @@ mod tests {
 
     #[test]
     fn a_buffer_that_no_memory_holds_is_refused_and_empty() {
-        let (mut buffer, n) = (vec![1u64; 8], usize::MAX / size_of::<u64>());
+        let mut buffer = vec![1u64; 8];
+        let n = usize::MAX / size_of::<u64>();
         let refused = resize(&mut buffer, n).unwrap_err();
         assert!(matches!(refused, Error::Limit(Exceeded { needed, .. }) if needed == 8 * n as u64), "{refused}");
         assert!(buffer.is_empty());

@@ -21,7 +21,8 @@ pub(crate) fn slice_bucket(
         }
     }
     let mut starts = [0u32; MOST_SLICES];
-    let (mut count, mut start) = (0usize, 0);
+    let mut count = 0usize;
+    let mut start = 0;
     for cursor in &mut cursors[..distributed.buckets] {
         if *cursor > 0 {
             starts[count] = start;

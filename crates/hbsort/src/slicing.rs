@@ -59,7 +59,8 @@ impl Slicing {
     /// The greatest relative key up to which all keys from that of `slice` on surely belong to it: a bound that lacks
     /// a few keys at most, so that most need not be asked for their slice.
     pub(crate) fn surely_within(&self, slice: u64) -> u32 {
-        let (near, slice) = (f64::from(self.near), slice as f64);
+        let near = f64::from(self.near);
+        let slice = slice as f64;
         // Two steps back from the edge outweigh the rounding of it.
         let edge = match self.direction {
             Direction::FrontToBack => ((near + (slice + 1.0) * self.thickness) as f32).next_down().next_down(),

@@ -95,7 +95,8 @@ pub(crate) fn check_count(n: usize) -> Result<(), Error> {
     if n as u64 <= MOST_SPLATS {
         return Ok(());
     }
-    let (what, hint) = ("an order".into(), "sort parts of the cloud, one behind the other".into());
+    let what = "an order".into();
+    let hint = "sort parts of the cloud, one behind the other".into();
     Err(Error::Limit(Exceeded { what, needed: n as u64, limit: Some(MOST_SPLATS), unit: "splats", hint }))
 }
 
@@ -162,7 +163,8 @@ fn run<D: Fn(u32) -> f32 + Sync, I: Fn(u32) -> u32 + Sync>(
     ids.truncate(kept);
     let slices = buckets::join_slices(&scratch.bucket_starts, ids, &mut scratch.bucket_slices);
     resize(&mut order.slice_starts, slices + 1)?;
-    let (starts, found) = (&scratch.bucket_starts, &scratch.bucket_slices);
+    let starts = &scratch.bucket_starts;
+    let found = &scratch.bucket_slices;
     buckets::gather_marks(0..buckets, starts, ids, found, &mut order.slice_starts[..slices]);
     order.slice_starts[slices] = kept as u32;
     resize(&mut order.slice_indices, slices)?;
@@ -245,7 +247,8 @@ fn by_depth_bits<D: Fn(usize) -> f32 + Sync, I: Fn(u32) -> u32 + Sync>(
     let distributed = Distributed { entries: &scratch.entries, rows: &scratch.rows, buckets: ranges.buckets };
     let leaf_capacity = leaf_capacity(n, ranges.buckets);
     let sort = DepthBits { slicing, ranges, distributed, leaf_capacity, depth_at, id_of };
-    let (starts, leaves) = (&scratch.bucket_starts, &scratch.leaves);
+    let starts = &scratch.bucket_starts;
+    let leaves = &scratch.leaves;
     let kept = starts[ranges.buckets] as usize;
     let order = |b: usize, out: &mut [u32]| sort.order_bucket(b, leaves, out);
     buckets::for_each(0..ranges.buckets, starts, &mut ids[..kept], &mut scratch.bucket_slices, &order);

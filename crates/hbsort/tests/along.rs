@@ -19,7 +19,9 @@ fn distances(cloud: &Cloud, axis: &SliceAxis) -> Vec<f64> {
 
 #[test]
 fn slices_across_a_half_vector_are_those_of_the_reference() {
-    let (cloud, axis, mut scratch) = (outdoor(60_000, FAR), half_vector(), Scratch::new());
+    let cloud = outdoor(60_000, FAR);
+    let axis = half_vector();
+    let mut scratch = Scratch::new();
     let exact_distances = distances(&cloud, &axis);
     for direction in [Direction::FrontToBack, Direction::BackToFront] {
         for (thickness, exact) in [(0.05, false), (0.05, true), (1e-6, true), (1e3, false)] {
@@ -65,7 +67,9 @@ fn an_axis_along_the_view_gives_the_slices_of_the_view() {
 
 #[test]
 fn a_slice_is_found_by_its_depth_range_whatever_the_order() {
-    let (cloud, camera, mut scratch) = (outdoor(50_000, DVec3::ZERO), camera(DVec3::ZERO), Scratch::new());
+    let cloud = outdoor(50_000, DVec3::ZERO);
+    let camera = camera(DVec3::ZERO);
+    let mut scratch = Scratch::new();
     let view = camera.view_from_offset(cloud.origin);
     for direction in [Direction::FrontToBack, Direction::BackToFront] {
         for (thickness, exact) in [(0.02, false), (0.02, true), (1e-7, false)] {
@@ -89,7 +93,8 @@ fn a_slice_is_found_by_its_depth_range_whatever_the_order() {
 #[test]
 fn what_is_no_axis_is_refused_and_what_is_no_number_left_out() {
     let mut cloud = outdoor(1000, FAR);
-    let (params, mut scratch) = (Params::default(), Scratch::new());
+    let params = Params::default();
+    let mut scratch = Scratch::new();
     for direction in [DVec3::ZERO, DVec3::X * 1.001, DVec3::NAN, DVec3::INFINITY] {
         let axis = SliceAxis { direction, ..half_vector() };
         assert!(matches!(slice_along(&cloud, None, &axis, &params, &mut scratch), Err(Error::Axis { .. })));

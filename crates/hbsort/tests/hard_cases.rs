@@ -28,7 +28,8 @@ fn agrees(depth: &[f32], params: &Params, scratch: &mut Scratch) -> Method {
 
 #[test]
 fn bs01_papers_two_levels_disagree_where_one_index_does_not() {
-    let (near, far) = (0.01, 10.0);
+    let near = 0.01;
+    let far = 10.0;
     for (thickness, share, inversion) in [(0.001, 0.02, 5.0), (0.0033, 0.5, 30.0)] {
         let depth: Vec<f32> = (0..50_000).map(|i| (near + (far - near) * rng::unit(1, 2, i, 3)) as f32).collect();
         let exact: Vec<f64> = depth.iter().map(|&d| f64::from(d)).collect();
@@ -188,7 +189,8 @@ fn bs04_more_than_half_of_the_splats_are_a_crowd() {
 fn bs05_one_tiny_splat_costs_no_slices() {
     let mut cloud = outdoor(20_000, DVec3::ZERO);
     cloud.radius.fill(1e-3);
-    let (camera, mut scratch) = (camera(DVec3::ZERO), Scratch::new());
+    let camera = camera(DVec3::ZERO);
+    let mut scratch = Scratch::new();
     let without = slice_cloud(&cloud, None, &camera, &Params::default(), &mut scratch).unwrap();
     assert_eq!(scratch.info().rule, ThicknessRule::SmallestRadius);
     assert_eq!(without.thickness, f64::from(1e-3f32));
@@ -213,7 +215,8 @@ fn bs06_a_scene_far_from_the_origin_is_sorted_as_one_at_it() {
         order.iter().enumerate().for_each(|(k, &id)| place[id as usize] = k);
         place
     };
-    let (a, b) = (places(&here.input_from_sorted), places(&there.input_from_sorted));
+    let a = places(&here.input_from_sorted);
+    let b = places(&there.input_from_sorted);
     let greatest = a.iter().zip(&b).map(|(a, b)| a.abs_diff(*b)).max().unwrap();
     assert!(greatest < 100, "{greatest} places of 30000");
 }
@@ -235,7 +238,9 @@ fn bs06_the_same_camera_at_ten_million_gives_the_same_bits() {
 
 #[test]
 fn bs07_every_splat_is_kept_or_culled() {
-    let (mut cloud, camera, mut scratch) = (outdoor(40_000, DVec3::ZERO), camera(DVec3::ZERO), Scratch::new());
+    let mut cloud = outdoor(40_000, DVec3::ZERO);
+    let camera = camera(DVec3::ZERO);
+    let mut scratch = Scratch::new();
     // Not valid clouds, but they must not break the sort either.
     for (i, bad) in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 3e38].into_iter().enumerate() {
         cloud.position[1000 * i] = Vec3::splat(bad);
@@ -294,7 +299,8 @@ fn bs08_shuffled_input_gives_the_same_order_of_splats() {
     let mut shuffled = cloud.gather(&order);
     assert_ne!(shuffled, cloud);
     shuffled.canonicalize();
-    let (camera, mut scratch) = (camera(DVec3::ZERO), Scratch::new());
+    let camera = camera(DVec3::ZERO);
+    let mut scratch = Scratch::new();
     let a = slice_cloud(&cloud, None, &camera, &Params::default(), &mut scratch).unwrap();
     let b = slice_cloud(&shuffled, None, &camera, &Params::default(), &mut scratch).unwrap();
     assert_eq!(a, b);
@@ -302,7 +308,8 @@ fn bs08_shuffled_input_gives_the_same_order_of_splats() {
 
 #[test]
 fn bs09_nothing_in_nothing_out() {
-    let (camera, mut scratch) = (camera(DVec3::ZERO), Scratch::new());
+    let camera = camera(DVec3::ZERO);
+    let mut scratch = Scratch::new();
     let empty = slice_cloud(&Cloud::new(DVec3::ZERO), None, &camera, &Params::default(), &mut scratch).unwrap();
     assert_eq!((empty.non_empty_slices(), empty.slices, empty.culled), (0, 0, 0));
     let empty = slice_depths(&[], &params(0.1, Direction::FrontToBack, true), &mut scratch).unwrap();

@@ -53,7 +53,8 @@ pub(super) fn run(arguments: &AccuracyArguments) -> Result<(), Error> {
             let sheets = sheets(&scene, &options, &points, &mut renderer, progress)?;
             progress.begin(STAGES[5].0);
             let surfels = surfels(&scene, &options, &points, &mut renderer, progress)?;
-            let (mut studies, mut absent) = (vec![points], Vec::new());
+            let mut studies = vec![points];
+            let mut absent = Vec::new();
             for study in [particles, sheets, surfels] {
                 match study {
                     Ok(study) => studies.push(study),

@@ -475,7 +475,8 @@ mod tests {
     #[test]
     fn the_help_of_every_command_has_examples_of_it() {
         for command in Arguments::command().get_subcommands() {
-            let (name, help) = (command.get_name(), command.get_after_help().map(ToString::to_string));
+            let name = command.get_name();
+            let help = command.get_after_help().map(ToString::to_string);
             let example = format!("organza {name}");
             assert!(help.is_some_and(|help| help.contains(&example)), "{name}");
         }

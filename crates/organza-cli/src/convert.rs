@@ -24,7 +24,9 @@ pub(super) fn run(arguments: &ConvertArguments) -> Result<(), Error> {
         // A power of two: no bit of a splat is lost.
         loaded.cloud.scale_world(2f64.powi(loaded.exponent));
         let materials: Vec<String> = scene.materials.iter().map(|material| material.name.clone()).collect();
-        let (cloud, names, footprints) = (&loaded.cloud, names(&loaded), &loaded.footprints);
+        let cloud = &loaded.cloud;
+        let names = names(&loaded);
+        let footprints = &loaded.footprints;
         let bytes = if arguments.packed {
             packed_splats_to_ply(cloud, &names, &materials, footprints).map_err(|e| Error::Internal(e.to_string()))?
         } else {

@@ -64,7 +64,8 @@ mod tests {
     #[test]
     fn a_software_driver_is_named_as_one() {
         let listed = |backend, name: &str, kind, memory_bytes| {
-            let (name, driver) = (name.to_owned(), "Vulkan 1.3.0".to_owned());
+            let name = name.to_owned();
+            let driver = "Vulkan 1.3.0".to_owned();
             let adapter = Adapter {
                 name,
                 driver,

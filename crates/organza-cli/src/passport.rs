@@ -102,7 +102,8 @@ mod tests {
     use organza::device::{Adapter, Agreement, KernelTime};
 
     fn one(kind: AdapterKind, outcome: Result<Agreement, String>) -> Passport {
-        let (name, driver) = ("X".to_owned(), "Vulkan 1.3.0".to_owned());
+        let name = "X".to_owned();
+        let driver = "Vulkan 1.3.0".to_owned();
         let adapter = Adapter {
             name,
             driver,

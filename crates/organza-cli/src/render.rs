@@ -371,7 +371,8 @@ impl Job<'_> {
                 ));
             }
             if report.without_room > 0 {
-                let (path, count) = (printable(path), report.without_room);
+                let path = printable(path);
+                let count = report.without_room;
                 warnings.push(format!("{path}: there is no room for {count} of the legends; use a larger --size"));
             }
             written.push((path, report));

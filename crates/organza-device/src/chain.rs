@@ -193,7 +193,8 @@ fn run_on(
     let Some(mut casts) = shadows::rooms(splats.castings, &attributes, device.adapter().binding_bytes) else {
         return Ok(Err(Reason::TooLarge));
     };
-    let (mut looked_up, lanes) = (None, Lanes::of(device.adapter()));
+    let mut looked_up = None;
+    let lanes = Lanes::of(device.adapter());
     loop {
         let whole = Whole::record(&rooms, &attributes, splats.input, splats.layout, sorts, &casts)?;
         let mut ready = match device.prepare(&whole.recording.by(lanes)) {
@@ -233,9 +234,12 @@ impl Splats<'_> {
 
     /// Room for so many entries of translucent splats, and as many as opaque ones may have.
     fn rooms(&self, attributes: &Attributes, accumulator: &Accumulator, entries: u32, most: u32) -> Rooms {
-        let (size, channels, splats) = (accumulator.size, accumulator.channels.len() as u32, attributes.room().splats);
+        let size = accumulator.size;
+        let channels = accumulator.channels.len() as u32;
+        let splats = attributes.room().splats;
         let footprints = self.footprints.layers().len() as u32;
-        let (solid, objects) = (!self.solid.is_empty(), !accumulator.object.is_empty());
+        let solid = !self.solid.is_empty();
+        let objects = !accumulator.object.is_empty();
         let all = Capacities {
             size,
             planes: accumulator.optical_depth.len() as u32,
@@ -249,7 +253,8 @@ impl Splats<'_> {
             depths: !accumulator.depth.is_empty(),
             objects,
         };
-        let (listed, entries) = (self.solid.len() as u32, room_for(self.solid.len()).min(most));
+        let listed = self.solid.len() as u32;
+        let entries = room_for(self.solid.len()).min(most);
         let resolved = resolve::Capacities { size, channels, splats, listed, entries, footprints, objects };
         Rooms { all, solid: solid.then_some(resolved) }
     }

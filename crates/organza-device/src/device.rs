@@ -175,7 +175,8 @@ mod tests {
         fn open(&self, _: &Choice, _: Validation) -> Result<Box<dyn Executor>, DeviceError> {
             let left = self.0.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |left| left.checked_sub(1));
             left.map_err(|_| DeviceError::NoDevice { why: "gone".to_owned() })?;
-            let (name, driver) = ("X".to_owned(), String::new());
+            let name = "X".to_owned();
+            let driver = String::new();
             let kind = AdapterKind::Discrete;
             Ok(Box::new(Nothing(Adapter {
                 name,
@@ -254,7 +255,8 @@ mod tests {
 
     #[test]
     fn what_cannot_be_opened_again_or_fails_otherwise_is_given_up() {
-        let (gone, whole) = (device(0), device(9));
+        let gone = device(0);
+        let whole = device(9);
         let lost = Helper::new(&gone);
         assert_eq!((attempt(&lost, &[1]), lost.said().len()), (None, 1));
         let refused = Helper::new(&whole);

@@ -31,9 +31,11 @@ pub(super) fn shadow_trial(device: &mut dyn Executor) -> Result<bool, Failure> {
     let mut cloud = Cloud::new(DVec3::ZERO);
     for i in 0..u64::from(SPLATS / 4) {
         let u = |k| 2.0 * rng::unit_f32(SEED, 1, i, k) - 1.0;
-        let (position, normal) = (Vec3::new(u(0), u(1), u(2)), Vec3::new(u(3), u(4), u(5)).normalize_or(Vec3::Z));
+        let position = Vec3::new(u(0), u(1), u(2));
+        let normal = Vec3::new(u(3), u(4), u(5)).normalize_or(Vec3::Z);
         let (kind, normal) = if i % 2 == 0 { (SplatKind::Medium, Vec3::ZERO) } else { (SplatKind::Surface, normal) };
-        let (radius, cross_section) = (0.06 + 0.03 * u(6), 1e-3);
+        let radius = 0.06 + 0.03 * u(6);
+        let cross_section = 1e-3;
         cloud.push(&Splat { position, radius, cross_section, kind, normal, ..Splat::default() });
     }
     let light = Light { shape: LightShape::Point { position: DVec3::new(0.4, 1.3, -0.3) }, intensity: [1.0; 3] };
@@ -62,7 +64,8 @@ pub(super) struct OrderInput {
 
 impl OrderInput {
     pub(super) fn new(splats: u32) -> Self {
-        let (eye, target) = (DVec3::new(3.1, 2.3, 4.7), DVec3::new(0.1, -0.2, 0.3));
+        let eye = DVec3::new(3.1, 2.3, 4.7);
+        let target = DVec3::new(0.1, -0.2, 0.3);
         let view = Projection::Perspective { fov_y: 0.7 };
         let camera = Camera::look_at(eye, target, DVec3::Y, view, [640, 480]).expect("invariant: a view of its target");
         let forward = (target - eye).normalize();

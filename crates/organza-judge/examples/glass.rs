@@ -120,7 +120,8 @@ fn sheet() -> image::RgbImage {
     let srgb = |v: f64| (255.0 * v.clamp(0.0, 1.0).powf(1.0 / 2.2) + 0.5) as u8;
     let size = [columns * side, tiles.len() / columns * side].map(|n| n as u32);
     image::RgbImage::from_fn(size[0], size[1], |x, y| {
-        let (x, y) = (x as usize, y as usize);
+        let x = x as usize;
+        let y = y as usize;
         image::Rgb(tiles[y / side * columns + x / side][y % side * side + x % side].map(srgb))
     })
 }

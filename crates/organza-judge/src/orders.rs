@@ -74,7 +74,11 @@ pub struct Ordered {
 impl Ordered {
     /// A picture of which nothing else is known.
     fn new(name: String, image: Image<Linear>) -> Self {
-        let (thickness, disorder, seconds, sampled, pop) = (None, None, None, None, None);
+        let thickness = None;
+        let disorder = None;
+        let seconds = None;
+        let sampled = None;
+        let pop = None;
         Self { name, thickness, image, disorder, seconds, bytes: 0, sampled, of_layers: false, pop }
     }
 }
@@ -138,8 +142,10 @@ pub fn compare(scene: &Scene, options: &RenderOptions, progress: &Progress) -> R
         let mut disorder = rays.disorder(&ranks(&order, loaded.cloud.len()));
         disorder.worst_backtrack *= world;
         progress.tick(0).map_err(|_| Error::Cancelled)?;
-        let (name, thickness) = (ordering.name(auto), ordering.thickness().map(|t| t * world));
-        let (image, disorder) = (image(&layers)?, Some(disorder));
+        let name = ordering.name(auto);
+        let thickness = ordering.thickness().map(|t| t * world);
+        let image = image(&layers)?;
+        let disorder = Some(disorder);
         Ok::<_, Error>(Ordered { thickness, disorder, seconds, bytes, ..Ordered::new(name, image) })
     };
     let stages = all.iter().map(|ordering| (ordering.name(auto), 1.0));

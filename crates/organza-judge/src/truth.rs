@@ -121,7 +121,8 @@ pub fn truth(
             Err(reason) => return Ok(Err(format!("object '{}': {reason}", organza::shown(&object.name)))),
         }
     }
-    let (mut lights, mut slides) = (Vec::new(), Vec::new());
+    let mut lights = Vec::new();
+    let mut slides = Vec::new();
     for light in &scene.lights {
         let known = reference::LightSource::from_light(&light.light);
         lights.push(known.ok_or_else(|| Error::Internal(format!("the reference knows no light such as {light:?}")))?);

@@ -67,7 +67,8 @@ pub(super) fn encode(
 /// Radiance of what lies before the background, premultiplied. What rounding makes of a bright background is no light.
 fn before_background(layers: &Layers) -> std::result::Result<Vec<[f32; 3]>, crate::Error> {
     let layer = |name: &str| layers.rgb(name).ok_or_else(|| Error::Internal(format!("a render has no {name} layer")));
-    let (beauty, background) = (layer("beauty")?, layer("background")?);
+    let beauty = layer("beauty")?;
+    let background = layer("background")?;
     let light = |seen: f32, behind: f32| {
         let difference = seen - behind;
         if difference <= ROUNDING * behind { 0.0 } else { difference }

@@ -163,7 +163,8 @@ impl Panel<'_> {
     /// Draws it with its upper left corner at a place.
     fn draw(&self, canvas: &mut Canvas<'_>, [left, top]: [f64; 2], capital: f64) {
         canvas.fill(pixels(left, self.width), pixels(top, self.height), PANEL, PANEL_OPACITY);
-        let (x, below) = (left + PAD * capital, top + (PAD + LINE) * capital);
+        let x = left + PAD * capital;
+        let below = top + (PAD + LINE) * capital;
         let text = |canvas: &mut Canvas<'_>, at: [f64; 2], text: &str| canvas.text(text, at, capital, TEXT);
         text(canvas, [x, top + (PAD + 1.0) * capital], &self.title);
         let bar = pixels(x, BAR * capital);
@@ -171,7 +172,8 @@ impl Panel<'_> {
         match &self.content {
             Content::Bar(height, told) => {
                 let first = (below + 0.5 * capital).round();
-                let (low, high) = (told[0].0, told[told.len().min(2) - 1].0);
+                let low = told[0].0;
+                let high = told[told.len().min(2) - 1].0;
                 for row in 0..*height as i64 {
                     let share = 1.0 - (row as f64 + 0.5) / height;
                     canvas.fill(

@@ -73,7 +73,8 @@ fn opaque(layers: &Layers, gain: f32, report: &mut WriteReport) -> Result<Vec<f3
 
 /// Displayed colours with the opacity of each pixel, not multiplied by it, of what lies before the background.
 fn transparent(layers: &Layers, gain: f32, report: &mut WriteReport) -> Result<Vec<f32>, Error> {
-    let (beauty, behind) = (layer(layers, "beauty")?, layer(layers, "background")?);
+    let beauty = layer(layers, "beauty")?;
+    let behind = layer(layers, "background")?;
     let alpha = layers.scalar("alpha").ok_or_else(|| Error::Internal("a render has no alpha layer".into()))?;
     let mut samples = Vec::with_capacity(4 * beauty.len());
     for ((beauty, behind), alpha) in beauty.iter().zip(behind).zip(alpha) {

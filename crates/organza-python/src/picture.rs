@@ -148,7 +148,10 @@ impl Picture {
         let report = written.map_err(|error| raised(&Error::Output(error)))?;
         let counts = [
             (report.clamped, "values were cut to the format's largest"),
-            (report.too_bright, "translucent pixels lose light, as they are brighter than a straight colour can be: write an .exr"),
+            (
+                report.too_bright,
+                "translucent pixels lose light, as they are brighter than a straight colour can be: write an .exr",
+            ),
             (report.without_room, "legends have no room: draw a larger picture"),
         ];
         let told = counts.into_iter().filter(|(count, _)| *count > 0);

@@ -61,7 +61,8 @@ impl<'a> At<'a> {
         if range.contains(&value) {
             return Ok(value);
         }
-        let (low, high) = (range.start(), range.end());
+        let low = range.start();
+        let high = range.end();
         let expected = match (*low, *high) {
             (SMALLEST, LARGEST) => format!("a number above 0, from {SMALLEST:e} to {LARGEST:e}"),
             (0.0, LARGEST) => format!("a number from 0 to {LARGEST:e}"),

@@ -95,8 +95,8 @@ pub fn read(file: &Path) -> Result<Vec<u8>, Error> {
 /// # Errors
 /// As [`load`], without those of reading.
 pub fn parse(file: &Path, bytes: &[u8], options: &LoadOptions) -> Result<Scene, Error> {
-    let (what, hint) =
-        (format!("the scene file {}", crate::printable(file)), "put data into files that the scene names");
+    let what = format!("the scene file {}", crate::printable(file));
+    let hint = "put data into files that the scene names";
     Exceeded::check(what, bytes.len() as u64, MAX_SCENE_BYTES, "bytes", hint).map_err(Error::Limit)?;
     let what = format!("the scene {}", crate::printable(file));
     let _held = options.memory.take(&what, bytes.len() as u64 * BYTES_PER_CHARACTER).map_err(Error::Limit)?;

@@ -70,7 +70,8 @@ impl Paths {
 
     /// What would allow a file that lies outside.
     fn hint(&self, place: &Path) -> String {
-        let (folder, above) = (self.folder.canonicalize(), place.parent().unwrap_or(place));
+        let folder = self.folder.canonicalize();
+        let above = place.parent().unwrap_or(place);
         // Another named folder is in the way of this one: both lie in what is above them.
         let above = self.named.as_deref().map_or(above.to_owned(), |named| common(named, above));
         let way = folder.ok().and_then(|folder| relative_path(&folder, &above)).unwrap_or(above);

@@ -41,7 +41,8 @@ impl DataFile {
     ) -> Result<Self, Error> {
         let columns = wish.color_by.iter().cloned().collect();
         let mut data = files.read(path, &ReadParams { columns, ..options.read_params() }, progress)?;
-        let (mut array, mut array_error) = (None, None);
+        let mut array = None;
+        let mut array_error = None;
         if let (SourceData::Grid(_), Some(name)) = (&data, &wish.color_by) {
             let params = ReadParams { array: Some(name.clone()), ..options.read_params() };
             match files.read(path, &params, progress) {

@@ -182,7 +182,8 @@ fn camera_text(found: &FoundCamera, azimuth: f64) -> String {
 /// A plane below all that is seen.
 fn ground(found: &FoundCamera) -> String {
     let (bounds, size) = (found.bounds, found.bounds.diagonal());
-    let (half, unit) = (GROUND * size, 1e-4 * size);
+    let half = GROUND * size;
+    let unit = 1e-4 * size;
     let center = DVec3::new(bounds.center().x, bounds.min.y, bounds.center().z);
     // Along the picture, so that its far side is a level horizon.
     let right = found.camera.axes[0];

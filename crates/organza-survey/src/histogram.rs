@@ -75,7 +75,9 @@ impl Histogram {
         let part = &self.counts[bins.clone()];
         let total: f64 = part.iter().map(|c| *c as f64).sum();
         let moment: f64 = part.iter().enumerate().map(|(i, c)| i as f64 * *c as f64).sum();
-        let (mut weight, mut sum, mut best) = (0.0, 0.0, (0.0, 0.0, 0usize));
+        let mut weight = 0.0;
+        let mut sum = 0.0;
+        let mut best = (0.0, 0.0, 0usize);
         for (i, count) in part.iter().enumerate() {
             weight += *count as f64;
             sum += i as f64 * *count as f64;

@@ -27,7 +27,9 @@ impl Labels {
             return None;
         }
         let [columns, rows, _] = grid.dims;
-        let (mut touching, mut same, mut jumps) = (0u64, 0u64, 0u64);
+        let mut touching = 0u64;
+        let mut same = 0u64;
+        let mut jumps = 0u64;
         let mut count = |a: f32, b: f32| {
             if a.max(b) > 0.0 {
                 touching += 1;

@@ -56,7 +56,8 @@ pub(crate) fn lamps(camera: &Camera, around: bool) -> String {
         color(FILL),
     );
     if around {
-        let (direction, color) = (direction(FROM_BACK), color(BACK));
+        let direction = direction(FROM_BACK);
+        let color = color(BACK);
         let _ = write!(
             text,
             "\n[[light]]                # the back, which is seen from behind, without shadows\n\

@@ -55,7 +55,8 @@ impl Matter {
         let (mut border, gaps) = border(grid);
         if gaps > border.len() {
             // What is around has no value: all that has one is matter, the lowest of it thin.
-            let (first, last) = (histogram.low - FOOT_OF_GAPS * spread, histogram.high);
+            let first = histogram.low - FOOT_OF_GAPS * spread;
+            let last = histogram.high;
             return Some(Self { histogram, air: None, first, last, opposite: None });
         }
         let [low, air, high] = [0.1, 0.5, 0.9].map(|share| quantile_of(&mut border, share));
@@ -72,7 +73,8 @@ impl Matter {
             return Some(Self { histogram, air: None, first, last, opposite: None });
         }
         // Farther away than air scatters by itself.
-        let (low, high) = (histogram.bin(low), histogram.bin(high));
+        let low = histogram.bin(low);
+        let high = histogram.bin(high);
         let above = sum(&histogram.counts[(2 * high - low + 1).min(BINS)..]);
         let below = sum(&histogram.counts[..(2 * low).saturating_sub(high)]);
         let is_above = above >= below;
@@ -90,13 +92,15 @@ impl Matter {
 
     /// The value that parts what is dense from the rest of matter: bone from flesh.
     pub(crate) fn dense(&self) -> f64 {
-        let (a, b) = (self.histogram.bin(self.first), self.histogram.bin(self.last));
+        let a = self.histogram.bin(self.first);
+        let b = self.histogram.bin(self.last);
         self.histogram.parting(a.min(b)..a.max(b) + 1)
     }
 
     /// The most frequent value of matter that is no air: of soft tissue in a body.
     pub(crate) fn bulk(&self) -> f64 {
-        let (a, b) = (self.histogram.bin(self.first), self.histogram.bin(self.last));
+        let a = self.histogram.bin(self.first);
+        let b = self.histogram.bin(self.last);
         let bins = a.min(b)..a.max(b) + 1;
         // Bins beside it count, so that one that is full by chance is none.
         let around = |i: &usize| sum(&self.histogram.counts[i.saturating_sub(4)..(i + 5).min(BINS)]);
@@ -154,7 +158,8 @@ fn border(grid: &Grid) -> (Vec<f32>, usize) {
     let [nx, ny, nz] = grid.dims;
     let mut all = Vec::new();
     for (row, values) in grid.values.chunks(nx).enumerate() {
-        let (j, k) = (row % ny, row / ny);
+        let j = row % ny;
+        let k = row / ny;
         if j == 0 || k == 0 || j + 1 == ny || k + 1 == nz {
             all.extend_from_slice(values);
         } else {
@@ -194,7 +199,9 @@ mod tests {
     fn matter_is_told_from_the_air_at_the_border_whichever_is_higher() {
         for (air, flesh, core) in [(0.0, 100.0, 200.0), (-1000.0, 40.0, 900.0), (250.0, 120.0, 20.0)] {
             let matter = Matter::of(&ball(air, flesh, core)).unwrap();
-            let (a, f, c) = (f64::from(air), f64::from(flesh), f64::from(core));
+            let a = f64::from(air);
+            let f = f64::from(flesh);
+            let c = f64::from(core);
             assert!((matter.air.unwrap() - a).abs() < 2.0, "{matter:?}");
             let between = |x: f64, y: f64, z: f64| (x.min(z)..=x.max(z)).contains(&y);
             assert!(
@@ -210,7 +217,8 @@ mod tests {
     #[test]
     fn a_field_of_both_signs_is_matter_on_both_sides_of_zero() {
         // Balls of +1 and −1 around which there is nothing.
-        let (plus, minus) = (ball(0.0, 60.0, 100.0), ball(0.0, 60.0, 100.0));
+        let plus = ball(0.0, 60.0, 100.0);
+        let minus = ball(0.0, 60.0, 100.0);
         let values = plus.values.iter().chain(&minus.values).enumerate();
         let values = values.map(|(i, v)| if i < plus.values.len() { *v } else { -*v }).collect();
         let both = Grid { dims: [32, 32, 64], values, ..plus };

@@ -118,7 +118,8 @@ impl Rims {
 
     /// Whether they were apart.
     fn join(&mut self, a: u32, b: u32) -> bool {
-        let (a, b) = (self.top(a), self.top(b));
+        let a = self.top(a);
+        let b = self.top(b);
         self.above[a.max(b) as usize] = a.min(b);
         a != b
     }

@@ -79,7 +79,8 @@ impl<'p> Lattice<'p> {
     /// Distance to the nearest point at another place, looked for in ever wider shells of cells.
     fn nearest(&self, p: Vec3) -> f64 {
         let middle = self.cell(p);
-        let (mut least, mut reach) = (f64::INFINITY, 0);
+        let mut least = f64::INFINITY;
+        let mut reach = 0;
         // All points within `reach` cells are known once the shell is done.
         while reach <= WIDEST && least > f64::from(self.side) * f64::from(reach - 1).max(0.0) {
             for z in -reach..=reach {

@@ -35,7 +35,8 @@ pub(crate) fn extent(grid: &Grid) -> DAabb {
 
 /// z where the data's box begins at z = 0 and lies about 0 along x and y, as printable and drawn things mostly do; `None` where it does not.
 pub(crate) fn stands_along(bounds: DAabb) -> Option<UpAxis> {
-    let (size, center) = (bounds.size(), bounds.center());
+    let size = bounds.size();
+    let center = bounds.center();
     let about = |axis: usize| center[axis].abs() <= ABOUT * size[axis];
     let stands = size.z > 0.0 && bounds.min.z.abs() <= ON * size.z && about(0) && about(1);
     stands.then_some(UpAxis::Z)

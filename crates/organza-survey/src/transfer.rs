@@ -69,9 +69,11 @@ impl Transfer {
     /// The mean of the weight's integral along lines through what shows, of lines along the three axes of the lattice.
     fn mean_length(&self, grid: &Grid) -> f64 {
         let [nx, ny, nz] = grid.dims;
-        let (mut sum, mut across) = (0.0, [vec![false; ny * nz], vec![false; nx * nz], vec![false; nx * ny]]);
+        let mut sum = 0.0;
+        let mut across = [vec![false; ny * nz], vec![false; nx * nz], vec![false; nx * ny]];
         for (row, values) in grid.values.chunks(nx).enumerate() {
-            let (j, k) = (row % ny, row / ny);
+            let j = row % ny;
+            let k = row / ny;
             for (i, v) in values.iter().enumerate() {
                 let weight = self.weight(f64::from(*v));
                 sum += weight;
@@ -127,7 +129,8 @@ fn points(matter: &Matter, look: Option<&Look>) -> (Vec<Point>, f64) {
         }
         Some(Look::Sampled(sampled)) => {
             let [low, high] = sampled.range();
-            let (least, most) = (matter.histogram.low, matter.histogram.high);
+            let least = matter.histogram.low;
+            let most = matter.histogram.high;
             // Values of a preset count as they are where they are such as the data has; else they are stretched over the data's.
             let fits = low >= least && high <= most && high - low > 0.1 * (most - least);
             let stretch = if fits || high <= low { 1.0 } else { (most - least) / (high - low) };
@@ -158,7 +161,8 @@ fn of_both_signs(matter: &Matter, opposite: [f64; 2], map: ColorMap) -> Vec<Poin
     const STEPS: usize = 8;
     let sides = [[matter.first, matter.last], opposite];
     let one = |side: usize, step: usize| {
-        let ([first, last], place) = (sides[side], step as f64 / STEPS as f64);
+        let [first, last] = sides[side];
+        let place = step as f64 / STEPS as f64;
         let sign = if last > first { 1.0 } else { -1.0 };
         Point { value: first + place * (last - first), color: map.at(0.5 + 0.5 * sign * place), weight: place * place }
     };

@@ -90,7 +90,8 @@ mod tests {
     }
 
     fn object(data: ObjectData) -> ObjectStatistics {
-        let (name, volumes_by) = ("a".into(), VolumeSampler::Auto);
+        let name = "a".into();
+        let volumes_by = VolumeSampler::Auto;
         let [opaque, by_gradient, is_plain, casts, receives] = [false, false, true, true, true];
         ObjectStatistics { name, data, opaque, by_gradient, is_plain, volumes_by, casts, receives }
     }

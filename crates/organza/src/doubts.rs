@@ -120,12 +120,14 @@ fn turned_away(loaded: &Loaded) -> Vec<String> {
     let unit = libm::exp2(f64::from(loaded.exponent));
     let one = |light: &SceneLight| {
         let shape = &light.light.shape;
-        let (at, normal) = (shape.place()?, shape.normal()?);
+        let at = shape.place()?;
+        let normal = shape.normal()?;
         // The corner of a box that lies farthest along the normal.
         let farthest = |b: &DAabb| DVec3::select(normal.cmpgt(DVec3::ZERO), b.max, b.min);
         let is_lit = boxes.iter().any(|b| (farthest(b) - at).dot(normal) > 0.0);
         (!is_lit && !boxes.is_empty()).then(|| {
-            let (at, along) = (place(at * unit), place(normal));
+            let at = place(at * unit);
+            let along = place(normal);
             format!(
                 "the flat light at {at} shines along {along}, away from all objects: turn its `normal`, or exchange `u` and `v`"
             )
@@ -224,7 +226,8 @@ fn outside(scene: &Scene, loaded: &Loaded, seen: &[bool]) -> Vec<String> {
     lost.retain(|(_, b)| !lights(loaded).any(|p| b.contains(p * unit)));
     let told = |(id, bounds): &(usize, DAabb)| {
         let name = escape_controls(&scene.objects[*id].name);
-        let (low, high) = (place(bounds.min), place(bounds.max));
+        let low = place(bounds.min);
+        let high = place(bounds.max);
         format!(
             "object '{name}' lies outside the view, from {low} to {high}: {looks}; move either, or set visible = false"
         )

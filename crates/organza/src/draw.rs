@@ -126,7 +126,8 @@ mod tests {
         let overrides = overrides.iter().map(|o| crate::scene::Override::parse(o).unwrap()).collect();
         let options = LoadOptions { overrides, ..LoadOptions::default() };
         let scene = parse("seam.toml".as_ref(), SCENE, &options).unwrap();
-        let (options, progress) = (RenderOptions::default(), Progress::new());
+        let options = RenderOptions::default();
+        let progress = Progress::new();
         let loaded = load(&scene, &options, &progress, &crate::Files::default()).unwrap();
         let plan = plan_loaded(&scene, &loaded, &options).unwrap();
         let frame = Frame::new(&scene, &loaded, &plan, &progress);

@@ -120,7 +120,8 @@ impl<'a> Frame<'a> {
 
     /// What it leaves when it is drawn.
     pub(crate) fn leaves(self) -> Leaves {
-        let (maps, shaded) = (self.maps.into_inner(), self.shaded.into_inner().unwrap_or_default());
+        let maps = self.maps.into_inner();
+        let shaded = self.shaded.into_inner().unwrap_or_default();
         Leaves { maps, lists: self.lists, shaded }
     }
 

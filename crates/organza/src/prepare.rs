@@ -157,7 +157,8 @@ pub(crate) fn prepare<'a>(
             plan_counted(&scene, &loaded, options, effects, None)?
         }
     };
-    let (plan, memory) = (planned.plan.clone(), planned.memory);
+    let plan = planned.plan.clone();
+    let memory = planned.memory;
     let mut notes = loaded.notes.clone();
     notes.extend(notes_of_scene);
     notes.extend(doubts::without_part(&scene));
@@ -441,7 +442,8 @@ fn probe_shadows(scene: &Scene, loaded: &Loaded, is_bent: bool, statistics: &mut
 /// Footprints keep their pixel rectangles in 16 bits.
 fn check_samples(scene: &Scene) -> Result<(), Error> {
     let longest = scene.camera.size[0].max(scene.camera.size[1]);
-    let (needed, limit) = (u64::from(longest) * u64::from(scene.render.antialias), u64::from(u16::MAX));
+    let needed = u64::from(longest) * u64::from(scene.render.antialias);
+    let limit = u64::from(u16::MAX);
     let hint = "use a smaller camera.size or render.antialias";
     Exceeded::check("the longer side of the image", needed, limit, "samples", hint).map_err(Error::Limit)
 }

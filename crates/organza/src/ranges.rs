@@ -25,7 +25,8 @@ pub(crate) fn ranges(frame: &Frame<'_>) -> Vec<Range<f32>> {
 
 /// Depths between which a translucent object may lie, with the place of its technique in the plan.
 fn spans(frame: &Frame<'_>) -> Vec<(usize, [f32; 2])> {
-    let (loaded, plan) = (frame.loaded, frame.plan);
+    let loaded = frame.loaded;
+    let plan = frame.plan;
     let at = |t: Technique| plan.techniques.iter().position(|u| *u == t).unwrap_or(0);
     let mut of_object: Vec<[f32; 2]> = vec![[f32::INFINITY, f32::NEG_INFINITY]; loaded.objects.len()];
     let mut meet = |object: usize, [near, far]: [f32; 2]| {
@@ -37,7 +38,8 @@ fn spans(frame: &Frame<'_>) -> Vec<(usize, [f32; 2])> {
     for i in 0..cloud.len() {
         let object = cloud.object[i] as usize;
         if cloud.kind[i] != SplatKind::Opaque && !plan.is_own[object] {
-            let (z, radius) = (place.depth(cloud.position[i]), cloud.radius[i]);
+            let z = place.depth(cloud.position[i]);
+            let radius = cloud.radius[i];
             meet(object, [z - radius, z + radius]);
         }
     }

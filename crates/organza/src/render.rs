@@ -154,7 +154,8 @@ pub(crate) fn render_keeping(
             let message = "only the technique `particles` is drawn in sets that a checkpoint can keep";
             return Err(Error::usage(message, "use --technique particles, or no --checkpoint"));
         }
-        let (kept, memory) = ((!left.is_still).then_some(&left.sets), left.files.memory(options));
+        let kept = (!left.is_still).then_some(&left.sets);
+        let memory = left.files.memory(options);
         Checkpoint::open(path, scene, options, kept, &memory)
     };
     let mut checkpoint = options.checkpoint.as_ref().map(open).transpose()?;
@@ -165,7 +166,8 @@ pub(crate) fn render_keeping(
     let stated = scene;
     let Prepared { scene, loaded, planned, explanation } = prepare(stated, options, progress, &left.files, made)?;
     let scene = &*scene;
-    let (plan, bytes) = (&planned.plan, planned.memory.total());
+    let plan = &planned.plan;
+    let bytes = planned.memory.total();
     let remembers = left.remembers(&loaded, plan, options.max_memory, bytes);
     left.fit(options.max_memory, bytes + remembers.unwrap_or(0));
     let Explanation { plan: shown, mut cost, mut warnings, notes, .. } = explanation;

@@ -65,7 +65,8 @@ impl ShadowTable {
     /// In words.
     pub(crate) fn describe(&self, light: &str) -> String {
         let tsm::Prediction { size: [columns, rows], limit, entries, .. } = self.predicted;
-        let (entries, cut) = (entries as u64, self.absorbance_cut());
+        let entries = entries as u64;
+        let cut = self.absorbance_cut();
         format!("{light}: {columns}x{rows} cells, {limit}, {entries} entries up to an absorbance of {cut:.1}")
     }
 }
@@ -176,7 +177,8 @@ fn tolerance(settings: &RenderSettings, loaded: &Loaded, point: &LightPoint, map
 /// Bytes of shadow maps, which live at once: all finished, and what building one takes beside it. With a half more, for casters that
 /// are not spread evenly make more entries than are predicted.
 pub(crate) fn bytes<'a>(tables: impl Iterator<Item = &'a ShadowTable>) -> u64 {
-    let (mut finished, mut building) = (0u64, 0);
+    let mut finished = 0u64;
+    let mut building = 0;
     for table in tables {
         let tsm::Prediction { bytes, map_bytes, .. } = table.predicted;
         finished = finished.saturating_add(map_bytes);

@@ -232,7 +232,8 @@ impl Staging {
     /// of the numbers that thin them out, and of those that choose channels.
     fn stage(&mut self, particles: &Particles, with: &Filling<'_>, keys: [u64; 2], before: u64) {
         for (block, offsets) in particles.position.chunks(BLOCK).enumerate() {
-            let (first, n) = (block * BLOCK, offsets.len());
+            let first = block * BLOCK;
+            let n = offsets.len();
             let number = before + first as u64;
             with.projector.view(offsets, with.tiling, &mut self.view);
             if with.depths != EVERYWHERE {
@@ -242,7 +243,8 @@ impl Staging {
                 let places = self.view.place[..n].iter_mut();
                 places.zip(number..).for_each(|(place, i)| *place |= clear(thinning(keys[1], i), shares));
             }
-            let (normals, colors) = (&particles.normal[first..first + n], &particles.color[first..first + n]);
+            let normals = &particles.normal[first..first + n];
+            let colors = &particles.color[first..first + n];
             if self.view.wide || normals.iter().fold(false, |any, n| any | n.is_per_crossing()) {
                 self.one_by_one(particles, first..first + n, with, (keys[0], before));
                 continue;
@@ -262,11 +264,18 @@ impl Staging {
     }
     /// A block with particles that are widened or whose k depends on their normal.
     fn one_by_one(&mut self, of: &Particles, range: Range<usize>, with: &Filling<'_>, (key, before): (u64, u64)) {
-        let (projector, outside) = (with.projector, with.tiling.tiles() as u32);
+        let projector = with.projector;
+        let outside = with.tiling.tiles() as u32;
         for (j, i) in range.enumerate() {
-            let (normal, color, number) = (of.normal[i], of.color[i], before + i as u64);
-            let (x, y, depth, mut k) = (self.view.x[j], self.view.y[j], self.view.z[j], self.view.k[j]);
-            let (tile, place) = (self.view.tile[j], self.view.place[j]);
+            let normal = of.normal[i];
+            let color = of.color[i];
+            let number = before + i as u64;
+            let x = self.view.x[j];
+            let y = self.view.y[j];
+            let depth = self.view.z[j];
+            let mut k = self.view.k[j];
+            let tile = self.view.tile[j];
+            let place = self.view.place[j];
             if normal.is_per_crossing() {
                 k *= projector.cosine(of.position[i], normal);
             }
@@ -284,7 +293,8 @@ impl Staging {
     fn widened(&mut self, foot: &Footing, record: Record, normal: PackedNormal, key: u64, with: &Filling<'_>) {
         for y in foot.y[0]..foot.y[1] {
             for x in (foot.x[0]..foot.x[1]).filter(|x| foot.covers(*x, y)) {
-                let (x, y) = (x as u32, y as u32);
+                let x = x as u32;
+                let y = y as u32;
                 let within = scramble(key ^ u64::from(x) << 48 ^ u64::from(y) << 32) as u32 & 0xffff;
                 let (tile, place) = place(x, y, within, with.tiling.columns as u32);
                 self.push(tile, Record { place: place | record.place, ..record }, normal, with.normals);

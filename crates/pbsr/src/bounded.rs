@@ -99,7 +99,8 @@ impl BoundedExtinction {
 
     /// Middles of the cells that may have an extinction, and their sides.
     pub fn seen(&self) -> (impl Iterator<Item = DVec3> + '_, DVec3) {
-        let (n, side) = (self.cells as usize, self.bounds.size() / f64::from(self.cells));
+        let n = self.cells as usize;
+        let side = self.bounds.size() / f64::from(self.cells);
         let index = move |c: usize| DVec3::new((c % n) as f64, (c / n % n) as f64, (c / (n * n)) as f64);
         let some = self.most.iter().enumerate().filter(|(_, most)| **most > 0.0);
         (some.map(move |(c, _)| self.bounds.min + side * (index(c) + 0.5)), side)
@@ -139,7 +140,8 @@ impl ScalarField for BoundedExtinction {
         if radius + off_middle > 0.5 * side.length() * (1.0 + 1e-6) {
             return self.bound_in(p, radius).map(|most| (0.0, most));
         }
-        let ([i, j, k], n) = (index.to_array().map(|v| v as usize), self.cells as usize);
+        let [i, j, k] = index.to_array().map(|v| v as usize);
+        let n = self.cells as usize;
         Some((0.0, self.most[(k * n + j) * n + i]))
     }
 }

@@ -199,7 +199,9 @@ impl<'a> BrownianSampler<'a> {
         let mut stream = Stream::new(self.params.seed, Stage::Brownian, set, chunk);
         let walkers = n.div_ceil(u64::from(self.walk.particles_per_walker)) as usize;
         let starts = self.starts.some_places(&mut stream, walkers);
-        let (mut places, mut steps, mut refused) = (Vec::with_capacity(n as usize), 0, 0);
+        let mut places = Vec::with_capacity(n as usize);
+        let mut steps = 0;
+        let mut refused = 0;
         for start in starts {
             let mut x = start;
             for _ in 0..self.walk.particles_per_walker {

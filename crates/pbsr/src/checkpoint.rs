@@ -68,8 +68,11 @@ impl Ensemble {
         let range = [f32::from_bits(read.u32()?), f32::from_bits(read.u32()?)];
         let on = |bit: u32| flags >> bit & 1 == 1;
         let depth_range = on(3).then_some(range);
-        let (effects, normal, shadow) = (on(0), on(1), on(2));
-        let (object, colored_extinction) = (on(4), on(5));
+        let effects = on(0);
+        let normal = on(1);
+        let shadow = on(2);
+        let object = on(4);
+        let colored_extinction = on(5);
         let params = EnsembleParams { effects, normal, shadow, depth_range, object, colored_extinction, radiance_unit };
         let levels = read.u32()?;
         params.validate().map_err(|e| bad(&e.to_string()))?;

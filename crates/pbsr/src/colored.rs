@@ -42,7 +42,8 @@ impl Colored {
         self.nearest.iter_mut().zip(&self.limit).for_each(|(nearest, limit)| *nearest = [*limit; 3]);
         for set in 0..all.batch {
             for record in all.of_set(set).flat_map(|task| task.tile(t)) {
-                let (nearest, hides) = (&mut self.nearest[record.pixel()], record.channels());
+                let nearest = &mut self.nearest[record.pixel()];
+                let hides = record.channels();
                 for c in (0..3).filter(|c| hides >> c & 1 == 1) {
                     nearest[c] = record.key().min(nearest[c]);
                 }
@@ -62,7 +63,8 @@ impl Colored {
         let params = &all.shader.channels;
         let mut values = [0.0; MAX_CHANNELS];
         for (record, normal) in task.tile(t).iter().zip(task.normals(t)) {
-            let (pixel, hides) = (record.pixel(), record.channels());
+            let pixel = record.pixel();
+            let hides = record.channels();
             let nearest = &mut self.nearest[pixel];
             let mut mask = 0;
             for c in (0..3).filter(|c| hides >> c & 1 == 1) {

@@ -94,7 +94,8 @@ fn put<const N: usize>(spans: &mut [Span; N], depth: f32, rank: f32) {
         k => spans[k - 1],
     };
     let k = cheapest(N, at, rank);
-    let (one, two) = (at(k), at(k + 1));
+    let one = at(k);
+    let two = at(k + 1);
     // The place of the second is free, and those between it and the sample move by one.
     if k + 1 < i {
         spans.copy_within(k + 2..i, k + 1);
@@ -108,9 +109,12 @@ fn put<const N: usize>(spans: &mut [Span; N], depth: f32, rank: f32) {
 
 /// Which of n + 1 spans becomes one with the next: that with the least samples × length, those far from the rank first.
 fn cheapest(n: usize, at: impl Fn(usize) -> Span, rank: f32) -> usize {
-    let (mut best, mut least, mut before) = (0, f32::INFINITY, 0.0);
+    let mut best = 0;
+    let mut least = f32::INFINITY;
+    let mut before = 0.0;
     for k in 0..n {
-        let (one, two) = (at(k), at(k + 1));
+        let one = at(k);
+        let two = at(k + 1);
         let both = one.count as f32 + two.count as f32;
         let away = (before - rank).max(rank - before - both).max(0.0) / rank;
         let cost = both * (two.high - one.low) / (1.0 + FAR * away * away);
@@ -189,7 +193,8 @@ impl DepthSum {
         if hits == 0 {
             return [behind, behind, behind, if solid.is_some() { 0.0 } else { f32::INFINITY }];
         }
-        let (n, all) = (f64::from(hits), f64::from(levels.max(hits)));
+        let n = f64::from(hits);
+        let all = f64::from(levels.max(hits));
         let step = f64::from(far - near) / f64::from(STEPS);
         let steps = self.sum as f64 / n;
         let variance = (self.square as f64 / n - steps * steps).max(0.0) * step * step;
@@ -214,7 +219,8 @@ impl DepthSum {
     /// As words, and back.
     pub(crate) fn words(&self) -> [u32; Self::WORDS] {
         let mut words = [0; Self::WORDS];
-        let (sum, square) = (self.sum, self.square);
+        let sum = self.sum;
+        let square = self.square;
         let head = [sum as u32, (sum >> 32) as u32, square as u32, (square >> 32) as u32];
         let spans = self.spans.iter().chain(&self.blocks);
         let spans = spans.flat_map(|s| [s.low.to_bits(), s.high.to_bits(), s.mean.to_bits(), s.count]);
@@ -252,7 +258,8 @@ mod tests {
 
     /// Depths of `levels` sets, of which `draw` gives each.
     fn depths(levels: u32, solid: Option<f32>, draw: impl Fn(u64) -> Option<f32>) -> [f32; 4] {
-        let (mut sum, mut hits) = (DepthSum::NONE, 0);
+        let mut sum = DepthSum::NONE;
+        let mut hits = 0;
         for set in 0..u64::from(levels) {
             if let Some(depth) = draw(set) {
                 sum.add(set, depth, RANGE);
@@ -270,10 +277,13 @@ mod tests {
         const LEVELS: u32 = 20_000;
         for tau in [1.0f64, 4.0] {
             // A slab from 2 to 3.
-            let (mut squares, mut sums, n) = ([0.0; 4], [0.0; 4], 200);
+            let mut squares = [0.0; 4];
+            let mut sums = [0.0; 4];
+            let n = 200;
             let mean = 1.0 / tau - 1.0 / tau.exp_m1();
             let sigma = (1.0 / (tau * tau) - tau.exp() / (tau.exp_m1() * tau.exp_m1())).sqrt();
-            let (first, median) = (-(-1.0f64 / 255.0).ln_1p() / tau, 2f64.ln() / tau);
+            let first = -(-1.0f64 / 255.0).ln_1p() / tau;
+            let median = 2f64.ln() / tau;
             let hits = f64::from(LEVELS) * -(-tau).exp_m1();
             let error = [
                 (0.69 * f64::from(LEVELS) / 255.0).sqrt().recip() / 255.0 / tau,
@@ -295,7 +305,8 @@ mod tests {
             for k in 0..3 {
                 // 200 pictures: four standard errors of the mean and of the mean square.
                 let n = n as f64;
-                let (mean, square) = (sums[k] / n, squares[k] / n);
+                let mean = sums[k] / n;
+                let square = squares[k] / n;
                 assert!(mean.abs() < 4.0 / n.sqrt(), "τ {tau}, {k}: mean z {mean}");
                 assert!((0.6..1.4).contains(&square), "τ {tau}, {k}: mean z² {square}");
             }

@@ -356,9 +356,11 @@ impl Ensemble {
 
     /// The sums by tile.
     pub(crate) fn tiles(&mut self) -> Vec<TileSums<'_>> {
-        let (hits, sums) = (AREA * self.params.hit_channels(), AREA * self.params.channels());
+        let hits = AREA * self.params.hit_channels();
+        let sums = AREA * self.params.channels();
         let inverse_unit = 1.0 / self.params.unit();
-        let (mut depths, mut objects) = (self.depths.chunks_mut(AREA), self.objects.chunks_mut(AREA));
+        let mut depths = self.depths.chunks_mut(AREA);
+        let mut objects = self.objects.chunks_mut(AREA);
         let mut apart = self.apart.chunks_mut(AREA);
         let planes = self.hits.chunks_mut(hits).zip(self.sums.chunks_mut(sums)).zip(self.squares.chunks_mut(AREA));
         let tile = |((hits, sums), squares)| TileSums {

@@ -158,7 +158,8 @@ impl Levels<'_> {
     /// Four dispatches a level, or light in place of the last.
     fn ranked(&self, r: &mut Recording) {
         let [view, objects, limits, sets, particles] = self.inputs;
-        let ([all_pixels, set], pixels) = (self.groups(), u64::from(self.capacities.pixels()));
+        let [all_pixels, set] = self.groups();
+        let pixels = u64::from(self.capacities.pixels());
         let footings = r.scratch("footings", 12 * u64::from(self.capacities.of_set));
         let [nearest, winners] = ["nearest", "winners"].map(|name| r.scratch(name, 4 * pixels));
         for level in 0..self.capacities.levels {
@@ -206,7 +207,8 @@ impl Recorded {
     /// the recording was made for none.
     pub fn uploads(&self, scene: &Scene<'_>, ensemble: &Ensemble) -> Result<Uploads, Error> {
         let [view, objects, limits] = self.surroundings(scene, ensemble)?;
-        let (mut sets, mut particles) = (Vec::new(), Vec::new());
+        let mut sets = Vec::new();
+        let mut particles = Vec::new();
         for level in 0..u64::from(self.capacities.levels) {
             let set = u64::from(ensemble.levels) + level;
             let first = particles.len();
@@ -301,7 +303,8 @@ pub fn is_shown(scene: &Scene<'_>, params: &EnsembleParams) -> bool {
 
 fn take_in(capacities: Capacities, sums: &[u8], ensemble: &mut Ensemble) -> Result<(), Error> {
     let mut more = Ensemble::new(capacities.size, &ensemble.params)?;
-    let (channels, words) = (ensemble.params.channels(), sum_words(&ensemble.params));
+    let channels = ensemble.params.channels();
+    let words = sum_words(&ensemble.params);
     let pixels = sums.chunks_exact(4 * words);
     check(pixels.len() >= more.hits.len(), "bytes read back", sums.len(), "the sums of all pixels")?;
     more.levels = capacities.levels;
@@ -336,7 +339,8 @@ fn sample(object: &Object<'_>, at: u32, set: u64, out: &mut Vec<[u32; PARTICLE_W
 }
 
 fn object_of(scene: &Scene<'_>, object: &Object<'_>) -> ParticleObject {
-    let (sampler, m) = (object.sampler, &object.look.material);
+    let sampler = object.sampler;
+    let m = &object.look.material;
     let projector = Projector::new(scene.camera, sampler.origin(), &object.transform, sampler.cross_section());
     let (wide, kind) = (|v: glam::Vec3| v.extend(0.0).to_array(), object.look.kind as u8);
     let [linear_x, linear_y, linear_z] = columns(&projector.linear);

@@ -81,7 +81,9 @@ impl<'a> LatticeSampler<'a> {
         let per_cell = 3.0 * params.particles_per_area() * grid.cell_volume() * weight;
         let blocks = Blocks::new(cells.len(), |_| per_cell)?;
         let sets = PoissonSets::new(grid.origin, params.cross_section, blocks);
-        let (axes, gradient, weight) = (grid.axes.as_mat3(), inverse.as_mat3(), weight as f32);
+        let axes = grid.axes.as_mat3();
+        let gradient = inverse.as_mat3();
+        let weight = weight as f32;
         let mut sampler = Self { grid, interpolation, level, params: *params, cells, sets, axes, gradient, weight };
         sampler.sets.share = sampler.survey();
         Ok(sampler)
@@ -147,7 +149,8 @@ impl<'a> LatticeSampler<'a> {
         }
         let values = corners(self.grid, at);
         // Not by a closure over both: one that is not inlined mixes gradients that nobody asks for.
-        let (low, high) = (interpolate(values, on_line(0.0)).0, interpolate(values, on_line(1.0)).0);
+        let low = interpolate(values, on_line(0.0)).0;
+        let high = interpolate(values, on_line(1.0)).0;
         if (low < self.level) != (high < self.level) {
             let f = on_line((self.level - low) / (high - low));
             keep(f, interpolate(values, f).1, lot);
@@ -203,8 +206,8 @@ impl Poisson for LatticeSampler<'_> {
         if self.interpolation != Interpolation::Trilinear {
             return None;
         }
-        let ([axis_x, axis_y, axis_z], [gradient_x, gradient_y, gradient_z]) =
-            (columns(&self.axes), columns(&self.gradient));
+        let [axis_x, axis_y, axis_z] = columns(&self.axes);
+        let [gradient_x, gradient_y, gradient_z] = columns(&self.gradient);
         let per_crossing = self.params.surface_opacity == SurfaceOpacity::PerCrossing;
         let [r, g, b] = self.params.color;
         let source = ParticleSource {
@@ -254,7 +257,8 @@ mod tests {
     }
 
     fn particles(sampler: &LatticeSampler<'_>, sets: u64) -> Particles {
-        let (mut all, mut scratch) = (Particles::default(), Particles::default());
+        let mut all = Particles::default();
+        let mut scratch = Particles::default();
         for set in 0..sets {
             (0..sampler.chunks()).for_each(|c| all.append(sampler.chunk(set, c, &mut scratch)));
         }

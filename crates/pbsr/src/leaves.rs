@@ -130,8 +130,10 @@ impl Leaf {
     /// All leaves of some cells, level by level, those of larger cubes first; and the cubes that were taken for empty though no bound says
     /// so. A set has so many particles on a unit of area.
     pub(crate) fn all(surface: &ImplicitSurface<'_>, cells: &Cells, per_area: f64) -> (Vec<Self>, Vec<Empty>) {
-        let (mut leaves, mut empty) = (Vec::new(), Vec::new());
-        let (mut corners, mut side) = (cells.active.clone(), cells.side);
+        let mut leaves = Vec::new();
+        let mut empty = Vec::new();
+        let mut corners = cells.active.clone();
+        let mut side = cells.side;
         // Cubes of the level before that were divided.
         let mut divided = 0;
         let lines_of = |side| Self::open(DVec3::ZERO, side).reach() * per_area;
@@ -191,7 +193,8 @@ impl Leaf {
     /// Where the line (u, v) of the graph meets the surface, nearly; `None` when it does so out of the cube.
     #[inline(always)]
     pub(crate) fn start(&self, graph: &Graph, [u, v]: [f32; 2]) -> Option<DVec3> {
-        let (x, y) = (u - 0.5, v - 0.5);
+        let x = u - 0.5;
+        let y = v - 0.5;
         let h = &graph.height;
         let t = h[0] + x * (h[1] + x * h[3] + y * h[4]) + y * (h[2] + y * h[5]);
         // The interval is mirrored onto itself: one comparison, which NaN fails.
@@ -271,7 +274,8 @@ fn corner_of(k: usize) -> DVec3 {
 
 /// What cubes hold, and those that are empty.
 fn looks(surface: &ImplicitSurface<'_>, corners: &[DVec3], side: f64) -> (Vec<Cube>, Vec<DVec3>) {
-    let (mut cubes, mut nothing) = (Vec::new(), Vec::new());
+    let mut cubes = Vec::new();
+    let mut nothing = Vec::new();
     for corners in corners.chunks(CHUNK) {
         let looks: Vec<Option<Cube>> = corners.par_iter().map(|corner| look(surface, *corner, side)).collect();
         nothing.extend(corners.iter().zip(&looks).filter(|(_, look)| look.is_none()).map(|(corner, _)| *corner));
@@ -287,7 +291,8 @@ fn look(surface: &ImplicitSurface<'_>, corner: DVec3, side: f64) -> Option<Cube>
     // False for what is not a number.
     let steady = |g: DVec3| (g - middle).length_squared() <= limit;
     let clear = CLEAR * middle.length() * side;
-    let (mut above, mut below) = (true, true);
+    let mut above = true;
+    let mut below = true;
     for place in (0..8).map(corner_of).chain(INSIDE) {
         let p = (corner + place * side).clamp(surface.bounds.min, surface.bounds.max);
         let (f, gradient) = surface.field.value_gradient(p);
@@ -343,17 +348,23 @@ impl Graph {
     fn taylor(axis: u8, foot: DVec3, gradient: DVec3, hessian: DMat3) -> Self {
         let [u, v, k] = [turned(axis, 1.0, 0.0, 0.0), turned(axis, 0.0, 1.0, 0.0), turned(axis, 0.0, 0.0, 1.0)];
         let steep = gradient.dot(k);
-        let (hu, hv) = (-gradient.dot(u) / steep, -gradient.dot(v) / steep);
-        let (to_u, to_v) = (u + k * hu, v + k * hv);
+        let hu = -gradient.dot(u) / steep;
+        let hv = -gradient.dot(v) / steep;
+        let to_u = u + k * hu;
+        let to_v = v + k * hv;
         let second = |a: DVec3, b: DVec3| -a.dot(hessian * b) / steep;
-        let (uu, uv, vv) = (second(to_u, to_u), second(to_u, to_v), second(to_v, to_v));
+        let uu = second(to_u, to_u);
+        let uv = second(to_u, to_v);
+        let vv = second(to_v, to_v);
         // From the foot to the middle of the face.
-        let (x, y) = (0.5 - foot.dot(u), 0.5 - foot.dot(v));
+        let x = 0.5 - foot.dot(u);
+        let y = 0.5 - foot.dot(v);
         let height = foot.dot(k) + hu * x + hv * y + 0.5 * (uu * x * x + vv * y * y) + uv * x * y;
         let slope = [hu + uu * x + uv * y, hv + uv * x + vv * y];
         // √(1 + |∇h|²) is convex where ∇h is linear: greatest at a corner.
         let at_corner = |k: usize| {
-            let (x, y) = ([-0.5, 0.5][k & 1], [-0.5, 0.5][k >> 1]);
+            let x = [-0.5, 0.5][k & 1];
+            let y = [-0.5, 0.5][k >> 1];
             (1.0 + (slope[0] + uu * x + uv * y).powi(2) + (slope[1] + uv * x + vv * y).powi(2)).sqrt()
         };
         let weight = (0..4).map(at_corner).fold(1.0, f64::max);
@@ -425,7 +436,8 @@ mod tests {
             assert!(leaves.len() <= if lines > WORTH { MOST_LEAVES } else { LEAVES }, "{}, {lines}", leaves.len());
             (leaves.len(), leaves.iter().filter(|leaf| leaf.graph.is_some()).count())
         };
-        let (few, many) = (of(1e3), of(1e6));
+        let few = of(1e3);
+        let many = of(1e6);
         assert!(few.0 <= LEAVES && (LEAVES..=MOST_LEAVES).contains(&many.0), "{few:?}, {many:?}");
         // Between the ridges there are graphs.
         assert!(few.1 < 100 && many.1 > 100_000, "{few:?}, {many:?}");

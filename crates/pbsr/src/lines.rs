@@ -251,7 +251,8 @@ impl<'a> LineSampler<'a> {
             for Empty { corners, side } in empty {
                 if let Some(corner) = corners.get((share / reach(*side)) as usize) {
                     let leaf = Leaf::open(*corner, *side);
-                    let (line, mut found) = (self.line(&leaf, &mut stream), Found::default());
+                    let line = self.line(&leaf, &mut stream);
+                    let mut found = Found::default();
                     self.search(&leaf, &line, 16, &mut found);
                     return self.inside(&line, &found);
                 }
@@ -358,7 +359,8 @@ impl<'a> LineSampler<'a> {
         let n = std::mem::take(&mut batch.len);
         self.surface.field.value_gradients(&batch.at[..n], &mut batch.found[..n]);
         for i in 0..n {
-            let (leaf, lot) = (&self.leaves[batch.leaf[i] as usize], batch.lot[i]);
+            let leaf = &self.leaves[batch.leaf[i] as usize];
+            let lot = batch.lot[i];
             let Some(graph) = &leaf.graph else { continue };
             let (f, gradient) = batch.found[i];
             let found = (f - self.surface.level, gradient);
@@ -403,15 +405,18 @@ impl Batch {
 
 /// The piece of a line in a box, or `None`.
 fn clip(line: &Line<'_>, low: DVec3, high: DVec3) -> Option<(f64, f64)> {
-    let (mut enter, mut leave) = (f64::NEG_INFINITY, f64::INFINITY);
+    let mut enter = f64::NEG_INFINITY;
+    let mut leave = f64::INFINITY;
     for a in 0..3 {
-        let (o, d) = (line.o[a], line.d[a]);
+        let o = line.o[a];
+        let d = line.d[a];
         if d == 0.0 {
             if !(low[a]..=high[a]).contains(&o) {
                 return None;
             }
         } else {
-            let (p, q) = ((low[a] - o) / d, (high[a] - o) / d);
+            let p = (low[a] - o) / d;
+            let q = (high[a] - o) / d;
             enter = enter.max(p.min(q));
             leave = leave.min(p.max(q));
         }

@@ -149,7 +149,8 @@ impl Poisson for MeshSampler<'_> {
 
     fn fill(&self, set: u64, chunk: usize, particles: &mut Particles) {
         let own = Steps::new(self.params.color);
-        let (seed, blocks) = (self.params.seed, &self.sets.blocks);
+        let seed = self.params.seed;
+        let blocks = &self.sets.blocks;
         let Some(density) = &self.density else {
             blocks.batches(seed, Stage::Mesh, set, chunk, |batch| self.place(batch, own, particles));
             return;

@@ -129,7 +129,8 @@ impl<'a> MetropolisSampler<'a> {
     }
 
     fn place(&self, cell: usize, share: [f32; 3]) -> Place {
-        let (at, lattice) = (self.cells.cells[cell].at, self.cells.lattice());
+        let at = self.cells.cells[cell].at;
+        let lattice = self.cells.lattice();
         let (value, gradient) = self.cells.interpolate(at, lattice.within(lattice.corner(at), share));
         let point = self.cells.transfer.at(value);
         Place { cell, share, gradient, point, weight: point.extinction * lattice.volume(at) }
@@ -196,7 +197,8 @@ impl Sampler for MetropolisSampler<'_> {
             for _ in 0..self.chains.particles_per_chain.min((wanted - made) as u32) {
                 made += 1;
                 (0..self.chains.stride).for_each(|n| self.step(&mut place, n, &mut stream));
-                let (at, lattice) = (self.cells.cells[place.cell].at, self.cells.lattice());
+                let at = self.cells.cells[place.cell].at;
+                let lattice = self.cells.lattice();
                 let corner = lattice.corner(at);
                 let offset = lattice.offset(corner, lattice.within(corner, place.share));
                 let at = self.cells.grid.origin + offset.as_dvec3();

@@ -89,7 +89,9 @@ impl Nearest {
             self.seen.resize(room, 0);
             self.colors.resize(room, PackedColor::default());
         }
-        let (nearest, seen, colors) = (&mut self.nearest[..AREA], &mut self.seen[..], &mut self.colors[..]);
+        let nearest = &mut self.nearest[..AREA];
+        let seen = &mut self.seen[..];
+        let colors = &mut self.colors[..];
         // Written always, kept when seen: whether a particle is seen cannot be foreseen.
         let mut n = 0;
         for (i, record) in records.iter().enumerate() {
@@ -105,7 +107,8 @@ impl Nearest {
 
     fn shade(&self, n: usize, task: &Task, t: usize, all: &Resolve<'_>, sums: &mut TileSums<'_>) {
         let params = &all.shader.channels;
-        let (records, normals) = (task.tile(t), task.normals(t));
+        let records = task.tile(t);
+        let normals = task.normals(t);
         let mut values = [0.0; MAX_CHANNELS];
         for &i in &self.seen[..n] {
             let record = &records[i as usize];

@@ -25,7 +25,8 @@ impl PackedNormal {
             return Self(0);
         }
         let inverse = 1.0 / sum;
-        let (x, y) = (n.x * inverse, n.y * inverse);
+        let x = n.x * inverse;
+        let y = n.y * inverse;
         let (u, v) =
             if n.z >= 0.0 { (x, y) } else { ((1.0 - y.abs()) * 1f32.copysign(x), (1.0 - x.abs()) * 1f32.copysign(y)) };
         let step = |w: f32| ((w * 0.5 + 0.5) * STEPS + 0.5) as i32 as u32;
@@ -58,7 +59,8 @@ impl PackedNormal {
             return Vec3::ZERO;
         }
         let part = |bits: u32| (bits & 0x7fff) as f32 * (2.0 / STEPS) - 1.0;
-        let (x, y) = (part(self.0), part(self.0 >> 15));
+        let x = part(self.0);
+        let y = part(self.0 >> 15);
         let z = 1.0 - x.abs() - y.abs();
         let fold = (-z).max(0.0);
         Vec3::new(x - fold.copysign(x), y - fold.copysign(y), z).normalize()

@@ -161,7 +161,8 @@ impl Ensemble {
             Some(apart) => {
                 let unit = f64::from(self.params.unit()) / f64::from(FRACTION);
                 let of_channel = |c: usize| {
-                    let (next, both) = ((c + 1) % 3, levels - f64::from(apart.either[c]));
+                    let next = (c + 1) % 3;
+                    let both = levels - f64::from(apart.either[c]);
                     let pair = open[c] * back[c] + 2.0 * both * back[next];
                     back[c] * (2.0 * apart.beside[c] as f64 * unit + pair)
                 };

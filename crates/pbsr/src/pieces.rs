@@ -43,7 +43,8 @@ impl Pieces {
     #[cfg(feature = "gpu")]
     pub(crate) fn words(&self) -> Vec<u32> {
         let words = |p: &Piece| {
-            let ([r, g, b], [dr, dg, db]) = (p.from.color, p.color);
+            let [r, g, b] = p.from.color;
+            let [dr, dg, db] = p.color;
             [p.from.value, r, g, b, p.from.extinction, dr, dg, db, p.extinction].map(f32::to_bits)
         };
         self.all.iter().flat_map(words).collect()
@@ -84,7 +85,8 @@ mod tests {
             assert_eq!(pieces.of(low, high), piece);
             for k in 0..=10 {
                 let value = low + (high - low) * k as f32 / 10.0;
-                let (found, expected) = (pieces.at(piece, value), transfer.at(value));
+                let found = pieces.at(piece, value);
+                let expected = transfer.at(value);
                 assert!((found.extinction - expected.extinction).abs() < 1e-6, "{value}: {found:?} {expected:?}");
                 assert!((0..3).all(|c| (found.color[c] - expected.color[c]).abs() < 1e-6));
             }

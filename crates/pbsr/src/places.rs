@@ -94,7 +94,8 @@ pub(crate) fn steps([nx, ny, nz]: [usize; 3]) -> [usize; 3] {
 /// Values at the corners of the cell with this first corner, x first.
 #[inline]
 pub(crate) fn corners(grid: &Grid, at: u32) -> [f32; 8] {
-    let ([next, row, layer], at) = (steps(grid.dims), at as usize);
+    let [next, row, layer] = steps(grid.dims);
+    let at = at as usize;
     let pair = |i: usize| -> [f32; 2] { [grid.values[i], grid.values[i + next]] };
     let [[a, b], [c, d], [e, f], [g, h]] = [pair(at), pair(at + row), pair(at + layer), pair(at + layer + row)];
     [a, b, c, d, e, f, g, h]

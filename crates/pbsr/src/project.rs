@@ -236,7 +236,8 @@ impl Lanes<'_> {
         let &Projector { linear, translation, focal, middle, share, size, .. } = projector;
         // Slopes of the rays at the borders: what lies beside the image has the k of the nearest pixel.
         let reach = middle.map(|middle| middle / focal);
-        let (columns, outside) = (tiling.columns as u32, tiling.tiles() as u32);
+        let columns = tiling.columns as u32;
+        let outside = tiling.tiles() as u32;
         let n = offsets.len().min(BLOCK);
         for i in 0..n {
             let p = linear * offsets[i] + translation;
@@ -280,7 +281,9 @@ mod tests {
         let mut view = View::EMPTY;
         let tiling = Tiling::new(projector.size.map(|s| s as u32));
         projector.view(&[offset], &tiling, &mut view);
-        let (x, y, k) = (view.x[0], view.y[0], view.k[0]);
+        let x = view.x[0];
+        let y = view.y[0];
+        let k = view.k[0];
         assert_eq!((view.wide, view.thin), (k > 1.0, k < 1.0));
         if k > 1.0 {
             let foot = projector.widened(x, y, k);
@@ -325,7 +328,9 @@ mod tests {
             for k in [0.3, 1.0, 2.7, 40.0] {
                 let s = k * pixel_area(&camera, DVec3::NEG_Z * depth);
                 let projector = Projector::new(&camera, DVec3::ZERO, &Similarity::default(), s);
-                let (mut hits, mut expected, mut variance) = (0.0, 0.0, 0.0);
+                let mut hits = 0.0;
+                let mut expected = 0.0;
+                let mut variance = 0.0;
                 for i in 0..100_000u64 {
                     let u = |c| rng::unit_f32(5, 0, i, c);
                     // Whole pixels around the axis, so that all phases are met, and no widened particle is cut.

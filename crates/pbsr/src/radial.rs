@@ -69,7 +69,9 @@ impl Radial {
 fn cubic([begin, end]: [f64; 2], h: impl Fn(f64) -> f64) -> [f32; 4] {
     let [a, p, q, e] = [0.0, 1.0, 2.0, 3.0].map(|k| h(begin + (end - begin) * (k / 3.0)));
     // Newton's form at 0, 1/3, 2/3 and 1, then in powers.
-    let (d1, d2, d3) = (p - a, q - 2.0 * p + a, e - 3.0 * q + 3.0 * p - a);
+    let d1 = p - a;
+    let d2 = q - 2.0 * p + a;
+    let d3 = e - 3.0 * q + 3.0 * p - a;
     let b = 3.0 * d1 - 1.5 * d2 + d3;
     let c = 4.5 * d2 - 4.5 * d3;
     [a, b, c, 4.5 * d3].map(|v| v as f32)
@@ -141,7 +143,8 @@ impl Shares {
         }
         let total = self.inside[STEPS];
         // Whichever is smaller, and has its digits.
-        let (inside, outside) = (libm::pow(square, power), -libm::expm1(power * libm::log1p(-t)));
+        let inside = libm::pow(square, power);
+        let outside = -libm::expm1(power * libm::log1p(-t));
         let (goal, begins_before) = if inside < 0.5 {
             (inside * total, self.inside.partition_point(|sum| *sum <= inside * total))
         } else {
@@ -190,7 +193,8 @@ mod tests {
             for k in 80..4096u32 {
                 let square = 1.0 - (k as f32 / 4096.0).powi(4);
                 let h = f64::from(radial.stretch(square));
-                let (found, t) = (outside(&footprint, f64::from(square) * h * h), 1.0 - f64::from(square));
+                let found = outside(&footprint, f64::from(square) * h * h);
+                let t = 1.0 - f64::from(square);
                 // A float of h has seven digits; the rim is a power of 1 - radius.
                 assert!((found - t).abs() < 4e-6 * t.powf(0.7), "{cutoff} {square}: {found} for {t}");
             }

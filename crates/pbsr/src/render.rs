@@ -198,7 +198,8 @@ impl<'a> Resolve<'a> {
         corner: [usize; 2],
         values: &mut [f32; MAX_CHANNELS],
     ) {
-        let (o, pixel) = (object as usize, record.pixel());
+        let o = object as usize;
+        let pixel = record.pixel();
         let [wx, wy] = record.within().map(f64::from);
         let at_px = [(corner[0] + pixel % TILE) as f64 + wx, (corner[1] + pixel / TILE) as f64 + wy];
         let normal = self.plan.turns[o] * normal.get();

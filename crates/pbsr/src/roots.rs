@@ -104,14 +104,16 @@ impl Line<'_> {
         if self.steepest.is_finite() && depth < DEPTH {
             return false;
         }
-        let (middle, half) = (self.o + self.d * (0.5 * (a.t + b.t)), 0.5 * (b.t - a.t) * (1.0 + 1e-12));
+        let middle = self.o + self.d * (0.5 * (a.t + b.t));
+        let half = 0.5 * (b.t - a.t) * (1.0 + 1e-12);
         let level = self.surface.level;
         self.surface.field.bound(middle, half).is_some_and(|(low, high)| low > level || high < level)
     }
 
     /// f runs towards c from both ends, on the side `up` of it: looks for the place where it turns.
     fn extremum(&self, [a, b]: [At; 2], slopes: [f64; 2], up: f64, depth: u32, found: &mut Found) {
-        let (mut low, mut high) = (a.t, b.t);
+        let mut low = a.t;
+        let mut high = b.t;
         let [mut g_low, mut g_high] = slopes;
         for step in 0..60 {
             // The root of the slope's chord, and the middle now and then so that the piece surely shrinks.
@@ -146,7 +148,8 @@ impl Line<'_> {
 
     /// The root between two ends of different sign, to 10⁻¹⁰ of the piece: positions are kept with 24 bits.
     fn bracket(&self, a: At, b: At) -> f64 {
-        let (mut low, mut high) = (a, b);
+        let mut low = a;
+        let mut high = b;
         let mut side = 0;
         let small = 1e-10 * (b.t - a.t);
         for step in 0..100 {
@@ -226,7 +229,8 @@ mod tests {
 
     #[test]
     fn a_bound_of_the_gradient_proves_what_halving_does_not_and_loses_no_root() {
-        let (apart, near) = (&Roots(&[1.5, 2.5]), &Roots(&[1.000_1, 1.000_2]));
+        let apart = &Roots(&[1.5, 2.5]);
+        let near = &Roots(&[1.000_1, 1.000_2]);
         assert!(found(apart, 0.0, 1.0).unproven > 0);
         assert_eq!(found_with(apart, [0.0, 1.0], 4.0).unproven, 0);
         // f′ is −2.0003 at 0.

@@ -150,7 +150,8 @@ impl KeptSets {
     pub fn new(sampler: &dyn Sampler, first: u64, n: usize) -> Self {
         let runs = runs(sampler);
         let one = |set: u64, run: &Run| {
-            let (mut all, mut scratch) = (Particles::default(), Particles::default());
+            let mut all = Particles::default();
+            let mut scratch = Particles::default();
             all.reserve((run.expected * 1.1) as usize + 64);
             run.chunks.clone().for_each(|c| all.append(sampler.chunk(set, c, &mut scratch)));
             all

@@ -17,7 +17,8 @@ impl Ensemble {
     pub fn accumulate(&self, layout: &ChannelLayout, objects: &[u32], accumulator: &mut Accumulator) {
         let layers = self.read(&|_, _| [0.0; 3], None);
         let scalar = |name: &str| layers.scalar(name).expect("invariant: an ensemble keeps the layers of its channels");
-        let (alpha, by_channel) = (scalar("alpha"), layers.rgb("alpha_rgb"));
+        let alpha = scalar("alpha");
+        let by_channel = layers.rgb("alpha_rgb");
         let opacity = |k: usize, c: usize| by_channel.map_or(alpha[k], |rgb| rgb[k][c]);
         for (c, plane) in accumulator.optical_depth.iter_mut().enumerate() {
             plane.iter_mut().enumerate().for_each(|(k, to)| *to = (-libm::log1pf(-opacity(k, c))).min(HIDDEN));

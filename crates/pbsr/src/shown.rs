@@ -48,7 +48,8 @@ impl Sampler for ShownSampler<'_> {
 
     fn chunk<'a>(&'a self, set: u64, chunk: usize, scratch: &'a mut Particles) -> &'a Particles {
         scratch.clear();
-        let (mut bare, origin) = (Particles::default(), self.origin());
+        let mut bare = Particles::default();
+        let origin = self.origin();
         let bare = self.bare.chunk(set, chunk, &mut bare);
         let draw = rng::bits(self.seed, THINNING, set, chunk as u64);
         for (i, ((position, normal), color)) in bare.position.iter().zip(&bare.normal).zip(&bare.color).enumerate() {

@@ -188,7 +188,8 @@ impl SplatSampler<'_> {
     /// The semi-axes of a disc.
     #[inline]
     fn axes(&self, i: usize) -> [Vec3; 2] {
-        let (normal, radius) = (self.cloud.normal_of(i), self.cloud.radius[i]);
+        let normal = self.cloud.normal_of(i);
+        let radius = self.cloud.radius[i];
         let tangent = match self.cloud.tangent_of(i) {
             Vec3::ZERO => normal.any_orthonormal_vector() * radius,
             tangent => tangent,
@@ -205,7 +206,8 @@ impl SplatSampler<'_> {
             return self.cloud.position[i] + p * radial.stretch(square) * self.cloud.radius[i];
         }
         let ([x, y], square) = on_disc(bits);
-        let ([tangent, across], h) = (self.axes(i), radial.stretch(square));
+        let [tangent, across] = self.axes(i);
+        let h = radial.stretch(square);
         self.cloud.position[i] + (tangent * x + across * y) * h
     }
 }

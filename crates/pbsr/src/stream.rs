@@ -205,7 +205,8 @@ mod tests {
         for mean in [0.0f64, 0.01, 0.7, 5.0, 11.9, 12.0, 40.0, 1e3, 1e6] {
             const N: usize = 200_000;
             let mut stream = Stream::new(3, Stage::Mesh, 0, mean.to_bits());
-            let (mut sum, mut square) = (0.0, 0.0);
+            let mut sum = 0.0;
+            let mut square = 0.0;
             for _ in 0..N {
                 let d = stream.poisson(mean) as f64 - mean;
                 sum += d;

@@ -196,7 +196,8 @@ fn row_of_cells(grid: &Grid, transfer: &TransferFunction, pieces: &Pieces, first
     let mut left = range(first);
     for i in first..first + cells(grid.dims[0]) {
         let right = range(i + next);
-        let (low, high) = (left.0.min(right.0), left.1.max(right.1));
+        let low = left.0.min(right.0);
+        let high = left.1.max(right.1);
         let most = largest_extinction(transfer, low, high);
         if most > 0.0 {
             found.push(Cell { at: i as u32, most, piece: pieces.of(low, high) });
@@ -228,8 +229,8 @@ impl Poisson for GridSampler<'_> {
         if self.density.is_some() {
             return None;
         }
-        let (mut axes, [gradient_x, gradient_y, gradient_z]) =
-            (columns(&self.grid.axes.as_mat3()), columns(&self.gradient));
+        let mut axes = columns(&self.grid.axes.as_mat3());
+        let [gradient_x, gradient_y, gradient_z] = columns(&self.gradient);
         axes.iter_mut().zip(self.lattice.ends().to_array()).for_each(|(axis, end)| axis[3] = end);
         let [axis_x, axis_y, axis_z] = axes;
         let source = ParticleSource {

@@ -73,7 +73,8 @@ impl<'a> Walk<'a> {
 
     /// Mirrored at the faces of the box.
     fn reflect(&self, p: DVec3) -> DVec3 {
-        let (low, high) = (self.surface.bounds.min, self.surface.bounds.max);
+        let low = self.surface.bounds.min;
+        let high = self.surface.bounds.max;
         let p = DVec3::select(p.cmplt(low), 2.0 * low - p, p);
         DVec3::select(p.cmpgt(high), 2.0 * high - p, p)
     }
@@ -89,7 +90,8 @@ impl<'a> Walk<'a> {
     /// the trust radius, or the gradient vanishes.
     pub fn project(&self, p: DVec3) -> Option<DVec3> {
         let mut x = p;
-        let (mut last, mut multiplicity) = (f64::INFINITY, 1.0);
+        let mut last = f64::INFINITY;
+        let mut multiplicity = 1.0;
         for _ in 0..NEWTON {
             let f = self.surface.value(x);
             if f == 0.0 {
@@ -123,7 +125,8 @@ impl<'a> Walk<'a> {
         let (gradient, _) = self.gradient(p)?;
         let n = gradient.normalize();
         let at = |t: f64| self.surface.value(p + n * t);
-        let (mut low, mut high) = (-self.trust, self.trust);
+        let mut low = -self.trust;
+        let mut high = self.trust;
         let f_low = at(low);
         if !(f_low.is_finite() && at(high).is_finite()) || (f_low < 0.0) == (at(high) < 0.0) {
             return None;
@@ -172,7 +175,8 @@ mod tests {
         // of standard errors.
         let bounds = DAabb { min: DVec3::splat(-2.0), max: DVec3::splat(2.0) };
         let surface = ImplicitSurface { field: &Torus, level: 0.0, bounds, inside: None };
-        let (step, n) = (0.01, 20_000);
+        let step = 0.01;
+        let n = 20_000;
         let walk = Walk::new(&surface, step).expect("a valid surface");
         for (u, v) in [(0.0, 0.0), (0.7, 1.0), (2.0, 2.2), (-1.0, 3.1), (3.0, -1.3)] {
             let x = Torus::at(u, v);

@@ -106,7 +106,8 @@ fn two_intersecting_planes_have_four_regions() {
     let camera = front(32);
     let s = pixel_area(&camera, DVec3::Z);
     let tilted = |slope: f32| rectangle(Vec3::ZERO, Vec3::new(1.5, 0.0, 1.5 * slope), Vec3::Y * 0.5, 1);
-    let (a, b) = (tilted(0.5), tilted(-0.5));
+    let a = tilted(0.5);
+    let b = tilted(-0.5);
     let params = |color, seed| SurfaceParams { color, ..surface(0.5, s, seed) };
     let first = MeshSampler::new(&a, &params([1.0, 0.0, 0.0], 1), None).unwrap();
     let second = MeshSampler::new(&b, &params([0.0, 1.0, 0.0], 2), None).unwrap();
@@ -215,7 +216,8 @@ fn splats_have_the_optical_depth_of_their_kernels() {
             for k in 0..n * n {
                 let at = |v: u32, k: u32| (f64::from(v) + (f64::from(k) + 0.5) / f64::from(n)) / 20.0 - 1.0;
                 // On the disc the first coordinate is stretched.
-                let (u, v) = (at(x, k % n) / cosine, at(y, k / n));
+                let u = at(x, k % n) / cosine;
+                let v = at(y, k / n);
                 depth += footprint.profile((u * u + v * v) / f64::from(radius * radius));
             }
             let depth = 0.8 * footprint.norm() / f64::from(radius * radius) * depth / f64::from(n * n);

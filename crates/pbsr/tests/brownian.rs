@@ -56,7 +56,8 @@ fn pb13_walkers_that_are_uniform_stay_so() {
         let x = (k * z).clamp(-1.0, 1.0);
         0.5 * (x * (1.0 - x * x).sqrt() + x.asin())
     };
-    let (low, high) = (below(-2.0), below(2.0));
+    let low = below(-2.0);
+    let high = below(2.0);
     let mut bins = [0u64; 20];
     ends.iter().for_each(|p| bins[((below(p.z) - low) / (high - low) * 20.0).clamp(0.0, 19.0) as usize] += 1);
     let chi2 = chi2_equal(&bins);
@@ -159,7 +160,8 @@ fn counting_spheres_find_area_and_opacity() {
     assert!(report.area_error < 0.02 && report.refused < 0.01, "{report:?}");
     // Opacity in the middle, two crossings near right angles.
     let ensemble = render(&camera, &[&sampler], 400);
-    let (mut hits, mut expected) = (0.0, 0.0);
+    let mut hits = 0.0;
+    let mut expected = 0.0;
     for y in 12..20 {
         for x in 12..20 {
             let at = |v: u32| (f64::from(v) + 0.5) / 16.0 - 1.0;

@@ -63,7 +63,9 @@ fn the_stated_error_is_that_of_the_sets() {
     let occluder = OpaqueImage { depth, channels, ..OpaqueImage::default() };
     let scene = pbsr::Scene { occluder: Some(&occluder), ..scene(&camera, &objects) };
     let mut ensemble = Ensemble::new([16, 16], &APART).unwrap();
-    let (mut sums, mut squares, mut last) = (vec![0.0f64; 256], vec![0.0f64; 256], vec![0.0f64; 256]);
+    let mut sums = vec![0.0f64; 256];
+    let mut squares = vec![0.0f64; 256];
+    let mut last = vec![0.0f64; 256];
     const LEVELS: u32 = 64;
     let read = |ensemble: &Ensemble| ensemble.read(&|_, _| [0.5, 0.125, 0.75], Some(&occluder));
     for set in 1..=LEVELS {
@@ -96,7 +98,8 @@ mod deep {
         let front = front(32);
         let oblique = camera(Projection::Perspective { fov_y: 0.5 }, 4.0, [32, 32]);
         // Optical depths of the planes in their largest channel; black planes before white.
-        let (a, b) = (0.8f64, 0.5f64);
+        let a = 0.8f64;
+        let b = 0.5f64;
         let shares = [[1.0, 0.5, 0.125], [0.0, 0.25, 1.0]];
         for (camera, scale) in [(&front, 1.0), (&front, 0.1), (&oblique, 1.0), (&oblique, 0.3)] {
             let s = scale * pixel_area(camera, DVec3::Z * 0.5);
@@ -111,10 +114,12 @@ mod deep {
             let mut ensemble = Ensemble::new([32, 32], &APART).unwrap();
             fold_into(&scene(camera, &objects), &mut ensemble, LEVELS);
             let layers = ensemble.read(&|_, _| [1.0; 3], None);
-            let (beauty, alpha) = (layers.rgb("beauty").unwrap(), layers.rgb("alpha_rgb").unwrap());
+            let beauty = layers.rgb("beauty").unwrap();
+            let alpha = layers.rgb("alpha_rgb").unwrap();
             for c in 0..3 {
                 let t = (-a * f64::from(shares[0][c]) - b * f64::from(shares[1][c])).exp();
-                let (n, all) = (beauty.len() as f64, f64::from(LEVELS));
+                let n = beauty.len() as f64;
+                let all = f64::from(LEVELS);
                 let error = (t * (1.0 - t) / all).sqrt();
                 let z = |k: usize| (f64::from(beauty[k][c]) - t) / error;
                 let mean = (0..beauty.len()).map(z).sum::<f64>() / n.sqrt();

@@ -15,7 +15,9 @@ const COLOR: [f32; 3] = [0.950_01, 0.5005, 0.0511];
 /// The largest deviation of the means of some colours from [`COLOR`] in standard deviations, and the standard deviations
 /// over the colour.
 fn deviation(colors: impl Iterator<Item = [f32; 3]>) -> (f64, f64) {
-    let (mut n, mut sum, mut squares) = (0.0, [0.0; 3], [0.0; 3]);
+    let mut n = 0.0;
+    let mut sum = [0.0; 3];
+    let mut squares = [0.0; 3];
     for color in colors {
         n += 1.0;
         for c in 0..3 {
@@ -114,7 +116,8 @@ fn colours_are_within_a_step_and_exact_where_they_need_no_rounding() {
         let u = |k| rng::unit_f32(2, 1, i, k);
         let place = Vec3::new(u(3), u(4), u(5));
         let color: [f32; 3] = std::array::from_fn(|k| (u(k as u64) * 20.0 - 10.0).exp2());
-        let (largest, back) = (color.iter().fold(0.0f32, |m, c| m.max(*c)), PackedColor::at(color, place).get());
+        let largest = color.iter().fold(0.0f32, |m, c| m.max(*c));
+        let back = PackedColor::at(color, place).get();
         for k in 0..3 {
             assert!((back[k] - color[k]).abs() <= largest / 255.5, "{color:?} → {back:?}");
         }

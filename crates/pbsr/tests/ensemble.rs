@@ -45,7 +45,8 @@ fn pb06_the_error_falls_with_the_root_of_the_repeat_level() {
         points.push((f64::from(levels).ln(), error.ln()));
     }
     let n = points.len() as f64;
-    let (mx, my) = (points.iter().map(|p| p.0).sum::<f64>() / n, points.iter().map(|p| p.1).sum::<f64>() / n);
+    let mx = points.iter().map(|p| p.0).sum::<f64>() / n;
+    let my = points.iter().map(|p| p.1).sum::<f64>() / n;
     let slope = points.iter().map(|p| (p.0 - mx) * (p.1 - my)).sum::<f64>()
         / points.iter().map(|p| (p.0 - mx).powi(2)).sum::<f64>();
     assert!((slope + 0.5).abs() < 0.03, "slope {slope}");
@@ -92,7 +93,8 @@ fn pb02_opaque_surfaces_are_exact_as_occluders() {
     }
     let ensemble = fold(&Scene { occluder: Some(&occluder), ..scene(&camera, &objects) }, 400);
     let layers = ensemble.read(&|_, _| [0.0; 3], Some(&occluder));
-    let (beauty, alpha) = (layers.rgb("beauty").unwrap(), layers.scalar("alpha").unwrap());
+    let beauty = layers.rgb("beauty").unwrap();
+    let alpha = layers.scalar("alpha").unwrap();
     for k in 0..256 {
         if k % 16 < 8 {
             assert_eq!((beauty[k], alpha[k]), ([0.25, 0.5, 0.75], 1.0), "pixel {k}");
@@ -123,7 +125,8 @@ fn pb16_coincident_surfaces_share_their_pixels_fairly() {
         f64::from(sums[0] / (sums[0] + sums[1]))
     };
     // 1024 pixels × 200 sets: 4σ = 0.0045.
-    let (one, two) = (share([&red, &green]), share([&green, &red]));
+    let one = share([&red, &green]);
+    let two = share([&green, &red]);
     assert!((one - 0.5).abs() < 0.006 && (two - 0.5).abs() < 0.006, "{one} {two}");
 }
 
@@ -181,7 +184,8 @@ fn x2_a_scene_at_1e7_has_the_same_hits() {
         let sampler = MeshSampler::new(&mesh, &params(0.4, 3e-3, [1.0; 3], 1), None).unwrap();
         all_hits(&render(&camera, &[&sampler], 8))
     };
-    let (near, far) = (at(DVec3::ZERO), at(DVec3::splat(1e7)));
+    let near = at(DVec3::ZERO);
+    let far = at(DVec3::splat(1e7));
     let differ = near.iter().zip(&far).filter(|(a, b)| a != b).count();
     assert_eq!(differ, 0, "of {}", near.len());
 }
@@ -206,7 +210,8 @@ fn x3_scaling_by_powers_of_two_changes_no_hit() {
 fn depths_are_those_of_the_hits() {
     let camera = front(16);
     let s = pixel_area(&camera, DVec3::Z);
-    let (near, far) = (wall(1.0), wall(-1.0));
+    let near = wall(1.0);
+    let far = wall(-1.0);
     let a = MeshSampler::new(&near, &params(0.5, s, [1.0; 3], 1), None).unwrap();
     let b = MeshSampler::new(&far, &params(0.999_999, s, [1.0; 3], 2), None).unwrap();
     let kept = EnsembleParams { depth_range: Some([0.0, 8.0]), ..EnsembleParams::default() };
@@ -316,7 +321,8 @@ fn sums_gathered_by_tile_are_those_added_hit_by_hit() {
             .unwrap();
         ensemble.read(&|_, _| [0.25; 3], None)
     };
-    let (gathered, one_by_one) = (fold(false), fold(true));
+    let gathered = fold(false);
+    let one_by_one = fold(true);
     for name in ["beauty", "alpha", "std_error"] {
         assert_eq!(gathered.images.get(name), one_by_one.images.get(name), "{name}");
     }
@@ -374,7 +380,8 @@ mod deep {
         let many = KeptSets::new(&sampler, 100, SETS as usize);
         let moved = Object { transform: turned, ..object(&many) };
         let ensemble = fold(&scene(&camera, &[moved]), SETS);
-        let (mut sum, mut n) = (0.0, 0.0);
+        let mut sum = 0.0;
+        let mut n = 0.0;
         for y in 2..30 {
             for x in 2..30 {
                 sum += f64::from(ensemble.hits(x, y));

@@ -21,8 +21,10 @@ fn transfer() -> TransferFunction {
 /// Length of a ray within the voxels of a grid, and steps of it around them.
 fn length_within(grid: &Grid, around: f64, (origin, direction): (DVec3, DVec3)) -> f64 {
     let index = grid.axes.inverse();
-    let (o, d) = (index * (origin - grid.origin), index * direction);
-    let (mut from, mut to) = (0.0, f64::INFINITY);
+    let o = index * (origin - grid.origin);
+    let d = index * direction;
+    let mut from = 0.0;
+    let mut to = f64::INFINITY;
     for a in 0..3 {
         let sides = [-0.5 - around, grid.dims[a] as f64 - 0.5 + around];
         let [near, far] = sides.map(|side| (side - o[a]) / d[a]);
@@ -124,7 +126,8 @@ mod deep {
 
     #[test]
     fn eight_voxels_along_a_ray_have_eight_voxels_of_optical_depth() {
-        let (camera, transfer) = (front(40), transfer());
+        let camera = front(40);
+        let transfer = transfer();
         let [grid, ..] = lattices();
         let params = VolumeParams { cross_section: pixel_area(&camera, DVec3::Z), ..VolumeParams::default() };
         for (s, sampler) in samplers(&grid, &transfer, &params).iter().enumerate() {
@@ -132,7 +135,8 @@ mod deep {
             let pixels = || (4..36).flat_map(|y| (4..36).map(move |x| (x, y)));
             let hits: f64 = pixels().map(|(x, y)| f64::from(ensemble.hits(x, y))).sum();
             let rays = pixels().count() as f64 * 400.0;
-            let (found, expected) = (-(1.0 - hits / rays).ln(), 8.0 * 0.2 * f64::from(EXTINCTION));
+            let found = -(1.0 - hits / rays).ln();
+            let expected = 8.0 * 0.2 * f64::from(EXTINCTION);
             // d τ = d α / (1 − α), of a binomial variable.
             let sigma = (expected.exp_m1() / rays).sqrt();
             assert!((found - expected).abs() < 4.0 * sigma, "sampler {s}: τ = {found} for {expected} ± {sigma}");

@@ -44,7 +44,8 @@ fn pb13_lines_are_uniform_on_spheres_and_ellipsoids() {
         let x = (k * z).clamp(-1.0, 1.0);
         0.5 * (x * (1.0 - x * x).sqrt() + x.asin())
     };
-    let (low, high) = (below(-3.0), below(3.0));
+    let low = below(-3.0);
+    let high = below(3.0);
     let mut bins = [0u64; 20];
     let all = positions(&sampler, 1);
     all.iter().for_each(|p| bins[((below(p.z) - low) / (high - low) * 20.0).clamp(0.0, 19.0) as usize] += 1);
@@ -59,7 +60,8 @@ fn pb13_lines_are_uniform_on_tori_and_across_edges() {
     let sampler =
         LineSampler::new(&boxed(&field, 1.1), &LineParams { resolution: 32 }, &params(0.5, 4e-5), None).unwrap();
     let all = positions(&sampler, 0);
-    let (mut tube, mut ring) = ([0u64; 40], [0u64; 40]);
+    let mut tube = [0u64; 40];
+    let mut ring = [0u64; 40];
     for p in &all {
         let phi = p.z.atan2(p.x.hypot(p.y) - 0.7);
         let share = 0.5 + (phi + 3.0 / 7.0 * phi.sin()) / (2.0 * PI);
@@ -285,7 +287,8 @@ impl ScalarField for Needle {
     }
 
     fn hessian(&self, p: DVec3) -> DMat3 {
-        let (d, hill) = (DVec3::new(p.x - 0.019, p.y - 0.0093, 0.0), Self::hill(p));
+        let d = DVec3::new(p.x - 0.019, p.y - 0.0093, 0.0);
+        let hill = Self::hill(p);
         let second = |a: f64, b: f64, same: f64| (60000.0 * 60000.0 * a * b - 60000.0 * same) * hill;
         let cross = second(d.x, d.y, 0.0);
         DMat3::from_cols(

@@ -113,7 +113,8 @@ fn lattice(kind: SplatKind) -> &'static Cloud {
         let z = if kind == SplatKind::Medium { at(i / (N * N)) } else { 0.0 };
         let position = Vec3::new(at(i % N), at(i / N % N), z);
         let cross_section = if kind == SplatKind::Medium { 0.5 * h * h * h } else { 0.7 * h * h };
-        let (radius, normal) = (2.4 * h, Vec3::Z);
+        let radius = 2.4 * h;
+        let normal = Vec3::Z;
         cloud.push(&Splat {
             position,
             radius,
@@ -217,7 +218,8 @@ fn pb13_pb14_shares_of_surfaces() {
     let make = |s| shown(MeshSampler::new(mesh, &half(s), None).unwrap());
     check(&make, by_share, 2);
     // Half of a square of area 4, in the colours of its places.
-    let (sampler, expected) = (make(FINE), 0.5 * 4.0 * half(FINE).particles_per_area());
+    let sampler = make(FINE);
+    let expected = 0.5 * 4.0 * half(FINE).particles_per_area();
     let mut scratch = Particles::default();
     let mut number = 0.0;
     for chunk in 0..sampler.chunks() {

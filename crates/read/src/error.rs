@@ -98,7 +98,8 @@ impl ReadError {
         found: impl Into<String>,
         hint: &'static str,
     ) -> Self {
-        let (expected, found) = (expected.into(), found.into());
+        let expected = expected.into();
+        let found = found.into();
         Self { file: String::new(), place, expected, found, hint, fault: Fault::Input }
     }
 

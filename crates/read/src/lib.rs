@@ -261,7 +261,8 @@ fn whole(
 ) -> Result<Loaded, ReadError> {
     let loaded = parse(path, stream, place, reading)?;
     if reading.params.frame > 0 && !matches!(loaded, Loaded::Grid(_)) {
-        let (expected, found) = ("a series of volumes", "a file of another kind");
+        let expected = "a series of volumes";
+        let found = "a file of another kind";
         return Err(ReadError::input(Place::File, expected, found, "leave out `frame`"));
     }
     let has_array = matches!(loaded, Loaded::Grid(_)) && ["Vtk", "VtkXml"].contains(&reading.notes.format.as_str());
@@ -400,7 +401,8 @@ fn parse_as(
 }
 
 fn not_compiled_in(format: Format) -> ReadError {
-    let (expected, hint) = ("a format that this build reads", "build with the feature of that name");
+    let expected = "a format that this build reads";
+    let hint = "build with the feature of that name";
     ReadError::input(Place::File, expected, format!("{format:?}"), hint)
 }
 

@@ -254,7 +254,8 @@ fn injured(content: &[u8], random: &mut Random) -> Vec<u8> {
                 let length = (end - at).min(out.len() / 2);
                 let other = random.below(out.len() - length);
                 let at = at.min(out.len() - length);
-                let (a, b) = (out[at..at + length].to_vec(), out[other..other + length].to_vec());
+                let a = out[at..at + length].to_vec();
+                let b = out[other..other + length].to_vec();
                 out[at..at + length].copy_from_slice(&b);
                 out[other..other + length].copy_from_slice(&a);
             }
@@ -341,13 +342,15 @@ fn ba15_gzip_inside_gzip_is_unpacked_no_further_than_its_header_says() {
         let header = format!("NRRD0004\ntype: uchar\ndimension: 3\nsizes: {sizes}\nencoding: gzip\n\n").into_bytes();
         gzip(&[header, zeros.clone()].concat())
     };
-    let (few, many) = (file("3 2 2"), file("1024 1024 512"));
+    let few = file("3 2 2");
+    let many = file("1024 1024 512");
     let before = peak();
     let error = load("a.nrrd.gz", &few).unwrap_err().to_string();
     assert!(error.contains("expected 12 bytes of voxels (3 x 2 x 2 x 1 bytes), found more than 12"), "{error}");
     let error = load("a.nrrd.gz", &many).unwrap_err();
     assert_eq!(error.fault.exit_code(), 5, "{error}");
-    let (taken, stored) = (peak() - before, few.len().max(many.len()));
+    let taken = peak() - before;
+    let stored = few.len().max(many.len());
     assert!(taken < 64 << 20, "{taken} bytes for a file of {stored}");
     println!("{taken} bytes for a file of {stored}");
 }
@@ -380,7 +383,8 @@ fn memory_is_asked_for_before_it_is_taken_and_comes_back() {
         let within = |bytes: u64| ReadParams { memory: MemoryAccount::new(bytes), ..ReadParams::default() };
         let ample = within(1 << 30);
         let (loaded, _) = bytes(name, &content, &ample, None).unwrap_or_else(|e| panic!("{name}: {e}"));
-        let (peak, held) = (ample.memory.peak(), loaded.bytes());
+        let peak = ample.memory.peak();
+        let held = loaded.bytes();
         assert!(peak >= held && ample.memory.used() == 0, "{name}: {peak} bytes at a time for {held}");
         // As much is enough, and less than what is given is not.
         assert_eq!(bytes(name, &content, &within(peak), None).unwrap().0, loaded, "{name} within {peak}");

@@ -71,7 +71,8 @@ fn splats(packed: bool) -> Vec<u8> {
     let mut cloud = Cloud::new(DVec3::new(1e6, 0.0, 0.5));
     cloud.push(&Splat { value: 2.0, ..Splat::default() });
     cloud.push(&Splat { kind: SplatKind::Surface, normal: Vec3::Y, tangent: Vec3::X, ..Splat::default() });
-    let (names, footprints) = (["it".to_owned()], FootprintStack::default());
+    let names = ["it".to_owned()];
+    let footprints = FootprintStack::default();
     if packed {
         return splat_core::splat_file::packed_splats_to_ply(&cloud, &names, &[], &footprints).unwrap();
     }

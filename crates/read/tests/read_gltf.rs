@@ -116,7 +116,8 @@ fn textures_become_colours_of_vertices_down_to_their_texels() {
     mesh.validate().unwrap();
     // The image's left half is red, its right half half green by the factor, its lower half blue. Turned, its right is up.
     let expected = |p: Vec3| {
-        let (u, v) = (p.y / 2.0, 1.0 - (10.0 - p.x) / 2.0);
+        let u = p.y / 2.0;
+        let v = 1.0 - (10.0 - p.x) / 2.0;
         if v >= 0.5 {
             [0.0, 0.0, 1.0]
         } else if u < 0.5 {

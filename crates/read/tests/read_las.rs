@@ -57,7 +57,8 @@ fn times_that_switch_without_end_are_damage() {
 #[test]
 fn every_field_gets_its_own_values_whatever_is_read_over() {
     for format in [1, 3, 6, 7, 8] {
-        let (plain, packed) = (points(&las(format, 3000, false)), points(&las(format, 3000, true)));
+        let plain = points(&las(format, 3000, false));
+        let packed = points(&las(format, 3000, true));
         assert_eq!(plain, packed, "format {format}");
     }
 }

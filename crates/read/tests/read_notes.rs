@@ -32,7 +32,8 @@ fn every_column_that_is_not_used_is_named() {
 #[test]
 fn extra_bytes_of_las_are_named_as_the_file_does() {
     let plain = las(0, 3, false);
-    let (points, record) = (u32::from_le_bytes(plain[96..100].try_into().unwrap()) as usize, 20);
+    let points = u32::from_le_bytes(plain[96..100].try_into().unwrap()) as usize;
+    let record = 20;
     let widened = |described: &[u8]| {
         let mut out = plain[..points].to_vec();
         out[96..100].copy_from_slice(&((points + described.len()) as u32).to_le_bytes());

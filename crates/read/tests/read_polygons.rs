@@ -70,7 +70,8 @@ fn read(text: &str) -> Result<Mesh, String> {
 fn covered(corners: &[DVec3], normal: DVec3, expected: f64) -> Vec<[u32; 3]> {
     let mesh = read(&ply(corners)).unwrap();
     let n = corners.len() as u32;
-    let (first, last) = (mesh.triangles[0], mesh.triangles[mesh.triangles.len() - 1]);
+    let first = mesh.triangles[0];
+    let last = mesh.triangles[mesh.triangles.len() - 1];
     assert_eq!((first, last), ([n, n + 1, n + 2], [n, n + 1, n + 2]));
     let triangles = mesh.triangles[1..mesh.triangles.len() - 1].to_vec();
     let at = |i: u32| corners[i as usize];

@@ -60,7 +60,8 @@ fn what_is_longer_than_announced_is_not_called_truncated() {
         ("a.las", [las.clone(), vec![0; 80]].concat(), las[..las.len() - 1].to_vec()),
         ("a.xyz", b"1\n0 0 0\n1 1 1\n".to_vec(), b"3\n0 0 0\n1 1 1\n".to_vec()),
     ] {
-        let (longer, shorter) = (error(name, &longer), error(name, &shorter));
+        let longer = error(name, &longer);
+        let shorter = error(name, &shorter);
         assert!(!longer.hint.contains("truncated") && longer.hint.contains("than"), "{longer}");
         assert!(shorter.hint.contains("truncated"), "{shorter}");
     }

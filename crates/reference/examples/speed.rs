@@ -82,7 +82,8 @@ fn error(grid: &Grid, target: f64) -> Result<(), splat_core::Error> {
         PathSettings { samples: 20_000, batch: 64, target_relative_error: Some(target), ..PathSettings::default() };
     let start = seconds();
     let image = path_trace(&scene, &camera([256; 2])?, &settings, None)?;
-    let (seconds, error) = (seconds() - start, 100.0 * image.relative_error());
+    let seconds = seconds() - start;
+    let error = 100.0 * image.relative_error();
     println!(
         "extinction 30, 256x256: {error:.2} % standard error after {} samples a pixel, {seconds:.1} core seconds",
         image.samples

@@ -73,14 +73,17 @@ impl Classified {
         let points = self.transfer.points();
         let upper = points.partition_point(|p| f64::from(p.value) <= value);
         let four = |i: usize| {
-            let ([red, green, blue], extinction) = (points[i].color, points[i].extinction);
+            let [red, green, blue] = points[i].color;
+            let extinction = points[i].extinction;
             [red, green, blue, extinction].map(f64::from)
         };
         if upper == 0 || upper == points.len() {
             return four(upper.saturating_sub(1));
         }
         let [from, to] = [upper - 1, upper].map(|i| f64::from(points[i].value));
-        let (a, b, t) = (four(upper - 1), four(upper), (value - from) / (to - from));
+        let a = four(upper - 1);
+        let b = four(upper);
+        let t = (value - from) / (to - from);
         std::array::from_fn(|c| a[c] + (b[c] - a[c]) * t)
     }
 
@@ -104,7 +107,8 @@ impl Classified {
         let q = self.index(p).max(DVec3::ZERO).min(last);
         let mut gradient = DVec3::ZERO;
         for axis in 0..3 {
-            let (mut before, mut after) = (q, q);
+            let mut before = q;
+            let mut after = q;
             before[axis] = (q[axis] - 1.0).max(0.0);
             after[axis] = (q[axis] + 1.0).min(last[axis]);
             let apart = after[axis] - before[axis];
@@ -139,7 +143,8 @@ impl Classified {
     pub(crate) fn upper(&self, bounds: &DAabb) -> f64 {
         let of = DAabb::of_points(bounds.corners().map(|c| self.index(c)));
         let Some(cells) = clamped_cells(&of, self.last()) else { return 0.0 };
-        let (mut low, mut high) = (f32::INFINITY, f32::NEG_INFINITY);
+        let mut low = f32::INFINITY;
+        let mut high = f32::NEG_INFINITY;
         let [nx, ny, _] = self.grid.dims;
         let [x, y, z] = cells;
         for row in z.flat_map(|k| y.clone().map(move |j| (k * ny + j) * nx)) {
@@ -206,7 +211,9 @@ impl Cubic {
     /// Through its values at 0, 1/3, 2/3 and 1.
     fn through([a, b, c, d]: [f64; 4]) -> Self {
         // Newton's form: what is 0 stays 0 of values that are alike.
-        let (first, second, third) = (b - a, c - 2.0 * b + a, d - 3.0 * c + 3.0 * b - a);
+        let first = b - a;
+        let second = c - 2.0 * b + a;
+        let third = d - 3.0 * c + 3.0 * b - a;
         Self([a, 3.0 * first - 1.5 * second + third, 4.5 * (second - third), 4.5 * third])
     }
 
@@ -231,7 +238,8 @@ impl Cubic {
     fn places_of(&self, value: f64) -> Vec<f64> {
         let above = |s: f64| self.at(s) > value;
         let crossed = |ends: &[f64]| {
-            let (mut a, mut b) = (ends[0], ends[1]);
+            let mut a = ends[0];
+            let mut b = ends[1];
             let at_a = above(a);
             if at_a == above(b) {
                 return None;

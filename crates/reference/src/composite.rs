@@ -223,7 +223,9 @@ fn opaque<'a>(
     if nearest == f64::INFINITY {
         return None;
     }
-    let (mut weight, mut depth, mut values) = (0.0, 0.0, vec![0.0; input.channels]);
+    let mut weight = 0.0;
+    let mut depth = 0.0;
+    let mut values = vec![0.0; input.channels];
     for &i in ids {
         let Some((splat, f)) = solid(i) else { continue };
         if (f.depth - nearest).abs() <= EPSILON_Z * splat.radius {

@@ -99,10 +99,18 @@ impl<'a> Lattice<'a> {
         let q = q.max(DVec3::ZERO).min(self.last);
         let [nx, ny, nz] = self.grid.dims;
         // By way of i32, which converts in one instruction; a longer axis than that does not fit memory.
-        let (i, j, k) = (q.x as i32 as usize, q.y as i32 as usize, q.z as i32 as usize);
-        let (i, j, k) = (i.min(nx.saturating_sub(2)), j.min(ny.saturating_sub(2)), k.min(nz.saturating_sub(2)));
-        let (fx, fy, fz) = (q.x - i as f64, q.y - j as f64, q.z - k as f64);
-        let (dx, dy, dz) = (usize::from(nx > 1), usize::from(ny > 1) * nx, usize::from(nz > 1) * nx * ny);
+        let i = q.x as i32 as usize;
+        let j = q.y as i32 as usize;
+        let k = q.z as i32 as usize;
+        let i = i.min(nx.saturating_sub(2));
+        let j = j.min(ny.saturating_sub(2));
+        let k = k.min(nz.saturating_sub(2));
+        let fx = q.x - i as f64;
+        let fy = q.y - j as f64;
+        let fz = q.z - k as f64;
+        let dx = usize::from(nx > 1);
+        let dy = usize::from(ny > 1) * nx;
+        let dz = usize::from(nz > 1) * nx * ny;
         let at = (k * ny + j) * nx + i;
         let v = &self.grid.values;
         // One check of bounds a pair of neighbours.
@@ -163,11 +171,13 @@ pub(crate) fn lattice_breaks(local: &Ray, last: DVec3, (t0, t1): (f64, f64), out
     let Some((enter, leave)) = local.clip(&DAabb::new(-half, last + half), t0, t1) else { return };
     out.extend([enter, leave]);
     for a in 0..3 {
-        let (o, d) = (local.origin[a], local.direction[a]);
+        let o = local.origin[a];
+        let d = local.direction[a];
         if d == 0.0 {
             continue;
         }
-        let (p, q) = (o + enter * d, o + leave * d);
+        let p = o + enter * d;
+        let q = o + leave * d;
         let first = p.min(q).ceil().max(0.0) as usize;
         let last = p.max(q).floor().min(last[a]);
         if last >= 0.0 {

@@ -183,7 +183,8 @@ mod tests {
             (0..5).map(|y| (0..8).map(|x| image.pixels[y * 8 + x][0]).sum::<f64>() * image.solid_angle(y)).sum();
         let mut rng = Stream::new(3, 0, 0, 0);
         let n = 50_000;
-        let (mut mean, mut square) = (0.0, 0.0);
+        let mut mean = 0.0;
+        let mut square = 0.0;
         for _ in 0..n {
             let (d, radiance, density) = sky.sample(rng.pair()).expect("a bright sky");
             assert_eq!(sky.radiance(d), radiance);

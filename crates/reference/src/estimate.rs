@@ -89,7 +89,8 @@ impl Estimate {
     /// pixels and channels; 0 for a dark image without error.
     pub fn relative_error(&self) -> f64 {
         let squares = |v: &[[f64; 3]]| v.iter().flatten().map(|e| e * e).sum::<f64>();
-        let (error, light) = (squares(&self.radiance.standard_error), squares(&self.radiance.mean));
+        let error = squares(&self.radiance.standard_error);
+        let light = squares(&self.radiance.mean);
         if error == 0.0 { 0.0 } else { (error / light).sqrt() }
     }
 }

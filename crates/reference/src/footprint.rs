@@ -169,7 +169,8 @@ impl<'a> Splat<'a> {
             if along.abs() < 1e-4 { DVec2::ZERO } else { DVec2::new(-normal.x, normal.y) / (along * px_per_world) };
         self.reach_px = DVec2::new(covariance.x_axis.x, covariance.y_axis.y).map(|c| c.sqrt() + 1.0);
         let crosses = self.depth < reach_z;
-        let (metric, core) = (covariance.inverse(), widened(CORE_FILTER_PX).inverse());
+        let metric = covariance.inverse();
+        let core = widened(CORE_FILTER_PX).inverse();
         let laid = self.pattern.map(|pattern| pattern.laid(jacobian, metric, core));
         self.shape = Shape::Disc { metric, core, depth_slope, crosses, laid };
     }

@@ -31,7 +31,8 @@ pub(crate) struct Gaussian {
 impl Gaussian {
     /// Gaussian `g` of the table with its centre in view space; `None` for one that is not seen.
     pub(crate) fn new(input: &Input<'_>, g: usize, center: DVec3) -> Option<Self> {
-        let (table, camera) = (&input.cloud.gaussians, input.camera);
+        let table = &input.cloud.gaussians;
+        let camera = input.camera;
         let opacity = f64::from(table.opacity[g]);
         let to_view = |v: DVec3| DVec3::from_array(camera.axes.map(|axis| axis.dot(v)));
         let axes = table.axes[g].map(|axis| to_view(axis.as_dvec3()));

@@ -206,7 +206,8 @@ impl<'a> Renderer<'a> {
 
     fn pixel(&self, ray: &Ray, found: &mut Found) -> Pixel {
         self.find(ray, f64::INFINITY, found);
-        let (mut radiance, mut left) = ([0.0; 3], [1.0; 3]);
+        let mut radiance = [0.0; 3];
+        let mut left = [1.0; 3];
         let mut shadow = Found::default();
         for crossing in &found.crossings {
             let opacity = self.opacity(ray, crossing);
@@ -219,7 +220,8 @@ impl<'a> Renderer<'a> {
                 break;
             }
         }
-        let (unresolved, proven) = (found.unresolved, found.proven);
+        let unresolved = found.unresolved;
+        let proven = found.proven;
         Pixel { radiance, transmittance: left, crossings: found.crossings.len() as u32, unresolved, proven }
     }
 

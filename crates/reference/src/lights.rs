@@ -130,7 +130,8 @@ impl LightSource {
             Self::Point { intensity, .. } => *intensity,
             Self::Spot { position, direction, inner, outer, intensity } => {
                 let cosine = (p - position).normalize_or_zero().dot(*direction);
-                let (low, high) = (outer.cos(), inner.cos());
+                let low = outer.cos();
+                let high = inner.cos();
                 let t =
                     if high > low { ((cosine - low) / (high - low)).clamp(0.0, 1.0) } else { f64::from(cosine >= low) };
                 intensity.map(|i| i * t * t * (3.0 - 2.0 * t))
@@ -236,7 +237,8 @@ impl LightSource {
                     Self::Rect { u, v, .. } => {
                         let n = u.cross(*v);
                         let scale = n.length_squared();
-                        let (a, b) = (offset.cross(*v).dot(n) / scale, u.cross(offset).dot(n) / scale);
+                        let a = offset.cross(*v).dot(n) / scale;
+                        let b = u.cross(offset).dot(n) / scale;
                         a.abs() <= 1.0 && b.abs() <= 1.0
                     }
                     _ => false,
@@ -300,7 +302,8 @@ mod tests {
         for (light, expected) in [disk, ball].iter().zip(expected) {
             let mut rng = Stream::new(1, 2, 3, 4);
             let n = 20_000;
-            let (mut mean, mut square) = (0.0, 0.0);
+            let mut mean = 0.0;
+            let mut square = 0.0;
             for _ in 0..n {
                 let s = light.sample(p, rng.pair()).expect("light");
                 let hit = light.hit(&Ray { origin: p, direction: s.direction }, 0.0);

@@ -58,7 +58,8 @@ impl MajorantGrid {
 
     fn fill(&mut self, media: &[Medium<'_>]) {
         let [nx, ny, nz] = self.dims;
-        let (low, cell) = (self.bounds.min, self.cell);
+        let low = self.bounds.min;
+        let cell = self.cell;
         let cells: Vec<(f64, Vec<u32>)> = (0..nx * ny * nz)
             .into_par_iter()
             .map(|i| {
@@ -100,12 +101,15 @@ impl MajorantGrid {
     /// reciprocals shared.
     #[inline(always)]
     fn enter(&self, ray: &Ray, t0: f64, t1: f64) -> Option<(f64, f64, Steps)> {
-        let (mut enter, mut leave) = (t0, t1);
+        let mut enter = t0;
+        let mut leave = t1;
         let per = ray.direction.recip();
         for a in 0..3 {
-            let (p, q) = (self.bounds.min[a] - ray.origin[a], self.bounds.max[a] - ray.origin[a]);
+            let p = self.bounds.min[a] - ray.origin[a];
+            let q = self.bounds.max[a] - ray.origin[a];
             if ray.direction[a] != 0.0 {
-                let (p, q) = (p * per[a], q * per[a]);
+                let p = p * per[a];
+                let q = q * per[a];
                 enter = enter.max(p.min(q));
                 leave = leave.min(p.max(q));
             } else if p > 0.0 || q < 0.0 {

@@ -125,7 +125,8 @@ fn pixel(scene: &Scene<'_>, camera: &Camera, params: &MarchParams, x: u32, y: u3
     let ray = Ray::of_pixel(camera, f64::from(x) + 0.5, f64::from(y) + 0.5);
     let marched = march(&scene.media, &scene.lights, &ray, [0.0, f64::INFINITY], params)?;
     let behind = scene.background.unwrap_or_else(|| scene.environment.radiance(ray.direction));
-    let (light, through) = (marched.radiance, marched.transmittance);
+    let light = marched.radiance;
+    let through = marched.transmittance;
     Ok(MarchedPixel {
         radiance: std::array::from_fn(|c| light.value[c] + through.value[c] * behind[c]),
         error: std::array::from_fn(|c| light.error[c] + through.error[c] * behind[c]),
@@ -182,8 +183,10 @@ impl<'a> Line<'a> {
             return integrate(|t| self.extinction(t), &[a, b], &self.params);
         }
         // ±1/√3 of the half length: exact for cubics.
-        let (middle, half) = (a + 0.5 * (b - a), 0.5 * (b - a));
-        let (p, q) = (self.extinction(middle - half / 3f64.sqrt()), self.extinction(middle + half / 3f64.sqrt()));
+        let middle = a + 0.5 * (b - a);
+        let half = 0.5 * (b - a);
+        let p = self.extinction(middle - half / 3f64.sqrt());
+        let q = self.extinction(middle + half / 3f64.sqrt());
         let value: [f64; 3] = std::array::from_fn(|c| (p[c] + q[c]) * half);
         Integral { value, error: value.map(|v| 4.0 * f64::EPSILON * v), evaluations: 2 }
     }
@@ -199,7 +202,8 @@ impl<'a> Line<'a> {
     }
 
     fn emitted(&self, t: f64) -> [f64; 3] {
-        let (p, left) = (self.ray.at(t), self.transmittance(t));
+        let p = self.ray.at(t);
+        let left = self.transmittance(t);
         let mut sum = [0.0; 3];
         for medium in self.media {
             let density = medium.density.value(p);
@@ -226,7 +230,8 @@ impl<'a> Line<'a> {
         };
         let shadow = Ray { origin: p, direction: to_light };
         let depth = optical_depth(self.media, &shadow, 0.0, distance, &self.params).value;
-        let (left, intensity) = (self.transmittance(t), light.intensity(p));
+        let left = self.transmittance(t);
+        let intensity = light.intensity(p);
         let mut sum = [0.0; 3];
         for medium in self.media {
             let density = density_at(medium);

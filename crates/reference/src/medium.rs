@@ -94,7 +94,8 @@ impl<'a> Medium<'a> {
 
     /// Radiance that a fully opaque column emits at `p`.
     pub(crate) fn emitted(&self, p: DVec3) -> [f64; 3] {
-        let (glow, color) = (self.facet(p).map_or(self.glow, |(facets, _)| facets.glow), self.color(p));
+        let glow = self.facet(p).map_or(self.glow, |(facets, _)| facets.glow);
+        let color = self.color(p);
         std::array::from_fn(|c| self.emission[c] + glow[c] * color[c].max(0.0))
     }
 

@@ -427,7 +427,8 @@ fn interface(
     }
     let eta = if leaving { 1.0 / glass.eta[channel] } else { glass.eta[channel] };
     let toward = |n: DVec3| if n.dot(travel) > 0.0 { -n } else { n };
-    let (face, mut normal) = (toward(geometric), toward(shading));
+    let face = toward(geometric);
+    let mut normal = toward(shading);
     if normal.dot(face) <= 0.0 {
         normal = face;
     }

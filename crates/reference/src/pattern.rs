@@ -56,7 +56,8 @@ impl Pattern {
         let texels = (0..size[1]).flat_map(|y| (0..size[0]).map(move |x| [x, y]));
         let mut texels: Vec<f64> = texels.map(|at| f64::from(image.texel(at))).collect();
         let half = DVec2::from_array(image.half_size().map(f64::from));
-        let (mut levels, mut area) = (Vec::new(), 0.0);
+        let mut levels = Vec::new();
+        let mut area = 0.0;
         loop {
             let mut table = Table { size, texels, gain: 1.0, threshold: SOLID };
             let mut places = table.places(half);
@@ -123,8 +124,10 @@ impl Table {
     fn at(&self, half: DVec2, place: DVec2) -> f64 {
         let size = DVec2::from_array(self.size.map(|n| n as f64));
         let at = (0.5 + 0.5 * DVec2::new(place.x, -place.y) / half) * size - 0.5;
-        let (low, share) = (at.floor(), at - at.floor());
-        let (x, y) = (low.x as i64, low.y as i64);
+        let low = at.floor();
+        let share = at - at.floor();
+        let x = low.x as i64;
+        let y = low.y as i64;
         let row = |y: i64| self.texel(x, y) * (1.0 - share.x) + self.texel(x + 1, y) * share.x;
         row(y) * (1.0 - share.y) + row(y + 1) * share.y
     }
@@ -143,12 +146,14 @@ impl Table {
     fn averaged(&self, to: [usize; 2]) -> Vec<f64> {
         let scale = [0, 1].map(|axis| self.size[axis] as f64 / to[axis] as f64);
         let share = |fine: usize, coarse: usize, axis: usize| {
-            let (low, high) = (coarse as f64 * scale[axis], (coarse + 1) as f64 * scale[axis]);
+            let low = coarse as f64 * scale[axis];
+            let high = (coarse + 1) as f64 * scale[axis];
             ((fine as f64 + 1.0).min(high) - (fine as f64).max(low)).max(0.0) / scale[axis]
         };
         let mean = |x: usize, y: usize| {
             let covered = |k: usize, axis: usize| {
-                let (low, high) = (k as f64 * scale[axis], (k + 1) as f64 * scale[axis]);
+                let low = k as f64 * scale[axis];
+                let high = (k + 1) as f64 * scale[axis];
                 low as usize..(high.ceil() as usize).min(self.size[axis])
             };
             let row =

@@ -49,7 +49,8 @@ mod tests {
     fn ms5_integral_is_one_and_mean_cosine_is_g() {
         for g in ASYMMETRIES {
             let n = 200_000;
-            let (mut total, mut mean) = (0.0, 0.0);
+            let mut total = 0.0;
+            let mut mean = 0.0;
             for i in 0..n {
                 let t = (f64::from(i) + 0.5) / f64::from(n);
                 let from_peak = PI * t.powi(3);
@@ -70,7 +71,8 @@ mod tests {
         for g in ASYMMETRIES {
             let n = 100_000;
             let mut rng = Stream::new(5, 1, g.to_bits(), 0);
-            let (mut sum, mut forward) = (0.0, 0);
+            let mut sum = 0.0;
+            let mut forward = 0;
             // Half of all samples lie within the median angle: u = 1/2 inverted in closed form.
             let a = g.abs();
             let median = (1.0 - a) * (1.0 - a) * (1.0 + 0.5 * a);

@@ -59,7 +59,8 @@ impl<F: ScalarField> ScalarField for Placed<F> {
     }
 
     fn bound(&self, p: DVec3, radius: f64) -> Option<(f64, f64)> {
-        let (q, reach) = (local(&self.transform, p), DVec3::splat(radius / self.transform.scale));
+        let q = local(&self.transform, p);
+        let reach = DVec3::splat(radius / self.transform.scale);
         if (q + reach).cmplt(self.within.min).any() || (q - reach).cmpgt(self.within.max).any() {
             return Some((0.0, 0.0));
         }

@@ -74,8 +74,11 @@ struct Piece {
 }
 
 fn rule(f: &mut impl FnMut(f64) -> [f64; 3], a: f64, b: f64) -> Piece {
-    let (middle, half) = (a + 0.5 * (b - a), 0.5 * (b - a));
-    let (mut kronrod, mut gauss, mut size) = ([0.0; 3], [0.0; 3], [0.0; 3]);
+    let middle = a + 0.5 * (b - a);
+    let half = 0.5 * (b - a);
+    let mut kronrod = [0.0; 3];
+    let mut gauss = [0.0; 3];
+    let mut size = [0.0; 3];
     for (i, (node, weight)) in NODES.iter().zip(KRONROD).enumerate() {
         let sides = if *node == 0.0 { 1 } else { 2 };
         for side in 0..sides {

@@ -32,16 +32,19 @@ impl Ray {
 
     /// The part [enter, leave] of (t0, t1) inside an axis-aligned box, if any.
     pub(crate) fn clip(&self, bounds: &DAabb, t0: f64, t1: f64) -> Option<(f64, f64)> {
-        let (mut enter, mut leave) = (t0, t1);
+        let mut enter = t0;
+        let mut leave = t1;
         for a in 0..3 {
-            let (o, d) = (self.origin[a], self.direction[a]);
+            let o = self.origin[a];
+            let d = self.direction[a];
             if d == 0.0 {
                 if o < bounds.min[a] || o > bounds.max[a] {
                     return None;
                 }
                 continue;
             }
-            let (p, q) = ((bounds.min[a] - o) / d, (bounds.max[a] - o) / d);
+            let p = (bounds.min[a] - o) / d;
+            let q = (bounds.max[a] - o) / d;
             enter = enter.max(p.min(q));
             leave = leave.min(p.max(q));
         }
@@ -54,7 +57,8 @@ impl Ray {
         let middle = (center - self.origin).dot(self.direction);
         let apart = (self.at(middle) - center).length();
         let half = ((radius - apart) * (radius + apart)).max(0.0).sqrt();
-        let (enter, leave) = (t0.max(middle - half), t1.min(middle + half));
+        let enter = t0.max(middle - half);
+        let leave = t1.min(middle + half);
         (enter < leave).then_some((enter, leave))
     }
 }

@@ -142,7 +142,8 @@ impl Search<'_> {
 
     /// The place of the change of sign, to neighbouring numbers.
     fn refine(&self, t: [f64; 2], v: [f64; 2]) -> f64 {
-        let ([mut a, mut b], [mut va, mut vb]) = (t, v);
+        let [mut a, mut b] = t;
+        let [mut va, mut vb] = v;
         let rising = positive(vb);
         for step in 0..200 {
             let middle = a + (b - a) * 0.5;

@@ -30,7 +30,8 @@ impl Slide {
         }
         let mut sum = [0.0; 3];
         for corner in 0..4 {
-            let (mut weight, mut index) = (1.0, [0; 2]);
+            let mut weight = 1.0;
+            let mut index = [0; 2];
             for a in 0..2 {
                 let place = at[a] * self.size[a] as f64 - 0.5;
                 let low = place.floor();

@@ -169,7 +169,8 @@ impl Response {
         let cosine = self.normal.dot(leave);
         let share = if cosine >= 0.0 { 1.0 - self.transmission } else { self.transmission };
         let weight = share * cosine.abs() / PI;
-        let (mut specular, mut density) = (0.0, (1.0 - self.lobe) * weight);
+        let mut specular = 0.0;
+        let mut density = (1.0 - self.lobe) * weight;
         if self.lobe > 0.0 {
             let lobe = self.mirrored.dot(leave).max(0.0).powf(self.shininess);
             specular = self.specular * (self.shininess + 2.0) / (2.0 * PI) * lobe * cosine.max(0.0);
@@ -180,7 +181,8 @@ impl Response {
 
     /// A direction, with the response times cosine over density, and the density; `None` when light is absorbed.
     pub(crate) fn sample(&self, rng: &mut Stream) -> Option<(DVec3, [f64; 3], f64)> {
-        let (choice, u) = (rng.unit(), rng.pair());
+        let choice = rng.unit();
+        let u = rng.pair();
         let leave = if choice < self.lobe {
             let cosine = u[0].powf(1.0 / (self.shininess + 1.0));
             around(self.mirrored.normalize(), cosine, ((1.0 - cosine) * (1.0 + cosine)).sqrt(), u[1])

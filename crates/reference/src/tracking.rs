@@ -137,8 +137,11 @@ impl<'a> Volume<'a> {
         weight: &mut [f64; 3],
         rng: &mut Stream,
     ) -> Option<usize> {
-        let (mut sum, mut total) = ([0.0; 3], 0.0);
-        let (mut chosen, mut of_chosen, mut share_of_chosen) = (0, [0.0; 3], 0.0);
+        let mut sum = [0.0; 3];
+        let mut total = 0.0;
+        let mut chosen = 0;
+        let mut of_chosen = [0.0; 3];
+        let mut share_of_chosen = 0.0;
         for &m in members {
             let medium = &self.media[m as usize];
             let density = medium.density.value(p);

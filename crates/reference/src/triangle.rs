@@ -46,7 +46,9 @@ impl Shear {
     pub(crate) fn cut(&self, origin: DVec3, triangle: &[DVec3; 3]) -> Option<Cut> {
         let [a, b, c] = triangle.map(|v| v - origin);
         let [fa, fb, fc] = [a, b, c].map(|v| self.flat(v));
-        let (u, v, w) = (edge(fb, fc), edge(fc, fa), edge(fa, fb));
+        let u = edge(fb, fc);
+        let v = edge(fc, fa);
+        let w = edge(fa, fb);
         if (u < 0.0 || v < 0.0 || w < 0.0) && (u > 0.0 || v > 0.0 || w > 0.0) {
             return None;
         }
@@ -115,7 +117,8 @@ mod tests {
     #[test]
     fn distance_and_weights_are_those_of_the_plane() {
         let triangle = [DVec3::new(0.0, 0.0, 1.0), DVec3::new(2.0, 0.0, 1.0), DVec3::new(0.0, 2.0, 3.0)];
-        let (origin, direction) = (DVec3::new(0.5, 0.5, -4.0), DVec3::Z);
+        let origin = DVec3::new(0.5, 0.5, -4.0);
+        let direction = DVec3::Z;
         for far in [0.0, 1e7] {
             let moved = triangle.map(|v| v + far);
             let cut = Shear::new(direction).cut(origin + far, &moved).expect("a hit");

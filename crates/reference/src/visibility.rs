@@ -75,10 +75,12 @@ impl Visibility {
     pub fn new(meshes: &[&Mesh]) -> Result<Self, Error> {
         let total: u64 = meshes.iter().map(|m| m.triangles.len() as u64).sum();
         if total >= 1 << 31 {
-            let (what, hint) = ("the meshes".into(), "use a coarser mesh".into());
+            let what = "the meshes".into();
+            let hint = "use a coarser mesh".into();
             return Err(Error::Limit(Exceeded { what, needed: total, limit: Some(1 << 31), unit: "triangles", hint }));
         }
-        let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        let mut low = DVec3::INFINITY;
+        let mut high = DVec3::NEG_INFINITY;
         for mesh in meshes {
             mesh.validate()?;
             for p in &mesh.position {
@@ -146,7 +148,8 @@ impl Visibility {
 
     /// First hit of those that `from` lets count.
     pub(crate) fn next(&self, ray: &Ray, from: Filter, t1: f64) -> Option<Hit> {
-        let (bvh, local) = (self.bvh.as_ref()?, self.local(ray, t1)?);
+        let bvh = self.bvh.as_ref()?;
+        let local = self.local(ray, t1)?;
         let mut best: Option<(Cut, u32)> = None;
         bvh.ray_traverse(local.ray, &mut RayHit::none(), |_, i| {
             let id = bvh.primitive_indices[i];

@@ -182,7 +182,9 @@ fn with_images() -> FootprintStack {
 /// Far away, near, and through the eye plane in parallel rays; some are opaque.
 #[test]
 fn the_exact_compositor_agrees_on_images() {
-    let (cloud, footprints, materials) = (mixed_cloud(3000), with_images(), materials(false));
+    let cloud = mixed_cloud(3000);
+    let footprints = with_images();
+    let materials = materials(false);
     let far =
         |projection| Camera::look_at(DVec3::new(2.0, 7.0, 25.0), DVec3::ZERO, DVec3::Y, projection, SIZE).unwrap();
     let amid = Camera::look_at(

@@ -35,7 +35,9 @@ fn ramps_and_constants_have_their_optical_depth_to_rounding() {
     let tent = || transfer(&[(0.26, [1.0; 3], 0.0), (0.51, [1.0; 3], 8.0), (0.77, [1.0; 3], 2.0)]);
     // Of the ramp v = z, constant in the outer half cells.
     let f64_of = |v: f32| f64::from(v);
-    let (a, b, c) = (f64_of(0.26), f64_of(0.51), f64_of(0.77));
+    let a = f64_of(0.26);
+    let b = f64_of(0.51);
+    let c = f64_of(0.77);
     let exact = 0.5 * 8.0 * (b - a) + 0.5 * (8.0 + 2.0) * (c - b) + 2.0 * (1.0 - c);
     let ramp = Classified::new(unit_cube(|p| p.z), tent(), &Similarity::default());
     let constant = Classified::new(unit_cube(|_| 0.385), tent(), &Similarity::default());
@@ -109,7 +111,9 @@ fn sums_of_steps_tend_to_the_integral_with_the_second_order() {
         (0..steps).map(|i| volume.extinction(p + to_light * h * (f64::from(i) + 0.5)) * h).sum::<f64>()
     };
     let radiance = |ray: &Ray, steps: u32| {
-        let (h, mut tau, mut sum) = (2.0 / f64::from(steps), 0.0, 0.0);
+        let h = 2.0 / f64::from(steps);
+        let mut tau = 0.0;
+        let mut sum = 0.0;
         for i in 0..steps {
             let p = ray.at(2.0 + h * (f64::from(i) + 0.5));
             let step = volume.extinction(p) * h;

@@ -10,7 +10,8 @@ const SIZE: [usize; 2] = [96, 64];
 fn picture(seed: u64, noise: f64) -> Vec<u8> {
     let mut bytes = Vec::new();
     for k in 0..SIZE[0] * SIZE[1] {
-        let (x, y) = ((k % SIZE[0]) as f64, (k / SIZE[0]) as f64);
+        let x = (k % SIZE[0]) as f64;
+        let y = (k / SIZE[0]) as f64;
         let base = [0.5 + 0.4 * (0.21 * x).sin(), 0.5 + 0.4 * (0.13 * y).cos(), if x > y { 0.8 } else { 0.2 }];
         for (c, b) in base.into_iter().enumerate() {
             let value = b + noise * (unit(seed, 0, k as u64, c as u64) - 0.5);

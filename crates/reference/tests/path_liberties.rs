@@ -34,7 +34,8 @@ fn sun() -> LightSource {
 
 /// The ground under a blocker that hides the sun from it.
 fn ground(unshadowed: Vec<bool>, of_ground: Liberty, of_blocker: Liberty, light: LightSource) -> Estimate {
-    let (floor, lid) = (flat(0.0, 5.0), flat(1.0, 0.5));
+    let floor = flat(0.0, 5.0);
+    let lid = flat(1.0, 0.5);
     let material = |liberty| SurfaceMaterial { diffuse: [ALBEDO; 3], liberty, ..SurfaceMaterial::default() };
     let surfaces = vec![
         Surface { mesh: &floor, material: material(of_ground) },
@@ -88,9 +89,11 @@ fn area_lights_without_shadows_are_as_bright_as_those_with() {
     let nature = Liberty::default();
     // The lid stands above the light. So freedom changes the method alone: no ray that meets the light counts.
     let free = Liberty { casts_shadow: false, ..nature };
-    let (a, b) = (ground(Vec::new(), nature, nature, rect), ground(Vec::new(), nature, free, rect));
+    let a = ground(Vec::new(), nature, nature, rect);
+    let b = ground(Vec::new(), nature, free, rect);
     for k in 0..9 {
-        let (x, y) = (a.radiance.mean[k][0], b.radiance.mean[k][0]);
+        let x = a.radiance.mean[k][0];
+        let y = b.radiance.mean[k][0];
         let error = a.radiance.standard_error[k][0].hypot(b.radiance.standard_error[k][0]);
         assert!((x - y).abs() < 4.5 * error && error < 0.02 * x, "{k}: {x} and {y} ± {error}");
     }
@@ -109,8 +112,11 @@ fn around_a_lamp_inside_a_medium_shadow_is_linear_in_its_coefficient_and_gain_a_
     };
     let nature = Liberty::default();
     let share = |k: f64| of(Liberty { shadow_coefficient: k, ..nature }, false);
-    let (none, half, full) = (share(0.0), share(0.5), share(1.0));
-    let (free, ghost) = (of(nature, true), of(Liberty { casts_shadow: false, ..nature }, false));
+    let none = share(0.0);
+    let half = share(0.5);
+    let full = share(1.0);
+    let free = of(nature, true);
+    let ghost = of(Liberty { casts_shadow: false, ..nature }, false);
     let bright = of(Liberty { gain: 4.0, ..nature }, false);
     for k in 0..4 {
         let at = |s: &reference::Statistics| (s.mean[k][0], s.standard_error[k][0]);

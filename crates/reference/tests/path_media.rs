@@ -27,7 +27,9 @@ fn blobs(n: usize) -> Grid {
     let h = 1.0 / n as f64;
     let value = |i: usize| {
         let at = |k: usize| (k as f64 + 0.5) * h;
-        let (x, y, z) = (at(i % n), at(i / n % n), at(i / (n * n)));
+        let x = at(i % n);
+        let y = at(i / n % n);
+        let z = at(i / (n * n));
         let blob = |cx: f64, cy: f64, cz: f64, r: f64| {
             let d = DVec3::new(x - cx, y - cy, z - cz).length_squared() / (r * r);
             (1.0 - d).max(0.0).powi(2)
@@ -46,7 +48,8 @@ fn blobs(n: usize) -> Grid {
 #[test]
 fn what_a_cut_leaves_transmits_e_to_the_minus_tau_of_its_chord() {
     let camera = parallel(DVec3::Z * 3.0, DVec3::ZERO, 2.4, [8, 8]);
-    let (ball, slab) = (Density::Ball { center: DVec3::ZERO, radius: 1.0 }, slab(1.0));
+    let ball = Density::Ball { center: DVec3::ZERO, radius: 1.0 };
+    let slab = slab(1.0);
     let ones = Grid { values: vec![1.0; 64], ..blobs(4) };
     let cube = Density::Grid(Lattice::new(&ones).unwrap());
     type Chord = fn(f64, f64) -> [f64; 2];
@@ -67,7 +70,8 @@ fn what_a_cut_leaves_transmits_e_to_the_minus_tau_of_its_chord() {
             let scene = Scene { media: vec![medium], background: Some([1.0; 3]), ..Scene::default() };
             let left = |pixel: usize| {
                 let at = |k: usize| (k as f64 + 0.5) * 0.3 - 1.2;
-                let (x, y) = (at(pixel % 8), -at(pixel / 8));
+                let x = at(pixel % 8);
+                let y = -at(pixel / 8);
                 let [near, far] = chord(x, y);
                 let below = (0.3 - x + 2.0 * y) / 4.0;
                 let within = clips.len() == 1 || (x > -0.7 && y < 0.8);
@@ -105,7 +109,8 @@ fn slab_transmits_e_to_the_minus_tau_per_channel() {
 
 #[test]
 fn homogeneous_ball_transmits_by_its_chords() {
-    let (size, sigma) = ([8, 8], [0.7, 1.4, 2.8]);
+    let size = [8, 8];
+    let sigma = [0.7, 1.4, 2.8];
     let camera = parallel(DVec3::Z * 5.0, DVec3::ZERO, 2.4, size);
     let medium =
         Medium { extinction: sigma, ..Medium::new(Density::Ball { center: DVec3::ZERO, radius: 1.0 }, 0.0, 0.0) };
@@ -125,7 +130,8 @@ fn homogeneous_ball_transmits_by_its_chords() {
 #[test]
 fn light_at_the_centre_of_a_ball_sends_out_what_the_medium_scattered() {
     // Albedo 1: all of the intensity I leaves, the share e^{−σR} unscattered, the rest as the ball's own image.
-    let (sigma, intensity) = (2.0, [3.0, 2.0, 1.0]);
+    let sigma = 2.0;
+    let intensity = [3.0, 2.0, 1.0];
     let medium = Medium::new(Density::Ball { center: DVec3::ONE, radius: 1.0 }, sigma, 1.0);
     let light = LightSource::Point { position: DVec3::ONE, intensity };
     let scene = Scene { media: vec![medium], lights: vec![light], ..Scene::default() };
@@ -155,7 +161,9 @@ fn sphere_light_in_a_ball_loses_nothing() {
     let sum = image.radiance.mean.iter().map(|m| m[0]).sum::<f64>();
     let variance = image.radiance.standard_error.iter().map(|e| e[0] * e[0]).sum::<f64>();
     let per = (2.0f64 / 16.0).powi(2);
-    let (found, error, exact) = (sum * per, variance.sqrt() * per, PI * 0.09 * 10.0);
+    let found = sum * per;
+    let error = variance.sqrt() * per;
+    let exact = PI * 0.09 * 10.0;
     // Two-sided 1e-3.
     assert!((found - exact).abs() < 3.3 * error, "{found} ± {error}, exactly {exact}");
     assert!(error < 0.01 * exact, "± {error} proves little");
@@ -163,7 +171,8 @@ fn sphere_light_in_a_ball_loses_nothing() {
 
 #[test]
 fn light_in_a_ball_once_scattered_agrees_with_quadrature_and_the_marcher() {
-    let (sigma, omega) = (1.5, 0.8);
+    let sigma = 1.5;
+    let omega = 0.8;
     let medium = Medium::new(Density::Ball { center: DVec3::ZERO, radius: 1.0 }, sigma, omega);
     let light = LightSource::Point { position: DVec3::ZERO, intensity: [2.0; 3] };
     let scene = Scene { media: vec![medium], lights: vec![light], ..Scene::default() };
@@ -189,7 +198,8 @@ fn light_in_a_ball_once_scattered_agrees_with_quadrature_and_the_marcher() {
     assert_mean(&trace(&scene, &camera, &settings(4000, Some(1))), truth, 4.0, "once scattered");
     let marched = march_image(&scene, &camera, &MarchParams::default(), None).unwrap();
     for k in 0..36 {
-        let (found, error) = (marched.radiance[k][0], marched.error[k][0]);
+        let found = marched.radiance[k][0];
+        let error = marched.error[k][0];
         assert!((found - truth(k)[0]).abs() <= error + 1e-7, "pixel {k}: {found} ± {error}, {}", truth(k)[0]);
         assert!(error <= 3e-6 * found, "pixel {k}: {error}");
     }
@@ -223,7 +233,8 @@ fn white_furnace_of_a_medium_of_albedo_one() {
 #[test]
 fn thin_slab_scatters_parallel_light_once() {
     // L = ωp(θ)E·(1 − e^{−τ(1/μ + 1/μ₀)})/(1 + μ/μ₀), seen from the lit side along μ; Chandrasekhar 1960, §47.
-    let (omega, g) = (0.9, 0.6);
+    let omega = 0.9;
+    let g = 0.6;
     let direction = DVec3::new(0.6, 0.0, -0.8);
     let light = LightSource::Directional { direction, irradiance: [1.0, 2.0, 3.0] };
     let eye = DVec3::new(0.0, 0.28, 0.96);
@@ -232,7 +243,8 @@ fn thin_slab_scatters_parallel_light_once() {
     for tau in [0.01, 1.0, 4.0] {
         let medium = Medium { asymmetry: g, ..Medium::new(slab(1.0), tau, omega) };
         let scene = Scene { media: vec![medium], lights: vec![light], ..Scene::default() };
-        let (mu, mu0) = (0.96, 0.8);
+        let mu = 0.96;
+        let mu0 = 0.8;
         let l = omega * p * (-(-tau * (1.0 / mu + 1.0 / mu0)).exp_m1()) / (1.0 + mu / mu0);
         let truth = [1.0, 2.0, 3.0].map(|e| e * l);
         assert_mean(&trace(&scene, &camera, &settings(20_000, Some(1))), |_| truth, 4.0, "thin slab");
@@ -274,7 +286,8 @@ fn slab_of_albedo_one_reflects_what_it_does_not_transmit() {
         let scene = Scene { media: vec![medium], environment, ..Scene::default() };
         trace(&scene, &camera, &PathSettings { seed, ..settings(1500, None) })
     };
-    let (transmitted, reflected) = (run(1.0, 0.0, 1), run(0.0, 1.0, 2));
+    let transmitted = run(1.0, 0.0, 1);
+    let reflected = run(0.0, 1.0, 2);
     let mut sum = transmitted.clone();
     for k in 0..36 {
         for c in 0..3 {

@@ -92,15 +92,18 @@ fn penumbra(light: &LightSource, blocked: bool) -> Estimate {
 #[test]
 fn penumbra_of_a_disk_light_is_as_wide_as_similar_triangles_say() {
     // Light of radius r at height H, edge at height h: the penumbra is 2r·h/(H − h) wide around x = 0.
-    let (r, high) = (1.2, 4.0);
+    let r = 1.2;
+    let high = 4.0;
     let light = LightSource::Disk { center: DVec3::Y * high, normal: DVec3::NEG_Y, radius: r, radiance: [10.0; 3] };
     let half_width = r * 1.0 / (high - 1.0);
-    let (open, shadowed) = (penumbra(&light, false), penumbra(&light, true));
+    let open = penumbra(&light, false);
+    let shadowed = penumbra(&light, true);
     for k in 0..64 {
         // The image's right is −x or +x by its axes: take the place from the camera.
         let camera_right = DVec3::NEG_Y.cross(DVec3::Z).x;
         let x = ((k as f64 + 0.5) / 64.0 - 0.5) * 2.0 * camera_right;
-        let (o, s) = (open.radiance.mean[k][0], shadowed.radiance.mean[k][0]);
+        let o = open.radiance.mean[k][0];
+        let s = shadowed.radiance.mean[k][0];
         if x > half_width {
             assert_eq!(s, 0.0, "umbra at {x}");
         } else if x < -half_width {
@@ -115,14 +118,16 @@ fn penumbra_of_a_disk_light_is_as_wide_as_similar_triangles_say() {
     }
     // The irradiance under the open disk at its foot: πL·r²/(r² + H²), reflected by 1/π.
     let foot = 10.0 * r * r / (r * r + high * high);
-    let (found, error) = (open.radiance.mean[32][0], open.radiance.standard_error[32][0]);
+    let found = open.radiance.mean[32][0];
+    let error = open.radiance.standard_error[32][0];
     assert!((found - foot).abs() < 4.0 * error + 1e-4 * foot, "{found} ± {error}, {foot}");
 }
 
 #[test]
 fn environment_image_lights_a_plane_by_its_closed_form() {
     // E = Σ L·Δφ·(sin²θ₂ − sin²θ₁)/2 over the pixels of the upper half; a small sun beside a dim sky.
-    let (width, height) = (16, 8);
+    let width = 16;
+    let height = 8;
     let mut pixels = vec![[0.3, 0.2, 0.1]; width * height];
     pixels[width + 5] = [300.0, 200.0, 50.0];
     let ground = quad([(-9.0, -9.0), (-9.0, 9.0), (9.0, 9.0), (9.0, -9.0)].map(|(x, z)| Vec3::new(x, 0.0, z)));

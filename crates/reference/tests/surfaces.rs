@@ -63,7 +63,8 @@ fn nested_balls_composite_in_the_order_of_their_shells() {
             let apart = at(k % 10).hypot(at(k / 10));
             // Shells from the outside in, then out again; cos θ = √(1 − b²/r²).
             let crossed: Vec<usize> = (0..3).filter(|b| apart < balls[*b].radius).collect();
-            let (mut expected, mut left) = ([0.0; 3], 1.0);
+            let mut expected = [0.0; 3];
+            let mut left = 1.0;
             for b in crossed.iter().chain(crossed.iter().rev()) {
                 let cosine = (1.0 - (apart / balls[*b].radius).powi(2)).sqrt();
                 let power = if law == SurfaceOpacity::ThinSlab { 1.0 / cosine } else { 1.0 };
@@ -93,7 +94,8 @@ fn opaque_ball_is_lit_by_lambert_and_shadows_itself() {
         let image = composite_surfaces(&scene, &camera, None).unwrap();
         for k in 0..81 {
             let at = |i: usize| ((i as f64 + 0.5) / 9.0 - 0.5) * 2.2;
-            let (x, y) = (at(k % 9), -at(k / 9));
+            let x = at(k % 9);
+            let y = -at(k / 9);
             let z_sq = 1.0 - x * x - y * y;
             let cosine = if z_sq > 0.0 { DVec3::new(x, y, z_sq.sqrt()).dot(to_light).max(0.0) } else { 0.0 };
             for (c, color) in [1.0, 0.5, 0.25].into_iter().enumerate() {
@@ -114,7 +116,8 @@ fn implicit_and_mesh_of_one_ball_agree() {
     let of_field = SurfaceScene { implicits, ..SurfaceScene::default() };
     let of_mesh = SurfaceScene { meshes: vec![Surface { mesh: &mesh, material }], ..SurfaceScene::default() };
     let render = |s: &SurfaceScene<'_>| composite_surfaces(s, &camera, None).unwrap();
-    let (a, b) = (render(&of_field), render(&of_mesh));
+    let a = render(&of_field);
+    let b = render(&of_mesh);
     // Away from the rim both cross the shell twice.
     assert!(a.crossings.iter().chain(&b.crossings).all(|c| *c == 2));
     for k in 0..64 {

@@ -36,7 +36,8 @@ impl Classifier {
             [(f64::from(p.extinction) * scale) as f32, p.color[0], p.color[1], p.color[2]]
         };
         let piece = |i: usize| {
-            let (at, next) = (four(i), four((i + 1).min(points.len() - 1)));
+            let at = four(i);
+            let next = four((i + 1).min(points.len() - 1));
             let width = points.get(i + 1).map_or(1.0, |next| f64::from(next.value) - f64::from(points[i].value));
             // A jump steeper than single precision has it stays a number: times no step at all it is nothing.
             let steepest = f64::from(f32::MAX);
@@ -70,7 +71,8 @@ impl Classifier {
 
     #[inline(always)]
     fn look_up<S: Simd>(&self, simd: S, value: Lanes<S>) -> [Lanes<S>; 4] {
-        let (mut values, mut out) = ([0.0; MAX_LANES], [[0.0; MAX_LANES]; 4]);
+        let mut values = [0.0; MAX_LANES];
+        let mut out = [[0.0; MAX_LANES]; 4];
         value.store(&mut values);
         for lane in 0..Lanes::<S>::COUNT {
             let class = self.one(values[lane]);
@@ -208,10 +210,12 @@ mod tests {
                 for p in tf.points() {
                     assert_eq!(at(p.value), [p.extinction, p.color[0], p.color[1], p.color[2]], "{p:?}");
                 }
-                let (first, last) = (tf.at(-1.0), tf.at(2.0));
+                let first = tf.at(-1.0);
+                let last = tf.at(2.0);
                 assert_eq!((at(-1e30)[0], at(1e30)[0]), (first.extinction, last.extinction));
                 for v in (0..1000).map(|i| i as f32 / 999.0) {
-                    let (found, expected) = (at(v), tf.at(v));
+                    let found = at(v);
+                    let expected = tf.at(v);
                     assert!((found[0] - expected.extinction).abs() < 2e-3, "{v}: {found:?}, {expected:?}");
                     assert!((found[2] - expected.color[1]).abs() < 1e-5, "{v}: {found:?}, {expected:?}");
                 }

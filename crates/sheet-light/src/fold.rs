@@ -121,7 +121,9 @@ pub fn prepare<'a>(input: SheetInput<'a>, params: &Params, progress: Option<&Pro
 /// Slabs between the nearest corner of a volume, or the nearest splat, before the eye and the farthest, as narrow as the finest
 /// volume needs them.
 pub(crate) fn slabs_of(input: &SheetInput<'_>, params: &Params, slant: Slant) -> Result<Slabs, Error> {
-    let (mut near, mut far, mut spacing) = (f64::INFINITY, 0.0f64, f64::INFINITY);
+    let mut near = f64::INFINITY;
+    let mut far = 0.0f64;
+    let mut spacing = f64::INFINITY;
     for volume in &input.volumes {
         spacing = spacing.min(spacing_of(volume, input, params));
         for corner in corners(volume, input.camera) {
@@ -210,7 +212,8 @@ impl<'a> Prepared<'a> {
         (slabs, slant): (&Slabs, Slant),
         tiles: [usize; 2],
     ) -> Self {
-        let (grid, camera) = (volume.grid, input.camera);
+        let grid = volume.grid;
+        let camera = input.camera;
         let stride = stride(&volume, input, params, slabs.width);
         let slabs = &slabs.wider(stride);
         let viewed = Viewed::new(&volume, camera, slabs, params, slant);
@@ -283,7 +286,8 @@ pub(crate) fn extremes(values: &[f32]) -> (f32, f32) {
     let join = |a: (f32, f32), b: (f32, f32)| (a.0.min(b.0), a.1.max(b.1));
     let of = |chunk: &[f32]| {
         // Side by side, so that vectors are compared.
-        let (mut least, mut greatest) = ([none.0; 16], [none.1; 16]);
+        let mut least = [none.0; 16];
+        let mut greatest = [none.1; 16];
         for values in chunk.chunks(16) {
             for ((least, greatest), v) in least.iter_mut().zip(&mut greatest).zip(values) {
                 *least = if *v < *least { *v } else { *least };

@@ -84,7 +84,8 @@ pub(crate) fn differences(lattice: &Lattice<'_>, at: [usize; 3]) -> [f64; 3] {
     let value = |[i, j, k]: [usize; 3]| f64::from(lattice.value(i, j, k));
     [0, 1, 2].map(|a| {
         let step = if a == 2 && lattice.packing == Packing::BodyCentred { 2 } else { 1 };
-        let (mut before, mut after) = (at, at);
+        let mut before = at;
+        let mut after = at;
         before[a] = if at[a] >= step { at[a] - step } else { at[a] };
         after[a] = if at[a] + step < lattice.dims[a] { at[a] + step } else { at[a] };
         (value(after) - value(before)) / (after[a] - before[a]).max(1) as f64
@@ -111,7 +112,8 @@ mod tests {
             grid.values.push(field(axes * (at - middle)).0 as f32);
         }
         let points = vec![TransferPoint { value: 0.0, color: [1.0; 3], extinction: 1.0 }];
-        let (transfer, material) = (TransferFunction::new(points).unwrap(), Material::default());
+        let transfer = TransferFunction::new(points).unwrap();
+        let material = Material::default();
         let volume = Volume {
             grid: &grid,
             packing,
@@ -134,7 +136,8 @@ mod tests {
         let params = Params { gradients: Gradients::Volume, ..Params::default() };
         let gradients = GradientVolume::new(&receivers, &lattice, &params).unwrap();
         let longest = [0, 1, 2].map(|a| inverse.row(a).length()).into_iter().fold(0.0, f64::max);
-        let (mut worst, mut most) = (0.0f64, 0.0f64);
+        let mut worst = 0.0f64;
+        let mut most = 0.0f64;
         for n in 0..2000 {
             let side = |a: u64| reach * (2.0 * rng::unit(5, a, n, 0) - 1.0) * middle[a as usize];
             let at = axes * DVec3::new(side(0), side(1), side(2));

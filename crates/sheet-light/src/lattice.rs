@@ -39,7 +39,8 @@ impl<'a> Lattice<'a> {
     /// What the place `i` along an axis is made of.
     #[inline(always)]
     fn terms(&self, axis: usize, i: usize) -> [Term; 2] {
-        let (n, i) = (self.grid.dims[axis] as isize, i as isize - self.rim[axis] as isize);
+        let n = self.grid.dims[axis] as isize;
+        let i = i as isize - self.rim[axis] as isize;
         let last = n - 1;
         if (0..n).contains(&i) {
             return [(1.0, i as usize), (0.0, 0)];
@@ -104,7 +105,8 @@ impl<'a> Lattice<'a> {
     /// The values of a row with its rim.
     pub(crate) fn row(&self, j: usize, k: usize, out: &mut Vec<f32>) {
         out.clear();
-        let (rim, n) = (self.rim[0], self.grid.dims[0]);
+        let rim = self.rim[0];
+        let n = self.grid.dims[0];
         match self.inside(rim..rim + n, j, k) {
             None => out.extend((0..self.dims[0]).map(|i| self.value(i, j, k))),
             Some(values) => {

@@ -105,7 +105,8 @@ impl<'a> Lamp<'a> {
         };
         let slide = lit.slide.map(|slide| {
             let SlideProjection { origin, axis, across, down } = *slide.projection();
-            let (origin, axis) = (placed(origin), axis.map(turned));
+            let origin = placed(origin);
+            let axis = axis.map(turned);
             SlideInView { slide, origin, axis, across: turned(across), down: turned(down) }
         });
         Self { shape, intensity: lit.light.intensity, slide, has_shadow: lit.shadow.is_some() }
@@ -203,7 +204,9 @@ impl Reflector<'_> {
         ambient: [f32; 3],
         lit: &Lit<S>,
     ) -> [[Lanes<S>; 3]; SHADED_EFFECTS.len()] {
-        let (m, zero, half) = (self.material, Lanes::splat(simd, 0.0), Lanes::splat(simd, 0.5));
+        let m = self.material;
+        let zero = Lanes::splat(simd, 0.0);
+        let half = Lanes::splat(simd, 0.5);
         let mut out = [[zero; 3]; SHADED_EFFECTS.len()];
         let is_unlit = m.shading == Shading::Unlit;
         let is_normal = if m.shading == Shading::Phase { zero } else { spots.is_normal };
@@ -233,7 +236,8 @@ impl Reflector<'_> {
     /// Per unit irradiance: the factor on the colour, and what is specular.
     #[inline(always)]
     fn factors<S: Simd>(&self, simd: S, spots: &Spots<S>, to_light: &[Lanes<S>; 3]) -> (Lanes<S>, Lanes<S>) {
-        let (zero, half) = (Lanes::splat(simd, 0.0), Lanes::splat(simd, 0.5));
+        let zero = Lanes::splat(simd, 0.0);
+        let half = Lanes::splat(simd, 0.5);
         if self.material.shading == Shading::Phase || !self.has_normals {
             return (self.scatter(simd, &spots.to_eye, to_light), zero);
         }
@@ -285,7 +289,8 @@ impl<S: Simd> Lit<S> {
     /// Share of green light that shadows let through; 1 where no light arrives.
     #[inline(always)]
     pub(crate) fn shadow(&self, simd: S) -> Lanes<S> {
-        let (zero, least) = (Lanes::splat(simd, 0.0), Lanes::splat(simd, f32::MIN_POSITIVE));
+        let zero = Lanes::splat(simd, 0.0);
+        let least = Lanes::splat(simd, f32::MIN_POSITIVE);
         (self.received / self.unshadowed.max(least)).where_less_or(zero, self.unshadowed, Lanes::splat(simd, 1.0))
     }
 }
@@ -365,7 +370,8 @@ mod tests {
         fn lights<'a>(&mut self) -> Vec<LitBy<'a>> {
             let mut place = || 2.0 * self.vector();
             let positions = [place(), place(), place()];
-            let (direction, normal) = (self.vector().normalize(), self.vector().normalize());
+            let direction = self.vector().normalize();
+            let normal = self.vector().normalize();
             let inner = f64::from(self.share());
             let shapes = [
                 LightShape::Directional { direction },
@@ -401,7 +407,8 @@ mod tests {
 
         fn with_simd<S: Simd>(self, simd: S) -> Vec<f32> {
             let is_normal = Lanes::splat(simd, if self.normal == Vec3::ZERO { 0.0 } else { 1.0 });
-            let (at, to_eye) = (all(simd, self.at), all(simd, self.to_eye));
+            let at = all(simd, self.at);
+            let to_eye = all(simd, self.to_eye);
             let color = all(simd, Vec3::from_array(self.color));
             let spots = Spots { at, to_eye, normal: all(simd, self.normal), is_normal, color };
             let mut lit = Lit::dark(simd);
@@ -426,10 +433,13 @@ mod tests {
         let mut lit = 0;
         for n in 0..3000 {
             let mut trial = Trial(n, 0);
-            let (eye, target) = (trial.vector() * 5.0, trial.vector());
+            let eye = trial.vector() * 5.0;
+            let target = trial.vector();
             let view = Projection::Perspective { fov_y: 1.0 };
             let camera = Camera::look_at(eye, target, DVec3::Y, view, [8, 8]).unwrap();
-            let (material, mut lights, position) = (trial.material(), trial.lights(), trial.vector());
+            let material = trial.material();
+            let mut lights = trial.lights();
+            let position = trial.vector();
             lights.iter_mut().for_each(|lit| lit.light.validate(0).unwrap());
             let slides = [0, 2].map(|k: usize| Trial(n + 10_000 * (1 + k as u64), 0).slide(&lights[k].light.shape));
             if n.is_multiple_of(2) {
@@ -438,7 +448,9 @@ mod tests {
             let normal = if n.is_multiple_of(7) { Vec3::ZERO } else { trial.vector().normalize().as_vec3() };
             let through: Vec<[f32; 3]> = lights.iter().map(|_| [trial.share(), trial.share(), 0.0]).collect();
             let to_eye = (eye - position).normalize().as_vec3();
-            let (coefficient, color, radius) = (trial.share(), [0.9, 0.5, 1.2], 0.3);
+            let coefficient = trial.share();
+            let color = [0.9, 0.5, 1.2];
+            let radius = 0.3;
             let point = Point { position, radius, normal, to_eye, color, material: &material };
             let exact = point.radiance([0.1, 0.2, 0.3], lights.iter(), |rank, _| {
                 through[rank].map(|t| 1.0 - coefficient * (1.0 - t))
@@ -459,7 +471,8 @@ mod tests {
             let reflector =
                 Reflector { material: &material, has_normals, spread: 0.01, shadow_coefficient: coefficient };
             let at = (camera.view_from_world(position) - 2.5 * DVec3::Z).as_vec3();
-            let (to_eye, normal) = (turned(to_eye), turned(normal));
+            let to_eye = turned(to_eye);
+            let normal = turned(normal);
             let by_lanes = ByLanes { lamps: &lamps, reflector, at, to_eye, normal, color, through: &through };
             let effects = exact.effects();
             let expected = effects.as_flattened().iter().chain([&exact.shadow]);

@@ -110,7 +110,8 @@ impl Lines {
             add(self.planes + c, of_plane(p) * Lanes::splat(simd, *value));
         }
         if self.has_depths {
-            let (green, line) = (of_plane(self.planes / 2), self.planes + self.channels);
+            let green = of_plane(self.planes / 2);
+            let line = self.planes + self.channels;
             add(line, green * source.view_depth(simd, run, rays));
             add(line + 1, green * Lanes::splat(simd, source.thickness()));
         }
@@ -153,7 +154,8 @@ impl Lines {
         is_any: bool,
         (optical_depth, values, part): Blended<'_>,
     ) -> [f32; MAX_LANES] {
-        let (zero, part) = (Lanes::splat(simd, 0.0), Lanes::load(simd, part));
+        let zero = Lanes::splat(simd, 0.0);
+        let part = Lanes::load(simd, part);
         let mut before = [zero; 3];
         if is_any {
             (0..self.planes).for_each(|p| before[p] = Lanes::load(simd, &optical_depth[p]));
@@ -171,7 +173,8 @@ impl Lines {
             let others = if is_any { before[p] * Lanes::load(simd, &values[c]) } else { zero };
             ((own + others) * inverse[p]).store(&mut values[c]);
         }
-        let (green, mut share) = (self.planes / 2, [0.0; MAX_LANES]);
+        let green = self.planes / 2;
+        let mut share = [0.0; MAX_LANES];
         (self.row(simd, green, at) * part * inverse[green]).store(&mut share);
         share
     }
@@ -184,7 +187,8 @@ impl Lines {
     /// Optical depth of green, and mean view depth and thickness, of the pixels from (x, y) on; the latter two only where they are kept.
     #[inline(always)]
     pub(crate) fn depths<S: Simd>(&self, simd: S, at: [usize; 2]) -> [[f32; MAX_LANES]; 3] {
-        let (green, line) = (self.row(simd, self.planes / 2, at), self.planes + self.channels);
+        let green = self.row(simd, self.planes / 2, at);
+        let line = self.planes + self.channels;
         let mut out = [[0.0; MAX_LANES]; 3];
         green.store(&mut out[0]);
         if self.has_depths {

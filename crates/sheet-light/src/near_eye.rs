@@ -84,10 +84,12 @@ impl NearEye {
     #[inline(always)]
     fn mend<S: Simd>(&self, simd: S, [slab, y, x]: [usize; 3], middle: f32, sheets: &mut Sheets) {
         let (slab, of) = (slab as u32, |v: f32| Lanes::splat(simd, v));
-        let ([value, weight], [next, next_weight]) = (sheets.load(simd, slab, y, x), sheets.load(simd, slab + 1, y, x));
-        let ([depth, _], [next_depth, _]) =
-            (self.depths.load(simd, slab, y, x), self.depths.load(simd, slab + 1, y, x));
-        let (apart, least) = (next_depth - depth, of(LEAST_APART as f32));
+        let [value, weight] = sheets.load(simd, slab, y, x);
+        let [next, next_weight] = sheets.load(simd, slab + 1, y, x);
+        let [depth, _] = self.depths.load(simd, slab, y, x);
+        let [next_depth, _] = self.depths.load(simd, slab + 1, y, x);
+        let apart = next_depth - depth;
+        let least = of(LEAST_APART as f32);
         let slope = (next - value) / of(1.0).where_less_or(apart, least, apart);
         let slope = slope.where_less(least, apart);
         let slope = slope.where_less(of(LEAST_WEIGHT), weight).where_less(of(LEAST_WEIGHT), next_weight);

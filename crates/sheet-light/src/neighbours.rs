@@ -62,8 +62,10 @@ impl Neighbours {
             return self.cells_between_shifted_planes(simd, voxels, at, (wanted, is_first_shifted));
         }
         let of = |v: f32| Lanes::splat(simd, v);
-        let (zero, one) = (of(0.0), of(1.0));
-        let (mut first, mut parts) = ([[0.0; MAX_LANES]; 3], [[[0.0; MAX_LANES]; 2]; 4]);
+        let zero = of(0.0);
+        let one = of(1.0);
+        let mut first = [[0.0; MAX_LANES]; 3];
+        let mut parts = [[[0.0; MAX_LANES]; 2]; 4];
         let mut high = [zero; 3];
         for a in 0..3 {
             let [x, y, z, start] = self.lattice_from_place[a];
@@ -113,7 +115,8 @@ impl Neighbours {
         at: &[Lanes<S>; 3],
         (wanted, is_first_shifted): (u32, bool),
     ) -> Cells {
-        let (mut places, dims) = ([[0.0; MAX_LANES]; 3], voxels.dims());
+        let mut places = [[0.0; MAX_LANES]; 3];
+        let dims = voxels.dims();
         for (place, [x, y, z, start]) in places.iter_mut().zip(self.lattice_from_place) {
             let of = |v: f32| Lanes::splat(simd, v);
             at[0].mul_add(of(x), at[1].mul_add(of(y), at[2].mul_add(of(z), of(start)))).store(place);
@@ -127,9 +130,11 @@ impl Neighbours {
             let (k, w) = cell(places[2][lane], dims[2]);
             for (k, depth) in [(k, 1.0 - w), (k + 1, w)] {
                 let shift = if (k % 2 == 1) != is_first_shifted { 0.5 } else { 0.0 };
-                let ((i, u), (j, v)) = (cell(places[0][lane] - shift, dims[0]), cell(places[1][lane] - shift, dims[1]));
+                let (i, u) = cell(places[0][lane] - shift, dims[0]);
+                let (j, v) = cell(places[1][lane] - shift, dims[1]);
                 for (row, (j, height)) in [(j, 1.0 - v), (j + 1, v)].into_iter().enumerate() {
-                    let (found, share) = (voxels.pair(&self.ranks, i, j, k), depth * height);
+                    let found = voxels.pair(&self.ranks, i, j, k);
+                    let share = depth * height;
                     cells.set(lane, row + 2 * (k % 2), found, [share * (1.0 - u), share * u]);
                 }
             }

@@ -54,9 +54,11 @@ impl<'a> Sheeted<'a> {
             return Err(Error::parameter("aligned", "along a lattice beside polygons", expected));
         }
         let quiet = Progress::new();
-        let (input, most) = (&self.input, self.params.limits.max_bytes.saturating_sub(self.bytes()));
+        let input = &self.input;
+        let most = self.params.limits.max_bytes.saturating_sub(self.bytes());
         let of = EyePanes::new(panes, (input.camera, opaque), (most, layout), progress.unwrap_or(&quiet))?;
-        let (ambient, camera) = (input.ambient, input.camera);
+        let ambient = input.ambient;
+        let camera = input.camera;
         let lamps = Lamps { carried: None, mapped: &input.lights, ambient, camera, light_alone: false };
         let mut shown = PanesInTheOpen::new(&of, layout);
         shown.shade(camera, None, &lamps, input.shadow_origin);

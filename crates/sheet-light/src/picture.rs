@@ -58,7 +58,8 @@ pub(crate) struct Picture {
 impl Picture {
     /// The tile at `corner` as it is so far.
     pub(crate) fn load(from: &Accumulator, corner: [usize; 2], params: &Params) -> Self {
-        let (planes, channels) = (from.optical_depth.len(), from.channels.len());
+        let planes = from.optical_depth.len();
+        let channels = from.channels.len();
         let inside = [0, 1].map(|a| (from.size[a] as usize - corner[a]).min(TILE));
         let mut tile = Self {
             corner,
@@ -101,7 +102,8 @@ impl Picture {
 
     /// Rows inside the image: where they are there, and where they begin in a plane of the tile.
     fn rows(&self, width: u32) -> impl Iterator<Item = (std::ops::Range<usize>, usize)> + use<> {
-        let ([x, y], [columns, rows]) = (self.corner, self.inside);
+        let [x, y] = self.corner;
+        let [columns, rows] = self.inside;
         (0..rows).map(move |row| {
             let begin = (y + row) * width as usize + x;
             (begin..begin + columns, row * TILE)
@@ -168,7 +170,8 @@ impl Picture {
         for p in 0..self.planes {
             most = most.max(Lanes::load(simd, &self.transmittance[p * PIXELS + at..]));
         }
-        let (mut weights, mut before) = ([zero; 3], zero);
+        let mut weights = [zero; 3];
+        let mut before = zero;
         for p in 0..self.planes {
             let plane = p * PIXELS + at;
             let tau =
@@ -199,12 +202,14 @@ impl Picture {
     /// Depths and objects, pixel by pixel.
     fn extras(&mut self, at: usize, before: &[f32; MAX_LANES], count: usize, of: &Fragments, origin: f64) {
         for lane in 0..count {
-            let (k, after) = (at + lane, self.optical_depth[self.planes / 2 * PIXELS + at + lane]);
+            let k = at + lane;
+            let after = self.optical_depth[self.planes / 2 * PIXELS + at + lane];
             if after <= before[lane] {
                 continue;
             }
             if let Some(depth) = self.depth.get_mut(k) {
-                let (near, far) = (f64::from(of.near[lane]), f64::from(of.far[lane]));
+                let near = f64::from(of.near[lane]);
+                let far = f64::from(of.far[lane]);
                 let thickness = (far - near) as f32;
                 let middle = (origin + 0.5 * (near + far)) as f32;
                 depth.add(&DepthFragment { depth: middle, thickness, narrow: 1.0, before: before[lane], after });

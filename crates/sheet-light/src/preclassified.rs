@@ -64,8 +64,9 @@ impl Preclassified {
     pub(crate) fn load<S: Simd>(&self, simd: S, slab: u32, y: usize, x: usize) -> [Lanes<S>; 4] {
         let [first, second, third, fourth] = &self.sheets;
         let [extinction, _] = first.load(simd, slab, y, x);
-        let ([red, _], [green, _], [blue, _]) =
-            (second.load(simd, slab, y, x), third.load(simd, slab, y, x), fourth.load(simd, slab, y, x));
+        let [red, _] = second.load(simd, slab, y, x);
+        let [green, _] = third.load(simd, slab, y, x);
+        let [blue, _] = fourth.load(simd, slab, y, x);
         let inverse = Lanes::splat(simd, 1.0) / extinction.max(Lanes::splat(simd, f32::MIN_POSITIVE));
         [extinction, red * inverse, green * inverse, blue * inverse]
     }

@@ -37,7 +37,8 @@ impl LatticeRays {
     /// Depths are counted from `origin`.
     pub(crate) fn new(volume: &Volume<'_>, camera: &Camera, origin: f64) -> Self {
         let world_from_view = DMat3::from_cols(camera.axes[0], camera.axes[1], camera.axes[2]);
-        let (inverse, lowest) = (volume.axes().inverse(), volume.packing.lowest());
+        let inverse = volume.axes().inverse();
+        let lowest = volume.packing.lowest();
         let Similarity { scale, rotation, .. } = volume.transform;
         let eye = rotation.inverse() * (camera.position - volume.transform.translation) / scale;
         let plane = |(normal, offset): (DVec3, f64)| {
@@ -69,9 +70,11 @@ impl LatticeRays {
 
     /// Where a view ray is inside, counted from the origin, not behind the eye.
     pub(crate) fn crossing(&self, (from, along): (DVec3, DVec3)) -> [f64; 2] {
-        let (mut near, mut far) = (0.0f64, f64::INFINITY);
+        let mut near = 0.0f64;
+        let mut far = f64::INFINITY;
         for (normal, offset) in &self.planes {
-            let (to_border, leaves) = (offset - normal.dot(from), normal.dot(along));
+            let to_border = offset - normal.dot(from);
+            let leaves = normal.dot(along);
             match leaves {
                 0.0 if to_border < 0.0 => return [f64::INFINITY, f64::NEG_INFINITY],
                 0.0 => {}
@@ -79,16 +82,19 @@ impl LatticeRays {
                 _ => near = near.max(to_border / leaves),
             }
         }
-        let (from, along) = (self.lattice(from), self.lattice_from_view * along);
+        let from = self.lattice(from);
+        let along = self.lattice_from_view * along;
         for a in 0..3 {
-            let (to_low, to_high) = (self.lowest[a] - from[a], self.highest[a] - from[a]);
+            let to_low = self.lowest[a] - from[a];
+            let to_high = self.highest[a] - from[a];
             if along[a] == 0.0 {
                 if to_low > 0.0 || to_high < 0.0 {
                     return [f64::INFINITY, f64::NEG_INFINITY];
                 }
                 continue;
             }
-            let (one, other) = (to_low / along[a], to_high / along[a]);
+            let one = to_low / along[a];
+            let other = to_high / along[a];
             (near, far) = (near.max(one.min(other)), far.min(one.max(other)));
         }
         [near - self.origin, far - self.origin]
@@ -120,7 +126,8 @@ impl Slopes {
             let (from, along) = camera.view_ray(px, px);
             (if is_parallel { from } else { along })[a]
         };
-        let (x, y): ([f64; SIDE], [f64; SIDE]) = (std::array::from_fn(|v| at(v, 0)), std::array::from_fn(|v| at(v, 1)));
+        let x: [f64; SIDE] = std::array::from_fn(|v| at(v, 0));
+        let y: [f64; SIDE] = std::array::from_fn(|v| at(v, 1));
         let column = |v: usize| x.get(v).map_or(0.0, |x| *x as f32);
         let reach = if is_parallel { 1.0 } else { origin };
         let start = [&x, &y].map(|at| std::array::from_fn(|v| at.get(v).map_or(0.0, |at| (at * reach) as f32)));

@@ -56,7 +56,8 @@ pub fn draw(input: &SheetInput<'_>, params: &Params) -> Result<Picture, Error> {
     let mut out = Picture { optical_depth: vec![0.0; width * height], color: vec![[0.0; 3]; width * height] };
     for slab in 1..slabs.count - 1 {
         for at in 0..width * height {
-            let (mut tau, mut color) = (0.0, [0.0; 3]);
+            let mut tau = 0.0;
+            let mut color = [0.0; 3];
             for (volume, sheets) in input.volumes.iter().zip(&sheets) {
                 let (own, radiance) = sheets.fragment(&view, volume, (&slabs, slab), at);
                 tau += own;
@@ -125,10 +126,12 @@ impl Sheets {
 
     /// Tells the values of a sheet that lacks kernels behind the eye in the middle of its slab, from the place that they are of and from the next sheet.
     fn mend(&mut self, slab: u32) {
-        let (count, middle) = (self.size[0] * self.size[1], f64::from(slab) + 0.5 - eye_of(&self.slabs));
+        let count = self.size[0] * self.size[1];
+        let middle = f64::from(slab) + 0.5 - eye_of(&self.slabs);
         for at in 0..count {
             let (Some(value), Some(next)) = (self.value(slab, at), self.value(slab + 1, at)) else { continue };
-            let (here, behind) = (slab as usize * count + at, (slab as usize + 1) * count + at);
+            let here = slab as usize * count + at;
+            let behind = (slab as usize + 1) * count + at;
             let [depth, next_depth] = [here, behind].map(|sheet| self.depths[sheet] / self.weights[sheet]);
             if next_depth - depth > LEAST_APART {
                 self.values[here] += self.weights[here] * (middle - depth) * (next - value) / (next_depth - depth);
@@ -153,7 +156,8 @@ impl Sheets {
         };
         for y in range(y0, footprint.half[1], self.size[1]) {
             for x in range(x0, footprint.half[0], self.size[0]) {
-                let (dx, dy) = (x as f64 + 0.5 - x0, y as f64 + 0.5 - y0);
+                let dx = x as f64 + 0.5 - x0;
+                let dy = y as f64 + 0.5 - y0;
                 let weight = profile.profile(a * dx * dx + 2.0 * b * dx * dy + c * dy * dy);
                 for (s, section) in sections.iter().enumerate() {
                     let slab = (place / PHASES) as usize + s;
@@ -190,14 +194,16 @@ impl Sheets {
     /// Where a ray is inside, within a slab.
     fn inside(&self, slabs: &Slabs, slab: u32, at: usize) -> Option<[f64; 2]> {
         let [near, far] = self.crossings[at];
-        let (near, far) = (near.max(f64::from(slab) * slabs.width), far.min(f64::from(slab + 1) * slabs.width));
+        let near = near.max(f64::from(slab) * slabs.width);
+        let far = far.min(f64::from(slab + 1) * slabs.width);
         (far > near).then_some([near, far])
     }
 
     /// Optical depth of a pixel in a slab, and the radiance of the volume's own slab, in the middle of what lies there.
     fn fragment(&self, of: &View<'_>, volume: &Volume<'_>, (slabs, slab): (&Slabs, u32), at: usize) -> (f64, [f64; 3]) {
         let View { input, params, slant } = *of;
-        let (nothing, own) = ((0.0, [0.0; 3]), slab / self.stride);
+        let nothing = (0.0, [0.0; 3]);
+        let own = slab / self.stride;
         let (Some(value), Some([near, far])) = (self.value(own, at), self.inside(slabs, slab, at)) else {
             return nothing;
         };
@@ -209,7 +215,8 @@ impl Sheets {
         if class == 0.0 {
             return nothing;
         }
-        let (x, y) = ((at % self.size[0]) as f64 + 0.5, (at / self.size[0]) as f64 + 0.5);
+        let x = (at % self.size[0]) as f64 + 0.5;
+        let y = (at / self.size[0]) as f64 + 0.5;
         let (from, along) = input.camera.view_ray(x, y);
         let extinction = class * volume.extinction_scale * f64::from(volume.material.extinction_rgb[1]);
         let tau = extinction * (far - near) * along.length();
@@ -236,8 +243,10 @@ impl Sheets {
 
     /// −∇v/|∇v| in world space, from the neighbours that are inside.
     fn normal(&self, of: &View<'_>, slab: u32, at: usize, along: DVec3) -> Vec3 {
-        let (camera, slabs) = (of.input.camera, &self.slabs);
-        let (x, y) = (at % self.size[0], at / self.size[0]);
+        let camera = of.input.camera;
+        let slabs = &self.slabs;
+        let x = at % self.size[0];
+        let y = at / self.size[0];
         let sample = |slab: u32, at: usize| self.value(slab, at).filter(|_| self.inside(slabs, slab, at).is_some());
         let here = self.value(slab, at).unwrap_or(0.0);
         let difference = |before: Option<f64>, after: Option<f64>| {
@@ -245,7 +254,8 @@ impl Sheets {
             (after.unwrap_or(here) - before.unwrap_or(here)) / steps.max(1.0)
         };
         let pixel = |x: Option<usize>, y: Option<usize>| {
-            let (x, y) = (x.filter(|x| *x < self.size[0])?, y.filter(|y| *y < self.size[1])?);
+            let x = x.filter(|x| *x < self.size[0])?;
+            let y = y.filter(|y| *y < self.size[1])?;
             sample(slab, y * self.size[0] + x)
         };
         let right = difference(pixel(x.checked_sub(1), Some(y)), pixel(Some(x + 1), Some(y)));
@@ -254,7 +264,8 @@ impl Sheets {
         let depth = slabs.origin + (f64::from(slab) + 0.5) * slabs.width;
         let scale = camera.focal_px() / if camera.is_orthographic() { 1.0 } else { depth.max(slabs.width * 1e-3) };
         // Along a slab that does not lie across the view depth changes, too.
-        let (gx, gy) = (right * scale + z * of.slant.offset(1.0, 0.0), -down * scale + z * of.slant.offset(0.0, 1.0));
+        let gx = right * scale + z * of.slant.offset(1.0, 0.0);
+        let gy = -down * scale + z * of.slant.offset(0.0, 1.0);
         let gradient = camera.axes[0] * gx + camera.axes[1] * gy + camera.axes[2] * (z - along.x * gx - along.y * gy);
         -(gradient * slabs.width).normalize_or_zero().as_vec3()
     }

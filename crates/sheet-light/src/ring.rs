@@ -72,7 +72,8 @@ pub(crate) struct Taper {
 
 impl Taper {
     pub(crate) fn new(sharpness: f64) -> Self {
-        let (q, rim) = (sharpness, -libm::exp(-sharpness));
+        let q = sharpness;
+        let rim = -libm::exp(-sharpness);
         let powers = [1.0 + q + 0.5 * q * q, -q - q * q, 0.5 * q * q];
         Self { sharpness: q as f32, polynomial: powers.map(|c| (rim * c) as f32) }
     }
@@ -132,7 +133,8 @@ impl Ring {
         if wanted.iter().fold(0, |any, row| any | row) & span == 0 {
             return 0;
         }
-        let (first, last) = (record.place / PHASES, record.place / PHASES + of.sections.touched as u32 - 1);
+        let first = record.place / PHASES;
+        let last = record.place / PHASES + of.sections.touched as u32 - 1;
         self.tag(first, last, y0..y1, span);
         if footprint.conic[1] == 0.0 {
             self.upright(simd, of, record, &footprint, [x0, x1, y0, y1]);
@@ -168,7 +170,8 @@ impl Ring {
     ) {
         let at = |v: f32| Lanes::splat(simd, v);
         let [a, _, c] = footprint.conic;
-        let (q, rim) = (at(of.taper.sharpness), of.taper.polynomial);
+        let q = at(of.taper.sharpness);
+        let rim = of.taper.polynomial;
         let mut y = y0;
         while y < y1 {
             let dy = at(y as f32 + 0.5 - record.center[1]) + Lanes::load(simd, &COUNTING);
@@ -231,7 +234,8 @@ impl Ring {
     /// What a voxel adds to the line of slabs 8·`line` to 8·`line` + 7, times the footprint; and where the lines of that place begin.
     #[inline(always)]
     fn line(&self, sections: &SectionTable, record: &Record, line: u32) -> ([f32; 16], usize) {
-        let (first, phase) = (record.place / PHASES, record.place % PHASES);
+        let first = record.place / PHASES;
+        let phase = record.place % PHASES;
         let begin = (SLABS * line) as isize - first as isize;
         let mut out = [0.0; 16];
         let eight = sections.eight(phase, begin);
@@ -289,7 +293,8 @@ fn take<const AT: usize>(row: &mut [Line], range: std::ops::Range<usize>, slab: 
 #[inline(always)]
 fn pixels(center: f32, half: f32) -> [usize; 2] {
     // Saturating casts: what lies before the tile is 0.
-    let (low, high) = ((center - half - 0.5).ceil(), (center + half + 0.5).floor());
+    let low = (center - half - 0.5).ceil();
+    let high = (center + half + 0.5).floor();
     [low.max(0.0) as usize, (high as usize).min(SIDE)]
 }
 
@@ -328,7 +333,8 @@ impl Covered<'_> {
     fn rows<S: Simd, const WIDTH: usize>(self, simd: S, parts: &[Lanes<S>; 16]) -> u64 {
         let mut rows = 0;
         for (y, wanted) in self.wanted.iter().enumerate() {
-            let (lines, weights) = (&mut self.lines[y * SIDE..], &self.weights[y * STRIDE..]);
+            let lines = &mut self.lines[y * SIDE..];
+            let weights = &self.weights[y * STRIDE..];
             let (Some(lines), Some(weights)) = (lines.first_chunk_mut::<WIDTH>(), weights.first_chunk::<WIDTH>())
             else {
                 break;

@@ -124,7 +124,8 @@ fn tiles_of(viewed: &Viewed, slabs: &Slabs, segment: Segment, tiles: [usize; 2])
     let Some(scale) = viewed.scale(nearest) else { return all };
     // One pixel for neighbours of gradients, one for rounding.
     let half = viewed.footprint(scale).half.map(|h| h + 2.0);
-    let (mut low, mut high) = ([f32::INFINITY; 2], [f32::NEG_INFINITY; 2]);
+    let mut low = [f32::INFINITY; 2];
+    let mut high = [f32::NEG_INFINITY; 2];
     for end in ends {
         let Some(scale) = viewed.scale(end.z) else { return all };
         let at: [f32; 2] = viewed.pixel(Vec3::new(end.x as f32, end.y as f32, 0.0), scale as f32);

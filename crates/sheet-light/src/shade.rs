@@ -166,7 +166,8 @@ impl Shader<'_> {
         let Place { slab, y, x } = place;
         let [value, weight] = of.sheets.load(simd, slab, y, x);
         let (slabs, splat) = (&of.prepared.slabs, |v: f32| Lanes::splat(simd, v));
-        let (zero, faces) = (splat(0.0), [slab, slab + 1].map(|slab| splat(slabs.face(slab))));
+        let zero = splat(0.0);
+        let faces = [slab, slab + 1].map(|slab| splat(slabs.face(slab)));
         let near = Lanes::load(simd, &of.crossings.near[place.pixel()..]).max(faces[0]);
         let far = Lanes::load(simd, &of.crossings.far[place.pixel()..]).min(faces[1]);
         // Twice as far as the middle lies behind that of the slab.
@@ -174,12 +175,14 @@ impl Shader<'_> {
         if !zero.any_less(behind.abs()) {
             return [value, weight];
         }
-        let (half, least) = (splat(0.5 / slabs.width as f32), splat(LEAST_WEIGHT));
+        let half = splat(0.5 / slabs.width as f32);
+        let least = splat(LEAST_WEIGHT);
         let towards = |shift: Lanes<S>, slab: u32| {
             let [v, weight] = of.sheets.load(simd, slab, y, x);
             shift.max(zero) * half * (v - value).where_less(least, weight)
         };
-        let (after, before) = (towards(behind, slab + 1), towards(zero - behind, slab.max(1) - 1));
+        let after = towards(behind, slab + 1);
+        let before = towards(zero - behind, slab.max(1) - 1);
         [value + after + before, weight]
     }
 
@@ -209,7 +212,8 @@ impl Shader<'_> {
         (medium, wanted): (&Medium<S>, u32),
     ) -> Spots<S> {
         let of_all = |v: f32| Lanes::splat(simd, v);
-        let (zero, half) = (of_all(0.0), of_all(0.5));
+        let zero = of_all(0.0);
+        let half = of_all(0.5);
         let middle = (medium.near + medium.far) * half;
         let towards = of_all(-1.0) / medium.secant;
         let to_eye = if self.input.camera.is_orthographic() {
@@ -242,7 +246,8 @@ impl Shader<'_> {
         let pixels = self.input.camera.focal_px() * slabs.width;
         if self.input.camera.is_orthographic() {
             let pixels = Lanes::splat(simd, pixels as f32);
-            let (right, up) = (right * pixels, Lanes::splat(simd, 0.0) - down * pixels);
+            let right = right * pixels;
+            let up = Lanes::splat(simd, 0.0) - down * pixels;
             if !self.slopes.slant.is_any() {
                 return [right, up, along];
             }
@@ -252,7 +257,8 @@ impl Shader<'_> {
             return [right + sx * along, up + sy * along, along];
         }
         let pixels = Lanes::splat(simd, (pixels / z.max(slabs.width * 1e-3)) as f32);
-        let (gx, gy) = (right * pixels, Lanes::splat(simd, 0.0) - down * pixels);
+        let gx = right * pixels;
+        let gy = Lanes::splat(simd, 0.0) - down * pixels;
         let [u, v] = self.slopes(simd, place);
         [gx, gy, along - (u * gx + v * gy)]
     }
@@ -261,7 +267,8 @@ impl Shader<'_> {
     #[inline(always)]
     fn sample<S: Simd>(&self, simd: S, of: &Reconstructed<'_>, place: Place) -> [Lanes<S>; 2] {
         let at = place.pixel();
-        let (zero, one) = (Lanes::splat(simd, 0.0), Lanes::splat(simd, 1.0));
+        let zero = Lanes::splat(simd, 0.0);
+        let one = Lanes::splat(simd, 1.0);
         let face = |slab: u32| Lanes::splat(simd, of.prepared.slabs.face(slab));
         let near = Lanes::load(simd, &of.crossings.near[at..]).max(face(place.slab));
         let far = Lanes::load(simd, &of.crossings.far[at..]).min(face(place.slab + 1));
@@ -283,7 +290,8 @@ impl Shader<'_> {
         self.channels(simd, of, &self.spots(simd, of, place, (medium, wanted)), medium, wanted, values);
         for c in 0..self.layout.count() {
             // What is not seen may be no number.
-            let (zero, value) = (Lanes::splat(simd, 0.0), Lanes::load(simd, &values[c]));
+            let zero = Lanes::splat(simd, 0.0);
+            let value = Lanes::load(simd, &values[c]);
             let least = Lanes::splat(simd, if c < self.layout.colors() { TRACE } else { -1.0 });
             value.where_less(zero, medium.depth).where_less(least, value.abs()).store(&mut values[c]);
         }
@@ -362,7 +370,8 @@ fn unit<S: Simd>(simd: S, gradient: &[Lanes<S>; 3]) -> ([Lanes<S>; 3], Lanes<S>)
 #[inline(always)]
 fn mix<S: Simd>(simd: S, own: &Shaded<'_>, medium: &Medium<S>, fragments: &mut Fragments, picture: &Picture) {
     let Shaded { volume, tau, values } = own;
-    let (extinction, object) = (volume.material.extinction_rgb, volume.object);
+    let extinction = volume.material.extinction_rgb;
+    let object = volume.object;
     let of = |v: f32| Lanes::splat(simd, v);
     let tau_here = Lanes::load(simd, tau);
     for c in 0..picture.channels {
@@ -373,7 +382,8 @@ fn mix<S: Simd>(simd: S, own: &Shaded<'_>, medium: &Medium<S>, fragments: &mut F
         let own = Lanes::load(simd, &values[c]);
         (own - before).mul_add(share, before).store(&mut fragments.values[c]);
     }
-    let (near, far) = (Lanes::load(simd, &fragments.near), Lanes::load(simd, &fragments.far));
+    let near = Lanes::load(simd, &fragments.near);
+    let far = Lanes::load(simd, &fragments.far);
     // A volume without optical depth here, before this one, says nothing of where the medium lies.
     let mut first = [0.0; MAX_LANES];
     for lane in 0..Lanes::<S>::COUNT {
@@ -384,7 +394,8 @@ fn mix<S: Simd>(simd: S, own: &Shaded<'_>, medium: &Medium<S>, fragments: &mut F
             fragments.object[lane] = object;
         }
     }
-    let (half, first) = (of(0.5), Lanes::load(simd, &first));
+    let half = of(0.5);
+    let first = Lanes::load(simd, &first);
     let is = medium.near.where_less_or(of(0.0), tau_here, near);
     let both = near.min(is);
     is.where_less_or(first, half, both).store(&mut fragments.near);

@@ -56,7 +56,8 @@ impl Shadows {
     /// What arrives of a light there; all of one without shadows, and where no voxel is known.
     #[inline(always)]
     pub(crate) fn at<S: Simd>(&self, simd: S, cells: &Cells, light: usize) -> [Lanes<S>; 3] {
-        let (zero, one) = (Lanes::splat(simd, 0.0), Lanes::splat(simd, 1.0));
+        let zero = Lanes::splat(simd, 0.0);
+        let one = Lanes::splat(simd, 1.0);
         let Some(shares) = self.of_lights[light].as_deref() else { return [one; 3] };
         let mut sums = [[0.0; MAX_LANES]; 4];
         for lane in lanes(cells.wanted) {
@@ -96,7 +97,8 @@ fn look_up(
     progress: &Progress,
 ) -> Result<Vec<Share>, Error> {
     let [nx, ny, nz] = of.voxels.dims();
-    let (start, axes) = (of.volume.origin() - origin, of.volume.axes());
+    let start = of.volume.origin() - origin;
+    let axes = of.volume.axes();
     let rim = of.rim.map(|n| n as f64);
     let shifts = [0, 1].map(|k| of.volume.packing.shift(k + of.rim[2] % 2));
     let share = |i: usize, row: usize| {

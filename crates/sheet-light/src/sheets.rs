@@ -74,7 +74,8 @@ impl Sheets {
     /// Replaces the values of pixels of a row from x on.
     #[inline(always)]
     pub(crate) fn set<S: Simd>(&mut self, slab: u32, y: usize, x: usize, values: Lanes<S>) {
-        let (at, n) = (Self::at(slab, y, x), Lanes::<S>::COUNT.min(SIDE - x));
+        let at = Self::at(slab, y, x);
+        let n = Lanes::<S>::COUNT.min(SIDE - x);
         let mut out = [0.0; MAX_LANES];
         values.store(&mut out);
         self.values[at..at + n].copy_from_slice(&out[..n]);

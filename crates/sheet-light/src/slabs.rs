@@ -51,7 +51,8 @@ impl Slabs {
             let needed = if needed.is_nan() { u64::MAX } else { needed as u64 };
             Err(Error::limit(what, needed, u64::from(limit), "slabs", format!("choose slabs wider than {width}")))
         };
-        let (mut before, mut behind) = (1.0f64, 1.0f64);
+        let mut before = 1.0f64;
+        let mut behind = 1.0f64;
         for Kernels { reach, stride } in kernels {
             let stride = f64::from(*stride);
             let touched = (2.0 * reach / (width * stride)).ceil() + 1.0;

@@ -187,11 +187,13 @@ impl Sums {
         for run in Runs::new(simd, shown.source.splat, of.projected.size, corner) {
             let [x, y] = position(run.block * PIXELS, corner[0], corner[1]);
             // The square reaches beyond the tile.
-            let (x, y) = (x.wrapping_sub(picture.corner[0]), y.wrapping_sub(picture.corner[1]));
+            let x = x.wrapping_sub(picture.corner[0]);
+            let y = y.wrapping_sub(picture.corner[1]);
             if x >= TILE || y >= TILE {
                 continue;
             }
-            let (bits, rows) = (0xf << (x + 1), y + 1..y + 1 + BLOCK);
+            let bits = 0xf << (x + 1);
+            let rows = y + 1..y + 1 + BLOCK;
             if picture.open[rows.clone()].iter().all(|row| row & bits == 0) {
                 continue;
             }
@@ -257,7 +259,8 @@ impl Sums {
     ) {
         let [tau, depth, thickness] = self.lines.depths(simd, [x, y]);
         for lane in (0..Lanes::<S>::COUNT).filter(|lane| tau[*lane] > 0.0) {
-            let (middle, half) = ((f64::from(depth[lane]) - origin) as f32, 0.5 * thickness[lane]);
+            let middle = (f64::from(depth[lane]) - origin) as f32;
+            let half = 0.5 * thickness[lane];
             let mix = |volumes: f32, own: f32| {
                 if share[lane] >= 1.0 || !fragments.any { own } else { volumes + (own - volumes) * share[lane] }
             };

@@ -41,7 +41,8 @@ impl VolumeScratch {
     fn finish<S: Simd>(&mut self, simd: S, of: &Prepared<'_>, picture: &Picture, counts: &mut SheetCounts) {
         let batch = self.batches.start;
         self.batches.start += 1;
-        let (splatter, wanted) = (of.splatter(), picture.wanted(of.volume.normals && of.gradients.is_none()));
+        let splatter = of.splatter();
+        let wanted = picture.wanted(of.volume.normals && of.gradients.is_none());
         let is_near = |lacking: &Range<u32>| batch <= lacking.end / BATCH;
         let mut near_eye = self.near_eye.as_deref_mut().filter(|_| of.lacking.as_ref().is_some_and(is_near));
         for record in self.queue.take(of, batch, picture.corner) {
@@ -84,7 +85,8 @@ impl FoldTile<'_> {
             axes: of.input.camera.axes.map(|a| a.as_vec3()),
             lamps: &of.lamps,
         };
-        let (mut slab, mut steps) = (span.start, 0);
+        let mut slab = span.start;
+        let mut steps = 0;
         while slab < span.end {
             if self.needs_batch(slab) || steps % BATCH == 0 {
                 picture.find_open();
@@ -124,7 +126,8 @@ impl FoldTile<'_> {
     fn next_face(&self, slab: u32, end: u32) -> u32 {
         let mut next = end;
         for (prepared, scratch) in self.of.volumes.iter().zip(&self.scratch.volumes) {
-            let (own, active) = (slab / prepared.stride, &scratch.queue.active);
+            let own = slab / prepared.stride;
+            let active = &scratch.queue.active;
             if own < active.end {
                 next = next.min(active.start.max(own + 1).saturating_mul(prepared.stride));
             }
@@ -145,12 +148,14 @@ impl FoldTile<'_> {
         picture: &mut Picture,
         counts: &mut SheetCounts,
     ) {
-        let (of, drawn) = (self.of, self.drawn());
+        let of = self.of;
+        let drawn = self.drawn();
         let Scratch { volumes, splats, panes, near, far, fragments } = &mut *self.scratch;
         if let Some(drawn) = drawn {
             counts.splat_fragments += splats.fill(simd, drawn, (&of.slabs, step.end - 1), picture);
         }
-        let (faces, polygons) = ([of.slabs.face(step.start), of.slabs.face(step.end)], of.panes.as_ref());
+        let faces = [of.slabs.face(step.start), of.slabs.face(step.end)];
+        let polygons = of.panes.as_ref();
         for y in 1..=TILE {
             let mut tags = 0;
             for (prepared, scratch) in of.volumes.iter().zip(volumes.iter()) {
@@ -159,7 +164,8 @@ impl FoldTile<'_> {
             counts.touched += u64::from((tags & INTERIOR).count_ones());
             let tags = tags & picture.lit[y] | splats.sums.tags[y] & picture.open[y];
             for x in (1..=TILE).step_by(Lanes::<S>::COUNT) {
-                let (at, is_any) = ([x - 1, y - 1], tags >> x & ((1 << Lanes::<S>::COUNT) - 1) != 0);
+                let at = [x - 1, y - 1];
+                let is_any = tags >> x & ((1 << Lanes::<S>::COUNT) - 1) != 0;
                 // Polygons are composited in order, with what lies before, among and behind them.
                 let most = panes.most::<S>(polygons, at, faces[1]);
                 for n in 0..=most {
@@ -208,14 +214,16 @@ impl Between<'_, '_> {
     fn shade<S: Simd>(&mut self, simd: S, [x, y]: [usize; 2], step: &Range<u32>, limits: &Limits<'_>) {
         let Self { of, volumes, splats, fragments, shader, picture } = self;
         let Limits { near, far, part, faces } = *limits;
-        let (origin, open) = (of.slabs.origin, (picture.open[y] >> x) as u32);
+        let origin = of.slabs.origin;
+        let open = (picture.open[y] >> x) as u32;
         fragments.any = false;
         for (prepared, scratch) in of.volumes.iter().zip(volumes.iter_mut()) {
             let Some(slab) = scratch.own(prepared, step.start) else { continue };
             let VolumeScratch { sheets, crossings, kept, preclassified, .. } = scratch;
             // What polygons part is lit part by part.
             let is_part = part.is_none() && step.len() < prepared.stride as usize;
-            let (limits, preclassified) = ([near, far], preclassified.as_deref());
+            let limits = [near, far];
+            let preclassified = preclassified.as_deref();
             let reconstructed =
                 Reconstructed { prepared, crossings, sheets, preclassified, limits, part, faces, is_part, open };
             shader.add(simd, &reconstructed, Place { slab, y, x }, picture, (kept, fragments));

@@ -155,7 +155,8 @@ impl VolumeScratch {
 /// The batches of a volume's own slabs that lie in a range of slabs, with their neighbours, and the beginnings of all kernels that
 /// reach them.
 fn batches(of: &Prepared<'_>, span: &Range<u32>) -> Range<u32> {
-    let (first, last) = (span.start / of.stride, span.end.saturating_sub(1) / of.stride);
+    let first = span.start / of.stride;
+    let last = span.end.saturating_sub(1) / of.stride;
     let begin = first.saturating_sub(of.sections.touched as u32 + 1);
     let behind = if of.lacking.is_some() { 3 } else { 2 };
     begin / BATCH..(last + behind).min(of.slabs.count).div_ceil(BATCH)
@@ -174,7 +175,8 @@ impl<'a> FoldTile<'a> {
 
     /// What the tile reads of splats, if there are any at all.
     pub(crate) fn drawn(&self) -> Option<Drawn<'a>> {
-        let (splats, bins) = (self.of.input.splats.as_ref()?, self.of.bins.as_ref()?);
+        let splats = self.of.input.splats.as_ref()?;
+        let bins = self.of.bins.as_ref()?;
         Some(Drawn { splats, bins, opaque: self.opaque })
     }
 

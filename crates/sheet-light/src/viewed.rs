@@ -103,7 +103,10 @@ pub(crate) fn spacing_along(axes: &DMat3) -> f64 {
 
 /// View positions of the corners of a volume.
 pub(crate) fn corners(volume: &Volume<'_>, camera: &Camera) -> [DVec3; 8] {
-    let (dims, origin, axes, low) = (volume.grid.dims, volume.origin(), volume.axes(), volume.packing.lowest());
+    let dims = volume.grid.dims;
+    let origin = volume.origin();
+    let axes = volume.axes();
+    let low = volume.packing.lowest();
     std::array::from_fn(|c| {
         let at = [0, 1, 2].map(|a| if c >> a & 1 == 1 { low[a] + dims[a] as f64 } else { low[a] });
         camera.view_from_world(origin + axes * DVec3::from_array(at))
@@ -134,7 +137,9 @@ impl Viewed {
         let steps = volume.packing.equivalent_steps(axes);
         let m = steps * steps.transpose() * e2;
         let least_radius = LEAST_SIGMA_PX * params.kernel.extent / params.kernel.sigma;
-        let (xx, xy, yy) = (m.x_axis.x, m.x_axis.y, m.y_axis.y);
+        let xx = m.x_axis.x;
+        let xy = m.x_axis.y;
+        let yy = m.y_axis.y;
         // Equal steps at right angles leave a rounding of a slant, and what is upright is drawn faster.
         let tilt = if xy.abs() > UPRIGHT * libm::sqrt(xx * yy) { xy } else { 0.0 };
         // Rows of pixels run down.
@@ -201,7 +206,8 @@ impl Viewed {
     #[inline(always)]
     pub(crate) fn eight(&self, start: DVec3) -> Eight {
         let mut out = Eight::default();
-        let (center, origin) = (self.center.map(|c| c as f32), self.origin.unwrap_or(0.0));
+        let center = self.center.map(|c| c as f32);
+        let origin = self.origin.unwrap_or(0.0);
         for i in 0..8 {
             let at = start + self.axes.x_axis * i as f64;
             let slabs = (f64::from(at.z as f32) - self.reach) / self.width;
@@ -260,7 +266,8 @@ impl Viewed {
         let pixel = neighbour / scale;
         // A sheet holds means over its slab, whose middle may lie beyond a volume's face; values there are in part those of the next sheet.
         let along = self.reach + (1.5 + neighbour) * slabs.width + self.rounding;
-        let (inverse, rays) = (self.axes.inverse(), corner_rays(camera));
+        let inverse = self.axes.inverse();
+        let rays = corner_rays(camera);
         [0, 1, 2].map(|a| {
             let row = inverse.row(a);
             // Rows of pixels run down, view space up.

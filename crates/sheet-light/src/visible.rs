@@ -78,7 +78,8 @@ impl Voxels {
     #[inline(always)]
     pub(crate) fn pair(&self, ranks: &[u64], i: usize, j: usize, k: usize) -> (usize, u64) {
         let at = (k * self.dims[1] + j) * self.words + i / 64;
-        let (word, bit) = (self.bits[at], i % 64);
+        let word = self.bits[at];
+        let bit = i % 64;
         let next = if bit == 63 { self.bits[at + 1] << 1 } else { 0 };
         (ranks[at] as usize + (word & ((1 << bit) - 1)).count_ones() as usize, (word >> bit | next) & 3)
     }
@@ -124,7 +125,8 @@ impl Voxels {
         let mut sure = self.clone();
         sure.erode_block(near.block);
         let [_, ny, nz] = self.dims.map(|n| n as isize);
-        let (words, pad) = (self.words, near.block[0] / 32 + 1);
+        let words = self.words;
+        let pad = near.block[0] / 32 + 1;
         // Ones before and behind each row.
         let stride = words + 2 * pad;
         let mut all = vec![!0u64; stride * self.dims[1] * self.dims[2]];
@@ -145,10 +147,12 @@ impl Voxels {
             let runs: Vec<_> = near.rows.iter().filter(|run| run.length == length).collect();
             let rows = self.bits.par_chunks_exact_mut(words).zip(sure.bits.par_chunks_exact(words)).enumerate();
             rows.with_min_len(256).for_each(|(row, (out, sure))| {
-                let (j, k) = (row as isize % ny, row as isize / ny);
+                let j = row as isize % ny;
+                let k = row as isize / ny;
                 for w in (0..words).filter(|w| sure[*w] != !0) {
                     for run in &runs {
-                        let (j, k) = (j + run.j, k + run.k);
+                        let j = j + run.j;
+                        let k = k + run.k;
                         if out[w] == 0 {
                             break;
                         }
@@ -174,10 +178,12 @@ impl Voxels {
             }
         });
         let [_, ny, nz] = self.dims;
-        let (plane, old) = (words * ny, self.bits.clone());
+        let plane = words * ny;
+        let old = self.bits.clone();
         let along = |bits: &mut Vec<u64>, old: &[u64], stride: usize, n: usize, reach: usize| {
             bits.par_chunks_mut(words).enumerate().with_min_len(256).for_each(|(row, out)| {
-                let (at, here) = (row * words / stride % n, row * words);
+                let at = row * words / stride % n;
+                let here = row * words;
                 for other in at.saturating_sub(reach)..=(at + reach).min(n - 1) {
                     let from = &old[here + other * stride - at * stride..][..words];
                     out.iter_mut().zip(from).for_each(|(out, from)| *out &= from);
@@ -193,14 +199,16 @@ impl Voxels {
 /// The word that begins `step` bits behind the beginning of a row.
 #[inline(always)]
 fn behind(row: &[u64], step: isize) -> u64 {
-    let (word, bit) = (step as usize / 64, step as usize % 64);
+    let word = step as usize / 64;
+    let bit = step as usize % 64;
     row[word] >> bit | row[word + 1] << 1 << (63 - bit)
 }
 
 /// Word `w` of a row moved by `step` bits to higher places, ones from outside.
 fn shifted(row: &[u64], w: usize, step: isize) -> u64 {
     let first = 64 * w as isize - step;
-    let (word, bit) = (first.div_euclid(64), first.rem_euclid(64));
+    let word = first.div_euclid(64);
+    let bit = first.rem_euclid(64);
     let at = |word: isize| usize::try_from(word).ok().and_then(|w| row.get(w)).copied().unwrap_or(!0);
     if bit == 0 { at(word) } else { at(word) >> bit | at(word + 1) << (64 - bit) }
 }
@@ -244,7 +252,8 @@ mod tests {
     #[test]
     fn needed_voxels_are_those_of_the_definition() {
         let tf = transfer(&[(0.25, 0.0), (0.3, 1.0), (0.35, 0.0), (0.995, 0.0), (1.0, 1.0)]);
-        let (dims, steps) = ([70, 13, 15], DMat3::from_cols(DVec3::X, DVec3::new(0.4, 0.9, 0.0), DVec3::Z));
+        let dims = [70, 13, 15];
+        let steps = DMat3::from_cols(DVec3::X, DVec3::new(0.4, 0.9, 0.0), DVec3::Z);
         let [nx, ny, nz] = dims;
         // Few that are shown, in much of two intervals that are not.
         let value = |i: usize| match rng::unit_f32(7, 0, i as u64, 0) {

@@ -68,7 +68,8 @@ impl Volume<'_> {
     /// The transfer function without what can not be seen: extinctions of which no ray through the whole volume gathers more than
     /// [`splat_core::optics::FAINTEST`], and colours that are a [`TRACE`].
     pub(crate) fn seen(&self) -> TransferFunction {
-        let (axes, [nx, ny, nz]) = (self.axes(), self.grid.dims.map(|n| n as f64));
+        let axes = self.axes();
+        let [nx, ny, nz] = self.grid.dims.map(|n| n as f64);
         let longest = axes.x_axis.length() * nx + axes.y_axis.length() * ny + axes.z_axis.length() * nz;
         let faintest = f64::from(faintest(std::slice::from_ref(self.material)));
         self.transfer.without_traces((faintest / (self.extinction_scale * longest)) as f32, TRACE)
@@ -90,14 +91,18 @@ impl Volume<'_> {
         let plane = |k: isize| {
             let shift = self.packing.shift(k.rem_euclid(2) as usize);
             let [x, y] = [at.x - shift, at.y - shift];
-            let (i, j, u, v) = (x.floor() as isize, y.floor() as isize, (x - x.floor()) as f32, (y - y.floor()) as f32);
+            let i = x.floor() as isize;
+            let j = y.floor() as isize;
+            let u = (x - x.floor()) as f32;
+            let v = (y - y.floor()) as f32;
             let row = |j: isize| {
                 let [a, b] = [0, 1].map(|n| self.grid.at_clamped(i + n, j, k));
                 a + (b - a) * u
             };
             row(j) + (row(j + 1) - row(j)) * v
         };
-        let (k, w) = (at.z.floor() as isize, (at.z - at.z.floor()) as f32);
+        let k = at.z.floor() as isize;
+        let w = (at.z - at.z.floor()) as f32;
         Some(plane(k) + (plane(k + 1) - plane(k)) * w)
     }
 
@@ -110,7 +115,8 @@ impl Volume<'_> {
     /// The planes that it is cut along, in lattice coordinates: unit normals that lead out, and their products with the border.
     pub(crate) fn planes(&self) -> impl Iterator<Item = (DVec3, f64)> {
         let plane = |(normal, offset): (DVec3, f64)| {
-            let (own, offset) = (self.grid.axes.transpose() * normal, offset - normal.dot(self.grid.origin));
+            let own = self.grid.axes.transpose() * normal;
+            let offset = offset - normal.dot(self.grid.origin);
             (own / own.length(), offset / own.length())
         };
         self.clip.iter().flat_map(Clip::half_spaces).map(plane)

@@ -30,9 +30,12 @@ fn truth(camera: &Camera, tf: &TransferFunction, side: f64) -> Vec<[f64; 4]> {
     let pixel = |at: usize| {
         let (from, along) = camera.view_ray((at % width) as f64 + 0.5, (at / width) as f64 + 0.5);
         let world = |v: DVec3| camera.axes[0] * v.x + camera.axes[1] * v.y + camera.axes[2] * v.z;
-        let (from, along) = (camera.position + world(from), world(along));
+        let from = camera.position + world(from);
+        let along = world(along);
         let [near, far] = in_box(camera, DVec3::splat(side), at);
-        let (n, mut tau, mut color) = (2000, 0.0, [0.0; 3]);
+        let n = 2000;
+        let mut tau = 0.0;
+        let mut color = [0.0; 3];
         let step = (far - near).max(0.0) / f64::from(n);
         for i in 0..n {
             let class = tf.at(waves(from + along * (near + (f64::from(i) + 0.5) * step)) as f32);
@@ -58,7 +61,8 @@ fn rmse(found: &Accumulator, truth: &[[f64; 4]]) -> f64 {
 
 #[test]
 fn body_centred_sheets_are_those_of_the_twin() {
-    let (tf, material) = (transfer(&[(0.2, 0.0), (0.5, 0.4), (0.8, 0.1), (0.9, 1.5)]), unlit());
+    let tf = transfer(&[(0.2, 0.0), (0.5, 0.4), (0.8, 0.1), (0.9, 1.5)]);
+    let material = unlit();
     let bcc = body_centred([11, 9, 18], 7.0, noise);
     let volumes = [bcc_volume(&bcc, &tf, &material)];
     for camera in [parallel([3.0, 2.0, 8.0], 11.0, [70, 50]), perspective([2.0, 3.0, 6.0], 60.0, [50, 70])] {
@@ -93,7 +97,8 @@ fn light_in_a_body_centred_lattice_is_that_of_the_twin() {
 
 #[test]
 fn voxels_of_a_body_centred_lattice_that_are_skipped_change_nothing() {
-    let (tf, material) = (transfer(&[(0.6, 0.0), (0.65, 3.0), (0.75, 3.0), (0.8, 0.0)]), unlit());
+    let tf = transfer(&[(0.6, 0.0), (0.65, 3.0), (0.75, 3.0), (0.8, 0.0)]);
+    let material = unlit();
     let bcc = body_centred([28, 28, 58], 8.0, |p| (-p.length_squared()).exp());
     crate::twin::skipping_changes_nothing(bcc_volume(&bcc, &tf, &material));
 }
@@ -101,12 +106,14 @@ fn voxels_of_a_body_centred_lattice_that_are_skipped_change_nothing() {
 /// One shape, whatever it is made of: a constant body-centred volume has the optical depths of a Cartesian one of the same box.
 #[test]
 fn a_constant_body_centred_volume_fills_its_box() {
-    let (tf, material) = (constant(0.4), unlit());
+    let tf = constant(0.4);
+    let material = unlit();
     let bcc = body_centred([9, 8, 20], 5.0, |_| 3.0);
     let one_cell = Grid { dims: [1; 3], values: vec![3.0], origin: DVec3::ZERO, axes: cubic(5.0) };
     for camera in [parallel([3.0, 4.0, 12.0], 9.0, [60, 50]), perspective([1.0, 2.0, 5.0], 80.0, [60, 50])] {
         let drawn = |volume| draw(&input(&[volume], &camera, &[]), &exact()).unwrap().0;
-        let (found, expected) = (drawn(bcc_volume(&bcc, &tf, &material)), drawn(volume(&one_cell, &tf, &material)));
+        let found = drawn(bcc_volume(&bcc, &tf, &material));
+        let expected = drawn(volume(&one_cell, &tf, &material));
         assert!(expected.optical_depth[0].iter().any(|t| *t > 2.0));
         let off = largest(&found.optical_depth[0], &expected.optical_depth[0]);
         assert!(off < 1e-5, "{off:e}");
@@ -115,7 +122,8 @@ fn a_constant_body_centred_volume_fills_its_box() {
 
 #[test]
 fn what_no_body_centred_lattice_is_is_refused() {
-    let (tf, material) = (constant(0.4), unlit());
+    let tf = constant(0.4);
+    let material = unlit();
     let bcc = body_centred([4, 4, 8], 2.0, |_| 3.0);
     let camera = parallel([0.0, 0.0, 9.0], 3.0, [8, 8]);
     let odd = BccGrid { planes: Grid { dims: [4, 8, 4], ..bcc.planes.clone() } };
@@ -131,7 +139,8 @@ mod deep {
 
     #[test]
     fn a_body_centred_lattice_shows_a_band_limited_field_as_well_with_less_points() {
-        let (tf, material) = (transfer(&[(-0.5, 0.0), (-0.1, 0.02), (0.2, 0.3), (0.4, 0.1), (0.9, 0.6)]), unlit());
+        let tf = transfer(&[(-0.5, 0.0), (-0.1, 0.02), (0.2, 0.3), (0.4, 0.1), (0.9, 0.6)]);
+        let material = unlit();
         let side = 34usize;
         let cartesian = grid([side; 3], cubic(1.0), waves);
         let bcc = body_centred([24, 24, 48], side as f64, waves);

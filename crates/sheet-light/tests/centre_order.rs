@@ -25,7 +25,8 @@ fn across() -> DVec3 {
 
 /// The same voxels as splats: green where the value is 0, red where it is 1, as the transfer function has it.
 fn whole_kernels(grid: &Grid, of_a_voxel: f64, camera: &Camera) -> [Vec<f32>; 2] {
-    let (mut cloud, mut values) = (Cloud::new(DVec3::ZERO), Vec::new());
+    let mut cloud = Cloud::new(DVec3::ZERO);
+    let mut values = Vec::new();
     let [nx, ny, nz] = grid.dims;
     for (k, j, i) in (0..nz).flat_map(|k| (0..ny).flat_map(move |j| (0..nx).map(move |i| (k, j, i)))) {
         cloud.push(&Splat {
@@ -63,7 +64,8 @@ fn whole_kernels(grid: &Grid, of_a_voxel: f64, camera: &Camera) -> [Vec<f32>; 2]
 fn sheets(grid: &Grid, of_a_voxel: f64, camera: &Camera) -> [Vec<f32>; 2] {
     let extinction = (of_a_voxel / SPACING) as f32;
     let point = |value, red| TransferPoint { value, color: [red, 1.0 - red, 0.0], extinction };
-    let (tf, material) = (TransferFunction::new(vec![point(0.0, 0.0), point(1.0, 1.0)]).unwrap(), unlit());
+    let tf = TransferFunction::new(vec![point(0.0, 0.0), point(1.0, 1.0)]).unwrap();
+    let material = unlit();
     let out = draw(&input(&[volume(grid, &tf, &material)], camera, &[]), &exact()).unwrap().0;
     [out.channels[0].clone(), out.channels[1].clone()]
 }

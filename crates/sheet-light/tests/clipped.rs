@@ -10,14 +10,16 @@ fn before_plane(camera: &Camera, at: usize, (normal, offset): (DVec3, f64)) -> [
     let [x, y] = [at % camera.size[0] as usize, at / camera.size[0] as usize].map(|v| v as f64 + 0.5);
     let world = |v: DVec3| camera.axes[0] * v.x + camera.axes[1] * v.y + camera.axes[2] * v.z;
     let (from, along) = camera.view_ray(x, y);
-    let (left, leaves) = (offset - normal.dot(camera.position + world(from)), normal.dot(world(along)));
+    let left = offset - normal.dot(camera.position + world(from));
+    let leaves = normal.dot(world(along));
     if leaves > 0.0 { [f64::NEG_INFINITY, left / leaves] } else { [left / leaves, f64::INFINITY] }
 }
 
 /// Every pixel of a constant volume of these sides has e^−τ of what the regions leave of its ray.
 fn check(volume: Volume<'_>, camera: &Camera, sides: DVec3, extinction: f64) {
     let (out, _) = draw(&input(&[volume], camera, &[]), &exact()).unwrap();
-    let (mut cut, mut seen) = (0, 0);
+    let mut cut = 0;
+    let mut seen = 0;
     for at in 0..out.optical_depth[0].len() {
         let [x, y] = [at % camera.size[0] as usize, at / camera.size[0] as usize].map(|v| v as f64 + 0.5);
         let in_box = in_box(camera, sides, at);
@@ -37,7 +39,9 @@ fn check(volume: Volume<'_>, camera: &Camera, sides: DVec3, extinction: f64) {
 
 #[test]
 fn rays_end_at_planes_and_boxes_in_any_view() {
-    let (grid, transfer, material) = (grid([20, 16, 12], cubic(0.25), |_| 5.0), constant(0.4), unlit());
+    let grid = grid([20, 16, 12], cubic(0.25), |_| 5.0);
+    let transfer = constant(0.4);
+    let material = unlit();
     let sides = DVec3::new(5.0, 4.0, 3.0);
     let oblique = Clip::HalfSpace { normal: DVec3::new(0.5, -1.0, 0.25), offset: 0.3 };
     let boxed = Clip::Box(DAabb::new(DVec3::new(-1.9, -0.3, -9.0), DVec3::new(1.3, 1.1, 0.4)));
@@ -51,7 +55,9 @@ fn rays_end_at_planes_and_boxes_in_any_view() {
 
 #[test]
 fn regions_move_with_their_volume() {
-    let (grid, transfer, material) = (grid([16; 3], cubic(0.25), |p| p.x + 0.5 * p.y), constant(0.7), unlit());
+    let grid = grid([16; 3], cubic(0.25), |p| p.x + 0.5 * p.y);
+    let transfer = constant(0.7);
+    let material = unlit();
     let clip = [Clip::HalfSpace { normal: DVec3::new(1.0, 2.0, -0.5), offset: 0.25 }];
     let still = Volume { clip: &clip, ..volume(&grid, &transfer, &material) };
     let camera = parallel([2.0, 3.0, 9.0], 6.0, [30, 24]);
@@ -79,7 +85,8 @@ fn regions_move_with_their_volume() {
 fn a_cut_shows_the_values_that_are_there() {
     let grid = grid([12, 12, 32], cubic(0.125), |p| p.z);
     let point = |value: f32| TransferPoint { value, color: [0.5 + 0.25 * value; 3], extinction: 20.0 };
-    let (transfer, material) = (TransferFunction::new(vec![point(-2.0), point(2.0)]).unwrap(), unlit());
+    let transfer = TransferFunction::new(vec![point(-2.0), point(2.0)]).unwrap();
+    let material = unlit();
     let camera = parallel([0.0, 0.0, 9.0], 1.0, [12, 12]);
     for (depth, width) in [(0.3, 0.02), (-0.71, 0.02), (0.3, 0.007)] {
         let clip = [Clip::HalfSpace { normal: DVec3::Z, offset: depth }];

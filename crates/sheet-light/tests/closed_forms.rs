@@ -15,7 +15,8 @@ fn inside(grid: &Grid, camera: &Camera, x: usize, y: usize) -> (f64, DVec3) {
         let at = inverse * (place(z) - grid.origin);
         (0..3).all(|a| at[a] >= -0.5 && at[a] <= grid.dims[a] as f64 - 0.5)
     };
-    let (far, n) = (200.0, 20_000);
+    let far = 200.0;
+    let n = 20_000;
     let step = |i: usize| far * i as f64 / f64::from(n);
     let Some(first) = (0..n as usize).find(|i| is_inside(step(*i))) else { return (0.0, DVec3::ZERO) };
     let last = (first..n as usize).take_while(|i| is_inside(step(*i))).last().unwrap();
@@ -33,7 +34,8 @@ fn inside(grid: &Grid, camera: &Camera, x: usize, y: usize) -> (f64, DVec3) {
 
 /// Every pixel of a constant volume has e^−τ and, being white, 1 − e^−τ; every 7th is held against the closed form.
 fn check(grid: &Grid, camera: &Camera, tau_per_length: f32, params: &Params) {
-    let (tf, material) = (constant(tau_per_length), unlit());
+    let tf = constant(tau_per_length);
+    let material = unlit();
     let volumes = [volume(grid, &tf, &material)];
     let (out, counts) = draw(&input(&volumes, camera, &[]), params).unwrap();
     let width = camera.size[0] as usize;
@@ -46,7 +48,8 @@ fn check(grid: &Grid, camera: &Camera, tau_per_length: f32, params: &Params) {
             continue;
         }
         let expected = (-length * f64::from(tau_per_length)).exp();
-        let (found, light) = ((-f64::from(out.optical_depth[0][at])).exp(), f64::from(out.channels[0][at]));
+        let found = (-f64::from(out.optical_depth[0][at])).exp();
+        let light = f64::from(out.channels[0][at]);
         assert!((found - expected).abs() < 1e-5, "pixel {at}: {found}, expected {expected}; {counts:?}");
         assert!((light - (1.0 - expected)).abs() < 1e-5, "pixel {at}: {light}, expected {}", 1.0 - expected);
         seen += 1;
@@ -71,7 +74,8 @@ fn hv05_opacity_does_not_depend_on_the_number_of_slabs() {
 fn a_linear_field_has_its_optical_depth_wherever_faces_cut_slabs() {
     let field = |p: DVec3| 1.5 + p.dot(DVec3::new(0.1, -0.05, 0.6));
     let grid = grid([30, 30, 5], cubic(0.4), field);
-    let (tf, material) = (transfer(&[(0.0, 0.0), (4.0, 4.0)]), unlit());
+    let tf = transfer(&[(0.0, 0.0), (4.0, 4.0)]);
+    let material = unlit();
     let volumes = [volume(&grid, &tf, &material)];
     for camera in [parallel([0.0, 0.0, 9.0], 6.0, [24, 24]), parallel([3.0, 2.0, 9.0], 6.0, [24, 24])] {
         for slab_width in [0.4, 0.6, 0.77, 1.3] {
@@ -79,7 +83,8 @@ fn a_linear_field_has_its_optical_depth_wherever_faces_cut_slabs() {
             let (out, _) = draw(&input(&volumes, &camera, &[]), &params).unwrap();
             for at in (0..576).step_by(7) {
                 let (length, middle) = inside(&grid, &camera, at % 24, at / 24);
-                let (found, expected) = (f64::from(out.optical_depth[0][at]), length * field(middle));
+                let found = f64::from(out.optical_depth[0][at]);
+                let expected = length * field(middle);
                 assert!((found / expected - 1.0).abs() < 0.01, "{slab_width}, pixel {at}: {found}, not {expected}");
             }
         }
@@ -91,7 +96,8 @@ fn a_linear_field_has_its_optical_depth_wherever_faces_cut_slabs() {
 fn an_eye_in_a_linear_field_sees_its_optical_depth() {
     let field = |p: DVec3| 1.5 + p.dot(DVec3::new(0.1, -0.05, 0.6));
     let grid = grid([30, 30, 5], cubic(0.4), field);
-    let (tf, material) = (transfer(&[(0.0, 0.0), (4.0, 4.0)]), unlit());
+    let tf = transfer(&[(0.0, 0.0), (4.0, 4.0)]);
+    let material = unlit();
     let volumes = [volume(&grid, &tf, &material)];
     let eyes = [[0.0, 0.0, 0.7], [0.0, 0.0, 0.51], [0.3, 0.2, 0.83], [-0.2, 0.1, 1.05], [0.1, 0.0, -0.2]];
     for camera in eyes.iter().flat_map(|eye| [perspective(*eye, 60.0, [24, 24]), parallel(*eye, 3.0, [24, 24])]) {
@@ -101,7 +107,8 @@ fn an_eye_in_a_linear_field_sees_its_optical_depth() {
             let (out, _) = draw(&input, &params).unwrap();
             for at in (0..576).step_by(7) {
                 let (length, middle) = inside(&grid, &camera, at % 24, at / 24);
-                let (found, expected) = (f64::from(out.optical_depth[0][at]), length * field(middle));
+                let found = f64::from(out.optical_depth[0][at]);
+                let expected = length * field(middle);
                 let what = format!("{slab_width}, {:?}, pixel {at}", camera.position);
                 assert!((found / expected - 1.0).abs() < 0.01, "{what}: {found}, not {expected}");
             }
@@ -180,7 +187,8 @@ fn footprints_on_a_lattice_ripple_by_less_than_a_hundredth() {
 fn ia03_voxels_that_cross_faces_keep_their_weight() {
     // A ramp of eight cells moved through slabs that stay where they are: something nearer holds them. A section that were lost
     // would move the mean of a slab along the ramp.
-    let (tf, material) = (transfer(&[(0.0, 0.0), (8.0, 8.0)]), unlit());
+    let tf = transfer(&[(0.0, 0.0), (8.0, 8.0)]);
+    let material = unlit();
     let camera = parallel([0.0, 0.0, 12.0], 1.0, [8, 8]);
     let mut nearer = grid([1, 1, 1], cubic(1.0), |_| 0.0);
     nearer.origin.z += 8.0;
@@ -203,11 +211,9 @@ mod deep {
 
     #[test]
     fn hv04_a_hundred_thousand_slabs_lose_no_digits() {
-        let (grid, material, camera) = (
-            grid([8, 8, 1000], DMat3::from_diagonal(DVec3::new(0.5, 0.5, 0.002)), |_| 3.0),
-            unlit(),
-            parallel([0.0, 0.0, 9.0], 0.5, [9, 9]),
-        );
+        let grid = grid([8, 8, 1000], DMat3::from_diagonal(DVec3::new(0.5, 0.5, 0.002)), |_| 3.0);
+        let material = unlit();
+        let camera = parallel([0.0, 0.0, 9.0], 0.5, [9, 9]);
         for (tau, slabs) in [(0.01f64, 1e5), (1.0, 1e4), (10.0, 1e4)] {
             let tf = constant((0.5 * tau) as f32);
             let params = Params { slab_width: Some(2.0 / slabs), ..exact() };

@@ -24,7 +24,9 @@ fn off_a_sphere(of: &SheetInput<'_>, radius: f64, gradients: Gradients) -> [f64;
     let sheets = prepare(of.clone(), &Params { gradients, slab_width: Some(0.02), ..exact() }, None).unwrap();
     sheets.fold(f32::NEG_INFINITY..f32::INFINITY, &[], &layout, &mut out, None).unwrap();
     let first = layout.normal().unwrap();
-    let (mut sum, mut most, mut count) = (0.0, 0.0f64, 0.0);
+    let mut sum = 0.0;
+    let mut most = 0.0f64;
+    let mut count = 0.0;
     for at in 0..out.optical_depth[0].len() {
         let [x, y] = [at % camera.size[0] as usize, at / camera.size[0] as usize].map(|v| v as f64 + 0.5);
         let from = camera.view_ray(x, y).0;
@@ -45,10 +47,12 @@ fn off_a_sphere(of: &SheetInput<'_>, radius: f64, gradients: Gradients) -> [f64;
 
 #[test]
 fn normals_of_a_sphere_are_its_radii_by_sheets_and_better_by_a_gradient_volume() {
-    let (radius, material) = (1.6, Material::default());
+    let radius = 1.6;
+    let material = Material::default();
     let tf = transfer(&[(-1.61, 0.0), (-1.59, 500.0)]);
     let field = |p: DVec3| -p.length();
-    let (cartesian, bcc) = (grid([24, 24, 24], cubic(0.2), field), body_centred([17, 17, 34], 4.8, field));
+    let cartesian = grid([24, 24, 24], cubic(0.2), field);
+    let bcc = body_centred([17, 17, 34], 4.8, field);
     let camera = parallel([3.0, 2.0, 8.0], 4.0, [64, 64]);
     for mut seen in [volume(&cartesian, &tf, &material), bcc_volume(&bcc, &tf, &material)] {
         seen.normals = true;
@@ -67,7 +71,8 @@ fn gradient_volumes_are_those_of_the_twin() {
     let material = Material { specular: 0.3, shininess: 12.0, ..Material::default() };
     let lights = [sun([1.0, 2.0, 1.5]), lit(LightShape::Point { position: DVec3::new(4.0, 1.0, 5.0) })];
     let sheared = DMat3::from_cols(DVec3::new(0.3, 0.05, 0.0), DVec3::new(0.1, 0.3, -0.05), DVec3::new(0.0, 0.1, -0.4));
-    let (grid, bcc) = (grid([16, 14, 12], sheared, smooth), body_centred([9, 9, 18], 4.0, smooth));
+    let grid = grid([16, 14, 12], sheared, smooth);
+    let bcc = body_centred([9, 9, 18], 4.0, smooth);
     let params = Params { gradients: VOLUME, ..exact() };
     for mut seen in [volume(&grid, &tf, &material), bcc_volume(&bcc, &tf, &material)] {
         seen.normals = true;
@@ -104,7 +109,8 @@ fn normals_across_half_vectors_are_those_of_the_twin() {
 
 #[test]
 fn a_gradient_volume_is_counted_before_it_is_made() {
-    let (tf, material) = (transfer(&[(0.0, 1.0)]), Material::default());
+    let tf = transfer(&[(0.0, 1.0)]);
+    let material = Material::default();
     let grid = grid([40, 40, 40], cubic(0.2), smooth);
     let mut volumes = [volume(&grid, &tf, &material)];
     volumes[0].normals = true;

@@ -12,9 +12,11 @@ use splat_core::{Accumulator, Exceeded, LayerSet, Limits, Material, Progress, Tr
 #[test]
 fn ia02_a_flat_field_is_flat() {
     // Sums of kernels ripple by some percent, and colour and extinction follow the value: what is left of it shows.
-    let (tf, material) = (transfer(&[(0.0, 0.0), (1.0, 0.5), (2.0, 0.1)]), unlit());
+    let tf = transfer(&[(0.0, 0.0), (1.0, 0.5), (2.0, 0.1)]);
+    let material = unlit();
     let camera = parallel([1.0, 2.0, 12.0], 2.0, [64, 64]);
-    let (mut cartesian, mut bcc) = (grid([16; 3], cubic(0.5), |_| 0.6), body_centred([11, 11, 22], 8.0, |_| 0.6));
+    let mut cartesian = grid([16; 3], cubic(0.5), |_| 0.6);
+    let mut bcc = body_centred([11, 11, 22], 8.0, |_| 0.6);
     // Far beside the picture values are others: sums are of differences to the middle of all, which else were 0.
     (cartesian.values[0], bcc.planes.values[0]) = (2.0, 2.0);
     for volume in [volume(&cartesian, &tf, &material), bcc_volume(&bcc, &tf, &material)] {
@@ -32,7 +34,8 @@ fn ia02_a_flat_field_is_flat() {
 #[test]
 fn ia04_sums_of_a_hundred_thousand_small_values_keep_their_digits() {
     // All in one pixel of one slab, where sums of 16 bits stall at a thirtieth of theirs.
-    let (tf, material) = (transfer(&[(0.0, 0.0), (1.0, 1.0)]), unlit());
+    let tf = transfer(&[(0.0, 0.0), (1.0, 1.0)]);
+    let material = unlit();
     let grid = grid([100, 100, 10], cubic(1.0), |_| 0.01);
     let camera = parallel([0.0, 0.0, 50.0], 100.0, [1, 1]);
     let params = Params { slab_width: Some(10.0), ..exact() };
@@ -43,9 +46,11 @@ fn ia04_sums_of_a_hundred_thousand_small_values_keep_their_digits() {
 
 #[test]
 fn ia11_five_thousand_slabs_front_to_back_are_those_back_to_front() {
-    let (tf, material) = (transfer(&[(0.1, 0.0), (0.5, 0.0008), (0.9, 0.002)]), unlit());
+    let tf = transfer(&[(0.1, 0.0), (0.5, 0.0008), (0.9, 0.002)]);
+    let material = unlit();
     let grid = grid([4, 4, 1250], cubic(1.0), noise);
-    let (camera, count) = (parallel([0.0, 0.0, 700.0], 2.0, [6, 6]), 5000u16);
+    let camera = parallel([0.0, 0.0, 700.0], 2.0, [6, 6]);
+    let count = 5000u16;
     let volumes = [volume(&grid, &tf, &material)];
     let sheeted = prepare(input(&volumes, &camera, &[]), &Params { slab_width: Some(0.25), ..exact() }, None).unwrap();
     let fold = |range: std::ops::Range<f32>| {
@@ -94,7 +99,8 @@ fn ia06_pixels_that_are_done_err_by_no_more_than_what_they_hide() {
 fn ia07_a_ramp_has_the_same_normal_everywhere() {
     let layers = LayerSet { normal: true, ..LayerSet::default() };
     let layout = ChannelLayout::new(&layers);
-    let (tf, material) = (constant(0.5), Material::default());
+    let tf = constant(0.5);
+    let material = Material::default();
     for (slope, tolerance) in [(DVec3::X, 0.01), (DVec3::Z, 0.01), (DVec3::new(1.0, 2.0, -1.5), 0.01)] {
         let grid = grid([20, 20, 20], cubic(0.5), |p| 1e3 + slope.dot(p));
         let mut volumes = [volume(&grid, &tf, &material)];
@@ -121,7 +127,8 @@ fn ia07_a_ramp_has_the_same_normal_everywhere() {
 
 #[test]
 fn cv08_without_a_gradient_there_is_no_normal_and_no_nan() {
-    let (tf, material) = (constant(0.5), Material::default());
+    let tf = constant(0.5);
+    let material = Material::default();
     let grid = grid([12, 12, 12], cubic(0.5), |_| 4.0);
     let mut volumes = [volume(&grid, &tf, &material)];
     let camera = perspective([2.0, 3.0, 9.0], 50.0, [60, 60]);
@@ -134,7 +141,8 @@ fn cv08_without_a_gradient_there_is_no_normal_and_no_nan() {
 
 #[test]
 fn ia09_any_zoom_keeps_the_mean_brightness() {
-    let (tf, material) = (transfer(&[(0.0, 0.0), (1.0, 0.05)]), unlit());
+    let tf = transfer(&[(0.0, 0.0), (1.0, 0.05)]);
+    let material = unlit();
     let grid = grid([16, 16, 16], cubic(0.5), noise);
     let volumes = [volume(&grid, &tf, &material)];
     // The same part of the image plane in pixels of 1/10 to 16 voxels.
@@ -156,7 +164,8 @@ fn ia09_any_zoom_keeps_the_mean_brightness() {
 #[test]
 fn ia14_one_field_on_two_lattices_and_finer_ones() {
     let field = |p: DVec3| (1.1 * p.x).sin() * (0.8 * p.y).cos() + 0.4 * p.z;
-    let (tf, material) = (transfer(&[(-0.5, 0.0), (0.3, 0.3), (1.5, 1.0)]), unlit());
+    let tf = transfer(&[(-0.5, 0.0), (0.3, 0.3), (1.5, 1.0)]);
+    let material = unlit();
     let camera = parallel([3.0, 4.0, 9.0], 4.0, [40, 40]);
     let shear = DMat3::from_cols(DVec3::new(1.0, 0.0, 0.0), DVec3::new(0.4, -0.9, 0.0), DVec3::new(0.0, 0.3, 1.2));
     let picture = |axes: DMat3, n: usize| {
@@ -172,18 +181,22 @@ fn ia14_one_field_on_two_lattices_and_finer_ones() {
         out
     };
     let rmse = |n: usize| {
-        let (a, b) = (picture(DMat3::IDENTITY, n), picture(shear, n));
+        let a = picture(DMat3::IDENTITY, n);
+        let b = picture(shear, n);
         let squares = a.optical_depth[0].iter().zip(&b.optical_depth[0]).map(|(a, b)| f64::from((a - b) * (a - b)));
         (squares.sum::<f64>() / 1600.0).sqrt()
     };
-    let (coarse, fine) = (rmse(24), rmse(48));
+    let coarse = rmse(24);
+    let fine = rmse(48);
     assert!(coarse > 1e-4 && fine < 0.5 * coarse, "{coarse} → {fine}");
 }
 
 #[test]
 fn depths_of_a_constant_volume_have_their_closed_form() {
-    let (extinction, length) = (0.4f64, 8.0f64);
-    let (tf, material) = (constant(extinction as f32), unlit());
+    let extinction = 0.4f64;
+    let length = 8.0f64;
+    let tf = constant(extinction as f32);
+    let material = unlit();
     let grid = grid([16, 16, 16], cubic(0.5), |_| 1.0);
     let volumes = [volume(&grid, &tf, &material)];
     let camera = parallel([0.0, 0.0, 10.0], 4.0, [24, 24]);
@@ -226,14 +239,16 @@ fn extinction_by_channel_hides_each_channel_by_its_own() {
 
 #[test]
 fn empty_space_costs_no_fragments() {
-    let (tf, material) = (transfer(&[(0.5, 0.0), (1.0, 1.0)]), unlit());
+    let tf = transfer(&[(0.5, 0.0), (1.0, 1.0)]);
+    let material = unlit();
     let camera = parallel([3.0, 4.0, 40.0], 24.0, [120, 120]);
     let ball = |p: DVec3| (3.0 - p.length()).max(0.0);
     let cost = |n: usize| {
         let grid = grid([n, n, n], cubic(0.5), ball);
         draw(&input(&[volume(&grid, &tf, &material)], &camera, &[]), &exact()).unwrap().1
     };
-    let (small, large) = (cost(24), cost(48));
+    let small = cost(24);
+    let large = cost(48);
     assert_eq!((small.visible, small.fragments), (large.visible, large.fragments));
     // Slabs begin elsewhere.
     assert!((large.shaded as f64 / small.shaded as f64 - 1.0).abs() < 0.05, "{small:?}, {large:?}");
@@ -244,7 +259,8 @@ fn empty_space_costs_no_fragments() {
 
 #[test]
 fn what_cannot_be_drawn_is_refused() {
-    let (tf, material) = (constant(0.5), unlit());
+    let tf = constant(0.5);
+    let material = unlit();
     let good = grid([12, 12, 12], cubic(0.5), |_| 1.0);
     let camera = parallel([0.0, 0.0, 10.0], 3.0, [24, 24]);
     let with = |params: Params| {
@@ -285,7 +301,8 @@ fn nothing_is_drawn_of_nothing() {
     let camera = parallel([0.0, 0.0, 10.0], 3.0, [24, 24]);
     let (out, counts) = draw(&input(&[], &camera, &[]), &exact()).unwrap();
     assert!(out.optical_depth[0].iter().all(|t| *t == 0.0) && counts.fragments == 0);
-    let (tf, material) = (constant(0.5), unlit());
+    let tf = constant(0.5);
+    let material = unlit();
     let behind = {
         let mut grid = grid([4, 4, 4], cubic(0.5), |_| 1.0);
         grid.origin.z += 20.0;

@@ -16,11 +16,13 @@ fn sun<'a>() -> LitBy<'a> {
 
 #[test]
 fn any_number_of_threads_gives_the_same_bits() {
-    let (tf, material) = (transfer(&[(0.3, 0.0), (0.5, 0.4), (0.9, 2.5)]), Material::default());
+    let tf = transfer(&[(0.3, 0.0), (0.5, 0.4), (0.9, 2.5)]);
+    let material = Material::default();
     let grid = grid([30, 26, 22], cubic(0.3), noise);
     let mut volumes = [volume(&grid, &tf, &material)];
     volumes[0].normals = true;
-    let (camera, lights) = (perspective([2.0, 3.0, 8.0], 60.0, [100, 80]), [sun()]);
+    let camera = perspective([2.0, 3.0, 8.0], 60.0, [100, 80]);
+    let lights = [sun()];
     let with = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| draw(&input(&volumes, &camera, &lights), &Params::default()).unwrap())
@@ -63,7 +65,8 @@ fn shift_a_place_far_from_the_origin_looks_the_same() {
 
 #[test]
 fn a_transform_is_the_lattice_in_another_place() {
-    let (tf, material) = (transfer(&[(0.3, 0.0), (0.5, 0.4), (0.9, 2.5)]), Material::default());
+    let tf = transfer(&[(0.3, 0.0), (0.5, 0.4), (0.9, 2.5)]);
+    let material = Material::default();
     let transform = Similarity {
         scale: 2.0,
         rotation: DQuat::from_axis_angle(DVec3::new(0.3, 1.0, -0.5).normalize(), 0.7),
@@ -79,14 +82,16 @@ fn a_transform_is_the_lattice_in_another_place() {
         (volumes[0].normals, volumes[0].transform) = (true, transform);
         draw(&input(&volumes, &camera, &[sun()]), &exact()).unwrap().0
     };
-    let (moved, written) = (drawn(&here, transform), drawn(&there, Similarity::default()));
+    let moved = drawn(&here, transform);
+    let written = drawn(&there, Similarity::default());
     assert_eq!(moved, written);
     assert!(moved.channels[0].iter().any(|c| *c > 0.1));
 }
 
 #[test]
 fn ia10_a_volume_that_turns_with_the_camera_looks_the_same() {
-    let (tf, material) = (transfer(&[(0.3, 0.0), (0.5, 0.4), (0.9, 2.5)]), Material::default());
+    let tf = transfer(&[(0.3, 0.0), (0.5, 0.4), (0.9, 2.5)]);
+    let material = Material::default();
     let turned = |degrees: f64| {
         let turn =
             DMat3::from_quat(DQuat::from_axis_angle(DVec3::new(0.3, 1.0, -0.5).normalize(), degrees.to_radians()));
@@ -110,11 +115,13 @@ fn ia10_a_volume_that_turns_with_the_camera_looks_the_same() {
 /// Rows of pixels run down and columns to the right: what is told of one must hold of the other.
 #[test]
 fn ia10_a_camera_that_rolls_sees_the_picture_turned() {
-    let (tf, material) = (transfer(&[(0.3, 0.0), (0.5, 0.4), (0.9, 2.5)]), Material::default());
+    let tf = transfer(&[(0.3, 0.0), (0.5, 0.4), (0.9, 2.5)]);
+    let material = Material::default();
     let grid = grid([16, 16, 16], cubic(0.5), noise);
     let mut volumes = [volume(&grid, &tf, &material)];
     volumes[0].normals = true;
-    let (n, lights) = (60, [sun()]);
+    let n = 60;
+    let lights = [sun()];
     for upright in [perspective([2.0, 3.0, 9.0], 50.0, [60, 60]), parallel([2.0, 3.0, 9.0], 8.0, [60, 60])] {
         let rolled =
             Camera::look_at(upright.position, DVec3::ZERO, upright.axes[0], upright.projection, [60, 60]).unwrap();
@@ -130,11 +137,13 @@ fn ia10_a_camera_that_rolls_sees_the_picture_turned() {
 
 #[test]
 fn ia05_ranges_of_depth_that_meet_are_one() {
-    let (tf, material) = (transfer(&[(0.3, 0.0), (0.5, 0.4), (0.9, 1.5)]), Material::default());
+    let tf = transfer(&[(0.3, 0.0), (0.5, 0.4), (0.9, 1.5)]);
+    let material = Material::default();
     let grid = grid([12, 12, 34], cubic(0.5), noise);
     let mut volumes = [volume(&grid, &tf, &material)];
     volumes[0].normals = true;
-    let (camera, lights) = (perspective([2.0, 3.0, 12.0], 50.0, [50, 40]), [sun()]);
+    let camera = perspective([2.0, 3.0, 12.0], 50.0, [50, 40]);
+    let lights = [sun()];
     let input = input(&volumes, &camera, &lights);
     for slab_width in [None, Some(0.004)] {
         let params = Params { slab_width, ..exact() };
@@ -156,7 +165,8 @@ fn ia05_ranges_of_depth_that_meet_are_one() {
 
 #[test]
 fn what_is_behind_an_opaque_surface_is_not_seen() {
-    let (tf, material) = (constant(0.25), unlit());
+    let tf = constant(0.25);
+    let material = unlit();
     let grid = grid([20, 20, 20], cubic(0.5), |_| 1.0);
     let volumes = [volume(&grid, &tf, &material)];
     let camera = parallel([0.0, 0.0, 20.0], 4.0, [40, 40]);
@@ -172,11 +182,13 @@ fn what_is_behind_an_opaque_surface_is_not_seen() {
 
 #[test]
 fn what_is_hidden_is_not_splatted_and_nothing_else_changes() {
-    let (tf, material) = (transfer(&[(0.3, 0.0), (0.5, 0.1), (0.9, 0.3)]), Material::default());
+    let tf = transfer(&[(0.3, 0.0), (0.5, 0.1), (0.9, 0.3)]);
+    let material = Material::default();
     let grid = grid([30, 26, 40], cubic(0.3), noise);
     let mut volumes = [volume(&grid, &tf, &material)];
     volumes[0].normals = true;
-    let (camera, lights) = (perspective([1.0, 2.0, 14.0], 40.0, [100, 80]), [sun()]);
+    let camera = perspective([1.0, 2.0, 14.0], 40.0, [100, 80]);
+    let lights = [sun()];
     let sheeted = prepare(input(&volumes, &camera, &lights), &exact(), None).unwrap();
     let fold = |end: f32, opaque: &[f32]| {
         let mut out = Accumulator::new(camera.size, 1, 3, true, true);

@@ -38,10 +38,11 @@ fn smooth(p: DVec3) -> f64 {
 
 #[test]
 fn older_methods_are_those_of_the_twin() {
-    let (tf, material) = (transfer(&[(0.2, 0.0), (0.5, 0.4), (0.8, 0.1), (0.9, 1.5)]), unlit());
+    let tf = transfer(&[(0.2, 0.0), (0.5, 0.4), (0.8, 0.1), (0.9, 1.5)]);
+    let material = unlit();
     let sheared = DMat3::from_cols(DVec3::new(0.5, 0.1, 0.0), DVec3::new(0.2, 0.6, -0.1), DVec3::new(-0.1, 0.1, -0.7));
-    let (grids, bcc) =
-        ([cubic(0.5), sheared].map(|axes| grid([17, 13, 11], axes, noise)), body_centred([11, 9, 18], 7.0, noise));
+    let grids = [cubic(0.5), sheared].map(|axes| grid([17, 13, 11], axes, noise));
+    let bcc = body_centred([11, 9, 18], 7.0, noise);
     let volumes =
         [volume(&grids[0], &tf, &material), volume(&grids[1], &tf, &material), bcc_volume(&bcc, &tf, &material)];
     let both = Params { classify: Classify::Before, ..ALONG };
@@ -85,14 +86,17 @@ fn lit_older_methods_are_those_of_the_twin() {
 #[test]
 fn values_classified_before_blur_a_thin_shell_and_after_do_not() {
     // A ramp of 1 a voxel along x, and a shell of 2 voxels in it: an extinction of 1 at its middle.
-    let (tf, material) = (transfer(&[(-1.0, 0.0), (0.0, 1.0), (1.0, 0.0)]), unlit());
+    let tf = transfer(&[(-1.0, 0.0), (0.0, 1.0), (1.0, 0.0)]);
+    let material = unlit();
     let ramp = grid([25, 25, 5], cubic(1.0), |p| p.x);
     let volumes = [volume(&ramp, &tf, &material)];
     // 16 pixels a voxel.
     let camera = parallel([0.0, 0.0, 20.0], 1.0, [160, 16]);
     let row =
         |params| draw(&input(&volumes, &camera, &[]), params).unwrap().0.optical_depth[0][8 * 160..9 * 160].to_vec();
-    let (after, before) = (row(&exact()), row(&BEFORE));
+    let params = exact();
+    let after = row(&params);
+    let before = row(&BEFORE);
     let mut worst = 0.0f64;
     for (at, tau) in after.iter().enumerate() {
         let x = (at as f64 + 0.5 - 80.0) / 16.0;
@@ -131,10 +135,12 @@ fn steps(volume: Volume<'_>, params: &Params) -> Vec<f64> {
 
 #[test]
 fn slabs_along_the_lattice_pop_at_45_degrees_and_those_across_the_view_do_not() {
-    let (tf, material) = (transfer(&[(0.3, 0.0), (0.5, 0.4), (0.9, 2.5)]), unlit());
+    let tf = transfer(&[(0.3, 0.0), (0.5, 0.4), (0.9, 2.5)]);
+    let material = unlit();
     let grid = grid([16; 3], cubic(0.5), noise);
     let volume = volume(&grid, &tf, &material);
-    let (along, across) = (steps(volume, &ALONG), steps(volume, &exact()));
+    let along = steps(volume, &ALONG);
+    let across = steps(volume, &exact());
     let most = |steps: &[f64]| steps.iter().copied().fold(0.0, f64::max);
     let pop = most(&along) / most(&across);
     println!("steps along the lattice {along:.5?}, across the view {across:.5?}: pop score {pop:.2}");
@@ -146,7 +152,8 @@ fn slabs_along_the_lattice_pop_at_45_degrees_and_those_across_the_view_do_not() 
 
 #[test]
 fn a_constant_volume_is_the_same_along_the_lattice() {
-    let (tf, material) = (constant(0.4), unlit());
+    let tf = constant(0.4);
+    let material = unlit();
     let cartesian = grid([14, 12, 9], DMat3::from_diagonal(DVec3::new(0.4, 0.5, 0.7)), |_| 3.0);
     let bcc = body_centred([9, 8, 20], 5.0, |_| 3.0);
     let opaque: Vec<f32> = (0..3000).map(|at| 38.0 + (at % 60) as f32 * 0.08).collect();
@@ -168,7 +175,8 @@ fn a_constant_volume_is_the_same_along_the_lattice() {
             for (opaque, cuts) in
                 [(&[][..], &whole[..]), (&opaque, &whole), (&[], &[f32::NEG_INFINITY, 39.3, 40.7, f32::INFINITY])]
             {
-                let (along, across) = (drawn(&ALONG, opaque, cuts), drawn(&exact(), opaque, &whole));
+                let along = drawn(&ALONG, opaque, cuts);
+                let across = drawn(&exact(), opaque, &whole);
                 assert!(across.optical_depth[0].iter().any(|t| *t > 0.5));
                 assert!(apart(&along, &across) < 1e-5, "{degrees}: {:e}", apart(&along, &across));
                 // Profiles are of whole slabs.
@@ -185,7 +193,8 @@ fn a_constant_volume_is_the_same_along_the_lattice() {
 
 #[test]
 fn what_older_methods_do_not_draw_is_refused() {
-    let (tf, material) = (constant(0.4), unlit());
+    let tf = constant(0.4);
+    let material = unlit();
     let grid: Grid = grid([6; 3], cubic(0.5), |_| 3.0);
     let volumes = [volume(&grid, &tf, &material); 2];
     let view = parallel([0.0, 0.0, 9.0], 3.0, [8, 8]);
@@ -216,9 +225,11 @@ fn what_older_methods_do_not_draw_is_refused() {
 
 #[test]
 fn any_number_of_threads_gives_older_methods_the_same_bits() {
-    let (tf, material) = (transfer(&[(0.3, 0.0), (0.5, 0.4), (0.9, 2.5)]), Material::default());
+    let tf = transfer(&[(0.3, 0.0), (0.5, 0.4), (0.9, 2.5)]);
+    let material = Material::default();
     let grid = grid([30, 26, 22], cubic(0.3), noise);
-    let (volumes, camera) = ([volume(&grid, &tf, &material)], parallel([2.0, 3.0, 8.0], 10.0, [100, 80]));
+    let volumes = [volume(&grid, &tf, &material)];
+    let camera = parallel([2.0, 3.0, 8.0], 10.0, [100, 80]);
     for params in [BEFORE, ALONG] {
         let with = |threads: usize| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();

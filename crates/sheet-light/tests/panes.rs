@@ -41,9 +41,13 @@ fn slabs(width: f64) -> Params {
 
 #[test]
 fn panes_in_a_medium_have_the_closed_form_at_any_slabs_and_in_any_ranges_of_depth() {
-    let (sigma, half, tau) = (0.4f64, 3.0f64, 0.35f64);
+    let sigma = 0.4f64;
+    let half = 3.0f64;
+    let tau = 0.35f64;
     let grid = grid([12, 12, 12], cubic(0.5), |_| 1.0);
-    let (tf, medium, paper) = (constant(sigma as f32), unlit(), unlit());
+    let tf = constant(sigma as f32);
+    let medium = unlit();
+    let paper = unlit();
     let volumes = [volume(&grid, &tf, &medium)];
     let places = [3.4, 2.2, 0.9, 0.25, 0.0, -0.6, -2.9, -3.2];
     let meshes = places.map(|z| wall([0.0, 0.0, z], [9.0, 0.0, 0.0], [0.0, 9.0, 0.0]));
@@ -73,7 +77,8 @@ fn panes_in_a_medium_have_the_closed_form_at_any_slabs_and_in_any_ranges_of_dept
 
 /// A haze, two panes that cross in it and reach beyond, and a wall.
 fn crossing(test: impl Fn(&HalfInput<'_>)) {
-    let (tf, medium) = (constant(0.7), scattering());
+    let tf = constant(0.7);
+    let medium = scattering();
     let paper = Material { transmission: 0.3, ..white() };
     let grid = grid([4, 4, 4], cubic(0.5), |_| 1.0);
     let volumes = [volume(&grid, &tf, &medium)];
@@ -137,8 +142,11 @@ fn any_number_of_threads_gives_the_same_bits_with_panes() {
 
 #[test]
 fn an_edge_of_a_pane_is_that_of_an_opaque_one_and_a_wall_hides_it() {
-    let (haze, tf, medium) = (grid([12, 12, 12], cubic(0.5), |_| 1.0), constant(0.2), unlit());
-    let (mesh, white) = (wall([0.13, -0.21, 0.4], [0.9, 0.31, 0.0], [-0.27, 0.83, 0.1]), white());
+    let haze = grid([12, 12, 12], cubic(0.5), |_| 1.0);
+    let tf = constant(0.2);
+    let medium = unlit();
+    let mesh = wall([0.13, -0.21, 0.4], [0.9, 0.31, 0.0], [-0.27, 0.83, 0.1]);
+    let white = white();
     let camera = perspective([0.3, 0.4, 6.0], 30.0, [60, 60]);
     let mut nothing = Accumulator::new(camera.size, 1, 3, false, false);
     let solid = HalfInput { polygons: &[polygons(&mesh, &white)], ..half_input(&[], &camera, &[]) };
@@ -147,7 +155,8 @@ fn an_edge_of_a_pane_is_that_of_an_opaque_one_and_a_wall_hides_it() {
     let opaque: Vec<f32> = (0..3600).map(|k| if k % 60 < 30 { 4.0 } else { f32::INFINITY }).collect();
     for volumes in [&[volume(&haze, &tf, &medium)][..], &[]] {
         let shown = |all: &[Polygons<'_>]| draw(&input(volumes, &camera, &[]), (all, &opaque), &exact(), &[]);
-        let (with, without) = (shown(&[pane(&mesh, &white, 0.5)]), shown(&[]));
+        let with = shown(&[pane(&mesh, &white, 0.5)]);
+        let without = shown(&[]);
         let mut covered = 0;
         for k in 0..3600 {
             let expected = if solid[k].is_finite() && k % 60 >= 30 { 0.5 } else { 0.0 };
@@ -166,7 +175,8 @@ fn an_edge_of_a_pane_is_that_of_an_opaque_one_and_a_wall_hides_it() {
 #[test]
 fn a_splat_lies_before_a_pane_or_behind_it_however_wide_its_slab() {
     let camera = parallel([0.0, 0.0, 9.0], 2.0, [9, 9]);
-    let (mesh, flat) = (wall([0.0; 3], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0]), unlit());
+    let mesh = wall([0.0; 3], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0]);
+    let flat = unlit();
     for (z, width) in [0.4f32, -0.4].into_iter().flat_map(|z| [0.01, 40.0].map(|width| (z, width))) {
         let mut cloud = Cloud::new(DVec3::ZERO);
         cloud.push(&Splat {
@@ -189,7 +199,8 @@ fn a_splat_lies_before_a_pane_or_behind_it_however_wide_its_slab() {
 
 #[test]
 fn lists_that_take_too_much_and_lattices_are_refused() {
-    let (material, tf) = (white(), constant(0.1));
+    let material = white();
+    let tf = constant(0.1);
     let meshes: Vec<Mesh> = (0..40).map(|k| wall([0.0, 0.0, f64::from(k)], [9.0, 0.0, 0.0], [0.0, 9.0, 0.0])).collect();
     let all: Vec<Polygons<'_>> = meshes.iter().map(|mesh| pane(mesh, &material, 0.05)).collect();
     let camera = parallel([0.0, 0.0, 60.0], 2.0, [64, 64]);
@@ -223,7 +234,8 @@ fn what_lists_will_take_is_known_before() {
         let sheeted = prepare(input(&[], &camera, &[]), &exact(), None).unwrap();
         sheeted.with_polygons(panes, opaque, &BEAUTY, None).unwrap().bytes()
     };
-    let (told, taken) = (pane_bytes(&placed, &camera, &BEAUTY), with(&all, &[]) - with(&[], &[]));
+    let told = pane_bytes(&placed, &camera, &BEAUTY);
+    let taken = with(&all, &[]) - with(&[], &[]);
     assert_eq!(told, taken);
     let wall: Vec<f32> = (0..6300).map(|k| if k < 3150 { 1.0 } else { f32::INFINITY }).collect();
     let half = with(&all, &wall) - with(&[], &[]);

@@ -18,12 +18,16 @@ const HALF_UNIT: f64 = 1.0 / 4096.0;
 
 #[test]
 fn few_sections_are_those_of_the_twin_and_show() {
-    let (tf, plain, scattering) = (transfer(&[(0.2, 0.0), (0.5, 0.4), (0.8, 0.1), (0.9, 1.5)]), unlit(), scattering());
+    let tf = transfer(&[(0.2, 0.0), (0.5, 0.4), (0.8, 0.1), (0.9, 1.5)]);
+    let plain = unlit();
+    let scattering = scattering();
     let grid = grid([9, 8, 7], cubic(0.5), noise);
     let camera = parallel([3.0, 2.0, 8.0], 7.0, [36, 30]);
-    let (volumes, media) = ([volume(&grid, &tf, &plain)], [volume(&grid, &tf, &scattering)]);
+    let volumes = [volume(&grid, &tf, &plain)];
+    let media = [volume(&grid, &tf, &scattering)];
     let lights = [sun([1.0, 3.0, 2.0])];
-    let (view, half) = (input(&volumes, &camera, &[]), half_input(&media, &camera, &lights));
+    let view = input(&volumes, &camera, &[]);
+    let half = half_input(&media, &camera, &lights);
     let mut before = [f64::INFINITY; 2];
     for sections in [1, 4, 64] {
         let params = Params { sections, slab_width: Some(0.37), ..exact() };
@@ -48,12 +52,14 @@ fn few_sections_are_those_of_the_twin_and_show() {
 
 #[test]
 fn sums_of_half_precision_lose_as_many_bits_as_slabs_round() {
-    let (tf, material) = (constant(0.25), scattering());
+    let tf = constant(0.25);
+    let material = scattering();
     let grid = grid([10, 10, 8], cubic(0.5), |_| 1.0);
     let camera = parallel([0.0, 0.0, 10.0], 2.0, [20, 20]);
     let volumes = [volume(&grid, &tf, &material)];
     let lights = [sun([1.0, 3.0, 2.0])];
-    let (view, half) = (input(&volumes, &camera, &[]), half_input(&volumes, &camera, &lights));
+    let view = input(&volumes, &camera, &[]);
+    let half = half_input(&volumes, &camera, &lights);
     for slabs in [8.0, 64.0, 512.0] {
         let params = Params { accumulation: F16, slab_width: Some(4.0 / slabs), ..exact() };
         let of_half = HalfParams { sheets: params, ..exact_half(None) };
@@ -70,12 +76,14 @@ fn sums_of_half_precision_lose_as_many_bits_as_slabs_round() {
 
 #[test]
 fn sums_of_half_precision_show_in_sheets_and_light() {
-    let (tf, material) = (transfer(&[(0.2, 0.0), (0.5, 0.4), (0.8, 0.1), (0.9, 1.5)]), scattering());
+    let tf = transfer(&[(0.2, 0.0), (0.5, 0.4), (0.8, 0.1), (0.9, 1.5)]);
+    let material = scattering();
     let grid = grid([9, 8, 7], cubic(0.5), noise);
     let camera = parallel([3.0, 2.0, 8.0], 7.0, [36, 30]);
     let volumes = [volume(&grid, &tf, &material)];
     let lights = [sun([1.0, 3.0, 2.0])];
-    let (view, half) = (input(&volumes, &camera, &lights), half_input(&volumes, &camera, &lights));
+    let view = input(&volumes, &camera, &lights);
+    let half = half_input(&volumes, &camera, &lights);
     let pictures = |accumulation| {
         let params = Params { accumulation, ..exact() };
         let of_half = HalfParams { sheets: params, ..exact_half(None) };
@@ -84,7 +92,8 @@ fn sums_of_half_precision_show_in_sheets_and_light() {
     for (exact, coarse) in pictures(Accumulation::F32).into_iter().zip(pictures(F16)) {
         let planes = [(&exact.optical_depth[0], &coarse.optical_depth[0]), (&exact.channels[1], &coarse.channels[1])];
         for (exact, coarse) in planes {
-            let (apart, most) = (largest(exact, coarse), exact.iter().copied().fold(0.0, f32::max));
+            let apart = largest(exact, coarse);
+            let most = exact.iter().copied().fold(0.0, f32::max);
             // A value of 50 voxels is off by a few units, and more where the transfer function is steep.
             assert!(apart > 1e-4 * most && apart < 0.02 * most, "{apart:e} of {most:e}");
         }
@@ -93,12 +102,14 @@ fn sums_of_half_precision_show_in_sheets_and_light() {
 
 #[test]
 fn sums_that_would_stall_are_refused() {
-    let (tf, material) = (constant(0.25), scattering());
+    let tf = constant(0.25);
+    let material = scattering();
     let grid = grid([8, 8, 8], cubic(0.25), |_| 1.0);
     let camera = parallel([0.0, 0.0, 10.0], 2.0, [20, 20]);
     let volumes = [volume(&grid, &tf, &material)];
     let lights = [sun([1.0, 3.0, 2.0])];
-    let (view, half) = (input(&volumes, &camera, &[]), half_input(&volumes, &camera, &lights));
+    let view = input(&volumes, &camera, &[]);
+    let half = half_input(&volumes, &camera, &lights);
     let mut out = Accumulator::new(camera.size, 1, 3, false, false);
     for (width, is_refused) in [(2.0 / 1000.0, false), (2.0 / 2100.0, true)] {
         let sheets = Params { accumulation: F16, slab_width: Some(width), kernel: THIN, ..exact() };

@@ -32,7 +32,9 @@ fn with_high(values: &mut [f32], dims: [usize; 3]) -> [usize; 3] {
 /// Askew to all axes: with parallel rays, with rays that are nearly so, and with `high` so near to a corner of the picture that its kernel ends there and
 /// rays are slanted most. Each with or without normals.
 fn views(high: DVec3) -> [(Camera, bool); 3] {
-    let (from, fov, size) = ([3.0, 2.0, 8.0], 40.0, [64, 56]);
+    let from = [3.0, 2.0, 8.0];
+    let fov = 40.0;
+    let size = [64, 56];
     let wide = perspective(from, fov, size);
     let half = (high - wide.position).length() * (0.5 * fov).to_radians().tan();
     let target = high - (wide.axes[0] * half * 64.0 / 56.0 + wide.axes[1] * half) * 0.73;
@@ -43,7 +45,8 @@ fn views(high: DVec3) -> [(Camera, bool); 3] {
 /// A few high voxels in a deep field: what shows are their kernels to the rim, where values are those of voxels as far away on the other side. One that
 /// is left out wrongly is missed there, by the value, or by the gradient, or where a shadow is interpolated.
 fn is_drawn_as_with_all(of: Volume<'_>, high: DVec3, kernel: KernelShape) {
-    let (few, all) = (above(0.0), above(1e-9));
+    let few = above(0.0);
+    let all = above(1e-9);
     // Thin slabs: what a neighbourhood has beyond two kernels is a small part of a step.
     let params = Params { slab_width: Some(0.02), kernel, ..exact() };
     let shape = LightShape::Directional { direction: DVec3::new(-1.0, -2.0, -1.5).normalize() };
@@ -53,7 +56,8 @@ fn is_drawn_as_with_all(of: Volume<'_>, high: DVec3, kernel: KernelShape) {
             let volumes = [Volume { transfer, normals, ..of }];
             draw(&input(&volumes, &camera, &lights), &params).unwrap()
         };
-        let ((found, needed), (expected, whole)) = (with(&few), with(&all));
+        let (found, needed) = with(&few);
+        let (expected, whole) = with(&all);
         let what = format!("{:?}, {kernel:?}, normals {normals}, {:?}", of.packing, camera.projection);
         let counts = format!("{} of {} voxels", needed.visible, whole.visible);
         assert!(needed.visible * 3 < whole.visible, "{what}: {counts}");
@@ -64,7 +68,8 @@ fn is_drawn_as_with_all(of: Volume<'_>, high: DVec3, kernel: KernelShape) {
 
 #[test]
 fn cubic_unequal_and_sheared_steps_are_drawn_as_with_all_voxels() {
-    let (tf, material) = (above(0.0), Material::default());
+    let tf = above(0.0);
+    let material = Material::default();
     let sheared = DMat3::from_cols(DVec3::new(0.4, 0.05, 0.0), DVec3::new(0.2, 0.4, -0.1), DVec3::new(-0.1, 0.1, -0.5));
     for axes in [cubic(0.4), DMat3::from_diagonal(DVec3::new(0.5, 0.4, 0.3)), sheared] {
         let mut grid = grid([22, 20, 24], axes, deep);
@@ -75,7 +80,8 @@ fn cubic_unequal_and_sheared_steps_are_drawn_as_with_all_voxels() {
 
 #[test]
 fn body_centred_steps_are_drawn_as_with_all_voxels() {
-    let (tf, material) = (above(0.0), Material::default());
+    let tf = above(0.0);
+    let material = Material::default();
     let mut bcc = body_centred([16, 16, 32], 8.0, deep);
     let [i, j, k] = with_high(&mut bcc.planes.values, bcc.planes.dims);
     is_drawn_as_with_all(bcc_volume(&bcc, &tf, &material), bcc.position(i, j, k), KernelShape::default());
@@ -84,7 +90,8 @@ fn body_centred_steps_are_drawn_as_with_all_voxels() {
 /// Shadows are interpolated between the corners of a cell, which lie beyond such kernels.
 #[test]
 fn narrow_kernels_are_drawn_as_with_all_voxels() {
-    let (tf, material) = (above(0.0), Material::default());
+    let tf = above(0.0);
+    let material = Material::default();
     let mut grid = grid([22, 20, 24], cubic(0.4), deep);
     let [i, j, k] = with_high(&mut grid.values, grid.dims);
     for extent in [1.2, 0.6] {

@@ -123,7 +123,9 @@ fn within_a_slab_extinctions_add_and_colours_weigh() {
     let mut cloud = Cloud::new(DVec3::ZERO);
     for (z, object) in [(0.1, 1), (-0.1, 2)] {
         let position = Vec3::new(0.0, 0.0, z);
-        let (kind, radius, normal) = (SplatKind::Surface, 0.5, Vec3::Z);
+        let kind = SplatKind::Surface;
+        let radius = 0.5;
+        let normal = Vec3::Z;
         cloud.push(&Splat {
             position,
             kind,
@@ -136,7 +138,8 @@ fn within_a_slab_extinctions_add_and_colours_weigh() {
     }
     let shown = Shown::new(cloud, &camera, materials());
     let found = sheets(&alone(shown.splats(4.0), &camera), &[], &[], 1);
-    let (tau, colors) = (found.optical_depth[0][32 * 64 + 32], [0, 1, 2].map(|c| found.channels[c][32 * 64 + 32]));
+    let tau = found.optical_depth[0][32 * 64 + 32];
+    let colors = [0, 1, 2].map(|c| found.channels[c][32 * 64 + 32]);
     assert!(tau > 0.3);
     for c in 0..3 {
         // One of three parts, two of three parts.
@@ -150,12 +153,14 @@ fn within_a_slab_extinctions_add_and_colours_weigh() {
 #[test]
 fn a_volume_and_splats_in_it_share_its_slabs() {
     let camera = parallel([0.0, 0.0, 9.0], 1.5, [60, 60]);
-    let (tf, material) = (constant(0.25), unlit());
+    let tf = constant(0.25);
+    let material = unlit();
     let grid = grid([12, 12, 12], cubic(0.5), |_| 1.0);
     let volumes = [volume(&grid, &tf, &material)];
     let shown = Shown::new(some(256), &camera, materials());
     let both = SheetInput { volumes: volumes.to_vec(), ..alone(shown.splats(1.0), &camera) };
-    let (found, splats) = (sheets(&both, &[], &[], 1), sheets(&alone(shown.splats(0.5), &camera), &[], &[], 1));
+    let found = sheets(&both, &[], &[], 1);
+    let splats = sheets(&alone(shown.splats(0.5), &camera), &[], &[], 1);
     let whole = found.optical_depth[0].iter().zip(&splats.optical_depth[0]).map(|(both, own)| both - own);
     // Six units of extinction 0.25, whatever else is in them.
     assert!(whole.clone().all(|tau| (tau - 1.5).abs() < 1e-5), "{:?}", whole.reduce(f32::max));

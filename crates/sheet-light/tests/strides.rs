@@ -46,7 +46,8 @@ fn cameras() -> [Camera; 2] {
 
 /// Draws both volumes, the coarse one scattering and the fine one reflecting.
 fn with_both(grids: &[Grid; 2], camera: &Camera, check: impl Fn(&SheetInput<'_>)) {
-    let (one, other) = (transfer(&[(0.2, 0.0), (0.8, 0.6)]), transfer(&[(0.3, 0.0), (0.9, 1.5)]));
+    let one = transfer(&[(0.2, 0.0), (0.8, 0.6)]);
+    let other = transfer(&[(0.3, 0.0), (0.9, 1.5)]);
     let cloud = Material { shading: Shading::Phase, asymmetry: 0.4, ..Material::default() };
     let solid = Material { specular: 0.3, shininess: 12.0, ..Material::default() };
     let mut volumes = [volume(&grids[0], &one, &cloud), volume(&grids[1], &other, &solid)];
@@ -65,7 +66,8 @@ fn volumes_of_unlike_steps_are_those_of_the_twin() {
             for (at, expected) in twin.optical_depth.iter().enumerate() {
                 assert!((f64::from(found.optical_depth[0][at]) - expected).abs() < 2e-5, "pixel {at}");
                 for c in 0..3 {
-                    let (found, expected) = (f64::from(found.channels[c][at]), twin.color[at][c]);
+                    let found = f64::from(found.channels[c][at]);
+                    let expected = twin.color[at][c];
                     assert!((found - expected).abs() < 1e-4, "pixel {at}: {found}, expected {expected}");
                 }
             }
@@ -77,7 +79,8 @@ fn volumes_of_unlike_steps_are_those_of_the_twin() {
 #[test]
 fn a_coarse_volume_is_shaded_by_its_own_slabs() {
     let grids = [grid([16, 14, 15], cubic(0.5), noise), grid([6, 6, 6], cubic(0.15), noise)];
-    let (tf, material) = (transfer(&[(0.2, 0.4), (0.8, 0.6)]), Material::default());
+    let tf = transfer(&[(0.2, 0.4), (0.8, 0.6)]);
+    let material = Material::default();
     let volumes = [volume(&grids[0], &tf, &material), volume(&grids[1], &tf, &material)];
     for camera in cameras() {
         let both = draw(&input(&volumes, &camera, &[]), &exact()).unwrap().1;
@@ -99,8 +102,11 @@ fn wide_slabs_of_a_coarse_volume_err_no_more_than_its_own_spacing() {
     for camera in cameras() {
         with_both(&grids, &camera, |input| {
             let with = |slab_width| draw(input, &Params { slab_width, ..exact() }).unwrap().0;
-            let (own, fine, wide) = (with(None), with(Some(0.15)), with(Some(0.45)));
-            let (own, wide) = (rmse(&own, &fine), rmse(&wide, &fine));
+            let own = with(None);
+            let fine = with(Some(0.15));
+            let wide = with(Some(0.45));
+            let own = rmse(&own, &fine);
+            let wide = rmse(&wide, &fine);
             assert!(own < 2e-3 && own < 0.7 * wide, "{own:e}, {wide:e}");
         });
     }
@@ -109,13 +115,15 @@ fn wide_slabs_of_a_coarse_volume_err_no_more_than_its_own_spacing() {
 #[test]
 fn constant_volumes_of_unlike_steps_keep_their_closed_form() {
     let grids = coarse_and_fine(|_| 1.0);
-    let (tf, material) = (constant(0.3), crate::common::unlit());
+    let tf = constant(0.3);
+    let material = crate::common::unlit();
     let volumes = [volume(&grids[0], &tf, &material), volume(&grids[1], &tf, &material)];
     for camera in cameras() {
         let (out, _) = draw(&input(&volumes, &camera, &[]), &exact()).unwrap();
         // Each alone has its own closed form, and extinctions add.
         let alone = |k: usize| draw(&input(&volumes[k..=k], &camera, &[]), &exact()).unwrap().0;
-        let (one, two) = (alone(0), alone(1));
+        let one = alone(0);
+        let two = alone(1);
         for (at, tau) in out.optical_depth[0].iter().enumerate() {
             let sum = one.optical_depth[0][at] + two.optical_depth[0][at];
             assert!(((-tau).exp() - (-sum).exp()).abs() < 1e-5, "{at}: {tau}, expected {sum}");

@@ -30,7 +30,8 @@ fn smooth(p: DVec3) -> f64 {
 
 #[test]
 fn unlit_sheets_are_those_of_the_twin() {
-    let (tf, material) = (transfer(&[(0.2, 0.0), (0.5, 0.4), (0.8, 0.1), (0.9, 1.5)]), unlit());
+    let tf = transfer(&[(0.2, 0.0), (0.5, 0.4), (0.8, 0.1), (0.9, 1.5)]);
+    let material = unlit();
     let sheared = DMat3::from_cols(DVec3::new(0.5, 0.1, 0.0), DVec3::new(0.2, 0.6, -0.1), DVec3::new(-0.1, 0.1, -0.7));
     for axes in [cubic(0.5), sheared] {
         let grid = grid([17, 13, 11], axes, noise);
@@ -60,7 +61,8 @@ pub(crate) fn skipping_changes_nothing(volume: Volume<'_>) {
 #[test]
 fn voxels_that_are_skipped_change_nothing() {
     // A thin shell in much that is hidden.
-    let (tf, material) = (transfer(&[(0.6, 0.0), (0.65, 3.0), (0.75, 3.0), (0.8, 0.0)]), unlit());
+    let tf = transfer(&[(0.6, 0.0), (0.65, 3.0), (0.75, 3.0), (0.8, 0.0)]);
+    let material = unlit();
     let grid = grid([40, 44, 40], cubic(0.2), |p| (-p.length_squared()).exp());
     skipping_changes_nothing(volume(&grid, &tf, &material));
 }
@@ -122,8 +124,10 @@ fn shadows_between_voxels_are_linear() {
 
 #[test]
 fn ia13_volumes_that_overlap_are_classified_each_by_itself() {
-    let (tf, other_tf) = (transfer(&[(0.2, 0.0), (0.7, 0.9)]), transfer(&[(300.0, 0.0), (900.0, 0.5), (1000.0, 0.0)]));
-    let (plain, glowing) = (unlit(), Material { emission: [0.2, 0.0, 1.0], ..unlit() });
+    let tf = transfer(&[(0.2, 0.0), (0.7, 0.9)]);
+    let other_tf = transfer(&[(300.0, 0.0), (900.0, 0.5), (1000.0, 0.0)]);
+    let plain = unlit();
+    let glowing = Material { emission: [0.2, 0.0, 1.0], ..unlit() };
     let one = grid([17, 13, 11], cubic(0.5), noise);
     let mut two = grid([9, 10, 8], cubic(0.7), |p| 1000.0 * noise(p));
     two.origin += DVec3::new(1.0, 0.3, 0.8);
@@ -132,13 +136,16 @@ fn ia13_volumes_that_overlap_are_classified_each_by_itself() {
     let [tau, color] = differences(&input(&volumes, &camera, &[]), &exact());
     assert!(tau < 2e-5 && color < 1e-5, "{tau:e} {color:e}");
     // Optical depths add: the other one without any extinction keeps the slabs where they are.
-    let (none, params) = (constant(0.0), Params { slab_width: Some(0.5), ..exact() });
+    let none = constant(0.0);
+    let params = Params { slab_width: Some(0.5), ..exact() };
     let alone = |k: usize| {
         let mut volumes = volumes;
         volumes[1 - k].transfer = &none;
         draw(&input(&volumes, &camera, &[]), &params).unwrap().0
     };
-    let (both, one, two) = (draw(&input(&volumes, &camera, &[]), &params).unwrap().0, alone(0), alone(1));
+    let both = draw(&input(&volumes, &camera, &[]), &params).unwrap().0;
+    let one = alone(0);
+    let two = alone(1);
     for (at, both) in both.optical_depth[0].iter().enumerate() {
         let sum = one.optical_depth[0][at] + two.optical_depth[0][at];
         assert!((both - sum).abs() < 2e-5, "{at}: {both}, {sum}");

@@ -19,11 +19,14 @@ fn depths(splat: &Splat, footprints: &FootprintStack) -> Vec<f32> {
     cloud.push(splat);
     let view = Projection::Orthographic { height: f64::from(SIZE) };
     let camera = &Camera::look_at(DVec3::Z * 400.0, DVec3::ZERO, DVec3::Y, view, [SIZE, SIZE]).expect("a camera");
-    let (materials, params) = (&[Material::default()], &Params { resampling_sigma_px: 0.0, ..Params::default() });
-    let (cloud, detail) = (&cloud, Detail::ALL);
+    let materials = &[Material::default()];
+    let params = &Params { resampling_sigma_px: 0.0, ..Params::default() };
+    let cloud = &cloud;
+    let detail = Detail::ALL;
     let projected = &project(&ProjectInput { cloud, camera, footprints, materials, params, detail });
     let mut seen = Accumulator::new([SIZE; 2], 1, 3, false, false);
-    let (opaque, direction) = (&OpaqueImage::default(), Direction::FrontToBack);
+    let opaque = &OpaqueImage::default();
+    let direction = Direction::FrontToBack;
     let input = FoldInput { projected, order: &[0], values: &[1.0; 3], materials, opaque, direction, params };
     fold(&input, &mut seen, None).expect("nobody cancels");
     seen.optical_depth.swap_remove(0)
@@ -36,7 +39,8 @@ fn errors(texels: u32) -> [f64; 3] {
     let places = (0..texels * texels).map(|k| [at(k % texels), at(k / texels)]);
     let coverage: Vec<f32> = places.map(|[x, y]| formula.profile(4.0 * (x * x + y * y)) as f32).collect();
     let image = FootprintImage::new([texels; 2], &coverage).expect("shares");
-    let (formulas, table) = (FootprintStack::default(), FootprintStack::default().with_image(0, image.into()));
+    let formulas = FootprintStack::default();
+    let table = FootprintStack::default().with_image(0, image.into());
     let [mut largest, mut squares, mut sums, mut count] = [0.0f64; 4];
     for k in 0..64 {
         let position = Vec3::new((k % 4) as f32, (k / 4 % 4) as f32, 0.0) / 4.0;

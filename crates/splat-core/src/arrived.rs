@@ -101,7 +101,9 @@ impl Transmittance for Remembered<'_> {
 
     fn at_splats(&self, splats: &[usize], receiver: &dyn Fn(usize) -> Receiver) -> [[f32; 3]; TOGETHER] {
         let mut light = [[0.0; 3]; TOGETHER];
-        let (mut asked, mut places, mut unknown) = ([0; TOGETHER], [0; TOGETHER], 0);
+        let mut asked = [0; TOGETHER];
+        let mut places = [0; TOGETHER];
+        let mut unknown = 0;
         for (place, splat) in splats.iter().enumerate() {
             if let Some(known) = self.arrived.known(*splat) {
                 light[place] = known;

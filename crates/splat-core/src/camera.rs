@@ -216,7 +216,8 @@ mod tests {
 
     #[test]
     fn offsets_are_seen_where_their_places_are() {
-        let (eye, origin) = (DVec3::new(3.0, 1.0, 5.0), DVec3::new(0.5, -0.25, 1.0));
+        let eye = DVec3::new(3.0, 1.0, 5.0);
+        let origin = DVec3::new(0.5, -0.25, 1.0);
         let camera =
             Camera::look_at(eye, DVec3::ZERO, DVec3::Y, Projection::Perspective { fov_y: 0.6 }, [4, 4]).unwrap();
         let view = camera.view_from_offset(origin);

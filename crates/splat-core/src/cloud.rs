@@ -269,7 +269,8 @@ impl Cloud {
 
     /// Multiplies all lengths by `scale`, cross-sections by its square.
     pub fn scale_world(&mut self, scale: f64) {
-        let (length, area) = (scale as f32, (scale * scale) as f32);
+        let length = scale as f32;
+        let area = (scale * scale) as f32;
         self.origin *= scale;
         self.position.iter_mut().for_each(|p| *p *= length);
         self.radius.iter_mut().for_each(|r| *r *= length);

@@ -164,7 +164,8 @@ impl DepthProfile {
             self.cell(thickness, before);
         }
         let medium = &mut self.medium;
-        let (tau, middle) = (after - before, depth - medium.origin);
+        let tau = after - before;
+        let middle = depth - medium.origin;
         let share = ((medium.end - begin) / thickness).clamp(0.0, 1.0);
         let rest = 1.0 - share;
         medium.now.add(tau * share, narrow, middle - 0.5 * rest * thickness, share * thickness);
@@ -273,7 +274,8 @@ impl DepthProfile {
     /// As a device keeps it: the largest number stands for infinity.
     #[cfg(feature = "gpu")]
     pub(crate) fn words(&self) -> [f32; WORDS] {
-        let (Medium { origin, end, held_end, held, now, next }, [z, c]) = (self.medium, self.knot);
+        let Medium { origin, end, held_end, held, now, next } = self.medium;
+        let [z, c] = self.knot;
         let mut words = [0.0; WORDS];
         words[..9].copy_from_slice(&[self.first, self.median, self.mean, self.m2, z, c, origin, end, held_end]);
         for (to, sums) in words[9..].chunks_exact_mut(4).zip([held, now, next]) {
@@ -386,7 +388,8 @@ mod tests {
     /// Closed form of a homogeneous slab from `z` on, `length` thick, of optical depth `tau`.
     fn slab(z: f64, length: f64, tau: f64) -> [f64; 4] {
         let at = |level: f64| if level <= tau { z + length * level / tau } else { f64::INFINITY };
-        let (m, e) = (1.0 / tau - 1.0 / tau.exp_m1(), tau.exp());
+        let m = 1.0 / tau - 1.0 / tau.exp_m1();
+        let e = tau.exp();
         let variance = 1.0 / (tau * tau) - e / (tau.exp_m1() * tau.exp_m1());
         [at(-(-1.0f64 / 255.0).ln_1p()), at(2f64.ln()), z + length * m, length * variance.sqrt()]
     }
@@ -411,14 +414,16 @@ mod tests {
 
     #[test]
     fn surfaces_are_steps() {
-        let (near, far) = (0.25f32, 1.5f32);
+        let near = 0.25f32;
+        let far = 1.5f32;
         let (profile, total) = {
             let mut p = DepthProfile::default();
             p.add(&at(3.0, 0.0, [0.0, near]));
             p.add(&at(4.0, 0.0, [near, near + far]));
             (p, near + far)
         };
-        let (a, b) = (-(-f64::from(near)).exp_m1(), (-f64::from(near)).exp() - (-f64::from(total)).exp());
+        let a = -(-f64::from(near)).exp_m1();
+        let b = (-f64::from(near)).exp() - (-f64::from(total)).exp();
         let mean = (3.0 * a + 4.0 * b) / (a + b);
         close(profile.depths(total, None), [3.0, 4.0, mean, (a * b).sqrt() / (a + b)], 1e-6);
         // With a wall behind, everything is absorbed.
@@ -449,7 +454,8 @@ mod tests {
 
     #[test]
     fn moments_do_not_jump_where_the_series_ends() {
-        let (below, above) = (moments(SERIES * (1.0 - 1e-6)), moments(SERIES));
+        let below = moments(SERIES * (1.0 - 1e-6));
+        let above = moments(SERIES);
         assert!((below.0 - above.0).abs() < 1e-6 && (below.1 - above.1).abs() < 1e-6, "{below:?} {above:?}");
     }
 }

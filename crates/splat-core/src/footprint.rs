@@ -102,7 +102,8 @@ impl Footprint {
     pub fn share_before(&self, x: f64) -> f64 {
         let q = f64::from(self.sharpness());
         let integral = |x: f64| {
-            let (root, x2) = (libm::sqrt(q), x * x);
+            let root = libm::sqrt(q);
+            let x2 = x * x;
             let gauss = 0.5 * libm::sqrt(PI) / root * libm::erf(root * x);
             let taper = x * ((1.0 + q + 0.5 * q * q) - x2 * ((q + q * q) / 3.0 - x2 * (0.1 * q * q)));
             gauss - libm::exp(-q) * taper
@@ -231,7 +232,8 @@ mod tests {
             let mut sum = 0.0;
             for i in -4..=4 {
                 for j in -4..=4 {
-                    let (x, y) = (f64::from(i) - u, f64::from(j) - v);
+                    let x = f64::from(i) - u;
+                    let y = f64::from(j) - v;
                     sum += f.profile((x * x + y * y) / (radius * radius));
                 }
             }

@@ -81,7 +81,8 @@ impl Gaussians {
     /// # Panics
     /// If there is no such Gaussian.
     pub fn color(&self, i: usize, direction: Vec3) -> [f32; 3] {
-        let (n, basis) = (self.terms(), basis(direction.as_dvec3()));
+        let n = self.terms();
+        let basis = basis(direction.as_dvec3());
         let mut sum = [0.5; 3];
         for (coefficient, y) in self.harmonics[i * n..][..n].iter().zip(basis) {
             (0..3).for_each(|c| sum[c] += f64::from(coefficient[c]) * y);
@@ -107,7 +108,8 @@ impl Gaussians {
         if by.rotation == glam::DQuat::IDENTITY || self.degree == 0 {
             return out;
         }
-        let (matrix, n) = (rotation(by.rotation), self.terms());
+        let matrix = rotation(by.rotation);
+        let n = self.terms();
         for (to, from) in out.harmonics.chunks_exact_mut(n).zip(self.harmonics.chunks_exact(n)) {
             for degree in 1..=self.degree {
                 // Degrees do not mix.
@@ -151,7 +153,8 @@ impl Gaussians {
     }
 
     fn raised(&self, degree: u8) -> Self {
-        let (from, to) = (self.terms(), terms(degree));
+        let from = self.terms();
+        let to = terms(degree);
         let one = |given: &[[f32; 3]]| (0..to).map(|k| given.get(k).copied().unwrap_or([0.0; 3])).collect::<Vec<_>>();
         Self { degree, harmonics: self.harmonics.chunks_exact(from).flat_map(one).collect(), ..self.clone() }
     }
@@ -279,7 +282,9 @@ mod tests {
 
     #[test]
     fn clouds_of_any_degree_join_and_keep_their_colors() {
-        let (first, second, mut plain) = (cloud(1, 3), cloud(3, 2), Cloud::new(DVec3::ZERO));
+        let first = cloud(1, 3);
+        let second = cloud(3, 2);
+        let mut plain = Cloud::new(DVec3::ZERO);
         plain.push(&Splat::default());
         let mut all = Cloud::new(DVec3::ZERO);
         [&plain, &first, &second].into_iter().for_each(|part| all.append(part));
@@ -309,7 +314,8 @@ mod tests {
             rotation: DQuat::from_xyzw(0.1, 0.7, -0.3, 0.4).normalize(),
             ..Similarity::default()
         };
-        let (before, d) = (some(3, 1), DVec3::new(2.0, -3.0, 6.0) / 7.0);
+        let before = some(3, 1);
+        let d = DVec3::new(2.0, -3.0, 6.0) / 7.0;
         let after = before.transformed(&by);
         assert!((after.axes[0][1].length() - 2.0).abs() < 1e-6);
         let colors = before.color(0, d.as_vec3()).into_iter().zip(after.color(0, by.rotate(d).as_vec3()));

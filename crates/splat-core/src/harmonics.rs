@@ -16,10 +16,17 @@ pub(crate) const fn terms(degree: u8) -> usize {
 /// All harmonics at a unit vector.
 pub(crate) fn basis(d: DVec3) -> [f64; MOST] {
     let DVec3 { x, y, z } = d;
-    let (xx, yy, zz) = (x * x, y * y, z * z);
+    let xx = x * x;
+    let yy = y * y;
+    let zz = z * z;
     let c = |squared: f64| (squared * FRAC_1_PI).sqrt();
-    let (c1, c2, c30, c31, c33) = (c(0.75), c(3.75), c(7.0 / 16.0), c(21.0 / 32.0), c(35.0 / 32.0));
-    let (c20, c32) = (c(5.0 / 16.0), c(105.0 / 4.0));
+    let c1 = c(0.75);
+    let c2 = c(3.75);
+    let c30 = c(7.0 / 16.0);
+    let c31 = c(21.0 / 32.0);
+    let c33 = c(35.0 / 32.0);
+    let c20 = c(5.0 / 16.0);
+    let c32 = c(105.0 / 4.0);
     [
         c(0.25),
         -c1 * y,
@@ -59,7 +66,8 @@ pub(crate) fn rotation(by: DQuat) -> [[f64; MOST]; MOST] {
             let (sin, cos) = libm::sincos(2.0 * PI * (k as f64 + 0.5) / AROUND as f64);
             let across = (1.0 - z * z).sqrt();
             let d = DVec3::new(across * cos, across * sin, z);
-            let (to, from) = (basis(d), basis(by.inverse() * d));
+            let to = basis(d);
+            let from = basis(by.inverse() * d);
             let weight = weight * 2.0 * PI / AROUND as f64;
             for (row, to) in matrix.iter_mut().zip(to) {
                 row.iter_mut().zip(from).for_each(|(sum, from)| *sum += weight * to * from);
@@ -83,7 +91,9 @@ mod tests {
         }
         // Kerbl et al. 2023, their program's constants, at a direction that tells all apart.
         let d = DVec3::new(0.36, 0.48, 0.8);
-        let (x, y, z) = (d.x, d.y, d.z);
+        let x = d.x;
+        let y = d.y;
+        let z = d.z;
         let expected = [
             0.282_094_791_773_878_14,
             -0.488_602_511_902_919_9 * y,

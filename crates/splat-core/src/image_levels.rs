@@ -39,7 +39,8 @@ impl ImageLevels {
     /// What is seen at a place, 0 to 1 from the top left, by who sees a width of so many texels of the finest image.
     pub(crate) fn at(&self, at: [f64; 2], texels: f64) -> [f64; 3] {
         let level = libm::log2(texels.max(1.0)).min((self.levels.len() - 1) as f64);
-        let (fine, share) = (level as usize, level.fract());
+        let fine = level as usize;
+        let share = level.fract();
         let seen = self.in_level(fine, at);
         let coarse = if share > 0.0 { self.in_level(fine + 1, at) } else { seen };
         std::array::from_fn(|c| seen[c] + share * (coarse[c] - seen[c]))
@@ -63,7 +64,8 @@ impl ImageLevels {
                 }
             }
         };
-        let ((left, right, x), (top, low, y)) = (between(at[0], width), between(at[1], height));
+        let (left, right, x) = between(at[0], width);
+        let (top, low, y) = between(at[1], height);
         let texel = |column: usize, row: usize| image.pixels[row * width + column].map(f64::from);
         let mix = |a: [f64; 3], b: [f64; 3], share: f64| [0, 1, 2].map(|c| a[c] + share * (b[c] - a[c]));
         mix(mix(texel(left, top), texel(right, top), x), mix(texel(left, low), texel(right, low), x), y)
@@ -91,7 +93,8 @@ fn coarser_size(size: [u32; 2]) -> Option<[u32; 2]> {
 fn covered([fine, coarse]: [u32; 2], k: u32) -> impl Iterator<Item = (usize, f64)> + Clone {
     // A fine texel has the length `coarse`, a coarse one the length `fine`.
     let [fine, coarse, k] = [fine, coarse, k].map(u64::from);
-    let (low, high) = (k * fine, (k + 1) * fine);
+    let low = k * fine;
+    let high = (k + 1) * fine;
     (low / coarse..high.div_ceil(coarse))
         .map(move |i| (i as usize, (high.min((i + 1) * coarse) - low.max(i * coarse)) as f64))
 }
@@ -99,8 +102,10 @@ fn covered([fine, coarse]: [u32; 2], k: u32) -> impl Iterator<Item = (usize, f64
 fn coarser(fine: &RadianceImage) -> Option<RadianceImage> {
     let size = coarser_size(fine.size)?;
     let texel = |x: u32, y: u32| {
-        let (columns, rows) = (covered([fine.size[0], size[0]], x), covered([fine.size[1], size[1]], y));
-        let (mut sum, mut area) = ([0.0; 3], 0.0);
+        let columns = covered([fine.size[0], size[0]], x);
+        let rows = covered([fine.size[1], size[1]], y);
+        let mut sum = [0.0; 3];
+        let mut area = 0.0;
         for (row, height) in rows {
             for (column, width) in columns.clone() {
                 let seen = fine.pixels[row * fine.size[0] as usize + column].map(f64::from);

@@ -229,7 +229,8 @@ impl Light {
             LightShape::Directional { direction } => (-direction, 1.0),
             LightShape::Spot { position, direction, inner, outer } => {
                 let (to_light, falloff) = from_point(position);
-                let (low, high) = (libm::cos(outer), libm::cos(inner));
+                let low = libm::cos(outer);
+                let high = libm::cos(inner);
                 let cosine = -to_light.dot(direction);
                 let t =
                     if high > low { ((cosine - low) / (high - low)).clamp(0.0, 1.0) } else { f64::from(cosine >= low) };
@@ -259,7 +260,8 @@ mod tests {
 
     #[test]
     fn what_is_flat_has_the_normal_of_the_side_that_it_shines_to() {
-        let (center, normal) = (DVec3::ONE, DVec3::NEG_Y);
+        let center = DVec3::ONE;
+        let normal = DVec3::NEG_Y;
         let disk = LightShape::Disk { center, normal, radius: 0.5 };
         let rect = LightShape::Rect { center, u: DVec3::X * 2.0, v: DVec3::Z };
         assert_eq!([disk.normal(), rect.normal()], [Some(normal); 2]);
@@ -294,7 +296,8 @@ mod tests {
 
     #[test]
     fn a_scaled_light_gives_a_scaled_world_the_same_irradiance() {
-        let (center, normal) = (DVec3::new(1.0, 2.0, 3.0), DVec3::NEG_Y);
+        let center = DVec3::new(1.0, 2.0, 3.0);
+        let normal = DVec3::NEG_Y;
         let shapes = [
             LightShape::Point { position: center },
             LightShape::Directional { direction: normal },
@@ -305,7 +308,8 @@ mod tests {
             LightShape::Rect { center, u: DVec3::X, v: DVec3::Z },
         ];
         for shape in shapes {
-            let (light, p) = (light(shape), DVec3::new(0.5, 0.25, 2.5));
+            let light = light(shape);
+            let p = DVec3::new(0.5, 0.25, 2.5);
             light.validate(0).expect("a light");
             for (one, other) in light.points(5).iter().zip(light.scaled(0.25).points(5)) {
                 assert_eq!(one.irradiance(p, 0.125), other.irradiance(p * 0.25, 0.125 * 0.25), "{shape:?}");
@@ -316,7 +320,9 @@ mod tests {
 
     #[test]
     fn lights_without_extent_direction_or_place_are_refused() {
-        let (center, normal, nan) = (DVec3::ZERO, DVec3::Y, f64::NAN);
+        let center = DVec3::ZERO;
+        let normal = DVec3::Y;
+        let nan = f64::NAN;
         let bad = [
             ("position", LightShape::Patch { position: DVec3::splat(nan), normal }),
             ("normal", LightShape::Patch { position: center, normal: normal * 2.0 }),

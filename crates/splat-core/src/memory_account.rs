@@ -152,7 +152,8 @@ impl Tally {
         if self.whole.is_none() && bytes > limit.saturating_sub(state.used) {
             let used = state.used;
             let beside = if used > 0 { format!(" beside the {used} that are taken") } else { String::new() };
-            let (what, limit) = (format!("{what}{beside}").into(), Some(limit));
+            let what = format!("{what}{beside}").into();
+            let limit = Some(limit);
             return Err(Exceeded { what, needed: bytes, limit, unit: "bytes", hint: HINT.into() });
         }
         if self.whole.is_none() {

@@ -53,7 +53,8 @@ impl Mesh {
     pub fn canonicalize(&mut self) {
         let position = &self.position;
         let compare = |a: u32, b: u32| {
-            let (a, b) = (position[a as usize], position[b as usize]);
+            let a = position[a as usize];
+            let b = position[b as usize];
             a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)).then(a.z.total_cmp(&b.z))
         };
         self.triangles.par_iter_mut().with_min_len(4096).for_each(|triangle| {

@@ -85,7 +85,8 @@ impl PackedCloud {
         }
         let looks = lists.concat();
         let place_of_look = |i: usize| {
-            let (look, first) = (Look::of(cloud, i), blocks[i / BLOCK].first_look as usize);
+            let look = Look::of(cloud, i);
+            let first = blocks[i / BLOCK].first_look as usize;
             looks[first..].iter().position(|l| *l == look).unwrap_or(0) as u8
         };
         Ok(Self {

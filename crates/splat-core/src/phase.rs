@@ -24,12 +24,14 @@ mod tests {
         for g in [-0.9f32, -0.3, 0.0, 0.5, 0.99, 0.9999, -0.9999] {
             // The angle from the peak is π t³, so that the peak is resolved.
             let n = 400_000;
-            let (mut total, mut mean) = (0.0f64, 0.0f64);
+            let mut total = 0.0f64;
+            let mut mean = 0.0f64;
             for i in 0..n {
                 let t = (f64::from(i) + 0.5) / f64::from(n);
                 let from_peak = std::f64::consts::PI * t.powi(3);
                 let theta = if g >= 0.0 { from_peak } else { std::f64::consts::PI - from_peak };
-                let (sin, cos) = (from_peak.sin(), theta.cos());
+                let sin = from_peak.sin();
+                let cos = theta.cos();
                 let p = f64::from(henyey_greenstein(Vec3::Z, Vec3::new(sin as f32, 0.0, cos as f32), g));
                 let solid_angle = 2.0 * std::f64::consts::PI * sin * std::f64::consts::PI * 3.0 * t * t / f64::from(n);
                 total += p * solid_angle;

@@ -33,7 +33,8 @@ impl PixelSamples {
         let antialias = self.antialias as usize;
         let [width, height] = self.pixels().map(|side| side as usize);
         let of_pixel = |k: usize| {
-            let (x, y) = (k % width * antialias, k / width * antialias);
+            let x = k % width * antialias;
+            let y = k / width * antialias;
             value(&mut (0..antialias * antialias).map(|s| (y + s / antialias) * width * antialias + x + s % antialias))
         };
         (0..width * height).map(of_pixel).collect()

@@ -10,7 +10,8 @@ fn stack(k: f32, count: usize, accumulation: Accumulation) -> (f32, f32) {
     cloud.push(&Splat { radius: 1.0, cross_section: k, ..Splat::default() });
     let view = Projection::Orthographic { height: 1.0 };
     let camera = Camera::look_at(DVec3::Z * 4.0, DVec3::ZERO, DVec3::Y, view, [1, 1]).unwrap();
-    let (materials, params) = ([Material::default()], Params { accumulation, ..Params::default() });
+    let materials = [Material::default()];
+    let params = Params { accumulation, ..Params::default() };
     let projected = project(&ProjectInput {
         cloud: &cloud,
         camera: &camera,

@@ -24,7 +24,8 @@ fn canonical_order_goes_octant_by_octant_and_along_x_first() {
 
 #[test]
 fn a_box_is_its_half_spaces_wherever_it_lies() {
-    let (min, max) = (DVec3::new(1.0, 2.0, 3.0), DVec3::new(1.5, 4.0, 3.25));
+    let min = DVec3::new(1.0, 2.0, 3.0);
+    let max = DVec3::new(1.5, 4.0, 3.25);
     let bounds = DAabb::new(min, max);
     for i in 0..343u32 {
         let p = min - 0.25 + DVec3::from_array([i % 7, i / 7 % 7, i / 49].map(f64::from)) * 0.25;

@@ -22,11 +22,13 @@ fn camera(view: Projection) -> Camera {
 /// What is to be seen of a cloud of one splat by a filter of this width, and its optical depth at every pixel. Surfaces are slabs.
 fn draw(cloud: &Cloud, camera: &Camera, opaque: &OpaqueImage, filter_px: f32) -> (Projected, Vec<f32>) {
     let material = Material { surface_opacity: SurfaceOpacity::ThinSlab, ..Material::default() };
-    let (materials, footprints) = (&[material], &FootprintStack::default());
+    let materials = &[material];
+    let footprints = &FootprintStack::default();
     let params = &Params { resampling_sigma_px: filter_px, ..Params::default() };
     let projected = project(&ProjectInput { cloud, camera, footprints, materials, params, detail: Detail::ALL });
     let mut out = Accumulator::new(camera.size, 1, 1, false, false);
-    let (order, values) = (&(0..cloud.len() as u32).collect::<Vec<_>>(), &vec![1.0; cloud.len()]);
+    let order = &(0..cloud.len() as u32).collect::<Vec<_>>();
+    let values = &vec![1.0; cloud.len()];
     let direction = Direction::FrontToBack;
     let input = FoldInput { projected: &projected, order, values, materials, opaque, direction, params };
     fold(&input, &mut out, None).unwrap();
@@ -57,7 +59,8 @@ fn rays(camera: &Camera) -> impl Iterator<Item = DVec3> {
 #[test]
 fn a_medium_is_its_kernel_around_every_ray_and_lies_in_few_tiles() {
     let camera = camera(Projection::Perspective { fov_y: 1.2 });
-    let (radius, kernel) = (0.3f32, Footprint::default());
+    let radius = 0.3f32;
+    let kernel = Footprint::default();
     // The last so thin that it has a loop of its own.
     for (x, y, cross_section) in [(0.0, 0.0, 0.05), (2.0, -0.9, 0.05), (-1.4, 1.3, 0.01f32)] {
         let center = DVec3::new(x, y, 3.0);
@@ -86,7 +89,8 @@ fn a_slab_is_thicker_along_a_slanted_ray_far_away_and_through_the_eye_plane() {
     let kernel = Footprint::default();
     let slab = |center: DVec3, radius: f32, normal: DVec3| {
         let mut cloud = Cloud::new(DVec3::ZERO);
-        let (position, normal) = (world(&camera, center), world(&camera, normal));
+        let position = world(&camera, center);
+        let normal = world(&camera, normal);
         let kind = SplatKind::Surface;
         cloud.push(&Splat { position, radius, cross_section: 0.05, kind, normal, ..Splat::default() });
         draw(&cloud, &camera, &OpaqueImage::default(), 0.0)
@@ -98,7 +102,9 @@ fn a_slab_is_thicker_along_a_slanted_ray_far_away_and_through_the_eye_plane() {
         let found = f64::from(slab(center, 0.1, normal).0.splats[0].peak);
         assert!((found * cosine / peak(0.1) - 1.0).abs() < 1e-4, "{normal}: {found}");
     }
-    let (center, normal, radius) = (DVec3::new(0.2, -0.3, 0.4), DVec3::new(0.0, 0.8, -0.6), 1.0);
+    let center = DVec3::new(0.2, -0.3, 0.4);
+    let normal = DVec3::new(0.0, 0.8, -0.6);
+    let radius = 1.0;
     let (_, found) = slab(center, radius, normal);
     for (k, (ray, found)) in rays(&camera).zip(found).enumerate() {
         let depth = normal.dot(center) / normal.dot(ray);
@@ -130,15 +136,21 @@ fn a_gaussian_is_its_opacity_around_every_place_and_a_surface_cuts_it_in_depth()
         harmonics: vec![[0.0; 3]],
     });
     let sum = |of: &dyn Fn(DVec3) -> f64| axes.iter().map(|a| of(*a)).sum::<f64>();
-    let (xx, yy, xy) = (sum(&|a| a.x * a.x), sum(&|a| a.y * a.y), sum(&|a| a.x * a.y));
-    let (zx, zy, zz) = (sum(&|a| a.z * a.x), sum(&|a| a.z * a.y), sum(&|a| a.z * a.z));
+    let xx = sum(&|a| a.x * a.x);
+    let yy = sum(&|a| a.y * a.y);
+    let xy = sum(&|a| a.x * a.y);
+    let zx = sum(&|a| a.z * a.x);
+    let zy = sum(&|a| a.z * a.y);
+    let zz = sum(&|a| a.z * a.z);
     let kernel = Footprint::default();
     for filter_px in [0.0, 4.0] {
         let filter = f64::from(Gaussians::FILTER_VARIANCE) * (f64::from(filter_px) / camera.focal_px()).powi(2);
-        let (xx, yy) = (xx + filter, yy + filter);
+        let xx = xx + filter;
+        let yy = yy + filter;
         let determinant = xx * yy - xy * xy;
         // Of the depth at a place in the image: how the mean changes, and what is left of the variance.
-        let (along_x, along_y) = ((yy * zx - xy * zy) / determinant, (xx * zy - xy * zx) / determinant);
+        let along_x = (yy * zx - xy * zy) / determinant;
+        let along_y = (xx * zy - xy * zx) / determinant;
         let deviation = (zz - along_x * zx - along_y * zy).sqrt();
         let (_, whole) = draw(&cloud, &camera, &OpaqueImage::default(), filter_px);
         for surface in [4.4, 5.0, 5.3] {
@@ -146,7 +158,8 @@ fn a_gaussian_is_its_opacity_around_every_place_and_a_surface_cuts_it_in_depth()
             let (_, cut) = draw(&cloud, &camera, &wall, filter_px);
             for (k, ray) in rays(&camera).enumerate() {
                 // Parallel rays: `ray` is the place itself.
-                let (dx, dy) = (ray.x - center.x, ray.y - center.y);
+                let dx = ray.x - center.x;
+                let dy = ray.y - center.y;
                 let half_square = 0.5 * (yy * dx * dx - 2.0 * xy * dx * dy + xx * dy * dy) / determinant;
                 let alpha = opacity * (-half_square).exp();
                 if (alpha * 255.0 - 1.0).abs() < 1e-2 {
@@ -165,7 +178,8 @@ fn a_gaussian_is_its_opacity_around_every_place_and_a_surface_cuts_it_in_depth()
 #[test]
 fn a_pixel_is_the_mean_of_its_samples_in_every_band_of_rows() {
     // Rows of more than one band, the last not whole; four samples a pixel.
-    let (width, height) = (3, 40);
+    let width = 3;
+    let height = 40;
     let mut acc = Accumulator::new([2 * width, 2 * height], 1, 3, false, false);
     let mut glass = GlassImage::new(acc.size);
     let samples = acc.optical_depth[0].len();
@@ -179,7 +193,8 @@ fn a_pixel_is_the_mean_of_its_samples_in_every_band_of_rows() {
             glass.behind[k] = [1.0, at(k, 0.873), 0.5];
         }
     }
-    let (layers, background) = (LayerSet::default(), [0.25, 0.5, 1.0]);
+    let layers = LayerSet::default();
+    let background = [0.25, 0.5, 1.0];
     let found = finish(&FinishInput {
         accumulator: &acc,
         opaque: &OpaqueImage::default(),
@@ -190,7 +205,8 @@ fn a_pixel_is_the_mean_of_its_samples_in_every_band_of_rows() {
         antialias: 2,
     });
     assert_eq!(found.size, [width, height]);
-    let (beauty, alpha) = (found.rgb("beauty").unwrap(), found.scalar("alpha").unwrap());
+    let beauty = found.rgb("beauty").unwrap();
+    let alpha = found.scalar("alpha").unwrap();
     assert_eq!((beauty.len(), alpha.len()), (120, 120));
     for y in 0..height {
         for x in 0..width {

@@ -46,10 +46,13 @@ fn by_definition(image: &RadianceImage, d: DVec3, solid_angle: f64) -> [f64; 3] 
     let [width, height] = image.size.map(f64::from);
     let texel = (PI / height).max(2.0 * PI / width);
     let radius_sq = 8.0 * (solid_angle / 6.0 + 1.5 * texel * texel / 8.0);
-    let (mut sum, mut weights) = ([0.0; 3], 0.0);
+    let mut sum = [0.0; 3];
+    let mut weights = 0.0;
     for (k, pixel) in image.pixels.iter().enumerate() {
-        let (x, y) = ((k % image.size[0] as usize) as f64, (k / image.size[0] as usize) as f64);
-        let (top, bottom) = (PI * y / height, PI * (y + 1.0) / height);
+        let x = (k % image.size[0] as usize) as f64;
+        let y = (k / image.size[0] as usize) as f64;
+        let top = PI * y / height;
+        let bottom = PI * (y + 1.0) / height;
         let solid_angle = top.cos() - bottom.cos();
         let polar = (bottom.sin() - bottom * bottom.cos() - top.sin() + top * top.cos()) / solid_angle;
         let center = direction((x + 0.5) / width, 0.5 * (polar + PI * (y + 0.5) / height));
@@ -79,8 +82,8 @@ fn look_ups_in_the_finest_image_are_their_definition() {
         let texel = (PI / f64::from(size[1])).max(2.0 * PI / f64::from(size[0]));
         for d in directions(300).chain([DVec3::Y, DVec3::NEG_Y, DVec3::Z, DVec3::NEG_Z]) {
             for share in [0.0, 0.25, 0.5] {
-                let (found, exact) =
-                    (sky.radiance(d, share * texel * texel), by_definition(&image, d, share * texel * texel));
+                let found = sky.radiance(d, share * texel * texel);
+                let exact = by_definition(&image, d, share * texel * texel);
                 for c in 0..3 {
                     // The rounding of f32.
                     assert!(
@@ -125,13 +128,15 @@ fn db15_a_peak_far_away_does_not_sparkle() {
     // A texel of 1.2e-3 sr seen by pixels of 0.04 sr, from a camera that turns by fractions of a pixel.
     let sky = Environment::new(&peak([128, 64], [70, 31]), 0.0, 1.0).unwrap();
     let texel = 2.0 * PI / 128.0 * ((PI * 31.0 / 64.0).cos() - (PI * 32.0 / 64.0).cos());
-    let (side, solid_angle) = (0.2, 0.04);
+    let side = 0.2;
+    let solid_angle = 0.04;
     let mut sums = Vec::new();
     for step in 0..20 {
         let turned = f64::from(step) / 20.0 * side;
         let mut sum = 0.0;
         for pixel in 0..31 * 15 {
-            let (x, y) = (f64::from(pixel % 31) * side + turned, 0.5 * PI + (f64::from(pixel / 31) - 7.3) * side);
+            let x = f64::from(pixel % 31) * side + turned;
+            let y = 0.5 * PI + (f64::from(pixel / 31) - 7.3) * side;
             if !(0.0..=PI).contains(&y) {
                 continue;
             }

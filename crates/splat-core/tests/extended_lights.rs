@@ -36,7 +36,8 @@ fn points_of_a_disk_tend_to_pi_l_sine_squared_on_its_axis() {
     let [_, _, z] = FRAME;
     for (radius, height) in [(1.0, 4.0), (1.0, 1.0), (2.0, 1.0)] {
         let disk = LightShape::Disk { center: CENTER, normal: z, radius };
-        let (p, l) = (CENTER + z * height, 1.0 / (PI * radius * radius));
+        let p = CENTER + z * height;
+        let l = 1.0 / (PI * radius * radius);
         let exact = PI * l * radius * radius / (radius * radius + height * height);
         let allowed = [(16, 1e-2), (256, 4e-5), (4096, 2e-7)];
         check("disk", &allowed, |n| error(disk, n, [p, -z], exact));
@@ -47,7 +48,8 @@ fn points_of_a_disk_tend_to_pi_l_sine_squared_on_its_axis() {
 
 /// ∫cos cos'/d² over a rectangle a × b, from a point at height c below its corner that faces it, over π: the form factor.
 fn corner(a: f64, b: f64, c: f64) -> f64 {
-    let (x, y) = (a / c, b / c);
+    let x = a / c;
+    let y = b / c;
     let side = |x: f64, y: f64| x / x.hypot(1.0) * (y / x.hypot(1.0)).atan();
     (side(x, y) + side(y, x)) / (2.0 * PI)
 }
@@ -56,7 +58,8 @@ fn corner(a: f64, b: f64, c: f64) -> f64 {
 fn points_of_a_rectangle_tend_to_the_form_factor_below_its_corner() {
     let [x, y, z] = FRAME;
     for (a, b, c) in [(1.0, 1.0, 2.0), (2.0, 1.0, 1.0), (1.0, 3.0, 1.5)] {
-        let (u, v) = (x * (0.5 * a), y * (0.5 * b));
+        let u = x * (0.5 * a);
+        let v = y * (0.5 * b);
         let rect = LightShape::Rect { center: CENTER, u, v };
         let p = CENTER + u + v + z * c;
         let exact = PI * corner(a, b, c) / (a * b);
@@ -115,7 +118,8 @@ fn points_of_a_sphere_project_to_an_even_disc() {
 
 #[test]
 fn points_of_flat_lights_lie_on_them() {
-    let (center, normal) = (DVec3::ONE, DVec3::new(0.0, 0.6, 0.8));
+    let center = DVec3::ONE;
+    let normal = DVec3::new(0.0, 0.6, 0.8);
     let places = |shape, n| -> Vec<DVec3> {
         Light { shape, intensity: [1.0; 3] }.points(n).iter().filter_map(|l| l.shape.place()).collect()
     };

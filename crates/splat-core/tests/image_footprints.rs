@@ -43,18 +43,22 @@ fn depths_by(splat: Splat, image: Option<FootprintImage>, params: &Params) -> Ve
     cloud.push(&splat);
     let stack = FootprintStack::default();
     let footprints = &image.map_or(stack.clone(), |image| stack.with_image(0, image.into()));
-    let (materials, camera) = (&[Material::default()], &camera());
-    let (cloud, detail) = (&cloud, Detail::ALL);
+    let materials = &[Material::default()];
+    let camera = &camera();
+    let cloud = &cloud;
+    let detail = Detail::ALL;
     let projected = &project(&ProjectInput { cloud, camera, footprints, materials, params, detail });
     let mut seen = Accumulator::new([SIZE; 2], 1, 3, false, false);
-    let (opaque, direction) = (&OpaqueImage::default(), Direction::FrontToBack);
+    let opaque = &OpaqueImage::default();
+    let direction = Direction::FrontToBack;
     let input = FoldInput { projected, order: &[0], values: &[1.0; 3], materials, opaque, direction, params };
     fold(&input, &mut seen, None).unwrap();
     seen.optical_depth.swap_remove(0)
 }
 
 fn disc(radius: f32, tangent: Vec3) -> Splat {
-    let (kind, normal) = (SplatKind::Surface, Vec3::Z);
+    let kind = SplatKind::Surface;
+    let normal = Vec3::Z;
     Splat {
         radius,
         cross_section: 50.0,
@@ -116,7 +120,8 @@ fn a_quarter_turn_of_the_tangent_turns_the_picture() {
     // The image lies upright: its top, where the blade is thin, is above, and it leans to the right.
     let row = |y: usize| (0..n).filter(|x| seen[y * n + x] > 0.5 * top).collect::<Vec<_>>();
     let rows: Vec<usize> = (0..n).filter(|y| !row(*y).is_empty()).collect();
-    let (first, last) = (row(rows[1]), row(rows[rows.len() - 2]));
+    let first = row(rows[1]);
+    let last = row(rows[rows.len() - 2]);
     assert!(first.len() < last.len() && first[0] > last[0], "{first:?} {last:?}");
 }
 
@@ -136,17 +141,22 @@ fn the_back_shows_the_mirror_image() {
 fn a_slanted_disc_off_the_axis_shows_its_image_where_rays_meet_it() {
     let view = Projection::Perspective { fov_y: 1.4 };
     let camera = &Camera::look_at(DVec3::ZERO, -DVec3::Z, DVec3::Y, view, [SIZE, SIZE]).unwrap();
-    let (position, normal) = (Vec3::new(-1.8, 1.6, -3.0), Vec3::new(0.6, 0.0, 0.8));
-    let (tangent, across) = (Vec3::new(0.64, 0.6, -0.48) * 0.5, normal.cross(Vec3::new(0.64, 0.6, -0.48)) * 0.5);
+    let position = Vec3::new(-1.8, 1.6, -3.0);
+    let normal = Vec3::new(0.6, 0.0, 0.8);
+    let tangent = Vec3::new(0.64, 0.6, -0.48) * 0.5;
+    let across = normal.cross(Vec3::new(0.64, 0.6, -0.48)) * 0.5;
     let mut cloud = Cloud::new(DVec3::ZERO);
     cloud.push(&Splat { position, normal, tangent, ..disc(0.5, tangent) });
     // The right half.
     let half = image([64, 64], |x, _| f64::from(u8::from(x > 0.5)));
     let footprints = &FootprintStack::default().with_image(0, half.into());
-    let (params, materials, cloud) = (&Params::default(), &[Material::default()], &cloud);
+    let params = &Params::default();
+    let materials = &[Material::default()];
+    let cloud = &cloud;
     let projected = &project(&ProjectInput { cloud, camera, footprints, materials, params, detail: Detail::ALL });
     let mut seen = Accumulator::new([SIZE; 2], 1, 3, false, false);
-    let (opaque, direction) = (&OpaqueImage::default(), Direction::FrontToBack);
+    let opaque = &OpaqueImage::default();
+    let direction = Direction::FrontToBack;
     let input = FoldInput { projected, order: &[0], values: &[1.0; 3], materials, opaque, direction, params };
     fold(&input, &mut seen, None).unwrap();
     let mut shown = [0, 0];
@@ -188,15 +198,20 @@ fn a_tabulated_formula_comes_to_the_formula_with_second_order() {
 fn an_opaque_image_covers_as_much_from_far_away() {
     let footprints = FootprintStack::default().with_image(0, blade().into());
     let area = |radius: f32| {
-        let (mut covered, mut discs) = (0, 0);
+        let mut covered = 0;
+        let mut discs = 0;
         for i in 0..64 {
             let mut cloud = Cloud::new(DVec3::ZERO);
             let (sin, cos) = (i as f32).sin_cos();
             let tangent = Vec3::new(cos, sin, 0.0) * radius;
             let position = Vec3::new((i % 8) as f32 / 8.0, (i / 8) as f32 / 8.0, 0.0);
             cloud.push(&Splat { kind: SplatKind::Opaque, position, ..disc(radius, tangent) });
-            let (materials, camera, params) = (&[Material::default()], &camera(), &Params::default());
-            let (cloud, footprints, detail) = (&cloud, &footprints, Detail::ALL);
+            let materials = &[Material::default()];
+            let camera = &camera();
+            let params = &Params::default();
+            let cloud = &cloud;
+            let footprints = &footprints;
+            let detail = Detail::ALL;
             let projected = &project(&ProjectInput { cloud, camera, footprints, materials, params, detail });
             let input = OpaqueInput { projected, ids: &[0], values: &[1.0; 3], channels: 3, objects: false };
             let (seen, _) = resolve_opaque(&input, None).unwrap();

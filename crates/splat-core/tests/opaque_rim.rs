@@ -22,7 +22,8 @@ fn ball(side: f32) -> Cloud {
         let (sin, cos) = (f64::from(i) * PI * (3.0 - 5.0f64.sqrt())).sin_cos();
         let across = (1.0 - z * z).sqrt();
         let at = Vec3::new((cos * across) as f32, (sin * across) as f32, z as f32);
-        let (kind, normal) = (SplatKind::Opaque, at.normalize() * side);
+        let kind = SplatKind::Opaque;
+        let normal = at.normalize() * side;
         cloud.push(&Splat { position: at, radius, cross_section: area as f32, kind, normal, ..Splat::default() });
     }
     cloud
@@ -33,7 +34,8 @@ fn picture(cloud: &Cloud, to_light: DVec3) -> OpaqueImage {
     let camera =
         Camera::look_at(DVec3::Z * 4.0, DVec3::ZERO, DVec3::Y, Projection::Orthographic { height: 2.5 }, [SIZE, SIZE]);
     let camera = camera.unwrap();
-    let (materials, footprints) = ([Material::default()], FootprintStack::default());
+    let materials = [Material::default()];
+    let footprints = FootprintStack::default();
     let object = Object { name: "ball".into(), casts_shadow: false, shadow_coefficient: 0.0 };
     let projected = project(&ProjectInput {
         cloud,
@@ -87,7 +89,8 @@ fn a_lit_closed_ball_has_no_dark_rim() {
 #[test]
 fn a_surface_that_faces_away_everywhere_is_lit_on_the_side_that_is_seen() {
     let to_light = DVec3::new(0.0, 0.0, 1.0);
-    let (front, back) = (picture(&ball(1.0), to_light), picture(&ball(-1.0), to_light));
+    let front = picture(&ball(1.0), to_light);
+    let back = picture(&ball(-1.0), to_light);
     let middle = (SIZE * SIZE / 2 + SIZE / 2) as usize;
     assert!((front.channels[0][middle] - 1.0).abs() < 0.01);
     assert!((front.channels[0][middle] - back.channels[0][middle]).abs() < 1e-5);

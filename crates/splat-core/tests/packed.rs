@@ -9,7 +9,8 @@ fn unit(item: u64, k: u64) -> f32 {
 }
 
 fn direction(item: u64) -> Vec3 {
-    let (z, angle) = (2.0 * unit(item, 10) - 1.0, std::f32::consts::TAU * unit(item, 11));
+    let z = 2.0 * unit(item, 10) - 1.0;
+    let angle = std::f32::consts::TAU * unit(item, 11);
     let (sin, cos) = angle.sin_cos();
     let flat = (1.0 - z * z).max(0.0).sqrt();
     Vec3::new(flat * cos, flat * sin, z)

@@ -81,7 +81,9 @@ fn input<'a>(projected: &'a Projected, params: &'a Params, opaque: &'a OpaqueIma
 
 #[test]
 fn what_does_not_fit_the_room_or_the_device_is_refused() {
-    let (projected, params, opaque) = (projected(), Params::default(), OpaqueImage::default());
+    let projected = projected();
+    let params = Params::default();
+    let opaque = OpaqueImage::default();
     let plain = Accumulator::new(ROOM.size, 1, 3, false, false);
     let input = input(&projected, &params, &opaque);
     let uploads =
@@ -117,7 +119,8 @@ fn what_does_not_fit_the_room_or_the_device_is_refused() {
         assert!(matches!(refused, Err(Error::ColumnLength { .. })), "no room for layers: {refused:?}");
         let room = Capacities { opaque: false, depths, objects, ..ROOM };
         uploads(room, &input, &acc).unwrap();
-        let (mut shallow, mut nameless) = (projected.clone(), projected.clone());
+        let mut shallow = projected.clone();
+        let mut nameless = projected.clone();
         shallow.depths.clear();
         nameless.objects.clear();
         let lacking = FoldInput { projected: if depths { &shallow } else { &nameless }, ..input };
@@ -173,7 +176,9 @@ fn opaque_splats_are_recorded_without_fault_or_refused() {
     let state = |low: u32| [low, 0, 5, 7].map(u32::to_ne_bytes).concat();
     let image = [1.5f32.to_bits(), f32::INFINITY.to_bits(), 2.5f32.to_bits(), 0, 4, u32::MAX].map(u32::to_ne_bytes);
     let (found, counts) = recorded.finish([&state(12), &image.concat()]).unwrap();
-    let (depth, channels, object) = (vec![1.5, f32::INFINITY], vec![vec![2.5, 0.0]], vec![4, u32::MAX]);
+    let depth = vec![1.5, f32::INFINITY];
+    let channels = vec![vec![2.5, 0.0]];
+    let object = vec![4, u32::MAX];
     assert_eq!((found, counts.entries), (OpaqueImage { depth, channels, object }, 12));
     assert!(matches!(
         recorded.finish([&state(101), &image.concat()]),
@@ -225,9 +230,12 @@ fn what_follows_a_sort_reads_how_many_splats_it_left() {
     );
     assert!(follows.sorted.is_some() && record(ROOM).unwrap().sorted.is_none());
     // View, tables and planes alone are uploaded; the planes hold nothing yet.
-    let (params, opaque, view) = (Params::default(), OpaqueImage::default(), Projection::Orthographic { height: 2.0 });
+    let params = Params::default();
+    let opaque = OpaqueImage::default();
+    let view = Projection::Orthographic { height: 2.0 };
     let camera = Camera::look_at(DVec3::Z * 4.0, DVec3::ZERO, DVec3::Y, view, ROOM.size).unwrap();
-    let (footprints, direction) = (FootprintStack::default(), Direction::FrontToBack);
+    let footprints = FootprintStack::default();
+    let direction = Direction::FrontToBack;
     let input = follow::Input {
         camera: &camera,
         footprints: &footprints,

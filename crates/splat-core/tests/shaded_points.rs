@@ -17,7 +17,8 @@ fn lights() -> [Light; 2] {
 
 fn radiance(shading: Shading, normal: Vec3) -> Radiance {
     let material = Material { shading, emission: EMISSION, single_scattering_albedo: 0.5, ..Material::default() };
-    let (position, to_eye) = (DVec3::new(1e7, 0.0, 0.0), Vec3::Z);
+    let position = DVec3::new(1e7, 0.0, 0.0);
+    let to_eye = Vec3::Z;
     let point = Point { position, radius: 0.1, normal, to_eye, color: COLOR, material: &material };
     point.radiance(AMBIENT, lights().map(|light| LitBy { slide: None, light, shadow: None }).iter(), |_, _| [SHARE; 3])
 }
@@ -119,7 +120,8 @@ fn effects_of_shading_are_additive_layers_in_the_same_order() {
 
 #[test]
 fn surfaces_show_the_side_that_faces_and_shadows_are_asked_where_they_can_be_seen() {
-    let (face, leaning) = (Vec3::Z, Vec3::new(0.0, 0.6, 0.8));
+    let face = Vec3::Z;
+    let leaning = Vec3::new(0.0, 0.6, 0.8);
     for kind in [SplatKind::Surface, SplatKind::Opaque] {
         assert_eq!(facing(kind, face, leaning, Vec3::Z), leaning);
         assert_eq!(facing(kind, face, leaning, Vec3::NEG_Z), -leaning);

@@ -30,18 +30,22 @@ fn cloud(cross_sections: &[f32]) -> Cloud {
 
 /// What a cloud looks like under a light, and its footprints.
 fn draw(cloud: &Cloud, intensity: f32, shadow: Option<&dyn Transmittance>) -> (Accumulator, Projected) {
-    let (camera, params, materials) = (&camera(), &Params::default(), &[Material::default()]);
+    let camera = &camera();
+    let params = &Params::default();
+    let materials = &[Material::default()];
     let footprints = &FootprintStack::default();
     let projected = project(&ProjectInput { cloud, camera, footprints, materials, params, detail: Detail::ALL });
     let shape = LightShape::Directional { direction: DVec3::new(0.6, 0.0, -0.8) };
     let lights = &[LitBy { slide: None, light: Light { shape, intensity: [intensity; 3] }, shadow }];
-    let (layout, objects) = (ChannelLayout::new(&LayerSet::default()), &[Object::default()]);
+    let layout = ChannelLayout::new(&LayerSet::default());
+    let objects = &[Object::default()];
     let input = ShadeInput { cloud, materials, objects, lights, ambient: [0.0; 3], camera };
     let values = &shade(&input, &projected, &layout, None).unwrap();
     let mut order: Vec<u32> = (0..cloud.len() as u32).collect();
     order.sort_by(|a, b| cloud.position[*b as usize].z.total_cmp(&cloud.position[*a as usize].z));
     let mut out = Accumulator::new(camera.size, 1, layout.count(), true, true);
-    let (opaque, direction) = (&OpaqueImage::default(), Direction::FrontToBack);
+    let opaque = &OpaqueImage::default();
+    let direction = Direction::FrontToBack;
     let input = FoldInput { projected: &projected, order: &order, values, materials, opaque, direction, params };
     fold(&input, &mut out, None).unwrap();
     (out, projected)
@@ -61,10 +65,12 @@ fn x6_traces_of_matter_are_not_drawn() {
 
 #[test]
 fn x6_matter_is_as_faint_as_its_material_makes_it() {
-    let (faint, camera) = (cloud(&[1e-3 * FAINTEST]), camera());
+    let faint = cloud(&[1e-3 * FAINTEST]);
+    let camera = camera();
     let visible = |factor: f32| {
         let materials = &[Material { extinction_rgb: [0.0, factor, 0.0], ..Material::default() }];
-        let (footprints, params) = (&FootprintStack::default(), &Params::default());
+        let footprints = &FootprintStack::default();
+        let params = &Params::default();
         let input = ProjectInput { cloud: &faint, camera: &camera, footprints, materials, params, detail: Detail::ALL };
         project(&input).visible()
     };

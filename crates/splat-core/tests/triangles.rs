@@ -49,15 +49,17 @@ fn net(cells: u32, half: f32, jitter: f32, turn: DQuat) -> Mesh {
     let step = 2.0 * half / cells as f32;
     let corner = |k: u32| {
         let unit = |axis: u64| rng::unit_f32(5, u64::from(cells), u64::from(k), axis) - 0.5;
-        let (i, j) = (k % n, k / n);
-        let inner = if i % cells == 0 || j % cells == 0 { 0.0 } else { jitter * step };
+        let i = k % n;
+        let j = k / n;
+        let inner = if i.is_multiple_of(cells) || j.is_multiple_of(cells) { 0.0 } else { jitter * step };
         let place = Vec3::new(i as f32 * step - half + inner * unit(0), j as f32 * step - half + inner * unit(1), 0.0);
         (turn * place.as_dvec3()).as_vec3()
     };
     let cell = |k: u32| {
-        let (i, j) = (k % cells, k / cells);
+        let i = k % cells;
+        let j = k / cells;
         let [a, b, c, d] = [j * n + i, j * n + i + 1, (j + 1) * n + i + 1, (j + 1) * n + i];
-        if (i + j) % 2 == 0 { [[a, b, c], [a, c, d]] } else { [[a, b, d], [b, c, d]] }
+        if (i + j).is_multiple_of(2) { [[a, b, c], [a, c, d]] } else { [[a, b, d], [b, c, d]] }
     };
     mesh((0..n * n).map(corner).collect(), (0..cells * cells).flat_map(cell).collect())
 }
@@ -126,7 +128,8 @@ fn hv11_from_within_a_room_every_pixel_meets_one_wall_at_its_distance() {
 
 /// The nearest triangle of a ray by solving for it, with its barycentric coordinates and the least of them all.
 fn slow(of: &Mesh, [from, along]: [DVec3; 2]) -> (Option<(f64, usize, DVec3)>, f64) {
-    let (mut nearest, mut margin): (Option<(f64, usize, DVec3)>, f64) = (None, f64::INFINITY);
+    let mut nearest: Option<(f64, usize, DVec3)> = None;
+    let mut margin: f64 = f64::INFINITY;
     for (t, triangle) in of.triangles.iter().enumerate() {
         let [a, b, c] = triangle.map(|v| of.position[v as usize].as_dvec3() - from);
         let normal = (b - a).cross(c - a);
@@ -162,7 +165,8 @@ fn hv11_a_heap_of_triangles_is_what_rays_meet() {
         let image = seen(&heap, &camera);
         let mut met = 0;
         for (k, hit) in image.hits.iter().enumerate() {
-            let (x, y) = ((k % 24) as f64 + 0.5, (k / 24) as f64 + 0.5);
+            let x = (k % 24) as f64 + 0.5;
+            let y = (k / 24) as f64 + 0.5;
             let (nearest, margin) = slow(&heap, ray(&camera, x, y));
             // Rounded corners decide within 1/4096 pixel of an edge.
             if margin < 1e-3 {
@@ -197,16 +201,18 @@ fn attributes_are_those_of_the_place_and_depths_go_on_as_the_plane_does() {
     let target = transform.apply(one.origin);
     for projection in [LENS, PARALLEL] {
         let camera = camera(target + DVec3::Y * 2.0, target + DVec3::new(0.0, 0.4, -4.0), projection, [32, 32]);
-        let (image, planes) =
-            (resolve(&placed, &camera, None).unwrap(), resolve_depth(&placed, &camera, None).unwrap());
+        let image = resolve(&placed, &camera, None).unwrap();
+        let planes = resolve_depth(&placed, &camera, None).unwrap();
         assert_eq!(image.depth, planes.depth);
         let mut met = 0;
         for (k, hit) in image.hits.iter().enumerate().filter(|(_, hit)| **hit != TriangleHit::NONE) {
-            let (x, y) = ((k % 32) as f64 + 0.5, (k / 32) as f64 + 0.5);
+            let x = (k % 32) as f64 + 0.5;
+            let y = (k / 32) as f64 + 0.5;
             let [from, along] = ray(&camera, x, y);
             let world = from + along * f64::from(image.depth[k]);
             let own = transform.rotation.inverse() * (world - transform.translation) / transform.scale - one.origin;
-            let (found, expected) = (hit.color(&one).unwrap(), tint(own.as_vec3()));
+            let found = hit.color(&one).unwrap();
+            let expected = tint(own.as_vec3());
             assert!((0..3).all(|c| (found[c] - expected[c]).abs() < 1e-4), "{found:?}, not {expected:?}");
             let [b, c] = hit.barycentric;
             let expected = Vec3::new(b, 1.0 - b - c, c).normalize();
@@ -245,7 +251,9 @@ fn of_surfaces_at_one_place_the_first_is_seen_and_what_is_behind_never() {
         let corner = |x: f32, y: f32| Vec3::new(x * 9.0, y * 9.0, z);
         mesh(vec![corner(-1.0, -1.0), corner(1.0, -1.0), corner(0.0, 1.0)], vec![[0, 1, 2]])
     };
-    let (near, far, behind) = (square(1.0), square(0.0), square(9.0));
+    let near = square(1.0);
+    let far = square(0.0);
+    let behind = square(9.0);
     let all = [&far, &behind, &near, &near].map(|mesh| PlacedMesh { mesh, transform: Similarity::default() });
     let camera = camera(DVec3::Z * 5.0, DVec3::ZERO, LENS, [8, 8]);
     let image = resolve(&all, &camera, None).unwrap();
@@ -288,10 +296,13 @@ fn hv11_layers_are_what_each_triangle_shows_by_itself_nearest_first() {
             let keep = |_: usize, at: &TriangleLayer| (at.depth, at.hit.triangle);
             resolve_layers(&placed(&heap), &camera, (hidden, most), (none, keep), None)
         };
-        let (all, nearest, counts) = (of(&[], u64::MAX).unwrap(), seen(&heap, &camera), coverage(&heap, &camera));
+        let all = of(&[], u64::MAX).unwrap();
+        let nearest = seen(&heap, &camera);
+        let counts = coverage(&heap, &camera);
         let hidden: Vec<f32> = nearest.depth.iter().map(|depth| depth + 1.0).collect();
         let before = of(&hidden, u64::MAX).unwrap();
-        let (mut most, mut sum) = (0, 0);
+        let mut most = 0;
+        let mut sum = 0;
         for (k, count) in counts.iter().enumerate() {
             let own = all.of(k);
             assert_eq!(own.len() as u32, *count, "pixel {k}");

@@ -72,7 +72,8 @@ impl Sizes {
 
     fn add(&mut self, size: f32, every: u64) {
         let bits = size.max(0.0).to_bits();
-        let (below, part) = ((bits >> Self::SHIFT) as usize, u64::from(bits) % Self::WHOLE);
+        let below = (bits >> Self::SHIFT) as usize;
+        let part = u64::from(bits) % Self::WHOLE;
         self.0[below] += every * (Self::WHOLE - part);
         self.0[below + 1] += every * part;
     }
@@ -98,7 +99,8 @@ impl Sizes {
     /// Size that half of the casters are below, between those where weights sum to less and to more; `None` without any.
     fn median(&self) -> Option<f64> {
         let total: u64 = self.0.iter().sum();
-        let (mut before, mut sum) = (None, 0);
+        let mut before = None;
+        let mut sum = 0;
         for (k, &weight) in self.0.iter().enumerate().filter(|(_, weight)| **weight > 0) {
             // The middle of this weight, so that a caster between two sizes is where it is.
             let at = (2 * sum + weight, Self::size(k));
@@ -315,7 +317,8 @@ impl pulp::NullaryFnOnce for SecondLook<'_> {
                 }
             }
         }
-        let (low, high) = (low.map(least), high.map(greatest));
+        let low = low.map(least);
+        let high = high.map(greatest);
         if matches!(apparent, Apparent::Tangent | Apparent::Length) {
             look.window = [Vec2::from_array(low), Vec2::from_array(high)];
         } else {

@@ -144,7 +144,8 @@ impl Casters<'_> {
     #[inline(always)]
     pub(crate) fn casts(&self, i: usize) -> bool {
         let casts = |object: u32| self.objects.get(object as usize).is_none_or(|o| o.casts_shadow);
-        let (radius, cross_section) = (self.cloud.radius[i], self.cloud.cross_section[i]);
+        let radius = self.cloud.radius[i];
+        let cross_section = self.cloud.cross_section[i];
         cross_section > self.faintest * radius * radius && (!self.may_spare || casts(self.cloud.object[i]))
     }
 

@@ -336,7 +336,8 @@ mod tests {
 
     /// Checks entries of both ways, and returns how many splats went side by side.
     fn compare<M: Mapping>(mapping: &M, kind: SplatKind) -> usize {
-        let (cloud, params) = (cloud(kind), Params::default());
+        let cloud = cloud(kind);
+        let params = Params::default();
         let casters = Casters::new(&crate::Scene::from(&cloud), &params);
         let frame = Frame::new(DVec3::ZERO, [DVec3::X, DVec3::Y, DVec3::Z], 1.0);
         let ids: Vec<u32> = (0..1000).collect();

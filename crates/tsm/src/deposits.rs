@@ -202,7 +202,9 @@ impl<M: Mapping, const C: usize> pulp::NullaryFnOnce for FillChunk<'_, M, C> {
         let mut others = std::mem::take(others);
         others.clear();
         if casters.has_opaque_discs() {
-            let (frame, mapping, opaque) = (&self.plan.frame, self.deposit.mapping, self.deposit.opaque);
+            let frame = &self.plan.frame;
+            let mapping = self.deposit.mapping;
+            let opaque = self.deposit.opaque;
             select(casters, &self.chunk, SplatKind::Medium, medium_ids);
             select(casters, &self.chunk, SplatKind::Surface, surface_ids);
             let mut target = Target { mapping, opaque, entries: media };

@@ -39,7 +39,8 @@ impl Discs {
             self.columns.set(POSITION, l, p.to_array());
         }
         for l in 0..LANES {
-            let (radius, area) = (self.splats.column[9][l], self.splats.column[10][l]);
+            let radius = self.splats.column[9][l];
+            let area = self.splats.column[10][l];
             let shadow = is_opaque.then(|| frame.length(casters.shadow_radius_of_area(area)));
             let tangent = frame.displacement(read(6, l));
             let (axes, normal, radius) = disc(frame.turn(read(3, l)), tangent, frame.length(radius), shadow);

@@ -56,8 +56,9 @@ impl<const C: usize> Entries<C> {
     pub(crate) fn extend_kept(&mut self, cells: &Cells, distance: &Lane, rgb: [&Lane; 3]) {
         self.grow();
         let range = self.len..self.len + LANES;
-        let (to_cell, to_distance, to_own) =
-            (&mut self.cell[range.clone()], &mut self.distance[range.clone()], &mut self.own[range]);
+        let to_cell = &mut self.cell[range.clone()];
+        let to_distance = &mut self.distance[range.clone()];
+        let to_own = &mut self.own[range];
         if cells.is_kept.iter().fold(true, |all, kept| all & kept) {
             to_cell.copy_from_slice(&cells.cell);
             to_distance.copy_from_slice(distance);

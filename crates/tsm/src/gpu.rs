@@ -112,7 +112,8 @@ pub fn record(capacities: Capacities) -> Recorded {
     r.dispatch(&kernels::TSM_GATHER, each, &[view, sort.places[0], cells, sort.keys[0]], &[]);
     sort.by_bits(r, capacities.cells.saturating_sub(1).checked_ilog2().map_or(0, |top| top + 1));
     // From here on the halves of the sort that are done with hold what comes next.
-    let ([sorted, near], [places, list]) = (sort.keys, sort.places);
+    let [sorted, near] = sort.keys;
+    let [places, list] = sort.places;
     let arrange = [view, places, distances, absorbances, near, arranged];
     r.dispatch(&kernels::TSM_ARRANGE, each, &arrange, &[]);
     let blocks = Groups::cover(entries.div_ceil(SUM_BLOCK));
@@ -140,7 +141,8 @@ impl Sort {
     /// Sorts by the lower bits of the keys.
     fn by_bits(&mut self, r: &mut Recording, bits: u32) {
         for shift in (0..bits).step_by(8) {
-            let ([keys, sorted_keys], [places, sorted_places]) = (self.keys, self.places);
+            let [keys, sorted_keys] = self.keys;
+            let [places, sorted_places] = self.places;
             sort_pass(
                 r,
                 SortPass {

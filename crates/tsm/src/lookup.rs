@@ -144,7 +144,8 @@ impl ShadowMap {
         // Outside of the table all passes.
         let mut light = [[if ABSORBANCE { 0.0 } else { 1.0 }; C]; R];
         for (r, receiver) in receivers.iter().enumerate() {
-            let (mut sum, mut seen) = ([0.0; C], 0.0);
+            let mut sum = [0.0; C];
+            let mut seen = 0.0;
             for k in 0..4 {
                 (0..C).for_each(|c| sum[c] += weights[r][k] * number(absorbed[r][k][c]));
                 seen += weights[r][k];
@@ -270,7 +271,8 @@ fn spans<const C: usize, const R: usize>(
 
 /// Places in a window.
 const INDEX: [f32; WINDOW + 1] = {
-    let (mut index, mut n) = ([0.0; WINDOW + 1], 0);
+    let mut index = [0.0; WINDOW + 1];
+    let mut n = 0;
     while n <= WINDOW {
         index[n] = n as f32;
         n += 1;
@@ -290,7 +292,11 @@ pub(crate) fn continuous<S: Simd, const C: usize>(
     ramp: f32,
 ) -> [f32; C] {
     let of = |v| Lanes::splat(simd, v);
-    let (place, half, inverse, none, whole) = (of(distance), of(0.5), of(0.5 / ramp), of(0.0), of(1.0));
+    let place = of(distance);
+    let half = of(0.5);
+    let inverse = of(0.5 / ramp);
+    let none = of(0.0);
+    let whole = of(1.0);
     let mut sums = [[0.0; WINDOW]; C];
     // The last that lies wholly before stands for all before it.
     let mut n = begin.saturating_sub(1);
@@ -408,7 +414,8 @@ mod tests {
         let many = lists(1, &[(0, 1.0, 0.3), (0, 1.0 + part, 0.3), (0, 1.0 + 2.0 * part, 0.3)]);
         for i in 0..400 {
             let d = i as f32 * 0.005;
-            let (a, b) = (absorbance(&one, 0, d, 0.5), absorbance(&many, 0, d, 0.5));
+            let a = absorbance(&one, 0, d, 0.5);
+            let b = absorbance(&many, 0, d, 0.5);
             assert!((a - b).abs() < 1e-6, "A({d}) = {a} or {b}");
         }
     }
@@ -428,7 +435,8 @@ mod tests {
         entries.iter().for_each(|(cell, d, a)| of_cell[*cell as usize].push((f64::from(*d), f64::from(*a))));
         for (cell, of_cell) in (0..).zip(&of_cell) {
             for i in 0..40 {
-                let (d, ramp) = (0.8 + i as f32 * 0.04, [0.02, 0.1, 0.7][i % 3]);
+                let d = 0.8 + i as f32 * 0.04;
+                let ramp = [0.02, 0.1, 0.7][i % 3];
                 let share = |at: f64| ((f64::from(d) - at) / f64::from(2.0 * ramp) + 0.5).clamp(0.0, 1.0);
                 let exact: f64 = of_cell.iter().map(|(at, a)| a * share(*at)).sum();
                 let a = f64::from(absorbance(&lists, cell, d, ramp));

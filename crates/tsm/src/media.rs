@@ -53,8 +53,13 @@ impl Axes {
     #[inline(always)]
     fn new(at: &Lane, half: &Lane) -> Self {
         let nought = [0.0; LANES];
-        let (inverse, cut, tail, scale, below) = (nought, nought, nought, nought, nought);
-        let (first, last) = ([0; LANES], [0; LANES]);
+        let inverse = nought;
+        let cut = nought;
+        let tail = nought;
+        let scale = nought;
+        let below = nought;
+        let first = [0; LANES];
+        let last = [0; LANES];
         let mut axes = Self { at: *at, half: *half, inverse, cut, tail, scale, first, last, below };
         for l in 0..LANES {
             let axis = Axis::new(at[l], half[l]);
@@ -180,7 +185,8 @@ impl<M: Mapping, const C: usize> Target<'_, M, C> {
         let mut columns = Axes::new(at, queue.column(HALF));
         let has_slant = slant[..n].iter().any(|s| *s != 0.0);
         let start = columns.below;
-        let (mut height, mut middle) = ([0.0; LANES], [0.0; LANES]);
+        let mut height = [0.0; LANES];
+        let mut middle = [0.0; LANES];
         for j in 0..rows.most_cells(n) {
             for l in 0..LANES {
                 height[l] = rows.next_share(l, j);
@@ -287,7 +293,8 @@ pub(crate) fn plain_footprint<M: Mapping>(
     let [columns, rows] = mapping.size().map(|n| n as f32);
     let Widths { half, slant } = Ellipse { at, spread, deviation }.widths();
     let reach = Vec2::new(half[0] + slant.abs() * half[1], half[1]);
-    let (low, high) = (at - reach, at + reach);
+    let low = at - reach;
+    let high = at + reach;
     let is_inside = (low.x >= 1.0) & (low.y >= 1.0) & (high.x <= columns - 1.0) & (high.y <= rows - 1.0);
     let is_plain = view.is_seen & is_inside & is_plain(mapping, at, spread, angle);
     // Numbers of any size, which the others may have, count no cells.

@@ -157,11 +157,13 @@ impl OpaqueDepth {
         let [nu, nv] = [0, 1].map(|k| queue.column(CELLS + k));
         let [width_most, height_most] = [most(CELLS), most(CELLS + 1)];
         for (j, k) in (0..height_most).flat_map(|j| (0..width_most).map(move |k| (j, k))) {
-            let (mut cell, mut bits): (Lane<u32>, Lane<u32>) = ([0; LANES], [u32::MAX; LANES]);
+            let mut cell: Lane<u32> = [0; LANES];
+            let mut bits: Lane<u32> = [u32::MAX; LANES];
             // Rays first: some come from a table, which is no work for vectors.
             let mut rays = [Ray { base: Vec3::ZERO, direction: Vec3::Z }; LANES];
             for l in 0..LANES {
-                let (column, row) = ((floor(us[l]) + k) as u32, (floor(vs[l]) + j) as u32);
+                let column = (floor(us[l]) + k) as u32;
+                let row = (floor(vs[l]) + j) as u32;
                 rays[l] = mapping.ray_of(column, row);
                 cell[l] = row.wrapping_mul(width).wrapping_add(column);
             }
@@ -182,9 +184,12 @@ fn fill<M: Mapping>(windows: &mut Columns<COUNT>, mapping: &M, discs: &Discs) {
     let parallel = mapping.is_parallel();
     let [columns, rows] = mapping.size().map(|n| n as i32);
     for l in 0..LANES {
-        let (position, axes, radius) = (discs.position(l), discs.axes(l), discs.radius(l));
+        let position = discs.position(l);
+        let axes = discs.axes(l);
+        let radius = discs.radius(l);
         let view = mapping.view(position);
-        let (at, distance) = (view.place.at, view.place.distance);
+        let at = view.place.at;
+        let distance = view.place.distance;
         let is_far = parallel | (radius <= NEAR * distance);
         let reach = reach_of(mapping, Spread::of_disc(axes, view.gradients), radius / distance);
         let is_small = (reach.x < 0.5 * MOST as f32) & (reach.y < 0.5 * MOST as f32);
@@ -216,7 +221,8 @@ mod tests {
             let position = Vec3::new(number(0) - 0.5, number(1) - 0.5, number(2) - 0.1);
             let normal = Vec3::new(number(3) - 0.5, number(4) - 0.5, number(5) - 0.5).normalize();
             let tangent = normal.any_orthonormal_vector() * if i % 2 == 0 { 0.0 } else { 0.02 * number(6) };
-            let (radius, cross_section) = (0.005 + 0.05 * number(7), 0.003 * number(8));
+            let radius = 0.005 + 0.05 * number(7);
+            let cross_section = 0.003 * number(8);
             cloud.push(&Splat {
                 position,
                 radius,

@@ -14,7 +14,8 @@ pub(crate) struct Patch {
 impl Patch {
     #[inline(always)]
     pub(crate) fn at<M: Mapping>(mapping: &M, at: Vec2) -> Self {
-        let (column, row) = (floor(at.x - 0.5), floor(at.y - 0.5));
+        let column = floor(at.x - 0.5);
+        let row = floor(at.y - 0.5);
         let part = at - 0.5 - Vec2::new(column as f32, row as f32);
         let rest = Vec2::ONE - part;
         let mut cells = [None; 4];
@@ -33,7 +34,8 @@ const LEAST_SPREAD: f32 = 0.1;
 /// Where the rays of the four nearest cells, weighted bilinearly, meet `p`: from its place `at` in the table by Newton
 /// steps, each with the slopes of the rays that it finds there.
 pub(crate) fn met_at<M: Mapping>(mapping: &M, p: Vec3, at: Vec2) -> Vec2 {
-    let (mut met, towards) = (at, p.normalize());
+    let mut met = at;
+    let towards = p.normalize();
     for _ in 0..STEPS {
         let Patch { cells: [Some(a), Some(b), Some(c), Some(d)], part, weights } = Patch::at(mapping, met) else {
             return at;

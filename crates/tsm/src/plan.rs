@@ -233,7 +233,8 @@ fn fit(look: &Appearance) -> PolarRange {
     polar = [(polar[0] - margin).max(0.0), (polar[1] + margin).min(PI)];
     let sector = 2.0 * PI / SECTORS as f64;
     // (length, end) of the widest run of empty sectors, round the circle twice so that it may cross the seam.
-    let (mut run, mut widest) = (0, (0, 0));
+    let mut run = 0;
+    let mut widest = (0, 0);
     for s in 0..2 * SECTORS {
         run = if look.sectors[s % SECTORS] { 0 } else { run + 1 };
         if run > widest.0 && run <= SECTORS {
@@ -294,7 +295,8 @@ fn least(finest: f64, coarsest: f64, fits: impl Fn(f64) -> bool) -> f64 {
     if fits(finest) {
         return finest;
     }
-    let (mut low, mut high) = (finest, coarsest);
+    let mut low = finest;
+    let mut high = coarsest;
     for _ in 0..52 {
         let middle = 0.5 * (low + high);
         (low, high) = if fits(middle) { (low, middle) } else { (middle, high) };

@@ -172,7 +172,8 @@ impl ShadowMap {
 
     /// The cell of a place, its distance from the light and the width of the cell there, both in the frame.
     fn place_of(&self, place: Vec3) -> Option<(u32, f32, f32)> {
-        let (cell, p) = (self.cell_of(place)?, self.frame.position(place));
+        let cell = self.cell_of(place)?;
+        let p = self.frame.position(place);
         with_mapping!(&self.table, m => {
             let (distance, spread) = if m.is_parallel() { (p.z, 1.0) } else { (p.length(), p.length()) };
             Some((cell, distance, spread * m.measure(cell).sqrt() as f32))
@@ -239,10 +240,12 @@ impl ShadowMap {
             let point = |cell: u32| -> Option<SurfacePoint> {
                 let p = hit(cell)?;
                 let [columns, _] = m.size();
-                let (i, j) = ((cell % columns) as i32, (cell / columns) as i32);
+                let i = (cell % columns) as i32;
+                let j = (cell / columns) as i32;
                 let at = |i, j| m.wrap(i, j).and_then(&hit);
                 let along = |a: Option<Vec3>, b: Option<Vec3>| b.unwrap_or(p) - a.unwrap_or(p);
-                let (du, dv) = (along(at(i - 1, j), at(i + 1, j)), along(at(i, j - 1), at(i, j + 1)));
+                let du = along(at(i - 1, j), at(i + 1, j));
+                let dv = along(at(i, j - 1), at(i, j + 1));
                 let light = -m.cell_ray(cell).direction;
                 let normal = du.cross(dv).try_normalize().unwrap_or(light);
                 let normal = if normal.dot(light) < 0.0 { -normal } else { normal };
@@ -311,7 +314,8 @@ impl<const C: usize> WithSimd for First<'_, C> {
         let ends = [media.distance().last().map(|d| d + ramp), surfaces.distance().last().copied()];
         let end = ends.into_iter().flatten().reduce(f32::max).filter(|end| is_reached(*end))?;
         // Distances are positive, and their bits in their order.
-        let (mut before, mut reached) = (0, end.to_bits());
+        let mut before = 0;
+        let mut reached = end.to_bits();
         while reached - before > 1 {
             let middle = before + (reached - before) / 2;
             *if is_reached(f32::from_bits(middle)) { &mut reached } else { &mut before } = middle;

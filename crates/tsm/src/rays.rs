@@ -96,7 +96,8 @@ impl<M: Mapping> Rays<'_, M> {
         let mut places = [0.0; MOST_SAMPLES as usize];
         (0..self.samples).for_each(|k| places[k as usize] = place(k, self.samples));
         // Density, weight, area and weighted distance of the cell that is being summed, and how many rays it has so far.
-        let (mut sums, mut count) = ([0.0f32; 4], 0);
+        let mut sums = [0.0f32; 4];
+        let mut count = 0;
         for begin in (0..total).step_by(LANES) {
             let rays = if self.samples == 1 {
                 self.rays_of_centres(begin)
@@ -142,7 +143,8 @@ impl<M: Mapping> Rays<'_, M> {
     #[inline(always)]
     fn rays_within(&self, places: &[f32; MOST_SAMPLES as usize], mut cell: usize, ray: usize) -> RayLanes {
         let samples = self.samples as usize;
-        let (mut i, mut j) = (ray % samples, ray / samples);
+        let mut i = ray % samples;
+        let mut j = ray / samples;
         let mut corner = [[0.0; LANES]; 2];
         let mut step = [[0.0; LANES]; 2];
         for l in 0..LANES {
@@ -163,9 +165,11 @@ impl<M: Mapping> Rays<'_, M> {
 
     #[inline(always)]
     fn look(&self, rays: &RayLanes) -> Found {
-        let (caster, parallel) = (self.caster, self.mapping.is_parallel());
+        let caster = self.caster;
+        let parallel = self.mapping.is_parallel();
         let nought = [0.0; LANES];
-        let (mut s, mut along) = (nought, nought);
+        let mut s = nought;
+        let mut along = nought;
         let mut found = Found { density: nought, weight: nought, area: nought, distance: [caster.distance; LANES] };
         for l in 0..LANES {
             let ray = get(rays, l);
@@ -211,7 +215,9 @@ mod tests {
             return [0.0; 2];
         }
         let half = radius * (1.0 - s).sqrt();
-        let (mut whole, mut held, mut moment) = (0.0, 0.0, 0.0);
+        let mut whole = 0.0;
+        let mut held = 0.0;
+        let mut moment = 0.0;
         for k in 0..400 {
             let t = along + half * ((k as f64 + 0.5) / 200.0 - 1.0);
             let density = libm::exp(-0.5 * ((t - along) / sigma).powi(2));
@@ -241,7 +247,9 @@ mod tests {
             assert_eq!(sampled.cells.len(), (n * n) as usize);
             for &(cell, weight, distance) in &sampled.cells {
                 let corner = Vec2::new((cell % n) as f32, (cell / n) as f32);
-                let (mut density, mut held, mut moment) = (0.0, 0.0, 0.0);
+                let mut density = 0.0;
+                let mut held = 0.0;
+                let mut moment = 0.0;
                 for k in 0..64 * 64 {
                     let ray = mapping.ray(corner + (Vec2::new((k % 64) as f32, (k / 64) as f32) + 0.5) / 64.0);
                     let here = f64::from(mapping.density(&ray));

@@ -57,12 +57,14 @@ impl Sampled {
         let span = |centre: f32, reach: f32, n: i32| {
             if 2.0 * reach >= n as f32 { 0..n } else { (centre - reach).floor() as i32..(centre + reach).ceil() as i32 }
         };
-        let (us, vs) = (span(at.x, reach.x, columns), span(at.y, reach.y, rows));
+        let us = span(at.x, reach.x, columns);
+        let vs = span(at.y, reach.y, rows);
         self.window.clear();
         for row in vs.clone() {
             for column in us.clone() {
                 let Some(cell) = mapping.wrap(column, row) else { continue };
-                let (u, v) = (cell % columns as u32, cell / columns as u32);
+                let u = cell % columns as u32;
+                let v = cell / columns as u32;
                 // Beside some corners of a folded table, what lies beyond an edge lies within reach on this side too.
                 let direct = (0..columns).contains(&column) && (0..rows).contains(&row);
                 if direct || !(us.contains(&(u as i32)) && vs.contains(&(v as i32))) {
@@ -99,7 +101,10 @@ pub(crate) fn sample_disc<M: Mapping>(mapping: &M, caster: &Caster, cell: u32, s
         return (s.weight * s.gain, s.weight * s.jacobian / inverse_measure, s.distance);
     }
     let corner = Vec2::new((cell % columns) as f32, (cell / columns) as f32);
-    let (mut weight, mut area, mut distance, mut total) = (0.0, 0.0, 0.0, 0.0);
+    let mut weight = 0.0;
+    let mut area = 0.0;
+    let mut distance = 0.0;
+    let mut total = 0.0;
     for k in 0..samples * samples {
         let step = Vec2::new(place(k % samples, samples), place(k / samples, samples));
         let ray = mapping.ray(corner + step);
@@ -149,7 +154,8 @@ pub(crate) fn ahead(caster: &Caster, along: f32, s: f32) -> Option<(f32, f32)> {
     let [t, end] = [along, half].map(|x| f64::from(x) / sigma);
     let part = |t: f64| 0.5 * erf(t * std::f64::consts::FRAC_1_SQRT_2);
     let density = |t: f64| libm::exp(-0.5 * t * t) / (2.0 * std::f64::consts::PI).sqrt();
-    let (before, whole) = (part(t) + part(end), 2.0 * part(end));
+    let before = part(t) + part(end);
+    let whole = 2.0 * part(end);
     let mean = sigma * (t + (density(t) - density(end)) / before.max(1e-6));
     Some(((before / whole) as f32, mean.max(sigma / 1024.0) as f32))
 }

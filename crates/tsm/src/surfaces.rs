@@ -113,14 +113,16 @@ pub(crate) fn plane_distances<M: Mapping, const F: usize>(
     cells: &Cells,
     distance: &Lane,
 ) -> Lane {
-    let (parallel, width) = (mapping.is_parallel(), mapping.size()[0]);
+    let parallel = mapping.is_parallel();
+    let width = mapping.size()[0];
     let read = |first: usize, l: usize| Vec3::from_array([0, 1, 2].map(|k| queue.column(first + k)[l]));
     let mut directions = [[0.0; LANES]; 3];
     let mut bases = [[0.0; LANES]; 3];
     let mut on_plane = [0.0; LANES];
     for l in (0..LANES).filter(|&l| cells.is_kept[l]) {
         let ray = mapping.ray_of(cells.cell[l] % width, cells.cell[l] / width);
-        let (base, direction) = (ray.base.to_array(), ray.direction.to_array());
+        let base = ray.base.to_array();
+        let direction = ray.direction.to_array();
         (0..3).for_each(|k| (bases[k][l], directions[k][l]) = (base[k], direction[k]));
     }
     for l in 0..LANES {

@@ -83,7 +83,8 @@ impl Block {
     pub(crate) fn new(casters: &Casters<'_>, splats: Range<usize>) -> Self {
         let cloud = casters.cloud;
         let nought = [0.0; LANES];
-        let (mut area, mut is_caster) = (nought, [false; LANES]);
+        let mut area = nought;
+        let mut is_caster = [false; LANES];
         let mut block = Self { position: [nought; 3], radius: nought, kind: [0; LANES] };
         // Column by column and without indices, which compilers make vector instructions of.
         let [x, y, z] = &mut block.position;
@@ -129,7 +130,9 @@ impl pulp::NullaryFnOnce for FirstLook<'_> {
         let mut survey = Survey::EMPTY;
         let mut low = [[f32::INFINITY; LANES]; 3];
         let mut high = [[f32::NEG_INFINITY; LANES]; 3];
-        let (mut most, mut media, mut kinds) = ([0.0; LANES], [0.0f64; LANES], [[0u16; LANES]; 3]);
+        let mut most = [0.0; LANES];
+        let mut media = [0.0f64; LANES];
+        let mut kinds = [[0u16; LANES]; 3];
         for begin in self.splats.clone().step_by(LANES) {
             let splats = begin..self.splats.end.min(begin + LANES);
             let block = Block::new(self.casters, splats.clone());

@@ -86,7 +86,9 @@ impl<const C: usize> Parted<C> {
         for s in &mut start {
             sum += std::mem::replace(s, sum);
         }
-        let (mut cell, mut distance, mut own) = (vec![0u32; n], vec![0f32; n], vec![[0f32; C]; n]);
+        let mut cell = vec![0u32; n];
+        let mut distance = vec![0f32; n];
+        let mut own = vec![[0f32; C]; n];
         for ((&c, d), a) in cells.iter().zip(&entries.distance).zip(&entries.own) {
             let slot = &mut start[(c >> ranges.shift) as usize];
             let i = *slot as usize;
@@ -136,9 +138,11 @@ impl<const C: usize> Lists<C> {
     pub(crate) fn new(parted: &[Parted<C>], ranges: Ranges, limit: f32) -> Self {
         let all: usize = parted.iter().map(Parted::len).sum();
         let mut span = vec![[0u32; 2]; ranges.cells];
-        let (mut distance, mut total) = (vec![0f32; all + WINDOW + 1], vec![[0f32; C]; all + WINDOW + 1]);
+        let mut distance = vec![0f32; all + WINDOW + 1];
+        let mut total = vec![[0f32; C]; all + WINDOW + 1];
         let mut tasks = Vec::with_capacity(ranges.count);
-        let (mut distances, mut totals) = (distance.as_mut_slice(), total.as_mut_slice());
+        let mut distances = distance.as_mut_slice();
+        let mut totals = total.as_mut_slice();
         let mut first = 0u32;
         for (range, span) in span.chunks_mut(1 << ranges.shift).enumerate() {
             let n: usize = parted.iter().map(|p| p.range(range).len()).sum();
@@ -267,7 +271,8 @@ impl<const C: usize> Task<'_, C> {
             let end = *start as usize;
             let begin = end - *kept as usize;
             sort(&mut key[begin..end], spare);
-            let (distance, total) = (&mut self.distance[begin..end], &mut self.total[begin..end]);
+            let distance = &mut self.distance[begin..end];
+            let total = &mut self.total[begin..end];
             *kept = sum_up(&key[begin..end], own, stop, distance, total);
             *start = (begin as u32).wrapping_add(self.first);
             all += u64::from(*kept);

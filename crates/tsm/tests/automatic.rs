@@ -6,7 +6,9 @@ use splat_core::{Cloud, Light, LightShape, Limits};
 use tsm::{Deposits, Limit, Params, Resolution, Scene};
 
 fn scaled(cloud: &Cloud, light: &Light, s: f64) -> (Cloud, Light) {
-    let (mut cloud, mut light, f) = (cloud.clone(), *light, s as f32);
+    let mut cloud = cloud.clone();
+    let mut light = *light;
+    let f = s as f32;
     cloud.origin *= s;
     cloud.position.iter_mut().for_each(|p| *p *= f);
     cloud.radius.iter_mut().for_each(|r| *r *= f);
@@ -58,7 +60,8 @@ fn ts12_tables_do_not_depend_on_the_unit_of_length() {
 fn errors(h: f32, light: &Light, sun: Vec3) -> (f64, f64, Limit) {
     let cloud = smooth_ball(h, 1.5, 1.0);
     let map = build(&cloud, light, &Params::default());
-    let (mut worst, mut square) = (0.0f64, 0.0);
+    let mut worst = 0.0f64;
+    let mut square = 0.0;
     for i in 0..4000 {
         let u = |k| (splat_core::rng::unit_f32(2, 0, i, k) - 0.5) * 2.6;
         let to = Vec3::new(u(0), u(1), -1.6);
@@ -80,7 +83,8 @@ fn errors(h: f32, light: &Light, sun: Vec3) -> (f64, f64, Limit) {
 fn ts16_finer_splats_have_better_shadows() {
     let sun = Vec3::new(0.2, 0.1, -1.0).normalize();
     for light in [point_light(DVec3::new(0.3, 0.2, 4.0)), directional(sun.as_dvec3())] {
-        let (mut last, mut limits) = ((f64::INFINITY, f64::INFINITY), Vec::new());
+        let mut last = (f64::INFINITY, f64::INFINITY);
+        let mut limits = Vec::new();
         for h in [0.12, 0.06, 0.03, 0.02] {
             let (worst, rms, limit) = errors(h, &light, sun);
             println!("{:?} h {h}: {worst:.4}, rms {rms:.4}, {limit:?}", light.shape);

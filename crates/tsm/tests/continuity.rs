@@ -16,7 +16,8 @@ fn lights(position: Vec3, radius: f32, normal: Vec3, middle: Vec3) -> [f32; 9] {
     let cross_section = DEPTH * radius * radius / norm;
     let mut cloud = Cloud::new(DVec3::ZERO);
     cloud.push(&Splat { position, radius, cross_section, kind, normal, ..Splat::default() });
-    let (mapping, resolution) = (MappingChoice::Octahedral, Resolution::Cells(CELLS));
+    let mapping = MappingChoice::Octahedral;
+    let resolution = Resolution::Cells(CELLS);
     let map = build(&cloud, &point_light(DVec3::ZERO), &Params { mapping, resolution, ..Params::default() });
     let [u, v] = [middle.any_orthonormal_vector(), middle.cross(middle.any_orthonormal_vector()).normalize()];
     std::array::from_fn(|k| {

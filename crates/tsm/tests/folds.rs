@@ -50,7 +50,8 @@ fn look_ups_beside_edges_of_octants_are_as_exact_as_elsewhere() {
     for (size, bound) in [(32, 0.02), (64, 0.006), (128, 0.004)] {
         let map = octahedral(&cloud, Resolution::Cells(size));
         let cell = (4.0 * std::f32::consts::PI).sqrt() / size as f32;
-        let (mut beside, mut apart) = (0.0f64, 0.0f64);
+        let mut beside = 0.0f64;
+        let mut apart = 0.0f64;
         for i in 0..40_000 {
             let to = Vec3::X + 0.5 * (direction(8, i) * Vec3::new(0.0, 2.2, 2.2));
             let d = to.normalize();

@@ -62,7 +62,8 @@ fn splats_that_are_looked_up_together_get_the_bits_of_each() {
 
 #[test]
 fn x6_matter_too_faint_to_be_seen_leaves_no_trace() {
-    let (mut faint, mut thin) = (mixed(9000, DVec3::ZERO), mixed(9000, DVec3::ZERO));
+    let mut faint = mixed(9000, DVec3::ZERO);
+    let mut thin = mixed(9000, DVec3::ZERO);
     for (cloud, of) in [(&mut faint, FAINTEST), (&mut thin, 4.0 * FAINTEST)] {
         cloud.kind.fill(SplatKind::Medium);
         cloud.cross_section.iter_mut().zip(&cloud.radius).for_each(|(k, radius)| *k = of * radius * radius);
@@ -157,7 +158,8 @@ fn ts14_one_cell_works_and_a_huge_table_is_refused_with_its_bytes() {
 #[test]
 fn what_maps_cost_together_is_known_before_any_is_built_and_held_while_they_are() {
     let cloud = mixed(20_000, DVec3::ZERO);
-    let (lights, params) = (lights(), Params::default());
+    let lights = lights();
+    let params = Params::default();
     for light in &lights {
         let predicted = Deposits::predict(&Scene::from(&cloud), light, &params).unwrap();
         let map = build(&cloud, light, &params);
@@ -218,7 +220,8 @@ fn predicted_work_is_near_the_counted() {
         let cloud = medium([17; 3], 0.06, 1.0, |p| p.length() < 1.0);
         for resolution in [Resolution::Auto, Resolution::Cells(32), Resolution::Cells(128)] {
             let map = build(&cloud, &light, &Params { resolution, ..Params::default() });
-            let (p, c) = (map.prediction(), map.counts());
+            let p = map.prediction();
+            let c = map.counts();
             let ratio = p.entries / c.entries as f64;
             println!("{:?} {resolution:?}: {p:?} {c:?} ratio {ratio:.2}", light.shape);
             assert!((0.4..2.5).contains(&ratio) || matches!(light.shape, LightShape::Spot { .. }), "{ratio}");
@@ -269,7 +272,8 @@ fn bar(half: Vec3) -> Vec<Vec3> {
 #[test]
 fn bars_that_fall_flat_or_upright_are_free_until_their_own_sides_touch_the_plane() {
     let cloud = plane(Vec3::Z * 3.0, Vec3::NEG_Z, 20, 0.05, SplatKind::Opaque, 1.0);
-    let (flat, upright) = (Vec3::new(0.4, 0.04, 0.04), Vec3::new(0.04, 0.04, 0.4));
+    let flat = Vec3::new(0.4, 0.04, 0.04);
+    let upright = Vec3::new(0.04, 0.04, 0.4);
     for light in [directional(DVec3::Z), point_light(DVec3::ZERO), directional(DVec3::new(0.4, 0.1, 1.0).normalize())] {
         // A slanted ray finds the plane within half a cell.
         let map = build(&cloud, &light, &Params { resolution: Resolution::Cells(512), ..Params::default() });
@@ -297,7 +301,8 @@ fn a_hit_is_where_a_look_up_on_its_ray_has_the_absorbance() {
     cloud.append(&plane(Vec3::Z * 0.4, Vec3::NEG_Z, 20, 0.05, SplatKind::Surface, 0.8));
     let resolution = Resolution::Cells(64);
     let map = build(&cloud, &directional(DVec3::NEG_Z), &Params { resolution, ..Params::default() });
-    let (mut within, mut at_plane) = (0, 0);
+    let mut within = 0;
+    let mut at_plane = 0;
     for absorbance in [0.05, 0.4, 1.0, 1.7, 3.0] {
         for p in map.first_surface(absorbance) {
             if p.position.truncate().length() > 0.7 {

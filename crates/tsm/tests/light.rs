@@ -73,7 +73,9 @@ fn ts09_error_of_the_limit_is_bounded_by_it() {
 
 #[test]
 fn ts10_light_inside_a_ball() {
-    let (h, sigma, r) = (0.08, 1.5, 1.0);
+    let h = 0.08;
+    let sigma = 1.5;
+    let r = 1.0;
     let mut cloud = medium([14; 3], h, sigma, |p| p.length() < r + h);
     // A splat stands for the part of its voxel that lies in the ball: without that the ball would be rough.
     for i in 0..cloud.len() {
@@ -348,7 +350,8 @@ fn thin_slabs_absorb_more_at_an_angle_and_crossings_do_not() {
 #[test]
 fn a_patch_casts_the_shadows_of_a_point_and_whole_lights_are_refused() {
     let cloud = medium([4; 3], 0.1, 3.0, |_| true);
-    let (position, normal) = (DVec3::new(0.3, 2.0, -0.2), DVec3::NEG_Y);
+    let position = DVec3::new(0.3, 2.0, -0.2);
+    let normal = DVec3::NEG_Y;
     let patch = Light { shape: LightShape::Patch { position, normal }, intensity: [1.0; 3] };
     let [of_patch, of_point] = [patch, point_light(position)].map(|light| build(&cloud, &light, &Params::default()));
     for k in 0..cloud.len() {
@@ -384,7 +387,8 @@ fn a_disc_of_the_reference_keeps_its_cross_section() {
         cloud.push(&Splat { position, radius: 0.25, cross_section: 0.1, kind, normal, tangent, ..Splat::default() });
         for along in [DVec3::Z, DVec3::new(0.3, 0.4, 0.8).normalize()] {
             let [u, v] = [along.any_orthonormal_vector(), along.cross(along.any_orthonormal_vector())];
-            let (n, cell) = (400, 1.4 / 400.0);
+            let n = 400;
+            let cell = 1.4 / 400.0;
             let depth = |k: usize| {
                 let [x, y] = [k % n, k / n].map(|i| (i as f64 + 0.5) * cell - 0.7);
                 let middle = position.as_dvec3() + u * x + v * y;
@@ -442,7 +446,8 @@ fn papers_model_takes_the_opacity_of_a_balls_centre() {
 #[test]
 fn smooth_shadows_converge_in_second_order() {
     let footprint = splat_core::Footprint::default();
-    let (radius, spread) = (0.25f32, 1.0f32);
+    let radius = 0.25f32;
+    let spread = 1.0f32;
     let mut cloud = Cloud::new(DVec3::ZERO);
     for i in 0..400 {
         let u = |k| splat_core::rng::unit_f32(31, 0, i, k) - 0.5;

@@ -44,7 +44,8 @@ fn ts04_the_papers_index_leaves_its_table_where_angles_are_degrees() {
 fn ts05_octahedral_cells_have_equal_solid_angle() {
     // Uniform directions: each of 24² cells gets its share; χ² with 575 degrees of freedom exceeds 683 with p = 1e-3.
     let table = Octahedral::new(24);
-    let (n, cells) = (576_000u64, 576);
+    let n = 576_000u64;
+    let cells = 576;
     let mut count = vec![0u64; cells];
     for i in 0..n {
         let at = table.locate(crate::common::direction(1, i)).unwrap().at.floor();
@@ -87,7 +88,8 @@ fn gradients_are_the_derivatives_of_places() {
                 (at(1e-3) - at(-1e-3)) / 2e-3
             });
             let [gu, gv] = table.gradients(p);
-            let (nu, nv) = (Vec3::from(steps.map(|s| s.x)), Vec3::from(steps.map(|s| s.y)));
+            let nu = Vec3::from(steps.map(|s| s.x));
+            let nv = Vec3::from(steps.map(|s| s.y));
             let smooth = p.abs().min_element() > 5e-3 && p.x.hypot(p.y) > 0.1;
             if smooth && nu.length() < 1e3 {
                 let error = (gu - nu).length() / gu.length() + (gv - nv).length() / gv.length();
@@ -191,7 +193,8 @@ fn ts04_indices_stay_inside_for_a_million_directions_of_any_bits() {
 /// What lies a quarter turn about the axis of poles further lies a quarter of the table further, at the poles and at the seam as elsewhere.
 #[test]
 fn ts02_ts03_a_quarter_turn_moves_every_direction_by_a_quarter_of_the_table() {
-    let (columns, rows) = (1024, 512);
+    let columns = 1024;
+    let rows = 512;
     let polar = PolarAzimuth::new(columns, rows, PolarRange::SPHERE);
     let octahedral = Octahedral::new(rows);
     let half = 0.5 * rows as f32;

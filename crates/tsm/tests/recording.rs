@@ -85,10 +85,12 @@ fn compare_lists(map: &ShadowMap, has_opaque: bool) -> usize {
     let numbers = |bytes: &[u8]| bytes.as_chunks::<4>().0.iter().map(|b| f32::from_le_bytes(*b)).collect::<Vec<_>>();
     let spans: Vec<usize> = spans.1.as_chunks::<4>().0.iter().map(|b| u32::from_le_bytes(*b) as usize).collect();
     let [distances, totals, opaque] = [distances, totals, opaque].map(|(_, bytes)| numbers(bytes));
-    let (channels, cells) = (map.channels(), map.cells() as usize);
+    let channels = map.channels();
+    let cells = map.cells() as usize;
     assert_eq!((spans.len(), totals.len()), (4 * cells, channels * distances.len()));
     assert_eq!(opaque.len(), if has_opaque { cells } else { 0 });
-    let (mut shared, mut unit) = (0, 0.0);
+    let mut shared = 0;
+    let mut unit = 0.0;
     for cell in 0..cells {
         // Lists of media, then of surfaces, and where an opaque disc ends them.
         let lists = [cell, cells + cell].map(|list| spans[2 * list]..spans[2 * list] + spans[2 * list + 1]);
@@ -130,7 +132,8 @@ fn too_little_room_says_how_much() {
     let batches = deposits.batches(most).unwrap();
     let [all] = &batches[..] else { panic!("{batches:?}") };
     assert_eq!(all.entries(), deposits.entries().iter().sum::<u64>());
-    let (entries, cells) = (all.entries() as u32, all.cells() as u32);
+    let entries = all.entries() as u32;
+    let cells = all.cells() as u32;
     let refused = |room| record(room).uploads(&deposits, all).unwrap_err();
     let overflow =
         |what, needed: u32, had: u32| Error::Overflow(Overflow { what, needed: needed.into(), had: had.into() });
@@ -160,12 +163,14 @@ fn bytes_that_no_run_gave_are_refused() {
     let deposits = deposits();
     let most = Capacities { entries: u32::MAX, cells: u32::MAX, channels: 1 };
     let batch = &deposits.batches(most).unwrap()[0];
-    let (entries, cells) = (batch.entries() as usize, batch.cells() as usize);
+    let entries = batch.entries() as usize;
+    let cells = batch.cells() as usize;
     let recorded = record(Capacities { entries: entries as u32, cells: cells as u32, channels: 1 });
     // Empty lists: those of surfaces begin behind the entries of media.
     let of_media = deposits.entries()[0] as u32;
     let empty = |cell| [if cell < cells / 2 { 0 } else { of_media }, 0].map(u32::to_ne_bytes).concat();
-    let (spans, column) = ((0..cells).flat_map(empty).collect::<Vec<u8>>(), vec![0u8; 4 * entries]);
+    let spans = (0..cells).flat_map(empty).collect::<Vec<u8>>();
+    let column = vec![0u8; 4 * entries];
     let short = |what, expected: usize, found: usize| {
         Err(Error::ReadBack { what, expected: expected as u64, found: found as u64 })
     };

@@ -111,7 +111,8 @@ fn an_opaque_disc_of_any_number_of_cells_hides_as_far_as_its_dilated_area_and_no
             let place = Vec3::new(u(0), u(1), -1.0);
             let from_middle = place - cloud.position[0];
             let beyond = (from_middle.x / seen[0]).hypot(from_middle.y / seen[1]) - shadow;
-            let (light, expected) = (light_at(&map, place), if beyond > 0.0 { 1.0 } else { 0.0 });
+            let light = light_at(&map, place);
+            let expected = if beyond > 0.0 { 1.0 } else { 0.0 };
             let what = || format!("{across} cells, {seen:?}, {beyond} beyond its rim: {light}");
             assert!(beyond.abs() * least < cell || light == expected, "{}", what());
         }
@@ -139,7 +140,8 @@ fn a_sphere_of_discs_is_lit_before_the_terminator_and_dark_behind() {
         });
     }
     let map = build(&cloud, &point_light(DVec3::Z * 4.0), &Params::default());
-    let (mut wrong, mut counted) = (0, 0);
+    let mut wrong = 0;
+    let mut counted = 0;
     for i in 0..cloud.len() {
         let light = map.transmittance(&receiver(&cloud, i))[0];
         let cosine = cloud.position[i].dot((Vec3::Z * 4.0 - cloud.position[i]).normalize());

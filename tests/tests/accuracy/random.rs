@@ -39,7 +39,8 @@ fn a_random_technique_has_intervals_and_its_noise_falls_with_the_root_of_the_rep
     // Nothing is refused, and the intervals hold what is known.
     assert!(study.outcomes.iter().all(|o| o.drawn));
     for o in &study.outcomes {
-        let (sampled, level) = (o.sampled.unwrap(), o.setting.request.scene.render.particles.repeat_level);
+        let sampled = o.sampled.unwrap();
+        let level = o.setting.request.scene.render.particles.repeat_level;
         let deviation = 0.1 / f64::from(level).sqrt();
         assert!((sampled.noise / deviation - 1.0).abs() < 0.05, "{level}: {sampled:?}");
         assert!((sampled.from_limit.mean - deviation).abs() <= sampled.from_limit.half_width, "{level}: {sampled:?}");

@@ -168,7 +168,8 @@ fn ply(colored: bool, size: f64) -> String {
 fn sheet(colored: bool, step: f64) -> String {
     let mut text = String::from(if colored { "x y z red green blue\n" } else { "x y z\n" });
     let point = |i: i32| {
-        let (x, y) = (f64::from(i % 16 - 8) * step, f64::from(i / 16 - 8) * step);
+        let x = f64::from(i % 16 - 8) * step;
+        let y = f64::from(i / 16 - 8) * step;
         let color = if colored { format!(" {} {} {}", 100 + i / 2, 200 - i / 2, 90) } else { String::new() };
         format!("{:.6} {:.6} {:.6}{color}\n", x + 0.01 * step, y + 0.01 * step, 0.01 + 0.05 * (3.0 * x).sin().abs())
     };
@@ -187,10 +188,14 @@ fn hot() -> String {
 fn ball(radius: f64) -> String {
     let mut text = String::from("x y z nx ny nz\n");
     for i in 0..400 {
-        let (y, angle) = (1.0 - (2.0 * f64::from(i) + 1.0) / 400.0, 2.399_963_229_728_653 * f64::from(i));
+        let y = 1.0 - (2.0 * f64::from(i) + 1.0) / 400.0;
+        let angle = 2.399_963_229_728_653 * f64::from(i);
         let r = (1.0 - y * y).sqrt();
-        let (x, z) = (r * angle.cos(), r * angle.sin());
-        let (nx, ny, nz) = (x, y / 0.7, z);
+        let x = r * angle.cos();
+        let z = r * angle.sin();
+        let nx = x;
+        let ny = y / 0.7;
+        let nz = z;
         let n = (nx * nx + ny * ny + nz * nz).sqrt();
         writeln!(text, "{} {} {} {} {} {}", radius * x, radius * 0.7 * y, radius * z, nx / n, ny / n, nz / n).unwrap();
     }
@@ -230,7 +235,9 @@ fn blob(most: f64) -> String {
     let mut text = String::new();
     for k in 0..216 {
         let at = |n: i32| 0.2 * f64::from(n) - 0.5;
-        let (x, y, z) = (at(k % 6), at(k / 6 % 6), at(k / 36));
+        let x = at(k % 6);
+        let y = at(k / 6 % 6);
+        let z = at(k / 36);
         writeln!(
             text,
             "{}",

@@ -123,7 +123,8 @@ impl Entry {
 
 /// A trial with some sources.
 pub(super) fn of(sources: Which, key: &'static str, set: &'static str) -> Entry {
-    let (with, but) = (&[][..], Vec::new());
+    let with = &[][..];
+    let but = Vec::new();
     Entry { key, set, with, look: Look::Picture, frame: None, techniques: EACH, sources, but }
 }
 

@@ -139,7 +139,8 @@ impl Shape {
         let reach = if rays == Rays::View { 1.0 } else { 2.4 };
         let point = |t: f64| [x + t * direction[0], y + t * direction[1], t * direction[2]];
         let boxed = |p: Point| p.iter().all(|c| c.abs() <= 1.0);
-        let (mut inside, mut crossings) = (0.0, 0);
+        let mut inside = 0.0;
+        let mut crossings = 0;
         let step = 2.0 * reach / f64::from(STEPS);
         let mut before: Option<f64> = None;
         for i in 0..=STEPS {

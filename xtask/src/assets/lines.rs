@@ -13,7 +13,8 @@ pub(super) fn csv() -> String {
     let mut text = "x,y,z,band,shadow_coefficient\n".to_owned();
     for (i, j) in (0..COUNT[0]).flat_map(|i| (0..COUNT[1]).map(move |j| (i, j))) {
         let at = |k: i32, axis: usize| (f64::from(k) - 0.5 * f64::from(COUNT[axis] - 1)) * STEP[axis];
-        let (x, z) = (at(i, 0), at(j, 1));
+        let x = at(i, 0);
+        let z = at(j, 1);
         let hill = 0.42 * (-3.0 * (x * x + z * z)).exp() + 0.05 * (5.0 * x).sin() * (6.0 * z).cos();
         let share = f64::from(i) / f64::from(COUNT[0] - 1);
         let _ = writeln!(text, "{x:.3},{hill:.4},{z:.3},{},{share:.3}", j / 5 % 2);

@@ -75,7 +75,8 @@ fn is_maple(x: f64, y: f64) -> bool {
     ];
     let y = y + 0.3;
     let lobe = |(d, length): &([f64; 2], f64)| {
-        let (along, across) = ((x * d[0] + y * d[1]) / length, (x * d[1] - y * d[0]) / length);
+        let along = (x * d[0] + y * d[1]) / length;
+        let across = (x * d[1] - y * d[0]) / length;
         (0.0..1.0).contains(&along) && across.abs() < 0.30 * (1.0 - along) * (0.55 + 1.9 * along)
     };
     LOBES.iter().any(lobe) || x * x + y * y < 0.05 || x.abs() < 0.035 && (-0.7..0.0).contains(&y)
@@ -86,11 +87,14 @@ fn is_flake(x: f64, y: f64) -> bool {
     let half_root_3 = 0.75f64.sqrt();
     let arms = [[1.0, 0.0], [0.5, half_root_3], [-0.5, half_root_3]];
     let is_arm = |d: [f64; 2]| {
-        let (along, across) = ((x * d[0] + y * d[1]).abs(), (x * d[1] - y * d[0]).abs());
+        let along = (x * d[0] + y * d[1]).abs();
+        let across = (x * d[1] - y * d[0]).abs();
         let side = |at: f64, length: f64| {
             // Along a direction of 60° to the arm.
-            let (u, v) = (along - at, across);
-            let (on, off) = (0.5 * u + half_root_3 * v, (half_root_3 * u - 0.5 * v).abs());
+            let u = along - at;
+            let v = across;
+            let on = 0.5 * u + half_root_3 * v;
+            let off = (half_root_3 * u - 0.5 * v).abs();
             (0.0..length).contains(&on) && off < 0.06
         };
         along < 0.97 && across < 0.075 || side(0.4, 0.42) || side(0.66, 0.26)
@@ -159,13 +163,15 @@ fn hedge() -> String {
     let mut numbers = Numbers(5);
     for k in 0..HEDGE[0] {
         let middle = [0.24 * (k as f64 - 21.5), numbers.between(0.4, 0.75), numbers.between(-3.4, -3.1)];
-        let (size, light) = (numbers.between(0.36, 0.5), numbers.between(0.8, 1.1));
+        let size = numbers.between(0.36, 0.5);
+        let light = numbers.between(0.8, 1.1);
         for _ in 0..HEDGE[1] {
             let out = unit(sum(numbers.direction(), [0.0, 0.3, 0.8], 1.0));
             let [x, y, z] = sum(middle, out, size * numbers.between(0.85, 1.08));
             let [nx, ny, nz] = unit(sum(sum(out, numbers.direction(), 0.7), [0.0, 1.0, 0.3], 0.4));
             let radius = HIDES * numbers.between(0.075, 0.11);
-            let (shade, young) = (light * numbers.between(0.75, 1.15), numbers.next());
+            let shade = light * numbers.between(0.75, 1.15);
+            let young = numbers.next();
             let color = [0.2 + 0.16 * young * young, 0.38 + 0.12 * young, 0.16].map(|c| (c * shade * 255.0) as u8);
             let [r, g, b] = color;
             let y = y.max(0.02);
@@ -232,7 +238,8 @@ fn leaf(numbers: &mut Numbers) -> Point {
 
 /// On the ground about the trunk.
 fn fallen(numbers: &mut Numbers) -> Point {
-    let (x, z) = (numbers.between(-1.0, 1.0), numbers.between(-1.0, 1.0));
+    let x = numbers.between(-1.0, 1.0);
+    let z = numbers.between(-1.0, 1.0);
     let away = 1.6 * (x * x + z * z).sqrt();
     let at = [x * away, 0.03, z * away * 0.8];
     let normal = unit(sum([0.0, 1.6, 0.35], numbers.direction(), 0.6));
@@ -245,7 +252,8 @@ fn fallen(numbers: &mut Numbers) -> Point {
 /// Upright, facing about where it is looked at from, a little tilted.
 fn blade(numbers: &mut Numbers) -> Point {
     let radius = numbers.between(0.05, 0.13);
-    let (x, z) = (numbers.between(-3.3, 3.3), numbers.between(-2.6, 2.3));
+    let x = numbers.between(-3.3, 3.3);
+    let z = numbers.between(-2.6, 2.3);
     let side = if numbers.next() < 0.5 { 1.0 } else { -1.0 };
     let normal = unit([numbers.between(-0.8, 0.8), numbers.between(-0.25, 0.15), side]);
     let top = unit([numbers.between(-0.3, 0.3), 1.0, numbers.between(-0.2, 0.2)]);
@@ -258,7 +266,8 @@ fn blade(numbers: &mut Numbers) -> Point {
 fn flake(numbers: &mut Numbers) -> Point {
     let at = [numbers.between(-2.6, 2.6), numbers.between(0.05, 3.6), numbers.between(-1.5, 2.6)];
     let normal = unit(sum([0.0, 0.25, 1.3], numbers.direction(), 0.8));
-    let (top, radius) = (numbers.direction(), numbers.between(0.018, 0.042));
+    let top = numbers.direction();
+    let radius = numbers.between(0.018, 0.042);
     Point { at, normal, top, radius, footprint: FLAKE, opacity: 0.9, color: [0.95, 0.97, 1.0] }
 }
 

@@ -42,7 +42,9 @@ pub(super) fn files() -> [(&'static str, String); 4] {
 
 fn mushroom() -> Solid {
     let mut solid = Solid::default();
-    let (stem, gills, red) = ([232, 222, 196], [214, 190, 150], [172, 46, 30]);
+    let stem = [232, 222, 196];
+    let gills = [214, 190, 150];
+    let red = [172, 46, 30];
     let foot = [(0.0, 0.115), (0.02, 0.13), (0.1, 0.115), (0.3, 0.09), (0.5, 0.085), (0.66, 0.1)];
     let below = [(0.63, 0.08), (0.61, 0.2), (0.57, 0.35), (0.555, 0.41)];
     let above = [
@@ -62,7 +64,10 @@ fn mushroom() -> Solid {
 
 fn dart() -> Solid {
     let mut solid = Solid::default();
-    let (steel, brass, black, red) = ([150, 155, 162], [196, 152, 62], [38, 38, 44], [188, 30, 36]);
+    let steel = [150, 155, 162];
+    let brass = [196, 152, 62];
+    let black = [38, 38, 44];
+    let red = [188, 30, 36];
     solid.turned(X, [0.0; 3], &[(&[(0.6, 0.014), (0.95, 0.01), (1.0, 0.001)], steel)]);
     solid.turned(
         X,
@@ -88,7 +93,10 @@ fn dart() -> Solid {
 
 fn aeroplane() -> Solid {
     let mut solid = Solid::default();
-    let (white, grey, dark, red) = ([236, 238, 240], [196, 202, 210], [70, 74, 80], [182, 36, 32]);
+    let white = [236, 238, 240];
+    let grey = [196, 202, 210];
+    let dark = [70, 74, 80];
+    let red = [182, 36, 32];
     let hull = [
         (-1.0, 0.012),
         (-0.9, 0.035),
@@ -132,7 +140,9 @@ fn aeroplane() -> Solid {
 
 fn probe() -> Solid {
     let mut solid = Solid::default();
-    let (steel, grip, dark) = ([176, 182, 188], [60, 110, 120], [46, 50, 56]);
+    let steel = [176, 182, 188];
+    let grip = [60, 110, 120];
+    let dark = [46, 50, 56];
     let shaft = [(0.0, 0.002), (0.01, 0.009), (0.05, 0.013), (0.75, 0.013), (0.76, 0.02), (0.79, 0.02), (0.8, 0.028)];
     let rings = [0.84, 0.9, 0.96, 1.02, 1.08, 1.14];
     let ringed =
@@ -181,7 +191,8 @@ impl Solid {
             }
         }
         let last = first + (ribs.len() - 1) * CORNERS;
-        let (start, end) = (self.corners.len(), self.corners.len() + 1);
+        let start = self.corners.len();
+        let end = self.corners.len() + 1;
         self.corners.extend([&ribs[0], &ribs[ribs.len() - 1]].map(|rib| (rib.at, rib.color)));
         for corner in 0..CORNERS {
             let next = (corner + 1) % CORNERS;

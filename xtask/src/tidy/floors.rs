@@ -79,7 +79,9 @@ fn module_of(path: &str) -> &str {
 fn names(after: &str) -> Vec<&str> {
     let name = |text: &'_ str| text.find(|c: char| !c.is_alphanumeric() && c != '_').unwrap_or(text.len());
     let Some(group) = after.strip_prefix('{') else { return vec![&after[..name(after)]] };
-    let (mut depth, mut names, mut begins) = (0, Vec::new(), true);
+    let mut depth = 0;
+    let mut names = Vec::new();
+    let mut begins = true;
     for (at, c) in group.char_indices() {
         match c {
             '{' => depth += 1,

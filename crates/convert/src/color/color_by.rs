@@ -241,7 +241,8 @@ mod tests {
     #[test]
     fn a_column_of_one_number_has_the_middle_and_gaps_have_the_object_s_colour() {
         let found = of(vec![4.0, f64::NAN, 4.0, f64::INFINITY], PointColors::Map(ColorMap::TURBO, None));
-        let (middle, own) = (ColorMap::TURBO.at(0.5), [0.5, 0.25, 0.125]);
+        let middle = ColorMap::TURBO.at(0.5);
+        let own = [0.5, 0.25, 0.125];
         assert_eq!((found.color, found.gaps), (vec![middle, own, middle, own], 2));
         assert_eq!(of(vec![f64::NAN], PointColors::Map(ColorMap::TURBO, None)).color, [own]);
     }

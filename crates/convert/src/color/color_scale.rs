@@ -34,7 +34,8 @@ impl ColorScale {
             (PointColors::Classes | PointColors::Distinct, _) => ScaleNumbers::Each(colored.present.clone()),
         };
         let is_empty = matches!(&numbers, ScaleNumbers::Each(present) if present.is_empty());
-        let (object, colors) = (object.to_owned(), by.colors.clone());
+        let object = object.to_owned();
+        let colors = by.colors.clone();
         (!is_empty).then(|| Self { object, column: Some(by.column.clone()), colors, numbers })
     }
 
@@ -53,7 +54,8 @@ impl ColorScale {
         let last = points.iter().rposition(|p| shows(p.value)).unwrap_or(points.len() - 1);
         let [low, high] =
             [first.saturating_sub(1), (last + 1).min(points.len() - 1)].map(|i| f64::from(points[i].value));
-        let (object, colors) = (object.to_owned(), PointColors::Transfer(transfer.clone(), crate::Classified::No));
+        let object = object.to_owned();
+        let colors = PointColors::Transfer(transfer.clone(), crate::Classified::No);
         Self { object, column: None, colors, numbers: ScaleNumbers::Range([low, high]) }
     }
 

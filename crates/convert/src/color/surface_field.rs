@@ -93,13 +93,15 @@ impl SurfaceField {
         keeps_values: bool,
     ) -> Result<Option<String>, ConvertError> {
         let transform = &params.transform;
-        let (back, from) = (transform.rotation.inverse(), cloud.origin - transform.translation);
+        let back = transform.rotation.inverse();
+        let from = cloud.origin - transform.translation;
         let place = |i: usize| back * (from + cloud.position[i].as_dvec3()) / transform.scale;
         let n = cloud.position.len();
         let values: Vec<Option<f32>> =
             (0..n).into_par_iter().with_min_len(CHUNK).map(|i| self.value(place(i))).collect();
         if n > 0 && values.iter().all(Option::is_none) {
-            let (known, surface) = (self.field.bounds(), DAabb::of_points((0..n).map(place)));
+            let known = self.field.bounds();
+            let surface = DAabb::of_points((0..n).map(place));
             let [[a, b], [c, d]] = [known, surface].map(|b| [b.min, b.max]);
             let found = format!("known from {a} to {b} alone, and the surface lies from {c} to {d}");
             return Err(params.bad_text(
@@ -136,7 +138,8 @@ fn area(cloud: &Cloud, i: usize) -> f64 {
 
 /// Leaves a splat a share of the opacity that its surface has.
 fn fade(cloud: &mut Cloud, i: usize, share: f64) {
-    let (area, n) = (area(cloud, i), cloud.position.len());
+    let area = area(cloud, i);
+    let n = cloud.position.len();
     let opacity = match (cloud.kind[i], cloud.crossing_depth.get(i)) {
         (SplatKind::Opaque, _) => 1.0,
         (_, Some(depth)) if *depth > 0.0 => optics::opacity(f64::from(*depth)),

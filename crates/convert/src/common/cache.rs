@@ -174,7 +174,8 @@ fn read<T: Pod>(file: &Path, key: &[u8; 32], count: usize) -> io::Result<Option<
         return Err(damaged());
     }
     let mut opened = File::open(file)?;
-    let (mut head, mut numbers) = ([0; HEAD], bytemuck::try_zeroed_vec::<T>(count).map_err(|()| damaged())?);
+    let mut head = [0; HEAD];
+    let mut numbers = bytemuck::try_zeroed_vec::<T>(count).map_err(|()| damaged())?;
     opened.read_exact(&mut head)?;
     opened.read_exact(bytemuck::cast_slice_mut(&mut numbers))?;
     let (magic, rest) = head.split_at(MAGIC.len());

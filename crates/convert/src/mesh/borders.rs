@@ -35,7 +35,8 @@ pub(crate) fn open_edges(mesh: &Mesh) -> Vec<[u32; 2]> {
     let open: Vec<[u32; 2]> =
         edges.chunk_by(|a, b| a == b).filter(|same| same.len() == 1).map(|same| same[0]).collect();
     drop(edges);
-    let (mut first, mut places) = (HashMap::new(), HashMap::new());
+    let mut first = HashMap::new();
+    let mut places = HashMap::new();
     for &v in open.iter().flatten() {
         // −0 is 0.
         let place = (mesh.position[v as usize] + Vec3::ZERO).to_array().map(f32::to_bits);
@@ -91,7 +92,8 @@ impl Borders {
 
     /// The first semi-axis of the disc at `position` and the length of the second; `None` where no border is near.
     fn ellipse(&self, position: Vec3, normal: Vec3, radius: f32) -> Option<(DVec3, f64)> {
-        let (p, n) = (position.as_dvec3(), normal.as_dvec3());
+        let p = position.as_dvec3();
+        let n = normal.as_dvec3();
         let whole = f64::from(radius * CORE);
         let overlap = OVERLAP * whole;
         // Ways into the surface from borders near, and how far.
@@ -114,7 +116,8 @@ impl Borders {
         let along = n.cross(way).normalize();
         let mut length = whole;
         for (distance, other) in &near {
-            let (over, beside) = (across * other.dot(way), other.dot(along).abs());
+            let over = across * other.dot(way);
+            let beside = other.dot(along).abs();
             // The same border, or one behind it.
             if beside < LEAST_TURN {
                 continue;
@@ -156,7 +159,8 @@ mod tests {
     #[test]
     fn cores_end_at_every_border_near_them() {
         let corner = Borders::new([[Vec3::ZERO, Vec3::X], [Vec3::Y, Vec3::ZERO]]);
-        let (whole, least) = (0.1, 0.01);
+        let whole = 0.1;
+        let least = 0.01;
         for (x, y) in [(0.05, 0.03), (0.02, 0.09), (0.5, 0.06), (0.07, 0.07), (0.001, 0.04), (0.3, 0.0)] {
             let (first, second) = corner.ellipse(Vec3::new(x, y, 0.0), Vec3::Z, whole / CORE).unwrap();
             let core = f64::from(CORE);

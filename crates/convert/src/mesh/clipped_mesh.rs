@@ -63,7 +63,8 @@ pub(crate) fn cut(mesh: Mesh, normal: DVec3, offset: f64, mut rims: Option<&mut 
         }
         let mut corners = Vec::with_capacity(4);
         for k in 0..3 {
-            let (a, b) = (triangle[k], triangle[(k + 1) % 3]);
+            let a = triangle[k];
+            let b = triangle[(k + 1) % 3];
             let [from_a, from_b] = [a, b].map(|v| beyond[v as usize]);
             if from_a <= 0.0 {
                 let (vertex, place) = part.corner([a, a], 0.0);
@@ -182,7 +183,8 @@ mod tests {
 
     #[test]
     fn parts_on_both_sides_add_up_and_share_their_border_exactly() {
-        let (ball, plane) = (ball(24, DVec3::new(1e7, -3e6, 5.0)), DVec3::new(0.48, 0.6, 0.64));
+        let ball = ball(24, DVec3::new(1e7, -3e6, 5.0));
+        let plane = DVec3::new(0.48, 0.6, 0.64);
         let offset = plane.dot(ball.origin) + 0.2;
         let inside = clipped(&ball, &[Clip::HalfSpace { normal: plane, offset }]);
         let outside = clipped(&ball, &[Clip::HalfSpace { normal: -plane, offset: -offset }]);
@@ -202,7 +204,8 @@ mod tests {
     fn a_shift_and_a_power_of_two_change_no_bit_but_the_scale() {
         let at = DVec3::new(1e7, 0.0, -1e7);
         let half = |mesh: &Mesh, place: f64| clipped(mesh, &[Clip::HalfSpace { normal: DVec3::X, offset: place }]);
-        let (near, far) = (half(&ball(8, DVec3::ZERO), 0.375), half(&ball(8, at), at.x + 0.375));
+        let near = half(&ball(8, DVec3::ZERO), 0.375);
+        let far = half(&ball(8, at), at.x + 0.375);
         assert_eq!((&near.position, &near.triangles), (&far.position, &far.triangles));
         let mut large = ball(8, DVec3::ZERO);
         large.position.iter_mut().for_each(|p| *p *= 1024.0);

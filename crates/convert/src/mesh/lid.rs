@@ -37,7 +37,8 @@ pub struct LidReport {
 impl LidReport {
     /// What there is to say of it, one sentence each without a full stop: that the mesh is open where it is cut.
     pub fn said(&self) -> impl Iterator<Item = String> {
-        let (open, bridged) = (counted(self.open, "outline"), counted(self.bridged, "small gap"));
+        let open = counted(self.open, "outline");
+        let bridged = counted(self.bridged, "small gap");
         let open = format!("`clip` leaves {open} of it without a lid: the mesh is open there");
         let bridged = format!("lids of `clip` bridge {bridged} of the mesh");
         [(self.open, open), (self.bridged, bridged)].into_iter().filter(|(n, _)| *n > 0).map(|(_, said)| said)
@@ -108,7 +109,9 @@ struct Edge {
 impl Outlines {
     /// Edges that two triangles have, one each way, are none.
     fn of(mesh: &Mesh, edges: &[[Rim; 2]]) -> Self {
-        let (mut rims, mut known, mut times) = (Vec::new(), HashMap::new(), BTreeMap::new());
+        let mut rims = Vec::new();
+        let mut known = HashMap::new();
+        let mut times = BTreeMap::new();
         let mut number = |rim: Rim| {
             // −0 is 0.
             let place = (mesh.position[rim.vertex as usize] + Vec3::ZERO).to_array().map(f32::to_bits);
@@ -137,7 +140,8 @@ impl Outlines {
         let part: Vec<usize> = (0..self.rims.len()).map(|rim| root(&mut parent, rim)).collect();
         let mut length = vec![0.0; self.rims.len()];
         self.edges.iter().for_each(|edge| length[part[edge.ends[0]]] += self.distance(edge.ends));
-        let (surplus, mut ends) = (self.surplus(), BTreeMap::new());
+        let surplus = self.surplus();
+        let mut ends = BTreeMap::new();
         for rim in (0..surplus.len()).filter(|rim| surplus[*rim] % 2 != 0) {
             ends.entry(part[rim]).or_insert_with(Vec::new).push(rim);
         }

@@ -227,7 +227,8 @@ pub fn flatten_leaning(mesh: &mut Mesh, least: f64) {
     }
     for i in 0..mesh.triangles.len() {
         let [ids, own] = [mesh.triangles[i].map(|v| v as usize), [0, 1, 2].map(|k| mesh.position.len() + k)];
-        let (normals, plane) = (ids.map(|v| mesh.normal[v]), plane(mesh, i).as_vec3());
+        let normals = ids.map(|v| mesh.normal[v]);
+        let plane = plane(mesh, i).as_vec3();
         if !leans(normals, plane) || subdivide::measure(corners(mesh, &mesh.triangles[i])).area <= least {
             continue;
         }

@@ -226,9 +226,11 @@ impl Corners {
     /// Writes the pieces of a run from piece `skip` on.
     #[inline(always)]
     fn write_run(&self, run: &Run, skip: f32, range: Range<usize>, target: &mut Target<'_>) {
-        let (start, step) = (run.start.as_vec3(), run.step.as_vec3());
+        let start = run.start.as_vec3();
+        let step = run.step.as_vec3();
         let line = |v: &[Vec3; 3]| {
-            let (e1, e2) = (v[1] - v[0], v[2] - v[0]);
+            let e1 = v[1] - v[0];
+            let e2 = v[2] - v[0];
             (v[0] + e1 * start.y + e2 * start.z, e1 * step.y + e2 * step.z)
         };
         let (from, along) = line(&self.position);

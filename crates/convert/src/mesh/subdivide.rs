@@ -41,7 +41,8 @@ pub(crate) struct Measure {
 pub(crate) fn measure(v: [DVec3; 3]) -> Measure {
     let edge_sq = [0, 1, 2].map(|i| (v[(i + 2) % 3] - v[(i + 1) % 3]).length_squared());
     let apex = (0..3).fold(0, |a, i| if edge_sq[i] > edge_sq[a] { i } else { a });
-    let (p, q) = (v[(apex + 1) % 3], v[(apex + 2) % 3]);
+    let p = v[(apex + 1) % 3];
+    let q = v[(apex + 2) % 3];
     let area = 0.5 * robust_cross(q - p, v[apex] - p).length();
     let longest_sq = edge_sq[apex];
     if area <= DEGENERATE * longest_sq {
@@ -113,7 +114,9 @@ pub(crate) fn split(m: &Measure, spacing: f64) -> Split {
         m.foot
     };
     let unit = |i: usize| DVec3::AXES[i % 3];
-    let (p, q, apex) = (unit(m.apex + 1), unit(m.apex + 2), unit(m.apex));
+    let p = unit(m.apex + 1);
+    let q = unit(m.apex + 2);
+    let apex = unit(m.apex);
     let corner = p * (1.0 - foot) + q * foot;
     let half = |end: DVec3, share: f64| {
         let base = share * length;
@@ -159,10 +162,12 @@ impl Split {
 
 /// Row i/2 of k: upright pieces for even i, upside-down ones for odd i.
 fn congruent_run(k: u32, i: u32) -> Run {
-    let (row, k_f) = (f64::from(i / 2), f64::from(k));
+    let row = f64::from(i / 2);
+    let k_f = f64::from(k);
     let (count, third) = if i.is_multiple_of(2) { (k - i / 2, 1.0 / 3.0) } else { (k - 1 - i / 2, 2.0 / 3.0) };
     // Weights of corner 0 are what the other two leave, so they sum to 1.
-    let (w1, w2) = (third / k_f, (row + third) / k_f);
+    let w1 = third / k_f;
+    let w2 = (row + third) / k_f;
     Run {
         start: DVec3::new(1.0 - w1 - w2, w1, w2),
         step: DVec3::new(-1.0 / k_f, 1.0 / k_f, 0.0),
@@ -180,9 +185,11 @@ impl Half {
 
     fn run(&self, i: u32) -> Run {
         let n = f64::from(self.strips);
-        let (x0, x1) = (f64::from(i) / n, f64::from(i + 1) / n);
+        let x0 = f64::from(i) / n;
+        let x1 = f64::from(i + 1) / n;
         // The strip is a trapezoid whose parallel sides are 1 − x0 and 1 − x1 short legs long.
-        let (side0, side1) = (1.0 - x0, 1.0 - x1);
+        let side0 = 1.0 - x0;
+        let side1 = 1.0 - x1;
         let x = x0 + (x1 - x0) * (side0 + 2.0 * side1) / (3.0 * (side0 + side1));
         let count = self.pieces(i);
         let rise = (1.0 - x) / f64::from(count);
@@ -218,7 +225,9 @@ mod tests {
             let m = measure(v);
             for spacing in [0.05, 0.3, 2.0, 50.0] {
                 let split = split(&m, spacing);
-                let (mut area, mut moment, mut count) = (0.0, DVec3::ZERO, 0u64);
+                let mut area = 0.0;
+                let mut moment = DVec3::ZERO;
+                let mut count = 0u64;
                 for run in (0..split.runs()).map(|i| split.run(i)) {
                     assert!(run.share * m.area <= spacing * spacing * (1.0 + 1e-12));
                     for j in 0..run.count {

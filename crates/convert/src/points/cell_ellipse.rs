@@ -33,7 +33,8 @@ fn moments<'a>(lines: &'a Lines, area: &Eight, i: usize) -> (Option<[f64; 3]>, i
     let mut sums = [0.0; 3];
     for [a, b] in lines.sides(i) {
         // Of the triangle between the point and a side.
-        let (c, share) = (a + b, a.perp_dot(b).abs() / 24.0);
+        let c = a + b;
+        let share = a.perp_dot(b).abs() / 24.0;
         let both = |f: &dyn Fn(DVec2) -> f64| share * (f(a) + f(b) + f(c));
         let found = [both(&|p| p.x * p.x), both(&|p| p.y * p.y), both(&|p| p.x * p.y)];
         (0..3).for_each(|k| sums[k] += found[k]);
@@ -44,7 +45,8 @@ fn moments<'a>(lines: &'a Lines, area: &Eight, i: usize) -> (Option<[f64; 3]>, i
 
 /// Unit vector along the greater eigenvalue, and both; `None` where they are alike.
 fn axes([xx, yy, xy]: [f64; 3]) -> Option<(DVec2, [f64; 2])> {
-    let (mean, half) = (0.5 * (xx + yy), 0.5 * (xx - yy));
+    let mean = 0.5 * (xx + yy);
+    let half = 0.5 * (xx - yy);
     let apart = (half * half + xy * xy).sqrt();
     if apart <= ROUND * mean {
         return None;

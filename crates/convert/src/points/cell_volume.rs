@@ -45,7 +45,8 @@ pub(crate) fn cell_volumes(distinct: &[Vec3], progress: &Progress) -> Result<Vec
     if distinct.len() < 2 {
         return Ok(vec![f64::INFINITY; distinct.len()]);
     }
-    let (tree, rays) = (Tree::new(distinct), rays());
+    let tree = Tree::new(distinct);
+    let rays = rays();
     let mut volumes = vec![0.0; distinct.len()];
     volumes.par_chunks_mut(LEAVES * WIDTH).enumerate().for_each(|(c, out)| {
         if progress.tick(out.len() as u64).is_ok() {
@@ -81,13 +82,15 @@ impl pulp::NullaryFnOnce for Task<'_> {
 
     #[inline(always)]
     fn call(self) {
-        let (mut nearest, mut stack) = (Nearest::default(), [Waiting::default(); MAX_WAITING]);
+        let mut nearest = Nearest::default();
+        let mut stack = [Waiting::default(); MAX_WAITING];
         let mut bounds = [[[0.0; WIDTH]; 3]; NEIGHBOURS];
         let count = NEIGHBOURS.min(self.distinct.len() - 1);
         for (l, out) in self.out.chunks_mut(WIDTH).enumerate() {
             let leaf = self.first + l;
             self.tree.nearest(leaf, NEIGHBOURS, &mut nearest, &mut stack);
-            let (first, mut units) = (self.tree.points_of(leaf).start, [0.0; WIDTH]);
+            let first = self.tree.points_of(leaf).start;
+            let mut units = [0.0; WIDTH];
             for slot in 0..WIDTH {
                 // Lanes without a point are those of the first again.
                 let lane = if slot < out.len() { slot } else { 0 };
@@ -134,7 +137,8 @@ fn mean_cubes(bounds: &[[Lanes; 3]], rays: &[Vec3; PAIRS]) -> Lanes {
     }
     // How many directions count, and the sum of t³: of all, and of those of each pair that lead to the neighbours. Orbits are summed by themselves, so
     // that f32 rounds short sums.
-    let (mut all, mut half) = ([[0.0; WIDTH]; 2], [[0.0; WIDTH]; 2]);
+    let mut all = [[0.0; WIDTH]; 2];
+    let mut half = [[0.0; WIDTH]; 2];
     for orbit in rays.chunks_exact(ORBIT) {
         let mut all_of_orbit = [[0.0; WIDTH]; 2];
         let mut half_of_orbit = [[0.0; WIDTH]; 2];
@@ -150,7 +154,8 @@ fn mean_cubes(bounds: &[[Lanes; 3]], rays: &[Vec3; PAIRS]) -> Lanes {
             }
             for i in 0..WIDTH {
                 let leads = ray.x * inwards[0][i] + ray.y * inwards[1][i] + ray.z * inwards[2][i] >= 0.0;
-                let ([is_ahead, before], [is_behind, after]) = (cubed(ahead[i]), cubed(behind[i]));
+                let [is_ahead, before] = cubed(ahead[i]);
+                let [is_behind, after] = cubed(behind[i]);
                 all_of_orbit[0][i] += is_ahead + is_behind;
                 all_of_orbit[1][i] += before + after;
                 // Where the direction that leads to the neighbours is open, the opposite one stands for it.

@@ -123,7 +123,8 @@ pub(crate) fn unused_by_discs(
 ) -> Vec<String> {
     let has = |name: &str| points.own_column(name).is_some();
     let mut said = Vec::new();
-    let (radius, missing) = (has(RADIUS), TANGENT.into_iter().find(|name| !has(name)));
+    let radius = has(RADIUS);
+    let missing = TANGENT.into_iter().find(|name| !has(name));
     let tangent = TANGENT.into_iter().find(|name| has(name));
     match (tangent, missing) {
         (Some(name), Some(missing)) => said.push(format!("`{name}` is not used: a tangent has `{missing}` too")),

@@ -237,7 +237,8 @@ impl Merged {
             let starts = (0..=ids.len() as u32).collect();
             return Self { ids, starts };
         };
-        let (mut ids, mut starts): (Vec<u32>, Vec<u32>) = (Vec::new(), Vec::new());
+        let mut ids: Vec<u32> = Vec::new();
+        let mut starts: Vec<u32> = Vec::new();
         for cell in thin::cells(points, spacing).chunk_by(|a, b| a.0 == b.0) {
             let start = ids.len();
             ids.extend(cell.iter().map(|(_, i)| *i).filter(absorbs));
@@ -262,7 +263,8 @@ fn emit(
     cells: &[PointCell],
     merged: &Merged,
 ) -> Result<Cloud, ConvertError> {
-    let (p, t) = (&params.splat, &params.splat.transform);
+    let p = &params.splat;
+    let t = &params.splat.transform;
     let mut cloud = Cloud::new(t.apply(points.origin));
     columns::size_columns(&mut cloud, merged.len(), SplatKind::Medium, wanted(points, params), p)?;
     let matter = OfMatter::new(points);
@@ -278,7 +280,9 @@ fn emit(
             let ids = merged.points_of(splat);
             let total: f64 = ids.iter().map(|i| amount(*i as usize)).sum();
             let volume: f64 = ids.iter().map(|i| cells[*i as usize].volume).sum();
-            let (mut place, mut tint, mut mean_reach) = (DVec3::ZERO, DVec3::ZERO, 0.0);
+            let mut place = DVec3::ZERO;
+            let mut tint = DVec3::ZERO;
+            let mut mean_reach = 0.0;
             for i in ids.iter().map(|i| *i as usize) {
                 let share = amount(i) / total;
                 let own = points.color.get(i).filter(|_| params.colors).unwrap_or(&p.color);

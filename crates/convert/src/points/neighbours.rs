@@ -169,7 +169,8 @@ impl Tree {
         nearest.tighten();
         let mut place = leaf;
         for (level, nodes) in self.levels.iter().enumerate() {
-            let (node, own) = (place / WIDTH, place % WIDTH);
+            let node = place / WIDTH;
+            let own = place % WIDTH;
             let distances = nodes[node].distances_squared(nearest.bounds);
             let waiting = |slot: usize| Waiting {
                 distance_squared: distances[slot],
@@ -241,7 +242,9 @@ impl Nearest {
         let [px, py, pz] = leaf.at.map(|c| c[slot]);
         let mut distances = [0.0; WIDTH];
         for i in 0..WIDTH {
-            let (x, y, z) = (px - self.query[0][i], py - self.query[1][i], pz - self.query[2][i]);
+            let x = px - self.query[0][i];
+            let y = py - self.query[1][i];
+            let z = pz - self.query[2][i];
             distances[i] = x * x + y * y + z * z;
         }
         distances
@@ -312,7 +315,8 @@ mod tests {
     }
 
     fn check(points: &[Vec3], k: usize) {
-        let (tree, mut nearest) = (Tree::new(points), Nearest::default());
+        let tree = Tree::new(points);
+        let mut nearest = Nearest::default();
         let mut stack = [Waiting::default(); MAX_WAITING];
         for i in 0..points.len() {
             let key = |j: usize| (points[i].distance_squared(points[j]).to_bits(), j as u32);
@@ -347,7 +351,8 @@ mod tests {
         let points: Vec<Vec3> = (0..40).map(|i| Vec3::new(i as f32, 0.3 * (i * i % 7) as f32, 0.0)).collect();
         let all = |factor: f32| {
             let scaled: Vec<Vec3> = points.iter().map(|p| *p * factor).collect();
-            let (tree, mut nearest) = (Tree::new(&scaled), Nearest::default());
+            let tree = Tree::new(&scaled);
+            let mut nearest = Nearest::default();
             let mut stack = [Waiting::default(); MAX_WAITING];
             let mut of = |i: usize| {
                 tree.nearest(i / WIDTH, 5, &mut nearest, &mut stack);

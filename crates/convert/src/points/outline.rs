@@ -51,14 +51,17 @@ const SEEN: f32 = 2.0;
 fn around(cloud: &Cloud, i: usize) -> [DVec3; 8] {
     let middle = cloud.origin + cloud.position[i].as_dvec3();
     let share = if cloud.kind[i] == SplatKind::Opaque { Footprint::CORE } else { SEEN / Footprint::default().cutoff };
-    let (normal, tangent, radius) = (cloud.normal_of(i), cloud.tangent_of(i), share * cloud.radius[i]);
+    let normal = cloud.normal_of(i);
+    let tangent = cloud.tangent_of(i);
+    let radius = share * cloud.radius[i];
     if normal == Vec3::ZERO {
         return DAabb::around(middle, DVec3::splat(radius.into())).corners();
     }
     let is_round = tangent == Vec3::ZERO;
     let first = if is_round { normal.any_orthonormal_vector() * radius } else { share * tangent };
     let second = normal.cross(first.normalize()) * radius;
-    let (sin, cos) = (std::f32::consts::FRAC_1_SQRT_2, libm::cosf(std::f32::consts::FRAC_PI_8));
+    let sin = std::f32::consts::FRAC_1_SQRT_2;
+    let cos = libm::cosf(std::f32::consts::FRAC_PI_8);
     let corners =
         [(1.0, 0.0), (sin, sin), (0.0, 1.0), (-sin, sin), (-1.0, 0.0), (-sin, -sin), (0.0, -1.0), (sin, -sin)];
     corners.map(|(s, t)| middle + ((s * first + t * second) / cos).as_dvec3())
@@ -87,7 +90,8 @@ mod tests {
         };
         let disc = Splat { radius: 2.0, normal: Vec3::new(0.6, 0.0, 0.8), kind: SplatKind::Opaque, ..Splat::default() };
         holds(disc, Vec3::new(1.6, 2.0, 1.2));
-        let (normal, tangent) = (Vec3::Z, Vec3::new(3.0, 3.0, 0.0));
+        let normal = Vec3::Z;
+        let tangent = Vec3::new(3.0, 3.0, 0.0);
         let ellipse = Splat { radius: 1.0, normal, tangent, kind: SplatKind::Surface, ..Splat::default() };
         holds(ellipse, Vec3::new(9.5f32.sqrt(), 9.5f32.sqrt(), 0.0));
         holds(Splat { radius: 2.0, kind: SplatKind::Medium, ..Splat::default() }, Vec3::splat(2.0));

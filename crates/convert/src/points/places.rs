@@ -96,7 +96,8 @@ impl pulp::NullaryFnOnce for Task<'_> {
 
     #[inline(always)]
     fn call(self) -> Vec<u32> {
-        let (mut kept, mut nearest) = (Vec::new(), Nearest::default());
+        let mut kept = Vec::new();
+        let mut nearest = Nearest::default();
         let mut stack = [Waiting::default(); MAX_WAITING];
         let mut offsets = [[[0.0; WIDTH]; 3]; MAX_NEIGHBOURS];
         let count = self.params.neighbours.min(self.distinct.len() - 1);
@@ -145,7 +146,8 @@ fn leaf_places(offsets: &[Offset], params: &SurfelParams, out: &mut [Place]) {
     for (i, out) in out.iter_mut().enumerate() {
         let (area, root) = (cells.area[i], cells.area[i].sqrt());
         let spacing = (std::f64::consts::SQRT_2 * cells.reach[i]).clamp(root, 2.0 * root);
-        let (normal, plane) = (normals[i].as_vec3(), planes[i].is_some().into());
+        let normal = normals[i].as_vec3();
+        let plane = planes[i].is_some().into();
         let (long, across) = match params.shape {
             DiscShape::Round => (Vec3::ZERO, 0.0),
             DiscShape::Elliptical => {

@@ -412,7 +412,8 @@ fn emit(
         (&mut cloud.position, &mut cloud.normal, &mut cloud.radius, &mut cloud.cross_section, &mut cloud.color);
     columns.into_par_iter().zip(&surfels).with_min_len(CHUNK).for_each(
         |((position, normal, radius, cross_section, color), &(place, point, sharers))| {
-            let (disc, i) = (disc_of(place, point), point as usize);
+            let disc = disc_of(place, point);
+            let i = point as usize;
             *position = (t.rotation * (points.position[i].as_dvec3() * t.scale)).as_vec3();
             *normal = t.rotate(normal_of(place, point).as_dvec3()).as_vec3();
             *radius = disc.radius as f32;

@@ -107,8 +107,12 @@ impl Symmetric {
         let Self { diagonal: [xx, yy, zz], mixed: [yz, zx, xy] } = self;
         let [mut trace, mut minors, mut determinant] = [[0.0; WIDTH]; 3];
         for i in 0..WIDTH {
-            let (x, y, z) = (xx[i], yy[i], zz[i]);
-            let (a, b, c) = (yz[i] * yz[i], zx[i] * zx[i], xy[i] * xy[i]);
+            let x = xx[i];
+            let y = yy[i];
+            let z = zz[i];
+            let a = yz[i] * yz[i];
+            let b = zx[i] * zx[i];
+            let c = xy[i] * xy[i];
             trace[i] = x + y + z;
             minors[i] = (y * z - a) + (z * x - b) + (x * y - c);
             determinant[i] = x * (y * z - a) + 2.0 * (yz[i] * zx[i] * xy[i]) - (y * b + z * c);
@@ -137,8 +141,9 @@ impl Symmetric {
         let Self { diagonal: [xx, yy, zz], mixed: [yz, zx, xy] } = self;
         let mut columns = [[0.0; WIDTH]; 3];
         for i in 0..WIDTH {
-            let (x, y, z) =
-                (yy[i] * zz[i] - yz[i] * yz[i], zz[i] * xx[i] - zx[i] * zx[i], xx[i] * yy[i] - xy[i] * xy[i]);
+            let x = yy[i] * zz[i] - yz[i] * yz[i];
+            let y = zz[i] * xx[i] - zx[i] * zx[i];
+            let z = xx[i] * yy[i] - xy[i] * xy[i];
             let a = zx[i] * xy[i] - xx[i] * yz[i];
             let b = xy[i] * yz[i] - yy[i] * zx[i];
             let c = yz[i] * zx[i] - zz[i] * xy[i];

@@ -138,9 +138,12 @@ impl Lines {
         let [mut low, mut high] = [[-FAR; WIDTH], [FAR; WIDTH]];
         for other in 0..self.count {
             // Copies: a compiler cannot see that lines of two indices lie apart.
-            let (p, mut p_low, mut p_high) = (self.q[other], self.low[other], self.high[other]);
+            let p = self.q[other];
+            let mut p_low = self.low[other];
+            let mut p_high = self.high[other];
             for i in 0..WIDTH {
-                let (dx, dy) = (q[0][i] - p[0][i], q[1][i] - p[1][i]);
+                let dx = q[0][i] - p[0][i];
+                let dy = q[1][i] - p[1][i];
                 let cross = p[0][i] * dy - p[1][i] * dx;
                 let cross = if cross.abs() < NOTHING { NOTHING } else { cross };
                 let half = 0.5 / cross;
@@ -181,7 +184,8 @@ impl Lines {
         for line in 0..self.count {
             for i in 0..WIDTH {
                 let [x, y] = [self.q[line][0][i], self.q[line][1][i]];
-                let (low, high) = (self.low[line][i], self.high[line][i]);
+                let low = self.low[line][i];
+                let high = self.high[line][i];
                 let squared = x * x + y * y;
                 area[i] += 0.25 * squared * greater(high - low, 0.0);
                 let corner = squared * (0.25 + greater(low * low, high * high));
@@ -256,8 +260,10 @@ mod tests {
                 let beyond = |c: &[f64; 2]| c[0] * q[0] + c[1] * q[1] - 0.5 * (q[0] * q[0] + q[1] * q[1]);
                 let n = corners.len();
                 let edge = |k: usize| {
-                    let (a, b) = (corners[k], corners[(k + 1) % n]);
-                    let (d, e) = (beyond(&a), beyond(&b));
+                    let a = corners[k];
+                    let b = corners[(k + 1) % n];
+                    let d = beyond(&a);
+                    let e = beyond(&b);
                     let cut = || [a[0] + (b[0] - a[0]) * d / (d - e), a[1] + (b[1] - a[1]) * d / (d - e)];
                     [(d <= 0.0).then_some(a), ((d <= 0.0) != (e <= 0.0)).then(cut)]
                 };

@@ -28,7 +28,8 @@ pub(crate) fn to_cloud(points: &RawPoints, params: &SurfelParams) -> Result<Clou
     let mut cloud = points.ready.cloud.clone();
     cloud.origin = t.apply(cloud.origin);
     if t.scale != 1.0 || t.rotation != DQuat::IDENTITY {
-        let (length, area) = (t.scale as f32, (t.scale * t.scale) as f32);
+        let length = t.scale as f32;
+        let area = (t.scale * t.scale) as f32;
         cloud.position.iter_mut().for_each(|p| *p = (t.rotation * (p.as_dvec3() * t.scale)).as_vec3());
         cloud.radius.iter_mut().for_each(|radius| *radius *= length);
         cloud.cross_section.iter_mut().for_each(|k| *k *= area);
@@ -56,7 +57,8 @@ fn check_footprints(points: &RawPoints, params: &SurfelParams) -> Result<(), Con
         let expected = "a formula: splats of a file are of one";
         return Err(params.splat.bad_text("footprint", "an image".to_owned(), expected));
     }
-    let (cutoffs, own) = (&points.ready.cutoffs, params.splat.profile.cutoff);
+    let cutoffs = &points.ready.cutoffs;
+    let own = params.splat.profile.cutoff;
     let cutoff = |footprint: &u8| cutoffs.get(usize::from(*footprint)).copied().unwrap_or_default();
     match points.ready.cloud.footprint.iter().map(cutoff).find(|cutoff| *cutoff != own) {
         Some(other) => {

@@ -36,7 +36,8 @@ pub(crate) fn to_cloud(points: &RawPoints, params: &SurfelParams) -> Result<Clou
     columns.into_par_iter().enumerate().with_min_len(CHUNK).for_each(
         |(i, ((position, radius, cross_section), (color, tangent, gaussian)))| {
             *position = (t.rotation * (points.position[i].as_dvec3() * t.scale)).as_vec3();
-            let (axes, opacity) = (&gaussians.axes[i], gaussians.opacity[i]);
+            let axes = &gaussians.axes[i];
+            let opacity = gaussians.opacity[i];
             let [r, k] = ball(axes, opacity.min(Gaussians::MOST_OPACITY), &splat.profile);
             (*radius, *cross_section) = ((r as f32).max(f32::MIN_POSITIVE), k as f32);
             *color = gaussians.mean_color(i);
@@ -69,7 +70,8 @@ fn reach(opacity: f32) -> f32 {
 
 /// Radius and cross-section of the ball that stands for it.
 fn ball(axes: &[Vec3; 3], opacity: f32, profile: &Footprint) -> [f64; 2] {
-    let (opacity, spread) = (f64::from(opacity), 2.0 * PI * ball_deviation(axes).powi(2));
+    let opacity = f64::from(opacity);
+    let spread = 2.0 * PI * ball_deviation(axes).powi(2);
     let depth = optics::optical_depth(opacity);
     let cross_section = spread * dilogarithm(opacity);
     let share = if depth > 0.0 { cross_section / depth } else { spread };

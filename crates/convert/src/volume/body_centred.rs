@@ -63,7 +63,9 @@ fn sizes(points: [usize; 3]) -> [usize; 3] {
 fn values(grid: &Grid, dims: [usize; 3]) -> Vec<f32> {
     let [nx, ny, _] = grid.dims;
     let places = |axis: usize| [0.0, 0.5].map(|shift| taps(grid.dims[axis], dims, axis, shift));
-    let (columns, rows, planes) = (places(0), places(1), taps(grid.dims[2], dims, 2, 0.0));
+    let columns = places(0);
+    let rows = places(1);
+    let planes = taps(grid.dims[2], dims, 2, 0.0);
     let mut out = vec![0.0f32; dims.iter().product()];
     let buffers = || (vec![0.0f64; nx * ny], vec![0.0f64; nx]);
     out.par_chunks_mut(dims[0] * dims[1]).enumerate().for_each_init(buffers, |(plane, row), (k, out)| {
@@ -89,7 +91,8 @@ fn values(grid: &Grid, dims: [usize; 3]) -> Vec<f32> {
 
 /// Taps of all places along an axis with `points` points, in planes that are shifted so far.
 fn taps(points: usize, dims: [usize; 3], axis: usize, shift: f64) -> Vec<Taps> {
-    let (step, lowest) = (points as f64 / dims[axis] as f64, Packing::BodyCentred.lowest()[axis]);
+    let step = points as f64 / dims[axis] as f64;
+    let lowest = Packing::BodyCentred.lowest()[axis];
     (0..dims[axis]).map(|i| Taps::new((i as f64 + shift - lowest) * step - 0.5, points)).collect()
 }
 

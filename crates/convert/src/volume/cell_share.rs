@@ -35,7 +35,8 @@ fn below(normal: DVec3, distance: f64) -> f64 {
         return if distance > 0.0 { 1.0 } else { 0.0 };
     }
     let largest = all.into_iter().fold(0.0, f64::max);
-    let (mut a, mut n) = ([0.0; 3], 0);
+    let mut a = [0.0; 3];
+    let mut n = 0;
     for component in all.into_iter().filter(|c| *c > FLAT * largest) {
         a[n] = component / largest;
         n += 1;

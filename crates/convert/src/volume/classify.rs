@@ -63,7 +63,8 @@ impl<'a> Classes<'a> {
         let mut pieces = vec![constant(knots[0], [0.0; 4], &points[0])];
         let mut sum = [0.0; 4];
         for pair in points.windows(2) {
-            let ((s0, c0), (s1, c1)) = (four(&pair[0]), four(&pair[1]));
+            let (s0, c0) = four(&pair[0]);
+            let (s1, c1) = four(&pair[1]);
             let base = f64::from(pair[0].value);
             let width = f64::from(pair[1].value) - base;
             let slope = (s1 - s0) / width;
@@ -81,7 +82,8 @@ impl<'a> Classes<'a> {
         let last = points.len() - 1;
         pieces.push(constant(knots[last], sum, &points[last]));
         let bend = |k: usize| {
-            let (left, right) = (&pieces[k], &pieces[k + 1]);
+            let left = &pieces[k];
+            let right = &pieces[k + 1];
             let d = knots[k] - left.base;
             let slopes = (0..4).map(|i| (2.0 * right.c[i] - 2.0 * left.c[i] - 6.0 * left.e[i] * d).abs());
             slopes.fold(0.0, f64::max)
@@ -138,7 +140,8 @@ impl<'a> Classes<'a> {
             return None;
         }
         let nodes = nodes(lattice, voxel);
-        let (mut low, mut high) = (nodes[1][1][1], nodes[1][1][1]);
+        let mut low = nodes[1][1][1];
+        let mut high = nodes[1][1][1];
         for v in nodes.as_flattened().as_flattened() {
             (low, high) = (lesser(*v, low), greater(*v, high));
         }
@@ -179,12 +182,14 @@ impl<'a> Classes<'a> {
         let lines: Nodes = std::array::from_fn(|b| std::array::from_fn(|a| turned(b, a)));
         let mut sum = [0.0; 4];
         for i in 0..Q * Q {
-            let ((a, s), (b, t)) = (place::<Q>(i % Q), place::<Q>(i / Q));
+            let (a, s) = place::<Q>(i % Q);
+            let (b, t) = place::<Q>(i / Q);
             let mix = |x: f64, y: f64, t: f64| x + (y - x) * t;
             let [low, high] = [&lines[b], &lines[b + 1]];
             let at = |m: usize| mix(mix(low[a][m], low[a + 1][m], s), mix(high[a][m], high[a + 1][m], s), t);
             let [v0, v1, v2] = [at(0), at(1), at(2)];
-            let (first, second) = (self.between(v0, v1), self.between(v1, v2));
+            let first = self.between(v0, v1);
+            let second = self.between(v1, v2);
             for c in 0..4 {
                 sum[c] += first[c] + second[c];
             }
@@ -198,15 +203,18 @@ impl<'a> Classes<'a> {
     /// The mean between two values.
     fn between(&self, a: f64, b: f64) -> Four {
         let (low, high) = if a < b { (a, b) } else { (b, a) };
-        let (first, last) = (self.piece(low), self.piece(high));
+        let first = self.piece(low);
+        let last = self.piece(high);
         if first == last {
             return self.pieces[first].mean(low, high);
         }
         // Whole pieces come from sums, parts of them from their own polynomial: nothing cancels.
-        let (rise, fall) = (self.knots[first] - low, high - self.knots[last - 1]);
+        let rise = self.knots[first] - low;
+        let fall = high - self.knots[last - 1];
         let head = self.pieces[first].mean(low, self.knots[first]);
         let tail = self.pieces[last].mean(self.knots[last - 1], high);
-        let (start, end) = (&self.pieces[first + 1].a, &self.pieces[last].a);
+        let start = &self.pieces[first + 1].a;
+        let end = &self.pieces[last].a;
         let mut mean = [0.0; 4];
         for i in 0..4 {
             mean[i] = (rise * head[i] + (end[i] - start[i]) + fall * tail[i]) / (high - low);
@@ -233,8 +241,10 @@ fn dark_until(points: &[TransferPoint]) -> Vec<f32> {
 impl Piece {
     /// The mean between two values of the piece.
     fn mean(&self, low: f64, high: f64) -> Four {
-        let (x, y) = (low - self.base, high - self.base);
-        let (first, second) = (x + y, x * x + x * y + y * y);
+        let x = low - self.base;
+        let y = high - self.base;
+        let first = x + y;
+        let second = x * x + x * y + y * y;
         let mut mean = [0.0; 4];
         for i in 0..4 {
             mean[i] = self.b[i] + self.c[i] * first + self.e[i] * second;

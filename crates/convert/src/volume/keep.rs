@@ -137,7 +137,8 @@ impl<'a> Keep<'a> {
                 range_of_rows(self.lattice, around(j, ny), around(k, nz), part, &mut rows);
                 let [low, high] = &rows;
                 for i in span {
-                    let (left, right) = (i.saturating_sub(1), (i + 1).min(nx - 1));
+                    let left = i.saturating_sub(1);
+                    let right = (i + 1).min(nx - 1);
                     let low = lesser(low[i], lesser(low[left], low[right]));
                     let high = greater(high[i], greater(high[left], high[right]));
                     if high > self.support[0] && low < self.support[1] {

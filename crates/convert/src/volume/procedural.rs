@@ -123,7 +123,10 @@ impl CloudShape {
     }
 
     fn turbulence(&self, noise: &Perlin, p: DVec3) -> f64 {
-        let (mut q, mut strength, mut sum, mut total) = (p * self.frequency, 1.0, 0.0, 0.0);
+        let mut q = p * self.frequency;
+        let mut strength = 1.0;
+        let mut sum = 0.0;
+        let mut total = 0.0;
         for octave in 0..self.octaves {
             // Shifted, so that the zeros of Perlin noise at whole coordinates do not fall together.
             let at = q + DVec3::new(0.37, 0.71, 0.19) * f64::from(octave + 1);

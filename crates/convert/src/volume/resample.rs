@@ -75,7 +75,8 @@ pub(crate) fn resample(grid: &Grid, dims: [usize; 3]) -> Grid {
     let columns: Vec<(usize, usize, f32)> = (0..dims[0]).map(|i| place(i, 0)).collect();
     let mut values = vec![0.0f32; dims[0] * dims[1] * dims[2]];
     values.par_chunks_mut(dims[0]).with_min_len(16).enumerate().for_each(|(row, out)| {
-        let ((j0, j1, v), (k0, k1, w)) = (place(row % dims[1], 1), place(row / dims[1], 2));
+        let (j0, j1, v) = place(row % dims[1], 1);
+        let (k0, k1, w) = place(row / dims[1], 2);
         let source = |j: usize, k: usize| &grid.values[(k * grid.dims[1] + j) * grid.dims[0]..][..grid.dims[0]];
         let [a, b, c, d] = [source(j0, k0), source(j1, k0), source(j0, k1), source(j1, k1)];
         let mix = |x: f32, y: f32, t: f32| x + (y - x) * t;

@@ -73,7 +73,8 @@ pub fn volume_section(
             progress.tick(1).map_err(|_| ConvertError::Cancelled)?;
         }
         let at = |i: f64, j: f64| center + u * (i * step - reach) + v * (j * step - reach);
-        let (i, j) = ((k % n as u64) as f64, (k / n as u64) as f64);
+        let i = (k % n as u64) as f64;
+        let j = (k / n as u64) as f64;
         let square = [at(i, j), at(i + 1.0, j), at(i + 1.0, j + 1.0), at(i, j + 1.0)];
         let polygon = within(square.to_vec(), |p| index * (p - grid.origin), last);
         let first = mesh.position.len() as u32;
@@ -101,7 +102,8 @@ fn within(mut polygon: Vec<DVec3>, coordinates: impl Fn(DVec3) -> DVec3, last: D
         let mut cut = Vec::with_capacity(polygon.len() + 1);
         for (k, &p) in polygon.iter().enumerate() {
             let next = polygon[(k + 1) % polygon.len()];
-            let (a, b) = (inside(p), inside(next));
+            let a = inside(p);
+            let b = inside(next);
             if a >= 0.0 {
                 cut.push(p);
             }
@@ -127,7 +129,8 @@ mod tests {
         let point = |value, red| TransferPoint { value, color: [red, 0.0, 1.0], extinction: 0.0 };
         let transfer = TransferFunction::new(vec![point(0.0, 0.0), point(3.0, 3.0)]).unwrap();
         let normal = DVec3::new(0.0, 1.0, 1.0).normalize();
-        let (center, splat) = (DVec3::splat(1.75), SplatParams::default());
+        let center = DVec3::splat(1.75);
+        let splat = SplatParams::default();
         let mesh =
             volume_section(grid.into(), &transfer, &Section { center, normal, spacing: 0.2 }, &splat, None).unwrap();
         let total = mesh.area();

@@ -130,7 +130,8 @@ pub fn rectangle(rectangle: &Rectangle, opacity: f64, params: &SplatParams) -> R
     cloud.reserve((nu * nv) as usize);
     for j in 0..nv as u64 {
         for i in 0..nu as u64 {
-            let (s, t) = ((2.0 * i as f64 + 1.0) / nu - 1.0, (2.0 * j as f64 + 1.0) / nv - 1.0);
+            let s = (2.0 * i as f64 + 1.0) / nu - 1.0;
+            let t = (2.0 * j as f64 + 1.0) / nv - 1.0;
             let offset = params.transform.rotate((u * s + v * t) * scale);
             cloud.push(&Splat { position: offset.as_vec3(), ..splat });
         }
@@ -177,7 +178,8 @@ impl Lattice {
         let bounds = medium.body.bounds();
         params.check()?;
         params.check_spacing(spacing * params.transform.scale)?;
-        let (DAabb { min, max }, extent) = (bounds, bounds.size());
+        let DAabb { min, max } = bounds;
+        let extent = bounds.size();
         if !bounds.is_solid() {
             return Err(params.bad("box", [min, max], "a lowest corner below the highest on every axis"));
         }
@@ -192,7 +194,8 @@ impl Lattice {
 
     /// The share of the cell around an offset from the middle of the box that all of the regions keep.
     pub(crate) fn cut(&self, clips: &[Clip]) -> impl Fn(DVec3) -> f64 + use<> {
-        let (shares, step) = (CellShares::new(clips, self.center, DMat3::from_diagonal(self.step)), self.step);
+        let shares = CellShares::new(clips, self.center, DMat3::from_diagonal(self.step));
+        let step = self.step;
         move |offset| shares.of(offset / step)
     }
 

@@ -86,7 +86,9 @@ impl<'a> Sobel<'a> {
         let columns = [m.x_axis, m.y_axis * factor_j, m.z_axis * factor_k];
         let [x, y, z] = [&rows.sum[0][..nx + 2], &rows.sum[1][..nx + 2], &rows.sum[2][..nx + 2]];
         let [gx, gy, gz] = &mut rows.gradient;
-        let (gx, gy, gz) = (&mut gx[..nx], &mut gy[..nx], &mut gz[..nx]);
+        let gx = &mut gx[..nx];
+        let gy = &mut gy[..nx];
+        let gz = &mut gz[..nx];
         for i in 0..nx {
             let dx = x[i + 2] - x[i];
             let dy = y[i] + y[i + 2] + (y[i + 1] + y[i + 1]);
@@ -153,10 +155,15 @@ impl Rows {
     fn load(&mut self, grid: &Grid, j: usize, k: usize, reference: f32) {
         let [nx, ny, nz] = grid.dims;
         let row = |k: usize| &grid.values[(k * ny + j) * nx..][..nx];
-        let (below, here, above) = (row(k.saturating_sub(1)), row(k), row((k + 1).min(nz - 1)));
-        let (smooth, across) = (&mut self.smooth[j % 3][..nx], &mut self.across[j % 3][..nx]);
+        let below = row(k.saturating_sub(1));
+        let here = row(k);
+        let above = row((k + 1).min(nz - 1));
+        let smooth = &mut self.smooth[j % 3][..nx];
+        let across = &mut self.across[j % 3][..nx];
         for i in 0..nx {
-            let (b, h, a) = (below[i] - reference, here[i] - reference, above[i] - reference);
+            let b = below[i] - reference;
+            let h = here[i] - reference;
+            let a = above[i] - reference;
             smooth[i] = b + a + (h + h);
             across[i] = a - b;
         }
@@ -165,12 +172,15 @@ impl Rows {
     /// Smooths and differences along j, repeating the rows at the faces.
     #[inline(always)]
     fn sum_over_j(&mut self, j: usize, ny: usize) {
-        let (below, above) = (j.saturating_sub(1) % 3, (j + 1).min(ny - 1) % 3);
+        let below = j.saturating_sub(1) % 3;
+        let above = (j + 1).min(ny - 1) % 3;
         let nx = self.smooth[0].len();
         let [sx, sy, sz] = &mut self.sum;
         let [b, h, a] = [below, j % 3, above].map(|r| &self.smooth[r][..nx]);
         let [db, dh, da] = [below, j % 3, above].map(|r| &self.across[r][..nx]);
-        let (px, py, pz) = (&mut sx[1..=nx], &mut sy[1..=nx], &mut sz[1..=nx]);
+        let px = &mut sx[1..=nx];
+        let py = &mut sy[1..=nx];
+        let pz = &mut sz[1..=nx];
         for i in 0..nx {
             px[i] = b[i] + a[i] + (h[i] + h[i]);
             py[i] = a[i] - b[i];

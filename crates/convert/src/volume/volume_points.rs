@@ -260,7 +260,8 @@ impl Emit<'_> {
         let values = &self.lattice.values[k * nx * self.lattice.dims[1]..];
         let mut averaged = slab.averaged.iter().peekable();
         for (s, &n) in slab.kept.iter().enumerate() {
-            let (i, j) = (n as usize % nx, n as usize / nx);
+            let i = n as usize % nx;
+            let j = n as usize / nx;
             let at = match averaged.next_if(|(of, _)| *of as usize == s) {
                 Some((_, mean)) => *mean,
                 None => {

@@ -109,7 +109,9 @@ impl Pairs {
     /// Pair `k`; either disc sees the other as it would be seen if it came second.
     fn set(&mut self, k: usize, discs: [&Surfel; 2], planes: [&Plane; 2]) {
         for (own, side) in self.0.iter_mut().enumerate() {
-            let (disc, other, Plane([first, second])) = (discs[own], discs[1 - own], planes[own]);
+            let disc = discs[own];
+            let other = discs[1 - own];
+            let Plane([first, second]) = planes[own];
             let unit = 1.0 / f64::from(disc.reach);
             let [a, b] = &mut side.axes;
             put(a, k, *first);
@@ -136,7 +138,8 @@ impl pulp::WithSimd for Covered<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> [Line; 2] {
-        let (Pairs([a, b]), mut shares) = (self.pairs, [[0.0; MAX_LANES]; 2]);
+        let Pairs([a, b]) = self.pairs;
+        let mut shares = [[0.0; MAX_LANES]; 2];
         for lane in (0..MAX_LANES).step_by(Lanes::<S>::COUNT) {
             covered(simd, lane, [a, b], self.gap).store(&mut shares[0][lane..]);
             covered(simd, lane, [b, a], self.gap).store(&mut shares[1][lane..]);
@@ -179,8 +182,10 @@ impl<S: Simd> Frame<S> {
     /// The place along a vector, times `per`.
     #[inline(always)]
     fn along(&self, simd: S, v: Vector<S>, per: Lanes<S>) -> Linear<S> {
-        let ([x, y], least) = (self.t, Lanes::splat(simd, LEAST));
-        let (p, q) = (dot(v, self.a) * per, dot(v, self.b) * per);
+        let [x, y] = self.t;
+        let least = Lanes::splat(simd, LEAST);
+        let p = dot(v, self.a) * per;
+        let q = dot(v, self.b) * per;
         let s = q * x - p * y;
         Linear { s: least.where_less_or(s.abs(), least, s), t: p.mul_add(x, q * y), center: dot(v, self.offset) * per }
     }
@@ -196,11 +201,16 @@ impl<S: Simd> Frame<S> {
 #[inline(always)]
 fn covered<S: Simd>(simd: S, lane: usize, [own, other]: [&Side; 2], gap: f32) -> Lanes<S> {
     let of = |v: f32| Lanes::splat(simd, v);
-    let (zero, one, least) = (of(0.0), of(1.0), of(LEAST));
-    let (a, b) = (load(simd, lane, &own.axes[0]), load(simd, lane, &own.axes[1]));
-    let (offset, ratio) = (load(simd, lane, &own.offset), Lanes::load(simd, &own.ratio[lane..]));
+    let zero = of(0.0);
+    let one = of(1.0);
+    let least = of(LEAST);
+    let a = load(simd, lane, &own.axes[0]);
+    let b = load(simd, lane, &own.axes[1]);
+    let offset = load(simd, lane, &own.offset);
+    let ratio = Lanes::load(simd, &own.ratio[lane..]);
     // t along the offset, in units of the semi-axes.
-    let (x, y) = (dot(a, offset) / dot(a, a), dot(b, offset) / dot(b, b));
+    let x = dot(a, offset) / dot(a, a);
+    let y = dot(b, offset) / dot(b, b);
     let length = x.mul_add(x, y * y).sqrt();
     let per = one / length.max(least);
     let t = [one.where_less_or(length, least, x * per), zero.where_less_or(length, least, y * per)];
@@ -209,26 +219,35 @@ fn covered<S: Simd>(simd: S, lane: usize, [own, other]: [&Side; 2], gap: f32) ->
     let u = frame.along_axis(simd, load(simd, lane, &other.axes[0]));
     let v = frame.along_axis(simd, load(simd, lane, &other.axes[1]));
     let square = u.s.mul_add(u.s, v.s * v.s);
-    let (per_square, root) = (one / square, square.sqrt() * ratio);
+    let per_square = one / square;
+    let root = square.sqrt() * ratio;
     // How far the line of a t passes by the other's centre, times √square.
-    let (by, at) = (u.s * v.t - v.s * u.t, u.s * v.center - v.s * u.center);
+    let by = u.s * v.t - v.s * u.t;
+    let at = u.s * v.center - v.s * u.center;
     let by = least.where_less_or(by.abs(), least, by);
-    let (center, half) = (at / by, root / by.abs());
-    let (low, high) = ((center - half).max(zero - one), (center + half).min(one));
-    let (middle, half) = (of(0.5) * (low + high), (of(0.5) * (high - low)).max(zero));
-    let (slope, start) = (u.s.mul_add(u.t, v.s * v.t) * per_square, u.s.mul_add(u.center, v.s * v.center) * per_square);
+    let center = at / by;
+    let half = root / by.abs();
+    let low = (center - half).max(zero - one);
+    let high = (center + half).min(one);
+    let middle = of(0.5) * (low + high);
+    let half = (of(0.5) * (high - low)).max(zero);
+    let slope = u.s.mul_add(u.t, v.s * v.t) * per_square;
+    let start = u.s.mul_add(u.center, v.s * v.center) * per_square;
     // d₁ is nowhere constant along s.
     let distance = frame.along(simd, load(simd, lane, &other.normal), one);
     let per = one / distance.s;
-    let (strip_slope, strip_start) = (distance.t * per, distance.center * per);
+    let strip_slope = distance.t * per;
+    let strip_start = distance.center * per;
     let reach = of(0.5 * gap) * (one + ratio) * per.abs();
-    let (root_square, mut sum) = (root * root, zero);
+    let root_square = root * root;
+    let mut sum = zero;
     for [node, weight] in NODES {
         let t = half.mul_add(of(node), middle);
         let mine = (one - t * t).max(zero).sqrt();
         let passes = by.mul_add(t, zero - at);
         let yours = (root_square - passes * passes).max(zero).sqrt() * per_square;
-        let (center, strip) = (start - slope * t, strip_start - strip_slope * t);
+        let center = start - slope * t;
+        let strip = strip_start - strip_slope * t;
         let from = (zero - mine).max(center - yours).max(strip - reach);
         let to = mine.min(center + yours).min(strip + reach);
         sum = (to - from).max(zero).mul_add(of(weight), sum);

@@ -144,7 +144,8 @@ impl Rows {
     fn seek(&mut self, level: &Level, key: u64) {
         self.key = key;
         for row in 0..9 {
-            let (y, z) = ((row % 3) as u64, (row / 3) as u64);
+            let y = (row % 3) as u64;
+            let z = (row / 3) as u64;
             // The row's first cell is one to the left.
             let first = key + (y << BITS) + (z << (2 * BITS)) - (1 << BITS) - (1 << (2 * BITS)) - 1;
             let from = seek(&level.keys, first, self.hints[row]);

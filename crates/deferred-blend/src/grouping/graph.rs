@@ -297,8 +297,11 @@ impl Relaxation {
 
 impl Coplanar {
     fn holds(&self, cloud: &Cloud, a: &Surfel, b: &Surfel) -> bool {
-        let (i, j) = (a.place as usize, b.place as usize);
-        let (n, m, offset) = (a.normal.as_dvec3(), b.normal.as_dvec3(), a.from(b));
+        let i = a.place as usize;
+        let j = b.place as usize;
+        let n = a.normal.as_dvec3();
+        let m = b.normal.as_dvec3();
+        let offset = a.from(b);
         let reach = f64::from(self.offset) * (f64::from(a.reach) + f64::from(b.reach));
         let is_near = |(p, q): (&f32, &f32)| (p - q).abs() <= self.color;
         n.dot(m) >= f64::from(self.cosine)
@@ -361,10 +364,13 @@ impl Part {
         is_edge: &impl Fn(&Surfel, &Surfel) -> bool,
         found: &AtomicU64,
     ) -> Result<(), Error> {
-        let (mut finder, mut near, factor) = (Finder::new(cells), Vec::new(), search.factor as f32 * MORE);
+        let mut finder = Finder::new(cells);
+        let mut near = Vec::new();
+        let factor = search.factor as f32 * MORE;
         let mut counted = 0;
         for node in nodes {
-            let (surfel, before) = (&surfels[node], self.neighbors.len());
+            let surfel = &surfels[node];
+            let before = self.neighbors.len();
             near.clear();
             finder.runs(surfel.center, node, |run| {
                 let discs = (run.start as u32..run.end as u32).zip(&surfels[run]);
@@ -390,7 +396,8 @@ impl Part {
 
 /// The rows of all parts, one after the other.
 fn join(parts: Vec<Part>, nodes: usize) -> (Vec<u32>, Vec<u32>) {
-    let (mut starts, mut end) = (Vec::with_capacity(nodes + 1), 0);
+    let mut starts = Vec::with_capacity(nodes + 1);
+    let mut end = 0;
     starts.push(0);
     for size in parts.iter().flat_map(|part| &part.sizes) {
         end += size;

@@ -165,7 +165,8 @@ fn shortest(a: i64, groups: i64) -> i64 {
 pub fn covering_factor(groups: u32) -> Result<f64, Error> {
     check_count(groups)?;
     let a = multiplier(groups);
-    let (count, mut best) = (i64::from(groups), f64::INFINITY);
+    let count = i64::from(groups);
+    let mut best = f64::INFINITY;
     let reach = 2 * count.isqrt() + 2;
     let of_group = |&[x, y]: &[i64; 2]| (x, y) != (0, 0) && (a * x + y).rem_euclid(count) == 0;
     let sides: Vec<[i64; 2]> =
@@ -173,7 +174,8 @@ pub fn covering_factor(groups: u32) -> Result<f64, Error> {
     for [x, y] in &sides {
         for [u, v] in &sides {
             // A triangle of neighbours has half the area of the K cells that it stands for, and no obtuse angle.
-            let (p, q) = (x * x + y * y, u * u + v * v);
+            let p = x * x + y * y;
+            let q = u * u + v * v;
             let third = (x - u).pow(2) + (y - v).pow(2);
             let acute = p + q >= third && p + third >= q && q + third >= p;
             if acute && (x * v - y * u).abs() == count {
@@ -244,7 +246,8 @@ impl Part {
     fn resolve(&mut self, count: u32, groups: &mut [u8]) {
         let Self { surfels, waits, lattice, .. } = self;
         lattice.fill(surfels);
-        let (mut overlap, mut near) = (vec![0u64; count as usize], Vec::new());
+        let mut overlap = vec![0u64; count as usize];
+        let mut near = Vec::new();
         for node in 0..surfels.len() {
             if !waits[node] {
                 continue;

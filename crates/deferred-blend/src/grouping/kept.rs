@@ -49,7 +49,8 @@ impl KeptGroups {
         if places.len() != self.places.len() || (radius - self.radius).abs() > near {
             return None;
         }
-        let (mut first, mut is_taken) = (0, vec![false; self.places.len()]);
+        let mut first = 0;
+        let mut is_taken = vec![false; self.places.len()];
         let mut from = vec![0; places.len()];
         for wanted in sorted(places) {
             while first < is_taken.len() && (is_taken[first] || self.places[first].along < wanted.along - near) {
@@ -124,9 +125,11 @@ impl GroupsOfObjects {
         for &id in ids {
             of_object.entry(cloud.object[id as usize] as usize).or_default().push(id);
         }
-        let (mut parts, mut anew) = (Vec::new(), 0);
+        let mut parts = Vec::new();
+        let mut anew = 0;
         for (&rank, ids) in &of_object {
-            let ((transform, recipe), discs) = (of(rank), cloud.gather(ids));
+            let (transform, recipe) = of(rank);
+            let discs = cloud.gather(ids);
             let members = self.members(rank, (&discs, &transform), &recipe, progress);
             let (members, is_new) = members.map_err(|e| (rank, e))?;
             anew += if is_new { ids.len() as u64 } else { 0 };

@@ -95,7 +95,9 @@ mod tests {
             Surfel { center, reach, across: reach, normal: Vec3::Z, ..Surfel::default() }
         };
         let discs: Vec<Surfel> = (0..8000).map(disc).collect();
-        let (mut lattice, mut near, mut count) = (Lattice::default(), Vec::new(), 0);
+        let mut lattice = Lattice::default();
+        let mut near = Vec::new();
+        let mut count = 0;
         // What was there before has gone.
         lattice.fill(&discs[..10]);
         lattice.fill(&discs);

@@ -63,14 +63,16 @@ impl Membership {
     /// If a place is out of range, or a part has not as many places as discs.
     pub fn join(discs: usize, parts: &[(&[u32], Self)]) -> Self {
         let count = parts.iter().map(|(_, part)| part.groups.count).max().unwrap_or(1);
-        let (mut of, mut rows): (Vec<u8>, Vec<Vec<u8>>) = (vec![0; discs], Vec::new());
+        let mut of: Vec<u8> = vec![0; discs];
+        let mut rows: Vec<Vec<u8>> = Vec::new();
         let has_rows = parts.iter().any(|(_, p)| p.groups.count < count || !p.groups.further.starts.is_empty());
         rows.resize(if has_rows { discs } else { 0 }, Vec::new());
         let mut reach = vec![1.0; if parts.iter().any(|(_, part)| !part.reach.is_empty()) { discs } else { 0 }];
         for (places, part) in parts {
             assert_eq!(places.len(), part.discs(), "invariant: one place a disc");
             for (i, &place) in places.iter().enumerate() {
-                let (own, place) = (part.groups.of[i], place as usize);
+                let own = part.groups.of[i];
+                let place = place as usize;
                 of[place] = own;
                 if let Some(row) = rows.get_mut(place) {
                     let again = |group: u8| (u32::from(group)..count).step_by(part.groups.count as usize);

@@ -76,7 +76,8 @@ fn largest_first(graph: &OverlapGraph) -> Vec<u32> {
 #[inline]
 fn least_free(neighbors: &[u32], colors: &[u16]) -> u16 {
     // Nearly always all colours are below 64: one word, and a look at whether there were others.
-    let (mut taken, mut seen) = (0u64, 0u16);
+    let mut taken = 0u64;
+    let mut seen = 0u16;
     for &n in neighbors {
         let color = colors[n as usize];
         seen |= color;

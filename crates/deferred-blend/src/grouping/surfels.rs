@@ -57,7 +57,8 @@ pub(crate) fn order(cloud: &Cloud, scale: f32) -> Result<Vec<u32>, Error> {
 impl Surfel {
     /// The disc at a place of a cloud, its radii times `scale`.
     pub(crate) fn new(cloud: &Cloud, place: u32, scale: f32) -> Self {
-        let (i, scale) = (place as usize, f64::from(scale));
+        let i = place as usize;
+        let scale = f64::from(scale);
         let across = (f64::from(cloud.radius[i]) * scale) as f32;
         let first = (cloud.tangent_of(i).as_dvec3() * scale).as_vec3();
         let circle = Self {
@@ -106,7 +107,8 @@ impl Surfel {
 
     /// Semi-axes.
     pub(crate) fn axes(&self) -> [DVec3; 2] {
-        let (normal, across) = (self.normal.as_dvec3(), f64::from(self.across));
+        let normal = self.normal.as_dvec3();
+        let across = f64::from(self.across);
         let unit = normal.normalize_or(DVec3::Z);
         let first = if self.is_circle() { unit.any_orthonormal_vector() * across } else { self.first.as_dvec3() };
         [first, unit.cross(first).normalize_or(unit.any_orthonormal_vector()) * across]
@@ -162,9 +164,12 @@ fn contact_is_below(offset: DVec3, [a, b]: [DMat3; 2], bound: f64) -> bool {
     };
     // Golden sections: the function is concave.
     let golden = 0.5 * (5f64.sqrt() - 1.0);
-    let (mut low, mut high) = (0.0, 1.0);
-    let (mut left, mut right) = (1.0 - golden, golden);
-    let (mut at_left, mut at_right) = (at(left), at(right));
+    let mut low = 0.0;
+    let mut high = 1.0;
+    let mut left = 1.0 - golden;
+    let mut right = golden;
+    let mut at_left = at(left);
+    let mut at_right = at(right);
     for _ in 0..CONTACT_ROUNDS {
         if at_left.max(at_right) >= bound {
             return false;

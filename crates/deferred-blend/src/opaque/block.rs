@@ -111,9 +111,16 @@ pub(super) struct Block {
 
 impl Block {
     pub(super) fn new(channels: usize) -> Self {
-        let (zero, lines) = (line(0.0), vec![line(0.0); channels]);
-        let (limit, near, disc, facing, front) = (zero, zero, zero, zero, [zero; 3]);
-        let (weight, depth, nearest) = (zero, zero, lines.clone());
+        let zero = line(0.0);
+        let lines = vec![line(0.0); channels];
+        let limit = zero;
+        let near = zero;
+        let disc = zero;
+        let facing = zero;
+        let front = [zero; 3];
+        let weight = zero;
+        let depth = zero;
+        let nearest = lines.clone();
         Self { first: [0; 2], limit, near, disc, facing, front, weight, depth, nearest, sums: lines }
     }
 
@@ -141,7 +148,8 @@ impl Block {
         let at = |line: &Line| Lanes::load(simd, &line.0[lane..]);
         let of = |v: f32| Lanes::splat(simd, v);
         let solid = |v: Lanes<S>| v.where_less_or(hit.distance_sq, of(rules.core), of(f32::INFINITY));
-        let (near, depth) = (at(&self.near), solid(hit.depth));
+        let near = at(&self.near);
+        let depth = solid(hit.depth);
         at(&self.limit).min(solid(hit.limit)).store(&mut self.limit.0[lane..]);
         of(f32::from_bits(rank)).where_less_or(depth, near, at(&self.disc)).store(&mut self.disc.0[lane..]);
         hit.facing.where_less_or(depth, near, at(&self.facing)).store(&mut self.facing.0[lane..]);
@@ -183,7 +191,8 @@ impl Block {
     ) -> Lanes<S> {
         let of = |v: f32| Lanes::splat(simd, v);
         let weight = (weight * of(FACING_AWAY)).where_less_or(side, of(0.0), weight);
-        let (limit, near) = (self.limit(simd, lane), Lanes::load(simd, &self.near.0[lane..]));
+        let limit = self.limit(simd, lane);
+        let near = Lanes::load(simd, &self.near.0[lane..]);
         let weight = weight.where_less(depth, limit).where_less(near, own_limit);
         let behind = (depth - near).where_less(depth, limit).where_less(near, own_limit);
         add(simd, &mut self.weight.0[lane..], weight);
@@ -196,7 +205,9 @@ impl Block {
     pub(super) fn side<S: Simd>(&self, simd: S, lane: usize, facing: Lanes<S>, normal: Vec3) -> Lanes<S> {
         let of = |v: f32| Lanes::splat(simd, v);
         let front = |axis: usize| Lanes::load(simd, &self.front[axis].0[lane..]);
-        let (a, b, c) = (front(0), front(1), front(2));
+        let a = front(0);
+        let b = front(1);
+        let c = front(2);
         facing * of(normal.x).mul_add(a, of(normal.y).mul_add(b, of(normal.z) * c))
     }
 
@@ -216,7 +227,9 @@ impl Block {
             let at = |line: &Line| Lanes::load(simd, &line.0[lane..]);
             let of = |v: f32| Lanes::splat(simd, v);
             // Where groups have kept none of what is seen the nearest disc stands for all.
-            let (near, weight, far) = (at(&self.near), at(&self.weight).max(of(NO_WEIGHT)), of(f32::INFINITY));
+            let near = at(&self.near);
+            let weight = at(&self.weight).max(of(NO_WEIGHT));
+            let far = of(f32::INFINITY);
             let pixel = b * PIXELS + lane;
             (near + at(&self.depth) / weight).where_less_or(near, far, far).store(&mut tile.depth[pixel..]);
             let channels = tile.channels.chunks_exact_mut(AREA).zip(&self.nearest).zip(&self.sums);
@@ -234,7 +247,8 @@ impl Block {
 #[inline(always)]
 pub(super) fn for_each_disc(discs: &Line, mut weights: [f32; PIXELS], mut visit: impl FnMut(f32, &[f32; PIXELS])) {
     while let Some(first) = weights.iter().position(|weight| *weight > 0.0) {
-        let (disc, mut own) = (discs.0[first], [0.0; PIXELS]);
+        let disc = discs.0[first];
+        let mut own = [0.0; PIXELS];
         for ((rest, own), other) in weights.iter_mut().zip(&mut own).zip(&discs.0) {
             let is_own = other.to_bits() == disc.to_bits();
             *own = if is_own { *rest } else { 0.0 };
@@ -247,7 +261,8 @@ pub(super) fn for_each_disc(discs: &Line, mut weights: [f32; PIXELS], mut visit:
 /// Values of a disc, whose rank is given as bits.
 #[inline(always)]
 pub(super) fn values_of<'a>(input: &Averaged<'a>, disc: f32) -> &'a [f32] {
-    let (channels, rank) = (input.channels as usize, disc.to_bits() as usize);
+    let channels = input.channels as usize;
+    let rank = disc.to_bits() as usize;
     let row = if input.by_rank { rank } else { input.discs.ids[rank] as usize };
     &input.values[row * channels..][..channels]
 }

@@ -55,7 +55,8 @@ impl GroupImages {
     /// The image of a group, empty if it was not met.
     #[inline(always)]
     fn of(&mut self, group: u8) -> &mut GroupImage {
-        let (word, bit) = (&mut self.met[usize::from(group / 64)], 1 << (group % 64));
+        let word = &mut self.met[usize::from(group / 64)];
+        let bit = 1 << (group % 64);
         let image = &mut self.images[usize::from(group)];
         if *word & bit == 0 {
             *word |= bit;
@@ -148,8 +149,8 @@ pub(super) fn composite<S: Simd>(simd: S, input: &Averaged<'_>, images: &GroupIm
     images.for_each(|image| {
         let mut weights = [0.0; PIXELS];
         for lane in (0..PIXELS).step_by(Lanes::<S>::COUNT) {
-            let (depth, weight) =
-                (Lanes::load(simd, &image.depth.0[lane..]), Lanes::load(simd, &image.weight.0[lane..]));
+            let depth = Lanes::load(simd, &image.depth.0[lane..]);
+            let weight = Lanes::load(simd, &image.weight.0[lane..]);
             weight.where_less(depth, block.limit(simd, lane)).store(&mut weights[lane..]);
         }
         for_each_disc(&image.disc, weights, |disc, own| {

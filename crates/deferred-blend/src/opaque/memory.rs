@@ -53,7 +53,8 @@ fn afford(input: &Averaged<'_>, lists: u64) -> Result<(), Error> {
     if needed <= input.max_bytes {
         return Ok(());
     }
-    let (what, limit) = ("an image of opaque discs".into(), Some(input.max_bytes));
+    let what = "an image of opaque discs".into();
+    let limit = Some(input.max_bytes);
     let hint = "make the image smaller, or the discs".into();
     Err(Error::Limit(Exceeded { what, needed, limit, unit: "bytes", hint }))
 }

@@ -19,7 +19,8 @@ pub(super) struct Tile {
 
 impl Tile {
     pub(super) fn new(channels: usize) -> Self {
-        let (depth, disc) = (vec![f32::INFINITY; AREA], vec![u32::MAX; AREA]);
+        let depth = vec![f32::INFINITY; AREA];
+        let disc = vec![u32::MAX; AREA];
         Self { depth, disc, channels: vec![0.0; AREA * channels], fragments: 0 }
     }
 }

@@ -34,7 +34,8 @@ pub(super) fn turned(light: &Light<'_>, discs: &Discs, image: &OpaqueImage, disc
         let reach = radius / discs.pixel_width(image.depth[k]);
         let asked = AROUND.iter().flat_map(|a| [0.5, 1.0].map(|share| a.map(|a| a * share * reach)));
         let neighbor = |[dx, dy]: [f32; 2]| {
-            let (x, y) = ((k % width) as f32 + dx, (k / width) as f32 + dy);
+            let x = (k % width) as f32 + dx;
+            let y = (k / width) as f32 + dy;
             let is_inside = x >= 0.0 && y >= 0.0 && x < width as f32 && y < height as f32;
             let at = is_inside.then(|| y as usize * width + x as usize)?;
             // Of the same surface: not farther along the ray than a few radii.
@@ -45,7 +46,8 @@ pub(super) fn turned(light: &Light<'_>, discs: &Discs, image: &OpaqueImage, disc
         let around: Vec3 = asked.filter_map(neighbor).sum();
         let mirror = |n: Vec3| to_eye * (2.0 * n.dot(to_eye)) - n;
         (mirror(own).dot(around) > own.dot(around)).then(|| {
-            let ([a, b, c], [d, e, f]) = (mirror(own).to_array(), mirror(normal(k, 3)).to_array());
+            let [a, b, c] = mirror(own).to_array();
+            let [d, e, f] = mirror(normal(k, 3)).to_array();
             (k, [a, b, c, d, e, f])
         })
     };

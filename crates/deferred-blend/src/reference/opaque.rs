@@ -67,7 +67,9 @@ pub fn opaque(
 /// Where the steps of Eq. 10 begin, and how long one is.
 fn floor(input: &DiscInput<'_>, params: &Params) -> [f64; 2] {
     let camera = input.camera;
-    let (mut near, mut far, mut radii) = (f64::INFINITY, 0.0, 0.0);
+    let mut near = f64::INFINITY;
+    let mut far = 0.0;
+    let mut radii = 0.0;
     for &id in input.ids {
         let axes = axes(input.cloud, id as usize, f64::from(params.disc_scale));
         let along = |v: DVec3| v.dot(camera.axes[2]);

@@ -19,7 +19,8 @@ pub(super) fn edges(graph: &OverlapGraph) -> Vec<[usize; 2]> {
 }
 
 fn axes(cloud: &Cloud, i: usize) -> [DVec3; 2] {
-    let (normal, radius) = (cloud.normal_of(i).as_dvec3(), f64::from(cloud.radius[i]));
+    let normal = cloud.normal_of(i).as_dvec3();
+    let radius = f64::from(cloud.radius[i]);
     let tangent = cloud.tangent_of(i).as_dvec3();
     let first = if tangent == DVec3::ZERO { normal.any_orthonormal_vector() * radius } else { tangent };
     [first, normal.cross(first).normalize() * radius]
@@ -35,7 +36,8 @@ fn shape(cloud: &Cloud, i: usize) -> DMat3 {
 /// The contact function of two ellipsoids, its maximum by a thousand steps.
 fn contact(cloud: &Cloud, i: usize, j: usize) -> f64 {
     let offset = cloud.position[j].as_dvec3() - cloud.position[i].as_dvec3();
-    let (a, b) = (shape(cloud, i), shape(cloud, j));
+    let a = shape(cloud, i);
+    let b = shape(cloud, j);
     let steps = (1..1000).map(|k| f64::from(k) / 1000.0);
     steps.map(|l| l * (1.0 - l) * offset.dot((a * (1.0 - l) + b * l).inverse() * offset)).fold(0.0, f64::max)
 }
@@ -44,11 +46,13 @@ fn contact(cloud: &Cloud, i: usize, j: usize) -> f64 {
 fn reference(cloud: &Cloud, relaxation: &Relaxation) -> Vec<[usize; 2]> {
     let c = f64::from(relaxation.factor);
     let joins = |i: usize, j: usize| {
-        let (p, q) = (cloud.position[i].as_dvec3(), cloud.position[j].as_dvec3());
+        let p = cloud.position[i].as_dvec3();
+        let q = cloud.position[j].as_dvec3();
         let round = cloud.tangent_of(i).length() + cloud.tangent_of(j).length() == 0.0;
         let reach = f64::from(cloud.radius[i]) + f64::from(cloud.radius[j]);
         let overlaps = if round { (p - q).length() < c * reach } else { i != j && contact(cloud, i, j) < c * c };
-        let (n, m) = (cloud.normal_of(i).as_dvec3(), cloud.normal_of(j).as_dvec3());
+        let n = cloud.normal_of(i).as_dvec3();
+        let m = cloud.normal_of(j).as_dvec3();
         let of_one_plane = relaxation.coplanar.is_some_and(|coplanar| {
             let far = (p - q).dot(n).abs().max((p - q).dot(m).abs());
             let color = (0..3).all(|k| (cloud.color[i][k] - cloud.color[j][k]).abs() <= coplanar.color);
@@ -81,7 +85,8 @@ fn edges_are_those_of_every_pair_in_f64() {
 /// Pairs of discs that touch, but for what their places are rounded by.
 #[test]
 fn discs_that_hardly_touch_or_hardly_do_not_are_told_apart_in_f64() {
-    let (mut cloud, mut touching) = (Cloud::new(DVec3::ZERO), 0);
+    let mut cloud = Cloud::new(DVec3::ZERO);
+    let mut touching = 0;
     for i in 0..500u64 {
         let u = |n| rng::unit_f32(7, 0, i, n) - 0.5;
         let radii = [1.0 + u(0), 1.0 + u(1)];

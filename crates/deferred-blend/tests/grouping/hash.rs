@@ -56,7 +56,8 @@ fn collisions_that_are_resolved_leave_less_overlap_and_only_near_ones_are() {
     let graph = OverlapGraph::build(&cloud, &GraphParams::default(), None).expect("a valid cloud");
     let overlap = |collisions| graph.mean_overlap(&grouped(&cloud, 8, collisions));
     let near = |distance| Collisions::ResolveNear { eye: cloud.origin + DVec3::new(1.5, 0.0, 0.0), distance };
-    let (keep, resolve) = (overlap(Collisions::Keep), overlap(Collisions::Resolve));
+    let keep = overlap(Collisions::Keep);
+    let resolve = overlap(Collisions::Resolve);
     assert!(keep <= 1.24 && resolve <= 0.19 && overlap(near(1.0)) <= 1.03, "Table 2: {keep} {resolve}");
     assert!(overlap(near(1.0)) > resolve && overlap(near(1.0)) < keep);
     assert_eq!(grouped(&cloud, 8, near(0.0)), grouped(&cloud, 8, Collisions::Keep));
@@ -71,7 +72,8 @@ fn db11_groups_of_a_plane_are_of_one_size_for_any_number() {
         let of = grouped(&flat(), groups, collisions);
         let counts: Vec<usize> =
             (0..groups as u8).map(|group| of.of().iter().filter(|&&g| g == group).count()).collect();
-        let (least, most) = (counts.iter().min(), counts.iter().max());
+        let least = counts.iter().min();
+        let most = counts.iter().max();
         assert!(least.zip(most).is_some_and(|(least, most)| *most <= 2 * least), "{groups}: {counts:?}");
     }
 }
@@ -100,7 +102,8 @@ fn collisions_among_more_discs_than_are_looked_at_together_are_resolved() {
     cloud.position.iter_mut().for_each(|position| *position *= 0.8);
     let graph = OverlapGraph::build(&cloud, &GraphParams::default(), None).expect("a valid cloud");
     let overlap = |collisions| graph.mean_overlap(&grouped(&cloud, 16, collisions));
-    let (keep, resolve) = (overlap(Collisions::Keep), overlap(Collisions::Resolve));
+    let keep = overlap(Collisions::Keep);
+    let resolve = overlap(Collisions::Resolve);
     assert!(resolve < 0.1 && keep > 2.0 * resolve, "{keep} {resolve}");
 }
 

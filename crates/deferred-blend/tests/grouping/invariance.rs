@@ -57,7 +57,8 @@ fn perm_any_order_of_the_cloud_gives_each_disc_its_group() {
     for cloud in clouds() {
         let mut order: Vec<u32> = (0..cloud.len() as u32).collect();
         order.sort_by_key(|&i| rng::bits(3, 1, u64::from(i), 0));
-        let (whole, shuffled) = (everything(&cloud, 1.0), everything(&cloud.gather(&order), 1.0));
+        let whole = everything(&cloud, 1.0);
+        let shuffled = everything(&cloud.gather(&order), 1.0);
         for (whole, shuffled) in whole.groups.iter().zip(&shuffled.groups) {
             let of_places: Vec<u8> = order.iter().map(|&i| whole[i as usize]).collect();
             assert_eq!(of_places, *shuffled);
@@ -97,7 +98,8 @@ fn scale2_powers_of_two_change_nothing() {
     for cloud in clouds() {
         let whole = everything(&cloud, 1.0);
         for power in [-40, -10, 10, 40] {
-            let (factor, mut scaled) = (2f32.powi(power), cloud.clone());
+            let factor = 2f32.powi(power);
+            let mut scaled = cloud.clone();
             scaled.origin *= f64::from(factor);
             scaled.position.iter_mut().for_each(|position| *position *= factor);
             scaled.radius.iter_mut().for_each(|radius| *radius *= factor);

@@ -12,7 +12,8 @@ use splat_core::{Cloud, Splat};
 #[test]
 fn db5_cells_end_at_the_bisector_for_any_number_of_steps() {
     let params = Params { disc_scale: 1.0, ..Params::default() };
-    let (middles, normal) = ([Vec3::new(-0.2, 0.0, 0.06), Vec3::new(0.2, 0.1, -0.07)], Vec3::new(0.3, 0.1, 1.0));
+    let middles = [Vec3::new(-0.2, 0.0, 0.06), Vec3::new(0.2, 0.1, -0.07)];
+    let normal = Vec3::new(0.3, 0.1, 1.0);
     for behind in [1.0, 1e2, 1e4, 1e6, 1e8] {
         let mut cloud = Cloud::new(DVec3::ZERO);
         let origin = middles[0];

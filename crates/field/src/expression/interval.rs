@@ -56,13 +56,15 @@ impl Interval {
     fn wave(self, shift: f64) -> Self {
         // The slack covers the rounding of the shift and of the multiples of 2π.
         let slack = 1e-15 * (self.low.abs().max(self.high.abs()) + TAU);
-        let (low, high) = (self.low + shift - slack, self.high + shift + slack);
+        let low = self.low + shift - slack;
+        let high = self.high + shift + slack;
         let width = high - low;
         if width.is_nan() || width >= TAU {
             return Self { low: -1.0, high: 1.0 };
         }
         let passes = |v: f64| ((low - v) / TAU).ceil() * TAU + v <= high;
-        let (a, b) = (libm::sin(low), libm::sin(high));
+        let a = libm::sin(low);
+        let b = libm::sin(high);
         Self {
             low: if passes(-FRAC_PI_2) { -1.0 } else { (a.min(b) - slack).max(-1.0) },
             high: if passes(FRAC_PI_2) { 1.0 } else { (a.max(b) + slack).min(1.0) },

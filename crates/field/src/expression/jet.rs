@@ -29,7 +29,8 @@ impl Jet {
 
     /// The symmetric Hessian.
     pub(crate) fn hessian(&self) -> DMat3 {
-        let (d, m) = (self.diagonal, self.mixed);
+        let d = self.diagonal;
+        let m = self.mixed;
         DMat3::from_cols(DVec3::new(d.x, m.z, m.y), DVec3::new(m.z, d.y, m.x), DVec3::new(m.y, m.x, d.z))
     }
 
@@ -51,7 +52,8 @@ impl Jet {
     }
 
     fn combine(self, other: Self, [f, a, b, aa, ab, bb]: Partials) -> Self {
-        let (g, h) = (self.gradient, other.gradient);
+        let g = self.gradient;
+        let h = other.gradient;
         Self {
             value: f,
             gradient: g * a + h * b,
@@ -118,7 +120,8 @@ impl Number for Jet {
     }
 
     fn binary(self, f: Binary, other: Self) -> Self {
-        let (a, b) = (self.value, other.value);
+        let a = self.value;
+        let b = other.value;
         let u = a.binary(f, b);
         match f {
             Binary::Add => self.combine(other, [u, 1.0, 1.0, 0.0, 0.0, 0.0]),
@@ -133,7 +136,8 @@ impl Number for Jet {
                 self.chain([u, b * libm::pow(a, b - 1.0), b * (b - 1.0) * libm::pow(a, b - 2.0)])
             }
             Binary::Pow => {
-                let (l, w) = (libm::log(a), libm::pow(a, b - 1.0));
+                let l = libm::log(a);
+                let w = libm::pow(a, b - 1.0);
                 let aa = b * (b - 1.0) * libm::pow(a, b - 2.0);
                 self.combine(other, [u, b * w, u * l, aa, w * (1.0 + b * l), u * l * l])
             }
@@ -153,7 +157,8 @@ impl Number for Jet {
             }
             Binary::Atan2 => {
                 let q = 1.0 / (a * a + b * b);
-                let (da, db) = (b * q, -a * q);
+                let da = b * q;
+                let db = -a * q;
                 self.combine(other, [u, da, db, 2.0 * da * db, (a * a - b * b) * q * q, -2.0 * da * db])
             }
         }

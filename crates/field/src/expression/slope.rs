@@ -106,8 +106,10 @@ impl<const N: usize> Slopes<N> {
     fn power(self, other: Self) -> Self {
         let mut found = self;
         for i in 0..N {
-            let (a, b) = (self.value[i], other.value[i]);
-            let (u, by_base) = (libm::pow(a, b), b * libm::pow(a, b - 1.0));
+            let a = self.value[i];
+            let b = other.value[i];
+            let u = libm::pow(a, b);
+            let by_base = b * libm::pow(a, b - 1.0);
             let constant = (0..3).all(|axis| other.gradient[axis][i] == 0.0);
             let by_exponent = if constant { 0.0 } else { u * libm::log(a) };
             found.value[i] = u;

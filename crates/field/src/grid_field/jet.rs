@@ -50,9 +50,12 @@ fn dot<const N: usize>(a: &[f64; N], b: &[f64; N]) -> f64 {
 pub(super) fn slope<const N: usize>(grid: &Grid, at: &[Stencil<N>; 3]) -> Slope {
     let block = gather(grid, [&at[0].index, &at[1].index, &at[2].index]);
     let [along, y, z] = at.each_ref().map(|a| &a.weight);
-    let (mut value, mut by_y, mut by_z) = ([0.0; N], [0.0; N], [0.0; N]);
+    let mut value = [0.0; N];
+    let mut by_y = [0.0; N];
+    let mut by_z = [0.0; N];
     for k in 0..N {
-        let (mut plane, mut derived) = ([0.0; N], [0.0; N]);
+        let mut plane = [0.0; N];
+        let mut derived = [0.0; N];
         for j in 0..N {
             for i in 0..N {
                 plane[i] += block[k][j][i] * y[0][j];
@@ -77,7 +80,9 @@ pub(super) fn hessian<const N: usize>(grid: &Grid, at: &[Stencil<N>; 3]) -> DMat
         let row = |k: usize, j: usize| dot(&block[k][j], x) * y[j] * z[k];
         (0..N).map(|k| (0..N).map(|j| row(k, j)).sum::<f64>()).sum::<f64>()
     };
-    let (xy, yz, zx) = (sum([1, 1, 0]), sum([0, 1, 1]), sum([1, 0, 1]));
+    let xy = sum([1, 1, 0]);
+    let yz = sum([0, 1, 1]);
+    let zx = sum([1, 0, 1]);
     DMat3::from_cols(
         DVec3::new(sum([2, 0, 0]), xy, zx),
         DVec3::new(xy, sum([0, 2, 0]), yz),
@@ -97,7 +102,8 @@ pub(super) fn control_range<const N: usize>(grid: &Grid, at: &[Control<N>; 3]) -
             columns[i][e] = x[e][i];
         }
     }
-    let (mut low, mut high) = ([f64::INFINITY; N], [f64::NEG_INFINITY; N]);
+    let mut low = [f64::INFINITY; N];
+    let mut high = [f64::NEG_INFINITY; N];
     for c in 0..N {
         let mut plane = [[0.0; N]; N];
         for k in 0..N {
@@ -108,7 +114,8 @@ pub(super) fn control_range<const N: usize>(grid: &Grid, at: &[Control<N>; 3]) -
             }
         }
         for d in 0..N {
-            let (mut row, mut control) = ([0.0; N], [0.0; N]);
+            let mut row = [0.0; N];
+            let mut control = [0.0; N];
             for j in 0..N {
                 for i in 0..N {
                     row[i] += plane[j][i] * y[d][j];

@@ -105,7 +105,8 @@ struct Row {
 
 /// Neighbours of lattice point `i` on an axis and a third of one over their distance: m/3 = (v[hi] − v[lo])·scale.
 fn slope(i: usize, n: usize) -> (usize, usize, f64) {
-    let (lo, hi) = (i.saturating_sub(1), (i + 1).min(n - 1));
+    let lo = i.saturating_sub(1);
+    let hi = (i + 1).min(n - 1);
     (lo, hi, 1.0 / (3 * (hi - lo).max(1)) as f64)
 }
 
@@ -123,8 +124,12 @@ impl Row {
             self.high.copy_from_slice(&self.low);
             return;
         }
-        let ((j0, j1, y), (k0, k1, z)) = (slope(j, ny), slope(k, nz));
-        let (below, above, front, back) = (row(j0, k), row(j1, k), row(j, k0), row(j, k1));
+        let (j0, j1, y) = slope(j, ny);
+        let (k0, k1, z) = slope(k, nz);
+        let below = row(j0, k);
+        let above = row(j1, k);
+        let front = row(j, k0);
+        let back = row(j, k1);
         let corners = [row(j0, k0), row(j1, k0), row(j0, k1), row(j1, k1)];
         let difference = |a: f32, b: f32| f64::from(a) - f64::from(b);
         let [v, vy, vz, vyz] = &mut self.parts;

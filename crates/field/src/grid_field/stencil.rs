@@ -94,7 +94,9 @@ impl Control<4> {
 /// The polar form of the cell's cubic: the value at t for r = s = t, the control points for r, s, t among two numbers.
 #[inline(always)]
 fn blossom(r: f64, s: f64, t: f64) -> [f64; 4] {
-    let (p, q, o) = (1.0 - r, 1.0 - s, 1.0 - t);
+    let p = 1.0 - r;
+    let q = 1.0 - s;
+    let o = 1.0 - t;
     let b = [p * q * o, r * q * o + p * s * o + p * q * t, p * s * t + r * q * t + r * s * o, r * s * t];
     const SIXTH: f64 = 1.0 / 6.0;
     [-SIXTH * b[1], b[0] + b[1] + SIXTH * b[2], SIXTH * b[1] + b[2] + b[3], -SIXTH * b[2]]

@@ -30,8 +30,10 @@ fn edge_between(a: usize, b: usize) -> usize {
 
 /// Corners of face 2a + side, counter-clockwise seen from outside.
 fn face_corners(face: usize) -> [usize; 4] {
-    let (axis, side) = (face / 2, face % 2);
-    let (u, v) = (1 << ((axis + 1) % 3), 1 << ((axis + 2) % 3));
+    let axis = face / 2;
+    let side = face % 2;
+    let u = 1 << ((axis + 1) % 3);
+    let v = 1 << ((axis + 2) % 3);
     let base = side << axis;
     let around = [base, base | u, base | u | v, base | v];
     if side == 1 { around } else { [around[3], around[2], around[1], around[0]] }
@@ -39,7 +41,9 @@ fn face_corners(face: usize) -> [usize; 4] {
 
 /// One bit for each face that an edge lies in.
 fn faces_of(edge: usize) -> u8 {
-    let (axis, u, v) = (edge / 4, edge & 1, edge >> 1 & 1);
+    let axis = edge / 4;
+    let u = edge & 1;
+    let v = edge >> 1 & 1;
     1 << (2 * ((axis + 1) % 3) + u) | 1 << (2 * ((axis + 2) % 3) + v)
 }
 
@@ -50,7 +54,8 @@ fn lines(case: u8) -> [Option<usize>; 12] {
     for face in 0..6 {
         let corner = face_corners(face);
         for i in 0..4 {
-            let (here, ahead) = (corner[i], corner[(i + 1) % 4]);
+            let here = corner[i];
+            let ahead = corner[(i + 1) % 4];
             if !below(here) || below(ahead) {
                 continue;
             }
@@ -89,7 +94,8 @@ fn cut(polygon: &[u8]) -> Option<Vec<[u8; 3]>> {
         return Some(vec![[polygon[0], polygon[1], polygon[2]]]);
     }
     (0..n).find_map(|i| {
-        let (before, after) = (polygon[(i + n - 1) % n], polygon[(i + 1) % n]);
+        let before = polygon[(i + n - 1) % n];
+        let after = polygon[(i + 1) % n];
         if faces_of(before.into()) & faces_of(after.into()) != 0 {
             return None;
         }
@@ -129,7 +135,8 @@ mod tests {
     fn both_cells_of_a_face_draw_the_same_lines_on_it() {
         // The upper face of a cell along each axis is the lower one of the next.
         for axis in 0..3 {
-            let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
+            let u = (axis + 1) % 3;
+            let v = (axis + 2) % 3;
             for signs in 0..16usize {
                 let case = |side: usize| {
                     (0..4).fold(0usize, |c, i| {

@@ -32,7 +32,9 @@ fn both_ways(a: DVec3, b: DVec3) -> DMat3 {
 impl Octree {
     /// The leaf of a place in the cube.
     fn leaf_at(&self, p: DVec3) -> usize {
-        let (mut node, mut center, mut half) = (0, self.center, self.half);
+        let mut node = 0;
+        let mut center = self.center;
+        let mut half = self.half;
         loop {
             match self.node(node) {
                 Node::Leaf(leaf) => return leaf,
@@ -55,9 +57,12 @@ impl Octree {
 
     /// The same in the cell of a leaf.
     fn blend_of<const D: usize>(&self, leaf: usize, p: DVec3) -> Blend {
-        let (mut sum, mut total) = (0.0, 0.0);
-        let (mut sum_slope, mut total_slope) = (DVec3::ZERO, DVec3::ZERO);
-        let (mut sum_bend, mut total_bend) = (DMat3::ZERO, DMat3::ZERO);
+        let mut sum = 0.0;
+        let mut total = 0.0;
+        let mut sum_slope = DVec3::ZERO;
+        let mut total_slope = DVec3::ZERO;
+        let mut sum_bend = DMat3::ZERO;
+        let mut total_bend = DMat3::ZERO;
         for &id in self.listed(leaf) {
             let support = &self.supports[id as usize];
             let y = (p - support.center) * support.inverse;
@@ -75,14 +80,16 @@ impl Octree {
             }
             let (w, slope) = weight_slope(r2);
             let (q, q_slope) = piece.value_gradient(y);
-            let (w_slope, q_slope) = (y * (slope * support.inverse), q_slope * support.inverse);
+            let w_slope = y * (slope * support.inverse);
+            let q_slope = q_slope * support.inverse;
             sum += w * q;
             total += w;
             sum_slope += w_slope * q + q_slope * w;
             total_slope += w_slope;
             if D == 2 {
                 let squared = support.inverse * support.inverse;
-                let (w_bend, q_bend) = (weight_hessian(y) * squared, piece.hessian() * squared);
+                let w_bend = weight_hessian(y) * squared;
+                let q_bend = piece.hessian() * squared;
                 sum_bend += q_bend * w + w_bend * q + both_ways(w_slope, q_slope);
                 total_bend += w_bend;
             }
@@ -149,13 +156,18 @@ impl Octree {
     /// Range and greatest gradient over the part of a leaf's cell within `radius` of `p`, which lies in the cell.
     fn over_part(&self, leaf: usize, p: DVec3, radius: f64) -> ([f64; 2], f64) {
         let value = self.blend_of::<0>(leaf, p).value;
-        let (mut hull, mut steepest_shape) = (EMPTY, 0.0f64);
+        let mut hull = EMPTY;
+        let mut steepest_shape = 0.0f64;
         // Sums of least and greatest weights and of greatest |∇wᵢ|, and of the latter two with greatest |Qᵢ − value|.
-        let (mut least, mut most_slope, mut slopes) = (0.0, 0.0, 0.0);
-        let (mut off, mut slopes_off) = (0.0, 0.0);
+        let mut least = 0.0;
+        let mut most_slope = 0.0;
+        let mut slopes = 0.0;
+        let mut off = 0.0;
+        let mut slopes_off = 0.0;
         for &id in self.listed(leaf) {
             let support = &self.supports[id as usize];
-            let (y, reach) = ((p - support.center) * support.inverse, radius * support.inverse);
+            let y = (p - support.center) * support.inverse;
+            let reach = radius * support.inverse;
             let r2 = y.length_squared();
             if r2 >= (1.0 + reach) * (1.0 + reach) {
                 continue;
@@ -164,7 +176,8 @@ impl Octree {
             let (pieces, joint) = self.function(id);
             let (range, slope) = shape_over_ball(pieces, joint, y, reach);
             let far = (range[1] - value).max(value - range[0]);
-            let (near, most) = ((r - reach).max(0.0), steepest(r - reach, r + reach) * support.inverse);
+            let near = (r - reach).max(0.0);
+            let most = steepest(r - reach, r + reach) * support.inverse;
             let most_weight = weight(near * near);
             hull = union(hull, &range);
             steepest_shape = steepest_shape.max(slope * support.inverse);

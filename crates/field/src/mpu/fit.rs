@@ -173,7 +173,8 @@ impl Ball {
         // Weights of a part may all be 0 at the rim of the ball.
         let weigh = |w: f64| if total > 0.0 { w / total } else { 1.0 / chosen.len() as f64 };
         let curves = || {
-            let (mut a, mut b) = ([[0.0; 6]; 6], [0.0; 6]);
+            let mut a = [[0.0; 6]; 6];
+            let mut b = [0.0; 6];
             for (u, v, h, w) in local.clone() {
                 add_equation(&mut a, &mut b, &[u * u, u * v, v * v, u, v, 1.0], h, weigh(w));
             }
@@ -181,7 +182,8 @@ impl Ball {
             solve(a, b)
         };
         let plane = || {
-            let (mut a, mut b) = ([[0.0; 3]; 3], [0.0; 3]);
+            let mut a = [[0.0; 3]; 3];
+            let mut b = [0.0; 3];
             for (u, v, h, w) in local.clone() {
                 add_equation(&mut a, &mut b, &[u, v, 1.0], h, weigh(w));
             }
@@ -195,7 +197,8 @@ impl Ball {
 
     /// The general quadric, or `None` where no auxiliary place is reliable or the system leaves a direction open.
     fn quadric(&self, tree: &SampleTree, half: f64, nearest: &mut Vec<(f64, u32)>) -> Option<Quadric> {
-        let (mut a, mut b) = ([[0.0; 10]; 10], [0.0; 10]);
+        let mut a = [[0.0; 10]; 10];
+        let mut b = [0.0; 10];
         let phi = |y: DVec3| [y.x * y.x, y.y * y.y, y.z * y.z, y.y * y.z, y.z * y.x, y.x * y.y, y.x, y.y, y.z, 1.0];
         for (s, w) in self.samples.iter().zip(&self.weights) {
             add_equation(&mut a, &mut b, &phi(s.position), 0.0, *w);

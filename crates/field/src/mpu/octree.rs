@@ -200,7 +200,8 @@ impl Octree {
             Part::Leaf { support, shape, error } => {
                 self.nodes[node] = LEAF | self.supports.len() as u32;
                 self.supports.push(support);
-                let (first, count) = (self.pieces.len() as u32, shape.pieces.len() as u32);
+                let first = self.pieces.len() as u32;
+                let count = shape.pieces.len() as u32;
                 self.functions.push(Pieces { first, count, joint: shape.joint });
                 self.pieces.extend(shape.pieces);
                 report.leaves += 1;

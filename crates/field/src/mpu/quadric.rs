@@ -30,7 +30,8 @@ impl Quadric {
 
     /// Values times `s`, as a function of coordinates whose unit is `unit` of the old.
     pub(super) fn rescaled(self, s: f64, unit: f64) -> Self {
-        let (once, twice) = (s * unit, s * unit * unit);
+        let once = s * unit;
+        let twice = s * unit * unit;
         Self {
             constant: self.constant * s,
             linear: self.linear * once,
@@ -56,7 +57,8 @@ impl Quadric {
     }
 
     pub(super) fn hessian(&self) -> DMat3 {
-        let (d, m) = (2.0 * self.diagonal, 2.0 * self.mixed);
+        let d = 2.0 * self.diagonal;
+        let m = 2.0 * self.mixed;
         DMat3::from_cols(DVec3::new(d.x, m.z, m.y), DVec3::new(m.z, d.y, m.x), DVec3::new(m.y, m.x, d.z))
     }
 
@@ -68,7 +70,8 @@ impl Quadric {
     /// Range within `radius` of `y` and the largest gradient there.
     fn over_ball(&self, y: DVec3, radius: f64) -> ([f64; 2], f64) {
         let (value, gradient) = self.value_gradient(y);
-        let (slope, curvature) = (gradient.length(), self.curvature());
+        let slope = gradient.length();
+        let curvature = self.curvature();
         let reach = radius * (slope + radius * curvature);
         // Terms may cancel in the value: what they lose is relative to them, not to it.
         let slack = 1e-14 * (self.constant.abs() + self.linear.abs().element_sum() + curvature);

@@ -22,7 +22,8 @@ pub struct SurfaceSample {
 
 fn order(a: &SurfaceSample, b: &SurfaceSample) -> Ordering {
     let key = |s: &SurfaceSample| [s.position, s.normal].map(|v| v.to_array());
-    let (a, b) = (key(a), key(b));
+    let a = key(a);
+    let b = key(b);
     a.iter().flatten().zip(b.iter().flatten()).fold(Ordering::Equal, |o, (x, y)| o.then(x.total_cmp(y)))
 }
 
@@ -96,7 +97,8 @@ impl SampleTree {
                 continue;
             }
             let child = |c: usize| (self.boxes[c].distance_squared(p), c);
-            let (a, b) = (child(2 * node), child(2 * node + 1));
+            let a = child(2 * node);
+            let b = child(2 * node + 1);
             (stack[top], stack[top + 1]) = if a.0 <= b.0 { (b, a) } else { (a, b) };
             top += 2;
         }
@@ -133,7 +135,8 @@ impl SampleTree {
 /// First and one past the last sample of a leaf or node.
 fn range(node: usize, samples: usize) -> (usize, usize) {
     let level = node.ilog2();
-    let (mut from, mut to) = (0, samples);
+    let mut from = 0;
+    let mut to = samples;
     for bit in (0..level).rev() {
         let middle = from + (to - from) / 2;
         if node >> bit & 1 == 0 { to = middle } else { from = middle }
@@ -165,7 +168,8 @@ mod tests {
             let sample =
                 |i| SurfaceSample { position: DVec3::new(unit(i, 0), unit(i, 1), 0.1 * unit(i, 2)), normal: DVec3::Z };
             let tree = SampleTree::new((0..n).map(sample).collect());
-            let (mut ids, mut found) = (Vec::new(), Vec::new());
+            let mut ids = Vec::new();
+            let mut found = Vec::new();
             for i in 0..50 {
                 let p = sample(1000 + i).position * 1.5;
                 let mut all: Vec<(f64, u32)> =

@@ -58,7 +58,8 @@ fn seeds(ball: &Ball) -> Vec<DVec3> {
     if widest.1 == widest.2 {
         return Vec::new();
     }
-    let (a, b) = (normals[widest.1], normals[widest.2]);
+    let a = normals[widest.1];
+    let b = normals[widest.2];
     let edge = a.cross(b).normalize_or_zero();
     let along =
         normals.iter().fold(DVec3::ZERO, |best, n| if n.dot(edge).abs() > best.dot(edge).abs() { *n } else { best });

@@ -54,13 +54,15 @@ mod tests {
 
     #[test]
     fn a_small_system_is_solved_and_an_open_one_refused() {
-        let (mut a, mut b) = ([[0.0; 3]; 3], [0.0; 3]);
+        let mut a = [[0.0; 3]; 3];
+        let mut b = [0.0; 3];
         for (phi, value) in [([1.0, 2.0, 0.5], 6.5), ([0.0, 1.0, 3.0], 11.0), ([2.0, -1.0, 1.0], 3.0)] {
             add_equation(&mut a, &mut b, &phi, value, 0.25);
         }
         let x = solve(a, b).expect("three independent equations");
         assert!(x.iter().zip([1.0, 2.0, 3.0]).all(|(x, e)| (x - e).abs() < 1e-12), "{x:?}");
-        let (mut a, mut b) = ([[0.0; 3]; 3], [0.0; 3]);
+        let mut a = [[0.0; 3]; 3];
+        let mut b = [0.0; 3];
         add_equation(&mut a, &mut b, &[1.0, 2.0, 0.5], 6.5, 1.0);
         add_equation(&mut a, &mut b, &[2.0, 4.0, 1.0], 13.0, 1.0);
         assert_eq!(solve(a, b), None);

@@ -55,7 +55,8 @@ impl Recorded {
         let state: SortState =
             bytemuck::pod_read_unaligned(state_bytes.ok_or(short("state", size_of::<SortState>(), state.len()))?);
         if state.kept > self.capacities.kept {
-            let (needed, had) = (state.kept.into(), self.capacities.kept.into());
+            let needed = state.kept.into();
+            let had = self.capacities.kept.into();
             return Err(Error::Overflow(Overflow { what: "splats in the view", needed, had }));
         }
         let splats = ids.map_or(cloud.len().min(cloud.radius.len()), <[u32]>::len);
@@ -65,7 +66,8 @@ impl Recorded {
             let (words, _) = used.as_chunks::<4>();
             Ok(words.iter().map(|w| u32::from_ne_bytes(*w)).collect())
         };
-        let (keys, places) = (words("keys", keys)?, words("places", places)?);
+        let keys = words("keys", keys)?;
+        let places = words("places", places)?;
         if let Some(&wrong) = places.iter().find(|&&p| p as usize >= splats) {
             return Err(short("places", splats, wrong as usize));
         }
@@ -93,7 +95,8 @@ pub fn join(parts: &[Sorted], cloud: &Cloud, ids: Option<&[u32]>, params: &Param
     }
     let least = |key: fn(&Sorted) -> u32| parts.iter().map(key).min().unwrap_or(u32::MAX);
     let far_key = parts.iter().map(|part| part.far_key).max().unwrap_or(0);
-    let (near, far) = (depth_of_key(least(|part| part.near_key)), depth_of_key(far_key));
+    let near = depth_of_key(least(|part| part.near_key));
+    let far = depth_of_key(far_key);
     let radius_at = |place: usize| cloud.radius[ids.map_or(place, |ids| ids[place] as usize)];
     let chosen = || {
         let span = f64::from(far) - f64::from(near);
@@ -180,7 +183,8 @@ mod tests {
         places.sort_by(|a, b| depth(a).total_cmp(&depth(b)));
         let keys: Vec<u32> = places.iter().map(|place| key_of(depth(place))).collect();
         let smallest = ids.iter().map(|id| cloud.radius[*id as usize]).fold(f32::INFINITY, f32::min);
-        let (kept, [near_key, far_key]) = (keys.len() as u32, [keys[0], keys[keys.len() - 1]]);
+        let kept = keys.len() as u32;
+        let [near_key, far_key] = [keys[0], keys[keys.len() - 1]];
         let state = SortState { kept, near_key, far_key, radius_key: key_of(smallest), ..bytemuck::Zeroable::zeroed() };
         [bytemuck::bytes_of(&state), bytemuck::cast_slice(&keys), bytemuck::cast_slice(&places)].map(<[u8]>::to_vec)
     }

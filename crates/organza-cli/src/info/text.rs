@@ -67,7 +67,8 @@ pub(super) fn of_facts(file: &Path, facts: &Facts) -> String {
     if facts.kind != "image" {
         let stands = facts.stands.map(UpAxis::name);
         let stands = stands.map(|axis| format!("; it stands along {axis}, so a first scene has {axis} point up"));
-        let (axis, stands) = (facts.up.name(), stands.unwrap_or_default());
+        let axis = facts.up.name();
+        let stands = stands.unwrap_or_default();
         text.add(
             "up",
             if facts.is_up_stated {

@@ -21,7 +21,8 @@ pub(super) fn chain_in_parts(
 ) -> Result<Result<Chained, Reason>, Failure> {
     let (order, mut passes) = slice_cloud_on(device, splats.input.cloud, splats.ids, splats.input.camera, splats.sort)?;
     let mut begun = accumulator.clone();
-    let (mut visible, mut raster) = (0, RasterCounts::default());
+    let mut visible = 0;
+    let mut raster = RasterCounts::default();
     let mut rest = &order.input_from_sorted[..];
     while !rest.is_empty() {
         let (ids, behind) = rest.split_at(most.min(rest.len()));

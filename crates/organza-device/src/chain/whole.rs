@@ -44,7 +44,9 @@ impl Whole {
         // The translucent ones come first.
         let sorted = order::Capacities { splats: room.ordered, kept: room.ordered };
         let sort = sorts.then(|| order::record(sorted));
-        let (attributes, footprints, materials) = (attributes.room(), room.footprints, room.materials);
+        let attributes = attributes.room();
+        let footprints = room.footprints;
+        let materials = room.materials;
         let projected =
             project::record(project::Capacities { attributes, footprints, materials, depth: room.needs_depth() })?;
         let shaded = shade::record(shade::Capacities::of(input, attributes, layout));
@@ -136,7 +138,9 @@ impl Whole {
         run: impl FnOnce(&[(BufferId, &[u8])]) -> Result<T, Failure>,
     ) -> Result<T, Failure> {
         let Splats { input, ids, footprints, raster, opaque, sort, .. } = *splats;
-        let (origin, camera, materials) = (input.cloud.origin, input.camera, input.materials);
+        let origin = input.cloud.origin;
+        let camera = input.camera;
+        let materials = input.materials;
         let count = ids.len() as u32;
         let view = order::view_bytes(origin, count, camera, sort);
         let of_object = |id: &u32| input.cloud.object[*id as usize];
@@ -144,8 +148,9 @@ impl Whole {
             if accumulator.object.is_empty() { Vec::new() } else { all.iter().map(of_object).collect() };
         // Where nothing sorts they come in their order.
         let order: Vec<u32> = if self.sort.is_some() { Vec::new() } else { (0..count).collect() };
-        let ((projected, in_project), (shaded, in_shade), (composite, in_composite)) =
-            (&self.project, &self.shade, &self.composite);
+        let (projected, in_project) = &self.project;
+        let (shaded, in_shade) = &self.shade;
+        let (composite, in_composite) = &self.composite;
         let to = project::Input { origin, camera, footprints, materials, params: raster };
         let project = projected.uploads(&to, attributes)?;
         let shade = if self.shadows.is_empty() {
@@ -155,7 +160,10 @@ impl Whole {
         };
         let shares = shade::shadow_shares(input, all);
         let cast = shadows::uploads(&self.shadows, splats.castings, all, &shares)?;
-        let (direction, params, order, objects) = (sort.direction, raster, &order[..], &objects[..]);
+        let direction = sort.direction;
+        let params = raster;
+        let order = &order[..];
+        let objects = &objects[..];
         let opaque = self.resolve.is_none().then_some(opaque);
         let into = follow::Input { camera, footprints, materials, opaque, direction, params, order, objects };
         let composited = follow::uploads(composite, &into, accumulator)?;
@@ -203,9 +211,11 @@ mod tests {
     fn attributes_are_uploaded_once_and_the_picture_alone_is_large_of_what_comes_back() {
         let mut cloud = Cloud::new(DVec3::ZERO);
         (0..3000).for_each(|i| cloud.push(&Splat { position: Vec3::X * i as f32, ..Splat::default() }));
-        let (size, view) = ([64, 48], Projection::Perspective { fov_y: 1.0 });
+        let size = [64, 48];
+        let view = Projection::Perspective { fov_y: 1.0 };
         let camera = Camera::look_at(DVec3::Z, DVec3::ZERO, DVec3::Y, view, size).expect("a camera");
-        let (materials, objects) = ([Material::default()], []);
+        let materials = [Material::default()];
+        let objects = [];
         let input = ShadeInput {
             cloud: &cloud,
             materials: &materials,

@@ -59,7 +59,8 @@ impl ChainInput {
                 ..Splat::default()
             });
         }
-        let (eye, view) = (DVec3::new(0.3, 0.2, 4.0), Projection::Perspective { fov_y: 0.5 });
+        let eye = DVec3::new(0.3, 0.2, 4.0);
+        let view = Projection::Perspective { fov_y: 0.5 };
         let camera = Camera::look_at(eye, DVec3::ZERO, DVec3::Y, view, SIZE).expect("invariant: a view of its target");
         let glossy = Material { specular: 0.05, transmission: 0.2, ..Material::default() };
         let materials = [Material { asymmetry: 0.5, ..Material::default() }, glossy];
@@ -69,7 +70,8 @@ impl ChainInput {
             light(LightShape::Point { position: DVec3::new(1.0, 2.0, 2.0) }, [2.0; 3]),
             light(LightShape::Directional { direction }, [0.5, 0.4, 0.3]),
         ];
-        let (footprints, params) = (FootprintStack::default(), Params::default());
+        let footprints = FootprintStack::default();
+        let params = Params::default();
         let projected = raster::project(&ProjectInput {
             cloud: &cloud,
             camera: &camera,
@@ -90,27 +92,33 @@ impl ChainInput {
             light,
             shadow,
         });
-        let (cloud, materials, objects) = (&self.cloud, &self.materials[..], &self.objects[..]);
+        let cloud = &self.cloud;
+        let materials = &self.materials[..];
+        let objects = &self.objects[..];
         work(&ShadeInput { cloud, materials, objects, lights: &lit, ambient: [0.05; 3], camera: &self.camera })
     }
 
     pub(super) fn check_project(&self, device: &mut dyn Executor) -> Result<Found, Failure> {
         let attributes = Attributes::new(&self.cloud, None)?;
-        let (footprints, materials, params) = (&self.footprints, &self.materials[..], &Params::default());
+        let footprints = &self.footprints;
+        let materials = &self.materials[..];
+        let params = &Params::default();
         let recorded = project::record(project::Capacities {
             attributes: attributes.room(),
             footprints: footprints.layers().len() as u32,
             materials: materials.len() as u32,
             depth: false,
         })?;
-        let (origin, camera) = (self.cloud.origin, &self.camera);
+        let origin = self.cloud.origin;
+        let camera = &self.camera;
         let uploads =
             recorded.uploads(&project::Input { origin, camera, footprints, materials, params }, &attributes)?;
         let mut inputs: Vec<(BufferId, &[u8])> = recorded.inputs(&uploads).to_vec();
         inputs.extend(attributes.inputs(&recorded.attributes));
         let run = device.run(&recorded.recording, &inputs)?;
         let twin: Vec<f32> = words(&self.projected, false).into_iter().map(f32::from_bits).collect();
-        let (mut found, expected) = (shares(&floats(run.bytes(recorded.splats)), &twin), shares(&twin, &twin));
+        let mut found = shares(&floats(run.bytes(recorded.splats)), &twin);
+        let expected = shares(&twin, &twin);
         // What no pixel shows has no footprint.
         let hidden = |k: usize| expected[k / 8 * 8 + 5] == 0.0;
         found.iter_mut().enumerate().filter(|(k, _)| hidden(*k) && k % 8 != 5).for_each(|(_, v)| *v = 0.0);
@@ -120,7 +128,8 @@ impl ChainInput {
     }
 
     pub(super) fn check_shade(&self, device: &mut dyn Executor) -> Result<Found, Failure> {
-        let (attributes, layout) = (Attributes::new(&self.cloud, None)?, ChannelLayout::default());
+        let attributes = Attributes::new(&self.cloud, None)?;
+        let layout = ChannelLayout::default();
         let ids: Vec<u32> = (0..SPLATS).collect();
         self.lit(|input| {
             let recorded = shade::record(shade::Capacities::of(input, attributes.room(), layout));
@@ -137,8 +146,11 @@ impl ChainInput {
     }
 
     pub(super) fn check_chain(&self, device: &mut dyn Executor) -> Result<Found, Failure> {
-        let (ids, progress): (Vec<u32>, _) = ((0..SPLATS).collect(), Progress::new());
-        let (layout, raster, opaque) = (ChannelLayout::default(), Params::default(), OpaqueImage::default());
+        let ids: Vec<u32> = (0..SPLATS).collect();
+        let progress = Progress::new();
+        let layout = ChannelLayout::default();
+        let raster = Params::default();
+        let opaque = OpaqueImage::default();
         let direction = Direction::FrontToBack;
         let sort = hbsort::Params { direction, exact: true, margin_px: 2.0, ..hbsort::Params::default() };
         let mut expected = Accumulator::new(SIZE, 1, layout.count(), false, false);

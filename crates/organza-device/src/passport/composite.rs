@@ -37,13 +37,16 @@ impl CompositeInput {
             let cross_section = 0.3 * radius * radius * number(i, 5);
             cloud.push(&Splat { position, radius, cross_section, kind: SplatKind::Medium, ..Splat::default() });
         }
-        let (eye, view) = (DVec3::Z * 4.0, Projection::Orthographic { height: 2.2 });
+        let eye = DVec3::Z * 4.0;
+        let view = Projection::Orthographic { height: 2.2 };
         let camera = Camera::look_at(eye, DVec3::ZERO, DVec3::Y, view, SIZE).expect("invariant: a view of its target");
         Self { cloud, camera, values: (0..3 * u64::from(SPLATS)).map(|i| number(i, 6)).collect() }
     }
 
     pub(super) fn check(&self, device: &mut dyn Executor) -> Result<Found, Failure> {
-        let (params, materials, opaque) = (Params::default(), [Material::default()], OpaqueImage::default());
+        let params = Params::default();
+        let materials = [Material::default()];
+        let opaque = OpaqueImage::default();
         let projected = project(&ProjectInput {
             cloud: &self.cloud,
             camera: &self.camera,
@@ -53,7 +56,8 @@ impl CompositeInput {
             detail: Detail::ALL,
         });
         let order: Vec<u32> = (0..SPLATS).collect();
-        let (values, direction) = (&self.values[..], Direction::FrontToBack);
+        let values = &self.values[..];
+        let direction = Direction::FrontToBack;
         let mut expected = Accumulator::new(SIZE, 1, 3, false, false);
         let mut found = expected.clone();
         let input = FoldInput {

@@ -31,12 +31,15 @@ impl OpaqueInput {
             let position = [3.2 * number(i, 0) - 1.6, 2.0 * number(i, 1) - 1.0, 2.0 * number(i, 2) - 1.0].into();
             let normal = Vec3::new(number(i, 3) - 0.5, number(i, 4) - 0.5, number(i, 5)).normalize_or(Vec3::Z);
             let radius = 0.02 + 0.1 * number(i, 6);
-            let (kind, cross_section) = (SplatKind::Opaque, 0.17 * radius * radius);
+            let kind = SplatKind::Opaque;
+            let cross_section = 0.17 * radius * radius;
             cloud.push(&Splat { position, normal, radius, cross_section, kind, ..Splat::default() });
         }
-        let (eye, view) = (DVec3::Z * 4.0, Projection::Perspective { fov_y: 0.5 });
+        let eye = DVec3::Z * 4.0;
+        let view = Projection::Perspective { fov_y: 0.5 };
         let camera = Camera::look_at(eye, DVec3::ZERO, DVec3::Y, view, SIZE).expect("invariant: a view of its target");
-        let (footprints, materials) = (FootprintStack::default(), [Material::default()]);
+        let footprints = FootprintStack::default();
+        let materials = [Material::default()];
         let mut projected = Projected::default();
         project_into(
             &mut projected,

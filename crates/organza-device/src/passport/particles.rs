@@ -32,7 +32,8 @@ impl ParticlesInput {
             let position = corners.map(|(x, y)| Vec3::new(side * x, side * y, z)).to_vec();
             Mesh { position, triangles: vec![[0, 1, 2], [0, 2, 3]], ..Mesh::default() }
         };
-        let (eye, view) = (DVec3::new(0.3, 0.2, 4.0), Projection::Perspective { fov_y: 0.7 });
+        let eye = DVec3::new(0.3, 0.2, 4.0);
+        let view = Projection::Perspective { fov_y: 0.7 };
         let camera = Camera::look_at(eye, DVec3::ZERO, DVec3::Y, view, SIZE).expect("invariant: a view of its target");
         Self { walls: [wall(0.7, 0.8), wall(1.5, -0.5)], camera }
     }
@@ -73,10 +74,13 @@ impl ParticlesInput {
             Object { sampler, transform, look: Appearance { material, radius: RADIUS, ..Appearance::default() } }
         };
         let objects = [object(&near, 0.5), object(&far, -0.3)];
-        let (shadow_origin, camera) = (DVec3::ZERO, &self.camera);
+        let shadow_origin = DVec3::ZERO;
+        let camera = &self.camera;
         let scene = Scene { objects: &objects, lights, shadow_origin, ambient: [0.1; 3], camera, occluder: None };
         let empty = Ensemble::new(SIZE, &EnsembleParams { radiance_unit: 0.5, ..EnsembleParams::default() })?;
-        let (mut expected, mut found, progress) = (empty.clone(), empty, Progress::default());
+        let mut expected = empty.clone();
+        let mut found = empty;
+        let progress = Progress::default();
         Renderer::new().fold(
             &scene,
             &mut expected,
@@ -100,7 +104,8 @@ fn agreement(found: &Ensemble, expected: &Ensemble) -> Agreement {
         let layers = ensemble.read(&|_, _| [0.0; 3], None);
         layers.rgb("beauty").map(<[[f32; 3]]>::to_vec).unwrap_or_default()
     };
-    let (a, b) = (radiance(found), radiance(expected));
+    let a = radiance(found);
+    let b = radiance(expected);
     let apart: Vec<f64> =
         a.as_flattened().iter().zip(b.as_flattened()).map(|(a, b)| f64::from((a - b).abs())).collect();
     let equal_share = same as f64 / pixels().count() as f64;

@@ -45,7 +45,8 @@ impl ShadowInput {
         let shape = LightShape::Point { position: DVec3::new(0.4, 2.0, -0.3) };
         let light = Light { shape, intensity: [1.0; 3] };
         let materials = [Material::default()];
-        let (params, progress) = (Params::default(), Progress::new());
+        let params = Params::default();
+        let progress = Progress::new();
         let valid = "invariant: generated splats and a lamp are valid, and fit";
         let casting = Casting::new(
             &tsm::Scene { cloud: &cloud, materials: &materials, objects: &[] },
@@ -76,7 +77,8 @@ impl ShadowInput {
         let made = map_on(device, &self.deposits)?;
         let (found, passes) = made.ok_or(Failure::from(DeviceError::Memory { bytes: self.map.counts().bytes }))?;
         let apart = |cell: u32| {
-            let (a, b) = (found.list(cell), self.map.list(cell));
+            let a = found.list(cell);
+            let b = self.map.list(cell);
             let total =
                 |list: &[(f64, [f32; 3])]| list.iter().rfind(|(_, t)| t[0].is_finite()).map_or(0.0, |(_, t)| t[0]);
             (a != b, f64::from((total(&a) - total(&b)).abs()))

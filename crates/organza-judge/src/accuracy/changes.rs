@@ -60,7 +60,8 @@ pub fn changes(as_written: &Scene, request: &Request) -> Vec<Change> {
 
 /// The same as TOML to copy. What cannot be a line of its own table stands in a comment.
 pub fn lines(as_written: &Scene, request: &Request) -> String {
-    let (mut text, mut open) = (String::new(), String::new());
+    let mut text = String::new();
+    let mut open = String::new();
     for Change { table, key, value } in changes(as_written, request) {
         if table != open && table.starts_with("render") {
             text += &format!("[{table}]\n");

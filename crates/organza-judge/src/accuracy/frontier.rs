@@ -217,9 +217,12 @@ mod tests {
 
     #[test]
     fn a_rerun_gives_the_same_frontier_in_nine_of_ten_points() {
-        let (mut same, mut all, mut thin) = (0, 0, usize::MAX);
+        let mut same = 0;
+        let mut all = 0;
+        let mut thin = usize::MAX;
         for pair in 0..100 {
-            let (a, b) = (rerun(2 * pair), rerun(2 * pair + 1));
+            let a = rerun(2 * pair);
+            let b = rerun(2 * pair + 1);
             same += a.iter().filter(|id| b.contains(id)).count();
             all += a.len().max(b.len());
             thin = thin.min(a.len());

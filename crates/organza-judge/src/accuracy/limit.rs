@@ -38,7 +38,8 @@ pub(super) fn converge(
     progress: &Progress,
     draw: &mut Draw<'_>,
 ) -> Result<(Vec<Curve>, Limit), Error> {
-    let (mut curves, mut refused) = (Vec::new(), Vec::new());
+    let mut curves = Vec::new();
+    let mut refused = Vec::new();
     for (knob, of_step) in sweep.knobs.iter().zip(&settings.of_step) {
         progress.begin(knob.name);
         match curve(sweep, (knob, of_step), settings, timed, floor, draw) {
@@ -124,7 +125,8 @@ fn limit(sweep: &Sweep, curves: &[Curve], mut held: Vec<Skipped>, draw: &mut Dra
     let mut best_first: Vec<&Curve> = curves.iter().collect();
     let worth = |c: &Curve| if c.end_size.is_none() { f64::INFINITY } else { c.own_setting / c.settled.own_error };
     best_first.sort_by(|a, b| worth(b).total_cmp(&worth(a)));
-    let (mut own_error, mut square) = (0.0, 0.0);
+    let mut own_error = 0.0;
+    let mut square = 0.0;
     let mut parts = Vec::new();
     for curve in best_first {
         let own = own_error + curve.settled.own_error;

@@ -129,7 +129,8 @@ impl<'a> Renderer<'a> {
     fn frame(&mut self, request: &Request) -> Result<Frame, Error> {
         let mut scene = request.scene.clone();
         scene.camera.size = scene.camera.size.map(|s| s.saturating_mul(request.oversample));
-        let (options, progress) = (self.options, self.progress);
+        let options = self.options;
+        let progress = self.progress;
         let (loaded, convert_seconds) = self.load(&scene)?;
         let plain = request.packed.then(|| pack(&mut loaded.cloud)).transpose()?;
         let mut cost = CostRecord::default();
@@ -158,7 +159,8 @@ impl<'a> Renderer<'a> {
     }
 
     fn look(&mut self, scene: &Scene) -> Result<Facts, Error> {
-        let (options, progress) = (self.options, self.progress);
+        let options = self.options;
+        let progress = self.progress;
         let (loaded, _) = self.load(scene)?;
         let plan = plan_loaded(scene, loaded, options)?;
         let translucent: Vec<u32> =
@@ -184,7 +186,8 @@ impl<'a> Renderer<'a> {
     /// As [`Renderer::draw`].
     pub fn slab_width(&mut self, scene: &Scene) -> Result<Option<f64>, Error> {
         self.within_stage(|renderer| {
-            let (options, progress) = (renderer.options, renderer.progress);
+            let options = renderer.options;
+            let progress = renderer.progress;
             let (loaded, _) = renderer.load(scene)?;
             let plan = plan_loaded(scene, loaded, options)?;
             organza::Frame::new(scene, loaded, &plan, progress).slab_width(options, &mut CostRecord::default())
@@ -283,7 +286,8 @@ mod tests {
         "#;
         let scene = organza::scene::parse("s.toml".as_ref(), text, &Default::default()).unwrap();
         let scene = scene.drawn_by(organza::scene::Technique::Points);
-        let (options, progress) = (RenderOptions::default(), Progress::new());
+        let options = RenderOptions::default();
+        let progress = Progress::new();
         let mut renderer = Renderer::new(&options, &progress);
         let mut draw = |packed| renderer.draw(&Request { scene: scene.clone(), oversample: 1, packed }).unwrap().image;
         let [plain, packed, again] = [false, true, false].map(&mut draw);

@@ -98,7 +98,10 @@ impl Plot {
     }
 
     fn axes(&self, svg: &mut String, x: &Axis, y: &Axis) {
-        let (bottom, top, left, right) = (y.from, y.to, x.from, x.to);
+        let bottom = y.from;
+        let top = y.to;
+        let left = x.from;
+        let right = x.to;
         for (value, lettered) in x.ticks() {
             let at = x.at(value);
             line(svg, [at, top], [at, bottom], if lettered { "var(--grid)" } else { "var(--faint)" }, "");
@@ -162,7 +165,8 @@ fn draw(svg: &mut String, series: &Series, x: &Axis, y: &Axis) {
         }
         Mark::Bars => {
             for pair in placed.chunks_exact(2) {
-                let ([x, low], [_, high]) = (pair[0].0, pair[1].0);
+                let [x, low] = pair[0].0;
+                let [_, high] = pair[1].0;
                 line(svg, [x, low], [x, high], color, "");
                 [low, high].iter().for_each(|y| line(svg, [x - 4.0, *y], [x + 4.0, *y], color, ""));
             }

@@ -34,7 +34,8 @@ pub(super) fn repeat_all(
     for job in jobs {
         progress.begin(&name(job));
         progress.tick(0).map_err(|_| Error::Cancelled)?;
-        let (setting, repeat) = (job % n, job / n);
+        let setting = job % n;
+        let repeat = job / n;
         let mut request = settings.list[setting].request.clone();
         if repeats.seeded {
             request.scene.render.seed = request.scene.render.seed.wrapping_add(repeat as u64);

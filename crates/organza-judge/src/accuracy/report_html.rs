@@ -92,7 +92,8 @@ fn color(study: &Study, knob: Option<&str>) -> &'static str {
 fn time_plot(html: &mut String, study: &Study) {
     let place = |i: usize| {
         let o = &study.outcomes[i];
-        let (s, e) = (least_seconds(o)?, rmse(o).filter(|_| o.drawn)?);
+        let s = least_seconds(o)?;
+        let e = rmse(o).filter(|_| o.drawn)?;
         Some(([1e3 * s, e], format!("{}: {:.1} ms, RMSE {e:.2e}", o.setting.label, 1e3 * s)))
     };
     let frontier = study.frontier.iter().rev().filter_map(|i| place(*i)).collect();
@@ -153,11 +154,13 @@ fn knob_plot(study: &Study, curve: &Curve, meaning: &str) -> Option<Plot> {
     let drawn = curve.points.iter().filter(|p| p.drawn);
     let points: Vec<([f64; 2], String)> = drawn
         .filter_map(|p| {
-            let (x, y) = (p.size?, p.error?);
+            let x = p.size?;
+            let y = p.error?;
             Some(([x, y], format!("{}: {y_label} {y:.2e}", study.outcomes[p.setting].setting.label)))
         })
         .collect();
-    let (first, last) = (points.first()?.0[0], points.last()?.0[0]);
+    let first = points.first()?.0[0];
+    let last = points.last()?.0[0];
     let mut series = Vec::new();
     if let Some(fit) = curve.settled.order() {
         let own = if curve.end_size.is_some() { curve.settled.own_error } else { 0.0 };
@@ -197,7 +200,8 @@ fn pictures(html: &mut String, study: &Study, exposure: f64, at: usize) -> Resul
         let shown = image.display(exposure);
         let (apart, gain) = difference(&shown, &limit)?;
         let label = escaped(&o.setting.label);
-        let (a, d) = (data_uri(&shown)?, data_uri(&apart)?);
+        let a = data_uri(&shown)?;
+        let d = data_uri(&apart)?;
         let flip = o.from_limit.as_ref().map_or_else(String::new, |d| format!(" FLIP {:.4}", d.flip));
         let _ = writeln!(
             html,

@@ -73,19 +73,22 @@ pub(super) fn bar_of(o: &Outcome, color: &str) -> Option<Series> {
 }
 
 fn bar(o: &Outcome, against: Against, color: &str) -> Option<Series> {
-    let ((mean, half), seconds) = (error(o, against).filter(|e| e.1 > 0.0)?, least_seconds(o)?);
+    let (mean, half) = error(o, against).filter(|e| e.1 > 0.0)?;
+    let seconds = least_seconds(o)?;
     let ends = [-half, half].map(|h| ([1e3 * seconds, (mean + h).max(LEAST * mean)], String::new()));
     Some(Series { color: color.into(), mark: Mark::Bars, points: ends.to_vec() })
 }
 
 fn plot(report: &Report, against: Against, y_label: &str, floor: Option<(f64, String)>) -> Plot {
     let place = |o: &Outcome| {
-        let (s, (e, half)) = (least_seconds(o)?, error(o, against)?);
+        let s = least_seconds(o)?;
+        let (e, half) = error(o, against)?;
         let interval = if half > 0.0 { format!(" ± {half:.1e}") } else { String::new() };
         Some(([1e3 * s, e], format!("{}: {:.1} ms, RMSE {e:.2e}{interval}", o.setting.label, 1e3 * s)))
     };
     let mut series = Vec::new();
-    let (limit, truth) = (&report.frontier, &report.frontier_by_truth);
+    let limit = &report.frontier;
+    let truth = &report.frontier_by_truth;
     let on_it = if against == Against::Limit { limit } else { truth };
     let on_it = on_it.iter().rev().filter_map(|[s, o]| place(&report.studies[*s].outcomes[*o]));
     series.push(Series { color: "var(--accent)".into(), mark: Mark::Steps, points: on_it.collect() });

@@ -97,7 +97,8 @@ fn richardson(points: &[[f64; 2]], end: f64, floor: f64) -> (f64, Option<f64>) {
         // Nothing differs by more than rounding: so does the end.
         return (points.last().map_or(f64::INFINITY, |_| floor), None);
     };
-    let (mut own, mut order) = (0.0, 0.0);
+    let mut own = 0.0;
+    let mut order = 0.0;
     for _ in 0..30 {
         let corrected: Vec<[f64; 2]> = above.iter().map(|p| [p[0], p[1] + own]).collect();
         let all = fit_order(&corrected).map_or(0.0, |f| f.order);

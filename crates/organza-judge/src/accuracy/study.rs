@@ -199,7 +199,8 @@ fn candidates_by<'a>(
     half_width: impl Fn(&Outcome) -> Option<f64>,
 ) -> Vec<Candidate> {
     let candidate = |(id, o): (usize, &Outcome)| {
-        let (error, seconds) = (error(o)?, least_seconds(o)?);
+        let error = error(o)?;
+        let seconds = least_seconds(o)?;
         Some(Candidate { id, error, half_width: half_width(o).unwrap_or(0.0), seconds })
     };
     outcomes.enumerate().filter_map(candidate).collect()

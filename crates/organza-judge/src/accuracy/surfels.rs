@@ -67,7 +67,10 @@ fn gap() -> Knob {
 
 /// A knob whose positions are choices.
 fn choices(name: &'static str, set: fn(&mut Request, f64), steps: Vec<Step>) -> Knob {
-    let (ends, end_is_exact, theory, joint) = (Vec::new(), false, None, false);
+    let ends = Vec::new();
+    let end_is_exact = false;
+    let theory = None;
+    let joint = false;
     Knob { name, size_meaning: "", set, steps, ends, end_is_exact, theory, joint }
 }
 

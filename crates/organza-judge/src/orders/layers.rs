@@ -64,14 +64,16 @@ fn truth(scene: &Scene, loaded: &Loaded, options: &RenderOptions, progress: &Pro
     let frame = Frame::new(scene, loaded, &plan, progress);
     let mut cost = CostRecord::default();
     let values = &frame.shaded(&mut cost)?.values;
-    let (settings, cloud) = (&scene.render.surfels, frame.drawn());
+    let settings = &scene.render.surfels;
+    let cloud = frame.drawn();
     let params = Params {
         disc_scale: settings.disc_scale as f32,
         gap: settings.gap as f32,
         transmittance_cutoff: settings.transmittance_cutoff as f32,
     };
     let ids = frame.translucent(Technique::Surfels);
-    let (footprints, materials) = (&loaded.footprints, &loaded.materials);
+    let footprints = &loaded.footprints;
+    let materials = &loaded.materials;
     let input = DiscInput { cloud, ids, camera: &frame.camera, footprints, materials };
     let mut accumulator = frame.accumulator();
     let sizes = [accumulator.optical_depth.len(), accumulator.channels.len()];

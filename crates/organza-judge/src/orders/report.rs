@@ -290,7 +290,9 @@ impl OrdersReport {
             let shown = self.shown(o);
             let (apart, gain) = difference(&shown, &truth(o, &self.comparison).display(self.exposure))?;
             let of = if o.of_layers { "layers" } else { "truth" };
-            let (a, d, name) = (data_uri(&shown)?, data_uri(&apart)?, &o.name);
+            let a = data_uri(&shown)?;
+            let d = data_uri(&apart)?;
+            let name = &o.name;
             let _ = writeln!(
                 html,
                 "<figure class=\"flip\"><img src=\"{a}\" alt=\"{name}\"><h3>{name}</h3><button \
@@ -316,7 +318,8 @@ fn pops(o: &Ordered, none: &str) -> String {
 fn seeds(o: &Ordered) -> String {
     let Some(s) = &o.sampled else { return String::new() };
     let bias = s.bias.map_or_else(|| "none at 95 %".into(), |b| format!("{b:.1e}"));
-    let (mean, half) = (s.from_limit.mean, s.from_limit.half_width);
+    let mean = s.from_limit.mean;
+    let half = s.from_limit.half_width;
     format!(" ({} seeds: RMSE {mean:.2e} ± {half:.0e}, bias {bias})", s.seeds)
 }
 

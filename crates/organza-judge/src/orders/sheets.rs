@@ -112,7 +112,8 @@ impl Way {
 impl<'a> Splats<'a> {
     /// The translucent ones, of these ids.
     pub(super) fn new(scene: &'a Scene, loaded: &'a Loaded, plan: &'a Plan, ids: &[u32]) -> Self {
-        let (cloud, share) = (&loaded.cloud, 1.0 / ids.len() as f64);
+        let cloud = &loaded.cloud;
+        let share = 1.0 / ids.len() as f64;
         let radius = ids.iter().map(|id| f64::from(cloud.radius[*id as usize])).sum::<f64>() * share;
         let middle = ids.iter().map(|id| cloud.position[*id as usize].as_dvec3()).sum::<DVec3>() * share;
         let middle = cloud.origin + middle;
@@ -151,7 +152,8 @@ impl<'a> Splats<'a> {
     }
 
     fn keys(&self, way: Way, camera: &Camera) -> Keys {
-        let (cloud, middle) = (&self.loaded.cloud, self.middle);
+        let cloud = &self.loaded.cloud;
+        let middle = self.middle;
         let depths =
             |normal: DVec3| cloud.position.iter().map(move |p| normal.dot(cloud.origin + p.as_dvec3() - middle));
         let of_splats = match way {
@@ -273,9 +275,11 @@ fn composite(input: &Input<'_>, fragments: &[Fragment], keys: &Keys) -> Pixel {
     };
     let mut sorted: Vec<(f64, &Fragment)> = fragments.iter().map(|f| (key(f), f)).collect();
     sorted.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let (mut color, mut so_far) = ([0.0f64; 3], [0.0f64; 3]);
+    let mut color = [0.0f64; 3];
+    let mut so_far = [0.0f64; 3];
     for sheet in sorted.chunk_by(|a, b| a.0 == b.0) {
-        let (mut depth, mut sum) = ([0.0; 3], [0.0; 3]);
+        let mut depth = [0.0; 3];
+        let mut sum = [0.0; 3];
         for (_, f) in sheet {
             let material = &input.materials[usize::from(input.cloud.material[f.splat as usize])];
             for c in 0..3 {
@@ -307,7 +311,8 @@ fn nearest_axis(direction: DVec3) -> usize {
 /// A camera turned about a place and its own upward axis.
 fn turned(camera: &Camera, about: DVec3, degrees: f64) -> Camera {
     let turn = DMat3::from_axis_angle(camera.axes[1], degrees.to_radians());
-    let (position, axes) = (about + turn * (camera.position - about), camera.axes.map(|axis| turn * axis));
+    let position = about + turn * (camera.position - about);
+    let axes = camera.axes.map(|axis| turn * axis);
     Camera { position, axes, ..*camera }
 }
 

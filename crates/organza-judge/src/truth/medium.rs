@@ -94,7 +94,8 @@ pub(super) fn medium(scene: &Scene, object: &SceneObject, options: &RenderOption
     let constant = constant.map(f64::from);
     let (color, brightest): (Box<dyn Fn(DVec3) -> [f64; 3] + Send + Sync>, f64) = match &shape {
         Shape::Volume(volume) => {
-            let (source, brightest) = (Arc::clone(volume), volume.brightest());
+            let source = Arc::clone(volume);
+            let brightest = volume.brightest();
             (Box::new(move |p| source.color(p)), brightest)
         }
         _ => (Box::new(move |_| constant), constant.into_iter().fold(0.0, f64::max)),
@@ -212,7 +213,8 @@ fn shape(
 /// A number that a field does not exceed in a box: the largest upper bound over balls around its cells, or where there is
 /// none a guess from samples, which the tracer watches.
 fn majorant(field: &Placed<ExpressionField>, bounds: DAabb) -> f64 {
-    let (low, size) = (bounds.min, bounds.size());
+    let low = bounds.min;
+    let size = bounds.size();
     let cell = size.max_element() / MAJORANT_CELLS;
     let count = (size / cell).ceil().max(DVec3::ONE);
     let step = size / count;

@@ -125,7 +125,8 @@ fn solid(scene: &Scene, source: &Source, object: &SceneObject, options: &RenderO
     let refused = |e| Error::from_core("a solid", e);
     match source {
         Source::Implicit(i) => {
-            let (field, walls) = (Arc::new(i.field()?), Vec::new());
+            let field = Arc::new(i.field()?);
+            let walls = Vec::new();
             Ok(Solid { field, walls, bounds: i.bounds, step: i.spacing }.closed())
         }
         Source::Isosurface(i) => match read(scene, &i.path, i.frame, object.array.as_ref(), options)? {
@@ -193,7 +194,8 @@ fn surface(scene: &Scene, object: &SceneObject, mut mesh: Mesh) -> Body {
     mesh.color.iter_mut().for_each(|c| *c = c.map(|v| (f64::from(v) * scale) as f32));
     let opacity = object.opacity.unwrap_or(material.opacity);
     let kind = if m.bounds_matter() {
-        let (eta, absorption) = (m.index_inside().map(f64::from), m.absorption_inside.map(f64::from));
+        let eta = m.index_inside().map(f64::from);
+        let absorption = m.absorption_inside.map(f64::from);
         SurfaceKind::Dielectric(Dielectric { eta, absorption })
     } else if opacity < 1.0 {
         let tau = optics::optical_depth(opacity);
@@ -249,7 +251,8 @@ fn place(mesh: &mut Mesh, t: &Similarity) {
     splat_core::part_at_creases(mesh);
     splat_core::smooth(mesh);
     mesh.origin = t.apply(mesh.origin);
-    let (turn, scale) = (t.rotation.as_quat(), t.scale as f32);
+    let turn = t.rotation.as_quat();
+    let scale = t.scale as f32;
     mesh.position.iter_mut().for_each(|p: &mut Vec3| *p = turn * (*p * scale));
     mesh.normal.iter_mut().for_each(|n| *n = turn * *n);
 }

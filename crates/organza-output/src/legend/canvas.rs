@@ -89,7 +89,8 @@ impl<'a> Canvas<'a> {
 
 /// From a line between two ends, which may be one place, to a place.
 fn distance([from, to]: [[f64; 2]; 2], place: [f64; 2]) -> f64 {
-    let (along, off) = ([to[0] - from[0], to[1] - from[1]], [place[0] - from[0], place[1] - from[1]]);
+    let along = [to[0] - from[0], to[1] - from[1]];
+    let off = [place[0] - from[0], place[1] - from[1]];
     let squared = along[0] * along[0] + along[1] * along[1];
     let share = if squared > 0.0 { ((off[0] * along[0] + off[1] * along[1]) / squared).clamp(0.0, 1.0) } else { 0.0 };
     let [dx, dy] = [0, 1].map(|i| off[i] - share * along[i]);

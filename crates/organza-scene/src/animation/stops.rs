@@ -28,7 +28,8 @@ pub struct Stop {
 impl Stop {
     /// What there is to say of a time up to which the object is free, in the scene at frame 0.
     pub fn said(&self, scene: &Scene, time: f64) -> Option<String> {
-        let (name, light) = (shown(&scene.objects[self.object].name), self.light);
+        let name = shown(&scene.objects[self.object].name);
+        let light = self.light;
         let said = format!("object '{name}' stops at frame {time:.2}, where light {light} sees it meet others");
         (time < self.last.into()).then_some(said)
     }

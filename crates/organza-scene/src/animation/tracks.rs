@@ -26,7 +26,8 @@ pub(crate) fn check_animation(at: &At<'_>, raw: &RawAnimation) -> Result<u32, Er
             return Err(at.key("keys").error("`keys`: expected at least one, found none", ""));
         }
         if let Some(k) = (1..track.keys.len()).find(|k| track.keys[*k].frame <= track.keys[k - 1].frame) {
-            let (before, found) = (track.keys[k - 1].frame, track.keys[k].frame);
+            let before = track.keys[k - 1].frame;
+            let found = track.keys[k].frame;
             let message = format!("`frame`: expected a frame after {before}, found {found}");
             return Err(at.key("keys").index(k).key("frame").error(message, "keys stand in the order of their frames"));
         }
@@ -105,7 +106,8 @@ pub(crate) fn weights(frames: &[f64], frame: f64, blend: Blend) -> (usize, Vec<f
     if after == 0 || after == frames.len() || frames[after - 1] == frame {
         return (after.saturating_sub(1), vec![1.0]);
     }
-    let (a, b) = (after - 1, after);
+    let a = after - 1;
+    let b = after;
     let length = frames[b] - frames[a];
     let t = (frame - frames[a]) / length;
     if blend == Blend::Linear {
@@ -114,11 +116,13 @@ pub(crate) fn weights(frames: &[f64], frame: f64, blend: Blend) -> (usize, Vec<f
     // The cubic with these values and slopes at both ends; slopes are differences of the keys around.
     let first = a.saturating_sub(1);
     let mut weights = vec![0.0; (b + 2).min(frames.len()) - first];
-    let (t2, t3) = (t * t, t * t * t);
+    let t2 = t * t;
+    let t3 = t * t * t;
     weights[a - first] += 2.0 * t3 - 3.0 * t2 + 1.0;
     weights[b - first] += 3.0 * t2 - 2.0 * t3;
     for (key, basis) in [(a, t3 - 2.0 * t2 + t), (b, t3 - t2)] {
-        let (low, high) = (key.saturating_sub(1), (key + 1).min(frames.len() - 1));
+        let low = key.saturating_sub(1);
+        let high = (key + 1).min(frames.len() - 1);
         let slope = basis * length / (frames[high] - frames[low]);
         weights[high - first] += slope;
         weights[low - first] -= slope;
@@ -184,7 +188,8 @@ mod tests {
 
     #[test]
     fn both_blends_pass_the_keys_and_hold_outside() {
-        let (frames, values) = ([2.0, 5.0, 6.0, 20.0], [1.0, -3.0, 8.0, 4.0]);
+        let frames = [2.0, 5.0, 6.0, 20.0];
+        let values = [1.0, -3.0, 8.0, 4.0];
         for blend in [Blend::Linear, Blend::Smooth] {
             for (f, v) in frames.iter().zip(values) {
                 assert_eq!(at(&frames, &values, *f, blend), v);

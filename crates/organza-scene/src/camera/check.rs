@@ -24,7 +24,8 @@ pub(crate) fn check_camera(at: &At<'_>, raw: &RawCamera, turn: Option<Turn>, goe
     refuse_what_does_not_apply(at, raw)?;
     let angle = turn.map_or(0.0, Turn::angle);
     if raw.auto {
-        let (projection, size) = (check_projection(at, raw)?, check_size(at, raw)?);
+        let projection = check_projection(at, raw)?;
+        let size = check_size(at, raw)?;
         let degrees = at.number("azimuth", raw.azimuth.unwrap_or(DEFAULT_AZIMUTH), -360.0..=360.0)?;
         let elevation = raw.elevation.map(|e| at.number("elevation", e, -90.0..=90.0)).transpose()?;
         let fill = raw.fit.unwrap_or(DEFAULT_FILL);
@@ -50,7 +51,8 @@ pub(crate) fn check_camera(at: &At<'_>, raw: &RawCamera, turn: Option<Turn>, goe
     let position = at.vector("position", needed("position", raw.position)?)?;
     let target = at.vector("target", needed("target", raw.target)?)?;
     let up = at.vector("up", raw.up.unwrap_or([0.0, 1.0, 0.0]))?;
-    let (projection, size) = (check_projection(at, raw)?, check_size(at, raw)?);
+    let projection = check_projection(at, raw)?;
+    let size = check_size(at, raw)?;
     let position = target + turned(position - target, angle);
     let camera = Camera::look_at(position, target, turned(up, angle), projection, size).map_err(|e| match e {
         splat_core::Error::Invalid { attribute, found, expected, .. } => {

@@ -111,7 +111,8 @@ fn by_shape(bounds: DAabb) -> f64 {
 
 /// Right, up and forward of a camera that looks back from an azimuth and an elevation.
 fn axes(azimuth: f64, elevation: f64) -> [DVec3; 3] {
-    let ((sin_a, cos_a), (sin_e, cos_e)) = (libm::sincos(azimuth.rem_euclid(TAU)), libm::sincos(elevation));
+    let (sin_a, cos_a) = libm::sincos(azimuth.rem_euclid(TAU));
+    let (sin_e, cos_e) = libm::sincos(elevation);
     // Straight up and down as well: the picture's right is level whatever the elevation.
     let back = DVec3::new(sin_a * cos_e, sin_e, cos_a * cos_e);
     let right = DVec3::new(cos_a, 0.0, -sin_a);
@@ -153,7 +154,8 @@ impl Sides {
         let depth = axes[2].dot(p);
         self.nearest = self.nearest.min(depth);
         for side in 0..2 {
-            let (across, lean) = (axes[side].dot(p), self.tangent[side] * depth);
+            let across = axes[side].dot(p);
+            let lean = self.tangent[side] * depth;
             let [high, low] = &mut self.most[side];
             *high = high.max(across - lean);
             *low = low.max(-across - lean);

@@ -33,7 +33,9 @@ pub(crate) fn check_footprints(
     options: &LoadOptions,
 ) -> Result<Footprints, Error> {
     let Some(raw) = raw else { return Ok(Footprints::default()) };
-    let (mut layers, mut images, mut files) = (Vec::new(), Vec::new(), Vec::new());
+    let mut layers = Vec::new();
+    let mut images = Vec::new();
+    let mut files = Vec::new();
     for (i, footprint) in raw.iter().enumerate() {
         let at = at.index(i);
         match footprint {
@@ -153,7 +155,8 @@ fn read_image(at: &At<'_>, path: &Path, options: &LoadOptions) -> Result<Arc<Foo
     }
     let coverage: Vec<f32> = image.pixels.iter().map(|pixel| pixel[0]).collect();
     if let Some(k) = coverage.iter().position(|c| !(0.0..=1.0).contains(c)) {
-        let (x, y) = (k as u32 % width, k as u32 / width);
+        let x = k as u32 % width;
+        let y = k as u32 / width;
         return refuse(
             format!("{} at pixel ({x}, {y})", coverage[k]),
             "a share from 0 to 1 is how much of a place is covered",

@@ -72,11 +72,13 @@ fn check_light(at: &At<'_>, raw: &RawLight, paths: &Paths) -> Result<SceneLight,
             Ok(SceneLight { slide, ..of(shape, at.color("intensity", intensity)?, shadow) })
         }
         RawLight::Sphere { position, radius, intensity, samples, shadow, .. } => {
-            let (center, radius) = (at.vector("position", position)?, at.length("radius", radius)?);
+            let center = at.vector("position", position)?;
+            let radius = at.length("radius", radius)?;
             extended(LightShape::Sphere { center, radius }, intensity, samples, shadow)
         }
         RawLight::Disk { position, normal, radius, intensity, samples, shadow, .. } => {
-            let (center, normal) = (at.vector("position", position)?, at.direction("normal", normal)?);
+            let center = at.vector("position", position)?;
+            let normal = at.direction("normal", normal)?;
             let radius = at.length("radius", radius)?;
             extended(LightShape::Disk { center, normal, radius }, intensity, samples, shadow)
         }
@@ -133,7 +135,8 @@ pub(crate) fn check_half_axes(at: &At<'_>, u: [f64; 3], v: [f64; 3]) -> Result<(
         let message = format!("`v`: expected a direction that is not parallel to `u`, found {v:?}");
         return Err(at.key("v").error(message, ""));
     }
-    let (u, v) = (DVec3::from_array(u), DVec3::from_array(v));
+    let u = DVec3::from_array(u);
+    let v = DVec3::from_array(v);
     at.number("u", u.length(), SMALLEST..=LARGEST)?;
     at.number("v", v.length(), SMALLEST..=LARGEST)?;
     Ok((u, v))

@@ -149,7 +149,8 @@ fn check_material(at: &At<'_>, name: &str, raw: &RawMaterial, paths: &Paths) -> 
 
 /// Bumps, and the image that has their heights where it is no noise.
 fn check_bump(at: &At<'_>, raw: &RawBump, paths: &Paths) -> Result<(Bump, Option<PathBuf>), Error> {
-    let (height, size) = (at.number("height", raw.height, 0.0..=LARGEST)? as f32, at.length("size", raw.size)? as f32);
+    let height = at.number("height", raw.height, 0.0..=LARGEST)? as f32;
+    let size = at.length("size", raw.size)? as f32;
     let Some(image) = &raw.image else {
         let octaves = at.whole("octaves", raw.octaves.unwrap_or(4), 1..=12)?;
         return Ok((Bump { height, size, octaves, seed: raw.seed.unwrap_or(0).into() }, None));
@@ -176,7 +177,8 @@ fn check_index(at: &At<'_>, raw: &RawMaterial) -> Result<Option<[f32; 3]>, Error
         return Err(at.key("ior").error("expected one of `ior` and `cauchy`, found both", "`cauchy` gives the index"));
     }
     let at = at.key("cauchy");
-    let (a, b) = (at.number("a", cauchy.a, 0.1..=10.0)?, at.number("b", cauchy.b, 0.0..=1.0)?);
+    let a = at.number("a", cauchy.a, 0.1..=10.0)?;
+    let b = at.number("b", cauchy.b, 0.0..=1.0)?;
     Ok(Some(WAVELENGTHS.map(|wavelength| (a + b / (wavelength * wavelength)) as f32)))
 }
 

@@ -57,7 +57,9 @@ impl SceneObject {
     pub fn matter_params(&self, splat: &SplatParams) -> Option<MatterParams> {
         let Source::Matter(MatterSource { extinction, .. }) = self.source else { return None };
         let spacing = self.spacing.map(|spacing| spacing / self.transform.scale);
-        let (splat, colors, values) = (splat.clone(), self.color.is_none(), self.points.keeps_values);
+        let splat = splat.clone();
+        let colors = self.color.is_none();
+        let values = self.points.keeps_values;
         Some(MatterParams { splat, colors, values, extinction, spacing, ..MatterParams::default() })
     }
 

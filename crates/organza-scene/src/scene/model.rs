@@ -71,8 +71,10 @@ impl Scene {
         scene.objects.retain(has);
         scene.objects.iter_mut().for_each(|o| (o.visible, o.technique) = (true, None));
         if !scene.objects.iter().any(|o| matches!(o.points.size, Some(DiscSize::Pixels(_)))) {
-            let (position, axes) = (DVec3::ZERO, [DVec3::X, DVec3::Y, -DVec3::Z]);
-            let (projection, size) = (Projection::Orthographic { height: 1.0 }, [1, 1]);
+            let position = DVec3::ZERO;
+            let axes = [DVec3::X, DVec3::Y, -DVec3::Z];
+            let projection = Projection::Orthographic { height: 1.0 };
+            let size = [1, 1];
             (scene.camera, scene.target, scene.fit) = (Camera { position, axes, projection, size }, DVec3::ZERO, None);
         }
         scene

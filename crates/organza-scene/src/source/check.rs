@@ -87,7 +87,8 @@ pub(crate) fn check_source(
     }
     if let Some(path) = &raw.volume {
         let path = paths.resolve(&at_source, path)?;
-        let (frame, transfer) = (raw.frame.unwrap_or(0).into(), check_transfer(at, raw, Beside::Extinction)?);
+        let frame = raw.frame.unwrap_or(0).into();
+        let transfer = check_transfer(at, raw, Beside::Extinction)?;
         return Ok(Source::Volume(VolumeSource { path, frame, transfer }));
     }
     if let Some(implicit) = &raw.implicit {
@@ -192,7 +193,8 @@ pub(crate) fn check_box<'a>(
     min: [f64; 3],
     max: [f64; 3],
 ) -> Result<DAabb, Error> {
-    let (low, high) = (at.vector(min_key, min)?, at.vector(max_key, max)?);
+    let low = at.vector(min_key, min)?;
+    let high = at.vector(max_key, max)?;
     if !low.cmplt(high).all() {
         let message = format!("expected a highest corner above the lowest in all axes, found {min:?} and {max:?}");
         return Err(at.key(max_key).error(message, ""));

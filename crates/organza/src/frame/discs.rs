@@ -10,7 +10,8 @@ use splat_core::raster::OpaqueImage;
 
 /// What these discs hide, and show.
 pub(super) fn opaque(frame: &Frame<'_>, ids: &[u32], cost: &mut CostRecord) -> Result<OpaqueImage, Error> {
-    let (params, asked) = (params(frame), &frame.settings.surfels.opaque);
+    let params = params(frame);
+    let asked = &frame.settings.surfels.opaque;
     let group = |groups| grouped::members(frame, groups, ids, true, cost);
     let members = asked.groups().map(group).transpose()?;
     let passes = match (asked, &members) {
@@ -22,7 +23,8 @@ pub(super) fn opaque(frame: &Frame<'_>, ids: &[u32], cost: &mut CostRecord) -> R
     with_shown(frame, cost, |shown, cost| {
         cost.measure(pass::OPAQUE, |stage| {
             let discs = Discs::project(&disc_input(frame, ids), &params);
-            let (channels, objects) = (frame.layout().count() as u32, frame.layers.object);
+            let channels = frame.layout().count() as u32;
+            let objects = frame.layers.object;
             let input = OpaqueInput { discs: &discs, shown, channels, objects, passes, max_bytes: u64::MAX };
             let seen = resolve_opaque(&input, &params, Some(frame.progress)).map_err(refuse)?;
             record(stage, &seen.counts);
@@ -44,7 +46,9 @@ pub(crate) fn with_shown<T>(
         return draw(Shown::Discs(values), cost);
     }
     let lights = frame.lit_by(frame.maps(cost)?);
-    let (input, layout, transforms) = (&frame.shading(&lights), frame.layout(), &transforms(frame));
+    let input = &frame.shading(&lights);
+    let layout = frame.layout();
+    let transforms = &transforms(frame);
     draw(Shown::Pixels(Light { input, layout, transforms, heights: &frame.loaded.images.heights }), cost)
 }
 
@@ -56,7 +60,8 @@ pub(crate) fn transforms(frame: &Frame<'_>) -> Vec<Similarity> {
 
 /// Some discs of what is drawn.
 pub(crate) fn disc_input<'a>(frame: &'a Frame<'a>, ids: &'a [u32]) -> DiscInput<'a> {
-    let (loaded, cloud) = (frame.loaded, frame.drawn());
+    let loaded = frame.loaded;
+    let cloud = frame.drawn();
     DiscInput { cloud, ids, camera: &frame.camera, footprints: &loaded.footprints, materials: &loaded.materials }
 }
 

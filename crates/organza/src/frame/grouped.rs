@@ -23,7 +23,8 @@ fn recipe(groups: &SurfelGroups, frame: &Frame<'_>, object: &SceneObject) -> Rec
         Grouping::Hash(of) => Method::Hash(collisions(of)),
     };
     let settings = &frame.settings.surfels;
-    let (disc_scale, gap) = (settings.disc_scale as f32, settings.gap as f32);
+    let disc_scale = settings.disc_scale as f32;
+    let gap = settings.gap as f32;
     Recipe { method, groups: groups.count, coverage: coverage(groups.coverage, &method), disc_scale, gap }
 }
 
@@ -48,7 +49,8 @@ pub(crate) fn members(
     are_opaque: bool,
     cost: &mut CostRecord,
 ) -> Result<Membership, Error> {
-    let (transforms, objects) = (super::discs::transforms(frame), &frame.scene.objects);
+    let transforms = super::discs::transforms(frame);
+    let objects = &frame.scene.objects;
     let of = |rank: usize| (transforms[rank], recipe(groups, frame, &objects[rank]));
     frame.progress.begin(stages::GROUP);
     cost.measure(pass::GROUP, |stage| {

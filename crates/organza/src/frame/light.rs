@@ -177,8 +177,10 @@ impl<'a> Frame<'a> {
     /// What shading the drawn splats reads.
     pub(crate) fn shading<'b>(&'b self, lights: &'b [LitBy<'b>]) -> ShadeInput<'b> {
         let l = self.loaded;
-        let (materials, objects) = (&l.materials[..], &l.objects[..]);
-        let (ambient, camera) = (self.scene.ambient, &self.camera);
+        let materials = &l.materials[..];
+        let objects = &l.objects[..];
+        let ambient = self.scene.ambient;
+        let camera = &self.camera;
         ShadeInput { cloud: self.drawn(), materials, objects, lights, ambient, camera }
     }
 

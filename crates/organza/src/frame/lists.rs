@@ -23,7 +23,8 @@ impl Frame<'_> {
     pub fn drawn(&self) -> &Cloud {
         let cloud = &self.loaded.cloud;
         let some = self.lists.drawn.get_or_init(|| {
-            let (is_own, draws) = (&self.plan.is_own, &self.plan.draws);
+            let is_own = &self.plan.is_own;
+            let draws = &self.plan.draws;
             let is_drawn = |kind, object: usize| (kind == SplatKind::Opaque && !is_own[object]) || draws[object];
             let drawn = splats_of(cloud, is_drawn);
             (drawn.len() < cloud.len()).then(|| cloud.gather(&drawn))

@@ -16,9 +16,11 @@ impl<'a> Frame<'a> {
 
     /// All of them.
     pub(crate) fn polygons(&self) -> Vec<Polygons<'a>> {
-        let (loaded, scene) = (self.loaded, self.scene);
+        let loaded = self.loaded;
+        let scene = self.scene;
         let one = |own: &'a Own| {
-            let (placed, object) = (own.placed()?, &loaded.objects[own.object]);
+            let placed = own.placed()?;
+            let object = &loaded.objects[own.object];
             let [r, g, b] = scene.materials[scene.objects[own.object].material].material.extinction_rgb;
             own.form.is_polygons().then(|| Polygons {
                 placed,
@@ -75,7 +77,9 @@ impl<'a> Frame<'a> {
 
     /// Volumes in slabs, in the light of some lights.
     pub(crate) fn sheet_input<'b>(&'b self, volumes: Vec<Volume<'b>>, lights: Vec<LitBy<'b>>) -> SheetInput<'b> {
-        let (camera, shadow_origin, ambient) = (&self.camera, self.loaded.cloud.origin, self.scene.ambient);
+        let camera = &self.camera;
+        let shadow_origin = self.loaded.cloud.origin;
+        let ambient = self.scene.ambient;
         SheetInput { volumes, splats: None, camera, lights, shadow_origin, ambient }
     }
 }

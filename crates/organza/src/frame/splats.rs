@@ -38,7 +38,8 @@ impl Frame<'_> {
         self.progress.begin(stage::SHADE);
         cost.measure(pass::SHADE, |stage| {
             let lights = self.lit_by(&shadows);
-            let (bends, progress) = (self.plan.bends, Some(self.progress));
+            let bends = self.plan.bends;
+            let progress = Some(self.progress);
             let is_one = |i| bends || projected.is_visible(i);
             let input = &self.shading(&lights);
             let shaded = match &eye {
@@ -68,9 +69,11 @@ impl Frame<'_> {
     fn project(&self, mut projected: Projected, cost: &mut CostRecord) -> Result<Projected, Error> {
         self.progress.begin(stage::PROJECT);
         self.tick()?;
-        let (l, cloud) = (self.loaded, self.drawn());
+        let l = self.loaded;
+        let cloud = self.drawn();
         cost.measure(pass::PROJECT, |stage| {
-            let (params, detail) = (self.raster_params(), self.detail());
+            let params = self.raster_params();
+            let detail = self.detail();
             raster::project_into(
                 &mut projected,
                 &ProjectInput {
@@ -104,7 +107,8 @@ impl Frame<'_> {
 
     /// The same of opaque splats alone, for a technique that adds polygons to it.
     pub(crate) fn solid(&self, cost: &mut CostRecord) -> Result<OpaqueImage, Error> {
-        let (image, ids) = (self.solid_splats(cost)?, self.solid_of(true));
+        let image = self.solid_splats(cost)?;
+        let ids = self.solid_of(true);
         if ids.is_empty() {
             return Ok(image);
         }

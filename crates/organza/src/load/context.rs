@@ -101,7 +101,8 @@ impl Context<'_> {
     }
 
     pub(super) fn read(&self, path: &Path) -> Result<SourceData, Error> {
-        let (columns, matter) = (self.scene.columns_of(path), self.scene.has_matter(path));
+        let columns = self.scene.columns_of(path);
+        let matter = self.scene.has_matter(path);
         let most_points = self.scene.render.max_points;
         let params = ReadParams { columns, matter, most_points, ..self.options.read_params() };
         self.files.data(self.scene, path, &params, self.progress)
@@ -126,7 +127,8 @@ impl Context<'_> {
     /// Parameters of a volume: normals only where they are used.
     pub(super) fn volume_params(&self, splat: SplatParams) -> VolumeParams {
         let object = &self.scene.objects[self.id];
-        let (normals, clip) = (needs_gradients(object, self.scene), object.clip.clone());
+        let normals = needs_gradients(object, self.scene);
+        let clip = object.clip.clone();
         let classification_error = CLASSIFICATION_SHARE * self.scene.render.tolerance;
         VolumeParams { splat, normals, classification_error, clip, ..VolumeParams::default() }
     }

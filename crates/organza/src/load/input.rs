@@ -187,7 +187,8 @@ fn slice<'a>(
     let section = Section { center: source.center, normal: source.normal, spacing };
     let mesh = convert::volume_section(grid, &source.transfer, &section, &splat, Some(context.progress))?;
     let density = Density::Spacing(spacing * splat.transform.scale);
-    let (name, mesh) = (crate::printable(&source.path), convert::clipped_mesh(mesh.into(), &object.clip));
+    let name = crate::printable(&source.path);
+    let mesh = convert::clipped_mesh(mesh.into(), &object.clip);
     Ok(Input::Mesh(name, mesh, MeshParams { splat, density, opacity }))
 }
 
@@ -203,12 +204,14 @@ pub(super) struct Isosurface {
 fn solid(source: &Source, object: &SceneObject, context: &Context<'_>) -> Result<(Solid, Option<Isosurface>), Error> {
     Ok(match source {
         Source::Implicit(source) => {
-            let (field, walls) = (Arc::new(source.field()?), Vec::new());
+            let field = Arc::new(source.field()?);
+            let walls = Vec::new();
             (Solid { field, walls, bounds: source.bounds, step: source.spacing }.closed(), None)
         }
         Source::Isosurface(source) => {
             let grid = read_grid(&source.path, source.frame, context)?;
-            let (interpolation, inside) = (source.interpolation, source.inside);
+            let interpolation = source.interpolation;
+            let inside = source.inside;
             let grid = convert::gaps_outside(&grid, source.level as f32, inside).map_or(grid, Arc::new);
             let solid = Solid::of_volume(grid.clone(), interpolation, source.level, inside);
             let of = Isosurface { grid, interpolation, level: source.level as f32, inside };
@@ -273,7 +276,8 @@ fn level_set(source: &LevelSetSource, object: &SceneObject, context: &Context<'_
         let memory = context.files.memory(context.options);
         let _fitting = memory.take(&what, points.len() as u64 * BYTES_PER_FITTED_POINT).map_err(Error::Limit)?;
         let (field, _) = convert::points_to_field(&points, &params, Some(context.progress))?;
-        let (bounds, bytes) = (field.bounds(), field.bytes());
+        let bounds = field.bounds();
+        let bytes = field.bytes();
         memory.hold(&what, bytes).map_err(Error::Limit)?;
         Ok(((Arc::new(field) as SharedField, bounds), bytes))
     };

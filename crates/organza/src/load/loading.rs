@@ -84,7 +84,8 @@ impl<'a> Loading<'a> {
         planned: &[PlannedObject],
     ) -> Result<Vec<SplatCount>, Error> {
         let mut splats: Vec<SplatCount> = Vec::new();
-        let (left, mut needed) = (self.files.memory(self.options).left(), 0);
+        let left = self.files.memory(self.options).left();
+        let mut needed = 0;
         for ((object, p), plan) in self.visible().map(|v| v.1).zip(prepared).zip(planned) {
             let mut count = SplatCount::predicted(&object.name, &p.prediction);
             if plan.splats.is_none() {

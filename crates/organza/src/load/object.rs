@@ -156,7 +156,8 @@ pub(super) fn convert(
     if let Some(too_many) = &prepared.too_many {
         return Err(too_many.clone().into());
     }
-    let (progress, splat) = (context.progress, context.limited(prepared.input.splat()));
+    let progress = context.progress;
+    let splat = context.limited(prepared.input.splat());
     let cloud = match &prepared.input {
         Input::Mesh(name, mesh, params) => {
             let made = convert::mesh_to_points(mesh, &MeshParams { splat, ..params.clone() }, Some(progress));
@@ -196,7 +197,8 @@ pub(super) fn convert(
         Input::Medium(medium, _, clip) => convert::medium(medium, clip, &splat),
         Input::Rectangle(r, opacity, _) => convert::rectangle(r, *opacity, &splat),
     };
-    let (mut cloud, object) = (cloud?, &context.scene.objects[context.id]);
+    let mut cloud = cloud?;
+    let object = &context.scene.objects[context.id];
     if let (Some(field), Some(source)) = (&prepared.field, &object.field) {
         let said = field.show(&mut cloud, prepared.input.splat(), object.points.keeps_values);
         let said = said.map_err(|e| Error::input(crate::printable(&source.path), e.to_string(), ""))?;

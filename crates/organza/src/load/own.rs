@@ -238,7 +238,8 @@ fn data(
         return Ok(field_data(prepared, field));
     }
     let cells = |grid: Arc<Grid>, transfer: TransferFunction, (normals, clip): (bool, &[Clip])| {
-        let (bounds, spacing) = (extinct_bounds(&grid, &transfer), grid.shortest_step());
+        let bounds = extinct_bounds(&grid, &transfer);
+        let spacing = grid.shortest_step();
         let cut = RegionField::shared(clip);
         Some((Body::Cells { grid, transfer, normals, body_centred: None, cut }, bounds, spacing))
     };
@@ -312,8 +313,11 @@ fn volume(
 ) -> Result<Data, Error> {
     let is_packed = context.scene.objects[context.id].packing == Packing::BodyCentred;
     let body_centred = is_packed.then(|| convert::body_centred(grid, &params.splat)).transpose()?;
-    let (bounds, spacing) = (extinct_bounds(grid, transfer), grid.shortest_step());
-    let (grid, transfer, cut) = (grid.clone(), transfer.clone(), RegionField::shared(&params.clip));
+    let bounds = extinct_bounds(grid, transfer);
+    let spacing = grid.shortest_step();
+    let grid = grid.clone();
+    let transfer = transfer.clone();
+    let cut = RegionField::shared(&params.clip);
     let body = Body::Cells { grid, transfer, normals: params.normals, body_centred, cut };
     Ok((body, bounds, spacing))
 }
@@ -323,7 +327,8 @@ fn volume(
 fn triangles(mut mesh: Mesh, splats: u64, form: Form) -> Option<Data> {
     mesh.canonicalize();
     splat_core::smooth(&mut mesh);
-    let (area, bounds) = (mesh.area(), mesh.bounds());
+    let area = mesh.area();
+    let bounds = mesh.bounds();
     // Particles are thinned by the angle at which they are seen: of faces, not of normals that lean from them.
     let piece = area / splats.max(1) as f64;
     if form == Form::Triangles {

@@ -152,7 +152,8 @@ mod tests {
             let caster = DAabb::around(4.0 * some(0), 0.6 * some(3));
             let receiver = DAabb::around(4.0 * some(6), 0.6 * some(9));
             let within = |bounds: &DAabb, of: u64| bounds.min + bounds.size() * some(of);
-            let (at, from) = (within(&receiver, 12), 4.0 * some(15));
+            let at = within(&receiver, 12);
+            let from = 4.0 * some(15);
             let direction = (within(&caster, 18) - at).normalize();
             // A light that sees the receiver through the caster.
             let between = within(&caster, 18);

@@ -472,7 +472,8 @@ impl Tiles {
                 return 0..self.counts[a];
             }
             // The tangents of the ball from the light, as turned vectors: sine and cosine of half its angle, times the squared distance.
-            let (sine, cosine) = (ball.reach, libm::sqrt(tangent_sq));
+            let sine = ball.reach;
+            let cosine = libm::sqrt(tangent_sq);
             let tangent = |x: f64, z: f64| if z > 0.0 { x / z } else { f64::INFINITY.copysign(across[a]) };
             let low = tangent(across[a] * cosine - z * sine, z * cosine + across[a] * sine);
             let high = tangent(across[a] * cosine + z * sine, z * cosine - across[a] * sine);

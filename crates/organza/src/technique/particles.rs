@@ -118,7 +118,8 @@ impl Fold for Particles<'_> {
             Ok::<_, Error>(average)
         })?;
         let asked = frame.settings.particles.repeat_level;
-        let (averaged, interrupted) = (average.ensemble.levels(), average.interrupted);
+        let averaged = average.ensemble.levels();
+        let interrupted = average.interrupted;
         session.sets = Some(Sets { averaged, asked, interrupted });
         let mut segment = frame.accumulator();
         let objects: Vec<u32> = inside.iter().map(|part| part.of).collect();

@@ -61,7 +61,8 @@ pub(super) fn sorted(
     params: &hbsort::Params,
     cost: &mut CostRecord,
 ) -> Result<SliceOrder, Error> {
-    let (cloud, camera) = (frame.drawn(), &frame.camera);
+    let cloud = frame.drawn();
+    let camera = &frame.camera;
     let translucent = frame.translucent(technique);
     if translucent.is_empty() {
         return Ok(SliceOrder::default());
@@ -135,7 +136,8 @@ fn composite(
     frame.tick()?;
     cost.measure(pass::SPLAT, |stage| {
         stage.items_in = ids.len() as u64;
-        let (materials, params) = (&frame.loaded.materials, frame.raster_params());
+        let materials = &frame.loaded.materials;
+        let params = frame.raster_params();
         let input = FoldInput { projected, order: ids, values, materials, opaque, direction, params: &params };
         let counts = raster::fold(&input, into, Some(frame.progress));
         let counts = counts.map_err(|e| Error::from_core("compositing", e))?;

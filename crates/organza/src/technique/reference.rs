@@ -69,7 +69,8 @@ impl Fold for Exact<'_> {
         let range = f64::from(range.start)..f64::from(range.end);
         frame.progress.begin(stage::REFERENCE);
         cost.measure(pass::REFERENCE, |stage| {
-            let (begun, last) = (&*into, &self.pixels);
+            let begun = &*into;
+            let last = &self.pixels;
             let pixel = |k: usize, fragments: &[Fragment]| {
                 let known = last.get(k).filter(|pixel| pixel.sum.is_rounded_in(begun, k));
                 let sum = known.map_or_else(|| PixelSum::of(begun, k), |pixel| pixel.sum.clone());
@@ -100,7 +101,9 @@ struct Pixel {
 impl Pixel {
     /// A fragment behind all so far.
     fn add(&mut self, input: &Input<'_>, fragment: &Fragment, narrowing: &[[f32; 2]]) {
-        let (cloud, i, planes) = (input.cloud, fragment.splat as usize, self.sum.planes());
+        let cloud = input.cloud;
+        let i = fragment.splat as usize;
+        let planes = self.sum.planes();
         let extinction = input.materials[cloud.material[i] as usize].extinction_rgb;
         let is_medium = cloud.kind[i] == SplatKind::Medium && cloud.gaussian_of(i).is_none();
         let id = cloud.footprint[i] as usize;

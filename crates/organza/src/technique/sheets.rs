@@ -188,7 +188,8 @@ impl Fold for Sheets<'_> {
 /// The volumes and splats of a frame that are the technique's own.
 fn sheeted<'a>(frame: &'a Frame<'a>, options: &RenderOptions, cost: &mut CostRecord) -> Result<Sheeted<'a>, Error> {
     let maps = frame.maps(cost)?;
-    let (splats, opaque) = (splats(frame, cost)?, frame.opaque(cost)?);
+    let splats = splats(frame, cost)?;
+    let opaque = frame.opaque(cost)?;
     frame.progress.begin(stage::SHEETS);
     let volumes = volumes(&frame.matter()).collect();
     let input = SheetInput { splats, ..frame.sheet_input(volumes, frame.lit_by(maps)) };
@@ -196,7 +197,8 @@ fn sheeted<'a>(frame: &'a Frame<'a>, options: &RenderOptions, cost: &mut CostRec
     cost.measure(pass::SHEETS, |stage| {
         stage.items_in = input.volumes.iter().map(|v| v.grid.values.len() as u64).sum();
         let sheeted = prepare(input, &params, Some(frame.progress)).map_err(|e| refuse(frame, e))?;
-        let (polygons, layout) = (frame.polygons(), frame.layout());
+        let polygons = frame.polygons();
+        let layout = frame.layout();
         let sheeted = sheeted.with_polygons(&polygons, &opaque.depth, &layout, Some(frame.progress));
         let sheeted = sheeted.map_err(|e| refuse(frame, e))?;
         stage.bytes = sheeted.bytes();
@@ -280,7 +282,8 @@ fn volumes<'a>(matter: &Matter<'a>) -> impl Iterator<Item = Volume<'a>> + use<'a
 
 /// The splats of a frame that are the technique's own, sorted; `None` without any.
 fn splats<'a>(frame: &'a Frame<'a>, cost: &mut CostRecord) -> Result<Option<Splats<'a>>, Error> {
-    let (cloud, camera) = (frame.drawn(), &frame.camera);
+    let cloud = frame.drawn();
+    let camera = &frame.camera;
     let translucent = frame.translucent(Technique::Sheets);
     if translucent.is_empty() {
         return Ok(None);

@@ -98,12 +98,15 @@ impl<'a> Fold for Surfels<'a> {
             self.surfaces = Some(made);
         }
         let discs = self.discs.as_ref().expect("invariant: discs were projected above");
-        let (background, [right, up, ahead]) = (frame.background(), frame.camera.axes);
+        let background = frame.background();
+        let [right, up, ahead] = frame.camera.axes;
         let sky = |d: Vec3, solid_angle: f32| {
             let [x, y, z] = d.as_dvec3().to_array();
             background.toward(right * x + up * y + ahead * z, f64::from(solid_angle))
         };
-        let (bending, unit, straight) = (bending(frame), unit(frame), !frame.settings.surfels.bent_behind);
+        let bending = bending(frame);
+        let unit = unit(frame);
+        let straight = !frame.settings.surfels.bent_behind;
         let glass = self.surfaces.as_ref().map(|surfaces| Glass { bending, sky: &sky, surfaces, straight, unit });
         let before = self.glass.take();
         let layering = layering(&frame.settings.surfels.layers, self.members.as_ref(), (discs, &params));

@@ -67,7 +67,8 @@ impl Given {
         let room = ((expected + 6.0 * expected.sqrt() + 64.0) as u32).min(capacities.particles);
         let bytes = 4 * PARTICLE_WORDS as u64 * u64::from(room);
         (chunks > 0).then(|| {
-            let (spans, particles) = (r.input("spans", 12 * u64::from(parts)), r.input("given", bytes));
+            let spans = r.input("spans", 12 * u64::from(parts));
+            let particles = r.input("given", bytes);
             Self { spans, particles, parts, room }
         })
     }
@@ -80,11 +81,13 @@ impl Given {
         scene: &Scene<'_>,
         first: u64,
     ) -> Result<Inputs<'static>, Error> {
-        let (mut spans, mut particles): (Vec<[u32; 3]>, Vec<_>) = (Vec::new(), Vec::new());
+        let mut spans: Vec<[u32; 3]> = Vec::new();
+        let mut particles: Vec<_> = Vec::new();
         for level in 0..capacities.levels {
             let objects = scene.objects.iter().zip(&sources.twins).zip(0u32..);
             for ((object, twin), at) in objects.filter(|((_, twin), _)| twin.is_given()) {
-                let (begin, source) = (particles.len(), &twin.source);
+                let begin = particles.len();
+                let source = &twin.source;
                 sample(object, at, first + u64::from(level), &mut particles);
                 let each = (particles.len() - begin).div_ceil(source.chunks as usize);
                 let place = level * source.all_chunks + source.first_chunk;
@@ -121,7 +124,8 @@ pub fn record_generated(
     let arrivals = r.scratch("arrivals", 4 * ARRIVAL_WORDS * u64::from(chunks));
     let counts = Scanned::scratch(r, scan, ["counts", "count sums"], chunks);
     let particle_bytes = 4 * PARTICLE_WORDS as u64 * u64::from(particles);
-    let (particles, sets) = (r.scratch("particles", particle_bytes), r.scratch("sets", 12 * u64::from(levels)));
+    let particles = r.scratch("particles", particle_bytes);
+    let sets = r.scratch("sets", 12 * u64::from(levels));
     let found = r.scratch("found", size_of::<ParticlesFound>() as u64);
     count(r, sources, &inputs, levels, [arrivals, counts.numbers]);
     if let Some(Given { spans, parts, .. }) = given {
@@ -137,7 +141,8 @@ pub fn record_generated(
     r.read(found);
     let [.., of_sets, of_particles] = projection.inputs;
     let in_whole = r.join(&projection.recording, &[(of_sets, sets), (of_particles, particles)]);
-    let (sums, sources) = (in_whole.of(projection.sums), inputs);
+    let sums = in_whole.of(projection.sums);
+    let sources = inputs;
     Ok(Generated {
         recording,
         capacities,
@@ -260,7 +265,8 @@ impl Generated {
     /// # Errors
     /// [`Error::Overflow`] when there is too little room for those: record again with what is needed.
     pub fn next(&self, sources: &Sources, scene: &Scene<'_>, ensemble: &Ensemble) -> Result<Inputs<'static>, Error> {
-        let (first, levels) = (u64::from(ensemble.levels), self.capacities.levels);
+        let first = u64::from(ensemble.levels);
+        let levels = self.capacities.levels;
         let of_object = |(twin, (buffer, _)): (&super::Twin, &(BufferId, Vec<BufferId>))| {
             let source = ParticleSource { first_set: halves(first), levels, ..twin.source };
             (*buffer, Cow::Owned(bytemuck::bytes_of(&source).to_vec()))

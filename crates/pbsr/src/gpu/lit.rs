@@ -115,7 +115,8 @@ pub(super) struct Seen {
 
 impl Seen {
     pub(super) fn record(r: &mut Recording, capacities: &Capacities) -> Self {
-        let (room, pixels) = (capacities.seen(), capacities.pixels());
+        let room = capacities.seen();
+        let pixels = capacities.pixels();
         let parts = pixels.div_ceil(room.splats);
         let words = |each: u64| 4 * each * u64::from(room.splats);
         let all_parts = u64::from(parts) * u64::from(capacities.levels);
@@ -178,10 +179,13 @@ impl Lit {
         (seen, winners): (&Seen, &Winners),
         level: u32,
     ) {
-        let (found, listed, shares) = (seen.found, seen.seen, seen.shares);
+        let found = seen.found;
+        let listed = seen.seen;
+        let shares = seen.shares;
         let [positions, radii, looks, frames] = seen.attributes.all();
         for part in 0..seen.parts {
-            let (first, at) = (part * seen.at_once, level * seen.parts + part);
+            let first = part * seen.at_once;
+            let at = level * seen.parts + part;
             let pixels = Groups::cover((seen.pixels - first).min(seen.at_once).div_ceil(BLOCK));
             let push = [level, first, at];
             match *winners {

@@ -147,7 +147,8 @@ fn control([a, b, c, d]: [f32; 4]) -> [f32; 4] {
 /// The gradient at a place, in steps of the lattice.
 #[inline(always)]
 pub(super) fn gradient(block: &Block, place: [f32; 3]) -> Vec3 {
-    let ([x, y, z], [dx, dy, dz]) = (place.map(weights), place.map(slopes));
+    let [x, y, z] = place.map(weights);
+    let [dx, dy, dz] = place.map(slopes);
     let rows: [[f32; 4]; 4] = std::array::from_fn(|k| at_y(block, k, &y));
     let derived: [[f32; 4]; 4] = std::array::from_fn(|k| at_y(block, k, &dy));
     let row = sum(rows.each_ref(), &z);
@@ -188,8 +189,11 @@ fn search(c: &[f32; 4], from: f32, length: f32, depth: u32, found: &mut impl FnM
 /// The root between ends of different sign, by Newton's method within a bracket.
 #[inline]
 fn bracket(c: &[f32; 4]) -> f32 {
-    let (p, q, r) = (3.0 * (c[1] - c[0]), 3.0 * (c[0] - 2.0 * c[1] + c[2]), c[3] - c[0] - 3.0 * (c[2] - c[1]));
-    let (mut low, mut high) = (0.0f32, 1.0f32);
+    let p = 3.0 * (c[1] - c[0]);
+    let q = 3.0 * (c[0] - 2.0 * c[1] + c[2]);
+    let r = c[3] - c[0] - 3.0 * (c[2] - c[1]);
+    let mut low = 0.0f32;
+    let mut high = 1.0f32;
     let falls = c[0] >= 0.0;
     let mut t = c[0] / (c[0] - c[3]);
     for _ in 0..32 {
@@ -220,7 +224,8 @@ fn may_pass(block: &Block) -> bool {
             (0..4).for_each(|k| by_z[k][j][i] = column[k]);
         }
     }
-    let (mut below, mut above) = (false, false);
+    let mut below = false;
+    let mut above = false;
     for plane in &by_z {
         let mut rows = [[0.0; 4]; 4];
         for i in 0..4 {
@@ -238,7 +243,8 @@ fn may_pass(block: &Block) -> bool {
 /// First corners of the cells of a row that the surface may pass; (j, k) is that of its first corners.
 pub(super) fn passed_in_row(grid: &Grid, level: f32, [j, k]: [usize; 2]) -> Vec<u32> {
     let [nx, ny, nz] = grid.dims;
-    let (mut low, mut high) = (vec![f32::INFINITY; nx], vec![f32::NEG_INFINITY; nx]);
+    let mut low = vec![f32::INFINITY; nx];
+    let mut high = vec![f32::NEG_INFINITY; nx];
     for k in k.saturating_sub(1)..=(k + 2).min(nz - 1) {
         for j in j.saturating_sub(1)..=(j + 2).min(ny - 1) {
             let row = &grid.values[(k * ny + j) * nx..][..nx];
@@ -272,7 +278,9 @@ mod tests {
 
     /// Catmull-Rom of four values by differences at both ends (Hermite).
     fn hermite([a, b, c, d]: [f64; 4], t: f64) -> f64 {
-        let (from, to, o) = (0.5 * (c - a), 0.5 * (d - b), 1.0 - t);
+        let from = 0.5 * (c - a);
+        let to = 0.5 * (d - b);
+        let o = 1.0 - t;
         o * o * (b * (1.0 + 2.0 * t) + from * t) + t * t * (c * (3.0 - 2.0 * t) - to * o)
     }
 
@@ -318,7 +326,8 @@ mod tests {
                 let expected = value(&grid, lattice) - 4.0;
                 for axis in 0..3 {
                     let [c0, c1, c2, c3] = along(&block, axis, place);
-                    let (t, o) = (place[axis], 1.0 - place[axis]);
+                    let t = place[axis];
+                    let o = 1.0 - place[axis];
                     let found = o * o * o * c0 + 3.0 * o * o * t * c1 + 3.0 * o * t * t * c2 + t * t * t * c3;
                     assert!((f64::from(found) - expected).abs() < 3e-5, "{dims:?} {lattice:?}: {found} {expected}");
                     // Within the cell: the second derivative jumps at its faces.
@@ -427,7 +436,8 @@ mod tests {
 
     #[test]
     fn a_step_of_one_rounding_is_passed() {
-        let (low, high) = (1000.0f32, 1000.0f32.next_up());
+        let low = 1000.0f32;
+        let high = 1000.0f32.next_up();
         let values = (0..5 * 5 * 5).map(|i| if i / 25 < 2 { low } else { high }).collect();
         let grid = Grid { values, ..grid([5; 3], 1) };
         let passed = (0..4).map(|k| passed_in_row(&grid, high, [1, k]).len());

@@ -75,7 +75,8 @@ pub(crate) fn sidak(p: f64, n: usize) -> f64 {
     let each = -((-p).ln_1p() / n as f64).exp_m1();
     // Quantile of the normal tail each/2 by bisection on its asymptotic series' integral.
     let tail = |z: f64| 0.5 * erfc(z / std::f64::consts::SQRT_2);
-    let (mut low, mut high) = (0.0, 12.0);
+    let mut low = 0.0;
+    let mut high = 12.0;
     for _ in 0..200 {
         let middle = 0.5 * (low + high);
         if tail(middle) > 0.5 * each { low = middle } else { high = middle }
@@ -126,7 +127,11 @@ impl Bias {
 pub(crate) fn bias(ensemble: &Ensemble, alpha: &dyn Fn(u32, u32) -> Option<f64>) -> Bias {
     let levels = f64::from(ensemble.levels());
     let [w, h] = ensemble.size();
-    let (mut worst, mut n, mut sum, mut variance, mut squares) = (0.0f64, 0usize, 0.0, 0.0, 0.0);
+    let mut worst = 0.0f64;
+    let mut n = 0usize;
+    let mut sum = 0.0;
+    let mut variance = 0.0;
+    let mut squares = 0.0;
     for y in 0..h {
         for x in 0..w {
             let Some(alpha) = alpha(x, y) else { continue };
@@ -278,7 +283,8 @@ impl ScalarField for Field {
             Field::Plane { .. } | Field::Ramp | Field::Cube => DMat3::ZERO,
             Field::Torus { large, .. } => {
                 let r = p.x.hypot(p.y);
-                let (c, s) = (p.x / r, p.y / r);
+                let c = p.x / r;
+                let s = p.y / r;
                 // In polar axes the diagonal is (2, 2(1 − R/r), 2).
                 let turn = 2.0 * (1.0 - large / r);
                 let xy = (2.0 - turn) * c * s;
@@ -313,7 +319,8 @@ impl ScalarField for Field {
                 pad((scale * (a - r * r), scale * (b - r * r)))
             }
             Field::Plane { normal, .. } => {
-                let (v, k) = (self.value(p), normal.length() * radius);
+                let v = self.value(p);
+                let k = normal.length() * radius;
                 pad((v - k, v + k))
             }
             Field::Torus { large, small } => {
@@ -328,7 +335,8 @@ impl ScalarField for Field {
             }
             Field::Double => {
                 let (a, b) = squares(p.length());
-                let (a, b) = (a - 1.0, b - 1.0);
+                let a = a - 1.0;
+                let b = b - 1.0;
                 let low = if a <= 0.0 && b >= 0.0 { 0.0 } else { (a * a).min(b * b) };
                 pad((low, (a * a).max(b * b)))
             }
@@ -339,11 +347,13 @@ impl ScalarField for Field {
                     let (a, b) = squares((p - DVec3::X * apart * [-1.0, 1.0][k]).length());
                     (a - r[k] * r[k], b - r[k] * r[k])
                 };
-                let (a, b) = (of(0), of(1));
+                let a = of(0);
+                let b = of(1);
                 pad((a.0.min(b.0), a.1.max(b.1)))
             }
             Field::Ellipsoid { axes } => {
-                let (d, k) = ((p / axes).length(), radius / axes.min_element());
+                let d = (p / axes).length();
+                let k = radius / axes.min_element();
                 pad(((d - k).max(0.0).powi(2) - 1.0, (d + k).powi(2) - 1.0))
             }
             Field::Sheets { gap } => {

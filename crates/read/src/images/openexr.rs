@@ -25,7 +25,8 @@ const LONGEST_ALONE: u32 = 1024;
 pub(crate) fn read(content: &[u8], reading: &mut Reading<'_>) -> Result<RadianceImage, ReadError> {
     let meta = MetaData::read_from_buffered(Cursor::new(content), false).map_err(damaged)?;
     let header = first_in_color(&meta)?;
-    let (size, has_alpha) = (checked_size(header)?, header.channels.list.iter().any(|c| c.name.to_string() == ALPHA));
+    let size = checked_size(header)?;
+    let has_alpha = header.channels.list.iter().any(|c| c.name.to_string() == ALPHA);
     check_image(size, reading.params)?;
     let stored = u64::from(size[0]) * u64::from(size[1]) * header.channels.bytes_per_pixel as u64;
     check_deflated(stored, content.len() as u64, "the packed image")?;
@@ -120,7 +121,8 @@ fn block_bytes(header: &Header) -> u64 {
 
 /// Width and height of an image that is whole.
 fn checked_size(header: &Header) -> Result<[u32; 2], ReadError> {
-    let (data, whole) = (header.data_window(), header.shared_attributes.display_window);
+    let data = header.data_window();
+    let whole = header.shared_attributes.display_window;
     if data != whole {
         let show = |w: ::exr::meta::attribute::IntegerBounds| {
             format!("{} x {} at ({}, {})", w.size.0, w.size.1, w.position.0, w.position.1)
@@ -141,7 +143,8 @@ fn check_radiance(image: &RadianceImage) -> Result<(), ReadError> {
     let is_bad = |v: &f32| !(v.is_finite() && *v >= 0.0);
     let Some(k) = image.pixels.iter().position(|p| p.iter().any(is_bad)) else { return Ok(()) };
     let channel = image.pixels[k].iter().position(is_bad).unwrap_or(0);
-    let (x, y) = (k % image.size[0] as usize, k / image.size[0] as usize);
+    let x = k % image.size[0] as usize;
+    let y = k / image.size[0] as usize;
     let found = format!("{} in channel {} of pixel ({x}, {y})", image.pixels[k][channel], CHANNELS[channel]);
     let hint = "replace it by 0 or by its neighbours first";
     Err(ReadError::input(Place::File, "radiance: finite numbers ≥ 0", found, hint))

@@ -56,7 +56,8 @@ pub(crate) fn read(content: &[u8], reading: &mut Reading<'_>) -> Result<Radiance
 
 /// Names of the chunks, of which the file is made up to the last byte.
 fn chunks(content: &[u8]) -> Result<Vec<&[u8]>, ReadError> {
-    let (mut at, mut names) = (MARK, Vec::new());
+    let mut at = MARK;
+    let mut names = Vec::new();
     while names.last() != Some(&b"IEND".as_slice()) {
         let head = content.get(at..at + 8).and_then(|head| head.split_first_chunk::<4>());
         let next = head.map(|(length, name)| (at as u64 + 12 + u64::from(u32::from_be_bytes(*length)), name));
@@ -68,7 +69,8 @@ fn chunks(content: &[u8]) -> Result<Vec<&[u8]>, ReadError> {
         at = next as usize;
     }
     if at < content.len() {
-        let (found, hint) = (format!("{} bytes more", content.len() - at), "something was added to the file");
+        let found = format!("{} bytes more", content.len() - at);
+        let hint = "something was added to the file";
         return Err(ReadError::input(Place::Byte(at as u64), "the end of the file after IEND", found, hint));
     }
     Ok(names)

@@ -72,7 +72,8 @@ fn radiance([r, g, b, e]: [u8; 4], exposure: [f64; 3]) -> [f32; 3] {
 }
 
 fn header(content: &[u8], reading: &mut Reading<'_>) -> Result<Header, ReadError> {
-    let (mut at, mut line) = (0, 0);
+    let mut at = 0;
+    let mut line = 0;
     let mut next = || {
         let rest = &content[at..];
         let Some(length) = rest.iter().position(|b| *b == b'\n') else {
@@ -105,7 +106,8 @@ fn statement(text: &[u8], line: u64, exposure: &mut [f64; 3], reading: &mut Read
     let refused =
         |expected: &str, hint| Err(ReadError::input(place, expected, format!("'{}'", escaped(text, 60)), hint));
     let Some(split) = text.iter().position(|b| *b == b'=').filter(|_| text[0] != b'#') else { return Ok(()) };
-    let (name, value) = (text[..split].trim_ascii(), String::from_utf8_lossy(&text[split + 1..]));
+    let name = text[..split].trim_ascii();
+    let value = String::from_utf8_lossy(&text[split + 1..]);
     let numbers: Vec<f64> = value.split_ascii_whitespace().map_while(|word| word.parse().ok()).collect();
     let are_factors = |n: usize| numbers.len() == n && numbers.iter().all(|v| v.is_finite() && *v > 0.0);
     match name {
@@ -195,7 +197,8 @@ impl Scanlines<'_> {
 
     /// A scanline of whole pixels, of which (1, 1, 1, n) repeats the last one n times, and one after it n·256 times.
     fn older(&mut self, row: &mut [[u8; 4]]) -> Result<(), Fault> {
-        let (mut x, mut shift) = (0, 0);
+        let mut x = 0;
+        let mut shift = 0;
         while x < row.len() {
             let pixel = self.pixel(x, row.len())?;
             let length = if pixel[..3] != [1; 3] {

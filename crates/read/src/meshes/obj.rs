@@ -199,7 +199,8 @@ impl Content<'_> {
         params: &ReadParams,
     ) -> Result<(), ReadError> {
         let mut number = |missing| words.next().map_or(Some(missing), Word::decimal).unwrap_or(f64::NAN) as f32;
-        let (u, v) = (number(f64::NAN), number(0.0));
+        let u = number(f64::NAN);
+        let v = number(0.0);
         self.held.places.hold((self.places.len() as u64 + 1) * 8, params)?;
         input::reserve(&mut self.places, 1)?;
         // Rows of an image are counted from the top.

@@ -209,7 +209,9 @@ struct Columns {
 
 impl Columns {
     fn new(form: Form, vertices: usize) -> Result<Self, ReadError> {
-        let (positions, normals, colors) = (Vec::new(), Vec::new(), Vec::new());
+        let positions = Vec::new();
+        let normals = Vec::new();
+        let colors = Vec::new();
         let mut columns = Self { form, positions, normals, colors, above_one: None, pointed: false };
         input::reserve(&mut columns.positions, vertices)?;
         input::reserve(&mut columns.normals, if form.normal { vertices } else { 0 })?;

@@ -117,7 +117,8 @@ fn root(parent: &mut [u32], mut v: u32) -> u32 {
 }
 
 fn join(parent: &mut [u32], a: u32, b: u32) {
-    let (a, b) = (root(parent, a), root(parent, b));
+    let a = root(parent, a);
+    let b = root(parent, b);
     parent[a.max(b) as usize] = a.min(b);
 }
 
@@ -132,7 +133,8 @@ fn measured(mesh: &Mesh, part_of: &[u32]) -> Vec<Part> {
     }
     for t in &mesh.triangles {
         let part = &mut all[part_of[t[0] as usize] as usize];
-        let (middle, factor) = (part.middle(), part.factor());
+        let middle = part.middle();
+        let factor = part.factor();
         let [a, b, c] = t.map(|v| (mesh.position[v as usize].as_dvec3() - middle) * factor);
         let cross = (b - a).cross(c - a);
         let volume = fixed(a.dot(cross));
@@ -226,7 +228,8 @@ mod tests {
         let mut mesh = Mesh::default();
         for axis in 0..3 {
             for sign in [-1.0, 1.0] {
-                let (n, u) = (Vec3::AXES[axis] * sign, Vec3::AXES[(axis + 1) % 3]);
+                let n = Vec3::AXES[axis] * sign;
+                let u = Vec3::AXES[(axis + 1) % 3];
                 let v = n.cross(u);
                 let first = mesh.position.len() as u32;
                 mesh.position.extend([-u - v, u - v, u + v, -u + v].map(|p| center + (n + p) * r));
@@ -259,7 +262,8 @@ mod tests {
 
     #[test]
     fn closed_parts_are_turned_outwards_and_walls_of_hollow_bodies_stay() {
-        let (body, cavity) = ((0.0, 2.0, false), (0.5, 1.0, true));
+        let body = (0.0, 2.0, false);
+        let cavity = (0.5, 1.0, true);
         assert_eq!(after(&[body]), (0, vec![false]));
         assert_eq!(after(&[(0.0, 2.0, true)]), (1, vec![false]));
         assert_eq!(after(&[body, cavity]), (0, vec![false, true]));

@@ -139,7 +139,8 @@ fn project(corners: &[u32], position: &[Vec3]) -> Option<Vec<DVec2>> {
         return None;
     }
     let axis = (0..3).fold(0, |a, i| if size[i] > size[a] { i } else { a });
-    let (mut u, mut v) = ((axis + 1) % 3, (axis + 2) % 3);
+    let mut u = (axis + 1) % 3;
+    let mut v = (axis + 2) % 3;
     if newell[axis] < 0.0 {
         (u, v) = (v, u);
     }
@@ -216,7 +217,8 @@ impl Flat {
         let mut times = vec![0u32; plane.num_undirected_edges()];
         for i in scattered(run.len()) {
             reading.go_on()?;
-            let (from, to) = (run[i], run[(i + 1) % run.len()]);
+            let from = run[i];
+            let to = run[(i + 1) % run.len()];
             let (Some(a), Some(b)) = (handles[from], handles[to]) else { return Ok(None) };
             if from == to {
                 continue;
@@ -305,7 +307,8 @@ fn sides(plane: &Plane, times: &[u32]) -> Vec<Option<bool>> {
     inside[plane.outer_face().fix().index()] = Some(false);
     let mut waiting: Vec<_> = plane.convex_hull().flat_map(|e| [e, e.rev()]).filter(|e| e.is_outer_edge()).collect();
     while let Some(edge) = waiting.pop() {
-        let (here, next) = (edge.face().fix().index(), edge.rev().face());
+        let here = edge.face().fix().index();
+        let next = edge.rev().face();
         if inside[next.fix().index()].is_some() {
             continue;
         }

@@ -120,10 +120,12 @@ impl Texture {
         let share = [x - 0.5 - low[0], y - 0.5 - low[1]].map(|s| s as f32);
         let [i, j] = low.map(|c| c as i64);
         let row = |j: i64| {
-            let (a, b) = (self.texel([i, j], wrap), self.texel([i.saturating_add(1), j], wrap));
+            let a = self.texel([i, j], wrap);
+            let b = self.texel([i.saturating_add(1), j], wrap);
             std::array::from_fn::<f32, 4, _>(|c| a[c] + (b[c] - a[c]) * share[0])
         };
-        let (a, b) = (row(j), row(j.saturating_add(1)));
+        let a = row(j);
+        let b = row(j.saturating_add(1));
         std::array::from_fn(|c| a[c] + (b[c] - a[c]) * share[1])
     }
 

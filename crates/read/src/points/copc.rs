@@ -37,7 +37,8 @@ impl Levels {
         let nodes = nodes(content, record.at, [number(info, ROOT), number(info, ROOT + 8)])?;
         let all = nodes.iter().map(|node| node.level + 1).max().unwrap_or(0);
         let of_level = |level: usize| nodes.iter().filter(move |n| n.level == level);
-        let (mut points, mut read) = (0u64, 0);
+        let mut points = 0u64;
+        let mut read = 0;
         for level in 0..all {
             let more = of_level(level).fold(points, |n, node| n.saturating_add(node.points));
             if more > most && level > 0 {
@@ -66,7 +67,8 @@ struct Node {
 
 /// All nodes, page by page; `at` is where the first page is told of.
 fn nodes(content: &[u8], at: usize, root: [u64; 2]) -> Result<Vec<Node>, ReadError> {
-    let (mut nodes, mut pages) = (Vec::new(), vec![root]);
+    let mut nodes = Vec::new();
+    let mut pages = vec![root];
     // Each page counts once: pages that lead back to others end here.
     let mut left = content.len();
     while let Some([start, length]) = pages.pop() {
@@ -79,7 +81,9 @@ fn nodes(content: &[u8], at: usize, root: [u64; 2]) -> Result<Vec<Node>, ReadErr
         left -= bytes.len();
         for entry in bytes.as_chunks::<ENTRY>().0 {
             let word = |i: usize| i32::from_le_bytes([entry[i], entry[i + 1], entry[i + 2], entry[i + 3]]);
-            let (level, size, points) = (word(0), word(24), word(28));
+            let level = word(0);
+            let size = word(24);
+            let points = word(28);
             let level = usize::try_from(level).ok().filter(|level| *level <= MAX_LEVEL);
             match (level, u64::try_from(size), u64::try_from(points)) {
                 (Some(_), Ok(size), Err(_)) if points == PAGE => pages.push([number(entry, 16), size]),

@@ -134,7 +134,8 @@ impl Gathered {
         }
         let middle = longest.len() / 2;
         let median = f64::from(*longest.select_nth_unstable_by(middle, f32::total_cmp).1);
-        let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        let mut low = DVec3::INFINITY;
+        let mut high = DVec3::NEG_INFINITY;
         self.positions.iter().for_each(|place| (low, high) = (low.min(*place), high.max(*place)));
         median >= SHARE * (high - low).length()
     }

@@ -145,7 +145,8 @@ pub(crate) fn variable_records<'a>(content: &'a [u8], layout: &Layout) -> impl I
     let before_points = &content[..layout.points];
     (0..count).map_while(move |_| {
         let head = before_points.get(at..)?.first_chunk::<RECORD_HEADER>()?;
-        let (begin, length) = (at + RECORD_HEADER, usize::from(u16::from_le_bytes([head[20], head[21]])));
+        let begin = at + RECORD_HEADER;
+        let length = usize::from(u16::from_le_bytes([head[20], head[21]]));
         let data = before_points.get(begin..begin + length)?;
         let user = &before_points[at + 2..at + 18];
         let user = user.split(|b| *b == 0).next().unwrap_or_default();

@@ -30,7 +30,8 @@ pub(crate) fn read(content: &[u8], reading: &mut Reading<'_>) -> Result<RawPoint
     match header.data {
         Data::Text => Text::new(content, &header).read(&header, &mut columns, reading)?,
         Data::Binary => {
-            let (record, needed) = (header.record(), header.bytes()?);
+            let record = header.record();
+            let needed = header.bytes()?;
             if !is_padded(body, needed) {
                 return Err(other_length(&header, needed, body.len()));
             }

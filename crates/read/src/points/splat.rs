@@ -14,7 +14,8 @@ const RECORD: usize = 32;
 pub(crate) fn read(content: &[u8], reading: &mut Reading<'_>) -> Result<RawPoints, ReadError> {
     let (records, rest) = content.as_chunks::<RECORD>();
     if records.is_empty() || !rest.is_empty() {
-        let (expected, found) = ("records of 32 bytes, at least one", format!("{} bytes", content.len()));
+        let expected = "records of 32 bytes, at least one";
+        let found = format!("{} bytes", content.len());
         return Err(ReadError::input(Place::Byte(0), expected, found, "the file is truncated, or no .splat file"));
     }
     let mut gathered = Gathered::new(records.len(), 0, reading.params)?;

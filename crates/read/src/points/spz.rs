@@ -81,7 +81,10 @@ fn header(content: &[u8], reading: &mut Reading<'_>) -> Result<Header, ReadError
         let found = format!("'{}'", splat_core::text::escaped(&head[..4], 4));
         return Err(ReadError::input(Place::Byte(0), "'NGSP', the mark of SPZ", found, "is this an SPZ file?"));
     }
-    let (version, degree, fraction, flags) = (word(4), head[12], head[13], head[14]);
+    let version = word(4);
+    let degree = head[12];
+    let fraction = head[13];
+    let flags = head[14];
     if !(2..=3).contains(&version) {
         let hint = "save it anew with a current program, as SPZ of version 3 or as PLY";
         return Err(ReadError::input(Place::Byte(4), "version 2 or 3", version.to_string(), hint));
@@ -120,7 +123,8 @@ fn smallest_three(bytes: &[u8]) -> [f64; 4] {
     const MOST: u32 = (1 << 9) - 1;
     let mut word = u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]);
     let largest = (word >> 30) as usize;
-    let (mut xyzw, mut squares) = ([0.0; 4], 0.0);
+    let mut xyzw = [0.0; 4];
+    let mut squares = 0.0;
     for k in (0..4).rev().filter(|k| *k != largest) {
         let size = FRAC_1_SQRT_2 * f64::from(word & MOST) / f64::from(MOST);
         xyzw[k] = if word & (MOST + 1) == 0 { size } else { -size };

@@ -43,7 +43,9 @@ const BYTES_PER_POINT: u64 = 24 + 12 + 12 + 12 + 4 + 4;
 pub(crate) fn read(content: &[u8], params: &ReadParams, notes: &mut Notes) -> Result<RawPoints, ReadError> {
     let mut lines = Lines::new(content);
     let mut columns: Option<Vec<Option<usize>>> = None;
-    let (mut count, mut positions, mut points) = (None, Vec::new(), RawPoints::default());
+    let mut count = None;
+    let mut positions = Vec::new();
+    let mut points = RawPoints::default();
     let is_intensity = |words: &[Word<'_>], roles: &[Option<usize>]| {
         words.iter().zip(roles).any(|(w, role)| *role == Some(VALUE) && bare(w).eq_ignore_ascii_case(b"intensity"))
     };
@@ -78,7 +80,8 @@ pub(crate) fn read(content: &[u8], params: &ReadParams, notes: &mut Notes) -> Re
         if words.len() != columns.len() {
             refuse_decimal_commas(line)?;
             refuse_empty_cells(line, columns.len())?;
-            let (expected, found) = (format!("{} columns", columns.len()), format!("{}", words.len()));
+            let expected = format!("{} columns", columns.len());
+            let found = format!("{}", words.len());
             return Err(ReadError::input(line.place(), expected, found, "every line has the same columns"));
         }
         let bytes = (positions.len() as u64 + 1) * (BYTES_PER_POINT + extras.bytes_per_point());

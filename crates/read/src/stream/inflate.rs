@@ -32,9 +32,11 @@ impl<R: BufRead> Read for Inflate<R> {
                 return if packed.is_empty() { Ok(0) } else { Err(io::Error::other("bytes after its end")) };
             }
             let at_end = packed.is_empty();
-            let (read, given) = (self.decoder.total_in(), self.decoder.total_out());
+            let read = self.decoder.total_in();
+            let given = self.decoder.total_out();
             let status = self.decoder.decompress(packed, target, FlushDecompress::None)?;
-            let (read, given) = (self.decoder.total_in() - read, self.decoder.total_out() - given);
+            let read = self.decoder.total_in() - read;
+            let given = self.decoder.total_out() - given;
             self.packed.consume(read as usize);
             self.ended = status == Status::StreamEnd;
             if given > 0 {

@@ -80,13 +80,15 @@ impl<'a> Stream<'a> {
     /// The unpacked bytes of what is left, which is gzip of one or several members. However often gzip is packed into
     /// gzip, the bytes of the file itself decide how much may come out.
     pub(crate) fn gunzip(self) -> Stream<'a> {
-        let (stored, params) = (self.stored, self.params.clone());
+        let stored = self.stored;
+        let params = self.params.clone();
         Stream::new(Unpacked::gzip(self, stored), None, stored, &params)
     }
 
     /// The same of one zlib stream.
     pub(crate) fn inflate(self) -> Stream<'a> {
-        let (stored, params) = (self.stored, self.params.clone());
+        let stored = self.stored;
+        let params = self.params.clone();
         Stream::new(Unpacked::zlib(self, stored), None, stored, &params)
     }
 

@@ -29,7 +29,8 @@ pub(crate) fn parse(text: &str, nodes: u32) -> Result<Document<'_>, Refused> {
 /// Counts attributes and namespaces. What is no tag is passed over; what is malformed the parser refuses.
 fn check(text: &str) -> Result<(), Refused> {
     let refused = |byte, what: &str| {
-        let (expected, found) = (format!("at most {MOST} {what}"), "more".to_owned());
+        let expected = format!("at most {MOST} {what}");
+        let found = "more".to_owned();
         Err(Refused { byte, line: None, expected, found })
     };
     let mut namespaces = 0;
@@ -43,7 +44,9 @@ fn check(text: &str) -> Result<(), Refused> {
             at = start + open.len() + length + end.len();
             continue;
         }
-        let (mut quote, mut attributes, mut end) = (None, 0, rest.len());
+        let mut quote = None;
+        let mut attributes = 0;
+        let mut end = rest.len();
         for (i, byte) in rest.bytes().enumerate() {
             match (quote, byte) {
                 (None, b'>') => {

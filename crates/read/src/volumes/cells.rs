@@ -115,7 +115,8 @@ pub(crate) fn field(
     place: Place,
     reading: &mut Reading<'_>,
 ) -> Result<Field, ReadError> {
-    let (params, notes) = (reading.params, &mut reading.notes);
+    let params = reading.params;
+    let notes = &mut reading.notes;
     let tuples = numbers.chunks_exact(selection.numbers as usize);
     input::hold("the field", 8 * tuples.len() as u64, params)?;
     let values: Vec<f64> = tuples.map(|tuple| selection.value.of(|i| tuple[i])).collect();
@@ -172,7 +173,8 @@ impl Cells {
     /// Refuses cells that are not read, and those that have not as many points as their kind.
     pub(crate) fn check(&self) -> Result<(), ReadError> {
         if self.kinds.len() != self.lists.len() {
-            let (expected, found) = (format!("{} kinds of cells", self.lists.len()), self.kinds.len().to_string());
+            let expected = format!("{} kinds of cells", self.lists.len());
+            let found = self.kinds.len().to_string();
             return Err(ReadError::input(self.place, expected, found, HINT));
         }
         for (i, (number, corners)) in self.kinds.iter().zip(self.lists.iter()).enumerate() {
@@ -236,7 +238,9 @@ impl Cells {
 
     /// The faces, if there are some, and the number of lines.
     fn fans(&self, reading: &mut Reading<'_>) -> Result<(Option<Fans>, usize), ReadError> {
-        let (mut fans, mut faces, mut lines) = (Fans::default(), 0, 0);
+        let mut fans = Fans::default();
+        let mut faces = 0;
+        let mut lines = 0;
         for (i, (number, corners)) in self.kinds.iter().zip(self.lists.iter()).enumerate() {
             let mut add = |corners: &[u32], reading: &mut Reading<'_>| fans.add(i as u64, corners, self.place, reading);
             match Kind::of(*number).map(|kind| kind.shape) {

@@ -35,7 +35,8 @@ pub(crate) fn read(
         header.place_of_numbers,
         notes,
     )?;
-    let (kind, big_endian) = (header.kind, header.big_endian);
+    let kind = header.kind;
+    let big_endian = header.big_endian;
     let stored = Stored { kind, big_endian, dims: header.sizes, selection, scaling: (1.0, 0.0) };
     stored.check(header.place_of_sizes, HINT)?;
     notes.not_used(header.unused.iter().map(String::as_bytes));

@@ -130,7 +130,8 @@ fn to_voxels(stream: &mut Stream<'_>, offset: f32) -> Result<(), ReadError> {
 
 /// Slope and intercept, (1, 0) where the file asks for none.
 fn scaling(header: &NiftiHeader) -> Result<(f64, f64), ReadError> {
-    let (slope, intercept) = (header.scl_slope, header.scl_inter);
+    let slope = header.scl_slope;
+    let intercept = header.scl_inter;
     if slope == 0.0 || slope.is_nan() {
         return Ok((1.0, 0.0));
     }

@@ -30,14 +30,18 @@ pub(crate) fn read(
 ) -> Result<Grid, ReadError> {
     let header = header::parse(header_bytes(&mut stream)?)?;
     let axes = &header.axes;
-    let (kind, big_endian, scaling) = (header.kind, header.big_endian, (1.0, 0.0));
+    let kind = header.kind;
+    let big_endian = header.big_endian;
+    let scaling = (1.0, 0.0);
     let stored = Stored { kind, big_endian, dims: axes.sizes, selection: selection(&header, params, notes)?, scaling };
     stored.check(axes.place_of_sizes, HINT)?;
     input::hold("the voxels", stored.count() * size_of::<f32>() as u64, params)?;
     if let Some(space) = axes.converted_from {
         notes.remarks.push(format!("space: {space}, converted to right-anterior-superior"));
     }
-    let (origin, steps, dims) = (axes.origin, axes.steps, axes.sizes.map(|n| n as usize));
+    let origin = axes.origin;
+    let steps = axes.steps;
+    let dims = axes.sizes.map(|n| n as usize);
     let data = DataOf { header: path, end: (header.end, header.lines), file: header.data_file.as_ref() };
     let values = data.read(stream, params, |data, lines| voxels_of(data, &header, lines, &stored, params))?;
     Ok(Grid { origin, axes: steps, dims, values })

@@ -123,7 +123,8 @@ impl Stored {
 
     /// Its sizes in words.
     fn shown(&self) -> String {
-        let ([x, y, z], Selection { frames, numbers, .. }) = (self.dims, self.selection);
+        let [x, y, z] = self.dims;
+        let Selection { frames, numbers, .. } = self.selection;
         let times = |n: u64, what: &str| if n == 1 { String::new() } else { format!(" x {n} {what}") };
         format!("{x} x {y} x {z}{}{}", times(numbers, "numbers"), times(frames, "frames"))
     }
@@ -136,7 +137,8 @@ pub(crate) fn read(
     params: &ReadParams,
     hint: &'static str,
 ) -> Result<Vec<f32>, ReadError> {
-    let (needed, at) = (stored.bytes(), stream.position());
+    let needed = stored.bytes();
+    let at = stream.position();
     let wrong = |found: String, hint: &'static str| {
         let expected = format!("{needed} bytes of voxels ({} x {} bytes)", stored.shown(), stored.kind.size());
         Err(ReadError::input(Place::Byte(at), expected, found, hint))
@@ -205,7 +207,8 @@ fn room(stored: &Stored, params: &ReadParams) -> Result<Vec<f32>, ReadError> {
 
 /// Reads one frame; gives how many bytes of it there were.
 fn frame(stream: &mut Stream<'_>, stored: &Stored, values: &mut Vec<f32>) -> Result<u64, ReadError> {
-    let (bytes, voxel) = (stored.frame_bytes(), stored.voxel_bytes());
+    let bytes = stored.frame_bytes();
+    let voxel = stored.voxel_bytes();
     let most = (BLOCK / voxel).max(1) * voxel;
     let mut block = vec![0; bytes.min(most) as usize];
     let mut got = 0;

@@ -62,7 +62,8 @@ fn image(
     let chosen = chosen(piece, params, notes)?;
     let (array, is_of_cells) = chosen.ok_or_else(|| wrong(piece, "a DataArray in PointData or CellData", "none"))?;
     not_used(image, &[array], notes);
-    let (mut origin, mut sizes) = (lattice.origin, lattice.points);
+    let mut origin = lattice.origin;
+    let mut sizes = lattice.points;
     if is_of_cells {
         (origin, sizes) = lattice::of_cells(origin, &lattice.axes, lattice.points);
         notes.remarks.push(format!("values of cells ({}): they lie at the middles", name(array)));
@@ -197,7 +198,8 @@ fn chosen<'a, 'i>(
         }
         for array in arrays(*data) {
             let is_named = first == Some(*data) && named.is_some() && array.attribute("Name") == named;
-            let (name, kind) = (name(array), kind(array).ok());
+            let name = name(array);
+            let kind = kind(array).ok();
             all.push((array, Candidate { name, numbers: components(array)?, kind, is_named }));
         }
     }

@@ -55,7 +55,8 @@ fn image<'a>(
     (mut lines, mut arrays): (Lines<'a>, Arrays<'a>),
     reading: &mut Reading<'_>,
 ) -> Result<Grid, ReadError> {
-    let (params, notes) = (reading.params, &mut reading.notes);
+    let params = reading.params;
+    let notes = &mut reading.notes;
     let mut points = Points { dims: None, origin: DVec3::ZERO, spacing: DVec3::ONE, place: Place::File };
     while let Some(line) = next(&mut lines)? {
         if !points.take(line)? {
@@ -69,7 +70,8 @@ fn image<'a>(
     notes.not_used(arrays.all().filter(|a| a.place != array.place).map(|a| a.name.as_bytes()));
     let axes = DMat3::from_diagonal(points.spacing);
     lattice::check(points.origin, &axes, points.place, HINT)?;
-    let (mut origin, mut sizes) = (points.origin, dims);
+    let mut origin = points.origin;
+    let mut sizes = dims;
     if array.of == Of::Cells {
         (origin, sizes) = lattice::of_cells(origin, &axes, dims);
         notes
@@ -83,7 +85,8 @@ fn image<'a>(
 /// The lines before those of the dataset: whether the data is binary, and what it is.
 fn head(lines: &mut Lines<'_>) -> Result<(bool, Dataset), ReadError> {
     // The second is a title.
-    let (mark, _title) = (lines.next()?, lines.next()?);
+    let mark = lines.next()?;
+    let _title = lines.next()?;
     if !mark.is_some_and(|line| line.text.starts_with(b"# vtk DataFile Version")) {
         let expected = "'# vtk DataFile Version' in the first line";
         return Err(ReadError::input(Place::Byte(0), expected, "another beginning", HINT));

@@ -7,7 +7,9 @@ use std::io::Cursor;
 pub(crate) fn copc(levels: &[i32]) -> Vec<u8> {
     let plain = las(7, levels.iter().sum(), false);
     let word = |at: usize| u32::from_le_bytes(plain[at..at + 4].try_into().unwrap());
-    let (header, points, record) = (word(94) as usize & 0xffff, word(96) as usize, word(105) as usize & 0xffff);
+    let header = word(94) as usize & 0xffff;
+    let points = word(96) as usize;
+    let record = word(105) as usize & 0xffff;
     let vlr = laz::LazVlrBuilder::default().with_point_format(7, 0).unwrap().with_variable_chunk_size().build();
     let mut description = Vec::new();
     vlr.write_to(&mut description).unwrap();
@@ -28,7 +30,8 @@ pub(crate) fn copc(levels: &[i32]) -> Vec<u8> {
     target.set_position(u64::from(start));
     let mut coder = laz::LasZipCompressor::new(target, vlr).unwrap();
     coder.reserve_offset_to_chunk_table().unwrap();
-    let (mut at, mut entries) = (points, Vec::new());
+    let mut at = points;
+    let mut entries = Vec::new();
     for (level, count) in levels.iter().enumerate() {
         let chunk = coder.get().position();
         let end = at + *count as usize * record;

@@ -56,7 +56,8 @@ pub(crate) fn pcd(data: &str) -> Vec<u8> {
 
 /// Literal bytes, and copies of runs.
 fn lzf(plain: &[u8]) -> Vec<u8> {
-    let (mut out, mut at) = (Vec::new(), 0);
+    let mut out = Vec::new();
+    let mut at = 0;
     while at < plain.len() {
         let run = if at == 0 { 0 } else { plain[at..].iter().take_while(|b| **b == plain[at - 1]).count().min(8) };
         if run > 2 {

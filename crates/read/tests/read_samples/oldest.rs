@@ -15,7 +15,8 @@ where
 {
     let plain = las(format, n, false);
     let word = |at: usize| u32::from_le_bytes(plain[at..at + 4].try_into().unwrap());
-    let (points, record) = (word(96) as usize, word(105) as usize & 0xffff);
+    let points = word(96) as usize;
+    let record = word(105) as usize & 0xffff;
     let mut gps_time = gps_time;
     let vlr = laz::LazVlrBuilder::default().with_point_format(format, 0).unwrap().build();
     let mut coder = SequentialPointRecordCompressor::new(Cursor::new(Vec::new()));

@@ -107,8 +107,8 @@ impl Vti {
     pub(crate) fn file(self) -> Vec<u8> {
         let mask = [7u8; 12];
         let shown = |bytes: &[u8], text: String| if self.encoding == "ascii" { text } else { self.base64(bytes) };
-        let (first, second) =
-            (shown(&mask, "7 ".repeat(12)), shown(&raw(self.big), String::from_utf8(text()).unwrap()));
+        let first = shown(&mask, "7 ".repeat(12));
+        let second = shown(&raw(self.big), String::from_utf8(text()).unwrap());
         let offset = if self.encoding == "raw" { self.packed(&mask).concat().len() } else { first.len() };
         let arrays = match self.encoding {
             "raw" | "base64" => {

@@ -21,7 +21,10 @@ pub struct Errors {
 /// [`MetricError::Size`].
 pub fn compare<S: ColorSpace>(image: &Image<S>, reference: &Image<S>) -> Result<Errors, MetricError> {
     reference.same_size(image)?;
-    let (mut square, mut sum, mut absolute, mut max) = (0.0, 0.0, 0.0, 0.0f64);
+    let mut square = 0.0;
+    let mut sum = 0.0;
+    let mut absolute = 0.0;
+    let mut max = 0.0f64;
     for (a, b) in image.pixels().iter().flatten().zip(reference.pixels().iter().flatten()) {
         let d = a - b;
         square += d * d;
@@ -48,7 +51,8 @@ pub fn psnr(image: &Image<Display>, reference: &Image<Display>) -> Result<f64, M
 /// [`MetricError::Size`].
 pub fn epsilon_8_bit(image: &Image<Display>, reference: &Image<Display>) -> Result<f64, MetricError> {
     reference.same_size(image)?;
-    let (a, b) = (image.bytes(), reference.bytes());
+    let a = image.bytes();
+    let b = reference.bytes();
     let sum: u64 = a.iter().zip(&b).map(|(a, b)| u64::from(a.abs_diff(*b))).sum();
     Ok(sum as f64 / image.pixels().len().max(1) as f64)
 }
@@ -103,7 +107,8 @@ mod tests {
         let black = Image::from_radiance(size, vec![[0.0; 3]; n]).unwrap();
         let e = compare(&Image::from_radiance(size, pixels.clone()).unwrap(), &black).unwrap();
         // The mean and the mean square of 0.1, 0.101, … 1.099.
-        let (mean, variance) = (0.5995, 1e-6 * (1e6 - 1.0) / 12.0);
+        let mean = 0.5995;
+        let variance = 1e-6 * (1e6 - 1.0) / 12.0;
         assert!((e.bias - mean).abs() < 1e-12 && (e.mean_absolute - mean).abs() < 1e-12, "{e:?}");
         assert!((e.rmse - f64::sqrt(mean * mean + variance)).abs() < 1e-12 && e.max == 1.099, "{e:?}");
         pixels[7] = [1e30; 3];

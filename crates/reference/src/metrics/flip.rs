@@ -120,7 +120,8 @@ fn features(luminance: &Plane, pixels_per_degree: f64) -> [Vec<f64>; 2] {
     let first = balanced(taps(reach, |x| -x * bell(x)));
     let second = balanced(taps(reach, |x| (x * x / (sigma * sigma) - 1.0) * bell(x)));
     [first, second].map(|taps| {
-        let (dx, dy) = (luminance.filtered(&taps, &across), luminance.filtered(&across, &taps));
+        let dx = luminance.filtered(&taps, &across);
+        let dy = luminance.filtered(&across, &taps);
         dx.values.iter().zip(&dy.values).map(|(x, y)| x.hypot(*y)).collect()
     })
 }
@@ -162,7 +163,8 @@ mod tests {
         let flat = shown(|_, _| [0.52; 3]);
         let lined = shown(|x, _| if x % 16 == 0 { [0.52; 3] } else { [0.5; 3] });
         let at = |image: &Image<Display>| flip(image, &grey, &Viewing { pixels_per_degree: 8.0 }).unwrap();
-        let (flat, lined) = (at(&flat).values, at(&lined).values);
+        let flat = at(&flat).values;
+        let lined = at(&lined).values;
         assert!(lined[20 * 64 + 16] > 0.0 && flat[20 * 64 + 16] > 0.0);
         assert!(at(&shown(|x, _| if x < 32 { [0.5; 3] } else { [0.0; 3] })).mean > 0.2);
         assert_eq!(flip(&grey, &Image::from_encoded([1, 1], vec![[0.0; 3]]).unwrap(), &Viewing::default()).ok(), None);

@@ -15,7 +15,8 @@ impl Plane {
     }
 
     fn along_rows(&self, taps: &[f64]) -> Self {
-        let (width, reach) = (self.width, (taps.len() / 2) as isize);
+        let width = self.width;
+        let reach = (taps.len() / 2) as isize;
         let mut values = vec![0.0; self.values.len()];
         values.par_chunks_mut(width).zip(self.values.par_chunks(width)).for_each(|(out, row)| {
             for (x, out) in out.iter_mut().enumerate() {
@@ -27,7 +28,8 @@ impl Plane {
     }
 
     fn along_columns(&self, taps: &[f64]) -> Self {
-        let (width, reach) = (self.width, (taps.len() / 2) as isize);
+        let width = self.width;
+        let reach = (taps.len() / 2) as isize;
         let height = self.values.len() / width;
         let mut values = vec![0.0; self.values.len()];
         values.par_chunks_mut(width).enumerate().for_each(|(y, out)| {

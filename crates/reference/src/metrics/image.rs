@@ -83,7 +83,8 @@ impl<S: ColorSpace> Image<S> {
     }
 
     pub(crate) fn same_size(&self, other: &Self) -> Result<(), MetricError> {
-        let (expected, found) = (self.size, other.size);
+        let expected = self.size;
+        let found = other.size;
         if expected == found { Ok(()) } else { Err(MetricError::Size { expected, found }) }
     }
 }
@@ -120,7 +121,8 @@ impl Image<Linear> {
         let mut pixels = vec![[0.0; 3]; size[0] * size[1]];
         for y in 0..size[1] * factor {
             for x in 0..size[0] * factor {
-                let (from, to) = (self.pixels[y * self.size[0] + x], &mut pixels[y / factor * size[0] + x / factor]);
+                let from = self.pixels[y * self.size[0] + x];
+                let to = &mut pixels[y / factor * size[0] + x / factor];
                 (0..3).for_each(|c| to[c] += share * from[c]);
             }
         }

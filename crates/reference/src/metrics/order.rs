@@ -100,8 +100,11 @@ fn wrong_pairs(values: &[f64]) -> u64 {
             return (values.to_vec(), 0);
         }
         let (a, b) = values.split_at(values.len() / 2);
-        let ((a, wrong_a), (b, wrong_b)) = (sorted(a), sorted(b));
-        let (mut merged, mut wrong, mut i) = (Vec::with_capacity(values.len()), wrong_a + wrong_b, 0);
+        let (a, wrong_a) = sorted(a);
+        let (b, wrong_b) = sorted(b);
+        let mut merged = Vec::with_capacity(values.len());
+        let mut wrong = wrong_a + wrong_b;
+        let mut i = 0;
         for v in b {
             while i < a.len() && a[i] <= v {
                 merged.push(a[i]);
@@ -117,7 +120,8 @@ fn wrong_pairs(values: &[f64]) -> u64 {
 }
 
 fn backtrack(values: &[f64]) -> f64 {
-    let (mut farthest, mut worst) = (f64::NEG_INFINITY, 0.0f64);
+    let mut farthest = f64::NEG_INFINITY;
+    let mut worst = 0.0f64;
     for &v in values {
         worst = worst.max(farthest - v);
         farthest = farthest.max(v);
@@ -151,7 +155,8 @@ mod tests {
         }
         let view = Projection::Orthographic { height: 2.0 };
         let camera = Camera::look_at(DVec3::Z * 4.0, DVec3::ZERO, DVec3::Y, view, [9, 9]).unwrap();
-        let (footprints, materials) = (FootprintStack::default(), [Material::default()]);
+        let footprints = FootprintStack::default();
+        let materials = [Material::default()];
         let input = Input {
             cloud: &cloud,
             camera: &camera,
@@ -170,7 +175,8 @@ mod tests {
         assert!((wrong.wrong_pairs_per_ray - 3.0 / 9.0).abs() < 1e-12 && (wrong.worst_backtrack - 2.0).abs() < 1e-6);
         assert_eq!(rays.disorder(&[0, u32::MAX, 1]).pairs_per_ray, 1.0 / 9.0);
         // A wall hides what lies behind it.
-        let (normal, kind) = (Vec3::Z, SplatKind::Opaque);
+        let normal = Vec3::Z;
+        let kind = SplatKind::Opaque;
         let position = Vec3::new(0.0, 0.0, -0.5);
         let mut walled = cloud.clone();
         walled.push(&Noun { position, radius: 2.0, cross_section: 1.0, kind, normal, ..Noun::default() });

@@ -79,7 +79,8 @@ impl Tracer<'_> {
         let Some(pole) = lamp.source.pole() else { return };
         let middle = (pole - path.ray.origin).dot(path.ray.direction);
         let apart = (pole - path.ray.at(middle)).length();
-        let (a, b) = ((t0 - middle).atan2(apart), (t1 - middle).atan2(apart));
+        let a = (t0 - middle).atan2(apart);
+        let b = (t1 - middle).atan2(apart);
         let t = middle + apart * (a + (b - a) * rng.unit()).tan();
         let point = path.ray.at(t);
         let may_reflect = !self.rules.reflects_apart || path.bounces == 0;
@@ -92,7 +93,8 @@ impl Tracer<'_> {
         let distance = to_light.length();
         let shadow = Ray { origin: point, direction: to_light / distance };
         let arrives = if lamp.shadowed { self.through(&shadow, distance, u32::MAX, true, rng) } else { [1.0; 3] };
-        let (intensity, passing) = (lamp.source.intensity(point), self.scene.passing(lamp.rank, point));
+        let intensity = lamp.source.intensity(point);
+        let passing = self.scene.passing(lamp.rank, point);
         // 1/density · 1/d²: the squares cancel but for rounding, apart² + (t − middle)² = d².
         let factor = n as f64 * (b - a) / apart;
         let lit = |c: usize| scattered[c] - dimmed[c] * (1.0 - arrives[c]);
@@ -101,12 +103,14 @@ impl Tracer<'_> {
 
     /// Σ over media of extinction · share of the light that is scattered or reflected, per channel; all, and the share that shadows dim.
     fn scattering(&self, p: DVec3, pole: DVec3, travel: DVec3, may_reflect: bool) -> ([f64; 3], [f64; 3]) {
-        let (mut sum, mut dimmed) = ([0.0; 3], [0.0; 3]);
+        let mut sum = [0.0; 3];
+        let mut dimmed = [0.0; 3];
         let to_light = (pole - p).normalize_or_zero();
         for medium in &self.scene.media {
             let density = medium.density.value(p);
             if density > 0.0 && (may_reflect || !medium.reflects(p)) {
-                let (share, factor) = (medium.toward(p, to_light, -travel), density * medium.liberty.gain);
+                let share = medium.toward(p, to_light, -travel);
+                let factor = density * medium.liberty.gain;
                 for c in 0..3 {
                     let own = factor * medium.extinction[c] * share[c];
                     sum[c] += own;

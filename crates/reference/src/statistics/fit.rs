@@ -25,7 +25,8 @@ pub fn fit_order(points: &[[f64; 2]]) -> Option<Fit> {
     let logs: Vec<[f64; 2]> = points.iter().filter(|p| p.iter().all(usable)).map(|p| [p[0].ln(), p[1].ln()]).collect();
     let n = logs.len() as f64;
     let mean = |c: usize| logs.iter().map(|p| p[c]).sum::<f64>() / n;
-    let (mx, my) = (mean(0), mean(1));
+    let mx = mean(0);
+    let my = mean(1);
     let sxx: f64 = logs.iter().map(|p| (p[0] - mx).powi(2)).sum();
     if logs.len() < 2 || sxx < 1e-12 {
         return None;

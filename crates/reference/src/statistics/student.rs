@@ -6,7 +6,8 @@ use std::f64::consts::PI;
 /// 95 %.
 pub fn student_t_95(degrees: usize) -> f64 {
     // The normal limit is 1.96, one degree of freedom 12.7.
-    let (mut low, mut high) = (1.9, 13.0);
+    let mut low = 1.9;
+    let mut high = 13.0;
     for _ in 0..60 {
         let middle = 0.5 * (low + high);
         if probability_within(middle, degrees.max(1)) < 0.95 { low = middle } else { high = middle }
@@ -17,10 +18,12 @@ pub fn student_t_95(degrees: usize) -> f64 {
 /// P(|T| < t); M. Abramowitz, I. Stegun, *Handbook of Mathematical Functions*, 26.7.3 and 26.7.4.
 fn probability_within(t: f64, degrees: usize) -> f64 {
     let theta = (t / (degrees as f64).sqrt()).atan();
-    let (sin, cos_sq) = (theta.sin(), theta.cos() * theta.cos());
+    let sin = theta.sin();
+    let cos_sq = theta.cos() * theta.cos();
     let odd = degrees % 2 == 1;
     // Σ of products of (k − 1)/k or k/(k + 1) times cos².
-    let (mut term, mut sum) = (1.0, 1.0);
+    let mut term = 1.0;
+    let mut sum = 1.0;
     let mut k = if odd { 3 } else { 2 };
     while k < degrees {
         term *= (k - 1) as f64 / k as f64 * cos_sq;

@@ -38,7 +38,9 @@ pub(crate) fn ball_mesh(center: Vec3, radius: f32, levels: u32) -> Mesh {
     let mut position = axes.to_vec();
     let mut triangles: Vec<[u32; 3]> = (0..8)
         .map(|i| {
-            let (x, y, z) = (i & 1, i >> 1 & 1, i >> 2 & 1);
+            let x = i & 1;
+            let y = i >> 1 & 1;
+            let z = i >> 2 & 1;
             let t = [x, 2 + y, 4 + z];
             if (x + y + z) % 2 == 0 { t } else { [t[0], t[2], t[1]] }
         })
@@ -53,7 +55,9 @@ pub(crate) fn ball_mesh(center: Vec3, radius: f32, levels: u32) -> Mesh {
                     position.len() as u32 - 1
                 })
             };
-            let (ab, bc, ca) = (middle(a, b), middle(b, c), middle(c, a));
+            let ab = middle(a, b);
+            let bc = middle(b, c);
+            let ca = middle(c, a);
             next.extend([[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]);
         }
         triangles = next;
@@ -67,9 +71,12 @@ pub(crate) fn ball_mesh(center: Vec3, radius: f32, levels: u32) -> Mesh {
 pub(crate) fn assert_mean(estimate: &Estimate, truth: impl Fn(usize) -> [f64; 3], sigmas: f64, what: &str) {
     let s = &estimate.radiance;
     for c in 0..3 {
-        let (mut off, mut variance) = (0.0, 0.0);
+        let mut off = 0.0;
+        let mut variance = 0.0;
         for k in 0..s.mean.len() {
-            let (found, error, exact) = (s.mean[k][c], s.standard_error[k][c], truth(k)[c]);
+            let found = s.mean[k][c];
+            let error = s.standard_error[k][c];
+            let exact = truth(k)[c];
             assert!(
                 (found - exact).abs() <= sigmas * error + 1e-12,
                 "{what}: pixel {k} channel {c} is {found} ± {error}, exactly {exact}"

@@ -83,7 +83,8 @@ impl Band {
     }
 
     fn set(&mut self, at: usize, frame: &Frame, camera: &Camera, lattices: &[LatticeRays], [x, y]: [usize; 2]) {
-        let (x, y) = (x as f64 + 0.5, y as f64 + 0.5);
+        let x = x as f64 + 0.5;
+        let y = y as f64 + 0.5;
         let ray = frame.ray(camera, x, y);
         let Some(slope) = slope_of(&ray) else { return };
         for a in 0..2 {
@@ -123,7 +124,8 @@ impl Band {
 
     /// Finds what each row has of each volume.
     pub(crate) fn find_hits(&mut self) {
-        let (stride, width) = (self.stride, self.width);
+        let stride = self.stride;
+        let width = self.width;
         let row = |[near, far]: &[Vec<f32>; 2], y: usize| {
             let none = Hit { columns: width..0, near: f32::INFINITY, far: f32::NEG_INFINITY };
             let join = |hit: Hit, x: usize| Hit {

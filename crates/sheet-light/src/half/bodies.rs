@@ -29,9 +29,12 @@ pub struct SplatBounds {
 impl SplatBounds {
     /// Those of some splats of a cloud, in slabs of half their mean radius, for neighbours are about as far apart; `None` without any.
     pub fn of(cloud: &Cloud, ids: impl Iterator<Item = u32>) -> Option<Self> {
-        let (mut all, mut radii, mut count) = (Aabb::EMPTY, 0.0f64, 0u64);
+        let mut all = Aabb::EMPTY;
+        let mut radii = 0.0f64;
+        let mut count = 0u64;
         for id in ids {
-            let (at, radius) = (cloud.position[id as usize], cloud.radius[id as usize]);
+            let at = cloud.position[id as usize];
+            let radius = cloud.radius[id as usize];
             all = all.union(Aabb { min: at, max: at });
             (radii, count) = (radii + f64::from(radius), count + 1);
         }

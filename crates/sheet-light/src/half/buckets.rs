@@ -62,7 +62,8 @@ pub(crate) struct Buckets {
 impl Buckets {
     pub(crate) fn new(of: &[Vec<Record>], placed: &Placed<'_>, frame: &Frame, sight: &Sight, shape: &Shape) -> Self {
         let [width, height] = sight.camera.size.map(|s| s as usize);
-        let (bands, touched) = (height.div_ceil(ROWS), placed.sections.touched);
+        let bands = height.div_ceil(ROWS);
+        let touched = placed.sections.touched;
         let bucket = |record: &Record| {
             let first = (record.place / PHASES).min(frame.slabs.count - 1);
             // A slab that a face cuts asks for what its neighbours hold, too.
@@ -97,7 +98,8 @@ impl Buckets {
 
     /// Voxels that may reach `band` in any of some slabs, or a rim of up to a band around it, run by run.
     pub(crate) fn of(&self, slabs: Range<u32>, band: usize, has_rim: bool) -> impl Iterator<Item = &[Record]> {
-        let (rim, count) = (usize::from(has_rim), (self.starts.len() - 1) / self.bands);
+        let rim = usize::from(has_rim);
+        let count = (self.starts.len() - 1) / self.bands;
         let slabs = slabs.start as usize..(slabs.end as usize).min(count);
         (slabs.start.saturating_sub(self.touched - 1)..slabs.end).map(move |first| {
             let row = first * self.bands;

@@ -50,7 +50,9 @@ pub(crate) struct Pixels {
 impl Pixels {
     /// Nothing seen yet, in the form of `of`; whether sums are rounded to half precision.
     pub(crate) fn new(band: &Band, of: &Accumulator, half: bool) -> Self {
-        let (n, planes, channels) = (band.stored * band.stride, of.optical_depth.len(), of.channels.len());
+        let n = band.stored * band.stride;
+        let planes = of.optical_depth.len();
+        let channels = of.channels.len();
         let plane = |fill: f32| vec![fill; n];
         let has = |kept: bool| if kept { n } else { 0 };
         Self {
@@ -154,7 +156,8 @@ impl Pixels {
     /// Adds to the depths of pixel `k` a medium between two view depths, before which lies the optical depth `before`.
     pub(crate) fn add_depth(&mut self, k: usize, [near, far]: [f64; 2], before: f32, own: f32) {
         if let Some(depth) = self.depth.get_mut(k).filter(|_| own > 0.0) {
-            let (middle, thickness) = ((0.5 * (near + far)) as f32, (far - near) as f32);
+            let middle = (0.5 * (near + far)) as f32;
+            let thickness = (far - near) as f32;
             depth.add(&DepthFragment { depth: middle, thickness, narrow: 1.0, before, after: before + own });
         }
     }
@@ -170,7 +173,8 @@ impl Pixels {
     pub(crate) fn store(&self, band: &Band, to: &mut Accumulator) {
         let width = band.width;
         for row in band.rows.clone() {
-            let (image, from) = (row * width..(row + 1) * width, (row - band.top) * band.stride);
+            let image = row * width..(row + 1) * width;
+            let from = (row - band.top) * band.stride;
             let own = from..from + width;
             let floats = to.optical_depth.iter_mut().zip(&self.optical_depth);
             for (to, from) in floats.chain(to.channels.iter_mut().zip(&self.values)) {

@@ -135,7 +135,8 @@ impl pulp::WithSimd for OneSlab<'_> {
                 fragments += self.reconstruct(simd, v, self.slab + 1);
             }
         }
-        let (top, own) = (self.eye.band.top, self.eye.band.rows.clone());
+        let top = self.eye.band.top;
+        let own = self.eye.band.rows.clone();
         for y in own.start - top..own.end - top {
             let spans = || volumes.clone().map(|v| &self.eye.sheet(v, self.slab).spans[y]);
             let splats = self.splats.and_then(|splats| splats.squares.span(top + y));
@@ -196,7 +197,8 @@ impl OneSlab<'_> {
             of(1.0).where_less_or(self.eye.pixels.most(simd, k), of(self.of.params.transmittance_cutoff), of(0.0));
         let stretch = Lanes::load(simd, &self.eye.band.stretch[k..]);
         let mut all = [of(0.0); 3];
-        let (mut near, mut far) = (of(f32::INFINITY), of(f32::NEG_INFINITY));
+        let mut near = of(f32::INFINITY);
+        let mut far = of(f32::NEG_INFINITY);
         let [lower, upper] = [0, 1].map(|end| Lanes::load(simd, &self.part[end]));
         for v in self.volumes() {
             let Some([extinction, length]) = self.extinction(simd, v, k) else {
@@ -209,8 +211,8 @@ impl OneSlab<'_> {
                 all[p] = tau.mul_add(of(self.of.volumes[v].material.extinction_rgb[p]), all[p]);
             }
             let sheet = self.eye.sheet(v, self.slab);
-            let (from, to) =
-                (Lanes::load(simd, &sheet.near[k..]).max(lower), Lanes::load(simd, &sheet.far[k..]).min(upper));
+            let from = Lanes::load(simd, &sheet.near[k..]).max(lower);
+            let to = Lanes::load(simd, &sheet.far[k..]).min(upper);
             near = near.min(from.where_less_or(of(0.0), tau, near));
             far = far.max(to.where_less_or(of(0.0), tau, far));
         }
@@ -226,7 +228,8 @@ impl OneSlab<'_> {
             all[p].store(&mut fragments.optical_depth[p]);
         }
         // Lanes without any are of no meaning, but are numbers.
-        let (near, far) = (near.where_less(of(0.0), most), far.where_less(of(0.0), most));
+        let near = near.where_less(of(0.0), most);
+        let far = far.where_less(of(0.0), most);
         if is_medium && self.step == Step::Draw {
             self.light(simd, chunk, [near, far], most, &mut fragments);
         }
@@ -236,7 +239,8 @@ impl OneSlab<'_> {
     /// Extinction of a volume, and the depth that it has; `None` where it has no sheet.
     #[inline(always)]
     fn extinction<S: Simd>(&self, simd: S, v: usize, k: usize) -> Option<[Lanes<S>; 2]> {
-        let (sheet, stride) = (self.eye.sheet(v, self.slab), self.eye.band.stride);
+        let sheet = self.eye.sheet(v, self.slab);
+        let stride = self.eye.band.stride;
         // No closure: what is vectorised must be inlined.
         if !sheet.spans[k / stride].contains(&(k % stride)) {
             return None;
@@ -270,7 +274,8 @@ impl OneSlab<'_> {
         let of = self.of;
         let mut wanted = [0.0; MAX_LANES];
         most.store(&mut wanted);
-        let (planes, arrives) = (self.eye.pixels.planes, self.arrives(simd, chunk.k, [near, far], &wanted, out));
+        let planes = self.eye.pixels.planes;
+        let arrives = self.arrives(simd, chunk.k, [near, far], &wanted, out);
         let middle = (near + far) * Lanes::splat(simd, 0.5);
         let at = self.places(simd, chunk.k, middle);
         let places = stored(&at);
@@ -329,7 +334,8 @@ impl OneSlab<'_> {
         let Some(buffer) = &self.of.light_buffer else { return [[1.0; MAX_LANES]; 3] };
         let [nearer, farther] = if self.of.frame.back_to_front { [far, near] } else { [near, far] };
         let ends = [self.places(simd, k, nearer), self.places(simd, k, farther)];
-        let (extinction, planes) = (&self.eye.extinction[..], self.eye.pixels.planes);
+        let extinction = &self.eye.extinction[..];
+        let planes = self.eye.pixels.planes;
         let splats = self.splats.and_then(|splats| splats.light.as_ref());
         let light = self.of.illumination(buffer, self.slab, splats);
         let parts = self.depths.and_then(|depths| LitParts::new(simd, (depths, &self.of.frame), &ends, wanted));
@@ -400,7 +406,8 @@ impl OneSlab<'_> {
             let scattered = lit.scattered(self.of, pixel, seen).unwrap_or([0.0; 3]);
             (0..3).for_each(|c| values[first + c] += scattered[c]);
         }
-        let (count, planes) = (self.layout.count(), self.eye.pixels.planes);
+        let count = self.layout.count();
+        let planes = self.eye.pixels.planes;
         for c in 0..count {
             let sum = &mut out.values[c][lane];
             *sum += (values[c] - *sum) * share[ChannelLayout::plane_of(c, count, planes)];
@@ -421,8 +428,10 @@ impl OneSlab<'_> {
         splats: Splatted<'_>,
         fragments: &mut Fragments,
     ) {
-        let (is_last_first, keeps_depths) = (self.prepends(), self.keeps_depths());
-        let (of, eye) = (self.of, &mut *self.eye);
+        let is_last_first = self.prepends();
+        let keeps_depths = self.keeps_depths();
+        let of = self.of;
+        let eye = &mut *self.eye;
         let mut before = [0.0; MAX_LANES];
         eye.pixels.so_far(simd, chunk.k).store(&mut before);
         let mut share = [0.0; MAX_LANES];
@@ -443,7 +452,8 @@ impl OneSlab<'_> {
         let mut ends = [[0.0; MAX_LANES]; 2];
         near.store(&mut ends[0]);
         far.store(&mut ends[1]);
-        let (green, mut splatted) = (eye.pixels.planes / 2, [[0.0; MAX_LANES]; 3]);
+        let green = eye.pixels.planes / 2;
+        let mut splatted = [[0.0; MAX_LANES]; 3];
         if let Some((lines, at, _)) = splats {
             splatted = lines.depths(simd, at);
         }

@@ -69,7 +69,9 @@ pub fn fold(
     let pixels = size[0] as usize * size[1] as usize;
     assert!(input.opaque.is_empty() || input.opaque.len() == pixels, "invariant: an opaque depth for each pixel");
     let has = |kept: usize| kept > 0;
-    let (planes, depth, object) = (into.optical_depth.len(), has(into.depth.len()), has(into.object.len()));
+    let planes = into.optical_depth.len();
+    let depth = has(into.depth.len());
+    let object = has(into.object.len());
     *into = Accumulator::new(size, planes, layout.count(), depth, object);
     let quiet = Progress::new();
     let progress = progress.unwrap_or(&quiet);
@@ -158,7 +160,8 @@ impl<'a> Sweeps<'a, '_> {
         let Some((axis, share)) = other else { return sweep.run(self.layout, form, image, self.progress) };
         let light_alone = sweep.light_alone;
         let blank = || self.eye.solid.as_ref().map(|solid| PolygonImage::new(solid, self.layout));
-        let (mut own_image, mut other_image) = (blank(), blank());
+        let mut own_image = blank();
+        let mut other_image = blank();
         let (mut bands, counts) = sweep.run(self.layout, form, own_image.as_mut(), self.progress)?;
         let form = Accumulator { depth: Vec::new(), object: Vec::new(), ..form.clone() };
         let other = self.begin(light, Some(axis), light_alone)?;
@@ -306,7 +309,8 @@ pub fn slab_width(bodies: &Bodies<'_>, camera: &Camera, light: Option<&Light>, p
 /// If there is no such lamp.
 pub fn balance(input: &HalfInput<'_>, params: &HalfParams, light: usize) -> Result<Balance, Error> {
     check(input, params)?;
-    let (volumes, lit) = (&input.sheets.volumes[..], &input.sheets.lights[light]);
+    let volumes = &input.sheets.volumes[..];
+    let lit = &input.sheets.lights[light];
     if !scatter::is_wanted(volumes, &lit.light, params) {
         return Ok(Balance::default());
     }
@@ -346,7 +350,8 @@ fn check(input: &HalfInput<'_>, params: &HalfParams) -> Result<(), Error> {
     if let Some(samples) = input.extended.iter().map(|e| e.samples).find(|n| !(1..=MOST_SAMPLES).contains(n)) {
         return Err(Error::parameter("extended.samples", samples, "1 to 1024"));
     }
-    let (bodies, camera) = (&input.bodies(), input.sheets.camera);
+    let bodies = &input.bodies();
+    let camera = input.sheets.camera;
     let points = input.sheets.lights.iter().map(|lit| serves(bodies, camera, &lit.light));
     let extended = input.extended.iter().map(|e| serves_extended(bodies, camera, &e.lit.light, e.samples));
     for (light, served) in points.chain(extended).enumerate() {
@@ -375,7 +380,8 @@ fn check_splats(input: &HalfInput<'_>, splats: &HalfSplats<'_>) -> Result<(), Er
 
 /// Refuses what takes more than it may, before it does.
 fn check_memory(input: &HalfInput<'_>, params: &HalfParams) -> Result<(), Error> {
-    let (needed, limit) = (needed(input, params), params.sheets.limits.max_bytes);
+    let needed = needed(input, params);
+    let limit = params.sheets.limits.max_bytes;
     let hint = || {
         "use fewer voxels, a smaller picture, fewer pixels of the light buffer or fewer points of an extended light"
             .to_owned()

@@ -30,7 +30,9 @@ pub(crate) struct Ray {
 
 /// World positions of the corners of a volume.
 pub(crate) fn world_corners(volume: &Volume<'_>) -> [DVec3; 8] {
-    let (ends, origin, axes) = (volume.ends(), volume.origin(), volume.axes());
+    let ends = volume.ends();
+    let origin = volume.origin();
+    let axes = volume.axes();
     std::array::from_fn(|c| origin + axes * DVec3::from_array([0, 1, 2].map(|a| ends[c >> a & 1][a])))
 }
 
@@ -45,7 +47,8 @@ impl Frame {
         let axes = [first, across.cross(first), across];
         let nowhere = Slabs { origin: 0.0, width: 1.0, count: 0 };
         let mut frame = Self { center: bodies.middle(), axes, slabs: nowhere, back_to_front: axis.back_to_front };
-        let (mut spacing, mut reach) = (f64::INFINITY, 0.0f64);
+        let mut spacing = f64::INFINITY;
+        let mut reach = 0.0f64;
         for volume in bodies.volumes {
             let along = spacing_along(&volume.packing.equivalent_steps(frame.steps(volume)));
             (spacing, reach) = (spacing.min(along), reach.max(along * params.kernel.extent));
@@ -54,7 +57,8 @@ impl Frame {
             spacing = splats.slab_width;
         }
         let depths = || bodies.corners().map(|corner| frame.point(corner).z);
-        let (near, far) = (depths().fold(f64::INFINITY, f64::min), depths().fold(f64::NEG_INFINITY, f64::max));
+        let near = depths().fold(f64::INFINITY, f64::min);
+        let far = depths().fold(f64::NEG_INFINITY, f64::max);
         frame.slabs = Slabs::new(near, far, params.slab_width.unwrap_or(spacing), reach)?;
         params.check_slabs(frame.slabs.count)?;
         Ok(frame)

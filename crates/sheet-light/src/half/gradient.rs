@@ -42,20 +42,26 @@ impl Gradients {
         k: usize,
     ) -> [Vec3; MAX_LANES] {
         let of = |v: f32| Lanes::splat(simd, v);
-        let (zero, half, one) = (of(0.0), of(0.5), of(1.0));
+        let zero = of(0.0);
+        let half = of(0.5);
+        let one = of(1.0);
         let own = at(simd, here, k, 0.0);
         let none = [own[0], own[1], own[2], own[3], zero];
         let above = if k >= stride { at(simd, here, k - stride, 0.0) } else { none };
         let below = if k + stride < here.near.len() { at(simd, here, k + stride, 0.0) } else { none };
         let [vx, x @ ..] = difference(simd, &own, &left_of(simd, here, k), &at(simd, here, k + 1, 0.0));
         let [vy, y @ ..] = difference(simd, &own, &above, &below);
-        let (before, after) = (at(simd, before, k, -1.0), at(simd, after, k, 1.0));
+        let before = at(simd, before, k, -1.0);
+        let after = at(simd, after, k, 1.0);
         let [vz, mut z @ ..] = difference(simd, &own, &before, &after);
         // Without a neighbour across the slabs there is no gradient across them.
         z[2] = one.where_less_or(before[INSIDE] + after[INSIDE], half, z[2]);
-        let (of_x, of_y, of_z) = (cross(&y, &z), cross(&z, &x), cross(&x, &y));
+        let of_x = cross(&y, &z);
+        let of_y = cross(&z, &x);
+        let of_z = cross(&x, &y);
         let determinant = dot(&x, &of_x);
-        let (least, size) = (of(f32::MIN_POSITIVE), determinant.abs());
+        let least = of(f32::MIN_POSITIVE);
+        let size = determinant.abs();
         let inverse = one / one.where_less_or(size, least, determinant);
         let mut gradient = [zero, zero, vz / z[2]];
         for n in 0..3 {
@@ -110,7 +116,8 @@ fn at<S: Simd>(simd: S, sheet: &Sheet, k: usize, slabs: f32) -> Sample<S> {
 /// Of near, far, kernel sum, value, a, b and s, of which the last is told from another sheet than its own, `slabs` behind that.
 #[inline(always)]
 fn sample<S: Simd>(simd: S, slabs: f32, of: [&[f32]; 7]) -> Sample<S> {
-    let (zero, one) = (Lanes::splat(simd, 0.0), Lanes::splat(simd, 1.0));
+    let zero = Lanes::splat(simd, 0.0);
+    let one = Lanes::splat(simd, 1.0);
     let inside = one.where_less(Lanes::load(simd, of[0]), Lanes::load(simd, of[1]));
     let inside = inside.where_less(Lanes::splat(simd, LEAST_WEIGHT), Lanes::load(simd, of[2]));
     let mut out = [inside; 5];

@@ -74,7 +74,9 @@ impl Illumination<'_> {
         let [nearer, farther] = &asked.ends;
         let middle = between(asked, of(0.5));
         let soft = self.buffer.soft.as_ref().map(|soft| soft.at(simd, &middle, wanted, asked.lit));
-        let (mut optical, mut bends, mut is_bent) = ([[of(0.0); NODES]; 3], [of(1.0); BENDS], of(0.0));
+        let mut optical = [[of(0.0); NODES]; 3];
+        let mut bends = [of(1.0); BENDS];
+        let mut is_bent = of(0.0);
         for v in 0..self.volumes.len() {
             let mean = self.means(simd, v, &middle, asked.extinction, wanted);
             let ways = [self.paths[v].ways(simd, nearer, self.face), self.paths[v].ways(simd, farther, self.face)];
@@ -151,7 +153,8 @@ impl Illumination<'_> {
         wanted: &[f32; MAX_LANES],
         (soft, to): (&Option<Soft<S>>, &mut [[Lanes<S>; NODES]; 3]),
     ) {
-        let (places, mut tau) = (stored(middle), [[[0.0; MAX_LANES]; 2]; 3]);
+        let places = stored(middle);
+        let mut tau = [[[0.0; MAX_LANES]; 2]; 3];
         for lane in (0..Lanes::<S>::COUNT).filter(|lane| wanted[*lane] > 0.0) {
             let at = Vec3::new(places[0][lane], places[1][lane], places[2][lane]);
             let of_each = splats.optical_depth(at, (at.z - self.face) / self.width);
@@ -247,7 +250,8 @@ impl pulp::WithSimd for ThroughVolumes<'_> {
                 of.add(simd, (&ways, mean, own), &None, [v, 0], &mut optical);
             }
             for p in 0..3 {
-                let (mut added, mut through) = ([0.0; MAX_LANES], [0.0; MAX_LANES]);
+                let mut added = [0.0; MAX_LANES];
+                let mut through = [0.0; MAX_LANES];
                 let more = more.iter().skip(chunk * Lanes::<S>::COUNT);
                 added.iter_mut().zip(more).for_each(|(added, more)| *added = more[p]);
                 (optical[p][0] + Lanes::load(simd, &added)).exp_neg().store(&mut through);
@@ -276,8 +280,10 @@ impl pulp::WithSimd for Around<'_> {
     fn with_simd<S: Simd>(self, simd: S) {
         let Self { of, places, visible, out } = self;
         let Some(soft) = &of.buffer.soft else { return out.fill([0.0; 3]) };
-        let (points, none) = (visible.len() / places.len().max(1), vec![[0.0; MAX_LANES]; of.volumes.len()]);
-        let (one, zero) = (Lanes::splat(simd, 1.0), Lanes::splat(simd, 0.0));
+        let points = visible.len() / places.len().max(1);
+        let none = vec![[0.0; MAX_LANES]; of.volumes.len()];
+        let one = Lanes::splat(simd, 1.0);
+        let zero = Lanes::splat(simd, 0.0);
         let chunks = places.chunks(Lanes::<S>::COUNT).zip(out.chunks_mut(Lanes::<S>::COUNT));
         for (chunk, (places, out)) in chunks.enumerate() {
             let (at, wanted) = lanes(simd, places);
@@ -291,7 +297,8 @@ impl pulp::WithSimd for Around<'_> {
                     optical[p] = before.mul_add(share, optical[p]);
                 }
             }
-            let (share, optical) = (stored(&soft.share), stored(&optical));
+            let share = stored(&soft.share);
+            let optical = stored(&optical);
             for (lane, (place, out)) in places.iter().zip(out).enumerate() {
                 let splats = of.splats.map(|splats| splats.optical_depth(*place, f32::NEG_INFINITY));
                 *out = [0, 1, 2].map(|p| optical[p][lane] + splats.map_or(0.0, |tau| share[p][lane] * tau[p][0]));
@@ -303,7 +310,8 @@ impl pulp::WithSimd for Around<'_> {
 /// Places of neighbours, and which there are.
 #[inline(always)]
 fn lanes<S: Simd>(simd: S, places: &[Vec3]) -> (Places<S>, [f32; MAX_LANES]) {
-    let (mut at, mut wanted) = ([[0.0; MAX_LANES]; 3], [0.0; MAX_LANES]);
+    let mut at = [[0.0; MAX_LANES]; 3];
+    let mut wanted = [0.0; MAX_LANES];
     for (lane, place) in places.iter().enumerate() {
         (0..3).for_each(|a| at[a][lane] = place[a]);
         wanted[lane] = 1.0;
@@ -327,7 +335,8 @@ fn part<S: Simd>(simd: S, tau: Lanes<S>, [g, f]: [Lanes<S>; 2]) -> Lanes<S> {
 /// The same over parts that meet at the shares `bends` of the way.
 #[inline(always)]
 fn bent<S: Simd>(simd: S, tau: Lanes<S>, bends: &[Lanes<S>; BENDS], optical: &[Lanes<S>; NODES]) -> Lanes<S> {
-    let (mut sum, mut from) = (Lanes::splat(simd, 0.0), Lanes::splat(simd, 0.0));
+    let mut sum = Lanes::splat(simd, 0.0);
+    let mut from = Lanes::splat(simd, 0.0);
     for n in 0..NODES - 1 {
         let to = if n < BENDS { bends[n] } else { Lanes::splat(simd, 1.0) };
         let own = part(simd, tau * (to - from), [optical[n], optical[n + 1]]);

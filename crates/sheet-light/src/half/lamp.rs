@@ -27,7 +27,8 @@ pub(crate) fn camera_of(bodies: &Bodies<'_>, light: &Light, params: &HalfParams)
         let fov_y = 2.0 * libm::atan(0.5 * f64::from(size[1]) / focal);
         return Camera { projection: Projection::Perspective { fov_y }, size, ..camera };
     }
-    let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+    let mut low = DVec3::INFINITY;
+    let mut high = DVec3::NEG_INFINITY;
     corners.for_each(|p| (low, high) = (low.min(p), high.max(p)));
     let center = 0.5 * (low + high);
     let position = camera.position + right * center.x + axes[1] * center.y + forward * (2.0 * low.z - high.z);

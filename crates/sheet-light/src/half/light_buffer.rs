@@ -138,9 +138,13 @@ impl LightBuffer {
         let ([[x0, x1], [y0, y1]], [u, v]) = self.sight.around(place);
         let width = self.sight.camera.size[0] as usize;
         let sum = |x: usize, y: usize| &self.sums[(y * width + x) * self.volumes + volume];
-        let (a, b, c, d) = (sum(x0, y0), sum(x1, y0), sum(x0, y1), sum(x1, y1));
+        let a = sum(x0, y0);
+        let b = sum(x1, y0);
+        let c = sum(x0, y1);
+        let d = sum(x1, y1);
         [0, 1].map(|n| {
-            let (upper, lower) = (a[n] + (b[n] - a[n]) * u, c[n] + (d[n] - c[n]) * u);
+            let upper = a[n] + (b[n] - a[n]) * u;
+            let lower = c[n] + (d[n] - c[n]) * u;
             upper + (lower - upper) * v
         })
     }

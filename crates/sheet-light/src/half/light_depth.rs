@@ -106,7 +106,9 @@ impl LightDepths {
         let lights = Light { intensity: [1.0; 3], ..*light }.points(samples);
         let (shares, _) = received(light, &lights, origin);
         let placed: Vec<PlacedMesh<'_>> = casters.iter().map(|p| p.placed).collect();
-        let (mut points, mut farthest, mut bytes) = (Vec::with_capacity(lights.len()), 0.0f64, 0);
+        let mut points = Vec::with_capacity(lights.len());
+        let mut farthest = 0.0f64;
+        let mut bytes = 0;
         for (light, share) in lights.iter().zip(shares) {
             let cameras = views(light, origin, &placed, (receivers, side(most_pixels, lights.len() as u32)))?;
             let mut all = Vec::with_capacity(cameras.len());
@@ -178,7 +180,9 @@ impl LightDepths {
         if let [point] = &self.points[..] {
             return LitWay::one(self.lit_by(point, ends));
         }
-        let (mut sum, mut moment, mut is_whole) = (0.0, 0.0, true);
+        let mut sum = 0.0;
+        let mut moment = 0.0;
+        let mut is_whole = true;
         for point in &self.points {
             let [from, to] = self.lit_by(point, ends);
             is_whole &= [from, to] == [0.0, 1.0];
@@ -217,7 +221,8 @@ impl LightDepths {
         }
         let mut way = LitWay::DARK;
         for n in 0..count {
-            let ([from, to], [here, next]) = ([share_at(n), share_at(n + 1)], [nodes[n], nodes[n + 1]]);
+            let [from, to] = [share_at(n), share_at(n + 1)];
+            let [here, next] = [nodes[n], nodes[n + 1]];
             // Penumbras are smooth.
             if !is_one || (here - next).abs().max_element() < STEP {
                 way.push(WayPart { from, to, through: 0.5 * (here + next) });
@@ -247,7 +252,9 @@ impl LightDepths {
         let parts = (pixels(point, [from, to]) / PIXELS).ceil().clamp(2.0, PARTS as f32);
         // Ends lie on polygons that end the way: whether these are in the light is asked before them.
         let looked = |share: f32| at(share.clamp(INSET, 1.0 - INSET));
-        let (mut sum, mut moment, mut here) = (0.0, 0.0, looked(0.0));
+        let mut sum = 0.0;
+        let mut moment = 0.0;
+        let mut here = looked(0.0);
         let mut is_whole = here == 1.0;
         for part in 0..parts as usize {
             let [low, high] = [part, part + 1].map(|n| n as f32 / parts);
@@ -285,7 +292,8 @@ fn part_of(sum: f32, moment: f32) -> [f32; 2] {
 
 /// Where light changes from what it is at one end of a part to what it is at the other.
 fn edge(at: &impl Fn(f32) -> Vec3, [low, high]: [f32; 2], [here, next]: [Vec3; 2]) -> f32 {
-    let (mut before, mut behind) = (low, high);
+    let mut before = low;
+    let mut behind = high;
     for _ in 0..HALVINGS {
         let middle = 0.5 * (before + behind);
         let seen = at(middle);
@@ -345,7 +353,8 @@ impl View {
 
     /// Whether all of a way is lit, or none, where blocks of pixels tell.
     fn whole(&self, [a, b]: &[Sighted<'_>; 2], rounding: f32) -> Option<bool> {
-        let (near, far) = (a.at.z.min(b.at.z), a.at.z.max(b.at.z));
+        let near = a.at.z.min(b.at.z);
+        let far = a.at.z.max(b.at.z);
         let reach = STEEPEST * self.width(far) + rounding;
         let [columns, rows] = [0, 1].map(|axis| {
             // A look-up asks the pixels about a place.
@@ -356,7 +365,8 @@ impl View {
         if columns.len() * rows.len() > MOST_BLOCKS {
             return None;
         }
-        let (mut is_lit, mut is_dark) = (true, true);
+        let mut is_lit = true;
+        let mut is_dark = true;
         for y in rows {
             for block in columns.clone().map(|x| y * self.size[0].div_ceil(BLOCK) + x) {
                 let [least, most] = self.blocks[block];
@@ -377,14 +387,17 @@ impl View {
 impl Sighted<'_> {
     fn visibility(&self, bias: f32, face: Option<Vec3>) -> Vec3 {
         let View { planes, layers, size, is_parallel, .. } = self.view;
-        let (mut low, mut share) = ([0; 2], [0.0; 2]);
+        let mut low = [0; 2];
+        let mut share = [0.0; 2];
         for a in 0..2 {
             let place = (self.pixel[a] - 0.5).clamp(0.0, (size[a] - 1) as f32);
             low[a] = (place as usize).min(size[a].saturating_sub(2));
             share[a] = place - low[a] as f32;
         }
         let reach = STEEPEST * self.view.width(self.at.z);
-        let (mut hidden, mut count, mut through) = (0.0, 0, Vec3::ZERO);
+        let mut hidden = 0.0;
+        let mut count = 0;
+        let mut through = Vec3::ZERO;
         for corner in 0..4 {
             let at = [corner & 1, corner >> 1];
             let [x, y] = [0, 1].map(|a| (low[a] + at[a]).min(size[a] - 1));
@@ -468,8 +481,13 @@ mod tests {
         mesh.triangles.push([120, 121, 122]);
         mesh.position.extend([[-9.0, -9.0, -0.2], [9.0, -9.0, -0.2], [0.0, 9.0, -0.2]].map(Vec3::from_array));
         let placed = PlacedMesh { mesh: &mesh, transform: Similarity::default() };
-        let (color, optical_depth, material) = ([1.0; 3], f32::INFINITY, &Material::default());
-        let (object, shadow_coefficient, casts_shadow, radius) = (0, 1.0, true, 0.0);
+        let color = [1.0; 3];
+        let optical_depth = f32::INFINITY;
+        let material = &Material::default();
+        let object = 0;
+        let shadow_coefficient = 1.0;
+        let casts_shadow = true;
+        let radius = 0.0;
         let mesh =
             Polygons { placed, material, color, optical_depth, object, shadow_coefficient, casts_shadow, radius };
         for shape in [

@@ -83,7 +83,8 @@ impl LightPath {
     #[inline(always)]
     pub(crate) fn ways<S: Simd>(&self, simd: S, at: &Places<S>, face: f32) -> Ways<S> {
         let of = |v: f32| Lanes::splat(simd, v);
-        let (zero, tiny) = (of(0.0), of(PARALLEL));
+        let zero = of(0.0);
+        let tiny = of(PARALLEL);
         // No closures around vectors: what is vectorised must be inlined.
         let mut here = [zero; 3];
         for a in 0..3 {
@@ -92,9 +93,13 @@ impl LightPath {
         }
         let (length, towards, across) = self.ray(simd, at, &here);
         let steepest = towards[0].abs().max(towards[1].abs()).max(towards[2].abs());
-        let (mut enters, mut leaves, mut depths, mut steps) = ([of(FAR); FACES], zero, [zero; FACES], [zero; FACES]);
+        let mut enters = [of(FAR); FACES];
+        let mut leaves = zero;
+        let mut depths = [zero; FACES];
+        let mut steps = [zero; FACES];
         for a in 0..3 {
-            let (above, below) = (here[a] - of(self.lowest[a]), of(self.highest[a]) - here[a]);
+            let above = here[a] - of(self.lowest[a]);
+            let below = of(self.highest[a]) - here[a];
             let rate = length / towards[a].abs().max(tiny * steepest);
             let is_parallel = [towards[a].abs(), tiny * steepest];
             let inside = of(FAR).where_less_or(of(-ROUNDING), above.min(below), of(-FAR));
@@ -105,12 +110,14 @@ impl LightPath {
         }
         let mut cut = of(FAR);
         for (normal, offset) in &self.planes {
-            let (mut depth, mut step) = (of(*offset), zero);
+            let mut depth = of(*offset);
+            let mut step = zero;
             for a in 0..3 {
                 depth = depth - of(normal[a]) * here[a];
                 step = of(normal[a]).mul_add(towards[a], step);
             }
-            let (along, flat) = (step.abs(), tiny * steepest);
+            let along = step.abs();
+            let flat = tiny * steepest;
             let distance = depth * (length / along.max(flat));
             let enter = distance.where_less_or(step, zero, of(FAR));
             let inside = of(FAR).where_less_or(of(-ROUNDING), depth, of(-FAR));
@@ -131,7 +138,8 @@ impl LightPath {
         let Some([slab, lattice]) = self.lamp else {
             return (of(1.0), [of(x), of(y), of(z)], of(self.travel.z));
         };
-        let (mut from, mut towards) = ([of(0.0); 3], [of(0.0); 3]);
+        let mut from = [of(0.0); 3];
+        let mut towards = [of(0.0); 3];
         for a in 0..3 {
             (from[a], towards[a]) = (at[a] - of(slab[a]), here[a] - of(lattice[a]));
         }
@@ -182,7 +190,8 @@ impl<S: Simd> Ways<S> {
     /// Length of the way in the volume before the slab, and within it.
     #[inline(always)]
     fn lengths(&self, simd: S) -> [Lanes<S>; 2] {
-        let (zero, own) = (Lanes::splat(simd, 0.0), self.enters[SLAB]);
+        let zero = Lanes::splat(simd, 0.0);
+        let own = self.enters[SLAB];
         let before = (self.entered() - self.leaves.max(own)).max(zero);
         [before, (self.entered().min(own) - self.leaves).max(zero)]
     }
@@ -205,8 +214,10 @@ impl<S: Simd> Ways<S> {
     /// ascending; and 1 where they do, else 0.
     #[inline(always)]
     pub(crate) fn bends(&self, simd: S, other: &Self) -> ([Lanes<S>; BENDS], Lanes<S>) {
-        let (zero, one) = (Lanes::splat(simd, 0.0), Lanes::splat(simd, 1.0));
-        let (here, there) = (self.entered(), other.entered());
+        let zero = Lanes::splat(simd, 0.0);
+        let one = Lanes::splat(simd, 1.0);
+        let here = self.entered();
+        let there = other.entered();
         // No face of the volume is the last one at both places, or only at one of them light comes into the slab later.
         let mut does = one.where_less(here, self.cut).max(one.where_less(there, other.cut));
         for f in 0..SLAB {

@@ -107,7 +107,8 @@ impl LitPart {
     ) {
         for p in 0..3 {
             for lane in 0..MAX_LANES {
-                let (tau, length) = (whole[p][lane].max(f32::MIN_POSITIVE), self.to[lane] - self.from[lane]);
+                let tau = whole[p][lane].max(f32::MIN_POSITIVE);
+                let length = self.to[lane] - self.from[lane];
                 let share = libm::expm1f(-tau * length) / libm::expm1f(-tau);
                 // What is too thin for a quotient is lit by its length.
                 let share = if share.is_finite() { share } else { length };

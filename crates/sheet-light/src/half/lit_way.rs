@@ -99,7 +99,8 @@ mod tests {
     #[test]
     fn parts_are_joined_where_they_are_alike_and_keep_their_light() {
         let shares = [1.0, 1.0, 0.5, 0.5 + 1e-7, 0.0, 0.25, 0.24, 0.9, 0.8];
-        let (mut way, mut light) = (LitWay::DARK, 0.0);
+        let mut way = LitWay::DARK;
+        let mut light = 0.0;
         for (n, share) in shares.into_iter().enumerate() {
             let [from, to] = [n, n + 1].map(|n| n as f32 / shares.len() as f32);
             way.push(WayPart { from, to, through: Vec3::splat(share) });

@@ -37,7 +37,8 @@ pub(crate) fn columns_for(shift: &Shift, columns: &Range<usize>, width: usize) -
 
 fn ends(shift: &Shift, side: usize, other: &Range<usize>, count: usize) -> Range<usize> {
     let at = |v: f64| (v - shift.start[side]) / (1.0 + shift.scale);
-    let (from, to) = (at(other.start as f64 - 2.0).floor(), at(other.end as f64 + 1.0).ceil() + 1.0);
+    let from = at(other.start as f64 - 2.0).floor();
+    let to = at(other.end as f64 + 1.0).ceil() + 1.0;
     let start = (from.max(0.0) as usize).min(count);
     start..(to.max(0.0) as usize).clamp(start, count)
 }
@@ -65,7 +66,8 @@ pub(crate) fn moved<'a, S: Simd>(
         }
     }
     for (y, to) in rows.zip(to) {
-        let (low, share) = (at(y).floor(), (at(y) - at(y).floor()) as f32);
+        let low = at(y).floor();
+        let share = (at(y) - at(y).floor()) as f32;
         let first = ((low as i64 - 1 - from) as usize).min(HELD - 4);
         *to = Lanes::splat(simd, 0.0);
         for n in 0..4 {
@@ -79,10 +81,12 @@ pub(crate) fn moved<'a, S: Simd>(
 #[inline(always)]
 fn taps<S: Simd>(simd: S, shift: &Shift, x: usize) -> (Range<i64>, [Lanes<S>; TAPS]) {
     let of = |v: f32| Lanes::splat(simd, v);
-    let (scale, start) = (shift.scale as f32, shift.start[0] as f32);
+    let scale = shift.scale as f32;
+    let start = shift.start[0] as f32;
     let by = |x: usize| (x as f32).mul_add(scale, start);
     let ends = [by(x), by(x + Lanes::<S>::COUNT - 1)];
-    let (first, last) = (ends[0].min(ends[1]).floor() as i64 - 1, ends[0].max(ends[1]).floor() as i64 + 2);
+    let first = ends[0].min(ends[1]).floor() as i64 - 1;
+    let last = ends[0].max(ends[1]).floor() as i64 + 2;
     let by = (of(x as f32) + Lanes::load(simd, &COUNTING)).mul_add(of(scale), of(start));
     let mut weights = [of(0.0); TAPS];
     let count = ((last - first + 1) as usize).min(TAPS);
@@ -158,7 +162,8 @@ mod tests {
     fn rows_and_columns_hold_all_that_lies_beside_others() {
         let shift = Shift { scale: -0.25, start: [7.3, -2.6] };
         let others = 10..20;
-        let (rows, columns) = (rows_for(&shift, &others, 64), columns_for(&shift, &others, 64));
+        let rows = rows_for(&shift, &others, 64);
+        let columns = columns_for(&shift, &others, 64);
         for at in 0..64 {
             let near = |side: usize| {
                 let v = at as f64 * 0.75 + shift.start[side];
@@ -167,6 +172,6 @@ mod tests {
             assert!(!near(1) || rows.contains(&at), "{at}: {rows:?}");
             assert!(!near(0) || columns.contains(&at), "{at}: {columns:?}");
         }
-        assert!(rows.len() < 24 && columns.start % MAX_LANES == 0, "{rows:?} {columns:?}");
+        assert!(rows.len() < 24 && columns.start.is_multiple_of(MAX_LANES), "{rows:?} {columns:?}");
     }
 }

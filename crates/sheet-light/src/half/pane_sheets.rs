@@ -56,8 +56,8 @@ impl<'a> PaneSheets<'a> {
         camera: &'a Camera,
         (depths, inside): (Option<&'a LightDepths>, [f32; 2]),
     ) -> Self {
-        let (slabs, light) =
-            (PolygonSlabs::new(&of.seen, frame, camera, inside), PolygonLight::new(&of.seen, camera, depths));
+        let slabs = PolygonSlabs::new(&of.seen, frame, camera, inside);
+        let light = PolygonLight::new(&of.seen, camera, depths);
         Self { of, camera, slabs, light, slab: 0, values: Vec::new(), channels: 0 }
     }
 
@@ -74,7 +74,8 @@ impl<'a> PaneSheets<'a> {
             self.light.enter(&self.slabs, slab, frame, carried);
         }
         self.draw(slab);
-        let (ranks, channels) = (self.slabs.by_slab.of(slab), layout.count());
+        let ranks = self.slabs.by_slab.of(slab);
+        let channels = layout.count();
         self.channels = channels;
         self.values.resize(ranks.len() * channels, 0.0);
         let lights: Vec<LitBy<'_>> = lamps.carried.iter().chain(lamps.mapped).copied().collect();
@@ -97,7 +98,8 @@ impl<'a> PaneSheets<'a> {
 
     /// Columns of a row of pixels between which any of the slab is seen.
     pub(crate) fn span(&self, y: usize) -> Option<Range<usize>> {
-        let (ranks, width) = (self.slabs.by_slab.of(self.slab), self.camera.size[0] as usize);
+        let ranks = self.slabs.by_slab.of(self.slab);
+        let width = self.camera.size[0] as usize;
         let begins = |row: usize| ranks.partition_point(|rank| (self.pixel(*rank) as usize) < row * width);
         let own = &ranks[begins(y)..begins(y + 1)];
         let column = |rank: &u32| self.pixel(*rank) as usize % width;
@@ -110,7 +112,8 @@ impl<'a> PaneSheets<'a> {
 
     /// Those of the slab that a pixel shows.
     pub(crate) fn of_pixel(&self, pixel: usize) -> OfPixel<'_> {
-        let (ranks, all) = (self.slabs.by_slab.of(self.slab), self.of.of_pixel(pixel));
+        let ranks = self.slabs.by_slab.of(self.slab);
+        let all = self.of.of_pixel(pixel);
         if all.is_empty() {
             return OfPixel::default();
         }
@@ -166,9 +169,11 @@ impl<'a> PanesInTheOpen<'a> {
 
     /// Adds what they show of some lights; normals and shadows are those of the first.
     pub(crate) fn shade(&mut self, camera: &Camera, depths: Option<&LightDepths>, lamps: &Lamps<'_>, origin: DVec3) {
-        let (light, channels) = (PolygonLight::new(&self.of.seen, camera, depths), self.layout.count());
+        let light = PolygonLight::new(&self.of.seen, camera, depths);
+        let channels = self.layout.count();
         let lights: Vec<LitBy<'_>> = lamps.carried.iter().chain(lamps.mapped).copied().collect();
-        let (seen, layout) = (&self.of.seen, &self.layout);
+        let seen = &self.of.seen;
+        let layout = &self.layout;
         self.values.par_chunks_mut(channels).enumerate().for_each(|(rank, values)| {
             let mut own = [0.0; MAX_CHANNELS];
             let (point, radiance) = light.radiance(&seen.seen(rank, camera), rank, (lamps, &lights, origin));
@@ -182,9 +187,11 @@ impl<'a> PanesInTheOpen<'a> {
 
     /// Composites them, nearest first.
     pub(crate) fn store(&self, camera: &Camera, into: &mut Accumulator) {
-        let (planes, channels) = (into.optical_depth.len(), self.layout.count());
+        let planes = into.optical_depth.len();
+        let channels = self.layout.count();
         for rank in 0..self.of.seen.count() {
-            let (k, seen) = (self.of.seen.pixel(rank) as usize, self.of.seen.seen(rank, camera));
+            let k = self.of.seen.pixel(rank) as usize;
+            let seen = self.of.seen.seen(rank, camera);
             let tau = seen.crossing();
             let before = [0, 1, 2].map(|p| into.optical_depth[p.min(planes - 1)][k]);
             for (c, value) in self.values[rank * channels..][..channels].iter().enumerate() {

@@ -65,7 +65,8 @@ impl OneSlab<'_> {
         for (lane, own) in of_lanes.iter().enumerate().filter(|(_, own)| n < own.count()) {
             panes.write(own, n, lane, &mut fragments);
         }
-        let (mut before, green) = ([0.0; MAX_LANES], self.eye.pixels.planes / 2);
+        let mut before = [0.0; MAX_LANES];
+        let green = self.eye.pixels.planes / 2;
         self.eye.pixels.so_far(simd, chunk.k).store(&mut before);
         if self.prepends() {
             return self.eye.pixels.prepend(simd, chunk.k, &fragments);

@@ -91,7 +91,9 @@ impl Penumbra {
         let [near, far] = ends.map(|z| z - center.z);
         // Rays move as much before the reference as behind it.
         let reference = center.z + 2.0 / (near.recip() + far.recip());
-        let (low, pixel, size) = (DVec2::ZERO, 1.0, [1, 1]);
+        let low = DVec2::ZERO;
+        let pixel = 1.0;
+        let size = [1, 1];
         let mut own = Self { center, points, shares, gain, corners, ends, has_splats, reference, low, pixel, size };
         let (low, high, shift) = own.reach();
         let extent = high - low;
@@ -110,7 +112,9 @@ impl Penumbra {
     fn reach(&self) -> (DVec2, DVec2, f64) {
         let places = || self.corners.iter().flatten().map(|p| self.called(*p));
         let seen = [places().fold(DVec2::INFINITY, DVec2::min), places().fold(DVec2::NEG_INFINITY, DVec2::max)];
-        let (mut low, mut high, mut shift) = (seen[0], seen[1], 0.0f64);
+        let mut low = seen[0];
+        let mut high = seen[1];
+        let mut shift = 0.0f64;
         for q in &self.points {
             let ways = self.ends.map(|z| self.map(*q, z));
             for at in seen {
@@ -184,11 +188,13 @@ impl Penumbra {
         if self.has_splats {
             return Some(self.size.map(|n| 0..n));
         }
-        let (mut low, mut high) = (DVec2::INFINITY, DVec2::NEG_INFINITY);
+        let mut low = DVec2::INFINITY;
+        let mut high = DVec2::NEG_INFINITY;
         for corners in &self.corners {
             for (c, a) in (0..8).flat_map(|c| (0..3).map(move |a| (c, a))).filter(|(c, a)| c >> a & 1 == 0) {
                 let [one, other] = [corners[c], corners[c | 1 << a]];
-                let (near, far) = (one.z.min(other.z).max(from), one.z.max(other.z).min(to));
+                let near = one.z.min(other.z).max(from);
+                let far = one.z.max(other.z).min(to);
                 if near > far {
                     continue;
                 }
@@ -214,8 +220,8 @@ impl Penumbra {
 /// Share of each point of a light in what a place receives of it, and all of that over what the centre gives alone.
 pub(super) fn received(light: &Light, points: &[Light], place: DVec3) -> (Vec<f32>, f64) {
     let of = |light: &Light| f64::from(light.irradiance(place, 0.0).1[0]);
-    let (each, centre): (Vec<f64>, f64) =
-        (points.iter().map(of).collect(), of(&Light { intensity: [1.0; 3], ..*light }));
+    let each: Vec<f64> = points.iter().map(of).collect();
+    let centre: f64 = of(&Light { intensity: [1.0; 3], ..*light });
     let all: f64 = each.iter().sum();
     if all > 0.0 && centre > 0.0 {
         (each.iter().map(|e| (e / all) as f32).collect(), all / centre)

@@ -44,7 +44,8 @@ impl PolygonSlabs {
     pub(crate) fn new(of: &Surfaces<'_>, frame: &Frame, camera: &Camera, [near, far]: [f32; 2]) -> Self {
         let place = |world: DVec3| frame.point(world).as_vec3();
         let places: Vec<Vec3> = of.places(camera).into_par_iter().map(place).collect();
-        let (count, width) = (frame.slabs.count, frame.slabs.width as f32);
+        let count = frame.slabs.count;
+        let width = frame.slabs.width as f32;
         let slabs: Vec<u32> = places.iter().map(|p| ((p.z / width) as u32).min(count)).collect();
         let mut regions = [0; 3];
         places.iter().for_each(|p| regions[if p.z < near { 0 } else { usize::from(p.z >= far) + 1 }] += 1);
@@ -85,7 +86,8 @@ impl<'a> PolygonLight<'a> {
             let depth = |place: &Vec3| place.z / frame.slabs.width as f32 - slab as f32;
             let mut more = Vec::new();
             if volumes.buffer.soft.is_some() {
-                let (of, visible) = (&Illumination { splats, ..*volumes }, &self.visible(ranks));
+                let of = &Illumination { splats, ..*volumes };
+                let visible = &self.visible(ranks);
                 more.resize(places.len(), [0.0; 3]);
                 let work = Around { of, places: &places, visible, out: &mut more };
                 pulp::Arch::new().dispatch(work);
@@ -166,7 +168,8 @@ impl<'a> PolygonLight<'a> {
         rank: usize,
         (lamps, lights, origin): (&Lamps<'_>, &[LitBy<'_>], DVec3),
     ) -> (Point<'s>, Radiance) {
-        let (point, is_carried) = (seen.point(), lamps.carried.is_some());
+        let point = seen.point();
+        let is_carried = lamps.carried.is_some();
         let mut radiance = point.radiance(lamps.ambient, lights.iter(), |light, irradiance| {
             let own = if is_carried && light == 0 { self.through[rank] } else { [1.0; 3] };
             let shadow = || {
@@ -191,7 +194,8 @@ pub(crate) fn add_diffuse(
     values: &mut [f32],
 ) {
     if let (Some(diffuse), Some(lit), Some(first)) = (diffuse, carried, layout.multiple()) {
-        let (point, of) = (seen.point(), seen.of.material);
+        let point = seen.point();
+        let of = seen.of.material;
         let shown = diffuse.reflected(seen.world, point.normal.as_dvec3(), (of, point.color), &lit.light);
         (0..3).for_each(|c| values[first + c] += shown[c]);
     }
@@ -226,7 +230,8 @@ impl PolygonImage {
 
     /// The picture, with objects where these are kept.
     pub(crate) fn finish(self, of: &EyePolygons<'_>, keeps: bool) -> OpaqueImage {
-        let (pixels, channels) = (of.opaque.len(), self.layout.count());
+        let pixels = of.opaque.len();
+        let channels = self.layout.count();
         let mut image = OpaqueImage {
             depth: vec![f32::INFINITY; pixels],
             channels: vec![vec![0.0; pixels]; channels],

@@ -135,7 +135,9 @@ impl<'a> Eye<'a> {
         progress: &Progress,
     ) -> Result<Self, Error> {
         let of = |opaque: bool| input.polygons.iter().filter(|p| p.is_opaque() == opaque).copied().collect::<Vec<_>>();
-        let (solid, panes, camera) = (of(true), of(false), input.sheets.camera);
+        let solid = of(true);
+        let panes = of(false);
+        let camera = input.sheets.camera;
         let solid = match solid.is_empty() {
             true => None,
             false => Some(EyePolygons::new(solid, (camera, input.opaque), progress)?),
@@ -177,7 +179,8 @@ impl<'a> EyePolygons<'a> {
         let image = resolve(&meshes, camera, Some(progress)).map_err(Error::of_polygons)?;
         let hides = |k: usize| opaque.get(k).copied().unwrap_or(f32::INFINITY);
         let hit = |k: usize| {
-            let (on, depth) = (image.hits[k], image.depth[k]);
+            let on = image.hits[k];
+            let depth = image.depth[k];
             (on != TriangleHit::NONE && depth < hides(k)).then_some(Hit { pixel: k as u32, depth, on })
         };
         let hits = (0..image.depth.len()).filter_map(hit).collect();
@@ -251,14 +254,17 @@ impl<'a> Surfaces<'a> {
 
     /// What a pixel shows.
     pub(crate) fn seen(&self, rank: usize, camera: &Camera) -> Seen<'_> {
-        let (Hit { pixel, depth, on }, width) = (&self.hits[rank], camera.size[0]);
+        let Hit { pixel, depth, on } = &self.hits[rank];
+        let width = camera.size[0];
         let of = &self.of[on.mesh as usize];
         let PlacedMesh { mesh, transform } = of.placed;
-        let (normal, face) = (transform.rotate(on.normal(mesh).as_dvec3()).as_vec3(), of.face(on));
+        let normal = transform.rotate(on.normal(mesh).as_dvec3()).as_vec3();
+        let face = of.face(on);
         let (from, along) = camera.view_ray(f64::from(pixel % width) + 0.5, f64::from(pixel / width) + 0.5);
         let [right, up, forward] = camera.axes;
         let world = |v: DVec3| right * v.x + up * v.y + forward * v.z;
-        let (from, along) = (camera.position + world(from), world(along));
+        let from = camera.position + world(from);
+        let along = world(along);
         // By the plane of the triangle, in more digits than the depth has.
         let corner = mesh.position[mesh.triangles[on.triangle as usize][0] as usize].as_dvec3();
         let plane = transform.rotate(exact_face(on, of));

@@ -95,7 +95,8 @@ fn of_light(
     params: &HalfParams,
     (lit, with_ambient): (&LitBy<'_>, bool),
 ) -> Result<Picture, Error> {
-    let (bodies, camera) = (&input.bodies(), input.sheets.camera);
+    let bodies = &input.bodies();
+    let camera = input.sheets.camera;
     let axis = axis_of_view(bodies, camera, Some(&lit.light));
     let mut own = View::new(input, params, lit, &axis)?.draw(lit, with_ambient);
     if let Some((axis, share)) = other_axis(bodies, camera, (&lit.light, 1)) {
@@ -127,7 +128,8 @@ impl<'a> View<'a> {
         let frame = Frame::new(&input.bodies(), input.sheets.camera, &params.sheets, axis)?;
         let placed: Vec<Placed<'a>> = volumes.iter().map(|v| Placed::new(v, &frame, &params.sheets)).collect();
         let of = |placed: &Placed<'_>| {
-            let (volume, most) = (placed.volume, [3, 3, 6]);
+            let volume = placed.volume;
+            let most = [3, 3, 6];
             let lattice = Lattice::new(volume.grid, volume.packing, most);
             let [nx, ny, nz] = lattice.dims;
             let places = (0..nz).flat_map(|k| (0..ny).flat_map(move |j| (0..nx).map(move |i| [i, j, k])));
@@ -142,7 +144,8 @@ impl<'a> View<'a> {
         let footprint = Footprint { cutoff: (kernel.extent / kernel.sigma) as f32 };
         let of_phases = |reach: f64| (0..PHASES).map(|phase| sections(phase, reach, &footprint)).collect();
         let sections = placed.iter().map(|placed| of_phases(placed.reach / frame.slabs.width)).collect();
-        let (polygons, diffuse) = (Triangles::new(input.polygons), scatter::Diffuse::new(volumes, lit, params));
+        let polygons = Triangles::new(input.polygons);
+        let diffuse = scatter::Diffuse::new(volumes, lit, params);
         Ok(Self { input, params, frame, placed, voxels, sections, polygons, diffuse })
     }
 
@@ -206,7 +209,8 @@ impl<'a> View<'a> {
 
     /// Adds a slab to a pixel of the eye.
     fn composite(&self, (tau, color): (f64, [f64; 3]), (optical_depth, sums): (&mut f64, &mut [f64; 3])) {
-        let (through, opacity) = (libm::exp(-*optical_depth), -libm::expm1(-tau));
+        let through = libm::exp(-*optical_depth);
+        let opacity = -libm::expm1(-tau);
         for (sum, color) in sums.iter_mut().zip(color) {
             *sum = if self.frame.back_to_front {
                 opacity * color + libm::exp(-tau) * *sum
@@ -275,7 +279,8 @@ impl<'a> View<'a> {
     fn part(&self, image: &Image, voxels: &[Reaching], v: usize, slab: u32, at: usize) -> Option<Part> {
         let width = self.frame.slabs.width;
         let [near, far] = self.crossing(self.placed[v].volume, image, at)?;
-        let (near, far) = (near.max(f64::from(slab) * width), far.min(f64::from(slab + 1) * width));
+        let near = near.max(f64::from(slab) * width);
+        let far = far.min(f64::from(slab + 1) * width);
         if far <= near {
             return None;
         }
@@ -284,9 +289,11 @@ impl<'a> View<'a> {
         let behind = q.z / width - (f64::from(slab) + 0.5);
         let footprint = Footprint { cutoff: self.placed[v].cutoff as f32 };
         let [aa, ab, bb] = image.shapes[v].extent();
-        let (mut sum, mut weights) = (0.0, 0.0);
+        let mut sum = 0.0;
+        let mut weights = 0.0;
         for (a, b, [before, own, after], value) in voxels {
-            let (da, db) = (q.x - a, q.y - b);
+            let da = q.x - a;
+            let db = q.y - b;
             let s = (bb * da * da - 2.0 * ab * da * db + aa * db * db) / (aa * bb - ab * ab);
             let section = own + behind.max(0.0) * (after - own) + (-behind).max(0.0) * (before - own);
             let weight = footprint.profile(s) * section;
@@ -365,8 +372,10 @@ impl<'a> View<'a> {
         let clamp = |v: f64, n: usize| (v - 0.5).clamp(0.0, n as f64 - 1.0);
         let x = clamp(0.5 * width as f64 + view.x * scale, width);
         let y = clamp(0.5 * height as f64 - view.y * scale, height);
-        let (i, j) = ((x as usize).min(width - 2), (y as usize).min(height - 2));
-        let (u, v) = (x - i as f64, y - j as f64);
+        let i = (x as usize).min(width - 2);
+        let j = (y as usize).min(height - 2);
+        let u = x - i as f64;
+        let v = y - j as f64;
         [(i, j, (1.0 - u) * (1.0 - v)), (i + 1, j, u * (1.0 - v)), (i, j + 1, (1.0 - u) * v), (i + 1, j + 1, u * v)]
             .map(|(i, j, weight)| (j * width + i, weight))
     }
@@ -430,7 +439,8 @@ impl<'a> View<'a> {
         lit: &LitBy<'_>,
         (mean, with_ambient): (f64, bool),
     ) -> [f64; 3] {
-        let (volume, camera) = (self.placed[v].volume, self.input.sheets.camera);
+        let volume = self.placed[v].volume;
+        let camera = self.input.sheets.camera;
         let value = part.as_ref().map_or(0.0, |part| part.value);
         let [right, up, forward] = camera.axes;
         let width = camera.size[0] as usize;
@@ -456,9 +466,11 @@ impl<'a> View<'a> {
 
 /// Between which multiples of `step` a line from `start`, in lattice coordinates, is in the cells of a volume and not cut away.
 fn clip(volume: &Volume<'_>, start: DVec3, step: DVec3) -> Option<[f64; 2]> {
-    let (mut near, mut far) = (f64::NEG_INFINITY, f64::INFINITY);
+    let mut near = f64::NEG_INFINITY;
+    let mut far = f64::INFINITY;
     for (normal, offset) in volume.planes() {
-        let (depth, leaves) = (offset - normal.dot(start), normal.dot(step));
+        let depth = offset - normal.dot(start);
+        let leaves = normal.dot(step);
         if leaves.abs() < 1e-12 * step.length() {
             if depth < -1e-9 {
                 return None;
@@ -471,14 +483,16 @@ fn clip(volume: &Volume<'_>, start: DVec3, step: DVec3) -> Option<[f64; 2]> {
     }
     let [lowest, highest] = volume.ends();
     for a in 0..3 {
-        let (low, high) = (lowest[a] - start[a], highest[a] - start[a]);
+        let low = lowest[a] - start[a];
+        let high = highest[a] - start[a];
         if step[a].abs() < 1e-12 * step.length() {
             if low > 1e-9 || high < -1e-9 {
                 return None;
             }
             continue;
         }
-        let (one, other) = (low / step[a], high / step[a]);
+        let one = low / step[a];
+        let other = high / step[a];
         (near, far) = (near.max(one.min(other)), far.min(one.max(other)));
     }
     (near < far).then_some([near, far])

@@ -93,7 +93,8 @@ pub(crate) fn is_wanted(volumes: &[Volume<'_>], light: &Light, params: &HalfPara
 
 impl Scattered {
     pub(crate) fn new(scene: &Scene, scattering: Scattering, lights_surfaces: bool) -> Self {
-        let ([width, height], layers) = (scene.grid.columns, scene.grid.layers);
+        let [width, height] = scene.grid.columns;
+        let layers = scene.grid.layers;
         let mut out = Self {
             grid: scene.grid,
             faces: vec![[0.0; NUMBERS]; width * height * (layers + 1)],
@@ -181,10 +182,12 @@ impl Scattered {
     /// Multiplies by how much scatters at each face, so that what is in the open, where nothing arrives that counts, does not darken
     /// what is beside it.
     fn weigh(&mut self, cells: &[Cell]) {
-        let ([width, _], layers) = (self.grid.columns, self.grid.layers);
+        let [width, _] = self.grid.columns;
+        let layers = self.grid.layers;
         let length = self.grid.depth as f32;
         for (at, face) in self.faces.iter_mut().enumerate() {
-            let ([x, level], y) = ([at % width, at / width % (layers + 1)], at / (width * (layers + 1)));
+            let [x, level] = [at % width, at / width % (layers + 1)];
+            let y = at / (width * (layers + 1));
             let share = |layer: usize| {
                 let cell = &cells[(y * layers + layer) * width + x];
                 let scattering = cell.scattering.iter().copied().fold(0.0, f32::max);
@@ -200,14 +203,16 @@ impl Scattered {
 
     /// Means over neighbours along an axis, 1/4, 1/2, 1/4: interpolated linearly they have no edges where cells meet.
     fn soften(&mut self, axis: usize) {
-        let ([width, height], faces) = (self.grid.columns, self.grid.layers + 1);
+        let [width, height] = self.grid.columns;
+        let faces = self.grid.layers + 1;
         let (count, step) = [(width, 1), (height, width * faces), (faces, width)][axis];
         let mut line = Vec::with_capacity(count);
         for start in (0..self.faces.len()).filter(|at| (at / step).is_multiple_of(count)) {
             line.clear();
             line.extend((0..count).map(|i| self.faces[start + i * step]));
             for i in 0..count {
-                let (before, behind) = (&line[i.saturating_sub(1)], &line[(i + 1).min(count - 1)]);
+                let before = &line[i.saturating_sub(1)];
+                let behind = &line[(i + 1).min(count - 1)];
                 let face = &mut self.faces[start + i * step];
                 // Both sides first: a mirrored cloud gives mirrored bits.
                 (0..NUMBERS).for_each(|n| face[n] = 0.5 * line[i][n] + 0.25 * (before[n] + behind[n]));
@@ -219,8 +224,10 @@ impl Scattered {
     fn at(&self, world: DVec3) -> [f32; NUMBERS] {
         let place = self.grid.place(world);
         let [width, height] = self.grid.columns;
-        let (counts, mut low, mut next, mut share) =
-            ([width, height, self.grid.layers + 1], [0; 3], [0; 3], [0.0f32; 3]);
+        let counts = [width, height, self.grid.layers + 1];
+        let mut low = [0; 3];
+        let mut next = [0; 3];
+        let mut share = [0.0f32; 3];
         for a in 0..3 {
             let v = place[a].clamp(0.0, (counts[a] - 1) as f64);
             low[a] = (v as usize).min(counts[a].saturating_sub(2));

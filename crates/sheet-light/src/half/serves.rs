@@ -176,7 +176,8 @@ pub(crate) fn other_axis(
     (light, samples): (&Light, u32),
 ) -> Option<(HalfVector, f32)> {
     let middle = bodies.middle();
-    let (to_eye, to_light) = (-seen_along(camera, middle), -travel(light, middle));
+    let to_eye = -seen_along(camera, middle);
+    let to_light = -travel(light, middle);
     let cosine = to_eye.dot(to_light);
     let axis = HalfVector::beyond(to_eye, to_light);
     let serves = cosine.abs() < TURNING && serves_across(bodies, camera, (light, samples), &axis).is_ok();

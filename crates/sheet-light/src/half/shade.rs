@@ -57,9 +57,11 @@ impl Lit<'_> {
     /// What the point shows of light that is scattered more than once, where that is simulated: scattered once more by a medium, reflected about the
     /// gradient by one that has it.
     pub(crate) fn scattered(&self, of: &Sweep<'_>, pixel: [usize; 2], at: DVec3) -> Option<[f32; 3]> {
-        let (scattered, light) = (of.scattered.as_ref()?, &of.light.as_ref()?.light);
+        let scattered = of.scattered.as_ref()?;
+        let light = &of.light.as_ref()?.light;
         if reflects(self.volume) {
-            let (surfaces, facet) = (scattered.at_surfaces.as_ref()?, (self.volume.material, self.color));
+            let surfaces = scattered.at_surfaces.as_ref()?;
+            let facet = (self.volume.material, self.color);
             return Some(surfaces.reflected(of.frame.world(at), self.normal.as_dvec3(), facet, light));
         }
         if !medium::scatters(self.volume) {

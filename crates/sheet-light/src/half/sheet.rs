@@ -84,7 +84,8 @@ impl Sheet {
         for y in 0..band.stored {
             let hit = &band.hits[volume][y];
             let is_met = hit.near < faces[1] && hit.far > faces[0];
-            let (old, count) = (self.spans[y].clone(), Lanes::<S>::COUNT);
+            let old = self.spans[y].clone();
+            let count = Lanes::<S>::COUNT;
             // What other pixels ask of these is whether they are inside.
             self.near[y * band.stride + old.start..y * band.stride + old.end].fill(f32::INFINITY);
             self.spans[y] = 0..0;
@@ -110,9 +111,16 @@ impl Sheet {
         faces: [f32; 2],
     ) -> bool {
         let of = |v: f32| Lanes::splat(simd, v);
-        let (first, last, half, zero, one) = (of(faces[0]), of(faces[1]), of(0.5), of(0.0), of(1.0));
-        let (middle, per_slab) = (of(0.5 * (faces[0] + faces[1])), of(1.0 / (faces[1] - faces[0])));
-        let (mut any, mut any_cut, mut run) = (false, false, start..start);
+        let first = of(faces[0]);
+        let last = of(faces[1]);
+        let half = of(0.5);
+        let zero = of(0.0);
+        let one = of(1.0);
+        let middle = of(0.5 * (faces[0] + faces[1]));
+        let per_slab = of(1.0 / (faces[1] - faces[0]));
+        let mut any = false;
+        let mut any_cut = false;
+        let mut run = start..start;
         self.whole[y] = start..start;
         let mut x = start;
         while x < end {
@@ -192,13 +200,24 @@ impl Sheet {
     ) -> u64 {
         let at = |v: f32| Lanes::splat(simd, v);
         let [aa, ab, bb] = of.shape.conic;
-        let (aa, ab, bb, value, own) = (at(aa), at(2.0 * ab), at(bb), at(record.value), at(section));
-        let (a, b, one, zero) = (at(record.at[0]), at(record.at[1]), at(1.0), at(0.0));
-        let (to_before, to_after) = (at(before - section), at(after - section));
-        let (mut fragments, of_neighbour) = (0, section == 0.0);
+        let aa = at(aa);
+        let ab = at(2.0 * ab);
+        let bb = at(bb);
+        let value = at(record.value);
+        let own = at(section);
+        let a = at(record.at[0]);
+        let b = at(record.at[1]);
+        let one = at(1.0);
+        let zero = at(0.0);
+        let to_before = at(before - section);
+        let to_after = at(after - section);
+        let mut fragments = 0;
+        let of_neighbour = section == 0.0;
         for y in rows {
-            let (span, whole) = (&self.spans[y], self.whole[y].clone());
-            let (mut x, end) = (columns.start.max(span.start), columns.end.min(span.end));
+            let span = &self.spans[y];
+            let whole = self.whole[y].clone();
+            let mut x = columns.start.max(span.start);
+            let end = columns.end.min(span.end);
             while x < end {
                 let k = y * stride + x;
                 let mut section = own;
@@ -229,7 +248,8 @@ impl Sheet {
     #[inline(always)]
     fn round<S: Simd>(&mut self, simd: S, stride: usize, rows: Range<usize>, columns: Range<usize>) {
         for y in rows {
-            let (mut x, end) = (columns.start.max(self.spans[y].start), columns.end.min(self.spans[y].end));
+            let mut x = columns.start.max(self.spans[y].start);
+            let end = columns.end.min(self.spans[y].end);
             while x < end {
                 for sums in [&mut self.values, &mut self.weights] {
                     let sums = &mut sums[y * stride + x..];

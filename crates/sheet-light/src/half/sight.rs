@@ -83,7 +83,8 @@ impl Sight {
     /// The pixels about a place: the columns, the rows, and the shares of the second of each; those at a border are those inside.
     #[inline(always)]
     pub(crate) fn around(&self, place: [f32; 2]) -> ([[usize; 2]; 2], [f32; 2]) {
-        let (mut pixels, mut shares) = ([[0; 2]; 2], [0.0; 2]);
+        let mut pixels = [[0; 2]; 2];
+        let mut shares = [0.0; 2];
         for a in 0..2 {
             let n = self.camera.size[a] as usize;
             let v = (place[a] - 0.5).clamp(0.0, (n - 1) as f32);
@@ -117,12 +118,15 @@ impl Sight {
             if nearest <= 1e-3 * zz.sqrt() {
                 return [f32::NEG_INFINITY, f32::INFINITY, f32::NEG_INFINITY, f32::INFINITY];
             }
-            let (x, y) = (at.x / at.z, at.y / at.z);
+            let x = at.x / at.z;
+            let y = at.y / at.z;
             let half = |v: f32, [vv, vz, zz]: [f32; 3]| (vv - 2.0 * v * vz + v * v * zz).max(0.0).sqrt() / nearest;
             (x, y, half(x, [xx, xz, zz]), half(y, [yy, yz, zz]), self.focal)
         };
-        let (cx, cy) = (self.center[0] + x * scale, self.center[1] + y * scale);
-        let (hx, hy) = (half_x * scale + MARGIN, half_y * scale + MARGIN);
+        let cx = self.center[0] + x * scale;
+        let cy = self.center[1] + y * scale;
+        let hx = half_x * scale + MARGIN;
+        let hy = half_y * scale + MARGIN;
         [cx - hx, cx + hx, cy - hy, cy + hy]
     }
 
@@ -177,7 +181,10 @@ impl Shape {
         let norm = 1.0 / (aa * bb - ab * ab);
         let [a, b, _] = of.steps;
         let product = |i: usize, k: usize| {
-            let (ai, bi, ak, bk) = (f64::from(a[i]), f64::from(b[i]), f64::from(a[k]), f64::from(b[k]));
+            let ai = f64::from(a[i]);
+            let bi = f64::from(b[i]);
+            let ak = f64::from(a[k]);
+            let bk = f64::from(b[k]);
             (ai * ak * aa + (ai * bk + bi * ak) * ab + bi * bk * bb) as f32
         };
         Self {

@@ -145,7 +145,9 @@ impl SoftBuffer {
 
     /// Takes a slab over from the light's image. Whether it has anything.
     fn gather(&mut self, part: &Part, bands: &[LightBand]) -> bool {
-        let (planes, stride, width) = (self.planes, self.stride(), self.penumbra.size[0]);
+        let planes = self.planes;
+        let stride = self.stride();
+        let width = self.penumbra.size[0];
         let row = planes * stride;
         self.slab[self.filled.start * row..self.filled.end * row].fill(0.0);
         self.filled = part.rows.clone();
@@ -211,7 +213,8 @@ impl SoftBuffer {
         for a in 0..3 {
             places[a].store(&mut at[a]);
         }
-        let (mut share, mut rest) = ([[1.0; MAX_LANES]; 3], [[0.0; MAX_LANES]; 3]);
+        let mut share = [[1.0; MAX_LANES]; 3];
+        let mut rest = [[0.0; MAX_LANES]; 3];
         for lane in (0..Lanes::<S>::COUNT).filter(|lane| wanted[*lane] > 0.0) {
             let place = DVec3::new(at[0][lane].into(), at[1][lane].into(), at[2][lane].into());
             for p in 0..3 {
@@ -236,7 +239,8 @@ impl SoftBuffer {
         }
         let pixel = self.penumbra.pixel(place);
         let length = self.stretch(pixel);
-        let (mut through, mut all) = (0.0, 0.0);
+        let mut through = 0.0;
+        let mut all = 0.0;
         for (point, share) in shares.iter().enumerate() {
             let Shift { scale, start } = self.penumbra.shift(point, place.z).inverse();
             let own = [0, 1].map(|a| pixel[a] * (1.0 + scale) + start[a]);
@@ -254,7 +258,8 @@ impl SoftBuffer {
         if !(x > -1.0 && y > -1.0 && x < width && y < height) {
             return 1.0;
         }
-        let (column, [u, v]) = ((x + PAD as f64) as usize, [x - x.floor(), y - y.floor()].map(|share| share as f32));
+        let column = (x + PAD as f64) as usize;
+        let [u, v] = [x - x.floor(), y - y.floor()].map(|share| share as f32);
         let [upper, lower] = [0, 1].map(|down| {
             let row = &self.sum_row(y.floor() as i64 + down, point, plane)[column..];
             let [one, other] = [row[0], row[1]].map(|optical| libm::expf(-(optical * length).max(0.0)));
@@ -272,11 +277,16 @@ impl SoftBuffer {
             let low = (v as usize).min(n.saturating_sub(2));
             (low, (low + 1).min(n - 1), v - low as f32)
         };
-        let ((x0, x1, u), (y0, y1, v)) = (split(pixel[0], width), split(pixel[1], height));
+        let (x0, x1, u) = split(pixel[0], width);
+        let (y0, y1, v) = split(pixel[1], height);
         [0, 1].map(|which| {
             let at = |x: usize, y: usize| self.arriving[((y * self.planes + plane) * 2 + which) * width + x];
-            let (a, b, c, d) = (at(x0, y0), at(x1, y0), at(x0, y1), at(x1, y1));
-            let (upper, lower) = (a + (b - a) * u, c + (d - c) * u);
+            let a = at(x0, y0);
+            let b = at(x1, y0);
+            let c = at(x0, y1);
+            let d = at(x1, y1);
+            let upper = a + (b - a) * u;
+            let lower = c + (d - c) * u;
             upper + (lower - upper) * v
         })
     }
@@ -316,7 +326,8 @@ impl Source {
             let at = |x: usize| slab[(y % ROWS * band.width + x) * planes + plane];
             at(x) + (at(x + 1) - at(x)) * self.share[0]
         };
-        let (upper, lower) = (row(y), row(y + 1));
+        let upper = row(y);
+        let lower = row(y + 1);
         upper + (lower - upper) * self.share[1]
     }
 }
@@ -335,7 +346,9 @@ impl pulp::WithSimd for Add<'_> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
         let Self { of, part, first, rows } = self;
-        let ([width, height], planes, stride) = (of.penumbra.size, of.planes, of.stride());
+        let [width, height] = of.penumbra.size;
+        let planes = of.planes;
+        let stride = of.stride();
         let each = (part.shifts.len() + 1) * planes * stride;
         let still = Shift { scale: 0.0, start: [0.0; 2] };
         let mut moved_to = [Lanes::splat(simd, 0.0); ROWS];
@@ -373,7 +386,8 @@ impl pulp::WithSimd for Arrive<'_> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
         let Self { of, part, first, rows } = self;
-        let (width, planes) = (of.penumbra.size[0], of.planes);
+        let width = of.penumbra.size[0];
+        let planes = of.planes;
         let each = 2 * planes * width;
         let own = part.rows.start.max(first)..part.rows.end.min(first + rows.len() / each);
         for p in (0..planes).filter(|_| !own.is_empty()) {
@@ -404,7 +418,8 @@ impl SoftBuffer {
         for (y, out) in rows.clone().zip(&mut out) {
             out[1] = self.length(simd, [x, y]);
         }
-        let (mut own, mut all) = ([of(0.0); ROWS], 0.0);
+        let mut own = [of(0.0); ROWS];
+        let mut all = 0.0;
         for (point, (shift, share)) in part.shifts.iter().zip(&self.penumbra.shares).enumerate() {
             all += share;
             let row = |y: i64| self.sum_row(y, point + 1, plane);

@@ -90,7 +90,8 @@ impl<'a> SplatLight<'a> {
     /// Optical depth at a splat beside that of the volumes from the light's centre, of a light with an extent, by channel: what its points change,
     /// and what lies before the splat in its own slab.
     pub(crate) fn more(&self, id: u32, place: Vec3, slab: u32) -> [f32; 3] {
-        let (around, own) = (self.through[id as usize], self.optical_depth(place, self.depth_of(id, slab)));
+        let around = self.through[id as usize];
+        let own = self.optical_depth(place, self.depth_of(id, slab));
         [0, 1, 2].map(|p| around[p] + own[p][1])
     }
 
@@ -110,7 +111,8 @@ impl<'a> SplatLight<'a> {
 
     /// Begins a slab, of these splats. Fragments.
     pub(crate) fn enter(&mut self, slab: u32, ids: &[u32], slabs: &[u32], places: &[Vec3]) -> u64 {
-        let (projected, materials) = (&self.projected, self.of.materials);
+        let projected = &self.projected;
+        let materials = self.of.materials;
         // Depths in the slab, for the mean depth of a pixel.
         let values: Vec<f32> = ids.iter().map(|id| places[*id as usize].z / self.slab_width - slab as f32).collect();
         self.squares.fill(Slab { projected, materials, slabs, slab, ids, values: &values })
@@ -153,7 +155,8 @@ impl<'a> SplatLight<'a> {
     /// Optical depth by plane, at a pixel, of the splats of all slabs before; and of the present one up to a depth, in slabs.
     #[inline]
     fn of_pixel(&self, [x, y]: [usize; 2], depth: f32) -> [[f32; 2]; 3] {
-        let (square, at) = (y / TILE * self.columns + x / TILE, [x % TILE, y % TILE]);
+        let square = y / TILE * self.columns + x / TILE;
+        let at = [x % TILE, y % TILE];
         let own = self.squares.at([x, y], 1).map(|(lines, at)| {
             let of = lines.pixel(ChannelLayout::plane_of(0, 1, self.planes), at).max(f32::MIN_POSITIVE);
             let mean = lines.pixel(self.planes, at) / of;
@@ -170,7 +173,8 @@ impl<'a> SplatLight<'a> {
     #[inline]
     fn patch(&self, place: [f32; 2]) -> [([usize; 2], f32); 4] {
         let ([[x0, x1], [y0, y1]], [u, v]) = self.sight.around(place);
-        let (left, upper) = (1.0 - u, 1.0 - v);
+        let left = 1.0 - u;
+        let upper = 1.0 - v;
         [([x0, y0], left * upper), ([x1, y0], u * upper), ([x0, y1], left * v), ([x1, y1], u * v)]
     }
 

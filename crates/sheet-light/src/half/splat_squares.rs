@@ -91,7 +91,9 @@ impl Squares {
             let rays = || TileRays::new(projected, opaque, corner);
             (!ids.is_empty()).then(|| Square { corner, rays: rays(), ids, lines: Lines::default(), tags: 0 })
         };
-        let (planes, depth, object) = (of.optical_depth.len(), !of.depth.is_empty(), !of.object.is_empty());
+        let planes = of.optical_depth.len();
+        let depth = !of.depth.is_empty();
+        let object = !of.object.is_empty();
         Self {
             all: (0..bins.tiles()).into_par_iter().map(square).collect(),
             columns: (projected.size[0] as usize).div_ceil(TILE),
@@ -158,7 +160,8 @@ impl pulp::WithSimd for OneSquare<'_> {
         }
         let first = square.ids.partition_point(|id| of.slabs[*id as usize] < of.slab);
         let own = square.ids[first..].iter().copied().take_while(|id| of.slabs[*id as usize] == of.slab);
-        let (channels, mut fragments) = (form.channels.len(), 0);
+        let channels = form.channels.len();
+        let mut fragments = 0;
         for id in own {
             if square.lines.is_empty() {
                 square.lines.resize(BLOCKS, COLUMNS, (form, false));

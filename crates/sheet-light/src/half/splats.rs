@@ -76,7 +76,8 @@ impl HalfSplats<'_> {
     /// Their footprints in another image.
     pub(crate) fn seen_by(&self, camera: &Camera) -> Projected {
         let Self { cloud, footprints, materials, .. } = *self;
-        let (params, detail) = (&Params::default(), Detail { depth: false, object: false });
+        let params = &Params::default();
+        let detail = Detail { depth: false, object: false };
         project(&ProjectInput { cloud, camera, footprints, materials, params, detail })
     }
 }
@@ -153,7 +154,8 @@ impl<'a> SplatSheets<'a> {
         (volumes, diffuse): (Option<(&Illumination<'_>, Option<&LightDepths>)>, Option<&SurfaceLight>),
         layout: &ChannelLayout,
     ) -> [u64; 2] {
-        let (ids, mut fragments) = (self.drawn.of(slab), 0);
+        let ids = self.drawn.of(slab);
+        let mut fragments = 0;
         if let (Some(light), Some((of, depths))) = (&mut self.light, volumes) {
             fragments = light.enter(slab, ids, &self.slabs, &self.places);
             let frame = &self.frame;
@@ -197,7 +199,9 @@ impl<'a> SplatSheets<'a> {
 
     /// Takes those of a slab up for the eye, with the values that were found before, if there are any. Fragments.
     pub(crate) fn draw(&mut self, slab: u32) -> u64 {
-        let (projected, materials, values) = (self.of.projected, self.of.materials, &self.values[..]);
+        let projected = self.of.projected;
+        let materials = self.of.materials;
+        let values = &self.values[..];
         self.squares.fill(Slab { projected, materials, slabs: &self.slabs, slab, ids: self.drawn.of(slab), values })
     }
 

@@ -89,7 +89,9 @@ impl<'a> Sweep<'a> {
         progress: &Progress,
     ) -> Result<Self, Error> {
         let sheets = &input.sheets;
-        let (bodies, volumes, camera) = (&input.bodies(), &sheets.volumes[..], sheets.camera);
+        let bodies = &input.bodies();
+        let volumes = &sheets.volumes[..];
+        let camera = sheets.camera;
         let is_lit = volumes.iter().any(is_lit) || input.splats.is_some_and(|splats| splats.are_lit()) || eye.are_lit();
         let carried = carried.filter(|_| is_lit);
         let mapped = if is_lit && !light_alone { &input.mapped[..] } else { &[] };
@@ -249,8 +251,10 @@ impl<'a> Sweep<'a> {
         progress: &Progress,
     ) -> Result<u64, Error> {
         let form = Accumulator { channels: Vec::new(), ..form.clone() };
-        let (mut drawn, mut splats, mut panes, mut fragments) =
-            (self.bands(&form), self.splats(&form), self.panes(None), 0);
+        let mut drawn = self.bands(&form);
+        let mut splats = self.splats(&form);
+        let mut panes = self.panes(None);
+        let mut fragments = 0;
         for slab in (0..=self.frame.slabs.count).rev() {
             progress.tick(0).map_err(cancelled)?;
             let splats = splats.as_mut().filter(|_| slab < self.frame.slabs.count);
@@ -289,7 +293,8 @@ impl<'a> Sweep<'a> {
     where
         'a: 'b,
     {
-        let (of, camera) = (&self.eye.solid.as_ref()?.seen, self.input.sheets.camera);
+        let of = &self.eye.solid.as_ref()?.seen;
+        let camera = self.input.sheets.camera;
         let slabs = PolygonSlabs::new(of, &self.frame, camera, self.inside());
         counts.polygon_pixels = slabs.regions;
         counts.bytes += slabs.bytes();
@@ -358,7 +363,8 @@ impl<'a> Sweep<'a> {
         let of = self.input.splats.as_ref().filter(|splats| !splats.cloud.is_empty())?;
         // Which of them lie before a translucent polygon their depths say.
         let depth = self.eye.panes.is_some() || !form.depth.is_empty();
-        let (planes, channels) = (form.optical_depth.len(), form.channels.len());
+        let planes = form.optical_depth.len();
+        let channels = form.channels.len();
         let form = &Accumulator::new([1, 1], planes, channels, depth, !form.object.is_empty());
         Some(SplatSheets::new(of, &self.frame, self.light_buffer.as_ref(), self.input.opaque, form))
     }
@@ -380,13 +386,16 @@ impl<'a> Sweep<'a> {
         slab: u32,
         splats: Option<&'b SplatLight<'b>>,
     ) -> Illumination<'b> {
-        let (paths, volumes) = (&self.paths[..], self.volumes);
-        let (face, width) = (self.frame.slabs.face(slab), self.frame.slabs.width as f32);
+        let paths = &self.paths[..];
+        let volumes = self.volumes;
+        let face = self.frame.slabs.face(slab);
+        let width = self.frame.slabs.width as f32;
         Illumination { buffer, paths, volumes, splats, face, width }
     }
 
     fn bands(&self, form: &Accumulator) -> Vec<EyeBand> {
-        let (camera, opaque) = (&self.sight.camera, self.input.opaque);
+        let camera = &self.sight.camera;
+        let opaque = self.input.opaque;
         let rim = usize::from(self.placed.iter().any(|v| v.compares));
         let one = |b: usize| {
             let mut band = Band::new(b, rim, &self.frame, camera, self.volumes);
@@ -442,7 +451,8 @@ fn light_buffer(
     bodies: &Bodies<'_>,
     (lit, samples): (&LitBy<'_>, u32),
 ) -> LightBuffer {
-    let (camera, volumes) = (lamp::camera_of(bodies, &lit.light, params), bodies.volumes);
+    let camera = lamp::camera_of(bodies, &lit.light, params);
+    let volumes = bodies.volumes;
     let mut buffer = LightBuffer::new(frame, camera, volumes, placed);
     if let Some(penumbra) = Penumbra::new(frame, bodies, (&lit.light, samples), &camera, params.most_light_pixels) {
         buffer.soften(penumbra, planes);

@@ -59,8 +59,10 @@ pub(crate) fn in_box(camera: &Camera, sides: DVec3, at: usize) -> [f64; 2] {
     let [x, y] = [at % camera.size[0] as usize, at / camera.size[0] as usize].map(|v| v as f64 + 0.5);
     let (from, along) = camera.view_ray(x, y);
     let world = |v: DVec3| camera.axes[0] * v.x + camera.axes[1] * v.y + camera.axes[2] * v.z;
-    let (from, along) = (camera.position + world(from), world(along));
-    let (mut near, mut far) = (0.0f64, f64::INFINITY);
+    let from = camera.position + world(from);
+    let along = world(along);
+    let mut near = 0.0f64;
+    let mut far = f64::INFINITY;
     for a in (0..3).filter(|a| along[*a] != 0.0) {
         let [one, other] = [-0.5, 0.5].map(|face| (face * sides[a] - from[a]) / along[a]);
         (near, far) = (near.max(one.min(other)), far.min(one.max(other)));
@@ -118,7 +120,8 @@ pub(crate) fn parallel(from: [f64; 3], height: f64, size: [u32; 2]) -> Camera {
 }
 
 pub(crate) fn input<'a>(volumes: &'a [Volume<'a>], camera: &'a Camera, lights: &'a [LitBy<'a>]) -> SheetInput<'a> {
-    let (volumes, lights) = (volumes.to_vec(), lights.to_vec());
+    let volumes = volumes.to_vec();
+    let lights = lights.to_vec();
     SheetInput { volumes, splats: None, camera, lights, shadow_origin: DVec3::ZERO, ambient: [0.1; 3] }
 }
 
@@ -175,6 +178,7 @@ pub(crate) fn with_gaussians(mut cloud: Cloud) -> Cloud {
 
 /// All that is known of splats in a camera's image, by default footprints.
 pub(crate) fn projected(cloud: &Cloud, camera: &Camera, materials: &[Material]) -> Projected {
-    let (footprints, params) = (&FootprintStack::default(), &raster::Params::default());
+    let footprints = &FootprintStack::default();
+    let params = &raster::Params::default();
     project(&ProjectInput { cloud, camera, footprints, materials, params, detail: Detail::ALL })
 }

@@ -12,10 +12,14 @@ use std::f64::consts::PI;
 /// Greatest differences from the closed forms over every `step`-th pixel: transmittance, and scattered light, 1 being what a
 /// black-backed infinity of the medium would scatter unattenuated.
 fn differences(grid: &Grid, sigma: f64, lit: &LitBy<'_>, camera: &Camera, params: &HalfParams) -> [f64; 2] {
-    let (tf, material) = (constant(sigma as f32), scattering());
-    let (volumes, lights) = ([volume(grid, &tf, &material)], [*lit]);
+    let tf = constant(sigma as f32);
+    let material = scattering();
+    let volumes = [volume(grid, &tf, &material)];
+    let lights = [*lit];
     let (out, _) = draw(&input(&volumes, camera, &lights), params).unwrap();
-    let (width, mut worst, mut seen) = (camera.size[0] as usize, [0.0f64; 2], 0);
+    let width = camera.size[0] as usize;
+    let mut worst = [0.0f64; 2];
+    let mut seen = 0;
     // Kernels of extent 2 that receive light have a deviation of a third of it.
     let spread = 2.0 / 3.0 * grid.axes.x_axis.length();
     for at in (0..out.optical_depth[0].len()).step_by(5) {
@@ -64,8 +68,10 @@ fn slab(tau: f64, slabs: f64, from: [f64; 3]) -> [f64; 2] {
     let (n, spacing) =
         if slabs > 1e3 { ([6, 6, 160], DVec3::new(1.0, 1.0, 0.025)) } else { ([40, 6, 8], DVec3::splat(0.5)) };
     let grid = grid(n, DMat3::from_diagonal(spacing), |_| 1.0);
-    let (tf, material) = (constant((tau / length) as f32), scattering());
-    let (volumes, lights) = ([volume(&grid, &tf, &material)], [sun(from)]);
+    let tf = constant((tau / length) as f32);
+    let material = scattering();
+    let volumes = [volume(&grid, &tf, &material)];
+    let lights = [sun(from)];
     let camera = parallel([0.0, 0.0, 10.0], 2.0, [9, 9]);
     // A pixel of the light buffer is as wide as a step of the coarser lattice.
     let params = HalfParams { light_pixels: spacing.z / spacing.x, ..exact(Some(length / slabs)) };
@@ -115,7 +121,8 @@ fn hv17_alpha_by_half_vector_slabs_is_that_by_view_slabs() {
     let flat = DMat3::from_diagonal(DVec3::new(0.4, 0.4, 1.3));
     for axes in [sheared, flat, -flat] {
         let grid = grid([14, 12, 9], axes, |_| 1.0);
-        let (tf, material) = (constant(0.4), scattering());
+        let tf = constant(0.4);
+        let material = scattering();
         let volumes = [volume(&grid, &tf, &material)];
         for camera in [perspective([3.0, 5.0, 12.0], 50.0, [56, 60]), parallel([-5.0, 2.0, 6.0], 12.0, [56, 60])] {
             let through = |out: &Accumulator| out.optical_depth[0].iter().map(|t| (-t).exp()).collect::<Vec<f32>>();
@@ -135,7 +142,8 @@ fn extinction_by_channel_shadows_each_channel_by_its_own() {
     let tf = TransferFunction::new(vec![TransferPoint { value: 0.0, color: [1.0; 3], extinction: 0.5 }]).unwrap();
     let material = Material { extinction_rgb: [0.5, 1.0, 2.0], ..scattering() };
     let grid = grid([12, 12, 12], cubic(0.5), |_| 1.0);
-    let (volumes, lights) = ([volume(&grid, &tf, &material)], [sun([0.0, 0.0, 1.0])]);
+    let volumes = [volume(&grid, &tf, &material)];
+    let lights = [sun([0.0, 0.0, 1.0])];
     let camera = parallel([0.0, 0.0, 10.0], 3.0, [24, 24]);
     let mut out = Accumulator::new(camera.size, 3, 3, false, false);
     let layout = &crate::common::BEAUTY;
@@ -158,9 +166,10 @@ mod deep {
         let field = |p: DVec3| 1.5 + p.dot(DVec3::new(0.1, -0.05, 0.6));
         let grid = grid([40, 40, 5], cubic(0.4), field);
         // All light that is taken is lost, so that a floor behind shows what is left of it.
-        let (tf, medium) =
-            (transfer(&[(0.0, 0.0), (4.0, 4.0)]), Material { single_scattering_albedo: 0.0, ..scattering() });
-        let (volumes, white) = ([volume(&grid, &tf, &medium)], white());
+        let tf = transfer(&[(0.0, 0.0), (4.0, 4.0)]);
+        let medium = Material { single_scattering_albedo: 0.0, ..scattering() };
+        let volumes = [volume(&grid, &tf, &medium)];
+        let white = white();
         let mesh = wall([0.0, 0.0, -3.0], [30.0, 0.0, 0.0], [0.0, 30.0, 0.0]);
         let floor = [polygons(&mesh, &white)];
         let tau = |from: DVec3, along: DVec3| {
@@ -181,11 +190,13 @@ mod deep {
                 for at in (0..144).step_by(7) {
                     let (from, along) = ray(&camera, at % 12, at / 12);
                     let what = format!("slabs {slab_width}, {to_light}, eye {}, pixel {at}", camera.position);
-                    let (found, expected) = (f64::from(out.optical_depth[0][at]), tau(from, along));
+                    let found = f64::from(out.optical_depth[0][at]);
+                    let expected = tau(from, along);
                     assert!((found / expected - 1.0).abs() < 0.01, "{what}: {found}, not {expected}");
                     if to_light.z > 0.0 {
                         let place = from - along * ((from.z + 3.0) / along.z);
-                        let (lit, expected) = (f64::from(drawn.polygons.channels[0][at]), tau(place, to_light));
+                        let lit = f64::from(drawn.polygons.channels[0][at]);
+                        let expected = tau(place, to_light);
                         let found = -(lit * PI / to_light.z).ln();
                         assert!((found / expected - 1.0).abs() < 0.01, "{what}: light's {found}, not {expected}");
                     }

@@ -34,7 +34,8 @@ pub(crate) fn exact(slab_width: Option<f64>) -> HalfParams {
 }
 
 pub(crate) fn input<'a>(volumes: &'a [Volume<'a>], camera: &'a Camera, lights: &'a [LitBy<'a>]) -> HalfInput<'a> {
-    let (volumes, lights) = (volumes.to_vec(), lights.to_vec());
+    let volumes = volumes.to_vec();
+    let lights = lights.to_vec();
     let sheets = SheetInput { volumes, splats: None, camera, lights, shadow_origin: DVec3::ZERO, ambient: [0.0; 3] };
     HalfInput { sheets, splats: None, polygons: &[], extended: Vec::new(), mapped: Vec::new(), opaque: &[] }
 }
@@ -49,17 +50,21 @@ pub(crate) fn draw(input: &HalfInput<'_>, params: &HalfParams) -> Result<(Accumu
 /// A ray's part in the cells of a lattice, as places in world space; `None` for less than a thousandth of a step.
 pub(crate) fn inside(grid: &Grid, from: DVec3, along: DVec3) -> Option<[f64; 2]> {
     let inverse = grid.axes.inverse();
-    let (start, step) = (inverse * (from - grid.origin), inverse * along);
-    let (mut near, mut far) = (f64::NEG_INFINITY, f64::INFINITY);
+    let start = inverse * (from - grid.origin);
+    let step = inverse * along;
+    let mut near = f64::NEG_INFINITY;
+    let mut far = f64::INFINITY;
     for a in 0..3 {
-        let (low, high) = (-0.5 - start[a], grid.dims[a] as f64 - 0.5 - start[a]);
+        let low = -0.5 - start[a];
+        let high = grid.dims[a] as f64 - 0.5 - start[a];
         if step[a].abs() < 1e-14 {
             if low > 1e-9 || high < -1e-9 {
                 return None;
             }
             continue;
         }
-        let (one, other) = (low / step[a], high / step[a]);
+        let one = low / step[a];
+        let other = high / step[a];
         (near, far) = (near.max(one.min(other)), far.min(one.max(other)));
     }
     (far - near > 1e-3 * grid.axes.x_axis.length()).then_some([near, far])

@@ -19,7 +19,8 @@ fn oblique() -> Clip {
 fn kept(grid: &Grid, clip: &[Clip], from: DVec3, along: DVec3) -> Option<[f64; 2]> {
     let [mut near, mut far] = inside(grid, from, along)?;
     for (normal, offset) in clip.iter().flat_map(Clip::half_spaces) {
-        let (left, leaves) = (offset - normal.dot(from), normal.dot(along));
+        let left = offset - normal.dot(from);
+        let leaves = normal.dot(along);
         if leaves > 0.0 { far = far.min(left / leaves) } else { near = near.max(left / leaves) }
     }
     (far > near).then_some([near, far])
@@ -27,12 +28,16 @@ fn kept(grid: &Grid, clip: &[Clip], from: DVec3, along: DVec3) -> Option<[f64; 2
 
 /// Greatest differences from the closed form of a constant volume: transmittance, and light that is scattered once, times 4π.
 fn apart(clip: &[Clip], from: [f64; 3], camera: &Camera, params: &HalfParams) -> [f64; 2] {
-    let (grid, sigma) = (grid([20, 16, 12], cubic(0.25), |_| 5.0), 0.4f64);
-    let (tf, material, light) = (constant(sigma as f32), scattering(), sun(from));
+    let grid = grid([20, 16, 12], cubic(0.25), |_| 5.0);
+    let sigma = 0.4f64;
+    let tf = constant(sigma as f32);
+    let material = scattering();
+    let light = sun(from);
     let volumes = [Volume { clip, ..volume(&grid, &tf, &material) }];
     let out = draw(&input(&volumes, camera, &[light]), params).unwrap().0;
     let LightShape::Directional { direction } = light.light.shape else { panic!("the sun") };
-    let (mut worst, mut cut) = ([0.0f64; 2], 0);
+    let mut worst = [0.0f64; 2];
+    let mut cut = 0;
     for at in (0..out.optical_depth[0].len()).step_by(7) {
         let (from, along) = ray(camera, at % 40, at / 40);
         let Some([near, far]) = kept(&grid, clip, from, along) else { continue };
@@ -75,14 +80,18 @@ fn rays_of_the_eye_and_of_light_end_at_planes_and_boxes() {
 /// A slab of τ 1 that is cut to 0.65 is one of 0.65, for the eye, for light that comes from there and for light that comes from behind.
 #[test]
 fn a_slab_that_is_cut_is_a_thinner_one() {
-    let (grid, tf, material) = (grid([40, 40, 8], cubic(0.25), |_| 1.0), constant(0.5), scattering());
+    let grid = grid([40, 40, 8], cubic(0.25), |_| 1.0);
+    let tf = constant(0.5);
+    let material = scattering();
     let clip = [Clip::HalfSpace { normal: DVec3::Z, offset: 0.3 }];
     let volumes = [Volume { clip: &clip, ..volume(&grid, &tf, &material) }];
-    let (camera, tau) = (parallel([0.0, 0.0, 9.0], 0.5, [9, 9]), 0.65f64);
+    let camera = parallel([0.0, 0.0, 9.0], 0.5, [9, 9]);
+    let tau = 0.65f64;
     for width in [0.01, 0.25, 5.0] {
         for (from, expected) in [(1.0, -(-2.0 * tau).exp_m1() / 2.0), (-1.0, tau * (-tau).exp())] {
             let out = draw(&input(&volumes, &camera, &[sun([0.0, 0.0, from])]), &exact(Some(width))).unwrap().0;
-            let (found, seen) = (f64::from(out.channels[0][40]) * 4.0 * PI, f64::from(out.optical_depth[0][40]));
+            let found = f64::from(out.channels[0][40]) * 4.0 * PI;
+            let seen = f64::from(out.optical_depth[0][40]);
             assert!((found - expected).abs() < 1e-5 && (seen - tau).abs() < 1e-5, "{from}, {width}: {found} {seen}");
         }
     }
@@ -90,8 +99,10 @@ fn a_slab_that_is_cut_is_a_thinner_one() {
 
 #[test]
 fn cut_and_body_centred_lattices_are_those_of_the_twin() {
-    let (tf, material) = (transfer(&[(0.2, 0.0), (0.5, 0.4), (0.8, 0.1), (0.9, 1.5)]), scattering());
-    let (whole, bcc) = (grid([8, 7, 6], cubic(0.5), noise), body_centred([6, 6, 12], 3.6, noise));
+    let tf = transfer(&[(0.2, 0.0), (0.5, 0.4), (0.8, 0.1), (0.9, 1.5)]);
+    let material = scattering();
+    let whole = grid([8, 7, 6], cubic(0.5), noise);
+    let bcc = body_centred([6, 6, 12], 3.6, noise);
     let clip = [oblique()];
     let all = [
         Volume { clip: &clip, ..volume(&whole, &tf, &material) },
@@ -115,9 +126,12 @@ fn cut_and_body_centred_lattices_are_those_of_the_twin() {
 #[test]
 fn hv17_alpha_of_cut_and_body_centred_lattices_is_that_of_slabs_across_the_view() {
     let wave = |p: DVec3| 0.5 + 0.2 * (1.1 * p.x + 0.7 * p.y).sin() + 0.2 * (0.9 * p.z - 0.4 * p.y).cos();
-    let (tf, material) = (transfer(&[(0.0, 0.0), (1.0, 1.0)]), scattering());
-    let (whole, bcc) = (grid([24, 20, 16], cubic(0.25), wave), body_centred([18, 18, 36], 4.5, wave));
-    let (clip, turn) = ([oblique()], DQuat::from_axis_angle(DVec3::new(0.6, 0.0, 0.8), 0.7));
+    let tf = transfer(&[(0.0, 0.0), (1.0, 1.0)]);
+    let material = scattering();
+    let whole = grid([24, 20, 16], cubic(0.25), wave);
+    let bcc = body_centred([18, 18, 36], 4.5, wave);
+    let clip = [oblique()];
+    let turn = DQuat::from_axis_angle(DVec3::new(0.6, 0.0, 0.8), 0.7);
     let transform = Similarity { scale: 1.2, rotation: turn, translation: DVec3::new(0.2, -0.3, 0.1) };
     for volume in [volume(&whole, &tf, &material), bcc_volume(&bcc, &tf, &material)] {
         let volumes = [Volume { clip: &clip, transform, ..volume }];

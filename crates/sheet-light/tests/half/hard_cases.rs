@@ -34,7 +34,8 @@ fn hv01_no_pair_of_directions_is_without_an_axis() {
 /// A smooth cloud under a sun at an angle to the eye's axis.
 fn turned(degrees: f64, slab_width: f64, light_pixels: f64) -> Accumulator {
     let grid = grid([20, 20, 20], cubic(0.25), |p| (-0.6 * p.length_squared()).exp() * (1.0 + 0.3 * (2.0 * p.x).sin()));
-    let (tf, material) = (transfer(&[(0.05, 0.0), (0.6, 1.0), (1.3, 2.0)]), scattering());
+    let tf = transfer(&[(0.05, 0.0), (0.6, 1.0), (1.3, 2.0)]);
+    let material = scattering();
     let volumes = [volume(&grid, &tf, &material)];
     let camera = parallel([0.0, 0.0, 9.0], 5.0, [48, 48]);
     let (sin, cos) = degrees.to_radians().sin_cos();
@@ -49,7 +50,8 @@ fn hv02_nothing_pops_where_the_slabs_turn_over() {
     let step = |from: f64, by: f64, w: f64| bright * apart(&turned(from - by, w, 1.5), &turned(from + by, w, 1.5));
     for width in [0.25, 0.125] {
         let others = [30.0, 60.0, 80.0, 88.0, 92.0, 120.0].map(|degrees| step(degrees, 1e-4, width));
-        let (most, turn) = (others.into_iter().fold(0.0, f32::max), step(90.0, 1e-4, width));
+        let most = others.into_iter().fold(0.0, f32::max);
+        let turn = step(90.0, 1e-4, width);
         println!("slabs {width}: {turn:e} where they turn over, {others:?} elsewhere");
         assert!(turn <= 2.0 * most, "slabs {width}: {turn:e} where they turn over, {most:e} elsewhere");
     }
@@ -57,7 +59,8 @@ fn hv02_nothing_pops_where_the_slabs_turn_over() {
 
 #[test]
 fn hv13_light_times_a_power_of_two_is_the_picture_times_it() {
-    let (tf, material) = (transfer(&[(0.2, 0.0), (0.5, 0.4), (0.9, 1.5)]), scattering());
+    let tf = transfer(&[(0.2, 0.0), (0.5, 0.4), (0.9, 1.5)]);
+    let material = scattering();
     let grid = grid([12, 12, 12], cubic(0.5), noise);
     let volumes = [volume(&grid, &tf, &material)];
     let camera = perspective([2.0, 3.0, 12.0], 40.0, [40, 40]);
@@ -66,7 +69,8 @@ fn hv13_light_times_a_power_of_two_is_the_picture_times_it() {
         draw(&input(&volumes, &camera, &[light]), &exact(None)).unwrap().0
     };
     for light in [sun([1.0, 2.0, 1.0]), lamp([-9.0, 3.0, -12.0])] {
-        let (one, mut other) = (with(1.0, light), with(2f32.powi(20), light));
+        let one = with(1.0, light);
+        let mut other = with(2f32.powi(20), light);
         assert!(one.channels[0].iter().any(|c| *c > 1e-4));
         other.channels.iter_mut().flatten().for_each(|c| *c *= 2f32.powi(-20));
         assert_eq!(one, other);
@@ -75,7 +79,8 @@ fn hv13_light_times_a_power_of_two_is_the_picture_times_it() {
 
 #[test]
 fn hv14_hv15_light_and_lens_that_cross_slabs_backwards_are_refused() {
-    let (tf, material) = (constant(0.5), scattering());
+    let tf = constant(0.5);
+    let material = scattering();
     let grid = grid([12, 12, 12], cubic(0.5), |_| 1.0);
     let volumes = [volume(&grid, &tf, &material)];
     let camera = perspective([0.0, 0.0, 12.0], 50.0, [24, 24]);
@@ -102,10 +107,13 @@ fn hv14_hv15_light_and_lens_that_cross_slabs_backwards_are_refused() {
 
 #[test]
 fn hv16_lights_in_any_order_give_the_same_bits() {
-    let (tf, dark) = (transfer(&[(0.2, 0.0), (0.5, 0.4), (0.9, 1.5)]), scattering());
+    let tf = transfer(&[(0.2, 0.0), (0.5, 0.4), (0.9, 1.5)]);
+    let dark = scattering();
     let grid = grid([12, 12, 12], cubic(0.5), noise);
     let camera = perspective([2.0, 3.0, 12.0], 40.0, [40, 40]);
-    let (a, b, c) = (sun([1.0, 2.0, 1.0]), lamp([-9.0, 3.0, -12.0]), sun([-3.0, 1.0, -1.0]));
+    let a = sun([1.0, 2.0, 1.0]);
+    let b = lamp([-9.0, 3.0, -12.0]);
+    let c = sun([-3.0, 1.0, -1.0]);
     let with = |material: &Material, lights: &[LitBy<'_>]| {
         draw(&input(&[volume(&grid, &tf, material)], &camera, lights), &exact(None)).unwrap()
     };
@@ -116,7 +124,8 @@ fn hv16_lights_in_any_order_give_the_same_bits() {
     // Images add, and what is emitted is there once: as in one sweep, whichever comes first.
     let alone = [a, b, c].map(|light| with(&dark, &[light]).0);
     let glowing = Material { emission: [0.1; 3], ..dark };
-    let (lit, glow) = (with(&glowing, &[a, b, c]).0, [a, b, c].map(|light| with(&glowing, &[light]).0));
+    let lit = with(&glowing, &[a, b, c]).0;
+    let glow = [a, b, c].map(|light| with(&glowing, &[light]).0);
     let mut is_one_of = [true; 3];
     for at in 0..1600 {
         let sum: f32 = alone.iter().map(|out| out.channels[0][at]).sum();
@@ -131,12 +140,15 @@ fn hv16_lights_in_any_order_give_the_same_bits() {
 
 #[test]
 fn a_light_buffer_is_no_larger_at_800_slabs_than_at_50() {
-    let (tf, material) = (constant(0.5), scattering());
+    let tf = constant(0.5);
+    let material = scattering();
     let grid = grid([12, 12, 12], cubic(0.5), |_| 1.0);
-    let (volumes, lights) = ([volume(&grid, &tf, &material)], [sun([0.0, 0.0, 1.0])]);
+    let volumes = [volume(&grid, &tf, &material)];
+    let lights = [sun([0.0, 0.0, 1.0])];
     let camera = parallel([0.0, 0.0, 12.0], 8.0, [24, 24]);
     let counts = |slabs: f64| draw(&input(&volumes, &camera, &lights), &exact(Some(6.0 / slabs))).unwrap().1;
-    let (few, many) = (counts(50.0), counts(800.0));
+    let few = counts(50.0);
+    let many = counts(800.0);
     assert_eq!(few.light_bytes, many.light_bytes);
     assert!(few.slabs < 200 && many.slabs > 800 && few.light_bytes > 0, "{few:?} {many:?}");
     assert!(few.voxels == 1728 && few.visible >= 1728 && few.light_fragments > 0 && few.eye_fragments > 0);
@@ -146,7 +158,8 @@ fn a_light_buffer_is_no_larger_at_800_slabs_than_at_50() {
 fn ia07_a_ramp_has_the_same_normal_everywhere() {
     let layers = LayerSet { normal: true, ..LayerSet::default() };
     let layout = ChannelLayout::new(&layers);
-    let (tf, material) = (constant(0.5), Material::default());
+    let tf = constant(0.5);
+    let material = Material::default();
     for slope in [DVec3::X, DVec3::Z, DVec3::new(1.0, 2.0, -1.5)] {
         let grid = grid([20, 20, 20], cubic(0.5), |p| 1e3 + slope.dot(p));
         let mut volumes = [volume(&grid, &tf, &material)];
@@ -173,7 +186,8 @@ fn ia07_a_ramp_has_the_same_normal_everywhere() {
 
 #[test]
 fn what_is_behind_an_opaque_surface_is_not_seen_but_lit_all_the_same() {
-    let (tf, material) = (constant(0.25), scattering());
+    let tf = constant(0.25);
+    let material = scattering();
     let grid = grid([20, 20, 20], cubic(0.5), |_| 1.0);
     let volumes = [volume(&grid, &tf, &material)];
     let camera = parallel([0.0, 0.0, 20.0], 4.0, [40, 40]);
@@ -191,7 +205,8 @@ fn what_is_behind_an_opaque_surface_is_not_seen_but_lit_all_the_same() {
 
 #[test]
 fn depths_are_those_of_slabs_across_the_view() {
-    let (tf, material) = (transfer(&[(0.2, 0.0), (0.5, 0.2), (1.5, 0.8)]), scattering());
+    let tf = transfer(&[(0.2, 0.0), (0.5, 0.2), (1.5, 0.8)]);
+    let material = scattering();
     let grid = grid([16, 16, 16], cubic(0.5), |p| 0.6 + 0.4 * (p.x + 0.5 * p.z).sin());
     let volumes = [volume(&grid, &tf, &material)];
     let camera = perspective([1.0, 2.0, 14.0], 30.0, [24, 24]);
@@ -212,9 +227,11 @@ fn depths_are_those_of_slabs_across_the_view() {
 
 #[test]
 fn pixels_that_are_done_err_by_no_more_than_what_they_hide() {
-    let (tf, material) = (transfer(&[(0.1, 0.0), (0.5, 2.0), (0.9, 6.0)]), scattering());
+    let tf = transfer(&[(0.1, 0.0), (0.5, 2.0), (0.9, 6.0)]);
+    let material = scattering();
     let grid = grid([24, 24, 24], cubic(0.25), noise);
-    let (volumes, lights) = ([volume(&grid, &tf, &material)], [sun([1.0, 1.0, 1.0])]);
+    let volumes = [volume(&grid, &tf, &material)];
+    let lights = [sun([1.0, 1.0, 1.0])];
     let camera = perspective([2.0, 3.0, 12.0], 30.0, [60, 60]);
     let full = draw(&input(&volumes, &camera, &lights), &exact(None)).unwrap().0;
     let mut params = exact(None);
@@ -226,9 +243,11 @@ fn pixels_that_are_done_err_by_no_more_than_what_they_hide() {
 
 #[test]
 fn what_cannot_be_drawn_is_refused() {
-    let (tf, material) = (constant(0.5), scattering());
+    let tf = constant(0.5);
+    let material = scattering();
     let good = grid([12, 12, 12], cubic(0.5), |_| 1.0);
-    let (volumes, lights) = ([volume(&good, &tf, &material)], [sun([1.0, 1.0, 1.0])]);
+    let volumes = [volume(&good, &tf, &material)];
+    let lights = [sun([1.0, 1.0, 1.0])];
     let camera = parallel([0.0, 0.0, 10.0], 3.0, [24, 24]);
     let whole = input(&volumes, &camera, &lights);
     let found = |params| draw(&whole, &params).unwrap_err();
@@ -262,7 +281,8 @@ static VEIL: Veil = Veil(1.0 / 3.0);
 
 #[test]
 fn what_else_casts_shadows_attenuates_the_light_as_far_as_it_is_received() {
-    let (tf, material) = (transfer(&[(0.2, 0.0), (0.5, 0.4), (0.9, 1.5)]), scattering());
+    let tf = transfer(&[(0.2, 0.0), (0.5, 0.4), (0.9, 1.5)]);
+    let material = scattering();
     let grid = grid([10, 10, 10], cubic(0.5), noise);
     let camera = perspective([2.0, 3.0, 12.0], 40.0, [30, 30]);
     for light in [sun([1.0, 2.0, 1.0]), lamp([-9.0, 3.0, -12.0])] {
@@ -271,7 +291,8 @@ fn what_else_casts_shadows_attenuates_the_light_as_far_as_it_is_received() {
             let volumes = [Volume { shadow_coefficient, ..volume(&grid, &tf, &material) }];
             draw(&input(&volumes, &camera, &[LitBy { shadow, ..light }]), &exact(None)).unwrap().0
         };
-        let (open, veiled) = (with(None, 1.0), with(Some(&VEIL), 1.0));
+        let open = with(None, 1.0);
+        let veiled = with(Some(&VEIL), 1.0);
         assert!(open.channels[0].iter().any(|c| *c > 1e-4) && open.optical_depth == veiled.optical_depth);
         for (open, veiled) in open.channels[0].iter().zip(&veiled.channels[0]) {
             assert!((open * VEIL.0 - veiled).abs() <= 1e-6 * open, "{open} {veiled}");
@@ -284,7 +305,8 @@ fn what_else_casts_shadows_attenuates_the_light_as_far_as_it_is_received() {
 
 #[test]
 fn a_light_without_a_sweep_and_a_volume_without_a_shadow_take_nothing_of_the_light() {
-    let (tf, material) = (transfer(&[(0.5, 0.7)]), scattering());
+    let tf = transfer(&[(0.5, 0.7)]);
+    let material = scattering();
     let grid = grid([12, 12, 6], cubic(0.5), |_| 0.5);
     let camera = parallel([0.0, 0.0, 9.0], 2.0, [12, 12]);
     let volumes = [volume(&grid, &tf, &material)];

@@ -9,7 +9,8 @@ use std::f64::consts::PI;
 
 #[test]
 fn x1_any_number_of_threads_gives_the_same_bits() {
-    let (tf, material) = (transfer(&[(0.3, 0.0), (0.5, 0.4), (0.9, 2.5)]), Material::default());
+    let tf = transfer(&[(0.3, 0.0), (0.5, 0.4), (0.9, 2.5)]);
+    let material = Material::default();
     let grid = grid([20, 20, 20], cubic(0.5), noise);
     let mut volumes = [volume(&grid, &tf, &material)];
     volumes[0].normals = true;
@@ -76,14 +77,16 @@ fn shift_a_place_far_from_the_origin_looks_the_same() {
 /// do; over three it does not.
 #[test]
 fn hv05_thinner_slabs_converge_in_second_order() {
-    let (tf, material) = (transfer(&[(-1.5, 0.0), (0.0, 0.3), (1.5, 0.9)]), scattering());
+    let tf = transfer(&[(-1.5, 0.0), (0.0, 0.3), (1.5, 0.9)]);
+    let material = scattering();
     let waves = |p: DVec3| (0.9 * p.x + 0.3 * p.z).sin() + 0.4 * (0.7 * p.y - 0.8 * p.z).cos();
     let fade = |v: f64| (PI * v / 5.0).cos().powi(2);
     let cut_by_faces = grid([10, 10, 10], cubic(0.5), waves);
     let faded = grid([10, 10, 10], cubic(0.5), |p| (waves(p) + 1.5) * fade(p.x) * fade(p.y) * fade(p.z) - 1.5);
     let camera = parallel([0.0, 0.0, 12.0], 5.0, [16, 16]);
     for (grid, light) in [&cut_by_faces, &faded].into_iter().flat_map(|grid| [2.0, -2.0].map(|z| (grid, z))) {
-        let (volumes, lights) = ([volume(grid, &tf, &material)], [sun([1.0, 0.3, light])]);
+        let volumes = [volume(grid, &tf, &material)];
+        let lights = [sun([1.0, 0.3, light])];
         let with = |width: f64| {
             let params = HalfParams { light_pixels: 3.0, ..exact(Some(width)) };
             draw(&input(&volumes, &camera, &lights), &params).unwrap().0
@@ -97,7 +100,8 @@ fn hv05_thinner_slabs_converge_in_second_order() {
                 .sum::<f64>();
             squares.sqrt()
         };
-        let (coarse, fine) = (error(0.5), error(0.0625));
+        let coarse = error(0.5);
+        let fine = error(0.0625);
         let order = (coarse / fine).log2() / 3.0;
         assert!(order > 1.9, "order {order}: {coarse:e} → {fine:e}");
     }

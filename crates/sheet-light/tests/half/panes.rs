@@ -38,9 +38,12 @@ fn draw(input: &HalfInput<'_>, params: &HalfParams, planes: usize) -> (Accumulat
 
 #[test]
 fn panes_in_a_medium_have_the_closed_form_for_eye_and_light_at_any_slabs_and_angle() {
-    let (sigma, half, tau) = (0.4, 3.0, 0.35f64);
+    let sigma = 0.4;
+    let half = 3.0;
+    let tau = 0.35f64;
     let grid = grid([12, 12, 12], cubic(0.5), |_| 1.0);
-    let (tf, medium) = (constant(sigma as f32), scattering());
+    let tf = constant(sigma as f32);
+    let medium = scattering();
     let paper = Material { transmission: 0.5, ..white() };
     let volumes = [volume(&grid, &tf, &medium)];
     let places = [3.4, 2.2, 0.9, 0.25, 0.0, -0.6, -2.9, -3.2];
@@ -54,7 +57,8 @@ fn panes_in_a_medium_have_the_closed_form_for_eye_and_light_at_any_slabs_and_ang
         ([0.0, 0.0, -1.0], parallel([0.0, 0.0, 12.0], 2.0, [9, 9])),
         ([0.28, 0.0, -0.96], perspective([0.0, 0.0, 12.0], 20.0, [9, 9])),
     ] {
-        let (lights, secant) = ([sun(from)], 1.0 / from[2].abs());
+        let lights = [sun(from)];
+        let secant = 1.0 / from[2].abs();
         // Optical depths to the eye and to the light: of the medium, per depth below its upper face, and of the panes before.
         let side = from[2].signum();
         let light = |z: f64| {
@@ -73,7 +77,8 @@ fn panes_in_a_medium_have_the_closed_form_for_eye_and_light_at_any_slabs_and_ang
         let faces: Vec<f64> =
             [half].into_iter().chain(places.into_iter().filter(|z| z.abs() < half)).chain([-half]).collect();
         for ends in faces.windows(2) {
-            let (middle, length) = (0.5 * (ends[0] + ends[1]), ends[0] - ends[1]);
+            let middle = 0.5 * (ends[0] + ends[1]);
+            let length = ends[0] - ends[1];
             // ∫ σ·e^(−τ_eye − τ_light) dz, whose exponent is linear.
             let slope = sigma * (1.0 + side * secant);
             let shape = if slope.abs() < 1e-12 { 1.0 } else { (slope * length / 2.0).sinh() / (slope * length / 2.0) };
@@ -93,17 +98,20 @@ fn panes_in_a_medium_have_the_closed_form_for_eye_and_light_at_any_slabs_and_ang
 
 #[test]
 fn panes_that_cross_are_in_order_on_each_side_of_the_crossing_in_the_open_and_in_a_medium() {
-    let (red, green) = (flat(), flat());
+    let red = flat();
+    let green = flat();
     let slanted = [0.3, -0.3].map(|slope| wall([0.0; 3], [4.0, 0.0, 4.0 * slope], [0.0, 4.0, 0.0]));
     let all = [
         Polygons { color: [1.0, 0.0, 0.0], object: 1, ..pane(&slanted[0], &red, 0.7) },
         Polygons { color: [0.0, 1.0, 0.0], object: 2, ..pane(&slanted[1], &green, 0.7) },
     ];
     let thin = grid([12, 12, 12], cubic(0.5), |_| 1.0);
-    let (tf, medium) = (constant(1e-6), scattering());
+    let tf = constant(1e-6);
+    let medium = scattering();
     let volumes = [volume(&thin, &tf, &medium)];
     let camera = parallel([0.0, 0.0, 9.0], 4.0, [16, 16]);
-    let (first, second) = (-(-0.7f64).exp_m1(), -(-0.7f64).exp_m1() * (-0.7f64).exp());
+    let first = -(-0.7f64).exp_m1();
+    let second = -(-0.7f64).exp_m1() * (-0.7f64).exp();
     let cases =
         [(&volumes[..], sun([0.0, 0.0, 1.0])), (&volumes[..], sun([0.0, 0.2, -1.0])), (&[], sun([0.0, 0.0, 1.0]))];
     for ((volumes, light), slab_width) in cases.into_iter().flat_map(|case| [0.05, 40.0].map(|width| (case, width))) {
@@ -125,7 +133,9 @@ fn panes_that_cross_are_in_order_on_each_side_of_the_crossing_in_the_open_and_in
 
 #[test]
 fn an_edge_of_a_pane_is_that_of_an_opaque_one_and_depths_are_its_own() {
-    let (tf, medium, material) = (constant(0.2), scattering(), white());
+    let tf = constant(0.2);
+    let medium = scattering();
+    let material = white();
     let haze = grid([12, 12, 12], cubic(0.5), |_| 1.0);
     let volumes = [volume(&haze, &tf, &medium)];
     let mesh = wall([0.13, -0.21, 0.4], [0.9, 0.31, 0.0], [-0.27, 0.83, 0.1]);
@@ -137,7 +147,8 @@ fn an_edge_of_a_pane_is_that_of_an_opaque_one_and_depths_are_its_own() {
         let shown = |all: &[Polygons<'_>]| {
             draw(&HalfInput { polygons: all, ..input(volumes, &camera, &lights) }, &coarse(None), 1).0
         };
-        let (with, without) = (shown(&[pane(&mesh, &material, 0.5)]), shown(&[]));
+        let with = shown(&[pane(&mesh, &material, 0.5)]);
+        let without = shown(&[]);
         let mut covered = 0;
         for k in 0..48 * 48 {
             let own = with.optical_depth[0][k] - without.optical_depth[0][k];
@@ -155,9 +166,12 @@ fn an_edge_of_a_pane_is_that_of_an_opaque_one_and_depths_are_its_own() {
 
 #[test]
 fn a_pane_tints_by_channel_what_is_behind_it_for_eye_and_light() {
-    let (tf, medium, material) = (constant(0.3), scattering(), white());
+    let tf = constant(0.3);
+    let medium = scattering();
+    let material = white();
     let tinted = Material { extinction_rgb: [0.25, 1.0, 2.0], ..flat() };
-    let (above, floor) = (across(1.0), across(-2.0));
+    let above = across(1.0);
+    let floor = across(-2.0);
     let all = [Polygons { color: [0.0; 3], ..pane(&above, &tinted, 0.6) }, polygons(&floor, &material)];
     let haze = grid([40, 40, 4], cubic(0.25), |_| 1.0);
     let volumes = [volume(&haze, &tf, &medium)];
@@ -167,7 +181,8 @@ fn a_pane_tints_by_channel_what_is_behind_it_for_eye_and_light() {
         let shown = |all: &[Polygons<'_>]| {
             draw(&HalfInput { polygons: all, ..input(volumes, &camera, &lights) }, &coarse(Some(0.3)), 3)
         };
-        let (with, without) = (shown(&all), shown(&all[1..]));
+        let with = shown(&all);
+        let without = shown(&all[1..]);
         for (c, factor) in [0.25f64, 1.0, 2.0].into_iter().enumerate() {
             let through = (-0.6 * factor).exp();
             let floors = [&with, &without].map(|(_, drawn)| f64::from(drawn.polygons.channels[c][27]));
@@ -183,11 +198,14 @@ fn a_pane_tints_by_channel_what_is_behind_it_for_eye_and_light() {
 
 #[test]
 fn light_with_an_extent_comes_through_panes_as_that_of_its_points() {
-    let (tf, medium, material) = (constant(0.3), scattering(), white());
+    let tf = constant(0.3);
+    let medium = scattering();
+    let material = white();
     let haze = grid([16, 16, 8], cubic(0.5), |_| 1.0);
     let volumes = [volume(&haze, &tf, &medium)];
     // Half of the floor lies behind the pane's edge.
-    let (half, floor) = (wall([4.0, 0.0, 3.0], [4.0, 0.0, 0.0], [0.0, 8.0, 0.0]), across(-3.0));
+    let half = wall([4.0, 0.0, 3.0], [4.0, 0.0, 0.0], [0.0, 8.0, 0.0]);
+    let floor = across(-3.0);
     let all = [pane(&half, &material, 0.8), polygons(&floor, &material)];
     let camera = parallel([0.5, 0.3, 12.0], 5.0, [24, 24]);
     let shape = LightShape::Disk { center: DVec3::new(0.0, 0.0, 14.0), normal: DVec3::NEG_Z, radius: 0.8 };
@@ -201,10 +219,8 @@ fn light_with_an_extent_comes_through_panes_as_that_of_its_points() {
             extended: vec![Extended { lit: lamp, samples: 8 }],
             ..input(volumes, &camera, &[])
         };
-        let (one, many) = (
-            draw(&soft, &params, 1),
-            draw(&HalfInput { polygons: &all, ..input(volumes, &camera, &points) }, &params, 1),
-        );
+        let one = draw(&soft, &params, 1);
+        let many = draw(&HalfInput { polygons: &all, ..input(volumes, &camera, &points) }, &params, 1);
         let mean = |of: &[f32]| of.iter().map(|v| f64::from(*v)).sum::<f64>() / of.len() as f64;
         for [one, many] in
             [[&one.1.polygons.channels[0], &many.1.polygons.channels[0]], [&one.0.channels[0], &many.0.channels[0]]]
@@ -225,7 +241,8 @@ fn a_pane_in_a_medium_that_scatters_again_tints_what_it_lets_through() {
         ChannelLayout::new(&LayerSet { effects: true, shadow: false, normal: false, depth: false, object: false })
             .with_multiple();
     let slab = grid([48, 48, 8], cubic(0.5), |_| 1.0);
-    let (tf, medium) = (constant(0.5), scattering());
+    let tf = constant(0.5);
+    let medium = scattering();
     let volumes = [volume(&slab, &tf, &medium)];
     let tinted = Material { extinction_rgb: [0.5, 1.0, 2.0], ..flat() };
     let params = HalfParams { scattering: Scattering::ForwardAndBack, voxels_per_cell: 1, ..coarse(Some(0.1)) };
@@ -253,13 +270,12 @@ fn a_pane_in_a_medium_that_scatters_again_tints_what_it_lets_through() {
 
 #[test]
 fn hv_panes_are_those_of_the_twin_but_at_the_edges_of_shadows() {
-    let (tf, material) = (transfer(&[(0.2, 0.0), (0.5, 0.4), (0.8, 0.1), (0.9, 1.5)]), scattering());
+    let tf = transfer(&[(0.2, 0.0), (0.5, 0.4), (0.8, 0.1), (0.9, 1.5)]);
+    let material = scattering();
     let grid = grid([8, 7, 6], cubic(0.5), noise);
     let volumes = [volume(&grid, &tf, &material)];
-    let (paper, film) = (
-        Material { transmission: 0.3, ..white() },
-        Material { surface_opacity: SurfaceOpacity::ThinSlab, extinction_rgb: [0.5; 3], ..flat() },
-    );
+    let paper = Material { transmission: 0.3, ..white() };
+    let film = Material { surface_opacity: SurfaceOpacity::ThinSlab, extinction_rgb: [0.5; 3], ..flat() };
     // Two that cross each other, and an opaque one.
     let meshes = [
         wall([0.2, 0.1, 0.0], [1.5, 0.3, 0.2], [0.0, 0.2, 1.6]),
@@ -275,10 +291,12 @@ fn hv_panes_are_those_of_the_twin_but_at_the_edges_of_shadows() {
     ] {
         let lights = [light];
         let input = HalfInput { polygons: &all, ..input(&volumes, &camera, &lights) };
-        let (params, twin) = (HalfParams { most_light_pixels: 1024, ..exact(slab_width) }, exact(slab_width));
+        let params = HalfParams { most_light_pixels: 1024, ..exact(slab_width) };
+        let twin = exact(slab_width);
         let (out, drawn) = draw(&input, &params, 1);
         let twin = reference::draw(&input, &twin).unwrap();
-        let (mut apart, mut shown) = (Vec::new(), 0);
+        let mut apart = Vec::new();
+        let mut shown = 0;
         for (at, expected) in twin.color.iter().enumerate() {
             let tau = f64::from(out.optical_depth[0][at]);
             // At the edges of polygons one form sees them, the other does not.
@@ -290,7 +308,8 @@ fn hv_panes_are_those_of_the_twin_but_at_the_edges_of_shadows() {
         }
         let size = apart.len();
         apart.sort_by(f64::total_cmp);
-        let (most, edges) = (apart[size * 9 / 10], apart.iter().filter(|d| **d > 1e-3).count());
+        let most = apart[size * 9 / 10];
+        let edges = apart.iter().filter(|d| **d > 1e-3).count();
         assert!(shown > 100 && size > twin.color.len() * 98 / 100, "{shown} pixels show any, {size} in all");
         let worst = apart[size - 1];
         assert!(most < 1e-4 && edges < 6, "{:?}: {most:e}, {edges} edges, {worst:e}", light.light.shape);
@@ -299,7 +318,8 @@ fn hv_panes_are_those_of_the_twin_but_at_the_edges_of_shadows() {
 
 #[test]
 fn hv11_a_pane_seen_and_lit_along_its_plane_gives_numbers_and_any_threads_the_same_bits() {
-    let (tf, medium) = (transfer(&[(0.3, 0.0), (0.9, 1.5)]), scattering());
+    let tf = transfer(&[(0.3, 0.0), (0.9, 1.5)]);
+    let medium = scattering();
     let grid = grid([10, 10, 10], cubic(0.5), noise);
     let volumes = [volume(&grid, &tf, &medium)];
     let film = Material { surface_opacity: SurfaceOpacity::ThinSlab, ..white() };
@@ -355,7 +375,8 @@ fn what_lists_of_panes_would_take_is_refused_before() {
 
 #[test]
 fn a_pane_that_lets_all_through_changes_nothing_and_no_number_is_refused() {
-    let (material, mesh) = (white(), across(0.0));
+    let material = white();
+    let mesh = across(0.0);
     let camera = parallel([0.0, 0.0, 9.0], 2.0, [8, 8]);
     let shown = |tau: f32| {
         let all = [pane(&mesh, &material, tau)];

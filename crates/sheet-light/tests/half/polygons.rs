@@ -24,7 +24,9 @@ pub(crate) fn wall(center: [f64; 3], u: [f32; 3], v: [f32; 3]) -> Mesh {
 
 pub(crate) fn polygons<'a>(mesh: &'a Mesh, material: &'a Material) -> Polygons<'a> {
     let placed = PlacedMesh { mesh, transform: Similarity::default() };
-    let (color, object, optical_depth) = ([1.0; 3], 7, f32::INFINITY);
+    let color = [1.0; 3];
+    let object = 7;
+    let optical_depth = f32::INFINITY;
     Polygons {
         placed,
         material,
@@ -59,9 +61,12 @@ const REFLECTED: f64 = std::f64::consts::FRAC_1_PI;
 
 #[test]
 fn a_wall_in_a_medium_is_lit_and_seen_by_the_closed_form_at_any_depth_and_any_slabs() {
-    let (sigma, half) = (0.4, 3.0);
+    let sigma = 0.4;
+    let half = 3.0;
     let grid = grid([12, 12, 12], cubic(0.5), |_| 1.0);
-    let (tf, medium, material) = (constant(sigma as f32), scattering(), white());
+    let tf = constant(sigma as f32);
+    let medium = scattering();
+    let material = white();
     let volumes = [volume(&grid, &tf, &medium)];
     let camera = parallel([0.0, 0.0, 12.0], 2.0, [9, 9]);
     for (from, secant) in [([0.0, 0.0, 1.0], 1.0), ([0.28, 0.0, 0.96], 1.0 / 0.96)] {
@@ -87,14 +92,17 @@ fn a_wall_in_a_medium_is_lit_and_seen_by_the_closed_form_at_any_depth_and_any_sl
 #[test]
 fn nothing_behind_a_wall_is_lit_and_its_back_is_dark() {
     let grid = grid([12, 12, 12], cubic(0.5), |_| 1.0);
-    let (tf, medium, material) = (constant(0.4), scattering(), white());
+    let tf = constant(0.4);
+    let medium = scattering();
+    let material = white();
     let volumes = [volume(&grid, &tf, &medium)];
     // The light comes from the other side, or past the eye at a right angle.
     for (from, at) in [([0.0, 0.0, -1.0], [0.0, 0.0, 12.0]), ([0.1, 0.2, -1.0], [2.0, 3.0, 12.0])] {
         let camera = perspective(at, 20.0, [16, 16]);
         for (z, slab_width) in [0.0, -1.3].into_iter().flat_map(|z| [0.1, 0.5, 40.0].map(|width| (z, width))) {
             let mesh = wall([0.0, 0.0, z], [30.0, 0.0, 0.0], [0.0, 30.0, 0.0]);
-            let (all, lights) = ([polygons(&mesh, &material)], [sun(from)]);
+            let all = [polygons(&mesh, &material)];
+            let lights = [sun(from)];
             let input = HalfInput { polygons: &all, ..input(&volumes, &camera, &lights) };
             let (out, drawn) = draw(&input, &coarse(Some(slab_width)));
             assert!(out.channels[0].iter().all(|v| *v == 0.0), "wall at {z}, slabs {slab_width}");
@@ -109,10 +117,13 @@ fn nothing_behind_a_wall_is_lit_and_its_back_is_dark() {
 fn a_ray_through_the_edge_of_a_shadow_is_lit_in_part_at_any_slabs() {
     let sigma = 0.3;
     let grid = grid([16, 16, 16], cubic(0.5), |_| 1.0);
-    let (tf, medium, material) = (constant(sigma as f32), scattering(), white());
+    let tf = constant(sigma as f32);
+    let medium = scattering();
+    let material = white();
     let volumes = [volume(&grid, &tf, &medium)];
     let mesh = wall([0.0, -20.0, 0.0], [0.0, 0.0, 40.0], [0.0, 20.0, 0.0]);
-    let (all, lights) = ([polygons(&mesh, &material)], [sun([1.0, 0.0, 0.0])]);
+    let all = [polygons(&mesh, &material)];
+    let lights = [sun([1.0, 0.0, 0.0])];
     // Seen from above, behind the wall and before it: rays cross the shadow's upper face.
     for at in [[-6.0, 9.0, 1.0], [3.0, 9.0, 1.0], [-9.0, 5.0, 0.5]] {
         let camera = parallel(at, 4.0, [12, 12]);
@@ -176,14 +187,16 @@ fn no_light_comes_through_at_the_foot_of_a_wall_and_no_surface_shadows_itself() 
 #[test]
 fn a_ball_of_triangles_is_shaded_without_a_speck_of_its_own_shadow() {
     let material = white();
-    let (bands, turns) = (24u32, 48u32);
+    let bands = 24u32;
+    let turns = 48u32;
     let vertex = |k: u32| {
-        let (polar, turn) =
-            (PI * f64::from(k / turns) / f64::from(bands), 2.0 * PI * f64::from(k % turns) / f64::from(turns));
+        let polar = PI * f64::from(k / turns) / f64::from(bands);
+        let turn = 2.0 * PI * f64::from(k % turns) / f64::from(turns);
         DVec3::new(polar.sin() * turn.cos(), polar.cos(), polar.sin() * turn.sin()).as_vec3()
     };
     let cell = |k: u32| {
-        let (a, b) = (k, k / turns * turns + (k + 1) % turns);
+        let a = k;
+        let b = k / turns * turns + (k + 1) % turns;
         [[a, b, b + turns], [a, b + turns, a + turns]]
     };
     let position: Vec<Vec3> = (0..(bands + 1) * turns).map(vertex).collect();
@@ -197,7 +210,8 @@ fn a_ball_of_triangles_is_shaded_without_a_speck_of_its_own_shadow() {
             let all = [Polygons { casts_shadow, ..all[0] }];
             draw(&HalfInput { polygons: &all, ..input(&[], &camera, &lights) }, &coarse(None)).1.polygons
         };
-        let (with, without) = (shown(true), shown(false));
+        let with = shown(true);
+        let without = shown(false);
         let brightest = without.channels[0].iter().copied().fold(0.0, f32::max);
         let specks =
             with.channels[0].iter().zip(&without.channels[0]).filter(|(a, b)| (**a - **b).abs() > 0.12 * brightest);
@@ -212,7 +226,8 @@ fn hv12_walls_before_among_and_behind_slabs_and_on_their_faces_are_lit_once() {
     // Denser towards the eye, so that a slab is told from its neighbour; σ in the mean.
     let grid = grid([12, 12, 12], cubic(0.5), |p| sigma * (1.0 + 0.25 * p.z));
     let tf = crate::common::transfer(&[(0.0, 0.0), (1.0, 1.0)]);
-    let (medium, material) = (scattering(), white());
+    let medium = scattering();
+    let material = white();
     let volumes = [volume(&grid, &tf, &medium)];
     let camera = parallel([0.0, 0.0, 20.0], 2.0, [8, 8]);
     for (from, before) in [([0.0, 0.0, 1.0], [0, 64, 0]), ([0.0, 0.0, -1.0], [0, 64, 0])] {
@@ -241,7 +256,8 @@ fn hv12_walls_before_among_and_behind_slabs_and_on_their_faces_are_lit_once() {
         }
         // Behind all of the volume, and before it.
         if from[2] > 0.0 {
-            let (before, behind) = (shown(4.0).0[2], shown(-4.0).0[2]);
+            let before = shown(4.0).0[2];
+            let behind = shown(-4.0).0[2];
             assert!((before - REFLECTED).abs() < 1e-5 && (behind - before * (-sigma * 6.0f64).exp()).abs() < 1e-5);
         }
     }
@@ -251,7 +267,9 @@ fn hv12_walls_before_among_and_behind_slabs_and_on_their_faces_are_lit_once() {
 #[test]
 fn hv13_hv16_brightness_scales_lights_swap_and_threads_change_no_bit() {
     let grid = grid([10, 10, 10], cubic(0.5), crate::common::noise);
-    let (tf, medium, material) = (crate::common::transfer(&[(0.3, 0.0), (0.9, 1.5)]), scattering(), white());
+    let tf = crate::common::transfer(&[(0.3, 0.0), (0.9, 1.5)]);
+    let medium = scattering();
+    let material = white();
     let volumes = [volume(&grid, &tf, &medium)];
     let meshes = [
         wall([0.2, -0.4, 0.1], [1.0, 0.2, 0.0], [0.0, 0.5, 0.9]),
@@ -267,7 +285,9 @@ fn hv13_hv16_brightness_scales_lights_swap_and_threads_change_no_bit() {
         (out.channels.clone(), drawn.polygons.channels.clone(), bits(&out.channels), bits(&drawn.polygons.channels))
     };
     // Of two the sum is the same either way round.
-    let (a, b, c) = (sun([1.0, 2.0, 1.0]), lamp([-6.0, 7.0, -8.0]), sun([-0.3, 1.0, 0.7]));
+    let a = sun([1.0, 2.0, 1.0]);
+    let b = lamp([-6.0, 7.0, -8.0]);
+    let c = sun([-0.3, 1.0, 0.7]);
     let first = shown(&[a, b, c], 1);
     assert!(first.1[0].iter().filter(|v| **v > 0.0).count() > 200);
     for other in [shown(&[c, b, a], 2), shown(&[b, c, a], 3)] {
@@ -286,10 +306,8 @@ fn hv13_hv16_brightness_scales_lights_swap_and_threads_change_no_bit() {
 #[test]
 fn a_lamp_with_walls_all_around_lights_them_and_a_post_keeps_its_light_off() {
     let material = white();
-    let (back, post) = (
-        wall([0.0, 0.0, -2.0], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0]),
-        wall([0.0, 0.0, -1.0], [0.2, 0.0, 0.0], [0.0, 0.4, 0.0]),
-    );
+    let back = wall([0.0, 0.0, -2.0], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0]);
+    let post = wall([0.0, 0.0, -1.0], [0.2, 0.0, 0.0], [0.0, 0.4, 0.0]);
     let beside = wall([0.0, 0.0, 2.5], [9.0, 0.0, 0.0], [0.0, 9.0, 0.0]);
     let all = [&back, &post, &beside].map(|mesh| polygons(mesh, &material));
     let mut lit = lamp([0.0, 0.0, 0.0]);
@@ -320,11 +338,13 @@ fn a_lamp_with_walls_all_around_lights_them_and_a_post_keeps_its_light_off() {
 #[test]
 fn ms10_no_flux_passes_a_wall_of_polygons() {
     let grid = grid([16, 16, 16], cubic(0.5), |_| 1.0);
-    let (tf, material) = (constant(1.0), white());
+    let tf = constant(1.0);
+    let material = white();
     let medium = Material { single_scattering_albedo: 0.99, ..scattering() };
     let volumes = [volume(&grid, &tf, &medium)];
     let mesh = wall([0.0, 0.0, 0.0], [30.0, 0.0, 0.0], [0.0, 30.0, 0.0]);
-    let (all, lights) = ([polygons(&mesh, &material)], [sun([0.0, 0.0, -1.0])]);
+    let all = [polygons(&mesh, &material)];
+    let lights = [sun([0.0, 0.0, -1.0])];
     // From the side, rays beside the wall: before it to the left, behind to the right.
     let camera = parallel([20.0, 0.0, 0.0], 7.0, [32, 32]);
     let layout = BEAUTY.with_multiple();
@@ -334,7 +354,8 @@ fn ms10_no_flux_passes_a_wall_of_polygons() {
     fold(&input, &params, &layout, &mut out, None).unwrap();
     let column = |x: usize| (10..22).map(|y| out.channels[0][y * 32 + x]).fold(0.0, f32::max);
     // Two layers of cells are interpolated.
-    let (lit, dark) = (column(26).max(column(5)), column(26).min(column(5)));
+    let lit = column(26).max(column(5));
+    let dark = column(26).min(column(5));
     assert!(lit > 0.01 && dark < 1e-6, "{lit} {dark}");
 }
 

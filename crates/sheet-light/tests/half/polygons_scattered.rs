@@ -28,7 +28,8 @@ fn params(voxels_per_cell: u32) -> HalfParams {
 fn received(tau: f64, medium: &Material, all: &[Polygons<'_>], camera: &Camera, params: &HalfParams) -> [f64; 2] {
     let slab = grid([48, 48, 8], cubic(0.5), |_| 1.0);
     let tf = constant((tau / DEPTH) as f32);
-    let (volumes, lights) = ([volume(&slab, &tf, medium)], [sun([0.0, 0.0, 1.0])]);
+    let volumes = [volume(&slab, &tf, medium)];
+    let lights = [sun([0.0, 0.0, 1.0])];
     let input = HalfInput { polygons: all, ..input(&volumes, camera, &lights) };
     let mut out = Accumulator::new(camera.size, 1, APART.count(), false, false);
     let Drawn { polygons, .. } = fold(&input, params, &APART, &mut out, None).unwrap();
@@ -47,7 +48,8 @@ fn two_streams(tau: f64, depth: f64) -> [f64; 2] {
 
 #[test]
 fn a_floor_under_a_slab_and_a_wall_in_it_receive_what_two_streams_let_through() {
-    let (medium, material) = (scattering(), white());
+    let medium = scattering();
+    let material = white();
     let camera = parallel([0.0, 0.0, 12.0], 2.0, [9, 9]);
     // Under it, and in it, where light ends and none comes from behind; the cells of the thick one have an optical depth of 0.6.
     for (tau, heights) in [(0.5, &[-2.0, -0.5, 0.7][..]), (2.0, &[-2.0, -0.5, 0.7]), (8.0, &[-2.0])] {
@@ -67,7 +69,8 @@ fn a_floor_under_a_slab_and_a_wall_in_it_receive_what_two_streams_let_through() 
 
 #[test]
 fn cells_of_any_size_come_near_two_streams() {
-    let (medium, material) = (scattering(), white());
+    let medium = scattering();
+    let material = white();
     let camera = parallel([0.0, 0.0, 12.0], 2.0, [9, 9]);
     let mesh = wall([0.0, 0.0, -2.0], [12.0, 0.0, 0.0], [0.0, 12.0, 0.0]);
     let error = |voxels_per_cell: u32| {
@@ -81,7 +84,8 @@ fn cells_of_any_size_come_near_two_streams() {
 
 #[test]
 fn a_wall_along_the_light_receives_a_quarter_of_the_fluence_on_either_side() {
-    let (medium, material) = (scattering(), white());
+    let medium = scattering();
+    let material = white();
     let mesh = wall([0.0, 0.0, 0.0], [0.0, 12.0, 0.0], [0.0, 0.0, 2.0]);
     let shy = Polygons { casts_shadow: false, ..polygons(&mesh, &material) };
     let [_, psi] = two_streams(2.0, 1.0);
@@ -94,7 +98,8 @@ fn a_wall_along_the_light_receives_a_quarter_of_the_fluence_on_either_side() {
 
 #[test]
 fn ms10_the_back_of_a_wall_across_the_light_receives_nothing_and_a_thin_one_shows_what_comes_to_its_front() {
-    let (medium, material) = (scattering(), white());
+    let medium = scattering();
+    let material = white();
     let mesh = wall([0.0, 0.0, 0.3], [12.0, 0.0, 0.0], [0.0, 12.0, 0.0]);
     let [before, behind] = [12.0, -12.0].map(|z| parallel([0.0, 0.0, z], 2.0, [9, 9]));
     let thick = polygons(&mesh, &material);
@@ -112,16 +117,21 @@ fn ms10_the_back_of_a_wall_across_the_light_receives_nothing_and_a_thin_one_show
 
 #[test]
 fn walls_far_from_a_thin_cube_receive_what_it_scatters_once() {
-    let (medium, material) = (scattering(), white());
-    let (sigma, side, distance) = (0.02, 2.0f64, 10.0);
+    let medium = scattering();
+    let material = white();
+    let sigma = 0.02;
+    let side = 2.0f64;
+    let distance = 10.0;
     let cube = grid([8, 8, 8], cubic(0.25), |_| 1.0);
     let tf = constant(sigma as f32);
-    let (volumes, lights) = ([volume(&cube, &tf, &medium)], [sun([0.0, 0.0, 1.0])]);
+    let volumes = [volume(&cube, &tf, &medium)];
+    let lights = [sun([0.0, 0.0, 1.0])];
     let expected = sigma * side.powi(3) / (4.0 * PI * distance * distance);
     let floor = wall([0.0, 0.0, -distance], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0]);
     let beside = wall([-distance, 0.0, 0.0], [0.0, 4.0, 0.0], [0.0, 0.0, 4.0]);
     for (mesh, from) in [(&floor, [0.0, 0.0, 12.0]), (&beside, [12.0, 0.0, 0.0])] {
-        let (camera, all) = (parallel(from, 2.0, [9, 9]), [polygons(mesh, &material)]);
+        let camera = parallel(from, 2.0, [9, 9]);
+        let all = [polygons(mesh, &material)];
         let input = HalfInput { polygons: &all, ..input(&volumes, &camera, &lights) };
         let mut out = Accumulator::new(camera.size, 1, APART.count(), false, false);
         let Drawn { polygons, .. } = fold(&input, &params(8), &APART, &mut out, None).unwrap();
@@ -132,7 +142,8 @@ fn walls_far_from_a_thin_cube_receive_what_it_scatters_once() {
 
 #[test]
 fn what_is_far_from_the_media_receives_less_and_black_media_scatter_none() {
-    let (medium, material) = (scattering(), white());
+    let medium = scattering();
+    let material = white();
     let camera = parallel([0.0, 0.0, 12.0], 2.0, [9, 9]);
     let mesh = wall([0.0, 0.0, -9.0], [12.0, 0.0, 0.0], [0.0, 12.0, 0.0]);
     let all = [polygons(&mesh, &material)];
@@ -151,11 +162,13 @@ fn what_is_far_from_the_media_receives_less_and_black_media_scatter_none() {
 
 #[test]
 fn a_lamp_far_away_is_a_sun_and_threads_are_not_known() {
-    let (medium, material) = (scattering(), white());
+    let medium = scattering();
+    let material = white();
     let slab = grid([48, 48, 8], cubic(0.5), |_| 1.0);
     let tf = constant(0.5);
     let mesh = wall([0.0, 0.0, -1.0], [6.0, 0.0, 1.0], [0.0, 6.0, 0.5]);
-    let (volumes, all) = ([volume(&slab, &tf, &medium)], [polygons(&mesh, &material)]);
+    let volumes = [volume(&slab, &tf, &medium)];
+    let all = [polygons(&mesh, &material)];
     let camera = parallel([0.0, 0.0, 12.0], 8.0, [24, 24]);
     let with = |light, intensity: f32, threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();

@@ -23,7 +23,8 @@ fn medium(albedo: f32, asymmetry: f32) -> Material {
 /// The balance of one light over one volume of one extinction.
 fn block(grid: &Grid, sigma: f32, material: &Material, lit: &LitBy<'static>, params: &HalfParams) -> Balance {
     let tf = constant(sigma);
-    let (volumes, lights) = ([volume(grid, &tf, material)], [*lit]);
+    let volumes = [volume(grid, &tf, material)];
+    let lights = [*lit];
     let camera = parallel([0.0, 0.0, 10.0], 2.0, [8, 8]);
     balance(&input(&volumes, &camera, &lights), params, 0).unwrap()
 }
@@ -107,8 +108,10 @@ fn ms01_no_light_is_lost_or_made() {
 fn ms02_energy_knows_no_slabs_and_the_picture_converges_with_them() {
     let tf = transfer(&[(-1.5, 0.0), (0.0, 0.6), (1.5, 1.8)]);
     let cloud = |p: DVec3| (0.9 * p.x + 0.3 * p.z).sin() + 0.4 * (0.7 * p.y - 0.8 * p.z).cos();
-    let (grid, material) = (grid([10, 10, 10], cubic(0.5), cloud), medium(1.0, 0.6));
-    let (volumes, lights) = ([volume(&grid, &tf, &material)], [sun([1.0, 0.3, 2.0])]);
+    let grid = grid([10, 10, 10], cubic(0.5), cloud);
+    let material = medium(1.0, 0.6);
+    let volumes = [volume(&grid, &tf, &material)];
+    let lights = [sun([1.0, 0.3, 2.0])];
     let camera = parallel([0.0, 0.0, 12.0], 5.0, [16, 16]);
     let with = |slabs: f64| {
         let params = HalfParams { scattering: BOTH, voxels_per_cell: 4, ..exact(Some(5.0 / slabs)) };
@@ -134,7 +137,8 @@ fn ms04_without_albedo_nothing_is_done_and_no_bit_changes() {
     let tf = transfer(&[(0.2, 0.0), (0.5, 0.4), (0.9, 1.5)]);
     let grid = grid([12, 12, 12], cubic(0.5), noise);
     let camera = perspective([2.0, 3.0, 12.0], 40.0, [40, 40]);
-    let (black, glowing) = (medium(0.0, 0.5), Material { emission: [0.1; 3], ..medium(0.0, 0.5) });
+    let black = medium(0.0, 0.5);
+    let glowing = Material { emission: [0.1; 3], ..medium(0.0, 0.5) };
     for (material, light) in [(black, sun([1.0, 2.0, 1.0])), (glowing, lamp([9.0, 3.0, 12.0]))] {
         let volumes = [volume(&grid, &tf, &material)];
         let lights = [light];
@@ -152,7 +156,8 @@ fn ms04_without_albedo_nothing_is_done_and_no_bit_changes() {
     let volumes = [volume(&grid, &tf, &white)];
     let lights = [sun([1.0, 2.0, 1.0])];
     let input = input(&volumes, &camera, &lights);
-    let (counts, wanted) = (draw(&input, &params(Scattering::None)).unwrap().1, draw(&input, &params(BOTH)).unwrap().1);
+    let counts = draw(&input, &params(Scattering::None)).unwrap().1;
+    let wanted = draw(&input, &params(BOTH)).unwrap().1;
     assert!(counts.scatter_passes == 0 && wanted.scatter_passes > 0);
     assert_eq!((counts.eye_fragments, counts.light_fragments), (wanted.eye_fragments, wanted.light_fragments));
 }
@@ -160,12 +165,14 @@ fn ms04_without_albedo_nothing_is_done_and_no_bit_changes() {
 #[test]
 fn beauty_is_the_sum_of_effects_and_single_scattering_keeps_its_bits() {
     let tf = transfer(&[(0.2, 0.0), (0.5, 0.4), (0.9, 4.0)]);
-    let (grid, material) = (grid([12, 12, 12], cubic(0.5), noise), medium(0.9, 0.5));
+    let grid = grid([12, 12, 12], cubic(0.5), noise);
+    let material = medium(0.9, 0.5);
     let camera = perspective([2.0, 3.0, 12.0], 40.0, [40, 40]);
     let volumes = [volume(&grid, &tf, &material)];
     let lights = [sun([1.0, 2.0, 1.0]), lamp([-9.0, 3.0, -12.0])];
     let input = input(&volumes, &camera, &lights);
-    let (once, both) = (draw_apart(&input, &params(Scattering::None)).0, draw_apart(&input, &params(BOTH)).0);
+    let once = draw_apart(&input, &params(Scattering::None)).0;
+    let both = draw_apart(&input, &params(BOTH)).0;
     assert_eq!(once.channels[..MORE], both.channels[..MORE]);
     assert!(once.channels[MORE..MORE + 3].iter().flatten().all(|v| *v == 0.0));
     assert!(both.channels[MORE].iter().any(|v| *v > 0.01) && both.channels.iter().flatten().all(|v| v.is_finite()));
@@ -184,7 +191,8 @@ fn beauty_is_the_sum_of_effects_and_single_scattering_keeps_its_bits() {
 #[test]
 fn ms07_a_cone_from_nothing_to_the_half_space() {
     let tf = transfer(&[(0.2, 0.0), (0.5, 4.0), (0.9, 40.0)]);
-    let (grid, material) = (grid([16, 16, 16], cubic(0.25), noise), medium(1.0, 0.85));
+    let grid = grid([16, 16, 16], cubic(0.25), noise);
+    let material = medium(1.0, 0.85);
     let camera = parallel([1.0, 2.0, 10.0], 5.0, [32, 32]);
     let volumes = [volume(&grid, &tf, &material)];
     let lights = [sun([1.0, 2.0, 3.0])];
@@ -193,7 +201,8 @@ fn ms07_a_cone_from_nothing_to_the_half_space() {
         let params = HalfParams { cone: Some(cone), voxels_per_cell: 8, ..params(BOTH) };
         (draw(&input, &params).unwrap(), balance(&input, &params, 0).unwrap())
     };
-    let (none, least) = (with(0.0), with(1e-6));
+    let none = with(0.0);
+    let least = with(1e-6);
     assert!(apart(&none.0.0, &least.0.0) < 1e-6 && none.0.1.scatter_passes < least.0.1.scatter_passes);
     let mut sides = 0.0;
     for cone in [0.0, 0.2, 0.8, 1.5, 1.57] {
@@ -212,7 +221,8 @@ fn ms07_a_cone_from_nothing_to_the_half_space() {
 
 #[test]
 fn ms08_a_dense_medium_makes_no_numbers_that_are_not_normal_and_no_more_work_a_cell() {
-    let (grid, material) = (grid([24, 24, 24], cubic(0.25), |_| 1.0), medium(0.9, 0.5));
+    let grid = grid([24, 24, 24], cubic(0.25), |_| 1.0);
+    let material = medium(0.9, 0.5);
     let camera = parallel([0.0, 0.0, -10.0], 5.0, [24, 24]);
     let with = |sigma: f32| {
         let tf = constant(sigma);
@@ -239,7 +249,8 @@ fn ms08_a_dense_medium_makes_no_numbers_that_are_not_normal_and_no_more_work_a_c
 fn ms09_a_symmetric_cloud_is_lit_symmetrically() {
     let tf = transfer(&[(0.3, 0.0), (1.0, 3.0)]);
     let cloud = |p: DVec3| 1.2 - 0.4 * p.length() + 0.2 * (2.0 * p.x).cos() * (2.0 * p.y).cos();
-    let (grid, material) = (grid([24, 24, 24], cubic(0.25), cloud), medium(1.0, 0.85));
+    let grid = grid([24, 24, 24], cubic(0.25), cloud);
+    let material = medium(1.0, 0.85);
     let volumes = [volume(&grid, &tf, &material)];
     let n = 40;
     let camera = parallel([0.0, 0.0, 10.0], 6.0, [n as u32; 2]);
@@ -270,7 +281,8 @@ static WALL: Wall = Wall(0.1);
 
 #[test]
 fn ms10_no_light_passes_an_opaque_wall() {
-    let (grid, material) = (grid([24, 24, 24], cubic(0.25), |_| 1.0), medium(1.0, 0.5));
+    let grid = grid([24, 24, 24], cubic(0.25), |_| 1.0);
+    let material = medium(1.0, 0.5);
     let tf = constant(0.8);
     let volumes = [volume(&grid, &tf, &material)];
     let camera = parallel([0.0, 0.0, -10.0], 6.0, [24, 24]);
@@ -294,7 +306,8 @@ fn ms10_no_light_passes_an_opaque_wall() {
 #[test]
 fn x1_scattered_light_knows_no_threads() {
     let tf = transfer(&[(0.3, 0.0), (0.5, 0.4), (0.9, 6.0)]);
-    let (grid, material) = (grid([20, 20, 20], cubic(0.5), noise), medium(0.95, 0.7));
+    let grid = grid([20, 20, 20], cubic(0.5), noise);
+    let material = medium(0.95, 0.7);
     let volumes = [volume(&grid, &tf, &material)];
     let camera = perspective([2.0, 3.0, 16.0], 50.0, [60, 50]);
     let lights = [sun([1.0, 2.0, 1.5]), lamp([0.0, 3.0, -14.0])];
@@ -311,7 +324,8 @@ fn x1_scattered_light_knows_no_threads() {
 #[test]
 fn hv13_scattered_light_is_linear_in_powers_of_two() {
     let tf = transfer(&[(0.2, 0.0), (0.5, 0.4), (0.9, 6.0)]);
-    let (grid, material) = (grid([12, 12, 12], cubic(0.5), noise), medium(1.0, 0.85));
+    let grid = grid([12, 12, 12], cubic(0.5), noise);
+    let material = medium(1.0, 0.85);
     let volumes = [volume(&grid, &tf, &material)];
     let camera = perspective([2.0, 3.0, 12.0], 40.0, [40, 40]);
     for light in [sun([1.0, 2.0, 1.0]), lamp([-9.0, 3.0, -12.0])] {
@@ -320,7 +334,8 @@ fn hv13_scattered_light_is_linear_in_powers_of_two() {
             light.light.intensity = [7.0 * factor, 3.0 * factor, factor];
             draw_apart(&input(&volumes, &camera, &[light]), &params(BOTH)).0
         };
-        let (one, mut other) = (with(1.0), with(2f32.powi(20)));
+        let one = with(1.0);
+        let mut other = with(2f32.powi(20));
         assert!(one.channels[MORE].iter().any(|c| *c > 1e-4));
         other.channels.iter_mut().flatten().for_each(|c| *c *= 2f32.powi(-20));
         assert_eq!(one, other);
@@ -329,7 +344,8 @@ fn hv13_scattered_light_is_linear_in_powers_of_two() {
 
 #[test]
 fn cells_are_few_and_no_more_at_800_slabs_than_at_50() {
-    let (tf, material) = (constant(0.25), medium(0.9, 0.5));
+    let tf = constant(0.25);
+    let material = medium(0.9, 0.5);
     let camera = parallel([0.0, 0.0, 12.0], 8.0, [8, 8]);
     let [along, aslant, lamp] = [sun([0.0, 0.0, 1.0]), sun([1.0, 2.0, 3.0]), lamp([20.0, 30.0, 30.0])];
     for (dims, lights) in [
@@ -346,7 +362,8 @@ fn cells_are_few_and_no_more_at_800_slabs_than_at_50() {
                     .unwrap()
                     .1
             };
-            let (few, many) = (counts(50.0), counts(800.0));
+            let few = counts(50.0);
+            let many = counts(800.0);
             let what = format!("{dims:?}, {:?}: {few:?}", light.light.shape);
             assert!(many.slabs > 4 * few.slabs && few.scatter_passes > 0, "{what}");
             assert_eq!((few.light_bytes, few.scatter_cells), (many.light_bytes, many.scatter_cells), "{what}");
@@ -388,9 +405,12 @@ fn media_that_share_cells_mix_by_their_scattering() {
     let grid = grid([16, 16, 16], cubic(0.5), |_| 1.0);
     let camera = parallel([0.0, 0.0, 10.0], 2.0, [8, 8]);
     let lights = [sun([0.0, 0.0, 1.0])];
-    let (one, other, sum) = (constant(0.3), constant(0.9), constant(1.2));
+    let one = constant(0.3);
+    let other = constant(0.9);
+    let sum = constant(1.2);
     let same = medium(0.9, 0.4);
-    let (dark, bright) = (medium(0.6, 0.4), medium(1.0, 0.4));
+    let dark = medium(0.6, 0.4);
+    let bright = medium(1.0, 0.4);
     let of =
         |volumes: &[sheet_light::Volume<'_>]| balance(&input(volumes, &camera, &lights), &params(BOTH), 0).unwrap();
     let whole = of(&[volume(&grid, &sum, &same)]);
@@ -405,7 +425,8 @@ fn media_that_share_cells_mix_by_their_scattering() {
 #[test]
 fn a_far_lamp_is_a_sun() {
     let cloud = |p: DVec3| 1.5 - 0.6 * p.length() + 0.3 * (2.0 * p.x + p.y).cos();
-    let (grid, material) = (grid([16, 16, 16], cubic(0.25), cloud), medium(1.0, 0.6));
+    let grid = grid([16, 16, 16], cubic(0.25), cloud);
+    let material = medium(1.0, 0.6);
     let tf = transfer(&[(0.2, 0.0), (1.0, 4.0)]);
     let volumes = [volume(&grid, &tf, &material)];
     let camera = parallel([1.0, 2.0, 10.0], 5.0, [32, 32]);
@@ -417,7 +438,8 @@ fn a_far_lamp_is_a_sun() {
         let input = input(&volumes, &camera, std::slice::from_ref(&light));
         (draw_apart(&input, &params).0, balance(&input, &params, 0).unwrap())
     };
-    let (one, other) = (of(far), of(sun([1.0, 2.0, 3.0])));
+    let one = of(far);
+    let other = of(sun([1.0, 2.0, 3.0]));
     let brightest = other.0.channels[MORE].iter().copied().fold(0.0, f32::max);
     let off = largest(&one.0.channels[MORE], &other.0.channels[MORE]) / brightest;
     assert!(off < 0.01, "{off}");
@@ -435,7 +457,8 @@ mod deep {
         for (tau, asymmetry) in [(5.0, 0.0), (20.0, 0.0), (20.0, 0.85), (60.0, 0.85)] {
             let tf = constant((tau / 6.0) as f32);
             let material = medium(1.0, asymmetry as f32);
-            let (volumes, lights) = ([volume(&cube, &tf, &material)], [sun([0.0, 0.0, 1.0])]);
+            let volumes = [volume(&cube, &tf, &material)];
+            let lights = [sun([0.0, 0.0, 1.0])];
             let block = Block { width: tau, depth: tau, albedo: 1.0, asymmetry };
             for (face, from) in eyes {
                 let expected = seen(&block, face, 120_000, 5);

@@ -42,7 +42,8 @@ pub(super) fn on_threads<T: Send>(threads: usize, make: impl FnOnce() -> T + Sen
 
 /// A constant block between two corners.
 pub(super) fn block(from: [f64; 3], to: [f64; 3], step: f64) -> Grid {
-    let (from, to) = (DVec3::from_array(from), DVec3::from_array(to));
+    let from = DVec3::from_array(from);
+    let to = DVec3::from_array(to);
     let dims = ((to - from) / step).ceil().to_array().map(|n| n.max(2.0) as usize);
     let axes = DMat3::from_diagonal((to - from) / DVec3::from_array(dims.map(|n| n as f64)));
     let mut grid = grid(dims, axes, |_| 1.0);
@@ -73,7 +74,9 @@ fn profile(
     params: &HalfParams,
 ) -> (Vec<[f64; 2]>, HalfCounts) {
     let receiver = block([-1.6, -0.4, -0.02], [1.6, 0.4, 0.02], 0.1);
-    let (thin, opaque, material) = (constant(0.01), constant(400.0), scattering());
+    let thin = constant(0.01);
+    let opaque = constant(400.0);
+    let material = scattering();
     let black = Material { single_scattering_albedo: 0.0, ..material };
     let with = |casts_shadow: bool| {
         let mut volumes: Vec<Volume<'_>> =
@@ -81,7 +84,8 @@ fn profile(
         volumes.push(Volume { casts_shadow, ..volume(&receiver, &thin, &material) });
         draw(&soft(&volumes, camera, vec![*light]), params).unwrap()
     };
-    let ((dark, counts), (open, _)) = (with(true), with(false));
+    let (dark, counts) = with(true);
+    let (open, _) = with(false);
     let width = camera.size[0] as usize;
     let mut out: Vec<[f64; 2]> = Vec::new();
     for at in 0..dark.channels[0].len() {
@@ -175,7 +179,8 @@ fn beside_two_edges(x: f64, r: f64) -> f64 {
 #[test]
 fn hv07_hv08_what_is_constant_stays_so_after_a_thousand_slabs_and_at_borders() {
     let grid = block([-3.0, -3.0, -1.0], [3.0, 3.0, 1.0], 0.25);
-    let (thin, material) = (constant(0.5), scattering());
+    let thin = constant(0.5);
+    let material = scattering();
     let camera = parallel([0.0, 0.0, 9.0], 5.6, [20, 20]);
     let disk = extended(LightShape::Disk { center: DVec3::Z * 1e3, normal: DVec3::NEG_Z, radius: 30.0 }, 8);
     let point = LitBy {
@@ -191,7 +196,8 @@ fn hv07_hv08_what_is_constant_stays_so_after_a_thousand_slabs_and_at_borders() {
         draw(&HalfInput { extended, ..input(&volumes, &camera, &lights) }, &params).unwrap()
     };
     // Nothing attenuates: 1 everywhere, at the borders too, to the bit.
-    let ((open, counts), (hard, _)) = (with(false, true), with(false, false));
+    let (open, counts) = with(false, true);
+    let (hard, _) = with(false, false);
     assert!(counts.slabs > 1000 && counts.soft_passes >= 1000 * 8, "{counts:?}");
     // All points together give the middle a little less than the centre does.
     let gain = open.channels[0][210] / hard.channels[0][210];
@@ -200,7 +206,8 @@ fn hv07_hv08_what_is_constant_stays_so_after_a_thousand_slabs_and_at_borders() {
     assert!((gain - 1.0).abs() < 1e-3, "{gain}");
     assert!(worst < 1e-5, "{worst:e}");
     // A constant medium lets through what it does of the centre's light, but beside the faces that light comes in at the sides.
-    let ((soft, _), (hard, _)) = (with(true, true), with(true, false));
+    let (soft, _) = with(true, true);
+    let (hard, _) = with(true, false);
     let apart = |at: usize| {
         let [x, y] = [at % 20, at / 20].map(|v| (v as f64 + 0.5) / 20.0 * 5.6 - 2.8);
         let scale = open.channels[0][at];
@@ -212,7 +219,8 @@ fn hv07_hv08_what_is_constant_stays_so_after_a_thousand_slabs_and_at_borders() {
 
 #[test]
 fn hv10_a_light_without_extent_is_a_point_to_the_bit_and_moves_no_image() {
-    let (tf, material) = (transfer(&[(0.3, 0.0), (0.5, 0.4), (0.9, 2.5)]), scattering());
+    let tf = transfer(&[(0.3, 0.0), (0.5, 0.4), (0.9, 2.5)]);
+    let material = scattering();
     let grid = grid([12, 12, 12], cubic(0.5), noise);
     let volumes = [volume(&grid, &tf, &material)];
     let camera = perspective([2.0, 3.0, 16.0], 30.0, [40, 40]);
@@ -238,7 +246,9 @@ fn hv10_a_light_without_extent_is_a_point_to_the_bit_and_moves_no_image() {
 fn a_small_occluder_takes_as_much_light_softly_as_it_does_hard() {
     let receiver = block([-1.6, -1.6, -0.05], [1.6, 1.6, 0.05], 0.1);
     let blob = block([-0.3, -0.3, 2.9], [0.3, 0.3, 3.1], 0.1);
-    let (thin, dense, material) = (constant(0.01), constant(3.0), scattering());
+    let thin = constant(0.01);
+    let dense = constant(3.0);
+    let material = scattering();
     let black = Material { single_scattering_albedo: 0.0, ..material };
     let camera = parallel([0.0, 0.0, -10.0], 3.2, [64, 64]);
     let missing = |radius: f64| {
@@ -247,11 +257,14 @@ fn a_small_occluder_takes_as_much_light_softly_as_it_does_hard() {
                 .map(|v| Volume { casts_shadow, ..v });
             draw(&soft(&volumes, &camera, vec![extended(above(0, radius), 32)]), &exact(None)).unwrap().0
         };
-        let (dark, open) = (with(true), with(false));
+        let dark = with(true);
+        let open = with(false);
         dark.channels[0].iter().zip(&open.channels[0]).map(|(d, o)| f64::from(1.0 - d / o)).collect::<Vec<f64>>()
     };
-    let (hard, soft) = (missing(1e-9), missing(0.8));
-    let (all_hard, all_soft): (f64, f64) = (hard.iter().sum(), soft.iter().sum());
+    let hard = missing(1e-9);
+    let soft = missing(0.8);
+    let all_hard: f64 = hard.iter().sum();
+    let all_soft: f64 = soft.iter().sum();
     let most = |v: &[f64]| v.iter().copied().fold(0.0, f64::max);
     assert!((all_soft / all_hard - 1.0).abs() < 0.035 && most(&soft) < 0.8 * most(&hard), "{all_soft}, not {all_hard}");
 }
@@ -267,7 +280,8 @@ fn lumps(p: DVec3) -> f64 {
 
 /// Root mean square difference to many points of a light, that of its centre alone, and the mean of what they show.
 fn against_points(light: &Extended<'static>, points: u32, camera: &Camera) -> [f64; 3] {
-    let (tf, material) = (transfer(&[(0.2, 0.0), (0.5, 4.0), (1.0, 9.0)]), scattering());
+    let tf = transfer(&[(0.2, 0.0), (0.5, 4.0), (1.0, 9.0)]);
+    let material = scattering();
     let grid = grid([24, 24, 24], cubic(0.2), lumps);
     let volumes = [volume(&grid, &tf, &material)];
     let of = |input: HalfInput<'_>| draw(&input, &exact(None)).unwrap().0.channels[1].clone();
@@ -315,7 +329,8 @@ fn a_cloud_under_an_extended_light_is_that_under_many_points_of_it() {
 
 #[test]
 fn soft_light_is_that_of_the_twin() {
-    let (tf, material) = (transfer(&[(0.2, 0.0), (0.5, 0.4), (0.9, 1.5)]), scattering());
+    let tf = transfer(&[(0.2, 0.0), (0.5, 0.4), (0.9, 1.5)]);
+    let material = scattering();
     let wave = |p: DVec3| 0.5 + 0.4 * (1.5 * p.x + 0.5 * p.z).sin() * (1.2 * p.y).cos();
     let grid = grid([8, 7, 6], cubic(0.5), wave);
     let params = HalfParams { light_pixels: 3.0, ..exact(Some(0.125)) };
@@ -338,9 +353,11 @@ fn soft_light_is_that_of_the_twin() {
 
 #[test]
 fn any_number_of_threads_gives_soft_light_the_same_bits() {
-    let (tf, plain) = (transfer(&[(0.3, 0.0), (0.5, 0.4), (0.9, 2.5)]), scattering());
+    let tf = transfer(&[(0.3, 0.0), (0.5, 0.4), (0.9, 2.5)]);
+    let plain = scattering();
     let red = Material { extinction_rgb: [0.5, 1.0, 2.0], ..plain };
-    let (one, other) = (grid([14, 14, 14], cubic(0.5), noise), block([-2.0, 3.0, -2.0], [2.0, 4.0, 2.0], 0.5));
+    let one = grid([14, 14, 14], cubic(0.5), noise);
+    let other = block([-2.0, 3.0, -2.0], [2.0, 4.0, 2.0], 0.5);
     let volumes = [volume(&one, &tf, &plain), volume(&other, &tf, &red)];
     let camera = perspective([2.0, 3.0, 16.0], 40.0, [60, 50]);
     let lights = [([2.0, 14.0, 3.0], 3), ([-9.0, 3.0, -9.0], 7)]
@@ -359,7 +376,8 @@ fn any_number_of_threads_gives_soft_light_the_same_bits() {
 
 #[test]
 fn an_extended_light_that_no_sweep_carries_is_refused() {
-    let (tf, material) = (constant(0.5), scattering());
+    let tf = constant(0.5);
+    let material = scattering();
     let grid = grid([12, 12, 12], cubic(0.5), |_| 1.0);
     let volumes = [volume(&grid, &tf, &material)];
     let camera = parallel([0.0, 0.0, 10.0], 3.0, [24, 24]);

@@ -28,7 +28,10 @@ struct Bench<'a> {
 impl Bench<'_> {
     /// (x, share of the light that arrives) along y = 0 at z = 0.
     fn profile(&self, light: &Extended<'static>, camera: &Camera, params: &HalfParams) -> Vec<[f64; 2]> {
-        let (thin, opaque, material, paper) = (constant(0.001), constant(400.0), scattering(), white());
+        let thin = constant(0.001);
+        let opaque = constant(400.0);
+        let material = scattering();
+        let paper = white();
         let black = Material { single_scattering_albedo: 0.0, ..material };
         let with = |casts_shadow: bool| {
             let blocks = self.blocks.iter().map(|block| volume(block, &opaque, &black));
@@ -40,7 +43,8 @@ impl Bench<'_> {
             let seen = if self.floor.is_some() { &drawn.polygons.channels } else { &out.channels };
             seen[0].clone()
         };
-        let (dark, open) = (with(true), with(false));
+        let dark = with(true);
+        let open = with(false);
         let width = camera.size[0] as usize;
         let mut out = Vec::new();
         for k in 0..dark.len() {
@@ -84,7 +88,8 @@ fn from_aside() -> Camera {
 #[test]
 fn hv09_penumbras_of_polygons_on_a_volume_are_as_wide_as_similar_triangles_say_whatever_the_slabs() {
     let receiver = block([-1.6, -0.4, -0.02], [1.6, 0.4, 0.02], 0.1);
-    let (walls, haze) = (&[half_plane()][..], Some(&receiver));
+    let walls = &[half_plane()][..];
+    let haze = Some(&receiver);
     let bench = Bench { blocks: &[], walls, haze, floor: None };
     check(&bench, &[parallel([0.0, 0.0, -10.0], 0.1, [160, 5]), from_aside()], &[2.0, 50.0], 1.0);
     check(&bench, &[from_aside()], &[800.0], 1.0);
@@ -92,8 +97,8 @@ fn hv09_penumbras_of_polygons_on_a_volume_are_as_wide_as_similar_triangles_say_w
 
 #[test]
 fn hv09_penumbras_of_a_volume_on_polygons_are_as_wide_as_similar_triangles_say_wherever_these_lie() {
-    let (blocks, floor) =
-        (&[block([-1.8, -0.6, 1.98], [0.0, 0.6, 2.02], 0.2)][..], wall([0.0; 3], [1.6, 0.0, 0.0], [0.0, 0.4, 0.0]));
+    let blocks = &[block([-1.8, -0.6, 1.98], [0.0, 0.6, 2.02], 0.2)][..];
+    let floor = wall([0.0; 3], [1.6, 0.0, 0.0], [0.0, 0.4, 0.0]);
     let around = block([-1.8, -0.6, -0.5], [1.8, 0.6, 1.0], 0.1);
     // Behind all slabs, and among them.
     for haze in [None, Some(&around)] {
@@ -105,8 +110,8 @@ fn hv09_penumbras_of_a_volume_on_polygons_are_as_wide_as_similar_triangles_say_w
 /// Points of the light look for the volume far beside its images.
 #[test]
 fn hv08_polygons_beside_a_volume_keep_all_their_light() {
-    let (blocks, floor) =
-        (&[block([-0.3, -0.3, 1.9], [0.3, 0.3, 2.1], 0.1)][..], wall([0.0; 3], [1.6, 0.0, 0.0], [0.0, 0.4, 0.0]));
+    let blocks = &[block([-0.3, -0.3, 1.9], [0.3, 0.3, 2.1], 0.1)][..];
+    let floor = wall([0.0; 3], [1.6, 0.0, 0.0], [0.0, 0.4, 0.0]);
     let bench = Bench { blocks, walls: &[], haze: None, floor: Some(&floor) };
     for kind in 0..3 {
         let profile = bench.profile(&extended(above(kind, 0.3), 32), &from_aside(), &fine(50.0));
@@ -118,7 +123,8 @@ fn hv08_polygons_beside_a_volume_keep_all_their_light() {
 
 #[test]
 fn hv09_penumbras_of_polygons_on_polygons_are_as_wide_as_similar_triangles_say() {
-    let (walls, floor) = (&[half_plane()][..], wall([0.0; 3], [1.6, 0.0, 0.0], [0.0, 0.4, 0.0]));
+    let walls = &[half_plane()][..];
+    let floor = wall([0.0; 3], [1.6, 0.0, 0.0], [0.0, 0.4, 0.0]);
     let around = block([-1.8, -0.6, -0.5], [1.8, 0.6, 1.0], 0.1);
     for haze in [None, Some(&around)] {
         check(&Bench { blocks: &[], walls, haze, floor: Some(&floor) }, &[from_aside()], &[50.0], 1.0);
@@ -130,7 +136,8 @@ fn hv09_penumbras_of_polygons_on_polygons_are_as_wide_as_similar_triangles_say()
 #[test]
 fn a_polygon_and_a_volume_side_by_side_leave_no_light_between_them() {
     let blocks = &[block([0.0, -0.6, 1.98], [1.8, 0.6, 2.02], 0.2)][..];
-    let (walls, floor) = (&[half_plane()][..], wall([0.0; 3], [1.6, 0.0, 0.0], [0.0, 0.4, 0.0]));
+    let walls = &[half_plane()][..];
+    let floor = wall([0.0; 3], [1.6, 0.0, 0.0], [0.0, 0.4, 0.0]);
     let receiver = block([-1.6, -0.4, -0.02], [1.6, 0.4, 0.02], 0.1);
     for (kind, in_haze) in (0..3).flat_map(|kind| [false, true].map(|in_haze| (kind, in_haze))) {
         let (haze, floor) = if in_haze { (Some(&receiver), None) } else { (None, Some(&floor)) };
@@ -144,7 +151,9 @@ fn a_polygon_and_a_volume_side_by_side_leave_no_light_between_them() {
 
 /// A block of a medium, a floor below it and a plate before the light.
 fn mixed(camera: &Camera, light: &Extended<'static>, one_sweep: bool, threads: usize) -> (Accumulator, Drawn) {
-    let (tf, material, paper) = (constant(0.4), scattering(), white());
+    let tf = constant(0.4);
+    let material = scattering();
+    let paper = white();
     let grid = grid([10, 6, 10], cubic(0.4), |_| 1.0);
     let volumes = [volume(&grid, &tf, &material)];
     let meshes = [
@@ -178,7 +187,8 @@ fn polygons_and_a_medium_under_an_extended_light_are_those_under_many_points_of_
 #[test]
 fn hv10_polygons_under_a_light_without_extent_have_the_shadow_of_a_point() {
     let camera = from_aside();
-    let (walls, floor) = (&[half_plane()][..], wall([0.0; 3], [1.6, 0.0, 0.0], [0.0, 0.4, 0.0]));
+    let walls = &[half_plane()][..];
+    let floor = wall([0.0; 3], [1.6, 0.0, 0.0], [0.0, 0.4, 0.0]);
     let bench = Bench { blocks: &[], walls, haze: None, floor: Some(&floor) };
     let center = DVec3::Z * 6.0;
     let [one, many] =

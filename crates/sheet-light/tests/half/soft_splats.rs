@@ -18,7 +18,9 @@ fn draw(input: &HalfInput<'_>, params: &HalfParams) -> (Accumulator, Drawn) {
 
 /// A medium, a pane before the light, another one in the medium, a ball of raw points beside it, and a floor that is opaque.
 fn mixed(camera: &Camera, light: &Extended<'static>, one_sweep: bool, threads: usize) -> (Accumulator, Drawn) {
-    let (tf, material, paper) = (constant(0.4), scattering(), white());
+    let tf = constant(0.4);
+    let material = scattering();
+    let paper = white();
     let grid = grid([10, 6, 10], cubic(0.4), |_| 1.0);
     let volumes = [volume(&grid, &tf, &material)];
     let mut cloud = Cloud::new(DVec3::ZERO);
@@ -57,7 +59,8 @@ fn surfaces_and_points_that_let_light_through_are_lit_as_under_many_points_of_an
 /// beside it where that is asked for.
 fn profile(light: &Extended<'static>, tau: f64, is_beside: bool) -> Vec<[f64; 2]> {
     let camera = parallel([8.0, 0.0, 5.0], 0.1, [110, 5]);
-    let (beside, opaque) = (block([0.0, -0.6, 1.98], [1.8, 0.6, 2.02], 0.2), constant(400.0));
+    let beside = block([0.0, -0.6, 1.98], [1.8, 0.6, 2.02], 0.2);
+    let opaque = constant(400.0);
     let black = Material { single_scattering_albedo: 0.0, ..scattering() };
     let of = |casts_shadow: bool| {
         let mut cloud = Cloud::new(DVec3::ZERO);
@@ -71,7 +74,8 @@ fn profile(light: &Extended<'static>, tau: f64, is_beside: bool) -> Vec<[f64; 2]
         let volumes = if is_beside { &volumes[..] } else { &[] };
         draw(&with(&shown, soft(volumes, &camera, vec![*light])), &fine(50.0)).0
     };
-    let (dark, open) = (of(true), of(false));
+    let dark = of(true);
+    let open = of(false);
     let places = (0..550).filter_map(|k| {
         let (from, along) = ray(&camera, k % 110, k / 110);
         let place = from - along * (from.z / along.z);

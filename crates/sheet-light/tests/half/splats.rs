@@ -23,7 +23,8 @@ pub(super) struct Shown {
 
 impl Shown {
     pub(super) fn new(cloud: Cloud, camera: &Camera, materials: Vec<Material>, slab_width: f64) -> Self {
-        let (footprints, projected) = (FootprintStack::default(), projected(&cloud, camera, &materials));
+        let footprints = FootprintStack::default();
+        let projected = projected(&cloud, camera, &materials);
         let objects = (0..4).map(|i| Object { name: i.to_string(), ..Object::default() }).collect();
         Self { cloud, projected, footprints, materials, objects, slab_width }
     }
@@ -108,7 +109,8 @@ fn a_translucent_plane_shadows_another_by_its_optical_depth() {
                 shown.objects[1].casts_shadow = casts;
                 let out = draw(&with(&shown, input(&[], &camera, &lights)), &exact(None)).unwrap().0;
                 let expected = to_light.z / PI * if casts { (-tau).exp() } else { 1.0 };
-                let (found, whole) = (middle(&out), to_light.z / PI);
+                let found = middle(&out);
+                let whole = to_light.z / PI;
                 assert!((found - expected).abs() < 1e-2 * whole, "τ {tau}, casts {casts}: {found}, not {expected}");
             }
         }
@@ -117,8 +119,10 @@ fn a_translucent_plane_shadows_another_by_its_optical_depth() {
 
 #[test]
 fn volumes_shadow_splats_and_splats_shadow_volumes() {
-    let (camera, tau) = (parallel([9.0, 0.0, 5.0], 0.4, [15, 15]), 1.0f64);
-    let (tf, material) = (constant(0.5), scattering());
+    let camera = parallel([9.0, 0.0, 5.0], 0.4, [15, 15]);
+    let tau = 1.0f64;
+    let tf = constant(0.5);
+    let material = scattering();
     let lights = [sun([0.0, 0.0, 1.0])];
     // Two thick, and so of τ 1, above a plane of splats.
     let above = grid([24, 24, 8], cubic(0.25), |_| 1.0);
@@ -161,7 +165,8 @@ fn volumes_shadow_splats_and_splats_shadow_volumes() {
 #[test]
 fn a_medium_of_splats_shadows_itself_as_the_closed_form_says() {
     let camera = parallel([0.0, 0.0, 9.0], 0.5, [15, 15]);
-    let (spacing, n) = (0.125, 16);
+    let spacing = 0.125;
+    let n = 16;
     for tau in [0.3, 1.0, 3.0] {
         let mut cloud = Cloud::new(DVec3::ZERO);
         for (i, (j, k)) in (-n..n).flat_map(|i| (-n..n).flat_map(move |j| (0..n).map(move |k| (i, (j, k))))) {
@@ -298,7 +303,9 @@ fn splats_that_sweeps_cannot_take_are_refused() {
 #[test]
 fn an_edge_of_translucent_discs_is_as_wide_as_their_kernels() {
     let camera = parallel([0.0, 0.0, 9.0], 0.02, [120, 2]);
-    let (step, tau, pixel) = (0.125, 0.7, 0.01);
+    let step = 0.125;
+    let tau = 0.7;
+    let pixel = 0.01;
     let mut cloud = Cloud::new(DVec3::ZERO);
     plane(&mut cloud, (DVec3::new(-1.0, 0.0, 0.0), DVec3::Z), 1.0, tau, &Splat::default());
     let shown = Shown::new(cloud, &camera, vec![lambert()], 0.1);

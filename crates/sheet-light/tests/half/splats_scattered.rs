@@ -56,7 +56,8 @@ fn middle(shown: Option<&Shown>, camera: &Camera) -> [f64; 3] {
 /// The same beside other volumes.
 fn middle_beside(others: &[Volume<'_>], shown: Option<&Shown>, camera: &Camera) -> [f64; 3] {
     let slab = grid([48, 48, 8], cubic(0.5), |_| 1.0);
-    let (tf, medium) = (constant(0.5), scattering());
+    let tf = constant(0.5);
+    let medium = scattering();
     let lights = [sun([0.0, 0.0, 1.0])];
     let volumes: Vec<Volume<'_>> = [volume(&slab, &tf, &medium)].into_iter().chain(others.iter().copied()).collect();
     let plain = input(&volumes, camera, &lights);
@@ -74,7 +75,8 @@ fn a_pane_before_a_medium_tints_what_it_scatters_and_one_behind_it_changes_nothi
     for (z, eye, tau) in [(5.0, -12.0, 0.7), (-5.0, 12.0, 0.0)] {
         let camera = parallel([0.0, 0.0, eye], 2.0, [9, 9]);
         let shown = Shown::new(pane(z, (15.0, 0.25), 0.7, [0.0; 3]), &camera, vec![tinted], 0.1);
-        let (plain, found) = (middle(None, &camera), middle(Some(&shown), &camera));
+        let plain = middle(None, &camera);
+        let found = middle(Some(&shown), &camera);
         for (c, factor) in [0.5f64, 1.0, 2.0].into_iter().enumerate() {
             let expected = plain[c] * (-tau * factor).exp();
             assert!(plain[c] > 0.01 && (found[c] / expected - 1.0).abs() < 0.01, "{z}: {found:?}, without {plain:?}");
@@ -84,7 +86,8 @@ fn a_pane_before_a_medium_tints_what_it_scatters_and_one_behind_it_changes_nothi
     let camera = parallel([0.0, 0.0, -12.0], 2.0, [9, 9]);
     let mut shown = Shown::new(pane(5.0, (15.0, 0.25), 0.7, [0.0; 3]), &camera, vec![tinted], 0.1);
     shown.objects[0].casts_shadow = false;
-    let (plain, found) = (middle(None, &camera), middle(Some(&shown), &camera));
+    let plain = middle(None, &camera);
+    let found = middle(Some(&shown), &camera);
     assert!((0..3).all(|c| (found[c] / plain[c] - 1.0).abs() < 1e-6), "{found:?}, without {plain:?}");
 }
 
@@ -95,13 +98,15 @@ fn a_pane_in_a_medium_lets_through_what_paths_do() {
     let camera = parallel([0.0, 0.0, 10.0], 2.0, [8, 8]);
     for (tau, passing) in [(1.0, 0.4f64), (4.0, 0.1)] {
         let tf = constant((tau / 4.0) as f32);
-        let (volumes, lights) = ([volume(&slab, &tf, &medium)], [sun([0.0, 0.0, 1.0])]);
+        let volumes = [volume(&slab, &tf, &medium)];
+        let lights = [sun([0.0, 0.0, 1.0])];
         let shown = Shown::new(pane(0.01, (56.0, 1.0), -passing.ln(), [0.0; 3]), &camera, vec![black()], 0.1);
         let found = balance(&with(&shown, input(&volumes, &camera, &lights)), &params(4), 0).unwrap();
         let share = |v: [f64; 3]| v[1] / found.incident[1];
         let paths = Block { width: f64::INFINITY, depth: tau, albedo: 1.0, asymmetry: 0.0 };
         let [back, through, _] = trace_with(&paths, (0.5 * tau, passing), 40_000, 5);
-        let (own_back, own_through) = (share(found.reflected), share(found.transmitted));
+        let own_back = share(found.reflected);
+        let own_through = share(found.transmitted);
         println!(
             "τ {tau}, {passing}: {own_back:.4} {own_through:.4}, paths {back:.4} {through:.4}, sides {:.4}",
             share(found.sides)
@@ -143,7 +148,8 @@ fn a_thin_pane_shows_what_the_medium_scatters_to_either_side_of_it() {
 
 #[test]
 fn volumes_that_reflect_about_their_gradient_show_what_the_medium_scatters_as_a_thin_pane_does() {
-    let (tau, material) = (0.005f64, lambert());
+    let tau = 0.005f64;
+    let material = lambert();
     for (eye, expected) in on_either_side() {
         let camera = parallel([0.0, 0.0, eye], 2.0, [9, 9]);
         // Values fall towards the eye. What it takes of the light is lost to the medium: as little as can be told.

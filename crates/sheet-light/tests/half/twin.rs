@@ -27,7 +27,8 @@ pub(crate) fn differences(input: &HalfInput<'_>, params: &HalfParams) -> [f64; 2
 
 #[test]
 fn hv_lit_sheets_are_those_of_the_twin() {
-    let (tf, material) = (transfer(&[(0.2, 0.0), (0.5, 0.4), (0.8, 0.1), (0.9, 1.5)]), scattering());
+    let tf = transfer(&[(0.2, 0.0), (0.5, 0.4), (0.8, 0.1), (0.9, 1.5)]);
+    let material = scattering();
     let sheared = DMat3::from_cols(DVec3::new(0.5, 0.1, 0.0), DVec3::new(0.2, 0.6, -0.1), DVec3::new(-0.1, 0.1, -0.7));
     let bright = |at: [f64; 3]| {
         let mut lit = lamp(at);
@@ -59,8 +60,10 @@ fn hv_lit_sheets_are_those_of_the_twin() {
 
 #[test]
 fn hv_volumes_that_overlap_shadow_each_other_as_in_the_twin() {
-    let (tf, other_tf) = (transfer(&[(0.2, 0.0), (0.7, 0.9)]), transfer(&[(300.0, 0.0), (900.0, 0.5), (1000.0, 0.0)]));
-    let (plain, glowing) = (scattering(), Material { emission: [0.02, 0.0, 0.1], ..unlit() });
+    let tf = transfer(&[(0.2, 0.0), (0.7, 0.9)]);
+    let other_tf = transfer(&[(300.0, 0.0), (900.0, 0.5), (1000.0, 0.0)]);
+    let plain = scattering();
+    let glowing = Material { emission: [0.02, 0.0, 0.1], ..unlit() };
     let one = grid([9, 7, 6], cubic(0.5), noise);
     let mut two = grid([5, 6, 5], cubic(0.6), |p| 1000.0 * noise(p));
     two.origin += DVec3::new(1.0, 0.3, 0.8);
@@ -109,8 +112,11 @@ fn discs_and_matter(camera: &Camera) -> Shown {
     for n in 0..60 {
         let side = |a: u64| (rng::unit(11, a, n, 0) - 0.5) as f32;
         let position = [3.0 * side(0), 3.0 * side(1), 2.5 * side(2) + 0.5].into();
-        let (radius, cross_section) = (0.45, 0.12);
-        let (kind, object, material) = (SplatKind::Medium, 1 + (n % 2) as u32, 1);
+        let radius = 0.45;
+        let cross_section = 0.12;
+        let kind = SplatKind::Medium;
+        let object = 1 + (n % 2) as u32;
+        let material = 1;
         cloud.push(&Splat { position, radius, cross_section, kind, object, material, ..Splat::default() });
     }
     let medium = Material { asymmetry: 0.3, extinction_rgb: [1.0; 3], ..scattering() };
@@ -122,7 +128,8 @@ fn discs_and_matter(camera: &Camera) -> Shown {
 
 #[test]
 fn hv_splats_among_volumes_are_those_of_the_twin() {
-    let (tf, material) = (transfer(&[(0.2, 0.0), (0.5, 0.4), (0.8, 0.1), (0.9, 1.5)]), scattering());
+    let tf = transfer(&[(0.2, 0.0), (0.5, 0.4), (0.8, 0.1), (0.9, 1.5)]);
+    let material = scattering();
     let grid = grid([8, 7, 6], cubic(0.5), noise);
     let volumes = [volume(&grid, &tf, &material)];
     let mut bright = lamp([6.0, 8.0, 7.0]);
@@ -146,14 +153,13 @@ fn hv_splats_among_volumes_are_those_of_the_twin() {
 #[test]
 fn hv_polygons_among_volumes_are_those_of_the_twin_but_at_the_edges_of_shadows() {
     let tf = transfer(&[(0.2, 0.0), (0.6, 0.5), (1.2, 0.1), (1.5, 1.0)]);
-    let (medium, material) = (scattering(), white());
+    let medium = scattering();
+    let material = white();
     let field = |p: DVec3| (1.3 * p.x).sin() + (0.9 * p.y + p.z).cos() + 0.2 * p.z;
     let grid = grid([8, 7, 6], cubic(0.5), field);
     let volumes = [volume(&grid, &tf, &medium)];
-    let (floor, pane) = (
-        wall([0.0, -1.3, 0.0], [2.5, 0.1, 0.0], [0.0, 0.1, -2.5]),
-        wall([-0.4, 0.3, 0.4], [0.5, 0.2, 0.1], [0.1, -0.1, 0.6]),
-    );
+    let floor = wall([0.0, -1.3, 0.0], [2.5, 0.1, 0.0], [0.0, 0.1, -2.5]);
+    let pane = wall([-0.4, 0.3, 0.4], [0.5, 0.2, 0.1], [0.1, -0.1, 0.6]);
     let all = [polygons(&floor, &material), polygons(&pane, &material)];
     let mut bright = lamp([3.0, 8.0, 5.0]);
     bright.light = Light { intensity: [80.0; 3], ..bright.light };
@@ -166,7 +172,8 @@ fn hv_polygons_among_volumes_are_those_of_the_twin_but_at_the_edges_of_shadows()
             let drawn = fold(&of, &params, &BEAUTY, &mut out, None).unwrap();
             let twin = reference::draw(&of, &params).unwrap();
             let behind = &drawn.polygons.channels[1];
-            let (mut apart, mut shown) = (Vec::new(), 0);
+            let mut apart = Vec::new();
+            let mut shown = 0;
             for (at, expected) in twin.color.iter().enumerate() {
                 let tau = f64::from(out.optical_depth[0][at]);
                 // At the edges of polygons one form sees them, the other does not.
@@ -179,7 +186,8 @@ fn hv_polygons_among_volumes_are_those_of_the_twin_but_at_the_edges_of_shadows()
             let size = apart.len();
             apart.sort_by(f64::total_cmp);
             // A white wall in full light shows 1/π. Edges of shadows are pixels of the light's z-buffer.
-            let (most, edges) = (apart[size * 97 / 100], apart.iter().filter(|d| **d > 2e-3).count());
+            let most = apart[size * 97 / 100];
+            let edges = apart.iter().filter(|d| **d > 2e-3).count();
             assert!(shown > 200 && size > twin.color.len() * 98 / 100, "{shown} pixels of polygons, {size} in all");
             let worst = apart[size - 1];
             assert!(most < 1e-5 && edges < 6, "{:?}: {most:e}, {edges} edges, {worst:e}", light.light.shape);

@@ -56,7 +56,8 @@ fn edge(y: f64, height: usize) -> f64 {
 /// are far from square.
 pub(super) fn coarser_size(size: [usize; 2]) -> Option<[usize; 2]> {
     let [width, height] = size;
-    let (wide, high) = (2.0 * PI / width as f64, PI / height as f64);
+    let wide = 2.0 * PI / width as f64;
+    let high = PI / height as f64;
     let fewer = |n: usize, side: f64, other: f64| if side < 1.5 * other { n.div_ceil(2) } else { n };
     (height > FEWEST_ROWS).then(|| [fewer(width, wide, high), fewer(height, high, wide)])
 }
@@ -85,7 +86,8 @@ impl Level {
             let (sine, cosine) = libm::sincos(2.0 * PI * j as f64 / width as f64);
             [cosine, sine]
         };
-        let (rows, columns) = ((0..height).map(row).collect(), (0..width).map(column).collect());
+        let rows = (0..height).map(row).collect();
+        let columns = (0..width).map(column).collect();
         Self { size, texels, rows, columns, texel: (2.0 * PI / width as f64).max(PI / height as f64) }
     }
 
@@ -108,13 +110,16 @@ impl Level {
         let [width, height] = self.size;
         // What of the finer texels [from, to) covers, with what share.
         let covered = |k: usize, coarse: usize, fine: usize| {
-            let (from, to) = ((k * fine) as f64 / coarse as f64, ((k + 1) * fine) as f64 / coarse as f64);
+            let from = (k * fine) as f64 / coarse as f64;
+            let to = ((k + 1) * fine) as f64 / coarse as f64;
             let range = from as usize..(to.ceil() as usize).min(fine);
             range.map(move |i| (i, from.max(i as f64), to.min((i + 1) as f64)))
         };
         let texel = |k: usize| {
-            let (x, y) = (k % size[0], k / size[0]);
-            let (mut sum, mut weights) = ([0.0; 3], 0.0);
+            let x = k % size[0];
+            let y = k / size[0];
+            let mut sum = [0.0; 3];
+            let mut weights = 0.0;
             for (row, top, bottom) in covered(y, size[1], height) {
                 let share = edge(top, height) - edge(bottom, height);
                 for (column, left, right) in covered(x, size[0], width) {
@@ -133,15 +138,18 @@ impl Level {
         let step = 2.0 * PI / width as f64;
         let x = place.turn * width as f64;
         // A turn of 1 is one of 0.
-        let (column, within) = (x as usize % width, x - x.floor());
+        let column = x as usize % width;
+        let within = x - x.floor();
         let (sine, cosine) = libm::sincos((0.5 - within) * step);
         let reach = 2.0 * libm::asin((0.5 * radius_sq.sqrt()).min(1.0)) / PI * height as f64;
         let y = place.polar / PI * height as f64;
-        let (mut sum, mut weights) = ([0.0; 3], 0.0);
+        let mut sum = [0.0; 3];
+        let mut weights = 0.0;
         for row in (y - reach).max(0.0) as usize..((y + reach).ceil() as usize).min(height) {
             let Row { sine: row_sine, cosine: row_cosine, weight } = self.rows[row];
             // R² − d² = a + b·cos Δφ
-            let (a, b) = (radius_sq - 2.0 + 2.0 * place.cosine * row_cosine, 2.0 * place.sine * row_sine);
+            let a = radius_sq - 2.0 + 2.0 * place.cosine * row_cosine;
+            let b = 2.0 * place.sine * row_sine;
             if a + b <= 0.0 {
                 continue;
             }

@@ -177,7 +177,8 @@ impl Level {
             let low = (at as usize).min(self.size[axis]);
             (low, at - low as f32)
         };
-        let ((x, right), (y, down)) = (along(0, 1.0), along(1, -1.0));
+        let (x, right) = along(0, 1.0);
+        let (y, down) = along(1, -1.0);
         let mix = |a: f32, b: f32, share: f32| a + (b - a) * share;
         let row = |y: usize| mix(self.texel(x, y), self.texel(x + 1, y), right);
         mix(row(y), row(y + 1), down)
@@ -209,7 +210,8 @@ fn averaged([width, height]: [usize; 2], pixels: &[f32], to: [usize; 2]) -> ([us
     }
     let covered = |fine: usize, coarse: usize, k: usize| {
         // A fine pixel has the length `coarse`, a coarse one the length `fine`.
-        let (low, high) = (k * fine, (k + 1) * fine);
+        let low = k * fine;
+        let high = (k + 1) * fine;
         (low / coarse..high.div_ceil(coarse))
             .map(move |i| (i, (high.min((i + 1) * coarse) - low.max(i * coarse)) as f64 / fine as f64))
     };

@@ -82,7 +82,8 @@ fn in_ball(i: u32, n: f64) -> DVec3 {
     let ring = (1.0 - z * z).sqrt();
     let direction = DVec3::new(ring * libm::cos(angle), ring * libm::sin(angle), z);
     let share = (0.5 + PLASTIC * f64::from(i)).fract();
-    let (mut low, mut high) = (0.0, 1.0f64);
+    let mut low = 0.0;
+    let mut high = 1.0f64;
     for _ in 0..40 {
         let r = 0.5 * (low + high);
         let inside = FRAC_2_PI * (libm::asin(r) - r * (1.0 - r * r).sqrt());

@@ -67,7 +67,8 @@ fn parted(mesh: &mut Mesh) -> Vec<u32> {
     for around in corners.chunk_by(|a, b| a.0 == b.0) {
         let v = around[0].0;
         let mut own = vec![v; around.len()];
-        let (sides, mut is_first) = (sides(&mesh.triangles, &planes, around), true);
+        let sides = sides(&mesh.triangles, &planes, around);
+        let mut is_first = true;
         for (i, (_, triangle)) in around.iter().enumerate() {
             if sides[i] != i {
                 own[i] = own[sides[i]];
@@ -113,7 +114,8 @@ fn sides(triangles: &[[u32; 3]], planes: &[DVec3], around: &[Corner]) -> Vec<usi
         for (k, (_, b)) in shared.iter().enumerate() {
             for (_, a) in &shared[k.saturating_sub(CROWD)..k] {
                 if planes[around[*a].1 as usize].dot(planes[around[*b].1 as usize]) >= CREASE {
-                    let (a, b) = (top(&mut first, *a), top(&mut first, *b));
+                    let a = top(&mut first, *a);
+                    let b = top(&mut first, *b);
                     first[a.max(b)] = a.min(b);
                 }
             }

@@ -25,7 +25,8 @@ mod tests {
     #[test]
     fn cv02_products_that_nearly_cancel_keep_their_digits() {
         // Nearly parallel edges of length 1e4: the products agree in 14 digits, so plain f64 would keep two.
-        let (a, b) = (DVec3::new(8193.0, 4097.0, 0.0), DVec3::new(16385.0, 8193.5, 0.0));
+        let a = DVec3::new(8193.0, 4097.0, 0.0);
+        let b = DVec3::new(16385.0, 8193.5, 0.0);
         assert_eq!(robust_cross(a, b).z, 8193.0 * 8193.5 - 4097.0 * 16385.0);
         let tiny = difference_of_products(1.0 + 2e-16, 1.0 - 2e-16, 1.0, 1.0);
         assert!((tiny + (2.0_f64 * f64::EPSILON / 2.0).powi(2)).abs() < 1e-16);

@@ -32,7 +32,8 @@ impl Accumulator {
     pub fn append(&mut self, behind: &Self) {
         let kept = |a: &Self| [a.channels.len(), a.optical_depth.len(), a.depth.len(), a.object.len()];
         assert_eq!((self.size, kept(self)), (behind.size, kept(behind)), "invariant: segments of one picture");
-        let (count, planes) = (self.channels.len(), self.optical_depth.len());
+        let count = self.channels.len();
+        let planes = self.optical_depth.len();
         let before = &self.optical_depth;
         for (c, (to, from)) in self.channels.iter_mut().zip(&behind.channels).enumerate() {
             let depth = &before[ChannelLayout::plane_of(c, count, planes)];

@@ -18,7 +18,8 @@ const COUNTED: usize = 1 << 18;
 pub fn tile_bytes(cloud: &Cloud, camera: &Camera) -> u64 {
     let side = TILE as f32;
     let [columns, rows] = camera.size.map(|s| (s as f32 / side).ceil());
-    let (view, focal) = (camera.view_from_offset(cloud.origin), camera.focal_px() as f32);
+    let view = camera.view_from_offset(cloud.origin);
+    let focal = camera.focal_px() as f32;
     let tiles = |(position, radius): (&Vec3, &f32)| {
         let nearest = view.depth(*position) - radius;
         let radius_px = if camera.is_orthographic() {
@@ -73,7 +74,8 @@ pub struct Expected {
 
 /// What is to be expected of the splats of a cloud that `is_one` says yes to, by their ids; from some at even distances in the list.
 pub fn expected(cloud: &Cloud, camera: &Camera, is_one: impl Fn(usize) -> bool) -> Expected {
-    let (place, focal) = (camera.view_from_offset(cloud.origin), camera.focal_px());
+    let place = camera.view_from_offset(cloud.origin);
+    let focal = camera.focal_px();
     let picture = camera.size.iter().map(|s| f64::from(*s)).product::<f64>();
     let footprint = |i: usize| {
         let p = place.apply(cloud.position[i]).as_dvec3();

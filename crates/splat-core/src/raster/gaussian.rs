@@ -45,7 +45,8 @@ impl Projector<'_> {
     /// it is not seen.
     fn gaussian(&self, offset: Vec3, g: usize) -> Option<(ProjectedSplat, ProjectedDepth)> {
         let gaussians = &self.columns.cloud.gaussians;
-        let (axes, opacity) = (gaussians.axes[g].map(|axis| self.view.rotation * axis), gaussians.opacity[g]);
+        let axes = gaussians.axes[g].map(|axis| self.view.rotation * axis);
+        let opacity = gaussians.opacity[g];
         let center = self.view.apply(offset);
         let variance_z: f32 = axes.iter().map(|a| a.z * a.z).sum();
         let level = Gaussians::level(opacity);
@@ -64,7 +65,8 @@ impl Projector<'_> {
         let area_sq = [(0, 1), (0, 2), (1, 2)].map(|(i, j)| m[i].perp_dot(m[j]).powi(2)).iter().sum::<f32>();
         let sum = |of: &dyn Fn(usize) -> f32| of(0) + of(1) + of(2);
         let trace = sum(&|k| m[k].length_squared());
-        let (xx, yy) = (sum(&|k| m[k].x * m[k].x) + filter, sum(&|k| m[k].y * m[k].y) + filter);
+        let xx = sum(&|k| m[k].x * m[k].x) + filter;
+        let yy = sum(&|k| m[k].y * m[k].y) + filter;
         let xy = sum(&|k| m[k].x * m[k].y);
         let inverse = 1.0 / (area_sq + filter * trace + filter * filter);
         let [zx, zy] = [sum(&|k| m[k].x * axes[k].z), sum(&|k| m[k].y * axes[k].z)];

@@ -174,8 +174,11 @@ struct Image<'a> {
 impl<'a> Image<'a> {
     fn of(input: &FoldInput<'a>) -> Self {
         let FoldInput { projected, order, materials, opaque, direction, params, .. } = *input;
-        let (size, perspective, kernels) = (projected.size, projected.perspective, &projected.kernels[..]);
-        let (ordered, objects) = (order.len() as u32, &projected.objects[..]);
+        let size = projected.size;
+        let perspective = projected.perspective;
+        let kernels = &projected.kernels[..];
+        let ordered = order.len() as u32;
+        let objects = &projected.objects[..];
         Self { size, perspective, kernels, materials, opaque, direction, params, ordered, objects, hidden: false }
     }
 
@@ -285,7 +288,8 @@ fn record_as(capacities: Capacities, follows: bool) -> Result<Recorded, Error> {
     r.dispatch(kernel, Groups::cover(tiles), &composited, &[]);
     r.read(list.state);
     r.read(planes);
-    let (inputs, state) = ([view, order, footprints, values, tables, opaque], list.state);
+    let inputs = [view, order, footprints, values, tables, opaque];
+    let state = list.state;
     let splats = footprints;
     Ok(Recorded { recording, capacities, state, planes, splats, order, values, opaque, sorted, inputs })
 }
@@ -400,12 +404,14 @@ impl Recorded {
     }
 
     fn check_splats(&self, input: &FoldInput<'_>) -> Result<(), Error> {
-        let (projected, room) = (input.projected, self.capacities);
+        let projected = input.projected;
+        let room = self.capacities;
         check_special(projected)?;
         let n = projected.splats.len();
         fits("splats", n as u64, room.splats)?;
         fits("splats in order", input.order.len() as u64, room.ordered)?;
-        let (depths, objects) = (projected.depths.len(), projected.objects.len());
+        let depths = projected.depths.len();
+        let objects = projected.objects.len();
         equal_lengths([
             ("values", input.values.len(), n * room.channels as usize),
             ("depths", depths, if room.needs_depth() { n } else { depths }),

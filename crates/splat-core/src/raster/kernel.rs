@@ -130,9 +130,12 @@ impl Kernel {
             // Pairs first: half the latency of Horner's scheme.
             let g = &self.g;
             let t2 = t * t;
-            let (a, b) = (of(g[1]).mul_add(t, of(g[0])), of(g[3]).mul_add(t, of(g[2])));
-            let (c, d) = (of(g[5]).mul_add(t, of(g[4])), of(g[7]).mul_add(t, of(g[6])));
-            let (low, high) = (b.mul_add(t2, a), d.mul_add(t2, c));
+            let a = of(g[1]).mul_add(t, of(g[0]));
+            let b = of(g[3]).mul_add(t, of(g[2]));
+            let c = of(g[5]).mul_add(t, of(g[4]));
+            let d = of(g[7]).mul_add(t, of(g[6]));
+            let low = b.mul_add(t2, a);
+            let high = d.mul_add(t2, c);
             return high.mul_add(t2 * t2, low) * (t2 * t);
         }
         let q = of(self.sharpness);
@@ -149,7 +152,9 @@ impl Kernel {
         // Not `map`, which is not compiled into code for vectors.
         let [a, b, c, d, e, f] = self.share;
         let [a, b, c, d, e, f] = [of(a), of(b), of(c), of(d), of(e), of(f)];
-        let (before, behind, square) = (of(1.0) + t, of(1.0) - t, t * t);
+        let before = of(1.0) + t;
+        let behind = of(1.0) - t;
+        let square = t * t;
         let [before, behind] = [before * before, behind * behind];
         let correction = a + square * (b + square * (c + square * (d + square * (e + square * f))));
         let triweight = of(0.5) - t * (of(0.906_25) - t * (of(0.625) - t * of(0.156_25)));
@@ -199,7 +204,8 @@ fn fit<const N: usize>([begin, end]: [f64; 2], function: impl Fn(f64) -> f64) ->
 
 /// G(t) = q³e^−q·Σ_j (qt)^j/(j + 3)!, all terms positive.
 fn tail(q: f64, t: f64) -> f64 {
-    let (mut sum, mut term) = (0.0, 1.0 / 6.0);
+    let mut sum = 0.0;
+    let mut term = 1.0 / 6.0;
     for j in 4..64 {
         sum += term;
         term *= q * t / f64::from(j);
@@ -246,10 +252,12 @@ mod tests {
         for cutoff in [1.0, 2.0, 3.0, 5.0, 8.0] {
             let footprint = Footprint { cutoff };
             let [constant, slope] = footprint.narrowing().map(f64::from);
-            let (n, cell) = (100_000, f64::from(footprint.spacing_for_radius(1.0)));
+            let n = 100_000;
+            let cell = f64::from(footprint.spacing_for_radius(1.0));
             let mut sums = [0.0; 3];
             for s in (0..n).map(|i| (f64::from(i) + 0.5) / f64::from(n)) {
-                let (w, narrow) = (footprint.profile(s), constant + slope * s);
+                let w = footprint.profile(s);
+                let narrow = constant + slope * s;
                 [w, w * narrow, w * narrow * s].iter().zip(&mut sums).for_each(|(add, sum)| *sum += add);
             }
             let [all, narrow, width] = sums;

@@ -120,7 +120,8 @@ impl<S: Simd> Lanes<S> {
     #[inline(always)]
     pub fn where_less_or(self, a: Self, b: Self, other: Self) -> Self {
         let simd = self.simd;
-        let (own, other) = (simd.transmute_u32s_f32s(self.value), simd.transmute_u32s_f32s(other.value));
+        let own = simd.transmute_u32s_f32s(self.value);
+        let other = simd.transmute_u32s_f32s(other.value);
         let bits = simd.select_u32s(simd.less_than_f32s(a.value, b.value), own, other);
         Self { simd, value: simd.transmute_f32s_u32s(bits) }
     }
@@ -179,7 +180,8 @@ impl<S: Simd> Lanes<S> {
     #[inline(always)]
     pub fn opacity_of_small(self) -> Self {
         let of = |v| Self::splat(self.simd, v);
-        let (low, high) = (of(OPACITY[1]).mul_add(self, of(OPACITY[0])), of(OPACITY[3]).mul_add(self, of(OPACITY[2])));
+        let low = of(OPACITY[1]).mul_add(self, of(OPACITY[0]));
+        let high = of(OPACITY[3]).mul_add(self, of(OPACITY[2]));
         let x2 = self * self;
         (high.mul_add(x2, low)).mul_add(x2, self)
     }

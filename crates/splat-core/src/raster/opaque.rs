@@ -231,7 +231,8 @@ impl pulp::WithSimd for ResolveTile<'_> {
 #[inline(always)]
 fn gather<'a>(projected: &'a Projected, batch: &[u32], records: &mut [Disc<'a>]) {
     for (&j, record) in batch.iter().zip(records) {
-        let (splat, depth) = (projected.splats[j as usize], projected.depths[j as usize]);
+        let splat = projected.splats[j as usize];
+        let depth = projected.depths[j as usize];
         *record = Disc { splat, depth, special: projected.special_disc(&splat, j) };
     }
 }
@@ -270,7 +271,8 @@ impl OpaqueTile {
     #[inline(always)]
     fn name_nearest<S: Simd>(&mut self, simd: S, projected: &Projected, disc: &Disc<'_>, object: u32) {
         for run in Runs::new(simd, &disc.splat, projected.size, [self.x, self.y]) {
-            let (mut s, mut z) = ([0.0; MAX_LANES], [0.0; MAX_LANES]);
+            let mut s = [0.0; MAX_LANES];
+            let mut z = [0.0; MAX_LANES];
             let [distance_sq, depth] = disc.core(simd, run, projected);
             distance_sq.store(&mut s);
             depth.store(&mut z);

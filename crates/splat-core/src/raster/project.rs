@@ -147,7 +147,8 @@ impl pulp::WithSimd for ProjectChunk<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> Vec<SpecialDisc> {
-        let (projector, lanes) = (self.projector, Lanes::<S>::COUNT);
+        let projector = self.projector;
+        let lanes = Lanes::<S>::COUNT;
         let mut attributes = Attributes::default();
         let mut image = Image::default();
         let mut special = Vec::new();
@@ -204,7 +205,8 @@ impl Projector<'_> {
             (_, false) => self.media(simd, attributes, &centers),
             (false, true) => self.discs(simd, attributes, &centers),
             (true, true) => {
-                let (media, discs) = (self.media(simd, attributes, &centers), self.discs(simd, attributes, &centers));
+                let media = self.media(simd, attributes, &centers);
+                let discs = self.discs(simd, attributes, &centers);
                 media.where_less(load(&attributes.disc), of(0.0), &discs)
             }
         };
@@ -249,7 +251,9 @@ impl Projector<'_> {
     #[inline(always)]
     fn rotate<S: Simd>(&self, simd: S, v: &[Column; 3]) -> [Lanes<S>; 3] {
         let m = &self.view.rotation;
-        let (x, y, z) = (Lanes::load(simd, &v[0]), Lanes::load(simd, &v[1]), Lanes::load(simd, &v[2]));
+        let x = Lanes::load(simd, &v[0]);
+        let y = Lanes::load(simd, &v[1]);
+        let z = Lanes::load(simd, &v[2]);
         let row =
             |a: f32, b: f32, c: f32| Lanes::splat(simd, a) * x + Lanes::splat(simd, b) * y + Lanes::splat(simd, c) * z;
         [
@@ -268,7 +272,8 @@ impl Projector<'_> {
         let radius_sq = radius * radius + filter_world * filter_world;
         let reach_sq = px_per_world * px_per_world * radius_sq;
         let scale = of(1.0) / reach_sq;
-        let (x_sq, y_sq) = (of(1.0) + u * u, of(1.0) + v * v);
+        let x_sq = of(1.0) + u * u;
+        let y_sq = of(1.0) + v * v;
         let mut peak = load(&attributes.cross_section) * load(&attributes.norm) / radius_sq;
         let mut half_extent = [reach_sq.sqrt(); 2];
         if !self.orthographic {
@@ -336,16 +341,19 @@ impl Projector<'_> {
         let (axis_u, axis_v) = self.disc_axes(simd, attributes, normal);
         // d(x/z) = (dx − (x/z)·dz)/z; parallel rays have no dz term.
         let to_image = |a: [Lanes<S>; 3]| [(a[0] - u * a[2]) * px_per_world, (v * a[2] - a[1]) * px_per_world];
-        let (ju, jv) = (to_image(axis_u), to_image(axis_v));
+        let ju = to_image(axis_u);
+        let jv = to_image(axis_v);
         let filter_sq = filter_px * filter_px;
         let area = ju[0] * jv[1] - ju[1] * jv[0];
         let area_sq = area * area;
-        let (trace_x, trace_y) = (ju[0] * ju[0] + jv[0] * jv[0], ju[1] * ju[1] + jv[1] * jv[1]);
+        let trace_x = ju[0] * ju[0] + jv[0] * jv[0];
+        let trace_y = ju[1] * ju[1] + jv[1] * jv[1];
         let mixed = ju[0] * ju[1] + jv[0] * jv[1];
         // (J Jᵀ + filter)⁻¹, its determinant |J|² + filter²·trace(JJᵀ) + filter⁴ written so that an edge-on disc does not
         // cancel.
         let conic_of = |filter_sq: Lanes<S>| {
-            let (xx, yy) = (trace_x + filter_sq, trace_y + filter_sq);
+            let xx = trace_x + filter_sq;
+            let yy = trace_y + filter_sq;
             let inverse = of(1.0) / (area_sq + filter_sq * (trace_x + trace_y) + filter_sq * filter_sq);
             ([yy * inverse, of(-2.0) * (mixed * inverse), xx * inverse], [xx, yy], inverse)
         };

@@ -148,7 +148,8 @@ impl Projected {
         let half = self.size.map(|s| s as f32 * 0.5);
         let factor = |k: usize| {
             let [column, row] = position(k, x, y);
-            let (u, v) = ((column as f32 + 0.5 - half[0]) / focal, (row as f32 + 0.5 - half[1]) / focal);
+            let u = (column as f32 + 0.5 - half[0]) / focal;
+            let v = (row as f32 + 0.5 - half[1]) / focal;
             1.0 / (1.0 + u * u + v * v)
         };
         (0..AREA).map(factor).collect()
@@ -226,10 +227,11 @@ impl ProjectedSplat {
             let extent = f32::from_bits(u32::from(self.half_extent[axis] & 0x7fff) << 16);
             // Pixel i is covered when |i + ½ − centre| < extent; casts round down, and on the rim itself w = 0.
             let clamp = |v: f32| v.max(0.0).min(size[axis] as f32) as i32 as u32;
-            let (center, extent) = (self.center_px[axis] + 0.5, extent);
+            let center = self.center_px[axis] + 0.5;
             [clamp(center - extent), clamp(center + extent)]
         };
-        let ([x0, x1], [y0, y1]) = (range(0), range(1));
+        let [x0, x1] = range(0);
+        let [y0, y1] = range(1);
         [x0, x1, y0, y1]
     }
 }

@@ -41,7 +41,9 @@ impl Image {
 
     pub(super) fn write_depths(&self, attributes: &Attributes, depths: &mut [ProjectedDepth]) {
         for (l, depth) in depths.iter_mut().enumerate() {
-            let (center, slope, extent) = (self.depth[l], self.slope.map(|s| s[l]), attributes.radius[l]);
+            let center = self.depth[l];
+            let slope = self.slope.map(|s| s[l]);
+            let extent = attributes.radius[l];
             *depth = ProjectedDepth { center, slope, extent, core: self.core.map(|c| c[l]) };
         }
     }

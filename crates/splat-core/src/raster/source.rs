@@ -61,7 +61,8 @@ impl TileRays {
     /// Where a splat lies, as far as it is told without a look at pixels: what a kernel or a plane tells of each of them is the same.
     #[inline(always)]
     pub(crate) fn place(&self, source: &Source<'_>) -> Place {
-        let (ProjectedDepth { center, slope, extent, .. }, [near, far]) = (source.depth, self.ends);
+        let ProjectedDepth { center, slope, extent, .. } = source.depth;
+        let [near, far] = self.ends;
         let splat = source.splat;
         let (before, behind) = if self.opaque.is_empty() {
             (true, false)
@@ -246,8 +247,12 @@ mod tests {
         }
         for view in [Projection::Perspective { fov_y: 0.8 }, Projection::Orthographic { height: 2.0 }] {
             let camera = Camera::look_at(DVec3::Z * 3.0, DVec3::ZERO, DVec3::Y, view, size).unwrap();
-            let (footprints, materials) = (&FootprintStack::default(), &[Material::default()]);
-            let (cloud, camera, params, detail) = (&cloud, &camera, &Params::default(), Detail::ALL);
+            let footprints = &FootprintStack::default();
+            let materials = &[Material::default()];
+            let cloud = &cloud;
+            let camera = &camera;
+            let params = &Params::default();
+            let detail = Detail::ALL;
             let projected = project(&ProjectInput { cloud, camera, footprints, materials, params, detail });
             // A slope with a hole.
             let depth = |i: u32| if i % size[0] < 40 { f32::INFINITY } else { 2.5 + (i / size[0]) as f32 / 64.0 };
@@ -260,7 +265,8 @@ mod tests {
                 for id in bins.tile(t).flatten() {
                     let source = Source::new(&projected, *id);
                     let depths = |source| pulp::Arch::new().dispatch(Depths(source, &rays, bins.corner(t), size));
-                    let (place, each) = (rays.place(&source), depths(source));
+                    let place = rays.place(&source);
+                    let each = depths(source);
                     found[place as usize] += 1;
                     match place {
                         Place::Before => assert_eq!(each, depths(Source { is_met: false, ..source }), "splat {id}"),

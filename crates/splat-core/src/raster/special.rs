@@ -35,7 +35,8 @@ impl Projector<'_> {
                 continue;
             }
             splat.set_special();
-            let (id, center) = ((first + l) as u32, image.depth[l]);
+            let id = (first + l) as u32;
+            let center = image.depth[l];
             let is_slab = crosses && attributes.crossing[l] < 0.0;
             list.push(SpecialDisc {
                 id,
@@ -201,7 +202,8 @@ impl<S: Simd> pulp::NullaryFnOnce for Shown<'_, S> {
             Asked::Solid => 1.0 / level.threshold,
         };
         let [x, y] = run.places(simd, to_disc, disc, perspective);
-        let (mut distance, mut out) = ([0.0; MAX_LANES], [0.0; MAX_LANES]);
+        let mut distance = [0.0; MAX_LANES];
+        let mut out = [0.0; MAX_LANES];
         s.store(&mut distance);
         formula.store(&mut out);
         for l in 0..Lanes::<S>::COUNT {

@@ -114,7 +114,8 @@ impl<S: Simd> Runs<S> {
     #[inline(always)]
     pub fn new(simd: S, splat: &ProjectedSplat, size: [u32; 2], origin: [usize; 2]) -> Self {
         let [x0, x1, y0, y1] = splat.bounds(size);
-        let ((x0, x1), (y0, y1)) = (block_range(x0, x1, origin[0]), block_range(y0, y1, origin[1]));
+        let (x0, x1) = block_range(x0, x1, origin[0]);
+        let (y0, y1) = block_range(y0, y1, origin[1]);
         let [cx, cy] = splat.center_px;
         Self {
             simd,
@@ -183,7 +184,8 @@ impl<S: Simd> Iterator for Runs<S> {
         if self.blocks == 0 {
             return None;
         }
-        let (simd, lane) = (self.simd, self.lane);
+        let simd = self.simd;
+        let lane = self.lane;
         let dx = offset(simd, self.origin[0], self.x, &X[lane..]);
         let dy = offset(simd, self.origin[1], self.y, &Y[lane..]);
         let run = Run { block: self.y * COLUMNS + self.x, lane, dx, dy };
@@ -201,7 +203,8 @@ impl<S: Simd> Iterator for Runs<S> {
 /// Blocks of the tile from pixel `origin` on that the pixels `low..high` lie in.
 #[inline(always)]
 fn block_range(low: u32, high: u32, origin: usize) -> (usize, usize) {
-    let (low, high) = ((low as usize).saturating_sub(origin), (high as usize).saturating_sub(origin).min(TILE));
+    let low = (low as usize).saturating_sub(origin);
+    let high = (high as usize).saturating_sub(origin).min(TILE);
     (low / BLOCK, high.div_ceil(BLOCK))
 }
 
@@ -223,7 +226,8 @@ impl<S: Simd> Run<S> {
     /// [`Run::distance_sq`] of the splat that `conic` was made of, bit for bit.
     #[inline(always)]
     pub(crate) fn distance_sq_by(&self, simd: S, splat: &ProjectedSplat, conic: &Conic) -> Lanes<S> {
-        let (column, row) = (self.block % COLUMNS, self.block / COLUMNS % COLUMNS);
+        let column = self.block % COLUMNS;
+        let row = self.block / COLUMNS % COLUMNS;
         let [dx, mixed, square] = [&conic.dx[column], &conic.mixed[row], &conic.square[row]]
             .map(|line| Lanes::load(simd, &line.0[self.lane..]));
         let along = Lanes::splat(simd, splat.conic[0]).mul_add(dx, mixed);
@@ -234,7 +238,8 @@ impl<S: Simd> Run<S> {
     #[inline(always)]
     pub fn meet(&self, simd: S, splat: &ProjectedSplat, disc: &SpecialDisc, perspective: bool) -> [Lanes<S>; 2] {
         let of = |v: f32| Lanes::splat(simd, v);
-        let (mut s, rise) = (self.distance_sq(simd, splat), self.rise(simd, disc));
+        let mut s = self.distance_sq(simd, splat);
+        let rise = self.rise(simd, disc);
         if !disc.crosses {
             return [s, of(disc.center) + rise.max(of(-disc.extent)).min(of(disc.extent))];
         }
@@ -259,7 +264,8 @@ impl<S: Simd> Run<S> {
     ) -> [[f32; MAX_LANES]; 2] {
         let of = |v: f32| Lanes::splat(simd, v);
         let [a, b, c, d] = *to_disc;
-        let (mut x, mut y) = (of(a) * self.dx + of(b) * self.dy, of(c) * self.dx + of(d) * self.dy);
+        let mut x = of(a) * self.dx + of(b) * self.dy;
+        let mut y = of(c) * self.dx + of(d) * self.dy;
         if disc.crosses && perspective {
             let w = of(1.0) - self.rise(simd, disc) / of(disc.center);
             (x, y) = (x / w, y / w);
@@ -307,7 +313,8 @@ pub fn for_each_span(
 
 /// Image position of pixel `k` of a plane of the tile at (x, y).
 pub fn position(k: usize, x: usize, y: usize) -> [usize; 2] {
-    let (block, pixel) = (k / PIXELS, k % PIXELS);
+    let block = k / PIXELS;
+    let pixel = k % PIXELS;
     [x + BLOCK * (block % COLUMNS) + pixel % BLOCK, y + BLOCK * (block / COLUMNS) + pixel / BLOCK]
 }
 

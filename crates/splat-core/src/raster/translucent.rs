@@ -173,7 +173,8 @@ impl FoldTile<'_> {
     fn fold<S: Simd, const FRONT: bool, const HALF: bool, const PLANES: usize, const CHANNELS: usize>(self, simd: S) {
         let channels = if CHANNELS > 0 { CHANNELS } else { self.tile.channels };
         let FoldInput { projected, values: of_splats, materials, params, .. } = *self.input;
-        let (deep, names) = (self.tile.needs_depth(), !self.tile.object.is_empty());
+        let deep = self.tile.needs_depth();
+        let names = !self.tile.object.is_empty();
         let mut records = [ProjectedSplat::default(); BATCH];
         let mut depths = [ProjectedDepth::default(); BATCH];
         let mut values = vec![0.0; BATCH * channels];
@@ -227,7 +228,8 @@ impl Tile {
         let [x, y] = bins.corner(t);
         let depth = tile_of(&acc.depth, acc.size, [x, y], DepthProfile::default());
         let object = tile_of(&acc.object, acc.size, [x, y], u32::MAX);
-        let (planes, channels) = (acc.optical_depth.len(), acc.channels.len());
+        let planes = acc.optical_depth.len();
+        let channels = acc.channels.len();
         let mut tile = Self {
             x,
             y,
@@ -387,7 +389,8 @@ impl Tile {
         run: Run<S>,
         nearer: Lanes<S>,
     ) {
-        let (mut before, mut z) = ([0.0; MAX_LANES], [0.0; MAX_LANES]);
+        let mut before = [0.0; MAX_LANES];
+        let mut z = [0.0; MAX_LANES];
         nearer.store(&mut before);
         let source = &splat.source;
         source.view_depth(simd, run, &self.rays).store(&mut z);
@@ -401,7 +404,8 @@ impl Tile {
             slope.mul_add(s, constant).store(&mut narrow);
         }
         for i in 0..Lanes::<S>::COUNT {
-            let (k, after) = (run.pixel() + i, self.lines[line].0[run.lane + i]);
+            let k = run.pixel() + i;
+            let after = self.lines[line].0[run.lane + i];
             if after <= before[i] {
                 continue;
             }

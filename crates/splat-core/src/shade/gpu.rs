@@ -55,7 +55,8 @@ pub struct Capacities {
 impl Capacities {
     /// Room for these splats of the input.
     pub fn of(input: &ShadeInput<'_>, attributes: AttributeRoom, layout: ChannelLayout) -> Self {
-        let (materials, lights) = (input.materials.len() as u32, input.lights.len() as u32);
+        let materials = input.materials.len() as u32;
+        let lights = input.lights.len() as u32;
         Self { attributes, materials, lights, shadows: shadowed(input.lights).count() as u32, layout }
     }
 }
@@ -244,7 +245,8 @@ impl Recorded {
     }
 
     fn view(&self, input: &ShadeInput<'_>, splats: u32) -> ShadeView {
-        let (camera, layout) = (input.camera, self.capacities.layout);
+        let camera = input.camera;
+        let layout = self.capacities.layout;
         let parallel = camera.is_orthographic();
         let eye = if parallel { -camera.axes[2] } else { camera.position - input.cloud.origin };
         ShadeView {
@@ -289,7 +291,8 @@ fn material(m: &Material) -> [[f32; 4]; 3] {
 
 /// The vectors of all lights, relative to the cloud's origin; one with an extent is what [`Light::irradiance`] takes it for.
 fn lights(input: &ShadeInput<'_>) -> impl Iterator<Item = [f32; 4]> {
-    let (origin, mut slots) = (input.cloud.origin, 0u32);
+    let origin = input.cloud.origin;
+    let mut slots = 0u32;
     input.lights.iter().flat_map(move |lit| {
         let (kind, position, direction, low, high) = match lit.light.shape {
             LightShape::Point { position } | LightShape::Sphere { center: position, .. } => {

@@ -138,7 +138,8 @@ impl Radiance {
         let reflectance = if by_phase { m.single_scattering_albedo } else { m.diffuse };
         out.ambient = std::array::from_fn(|c| ambient[c] * color[c] * reflectance * m.ambient);
         let mut lit = dark;
-        let (mut received, mut unshadowed) = (0.0, 0.0);
+        let mut received = 0.0;
+        let mut unshadowed = 0.0;
         for (rank, Incoming { irradiance, diffuse, specular }) in lights.enumerate() {
             let transmittance = transmittance(rank, irradiance);
             for c in 0..3 {

@@ -143,10 +143,12 @@ impl<'a> Scattering<'a> {
             }
             let incoming =
                 |of: &OfLight| Incoming { irradiance: of.irradiance[k], diffuse: of.leaving[k], specular: 0.0 };
-            let (incoming, color) = (lights.iter().map(incoming), input.cloud.color[i]);
+            let incoming = lights.iter().map(incoming);
+            let color = input.cloud.color[i];
             let radiance =
                 Radiance::of(material, color, true, input.ambient, incoming, |rank, _| lights[rank].share[k]);
-            let (cloud, to_eye) = (input.cloud, Vec3::from_array(to_eye.map(|axis| axis[k])));
+            let cloud = input.cloud;
+            let to_eye = Vec3::from_array(to_eye.map(|axis| axis[k]));
             let normal = facing(cloud.kind[i], cloud.normal_of(i), cloud.shading_normal_of(i), to_eye);
             radiance.write(normal, layout, out);
         }
@@ -186,7 +188,8 @@ impl<'a> Scattering<'a> {
                 let (to_light, arriving) = match *source {
                     Source::Parallel(to_light) => (vector(to_light), of(1.0)),
                     Source::Lamp([near, rest]) => {
-                        let ([nx, ny, nz], [rx, ry, rz]) = (vector(near), vector(rest));
+                        let [nx, ny, nz] = vector(near);
+                        let [rx, ry, rz] = vector(rest);
                         let away = [(nx - x) + rx, (ny - y) + ry, (nz - z) + rz];
                         let spread = radius / of(3.0);
                         let distance_sq = spread.mul_add(spread, length_sq(away));
@@ -211,7 +214,9 @@ fn length_sq<S: Simd>([x, y, z]: [Lanes<S>; 3]) -> Lanes<S> {
 #[inline(always)]
 fn phase<S: Simd>(simd: S, to_light: [Lanes<S>; 3], to_eye: [Lanes<S>; 3], asymmetry: f32) -> Lanes<S> {
     let of = |v: f32| Lanes::splat(simd, v);
-    let (g, [lx, ly, lz], [ex, ey, ez]) = (asymmetry.abs(), to_light, to_eye);
+    let g = asymmetry.abs();
+    let [lx, ly, lz] = to_light;
+    let [ex, ey, ez] = to_eye;
     let apart = if asymmetry >= 0.0 { [lx + ex, ly + ey, lz + ez] } else { [ex - lx, ey - ly, ez - lz] };
     let d = of(g).mul_add(length_sq(apart), of((1.0 - g) * (1.0 - g)));
     of((1.0 - g) * (1.0 + g)) / (of(4.0 * PI) * d * d.sqrt())
@@ -247,7 +252,8 @@ mod tests {
             };
             let (kind, normal) =
                 if i % 5 == 0 { (SplatKind::Surface, Vec3::Y) } else { (SplatKind::Medium, Vec3::ZERO) };
-            let (color, material) = ([red, 0.5, 1.0 - red], (i / 20 % 4) as u16);
+            let color = [red, 0.5, 1.0 - red];
+            let material = (i / 20 % 4) as u16;
             cloud.push(&Splat { position, radius, kind, normal, color, material, ..Splat::default() });
         }
         cloud
@@ -304,7 +310,8 @@ mod tests {
 
     #[test]
     fn a_splat_has_the_same_bits_among_others() {
-        let (mut few, mut many) = (Vec::new(), Vec::new());
+        let mut few = Vec::new();
+        let mut many = Vec::new();
         for_each_picture(&cloud(50), |together, _| few.push(together));
         for_each_picture(&cloud(5000), |together, _| many.push(together));
         assert!(few.iter().zip(&many).all(|(few, many)| few[..] == many[..few.len()]));

@@ -107,7 +107,8 @@ impl Casting {
         progress: &Progress,
     ) -> Result<Self, Error> {
         let map = head(casters, survey, plan, mapping);
-        let (cloud, opaque) = (casters.cloud, &map.opaque[..]);
+        let cloud = casters.cloud;
+        let opaque = &map.opaque[..];
         let chunks: Vec<(Vec<u32>, Given)> = (0..cloud.len().div_ceil(CHUNK))
             .into_par_iter()
             .map_init(Scratch::<C>::default, |scratch, c| {
@@ -119,14 +120,16 @@ impl Casting {
                 Ok(pulp::Arch::new().dispatch(PartChunk { casters, plan, deposit, chunk }))
             })
             .collect::<Result<_, Error>>()?;
-        let (mut plain, mut given) = (Vec::new(), Given::default());
+        let mut plain = Vec::new();
+        let mut given = Given::default();
         for (of_chunk, entries) in chunks {
             plain.extend(of_chunk);
             given.append(entries);
         }
         check_entries::<C>(given.cells.len() as u64, &casters.params.limits)?;
         let has_planes = C > 1 || survey.kinds[SplatKind::Surface as usize] > 0;
-        let (tables, footprints) = (tables(casters), casters.kernels.len() as u32);
+        let tables = tables(casters);
+        let footprints = casters.kernels.len() as u32;
         let limit = casters.params.absorbance_limit();
         Ok(Self { map, plain, given, channels: C as u32, has_planes, limit, tables, footprints })
     }
@@ -177,8 +180,11 @@ impl<M: Mapping, const C: usize> pulp::NullaryFnOnce for PartChunk<'_, M, C> {
 
     #[inline(always)]
     fn call(mut self) -> (Vec<u32>, Given) {
-        let (casters, mapping, frame) = (self.casters, self.deposit.mapping, &self.plan.frame);
-        let (mut plain, mut others) = (Vec::new(), Vec::new());
+        let casters = self.casters;
+        let mapping = self.deposit.mapping;
+        let frame = &self.plan.frame;
+        let mut plain = Vec::new();
+        let mut others = Vec::new();
         if casters.has_opaque_discs() {
             let Scratch { media_batches, surface_batches, ids: [ids, ..], .. } = &mut *self.deposit.scratch;
             select(casters, &self.chunk, SplatKind::Medium, ids);
@@ -192,7 +198,8 @@ impl<M: Mapping, const C: usize> pulp::NullaryFnOnce for PartChunk<'_, M, C> {
             self.deposit.add(&casters.get(i as usize, frame, mapping.is_parallel()));
         }
         let [columns, rows] = mapping.size();
-        let (mut given, Scratch { media, surfaces, .. }) = (Given::default(), &*self.deposit.scratch);
+        let mut given = Given::default();
+        let Scratch { media, surfaces, .. } = &*self.deposit.scratch;
         given.add(media, 0);
         given.add(surfaces, columns * rows);
         (plain, given)

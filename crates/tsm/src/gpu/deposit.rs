@@ -209,7 +209,8 @@ impl RecordedCast {
                 return Err(Error::Overflow(Overflow { what, needed: needed.into(), had: had.into() }));
             }
         }
-        let (needed, had) = (needed.channels, self.room.channels);
+        let needed = needed.channels;
+        let had = self.room.channels;
         if needed != had {
             return Err(Error::Overflow(Overflow { what: "channels", needed: needed.into(), had: had.into() }));
         }

@@ -52,7 +52,9 @@ impl Room {
             Table::PolarAzimuth(_) => return None,
         };
         let entries = u32::try_from(map.counts().entries).ok()?;
-        let (cells, channels, opaque) = (map.cells(), map.channels() as u32, !map.opaque.is_empty());
+        let cells = map.cells();
+        let channels = map.channels() as u32;
+        let opaque = !map.opaque.is_empty();
         Some(Self { receivers, cells, entries, channels, directions, opaque })
     }
 
@@ -122,14 +124,16 @@ impl RecordedLookUp {
     pub fn map(&self, map: &ShadowMap) -> Result<MapUploads, Error> {
         let needed = Room::of(map, 0);
         let of = |room: &Room| [room.cells, room.entries, room.directions, u32::from(room.opaque)];
-        let (had, needed) = (of(&self.room), needed.as_ref().map_or([u32::MAX; 4], of));
+        let had = of(&self.room);
+        let needed = needed.as_ref().map_or([u32::MAX; 4], of);
         let names = ["cells", "entries", "directions", "opaque discs"];
         for ((what, needed), had) in names.into_iter().zip(needed).zip(had) {
             if needed > had {
                 return Err(Error::Overflow(Overflow { what, needed: needed.into(), had: had.into() }));
             }
         }
-        let (had, needed) = (u64::from(self.room.channels), map.channels() as u64);
+        let had = u64::from(self.room.channels);
+        let needed = map.channels() as u64;
         if needed != had {
             return Err(Error::Overflow(Overflow { what: "channels", needed, had }));
         }
@@ -161,7 +165,8 @@ impl RecordedLookUp {
         uploads: &MapUploads,
         receivers: &[Receiver],
     ) -> Result<ReceiverUploads, Error> {
-        let (needed, had) = (receivers.len() as u64, u64::from(self.room.receivers));
+        let needed = receivers.len() as u64;
+        let had = u64::from(self.room.receivers);
         if needed > had {
             return Err(Error::Overflow(Overflow { what: "receivers", needed, had }));
         }

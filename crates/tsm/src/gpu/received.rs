@@ -65,9 +65,11 @@ pub fn record_received(room: Room, attributes: AttributeRoom, light: u32) -> Rec
     last.dispatch(&kernels::TSM_HAND_ON, each, &[own_frame, own_lights, shares, received], &[light]);
     last.read(received);
     let in_last = r.join(&last, &[(own_frame, frame), (own_lights, in_look_up.of(look_up.lights))]);
-    let (received, shares) = (in_last.of(received), in_last.of(shares));
+    let received = in_last.of(received);
+    let shares = in_last.of(shares);
     r.read_only(&[received]);
-    let (view, map) = (in_look_up.of(look_up.view), look_up.map.map(|buffer| in_look_up.of(buffer)));
+    let view = in_look_up.of(look_up.view);
+    let map = look_up.map.map(|buffer| in_look_up.of(buffer));
     RecordedReceived { recording, attributes, shares, received, frame, view, map, look_up, splats, frame_words }
 }
 

@@ -53,7 +53,8 @@ impl RecordedMap {
         state: &[u8],
         [spans, distances, totals]: [&[u8]; 3],
     ) -> Result<ShadowMap, Error> {
-        let (entries, channels) = (self.cast.found(state)?, self.cast.room.channels);
+        let entries = self.cast.found(state)?;
+        let channels = self.cast.room.channels;
         let cells = casting.map.cells() as usize;
         let spans: Vec<[u32; 2]> = read("spans", spans, 2 * cells)?;
         // Lists of surfaces begin behind the entries of media.

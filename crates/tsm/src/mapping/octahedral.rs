@@ -136,7 +136,8 @@ impl Mapping for Octahedral {
         let sin_sq = d.x * d.x + d.y * d.y;
         let r = (sin_sq / (1.0 + d.z)).sqrt();
         let share = quadrant_share(d.x, d.y);
-        let (x, y) = (r * (1.0 - share), r * share);
+        let x = r * (1.0 - share);
+        let y = r * share;
         let (x, y) = if is_lower { (1.0 - y, 1.0 - x) } else { (x, y) };
         let at = Vec2::new(half + half * x.copysign(p.x), half + half * y.copysign(p.y));
         let sin = sin_sq.sqrt();
@@ -177,7 +178,8 @@ impl Mapping for Octahedral {
         let sin = |p: f32| p * SIN.iter().rev().fold(0.0, |sum, c| sum * (p * p) + c);
         let sin_theta = r * (2.0 - r * r).max(0.0).sqrt();
         let z = if upper { 1.0 - r * r } else { r * r - 1.0 };
-        let (x, y) = (sin_theta * sin(1.0 - share), sin_theta * sin(share));
+        let x = sin_theta * sin(1.0 - share);
+        let y = sin_theta * sin(share);
         Ray { base: Vec3::ZERO, direction: Vec3::new(x.copysign(square.x), y.copysign(square.y), z) }
     }
 
@@ -270,12 +272,14 @@ fn across_line(q: Vec2, side: f32, upper: bool, rows: bool) -> Across {
 /// Across a diagonal: with r = √(1 − |cos θ|) and D = X − Y in units of the half side, D/r is the same function of azimuth
 /// on both sides, and r of the one side, continued, is √(1 + cos θ) = √(2 − r²) on the other.
 fn across_diagonal(q: Vec2, side: f32, upper: bool) -> Across {
-    let (sum, difference) = ((q.x + q.y) / side, (q.x - q.y) / side);
+    let sum = (q.x + q.y) / side;
+    let difference = (q.x - q.y) / side;
     let (sign, own) = if upper { (1.0, sum) } else { (-1.0, 2.0 - sum) };
     // Far from the diagonal, where only footprints of the size of the table reach across it, any slope does.
     let own = own.max(LEAST_CONTINUED);
     let other = (2.0 - own * own).max(0.0).sqrt();
-    let (along, across) = (own / other, other / own);
+    let along = own / other;
+    let across = other / own;
     let there = Vec2::splat(if upper { 2.0 - other } else { other }) + Vec2::new(1.0, -1.0) * (difference * across);
     // With dS′ = along·dS and dD′ = across·dD + lean·dS of the sum S = X + Y: the area stays.
     let lean = -sign * 2.0 * difference / (other * own * own);

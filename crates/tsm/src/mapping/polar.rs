@@ -93,7 +93,8 @@ impl Mapping for PolarAzimuth {
     }
 
     fn wrap(&self, mut column: i32, mut row: i32) -> Option<u32> {
-        let (columns, rows) = (self.columns as i32, self.rows as i32);
+        let columns = self.columns as i32;
+        let rows = self.rows as i32;
         let over_north = row < 0 && self.range.polar[0] <= 0.0;
         let over_south = row >= rows && self.range.polar[1] >= PI;
         if (over_north || over_south) && self.is_full_circle() {

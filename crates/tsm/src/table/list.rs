@@ -61,7 +61,8 @@ impl<const C: usize> Lists<C> {
     /// The list of a [`Lists::span`].
     #[inline(always)]
     pub(crate) fn list_at(&self, span: [u32; 2]) -> List<'_, C> {
-        let (start, len) = (span[0] as usize, span[1] as usize);
+        let start = span[0] as usize;
+        let len = span[1] as usize;
         List { distance: &self.distance[start..], total: &self.total[start..], len }
     }
 
@@ -82,7 +83,8 @@ impl<const C: usize> Lists<C> {
         n: usize,
         is_before: impl Fn(f32, f32) -> bool,
     ) -> [[usize; 4]; R] {
-        let (mut at, mut size) = ([[0u32; 4]; R], [[0u32; 4]; R]);
+        let mut at = [[0u32; 4]; R];
+        let mut size = [[0u32; 4]; R];
         let mut most = 0;
         for r in 0..n {
             for k in 0..4 {

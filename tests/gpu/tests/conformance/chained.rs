@@ -39,15 +39,21 @@ fn cloud() -> Cloud {
 
 #[test]
 fn four_stages_in_one_submission_are_the_cpu_s_picture() {
-    let (cloud, materials, footprints) = (cloud(), [Material::default()], FootprintStack::default());
+    let cloud = cloud();
+    let materials = [Material::default()];
+    let footprints = FootprintStack::default();
     let view = Projection::Perspective { fov_y: 0.6 };
     let camera = Camera::look_at(cloud.origin + DVec3::new(0.3, 0.2, 4.0), cloud.origin, DVec3::Y, view, SIZE).unwrap();
     let objects = [Object::default()];
     let shape = LightShape::Point { position: cloud.origin + DVec3::new(1.0, 2.0, 2.0) };
     let lights = [LitBy { slide: None, light: Light { shape, intensity: [9.0; 3] }, shadow: None }];
-    let (ambient, objects, lights) = ([0.1; 3], &objects[..], &lights[..]);
+    let ambient = [0.1; 3];
+    let objects = &objects[..];
+    let lights = &lights[..];
     let input = ShadeInput { cloud: &cloud, materials: &materials, objects, lights, ambient, camera: &camera };
-    let (layout, params, opaque) = (ChannelLayout::default(), Params::default(), OpaqueImage::default());
+    let layout = ChannelLayout::default();
+    let params = Params::default();
+    let opaque = OpaqueImage::default();
     let mut device = open().unwrap();
     for direction in [Direction::FrontToBack, Direction::BackToFront] {
         let sort_params = hbsort::Params { direction, exact: true, margin_px: 2.0, ..hbsort::Params::default() };
@@ -65,7 +71,9 @@ fn four_stages_in_one_submission_are_the_cpu_s_picture() {
         let mut cpu = Accumulator::new(SIZE, 1, 3, false, false);
         let mut gpu = cpu.clone();
         let ids = &order.input_from_sorted;
-        let (opaque, params, materials) = (&opaque, &params, &materials[..]);
+        let opaque = &opaque;
+        let params = &params;
+        let materials = &materials[..];
         let folded = FoldInput { projected, order: ids, values, materials, opaque, direction, params };
         fold(&folded, &mut cpu, None).unwrap();
 
@@ -84,7 +92,8 @@ fn four_stages_in_one_submission_are_the_cpu_s_picture() {
             depths: false,
             objects: false,
         };
-        let (held, layers) = (attributes.room(), room.footprints);
+        let held = attributes.room();
+        let layers = room.footprints;
         let room_for = projection::Capacities { attributes: held, footprints: layers, materials: 1, depth: false };
         let project = projection::record(room_for).unwrap();
         let shade = shading::record(shading::Capacities::of(&input, attributes.room(), layout));
@@ -104,7 +113,8 @@ fn four_stages_in_one_submission_are_the_cpu_s_picture() {
         );
         let origin = cloud.origin;
         let view = hbsort::gpu::view_bytes(origin, SPLATS, &camera, &sort_params);
-        let (camera, footprints) = (&camera, &footprints);
+        let camera = &camera;
+        let footprints = &footprints;
         let to = projection::Input { origin, camera, footprints, materials, params };
         let to = project.uploads(&to, &attributes).unwrap();
         let lit = shade.uploads(&input, &attributes, &[]).unwrap();

@@ -73,7 +73,8 @@ struct Case {
 
 impl Case {
     fn new(cloud: Cloud, coloured: bool, light: &Light, params: &Params) -> Self {
-        let (materials, progress) = (materials(coloured), Progress::new());
+        let materials = materials(coloured);
+        let progress = Progress::new();
         let casting = Casting::new(
             &tsm::Scene { cloud: &cloud, materials: &materials, objects: &[] },
             light,
@@ -226,7 +227,8 @@ fn too_little_room_is_found_and_says_how_much() {
     let mut device = open().unwrap();
     let some = ["media", "far away", "a beam"];
     for (name, _, case) in cases().into_iter().filter(|(name, ..)| some.contains(name)) {
-        let (needed, given) = (case.expected.counts().entries as u32, case.casting.given() as u32);
+        let needed = case.expected.counts().entries as u32;
+        let given = case.casting.given() as u32;
         // A driver that rounds otherwise may find some more or less.
         let slack = if is_loose() { needed / 10_000 + 1 } else { 0 };
         let is_told = |error: Error, room: u32| match error {

@@ -36,7 +36,8 @@ pub(crate) fn splats() -> Cloud {
     for i in 0..3000u64 {
         let u = |k| rng::unit_f32(77, 0, i, k);
         let from_middle = Vec3::new(u(0) - 0.5, u(1) - 0.5, u(2) - 0.5) * 1.6;
-        let (normal, radius) = ((from_middle + Vec3::splat(0.1)).normalize(), 0.03 + 0.07 * u(3));
+        let normal = (from_middle + Vec3::splat(0.1)).normalize();
+        let radius = 0.03 + 0.07 * u(3);
         let kind = match i % 16 {
             0 => SplatKind::Opaque,
             1..8 => SplatKind::Surface,
@@ -63,7 +64,8 @@ impl World {
         let corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
         let position = corners.map(|(x, y)| Vec3::new(1.3 * x, 0.9 * y, -0.7)).to_vec();
         let wall = Mesh { position, triangles: vec![[0, 1, 2], [0, 2, 3]], ..Mesh::default() };
-        let (mut sheet, n) = (Mesh { origin: DVec3::new(0.1, 0.0, 0.3), ..Mesh::default() }, 48u32);
+        let mut sheet = Mesh { origin: DVec3::new(0.1, 0.0, 0.3), ..Mesh::default() };
+        let n = 48u32;
         for k in 0..(n + 1) * (n + 1) {
             let [u, v] = [k % (n + 1), k / (n + 1)].map(|i| i as f32 / n as f32 * 2.0 - 1.0);
             let z = 0.3 * (3.0 * u).sin() * (2.0 * v).cos();
@@ -153,7 +155,9 @@ impl World {
         let [wall, sheet, volume] = samplers;
         let objects =
             [object(wall, 0.2, [0.0; 3]), object(sheet, -0.3, [0.0, 0.25, 0.0]), object(volume, 0.4, [0.0; 3])];
-        let (objects, camera, shadow_origin) = (&objects[..], &self.camera, DVec3::ZERO);
+        let objects = &objects[..];
+        let camera = &self.camera;
+        let shadow_origin = DVec3::ZERO;
         work(&Scene { objects, lights: &[], shadow_origin, ambient: [0.0; 3], camera, occluder: None })
     }
 }
@@ -164,7 +168,8 @@ pub(crate) fn empty() -> Ensemble {
 
 /// Sets that the device makes and folds.
 pub(crate) fn by_device(device: &mut Device, scene: &Scene<'_>, runs: u32) -> Ensemble {
-    let (sources, mut ensemble) = (Sources::new(scene).unwrap(), empty());
+    let sources = Sources::new(scene).unwrap();
+    let mut ensemble = empty();
     let generated = record_generated(ROOM, Nearest::of(device.adapter()), None, &sources).unwrap();
     let mut prepared = device.prepare(&generated.recording).unwrap();
     let tables = generated.tables(&sources, scene, &ensemble).unwrap();
@@ -265,7 +270,8 @@ fn streams_are_the_cpu_s_bit_for_bit() {
     let samplers: [&dyn Sampler; 3] = [&wall, &sheet, &volume];
     let (_, arrivals) = world.with(samplers, |scene| particles(&mut open().unwrap(), scene));
     let mut arrivals = arrivals.chunks(3);
-    let (mut sum, mut mean) = (0.0, 0.0);
+    let mut sum = 0.0;
+    let mut mean = 0.0;
     for level in 0..u64::from(ROOM.levels) {
         for (k, sampler) in samplers.iter().enumerate() {
             for chunk in 0..sampler.chunks() {
@@ -287,11 +293,13 @@ fn streams_are_the_cpu_s_bit_for_bit() {
 
 #[test]
 fn hits_of_one_seed_are_the_cpu_s() {
-    let (world, mut device) = (World::new(), open().unwrap());
+    let world = World::new();
+    let mut device = open().unwrap();
     // Widened and thinned out; the second run begins where the first ends.
     for scale in [0.5, 6.0] {
         let (wall, sheet, volume) = world.samplers(5, scale, 1.0);
-        let (crossings, splats) = (world.crossings(5, scale, 1.0), world.splats(5, scale));
+        let crossings = world.crossings(5, scale, 1.0);
+        let splats = world.splats(5, scale);
         for samplers in
             [[&wall as &dyn Sampler, &sheet, &volume], [&wall, &crossings, &volume], [&wall, &sheet, &splats]]
         {
@@ -316,7 +324,8 @@ fn too_little_room_folds_nothing_and_says_what_is_needed() {
 
 fn room_is_told(world: &World, samplers: [&dyn Sampler; 3]) {
     world.with(samplers, |scene| {
-        let (mut device, sources) = (open().unwrap(), Sources::new(scene).unwrap());
+        let mut device = open().unwrap();
+        let sources = Sources::new(scene).unwrap();
         let mut run = |room: Capacities| {
             let mut ensemble = empty();
             let generated = record_generated(room, Nearest::of(device.adapter()), None, &sources).unwrap();

@@ -55,7 +55,8 @@ fn sorted(device: &mut Device, lanes: Lanes, keys: &[u32], shift: u32, scans: bo
         r.dispatch(&kernels::RADIX_SCATTER, groups, &scattered, &[shift]);
     }
     to.iter().for_each(|buffer| r.read(*buffer));
-    let (of_sort, of_scan) = (SortState::of(n), Scan::of_digits(n));
+    let of_sort = SortState::of(n);
+    let of_scan = Scan::of_digits(n);
     let companions: Vec<u32> = (0..n).map(|i| i ^ 0x5555).collect();
     let inputs = [
         (state, bytemuck::bytes_of(&of_sort)),

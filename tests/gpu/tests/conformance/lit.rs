@@ -37,7 +37,8 @@ struct World {
 
 impl World {
     fn new(origin: DVec3) -> Self {
-        let (mut sheet, n) = (Mesh { origin: origin + DVec3::new(0.1, 0.0, 0.3), ..Mesh::default() }, 32u32);
+        let mut sheet = Mesh { origin: origin + DVec3::new(0.1, 0.0, 0.3), ..Mesh::default() };
+        let n = 32u32;
         for k in 0..(n + 1) * (n + 1) {
             let [u, v] = [k % (n + 1), k / (n + 1)].map(|i| i as f32 / n as f32 * 2.0 - 1.0);
             sheet.position.push(Vec3::new(u, 0.8 * v, 0.3 * (3.0 * u).sin() * (2.0 * v).cos()));
@@ -155,7 +156,8 @@ fn by_device(
     way: Way,
     room: Capacities,
 ) -> Ensemble {
-    let (seen, mut ensemble) = (room.seen(), Ensemble::new(room.size, &way.params).unwrap());
+    let seen = room.seen();
+    let mut ensemble = Ensemble::new(room.size, &way.params).unwrap();
     let rooms = maps.iter().map(|(map, _)| Room::of(map, seen.splats).unwrap());
     let recorded: Vec<_> = (0..).zip(rooms).map(|(light, room)| record_received(room, seen, light)).collect();
     let shadows: Vec<_> = recorded
@@ -256,7 +258,8 @@ fn assisted() -> bool {
 
 #[test]
 fn ambient_light_alone_and_lights_without_maps() {
-    let (mut device, world) = (open().unwrap(), World::new(DVec3::ZERO));
+    let mut device = open().unwrap();
+    let world = World::new(DVec3::ZERO);
     let lights = world.lights().map(|light| LitBy { slide: None, light, shadow: None });
     for lights in [&lights[..0], &lights[..]] {
         world.with(VIEWS[0], 0.7, false, |objects, camera| {
@@ -278,8 +281,10 @@ fn faults_of_light_are_found() {
     if assisted() {
         return;
     }
-    let (mut device, world) = (open().unwrap(), World::new(DVec3::ZERO));
-    let (lights, maps) = (world.lights(), world.maps());
+    let mut device = open().unwrap();
+    let world = World::new(DVec3::ZERO);
+    let lights = world.lights();
+    let maps = world.maps();
     let lights = lit(&lights, &maps);
     let way = Way { params: EnsembleParams::default(), nearest: Nearest::of(device.adapter()), made: false };
     world.with(VIEWS[0], 0.7, false, |objects, camera| {
@@ -312,8 +317,10 @@ fn widened_particles_are_lit_as_the_cpu_s_in_the_mean() {
     if assisted() {
         return;
     }
-    let (mut device, world) = (open().unwrap(), World::new(DVec3::ZERO));
-    let (lights, maps) = (world.lights(), world.maps());
+    let mut device = open().unwrap();
+    let world = World::new(DVec3::ZERO);
+    let lights = world.lights();
+    let maps = world.maps();
     let lights = lit(&lights, &maps);
     let with_maps = [(&maps[0], DVec3::ZERO), (&maps[1], DVec3::ZERO)];
     world.with(VIEWS[0], 8.0, false, |objects, camera| {
@@ -334,12 +341,14 @@ fn widened_particles_are_lit_as_the_cpu_s_in_the_mean() {
 
 #[test]
 fn too_little_room_and_other_lights_are_refused() {
-    let (mut device, world) = (open().unwrap(), World::new(DVec3::ZERO));
+    let mut device = open().unwrap();
+    let world = World::new(DVec3::ZERO);
     world.with(VIEWS[0], 0.7, false, |objects, camera| {
         let lights = world.lights().map(|light| LitBy { slide: None, light, shadow: None });
         let scene =
             Scene { objects, lights: &lights, shadow_origin: world.origin, ambient: [0.1; 3], camera, occluder: None };
-        let (sources, mut ensemble) = (Sources::new(&scene).unwrap(), Ensemble::new(SIZE, &ALL).unwrap());
+        let sources = Sources::new(&scene).unwrap();
+        let mut ensemble = Ensemble::new(SIZE, &ALL).unwrap();
         let lighting = Lighting { params: ALL, lights: 3, shadows: &[] };
         let room = Capacities { of_set: 10, ..ROOM };
         let generated = record_generated(room, Nearest::of(device.adapter()), Some(&lighting), &sources).unwrap();
@@ -384,13 +393,15 @@ mod deep {
         if assisted() {
             return;
         }
-        let (mut device, world) = (open().unwrap(), World::new(DVec3::ZERO));
+        let mut device = open().unwrap();
+        let world = World::new(DVec3::ZERO);
         // 22 × 13 tiles: more pixels than are lit at once.
         let size = [1400, 800];
         let room = Capacities { size, levels: 1, ..ROOM };
         let pixels = 22 * 13 * 4096;
         assert!(room.seen().splats < pixels && room.seen().splats.is_multiple_of(256));
-        let (lights, maps) = (world.lights(), world.maps());
+        let lights = world.lights();
+        let maps = world.maps();
         let lights = lit(&lights, &maps);
         let camera = world.camera(VIEWS[0], size);
         // Sets for a smaller picture: sparse in this one, in all parts.
@@ -426,7 +437,8 @@ mod deep {
         let mut device = open().unwrap();
         for (origin, views) in [(DVec3::ZERO, &VIEWS[..]), (DVec3::new(1e7, -3e6, 5e6), &VIEWS[..1])] {
             let world = World::new(origin);
-            let (lights, maps) = (world.lights(), world.maps());
+            let lights = world.lights();
+            let maps = world.maps();
             let lights = lit(&lights, &maps);
             let with_maps = [(&maps[0], origin), (&maps[1], origin)];
             for (view, plain) in views.iter().zip([true, false]) {

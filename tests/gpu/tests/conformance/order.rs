@@ -107,7 +107,8 @@ fn bs09_nothing_in_the_view_is_an_empty_order() {
 fn too_little_room_is_found_and_recording_again_cures_it() {
     let mut device = open().unwrap();
     let cloud = cloud(20_000, DVec3::ZERO);
-    let (camera, params) = (camera(DVec3::ZERO, VIEWS[0]), Params { exact: true, ..Params::default() });
+    let camera = camera(DVec3::ZERO, VIEWS[0]);
+    let params = Params { exact: true, ..Params::default() };
     let expected = slice_cloud(&cloud, None, &camera, &params, &mut Scratch::new()).unwrap();
     for kept in [0, 1, 4000] {
         let room = Capacities { splats: 20_000, kept };
@@ -152,7 +153,8 @@ fn parts_joined_are_the_order_of_all() {
 #[test]
 fn ou8_ou9_steps_submitted_one_by_one_or_in_batches_give_the_same() {
     // Validation follows one command buffer, so that only what it does not watch is submitted in parts.
-    let (cloud, camera) = (cloud(40_000, DVec3::ZERO), camera(DVec3::ZERO, Projection::Perspective { fov_y: 0.9 }));
+    let cloud = cloud(40_000, DVec3::ZERO);
+    let camera = camera(DVec3::ZERO, Projection::Perspective { fov_y: 0.9 });
     let params = Params { exact: true, ..Params::default() };
     let capacities = Capacities { splats: 40_000, kept: 40_000 };
     let recorded = record(capacities);
@@ -175,7 +177,8 @@ fn a_device_that_does_not_come_back_in_time_is_given_up() {
     let params = Params { exact: true, ..Params::default() };
     let recorded = record(Capacities { splats: 50, kept: 50 });
     let uploads = recorded.uploads(&small.0, None, &small.1, &params).unwrap();
-    let (recording, inputs) = (&recorded.recording, recorded.inputs(&uploads));
+    let recording = &recorded.recording;
+    let inputs = recorded.inputs(&uploads);
 
     let mut device = gpu_ash::Device::open(&adapter(), Validation::Off).unwrap();
     assert!(device.run(recording, &inputs).is_ok());

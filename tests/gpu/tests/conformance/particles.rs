@@ -35,8 +35,10 @@ fn both(scene: &Scene<'_>) -> [Ensemble; 2] {
     let mut ways = vec![Nearest::Ranked];
     ways.extend((Nearest::of(device.adapter()) == Nearest::Wide).then_some(Nearest::Wide));
     let empty = Ensemble::new(SIZE, &EnsembleParams { radiance_unit: 0.5, ..EnsembleParams::default() }).unwrap();
-    let (mut cpu, mut gpu) = (empty.clone(), empty);
-    let (params, progress) = (FoldParams::default(), Progress::default());
+    let mut cpu = empty.clone();
+    let mut gpu = empty;
+    let params = FoldParams::default();
+    let progress = Progress::default();
     Renderer::new().fold(scene, &mut cpu, &FoldParams { levels: 2 * ROOM.levels, ..params }, Some(&progress)).unwrap();
     let empty = gpu.clone();
     for way in ways {
@@ -72,13 +74,15 @@ fn agreement([cpu, gpu]: &[Ensemble; 2]) -> (f64, u64) {
 /// The widest difference of a channel between the two pictures.
 fn difference([cpu, gpu]: &[Ensemble; 2]) -> f32 {
     let [a, b] = [cpu, gpu].map(|e| e.read(&|_, _| [0.1, 0.2, 0.3], None));
-    let (a, b) = (a.rgb("beauty").unwrap(), b.rgb("beauty").unwrap());
+    let a = a.rgb("beauty").unwrap();
+    let b = b.rgb("beauty").unwrap();
     a.iter().zip(b).flat_map(|(a, b)| (0..3).map(move |c| (a[c] - b[c]).abs())).fold(0.0, f32::max)
 }
 
 #[test]
 fn hits_and_sums_are_the_cpu_s() {
-    let (near, far) = (wall(0.7, 0.8), wall(1.5, -0.5));
+    let near = wall(0.7, 0.8);
+    let far = wall(1.5, -0.5);
     for (projection, opacity) in [
         (Projection::Perspective { fov_y: 0.7 }, SurfaceOpacity::PerCrossing),
         (Projection::Perspective { fov_y: 0.7 }, SurfaceOpacity::ThinSlab),

@@ -68,7 +68,8 @@ fn apart(a: &[u32], b: &[u32]) -> (f32, bool) {
     let steps = extents(a[6]).into_iter().zip(extents(b[6])).map(|(a, b)| a.abs_diff(b)).max().unwrap();
     let share = |places: std::ops::Range<usize>| {
         let of = |words: &[u32]| words[places.clone()].iter().map(|w| f32::from_bits(*w)).collect::<Vec<_>>();
-        let (a, b) = (of(a), of(b));
+        let a = of(a);
+        let b = of(b);
         let largest = a.iter().fold(f32::MIN_POSITIVE, |most, v| most.max(v.abs()));
         a.iter().zip(&b).map(|(a, b)| (a - b).abs() / largest).fold(0.0, f32::max)
     };
@@ -81,7 +82,9 @@ fn apart(a: &[u32], b: &[u32]) -> (f32, bool) {
 }
 
 fn on_device(device: &mut Device, cloud: &Cloud, ids: Option<&[u32]>, camera: &Camera, depth: bool) -> (Vec<u32>, u64) {
-    let (footprints, materials, params) = (FootprintStack::default(), materials(), Params::default());
+    let footprints = FootprintStack::default();
+    let materials = materials();
+    let params = Params::default();
     let attributes = Attributes::new(cloud, ids).unwrap();
     let layers = footprints.layers().len() as u32;
     let room = Capacities { attributes: attributes.room(), footprints: layers, materials: 2, depth };
@@ -116,7 +119,8 @@ fn footprints_and_their_number_are_the_cpu_s() {
                 assert!(n < 1000 || (count > n / 4 && count < n), "{count} of {n}");
                 let words = if depth { 15 } else { 8 };
                 assert_eq!(found.len(), expected.len());
-                let (mut most, mut same) = (0.0f32, 0);
+                let mut most = 0.0f32;
+                let mut same = 0;
                 for (i, (a, b)) in expected.chunks(words).zip(found.chunks(words)).enumerate() {
                     assert_eq!(a[5] == 0, b[5] == 0, "splat {i} is shown by one alone");
                     if a[5] != 0 {
@@ -155,7 +159,9 @@ fn some_splats_of_a_cloud_are_projected_as_those() {
 fn what_the_tables_do_not_have_is_refused() {
     let cloud = cloud(10, DVec3::ZERO);
     let attributes = Attributes::new(&cloud, None).unwrap();
-    let (footprints, materials, params) = (FootprintStack::default(), materials(), Params::default());
+    let footprints = FootprintStack::default();
+    let materials = materials();
+    let params = Params::default();
     let camera = camera(DVec3::ZERO, VIEWS[0]);
     let room = Capacities { attributes: attributes.room(), footprints: 9, materials: 2, depth: true };
     let uploads = |room: Capacities, materials: &[Material]| {

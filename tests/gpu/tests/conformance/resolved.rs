@@ -34,7 +34,8 @@ fn projected(cloud: &Cloud, view: Projection, size: [u32; 2]) -> Projected {
     let eye = cloud.origin + DVec3::new(0.3, 0.2, 4.0);
     let camera = Camera::look_at(eye, cloud.origin, DVec3::Y, view, size).unwrap();
     let mut projected = Projected::default();
-    let (footprints, materials) = (FootprintStack::default(), [Material::default()]);
+    let footprints = FootprintStack::default();
+    let materials = [Material::default()];
     project_into(
         &mut projected,
         &ProjectInput {
@@ -108,7 +109,8 @@ fn opaque_surfaces_are_the_cpu_s() {
 fn any_size_no_splat_and_too_little_room_are_the_cpu_s() {
     let mut device = open().unwrap();
     let cloud = cloud();
-    let (ids, values) = (opaque_ids(&cloud), values(cloud.len(), 3));
+    let ids = opaque_ids(&cloud);
+    let values = values(cloud.len(), 3);
     for size in [[1, 1], [17, 33], [257 * 16, 9]] {
         let projected = projected(&cloud, VIEWS[1], size);
         let input = OpaqueInput { projected: &projected, ids: &ids, values: &values, channels: 3, objects: true };

@@ -64,7 +64,8 @@ fn materials() -> Vec<Material> {
 }
 
 fn lights(origin: DVec3) -> Vec<Light> {
-    let (position, direction) = (origin + DVec3::new(0.3, 0.1, 0.2), DVec3::new(0.6, -0.8, 0.0));
+    let position = origin + DVec3::new(0.3, 0.1, 0.2);
+    let direction = DVec3::new(0.6, -0.8, 0.0);
     let spot = LightShape::Spot { position: origin + DVec3::new(-1.0, 2.0, 0.5), direction, inner: 0.3, outer: 0.6 };
     let intensity = [3.0, 2.0, 1.0];
     // One light within the cloud, one above that shines to one side, one that gives nothing.
@@ -100,9 +101,11 @@ fn on_device(device: &mut Device, input: &ShadeInput<'_>, layout: ChannelLayout)
 #[test]
 fn values_are_the_cpu_s() {
     let mut device = open().unwrap();
-    let (materials, objects) = (materials(), objects());
+    let materials = materials();
+    let objects = objects();
     for (n, origin) in [(1, DVec3::ZERO), (9000, DVec3::ZERO), (3000, DVec3::new(1e7, -3e6, 5e6))] {
-        let (cloud, lights) = (cloud(n, origin, n % 2 == 0), lights(origin));
+        let cloud = cloud(n, origin, n % 2 == 0);
+        let lights = lights(origin);
         let veiled = |(k, light): (usize, &Light)| {
             let shadow = (k % 2 == 0).then_some(&Veil as &dyn Transmittance);
             LitBy { slide: None, light: *light, shadow }
@@ -116,7 +119,8 @@ fn values_are_the_cpu_s() {
             ] {
                 let eye = origin + DVec3::new(0.3, 0.2, 4.0);
                 let camera = Camera::look_at(eye, origin, DVec3::Y, view, [150, 90]).unwrap();
-                let (ambient, camera) = ([0.1, 0.2, 0.3], &camera);
+                let ambient = [0.1, 0.2, 0.3];
+                let camera = &camera;
                 let input = ShadeInput {
                     cloud: &cloud,
                     materials: &materials,
@@ -138,7 +142,8 @@ fn values_are_the_cpu_s() {
                 let expected = shade(&input, &projected, &layout, None).unwrap();
                 let found = on_device(&mut device, &input, layout);
                 assert_eq!(found.len(), expected.len());
-                let (mut most, mut seen) = (0.0f32, 0);
+                let mut most = 0.0f32;
+                let mut seen = 0;
                 for (i, (a, b)) in expected.chunks(layout.count()).zip(found.chunks(layout.count())).enumerate() {
                     if !projected.is_visible(i) {
                         continue;
@@ -159,13 +164,16 @@ fn values_are_the_cpu_s() {
 
 #[test]
 fn what_single_precision_does_not_resolve_is_said() {
-    let (cloud, objects) = (cloud(4, DVec3::ZERO, false), objects());
+    let cloud = cloud(4, DVec3::ZERO, false);
+    let objects = objects();
     let camera = Camera::look_at(DVec3::Z, DVec3::ZERO, DVec3::Y, VIEWS[0], [8, 8]).unwrap();
     let spot = |inner, outer| LightShape::Spot { position: DVec3::Y, direction: DVec3::NEG_Y, inner, outer };
     let asks = |shape, shininess| {
         let lights = [LitBy { slide: None, light: Light { shape, intensity: [1.0; 3] }, shadow: None }];
         let materials = vec![Material { specular: 0.1, shininess, ..Material::default() }; 4];
-        let (cloud, objects, ambient) = (&cloud, &objects[..], [0.0; 3]);
+        let cloud = &cloud;
+        let objects = &objects[..];
+        let ambient = [0.0; 3];
         let input = ShadeInput { cloud, materials: &materials, objects, lights: &lights, ambient, camera: &camera };
         (suits(&input), Capacities::of(&input, Attributes::new(cloud, None).unwrap().room(), ChannelLayout::default()))
     };
@@ -176,7 +184,8 @@ fn what_single_precision_does_not_resolve_is_said() {
     assert_eq!((room.lights, room.shadows, room.materials), (1, 0, 4));
     let attributes = Attributes::new(&cloud, None).unwrap();
     let lit = || LitBy { slide: None, light: Light { shape: spot(0.1, 0.5), intensity: [1.0; 3] }, shadow: None };
-    let (materials, two) = (vec![Material::default(); 4], [lit(), lit()]);
+    let materials = vec![Material::default(); 4];
+    let two = [lit(), lit()];
     let input = ShadeInput {
         cloud: &cloud,
         materials: &materials,

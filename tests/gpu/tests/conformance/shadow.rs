@@ -191,7 +191,8 @@ fn look_ups_are_the_cpu_s_within_the_tolerance() {
         recorded.recording.check().unwrap();
         let mut ready = device.prepare(&recorded.recording).unwrap();
         let uploads = recorded.map(&map).unwrap();
-        let (mut shadowed, mut most) = (0, 0f32);
+        let mut shadowed = 0;
+        let mut most = 0f32;
         for (k, part) in receivers.chunks(3000).enumerate() {
             let own = recorded.receivers(&map, &uploads, part).unwrap();
             // The map stays where it is for the runs behind the first.

@@ -63,7 +63,8 @@ impl Scene {
         let mut projected = Projected::default();
         let detail =
             Detail { depth: self.depths || self.objects || !self.opaque.depth.is_empty(), object: self.objects };
-        let (camera, params) = (&self.camera, &self.params);
+        let camera = &self.camera;
+        let params = &self.params;
         project_into(
             &mut projected,
             &ProjectInput {
@@ -103,8 +104,10 @@ impl Scene {
         let projected = self.project();
         let n = (self.cloud.len() * self.channels) as u64;
         let values: Vec<f32> = (0..n).map(|i| 3.0 * rng::unit_f32(77, 0, i, 0)).collect();
-        let (direction, params) = (self.direction, &self.params);
-        let (materials, opaque) = (&self.materials[..], &self.opaque);
+        let direction = self.direction;
+        let params = &self.params;
+        let materials = &self.materials[..];
+        let opaque = &self.opaque;
         let mut cpu = begin.clone();
         let input = FoldInput { projected: &projected, order, values: &values, materials, opaque, direction, params };
         fold(&input, &mut cpu, None).unwrap();
@@ -178,7 +181,8 @@ pub(crate) fn discs(n: u64) -> Cloud {
         let normal = Vec3::new(turn.cos(), turn.sin(), tilt).normalize();
         // Some are as long as the image, and edge-on thinner than a pixel.
         let radius = if i % 30 == 0 { 2.0 } else { 0.03 + 0.3 * unit(i, 3) * unit(i, 4) };
-        let (kind, cross_section) = (SplatKind::Surface, radius * radius * unit(i, 6));
+        let kind = SplatKind::Surface;
+        let cross_section = radius * radius * unit(i, 6);
         cloud.push(&Splat { kind, position: position(i), normal, radius, cross_section, ..Splat::default() });
     }
     cloud
@@ -302,7 +306,8 @@ fn one_tile_takes_any_number_of_splats_in_their_order() {
 fn a_fold_goes_on_where_another_ended() {
     let mut device = open().unwrap();
     let scene = Scene::new(media(3000, DVec3::ZERO), VIEWS[0]);
-    let (order, empty) = (scene.order(), scene.accumulator());
+    let order = scene.order();
+    let empty = scene.accumulator();
     let (near, far) = order.split_at(1500);
     let whole = scene.both(&mut device, &order, &empty, 1 << 18).unwrap().gpu;
     let first = scene.both(&mut device, near, &empty, 1 << 18).unwrap().gpu;
@@ -348,7 +353,8 @@ fn nothing_to_composite_leaves_everything_as_it_was() {
 fn too_little_room_is_found_and_recording_again_cures_it() {
     let mut device = open().unwrap();
     let scene = Scene::new(media(3000, DVec3::ZERO), VIEWS[0]);
-    let (order, begin) = (scene.order(), scene.accumulator());
+    let order = scene.order();
+    let begin = scene.accumulator();
     let expected = scene.both(&mut device, &order, &begin, 1 << 18).unwrap();
     for room in [0, 1, 4000] {
         let Err(Error::Overflow(Overflow { needed, had, .. })) = scene.both(&mut device, &order, &begin, room) else {

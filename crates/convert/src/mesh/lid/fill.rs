@@ -40,7 +40,8 @@ type Triangles = ConstrainedDelaunayTriangulation<Corner>;
 
 /// Corners, and triangles of them whose fronts point along the normal.
 pub(super) fn fill(outlines: &Outlines, normal: DVec3) -> (Vec<Place>, Vec<[usize; 3]>) {
-    let (mut places, mut triangles) = (Vec::new(), Vec::new());
+    let mut places = Vec::new();
+    let mut triangles = Vec::new();
     let Some(plane) = Plane::of(outlines, normal) else { return (places, triangles) };
     let Some(all) = triangulated(outlines, &plane) else { return (places, triangles) };
     let (region, middles) = regions(&all);
@@ -76,7 +77,8 @@ impl Plane {
         let offset = normal.dot(place(outlines.edges.first()?));
         let size = normal.abs();
         let w = (0..3).fold(0, |most, axis| if size[axis] > size[most] { axis } else { most });
-        let (u, v) = ((w + 1) % 3, (w + 2) % 3);
+        let u = (w + 1) % 3;
+        let v = (w + 2) % 3;
         let largest = outlines.edges.iter().map(|e| place(e)[u].abs().max(place(e)[v].abs())).fold(0.0, f64::max);
         let scale = if largest > 0.0 { libm::exp2(-libm::log2(largest).floor()) } else { 1.0 };
         let axes = if normal[w] < 0.0 { [v, u, w] } else { [u, v, w] };
@@ -103,7 +105,8 @@ impl Plane {
 
 /// All corners with the edges of the outlines; `None` where there are none, or coordinates that [`Plane::flat`] does not give.
 fn triangulated(outlines: &Outlines, plane: &Plane) -> Option<Triangles> {
-    let (mut known, mut corners) = (HashMap::new(), Vec::new());
+    let mut known = HashMap::new();
+    let mut corners = Vec::new();
     // Rims at one place of the plane are the first of them.
     let mut first: Vec<Option<usize>> = vec![None; outlines.rims.len()];
     for &rim in outlines.edges.iter().flat_map(|edge| &edge.ends) {
@@ -118,7 +121,8 @@ fn triangulated(outlines: &Outlines, plane: &Plane) -> Option<Triangles> {
     all.vertices().for_each(|vertex| handles[vertex.data().rim] = Some(vertex.fix()));
     for edge in &outlines.edges {
         let [from, to] = edge.ends.map(|rim| handles[first[rim]?]);
-        let (from, to) = (from?, to?);
+        let from = from?;
+        let to = to?;
         if from != to && all.try_add_constraint(from, to).is_empty() {
             let crossing = |at| Corner { at, rim: edge.ends[0], is_crossing: true };
             all.add_constraint_and_split(from, to, crossing);
@@ -129,13 +133,15 @@ fn triangulated(outlines: &Outlines, plane: &Plane) -> Option<Triangles> {
 
 /// For each face the number of its region, which outlines are around; and in each region the middle of its largest triangle.
 fn regions(all: &Triangles) -> (Vec<usize>, Vec<DVec2>) {
-    let (mut region, mut middles) = (vec![usize::MAX; all.num_all_faces()], Vec::new());
+    let mut region = vec![usize::MAX; all.num_all_faces()];
+    let mut middles = Vec::new();
     for face in all.inner_faces() {
         if region[face.fix().index()] != usize::MAX {
             continue;
         }
         region[face.fix().index()] = middles.len();
-        let (mut waiting, mut largest) = (vec![face], (0.0, DVec2::ZERO));
+        let mut waiting = vec![face];
+        let mut largest = (0.0, DVec2::ZERO);
         while let Some(face) = waiting.pop() {
             let [a, b, c] = face.positions().map(|p| DVec2::new(p.x, p.y));
             let area = (b - a).perp_dot(c - a);
@@ -164,7 +170,9 @@ fn inside(outlines: &Outlines, plane: &Plane, places: &[DVec2]) -> Vec<bool> {
     let mut order: Vec<usize> = (0..places.len()).collect();
     order.sort_by(|a, b| places[*a].y.total_cmp(&places[*b].y));
     let are_wound = outlines.are_wound();
-    let (mut inside, mut edges, mut beside) = (vec![false; places.len()], edges.into_iter().peekable(), Vec::new());
+    let mut inside = vec![false; places.len()];
+    let mut edges = edges.into_iter().peekable();
+    let mut beside = Vec::new();
     for n in order {
         let p = places[n];
         // Those at the height of the place, half-open: a corner at its height counts once.
@@ -172,7 +180,8 @@ fn inside(outlines: &Outlines, plane: &Plane, places: &[DVec2]) -> Vec<bool> {
             beside.push(edge);
         }
         beside.retain(|([a, b], _)| a.y.max(b.y) > p.y);
-        let (mut turns, mut crossed) = (0, 0);
+        let mut turns = 0;
+        let mut crossed = 0;
         for ([a, b], times) in &beside {
             let rises = a.y < b.y;
             if ((*b - *a).perp_dot(p - *a) > 0.0) == rises {

@@ -15,9 +15,11 @@ fn cut_open(mesh: &Mesh, clips: &[Clip]) -> (Mesh, LidReport) {
 
 /// A torus about the axis z, of radii 2 and 0.5.
 fn torus(at: DVec3) -> Mesh {
-    let (n, m) = (96, 48);
+    let n = 96;
+    let m = 48;
     let place = |vertex: usize| {
-        let (around, across) = (TAU * (vertex / m) as f64 / n as f64, TAU * (vertex % m) as f64 / m as f64);
+        let around = TAU * (vertex / m) as f64 / n as f64;
+        let across = TAU * (vertex % m) as f64 / m as f64;
         let r = 2.0 + 0.5 * libm::cos(across);
         DVec3::new(r * libm::cos(around), r * libm::sin(around), 0.5 * libm::sin(across)).as_vec3()
     };
@@ -60,7 +62,8 @@ fn volume_and_closed(mesh: &Mesh) -> (f64, bool) {
     let mut edges = BTreeMap::new();
     for t in &mesh.triangles {
         for k in 0..3 {
-            let (a, b) = (bits(t[k]), bits(t[(k + 1) % 3]));
+            let a = bits(t[k]);
+            let b = bits(t[(k + 1) % 3]);
             *edges.entry(if a < b { (a, b) } else { (b, a) }).or_insert(0i64) += if a < b { 1 } else { -1 };
         }
     }
@@ -111,7 +114,8 @@ fn planes_of_faces_leave_all_or_nothing() {
 
 #[test]
 fn both_sides_of_a_plane_make_the_whole_and_a_box_beside_a_body_nothing() {
-    let (torus, normal) = (torus(DVec3::ZERO), DVec3::new(0.48, 0.6, 0.64));
+    let torus = torus(DVec3::ZERO);
+    let normal = DVec3::new(0.48, 0.6, 0.64);
     let all = volume_and_closed(&torus).0;
     assert!((all / (2.0 * PI * PI * 2.0 * 0.25) - 1.0).abs() < 5e-3, "{all}");
     for height in [-0.7, 0.0, 0.31] {
@@ -127,7 +131,8 @@ fn both_sides_of_a_plane_make_the_whole_and_a_box_beside_a_body_nothing() {
 #[test]
 fn the_volume_of_a_cap_is_that_of_its_height() {
     let n = 128;
-    let (mut position, mut triangles) = (vec![Vec3::Z, -Vec3::Z], Vec::new());
+    let mut position = vec![Vec3::Z, -Vec3::Z];
+    let mut triangles = Vec::new();
     let v = |i: usize, k: usize| (2 + (i - 1) * n + k % n) as u32;
     for i in 1..n {
         let theta = PI * i as f64 / n as f64;
@@ -168,7 +173,8 @@ fn a_torus_has_two_lids_or_a_ring() {
 
 #[test]
 fn a_shift_a_power_of_two_and_triangles_that_share_nothing_change_no_bit_of_a_place() {
-    let (normal, at) = (DVec3::new(0.0, 0.8, 0.6), DVec3::new(0.0, 1e7, -1e7));
+    let normal = DVec3::new(0.0, 0.8, 0.6);
+    let at = DVec3::new(0.0, 1e7, -1e7);
     let clip = |at: DVec3, scale: f64| above(normal, normal.dot(at) + 0.125 * scale);
     let (near, _) = cut_open(&torus(DVec3::ZERO), &[clip(DVec3::ZERO, 1.0)]);
     let (far, _) = cut_open(&torus(at), &[clip(at, 1.0)]);

@@ -31,7 +31,8 @@ pub(super) fn fold(
     let shining: Vec<(LitBy<'_>, Option<&ShadowMap>)> = frame.shining(maps).collect();
     let shadow = |map| -> Option<&dyn Transmittance> { Some(map? as &ShadowMap) };
     let lights: Vec<LitBy<'_>> = shining.iter().map(|(lit, map)| LitBy { shadow: shadow(*map), ..*lit }).collect();
-    let (camera, ambient) = (&frame.camera, frame.scene.ambient);
+    let camera = &frame.camera;
+    let ambient = frame.scene.ambient;
     let scene = pbsr::Scene { objects: &objects, lights: &lights, shadow_origin: origin, ambient, camera, occluder };
     let colored = frame.plan.optical_depth_planes == 3;
     let corners = parts.iter().flat_map(|part| part.corners());
@@ -46,8 +47,8 @@ pub(super) fn fold(
     let params = FoldParams { depths: [range.start, range.end], ..fold_params(session.options) };
     let settings = &frame.settings.particles;
     let background = settings.target_error.map(|_| behind(frame));
-    let (mut renderer, mut folding) =
-        (Renderer::new(), Folding::new(shining.iter().filter_map(|(_, map)| Some(((*map)?, origin))).collect()));
+    let mut renderer = Renderer::new();
+    let mut folding = Folding::new(shining.iter().filter_map(|(_, map)| Some(((*map)?, origin))).collect());
     let helper = helper(frame, checkpoint.is_some());
     frame.progress.begin(stage::PARTICLES);
     frame.progress.add_total(u64::from(settings.repeat_level.saturating_sub(average.ensemble.levels())));
@@ -83,7 +84,8 @@ pub(super) fn fold(
 
 /// Radiance behind every sample, by rows: looked up once, for the error is asked for again and again.
 fn behind(frame: &Frame<'_>) -> Vec<Vec<[f32; 3]>> {
-    let (background, [width, height]) = (frame.background(), frame.camera.size);
+    let background = frame.background();
+    let [width, height] = frame.camera.size;
     let row = |y: u32| (0..width).map(|x| background.radiance(x, y)).collect();
     (0..height).into_par_iter().map(row).collect()
 }

@@ -108,7 +108,8 @@ impl Kept {
 /// An object without its place and visibility, its material and what random numbers come from. Every number is written so
 /// that it reads back the same.
 fn made_from(object: &SceneObject, scene: &Scene, cross_section: f64) -> String {
-    let (scale, material) = (object.transform.scale, &scene.materials[object.material]);
+    let scale = object.transform.scale;
+    let material = &scene.materials[object.material];
     let object = SceneObject { transform: Similarity::default(), visible: true, ..object.clone() };
     let settings = (scene.render.seed, scene.render.particles, cross_section, scale);
     // Where nothing is lit and no layer shows them, volumes have no normals.

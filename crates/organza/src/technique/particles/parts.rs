@@ -192,7 +192,8 @@ fn of_splats<'a>(frame: &Frame<'a>) -> Vec<Source<'a>> {
         let look = Appearance { material, kind, radius: radius as f32, shadow_coefficient, color_unit };
         let data = Data::Splats(Box::new((splats, params)));
         let name = objects[object as usize].name.clone();
-        let (transform, volumes_by) = (Similarity::default(), VolumeSampler::Auto);
+        let transform = Similarity::default();
+        let volumes_by = VolumeSampler::Auto;
         Source { name, data, transform, look, cross_section, seed, volumes_by, of: object, bounds, brightest_color }
     };
     of_object.into_iter().map(part).collect()

@@ -126,7 +126,8 @@ impl Points<'_> {
         cost: &mut CostRecord,
     ) -> Result<bool, Error> {
         let frame = self.frame;
-        let (ids, solid) = (frame.translucent(Technique::Points), frame.solid_ids());
+        let ids = frame.translucent(Technique::Points);
+        let solid = frame.solid_ids();
         let sort = sort_params(frame);
         let (lights, castings) = lit;
         let chained = Chained { lights, castings, ids, solid, sort: &sort };

@@ -47,7 +47,8 @@ fn points_served(matter: &Matter<'_>, points: &[LightPoint]) -> Result<Carries, 
         return refuse(other, &message);
     }
     let scatters_again = matter.scene.render.sheets.scattering().is_some();
-    let (volumes, splats) = (volumes(matter).collect::<Vec<_>>(), splat_bounds(matter));
+    let volumes = volumes(matter).collect::<Vec<_>>();
+    let splats = splat_bounds(matter);
     let bodies = Bodies { volumes: &volumes, splats };
     let words = |reason: Reason| match reason {
         Reason::LampInside { volume, .. } => {
@@ -104,7 +105,8 @@ pub(super) fn bytes(
     points: &[LightPoint],
     options: &RenderOptions,
 ) -> u64 {
-    let (volumes, splats) = (volumes(matter).collect::<Vec<_>>(), splat_bounds(matter));
+    let volumes = volumes(matter).collect::<Vec<_>>();
+    let splats = splat_bounds(matter);
     let bodies = Bodies { volumes: &volumes, splats };
     // Of counts alone: no length among the parameters plays a part.
     let params = half_params(matter.scene, params(matter.scene, 0, options));
@@ -129,7 +131,8 @@ pub(super) fn draw(
     let polygons = frame.polygons();
     // Opaque splats alone, to which polygons are added.
     let solid = frame.solid(cost)?;
-    let (means, splats) = (mean_shadows(frame, cost)?, OwnSplats::of(frame));
+    let means = mean_shadows(frame, cost)?;
+    let splats = OwnSplats::of(frame);
     let mut input = input(frame, &solid.depth, &means, cost)?;
     input.polygons = &polygons;
     input.splats = splats.as_ref().map(|splats| splats.input(frame));
@@ -157,7 +160,8 @@ pub(super) fn draw(
 
 /// Width of the slabs of the first sweep.
 pub(super) fn width(frame: &Frame<'_>, params: &Params) -> Result<f64, Error> {
-    let (volumes, splats) = (volumes(&frame.matter()).collect::<Vec<_>>(), splat_bounds(&frame.matter()));
+    let volumes = volumes(&frame.matter()).collect::<Vec<_>>();
+    let splats = splat_bounds(&frame.matter());
     let bodies = Bodies { volumes: &volumes, splats };
     let carried = frame.light_points().iter().zip(&frame.plan.carried).filter(|(_, carried)| **carried);
     let light = carried.filter_map(|(point, _)| swept(frame.scene, point)).map(|(light, _)| light).next();
@@ -188,7 +192,9 @@ fn input<'a>(
 ) -> Result<HalfInput<'a>, Error> {
     let maps = frame.maps(cost)?;
     let of_others = frame.maps_of_others(cost)?;
-    let (mut lights, mut extended, mut mapped) = (Vec::new(), Vec::new(), Vec::new());
+    let mut lights = Vec::new();
+    let mut extended = Vec::new();
+    let mut mapped = Vec::new();
     let points = frame.light_points().iter().zip(&frame.plan.carried).enumerate();
     for (k, (point, carried)) in points.filter(|(_, (point, _))| point.light.intensity != [0.0; 3]) {
         let map = if *carried { of_others.get(k) } else { maps.get(k) };

@@ -21,7 +21,8 @@ pub(super) fn bending(frame: &Frame<'_>) -> Bending {
 
 /// Opaque surfaces, and those that bound matter where rays are followed: rays from anywhere can meet them.
 pub(super) fn surfaces<'a>(frame: &'a Frame<'a>, values: &'a [f32], stage: &mut StageCost) -> Surfaces<'a> {
-    let (cloud, settings) = (frame.drawn(), &frame.settings.surfels);
+    let cloud = frame.drawn();
+    let settings = &frame.settings.surfels;
     let follows = settings.bending == scene::Bending::Traced;
     let is_met = |&i: &u32| {
         let (i, bounds) = (i as usize, |m: u16| frame.loaded.materials[m as usize].bounds_matter());

@@ -9,8 +9,10 @@ use splat_core::SplatKind;
 /// Adds to a plan how discs are drawn, and the passes that group them where they are; takes those out that shade splats where
 /// light falls on pixels alone.
 pub(crate) fn plans(scene: &Scene, loaded: &Loaded, plan: &mut Plan) {
-    let (by, draws) = (plan.by.clone(), plan.draws.clone());
-    let (settings, cloud) = (&scene.render.surfels, &loaded.cloud);
+    let by = plan.by.clone();
+    let draws = plan.draws.clone();
+    let settings = &scene.render.surfels;
+    let cloud = &loaded.cloud;
     let object = |i: usize| cloud.object[i] as usize;
     let is_ours = |i: usize| by[object(i)] == Technique::Surfels;
     let is_solid = |i: usize| cloud.kind[i] == SplatKind::Opaque && !plan.is_own[object(i)];

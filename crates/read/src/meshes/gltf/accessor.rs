@@ -147,7 +147,8 @@ impl<'a> Buffers<'a> {
     ) -> Result<Vec<T>, ReadError> {
         reading.go_on()?;
         let accessor = self.accessor(index)?;
-        let (count, kind) = (accessor.count, accessor.component_type);
+        let count = accessor.count;
+        let kind = accessor.component_type;
         let bytes = (count as u64).saturating_mul(size_of::<T>() as u64);
         let mut all = Vec::new();
         if let Some(view) = accessor.buffer_view {

@@ -32,7 +32,9 @@ pub(super) fn open<'a>(content: &'a [u8], params: &ReadParams) -> Result<(Docume
         let found = number(8).map_or("nothing".to_owned(), |n| n.to_string());
         return Err(damaged(8, &format!("{length}, the length of the file"), &found, HINT));
     }
-    let (mut at, mut json, mut binary) = (HEADER, None, None);
+    let mut at = HEADER;
+    let mut json = None;
+    let mut binary = None;
     while at < length {
         let (kind, body) = chunk(content, at)?;
         match kind {
@@ -74,7 +76,8 @@ fn document(json: &[u8], start: usize, params: &ReadParams) -> Result<Document, 
     input::hold("the description", bytes, params)?;
     let text = json.strip_prefix(b"\xef\xbb\xbf").unwrap_or(json);
     let document: Document = serde_json::from_slice(text).map_err(|e| {
-        let (line, column) = (e.line(), e.column());
+        let line = e.line();
+        let column = e.column();
         let place = if start == 0 {
             Place::Line { line: line as u64, column: column as u64 }
         } else {

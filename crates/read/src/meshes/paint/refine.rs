@@ -100,7 +100,8 @@ fn wanted(mesh: &Mesh, painting: &Painting, is_new: &[bool]) -> (Vec<Edge>, f32)
 
 /// Edge `k` of a triangle, from its corner `k` to the next.
 fn edge(t: &[u32; 3], k: usize) -> Edge {
-    let (a, b) = (t[k], t[(k + 1) % 3]);
+    let a = t[k];
+    let b = t[(k + 1) % 3];
     [a.min(b), a.max(b)]
 }
 
@@ -147,7 +148,8 @@ fn add_middles(mesh: &mut Mesh, painting: &mut Painting, edges: &[Edge]) {
             mesh.normal.push(between.try_normalize().unwrap_or(mesh.normal[a]));
         }
         if !painting.tint.is_empty() {
-            let (of_a, of_b) = (painting.tint[a], painting.tint[b]);
+            let of_a = painting.tint[a];
+            let of_b = painting.tint[b];
             painting.tint.push(std::array::from_fn(|c| 0.5 * of_a[c] + 0.5 * of_b[c]));
         }
         let between = 0.5 * Vec2::from(painting.place[a]) + 0.5 * Vec2::from(painting.place[b]);
@@ -159,7 +161,8 @@ fn add_middles(mesh: &mut Mesh, painting: &mut Painting, edges: &[Edge]) {
 /// Divides the triangles whose edges are halved; the last vertices are the middles of the edges.
 fn divide(mesh: &mut Mesh, edges: &[Edge], is_new: &mut Vec<bool>) {
     let first = mesh.position.len() - edges.len();
-    let (old, mut triangles) = (std::mem::take(&mut mesh.triangles), Vec::new());
+    let old = std::mem::take(&mut mesh.triangles);
+    let mut triangles = Vec::new();
     is_new.clear();
     for t in old {
         let middles = halved(&t, edges).map(|m| m.map(|rank| (first + rank) as u32));
@@ -215,7 +218,8 @@ mod tests {
                 .flat_map(|t| [0, 1, 2].map(|k| edge(t, k)))
                 .for_each(|e| *count.entry(e).or_insert(0) += 1);
             for ([a, b], n) in count {
-                let (a, b) = (of(a), of(b));
+                let a = of(a);
+                let b = of(b);
                 let is_rim = [0.0, 4.0].iter().any(|w| a.x == *w && b.x == *w || a.y == *w && b.y == *w);
                 assert_eq!(n, if is_rim { 1 } else { 2 }, "{subset}: {a} {b}");
             }
@@ -225,7 +229,8 @@ mod tests {
     #[test]
     fn middles_between_the_largest_numbers_are_numbers() {
         // Found by fuzzing glTF: the sum of two places was infinite.
-        let (far, place) = (Vec3::splat(f32::MAX), vec![[f32::MAX; 2]; 2]);
+        let far = Vec3::splat(f32::MAX);
+        let place = vec![[f32::MAX; 2]; 2];
         let mut mesh = Mesh { position: vec![far; 2], ..Mesh::default() };
         let mut painting =
             Painting { paint_of: vec![0; 2], place, tint: vec![[f32::MAX; 4]; 2], ..Painting::default() };

@@ -150,7 +150,8 @@ impl Faces {
     ) -> Result<(), ReadError> {
         let length = list_length(source, count, item)?;
         self.room(length.saturating_sub(2), reading)?;
-        let (mut last, mut known) = ([0; 2], 0u64);
+        let mut last = [0; 2];
+        let mut known = 0u64;
         for i in 0..length {
             look(i + 1, reading)?;
             let index = source.number(item)?;

@@ -41,7 +41,8 @@ impl<'a> Numbers<'a> {
     /// The next number, `None` beyond the end or for one above the largest.
     pub(super) fn next(&mut self) -> Option<f64> {
         let bits = self.stored.bits() as usize;
-        let (byte, shift) = (self.at / 8, self.at % 8);
+        let byte = self.at / 8;
+        let shift = self.at % 8;
         let needed = (shift + bits).div_ceil(8);
         let found = self.bytes.get(byte..byte + needed)?;
         let mut window = [0; 16];

@@ -114,7 +114,8 @@ impl Columns {
         let some = has.iter().zip([12, 12, 4]).filter(|(has, _)| **has).map(|(_, bytes)| bytes).sum::<u64>();
         let bytes = 36 + extras.bytes_per_point() + some;
         input::hold("the points", all.saturating_mul(bytes), reading.params)?;
-        let (positions, points) = (Vec::new(), RawPoints::default());
+        let positions = Vec::new();
+        let points = RawPoints::default();
         Ok(Self { extras, names, positions, points, has, scans: 0, without: [0; 3] })
     }
 

@@ -142,7 +142,8 @@ impl Reader<'_> {
             return Err(self.wrong(prototype, &format!("at most {MAX_FIELDS} fields"), &fields.len().to_string()));
         }
         let place = self.byte(scan);
-        let (count, section) = (needed("recordCount")?, needed("fileOffset")?);
+        let count = needed("recordCount")?;
+        let section = needed("fileOffset")?;
         if count > 1 && fields.iter().all(|field| field.stored.bits() == 0) {
             return Err(self.wrong(prototype, "a field that tells points apart", "fields of one number each"));
         }
@@ -176,7 +177,8 @@ impl Reader<'_> {
                 Err(self.wrong(field, &format!("a finite {name}"), &number.to_string()))
             }
         };
-        let (scale, offset) = (of("scale", 1.0)?, of("offset", 0.0)?);
+        let scale = of("scale", 1.0)?;
+        let offset = of("offset", 0.0)?;
         if most < least {
             return Err(self.wrong(field, &format!("{name} to have a maximum above its minimum"), &most.to_string()));
         }

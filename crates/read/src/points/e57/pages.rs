@@ -101,7 +101,8 @@ const TABLE: [u32; 256] = {
     let mut table = [0; 256];
     let mut byte = 0;
     while byte < 256 {
-        let (mut sum, mut bit) = (byte as u32, 0);
+        let mut sum = byte as u32;
+        let mut bit = 0;
         while bit < 8 {
             sum = if sum & 1 == 1 { sum >> 1 ^ 0x82f6_3b78 } else { sum >> 1 };
             bit += 1;

@@ -73,7 +73,8 @@ fn extras(layout: &Layout, described: &[u8]) -> Vec<Field> {
     let mut at = end - usize::from(layout.format.extra_bytes);
     let mut found = Vec::new();
     for d in described.as_chunks::<DESCRIPTION>().0 {
-        let (kind, options) = (d[2], d[3]);
+        let kind = d[2];
+        let options = d[3];
         // Type 0 says its length in the place of options; types from 11 on are two or three numbers of the first ten.
         let (number, count) = match kind {
             0 => (Number(1), usize::from(options)),
@@ -88,7 +89,8 @@ fn extras(layout: &Layout, described: &[u8]) -> Vec<Field> {
         let stated = |(at, bit): (usize, u8)| (options & bit != 0).then(|| f64::from_le_bytes(eight(at)));
         if (1..=10).contains(&kind) && !name.is_empty() {
             let no_data = (options & NO_DATA.1 != 0).then(|| number.widened().of(&eight(NO_DATA.0)));
-            let (scale, offset) = (stated(SCALE).unwrap_or(1.0), stated(OFFSET).unwrap_or(0.0));
+            let scale = stated(SCALE).unwrap_or(1.0);
+            let offset = stated(OFFSET).unwrap_or(0.0);
             let extra = Extra { at, number, no_data, scale, offset };
             found.push(Field { name: String::from_utf8_lossy(name).into_owned(), kind: Kind::Extra(extra) });
         }

@@ -81,7 +81,8 @@ impl<'a> Text<'a> {
         columns: &mut Columns,
         reading: &Reading<'_>,
     ) -> Result<(), ReadError> {
-        let (points, numbers) = (header.points, header.numbers());
+        let points = header.points;
+        let numbers = header.numbers();
         let mut count = 0;
         while let Some(line) = self.lines.next()? {
             let words: Vec<Word<'a>> = line.words(false).collect();

@@ -111,7 +111,8 @@ pub(super) fn parse(content: &[u8]) -> Result<Header, ReadError> {
     let (fields, place_of_fields) = statements.fields(end)?;
     let (points, place_of_points) = statements.points(end)?;
     let has_viewpoint = statements.has_viewpoint()?;
-    let (body, lines) = (lines.offset(), lines.number());
+    let body = lines.offset();
+    let lines = lines.number();
     Ok(Header { fields, place_of_fields, points, place_of_points, data, has_viewpoint, body, lines })
 }
 
@@ -160,7 +161,8 @@ impl<'a> Statements<'a> {
         if values.len() == fields {
             return Ok(values);
         }
-        let (expected, found) = (format!("{}, one a field", counted(fields as u64, "value")), values.len().to_string());
+        let expected = format!("{}, one a field", counted(fields as u64, "value"));
+        let found = values.len().to_string();
         Err(ReadError::input(word.place(), expected, found, "the header is damaged"))
     }
 
@@ -179,7 +181,8 @@ impl<'a> Statements<'a> {
             None => None,
         };
         let mut fields: Vec<Field> = Vec::with_capacity(names.len());
-        let (mut offset, mut column) = (0, 0);
+        let mut offset = 0;
+        let mut column = 0;
         for (i, name) in names.iter().enumerate() {
             // Padding is `_`, as often as there is some.
             if name.text != b"_" && fields.iter().any(|f| f.name == name.text) {
@@ -201,7 +204,8 @@ impl<'a> Statements<'a> {
             let [value] = values.as_slice() else { return Err(wrong(*word, "one number after the keyword")) };
             Ok(Some((whole(*value, "a whole number")?, *value)))
         };
-        let (width, height) = (number("WIDTH")?, number("HEIGHT")?.map_or(1, |(n, _)| n));
+        let width = number("WIDTH")?;
+        let height = number("HEIGHT")?.map_or(1, |(n, _)| n);
         let product = match width {
             Some((width, word)) => {
                 let product = width.checked_mul(height);

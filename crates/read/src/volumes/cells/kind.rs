@@ -102,7 +102,8 @@ mod tests {
     #[test]
     fn faces_close_a_body_and_face_outwards() {
         for (number, volume) in [(11, 1.0), (12, 1.0), (13, 0.5), (14, 1.0 / 3.0)] {
-            let (kind, places) = (Kind::of(number).unwrap(), places(number));
+            let kind = Kind::of(number).unwrap();
+            let places = places(number);
             let Shape::Body(faces) = kind.shape else { panic!("a body") };
             assert_eq!(places.len(), kind.corners.unwrap());
             let mut edges: Vec<[u8; 2]> = Vec::new();

@@ -22,7 +22,8 @@ impl Lists {
 
     /// So many cells, each with the number of its points before them: how VTK wrote them up to version 4.
     pub(crate) fn counted(numbers: &[f64], cells: u64, points: usize, place: Place) -> Result<Self, ReadError> {
-        let (mut lists, mut left) = (Self::default(), numbers);
+        let mut lists = Self::default();
+        let mut left = numbers;
         while let Some((count, rest)) = left.split_first() {
             let cell = lists.len();
             let Some(n) = whole(*count, rest.len()) else {
@@ -40,7 +41,8 @@ impl Lists {
 
     /// Cells that end at these of their points.
     pub(crate) fn ending(ends: &[f64], corners: &[f64], points: usize, place: Place) -> Result<Self, ReadError> {
-        let (mut lists, mut start) = (Self::default(), 0);
+        let mut lists = Self::default();
+        let mut start = 0;
         for (cell, end) in ends.iter().enumerate() {
             let Some(end) = whole(*end, corners.len()).filter(|end| *end >= start) else {
                 let expected = format!("cell {cell} to end at {start} to {} of the points of cells", corners.len());

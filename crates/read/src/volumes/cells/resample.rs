@@ -98,14 +98,16 @@ pub(super) fn grid(
     })?;
     let dims = bounds.dims(bodies.len() as f64);
     let step = bounds.size / DVec3::from_array(dims.map(|n| n as f64));
-    let (origin, axes) = (bounds.low + 0.5 * step, DMat3::from_diagonal(step));
+    let origin = bounds.low + 0.5 * step;
+    let axes = DMat3::from_diagonal(step);
     lattice::check(origin, &axes, place, HINT)?;
     let least = bodies.iter().flat_map(|body| body.corners.iter().map(|corner| field.at(body.cell, *corner)));
     let outside = least.fold(0.0, f64::min);
     let lattice = Lattice { low: bounds.low, sample: step / SAMPLES as f64, dims, outside };
     lattice.check_work(points, bodies, bounds.volume)?;
     let values = lattice.filled((points, bodies), field, reading)?;
-    let ([x, y, z], cells) = (dims, counted(bodies.len() as u64, "cell"));
+    let [x, y, z] = dims;
+    let cells = counted(bodies.len() as u64, "cell");
     let remarks = &mut reading.notes.remarks;
     remarks.push(format!("{cells}, sampled as {x} x {y} x {z} voxels; outside them the value is {outside}"));
     match bounds.folded {
@@ -129,10 +131,13 @@ impl Bounds {
     /// `None` without a volume, or for one that is no number.
     fn of(points: &[DVec3], bodies: &[Body<'_>]) -> Option<Self> {
         let place = |corner: u32| (points[corner as usize], 0.0);
-        let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-        let (mut sum, mut folded) = (0.0, 0);
+        let mut low = DVec3::INFINITY;
+        let mut high = DVec3::NEG_INFINITY;
+        let mut sum = 0.0;
+        let mut folded = 0;
         for body in bodies {
-            let (mut right, mut wrong) = (0.0, 0.0);
+            let mut right = 0.0;
+            let mut wrong = 0.0;
             body.part(&place, |t| match volume(t) {
                 v if v < 0.0 => wrong -= v,
                 v => right += v,
@@ -199,7 +204,8 @@ impl Lattice {
         let count = nx * ny * nz;
         let bytes = count * (size_of::<f32>() + size_of::<u8>());
         input::hold("the voxels", bytes as u64, reading.params)?;
-        let (mut sums, mut taken) = (Vec::new(), Vec::new());
+        let mut sums = Vec::new();
+        let mut taken = Vec::new();
         input::reserve(&mut sums, count)?;
         input::reserve(&mut taken, count)?;
         sums.resize(count, 0f32);
@@ -223,7 +229,8 @@ impl Lattice {
         })?;
         drop(taken);
         // A sum that was rounded may lie a little beyond the largest value.
-        let (low, high) = (f64::from(f32::MIN), f64::from(f32::MAX));
+        let low = f64::from(f32::MIN);
+        let high = f64::from(f32::MAX);
         sums.par_iter_mut().for_each(|v| *v = (self.outside + 2.0 * f64::from(*v)).clamp(low, high) as f32);
         Ok(sums)
     }
@@ -350,13 +357,15 @@ mod tests {
 
     #[test]
     fn values_as_large_as_single_precision_has_them_stay_numbers() {
-        let (points, corners) = (block(DVec3::ZERO, DVec3::ONE), (0..8).collect::<Vec<u32>>());
+        let points = block(DVec3::ZERO, DVec3::ONE);
+        let corners = (0..8).collect::<Vec<u32>>();
         let sampled = |largest: f32| {
             let signs = [1.0, -1.0, 1.0, 1.0, 1.0, -1.0, 1.0, 1.0];
             let field = Field::Points(signs.map(|sign| sign * f64::from(largest)).to_vec());
             sampled(&points, &[Body { cell: 0, corners: &corners, faces: HEXAHEDRON }], &field).values
         };
-        let (small, large) = (sampled(1.0), sampled(f32::MAX));
+        let small = sampled(1.0);
+        let large = sampled(f32::MAX);
         assert!(large.iter().zip(&small).all(|(l, s)| (l / f32::MAX - s).abs() < 1e-6), "{large:?}");
     }
 

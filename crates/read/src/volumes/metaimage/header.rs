@@ -138,7 +138,8 @@ impl Fields {
             let found = format!("'{}'", escaped(line, 60));
             return Err(ReadError::input(place, "a line Field = value", found, super::HINT));
         };
-        let (name, value) = (name.trim(), value.trim());
+        let name = name.trim();
+        let value = value.trim();
         let one = [&BYTE_ORDER[..], &OFFSET, &MATRIX].into_iter().find(|names| names.contains(&name));
         if self.find(one.unwrap_or(&[name])).is_some() {
             return Err(wrong(place, "each field once", name));

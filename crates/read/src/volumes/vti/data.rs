@@ -156,7 +156,8 @@ impl<'a> Encoding<'a> {
             // NaN is a gap in a field; places and counts refuse it where they are made.
             numbers.all.push(word.decimal().filter(|v| v.is_nan()).map_or_else(|| word.number(), Ok)?);
         }
-        let (found, more) = (numbers.len() as u64, words.count() as u64);
+        let found = numbers.len() as u64;
+        let more = words.count() as u64;
         if found == count && more == 0 {
             return Ok(numbers);
         }
@@ -249,7 +250,8 @@ impl<'a> Encoding<'a> {
         let head = head.ok_or_else(|| source.wrong("a number of blocks within the data", &blocks.to_string()))?;
         let head = source.take(head)?;
         let sizes: Vec<u64> = head.chunks_exact(self.word).map(|word| self.size(word)).collect();
-        let (size, last) = (sizes[1], if sizes[2] == 0 { sizes[1] } else { sizes[2] });
+        let size = sizes[1];
+        let last = if sizes[2] == 0 { sizes[1] } else { sizes[2] };
         let whole = blocks.checked_sub(1).and_then(|n| n.checked_mul(size)).and_then(|n| n.checked_add(last));
         if whole != Some(bytes) || last > size {
             let found = format!("{blocks} blocks of {size} bytes, the last of {last}");

@@ -33,7 +33,8 @@ pub(super) fn read(
     encoding: &Encoding<'_>,
     reading: &mut Reading<'_>,
 ) -> Result<Loaded, ReadError> {
-    let (mut used, mut pieces) = (Vec::new(), Vec::new());
+    let mut used = Vec::new();
+    let mut pieces = Vec::new();
     let mut all: Option<Cells> = None;
     for node in dataset.children().filter(|c| c.has_tag_name("Piece")) {
         reading.go_on()?;
@@ -48,7 +49,8 @@ pub(super) fn read(
         }
     }
     let cells = all.ok_or_else(|| wrong(dataset, "a Piece", "none"))?;
-    let (mut field, mut columns) = (Field::One, PointColumns::default());
+    let mut field = Field::One;
+    let mut columns = PointColumns::default();
     if cells.has_bodies() {
         // Pieces without points or cells have no arrays.
         let mut found = None;
@@ -169,7 +171,8 @@ impl<'a, 'i> Piece<'_, 'a, 'i> {
         let mut cells = Cells { points: places, lists: Lists::default(), kinds: Vec::new(), place: place(self.node) };
         if self.node.parent_element().is_some_and(|dataset| dataset.has_tag_name("UnstructuredGrid")) {
             let element = child(self.node, "Cells").ok_or_else(|| wrong(self.node, "an element Cells", "none"))?;
-            let (count, types) = (self.count("NumberOfCells")?, self.array(element, "types")?);
+            let count = self.count("NumberOfCells")?;
+            let types = self.array(element, "types")?;
             used.push(types);
             cells.place = place(element);
             cells.lists = self.lists(element, count, cells.points.len(), used, reading)?;
@@ -177,7 +180,8 @@ impl<'a, 'i> Piece<'_, 'a, 'i> {
             return Ok(cells);
         }
         for (name, attribute, kind) in OF_POLYDATA {
-            let (count, element) = (self.count(attribute)?, child(self.node, name));
+            let count = self.count(attribute)?;
+            let element = child(self.node, name);
             if count == 0 {
                 // What says that there are none is used.
                 used.extend(element.into_iter().flat_map(arrays));

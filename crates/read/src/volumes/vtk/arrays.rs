@@ -251,7 +251,8 @@ impl<'a> Arrays<'a> {
         } else {
             for passed in 0..count {
                 if !data.next().is_some_and(|word| may_be_number(word.text)) {
-                    let (expected, found) = (counted(count, "number"), passed.to_string());
+                    let expected = counted(count, "number");
+                    let found = passed.to_string();
                     return Err(ReadError::input(line.place(), expected, found, HINT));
                 }
             }
@@ -262,7 +263,8 @@ impl<'a> Arrays<'a> {
         }
         lines.go_to(end, last);
         let name = words.get(1).map(|w| escaped(w.text, 40)).unwrap_or_default();
-        let (of, place) = (self.of, line.place());
+        let of = self.of;
+        let place = line.place();
         self.found.push(Array {
             name,
             of,

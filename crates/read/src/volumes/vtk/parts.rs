@@ -29,7 +29,8 @@ pub(super) fn take<'a>(line: Line<'a>, lines: &mut Lines<'a>, arrays: &mut Array
     let keyword = words.first().map(|w| w.text.to_ascii_uppercase()).unwrap_or_default();
     match keyword.as_slice() {
         b"POINTS" => {
-            let (size, kind) = ((3, whole(words.get(1), line)?), kind(words.get(2), line)?);
+            let size = (3, whole(words.get(1), line)?);
+            let kind = kind(words.get(2), line)?;
             arrays.take_part(line, Part { name: "POINTS", kind, size, cells: 0 }, lines)?;
         }
         b"CELL_TYPES" => {
@@ -91,7 +92,9 @@ pub(super) fn read(
     let source = Source { content, is_binary, arrays, end };
     let cells = source.cells(dataset, reading)?;
     cells.check()?;
-    let (mut field, mut columns, mut used) = (Field::One, PointColumns::default(), Vec::new());
+    let mut field = Field::One;
+    let mut columns = PointColumns::default();
+    let mut used = Vec::new();
     if cells.has_bodies() {
         if let Some(array) = arrays.chosen(reading.params, &mut reading.notes)? {
             used.push(array.place);

@@ -28,7 +28,8 @@ pub(super) struct Hit {
 impl<'a> Triangles<'a> {
     pub(super) fn new(of: &'a [Polygons<'a>]) -> Self {
         let of_mesh = |(m, polygons): (usize, &Polygons<'_>)| {
-            let (mesh, transform) = (polygons.placed.mesh, polygons.placed.transform);
+            let mesh = polygons.placed.mesh;
+            let transform = polygons.placed.transform;
             let corner = |v: u32| transform.apply(mesh.origin + mesh.position[v as usize].as_dvec3());
             mesh.triangles.iter().map(|t| (t.map(corner), m)).collect::<Vec<_>>()
         };
@@ -38,7 +39,8 @@ impl<'a> Triangles<'a> {
     /// Where a line meets a triangle, as a multiple of `along` (Möller, Trumbore 1997).
     fn meets(&self, triangle: usize, from: DVec3, along: DVec3) -> Option<f64> {
         let [p, q, r] = self.all[triangle].0;
-        let (u, v) = (q - p, r - p);
+        let u = q - p;
+        let v = r - p;
         let across = along.cross(v);
         let determinant = u.dot(across);
         let start = from - p;
@@ -54,7 +56,8 @@ impl<'a> Triangles<'a> {
         let (from, along) = camera.view_ray((at % width) as f64 + 0.5, (at / width) as f64 + 0.5);
         let [right, up, forward] = camera.axes;
         let world = |v: DVec3| right * v.x + up * v.y + forward * v.z;
-        let (from, along) = (camera.position + world(from), world(along));
+        let from = camera.position + world(from);
+        let along = world(along);
         let mut hits: Vec<Hit> = (0..self.all.len())
             .filter(|triangle| self.mesh(*triangle).is_opaque() == opaque)
             .filter_map(|triangle| {
@@ -90,7 +93,8 @@ impl<'a> Triangles<'a> {
 
     /// Green optical depth of one crossing along a direction.
     fn crossing(&self, triangle: usize, along: DVec3) -> f64 {
-        let (of, cosine) = (self.mesh(triangle), along.normalize().dot(self.face(triangle)));
+        let of = self.mesh(triangle);
+        let cosine = along.normalize().dot(self.face(triangle));
         let factor = of.material.surface_opacity.optical_depth_factor(cosine as f32) * of.material.extinction_rgb[1];
         f64::from(of.optical_depth) * f64::from(factor)
     }
@@ -187,7 +191,8 @@ impl View<'_> {
         (light, sums, splats): Carried<'_, '_>,
         (lit, with_ambient): (&LitBy<'_>, bool),
     ) -> [f64; 3] {
-        let (of, place) = (self.polygons.mesh(hit.triangle), self.frame.point(hit.world));
+        let of = self.polygons.mesh(hit.triangle);
+        let place = self.frame.point(hit.world);
         let eye = self.input.sheets.camera;
         let to_eye = if eye.is_orthographic() { -eye.axes[2] } else { (eye.position - hit.world).normalize() };
         let face = self.polygons.face(hit.triangle);

@@ -87,12 +87,15 @@ impl Diffuse {
             scatter::entering(&one, place, self.grid.area(0.0))[c]
         };
         let entering: Vec<f64> = self.columns().map(enters).collect();
-        let (mut beam, mut ahead) = (entering.clone(), vec![0.0; entering.len()]);
-        let (mut incoming, mut since) = (Vec::new(), None);
+        let mut beam = entering.clone();
+        let mut ahead = vec![0.0; entering.len()];
+        let mut incoming = Vec::new();
+        let mut since = None;
         for k in 0..self.grid.layers {
             incoming.push(beam.iter().zip(&ahead).map(|(b, a)| b + a).collect::<Vec<f64>>());
             for (at, (x, y)) in self.columns().enumerate() {
-                let (cell, length) = (self.cell(x, y, k), self.grid.length([x, y]));
+                let cell = self.cell(x, y, k);
+                let length = self.grid.length([x, y]);
                 let [tau, stays] = [cell.extinction[c], cell.ahead[c]].map(|v| f64::from(v) * length);
                 ahead[at] = (beam[at] + ahead[at]) * libm::exp(stays - tau) - beam[at] * libm::exp(-tau);
                 beam[at] *= libm::exp(-tau);
@@ -123,7 +126,8 @@ impl Diffuse {
         let mut out = vec![0.0; of.len()];
         for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
             for (i, j) in (-reach_y..=reach_y).flat_map(|j| (-reach_x..=reach_x).map(move |i| (i, j))) {
-                let (px, py) = (x + i, y + j);
+                let px = x + i;
+                let py = y + j;
                 if (0..width).contains(&px) && (0..height).contains(&py) {
                     let weight = along[i.unsigned_abs()] * down[j.unsigned_abs()];
                     out[(y * width + x) as usize] += weight * of[(py * width + px) as usize];
@@ -148,7 +152,8 @@ impl Diffuse {
             self.columns().map(|(x, y)| (0..=layers).map(|k| self.sides(x, y, k, c)).collect()).collect();
         let mut psi = vec![0.0; self.faces.len()];
         loop {
-            let (mut change, mut most) = (0.0f64, 0.0f64);
+            let mut change = 0.0f64;
+            let mut most = 0.0f64;
             for (column, (x, y)) in self.columns().enumerate() {
                 let found = self.column(&psi, (&slabs[column], &sides[column]), [x, y]);
                 for (k, found) in found.into_iter().enumerate() {
@@ -169,7 +174,8 @@ impl Diffuse {
     /// ψ of one column between what its neighbours have: three unknowns an equation.
     fn column(&self, psi: &[f64], (slabs, sides): (&[Slab], &[[[f64; 2]; 4]]), [x, y]: [usize; 2]) -> Vec<f64> {
         let (grid, layers) = (self.grid, self.grid.layers);
-        let (mut takes, mut comes) = (Vec::new(), Vec::new());
+        let mut takes = Vec::new();
+        let mut comes = Vec::new();
         for k in 0..=layers {
             let beside = self.beside(x, y, k);
             let exchange = |side: usize| beside[side].map_or(0.0, |next| sides[k][side][0] * psi[next]);
@@ -246,7 +252,8 @@ impl Diffuse {
 
     /// The same of one layer.
     fn side(&self, side: usize, [x, y, layer]: [usize; 3], c: usize) -> [f64; 2] {
-        let (grid, direction) = (self.grid, side / 2);
+        let grid = self.grid;
+        let direction = side / 2;
         let spread = grid.spread(layer as f64 + 0.5);
         let along = grid.step[direction] * spread;
         let wall = grid.step[1 - direction] * spread * grid.depth;
@@ -254,7 +261,8 @@ impl Diffuse {
             let cell = if direction == 0 { self.cell(n, y, layer) } else { self.cell(x, n, layer) };
             f64::from((cell.extinction[c] - cell.forward[c]).max(0.0)) * along
         };
-        let (here, count) = (if direction == 0 { x } else { y }, grid.columns[direction]);
+        let here = if direction == 0 { x } else { y };
+        let count = grid.columns[direction];
         let before = |n: usize| libm::exp(-1.5 * (0..n).map(tau).sum::<f64>());
         let behind = |n: usize| libm::exp(-1.5 * (n + 1..count).map(tau).sum::<f64>());
         let beyond = if side.is_multiple_of(2) { before(here) } else { behind(here) };
@@ -264,7 +272,8 @@ impl Diffuse {
             / (1.0 + 0.75 * tau(here));
         let next = if side.is_multiple_of(2) { here.checked_sub(1) } else { Some(here + 1).filter(|n| *n < count) };
         let across = next.map_or(0.0, |next| {
-            let (low, high) = (here.min(next), here.max(next));
+            let low = here.min(next);
+            let high = here.max(next);
             let thinnest = 2.0 / count as f64;
             let optical = 0.5 * (tau(here).max(thinnest) + tau(next).max(thinnest));
             wall * (1.0 - behind(low)) * (1.0 - before(high)) / (1.5 * optical)
@@ -292,7 +301,8 @@ impl Diffuse {
         let spread = grid.spread(at[2] as f64 + 0.5);
         let sizes = [grid.step[0] * spread, grid.step[1] * spread, grid.depth];
         let slope = |a: usize| {
-            let (mut before, mut behind) = (at.map(|n| n as isize), at.map(|n| n as isize));
+            let mut before = at.map(|n| n as isize);
+            let mut behind = at.map(|n| n as isize);
             (before[a], behind[a]) = (before[a] - 1, behind[a] + 1);
             (mean(behind) - mean(before)) / sizes[a]
         };
@@ -334,7 +344,9 @@ impl Diffuse {
                     }
                 }
                 let whole = |v: [f64; 3]| v.map(|v| v / sum.weight);
-                let (ahead, psi, flux) = (whole(sum.ahead), whole(sum.psi), sum.flux.map(whole));
+                let ahead = whole(sum.ahead);
+                let psi = whole(sum.psi);
+                let flux = sum.flux.map(whole);
                 out[self.face(x, y, k)] = Face { ahead, psi, flux, weight: sum.weight };
             }
         }
@@ -353,9 +365,10 @@ impl Diffuse {
         if !medium::scatters(volume) {
             return [0.0; 3];
         }
-        let (counts, place) =
-            ([self.grid.columns[0], self.grid.columns[1], self.grid.layers + 1], self.grid.place(world));
-        let (mut sum, mut weights) = ([[0.0; 3]; 2], 0.0);
+        let counts = [self.grid.columns[0], self.grid.columns[1], self.grid.layers + 1];
+        let place = self.grid.place(world);
+        let mut sum = [[0.0; 3]; 2];
+        let mut weights = 0.0;
         let towards = self.grid.axes.map(|axis| axis.dot(to_eye.as_dvec3()));
         let g = f64::from(volume.material.asymmetry);
         for (x, y) in self.columns() {
@@ -387,7 +400,8 @@ impl Slab {
     /// From reflectance and transmittance, and from what comes out of both faces of a layer under a beam of 1.
     fn new(cell: &Cell, c: usize, length: f64) -> Self {
         let optics = scatter::streams::optics(cell, c, length);
-        let (omega, g) = (optics.omega, optics.asymmetry.clamp(-2.0 / 3.0, 2.0 / 3.0));
+        let omega = optics.omega;
+        let g = optics.asymmetry.clamp(-2.0 / 3.0, 2.0 / 3.0);
         let (omega, tau) = if optics.tau < 1e-6 { (1.0, 1e-6) } else { (omega, optics.tau) };
         let gamma2 = ((omega * (4.0 - 3.0 * g) - 1.0) / 4.0).max(0.0);
         let gamma1 = 2.0 * (1.0 - omega) + gamma2;
@@ -399,15 +413,18 @@ impl Slab {
             let below = k + gamma1 + (k - gamma1) * e * e;
             (gamma2 * (1.0 - e * e) / below, 2.0 * k * e / below, k)
         };
-        let (behind, ahead) = ((2.0 - 3.0 * g) / 4.0, (2.0 + 3.0 * g) / 4.0);
+        let behind = (2.0 - 3.0 * g) / 4.0;
+        let ahead = (2.0 + 3.0 * g) / 4.0;
         let from_alike = k * k - 1.0;
         let with = optics.omega * (ahead * (gamma1 + 1.0) + gamma2 * behind) / from_alike;
         let against = optics.omega * (behind * (gamma1 - 1.0) + gamma2 * ahead) / from_alike;
         let left = libm::exp(-optics.tau);
         let up = against - reflects * with - transmits * against * left;
         let down = with * left - transmits * with - reflects * against * left;
-        let (even, odd) = (1.0 + reflects + transmits, 1.0 + reflects - transmits);
-        let (slow, fast) = ((1.0 - reflects - transmits) / even, (1.0 - reflects + transmits) / odd);
+        let even = 1.0 + reflects + transmits;
+        let odd = 1.0 + reflects - transmits;
+        let slow = (1.0 - reflects - transmits) / even;
+        let fast = (1.0 - reflects + transmits) / odd;
         Self {
             own: 0.5 * (slow + fast),
             through: 0.5 * (fast - slow),

@@ -45,7 +45,8 @@ impl Transmittance for Carried<'_> {
 impl<'a> Splats<'a> {
     pub(super) fn new(of: &HalfSplats<'a>, view: &View<'_>, light: &Image) -> Self {
         let cloud = of.cloud;
-        let (frame, camera) = (&view.frame, &light.camera);
+        let frame = &view.frame;
+        let camera = &light.camera;
         let world = |p: &splat_core::glam::Vec3| cloud.origin + p.as_dvec3();
         let places: Vec<DVec3> = cloud.position.iter().map(|p| frame.point(world(p))).collect();
         let slab = |depth: f64| ((depth / frame.slabs.width).max(0.0) as u32).min(frame.slabs.count - 1);
@@ -66,7 +67,8 @@ impl<'a> Splats<'a> {
         if !seen.is_visible(i) {
             return 0.0;
         }
-        let (splat, width) = (&seen.splats[i], image.camera.size[0] as usize);
+        let splat = &seen.splats[i];
+        let width = image.camera.size[0] as usize;
         let [x, y] = [at % width, at / width].map(|v| v as f64 + 0.5);
         let [dx, dy] = [x - f64::from(splat.center_px[0]), y - f64::from(splat.center_px[1])];
         let [a, b, c] = splat.conic.map(f64::from);
@@ -139,7 +141,8 @@ impl<'a> Splats<'a> {
         let HalfSplats { cloud, materials, objects, .. } = self.of;
         let carried = Carried { through: &self.through, others: lit.shadow };
         let lights = [LitBy { shadow: Some(&carried), ..*lit }];
-        let (ambient, camera) = (view.input.sheets.ambient, view.input.sheets.camera);
+        let ambient = view.input.sheets.ambient;
+        let camera = view.input.sheets.camera;
         let input = ShadeInput { cloud, materials, objects, lights: &lights, ambient, camera };
         let radiance = |i: usize| {
             let mut own = shade_splat(&input, i).0;
@@ -165,7 +168,8 @@ impl<'a> Splats<'a> {
         if !(part[0] <= mean && mean < part[1]) {
             return (tau, color);
         }
-        let (mut all, mut sum) = (tau, color.map(|c| c * tau));
+        let mut all = tau;
+        let mut sum = color.map(|c| c * tau);
         for (i, radiance) in shown {
             let own = own(*i);
             all += own;

@@ -37,8 +37,11 @@ struct Adding<'a> {
 pub(crate) fn solve(of: &Streams) -> Solution {
     let adding = Adding::new(of);
     let n = of.faces();
-    let (mut psi, mut left, mut to) = (vec![0.0; n], of.source.clone(), vec![0.0; n]);
-    let (mut change, mut across) = (vec![0.0; n], vec![0.0; n]);
+    let mut psi = vec![0.0; n];
+    let mut left = of.source.clone();
+    let mut to = vec![0.0; n];
+    let mut change = vec![0.0; n];
+    let mut across = vec![0.0; n];
     let enough = LEFT_OVER * adding.sum(|k| left[k].abs());
     let mut before = 1.0;
     for pass in 0..MOST {
@@ -63,7 +66,8 @@ pub(crate) fn solve(of: &Streams) -> Solution {
 
 impl<'a> Adding<'a> {
     fn new(of: &'a Streams) -> Self {
-        let (width, layers) = (of.columns[0], of.layers);
+        let width = of.columns[0];
+        let layers = of.layers;
         let row = (layers + 1) * width;
         let mut taken = vec![0.0; of.faces()];
         taken.par_chunks_mut(row).enumerate().for_each(|(y, taken)| {
@@ -79,9 +83,12 @@ impl<'a> Adding<'a> {
 
     /// Adds layers along all columns: what `left` makes where nothing comes back from the sides.
     fn along(&self, left: &[f64], out: &mut [f64]) {
-        let (row, width, layers) = (self.row, self.of.columns[0], self.of.layers);
+        let row = self.row;
+        let width = self.of.columns[0];
+        let layers = self.of.layers;
         out.par_chunks_mut(row).enumerate().for_each(|(y, out)| {
-            let (taken, through) = (&self.taken[y * row..], &self.of.through[y * layers * width..]);
+            let taken = &self.taken[y * row..];
+            let through = &self.of.through[y * layers * width..];
             out.copy_from_slice(&left[y * row..(y + 1) * row]);
             for at in (0..row - width).rev() {
                 out[at] += through[at] * taken[at + width] * out[at + width];
@@ -96,11 +103,15 @@ impl<'a> Adding<'a> {
 
     /// What leaves each face for `psi`, less what comes in from others.
     fn apply(&self, psi: &[f64], out: &mut [f64]) {
-        let (row, width, layers, of) = (self.row, self.of.columns[0], self.of.layers, self.of);
+        let row = self.row;
+        let width = self.of.columns[0];
+        let layers = self.of.layers;
+        let of = self.of;
         let height = of.columns[1];
         out.par_chunks_mut(row).enumerate().for_each(|(y, out)| {
             let first = y * row;
-            let (own, through) = (&psi[first..first + row], &of.through[y * layers * width..]);
+            let own = &psi[first..first + row];
+            let through = &of.through[y * layers * width..];
             for at in 0..row {
                 out[at] = of.all[first + at] * own[at];
             }

@@ -56,7 +56,8 @@ impl Balance {
         streams: &Streams,
         psi: &[f64],
     ) {
-        let ([width, _], layers) = (grid.columns, grid.layers);
+        let [width, _] = grid.columns;
+        let layers = grid.layers;
         for (at, cell) in cells.iter().enumerate() {
             let face = at + at / (layers * width) * width;
             let [up, down] = streams.given[at];

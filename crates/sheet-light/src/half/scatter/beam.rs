@@ -55,7 +55,8 @@ impl Path<'_> {
 
     /// Marches one channel.
     pub(crate) fn march(&self, channel: usize) -> Beam {
-        let ([width, height], layers) = (self.grid.columns, self.grid.layers);
+        let [width, height] = self.grid.columns;
+        let layers = self.grid.layers;
         let n = width * height;
         let mut out = Beam {
             ahead: vec![0.0; n * (layers + 1)],
@@ -99,7 +100,8 @@ impl Path<'_> {
             let stays = f64::from(self.cells[cell].ahead[channel]) * length;
             is_any |= stays > 0.0;
             out.incoming[cell] = beam[at] + ahead[at];
-            let (own, all) = (libm::exp(-tau), libm::exp(stays - tau));
+            let own = libm::exp(-tau);
+            let all = libm::exp(stays - tau);
             let passing = self.passing(layer, column, channel);
             // The first form keeps the digits of thin layers, the second has no powers that are too large.
             let gained = if stays < 1.0 { own * libm::expm1(stays) } else { all - own };
@@ -115,7 +117,8 @@ impl Path<'_> {
     /// from where it would have come is tan²·z²/3, and these are differences of that.
     fn kernels(&self, layer: usize, since: usize) -> [Kernel; 2] {
         let behind = |n: usize| (n - since) as f64 * self.grid.depth;
-        let (near, far) = (behind(layer), behind(layer + 1));
+        let near = behind(layer);
+        let far = behind(layer + 1);
         let slope = libm::tan(self.cone);
         let variance = slope * slope * (far * far - near * near) / 3.0;
         [0, 1].map(|a| {

@@ -54,7 +54,8 @@ impl Kernel {
 
 /// Convolves a plane of `width` numbers a row by one kernel along rows and another along columns.
 pub(crate) fn convolve(plane: &mut [f64], width: usize, kernels: &[Kernel; 2], outside: f64) {
-    let (height, mut line) = (plane.len() / width, Vec::new());
+    let height = plane.len() / width;
+    let mut line = Vec::new();
     if !kernels[0].is_point() {
         (0..height).for_each(|y| kernels[0].line(plane, [y * width, 1, width], outside, &mut line));
     }
@@ -83,7 +84,8 @@ mod tests {
         plane[50 * 101 + 50] = 1e4;
         for variance in [0.2, 0.9, 7.0] {
             let kernel = Kernel::new(variance);
-            let (mut left, before) = (plane.clone(), variance);
+            let mut left = plane.clone();
+            let before = variance;
             convolve(&mut left, 101, &[kernel.clone(), kernel], 0.0);
             assert!(left.iter().all(|v| *v >= 0.0));
             let sum: f64 = left.iter().sum();
@@ -110,7 +112,8 @@ mod tests {
         let start: Vec<f64> = (0..60).map(|n| f64::from(n * n % 23) / 7.0).collect();
         let kernel = Kernel::new(1.7);
         let mirror = |plane: &[f64]| plane.chunks(10).flat_map(|row| row.iter().rev().copied()).collect::<Vec<f64>>();
-        let (mut one, mut other) = (start.clone(), mirror(&start));
+        let mut one = start.clone();
+        let mut other = mirror(&start);
         convolve(&mut one, 10, &[kernel.clone(), kernel.clone()], 0.0);
         convolve(&mut other, 10, &[kernel.clone(), kernel], 0.0);
         assert_eq!(mirror(&one), other);

@@ -38,7 +38,8 @@ impl LightGrid {
     pub(crate) fn new(volumes: &[Volume<'_>], camera: &Camera, voxels: u32) -> Self {
         let is_lamp = !camera.is_orthographic();
         let views = || volumes.iter().flat_map(world_corners).map(|p| camera.view_from_world(p));
-        let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        let mut low = DVec3::INFINITY;
+        let mut high = DVec3::NEG_INFINITY;
         for p in views() {
             let spread = if is_lamp { p.z } else { 1.0 };
             let p = DVec3::new(p.x / spread, p.y / spread, p.z);
@@ -138,7 +139,8 @@ impl LightGrid {
             return self.depth;
         }
         let along = |n: usize, a: usize| self.corner[a] + (n as f64 + 0.5) * self.step[a];
-        let (x, y) = (along(x, 0), along(y, 1));
+        let x = along(x, 0);
+        let y = along(y, 1);
         self.depth * libm::sqrt(1.0 + x * x + y * y)
     }
 }

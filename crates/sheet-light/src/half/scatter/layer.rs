@@ -77,7 +77,9 @@ impl Layer {
         let ahead = 1.0 - behind;
         let a = omega * (ahead * (gamma1 + 1.0) + gamma2 * behind) / from_alike;
         let z = omega * (behind * (gamma1 - 1.0) + gamma2 * ahead) / from_alike;
-        let (sum, net, left) = (a + z, a - z, exp(-tau));
+        let sum = a + z;
+        let net = a - z;
+        let left = exp(-tau);
         let sources = [own * sum - through * sum * left - net, net * left - through * sum + own * sum * left];
         Self { own, through, sources }
     }
@@ -139,7 +141,8 @@ mod tests {
     fn lit(optics: &[Optics]) -> [f64; 3] {
         let layers: Vec<Layer> = optics.iter().map(Layer::new).collect();
         let n = layers.len();
-        let (mut beam, mut given) = (1.0, vec![0.0; n + 1]);
+        let mut beam = 1.0;
+        let mut given = vec![0.0; n + 1];
         let mut absorbed = 0.0;
         for (k, layer) in layers.iter().enumerate() {
             given[k] += beam * layer.sources[0];

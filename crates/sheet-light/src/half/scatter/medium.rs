@@ -56,7 +56,8 @@ struct Lattice<'a> {
 impl<'a> Lattice<'a> {
     fn new(volume: &'a Volume<'a>, scattering: Scattering) -> Self {
         let ahead = share_ahead(scattering, volume.material.asymmetry) as f32;
-        let (inverse, origin) = (volume.axes().inverse(), volume.origin());
+        let inverse = volume.axes().inverse();
+        let origin = volume.origin();
         Self { volume, inverse, origin, ahead, scatters: scatters(volume) }
     }
 

@@ -157,7 +157,8 @@ impl Emitters {
         for direction in (0..DIRECTIONS).filter(|d| steps(*d) != [0; 3]) {
             let step = steps(direction);
             let way = (0..3).map(|a| self.axes[a] * (self.sides[a] * step[a] as f64)).sum::<DVec3>();
-            let (length, towards) = (way.length(), way.normalize());
+            let length = way.length();
+            let towards = way.normalize();
             let mut passing = vec![[1.0; 3]; sums.len()];
             for at in ordered(counts, step) {
                 let k = (at[2] * counts[1] + at[1]) * counts[0] + at[0];
@@ -192,7 +193,8 @@ impl Emitters {
 
     /// Adds a share of a node.
     fn add(&self, level: usize, node: usize, share: f64, to: &Receiver, sum: &mut [f64; 3]) {
-        let (Level { counts, size, .. }, from) = (&self.levels[level], &self.levels[level].nodes[node]);
+        let Level { counts, size, .. } = &self.levels[level];
+        let from = &self.levels[level].nodes[node];
         if from.weight == 0.0 {
             return;
         }
@@ -279,16 +281,20 @@ fn merged(counts: [usize; 3], sides: [f64; 3]) -> [usize; 3] {
 /// Sums of the cells of all blocks.
 fn sums(emission: &Emission<'_>, merged: [usize; 3], counts: [usize; 3]) -> Vec<Sums> {
     let Emission { grid, cells, faces, sources, .. } = *emission;
-    let ([width, height], layers) = (grid.columns, grid.layers);
+    let [width, height] = grid.columns;
+    let layers = grid.layers;
     let mut out = vec![Sums::default(); counts.iter().product()];
     for (y, layer, x) in
         (0..height).flat_map(|y| (0..layers).flat_map(move |layer| (0..width).map(move |x| (y, layer, x))))
     {
-        let (at, face) = ((y * layers + layer) * width + x, (y * (layers + 1) + layer) * width + x);
-        let (cell, ends) = (&cells[at], [&faces[face], &faces[face + width]]);
+        let at = (y * layers + layer) * width + x;
+        let face = (y * (layers + 1) + layer) * width + x;
+        let cell = &cells[at];
+        let ends = [&faces[face], &faces[face + width]];
         let mean = |n: usize| 0.5 * f64::from(ends[0][n] + ends[1][n]);
         let place = grid.world([x as f64, y as f64, layer as f64 + 0.5]);
-        let (travel, volume) = (grid.travel(place), grid.area(layer as f64 + 0.5) * grid.depth);
+        let travel = grid.travel(place);
+        let volume = grid.area(layer as f64 + 0.5) * grid.depth;
         let block = [x / merged[0], y / merged[1], layer / merged[2]];
         let sum = &mut out[(block[2] * counts[1] + block[1]) * counts[0] + block[0]];
         sum.cells += 1.0;

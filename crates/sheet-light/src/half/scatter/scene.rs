@@ -40,9 +40,11 @@ impl Scene {
     ) -> Self {
         let camera = lamp::camera_of(&Bodies::volumes(volumes), &lit.light, params);
         let (grid, cells) = medium::resolved(volumes, &camera, params);
-        let ([width, height], layers) = (grid.columns, grid.layers);
+        let [width, height] = grid.columns;
+        let layers = grid.layers;
         let one = Light { intensity: [1.0; 3], ..lit.light };
-        let (area, lit_by_one) = (grid.area(0.0), LitBy { light: one, ..*lit });
+        let area = grid.area(0.0);
+        let lit_by_one = LitBy { light: one, ..*lit };
         let entering = |channel: usize| {
             let column = |at: usize| {
                 let place = grid.world([(at % width) as f64, (at / width) as f64, 0.0]);
@@ -88,7 +90,8 @@ impl Scene {
         if self.others.is_empty() {
             return Vec::new();
         }
-        let ([width, _], layers) = (self.grid.columns, self.grid.layers);
+        let [width, _] = self.grid.columns;
+        let layers = self.grid.layers;
         let cell = |at: usize| {
             let node = [at % width, at / (width * layers)];
             self.path().passing(at / width % layers, node, channel)
@@ -98,8 +101,10 @@ impl Scene {
 
     /// The beam of a channel, and the equations of what it gives to two streams.
     pub(crate) fn streams(&self, channel: usize) -> (Beam, Streams) {
-        let (beam, passing) = (self.path().march(channel), self.passing(channel));
-        let (grid, cells) = (&self.grid, &self.cells[..]);
+        let beam = self.path().march(channel);
+        let passing = self.passing(channel);
+        let grid = &self.grid;
+        let cells = &self.cells[..];
         let streams = Streams::new(&Sources { grid, cells, channel, incoming: &beam.incoming, passing: &passing });
         (beam, streams)
     }

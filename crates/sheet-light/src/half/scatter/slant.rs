@@ -15,7 +15,8 @@ pub(crate) const WEIGHTS: [f64; 2] = [0.5, 0.25];
 
 /// Share of the sides' area, by cell.
 pub(super) fn shares(of: &Sources<'_>) -> Vec<f64> {
-    let ([width, height], layers) = (of.grid.columns, of.grid.layers);
+    let [width, height] = of.grid.columns;
+    let layers = of.grid.layers;
     let lines = [(width, 1), (height, layers * width), (layers, width)];
     let mut media: Vec<f64> = of.cells.iter().map(|cell| transport(cell, of.channel)).collect();
     let mut line = Vec::new();
@@ -48,7 +49,8 @@ pub(super) fn shares(of: &Sources<'_>) -> Vec<f64> {
 /// √((1 − |n_z|)/(|n_x| + |n_y|)) for a gradient; 1 without any.
 pub(crate) fn of_normal(gradient: [f64; 3]) -> f64 {
     let [x, y, z] = gradient.map(f64::abs);
-    let (length, sides) = (libm::sqrt(x * x + y * y + z * z), x + y);
+    let length = libm::sqrt(x * x + y * y + z * z);
+    let sides = x + y;
     // √(x² + y² + z²) − z without the digits that cancel.
     if sides > 0.0 { libm::sqrt((x * x + y * y) / ((length + z) * sides)) } else { 1.0 }
 }

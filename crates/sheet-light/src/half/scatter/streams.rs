@@ -62,7 +62,8 @@ pub(crate) struct Sources<'a> {
 pub(crate) fn optics(cell: &Cell, channel: usize, length: f64) -> Optics {
     let [extinction, scattering, forward, ahead] =
         [cell.extinction, cell.scattering, cell.forward, cell.ahead].map(|v| f64::from(v[channel]));
-    let (left, scattered) = (extinction - ahead, scattering - ahead);
+    let left = extinction - ahead;
+    let scattered = scattering - ahead;
     Optics {
         tau: left.max(0.0) * length,
         omega: if left > 0.0 { (scattered / left).clamp(0.0, 1.0) } else { 0.0 },
@@ -78,7 +79,8 @@ pub(crate) fn transport(cell: &Cell, channel: usize) -> f64 {
 impl Streams {
     pub(crate) fn new(of: &Sources<'_>) -> Self {
         let (grid, [width, height], layers) = (of.grid, of.grid.columns, of.grid.layers);
-        let (cells, faces) = (grid.cells(), width * height * (layers + 1));
+        let cells = grid.cells();
+        let faces = width * height * (layers + 1);
         let mut out = Self {
             columns: grid.columns,
             layers,
@@ -99,7 +101,8 @@ impl Streams {
 
     /// Fills in what goes along the columns.
     fn add_layers(&mut self, of: &Sources<'_>) {
-        let (layers, width) = (self.layers, self.columns[0]);
+        let layers = self.layers;
+        let width = self.columns[0];
         let rows = self
             .own
             .par_chunks_mut(layers * width)
@@ -107,7 +110,8 @@ impl Streams {
             .zip(self.given.par_chunks_mut(layers * width));
         rows.enumerate().for_each(|(y, ((own, through), given))| {
             for at in 0..layers * width {
-                let (cell, area) = (y * layers * width + at, of.grid.area((at / width) as f64 + 0.5));
+                let cell = y * layers * width + at;
+                let area = of.grid.area((at / width) as f64 + 0.5);
                 let length = of.grid.length([at % width, y]);
                 let layer = Layer::new(&optics(&of.cells[cell], of.channel, length));
                 let passing = of.passing.get(cell).copied().unwrap_or(1.0);
@@ -123,7 +127,8 @@ impl Streams {
 
     /// Fills in what goes between columns and out by the sides.
     fn add_sides(&mut self, of: &Sources<'_>) {
-        let ([width, height], layers) = (self.columns, self.layers);
+        let [width, height] = self.columns;
+        let layers = self.layers;
         let mut open = vec![[0.0; SIDES]; self.own.len()];
         let mut line = Line::default();
         for direction in 0..2 {
@@ -154,10 +159,12 @@ impl Streams {
 
     /// Sums all that leaves each face.
     fn add_up(&mut self) {
-        let ([width, height], layers) = (self.columns, self.layers);
+        let [width, height] = self.columns;
+        let layers = self.layers;
         let row = (layers + 1) * width;
         for at in 0..row * height {
-            let ([x, face], y) = ([at % width, at / width % (layers + 1)], at / row);
+            let [x, face] = [at % width, at / width % (layers + 1)];
+            let y = at / row;
             let cell = (y * layers + face) * width + x;
             let (before, down) =
                 if face == 0 { (self.ends[0], 0.0) } else { (self.own[cell - width], self.given[cell - width][1]) };
@@ -178,9 +185,11 @@ impl Streams {
 
     /// Net flux at a face per area: along x, along y, with the light.
     pub(crate) fn flux(&self, grid: &LightGrid, psi: &[f64], at: usize) -> [f64; 3] {
-        let ([width, _], layers) = (self.columns, self.layers);
+        let [width, _] = self.columns;
+        let layers = self.layers;
         let row = (layers + 1) * width;
-        let ([x, face], y) = ([at % width, at / width % (layers + 1)], at / row);
+        let [x, face] = [at % width, at / width % (layers + 1)];
+        let y = at / row;
         let along = self.along(psi, [x, y, face]) / grid.area(face as f64);
         let [mut right, mut up] = [0.0; 2];
         let share = if face == 0 || face == layers { 0.5 } else { 1.0 };
@@ -197,7 +206,8 @@ impl Streams {
 
     /// J at a face: the mean of what leaves the layer before and what enters the one behind; sideways flow is the difference.
     fn along(&self, psi: &[f64], [x, y, face]: [usize; 3]) -> f64 {
-        let (width, layers) = (self.columns[0], self.layers);
+        let width = self.columns[0];
+        let layers = self.layers;
         let at = (y * (layers + 1) + face) * width + x;
         let cell = (y * layers + face) * width + x;
         let before = match face {
@@ -231,7 +241,8 @@ impl Line {
         let grid = of.grid;
         let layer = start / grid.columns[0] % grid.layers;
         let spread = grid.spread(layer as f64 + 0.5);
-        let (along, height) = (grid.step[direction] * spread, grid.step[1 - direction] * spread * grid.depth);
+        let along = grid.step[direction] * spread;
+        let height = grid.step[1 - direction] * spread * grid.depth;
         let thinnest = 1.0 / (LONGEST_WAY * count as f64);
         let tau = |i: usize| transport(&of.cells[start + i * step], of.channel) * along;
         self.optical.clear();

@@ -55,9 +55,11 @@ impl SurfaceLight {
     pub(super) fn new(scene: &Scene, faces: &[[f32; NUMBERS]], given: &Given) -> Self {
         let Given { sources, leaving } = given;
         let Scene { grid, cells, .. } = scene;
-        let (width, layers) = (grid.columns[0], grid.layers);
+        let width = grid.columns[0];
+        let layers = grid.layers;
         let one = |(at, face): (usize, &[f32; NUMBERS])| {
-            let ([x, level], y) = ([at % width, at / width % (layers + 1)], at / (width * (layers + 1)));
+            let [x, level] = [at % width, at / width % (layers + 1)];
+            let y = at / (width * (layers + 1));
             let sides = [level.saturating_sub(1), level.min(layers - 1)].map(|layer| (y * layers + layer) * width + x);
             let of = |first: usize| [0, 1, 2].map(|c| face[first + c]);
             let flux = |c: usize| (0..3).map(|a| grid.axes[a] * f64::from(face[FLUX + 3 * a + c])).sum();
@@ -96,12 +98,15 @@ impl SurfaceLight {
     /// The same in the media.
     fn inside(&self, world: DVec3, normal: DVec3, travel: DVec3) -> [f64; 3] {
         let place = self.grid.place(world + normal * self.half_a_cell(normal, world));
-        let ([width, height], layers) = (self.grid.columns, self.grid.layers);
+        let [width, height] = self.grid.columns;
+        let layers = self.grid.layers;
         let counts = [width, height, layers + 1];
-        let (mut sum, mut weights) = ([0.0; 3], 0.0);
+        let mut sum = [0.0; 3];
+        let mut weights = 0.0;
         let ahead = (-travel.dot(normal)).max(0.0);
         for corner in 0..8 {
-            let (mut weight, mut at) = (1.0, [0; 3]);
+            let mut weight = 1.0;
+            let mut at = [0; 3];
             for a in 0..3 {
                 let low = place[a].floor();
                 let is_next = corner >> a & 1 == 1;
@@ -177,7 +182,8 @@ impl SurfaceLight {
             0.0 => [0.0; 3],
             share => self.irradiance(world, normal, travel).map(|e| share * e),
         };
-        let (front, back) = (arriving(normal, 1.0 - m.transmission), arriving(-normal, m.transmission));
+        let front = arriving(normal, 1.0 - m.transmission);
+        let back = arriving(-normal, m.transmission);
         [0, 1, 2].map(|c| light.intensity[c] * color[c] * m.diffuse / PI * (front[c] + back[c]))
     }
 
@@ -212,7 +218,8 @@ impl SurfaceLight {
 
 /// How much of each cell belongs to the media: its optical depth as a share of the greatest among its neighbours, of which little is next to nothing.
 fn filled(grid: &LightGrid, cells: &[Cell]) -> Vec<f32> {
-    let ([width, height], layers) = (grid.columns, grid.layers);
+    let [width, height] = grid.columns;
+    let layers = grid.layers;
     let optical_depth = |cell: &Cell| cell.extinction.into_iter().fold(0.0, f32::max) * grid.depth as f32;
     let own: Vec<f32> = cells.iter().map(optical_depth).collect();
     let mut most = own.clone();

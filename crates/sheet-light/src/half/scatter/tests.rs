@@ -44,7 +44,8 @@ fn cells() -> LightGrid {
 #[test]
 fn ms07_light_ahead_spreads_as_its_cone_says() {
     let grid = cells();
-    let ([width, height], layers) = (grid.columns, grid.layers);
+    let [width, height] = grid.columns;
+    let layers = grid.layers;
     let depth = layers as f64 * grid.depth;
     // All is scattered in the first layer, and nothing behind it.
     let sigma = (40.0 / grid.depth) as f32;
@@ -81,7 +82,8 @@ fn ms08_light_that_fades_ends_before_its_numbers_are_not_normal() {
         Cell { extinction: [sigma; 3], scattering: [0.5 * sigma; 3], ahead: [0.2 * sigma; 3], ..Cell::default() };
     let entering = vec![1.0; grid.columns[0] * grid.columns[1]];
     let entering = [entering.clone(), entering.clone(), entering];
-    let (cells, others) = (vec![cell; grid.cells()], &[]);
+    let cells = vec![cell; grid.cells()];
+    let others = &[];
     let beam = Path { grid: &grid, cells: &cells, entering: &entering, others, cone: 0.3 }.march(0);
     assert!(beam.incoming.iter().any(|power| *power > 0.5) && beam.transmitted == 0.0);
     assert!(beam.incoming.iter().all(|power| *power == 0.0 || *power > 1e-30), "a trace goes on");

@@ -16,14 +16,16 @@ use splat_core::glam::Vec3;
 /// By face: share of each channel, of the light whose image `camera` takes.
 pub(crate) fn through(splats: &HalfSplats<'_>, grid: &LightGrid, camera: &Camera) -> Vec<[f32; 3]> {
     let frame = grid.slabs();
-    let (count, width) = (frame.slabs.count, frame.slabs.width as f32);
+    let count = frame.slabs.count;
+    let width = frame.slabs.width as f32;
     let place = |p: &Vec3| frame.point(splats.cloud.origin + p.as_dvec3()).as_vec3();
     let places: Vec<Vec3> = splats.cloud.position.par_iter().map(place).collect();
     // What lies before the first slab is in it, what lies behind the last in that.
     let slabs: Vec<u32> = places.iter().map(|p| ((p.z / width) as u32).min(count - 1)).collect();
     let by_slab = BySlab::new(&slabs, count);
     let mut light = SplatLight::new(splats, &frame, (&Sight::new(&frame, *camera), 1.0), (&places, &by_slab.ids), 3);
-    let ([columns, rows], faces) = (grid.columns, grid.layers + 1);
+    let [columns, rows] = grid.columns;
+    let faces = grid.layers + 1;
     let mut out = vec![[1.0; 3]; columns * rows * faces];
     for slab in 0..count {
         light.enter(slab, by_slab.of(slab), &slabs, &places);

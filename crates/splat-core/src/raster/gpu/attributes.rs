@@ -55,7 +55,8 @@ impl AttributeBuffers {
 
     /// Each beside its twin, as [`Recording::join`] takes them.
     pub fn shared(&self, with: &Self) -> [(BufferId, BufferId); 4] {
-        let (own, other) = (self.all(), with.all());
+        let own = self.all();
+        let other = with.all();
         std::array::from_fn(|k| (own[k], other[k]))
     }
 }
@@ -137,7 +138,8 @@ impl Attributes {
     pub(crate) fn check(&self, room: AttributeRoom, materials: usize, footprints: usize) -> Result<(), Error> {
         super::fits("splats", self.room.splats.into(), room.splats)?;
         if self.room.frame_words != room.frame_words {
-            let (found, expected) = (self.room.frame_words as usize, room.frame_words as usize);
+            let found = self.room.frame_words as usize;
+            let expected = room.frame_words as usize;
             return Err(Error::ColumnLength { attribute: "words of a frame", found, expected });
         }
         for (what, greatest, had) in

@@ -50,8 +50,10 @@ pub fn uploads(recorded: &Recorded, input: &Input<'_>, accumulator: &Accumulator
     let Input { camera, materials, direction, params, order, objects, .. } = *input;
     super::fits("splats in order", order.len() as u64, recorded.capacities.ordered)?;
     let perspective = (!camera.is_orthographic()).then_some(camera.focal_px() as f32);
-    let (size, kernels) = (camera.size, &kernels[..]);
-    let (none, ordered) = (OpaqueImage::default(), order.len() as u32);
+    let size = camera.size;
+    let kernels = &kernels[..];
+    let none = OpaqueImage::default();
+    let ordered = order.len() as u32;
     let (opaque, hidden) = (input.opaque.unwrap_or(&none), input.opaque.is_none());
     let image = Image { size, perspective, kernels, materials, opaque, direction, params, ordered, objects, hidden };
     recorded.check_image(&image, accumulator)?;

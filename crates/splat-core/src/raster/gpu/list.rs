@@ -61,7 +61,8 @@ impl List {
         // Bits of the greatest tile.
         let passes = (tiles - 1).checked_ilog2().map_or(0, |top| top as usize / 8 + 1);
         for pass in 0..passes {
-            let (from, to) = (pass % 2, 1 - pass % 2);
+            let from = pass % 2;
+            let to = 1 - pass % 2;
             sort_pass(
                 r,
                 SortPass {
@@ -73,7 +74,8 @@ impl List {
                 },
             );
         }
-        let (keys, ids) = (keys[passes % 2], ids[passes % 2]);
+        let keys = keys[passes % 2];
+        let ids = ids[passes % 2];
         let ranged = [view, sort, keys, starts, state];
         r.dispatch(&kernels::SPLAT_RANGES, Groups::cover((tiles + 1).div_ceil(256)), &ranged, &[]);
         ids
@@ -95,13 +97,16 @@ impl Counts {
     /// Of this list and another together.
     #[must_use]
     pub fn and(&self, other: &Self) -> Self {
-        let (splats, entries) = (self.splats + other.splats, self.entries + other.entries);
+        let splats = self.splats + other.splats;
+        let entries = self.entries + other.entries;
         Self { splats, entries, longest: self.longest.max(other.longest) }
     }
 
     /// From the bytes of a [`SplatState`], of a list with so much room.
     pub(super) fn read(state: &[u8], room: u32) -> Result<Self, Error> {
-        let (attribute, found, expected) = ("state read back", state.len(), size_of::<SplatState>());
+        let attribute = "state read back";
+        let found = state.len();
+        let expected = size_of::<SplatState>();
         let bytes = state.get(..expected).ok_or(Error::ColumnLength { attribute, found, expected })?;
         let state: SplatState = bytemuck::pod_read_unaligned(bytes);
         let entries = u64::from(state.entries_low) | u64::from(state.entries_high) << 32;

@@ -30,7 +30,8 @@ pub(super) fn words(accumulator: &Accumulator) -> Vec<u32> {
 
 /// Puts what was read back into an accumulator with the same planes.
 pub(super) fn put(bytes: &[u8], accumulator: &mut Accumulator) -> Result<(), Error> {
-    let (profiles, objects) = (accumulator.depth.len(), accumulator.object.len());
+    let profiles = accumulator.depth.len();
+    let objects = accumulator.object.len();
     let numbers = sums(accumulator).map(<[f32]>::len).sum::<usize>() + WORDS * profiles + objects;
     equal_lengths([("planes read back", bytes.len(), 4 * numbers)])?;
     let (words, _) = bytes.as_chunks::<4>();

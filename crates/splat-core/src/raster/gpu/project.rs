@@ -129,7 +129,8 @@ impl Recorded {
                 "formulas: images are the processor's",
             ));
         }
-        let (room, footprints) = (self.capacities, input.footprints.layers());
+        let room = self.capacities;
+        let footprints = input.footprints.layers();
         attributes.check(room.attributes, input.materials.len(), footprints.len())?;
         fits("footprints", footprints.len() as u64, room.footprints)?;
         fits("materials", input.materials.len() as u64, room.materials)?;
@@ -186,7 +187,9 @@ pub fn through_the_eye(state: &[u8]) -> Result<u64, Error> {
 }
 
 fn read(state: &[u8]) -> Result<ProjectState, Error> {
-    let (attribute, found, expected) = ("state read back", state.len(), size_of::<ProjectState>());
+    let attribute = "state read back";
+    let found = state.len();
+    let expected = size_of::<ProjectState>();
     let bytes = state.get(..expected).ok_or(Error::ColumnLength { attribute, found, expected })?;
     Ok(bytemuck::pod_read_unaligned(bytes))
 }

@@ -135,7 +135,8 @@ impl Recorded {
     /// [`Error::Overflow`] for more than there is room for, [`Error::ColumnLength`] for columns of different lengths,
     /// [`Error::Invalid`] for an id that no splat has.
     pub fn uploads(&self, input: &OpaqueInput<'_>) -> Result<Uploads, Error> {
-        let (projected, room) = (input.projected, self.capacities);
+        let projected = input.projected;
+        let room = self.capacities;
         check_special(projected)?;
         let n = projected.splats.len();
         fits("splats", n as u64, room.splats)?;

@@ -24,7 +24,8 @@ pub(super) fn resolve<T: Copy + Send>(
     let [width, height] = of.camera.size.map(|s| s as usize);
     let found = Found::new(of);
     progress.add_total(height.div_ceil(ROWS) as u64);
-    let (mut depth, mut kept) = (vec![f32::INFINITY; width * height], vec![none; width * height]);
+    let mut depth = vec![f32::INFINITY; width * height];
+    let mut kept = vec![none; width * height];
     let bands = depth.par_chunks_mut(width * ROWS).zip(kept.par_chunks_mut(width * ROWS)).enumerate();
     bands.for_each(|(b, (depth, kept))| {
         if progress.tick(1).is_err() {

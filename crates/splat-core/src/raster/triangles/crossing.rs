@@ -30,7 +30,8 @@ impl Plane {
     pub(super) fn new(of: &Meshes<'_>, triangle: [DVec3; 3]) -> Self {
         let is_parallel = of.camera.is_orthographic();
         let weight = |k: usize| {
-            let (a, b) = (triangle[(k + 1) % 3], triangle[(k + 2) % 3]);
+            let a = triangle[(k + 1) % 3];
+            let b = triangle[(k + 2) % 3];
             // Of the ray's x, of its y, and without either.
             let (x, y, rest) = if is_parallel {
                 (a.y - b.y, b.x - a.x, a.x * b.y - a.y * b.x)
@@ -38,7 +39,8 @@ impl Plane {
                 let normal = a.cross(b);
                 (normal.x, normal.y, normal.z)
             };
-            let (column, row) = (x / of.focal, -y / of.focal);
+            let column = x / of.focal;
+            let row = -y / of.focal;
             let [width, height] = of.camera.size.map(|s| 0.5 * f64::from(s) - 0.5);
             DVec3::new(rest - column * width - row * height, column, row)
         };

@@ -78,7 +78,8 @@ pub fn resolve_layers<T: Copy + Send + Sync>(
     Exceeded::check("layers of translucent triangles", needed, most, "bytes", hint).map_err(Error::Limit)?;
     (1..starts.len()).for_each(|k| starts[k] += starts[k - 1]);
     let mut all = vec![none; total as usize];
-    let (mut lists, mut rest) = (Vec::new(), &mut all[..]);
+    let mut lists = Vec::new();
+    let mut rest = &mut all[..];
     for first in (0..width * height).step_by(width * ROWS) {
         let own = &starts[first..=(first + width * ROWS).min(width * height)];
         let (list, behind) = rest.split_at_mut((own[own.len() - 1] - own[0]) as usize);
@@ -89,7 +90,8 @@ pub fn resolve_layers<T: Copy + Send + Sync>(
         if progress.tick(1).is_err() || list.is_empty() {
             return;
         }
-        let (base, first) = (starts[0], band * ROWS * width);
+        let base = starts[0];
+        let first = band * ROWS * width;
         let mut ends: Vec<u32> = starts[..starts.len() - 1].iter().map(|start| start - base).collect();
         // Depths in double precision, and the order of equal ones.
         let mut met = vec![(f64::INFINITY, 0u32, none); list.len()];

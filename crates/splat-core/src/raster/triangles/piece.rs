@@ -51,7 +51,8 @@ impl Piece {
 
     fn middles(&self, axis: usize, size: u32) -> Range<usize> {
         let [a, b, c] = self.corners.map(|corner| i64::from(corner[axis]));
-        let (low, high) = (a.min(b).min(c), a.max(b).max(c));
+        let low = a.min(b).min(c);
+        let high = a.max(b).max(c);
         // Pixel n has its middle at n + 1/2.
         let first = (low - PIXEL / 2).div_ceil_euclid(PIXEL).max(0);
         let end = ((high - PIXEL / 2).div_euclid(PIXEL) + 1).min(i64::from(size));
@@ -61,10 +62,12 @@ impl Piece {
     /// Columns of a row whose middles are inside.
     pub(super) fn span(&self, row: usize, width: u32) -> Range<usize> {
         let y = row as i64 * PIXEL + PIXEL / 2;
-        let (mut first, mut end) = (0, i64::from(width));
+        let mut first = 0;
+        let mut end = i64::from(width);
         for k in 0..3 {
             let [a, b] = [self.corners[k], self.corners[(k + 1) % 3]].map(|corner| corner.map(i64::from));
-            let (dx, dy) = (b[0] - a[0], b[1] - a[1]);
+            let dx = b[0] - a[0];
+            let dy = b[1] - a[1];
             // To the right of an edge upwards, or below one to the right: a middle on it is inside.
             let least = if dy < 0 || (dy == 0 && dx > 0) { 0 } else { 1 };
             // Above or at `least` where the place is inside; at column 0, and what each further column takes away.
@@ -118,7 +121,8 @@ mod tests {
         let middle = [x, y].map(|v| i128::from(v * PIXEL + PIXEL / 2));
         (0..3).all(|k| {
             let [a, b] = [piece.corners[k], piece.corners[(k + 1) % 3]].map(|c| c.map(i128::from));
-            let (dx, dy) = (b[0] - a[0], b[1] - a[1]);
+            let dx = b[0] - a[0];
+            let dy = b[1] - a[1];
             let side = dx * (middle[1] - a[1]) - dy * (middle[0] - a[0]);
             side > 0 || (side == 0 && (dy < 0 || (dy == 0 && dx > 0)))
         })
@@ -127,7 +131,8 @@ mod tests {
     /// Spans are those of each pixel by itself, in 128 bits: slivers, corners on middles, and corners as far away as there are any.
     #[test]
     fn hv11_spans_are_those_of_exact_edge_functions() {
-        let (width, height) = (24, 16);
+        let width = 24;
+        let height = 16;
         for item in 0..3000u64 {
             let unit = |n: u64| rng::unit(11, 0, item, n);
             let corner = |n: u64| -> [i32; 2] {

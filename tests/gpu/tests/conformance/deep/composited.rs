@@ -90,7 +90,8 @@ fn a_composited_picture_is_the_processor_s_within_the_tolerance() {
     for direction in ["front_to_back", "back_to_front"] {
         let settings = format!("[render.points]\ndirection = \"{direction}\"");
         let alone = picture(&settings, None);
-        let (beauty, alpha) = (alone.layers.rgb("beauty").unwrap(), alone.layers.scalar("alpha").unwrap());
+        let beauty = alone.layers.rgb("beauty").unwrap();
+        let alpha = alone.layers.scalar("alpha").unwrap();
         let brightest = beauty.iter().flatten().fold(0.0, |most: f32, v| most.max(*v));
         assert!(brightest > 0.1 && alpha.iter().any(|a| *a > 0.5) && alpha.contains(&0.0), "a picture of something");
         let (name, device) = crate::named_device();
@@ -172,7 +173,8 @@ fn every_layer_that_is_shaded_is_the_processor_s() {
     assert_eq!(names(&alone), names(&helped));
     for name in ["ambient", "direct", "scatter1", "normal"] {
         let of = |r: &Render| r.layers.rgb(name).unwrap().as_flattened().to_vec();
-        let (a, b) = (of(&alone), of(&helped));
+        let a = of(&alone);
+        let b = of(&helped);
         let largest = a.iter().fold(0.0, |most: f32, v| most.max(v.abs()));
         assert!(largest > 0.0 && a.iter().zip(&b).all(|(a, b)| (a - b).abs() <= TOLERANCE * largest), "{name}");
     }
@@ -336,7 +338,8 @@ fn depth_and_object_layers_are_the_processor_s() {
         let mut others = expected.iter().zip(found).filter(|(a, b)| a != b).count();
         assert!((0..3).all(|o| expected.contains(&o)) && expected.contains(&u32::MAX));
         for layer in ["depth.first", "depth.median", "depth.mean", "depth.sigma"] {
-            let (a, b) = (alone.layers.scalar(layer).unwrap(), helped.layers.scalar(layer).unwrap());
+            let a = alone.layers.scalar(layer).unwrap();
+            let b = helped.layers.scalar(layer).unwrap();
             assert!(a.iter().any(|z| *z < f32::INFINITY));
             // A level may be reached one splat earlier or later; a deviation is the root of a variance.
             let near = |(a, b): (&f32, &f32)| a == b || (a - b).abs() <= 1e-3;

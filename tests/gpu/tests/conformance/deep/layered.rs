@@ -22,12 +22,14 @@ fn apart(both: &Both, solid: &OpaqueImage) -> ([f32; 2], f64) {
         let wall = solid.depth.get(k).copied().filter(|z| *z < f32::INFINITY);
         profile.depths(plane[k], wall)
     };
-    let (mut off, mut others) = ([vec![0f32], vec![0f32]], 0);
+    let mut off = [vec![0f32], vec![0f32]];
+    let mut others = 0;
     let n = both.cpu.depth.len().max(both.cpu.object.len());
     for k in 0..n {
         let mut other = both.cpu.object.get(k) != both.gpu.object.get(k);
         if let (Some(a), Some(b)) = (both.cpu.depth.get(k), both.gpu.depth.get(k)) {
-            let (a, b) = (depths(a, &both.cpu, k), depths(b, &both.gpu, k));
+            let a = depths(a, &both.cpu, k);
+            let b = depths(b, &both.gpu, k);
             // Where nothing is, both say so; what is no number is as far apart as can be.
             let of = |i: usize| if a[i] == b[i] { 0.0 } else { (a[i] - b[i]).abs().min(f32::INFINITY) };
             other |= !(of(0) <= DEPTH_TOLERANCE && of(1) <= DEPTH_TOLERANCE);
@@ -65,7 +67,8 @@ fn depths_and_objects_are_the_cpu_s() {
             {
                 let mut cloud = mixed();
                 (0..cloud.len()).step_by(2).for_each(|i| cloud.material[i] = u16::from(planes == 3));
-                let (opaque, materials) = (opaque.clone(), vec![Material::default(), green]);
+                let opaque = opaque.clone();
+                let materials = vec![Material::default(), green];
                 let scene = Scene { depths, objects, planes, channels, opaque, materials, ..Scene::new(cloud, view) };
                 let (both, difference) = scene.compare(&mut device);
                 let ([mean, sigma], others) = apart(&both, &scene.opaque);
@@ -108,7 +111,8 @@ fn the_last_object_is_seen_back_to_front_and_wrong_depths_are_found() {
 fn depths_go_on_where_a_fold_before_ended() {
     let mut device = open().unwrap();
     let scene = Scene { depths: true, objects: true, ..Scene::new(mixed(), VIEWS[1]) };
-    let (order, empty) = (scene.order(), scene.accumulator());
+    let order = scene.order();
+    let empty = scene.accumulator();
     let (near, far) = order.split_at(1500);
     let whole = scene.both(&mut device, &order, &empty, 1 << 18).unwrap().gpu;
     let first = scene.both(&mut device, near, &empty, 1 << 18).unwrap().gpu;

@@ -12,7 +12,10 @@ const RUNS: u32 = 12;
 fn deviations(a: &Ensemble, b: &Ensemble) -> [f64; 3] {
     let levels = f64::from(a.levels());
     assert_eq!(a.levels(), b.levels());
-    let (mut chi2, mut bins, mut sum, mut variance) = (0.0, 0.0, 0.0, 0.0);
+    let mut chi2 = 0.0;
+    let mut bins = 0.0;
+    let mut sum = 0.0;
+    let mut variance = 0.0;
     for (x, y) in pixels() {
         let [ha, hb] = [a, b].map(|e| f64::from(e.hits(x, y)));
         let p = (ha + hb) / (2.0 * levels);

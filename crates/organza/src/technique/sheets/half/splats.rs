@@ -44,7 +44,8 @@ impl OwnSplats {
 
     pub(super) fn input<'a>(&'a self, frame: &'a Frame<'_>) -> HalfSplats<'a> {
         let Self { cloud, projected, slab_width } = self;
-        let (materials, objects) = (&frame.loaded.materials, &frame.loaded.objects);
+        let materials = &frame.loaded.materials;
+        let objects = &frame.loaded.objects;
         let footprints = &frame.loaded.footprints;
         HalfSplats { cloud, materials, objects, footprints, projected, slab_width: *slab_width }
     }

@@ -51,7 +51,8 @@ pub(super) fn read<S: Source>(
     reading: &mut Reading<'_>,
 ) -> Result<RawPoints, ReadError> {
     let mut all = Elements { chunks: Vec::new(), words: Vec::new(), rest: Vec::new(), degree: 0 };
-    let (mut place, mut of_rest) = (at_line(header.body_line), None);
+    let mut place = at_line(header.body_line);
+    let mut of_rest = None;
     for element in &header.elements {
         check_count(&source, element)?;
         match element.name.as_slice() {
