@@ -190,6 +190,59 @@ fn what_does_not_converge_is_refused_with_what_it_would_take() {
 }
 
 #[test]
+fn a_study_that_is_interrupted_keeps_what_it_has() {
+    // A study draws each setting once, the ends and the limit, and then repeats.
+    let drawn_until = |last: usize| {
+        let mut draws = 0;
+        let mut draw = |request: &Request| {
+            draws += 1;
+            if draws > last {
+                return Err(Error::Cancelled);
+            }
+            let n = f64::from(request.oversample);
+            let cut = request.scene.render.points.transmittance_cutoff;
+            Ok(frame(slab_image(n, 0.5, cut), 1e-3 * n * (2.0 - cut)))
+        };
+        let study = study(&sweep(), Err("a test".into()), &OPTIONS, &Progress::new(), &mut draw);
+        (study, draws)
+    };
+    let (whole, draws) = drawn_until(usize::MAX);
+    let whole = whole.unwrap();
+    let repeats = whole.outcomes.iter().map(|o| o.timed.seconds.len()).sum::<usize>();
+    let before_repeats = draws - repeats;
+    assert!(matches!(drawn_until(before_repeats - 1).0, Err(Error::Cancelled)), "the limit is not known");
+    for last in [before_repeats + 5, draws - 1] {
+        let part = drawn_until(last).0.unwrap();
+        assert_eq!((part.outcomes.len(), &part.limit), (whole.outcomes.len(), &whole.limit));
+        assert_eq!(part.outcomes.iter().map(|o| o.timed.seconds.len()).sum::<usize>(), last - before_repeats);
+        assert!(!part.frontier.is_empty());
+        let timed = |setting: &usize| least_seconds(&part.outcomes[*setting]).is_some();
+        assert!(part.frontier.iter().all(timed), "what was never timed is on no frontier");
+    }
+}
+
+#[test]
+fn a_setting_that_is_the_limit_leads_the_frontier() {
+    // All but the cut is exact, and the base has no cut: what is slower and less exact comes after nothing.
+    let mut exact = sweep();
+    exact.base.scene.render.points.transmittance_cutoff = 0.0;
+    exact.base.oversample = 256;
+    exact.knobs.remove(0);
+    exact.knobs[0].joint = false;
+    exact.joint_levels = 0;
+    let mut draw = |request: &Request| {
+        let cut = request.scene.render.points.transmittance_cutoff;
+        // The cut of .01 is a little slower than none.
+        Ok(frame(slab_image(256.0, 0.5, cut), if cut == 0.01 { 1.2 } else { 1.0 - 5.0 * cut }))
+    };
+    let study = study(&exact, Err("a test".into()), &OPTIONS, &Progress::new(), &mut draw).unwrap();
+    let labels: Vec<&str> = study.frontier.iter().map(|i| study.outcomes[*i].setting.label.as_str()).collect();
+    assert_eq!(labels, ["the scene's own", "cut: 0.03", "cut: 0.1"]);
+    let html = Report::new(&scene(), OPTIONS, vec![study], Vec::new()).html().unwrap();
+    assert!(html.contains("none: the limit's picture"));
+}
+
+#[test]
 fn what_was_not_measured_is_null() {
     let mut draw = |request: &Request| {
         let n = f64::from(request.oversample);
@@ -208,7 +261,11 @@ fn what_was_not_measured_is_null() {
     let failed = settings.iter().find(|s| s["setting"] == "slabs: 16").unwrap();
     assert!(failed["seconds"].is_null() && failed["from_limit"].is_null() && failed["from_truth"].is_null());
     assert_eq!(failed["failure"], "the table needs 9 bytes, the limit is 1");
-    assert!(report.csv().lines().any(|l| l.starts_with("\"slabs\",\"slabs: 16\",\"slabs\",false,false,,,")));
+    let csv = report.csv();
+    assert!(csv.lines().any(|l| l.contains(",\"slabs\",\"slabs: 16\",\"slabs\",false,false,,,")));
+    // Every line says of which scene and by what: tables of several runs can be joined.
+    assert!(csv.starts_with("scene,width_px,height_px,version,processor,threads,technique,"));
+    assert!(csv.lines().skip(1).all(|l| l.starts_with("\"s.toml\",24,16,")), "{csv}");
     assert!(report.html().unwrap().contains("Not drawn: slabs: 16"));
     // Two repeats of everything else, and more of what the frontier hangs on.
     assert!(

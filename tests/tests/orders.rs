@@ -1,10 +1,11 @@
 //! `organza orders`: every ordering against the truth of each pixel.
 
 use organza::{Progress, RenderOptions, scene};
-use organza_judge::orders::compare;
+use organza_judge::orders::{Options, OrdersReport, compare};
 use organza_tests::organza;
 use serde_json::Value;
 use std::fs;
+use std::sync::OnceLock;
 
 /// Two media of different colour inside each other, above an opaque ground.
 const SCENE: &str = r#"version = 1
@@ -72,9 +73,51 @@ fn a_scene_without_translucent_splats_has_no_order() {
     let elsewhere = SCENE.replace("target = [0, 0, 0]", "target = [0, 0, 8]");
     for text in [opaque, elsewhere] {
         let scene = scene::parse("s.toml".as_ref(), text.as_bytes(), &Default::default()).unwrap();
-        let error = compare(&scene, &RenderOptions::default(), &Progress::new()).unwrap_err();
+        let error = compare(&scene, &Options::default(), &RenderOptions::default(), &Progress::new()).unwrap_err();
         assert_eq!(error.exit_code(), 3, "{error}");
     }
+}
+
+#[test]
+fn a_comparison_that_is_interrupted_keeps_what_it_has() {
+    static PROGRESS: OnceLock<Progress> = OnceLock::new();
+    let stop = |stage: &str, _| {
+        if stage.starts_with("sheets: turn") {
+            PROGRESS.get().unwrap().cancel();
+        }
+    };
+    let progress = PROGRESS.get_or_init(|| Progress::watched(stop));
+    let text = SCENE.replace("[32, 24]", "[16, 12]");
+    let scene = scene::parse("s.toml".as_ref(), text.as_bytes(), &Default::default()).unwrap();
+    let quick = Options { quick: true };
+    let comparison = compare(&scene, &quick, &RenderOptions::default(), progress).unwrap();
+    assert_eq!(comparison.interrupted, Some("sheets"));
+    let report = OrdersReport::new(&scene, comparison).unwrap();
+    let document: Value = serde_json::from_str(&report.json()).unwrap();
+    assert_eq!(document["interrupted"], "sheets");
+    assert!(row(&document, "slices, exact inside")["rmse"].as_f64().unwrap() < 1e-2);
+    let sheets = row(&document, "sheets across the view, 8 voxels");
+    assert!(sheets["rmse"].is_number() && sheets["pop_score"].is_null());
+    assert!(report.text().ends_with("interrupted at sheets: nothing stands here of what comes after\n"));
+    assert!(report.csv().lines().skip(1).all(|line| line.starts_with("\"s.toml\",16,12,")));
+}
+
+#[test]
+fn a_quick_comparison_has_every_ordering() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("s.toml"), SCENE.replace("[32, 24]", "[16, 12]")).unwrap();
+    let arguments = ["orders", "s.toml", "--quick", "--out", "o", "--json"];
+    let out = organza().args(arguments).current_dir(&folder).output().unwrap();
+    assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+    let document: Value = serde_json::from_slice(&out.stdout).unwrap();
+    let report = &document["report"];
+    assert!(report["interrupted"].is_null());
+    for name in
+        ["slices, exact inside", "unsorted", "sheets across an axis, 8 voxels", "particles, 8 sets: none needed"]
+    {
+        assert!(row(report, name)["rmse"].is_number(), "{name}");
+    }
+    assert!(row(report, "sheets across the view, 1 voxel")["pop_score"].is_number());
 }
 
 /// What takes long and rarely fails where the others hold: `cargo xtask deep`.

@@ -2,7 +2,7 @@
 
 use organza::scene::{LoadOptions, Scene, parse};
 use organza::{Progress, Render, RenderOptions, Sequence, explain, render};
-use organza_judge::orders::{Comparison, OrdersReport, compare};
+use organza_judge::orders::{Comparison, Options, OrdersReport, compare};
 use organza_tests::{draw, organza, parallel_view, window};
 
 fn scene(text: &str, frame: Option<u32>) -> Scene {
@@ -70,7 +70,7 @@ fn balls(keys: &str) -> String {
 }
 
 fn compared(keys: &str) -> Comparison {
-    compare(&scene(&balls(keys), None), &RenderOptions::default(), &Progress::new()).unwrap()
+    compare(&scene(&balls(keys), None), &Options::default(), &RenderOptions::default(), &Progress::new()).unwrap()
 }
 
 /// Section 6.3 of the paper: ε of Algorithm 1, Algorithm 2 and the three nearest layers is 4.71, 3.42 and 5.82.
@@ -100,7 +100,10 @@ fn orders_has_the_papers_errors_of_layers() {
 #[test]
 fn what_has_no_layers_is_said() {
     let few = balls("").replace("[48, 36]", "[8, 6]").replace("spacing = 0.09", "spacing = 0.3");
-    let with = |more: &str| compare(&scene(&(few.clone() + more), None), &RenderOptions::default(), &Progress::new());
+    let with = |more: &str| {
+        let scene = scene(&(few.clone() + more), None);
+        compare(&scene, &Options::default(), &RenderOptions::default(), &Progress::new())
+    };
     let fog =
         "[[object]]\nname = 'fog'\nmedium_ball = { center = [0, 0, 0], radius = 0.3, extinction = 1, spacing = 0.1 }\n";
     assert_eq!(with(fog).unwrap().layers.unwrap_err(), "`fog` is a medium");

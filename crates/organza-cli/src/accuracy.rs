@@ -22,7 +22,11 @@ const STAGES: [(&str, f64); 6] = [
     ("settings of surfels", 10.0),
 ];
 
-/// Sweeps the knobs, judges, writes the report. Whatever can be refused is refused before any work.
+/// Techniques that come after `points`.
+const FURTHER: [&str; 3] = ["particles", "sheets", "surfels"];
+
+/// Sweeps the knobs, judges, writes the report. Whatever can be refused is refused before any work. A report that is interrupted is written
+/// with the techniques that it has.
 pub(super) fn run(arguments: &AccuracyArguments) -> Result<(), Error> {
     processor_only(&arguments.scene)?;
     refuse_technique_and_layers("accuracy", &arguments.scene)?;
@@ -37,7 +41,9 @@ pub(super) fn run(arguments: &AccuracyArguments) -> Result<(), Error> {
         if arguments.scene.common.max_memory.is_none() {
             render.max_memory = render.max_memory.min(options.memory());
         }
-        let (studies, absent) = with_bar(|progress| {
+        let mut studies: Vec<Study> = Vec::new();
+        let mut absent = Vec::new();
+        let swept = with_bar(|progress| {
             progress.plan(STAGES);
             let mut renderer = Renderer::new(&render, progress);
             progress.begin(STAGES[0].0);
@@ -46,26 +52,35 @@ pub(super) fn run(arguments: &AccuracyArguments) -> Result<(), Error> {
             progress.begin(STAGES[1].0);
             let truth = truth(&scene, &render, &options, progress)?;
             progress.begin(STAGES[2].0);
-            let points = accuracy::study(&sweep, truth, &options, progress, &mut |request| renderer.draw(request))?;
-            progress.begin(STAGES[3].0);
-            let particles = particles(&scene, &facts, &options, &points, &mut renderer, progress)?;
-            progress.begin(STAGES[4].0);
-            let sheets = sheets(&scene, &options, &points, &mut renderer, progress)?;
-            progress.begin(STAGES[5].0);
-            let surfels = surfels(&scene, &options, &points, &mut renderer, progress)?;
-            let mut studies = vec![points];
-            let mut absent = Vec::new();
-            for study in [particles, sheets, surfels] {
+            studies.push(accuracy::study(&sweep, truth, &options, progress, &mut |request| renderer.draw(request))?);
+            for (technique, (stage, _)) in FURTHER.into_iter().zip(&STAGES[3..]) {
+                progress.begin(stage);
+                progress.tick(0).map_err(|_| Error::Cancelled)?;
+                let points = &studies[0];
+                let study = match technique {
+                    "particles" => particles(&scene, &facts, &options, points, &mut renderer, progress)?,
+                    "sheets" => sheets(&scene, &options, points, &mut renderer, progress)?,
+                    _ => surfels(&scene, &options, points, &mut renderer, progress)?,
+                };
                 match study {
                     Ok(study) => studies.push(study),
                     Err(reason) => absent.push(reason),
                 }
             }
-            Ok((studies, absent))
-        })?;
+            Ok(())
+        });
+        let is_interrupted = matches!(swept, Err(Error::Cancelled)) && !studies.is_empty();
+        if is_interrupted {
+            let reached = studies.len() + absent.len() - 1;
+            absent
+                .extend(FURTHER[reached..].iter().map(|technique| Absent { technique, reason: "interrupted".into() }));
+        } else {
+            swept?;
+        }
         let report = Report::new(&scene, options, studies, absent);
         accuracy::write(&report, &targets)?;
-        console::out(&summary(&report, &targets, arguments.scene.common.json))
+        console::out(&summary(&report, &targets, arguments.scene.common.json))?;
+        if is_interrupted { Err(Error::Cancelled) } else { Ok(()) }
     })
 }
 
@@ -201,7 +216,19 @@ fn summary(report: &Report, files: &[Target], as_json: bool) -> String {
 }
 
 fn study_text(study: &Study) -> String {
-    let mut text = format!("technique: {}\n\nfrontier, from the most accurate to the fastest\n", study.technique);
+    let mut text = format!("technique: {}\n", study.technique);
+    // A random technique is judged by the limit and the truth of another, which says it all.
+    if !study.is_random() {
+        let _ = writeln!(
+            text,
+            "errors are against the limit, all knobs at their ends; the limit's own error: {:.1e}",
+            study.limit.own_error
+        );
+        for held in &study.limit.held {
+            let _ = writeln!(text, "the limit keeps `{}` as the scene has it: {}", held.knob, held.reason);
+        }
+    }
+    text += "\nfrontier, from the most accurate to the fastest\n";
     for i in &study.frontier {
         let _ = writeln!(text, "  {}", outcome_text(&study.outcomes[*i]));
     }
@@ -210,13 +237,11 @@ fn study_text(study: &Study) -> String {
         let _ = writeln!(text, "  {}: {}", curve.knob, accuracy::verdict(study, curve));
     }
     if study.is_random() {
-        // The limit and the truth are those of another technique, which says it all.
         return text;
     }
-    for skipped in study.limit.held.iter().chain(&study.skipped) {
+    for skipped in &study.skipped {
         let _ = writeln!(text, "  {}: {}", skipped.knob, skipped.reason);
     }
-    let _ = writeln!(text, "the limit's own error: {:.1e}", study.limit.own_error);
     let _ = match (&study.truth, &study.outcomes[0].from_truth) {
         (Ok(truth), Some(distance)) => writeln!(
             text,
@@ -232,8 +257,11 @@ fn study_text(study: &Study) -> String {
 
 fn outcome_text(o: &Outcome) -> String {
     let time = accuracy::least_seconds(o).map_or_else(|| "-".into(), |s| format!("{:.1} ms", 1e3 * s));
-    let error = o.from_limit.as_ref().filter(|_| o.drawn);
     let half = o.sampled.map_or_else(String::new, |s| format!(" ± {:.0e}", s.from_limit.half_width));
-    let error = error.map_or_else(|| "-".into(), |d| format!("RMSE {:.2e}{half}  FLIP {:.4}", d.linear.rmse, d.flip));
+    let error = match &o.from_limit {
+        Some(d) if o.drawn => format!("RMSE {:.2e}{half}  FLIP {:.4}", d.linear.rmse, d.flip),
+        Some(_) => "not told from the limit".into(),
+        None => "-".into(),
+    };
     format!("{time:>10}  {error}  {}", o.setting.label)
 }

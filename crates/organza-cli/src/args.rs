@@ -55,7 +55,7 @@ pub(super) enum Command {
     #[command(after_help = "Examples:\n  organza accuracy scene.toml --quick -o report")]
     Accuracy(AccuracyArguments),
     /// Draws a scene by every ordering there is; writes a comparison.
-    #[command(after_help = "Examples:\n  organza orders scene.toml -o orders")]
+    #[command(after_help = "Examples:\n  organza orders scene.toml --quick -o orders")]
     Orders(OrdersArguments),
     /// Describes a data file or a scene.
     #[command(
@@ -375,6 +375,9 @@ pub(super) struct OrdersArguments {
     /// Folder for orders.json, orders.csv, orders.html and orders.png; made if it is not there
     #[arg(short = 'o', long, value_name = "DIR", default_value = ".")]
     pub(super) out: PathBuf,
+    /// A small picture, few repeats, sets, sheets and frames
+    #[arg(long)]
+    pub(super) quick: bool,
     /// Replace outputs that exist
     #[arg(long)]
     pub(super) force: bool,

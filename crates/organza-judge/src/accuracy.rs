@@ -55,6 +55,7 @@ pub use surfels::{in_surfels, surfels};
 pub use verdict::verdict;
 
 pub(crate) use plot::{COLORS, Mark, Plot, Series, escaped};
+pub(crate) use report::SHARED_COLUMNS;
 pub(crate) use report_pictures::{data_uri, difference, png};
 
 pub use crate::truth::Truth;

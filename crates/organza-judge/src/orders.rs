@@ -27,8 +27,39 @@ use sorter::{Ordering, Sorter};
 use splat_core::{Camera, Direction, Layers, SliceOrder};
 use std::time::Instant;
 
-/// Longest side of the picture, pixels, unless the user asked for a size.
-pub const LONGEST_SIDE: u32 = 240;
+/// How much work a comparison may take.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Options {
+    /// A smaller picture, fewer repeats, sets, sheets and frames.
+    pub quick: bool,
+}
+
+impl Options {
+    /// Longest side of the picture, pixels, unless the user asked for a size.
+    pub fn longest_side(&self) -> u32 {
+        if self.quick { 120 } else { 240 }
+    }
+
+    /// Timed repeats of each ordering.
+    fn repeats(&self) -> usize {
+        if self.quick { 2 } else { 5 }
+    }
+
+    /// Sets of particles that are averaged.
+    fn sets(&self) -> u32 {
+        if self.quick { 8 } else { 32 }
+    }
+
+    /// Thicknesses of sheets, voxels.
+    fn voxels(&self) -> &'static [u32] {
+        if self.quick { &[1, 8] } else { &[1, 2, 4, 8] }
+    }
+
+    /// Steps in a turn that looks for what pops.
+    fn steps(&self) -> i32 {
+        if self.quick { 2 } else { 6 }
+    }
+}
 
 /// Stages.
 const LOAD: &str = "first look";
@@ -40,9 +71,6 @@ const LAYERS: &str = "layers";
 
 /// About as many rays are looked at for wrong pairs.
 const RAYS: f64 = 20_000.0;
-
-/// Sets of particles that are averaged.
-const SETS: u32 = 32;
 
 /// Slices so many times thicker than the scene's own.
 const THICKER: [f64; 4] = [1.0, 8.0, 64.0, 512.0];
@@ -98,13 +126,21 @@ pub struct Comparison {
     pub without_particles: Option<String>,
     /// The discs of each layer averaged, all layers composited, in f64; or why there are none.
     pub layers: Result<Image<Linear>, String>,
+    /// The stage that was interrupted, behind which nothing was compared; `None` where all was.
+    pub interrupted: Option<&'static str>,
 }
 
 /// Draws a scene by every ordering. `scene.render` counts but for what concerns order, cut-offs and layers.
 ///
 /// # Errors
-/// As [`organza::render`]; [`Error::Input`] for a scene without translucent splats.
-pub fn compare(scene: &Scene, options: &RenderOptions, progress: &Progress) -> Result<Comparison, Error> {
+/// As [`organza::render`]; [`Error::Input`] for a scene without translucent splats; [`Error::Cancelled`] before the truth is known: a
+/// comparison that is interrupted after that has what was drawn.
+pub fn compare(
+    scene: &Scene,
+    effort: &Options,
+    options: &RenderOptions,
+    progress: &Progress,
+) -> Result<Comparison, Error> {
     let scene = by_slices_alone(scene);
     progress.plan([(LOAD, 2.0), (ORDERS, 8.0), (TRUTH, 8.0), (SHEETS, 8.0), (SETS_OF_PARTICLES, 8.0), (LAYERS, 8.0)]);
     progress.begin(LOAD);
@@ -119,6 +155,7 @@ pub fn compare(scene: &Scene, options: &RenderOptions, progress: &Progress) -> R
         camera: frame.camera,
         translucent: frame.translucent(Technique::Points).to_vec(),
         margin_px: frame.filter_reach_px(),
+        repeats: effort.repeats(),
     };
     let auto = sorter.slices(Thickness::Auto, false)?;
     if auto.input_from_sorted.is_empty() {
@@ -150,21 +187,41 @@ pub fn compare(scene: &Scene, options: &RenderOptions, progress: &Progress) -> R
     };
     let stages = all.iter().map(|ordering| (ordering.name(auto), 1.0));
     let drawn = progress.within(ORDERS, stages, || all.iter().map(|o| draw(*o)).collect::<Result<Vec<_>, _>>());
-    let mut orderings = drawn?;
+    let orderings = drawn?;
     progress.begin(TRUTH);
     let start = Instant::now();
     let truth = by_technique(Technique::Reference, &scene, &loaded, options, progress)?;
     let truth_seconds = start.elapsed().as_secs_f64();
-    let splats = sheets::Splats::new(&scene, &loaded, &plan, &sorter.translucent);
-    sheets::ways(&splats, (&frame, &Ordering::Centre.name(auto)), &mut orderings, progress)?;
-    progress.begin(SETS_OF_PARTICLES);
-    let unordered = particles(&scene, &loaded, &truth, options, progress)?;
-    let without_particles = unordered.as_ref().err().cloned();
-    orderings.extend(unordered);
-    progress.begin(LAYERS);
-    let layers = layers::ways(&scene, &loaded, &mut orderings, options, progress)?;
     let splats = sorter.translucent.len() as u64;
-    Ok(Comparison { orderings, truth, truth_seconds, splats, without_particles, layers })
+    let mut comparison = Comparison {
+        orderings,
+        truth,
+        truth_seconds,
+        splats,
+        without_particles: None,
+        layers: Err("interrupted".into()),
+        interrupted: None,
+    };
+    let mut reached = SHEETS;
+    let mut finish = |comparison: &mut Comparison| {
+        progress.begin(SHEETS);
+        let splats = sheets::Splats::new(&scene, &loaded, &plan, &sorter.translucent);
+        sheets::ways(&splats, &frame, &Ordering::Centre.name(auto), effort, &mut comparison.orderings, progress)?;
+        reached = SETS_OF_PARTICLES;
+        progress.begin(SETS_OF_PARTICLES);
+        let unordered = particles(&scene, &loaded, &comparison.truth, effort, options, progress)?;
+        comparison.without_particles = unordered.as_ref().err().cloned();
+        comparison.orderings.extend(unordered);
+        reached = LAYERS;
+        progress.begin(LAYERS);
+        comparison.layers = layers::ways(&scene, &loaded, &mut comparison.orderings, options, progress)?;
+        Ok(())
+    };
+    match finish(&mut comparison) {
+        Err(Error::Cancelled) => comparison.interrupted = Some(reached),
+        finished => finished?,
+    }
+    Ok(comparison)
 }
 
 /// The scene by points without cut-offs and layers, front to back, in the order of slices.
@@ -223,12 +280,14 @@ fn particles(
     scene: &Scene,
     loaded: &Loaded,
     truth: &Image<Linear>,
+    effort: &Options,
     options: &RenderOptions,
     progress: &Progress,
 ) -> Result<Result<Ordered, String>, Error> {
     let mut scene = scene.clone();
     scene.render.technique = Technique::Particles;
-    scene.render.particles = ParticlesSettings { repeat_level: SETS, target_error: None, ..scene.render.particles };
+    scene.render.particles =
+        ParticlesSettings { repeat_level: effort.sets(), target_error: None, ..scene.render.particles };
     let plan = match plan_loaded(&scene, loaded, options) {
         Err(e @ (Error::Input { .. } | Error::Limit(_) | Error::TooLarge { .. })) => return Ok(Err(e.to_string())),
         planned => planned?,
@@ -250,7 +309,7 @@ fn particles(
     }
     progress.leave();
     let sampled = Sampled::of(&images, truth, 0.0, None)?;
-    let name = format!("particles, {SETS} sets: none needed");
+    let name = format!("particles, {} sets: none needed", effort.sets());
     Ok(Ok(Ordered { sampled, ..Ordered::new(name, images.swap_remove(0)) }))
 }
 

@@ -19,7 +19,8 @@ pub(crate) fn draw(frame: &Frame<'_>, session: &mut Session<'_>, cost: &mut Cost
     Ok(layers)
 }
 
-/// The same in these ranges of depth, which follow each other. A long drawing is announced before it begins.
+/// The same in these ranges of depth, which follow each other. A long drawing is announced before it begins, where the session
+/// announces any.
 pub(crate) fn draw_ranges(
     frame: &Frame<'_>,
     ranges: &[Range<f32>],
@@ -31,7 +32,9 @@ pub(crate) fn draw_ranges(
     folds.iter_mut().try_for_each(|fold| fold.prepare(session, cost))?;
     let predicted = prediction(frame, &folds, ranges, session.options);
     frame.progress.plan(session.options.rates.stages(&predicted.drawing));
-    if let Some(sentence) = predicted.announcement(rayon::current_num_threads()) {
+    if session.announces
+        && let Some(sentence) = predicted.announcement(rayon::current_num_threads())
+    {
         frame.progress.announce(&sentence);
     }
     session.predicted = predicted;
@@ -69,6 +72,7 @@ pub struct Planned<'a> {
 }
 
 /// Draws a planned scene by the processor alone, and keeps the layers that it asks for. The passes that ran are added to `cost`.
+/// That it may take long is not announced.
 ///
 /// # Errors
 /// As [`crate::render`]; [`Error::Cancelled`] also where a random technique was interrupted between its sets.
@@ -82,6 +86,7 @@ pub fn draw_loaded(planned: &Planned<'_>, progress: &Progress, cost: &mut CostRe
         warnings: &mut Vec::new(),
         sets: None,
         predicted: Prediction::default(),
+        announces: false,
     };
     let layers = draw(&frame, &mut session, cost)?;
     if session.sets.is_some_and(|sets| sets.interrupted) { Err(Error::Cancelled) } else { Ok(layers) }
@@ -142,6 +147,7 @@ mod tests {
             warnings: &mut Vec::new(),
             sets: None,
             predicted: Prediction::default(),
+            announces: false,
         };
         draw_ranges(&frame, &ranges, &mut session, &mut CostRecord::default()).unwrap()
     }

@@ -183,8 +183,15 @@ pub(crate) fn render_keeping(
     frame.groups.replace(std::mem::take(&mut left.groups));
     let kept = (!left.is_still).then_some(&mut left.sets);
     let checkpoint = checkpoint.as_mut();
-    let mut session =
-        Session { options, checkpoint, kept, warnings: &mut warnings, sets: None, predicted: Prediction::default() };
+    let mut session = Session {
+        options,
+        checkpoint,
+        kept,
+        warnings: &mut warnings,
+        sets: None,
+        predicted: Prediction::default(),
+        announces: true,
+    };
     let layers = draw(&frame, &mut session, &mut cost)?;
     let Session { sets, predicted, .. } = session;
     left.groups = frame.groups.take();

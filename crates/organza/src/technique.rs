@@ -173,6 +173,8 @@ pub(crate) struct Session<'s> {
     pub(crate) sets: Option<Sets>,
     /// What was predicted of the drawing.
     pub(crate) predicted: Prediction,
+    /// Whether a long drawing is announced: one of many for a comparison is not.
+    pub(crate) announces: bool,
 }
 
 /// Sets of particles in a picture.

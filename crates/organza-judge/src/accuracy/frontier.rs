@@ -2,8 +2,8 @@
 //!
 //! From the most accurate on, a setting is on the frontier if it is faster than the last one on it by more than times can
 //! be told apart. Errors that are equal to two digits count as one, and so do errors of random settings that differ by no more
-//! than their noise. The first setting in the report's order stands for those that are nearly as fast; so the scene's own does
-//! for knobs that change nothing.
+//! than their noise, and so do all that cannot be told from the limit: they are the most accurate, with an error of 0. The first
+//! setting in the report's order stands for those that are nearly as fast; so the scene's own does for knobs that change nothing.
 //!
 //! A setting's time is the least of its repeats: other work of the machine adds to a repeat and never takes from it. Errors
 //! are the same in every run, so a frontier changes with the times alone: what it hangs on is repeated until it has held for
@@ -21,7 +21,7 @@ const NEAR: f64 = 1.25;
 pub struct Candidate {
     /// What it is known by.
     pub id: usize,
-    /// Its error, > 0.
+    /// Its error, at least 0.
     pub error: f64,
     /// Half of the 95 % interval of the error; 0 of what is not random.
     pub half_width: f64,
@@ -61,8 +61,11 @@ fn is_equal(a: &Candidate, b: &Candidate) -> bool {
     two_digits(a.error) == two_digits(b.error) || (a.error - b.error).abs() < a.half_width.hypot(b.half_width)
 }
 
-/// Exponent and two digits of an error > 0.
+/// Exponent and two digits of an error; those of 0 are below all others.
 fn two_digits(error: f64) -> (i32, i64) {
+    if error == 0.0 {
+        return (i32::MIN, 0);
+    }
     let exponent = error.log10().floor() as i32;
     (exponent, (error / 10f64.powi(exponent - 1)).round() as i64)
 }
@@ -118,7 +121,7 @@ fn contenders(candidates: &[Candidate]) -> Vec<usize> {
 }
 
 fn sorted(candidates: &[Candidate]) -> Vec<Candidate> {
-    let usable = candidates.iter().filter(|c| c.seconds > 0.0 && c.error > 0.0 && c.error.is_finite());
+    let usable = candidates.iter().filter(|c| c.seconds > 0.0 && c.error >= 0.0 && c.error.is_finite());
     let mut sorted: Vec<Candidate> = usable.copied().collect();
     sorted.sort_by_key(|c| (two_digits(c.error), c.id));
     sorted
@@ -146,7 +149,8 @@ mod tests {
         assert_eq!(frontier(&all), [0, 2, 4]);
         assert_eq!(contenders(&all), [0, 1, 2, 4], "5 s are hopeless beside 4 s, 9.5 s beside 10 s are not");
         assert_eq!(frontier(&[]), [0usize; 0]);
-        assert_eq!(frontier(&[candidate(7, 0.0, 1.0)]), [0usize; 0], "nothing can be said of an error of 0");
+        assert_eq!(frontier(&[candidate(1, 1e-4, 2.0), candidate(7, 0.0, 1.0)]), [7], "exact and faster");
+        assert_eq!(frontier(&[candidate(1, 1e-4, 0.5), candidate(7, 0.0, 1.0), candidate(8, 0.0, 0.9)]), [7, 1]);
         assert_eq!(frontier(&[candidate(7, f64::NAN, 1.0)]), [0usize; 0]);
     }
 

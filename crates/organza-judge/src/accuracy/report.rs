@@ -59,6 +59,23 @@ pub struct Absent {
     pub reason: String,
 }
 
+/// Columns of a table that all of its lines share, with their units in their names.
+pub(crate) const SHARED_COLUMNS: &str = "scene,width_px,height_px,version,processor,threads";
+
+impl Machine {
+    /// The cells of [`SHARED_COLUMNS`].
+    pub(crate) fn shared_cells(&self, scene: &str, size: [usize; 2]) -> String {
+        let processor = quoted(self.cpu.as_deref().unwrap_or(&self.system));
+        let [width, height] = size;
+        format!("{},{width},{height},{},{processor},{}", quoted(scene), env!("CARGO_PKG_VERSION"), self.threads)
+    }
+}
+
+/// A cell of text.
+pub(crate) fn quoted(text: &str) -> String {
+    format!("\"{}\"", text.replace('"', "\"\""))
+}
+
 impl Report {
     /// A report of studies of a scene on this machine.
     pub fn new(scene: &Scene, options: Options, studies: Vec<Study>, absent: Vec<Absent>) -> Self {

@@ -1,7 +1,7 @@
 //! The report as one page without any other file: curves, frontier, convergence, pictures to flip, table, notes.
 
 use super::plot::{COLORS, Mark, Plot, Series, escaped};
-use super::report_frontier::{RULE, error_text, to_copy};
+use super::report_frontier::{Against, RULE, error_text, to_copy};
 use super::report_joint::{bar_of, joint};
 use super::report_pictures::{data_uri, difference};
 use super::{Curve, Outcome, Report, SEEDS, Study, TOLD_APART, least_seconds, verdict};
@@ -27,7 +27,7 @@ pub(super) fn page(report: &Report) -> Result<String, Error> {
         summary(&mut html, study);
         time_plot(&mut html, study);
         let frontier = study.frontier.iter().map(|place| (study, *place));
-        to_copy(&mut html, &report.scene, frontier, |o| o.from_limit.as_ref());
+        to_copy(&mut html, &report.scene, frontier, Against::Limit);
         knob_plots(&mut html, study);
         pictures(&mut html, study, report.scene.render.exposure, at)?;
         table(&mut html, study);

@@ -1,19 +1,12 @@
 //! The part of the page that shows all techniques together: their settings in one plot, and one frontier.
 
 use super::plot::{COLORS, Mark, Plot, Series, escaped};
-use super::report_frontier::{RULE, to_copy};
-use super::{Distance, Outcome, Report, Study, least_seconds};
+use super::report_frontier::{Against, RULE, to_copy};
+use super::{Outcome, Report, Study, least_seconds};
 use std::fmt::Write;
 
 /// A bar that reaches below zero ends at this share of the mean.
 const LEAST: f64 = 0.02;
-
-/// Which error a plot shows.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Against {
-    Limit,
-    Truth,
-}
 
 /// Techniques side by side; nothing for one alone.
 pub(super) fn joint(html: &mut String, report: &Report) {
@@ -33,19 +26,19 @@ pub(super) fn joint(html: &mut String, report: &Report) {
     let floor = Some((10.0 * limit.own_error, "ten times the limit's own error".to_owned()));
     *html += &plot(report, Against::Limit, "RMSE against the limit, linear radiance", floor).svg();
     legend(html, report);
-    copied(html, report, &report.frontier, |o| o.from_limit.as_ref());
+    copied(html, report, &report.frontier, Against::Limit);
     if let Ok(truth) = &report.studies[0].truth {
         let level = truth.rms_standard_error();
         let floor = Some((level, "the truth's own standard error".to_owned()));
         *html += "<p>The same against physical truth. No picture can come below the truth's own standard error.</p>\n<figure>";
         *html += &plot(report, Against::Truth, "RMSE against physical truth", floor).svg();
         legend(html, report);
-        copied(html, report, &report.frontier_by_truth, |o| o.from_truth.as_ref());
+        copied(html, report, &report.frontier_by_truth, Against::Truth);
     }
 }
 
-fn copied(html: &mut String, report: &Report, frontier: &[[usize; 2]], error: fn(&Outcome) -> Option<&Distance>) {
-    to_copy(html, &report.scene, frontier.iter().map(|[study, place]| (&report.studies[*study], *place)), error);
+fn copied(html: &mut String, report: &Report, frontier: &[[usize; 2]], against: Against) {
+    to_copy(html, &report.scene, frontier.iter().map(|[study, place]| (&report.studies[*study], *place)), against);
 }
 
 fn legend(html: &mut String, report: &Report) {

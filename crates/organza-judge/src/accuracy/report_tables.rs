@@ -1,5 +1,6 @@
 //! The report as JSON and as CSV. A number that was not measured is null, or an empty cell; never 0.
 
+use super::report::{SHARED_COLUMNS, quoted};
 use super::{Curve, Distance, Outcome, Report, Study, TOLD_APART, lines};
 use organza::scene::Scene;
 use reference::metrics::Errors;
@@ -136,13 +137,16 @@ fn finite(value: f64) -> Option<f64> {
     Some(value).filter(|v| v.is_finite())
 }
 
-/// One line a setting.
+/// One line a setting, after what all lines share: the scene, the picture's size, what computed.
 pub(super) fn csv(report: &Report) -> String {
-    let mut text = String::from(
-        "technique,setting,knob,drawn,on_frontier,rmse,bias,mean_absolute,max,display_rmse,psnr_db,flip,epsilon_8_bit,\
-         truth_rmse,median_ms,min_ms,max_ms,convert_ms,fragments,bytes,on_joint_frontier,rmse_half_width_95,\
-         truth_rmse_half_width_95,standard_deviation,rms_bias\n",
+    let mut text = format!(
+        "{SHARED_COLUMNS},technique,setting,knob,drawn,on_frontier,rmse_radiance,bias_radiance,mean_absolute_radiance,max_radiance,\
+         rmse_displayed,psnr_db,flip,epsilon_8_bit,truth_rmse_radiance,median_ms,min_ms,max_ms,convert_ms,fragments,bytes,\
+         on_joint_frontier,rmse_half_width_95_radiance,truth_rmse_half_width_95_radiance,standard_deviation_radiance,\
+         rms_bias_radiance\n",
     );
+    let size = report.scene.camera.size.map(|side| side as usize);
+    let shared = report.machine.shared_cells(&report.scene_name(), size);
     for (at, study) in report.studies.iter().enumerate() {
         for (i, o) in study.outcomes.iter().enumerate() {
             let d = o.from_limit.as_ref();
@@ -150,6 +154,7 @@ pub(super) fn csv(report: &Report) -> String {
             let convert = median_with_spread(&o.timed.convert_seconds);
             let ms = |seconds: Option<f64>| cell(seconds.map(|s| 1e3 * s));
             let cells = [
+                shared.clone(),
                 quoted(study.technique),
                 quoted(&o.setting.label),
                 quoted(o.setting.knob.unwrap_or("")),
@@ -184,8 +189,4 @@ pub(super) fn csv(report: &Report) -> String {
 
 fn cell(value: Option<f64>) -> String {
     value.filter(|v| v.is_finite()).map_or_else(String::new, |v| format!("{v:.6e}"))
-}
-
-fn quoted(text: &str) -> String {
-    format!("\"{}\"", text.replace('"', "\"\""))
 }

@@ -6,7 +6,7 @@ use super::resolve::MARGIN;
 use super::settings::Settings;
 use super::{
     Candidate, Curve, Distance, Frame, Knob, Limit, Options, Request, Sampled, Setting, Skipped, Sweep, Timed, Truth,
-    hold,
+    frontier, hold,
 };
 use organza::{Error, Progress};
 use reference::metrics::{Image, Linear};
@@ -84,7 +84,8 @@ pub type Draw<'a> = dyn FnMut(&Request) -> Result<Frame, Error> + 'a;
 ///
 /// # Errors
 /// [`Error::Unresolved`] when the limit's own error is not ten times below that of the scene's own setting, or leaves fewer
-/// than three settings to draw; those of `draw`, but a setting that exceeds a limit of resources is noted and left out.
+/// than three settings to draw; those of `draw`, but a setting that exceeds a limit of resources is noted and left out. A study that is
+/// cancelled once every picture is drawn has fewer times and is none.
 pub fn study(
     sweep: &Sweep,
     truth: Result<Truth, String>,
@@ -112,7 +113,11 @@ pub fn study(
     timed.resize(settings.list.len(), Timed::default());
     let repeats = Repeats { times: options.repeats(), seeded: false, order: options.seed };
     progress.begin(REPEATS);
-    repeat_all(&settings, &mut timed, &repeats, progress, draw)?;
+    match repeat_all(&settings, &mut timed, &repeats, progress, draw) {
+        // Every picture is there; some have fewer times.
+        Err(Error::Cancelled) => {}
+        repeated => repeated?,
+    }
     let exposure = sweep.base.scene.render.exposure;
     let mut outcomes = Vec::new();
     for (setting, timed) in settings.list.into_iter().zip(timed) {
@@ -181,7 +186,8 @@ fn unresolved(message: impl Into<String>, hint: impl Into<String>) -> Error {
 
 /// What may be on a frontier by the limit; ids are places in `outcomes`.
 pub(super) fn candidates<'a>(outcomes: impl Iterator<Item = &'a Outcome>) -> Vec<Candidate> {
-    let error = |o: &Outcome| Some(o.from_limit.as_ref().filter(|_| o.drawn)?.linear.rmse);
+    // What cannot be told from the limit is as exact as the limit.
+    let error = |o: &Outcome| o.from_limit.as_ref().map(|d| if o.drawn { d.linear.rmse } else { 0.0 });
     let half_width = |o: &Outcome| o.sampled.map(|s| s.from_limit.half_width);
     candidates_by(outcomes, error, half_width)
 }
@@ -213,12 +219,17 @@ pub(super) fn hold_frontier(
     progress: &Progress,
     draw: &mut Draw<'_>,
 ) -> Result<Vec<usize>, Error> {
-    hold(&mut candidates(outcomes.iter()), options.hold(), |id| {
+    let held = hold(&mut candidates(outcomes.iter()), options.hold(), |id| {
         progress.tick(0).map_err(|_| Error::Cancelled)?;
         let frame = draw(&outcomes[id].setting.request)?;
         outcomes[id].timed.seconds.push(frame.seconds);
         Ok(frame.seconds)
-    })
+    });
+    match held {
+        // It is that of the repeats there are.
+        Err(Error::Cancelled) => Ok(frontier(&candidates(outcomes.iter()))),
+        held => held,
+    }
 }
 
 fn root_mean_square(image: &Image<Linear>) -> f64 {

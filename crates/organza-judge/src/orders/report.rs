@@ -1,7 +1,7 @@
 //! The files of a comparison of orderings: JSON, CSV, a contact sheet, and a page.
 
 use super::{Comparison, Ordered};
-use crate::accuracy::{COLORS, Mark, Plot, Series, data_uri, difference, escaped, png};
+use crate::accuracy::{COLORS, Mark, Plot, SHARED_COLUMNS, Series, data_uri, difference, escaped, png};
 use crate::accuracy::{Distance, Machine};
 use organza::output::{Target, Targets};
 use organza::scene::Scene;
@@ -92,23 +92,25 @@ impl OrdersReport {
             "rays": self.comparison.orderings.iter().find_map(|o| o.disorder).map(|d| d.rays),
             "without_particles": self.comparison.without_particles,
             "without_layers": self.comparison.layers.as_ref().err(),
+            "interrupted": self.comparison.interrupted,
             "truth": { "method": "fragments sorted per pixel, f64", "seconds": self.comparison.truth_seconds },
             "orderings": self.rows().map(row).collect::<Value>(),
         });
         format!("{document:#}\n")
     }
 
-    /// One line an ordering.
+    /// One line an ordering, after what all lines share: the scene, the picture's size, what computed.
     pub fn csv(&self) -> String {
-        let mut text = String::from(
-            "ordering,slice_thickness,wrong_pairs_per_ray,pairs_per_ray,worst_backtrack,rmse,max,flip,sort_ms,bytes,\
-             rmse_half_width_95,rms_bias,pop_score,epsilon_8_bit,of_layers\n",
+        let mut text = format!(
+            "{SHARED_COLUMNS},ordering,slice_thickness_world,wrong_pairs_per_ray,pairs_per_ray,worst_backtrack_world,rmse_radiance,\
+             max_radiance,flip,sort_ms,bytes,rmse_half_width_95_radiance,rms_bias_radiance,pop_score,epsilon_8_bit,of_layers\n",
         );
+        let shared = self.machine.shared_cells(&self.scene, self.comparison.truth.size());
         let cell = |v: Option<f64>| v.map_or_else(String::new, |v| format!("{v:.6e}"));
         for (o, d) in self.rows() {
             let _ = writeln!(
                 text,
-                "\"{}\",{},{},{},{},{:.6e},{:.6e},{:.6e},{},{},{},{},{},{:.6e},{}",
+                "{shared},\"{}\",{},{},{},{},{:.6e},{:.6e},{:.6e},{},{},{},{},{},{:.6e},{}",
                 o.name,
                 cell(o.thickness),
                 cell(o.disorder.map(|d| d.wrong_pairs_per_ray)),
@@ -150,6 +152,10 @@ impl OrdersReport {
                 o.name,
                 seeds(o)
             );
+        }
+        if let Some(stage) = self.comparison.interrupted {
+            let _ = writeln!(text, "interrupted at {stage}: nothing stands here of what comes after");
+            return text;
         }
         if let Some(reason) = &self.comparison.without_particles {
             let _ = writeln!(text, "no particles: {reason}");
@@ -234,6 +240,9 @@ impl OrdersReport {
             );
         }
         html += "</table></div>\n";
+        if let Some(stage) = self.comparison.interrupted {
+            let _ = writeln!(html, "<p>Interrupted at {stage}: nothing stands here of what comes after.</p>");
+        }
         self.pops_by_thickness(&mut html);
         let _ = writeln!(
             html,

@@ -8,7 +8,7 @@
 //! another axis becomes the nearest, and where view and light are at right angles. Each turn has frames a tenth of a degree apart, of translucent
 //! splats alone, which are lit once for all of its frames, so that order is all that differs.
 
-use super::{Ordered, SHEETS, exact_input, image};
+use super::{Options, Ordered, exact_input, image};
 use ::reference::{Fragment, Input, fold_fragments};
 use glam::{DMat3, DVec3};
 use organza::plan::Plan;
@@ -16,17 +16,14 @@ use organza::scene::Scene;
 use organza::{CostRecord, Error, Frame, Loaded, Progress};
 use splat_core::Camera;
 
-/// Thicknesses of sheets, voxels.
-const VOXELS: [u32; 4] = [1, 2, 4, 8];
-
 /// Steps of a turn, degrees.
 const STEP: f64 = 0.1;
 
-/// Steps in a turn.
-const STEPS: i32 = 6;
-
 /// Longest side of its frames, pixels.
 const SIDE: u32 = 96;
+
+/// Stage that draws the scene's own view.
+const PICTURES: &str = "pictures";
 
 /// Ways without sheets, which come first.
 const FIRST_SHEETS: usize = 2;
@@ -101,10 +98,10 @@ impl Way {
     }
 
     /// Of sheets, in the scale of the cloud.
-    fn thickness(self, of: &Splats<'_>) -> Option<f64> {
+    fn thickness(self, splats: &Splats<'_>) -> Option<f64> {
         match self {
             Self::Fragments | Self::Centres => None,
-            Self::Sheets(_, voxels) => Some(of.thickness(voxels)),
+            Self::Sheets(_, voxels) => Some(splats.thickness(voxels)),
         }
     }
 }
@@ -126,9 +123,10 @@ impl<'a> Splats<'a> {
         self.radius * SPACING * f64::from(voxels)
     }
 
-    fn ways(&self) -> Vec<Way> {
+    fn ways(&self, voxels: &[u32]) -> Vec<Way> {
         let across = [Some(Across::View), Some(Across::Axis), self.to_light.map(|_| Across::Half)];
-        let sheets = across.into_iter().flatten().flat_map(|a| VOXELS.map(|voxels| Way::Sheets(a, voxels)));
+        let sheets =
+            across.into_iter().flatten().flat_map(|across| voxels.iter().map(move |v| Way::Sheets(across, *v)));
         let one_by_one: [Way; FIRST_SHEETS] = [Way::Fragments, Way::Centres];
         one_by_one.into_iter().chain(sheets).collect()
     }
@@ -183,24 +181,31 @@ impl<'a> Splats<'a> {
 
 /// Adds the pictures by sheets to those by other orderings, and says how much each of them pops, and the ordering named `by_centre`.
 pub(super) fn ways(
-    of: &Splats<'_>,
-    (frame, by_centre): (&Frame<'_>, &str),
-    all: &mut Vec<Ordered>,
+    splats: &Splats<'_>,
+    frame: &Frame<'_>,
+    by_centre: &str,
+    effort: &Options,
+    orderings: &mut Vec<Ordered>,
     progress: &Progress,
 ) -> Result<(), Error> {
-    progress.begin(SHEETS);
     progress.enter();
-    let ways = of.ways();
-    draw(of, frame, &ways[FIRST_SHEETS..], (all, progress))?;
+    let ways = splats.ways(effort.voxels());
+    let turns = splats.turns(&splats.loaded.camera);
+    let name = |turn: usize| format!("turn {} of {}", turn + 1, turns.len());
+    // A turn has several frames, which are small.
+    progress.plan([(PICTURES.to_owned(), 1.0)].into_iter().chain((0..turns.len()).map(|turn| (name(turn), 2.0))));
+    progress.begin(PICTURES);
+    draw(splats, frame, &ways[FIRST_SHEETS..], orderings, progress)?;
     let mut steps = vec![0.0f64; ways.len()];
-    for degrees in of.turns(&of.loaded.camera) {
-        for (most, step) in steps.iter_mut().zip(largest_steps(of, &ways, degrees, progress)?) {
+    for (turn, degrees) in turns.iter().enumerate() {
+        progress.begin(&name(turn));
+        for (most, step) in steps.iter_mut().zip(largest_steps(splats, &ways, *degrees, effort.steps(), progress)?) {
             *most = most.max(step);
         }
     }
     for (way, step) in ways.iter().zip(&steps).skip(1).filter(|_| steps[0] > 0.0) {
         let name = way.name().unwrap_or_else(|| by_centre.to_owned());
-        if let Some(row) = all.iter_mut().find(|o| o.name == name) {
+        if let Some(row) = orderings.iter_mut().find(|o| o.name == name) {
             row.pop = Some(step / steps[0]);
         }
     }
@@ -210,20 +215,21 @@ pub(super) fn ways(
 
 /// The scene's picture by each way of sheets.
 fn draw(
-    of: &Splats<'_>,
+    splats: &Splats<'_>,
     frame: &Frame<'_>,
     ways: &[Way],
-    (all, progress): (&mut Vec<Ordered>, &Progress),
+    orderings: &mut Vec<Ordered>,
+    progress: &Progress,
 ) -> Result<(), Error> {
     let mut cost = CostRecord::default();
     let shaded = frame.shaded(&mut cost)?;
-    let input = exact_input(of.loaded, &frame.camera, shaded, frame.raster_params().resampling_sigma_px);
-    let keys: Vec<Keys> = ways.iter().map(|way| of.keys(*way, &frame.camera)).collect();
+    let input = exact_input(splats.loaded, &frame.camera, shaded, frame.raster_params().resampling_sigma_px);
+    let keys: Vec<Keys> = ways.iter().map(|way| splats.keys(*way, &frame.camera)).collect();
     let by_way =
         |_, fragments: &[Fragment]| -> Vec<Pixel> { keys.iter().map(|k| composite(&input, fragments, k)).collect() };
     let opaque = &frame.opaque(&mut cost)?.depth;
     let pixels = fold_fragments(&input, opaque, by_way, Some(progress)).map_err(|_| Error::Cancelled)?;
-    let world = libm::exp2(f64::from(of.loaded.exponent));
+    let world = libm::exp2(f64::from(splats.loaded.exponent));
     for (n, way) in ways.iter().enumerate() {
         let mut accumulator = frame.accumulator();
         let planes = accumulator.optical_depth.len();
@@ -233,29 +239,35 @@ fn draw(
             accumulator.optical_depth.iter_mut().enumerate().for_each(|(p, plane)| plane[k] = depth(p));
         }
         let shown = image(&frame.finish(&accumulator, None, &mut cost)?)?;
-        let thickness = way.thickness(of).map(|thickness| thickness * world);
-        all.push(Ordered { thickness, ..Ordered::new(way.name().unwrap_or_default(), shown) });
+        let thickness = way.thickness(splats).map(|thickness| thickness * world);
+        orderings.push(Ordered { thickness, ..Ordered::new(way.name().unwrap_or_default(), shown) });
     }
     Ok(())
 }
 
 /// The largest step from frame to frame of a turn about so many degrees, by way.
-fn largest_steps(of: &Splats<'_>, ways: &[Way], degrees: f64, progress: &Progress) -> Result<Vec<f64>, Error> {
-    let mut frame = Frame::new(of.scene, of.loaded, of.plan, progress);
-    let camera = smaller(turned(&of.loaded.camera, of.middle, degrees));
+fn largest_steps(
+    splats: &Splats<'_>,
+    ways: &[Way],
+    degrees: f64,
+    steps: i32,
+    progress: &Progress,
+) -> Result<Vec<f64>, Error> {
+    let mut frame = Frame::new(splats.scene, splats.loaded, splats.plan, progress);
+    let camera = smaller(turned(&splats.loaded.camera, splats.middle, degrees));
     frame.camera = camera;
     let sigma = frame.raster_params().resampling_sigma_px;
     let shaded = frame.shaded(&mut CostRecord::default())?;
     let picture = |step: i32| {
-        let camera = turned(&camera, of.middle, STEP * (f64::from(step) - 0.5 * f64::from(STEPS)));
-        let input = exact_input(of.loaded, &camera, shaded, sigma);
-        let keys: Vec<Keys> = ways.iter().map(|way| of.keys(*way, &camera)).collect();
+        let camera = turned(&camera, splats.middle, STEP * (f64::from(step) - 0.5 * f64::from(steps)));
+        let input = exact_input(splats.loaded, &camera, shaded, sigma);
+        let keys: Vec<Keys> = ways.iter().map(|way| splats.keys(*way, &camera)).collect();
         let by_way = |_, fragments: &[Fragment]| keys.iter().map(|k| composite(&input, fragments, k).color).collect();
         fold_fragments(&input, &[], by_way, Some(progress)).map_err(|_| Error::Cancelled)
     };
     let mut largest = vec![0.0f64; ways.len()];
     let mut before: Vec<Vec<[f32; 3]>> = picture(0)?;
-    for step in 1..=STEPS {
+    for step in 1..=steps {
         let next = picture(step)?;
         for (one, other) in before.iter().zip(&next) {
             for (most, (a, b)) in largest.iter_mut().zip(one.iter().zip(other)) {

@@ -7,9 +7,6 @@ use reference::statistics::{Spread, median_with_spread};
 use splat_core::{Camera, Direction, SliceOrder};
 use std::time::Instant;
 
-/// Timed repeats of each ordering.
-const REPEATS: usize = 5;
-
 /// How splats are put in order.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Ordering {
@@ -50,6 +47,8 @@ pub(super) struct Sorter<'a> {
     pub(super) camera: Camera,
     pub(super) translucent: Vec<u32>,
     pub(super) margin_px: f64,
+    /// Timed repeats of each ordering.
+    pub(super) repeats: usize,
 }
 
 impl Sorter<'_> {
@@ -57,7 +56,7 @@ impl Sorter<'_> {
     pub(super) fn timed(&self, ordering: Ordering) -> Result<(SliceOrder, Option<Spread>, u64), Error> {
         let mut seconds = Vec::new();
         let mut order = SliceOrder::default();
-        for _ in 0..REPEATS {
+        for _ in 0..self.repeats {
             let start = Instant::now();
             order = match ordering {
                 Ordering::Exact => self.slices(Thickness::Auto, true)?,

@@ -53,6 +53,7 @@ impl Drawing<'_> {
             warnings: &mut warnings,
             sets: None,
             predicted: Prediction::default(),
+            announces: false,
         };
         let layers = draw::draw(&frame, &mut session, &mut cost)?;
         if session.sets.is_some_and(|sets| sets.interrupted) {
