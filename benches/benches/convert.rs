@@ -1,8 +1,8 @@
 //! Benchmark of convert: files to nouns are not timed, nouns to splats are; splats (or points, voxels) per second.
 
 use convert::{
-    CloudShape, Density, MeshParams, SplatParams, SurfelParams, VolumeParams, mesh_to_points, mesh_to_points_into,
-    procedural_cloud, raw_to_surfels, sobel_gradient_into, surface_to_points, volume_to_points,
+    CloudShape, Density, MeshParams, Orientation, SplatParams, SurfelParams, VolumeParams, mesh_to_points,
+    mesh_to_points_into, procedural_cloud, raw_to_surfels, sobel_gradient_into, surface_to_points, volume_to_points,
 };
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use field::ExpressionField;
@@ -114,6 +114,30 @@ fn points(c: &mut Criterion) {
     group.finish();
 }
 
+/// Points that no surface orders: of one density, thinner outwards, and with some of them far out.
+fn clouds_of_points(c: &mut Criterion) {
+    let uniform = |i: u64| DVec3::new(rng::unit(2, 0, i, 0), rng::unit(2, 0, i, 1), rng::unit(2, 0, i, 2));
+    let bell = |i: u64, axis: u64| {
+        let radius = (-2.0 * rng::unit(3, 0, i, 2 * axis).max(1e-300).ln()).sqrt();
+        radius * (std::f64::consts::TAU * rng::unit(3, 0, i, 2 * axis + 1)).cos()
+    };
+    let normal = |i: u64| DVec3::new(bell(i, 0), bell(i, 1), bell(i, 2));
+    let heavy = |i: u64| normal(i) * (6.0 * bell(i, 3)).exp();
+    let kinds: [(&str, &dyn Fn(u64) -> DVec3); 3] =
+        [("uniform", &uniform), ("normal", &normal), ("heavy tails", &heavy)];
+    let params = SurfelParams { orientation: Orientation::Auto(DVec3::Y), ..SurfelParams::default() };
+    let mut group = c.benchmark_group("clouds of points");
+    for (name, point) in kinds {
+        for count in [250_000, 1_000_000, 4_000_000] {
+            let position = (0..count).map(|i| point(i).as_vec3()).collect();
+            let points = RawPoints { position, ..RawPoints::default() };
+            group.throughput(Throughput::Elements(count));
+            group.bench_function(BenchmarkId::new(name, count), |b| b.iter(|| raw_to_surfels(&points, &params, None)));
+        }
+    }
+    group.finish();
+}
+
 fn fields(c: &mut Criterion) {
     let mut group = c.benchmark_group("fields");
     let text = "sin(x)*cos(y) + sin(y)*cos(z) + sin(z)*cos(x)";
@@ -172,6 +196,6 @@ fn hills(n: u64) -> RawPoints {
 criterion_group! {
     name = benches;
     config = Criterion::default().sample_size(10);
-    targets = meshes, volumes, points, fields, growth
+    targets = meshes, volumes, points, clouds_of_points, fields, growth
 }
 criterion_main!(benches);

@@ -11,6 +11,8 @@ pub(crate) mod matter;
 pub(crate) mod neighbours;
 pub(crate) mod orient;
 pub(crate) mod outline;
+pub(crate) mod pair_queue;
+pub(crate) mod place_order;
 pub(crate) mod places;
 pub(crate) mod point_cells;
 pub(crate) mod shown_points;

@@ -74,7 +74,7 @@ pub use render::{Render, render, render_from};
 pub use sequence::Sequence;
 pub use shadows::{ShadowTable, shadow_params};
 pub use splat_core::{CostRecord, Layers, Progress};
-pub use statistics::SplatCount;
+pub use statistics::{Conversion, SplatCount};
 pub use technique::Sets;
 
 /// The page's example compiles and holds.

@@ -5,7 +5,7 @@ use crate::cost::{Change, Count, CountedPass, Item, Prediction, Translucent, bef
 use crate::frame::{Extent, Frame, grouped};
 use crate::scene::{LightPoint, SceneObject, Technique};
 use crate::technique::{EVERYWHERE, Fold, OwnWork, TABLE};
-use crate::{RenderOptions, ShadowTable, pass, stage};
+use crate::{RenderOptions, ShadowTable, SplatCount, pass, stage};
 use splat_core::SplatKind;
 use splat_core::raster::{self, Expected};
 use std::ops::Range;
@@ -163,8 +163,8 @@ pub(crate) fn prediction(
     let seen = Seen::new(frame, folds, ranges);
     let mut loading: Vec<CountedPass> =
         before_reading(frame.scene, &[]).into_iter().filter(|pass| pass.pass == pass::READ).collect();
-    let converted = frame.loaded.splats.iter().map(|splats| splats.predicted as f64).sum();
-    loading.push(conversion(converted));
+    let count = |object: &SplatCount| Count::new(Item::of_conversion(object.conversion), object.predicted as f64);
+    loading.push(conversion(frame.loaded.splats.iter().map(count)));
     let whole = || Seen::new(frame, folds, &[EVERYWHERE]);
     let changes = [automatic_cells(frame, &seen), one_range(frame, &seen, whole), preferred(frame, &seen)];
     Prediction {
@@ -175,8 +175,11 @@ pub(crate) fn prediction(
     }
 }
 
-fn conversion(splats: f64) -> CountedPass {
-    CountedPass::new(pass::CONVERT, pass::CONVERT.to_owned(), vec![Count::new(Item::ConvertedSplat, splats)])
+/// The conversion of several objects.
+fn conversion(counts: impl Iterator<Item = Count>) -> CountedPass {
+    let mut pass = CountedPass::new(pass::CONVERT, pass::CONVERT.to_owned(), Vec::new());
+    pass.add(&counts.collect::<Vec<Count>>());
+    pass
 }
 
 /// Shadow tables of the automatic resolution, where the scene asks for cells.
@@ -213,11 +216,11 @@ fn preferred(frame: &Frame<'_>, seen: &Seen) -> Option<Change> {
     };
     let mut splats = seen.translucent.iter().map(|by| by.splats).fold(Expected::default(), sum);
     // Objects from their own data become splats of that radius.
-    let mut converted = 0.0;
+    let mut converted = Vec::new();
     for own in &loaded.own {
         let rank = visible().position(|(_, object)| object == own.object)?;
         let number = loaded.convertible[rank] as f64;
-        converted += number;
+        converted.push(Count::new(Item::of_conversion(loaded.splats[rank].conversion), number));
         let extent = Extent::new(&own.world_box(), &frame.camera);
         let radius = own.radius * extent.samples_per_unit;
         let footprint = (std::f64::consts::PI * radius * radius).clamp(4.0, samples(scene));
@@ -235,6 +238,6 @@ fn preferred(frame: &Frame<'_>, seen: &Seen) -> Option<Change> {
         Count::new(Item::ShadowLookUp, drawn * maps),
     ];
     passes.push(CountedPass::new(pass::SHADE, stage::SHADE.to_owned(), shading));
-    passes.push(conversion(converted));
+    passes.push(conversion(converted.into_iter()));
     Some(Change { key: format!("render.technique = \"{}\"", first.technique.name()), passes })
 }

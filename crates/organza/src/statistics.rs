@@ -148,6 +148,17 @@ pub struct ObjectStatistics {
     pub receives: bool,
 }
 
+/// What a splat is made of, where the time that takes differs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Conversion {
+    /// Of anything else: a piece of a surface, a voxel, a Gaussian.
+    Plain,
+    /// Of a raw point that becomes a disc, by its neighbours.
+    SurfacePoint,
+    /// Of a raw point that becomes a medium, by its neighbours.
+    MatterPoint,
+}
+
 /// Splats of one object.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct SplatCount {
@@ -159,12 +170,14 @@ pub struct SplatCount {
     pub exact: bool,
     /// Splats made.
     pub made: u64,
+    /// How one of them is made.
+    pub conversion: Conversion,
 }
 
 impl SplatCount {
-    pub(crate) fn predicted(object: &str, prediction: &Prediction) -> Self {
+    pub(crate) fn predicted(object: &str, prediction: &Prediction, conversion: Conversion) -> Self {
         let exact = prediction.at_most == Some(prediction.splats);
-        Self { object: object.to_owned(), predicted: prediction.splats, exact, made: 0 }
+        Self { object: object.to_owned(), predicted: prediction.splats, exact, made: 0, conversion }
     }
 }
 

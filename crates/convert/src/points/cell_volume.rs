@@ -45,7 +45,7 @@ pub(crate) fn cell_volumes(distinct: &[Vec3], progress: &Progress) -> Result<Vec
     if distinct.len() < 2 {
         return Ok(vec![f64::INFINITY; distinct.len()]);
     }
-    let tree = Tree::new(distinct);
+    let tree = Tree::new(distinct, progress);
     let rays = rays();
     let mut volumes = vec![0.0; distinct.len()];
     volumes.par_chunks_mut(LEAVES * WIDTH).enumerate().for_each(|(c, out)| {
@@ -53,7 +53,7 @@ pub(crate) fn cell_volumes(distinct: &[Vec3], progress: &Progress) -> Result<Vec
             pulp::Arch::new().dispatch(Task { tree: &tree, distinct, rays: &rays, first: c * LEAVES, out });
         }
     });
-    check_cancelled(progress).map(|()| volumes)
+    check_cancelled(progress).map(|()| tree.by_point(volumes, 1))
 }
 
 /// One direction of each pair, orbit by orbit.
@@ -89,13 +89,13 @@ impl pulp::NullaryFnOnce for Task<'_> {
         for (l, out) in self.out.chunks_mut(WIDTH).enumerate() {
             let leaf = self.first + l;
             self.tree.nearest(leaf, NEIGHBOURS, &mut nearest, &mut stack);
-            let first = self.tree.points_of(leaf).start;
+            let first = self.tree.slots_of(leaf).start;
             let mut units = [0.0; WIDTH];
             for slot in 0..WIDTH {
                 // Lanes without a point are those of the first again.
                 let lane = if slot < out.len() { slot } else { 0 };
-                let at = self.distinct[first + lane].as_dvec3();
-                let way = |j: usize| self.distinct[nearest.id(j, slot) as usize].as_dvec3() - at;
+                let at = self.distinct[self.tree.point(first + lane)].as_dvec3();
+                let way = |j: usize| self.distinct[nearest.id(j, lane) as usize].as_dvec3() - at;
                 units[slot] = unit(count, way);
                 for (j, bound) in bounds[..count].iter_mut().enumerate() {
                     let d = way(j);

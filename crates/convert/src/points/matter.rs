@@ -10,9 +10,10 @@
 
 use crate::ConvertError;
 use crate::common::columns::{self, CHUNK, Wanted};
+use crate::common::convert_error::check_cancelled;
 use crate::common::params::SplatParams;
+use crate::points::place_order::{canonical_order, distinct_places};
 use crate::points::point_cells::{cells_of, cut_outliers};
-use crate::points::surfels::{canonical_order, distinct_places};
 use crate::points::thin;
 use rayon::prelude::*;
 use splat_core::glam::{DVec3, Vec3};
@@ -64,11 +65,11 @@ pub struct MatterReport {
     pub duplicates: u64,
     /// Splats made: none of points without extinction.
     pub splats: u64,
-    /// Points whose cell was cut to the largest.
+    /// Points whose cell was cut to the largest; none where masses and reaches are stated, and cells not asked for.
     pub lone: u64,
-    /// Median edge of the cubes with the volumes of the cells, world units; 0 without points.
+    /// Median edge of the cubes with the volumes of the cells, world units; 0 without points, and without cells.
     pub median_spacing: f64,
-    /// Sum of the volumes, world units³.
+    /// Sum of the volumes, world units³; 0 without cells.
     pub volume: f64,
 }
 
@@ -114,8 +115,14 @@ pub fn raw_to_matter(
     check(points, params)?;
     let order = canonical_order(points);
     let (distinct, starts) = distinct_places(points, &order);
-    let found = || cells_of(&order, &distinct, &starts, progress);
-    let mut cells = if points.cells.is_empty() { found()? } else { points.cells.clone() };
+    check_cancelled(progress)?;
+    let mut cells = if !points.cells.is_empty() {
+        points.cells.clone()
+    } else if params.spacing.is_none() && OfMatter::new(points).needs_no_cells() {
+        vec![PointCell::default(); points.len()]
+    } else {
+        cells_of(&order, &distinct, &starts, progress)?
+    };
     let scale = params.splat.transform.scale;
     let (median, lone) = cut_outliers(&mut cells, params.lone_spacing / scale, params.largest_spacing);
     let volume = order.iter().map(|i| cells[*i as usize].volume).sum::<f64>();
@@ -182,6 +189,11 @@ impl<'a> OfMatter<'a> {
             mass: column(MASS),
             shadow_coefficient: column(SHADOW_COEFFICIENT),
         }
+    }
+
+    /// Whether masses and reaches say what volumes would.
+    fn needs_no_cells(&self) -> bool {
+        self.mass.is_some() && self.reach.is_some()
     }
 
     /// The reach of the kernel of point `i` in the unit of the file, where that is stated.

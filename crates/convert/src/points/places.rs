@@ -4,7 +4,7 @@ use crate::common::convert_error::check_cancelled;
 use crate::points::cell_ellipse::ellipse;
 use crate::points::discs::DiscShape;
 use crate::points::neighbours::{MAX_NEIGHBOURS, MAX_WAITING, Nearest, Tree, WIDTH, Waiting};
-use crate::points::orient::{self, Orientation};
+use crate::points::orient;
 use crate::points::tangent_plane::{Offset, fit_normals};
 use crate::points::voronoi_cell::voronoi_sides;
 use crate::{ConvertError, SurfelParams};
@@ -54,30 +54,41 @@ pub(crate) struct Neighbours {
     pub(crate) of_each: usize,
 }
 
-/// The places of points in Morton order; and their neighbours where normals are to be propagated.
+impl Neighbours {
+    /// Those of one place.
+    pub(crate) fn of(&self, place: u32) -> &[u32] {
+        let first = place as usize * self.of_each;
+        &self.ids[first..first + self.of_each]
+    }
+}
+
+/// The places of points; and their neighbours where they are to be kept.
 pub(crate) fn places(
     distinct: &[Vec3],
     params: &SurfelParams,
+    keep_neighbours: bool,
     progress: &Progress,
 ) -> Result<(Vec<Place>, Neighbours), ConvertError> {
     progress.add_total(distinct.len() as u64);
-    let keep_neighbours = params.orientation == Orientation::Propagate;
-    let tree = Tree::new(distinct);
+    let tree = Tree::new(distinct, progress);
     let mut places = vec![Place::default(); distinct.len()];
-    let kept: Vec<Vec<u32>> = places
-        .par_chunks_mut(LEAVES * WIDTH)
-        .enumerate()
-        .map(|(c, out)| {
-            if progress.tick(out.len() as u64).is_err() {
-                return Vec::new();
-            }
-            let task = Task { tree: &tree, distinct, params, first: c * LEAVES, keep_neighbours, out };
-            pulp::Arch::new().dispatch(task)
-        })
-        .collect();
-    check_cancelled(progress)?;
     let of_each = params.neighbours.min(distinct.len().saturating_sub(1));
-    Ok((places, Neighbours { ids: kept.concat(), of_each }))
+    let kept_of_each = if keep_neighbours { of_each } else { 0 };
+    let mut ids = vec![0u32; kept_of_each * distinct.len()];
+    let mut rest = &mut ids[..];
+    let mut tasks = Vec::with_capacity(distinct.len().div_ceil(LEAVES * WIDTH));
+    for (chunk, out) in places.chunks_mut(LEAVES * WIDTH).enumerate() {
+        let (kept, behind) = std::mem::take(&mut rest).split_at_mut(kept_of_each * out.len());
+        rest = behind;
+        tasks.push(Task { tree: &tree, distinct, params, first: chunk * LEAVES, kept, out });
+    }
+    tasks.into_par_iter().for_each(|task| {
+        if progress.tick(task.out.len() as u64).is_ok() {
+            pulp::Arch::new().dispatch(task);
+        }
+    });
+    check_cancelled(progress)?;
+    Ok((tree.by_point(places, 1), Neighbours { ids: tree.by_point(ids, kept_of_each), of_each }))
 }
 
 /// The places of some leaves, in the form that [`pulp`] compiles once per instruction set.
@@ -87,42 +98,43 @@ struct Task<'a> {
     params: &'a SurfelParams,
     /// First leaf.
     first: usize,
-    keep_neighbours: bool,
+    /// The neighbours of each, as many of each; empty where none are kept.
+    kept: &'a mut [u32],
     out: &'a mut [Place],
 }
 
 impl pulp::NullaryFnOnce for Task<'_> {
-    type Output = Vec<u32>;
+    type Output = ();
 
     #[inline(always)]
-    fn call(self) -> Vec<u32> {
-        let mut kept = Vec::new();
+    fn call(self) {
         let mut nearest = Nearest::default();
         let mut stack = [Waiting::default(); MAX_WAITING];
         let mut offsets = [[[0.0; WIDTH]; 3]; MAX_NEIGHBOURS];
         let count = self.params.neighbours.min(self.distinct.len() - 1);
+        let kept_of_each = self.kept.len() / self.out.len();
         for (l, out) in self.out.chunks_mut(WIDTH).enumerate() {
             let leaf = self.first + l;
             self.tree.nearest(leaf, self.params.neighbours, &mut nearest, &mut stack);
-            let points = self.tree.points_of(leaf);
+            let first = self.tree.slots_of(leaf).start;
             for (j, offset) in offsets[..count].iter_mut().enumerate() {
                 for slot in 0..WIDTH {
                     // Lanes without a point are those of the first again.
-                    let at = self.distinct[if slot < out.len() { points.start + slot } else { points.start }];
-                    let to = self.distinct[nearest.id(j, slot) as usize] - at;
+                    let lane = if slot < out.len() { slot } else { 0 };
+                    let at = self.distinct[self.tree.point(first + lane)];
+                    let to = self.distinct[nearest.id(j, lane) as usize] - at;
                     (offset[0][slot], offset[1][slot], offset[2][slot]) = (to.x, to.y, to.z);
                 }
             }
             leaf_places(&offsets[..count], self.params, out);
-            if self.keep_neighbours {
-                kept.extend(
-                    (0..out.len())
-                        .flat_map(|slot| (0..count).map(move |j| (j, slot)))
-                        .map(|(j, slot)| nearest.id(j, slot)),
-                );
+            if kept_of_each > 0 {
+                for slot in 0..out.len() {
+                    for j in 0..count {
+                        self.kept[(l * WIDTH + slot) * count + j] = nearest.id(j, slot);
+                    }
+                }
             }
         }
-        kept
     }
 }
 

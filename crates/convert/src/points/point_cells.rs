@@ -1,7 +1,7 @@
 //! What each of some points stands for if they are matter: its share of the Voronoi cell of its place.
 
 use crate::points::cell_volume::cell_volumes;
-use crate::points::surfels::{canonical_order, distinct_places};
+use crate::points::place_order::{canonical_order, distinct_places};
 use crate::{ConvertError, SplatParams};
 use splat_core::glam::Vec3;
 use splat_core::{PointCell, Progress, RawPoints};

@@ -24,10 +24,12 @@ use crate::points::materials::materials_of;
 use crate::points::matter::check_columns;
 use crate::points::neighbours::MAX_NEIGHBOURS;
 use crate::points::orient::{self, Orientation};
+use crate::points::place_order::{canonical_order, distinct_places};
 use crate::points::places::{Place, places};
 use crate::splats::footprints::choose_footprints;
 use crate::splats::{from_splats, gaussian_points};
 use rayon::prelude::*;
+use splat_core::RawPoints;
 use splat_core::points::attributes::{FOOTPRINT, SHADOW_COEFFICIENT};
 use splat_core::text::counted;
 use splat_core::{
@@ -35,8 +37,6 @@ use splat_core::{
     glam::{DVec3, Vec3},
     optics,
 };
-use splat_core::{Column, RawPoints};
-use std::cmp::Ordering;
 
 /// How raw points become surfels.
 #[derive(Debug, Clone, PartialEq)]
@@ -95,11 +95,11 @@ pub struct SurfelReport {
     pub duplicates: u64,
     /// Surfels made.
     pub splats: u64,
-    /// Places whose neighbours lie on a line, so that the normal is a guess.
+    /// Places whose neighbours lie on a line, so that the normal is a guess; none where neighbours are not asked.
     pub without_plane: u64,
     /// Places whose spacing was cut to the largest.
     pub lone: u64,
-    /// Median spacing, world units; 0 without points.
+    /// Median spacing, world units; 0 without points, and where points have normals and discs one size, so that neighbours are not asked.
     pub median_spacing: f64,
     /// Sum of the areas, world units².
     pub area: f64,
@@ -156,9 +156,19 @@ pub fn raw_to_surfels(
         });
     }
     let order = canonical_order(points);
+    check_cancelled(progress)?;
     let (distinct, starts) = distinct_places(points, &order);
-    let params = &SurfelParams { orientation: known_orientation(&distinct, params)?, ..params.clone() };
-    let mut places = turned_places(&distinct, points.origin, params, progress)?;
+    let has_normals = points.normal.len() == points.len()
+        && points.normal.par_iter().with_min_len(CHUNK).all(|n| columns::unit_or_zero(*n) != Vec3::ZERO);
+    let mut places = if has_normals && matches!(params.size, Some(DiscSize::World(_))) {
+        // The size tells the area too, so nothing of a place is asked for.
+        progress.add_total(distinct.len() as u64);
+        vec![Place { plane: 1, ..Place::default() }; distinct.len()]
+    } else {
+        let orientation = known_orientation(&distinct, params, progress)?;
+        let params = &SurfelParams { orientation, ..params.clone() };
+        places_with_normals(&distinct, points.origin, params, !has_normals, progress)?
+    };
     let mut report = SurfelReport {
         points: points.len() as u64,
         duplicates: (points.len() - distinct.len()) as u64,
@@ -170,21 +180,25 @@ pub fn raw_to_surfels(
     Ok((cloud, report))
 }
 
-/// Places whose normals point to the side that is asked for; those that are kept of the same points, where something is.
-fn turned_places(
+/// Places whose normals point to the side that is asked for, if `turns` says so; those that are kept of the same points, where something is.
+fn places_with_normals(
     distinct: &[Vec3],
     origin: DVec3,
     params: &SurfelParams,
+    turns: bool,
     progress: &Progress,
 ) -> Result<Vec<Place>, ConvertError> {
     let find = || {
-        let (mut places, neighbours) = places(distinct, params, progress)?;
-        orient::orient(&mut places, distinct, origin, params.orientation, &neighbours);
-        check_cancelled(progress).map(|()| places)
+        let keep_neighbours = turns && params.orientation == Orientation::Propagate;
+        let (mut places, neighbours) = places(distinct, params, keep_neighbours, progress)?;
+        if !turns {
+            return Ok(places);
+        }
+        orient::orient(&mut places, distinct, origin, params.orientation, &neighbours, progress).map(|()| places)
     };
     #[cfg(feature = "cache")]
     if let Some(cache) = &params.splat.cache {
-        let key = place_key(distinct, origin, params);
+        let key = place_key(distinct, origin, params, turns);
         let what = format!("normals and areas of object '{}'", params.splat.object_name);
         return cache.get(&what, key, distinct.len(), Place::is_valid, find);
     }
@@ -193,7 +207,7 @@ fn turned_places(
 
 /// All that places and their normals are made from.
 #[cfg(feature = "cache")]
-fn place_key(distinct: &[Vec3], origin: DVec3, params: &SurfelParams) -> Key {
+fn place_key(distinct: &[Vec3], origin: DVec3, params: &SurfelParams, turns: bool) -> Key {
     let (side, at) = match params.orientation {
         Orientation::Toward(d) | Orientation::Auto(d) => (0u64, d),
         Orientation::Viewpoint(eye) => (1, eye - origin),
@@ -201,19 +215,27 @@ fn place_key(distinct: &[Vec3], origin: DVec3, params: &SurfelParams) -> Key {
     };
     let lone = params.lone_spacing / params.splat.transform.scale;
     let numbers = [params.neighbours as u64, side, params.shape as u64];
-    Key::new("places").with(distinct).with(&numbers).with(&[at]).with(&[lone])
+    Key::new(if turns { "places" } else { "places with normals of any side" })
+        .with(distinct)
+        .with(&numbers)
+        .with(&[at])
+        .with(&[lone])
 }
 
 /// The orientation, where it depends on what the points enclose: told by some of them, which lie evenly among all.
-fn known_orientation(distinct: &[Vec3], params: &SurfelParams) -> Result<Orientation, ConvertError> {
+fn known_orientation(
+    distinct: &[Vec3],
+    params: &SurfelParams,
+    progress: &Progress,
+) -> Result<Orientation, ConvertError> {
     /// Places that are enough to tell.
     const ENOUGH: usize = 1 << 16;
     let Orientation::Auto(up) = params.orientation else { return Ok(params.orientation) };
     let some: Vec<Vec3> = distinct.iter().step_by(distinct.len().div_ceil(ENOUGH).max(1)).copied().collect();
     let outwards = SurfelParams { orientation: Orientation::Propagate, ..params.clone() };
-    let (mut places, neighbours) = places(&some, &outwards, &Progress::new())?;
+    let (mut places, neighbours) = places(&some, &outwards, true, progress)?;
     cut_outliers(&mut places, params, &mut SurfelReport::default());
-    orient::orient(&mut places, &some, DVec3::ZERO, Orientation::Propagate, &neighbours);
+    orient::orient(&mut places, &some, DVec3::ZERO, Orientation::Propagate, &neighbours, progress)?;
     Ok(if orient::encloses(&places) { Orientation::Propagate } else { Orientation::Toward(up) })
 }
 
@@ -247,59 +269,6 @@ pub(crate) fn check(points: &RawPoints, params: &SurfelParams) -> Result<(), Con
     }
     orient::check(params.orientation).map_err(|(found, expected)| p.bad("orientation", found, expected))?;
     p.check_spacing(params.lone_spacing).map(|_| ())
-}
-
-/// Ids by place (along a Morton curve), then by attributes: the order of the file does not matter.
-pub(crate) fn canonical_order(points: &RawPoints) -> Vec<u32> {
-    let bounds = splat_core::Aabb::of_points(&points.position);
-    let extent = (bounds.max - bounds.min).max_element().max(f32::MIN_POSITIVE);
-    let mut keys: Vec<(u64, u32)> = points
-        .position
-        .par_iter()
-        .enumerate()
-        .with_min_len(CHUNK)
-        .map(|(i, p)| (morton((p.as_dvec3() - bounds.min.as_dvec3()) / f64::from(extent)), i as u32))
-        .collect();
-    keys.par_sort_unstable_by(|a, b| a.0.cmp(&b.0).then_with(|| compare(points, a.1 as usize, b.1 as usize)));
-    keys.into_iter().map(|k| k.1).collect()
-}
-
-pub(crate) fn compare(points: &RawPoints, a: usize, b: usize) -> Ordering {
-    let bits = |v: Vec3| v.to_array().map(f32::to_bits);
-    let place = |i: usize| points.position[i].to_array().map(|c| (c + 0.0).to_bits());
-    let attributes = |i: usize| {
-        let color = points.color.get(i).map(|c| c.map(f32::to_bits));
-        let number = |column: &[f32]| column.get(i).map(|v| v.to_bits());
-        (points.normal.get(i).map(|n| bits(*n)), color, number(&points.value), number(&points.opacity))
-    };
-    let further = || {
-        let differ = |c: &Column| c.values[a].total_cmp(&c.values[b]);
-        points.columns.iter().map(differ).fold(Ordering::Equal, Ordering::then)
-    };
-    place(a).cmp(&place(b)).then_with(|| attributes(a).cmp(&attributes(b))).then_with(further).then(a.cmp(&b))
-}
-
-/// 21 bits an axis of a place in the unit cube.
-fn morton(p: DVec3) -> u64 {
-    let spread = |v: f64| {
-        let mut v = ((v * f64::from(1u32 << 21)) as u64).min((1 << 21) - 1);
-        v = (v | v << 32) & 0x001f_0000_0000_ffff;
-        v = (v | v << 16) & 0x001f_0000_ff00_00ff;
-        v = (v | v << 8) & 0x100f_00f0_0f00_f00f;
-        v = (v | v << 4) & 0x10c3_0c30_c30c_30c3;
-        (v | v << 2) & 0x1249_2492_4924_9249
-    };
-    spread(p.x) | spread(p.y) << 1 | spread(p.z) << 2
-}
-
-/// The distinct places in order, and where the points of each begin in `order` (then the number of points).
-pub(crate) fn distinct_places(points: &RawPoints, order: &[u32]) -> (Vec<Vec3>, Vec<u32>) {
-    let mut distinct: Vec<Vec3> = order.par_iter().with_min_len(CHUNK).map(|i| points.position[*i as usize]).collect();
-    let is_first = |s: &usize| *s == 0 || distinct[*s] != distinct[*s - 1];
-    let mut starts: Vec<u32> = (0..order.len()).filter(is_first).map(|s| s as u32).collect();
-    starts.push(order.len() as u32);
-    distinct.dedup();
-    (distinct, starts)
 }
 
 /// Cuts spacings to a multiple of the median; sets the sums of the report.

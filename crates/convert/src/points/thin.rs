@@ -1,7 +1,7 @@
 //! Fewer raw points: those of one cell of a lattice become one, their mean.
 
 use crate::common::columns::CHUNK;
-use crate::points::surfels::compare;
+use crate::points::place_order::compare;
 use crate::{ConvertError, SplatParams};
 use rayon::prelude::*;
 use splat_core::glam::{DVec3, Vec3};

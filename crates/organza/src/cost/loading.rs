@@ -64,7 +64,7 @@ pub(crate) fn before_conversion(
 ) -> Vec<CountedPass> {
     let converted = splats.iter().zip(planned).filter(|(_, plan)| plan.splats.is_some());
     let convert = |(s, _): (&SplatCount, _)| {
-        let counts = vec![Count::new(Item::ConvertedSplat, s.predicted as f64)];
+        let counts = vec![Count::new(Item::of_conversion(s.conversion), s.predicted as f64)];
         CountedPass::new(pass::CONVERT, converting(&s.object), counts)
     };
     let mut passes: Vec<CountedPass> = converted.map(convert).collect();

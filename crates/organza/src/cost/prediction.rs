@@ -33,7 +33,7 @@ impl CountedPass {
     }
 
     /// Takes in more counted work.
-    fn add(&mut self, counts: &[Count]) {
+    pub(crate) fn add(&mut self, counts: &[Count]) {
         for count in counts {
             match self.counts.iter_mut().find(|known| known.item == count.item) {
                 Some(known) => known.number += count.number,

@@ -2,6 +2,7 @@
 
 use super::{Count, CountedPass};
 use crate::pass;
+use crate::statistics::Conversion;
 
 /// Where the built-in figures were measured.
 pub const BUILT_IN_MACHINE: &str = "AMD EPYC, one core, profile dev";
@@ -15,6 +16,10 @@ pub enum Item {
     GeneratedObject,
     /// A splat that is converted.
     ConvertedSplat,
+    /// A raw point that becomes a disc: its neighbours tell how it lies.
+    SurfacePoint,
+    /// A raw point that becomes a medium: its neighbours tell its volume.
+    MatterPoint,
     /// A splat that is offered to a shadow table.
     CastSplat,
     /// An opaque splat that is offered to a shadow table, where it ends rays.
@@ -97,10 +102,12 @@ const fn row(item: Item, name: &'static str, words: &'static str, pass: &'static
 
 /// The built-in figures, measured on [`BUILT_IN_MACHINE`] by the command in benches/README.md, in the order of [`Item`]. Enlarged and grouped discs
 /// and exact fragments are of older benchmarks; parallel shares are estimates.
-static TABLE: [Row; 27] = [
+static TABLE: [Row; 29] = [
     row(Item::FileByte, "file_byte", "bytes", pass::READ, 80.0, 0.0),
     row(Item::GeneratedObject, "generated_object", "objects", pass::READ, 1.5e7, 0.5),
     row(Item::ConvertedSplat, "converted_splat", "splats", pass::CONVERT, 400.0, 0.5),
+    row(Item::SurfacePoint, "surface_point", "points that become discs", pass::CONVERT, 2000.0, 0.7),
+    row(Item::MatterPoint, "matter_point", "points that become a medium", pass::CONVERT, 5000.0, 0.95),
     row(Item::CastSplat, "cast_splat", "splats", pass::SHADOW_MAP, 30.0, 0.9),
     row(Item::OpaqueCaster, "opaque_caster", "opaque splats", pass::SHADOW_MAP, 420.0, 0.9),
     row(Item::ShadowEntry, "shadow_entry", "entries of a shadow table", pass::SHADOW_MAP, 47.0, 0.9),
@@ -133,6 +140,15 @@ impl Item {
         TABLE.iter().map(|row| row.item)
     }
 
+    /// A splat that is made so.
+    pub(crate) fn of_conversion(conversion: Conversion) -> Self {
+        match conversion {
+            Conversion::Plain => Self::ConvertedSplat,
+            Conversion::SurfacePoint => Self::SurfacePoint,
+            Conversion::MatterPoint => Self::MatterPoint,
+        }
+    }
+
     /// Its name in files of a machine.
     pub fn name(self) -> &'static str {
         TABLE[self as usize].name
@@ -149,6 +165,8 @@ impl Item {
             Self::FileByte
             | Self::GeneratedObject
             | Self::ConvertedSplat
+            | Self::SurfacePoint
+            | Self::MatterPoint
             | Self::CastSplat
             | Self::OpaqueCaster
             | Self::ShadowEntry

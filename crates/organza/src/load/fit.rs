@@ -7,7 +7,8 @@ use crate::scene::{FoundCamera, Scene};
 use crate::{Error, Progress, RenderOptions};
 use convert::{ConvertError, DiscSize, Outline, SurfelParams, raw_to_matter, raw_to_surfels};
 use field::visible_ends;
-use splat_core::{Cloud, DAabb, RawPoints, Similarity};
+use splat_core::glam::{DVec2, Vec3};
+use splat_core::{Camera, Cloud, DAabb, RawPoints, Similarity};
 use std::borrow::Cow;
 
 /// Most points of an object whose splats are looked at: of more each is a pixel or two.
@@ -40,8 +41,45 @@ pub(crate) fn placed<'s>(
         };
         return Err(Error::input(crate::printable(&scene.file), message, hint));
     };
+    for input in &inputs {
+        if let Input::Points(path, points, _) | Input::Matter(path, points, _) = input {
+            files.warn(path, crowded(points, &input.splat().transform, &found.camera));
+        }
+    }
     let scene = Scene { camera: found.camera, target: found.target, fit: None, ..Scene::clone(&scene) };
     Ok((Cow::Owned(scene), Some(found)))
+}
+
+/// A sentence about points of which nearly all are drawn within one pixel, because a few lie far out.
+fn crowded(points: &RawPoints, to_world: &Similarity, camera: &Camera) -> Option<String> {
+    /// One of so many is left out at each end of a column of pixels, and of a row.
+    const FEW_OF: usize = 100;
+    if points.len() < FEW_OF || !points.gaussians.is_empty() {
+        return None;
+    }
+    let pixel = |p: &Vec3| {
+        let place = camera.view_from_world(to_world.apply(points.origin + p.as_dvec3()));
+        let depth = if camera.is_orthographic() { 1.0 } else { place.z };
+        place.truncate() * (camera.focal_px() / depth)
+    };
+    let pixels: Vec<DVec2> = points.position.iter().map(pixel).collect();
+    let few = points.len() / FEW_OF;
+    let is_narrow = |mut places: Vec<f64>| {
+        let last = places.len() - 1;
+        let low = *places.select_nth_unstable_by(few, f64::total_cmp).1;
+        let high = *places.select_nth_unstable_by(last - few, f64::total_cmp).1;
+        high - low < 1.0
+    };
+    let low = pixels.iter().fold(DVec2::INFINITY, |low, pixel| low.min(*pixel));
+    let high = pixels.iter().fold(DVec2::NEG_INFINITY, |high, pixel| high.max(*pixel));
+    let is_crowded = (high - low).max_element() >= 2.0
+        && is_narrow(pixels.iter().map(|pixel| pixel.x).collect())
+        && is_narrow(pixels.iter().map(|pixel| pixel.y).collect());
+    is_crowded.then(|| {
+        "nearly all of its points lie within one pixel, because the camera sees a few that lie far out: `clip` leaves those out, or give the \
+         camera a position"
+            .to_owned()
+    })
 }
 
 /// Points around what is seen of an object, and what leads them to the world.

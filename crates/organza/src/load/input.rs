@@ -7,7 +7,7 @@ use crate::scene::{
     CombinedSource, DensitySource, FieldSource, LevelSetSource, MatterSource, SceneObject, SliceSource, Source,
     SourceData, SurfaceSampler, VolumeSource,
 };
-use crate::statistics::ObjectData;
+use crate::statistics::{Conversion, ObjectData};
 use convert::{
     CloudShape, Density, DensityParams, HomogeneousMedium, MatterParams, MediumBody, MeshParams, Section, ShownPoints,
     SplatParams, SurfaceField, SurfelParams, VolumeParams,
@@ -95,6 +95,19 @@ impl Input<'_> {
     }
 
     /// What it is made of, as far as the data and its field tell.
+    /// What its splats are made of.
+    pub(super) fn conversion(&self) -> Conversion {
+        match self {
+            // Gaussians and splats of files ask no neighbours.
+            Self::Points(_, points, _) if !(points.gaussians.is_empty() && points.ready.cloud.is_empty()) => {
+                Conversion::Plain
+            }
+            Self::Points(..) => Conversion::SurfacePoint,
+            Self::Matter(..) => Conversion::MatterPoint,
+            _ => Conversion::Plain,
+        }
+    }
+
     pub(super) fn data(&self, bounded: bool, looseness: f64, by: SurfaceSampler) -> ObjectData {
         match self {
             Self::Points(_, points, _) if !points.gaussians.is_empty() => ObjectData::Gaussians,

@@ -87,7 +87,7 @@ impl<'a> Loading<'a> {
         let left = self.files.memory(self.options).left();
         let mut needed = 0;
         for ((object, p), plan) in self.visible().map(|v| v.1).zip(prepared).zip(planned) {
-            let mut count = SplatCount::predicted(&object.name, &p.prediction);
+            let mut count = SplatCount::predicted(&object.name, &p.prediction, p.input.conversion());
             if plan.splats.is_none() {
                 (count.predicted, count.exact) = (0, true);
             }
