@@ -109,8 +109,8 @@ pub fn blend(
             let visit = |k: usize, fragments: &mut [Fragment]| {
                 rule.split(discs, fragments, &mut layers);
                 match &floor {
-                    Some(floor) => tile.floored(k, fragments, &layers, input, (floor, rule)),
-                    None => tile.pixel(k, fragments, &layers[..most.min(layers.len())], (input, params)),
+                    Some(floor) => tile.floored(k, fragments, &layers, input, floor, rule),
+                    None => tile.pixel(k, fragments, &layers[..most.min(layers.len())], input, params),
                 }
             };
             let fragments = pulp::Arch::new().dispatch(WalkTile { discs, lists, corner, visit });

@@ -26,7 +26,7 @@ pub(crate) fn slope(bump: &Bump, place: DVec3, pixel: f64) -> DVec3 {
 }
 
 /// ∇h of an image, at a place and across a unit normal of the object, which is on the viewer's side.
-pub(crate) fn image_slope(bump: &Bump, image: &HeightImage, (at, normal): (DVec3, DVec3), pixel: f64) -> DVec3 {
+pub(crate) fn image_slope(bump: &Bump, image: &HeightImage, at: DVec3, normal: DVec3, pixel: f64) -> DVec3 {
     let size = f64::from(bump.size);
     let side = normal.signum();
     // Right and up in the image, as they are seen from outside.
@@ -135,7 +135,7 @@ mod tests {
         ];
         for (normal, right) in sides {
             for at in [DVec3::new(0.3, -0.7, 0.2), DVec3::new(-13.1, 5.2, 8.6)] {
-                let slope = image_slope(&bump, &image, (at, normal), 1e-3);
+                let slope = image_slope(&bump, &image, at, normal, 1e-3);
                 // Differences over two texels, of 64 a ridge, are lower by a share of 1 − sin(δ)/δ < 0.002, and so is what lies between.
                 assert!(
                     slope.distance(right * rises(at.dot(right))) < 0.004 * 0.15 * std::f64::consts::PI,
@@ -150,7 +150,7 @@ mod tests {
         let image = ridges(1);
         let bump = Bump { height: 0.3, size: 1.0, octaves: 0, seed: 0 };
         let at = DVec3::new(0.2, 0.0, 0.2);
-        let of = |normal: DVec3, pixel: f64| image_slope(&bump, &image, (at, normal.normalize()), pixel);
+        let of = |normal: DVec3, pixel: f64| image_slope(&bump, &image, at, normal.normalize(), pixel);
         let half = 0.5 * (of(DVec3::X, 1e-3) + of(DVec3::Z, 1e-3));
         assert!(of(DVec3::new(1.0, 0.0, 1.0), 1e-3).distance(half) < 1e-12);
         assert!(of(DVec3::new(1.0, 0.0, 0.1), 1e-3).distance(of(DVec3::X, 1e-3)) < 1e-3);

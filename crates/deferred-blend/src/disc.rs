@@ -177,7 +177,8 @@ impl Discs {
     }
 
     /// The ray of a pixel.
-    pub(crate) fn ray(&self, [x, y]: [usize; 2]) -> Ray {
+    pub(crate) fn ray(&self, pixel: [usize; 2]) -> Ray {
+        let [x, y] = pixel;
         let offset = |at: usize, size: u32| (at as f32 + 0.5 - 0.5 * size as f32) / self.focal;
         let at = Vec3::new(offset(x, self.size[0]), -offset(y, self.size[1]), 0.0);
         if self.parallel {

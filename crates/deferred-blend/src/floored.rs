@@ -60,7 +60,8 @@ impl Blended {
     const NOTHING: Self = Self { values: [0.0; MAX_CHANNELS], through: [1.0; 3] };
 
     /// Something nearer, in front of it.
-    fn behind(&mut self, values: &[f32; MAX_CHANNELS], opacity: [f32; 3], [planes, channels]: [usize; 2]) {
+    fn behind(&mut self, values: &[f32; MAX_CHANNELS], opacity: [f32; 3], sizes: [usize; 2]) {
+        let [planes, channels] = sizes;
         for (c, sum) in self.values.iter_mut().enumerate().take(channels) {
             *sum = values[c] + (1.0 - opacity[ChannelLayout::plane_of(c, channels, planes)]) * *sum;
         }
@@ -84,7 +85,8 @@ impl<'a> Floor<'a> {
     /// Eq. 10 between the depths of the nearest and the farthest disc; `None` where depths are not floored.
     ///
     /// The farthest disc belongs to the last step, not to one behind it.
-    pub(crate) fn new(layering: &Layering<'a>, [near, far]: [f32; 2]) -> Option<Self> {
+    pub(crate) fn new(layering: &Layering<'a>, range: [f32; 2]) -> Option<Self> {
+        let [near, far] = range;
         let (floors, smooths_nearest) = match layering {
             Layering::Gaps | Layering::Peeled(_) => return None,
             Layering::Algorithm1(floors) => (floors, false),
@@ -105,15 +107,16 @@ impl<'a> Floor<'a> {
         fragments: &[Fragment],
         input: &BlendInput<'_>,
         rule: GapRule,
-        (ray, sizes): (&Ray, [usize; 2]),
+        ray: &Ray,
+        sizes: [usize; 2],
     ) -> Blended {
         let Some(nearest) = fragments.first().filter(|_| self.smooths_nearest) else {
-            return algorithm_1(fragments, input, self, (ray, sizes));
+            return algorithm_1(fragments, input, self, ray, sizes);
         };
         // The conservative test of Fig. 6: within ε of the nearest, not of a neighbour.
         let end = fragments.iter().position(|f| !rule.joins(input.discs, nearest, f)).unwrap_or(fragments.len());
         // I = α·C_F + (1 − α)·C_O
-        let mut all = algorithm_1(&fragments[end..], input, self, (ray, sizes));
+        let mut all = algorithm_1(&fragments[end..], input, self, ray, sizes);
         let front = Layer::of(&fragments[..end], input, ray, sizes);
         all.behind(&front.values, front.opacity, sizes);
         all
@@ -125,7 +128,8 @@ fn algorithm_1(
     fragments: &[Fragment],
     input: &BlendInput<'_>,
     floor: &Floor<'_>,
-    (ray, sizes): (&Ray, [usize; 2]),
+    ray: &Ray,
+    sizes: [usize; 2],
 ) -> Blended {
     let [planes, channels] = sizes;
     let count = floor.groups.count();

@@ -101,7 +101,7 @@ impl<V: FnMut(usize, &mut [Fragment])> pulp::WithSimd for WalkTile<'_, V> {
         for b in 0..BLOCKS {
             pixels.iter_mut().for_each(Vec::clear);
             for &i in lists.block(b) {
-                meet_block(simd, discs, i, (b, corner), &mut pixels);
+                meet_block(simd, discs, i, b, corner, &mut pixels);
             }
             for (k, fragments) in pixels.iter_mut().enumerate() {
                 let pixel = b * PIXELS + k;
@@ -123,7 +123,8 @@ fn meet_block<S: Simd>(
     simd: S,
     discs: &Discs,
     i: u32,
-    (b, corner): (usize, [usize; 2]),
+    b: usize,
+    corner: [usize; 2],
     pixels: &mut [Vec<Fragment>; PIXELS],
 ) {
     let of = |v: f32| Lanes::splat(simd, v);

@@ -211,7 +211,7 @@ impl<'m> Path<'m> {
             return None;
         }
         let seen = |c: usize| match glass.bending {
-            Bending::Traced => trace(glass, (*place, along[c], *cone), (inside.clone(), c)),
+            Bending::Traced => trace(glass, *place, along[c], *cone, inside.clone(), c),
             Bending::Power | Bending::Nearest => glass.seen(*place, along[c], *cone),
         };
         let first = seen(0);

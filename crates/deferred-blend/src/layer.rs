@@ -22,12 +22,8 @@ pub(crate) struct Layer {
 impl Layer {
     /// Eq. 1 for depth and opacity, and for what is shown, whose weights are w times the opacity. All are averaged as differences from the
     /// nearest disc's, so what is constant stays so to the last bit.
-    pub(crate) fn of(
-        fragments: &[Fragment],
-        input: &BlendInput<'_>,
-        ray: &Ray,
-        [planes, channels]: [usize; 2],
-    ) -> Self {
+    pub(crate) fn of(fragments: &[Fragment], input: &BlendInput<'_>, ray: &Ray, sizes: [usize; 2]) -> Self {
+        let [planes, channels] = sizes;
         let optics = |f: &Fragment, p: usize| input.discs.looks[f.disc as usize].opacity(p, f.facing / ray.length);
         let first = &fragments[0];
         let mut weights = 0.0;
@@ -50,12 +46,12 @@ impl Layer {
         match input.shown {
             Shown::Discs(values) => {
                 let of = |f: &Fragment| &values[input.discs.ids[f.disc as usize] as usize * channels..][..channels];
-                mean_values(fragments, of, (share, plane), &mut layer.values);
+                mean_values(fragments, of, share, plane, &mut layer.values);
             }
             Shown::Pixels(light) => {
                 let disc = input.discs.ids[first.disc as usize] as usize;
                 let place = Place { discs: input.discs, ray, depth: layer.depth, disc };
-                light.on_layer(fragments, &place, (share, plane), &mut layer.values);
+                light.on_layer(fragments, &place, share, plane, &mut layer.values);
             }
         }
         for (c, value) in layer.values.iter_mut().enumerate().take(channels) {
@@ -65,7 +61,8 @@ impl Layer {
     }
 
     /// Another opacity, with the values that it shows.
-    pub(crate) fn set_opacity(&mut self, opacity: [f32; 3], [planes, channels]: [usize; 2]) {
+    pub(crate) fn set_opacity(&mut self, opacity: [f32; 3], sizes: [usize; 2]) {
+        let [planes, channels] = sizes;
         if opacity == self.opacity {
             return;
         }
@@ -81,7 +78,8 @@ impl Layer {
 fn mean_values<'v>(
     fragments: &[Fragment],
     of: impl Fn(&Fragment) -> &'v [f32],
-    (share, plane): (impl Fn(&Fragment) -> [f32; 3], impl Fn(usize) -> usize),
+    share: impl Fn(&Fragment) -> [f32; 3],
+    plane: impl Fn(usize) -> usize,
     means: &mut [f32; MAX_CHANNELS],
 ) {
     let first = of(&fragments[0]);

@@ -220,7 +220,7 @@ impl pulp::WithSimd for ResolveTile<'_> {
             block.clear(b, corner);
             let passes = match input.passes {
                 Passes::OnePlusOne { groups, .. } => {
-                    groups::keep(simd, list, (input.discs, groups), (rules, &mut *block), images);
+                    groups::keep(simd, list, input.discs, groups, rules, &mut *block, images);
                     groups::composite(simd, input, images, block);
                     1
                 }

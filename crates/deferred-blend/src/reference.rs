@@ -44,10 +44,12 @@ struct Hit {
 pub fn layers(
     input: &DiscInput<'_>,
     params: &Params,
-    [x, y]: [u32; 2],
+    pixel: [u32; 2],
     values: &[f32],
-    [planes, channels]: [usize; 2],
+    sizes: [usize; 2],
 ) -> Vec<Layer> {
+    let [x, y] = pixel;
+    let [planes, channels] = sizes;
     let (origin, direction) = world_ray(input.camera, f64::from(x) + 0.5, f64::from(y) + 0.5);
     let hits = hits(input, params, origin, direction);
     let core = f64::from(Footprint::CORE / params.disc_scale).powi(2);
@@ -172,7 +174,8 @@ fn joins(near: &Hit, far: &Hit, gap: f64) -> bool {
     (far.depth - near.depth) * facing < gap * 0.5 * (near.radius + far.radius)
 }
 
-fn blend(hits: &[Hit], input: &DiscInput<'_>, ray: f64, values: &[f32], [planes, channels]: [usize; 2]) -> Layer {
+fn blend(hits: &[Hit], input: &DiscInput<'_>, ray: f64, values: &[f32], sizes: [usize; 2]) -> Layer {
+    let [planes, channels] = sizes;
     let cloud = input.cloud;
     let weights: f64 = hits.iter().map(|h| h.weight).sum();
     let mut layer = Layer { depth: 0.0, opacity: [0.0; 3], values: vec![0.0; channels] };

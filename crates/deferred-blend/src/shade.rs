@@ -84,7 +84,8 @@ impl Light<'_> {
         &self,
         fragments: &[Fragment],
         place: &Place<'_>,
-        (share, plane): (impl Fn(&Fragment) -> [f32; 3], impl Fn(usize) -> usize),
+        share: impl Fn(&Fragment) -> [f32; 3],
+        plane: impl Fn(usize) -> usize,
         out: &mut [f32; MAX_CHANNELS],
     ) {
         let of = |f: &Fragment| Attributes::of(self.input.cloud, place.discs.ids[f.disc as usize] as usize);
@@ -149,7 +150,7 @@ impl Light<'_> {
         let bump = &self.input.materials[material].bump;
         let pixel = f64::from(place.discs.pixel_width(place.depth)) / scale;
         let slope = match self.heights.get(material).and_then(Option::as_ref) {
-            Some(image) => bump::image_slope(bump, image, (at, rotation.inverse() * normal.as_dvec3()), pixel),
+            Some(image) => bump::image_slope(bump, image, at, rotation.inverse() * normal.as_dvec3(), pixel),
             None => bump::slope(bump, at, pixel),
         };
         (rotation * slope).as_vec3()

@@ -203,7 +203,7 @@ impl<'a> Surfaces<'a> {
             }
             nearest.map_or(f32::INFINITY, |(t, _)| t)
         });
-        nearest.map(|(t, k)| self.average(from, along, wanted, (t, k)))
+        nearest.map(|(t, k)| self.average(from, along, wanted, t, k))
     }
 
     fn counts(&self, k: usize, hit: &Hit, wanted: Wanted) -> bool {
@@ -217,7 +217,7 @@ impl<'a> Surfaces<'a> {
     }
 
     /// The layer that a disc belongs to, which a ray meets at some distance.
-    fn average(&self, from: Vec3, along: Vec3, wanted: Wanted, (nearest, first): (f32, usize)) -> Met<'_> {
+    fn average(&self, from: Vec3, along: Vec3, wanted: Wanted, nearest: f32, first: usize) -> Met<'_> {
         let bvh = self.bvh.as_ref().expect("invariant: something was met");
         let first = &self.discs[first];
         let reach = SAME / LEAST_FACING * self.largest[first.look.object as usize];

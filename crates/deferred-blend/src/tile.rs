@@ -59,7 +59,8 @@ impl Tile {
         k: usize,
         fragments: &[Fragment],
         layers: &[Range<usize>],
-        (input, params): (&BlendInput<'_>, &Params),
+        input: &BlendInput<'_>,
+        params: &Params,
     ) {
         let limit = self.opaque.get(k).copied().unwrap_or(f32::INFINITY);
         let [x, y] = self.corner;
@@ -83,7 +84,7 @@ impl Tile {
                 if path.leaves_out(glass) {
                     continue;
                 }
-                let [rank, of_object] = count(own[0].object, layer.start, limit, (fragments, layers));
+                let [rank, of_object] = count(own[0].object, layer.start, limit, fragments, layers);
                 let place = ray.at(blended.depth);
                 let distance = ray.length * blended.depth;
                 let (normal, curvature) = normal(own, input);
@@ -100,7 +101,7 @@ impl Tile {
             }
         }
         if let Some((glass, path)) = way {
-            self.end(k, glass, &path, (limit, ray.length), &input.range);
+            self.end(k, glass, &path, limit, ray.length, &input.range);
         }
     }
 
@@ -114,7 +115,8 @@ impl Tile {
         fragments: &mut [Fragment],
         layers: &[Range<usize>],
         input: &BlendInput<'_>,
-        (floor, rule): (&Floor<'_>, GapRule),
+        floor: &Floor<'_>,
+        rule: GapRule,
     ) {
         let limit = self.opaque.get(k).copied().unwrap_or(f32::INFINITY);
         let [x, y] = self.corner;
@@ -148,7 +150,7 @@ impl Tile {
             }
         }
         if let Some((glass, path)) = way {
-            self.end(k, glass, &path, (limit, ray.length), &input.range);
+            self.end(k, glass, &path, limit, ray.length, &input.range);
         }
     }
 
@@ -172,7 +174,7 @@ impl Tile {
             (None, Some(crossing)) => (crossing.depth, u32::MAX),
             (None, None) => return,
         };
-        let blended = floor.blend(&inside, input, rule, (ray, sizes));
+        let blended = floor.blend(&inside, input, rule, ray, sizes);
         let opacity = blended.through.map(|t| (1.0 - t).clamp(0.0, 1.0));
         let layer = Layer { depth, opacity, values: blended.values };
         self.add(k, &layer, crossing.map_or(&Passage::CLEAR, |crossing| &crossing.passage), object);
@@ -181,7 +183,7 @@ impl Tile {
 
     /// What a ray sees that has come through all layers: matter before an opaque surface absorbs, and where the ray was bent
     /// something else is seen.
-    fn end(&mut self, k: usize, glass: &Glass<'_>, path: &Path<'_>, (limit, ray): (f32, f32), range: &Range<f32>) {
+    fn end(&mut self, k: usize, glass: &Glass<'_>, path: &Path<'_>, limit: f32, ray: f32, range: &Range<f32>) {
         if limit.is_finite() && range.contains(&limit) {
             let depth = path.absorbed_before(limit * ray, glass);
             let planes = self.optical_depth.len();
@@ -281,7 +283,7 @@ fn cross_layers<'m>(
             break;
         }
         let Some(material) = bound_matter(of_layer, input) else { continue };
-        let [rank, layers] = count(object, layer.start, limit, (fragments, layers));
+        let [rank, layers] = count(object, layer.start, limit, fragments, layers);
         let (normal, curvature) = normal(of_layer, input);
         let distance = ray.length * depth;
         let cone = ray.cone.after(distance);
@@ -298,7 +300,7 @@ fn cross_layers<'m>(
 }
 
 /// How many layers of an object lie before the one that starts at a fragment, and how many before an opaque surface.
-fn count(object: u32, start: usize, limit: f32, (fragments, layers): (&[Fragment], &[Range<usize>])) -> [u32; 2] {
+fn count(object: u32, start: usize, limit: f32, fragments: &[Fragment], layers: &[Range<usize>]) -> [u32; 2] {
     let of_object = layers.iter().filter(|l| fragments[l.start].object == object);
     let rank = of_object.clone().take_while(|l| l.start != start).count() as u32;
     let all = of_object.take_while(|l| mean_depth(&fragments[(*l).clone()]) < limit).count() as u32;

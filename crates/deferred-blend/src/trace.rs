@@ -45,8 +45,11 @@ impl<'m> Inside<'m> {
 /// are those of a ray that goes the same way.
 pub(crate) fn trace<'m>(
     glass: &'m Glass<'_>,
-    (mut from, mut along, mut cone): (Vec3, Vec3, Cone),
-    (mut inside, channel): (Inside<'m>, usize),
+    mut from: Vec3,
+    mut along: Vec3,
+    mut cone: Cone,
+    mut inside: Inside<'m>,
+    channel: usize,
 ) -> [f32; 3] {
     let mut sum = [0.0; 3];
     let mut share = [1.0f32; 3];

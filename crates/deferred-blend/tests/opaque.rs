@@ -61,7 +61,7 @@ fn agrees_with_the_twin(scene: &Scene, (params, step): (&Params, f64), (name, pa
         let twin = |factor: f32, step: [f64; 2]| {
             let params = Params { gap: params.gap * factor, ..*params };
             let at = [f64::from(x) + 0.5 + step[0], f64::from(y) + 0.5 + step[1]];
-            let seen = reference::opaque(&scene.input(), &params, passes, at, (&scene.values, 3))?;
+            let seen = reference::opaque(&scene.input(), &params, passes, at, &scene.values, 3)?;
             assert_eq!(picture.disc[k], seen.disc as u32, "{name}, pixel {x} {y}");
             Some([seen.depth, seen.values[0], seen.values[1], seen.values[2]])
         };
@@ -135,7 +135,7 @@ fn db2_opaque_discs_a_million_units_away_are_one_surface() {
     let twin = |k: u32| {
         let at = [k % SIZE[0], k / SIZE[0]].map(|v| f64::from(v) + 0.5);
         let all = Passes::TwoPlusOne;
-        reference::opaque(&scene.input(), &Params::default(), all, at, (&scene.values, 3)).expect("a large plane")
+        reference::opaque(&scene.input(), &Params::default(), all, at, &scene.values, 3).expect("a large plane")
     };
     let twin: Vec<reference::Seen> = (0..SIZE[0] * SIZE[1]).map(twin).collect();
     for passes in [Passes::TwoPlusOne, plain(&groups), voronoi(&groups)] {

@@ -35,7 +35,7 @@ pub(crate) fn cut<F: ScalarField + ?Sized>(field: &F, mesh: Mesh) -> Mesh {
             if inside[a] != inside[b] {
                 // From the vertex inside, whichever triangle asks: neighbours get the same place.
                 let (from, to) = if inside[a] { (a, b) } else { (b, a) };
-                let share = border(field, mesh.origin, [mesh.position[from], mesh.position[to]]);
+                let share = border(field, mesh.origin, mesh.position[from], mesh.position[to]);
                 let normal = mesh.normal[from].lerp(mesh.normal[to], share).normalize_or_zero();
                 corners.push(push(&mut part, mesh.position[from].lerp(mesh.position[to], share), normal));
             }
@@ -55,7 +55,7 @@ fn push(mesh: &mut Mesh, position: Vec3, normal: Vec3) -> u32 {
 }
 
 /// The share of the way from a place inside to one outside that is inside.
-fn border<F: ScalarField + ?Sized>(field: &F, origin: DVec3, [from, to]: [Vec3; 2]) -> f32 {
+fn border<F: ScalarField + ?Sized>(field: &F, origin: DVec3, from: Vec3, to: Vec3) -> f32 {
     let mut low = 0.0f32;
     let mut high = 1.0f32;
     for _ in 0..HALVINGS {

@@ -192,7 +192,8 @@ impl Writer<'_> {
         ((self.grid.axes * at).as_vec3(), normal.as_vec3())
     }
 
-    fn value(&self, [i, j, k]: [usize; 3]) -> f64 {
+    fn value(&self, cell: [usize; 3]) -> f64 {
+        let [i, j, k] = cell;
         let [nx, ny, _] = self.grid.dims;
         f64::from(self.grid.values[(k * ny + j) * nx + i])
     }

@@ -92,5 +92,5 @@ pub fn slice_along(
     };
     let extremes = order.input_from_sorted.par_chunks_mut(CHUNK).enumerate().map(chunk);
     let extremes = extremes.reduce(|| Extremes::NONE, Extremes::join);
-    slice_projected((cloud, ids), Bits { extremes, order }, distance, params, scratch)
+    slice_projected(cloud, ids, Bits { extremes, order }, distance, params, scratch)
 }

@@ -169,11 +169,12 @@ impl Recorded {
     /// [`Error::ReadBack`] for bytes that no run gave.
     pub fn order(
         &self,
-        [state, keys, places]: [&[u8]; 3],
+        buffers: [&[u8]; 3],
         cloud: &Cloud,
         ids: Option<&[u32]>,
         params: &Params,
     ) -> Result<SliceOrder, Error> {
+        let [state, keys, places] = buffers;
         join(&[self.sorted([state, keys, places], cloud, ids)?], cloud, ids, params)
     }
 }

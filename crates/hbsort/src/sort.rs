@@ -44,7 +44,7 @@ pub fn slice_cloud(
     let mut order = scratch.take_order(ids.map_or(len, <[u32]>::len))?;
     let projector = Projector::new(cloud, ids, camera, params.margin_px);
     let extremes = projector.project(&mut order.input_from_sorted);
-    slice_projected((cloud, ids), Bits { extremes, order }, |id| projector.depth(id), params, scratch)
+    slice_projected(cloud, ids, Bits { extremes, order }, |id| projector.depth(id), params, scratch)
 }
 
 /// What a projection leaves: the bits of the depths, in the place of the ids that come of them, and their extremes.
@@ -56,7 +56,8 @@ pub(crate) struct Bits {
 /// Slices the splats of a cloud, or those of `ids`, once their depths are known. `depth_of` gives a splat's depth by its
 /// id.
 pub(crate) fn slice_projected(
-    (cloud, ids): (&Cloud, Option<&[u32]>),
+    cloud: &Cloud,
+    ids: Option<&[u32]>,
     Bits { extremes, order }: Bits,
     depth_of: impl Fn(u32) -> f32 + Sync,
     params: &Params,

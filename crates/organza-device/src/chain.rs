@@ -206,7 +206,7 @@ fn run_on(
             return Err(Error::Cancelled.into());
         }
         let run = |inputs: &[(BufferId, &[u8])]| ready.run(inputs).map_err(Failure::from);
-        let run = whole.with_inputs(splats, (&all, &attributes), &received, accumulator, run)?;
+        let run = whole.with_inputs(splats, &all, &attributes, &received, accumulator, run)?;
         let (projected, joined) = &whole.project;
         let projection = run.bytes(joined.of(projected.state));
         if project::through_the_eye(projection)? > 0 {

@@ -75,7 +75,7 @@ pub(super) fn draw(canvas: &mut Canvas<'_>, scales: &[ColorScale]) -> u64 {
     let all: f64 = panels.iter().map(|panel| panel.height + margin).sum();
     let mut top = (0.5 * (height - all + margin)).round();
     for panel in &panels {
-        panel.draw(canvas, [width - margin - panel.width, top], capital);
+        panel.draw(canvas, width - margin - panel.width, top, capital);
         top += panel.height + margin;
     }
     (scales.len() - panels.len()) as u64
@@ -161,7 +161,7 @@ fn shortened(text: String, fits: impl Fn(&str) -> bool) -> String {
 
 impl Panel<'_> {
     /// Draws it with its upper left corner at a place.
-    fn draw(&self, canvas: &mut Canvas<'_>, [left, top]: [f64; 2], capital: f64) {
+    fn draw(&self, canvas: &mut Canvas<'_>, left: f64, top: f64, capital: f64) {
         canvas.fill(pixels(left, self.width), pixels(top, self.height), PANEL, PANEL_OPACITY);
         let x = left + PAD * capital;
         let below = top + (PAD + LINE) * capital;
@@ -230,7 +230,8 @@ mod tests {
     }
 
     /// A picture of one brightness with legends: its samples, and how many had no room.
-    fn drawn([width, height]: [usize; 2], brightness: f32, scales: &[ColorScale]) -> (Vec<[f32; 3]>, u64) {
+    fn drawn(size: [usize; 2], brightness: f32, scales: &[ColorScale]) -> (Vec<[f32; 3]>, u64) {
+        let [width, height] = size;
         let mut samples = vec![brightness; 3 * width * height];
         let left = draw(&mut Canvas::new(&mut samples, width as u32, 3), scales);
         (samples.as_chunks::<3>().0.to_vec(), left)

@@ -16,7 +16,7 @@ pub(super) fn encode(
     let color = if params.transparent { ColorType::Rgba } else { ColorType::Rgb };
     let depth = if params.deep { BitDepth::Sixteen } else { BitDepth::Eight };
     let mut bytes = Vec::new();
-    written(&mut bytes, layers.size, (color, depth), &quantized(&samples, depth), metadata)
+    written(&mut bytes, layers.size, color, depth, &quantized(&samples, depth), metadata)
         .map_err(|e| Error::Internal(format!("PNG encoder: {e}")))?;
     Ok(bytes)
 }
@@ -45,11 +45,13 @@ fn samples(layers: &Layers, metadata: &Metadata, params: &Params, report: &mut W
 
 fn written(
     bytes: &mut Vec<u8>,
-    [width, height]: [u32; 2],
-    (color, depth): (ColorType, BitDepth),
+    size: [u32; 2],
+    color: ColorType,
+    depth: BitDepth,
     pixels: &[u8],
     metadata: &Metadata,
 ) -> Result<(), EncodingError> {
+    let [width, height] = size;
     let mut encoder = Encoder::new(bytes, width, height);
     encoder.set_color(color);
     encoder.set_depth(depth);

@@ -246,7 +246,7 @@ impl Staging {
             let normals = &particles.normal[first..first + n];
             let colors = &particles.color[first..first + n];
             if self.view.wide || normals.iter().fold(false, |any, n| any | n.is_per_crossing()) {
-                self.one_by_one(particles, first..first + n, with, (keys[0], before));
+                self.one_by_one(particles, first..first + n, with, keys[0], before);
                 continue;
             }
             if self.view.thin {
@@ -263,7 +263,7 @@ impl Staging {
         }
     }
     /// A block with particles that are widened or whose k depends on their normal.
-    fn one_by_one(&mut self, of: &Particles, range: Range<usize>, with: &Filling<'_>, (key, before): (u64, u64)) {
+    fn one_by_one(&mut self, of: &Particles, range: Range<usize>, with: &Filling<'_>, key: u64, before: u64) {
         let projector = with.projector;
         let outside = with.tiling.tiles() as u32;
         for (j, i) in range.enumerate() {

@@ -165,7 +165,8 @@ impl DepthSum {
     pub(crate) const WORDS: usize = 4 + 4 * (SPANS + BLOCK_SPANS) + 2;
 
     /// A hit of set `set`, at a positive depth; sets come in order.
-    pub(crate) fn add(&mut self, set: u64, depth: f32, [near, far]: [f32; 2]) {
+    pub(crate) fn add(&mut self, set: u64, depth: f32, range: [f32; 2]) {
+        let [near, far] = range;
         let steps = ((depth - near) / (far - near) * STEPS + 0.5).clamp(0.0, STEPS) as u64;
         self.sum = self.sum.saturating_add(steps);
         self.square = self.square.saturating_add(steps * steps);
@@ -188,7 +189,8 @@ impl DepthSum {
 
     /// First, median, mean and deviation after `levels` sets with `hits` hits; +∞ where undefined. Rays that pass all
     /// particles end at `solid`.
-    pub(crate) fn depths(mut self, levels: u32, hits: u32, [near, far]: [f32; 2], solid: Option<f32>) -> [f32; 4] {
+    pub(crate) fn depths(mut self, levels: u32, hits: u32, range: [f32; 2], solid: Option<f32>) -> [f32; 4] {
+        let [near, far] = range;
         let behind = solid.unwrap_or(f32::INFINITY);
         if hits == 0 {
             return [behind, behind, behind, if solid.is_some() { 0.0 } else { f32::INFINITY }];

@@ -193,7 +193,7 @@ impl Levels<'_> {
     fn light(&self, r: &mut Recording, winners: &Winners, level: u32) -> bool {
         let Some((lighting, seen, lit)) = self.lit else { return false };
         let [view, objects, _, sets, particles] = self.inputs;
-        lit.record_level(r, lighting, [view, objects, sets, particles, self.sums], (seen, winners), level);
+        lit.record_level(r, lighting, view, objects, sets, particles, self.sums, seen, winners, level);
         true
     }
 }

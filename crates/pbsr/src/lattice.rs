@@ -226,7 +226,7 @@ impl Poisson for LatticeSampler<'_> {
         };
         let values = self.grid.values.iter().map(|v| v.to_bits()).collect();
         let tables = vec![self.cells.clone(), values];
-        Some(Twin::new(Maker::Lattice, self, source, tables, (self.params.seed, Stage::Lattice)))
+        Some(Twin::new(Maker::Lattice, self, source, tables, self.params.seed, Stage::Lattice))
     }
 }
 

@@ -192,7 +192,8 @@ impl Leaf {
 
     /// Where the line (u, v) of the graph meets the surface, nearly; `None` when it does so out of the cube.
     #[inline(always)]
-    pub(crate) fn start(&self, graph: &Graph, [u, v]: [f32; 2]) -> Option<DVec3> {
+    pub(crate) fn start(&self, graph: &Graph, place: [f32; 2]) -> Option<DVec3> {
+        let [u, v] = place;
         let x = u - 0.5;
         let y = v - 0.5;
         let h = &graph.height;
@@ -210,7 +211,8 @@ impl Leaf {
         surface: &ImplicitSurface<'_>,
         graph: &Graph,
         mut p: DVec3,
-        (mut f, mut gradient): (f64, DVec3),
+        mut f: f64,
+        mut gradient: DVec3,
     ) -> Option<(DVec3, DVec3)> {
         let low = along(graph.axis, self.corner);
         for _ in 0..8 {
@@ -234,7 +236,8 @@ impl Leaf {
     }
 
     /// Both ends of the line (u, v) of the graph in the cube.
-    pub(crate) fn ends(&self, graph: &Graph, [u, v]: [f32; 2]) -> [DVec3; 2] {
+    pub(crate) fn ends(&self, graph: &Graph, place: [f32; 2]) -> [DVec3; 2] {
+        let [u, v] = place;
         [0.0, 1.0].map(|t| self.corner + turned(graph.axis, f64::from(u), f64::from(v), t) * self.side)
     }
 }

@@ -273,7 +273,7 @@ impl<'a> LineSampler<'a> {
     /// The root on the line of a graph that begins at `p`, and ∇f/|f_k| there.
     fn root(&self, leaf: &Leaf, graph: &Graph, p: DVec3) -> Option<(DVec3, DVec3)> {
         let (f, gradient) = self.surface.field.value_gradient(p);
-        leaf.refine(&self.surface, graph, p, (f - self.surface.level, gradient))
+        leaf.refine(&self.surface, graph, p, f - self.surface.level, gradient)
     }
 
     /// `n` uniform places of the surface, fewer only where lines hardly meet it: starts of walks.
@@ -363,8 +363,8 @@ impl<'a> LineSampler<'a> {
             let lot = batch.lot[i];
             let Some(graph) = &leaf.graph else { continue };
             let (f, gradient) = batch.found[i];
-            let found = (f - self.surface.level, gradient);
-            let Some((p, gradient)) = leaf.refine(&self.surface, graph, batch.at[i], found) else { continue };
+            let value = f - self.surface.level;
+            let Some((p, gradient)) = leaf.refine(&self.surface, graph, batch.at[i], value, gradient) else { continue };
             let thinned = self.density.as_ref().is_some_and(|d| batch.thinning[i] * d.max >= d.at(p));
             if !keeps(graph, lot, gradient) || thinned || !self.surface.contains(p) {
                 continue;

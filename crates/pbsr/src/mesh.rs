@@ -89,7 +89,8 @@ impl<'a> MeshSampler<'a> {
     }
 
     #[inline]
-    fn normal(&self, t: usize, [u, v]: [f32; 2]) -> PackedNormal {
+    fn normal(&self, t: usize, place: [f32; 2]) -> PackedNormal {
+        let [u, v] = place;
         match &*self.mesh.normal {
             [] => self.normals[t],
             normals => {
@@ -100,7 +101,8 @@ impl<'a> MeshSampler<'a> {
     }
 
     #[inline]
-    fn color(&self, t: usize, [u, v]: [f32; 2], own: Steps) -> Steps {
+    fn color(&self, t: usize, place: [f32; 2], own: Steps) -> Steps {
+        let [u, v] = place;
         match &*self.mesh.color {
             [] => own,
             colors => {
@@ -121,14 +123,16 @@ fn pack(normal: Vec3, params: &SurfaceParams) -> PackedNormal {
 
 /// Coordinates in a triangle of coordinates in its parallelogram.
 #[inline]
-fn folded([u, v]: [f32; 2]) -> [f32; 2] {
+fn folded(place: [f32; 2]) -> [f32; 2] {
+    let [u, v] = place;
     // Selections, not a branch: whether it is folded cannot be foreseen.
     let beyond = u + v > 1.0;
     [u, v].map(|w| if beyond { 1.0 - w } else { w })
 }
 
 #[inline]
-fn point([a, b, c]: [Vec3; 3], [u, v]: [f32; 2]) -> Vec3 {
+fn point([a, b, c]: [Vec3; 3], place: [f32; 2]) -> Vec3 {
+    let [u, v] = place;
     a + (b - a) * u + (c - a) * v
 }
 
@@ -190,6 +194,6 @@ impl Poisson for MeshSampler<'_> {
             ..ParticleSource::default()
         };
         let tables = [mesh.triangles.as_flattened().to_vec(), (0..mesh.position.len()).flat_map(vertex).collect()];
-        Some(Twin::new(Maker::Mesh, self, source, tables.into(), (self.params.seed, Stage::Mesh)))
+        Some(Twin::new(Maker::Mesh, self, source, tables.into(), self.params.seed, Stage::Mesh))
     }
 }

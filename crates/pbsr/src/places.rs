@@ -22,7 +22,8 @@ pub(crate) struct Lattice {
 }
 
 impl Lattice {
-    pub(crate) fn new(axes: Mat3, [nx, ny, nz]: [u32; 3]) -> Self {
+    pub(crate) fn new(axes: Mat3, counts: [u32; 3]) -> Self {
+        let [nx, ny, nz] = counts;
         let ends = Vec3::from_array([nx, ny, nz].map(|n| (f64::from(n) - 0.5) as f32));
         Self { axes, dims: [nx, ny], inverse_dims: [nx, ny].map(|n| 1.0 / f64::from(n)), ends }
     }
@@ -69,7 +70,8 @@ impl Lattice {
 
     /// Offset from the grid's origin, so many steps from the first corner of a cell.
     #[inline(always)]
-    pub(crate) fn offset(&self, [i, j, k]: [u32; 3], within: [f32; 3]) -> Vec3 {
+    pub(crate) fn offset(&self, cell: [u32; 3], within: [f32; 3]) -> Vec3 {
+        let [i, j, k] = cell;
         self.axes * Vec3::new(i as f32 + within[0], j as f32 + within[1], k as f32 + within[2])
     }
 }
@@ -87,7 +89,8 @@ pub(crate) fn cells(points: usize) -> usize {
 
 /// From a lattice point to the next along each axis, in values; 0 where there is no other.
 #[inline(always)]
-pub(crate) fn steps([nx, ny, nz]: [usize; 3]) -> [usize; 3] {
+pub(crate) fn steps(counts: [usize; 3]) -> [usize; 3] {
+    let [nx, ny, nz] = counts;
     [usize::from(nx > 1), if ny > 1 { nx } else { 0 }, if nz > 1 { nx * ny } else { 0 }]
 }
 
@@ -103,7 +106,8 @@ pub(crate) fn corners(grid: &Grid, at: u32) -> [f32; 8] {
 
 /// Value and lattice gradient at a place in \[0, 1\]³ of a cell with these values at its corners.
 #[inline(always)]
-pub(crate) fn interpolate([a0, a1, b0, b1, c0, c1, d0, d1]: [f32; 8], [fx, fy, fz]: [f32; 3]) -> (f32, Vec3) {
+pub(crate) fn interpolate([a0, a1, b0, b1, c0, c1, d0, d1]: [f32; 8], share: [f32; 3]) -> (f32, Vec3) {
+    let [fx, fy, fz] = share;
     let mix = |a: f32, b: f32, t: f32| a + (b - a) * t;
     let [da, db, dc, dd] = [a1 - a0, b1 - b0, c1 - c0, d1 - d0];
     let [xa, xb, xc, xd] = [a0 + da * fx, b0 + db * fx, c0 + dc * fx, d0 + dd * fx];

@@ -111,7 +111,8 @@ impl View {
 
 impl View {
     /// Leaves out those of `n` particles before the first depth, or at the second or behind it.
-    pub(crate) fn leave_out(&mut self, n: usize, [near, far]: [f32; 2], outside: u32) {
+    pub(crate) fn leave_out(&mut self, n: usize, range: [f32; 2], outside: u32) {
+        let [near, far] = range;
         for i in 0..n {
             if !(near..far).contains(&self.z[i]) {
                 (self.tile[i], self.k[i]) = (outside, 0.0);

@@ -41,7 +41,7 @@ impl Radial {
     pub(crate) fn new(footprint: &Footprint, shape: Shape) -> Self {
         let shares = Shares::new(footprint, shape);
         let begin = |cell: usize| f64::from(f32::from_bits(((cell as u32) << BELOW) + ((127 - OCTAVES as u32) << 23)));
-        let cells = (0..CELLS - 1).map(|c| cubic([begin(c), begin(c + 1)], |t| shares.stretch(t)));
+        let cells = (0..CELLS - 1).map(|c| cubic(begin(c), begin(c + 1), |t| shares.stretch(t)));
         Self { cells: cells.chain([[shares.stretch(1.0) as f32, 0.0, 0.0, 0.0]]).collect() }
     }
 
@@ -66,7 +66,7 @@ impl Radial {
 }
 
 /// The cubic over a cell through its ends and two points between, in the share of the cell.
-fn cubic([begin, end]: [f64; 2], h: impl Fn(f64) -> f64) -> [f32; 4] {
+fn cubic(begin: f64, end: f64, h: impl Fn(f64) -> f64) -> [f32; 4] {
     let [a, p, q, e] = [0.0, 1.0, 2.0, 3.0].map(|k| h(begin + (end - begin) * (k / 3.0)));
     // Newton's form at 0, 1/3, 2/3 and 1, then in powers.
     let d1 = p - a;

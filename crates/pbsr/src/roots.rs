@@ -80,7 +80,7 @@ impl Line<'_> {
                 return;
             }
         } else if ga * up < 0.0 && gb * up > 0.0 {
-            self.extremum([a, b], [ga, gb], up, depth, found);
+            self.extremum(a, b, [ga, gb], up, depth, found);
             return;
         } else if depth >= DEPTH {
             found.unproven += 1;
@@ -111,7 +111,7 @@ impl Line<'_> {
     }
 
     /// f runs towards c from both ends, on the side `up` of it: looks for the place where it turns.
-    fn extremum(&self, [a, b]: [At; 2], slopes: [f64; 2], up: f64, depth: u32, found: &mut Found) {
+    fn extremum(&self, a: At, b: At, slopes: [f64; 2], up: f64, depth: u32, found: &mut Found) {
         let mut low = a.t;
         let mut high = b.t;
         let [mut g_low, mut g_high] = slopes;
@@ -209,7 +209,7 @@ mod tests {
     }
 
     /// `steepest` bounds the slope there.
-    fn found_with(field: &Roots, [from, to]: [f64; 2], steepest: f64) -> Found {
+    fn found_with(field: &Roots, from: f64, to: f64, steepest: f64) -> Found {
         let surface = ImplicitSurface {
             field,
             level: 0.0,
@@ -224,7 +224,7 @@ mod tests {
     }
 
     fn found(field: &Roots, from: f64, to: f64) -> Found {
-        found_with(field, [from, to], f64::INFINITY)
+        found_with(field, from, to, f64::INFINITY)
     }
 
     #[test]
@@ -232,11 +232,11 @@ mod tests {
         let apart = &Roots(&[1.5, 2.5]);
         let near = &Roots(&[1.000_1, 1.000_2]);
         assert!(found(apart, 0.0, 1.0).unproven > 0);
-        assert_eq!(found_with(apart, [0.0, 1.0], 4.0).unproven, 0);
+        assert_eq!(found_with(apart, 0.0, 1.0, 4.0).unproven, 0);
         // f′ is −2.0003 at 0.
-        assert!(found_with(near, [0.0, 1.0], 2.01).unproven > 0);
+        assert!(found_with(near, 0.0, 1.0, 2.01).unproven > 0);
         let pair = &Roots(&[0.499_9, 0.500_1]);
-        assert_eq!(found_with(pair, [0.0, 1.0], 1.0).roots.len(), 2);
+        assert_eq!(found_with(pair, 0.0, 1.0, 1.0).roots.len(), 2);
     }
 
     #[test]

@@ -41,9 +41,12 @@ impl Ensemble {
         }
         if !accumulator.depth.is_empty() {
             let plane = &accumulator.optical_depth[accumulator.optical_depth.len() / 2];
-            let depths = ["depth.first", "depth.median", "depth.mean", "depth.sigma"].map(scalar);
+            let first = scalar("depth.first");
+            let median = scalar("depth.median");
+            let mean = scalar("depth.mean");
+            let sigma = scalar("depth.sigma");
             for (k, profile) in accumulator.depth.iter_mut().enumerate() {
-                *profile = DepthProfile::of_depths(depths.map(|d| d[k]), plane[k]);
+                *profile = DepthProfile::of_depths(first[k], median[k], mean[k], sigma[k], plane[k]);
             }
         }
         if let Some(LayerData::Id(found)) = layers.images.get("object") {

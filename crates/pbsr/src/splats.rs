@@ -248,6 +248,6 @@ impl Poisson for SplatSampler<'_> {
         });
         let kernels = self.radials.iter().flat_map(|r| r.cells()).flat_map(|cell| cell.map(f32::to_bits)).collect();
         let source = ParticleSource { vertex_words: words, ..ParticleSource::default() };
-        Some(Twin::new(Maker::Splats, self, source, vec![splats, kernels], (self.params.seed, Stage::Splats)))
+        Some(Twin::new(Maker::Splats, self, source, vec![splats, kernels], self.params.seed, Stage::Splats))
     }
 }

@@ -248,7 +248,7 @@ impl Poisson for GridSampler<'_> {
         let cells = self.cells.iter().flat_map(|c| [c.at, c.most.to_bits(), c.piece]).collect();
         let values = self.grid.values.iter().map(|v| v.to_bits()).collect();
         let tables = vec![cells, values, self.pieces.words()];
-        Some(Twin::new(Maker::Volume, self, source, tables, (self.params.seed, Stage::Volume)))
+        Some(Twin::new(Maker::Volume, self, source, tables, self.params.seed, Stage::Volume))
     }
 }
 

@@ -282,7 +282,7 @@ fn whole(
 fn outwards(mut mesh: Mesh, reading: &mut Reading<'_>) -> Result<Mesh, ReadError> {
     input::hold("which parts the triangles make", mesh.position.len() as u64 * BYTES_PER_PART, reading.params)?;
     for _ in 0..turn_outwards(&mut mesh) {
-        reading.mend((Fix::InsideOut, Place::File, None), || {
+        reading.mend(Fix::InsideOut, Place::File, None, || {
             let hint = "turn the faces around, or leave out --strict";
             ReadError::input(Place::File, "surfaces whose faces are wound outwards", "one that is inside out", hint)
         })?;

@@ -156,7 +156,9 @@ impl<'a> Reading<'a> {
     /// Counts a fault that is mended; with [`ReadParams::strict`] it is the error that it stands for.
     pub(crate) fn mend(
         &mut self,
-        (fix, place, face): (Fix, Place, Option<u64>),
+        fix: Fix,
+        place: Place,
+        face: Option<u64>,
         error: impl FnOnce() -> ReadError,
     ) -> Result<(), ReadError> {
         if self.params.strict {

@@ -157,7 +157,8 @@ impl Classified {
     }
 
     /// Largest extinction of values between two.
-    fn most_between(&self, [low, high]: [f64; 2]) -> f64 {
+    fn most_between(&self, range: [f64; 2]) -> f64 {
+        let [low, high] = range;
         let between = self.transfer.points().iter().filter(|p| (low..=high).contains(&f64::from(p.value)));
         let ends = self.class(low)[3].max(self.class(high)[3]);
         between.fold(ends, |most, p| most.max(f64::from(p.extinction)))
@@ -175,7 +176,7 @@ impl Classified {
     pub(crate) fn breaks(&self, ray: &Ray, t0: f64, t1: f64, out: &mut Vec<f64>) {
         let local = Ray { origin: self.index(ray.origin), direction: self.index_from_world * ray.direction };
         let mut planes = Vec::new();
-        lattice_breaks(&local, self.last(), (t0, t1), &mut planes);
+        lattice_breaks(&local, self.last(), t0, t1, &mut planes);
         planes.sort_by(f64::total_cmp);
         let mut was_empty = false;
         for ends in planes.windows(2) {

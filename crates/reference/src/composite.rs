@@ -94,7 +94,7 @@ pub fn fold_fragments<T: Send>(
     let of_pixel = |ids: &[u32], x: usize, y: usize| {
         let k = y * width + x;
         let surface = solid.get(k).map_or(f64::INFINITY, |d| f64::from(*d));
-        fold(k, &fragments(input, &splats, ids, [x, y], surface))
+        fold(k, &fragments(input, &splats, ids, x, y, surface))
     };
     by_pixel(input, &splats, of_pixel, progress)
 }
@@ -141,7 +141,8 @@ fn fragments(
     input: &Input<'_>,
     splats: &[Option<Splat<'_>>],
     ids: &[u32],
-    [x, y]: [usize; 2],
+    x: usize,
+    y: usize,
     surface_depth: f64,
 ) -> Vec<Fragment> {
     let mut all: Vec<Fragment> = Vec::new();
@@ -174,7 +175,7 @@ fn pixel(input: &Input<'_>, splats: &[Option<Splat<'_>>], ids: &[u32], x: usize,
     };
     let solid = opaque(input, ids, &at);
     let surface_depth = solid.as_ref().map_or(f64::INFINITY, |s| s.0);
-    let fragments = fragments(input, splats, ids, [x, y], surface_depth);
+    let fragments = fragments(input, splats, ids, x, y, surface_depth);
     let mut out = Pixel { values: vec![0.0; input.channels], transmittance: [1.0; 3] };
     for f in &fragments {
         let material = input.cloud.material[f.splat as usize] as usize;

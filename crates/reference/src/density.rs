@@ -147,7 +147,7 @@ impl<'a> Lattice<'a> {
 
     fn breaks(&self, ray: &Ray, t0: f64, t1: f64, out: &mut Vec<f64>) {
         let local = Ray { origin: self.index(ray.origin), direction: self.index_from_world * ray.direction };
-        lattice_breaks(&local, self.last, (t0, t1), out);
+        lattice_breaks(&local, self.last, t0, t1, out);
     }
 }
 
@@ -166,7 +166,7 @@ pub(crate) fn clamped_cells(bounds: &DAabb, last: DVec3) -> Option<[RangeInclusi
 
 /// Appends the distances in (t0, t1) where a ray crosses planes of lattice points, or the faces half a cell beyond the outermost. The ray
 /// is one in units of the lattice whose distances are those of the world.
-pub(crate) fn lattice_breaks(local: &Ray, last: DVec3, (t0, t1): (f64, f64), out: &mut Vec<f64>) {
+pub(crate) fn lattice_breaks(local: &Ray, last: DVec3, t0: f64, t1: f64, out: &mut Vec<f64>) {
     let half = DVec3::splat(0.5);
     let Some((enter, leave)) = local.clip(&DAabb::new(-half, last + half), t0, t1) else { return };
     out.extend([enter, leave]);

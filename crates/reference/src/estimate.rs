@@ -156,7 +156,7 @@ pub fn path_trace(
             progress.tick(1)?;
             for (x, pixel) in row.iter_mut().enumerate() {
                 for sample in done..until {
-                    one_sample(&tracer, camera, settings, [x, y], sample, pixel);
+                    one_sample(&tracer, camera, settings, x, y, sample, pixel);
                 }
             }
             Ok::<(), Error>(())
@@ -175,7 +175,8 @@ fn one_sample(
     tracer: &Tracer<'_>,
     camera: &Camera,
     settings: &PathSettings,
-    [x, y]: [usize; 2],
+    x: usize,
+    y: usize,
     sample: u32,
     pixel: &mut Pixel,
 ) {

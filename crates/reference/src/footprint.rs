@@ -144,7 +144,7 @@ impl<'a> Splat<'a> {
             return;
         }
         if !parallel && self.depth < through {
-            return self.near_disc(input, normal, [u, v], amount);
+            return self.near_disc(input, normal, u, v, amount);
         }
         let slope = if parallel { DVec3::ZERO } else { self.center / self.center.z };
         let project =
@@ -175,7 +175,7 @@ impl<'a> Splat<'a> {
         self.shape = Shape::Disc { metric, core, depth_slope, crosses, laid };
     }
 
-    fn near_disc(&mut self, input: &Input<'_>, normal: DVec3, [u, v]: [DVec3; 2], amount: f64) {
+    fn near_disc(&mut self, input: &Input<'_>, normal: DVec3, u: DVec3, v: DVec3, amount: f64) {
         let opaque = self.kind == SplatKind::Opaque;
         let away = if opaque && normal.dot(self.center) > 0.0 { FACING_AWAY } else { 1.0 };
         let slab = !opaque && input.materials[self.material].surface_opacity == SurfaceOpacity::ThinSlab;

@@ -51,9 +51,10 @@ pub fn march(
     media: &[Medium<'_>],
     lights: &[LightSource],
     ray: &Ray,
-    [t0, t1]: [f64; 2],
+    range: [f64; 2],
     params: &MarchParams,
 ) -> Result<MarchedRay, Error> {
+    let [t0, t1] = range;
     if let Some(i) = lights.iter().position(LightSource::is_area) {
         return Err(Error::invalid("light", i, "shape", lights[i], "a point, spot or parallel light"));
     }

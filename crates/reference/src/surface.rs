@@ -145,12 +145,8 @@ impl SurfaceMaterial {
 
 impl Response {
     /// About a unit normal, as it is.
-    pub(crate) fn new(
-        diffuse: [f64; 3],
-        [transmission, specular, shininess]: [f64; 3],
-        normal: DVec3,
-        to_eye: DVec3,
-    ) -> Self {
+    pub(crate) fn new(diffuse: [f64; 3], optics: [f64; 3], normal: DVec3, to_eye: DVec3) -> Self {
+        let [transmission, specular, shininess] = optics;
         let brightest = diffuse.iter().fold(0.0, |m: f64, d| m.max(*d));
         let sum = brightest + specular;
         Self {

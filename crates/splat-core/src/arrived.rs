@@ -28,13 +28,15 @@ pub struct Arrived {
 /// No bits of shares, which are numbers.
 const UNKNOWN: u64 = u64::MAX;
 
-fn packed([r, g, b]: [f32; 3]) -> [u64; 2] {
+fn packed(color: [f32; 3]) -> [u64; 2] {
+    let [r, g, b] = color;
     let [r, g, b] = [r, g, b].map(|share| u64::from(share.to_bits()));
     [r | g << 32, b]
 }
 
 #[inline]
-fn unpacked([red_green, blue]: [u64; 2]) -> [f32; 3] {
+fn unpacked(words: [u64; 2]) -> [f32; 3] {
+    let [red_green, blue] = words;
     [red_green as u32, (red_green >> 32) as u32, blue as u32].map(f32::from_bits)
 }
 

@@ -215,7 +215,7 @@ impl DepthProfile {
 
     /// The profile whose first, median, mean and standard deviation are known, such as those of an average of hits; `total` is
     /// the optical depth of all. What its curve is between them is forgotten.
-    pub fn of_depths([first, median, mean, sigma]: [f32; 4], total: f32) -> Self {
+    pub fn of_depths(first: f32, median: f32, mean: f32, sigma: f32, total: f32) -> Self {
         let absorbed = -libm::expm1f(-total);
         if !(absorbed > 0.0 && mean.is_finite()) {
             return Self::default();
@@ -366,7 +366,8 @@ fn moments(delta: f32) -> (f32, f32) {
 mod tests {
     use super::*;
 
-    fn at(depth: f32, thickness: f32, [before, after]: [f32; 2]) -> DepthFragment {
+    fn at(depth: f32, thickness: f32, depths: [f32; 2]) -> DepthFragment {
+        let [before, after] = depths;
         DepthFragment { depth, thickness, narrow: 1.0, before, after }
     }
 

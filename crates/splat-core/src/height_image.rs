@@ -47,7 +47,8 @@ impl HeightImage {
 
     /// How heights rise to the right and downwards, a width of the image, at a place from its top left, which also is in widths of it. They
     /// are a mean of what `width`, in that unit too, covers.
-    pub fn slope(&self, [right, down]: [f64; 2], width: f64) -> [f64; 2] {
+    pub fn slope(&self, offset: [f64; 2], width: f64) -> [f64; 2] {
+        let [right, down] = offset;
         let [columns, rows] = self.slopes.image().size.map(f64::from);
         let [x, y, _] = self.slopes.at([right, down * columns / rows], width * columns);
         [x, y]

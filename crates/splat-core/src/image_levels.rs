@@ -90,7 +90,8 @@ fn coarser_size(size: [u32; 2]) -> Option<[u32; 2]> {
 }
 
 /// The texels of `fine` that texel `k` of `coarse` covers, and how much of each.
-fn covered([fine, coarse]: [u32; 2], k: u32) -> impl Iterator<Item = (usize, f64)> + Clone {
+fn covered(sizes: [u32; 2], k: u32) -> impl Iterator<Item = (usize, f64)> + Clone {
+    let [fine, coarse] = sizes;
     // A fine texel has the length `coarse`, a coarse one the length `fine`.
     let [fine, coarse, k] = [fine, coarse, k].map(u64::from);
     let low = k * fine;

@@ -85,11 +85,11 @@ fn a_cone_that_ends_at_once_lights_its_edge_and_none_is_a_half_space() {
 
 #[test]
 fn a_profile_without_matter_has_no_depths_and_one_behind_another_keeps_its_own() {
-    let nothing = DepthProfile::of_depths([1.0, 2.0, 3.0, 0.5], 0.0);
+    let nothing = DepthProfile::of_depths(1.0, 2.0, 3.0, 0.5, 0.0);
     assert_eq!(nothing.depths(0.0, None), [f32::INFINITY; 4]);
     // A thin veil, and behind it what has its light uniformly from 4 to 6: mean 5, σ = 1/√3, a median that is not reached by either alone.
-    let mut veil = DepthProfile::of_depths([1.0, f32::INFINITY, 1.0, 0.0], 0.5);
-    let behind = DepthProfile::of_depths([4.5, f32::INFINITY, 5.0, 1.0 / 3f32.sqrt()], 0.5);
+    let mut veil = DepthProfile::of_depths(1.0, f32::INFINITY, 1.0, 0.0, 0.5);
+    let behind = DepthProfile::of_depths(4.5, f32::INFINITY, 5.0, 1.0 / 3f32.sqrt(), 0.5);
     veil.append(&behind, 0.5, 0.5);
     let [first, median, mean, _] = veil.depths(1.0, None);
     let before = 1.0 - (-0.5f32).exp();
@@ -99,7 +99,7 @@ fn a_profile_without_matter_has_no_depths_and_one_behind_another_keeps_its_own()
     let level = (std::f32::consts::LN_2 - 0.5 - 0.003_929) / (0.5 - 0.003_929);
     assert!((median - (4.5 + 0.5 * level)).abs() < 1e-3, "{median}");
     // Before its first depth it begins where a box of its deviation does, here at 4.
-    let mut thin = DepthProfile::of_depths([f32::INFINITY, f32::INFINITY, 1.0, 0.0], 0.002);
+    let mut thin = DepthProfile::of_depths(f32::INFINITY, f32::INFINITY, 1.0, 0.0, 0.002);
     thin.append(&behind, 0.002, 0.5);
     let [first, ..] = thin.depths(0.502, None);
     let level = (0.003_929_3 - 0.002) / 0.003_929_3;

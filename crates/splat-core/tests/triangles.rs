@@ -294,7 +294,7 @@ fn hv11_layers_are_what_each_triangle_shows_by_itself_nearest_first() {
         let of = |hidden: &[f32], most: u64| {
             let none = (f32::INFINITY, u32::MAX);
             let keep = |_: usize, at: &TriangleLayer| (at.depth, at.hit.triangle);
-            resolve_layers(&placed(&heap), &camera, (hidden, most), (none, keep), None)
+            resolve_layers(&placed(&heap), &camera, hidden, most, none, keep, None)
         };
         let all = of(&[], u64::MAX).unwrap();
         let nearest = seen(&heap, &camera);

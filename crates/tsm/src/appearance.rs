@@ -148,7 +148,8 @@ impl Appearance {
     }
 
     /// Counts a splat, given the apparent size of a world unit and of its radius, for `every`.
-    fn count(&mut self, casters: &Casters<'_>, i: usize, [unit, radius]: [f32; 2], every: u64) {
+    fn count(&mut self, casters: &Casters<'_>, i: usize, lengths: [f32; 2], every: u64) {
+        let [unit, radius] = lengths;
         let cloud = casters.cloud;
         let spacing = if cloud.kind[i] == SplatKind::Opaque {
             self.disc.add(radius, every);

@@ -166,7 +166,7 @@ impl<M: Mapping, const C: usize> Deposit<'_, M, C> {
 
     /// Entries of a medium in neighbouring cells of a row, at its own distance.
     #[inline(always)]
-    fn put_row(&mut self, caster: &Caster, total: f32, [first, row]: [u32; 2], used: usize, shares: &[f32; BLOCK]) {
+    fn put_row(&mut self, caster: &Caster, total: f32, first: u32, row: u32, used: usize, shares: &[f32; BLOCK]) {
         let [columns, _] = self.mapping.size();
         let cell = row * columns + first;
         let own: [f32; BLOCK] =
@@ -285,7 +285,7 @@ impl<M: Mapping, const C: usize> Sink for Put<'_, '_, M, C> {
         let [columns, rows] = mapping.size().map(|n| n as i32);
         let is_inside = (0..rows).contains(&row) && first >= 0 && first + BLOCK as i32 <= columns;
         if is_inside && self.is_plain {
-            self.deposit.put_row(self.caster, self.total, [first as u32, row as u32], used, shares);
+            self.deposit.put_row(self.caster, self.total, first as u32, row as u32, used, shares);
         } else {
             self.each(row, first, &shares[..used]);
         }

@@ -129,7 +129,9 @@ impl MediaBatches {
     #[inline(always)]
     pub(crate) fn part<M: Mapping>(
         &mut self,
-        (mapping, casters, frame): (&M, &Casters<'_>, &Frame),
+        mapping: &M,
+        casters: &Casters<'_>,
+        frame: &Frame,
         ids: &[u32],
         plain: &mut Vec<u32>,
         others: &mut Vec<u32>,
@@ -199,7 +201,7 @@ impl<M: Mapping, const C: usize> Target<'_, M, C> {
                 columns.below = start;
             }
             for k in 0..columns.most_cells(n) {
-                let mut cells = self.cells(queue.column(TOTAL), (&rows, &height), &mut columns, [j, k]);
+                let mut cells = self.cells(queue.column(TOTAL), &rows, &height, &mut columns, [j, k]);
                 cells.is_kept[n..].fill(false);
                 let on_plane;
                 let distance = if F > FOOTPRINT {
@@ -216,7 +218,7 @@ impl<M: Mapping, const C: usize> Target<'_, M, C> {
 
     /// Column `k` in row `j` of each footprint.
     #[inline(always)]
-    fn cells(&self, total: &Lane, (rows, height): (&Axes, &Lane), columns: &mut Axes, [j, k]: [i32; 2]) -> Cells {
+    fn cells(&self, total: &Lane, rows: &Axes, height: &Lane, columns: &mut Axes, [j, k]: [i32; 2]) -> Cells {
         let width = self.mapping.size()[0];
         let mut cells = Cells { cell: [0; LANES], own: [0.0; LANES], is_kept: [false; LANES] };
         for l in 0..LANES {

@@ -34,7 +34,8 @@ pub(crate) struct Spread {
 impl Spread {
     /// From the centre to where the kernel ends.
     #[inline(always)]
-    pub(crate) fn new(caster: &Caster, [gu, gv]: [Vec3; 2]) -> Self {
+    pub(crate) fn new(caster: &Caster, axes: [Vec3; 2]) -> Self {
+        let [gu, gv] = axes;
         if caster.kind == SplatKind::Medium {
             return Self::of_ball(caster.radius, [gu, gv]);
         }
@@ -49,7 +50,8 @@ impl Spread {
     }
 
     #[inline(always)]
-    pub(crate) fn of_ball(radius: f32, [gu, gv]: [Vec3; 2]) -> Self {
+    pub(crate) fn of_ball(radius: f32, axes: [Vec3; 2]) -> Self {
+        let [gu, gv] = axes;
         let square = radius * radius;
         Self { uu: gu.length_squared() * square, vv: gv.length_squared() * square, uv: gu.dot(gv) * square }
     }
@@ -184,7 +186,8 @@ impl Sink for OneSide<'_> {
 }
 
 /// Share of a footprint in the near half of a cell that a diagonal halves: strips of rows up to the diagonal.
-fn near_half(crease: &Crease, [columns, rows]: [&Axis; 2], column: i32, row: i32) -> f32 {
+fn near_half(crease: &Crease, axes: [&Axis; 2], column: i32, row: i32) -> f32 {
+    let [columns, rows] = axes;
     const STRIPS: i32 = 4;
     let [a, b, _] = crease.line;
     let low = column as f32 - columns.at;

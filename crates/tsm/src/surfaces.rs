@@ -32,7 +32,9 @@ impl SurfaceBatches {
     #[inline(always)]
     pub(crate) fn part<M: Mapping>(
         &mut self,
-        (mapping, casters, frame): (&M, &Casters<'_>, &Frame),
+        mapping: &M,
+        casters: &Casters<'_>,
+        frame: &Frame,
         ids: &[u32],
         plain: &mut Vec<u32>,
         others: &mut Vec<u32>,

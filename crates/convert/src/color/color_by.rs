@@ -172,7 +172,8 @@ fn present(numbers: &[f64]) -> Vec<f64> {
 }
 
 /// Where in a range a number lies, from 0 to 1 within; the middle of a range without a width.
-fn place(number: f64, [low, high]: [f64; 2]) -> f64 {
+fn place(number: f64, range: [f64; 2]) -> f64 {
+    let [low, high] = range;
     if high > low { (number - low) / (high - low) } else { 0.5 }
 }
 

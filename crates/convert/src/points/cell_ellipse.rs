@@ -44,7 +44,8 @@ fn moments<'a>(lines: &'a Lines, area: &Eight, i: usize) -> (Option<[f64; 3]>, i
 }
 
 /// Unit vector along the greater eigenvalue, and both; `None` where they are alike.
-fn axes([xx, yy, xy]: [f64; 3]) -> Option<(DVec2, [f64; 2])> {
+fn axes(covariance: [f64; 3]) -> Option<(DVec2, [f64; 2])> {
+    let [xx, yy, xy] = covariance;
     let mean = 0.5 * (xx + yy);
     let half = 0.5 * (xx - yy);
     let apart = (half * half + xy * xy).sqrt();

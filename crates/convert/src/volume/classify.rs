@@ -135,7 +135,8 @@ impl<'a> Classes<'a> {
 
     /// The mean over the cell around a voxel, or of a part of it that has more than `enough` extinction; `None` where the function bends too
     /// little for a mean.
-    fn mean_of_cell(&self, lattice: &Grid, voxel: [usize; 3], [low, high]: [f32; 2], enough: f64) -> Option<Four> {
+    fn mean_of_cell(&self, lattice: &Grid, voxel: [usize; 3], range: [f32; 2], enough: f64) -> Option<Four> {
+        let [low, high] = range;
         if self.bend(f64::from(low), f64::from(high)) <= 1.0 {
             return None;
         }
@@ -254,7 +255,8 @@ impl Piece {
 }
 
 /// The value of a voxel.
-fn value(lattice: &Grid, [i, j, k]: [usize; 3]) -> f32 {
+fn value(lattice: &Grid, cell: [usize; 3]) -> f32 {
+    let [i, j, k] = cell;
     lattice.values[(k * lattice.dims[1] + j) * lattice.dims[0] + i]
 }
 

@@ -160,7 +160,8 @@ impl<'a> Keep<'a> {
         (class, true)
     }
 
-    fn within_slab(&self, [i, j, _]: [usize; 3]) -> usize {
+    fn within_slab(&self, cell: [usize; 3]) -> usize {
+        let [i, j, _] = cell;
         j * self.lattice.dims[0] + i
     }
 

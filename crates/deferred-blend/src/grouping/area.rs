@@ -141,8 +141,8 @@ impl pulp::WithSimd for Covered<'_> {
         let Pairs([a, b]) = self.pairs;
         let mut shares = [[0.0; MAX_LANES]; 2];
         for lane in (0..MAX_LANES).step_by(Lanes::<S>::COUNT) {
-            covered(simd, lane, [a, b], self.gap).store(&mut shares[0][lane..]);
-            covered(simd, lane, [b, a], self.gap).store(&mut shares[1][lane..]);
+            covered(simd, lane, a, b, self.gap).store(&mut shares[0][lane..]);
+            covered(simd, lane, b, a, self.gap).store(&mut shares[1][lane..]);
         }
         shares
     }
@@ -199,7 +199,7 @@ impl<S: Simd> Frame<S> {
 
 /// The share of `own` that `other` covers.
 #[inline(always)]
-fn covered<S: Simd>(simd: S, lane: usize, [own, other]: [&Side; 2], gap: f32) -> Lanes<S> {
+fn covered<S: Simd>(simd: S, lane: usize, own: &Side, other: &Side, gap: f32) -> Lanes<S> {
     let of = |v: f32| Lanes::splat(simd, v);
     let zero = of(0.0);
     let one = of(1.0);

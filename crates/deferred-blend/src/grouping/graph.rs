@@ -127,7 +127,7 @@ impl OverlapGraph {
             .into_par_iter()
             .map(|nodes| {
                 let mut part = Part::new(nodes.len());
-                part.find((&surfels, &cells, search), nodes, &is_edge, &found)?;
+                part.find(&surfels, &cells, search, nodes, &is_edge, &found)?;
                 Ok(part)
             })
             .collect::<Result<_, _>>()?;
@@ -359,7 +359,9 @@ impl Part {
 
     fn find(
         &mut self,
-        (surfels, cells, search): (&[Surfel], &Cells, &Search<'_>),
+        surfels: &[Surfel],
+        cells: &Cells,
+        search: &Search<'_>,
         nodes: Range<usize>,
         is_edge: &impl Fn(&Surfel, &Surfel) -> bool,
         found: &AtomicU64,

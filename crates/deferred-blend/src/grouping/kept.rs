@@ -93,7 +93,8 @@ impl GroupsOfObjects {
     pub fn members(
         &mut self,
         rank: usize,
-        (cloud, transform): (&Cloud, &Similarity),
+        cloud: &Cloud,
+        transform: &Similarity,
         recipe: &Recipe,
         progress: Option<&Progress>,
     ) -> Result<(Membership, bool), Error> {
@@ -117,7 +118,8 @@ impl GroupsOfObjects {
     /// As [`Recipe::group`], with the object's rank.
     pub fn members_of_all(
         &mut self,
-        (cloud, ids): (&Cloud, &[u32]),
+        cloud: &Cloud,
+        ids: &[u32],
         of: impl Fn(usize) -> (Similarity, Recipe),
         progress: Option<&Progress>,
     ) -> Result<(Membership, u64), (usize, Error)> {
@@ -130,7 +132,7 @@ impl GroupsOfObjects {
         for (&rank, ids) in &of_object {
             let (transform, recipe) = of(rank);
             let discs = cloud.gather(ids);
-            let members = self.members(rank, (&discs, &transform), &recipe, progress);
+            let members = self.members(rank, &discs, &transform, &recipe, progress);
             let (members, is_new) = members.map_err(|e| (rank, e))?;
             anew += if is_new { ids.len() as u64 } else { 0 };
             parts.push((ids.as_slice(), members));

@@ -86,14 +86,15 @@ impl Recipe {
                 hash_grouping(cloud, &params, progress)?
             }
         };
-        self.extended(cloud, groups, (graph, max_bytes), progress)
+        self.extended(cloud, groups, graph, max_bytes, progress)
     }
 
     fn extended(
         &self,
         cloud: &Cloud,
         groups: Groups,
-        (graph, max_bytes): (Option<OverlapGraph>, u64),
+        graph: Option<OverlapGraph>,
+        max_bytes: u64,
         progress: Option<&Progress>,
     ) -> Result<Membership, Error> {
         let Self { disc_scale, gap, .. } = *self;

@@ -142,7 +142,7 @@ impl Surfel {
         }
         (self.is_circle() && other.is_circle())
             || within(self.least(), other.least())
-            || contact_is_below(offset, [self.shape(), other.shape()], factor * factor)
+            || contact_is_below(offset, self.shape(), other.shape(), factor * factor)
     }
 
     /// Sum of n·nᵀ over the semi-axes of the ellipsoid.
@@ -157,7 +157,7 @@ impl Surfel {
 /// Whether two ellipsoids that lie `offset` apart have a contact function below `bound`: the greatest
 /// λ(1 − λ)·Rᵀ((1 − λ)A + λB)⁻¹R over λ in \[0, 1\] (Perram and Wertheim 1985), which is 1 where they touch, and squared is the
 /// factor by which both must grow to touch. For balls it is |R|²/(r_a + r_b)².
-fn contact_is_below(offset: DVec3, [a, b]: [DMat3; 2], bound: f64) -> bool {
+fn contact_is_below(offset: DVec3, a: DMat3, b: DMat3, bound: f64) -> bool {
     let at = |lambda: f64| {
         let mixed = a * (1.0 - lambda) + b * lambda;
         lambda * (1.0 - lambda) * offset.dot(mixed.inverse() * offset)

@@ -144,7 +144,7 @@ impl Block {
 
     /// The core of a disc hides: the nearest so far and what hides most are kept; of several at one depth the first.
     #[inline(always)]
-    pub(super) fn hide<S: Simd>(&mut self, simd: S, lane: usize, hit: &Hit<S>, (rules, rank): (&Rules, u32)) {
+    pub(super) fn hide<S: Simd>(&mut self, simd: S, lane: usize, hit: &Hit<S>, rules: &Rules, rank: u32) {
         let at = |line: &Line| Lanes::load(simd, &line.0[lane..]);
         let of = |v: f32| Lanes::splat(simd, v);
         let solid = |v: Lanes<S>| v.where_less_or(hit.distance_sq, of(rules.core), of(f32::INFINITY));

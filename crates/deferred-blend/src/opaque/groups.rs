@@ -83,8 +83,10 @@ impl GroupImages {
 pub(super) fn keep<S: Simd>(
     simd: S,
     list: &[u32],
-    (discs, groups): (&Discs, &Groups),
-    (rules, block): (&Rules, &mut Block),
+    discs: &Discs,
+    groups: &Groups,
+    rules: &Rules,
+    block: &mut Block,
     images: &mut GroupImages,
 ) {
     let of = |v: f32| Lanes::splat(simd, v);
@@ -93,7 +95,7 @@ pub(super) fn keep<S: Simd>(
         let disc = &discs.discs[i as usize];
         for lane in (0..PIXELS).step_by(Lanes::<S>::COUNT) {
             let hit = rules.hit(simd, disc, block.first(), lane);
-            block.hide(simd, lane, &hit, (rules, i));
+            block.hide(simd, lane, &hit, rules, i);
             let Hit { depth, limit, distance_sq, .. } = hit;
             // What is hidden already is never seen; by Eq. 14 it takes the place of what is, in whatever order both come.
             let beyond = if rules.floor.is_some() { of(f32::INFINITY) } else { block.limit(simd, lane) };
@@ -135,7 +137,8 @@ fn behind<S: Simd>(simd: S, image: &GroupImage, lane: usize, [step, place]: [Lan
 
 /// Eq. 10, in steps.
 #[inline(always)]
-fn floored<S: Simd>(simd: S, [near, per_depth]: [f32; 2], depth: Lanes<S>) -> Lanes<S> {
+fn floored<S: Simd>(simd: S, range: [f32; 2], depth: Lanes<S>) -> Lanes<S> {
+    let [near, per_depth] = range;
     let of = |v: f32| Lanes::splat(simd, v);
     let steps = (depth - of(near)) * of(per_depth);
     let whole = (steps + of(TO_WHOLE)) - of(TO_WHOLE);

@@ -13,7 +13,7 @@ pub(super) fn hide<S: Simd>(simd: S, list: &[u32], discs: &Discs, rules: &Rules,
     for &i in list {
         for lane in (0..PIXELS).step_by(Lanes::<S>::COUNT) {
             let hit = rules.hit(simd, &discs.discs[i as usize], block.first(), lane);
-            block.hide(simd, lane, &hit, (rules, i));
+            block.hide(simd, lane, &hit, rules, i);
         }
     }
 }

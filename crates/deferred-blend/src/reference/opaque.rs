@@ -22,9 +22,11 @@ pub fn opaque(
     input: &DiscInput<'_>,
     params: &Params,
     passes: Passes<'_>,
-    [x, y]: [f64; 2],
-    (values, channels): (&[f32], usize),
+    place: [f64; 2],
+    values: &[f32],
+    channels: usize,
 ) -> Option<Seen> {
+    let [x, y] = place;
     let (origin, direction) = world_ray(input.camera, x, y);
     let mut hits = hits(input, params, origin, direction);
     hits.sort_by_key(|hit| hit.id);

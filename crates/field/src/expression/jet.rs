@@ -38,7 +38,8 @@ impl Jet {
         self.gradient == DVec3::ZERO && self.diagonal == DVec3::ZERO && self.mixed == DVec3::ZERO
     }
 
-    fn chain(self, [f, d, dd]: [f64; 3]) -> Self {
+    fn chain(self, jet: [f64; 3]) -> Self {
+        let [f, d, dd] = jet;
         if self.is_constant() {
             return Self::constant(f);
         }

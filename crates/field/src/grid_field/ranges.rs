@@ -29,7 +29,8 @@ pub(super) struct Ranges {
 }
 
 /// Widens a range in f64 so that values computed in another order stay inside.
-pub(super) fn widen([low, high]: [f64; 2]) -> [f64; 2] {
+pub(super) fn widen(range: [f64; 2]) -> [f64; 2] {
+    let [low, high] = range;
     let slack = ROUNDING * low.abs().max(high.abs());
     [low - slack, high + slack]
 }
@@ -50,7 +51,7 @@ impl Ranges {
         nodes
             .par_chunks_mut(dims[0] * dims[1])
             .enumerate()
-            .for_each(|(k, out)| layer(grid, interpolation, k, out, [dims[0], dims[1]]));
+            .for_each(|(k, out)| layer(grid, interpolation, k, out, dims[0], dims[1]));
         let mut levels = vec![Level { dims, nodes }];
         while let Some(next) = levels.last().and_then(Level::coarser) {
             levels.push(next);
@@ -170,7 +171,7 @@ impl Row {
 }
 
 /// The finest nodes of one layer.
-fn layer(grid: &Grid, interpolation: Interpolation, k: usize, out: &mut [Range], [nx, ny]: [usize; 2]) {
+fn layer(grid: &Grid, interpolation: Interpolation, k: usize, out: &mut [Range], nx: usize, ny: usize) {
     let [points_x, points_y, points_z] = grid.dims;
     let mut row = Row::new(points_x);
     let mut nodes = vec![[f64::INFINITY, f64::NEG_INFINITY]; nx * ny];

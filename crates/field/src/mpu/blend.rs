@@ -104,12 +104,12 @@ impl Octree {
     /// Range within `radius` of a place in the cube, as far as that lies in the cube.
     pub(super) fn over_ball(&self, p: DVec3, radius: f64) -> [f64; 2] {
         let mut range = EMPTY;
-        self.descend(0, (self.center, self.half), (p, radius), &mut range);
+        self.descend(0, self.center, self.half, p, radius, &mut range);
         range
     }
 
     /// Widens `range` by that of a node's cell within a ball.
-    fn descend(&self, node: usize, (center, half): (DVec3, f64), (p, radius): (DVec3, f64), range: &mut [f64; 2]) {
+    fn descend(&self, node: usize, center: DVec3, half: f64, p: DVec3, radius: f64, range: &mut [f64; 2]) {
         let stored = self.range(node);
         let known = range[0] <= stored[0] && range[1] >= stored[1];
         let nearest = p.clamp(center - half, center + half);
@@ -121,7 +121,7 @@ impl Octree {
             _ if half <= radius => *range = union(*range, &stored),
             Node::Inner(first) => {
                 for c in 0..8 {
-                    self.descend(first + c, (child_center(center, half, c), 0.5 * half), (p, radius), range);
+                    self.descend(first + c, child_center(center, half, c), 0.5 * half, p, radius, range);
                 }
             }
             Node::Leaf(leaf) => {
@@ -133,11 +133,11 @@ impl Octree {
 
     /// Greatest gradient within `radius` of a place in the cube; infinite where the ball is so large that it is not worth its search.
     pub(super) fn steepest(&self, p: DVec3, radius: f64) -> f64 {
-        self.steepest_below(0, (self.center, self.half), (p, radius))
+        self.steepest_below(0, self.center, self.half, p, radius)
     }
 
     /// The same in a node's cell within a ball.
-    fn steepest_below(&self, node: usize, (center, half): (DVec3, f64), (p, radius): (DVec3, f64)) -> f64 {
+    fn steepest_below(&self, node: usize, center: DVec3, half: f64, p: DVec3, radius: f64) -> f64 {
         let nearest = p.clamp(center - half, center + half);
         if nearest.distance_squared(p) > radius * radius * (1.0 + 1e-12) {
             return 0.0;
@@ -145,8 +145,7 @@ impl Octree {
         match self.node(node) {
             _ if 4.0 * half <= radius => f64::INFINITY,
             Node::Inner(first) => {
-                let child =
-                    |c| self.steepest_below(first + c, (child_center(center, half, c), 0.5 * half), (p, radius));
+                let child = |c| self.steepest_below(first + c, child_center(center, half, c), 0.5 * half, p, radius);
                 (0..8).map(child).fold(0.0, f64::max)
             }
             Node::Leaf(leaf) => self.over_part(leaf, nearest, radius).1,

@@ -45,12 +45,8 @@ impl Recorded {
     /// # Errors
     /// [`Error::Overflow`] when the view holds more splats than there is room for, [`Error::ReadBack`] for bytes that no
     /// run gave.
-    pub fn sorted(
-        &self,
-        [state, keys, places]: [&[u8]; 3],
-        cloud: &Cloud,
-        ids: Option<&[u32]>,
-    ) -> Result<Sorted, Error> {
+    pub fn sorted(&self, buffers: [&[u8]; 3], cloud: &Cloud, ids: Option<&[u32]>) -> Result<Sorted, Error> {
+        let [state, keys, places] = buffers;
         let state_bytes = state.get(..size_of::<SortState>());
         let state: SortState =
             bytemuck::pod_read_unaligned(state_bytes.ok_or(short("state", size_of::<SortState>(), state.len()))?);

@@ -132,7 +132,8 @@ impl Whole {
     pub(super) fn with_inputs<T>(
         &self,
         splats: &Splats<'_>,
-        (all, attributes): (&[u32], &Attributes),
+        all: &[u32],
+        attributes: &Attributes,
         received: &[[f32; 3]],
         accumulator: &Accumulator,
         run: impl FnOnce(&[(BufferId, &[u8])]) -> Result<T, Failure>,

@@ -41,7 +41,7 @@ impl ParticlesInput {
     /// Shown as they are; the nearer ones are widened, the farther thinned out.
     pub(super) fn check(&self, device: &mut dyn Executor, folding: Folding<'_>) -> Result<Found, Failure> {
         let material = Material { shading: Shading::Unlit, ..Material::default() };
-        self.check_in(device, folding, (material, 3.0), &[])
+        self.check_in(device, folding, material, 3.0, &[])
     }
 
     /// Lit by the lamp of a shadow map; none is widened, so that places within pixels are the same.
@@ -49,14 +49,15 @@ impl ParticlesInput {
         let (map, light) = shadow.lamp();
         let lit = LitBy { slide: None, light, shadow: Some(map) };
         let material = Material { specular: 0.2, shininess: 20.0, ..Material::default() };
-        self.check_in(device, Folding::new(vec![(map, DVec3::ZERO)]), (material, 0.6), &[lit])
+        self.check_in(device, Folding::new(vec![(map, DVec3::ZERO)]), material, 0.6, &[lit])
     }
 
     fn check_in(
         &self,
         device: &mut dyn Executor,
         mut folding: Folding<'_>,
-        (material, nearer): (Material, f64),
+        material: Material,
+        nearer: f64,
         lights: &[LitBy<'_>],
     ) -> Result<Found, Failure> {
         let middle = pixel_area(&self.camera, self.camera.position + 4.0 * self.camera.axes[2]);

@@ -31,7 +31,7 @@ impl<'a> Canvas<'a> {
     pub(super) fn fill(&mut self, columns: Range<i64>, rows: Range<i64>, color: [f32; 3], opacity: f32) {
         for y in rows {
             for x in columns.clone() {
-                self.over([x, y], color, opacity);
+                self.over(x, y, color, opacity);
             }
         }
     }
@@ -64,13 +64,13 @@ impl<'a> Canvas<'a> {
                 let middle = [x as f64 + 0.5, y as f64 + 0.5];
                 let nearest = lines.iter().map(|line| distance(*line, middle)).fold(f64::INFINITY, f64::min);
                 // A pixel is a disc here whose edge the pen's crosses straight.
-                self.over([x, y], color, (0.5 + pen - nearest).clamp(0.0, 1.0) as f32);
+                self.over(x, y, color, (0.5 + pen - nearest).clamp(0.0, 1.0) as f32);
             }
         }
     }
 
     /// Porter and Duff's over, with opacities that are not multiplied into colours; outside the picture nothing.
-    fn over(&mut self, [x, y]: [i64; 2], color: [f32; 3], opacity: f32) {
+    fn over(&mut self, x: i64, y: i64, color: [f32; 3], opacity: f32) {
         let [width, height] = self.size().map(i64::from);
         if opacity <= 0.0 || !(0..width).contains(&x) || !(0..height).contains(&y) {
             return;

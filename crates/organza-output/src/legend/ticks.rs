@@ -20,7 +20,8 @@ pub(super) struct Ticks {
 
 impl Ticks {
     /// Those of a range, of which at most so many are round; of one number alone that is all.
-    pub(super) fn of([low, high]: [f64; 2], most: usize) -> Self {
+    pub(super) fn of(range: [f64; 2], most: usize) -> Self {
+        let [low, high] = range;
         let span = high - low;
         if !(span > 0.0 && span.is_finite() && most > 0) {
             let digit = last_digit(low.abs().max(high.abs())) - 3;

@@ -55,7 +55,7 @@ pub(crate) fn members(
     frame.progress.begin(stages::GROUP);
     cost.measure(pass::GROUP, |stage| {
         let kept = &mut frame.groups.borrow_mut()[usize::from(are_opaque)];
-        let made = kept.members_of_all((frame.drawn(), ids), of, Some(frame.progress));
+        let made = kept.members_of_all(frame.drawn(), ids, of, Some(frame.progress));
         let (all, anew) = made.map_err(|(rank, e)| refuse(&objects[rank], e))?;
         (stage.items_in, stage.items_out, stage.bytes) = (ids.len() as u64, anew, all.bytes());
         Ok(all)

@@ -137,7 +137,7 @@ pub fn record_generated(
         let buffers = [*source, scan, counts.numbers, sets, found];
         r.dispatch(&kernels::PBSR_SETS, Groups::cover(1), &buffers, &[capacities.particles, of_set]);
     }
-    put(r, sources, (&inputs, given), levels, [arrivals, counts.numbers, particles]);
+    put(r, sources, &inputs, given, levels, arrivals, counts.numbers, particles);
     r.read(found);
     let [.., of_sets, of_particles] = projection.inputs;
     let in_whole = r.join(&projection.recording, &[(of_sets, sets), (of_particles, particles)]);
@@ -163,9 +163,12 @@ pub fn record_generated(
 fn put(
     r: &mut Recording,
     sources: &Sources,
-    (inputs, given): (&[(BufferId, Vec<BufferId>)], Option<Given>),
+    inputs: &[(BufferId, Vec<BufferId>)],
+    given: Option<Given>,
     levels: u32,
-    [arrivals, counts, particles]: [BufferId; 3],
+    arrivals: BufferId,
+    counts: BufferId,
+    particles: BufferId,
 ) {
     for (twin, (source, tables)) in sources.twins.iter().zip(inputs) {
         let kernel = match twin.maker {

@@ -175,8 +175,13 @@ impl Lit {
         &self,
         r: &mut Recording,
         lighting: &Lighting<'_>,
-        [view, objects, sets, particles, sums]: [BufferId; 5],
-        (seen, winners): (&Seen, &Winners),
+        view: BufferId,
+        objects: BufferId,
+        sets: BufferId,
+        particles: BufferId,
+        sums: BufferId,
+        seen: &Seen,
+        winners: &Winners,
         level: u32,
     ) {
         let found = seen.found;

@@ -44,7 +44,8 @@ impl Twin {
         sampler: &T,
         source: ParticleSource,
         own_tables: Vec<Vec<u32>>,
-        (seed, stage): (u64, Stage),
+        seed: u64,
+        stage: Stage,
     ) -> Self {
         let blocks = &sampler.sets().blocks;
         let mut chunks: Vec<u32> = Vec::with_capacity(blocks.chunks() * CHUNK_WORDS + 2 * blocks.slots().len());

@@ -53,16 +53,16 @@ fn at_border(grid: &Grid, corner: [u32; 3], level: f32, block: &mut Block) {
     }
     for axis in 0..3 {
         if corner[axis] == 0 {
-            extrapolate(block, axis, [0, 1, 2]);
+            extrapolate(block, axis, 0, 1, 2);
         }
         if corner[axis] as usize + 2 == grid.dims[axis] {
-            extrapolate(block, axis, [3, 2, 1]);
+            extrapolate(block, axis, 3, 2, 1);
         }
     }
 }
 
 /// Sets the values of one plane to where the line through those of two others leads.
-fn extrapolate(block: &mut Block, axis: usize, [beyond, near, far]: [usize; 3]) {
+fn extrapolate(block: &mut Block, axis: usize, beyond: usize, near: usize, far: usize) {
     for p in 0..4 {
         for q in 0..4 {
             let of = |s: usize| match axis {

@@ -64,7 +64,8 @@ fn check_size(header: &Header, stored: usize, params: &ReadParams) -> Result<(),
 }
 
 /// Linear radiance of three mantissas and an exponent, without the factors that the file was written with.
-fn radiance([r, g, b, e]: [u8; 4], exposure: [f64; 3]) -> [f32; 3] {
+fn radiance(bytes: [u8; 4], exposure: [f64; 3]) -> [f32; 3] {
+    let [r, g, b, e] = bytes;
     // 2^(e − 136), and 0 for e = 0.
     let unit = if e == 0 { 0.0 } else { f64::from_bits((u64::from(e) + 1023 - 136) << 52) };
     let mantissas = [r, g, b].map(f64::from);
@@ -155,7 +156,8 @@ struct Fault {
 }
 
 impl Fault {
-    fn into_error(self, y: usize, [_, height]: [u32; 2]) -> ReadError {
+    fn into_error(self, y: usize, size: [u32; 2]) -> ReadError {
+        let [_, height] = size;
         let Self { at, expected, found } = self;
         let expected = format!("{expected} in scanline {y} of {height}");
         ReadError::input(Place::Byte(at as u64), expected, found, TRUNCATED)

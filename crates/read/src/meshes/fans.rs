@@ -33,7 +33,7 @@ impl Fans {
         reading: &mut Reading<'_>,
     ) -> Result<(), ReadError> {
         let Some(count) = corners.len().checked_sub(2).filter(|n| *n > 0) else {
-            return reading.mend((Fix::TooFewCorners, place, Some(face)), || {
+            return reading.mend(Fix::TooFewCorners, place, Some(face), || {
                 let expected = format!("3 or more corners of face {face}");
                 ReadError::input(place, expected, corners.len().to_string(), "remove degenerate faces")
             });

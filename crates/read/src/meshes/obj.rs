@@ -274,7 +274,7 @@ impl Content<'_> {
         let is_index = std::str::from_utf8(part).is_ok_and(|t| t.parse::<i64>().is_ok_and(|n| n != 0));
         match found {
             Err(error) if self.normals.is_empty() && is_index => {
-                reading.mend((Fix::MissingNormals, word.place(), None), || error.clone())?;
+                reading.mend(Fix::MissingNormals, word.place(), None, || error.clone())?;
                 self.without_normal.get_or_insert(error);
                 Ok(NONE)
             }

@@ -77,7 +77,7 @@ pub(crate) fn triangulate(
             Outcome::Fan => continue,
             Outcome::Triangles(better) => better,
             Outcome::Mended(fix, better) => {
-                reading.mend((fix, place(rank), Some(polygon.face)), || {
+                reading.mend(fix, place(rank), Some(polygon.face), || {
                     let found = format!("face {} of {} corners that crosses itself", polygon.face, polygon.count + 2);
                     let hint = "split the face into triangles, or put its corners in order";
                     ReadError::input(place(rank), "faces whose edges do not cross", found, hint)

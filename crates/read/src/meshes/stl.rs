@@ -54,7 +54,7 @@ pub(crate) fn read(content: &[u8], reading: &mut Reading<'_>) -> Result<Mesh, Re
         // Less than a facet more is padding; more, and the number of facets is not to be believed.
         Some(needed) if needed < length && length - needed < FACET as u64 => {
             for _ in needed..length {
-                reading.mend((Fix::TrailingBytes, Place::Byte(needed), None), refused)?;
+                reading.mend(Fix::TrailingBytes, Place::Byte(needed), None, refused)?;
             }
             binary(&content[HEADER..needed as usize], reading)
         }

@@ -96,7 +96,7 @@ pub(crate) fn kinds(numbers: &[f64], place: Place) -> Result<Vec<u8>, ReadError>
 }
 
 /// Refuses an array that has not as many tuples as there are points or cells.
-pub(crate) fn check_count((found, count, what): (u64, usize, &str), place: Place) -> Result<(), ReadError> {
+pub(crate) fn check_count(found: u64, count: usize, what: &str, place: Place) -> Result<(), ReadError> {
     if found == count as u64 {
         return Ok(());
     }
@@ -110,8 +110,10 @@ pub(crate) fn check_count((found, count, what): (u64, usize, &str), place: Place
 
 /// The field of an array of that name, of points or of cells: one number of each tuple.
 pub(crate) fn field(
-    (numbers, selection): (&[f64], &Selection),
-    (name, of_points): (&str, bool),
+    numbers: &[f64],
+    selection: &Selection,
+    name: &str,
+    of_points: bool,
     place: Place,
     reading: &mut Reading<'_>,
 ) -> Result<Field, ReadError> {
@@ -210,7 +212,7 @@ impl Cells {
             let count = self.bodies().count() as u64;
             input::hold("the bodies", count * size_of::<Body<'_>>() as u64, reading.params)?;
             let bodies: Vec<Body<'_>> = self.bodies().collect();
-            return resample::grid((&self.points, &bodies, self.place), &field, reading).map(Loaded::Grid);
+            return resample::grid(&self.points, &bodies, self.place, &field, reading).map(Loaded::Grid);
         }
         let PointColumns { normal, color } = columns;
         let (fans, lines) = self.fans(reading)?;

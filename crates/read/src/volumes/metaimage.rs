@@ -31,7 +31,9 @@ pub(crate) fn read(
 ) -> Result<Grid, ReadError> {
     let header = header::parse(stream.peek_until(header::ends, "a field ElementDataFile after a header", HINT)?)?;
     let selection = Selection::of_frames(header.frames, header.place_of_sizes, params, notes)?.with_numbers(
-        (header.numbers, header.kind, false),
+        header.numbers,
+        header.kind,
+        false,
         header.place_of_numbers,
         notes,
     )?;

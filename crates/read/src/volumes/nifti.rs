@@ -27,7 +27,9 @@ pub(crate) fn read(mut stream: Stream<'_>, params: &ReadParams, notes: &mut Note
         ReadError::input(Place::Byte(70), expected, format!("code {}", header.datatype), "convert the volume first")
     })?;
     let selection = Selection::of_frames(frames, Place::Byte(40), params, notes)?.with_numbers(
-        (numbers, kind, true),
+        numbers,
+        kind,
+        true,
         Place::Byte(70),
         notes,
     )?;

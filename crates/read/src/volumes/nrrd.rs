@@ -59,7 +59,9 @@ fn selection(header: &Header, params: &ReadParams, notes: &mut Notes) -> Result<
             Selection::of_frames(size, place, params, notes).map(Selection::mingled)
         }
         Some(Other { size, meaning, place, .. }) => Selection::of_frames(1, place, params, notes)?.with_numbers(
-            (size, header.kind, meaning == Meaning::Color),
+            size,
+            header.kind,
+            meaning == Meaning::Color,
             place,
             notes,
         ),

@@ -126,7 +126,9 @@ impl Selection {
     /// integers of 8 or 16 bits; other vectors are refused.
     pub(crate) fn with_numbers(
         self,
-        (numbers, kind, declared): (u64, Kind, bool),
+        numbers: u64,
+        kind: Kind,
+        declared: bool,
         place: Place,
         notes: &mut Notes,
     ) -> Result<Self, ReadError> {

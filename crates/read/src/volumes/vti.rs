@@ -248,6 +248,7 @@ fn components(array: Node<'_, '_>) -> Result<u64, ReadError> {
 
 /// Which of the numbers of a tuple is its value.
 fn selection(array: Node<'_, '_>, params: &ReadParams, notes: &mut Notes) -> Result<Selection, ReadError> {
-    let numbers = (components(array)?, kind(array)?, false);
-    Selection::of_frames(1, place(array), params, notes)?.with_numbers(numbers, place(array), notes)
+    let numbers = components(array)?;
+    let kind = kind(array)?;
+    Selection::of_frames(1, place(array), params, notes)?.with_numbers(numbers, kind, false, place(array), notes)
 }

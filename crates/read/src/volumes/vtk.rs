@@ -38,21 +38,22 @@ pub(crate) fn read(content: &[u8], reading: &mut Reading<'_>) -> Result<Loaded, 
     let (is_binary, dataset) = head(&mut lines)?;
     let mut arrays = Arrays::new(content, is_binary);
     if dataset == Dataset::StructuredPoints {
-        return image(content, is_binary, (lines, arrays), reading).map(Loaded::Grid);
+        return image(content, is_binary, lines, arrays, reading).map(Loaded::Grid);
     }
     while let Some(line) = next(&mut lines)? {
         if !parts::take(line, &mut lines, &mut arrays)? {
             arrays.take(line, &mut lines)?;
         }
     }
-    parts::read((content, is_binary), dataset, (&arrays, lines.end()), reading)
+    parts::read(content, is_binary, dataset, &arrays, lines.end(), reading)
 }
 
 /// Reads a volume of structured points.
 fn image<'a>(
     content: &'a [u8],
     is_binary: bool,
-    (mut lines, mut arrays): (Lines<'a>, Arrays<'a>),
+    mut lines: Lines<'a>,
+    mut arrays: Arrays<'a>,
     reading: &mut Reading<'_>,
 ) -> Result<Grid, ReadError> {
     let params = reading.params;
@@ -78,7 +79,7 @@ fn image<'a>(
             .remarks
             .push(format!("values of cells ({}): they lie at the middles", escaped(array.name.as_bytes(), 40)));
     }
-    let values = values(content, array, is_binary, (sizes, place), params, notes)?;
+    let values = values(content, array, is_binary, sizes, place, params, notes)?;
     Ok(Grid { origin, axes, dims: sizes.map(|n| n as usize), values })
 }
 
@@ -170,12 +171,15 @@ fn values(
     content: &[u8],
     array: &Array,
     is_binary: bool,
-    (dims, place): ([u64; 3], Place),
+    dims: [u64; 3],
+    place: Place,
     params: &ReadParams,
     notes: &mut Notes,
 ) -> Result<Vec<f32>, ReadError> {
     let selection = Selection::of_frames(1, place, params, notes)?.with_numbers(
-        (array.numbers, array.kind, false),
+        array.numbers,
+        array.kind,
+        false,
         array.place,
         notes,
     )?;

@@ -53,7 +53,7 @@ impl LightLayers {
             let optical_depth = of.crossing(|| along(k).dot(of.face(&at.hit)));
             Layer { depth: at.depth, slope: at.slope, optical_depth }
         };
-        let layers = resolve_layers(&meshes, camera, (&[], most), (none, keep), Some(progress));
+        let layers = resolve_layers(&meshes, camera, &[], most, none, keep, Some(progress));
         let layers = layers.map_err(Error::of_polygons)?;
         let columns = width.div_ceil(BLOCK);
         let mut nearest = vec![f32::INFINITY; columns * (camera.size[1] as usize).div_ceil(BLOCK)];

@@ -201,7 +201,7 @@ impl<'a> EyePanes<'a> {
         let none = Hit { pixel: 0, depth: 0.0, on: TriangleHit::NONE };
         // What else is kept of each takes as much again and more.
         let most = most / bytes_of_a_pane(layout) * size_of::<Hit>() as u64;
-        let layers = resolve_layers(&meshes, camera, (opaque, most), (none, hit), Some(progress));
+        let layers = resolve_layers(&meshes, camera, opaque, most, none, hit, Some(progress));
         let (starts, hits) = layers.map_err(Error::of_polygons)?.into_lists();
         Ok(Self { seen: Surfaces { of, hits }, starts })
     }

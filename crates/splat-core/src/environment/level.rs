@@ -63,7 +63,8 @@ pub(super) fn coarser_size(size: [usize; 2]) -> Option<[usize; 2]> {
 }
 
 /// Bytes of a level of a size.
-pub(super) fn bytes_of([width, height]: [usize; 2]) -> u64 {
+pub(super) fn bytes_of(size: [usize; 2]) -> u64 {
+    let [width, height] = size;
     (width * height * size_of::<[f32; 3]>() + height * size_of::<Row>() + width * size_of::<[f64; 2]>()) as u64
 }
 

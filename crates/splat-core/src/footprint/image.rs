@@ -109,7 +109,8 @@ impl FootprintImage {
     ///
     /// # Panics
     /// If it is out of range.
-    pub fn texel(&self, [x, y]: [usize; 2]) -> f32 {
+    pub fn texel(&self, pixel: [usize; 2]) -> f32 {
+        let [x, y] = pixel;
         self.levels[0].texel(x + 1, y + 1)
     }
 
@@ -204,7 +205,8 @@ impl Level {
 }
 
 /// An image of another size, whose pixels are means over areas.
-fn averaged([width, height]: [usize; 2], pixels: &[f32], to: [usize; 2]) -> ([usize; 2], Vec<f32>) {
+fn averaged(size: [usize; 2], pixels: &[f32], to: [usize; 2]) -> ([usize; 2], Vec<f32>) {
+    let [width, height] = size;
     if to == [width, height] {
         return (to, pixels.to_vec());
     }

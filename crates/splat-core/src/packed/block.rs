@@ -34,7 +34,8 @@ pub(super) struct Even {
 }
 
 impl Even {
-    fn new([low, high]: [f32; 2], steps: f64) -> Self {
+    fn new(range: [f32; 2], steps: f64) -> Self {
+        let [low, high] = range;
         let mut even = Self { low, step: ((f64::from(high) - f64::from(low)) / steps) as f32 };
         // Rounded up, the last step may be beyond the greatest number, and a share of shadows beyond 1.
         let last = |even: Self| even.value(steps as f32);
@@ -66,7 +67,8 @@ pub(super) struct Rooted {
 }
 
 impl Rooted {
-    fn new([low, high]: [f32; 2], steps: f64) -> Self {
+    fn new(range: [f32; 2], steps: f64) -> Self {
+        let [low, high] = range;
         let [root, top] = [low, high].map(|v| f64::from(v).sqrt());
         Self { low, root: root as f32, step: ((top - root) / steps) as f32 }
     }

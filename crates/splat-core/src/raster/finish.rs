@@ -125,7 +125,8 @@ pub fn finish(input: &FinishInput<'_>) -> Layers {
     out.into_layers(size, layout, layers)
 }
 
-fn sample(input: &FinishInput<'_>, [x, y]: [u32; 2]) -> Sample {
+fn sample(input: &FinishInput<'_>, pixel: [u32; 2]) -> Sample {
+    let [x, y] = pixel;
     let FinishInput { accumulator: acc, opaque, background, .. } = *input;
     let k = y as usize * acc.size[0] as usize + x as usize;
     let planes = acc.optical_depth.len();

@@ -23,7 +23,8 @@ impl Projector<'_> {
     pub(super) fn write_gaussians(
         &self,
         first: usize,
-        (splats, coverage): (&mut [ProjectedSplat], &mut [Coverage]),
+        splats: &mut [ProjectedSplat],
+        coverage: &mut [Coverage],
         depths: &mut [ProjectedDepth],
     ) {
         let cloud = self.columns.cloud;

@@ -431,7 +431,8 @@ impl Recorded {
     /// # Errors
     /// [`Error::Overflow`] when there are more entries than there is room for: record again with what is needed.
     /// [`Error::ColumnLength`] for bytes that no run gave.
-    pub fn finish(&self, [state, planes]: [&[u8]; 2], accumulator: &mut Accumulator) -> Result<Counts, Error> {
+    pub fn finish(&self, buffers: [&[u8]; 2], accumulator: &mut Accumulator) -> Result<Counts, Error> {
+        let [state, planes] = buffers;
         let counts = self.counts(state)?;
         planes::put(planes, accumulator)?;
         Ok(counts)

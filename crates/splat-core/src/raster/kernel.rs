@@ -179,7 +179,8 @@ pub(crate) fn share_terms(footprint: &Footprint) -> [f32; SHARE_TERMS] {
 }
 
 /// The polynomial that equals a function at the Chebyshev points of an interval, the constant term first.
-fn fit<const N: usize>([begin, end]: [f64; 2], function: impl Fn(f64) -> f64) -> [f32; N] {
+fn fit<const N: usize>(range: [f64; 2], function: impl Fn(f64) -> f64) -> [f32; N] {
+    let [begin, end] = range;
     let node = |k: usize| {
         let angle = (k as f64 + 0.5) * PI / N as f64;
         begin + (end - begin) * (0.5 + 0.5 * libm::cos(angle))

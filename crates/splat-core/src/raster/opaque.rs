@@ -70,12 +70,9 @@ impl Disc<'_> {
     fn core<S: Simd>(&self, simd: S, run: Run<S>, projected: &Projected) -> [Lanes<S>; 2] {
         match self.special {
             None => [run.distance_sq(simd, &self.splat), run.depth(simd, &self.depth)],
-            Some(disc) => special::solid(
-                simd,
-                run,
-                (&self.splat, disc),
-                (projected.kernel(&self.splat), projected.is_perspective()),
-            ),
+            Some(disc) => {
+                special::solid(simd, run, &self.splat, disc, projected.kernel(&self.splat), projected.is_perspective())
+            }
         }
     }
 
@@ -91,8 +88,10 @@ impl Disc<'_> {
             Some(disc) => special::profile(
                 simd,
                 run,
-                (&self.splat, disc),
-                (projected.kernel(&self.splat), projected.is_perspective()),
+                &self.splat,
+                disc,
+                projected.kernel(&self.splat),
+                projected.is_perspective(),
             ),
         }
     }

@@ -166,7 +166,8 @@ impl pulp::WithSimd for ProjectChunk<'_> {
                     self.first + begin,
                     &attributes,
                     &image,
-                    (splats, &self.coverage[begin..end]),
+                    splats,
+                    &self.coverage[begin..end],
                     &mut special,
                 );
             }
@@ -174,9 +175,10 @@ impl pulp::WithSimd for ProjectChunk<'_> {
                 image.write_depths(&attributes, &mut self.depths[begin..end]);
             }
             if !projector.columns.cloud.gaussian.is_empty() {
-                let footprints = (&mut self.splats[begin..end], &mut self.coverage[begin..end]);
+                let splats = &mut self.splats[begin..end];
+                let coverage = &mut self.coverage[begin..end];
                 let depths = self.depths.get_mut(begin..end).unwrap_or_default();
-                projector.write_gaussians(self.first + begin, footprints, depths);
+                projector.write_gaussians(self.first + begin, splats, coverage, depths);
             }
         }
         special

@@ -143,7 +143,8 @@ impl Projected {
 
     /// 1/|d|² for the rays of the pixels of the tile at `corner`, those outside the image included: what
     /// [`Run::distance_sq`](super::tile::Run::distance_sq) of a medium is multiplied by. 1 for parallel rays.
-    pub fn ray_factors(&self, [x, y]: [usize; 2]) -> Vec<f32> {
+    pub fn ray_factors(&self, pixel: [usize; 2]) -> Vec<f32> {
+        let [x, y] = pixel;
         let Some(focal) = self.perspective else { return vec![1.0; AREA] };
         let half = self.size.map(|s| s as f32 * 0.5);
         let factor = |k: usize| {

@@ -168,7 +168,7 @@ impl<'a> Source<'a> {
     #[inline(always)]
     fn of_special<S: Simd>(&self, simd: S, run: Run<S>, rays: &TileRays, disc: &SpecialDisc) -> Lanes<S> {
         let of = |v: f32| Lanes::splat(simd, v);
-        let [profile, depth] = special::profile(simd, run, (self.splat, disc), (self.kernel, rays.is_perspective));
+        let [profile, depth] = special::profile(simd, run, self.splat, disc, self.kernel, rays.is_perspective);
         let mut tau = of(self.splat.peak) * profile;
         if disc.slab[1] > 0.0 && rays.is_perspective {
             let w = of(disc.center) / depth;

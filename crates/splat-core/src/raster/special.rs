@@ -25,7 +25,8 @@ impl Projector<'_> {
         first: usize,
         attributes: &Attributes,
         image: &Image,
-        (splats, coverage): (&mut [ProjectedSplat], &[Coverage]),
+        splats: &mut [ProjectedSplat],
+        coverage: &[Coverage],
         list: &mut Vec<SpecialDisc>,
     ) {
         for (l, splat) in splats.iter_mut().enumerate() {
@@ -46,8 +47,8 @@ impl Projector<'_> {
                 crosses,
                 slab: if is_slab { self.slab_of(id, splat.center_px) } else { [0.0; 2] },
                 image: pattern.map(|pattern| {
-                    let conics = (&*splat, image.core.map(|c| c[l]));
-                    self.image_frame(first + l, conics, &pattern.image, (crosses, center))
+                    let core = image.core.map(|c| c[l]);
+                    self.image_frame(first + l, splat, core, &pattern.image, crosses, center)
                 }),
             });
         }
@@ -70,9 +71,11 @@ impl Projector<'_> {
     fn image_frame(
         &self,
         i: usize,
-        (splat, core): (&ProjectedSplat, [f32; 3]),
+        splat: &ProjectedSplat,
+        core: [f32; 3],
         pattern: &FootprintImage,
-        (crosses, depth): (bool, f32),
+        crosses: bool,
+        depth: f32,
     ) -> ImageFrame {
         let cloud = self.columns.cloud;
         let normal = cloud.normal_of(i);
@@ -134,8 +137,10 @@ fn rows(m: Mat2) -> [f32; 4] {
 pub(super) fn profile<S: Simd>(
     simd: S,
     run: Run<S>,
-    (splat, disc): (&ProjectedSplat, &SpecialDisc),
-    (kernel, perspective): (&Kernel, bool),
+    splat: &ProjectedSplat,
+    disc: &SpecialDisc,
+    kernel: &Kernel,
+    perspective: bool,
 ) -> [Lanes<S>; 2] {
     Shown { simd, run, splat, disc, kernel, perspective, asked: Asked::Profile }.met()
 }
@@ -146,8 +151,10 @@ pub(super) fn profile<S: Simd>(
 pub(super) fn solid<S: Simd>(
     simd: S,
     run: Run<S>,
-    (splat, disc): (&ProjectedSplat, &SpecialDisc),
-    (kernel, perspective): (&Kernel, bool),
+    splat: &ProjectedSplat,
+    disc: &SpecialDisc,
+    kernel: &Kernel,
+    perspective: bool,
 ) -> [Lanes<S>; 2] {
     Shown { simd, run, splat, disc, kernel, perspective, asked: Asked::Solid }.met()
 }

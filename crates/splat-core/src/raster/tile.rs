@@ -322,7 +322,8 @@ pub fn position(k: usize, x: usize, y: usize) -> [usize; 2] {
 ///
 /// # Panics
 /// If the plane is shorter than the image.
-pub fn tile_of<T: Copy>(plane: &[T], size: [u32; 2], [x, y]: [usize; 2], fill: T) -> Vec<T> {
+pub fn tile_of<T: Copy>(plane: &[T], size: [u32; 2], pixel: [usize; 2], fill: T) -> Vec<T> {
+    let [x, y] = pixel;
     let mut out = vec![fill; if plane.is_empty() { 0 } else { AREA }];
     if !plane.is_empty() {
         for_each_span(size, x, y, |tile, image| out[tile].copy_from_slice(&plane[image]));

@@ -169,15 +169,15 @@ impl DepthPlanes {
     /// View depth at which the plane of the triangle at pixel `k` lies beside the middle of that pixel, world units; +∞ where there is
     /// none, and where the plane lies behind the eye.
     #[inline]
-    pub fn at(&self, k: usize, [right, down]: [f32; 2], is_parallel: bool) -> f32 {
-        depth_beside(self.depth[k], self.slope[k], [right, down], is_parallel)
+    pub fn at(&self, k: usize, offset: [f32; 2], is_parallel: bool) -> f32 {
+        depth_beside(self.depth[k], self.slope[k], offset, is_parallel)
     }
 }
 
 /// View depth at which the plane of a triangle lies beside the middle of a pixel, where it has this depth and slope.
 #[inline]
-pub fn depth_beside(depth: f32, slope: [f32; 2], [right, down]: [f32; 2], is_parallel: bool) -> f32 {
-    let step = slope[0] * right + slope[1] * down;
+pub fn depth_beside(depth: f32, slope: [f32; 2], offset: [f32; 2], is_parallel: bool) -> f32 {
+    let step = slope[0] * offset[0] + slope[1] * offset[1];
     if is_parallel {
         return depth + step;
     }

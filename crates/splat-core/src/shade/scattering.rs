@@ -206,7 +206,8 @@ impl<'a> Scattering<'a> {
 }
 
 #[inline(always)]
-fn length_sq<S: Simd>([x, y, z]: [Lanes<S>; 3]) -> Lanes<S> {
+fn length_sq<S: Simd>(vector: [Lanes<S>; 3]) -> Lanes<S> {
+    let [x, y, z] = vector;
     x.mul_add(x, y.mul_add(y, z * z))
 }
 

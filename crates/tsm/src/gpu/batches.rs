@@ -186,7 +186,8 @@ impl Recorded {
     ///
     /// # Errors
     /// [`Error::ReadBack`] for fewer bytes than a run gives.
-    pub fn listed(&self, [spans, distances, totals]: [&[u8]; 3], batch: &Batch) -> Result<Listed, Error> {
+    pub fn listed(&self, buffers: [&[u8]; 3], batch: &Batch) -> Result<Listed, Error> {
+        let [spans, distances, totals] = buffers;
         let entries = batch.entries as usize;
         Ok(Listed {
             spans: read("spans", spans, batch.cells as usize)?,

@@ -188,9 +188,9 @@ impl<M: Mapping, const C: usize> pulp::NullaryFnOnce for PartChunk<'_, M, C> {
         if casters.has_opaque_discs() {
             let Scratch { media_batches, surface_batches, ids: [ids, ..], .. } = &mut *self.deposit.scratch;
             select(casters, &self.chunk, SplatKind::Medium, ids);
-            media_batches.part((mapping, casters, frame), ids, &mut plain, &mut others);
+            media_batches.part(mapping, casters, frame, ids, &mut plain, &mut others);
             select(casters, &self.chunk, SplatKind::Surface, ids);
-            surface_batches.part((mapping, casters, frame), ids, &mut plain, &mut others);
+            surface_batches.part(mapping, casters, frame, ids, &mut plain, &mut others);
         } else {
             others.extend(self.chunk.filter(|&i| casters.casts(i)).map(|i| i as u32));
         }

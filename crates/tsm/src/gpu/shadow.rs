@@ -47,12 +47,8 @@ impl RecordedMap {
     ///
     /// # Errors
     /// As [`RecordedCast::found`].
-    pub fn map(
-        &self,
-        casting: &Casting,
-        state: &[u8],
-        [spans, distances, totals]: [&[u8]; 3],
-    ) -> Result<ShadowMap, Error> {
+    pub fn map(&self, casting: &Casting, state: &[u8], buffers: [&[u8]; 3]) -> Result<ShadowMap, Error> {
+        let [spans, distances, totals] = buffers;
         let entries = self.cast.found(state)?;
         let channels = self.cast.room.channels;
         let cells = casting.map.cells() as usize;

@@ -89,7 +89,8 @@ impl Octahedral {
 }
 
 /// Unit direction at (X, Y) ∈ [0, 1]².
-fn direction([x, y]: [f64; 2]) -> Vec3 {
+fn direction(place: [f64; 2]) -> Vec3 {
+    let [x, y] = place;
     let upper = x + y <= 1.0;
     let (x, y) = if upper { (x, y) } else { (1.0 - y, 1.0 - x) };
     let r = x + y;

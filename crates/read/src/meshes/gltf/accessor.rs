@@ -153,7 +153,7 @@ impl<'a> Buffers<'a> {
         let mut all = Vec::new();
         if let Some(view) = accessor.buffer_view {
             let what = format!("accessor {index}");
-            let view = self.strided((view, accessor.byte_offset), (count, width, kind), &what)?;
+            let view = self.strided(view, accessor.byte_offset, count, width, kind, &what)?;
             input::check_bytes("an accessor", bytes, reading.params)?;
             input::reserve(&mut all, count)?;
             all.extend((0..count).map(|i| entry(&view, i)));
@@ -172,10 +172,10 @@ impl<'a> Buffers<'a> {
         if !matches!(component_type, U8 | U16 | U32) {
             return Err(wrong(format!("whole numbers as {what}"), format!("type {component_type}")));
         }
-        let places = self.strided((buffer_view, byte_offset), (sparse.count, 1, component_type), &what)?;
+        let places = self.strided(buffer_view, byte_offset, sparse.count, 1, component_type, &what)?;
         let what = format!("the sparse values of accessor {index}");
-        let at = (sparse.values.buffer_view, sparse.values.byte_offset);
-        let values = self.strided(at, (sparse.count, width, kind), &what)?;
+        let values = &sparse.values;
+        let values = self.strided(values.buffer_view, values.byte_offset, sparse.count, width, kind, &what)?;
         for i in 0..sparse.count {
             let place = stored(&places.bytes[i * places.stride..], places.kind) as usize;
             let target = all.get_mut(place).ok_or_else(|| missing("entry of a sparse accessor", place, count))?;
@@ -187,8 +187,11 @@ impl<'a> Buffers<'a> {
     /// `count` entries of `width` numbers from a byte of a view on, all of them inside it.
     fn strided(
         &self,
-        (view, offset): (usize, usize),
-        (count, width, kind): (usize, usize, u32),
+        view: usize,
+        offset: usize,
+        count: usize,
+        width: usize,
+        kind: u32,
         what: &str,
     ) -> Result<View<'_>, ReadError> {
         let size = width

@@ -78,8 +78,8 @@ impl Faces {
                         source.number(kind)?;
                     }
                     Shape::List { count, item } if is_index(property) => match form {
-                        Form::Polygons => self.polygon(source, record, (count, item), reading)?,
-                        Form::Strips => self.strip(source, record, (count, item), reading)?,
+                        Form::Polygons => self.polygon(source, record, count, item, reading)?,
+                        Form::Strips => self.strip(source, record, count, item, reading)?,
                     },
                     Shape::List { count, item } => skip_list(source, count, item)?,
                 }
@@ -103,13 +103,14 @@ impl Faces {
         &mut self,
         source: &mut S,
         face: u64,
-        (count, item): (Type, Type),
+        count: Type,
+        item: Type,
         reading: &mut Reading<'_>,
     ) -> Result<(), ReadError> {
         let corners = list_length(source, count, item)?;
         if corners < 3 {
             let place = source.place();
-            reading.mend((Fix::TooFewCorners, place, Some(face)), || {
+            reading.mend(Fix::TooFewCorners, place, Some(face), || {
                 let expected = format!("3 or more corners of face {face}");
                 ReadError::input(place, expected, corners.to_string(), "remove degenerate faces")
             })?;
@@ -145,7 +146,8 @@ impl Faces {
         &mut self,
         source: &mut S,
         record: u64,
-        (count, item): (Type, Type),
+        count: Type,
+        item: Type,
         reading: &Reading<'_>,
     ) -> Result<(), ReadError> {
         let length = list_length(source, count, item)?;

@@ -148,7 +148,8 @@ fn read_record<S: Source>(
 fn table<S: Source, T>(
     source: &mut S,
     element: &Element,
-    (names, of): (&[&str], fn(f64) -> T),
+    names: &[&str],
+    of: fn(f64) -> T,
     reading: &mut Reading<'_>,
 ) -> Result<Vec<T>, ReadError> {
     let place = |p: &Property| names.iter().position(|n| n.as_bytes() == p.name);

@@ -74,7 +74,8 @@ fn check_attributes(
     extras: &Extras,
     names: &[String],
     number: impl Fn(usize) -> f64,
-    (place, point): (u64, u64),
+    place: u64,
+    point: u64,
 ) -> Result<(), ReadError> {
     let unfit = |rank: usize| Some((rank, extras.unfit(rank, number(rank))?));
     extras.read().find_map(unfit).map_or(Ok(()), |(rank, expected)| {
@@ -147,7 +148,7 @@ impl Columns {
                         damaged(scan.place, format!("{name} of point {point} within its range"), "a number above it")
                     })?;
                 }
-                self.push((scan, &ranks), &row, point, reading)?;
+                self.push(scan, &ranks, &row, point, reading)?;
             }
         }
         self.scans += 1;
@@ -180,7 +181,8 @@ impl Columns {
     /// Takes a point with these numbers.
     fn push(
         &mut self,
-        (scan, ranks): (&Scan, &Ranks),
+        scan: &Scan,
+        ranks: &Ranks,
         row: &[f64],
         point: u64,
         reading: &Reading<'_>,
@@ -211,7 +213,7 @@ impl Columns {
         }
         let of_scan = |rank: usize| if self.names[rank] == SCAN { self.scans as f64 } else { f64::NAN };
         let further = |rank: usize| ranks.further[rank].map_or_else(|| of_scan(rank), |field| row[field]);
-        check_attributes(&self.extras, &self.names, further, (scan.place, point))?;
+        check_attributes(&self.extras, &self.names, further, scan.place, point)?;
         self.positions.push(place);
         self.extras.push(further);
         let [has_normal, has_color, has_value] = self.has;

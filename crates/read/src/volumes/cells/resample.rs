@@ -83,7 +83,9 @@ fn volume([a, b, c, d]: &Tetrahedron) -> f64 {
 
 /// The volume of a field over bodies, whose cells are told of at a place.
 pub(super) fn grid(
-    (points, bodies, place): (&[DVec3], &[Body<'_>], Place),
+    points: &[DVec3],
+    bodies: &[Body<'_>],
+    place: Place,
     field: &Field,
     reading: &mut Reading<'_>,
 ) -> Result<Grid, ReadError> {
@@ -105,7 +107,7 @@ pub(super) fn grid(
     let outside = least.fold(0.0, f64::min);
     let lattice = Lattice { low: bounds.low, sample: step / SAMPLES as f64, dims, outside };
     lattice.check_work(points, bodies, bounds.volume)?;
-    let values = lattice.filled((points, bodies), field, reading)?;
+    let values = lattice.filled(points, bodies, field, reading)?;
     let [x, y, z] = dims;
     let cells = counted(bodies.len() as u64, "cell");
     let remarks = &mut reading.notes.remarks;
@@ -196,7 +198,8 @@ impl Lattice {
     /// The values of all voxels.
     fn filled(
         &self,
-        (points, bodies): (&[DVec3], &[Body<'_>]),
+        points: &[DVec3],
+        bodies: &[Body<'_>],
         field: &Field,
         reading: &Reading<'_>,
     ) -> Result<Vec<f32>, ReadError> {
@@ -329,7 +332,7 @@ mod tests {
     }
 
     fn sampled(points: &[DVec3], bodies: &[Body<'_>], field: &Field) -> Grid {
-        grid((points, bodies, Place::File), field, &mut Reading::new(&ReadParams::default(), None)).unwrap()
+        grid(points, bodies, Place::File, field, &mut Reading::new(&ReadParams::default(), None)).unwrap()
     }
 
     fn mass(grid: &Grid) -> f64 {

@@ -63,7 +63,7 @@ pub(super) fn read(
             let selection = selection(array, reading.params, &mut reading.notes)?;
             let numbers = joined(&pieces, array, &mut used, reading)?;
             let told = (name(array), !of_cells);
-            field = cells::field((&numbers, &selection), (&told.0, told.1), place(array), reading)?;
+            field = cells::field(&numbers, &selection, &told.0, told.1, place(array), reading)?;
         }
     } else {
         let data = || pieces.iter().filter_map(|piece| child(piece.node, "PointData"));

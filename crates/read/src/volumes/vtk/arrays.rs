@@ -46,8 +46,9 @@ pub(super) struct Array {
 pub(super) struct Part<'n> {
     pub(super) name: &'n str,
     pub(super) kind: Kind,
-    /// Numbers of a tuple, and tuples.
-    pub(super) size: (u64, u64),
+    /// Numbers of a tuple.
+    pub(super) numbers: u64,
+    pub(super) tuples: u64,
     pub(super) cells: u64,
 }
 
@@ -159,10 +160,10 @@ impl<'a> Arrays<'a> {
                 return Ok(());
             }
             b"FIELD" => return self.field(whole(2)?, lines),
-            b"LOOKUP_TABLE" => return self.pass((&words, line), Kind::U8, (4, whole(2)?), Role::Other, lines),
+            b"LOOKUP_TABLE" => return self.pass(&words, line, Kind::U8, 4, whole(2)?, Role::Other, lines),
             // What VTK writes of bytes.
             b"COLOR_SCALARS" => {
-                return self.pass((&words, line), Kind::U8, (whole(2)?, self.tuples), Role::Colors, lines);
+                return self.pass(&words, line, Kind::U8, whole(2)?, self.tuples, Role::Colors, lines);
             }
             b"SCALARS" => (Role::Scalars, if words.len() > 3 { whole(3)? } else { 1 }),
             b"VECTORS" => (Role::Other, 3),
@@ -177,7 +178,7 @@ impl<'a> Arrays<'a> {
         if keyword == b"SCALARS" {
             self.pass_table_name(lines)?;
         }
-        self.pass((&words, line), kind, (numbers, self.tuples), role, lines)
+        self.pass(&words, line, kind, numbers, self.tuples, role, lines)
     }
 
     /// The arrays of a field.
@@ -192,10 +193,11 @@ impl<'a> Arrays<'a> {
                 continue;
             }
             let words: Vec<Word<'_>> = line.words(false).collect();
-            let size = (whole(words.get(1), line)?, whole(words.get(2), line)?);
+            let numbers = whole(words.get(1), line)?;
+            let tuples = whole(words.get(2), line)?;
             // The name stands where other arrays have their keyword.
             let named = [&words[..1], &words].concat();
-            self.pass((&named, line), kind(words.get(3), line)?, size, Role::Field, lines)?;
+            self.pass(&named, line, kind(words.get(3), line)?, numbers, tuples, Role::Field, lines)?;
             left -= 1;
         }
         Ok(())
@@ -206,7 +208,7 @@ impl<'a> Arrays<'a> {
         if self.part(part.name).is_some() {
             return Err(wrong(line, &format!("{} once", part.name)));
         }
-        self.pass((&[], line), part.kind, part.size, Role::Part, lines)?;
+        self.pass(&[], line, part.kind, part.numbers, part.tuples, Role::Part, lines)?;
         if let Some(array) = self.found.last_mut() {
             part.name.clone_into(&mut array.name);
             array.cells = part.cells;
@@ -231,9 +233,11 @@ impl<'a> Arrays<'a> {
     /// Passes over an array of so many numbers a tuple and so many tuples, whose name is the second word.
     fn pass(
         &mut self,
-        (words, line): (&[Word<'_>], Line<'_>),
+        words: &[Word<'_>],
+        line: Line<'_>,
         kind: Kind,
-        (numbers, tuples): (u64, u64),
+        numbers: u64,
+        tuples: u64,
         role: Role,
         lines: &mut Lines<'a>,
     ) -> Result<(), ReadError> {

@@ -29,19 +29,23 @@ pub(super) fn take<'a>(line: Line<'a>, lines: &mut Lines<'a>, arrays: &mut Array
     let keyword = words.first().map(|w| w.text.to_ascii_uppercase()).unwrap_or_default();
     match keyword.as_slice() {
         b"POINTS" => {
-            let size = (3, whole(words.get(1), line)?);
+            let tuples = whole(words.get(1), line)?;
             let kind = kind(words.get(2), line)?;
-            arrays.take_part(line, Part { name: "POINTS", kind, size, cells: 0 }, lines)?;
+            arrays.take_part(line, Part { name: "POINTS", kind, numbers: 3, tuples, cells: 0 }, lines)?;
         }
         b"CELL_TYPES" => {
-            let size = (1, whole(words.get(1), line)?);
-            arrays.take_part(line, Part { name: "CELL_TYPES", kind: Kind::I32, size, cells: 0 }, lines)?;
+            let tuples = whole(words.get(1), line)?;
+            arrays.take_part(
+                line,
+                Part { name: "CELL_TYPES", kind: Kind::I32, numbers: 1, tuples, cells: 0 },
+                lines,
+            )?;
         }
         name => {
             let all = ["CELLS"].into_iter().chain(OF_POLYDATA.map(|part| part.0));
             let Some(name) = all.into_iter().find(|part| part.as_bytes() == name) else { return Ok(false) };
             let sizes = [whole(words.get(1), line)?, whole(words.get(2), line)?];
-            take_cells((name, line), sizes, lines, arrays)?;
+            take_cells(name, line, sizes, lines, arrays)?;
         }
     }
     Ok(true)
@@ -49,13 +53,14 @@ pub(super) fn take<'a>(line: Line<'a>, lines: &mut Lines<'a>, arrays: &mut Array
 
 /// Takes cells: their number and how many numbers tell of them, or how many ends and how many points.
 fn take_cells<'a>(
-    (name, line): (&str, Line<'a>),
+    name: &str,
+    line: Line<'a>,
     sizes: [u64; 2],
     lines: &mut Lines<'a>,
     arrays: &mut Arrays<'a>,
 ) -> Result<(), ReadError> {
     if !arrays.continues_with(BY_ENDS[0], lines) {
-        let part = Part { name, kind: Kind::I32, size: (1, sizes[1]), cells: sizes[0] };
+        let part = Part { name, kind: Kind::I32, numbers: 1, tuples: sizes[1], cells: sizes[0] };
         return arrays.take_part(line, part, lines);
     }
     for (part, size) in BY_ENDS.iter().zip(sizes) {
@@ -67,7 +72,7 @@ fn take_cells<'a>(
             return Err(wrong(line, part));
         }
         let name = format!("{name}.{part}");
-        let part = Part { name: &name, kind: kind(words.get(1), line)?, size: (1, size), cells: 0 };
+        let part = Part { name: &name, kind: kind(words.get(1), line)?, numbers: 1, tuples: size, cells: 0 };
         arrays.take_part(line, part, lines)?;
     }
     Ok(())
@@ -84,9 +89,11 @@ struct Source<'a> {
 
 /// What the arrays of a file are: a volume, a mesh or points.
 pub(super) fn read(
-    (content, is_binary): (&[u8], bool),
+    content: &[u8],
+    is_binary: bool,
     dataset: Dataset,
-    (arrays, end): (&Arrays<'_>, Place),
+    arrays: &Arrays<'_>,
+    end: Place,
     reading: &mut Reading<'_>,
 ) -> Result<Loaded, ReadError> {
     let source = Source { content, is_binary, arrays, end };
@@ -171,7 +178,7 @@ impl Source<'_> {
 
     /// The numbers of an array that has as many tuples as there are points.
     fn of_points(&self, array: &Array, cells: &Cells, reading: &Reading<'_>) -> Result<Numbers, ReadError> {
-        cells::check_count((array.tuples, cells.points.len(), "points"), array.place)?;
+        cells::check_count(array.tuples, cells.points.len(), "points", array.place)?;
         self.numbers(array, reading)
     }
 
@@ -184,15 +191,15 @@ impl Source<'_> {
     fn field(&self, array: &Array, cells: &Cells, reading: &mut Reading<'_>) -> Result<Field, ReadError> {
         let of_points = array.of == Of::Points;
         let (count, what) = if of_points { (cells.points.len(), "points") } else { (cells.kinds.len(), "cells") };
-        cells::check_count((array.tuples, count, what), array.place)?;
+        cells::check_count(array.tuples, count, what, array.place)?;
         let selection = Selection::of_frames(1, array.place, reading.params, &mut reading.notes)?;
-        let selection = selection.with_numbers((array.numbers, array.kind, false), array.place, &mut reading.notes)?;
+        let selection = selection.with_numbers(array.numbers, array.kind, false, array.place, &mut reading.notes)?;
         let mut numbers = self.numbers(array, reading)?;
         if self.is_of_shares(array) {
             // Shares have few digits, and stand for whole numbers.
             numbers.all.iter_mut().for_each(|n| *n = (255.0 * *n).round());
         }
         let name = escaped(array.name.as_bytes(), 40);
-        cells::field((&numbers, &selection), (&name, of_points), array.place, reading)
+        cells::field(&numbers, &selection, &name, of_points, array.place, reading)
     }
 }

@@ -48,7 +48,8 @@ impl List {
     }
 
     /// Lists the splats of an order, and gives the buffer of the sorted ids.
-    pub(super) fn record(&self, r: &mut Recording, room: &ListRoom, [view, order, splats]: [BufferId; 3]) -> BufferId {
+    pub(super) fn record(&self, r: &mut Recording, room: &ListRoom, buffers: [BufferId; 3]) -> BufferId {
+        let [view, order, splats] = buffers;
         let ListRoom { tiles, ordered, entries } = *room;
         let Self { state, places, sort, digits, keys, ids, starts } = *self;
         r.dispatch(&kernels::SPLAT_BEGIN, Groups::cover(1), &[view, state, places.scan], &[]);

@@ -148,7 +148,7 @@ impl Recorded {
         ])?;
         check_ids(input.ids, n)?;
         let given = [words(projected, true), input.values.iter().map(|v| v.to_bits()).collect()];
-        self.bytes(projected.perspective, &projected.kernels, input.ids, (&projected.objects, n), given)
+        self.bytes(projected.perspective, &projected.kernels, input.ids, &projected.objects, n, given)
     }
 
     /// The bytes that it takes where footprints and values come from recordings before it: view, ids and tables; `objects` by
@@ -167,7 +167,7 @@ impl Recorded {
         let perspective = (!camera.is_orthographic()).then_some(camera.focal_px() as f32);
         let n = self.capacities.splats as usize;
         check_ids(ids, n)?;
-        self.bytes(perspective, &kernels, ids, (objects, n), [Vec::new(), Vec::new()])
+        self.bytes(perspective, &kernels, ids, objects, n, [Vec::new(), Vec::new()])
     }
 
     fn bytes(
@@ -175,7 +175,8 @@ impl Recorded {
         perspective: Option<f32>,
         kernels: &[Kernel],
         ids: &[u32],
-        (objects, splats): (&[u32], usize),
+        objects: &[u32],
+        splats: usize,
         given: [Vec<u32>; 2],
     ) -> Result<Uploads, Error> {
         let room = self.capacities;
@@ -220,7 +221,8 @@ impl Recorded {
     /// # Errors
     /// [`Error::Overflow`] when there are more entries than there is room for: record again with what is needed.
     /// [`Error::ColumnLength`] for bytes that no run gave.
-    pub fn finish(&self, [state, image]: [&[u8]; 2]) -> Result<(OpaqueImage, Counts), Error> {
+    pub fn finish(&self, buffers: [&[u8]; 2]) -> Result<(OpaqueImage, Counts), Error> {
+        let [state, image] = buffers;
         let counts = self.counts(state)?;
         let room = self.capacities;
         let area: usize = room.size.map(|s| s as usize).iter().product();

@@ -59,17 +59,17 @@ fn cut(of: &Meshes<'_>, plane: usize, polygon: &Polygon) -> Polygon {
             out.push(here);
         }
         if (own >= 0.0) != (other >= 0.0) {
-            out.push(crossing([here, next], [own, other]));
+            out.push(crossing(here, next, own, other));
         }
     }
     out
 }
 
 /// Where an edge meets a plane, the same from both ends.
-fn crossing([a, b]: [DVec3; 2], [own, other]: [f64; 2]) -> DVec3 {
+fn crossing(a: DVec3, b: DVec3, own: f64, other: f64) -> DVec3 {
     let key = |p: DVec3| p.to_array().map(f64::to_bits);
     if key(a) > key(b) {
-        return crossing([b, a], [other, own]);
+        return crossing(b, a, other, own);
     }
     a + (b - a) * (own / (own - other))
 }

@@ -49,7 +49,8 @@ impl Plane {
 
     /// Where the ray through the middle of a pixel meets the plane.
     #[inline]
-    pub(super) fn at(&self, [x, y]: [usize; 2]) -> Crossing {
+    pub(super) fn at(&self, pixel: [usize; 2]) -> Crossing {
+        let [x, y] = pixel;
         let at = DVec3::new(1.0, x as f64, y as f64);
         let raw = self.weights.map(|w| w.dot(at));
         let whole = raw[0] + raw[1] + raw[2];

@@ -55,8 +55,10 @@ impl<T> TriangleLayers<T> {
 pub fn resolve_layers<T: Copy + Send + Sync>(
     meshes: &[PlacedMesh<'_>],
     camera: &Camera,
-    (hidden, most): (&[f32], u64),
-    (none, keep): (T, impl Fn(usize, &TriangleLayer) -> T + Sync),
+    hidden: &[f32],
+    most: u64,
+    none: T,
+    keep: impl Fn(usize, &TriangleLayer) -> T + Sync,
     progress: Option<&Progress>,
 ) -> Result<TriangleLayers<T>, Error> {
     let of = &Meshes::new(meshes, camera)?;

@@ -117,7 +117,7 @@ mod tests {
     use super::*;
     use crate::rng;
 
-    fn is_inside(piece: &Piece, [x, y]: [i64; 2]) -> bool {
+    fn is_inside(piece: &Piece, x: i64, y: i64) -> bool {
         let middle = [x, y].map(|v| i128::from(v * PIXEL + PIXEL / 2));
         (0..3).all(|k| {
             let [a, b] = [piece.corners[k], piece.corners[(k + 1) % 3]].map(|c| c.map(i128::from));
@@ -155,7 +155,7 @@ mod tests {
                 let rows = piece.rows(height as u32);
                 let span = if rows.contains(&y) { piece.span(y, width) } else { 0..0 };
                 for x in 0..width as usize {
-                    let expected = is_inside(&piece, [x as i64, y as i64]);
+                    let expected = is_inside(&piece, x as i64, y as i64);
                     assert_eq!(span.contains(&x), expected, "{corners:?}: {x}, {y}");
                 }
             }

@@ -59,7 +59,7 @@ pub(super) fn read<S: Source>(
             b"chunk" => all.chunks = chunks(&mut source, element, reading)?,
             b"vertex" => {
                 place = at_line(element.line);
-                all.words = table(&mut source, element, (&WORDS, |v| v as u32), reading)?;
+                all.words = table(&mut source, element, &WORDS, |v| v as u32, reading)?;
             }
             b"sh" => {
                 let n = element.properties.len();
@@ -70,7 +70,7 @@ pub(super) fn read<S: Source>(
                 })?;
                 let names: Vec<String> = (0..n).map(|k| format!("f_rest_{k}")).collect();
                 let names: Vec<&str> = names.iter().map(String::as_str).collect();
-                all.rest = table(&mut source, element, (&names, |v| v as u8), reading)?;
+                all.rest = table(&mut source, element, &names, |v| v as u8, reading)?;
                 of_rest = Some(element);
             }
             _ => {
@@ -108,9 +108,9 @@ pub(super) fn read<S: Source>(
 fn chunks<S: Source>(source: &mut S, element: &Element, reading: &mut Reading<'_>) -> Result<Vec<f64>, ReadError> {
     let has_colors = element.properties.iter().any(|p| p.name == COLORS[0].as_bytes());
     if has_colors {
-        return table(source, element, (&[&BOUNDS[..], &COLORS].concat(), |v| v), reading);
+        return table(source, element, &[&BOUNDS[..], &COLORS].concat(), |v| v, reading);
     }
-    let rows = table(source, element, (&BOUNDS, |v| v), reading)?;
+    let rows = table(source, element, &BOUNDS, |v| v, reading)?;
     Ok(rows.chunks_exact(12).flat_map(|row| row.iter().copied().chain([0.0, 0.0, 0.0, 1.0, 1.0, 1.0])).collect())
 }
 
