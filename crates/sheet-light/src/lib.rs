@@ -49,49 +49,22 @@
 //! The README says how it works and where it deviates from the paper, and why.
 #![forbid(unsafe_code)]
 
-mod aligned;
-mod classify;
-mod counts;
-mod error;
-mod fold;
-mod gradient_volume;
-pub mod half;
-mod kept;
-mod lattice;
-mod light;
-mod lines;
-mod near;
-mod near_eye;
-mod neighbours;
-mod panes;
-mod params;
-mod picture;
-mod precision;
-mod preclassified;
-mod queue;
-mod rays;
-pub mod reference;
-mod ring;
-pub mod sections;
-mod segments;
-mod shade;
-mod shadows;
-mod sheets;
-mod slabs;
-mod splats;
-mod sweep;
-mod tile;
-mod viewed;
-mod visible;
-mod volume;
-mod within;
+pub mod half_vector;
+mod image_aligned;
+mod shared;
 
-pub use counts::SheetCounts;
-pub use error::Error;
-pub use fold::{Sheeted, prepare};
-pub use params::{Aligned, Classify, Gradients, KernelShape, Lighting, Params};
-pub use splats::Splats;
-pub use volume::{SheetInput, Volume};
+/// The name of [`half_vector`] in paths of other crates.
+pub use half_vector as half;
+pub use image_aligned::counts::SheetCounts;
+pub use image_aligned::prepare::prepare;
+pub use image_aligned::prepared::Sheeted;
+#[cfg(feature = "reference")]
+pub use image_aligned::reference;
+pub use shared::error::Error;
+pub use shared::input::{SheetInput, Splats};
+pub use shared::params::{Aligned, Classify, Gradients, KernelShape, Lighting, Params};
+pub use shared::sections;
+pub use shared::volume::Volume;
 
 /// The page's examples compile and hold.
 #[cfg(doctest)]

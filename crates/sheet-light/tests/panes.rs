@@ -6,7 +6,7 @@ use crate::common::{
 use crate::half::common::{input as half_input, lamp, scattering, sun};
 use crate::half::polygons::{polygons, wall, white};
 use crate::splats::{Shown, alone};
-use sheet_light::half::{Bodies, HalfInput, HalfParams, Polygons, fold, light_list_bytes, pane_bytes};
+use sheet_light::half::{Bodies, HalfInput, HalfParams, Polygons, SampledLight, fold, light_list_bytes, pane_bytes};
 use sheet_light::{Aligned, Error, Params, SheetInput, prepare};
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::raster::triangles::PlacedMesh;
@@ -250,7 +250,7 @@ fn what_lists_will_take_is_known_before() {
         };
         // What is taken holds twelve bytes a pixel of its images beside the lists.
         let taken = taken(&[light]) - taken(&[]);
-        let told = light_list_bytes(&placed, &Bodies::default(), (&light.light, 1), 256);
+        let told = light_list_bytes(&placed, &Bodies::default(), SampledLight { light: &light.light, samples: 1 }, 256);
         assert!(told > taken / 2 && told < taken && told > 1 << 19, "{told} told, {taken} taken");
     }
 }

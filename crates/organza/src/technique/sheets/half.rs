@@ -14,8 +14,8 @@ use crate::technique::Session;
 use crate::{CostRecord, Error, RenderOptions, stage};
 use sheet_light::Params;
 use sheet_light::half::{
-    self, Bodies, Drawn, Extended, HalfInput, HalfParams, MOST_SAMPLES, Reason, Scattering, fold, light_list_bytes,
-    penumbra_widening, polygon_bytes, serves_extended, slab_width,
+    self, Bodies, Drawn, Extended, HalfInput, HalfParams, MOST_SAMPLES, Reason, SampledLight, Scattering, fold,
+    light_list_bytes, penumbra_widening, polygon_bytes, serves_extended, slab_width,
 };
 use splat_core::raster::triangles::PlacedMesh;
 use splat_core::shade::LitBy;
@@ -116,9 +116,10 @@ pub(super) fn bytes(
     let samples = served.iter().map(|(_, samples)| *samples).max().unwrap_or(1);
     let has_polygons = matter.own.iter().any(|own| own.form.is_polygons());
     let polygons = if has_polygons { polygon_bytes(matter.camera, samples, &params) } else { 0 };
-    let of_light = |lamp: &(&Light, u32)| light_list_bytes(panes, &bodies, *lamp, params.most_light_pixels);
-    let lists = served.iter().map(of_light).max().unwrap_or(0);
-    lists + polygons + half::bytes(&bodies, matter.camera, served.into_iter(), mapped.len(), &params)
+    let served = served.into_iter().map(|(light, samples)| SampledLight { light, samples });
+    let of_light = |light| light_list_bytes(panes, &bodies, light, params.most_light_pixels);
+    let lists = served.clone().map(of_light).max().unwrap_or(0);
+    lists + polygons + half::bytes(&bodies, matter.camera, served, mapped.len(), &params)
 }
 
 /// Draws all that is translucent into a segment of its own.

@@ -1,0 +1,151 @@
+//! Volumes and a view, ready to be folded.
+
+use super::light::Lamp;
+use super::panes::Panes;
+use super::segments::Segments;
+use super::slant::Slant;
+use super::view_slabs::stride;
+use super::viewed::{PixelFootprint, Viewed, lacking};
+use super::within::Within;
+use crate::image_aligned::tile::ring::{Splatter, Taper};
+use crate::shared::classifier::{Base, Classifier};
+use crate::shared::gradient_volume::GradientVolume;
+use crate::shared::input::SheetInput;
+use crate::shared::lattice::Lattice;
+use crate::shared::lattice_rays::LatticeRays;
+use crate::shared::neighbours::Receivers;
+use crate::shared::params::Classify;
+use crate::shared::sections::SectionTable;
+use crate::shared::shadows::Shadows;
+use crate::shared::slabs::Slabs;
+use crate::shared::value_range::ValueRange;
+use crate::shared::voxels::Voxels;
+use crate::{Params, Volume};
+use splat_core::Footprint;
+use splat_core::raster::bins::Bins;
+use splat_core::raster::kernel::Kernel;
+use std::ops::Range;
+
+/// One volume, ready to be splatted.
+pub(crate) struct Prepared<'a> {
+    pub(crate) volume: Volume<'a>,
+    /// Its own slabs.
+    pub(crate) slabs: Slabs,
+    /// How many of all volumes' slabs one of them is wide.
+    pub(crate) stride: u32,
+    pub(crate) lattice: Lattice<'a>,
+    pub(crate) viewed: Viewed,
+    pub(crate) sections: SectionTable,
+    kernel: Kernel,
+    taper: Taper,
+    /// Whether sums are rounded to half precision.
+    half: bool,
+    pub(crate) classify: Classify,
+    pub(crate) classifier: Classifier,
+    pub(crate) rays: LatticeRays,
+    pub(crate) voxels: Voxels,
+    pub(crate) shadows: Option<Shadows>,
+    /// Of one whose spacing is optically thick.
+    pub(crate) within: Option<Within>,
+    /// Where normals come from that.
+    pub(crate) gradients: Option<GradientVolume>,
+    /// Its slabs that lack kernels, because these lie behind the eye.
+    pub(crate) lacking: Option<Range<u32>>,
+    pub(crate) segments: Segments,
+    /// What values are taken relative to.
+    pub(crate) base: Base,
+    /// The footprint of all voxels, where rays are parallel.
+    footprint: Option<PixelFootprint>,
+}
+
+/// The sheets of some volumes in one view, ready to be folded.
+pub struct Sheeted<'a> {
+    pub(crate) input: SheetInput<'a>,
+    pub(crate) params: Params,
+    pub(crate) slabs: Slabs,
+    pub(crate) slant: Slant,
+    pub(crate) volumes: Vec<Prepared<'a>>,
+    pub(crate) lamps: Vec<Lamp<'a>>,
+    /// Lists of splats by square of the image.
+    pub(crate) bins: Option<Bins>,
+    /// Translucent polygons.
+    pub(crate) panes: Option<Panes<'a>>,
+    pub(crate) tiles: [usize; 2],
+}
+
+impl<'a> Prepared<'a> {
+    pub(crate) fn new(
+        volume: Volume<'a>,
+        input: &SheetInput<'_>,
+        params: &Params,
+        slabs: &Slabs,
+        slant: Slant,
+        tiles: [usize; 2],
+    ) -> Self {
+        let grid = volume.grid;
+        let camera = input.camera;
+        let stride = stride(&volume, input, params, slabs.width);
+        let slabs = &slabs.wider(stride);
+        let viewed = Viewed::new(&volume, camera, slabs, params, slant);
+        let lacking = lacking(&volume, camera, slabs, viewed.reach);
+        let reach = viewed.lattice_reach(camera, slabs, params.compares_sheets(&volume));
+        let lattice = Lattice::new(grid, volume.packing, reach);
+        let viewed = viewed.with_rim(lattice.rim);
+        let transfer = &volume.seen();
+        let near = viewed.near(camera, slabs, &params.kernel, params.compares_sheets(&volume), lacking.is_some());
+        let voxels = Voxels::needed(&lattice, transfer, &near);
+        let segments = Segments::new(&viewed, slabs, &voxels, lattice.dims, tiles);
+        let cutoff = params.kernel.extent / params.kernel.sigma;
+        let footprint = Footprint { cutoff: cutoff as f32 };
+        let base = Base::new(ValueRange::of_values(&grid.values), transfer);
+        Self {
+            volume,
+            slabs: *slabs,
+            stride,
+            lattice,
+            sections: SectionTable::new(viewed.reach / slabs.width, &footprint),
+            taper: Taper::new(0.5 * cutoff * cutoff),
+            kernel: Kernel::new(&footprint),
+            half: params.is_half(),
+            classify: params.classify,
+            classifier: Classifier::new(transfer, volume.extinction_scale, base),
+            rays: LatticeRays::new(&volume, camera, slabs.origin),
+            footprint: camera.is_orthographic().then(|| viewed.footprint(camera.focal_px())),
+            viewed,
+            voxels,
+            shadows: None,
+            within: None,
+            gradients: None,
+            lacking,
+            segments,
+            base,
+        }
+    }
+
+    pub(crate) fn receivers(&self) -> Receivers<'_> {
+        Receivers {
+            volume: &self.volume,
+            voxels: &self.voxels,
+            rim: self.lattice.rim,
+            radius: self.viewed.reach as f32,
+            rows: self.rays.rows(),
+        }
+    }
+
+    pub(crate) fn splatter(&self) -> Splatter<'_> {
+        Splatter {
+            viewed: &self.viewed,
+            kernel: &self.kernel,
+            taper: self.taper,
+            sections: &self.sections,
+            half: self.half,
+            footprint: self.footprint,
+        }
+    }
+
+    /// Half the bounds of a footprint at `scale`, pixels.
+    #[inline(always)]
+    pub(crate) fn half(&self, scale: f64) -> [f32; 2] {
+        self.footprint.unwrap_or_else(|| self.viewed.footprint(scale)).half
+    }
+}

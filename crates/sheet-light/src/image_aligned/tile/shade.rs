@@ -1,0 +1,477 @@
+//! Shading of finished sheets: classification, gradients, radiance, and the mix of volumes that share a slab.
+
+use super::kept::Kept;
+use super::picture::{Fragments, Picture};
+use super::place::Place;
+use super::preclassified::Preclassified;
+use super::rays::{Crossings, Slopes};
+use super::sheets::{Sheets, difference};
+use super::size::TILE;
+use crate::image_aligned::light::{Lamp, Lit, Reflector, Spots};
+use crate::image_aligned::prepared::Prepared;
+use crate::image_aligned::within::RayPart;
+use crate::shared::depths::{DepthRange, DepthSpans};
+use crate::shared::input::SheetInput;
+use crate::shared::pixel::Pixel;
+use crate::shared::sections::LEAST_WEIGHT;
+use crate::shared::vectors::dot;
+use crate::shared::volume::Volume;
+use splat_core::Shading;
+use splat_core::glam::Vec3;
+use splat_core::optics::TRACE;
+use splat_core::raster::lanes::{Lanes, MAX_LANES};
+use splat_core::raster::pulp::Simd;
+use splat_core::shade::{ChannelLayout, MAX_CHANNELS};
+
+/// What shading reads beside the sheets.
+pub(crate) struct Shader<'a> {
+    pub(crate) input: &'a SheetInput<'a>,
+    pub(crate) layout: &'a ChannelLayout,
+    pub(crate) slopes: &'a Slopes,
+    /// The camera's, in single precision.
+    pub(crate) axes: [Vec3; 3],
+    pub(crate) lamps: &'a [Lamp<'a>],
+}
+
+/// One volume of a tile, as shading reads it.
+pub(crate) struct Reconstructed<'a> {
+    pub(crate) prepared: &'a Prepared<'a>,
+    pub(crate) crossings: &'a Crossings,
+    pub(crate) sheets: &'a Sheets,
+    /// Classes, where voxels have them.
+    pub(crate) preclassified: Option<&'a Preclassified>,
+    /// View depths between which each pixel of the tile without its rim may have light, counted from the first slab.
+    pub(crate) limits: [&'a [f32]; 2],
+    /// The same of the part of each of the pixels that is shaded, where there are several.
+    pub(crate) part: Option<&'a DepthSpans>,
+    /// Depths between which the volume is shaded.
+    pub(crate) faces: DepthRange,
+    /// Whether that is not the whole of its own slab.
+    pub(crate) is_part: bool,
+    /// Pixels that are seen through, from the first one on, a bit each.
+    pub(crate) open: u32,
+}
+
+/// What one volume has in neighbouring pixels between two depths.
+struct Medium<S: Simd> {
+    near: Lanes<S>,
+    far: Lanes<S>,
+    /// Optical depth.
+    depth: Lanes<S>,
+    /// Length of each ray per unit of view depth.
+    secant: Lanes<S>,
+    color: [Lanes<S>; 3],
+}
+
+/// What one volume brings to neighbouring pixels.
+struct Shaded<'a> {
+    volume: &'a Volume<'a>,
+    tau: [f32; MAX_LANES],
+    values: Values,
+}
+
+/// A number for each channel of each pixel.
+type Values = [[f32; MAX_LANES]; MAX_CHANNELS];
+
+impl Shader<'_> {
+    /// Adds a volume to the fragments; nothing where it has no optical depth in any of the pixels.
+    #[inline(always)]
+    pub(crate) fn add<S: Simd>(
+        &self,
+        simd: S,
+        reconstructed: &Reconstructed<'_>,
+        place: Place,
+        picture: &Picture,
+        kept: &mut Kept,
+        fragments: &mut Fragments,
+    ) {
+        let medium = self.classify(simd, reconstructed, place, reconstructed.faces);
+        if !Lanes::splat(simd, 0.0).any_less(medium.depth) {
+            return;
+        }
+        let is_first = !fragments.any;
+        fragments.any = true;
+        let mut values_beside_others = [[0.0; MAX_LANES]; MAX_CHANNELS];
+        let values = if is_first { &mut fragments.values } else { &mut values_beside_others };
+        let is_plain = reconstructed.prepared.volume.material.shading == Shading::Unlit && self.layout.count() == 3;
+        if is_plain {
+            for c in 0..3 {
+                (medium.color[c] + Lanes::splat(simd, reconstructed.prepared.volume.material.emission[c]))
+                    .store(&mut values[c]);
+            }
+        } else if !reconstructed.is_part {
+            self.light(simd, reconstructed, place, &medium, values);
+        } else {
+            if kept.is_new(place) {
+                let whole = self.classify(simd, reconstructed, place, reconstructed.prepared.slabs.faces(place.slab));
+                self.light(simd, reconstructed, place, &whole, values);
+                kept.keep::<S>(place, &values[..self.layout.count()]);
+            }
+            kept.recall::<S>(place, &mut values[..self.layout.count()]);
+        }
+        let mut tau = [0.0; MAX_LANES];
+        medium.depth.store(&mut tau);
+        let extinction = reconstructed.prepared.volume.material.extinction_rgb;
+        for p in 0..picture.planes {
+            let values_beside_others = Lanes::load(simd, &tau) * Lanes::splat(simd, extinction[p]);
+            let sum = if is_first {
+                values_beside_others
+            } else {
+                values_beside_others + Lanes::load(simd, &fragments.optical_depth[p])
+            };
+            sum.store(&mut fragments.optical_depth[p]);
+        }
+        if is_first {
+            medium.near.store(&mut fragments.near);
+            medium.far.store(&mut fragments.far);
+            fragments.object = [reconstructed.prepared.volume.object; MAX_LANES];
+        } else {
+            mix(
+                simd,
+                &Shaded { volume: &reconstructed.prepared.volume, tau, values: values_beside_others },
+                &medium,
+                fragments,
+                picture,
+            );
+        }
+    }
+
+    /// The medium of a volume between two depths in its slab: its length within the limits, its class.
+    #[inline(always)]
+    fn classify<S: Simd>(
+        &self,
+        simd: S,
+        reconstructed: &Reconstructed<'_>,
+        place: Place,
+        faces: DepthRange,
+    ) -> Medium<S> {
+        let pixel = place.pixel();
+        let limit = |depths: &[f32]| Lanes::load(simd, &depths[(place.y - 1) * TILE + place.x - 1..]);
+        let near = Lanes::load(simd, &reconstructed.crossings.near[pixel..])
+            .max(limit(reconstructed.limits[0]))
+            .max(Lanes::splat(simd, faces.near));
+        let far = Lanes::load(simd, &reconstructed.crossings.far[pixel..])
+            .min(limit(reconstructed.limits[1]))
+            .min(Lanes::splat(simd, faces.far));
+        let [near, far] = match reconstructed.part {
+            None => [near, far],
+            Some(part) => [near.max(Lanes::load(simd, &part.from)), far.min(Lanes::load(simd, &part.to))],
+        };
+        let length = (far - near).max(Lanes::splat(simd, 0.0));
+        let [value, weight] = self.amid(simd, reconstructed, place);
+        let [extinction, red, green, blue] = match reconstructed.preclassified {
+            None => reconstructed.prepared.classifier.classify(simd, value),
+            Some(classes) => classes.load(simd, place.slab, place.y, place.x),
+        };
+        let secant = self.secants(simd, place);
+        let depth = (extinction * length * secant).where_less(Lanes::splat(simd, LEAST_WEIGHT), weight);
+        Medium { near, far, depth, secant, color: [red, green, blue] }
+    }
+
+    /// The value in the middle of what each ray has of slab and volume, and the kernels' sum. A sheet has that of the middle of its slab; where a
+    /// face of the volume cuts the slab, the sheet to the other side tells how values go on from there. Whether the ray is inside the volume
+    /// there does not count: it may end at the slab's face, before or behind it.
+    #[inline(always)]
+    fn amid<S: Simd>(&self, simd: S, reconstructed: &Reconstructed<'_>, place: Place) -> [Lanes<S>; 2] {
+        let Place { slab, y, x } = place;
+        let [value, weight] = reconstructed.sheets.load(simd, slab, y, x);
+        let slabs = &reconstructed.prepared.slabs;
+        let splat = |v: f32| Lanes::splat(simd, v);
+        let zero = splat(0.0);
+        let faces = slabs.faces(slab);
+        let first = splat(faces.near);
+        let last = splat(faces.far);
+        let near = Lanes::load(simd, &reconstructed.crossings.near[place.pixel()..]).max(first);
+        let far = Lanes::load(simd, &reconstructed.crossings.far[place.pixel()..]).min(last);
+        // Twice as far as the middle lies behind that of the slab.
+        let behind = ((near - first) + (far - last)).where_less(near, far);
+        if !zero.any_less(behind.abs()) {
+            return [value, weight];
+        }
+        let half = splat(0.5 / slabs.width as f32);
+        let least = splat(LEAST_WEIGHT);
+        let towards = |shift: Lanes<S>, slab: u32| {
+            let [v, weight] = reconstructed.sheets.load(simd, slab, y, x);
+            shift.max(zero) * half * (v - value).where_less(least, weight)
+        };
+        let after = towards(behind, slab + 1);
+        let before = towards(zero - behind, slab.max(1) - 1);
+        [value + after + before, weight]
+    }
+
+    /// Length of each ray per unit of view depth.
+    #[inline(always)]
+    fn secants<S: Simd>(&self, simd: S, place: Place) -> Lanes<S> {
+        if self.input.camera.is_orthographic() {
+            return Lanes::splat(simd, 1.0);
+        }
+        let [u, v] = self.slopes(simd, place);
+        u.mul_add(u, v.mul_add(v, Lanes::splat(simd, 1.0))).sqrt()
+    }
+
+    /// x and y per unit of view depth of rays in perspective.
+    #[inline(always)]
+    fn slopes<S: Simd>(&self, simd: S, place: Place) -> [Lanes<S>; 2] {
+        [Lanes::load(simd, &self.slopes.u[place.x..]), Lanes::splat(simd, self.slopes.v[place.y])]
+    }
+
+    /// Where light is asked for: the middle of the medium.
+    #[inline(always)]
+    fn spots<S: Simd>(
+        &self,
+        simd: S,
+        reconstructed: &Reconstructed<'_>,
+        place: Place,
+        medium: &Medium<S>,
+        lane_bits: u32,
+    ) -> Spots<S> {
+        let of_all = |v: f32| Lanes::splat(simd, v);
+        let zero = of_all(0.0);
+        let half = of_all(0.5);
+        let middle = (medium.near + medium.far) * half;
+        let towards = of_all(-1.0) / medium.secant;
+        let to_eye = if self.input.camera.is_orthographic() {
+            [zero, zero, towards]
+        } else {
+            let [u, v] = self.slopes(simd, place);
+            [u * towards, v * towards, towards]
+        };
+        let places = self.slopes.places(simd, Pixel { x: place.x, y: place.y }, middle);
+        let (normal, is_normal) = match &reconstructed.prepared.gradients {
+            Some(gradients) => {
+                unit(simd, &gradients.gradients(simd, &reconstructed.prepared.voxels, &places, lane_bits))
+            }
+            None if reconstructed.prepared.volume.normals => unit(simd, &self.gradient(simd, reconstructed, place)),
+            None => ([zero; 3], zero),
+        };
+        Spots { places, to_eye, normal, is_normal, color: medium.color }
+    }
+
+    /// ∇v in view space, per slab width.
+    #[inline(always)]
+    fn gradient<S: Simd>(&self, simd: S, reconstructed: &Reconstructed<'_>, place: Place) -> [Lanes<S>; 3] {
+        let of_place = |slab: u32, y: usize, x: usize| self.sample(simd, reconstructed, Place { slab, y, x });
+        let Place { slab, y, x } = place;
+        let [value, _] = reconstructed.sheets.load(simd, slab, y, x);
+        let before = if slab > 0 { of_place(slab - 1, y, x) } else { [value, Lanes::splat(simd, 0.0)] };
+        let along = difference(simd, value, before, of_place(slab + 1, y, x));
+        let right = difference(simd, value, of_place(slab, y, x - 1), of_place(slab, y, x + 1));
+        let down = difference(simd, value, of_place(slab, y - 1, x), of_place(slab, y + 1, x));
+        let slabs = &reconstructed.prepared.slabs;
+        let z = slabs.origin + (f64::from(slab) + 0.5) * slabs.width;
+        let pixels = self.input.camera.focal_px() * slabs.width;
+        if self.input.camera.is_orthographic() {
+            let pixels = Lanes::splat(simd, pixels as f32);
+            let right = right * pixels;
+            let up = Lanes::splat(simd, 0.0) - down * pixels;
+            if !self.slopes.slant.is_any() {
+                return [right, up, along];
+            }
+            // Along a slab depth changes, too.
+            let [sx, sy] = self.slopes.slant.single();
+            let [sx, sy] = [Lanes::splat(simd, sx), Lanes::splat(simd, sy)];
+            return [right + sx * along, up + sy * along, along];
+        }
+        let pixels = Lanes::splat(simd, (pixels / z.max(slabs.width * 1e-3)) as f32);
+        let gx = right * pixels;
+        let gy = Lanes::splat(simd, 0.0) - down * pixels;
+        let [u, v] = self.slopes(simd, place);
+        [gx, gy, along - (u * gx + v * gy)]
+    }
+
+    /// Values of a sheet, with 1 where the ray is inside the volume there, else 0.
+    #[inline(always)]
+    fn sample<S: Simd>(&self, simd: S, reconstructed: &Reconstructed<'_>, place: Place) -> [Lanes<S>; 2] {
+        let pixel = place.pixel();
+        let zero = Lanes::splat(simd, 0.0);
+        let one = Lanes::splat(simd, 1.0);
+        let face = |slab: u32| Lanes::splat(simd, reconstructed.prepared.slabs.face(slab));
+        let near = Lanes::load(simd, &reconstructed.crossings.near[pixel..]).max(face(place.slab));
+        let far = Lanes::load(simd, &reconstructed.crossings.far[pixel..]).min(face(place.slab + 1));
+        let [value, weight] = reconstructed.sheets.load(simd, place.slab, place.y, place.x);
+        let inside = one.where_less_or(near, far, zero);
+        [value, inside.where_less(Lanes::splat(simd, LEAST_WEIGHT), weight)]
+    }
+
+    /// All channels of a medium where it is seen, 0 elsewhere.
+    #[inline(always)]
+    fn light<S: Simd>(
+        &self,
+        simd: S,
+        reconstructed: &Reconstructed<'_>,
+        place: Place,
+        medium: &Medium<S>,
+        values: &mut Values,
+    ) {
+        let mut tau = [0.0; MAX_LANES];
+        medium.depth.store(&mut tau);
+        let mut lane_bits = 0;
+        for lane in 0..Lanes::<S>::COUNT {
+            lane_bits |= u32::from(tau[lane] > 0.0) << lane;
+        }
+        let lane_bits = lane_bits & reconstructed.open;
+        self.channels(
+            simd,
+            reconstructed,
+            &self.spots(simd, reconstructed, place, medium, lane_bits),
+            medium,
+            lane_bits,
+            values,
+        );
+        for c in 0..self.layout.count() {
+            // What is not seen may be no number.
+            let zero = Lanes::splat(simd, 0.0);
+            let value = Lanes::load(simd, &values[c]);
+            let least = Lanes::splat(simd, if c < self.layout.colors() { TRACE } else { -1.0 });
+            value.where_less(zero, medium.depth).where_less(least, value.abs()).store(&mut values[c]);
+        }
+    }
+
+    /// The channels of the spots: effects, normals, shadows. Of the lanes that are not `lane_bits` anything.
+    #[inline(always)]
+    fn channels<S: Simd>(
+        &self,
+        simd: S,
+        reconstructed: &Reconstructed<'_>,
+        spots: &Spots<S>,
+        medium: &Medium<S>,
+        lane_bits: u32,
+        values: &mut Values,
+    ) {
+        let volume = &reconstructed.prepared.volume;
+        let radius = reconstructed.prepared.viewed.reach as f32 / 3.0;
+        let reflector = Reflector {
+            material: volume.material,
+            has_normals: volume.normals,
+            spread: radius * radius,
+            shadow_coefficient: volume.shadow_coefficient,
+        };
+        let mut lit = Lit::dark(simd);
+        if volume.material.shading != Shading::Unlit {
+            let shadows = reconstructed.prepared.shadows.as_ref();
+            let shadows = shadows
+                .map(|s| (s, s.neighbours.cells(simd, &reconstructed.prepared.voxels, &spots.places, lane_bits)));
+            let mut through = [Lanes::splat(simd, 1.0); 3];
+            let within = reconstructed.prepared.within.as_ref().zip(shadows.as_ref());
+            let within = within.map(|(within, (shadows, cells))| {
+                (within, cells, parts(shadows.neighbours.lattice_from_place, spots, medium))
+            });
+            for (rank, lamp) in self.lamps.iter().enumerate() {
+                if let Some((shadows, cells)) = &shadows {
+                    through = shadows.transmittance(simd, cells, rank);
+                }
+                if let Some((within, cells, parts)) = &within {
+                    through = within_lanes(simd, through, |shares| within.replace(cells, rank, parts, shares));
+                }
+                reflector.add(simd, lamp, spots, &through, &mut lit);
+            }
+        }
+        let effects = reflector.effects(simd, spots, self.input.ambient, &lit);
+        for c in 0..3 {
+            if self.layout.is_apart() {
+                (0..effects.len()).for_each(|e| effects[e][c].store(&mut values[3 * e + c]));
+            } else {
+                (effects[0][c] + effects[1][c] + effects[2][c] + effects[3][c]).store(&mut values[c]);
+            }
+        }
+        if let Some(first) = self.layout.normal() {
+            for a in 0..3 {
+                let along = |axis: usize| Lanes::splat(simd, self.axes[axis][a]);
+                dot(&spots.normal, &[along(0), along(1), along(2)]).store(&mut values[first + a]);
+            }
+        }
+        if let Some(at) = self.layout.shadow() {
+            lit.shadow(simd).store(&mut values[at]);
+        }
+    }
+}
+
+/// −∇v/|∇v|, and 1 where there is a gradient, else 0.
+#[inline(always)]
+fn unit<S: Simd>(simd: S, gradient: &[Lanes<S>; 3]) -> ([Lanes<S>; 3], Lanes<S>) {
+    let broadcast = |v: f32| Lanes::splat(simd, v);
+    let inverse = broadcast(-1.0) / dot(gradient, gradient).sqrt();
+    let is_normal = broadcast(1.0).where_less(inverse, broadcast(0.0)).where_less(broadcast(-f32::MAX), inverse);
+    let [x, y, z] = [gradient[0] * inverse, gradient[1] * inverse, gradient[2] * inverse];
+    let half = broadcast(0.5);
+    ([x.where_less(half, is_normal), y.where_less(half, is_normal), z.where_less(half, is_normal)], is_normal)
+}
+
+/// Adds a volume to those before it: colours weigh by extinction.
+#[inline(always)]
+fn mix<S: Simd>(simd: S, shaded: &Shaded<'_>, medium: &Medium<S>, fragments: &mut Fragments, picture: &Picture) {
+    let Shaded { volume, tau, values } = shaded;
+    let extinction = volume.material.extinction_rgb;
+    let object = volume.object;
+    let broadcast = |v: f32| Lanes::splat(simd, v);
+    let tau_here = Lanes::load(simd, tau);
+    for c in 0..picture.channels {
+        let p = ChannelLayout::plane_of(c, picture.channels, picture.planes);
+        let whole = Lanes::load(simd, &fragments.optical_depth[p]).max(broadcast(f32::MIN_POSITIVE));
+        let share = tau_here * broadcast(extinction[p]) / whole;
+        let before = Lanes::load(simd, &fragments.values[c]);
+        let shaded = Lanes::load(simd, &values[c]);
+        (shaded - before).mul_add(share, before).store(&mut fragments.values[c]);
+    }
+    let near = Lanes::load(simd, &fragments.near);
+    let far = Lanes::load(simd, &fragments.far);
+    // A volume without optical depth here, before this one, says nothing of where the medium lies.
+    let mut first = [0.0; MAX_LANES];
+    for lane in 0..Lanes::<S>::COUNT {
+        let green = picture.planes / 2;
+        let others = fragments.optical_depth[green][lane] - tau[lane] * extinction[green];
+        first[lane] = if others > 0.0 { 1.0 } else { 0.0 };
+        if others <= 0.0 {
+            fragments.object[lane] = object;
+        }
+    }
+    let half = broadcast(0.5);
+    let first = Lanes::load(simd, &first);
+    let is = medium.near.where_less_or(broadcast(0.0), tau_here, near);
+    let both = near.min(is);
+    is.where_less_or(first, half, both).store(&mut fragments.near);
+    let is = medium.far.where_less_or(broadcast(0.0), tau_here, far);
+    let both = far.max(is);
+    is.where_less_or(first, half, both).store(&mut fragments.far);
+}
+
+/// The parts of the rays of some pixels in their slab, as thick volumes need them.
+#[inline(always)]
+fn parts<S: Simd>(lattice: [[f32; 4]; 3], spots: &Spots<S>, medium: &Medium<S>) -> [RayPart; MAX_LANES] {
+    let mut places = [[0.0; MAX_LANES]; 3];
+    let mut ways = [[0.0; MAX_LANES]; 3];
+    let mut lengths = [0.0; MAX_LANES];
+    let mut depths = [0.0; MAX_LANES];
+    for axis in 0..3 {
+        spots.places[axis].store(&mut places[axis]);
+        spots.to_eye[axis].store(&mut ways[axis]);
+    }
+    ((medium.far - medium.near) * medium.secant).store(&mut lengths);
+    medium.depth.store(&mut depths);
+    std::array::from_fn(|lane| {
+        let place = Vec3::new(places[0][lane], places[1][lane], places[2][lane]);
+        let way = Vec3::new(ways[0][lane], ways[1][lane], ways[2][lane]) * lengths[lane];
+        let row = |axis: usize| Vec3::new(lattice[axis][0], lattice[axis][1], lattice[axis][2]);
+        RayPart {
+            middle: Vec3::from_array([0, 1, 2].map(|axis: usize| row(axis).dot(place) + lattice[axis][3])),
+            to_eye: Vec3::from_array([0, 1, 2].map(|axis: usize| row(axis).dot(way))),
+            length: lengths[lane],
+            optical_depth: depths[lane],
+        }
+    })
+}
+
+/// Shares of some pixels, changed one by one.
+#[inline(always)]
+fn within_lanes<S: Simd>(
+    simd: S,
+    through: [Lanes<S>; 3],
+    change: impl FnOnce(&mut [[f32; MAX_LANES]; 3]),
+) -> [Lanes<S>; 3] {
+    let mut shares = [[0.0; MAX_LANES]; 3];
+    for channel in 0..3 {
+        through[channel].store(&mut shares[channel]);
+    }
+    change(&mut shares);
+    [Lanes::load(simd, &shares[0]), Lanes::load(simd, &shares[1]), Lanes::load(simd, &shares[2])]
+}

@@ -1,0 +1,26 @@
+//! Vectors of neighbouring pixels, lane by lane.
+
+use splat_core::glam::Vec3;
+use splat_core::raster::lanes::Lanes;
+use splat_core::raster::pulp::Simd;
+
+/// A vector on all lanes.
+#[inline(always)]
+pub(crate) fn vector<S: Simd>(simd: S, v: Vec3) -> [Lanes<S>; 3] {
+    [Lanes::splat(simd, v.x), Lanes::splat(simd, v.y), Lanes::splat(simd, v.z)]
+}
+
+#[inline(always)]
+pub(crate) fn dot<S: Simd>(a: &[Lanes<S>; 3], b: &[Lanes<S>; 3]) -> Lanes<S> {
+    a[2].mul_add(b[2], a[1].mul_add(b[1], a[0] * b[0]))
+}
+
+#[inline(always)]
+pub(crate) fn sum<S: Simd>(a: &[Lanes<S>; 3], b: &[Lanes<S>; 3]) -> [Lanes<S>; 3] {
+    [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
+}
+
+#[inline(always)]
+pub(crate) fn difference<S: Simd>(a: &[Lanes<S>; 3], b: &[Lanes<S>; 3]) -> [Lanes<S>; 3] {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
