@@ -54,7 +54,7 @@ pub(crate) fn needed(input: &HalfInput<'_>, params: &HalfParams) -> u64 {
     needed + if input.polygons.is_empty() { 0 } else { polygon_bytes(camera, most_samples(input), params) }
 }
 
-/// Bytes that [`fold`] takes at most for such lights, of which sweeps follow one another; and `mapped` others, whose shadows are known.
+/// Bytes that [`fold`](crate::half::fold) takes at most for such lights, of which sweeps follow one another; and `mapped` others, whose shadows are known.
 pub fn bytes<'l>(
     bodies: &Bodies<'_>,
     camera: &Camera,
@@ -107,7 +107,7 @@ pub fn bytes<'l>(
         + volumes.iter().map(voxels).sum::<u64>()
 }
 
-/// Bytes that [`fold`] takes at most for polygons beside [`bytes`]: buffers of the eye and of one light, of at most so many points; 0 for no
+/// Bytes that [`fold`](crate::half::fold) takes at most for polygons beside [`bytes`]: buffers of the eye and of one light, of at most so many points; 0 for no
 /// light. Lists of translucent ones are [`crate::half::pane_bytes`] and [`crate::half::light_list_bytes`].
 pub fn polygon_bytes(camera: &Camera, samples: u32, params: &HalfParams) -> u64 {
     let pixels: u64 = camera.size.into_iter().map(u64::from).product();

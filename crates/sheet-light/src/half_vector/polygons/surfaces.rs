@@ -31,7 +31,7 @@ pub struct Polygons<'a> {
     pub shadow_coefficient: f32,
     /// Whether it keeps light from others and from itself.
     pub casts_shadow: bool,
-    /// Radius of the splats that stand for it in the shadow maps of [`HalfInput::mapped`], world units, ≥ 0; 0 for none.
+    /// Radius of the splats that stand for it in the shadow maps of [`HalfInput::mapped`](crate::half::HalfInput::mapped), world units, ≥ 0; 0 for none.
     pub radius: f32,
 }
 
