@@ -10,7 +10,7 @@
 
 use convert::{SplatParams, body_centred};
 use organza_benches::{HeadLike, processor_ms, record};
-use sheet_light::{Aligned, Classify, Params, SheetCounts, SheetInput, Volume, prepare};
+use sheet_light::{Aligned, Classify, GatherKernel, Params, Reconstruction, SheetCounts, SheetInput, Volume, prepare};
 use splat_core::glam::DVec3;
 use splat_core::shade::{ChannelLayout, LitBy};
 use splat_core::{
@@ -22,11 +22,12 @@ use std::time::Instant;
 /// Runs each part this often.
 const REPEATS: usize = 7;
 
-/// What a row splats, and how.
+/// What a row splats or reads, and how.
 struct Method<'a> {
     name: &'static str,
     grid: &'a Grid,
     packing: Packing,
+    reconstruction: Reconstruction,
     classify: Classify,
     aligned: Aligned,
     /// Transmittance below which a pixel is done.
@@ -80,12 +81,15 @@ fn main() {
         name: "",
         grid,
         packing: Packing::Cartesian,
+        reconstruction: Reconstruction::Splat,
         classify: Classify::After,
         aligned: Aligned::View,
         cutoff: Params::PAPERS_CUTOFF,
         width: 1.0,
     };
     let methods = [
+        Method { name: " gathered", reconstruction: Reconstruction::Gather(GatherKernel::Gaussian), ..paper },
+        Method { name: " linear", reconstruction: Reconstruction::Gather(GatherKernel::Linear), ..paper },
         Method { name: " bcc", grid: &bcc.planes, packing: Packing::BodyCentred, ..paper },
         Method { name: " before", classify: Classify::Before, ..paper },
         Method { name: " axis", aligned: Aligned::Axis, ..paper },
@@ -131,6 +135,7 @@ fn row(name: &str, [method, paper]: [&Method<'_>; 2], transfer: &TransferFunctio
         ambient: [0.1; 3],
     };
     let params = Params {
+        reconstruction: method.reconstruction,
         classify: method.classify,
         aligned: method.aligned,
         transmittance_cutoff: method.cutoff,

@@ -2,6 +2,7 @@
 
 pub(crate) mod counts;
 pub(crate) mod fold;
+pub(crate) mod gather;
 pub(crate) mod light;
 pub(crate) mod panes;
 pub(crate) mod prepare;

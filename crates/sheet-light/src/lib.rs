@@ -62,7 +62,7 @@ pub use image_aligned::prepared::Sheeted;
 pub use image_aligned::reference;
 pub use shared::error::Error;
 pub use shared::input::{SheetInput, Splats};
-pub use shared::params::{Aligned, Classify, Gradients, KernelShape, Lighting, Params};
+pub use shared::params::{Aligned, Classify, GatherKernel, Gradients, KernelShape, Lighting, Params, Reconstruction};
 pub use shared::sections;
 pub use shared::volume::Volume;
 

@@ -6,6 +6,7 @@ mod centre_order;
 mod clipped;
 mod closed_forms;
 mod common;
+mod gathered;
 mod gradients;
 mod half;
 mod hard_cases;

@@ -15,6 +15,7 @@ const BEFORE: Params = Params { classify: Classify::Before, ..EXACT };
 const ALONG: Params = Params { aligned: Aligned::Axis, ..EXACT };
 const EXACT: Params = Params {
     slab_width: None,
+    reconstruction: sheet_light::Reconstruction::Splat,
     kernel: sheet_light::KernelShape { extent: 2.0, sigma: 0.7 },
     sections: 256,
     accumulation: splat_core::raster::Accumulation::F32,

@@ -18,7 +18,8 @@ use crate::technique::{Asked, Fold, OwnWork, Session};
 use crate::{CostRecord, Error, RenderOptions, memory, stage};
 use sheet_light::half::{HalfParams, pane_bytes, polygon_bytes};
 use sheet_light::{
-    Aligned, Classify, Gradients, KernelShape, Lighting, Params, SheetInput, Sheeted, Splats, Volume, prepare,
+    Aligned, Classify, Gradients, KernelShape, Lighting, Params, Reconstruction, SheetInput, Sheeted, Splats, Volume,
+    prepare,
 };
 use splat_core::{Accumulator, Camera, Direction, Limits, Packing};
 use std::ops::Range;
@@ -241,6 +242,8 @@ fn params(scene: &Scene, exponent: i32, options: &RenderOptions) -> Params {
         slab_width: settings.slab_width.map(|width| width * unit),
         classify: if settings.classify == scene::Classify::Before { Classify::Before } else { Classify::After },
         aligned: if settings.aligned == scene::Aligned::Axis { Aligned::Axis } else { Aligned::View },
+        // No key asks for gathered ones.
+        reconstruction: Reconstruction::Splat,
         kernel: KernelShape { extent: settings.kernel_extent, sigma: settings.kernel_sigma },
         sections: settings.kernel_sections,
         accumulation: settings.accumulation,

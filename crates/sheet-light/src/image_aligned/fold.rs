@@ -1,6 +1,7 @@
 //! The fold of prepared sheets over a range of depths.
 
 use super::counts::SheetCounts;
+use super::gather::Gathered;
 use super::panes::Panes;
 use super::prepared::Sheeted;
 use crate::Error;
@@ -21,7 +22,11 @@ impl Sheeted<'_> {
 
     /// Bytes of what was prepared.
     pub fn bytes(&self) -> u64 {
-        let volumes: u64 = self.volumes.iter().map(|v| v.segments.bytes() + v.voxels.held()).sum();
+        let volumes: u64 = self
+            .volumes
+            .iter()
+            .map(|v| v.segments.bytes() + v.voxels.held() + v.gathered.as_ref().map_or(0, Gathered::bytes))
+            .sum();
         volumes + self.bins.as_ref().map_or(0, Bins::bytes) + self.panes.as_ref().map_or(0, Panes::bytes)
     }
 

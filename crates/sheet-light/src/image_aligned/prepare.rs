@@ -19,13 +19,13 @@ use crate::shared::error::cancelled;
 use crate::shared::gradient_volume::GradientVolume;
 use crate::shared::input::{SheetInput, Splats};
 use crate::shared::lattice::Lattice;
-use crate::shared::params::{Aligned, Classify, Lighting};
+use crate::shared::params::{Aligned, Classify, GatherKernel, Lighting, Reconstruction};
 use crate::shared::shadows::Shadows;
 use crate::shared::slabs::Slabs;
 use crate::shared::voxels::Voxels;
 use crate::{Error, Params};
-use splat_core::Progress;
 use splat_core::shade::ChannelLayout;
+use splat_core::{Packing, Progress};
 
 /// Finds the voxels that may be seen and lists them by tile.
 ///
@@ -44,6 +44,9 @@ pub fn prepare<'a>(input: SheetInput<'a>, params: &Params, progress: Option<&Pro
     progress.add_total(input.volumes.len() as u64);
     let mut volumes = Vec::with_capacity(input.volumes.len());
     for volume in &input.volumes {
+        if params.reconstruction != Reconstruction::Splat && volume.packing != Packing::Cartesian {
+            return Err(Error::parameter("reconstruction", "gathered of a body-centred lattice", "splatted"));
+        }
         let mut prepared = Prepared::new(*volume, &input, params, &slabs, slant, tiles);
         let count = prepared.voxels.count();
         needed += Shadows::bytes(count, &input.lights);
@@ -80,6 +83,12 @@ fn memory(input: &SheetInput<'_>, params: &Params, slabs: &Slabs, tiles: [usize;
         let sums = sums + u64::from(is_near);
         // Lists: four bytes for eight voxels, in two or three tiles each. Records: two of sixteen bytes a voxel of a tile.
         let voxels = dims.iter().map(|n| *n as u64).product::<u64>();
+        if let Reconstruction::Gather(kernel) = params.reconstruction {
+            // A filtered lattice is made of one that is filtered across alone.
+            let copies = if kernel == GatherKernel::Gaussian { 8 } else { 0 };
+            needed += Voxels::bytes(dims) + copies * voxels + threads * (Sheets::bytes() + Kept::bytes(stride));
+            continue;
+        }
         let of_a_tile = voxels.div_ceil((tiles[0] * tiles[1]) as u64) * 4;
         needed += Voxels::bytes(dims)
             + 2 * voxels

@@ -1,5 +1,6 @@
 //! Volumes and a view, ready to be folded.
 
+use super::gather::{Gathered, RIM};
 use super::light::Lamp;
 use super::panes::Panes;
 use super::segments::Segments;
@@ -14,12 +15,12 @@ use crate::shared::input::SheetInput;
 use crate::shared::lattice::Lattice;
 use crate::shared::lattice_rays::LatticeRays;
 use crate::shared::neighbours::Receivers;
-use crate::shared::params::Classify;
+use crate::shared::params::{Classify, Reconstruction};
 use crate::shared::sections::SectionTable;
 use crate::shared::shadows::Shadows;
 use crate::shared::slabs::Slabs;
 use crate::shared::value_range::ValueRange;
-use crate::shared::voxels::Voxels;
+use crate::shared::voxels::{Voxels, without_extinction};
 use crate::{Params, Volume};
 use splat_core::Footprint;
 use splat_core::raster::bins::Bins;
@@ -45,6 +46,8 @@ pub(crate) struct Prepared<'a> {
     pub(crate) rays: LatticeRays,
     pub(crate) voxels: Voxels,
     pub(crate) shadows: Option<Shadows>,
+    /// What its sheets read, where they read the lattice instead of being written by its voxels.
+    pub(crate) gathered: Option<Gathered<'a>>,
     /// Of one whose spacing is optically thick.
     pub(crate) within: Option<Within>,
     /// Where normals come from that.
@@ -86,18 +89,36 @@ impl<'a> Prepared<'a> {
         let camera = input.camera;
         let stride = stride(&volume, input, params, slabs.width);
         let slabs = &slabs.wider(stride);
-        let viewed = Viewed::new(&volume, camera, slabs, params, slant);
-        let lacking = lacking(&volume, camera, slabs, viewed.reach);
-        let reach = viewed.lattice_reach(camera, slabs, params.compares_sheets(&volume));
-        let lattice = Lattice::new(grid, volume.packing, reach);
-        let viewed = viewed.with_rim(lattice.rim);
+        let without_rim = Viewed::new(&volume, camera, slabs, params, slant);
         let transfer = &volume.seen();
-        let near = viewed.near(camera, slabs, &params.kernel, params.compares_sheets(&volume), lacking.is_some());
-        let voxels = Voxels::needed(&lattice, transfer, &near);
-        let segments = Segments::new(&viewed, slabs, &voxels, lattice.dims, tiles);
+        let base = Base::new(ValueRange::of_values(&grid.values), transfer);
+        let compares = params.compares_sheets(&volume);
+        let (lattice, viewed, voxels, segments, gathered, slabs_beside_eye);
+        match params.reconstruction {
+            Reconstruction::Splat => {
+                slabs_beside_eye = lacking(&volume, camera, slabs, without_rim.reach);
+                let reach = without_rim.lattice_reach(camera, slabs, compares);
+                lattice = Lattice::new(grid, volume.packing, reach);
+                viewed = without_rim.with_rim(lattice.rim);
+                let near = viewed.near(camera, slabs, &params.kernel, compares, slabs_beside_eye.is_some());
+                voxels = Voxels::needed(&lattice, &without_extinction(transfer), &near);
+                segments = Segments::new(&viewed, slabs, &voxels, lattice.dims, tiles);
+                gathered = None;
+            }
+            Reconstruction::Gather(kernel) => {
+                let near = kernel.near(without_rim.steps_to_neighbours(camera, slabs, compares));
+                let found;
+                (found, voxels) = Gathered::new(&volume, kernel, transfer, base, &near);
+                lattice = Lattice::new(grid, volume.packing, RIM);
+                viewed = without_rim.with_rim(lattice.rim);
+                segments = Segments::default();
+                gathered = Some(found);
+                // The lattice goes on behind the eye.
+                slabs_beside_eye = None;
+            }
+        }
         let cutoff = params.kernel.extent / params.kernel.sigma;
         let footprint = Footprint { cutoff: cutoff as f32 };
-        let base = Base::new(ValueRange::of_values(&grid.values), transfer);
         Self {
             volume,
             slabs: *slabs,
@@ -114,9 +135,10 @@ impl<'a> Prepared<'a> {
             viewed,
             voxels,
             shadows: None,
+            gathered,
             within: None,
             gradients: None,
-            lacking,
+            lacking: slabs_beside_eye,
             segments,
             base,
         }

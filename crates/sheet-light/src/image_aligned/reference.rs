@@ -1,5 +1,6 @@
 //! The slow form in f64: the same sheets pixel by pixel and slab by slab, without tiles, vectors, rings, lists or skipped voxels.
 
+use super::gather::exact::Exact;
 use super::slant::Slant;
 use super::view_slabs::{slabs_of, stride};
 use super::viewed::{Viewed, eye_of, lacking};
@@ -7,7 +8,7 @@ use crate::image_aligned::tile::near_eye::LEAST_APART;
 use crate::shared::gradient_volume::differences;
 use crate::shared::lattice::Lattice;
 use crate::shared::lattice_rays::{LatticeRays, ViewRay};
-use crate::shared::params::{Classify, Gradients};
+use crate::shared::params::{Classify, Gradients, Reconstruction};
 use crate::shared::sections::{PHASES, sections};
 use crate::shared::slabs::Slabs;
 use crate::{Error, Params, SheetInput, Volume};
@@ -115,6 +116,10 @@ impl Sheets {
             crossings: pixels.map(|pixel| crossing(ray(pixel))).collect(),
             size,
         };
+        if let Reconstruction::Gather(kernel) = params.reconstruction {
+            sheets.gather(&Exact::new(volume, kernel), &rays, ray);
+            return sheets;
+        }
         let viewed = Viewed::new(volume, camera, slabs, params, slant);
         let reach = viewed.lattice_reach(camera, slabs, params.compares_sheets(volume));
         let lattice = Lattice::new(volume.grid, volume.packing, reach);
@@ -136,6 +141,18 @@ impl Sheets {
             sheets.mend(slab);
         }
         sheets
+    }
+
+    /// Reads the lattice at each pixel of each sheet.
+    fn gather(&mut self, lattice: &Exact, rays: &LatticeRays, ray: impl Fn(usize) -> ViewRay) {
+        let pixels = self.size[0] * self.size[1];
+        for slab in 0..self.slabs.count as usize {
+            let depth = (slab as f64 + 0.5) * self.slabs.width;
+            for at in 0..pixels {
+                self.values[slab * pixels + at] = lattice.at(rays.place(ray(at), depth));
+                self.weights[slab * pixels + at] = 1.0;
+            }
+        }
     }
 
     /// Tells the values of a sheet that lacks kernels behind the eye in the middle of its slab, from the place that they are of and from the next sheet.

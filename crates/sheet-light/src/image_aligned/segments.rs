@@ -18,7 +18,7 @@ const PLANES: usize = 4;
 const PLACE_BITS: u32 = 13;
 
 /// Segments by tile.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub(crate) struct Segments {
     chunks: Vec<Chunk>,
     rows: usize,

@@ -307,6 +307,20 @@ impl Viewed {
         })
     }
 
+    /// Lattice steps along each axis within which the places of neighbouring sheets lie, and with `gradient` those of neighbouring pixels.
+    pub(crate) fn steps_to_neighbours(&self, camera: &Camera, slabs: &Slabs, gradient: bool) -> [usize; 3] {
+        let far = slabs.width * f64::from(slabs.count);
+        let pixel = if gradient { 1.0 / self.scale(far).unwrap_or(self.focal) } else { 0.0 };
+        let inverse = self.axes.inverse();
+        let rays = corner_rays(camera);
+        [0, 1, 2].map(|a| {
+            let row = inverse.row(a);
+            let steps = most_along(row, &rays) * slabs.width + row.x.abs().max(row.y.abs()) * pixel;
+            // What lies at a step by rounding does.
+            ((steps - 1e-9).ceil()).clamp(0.0, 1e6) as usize
+        })
+    }
+
     /// Voxels that have a share in anything that a voxel shapes: both have one in a place where a pixel's ray crosses a slab, or in one of those before
     /// and behind it, which tell how values go on at faces and which gradients are taken from; with `gradient` one of the two in the neighbouring
     /// pixels, too. With `is_near`, values near the eye are told from two sheets, and both have a share in these.

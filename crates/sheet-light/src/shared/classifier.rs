@@ -134,6 +134,11 @@ impl Base {
         Self { middle, factor: libm::exp2(factor.into()) }
     }
 
+    /// The middle, and the factor behind it.
+    pub(crate) fn parts(self) -> [f64; 2] {
+        [self.middle, self.factor]
+    }
+
     /// A value less the middle, in the unit of the base.
     #[inline(always)]
     pub(crate) fn relative(self, value: f32) -> f32 {

@@ -102,6 +102,7 @@ pub(crate) fn differences(lattice: &Lattice<'_>, index: [usize; 3]) -> [f64; 3] 
 mod tests {
     use super::*;
     use crate::shared::near::Near;
+    use crate::shared::voxels::without_extinction;
     use splat_core::glam::{DMat3, DQuat};
     use splat_core::raster::pulp;
     use splat_core::{Grid, Material, Similarity, TransferFunction, TransferPoint, rng};
@@ -134,7 +135,7 @@ mod tests {
             casts_shadow: true,
         };
         let lattice = Lattice::new(&grid, packing, [3, 3, 6]);
-        let voxels = Voxels::needed(&lattice, &transfer, &Near::block([2; 3]));
+        let voxels = Voxels::needed(&lattice, &without_extinction(&transfer), &Near::block([2; 3]));
         // Places are those of the field.
         let inverse = axes.inverse();
         let rows = [0, 1, 2].map(|a| [inverse.row(a).x, inverse.row(a).y, inverse.row(a).z, middle[a]]);

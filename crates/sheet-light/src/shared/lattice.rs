@@ -16,7 +16,9 @@ const MOST_PLANES: usize = 2 * MOST_RIM;
 /// A grid with its rim; indices count from the rim's corner.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Lattice<'a> {
-    pub(crate) grid: &'a Grid,
+    /// Without the rim, i fastest.
+    values: &'a [f32],
+    inner: [usize; 3],
     /// Which planes continue which.
     pub(crate) packing: Packing,
     /// Voxels before and behind the grid, by axis.
@@ -26,21 +28,26 @@ pub(crate) struct Lattice<'a> {
 }
 
 /// A share of a lattice point.
-type Term = (f64, usize);
+pub(crate) type Term = (f64, usize);
 
 impl<'a> Lattice<'a> {
     /// Of planes that lie like that, with a rim for kernels that reach so many steps along the axes. Planes of the two lattices of a body-centred
     /// one go on each by itself.
     pub(crate) fn new(grid: &'a Grid, packing: Packing, reach: [usize; 3]) -> Self {
+        Self::over(&grid.values, grid.dims, packing, reach)
+    }
+
+    /// The same of bare values, as a grid holds them.
+    pub(crate) fn over(values: &'a [f32], inner: [usize; 3], packing: Packing, reach: [usize; 3]) -> Self {
         let most = [MOST_RIM, MOST_RIM, if packing == Packing::Cartesian { MOST_RIM } else { MOST_PLANES }];
         let rim = [0, 1, 2].map(|a| reach[a].min(most[a]));
-        Self { grid, packing, rim, dims: [0, 1, 2].map(|a| grid.dims[a] + 2 * rim[a]) }
+        Self { values, inner, packing, rim, dims: [0, 1, 2].map(|a| inner[a] + 2 * rim[a]) }
     }
 
     /// What the place `i` along an axis is made of.
     #[inline(always)]
-    fn terms(&self, axis: usize, i: usize) -> [Term; 2] {
-        let n = self.grid.dims[axis] as isize;
+    pub(crate) fn terms(&self, axis: usize, i: usize) -> [Term; 2] {
+        let n = self.inner[axis] as isize;
         let i = i as isize - self.rim[axis] as isize;
         let last = n - 1;
         if (0..n).contains(&i) {
@@ -63,14 +70,14 @@ impl<'a> Lattice<'a> {
         if let Some(value) = self.inside(i..i + 1, j, k) {
             return value[0];
         }
-        let [nx, ny, _] = self.grid.dims;
+        let [nx, ny, _] = self.inner;
         let mut sum = 0.0;
         for (c, k) in self.terms(2, k) {
             for (b, j) in self.terms(1, j) {
                 for (a, i) in self.terms(0, i) {
                     let share = a * b * c;
                     if share != 0.0 {
-                        sum += share * f64::from(self.grid.values[(k * ny + j) * nx + i]);
+                        sum += share * f64::from(self.values[(k * ny + j) * nx + i]);
                     }
                 }
             }
@@ -81,12 +88,12 @@ impl<'a> Lattice<'a> {
     /// Values of the grid in a row, without the rim, where all of `range` lies inside.
     #[inline(always)]
     pub(crate) fn inside(&self, range: std::ops::Range<usize>, j: usize, k: usize) -> Option<&'a [f32]> {
-        let [nx, ny, nz] = self.grid.dims;
+        let [nx, ny, nz] = self.inner;
         let [ri, rj, rk] = self.rim;
         let is_inside = range.start >= ri && range.end <= ri + nx && j >= rj && j < rj + ny && k >= rk && k < rk + nz;
         is_inside.then(|| {
             let row = ((k - rk) * ny + j - rj) * nx;
-            &self.grid.values[row + range.start - ri..row + range.end - ri]
+            &self.values[row + range.start - ri..row + range.end - ri]
         })
     }
 
@@ -107,7 +114,7 @@ impl<'a> Lattice<'a> {
     pub(crate) fn row(&self, j: usize, k: usize, out: &mut Vec<f32>) {
         out.clear();
         let rim = self.rim[0];
-        let n = self.grid.dims[0];
+        let n = self.inner[0];
         match self.inside(rim..rim + n, j, k) {
             None => out.extend((0..self.dims[0]).map(|i| self.value(i, j, k))),
             Some(values) => {

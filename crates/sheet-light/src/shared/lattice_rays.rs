@@ -65,6 +65,12 @@ impl LatticeRays {
         })
     }
 
+    /// Lattice coordinates of the place on a view ray at a depth that is counted from the origin.
+    #[inline(always)]
+    pub(crate) fn place(&self, ray: ViewRay, depth: f64) -> DVec3 {
+        self.lattice(ray.from + ray.along * (self.origin + depth))
+    }
+
     /// Lattice coordinates of a view position.
     fn lattice(&self, place: DVec3) -> DVec3 {
         self.start + self.lattice_from_view * place

@@ -22,6 +22,25 @@ impl Default for KernelShape {
     }
 }
 
+/// How sheets get their values.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Reconstruction {
+    /// Each voxel adds its kernel to the sheets that it touches (the paper).
+    #[default]
+    Splat,
+    /// Each pixel of a sheet reads the lattice. Of Cartesian lattices, classified afterwards, in slabs across the view.
+    Gather(GatherKernel),
+}
+
+/// What a pixel reads of the lattice around its place.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum GatherKernel {
+    /// Eight voxels, linearly, as most ray casters have it.
+    Linear,
+    /// The paper's kernel, [`KernelShape::default`], as a cubic B-spline over a filtered lattice: 64 voxels, and 4 bytes a voxel beside the file's own values.
+    Gaussian,
+}
+
 /// When values become colours.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Classify {
@@ -70,7 +89,9 @@ pub enum Lighting {
 pub struct Params {
     /// Slab width Δs, world units, > 0; `None` for the least spacing of the volumes along the view.
     pub slab_width: Option<f64>,
-    /// The kernel.
+    /// How sheets get their values.
+    pub reconstruction: Reconstruction,
+    /// The kernel of what is splatted.
     pub kernel: KernelShape,
     /// Sections that are known of a kernel in each slab's width: the places within a slab at which kernels may begin, which theirs are rounded to.
     /// A power of two up to [`PHASES`](crate::shared::sections::PHASES), the default; 64 in the paper.
@@ -110,6 +131,9 @@ impl Params {
         if self.aligned != Aligned::View {
             return Err(Error::parameter("aligned", self.aligned, "View in half-vector sheets"));
         }
+        if self.reconstruction != Reconstruction::Splat {
+            return Err(Error::parameter("reconstruction", self.reconstruction, "Splat in half-vector sheets"));
+        }
         Ok(())
     }
 
@@ -148,6 +172,9 @@ impl Params {
         if !(self.sections.is_power_of_two() && self.sections <= PHASES) {
             return Err(Error::parameter("sections", self.sections, "a power of two up to 256"));
         }
+        if self.reconstruction != Reconstruction::Splat {
+            self.check_gathered()?;
+        }
         if !(0.0..1.0).contains(&self.transmittance_cutoff) {
             return Err(Error::parameter("transmittance_cutoff", self.transmittance_cutoff, "0 to below 1"));
         }
@@ -167,10 +194,33 @@ impl Params {
     }
 }
 
+impl Params {
+    /// That nothing is asked of gathered sheets which splats alone have.
+    fn check_gathered(&self) -> Result<(), Error> {
+        if self.kernel != KernelShape::default() {
+            return Err(Error::parameter("kernel", self.kernel, "that of the paper, or splatted sheets"));
+        }
+        if self.sections != PHASES {
+            return Err(Error::parameter("sections", self.sections, "256, or splatted sheets"));
+        }
+        if self.classify != Classify::After {
+            return Err(Error::parameter("classify", self.classify, "After, or splatted sheets"));
+        }
+        if self.aligned != Aligned::View {
+            return Err(Error::parameter("aligned", self.aligned, "View, or splatted sheets"));
+        }
+        if self.accumulation == Accumulation::F16 {
+            return Err(Error::parameter("accumulation", self.accumulation, "F32, or splatted sheets"));
+        }
+        Ok(())
+    }
+}
+
 impl Default for Params {
     fn default() -> Self {
         Self {
             slab_width: None,
+            reconstruction: Reconstruction::default(),
             kernel: KernelShape::default(),
             sections: PHASES,
             accumulation: Accumulation::F32,

@@ -1,5 +1,6 @@
 //! The values of a volume, from the least to the greatest.
 
+use super::classifier::Base;
 use rayon::prelude::*;
 
 /// Values side by side, so that vectors are compared.
@@ -40,6 +41,11 @@ impl ValueRange {
     /// The least range that holds both.
     fn join(self, other: Self) -> Self {
         Self { least: self.least.min(other.least), greatest: self.greatest.max(other.greatest) }
+    }
+
+    /// The same of values relative to a base.
+    pub(crate) fn relative_to(self, base: Base) -> Self {
+        Self { least: base.relative(self.least), greatest: base.relative(self.greatest) }
     }
 
     /// Whether all of another range lies in this one.

@@ -35,12 +35,13 @@ pub(crate) struct Voxels {
 }
 
 impl Voxels {
-    /// The voxels of `lattice` whose kernels may matter, `near` being the voxels that have a share in anything that one of them shapes.
-    pub(crate) fn needed(lattice: &Lattice<'_>, transfer: &TransferFunction, near: &Near) -> Self {
+    /// The voxels of `lattice` whose kernels may matter, `hidden` being intervals of values that nothing is seen of, and `near` the voxels that have a
+    /// share in anything that one of them shapes.
+    pub(crate) fn needed(lattice: &Lattice<'_>, hidden: &[ValueRange], near: &Near) -> Self {
         let (dims, words) = (lattice.dims, lattice.dims[0].div_ceil(64));
         let mut needed = Self { dims, words, bits: vec![!0; words * dims[1] * dims[2]] };
-        for interval in without_extinction(transfer).into_iter().take(MOST_INTERVALS) {
-            let mut inside = Self::within(lattice, interval);
+        for interval in hidden.iter().take(MOST_INTERVALS) {
+            let mut inside = Self::within(lattice, *interval);
             inside.erode(near);
             needed.bits.iter_mut().zip(&inside.bits).for_each(|(needed, hidden)| *needed &= !hidden);
         }
@@ -293,7 +294,7 @@ mod tests {
         let is_block = |d: DVec3| d.x.abs() <= 2.0 && d.y.abs() <= 1.0 && d.z.abs() <= 3.0;
         type IsNear<'a> = &'a dyn Fn(DVec3) -> bool;
         let cases: [(Near, IsNear<'_>); 2] = [(Near::block([2, 1, 3]), &is_block), (slanted, &is_slanted)];
-        let lattice = Lattice { grid: &grid, packing: Packing::Cartesian, rim: [0; 3], dims };
+        let lattice = Lattice::new(&grid, Packing::Cartesian, [0; 3]);
         for (near, is_near) in cases {
             let voxels_between = |first: [usize; 3], end: [usize; 3]| {
                 let range = move |a: usize| first[a]..end[a].min(dims[a]);
@@ -306,7 +307,7 @@ mod tests {
                 let within = |range: ValueRange| around().all(|v| (range.least..=range.greatest).contains(&value(v)));
                 without_extinction(&tf).into_iter().any(within)
             };
-            let found = Voxels::needed(&lattice, &tf, &near);
+            let found = Voxels::needed(&lattice, &without_extinction(&tf), &near);
             let mut count = 0;
             for c in voxels_between([0; 3], dims) {
                 let [i, j, k] = c;

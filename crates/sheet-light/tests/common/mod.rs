@@ -1,6 +1,6 @@
 //! Volumes, views and pictures for the tests.
 
-use sheet_light::{Error, Lighting, Params, SheetCounts, SheetInput, Volume, prepare};
+use sheet_light::{Error, GatherKernel, Lighting, Params, Reconstruction, SheetCounts, SheetInput, Volume, prepare};
 use splat_core::glam::{DMat3, DVec3, Vec3};
 use splat_core::raster::{self, Detail, ProjectInput, Projected, project};
 use splat_core::shade::{ChannelLayout, LitBy};
@@ -131,6 +131,13 @@ pub(crate) const BEAUTY: ChannelLayout =
 /// No pixel is done before its end.
 pub(crate) fn exact() -> Params {
     Params { transmittance_cutoff: 0.0, ..Params::default() }
+}
+
+/// Parameters with sheets that are splatted, and with sheets that are gathered by each kernel.
+pub(crate) fn forms(params: &Params) -> [Params; 3] {
+    let gathered = [GatherKernel::Linear, GatherKernel::Gaussian].map(Reconstruction::Gather);
+    let [linear, gaussian] = gathered.map(|reconstruction| Params { reconstruction, ..*params });
+    [*params, linear, gaussian]
 }
 
 /// The same with light as the twin takes it.

@@ -7,7 +7,7 @@ use crate::shared::near::Near;
 use crate::shared::neighbours::Receivers;
 use crate::shared::sections::{PHASES, SectionTable};
 use crate::shared::value_range::ValueRange;
-use crate::shared::voxels::Voxels;
+use crate::shared::voxels::{Voxels, without_extinction};
 use crate::{Params, Volume};
 use splat_core::Footprint;
 use splat_core::glam::{DMat3, DVec3};
@@ -100,7 +100,8 @@ impl<'a> Placed<'a> {
     /// The lattice with the rim that kernels reach, and the voxels of it that may matter.
     pub(crate) fn voxels(&self, reach: [usize; 3]) -> (Lattice<'a>, Voxels) {
         let lattice = Lattice::new(self.volume.grid, self.volume.packing, reach);
-        let voxels = Voxels::needed(&lattice, &self.volume.seen(), &Near::block(reach.map(|n| 2 * n)));
+        let voxels =
+            Voxels::needed(&lattice, &without_extinction(&self.volume.seen()), &Near::block(reach.map(|n| 2 * n)));
         (lattice, voxels)
     }
 

@@ -45,12 +45,14 @@ pub(crate) struct VolumeScratch {
     pub(crate) near_eye: Option<Box<NearEye>>,
     /// Batches of its own slabs that are not finished yet.
     pub(crate) batches: Range<u32>,
+    /// Its own slabs that hold anything of it in the tile.
+    pub(crate) active: Range<u32>,
 }
 
 impl Scratch {
     pub(crate) fn new(volumes: &[Prepared<'_>]) -> Self {
         let scratch = |v: &Prepared<'_>| VolumeScratch {
-            ring: Ring::new(v.sections.touched),
+            ring: Ring::new(if v.gathered.is_some() { 0 } else { v.sections.touched }),
             sheets: Sheets::new(),
             crossings: Crossings::new(),
             queue: Queue::new(v),
@@ -58,6 +60,7 @@ impl Scratch {
             preclassified: (v.classify == Classify::Before).then(|| Box::new(Preclassified::new(v.sections.touched))),
             near_eye: v.lacking.as_ref().map(|_| Box::new(NearEye::new(v.sections.touched))),
             batches: 0..0,
+            active: 0..0,
         };
         Self {
             volumes: volumes.iter().map(scratch).collect(),
@@ -107,7 +110,9 @@ impl pulp::WithSimd for FoldTile<'_> {
         let before = self.limits(corner);
         for (prepared, scratch) in sheeted.volumes.iter().zip(&mut self.scratch.volumes) {
             scratch.batches = batches(prepared, &(span.start..span.end.min(before)));
-            scratch.queue.fill(prepared, self.t, &scratch.batches);
+            if prepared.gathered.is_none() {
+                scratch.queue.fill(prepared, self.t, &scratch.batches);
+            }
         }
         let has_splats = self.drawn().is_some_and(|drawn| {
             let form = PixelForm::of_image(self.into);
@@ -115,7 +120,10 @@ impl pulp::WithSimd for FoldTile<'_> {
             self.scratch.splats.begin(drawn, corner, &self.range, form)
         });
         let has_panes = self.scratch.panes.begin(sheeted.panes.as_ref(), corner, &self.range);
-        if !has_splats && !has_panes && self.scratch.volumes.iter().all(|v| v.queue.is_empty()) {
+        let splats_nothing = |(prepared, scratch): (&Prepared<'_>, &VolumeScratch)| {
+            prepared.gathered.is_none() && scratch.queue.is_empty()
+        };
+        if !has_splats && !has_panes && sheeted.volumes.iter().zip(&self.scratch.volumes).all(splats_nothing) {
             counts.tiles_skipped = 1;
             return (None, counts);
         }
@@ -125,6 +133,10 @@ impl pulp::WithSimd for FoldTile<'_> {
         }
         for (prepared, scratch) in sheeted.volumes.iter().zip(&mut self.scratch.volumes) {
             scratch.begin(prepared, &slopes);
+        }
+        if !has_splats && !has_panes && self.scratch.volumes.iter().all(|v| v.active.is_empty()) {
+            counts.tiles_skipped = 1;
+            return (None, counts);
         }
         self.sweep(simd, &slopes, span, &mut picture, &mut counts);
         let Scratch { panes, fragments, .. } = &mut *self.scratch;
@@ -142,8 +154,12 @@ impl VolumeScratch {
         self.kept.clear();
         self.preclassified.iter_mut().for_each(|p| p.clear());
         self.near_eye.iter_mut().for_each(|n| n.clear());
+        self.active = match prepared.gathered {
+            Some(_) => self.crossings.slabs(&prepared.slabs),
+            None => self.queue.active.clone(),
+        };
         // Nothing begins before.
-        self.batches.start = self.batches.start.max(self.queue.active.start / BATCH);
+        self.batches.start = self.batches.start.max(self.active.start / BATCH);
     }
 }
 

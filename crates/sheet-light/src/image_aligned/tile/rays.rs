@@ -9,6 +9,7 @@ use splat_core::Camera;
 use splat_core::glam::DVec3;
 use splat_core::raster::lanes::{Lanes, MAX_LANES};
 use splat_core::raster::pulp::Simd;
+use std::ops::Range;
 
 /// View depths between which each ray is inside, counted from the first slab; beyond each other where it is not. The rim of the
 /// tile is included.
@@ -107,6 +108,20 @@ impl Slopes {
 impl Crossings {
     pub(crate) fn new() -> Self {
         Self { near: vec![0.0; AREA + MAX_LANES], far: vec![0.0; AREA + MAX_LANES] }
+    }
+
+    /// The slabs between the nearest and the farthest place that any ray is inside at.
+    pub(crate) fn slabs(&self, slabs: &Slabs) -> Range<u32> {
+        let mut near = f32::INFINITY;
+        let mut far = f32::NEG_INFINITY;
+        for (from, to) in self.near[..AREA].iter().zip(&self.far[..AREA]).filter(|(from, to)| from < to) {
+            (near, far) = (near.min(*from), far.max(*to));
+        }
+        if near > far {
+            return 0..0;
+        }
+        let slab = |depth: f32| (f64::from(depth) / slabs.width).clamp(0.0, f64::from(slabs.count - 1)) as u32;
+        slab(near)..slab(far) + 1
     }
 
     /// Those of a tile, in the slabs of a volume.

@@ -14,6 +14,7 @@ use super::size::TILE;
 use super::splat_sheet::SplatSheet;
 use super::waiting_panes::NthPane;
 use crate::image_aligned::counts::SheetCounts;
+use crate::image_aligned::gather::SheetLines;
 use crate::image_aligned::prepared::{Prepared, Sheeted};
 use crate::shared::depths::{DepthRange, DepthSpans};
 use crate::shared::pixel::Pixel;
@@ -30,7 +31,7 @@ impl VolumeScratch {
     #[inline(always)]
     fn own_slab(&self, prepared: &Prepared<'_>, slab: u32) -> Option<u32> {
         let slab_of_volume = slab / prepared.stride;
-        self.queue.active.contains(&slab_of_volume).then_some(slab_of_volume)
+        self.active.contains(&slab_of_volume).then_some(slab_of_volume)
     }
 
     /// Whether the sheet there, or the next one, which tells how values go on, is not finished. Beside the eye the next one needs another.
@@ -44,11 +45,23 @@ impl VolumeScratch {
 
     /// Splats and finishes the next batch of sheets.
     #[inline(always)]
-    fn finish<S: Simd>(&mut self, simd: S, prepared: &Prepared<'_>, picture: &Picture, counts: &mut SheetCounts) {
+    fn finish<S: Simd>(
+        &mut self,
+        simd: S,
+        prepared: &Prepared<'_>,
+        slopes: &Slopes,
+        picture: &Picture,
+        counts: &mut SheetCounts,
+    ) {
         let batch = self.batches.start;
         self.batches.start += 1;
-        let splatter = prepared.splatter();
         let mask = picture.mask(prepared.volume.normals && prepared.gradients.is_none());
+        if let Some(gathered) = &prepared.gathered {
+            let lines = SheetLines { rays: &prepared.rays, slopes, slabs: &prepared.slabs, crossings: &self.crossings };
+            counts.fragments += gathered.batch(simd, &lines, batch, &mask, &mut self.sheets);
+            return;
+        }
+        let splatter = prepared.splatter();
         let is_near = |lacking: &Range<u32>| batch <= lacking.end / BATCH;
         let mut near_eye = self.near_eye.as_deref_mut().filter(|_| prepared.lacking.as_ref().is_some_and(is_near));
         for record in self.queue.take(prepared, batch, picture.corner) {
@@ -105,7 +118,7 @@ impl FoldTile<'_> {
                 if left.iter().all(|row| *row == 0) {
                     return;
                 }
-                self.finish(simd, slab, picture, counts);
+                self.finish(simd, shader.slopes, slab, picture, counts);
             }
             let end = self.next_face(slab, span.end);
             self.shade(simd, &shader, slab..end, picture, counts);
@@ -121,10 +134,10 @@ impl FoldTile<'_> {
 
     /// Finishes the sheets that are needed.
     #[inline(always)]
-    fn finish<S: Simd>(&mut self, simd: S, slab: u32, picture: &Picture, counts: &mut SheetCounts) {
+    fn finish<S: Simd>(&mut self, simd: S, slopes: &Slopes, slab: u32, picture: &Picture, counts: &mut SheetCounts) {
         for (prepared, scratch) in self.sheeted.volumes.iter().zip(&mut self.scratch.volumes) {
             while scratch.needs(prepared, slab) {
-                scratch.finish(simd, prepared, picture, counts);
+                scratch.finish(simd, prepared, slopes, picture, counts);
             }
         }
     }
@@ -134,7 +147,7 @@ impl FoldTile<'_> {
         let mut next = end;
         for (prepared, scratch) in self.sheeted.volumes.iter().zip(&self.scratch.volumes) {
             let slab_of_volume = slab / prepared.stride;
-            let active = &scratch.queue.active;
+            let active = &scratch.active;
             if slab_of_volume < active.end {
                 next = next.min(active.start.max(slab_of_volume + 1).saturating_mul(prepared.stride));
             }
