@@ -72,7 +72,7 @@ pub struct Planned<'a> {
 }
 
 /// Draws a planned scene by the processor alone, and keeps the layers that it asks for. The passes that ran are added to `cost`.
-/// That it may take long is not announced.
+/// A long drawing is not announced: a comparison draws many.
 ///
 /// # Errors
 /// As [`crate::render`]; [`Error::Cancelled`] also where a random technique was interrupted between its sets.

@@ -32,7 +32,7 @@ struct Leaf {
     at: [Lanes; 3],
 }
 
-/// What lies in a leaf or in a node.
+/// The box around the points of a leaf or of a node.
 #[derive(Debug, Clone, Copy)]
 struct Box3 {
     bounds: Aabb,
@@ -97,7 +97,7 @@ impl Leaf {
         leaf
     }
 
-    /// Of those of its points that `counts` names.
+    /// The box around the points that `counts` picks.
     #[inline(always)]
     fn bounds(&self, counts: &[bool; WIDTH]) -> Aabb {
         let mut bounds = Aabb::EMPTY;
@@ -153,7 +153,7 @@ pub(crate) struct Tree {
     points: usize,
     /// The ids of the points leaf by leaf.
     order: Vec<u32>,
-    /// What differences of coordinates in leaves and boxes are multiplied by to be at most about 1.
+    /// Factor that makes the largest difference of coordinates about 1.
     unit: f32,
 }
 
@@ -178,7 +178,7 @@ pub(crate) struct Nearest {
     asks: [bool; WIDTH],
     /// Of the points that ask.
     bounds: Aabb,
-    /// What differences of coordinates are multiplied by.
+    /// Factor that differences of coordinates are multiplied by.
     unit: f32,
     /// Bits of the squared distances of the k-th neighbours, −1 for a point that does not ask, and the largest of these distances.
     limits: [i32; WIDTH],
@@ -251,7 +251,7 @@ impl Tree {
         self.order[slot] as usize
     }
 
-    /// What was found leaf by leaf, `of_each` items a point, in the order of the points.
+    /// Puts results, `of_each` a point, from the order of leaves into that of points.
     pub(crate) fn by_point<T: Copy + Default + Send + Sync>(&self, by_slot: Vec<T>, of_each: usize) -> Vec<T> {
         if of_each == 0 {
             return by_slot;
@@ -344,7 +344,7 @@ impl Tree {
             }
             let distances =
                 self.levels[level as usize - 1][index as usize].distances_squared(&nearest.bounds, nearest.unit);
-            // What is added last is looked into first: the nearest box, then those with the least ids.
+            // The stack gives back the last box first: so the nearest one goes on last, and before it those with the least ids.
             let mut nearest_slot = 0;
             for slot in 1..WIDTH {
                 if distances[slot] < distances[nearest_slot] {

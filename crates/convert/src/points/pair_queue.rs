@@ -24,11 +24,11 @@ pub(crate) struct Led {
     pub(crate) place: u32,
 }
 
-/// See the head of this file.
+/// Pairs by how much they disagree: boxes, of which the one that is taken from is a heap.
 pub(crate) struct PairQueue {
-    /// What was taken from last, or may be taken from next.
+    /// By box: pairs in order.
     heaps: Vec<BinaryHeap<Reverse<Led>>>,
-    /// What has come since.
+    /// By box: pairs that came after its heap was made.
     loose: Vec<Vec<Led>>,
     /// A bit for each box, set while it has something.
     filled: [u64; 64],

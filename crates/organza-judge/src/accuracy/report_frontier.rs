@@ -10,7 +10,7 @@ use std::fmt::Write;
 pub(super) const RULE: &str = "The pale line is the frontier: from the most accurate setting on, what is faster than the last one on it \
                                by more than 10 %. Errors that are equal to two digits, or within the noise of random settings, count as one.";
 
-/// What settings are judged by.
+/// The picture that errors of settings are counted from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Against {
     Limit,

@@ -186,7 +186,7 @@ fn unresolved(message: impl Into<String>, hint: impl Into<String>) -> Error {
 
 /// What may be on a frontier by the limit; ids are places in `outcomes`.
 pub(super) fn candidates<'a>(outcomes: impl Iterator<Item = &'a Outcome>) -> Vec<Candidate> {
-    // What cannot be told from the limit is as exact as the limit.
+    // A picture that cannot be told from the limit has no error that could be shown.
     let error = |o: &Outcome| o.from_limit.as_ref().map(|d| if o.drawn { d.linear.rmse } else { 0.0 });
     let half_width = |o: &Outcome| o.sampled.map(|s| s.from_limit.half_width);
     candidates_by(outcomes, error, half_width)

@@ -21,6 +21,7 @@ use crate::shared::near::Near;
 use crate::shared::params::GatherKernel;
 use crate::shared::slabs::{BATCH, Slabs};
 use crate::shared::value_range::ValueRange;
+use crate::shared::vectors::{COUNTING, NATURAL};
 use crate::shared::voxels::{Voxels, without_extinction};
 use bricks::{Box3, Bricks};
 use rayon::prelude::*;
@@ -32,12 +33,6 @@ use std::borrow::Cow;
 
 /// Voxels around the lattice that continue its values: kernels of places in the outermost cells reach them.
 pub(crate) const RIM: [usize; 3] = [2; 3];
-
-/// 2²³, from which on floats are natural numbers.
-const NATURAL: f32 = 8_388_608.0;
-
-/// 0, 1, 2 …
-const COUNTING: [f32; MAX_LANES] = [0., 1., 2., 3., 4., 5., 6., 7., 8., 9., 10., 11., 12., 13., 14., 15.];
 
 /// A lattice that sheets read.
 pub(crate) struct Gathered<'a> {
@@ -203,6 +198,37 @@ impl<'a> Gathered<'a> {
         tags
     }
 
+    /// The first voxels of the cells of places, which are counted from `start`, and how far behind these the places lie along each axis: in \[0, 1\], and
+    /// farther before the first cell and behind the `last` where the lattice goes on as they do.
+    #[inline(always)]
+    fn cells<S: Simd>(
+        &self,
+        simd: S,
+        start: usize,
+        places: &[Lanes<S>; 3],
+        last: &[f32; 3],
+    ) -> ([usize; MAX_LANES], [Lanes<S>; 3]) {
+        let natural = Lanes::splat(simd, NATURAL);
+        let outside = self.kernel.outside();
+        let mut parts = *places;
+        let mut firsts = [start; MAX_LANES];
+        let mut stride = 1;
+        for a in 0..3 {
+            let place = places[a].max(Lanes::splat(simd, -outside)).min(Lanes::splat(simd, last[a] + 1.0 + outside));
+            // Half a step less, rounded: the voxel before, and for a place at a voxel that or the one before it.
+            let rounded = (place - Lanes::splat(simd, 0.5)) + natural;
+            let cell = rounded.max(natural).min(Lanes::splat(simd, NATURAL + last[a]));
+            parts[a] = place - (cell - natural);
+            let mut stored = [0.0f32; MAX_LANES];
+            cell.store(&mut stored);
+            for lane in 0..Lanes::<S>::COUNT {
+                firsts[lane] += stride * (stored[lane].to_bits() - NATURAL.to_bits()) as usize;
+            }
+            stride *= self.stored[a];
+        }
+        (firsts, parts)
+    }
+
     /// Linear between the eight voxels around each place; `start` is the voxel that places are counted from.
     #[inline(always)]
     fn linear<S: Simd>(
@@ -214,13 +240,10 @@ impl<'a> Gathered<'a> {
         out: &mut [f32; MAX_LANES],
     ) {
         let [nx, ny, _] = self.stored;
-        let (cells, parts) = cells(simd, places, last, self.kernel.outside());
+        let (firsts, parts) = self.cells(simd, start, places, last);
         let mut corners = [[0.0; MAX_LANES]; 8];
         for lane in 0..Lanes::<S>::COUNT {
-            let i = cells[0][lane] as usize;
-            let j = cells[1][lane] as usize;
-            let k = cells[2][lane] as usize;
-            let here = start + (k * ny + j) * nx + i;
+            let here = firsts[lane];
             for (row, at) in [here, here + nx, here + nx * ny, here + nx * ny + nx].into_iter().enumerate() {
                 let pair = &self.values[at..at + 2];
                 corners[2 * row][lane] = pair[0];
@@ -247,7 +270,7 @@ impl<'a> Gathered<'a> {
         out: &mut [f32; MAX_LANES],
     ) {
         let [nx, ny, _] = self.stored;
-        let (cells, parts) = cells(simd, places, last, self.kernel.outside());
+        let (firsts, parts) = self.cells(simd, start, places, last);
         let mut weights = [[[0.0; MAX_LANES]; 4]; 3];
         for a in 0..3 {
             let [first, second, third, fourth] = spline(simd, parts[a]);
@@ -257,10 +280,7 @@ impl<'a> Gathered<'a> {
             fourth.store(&mut weights[a][3]);
         }
         for lane in 0..Lanes::<S>::COUNT {
-            let i = cells[0][lane] as usize;
-            let j = cells[1][lane] as usize;
-            let k = cells[2][lane] as usize;
-            let corner = start + (k * ny + j) * nx + i - (nx * ny + nx + 1);
+            let corner = firsts[lane] - (nx * ny + nx + 1);
             let mut sums = [0.0f32; 4];
             for k in 0..4 {
                 let mut plane = [0.0f32; 4];
@@ -351,33 +371,6 @@ impl SheetLines<'_> {
     fn place(&self, slab: u32, x: usize, y: usize) -> DVec3 {
         self.rays.place(self.slopes.ray(x, y), (f64::from(slab) + 0.5) * self.slabs.width)
     }
-}
-
-/// The cells of places along each axis, from 0 to `last`, and how far behind their first voxel these lie: in \[0, 1\], and up to `outside` steps before and
-/// behind the first and the last of them.
-#[inline(always)]
-fn cells<S: Simd>(
-    simd: S,
-    places: &[Lanes<S>; 3],
-    last: &[f32; 3],
-    outside: f32,
-) -> ([[u32; MAX_LANES]; 3], [Lanes<S>; 3]) {
-    let natural = Lanes::splat(simd, NATURAL);
-    let mut cells = [[0; MAX_LANES]; 3];
-    let mut parts = *places;
-    for a in 0..3 {
-        let place = places[a].max(Lanes::splat(simd, -outside)).min(Lanes::splat(simd, last[a] + 1.0 + outside));
-        // Half a step less, rounded: the voxel before, and for a place at a voxel that or the one before it.
-        let rounded = (place - Lanes::splat(simd, 0.5)) + natural;
-        let cell = rounded.max(natural).min(Lanes::splat(simd, NATURAL + last[a]));
-        parts[a] = place - (cell - natural);
-        let mut stored = [0.0f32; MAX_LANES];
-        cell.store(&mut stored);
-        for lane in 0..Lanes::<S>::COUNT {
-            cells[a][lane] = stored[lane].to_bits() - NATURAL.to_bits();
-        }
-    }
-    (cells, parts)
 }
 
 /// The values of a lattice with its rim.

@@ -27,7 +27,7 @@ use splat_core::raster::bins::Bins;
 use splat_core::raster::kernel::Kernel;
 use std::ops::Range;
 
-/// One volume, ready to be splatted.
+/// One volume, ready for its sheets.
 pub(crate) struct Prepared<'a> {
     pub(crate) volume: Volume<'a>,
     /// Its own slabs.

@@ -1,5 +1,6 @@
 //! The needed voxels around places, and how much each of them counts: trilinear in the lattice.
 
+use super::vectors::NATURAL;
 use super::voxels::{VoxelPair, Voxels};
 use crate::Volume;
 use splat_core::Packing;
@@ -28,9 +29,6 @@ pub(crate) struct Neighbours {
     /// From the places that are asked for to lattice coordinates that count from the rim.
     pub(crate) lattice_from_place: [[f32; 4]; 3],
 }
-
-/// 2²³, from which on floats are natural numbers.
-const NATURAL: f32 = 8_388_608.0;
 
 /// Needed voxels around places: by lane, row by row of two voxels, which they are among all of them, and their weights.
 pub(crate) struct Cells {

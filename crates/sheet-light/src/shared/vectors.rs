@@ -1,8 +1,14 @@
 //! Vectors of neighbouring pixels, lane by lane.
 
 use splat_core::glam::Vec3;
-use splat_core::raster::lanes::Lanes;
+use splat_core::raster::lanes::{Lanes, MAX_LANES};
 use splat_core::raster::pulp::Simd;
+
+/// 2²³, from which on floats are natural numbers.
+pub(crate) const NATURAL: f32 = 8_388_608.0;
+
+/// 0, 1, 2 …
+pub(crate) const COUNTING: [f32; MAX_LANES] = [0., 1., 2., 3., 4., 5., 6., 7., 8., 9., 10., 11., 12., 13., 14., 15.];
 
 /// A vector on all lanes.
 #[inline(always)]

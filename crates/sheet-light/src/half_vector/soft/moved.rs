@@ -2,23 +2,13 @@
 
 use super::penumbra::Shift;
 use crate::half_vector::slicing::band::ROWS;
+use crate::shared::vectors::COUNTING;
 use splat_core::raster::lanes::{Lanes, MAX_LANES};
 use splat_core::raster::pulp::Simd;
 use std::ops::Range;
 
 /// Pixels before and behind each stored row, all 0, so that vectors may run over its ends.
 pub(crate) const PAD: usize = 2 * MAX_LANES;
-
-/// 0, 1, 2, …
-const COUNTING: [f32; MAX_LANES] = {
-    let mut out = [0.0; MAX_LANES];
-    let mut n = 0;
-    while n < MAX_LANES {
-        out[n] = n as f32;
-        n += 1;
-    }
-    out
-};
 
 /// Most pixels of a row that a vector lies between, and most rows that [`ROWS`] rows do.
 const TAPS: usize = MAX_LANES + 4;

@@ -12,6 +12,7 @@ use crate::image_aligned::viewed::{PixelFootprint, Viewed};
 use crate::shared::sections::{PHASES, SectionTable};
 use crate::shared::slabs::BATCH;
 use crate::shared::sums::rounded;
+use crate::shared::vectors::COUNTING;
 use splat_core::raster::kernel::Kernel;
 use splat_core::raster::lanes::{Lanes, MAX_LANES};
 use splat_core::raster::pulp::Simd;
@@ -85,9 +86,6 @@ impl Taper {
         Self { sharpness: q as f32, polynomial: powers.map(|c| (rim * c) as f32) }
     }
 }
-
-/// 0, 1, 2 …
-const COUNTING: [f32; MAX_LANES] = [0., 1., 2., 3., 4., 5., 6., 7., 8., 9., 10., 11., 12., 13., 14., 15.];
 
 impl Ring {
     /// Lines a pixel for kernels that touch so many slabs.
