@@ -3,6 +3,9 @@
 use super::ledger::{Ledger, Row, Verdict};
 use std::fmt::Write as _;
 
+/// The folder of pictures, as rows name it.
+const PICTURES: &str = "docs/images/";
+
 /// The whole page.
 pub(crate) fn page(ledgers: &[Ledger]) -> String {
     let mut out = String::from(
@@ -31,10 +34,28 @@ fn line(row: &Row) -> String {
         [] => "—".to_owned(),
         _ => list.iter().map(|n| format!("`{n}`")).collect::<Vec<_>>().join(", "),
     };
-    let cells =
-        [&row.id, &row.claim, &names(&row.code), &names(&row.tests), &row.ours, row.verdict.words(), &row.reason]
-            .map(|cell: &str| cell.replace('|', "\\|"));
+    let ours = with_links(&row.ours);
+    let reason = with_links(&row.reason);
+    let cells = [&row.id, &row.claim, &names(&row.code), &names(&row.tests), &ours, row.verdict.words(), &reason]
+        .map(|cell: &str| cell.replace('|', "\\|"));
     format!("| {} |\n", cells.join(" | "))
+}
+
+/// A cell with a link for each picture that it names. The page lies in `docs`, so links begin at `images`.
+fn with_links(cell: &str) -> String {
+    let mut linked = String::new();
+    let mut rest = cell;
+    while let Some(at) = rest.find(PICTURES) {
+        let after = &rest[at + PICTURES.len()..];
+        let is_in_name = |c: char| c.is_ascii_alphanumeric() || matches!(c, '-' | '_' | '.');
+        let end = after.find(|c: char| !is_in_name(c)).unwrap_or(after.len());
+        // A name may end a sentence.
+        let name = after[..end].trim_end_matches('.');
+        let _ = write!(linked, "{}[{name}](images/{name})", &rest[..at]);
+        rest = &after[name.len()..];
+    }
+    linked.push_str(rest);
+    linked
 }
 
 #[cfg(test)]
@@ -48,5 +69,11 @@ mod tests {
         let page = page(&[Ledger::parse("p", text).expect("well formed")]);
         assert!(page.ends_with("| Eq. 1 | a \\| b | `x.rs::f`, `y.rs` | — | 2 | holds | r |\n"), "{page}");
         assert!(page.contains("## A (2007): T\n\nN\n\n1 rows: 1 holds, 0 differs"), "{page}");
+    }
+
+    #[test]
+    fn a_picture_becomes_a_link() {
+        assert_eq!(with_links("left of docs/images/a-b.png."), "left of [a-b.png](images/a-b.png).");
+        assert_eq!(with_links("no picture"), "no picture");
     }
 }
