@@ -84,7 +84,8 @@ mod tests {
         let files = [&files[..], &[("fuzz/Cargo.toml", &fuzz)]].concat();
         let files: Vec<(&str, &str)> = files.iter().map(|(path, text)| (*path, text.as_str())).collect();
         let repo = Repo::of(&files);
-        let paths = ["crates/tsm/src/lookup.rs", "tests/gpu/lib.rs", "fuzz/src/lib.rs", "README.md"].map(str::to_owned);
+        let paths =
+            ["crates/tsm/src/reading/lookup.rs", "tests/gpu/lib.rs", "fuzz/src/lib.rs", "README.md"].map(str::to_owned);
         let found = packages(&repo, &paths);
         assert_eq!(found.iter().collect::<Vec<_>>(), ["gpu-conformance", "organza-tsm"]);
         let Work::Cargo(runs, _) = &steps(&found).pop().expect("steps").work else { panic!("tests are run by cargo") };

@@ -1,8 +1,8 @@
 //! `organza accuracy`.
 
 use super::args::AccuracyArguments;
-use super::bar::with_bar;
 use super::console;
+use super::console::bar::with_bar;
 use super::session::{in_folder, load_scene, path_text, processor_only, refuse_technique_and_layers, render_options};
 use organza::output::Target;
 use organza::scene::Scene;

@@ -1,5 +1,8 @@
 //! stdout and stderr that survive a closed pipe.
 
+pub(super) mod bar;
+pub(super) mod signals;
+
 use organza::{Error, escape_controls, printable};
 use serde_json::json;
 use std::io::{self, ErrorKind, IsTerminal, Write};

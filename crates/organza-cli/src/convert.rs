@@ -1,8 +1,8 @@
 //! `organza convert`.
 
 use super::args::{ConvertArguments, SceneArguments};
-use super::bar::with_bar;
 use super::console;
+use super::console::bar::with_bar;
 use super::given::given;
 use super::session::{parse_scene, path_text, processor_only, render_options, unused_goal};
 use organza::output::{Target, Targets};

@@ -1,7 +1,7 @@
 //! `organza explain`.
 
 use super::args::{ExplainArguments, SceneArguments};
-use super::bar::with_bar;
+use super::console::bar::with_bar;
 use super::given::{Given, given};
 use super::machine::rates;
 use super::session::{

@@ -1,8 +1,8 @@
 //! `organza extract`: the surface that a light of a scene sees first, straight from its shadow map (Gunjee 2007, Figure 15 a).
 
 use super::args::ExtractArguments;
-use super::bar::with_bar;
 use super::console;
+use super::console::bar::with_bar;
 use super::convert::begin;
 use super::session::{path_text, render_options};
 use organza::scene::{ExtractSource, MOST_ABSORBANCE, Scene};

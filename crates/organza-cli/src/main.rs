@@ -8,7 +8,6 @@
 
 mod accuracy;
 mod args;
-mod bar;
 mod calibrate;
 mod console;
 mod convert;
@@ -26,7 +25,6 @@ mod passport;
 mod render;
 mod report;
 mod session;
-mod signals;
 
 use args::{Arguments, Command};
 use clap::Parser;
@@ -35,7 +33,7 @@ use std::panic::{self, AssertUnwindSafe};
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    signals::block_ignored();
+    console::signals::block_ignored();
     ExitCode::from(guard(|| {
         let arguments = match Arguments::try_parse() {
             Ok(arguments) => arguments,
@@ -65,8 +63,8 @@ fn without_floods(message: &str) -> String {
 
 /// The exit code of a command that has said what it had to say.
 fn run(command: Command) -> Result<u8, Error> {
-    signals::listen()?;
-    signals::end_aborts_as_limits()?;
+    console::signals::listen()?;
+    console::signals::end_aborts_as_limits()?;
     match command {
         Command::Render(arguments) => return render::run(&arguments),
         Command::Init(arguments) => init::run(&arguments),

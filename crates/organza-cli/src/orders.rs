@@ -1,8 +1,8 @@
 //! `organza orders`.
 
 use super::args::OrdersArguments;
-use super::bar::with_bar;
 use super::console;
+use super::console::bar::with_bar;
 use super::session::{in_folder, load_scene, path_text, processor_only, refuse_technique_and_layers, render_options};
 use organza::{Error, printable};
 use organza_judge::accuracy;

@@ -1,7 +1,7 @@
 //! `organza render`.
 
 use super::args::{GoalArguments, RenderArguments};
-use super::bar::with_bar;
+use super::console::bar::with_bar;
 use super::jobs::{Drawing, Jobs, Places};
 use super::machine::rates;
 use super::session::{open_device, path_text, processor_only, render_options, without_effect};

@@ -5,6 +5,7 @@
 
 mod effects;
 mod passes;
+pub(crate) mod settle;
 
 pub(crate) use effects::{displayed, plan, technique_effect};
 

@@ -7,6 +7,7 @@ mod extent;
 pub(crate) mod grouped;
 mod light;
 mod lists;
+pub(crate) mod matter;
 mod on_device;
 mod polygons;
 mod splats;
@@ -19,8 +20,8 @@ pub use splats::Shaded;
 pub(crate) use splats::record;
 
 use crate::device::Helper;
+use crate::frame::matter::Matter;
 use crate::load::Loaded;
-use crate::matter::Matter;
 use crate::plan::Plan;
 use crate::scene::{LightPoint, RenderSettings, Scene};
 use crate::{Error, Progress};

@@ -31,7 +31,6 @@
 #![forbid(unsafe_code)]
 
 mod brightness;
-mod carried;
 mod choose;
 pub mod cost;
 mod doubts;
@@ -40,8 +39,6 @@ mod error;
 mod form;
 mod frame;
 mod load;
-mod matter;
-mod media;
 mod memory;
 mod options;
 pub mod pass;
@@ -50,8 +47,6 @@ mod predict;
 mod prepare;
 mod ranges;
 mod render;
-mod sequence;
-mod settle;
 mod shadows;
 mod stage;
 pub mod statistics;
@@ -70,8 +65,8 @@ pub use organza_scene as scene;
 pub use organza_scene::{InMemory, SourceData, escape_controls, printable, shown};
 pub use prepare::{Explanation, explain, explain_from, fitted, load, plan_loaded, same_splats, seen, settled};
 pub use render::budget::{Expected, ExpectedError, GivenUp, WithinGoal, render_within};
+pub use render::sequence::Sequence;
 pub use render::{Render, render, render_from};
-pub use sequence::Sequence;
 pub use shadows::{ShadowTable, shadow_params};
 pub use splat_core::{CostRecord, Layers, Progress};
 pub use statistics::{Conversion, SplatCount};

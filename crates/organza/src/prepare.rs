@@ -1,19 +1,20 @@
 //! From a scene to what drawing reads: read, choose, convert, plan.
 
+pub(crate) mod carried;
 mod facts;
+pub(crate) mod media;
 mod seen;
 
 use crate::brightness;
-use crate::carried;
+use crate::choose::settle;
 use crate::choose::{choose, plan, row, same_forms, technique_of, techniques, unshown};
 use crate::cost::{Count, Prediction, Translucent};
 use crate::form::PlannedObject;
 use crate::frame::Frame;
+use crate::frame::matter::Matter;
 use crate::load::files::Files;
 use crate::load::own::Own;
 use crate::load::{self, Loaded, Spare, light_statistics};
-use crate::matter::Matter;
-use crate::media;
 use crate::memory::{self, Memory};
 use crate::pass;
 use crate::plan::{Effect, Plan};
@@ -22,7 +23,6 @@ use crate::ranges::ranges;
 use crate::scene::{
     EffectKind, FoundCamera, Scene, SceneLight, SceneObject, Source, SwitchedEffect, Technique, light_points,
 };
-use crate::settle;
 use crate::shadows::{Probe, Shadowing};
 use crate::statistics::{ObjectData, ObjectStatistics, Statistics};
 use crate::technique::{Fold, Row};

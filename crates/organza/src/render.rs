@@ -1,7 +1,9 @@
 //! From a scene to images: prepare, draw.
 
 pub(crate) mod budget;
+pub(crate) mod sequence;
 
+use crate::choose::settle;
 use crate::choose::{row, techniques};
 use crate::cost::Prediction;
 use crate::device::Helper;
@@ -13,7 +15,6 @@ use crate::load::files::Files;
 use crate::plan::Plan;
 use crate::prepare::{Explanation, Planned, Prepared, prepare, settled, turned};
 use crate::scene::{FoundCamera, Scene, SceneObject, Technique};
-use crate::settle;
 use crate::technique::{Checkpoint, Kept, Session, Sets};
 use crate::{CostRecord, Error, Layers, Progress, RenderOptions, doubts};
 use convert::ColorScale;

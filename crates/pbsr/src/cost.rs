@@ -1,6 +1,6 @@
 //! What folding costs: predicted from the samplers, counted while it runs.
 
-use crate::bins::Task;
+use crate::project::bins::Task;
 use crate::render::BYTES_IN_BATCH;
 use crate::{EnsembleParams, FoldParams, Scene};
 

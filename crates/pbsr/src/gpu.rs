@@ -24,9 +24,9 @@ use lit::{Lit, Seen, Winners};
 pub(crate) use twin::{Maker, columns};
 pub use twin::{Sources, Twin};
 
-use crate::bins::{AREA, Tiling, thinning, thinning_key};
 use crate::error::check;
 use crate::project::Projector;
+use crate::project::bins::{AREA, Tiling, thinning, thinning_key};
 use crate::{Ensemble, EnsembleParams, Error, KeptSets, Object, Particles, Sampler, Scene};
 use splat_core::{Shading, glam, rng};
 use splat_shaders::layouts::{ParticleObject, ParticleView};

@@ -47,69 +47,46 @@
 //! a pixel of opacity α after L sets is √(α(1 − α)/L). See `README.md` for symbols, deviations from the paper, and speed.
 #![forbid(unsafe_code)]
 
-mod bins;
 mod blocks;
-mod bounded;
-mod brownian;
-mod checkpoint;
-mod colored;
 mod cost;
-mod depths;
 mod ensemble;
 mod error;
-mod flat;
 #[cfg(feature = "gpu")]
 pub mod gpu;
-mod implicit;
-mod lattice;
-mod leaves;
-mod lines;
-mod mesh;
-mod metropolis;
-mod nearest;
+mod media;
 pub mod opacity;
 mod params;
 mod particles;
-mod picture;
-mod pieces;
-mod places;
 mod project;
-mod radial;
 pub mod reference;
 mod render;
-mod roots;
 mod sampler;
-mod segment;
-mod shade;
 mod shown;
-mod splats;
 mod stream;
-mod volume;
-mod volume_field;
-mod walk;
+mod surfaces;
 
-pub use bounded::{BoundedExtinction, Matter};
-pub use brownian::{BrownianParams, BrownianReport, BrownianSampler};
 pub use cost::{Counts, Prediction, predict};
 pub use ensemble::{Ensemble, EnsembleParams};
 pub use error::Error;
-pub use implicit::{CellCounts, ImplicitSurface};
-pub use lattice::LatticeSampler;
-pub use lines::{LineParams, LineReport, LineSampler};
-pub use mesh::MeshSampler;
-pub use metropolis::{MetropolisParams, MetropolisSampler};
+pub use media::bounded::{BoundedExtinction, Matter};
+pub use media::metropolis::{MetropolisParams, MetropolisSampler};
+pub use media::splats::{SplatParams, SplatSampler};
+pub use media::volume::{GridSampler, VolumeParams};
+pub use media::volume_field::{FieldVolumeParams, FieldVolumeSampler};
 pub use params::{Density, SurfaceParams};
 pub use particles::{PackedColor, PackedNormal, Particles};
+pub use project::shade::Appearance;
 pub use project::{depth_range, finest_pixel_area, pixel_area};
 pub use render::{FoldParams, Object, Renderer, Scene};
 pub use sampler::{KeptSets, Sampler};
-pub use shade::Appearance;
 pub use shown::{Look, ShownSampler};
 pub use splat_core::shade::LitBy;
-pub use splats::{SplatParams, SplatSampler};
-pub use volume::{GridSampler, VolumeParams};
-pub use volume_field::{FieldVolumeParams, FieldVolumeSampler};
-pub use walk::Walk;
+pub use surfaces::brownian::{BrownianParams, BrownianReport, BrownianSampler};
+pub use surfaces::implicit::{CellCounts, ImplicitSurface};
+pub use surfaces::lattice::LatticeSampler;
+pub use surfaces::lines::{LineParams, LineReport, LineSampler};
+pub use surfaces::mesh::MeshSampler;
+pub use surfaces::walk::Walk;
 
 /// The page's example compiles and holds.
 #[cfg(doctest)]

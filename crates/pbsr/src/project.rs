@@ -14,8 +14,13 @@
 //!
 //! Both make exactly one pixel, floor(x), floor(y), of k = 1. A surface of angle-independent opacity has k·|cos θ|.
 
+pub(crate) mod bins;
+pub(crate) mod colored;
+pub(crate) mod flat;
+pub(crate) mod nearest;
+pub(crate) mod shade;
 use crate::PackedNormal;
-use crate::bins::{Tiling, place};
+use crate::project::bins::{Tiling, place};
 use glam::{DMat3, DVec3, Mat3, Vec3};
 use splat_core::{Camera, Similarity, glam};
 

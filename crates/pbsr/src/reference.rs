@@ -1,6 +1,6 @@
 //! Slow and obvious: one set on one image in f64, particle by particle; and opacities in closed form.
 
-use crate::bins::{thinning, thinning_key};
+use crate::project::bins::{thinning, thinning_key};
 use crate::project::pixel_area_view;
 use crate::{KeptSets, Particles, Sampler, Scene, opacity};
 use splat_core::glam::DVec3;

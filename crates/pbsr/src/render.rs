@@ -5,15 +5,15 @@
 //! Nothing is shared between tasks and every sum is in integers: the result has the same bits for any number of threads.
 //! Memory depends on the image and on the particles of one batch, never on the number of sets.
 
-use crate::bins::{Filling, Record, Staging, TILE, Task, Tiling};
-use crate::colored::Colored;
 use crate::cost::Counts;
 use crate::ensemble::Ensemble;
 use crate::error::check;
-use crate::nearest::Nearest;
 use crate::project::Projector;
+use crate::project::bins::{Filling, Record, Staging, TILE, Task, Tiling};
+use crate::project::colored::Colored;
+use crate::project::nearest::Nearest;
+use crate::project::shade::{Appearance, Seen, Shader};
 use crate::sampler::{Run, runs};
-use crate::shade::{Appearance, Seen, Shader};
 use crate::{Error, PackedNormal, Sampler};
 use glam::{DMat3, DVec3, Mat3};
 use rayon::prelude::*;

@@ -36,62 +36,42 @@
 //! ```
 #![forbid(unsafe_code)]
 
-mod classified;
-mod composite;
-mod density;
-mod dielectric;
-mod environment;
-mod estimate;
-mod footprint;
-mod gaussian;
-mod implicit;
 mod liberty;
 mod lights;
-mod majorant;
-mod march;
-mod medium;
+mod media;
 pub mod metrics;
 mod path;
-mod pattern;
-mod phase;
-mod pixel;
 mod placed;
-mod quadrature;
-mod random;
 mod ray;
-mod roots;
 mod scene;
-mod slide;
+mod splats;
 pub mod statistics;
-mod surface;
-mod tracking;
-mod triangle;
-mod visibility;
+mod surfaces;
 
-pub use classified::Classified;
-pub use composite::{ExactImage, Fragment, Input, Order, composite, fold_fragments};
-pub use density::{Density, Lattice};
-pub use dielectric::{
-    CHANNEL_WAVELENGTHS_UM, Cauchy, Dielectric, fresnel_reflectance, reflect, refract, transmitted_cosine,
-};
-pub use environment::{Environment, LatLong};
-pub use estimate::{Estimate, PathSettings, PixelSampling, Statistics, path_trace};
-pub use implicit::{ImplicitSurface, SurfaceImage, SurfaceScene, composite_surfaces};
 pub use liberty::Liberty;
 pub use lights::LightSource;
-pub use march::{MarchedImage, MarchedRay, march, march_image, optical_depth};
-pub use medium::{ColorAt, Facets, Medium};
+pub use lights::environment::{Environment, LatLong};
+pub use lights::slide::Slide;
+pub use media::classified::Classified;
+pub use media::density::{Density, Lattice};
+pub use media::march::{MarchedImage, MarchedRay, march, march_image, optical_depth};
+pub use media::medium::{ColorAt, Facets, Medium};
+pub use media::phase::{henyey_greenstein, sample_henyey_greenstein};
+pub use media::quadrature::{Integral, MarchParams};
 pub use path::PathRules;
-pub use phase::{henyey_greenstein, sample_henyey_greenstein};
-pub use pixel::PixelSum;
+pub use path::estimate::{Estimate, PathSettings, PixelSampling, Statistics, path_trace};
 pub use placed::{Placed, TurnedBox};
-pub use quadrature::{Integral, MarchParams};
 pub use ray::Ray;
-pub use roots::{Crossings, RootParams, crossings};
 pub use scene::Scene;
-pub use slide::Slide;
-pub use surface::{Surface, SurfaceKind, SurfaceMaterial};
-pub use visibility::{Hit, Visibility};
+pub use splats::composite::{ExactImage, Fragment, Input, Order, composite, fold_fragments};
+pub use splats::pixel::PixelSum;
+pub use surfaces::dielectric::{
+    CHANNEL_WAVELENGTHS_UM, Cauchy, Dielectric, fresnel_reflectance, reflect, refract, transmitted_cosine,
+};
+pub use surfaces::implicit::{ImplicitSurface, SurfaceImage, SurfaceScene, composite_surfaces};
+pub use surfaces::roots::{Crossings, RootParams, crossings};
+pub use surfaces::surface::{Surface, SurfaceKind, SurfaceMaterial};
+pub use surfaces::visibility::{Hit, Visibility};
 
 /// The page's example compiles and holds.
 #[cfg(doctest)]

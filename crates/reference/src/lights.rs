@@ -3,7 +3,9 @@
 //! An area light is an emitter alone: it casts no shadow, and rays pass through it. Disk and rectangle shine on the side
 //! of their normal, the sphere outwards.
 
-use crate::phase::around;
+pub(crate) mod environment;
+pub(crate) mod slide;
+use crate::media::phase::around;
 use crate::ray::Ray;
 use glam::DVec3;
 use splat_core::{Error, Light, LightShape};
@@ -289,7 +291,7 @@ fn cone_versine(apart: f64, radius: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::random::Stream;
+    use crate::path::random::Stream;
 
     #[test]
     fn areas_give_the_irradiance_of_their_closed_forms() {

@@ -10,18 +10,20 @@
 //! dielectric are no scattering events; beyond one, lights count in full, since shadow rays end there.
 
 mod direct;
+pub(crate) mod estimate;
+pub(crate) mod random;
 
-use crate::dielectric::{Dielectric, fresnel_reflectance, reflect, refract};
 use crate::liberty::Liberty;
 use crate::lights::LightSource;
-use crate::medium::Event;
-use crate::phase::{henyey_greenstein, sample_henyey_greenstein};
-use crate::random::Stream;
+use crate::media::medium::Event;
+use crate::media::phase::{henyey_greenstein, sample_henyey_greenstein};
+use crate::media::tracking::{Collision, Volume};
+use crate::path::random::Stream;
 use crate::ray::Ray;
 use crate::scene::Scene;
-use crate::surface::{Response, SurfaceKind};
-use crate::tracking::{Collision, Volume};
-use crate::visibility::{Filter, Hit, Visibility};
+use crate::surfaces::dielectric::{Dielectric, fresnel_reflectance, reflect, refract};
+use crate::surfaces::surface::{Response, SurfaceKind};
+use crate::surfaces::visibility::{Filter, Hit, Visibility};
 use glam::DVec3;
 
 /// Which light paths count.

@@ -1,10 +1,10 @@
 //! What the path tracer and the ray marcher look at.
 
-use crate::environment::Environment;
 use crate::lights::LightSource;
-use crate::medium::Medium;
-use crate::slide::Slide;
-use crate::surface::Surface;
+use crate::lights::environment::Environment;
+use crate::lights::slide::Slide;
+use crate::media::medium::Medium;
+use crate::surfaces::surface::Surface;
 use glam::DVec3;
 use splat_core::Error;
 

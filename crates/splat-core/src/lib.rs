@@ -36,86 +36,61 @@
 //! ```
 #![forbid(unsafe_code)]
 
-mod accumulation;
-mod arrived;
-mod camera;
-mod canonical;
 mod clip;
-mod cloud;
-mod cost;
-mod depth_profile;
-mod environment;
+mod compositing;
 mod error;
-mod fewer;
-mod field;
-mod footprint;
-mod gaussians;
-mod grid;
-mod harmonics;
-mod height_image;
-mod image_levels;
-mod layers;
-mod light;
-mod limits;
-mod material;
-mod memory_account;
-mod mesh;
 pub mod optics;
-mod packed;
-mod phase;
-mod pixel_samples;
 pub mod points;
-mod progress;
 mod relative;
 pub mod rng;
-mod slice_order;
+mod scene;
+mod shapes;
 mod space;
 pub mod splat_file;
+mod splats;
 pub mod srgb;
 pub mod text;
-mod transfer;
-mod transmittance;
-mod turns;
 mod up_axis;
+mod work;
 
 #[cfg(feature = "raster")]
 pub mod raster;
 #[cfg(feature = "raster")]
 pub mod shade;
 
-pub use accumulation::Accumulation;
-pub use arrived::{Arrived, Remembered};
-pub use camera::{Camera, Projection, ViewTransform};
 pub use clip::Clip;
-pub use cloud::{Cloud, Splat, SplatKind, Unfit};
-pub use cost::{CostRecord, StageCost};
-pub use depth_profile::{DepthFragment, DepthProfile};
-pub use environment::{Environment, RadianceImage};
+pub use compositing::accumulation::Accumulation;
+pub use compositing::arrived::{Arrived, Remembered};
+pub use compositing::depth_profile::{DepthFragment, DepthProfile};
+pub use compositing::layers::{ADDITIVE_LAYERS, Accumulator, LayerData, LayerSet, Layers, SHADED_EFFECTS};
+pub use compositing::pixel_samples::PixelSamples;
+pub use compositing::transmittance::{ABOUT, MeanTransmittance, Receiver, TOGETHER, Transmittance};
 pub use error::Error;
-pub use field::ScalarField;
-pub use footprint::{Footprint, FootprintImage, FootprintStack, MOST_TEXELS};
-pub use gaussians::Gaussians;
 pub use glam;
-pub use grid::{BccGrid, Grid, Interpolation, Packing};
-pub use height_image::HeightImage;
-pub use layers::{ADDITIVE_LAYERS, Accumulator, LayerData, LayerSet, Layers, SHADED_EFFECTS};
-pub use light::{Framing, Light, LightShape, Slide, SlideProjection};
-pub use limits::{Exceeded, Limits};
-pub use material::{Bump, Material, MaterialTable, Object, ObjectTable, Shading};
-pub use memory_account::{MemoryAccount, Reservation};
-pub use mesh::{Mesh, crease_bytes, part_at_creases, robust_cross, smooth, vertex_normals};
-pub use packed::PackedCloud;
-pub use phase::henyey_greenstein;
-pub use pixel_samples::PixelSamples;
 pub use points::{Column, PointCell, PointLattice, RawPoints, ReadySplats};
-pub use progress::Progress;
 pub use relative::Relative;
-pub use slice_order::{Direction, SliceOrder};
+pub use scene::camera::{Camera, Projection, ViewTransform};
+pub use scene::environment::{Environment, RadianceImage};
+pub use scene::light::{Framing, Light, LightShape, Slide, SlideProjection};
+pub use scene::material::{Bump, Material, MaterialTable, Object, ObjectTable, Shading};
+pub use scene::phase::henyey_greenstein;
+pub use scene::transfer::{TransferFunction, TransferPoint};
+pub use scene::turns::turns;
+pub use shapes::field::ScalarField;
+pub use shapes::gaussians::Gaussians;
+pub use shapes::grid::{BccGrid, Grid, Interpolation, Packing};
+pub use shapes::height_image::HeightImage;
+pub use shapes::mesh::{Mesh, crease_bytes, part_at_creases, robust_cross, smooth, vertex_normals};
 pub use space::{Aabb, DAabb, Similarity};
-pub use transfer::{TransferFunction, TransferPoint};
-pub use transmittance::{ABOUT, MeanTransmittance, Receiver, TOGETHER, Transmittance};
-pub use turns::turns;
+pub use splats::cloud::{Cloud, Splat, SplatKind, Unfit};
+pub use splats::footprint::{Footprint, FootprintImage, FootprintStack, MOST_TEXELS};
+pub use splats::packed::PackedCloud;
+pub use splats::slice_order::{Direction, SliceOrder};
 pub use up_axis::UpAxis;
+pub use work::cost::{CostRecord, StageCost};
+pub use work::limits::{Exceeded, Limits};
+pub use work::memory_account::{MemoryAccount, Reservation};
+pub use work::progress::Progress;
 
 /// The page's example compiles and holds.
 #[cfg(doctest)]

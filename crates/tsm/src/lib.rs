@@ -25,43 +25,25 @@
 //! 8 bytes a cell. See `README.md` for symbols, deviations from the paper, and measured speed.
 #![forbid(unsafe_code)]
 
-mod appearance;
-mod caster;
-mod cost;
-mod deposit;
-mod deposits;
-mod discs;
-mod entries;
+mod building;
 mod error;
 mod frame;
 #[cfg(feature = "gpu")]
 pub mod gpu;
-mod lanes;
-mod lookup;
 pub mod mapping;
-mod media;
-mod opaque;
-mod overlap;
 mod params;
-mod patch;
-mod plan;
-mod query;
-mod rays;
+mod planning;
+mod reading;
 pub mod reference;
-mod sampling;
 mod scene;
 mod shadow_map;
-mod shares;
-mod sort;
-mod surfaces;
-mod survey;
 mod table;
 
-pub use cost::{Counts, Limit, Prediction};
-pub use deposits::Deposits;
+pub use building::deposits::Deposits;
 pub use error::Error;
 pub use params::{MappingChoice, Params, Resolution};
-pub use query::SurfacePoint;
+pub use planning::cost::{Counts, Limit, Prediction};
+pub use reading::query::SurfacePoint;
 pub use scene::Scene;
 pub use shadow_map::ShadowMap;
 

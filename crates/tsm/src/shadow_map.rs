@@ -1,12 +1,12 @@
 //! A map, and what of it is there before its lists: opaque discs, sizes (Gunjee 2007, section 4.1, steps 1-3).
 
-use crate::caster::Casters;
-use crate::cost::{Counts, Prediction};
+use crate::building::caster::Casters;
+use crate::building::opaque::{DiscBatches, OpaqueDepth};
 use crate::frame::Frame;
 use crate::mapping::{Mapping, Table};
-use crate::opaque::{DiscBatches, OpaqueDepth};
-use crate::plan::Plan;
-use crate::survey::{CHUNK, Survey};
+use crate::planning::cost::{Counts, Prediction};
+use crate::planning::plan::Plan;
+use crate::planning::survey::{CHUNK, Survey};
 use crate::table::Lists;
 use crate::{Deposits, Error, Params, Scene};
 use rayon::prelude::*;

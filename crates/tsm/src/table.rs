@@ -7,8 +7,8 @@
 
 mod list;
 
-use crate::entries::Entries;
-use crate::sort::sort;
+use crate::building::entries::Entries;
+use crate::building::sort::sort;
 pub(crate) use list::{ENOUGH, List};
 use rayon::prelude::*;
 use splat_core::raster::lanes::MAX_LANES;

@@ -7,23 +7,22 @@ use crate::source::{code_only, line_of};
 const HOUSE: &str = "crates/organza/src/";
 
 /// The modules of each floor, from the ground up.
-const FLOORS: [&[&str]; 17] = [
+const FLOORS: [&[&str]; 16] = [
     &["error", "form", "pass", "stage"],
     &["statistics"],
     &["cost"],
     &["options"],
     &["load"],
     &["brightness"],
-    &["matter", "media", "memory", "shadows"],
+    &["memory", "shadows"],
     &["plan"],
     &["frame"],
     &["technique"],
     &["choose"],
-    &["carried", "doubts", "ranges", "settle"],
+    &["doubts", "ranges"],
     &["predict"],
     &["draw", "prepare"],
     &["render"],
-    &["sequence"],
     &["lib"],
 ];
 

@@ -1,8 +1,8 @@
 //! What to write into a scene file, so that it is drawn as a setting of a report was.
 
 use super::Request;
-use super::points::spacing_factor;
-use super::tables;
+use super::knob::points::spacing_factor;
+use super::knob::tables;
 use organza::scene::{
     Classify, Collisions, Coverage, Grouping, RenderSettings, Scene, ShadowMapping, Slicing, SoftShadows,
     SurfaceSampler, SurfelLayers, VolumeSampler,

@@ -1,5 +1,11 @@
 //! What a technique can trade: its knobs, their steps from coarse to fine, and their ends.
 
+pub(super) mod particles;
+pub(super) mod points;
+pub(super) mod sheets;
+pub(super) mod surfels;
+pub(super) mod tables;
+
 use organza::scene::Scene;
 
 /// What is to be drawn.

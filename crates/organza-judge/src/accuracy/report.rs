@@ -1,7 +1,14 @@
 //! The files of a report.
 
+mod frontier;
+pub(super) mod html;
+mod joint;
+pub(super) mod pictures;
+mod tables;
+
+use super::frontier::frontier;
 use super::study::{candidates, candidates_by_truth};
-use super::{Options, Study, frontier, report_html, report_tables};
+use super::{Options, Study};
 use organza::output::{Target, Targets};
 use organza::scene::Scene;
 use organza::{Error, printable};
@@ -104,12 +111,12 @@ impl Report {
 
     /// The report as a JSON document.
     pub fn json(&self) -> String {
-        format!("{:#}\n", report_tables::json(self))
+        format!("{:#}\n", tables::json(self))
     }
 
     /// The report as a table with one line a setting.
     pub fn csv(&self) -> String {
-        report_tables::csv(self)
+        tables::csv(self)
     }
 
     /// The report as a page that needs no other file.
@@ -117,7 +124,7 @@ impl Report {
     /// # Errors
     /// [`Error::Internal`] if a picture cannot be encoded.
     pub fn html(&self) -> Result<String, Error> {
-        report_html::page(self)
+        html::page(self)
     }
 
     /// Checks before any work that the files of [`write()`] can be written to a folder; none may be one of the `inputs`.

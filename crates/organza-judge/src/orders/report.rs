@@ -212,7 +212,7 @@ impl OrdersReport {
              <th>wrong pairs a ray</th><th>worst backtrack</th><th>RMSE</th><th>max</th><th>FLIP</th><th>ε</th><th>pops</th><th>sort ms</th>\
              <th>bytes</th></tr>\n",
             escaped(&self.scene),
-            include_str!("../accuracy/report.css"),
+            include_str!("../accuracy/report/report.css"),
             self.comparison.splats,
             self.comparison.truth_seconds,
             self.machine.threads,
@@ -256,8 +256,11 @@ impl OrdersReport {
         }
         html += "<div class=\"grid\">";
         self.figures(&mut html)?;
-        let _ =
-            write!(html, "</div></main>\n<script>\n{}</script></body></html>\n", include_str!("../accuracy/report.js"));
+        let _ = write!(
+            html,
+            "</div></main>\n<script>\n{}</script></body></html>\n",
+            include_str!("../accuracy/report/report.js")
+        );
         Ok(html)
     }
 

@@ -6,7 +6,7 @@ use crate::load::placed;
 use crate::memory::loading_bytes;
 use crate::scene::{ExtractSource, FoundCamera, Scene, SceneObject, Source, Stop};
 use crate::shadows::{shadow_error, shadow_params};
-use crate::{Error, Progress, RenderOptions, printable, settle, shown};
+use crate::{Error, Progress, RenderOptions, choose::settle, printable, shown};
 use glam::DVec3;
 use splat_core::RawPoints;
 use std::borrow::Cow;

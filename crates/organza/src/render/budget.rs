@@ -17,6 +17,7 @@ mod trial;
 
 use super::{Left, Made, Render, render_keeping};
 use crate::choose::row;
+use crate::choose::settle;
 use crate::cost::Rates;
 use crate::frame::{Frame, Leaves};
 use crate::load::Loaded;
@@ -26,7 +27,6 @@ use crate::predict::prediction;
 use crate::prepare::{Planned, fitted, load_measured, plan_alone};
 use crate::ranges::ranges;
 use crate::scene::{FoundCamera, Goal, Scene};
-use crate::settle;
 use crate::technique::Fold;
 use crate::{CostRecord, Error, Progress, RenderOptions};
 use errors::Errors;

@@ -8,9 +8,9 @@ mod half;
 
 use crate::cost::{Count, Item, Translucent};
 use crate::form::Form;
+use crate::frame::matter::Matter;
 use crate::frame::{Extent, Frame, Shaded};
 use crate::load::own::{Body, Own};
-use crate::matter::Matter;
 use crate::pass;
 use crate::scene::{self, LightPoint, Scene, Technique};
 use crate::statistics::{MediumFacts, ObjectData, ObjectStatistics};

@@ -6,8 +6,8 @@ mod plans;
 
 use crate::cost::{Count, Item, Translucent, samples};
 use crate::frame::discs::{disc_input, params, refuse, with_shown};
+use crate::frame::matter::Matter;
 use crate::frame::{Frame, grouped};
-use crate::matter::Matter;
 use crate::pass;
 use crate::scene::{LightPoint, Scene, SurfelGroups, SurfelLayers, Technique};
 use crate::technique::{Fold, Session, points};

@@ -4,7 +4,7 @@
 //! rising depths. A pair that does not is wrong; a backtrack is how far a fragment lies in front of one that came before it.
 
 use crate::Input;
-use crate::footprint::{Splat, profiles};
+use crate::splats::footprint::{Splat, profiles};
 use rayon::prelude::*;
 use splat_core::SplatKind;
 

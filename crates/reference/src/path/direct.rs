@@ -2,9 +2,9 @@
 
 use super::{Lamp, Path, Tracer, Vertex};
 use crate::lights::LightSample;
-use crate::random::Stream;
+use crate::path::random::Stream;
 use crate::ray::Ray;
-use crate::visibility::Filter;
+use crate::surfaces::visibility::Filter;
 use glam::DVec3;
 
 /// Light on its way to a vertex.

@@ -110,7 +110,7 @@ impl Capacities {
 
     /// Numbers of a pixel.
     fn planes_of_pixel(&self) -> u32 {
-        let depths = if self.depths { crate::depth_profile::WORDS as u32 } else { 0 };
+        let depths = if self.depths { crate::compositing::depth_profile::WORDS as u32 } else { 0 };
         self.planes + self.channels + depths + u32::from(self.objects)
     }
 

@@ -12,7 +12,7 @@ use super::project::Projector;
 use super::projected::{Coverage, ImageFrame, ProjectedSplat, SpecialDisc};
 use super::shapes::Image;
 use super::tile::Run;
-use crate::footprint::Level;
+use crate::splats::footprint::Level;
 use crate::{FootprintImage, SplatKind};
 use glam::{Mat2, Vec2, Vec3};
 use pulp::Simd;

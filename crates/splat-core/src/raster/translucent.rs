@@ -13,7 +13,7 @@ use super::projected::{Projected, ProjectedDepth, ProjectedSplat};
 use super::source::{Place, Source, TileRays};
 use super::tile::{BATCH, BLOCKS, Conic, Line, PIXELS, Run, Runs, for_each_span, tile_of};
 use super::{Accumulation, OpaqueImage, Params, RasterCounts};
-use crate::depth_profile::DepthFragment;
+use crate::compositing::depth_profile::DepthFragment;
 use crate::shade::ChannelLayout;
 use crate::{Accumulator, DepthProfile, Direction, Error, Material, Progress, SplatKind};
 use pulp::Simd;

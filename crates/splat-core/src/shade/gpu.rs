@@ -20,8 +20,8 @@
 //! ```
 
 use super::{CHUNK, ChannelLayout, LitBy, ShadeInput, point_of, shadow_share};
-use crate::light::rect_normal;
 use crate::raster::gpu::{AttributeBuffers, AttributeRoom, Attributes};
+use crate::scene::light::rect_normal;
 use crate::{Error, Light, LightShape, Material, Progress, Shading};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;

@@ -5,7 +5,7 @@
 //! in which deposits lie parted, so that a chunk of splats gives a run one slice of its entries.
 
 use super::{Capacities, GROUP, MOST_ENTRIES, Recorded, record};
-use crate::deposits::{Parted2, Parts};
+use crate::building::deposits::{Parted2, Parts};
 use crate::shadow_map::{Absorbances, Matter};
 use crate::table::{Lists, Parted};
 use crate::{Deposits, Error, ShadowMap};

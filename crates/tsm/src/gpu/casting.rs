@@ -5,15 +5,15 @@
 //! of few cells. They are the device's. The others (bent over an edge between octants, of many cells, near the light), and all
 //! of them in the paper's model, are the processor's, which hands on their entries.
 
-use crate::caster::Casters;
-use crate::deposit::{Deposit, Scratch};
-use crate::deposits::{check_entries, select};
-use crate::entries::Entries;
+use crate::building::caster::Casters;
+use crate::building::deposit::{Deposit, Scratch};
+use crate::building::deposits::{check_entries, select};
+use crate::building::entries::Entries;
 use crate::gpu::MOST_ENTRIES;
 use crate::mapping::{Mapping, Table, with_mapping};
-use crate::plan::{Plan, plan};
+use crate::planning::plan::{Plan, plan};
+use crate::planning::survey::{CHUNK, Survey};
 use crate::shadow_map::head;
-use crate::survey::{CHUNK, Survey};
 use crate::{Error, Params, Scene, ShadowMap};
 use rayon::prelude::*;
 use splat_core::optics::SurfaceOpacity;
@@ -158,7 +158,7 @@ impl Casting {
 
 /// Extinction and whether it is of a thin slab; deviations of footprints.
 fn tables(casters: &Casters<'_>) -> Vec<[f32; 4]> {
-    let unknown = crate::caster::Extinction::default();
+    let unknown = crate::building::caster::Extinction::default();
     let materials = casters.extinctions.iter().chain(std::iter::once(&unknown)).map(|e| {
         let [r, g, b] = e.rgb;
         [r, g, b, f32::from(u8::from(e.opacity == SurfaceOpacity::ThinSlab))]

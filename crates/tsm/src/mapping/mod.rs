@@ -8,7 +8,7 @@ pub use octahedral::Octahedral;
 pub use planar::Planar;
 pub use polar::{PolarAzimuth, PolarRange};
 
-use crate::shares::between;
+use crate::building::shares::between;
 use glam::{Vec2, Vec3};
 
 /// A ray of light through the table, in the light's frame.

@@ -7,7 +7,7 @@ mod splats;
 use super::{params, refuse, volumes};
 use crate::form::{Form, PlannedObject};
 use crate::frame::Frame;
-use crate::matter::{Carries, CarriesLight, Matter};
+use crate::frame::matter::{Carries, CarriesLight, Matter};
 use crate::pass;
 use crate::scene::{self, LightPoint, Scene, Slicing, SoftShadows, Technique};
 use crate::technique::Session;

@@ -2,7 +2,7 @@
 //! for.
 
 use super::equal_lengths;
-use crate::depth_profile::WORDS;
+use crate::compositing::depth_profile::WORDS;
 use crate::{Accumulator, DepthProfile, Error};
 
 /// Planes of optical depth, then channels.

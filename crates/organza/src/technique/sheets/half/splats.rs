@@ -1,7 +1,7 @@
 //! Translucent splats that are swept with the volumes.
 
 use crate::frame::Frame;
-use crate::matter::Matter;
+use crate::frame::matter::Matter;
 use sheet_light::half::{HalfSplats, SplatBounds};
 use splat_core::raster::{self, Detail, ProjectInput, Projected};
 use splat_core::{Cloud, SplatKind};

@@ -1,0 +1,222 @@
+//! Everything that a map's build leaves before its lists are sorted and summed: by the processor, or by a device.
+
+use crate::building::caster::Casters;
+use crate::building::deposit::{Deposit, Scratch};
+use crate::building::media::Target;
+use crate::mapping::{Mapping, with_mapping};
+use crate::planning::plan::{Plan, plan};
+use crate::planning::survey::{CHUNK, Survey};
+use crate::shadow_map::{Absorbances, Matter, head};
+use crate::table::{Lists, Parted, Ranges};
+use crate::{Error, Params, Prediction, Resolution, Scene, ShadowMap};
+use rayon::prelude::*;
+use splat_core::{Light, Limits, Progress, SplatKind};
+use std::ops::Range;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// The deposits of one light's map, parted by cells: all of the map but its lists (Gunjee 2007, section 4.1, steps 1-2).
+///
+/// [`Deposits::into_map`] makes the lists here; with feature `gpu` a device can, with the same bits.
+#[derive(Debug, Clone)]
+pub struct Deposits {
+    /// The map, without lists.
+    pub(crate) map: ShadowMap,
+    pub(crate) parts: Parts,
+    pub(crate) ranges: Ranges,
+    /// Absorbance at which lists stop.
+    pub(crate) limit: f32,
+}
+
+/// Entries of media and of surfaces, each chunk of splats by itself.
+pub(crate) type Parted2<const C: usize> = [Vec<Parted<C>>; 2];
+
+/// Entries with one absorbance for all channels, or with three.
+#[derive(Debug, Clone)]
+pub(crate) enum Parts {
+    Mono(Parted2<1>),
+    Rgb(Parted2<3>),
+}
+
+impl Deposits {
+    /// Looks at the casters, chooses the table and deposits their absorbance; the arguments are those of
+    /// [`ShadowMap::build`].
+    ///
+    /// # Errors
+    /// Those of [`ShadowMap::build`].
+    pub fn new(scene: &Scene<'_>, light: &Light, params: &Params, progress: Option<&Progress>) -> Result<Self, Error> {
+        let quiet = Progress::new();
+        let progress = progress.unwrap_or(&quiet);
+        params.validate()?;
+        light.validate(0)?;
+        let casters = Casters::new(scene, params);
+        let survey = Survey::new(&casters);
+        let mut room = params.limits;
+        let mut refused = None;
+        loop {
+            let plan = match plan(&casters, &survey, light, &room) {
+                Ok(plan) => plan,
+                Err(error) => return Err(refused.unwrap_or(error)),
+            };
+            progress.add_total(scene.cloud.len() as u64);
+            match with_mapping!(&plan.table, m => Self::with_mapping(&casters, &survey, &plan, m, progress)) {
+                // Casters that are not spread evenly make more entries than were predicted.
+                Err(error @ Error::Limit(_)) if params.resolution == Resolution::Auto => refused = Some(error),
+                made => return made,
+            }
+            room = Limits { max_bytes: room.max_bytes / 2, max_elements: room.max_elements / 2 };
+        }
+    }
+
+    /// What [`Deposits::new`] will cost, by looks at the casters alone.
+    ///
+    /// # Errors
+    /// Those of [`ShadowMap::build`].
+    pub fn predict(scene: &Scene<'_>, light: &Light, params: &Params) -> Result<Prediction, Error> {
+        params.validate()?;
+        light.validate(0)?;
+        let casters = Casters::new(scene, params);
+        plan(&casters, &Survey::new(&casters), light, &params.limits).map(|plan| plan.prediction)
+    }
+
+    fn with_mapping<M: Mapping>(
+        casters: &Casters<'_>,
+        survey: &Survey,
+        plan: &Plan,
+        mapping: &M,
+        progress: &Progress,
+    ) -> Result<Self, Error> {
+        let map = head(casters, survey, plan, mapping);
+        let [columns, rows] = mapping.size();
+        let ranges = Ranges::new(columns as usize * rows as usize, plan.prediction.entries);
+        let parts = if survey.coloured {
+            Parts::Rgb(deposit_all(casters, plan, mapping, &map.opaque, ranges, progress)?)
+        } else {
+            Parts::Mono(deposit_all(casters, plan, mapping, &map.opaque, ranges, progress)?)
+        };
+        Ok(Self { map, parts, ranges, limit: casters.params.absorbance_limit() })
+    }
+
+    /// Entries of media and of surfaces.
+    pub fn entries(&self) -> [u64; 2] {
+        match &self.parts {
+            Parts::Mono(parts) => entries(parts),
+            Parts::Rgb(parts) => entries(parts),
+        }
+    }
+
+    /// 1 when all casters absorb every channel alike, else 3.
+    pub fn channels(&self) -> usize {
+        if matches!(self.parts, Parts::Mono(_)) { 1 } else { 3 }
+    }
+
+    /// The map, its lists sorted and summed by the processor.
+    pub fn into_map(self) -> ShadowMap {
+        let Self { map, parts, ranges, limit } = self;
+        match parts {
+            Parts::Mono(parts) => map.with(Absorbances::Mono(lists(&parts, ranges, limit))),
+            Parts::Rgb(parts) => map.with(Absorbances::Rgb(lists(&parts, ranges, limit))),
+        }
+    }
+}
+
+fn entries<const C: usize>(parts: &Parted2<C>) -> [u64; 2] {
+    parts.each_ref().map(|parted| parted.iter().map(|p| p.len() as u64).sum())
+}
+
+fn lists<const C: usize>(parts: &Parted2<C>, ranges: Ranges, limit: f32) -> Matter<C> {
+    let [media, surfaces] = [0, 1].map(|of| (entries(parts)[of] > 0).then(|| Lists::new(&parts[of], ranges, limit)));
+    Matter { media, surfaces }
+}
+
+fn deposit_all<M: Mapping, const C: usize>(
+    casters: &Casters<'_>,
+    plan: &Plan,
+    mapping: &M,
+    opaque: &[f32],
+    ranges: Ranges,
+    progress: &Progress,
+) -> Result<Parted2<C>, Error> {
+    let cloud = casters.cloud;
+    // Held to the limit while they are made: predictions may be half of it.
+    let made = AtomicU64::new(0);
+    let chunks: Vec<(Parted<C>, Parted<C>)> = (0..cloud.len().div_ceil(CHUNK))
+        .into_par_iter()
+        .map_init(Scratch::default, |scratch, c| {
+            let chunk = c * CHUNK..cloud.len().min((c + 1) * CHUNK);
+            progress.tick(chunk.len() as u64)?;
+            scratch.media.clear();
+            scratch.surfaces.clear();
+            pulp::Arch::new().dispatch(FillChunk {
+                casters,
+                plan,
+                deposit: Deposit { mapping, opaque, scratch },
+                chunk,
+            });
+            let more = (scratch.media.len + scratch.surfaces.len) as u64;
+            check_entries::<C>(made.fetch_add(more, Ordering::Relaxed) + more, &casters.params.limits)?;
+            Ok((Parted::new(&scratch.media, ranges), Parted::new(&scratch.surfaces, ranges)))
+        })
+        .collect::<Result<_, Error>>()?;
+    let (media, surfaces) = chunks.into_iter().unzip();
+    Ok([media, surfaces])
+}
+
+/// Holds the lists to what they may take.
+pub(crate) fn check_entries<const C: usize>(entries: u64, limits: &Limits) -> Result<(), Error> {
+    let most = limits.max_elements.min(u32::MAX.into());
+    if entries > most {
+        return Err(Error::limit("the set of lists", entries, most, "entries"));
+    }
+    let absorbance = size_of::<[f32; C]>() as u64;
+    let needed = entries * (2 * absorbance + 12);
+    if needed > limits.max_bytes {
+        return Err(Error::limit("the set of lists", needed, limits.max_bytes, "bytes"));
+    }
+    Ok(())
+}
+
+/// The casters of one kind in a chunk.
+#[inline(always)]
+pub(crate) fn select(casters: &Casters<'_>, chunk: &Range<usize>, kind: SplatKind, ids: &mut Vec<u32>) {
+    ids.clear();
+    let is_wanted = |&i: &usize| casters.cloud.kind[i] == kind && casters.casts(i);
+    ids.extend(chunk.clone().filter(is_wanted).map(|i| i as u32));
+}
+
+/// Deposits of one chunk of splats, in the form that [`pulp`] compiles once per instruction set.
+struct FillChunk<'a, M: Mapping, const C: usize> {
+    casters: &'a Casters<'a>,
+    plan: &'a Plan,
+    deposit: Deposit<'a, M, C>,
+    chunk: Range<usize>,
+}
+
+impl<M: Mapping, const C: usize> pulp::NullaryFnOnce for FillChunk<'_, M, C> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(mut self) {
+        let casters = self.casters;
+        let Scratch { media, surfaces, media_batches, surface_batches, ids, .. } = &mut *self.deposit.scratch;
+        let [medium_ids, surface_ids, others] = ids;
+        let mut others = std::mem::take(others);
+        others.clear();
+        if casters.has_opaque_discs() {
+            let frame = &self.plan.frame;
+            let mapping = self.deposit.mapping;
+            let opaque = self.deposit.opaque;
+            select(casters, &self.chunk, SplatKind::Medium, medium_ids);
+            select(casters, &self.chunk, SplatKind::Surface, surface_ids);
+            let mut target = Target { mapping, opaque, entries: media };
+            target.add_media(casters, frame, medium_ids, media_batches, &mut others);
+            let mut target = Target { mapping, opaque, entries: surfaces };
+            target.add_surfaces(casters, frame, surface_ids, surface_batches, &mut others);
+        } else {
+            others.extend(self.chunk.filter(|&i| casters.casts(i)).map(|i| i as u32));
+        }
+        for &i in &others {
+            self.deposit.add(&casters.get(i as usize, &self.plan.frame, self.deposit.mapping.is_parallel()));
+        }
+        self.deposit.scratch.ids[2] = others;
+    }
+}
