@@ -31,7 +31,7 @@ mod source;
 mod text;
 mod written;
 
-pub use animation::stops::{Path, Stop};
+pub use animation::stop::{Path, Stop};
 pub use background::model::EnvironmentSource;
 pub use camera::fit::{CameraFit, DEFAULT_AZIMUTH, DEFAULT_FILL, DEFAULT_SIZE, EachPoint, FoundCamera};
 pub use convert::{ColorMap, ColorScale, PointColors, ScaleNumbers};
@@ -41,7 +41,8 @@ pub use field::Combination;
 pub use in_memory::{InMemory, SourceData, name_of as name_in_memory, source_of as source_in_memory};
 pub use light::model::{SceneLight, SlideSource};
 pub use light::points::{LightPoint, light_points};
-pub use load::{LoadOptions, MAX_SCENE_BYTES, MAX_SCENE_DEPTH, load, parse, read, schema};
+pub use load::options::LoadOptions;
+pub use load::{MAX_SCENE_BYTES, load, parse, read, schema};
 pub use material::model::SceneMaterial;
 pub use object::model::{SceneObject, Up, UpBy};
 pub use object::points_look::PointsLook;
@@ -60,6 +61,7 @@ pub use source::model::{
 };
 pub use splat_core::UpAxis;
 pub use text::overrides::Override;
+pub use text::tree::MAX_SCENE_DEPTH;
 pub use written::Written;
 
 /// The page's example compiles and holds.

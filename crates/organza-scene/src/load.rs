@@ -1,17 +1,20 @@
 //! From a file, or its bytes, to a checked scene.
 
-use super::{InMemory, Scene};
+pub(crate) mod options;
+
+use super::Scene;
 use crate::animation::tracks;
+use crate::load::options::{LoadOptions, Turn};
 use crate::scene::check;
 use crate::scene::raw::RawScene;
 use crate::text::de;
 use crate::text::json::read_json;
-use crate::text::overrides::{self, Override};
+use crate::text::overrides;
 use crate::text::toml::read_toml;
 use crate::text::tree::{Document, error_at};
 use crate::{Error, camera};
 use sha2::{Digest, Sha256};
-use splat_core::{Exceeded, MemoryAccount};
+use splat_core::Exceeded;
 use std::io::Read;
 use std::path::Path;
 use std::sync::Arc;
@@ -22,46 +25,6 @@ pub const MAX_SCENE_BYTES: u64 = 16 << 20;
 /// Bytes that a character of a scene takes while it is read, at most: a digit and a comma are a value with its place, in a list with
 /// room for as many again.
 const BYTES_PER_CHARACTER: u64 = 96;
-
-/// Most levels of lists and tables inside each other.
-pub const MAX_SCENE_DEPTH: usize = 64;
-
-/// How a scene is loaded.
-#[derive(Debug, Clone, Default)]
-pub struct LoadOptions {
-    /// Allow data outside the scene's root folder: the folder above the scene's folder (or the scene's folder itself
-    /// where that would be the root of the file system).
-    pub allow_path: bool,
-    /// Forbid that the scene's own word, its key `root`, allows data outside the scene's root folder: for scenes of strangers.
-    pub sandbox: bool,
-    /// What the text of the scene and the images of its footprints take while they are read, together with all else on the same account.
-    pub memory: MemoryAccount,
-    /// Data that the scene may name as `memory:NAME`.
-    pub in_memory: InMemory,
-    /// Changes from the command line, applied in order before anything is checked.
-    pub overrides: Vec<Override>,
-    /// The frame of the scene's animation; `None` loads the scene as it is written.
-    pub frame: Option<u32>,
-    /// Frames of a turntable, which take the place of an animation: in frame k of n the camera has gone k/n of a circle about +Y
-    /// through its target, or through the middle of all that is seen.
-    pub turntable: Option<u32>,
-}
-
-/// A frame of a turntable.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Turn {
-    /// Frames of the whole circle.
-    pub(crate) frames: u32,
-    /// This one.
-    pub(crate) frame: u32,
-}
-
-impl Turn {
-    /// How far the camera has gone, radians.
-    pub(crate) fn angle(self) -> f64 {
-        std::f64::consts::TAU * f64::from(self.frame) / f64::from(self.frames)
-    }
-}
 
 /// Reads and checks a scene file; JSON if its name ends in `.json`, else TOML. Of data files that are drawn
 /// only the beginning is looked at, for the axis that points up; images of footprints are read.

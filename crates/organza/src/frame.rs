@@ -2,16 +2,15 @@
 //! radiance, the opaque image, the device, progress. Whatever is made for it is made once, when it is first asked for.
 
 mod coarse;
-pub(crate) mod discs;
+mod engines;
 mod extent;
-pub(crate) mod grouped;
 mod light;
 mod lists;
 pub(crate) mod matter;
 mod on_device;
-mod polygons;
 mod splats;
 
+pub(crate) use engines::OpaqueEngines;
 pub(crate) use extent::Extent;
 pub(crate) use light::Maps;
 use lists::Lists;
@@ -25,6 +24,7 @@ use crate::load::Loaded;
 use crate::plan::Plan;
 use crate::scene::{LightPoint, RenderSettings, Scene};
 use crate::{Error, Progress};
+use deferred_blend::grouping::GroupsOfObjects;
 use splat_core::raster::{self, Background, OpaqueImage};
 use splat_core::shade::ChannelLayout;
 use splat_core::{Accumulator, Camera, LayerSet};
@@ -48,7 +48,8 @@ pub struct Frame<'a> {
     pub(crate) device_composites: bool,
     pub(crate) progress: &'a Progress,
     /// Groups of discs, which serve all frames of an animation.
-    pub(crate) groups: RefCell<grouped::KeptInFrames>,
+    pub(crate) groups: RefCell<KeptGroups>,
+    engines: OpaqueEngines,
     /// Whether frames follow that ask for the same light again.
     remembers: bool,
     /// Those of the frame before it, whose memory is used again.
@@ -58,6 +59,13 @@ pub struct Frame<'a> {
     maps: OnceCell<Maps>,
     shaded: OnceCell<Shaded>,
     opaque: OnceCell<OpaqueImage>,
+}
+
+/// Groups that frames of an animation keep: of translucent discs, and of opaque ones, for an object may have both.
+#[derive(Default)]
+pub(crate) struct KeptGroups {
+    pub(crate) translucent: GroupsOfObjects,
+    pub(crate) opaque: GroupsOfObjects,
 }
 
 /// What a frame leaves for the next of the same splats.
@@ -80,8 +88,14 @@ impl Leaves {
 }
 
 impl<'a> Frame<'a> {
-    /// A frame by the processor, with nothing made yet. `plan` is that of [`plan_loaded`](crate::plan_loaded) for the same scene.
-    pub fn new(scene: &'a Scene, loaded: &'a Loaded, plan: &'a Plan, progress: &'a Progress) -> Self {
+    /// A frame by the processor, with nothing made yet, whose opaque surfaces these engines draw.
+    pub(crate) fn with_engines(
+        scene: &'a Scene,
+        loaded: &'a Loaded,
+        plan: &'a Plan,
+        progress: &'a Progress,
+        engines: OpaqueEngines,
+    ) -> Self {
         Self {
             scene,
             settings: &scene.render,
@@ -93,6 +107,7 @@ impl<'a> Frame<'a> {
             device_composites: false,
             progress,
             groups: RefCell::default(),
+            engines,
             remembers: false,
             before: Cell::default(),
             lists: Lists::default(),

@@ -2,7 +2,7 @@
 
 use crate::choose::{row, technique_of};
 use crate::cost::{Change, Count, CountedPass, Item, Prediction, Translucent, before_reading, samples, shadow_map};
-use crate::frame::{Extent, Frame, grouped};
+use crate::frame::{Extent, Frame};
 use crate::scene::{LightPoint, SceneObject, Technique};
 use crate::technique::{EVERYWHERE, Fold, OwnWork, TABLE};
 use crate::{RenderOptions, ShadowTable, SplatCount, pass, stage};
@@ -130,7 +130,9 @@ fn surfaces(frame: &Frame<'_>, seen: &Seen) -> Vec<CountedPass> {
         passes.extend(steps);
     }
     let mut add = |pass, stage: &str, counts: Vec<Count>| passes.push(CountedPass::new(pass, stage.to_owned(), counts));
-    add(pass::GROUP, stage::GROUP, grouped::counts(scene, frame.loaded.cloud.len() as f64));
+    let splats = frame.loaded.cloud.len() as f64;
+    let groups = seen.translucent.iter().flat_map(|by| (row(by.technique).counts_groups)(scene, splats));
+    add(pass::GROUP, stage::GROUP, groups.collect());
     add(pass::PROJECT, stage::PROJECT, vec![Count::new(Item::ProjectedSplat, drawn)]);
     // Thick media look up the eye's map too, and share both over each cell.
     let of_eye = if plan.eye_table.is_some() { 2.0 } else { 0.0 };

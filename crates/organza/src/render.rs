@@ -8,8 +8,7 @@ use crate::choose::{row, techniques};
 use crate::cost::Prediction;
 use crate::device::Helper;
 use crate::draw::draw;
-use crate::frame::grouped::KeptInFrames;
-use crate::frame::{Frame, Leaves};
+use crate::frame::{Frame, KeptGroups, Leaves};
 use crate::load::Loaded;
 use crate::load::files::Files;
 use crate::plan::Plan;
@@ -69,7 +68,7 @@ pub fn render_from(scene: &Scene, options: &RenderOptions, progress: &Progress, 
 pub(crate) struct Left {
     pub(crate) files: Files,
     pub(crate) sets: Kept,
-    groups: KeptInFrames,
+    groups: KeptGroups,
     made: Option<Made>,
     /// The technique of each object in the last frame, by rank.
     by: Vec<Technique>,

@@ -16,15 +16,15 @@ pub(crate) mod surfels;
 
 use crate::cost::{Count, Item, Prediction, Translucent, samples};
 use crate::form::{DRAWN, Form};
-use crate::frame::Frame;
 use crate::frame::matter::{CarriesLight, Matter};
+use crate::frame::{Frame, OpaqueEngines};
 use crate::load::Loaded;
 use crate::pass;
 use crate::plan::{Estimate, Plan};
 use crate::scene::{LightPoint, RenderSettings, Scene, Technique};
 use crate::stage;
 use crate::statistics::{MediumFacts, ObjectStatistics};
-use crate::{CostRecord, Error, Layers, RenderOptions};
+use crate::{CostRecord, Error, Layers, Progress, RenderOptions};
 pub(crate) use estimates::{Asked, estimates};
 pub(crate) use particles::{Checkpoint, Kept};
 use splat_core::raster::{GlassImage, OpaqueImage};
@@ -38,6 +38,14 @@ type FormOf = fn(&ObjectStatistics) -> (Form, &'static str);
 pub(crate) fn row(technique: Technique) -> &'static Row {
     let known = TABLE.iter().find(|row| row.technique == technique);
     known.expect("invariant: every technique of a settled scene has a row")
+}
+
+impl<'a> Frame<'a> {
+    /// A frame by the processor, with nothing made yet. `plan` is that of [`plan_loaded`](crate::plan_loaded) for the same scene.
+    pub fn new(scene: &'a Scene, loaded: &'a Loaded, plan: &'a Plan, progress: &'a Progress) -> Self {
+        let engines = OpaqueEngines { discs: surfels::opaque, polygons: sheets::opaque_polygons };
+        Self::with_engines(scene, loaded, plan, progress, engines)
+    }
 }
 
 /// What a technique states.
@@ -98,6 +106,8 @@ pub(crate) struct Row {
     pub(crate) plans: fn(&Scene, &Loaded, &mut Plan),
     /// What repeats its last pass, in words; empty where nothing does.
     pub(crate) repeats: fn(&Scene) -> String,
+    /// Counted work of grouping so many splats, where it draws some in groups.
+    pub(crate) counts_groups: fn(&Scene, f64) -> Vec<Count>,
     /// Begins a frame.
     pub(crate) begin: for<'a> fn(&'a Frame<'a>) -> Box<dyn Fold + 'a>,
 }
@@ -257,6 +267,7 @@ pub(crate) static TABLE: [Row; 5] = [
         steps: &[SORT, Step { pass: pass::SURFELS, stage: stage::SURFELS, counts: surfels::counts }],
         bytes: surfels::bytes,
         plans: surfels::plans,
+        counts_groups: surfels::group_counts,
         begin: surfels::begin,
         ..POINTS
     },
@@ -319,5 +330,6 @@ const POINTS: Row = Row {
     scattering_again: |_| None,
     plans: |_, _, _| {},
     repeats: |_| String::new(),
+    counts_groups: |_, _| Vec::new(),
     begin: points::begin,
 };

@@ -1,7 +1,7 @@
 //! What folding costs: predicted from the samplers, counted while it runs.
 
 use crate::project::bins::Task;
-use crate::render::BYTES_IN_BATCH;
+use crate::scene::BYTES_IN_BATCH;
 use crate::{EnsembleParams, FoldParams, Scene};
 
 /// Work and memory of some sets, before any of it is done.

@@ -13,7 +13,7 @@ pub(crate) mod segment;
 use crate::Error;
 use crate::ensemble::depths::DepthSum;
 use crate::error::check;
-use crate::project::bins::{AREA, TILE, Tiling};
+use crate::project::tiles::{AREA, TILE, Tiling};
 use splat_core::LayerSet;
 use splat_core::shade::ChannelLayout;
 

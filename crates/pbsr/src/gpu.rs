@@ -26,7 +26,8 @@ pub use twin::{Sources, Twin};
 
 use crate::error::check;
 use crate::project::Projector;
-use crate::project::bins::{AREA, Tiling, thinning, thinning_key};
+use crate::project::bins::{thinning, thinning_key};
+use crate::project::tiles::{AREA, Tiling};
 use crate::{Ensemble, EnsembleParams, Error, KeptSets, Object, Particles, Sampler, Scene};
 use splat_core::{Shading, glam, rng};
 use splat_shaders::layouts::{ParticleObject, ParticleView};

@@ -18,9 +18,12 @@ pub(crate) mod bins;
 pub(crate) mod colored;
 pub(crate) mod flat;
 pub(crate) mod nearest;
+pub(crate) mod resolve;
 pub(crate) mod shade;
+pub(crate) mod tiles;
+
 use crate::PackedNormal;
-use crate::project::bins::{Tiling, place};
+use crate::project::tiles::{Tiling, place};
 use glam::{DMat3, DVec3, Mat3, Vec3};
 use splat_core::{Camera, Similarity, glam};
 

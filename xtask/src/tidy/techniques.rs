@@ -11,7 +11,12 @@ const TABLE: &str = "crates/organza/src/technique";
 /// Techniques as scenes name them.
 const NAMES: [&str; 5] = ["Points", "Particles", "Sheets", "Surfels", "Reference"];
 
-/// Finds names of techniques in product code beside the table.
+/// Crates that are each one technique's engine.
+const ENGINES: [&str; 2] = ["deferred_blend", "sheet_light"];
+/// What frames keep for each other has the type of the engine that made it: the one noun that passes the wall.
+const KEPT: &str = "use deferred_blend::grouping::GroupsOfObjects;";
+
+/// Finds names of techniques, and of their engines, in product code beside the table.
 pub(crate) fn named(repo: &Repo) -> Vec<String> {
     let mut found = Vec::new();
     for (path, text) in repo.rust().filter(|(path, _)| path.starts_with(HOUSE) && !path.starts_with(TABLE)) {
@@ -21,6 +26,14 @@ pub(crate) fn named(repo: &Repo) -> Vec<String> {
             for (at, _) in product.match_indices(&format!("Technique::{name}")) {
                 let line = line_of(&code, at);
                 found.push(format!("{path}:{line}: a name of a technique: ask its row in technique.rs"));
+            }
+        }
+        for engine in ENGINES {
+            for (at, _) in product.match_indices(&format!("{engine}::")) {
+                let line = line_of(&code, at);
+                if text.lines().nth(line - 1) != Some(KEPT) {
+                    found.push(format!("{path}:{line}: the engine of a technique: its folder of technique/ calls it"));
+                }
             }
         }
     }
@@ -41,5 +54,14 @@ mod tests {
         assert!(found("crates/organza/src/technique/sheets.rs", line).is_empty());
         assert!(found("crates/organza/src/frame.rs", &format!("#[cfg(test)]\nmod tests {{\n{line}}}\n")).is_empty());
         assert!(found("crates/organza/src/choose.rs", "fn auto() -> Technique {\n    Technique::Auto\n}\n").is_empty());
+    }
+
+    #[test]
+    fn an_engine_is_called_in_a_technique_alone() {
+        let found = |path: &str, text: &str| named(&Repo::of(&[(path, text)]));
+        let told = found("crates/organza/src/frame.rs", "fn f() {}\nuse sheet_light::Volume;\n");
+        assert!(told.len() == 1 && told[0].starts_with("crates/organza/src/frame.rs:2:"), "{told:?}");
+        assert!(found("crates/organza/src/technique/sheets.rs", "use sheet_light::Volume;\n").is_empty());
+        assert!(found("crates/organza/src/frame.rs", &format!("{KEPT}\n")).is_empty());
     }
 }

@@ -1,55 +1,13 @@
 //! Objects that stop on their way where a light sees them meet others: collision by a shadow map (Gunjee 2007, sections 2 and 6).
 
-use crate::animation::raw::{Blend, RawAnimation, RawStop};
-use crate::animation::tracks::{entry, items, path_of, weights};
+use crate::animation::raw::{RawAnimation, RawStop};
+use crate::animation::stop::{Path, Stop};
+use crate::animation::tracks::{entry, items, path_of};
 use crate::at::At;
 use crate::source::extract::{check_light_index, check_names};
 use crate::text::tree::{Node, Value};
-use crate::{Error, Scene, SceneObject, Source, shown};
+use crate::{Error, SceneObject, Source, shown};
 use glam::DVec3;
-
-/// An object that moves until it meets others.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Stop {
-    /// Its rank.
-    pub object: usize,
-    /// Its way.
-    pub path: Path,
-    /// The last frame of the animation.
-    pub last: u32,
-    /// The frame that the scene is at.
-    pub frame: u32,
-    /// The light whose shadow map tells what is met.
-    pub light: usize,
-    /// Names of what may be met; no track changes them or the light.
-    pub objects: Vec<String>,
-}
-
-impl Stop {
-    /// What there is to say of a time up to which the object is free, in the scene at frame 0.
-    pub fn said(&self, scene: &Scene, time: f64) -> Option<String> {
-        let name = shown(&scene.objects[self.object].name);
-        let light = self.light;
-        let said = format!("object '{name}' stops at frame {time:.2}, where light {light} sees it meet others");
-        (time < self.last.into()).then_some(said)
-    }
-}
-
-/// The places of an object by time, in frames.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Path {
-    frames: Vec<f64>,
-    places: Vec<DVec3>,
-    blend: Blend,
-}
-
-impl Path {
-    /// The translation of the object's transform at a time, which may lie between two frames.
-    pub fn at(&self, time: f64) -> DVec3 {
-        let (first, weights) = weights(&self.frames, time, self.blend);
-        weights.iter().zip(&self.places[first..]).map(|(w, p)| *w * *p).sum()
-    }
-}
 
 /// Checks what the tracks say of stopping; `at` is the place of the animation.
 pub(crate) fn check_stops(

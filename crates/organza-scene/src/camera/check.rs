@@ -4,7 +4,7 @@ use super::fit::{CameraFit, DEFAULT_AZIMUTH, DEFAULT_FILL, DEFAULT_SIZE};
 use crate::Error;
 use crate::at::At;
 use crate::camera::raw::RawCamera;
-use crate::load::Turn;
+use crate::load::options::Turn;
 use glam::DVec3;
 use splat_core::{Camera, Projection};
 use std::f64::consts::TAU;

@@ -11,7 +11,7 @@ use crate::effects::check::{Causes, check_effects};
 use crate::effects::switched::{switch, switch_lights};
 use crate::footprint::check::check_footprints;
 use crate::light::check::check_lights;
-use crate::load::{LoadOptions, Turn};
+use crate::load::options::{LoadOptions, Turn};
 use crate::material::check::{check_listed, check_materials, unknown_material};
 use crate::object::check::{Named, check_object};
 use crate::object::drawn::check_drawn;

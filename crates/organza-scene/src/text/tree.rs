@@ -3,6 +3,9 @@
 use crate::{Error, Written, shown};
 use std::path::Path;
 
+/// Most levels of lists and tables inside each other.
+pub const MAX_SCENE_DEPTH: usize = 64;
+
 /// Where a value was written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Place {

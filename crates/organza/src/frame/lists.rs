@@ -55,6 +55,11 @@ impl Frame<'_> {
         self.solid_of(true).is_empty() && !self.has_polygons()
     }
 
+    /// Whether any triangles stay triangles.
+    pub(super) fn has_polygons(&self) -> bool {
+        self.loaded.own.iter().any(|own| own.form.is_polygons())
+    }
+
     /// The opaque ones of the drawn splats, those that rays meet exactly, or the others.
     pub(super) fn solid_of(&self, exact: bool) -> &[u32] {
         let are = &self.plan.exact;

@@ -1,7 +1,6 @@
 //! Splats of a frame: those that are drawn, their footprints and radiance, and the opaque ones as an image.
 
 use super::Frame;
-use super::discs::opaque;
 use crate::pass;
 use crate::{CostRecord, Error, stage};
 use splat_core::raster::{
@@ -100,7 +99,7 @@ impl Frame<'_> {
     /// [`Error::Cancelled`], and those of [`Frame::maps`].
     pub fn opaque(&self, cost: &mut CostRecord) -> Result<&OpaqueImage, Error> {
         if self.opaque.get().is_none() {
-            self.set_opaque(self.solid(cost)?.joined(self.solid_polygons(cost)?));
+            self.set_opaque(self.solid(cost)?.joined((self.engines.polygons)(self, cost)?));
         }
         Ok(self.opaque.get().expect("invariant: it was set above"))
     }
@@ -113,7 +112,7 @@ impl Frame<'_> {
             return Ok(image);
         }
         self.progress.begin(stage::OPAQUE);
-        Ok(image.joined(opaque(self, ids, cost)?))
+        Ok(image.joined((self.engines.discs)(self, ids, cost)?))
     }
 
     fn solid_splats(&self, cost: &mut CostRecord) -> Result<OpaqueImage, Error> {

@@ -114,7 +114,7 @@ fn stop_time(stop: &Stop, eye: &Eye<'_>) -> Result<f64, Error> {
     let own = eye.splats(stop.light, &|o| o.name == eye.scene.objects[stop.object].name)?.cloud;
     let start = own.origin - origin - stop.path.at(0.0);
     let time = map.free_until(&own.position, &|time| (start + stop.path.at(time)).as_vec3(), stop.last);
-    eye.files.note(&eye.scene.file, stop.said(eye.scene, time));
+    eye.files.note(&eye.scene.file, stop.said(&eye.scene.objects[stop.object].name, time));
     Ok(time)
 }
 

@@ -5,6 +5,7 @@
 //! slabs themselves ([`half`]).
 
 mod half;
+mod polygons;
 
 use crate::cost::{Count, Item, Translucent};
 use crate::form::Form;
@@ -21,6 +22,7 @@ use sheet_light::{
     Aligned, Classify, Gradients, KernelShape, Lighting, Params, Reconstruction, SheetInput, Sheeted, Splats, Volume,
     prepare,
 };
+use splat_core::raster::OpaqueImage;
 use splat_core::{Accumulator, Camera, Direction, Limits, Packing};
 use std::ops::Range;
 
@@ -184,6 +186,11 @@ impl Fold for Sheets<'_> {
             Ok(())
         })
     }
+}
+
+/// The opaque polygons of a frame, seen in the light that comes through shadow maps; without any pixel where there are none.
+pub(crate) fn opaque_polygons(frame: &Frame<'_>, cost: &mut CostRecord) -> Result<OpaqueImage, Error> {
+    frame.solid_polygons(cost)
 }
 
 /// The volumes and splats of a frame that are the technique's own.

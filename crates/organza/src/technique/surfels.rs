@@ -1,20 +1,24 @@
 //! The `surfels` technique (Zhang and Pajarola 2007): translucent surfaces as discs that are averaged in each layer, by rays that meet
 //! them exactly, and layers that are composited in order.
 
+mod discs;
 mod glass;
+mod groups;
 mod plans;
 
 use crate::cost::{Count, Item, Translucent, samples};
-use crate::frame::discs::{disc_input, params, refuse, with_shown};
+use crate::frame::Frame;
 use crate::frame::matter::Matter;
-use crate::frame::{Frame, grouped};
 use crate::pass;
 use crate::scene::{LightPoint, Scene, SurfelGroups, SurfelLayers, Technique};
 use crate::technique::{Fold, Session, points};
 use crate::{CostRecord, Error, RenderOptions, stage};
 use deferred_blend::grouping::Membership;
 use deferred_blend::{BlendInput, Blended, Discs, Floors, Glass, Layering, Params, Surfaces, blend};
+pub(crate) use discs::opaque;
+use discs::{disc_input, params, refuse, with_shown};
 use glass::{bending, surfaces, unit};
+pub(crate) use groups::counts as group_counts;
 pub(crate) use plans::plans;
 use splat_core::glam::Vec3;
 use splat_core::raster::GlassImage;
@@ -35,10 +39,10 @@ pub(crate) fn bytes(matter: &Matter<'_>, _: &[LightPoint], _: bool, _: &RenderOp
     let discs = matter.cloud.map_or(0, |cloud| cloud.len() as u64);
     let bounds = matter.scene.materials.iter().any(|m| m.material.bounds_matter());
     let glass = if bounds { Surfaces::bytes(discs) + GLASS_BYTES * matter.camera.pixels() } else { 0 };
-    let groups = grouped::bytes(matter.scene, discs, matter.cloud.map_or(0, |cloud| cloud.bytes()));
+    let group_bytes = groups::bytes(matter.scene, discs, matter.cloud.map_or(0, |cloud| cloud.bytes()));
     let is_solid = |cloud: &Cloud| cloud.kind.contains(&SplatKind::Opaque);
     let opaque = if matter.cloud.is_some_and(is_solid) { OPAQUE_BYTES * matter.camera.pixels() } else { 0 };
-    DISC_BYTES * discs + glass + groups + opaque
+    DISC_BYTES * discs + glass + group_bytes + opaque
 }
 
 /// Whether light falls on bumps, or what to set so that it does.
@@ -85,9 +89,9 @@ impl<'a> Fold for Surfels<'a> {
         let frame = self.frame;
         let params = params(frame);
         if self.discs.is_none() {
-            if let Some(groups) = frame.settings.surfels.layers.groups() {
+            if let Some(asked) = frame.settings.surfels.layers.groups() {
                 let ids = frame.translucent(Technique::Surfels);
-                self.members = Some(grouped::members(frame, groups, ids, false, cost)?);
+                self.members = Some(groups::members(frame, asked, ids, false, cost)?);
             }
             self.discs = Some(project(frame, &params, self.members.as_ref(), cost)?);
         }

@@ -1,8 +1,8 @@
 //! Samplers as tables, from which a device makes the same sets: the same counters, so the same particles but for rounding.
 
 use crate::Sampler;
-use crate::render::{Object, Scene};
 use crate::sampler::{Poisson, runs};
+use crate::scene::{Object, Scene};
 use crate::stream::{REJECTED_FROM, Stage, rejection};
 use splat_core::glam::Mat3;
 use splat_core::rng;

@@ -3,17 +3,12 @@
 //! Blocks of particles are projected in lanes, down to the tile. Those that are not kept are not picked out: they go to a
 //! tile of their own, behind all others.
 
+use crate::project::tiles::{Tiling, place};
 use crate::project::{BLOCK, EVERYWHERE, Footing, Projector, View};
 use crate::stream::{Stage, scramble};
 use crate::{PackedColor, PackedNormal, Particles, Sampler};
 use splat_core::rng;
 use std::ops::Range;
-
-/// Side of a tile, pixels: its depths fit the first cache.
-pub(crate) const TILE: usize = 64;
-
-/// Pixels of a tile.
-pub(crate) const AREA: usize = TILE * TILE;
 
 /// Where the bits of the channels begin that a particle does not hide.
 const CLEAR: u32 = 28;
@@ -50,30 +45,6 @@ impl Record {
     #[inline(always)]
     pub(crate) fn within(&self) -> [f32; 2] {
         [self.place >> 12, self.place >> 20].map(|v| ((v & 255) as f32 + 0.5) * (1.0 / 256.0))
-    }
-}
-
-/// Tiles of an image.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Tiling {
-    pub(crate) size: [usize; 2],
-    pub(crate) columns: usize,
-    pub(crate) rows: usize,
-}
-
-impl Tiling {
-    pub(crate) fn new(size: [u32; 2]) -> Self {
-        let size = size.map(|s| s as usize);
-        Self { size, columns: size[0].div_ceil(TILE), rows: size[1].div_ceil(TILE) }
-    }
-
-    pub(crate) fn tiles(&self) -> usize {
-        self.columns * self.rows
-    }
-
-    /// Where pixel (x, y) stands in tile order.
-    pub(crate) fn index(&self, x: usize, y: usize) -> usize {
-        (y / TILE * self.columns + x / TILE) * AREA + y % TILE * TILE + x % TILE
     }
 }
 
@@ -334,12 +305,4 @@ impl pulp::NullaryFnOnce for Thin<'_> {
             view.tile[j] = if kept { view.tile[j] } else { outside };
         }
     }
-}
-
-/// Tile of a pixel, and the place in the tile as a record has it; `within` are two of 8 bits.
-#[inline(always)]
-pub(crate) fn place(x: u32, y: u32, within: u32, columns: u32) -> (u32, u32) {
-    const SIDE: u32 = TILE as u32;
-    let tile = (y / SIDE).wrapping_mul(columns).wrapping_add(x / SIDE);
-    (tile, (y % SIDE * SIDE + x % SIDE) | ((within & 0xffff) << 12))
 }

@@ -6,8 +6,9 @@
 //! particle is shaded once for all channels that show it.
 
 use crate::ensemble::TileSums;
-use crate::project::bins::{AREA, TILE, Task};
-use crate::render::{Resolve, solid};
+use crate::project::bins::Task;
+use crate::project::resolve::{Resolve, solid};
+use crate::project::tiles::{AREA, TILE};
 use splat_core::shade::MAX_CHANNELS;
 
 /// The depth buffers of one tile.

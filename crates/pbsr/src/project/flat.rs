@@ -6,7 +6,7 @@
 
 use crate::PackedColor;
 use crate::ensemble::{BRIGHTEST, FRACTION, LUMINANCE, TileSums, fixed, fixed_square, raise};
-use crate::project::bins::AREA;
+use crate::project::tiles::AREA;
 
 /// Hits that are converted at once.
 pub(crate) const BLOCK: usize = 32;

@@ -2,9 +2,10 @@
 
 use crate::PackedColor;
 use crate::ensemble::TileSums;
-use crate::project::bins::{AREA, Record, TILE, Task};
+use crate::project::bins::{Record, Task};
 use crate::project::flat::{self, Flat, Shown};
-use crate::render::{Resolve, solid};
+use crate::project::resolve::{Resolve, solid};
+use crate::project::tiles::{AREA, TILE};
 use splat_core::shade::MAX_CHANNELS;
 
 /// The key of a pixel that nothing hides.

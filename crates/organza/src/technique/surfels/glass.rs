@@ -1,7 +1,7 @@
 //! What surfaces that bound matter mirror and bend.
 
+use super::discs::disc_input;
 use crate::frame::Frame;
-use crate::frame::discs::disc_input;
 use crate::scene::{self, Technique};
 use deferred_blend::{Bending, Surfaces};
 use splat_core::{SplatKind, StageCost};

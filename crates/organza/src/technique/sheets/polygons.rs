@@ -1,6 +1,6 @@
 //! Triangles that stay triangles, of objects whose technique keeps them.
 
-use super::Frame;
+use crate::frame::Frame;
 use crate::load::own::Own;
 use crate::{CostRecord, Error, pass, stage};
 use sheet_light::half::{PolygonLamp, PolygonView, Polygons, opaque_polygons};
@@ -9,13 +9,8 @@ use splat_core::raster::OpaqueImage;
 use splat_core::{optics, shade::LitBy};
 
 impl<'a> Frame<'a> {
-    /// Whether there are any.
-    pub(super) fn has_polygons(&self) -> bool {
-        self.loaded.own.iter().any(|own| own.form.is_polygons())
-    }
-
     /// All of them.
-    pub(crate) fn polygons(&self) -> Vec<Polygons<'a>> {
+    pub(super) fn polygons(&self) -> Vec<Polygons<'a>> {
         let loaded = self.loaded;
         let scene = self.scene;
         let one = |own: &'a Own| {
@@ -76,7 +71,7 @@ impl<'a> Frame<'a> {
     }
 
     /// Volumes in slabs, in the light of some lights.
-    pub(crate) fn sheet_input<'b>(&'b self, volumes: Vec<Volume<'b>>, lights: Vec<LitBy<'b>>) -> SheetInput<'b> {
+    pub(super) fn sheet_input<'b>(&'b self, volumes: Vec<Volume<'b>>, lights: Vec<LitBy<'b>>) -> SheetInput<'b> {
         let camera = &self.camera;
         let shadow_origin = self.loaded.cloud.origin;
         let ambient = self.scene.ambient;

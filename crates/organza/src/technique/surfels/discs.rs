@@ -1,6 +1,7 @@
 //! Discs of a frame that rays meet exactly: what they show, and the opaque ones (Zhang and Pajarola 2007, sections 3 and 5.1).
 
-use super::{Frame, grouped, record};
+use super::groups;
+use crate::frame::{Frame, record};
 use crate::pass;
 use crate::scene::OpaqueSurfels;
 use crate::{CostRecord, Error};
@@ -9,10 +10,10 @@ use splat_core::Similarity;
 use splat_core::raster::OpaqueImage;
 
 /// What these discs hide, and show.
-pub(super) fn opaque(frame: &Frame<'_>, ids: &[u32], cost: &mut CostRecord) -> Result<OpaqueImage, Error> {
+pub(crate) fn opaque(frame: &Frame<'_>, ids: &[u32], cost: &mut CostRecord) -> Result<OpaqueImage, Error> {
     let params = params(frame);
     let asked = &frame.settings.surfels.opaque;
-    let group = |groups| grouped::members(frame, groups, ids, true, cost);
+    let group = |asked| groups::members(frame, asked, ids, true, cost);
     let members = asked.groups().map(group).transpose()?;
     let passes = match (asked, &members) {
         (OpaqueSurfels::OnePass { voronoi, .. }, Some(members)) => {
@@ -36,7 +37,7 @@ pub(super) fn opaque(frame: &Frame<'_>, ids: &[u32], cost: &mut CostRecord) -> R
 }
 
 /// Hands on what discs show: light on pixels, or what shading has given to each.
-pub(crate) fn with_shown<T>(
+pub(super) fn with_shown<T>(
     frame: &Frame<'_>,
     cost: &mut CostRecord,
     draw: impl FnOnce(Shown<'_>, &mut CostRecord) -> Result<T, Error>,
@@ -53,19 +54,19 @@ pub(crate) fn with_shown<T>(
 }
 
 /// From each object into the world, in the cloud's unit.
-pub(crate) fn transforms(frame: &Frame<'_>) -> Vec<Similarity> {
+pub(super) fn transforms(frame: &Frame<'_>) -> Vec<Similarity> {
     let unit = libm::exp2(f64::from(-frame.loaded.exponent));
     frame.scene.objects.iter().map(|object| object.transform.scaled(unit)).collect()
 }
 
 /// Some discs of what is drawn.
-pub(crate) fn disc_input<'a>(frame: &'a Frame<'a>, ids: &'a [u32]) -> DiscInput<'a> {
+pub(super) fn disc_input<'a>(frame: &'a Frame<'a>, ids: &'a [u32]) -> DiscInput<'a> {
     let loaded = frame.loaded;
     let cloud = frame.drawn();
     DiscInput { cloud, ids, camera: &frame.camera, footprints: &loaded.footprints, materials: &loaded.materials }
 }
 
-pub(crate) fn params(frame: &Frame<'_>) -> Params {
+pub(super) fn params(frame: &Frame<'_>) -> Params {
     let settings = &frame.settings.surfels;
     Params {
         disc_scale: settings.disc_scale as f32,
@@ -74,7 +75,7 @@ pub(crate) fn params(frame: &Frame<'_>) -> Params {
     }
 }
 
-pub(crate) fn refuse(error: deferred_blend::Error) -> Error {
+pub(super) fn refuse(error: deferred_blend::Error) -> Error {
     match error {
         deferred_blend::Error::Cancelled => Error::Cancelled,
         other => Error::Internal(other.to_string()),

@@ -1,11 +1,11 @@
 //! Groups of discs, as the algorithms of the paper ask for: found once for each object, and kept while it only moves.
 
-use super::Frame;
 use crate::cost::{Count, Item};
+use crate::frame::Frame;
 use crate::scene::{Collisions, Coverage, Grouping, Scene, SceneObject, SurfelGroups};
 use crate::{CostRecord, Error, escape_controls};
 use crate::{pass, stage as stages};
-use deferred_blend::grouping::{self, GroupsOfObjects, KeptGroups, Membership, Method, Recipe};
+use deferred_blend::grouping::{self, KeptGroups, Membership, Method, Recipe};
 
 /// How the discs of an object are grouped, seen by some camera.
 fn recipe(groups: &SurfelGroups, frame: &Frame<'_>, object: &SceneObject) -> Recipe {
@@ -38,11 +38,8 @@ fn coverage(asked: Coverage, method: &Method) -> grouping::Coverage {
     }
 }
 
-/// Groups that frames of an animation keep: of translucent discs, and of opaque ones, for an object may have both.
-pub(crate) type KeptInFrames = [GroupsOfObjects; 2];
-
 /// The groups of discs that are drawn, all of a kind, by their places. The cost record has all discs, and those that were grouped anew.
-pub(crate) fn members(
+pub(super) fn members(
     frame: &Frame<'_>,
     groups: &SurfelGroups,
     ids: &[u32],
@@ -54,7 +51,8 @@ pub(crate) fn members(
     let of = |rank: usize| (transforms[rank], recipe(groups, frame, &objects[rank]));
     frame.progress.begin(stages::GROUP);
     cost.measure(pass::GROUP, |stage| {
-        let kept = &mut frame.groups.borrow_mut()[usize::from(are_opaque)];
+        let groups = &mut *frame.groups.borrow_mut();
+        let kept = if are_opaque { &mut groups.opaque } else { &mut groups.translucent };
         let made = kept.members_of_all(frame.drawn(), ids, of, Some(frame.progress));
         let (all, anew) = made.map_err(|(rank, e)| refuse(&objects[rank], e))?;
         (stage.items_in, stage.items_out, stage.bytes) = (ids.len() as u64, anew, all.bytes());
@@ -83,7 +81,7 @@ pub(crate) fn counts(scene: &Scene, discs: f64) -> Vec<Count> {
 }
 
 /// Bytes of grouping so many discs, of a cloud of these bytes.
-pub(crate) fn bytes(scene: &Scene, discs: u64, cloud: u64) -> u64 {
+pub(super) fn bytes(scene: &Scene, discs: u64, cloud: u64) -> u64 {
     let settings = &scene.render.surfels;
     let of = |groups: &SurfelGroups| {
         let method = match groups.grouping {
