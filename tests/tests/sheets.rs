@@ -6,6 +6,10 @@ fn in_sheets(scene: &str, arguments: &[&str]) -> Picture {
     draw(scene, &[&["--technique", "sheets"], arguments].concat())
 }
 
+/// The forms of slabs: splatted, gathered by the same kernel, gathered linearly.
+const FORMS: [&str; 3] =
+    ["render.sheets.reconstruction='splat'", "render.sheets.reconstruction='gather'", "render.sheets.kernel='linear'"];
+
 /// Largest difference from a number, over pixels.
 fn off(seen: &[f64], expected: f64) -> f64 {
     seen.iter().map(|v| (v - expected).abs()).fold(0.0, f64::max)
@@ -19,11 +23,15 @@ fn a_slab_of_fog_has_its_transmittance_at_any_width_of_slabs() {
              extinction = {tau:?}, spacing = 0.1 }}\n[render.sheets]\ntransmittance_cutoff = 0\n",
             parallel_view(2.0, 32)
         );
-        for width in ["'auto'", "0.033", "0.7", "3"] {
-            let picture = in_sheets(&scene, &["--set", &format!("render.sheets.slab_width={width}")]);
-            let seen = window(&picture.opacity(), 32, 4..28, 4..28);
-            let through: Vec<f64> = seen.iter().map(|a| 1.0 - a).collect();
-            assert!(off(&through, (-tau).exp()) < 1e-5, "{tau}, slabs {width}: {:e}", off(&through, (-tau).exp()));
+        for form in FORMS {
+            for width in ["'auto'", "0.033", "0.7", "3"] {
+                let width = format!("render.sheets.slab_width={width}");
+                let picture = in_sheets(&scene, &["--set", &width, "--set", form]);
+                let seen = window(&picture.opacity(), 32, 4..28, 4..28);
+                let through: Vec<f64> = seen.iter().map(|a| 1.0 - a).collect();
+                let error = off(&through, (-tau).exp());
+                assert!(error < 1e-5, "{tau}, {width}, {form}: {error:e}");
+            }
         }
     }
 }
@@ -33,12 +41,98 @@ fn rays_of_a_wide_lens_are_as_long_as_they_are() {
     let scene = "version = 1\n[camera]\nposition = [0, 0, 3]\ntarget = [0, 0, 0]\nfov_y = 90\nsize = [32, 32]\n\
                  [[object]]\nname = 'fog'\nmedium_box = { min = [-9, -9, -0.5], max = [9, 9, 0.5], \
                  extinction = 0.6, spacing = 0.25 }\n[render]\nantialias = 1\n";
-    let alpha = in_sheets(scene, &[]).opacity();
-    for (k, alpha) in alpha.iter().enumerate() {
-        let at = |i: usize| (i as f64 + 0.5) / 16.0 - 1.0;
-        let [x, y] = [at(k % 32), at(k / 32)];
-        let exact = (-0.6 * (1.0 + x * x + y * y).sqrt()).exp();
-        assert!((1.0 - alpha - exact).abs() < 1e-5, "{k}: {alpha}, expected {}", 1.0 - exact);
+    for form in FORMS {
+        let alpha = in_sheets(scene, &["--set", form]).opacity();
+        for (k, alpha) in alpha.iter().enumerate() {
+            let at = |i: usize| (i as f64 + 0.5) / 16.0 - 1.0;
+            let [x, y] = [at(k % 32), at(k / 32)];
+            let exact = (-0.6 * (1.0 + x * x + y * y).sqrt()).exp();
+            assert!((1.0 - alpha - exact).abs() < 1e-5, "{form}, {k}: {alpha}, expected {}", 1.0 - exact);
+        }
+    }
+}
+
+/// A ball whose values fall off around its middle, classified, lit and shadowed.
+const BALL: &str = "[[light]]\nkind = 'directional'\ndirection = [-0.4, -1, -0.6]\nirradiance = [2, 1.9, 1.8]\n\
+     [ambient]\ncolor = [0.1, 0.1, 0.12]\n\
+     [[object]]\nname = 'ball'\n\
+     density = { expression = 'exp(-2*(x^2 + y^2 + z^2))', box = [[-1, -1, -1], [1, 1, 1]], spacing = 0.06, extinction = 2.5 }\n\
+     [render]\ntechnique = 'sheets'\nlayers = ['effects', 'shadow']\n";
+
+#[test]
+fn gathered_slabs_show_what_splatted_ones_do() {
+    let scene = parallel_view(2.4, 48) + BALL;
+    let [splatted, gathered, linear] = FORMS.map(|form| in_sheets(&scene, &["--set", form]));
+    for channel in ["R", "G", "A", "scatter1.R"] {
+        let a = splatted.channel(channel);
+        let mean = a.iter().sum::<f64>() / a.len() as f64;
+        assert!(mean > 0.02, "{channel}: mean {mean}");
+        let error = |other: &Picture| {
+            let square = a.iter().zip(other.channel(channel)).map(|(a, b)| (a - b).powi(2)).sum::<f64>();
+            (square / a.len() as f64).sqrt()
+        };
+        println!("{channel}: gathered {:.2e}, linear {:.2e}", error(&gathered), error(&linear));
+        // The spline is within .0007 of the range of the kernel at a step edge; a linear kernel blurs less.
+        assert!(error(&gathered) < 1e-3, "{channel}: {:e}", error(&gathered));
+        assert!(error(&linear) < 1e-2, "{channel}: {:e}", error(&linear));
+        // They are not the same form under three names.
+        assert!(error(&gathered) > 0.0 && error(&linear) > error(&gathered), "{channel}");
+    }
+}
+
+#[test]
+fn explain_says_which_form_draws_and_why() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = folder.path().join("scene.toml");
+    std::fs::write(&scene, parallel_view(2.4, 48) + BALL).unwrap();
+    let explained = |settings: &[&str]| {
+        let sets = settings.iter().flat_map(|setting| ["--set", setting]);
+        let output = organza().arg("explain").arg(&scene).args(sets).output().unwrap();
+        assert!(output.status.success(), "{settings:?}: {}", String::from_utf8_lossy(&output.stderr));
+        String::from_utf8(output.stdout).unwrap().split_whitespace().collect::<Vec<_>>().join(" ")
+    };
+    for (settings, form, reason) in [
+        (&[][..], "gathered slabs", "a quarter of the voxels or more has extinction"),
+        (&["render.sheets.kernel='linear'"], "linearly gathered slabs", "the scene asks for it"),
+        (&["render.sheets.reconstruction='splat'"], "splatted slabs", "the scene asks for it"),
+        (&["render.sheets.kernel_extent=3"], "splatted slabs", "a kernel that is splatted alone"),
+        (&["render.sheets.kernel_sections=64"], "splatted slabs", "a kernel that is splatted alone"),
+        (&["render.sheets.classify='before'"], "splatted slabs", "before they are reconstructed"),
+        (&["render.sheets.aligned='axis'", "camera.orthographic=2"], "splatted slabs", "along the lattice"),
+        (&["render.sheets.accumulation='f16'"], "splatted slabs", "half precision"),
+        (&["render.sheets.slicing='half_vector'"], "splatted slabs", "half vectors"),
+        (&["object.ball.density.spacing=0.02"], "splatted slabs", "finer than samples"),
+        (&["object.ball.density.expression='exp(-2*(x^2+y^2+z^2)) - 0.8'"], "splatted slabs", "less than a quarter"),
+    ] {
+        let text = explained(settings);
+        assert!(text.contains(form), "{settings:?}: no `{form}` in {text}");
+        assert!(text.contains(reason), "{settings:?}: no `{reason}` in {text}");
+        assert_eq!(text.contains("gathered slabs"), form.contains("gathered"), "{settings:?}: {text}");
+    }
+}
+
+#[test]
+fn what_gathered_slabs_have_not_is_refused_by_name() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = folder.path().join("scene.toml");
+    for (settings, key) in [
+        ("reconstruction = 'gather', kernel_extent = 2", "`kernel_extent`"),
+        ("reconstruction = 'gather', kernel_sigma = 0.7", "`kernel_sigma`"),
+        ("reconstruction = 'gather', kernel_sections = 256", "`kernel_sections`"),
+        ("reconstruction = 'gather', classify = 'before'", "`classify`"),
+        ("reconstruction = 'gather', aligned = 'axis'", "`aligned`"),
+        ("reconstruction = 'gather', accumulation = 'f16'", "`accumulation`"),
+        ("reconstruction = 'gather', slicing = 'half_vector'", "`slicing`"),
+        ("kernel = 'linear', kernel_extent = 3", "`kernel_extent`"),
+        ("kernel = 'linear', reconstruction = 'splat'", "`kernel`"),
+        ("kernel = 'cubic'", "cubic"),
+        ("reconstruction = 'both'", "both"),
+    ] {
+        std::fs::write(&scene, format!("{}{BALL}sheets = {{ {settings} }}\n", parallel_view(2.4, 8))).unwrap();
+        let output = organza().arg("explain").arg(&scene).output().unwrap();
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(3), "{settings}: {said}");
+        assert!(said.contains(key) && said.contains("scene.toml:"), "{settings}: {said}");
     }
 }
 

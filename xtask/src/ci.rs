@@ -111,10 +111,13 @@ pub(crate) fn clippy() -> String {
     format!("clippy --workspace --all-targets --features {FEATURES},{DRIVER} -- -D warnings")
 }
 
+/// Every package as it would be published, unpacked and built by itself.
+const PACKAGES: &str = "publish --workspace --dry-run --allow-dirty";
+
 /// What takes minutes and rarely breaks where [`run`] holds, to be run before a release: kernels
 /// compiled anew, where tests hold the hashes of what they were compiled from; each crate by itself, with none of its features
 /// and with each of them; recordings by every executor under every validation; every scene drawn, forms
-/// that take long, every bit of small files flipped, and a minute of each target of fuzzing.
+/// that take long, every bit of small files flipped, every package built by itself, and a minute of each target of fuzzing.
 pub(crate) fn deep(repo: &Repo) -> Outcome {
     // Of the whole workspace, so that what other steps have compiled serves this one.
     let slow = format!("{TESTS} --features {FEATURES},{DRIVER} --test tests --test end-to-end -- {DEEP}");
@@ -127,6 +130,7 @@ pub(crate) fn deep(repo: &Repo) -> Outcome {
         Step { name: "vulkan", work: Work::Task(vulkan::run) },
         Step { name: "deep tests", work: Work::Cargo(vec![split(&slow)], &[]) },
         Step { name: "damage", work: Work::Cargo(vec![split(&damage)], &[("ORGANZA_DEEP", "1")]) },
+        Step { name: "packages", work: Work::Cargo(vec![split(PACKAGES)], &[]) },
         Step { name: "python", work: Work::Task(python::run) },
         Step { name: "fuzz", work: Work::Task(|repo| fuzz::run(repo, &[])) },
     ];

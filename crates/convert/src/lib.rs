@@ -22,6 +22,7 @@ pub mod cost;
 mod field_points;
 mod mesh;
 mod points;
+#[cfg(feature = "reference")]
 pub mod reference;
 mod splats;
 mod volume;
@@ -54,6 +55,8 @@ pub use points::point_cells::with_cells;
 pub use points::shown_points::{PointsShown, ShownPoints, shown_points};
 pub use points::surfels::{SurfelParams, SurfelReport, raw_to_surfels};
 pub use points::thin::thinned;
+/// The nouns that this crate takes and returns.
+pub use splat_core;
 pub use splats::footprints::FootprintChoice;
 pub use volume::body_centred::body_centred;
 pub use volume::gaps::{gaps_of_value, gaps_outside, transparent_gaps};

@@ -19,6 +19,7 @@ mod layer;
 mod layers;
 mod opaque;
 mod params;
+#[cfg(feature = "reference")]
 pub mod reference;
 mod shade;
 mod surfaces;
@@ -33,6 +34,8 @@ pub use glass::{Bending, Glass};
 pub use opaque::{Opaque, OpaqueInput, Passes, resolve_opaque};
 pub use params::Params;
 pub use shade::{Light, Shown};
+/// The nouns that this crate takes and returns.
+pub use splat_core;
 pub use surfaces::Surfaces;
 
 /// The page's example compiles and holds.

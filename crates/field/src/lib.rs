@@ -36,6 +36,8 @@ pub use marching_cubes::isosurface_to_mesh;
 pub use mpu::{MpuField, MpuParams, MpuReport, SurfaceSample};
 pub use search::{ZeroSearch, extinct_bounds, visible_ends};
 pub use solids::{Combination, Solid};
+/// The nouns that this crate takes and returns.
+pub use splat_core;
 pub use surface_nets::{Lattice, evaluations, surface_nets};
 
 /// The page's example compiles and holds.

@@ -42,6 +42,7 @@
 
 mod along;
 mod buckets;
+pub mod comparison;
 pub mod cost;
 mod crowd;
 mod depth_bits;
@@ -53,6 +54,7 @@ mod params;
 mod project;
 mod radix;
 mod ranges;
+#[cfg(feature = "reference")]
 pub mod reference;
 mod scratch;
 mod second_level;
@@ -65,6 +67,8 @@ pub use error::Error;
 pub use params::{Params, Thickness};
 pub use scratch::{Method, Scratch, SortInfo, ThicknessRule};
 pub use sort::{slice_cloud, slice_depths};
+/// The nouns that this crate takes and returns.
+pub use splat_core;
 pub use splat_core::{Direction, SliceOrder};
 
 /// The page's example compiles and holds.

@@ -50,8 +50,8 @@ pub use paths::{ROOT_KEY, relative_path, root_for};
 pub use render::layer_choice::{LAYER_NAMES, LayerChoice};
 pub use render::settings::{
     Aligned, Bending, Classify, Collisions, Coverage, Goal, Grouping, OpaqueSurfels, ParticlesSettings, PointsSettings,
-    RenderSettings, Scattering, ShadowMapping, ShadowSettings, SheetsSettings, Slicing, SoftShadows, SurfaceSampler,
-    SurfelGroups, SurfelLayers, SurfelsSettings, Technique, TechniqueKey, VolumeSampler,
+    Reconstruction, RenderSettings, Scattering, ShadowMapping, ShadowSettings, SheetKernel, SheetsSettings, Slicing,
+    SoftShadows, SurfaceSampler, SurfelGroups, SurfelLayers, SurfelsSettings, Technique, TechniqueKey, VolumeSampler,
 };
 pub use scene::model::Scene;
 pub use shown::{escape_controls, place, printable, short, shown};

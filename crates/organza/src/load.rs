@@ -260,7 +260,7 @@ impl Inputs<'_> {
             })?;
         }
         let mut camera = scene.camera;
-        let exponent = normalize(&mut cloud, &mut own, &mut camera, (&mut lights, &mut images.slides));
+        let exponent = normalize(&mut cloud, &mut own, &mut camera, &mut lights, &mut images.slides);
         cloud.canonicalize();
         let objects: Vec<Object> = scene.objects.iter().map(object::entry).collect();
         if scene.render.splat_share < 1.0 {

@@ -247,6 +247,7 @@ pub(crate) static TABLE: [Row; 5] = [
         scatters_by: Some(
             "technique = \"sheets\" with [render.sheets] slicing = \"half_vector\" and scattering = \"forward_and_back\"",
         ),
+        plans: sheets::plans,
         scattering_again: |settings| {
             let sheets = settings.sheets.scattering_again()?;
             Some(RenderSettings { sheets, ..settings.clone() })

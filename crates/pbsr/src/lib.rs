@@ -58,6 +58,7 @@ pub mod opacity;
 mod params;
 mod particles;
 mod project;
+#[cfg(feature = "reference")]
 pub mod reference;
 mod render;
 mod sampler;
@@ -82,6 +83,8 @@ pub use render::Renderer;
 pub use sampler::{KeptSets, Sampler};
 pub use scene::{FoldParams, Object, Scene};
 pub use shown::{Look, ShownSampler};
+/// The nouns that this crate takes and returns.
+pub use splat_core;
 pub use splat_core::shade::LitBy;
 pub use surfaces::brownian::{BrownianParams, BrownianReport, BrownianSampler};
 pub use surfaces::implicit::{CellCounts, ImplicitSurface};

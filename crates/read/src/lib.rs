@@ -52,6 +52,8 @@ pub use format::up::{stated_up_axis, up_axis};
 #[cfg(feature = "las")]
 pub use points::laz::panic_is_input_error;
 pub use reading::{Fix, Mended, NamedColumn, Notes};
+/// The nouns that this crate takes and returns.
+pub use splat_core;
 
 use format::{Format, format_of, is_raw, unread};
 #[cfg(feature = "exr")]

@@ -63,6 +63,8 @@ pub use path::estimate::{Estimate, PathSettings, PixelSampling, Statistics, path
 pub use placed::{Placed, TurnedBox};
 pub use ray::Ray;
 pub use scene::Scene;
+/// The nouns that this crate takes and returns.
+pub use splat_core;
 pub use splats::composite::{ExactImage, Fragment, Input, Order, composite, fold_fragments};
 pub use splats::pixel::PixelSum;
 pub use surfaces::dielectric::{

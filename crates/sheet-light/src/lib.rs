@@ -65,6 +65,8 @@ pub use shared::input::{SheetInput, Splats};
 pub use shared::params::{Aligned, Classify, GatherKernel, Gradients, KernelShape, Lighting, Params, Reconstruction};
 pub use shared::sections;
 pub use shared::volume::Volume;
+/// The nouns that this crate takes and returns.
+pub use splat_core;
 
 /// The page's examples compile and hold.
 #[cfg(doctest)]

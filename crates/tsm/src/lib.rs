@@ -34,6 +34,7 @@ pub mod mapping;
 mod params;
 mod planning;
 mod reading;
+#[cfg(feature = "reference")]
 pub mod reference;
 mod scene;
 mod shadow_map;
@@ -46,6 +47,8 @@ pub use planning::cost::{Counts, Limit, Prediction};
 pub use reading::query::SurfacePoint;
 pub use scene::Scene;
 pub use shadow_map::ShadowMap;
+/// The nouns that this crate takes and returns.
+pub use splat_core;
 
 /// The page's example compiles and holds.
 #[cfg(doctest)]

@@ -1,5 +1,6 @@
 //! Slow and obvious: the paper's insertion lists with their number of steps, and optical depth by brute force in f64.
 
+use crate::building::sampling::erf;
 use glam::{DVec3, Vec3};
 use splat_core::{Cloud, FootprintStack, SplatKind, glam};
 
@@ -88,12 +89,4 @@ fn one(cloud: &Cloud, footprints: &FootprintStack, i: usize, from: DVec3, direct
         return if area <= k { f64::INFINITY } else { 0.0 };
     }
     k * footprint.norm() / (radius * tangent.length()) * footprint.profile(s)
-}
-
-/// The error function; its absolute error is below 1.5e-7 (Abramowitz and Stegun 7.1.26).
-pub(crate) fn erf(x: f64) -> f64 {
-    const A: [f64; 5] = [0.254_829_592, -0.284_496_736, 1.421_413_741, -1.453_152_027, 1.061_405_429];
-    let t = 1.0 / (1.0 + 0.327_591_1 * x.abs());
-    let sum = A.iter().rev().fold(0.0, |s, a| (s + a) * t);
-    (1.0 - sum * (-x * x).exp()).copysign(x)
 }

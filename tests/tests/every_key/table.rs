@@ -448,6 +448,10 @@ fn render() -> Vec<Entry> {
         of(BALL, "render.sheets.scattering_cone", "render.sheets.scattering_cone=70").by(SHEETS).with(SCATTERING),
         of(BALL, "render.sheets.voxels_per_cell", "render.sheets.voxels_per_cell=256").by(SHEETS).with(SCATTERING),
         of(BALL_AND_SURFACE, "render.sheets.slab_width", "render.sheets.slab_width=0.4").by(SHEETS),
+        of(BALL, "render.sheets.reconstruction", "render.sheets.reconstruction='gather'")
+            .by(SHEETS)
+            .with(&["render.sheets.reconstruction='splat'"]),
+        of(BALL, "render.sheets.kernel", "render.sheets.kernel='linear'").by(SHEETS),
         of(BALL_AND_SURFACE, "render.sheets.kernel_extent", "render.sheets.kernel_extent=3")
             .by(SHEETS)
             .but(These(&["implicit"]), NO_VOXELS),

@@ -4,8 +4,8 @@ use super::Request;
 use super::knob::points::spacing_factor;
 use super::knob::tables;
 use organza::scene::{
-    Classify, Collisions, Coverage, Grouping, RenderSettings, Scene, ShadowMapping, Slicing, SoftShadows,
-    SurfaceSampler, SurfelLayers, VolumeSampler,
+    Classify, Collisions, Coverage, Grouping, Reconstruction, RenderSettings, Scene, ShadowMapping, SheetKernel,
+    Slicing, SoftShadows, SurfaceSampler, SurfelLayers, VolumeSampler,
 };
 use splat_core::Packing;
 use splat_core::raster::Accumulation;
@@ -164,6 +164,15 @@ fn sheets(render: &RenderSettings, all: &mut Vec<Stated>) {
     let sheets = &render.sheets;
     let mut add = |key, value| all.push(("render.sheets", key, value));
     add("slab_width", sheets.slab_width.map_or_else(|| quoted("auto"), number));
+    let reconstruction = match sheets.reconstruction {
+        Reconstruction::Auto => "auto",
+        Reconstruction::Gather => "gather",
+        Reconstruction::Splat => "splat",
+    };
+    add("reconstruction", quoted(reconstruction));
+    if sheets.kernel == SheetKernel::Linear {
+        add("kernel", quoted("linear"));
+    }
     add("kernel_extent", number(sheets.kernel_extent));
     add("kernel_sigma", number(sheets.kernel_sigma));
     add("kernel_sections", sheets.kernel_sections.to_string());

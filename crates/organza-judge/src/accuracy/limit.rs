@@ -42,7 +42,7 @@ pub(super) fn converge(
     let mut refused = Vec::new();
     for (knob, of_step) in sweep.knobs.iter().zip(&settings.of_step) {
         progress.begin(knob.name);
-        match curve(sweep, (knob, of_step), settings, timed, floor, draw) {
+        match curve(sweep, knob, of_step, settings, timed, floor, draw) {
             Ok(curve) => curves.extend(curve),
             Err(e) if is_resource_limit(&e) => refused.push(Skipped { knob: knob.name, reason: e.to_string() }),
             Err(e) => return Err(e),
@@ -56,7 +56,8 @@ pub(super) fn converge(
 /// The convergence of one knob against its end, the other knobs as in the scene; `None` for a choice.
 fn curve(
     sweep: &Sweep,
-    (knob, of_step): (&Knob, &[usize]),
+    knob: &Knob,
+    of_step: &[usize],
     settings: &Settings,
     timed: &[Timed],
     floor: f64,

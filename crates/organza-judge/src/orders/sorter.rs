@@ -1,6 +1,6 @@
 //! The orderings, and what each takes to make.
 
-use hbsort::reference::{CentreKey, as_given, by_centre};
+use hbsort::comparison::{CentreKey, as_given, by_centre};
 use hbsort::{Params, Scratch, Thickness, slice_cloud};
 use organza::{Error, Loaded};
 use reference::statistics::{Spread, median_with_spread};

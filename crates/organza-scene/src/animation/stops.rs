@@ -17,14 +17,16 @@ pub(crate) fn check_stops(
     lights: usize,
 ) -> Result<Vec<Stop>, Error> {
     let stops = raw.track.iter().enumerate().filter_map(|(i, track)| Some((i, track.stop.as_ref()?)));
-    stops.map(|(i, stop)| check_stop(at, raw, (i, stop), (objects, lights))).collect()
+    stops.map(|(i, stop)| check_stop(at, raw, i, stop, objects, lights)).collect()
 }
 
 fn check_stop(
     at: &At<'_>,
     raw: &RawAnimation,
-    (i, stop): (usize, &RawStop),
-    (objects, lights): (&[SceneObject], usize),
+    i: usize,
+    stop: &RawStop,
+    objects: &[SceneObject],
+    lights: usize,
 ) -> Result<Stop, Error> {
     let track = at.key("track").index(i);
     let at = track.key("stop");

@@ -173,7 +173,8 @@ pub(crate) fn check_choice(
     at: &At<'_>,
     raw: Option<&RawChoice>,
     of_material: Option<u8>,
-    (stack, source): (&FootprintStack, &Source),
+    stack: &FootprintStack,
+    source: &Source,
 ) -> Result<FootprintChoice, Error> {
     let at_key = at.key("footprint");
     let plain = RawChosen { of: None, seed: None, turn: None };

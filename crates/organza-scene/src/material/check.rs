@@ -18,7 +18,8 @@ use std::path::PathBuf;
 pub(crate) fn check_materials<'a>(
     at: &At<'a>,
     raw: &'a BTreeMap<String, RawMaterial>,
-    (paths, footprints): (&Paths, &FootprintStack),
+    paths: &Paths,
+    footprints: &FootprintStack,
 ) -> Result<Vec<SceneMaterial>, Error> {
     if raw.len() > usize::from(u16::MAX) {
         return Err(at.error(format!("expected at most {} materials, found {}", u16::MAX, raw.len()), ""));

@@ -43,9 +43,8 @@ pub(crate) fn check_object(
     let source = check_source(at, &raw, fallback, named.paths)?;
     refuse_what_does_not_apply(at, &raw, &source)?;
     let of_material = named.materials[material].footprint;
-    let footprints = check_choice(at, raw.footprint.as_ref(), of_material, (named.footprints, &source))?;
-    let field =
-        raw.field.as_ref().map(|field| check_shown_field(at, &raw, field, (&source, named.paths))).transpose()?;
+    let footprints = check_choice(at, raw.footprint.as_ref(), of_material, named.footprints, &source)?;
+    let field = raw.field.as_ref().map(|field| check_shown_field(at, &raw, field, &source, named.paths)).transpose()?;
     let up = match raw.transform.up {
         // An invisible object is not even read, unless a light is to see it.
         RawUp::Auto if raw.visible == Some(false) && !named.seen.contains(&raw.name) => by_scene(UpAxis::Y),

@@ -2,7 +2,7 @@
 
 use crate::at::At;
 use crate::render::check::own_layers;
-use crate::{Error, RenderSettings, SceneMaterial, SceneObject, Source, Technique, VolumeSampler};
+use crate::{Error, Reconstruction, RenderSettings, SceneMaterial, SceneObject, Source, Technique, VolumeSampler};
 use splat_core::Packing;
 
 /// Refuses what a technique cannot draw, and layers that it cannot fill; adds the effects that only some scenes have. `layers` are as they
@@ -11,7 +11,8 @@ pub(crate) fn check_drawn(
     at: &At<'_>,
     objects: &[SceneObject],
     materials: &[SceneMaterial],
-    (at_layers, layers): (&At<'_>, &[String]),
+    at_layers: &At<'_>,
+    layers: &[String],
     render: &mut RenderSettings,
 ) -> Result<(), Error> {
     check_one_technique(at, objects, render)?;
@@ -20,7 +21,7 @@ pub(crate) fn check_drawn(
     check_sampled(at, objects, render)?;
     check_bounds(at, objects, materials)?;
     check_scattered(at_layers, layers, objects, render)?;
-    check_bent(at_layers, layers, objects, (materials, render))
+    check_bent(at_layers, layers, objects, materials, render)
 }
 
 /// Refuses what a picture has only if one technique draws all of it.
@@ -42,6 +43,10 @@ fn check_lattices(at: &At<'_>, objects: &[SceneObject], render: &RenderSettings)
         if technique != Technique::Sheets {
             let message = format!("`lattice`: the technique `{}` draws no body-centred lattice", technique.name());
             return refuse(&message, "use technique = \"sheets\", or leave it out");
+        }
+        if render.sheets.reconstruction == Reconstruction::Gather {
+            let message = "`lattice`: gathered slabs read no body-centred lattice";
+            return refuse(message, "set render.sheets.reconstruction = \"splat\", or leave it out");
         }
     }
     Ok(())
@@ -83,7 +88,8 @@ fn check_bent(
     at: &At<'_>,
     layers: &[String],
     objects: &[SceneObject],
-    (materials, render): (&[SceneMaterial], &mut RenderSettings),
+    materials: &[SceneMaterial],
+    render: &mut RenderSettings,
 ) -> Result<(), Error> {
     const LAYERS: [&str; 2] = ["reflection", "refraction"];
     let bends = objects.iter().any(|o| is_bent(o, materials, render.technique));

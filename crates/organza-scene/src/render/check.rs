@@ -3,17 +3,17 @@
 use crate::at::At;
 use crate::limits::{LARGEST, SMALLEST};
 use crate::render::raw::{
-    Auto, RawAccumulation, RawAligned, RawClassify, RawDirection, RawGoal, RawGradients, RawMapping, RawParticles,
-    RawPoints, RawRender, RawScattering, RawShadow, RawSheets, RawSlicing, RawSoftShadows, RawSurfaceSampler,
-    RawVolumeSampler,
+    Auto, RawAccumulation, RawAligned, RawClassify, RawDirection, RawGoal, RawGradients, RawKernel, RawMapping,
+    RawParticles, RawPoints, RawReconstruction, RawRender, RawScattering, RawShadow, RawSheets, RawSlicing,
+    RawSoftShadows, RawSurfaceSampler, RawVolumeSampler,
 };
 use crate::render::surfels_check::check_surfels;
 use crate::text::de::suggest;
 use crate::text::tree::Value;
 use crate::{
-    Aligned, Classify, Error, Goal, LAYER_NAMES, LayerChoice, ParticlesSettings, PointsSettings, RenderSettings,
-    Scattering, ShadowMapping, ShadowSettings, SheetsSettings, Slicing, SoftShadows, SurfaceSampler, Technique,
-    TechniqueKey, VolumeSampler, shown,
+    Aligned, Classify, Error, Goal, LAYER_NAMES, LayerChoice, ParticlesSettings, PointsSettings, Reconstruction,
+    RenderSettings, Scattering, ShadowMapping, ShadowSettings, SheetKernel, SheetsSettings, Slicing, SoftShadows,
+    SurfaceSampler, Technique, TechniqueKey, VolumeSampler, shown,
 };
 use splat_core::{Accumulation, Direction};
 
@@ -212,6 +212,7 @@ fn check_sheets(at: &At<'_>, raw: &RawSheets) -> Result<SheetsSettings, Error> {
     let extent = at.number("kernel_extent", raw.kernel_extent.unwrap_or(2.0), 0.5..=8.0)?;
     // As far from the rim as the default's, where only the extent is given.
     let sigma = at.number("kernel_sigma", raw.kernel_sigma.unwrap_or(0.35 * extent), 0.125 * extent..=extent)?;
+    let reconstruction = check_reconstruction(at, raw)?;
     Ok(SheetsSettings {
         slicing: check_slicing(at, raw)?,
         may_slice: raw.slicing == RawSlicing::Auto,
@@ -222,6 +223,8 @@ fn check_sheets(at: &At<'_>, raw: &RawSheets) -> Result<SheetsSettings, Error> {
         },
         aligned: check_aligned(at, raw, slab_width)?,
         slab_width,
+        reconstruction,
+        kernel: if raw.kernel == Some(RawKernel::Linear) { SheetKernel::Linear } else { SheetKernel::Gaussian },
         kernel_extent: extent,
         kernel_sigma: sigma,
         kernel_sections: check_sections(at, raw.kernel_sections.unwrap_or(256))?,
@@ -229,6 +232,40 @@ fn check_sheets(at: &At<'_>, raw: &RawSheets) -> Result<SheetsSettings, Error> {
         gradient_volume: raw.gradients == RawGradients::Volume,
         transmittance_cutoff: check_cutoff(at, raw.transmittance_cutoff)?,
     })
+}
+
+/// How slabs get their values: what gathering has not is refused beside it.
+fn check_reconstruction(at: &At<'_>, raw: &RawSheets) -> Result<Reconstruction, Error> {
+    let splatted = [
+        ("kernel_extent", raw.kernel_extent.is_some(), "their kernel has an extent of 2"),
+        ("kernel_sigma", raw.kernel_sigma.is_some(), "their kernel has a deviation of 0.7"),
+        ("kernel_sections", raw.kernel_sections.is_some(), "their kernels have no sections"),
+        ("classify", raw.classify == Some(RawClassify::Before), "they classify what they have reconstructed"),
+        ("aligned", raw.aligned == Some(RawAligned::Axis), "they lie along the view"),
+        ("accumulation", raw.accumulation == RawAccumulation::F16, "they sum nothing over voxels"),
+        ("slicing", raw.slicing == RawSlicing::HalfVector, "they lie across the view"),
+    ];
+    let is_linear = raw.kernel == Some(RawKernel::Linear);
+    match raw.reconstruction {
+        RawReconstruction::Splat => match raw.kernel {
+            Some(_) => {
+                let message = "`kernel`: slabs are splatted, whose kernel `kernel_extent` and `kernel_sigma` state";
+                Err(at.key("kernel").error(message, "set reconstruction = \"gather\", or leave it out"))
+            }
+            None => Ok(Reconstruction::Splat),
+        },
+        RawReconstruction::Auto if !is_linear => Ok(Reconstruction::Auto),
+        RawReconstruction::Auto | RawReconstruction::Gather => {
+            match splatted.into_iter().find(|(_, is_given, _)| *is_given) {
+                None => Ok(Reconstruction::Gather),
+                Some((key, _, reason)) => {
+                    let asked = if is_linear { "kernel = \"linear\"" } else { "reconstruction = \"gather\"" };
+                    let message = format!("`{key}`: {asked} has slabs gathered, and {reason}");
+                    Err(at.key(key).error(message, "set reconstruction = \"splat\", or leave it out"))
+                }
+            }
+        }
+    }
 }
 
 fn check_sections(at: &At<'_>, sections: u32) -> Result<u32, Error> {

@@ -97,6 +97,10 @@ pub(crate) struct RawSheets {
     pub(crate) voxels_per_cell: Option<u32>,
     /// Width of a slab in world units, or "auto" (the default): the least step of the volumes across the slabs.
     pub(crate) slab_width: Option<Auto>,
+    /// How slabs get their values: "gather", each pixel reads the lattice, "splat", each voxel writes into slabs, or "auto" (default).
+    pub(crate) reconstruction: RawReconstruction,
+    /// What gathered pixels read: "gaussian" (default), the kernel that is splatted, or "linear", between eight voxels.
+    pub(crate) kernel: Option<RawKernel>,
     /// Radius of a voxel's kernel in steps of its lattice, 0.5 to 8; default 2.
     pub(crate) kernel_extent: Option<f64>,
     /// Standard deviation of the kernel in steps of the lattice, an eighth of the extent to the whole; default 0.35 of it.
@@ -109,6 +113,26 @@ pub(crate) struct RawSheets {
     pub(crate) gradients: RawGradients,
     /// A pixel is finished when its transmittance is below this, from 0 to below 1; default 1/1024.
     pub(crate) transmittance_cutoff: Option<f64>,
+}
+
+/// How slabs get their values.
+#[derive(Debug, Default, Clone, Copy, PartialEq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+#[schemars(rename = "Reconstruction")]
+pub(crate) enum RawReconstruction {
+    #[default]
+    Auto,
+    Gather,
+    Splat,
+}
+
+/// What gathered pixels read.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+#[schemars(rename = "Kernel")]
+pub(crate) enum RawKernel {
+    Gaussian,
+    Linear,
 }
 
 /// Where normals come from.
@@ -234,7 +258,7 @@ pub(crate) enum RawDirection {
 }
 
 /// Precision of the running sums.
-#[derive(Debug, Default, Clone, Copy, Deserialize, JsonSchema)]
+#[derive(Debug, Default, Clone, Copy, PartialEq, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 #[schemars(rename = "Accumulation")]
 pub(crate) enum RawAccumulation {

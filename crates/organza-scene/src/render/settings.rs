@@ -149,6 +149,10 @@ pub struct SheetsSettings {
     pub aligned: Aligned,
     /// Width of a slab, world units; `None` takes the least step of the volumes across the slabs.
     pub slab_width: Option<f64>,
+    /// How slabs get their values.
+    pub reconstruction: Reconstruction,
+    /// What gathered pixels read of a lattice.
+    pub kernel: SheetKernel,
     /// Radius of a voxel's kernel, steps of its lattice, in [0.5, 8].
     pub kernel_extent: f64,
     /// Standard deviation of the kernel, steps of the lattice, in [extent/8, extent].
@@ -169,7 +173,8 @@ impl SheetsSettings {
     pub fn scattering_again(&self) -> Option<Self> {
         let mut settings = *self;
         // Half vectors know neither of the other choices.
-        if self.may_slice && self.classify == Classify::After && self.aligned == Aligned::View {
+        let is_free = self.classify == Classify::After && self.aligned == Aligned::View;
+        if self.may_slice && is_free && self.reconstruction != Reconstruction::Gather {
             settings.slicing = Slicing::HALF_VECTOR;
         }
         let Slicing::HalfVector { scattering, .. } = &mut settings.slicing else { return None };
@@ -364,6 +369,26 @@ pub enum Classify {
     After,
     /// At the voxels, before they are splatted.
     Before,
+}
+
+/// How slabs get their values.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Reconstruction {
+    /// As the plan chooses.
+    Auto,
+    /// Each pixel reads the lattice.
+    Gather,
+    /// Each voxel writes into slabs.
+    Splat,
+}
+
+/// What gathered pixels read of a lattice.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SheetKernel {
+    /// The kernel that is splatted by default.
+    Gaussian,
+    /// Eight voxels, linearly.
+    Linear,
 }
 
 /// What slabs across the view lie along.

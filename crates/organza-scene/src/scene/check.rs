@@ -42,7 +42,7 @@ pub(crate) fn scene(
     let paths = Paths::new(&at.key(ROOT_KEY), document.file, raw.root.as_deref(), options)?;
     let at_footprints = at.key("footprints");
     let footprints = check_footprints(&at_footprints, raw.footprints.as_deref(), &paths, options)?;
-    let mut materials = check_materials(&at.key("material"), &raw.material, (&paths, &footprints.stack))?;
+    let mut materials = check_materials(&at.key("material"), &raw.material, &paths, &footprints.stack)?;
     let extracts = raw.object.iter().filter_map(|object| object.extract.as_ref()?.objects.clone());
     let tracks = raw.animation.iter().flat_map(|animation| &animation.track);
     let stops = tracks.filter_map(|track| track.stop.as_ref()?.objects.clone());
@@ -64,8 +64,8 @@ pub(crate) fn scene(
     if SwitchedEffect::find(&render.effects, EffectKind::Scatter, "") == Some(false) {
         render.sheets.scatter_once();
     }
-    let layers = (&at.key("render").key("layers"), raw.render.layers.as_slice());
-    check_drawn(&at_objects, &objects, &materials, layers, &mut render)?;
+    let at_layers = at.key("render").key("layers");
+    check_drawn(&at_objects, &objects, &materials, &at_layers, &raw.render.layers, &mut render)?;
     let goes_around = raw.animation.as_ref().is_some_and(|animation| moves(animation, "camera", "azimuth"));
     let seen = check_camera(&at.key("camera"), &raw.camera, turn, goes_around)?;
     check_aligned(&at.key("render").key("sheets").key("aligned"), &seen.camera, &render)?;

@@ -97,7 +97,8 @@ pub(crate) fn check_shown_field(
     at: &At<'_>,
     raw: &RawObject,
     field: &RawField,
-    (source, paths): (&Source, &Paths),
+    source: &Source,
+    paths: &Paths,
 ) -> Result<FieldSource, Error> {
     let at_field = at.key("field");
     if source.is_medium() {

@@ -12,7 +12,8 @@ pub(super) fn normalize(
     cloud: &mut Cloud,
     own: &mut [Own],
     camera: &mut Camera,
-    (lights, slides): (&mut [SceneLight], &mut [Option<Slide>]),
+    lights: &mut [SceneLight],
+    slides: &mut [Option<Slide>],
 ) -> i32 {
     let diagonal = diagonal(cloud, own);
     if !(diagonal.is_finite() && diagonal > 0.0) {

@@ -6,21 +6,24 @@
 
 mod half;
 mod polygons;
+mod reconstruction;
 
 use crate::cost::{Count, Item, Translucent};
 use crate::form::Form;
 use crate::frame::matter::Matter;
 use crate::frame::{Extent, Frame, Shaded};
+use crate::load::Loaded;
 use crate::load::own::{Body, Own};
 use crate::pass;
+use crate::plan::{Bound, Effect, Plan};
 use crate::scene::{self, LightPoint, Scene, Technique};
 use crate::statistics::{MediumFacts, ObjectData, ObjectStatistics};
 use crate::technique::{Asked, Fold, OwnWork, Session};
 use crate::{CostRecord, Error, RenderOptions, memory, stage};
 use sheet_light::half::{HalfParams, pane_bytes, polygon_bytes};
 use sheet_light::{
-    Aligned, Classify, Gradients, KernelShape, Lighting, Params, Reconstruction, SheetInput, Sheeted, Splats, Volume,
-    prepare,
+    Aligned, Classify, GatherKernel, Gradients, KernelShape, Lighting, Params, Reconstruction, SheetInput, Sheeted,
+    Splats, Volume, prepare,
 };
 use splat_core::raster::OpaqueImage;
 use splat_core::{Accumulator, Camera, Direction, Limits, Packing};
@@ -100,6 +103,8 @@ fn own_work(frame: &Frame<'_>) -> OwnWork {
     let sweeps = if is_half { 2.0 * lights.max(1.0) } else { 1.0 };
     let lit = if is_half { 1.0 } else { lights };
     let extent = frame.settings.sheets.kernel_extent;
+    let form = reconstruction::chosen(frame.scene, &frame.loaded.own, &frame.camera);
+    let is_splatted = form.reconstruction == Reconstruction::Splat;
     let one = |own: &Own| {
         let Body::Cells { grid, .. } = &own.body else { return OwnWork::default() };
         let seen = Extent::new(&own.world_box(), &frame.camera);
@@ -107,9 +112,11 @@ fn own_work(frame: &Frame<'_>) -> OwnWork {
         let radius = extent * step * seen.samples_per_unit;
         let voxels = own.voxels() as f64 * seen.share;
         let slabs = own.world_box().diagonal() / step;
+        let fragments = voxels * (std::f64::consts::PI * radius * radius).max(1.0);
         OwnWork {
-            items: sweeps * voxels * (std::f64::consts::PI * radius * radius).max(1.0),
-            slab_samples: sweeps * seen.samples * slabs * (1.0 + lit),
+            items: if is_splatted { sweeps * fragments } else { 0.0 },
+            // Gathered slabs pass over bricks without extinction.
+            slab_samples: sweeps * seen.samples * slabs * (1.0 + lit) * if is_splatted { 1.0 } else { form.visible },
             ranges: None,
         }
     };
@@ -119,6 +126,30 @@ fn own_work(frame: &Frame<'_>) -> OwnWork {
         slab_samples: sum.slab_samples + work.slab_samples,
         ranges: None,
     })
+}
+
+/// Adds to a plan how slabs get the values of its volumes, and why.
+pub(crate) fn plans(scene: &Scene, loaded: &Loaded, plan: &mut Plan) {
+    let is_volume = |own: &Own| own.technique == Technique::Sheets && own.grid().is_some();
+    if !loaded.own.iter().any(is_volume) {
+        return;
+    }
+    let camera = loaded.camera.with_samples(scene.render.antialias);
+    let form = reconstruction::chosen(scene, &loaded.own, &camera);
+    let name = match form.reconstruction {
+        Reconstruction::Splat => "splatted slabs",
+        Reconstruction::Gather(GatherKernel::Gaussian) => "gathered slabs",
+        Reconstruction::Gather(GatherKernel::Linear) => "linearly gathered slabs",
+    };
+    plan.effects.push(Effect {
+        name: name.into(),
+        what: "how slabs get the values of volumes",
+        called_for: true,
+        reason: form.reason.into(),
+        bound: Bound::Unknown,
+        is_lacking: false,
+        is_absent: false,
+    });
 }
 
 pub(crate) use half::carries;
@@ -201,7 +232,8 @@ fn sheeted<'a>(frame: &'a Frame<'a>, options: &RenderOptions, cost: &mut CostRec
     frame.progress.begin(stage::SHEETS);
     let volumes = volumes(&frame.matter()).collect();
     let input = SheetInput { splats, ..frame.sheet_input(volumes, frame.lit_by(maps)) };
-    let params = params(frame.scene, frame.loaded.exponent, options);
+    let form = reconstruction::chosen(frame.scene, &frame.loaded.own, &frame.camera);
+    let params = Params { reconstruction: form.reconstruction, ..params(frame.scene, frame.loaded.exponent, options) };
     cost.measure(pass::SHEETS, |stage| {
         stage.items_in = input.volumes.iter().map(|v| v.grid.values.len() as u64).sum();
         let sheeted = prepare(input, &params, Some(frame.progress)).map_err(|e| refuse(frame, e))?;
@@ -249,7 +281,7 @@ fn params(scene: &Scene, exponent: i32, options: &RenderOptions) -> Params {
         slab_width: settings.slab_width.map(|width| width * unit),
         classify: if settings.classify == scene::Classify::Before { Classify::Before } else { Classify::After },
         aligned: if settings.aligned == scene::Aligned::Axis { Aligned::Axis } else { Aligned::View },
-        // No key asks for gathered ones.
+        // Slabs across the view may be gathered instead.
         reconstruction: Reconstruction::Splat,
         kernel: KernelShape { extent: settings.kernel_extent, sigma: settings.kernel_sigma },
         sections: settings.kernel_sections,

@@ -113,7 +113,7 @@ impl<'a> Fold for Surfels<'a> {
         let straight = !frame.settings.surfels.bent_behind;
         let glass = self.surfaces.as_ref().map(|surfaces| Glass { bending, sky: &sky, surfaces, straight, unit });
         let before = self.glass.take();
-        let layering = layering(&frame.settings.surfels.layers, self.members.as_ref(), (discs, &params));
+        let layering = layering(&frame.settings.surfels.layers, self.members.as_ref(), discs, &params);
         self.glass = with_shown(frame, cost, |shown, cost| {
             frame.progress.begin(stage::SURFELS);
             frame.tick()?;
@@ -137,11 +137,7 @@ impl<'a> Fold for Surfels<'a> {
 }
 
 /// How the scene tells layers apart.
-fn layering<'a>(
-    asked: &SurfelLayers,
-    members: Option<&'a Membership>,
-    (discs, params): (&Discs, &Params),
-) -> Layering<'a> {
+fn layering<'a>(asked: &SurfelLayers, members: Option<&'a Membership>, discs: &Discs, params: &Params) -> Layering<'a> {
     let floors = |asked: &SurfelGroups| {
         let groups = members.expect("invariant: what needs groups has some").groups();
         Floors { groups, steps: asked.depth_steps.unwrap_or_else(|| discs.depth_steps(params)) }

@@ -2,7 +2,10 @@
 
 use super::points::{absorbance_cut, cells, choice, cutoffs, finer, samples, step};
 use crate::accuracy::{Facts, Knob, Options, Request, Skipped, Sweep, Theory};
-use organza::scene::{Classify, LayerChoice, Scattering, Scene, SceneObject, Slicing, SoftShadows, Source, Technique};
+use organza::scene::{
+    Aligned, Classify, LayerChoice, Reconstruction, Scattering, Scene, SceneObject, SheetKernel, SheetsSettings,
+    Slicing, SoftShadows, Source, Technique,
+};
 use splat_core::raster::Accumulation;
 use splat_core::{Packing, Shading};
 
@@ -13,6 +16,8 @@ use splat_core::{Packing, Shading};
 /// classify after reconstruction.
 pub fn sheets(scene: &Scene, slab_width: Option<f64>, facts: &Facts, options: &Options) -> Sweep {
     let in_slabs = |knob: &dyn Fn(f64) -> Knob| slab_width.map(knob).ok_or_else(|| NO_SLABS.to_owned());
+    let is_gathered = scene.render.sheets.reconstruction == Reconstruction::Gather;
+    let in_splatted = |knob: &dyn Fn(f64) -> Knob| if is_gathered { Err(GATHERED.to_owned()) } else { in_slabs(knob) };
     let mut base = Request { scene: in_sheets(scene), oversample: 1, packed: false };
     base.scene.render.layers = LayerChoice::default();
     let mut sweep = Sweep {
@@ -25,10 +30,11 @@ pub fn sheets(scene: &Scene, slab_width: Option<f64>, facts: &Facts, options: &O
     };
     let knobs = [
         ("slab width", in_slabs(&|own| slabs(own, options))),
-        ("kernel radius", in_slabs(&|_| radius())),
-        ("kernel deviation", in_slabs(&|_| deviation())),
-        ("kernel sections", in_slabs(&|_| sections(options))),
-        ("buffer format", Ok(buffers())),
+        ("reconstruction", reconstruction(scene, slab_width.is_some())),
+        ("kernel radius", in_splatted(&|_| radius())),
+        ("kernel deviation", in_splatted(&|_| deviation())),
+        ("kernel sections", in_splatted(&|_| sections(options))),
+        ("buffer format", if is_gathered { Err(GATHERED.to_owned()) } else { Ok(buffers()) }),
         ("gradients", gradients(scene)),
         ("shadow table cells", cells(facts, options)),
         ("absorbance cut", absorbance_cut(facts, options)),
@@ -52,6 +58,9 @@ pub fn sheets(scene: &Scene, slab_width: Option<f64>, facts: &Facts, options: &O
 
 /// Why a scene has no knobs of slabs and kernels.
 const NO_SLABS: &str = "no volume and no splat lies in slabs: translucent triangles are drawn as they are";
+
+/// Why a scene has no knobs of splatted kernels.
+const GATHERED: &str = "the scene has slabs gathered, which splat nothing";
 
 /// The scene by this technique.
 pub fn in_sheets(scene: &Scene) -> Scene {
@@ -163,8 +172,40 @@ fn scattered_cone(scene: &Scene) -> Result<Knob, String> {
     ))
 }
 
+/// How slabs get their values.
+fn reconstruction(scene: &Scene, has_slabs: bool) -> Result<Knob, String> {
+    let sheets = &scene.render.sheets;
+    let is_volume =
+        |o: &SceneObject| is_drawn(o) && matches!(o.source, Source::Volume(_) | Source::Density(_) | Source::Cloud(_));
+    if !has_slabs || !scene.objects.iter().any(is_volume) {
+        return Err("no volume lies in slabs".into());
+    }
+    if sheets.slicing != Slicing::View || sheets.classify == Classify::Before || sheets.aligned == Aligned::Axis {
+        return Err("slabs across half vectors, along a lattice or of classified voxels are splatted alone".into());
+    }
+    let has_other_kernel = sheets.kernel_extent != 2.0 || sheets.kernel_sigma != 0.7 || sheets.kernel_sections != 256;
+    if has_other_kernel || sheets.accumulation == Accumulation::F16 {
+        return Err("the scene states a kernel or sums that are splatted alone".into());
+    }
+    if scene.objects.iter().any(|o| is_drawn(o) && o.packing == Packing::BodyCentred) {
+        return Err("a body-centred lattice is splatted alone".into());
+    }
+    Ok(choices(
+        "reconstruction",
+        |request, value| {
+            let sheets = &mut request.scene.render.sheets;
+            sheets.reconstruction = if value > 0.0 { Reconstruction::Gather } else { Reconstruction::Splat };
+            sheets.kernel = if value > 1.0 { SheetKernel::Linear } else { SheetKernel::Gaussian };
+        },
+        &[("splatted", 0.0), ("gathered", 1.0), ("gathered linearly", 2.0)],
+    ))
+}
+
 /// When values become colours.
 fn classification(scene: &Scene) -> Result<Knob, String> {
+    if scene.render.sheets.reconstruction == Reconstruction::Gather {
+        return Err(GATHERED.into());
+    }
     if scene.render.sheets.slicing != Slicing::View {
         return Err("slabs across half vectors classify what they have reconstructed".into());
     }
@@ -179,6 +220,9 @@ fn classification(scene: &Scene) -> Result<Knob, String> {
 
 /// What volumes are drawn on.
 fn lattice(scene: &Scene) -> Result<Knob, String> {
+    if scene.render.sheets.reconstruction == Reconstruction::Gather {
+        return Err(GATHERED.into());
+    }
     if !scene.objects.iter().any(may_be_packed) {
         return Err("no volume of a file is drawn".into());
     }
@@ -215,14 +259,21 @@ fn choices(name: &'static str, set: fn(&mut Request, f64), steps: &[(impl AsRef<
     }
 }
 
+/// Settings of sheets that are splatted whatever the plan would choose, so that what a knob of their kernel changes is the kernel alone.
+fn splatted(request: &mut Request) -> &mut SheetsSettings {
+    let sheets = &mut request.scene.render.sheets;
+    sheets.reconstruction = Reconstruction::Splat;
+    sheets
+}
+
 /// How far a kernel reaches with the deviation that it has.
 fn radius() -> Knob {
-    let set = |request: &mut Request, value| request.scene.render.sheets.kernel_extent = value;
+    let set = |request: &mut Request, value| splatted(request).kernel_extent = value;
     choices("kernel radius", set, &[1.5, 2.0, 3.0].map(steps_of_the_lattice))
 }
 
 fn deviation() -> Knob {
-    let set = |request: &mut Request, value| request.scene.render.sheets.kernel_sigma = value;
+    let set = |request: &mut Request, value| splatted(request).kernel_sigma = value;
     choices("kernel deviation", set, &[0.5, 0.7, 1.0].map(steps_of_the_lattice))
 }
 
@@ -233,7 +284,7 @@ fn sections(options: &Options) -> Knob {
     Knob {
         name: "kernel sections",
         size_meaning: "1 / sections in a slab's width",
-        set: |request, value| request.scene.render.sheets.kernel_sections = value as u32,
+        set: |request, value| splatted(request).kernel_sections = value as u32,
         steps: counts.iter().map(|n| at(*n)).collect(),
         ends: vec![at(256.0)],
         end_is_exact: false,
@@ -250,7 +301,7 @@ fn sections(options: &Options) -> Knob {
 /// What is summed over voxels in a slab and over slabs in a pixel, in single precision or in buffers of 16 bits.
 fn buffers() -> Knob {
     let set = |request: &mut Request, value| {
-        request.scene.render.sheets.accumulation = if value > 0.0 { Accumulation::F32 } else { Accumulation::F16 };
+        splatted(request).accumulation = if value > 0.0 { Accumulation::F32 } else { Accumulation::F16 };
     };
     choices("buffer format", set, &[("f16", 0.0), ("f32", 1.0)])
 }

@@ -103,11 +103,11 @@ impl Part<'_> {
 /// Everything translucent that is drawn by particles: objects by their own data, the splats of the others by object.
 pub(super) fn sources<'a>(frame: &Frame<'a>) -> Vec<Source<'a>> {
     let loaded = frame.loaded;
-    // Splats of each object, and the sum of their radii.
-    let mut splats = vec![(0u32, 0.0); loaded.objects.len()];
+    let mut splats = vec![Radii::default(); loaded.objects.len()];
     for (object, radius) in loaded.cloud.object.iter().zip(&loaded.cloud.radius) {
-        let (n, sum) = &mut splats[*object as usize];
-        (*n, *sum) = (*n + 1, *sum + f64::from(*radius));
+        let radii = &mut splats[*object as usize];
+        radii.splats += 1;
+        radii.sum += f64::from(*radius);
     }
     // What other techniques draw from data of its own is not drawn again.
     let own = loaded.own.iter().filter(|own| own.technique == Technique::Particles);
@@ -125,12 +125,19 @@ fn seed(frame: &Frame<'_>, object: u32, kind: SplatKind) -> u64 {
     rng::bits(frame.settings.seed, SEEDS, u64::from(object), kind as u64)
 }
 
-fn of_own<'a>(own: &'a Own, (n, sum): (u32, f64), frame: &Frame<'a>) -> Source<'a> {
+/// Splats of an object, and the sum of their radii.
+#[derive(Clone, Copy, Default)]
+struct Radii {
+    splats: u32,
+    sum: f64,
+}
+
+fn of_own<'a>(own: &'a Own, radii: Radii, frame: &Frame<'a>) -> Source<'a> {
     let Loaded { objects, materials, .. } = frame.loaded;
     let material = materials[own.material];
     let brightest_color = own.brightest_color();
     // As its splats have it, where it has some.
-    let radius = if n > 0 { sum / f64::from(n) } else { own.radius };
+    let radius = if radii.splats > 0 { radii.sum / f64::from(radii.splats) } else { own.radius };
     Source {
         name: objects[own.object].name.clone(),
         data: Data::Own(own),

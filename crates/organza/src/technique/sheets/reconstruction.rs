@@ -1,0 +1,70 @@
+//! How slabs get the values of volumes: each voxel writes into them, or each of their pixels reads the lattice.
+
+use super::half;
+use crate::frame::Extent;
+use crate::load::own::{Body, Own};
+use crate::scene::{self, Scene, SheetKernel, Technique};
+use sheet_light::{GatherKernel, KernelShape, Params, Reconstruction};
+use splat_core::{Accumulation, Camera};
+
+/// Share of voxels with extinction below which the plan has volumes splatted: a splat is made of such a voxel alone, while a gathered slab looks for
+/// bricks that hold one. benches/README.md has the times on both sides of it.
+const SPARSE: f64 = 0.25;
+
+/// The form of a scene's slabs.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Chosen {
+    pub(super) reconstruction: Reconstruction,
+    /// Why, as `explain` says it.
+    pub(super) reason: &'static str,
+    /// Share of the voxels that have extinction.
+    pub(super) visible: f64,
+}
+
+/// The form that a scene states, or the plan chooses for it. `camera` is that of samples.
+pub(super) fn chosen(scene: &Scene, own: &[Own], camera: &Camera) -> Chosen {
+    let settings = &scene.render.sheets;
+    let kernel = match settings.kernel {
+        SheetKernel::Gaussian => GatherKernel::Gaussian,
+        SheetKernel::Linear => GatherKernel::Linear,
+    };
+    let volumes = || own.iter().filter(|own| own.technique == Technique::Sheets && own.grid().is_some());
+    let voxels: f64 = volumes().filter_map(Own::grid).map(|grid| grid.values.len() as f64).sum();
+    let visible = (volumes().map(|own| own.voxels() as f64).sum::<f64>() / voxels.max(1.0)).min(1.0);
+    let splat = |reason| Chosen { reconstruction: Reconstruction::Splat, reason, visible };
+    let gather = |reason| Chosen { reconstruction: Reconstruction::Gather(kernel), reason, visible };
+    let states_kernel = KernelShape { extent: settings.kernel_extent, sigma: settings.kernel_sigma }
+        != KernelShape::default()
+        || settings.kernel_sections != Params::default().sections;
+    let is_body_centred = |own: &Own| matches!(&own.body, Body::Cells { body_centred: Some(_), .. });
+    let is_finer = |own: &Own| {
+        let step = own.grid().map_or(0.0, |grid| grid.shortest_step() * own.transform.scale);
+        step * Extent::new(&own.world_box(), camera).samples_per_unit < 1.0
+    };
+    match settings.reconstruction {
+        scene::Reconstruction::Gather => return gather("the scene asks for it"),
+        scene::Reconstruction::Splat => return splat("the scene asks for it"),
+        scene::Reconstruction::Auto => {}
+    }
+    if half::is_asked(scene) {
+        splat("slabs lie across half vectors, which are splatted alone")
+    } else if states_kernel {
+        splat("the scene states a kernel that is splatted alone")
+    } else if settings.classify == scene::Classify::Before {
+        splat("values are classified before they are reconstructed")
+    } else if settings.aligned == scene::Aligned::Axis {
+        splat("slabs lie along the lattice")
+    } else if settings.accumulation == Accumulation::F16 {
+        splat("slabs sum in half precision")
+    } else if volumes().any(is_body_centred) {
+        splat("a lattice is body-centred")
+    } else if volumes().any(is_finer) {
+        splat("voxels are finer than samples, which splats average")
+    } else if visible < SPARSE {
+        splat("less than a quarter of the voxels has extinction, and a splat is made of these alone")
+    } else {
+        gather(
+            "a quarter of the voxels or more has extinction, and a pixel reads them in less time than all are splatted",
+        )
+    }
+}
