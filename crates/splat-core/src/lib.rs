@@ -103,7 +103,9 @@ pub use light::{Framing, Light, LightShape, Slide, SlideProjection};
 pub use limits::{Exceeded, Limits};
 pub use material::{Bump, Material, MaterialTable, Object, ObjectTable, Shading};
 pub use memory_account::{MemoryAccount, Reservation};
-pub use mesh::{Mesh, crease_bytes, part_at_creases, robust_cross, smooth, vertex_normals};
+pub use mesh::{
+    Association, Mesh, MeshColumn, crease_bytes, halve_edges, part_at_creases, robust_cross, smooth, vertex_normals,
+};
 pub use packed::PackedCloud;
 pub use phase::henyey_greenstein;
 pub use pixel_samples::PixelSamples;
