@@ -42,6 +42,8 @@ mod measured_effects;
 mod memory;
 mod memory_inputs;
 mod memory_particles;
+mod mesh_columns;
+mod mesh_opacity;
 mod meshes;
 mod only_what_is_called_for;
 mod orders;

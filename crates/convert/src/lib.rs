@@ -30,6 +30,7 @@ mod volume;
 pub use color::color_by::{Classified, ColorBy, Colored, PointColors, class_name, colored};
 pub use color::color_map::ColorMap;
 pub use color::color_scale::{ColorScale, ScaleNumbers};
+pub use color::colored_mesh::{ColoredMesh, colored_mesh};
 pub use color::surface_field::SurfaceField;
 #[cfg(feature = "cache")]
 pub use common::cache::Cache;

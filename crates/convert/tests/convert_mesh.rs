@@ -331,3 +331,31 @@ fn discs_of_coarse_triangles_lie_in_their_planes() {
     let fine = mesh_to_points(&mesh, &params(2.0, 1.0), None).unwrap().0;
     assert!(fine.shading_normal.is_empty() && fine.normal[0].distance(fine.position[0].normalize()) < 1e-6);
 }
+
+#[test]
+fn opacities_of_vertices_are_those_of_pieces_and_opaque_ones_are_opaque() {
+    // From 0 on the left to 1.5 on the right, cut at 1: opaque from two thirds on.
+    let place = |x: f32, y: f32| Vec3::new(x, y, 0.0);
+    let position = [0.0, 2.0, 3.0].into_iter().flat_map(|x| [place(x, 0.0), place(x, 1.0)]).collect();
+    let triangles = vec![[0, 2, 3], [0, 3, 1], [2, 4, 5], [2, 5, 3]];
+    let mesh = Mesh { position, triangles, opacity: vec![0.0, 0.0, 1.0, 1.0, 1.0, 1.0], ..Mesh::default() };
+    for alpha in [1.0, 0.5] {
+        let params = MeshParams { density: Density::Spacing(0.02), opacity: alpha, ..MeshParams::default() };
+        let (cloud, report) = mesh_to_points(&mesh, &params, None).unwrap();
+        cloud.validate().unwrap();
+        assert_eq!(cloud.len() as u64, report.splats);
+        for i in 0..cloud.len() {
+            let x = f64::from(cloud.position[i].x);
+            let is_opaque = alpha == 1.0 && x > 2.0;
+            assert_eq!(cloud.kind[i], if is_opaque { SplatKind::Opaque } else { SplatKind::Surface });
+            let opacity = alpha * (0.5 * x).min(1.0);
+            let found = if is_opaque { 1.0 } else { 1.0 - (-f64::from(cloud.crossing_depth[i])).exp() };
+            assert!((found - opacity).abs() < 1e-5, "{x}: {found} {opacity}");
+        }
+        // Of the ramp the integral of −ln(1 − α·x/2): 2 for α = 1, and 2 − 2·ln 2 for one half.
+        let ramp = |i: &usize| cloud.position[*i].x < 2.0;
+        let sum: f64 = (0..cloud.len()).filter(ramp).map(|i| f64::from(cloud.cross_section[i])).sum();
+        let expected = if alpha == 1.0 { 2.0 } else { 2.0 - 2.0 * 2.0f64.ln() };
+        assert!((sum - expected).abs() < 0.02, "{sum} {expected}");
+    }
+}

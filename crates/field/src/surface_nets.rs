@@ -128,7 +128,7 @@ fn join(lattice: &Lattice, parts: &[Part]) -> Mesh {
             if length(a, c) <= length(b, d) { [[a, b, c], [a, c, d]] } else { [[a, b, d], [b, c, d]] }
         })
         .collect();
-    Mesh { origin, position, normal: vertices.iter().map(|v| v.2).collect(), color: Vec::new(), triangles }
+    Mesh { origin, position, normal: vertices.iter().map(|v| v.2).collect(), triangles, ..Mesh::default() }
 }
 
 /// Values at the corners of a block of cells.

@@ -125,8 +125,8 @@ pub(super) struct FirstArguments {
     /// Look of volumes, and the colour map of --color-by: ct-bone, ct-skin, mri, cloud, viridis, magma, inferno, plasma, cividis, turbo, grey, or a .json preset of ParaView
     #[arg(long, value_name = "NAME")]
     pub(super) preset: Option<String>,
-    /// Column that points take their colours from, one of those that `organza info` lists, or array of a VTK volume; --preset names the
-    /// colour map [default: the file's colours; of a LAS file without colours its classes where most points have one, else its values]
+    /// Column that points or meshes take their colours from, one of those that `organza info` lists, or array of a VTK volume; --preset names
+    /// the colour map [default: the file's colours; of a LAS file without colours its classes where most points have one, else its values]
     #[arg(long, value_name = "COLUMN")]
     pub(super) color_by: Option<String>,
     /// Axis of the data that points up [default: what the format of each file says, else y]

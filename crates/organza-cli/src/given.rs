@@ -64,12 +64,17 @@ pub(super) fn write_first(
     let progress = Progress::new();
     let read = inputs.iter().map(|path| DataFile::read(path, wish, (files, options, &progress)));
     let mut data = read.collect::<Result<Vec<_>, _>>()?;
-    if wish.color_by.is_some() && !data.iter().any(|d| matches!(d.data, SourceData::Points(_)) || d.array.is_some()) {
+    let takes_colors =
+        |d: &DataFile| matches!(d.data, SourceData::Points(_) | SourceData::Mesh(_)) || d.array.is_some();
+    if wish.color_by.is_some() && !data.iter().any(takes_colors) {
         if let Some(error) = data.iter_mut().find_map(|d| d.array_error.take()) {
             return Err(error);
         }
         let hint = "leave it out, or in a scene give the surface a `field`, the volume whose values it shows";
-        return Err(Error::usage("--color-by is for points and for arrays of VTK volumes, and no file has such", hint));
+        return Err(Error::usage(
+            "--color-by is for points, meshes and arrays of VTK volumes, and no file has such",
+            hint,
+        ));
     }
     let written = first_scene(&data, scene_file, wish, &InMemory::default(), (files, options, &progress))?;
     written.remarks.iter().for_each(|remark| console::remark(remark));

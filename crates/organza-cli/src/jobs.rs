@@ -50,7 +50,7 @@ impl<'a> Jobs<'a> {
         let still = parsed(arguments, &given, None)?;
         if arguments.legend && !still.objects.iter().any(|object| object.visible && object.has_scale()) {
             let message = "--legend: no colours of this picture stand for numbers";
-            let hint = "give points a `color_by` (data files: --color-by COLUMN), a volume is coloured by its `transfer`; or leave it out";
+            let hint = "give points or a mesh a `color_by` (data files: --color-by COLUMN), a volume is coloured by its `transfer`; or leave it out";
             return Err(Error::usage(message, hint));
         }
         let stated_goal = parse_scene(&arguments.scene, &given, None, arguments.turntable)?.render.goal;

@@ -36,6 +36,7 @@ impl Data {
             normal: unit_vectors("normals", normals, count)?,
             color: colors.map_or_else(|| Ok(Vec::new()), |colors| arrays::colors("colors", colors, count))?,
             triangles: arrays::triangles("faces", faces, count)?,
+            ..Mesh::default()
         };
         Ok(Self { data: SourceData::Mesh(mesh.into()) })
     }

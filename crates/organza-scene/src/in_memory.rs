@@ -81,7 +81,12 @@ impl SourceData {
                 vectors(hasher, &mesh.position);
                 vectors(hasher, &mesh.normal);
                 hasher.update(bytemuck::cast_slice(&mesh.color));
+                hasher.update(bytemuck::cast_slice(&mesh.opacity));
                 hasher.update(bytemuck::cast_slice(&mesh.triangles));
+                for column in &mesh.columns {
+                    hasher.update(format!("{} of {}\n", column.name, column.association.name()));
+                    hasher.update(bytemuck::cast_slice(&column.values));
+                }
             }
             Self::Grid(grid) => {
                 hasher.update(bytemuck::bytes_of(&grid.origin));

@@ -8,7 +8,7 @@ use convert::{FillValue, Strays, looks_like_degrees};
 use organza::Error;
 use read::{Loaded, Mended, NamedColumn, ReadParams, stated_up_axis, up_axis};
 use splat_core::glam::{DVec3, Vec3};
-use splat_core::{Aabb, DAabb, Grid, MemoryAccount, Mesh, RadianceImage, RawPoints, UpAxis};
+use splat_core::{Aabb, Association, DAabb, Grid, MemoryAccount, Mesh, RadianceImage, RawPoints, UpAxis};
 use std::collections::HashSet;
 use std::path::Path;
 
@@ -47,8 +47,11 @@ pub struct Facts {
     pub histogram: Option<Histogram>,
     /// Shares of the values, and the value below which each lies.
     pub quantiles: Vec<(f64, f64)>,
-    /// Name, lowest and highest number of columns beside positions; of points those that they can be coloured and kept by.
+    /// Name, lowest and highest number of columns beside positions; of points those that they can be coloured and kept by, of
+    /// meshes those that they can be coloured by.
     pub columns: Vec<(String, [f64; 2])>,
+    /// What the numbers of columns of a mesh belong to, by their names.
+    pub associations: Vec<(String, Association)>,
     /// Faults of a mesh.
     pub faults: Option<MeshFaults>,
     /// Columns, fields and statements of the file that are not used, as the file names them.
@@ -76,7 +79,7 @@ pub fn facts(path: &Path, max_bytes: u64, strict: bool) -> Result<Facts, Error> 
     let (data, notes) = read.map_err(|e| Error::from_read(path, &e))?;
     let bytes = std::fs::metadata(path).map_err(|e| Error::io(path, "cannot read", e))?.len();
     let facts = match data {
-        Loaded::Mesh(mesh) => of_mesh(&mesh),
+        Loaded::Mesh(mesh) => of_mesh(&mesh, &notes.columns, up_axis(path)),
         Loaded::Points(points) => of_points(&points, &notes.columns, up_axis(path)),
         Loaded::Grid(grid) => of_grid(&grid),
         Loaded::Image(image) => of_image(&image),
@@ -132,13 +135,24 @@ fn height(bounds: DAabb, up: UpAxis) -> (String, [f64; 2]) {
     ("height".to_owned(), [bounds.min, bounds.max].map(|corner| corner.dot(up.direction())))
 }
 
-fn of_mesh(mesh: &Mesh) -> Facts {
+fn of_mesh(mesh: &Mesh, further: &[NamedColumn], up: UpAxis) -> Facts {
+    let bounds = bounds_of(mesh.origin, &mesh.position);
+    let of_file = further.iter().filter_map(|c| Some((c.name.clone(), c.range?)));
     Facts {
         kind: "mesh",
         counts: vec![("vertices", mesh.position.len() as u64), ("triangles", mesh.triangles.len() as u64)],
-        attributes: present(&[("normal", !mesh.normal.is_empty()), ("color", !mesh.color.is_empty())]),
-        bounds: bounds_of(mesh.origin, &mesh.position),
-        columns: ranges([("color", mesh.color.iter().flatten().copied().collect())]),
+        attributes: present(&[
+            ("normal", !mesh.normal.is_empty()),
+            ("color", !mesh.color.is_empty()),
+            ("opacity", !mesh.opacity.is_empty()),
+        ]),
+        bounds,
+        associations: further.iter().filter_map(|c| Some((c.name.clone(), c.association?))).collect(),
+        columns: ranges([("color", mesh.color.iter().flatten().copied().collect()), ("opacity", mesh.opacity.clone())])
+            .into_iter()
+            .chain(bounds.map(|bounds| height(bounds, up)))
+            .chain(of_file)
+            .collect(),
         faults: Some(mesh_faults(mesh)),
         ..Facts::default()
     }
@@ -258,8 +272,8 @@ mod tests {
 
     #[test]
     fn an_empty_mesh_has_no_bounds_and_one_at_a_place_is_near_or_far() {
-        assert_eq!(of_mesh(&Mesh::default()).bounds, None);
-        assert_eq!(of_mesh(&Mesh::default()).far(), None);
+        let empty = of_mesh(&Mesh::default(), &[], UpAxis::Y);
+        assert_eq!((empty.bounds, empty.far()), (None, None));
         let points = RawPoints {
             origin: DVec3::new(3e6, 0.0, 4e6),
             position: vec![Vec3::new(-0.5, 0.0, 0.0), Vec3::new(0.5, 0.0, 0.0)],

@@ -67,7 +67,8 @@ pub fn first_scene(
     let root = root_for(scene_file, on_disk)?;
     let root = root.map(|root| text_of(&root)).transpose()?;
     if wish.preset.is_some() && !data.iter().any(|file| takes_preset(file, wish)) {
-        let message = "--preset is for volumes, and as a colour map for points by a column, and no file is drawn so";
+        let message =
+            "--preset is for volumes, and as a colour map for points and meshes by a column, and no file is drawn so";
         return Err(Error::usage(message, "leave it out; in a scene `color` of an object is the colour of a mesh"));
     }
     let objects = objects(data, &paths, wish);

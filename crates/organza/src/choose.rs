@@ -93,8 +93,9 @@ mod tests {
     fn object(data: ObjectData) -> ObjectStatistics {
         let name = "a".into();
         let volumes_by = VolumeSampler::Auto;
-        let [opaque, by_gradient, is_plain, casts, receives] = [false, false, true, true, true];
-        ObjectStatistics { name, data, opaque, by_gradient, is_plain, volumes_by, casts, receives }
+        let [opaque, is_partly_opaque, by_gradient, is_plain, casts, receives] =
+            [false, false, false, true, true, true];
+        ObjectStatistics { name, data, opaque, is_partly_opaque, by_gradient, is_plain, volumes_by, casts, receives }
     }
 
     fn sun() -> LightStatistics {

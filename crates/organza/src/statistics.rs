@@ -136,6 +136,8 @@ pub struct ObjectStatistics {
     pub data: ObjectData,
     /// Whether it is an opaque surface.
     pub opaque: bool,
+    /// Whether it is a mesh of which its vertices' opacities leave parts opaque.
+    pub is_partly_opaque: bool,
     /// Whether the gradients of its values shade it or fill a layer.
     pub by_gradient: bool,
     /// Whether its discs have the usual footprint, as far as objects and materials say, and it shows no field.

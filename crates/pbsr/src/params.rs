@@ -19,6 +19,9 @@ pub struct SurfaceParams {
     pub cross_section: f64,
     /// How the opacity grows at grazing angles; the paper's surfaces are thin slabs.
     pub surface_opacity: SurfaceOpacity,
+    /// Factor on the optical depth of one crossing that `opacity` has in it already, > 0: opacities of a mesh's vertices are those of a crossing
+    /// without it.
+    pub extinction_factor: f64,
     /// Linear Rec.709 colour of every particle, or the factor on a mesh's own colours; each channel ≥ 0.
     pub color: [f32; 3],
     /// Optical depth at which an opaque surface is sampled, in (0, 64\]; see [`crate::opacity::capped_optical_depth`].
@@ -33,6 +36,7 @@ impl Default for SurfaceParams {
             opacity: 0.5,
             cross_section: 1e-4,
             surface_opacity: SurfaceOpacity::ThinSlab,
+            extinction_factor: 1.0,
             color: [1.0; 3],
             opaque_optical_depth: 16.0,
             seed: 1,
@@ -58,6 +62,7 @@ impl SurfaceParams {
     pub fn validate(&self) -> Result<(), Error> {
         check((0.0..=1.0).contains(&self.opacity), "opacity", self.opacity, "a number in [0, 1]")?;
         positive(self.cross_section, "cross_section")?;
+        positive(self.extinction_factor, "extinction_factor")?;
         let cap = self.opaque_optical_depth;
         check(cap > 0.0 && cap <= 64.0, "opaque_optical_depth", cap, "a number in (0, 64]")?;
         color(self.color)

@@ -110,7 +110,7 @@ pub struct ReadParams {
     /// Points that are wanted at most. Of a file that has levels of detail (COPC) whole levels are read, coarsest first, as far as that
     /// goes, and the coarsest in any case; other files are read whole.
     pub most_points: Option<u64>,
-    /// Columns of points that are kept in [`RawPoints::columns`] beside those that have a meaning, each by its name in the file or by one
+    /// Columns of a mesh that are kept in [`Mesh::columns`], and columns of points that are kept in [`RawPoints::columns`] beside those that have a meaning, each by its name in the file or by one
     /// that [`RawPoints::column`] knows. One that a file of points has not is an error that names those that it has.
     pub columns: Vec<String>,
     /// Name of the array of a VTK file that is the volume's field; `None` for the one that the file names, else the first of one number a
@@ -250,6 +250,7 @@ pub fn grid_in_memory(name: &str, grid: &Grid, params: &ReadParams) -> Result<No
 /// [`ReadError`] as [`file()`] gives it.
 pub fn mesh_in_memory(name: &str, mesh: Mesh, params: &ReadParams) -> Result<(Mesh, Notes), ReadError> {
     let mut reading = Reading::new(params, None);
+    check_mesh_columns(&mesh, &reading).map_err(|e| e.in_file(name))?;
     let mesh = outwards(mesh, &mut reading).map_err(|e| e.in_file(name))?;
     Ok((mesh, reading.finish(name)))
 }
@@ -275,7 +276,10 @@ fn whole(
     match loaded {
         Loaded::Points(points) => check_columns(&points, reading).map(|()| Loaded::Points(points)),
         Loaded::Grid(grid) => remark_gaps(&grid, reading).map(|()| Loaded::Grid(grid)),
-        Loaded::Mesh(mesh) => outwards(mesh, reading).map(Loaded::Mesh),
+        Loaded::Mesh(mesh) => {
+            check_mesh_columns(&mesh, reading)?;
+            outwards(mesh, reading).map(Loaded::Mesh)
+        }
         Loaded::Image(image) => Ok(Loaded::Image(image)),
     }
 }
@@ -326,6 +330,17 @@ fn check_columns(points: &RawPoints, reading: &mut Reading<'_>) -> Result<(), Re
     Ok(())
 }
 
+/// Refuses columns of a mesh that were asked for and are not there.
+fn check_mesh_columns(mesh: &Mesh, reading: &Reading<'_>) -> Result<(), ReadError> {
+    let Some(missing) = reading.params.columns.iter().find(|name| !mesh.has_column(name)) else { return Ok(()) };
+    let known: Vec<&str> = mesh.column_names().collect();
+    let further = reading.notes.columns.iter().map(|c| c.name.as_str()).filter(|name| !known.contains(name));
+    let names: Vec<&str> = known.iter().copied().chain(further).collect();
+    let expected = format!("a column among {}", names.join(", "));
+    let found = format!("`{}`", escaped(missing.as_bytes(), LONGEST_NAME));
+    Err(ReadError::input(Place::File, expected, found, "`organza info` says what they hold"))
+}
+
 /// Bytes that tell the format.
 const MARK: usize = 4096;
 
@@ -367,7 +382,7 @@ fn parse_as(
     let params = reading.params;
     match format {
         #[cfg(feature = "ply")]
-        Format::Ply => ply::read(&stream.rest()?, reading),
+        Format::Ply => ply::read(&stream.rest()?, place, reading),
         Format::Stl => stl::read(&stream.rest()?, reading).map(Loaded::Mesh),
         #[cfg(feature = "obj")]
         Format::Obj => obj::read(&stream.rest()?, place, reading),

@@ -6,12 +6,15 @@ pub(crate) mod fans;
 pub(crate) mod gltf;
 #[cfg(feature = "obj")]
 pub(crate) mod mtl;
+#[cfg(any(feature = "vti", feature = "vtk"))]
+pub(crate) mod named_arrays;
 #[cfg(feature = "obj")]
 pub(crate) mod obj;
 #[cfg(feature = "off")]
 pub(crate) mod off;
+pub(crate) mod opacity;
 pub(crate) mod outwards;
-#[cfg(any(feature = "obj", feature = "gltf"))]
+#[cfg(any(feature = "obj", feature = "gltf", feature = "ply"))]
 pub(crate) mod paint;
 #[cfg(feature = "ply")]
 pub(crate) mod ply;
@@ -20,5 +23,5 @@ pub(crate) mod polygon;
 #[cfg(feature = "obj")]
 pub(crate) mod statements;
 pub(crate) mod stl;
-#[cfg(any(feature = "obj", feature = "gltf"))]
+#[cfg(any(feature = "obj", feature = "gltf", feature = "ply"))]
 pub(crate) mod texture;

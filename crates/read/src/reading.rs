@@ -3,8 +3,8 @@
 use super::ReadParams;
 use crate::error::{Place, ReadError};
 use crate::points::extras::LONGEST_NAME;
-use splat_core::Progress;
 use splat_core::text::escaped;
+use splat_core::{Association, Progress};
 use std::fmt;
 
 /// Most names that are said not to be used: each new one is held against all others, and a file may have millions.
@@ -84,13 +84,15 @@ impl fmt::Display for Mended {
     }
 }
 
-/// A column of points that has no meaning of its own.
+/// A column of points or of a mesh that has no meaning of its own.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NamedColumn {
     /// Its name in the file, by which [`super::ReadParams::columns`] asks for it.
     pub name: String,
     /// Its least and greatest finite number, where they were looked at.
     pub range: Option<[f64; 2]>,
+    /// What its numbers belong to, of a mesh; `None` for one of points.
+    pub association: Option<Association>,
 }
 
 /// What a reader has to say of a file beside its data.
@@ -100,7 +102,7 @@ pub struct Notes {
     pub format: String,
     /// Columns, fields and statements of the file that are not used, as the file names them.
     pub unused: Vec<String>,
-    /// Columns of points that have no meaning of their own, kept or not.
+    /// Columns of points or of a mesh that have no meaning of their own, kept or not.
     pub columns: Vec<NamedColumn>,
     /// What was made of the data that its user should know, one sentence without a full stop each.
     pub remarks: Vec<String>,

@@ -17,6 +17,7 @@ mod read_materials;
 #[cfg(feature = "obj")]
 mod read_memory;
 mod read_mended;
+mod read_mesh_columns;
 mod read_metaimage;
 mod read_more;
 mod read_nifti;

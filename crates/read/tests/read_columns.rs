@@ -54,7 +54,7 @@ fn columns_of_text_are_kept_by_name_and_no_longer_unused() {
     assert_eq!(column(&points, "height"), [1.0, 2.0, 4.0]);
     assert_eq!(column(&points, "value"), [5.0, 6.0, 7.0]);
     assert_eq!(notes.unused, ["label"]);
-    let named = |name: &str| NamedColumn { name: name.to_owned(), range: None };
+    let named = |name: &str| NamedColumn { name: name.to_owned(), range: None, association: None };
     assert_eq!(read("a.csv", CSV, &[]).1.columns, ["heat", "label"].map(named));
 }
 
@@ -106,8 +106,8 @@ fn properties_of_ply_are_kept_whether_they_come_before_or_behind_what_is_known()
         assert!(points.color.len() == 2 && notes.unused.is_empty(), "{:?}", notes.unused);
         assert_eq!(read("a.ply", &content, &[]).1.unused, ["time", "label"]);
     }
-    // A mesh has no points whose columns could be asked for.
-    assert!(bytes("a.ply", ply_ascii().as_bytes(), &asking(&["nothing"]), None).is_ok());
+    let refused = bytes("a.ply", ply_ascii().as_bytes(), &asking(&["nothing"]), None).unwrap_err();
+    assert_eq!(refused.expected, "a column among x, y, z, height, skipped_too, flags");
 }
 
 #[test]

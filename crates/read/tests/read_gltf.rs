@@ -140,7 +140,7 @@ fn textures_become_colours_of_vertices_down_to_their_texels() {
 }
 
 #[test]
-fn an_alpha_mask_cuts_out_what_is_not_there_and_blending_is_named() {
+fn an_alpha_mask_cuts_out_what_is_not_there_and_blending_is_the_opacity() {
     let mut pixels = image::RgbaImage::from_pixel(4, 4, image::Rgba([255, 255, 255, 255]));
     (0..4).for_each(|y| (0..2).for_each(|x| pixels.put_pixel(x, y, image::Rgba([255, 255, 255, 0]))));
     let mut png = std::io::Cursor::new(Vec::new());
@@ -154,8 +154,17 @@ fn an_alpha_mask_cuts_out_what_is_not_there_and_blending_is_named() {
     // Half of the square, within half a texel of its four.
     assert!((area("MASK") - 2.0).abs() <= 0.5, "{}", area("MASK"));
     let (mesh, notes) = read("a.glb", &glb(&json("BLEND"), &square(&png)));
-    assert!((mesh.area() - 4.0).abs() < 1e-5);
-    assert!(notes.remarks.iter().any(|r| r.starts_with("alphaMode BLEND: ")), "{:?}", notes.remarks);
+    // What is clear everywhere is left out, to about a texel of four.
+    assert!((mesh.area() - 2.0).abs() <= 1.0, "{}", mesh.area());
+    assert!(notes.remarks.iter().any(|r| r.starts_with("doubleSided is not set")), "{:?}", notes.remarks);
+    assert_eq!(mesh.opacity.len(), mesh.position.len());
+    for t in &mesh.triangles {
+        for (p, opacity) in t.map(|v| (mesh.position[v as usize], mesh.opacity[v as usize])) {
+            // Turned, the image's right is up; texels are squares of one opacity.
+            let height = mesh.origin.y as f32 + p.y - 1.0;
+            assert!(height.abs() < 0.01 || opacity == f32::from(u8::from(height > 0.0)), "{p}: {opacity}");
+        }
+    }
 }
 
 #[test]

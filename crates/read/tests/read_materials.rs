@@ -38,9 +38,15 @@ fn faces_have_the_diffuse_colours_of_their_materials() {
     assert_eq!(colors(&mesh), [[[1.0, 0.0, 0.0]; 3], [[0.0, 0.5, 0.0]; 3]]);
     // Two vertices are split where the materials meet, and shaded as one.
     assert_eq!((mesh.position.len(), mesh.normal), (6, vec![Vec3::Z; 6]));
-    assert_eq!(notes.unused, ["Ns", "d", "vt"]);
-    assert!(notes.remarks.len() == 1, "{:?}", notes.remarks);
-    assert!(notes.remarks[0].starts_with("opacities of materials (`d` and `Tr`, the least 0.500) are not used"));
+    assert_eq!(notes.unused, ["Ns", "vt"]);
+    assert!(notes.remarks.is_empty(), "{:?}", notes.remarks);
+    let opacities = mesh.triangles.iter().map(|t| t.map(|v| mesh.opacity[v as usize]));
+    assert_eq!(opacities.collect::<Vec<_>>(), [[1.0; 3], [0.5; 3]]);
+    std::fs::write(folder.join("a.mtl"), MTL.replace("d 0.5", "d 2\nTr 0.25")).unwrap();
+    let (mesh, notes) = read(&folder, OBJ);
+    assert_eq!(mesh.opacity.iter().copied().fold(1.0, f32::min), 0.75);
+    assert_eq!(notes.remarks, ["a material states no number from 0 to 1 as its `d`, which is left out"]);
+    std::fs::write(folder.join("a.mtl"), MTL).unwrap();
     // In a folder below, by another system's separator, of several files; the later of two materials counts.
     std::fs::write(folder.join("sub/b.mtl"), "newmtl green\nKd 0.25\n").unwrap();
     let (mesh, _) = read(&folder, &OBJ.replace("mtllib a.mtl", "mtllib a.mtl sub\\b.mtl"));
@@ -54,7 +60,10 @@ fn faces_have_the_diffuse_colours_of_their_materials() {
     let own = OBJ.replace("v 0 0 0", "v 0 0 0 0 0 1").replace("v 1 0 0", "v 1 0 0 0 0 1");
     let own = own.replace("v 1 1 0", "v 1 1 0 0 0 1").replace("v 0 1 0", "v 0 1 0 0 0 1");
     let (mesh, notes) = read(&folder, &own);
-    assert_eq!((colors(&mesh)[0], notes.unused.last().unwrap().as_str()), ([[0.0, 0.0, 1.0]; 3], "Kd"));
+    assert_eq!(
+        (colors(&mesh)[0], notes.unused),
+        ([[0.0, 0.0, 1.0]; 3], ["Ns", "vt", "Kd", "d"].map(str::to_owned).to_vec())
+    );
 }
 
 #[test]

@@ -65,7 +65,10 @@ fn the_first_word_says_what_a_vertex_has() {
         (DVec3::new(1.0, 2.0, 3.0), Vec3::Z, [0.0, 1.0, 0.0])
     );
     let unused = bytes("a.off", &off(), &ReadParams::default(), None).unwrap().1.unused;
-    assert_eq!(unused, ["vertex alpha", "face colours"]);
+    assert_eq!(unused, ["face colours"]);
+    assert_eq!(whole.opacity, [1.0, 9.0 / 255.0, 1.0]);
+    let shares = mesh(&format!("COFF\n3 1 0\n0 0 0 255 0 0 0.5\n1 0 0 0 128 0 1\n0 1 0 0 0 1 0\n{faces}"));
+    assert_eq!(shares.opacity, [0.5, 1.0, 0.0]);
 }
 
 #[test]

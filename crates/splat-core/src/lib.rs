@@ -80,7 +80,9 @@ pub use shapes::field::ScalarField;
 pub use shapes::gaussians::Gaussians;
 pub use shapes::grid::{BccGrid, Grid, Interpolation, Packing};
 pub use shapes::height_image::HeightImage;
-pub use shapes::mesh::{Mesh, crease_bytes, part_at_creases, robust_cross, smooth, vertex_normals};
+pub use shapes::mesh::{
+    Association, Mesh, MeshColumn, crease_bytes, halve_edges, part_at_creases, robust_cross, smooth, vertex_normals,
+};
 pub use space::{Aabb, DAabb, Similarity};
 pub use splats::cloud::{Cloud, Splat, SplatKind, Unfit};
 pub use splats::footprint::{Footprint, FootprintImage, FootprintStack, MOST_TEXELS};

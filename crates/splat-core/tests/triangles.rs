@@ -194,7 +194,14 @@ fn attributes_are_those_of_the_place_and_depths_go_on_as_the_plane_does() {
     let tint = |p: Vec3| [0.5 + 0.05 * p.x, 0.3 + 0.01 * p.z, 0.2 + 0.1 * p.y];
     let color = position.iter().map(|p| tint(*p)).collect();
     let normal = vec![Vec3::Y, Vec3::X, Vec3::Z];
-    let one = Mesh { origin: DVec3::new(100.0, 0.0, 0.0), position, normal, color, triangles: vec![[0, 1, 2]] };
+    let one = Mesh {
+        origin: DVec3::new(100.0, 0.0, 0.0),
+        position,
+        normal,
+        color,
+        triangles: vec![[0, 1, 2]],
+        ..Mesh::default()
+    };
     let transform =
         Similarity { scale: 2.0, rotation: DQuat::from_rotation_y(0.3), translation: DVec3::new(0.0, -1.0, 0.5) };
     let placed = [PlacedMesh { mesh: &one, transform }];

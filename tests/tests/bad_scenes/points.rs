@@ -22,7 +22,7 @@ fn how_points_look_is_checked() {
     refused(&format!("color_by = {{ column = \"z\", map = \"grey\" }}\n{transfer}"), "exclude each other");
     refused(
         transfer,
-        "`transfer` belongs to a `volume` or `slice`, to a surface with a `field`, and to `points` with `color_by`",
+        "`transfer` belongs to a `volume` or `slice`, to a surface with a `field`, and to `points` or a `mesh` with `color_by`",
     );
     refused(
         "color_by = { column = \"z\" }\ntransfer = [{ value = 0, color = [1, 1, 1], extinction = 0.5 }]",
@@ -118,11 +118,10 @@ fn what_raw_points_alone_have_is_refused_elsewhere() {
         ("as", "\"medium\""),
         ("extinction", "1"),
     ] {
-        refused(
-            "mesh = \"a.ply\"",
-            &format!("mesh = \"a.ply\"\n{key} = {value}"),
-            &format!("`{key}` belongs to `points`"),
-        );
+        // A mesh has colours by columns.
+        let source =
+            if key == "color_by" { "isosurface = { volume = \"b.nii\", level = 1 }" } else { "mesh = \"a.ply\"" };
+        refused("mesh = \"a.ply\"", &format!("{source}\n{key} = {value}"), &format!("`{key}` belongs to `points`"));
     }
 }
 

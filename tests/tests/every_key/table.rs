@@ -176,6 +176,8 @@ pub(super) const SUN: &[&str] = &["light=[{kind='directional', direction=[-2, -3
 const OF_THE_TRANSFER: Expected = Refused(2, "are those of its `transfer`");
 const NOT_OF_POINTS: Expected = Refused(2, "`merge_duplicates` belongs to `points`");
 const RAW: Which = These(&["points", "plain points"]);
+const MESHES: Which = These(&["mesh", "plain mesh"]);
+const BY_Z: &[&str] = &["object.it.color_by={column='z'}"];
 const HOT: &[&str] = &["object.it.points='hot.xyz'", "object.it.color_by={column='heat'}"];
 const MATTER: &[&str] = &["object.it.as='medium'", "object.it.extinction=3"];
 const OWN_SPACING: Expected = Refused(2, "states its own spacing");
@@ -225,6 +227,10 @@ fn objects() -> Vec<Entry> {
         of(RAW, "object.extinction", "object.it.extinction=1").with(MATTER).by(POINTS),
         one("object.materials", "object.it.materials=['m']").but(All, Refused(2, "belongs to `points` that are")),
         of(RAW, "object.color_by", "object.it.color_by={column='z'}"),
+        of(MESHES, "object.color_by", "object.it.color_by={column='z'}"),
+        of(MESHES, "object.color_by.column", "object.it.color_by.column='x'").with(BY_Z),
+        of(MESHES, "object.color_by.map", "object.it.color_by.map='turbo'").with(BY_Z),
+        of(MESHES, "object.color_by.range", "object.it.color_by.range=[-9, 9]").with(BY_Z),
         one("object.color_by", "object.it.color_by={column='z'}")
             .but(All, Refused(2, "`color_by` belongs to `points`")),
         of(HEAT, "object.color_by.column", "object.it.color_by.column='x'").with(HOT),

@@ -68,10 +68,10 @@ pub enum Classified {
     Extinction,
 }
 
-/// A column that points take their colours from.
+/// A column that points or meshes take their colours from.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ColorBy {
-    /// Its name, see [`RawPoints::column`].
+    /// Its name, see [`RawPoints::column`] and [`splat_core::Mesh::column`].
     pub column: String,
     /// What its numbers look like.
     pub colors: PointColors,
@@ -136,6 +136,11 @@ pub fn colored(points: &RawPoints, by: &ColorBy, up: DVec3, splat: &SplatParams)
     let Some(numbers) = points.column(&by.column, up) else {
         return Err(splat.bad("color_by", &by.column, "a column of its points"));
     };
+    Ok(colored_numbers(numbers, by, splat))
+}
+
+/// The colours of numbers.
+pub(crate) fn colored_numbers(numbers: Vec<f64>, by: &ColorBy, splat: &SplatParams) -> Colored {
     let range = match &by.colors {
         PointColors::Map(_, range) => Some(range.unwrap_or_else(|| spread(&numbers))),
         _ => None,
@@ -154,7 +159,7 @@ pub fn colored(points: &RawPoints, by: &ColorBy, up: DVec3, splat: &SplatParams)
     let is_of_whole = matches!(by.colors, PointColors::Classes | PointColors::Distinct);
     let present = if is_of_whole { present(&numbers) } else { Vec::new() };
     let color = numbers.par_iter().map(color).collect();
-    Ok(Colored { color, numbers, classified, range, gaps, present })
+    Colored { color, numbers, classified, range, gaps, present }
 }
 
 /// The least whole numbers that occur, rising.

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use rstar::primitives::Line;
 use rstar::{AABB, RTree};
 use splat_core::glam::{DVec3, Vec3};
-use splat_core::{Cloud, Footprint, Mesh};
+use splat_core::{Cloud, Footprint, Mesh, SplatKind};
 use std::collections::HashMap;
 
 /// Share of a disc's radius within which it hides.
@@ -74,7 +74,8 @@ impl Borders {
         cloud.tangent.resize(n, Vec3::ZERO);
         let groups = cloud.position.par_chunks(GROUP).zip(cloud.normal.par_chunks(GROUP));
         let discs = cloud.radius.par_chunks_mut(GROUP).zip(cloud.tangent.par_chunks_mut(GROUP));
-        groups.zip(discs).with_min_len(CHUNK / GROUP).for_each(|((position, normal), (radius, tangent))| {
+        let discs = discs.zip(cloud.kind.par_chunks(GROUP));
+        groups.zip(discs).with_min_len(CHUNK / GROUP).for_each(|((position, normal), ((radius, tangent), kind))| {
             let reach = Vec3::splat(radius.iter().fold(0.0, |most, r| r.max(most)) * CORE);
             let (low, high) = position.iter().fold((position[0], position[0]), |(l, h), p| (l.min(*p), h.max(*p)));
             let around = |p: Vec3| p.as_dvec3().to_array();
@@ -82,7 +83,7 @@ impl Borders {
             if self.edges.locate_in_envelope_intersecting(&around).next().is_none() {
                 return;
             }
-            for k in 0..position.len() {
+            for k in (0..position.len()).filter(|k| kind[*k] == SplatKind::Opaque) {
                 if let Some((first, second)) = self.ellipse(position[k], normal[k], radius[k]) {
                     (tangent[k], radius[k]) = (first.as_vec3(), second as f32);
                 }

@@ -133,6 +133,10 @@ impl Part<'_> {
             mesh.position.push(place.as_vec3());
             let normal = between(whole.normal[a], whole.normal[b]);
             mesh.normal.push(if a == b { normal } else { normal.normalize_or_zero() });
+            if !whole.opacity.is_empty() {
+                let [here, there] = [whole.opacity[a], whole.opacity[b]].map(f64::from);
+                mesh.opacity.push((here + (there - here) * share).clamp(0.0, 1.0) as f32);
+            }
             if !whole.color.is_empty() {
                 mesh.color.push(between(whole.color[a].into(), whole.color[b].into()).to_array());
             }

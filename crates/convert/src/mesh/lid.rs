@@ -83,11 +83,11 @@ fn close(mesh: &mut Mesh, normal: DVec3, edges: &[[Rim; 2]], report: &mut LidRep
     let normal = normal.normalize().as_vec3();
     for Place { rim, crossing } in places {
         let rim = outlines.rims[rim].vertex as usize;
-        mesh.position.push(crossing.map_or(mesh.position[rim], |place| place.as_vec3()));
-        mesh.normal.push(normal);
-        if !mesh.color.is_empty() {
-            mesh.color.push(mesh.color[rim]);
+        mesh.push_copy(rim);
+        if let (Some(place), Some(last)) = (crossing, mesh.position.last_mut()) {
+            *last = place.as_vec3();
         }
+        mesh.normal.push(normal);
     }
     report.triangles += triangles.len() as u64;
     mesh.triangles.extend(triangles.into_iter().map(|corners| corners.map(|place| first + place as u32)));

@@ -5,6 +5,9 @@
 //! K = a for an opaque one. All discs of an object have the radius R = cutoff·0.8·h. So Σ a·norm/R²·profile is a
 //! quadrature of ∫ norm/R²·profile dA = 1 over the surface: splitting finer or coarser leaves the transmittance alone.
 //!
+//! A mesh with opacities of vertices has on each piece α times what they interpolate to at its centroid; a piece of which 1 comes is an opaque
+//! disc. Optical depth is found of that product, not interpolated, so the opacity of the surface is what its vertices say.
+//!
 //! Deviation from the paper: it gives each piece the opacity of the surface, which multiplies where discs overlap.
 
 use crate::ConvertError;
@@ -32,7 +35,8 @@ pub struct MeshParams {
     /// whichever is smaller, but not more than four million splats. With [`Density::Splats`] the count is met
     /// within some percent where the triangles are not finer.
     pub density: Density,
-    /// Opacity α of one crossing, in \[0, 1\]; 1 makes the surface opaque, 0 leaves nothing.
+    /// Opacity α of one crossing, in \[0, 1\]; 1 makes the surface opaque, 0 leaves nothing. Opacities of the mesh's vertices are multiplied
+    /// by it.
     pub opacity: f64,
 }
 
@@ -133,13 +137,14 @@ pub fn mesh_to_points_into(
     let plan = plan(mesh, params)?;
     let report = plan.report;
     cloud.origin = p.transform.apply(mesh.origin);
-    let kind = if params.opacity < 1.0 { SplatKind::Surface } else { SplatKind::Opaque };
+    let is_opaque = params.opacity >= 1.0 && mesh.opacity.is_empty();
+    let kind = if is_opaque { SplatKind::Opaque } else { SplatKind::Surface };
     columns::size_columns(cloud, report.splats as usize, kind, plan.wanted, p)?;
     progress.add_total(report.splats);
     if report.splats > 0 {
         let pieces = Pieces::new(mesh, params, &plan);
         pieces.emit(cloud, progress)?;
-        if plan.wanted.crossing_depth {
+        if mesh.opacity.is_empty() && plan.wanted.crossing_depth {
             cloud.crossing_depth.fill(optics::optical_depth(params.opacity) as f32);
         }
         if !plan.borders.is_empty() {
@@ -192,10 +197,16 @@ pub(crate) fn plan(mesh: &Mesh, params: &MeshParams) -> Result<Plan, ConvertErro
     report.splats = starts.last().copied().unwrap_or(0);
     report.normals_computed = mesh.normal.is_empty();
     let normal = if report.normals_computed { vertex_normals(mesh) } else { mesh.normal.clone() };
-    // A disc ends where its image does.
-    let ends = params.opacity >= 1.0 && !p.shows_images();
+    // A disc ends where its image does. Translucent discs add up beyond a border to what they leave out before it.
+    let has_opaque = mesh.opacity.is_empty() || mesh.opacity.contains(&1.0);
+    let ends = params.opacity >= 1.0 && has_opaque && !p.shows_images();
     let borders = if ends { open_edges(mesh) } else { Vec::new() };
-    let wanted = Wanted { tangent: !borders.is_empty() || p.shows_images(), ..wanted(params.opacity) };
+    let wanted = wanted(params.opacity);
+    let wanted = Wanted {
+        tangent: !borders.is_empty() || p.shows_images(),
+        crossing_depth: wanted.crossing_depth || !mesh.opacity.is_empty(),
+        ..wanted
+    };
     let mut plan = Plan { measures, starts, normal, borders, wanted, report };
     let triangles = (0..mesh.triangles.len()).into_par_iter().with_min_len(4096);
     plan.wanted.shading_normal = triangles.any(|i| plan.is_flat(mesh, i, plane(mesh, i)));
@@ -234,9 +245,8 @@ pub fn flatten_leaning(mesh: &mut Mesh, least: f64) {
         }
         let side = if normals.iter().sum::<Vec3>().dot(plane) < 0.0 { -plane } else { plane };
         for v in ids {
-            mesh.position.push(mesh.position[v]);
+            mesh.push_copy(v);
             mesh.normal.push(side);
-            mesh.color.extend(mesh.color.get(v).copied());
         }
         mesh.triangles[i] = own.map(|v| v as u32);
     }

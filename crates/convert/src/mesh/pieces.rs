@@ -7,7 +7,7 @@ use crate::mesh::subdivide::{self, Run, Split};
 use crate::{ConvertError, MeshParams};
 use rayon::prelude::*;
 use splat_core::{
-    Cloud, Mesh, Progress,
+    Cloud, Mesh, Progress, SplatKind,
     glam::{DQuat, Vec3},
     optics,
 };
@@ -25,8 +25,10 @@ pub(crate) struct Pieces<'a> {
     normal: Vec<Vec3>,
     /// Spacing in the mesh's units.
     spacing: f64,
-    /// Factor from a share of the mesh's area to K.
+    /// Factor from a share of the mesh's area to K; to an area where vertices have opacities.
     depth: f64,
+    /// Opacity of one crossing where that of the vertices is 1.
+    opacity: f64,
     radius: f32,
     color: [f32; 3],
     rotation: DQuat,
@@ -42,14 +44,20 @@ struct Target<'a> {
     shading_normal: &'a mut [Vec3],
     cross_section: &'a mut [f32],
     color: &'a mut [[f32; 3]],
+    /// Empty for a mesh without opacities.
+    opacity: &'a mut [f32],
 }
+
+/// Least optical depth of one crossing where vertices take all opacity away: none to the eye, and yet the layer of a surface.
+const CLEAR: f64 = 1e-30;
 
 impl<'a> Pieces<'a> {
     pub(crate) fn new(mesh: &'a Mesh, params: &MeshParams, plan: &'a Plan) -> Self {
         let t = &params.splat.transform;
         let place = |v: &Vec3| (t.rotation * (v.as_dvec3() * t.scale)).as_vec3();
         let turn = |n: &Vec3| columns::unit_or_zero(t.rotate(n.as_dvec3()).as_vec3());
-        let tau = if params.opacity < 1.0 { optics::optical_depth(params.opacity) } else { 1.0 };
+        let is_even = params.opacity < 1.0 && mesh.opacity.is_empty();
+        let tau = if is_even { optics::optical_depth(params.opacity) } else { 1.0 };
         Self {
             mesh,
             plan,
@@ -57,6 +65,7 @@ impl<'a> Pieces<'a> {
             normal: plan.normal.par_iter().with_min_len(CHUNK).map(turn).collect(),
             spacing: plan.report.spacing / t.scale,
             depth: tau * t.scale * t.scale,
+            opacity: params.opacity,
             radius: plan.report.radius as f32,
             color: params.splat.color,
             rotation: t.rotation,
@@ -75,10 +84,14 @@ impl<'a> Pieces<'a> {
         let rest = (cloud.cross_section.par_chunks_mut(CHUNK), cloud.color.par_chunks_mut(CHUNK));
         let mut shading: Vec<&mut [Vec3]> = cloud.shading_normal.chunks_mut(CHUNK).collect();
         shading.resize_with(cloud.radius.len().div_ceil(CHUNK), Default::default);
-        (columns.0, columns.1, shading, rest.0, rest.1, cloud.radius.par_chunks_mut(CHUNK))
+        let has_opacity = !self.mesh.opacity.is_empty();
+        let opacities = if has_opacity { &mut cloud.crossing_depth[..] } else { &mut [] };
+        let mut opacities: Vec<&mut [f32]> = opacities.chunks_mut(CHUNK).collect();
+        opacities.resize_with(cloud.radius.len().div_ceil(CHUNK), Default::default);
+        (columns.0, columns.1, shading, rest.0, rest.1, opacities, cloud.radius.par_chunks_mut(CHUNK))
             .into_par_iter()
             .enumerate()
-            .for_each(|(chunk, (position, normal, shading_normal, cross_section, color, radius))| {
+            .for_each(|(chunk, (position, normal, shading_normal, cross_section, color, opacity, radius))| {
                 if progress.tick(radius.len() as u64).is_err() {
                     return;
                 }
@@ -86,10 +99,30 @@ impl<'a> Pieces<'a> {
                 if self.mesh.color.is_empty() {
                     color.fill(self.color);
                 }
-                let target = Target { position, normal, shading_normal, cross_section, color };
+                let target = Target { position, normal, shading_normal, cross_section, color, opacity };
                 pulp::Arch::new().dispatch(Fill { pieces: self, first: (chunk * CHUNK) as u64, target });
             });
+        if has_opacity {
+            self.fade(cloud);
+        }
         check_cancelled(progress)
+    }
+
+    /// Turns areas and opacities of vertices, which the columns hold so far, into K and optical depths of one crossing.
+    fn fade(&self, cloud: &mut Cloud) {
+        let least = if self.opacity > 0.0 { CLEAR } else { 0.0 };
+        let depths = cloud.cross_section.par_iter_mut().zip(cloud.crossing_depth.par_iter_mut());
+        depths.zip(cloud.kind.par_iter_mut()).with_min_len(CHUNK).for_each(|((cross_section, crossing), kind)| {
+            let opacity = self.opacity * f64::from(*crossing);
+            if opacity < 1.0 {
+                let depth = optics::optical_depth(opacity).max(least);
+                *cross_section = (depth * f64::from(*cross_section)) as f32;
+                *crossing = depth as f32;
+            } else {
+                *kind = SplatKind::Opaque;
+                *crossing = 0.0;
+            }
+        });
     }
 }
 
@@ -142,6 +175,7 @@ struct Corners {
     position: [Vec3; 3],
     normal: [Vec3; 3],
     color: Option<[Vec3; 3]>,
+    opacity: Option<[f32; 3]>,
     /// Normal of the plane, on the side of the vertex normals.
     plane: Vec3,
     /// Whether its discs lie in the plane, since normals lean.
@@ -160,7 +194,16 @@ impl Corners {
         let is_flat = pieces.plan.is_flat(pieces.mesh, triangle, own);
         let plane = if normal.iter().sum::<Vec3>().dot(plane) < 0.0 { -plane } else { plane };
         let color = (!pieces.mesh.color.is_empty()).then(|| ids.map(|v| Vec3::from(pieces.mesh.color[v])));
-        Self { position, normal, color, plane, is_flat, depth: pieces.depth * pieces.plan.measures[triangle].area }
+        let opacity = (!pieces.mesh.opacity.is_empty()).then(|| ids.map(|v| pieces.mesh.opacity[v]));
+        Self {
+            position,
+            normal,
+            color,
+            opacity,
+            plane,
+            is_flat,
+            depth: pieces.depth * pieces.plan.measures[triangle].area,
+        }
     }
 
     /// Writes pieces of one share of the area, given by their weights of corners 1 and 2.
@@ -179,6 +222,11 @@ impl Corners {
             let (from, e1, e2) = edges(color);
             for (c, w) in target.color[range.clone()].iter_mut().zip(weights) {
                 *c = (from + e1 * w[0] + e2 * w[1]).max(Vec3::ZERO).to_array();
+            }
+        }
+        if let Some([a, b, c]) = self.opacity {
+            for (opacity, w) in target.opacity[range.clone()].iter_mut().zip(weights) {
+                *opacity = (a + (b - a) * w[0] + (c - a) * w[1]).clamp(0.0, 1.0);
             }
         }
         target.cross_section[range].fill((self.depth * share) as f32);
@@ -245,6 +293,13 @@ impl Corners {
             let (from, along) = line(color);
             for (j, c) in target.color[range.clone()].iter_mut().enumerate() {
                 *c = (from + along * (j as f32 + skip)).max(Vec3::ZERO).to_array();
+            }
+        }
+        if let Some([a, b, c]) = self.opacity {
+            let from = a + (b - a) * start.y + (c - a) * start.z;
+            let along = (b - a) * step.y + (c - a) * step.z;
+            for (j, opacity) in target.opacity[range.clone()].iter_mut().enumerate() {
+                *opacity = (from + along * (j as f32 + skip)).clamp(0.0, 1.0);
             }
         }
         target.cross_section[range].fill((self.depth * run.share) as f32);

@@ -90,7 +90,7 @@ pub fn shown_points(
     points = with_materials(points, splat, shown.has_opacity)?;
     if let Some(by) = shown.color_by.filter(|_| !points.is_empty()) {
         let colored = colored(&points, by, shown.up, splat)?;
-        said.push(sentence(by, &colored));
+        said.push(said_of_colors(by, &colored, "point"));
         scale = ColorScale::of_points(&splat.object_name, by, &colored);
         let mut own = Arc::unwrap_or_clone(points);
         if !own.gaussians.is_empty() {
@@ -158,7 +158,8 @@ fn causes(shown: &PointsShown<'_>) -> String {
     format!(" by {}", all.join(" and "))
 }
 
-fn sentence(by: &ColorBy, colored: &Colored) -> String {
+/// How colours arose, of what has one number each: a point, a vertex or a face.
+pub(crate) fn said_of_colors(by: &ColorBy, colored: &Colored, each: &str) -> String {
     let colors = match (&by.colors, colored.range) {
         (PointColors::Map(map, _), Some([low, high])) => {
             let [from, to] = [low, high].map(|end| short(end, high - low));
@@ -170,14 +171,27 @@ fn sentence(by: &ColorBy, colored: &Colored) -> String {
     };
     let gaps = match colored.gaps {
         0 => String::new(),
-        n => format!("; the object's colour for {} without a number", counted(n, "point")),
+        n => format!("; the object's colour for {} without a number", counted_each(n, each)),
     };
     let also = match by.colors {
         PointColors::Transfer(_, Classified::Opacity) => " and opacities",
         PointColors::Transfer(_, Classified::Extinction) => " and extinctions",
         _ => "",
     };
-    format!("points have the colours{also} of `{}` by {colors}{gaps}", by.column)
+    format!("{} have the colours{also} of `{}` by {colors}{gaps}", plural(each), by.column)
+}
+
+/// Several of what has one number each.
+fn plural(each: &str) -> &str {
+    match each {
+        "vertex" => "vertices",
+        "face" => "faces",
+        _ => "points",
+    }
+}
+
+fn counted_each(n: u64, each: &str) -> String {
+    if n == 1 { format!("1 {each}") } else { format!("{n} {}", plural(each)) }
 }
 
 /// A number to a thousandth of a width.

@@ -60,6 +60,9 @@ pub(super) fn body(
         }
         Source::Combined(_) => combined(scene, object, options)?,
         Source::Mesh(path) => match read(scene, path, 0, None, options)? {
+            FileData::Mesh(mesh) if !mesh.opacity.is_empty() => {
+                return no("meshes whose vertices have opacities are not path-traced");
+            }
             FileData::Mesh(mesh) => mesh,
             _ => {
                 return Err(Error::wrong_kind(

@@ -162,8 +162,7 @@ fn refuse_what_does_not_apply(at: &At<'_>, raw: &RawObject, source: &Source) -> 
     }
     let is_classified = raw.volume.is_some() || raw.slice.is_some();
     if raw.transfer.is_some() && !is_classified && raw.color_by.is_none() && raw.field.is_none() {
-        let message =
-            "`transfer` belongs to a `volume` or `slice`, to a surface with a `field`, and to `points` with `color_by`";
+        let message = "`transfer` belongs to a `volume` or `slice`, to a surface with a `field`, and to `points` or a `mesh` with `color_by`";
         return Err(at.key("transfer").error(message, ""));
     }
     let is_matter = matches!(source, Source::Matter(_)) && raw.transfer.is_some();

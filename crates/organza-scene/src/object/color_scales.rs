@@ -14,7 +14,7 @@ impl SceneObject {
         }
     }
 
-    /// Whether its colours stand for numbers: for those of a column of its points, or for its values.
+    /// Whether its colours stand for numbers: for those of a column of its points or its mesh, or for its values.
     pub fn has_scale(&self) -> bool {
         self.points.color_by.is_some() || self.value_scale().is_some()
     }

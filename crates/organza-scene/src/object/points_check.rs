@@ -15,7 +15,7 @@ const MOST_PIXELS: f64 = 1024.0;
 /// Names of the column of classes.
 const CLASSES: [&str; 2] = ["classification", "class"];
 
-/// What an object says of its points; `None` of the keys for other sources.
+/// What an object says of its points, or of a mesh's colours; `None` of the keys for other sources.
 pub(crate) fn check_points(at: &At<'_>, raw: &RawObject) -> Result<PointsLook, Error> {
     let is_medium = raw.points.is_some() && raw.form == Some(RawPointForm::Medium);
     if raw.extinction.is_some() && !is_medium {
@@ -24,10 +24,15 @@ pub(crate) fn check_points(at: &At<'_>, raw: &RawObject) -> Result<PointsLook, E
             .key("extinction")
             .error(message, "other media have an `extinction` in their source, surfaces none"));
     }
+    if let (Some(_), Some(_)) = (&raw.color_by, raw.color) {
+        let hint = "remove the key `color` of the object, or `color_by`";
+        return Err(at.key("color").error("`color` and `color_by` exclude each other", hint));
+    }
+    let color_by = || raw.color_by.as_ref().map(|by| check_color_by(at, raw, by)).transpose();
     if raw.points.is_none() {
         let keys = [
             ("as", raw.form.is_some()),
-            ("color_by", raw.color_by.is_some()),
+            ("color_by", raw.color_by.is_some() && raw.mesh.is_none()),
             ("keep", raw.keep.is_some()),
             ("unlit", raw.unlit.is_some()),
             ("point_size", raw.point_size.is_some()),
@@ -38,8 +43,12 @@ pub(crate) fn check_points(at: &At<'_>, raw: &RawObject) -> Result<PointsLook, E
                 let hint = "give its material shading = \"unlit\"";
                 Err(at.key("unlit").error("`unlit` belongs to `points`", hint))
             }
+            Some((key @ "color_by", _)) => {
+                let hint = "a surface shows the values of a volume by `field`";
+                Err(at.key(key).error("`color_by` belongs to `points` and to a `mesh`", hint))
+            }
             Some((key, _)) => Err(at.key(key).error(format!("`{key}` belongs to `points`"), "")),
-            None => Ok(PointsLook::default()),
+            None => Ok(PointsLook { color_by: color_by()?, ..PointsLook::default() }),
         };
     }
     if raw.point_size.is_some() && is_medium {
@@ -61,13 +70,9 @@ pub(crate) fn check_points(at: &At<'_>, raw: &RawObject) -> Result<PointsLook, E
         let hint = "leave one of them out, or give the material shading = \"unlit\"";
         return Err(at.key("unlit").error("`unlit` and `material` exclude each other", hint));
     }
-    if let (Some(_), Some(_)) = (&raw.color_by, raw.color) {
-        let hint = "remove the key `color` of the object, or `color_by`";
-        return Err(at.key("color").error("`color` and `color_by` exclude each other", hint));
-    }
     let keep = raw.keep.iter().flatten().map(|(column, numbers)| check_kept(&at.key("keep"), column, numbers));
     Ok(PointsLook {
-        color_by: raw.color_by.as_ref().map(|by| check_color_by(at, raw, by)).transpose()?,
+        color_by: color_by()?,
         keep: keep.collect::<Result<_, _>>()?,
         unlit: raw.unlit,
         shape: if raw.discs == Some(RawDiscShape::Elliptical) { DiscShape::Elliptical } else { DiscShape::Round },

@@ -4,10 +4,10 @@ use crate::{MatterSource, Scene, SceneMaterial, SceneObject, Source};
 use convert::{ColorBy, DiscShape, DiscSize, Kept, MatterParams, PointMaterial, PointsShown, SplatParams};
 use std::sync::Arc;
 
-/// What a scene says of raw points; of other sources nothing.
+/// What a scene says of raw points; of a mesh its colours alone, and of other sources nothing.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct PointsLook {
-    /// The column that they take their colours from; `None` for those of the file, the object or its material.
+    /// The column that they, or a mesh, take their colours from; `None` for those of the file, the object or its material.
     pub color_by: Option<ColorBy>,
     /// Which of them are drawn, by their columns.
     pub keep: Vec<Kept>,

@@ -62,7 +62,7 @@ pub(crate) struct RawObject {
     pub(crate) form: Option<RawPointForm>,
     /// Extinction within `points` that are a medium, 1/world unit; default the material's.
     pub(crate) extinction: Option<f64>,
-    /// The column that `points` take their colours from.
+    /// The column that `points` or a `mesh` take their colours from.
     pub(crate) color_by: Option<RawColorBy>,
     /// Which `points` are drawn: classes by a list, other columns by their lowest and highest number.
     pub(crate) keep: Option<BTreeMap<String, Vec<f64>>>,
@@ -80,7 +80,7 @@ pub(crate) struct RawObject {
     pub(crate) clip: Vec<RawClip>,
     /// A volume whose values a surface shows by the colours, and the opacities if it has some, of `transfer`.
     pub(crate) field: Option<RawField>,
-    /// Control points of the transfer function of a `volume`, `slice`, surface with a `field` or `points` with `color_by`, by rising value.
+    /// Control points of the transfer function of a `volume`, `slice`, surface with a `field`, `points` or a `mesh` with `color_by`, by rising value.
     pub(crate) transfer: Option<Vec<RawTransferPoint>>,
     /// Length that opacities of `transfer` refer to, in the unit of the data: it grows with `transform.scale`.
     pub(crate) unit_length: Option<f64>,

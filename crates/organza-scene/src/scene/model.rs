@@ -97,10 +97,13 @@ impl Scene {
         std::iter::once(&*self.file).chain(data).chain(self.images()).chain(footprints).map(Path::to_owned).collect()
     }
 
-    /// The columns that are read of a file of points, by name, each once: those that any visible object asks for, so that the file is read
+    /// The columns that are read of a file of points or a mesh, by name, each once: those that any visible object asks for, so that the file is read
     /// once for all of them.
     pub fn columns_of(&self, path: &Path) -> Vec<String> {
-        let names: BTreeSet<&str> = self.made_of(path).flat_map(|o| o.points.columns()).collect();
+        let of_mesh =
+            |o: &&SceneObject| o.visible && o.source.path() == Some(path) && matches!(o.source, Source::Mesh(_));
+        let meshes = self.objects.iter().filter(of_mesh);
+        let names: BTreeSet<&str> = self.made_of(path).chain(meshes).flat_map(|o| o.points.columns()).collect();
         names.into_iter().map(str::to_owned).collect()
     }
 

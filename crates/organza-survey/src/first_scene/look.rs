@@ -1,6 +1,6 @@
 //! How an object looks whose data has not been seen before: its tables in a scene.
 
-use super::point_colors::point_colors;
+use super::point_colors::{mesh_colors, point_colors};
 use super::quoted;
 use crate::data_file::DataFile;
 use crate::labels::Labels;
@@ -83,10 +83,10 @@ pub(super) fn objects(data: &[DataFile], paths: &[String], wish: &Wish) -> Vec<O
         if *count > 1 {
             name = format!("{name}-{count}");
         }
-        let colors = if let SourceData::Points(points) = &file.data {
-            point_colors(points, file.has_colors(), wish)
-        } else {
-            None
+        let colors = match &file.data {
+            SourceData::Points(points) => point_colors(points, file.has_colors(), wish),
+            SourceData::Mesh(_) => mesh_colors(wish),
+            SourceData::Grid(_) | SourceData::Image(_) => None,
         };
         let bare = if file.is_colored() || colors.is_some() { None } else { clays.next() };
         let mut object = object(file, wish.preset.as_ref(), colors);
@@ -133,7 +133,8 @@ pub(super) fn takes_preset(file: &DataFile, wish: &Wish) -> bool {
     match &file.data {
         SourceData::Grid(_) => true,
         SourceData::Points(points) => is_map && point_colors(points, file.has_colors(), wish).is_some(),
-        SourceData::Mesh(_) | SourceData::Image(_) => false,
+        SourceData::Mesh(_) => is_map && wish.color_by.is_some(),
+        SourceData::Image(_) => false,
     }
 }
 
@@ -160,7 +161,7 @@ fn object(file: &DataFile, preset: Option<&Preset>, colors: Option<String>) -> O
                 grouped(mesh.position.len() as u64),
                 sides(mesh.bounds())
             );
-            of("mesh", about, clay, String::new())
+            of("mesh", about, clay, colors.unwrap_or_default())
         }
         SourceData::Points(points) => {
             let all = points.position.iter().map(|p| points.origin + p.as_dvec3());

@@ -1,4 +1,4 @@
-//! Which column points take their colours from in a first scene, and in which colours.
+//! Which column points or a mesh take their colours from in a first scene, and in which colours.
 
 use super::quoted;
 use crate::number::grouped;
@@ -25,9 +25,21 @@ pub(super) fn point_colors(points: &RawPoints, are_colored: bool, wish: &Wish) -
     }
     text +=
         "# Colours by a column; `organza info` lists the columns of the file, and `keep` leaves points out by them.\n";
-    let map = wish.preset.as_ref().and_then(Preset::map).map(|map| format!(", map = \"{}\"", map.name()));
-    let _ = writeln!(text, "color_by = {{ column = {}{} }}", quoted(chosen), map.unwrap_or_default());
+    text += &color_by(chosen, wish);
     Some(text)
+}
+
+/// The keys of the colours of a mesh, where they are asked for.
+pub(super) fn mesh_colors(wish: &Wish) -> Option<String> {
+    let chosen = wish.color_by.as_ref()?;
+    let about = "# Colours by a column; `organza info` lists the columns of the file.\n";
+    Some(format!("{about}{}", color_by(chosen, wish)))
+}
+
+/// The line that names a column.
+fn color_by(column: &str, wish: &Wish) -> String {
+    let map = wish.preset.as_ref().and_then(Preset::map).map(|map| format!(", map = \"{}\"", map.name()));
+    format!("color_by = {{ column = {}{} }}\n", quoted(column), map.unwrap_or_default())
 }
 
 /// The column that tells most of points without colours: their classes, else their values, if they differ.

@@ -13,6 +13,7 @@ use crate::scene::{EffectKind, RenderSettings, Scene, SceneObject, SwitchedEffec
 use crate::statistics::MediumFacts;
 use crate::technique::{Asked, Row, TABLE, estimates, row};
 use crate::{Error, Progress, RenderOptions, pass};
+use convert::PointColors;
 use std::borrow::Cow;
 
 /// How many times the time of the next way a way may take.
@@ -116,9 +117,13 @@ fn ways<'a>(scene: &'a Scene, media: &'a [MediumFacts]) -> impl Iterator<Item = 
     plain.chain(scattering)
 }
 
-/// Whether an object is opaque for certain: raw points may each have an opacity of their own.
+/// Whether an object is opaque for certain: raw points may each have an opacity of their own, and a column may give a mesh opacities. Those of a
+/// mesh's file are not known yet.
 fn is_opaque(scene: &Scene, object: &SceneObject) -> bool {
-    let may_vary = object.field.is_some() || !object.materials.is_empty() || object.source.is_of_points();
+    let is_classified =
+        object.points.color_by.as_ref().is_some_and(|by| matches!(by.colors, PointColors::Transfer(..)));
+    let may_vary =
+        object.field.is_some() || is_classified || !object.materials.is_empty() || object.source.is_of_points();
     !object.source.is_medium() && !may_vary && scene.opacity_of(object) == 1.0
 }
 

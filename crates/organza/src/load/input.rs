@@ -14,7 +14,7 @@ use convert::{
 };
 use field::{ClippedField, Inside, MpuParams, SharedField, Solid};
 use pbsr::{BoundedExtinction, Matter};
-use splat_core::{Clip, DAabb, Grid, Interpolation, Mesh, RawPoints, Reservation, TransferFunction};
+use splat_core::{Clip, DAabb, Grid, Interpolation, Mesh, RawPoints, Reservation, TransferFunction, optics};
 use std::borrow::Cow;
 use std::path::Path;
 use std::sync::Arc;
@@ -60,11 +60,40 @@ impl Input<'_> {
     /// Opacity of one crossing, the least of it; `None` for a medium.
     pub(super) fn opacity(&self) -> Option<f64> {
         match self {
-            Self::Mesh(_, _, params) | Self::Surface(_, _, params, _) => Some(params.opacity),
+            Self::Mesh(_, mesh, params) => Some(params.opacity * f64::from(mesh.least_opacity())),
+            Self::Surface(_, _, params, _) => Some(params.opacity),
             Self::Points(_, points, params) => Some(params.opacity * f64::from(points.least_opacity())),
             Self::Rectangle(_, opacity, _) => Some(*opacity),
             Self::Volume(..) | Self::Procedural(..) | Self::Density(..) | Self::Medium(..) | Self::Matter(..) => None,
         }
+    }
+
+    /// Opacity of one crossing where opacities of a mesh's vertices are 1; of other data the least of it.
+    fn opacity_of_crossing(&self) -> Option<f64> {
+        match self {
+            Self::Mesh(_, _, params) => Some(params.opacity),
+            _ => self.opacity(),
+        }
+    }
+
+    /// Opacity of one crossing in the channel that absorbs most, by the factor that its material has on extinction there.
+    pub(super) fn greatest_opacity(&self, factor: f64) -> f64 {
+        // A material without extinction is clear, whatever the opacity.
+        if factor > 0.0 {
+            optics::opacity(factor * optics::optical_depth(self.opacity_of_crossing().unwrap_or(0.0)))
+        } else {
+            0.0
+        }
+    }
+
+    /// Whether opacities of a mesh's vertices make it translucent, and leave parts of it opaque.
+    pub(super) fn is_partly_opaque(&self) -> bool {
+        matches!(self, Self::Mesh(_, mesh, params) if params.opacity == 1.0 && mesh.opacity.contains(&1.0))
+    }
+
+    /// Whether opacities vary over a mesh.
+    pub(super) fn is_uneven(&self) -> bool {
+        matches!(self, Self::Mesh(_, mesh, _) if !mesh.opacity.is_empty())
     }
 
     /// Whether particles or splats get the gradient as normal.
@@ -128,7 +157,7 @@ pub(super) fn input<'a>(object: &'a SceneObject, context: &Context<'_>) -> Resul
     Ok(match &object.source {
         Source::Mesh(path) => {
             let density = object.spacing.map_or(Density::Auto, Density::Spacing);
-            let mesh = own_mesh(path, object, context)?;
+            let mesh = own_mesh(path, object, &splat, context)?;
             Input::Mesh(crate::printable(path).to_string(), mesh, MeshParams { splat, density, opacity })
         }
         Source::Points(path) | Source::Matter(MatterSource { path, .. }) => match context.read(path)? {
@@ -174,13 +203,24 @@ pub(super) fn input<'a>(object: &'a SceneObject, context: &Context<'_>) -> Resul
     })
 }
 
-/// The mesh of an object, cut and closed again, in the colours that it has.
-fn own_mesh(path: &Path, object: &SceneObject, context: &Context<'_>) -> Result<Arc<Mesh>, Error> {
-    let mesh = read_mesh(path, context)?;
-    // While it is cut, or parted from its colours, there is another one.
-    let is_changed = !object.clip.is_empty() || object.color.is_some() && !mesh.color.is_empty();
+/// The mesh of an object, in the colours that it has, cut and closed again.
+fn own_mesh(path: &Path, object: &SceneObject, splat: &SplatParams, context: &Context<'_>) -> Result<Arc<Mesh>, Error> {
+    let mut mesh = read_mesh(path, context)?;
+    let color_by = object.points.color_by.as_ref();
+    // While it is cut, or gets other colours, there is another one.
+    let is_colored = color_by.is_some() || !mesh.columns.is_empty();
+    let is_changed = is_colored || !object.clip.is_empty() || object.color.is_some() && !mesh.color.is_empty();
     let more = if is_changed { 2 * mesh.bytes() } else { 0 };
     let _held = context.files.memory(context.options).take(&crate::printable(path), more).map_err(Error::Limit)?;
+    if let Some(by) = color_by {
+        let colored = convert::colored_mesh(mesh, by, object.up.axis.direction(), splat)?;
+        context.files.note(path, colored.said);
+        context.files.scales.borrow_mut().extend(colored.scale);
+        mesh = colored.mesh;
+    } else if !mesh.columns.is_empty() {
+        // Another object asks for them.
+        mesh = Mesh { columns: Vec::new(), ..Mesh::clone(&mesh) }.into();
+    }
     let (mesh, lids) = convert::lidded_mesh(mesh, &object.clip);
     context.files.warn(path, lids.said());
     let has_others = object.color.is_some() && !mesh.color.is_empty();

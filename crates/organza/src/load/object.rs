@@ -133,11 +133,12 @@ impl Prepared<'_> {
         ObjectStatistics {
             name: object.name.clone(),
             data: match self.field {
-                Some(_) if self.input.opacity() == Some(1.0) => ObjectData::Points,
+                Some(_) if self.input.opacity() == Some(1.0) || self.input.is_uneven() => ObjectData::Points,
                 _ => self.input.data(self.bounded.is_some(), looseness, context.scene.render.particles.surface_sampler),
             },
             opaque,
             by_gradient: self.input.by_gradient(),
+            is_partly_opaque: self.input.is_partly_opaque(),
             is_plain: object.footprints.is_usual() && self.field.is_none(),
             volumes_by: context.scene.render.particles.volume_sampler,
             casts: object.casts_shadow && extinct,

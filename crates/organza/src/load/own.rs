@@ -16,7 +16,6 @@ use rayon::prelude::*;
 use splat_core::raster::triangles::PlacedMesh;
 use splat_core::{
     BccGrid, Clip, DAabb, Footprint, Grid, Interpolation, Mesh, Packing, Similarity, SplatKind, TransferFunction,
-    optics,
 };
 use std::sync::Arc;
 
@@ -35,8 +34,10 @@ pub(crate) struct Own {
     pub(crate) body: Body,
     /// Its material.
     pub(crate) material: usize,
-    /// Opacity of one crossing in the channel that absorbs most; surfaces alone.
+    /// Opacity of one crossing in the channel that absorbs most; surfaces alone. Where vertices have opacities, where those are 1.
     pub(crate) opacity: f64,
+    /// The factor on optical depths of the channel that absorbs most.
+    pub(crate) extinction_factor: f64,
     /// From extinction in 1/world unit to that of the same channel in 1/object unit, for cells.
     pub(crate) extinction_scale: f64,
     /// Colour where the data has none.
@@ -103,7 +104,7 @@ impl Own {
         let source = planned.form;
         let splat = prepared.input.splat().clone();
         let factor = context.extinction_factor(&context.scene.objects[context.id]);
-        let depth = factor * optics::optical_depth(prepared.input.opacity().unwrap_or(0.0));
+        let opacity = prepared.input.greatest_opacity(factor);
         let bounded = prepared.bounded.take().filter(|_| source == Form::Field);
         let Some((body, bounds, spacing)) = data(prepared, bounded, source, context)? else { return Ok(None) };
         let table_bytes = table_bytes(&body, source, bounds, prepared.prediction.splats);
@@ -114,8 +115,9 @@ impl Own {
             technique: planned.technique,
             form: source,
             material: usize::from(splat.material),
-            opacity: optics::opacity(depth),
+            opacity,
             field: prepared.field.clone().zip(prepared.input.opacity()),
+            extinction_factor: factor,
             extinction_scale: factor * splat.transform.scale,
             // The technique multiplies the data's colours by it.
             color: if has_colors { [1.0; 3] } else { splat.color },

@@ -3,6 +3,9 @@
 //! A triangle of area A gets a Poisson number of particles of mean τ·A/s, by an alias table of all triangles with areas
 //! in f64; a particle lies at barycentric coordinates (u, v), folded into the triangle where u + v > 1.
 //!
+//! Where vertices have opacities, τ is that of the interpolated opacity: particles are drawn at the rate of the greatest τ of a triangle's
+//! corners and kept with probability τ over that, so that the opacity of a pixel is exact there too.
+//!
 //! Deviation: a Poisson number in place of a fixed n. The opacity of a pixel is then 1 − e^(−τ/cos θ) exactly, and each
 //! part of the mesh is sampled on its own.
 
@@ -15,7 +18,7 @@ use crate::stream::{Stage, pair};
 use crate::{Density, Error, PackedNormal, Particles, SurfaceParams};
 use glam::Vec3;
 use rayon::prelude::*;
-use splat_core::optics::SurfaceOpacity;
+use splat_core::optics::{self, SurfaceOpacity};
 use splat_core::{Mesh, glam};
 #[cfg(feature = "gpu")]
 use splat_shaders::layouts::ParticleSource;
@@ -25,10 +28,36 @@ pub struct MeshSampler<'a> {
     mesh: &'a Mesh,
     params: SurfaceParams,
     density: Option<Density<'a>>,
+    /// What opacities of vertices mean; `None` for a mesh without.
+    fading: Option<Fading>,
     sets: PoissonSets,
     /// Of each triangle, where the mesh has none of its own.
     normals: Vec<PackedNormal>,
     area: f64,
+}
+
+/// Optical depths of a surface whose opacity varies.
+#[derive(Debug, Clone, Copy)]
+struct Fading {
+    /// Opacity of one crossing where that of the vertices is 1, before the factor.
+    opacity: f64,
+    /// Factor on optical depths.
+    factor: f64,
+    /// Optical depth of what is opaque.
+    most: f64,
+}
+
+impl Fading {
+    fn new(mesh: &Mesh, params: &SurfaceParams) -> Option<Self> {
+        let factor = params.extinction_factor;
+        let opacity = optics::opacity(optics::optical_depth(params.opacity) / factor);
+        (!mesh.opacity.is_empty()).then_some(Self { opacity, factor, most: params.opaque_optical_depth })
+    }
+
+    /// Optical depth of one crossing at an opacity of vertices.
+    fn depth(&self, share: f64) -> f64 {
+        (optics::optical_depth(self.opacity * share) * self.factor).min(self.most)
+    }
 }
 
 impl<'a> MeshSampler<'a> {
@@ -41,8 +70,11 @@ impl<'a> MeshSampler<'a> {
         params.validate()?;
         mesh.validate()?;
         density.as_ref().map_or(Ok(()), Density::validate)?;
+        let fading = Fading::new(mesh, params);
         let per_area = params.particles_per_area();
         let rate = |t: usize| {
+            let per_area =
+                fading.map_or(per_area, |fading| fading.depth(greatest_opacity(mesh, t)) / params.cross_section);
             let [a, b, c] = corners(mesh, t).map(Vec3::as_dvec3);
             let most = density.as_ref().map_or(1.0, |d| {
                 let middle = (a + b + c) / 3.0;
@@ -63,7 +95,7 @@ impl<'a> MeshSampler<'a> {
             pack((b - a).cross(c - a), params)
         };
         let normals = (0..flat).into_par_iter().with_min_len(1024).map(normal).collect();
-        Ok(Self { mesh, params: *params, density, sets, normals, area })
+        Ok(Self { mesh, params: *params, density, fading, sets, normals, area })
     }
 
     /// Area of the mesh, world units².
@@ -100,6 +132,14 @@ impl<'a> MeshSampler<'a> {
         }
     }
 
+    /// Opacity of the vertices at a place of a triangle.
+    #[inline]
+    fn opacity(&self, t: usize, place: [f32; 2]) -> f64 {
+        let [u, v] = place.map(f64::from);
+        let [a, b, c] = self.mesh.triangles[t].map(|i| f64::from(self.mesh.opacity[i as usize]));
+        a + (b - a) * u + (c - a) * v
+    }
+
     #[inline]
     fn color(&self, t: usize, place: [f32; 2], own: Steps) -> Steps {
         let [u, v] = place;
@@ -112,6 +152,12 @@ impl<'a> MeshSampler<'a> {
             }
         }
     }
+}
+
+/// The greatest opacity of a triangle's corners.
+fn greatest_opacity(mesh: &Mesh, t: usize) -> f64 {
+    let opacities = mesh.triangles[t].iter().map(|v| mesh.opacity[*v as usize]);
+    f64::from(opacities.fold(0.0, f32::max))
 }
 
 /// The normal of a particle.
@@ -155,10 +201,10 @@ impl Poisson for MeshSampler<'_> {
         let own = Steps::new(self.params.color);
         let seed = self.params.seed;
         let blocks = &self.sets.blocks;
-        let Some(density) = &self.density else {
+        if self.density.is_none() && self.fading.is_none() {
             blocks.batches(seed, Stage::Mesh, set, chunk, |batch| self.place(batch, own, particles));
             return;
-        };
+        }
         blocks.arrivals(seed, Stage::Mesh, set, chunk, |t, stream| {
             let at = folded(stream.pair());
             let triangle = corners(self.mesh, t);
@@ -166,8 +212,16 @@ impl Poisson for MeshSampler<'_> {
             let [a, b, c] = triangle.map(Vec3::as_dvec3);
             let middle = (a + b + c) / 3.0;
             let radius = [a, b, c].map(|p| (p - middle).length()).into_iter().fold(0.0, f64::max);
-            let most = density.bound(self.mesh.origin + middle, radius * (1.0 + 1e-12));
-            if stream.unit() * most < density.at(self.mesh.origin + p.as_dvec3()) {
+            let is_dense = self.density.as_ref().is_none_or(|density| {
+                let most = density.bound(self.mesh.origin + middle, radius * (1.0 + 1e-12));
+                stream.unit() * most < density.at(self.mesh.origin + p.as_dvec3())
+            });
+            let is_kept = is_dense
+                && self.fading.is_none_or(|fading| {
+                    let most = fading.depth(greatest_opacity(self.mesh, t));
+                    stream.unit() * most < fading.depth(self.opacity(t, at))
+                });
+            if is_kept {
                 particles.push(p, self.normal(t, at), self.color(t, at, own).at(p));
             }
         });
@@ -175,7 +229,7 @@ impl Poisson for MeshSampler<'_> {
 
     #[cfg(feature = "gpu")]
     fn tables(&self) -> Option<Twin> {
-        if self.density.is_some() {
+        if self.density.is_some() || self.fading.is_some() {
             return None;
         }
         let mesh = self.mesh;

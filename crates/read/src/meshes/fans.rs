@@ -52,7 +52,12 @@ impl Fans {
         Ok(())
     }
 
-    /// The mesh of these vertices.
+    /// Triangles so far.
+    pub(crate) fn len(&self) -> usize {
+        self.triangles.len()
+    }
+
+    /// The mesh of these vertices; columns of triangles are in the order of the fans.
     pub(crate) fn into_mesh(self, vertices: Mesh, reading: &mut Reading<'_>) -> Result<Mesh, ReadError> {
         let mut mesh = Mesh { triangles: self.triangles, ..vertices };
         polygon::triangulate(&mut mesh, &self.polygons, reading, |rank| self.places[rank])?;

@@ -12,6 +12,7 @@ mod material;
 mod nodes;
 mod primitive;
 
+use super::paint::Paint;
 use crate::Loaded;
 use crate::error::{Place, ReadError};
 use crate::points::origin;
@@ -107,15 +108,14 @@ fn loaded(surface: Surface, is_mesh: bool, reading: &mut Reading<'_>) -> Result<
     let (origin, position) = origin::relative(&position, Place::File, |i| format!("vertex {i}"))?;
     let mesh = Mesh { origin, position, normal, triangles, ..Mesh::default() };
     // All white is no colour.
-    let is_white = |p: &super::paint::Paint| p.factor[..3] == [1.0; 3] && p.texture.is_none() && p.cutoff.is_none();
-    let is_painted = is_tinted || !painting.paints.iter().all(is_white);
+    let is_painted = is_tinted || !painting.paints.iter().all(Paint::is_none);
     let mesh = if is_painted { painting.paint(mesh, reading)? } else { mesh };
     if is_mesh {
         return Ok(Loaded::Mesh(mesh));
     }
-    let Mesh { origin, position, normal, color, .. } = mesh;
+    let Mesh { origin, position, normal, color, opacity, .. } = mesh;
     let normal = if normal.iter().all(|n| *n == Vec3::ZERO) { Vec::new() } else { normal };
-    Ok(Loaded::Points(RawPoints { origin, position, normal, color, ..RawPoints::default() }))
+    Ok(Loaded::Points(RawPoints { origin, position, normal, color, opacity, ..RawPoints::default() }))
 }
 
 /// Refuses extensions without which the file is not what it shows.

@@ -3,7 +3,7 @@
 //! Material files and textures are opened only in the folder of the OBJ or below; where one is not, a remark says so and the
 //! rest is read. `Kd` is a linear colour, as that of vertices is; a texture is multiplied by it.
 
-use super::paint::Paint;
+use super::paint::{Alpha, Paint};
 use super::texture::Texture;
 use crate::error::{Fault, ReadError};
 use crate::reading::Reading;
@@ -19,7 +19,7 @@ const BYTES_PER_ENTRY: u64 = 320;
 /// Lines between two looks at whether to stop.
 const LOOK: u64 = 1 << 14;
 
-const WHITE: Paint = Paint { factor: [1.0; 4], texture: None, cutoff: None };
+const WHITE: Paint = Paint { factor: [1.0; 4], texture: None, alpha: Alpha::Blended };
 
 /// The materials of an OBJ file.
 pub(crate) struct Materials<'a> {
@@ -39,8 +39,6 @@ pub(crate) struct Materials<'a> {
     held: Growing,
     bytes: u64,
     current: usize,
-    /// The least opacity of a material, which surfaces do not take: theirs is that of their object.
-    least_opacity: f64,
     /// Whether a material of a file was chosen.
     pub(crate) is_used: bool,
 }
@@ -60,7 +58,6 @@ impl<'a> Materials<'a> {
             held: Growing::new("the materials"),
             bytes: 0,
             current: 0,
-            least_opacity: 1.0,
             is_used: false,
         }
     }
@@ -90,14 +87,8 @@ impl<'a> Materials<'a> {
         Ok(())
     }
 
-    /// Says where material files state materials, and no face has one of them, and where they state opacities.
+    /// Says where material files state materials, and no face has one of them.
     pub(crate) fn remark_unused(&self, reading: &mut Reading<'_>) {
-        if self.least_opacity < 1.0 && self.is_used {
-            reading.notes.remark(format!(
-                "opacities of materials (`d` and `Tr`, the least {:.3}) are not used: surfaces have the `opacity` of their object",
-                self.least_opacity
-            ));
-        }
         if !self.is_used && !self.rank.is_empty() {
             reading.notes.remark("its material file is not used: no face names one of its materials by `usemtl`");
         }
@@ -181,6 +172,8 @@ impl<'a> Materials<'a> {
     fn take(&mut self, content: &[u8], folder: &str, reading: &mut Reading<'_>) -> Result<(), ReadError> {
         let mut lines = Lines::new(content);
         let mut rank = None;
+        // Of a material that states both, `d` counts: programs disagree about `Tr`.
+        let mut has_dissolve = false;
         while let Some(line) = lines.next()? {
             if line.number.is_multiple_of(LOOK) {
                 reading.go_on()?;
@@ -189,11 +182,14 @@ impl<'a> Materials<'a> {
             let Some(keyword) = words.next() else { continue };
             let values: Vec<Word<'_>> = words.collect();
             match (keyword.text, rank) {
-                (b"newmtl", _) => rank = Some(self.add(rest(line), reading)?),
+                (b"newmtl", _) => {
+                    rank = Some(self.add(rest(line), reading)?);
+                    has_dissolve = false;
+                }
                 (b"Kd", Some(rank)) => {
                     if let Some([r, g, b]) = color(keyword, &values)? {
                         let of_both: &mut [Paint] = &mut self.paints[rank..rank + 2];
-                        of_both.iter_mut().for_each(|p| p.factor = [r, g, b, 1.0]);
+                        of_both.iter_mut().for_each(|p| p.factor = [r, g, b, p.factor[3]]);
                     } else {
                         reading.notes.not_used([&b"Kd of a spectrum"[..]]);
                     }
@@ -203,17 +199,26 @@ impl<'a> Materials<'a> {
                     self.hold(name.as_ref().map_or(0, String::len), reading)?;
                     self.maps[rank] = name;
                 }
-                (b"d" | b"Tr", Some(_)) => {
-                    // Factors of a halo come before the number.
-                    let number = values.last().and_then(|word| word.decimal()).unwrap_or(f64::NAN);
-                    let opacity = if keyword.text == b"d" { number } else { 1.0 - number };
-                    self.least_opacity = self.least_opacity.min(opacity);
-                    reading.notes.not_used([keyword.text]);
+                (b"d", Some(rank)) => {
+                    if let Some(opacity) = share(keyword, &values, reading) {
+                        has_dissolve = true;
+                        self.set_opacity(rank, opacity);
+                    }
+                }
+                (b"Tr", Some(rank)) => {
+                    if let Some(transparency) = share(keyword, &values, reading).filter(|_| !has_dissolve) {
+                        self.set_opacity(rank, 1.0 - transparency);
+                    }
                 }
                 (other, _) => reading.notes.not_used([other]),
             }
         }
         Ok(())
+    }
+
+    /// Gives a material its opacity, with its texture and without.
+    fn set_opacity(&mut self, rank: usize, opacity: f32) {
+        self.paints[rank..rank + 2].iter_mut().for_each(|paint| paint.factor[3] = opacity);
     }
 
     /// Rank of a new material; one of a name that is known takes its place.
@@ -259,6 +264,20 @@ fn color(keyword: Word<'_>, values: &[Word<'_>]) -> Result<Option<[f32; 3]>, Rea
         }
     }
     Ok(Some(numbers))
+}
+
+/// The opacity that `d` states, or the transparency of `Tr`; `None` for what is no share, which a remark says.
+fn share(keyword: Word<'_>, values: &[Word<'_>], reading: &mut Reading<'_>) -> Option<f32> {
+    // Factors of a halo come before the number.
+    if values.first().is_some_and(|word| word.text == b"-halo") {
+        reading.notes.not_used([&b"d -halo"[..]]);
+    }
+    let number = values.last().and_then(|word| word.decimal()).filter(|number| (0.0..=1.0).contains(number));
+    if number.is_none() {
+        let keyword = escaped(keyword.text, 4);
+        reading.notes.remark(format!("a material states no number from 0 to 1 as its `{keyword}`, which is left out"));
+    }
+    number.map(|number| number as f32)
 }
 
 /// The name of a texture, beside the OBJ; its options are not used.

@@ -4,10 +4,9 @@
 //! colour and its texture (see `mtl.rs`), unless vertices have colours of their own. Vertices are split where materials
 //! meet. Groups, lines and curves are read over. The parser is our own: lines, columns and checked indices are asked of it.
 
-mod painted;
-
 use super::fans::Fans;
 use super::mtl::Materials;
+use super::paint::corners::{BYTES_PER_CORNER, Corner, NONE, painted};
 use super::statements;
 use crate::error::{Place, ReadError};
 use crate::points::direction::unit;
@@ -22,9 +21,8 @@ use splat_core::{Mesh, RawPoints};
 use std::collections::HashMap;
 use std::path::Path;
 
-/// Bytes that a vertex and a corner take while they are read and converted.
+/// Bytes that a vertex takes while it is read and converted.
 const BYTES_PER_VERTEX: u64 = 24 + 12 + 12 + 12;
-const BYTES_PER_CORNER: u64 = 16 + 48 + 48;
 
 /// Statements without a meaning here.
 pub(crate) const READ_OVER: [&[u8]; 19] = [
@@ -48,9 +46,6 @@ pub(crate) const READ_OVER: [&[u8]; 19] = [
     b"call",
     b"csh",
 ];
-
-/// A vertex of the mesh: position, normal, place in its texture, paint; `NONE` where a corner has none.
-type Corner = [u32; 4];
 
 struct Content<'a> {
     positions: Vec<DVec3>,
@@ -77,8 +72,6 @@ struct Held {
     places: Growing,
     corners: Growing,
 }
-
-const NONE: u32 = u32::MAX;
 
 /// Lines between two looks at whether to stop.
 const LOOK: u64 = 1 << 14;
@@ -304,17 +297,19 @@ impl Content<'_> {
             // Normals of which one is missing are to be computed anew.
             normal: if normals.contains(&Vec3::ZERO) { Vec::new() } else { normals },
             color: if colored { self.corners.iter().map(|c| self.colors[c[0] as usize]).collect() } else { Vec::new() },
-            triangles: Vec::new(),
+            ..Mesh::default()
         };
         let mesh = self.fans.into_mesh(vertices, reading)?;
         self.materials.remark_unused(reading);
         if self.materials.is_used && colored {
-            reading.notes.not_used([&b"Kd"[..]]);
+            let is_clear = self.materials.paints.iter().any(|paint| paint.factor[3] < 1.0);
+            reading.notes.not_used([&b"Kd"[..]].into_iter().chain(is_clear.then_some(&b"d"[..])));
         }
         if colored || !self.materials.is_used {
             return Ok(Loaded::Mesh(mesh));
         }
-        painted::painted(mesh, self.corners, &self.places, self.materials, reading).map(Loaded::Mesh)
+        let Materials { paints, textures, .. } = self.materials;
+        painted(mesh, self.corners, &self.places, paints, textures, reading).map(Loaded::Mesh)
     }
 }
 

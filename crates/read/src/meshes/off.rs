@@ -5,6 +5,7 @@
 //! writers write them. Colours that are whole numbers, one of them above 1, are sRGB from 0 to 255; others are linear.
 
 use super::fans::Fans;
+use super::opacity;
 use crate::Loaded;
 use crate::error::{Place, ReadError};
 use crate::points::direction::unit;
@@ -45,14 +46,15 @@ pub(crate) fn read(content: &[u8], reading: &mut Reading<'_>) -> Result<Loaded, 
         fans.add(face, &corners, words[0].place(), reading)?;
     }
     text.finish()?;
-    let points = columns.into_points()?;
+    let mut points = columns.into_points()?;
+    points.opacity = opacity::meant(points.opacity, &mut reading.notes);
     if faces == 0 {
         return Ok(Loaded::Points(points));
     }
-    let RawPoints { origin, position, normal, color, .. } = points;
+    let RawPoints { origin, position, normal, color, opacity, .. } = points;
     // Normals of which one is zero are left out: they are to be computed anew.
     let normal = if normal.contains(&Vec3::ZERO) { Vec::new() } else { normal };
-    let vertices = Mesh { origin, position, normal, color, triangles: Vec::new() };
+    let vertices = Mesh { origin, position, normal, color, opacity, ..Mesh::default() };
     fans.into_mesh(vertices, reading).map(Loaded::Mesh)
 }
 
@@ -202,6 +204,8 @@ struct Columns {
     positions: Vec<DVec3>,
     normals: Vec<Vec3>,
     colors: Vec<DVec3>,
+    /// One a vertex with a colour; NaN for one without.
+    opacities: Vec<f64>,
     /// The first colour above 1, and whether one is written with a point.
     above_one: Option<(Place, String)>,
     pointed: bool,
@@ -212,7 +216,8 @@ impl Columns {
         let positions = Vec::new();
         let normals = Vec::new();
         let colors = Vec::new();
-        let mut columns = Self { form, positions, normals, colors, above_one: None, pointed: false };
+        let opacities = Vec::new();
+        let mut columns = Self { form, positions, normals, colors, opacities, above_one: None, pointed: false };
         input::reserve(&mut columns.positions, vertices)?;
         input::reserve(&mut columns.normals, if form.normal { vertices } else { 0 })?;
         input::reserve(&mut columns.colors, if form.color { vertices } else { 0 })?;
@@ -242,9 +247,15 @@ impl Columns {
         if color {
             self.color(&words[before..before + 3])?;
             self.colors.push(DVec3::from_slice(&numbers[before..]));
-        }
-        if colors == Some(4) {
-            reading.notes.not_used([&b"vertex alpha"[..]]);
+            if colors == Some(4) {
+                let word = words[before + 3];
+                if !(0.0..=255.0).contains(&numbers[before + 3]) {
+                    let hint = "opacities are whole numbers from 0 to 255, or 0.0 to 1.0";
+                    return Err(ReadError::input(word.place(), "an opacity from 0 to 255", word.shown(), hint));
+                }
+            }
+            input::reserve(&mut self.opacities, 1)?;
+            self.opacities.push(if colors == Some(4) { numbers[before + 3] } else { f64::NAN });
         }
         if texture {
             reading.notes.not_used([&b"texture coordinates"[..]]);
@@ -277,6 +288,10 @@ impl Columns {
             Some(_) => self.colors.iter().map(|c| c.to_array().map(|v| linear_from_srgb(v / 255.0))).collect(),
             None => self.colors.iter().map(|c| c.as_vec3().to_array()).collect(),
         };
-        Ok(RawPoints { origin, position, normal: self.normals, color, ..RawPoints::default() })
+        // Programs write whole colours beside opacities from 0 to 1.
+        let top = if self.opacities.iter().any(|alpha| *alpha > 1.0) { 255.0 } else { 1.0 };
+        let opacity =
+            self.opacities.iter().map(|alpha| if alpha.is_nan() { 1.0 } else { (alpha / top) as f32 }).collect();
+        Ok(RawPoints { origin, position, normal: self.normals, color, opacity, ..RawPoints::default() })
     }
 }

@@ -4,16 +4,19 @@
 //! those of the texture, down to its texels, within a bounded number of triangles. So pictures show the texture, and every
 //! stage that follows knows vertices alone.
 
+#[cfg(any(feature = "obj", feature = "ply"))]
+pub(crate) mod corners;
 mod refine;
 
+use super::opacity;
 use super::texture::Texture;
 use crate::error::ReadError;
 use crate::reading::Reading;
 use crate::stream::input;
-use splat_core::Mesh;
+use splat_core::{Association, Mesh};
 
-/// Bytes of the colour and opacity of a vertex, and of its colour in the mesh.
-const BYTES_PER_COLOR: u64 = 16 + 12;
+/// Bytes of the colour and opacity of a vertex, and of both in the mesh.
+const BYTES_PER_COLOR: u64 = 16 + 12 + 4;
 
 /// What a surface is painted with.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -22,8 +25,37 @@ pub(crate) struct Paint {
     pub(crate) factor: [f32; 4],
     /// Rank of its texture.
     pub(crate) texture: Option<usize>,
-    /// Opacity below which nothing is there; `None` where opacities are not asked for.
-    pub(crate) cutoff: Option<f32>,
+    /// What its opacity does.
+    pub(crate) alpha: Alpha,
+}
+
+/// What the opacity of a paint does.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Alpha {
+    /// Nothing: surfaces are opaque.
+    Ignored,
+    /// Below this one nothing is there, and what is there is opaque.
+    Cut(f32),
+    /// It is that of the surface.
+    Blended,
+}
+
+impl Alpha {
+    /// Opacity below which nothing is there; `None` where nothing is cut out.
+    fn cutoff(self) -> Option<f32> {
+        match self {
+            Self::Cut(cutoff) => Some(cutoff),
+            Self::Ignored | Self::Blended => None,
+        }
+    }
+}
+
+impl Paint {
+    /// Whether it leaves surfaces as they are without it.
+    pub(crate) fn is_none(&self) -> bool {
+        let is_blended = self.alpha == Alpha::Blended && self.factor[3] < 1.0;
+        self.factor[..3] == [1.0; 3] && self.texture.is_none() && self.alpha.cutoff().is_none() && !is_blended
+    }
 }
 
 /// What the vertices of a mesh are painted with.
@@ -53,7 +85,11 @@ impl Painting {
         std::array::from_fn(|c| factor[c] * tint[c] * texture[c])
     }
 
-    /// The mesh with its colours; where a paint says so, what is too thin to be there is left out.
+    fn alpha_of(&self, vertex: u32) -> Alpha {
+        self.paints[self.paint_of[vertex as usize] as usize].alpha
+    }
+
+    /// The mesh with its colours and opacities; where a paint says so, what is too thin to be there is left out.
     pub(crate) fn paint(mut self, mut mesh: Mesh, reading: &mut Reading<'_>) -> Result<Mesh, ReadError> {
         input::hold("the colours of vertices", mesh.position.len() as u64 * BYTES_PER_COLOR, reading.params)?;
         if !self.textures.is_empty() {
@@ -61,15 +97,31 @@ impl Painting {
         }
         let vertices = 0..mesh.position.len() as u32;
         let colors: Vec<[f32; 4]> = vertices.map(|v| self.at(v)).collect();
-        if self.paints.iter().any(|p| p.cutoff.is_some()) {
-            let is_there = |t: &[u32; 3]| {
-                let cutoff = self.paints[self.paint_of[t[0] as usize] as usize].cutoff;
-                let mean = t.iter().map(|v| colors[*v as usize][3]).sum::<f32>() / 3.0;
-                cutoff.is_none_or(|cutoff| mean >= cutoff)
+        if self.paints.iter().any(|p| p.alpha != Alpha::Ignored) {
+            let opacity = |(v, color): (usize, &[f32; 4])| match self.alpha_of(v as u32) {
+                Alpha::Blended => color[3].clamp(0.0, 1.0),
+                Alpha::Ignored | Alpha::Cut(_) => 1.0,
             };
-            mesh.triangles.retain(is_there);
+            opacity::give(&mut mesh, colors.iter().enumerate().map(opacity).collect(), &mut reading.notes);
+            let alpha = |v: u32| colors[v as usize][3];
+            let is_there = |t: &[u32; 3]| match self.alpha_of(t[0]) {
+                Alpha::Ignored => true,
+                Alpha::Cut(cutoff) => t.iter().map(|v| alpha(*v)).sum::<f32>() / 3.0 >= cutoff,
+                Alpha::Blended => mesh.opacity.is_empty() || t.iter().any(|v| alpha(*v) > 0.0),
+            };
+            let are_there: Vec<bool> = mesh.triangles.iter().map(is_there).collect();
+            keep(&mut mesh.triangles, &are_there);
+            for column in mesh.columns.iter_mut().filter(|column| column.association == Association::Triangle) {
+                keep(&mut column.values, &are_there);
+            }
         }
         mesh.color = colors.iter().map(|[r, g, b, _]| [*r, *g, *b]).collect();
         Ok(mesh)
     }
+}
+
+/// Keeps entries that are there.
+fn keep<T>(entries: &mut Vec<T>, are_there: &[bool]) {
+    let mut there = are_there.iter();
+    entries.retain(|_| there.next().copied().unwrap_or(true));
 }

@@ -12,6 +12,7 @@ mod faces;
 mod gaussians;
 mod header;
 mod splats;
+mod texture;
 
 use crate::error::{Place, ReadError};
 use crate::reading::Reading;
@@ -19,19 +20,25 @@ use crate::{Loaded, ReadParams};
 use ascii::Ascii;
 use binary::Binary;
 use body::Source;
-use header::{Encoding, Header};
+use header::{Encoding, Header, Shape};
+use std::path::Path;
 
-/// Reads a PLY file.
-pub(crate) fn read(content: &[u8], reading: &mut Reading<'_>) -> Result<Loaded, ReadError> {
+/// Reads a PLY file that lies at `place`, if it is no part of memory.
+pub(crate) fn read(content: &[u8], place: Option<&Path>, reading: &mut Reading<'_>) -> Result<Loaded, ReadError> {
     let header = header::parse(content)?;
     match header.encoding {
-        Encoding::Ascii => elements(Ascii::new(content, header.body, header.body_line), &header, reading),
-        Encoding::LittleEndian => elements(Binary::<false>::new(content, header.body), &header, reading),
-        Encoding::BigEndian => elements(Binary::<true>::new(content, header.body), &header, reading),
+        Encoding::Ascii => elements(Ascii::new(content, header.body, header.body_line), &header, place, reading),
+        Encoding::LittleEndian => elements(Binary::<false>::new(content, header.body), &header, place, reading),
+        Encoding::BigEndian => elements(Binary::<true>::new(content, header.body), &header, place, reading),
     }
 }
 
-fn elements<S: Source>(source: S, header: &Header, reading: &mut Reading<'_>) -> Result<Loaded, ReadError> {
+fn elements<S: Source>(
+    source: S,
+    header: &Header,
+    place: Option<&Path>,
+    reading: &mut Reading<'_>,
+) -> Result<Loaded, ReadError> {
     if splats::is_of_splats(header) {
         return splats::read(source, header, reading).map(Loaded::Points);
     }
@@ -44,7 +51,7 @@ fn elements<S: Source>(source: S, header: &Header, reading: &mut Reading<'_>) ->
         let expected = "Gaussians with their colours as f_dc_0 to f_dc_2";
         return Err(ReadError::input(Place::File, expected, "Gaussians without such", hint));
     }
-    let loaded = body::read(source, header, reading)?;
+    let loaded = body::read(source, header, place, reading)?;
     reading.notes.not_used(unused(header, reading.params)?.iter().map(Vec::as_slice));
     Ok(loaded)
 }
@@ -61,7 +68,17 @@ fn unused(header: &Header, params: &ReadParams) -> Result<Vec<Vec<u8>>, ReadErro
                 names.extend(columns.unused(element).map(<[u8]>::to_vec));
             }
             b"tristrips" => {}
-            b"face" => names.extend(all.filter(|n| !is_index(n)).map(|n| [b"face.", n].concat())),
+            // Numbers of faces can be asked for, but for those of a name that vertices have.
+            b"face" => {
+                let vertex = header.elements.iter().find(|e| e.name == b"vertex");
+                let is_taken = |name: &[u8]| vertex.is_some_and(|v| v.properties.iter().any(|p| p.name == name));
+                let unused = element.properties.iter().filter(|p| {
+                    let is_list = matches!(p.shape, Shape::List { .. });
+                    let is_place = p.name == texture::OF_CORNERS && texture::has_corners(header);
+                    !is_index(&p.name) && !is_place && (is_list || is_taken(&p.name))
+                });
+                names.extend(unused.map(|p| [b"face.", p.name.as_slice()].concat()));
+            }
             other => names.extend(all.map(|n| [other, b".", n].concat())),
         }
     }

@@ -18,8 +18,8 @@ use rayon::prelude::*;
 use robust::{Coord, orient2d};
 use spade::handles::FixedVertexHandle;
 use spade::{ConstrainedDelaunayTriangulation, HasPosition, Point2, Triangulation};
-use splat_core::Mesh;
 use splat_core::glam::{DVec2, DVec3, Vec3};
+use splat_core::{Association, Mesh};
 use std::collections::HashMap;
 
 /// Coordinates below this share of the extent become 0: spade takes none that are tiny.
@@ -72,6 +72,9 @@ pub(crate) fn triangulate(
     input::hold("the triangles of larger faces", size_of_val(mesh.triangles.as_slice()) as u64, reading.params)?;
     input::reserve(&mut triangles, mesh.triangles.len())?;
     let mut copied = 0;
+    // Of each triangle the one of the fans that it comes of, for columns.
+    let has_columns = mesh.columns.iter().any(|column| column.association == Association::Triangle);
+    let mut sources: Vec<usize> = Vec::new();
     for (rank, (polygon, outcome)) in polygons.iter().zip(outcomes).enumerate() {
         let better = match outcome {
             Outcome::Fan => continue,
@@ -87,10 +90,20 @@ pub(crate) fn triangulate(
             Outcome::Refused(error) => return Err(error),
         };
         triangles.extend_from_slice(&mesh.triangles[copied..polygon.first]);
+        if has_columns {
+            sources.extend(copied..polygon.first);
+            sources.extend(std::iter::repeat_n(polygon.first, better.len()));
+        }
         triangles.extend_from_slice(&better);
         copied = polygon.first + polygon.count;
     }
     triangles.extend_from_slice(&mesh.triangles[copied..]);
+    if has_columns {
+        sources.extend(copied..mesh.triangles.len());
+    }
+    for column in mesh.columns.iter_mut().filter(|column| column.association == Association::Triangle) {
+        column.values = sources.iter().map(|source| column.values[*source]).collect();
+    }
     mesh.triangles = triangles;
     Ok(())
 }

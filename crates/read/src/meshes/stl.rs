@@ -3,8 +3,13 @@
 //! A binary file has 84 + 50·n bytes; that decides, as many binary files begin with `solid` like a text. Where the size
 //! fits neither, the content does: a text has no zero byte, the first 512 bytes of a binary file have some. The parser
 //! is our own, for lines and columns. Corners are not joined: STL says facets, so each keeps its own plane. Its
-//! stored normals and attribute bytes are read over: normals follow from the order of the corners.
+//! stored normals are read over: normals follow from the order of the corners.
+//!
+//! The two attribute bytes of a facet are its colour in two forms, five bits a channel, taken as sRGB. Where the header has `COLOR=` and
+//! four bytes (Materialise), those are the colour and the opacity of the body, and a facet has red in its lowest bits and its own colour
+//! where bit 15 is 0. Else (VisCAM, SolidView) blue is lowest, and a facet has a colour where bit 15 is 1.
 
+use super::opacity;
 use crate::ReadParams;
 use crate::error::{Place, ReadError};
 use crate::points::origin;
@@ -13,6 +18,8 @@ use crate::stream::input;
 use crate::text::{Line, Lines, Word};
 use splat_core::Mesh;
 use splat_core::glam::DVec3;
+use splat_core::srgb::linear_from_srgb;
+use splat_core::text::counted;
 
 const HEADER: usize = 84;
 const FACET: usize = 50;
@@ -22,6 +29,8 @@ const BEGINNING: usize = 512;
 const LOOK: usize = 1 << 14;
 /// Bytes that a facet takes while it is read and converted.
 const BYTES_PER_FACET: u64 = 3 * (24 + 12) + 12;
+/// Bytes of the colour and the opacity of a corner.
+const BYTES_PER_COLOR: u64 = 12 + 4;
 
 /// What is wrong with a file that is longer than it says.
 const LONGER: &str = "the file holds more than the facets that its header counts: the count is wrong, or it is no STL";
@@ -33,7 +42,7 @@ pub(crate) fn read(content: &[u8], reading: &mut Reading<'_>) -> Result<Mesh, Re
     // At most 2³²·50 + 84.
     let needed = announced.map(|n| HEADER as u64 + FACET as u64 * n);
     if needed == Some(length) {
-        return binary(&content[HEADER..], reading);
+        return binary(content, reading);
     }
     if is_text(content) {
         return text(content, reading);
@@ -56,7 +65,7 @@ pub(crate) fn read(content: &[u8], reading: &mut Reading<'_>) -> Result<Mesh, Re
             for _ in needed..length {
                 reading.mend(Fix::TrailingBytes, Place::Byte(needed), None, refused)?;
             }
-            binary(&content[HEADER..needed as usize], reading)
+            binary(&content[..needed as usize], reading)
         }
         _ => Err(refused()),
     }
@@ -69,15 +78,88 @@ pub(crate) fn is_text(content: &[u8]) -> bool {
     words.get(..5).is_some_and(|word| word.eq_ignore_ascii_case(b"solid")) && !beginning.contains(&0)
 }
 
-/// The facets after the header.
-fn binary(content: &[u8], reading: &mut Reading<'_>) -> Result<Mesh, ReadError> {
-    let facets = content.as_chunks::<FACET>().0;
-    if facets.iter().any(|facet| facet[48..] != [0; 2]) {
-        reading.notes.remark(
-            "its facets have attribute bytes, which some programs use as colours: they are not drawn; colours are read \
-             from PLY, OBJ and glTF",
-        );
+/// The colour of what states none, beside facets that do.
+const PLAIN: [f32; 3] = [1.0; 3];
+
+/// How facets have their colours.
+#[derive(Debug, Clone, Copy)]
+enum FacetColors {
+    /// In the header the body's colour, and its opacity.
+    Materialise { body: [f32; 3], opacity: f32 },
+    /// Each by itself.
+    VisCam,
+}
+
+impl FacetColors {
+    /// How the facets after a header have them; `None` where they have none.
+    fn of(header: &[u8], facets: &[[u8; FACET]]) -> Option<Self> {
+        const MARK: &[u8] = b"COLOR=";
+        let mark = header[..80].windows(MARK.len()).position(|bytes| bytes == MARK);
+        if let Some([r, g, b, alpha]) = mark.and_then(|at| header[at + MARK.len()..80].first_chunk::<4>()) {
+            let body = [r, g, b].map(|byte| linear_from_srgb(f64::from(*byte) / 255.0));
+            return Some(Self::Materialise { body, opacity: f32::from(*alpha) / 255.0 });
+        }
+        facets.iter().any(|facet| attribute(facet) >> 15 == 1).then_some(Self::VisCam)
     }
+
+    /// The colour of a facet; `None` where it states none.
+    fn color(self, facet: &[u8; FACET]) -> Option<[f32; 3]> {
+        let bits = attribute(facet);
+        let channel = |shift: u32| linear_from_srgb(f64::from(bits >> shift & 31) / 31.0);
+        let is_set = bits >> 15 == 1;
+        match self {
+            Self::Materialise { body, .. } if is_set => Some(body),
+            Self::Materialise { .. } => Some([0, 5, 10].map(channel)),
+            Self::VisCam => is_set.then(|| [10, 5, 0].map(channel)),
+        }
+    }
+}
+
+/// The attribute bytes of a facet.
+fn attribute(facet: &[u8; FACET]) -> u16 {
+    u16::from_le_bytes([facet[48], facet[49]])
+}
+
+/// A header and its facets.
+fn binary(content: &[u8], reading: &mut Reading<'_>) -> Result<Mesh, ReadError> {
+    let (header, content) = content.split_at(HEADER);
+    let facets = content.as_chunks::<FACET>().0;
+    let colors = FacetColors::of(header, facets);
+    if colors.is_none() && facets.iter().any(|facet| facet[48..] != [0; 2]) {
+        reading.notes.remark("its facets have attribute bytes that are no colours, and are not used");
+    }
+    let mut mesh = facets_of(facets, reading)?;
+    if let Some(colors) = colors {
+        paint(&mut mesh, facets, colors, reading)?;
+    }
+    Ok(mesh)
+}
+
+/// Gives facets their colours, and the body its opacity.
+fn paint(
+    mesh: &mut Mesh,
+    facets: &[[u8; FACET]],
+    colors: FacetColors,
+    reading: &mut Reading<'_>,
+) -> Result<(), ReadError> {
+    let corners = mesh.position.len();
+    input::hold("the colours of facets", corners as u64 * BYTES_PER_COLOR, reading.params)?;
+    input::reserve(&mut mesh.color, corners)?;
+    let stated = |facet: &[u8; FACET]| colors.color(facet);
+    mesh.color.extend(facets.iter().flat_map(|facet| [stated(facet).unwrap_or(PLAIN); 3]));
+    let plain = facets.iter().filter(|facet| stated(facet).is_none()).count();
+    if plain > 0 {
+        let all = counted(facets.len() as u64, "facet");
+        reading.notes.remark(format!("{plain} of {all} state no colour: they are white"));
+    }
+    if let FacetColors::Materialise { opacity: share, .. } = colors {
+        opacity::give(mesh, vec![share; corners], &mut reading.notes);
+    }
+    Ok(())
+}
+
+/// The facets as triangles.
+fn facets_of(facets: &[[u8; FACET]], reading: &Reading<'_>) -> Result<Mesh, ReadError> {
     let mut corners = reserved(facets.len(), reading.params)?;
     for (n, facet) in facets.iter().enumerate() {
         if n.is_multiple_of(LOOK) {

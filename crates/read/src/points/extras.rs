@@ -4,10 +4,10 @@ use crate::error::ReadError;
 use crate::reading::NamedColumn;
 use crate::stream::input;
 use crate::{Notes, ReadParams};
-use splat_core::Column;
 use splat_core::points::attributes::{attribute, expected};
 use splat_core::points::unaliased;
 use splat_core::text::escaped;
+use splat_core::{Association, Column};
 
 /// Most bytes of a name that are shown.
 pub(crate) const LONGEST_NAME: usize = 40;
@@ -19,6 +19,8 @@ pub(crate) const UNFIT_HINT: &str = "points are drawn by this column: repair it,
 #[derive(Default)]
 pub(crate) struct Extras {
     all: Vec<Extra>,
+    /// What their numbers belong to, of a mesh.
+    association: Option<Association>,
     /// What was expected, and what was found.
     unfit: Option<(&'static str, String)>,
 }
@@ -46,7 +48,33 @@ impl Extras {
             let (is_read, range) = (is_kept || params.ranges, [f64::INFINITY, f64::NEG_INFINITY]);
             (is_kept || !spare).then_some(Extra { rank, column, is_kept, is_read, is_attribute, range })
         };
-        Self { all: columns.into_iter().filter_map(extra).collect(), unfit: None }
+        Self { all: columns.into_iter().filter_map(extra).collect(), association: None, unfit: None }
+    }
+
+    /// The same of a mesh, whose columns have no meaning but their numbers.
+    pub(crate) fn of_mesh<'a>(
+        columns: impl IntoIterator<Item = (usize, &'a [u8], bool)>,
+        association: Association,
+        params: &ReadParams,
+    ) -> Self {
+        let mut extras = Self { association: Some(association), ..Self::new(columns, params) };
+        for extra in &mut extras.all {
+            extra.is_kept = params.columns.contains(&extra.column.name);
+            extra.is_read = extra.is_kept || params.ranges;
+            extra.is_attribute = false;
+        }
+        extras
+    }
+
+    /// Leaves out the columns of these names.
+    pub(crate) fn without(mut self, names: &[&[u8]]) -> Self {
+        self.all.retain(|extra| !names.contains(&extra.column.name.as_bytes()));
+        self
+    }
+
+    /// Whether there are any whose numbers are to be pushed.
+    pub(crate) fn reads(&self) -> bool {
+        self.all.iter().any(|extra| extra.is_read)
     }
 
     /// Ranks of the columns whose numbers are to be pushed.
@@ -106,7 +134,11 @@ impl Extras {
     /// The columns that are kept; tells the notes of all.
     pub(crate) fn finish(self, notes: &mut Notes) -> Vec<Column> {
         let range = |e: &Extra| (e.range[0] <= e.range[1]).then_some(e.range);
-        let named = |e: &Extra| NamedColumn { name: escaped(e.column.name.as_bytes(), LONGEST_NAME), range: range(e) };
+        let named = |e: &Extra| NamedColumn {
+            name: escaped(e.column.name.as_bytes(), LONGEST_NAME),
+            range: range(e),
+            association: self.association,
+        };
         notes.columns.extend(self.all.iter().map(named));
         self.all.into_iter().filter(|e| e.is_kept).map(|e| e.column).collect()
     }

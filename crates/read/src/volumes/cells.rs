@@ -8,6 +8,7 @@ use super::selection::Selection;
 use crate::Loaded;
 use crate::error::{Place, ReadError};
 use crate::meshes::fans::Fans;
+use crate::meshes::opacity;
 use crate::points::direction::unit;
 use crate::points::origin;
 use crate::reading::Reading;
@@ -18,7 +19,7 @@ use resample::Body;
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::srgb::linear_from_srgb;
 use splat_core::text::counted;
-use splat_core::{Mesh, RawPoints, Reservation};
+use splat_core::{Association, Column, Mesh, MeshColumn, RawPoints, Reservation};
 use std::ops::Deref;
 
 const HINT: &str = "the file is damaged, or its header states other sizes";
@@ -64,11 +65,14 @@ impl Field {
     }
 }
 
-/// What points of a surface have beside their places; empty where the file has none.
+/// What points and cells of a surface have beside their places; empty where the file has none.
 #[derive(Default)]
 pub(crate) struct PointColumns {
     pub(crate) normal: Vec<Vec3>,
     pub(crate) color: Vec<[f32; 3]>,
+    pub(crate) opacity: Vec<f32>,
+    /// Columns of points and of cells that are asked for.
+    pub(crate) named: Vec<MeshColumn>,
 }
 
 /// Points out of their coordinates.
@@ -143,6 +147,12 @@ pub(crate) fn colors(numbers: &[f64], each: u64, top: f64) -> Vec<[f32; 3]> {
     numbers.chunks_exact(each as usize).map(color).collect()
 }
 
+/// Opacities out of colours of four numbers each, of which 1 is `top`; none out of colours of three.
+pub(crate) fn opacities(numbers: &[f64], each: u64, top: f64) -> Vec<f32> {
+    let fourth = numbers.chunks_exact(each as usize).filter_map(|c| c.get(3));
+    fourth.map(|alpha| (alpha / top).clamp(0.0, 1.0) as f32).collect()
+}
+
 impl Cells {
     /// Cells of one kind behind the others.
     pub(crate) fn append(&mut self, lists: &Lists, kind: u8) {
@@ -214,19 +224,27 @@ impl Cells {
             let bodies: Vec<Body<'_>> = self.bodies().collect();
             return resample::grid(&self.points, &bodies, self.place, &field, reading).map(Loaded::Grid);
         }
-        let PointColumns { normal, color } = columns;
-        let (fans, lines) = self.fans(reading)?;
+        let PointColumns { normal, color, opacity, mut named } = columns;
+        let (fans, lines, cell_of) = self.fans(&named, reading)?;
         if lines > 0 {
             reading.notes.not_used([counted(lines as u64, "line").as_bytes()]);
         }
         input::hold("the vertices", self.points.len() as u64 * BYTES_PER_VERTEX, reading.params)?;
         let (origin, position) = origin::relative(&self.points, self.place, |i| format!("point {i}"))?;
         let Some(fans) = fans else {
-            return Ok(Loaded::Points(RawPoints { origin, position, normal, color, ..RawPoints::default() }));
+            let opacity = opacity::meant(opacity, &mut reading.notes);
+            named.retain(|column| column.association == Association::Vertex);
+            let columns = named.into_iter().map(|MeshColumn { name, values, .. }| Column { name, values }).collect();
+            let points = RawPoints { origin, position, normal, color, opacity, columns, ..RawPoints::default() };
+            return Ok(Loaded::Points(points));
         };
         // Normals of which one is zero are left out: they are to be computed anew.
         let normal = if normal.contains(&Vec3::ZERO) { Vec::new() } else { normal };
-        let vertices = Mesh { origin, position, normal, color, triangles: Vec::new() };
+        for column in named.iter_mut().filter(|column| column.association == Association::Triangle) {
+            column.values = cell_of.iter().map(|cell| column.values[*cell as usize]).collect();
+        }
+        let mut vertices = Mesh { origin, position, normal, color, columns: named, ..Mesh::default() };
+        opacity::give(&mut vertices, opacity, &mut reading.notes);
         fans.into_mesh(vertices, reading).map(Loaded::Mesh)
     }
 
@@ -238,8 +256,14 @@ impl Cells {
         })
     }
 
-    /// The faces, if there are some, and the number of lines.
-    fn fans(&self, reading: &mut Reading<'_>) -> Result<(Option<Fans>, usize), ReadError> {
+    /// The faces, if there are some, and the number of lines; and where columns of cells need it the cell of each triangle.
+    fn fans(
+        &self,
+        named: &[MeshColumn],
+        reading: &mut Reading<'_>,
+    ) -> Result<(Option<Fans>, usize, Vec<u32>), ReadError> {
+        let has_columns = named.iter().any(|column| column.association == Association::Triangle);
+        let mut cell_of = Vec::new();
         let mut fans = Fans::default();
         let mut faces = 0;
         let mut lines = 0;
@@ -261,8 +285,11 @@ impl Cells {
                 _ => continue,
             }
             faces += 1;
+            if has_columns {
+                cell_of.resize(fans.len(), i as u32);
+            }
         }
-        Ok(((faces > 0).then_some(fans), lines))
+        Ok(((faces > 0).then_some(fans), lines, cell_of))
     }
 }
 

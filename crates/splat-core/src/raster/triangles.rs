@@ -143,6 +143,14 @@ impl TriangleHit {
         self.mix(mesh, |v| mesh.color[v], mesh.color.len())
     }
 
+    /// Opacity of one crossing here; 1 for a mesh without opacities.
+    ///
+    /// # Panics
+    /// If the hit is of another mesh.
+    pub fn opacity(&self, mesh: &Mesh) -> f32 {
+        self.mix(mesh, |v| [mesh.opacity[v]], mesh.opacity.len()).map_or(1.0, |[share]| share)
+    }
+
     /// Unit normal of the triangle in the mesh's own space, to the side from which its corners run counterclockwise; zero for one without
     /// area.
     ///

@@ -1,11 +1,15 @@
 //! Triangle meshes.
 
+mod columns;
 mod creases;
 mod cross;
+mod halved;
 mod vertex_normals;
 
+pub use columns::{Association, MeshColumn};
 pub use creases::{crease_bytes, part_at_creases};
 pub use cross::robust_cross;
+pub use halved::halve_edges;
 pub use vertex_normals::{smooth, vertex_normals};
 
 use crate::{DAabb, Error};
@@ -24,8 +28,12 @@ pub struct Mesh {
     pub normal: Vec<Vec3>,
     /// Linear Rec.709 vertex colours; empty when the file has none.
     pub color: Vec<[f32; 3]>,
+    /// Opacity of one crossing at each vertex, in \[0, 1\], by which that of the object is multiplied; empty where it is 1 everywhere.
+    pub opacity: Vec<f32>,
     /// Vertex indices, three a triangle.
     pub triangles: Vec<[u32; 3]>,
+    /// Named numbers of vertices or triangles that were asked for.
+    pub columns: Vec<MeshColumn>,
 }
 
 impl Mesh {
@@ -72,25 +80,50 @@ impl Mesh {
         DAabb::of_points(self.triangles.iter().flatten().map(|v| self.origin + self.position[*v as usize].as_dvec3()))
     }
 
-    /// Bytes held by vertices and indices.
-    pub fn bytes(&self) -> u64 {
-        let vertices = size_of_val(self.position.as_slice()) + size_of_val(self.normal.as_slice());
-        (vertices + size_of_val(self.color.as_slice()) + size_of_val(self.triangles.as_slice())) as u64
+    /// The least opacity of a vertex; 1 for a mesh without opacities.
+    pub fn least_opacity(&self) -> f32 {
+        self.opacity.iter().copied().fold(1.0, f32::min)
     }
 
-    /// Checks column lengths, finite positions and index range.
+    /// Appends a vertex at the place of vertex `v`, with its colour and its opacity. The normal, and the numbers of columns of vertices, are
+    /// left to the caller.
+    pub fn push_copy(&mut self, v: usize) {
+        self.position.push(self.position[v]);
+        self.color.extend(self.color.get(v).copied());
+        self.opacity.extend(self.opacity.get(v).copied());
+    }
+
+    /// Bytes held by vertices, indices and columns.
+    pub fn bytes(&self) -> u64 {
+        let vertices = size_of_val(self.position.as_slice()) + size_of_val(self.normal.as_slice());
+        let looks = size_of_val(self.color.as_slice()) + size_of_val(self.opacity.as_slice());
+        let columns = self.columns.iter().map(|column| size_of_val(column.values.as_slice())).sum::<usize>();
+        (vertices + looks + size_of_val(self.triangles.as_slice()) + columns) as u64
+    }
+
+    /// Checks column lengths, finite positions, opacities and index range.
     ///
     /// # Errors
     /// [`Error::Invalid`] or [`Error::ColumnLength`] for the first that does not hold.
     pub fn validate(&self) -> Result<(), Error> {
         let n = self.position.len();
-        for (attribute, found) in [("normal", self.normal.len()), ("color", self.color.len())] {
+        let lengths = [("normal", self.normal.len()), ("color", self.color.len()), ("opacity", self.opacity.len())];
+        for (attribute, found) in lengths {
             if found != 0 && found != n {
                 return Err(Error::ColumnLength { attribute, found, expected: n });
             }
         }
         if let Some(i) = self.position.iter().position(|p| !p.is_finite()) {
             return Err(Error::invalid("vertex", i, "position", self.position[i], "finite numbers"));
+        }
+        if let Some(i) = self.opacity.iter().position(|share| !(0.0..=1.0).contains(share)) {
+            return Err(Error::invalid("vertex", i, "opacity", self.opacity[i], "a number in [0, 1]"));
+        }
+        for column in &self.columns {
+            let expected = column.association.count(self);
+            if column.values.len() != expected {
+                return Err(Error::ColumnLength { attribute: "columns", found: column.values.len(), expected });
+            }
         }
         if let Some(i) = self.triangles.iter().position(|t| t.iter().any(|&v| v as usize >= n)) {
             return Err(Error::invalid("face", i, "vertex index", self.triangles[i], "less than the vertex count"));

@@ -18,6 +18,9 @@ pub(crate) fn form(object: &ObjectStatistics) -> (Form, &'static str) {
         ObjectData::Points | ObjectData::Gaussians => {
             (Form::Splats, "raw points have nothing between them, and fields are shown by splats")
         }
+        ObjectData::Triangles if object.is_partly_opaque => {
+            (Form::Splats, "its opaque parts are drawn exactly, as opaque splats")
+        }
         ObjectData::Triangles => (Form::Triangles, "a uniform place on a triangle is exact"),
         ObjectData::Surface { looseness, on_lattice, by } => surface(looseness, on_lattice, by),
         ObjectData::Volume | ObjectData::Density { .. } if object.volumes_by != VolumeSampler::Auto => {

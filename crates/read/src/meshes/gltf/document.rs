@@ -128,6 +128,7 @@ pub(super) struct Material {
     pub(super) emissive_factor: Option<[f64; 3]>,
     pub(super) alpha_mode: Option<String>,
     pub(super) alpha_cutoff: Option<f64>,
+    pub(super) double_sided: bool,
     pub(super) extensions: BTreeMap<String, IgnoredAny>,
 }
 

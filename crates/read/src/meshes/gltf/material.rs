@@ -4,13 +4,17 @@ use super::accessor::{Buffers, fetch, missing};
 use super::document::{Document, Image, Material, TextureOf};
 use super::wrong;
 use crate::error::{Fault, ReadError};
-use crate::meshes::paint::Paint;
+use crate::meshes::paint::{Alpha, Paint};
 use crate::meshes::texture::{Texture, Wrap};
 use crate::reading::Reading;
 use crate::stream::beside::{self, Beside};
 use splat_core::glam::{Mat2, Vec2};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
+
+/// What is said of blended materials whose faces are seen from one side alone.
+const BACK_FACES: &str =
+    "doubleSided is not set beside alphaMode BLEND: the backs of its faces are drawn too, as light crosses them";
 
 const NEAREST: u32 = 9728;
 const CLAMP: u32 = 33_071;
@@ -98,18 +102,21 @@ impl<'a> Paints<'a> {
             texture = self.texture(of.index, reading)?;
             coordinates = texture.map(|_| coordinates_of(of)).transpose()?;
         }
-        let cutoff = match stated.alpha_mode.as_deref() {
-            Some("MASK") => Some(stated.alpha_cutoff.unwrap_or(0.5) as f32),
+        let alpha = match stated.alpha_mode.as_deref() {
+            Some("MASK") => Alpha::Cut(stated.alpha_cutoff.unwrap_or(0.5) as f32),
             Some("BLEND") => {
-                let remark = "alphaMode BLEND: surfaces have the opacity of their object, not that of their material";
-                reading.notes.remark(remark);
-                None
+                if !stated.double_sided {
+                    reading.notes.remark(BACK_FACES);
+                }
+                Alpha::Blended
             }
-            _ => None,
+            // Opacities of vertices without a material are meant; a material that is opaque overrules them.
+            _ if material.is_none() => Alpha::Blended,
+            _ => Alpha::Ignored,
         };
         name_unused(stated, reading);
         let rank = self.paints.len() as u32;
-        let textured = Paint { factor: factor.map(|f| f as f32), texture, cutoff };
+        let textured = Paint { factor: factor.map(|f| f as f32), texture, alpha };
         self.paints.extend([textured, Paint { texture: None, ..textured }]);
         self.known.insert(material, (rank, coordinates));
         Ok((rank, coordinates))

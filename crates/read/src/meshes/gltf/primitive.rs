@@ -5,7 +5,7 @@ use super::document::Primitive;
 use super::material::{Coordinates, Paints};
 use super::{HINT, wrong};
 use crate::error::{Place, ReadError};
-use crate::meshes::paint::Painting;
+use crate::meshes::paint::{Alpha, Painting};
 use crate::points::direction::unit;
 use crate::reading::Reading;
 use crate::stream::input;
@@ -137,7 +137,7 @@ pub(super) fn vertices_of(primitive: &Primitive, buffers: &Buffers<'_>) -> u64 {
 
 /// The remark on vertices with opacities.
 const OPACITIES: &str =
-    "opacities of vertices (COLOR_0) are not drawn: a surface has one opacity, the key `opacity` of its object";
+    "opacities of vertices (COLOR_0) are not used: the alphaMode of their material is OPAQUE; BLEND would show them";
 
 fn vertices(
     primitive: &Primitive,
@@ -171,7 +171,7 @@ fn vertices(
     let tint = attribute("COLOR_0").map(|index| colors(index, buffers, reading)).transpose()?;
     if let Some(tint) = &tint {
         alike(tint.len(), "COLOR_0")?;
-        if tint.iter().any(|color| color[3] < 1.0) && paints.paints[paint as usize].cutoff.is_none() {
+        if tint.iter().any(|color| color[3] < 1.0) && paints.paints[paint as usize].alpha == Alpha::Ignored {
             reading.notes.remark(OPACITIES);
         }
     }

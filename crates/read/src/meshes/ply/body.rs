@@ -3,11 +3,14 @@
 use super::columns::Columns;
 use super::faces::{Faces, Form};
 use super::header::{Element, Header, Property, Shape, Type, at_line};
+use super::texture::{self, Textures};
 use crate::Loaded;
 use crate::error::{Place, ReadError};
 use crate::reading::Reading;
+use crate::stream::beside::Beside;
 use crate::stream::input;
 use splat_core::text::escaped;
+use std::path::Path;
 
 /// Where numbers come from.
 pub(super) trait Source {
@@ -33,14 +36,26 @@ pub(super) trait Source {
 const LOOK: u64 = 1 << 14;
 
 /// Reads every element.
-pub(super) fn read<S: Source>(mut source: S, header: &Header, reading: &mut Reading<'_>) -> Result<Loaded, ReadError> {
+pub(super) fn read<S: Source>(
+    mut source: S,
+    header: &Header,
+    place: Option<&Path>,
+    reading: &mut Reading<'_>,
+) -> Result<Loaded, ReadError> {
     let Some(vertices) = header.elements.iter().find(|e| e.name == b"vertex") else {
         let hint = "only meshes and point clouds are read";
         return Err(ReadError::input(at_line(header.body_line - 1), "an element 'vertex'", "none", hint));
     };
     let mesh = header.is_mesh();
-    let mut columns = Columns::new(vertices, mesh, reading.params)?;
-    let mut faces = Faces::new(vertices.count);
+    let textures = if mesh { Textures::open(&header.textures, &Beside::new(place), reading)? } else { None };
+    let has_wedges = textures.is_some() && texture::has_corners(header);
+    // Places of vertices in a texture are read as numbers that are asked for.
+    let places = texture::of_vertices(header, vertices).filter(|_| textures.is_some() && !has_wedges);
+    let mut params = reading.params.clone();
+    params.columns.extend(places.into_iter().flatten().map(str::to_owned));
+    let mut columns = Columns::new(vertices, mesh, &params)?;
+    let of_vertices = vertices.properties.iter().map(|property| property.name.clone()).collect();
+    let mut faces = Faces::new(vertices.count, of_vertices, has_wedges);
     for element in &header.elements {
         check_count(&source, element)?;
         match element.name.as_slice() {
@@ -54,7 +69,19 @@ pub(super) fn read<S: Source>(mut source: S, header: &Header, reading: &mut Read
     if !mesh {
         return columns.into_points(&mut reading.notes).map(Loaded::Points);
     }
-    faces.into_mesh(columns, reading).map(Loaded::Mesh)
+    let (mesh, wedges) = faces.into_mesh(columns, reading)?;
+    let mesh = match (textures, wedges, places) {
+        (Some(textures), Some(wedges), _) => wedges.paint(mesh, textures, reading)?,
+        (Some(textures), None, Some(places)) => textures.paint_vertices(mesh, places, reading)?,
+        (Some(_), None, None) => {
+            reading
+                .notes
+                .remark("it names a texture, and nothing has a place in it (texcoord of faces, s and t of vertices)");
+            mesh
+        }
+        (None, ..) => mesh,
+    };
+    Ok(Loaded::Mesh(mesh))
 }
 
 /// Looks now and then whether to stop.

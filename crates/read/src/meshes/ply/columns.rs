@@ -2,6 +2,7 @@
 
 use super::header::{Element, Property, Shape, Type, at_line};
 use crate::error::ReadError;
+use crate::meshes::opacity;
 use crate::points::direction::unit;
 use crate::points::extras::{Extras, UNFIT_HINT};
 use crate::points::origin;
@@ -9,7 +10,7 @@ use crate::stream::input;
 use crate::{Notes, ReadParams};
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::srgb::linear_from_srgb;
-use splat_core::{Mesh, RawPoints};
+use splat_core::{Association, Column, Mesh, MeshColumn, RawPoints};
 
 /// Names of the kept properties by role: x y z, normal, colour, value, opacity. The first name of a role that is there wins.
 const ROLES: [&[&str]; 11] = [
@@ -56,9 +57,8 @@ impl Columns {
     pub(super) fn new(vertex: &Element, mesh: bool, params: &ReadParams) -> Result<Self, ReadError> {
         let mut kept = vec![None; vertex.properties.len()];
         let mut found = [false; 11];
-        // A mesh has the opacity that its object states.
-        let roles = ROLES.iter().enumerate().filter(|(role, _)| !(mesh && *role == OPACITY));
-        for (role, names) in roles {
+        // A mesh has no values: they are numbers as others.
+        for (role, names) in ROLES.iter().enumerate().filter(|(role, _)| !(mesh && *role == VALUE)) {
             let of = |name: &&str| vertex.properties.iter().position(|p| p.name == name.as_bytes());
             let Some(index) = names.iter().find_map(of) else { continue };
             match vertex.properties[index] {
@@ -86,7 +86,8 @@ impl Columns {
         }
         let scalars = vertex.properties.iter().enumerate().filter(|(_, p)| matches!(p.shape, Shape::Scalar(_)));
         let others = scalars.map(|(i, p)| (i, p.name.as_slice(), kept[i].is_some()));
-        let extras = if mesh { Extras::default() } else { Extras::new(others, params) };
+        let extras =
+            if mesh { Extras::of_mesh(others, Association::Vertex, params) } else { Extras::new(others, params) };
         let of_roles = kept.iter().rposition(Option::is_some).unwrap_or(0);
         let last = extras.read().max().unwrap_or(0).max(of_roles);
         let further = vec![0.0; if extras.read().next().is_some() { kept.len() } else { 0 }];
@@ -102,9 +103,11 @@ impl Columns {
         Ok(Self { kept, extras, further, last, has, record, positions, points, drop_invalid, line: vertex.line })
     }
 
-    /// Names of the properties of `vertex` that are read over.
+    /// Names of the properties of `vertex` that are read over; of a mesh those that cannot be asked for either.
     pub(super) fn unused<'a>(&'a self, vertex: &'a Element) -> impl Iterator<Item = &'a [u8]> {
-        vertex.properties.iter().zip(&self.kept).filter(|(_, k)| k.is_none()).map(|(p, _)| p.name.as_slice())
+        let is_mesh = self.drop_invalid.is_none();
+        let unused = vertex.properties.iter().zip(&self.kept).filter(|(_, k)| k.is_none()).map(|(p, _)| p);
+        unused.filter(move |p| !(is_mesh && matches!(p.shape, Shape::Scalar(_)))).map(|p| p.name.as_slice())
     }
 
     /// Bytes that a vertex takes while it is read and converted.
@@ -192,10 +195,15 @@ impl Columns {
     }
 
     /// The columns as a mesh. Normals of which one is zero are left out: they are to be computed anew.
-    pub(super) fn into_mesh(self, triangles: Vec<[u32; 3]>) -> Result<Mesh, ReadError> {
-        let points = self.into_points(&mut Notes::default())?;
+    pub(super) fn into_mesh(self, triangles: Vec<[u32; 3]>, notes: &mut Notes) -> Result<Mesh, ReadError> {
+        let points = self.into_points(notes)?;
         let normal = if points.normal.contains(&Vec3::ZERO) { Vec::new() } else { points.normal };
-        Ok(Mesh { origin: points.origin, position: points.position, normal, color: points.color, triangles })
+        let opacity = opacity::meant(points.opacity, notes);
+        let RawPoints { origin, position, color, columns, .. } = points;
+        let association = Association::Vertex;
+        let columns = columns.into_iter().map(|Column { name, values }| MeshColumn { name, association, values });
+        let columns = columns.collect();
+        Ok(Mesh { origin, position, normal, color, opacity, triangles, columns })
     }
 
     /// The columns as points.

@@ -107,6 +107,8 @@ pub(super) struct Header {
     pub(super) elements: Vec<Element>,
     /// Comments of our own.
     pub(super) comments: Vec<Comment>,
+    /// Names of files that comments `TextureFile` name.
+    pub(super) textures: Vec<Vec<u8>>,
     /// Byte offset of the body.
     pub(super) body: usize,
     /// Line number of the body's first line.
@@ -163,6 +165,7 @@ pub(super) fn parse(content: &[u8]) -> Result<Header, ReadError> {
     let mut encoding = None;
     let mut elements: Vec<Element> = Vec::new();
     let mut comments = Vec::new();
+    let mut textures = Vec::new();
     let mut entries = 0;
     loop {
         let text = lines.next()?;
@@ -172,7 +175,10 @@ pub(super) fn parse(content: &[u8]) -> Result<Header, ReadError> {
             b"end_header" => break,
             b"comment" => match comment(text, line) {
                 Some(own) => comments.push(own),
-                None => continue,
+                None => match texture(text) {
+                    Some(name) => textures.push(name),
+                    None => continue,
+                },
             },
             b"obj_info" => continue,
             b"format" if encoding.is_none() => encoding = Some(format(&mut words, line, text)?),
@@ -198,7 +204,7 @@ pub(super) fn parse(content: &[u8]) -> Result<Header, ReadError> {
         }
     }
     let encoding = encoding.ok_or_else(|| wrong(lines.line, "a format line before end_header", b"none"))?;
-    Ok(Header { encoding, elements, comments, body: lines.at, body_line: lines.line + 1 })
+    Ok(Header { encoding, elements, comments, textures, body: lines.at, body_line: lines.line + 1 })
 }
 
 /// A comment of our own, and none of somebody else's.
@@ -208,6 +214,15 @@ fn comment(text: &[u8], line: u64) -> Option<Comment> {
     let end = rest.iter().position(u8::is_ascii_whitespace).unwrap_or(rest.len());
     let (key, rest) = rest.split_at(end);
     Some(Comment { key: key.to_vec(), rest: rest.trim_ascii().to_vec(), line })
+}
+
+/// The name of a texture, which a comment `TextureFile` has.
+fn texture(text: &[u8]) -> Option<Vec<u8>> {
+    const KEY: &[u8] = b"TextureFile";
+    let rest = text.trim_ascii().strip_prefix(b"comment")?.trim_ascii_start();
+    let (key, name) = rest.split_at_checked(KEY.len())?;
+    let name = name.trim_ascii();
+    (key.eq_ignore_ascii_case(KEY) && !name.is_empty()).then(|| name.to_vec())
 }
 
 fn format<'a>(words: &mut impl Iterator<Item = &'a [u8]>, line: u64, text: &[u8]) -> Result<Encoding, ReadError> {

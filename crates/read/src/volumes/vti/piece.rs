@@ -4,11 +4,13 @@ use super::data::Encoding;
 use super::{arrays, child, chosen, components, kind, name, not_used, place, selection, wrong};
 use crate::Loaded;
 use crate::error::ReadError;
+use crate::meshes::named_arrays::{NamedArrays, SurfaceArray};
 use crate::reading::Reading;
 use crate::volumes::cells::{self, Cells, Field, Lists, Numbers, PointColumns};
 use crate::volumes::voxels::Kind;
 use roxmltree::Node;
 use splat_core::text::counted;
+use splat_core::{Association, MeshColumn};
 
 /// Elements of polygonal data with the attribute that says how many cells they have, and VTK's kind of those, in the order in which
 /// values of cells count them.
@@ -71,11 +73,42 @@ pub(super) fn read(
             columns.normal = cells::normals(&joined(&pieces, array, &mut used, reading)?);
         }
         if let Some(array) = data().find_map(colors_of) {
-            columns.color = cells::colors(&joined(&pieces, array, &mut used, reading)?, components(array)?, 255.0);
+            let numbers = joined(&pieces, array, &mut used, reading)?;
+            columns.color = cells::colors(&numbers, components(array)?, 255.0);
+            columns.opacity = cells::opacities(&numbers, components(array)?, 255.0);
         }
+        columns.named = named(&pieces, &mut used, reading)?;
     }
     not_used(dataset, &used, &mut reading.notes);
     cells.loaded(field, columns, reading)
+}
+
+/// Columns of points and of cells that are asked for; those that could be are used.
+fn named<'a, 'i>(
+    pieces: &[Piece<'_, 'a, 'i>],
+    used: &mut Vec<Node<'a, 'i>>,
+    reading: &mut Reading<'_>,
+) -> Result<Vec<MeshColumn>, ReadError> {
+    let mut named = NamedArrays::new(reading.params);
+    for (element, association) in [("PointData", Association::Vertex), ("CellData", Association::Triangle)] {
+        let Some(data) = pieces.iter().find_map(|piece| child(piece.node, element)) else { continue };
+        for array in arrays(data).filter(|array| kind(*array).is_ok()) {
+            if used.contains(&array) {
+                continue;
+            }
+            let own = array.attribute("Name").unwrap_or_default();
+            let surface = SurfaceArray { name: own, association, numbers: components(array)? };
+            if own.is_empty() || !surface.is_offered() {
+                continue;
+            }
+            let numbers = if named.needs(&surface) { Some(joined(pieces, array, used, reading)?) } else { None };
+            named.take(&surface, numbers.as_deref());
+            let same = |other: &Node<'_, '_>| other.attribute("Name") == Some(own);
+            let data = pieces.iter().filter_map(|piece| child(piece.node, element));
+            used.extend(data.flat_map(|data| arrays(data).filter(same).collect::<Vec<_>>()));
+        }
+    }
+    Ok(named.finish(&mut reading.notes))
 }
 
 /// The numbers of an array of one piece, and before and behind them those of the arrays of its name in the others.

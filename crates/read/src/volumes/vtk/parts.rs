@@ -5,12 +5,14 @@ use super::arrays::{Array, Arrays, Of, Part, kind, whole};
 use super::{Dataset, HINT, next, wrong};
 use crate::Loaded;
 use crate::error::{Place, ReadError};
+use crate::meshes::named_arrays::{NamedArrays, SurfaceArray};
 use crate::reading::Reading;
 use crate::text::{Line, Lines, Word};
 use crate::volumes::cells::{self, Cells, Field, Lists, Numbers, PointColumns};
 use crate::volumes::selection::Selection;
 use crate::volumes::voxels::Kind;
 use splat_core::text::escaped;
+use splat_core::{Association, MeshColumn};
 
 /// Parts of polygonal data and VTK's kinds of their cells, in the order in which values of cells count them.
 const OF_POLYDATA: [(&str, u8); 4] = [
@@ -115,8 +117,11 @@ pub(super) fn read(
         if let Some(array) = arrays.colors() {
             used.push(array.place);
             let top = if source.is_of_shares(array) { 1.0 } else { 255.0 };
-            columns.color = cells::colors(&source.of_points(array, &cells, reading)?, array.numbers, top);
+            let numbers = source.of_points(array, &cells, reading)?;
+            columns.color = cells::colors(&numbers, array.numbers, top);
+            columns.opacity = cells::opacities(&numbers, array.numbers, top);
         }
+        columns.named = source.named(&cells, &mut used, reading)?;
     }
     reading.notes.not_used(arrays.all().filter(|a| !used.contains(&a.place)).map(|a| a.name.as_bytes()));
     cells.loaded(field, columns, reading)
@@ -174,6 +179,34 @@ impl Source<'_> {
         cells::hold_lists(rest.len(), of_cells.len(), reading)?;
         let lists = Lists::ending(rest, &of_cells, points, corners.place)?;
         Ok(Some((lists, corners.place)))
+    }
+
+    /// Columns of points and of cells that are asked for; those that could be are used.
+    fn named(
+        &self,
+        cells: &Cells,
+        used: &mut Vec<Place>,
+        reading: &mut Reading<'_>,
+    ) -> Result<Vec<MeshColumn>, ReadError> {
+        let mut named = NamedArrays::new(reading.params);
+        for of in [Of::Points, Of::Cells] {
+            let (association, count) = match of {
+                Of::Points => (Association::Vertex, cells.points.len()),
+                Of::Cells | Of::File => (Association::Triangle, cells.kinds.len()),
+            };
+            let arrays = self.arrays.all().filter(|array| array.of == of && array.tuples == count as u64);
+            for array in arrays.filter(|array| !used.contains(&array.place)).collect::<Vec<_>>() {
+                let surface = SurfaceArray { name: &array.name, association, numbers: array.numbers };
+                if !surface.is_offered() {
+                    continue;
+                }
+                used.push(array.place);
+                let is_needed = named.needs(&surface);
+                let numbers = if is_needed { Some(self.numbers(array, reading)?) } else { None };
+                named.take(&surface, numbers.as_deref());
+            }
+        }
+        Ok(named.finish(&mut reading.notes))
     }
 
     /// The numbers of an array that has as many tuples as there are points.

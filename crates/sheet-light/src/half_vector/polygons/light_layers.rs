@@ -59,7 +59,7 @@ impl LightLayers {
         };
         let keep = |k: usize, layer: &TriangleLayer| {
             let polygons = panes[layer.hit.mesh as usize];
-            let optical_depth = polygons.crossing(|| along(k).dot(polygons.face(&layer.hit)));
+            let optical_depth = polygons.crossing(&layer.hit, || along(k).dot(polygons.face(&layer.hit)));
             Layer { depth: layer.depth, slope: layer.slope, optical_depth }
         };
         let layers = resolve_layers(&meshes, camera, &[], most, none, keep, Some(progress));

@@ -7,7 +7,7 @@
 use crate::Error;
 use rayon::prelude::*;
 use splat_core::glam::{DVec3, Vec3};
-use splat_core::optics::SurfaceOpacity;
+use splat_core::optics::{self, SurfaceOpacity};
 use splat_core::raster::triangles::{PlacedMesh, TriangleHit, TriangleLayer, resolve, resolve_layers};
 use splat_core::shade::{ChannelLayout, Point, facing};
 use splat_core::{Camera, Material, Progress, Receiver, Shading, SplatKind};
@@ -23,7 +23,7 @@ pub struct Polygons<'a> {
     /// Linear Rec.709; a factor on the colours of the mesh where it has any.
     pub color: [f32; 3],
     /// Optical depth of one crossing of a triangle, times [`Material::extinction_rgb`] by channel and, of a thin slab, 1/|cos θ|; ≥ 0, +∞ for what
-    /// is opaque.
+    /// is opaque. Where the mesh has opacities, that of a crossing where they are 1.
     pub optical_depth: f32,
     /// Id of the object.
     pub object: u32,
@@ -74,12 +74,26 @@ pub(crate) struct Seen<'a> {
     normal: Vec3,
     to_eye: Vec3,
     color: [f32; 3],
+    on: TriangleHit,
 }
+
+/// Optical depth of an opaque part of a mesh with opacities: 10⁻²⁸ of what is behind it comes through.
+const DEEPEST: f64 = 64.0;
 
 impl Polygons<'_> {
     /// Whether no light comes through.
     pub fn is_opaque(&self) -> bool {
-        self.optical_depth == f32::INFINITY
+        self.optical_depth == f32::INFINITY && self.placed.mesh.opacity.is_empty()
+    }
+
+    /// Optical depth of one crossing there, before the factors of [`Polygons::crossing`].
+    pub(crate) fn depth_at(&self, on: &TriangleHit) -> f64 {
+        let depth = f64::from(self.optical_depth);
+        if self.placed.mesh.opacity.is_empty() {
+            return depth;
+        }
+        let share = f64::from(on.opacity(self.placed.mesh).clamp(0.0, 1.0));
+        optics::optical_depth(optics::opacity(depth) * share).min(DEEPEST)
     }
 
     /// Refuses what cannot be drawn, at the place `index` of an input.
@@ -102,13 +116,14 @@ impl Polygons<'_> {
         self.material.shading != Shading::Unlit
     }
 
-    /// Optical depth by channel of one crossing, at this cosine of the ray to the normal, which few ask for.
-    pub(crate) fn crossing(&self, cosine: impl FnOnce() -> f32) -> [f32; 3] {
+    /// Optical depth by channel of one crossing there, at this cosine of the ray to the normal, which few ask for.
+    pub(crate) fn crossing(&self, on: &TriangleHit, cosine: impl FnOnce() -> f32) -> [f32; 3] {
         let slanted = match self.material.surface_opacity {
             SurfaceOpacity::PerCrossing => 1.0,
             law @ SurfaceOpacity::ThinSlab => law.optical_depth_factor(cosine()),
         };
-        self.material.extinction_rgb.map(|factor| self.optical_depth * slanted * factor)
+        let depth = self.depth_at(on) as f32;
+        self.material.extinction_rgb.map(|factor| depth * slanted * factor)
     }
 
     /// Unit normal of a triangle in the world.
@@ -230,6 +245,7 @@ impl<'a> Surfaces<'a> {
             normal,
             to_eye: -along.normalize().as_vec3(),
             color: [0, 1, 2].map(|c| polygons.color[c] * of_mesh[c]),
+            on: *on,
         }
     }
 }
@@ -266,6 +282,6 @@ impl<'a> Seen<'a> {
 
     /// Optical depth by channel that it has for the eye.
     pub(crate) fn crossing(&self) -> [f32; 3] {
-        self.polygons.crossing(|| self.to_eye.dot(self.face))
+        self.polygons.crossing(&self.on, || self.to_eye.dot(self.face))
     }
 }

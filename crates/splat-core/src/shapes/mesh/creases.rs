@@ -3,7 +3,7 @@
 //! Around each vertex the triangles that follow each other across edges of less than [`CREASE`] are one side, and each side beyond the first
 //! gets a vertex of its own, so that [`crate::vertex_normals`] are smooth within a side and break at the edges between two.
 
-use crate::{Mesh, robust_cross};
+use crate::{Association, Mesh, robust_cross};
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -40,14 +40,17 @@ pub fn part_at_creases(mesh: &mut Mesh) {
         return;
     }
     for v in parted(mesh) {
-        mesh.position.push(mesh.position[v as usize]);
-        mesh.color.extend(mesh.color.get(v as usize).copied());
+        mesh.push_copy(v as usize);
+        for column in mesh.columns.iter_mut().filter(|column| column.association == Association::Vertex) {
+            column.values.push(column.values[v as usize]);
+        }
     }
 }
 
 /// Most bytes that [`part_at_creases`] takes and adds to a mesh: planes and corners of triangles, sums at vertices, and a vertex for each corner.
 pub fn crease_bytes(mesh: &Mesh) -> u64 {
-    let of_triangle = 24 + 3 * (8 + 4 + 12 + if mesh.color.is_empty() { 0 } else { 12 });
+    let looks = if mesh.color.is_empty() { 0 } else { 12 } + if mesh.opacity.is_empty() { 0 } else { 4 };
+    let of_triangle = 24 + 3 * (8 + 4 + 12 + looks + 8 * mesh.columns.len() as u64);
     if mesh.normal.is_empty() { mesh.triangles.len() as u64 * of_triangle + mesh.position.len() as u64 * 25 } else { 0 }
 }
 

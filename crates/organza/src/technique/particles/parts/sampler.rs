@@ -90,6 +90,8 @@ impl<'a> Source<'a> {
             opacity: own.opacity,
             cross_section: self.cross_section,
             surface_opacity: self.look.material.surface_opacity,
+            // Without extinction there is no particle, whatever the factor.
+            extinction_factor: if own.extinction_factor > 0.0 { own.extinction_factor } else { 1.0 },
             color: self.color(own),
             opaque_optical_depth: DEEPEST,
             seed: self.seed,

@@ -1,36 +1,44 @@
-//! Colours of materials on the corners of faces.
+//! Colours of materials on the corners of faces, which share a vertex where they have all in common.
 
-use super::{BYTES_PER_CORNER, Corner};
+use super::{Paint, Painting};
 use crate::error::ReadError;
-use crate::meshes::mtl::Materials;
-use crate::meshes::paint::Painting;
+use crate::meshes::texture::Texture;
 use crate::reading::Reading;
 use crate::stream::input;
 use splat_core::glam::Vec3;
-use splat_core::{Mesh, part_at_creases, vertex_normals};
+use splat_core::{Association, Mesh, part_at_creases, vertex_normals};
 use std::collections::HashMap;
 
 /// Bytes that a vertex and a triangle of the surface without materials take, while it is parted at sharp edges and its normals are found.
 const BYTES_PER_WHOLE_VERTEX: u64 = 12 + 25 + 12;
 const BYTES_PER_WHOLE_TRIANGLE: u64 = 12 + 48 + 3 * 36;
 
-/// The mesh with the colours of its materials.
-pub(super) fn painted(
+/// A vertex of the mesh: position, normal, place in its texture, paint; [`NONE`] where a corner has none.
+pub(crate) type Corner = [u32; 4];
+
+/// What a corner has not.
+pub(crate) const NONE: u32 = u32::MAX;
+
+/// Bytes that a corner takes while it is read and converted.
+pub(crate) const BYTES_PER_CORNER: u64 = 16 + 48 + 48;
+
+/// The mesh with the colours of its paints, times those opacities that its vertices have.
+pub(crate) fn painted(
     mut mesh: Mesh,
     mut corners: Vec<Corner>,
     places: &[[f32; 2]],
-    materials: Materials<'_>,
+    paints: Vec<Paint>,
+    textures: Vec<Texture>,
     reading: &mut Reading<'_>,
 ) -> Result<Mesh, ReadError> {
     if mesh.normal.is_empty() {
         smooth(&mut mesh, &mut corners, reading)?;
     }
-    let Materials { paints, textures, .. } = materials;
     let place = |c: &Corner| places.get(c[2] as usize).copied().unwrap_or_default();
     let painting = Painting {
         place: if textures.is_empty() { Vec::new() } else { corners.iter().map(place).collect() },
         paint_of: corners.iter().map(|c| c[3]).collect(),
-        tint: Vec::new(),
+        tint: mesh.opacity.iter().map(|opacity| [1.0, 1.0, 1.0, *opacity]).collect(),
         paints,
         textures,
     };
@@ -51,12 +59,16 @@ fn smooth(mesh: &mut Mesh, corners: &mut Vec<Corner>, reading: &Reading<'_>) -> 
     input::hold("the corners", (corners.len() as u64 + more) * BYTES_PER_CORNER, reading.params)?;
     let mut side_of: Vec<Option<u32>> = vec![None; mesh.position.len()];
     let mut further: HashMap<[u32; 2], u32> = HashMap::new();
-    for (ids, sides) in mesh.triangles.iter_mut().zip(&whole.triangles) {
+    let mut triangles = std::mem::take(&mut mesh.triangles);
+    for (ids, sides) in triangles.iter_mut().zip(&whole.triangles) {
         for (id, side) in ids.iter_mut().zip(sides) {
             let v = *id as usize;
             if *side_of[v].get_or_insert(*side) != *side {
                 *id = *further.entry([*id, *side]).or_insert_with(|| {
-                    mesh.position.push(mesh.position[v]);
+                    mesh.push_copy(v);
+                    for column in mesh.columns.iter_mut().filter(|c| c.association == Association::Vertex) {
+                        column.values.push(column.values[v]);
+                    }
                     corners.push(corners[v]);
                     side_of.push(Some(*side));
                     side_of.len() as u32 - 1
@@ -64,6 +76,7 @@ fn smooth(mesh: &mut Mesh, corners: &mut Vec<Corner>, reading: &Reading<'_>) -> 
             }
         }
     }
+    mesh.triangles = triangles;
     let normals = vertex_normals(&whole);
     mesh.normal = side_of.iter().map(|side| side.map_or(Vec3::ZERO, |side| normals[side as usize])).collect();
     Ok(())

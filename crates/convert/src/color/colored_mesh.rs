@@ -1,0 +1,239 @@
+//! The colours, and the opacities, of a mesh by a column of its vertices or triangles.
+//!
+//! Numbers are interpolated between vertices, not colours: where the colours of a map between two vertices are not the mean of theirs, the edge is
+//! halved in all triangles that share it, until they are within [`TOLERANCE`]. Triangles with numbers of their own get vertices of their own, with the
+//! normals that these had.
+
+use crate::color::color_by::colored_numbers;
+use crate::points::shown_points::said_of_colors;
+use crate::{Classified, ColorBy, ColorScale, Colored, ConvertError, PointColors, SplatParams};
+use rayon::prelude::*;
+use splat_core::glam::DVec3;
+use splat_core::{Association, Mesh, MeshColumn, halve_edges, smooth};
+use std::sync::Arc;
+
+/// Largest difference of the square root of a colour, which is about how the eye tells colours apart, or of an opacity, from what lies between
+/// those of the ends of an edge.
+const TOLERANCE: f32 = 1.0 / 64.0;
+/// Most triangles that a mesh is divided into; one that has more already keeps them.
+const MOST: usize = 2 << 20;
+/// Edges looked at by one task.
+const CHUNK: usize = 1024;
+
+/// A mesh in the colours of a column.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ColoredMesh {
+    /// The mesh, without columns.
+    pub mesh: Arc<Mesh>,
+    /// How its colours arose, one sentence without a full stop each.
+    pub said: Vec<String>,
+    /// What its colours stand for; `None` where no number is known.
+    pub scale: Option<ColorScale>,
+}
+
+/// The mesh in the colours of a column, and with the opacities that a transfer function has; `up` is where `height` grows. Of `splat` the name and
+/// the colour are used.
+///
+/// ```
+/// use convert::{ColorBy, ColorMap, PointColors, SplatParams, colored_mesh};
+/// use splat_core::{Mesh, glam::DVec3};
+/// let mesh = Mesh::rectangle(DVec3::ZERO, DVec3::X, DVec3::Y);
+/// let map = ColorMap::VIRIDIS;
+/// let by = ColorBy { column: "x".into(), colors: PointColors::Map(map, Some([-1.0, 1.0])) };
+/// let colored = colored_mesh(mesh.into(), &by, DVec3::Y, &SplatParams::default()).unwrap();
+/// assert_eq!(colored.mesh.color[..2], [map.at(0.0), map.at(1.0)]);
+/// ```
+///
+/// # Errors
+/// [`ConvertError::Parameter`] for a column that the mesh has not.
+pub fn colored_mesh(
+    mesh: Arc<Mesh>,
+    by: &ColorBy,
+    up: DVec3,
+    splat: &SplatParams,
+) -> Result<ColoredMesh, ConvertError> {
+    let Some(column) = mesh.column(&by.column, up) else {
+        return Err(splat.bad("color_by", &by.column, "a column of the mesh's vertices or faces"));
+    };
+    let association = column.association;
+    let colored = colored_numbers(column.values.clone(), by, splat);
+    let mut said =
+        vec![said_of_colors(by, &colored, if association == Association::Vertex { "vertex" } else { "face" })];
+    let scale = ColorScale::of_points(&splat.object_name, by, &colored);
+    let mut mesh = Arc::unwrap_or_clone(mesh);
+    mesh.columns = vec![column];
+    let looks = Looks { by, colored: &colored, plain: splat.color };
+    match association {
+        Association::Vertex => said.extend(divide(&mut mesh, &looks)),
+        Association::Triangle => part(&mut mesh),
+    }
+    let MeshColumn { values, .. } = mesh.columns.remove(0);
+    let shown: Vec<Look> = match association {
+        Association::Vertex => values.par_iter().map(|number| looks.at(*number)).collect(),
+        Association::Triangle => values.iter().flat_map(|number| [looks.at(*number); 3]).collect(),
+    };
+    mesh.color = shown.iter().map(|look| look.color).collect();
+    if matches!(by.colors, PointColors::Transfer(_, Classified::Opacity)) {
+        let own = mesh.opacity.iter().copied().chain(std::iter::repeat(1.0));
+        let opacity: Vec<f32> = shown.iter().zip(own).map(|(look, own)| look.opacity * own).collect();
+        mesh.opacity = if opacity.iter().all(|share| *share == 1.0) { Vec::new() } else { opacity };
+    }
+    Ok(ColoredMesh { mesh: mesh.into(), said, scale })
+}
+
+/// What a number looks like.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Look {
+    color: [f32; 3],
+    opacity: f32,
+}
+
+/// What numbers look like.
+struct Looks<'a> {
+    by: &'a ColorBy,
+    colored: &'a Colored,
+    /// The colour of what has no number.
+    plain: [f32; 3],
+}
+
+impl Looks<'_> {
+    fn at(&self, number: f64) -> Look {
+        if !number.is_finite() {
+            return Look { color: self.plain, opacity: 1.0 };
+        }
+        let opacity = match &self.by.colors {
+            PointColors::Transfer(transfer, Classified::Opacity) => transfer.at(number as f32).extinction,
+            _ => 1.0,
+        };
+        Look {
+            color: self.by.colors.at(number, self.colored.range.unwrap_or_default()),
+            opacity: opacity.clamp(0.0, 1.0),
+        }
+    }
+
+    /// Whether what lies between two numbers looks otherwise than what lies between their looks.
+    fn deviates(&self, [a, b]: [f64; 2]) -> bool {
+        let [from, to] = [self.at(a), self.at(b)];
+        [0.25, 0.5, 0.75].iter().any(|share| {
+            let found = self.at(a + (b - a) * share);
+            let between = |x: f32, y: f32| x + (y - x) * *share as f32;
+            let is_other = |k: usize| {
+                (found.color[k].sqrt() - between(from.color[k], to.color[k]).max(0.0).sqrt()).abs() > TOLERANCE
+            };
+            (0..3).any(is_other) || (found.opacity - between(from.opacity, to.opacity)).abs() > TOLERANCE
+        })
+    }
+}
+
+/// Halves edges between whose ends other colours lie than the means of theirs; says what was done. Whole numbers that stand for classes have nothing
+/// between them.
+fn divide(mesh: &mut Mesh, looks: &Looks<'_>) -> Option<String> {
+    if matches!(looks.by.colors, PointColors::Classes | PointColors::Distinct) {
+        return None;
+    }
+    let before = mesh.triangles.len();
+    let mut is_new = vec![true; before];
+    let is_cut_short = loop {
+        let edges = wanted(mesh, looks, &is_new);
+        if edges.is_empty() {
+            break false;
+        }
+        let more: usize = mesh.triangles.iter().map(|t| halves(t, &edges)).sum();
+        if mesh.triangles.len() + more > MOST {
+            break true;
+        }
+        let parents = halve_edges(mesh, &edges);
+        let mut parts = vec![0u32; is_new.len()];
+        parents.iter().for_each(|parent| parts[*parent as usize] += 1);
+        is_new = parents.iter().map(|parent| parts[*parent as usize] > 1).collect();
+    };
+    let after = mesh.triangles.len();
+    let cut_short = if is_cut_short { ", and no further: colours between vertices lose detail" } else { "" };
+    (after > before || is_cut_short)
+        .then(|| format!("{before} faces were divided into {after} for the colours between their vertices{cut_short}"))
+}
+
+/// How many of its edges are halved of a triangle.
+fn halves(t: &[u32; 3], edges: &[[u32; 2]]) -> usize {
+    (0..3).filter(|k| edges.binary_search(&edge(t, *k)).is_ok()).count()
+}
+
+/// Edge `k` of a triangle, from its corner `k` to the next.
+fn edge(t: &[u32; 3], k: usize) -> [u32; 2] {
+    let a = t[k];
+    let b = t[(k + 1) % 3];
+    [a.min(b), a.max(b)]
+}
+
+/// The edges of new triangles that are to be halved, in order, each once.
+fn wanted(mesh: &Mesh, looks: &Looks<'_>, is_new: &[bool]) -> Vec<[u32; 2]> {
+    let values = &mesh.columns[0].values;
+    let new = mesh.triangles.iter().zip(is_new).filter(|(_, is_new)| **is_new);
+    let mut edges: Vec<[u32; 2]> = new.flat_map(|(t, _)| [0, 1, 2].map(|k| edge(t, k))).collect();
+    edges.par_sort_unstable();
+    edges.dedup();
+    let deviates = |edge: &[u32; 2]| {
+        let [a, b] = edge.map(|v| values[v as usize]);
+        let is_short = mesh.position[edge[0] as usize] == mesh.position[edge[1] as usize];
+        a.is_finite() && b.is_finite() && !is_short && looks.deviates([a, b])
+    };
+    edges.into_par_iter().with_min_len(CHUNK).filter(deviates).collect()
+}
+
+/// Gives each triangle vertices of its own.
+fn part(mesh: &mut Mesh) {
+    smooth(mesh);
+    let corners: Vec<usize> = mesh.triangles.iter().flatten().map(|v| *v as usize).collect();
+    mesh.position = corners.iter().map(|v| mesh.position[*v]).collect();
+    mesh.normal = corners.iter().map(|v| mesh.normal[*v]).collect();
+    if !mesh.opacity.is_empty() {
+        mesh.opacity = corners.iter().map(|v| mesh.opacity[*v]).collect();
+    }
+    mesh.color.clear();
+    mesh.triangles = (0..corners.len() as u32 / 3).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ColorMap;
+    use splat_core::TransferFunction;
+    use splat_core::TransferPoint;
+
+    fn square(association: Association, values: &[f64]) -> Arc<Mesh> {
+        let mut mesh = Mesh::rectangle(DVec3::ZERO, DVec3::X, DVec3::Y);
+        mesh.columns = vec![MeshColumn { name: "heat".into(), association, values: values.to_vec() }];
+        mesh.into()
+    }
+
+    fn of(mesh: Arc<Mesh>, colors: PointColors) -> ColoredMesh {
+        let by = ColorBy { column: "heat".into(), colors };
+        colored_mesh(mesh, &by, DVec3::Y, &SplatParams::default()).expect("a column that is there")
+    }
+
+    #[test]
+    fn a_map_is_followed_between_far_vertices_and_faces_have_one_colour() {
+        let map = ColorMap::VIRIDIS;
+        let colors = || PointColors::Map(map, Some([0.0, 1.0]));
+        let ramp = of(square(Association::Vertex, &[0.0, 1.0, 1.0, 0.0]), colors());
+        assert!(ramp.mesh.triangles.len() > 8 && ramp.mesh.columns.is_empty());
+        for (p, color) in ramp.mesh.position.iter().zip(&ramp.mesh.color) {
+            assert_eq!(*color, map.at(f64::from(0.5 * p.x + 0.5)));
+        }
+        assert!((ramp.mesh.area() - 4.0).abs() < 1e-9 && ramp.said.len() == 2, "{:?}", ramp.said);
+        let faces = of(square(Association::Triangle, &[0.0, 1.0]), colors());
+        assert_eq!(faces.mesh.color, [[map.at(0.0); 3], [map.at(1.0); 3]].concat());
+        assert_eq!(faces.said, ["faces have the colours of `heat` by the map viridis from 0 to 1"]);
+    }
+
+    #[test]
+    fn opacities_of_a_transfer_function_are_factors_and_gaps_stay() {
+        let point = |value, extinction| TransferPoint { value, color: [1.0; 3], extinction };
+        let transfer = TransferFunction::new(vec![point(0.0, 0.0), point(4.0, 1.0)]).expect("rising values");
+        let mut mesh = Mesh::clone(&square(Association::Vertex, &[0.0, 4.0, f64::NAN, 2.0]));
+        mesh.opacity = vec![1.0, 0.5, 0.5, 0.5];
+        let shown = of(mesh.into(), PointColors::Transfer(transfer, Classified::Opacity));
+        assert_eq!(shown.mesh.opacity, [0.0, 0.5, 0.5, 0.25]);
+        assert_eq!(shown.mesh.triangles.len(), 2);
+    }
+}
