@@ -1,7 +1,7 @@
 //! The command `organza`: arguments → library calls → text or JSON, with one exit code for each kind of error.
 //!
 //! ```text
-//! args ─► given (a scene, or one made of data files) ─► session (overrides, memory) ─► render convert extract explain accuracy orders ─► report ─► console
+//! args ─► given (a scene, or one made of data files) ─► session (overrides, memory) ─► render convert extract explain accuracy orders view ─► report ─► console
 //!         init info calibrate devices passport
 //! ```
 #![forbid(unsafe_code)]
@@ -27,6 +27,8 @@ mod render;
 mod report;
 mod session;
 mod signals;
+#[cfg(feature = "view")]
+mod view;
 
 use args::{Arguments, Command};
 use clap::Parser;
@@ -79,6 +81,8 @@ fn run(command: Command) -> Result<u8, Error> {
         Command::Calibrate(arguments) => calibrate::run(&arguments),
         Command::Devices(arguments) => devices::run(&arguments),
         Command::Passport(arguments) => return passport::run(&arguments),
+        #[cfg(feature = "view")]
+        Command::View(arguments) => view::run(&arguments),
         Command::Schema => console::out(&(organza::scene::schema() + "\n")),
     }
     .map(|()| 0)
