@@ -73,6 +73,8 @@ mod textured_lights;
 mod thick_media;
 mod triangles;
 mod truth;
+#[cfg(all(unix, feature = "view"))]
+mod view;
 mod whole_fields;
 
 /// What takes long and rarely fails where the others hold: `cargo xtask deep`.

@@ -55,7 +55,8 @@ fn rays_of_a_wide_lens_are_as_long_as_they_are() {
 /// A ball whose values fall off around its middle, classified, lit and shadowed.
 const BALL: &str = "[[light]]\nkind = 'directional'\ndirection = [-0.4, -1, -0.6]\nirradiance = [2, 1.9, 1.8]\n\
      [ambient]\ncolor = [0.1, 0.1, 0.12]\n\
-     [[object]]\nname = 'ball'\n\
+     [material.smoke]\nmedium = { extinction = 1.5, albedo = 0.8 }\n\
+     [[object]]\nname = 'ball'\nmaterial = 'smoke'\n\
      density = { expression = 'exp(-2*(x^2 + y^2 + z^2))', box = [[-1, -1, -1], [1, 1, 1]], spacing = 0.06, extinction = 2.5 }\n\
      [render]\ntechnique = 'sheets'\nlayers = ['effects', 'shadow']\n";
 

@@ -3,7 +3,11 @@
 mod parse;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
+#[cfg(feature = "view")]
+use parse::parse_address;
 use parse::{parse_budget, parse_bytes, parse_device, parse_error_limit, parse_finite, parse_frames, parse_size};
+#[cfg(feature = "view")]
+use std::net::SocketAddr;
 use std::path::PathBuf;
 
 /// Most threads that are worth a try.
@@ -73,6 +77,12 @@ pub(super) enum Command {
     /// Runs every GPU recording on every device and compares with the processor.
     #[command(after_help = "Examples:\n  organza passport\n  organza passport --device llvmpipe")]
     Passport(PassportArguments),
+    /// Shows a scene, or data files, on a page of the browser: to turn it, change it, and see what each effect is for.
+    #[cfg(feature = "view")]
+    #[command(
+        after_help = "Examples:\n  organza view bunny.ply\n  organza view scene.toml --size 640x360\n  organza view scene.toml --no-open --listen 127.0.0.1:8000"
+    )]
+    View(ViewArguments),
     /// Prints the JSON Schema of scene files.
     #[command(after_help = "Examples:\n  organza schema > scene.schema.json")]
     Schema,
@@ -93,6 +103,8 @@ impl Command {
             Self::Calibrate(a) => a.json,
             Self::Devices(a) => a.json,
             Self::Passport(a) => a.json,
+            #[cfg(feature = "view")]
+            Self::View(a) => a.scene.common.json,
             Self::Schema => false,
         }
     }
@@ -429,6 +441,28 @@ pub(super) struct PassportArguments {
     /// Print one JSON document on stdout
     #[arg(long)]
     pub(super) json: bool,
+}
+
+#[cfg(feature = "view")]
+#[derive(Debug, Args)]
+pub(super) struct ViewArguments {
+    #[command(flatten)]
+    pub(super) scene: SceneArguments,
+    /// Address at which the page is served, with or without a port [default: 127.0.0.1, a free port]
+    #[arg(long, value_name = "ADDRESS", value_parser = parse_address)]
+    pub(super) listen: Option<SocketAddr>,
+    /// Print the address of the page and do not open it in the browser
+    #[arg(long)]
+    pub(super) no_open: bool,
+    /// Begin with the events of a file, as --record writes it
+    #[arg(long, value_name = "EVENTS.json")]
+    pub(super) play: Option<PathBuf>,
+    /// Write what is done on the page to a file when the view ends
+    #[arg(long, value_name = "EVENTS.json")]
+    pub(super) record: Option<PathBuf>,
+    /// Replace a recording that exists
+    #[arg(long, requires = "record")]
+    pub(super) force: bool,
 }
 
 /// What computes.

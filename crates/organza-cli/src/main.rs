@@ -1,7 +1,7 @@
 //! The command `organza`: arguments → library calls → text or JSON, with one exit code for each kind of error.
 //!
 //! ```text
-//! args ─► given (a scene, or one made of data files) ─► session (overrides, memory) ─► render convert extract explain accuracy orders ─► report ─► console
+//! args ─► given (a scene, or one made of data files) ─► session (overrides, memory) ─► render convert extract explain accuracy orders view ─► report ─► console
 //!         init info calibrate devices passport
 //! ```
 #![forbid(unsafe_code)]
@@ -25,6 +25,8 @@ mod passport;
 mod render;
 mod report;
 mod session;
+#[cfg(feature = "view")]
+mod view;
 
 use args::{Arguments, Command};
 use clap::Parser;
@@ -77,6 +79,8 @@ fn run(command: Command) -> Result<u8, Error> {
         Command::Calibrate(arguments) => calibrate::run(&arguments),
         Command::Devices(arguments) => devices::run(&arguments),
         Command::Passport(arguments) => return passport::run(&arguments),
+        #[cfg(feature = "view")]
+        Command::View(arguments) => view::run(&arguments),
         Command::Schema => console::out(&(organza::scene::schema() + "\n")),
     }
     .map(|()| 0)

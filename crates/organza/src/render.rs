@@ -192,7 +192,17 @@ pub(crate) fn render_keeping(
         predicted: Prediction::default(),
         announces: true,
     };
-    let layers = draw(&frame, &mut session, &mut cost)?;
+    // What was taken out of a scene may be in the next.
+    let is_whole = planned.plan.left_out.is_empty();
+    let layers = match draw(&frame, &mut session, &mut cost) {
+        Ok(layers) => layers,
+        Err(error) => {
+            // What was made before a stop serves the next frame, which begins with it.
+            let leaves = frame.leaves();
+            left.made = (!left.is_still && is_whole).then(|| Made { scene: stated.clone(), loaded, planned, leaves });
+            return Err(error);
+        }
+    };
     let Session { sets, predicted, .. } = session;
     left.groups = frame.groups.take();
     let is_judged = !doubtful && scene.frames.is_none();
@@ -209,8 +219,6 @@ pub(crate) fn render_keeping(
     warnings.extend(helper.as_ref().and_then(|_| left_to_processor(plan)));
     warnings.extend(helper.map(|helper| helper.said()).unwrap_or_default());
     let scales = loaded.scales.clone();
-    // What was taken out of a scene may be in the next.
-    let is_whole = planned.plan.left_out.is_empty();
     left.made = (!left.is_still && is_whole).then(|| Made { scene: stated.clone(), loaded, planned, leaves });
     Ok(Render { layers, cost, plan: shown, predicted, sets, warnings, notes, scales, found, backend })
 }

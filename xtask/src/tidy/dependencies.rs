@@ -4,7 +4,7 @@ use crate::repo::Repo;
 use crate::toml_lines::{lines, string};
 
 /// For each crate of the workspace, the crates of the workspace that it may depend on, tests and benches included.
-const MAY_KNOW: [(&str, &[&str]); 26] = [
+const MAY_KNOW: [(&str, &[&str]); 27] = [
     ("splat-core", &["splat-shaders"]),
     ("read", &["splat-core"]),
     ("field", &["splat-core"]),
@@ -44,7 +44,8 @@ const MAY_KNOW: [(&str, &[&str]); 26] = [
         &["splat-core", "read", "field", "convert", "tsm", "hbsort", "deferred-blend", "reference", "organza"],
     ),
     ("organza-survey", &["splat-core", "read", "convert", "organza"]),
-    ("organza-cli", &["splat-core", "read", "convert", "organza", "organza-judge", "organza-survey"]),
+    ("organza-view", &["splat-core", "organza"]),
+    ("organza-cli", &["splat-core", "read", "convert", "organza", "organza-judge", "organza-survey", "organza-view"]),
     ("organza-python", &["splat-core", "convert", "organza", "organza-judge", "organza-survey"]),
     (
         "organza-tests",
@@ -60,6 +61,7 @@ const MAY_KNOW: [(&str, &[&str]); 26] = [
             "organza",
             "organza-judge",
             "organza-survey",
+            "organza-view",
         ],
     ),
     (

@@ -2,6 +2,8 @@
 
 use super::Frames;
 use organza::scene::Goal;
+#[cfg(feature = "view")]
+use std::net::{IpAddr, SocketAddr};
 
 pub(super) fn parse_frames(text: &str) -> Result<Frames, String> {
     if text == "all" {
@@ -54,9 +56,26 @@ pub(super) fn parse_bytes(text: &str) -> Result<u64, String> {
     bytes.ok_or_else(|| "expected a number of bytes above 0, such as 500M or 8G".into())
 }
 
+/// A numeric address, with or without a port: port 0 is any that is free.
+#[cfg(feature = "view")]
+pub(super) fn parse_address(text: &str) -> Result<SocketAddr, String> {
+    let with_port = text.parse::<SocketAddr>().ok();
+    let alone = || text.parse::<IpAddr>().ok().map(|ip| SocketAddr::new(ip, 0));
+    with_port.or_else(alone).ok_or_else(|| "expected a numeric address, such as 127.0.0.1:8000 or ::1".into())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[cfg(feature = "view")]
+    #[test]
+    fn addresses_are_numbers() {
+        let read = |text| parse_address(text).ok().map(|address| address.to_string());
+        assert_eq!(read("127.0.0.1:8000").as_deref(), Some("127.0.0.1:8000"));
+        assert_eq!([read("0.0.0.0"), read("::1")].map(Option::unwrap), ["0.0.0.0:0", "[::1]:0"]);
+        assert!(["", "localhost", "a.example:80", "127.0.0.1:99999", ":80"].iter().all(|t| read(t).is_none()));
+    }
 
     #[test]
     fn sizes_and_bytes_are_read() {

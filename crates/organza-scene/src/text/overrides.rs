@@ -73,6 +73,56 @@ impl Override {
     pub fn flag(&self) -> &str {
         &self.flag
     }
+
+    /// The keys that lead to the value; in a list an index, or an entry's `name`.
+    pub fn path(&self) -> &[String] {
+        &self.path
+    }
+
+    /// The value as TOML on one line.
+    ///
+    /// ```
+    /// use organza_scene::Override;
+    /// let change = Override::parse("camera={ size = [64, 48], fov_y = 35.5 }").unwrap();
+    /// assert_eq!((change.path().join("."), change.toml()), ("camera".into(), "{ size = [64, 48], fov_y = 35.5 }".into()));
+    /// ```
+    pub fn toml(&self) -> String {
+        toml_of(&self.value)
+    }
+}
+
+/// A value as TOML on one line, whose numbers are read as the same ones.
+fn toml_of(value: &Value) -> String {
+    match value {
+        // TOML has none, and none comes from it.
+        Value::Null => "\"\"".to_owned(),
+        Value::Bool(is_so) => is_so.to_string(),
+        Value::Int(number) => number.to_string(),
+        Value::Float(number) => format!("{number:?}"),
+        Value::Text(text) => quoted(text),
+        Value::List(items) => {
+            let items: Vec<String> = items.iter().map(|item| toml_of(&item.value)).collect();
+            format!("[{}]", items.join(", "))
+        }
+        Value::Table(entries) if entries.is_empty() => "{}".to_owned(),
+        Value::Table(entries) => {
+            let entry = |entry: &Entry| format!("{} = {}", key_of(&entry.key), toml_of(&entry.node.value));
+            let entries: Vec<String> = entries.iter().map(entry).collect();
+            format!("{{ {} }}", entries.join(", "))
+        }
+    }
+}
+
+/// A key as TOML has it: in quotes unless it is a plain word.
+fn key_of(key: &str) -> String {
+    let is_bare = !key.is_empty() && key.chars().all(|c| c.is_ascii_alphanumeric() || "_-".contains(c));
+    if is_bare { key.to_owned() } else { quoted(key) }
+}
+
+/// A text in the quotes and escapes that TOML shares with JSON.
+fn quoted(text: &str) -> String {
+    // JSON leaves DEL as it is, which TOML forbids.
+    serde_json::Value::from(text).to_string().replace('\u{7f}', "\\u007f")
 }
 
 /// Keys with dots between them; the error is a message alone.

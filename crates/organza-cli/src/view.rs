@@ -1,0 +1,113 @@
+//! `organza view`.
+
+use super::args::ViewArguments;
+use super::console::bar::with_bar;
+use super::console::{self, signals};
+use super::given::given;
+use super::session::{overrides, parse_scene, processor_only, render_options, unused_goal, without_effect};
+use organza::output::{Target, Targets};
+use organza::scene::LoadOptions;
+use organza::{Error, InMemory, Progress, printable};
+use organza_view::{Ended, MOST_EVENTS, Opening, Server, Session, read_events, write_events};
+use serde_json::json;
+use splat_core::MemoryAccount;
+use std::net::{Ipv4Addr, SocketAddr};
+use std::process::{Command, Stdio};
+use std::sync::Arc;
+
+/// Serves a page of the scene until it is closed or the command is interrupted. Whatever can be refused is refused before any work.
+pub(super) fn run(arguments: &ViewArguments) -> Result<(), Error> {
+    processor_only(&arguments.scene)?;
+    let record = arguments.record.as_ref().map(|path| Target::new(path, arguments.force)).transpose()?;
+    let played = arguments.play.as_ref().map(|path| read_events(path)).transpose()?.unwrap_or_default();
+    let address = arguments.listen.unwrap_or(SocketAddr::from((Ipv4Addr::LOCALHOST, 0)));
+    let server = Server::bind(address)?;
+    let session = with_bar(|progress| open(arguments, progress))?;
+    // Whoever reads the address may interrupt at once.
+    let ending = Arc::new(Progress::new());
+    signals::stops(&ending);
+    if let Some(path) = &arguments.play {
+        session.apply(&played).map_err(|e| Error::input(printable(path), e.to_string(), e.hint()))?;
+    }
+    if !address.ip().is_loopback() {
+        console::warn(&format!(
+            "--listen {}: whoever can read along on the way to this machine sees the page and its address, as nothing is encrypted; a tunnel of ssh \
+             to 127.0.0.1 is",
+            address.ip()
+        ));
+    }
+    tell(&server.url(), arguments)?;
+    let session = Arc::new(session);
+    let ended = server.run(&session, &ending);
+    session.close();
+    if let Some(target) = &record {
+        let events = session.recorded();
+        if events.len() == MOST_EVENTS {
+            console::warn(&format!("--record: the recording ends at {MOST_EVENTS} events"));
+        }
+        write_events(target, &events)?;
+    }
+    if ended? == Ended::PagesClosed {
+        console::remark("the page is closed, and the view with it");
+    }
+    Ok(())
+}
+
+/// Reads the scene, or makes one of data files, and begins to draw it.
+fn open(arguments: &ViewArguments, progress: &Progress) -> Result<Session, Error> {
+    let scene_arguments = &arguments.scene;
+    let (given, files) = given(scene_arguments, None)?;
+    let scene = parse_scene(scene_arguments, &given, None, None)?;
+    unused_goal(&scene.render.goal, "`organza view`").iter().for_each(|sentence| console::warn(sentence));
+    without_effect(scene_arguments, &scene).iter().for_each(|sentence| console::warn(sentence));
+    for path in arguments.record.iter() {
+        let mut targets = Targets::default();
+        targets.add_inputs(&scene.files());
+        targets.add(path, arguments.force)?;
+    }
+    let options = render_options(scene_arguments);
+    let load = LoadOptions {
+        allow_path: scene_arguments.allow_path,
+        sandbox: scene_arguments.sandbox,
+        memory: MemoryAccount::new(options.max_memory),
+        overrides: overrides(scene_arguments, given.is_made)?,
+        frame: None,
+        turntable: None,
+        in_memory: InMemory::default(),
+    };
+    let names =
+        scene_arguments.inputs.iter().map(|path| printable(path.file_name().unwrap_or(path.as_os_str()).as_ref()));
+    let title = names.collect::<Vec<_>>().join(", ");
+    Session::open(Opening { title, file: given.file, text: given.bytes, load, options, files }, progress)
+}
+
+/// Prints where the page is, and opens it.
+fn tell(url: &str, arguments: &ViewArguments) -> Result<(), Error> {
+    if arguments.scene.common.json {
+        console::out(&format!("{}\n", json!({ "url": url })))?;
+    } else {
+        console::out(&format!("{url}\n"))?;
+    }
+    if !arguments.no_open && !opened(url) {
+        console::remark("no browser could be opened: open the address above in one; Ctrl-C ends the view");
+    }
+    Ok(())
+}
+
+/// Hands an address to the browser of the desktop; false where there is none.
+fn opened(url: &str) -> bool {
+    let (program, before): (&str, &[&str]) = if cfg!(target_os = "macos") {
+        ("open", &[])
+    } else if cfg!(windows) {
+        ("rundll32", &["url.dll,FileProtocolHandler"])
+    } else {
+        // Without a desktop a browser of the terminal would take its place.
+        if std::env::var_os("DISPLAY").is_none() && std::env::var_os("WAYLAND_DISPLAY").is_none() {
+            return false;
+        }
+        ("xdg-open", &[])
+    };
+    let mut command = Command::new(program);
+    command.args(before).arg(url).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
+    command.spawn().is_ok()
+}

@@ -1,0 +1,214 @@
+//! What a person does to a view, as data: the page sends it, files record it, tests play it.
+
+use organza::Error;
+use organza::scene::short;
+use serde::{Deserialize, Serialize};
+
+/// Largest number of a drag, in heights of the picture, and of steps of a wheel: more is no hand's.
+const MOST: f64 = 1000.0;
+
+/// One thing that a person does. In JSON an object whose key `do` names it, such as `{"do": "orbit", "right": 0.1, "up": 0}`.
+///
+/// ```
+/// use organza_view::Event;
+/// let event: Event = serde_json::from_str(r#"{"do": "zoom", "steps": 2}"#).unwrap();
+/// assert_eq!(event, Event::Zoom { steps: 2.0 });
+/// assert!(serde_json::from_str::<Event>(r#"{"do": "zoom", "steps": 2, "more": 1}"#).is_err());
+/// ```
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "do", rename_all = "snake_case", deny_unknown_fields)]
+pub enum Event {
+    /// Turns the scene under the pointer: a drag, in heights of the picture. One height is half a turn.
+    Orbit {
+        /// To the right.
+        right: f64,
+        /// Upwards.
+        up: f64,
+    },
+    /// Moves the scene with the pointer: a drag, in heights of the picture.
+    Pan {
+        /// To the right.
+        right: f64,
+        /// Upwards.
+        up: f64,
+    },
+    /// Comes nearer by steps of a wheel, or goes away where they are negative.
+    Zoom {
+        /// Ten steps are about a factor of 3.
+        steps: f64,
+    },
+    /// Looks from a place that is named.
+    LookFrom {
+        /// Degrees about the pole of the view, from +Z towards +X where the pole is +Y.
+        azimuth: f64,
+        /// Degrees above the horizon, −90 to 90.
+        elevation: f64,
+        /// World units between the eye and the centre; `None` keeps it.
+        #[serde(default)]
+        distance: Option<f64>,
+        /// World position in the middle of the picture; `None` keeps it.
+        #[serde(default)]
+        centre: Option<[f64; 3]>,
+    },
+    /// Goes back to the scene's own camera.
+    Reset {},
+    /// Shows or hides an object.
+    Show {
+        /// Name of the object.
+        object: String,
+        /// Whether it is drawn.
+        visible: bool,
+    },
+    /// Sets the opacity of a surface.
+    Opacity {
+        /// Name of the object.
+        object: String,
+        /// Opacity of one crossing, 0 to 1; `None` for what the scene says.
+        opacity: Option<f64>,
+    },
+    /// Switches an effect of the plan.
+    Effect {
+        /// As `organza explain` lists it, such as `shadow.sun`.
+        name: String,
+        /// Whether it is simulated.
+        switch: Switch,
+    },
+    /// Sets the exposure of the displayed picture.
+    Exposure {
+        /// Stops.
+        stops: f64,
+    },
+    /// Sets the size of the picture.
+    Size {
+        /// Pixels.
+        width: u32,
+        /// Pixels.
+        height: u32,
+    },
+}
+
+/// Whether an effect is simulated.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Switch {
+    /// The plan decides, by its bound.
+    Auto,
+    /// It is simulated.
+    On,
+    /// It is left out.
+    Off,
+}
+
+impl Switch {
+    /// As scenes write it.
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::Auto => "auto",
+            Self::On => "on",
+            Self::Off => "off",
+        }
+    }
+}
+
+impl Event {
+    /// Refuses numbers that no hand makes. What scenes say of a number is for the scene to refuse.
+    ///
+    /// # Errors
+    /// [`Error::Input`] that names the event and its key.
+    pub fn check(&self) -> Result<(), Error> {
+        match self {
+            Self::Orbit { right, up } => within("orbit", "right", *right, MOST).and(within("orbit", "up", *up, MOST)),
+            Self::Pan { right, up } => within("pan", "right", *right, MOST).and(within("pan", "up", *up, MOST)),
+            Self::Zoom { steps } => within("zoom", "steps", *steps, MOST),
+            Self::LookFrom { azimuth, elevation, distance, centre } => {
+                within("look_from", "azimuth", *azimuth, 360.0)?;
+                within("look_from", "elevation", *elevation, 90.0)?;
+                if let Some(distance) = distance.filter(|distance| !(1e-18..=1e18).contains(distance)) {
+                    return Err(bad("look_from", "distance", "a length between 1e-18 and 1e18", distance));
+                }
+                for number in centre.iter().flatten() {
+                    within("look_from", "centre", *number, 1e18)?;
+                }
+                Ok(())
+            }
+            Self::Exposure { stops } if !stops.is_finite() => Err(bad("exposure", "stops", "a finite number", *stops)),
+            Self::Opacity { opacity: Some(opacity), .. } if !(0.0..=1.0).contains(opacity) => {
+                Err(bad("opacity", "opacity", "0 to 1", *opacity))
+            }
+            Self::Reset {} | Self::Show { .. } | Self::Opacity { .. } | Self::Effect { .. } => Ok(()),
+            Self::Exposure { .. } | Self::Size { .. } => Ok(()),
+        }
+    }
+
+    /// Whether it changes where the eye is, and nothing else.
+    pub const fn is_of_viewpoint(&self) -> bool {
+        matches!(
+            self,
+            Self::Orbit { .. } | Self::Pan { .. } | Self::Zoom { .. } | Self::LookFrom { .. } | Self::Reset {}
+        )
+    }
+}
+
+fn within(event: &str, key: &str, number: f64, most: f64) -> Result<(), Error> {
+    let is_within = number.abs() <= most;
+    is_within.then_some(()).ok_or_else(|| bad(event, key, &format!("-{most} to {most}"), number))
+}
+
+fn bad(event: &str, key: &str, expected: &str, found: f64) -> Error {
+    Error::input(format!("event `{event}`"), format!("`{key}`: expected {expected}, found {}", short(found)), "")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_event_is_read_as_it_is_written() {
+        let events = [
+            Event::Orbit { right: 0.1, up: -0.25 },
+            Event::Pan { right: -1e-3, up: 2.0 },
+            Event::Zoom { steps: -1.5 },
+            Event::LookFrom { azimuth: 30.0, elevation: -90.0, distance: None, centre: Some([1.0, 2.0, 3.0]) },
+            Event::Reset {},
+            Event::Show { object: "a \"b\"".into(), visible: false },
+            Event::Opacity { object: "c".into(), opacity: None },
+            Event::Effect { name: "shadow.sun".into(), switch: Switch::Off },
+            Event::Exposure { stops: -2.0 },
+            Event::Size { width: 640, height: 360 },
+        ];
+        for event in events {
+            event.check().unwrap();
+            let text = serde_json::to_string(&event).unwrap();
+            assert_eq!(serde_json::from_str::<Event>(&text).unwrap(), event, "{text}");
+        }
+    }
+
+    #[test]
+    fn events_that_no_page_sends_are_refused() {
+        for text in [
+            r#"{"do": "fly"}"#,
+            r#"{"do": "reset", "more": 1}"#,
+            r#"{"do": "orbit", "right": 1}"#,
+            r#"{"do": "orbit", "right": "1", "up": 0}"#,
+            r#"{"do": "effect", "name": "shadow.a", "switch": "maybe"}"#,
+            r#"{"do": "size", "width": -1, "height": 2}"#,
+            r#"{"right": 1, "up": 0}"#,
+            "[]",
+        ] {
+            assert!(serde_json::from_str::<Event>(text).is_err(), "{text}");
+        }
+        for event in [
+            Event::Orbit { right: f64::NAN, up: 0.0 },
+            Event::Pan { right: 0.0, up: 1e9 },
+            Event::Zoom { steps: f64::INFINITY },
+            Event::LookFrom { azimuth: 0.0, elevation: 91.0, distance: None, centre: None },
+            Event::LookFrom { azimuth: 0.0, elevation: 0.0, distance: Some(0.0), centre: None },
+            Event::LookFrom { azimuth: 0.0, elevation: 0.0, distance: None, centre: Some([f64::NAN, 0.0, 0.0]) },
+            Event::Exposure { stops: f64::NAN },
+            Event::Opacity { object: "a".into(), opacity: Some(1.5) },
+        ] {
+            let error = event.check().unwrap_err();
+            assert!(error.to_string().contains("expected"), "{event:?}: {error}");
+        }
+    }
+}

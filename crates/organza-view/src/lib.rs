@@ -1,0 +1,58 @@
+//! A scene on a page of the browser: it is turned, its objects and effects are changed, and every change is drawn again.
+//!
+//! ```text
+//! page ─ events ─► session ─► state ─► scene ─► artist ─► picture, coarse, then whole ─► page
+//! (src/page)       (session)  (state)            (artist)  (picture)
+//!        └─ server, serving: HTTP on the loopback, one token, two clients ─┘
+//! ```
+//! All but `server` and `serving` knows neither a window nor a network: a [`Session`] takes [`Event`]s and hands out pictures. The last picture of
+//! each state has the bits of [`organza::render`] of the same scene.
+//!
+//! ```
+//! use organza::RenderOptions;
+//! use organza_view::{Event, Opening, Session};
+//! let text = br#"
+//!     version = 1
+//!     [camera]
+//!     position = [0, 0, 4]
+//!     target = [0, 0, 0]
+//!     size = [32, 32]
+//!     [[object]]
+//!     name = "fog"
+//!     medium_box = { min = [-1, -1, -1], max = [1, 1, 1], extinction = 0.5, spacing = 0.1 }
+//! "#;
+//! let opening = Opening::of_text("fog.toml", text, RenderOptions::default());
+//! let session = Session::open(opening, &organza::Progress::new()).unwrap();
+//! session.apply(&[Event::Orbit { right: 0.25, up: 0.0 }]).unwrap();
+//! let picture = session.whole_picture().unwrap();
+//! assert_eq!(picture.facts.size.width, 32);
+//! assert!(picture.png.starts_with(b"\x89PNG"));
+//! ```
+#![forbid(unsafe_code)]
+
+mod artist;
+mod clients;
+mod desk;
+mod event;
+mod picture;
+mod recording;
+mod scene_text;
+mod server;
+mod serving;
+mod session;
+mod state;
+mod token;
+mod viewpoint;
+
+pub use event::{Event, Switch};
+pub use picture::{EffectRow, Facts, Level, Picture, Size};
+pub use recording::{MOST_EVENTS, read_events, write_events};
+pub use server::{Ended, Server};
+pub use session::{Failure, ObjectRow, Session, Shown};
+pub use state::Opening;
+pub use viewpoint::Viewpoint;
+
+/// The page's example compiles and holds.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Page;

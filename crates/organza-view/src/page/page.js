@@ -1,0 +1,422 @@
+"use strict";
+// Everything comes from this server: the state and the pictures by two requests that wait for news, and events go back one after the other.
+
+const client = Array.from(crypto.getRandomValues(new Uint8Array(16)), (byte) => byte.toString(16).padStart(2, "0")).join("");
+const at = (id) => document.getElementById(id);
+const stage = at("stage");
+const canvas = at("picture");
+const pen = canvas.getContext("2d");
+
+let shown = null;
+let isOpen = true;
+
+// ---- events to the server: those of a drag are added up while the one before is on its way ----
+
+let waiting = [];
+let isSending = false;
+
+function add(event) {
+  const last = waiting[waiting.length - 1];
+  const adds = { orbit: ["right", "up"], pan: ["right", "up"], zoom: ["steps"] }[event.do];
+  const replaces = { exposure: [], size: [], opacity: ["object"] }[event.do];
+  if (last && adds && last.do === event.do) {
+    for (const key of adds) last[key] += event[key];
+  } else if (last && replaces && last.do === event.do && replaces.every((key) => last[key] === event[key])) {
+    waiting[waiting.length - 1] = event;
+  } else {
+    waiting.push(event);
+  }
+  send();
+}
+
+async function send() {
+  if (isSending || waiting.length === 0) return;
+  isSending = true;
+  const events = waiting;
+  waiting = [];
+  try {
+    const answer = await fetch(`events?client=${client}`, {
+      method: "POST", headers: { "content-type": "application/json" }, body: JSON.stringify(events),
+    });
+    const found = await answer.json();
+    if (answer.ok) {
+      trouble("");
+      show(found);
+    } else {
+      trouble(sentence(found));
+      if (shown) show(shown, true);
+    }
+  } catch {
+    lost();
+  }
+  isSending = false;
+  send();
+}
+
+// ---- news from the server ----
+
+function pause(ms) {
+  return new Promise((resolve) => setTimeout(resolve, ms));
+}
+
+async function follow(path, after, take) {
+  let failures = 0;
+  while (isOpen) {
+    try {
+      const answer = await fetch(`${path}?client=${client}&after=${after()}`);
+      if (answer.status === 409 || answer.status === 403) {
+        trouble(sentence(await answer.json()));
+        isOpen = false;
+        return;
+      }
+      if (answer.ok) await take(answer);
+      failures = 0;
+    } catch {
+      failures += 1;
+      if (failures > 2) {
+        lost();
+        return;
+      }
+      await pause(300 * failures);
+    }
+  }
+}
+
+function lost() {
+  if (!isOpen) return;
+  isOpen = false;
+  trouble("The view has ended. Start `organza view` again and open its new address.");
+  for (const control of document.querySelectorAll("#panels input, #panels button")) control.disabled = true;
+}
+
+function sentence(error) {
+  return error.hint ? `${error.message}. ${error.hint}` : error.message;
+}
+
+let problem = "";
+function trouble(text) {
+  problem = text;
+  at("trouble").textContent = text;
+  at("trouble").hidden = text === "";
+}
+
+// The picture that is on the page: the state may know of a newer one already.
+let number = 0;
+let generation = 0;
+async function takePicture(answer) {
+  if (answer.status !== 200) return;
+  number = Number(answer.headers.get("organza-number"));
+  generation = Number(answer.headers.get("organza-generation"));
+  const image = await createImageBitmap(await answer.blob());
+  canvas.width = image.width;
+  canvas.height = image.height;
+  pen.drawImage(image, 0, 0);
+  image.close();
+  at("waiting").hidden = true;
+  if (shown) showMark(shown);
+}
+
+/// Says of a picture that is not the whole one of the present state what it is.
+function showMark(found) {
+  const isCoarse = canvas.width < found.size.width || canvas.height < found.size.height;
+  at("coarse").hidden = number === 0 || (!isCoarse && generation === found.generation);
+  at("coarse").textContent = isCoarse ? "coarse" : "before the last change";
+}
+
+// ---- what the page shows ----
+
+function show(found, isAgain = false) {
+  if (shown && found.version < shown.version && !isAgain) return;
+  shown = found;
+  document.title = `${found.title} · Organza`;
+  at("title").textContent = found.title;
+  at("title").title = found.title;
+  showStatus(found);
+  showObjects(found.objects);
+  showEffects(found.picture ? found.picture.effects : []);
+  if (document.activeElement !== at("exposure")) at("exposure").value = found.exposure;
+  at("exposure-value").textContent = `${found.exposure > 0 ? "+" : ""}${found.exposure} EV`;
+  for (const side of ["width", "height"]) {
+    if (document.activeElement !== at(side)) at(side).value = found.size[side];
+  }
+  stage.style.setProperty("--aspect", `${found.size.width} / ${found.size.height}`);
+  for (const id of ["save-png", "save-exr"]) at(id).disabled = !found.is_whole;
+}
+
+function showStatus(found) {
+  const picture = found.picture;
+  const drawing = found.drawing;
+  const words = [];
+  if (picture) {
+    const ms = picture.ms < 10 ? picture.ms.toFixed(1) : Math.round(picture.ms);
+    words.push(picture.level === "whole" ? "whole" : `coarse, ${picture.size.width} × ${picture.size.height} pixels`, `${ms} ms`);
+    if (picture.level === "whole") words.push(`${picture.size.width} × ${picture.size.height}`);
+    words.push(picture.technique);
+    if (picture.sets) words.push(`${picture.sets} sets`);
+  }
+  if (drawing) words.push(drawing.stage ? `drawing: ${drawing.stage}` : "drawing");
+  at("facts").textContent = words.join(" · ");
+  at("facts").title = words.join(" · ");
+  at("share").hidden = !drawing;
+  at("share").value = drawing ? drawing.share : 0;
+  showMark(found);
+  if (!picture) at("waiting").textContent = drawing && drawing.stage ? `Drawing: ${drawing.stage}` : "Reading the scene";
+  const eye = found.viewpoint;
+  at("where").textContent = `azimuth ${eye.azimuth.toFixed(0)}°, elevation ${eye.elevation.toFixed(0)}°`;
+  canvas.setAttribute("aria-label", `${found.title} from azimuth ${eye.azimuth.toFixed(0)}, elevation ${eye.elevation.toFixed(0)} degrees`);
+  if (found.failure) {
+    trouble(sentence(found.failure));
+    if (!picture) at("waiting").textContent = "";
+  }
+  showWarnings(picture && picture.level === "whole" ? picture.warnings : null);
+}
+
+let warned = null;
+function showWarnings(warnings) {
+  // A coarse picture has warnings of its own size: those of the last whole one stay.
+  if (!warnings || JSON.stringify(warnings) === warned) return;
+  warned = JSON.stringify(warnings);
+  const box = at("warnings");
+  box.hidden = warnings.length === 0;
+  box.querySelector("summary").textContent =
+    warnings.length === 1 ? `Warning: ${warnings[0]}` : `${warnings.length} warnings: ${warnings[0] || ""}`;
+  box.querySelector("ul").replaceChildren(...warnings.map((warning) => element("li", { textContent: warning })));
+}
+
+function element(name, values = {}, children = []) {
+  const made = document.createElement(name);
+  for (const [key, value] of Object.entries(values)) {
+    if (key.includes("-") || key === "role") made.setAttribute(key, value);
+    else made[key] = value;
+  }
+  made.append(...children);
+  return made;
+}
+
+/// Rows are made once for each name, and filled anew: what has the focus keeps it.
+const rows = { objects: new Map(), effects: new Map() };
+function rowsOf(list, items, make, fill) {
+  const known = rows[list];
+  const names = items.map((item) => item.name);
+  if (names.join("\n") !== [...known.keys()].join("\n")) {
+    known.clear();
+    for (const item of items) known.set(item.name, make(item));
+    at(list).replaceChildren(...[...known.values()].map((row) => row.item));
+  }
+  for (const item of items) fill(known.get(item.name), item);
+}
+
+function showObjects(objects) {
+  rowsOf("objects", objects, makeObject, (row, object) => {
+    row.visible.checked = object.visible;
+    if (row.opacity) {
+      if (document.activeElement !== row.opacity || !isSending) row.opacity.value = object.opacity;
+      row.value.textContent = object.opacity.toFixed(2);
+      row.opacity.disabled = !object.visible;
+    }
+  });
+}
+
+let rank = 0;
+function makeObject(object) {
+  const id = `object-${(rank += 1)}`;
+  const visible = element("input", { type: "checkbox", id });
+  visible.addEventListener("change", () => add({ do: "show", object: object.name, visible: visible.checked }));
+  const children = [
+    visible,
+    element("label", { className: "name", htmlFor: id, textContent: object.name }),
+    element("span", { className: "kind", textContent: object.kind === object.name ? "" : object.kind }),
+  ];
+  const row = { visible };
+  if (object.opacity !== null) {
+    row.opacity = element("input", { type: "range", min: 0, max: 1, step: 0.01, "aria-label": `Opacity of ${object.name}` });
+    row.value = element("output");
+    row.opacity.addEventListener("input", () => {
+      row.value.textContent = Number(row.opacity.value).toFixed(2);
+      add({ do: "opacity", object: object.name, opacity: Number(row.opacity.value) });
+    });
+    children.push(element("span", { className: "opacity" }, [element("span", { textContent: "Opacity" }), row.opacity, row.value]));
+  }
+  row.item = element("li", { className: "object" }, children);
+  return row;
+}
+
+/// What can be switched comes first; objects have their own panel.
+function order(effect) {
+  return effect.fixed ? 2 : effect.name.startsWith("object.") ? 1 : 0;
+}
+
+function showEffects(unordered) {
+  const effects = [...unordered].sort((a, b) => order(a) - order(b));
+  rowsOf("effects", effects, makeEffect, (row, effect) => {
+    row.item.classList.toggle("left-out", !effect.called_for);
+    row.bound.textContent = boundText(effect.bound);
+    row.why.textContent = effect.reason;
+    const isDrawn = effect.called_for && !effect.lacking;
+    row.state.textContent = effect.fixed || (effect.lacking ? "lacking" : isDrawn ? "simulated" : "left out");
+    for (const [word, input] of Object.entries(row.inputs)) input.checked = effect.switch === word;
+  });
+}
+
+function boundText(bound) {
+  if (bound === null) return "bound unknown";
+  if (bound === 0) return "nothing";
+  const percent = 100 * bound;
+  if (percent < 0.01) return "< 0.01 %";
+  return `≤ ${percent < 10 ? Number(percent.toPrecision(2)) : Math.round(percent)} %`;
+}
+
+function makeEffect(effect) {
+  const row = { inputs: {} };
+  row.bound = element("span", { className: "bound" });
+  row.why = element("p", { className: "why" });
+  row.state = element("span", { className: "state" });
+  const group = `effect-${(rank += 1)}`;
+  const switches = effect.fixed ? [] : ["auto", "on", "off"].map((word) => {
+    const input = element("input", { type: "radio", name: group, value: word });
+    input.addEventListener("change", () => add({ do: "effect", name: effect.name, switch: word }));
+    row.inputs[word] = input;
+    return element("label", {}, [input, element("span", { textContent: word })]);
+  });
+  const name = element("span", { className: "name", textContent: effect.name, title: effect.what });
+  const head = element("div", { className: "head" }, [name, row.bound]);
+  const choice = element("div", {}, [row.state]);
+  if (switches.length > 0) {
+    choice.prepend(element("span", { className: "switch", role: "radiogroup", "aria-label": `${effect.name}, ${effect.what}` }, switches));
+  }
+  row.item = element("li", { className: "effect" }, [head, row.why, choice]);
+  return row;
+}
+
+// ---- the pointer ----
+
+/// Height of the picture in the stage, CSS pixels: shares of it are what events are in.
+function pictureHeight() {
+  const aspect = shown ? shown.size.width / shown.size.height : 16 / 9;
+  return Math.min(stage.clientHeight, stage.clientWidth / aspect) || 1;
+}
+
+const pointers = new Map();
+let span = null;
+
+stage.addEventListener("pointerdown", (event) => {
+  stage.setPointerCapture(event.pointerId);
+  pointers.set(event.pointerId, { x: event.clientX, y: event.clientY, pans: event.button !== 0 || event.shiftKey });
+  span = null;
+  stage.classList.add("dragging");
+});
+
+stage.addEventListener("pointermove", (event) => {
+  const before = pointers.get(event.pointerId);
+  if (!before) return;
+  const right = (event.clientX - before.x) / pictureHeight();
+  const up = (before.y - event.clientY) / pictureHeight();
+  before.x = event.clientX;
+  before.y = event.clientY;
+  if (pointers.size === 2) {
+    const [a, b] = [...pointers.values()];
+    const now = Math.hypot(a.x - b.x, a.y - b.y);
+    if (span && now > 0) add({ do: "zoom", steps: 6 * Math.log2(now / span) });
+    span = now;
+    add({ do: "pan", right: right / 2, up: up / 2 });
+  } else if (right !== 0 || up !== 0) {
+    add({ do: before.pans ? "pan" : "orbit", right, up });
+  }
+});
+
+function release(event) {
+  pointers.delete(event.pointerId);
+  span = null;
+  if (pointers.size === 0) stage.classList.remove("dragging");
+}
+stage.addEventListener("pointerup", release);
+stage.addEventListener("pointercancel", release);
+stage.addEventListener("contextmenu", (event) => event.preventDefault());
+
+stage.addEventListener("wheel", (event) => {
+  event.preventDefault();
+  const pixels = event.deltaMode === 1 ? event.deltaY * 33 : event.deltaY;
+  add({ do: "zoom", steps: Math.max(-6, Math.min(6, -pixels / 100)) });
+}, { passive: false });
+
+// ---- keys ----
+
+const look = (azimuth, elevation) => add({ do: "look_from", azimuth, elevation });
+const keys = {
+  "+": () => add({ do: "zoom", steps: 1 }),
+  "=": () => add({ do: "zoom", steps: 1 }),
+  "-": () => add({ do: "zoom", steps: -1 }),
+  "1": () => look(0, 0),
+  "3": () => look(90, 0),
+  "7": () => look(0, 90),
+  r: () => add({ do: "reset" }),
+  s: () => save("picture.png"),
+  h: () => at("keys").showModal(),
+  "?": () => at("keys").showModal(),
+};
+const arrows = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
+
+document.addEventListener("keydown", (event) => {
+  if (event.ctrlKey || event.metaKey || event.altKey || at("keys").open) return;
+  const isTyping = event.target.matches("input, select, textarea");
+  const arrow = arrows[event.key];
+  if (arrow && !isTyping) {
+    const [right, up] = arrow;
+    add(event.shiftKey ? { do: "pan", right: right * 0.05, up: up * 0.05 } : { do: "orbit", right: right / 36, up: up / 36 });
+    event.preventDefault();
+    return;
+  }
+  if (isTyping && event.target.type === "number") return;
+  const key = keys[event.key.length === 1 ? event.key.toLowerCase() : event.key];
+  if (key) {
+    key();
+    event.preventDefault();
+  }
+});
+
+// ---- panels ----
+
+at("reset").addEventListener("click", () => add({ do: "reset" }));
+at("help").addEventListener("click", () => at("keys").showModal());
+at("exposure").addEventListener("input", () => add({ do: "exposure", stops: Number(at("exposure").value) }));
+
+function setSize(width, height) {
+  if (width >= 1 && height >= 1) add({ do: "size", width: Math.round(width), height: Math.round(height) });
+}
+for (const side of ["width", "height"]) {
+  at(side).addEventListener("change", () => setSize(Number(at("width").value), Number(at("height").value)));
+}
+// A pixel of the picture is one of the screen.
+at("fill").addEventListener("click", () => setSize(stage.clientWidth * devicePixelRatio, stage.clientHeight * devicePixelRatio));
+
+async function save(what) {
+  if (what !== "scene" && !(shown && shown.is_whole)) {
+    trouble("The whole picture is not drawn yet; save it when it is.");
+    return;
+  }
+  try {
+    const answer = await fetch(`save/${what}?client=${client}`);
+    if (!answer.ok) {
+      trouble(sentence(await answer.json()));
+      return;
+    }
+    const stem = shown.title.split(", ")[0].replace(/\.gz$/i, "").replace(/\.[^.]*$/, "") || "picture";
+    const ending = what === "scene" ? (shown.title.endsWith(".json") ? "view.json" : "view.toml") : what.split(".")[1];
+    const address = URL.createObjectURL(await answer.blob());
+    const link = element("a", { href: address, download: `${stem}.${ending}` });
+    link.click();
+    setTimeout(() => URL.revokeObjectURL(address), 10000);
+    trouble("");
+  } catch {
+    lost();
+  }
+}
+at("save-png").addEventListener("click", () => save("picture.png"));
+at("save-exr").addEventListener("click", () => save("picture.exr"));
+at("save-scene").addEventListener("click", () => save("scene"));
+
+// The server ends a while after the last page.
+window.addEventListener("pagehide", () => navigator.sendBeacon(`leave?client=${client}`));
+
+follow("state", () => (shown ? shown.version : 0), async (answer) => show(await answer.json()));
+follow("picture", () => number, takePicture);

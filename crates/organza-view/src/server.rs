@@ -1,0 +1,140 @@
+//! The server of the page: sockets, their limits, and when it ends.
+
+use crate::clients::Clients;
+use crate::serving::{Counter, answer};
+use crate::session::Session;
+use crate::token::Token;
+use hyper::server::conn::http1;
+use hyper::service::service_fn;
+use hyper_util::rt::{TokioIo, TokioTimer};
+use organza::{Error, Progress};
+use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr};
+use std::path::Path;
+use std::pin::pin;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+use tokio::net::{TcpListener, TcpStream};
+use tokio::sync::Semaphore;
+use tokio::time::{sleep, timeout};
+
+/// Sockets that are served at a time; others wait until one is free.
+const MOST_SOCKETS: usize = 32;
+
+/// Time in which a request's head has to be there, also of the next one on a socket: it bounds how long an idle socket stays.
+const HEAD_TIME: Duration = Duration::from_secs(5);
+
+/// Time after which a socket takes no more requests, and time for the last one: an answer that nobody reads holds nothing for longer.
+const SOCKET_TIME: Duration = Duration::from_secs(60);
+const LAST_ANSWER_TIME: Duration = Duration::from_secs(30);
+
+/// Most bytes of a request's head.
+const MOST_HEAD_BYTES: usize = 16 << 10;
+
+/// Time between two looks whether it is to end.
+const LOOK: Duration = Duration::from_millis(50);
+
+/// Time that answers in the making have when it ends.
+const FAREWELL: Duration = Duration::from_millis(100);
+
+/// A server that has its address, and serves nobody yet.
+pub struct Server {
+    listener: std::net::TcpListener,
+    address: SocketAddr,
+    token: Token,
+}
+
+/// Why a server has ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Ended {
+    /// It was asked to.
+    Asked,
+    /// All pages are closed.
+    PagesClosed,
+}
+
+impl Server {
+    /// Takes an address; port 0 is any that is free. Programs of other machines reach it only where the address is not of the loopback.
+    ///
+    /// # Errors
+    /// [`Error::Io`] where the system refuses the address.
+    pub fn bind(address: SocketAddr) -> Result<Self, Error> {
+        let fail = |e| Error::io(Path::new(&address.to_string()), "cannot listen at this address", e);
+        let listener = std::net::TcpListener::bind(address).map_err(fail)?;
+        listener.set_nonblocking(true).map_err(fail)?;
+        let address = listener.local_addr().map_err(fail)?;
+        Ok(Self { listener, address, token: Token::new()? })
+    }
+
+    /// The address of the page, with its token.
+    pub fn url(&self) -> String {
+        // What listens everywhere is reached from here by the loopback.
+        let ip = match self.address.ip() {
+            IpAddr::V4(ip) if ip.is_unspecified() => IpAddr::V4(Ipv4Addr::LOCALHOST),
+            IpAddr::V6(ip) if ip.is_unspecified() => IpAddr::V6(Ipv6Addr::LOCALHOST),
+            ip => ip,
+        };
+        format!("http://{}/{}/", SocketAddr::new(ip, self.address.port()), self.token.text())
+    }
+
+    /// Serves a session until `ending` is cancelled, or all pages are closed.
+    ///
+    /// # Errors
+    /// [`Error::Internal`] where the system has no sockets for it.
+    pub fn run(self, session: &Arc<Session>, ending: &Progress) -> Result<Ended, Error> {
+        let internal = |e: std::io::Error| Error::Internal(format!("the server of the page: {e}"));
+        let runtime =
+            tokio::runtime::Builder::new_current_thread().enable_io().enable_time().build().map_err(internal)?;
+        let Self { listener, address, token } = self;
+        let clients = Mutex::new(Clients::default());
+        let counter = Arc::new(Counter { session: Arc::clone(session), clients, token, address });
+        let ended = runtime.block_on(async {
+            let listener = TcpListener::from_std(listener).map_err(internal)?;
+            tokio::spawn(accept(listener, Arc::clone(&counter)));
+            loop {
+                if ending.is_cancelled() {
+                    return Ok(Ended::Asked);
+                }
+                if counter.clients.lock().unwrap_or_else(PoisonError::into_inner).are_gone(Instant::now()) {
+                    return Ok(Ended::PagesClosed);
+                }
+                sleep(LOOK).await;
+            }
+        });
+        runtime.shutdown_timeout(FAREWELL);
+        ended
+    }
+}
+
+async fn accept(listener: TcpListener, counter: Arc<Counter>) {
+    let sockets = Arc::new(Semaphore::new(MOST_SOCKETS));
+    loop {
+        let Ok(permit) = Arc::clone(&sockets).acquire_owned().await else { return };
+        let Ok((stream, _)) = listener.accept().await else {
+            // The system has no more sockets: some are free soon.
+            sleep(LOOK).await;
+            continue;
+        };
+        let counter = Arc::clone(&counter);
+        tokio::spawn(async move {
+            serve(stream, counter).await;
+            drop(permit);
+        });
+    }
+}
+
+async fn serve(stream: TcpStream, counter: Arc<Counter>) {
+    // Answers of a drag are small, and are not to wait for more.
+    let _ = stream.set_nodelay(true);
+    let service = service_fn(move |request| {
+        let counter = Arc::clone(&counter);
+        async move { Ok::<_, std::convert::Infallible>(answer(&counter, request).await) }
+    });
+    let mut builder = http1::Builder::new();
+    builder.timer(TokioTimer::new()).header_read_timeout(HEAD_TIME).max_buf_size(MOST_HEAD_BYTES);
+    let mut connection = pin!(builder.serve_connection(TokioIo::new(stream), service));
+    // A socket that fails is closed: its page asks again by another.
+    if timeout(SOCKET_TIME, connection.as_mut()).await.is_err() {
+        connection.as_mut().graceful_shutdown();
+        let _ = timeout(LAST_ANSWER_TIME, connection).await;
+    }
+}

@@ -1,0 +1,347 @@
+//! Requests and their answers: who may ask, and for what.
+
+use crate::clients::{Admission, Clients, MOST_CLIENTS};
+use crate::event::Event;
+use crate::session::Session;
+use crate::token::Token;
+use http_body_util::{BodyExt, Full, LengthLimitError, Limited};
+use hyper::body::{Bytes, Incoming};
+use hyper::header::{self, HeaderMap, HeaderName, HeaderValue};
+use hyper::{Method, Request, Response, StatusCode};
+use organza::Error;
+use organza::output::Format;
+use serde_json::json;
+use std::net::{IpAddr, SocketAddr};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+use tokio::time::timeout;
+
+/// Most bytes of a request's body: events of a drag are a few hundred.
+const MOST_BODY_BYTES: usize = 64 << 10;
+
+/// Time in which a request's body has to be there.
+const BODY_TIME: Duration = Duration::from_secs(5);
+
+/// How long a request waits for news, at most; while something is drawn, so long for the next word of its progress.
+const PATIENCE: Duration = Duration::from_secs(20);
+const PATIENCE_WHILE_DRAWING: Duration = Duration::from_millis(250);
+
+/// The one policy: script, style and pictures of this server alone, and no other page around this one.
+const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; connect-src 'self'; \
+                      base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
+
+const PAGE: &str = include_str!("page/page.html");
+const SCRIPT: &str = include_str!("page/page.js");
+const STYLE: &str = include_str!("page/page.css");
+
+/// What answers are made from.
+pub(crate) struct Counter {
+    pub(crate) session: Arc<Session>,
+    pub(crate) clients: Mutex<Clients>,
+    pub(crate) token: Token,
+    pub(crate) address: SocketAddr,
+}
+
+type Answer = Response<Full<Bytes>>;
+
+/// Answers a request, or says why not.
+pub(crate) async fn answer(counter: &Arc<Counter>, request: Request<Incoming>) -> Answer {
+    let mut answer = answered(counter, request).await.unwrap_or_else(Refusal::answer);
+    let headers = answer.headers_mut();
+    for (name, value) in [
+        (header::CONTENT_SECURITY_POLICY, POLICY),
+        (header::X_CONTENT_TYPE_OPTIONS, "nosniff"),
+        (header::REFERRER_POLICY, "no-referrer"),
+        (header::CACHE_CONTROL, "no-store"),
+        (HeaderName::from_static("cross-origin-resource-policy"), "same-origin"),
+    ] {
+        headers.insert(name, HeaderValue::from_static(value));
+    }
+    answer
+}
+
+/// Why a request is not answered.
+struct Refusal {
+    status: StatusCode,
+    message: String,
+    hint: String,
+}
+
+impl Refusal {
+    fn new(status: StatusCode, message: &str) -> Self {
+        Self { status, message: message.to_owned(), hint: String::new() }
+    }
+
+    /// What a scene is refused for.
+    fn of_error(error: &Error) -> Self {
+        let status = match error {
+            Error::Internal(_) => StatusCode::INTERNAL_SERVER_ERROR,
+            _ => StatusCode::UNPROCESSABLE_ENTITY,
+        };
+        Self { status, message: error.to_string(), hint: error.hint().to_owned() }
+    }
+
+    fn answer(self) -> Answer {
+        let document = json!({ "message": self.message, "hint": self.hint });
+        let mut answer = of_type("application/json", document.to_string());
+        *answer.status_mut() = self.status;
+        answer
+    }
+}
+
+fn of_type(content: &'static str, body: impl Into<Bytes>) -> Answer {
+    let mut answer = Response::new(Full::new(body.into()));
+    answer.headers_mut().insert(header::CONTENT_TYPE, HeaderValue::from_static(content));
+    answer
+}
+
+/// What is asked for, behind the token.
+enum Route<'p> {
+    Page,
+    Script,
+    Style,
+    State,
+    Picture,
+    Events,
+    Leave,
+    Save(&'p str),
+}
+
+impl<'p> Route<'p> {
+    fn of(path: &'p str) -> Option<Self> {
+        Some(match path {
+            "" => Self::Page,
+            "page.js" => Self::Script,
+            "page.css" => Self::Style,
+            "state" => Self::State,
+            "picture" => Self::Picture,
+            "events" => Self::Events,
+            "leave" => Self::Leave,
+            "save/picture.png" | "save/picture.exr" | "save/scene" => Self::Save(path.strip_prefix("save/")?),
+            _ => return None,
+        })
+    }
+
+    const fn method(&self) -> Method {
+        match self {
+            Self::Events | Self::Leave => Method::POST,
+            _ => Method::GET,
+        }
+    }
+}
+
+async fn answered(counter: &Arc<Counter>, request: Request<Incoming>) -> Result<Answer, Refusal> {
+    check_origin(counter.address.ip(), request.headers())?;
+    let uri = request.uri().clone();
+    let unknown = || Refusal::new(StatusCode::FORBIDDEN, "this address has another token");
+    let (token, path) = uri.path().strip_prefix('/').and_then(|path| path.split_once('/')).ok_or_else(unknown)?;
+    if !counter.token.is(token) {
+        return Err(unknown());
+    }
+    let route = Route::of(path).ok_or_else(|| Refusal::new(StatusCode::NOT_FOUND, "there is nothing here"))?;
+    if *request.method() != route.method() {
+        return Err(Refusal::new(StatusCode::METHOD_NOT_ALLOWED, "this address takes another method"));
+    }
+    let query = Query(uri.query().unwrap_or(""));
+    match route {
+        Route::Page => return Ok(of_type("text/html; charset=utf-8", PAGE)),
+        Route::Script => return Ok(of_type("text/javascript; charset=utf-8", SCRIPT)),
+        Route::Style => return Ok(of_type("text/css; charset=utf-8", STYLE)),
+        _ => {}
+    }
+    let name = query.value("client").unwrap_or("");
+    if matches!(route, Route::Leave) {
+        counter.clients.lock().unwrap_or_else(PoisonError::into_inner).leave(name, Instant::now());
+        return Ok(Response::new(Full::default()));
+    }
+    admit(counter, name)?;
+    let answer = match route {
+        Route::State => state(&counter.session, query.number("after")?).await,
+        Route::Picture => picture(&counter.session, query.number("after")?).await,
+        Route::Events => events(&counter.session, request).await,
+        Route::Save(what) => saved(&counter.session, what).await,
+        Route::Page | Route::Script | Route::Style | Route::Leave => {
+            Err(Refusal::new(StatusCode::NOT_FOUND, "there is nothing here"))
+        }
+    };
+    // A page that has waited was there all the time.
+    admit(counter, name)?;
+    answer
+}
+
+/// Refuses pages that another site has made: their origin, or the name by which they found this machine, is another.
+fn check_origin(listening: IpAddr, headers: &HeaderMap) -> Result<(), Refusal> {
+    let forbidden = |message| Refusal::new(StatusCode::FORBIDDEN, message);
+    let text = |name| headers.get(name).map(|value| value.to_str().unwrap_or("?"));
+    let host = text(header::HOST).ok_or_else(|| forbidden("the request names no host"))?;
+    if headers.get_all(header::HOST).iter().count() > 1 || !is_own_host(listening, host) {
+        return Err(forbidden("this server is asked by its numeric address, or as localhost"));
+    }
+    if text(header::ORIGIN).is_some_and(|origin| origin.strip_prefix("http://") != Some(host)) {
+        return Err(forbidden("a page of another origin asks"));
+    }
+    Ok(())
+}
+
+/// Whether a host is this server: a name of the loopback, or the address at which it listens. The port may be that of a tunnel; a name that someone
+/// may point at this machine is none of these.
+fn is_own_host(listening: IpAddr, host: &str) -> bool {
+    let name = match host.rsplit_once(':') {
+        Some((name, port)) if !port.is_empty() && port.bytes().all(|b| b.is_ascii_digit()) => name,
+        _ => host,
+    };
+    if name.eq_ignore_ascii_case("localhost") {
+        return true;
+    }
+    let bare = name.strip_prefix('[').and_then(|name| name.strip_suffix(']')).unwrap_or(name);
+    let Ok(ip) = bare.parse::<IpAddr>() else { return false };
+    ip.is_loopback() || ip == listening || listening.is_unspecified()
+}
+
+fn admit(counter: &Counter, name: &str) -> Result<(), Refusal> {
+    match counter.clients.lock().unwrap_or_else(PoisonError::into_inner).admit(name, Instant::now()) {
+        Admission::Welcome => Ok(()),
+        Admission::Nameless => {
+            Err(Refusal::new(StatusCode::BAD_REQUEST, "`client`: expected a word of 1 to 64 letters and digits"))
+        }
+        Admission::Full => {
+            let message =
+                format!("{MOST_CLIENTS} pages show this scene already; close one of them, then load this page again");
+            Err(Refusal::new(StatusCode::CONFLICT, &message))
+        }
+    }
+}
+
+/// The part of an address behind `?`.
+struct Query<'q>(&'q str);
+
+impl<'q> Query<'q> {
+    fn value(&self, key: &str) -> Option<&'q str> {
+        self.0
+            .split('&')
+            .find_map(|pair| pair.split_once('=').filter(|(found, _)| *found == key))
+            .map(|(_, value)| value)
+    }
+
+    fn number(&self, key: &str) -> Result<u64, Refusal> {
+        let number = self.value(key).unwrap_or("0").parse();
+        number.map_err(|_| Refusal::new(StatusCode::BAD_REQUEST, "`after`: expected a whole number"))
+    }
+}
+
+/// The state behind a version: at once where it is newer, else when it is, or after a while.
+async fn state(session: &Session, after: u64) -> Result<Answer, Refusal> {
+    let mut versions = session.versions();
+    let is_drawing = session.shown().drawing.is_some();
+    let patience = if is_drawing { PATIENCE_WHILE_DRAWING } else { PATIENCE };
+    // Without news the answer is what was known.
+    let _ = timeout(patience, versions.wait_for(|version| *version > after)).await;
+    Ok(of_type("application/json", shown(session)?))
+}
+
+fn shown(session: &Session) -> Result<Vec<u8>, Refusal> {
+    let bytes = serde_json::to_vec(&session.shown());
+    bytes.map_err(|e| Refusal::new(StatusCode::INTERNAL_SERVER_ERROR, &format!("the state is no JSON: {e}")))
+}
+
+/// The newest picture, where it comes behind a number; no content where none has come for a while.
+async fn picture(session: &Session, after: u64) -> Result<Answer, Refusal> {
+    let mut versions = session.versions();
+    let newer = async {
+        while session.picture().is_none_or(|picture| picture.facts.number <= after) && versions.changed().await.is_ok()
+        {
+        }
+    };
+    let _ = timeout(PATIENCE, newer).await;
+    let Some(picture) = session.picture().filter(|picture| picture.facts.number > after) else {
+        let mut answer = Response::new(Full::default());
+        *answer.status_mut() = StatusCode::NO_CONTENT;
+        return Ok(answer);
+    };
+    let mut answer = of_type("image/png", picture.png.clone());
+    for (name, number) in [("organza-number", picture.facts.number), ("organza-generation", picture.facts.generation)] {
+        answer.headers_mut().insert(HeaderName::from_static(name), HeaderValue::from(number));
+    }
+    Ok(answer)
+}
+
+/// Takes events in, and answers with the state.
+async fn events(session: &Arc<Session>, request: Request<Incoming>) -> Result<Answer, Refusal> {
+    let bad = |message: &str| Refusal::new(StatusCode::BAD_REQUEST, message);
+    let content = request.headers().get(header::CONTENT_TYPE).and_then(|value| value.to_str().ok());
+    if content != Some("application/json") {
+        return Err(Refusal::new(StatusCode::UNSUPPORTED_MEDIA_TYPE, "expected events as application/json"));
+    }
+    let body = Limited::new(request.into_body(), MOST_BODY_BYTES).collect();
+    let body = timeout(BODY_TIME, body)
+        .await
+        .map_err(|_| Refusal::new(StatusCode::REQUEST_TIMEOUT, "the events come too slowly"))?;
+    let body = body.map_err(|e| match e.downcast_ref::<LengthLimitError>() {
+        Some(_) => Refusal::new(StatusCode::PAYLOAD_TOO_LARGE, "expected at most 64 KiB of events"),
+        None => bad("the request broke off"),
+    })?;
+    let events: Vec<Event> = serde_json::from_slice(&body.to_bytes())
+        .map_err(|e| bad(&format!("events: {}", organza::shown(&e.to_string()))))?;
+    session.apply(&events).map_err(|e| Refusal::of_error(&e))?;
+    Ok(of_type("application/json", shown(session)?))
+}
+
+/// A file to save. Its name is given by the page.
+async fn saved(session: &Arc<Session>, what: &str) -> Result<Answer, Refusal> {
+    if what == "scene" {
+        let text = session.scene_text().map_err(|e| Refusal::of_error(&e))?;
+        let content = if session.is_json() { "application/json" } else { "application/toml" };
+        return Ok(of_type(content, text));
+    }
+    let is_exr = what == "picture.exr";
+    let format = if is_exr { Format::Exr } else { Format::Png };
+    let session = Arc::clone(session);
+    // A large file takes a while: other requests are answered meanwhile.
+    let file = tokio::task::spawn_blocking(move || session.file(format)).await;
+    let file = file.map_err(|_| Refusal::new(StatusCode::INTERNAL_SERVER_ERROR, "writing this picture failed"))?;
+    let file = file.map_err(|e| Refusal::of_error(&e))?;
+    let file = file.ok_or_else(|| {
+        Refusal::new(StatusCode::SERVICE_UNAVAILABLE, "the whole picture is not drawn yet; save it when it is")
+    })?;
+    Ok(of_type(if is_exr { "image/x-exr" } else { "image/png" }, file))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_host_is_this_machine_by_its_number() {
+        let loopback: IpAddr = "127.0.0.1".parse().unwrap();
+        for host in ["127.0.0.1:80", "localhost:9", "LOCALHOST", "[::1]:8080", "127.0.0.1"] {
+            assert!(is_own_host(loopback, host), "{host}");
+        }
+        for host in [
+            "",
+            ":",
+            "evil.example",
+            "evil.example:80",
+            "192.168.0.1:80",
+            "localhost.evil.example",
+            "127.0.0.1.nip.io:1",
+            "[::1",
+            "1",
+        ] {
+            assert!(!is_own_host(loopback, host), "{host}");
+        }
+        let own: IpAddr = "192.168.0.1".parse().unwrap();
+        assert!(is_own_host(own, "192.168.0.1:80") && !is_own_host(own, "192.168.0.2:80"));
+        assert!(
+            is_own_host("0.0.0.0".parse().unwrap(), "192.168.0.2:80")
+                && !is_own_host("::".parse().unwrap(), "a.example")
+        );
+    }
+
+    #[test]
+    fn a_query_is_read_by_its_keys() {
+        let query = Query("a=1&client=x&after=7");
+        assert_eq!([query.value("client"), query.value("a"), query.value("b")], [Some("x"), Some("1"), None]);
+        assert_eq!(query.number("after").ok(), Some(7));
+        assert!(Query("after=-1").number("after").is_err() && Query("after=").number("after").is_err());
+    }
+}

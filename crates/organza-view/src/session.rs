@@ -1,0 +1,288 @@
+//! A view without a window: events go in, pictures and the state come out.
+
+use crate::artist::Artist;
+pub use crate::desk::Failure;
+use crate::desk::{Desk, Request, Seen};
+use crate::event::Event;
+use crate::picture::{Drawn, Facts, Picture, Size};
+use crate::recording::MOST_EVENTS;
+use crate::scene_text;
+use crate::state::{Opening, Source, State};
+use crate::viewpoint::Viewpoint;
+use organza::output::Format;
+use organza::scene::{self, Scene, SceneObject};
+use organza::{Error, Progress};
+use serde::Serialize;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+use tokio::sync::watch;
+
+/// How long a session waits for its artist when it ends: passes hear of it at their next step.
+const FAREWELL: Duration = Duration::from_millis(600);
+
+/// A scene that is viewed: its state, and the thread that draws it.
+pub struct Session {
+    desk: Arc<Desk>,
+    studio: Mutex<Studio>,
+    artist: Mutex<Option<JoinHandle<()>>>,
+}
+
+/// What events change.
+struct Studio {
+    title: String,
+    source: Source,
+    /// The scene as the command line has it.
+    stated: Scene,
+    state: State,
+    /// The scene of the state.
+    scene: Scene,
+    generation: u64,
+    recorded: Vec<Event>,
+}
+
+/// What a page shows beside the picture.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Shown {
+    /// Grows with every change.
+    pub version: u64,
+    /// The state; a session's states are counted from 1.
+    pub generation: u64,
+    /// The names of the files that were asked for.
+    pub title: String,
+    /// Size of the whole picture.
+    pub size: Size,
+    /// Where the eye is.
+    pub viewpoint: ShownViewpoint,
+    /// Stops.
+    pub exposure: f64,
+    /// The objects of the scene, in its order.
+    pub objects: Vec<ObjectRow>,
+    /// What is to be said of the newest picture.
+    pub picture: Option<Facts>,
+    /// The picture in the making.
+    pub drawing: Option<Drawing>,
+    /// Whether the newest state has its whole picture, which can be saved.
+    pub is_whole: bool,
+    /// Why the newest state has no picture.
+    pub failure: Option<Failure>,
+}
+
+/// Where the eye is, as the page shows it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ShownViewpoint {
+    /// Degrees about the pole.
+    pub azimuth: f64,
+    /// Degrees above the horizon.
+    pub elevation: f64,
+    /// World units between the eye and the centre.
+    pub distance: f64,
+    /// World position in the middle of the picture.
+    pub centre: [f64; 3],
+}
+
+/// An object, as a row of the page.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ObjectRow {
+    /// Name of the object.
+    pub name: String,
+    /// What it is made of, in a word.
+    pub kind: &'static str,
+    /// Whether it is drawn.
+    pub visible: bool,
+    /// Opacity of one crossing, 0 to 1; `None` for a medium, which has none.
+    pub opacity: Option<f64>,
+}
+
+/// A picture in the making.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Drawing {
+    /// What is done at present.
+    pub stage: String,
+    /// Share done, 0 to 1.
+    pub share: f64,
+}
+
+impl Session {
+    /// Reads a scene, finds its camera, and begins to draw.
+    ///
+    /// # Errors
+    /// Those of [`scene::parse`], and those of reading data where that places the camera.
+    pub fn open(opening: Opening, progress: &Progress) -> Result<Self, Error> {
+        let Opening { title, file, text, load, options, files } = opening;
+        let source = Source { file, text, load };
+        let stated = source.scene(source.load.overrides.clone())?;
+        let own = Viewpoint::of_scene(&organza::fitted(&stated, &options, progress, &files)?.0);
+        let desk = Arc::new(Desk::new(own));
+        let artist = Artist::new(files, options);
+        let board = Arc::clone(&desk);
+        let thread = std::thread::Builder::new().name("artist".into()).spawn(move || artist.work(&board));
+        let thread = thread.map_err(|e| Error::Internal(format!("a thread that draws: {e}")))?;
+        let state = State::default();
+        let scene = stated.clone();
+        let studio = Studio { title, source, stated, state, scene, generation: 0, recorded: Vec::new() };
+        let session = Self { desk, studio: Mutex::new(studio), artist: Mutex::new(Some(thread)) };
+        session.apply(&[])?;
+        Ok(session)
+    }
+
+    fn studio(&self) -> MutexGuard<'_, Studio> {
+        // It is changed as a whole, after all that can fail.
+        self.studio.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Takes events in, all of them or none, and asks for a picture of the state behind the last.
+    ///
+    /// # Errors
+    /// What a scene with these changes is refused for; the state is then as before.
+    pub fn apply(&self, events: &[Event]) -> Result<(), Error> {
+        let mut studio = self.studio();
+        let own = self.desk.own();
+        let mut state = studio.state.clone();
+        events.iter().try_for_each(|event| state.apply(event, &studio.stated, &own))?;
+        let overrides = studio.source.overrides(&state, &studio.stated)?;
+        let told = studio.source.told(&overrides);
+        let scene = studio.source.scene(overrides)?;
+        let has_own_camera = state.viewpoint().is_none();
+        studio.generation += 1;
+        let generation = studio.generation;
+        self.desk.ask(Request { generation, scene: scene.clone(), told, has_own_camera });
+        (studio.state, studio.scene) = (state, scene);
+        let room = MOST_EVENTS.saturating_sub(studio.recorded.len());
+        studio.recorded.extend(events.iter().take(room).cloned());
+        Ok(())
+    }
+
+    /// The events so far, [`MOST_EVENTS`] at most.
+    pub fn recorded(&self) -> Vec<Event> {
+        self.studio().recorded.clone()
+    }
+
+    /// What a page shows beside the picture.
+    pub fn shown(&self) -> Shown {
+        let studio = self.studio();
+        let Seen { version, picture, failure, drawing, whole } = self.desk.seen();
+        let viewpoint = studio.state.viewpoint().copied().unwrap_or_else(|| self.desk.own());
+        let row = |object: &SceneObject| ObjectRow {
+            name: object.name.clone(),
+            kind: kind_of(&object.source),
+            visible: object.visible,
+            opacity: (!object.source.is_medium()).then(|| studio.scene.opacity_of(object)),
+        };
+        Shown {
+            version,
+            generation: studio.generation,
+            title: studio.title.clone(),
+            size: Size::of_scene(&studio.scene),
+            viewpoint: ShownViewpoint {
+                azimuth: viewpoint.azimuth.to_degrees(),
+                elevation: viewpoint.elevation.to_degrees(),
+                distance: viewpoint.distance,
+                centre: viewpoint.centre.to_array(),
+            },
+            exposure: studio.scene.render.exposure,
+            objects: studio.scene.objects.iter().map(row).collect(),
+            picture: picture.map(|picture| picture.facts.clone()),
+            drawing: drawing.map(|(stage, share)| Drawing { stage, share }),
+            is_whole: whole == Some(studio.generation),
+            failure,
+        }
+    }
+
+    /// The newest picture, if there is one yet.
+    pub fn picture(&self) -> Option<Arc<Picture>> {
+        self.desk.seen().picture
+    }
+
+    /// Waits for the whole picture of the present state.
+    ///
+    /// # Errors
+    /// Why there is none.
+    pub fn whole_picture(&self) -> Result<Arc<Picture>, Failure> {
+        self.desk.wait_for_whole()
+    }
+
+    /// The last whole picture where it is that of the present state: what can be saved.
+    pub(crate) fn finished(&self) -> Option<Arc<Drawn>> {
+        let generation = self.studio().generation;
+        self.desk.whole().filter(|whole| whole.generation == generation)
+    }
+
+    /// The file of the whole picture, as `organza render` writes it; `None` while it is drawn.
+    ///
+    /// # Errors
+    /// [`Error::Output`] for a picture that the format cannot hold.
+    pub fn file(&self, format: Format) -> Result<Option<Vec<u8>>, Error> {
+        self.finished().map(|drawn| drawn.file(format)).transpose()
+    }
+
+    /// The scene of the present state as the text of a scene file, with the comments of the first.
+    ///
+    /// # Errors
+    /// [`Error::Internal`] where the text would not be that of the same scene.
+    pub fn scene_text(&self) -> Result<String, Error> {
+        let studio = self.studio();
+        let Studio { source, state, stated, scene, .. } = &*studio;
+        let text = scene_text::changed(source, &source.overrides(state, stated)?)?;
+        // What is saved is read as what is seen, or is not saved.
+        let load = scene::LoadOptions { overrides: Vec::new(), ..source.load.clone() };
+        let mut read = scene::parse(&source.file, text.as_bytes(), &load)?;
+        read.sha256.clone_from(&scene.sha256);
+        if read != *scene {
+            return Err(Error::Internal("the text of this scene is not read as the scene that is seen".into()));
+        }
+        Ok(text)
+    }
+
+    /// Whether the scene is written in JSON.
+    pub(crate) fn is_json(&self) -> bool {
+        self.studio().source.is_json()
+    }
+
+    /// Versions as they come.
+    pub(crate) fn versions(&self) -> watch::Receiver<u64> {
+        self.desk.versions()
+    }
+
+    /// Stops drawing, and waits a moment for that.
+    pub fn close(&self) {
+        self.desk.close();
+        let thread = self.artist.lock().unwrap_or_else(PoisonError::into_inner).take();
+        let Some(thread) = thread else { return };
+        let end = Instant::now() + FAREWELL;
+        while !thread.is_finished() && Instant::now() < end {
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        // One that does not hear of it ends with the process.
+        if thread.is_finished() {
+            let _ = thread.join();
+        }
+    }
+}
+
+impl Drop for Session {
+    fn drop(&mut self) {
+        self.close();
+    }
+}
+
+/// What an object is made of, in a word.
+fn kind_of(source: &scene::Source) -> &'static str {
+    use scene::Source;
+    match source {
+        Source::Mesh(_) => "mesh",
+        Source::Points(_) => "points",
+        Source::Matter(_) => "points as a medium",
+        Source::Extract(_) => "extract",
+        Source::Volume(_) => "volume",
+        Source::Implicit(_) => "implicit surface",
+        Source::Isosurface(_) => "isosurface",
+        Source::LevelSet(_) => "level set",
+        Source::Combined(_) => "solid",
+        Source::Slice(_) => "slice",
+        Source::Density(_) => "density",
+        Source::Cloud(_) => "cloud",
+        Source::Rectangle(_) => "rectangle",
+        Source::Medium(_) => "medium",
+    }
+}

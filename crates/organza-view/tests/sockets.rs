@@ -1,0 +1,333 @@
+//! The server by real sockets: who is answered, who is refused, and that nobody holds it.
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use organza::{Progress, RenderOptions};
+use organza_view::{Ended, Opening, Server, Session};
+use std::io::{Read, Write};
+use std::net::{SocketAddr, TcpStream};
+use std::sync::Arc;
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+const SCENE: &str = r#"version = 1
+[camera]
+position = [0, 0, 4]
+target = [0, 0, 0]
+size = [24, 16]
+[[object]]
+name = "fog"
+medium_box = { min = [-1, -1, -1], max = [1, 1, 1], extinction = 1.5, spacing = 0.25 }
+"#;
+
+/// A server that is running.
+struct Running {
+    session: Arc<Session>,
+    address: SocketAddr,
+    token: String,
+    ending: Arc<Progress>,
+    thread: Option<JoinHandle<Ended>>,
+}
+
+impl Running {
+    fn start() -> Self {
+        let opening = Opening::of_text("scene.toml", SCENE, RenderOptions::default());
+        let session = Arc::new(Session::open(opening, &Progress::new()).unwrap());
+        let server = Server::bind("127.0.0.1:0".parse().unwrap()).unwrap();
+        let url = server.url();
+        let rest = url.strip_prefix("http://").unwrap();
+        let (address, token) = rest.trim_end_matches('/').split_once('/').unwrap();
+        let (address, token) = (address.parse().unwrap(), token.to_owned());
+        let ending = Arc::new(Progress::new());
+        let thread = std::thread::spawn({
+            let (session, ending) = (Arc::clone(&session), Arc::clone(&ending));
+            move || server.run(&session, &ending).unwrap()
+        });
+        Self { session, address, token, ending, thread: Some(thread) }
+    }
+
+    fn stop(&mut self) -> Ended {
+        self.ending.cancel();
+        self.thread.take().unwrap().join().unwrap()
+    }
+
+    /// Sends bytes and reads the answer to its end.
+    fn raw(&self, request: &[u8]) -> String {
+        let mut stream = TcpStream::connect(self.address).unwrap();
+        stream.set_read_timeout(Some(Duration::from_secs(20))).unwrap();
+        // A server that refuses early closes before all is sent.
+        let _ = stream.write_all(request);
+        let mut answer = Vec::new();
+        let _ = stream.read_to_end(&mut answer);
+        String::from_utf8_lossy(&answer).into_owned()
+    }
+
+    fn ask(&self, line: &str, headers: &str, body: &str) -> Answer {
+        let length = if body.is_empty() { String::new() } else { format!("Content-Length: {}\r\n", body.len()) };
+        let request = format!("{line} HTTP/1.1\r\nConnection: close\r\n{headers}{length}\r\n{body}");
+        Answer::of(&self.raw(request.as_bytes()))
+    }
+
+    fn host(&self) -> String {
+        format!("Host: {}\r\n", self.address)
+    }
+
+    fn get(&self, path: &str) -> Answer {
+        self.ask(&format!("GET /{}/{path}", self.token), &self.host(), "")
+    }
+
+    fn post(&self, body: &str) -> Answer {
+        let headers = format!("{}Content-Type: application/json\r\n", self.host());
+        self.ask(&format!("POST /{}/events?client=a", self.token), &headers, body)
+    }
+}
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        self.ending.cancel();
+    }
+}
+
+struct Answer {
+    status: u16,
+    head: String,
+    body: String,
+}
+
+impl Answer {
+    fn of(text: &str) -> Self {
+        let (head, body) = text.split_once("\r\n\r\n").unwrap_or((text, ""));
+        let status = head.split(' ').nth(1).and_then(|status| status.parse().ok()).unwrap_or(0);
+        Self { status, head: head.to_lowercase(), body: body.to_owned() }
+    }
+}
+
+#[test]
+fn the_page_and_its_parts_are_served_under_one_policy() {
+    let running = Running::start();
+    for (path, content) in [("", "text/html"), ("page.js", "text/javascript"), ("page.css", "text/css")] {
+        let answer = running.get(path);
+        assert_eq!(answer.status, 200, "{path}");
+        assert!(answer.head.contains(content), "{path}: {}", answer.head);
+        let policy = answer.head.lines().find(|line| line.starts_with("content-security-policy:")).unwrap().to_owned();
+        assert!(policy.contains("default-src 'none'") && !policy.contains("http") && !policy.contains('*'), "{policy}");
+        assert!(answer.head.contains("nosniff") && answer.head.contains("no-store"));
+        // Nothing is from elsewhere.
+        let body = answer.body.replace("http://www.w3.org", "");
+        assert!(!body.contains("http://") && !body.contains("https://"), "{path}");
+    }
+    running.session.whole_picture().unwrap();
+    assert_eq!(running.get("state?client=a").status, 200);
+    assert_eq!(running.get("picture?client=a&after=0").status, 200);
+    assert!(running.get("save/picture.png?client=a").head.contains("image/png"));
+    assert!(running.get("save/picture.exr?client=a").head.contains("image/x-exr"));
+    assert!(running.get("save/scene?client=a").body.contains("medium_box"));
+}
+
+#[test]
+fn events_change_the_state_or_say_why_not() {
+    let running = Running::start();
+    let answer = running.post(r#"[{"do": "orbit", "right": 0.25, "up": 0}]"#);
+    assert!(answer.status == 200 && answer.body.contains("\"generation\":2"), "{}", answer.body);
+    assert!(answer.body.contains("\"azimuth\":-45.0"), "{}", answer.body);
+    let refused = running.post(r#"[{"do": "show", "object": "nobody", "visible": true}]"#);
+    assert!(refused.status == 422 && refused.body.contains("nobody"), "{}", refused.body);
+    for body in ["", "{}", "[1]", "[{\"do\": \"fly\"}]", "[[[[", "\u{0}"] {
+        assert!([400, 415].contains(&running.post(body).status), "{body}");
+    }
+    let deep = "[".repeat(60_000);
+    assert_eq!(running.post(&deep).status, 400);
+    let headers = format!("{}Content-Type: text/plain\r\n", running.host());
+    let plain = running.ask(&format!("POST /{}/events?client=a", running.token), &headers, "[]");
+    assert_eq!(plain.status, 415);
+    assert_eq!(running.session.shown().generation, 2);
+}
+
+#[test]
+fn strangers_are_refused() {
+    let running = Running::start();
+    let Running { token, address, .. } = &running;
+    let host = running.host();
+    let other = format!("{}{}", if token.starts_with('0') { "1" } else { "0" }, &token[1..]);
+    for path in
+        ["/", "/favicon.ico", &format!("/{other}/"), &format!("/{}/", &token[1..]), &format!("/{token}"), "//", "*"]
+    {
+        let answer = running.ask(&format!("GET {path}"), &host, "");
+        assert!([400, 403].contains(&answer.status), "{path}: {}", answer.status);
+        assert!(!answer.body.contains(token.as_str()) && !answer.body.contains("<html"), "{path}");
+    }
+    let page = format!("GET /{token}/");
+    for host in ["Host: evil.example\r\n", "Host: evil.example:80\r\n", "", "Host: 127.0.0.1.nip.io\r\n"] {
+        assert!([400, 403].contains(&running.ask(&page, host, "").status), "{host}");
+    }
+    let two = format!("{host}Host: evil.example\r\n");
+    assert!([400, 403].contains(&running.ask(&page, &two, "").status));
+    for origin in ["http://evil.example", "https://127.0.0.1", "null", "file://", "http://127.0.0.1:1"] {
+        let headers = format!("{host}Origin: {origin}\r\nContent-Type: application/json\r\n");
+        let answer = running.ask(&format!("POST /{token}/events?client=a"), &headers, "[]");
+        assert_eq!(answer.status, 403, "{origin}");
+    }
+    let headers = format!("{host}Origin: http://{address}\r\nContent-Type: application/json\r\n");
+    assert_eq!(running.ask(&format!("POST /{token}/events?client=a"), &headers, "[]").status, 200);
+    // Another program's page by a name of this machine, through a tunnel with another port.
+    let tunnel = "Host: localhost:9\r\nOrigin: http://localhost:9\r\nContent-Type: application/json\r\n";
+    assert_eq!(running.ask(&format!("POST /{token}/events?client=a"), tunnel, "[]").status, 200);
+}
+
+#[test]
+fn paths_lead_nowhere_else() {
+    let running = Running::start();
+    for path in [
+        "../Cargo.toml",
+        "..%2f..%2fetc%2fpasswd",
+        "save/../../../etc/passwd",
+        "save/scene/../../x",
+        "page.js/..",
+        "save/picture.png%00",
+        "%2e%2e/",
+        "save/",
+        "picture/1",
+        "./page.js",
+        "PAGE.JS",
+    ] {
+        assert_eq!(running.get(path).status, 404, "{path}");
+    }
+    for line in ["PUT", "DELETE", "OPTIONS", "POST", "HEAD"] {
+        let answer = running.ask(&format!("{line} /{}/state?client=a", running.token), &running.host(), "");
+        assert_eq!(answer.status, 405, "{line}");
+    }
+    assert_eq!(running.get("events?client=a").status, 405);
+    assert_eq!(running.get("state?client=a&after=x").status, 400);
+    for client in ["", "a%20b", "a/b"] {
+        assert_eq!(running.get(&format!("state?client={client}")).status, 400, "{client}");
+    }
+}
+
+#[test]
+fn malformed_and_oversized_requests_end() {
+    let running = Running::start();
+    let Running { token, address, .. } = &running;
+    let long = "a".repeat(1 << 20);
+    for request in [
+        "\r\n\r\n\r\n".to_owned(),
+        "\u{0}\u{1}\u{2}\u{3}\r\n\r\n".to_owned(),
+        "GET\r\n\r\n".to_owned(),
+        format!("GET /{token}/ HTTP/9.9\r\nHost: {address}\r\n\r\n"),
+        format!("GET /{token}/{long} HTTP/1.1\r\nHost: {address}\r\n\r\n"),
+        format!("GET /{token}/ HTTP/1.1\r\nHost: {address}\r\nX: {long}\r\n\r\n"),
+        format!("GET /{token}/ HTTP/1.1\r\nHost: {address}\r\n{}\r\n", "X: y\r\n".repeat(2000)),
+        format!("POST /{token}/events?client=a HTTP/1.1\r\nHost: {address}\r\nContent-Length: -1\r\n\r\n"),
+        format!(
+            "POST /{token}/events?client=a HTTP/1.1\r\nHost: {address}\r\nTransfer-Encoding: chunked\r\nContent-Length: 3\r\nContent-Type: application/json\r\n\r\nzz\r\n"
+        ),
+    ] {
+        let answer = Answer::of(&running.raw(request.as_bytes()));
+        assert!(answer.status == 0 || answer.status >= 400, "{}: {}", &request[..40.min(request.len())], answer.status);
+    }
+    let body = format!("[{}]", " ".repeat(100 << 10));
+    assert_eq!(running.post(&body).status, 413);
+    // One that is announced is refused before it is sent.
+    let head = format!(
+        "POST /{token}/events?client=a HTTP/1.1\r\nHost: {address}\r\nConnection: close\r\nContent-Type: application/json\r\nContent-Length: 1073741824\r\n\r\n"
+    );
+    let start = Instant::now();
+    assert!([413, 408].contains(&Answer::of(&running.raw(head.as_bytes())).status));
+    assert!(start.elapsed() < Duration::from_secs(10));
+    assert_eq!(running.get("").status, 200);
+}
+
+#[test]
+fn a_third_page_gets_409_until_one_is_closed() {
+    let running = Running::start();
+    for (client, status) in [("a", 200), ("b", 200), ("c", 409), ("a", 200)] {
+        assert_eq!(running.get(&format!("state?client={client}")).status, status, "{client}");
+    }
+    assert_eq!(running.get("picture?client=c").status, 409);
+    assert_eq!(running.get("save/scene?client=c").status, 409);
+    let left = running.ask(&format!("POST /{}/leave?client=b", running.token), &running.host(), "");
+    assert_eq!(left.status, 200);
+    assert_eq!(running.get("state?client=c").status, 200);
+}
+
+#[test]
+fn slow_sockets_hold_nobody() {
+    let running = Running::start();
+    let slow: Vec<TcpStream> = (0..200).filter_map(|_| TcpStream::connect(running.address).ok()).collect();
+    for mut stream in &slow {
+        let _ = stream.write_all(b"GET /");
+    }
+    // Heads have five seconds; 200 sockets wait in rows of 32, so a page gets its turn after some of them.
+    let start = Instant::now();
+    let mut first = slow.first().unwrap();
+    first.set_read_timeout(Some(Duration::from_secs(12))).unwrap();
+    let mut rest = Vec::new();
+    first.read_to_end(&mut rest).unwrap();
+    assert!(start.elapsed() < Duration::from_secs(8), "{:?}", start.elapsed());
+    drop(slow);
+    assert_eq!(running.get("").status, 200);
+    // A body that comes byte by byte ends too.
+    let mut stream = TcpStream::connect(running.address).unwrap();
+    stream.set_read_timeout(Some(Duration::from_secs(12))).unwrap();
+    let head = format!(
+        "POST /{}/events?client=a HTTP/1.1\r\nHost: {}\r\nContent-Type: application/json\r\nContent-Length: 100\r\nConnection: close\r\n\r\n[",
+        running.token, running.address
+    );
+    stream.write_all(head.as_bytes()).unwrap();
+    let mut answer = String::new();
+    stream.read_to_string(&mut answer).unwrap();
+    assert_eq!(Answer::of(&answer).status, 408, "{answer}");
+}
+
+#[test]
+fn pages_that_wait_hear_of_every_picture() {
+    let running = Running::start();
+    running.session.whole_picture().unwrap();
+    std::thread::scope(|scope| {
+        // Two pages ask for news again and again while events come.
+        for client in ["a", "b"] {
+            let running = &running;
+            scope.spawn(move || {
+                let mut number = 0;
+                while number < 20 {
+                    let answer = running.get(&format!("picture?client={client}&after={number}"));
+                    assert_eq!(answer.status, 200);
+                    let line =
+                        answer.head.lines().find_map(|line| line.strip_prefix("organza-number: ")).unwrap().to_owned();
+                    let newest: u64 = line.parse().unwrap();
+                    assert!(newest > number);
+                    number = newest;
+                }
+            });
+        }
+        scope.spawn(|| {
+            for _ in 0..40 {
+                assert_eq!(running.post(r#"[{"do": "orbit", "right": 0.01, "up": 0}]"#).status, 200);
+                running.session.whole_picture().unwrap();
+            }
+        });
+    });
+}
+
+#[test]
+fn it_ends_when_it_is_asked_to_while_requests_wait() {
+    let mut running = Running::start();
+    running.session.whole_picture().unwrap();
+    let version = running.session.shown().version;
+    let mut stream = TcpStream::connect(running.address).unwrap();
+    let waiting =
+        format!("GET /{}/state?client=a&after={version} HTTP/1.1\r\nHost: {}\r\n\r\n", running.token, running.address);
+    stream.write_all(waiting.as_bytes()).unwrap();
+    std::thread::sleep(Duration::from_millis(100));
+    let start = Instant::now();
+    assert_eq!(running.stop(), Ended::Asked);
+    assert!(start.elapsed() < Duration::from_millis(900), "{:?}", start.elapsed());
+}
+
+#[test]
+fn it_ends_a_while_after_its_last_page() {
+    let mut running = Running::start();
+    assert_eq!(running.get("state?client=a").status, 200);
+    running.ask(&format!("POST /{}/leave?client=a", running.token), &running.host(), "");
+    let start = Instant::now();
+    assert_eq!(running.thread.take().unwrap().join().unwrap(), Ended::PagesClosed);
+    assert!((15..40).contains(&start.elapsed().as_secs()), "{:?}", start.elapsed());
+}

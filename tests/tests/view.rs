@@ -1,0 +1,151 @@
+//! `organza view` as a process: one line with an address, pictures with the bytes of `organza render`, an end on request.
+
+use organza_tests::{Place, SMALL_SCENE, organza};
+use std::io::{BufRead, BufReader, Read, Write};
+use std::net::TcpStream;
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+const FOG: &str = "[[object]]\nname = \"fog\" # thin\nmedium_box = { min = [-1, -1, -1], max = [1, 1, 1], extinction = 1.5, spacing = 0.25 }\n\
+                   [[object]]\nname = \"pane\"\nrectangle = { center = [0, 0, 0.5], u = [1, 0, 0], v = [0, 1, 0], spacing = 0.1 }\n";
+
+/// A view that is running.
+struct View {
+    child: Child,
+    address: String,
+    token: String,
+}
+
+impl View {
+    fn start(place: &Place, arguments: &[&str]) -> Self {
+        let mut command = organza();
+        command.current_dir(place.folder()).arg("view").args(arguments).arg("--no-open");
+        let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+        let mut line = String::new();
+        BufReader::new(child.stdout.as_mut().unwrap()).read_line(&mut line).unwrap();
+        let rest = line.trim().strip_prefix("http://").unwrap_or_else(|| panic!("an address, not {line:?}"));
+        let (address, token) = rest.trim_end_matches('/').split_once('/').unwrap();
+        Self { address: address.to_owned(), token: token.to_owned(), child }
+    }
+
+    /// The status and the body of an answer.
+    fn get(&self, path: &str) -> (u16, Vec<u8>) {
+        let mut stream = TcpStream::connect(&self.address).unwrap();
+        let head =
+            format!("GET /{}/{path} HTTP/1.1\r\nHost: {}\r\nConnection: close\r\n\r\n", self.token, self.address);
+        stream.write_all(head.as_bytes()).unwrap();
+        let mut answer = Vec::new();
+        stream.read_to_end(&mut answer).unwrap();
+        let end = answer.windows(4).position(|bytes| bytes == b"\r\n\r\n").unwrap();
+        let status = std::str::from_utf8(&answer[9..12]).unwrap().parse().unwrap();
+        (status, answer.split_off(end + 4))
+    }
+
+    /// A file to save, once the whole picture is drawn.
+    fn saved(&self, what: &str) -> Vec<u8> {
+        let end = Instant::now() + Duration::from_secs(60);
+        loop {
+            let (status, body) = self.get(&format!("save/{what}?client=a"));
+            match status {
+                200 => return body,
+                503 if Instant::now() < end => std::thread::sleep(Duration::from_millis(20)),
+                _ => panic!("{what}: {status} {}", String::from_utf8_lossy(&body)),
+            }
+        }
+    }
+
+    /// Interrupts it; its exit code and what it said.
+    fn interrupted(mut self) -> (Option<i32>, String) {
+        Command::new("kill").args(["-INT", &self.child.id().to_string()]).status().unwrap();
+        let start = Instant::now();
+        let status = self.child.wait().unwrap();
+        assert!(start.elapsed() < Duration::from_secs(1), "{:?}", start.elapsed());
+        let mut told = String::new();
+        self.child.stderr.take().unwrap().read_to_string(&mut told).unwrap();
+        (status.code(), told)
+    }
+}
+
+#[test]
+fn saved_files_are_those_of_render_with_the_same_changes() {
+    let place = Place::new(&format!("{SMALL_SCENE}{FOG}"));
+    let played = "[{\"do\": \"show\", \"object\": \"fog\", \"visible\": true},\n{\"do\": \"opacity\", \"object\": \"pane\", \"opacity\": 0.5},\n\
+                  {\"do\": \"exposure\", \"stops\": 1.5}, {\"do\": \"effect\", \"name\": \"shadow.0\", \"switch\": \"off\"}]";
+    place.write("events.json", played);
+    let view = View::start(&place, &["s.toml", "--size", "30x20", "--play", "events.json", "--record", "again.json"]);
+    for (file, name) in [("picture.png", "view.png"), ("picture.exr", "view.exr"), ("scene", "view.toml")] {
+        place.write(name, view.saved(file));
+    }
+    assert_eq!(view.interrupted(), (Some(0), String::new()));
+    let set = ["object.fog.visible=true", "object.pane.opacity=0.5", "render.exposure=1.5"];
+    let set = set.iter().flat_map(|set| ["--set", set]);
+    let outputs = ["-o", "render.png", "-o", "render.exr", "--effect", "shadow.0=off"];
+    let arguments: Vec<&str> = ["render", "s.toml", "--size", "30x20"].into_iter().chain(set).chain(outputs).collect();
+    place.expect(0, &arguments, "");
+    assert!(place.bytes("view.png") == place.bytes("render.png"));
+    assert!(place.bytes("view.exr") == place.bytes("render.exr"));
+    // The scene that was saved is the same picture, and keeps its comments.
+    place.expect(0, &["render", "view.toml", "-o", "saved.png"], "");
+    assert_eq!(place.pixels("saved.png"), place.pixels("render.png"));
+    assert!(String::from_utf8(place.bytes("view.toml")).unwrap().contains("# thin"));
+    // What was done is recorded, and is played again to the same picture.
+    let again = View::start(&place, &["s.toml", "--size", "30x20", "--play", "again.json"]);
+    assert!(again.saved("picture.png") == place.bytes("render.png"));
+    assert_eq!(again.interrupted().0, Some(0));
+}
+
+#[test]
+fn data_files_are_seen_as_render_draws_them() {
+    let place = Place::new(SMALL_SCENE);
+    place.write("corner.xyz", "0 0 0\n1 0 0\n0 1 0\n0 0 1\n");
+    let options = ["corner.xyz", "--azimuth", "70", "--size", "40x30", "--ground"];
+    let view = View::start(&place, &options);
+    place.write("view.png", view.saved("picture.png"));
+    let (_, state) = view.get("state?client=a");
+    assert!(String::from_utf8(state).unwrap().contains("\"title\":\"corner.xyz\""));
+    assert_eq!(view.interrupted().0, Some(0));
+    let arguments: Vec<&str> = ["render"].into_iter().chain(options).chain(["-o", "render.png"]).collect();
+    place.expect(0, &arguments, "");
+    assert!(place.bytes("view.png") == place.bytes("render.png"));
+}
+
+#[test]
+fn an_interrupt_ends_it_within_a_second_while_it_draws() {
+    let long = "[render]\ntechnique = \"particles\"\n[render.particles]\nrepeat_level = 100000\n";
+    let place = Place::new(&format!("{SMALL_SCENE}{FOG}{long}"));
+    let view = View::start(&place, &["s.toml", "--size", "320x240", "--record", "events.json"]);
+    std::thread::sleep(Duration::from_millis(300));
+    assert_eq!(view.interrupted().0, Some(0));
+    assert_eq!(place.bytes("events.json"), b"[]\n");
+}
+
+#[test]
+fn what_cannot_be_viewed_is_refused_before_an_address_is_printed() {
+    let place = Place::new(&format!("{SMALL_SCENE}{FOG}"));
+    place.write("events.json", "[{\"do\": \"show\", \"object\": \"nobody\", \"visible\": true}]");
+    place.write("fly.json", "[{\"do\": \"fly\"}]");
+    for (code, arguments, said) in [
+        (3, &["s.toml", "--play", "events.json"][..], "expected the name of an object, found `nobody`"),
+        (3, &["s.toml", "--play", "fly.json"], "fly.json: unknown variant"),
+        (4, &["s.toml", "--play", "none.json"], "cannot read the events"),
+        (4, &["s.toml", "--record", "fly.json"], "fly.json"),
+        (4, &["none.toml"], "none.toml"),
+        (2, &["s.toml", "--listen", "localhost"], "expected a numeric address"),
+        (2, &["s.toml", "--backend", "ash"], "--backend ash is for `organza render`"),
+        (2, &["s.toml", "--force"], "--record"),
+    ] {
+        let arguments: Vec<&str> = ["view", "--no-open"].into_iter().chain(arguments.iter().copied()).collect();
+        let out = place.expect(code, &arguments, said);
+        assert!(out.stdout.is_empty(), "{arguments:?}");
+    }
+    assert_eq!(place.made(), ["events.json", "fly.json"]);
+}
+
+#[test]
+fn an_address_that_others_reach_is_warned_of() {
+    let place = Place::new(&format!("{SMALL_SCENE}{FOG}"));
+    let view = View::start(&place, &["s.toml", "--listen", "0.0.0.0"]);
+    assert!(view.address.starts_with("127.0.0.1:"));
+    let (code, told) = view.interrupted();
+    assert!(code == Some(0) && told.contains("warning: --listen 0.0.0.0"), "{told}");
+}
