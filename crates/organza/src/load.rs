@@ -87,6 +87,15 @@ impl Loaded {
         self.slice_thickness = scaled_thickness(scene, self.exponent);
     }
 
+    /// Takes the lights from a scene that differs from the loaded one in camera, lights and render settings alone, and what is known of its media in these lights;
+    /// no light has a slide.
+    pub(crate) fn relight(&mut self, scene: &Scene, media: Vec<MediumFacts>) {
+        let scale = libm::exp2(f64::from(self.exponent)).recip();
+        self.lights = lights(scene);
+        self.lights.iter_mut().for_each(|light| light.light = light.light.scaled(scale));
+        self.media = media;
+    }
+
     /// Keeps a share of the splats, above 0, at most 1, and gives back all of them; `None` where these stay.
     pub(crate) fn keep_share(&mut self, share: f64) -> Option<Everything> {
         if share >= 1.0 {

@@ -14,7 +14,7 @@ use crate::frame::Frame;
 use crate::frame::matter::Matter;
 use crate::load::files::Files;
 use crate::load::own::Own;
-use crate::load::{self, Loaded, Spare, light_statistics};
+use crate::load::{self, Loaded, Spare, light_statistics, media_facts};
 use crate::memory::{self, Memory};
 use crate::pass;
 use crate::plan::{Effect, Plan};
@@ -105,13 +105,13 @@ pub(crate) struct Prepared<'a> {
     pub(crate) explanation: Explanation,
 }
 
-/// Loads and plans; `made` is what was loaded and planned of another scene that [`turned`] says serves this one.
+/// Loads and plans; `made` is what was loaded of another scene that serves this one, and its plan where [`turned`] says that it serves, too.
 pub(crate) fn prepare<'a>(
     scene: &'a Scene,
     options: &RenderOptions,
     progress: &Progress,
     files: &Files,
-    made: Option<(Loaded, Planned)>,
+    made: Option<(Loaded, Option<Planned>)>,
 ) -> Result<Prepared<'a>, Error> {
     let mut cost = CostRecord::default();
     memory::check("the image", memory::image_bytes(scene), options.max_memory)?;
@@ -119,7 +119,10 @@ pub(crate) fn prepare<'a>(
     let (mut loaded, planned) = match made {
         Some((mut loaded, planned)) => {
             loaded.retarget(scene);
-            (loaded, Some(planned))
+            if planned.is_none() {
+                loaded.relight(scene, media_facts(scene, options, progress, files)?);
+            }
+            (loaded, planned)
         }
         None => (load_measured(scene, options, progress, files, &mut cost)?, None),
     };
@@ -237,6 +240,41 @@ pub(crate) fn turned(a: &Scene, b: &Scene) -> bool {
     // Discs as large as some pixels; splats that no shadow map needs, as light is carried for this view.
     let of_view = || carried::of_scene(b).is_some() || visible(b).any(by_pixels);
     *a == other && (a.camera == b.camera || !of_view())
+}
+
+/// Whether the splats of one scene serve the other, after [`Loaded::retarget`] and [`Loaded::relight`]: whether they differ in camera, lights and settings of the
+/// render alone, and none of these decides what is made of an object.
+pub(crate) fn splats_serve(before: &Scene, after: &Scene, loaded: &Loaded) -> bool {
+    // The frame's number is part of the hash.
+    let alike = Scene {
+        camera: after.camera,
+        target: after.target,
+        lights: after.lights.clone(),
+        sha256: after.sha256.clone(),
+        ..before.clone()
+    };
+    let by_pixels = |object: &SceneObject| matches!(object.points.size, Some(DiscSize::Pixels(_)));
+    let by_lights = |object: &SceneObject| matches!(object.source, Source::Extract(_));
+    let is_seen_alike = before.camera == after.camera || !visible(after).any(by_pixels);
+    let has_slide = |scene: &Scene| scene.lights.iter().any(|light| light.slide.is_some());
+    let is_lit_alike = before.lights == after.lights
+        || before.lights.is_empty() == after.lights.is_empty()
+            && !has_slide(before)
+            && !has_slide(after)
+            && !visible(after).any(by_lights);
+    is_seen_alike
+        && is_lit_alike
+        && carried::of_scene(before).is_none()
+        && carried::of_scene(after).is_none()
+        && same_splats(&alike, after)
+        && chosen(loaded, after) == loaded.planned
+}
+
+/// How the objects of a loaded scene would be drawn in the lights and by the settings of another.
+fn chosen(loaded: &Loaded, scene: &Scene) -> Vec<PlannedObject> {
+    let lights = light_statistics(&scene.lights, &scene.render.effects);
+    let objects = loaded.statistics.iter().zip(visible(scene).map(|object| technique_of(object, scene)));
+    choose(objects, &lights)
 }
 
 /// Plans the render of a loaded scene. `scene` may differ from the one that was loaded in its render settings; whether the same

@@ -12,7 +12,7 @@ use crate::frame::{Frame, KeptGroups, Leaves};
 use crate::load::Loaded;
 use crate::load::files::Files;
 use crate::plan::Plan;
-use crate::prepare::{Explanation, Planned, Prepared, prepare, settled, turned};
+use crate::prepare::{Explanation, Planned, Prepared, prepare, settled, splats_serve, turned};
 use crate::scene::{FoundCamera, Scene, SceneObject, Technique};
 use crate::technique::{Checkpoint, Kept, Session, Sets};
 use crate::{CostRecord, Error, Layers, Progress, RenderOptions, doubts};
@@ -161,8 +161,11 @@ pub(crate) fn render_keeping(
     let mut checkpoint = options.checkpoint.as_ref().map(open).transpose()?;
     let helper = options.device.as_deref().map(Helper::new);
     // What serves no longer makes room.
-    let made = left.made.take().filter(|made| turned(&made.scene, scene));
-    let (made, mut leaves) = made.map_or_else(Default::default, |m| (Some((m.loaded, m.planned)), m.leaves));
+    let (made, mut leaves) = match left.made.take() {
+        Some(made) if turned(&made.scene, scene) => (Some((made.loaded, Some(made.planned))), made.leaves),
+        Some(made) if splats_serve(&made.scene, scene, &made.loaded) => (Some((made.loaded, None)), Leaves::default()),
+        _ => Default::default(),
+    };
     let stated = scene;
     let Prepared { scene, loaded, planned, explanation } = prepare(stated, options, progress, &left.files, made)?;
     let scene = &*scene;
@@ -194,7 +197,9 @@ pub(crate) fn render_keeping(
     };
     // What was taken out of a scene may be in the next.
     let is_whole = planned.plan.left_out.is_empty();
-    let layers = match draw(&frame, &mut session, &mut cost) {
+    let drawn = draw(&frame, &mut session, &mut cost);
+    left.groups = frame.groups.take();
+    let layers = match drawn {
         Ok(layers) => layers,
         Err(error) => {
             // What was made before a stop serves the next frame, which begins with it.
@@ -204,7 +209,6 @@ pub(crate) fn render_keeping(
         }
     };
     let Session { sets, predicted, .. } = session;
-    left.groups = frame.groups.take();
     let is_judged = !doubtful && scene.frames.is_none();
     let coarse = is_judged.then(|| frame.coarse()).flatten().and_then(doubts::of_cells);
     let leaves = frame.leaves();

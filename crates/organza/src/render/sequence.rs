@@ -87,3 +87,84 @@ impl Sequence {
         render_keeping(frame, options, progress, &mut self.left)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::render;
+    use crate::scene::{LoadOptions, Override, parse};
+
+    /// Fog in a bunch of lights, a pane and a wall, some of them seen by raw points that are sized in the world.
+    const SCENE: &[u8] = br#"
+        version = 1
+        [camera]
+        position = [0.2, 0.1, 4]
+        target = [0, 0, 0]
+        size = [24, 16]
+        [ambient]
+        color = [0.1, 0.1, 0.1]
+        [[light]]
+        name = "lamp"
+        kind = "point"
+        position = [2, 3, 4]
+        intensity = [20, 18, 16]
+        [[light]]
+        name = "sun"
+        kind = "directional"
+        direction = [-1, -1, -0.5]
+        irradiance = [1, 1, 1]
+        [material.smoke]
+        medium = { extinction = 1.5, albedo = 0.8 }
+        [[object]]
+        name = "fog"
+        material = "smoke"
+        medium_box = { min = [-1, -1, -1], max = [1, 1, 1], extinction = 0.7, spacing = 0.25 }
+        [[object]]
+        name = "pane"
+        rectangle = { center = [0, 0, 0.3], u = [1.2, 0, 0.5], v = [0, 1.2, 0], spacing = 0.15 }
+        opacity = 0.4
+        [[object]]
+        name = "wall"
+        rectangle = { center = [0.5, 0, -2], u = [2, 0, 0], v = [0, 2, 0], spacing = 0.2 }
+        [render]
+        technique = "points"
+        particles = { repeat_level = 4 }
+    "#;
+
+    fn changed(changes: &[&str]) -> Scene {
+        let overrides = changes.iter().map(|change| Override::parse(change).unwrap()).collect();
+        parse("lights.toml".as_ref(), SCENE, &LoadOptions { overrides, ..LoadOptions::default() }).unwrap()
+    }
+
+    #[test]
+    fn splats_serve_other_lights_and_settings_with_the_same_bits() {
+        let options = RenderOptions::default();
+        let progress = Progress::new();
+        // Each follows the one before it.
+        let states: [(&[&str], bool); 9] = [
+            (&[], false),
+            (&["render.exposure=1"], true),
+            (&["light.sun.irradiance=[0.2, 0.3, 0.1]"], true),
+            (&["light.lamp.position=[-2, 3, 4]"], true),
+            (&["light.lamp.shadow=false"], true),
+            (&["light.lamp.shadow=false", "camera.position=[1, 1, 4]"], true),
+            // Nothing casts any more, and the pane may be faint: that is another scene.
+            (&["object.pane.opacity=0.5"], false),
+            (&["object.pane.opacity=0.5", "render.tolerance=0.01"], true),
+            (&["object.pane.opacity=0.5", "render.splat_share=0.5"], false),
+        ];
+        for technique in ["points", "particles", "sheets"] {
+            let mut sequence = Sequence::default();
+            for (changes, serves) in states {
+                let technique = format!("render.technique=\"{technique}\"");
+                let scene = changed(&[&[technique.as_str()], changes].concat());
+                let kept = sequence.render(&scene, &options, &progress).unwrap();
+                let alone = render(&scene, &options, &progress).unwrap();
+                assert_eq!(kept.layers, alone.layers, "{technique}: {changes:?}");
+                assert_eq!(kept.plan, alone.plan, "{technique}: {changes:?}");
+                let is_read = kept.cost.stages.iter().any(|stage| stage.name == crate::pass::READ);
+                assert_eq!(!is_read, serves, "{technique}: {changes:?}");
+            }
+        }
+    }
+}
