@@ -191,7 +191,7 @@ fn info_lists_arrays_and_an_unknown_one_is_refused_with_their_names() {
 #[test]
 fn columns_of_meshes_are_refused_where_they_are_none() {
     let place = Place::new(&scene("square.ply", "wind", 1.0, false));
-    place.write("square.ply", &ply());
+    place.write("square.ply", ply());
     place.expect(
         3,
         &["render", "s.toml"],
