@@ -54,13 +54,18 @@ fn columns_that_are_used_are_not_named_and_the_others_are() {
     let both = ply("float", "alpha\nproperty float opacity", &["0.5 0.25"]);
     assert_eq!(unused("a.ply", &both), ["alpha"]);
     assert_eq!(points("a.ply", both.as_bytes()).opacity, [0.25]);
-    // The corners of a mesh have none, and whatever stands there is read over.
-    let mesh = ply("float", "alpha", &["7", "nan", "1"])
-        .replace("end_header\n", "element face 1\nproperty list uchar int vertex_index\nend_header\n")
-        .replace("1 0 0 nan", "0 1 0 nan")
-        + "3 0 1 2\n";
-    assert_eq!(unused("a.ply", &mesh), ["alpha"]);
-    assert!(matches!(load("a.ply", mesh.as_bytes()).unwrap(), Loaded::Mesh(_)));
+    // The corners of a mesh have some, too.
+    let mesh = |opacities: &[&str; 3]| {
+        ply("float", "alpha", opacities)
+            .replace("end_header\n", "element face 1\nproperty list uchar int vertex_index\nend_header\n")
+            .replacen("1 0 0 ", "0 1 0 ", 1)
+            + "3 0 1 2\n"
+    };
+    let read = mesh(&["0.5", "0", "1"]);
+    assert!(unused("a.ply", &read).is_empty());
+    let Loaded::Mesh(found) = load("a.ply", read.as_bytes()).unwrap() else { panic!("no mesh") };
+    assert_eq!(found.opacity, [0.5, 0.0, 1.0]);
+    assert!(load("a.ply", mesh(&["0.5", "nan", "1"]).as_bytes()).is_err());
 }
 
 #[test]
