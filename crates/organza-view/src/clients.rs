@@ -1,5 +1,6 @@
 //! Who looks at a session: at most two pages.
 
+use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
 /// Most pages that share a session.
@@ -13,6 +14,9 @@ const CLOSED: Duration = Duration::from_secs(20);
 
 /// The same where the last page fell silent without a word: phones and notebooks that sleep may wake again.
 const ASLEEP: Duration = Duration::from_secs(600);
+
+/// Most names that are remembered of pages that were closed.
+const MOST_LEFT: usize = 64;
 
 /// Most characters of the word that a page calls itself by.
 const LONGEST_NAME: usize = 64;
@@ -28,6 +32,8 @@ struct Client {
 #[derive(Debug, Default)]
 pub(crate) struct Clients {
     clients: Vec<Client>,
+    /// Names of the last pages that said that they are closed: what they still asked on their way out brings none of them back.
+    left: VecDeque<String>,
     /// When the view is over, where there is no page after the first.
     over_at: Option<Instant>,
 }
@@ -41,6 +47,8 @@ pub(crate) enum Admission {
     Nameless,
     /// There are as many as may be.
     Full,
+    /// It has said that it is closed.
+    Left,
 }
 
 impl Clients {
@@ -49,6 +57,9 @@ impl Clients {
         let is_word = !name.is_empty() && name.len() <= LONGEST_NAME && name.bytes().all(|b| b.is_ascii_alphanumeric());
         if !is_word {
             return Admission::Nameless;
+        }
+        if self.left.iter().any(|left| left == name) {
+            return Admission::Left;
         }
         self.forget(now);
         if let Some(client) = self.clients.iter_mut().find(|client| client.name == name) {
@@ -65,6 +76,12 @@ impl Clients {
 
     /// A page says that it is closed.
     pub(crate) fn leave(&mut self, name: &str, now: Instant) {
+        if self.clients.iter().any(|client| client.name == name) {
+            self.left.push_back(name.to_owned());
+            if self.left.len() > MOST_LEFT {
+                self.left.pop_front();
+            }
+        }
         self.keep(now + CLOSED, |client| client.name != name);
     }
 
@@ -116,6 +133,24 @@ mod tests {
         assert!(!clients.are_gone(start + CLOSED));
         let silent = start + CLOSED + SILENCE;
         assert!(!clients.are_gone(silent) && !clients.are_gone(silent + CLOSED) && clients.are_gone(silent + ASLEEP));
+    }
+
+    #[test]
+    fn what_a_page_asked_on_its_way_out_does_not_bring_it_back() {
+        let start = Instant::now();
+        let mut clients = Clients::default();
+        clients.admit("a", start);
+        clients.leave("a", start);
+        assert_eq!(clients.admit("a", start), Admission::Left);
+        assert!(clients.are_gone(start + CLOSED));
+        // Names are forgotten in the end, and so is whoever was never there.
+        for rank in 0..=MOST_LEFT {
+            let name = format!("b{rank}");
+            clients.leave(&name, start);
+            assert_eq!(clients.admit(&name, start), Admission::Welcome);
+            clients.leave(&name, start);
+        }
+        assert_eq!(clients.left.len(), MOST_LEFT);
     }
 
     #[test]

@@ -204,6 +204,7 @@ fn admit(counter: &Counter, name: &str) -> Result<(), Refusal> {
         Admission::Nameless => {
             Err(Refusal::new(StatusCode::BAD_REQUEST, "`client`: expected a word of 1 to 64 letters and digits"))
         }
+        Admission::Left => Err(Refusal::new(StatusCode::GONE, "this page has said that it is closed; load it again")),
         Admission::Full => {
             let message =
                 format!("{MOST_CLIENTS} pages show this scene already; close one of them, then load this page again");

@@ -117,7 +117,11 @@ impl State {
                 self.viewpoint = Some(Viewpoint { distance, centre, ..turned });
             }
             Event::Reset {} => self.viewpoint = None,
-            Event::Show { object, visible } => self.change(scene, object)?.visible = Some(*visible),
+            Event::Show { object, visible } => {
+                self.change(scene, object)?.visible = Some(*visible);
+                // An object that was switched off as an effect is shown by this.
+                self.effects.remove(&format!("object.{object}"));
+            }
             Event::Opacity { object, opacity } => self.change(scene, object)?.opacity = *opacity,
             Event::Effect { name, switch } => {
                 self.effects.insert(name.clone(), *switch);
@@ -277,6 +281,14 @@ mod tests {
     fn an_effect_is_left_to_the_plan_again() {
         let switch = |switch| Event::Effect { name: "shadow.sun".into(), switch };
         assert_eq!(after(&[switch(Switch::On), switch(Switch::Auto)]).unwrap().render.effects, []);
+    }
+
+    #[test]
+    fn an_object_is_shown_that_was_switched_off_as_an_effect() {
+        let off = Event::Effect { name: "object.fog".into(), switch: Switch::Off };
+        assert!(!after(&[off.clone()]).unwrap().objects[2].visible);
+        let shown = after(&[off, show("fog", true)]).unwrap();
+        assert!(shown.objects[2].visible && shown.render.effects.is_empty());
     }
 
     #[test]

@@ -271,7 +271,12 @@ fn whole(
     let has_array = matches!(loaded, Loaded::Grid(_)) && ["Vtk", "VtkXml"].contains(&reading.notes.format.as_str());
     if let (Some(name), false) = (&reading.params.array, has_array) {
         let found = format!("the array '{}', and a file without arrays", escaped(name.as_bytes(), LONGEST_NAME));
-        return Err(ReadError::input(Place::File, "a volume of VTK", found, "leave out `array`"));
+        return Err(ReadError::input(
+            Place::File,
+            "a volume of VTK",
+            found,
+            "leave out `array`, or `--color-by`, which names it on the command line",
+        ));
     }
     match loaded {
         Loaded::Points(points) => check_columns(&points, reading).map(|()| Loaded::Points(points)),

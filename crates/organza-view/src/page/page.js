@@ -64,7 +64,7 @@ async function follow(path, after, take) {
   while (isOpen) {
     try {
       const answer = await fetch(`${path}?client=${client}&after=${after()}`);
-      if (answer.status === 409 || answer.status === 403) {
+      if ([403, 409, 410].includes(answer.status)) {
         trouble(sentence(await answer.json()));
         isOpen = false;
         return;
@@ -417,6 +417,8 @@ at("save-scene").addEventListener("click", () => save("scene"));
 
 // The server ends a while after the last page.
 window.addEventListener("pagehide", () => navigator.sendBeacon(`leave?client=${client}`));
+// A page that comes back as it was left is a new one to the server.
+window.addEventListener("pageshow", (event) => event.persisted && location.reload());
 
 follow("state", () => (shown ? shown.version : 0), async (answer) => show(await answer.json()));
 follow("picture", () => number, takePicture);
