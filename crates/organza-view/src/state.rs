@@ -286,7 +286,7 @@ mod tests {
     #[test]
     fn an_object_is_shown_that_was_switched_off_as_an_effect() {
         let off = Event::Effect { name: "object.fog".into(), switch: Switch::Off };
-        assert!(!after(&[off.clone()]).unwrap().objects[2].visible);
+        assert!(!after(std::slice::from_ref(&off)).unwrap().objects[2].visible);
         let shown = after(&[off, show("fog", true)]).unwrap();
         assert!(shown.objects[2].visible && shown.render.effects.is_empty());
     }
