@@ -3,7 +3,7 @@
 use splat_core::glam::Vec3;
 use splat_core::{Camera, Cloud, SliceOrder};
 
-/// What splats are compared by in [`by_centre`].
+/// The distance by which [`by_centre`] compares splats.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum CentreKey {
     /// The view depth of the centre.

@@ -50,7 +50,7 @@ pub struct Facts {
     /// Name, lowest and highest number of columns beside positions; of points those that they can be coloured and kept by, of
     /// meshes those that they can be coloured by.
     pub columns: Vec<(String, [f64; 2])>,
-    /// What the numbers of columns of a mesh belong to, by their names.
+    /// The element, vertex or face, that each column of a mesh has a number for, by the column's name.
     pub associations: Vec<(String, Association)>,
     /// Faults of a mesh.
     pub faults: Option<MeshFaults>,

@@ -62,8 +62,9 @@ impl Artist {
         let (scene, found) = organza::settled(&request.scene, &self.options, &progress, self.sequence.files())?;
         let scene = scene.into_owned();
         if request.has_own_camera {
-            let own = found.map_or_else(|| Viewpoint::of_scene(&scene), |f| Viewpoint::of_camera(&f.camera, f.target));
-            desk.set_own(own);
+            let first =
+                found.map_or_else(|| Viewpoint::of_scene(&scene), |f| Viewpoint::of_camera(&f.camera, f.target));
+            desk.set_own(first);
         }
         if !self.is_fluent(&scene) {
             let mut coarse = scene.clone();

@@ -330,8 +330,8 @@ mod tests {
         ] {
             assert!(!is_own_host(loopback, host), "{host}");
         }
-        let own: IpAddr = "192.168.0.1".parse().unwrap();
-        assert!(is_own_host(own, "192.168.0.1:80") && !is_own_host(own, "192.168.0.2:80"));
+        let address: IpAddr = "192.168.0.1".parse().unwrap();
+        assert!(is_own_host(address, "192.168.0.1:80") && !is_own_host(address, "192.168.0.2:80"));
         assert!(
             is_own_host("0.0.0.0".parse().unwrap(), "192.168.0.2:80")
                 && !is_own_host("::".parse().unwrap(), "a.example")

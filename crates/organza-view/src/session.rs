@@ -112,8 +112,8 @@ impl Session {
         let Opening { title, file, text, load, options, files } = opening;
         let source = Source { file, text, load };
         let stated = source.scene(source.load.overrides.clone())?;
-        let own = Viewpoint::of_scene(&organza::fitted(&stated, &options, progress, &files)?.0);
-        let desk = Arc::new(Desk::new(own));
+        let first = Viewpoint::of_scene(&organza::fitted(&stated, &options, progress, &files)?.0);
+        let desk = Arc::new(Desk::new(first));
         let artist = Artist::new(files, options);
         let board = Arc::clone(&desk);
         let thread = std::thread::Builder::new().name("artist".into()).spawn(move || artist.work(&board));
@@ -137,9 +137,9 @@ impl Session {
     /// What a scene with these changes is refused for; the state is then as before.
     pub fn apply(&self, events: &[Event]) -> Result<(), Error> {
         let mut studio = self.studio();
-        let own = self.desk.own();
+        let first = self.desk.own();
         let mut state = studio.state.clone();
-        events.iter().try_for_each(|event| state.apply(event, &studio.stated, &own))?;
+        events.iter().try_for_each(|event| state.apply(event, &studio.stated, &first))?;
         let overrides = studio.source.overrides(&state, &studio.stated)?;
         let told = studio.source.told(&overrides);
         let scene = studio.source.scene(overrides)?;

@@ -99,13 +99,13 @@ impl State {
         self.viewpoint.as_ref()
     }
 
-    /// Takes an event in; `own` is the viewpoint of the scene's own camera. Numbers that a scene refuses are for [`Source::scene`] to find.
+    /// Takes an event in; `first` is the viewpoint of the scene's own camera. Numbers that a scene refuses are for [`Source::scene`] to find.
     ///
     /// # Errors
     /// [`Error::Input`] for numbers that no hand makes, and for objects that the scene does not have.
-    pub(crate) fn apply(&mut self, event: &Event, scene: &Scene, own: &Viewpoint) -> Result<(), Error> {
+    pub(crate) fn apply(&mut self, event: &Event, scene: &Scene, first: &Viewpoint) -> Result<(), Error> {
         event.check()?;
-        let viewpoint = self.viewpoint.unwrap_or(*own);
+        let viewpoint = self.viewpoint.unwrap_or(*first);
         match event {
             Event::Orbit { right, up } => self.viewpoint = Some(viewpoint.orbited(*right, *up)),
             Event::Pan { right, up } => self.viewpoint = Some(viewpoint.panned(*right, *up)),
@@ -237,9 +237,9 @@ mod tests {
     fn after(events: &[Event]) -> Result<Scene, Error> {
         let source = source();
         let scene = source.scene(Vec::new()).unwrap();
-        let own = Viewpoint::of_scene(&scene);
+        let first = Viewpoint::of_scene(&scene);
         let mut state = State::default();
-        events.iter().try_for_each(|event| state.apply(event, &scene, &own))?;
+        events.iter().try_for_each(|event| state.apply(event, &scene, &first))?;
         source.scene(source.overrides(&state, &scene)?)
     }
 

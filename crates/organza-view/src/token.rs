@@ -35,12 +35,12 @@ impl Token {
 
     /// Whether a word is the token. It takes the same time wherever the first wrong letter stands.
     pub(crate) fn is(&self, word: &str) -> bool {
-        let own = self.text.as_bytes();
-        let other = word.as_bytes();
-        if own.len() != other.len() {
+        let token = self.text.as_bytes();
+        let word = word.as_bytes();
+        if token.len() != word.len() {
             return false;
         }
-        let difference = own.iter().zip(other).fold(0, |sum, (a, b)| sum | (a ^ b));
+        let difference = token.iter().zip(word).fold(0, |sum, (a, b)| sum | (a ^ b));
         std::hint::black_box(difference) == 0
     }
 }

@@ -27,7 +27,7 @@ pub struct ColoredMesh {
     pub mesh: Arc<Mesh>,
     /// How its colours arose, one sentence without a full stop each.
     pub said: Vec<String>,
-    /// What its colours stand for; `None` where no number is known.
+    /// The numbers that its colours stand for; `None` where no number is known.
     pub scale: Option<ColorScale>,
 }
 
@@ -74,21 +74,21 @@ pub fn colored_mesh(
     };
     mesh.color = shown.iter().map(|look| look.color).collect();
     if matches!(by.colors, PointColors::Transfer(_, Classified::Opacity)) {
-        let own = mesh.opacity.iter().copied().chain(std::iter::repeat(1.0));
-        let opacity: Vec<f32> = shown.iter().zip(own).map(|(look, own)| look.opacity * own).collect();
+        let stated = mesh.opacity.iter().copied().chain(std::iter::repeat(1.0));
+        let opacity: Vec<f32> = shown.iter().zip(stated).map(|(look, stated)| look.opacity * stated).collect();
         mesh.opacity = if opacity.iter().all(|share| *share == 1.0) { Vec::new() } else { opacity };
     }
     Ok(ColoredMesh { mesh: mesh.into(), said, scale })
 }
 
-/// What a number looks like.
+/// The look of a number.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Look {
     color: [f32; 3],
     opacity: f32,
 }
 
-/// What numbers look like.
+/// The looks of the numbers of a column.
 struct Looks<'a> {
     by: &'a ColorBy,
     colored: &'a Colored,
@@ -112,10 +112,11 @@ impl Looks<'_> {
     }
 
     /// Whether what lies between two numbers looks otherwise than what lies between their looks.
-    fn deviates(&self, [a, b]: [f64; 2]) -> bool {
-        let [from, to] = [self.at(a), self.at(b)];
+    fn deviates(&self, first: f64, last: f64) -> bool {
+        let from = self.at(first);
+        let to = self.at(last);
         [0.25, 0.5, 0.75].iter().any(|share| {
-            let found = self.at(a + (b - a) * share);
+            let found = self.at(first + (last - first) * share);
             let between = |x: f32, y: f32| x + (y - x) * *share as f32;
             let is_other = |k: usize| {
                 (found.color[k].sqrt() - between(from.color[k], to.color[k]).max(0.0).sqrt()).abs() > TOLERANCE
@@ -134,7 +135,7 @@ fn divide(mesh: &mut Mesh, looks: &Looks<'_>) -> Option<String> {
     let before = mesh.triangles.len();
     let mut is_new = vec![true; before];
     let is_cut_short = loop {
-        let edges = wanted(mesh, looks, &is_new);
+        let edges = deviating(mesh, looks, &is_new);
         if edges.is_empty() {
             break false;
         }
@@ -166,16 +167,17 @@ fn edge(t: &[u32; 3], k: usize) -> [u32; 2] {
 }
 
 /// The edges of new triangles that are to be halved, in order, each once.
-fn wanted(mesh: &Mesh, looks: &Looks<'_>, is_new: &[bool]) -> Vec<[u32; 2]> {
+fn deviating(mesh: &Mesh, looks: &Looks<'_>, is_new: &[bool]) -> Vec<[u32; 2]> {
     let values = &mesh.columns[0].values;
     let new = mesh.triangles.iter().zip(is_new).filter(|(_, is_new)| **is_new);
     let mut edges: Vec<[u32; 2]> = new.flat_map(|(t, _)| [0, 1, 2].map(|k| edge(t, k))).collect();
     edges.par_sort_unstable();
     edges.dedup();
     let deviates = |edge: &[u32; 2]| {
-        let [a, b] = edge.map(|v| values[v as usize]);
+        let first = values[edge[0] as usize];
+        let last = values[edge[1] as usize];
         let is_short = mesh.position[edge[0] as usize] == mesh.position[edge[1] as usize];
-        a.is_finite() && b.is_finite() && !is_short && looks.deviates([a, b])
+        first.is_finite() && last.is_finite() && !is_short && looks.deviates(first, last)
     };
     edges.into_par_iter().with_min_len(CHUNK).filter(deviates).collect()
 }
@@ -197,8 +199,7 @@ fn part(mesh: &mut Mesh) {
 mod tests {
     use super::*;
     use crate::ColorMap;
-    use splat_core::TransferFunction;
-    use splat_core::TransferPoint;
+    use splat_core::{TransferFunction, TransferPoint};
 
     fn square(association: Association, values: &[f64]) -> Arc<Mesh> {
         let mut mesh = Mesh::rectangle(DVec3::ZERO, DVec3::X, DVec3::Y);
@@ -206,7 +207,7 @@ mod tests {
         mesh.into()
     }
 
-    fn of(mesh: Arc<Mesh>, colors: PointColors) -> ColoredMesh {
+    fn colored_by_heat(mesh: Arc<Mesh>, colors: PointColors) -> ColoredMesh {
         let by = ColorBy { column: "heat".into(), colors };
         colored_mesh(mesh, &by, DVec3::Y, &SplatParams::default()).expect("a column that is there")
     }
@@ -215,13 +216,13 @@ mod tests {
     fn a_map_is_followed_between_far_vertices_and_faces_have_one_colour() {
         let map = ColorMap::VIRIDIS;
         let colors = || PointColors::Map(map, Some([0.0, 1.0]));
-        let ramp = of(square(Association::Vertex, &[0.0, 1.0, 1.0, 0.0]), colors());
+        let ramp = colored_by_heat(square(Association::Vertex, &[0.0, 1.0, 1.0, 0.0]), colors());
         assert!(ramp.mesh.triangles.len() > 8 && ramp.mesh.columns.is_empty());
         for (p, color) in ramp.mesh.position.iter().zip(&ramp.mesh.color) {
             assert_eq!(*color, map.at(f64::from(0.5 * p.x + 0.5)));
         }
         assert!((ramp.mesh.area() - 4.0).abs() < 1e-9 && ramp.said.len() == 2, "{:?}", ramp.said);
-        let faces = of(square(Association::Triangle, &[0.0, 1.0]), colors());
+        let faces = colored_by_heat(square(Association::Triangle, &[0.0, 1.0]), colors());
         assert_eq!(faces.mesh.color, [[map.at(0.0); 3], [map.at(1.0); 3]].concat());
         assert_eq!(faces.said, ["faces have the colours of `heat` by the map viridis from 0 to 1"]);
     }
@@ -232,7 +233,7 @@ mod tests {
         let transfer = TransferFunction::new(vec![point(0.0, 0.0), point(4.0, 1.0)]).expect("rising values");
         let mut mesh = Mesh::clone(&square(Association::Vertex, &[0.0, 4.0, f64::NAN, 2.0]));
         mesh.opacity = vec![1.0, 0.5, 0.5, 0.5];
-        let shown = of(mesh.into(), PointColors::Transfer(transfer, Classified::Opacity));
+        let shown = colored_by_heat(mesh.into(), PointColors::Transfer(transfer, Classified::Opacity));
         assert_eq!(shown.mesh.opacity, [0.0, 0.5, 0.5, 0.25]);
         assert_eq!(shown.mesh.triangles.len(), 2);
     }

@@ -201,11 +201,11 @@ pub(crate) fn plan(mesh: &Mesh, params: &MeshParams) -> Result<Plan, ConvertErro
     let has_opaque = mesh.opacity.is_empty() || mesh.opacity.contains(&1.0);
     let ends = params.opacity >= 1.0 && has_opaque && !p.shows_images();
     let borders = if ends { open_edges(mesh) } else { Vec::new() };
-    let wanted = wanted(params.opacity);
+    let of_opacity = wanted(params.opacity);
     let wanted = Wanted {
         tangent: !borders.is_empty() || p.shows_images(),
-        crossing_depth: wanted.crossing_depth || !mesh.opacity.is_empty(),
-        ..wanted
+        crossing_depth: of_opacity.crossing_depth || !mesh.opacity.is_empty(),
+        ..of_opacity
     };
     let mut plan = Plan { measures, starts, normal, borders, wanted, report };
     let triangles = (0..mesh.triangles.len()).into_par_iter().with_min_len(4096);

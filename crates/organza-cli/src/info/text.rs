@@ -151,8 +151,8 @@ fn values(facts: &Facts, text: &mut Lines) {
     for (name, [low, high]) in &facts.columns {
         let unit = 1e-5 * (high - low).max(1e-300);
         let association = facts.associations.iter().find(|(column, _)| column == name);
-        let of = association.map(|(_, association)| format!(" of the {}", association.name())).unwrap_or_default();
-        text.add("column", format!("{name}{of}: {} to {}", rounded(*low, unit), rounded(*high, unit)));
+        let element = association.map(|(_, association)| format!(" of the {}", association.name())).unwrap_or_default();
+        text.add("column", format!("{name}{element}: {} to {}", rounded(*low, unit), rounded(*high, unit)));
     }
 }
 

@@ -12,7 +12,7 @@ pub struct LoadOptions {
     pub allow_path: bool,
     /// Forbid that the scene's own word, its key `root`, allows data outside the scene's root folder: for scenes of strangers.
     pub sandbox: bool,
-    /// What the text of the scene and the images of its footprints take while they are read, together with all else on the same account.
+    /// The account on which the text of the scene and the images of its footprints are while they are read, with all else that is on it.
     pub memory: MemoryAccount,
     /// Data that the scene may name as `memory:NAME`.
     pub in_memory: InMemory,

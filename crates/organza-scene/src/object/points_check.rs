@@ -15,7 +15,7 @@ const MOST_PIXELS: f64 = 1024.0;
 /// Names of the column of classes.
 const CLASSES: [&str; 2] = ["classification", "class"];
 
-/// What an object says of its points, or of a mesh's colours; `None` of the keys for other sources.
+/// Checks an object's keys of points, and of the colours of a mesh; sources that take none of them have the default.
 pub(crate) fn check_points(at: &At<'_>, raw: &RawObject) -> Result<PointsLook, Error> {
     let is_medium = raw.points.is_some() && raw.form == Some(RawPointForm::Medium);
     if raw.extinction.is_some() && !is_medium {

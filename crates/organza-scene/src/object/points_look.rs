@@ -4,7 +4,7 @@ use crate::{MatterSource, Scene, SceneMaterial, SceneObject, Source};
 use convert::{ColorBy, DiscShape, DiscSize, Kept, MatterParams, PointMaterial, PointsShown, SplatParams};
 use std::sync::Arc;
 
-/// What a scene says of raw points; of a mesh its colours alone, and of other sources nothing.
+/// The look that a scene states for raw points. A mesh takes the colours of it, and other sources nothing.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct PointsLook {
     /// The column that they, or a mesh, take their colours from; `None` for those of the file, the object or its material.

@@ -99,7 +99,7 @@ pub(crate) struct RawSheets {
     pub(crate) slab_width: Option<Auto>,
     /// How slabs get their values: "gather", each pixel reads the lattice, "splat", each voxel writes into slabs, or "auto" (default).
     pub(crate) reconstruction: RawReconstruction,
-    /// What gathered pixels read: "gaussian" (default), the kernel that is splatted, or "linear", between eight voxels.
+    /// The kernel of gathered slabs: "gaussian" (default), that of splatted ones, or "linear", between eight voxels.
     pub(crate) kernel: Option<RawKernel>,
     /// Radius of a voxel's kernel in steps of its lattice, 0.5 to 8; default 2.
     pub(crate) kernel_extent: Option<f64>,
@@ -126,7 +126,7 @@ pub(crate) enum RawReconstruction {
     Splat,
 }
 
-/// What gathered pixels read.
+/// The kernel of gathered slabs.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 #[schemars(rename = "Kernel")]

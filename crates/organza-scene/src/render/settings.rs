@@ -151,7 +151,7 @@ pub struct SheetsSettings {
     pub slab_width: Option<f64>,
     /// How slabs get their values.
     pub reconstruction: Reconstruction,
-    /// What gathered pixels read of a lattice.
+    /// The kernel of gathered slabs.
     pub kernel: SheetKernel,
     /// Radius of a voxel's kernel, steps of its lattice, in [0.5, 8].
     pub kernel_extent: f64,
@@ -382,7 +382,7 @@ pub enum Reconstruction {
     Splat,
 }
 
-/// What gathered pixels read of a lattice.
+/// The kernel of gathered slabs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SheetKernel {
     /// The kernel that is splatted by default.

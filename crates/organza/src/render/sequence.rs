@@ -94,7 +94,7 @@ mod tests {
     use crate::render;
     use crate::scene::{LoadOptions, Override, parse};
 
-    /// Fog in a bunch of lights, a pane and a wall, some of them seen by raw points that are sized in the world.
+    /// Fog, a pane and a wall in the light of a lamp and of a sun.
     const SCENE: &[u8] = br#"
         version = 1
         [camera]
@@ -148,7 +148,7 @@ mod tests {
             (&["light.lamp.position=[-2, 3, 4]"], true),
             (&["light.lamp.shadow=false"], true),
             (&["light.lamp.shadow=false", "camera.position=[1, 1, 4]"], true),
-            // Nothing casts any more, and the pane may be faint: that is another scene.
+            // Of another opacity splats are made anew, and a share of them is another cloud.
             (&["object.pane.opacity=0.5"], false),
             (&["object.pane.opacity=0.5", "render.tolerance=0.01"], true),
             (&["object.pane.opacity=0.5", "render.splat_share=0.5"], false),

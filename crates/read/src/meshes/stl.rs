@@ -149,8 +149,8 @@ fn paint(
     mesh.color.extend(facets.iter().flat_map(|facet| [stated(facet).unwrap_or(PLAIN); 3]));
     let plain = facets.iter().filter(|facet| stated(facet).is_none()).count();
     if plain > 0 {
-        let all = counted(facets.len() as u64, "facet");
-        reading.notes.remark(format!("{plain} of {all} state no colour: they are white"));
+        let facets = counted(facets.len() as u64, "facet");
+        reading.notes.remark(format!("{plain} of {facets} state no colour: they are white"));
     }
     if let FacetColors::Materialise { opacity: share, .. } = colors {
         opacity::give(mesh, vec![share; corners], &mut reading.notes);

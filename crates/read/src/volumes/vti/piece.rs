@@ -96,14 +96,14 @@ fn named<'a, 'i>(
             if used.contains(&array) {
                 continue;
             }
-            let own = array.attribute("Name").unwrap_or_default();
-            let surface = SurfaceArray { name: own, association, numbers: components(array)? };
-            if own.is_empty() || !surface.is_offered() {
+            let name = array.attribute("Name").unwrap_or_default();
+            let surface = SurfaceArray { name, association, numbers: components(array)? };
+            if name.is_empty() || !surface.is_offered() {
                 continue;
             }
             let numbers = if named.needs(&surface) { Some(joined(pieces, array, used, reading)?) } else { None };
             named.take(&surface, numbers.as_deref());
-            let same = |other: &Node<'_, '_>| other.attribute("Name") == Some(own);
+            let same = |other: &Node<'_, '_>| other.attribute("Name") == Some(name);
             let data = pieces.iter().filter_map(|piece| child(piece.node, element));
             used.extend(data.flat_map(|data| arrays(data).filter(same).collect::<Vec<_>>()));
         }

@@ -189,12 +189,12 @@ impl Source<'_> {
         reading: &mut Reading<'_>,
     ) -> Result<Vec<MeshColumn>, ReadError> {
         let mut named = NamedArrays::new(reading.params);
-        for of in [Of::Points, Of::Cells] {
-            let (association, count) = match of {
+        for element in [Of::Points, Of::Cells] {
+            let (association, count) = match element {
                 Of::Points => (Association::Vertex, cells.points.len()),
                 Of::Cells | Of::File => (Association::Triangle, cells.kinds.len()),
             };
-            let arrays = self.arrays.all().filter(|array| array.of == of && array.tuples == count as u64);
+            let arrays = self.arrays.all().filter(|array| array.of == element && array.tuples == count as u64);
             for array in arrays.filter(|array| !used.contains(&array.place)).collect::<Vec<_>>() {
                 let surface = SurfaceArray { name: &array.name, association, numbers: array.numbers };
                 if !surface.is_offered() {
