@@ -75,7 +75,7 @@ fn fault(
     }
 }
 
-/// Tries every key: with every source that it could apply to by each technique, or with every fourth source by one technique, in
+/// Tries every key: with every source that it could apply to by each technique, or with every sixth source by one technique, in
 /// turn.
 fn try_all(by_each: bool) {
     let folder = Folder::new();
@@ -87,8 +87,8 @@ fn try_all(by_each: bool) {
         let mut with: Vec<_> = SOURCES.iter().map(|s| (s.name, by(s.name))).filter(|(_, by)| !by.is_empty()).collect();
         if !by_each {
             let one = |(i, (source, by)): (usize, (_, Vec<_>))| (source, vec![by[(at + i) % by.len()]]);
-            let first = at % with.len().clamp(1, 4);
-            with = with.into_iter().enumerate().map(one).skip(first).step_by(4).collect();
+            let first = at % with.len().clamp(1, 6);
+            with = with.into_iter().enumerate().map(one).skip(first).step_by(6).collect();
         }
         for (source, technique) in with.iter().flat_map(|(source, by)| by.iter().map(|t| (*source, *t))) {
             tried += 1;

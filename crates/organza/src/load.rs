@@ -7,6 +7,7 @@ mod images;
 pub(crate) mod input;
 mod loading;
 mod media_facts;
+mod mesh_facts;
 mod normalize;
 pub(crate) mod object;
 pub(crate) mod own;
@@ -14,7 +15,7 @@ pub(crate) mod own;
 use crate::cost::{Count, before_conversion};
 use crate::form::{Form, PlannedObject};
 use crate::scene::{Scene, SceneLight, SceneObject, SwitchedEffect};
-use crate::statistics::{LightStatistics, MediumFacts, ObjectStatistics};
+use crate::statistics::{LightStatistics, ObjectStatistics, SourceFacts};
 use crate::{CostRecord, Error, Progress, RenderOptions, SplatCount, pass};
 pub(crate) use context::{BYTES_PER_LATTICE_POINT, BYTES_PER_SPLAT};
 use convert::ColorScale;
@@ -23,7 +24,6 @@ pub(crate) use fit::placed;
 use glam::DVec3;
 use images::Images;
 use loading::Loading;
-pub(crate) use media_facts::media_facts;
 use normalize::normalize;
 use object::Prepared;
 use own::Own;
@@ -40,8 +40,8 @@ pub struct Loaded {
     pub(crate) own: Vec<Own>,
     /// What the planner was told of every visible object.
     pub(crate) statistics: Vec<ObjectStatistics>,
-    /// What was known of media that scatter light.
-    pub(crate) media: Vec<MediumFacts>,
+    /// What was known of media and meshes.
+    pub(crate) facts: SourceFacts,
     /// How each of them was to be drawn.
     pub(crate) planned: Vec<PlannedObject>,
     /// Materials by id.
@@ -87,13 +87,13 @@ impl Loaded {
         self.slice_thickness = scaled_thickness(scene, self.exponent);
     }
 
-    /// Takes the lights from a scene that differs from the loaded one in camera, lights and render settings alone, and what is known of its media in these lights;
+    /// Takes the lights from a scene that differs from the loaded one in camera, lights and render settings alone, and what is known of its sources in these lights;
     /// no light has a slide.
-    pub(crate) fn relight(&mut self, scene: &Scene, media: Vec<MediumFacts>) {
+    pub(crate) fn relight(&mut self, scene: &Scene, facts: SourceFacts) {
         let scale = libm::exp2(f64::from(self.exponent)).recip();
         self.lights = lights(scene);
         self.lights.iter_mut().for_each(|light| light.light = light.light.scaled(scale));
-        self.media = media;
+        self.facts = facts;
     }
 
     /// Keeps a share of the splats, above 0, at most 1, and gives back all of them; `None` where these stay.
@@ -189,7 +189,22 @@ pub(crate) struct Inputs<'a> {
     warnings: Vec<String>,
     /// What is known of each visible object, in the order of the scene.
     pub(crate) statistics: Vec<ObjectStatistics>,
-    media: Vec<MediumFacts>,
+    facts: SourceFacts,
+}
+
+/// What is known of media and meshes, before anything is converted. A file is read once: what reads it again takes it from `files`.
+///
+/// # Errors
+/// Those of reading files.
+pub(crate) fn source_facts(
+    scene: &Scene,
+    options: &RenderOptions,
+    progress: &Progress,
+    files: &Files,
+) -> Result<SourceFacts, Error> {
+    let media = media_facts::media_facts(scene, options, progress, files)?;
+    let meshes = mesh_facts::mesh_facts(scene, options, progress, files)?;
+    Ok(SourceFacts { media, meshes })
 }
 
 /// Whether the splats of objects that are drawn from their own data are not needed: asked with these, how all objects are drawn, what
@@ -222,8 +237,8 @@ pub(crate) fn read<'a>(
         Ok::<_, Error>((prepared, images))
     })?;
     let statistics = loading.statistics(&prepared);
-    let media = media_facts(scene, options, progress, files)?;
-    Ok(Inputs { loading, prepared, images, lights, warnings: files.mended(), statistics, media })
+    let facts = source_facts(scene, options, progress, files)?;
+    Ok(Inputs { loading, prepared, images, lights, warnings: files.mended(), statistics, facts })
 }
 
 impl Inputs<'_> {
@@ -241,7 +256,7 @@ impl Inputs<'_> {
         beside: &[Count],
         cost: &mut CostRecord,
     ) -> Result<Loaded, Error> {
-        let Self { loading, mut prepared, mut images, mut lights, mut warnings, statistics, media } = self;
+        let Self { loading, mut prepared, mut images, mut lights, mut warnings, statistics, facts } = self;
         let Loading { scene, progress, files, options } = loading;
         let mut early = spare.map(|_| loading.own(&mut prepared, &planned, &mut warnings)).transpose()?;
         if let (Some(own), Some(spare)) = (&mut early, spare)
@@ -286,7 +301,7 @@ impl Inputs<'_> {
             cloud,
             own,
             statistics,
-            media,
+            facts,
             planned,
             materials,
             objects,

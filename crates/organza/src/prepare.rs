@@ -14,7 +14,7 @@ use crate::frame::Frame;
 use crate::frame::matter::Matter;
 use crate::load::files::Files;
 use crate::load::own::Own;
-use crate::load::{self, Loaded, Spare, light_statistics, media_facts};
+use crate::load::{self, Loaded, Spare, light_statistics, source_facts};
 use crate::memory::{self, Memory};
 use crate::pass;
 use crate::plan::{Effect, Plan};
@@ -120,7 +120,7 @@ pub(crate) fn prepare<'a>(
         Some((mut loaded, planned)) => {
             loaded.retarget(scene);
             if planned.is_none() {
-                loaded.relight(scene, media_facts(scene, options, progress, files)?);
+                loaded.relight(scene, source_facts(scene, options, progress, files)?);
             }
             (loaded, planned)
         }
@@ -171,7 +171,7 @@ pub(crate) fn prepare<'a>(
         notes.extend(doubts::lacking(&plan));
     }
     notes.extend(said.notes);
-    let chosen = settle::foreseen_bytes(&scene, &loaded.media);
+    let chosen = settle::foreseen_bytes(&scene, &loaded.facts);
     let most = memory.total().max(loading).max(files.most.get()).max(files.peak()).max(gathering).max(chosen);
     let explanation = Explanation {
         plan,
@@ -461,7 +461,7 @@ fn plan_effects(
     let draws = |by: &Technique| row(*by).draws_splats && !statistics.lit_as_drawn;
     plan.draws = plan.by.iter().zip(&plan.is_own).map(|(by, own)| draws(by) && !own).collect();
     techniques(scene).into_iter().for_each(|t| (row(t).plans)(scene, loaded, &mut plan));
-    plan.estimates = settle::all_estimates(scene, &loaded.media);
+    plan.estimates = settle::all_estimates(scene, &loaded.facts);
     Ok(Effects { statistics, plan, shadowing: Some(shadowing) })
 }
 

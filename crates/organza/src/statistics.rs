@@ -67,6 +67,42 @@ pub struct MediumFacts {
     pub outside_share: f64,
 }
 
+/// What is known of a mesh, before anything is converted.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MeshFacts {
+    /// Rank of its object in the scene.
+    pub object: usize,
+    /// Whether some of it is translucent, by its material or by opacities of its file.
+    pub is_translucent: bool,
+    /// Whether nothing about it is seen on discs alone: a footprint, a field on its surface.
+    pub stays_triangles: bool,
+    /// The greatest change of the transmittance of one crossing with the logarithm of its optical depth, 0 to 1/e; 0 for what is opaque.
+    pub sensitivity: f64,
+    /// Sine of the angle between neighbouring triangles, root mean square, 0 to 1; 0 where the sensitivity is.
+    pub bend: f64,
+}
+
+/// What is known of media and meshes, before anything is converted.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct SourceFacts {
+    /// Of media that scatter light, in the order of the scene.
+    pub media: Vec<MediumFacts>,
+    /// Of meshes, in the order of the scene.
+    pub meshes: Vec<MeshFacts>,
+}
+
+impl SourceFacts {
+    /// Those of the medium that an object is, by its rank in the scene.
+    pub(crate) fn medium(&self, object: usize) -> Option<&MediumFacts> {
+        self.media.iter().find(|medium| medium.object == object)
+    }
+
+    /// Those of the mesh that an object is, by its rank in the scene.
+    pub(crate) fn mesh(&self, object: usize) -> Option<&MeshFacts> {
+        self.meshes.iter().find(|mesh| mesh.object == object)
+    }
+}
+
 /// What the planner knows of the effects of one visible object, once it is loaded.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ObjectFacts {

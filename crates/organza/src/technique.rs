@@ -231,7 +231,7 @@ pub(crate) static TABLE: [Row; 5] = [
     },
     Row {
         technique: Technique::Sheets,
-        is_offered: |_| false,
+        is_offered: |asked| estimates::suits_triangles(Technique::Sheets, asked),
         estimates: |asked| estimates::of_slabs(Technique::Sheets, asked),
         foresees: sheets::foresees,
         foresees_bytes: sheets::foresees_bytes,
@@ -275,7 +275,7 @@ pub(crate) static TABLE: [Row; 5] = [
     Row {
         technique: Technique::Reference,
         is_offered: |_| false,
-        estimates: |asked| estimates::of_one_order(Technique::Reference, asked),
+        estimates: |asked| estimates::of_discs(Technique::Reference, asked),
         how: "are sorted pixel by pixel, exactly, which is slow",
         by_device: false,
         steps: &[Step {
@@ -306,7 +306,7 @@ fn composited(scene: &Scene, all: &Translucent) -> Vec<Count> {
 const POINTS: Row = Row {
     technique: Technique::Points,
     is_offered: |_| true,
-    estimates: |asked| estimates::of_one_order(Technique::Points, asked),
+    estimates: |asked| estimates::of_discs(Technique::Points, asked),
     foresees: |_, _| OwnWork::default(),
     foresees_bytes: |_, _, _| 0,
     how: "are composited in order",

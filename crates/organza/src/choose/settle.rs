@@ -7,13 +7,12 @@
 use crate::choose::technique_of;
 use crate::cost::{Count, CountedPass, Item, Rates, Translucent, samples};
 use crate::load::files::Files;
-use crate::load::media_facts;
+use crate::load::source_facts;
 use crate::plan::Estimate;
 use crate::scene::{EffectKind, RenderSettings, Scene, SceneObject, SwitchedEffect, Technique};
-use crate::statistics::MediumFacts;
+use crate::statistics::SourceFacts;
 use crate::technique::{Asked, Row, TABLE, estimates, row};
 use crate::{Error, Progress, RenderOptions, pass};
-use convert::PointColors;
 use std::borrow::Cow;
 
 /// How many times the time of the next way a way may take.
@@ -30,7 +29,7 @@ const ENTRIES_PER_SPLAT: f64 = 8.0;
 /// names all techniques is returned as it is.
 ///
 /// # Errors
-/// Those of reading media; [`Error::Input`] where a layer is asked for that no way fills.
+/// Those of reading media and meshes; [`Error::Input`] where a layer is asked for that no way fills.
 pub(crate) fn settled<'s>(
     scene: Cow<'s, Scene>,
     options: &RenderOptions,
@@ -40,13 +39,13 @@ pub(crate) fn settled<'s>(
     if is_settled(&scene) {
         return Ok(scene);
     }
-    let media = media_facts(&scene, options, progress, files)?;
+    let facts = source_facts(&scene, options, progress, files)?;
     let switched = SwitchedEffect::find(&scene.render.effects, EffectKind::Scatter, "");
     let has_layer = scene.render.layers.names().any(|name| name == SCATTERED);
     let asked_for = has_layer || switched == Some(true);
-    let fits = |way: &Way| !way.scatters_again || bytes(&scene, &media, way) <= options.max_memory;
+    let fits = |way: &Way| !way.scatters_again || bytes(&scene, &facts, way) <= options.max_memory;
     let is_wanted = |way: &Way| if way.scatters_again { switched != Some(false) } else { !asked_for };
-    let ways: Vec<Way> = ways(&scene, &media).filter(is_wanted).filter(fits).collect();
+    let ways: Vec<Way> = ways(&scene, &facts).filter(is_wanted).filter(fits).collect();
     let Some(way) = chosen(&ways, scene.render.tolerance) else {
         let what = if has_layer { "the layer `scatterN`" } else { "the effect `scatter`, which is on" };
         let message = format!("{what}: no technique that `auto` chooses scatters light again and again here");
@@ -66,11 +65,11 @@ pub(crate) fn is_settled(scene: &Scene) -> bool {
 }
 
 /// What the techniques err by that draw, and those that `auto` may take in their place, object by object.
-pub(crate) fn all_estimates(scene: &Scene, media: &[MediumFacts]) -> Vec<Estimate> {
+pub(crate) fn all_estimates(scene: &Scene, facts: &SourceFacts) -> Vec<Estimate> {
     let visible = scene.objects.iter().enumerate().filter(|(_, object)| object.visible);
     let of_object = |(rank, object): (usize, &SceneObject)| {
         let drawing = technique_of(object, scene);
-        let asked = Asked { scene, object, medium: medium_of(media, rank), settings: &scene.render };
+        let asked = asked(scene, rank, facts, &scene.render);
         let others = TABLE.iter().filter(|row| row.technique != drawing && (row.is_offered)(&asked));
         let techniques = std::iter::once(drawing).chain(others.map(|row| row.technique));
         techniques.flat_map(|technique| estimates(technique, &asked)).collect::<Vec<_>>()
@@ -91,44 +90,35 @@ struct Way {
 }
 
 /// The ways that draw the scene, the plainest first.
-fn ways<'a>(scene: &'a Scene, media: &'a [MediumFacts]) -> impl Iterator<Item = Way> + 'a {
+fn ways<'a>(scene: &'a Scene, facts: &'a SourceFacts) -> impl Iterator<Item = Way> + 'a {
     let plain = std::iter::once_with(|| {
         let by = scene.objects.iter().enumerate().map(|(rank, object)| match technique_of(object, scene) {
-            Technique::Auto => suiting(scene, object, medium_of(media, rank)),
+            Technique::Auto => suiting(&asked(scene, rank, facts, &scene.render)),
             named => named,
         });
-        way(scene, media, by.collect(), scene.render.clone())
+        way(scene, facts, by.collect(), scene.render.clone())
     });
     let scattering = TABLE.iter().filter_map(|row| {
         let settings = (row.scattering_again)(&scene.render)?;
-        let draws = |object: &SceneObject| match technique_of(object, scene) {
+        let draws = |(rank, object): (usize, &SceneObject)| match technique_of(object, scene) {
             Technique::Auto => true,
-            named => named == row.technique || is_opaque(scene, object),
+            named => named == row.technique || asked(scene, rank, facts, &settings).is_opaque(),
         };
         let named = |object: &SceneObject| match technique_of(object, scene) {
             Technique::Auto => row.technique,
             named => named,
         };
-        let draws_all = scene.objects.iter().filter(|object| object.visible).all(draws);
+        let draws_all = scene.objects.iter().enumerate().filter(|(_, object)| object.visible).all(draws);
         let by: Vec<Technique> = scene.objects.iter().map(named).collect();
-        (draws_all && media.iter().any(|medium| medium.is_lattice && by[medium.object] == row.technique))
-            .then(|| way(scene, media, by, settings))
+        (draws_all && facts.media.iter().any(|medium| medium.is_lattice && by[medium.object] == row.technique))
+            .then(|| way(scene, facts, by, settings))
     });
     plain.chain(scattering)
 }
 
-/// Whether an object is opaque for certain: raw points may each have an opacity of their own, and a column may give a mesh opacities. Those of a
-/// mesh's file are not known yet.
-fn is_opaque(scene: &Scene, object: &SceneObject) -> bool {
-    let is_classified =
-        object.points.color_by.as_ref().is_some_and(|by| matches!(by.colors, PointColors::Transfer(..)));
-    let may_vary =
-        object.field.is_some() || is_classified || !object.materials.is_empty() || object.source.is_of_points();
-    !object.source.is_medium() && !may_vary && scene.opacity_of(object) == 1.0
-}
-
-fn medium_of(media: &[MediumFacts], rank: usize) -> Option<&MediumFacts> {
-    media.iter().find(|medium| medium.object == rank)
+/// What techniques are asked about an object.
+fn asked<'a>(scene: &'a Scene, rank: usize, facts: &'a SourceFacts, settings: &'a RenderSettings) -> Asked<'a> {
+    Asked { scene, rank, object: &scene.objects[rank], facts, settings }
 }
 
 /// A technique that may draw an object by itself.
@@ -140,46 +130,45 @@ struct Candidate {
 
 /// The technique that suits an object by itself, with the settings of the scene: of those within the tolerance the fastest, else the one that errs
 /// least, and of equal ones the first of the table.
-fn suiting(scene: &Scene, object: &SceneObject, medium: Option<&MediumFacts>) -> Technique {
-    let asked = Asked { scene, object, medium, settings: &scene.render };
-    let offered = TABLE.iter().filter(|row| (row.is_offered)(&asked));
+fn suiting(asked: &Asked<'_>) -> Technique {
+    let offered = TABLE.iter().filter(|row| (row.is_offered)(asked));
     let candidate = |row: &Row| Candidate {
         technique: row.technique,
-        displayed_error: greatest(&estimates(row.technique, &asked)),
-        seconds: seconds(row, &asked),
+        displayed_error: greatest(&estimates(row.technique, asked)),
+        seconds: seconds(row, asked),
     };
     let candidates: Vec<Candidate> = offered.map(candidate).collect();
-    let sufficient = candidates.iter().filter(|one| one.displayed_error <= scene.render.tolerance);
+    let sufficient = candidates.iter().filter(|one| one.displayed_error <= asked.settings.tolerance);
     let fastest = sufficient.min_by(|a, b| a.seconds.total_cmp(&b.seconds));
     let best = fastest.or_else(|| candidates.iter().min_by(|a, b| a.displayed_error.total_cmp(&b.displayed_error)));
     best.map_or(TABLE[0].technique, |one| one.technique)
 }
 
 /// Bytes that the techniques of a way take at most for media, before anything is converted.
-fn bytes(scene: &Scene, media: &[MediumFacts], way: &Way) -> u64 {
+fn bytes(scene: &Scene, facts: &SourceFacts, way: &Way) -> u64 {
     let used = TABLE.iter().filter(|row| way.by.contains(&row.technique));
-    used.map(|row| (row.foresees_bytes)(scene, &way.settings, media)).sum()
+    used.map(|row| (row.foresees_bytes)(scene, &way.settings, &facts.media)).sum()
 }
 
 /// Bytes with which a settled scene is settled alike: with fewer the plan would choose otherwise. 0 where it chose nothing that it weighs by memory.
-pub(crate) fn foreseen_bytes(scene: &Scene, media: &[MediumFacts]) -> u64 {
+pub(crate) fn foreseen_bytes(scene: &Scene, facts: &SourceFacts) -> u64 {
     let is_weighed = scene.render.is_chosen && scene.render.sheets.scattering().is_some();
     let chosen = |row: &&Row| {
         let is_of_it = |object: &SceneObject| object.is_chosen && technique_of(object, scene) == row.technique;
         is_weighed && scene.objects.iter().any(is_of_it)
     };
-    TABLE.iter().filter(chosen).map(|row| (row.foresees_bytes)(scene, &scene.render, media)).sum()
+    TABLE.iter().filter(chosen).map(|row| (row.foresees_bytes)(scene, &scene.render, &facts.media)).sum()
 }
 
 fn greatest(estimates: &[Estimate]) -> f64 {
     estimates.iter().map(|estimate| estimate.displayed_error).fold(0.0, f64::max)
 }
 
-fn way(scene: &Scene, media: &[MediumFacts], by: Vec<Technique>, settings: RenderSettings) -> Way {
+fn way(scene: &Scene, facts: &SourceFacts, by: Vec<Technique>, settings: RenderSettings) -> Way {
     let mut displayed_error = 0.0f64;
     let mut time = 0.0;
-    for (rank, object) in scene.objects.iter().enumerate().filter(|(_, object)| object.visible) {
-        let asked = Asked { scene, object, medium: medium_of(media, rank), settings: &settings };
+    for (rank, _) in scene.objects.iter().enumerate().filter(|(_, object)| object.visible) {
+        let asked = asked(scene, rank, facts, &settings);
         displayed_error = displayed_error.max(greatest(&estimates(by[rank], &asked)));
         time += seconds(row(by[rank]), &asked);
     }
@@ -198,7 +187,7 @@ fn seconds(row: &Row, asked: &Asked<'_>) -> f64 {
     let maps: f64 = scene.lights.iter().filter(|light| light.shadow).map(|light| light.count() as f64).sum();
     // What is drawn from its own data carries its light, or has splats for shadow maps.
     let carries = (row.scattering_again)(asked.settings).is_some() && asked.settings.sheets.scattering().is_some();
-    let converted = asked.medium.map_or(samples / SAMPLES_PER_SPLAT, |medium| medium.splats);
+    let converted = asked.medium().map_or(samples / SAMPLES_PER_SPLAT, |medium| medium.splats);
     let drawn = if draws_own_data { 0.0 } else { converted };
     let fragments = if draws_own_data { 0.0 } else { samples * FRAGMENTS_PER_SAMPLE };
     let translucent = Translucent {
