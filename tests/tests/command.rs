@@ -40,7 +40,22 @@ fn exit_0_render_writes_all_outputs_and_nothing_else() {
 fn exit_0_the_default_output_is_the_scenes_name() {
     let place = place();
     place.expect(0, &["render", "s.toml"], "");
-    assert_eq!(place.made(), ["s.exr"]);
+    assert_eq!(place.made(), ["s.png"]);
+    // What PNG does not hold is asked for.
+    place.expect(0, &["render", "s.toml", "--layers", "depth"], "");
+    assert_eq!(place.made(), ["s.exr", "s.png"]);
+}
+
+#[test]
+fn exit_0_a_background_is_the_colour_that_is_named_and_a_jpeg_is_near() {
+    let place = place();
+    let clear = ["render", "s.toml", "--set", "object.0.visible=false", "--background"];
+    for (name, expected) in [("white", [255; 3]), ("#336699", [0x33, 0x66, 0x99]), ("#fa0", [0xff, 0xaa, 0])] {
+        place.expect(0, &[&clear[..], &[name, "-o", "b.png", "-o", "b.jpg", "--force"]].concat(), "");
+        let [exact, near] = ["b.png", "b.jpg"].map(|file| image::open(place.path(file)).unwrap().to_rgb8());
+        assert!(exact.pixels().all(|pixel| pixel.0 == expected), "{name}: {:?}", exact.get_pixel(0, 0));
+        assert!(near.as_raw().iter().zip(exact.as_raw()).all(|(a, b)| a.abs_diff(*b) <= 3), "{name}");
+    }
 }
 
 #[test]
@@ -62,7 +77,11 @@ fn exit_2_is_for_the_command_line() {
     let place = place();
     for (arguments, stderr) in [
         (vec!["rendr"], "unrecognized subcommand"),
-        (vec!["render", "s.toml", "-o", "a.jpg"], "expected a name that ends in .exr or .png"),
+        (vec!["render", "s.toml", "-o", "a.gif"], "expected a name that ends in .exr, .png or .jpg"),
+        (vec!["render", "s.toml", "-o", "a.jpg", "--transparent"], "--transparent is for PNG files"),
+        (vec!["render", "s.toml", "-o", "a.jpg", "--layers", "depth"], "--layers is for EXR files"),
+        (vec!["render", "s.toml", "--background", "mauve"], "expected #rrggbb or one of black, white"),
+        (vec!["render", "s.toml", "--background", "#12345g"], "expected #rrggbb or one of black, white"),
         (vec!["render", "s.toml", "-o", "a.exr", "-o", "a.exr"], "named twice"),
         (vec!["render", "s.toml", "--set", "render.sed=1"], "--set render.sed=1: unknown key `sed`"),
         (vec!["render", "s.toml", "--size", "0x9"], "--size 0x9: `size`: expected 1 to 65536 pixels a side, found 0"),

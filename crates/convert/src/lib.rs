@@ -27,7 +27,7 @@ pub mod reference;
 mod splats;
 mod volume;
 
-pub use color::color_by::{Classified, ColorBy, Colored, PointColors, class_name, colored};
+pub use color::color_by::{Classified, ColorBy, Colored, MapScale, PointColors, class_name, colored};
 pub use color::color_map::ColorMap;
 pub use color::color_scale::{ColorScale, ScaleNumbers};
 pub use color::colored_mesh::{ColoredMesh, colored_mesh};

@@ -73,7 +73,7 @@ fn what_chooses_no_material_is_refused_or_named() {
 
 #[test]
 fn splats_keep_the_numbers_that_their_colours_are_of_where_that_is_asked_for() {
-    let colors = PointColors::Map(ColorMap::VIRIDIS, None);
+    let colors = PointColors::map(ColorMap::VIRIDIS);
     let by = ColorBy { column: "heat".into(), colors };
     let heat = |p: Vec3| f64::from(p.x + 12.0 * p.y) * 0.5;
     let asked = PointsShown { color_by: Some(&by), keeps_values: true, ..PointsShown::default() };

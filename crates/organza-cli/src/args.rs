@@ -5,7 +5,10 @@ mod parse;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 #[cfg(feature = "view")]
 use parse::parse_address;
-use parse::{parse_budget, parse_bytes, parse_device, parse_error_limit, parse_finite, parse_frames, parse_size};
+use parse::{
+    parse_budget, parse_bytes, parse_color, parse_device, parse_error_limit, parse_finite, parse_frames, parse_range,
+    parse_size,
+};
 #[cfg(feature = "view")]
 use std::net::SocketAddr;
 use std::path::PathBuf;
@@ -134,13 +137,19 @@ pub(super) struct FirstArguments {
     /// Share of the picture's width or height that is filled, above 0, at most 1 [default: 0.9]
     #[arg(long, value_name = "SHARE", value_parser = parse_finite)]
     pub(super) fit: Option<f64>,
-    /// Look of volumes, and the colour map of --color-by: ct-bone, ct-skin, mri, cloud, viridis, magma, inferno, plasma, cividis, turbo, grey, or a .json preset of ParaView
+    /// Look of volumes, and the colour map of --color-by: ct-bone, ct-skin, mri, cloud, viridis, magma, inferno, plasma, cividis, turbo, grey, coolwarm, or a .json preset of ParaView
     #[arg(long, value_name = "NAME")]
     pub(super) preset: Option<String>,
     /// Column that points or meshes take their colours from, one of those that `organza info` lists, or array of a VTK volume; --preset names
     /// the colour map [default: the file's colours; of a LAS file without colours its classes where most points have one, else its values]
     #[arg(long, value_name = "COLUMN")]
     pub(super) color_by: Option<String>,
+    /// Numbers at the two ends of the colour map of --color-by [default: the 1st and the 99th percentile of the column]
+    #[arg(long, value_name = "LOW,HIGH", allow_hyphen_values = true, value_parser = parse_range, requires = "color_by")]
+    pub(super) color_range: Option<[f64; 2]>,
+    /// The colour map of --color-by goes by logarithms: numbers that are not above 0 have the object's colour
+    #[arg(long, requires = "color_by")]
+    pub(super) log: bool,
     /// Axis of the data that points up [default: what the format of each file says, else y]
     #[arg(long, value_enum, allow_hyphen_values = true)]
     pub(super) up: Option<Axis>,
@@ -213,6 +222,9 @@ pub(super) struct SceneArguments {
     /// Exposure of PNG files, stops; EXR files keep radiance
     #[arg(long, value_name = "EV", allow_negative_numbers = true, value_parser = parse_finite)]
     pub(super) exposure: Option<f64>,
+    /// What lies behind all: a name such as white, black, grey or skyblue, or #rrggbb, as it is displayed without exposure
+    #[arg(long, value_name = "COLOUR", value_parser = parse_color)]
+    pub(super) background: Option<[f32; 3]>,
     /// Images to keep besides beauty and alpha, such as direct,shadow,depth
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     pub(super) layers: Option<Vec<String>>,
@@ -259,7 +271,8 @@ pub(super) struct GoalArguments {
 pub(super) struct RenderArguments {
     #[command(flatten)]
     pub(super) scene: SceneArguments,
-    /// Output, .exr or .png; several are allowed [default: the scene's name with .exr, in this folder]
+    /// Output, .png, .exr or .jpg; several are allowed [default: the scene's name with .png, or .exr where --layers or --half ask for what it alone
+    /// holds, in this folder]
     #[arg(short, long = "output", value_name = "FILE")]
     pub(super) output: Vec<PathBuf>,
     /// Keep the sums of the technique `particles` in a file, and go on from it if it is there
@@ -277,7 +290,7 @@ pub(super) struct RenderArguments {
     /// Write files with the opacity of each pixel in the place of the background: premultiplied in EXR, straight in PNG
     #[arg(long)]
     pub(super) transparent: bool,
-    /// Draw into PNG files what colours stand for: the maps of points by a column, the transfer functions of volumes
+    /// Draw into PNG and JPEG files what colours stand for: the maps of points by a column, the transfer functions of volumes
     #[arg(long)]
     pub(super) legend: bool,
     /// Write PNG files with 16 bits a channel instead of 8

@@ -151,6 +151,7 @@ fn refuse_of_pictures(scene: &SceneArguments) -> Result<(), Error> {
         ("--target-error", scene.target_error.is_some()),
         ("--repeat-level", scene.repeat_level.is_some()),
         ("--exposure", scene.exposure.is_some()),
+        ("--background", scene.background.is_some()),
         ("--layers", scene.layers.is_some()),
         ("--effect", !scene.effect.is_empty()),
     ];

@@ -115,6 +115,8 @@ pub(super) fn wish(first: &FirstArguments, size: Option<[i64; 2]>, turntable: Op
         size,
         preset: first.preset.as_deref().map(Preset::named).transpose()?,
         color_by: first.color_by.clone(),
+        color_range: first.color_range,
+        is_logarithmic: first.log,
         up: first.up.map(|axis| match axis {
             Axis::Y => UpAxis::Y,
             Axis::Z => UpAxis::Z,

@@ -264,7 +264,7 @@ fn numbered(path: &Path, frame: u32, digits: usize) -> PathBuf {
     }
 }
 
-/// The outputs, none twice; the scene's name with `.exr` if none was named.
+/// The outputs, none twice; if none was named the scene's name with `.png`, or `.exr` where that alone holds what is asked for.
 fn outputs(arguments: &RenderArguments) -> Result<Vec<PathBuf>, Error> {
     let mut outputs = arguments.output.clone();
     if outputs.is_empty() {
@@ -275,16 +275,20 @@ fn outputs(arguments: &RenderArguments) -> Result<Vec<PathBuf>, Error> {
         } else {
             name.to_owned()
         };
-        outputs.push(Path::new(name.file_stem().unwrap_or("picture".as_ref())).with_added_extension("exr"));
+        let extension = if arguments.scene.layers.is_some() || arguments.half { "exr" } else { "png" };
+        outputs.push(Path::new(name.file_stem().unwrap_or("picture".as_ref())).with_added_extension(extension));
     }
-    let of_png =
-        [Flag { name: "--deep", is_given: arguments.deep }, Flag { name: "--legend", is_given: arguments.legend }];
-    refuse_options_of(Format::Png, &of_png, &outputs)?;
+    let of_png = [Flag { name: "--deep", is_given: arguments.deep }];
+    refuse_options_of(&[Format::Png], &of_png, &outputs)?;
+    let of_displayed = [Flag { name: "--legend", is_given: arguments.legend }];
+    refuse_options_of(&[Format::Png, Format::Jpeg], &of_displayed, &outputs)?;
+    let of_opacity = [Flag { name: "--transparent", is_given: arguments.transparent }];
+    refuse_options_of(&[Format::Png, Format::Exr], &of_opacity, &outputs)?;
     let of_exr = [
         Flag { name: "--layers", is_given: arguments.scene.layers.is_some() },
         Flag { name: "--half", is_given: arguments.half },
     ];
-    refuse_options_of(Format::Exr, &of_exr, &outputs)?;
+    refuse_options_of(&[Format::Exr], &of_exr, &outputs)?;
     for (i, path) in outputs.iter().enumerate() {
         Format::of_path(path)?;
         let others = [&arguments.cost, &arguments.checkpoint];
@@ -295,14 +299,15 @@ fn outputs(arguments: &RenderArguments) -> Result<Vec<PathBuf>, Error> {
     Ok(outputs)
 }
 
-/// Refuses options of one format where no output has it: they would change nothing.
-fn refuse_options_of(format: Format, options: &[Flag], outputs: &[PathBuf]) -> Result<(), Error> {
-    let has_format = |path: &PathBuf| Format::of_path(path).is_ok_and(|found| found == format);
+/// Refuses options of some formats where no output has one of these: they would change nothing.
+fn refuse_options_of(formats: &[Format], options: &[Flag], outputs: &[PathBuf]) -> Result<(), Error> {
+    let has_format = |path: &PathBuf| Format::of_path(path).is_ok_and(|found| formats.contains(&found));
     let given = options.iter().find(|option| option.is_given).filter(|_| !outputs.iter().any(has_format));
     let Some(Flag { name, .. }) = given else { return Ok(()) };
-    let kind = match format {
+    let kind = match formats[0] {
         Format::Png => "PNG",
         Format::Exr => "EXR",
+        Format::Jpeg => "JPEG",
     };
     let hint = format!("add -o NAME.{}", kind.to_ascii_lowercase());
     Err(Error::usage(format!("{name} is for {kind} files, and no output is one"), hint))

@@ -282,6 +282,10 @@ pub(super) fn overrides(a: &SceneArguments, is_made: bool) -> Result<Vec<Overrid
     if let Some(exposure) = a.exposure {
         options.push((format!("--exposure {}", short(exposure)), "render.exposure", format!("{exposure:?}")));
     }
+    if let Some([red, green, blue]) = a.background {
+        let color = format!("{{ color = [{red:?}, {green:?}, {blue:?}] }}");
+        options.push(("--background".to_owned(), "background", color));
+    }
     if let Some(layers) = &a.layers {
         let list = layers.iter().map(|l| quote(l)).collect::<Vec<_>>().join(", ");
         options.push((format!("--layers {}", layers.join(",")), "render.layers", format!("[{list}]")));

@@ -11,7 +11,7 @@ mod ticks;
 pub(super) use canvas::Canvas;
 
 use crate::png_file::encoded;
-use organza_scene::{ColorScale, ScaleNumbers};
+use organza_scene::{ColorScale, MapScale, ScaleNumbers};
 use std::ops::Range;
 use ticks::{Ticks, whole};
 
@@ -31,6 +31,8 @@ const LEAST_BAR: f64 = 6.0;
 /// Greatest height of a panel over that of the picture, and greatest width over its width: the middle stays free.
 const HIGHEST: f64 = 0.62;
 const WIDEST: f64 = 0.3;
+/// What the colour of no number is called.
+const NO_NUMBER: &str = "no number";
 /// Most whole numbers of one panel.
 const MOST_ROWS: usize = 24;
 
@@ -53,8 +55,8 @@ struct Panel<'a> {
 enum Content {
     /// A bar of this height, pixels, with its ticks; the numbers at its ends come first.
     Bar(f64, Vec<(f64, String)>),
-    /// Whole numbers with what they are called; one without a colour says how many there are besides.
-    Rows(Vec<(Option<f64>, String)>),
+    /// Squares of a colour with what it stands for; one without a colour says how many there are besides.
+    Rows(Vec<(Option<[f32; 3]>, String)>),
 }
 
 /// Draws legends, the first at the top; gives the number of those that the picture has no room for.
@@ -97,21 +99,27 @@ fn panel(scale: &ColorScale, title: String, capital: f64, room: [f64; 2]) -> Opt
     let (content, height) = match &scale.numbers {
         ScaleNumbers::Range(range) => {
             // Half of a number above the bar, and half of one below.
-            let bar = (left - capital).floor();
+            let below = if scale.gap.is_some() { 2.0 * LINE * capital } else { 0.0 };
+            let bar = (left - capital - below).floor();
             (bar >= LEAST_BAR * capital).then_some(())?;
-            (Content::Bar(bar, told(*range, bar, capital)), bar + capital)
+            (Content::Bar(bar, told(scale.spacing(), *range, bar, capital)), bar + capital + below)
         }
         ScaleNumbers::Each(numbers) => {
-            let rows = ((left / (LINE * capital)) as usize).min(MOST_ROWS);
+            let gap_rows = usize::from(scale.gap.is_some());
+            let rows = ((left / (LINE * capital)) as usize).min(MOST_ROWS).saturating_sub(gap_rows);
             let beside = most - (BAR + 2.0 * TICK) * capital;
             let whole = rows_of(scale, numbers, rows)?.into_iter();
-            let shown = whole.map(|(number, label)| (number, shortened(label, |label| text(label) <= beside)));
+            let shown = whole.map(|(color, label)| (color, shortened(label, |label| text(label) <= beside)));
             let content = Content::Rows(shown.collect());
-            (content, (numbers.len().min(rows) as f64 - 1.0) * LINE * capital + BAR * capital)
+            (content, ((numbers.len().min(rows) + gap_rows) as f64 - 1.0) * LINE * capital + BAR * capital)
         }
     };
     let labels: f64 = match &content {
-        Content::Bar(_, told) => told.iter().map(|(_, label)| text(label)).fold(0.0, f64::max),
+        Content::Bar(_, told) => {
+            let gap = scale.gap.map_or(0.0, |_| text(NO_NUMBER));
+            let numbers = told.iter().map(|(_, label)| text(label)).fold(0.0, f64::max);
+            (numbers + minus_space(told) * capital).max(gap)
+        }
         Content::Rows(rows) => rows.iter().map(|(_, label)| text(label)).fold(0.0, f64::max),
     };
     let inner = (BAR + 2.0 * TICK) * capital + labels;
@@ -120,28 +128,38 @@ fn panel(scale: &ColorScale, title: String, capital: f64, room: [f64; 2]) -> Opt
     (inner <= most).then_some(Panel { title, scale, content, width, height: (height + around).ceil() })
 }
 
+/// The space between ticks and numbers, in capitals, that keeps a tick and a minus apart.
+fn minus_space(told: &[(f64, String)]) -> f64 {
+    if told.iter().any(|(number, _)| *number < 0.0) { TICK } else { 0.0 }
+}
+
 /// The numbers beside a bar: its ends, and round ones that are not too near to them.
-fn told(range: [f64; 2], bar: f64, capital: f64) -> Vec<(f64, String)> {
+fn told(spacing: MapScale, range: [f64; 2], bar: f64, capital: f64) -> Vec<(f64, String)> {
     let [low, high] = range;
-    let Ticks { ends, round } = Ticks::of(range, (bar / (2.0 * LINE * capital)) as usize);
-    let near = LINE * capital / bar * (high - low);
-    let is_apart = |(number, _): &(f64, String)| *number - low >= near && high - *number >= near;
+    let most = (bar / (2.0 * LINE * capital)) as usize;
+    let Ticks { ends, round } = match spacing {
+        MapScale::Linear => Ticks::of(range, most),
+        MapScale::Logarithmic => Ticks::of_powers(range, most),
+    };
+    let near = LINE * capital / bar;
+    let is_apart = |(number, _): &(f64, String)| (near..=1.0 - near).contains(&spacing.place(*number, range));
     let ends = if low < high { ends.to_vec() } else { ends[..1].to_vec() };
     ends.into_iter().chain(round.into_iter().filter(is_apart)).collect()
 }
 
 /// The rows of whole numbers, of which the last says how many there is no room for.
-fn rows_of(scale: &ColorScale, numbers: &[f64], rows: usize) -> Option<Vec<(Option<f64>, String)>> {
+fn rows_of(scale: &ColorScale, numbers: &[f64], rows: usize) -> Option<Vec<(Option<[f32; 3]>, String)>> {
     let name = |number: &f64| {
         let meaning = scale.meaning(*number).map_or_else(String::new, |meaning| format!(" {meaning}"));
-        (Some(*number), whole(*number) + &meaning)
+        (Some(scale.color(*number)), whole(*number) + &meaning)
     };
+    let gap = scale.gap.map(|color| (Some(color), NO_NUMBER.to_owned()));
     if numbers.len() <= rows {
-        return Some(numbers.iter().map(name).collect());
+        return Some(numbers.iter().map(name).chain(gap).collect());
     }
     let shown = rows.checked_sub(1).filter(|shown| *shown > 0)?;
     let rest = (None, format!("and {} more", numbers.len() - shown));
-    Some(numbers[..shown].iter().map(name).chain([rest]).collect())
+    Some(numbers[..shown].iter().map(name).chain([rest]).chain(gap).collect())
 }
 
 /// A text, or as much of its beginning as fits.
@@ -169,43 +187,46 @@ impl Panel<'_> {
         text(canvas, [x, top + (PAD + 1.0) * capital], &self.title);
         let bar = pixels(x, BAR * capital);
         let labels = x + (BAR + 2.0 * TICK) * capital;
+        let range = match self.scale.numbers {
+            ScaleNumbers::Range(range) => range,
+            ScaleNumbers::Each(_) => [0.0; 2],
+        };
+        let spacing = self.scale.spacing();
         match &self.content {
             Content::Bar(height, told) => {
                 let first = (below + 0.5 * capital).round();
-                let low = told[0].0;
-                let high = told[told.len().min(2) - 1].0;
+                let labels = labels + minus_space(told) * capital;
                 for row in 0..*height as i64 {
                     let share = 1.0 - (row as f64 + 0.5) / height;
                     canvas.fill(
                         bar.clone(),
                         pixels(first + row as f64, 1.0),
-                        self.color(low + (high - low) * share),
+                        self.scale.color(spacing.number(share, range)).map(encoded),
                         1.0,
                     );
                 }
                 for (number, label) in told {
-                    let share = if high > low { (number - low) / (high - low) } else { 0.5 };
-                    let y = first + (1.0 - share) * height;
+                    let y = first + (1.0 - spacing.place(*number, range)) * height;
                     let tick = pixels(x + BAR * capital, TICK * capital);
                     canvas.fill(tick, pixels((y - 0.5).round(), (0.1 * capital).max(1.0)), TEXT, 1.0);
                     text(canvas, [labels, y + 0.5 * capital], label);
                 }
+                if let Some(color) = self.scale.gap {
+                    let y = first + height + LINE * capital;
+                    canvas.fill(bar, pixels(y, BAR * capital), color.map(encoded), 1.0);
+                    text(canvas, [labels, y + 0.5 * (BAR + 1.0) * capital], NO_NUMBER);
+                }
             }
             Content::Rows(rows) => {
-                for (i, (number, label)) in rows.iter().enumerate() {
+                for (i, (color, label)) in rows.iter().enumerate() {
                     let y = below + i as f64 * LINE * capital;
-                    if let Some(number) = number {
-                        canvas.fill(bar.clone(), pixels(y, BAR * capital), self.color(*number), 1.0);
+                    if let Some(color) = color {
+                        canvas.fill(bar.clone(), pixels(y, BAR * capital), color.map(encoded), 1.0);
                     }
                     text(canvas, [labels - TICK * capital, y + 0.5 * (BAR + 1.0) * capital], label);
                 }
             }
         }
-    }
-
-    /// The displayed colour of a number.
-    fn color(&self, number: f64) -> [f32; 3] {
-        self.scale.color(number).map(encoded)
     }
 }
 
@@ -221,11 +242,11 @@ mod tests {
     use organza_scene::{ColorMap, PointColors};
 
     fn of(column: Option<&str>, colors: PointColors, numbers: ScaleNumbers) -> ColorScale {
-        ColorScale { object: "survey".into(), column: column.map(str::to_owned), colors, numbers }
+        ColorScale { object: "survey".into(), column: column.map(str::to_owned), colors, numbers, gap: None }
     }
 
     fn heights() -> ColorScale {
-        let map = PointColors::Map(ColorMap::VIRIDIS, None);
+        let map = PointColors::map(ColorMap::VIRIDIS);
         of(Some("height"), map, ScaleNumbers::Range([405.0, 513.0]))
     }
 
@@ -293,11 +314,25 @@ mod tests {
         let numbers: Vec<f64> = (0..64).map(f64::from).collect();
         let scale = of(Some("class"), PointColors::Classes, ScaleNumbers::Each(numbers.clone()));
         let rows = rows_of(&scale, &numbers, 5).expect("room for rows");
-        assert_eq!(rows[2], (Some(2.0), "2 ground".to_owned()));
+        assert_eq!(rows[2], (Some(scale.color(2.0)), "2 ground".to_owned()));
         assert_eq!(rows[4], (None, "and 60 more".to_owned()));
         assert_eq!(rows_of(&scale, &numbers[..3], 5).map(|rows| rows.len()), Some(3));
         assert_eq!(rows_of(&scale, &numbers, 1), None);
-        assert_eq!(drawn([480, 270], 0.5, &[scale]).1, 0);
+        let with_gap = ColorScale { gap: Some([0.5; 3]), ..scale.clone() };
+        let rows = rows_of(&with_gap, &numbers, 5).expect("room for rows");
+        assert_eq!(rows[5], (Some([0.5; 3]), "no number".to_owned()));
+        assert_eq!([drawn([480, 270], 0.5, &[scale]).1, drawn([480, 270], 0.5, &[with_gap]).1], [0, 0]);
+    }
+
+    #[test]
+    fn a_bar_shows_the_colour_of_no_number_below_it() {
+        let gap = [0.0, 0.0, 1.0];
+        let (picture, left) = drawn([960, 540], 0.5, &[ColorScale { gap: Some(gap), ..heights() }]);
+        let (plain, _) = drawn([960, 540], 0.5, &[heights()]);
+        let blue = |picture: &[[f32; 3]]| picture.iter().filter(|pixel| **pixel == gap).count();
+        assert_eq!((left, blue(&plain)), (0, 0));
+        // A square of a bar's width: 17 pixels a side.
+        assert_eq!(blue(&picture), 17 * 17);
     }
 
     #[test]
@@ -313,8 +348,11 @@ mod tests {
 
     #[test]
     fn a_column_of_one_number_has_one_tick() {
-        assert_eq!(told([4.0, 4.0], 100.0, 8.0), [(4.0, "4".to_owned())]);
-        let all = told([0.0, 100.0], 200.0, 10.0);
-        assert_eq!(all.iter().map(|(_, text)| text.as_str()).collect::<Vec<_>>(), ["0", "100", "20", "40", "60", "80"]);
+        assert_eq!(told(MapScale::Linear, [4.0, 4.0], 100.0, 8.0), [(4.0, "4".to_owned())]);
+        let told_of =
+            |spacing, range| told(spacing, range, 200.0, 10.0).into_iter().map(|tick| tick.1).collect::<Vec<_>>();
+        assert_eq!(told_of(MapScale::Linear, [0.0, 100.0]), ["0", "100", "20", "40", "60", "80"]);
+        assert_eq!(told_of(MapScale::Logarithmic, [0.02, 300.0]), ["0.02", "300", "0.1", "1", "10", "100"]);
+        assert_eq!(told_of(MapScale::Logarithmic, [1.0, 10.0]), ["1", "10", "2", "5"]);
     }
 }

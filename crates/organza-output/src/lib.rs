@@ -22,6 +22,7 @@
 mod doubt;
 mod error;
 mod exr_file;
+mod jpeg_file;
 mod legend;
 mod png_file;
 mod target;
@@ -97,6 +98,8 @@ pub enum Format {
     Exr,
     /// PNG with the displayed picture.
     Png,
+    /// JPEG with the displayed picture, which loses a little of it, and has neither an opacity nor texts.
+    Jpeg,
 }
 
 impl Format {
@@ -110,8 +113,11 @@ impl Format {
             Ok(Self::Exr)
         } else if extension.eq_ignore_ascii_case("png") {
             Ok(Self::Png)
+        } else if extension.eq_ignore_ascii_case("jpg") || extension.eq_ignore_ascii_case("jpeg") {
+            Ok(Self::Jpeg)
         } else {
-            let message = format!("{}: expected a name that ends in .exr or .png", organza_scene::printable(path));
+            let message =
+                format!("{}: expected a name that ends in .exr, .png or .jpg", organza_scene::printable(path));
             Err(Error::Usage { message, hint: "the format follows from the extension".into() })
         }
     }
@@ -145,6 +151,7 @@ pub fn encode(
     let bytes = match format {
         Format::Exr => exr_file::encode(layers, metadata, params, &mut report)?,
         Format::Png => png_file::encode(layers, metadata, params, &mut report)?,
+        Format::Jpeg => jpeg_file::encode(layers, metadata, params, &mut report)?,
     };
     report.bytes = bytes.len() as u64;
     Ok((bytes, report))

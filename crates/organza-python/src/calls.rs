@@ -189,6 +189,7 @@ impl Wished {
             color_by: self.color_by.clone(),
             up,
             ground: self.ground,
+            ..defaults
         })
     }
 }

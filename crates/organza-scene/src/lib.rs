@@ -34,7 +34,7 @@ mod written;
 pub use animation::stop::{Path, Stop};
 pub use background::model::EnvironmentSource;
 pub use camera::fit::{CameraFit, DEFAULT_AZIMUTH, DEFAULT_FILL, DEFAULT_SIZE, EachPoint, FoundCamera};
-pub use convert::{ColorMap, ColorScale, PointColors, ScaleNumbers};
+pub use convert::{ColorMap, ColorScale, MapScale, PointColors, ScaleNumbers};
 pub use effects::kinds::{EffectKind, HangsOn, SwitchedEffect};
 pub use error::Error;
 pub use field::Combination;

@@ -148,11 +148,7 @@ fn of_mesh(mesh: &Mesh, further: &[NamedColumn], up: UpAxis) -> Facts {
         ]),
         bounds,
         associations: further.iter().filter_map(|c| Some((c.name.clone(), c.association?))).collect(),
-        columns: ranges([("color", mesh.color.iter().flatten().copied().collect()), ("opacity", mesh.opacity.clone())])
-            .into_iter()
-            .chain(bounds.map(|bounds| height(bounds, up)))
-            .chain(of_file)
-            .collect(),
+        columns: bounds.map(|bounds| height(bounds, up)).into_iter().chain(of_file).collect(),
         faults: Some(mesh_faults(mesh)),
         ..Facts::default()
     }

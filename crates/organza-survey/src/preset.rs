@@ -14,6 +14,8 @@ pub struct Preset(pub(crate) Look);
 /// The looks that there are.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Look {
+    /// A computed tomogram in Hounsfield units: bones in a film of what is soft.
+    Tomogram,
     /// Bones of a computed tomogram, without what is soft.
     CtBone,
     /// Its outer surface, as a body is seen.
@@ -84,6 +86,10 @@ pub struct Wish {
     pub preset: Option<Preset>,
     /// The column that points take their colours from; without it one is chosen where their file has no colours.
     pub color_by: Option<String>,
+    /// The numbers at the two ends of its map, rising; `None` leaves that to the column.
+    pub color_range: Option<[f64; 2]>,
+    /// Whether numbers lie along its map by their logarithms.
+    pub is_logarithmic: bool,
     /// Which axis of the data points up; `None` leaves that to the format of each file.
     pub up: Option<UpAxis>,
     /// Whether everything stands on a ground.
@@ -100,6 +106,8 @@ impl Default for Wish {
             size: DEFAULT_SIZE,
             preset: None,
             color_by: None,
+            color_range: None,
+            is_logarithmic: false,
             up: None,
             ground: false,
         }

@@ -16,6 +16,10 @@ const DROPLETS: [f32; 3] = [3.4, 3.4, 3.5];
 
 /// Hounsfield units of what lets bones show, from flesh to their dense shell, and of the surface of a body.
 const BONES: [f64; 4] = [130.0, 220.0, 450.0, 1100.0];
+/// What is soft around bones: its edge in air, flesh, and how much of a bone's extinction it has.
+const FILM: [f64; 2] = [-400.0, -150.0];
+const FILM_WEIGHT: f64 = 0.012;
+const FLESH: [f32; 3] = [0.78, 0.42, 0.32];
 const SKINS: [f64; 4] = [-500.0, -250.0, -100.0, 300.0];
 
 /// A control point: colour, and extinction over the largest one.
@@ -99,7 +103,7 @@ fn points(matter: &Matter, look: Option<&Look>) -> (Vec<Point>, f64) {
     let of_body = |place: f64, color: [f32; 3], weight: f64| Point { value: at(place), color, weight };
     if let Some(opposite) = matter.opposite {
         match look {
-            None => return (of_both_signs(matter, opposite, ColorMap::VIRIDIS), 8.0),
+            None => return (of_both_signs(matter, opposite, ColorMap::COOLWARM), 8.0),
             Some(Look::Map(map)) => return (of_both_signs(matter, opposite, *map), 8.0),
             Some(Look::Field(map)) => return (of_both_signs(matter, opposite, *map), 4.0),
             Some(_) => {}
@@ -115,6 +119,13 @@ fn points(matter: &Matter, look: Option<&Look>) -> (Vec<Point>, f64) {
         Some(Look::Map(map)) => (of_map(*map, of_body), 8.0),
         Some(Look::Labels(map, labels)) => (of_labels(*map, labels), 8.0),
         Some(Look::Field(map)) => (of_map(*map, of_body), 4.0),
+        Some(Look::Tomogram) => {
+            let [low, high] = BONE;
+            let film = [FILM[0], FILM[1]].into_iter().zip([(FLESH, 0.0), (FLESH, FILM_WEIGHT)]);
+            let looks = [(FLESH, FILM_WEIGHT), (low, 0.15), (high, 0.7), (high, 1.0)];
+            let point = |(value, (color, weight))| Point { value, color, weight };
+            (film.chain(BONES.into_iter().zip(looks)).map(point).collect(), 20.0)
+        }
         Some(Look::CtBone) => {
             let [low, high] = BONE;
             let bones =
@@ -288,6 +299,11 @@ mod tests {
             let transfer = Transfer::new(&grid, Some(&matter), Some(&Look::CtBone));
             let [air, flesh, bone] = [air, flesh, bone].map(|v| transfer.weight(f64::from(v)));
             assert!(air == 0.0 && flesh < 0.05 && bone > 0.9, "{air} {flesh} {bone}");
+            if units {
+                let film = Transfer::new(&grid, Some(&matter), Some(&Look::Tomogram));
+                let [air, flesh, bone] = [-1000.0, 40.0, 1200.0].map(|v| film.weight(v));
+                assert!(air == 0.0 && flesh == FILM_WEIGHT && bone == 1.0, "{air} {flesh} {bone}");
+            }
         }
     }
 }

@@ -323,12 +323,7 @@ fn remark_gaps(grid: &Grid, reading: &mut Reading<'_>) -> Result<(), ReadError> 
 fn check_columns(points: &RawPoints, reading: &mut Reading<'_>) -> Result<(), ReadError> {
     let missing = reading.params.columns.iter().find(|name| points.column(name, DVec3::Y).is_none());
     if let Some(missing) = missing {
-        let known: Vec<&str> = points.column_names().collect();
-        let further = reading.notes.columns.iter().map(|c| c.name.as_str()).filter(|name| !known.contains(name));
-        let names: Vec<&str> = known.iter().copied().chain(further).collect();
-        let expected = format!("a column among {}", names.join(", "));
-        let found = format!("`{}`", escaped(missing.as_bytes(), LONGEST_NAME));
-        return Err(ReadError::input(Place::File, expected, found, "`organza info` says what they hold"));
+        return Err(missing_column(missing, points.column_names().collect(), reading));
     }
     let shown: Vec<String> = points.columns.iter().map(|c| escaped(c.name.as_bytes(), LONGEST_NAME)).collect();
     reading.notes.unused.retain(|name| !shown.contains(name));
@@ -338,12 +333,21 @@ fn check_columns(points: &RawPoints, reading: &mut Reading<'_>) -> Result<(), Re
 /// Refuses columns of a mesh that were asked for and are not there.
 fn check_mesh_columns(mesh: &Mesh, reading: &Reading<'_>) -> Result<(), ReadError> {
     let Some(missing) = reading.params.columns.iter().find(|name| !mesh.has_column(name)) else { return Ok(()) };
-    let known: Vec<&str> = mesh.column_names().collect();
+    Err(missing_column(missing, mesh.column_names().collect(), reading))
+}
+
+/// The error of a column that data lacks which has those that are `known`, and those of its notes.
+fn missing_column(missing: &str, known: Vec<&str>, reading: &Reading<'_>) -> ReadError {
     let further = reading.notes.columns.iter().map(|c| c.name.as_str()).filter(|name| !known.contains(name));
     let names: Vec<&str> = known.iter().copied().chain(further).collect();
     let expected = format!("a column among {}", names.join(", "));
-    let found = format!("`{}`", escaped(missing.as_bytes(), LONGEST_NAME));
-    Err(ReadError::input(Place::File, expected, found, "`organza info` says what they hold"))
+    let shown = escaped(missing.as_bytes(), LONGEST_NAME);
+    let is_vector = names.contains(&format!("{shown}:magnitude").as_str());
+    let hint = match is_vector {
+        true => "it has several numbers: add `:magnitude` for the length of the vector, or `:x` for a component",
+        false => "`organza info` says what they hold",
+    };
+    ReadError::input(Place::File, expected, format!("`{shown}`"), hint)
 }
 
 /// Bytes that tell the format.

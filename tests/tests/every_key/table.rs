@@ -231,11 +231,13 @@ fn objects() -> Vec<Entry> {
         of(MESHES, "object.color_by.column", "object.it.color_by.column='x'").with(BY_Z),
         of(MESHES, "object.color_by.map", "object.it.color_by.map='turbo'").with(BY_Z),
         of(MESHES, "object.color_by.range", "object.it.color_by.range=[-9, 9]").with(BY_Z),
+        of(MESHES, "object.color_by.scale", "object.it.color_by.scale='log'").with(BY_Z),
         one("object.color_by", "object.it.color_by={column='z'}")
             .but(All, Refused(2, "`color_by` belongs to `points`")),
         of(HEAT, "object.color_by.column", "object.it.color_by.column='x'").with(HOT),
         of(HEAT, "object.color_by.map", "object.it.color_by.map='distinct'").with(HOT),
         of(HEAT, "object.color_by.range", "object.it.color_by.range=[0, 900]").with(HOT),
+        of(HEAT, "object.color_by.scale", "object.it.color_by.scale='log'").with(HOT),
         of(HEAT, "object.keep", "object.it.keep={heat=[10, 200]}").with(HOT),
         one("object.keep", "object.it.keep={z=[0, 1]}").but(All, Refused(2, "`keep` belongs to `points`")),
         of(RAW, "object.unlit", "object.it.unlit=true")

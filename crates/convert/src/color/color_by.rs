@@ -46,14 +46,32 @@ const DISTINCT: [u32; 12] = [
 /// How numbers become colours.
 #[derive(Debug, Clone, PartialEq)]
 pub enum PointColors {
-    /// A colour map over a range; without one from the 1st to the 99th percentile of the column.
-    Map(ColorMap, Option<[f64; 2]>),
+    /// A colour map over a range of numbers.
+    Map {
+        /// The map.
+        map: ColorMap,
+        /// The numbers at its ends, rising. Without one these are the 1st and the 99th percentile of the column; of a map that diverges from a
+        /// middle, and of numbers with both signs, as far from 0 as the farther of these.
+        range: Option<[f64; 2]>,
+        /// How numbers lie along it.
+        scale: MapScale,
+    },
     /// Whole numbers as classes of LAS, each in a colour of its own.
     Classes,
     /// Whole numbers, in twelve colours in turns.
     Distinct,
     /// By control points, whose extinctions stand for that.
     Transfer(TransferFunction, Classified),
+}
+
+/// How numbers lie along a colour map.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum MapScale {
+    /// As they are.
+    #[default]
+    Linear,
+    /// By their logarithms. What is not above 0 has no colour of the map.
+    Logarithmic,
 }
 
 /// What the extinctions of a transfer function stand for that gives points their colours.
@@ -102,13 +120,57 @@ impl Colored {
 }
 
 impl PointColors {
-    /// The colour of a number, linear Rec.709; `range` are the numbers at the ends of a map.
+    /// A map of numbers as they are, from its 1st to its 99th percentile.
+    pub fn map(map: ColorMap) -> Self {
+        Self::Map { map, range: None, scale: MapScale::Linear }
+    }
+
+    /// A map of numbers as they are, from one to another.
+    pub fn map_over(map: ColorMap, range: [f64; 2]) -> Self {
+        Self::Map { map, range: Some(range), scale: MapScale::Linear }
+    }
+
+    /// Whether a number has a colour: it is finite, and has a logarithm where that is asked for.
+    pub(crate) fn shows(&self, number: f64) -> bool {
+        let is_logarithmic = matches!(self, Self::Map { scale: MapScale::Logarithmic, .. });
+        number.is_finite() && (number > 0.0 || !is_logarithmic)
+    }
+
+    /// The colour of a number that has one, linear Rec.709; `range` are the numbers at the ends of a map.
     pub(crate) fn at(&self, number: f64, range: [f64; 2]) -> [f32; 3] {
         match self {
-            Self::Map(map, _) => map.at(place(number, range)),
+            Self::Map { map, scale, .. } => map.at(scale.place(number, range)),
             Self::Classes => class_color(number),
             Self::Distinct => distinct(number),
             Self::Transfer(transfer, _) => transfer.at(number as f32).color,
+        }
+    }
+}
+
+impl MapScale {
+    /// Where in a range a number lies, from 0 to 1 within; the middle of a range without a width.
+    ///
+    /// ```
+    /// use convert::MapScale;
+    /// assert!((MapScale::Logarithmic.place(10.0, [1.0, 1000.0]) - 1.0 / 3.0).abs() < 1e-12);
+    /// ```
+    pub fn place(self, number: f64, range: [f64; 2]) -> f64 {
+        let [low, high] = range;
+        if high <= low {
+            return 0.5;
+        }
+        match self {
+            Self::Linear => (number - low) / (high - low),
+            Self::Logarithmic => libm::log(number / low) / libm::log(high / low),
+        }
+    }
+
+    /// The number at a place of a range: the inverse of [`MapScale::place`].
+    pub fn number(self, place: f64, range: [f64; 2]) -> f64 {
+        let [low, high] = range;
+        match self {
+            Self::Linear => low + (high - low) * place,
+            Self::Logarithmic => low * libm::pow(high / low, place),
         }
     }
 }
@@ -125,7 +187,7 @@ pub fn class_name(class: u8) -> Option<&'static str> {
 /// use splat_core::RawPoints;
 /// use splat_core::glam::{DVec3, Vec3};
 /// let points = RawPoints { position: vec![Vec3::ZERO, Vec3::Z * 0.5, Vec3::Z], ..RawPoints::default() };
-/// let by = ColorBy { column: "z".into(), colors: PointColors::Map(ColorMap::VIRIDIS, Some([0.0, 1.0])) };
+/// let by = ColorBy { column: "z".into(), colors: PointColors::map_over(ColorMap::VIRIDIS, [0.0, 1.0]) };
 /// let colored = colored(&points, &by, DVec3::Z, &SplatParams::default()).unwrap();
 /// assert_eq!(colored.color[1], ColorMap::VIRIDIS.at(0.5));
 /// ```
@@ -142,11 +204,11 @@ pub fn colored(points: &RawPoints, by: &ColorBy, up: DVec3, splat: &SplatParams)
 /// The colours of numbers.
 pub(crate) fn colored_numbers(numbers: Vec<f64>, by: &ColorBy, splat: &SplatParams) -> Colored {
     let range = match &by.colors {
-        PointColors::Map(_, range) => Some(range.unwrap_or_else(|| spread(&numbers))),
+        PointColors::Map { map, range, .. } => Some(range.unwrap_or_else(|| spread(&numbers, by, *map))),
         _ => None,
     };
     let color = |number: &f64| {
-        if number.is_finite() { by.colors.at(*number, range.unwrap_or_default()) } else { splat.color }
+        if by.colors.shows(*number) { by.colors.at(*number, range.unwrap_or_default()) } else { splat.color }
     };
     let classified = |number: &f64| match &by.colors {
         PointColors::Transfer(transfer, _) if number.is_finite() => transfer.at(*number as f32).extinction,
@@ -155,7 +217,7 @@ pub(crate) fn colored_numbers(numbers: Vec<f64>, by: &ColorBy, splat: &SplatPara
     };
     let classifies = matches!(by.colors, PointColors::Transfer(_, Classified::Opacity | Classified::Extinction));
     let classified = if classifies { numbers.par_iter().map(classified).collect() } else { Vec::new() };
-    let gaps = numbers.iter().filter(|n| !n.is_finite()).count() as u64;
+    let gaps = numbers.iter().filter(|n| !by.colors.shows(**n)).count() as u64;
     let is_of_whole = matches!(by.colors, PointColors::Classes | PointColors::Distinct);
     let present = if is_of_whole { present(&numbers) } else { Vec::new() };
     let color = numbers.par_iter().map(color).collect();
@@ -176,22 +238,18 @@ fn present(numbers: &[f64]) -> Vec<f64> {
     of_chunks.reduce(Vec::new, |all, more| least([all, more].concat()))
 }
 
-/// Where in a range a number lies, from 0 to 1 within; the middle of a range without a width.
-fn place(number: f64, range: [f64; 2]) -> f64 {
-    let [low, high] = range;
-    if high > low { (number - low) / (high - low) } else { 0.5 }
-}
-
 /// The numbers below which the first and all but the last hundredth of a column lie; gaps do not count.
-fn spread(numbers: &[f64]) -> [f64; 2] {
-    let mut finite: Vec<f64> = numbers.iter().copied().filter(|n| n.is_finite()).collect();
-    if finite.is_empty() {
+fn spread(numbers: &[f64], by: &ColorBy, map: ColorMap) -> [f64; 2] {
+    let mut shown: Vec<f64> = numbers.iter().copied().filter(|n| by.colors.shows(*n)).collect();
+    if shown.is_empty() {
         return [0.0; 2];
     }
-    SHARES.map(|share| {
-        let rank = ((finite.len() - 1) as f64 * share).round() as usize;
-        *finite.select_nth_unstable_by(rank, f64::total_cmp).1
-    })
+    let [low, high] = SHARES.map(|share| {
+        let rank = ((shown.len() - 1) as f64 * share).round() as usize;
+        *shown.select_nth_unstable_by(rank, f64::total_cmp).1
+    });
+    let end = high.max(-low);
+    if map.is_diverging() && low < 0.0 && high > 0.0 { [-end, end] } else { [low, high] }
 }
 
 /// The colour of a class; those that LAS leaves to users have [`DISTINCT`] ones.
@@ -226,17 +284,43 @@ mod tests {
     #[test]
     fn a_ramp_has_the_map_s_own_colours_at_its_ends_and_in_its_middle() {
         let map = ColorMap::VIRIDIS;
-        let of_range = of(vec![-3.0, -2.0, 0.0, 2.0, 9.0], PointColors::Map(map, Some([-2.0, 2.0])));
+        let of_range = of(vec![-3.0, -2.0, 0.0, 2.0, 9.0], PointColors::map_over(map, [-2.0, 2.0]));
         assert_eq!(of_range.color, [0.0, 0.0, 0.5, 1.0, 1.0].map(|place| map.at(place)));
-        let of_data = of((0..=100).map(f64::from).collect(), PointColors::Map(map, None));
+        let of_data = of((0..=100).map(f64::from).collect(), PointColors::map(map));
         assert_eq!(of_data.range, Some([1.0, 99.0]));
         assert_eq!([of_data.color[0], of_data.color[50], of_data.color[100]], [map.at(0.0), map.at(0.5), map.at(1.0)]);
     }
 
     #[test]
+    fn a_logarithmic_map_has_powers_at_equal_places_and_leaves_out_what_has_none() {
+        let map = ColorMap::VIRIDIS;
+        let colors = PointColors::Map { map, range: Some([1e-2, 1e2]), scale: MapScale::Logarithmic };
+        let found = of(vec![1e-2, 1e-1, 1.0, 1e2, 0.0, -5.0], colors);
+        for (color, place) in found.color.iter().zip([0.0, 0.25, 0.5, 1.0]) {
+            let expected = map.at(place);
+            assert!((0..3).all(|c| (color[c] - expected[c]).abs() < 1e-6), "{color:?} for {expected:?}");
+        }
+        assert_eq!((found.gaps, &found.color[4..]), (2, &[[0.5, 0.25, 0.125]; 2][..]));
+        // Percentiles are those of the numbers that show.
+        let colors = PointColors::Map { map, range: None, scale: MapScale::Logarithmic };
+        assert_eq!(of(vec![-1.0, 0.0, 1.0, 10.0], colors).range, Some([1.0, 10.0]));
+        for place in [0.0, 0.3, 1.0] {
+            let scale = MapScale::Logarithmic;
+            assert!((scale.place(scale.number(place, [2.0, 5.0]), [2.0, 5.0]) - place).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn a_diverging_map_has_nothing_in_its_middle() {
+        let map = ColorMap::named("coolwarm").expect("a map");
+        assert_eq!(of(vec![-1.0, 0.0, 3.0], PointColors::map(map)).range, Some([-3.0, 3.0]));
+        assert_eq!(of(vec![1.0, 2.0, 3.0], PointColors::map(map)).range, Some([1.0, 3.0]));
+    }
+
+    #[test]
     fn neither_the_order_nor_a_shift_nor_a_scale_changes_a_colour() {
         let numbers: Vec<f64> = (0..999).map(|i| f64::from(i * 37 % 999)).collect();
-        let colors = || PointColors::Map(ColorMap::TURBO, None);
+        let colors = || PointColors::map(ColorMap::TURBO);
         let once = of(numbers.clone(), colors()).color;
         let mut back = of(numbers.iter().rev().copied().collect(), colors()).color;
         back.reverse();
@@ -246,11 +330,11 @@ mod tests {
 
     #[test]
     fn a_column_of_one_number_has_the_middle_and_gaps_have_the_object_s_colour() {
-        let found = of(vec![4.0, f64::NAN, 4.0, f64::INFINITY], PointColors::Map(ColorMap::TURBO, None));
+        let found = of(vec![4.0, f64::NAN, 4.0, f64::INFINITY], PointColors::map(ColorMap::TURBO));
         let middle = ColorMap::TURBO.at(0.5);
         let own = [0.5, 0.25, 0.125];
         assert_eq!((found.color, found.gaps), (vec![middle, own, middle, own], 2));
-        assert_eq!(of(vec![f64::NAN], PointColors::Map(ColorMap::TURBO, None)).color, [own]);
+        assert_eq!(of(vec![f64::NAN], PointColors::map(ColorMap::TURBO)).color, [own]);
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! Colour maps, each by ten or fewer colours at equal distances, between which colours are blended.
 //!
 //! viridis, magma, inferno and plasma are those of matplotlib (Smith, van der Walt and Firing, CC0), cividis is that of Nuñez,
-//! Anderton and Renslow 2018, turbo that of Mikhailov 2019.
+//! Anderton and Renslow 2018, turbo that of Mikhailov 2019, coolwarm that of Moreland 2009 (Diverging Color Maps for Scientific Visualization).
 
 use splat_core::srgb::linear_from_hex;
 
@@ -23,8 +23,11 @@ const TURBO: ColorMap =
     ColorMap(&[0x30123b, 0x4662d7, 0x36aaf9, 0x1ae4b6, 0x72fe5e, 0xc8ef34, 0xfaba39, 0xf66b19, 0xcb2a04, 0x7a0403]);
 const GREY: ColorMap = ColorMap(&[0x202020, 0xf4f4f4]);
 
+const COOLWARM: ColorMap =
+    ColorMap(&[0x3b4cc0, 0x6282ea, 0x8db0fe, 0xb8d0f9, 0xdddddd, 0xf5c4ad, 0xf49a7b, 0xde604d, 0xb40426]);
+
 /// The maps, by the names that scenes and commands have for them.
-const NAMED: [(&str, ColorMap); 7] = [
+const NAMED: [(&str, ColorMap); 8] = [
     ("viridis", VIRIDIS),
     ("magma", MAGMA),
     ("inferno", INFERNO),
@@ -32,6 +35,7 @@ const NAMED: [(&str, ColorMap); 7] = [
     ("cividis", CIVIDIS),
     ("turbo", TURBO),
     ("grey", GREY),
+    ("coolwarm", COOLWARM),
 ];
 
 impl ColorMap {
@@ -39,6 +43,8 @@ impl ColorMap {
     pub const VIRIDIS: Self = VIRIDIS;
     /// The whole rainbow, with the most steps that an eye tells apart.
     pub const TURBO: Self = TURBO;
+    /// From blue by grey to red: the map of numbers with both signs, with 0 in its middle.
+    pub const COOLWARM: Self = COOLWARM;
 
     /// The map of a name, if there is one.
     pub fn named(name: &str) -> Option<Self> {
@@ -70,6 +76,11 @@ impl ColorMap {
         std::array::from_fn(|c| a[c] + (b[c] - a[c]) * part)
     }
 
+    /// Whether it has a middle that both ends lead away from: of numbers with both signs that is where 0 belongs.
+    pub fn is_diverging(self) -> bool {
+        self == COOLWARM
+    }
+
     /// How many colours it has, between which others are blended.
     pub fn steps(self) -> usize {
         self.0.len()
@@ -87,6 +98,13 @@ mod tests {
         assert_eq!(VIRIDIS.at(7.0), VIRIDIS.at(1.0));
         let [a, b] = [linear_from_hex(0x202020)[0], linear_from_hex(0xf4f4f4)[0]];
         assert!((GREY.at(0.25)[1] - (0.75 * a + 0.25 * b)).abs() < 1e-6);
+    }
+
+    #[test]
+    fn a_diverging_map_is_brightest_in_its_middle() {
+        let sum = |place: f64| COOLWARM.at(place).iter().sum::<f32>();
+        assert!(COOLWARM.is_diverging() && !TURBO.is_diverging());
+        assert!((0..100).all(|i| sum(f64::from(i) / 100.0) <= sum(0.5)));
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! What colours of a picture stand for: numbers of a column of points, or values of a volume.
 
-use crate::{ColorBy, Colored, PointColors, class_name};
+use crate::{ColorBy, Colored, MapScale, PointColors, class_name};
 use splat_core::TransferFunction;
 
 /// What the colours of an object stand for, as a legend beside its picture tells it.
@@ -14,6 +14,8 @@ pub struct ColorScale {
     pub colors: PointColors,
     /// The numbers that have colours.
     pub numbers: ScaleNumbers,
+    /// The colour of what has no number, linear Rec.709, where something has none.
+    pub gap: Option<[f32; 3]>,
 }
 
 /// The numbers of a [`ColorScale`].
@@ -26,17 +28,18 @@ pub enum ScaleNumbers {
 }
 
 impl ColorScale {
-    /// That of points; `None` where no point has a number.
-    pub fn of_points(object: &str, by: &ColorBy, colored: &Colored) -> Option<Self> {
+    /// That of points, of which those without a number have the colour `plain`; `None` where no point has a number.
+    pub fn of_points(object: &str, by: &ColorBy, colored: &Colored, plain: [f32; 3]) -> Option<Self> {
         let numbers = match (&by.colors, colored.range) {
-            (PointColors::Map(..), range) => ScaleNumbers::Range(range.filter(|_| colored.has_numbers())?),
+            (PointColors::Map { .. }, range) => ScaleNumbers::Range(range.filter(|_| colored.has_numbers())?),
             (PointColors::Transfer(transfer, _), _) => ScaleNumbers::Range(ends(transfer)),
             (PointColors::Classes | PointColors::Distinct, _) => ScaleNumbers::Each(colored.present.clone()),
         };
         let is_empty = matches!(&numbers, ScaleNumbers::Each(present) if present.is_empty());
         let object = object.to_owned();
         let colors = by.colors.clone();
-        (!is_empty).then(|| Self { object, column: Some(by.column.clone()), colors, numbers })
+        let gap = (colored.gaps > 0).then_some(plain);
+        (!is_empty).then(|| Self { object, column: Some(by.column.clone()), colors, numbers, gap })
     }
 
     /// That of a volume or of a plane through one: of the values between the outermost that show, if extinctions tell which do.
@@ -56,7 +59,7 @@ impl ColorScale {
             [first.saturating_sub(1), (last + 1).min(points.len() - 1)].map(|i| f64::from(points[i].value));
         let object = object.to_owned();
         let colors = PointColors::Transfer(transfer.clone(), crate::Classified::No);
-        Self { object, column: None, colors, numbers: ScaleNumbers::Range([low, high]) }
+        Self { object, column: None, colors, numbers: ScaleNumbers::Range([low, high]), gap: None }
     }
 
     /// Linear Rec.709 of a number.
@@ -66,6 +69,14 @@ impl ColorScale {
             ScaleNumbers::Each(_) => [0.0; 2],
         };
         self.colors.at(number, range)
+    }
+
+    /// How numbers of a range lie along its bar.
+    pub fn spacing(&self) -> MapScale {
+        match self.colors {
+            PointColors::Map { scale, .. } => scale,
+            _ => MapScale::Linear,
+        }
     }
 
     /// What a whole number means, such as `ground` for the class 2 of LAS.
@@ -93,15 +104,15 @@ mod tests {
         let by = ColorBy { column: "height".into(), colors };
         let points = RawPoints { position, ..RawPoints::default() };
         let found = colored(&points, &by, DVec3::Y, &SplatParams::default()).expect("a column that is there");
-        ColorScale::of_points("survey", &by, &found)
+        ColorScale::of_points("survey", &by, &found, [0.5; 3])
     }
 
     #[test]
     fn a_map_is_told_from_end_to_end_in_the_colours_of_the_points() {
-        let scale = of(&[2.0, 4.0, 10.0], PointColors::Map(ColorMap::TURBO, Some([2.0, 10.0]))).expect("a scale");
+        let scale = of(&[2.0, 4.0, 10.0], PointColors::map_over(ColorMap::TURBO, [2.0, 10.0])).expect("a scale");
         assert_eq!(scale.numbers, ScaleNumbers::Range([2.0, 10.0]));
         assert_eq!([2.0, 4.0, 11.0].map(|n| scale.color(n)), [0.0, 0.25, 1.0].map(|place| ColorMap::TURBO.at(place)));
-        assert_eq!(of(&[f32::NAN], PointColors::Map(ColorMap::TURBO, None)), None);
+        assert_eq!(of(&[f32::NAN], PointColors::map(ColorMap::TURBO)), None);
     }
 
     #[test]

@@ -2,13 +2,14 @@
 //!
 //! Numbers are interpolated between vertices, not colours: where the colours of a map between two vertices are not the mean of theirs, the edge is
 //! halved in all triangles that share it, until they are within [`TOLERANCE`]. Triangles with numbers of their own get vertices of their own, with the
-//! normals that these had.
+//! normals that these had. Between a class and another, and beside a vertex without a number, nothing is interpolated: such a triangle is parted into
+//! what lies nearest to each of its corners.
 
 use crate::color::color_by::colored_numbers;
 use crate::points::shown_points::said_of_colors;
 use crate::{Classified, ColorBy, ColorScale, Colored, ConvertError, PointColors, SplatParams};
 use rayon::prelude::*;
-use splat_core::glam::DVec3;
+use splat_core::glam::{DVec3, Vec3};
 use splat_core::{Association, Mesh, MeshColumn, halve_edges, smooth};
 use std::sync::Arc;
 
@@ -39,7 +40,7 @@ pub struct ColoredMesh {
 /// use splat_core::{Mesh, glam::DVec3};
 /// let mesh = Mesh::rectangle(DVec3::ZERO, DVec3::X, DVec3::Y);
 /// let map = ColorMap::VIRIDIS;
-/// let by = ColorBy { column: "x".into(), colors: PointColors::Map(map, Some([-1.0, 1.0])) };
+/// let by = ColorBy { column: "x".into(), colors: PointColors::map_over(map, [-1.0, 1.0]) };
 /// let colored = colored_mesh(mesh.into(), &by, DVec3::Y, &SplatParams::default()).unwrap();
 /// assert_eq!(colored.mesh.color[..2], [map.at(0.0), map.at(1.0)]);
 /// ```
@@ -59,12 +60,15 @@ pub fn colored_mesh(
     let colored = colored_numbers(column.values.clone(), by, splat);
     let mut said =
         vec![said_of_colors(by, &colored, if association == Association::Vertex { "vertex" } else { "face" })];
-    let scale = ColorScale::of_points(&splat.object_name, by, &colored);
+    let scale = ColorScale::of_points(&splat.object_name, by, &colored, splat.color);
     let mut mesh = Arc::unwrap_or_clone(mesh);
     mesh.columns = vec![column];
     let looks = Looks { by, colored: &colored, plain: splat.color };
     match association {
-        Association::Vertex => said.extend(divide(&mut mesh, &looks)),
+        Association::Vertex => {
+            part_at_borders(&mut mesh, &looks);
+            said.extend(divide(&mut mesh, &looks));
+        }
         Association::Triangle => part(&mut mesh),
     }
     let MeshColumn { values, .. } = mesh.columns.remove(0);
@@ -98,7 +102,7 @@ struct Looks<'a> {
 
 impl Looks<'_> {
     fn at(&self, number: f64) -> Look {
-        if !number.is_finite() {
+        if !self.by.colors.shows(number) {
             return Look { color: self.plain, opacity: 1.0 };
         }
         let opacity = match &self.by.colors {
@@ -108,6 +112,15 @@ impl Looks<'_> {
         Look {
             color: self.by.colors.at(number, self.colored.range.unwrap_or_default()),
             opacity: opacity.clamp(0.0, 1.0),
+        }
+    }
+
+    /// Whether numbers between two have a meaning, or both have none.
+    fn are_alike(&self, first: f64, last: f64) -> bool {
+        match self.by.colors {
+            _ if self.by.colors.shows(first) != self.by.colors.shows(last) => false,
+            PointColors::Classes | PointColors::Distinct => !first.is_finite() || first.round() == last.round(),
+            _ => true,
         }
     }
 
@@ -154,6 +167,56 @@ fn divide(mesh: &mut Mesh, looks: &Looks<'_>) -> Option<String> {
         .then(|| format!("{before} faces were divided into {after} for the colours between their vertices{cut_short}"))
 }
 
+/// Parts triangles between whose corners nothing can be interpolated, in barycentric cells of the corners: two triangles for each, between the corner, the
+/// middles of its edges and the middle of the triangle.
+fn part_at_borders(mesh: &mut Mesh, looks: &Looks<'_>) {
+    let values = &mesh.columns[0].values;
+    let is_parted = |t: &[u32; 3]| {
+        let numbers = t.map(|v| values[v as usize]);
+        !(looks.are_alike(numbers[0], numbers[1]) && looks.are_alike(numbers[0], numbers[2]))
+    };
+    if !mesh.triangles.iter().any(is_parted) {
+        return;
+    }
+    let [parted, whole]: [Vec<[u32; 3]>; 2] = {
+        let (parted, whole) = mesh.triangles.iter().copied().partition(is_parted);
+        [parted, whole]
+    };
+    smooth(mesh);
+    mesh.color.clear();
+    mesh.triangles = whole;
+    for t in parted {
+        for k in 0..3 {
+            let corner = t[k] as usize;
+            let next = t[(k + 1) % 3] as usize;
+            let last = t[(k + 2) % 3] as usize;
+            let to_next = push_mean(mesh, looks, corner, &[next]);
+            let middle = push_mean(mesh, looks, corner, &[next, last]);
+            let to_last = push_mean(mesh, looks, corner, &[last]);
+            mesh.triangles.extend([[t[k], to_next, middle], [t[k], middle, to_last]]);
+        }
+    }
+}
+
+/// A vertex in the middle of a corner and others, with the mean number of those that are like the corner's.
+fn push_mean(mesh: &mut Mesh, looks: &Looks<'_>, corner: usize, others: &[usize]) -> u32 {
+    let new = mesh.position.len();
+    let count = (1 + others.len()) as f32;
+    let ids = || std::iter::once(corner).chain(others.iter().copied());
+    let position = ids().map(|v| mesh.position[v]).sum::<Vec3>() / count;
+    let normal = ids().map(|v| mesh.normal[v]).sum::<Vec3>().normalize_or(mesh.normal[corner]);
+    let opacity = (!mesh.opacity.is_empty()).then(|| ids().map(|v| mesh.opacity[v]).sum::<f32>() / count);
+    mesh.position.push(position);
+    mesh.normal.push(normal);
+    mesh.opacity.extend(opacity);
+    let values = &mut mesh.columns[0].values;
+    let alike: Vec<f64> = ids().map(|v| values[v]).filter(|number| looks.are_alike(values[corner], *number)).collect();
+    let mean = alike.iter().sum::<f64>() / alike.len() as f64;
+    // A class, or none.
+    values.push(if alike.len() == 1 { alike[0] } else { mean });
+    new as u32
+}
+
 /// How many of its edges are halved of a triangle.
 fn halves(t: &[u32; 3], edges: &[[u32; 2]]) -> usize {
     (0..3).filter(|k| edges.binary_search(&edge(t, *k)).is_ok()).count()
@@ -177,7 +240,7 @@ fn deviating(mesh: &Mesh, looks: &Looks<'_>, is_new: &[bool]) -> Vec<[u32; 2]> {
         let first = values[edge[0] as usize];
         let last = values[edge[1] as usize];
         let is_short = mesh.position[edge[0] as usize] == mesh.position[edge[1] as usize];
-        first.is_finite() && last.is_finite() && !is_short && looks.deviates(first, last)
+        looks.by.colors.shows(first) && looks.by.colors.shows(last) && !is_short && looks.deviates(first, last)
     };
     edges.into_par_iter().with_min_len(CHUNK).filter(deviates).collect()
 }
@@ -215,7 +278,7 @@ mod tests {
     #[test]
     fn a_map_is_followed_between_far_vertices_and_faces_have_one_colour() {
         let map = ColorMap::VIRIDIS;
-        let colors = || PointColors::Map(map, Some([0.0, 1.0]));
+        let colors = || PointColors::map_over(map, [0.0, 1.0]);
         let ramp = colored_by_heat(square(Association::Vertex, &[0.0, 1.0, 1.0, 0.0]), colors());
         assert!(ramp.mesh.triangles.len() > 8 && ramp.mesh.columns.is_empty());
         for (p, color) in ramp.mesh.position.iter().zip(&ramp.mesh.color) {
@@ -234,7 +297,36 @@ mod tests {
         let mut mesh = Mesh::clone(&square(Association::Vertex, &[0.0, 4.0, f64::NAN, 2.0]));
         mesh.opacity = vec![1.0, 0.5, 0.5, 0.5];
         let shown = colored_by_heat(mesh.into(), PointColors::Transfer(transfer, Classified::Opacity));
-        assert_eq!(shown.mesh.opacity, [0.0, 0.5, 0.5, 0.25]);
-        assert_eq!(shown.mesh.triangles.len(), 2);
+        assert_eq!(shown.mesh.opacity[..4], [0.0, 0.5, 0.5, 0.25]);
+        // Both triangles have the corner without a number.
+        assert_eq!(shown.mesh.triangles.len(), 12);
+        assert!((shown.mesh.area() - 4.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn between_classes_lies_a_border_and_no_other_class() {
+        let shown = colored_by_heat(square(Association::Vertex, &[3.0, 3.0, 7.0, 7.0]), PointColors::Distinct).mesh;
+        let [three, seven] = [3.0, 7.0].map(|class| PointColors::Distinct.at(class, [0.0; 2]));
+        assert!((shown.area() - 4.0).abs() < 1e-6);
+        let mut areas = [0.0; 2];
+        for t in &shown.triangles {
+            let colors = t.map(|v| shown.color[v as usize]);
+            assert!(colors == [three; 3] || colors == [seven; 3], "{colors:?}");
+            let [a, b, c] = t.map(|v| shown.position[v as usize]);
+            areas[usize::from(colors[0] == seven)] += 0.5 * (b - a).cross(c - a).length();
+        }
+        assert!((areas[0] - 2.0).abs() < 1e-6 && (areas[1] - 2.0).abs() < 1e-6, "{areas:?}");
+    }
+
+    #[test]
+    fn what_has_no_number_ends_half_way_and_does_not_fade() {
+        let map = ColorMap::VIRIDIS;
+        let gap = square(Association::Vertex, &[1.0, 1.0, 1.0, f64::NAN]);
+        let shown = colored_by_heat(gap, PointColors::map_over(map, [0.0, 1.0])).mesh;
+        let plain = SplatParams::default().color;
+        for t in &shown.triangles {
+            let colors = t.map(|v| shown.color[v as usize]);
+            assert!(colors == [map.at(1.0); 3] || colors == [plain; 3], "{colors:?}");
+        }
     }
 }

@@ -4,8 +4,8 @@ use crate::points::discs::unused_by_discs;
 use crate::points::materials::with_materials;
 use crate::points::matter::unused_by_matter;
 use crate::{
-    Classified, ColorBy, ColorScale, Colored, ConvertError, DiscShape, Kept, PointColors, SplatParams, colored, kept,
-    thinned, with_cells,
+    Classified, ColorBy, ColorScale, Colored, ConvertError, DiscShape, Kept, MapScale, PointColors, SplatParams,
+    colored, kept, thinned, with_cells,
 };
 use splat_core::glam::DVec3;
 use splat_core::points::attributes::EXTINCTION;
@@ -91,7 +91,7 @@ pub fn shown_points(
     if let Some(by) = shown.color_by.filter(|_| !points.is_empty()) {
         let colored = colored(&points, by, shown.up, splat)?;
         said.push(said_of_colors(by, &colored, "point"));
-        scale = ColorScale::of_points(&splat.object_name, by, &colored);
+        scale = ColorScale::of_points(&splat.object_name, by, &colored, splat.color);
         let mut own = Arc::unwrap_or_clone(points);
         if !own.gaussians.is_empty() {
             own.gaussians.recolor(&colored.color);
@@ -160,10 +160,17 @@ fn causes(shown: &PointsShown<'_>) -> String {
 
 /// How colours arose, of what has one number each: a point, a vertex or a face.
 pub(crate) fn said_of_colors(by: &ColorBy, colored: &Colored, each: &str) -> String {
+    if !colored.has_numbers() {
+        let all = plural(each);
+        return format!("no number of `{}` can be shown: all {all} have the object's colour", by.column);
+    }
     let colors = match (&by.colors, colored.range) {
-        (PointColors::Map(map, _), Some([low, high])) => {
-            let [from, to] = [low, high].map(|end| short(end, high - low));
-            format!("the map {} from {from} to {to}", map.name())
+        (PointColors::Map { map, scale, .. }, Some([low, high])) => {
+            // Of a logarithmic map the lower end tells how fine numbers are.
+            let is_logarithmic = *scale == MapScale::Logarithmic;
+            let [from, to] = [low, high].map(|end| short(end, if is_logarithmic { low } else { high - low }));
+            let by_logarithm = if is_logarithmic { ", by logarithm" } else { "" };
+            format!("the map {} from {from} to {to}{by_logarithm}", map.name())
         }
         (PointColors::Transfer(..), _) => "the object's `transfer`".to_owned(),
         (PointColors::Distinct, _) => "twelve colours in turns".to_owned(),
@@ -171,7 +178,7 @@ pub(crate) fn said_of_colors(by: &ColorBy, colored: &Colored, each: &str) -> Str
     };
     let gaps = match colored.gaps {
         0 => String::new(),
-        n => format!("; the object's colour for {} without a number", counted_each(n, each)),
+        n => format!("; the object's colour for {} without a number that shows", counted_each(n, each)),
     };
     let also = match by.colors {
         PointColors::Transfer(_, Classified::Opacity) => " and opacities",
@@ -216,7 +223,7 @@ mod tests {
             ..RawPoints::default()
         };
         let keep = [Kept { column: "class".into(), within: Within::Among(vec![2.0]) }];
-        let by = ColorBy { column: "value".into(), colors: PointColors::Map(ColorMap::VIRIDIS, Some([0.0, 6.0])) };
+        let by = ColorBy { column: "value".into(), colors: PointColors::map_over(ColorMap::VIRIDIS, [0.0, 6.0]) };
         let mut shown = PointsShown { keep: &keep, spacing: Some(2.0), color_by: Some(&by), ..PointsShown::default() };
         let splat = SplatParams::default();
         let ShownPoints { points: found, said, scale } =

@@ -2,6 +2,7 @@
 
 use super::Frames;
 use organza::scene::Goal;
+use splat_core::srgb::linear_from_hex;
 #[cfg(feature = "view")]
 use std::net::{IpAddr, SocketAddr};
 
@@ -29,6 +30,48 @@ pub(super) fn parse_device(text: &str) -> Result<String, String> {
 
 pub(super) fn parse_finite(text: &str) -> Result<f64, String> {
     text.parse().ok().filter(|x: &f64| x.is_finite()).ok_or_else(|| "expected a finite number".into())
+}
+
+/// Colours with a name, as CSS has them, 0xRRGGBB.
+const COLORS: [(&str, u32); 17] = [
+    ("black", 0x000000),
+    ("white", 0xffffff),
+    ("grey", 0x808080),
+    ("gray", 0x808080),
+    ("darkgrey", 0x404040),
+    ("lightgrey", 0xd3d3d3),
+    ("silver", 0xc0c0c0),
+    ("ivory", 0xfffff0),
+    ("beige", 0xf5f5dc),
+    ("skyblue", 0x87ceeb),
+    ("lightblue", 0xadd8e6),
+    ("navy", 0x000080),
+    ("blue", 0x0000ff),
+    ("green", 0x008000),
+    ("red", 0xff0000),
+    ("yellow", 0xffff00),
+    ("orange", 0xffa500),
+];
+
+/// A colour by its name or its bytes of sRGB, linear Rec.709.
+pub(super) fn parse_color(text: &str) -> Result<[f32; 3], String> {
+    let named = COLORS.iter().find(|(name, _)| name.eq_ignore_ascii_case(text)).map(|(_, rgb)| *rgb);
+    let bytes = text.strip_prefix('#').filter(|digits| digits.bytes().all(|digit| digit.is_ascii_hexdigit()));
+    let bytes = bytes.and_then(|digits| match digits.len() {
+        6 => u32::from_str_radix(digits, 16).ok(),
+        // Each digit stands twice.
+        3 => u32::from_str_radix(&digits.chars().flat_map(|digit| [digit; 2]).collect::<String>(), 16).ok(),
+        _ => None,
+    });
+    let names = || COLORS.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ");
+    named.or(bytes).map(linear_from_hex).ok_or_else(|| format!("expected #rrggbb or one of {}", names()))
+}
+
+/// Two numbers, the first below the second.
+pub(super) fn parse_range(text: &str) -> Result<[f64; 2], String> {
+    let ends = text.split_once(',').and_then(|(low, high)| Some([low.trim().parse().ok()?, high.trim().parse().ok()?]));
+    let rises = |[low, high]: &[f64; 2]| low.is_finite() && high.is_finite() && low < high;
+    ends.filter(rises).ok_or_else(|| "expected LOW,HIGH, two numbers of which the first is less, such as 0,100".into())
 }
 
 /// Milliseconds of a budget.

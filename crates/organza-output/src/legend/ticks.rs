@@ -38,6 +38,29 @@ impl Ticks {
     }
 }
 
+impl Ticks {
+    /// Those of a range above 0 by whose logarithms numbers lie: powers of ten, and 2 and 5 times these where there are few.
+    pub(super) fn of_powers(range: [f64; 2], most: usize) -> Self {
+        let [low, high] = range;
+        if !(low > 0.0 && high > low && high.is_finite()) {
+            return Self::of(range, 0);
+        }
+        let digits = last_digit(low)..=last_digit(high);
+        let within = |times: f64, digit: i32| {
+            let number = times * libm::pow(10.0, f64::from(digit));
+            (low..=high).contains(&number).then(|| (number, written(number, digit)))
+        };
+        let fine = digits.clone().flat_map(|digit| [1.0, 2.0, 5.0].map(|times| within(times, digit)));
+        let fine: Vec<(f64, String)> = fine.flatten().collect();
+        let every = digits.clone().count().div_ceil(most.max(1));
+        let round = match fine.len() <= most {
+            true => fine,
+            false => digits.step_by(every).filter_map(|digit| within(1.0, digit)).collect(),
+        };
+        Self { ends: [low, high].map(|end| (end, trimmed(written(end, last_digit(end) - FINER)))), round }
+    }
+}
+
 /// The least of 1, 2 and 5 times a power of ten that is not below a distance, and that power.
 fn step(distance: f64) -> (f64, i32) {
     let digit = last_digit(distance);

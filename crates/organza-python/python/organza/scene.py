@@ -80,6 +80,7 @@ class Scene:
         color_by: str | None = None,
         colormap: str | None = None,
         clim: tuple[float, float] | None = None,
+        log_scale: bool = False,
         name: str | None = None,
         **keys: Any,
     ) -> None:
@@ -106,6 +107,8 @@ class Scene:
             without colours.
         colormap, clim
             Its map and the numbers at the two ends of it.
+        log_scale
+            Whether numbers lie along the map by their logarithms; those that are not above 0 have the object's colour.
         name
             How the object is called.
         **keys
@@ -126,9 +129,11 @@ class Scene:
                 shown["map"] = colormap
             if clim is not None:
                 shown["range"] = [float(end) for end in clim]
+            if log_scale:
+                shown["scale"] = "log"
             keys = {"color_by": shown} | keys
-        elif colormap is not None or clim is not None:
-            raise InputError("colormap, clim: expected a column to colour by, found none; give `values` or `color_by`")
+        elif colormap is not None or clim is not None or log_scale:
+            raise InputError("colormap, clim, log_scale: expected a column to colour by, found none; give `values` or `color_by`")
         self._add("points", data, name, keys)
 
     def add_mesh(

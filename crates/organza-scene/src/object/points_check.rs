@@ -2,11 +2,11 @@
 
 use crate::at::At;
 use crate::limits::LARGEST;
-use crate::object::points_raw::{RawColorBy, RawDiscShape, RawPointForm, RawPointSize};
+use crate::object::points_raw::{RawColorBy, RawDiscShape, RawMapScale, RawPointForm, RawPointSize};
 use crate::object::raw::RawObject;
 use crate::source::transfer::{Beside, beside_of_points, check_transfer};
 use crate::{Error, PointsLook, shown};
-use convert::{Classified, ColorBy, ColorMap, DiscShape, DiscSize, Kept, PointColors, Within};
+use convert::{Classified, ColorBy, ColorMap, DiscShape, DiscSize, Kept, MapScale, PointColors, Within};
 
 /// Longest name of a column, bytes.
 const LONGEST_NAME: usize = 256;
@@ -94,7 +94,7 @@ fn check_color_by(at: &At<'_>, raw: &RawObject, by: &RawColorBy) -> Result<Color
     let column = check_name(&at_by.key("column"), &by.column)?.to_owned();
     let range = by.range.map(|range| check_range(&at_by.key("range"), range)).transpose()?;
     if raw.transfer.is_some() {
-        for (key, on) in [("map", by.map.is_some()), ("range", range.is_some())] {
+        for (key, on) in [("map", by.map.is_some()), ("range", range.is_some()), ("scale", by.scale.is_some())] {
             if on {
                 let message = format!("`{key}` and the object's `transfer` exclude each other");
                 return Err(at_by.key(key).error(message, "leave one of them out"));
@@ -111,14 +111,16 @@ fn check_color_by(at: &At<'_>, raw: &RawObject, by: &RawColorBy) -> Result<Color
     let default = if CLASSES.contains(&column.as_str()) { "classes" } else { "viridis" };
     let colors = match by.map.as_deref().unwrap_or(default) {
         name @ ("classes" | "distinct") => {
-            if range.is_some() {
-                let message = format!("the map \"{name}\" has a colour for each number and no `range`");
-                return Err(at_by.key("range").error(message, "leave it out, or choose another map"));
+            for (key, on) in [("range", range.is_some()), ("scale", by.scale.is_some())] {
+                if on {
+                    let message = format!("the map \"{name}\" has a colour for each number and no `{key}`");
+                    return Err(at_by.key(key).error(message, "leave it out, or choose another map"));
+                }
             }
             if name == "classes" { PointColors::Classes } else { PointColors::Distinct }
         }
         name => match ColorMap::named(name) {
-            Some(map) => PointColors::Map(map, range),
+            Some(map) => PointColors::Map { map, range, scale: check_scale(&at_by, by.scale, range)? },
             None => {
                 let names: Vec<&str> = ColorMap::names().chain(["classes", "distinct"]).collect();
                 let message = format!("`map`: expected one of {}, found `{}`", names.join(", "), shown(name));
@@ -127,6 +129,18 @@ fn check_color_by(at: &At<'_>, raw: &RawObject, by: &RawColorBy) -> Result<Color
         },
     };
     Ok(ColorBy { column, colors })
+}
+
+/// How numbers lie along a map; only numbers above 0 have logarithms.
+fn check_scale(at: &At<'_>, scale: Option<RawMapScale>, range: Option<[f64; 2]>) -> Result<MapScale, Error> {
+    let Some(RawMapScale::Log) = scale else { return Ok(MapScale::Linear) };
+    match range {
+        Some([low, _]) if low <= 0.0 => {
+            let message = format!("scale = \"log\": expected a range above 0, found one from {low}");
+            Err(at.key("range").error(message, "such as [0.01, 100]"))
+        }
+        _ => Ok(MapScale::Logarithmic),
+    }
 }
 
 /// Two numbers of which the first is below the second.

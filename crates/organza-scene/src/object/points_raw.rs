@@ -23,6 +23,17 @@ pub(crate) struct RawColorBy {
     pub(crate) map: Option<String>,
     /// Numbers at the two ends of the map; default the 1st and the 99th percentile.
     pub(crate) range: Option<[f64; 2]>,
+    /// How numbers lie along the map; default "linear".
+    pub(crate) scale: Option<RawMapScale>,
+}
+
+/// How numbers lie along a colour map.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+#[schemars(rename = "MapScale")]
+pub(crate) enum RawMapScale {
+    Linear,
+    Log,
 }
 
 /// The diameter of every disc of points.

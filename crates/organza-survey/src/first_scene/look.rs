@@ -197,7 +197,7 @@ fn object(file: &DataFile, preset: Option<&Preset>, colors: Option<String>) -> O
     }
 }
 
-/// How a volume looks: a computed field in the colours of a map and labels in such, unless its look has a name. What scanners measure comes in whole numbers, in
+/// How a volume looks: a computed field in the colours of a map and labels in such, a computed tomogram as bones in a film, unless its look has a name. What scanners measure comes in whole numbers, in
 /// Hounsfield units, or in formats that state how the patient lies.
 fn volume_look(grid: &Grid, matter: Option<&Matter>, preset: Option<&Preset>, is_scan: bool) -> Option<Look> {
     let is_field =
@@ -210,7 +210,11 @@ fn volume_look(grid: &Grid, matter: Option<&Matter>, preset: Option<&Preset>, is
         return Some(Look::Labels(map, labels));
     }
     match look {
-        None if is_field() => Some(Look::Field(ColorMap::VIRIDIS)),
+        None if matter.is_some_and(Matter::has_units) => Some(Look::Tomogram),
+        None if is_field() => {
+            let has_both_signs = matter.is_some_and(|matter| matter.opposite.is_some());
+            Some(Look::Field(if has_both_signs { ColorMap::COOLWARM } else { ColorMap::VIRIDIS }))
+        }
         Some(Look::Map(map)) if is_field() => Some(Look::Field(*map)),
         look => look.cloned(),
     }
@@ -300,7 +304,9 @@ mod tests {
         assert_eq!(look(&field, None, true), None);
         assert_eq!(look(&bytes, None, false), None);
         assert!(matches!(look(&bytes, Some("turbo"), false), Some(Look::Map(_))));
-        assert_eq!(look(&units, None, false), None);
+        assert_eq!(look(&units, None, false), Some(Look::Tomogram));
+        let both = ball(|r| libm::exp(-r / 12.0) - libm::exp(-(r - 20.0).abs() / 12.0));
+        assert_eq!(look(&both, None, false), Some(Look::Field(ColorMap::COOLWARM)));
     }
 
     #[test]

@@ -39,7 +39,10 @@ pub(super) fn mesh_colors(wish: &Wish) -> Option<String> {
 /// The line that names a column.
 fn color_by(column: &str, wish: &Wish) -> String {
     let map = wish.preset.as_ref().and_then(Preset::map).map(|map| format!(", map = \"{}\"", map.name()));
-    format!("color_by = {{ column = {}{} }}\n", quoted(column), map.unwrap_or_default())
+    let range = wish.color_range.map(|[low, high]| format!(", range = [{low:?}, {high:?}]"));
+    let scale = if wish.is_logarithmic { ", scale = \"log\"" } else { "" };
+    let keys = [map.unwrap_or_default(), range.unwrap_or_default()].concat();
+    format!("color_by = {{ column = {}{keys}{scale} }}\n", quoted(column))
 }
 
 /// The column that tells most of points without colours: their classes, else their values, if they differ.
@@ -94,6 +97,9 @@ mod tests {
         let wish = Wish { color_by: Some("height".into()), preset, ..Wish::default() };
         let text = point_colors(&colored, true, &wish).unwrap();
         assert!(text.ends_with("color_by = { column = \"height\", map = \"turbo\" }\n"), "{text}");
+        let wish = Wish { color_range: Some([0.5, 20.0]), is_logarithmic: true, ..wish };
+        let text = point_colors(&colored, true, &wish).unwrap();
+        assert!(text.ends_with("map = \"turbo\", range = [0.5, 20.0], scale = \"log\" }\n"), "{text}");
         let wish = Wish { color_by: Some("classification".into()), ..Wish::default() };
         let text = point_colors(&colored, true, &wish).unwrap();
         assert!(text.starts_with("# Classes: 2 (ground) 1, 6 (building) 1.\n"), "{text}");
