@@ -65,6 +65,11 @@ fn exit_0_explain_info_schema_print_documents() {
     assert!(explained["plan"]["effects"].as_array().is_some_and(|e| !e.is_empty()));
     let info = json_of(&place.expect(0, &["info", "s.toml", "--json"], ""));
     assert_eq!(info["objects"][0]["name"], "fog");
+    for shell in ["bash", "zsh", "fish"] {
+        let script = place.expect(0, &["completions", shell], "");
+        let script = String::from_utf8_lossy(&script.stdout).into_owned();
+        assert!(script.contains("organza") && script.contains("color-by"), "{shell}: {script}");
+    }
     let schema = json_of(&place.expect(0, &["schema"], ""));
     assert_eq!(schema["title"], "Organza scene");
     assert_eq!(schema["$defs"]["Light"]["oneOf"].as_array().map(Vec::len), Some(6));

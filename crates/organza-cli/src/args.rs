@@ -86,6 +86,11 @@ pub(super) enum Command {
         after_help = "Examples:\n  organza view bunny.ply\n  organza view scene.toml --size 640x360\n  organza view scene.toml --no-open --listen 127.0.0.1:8000"
     )]
     View(ViewArguments),
+    /// Prints what completes the arguments of this command in a shell.
+    #[command(
+        after_help = "Examples:\n  organza completions bash > ~/.local/share/bash-completion/completions/organza\n  organza completions zsh > ~/.zfunc/_organza"
+    )]
+    Completions(CompletionsArguments),
     /// Prints the JSON Schema of scene files.
     #[command(after_help = "Examples:\n  organza schema > scene.schema.json")]
     Schema,
@@ -108,9 +113,16 @@ impl Command {
             Self::Passport(a) => a.json,
             #[cfg(feature = "view")]
             Self::View(a) => a.scene.common.json,
-            Self::Schema => false,
+            Self::Completions(_) | Self::Schema => false,
         }
     }
+}
+
+#[derive(Debug, Args)]
+pub(super) struct CompletionsArguments {
+    /// The shell
+    #[arg(value_name = "SHELL")]
+    pub(super) shell: clap_complete::Shell,
 }
 
 /// An axis that may point up.

@@ -29,7 +29,7 @@ mod session;
 mod view;
 
 use args::{Arguments, Command};
-use clap::Parser;
+use clap::{CommandFactory, Parser};
 use organza::Error;
 use std::panic::{self, AssertUnwindSafe};
 use std::process::ExitCode;
@@ -81,6 +81,11 @@ fn run(command: Command) -> Result<u8, Error> {
         Command::Passport(arguments) => return passport::run(&arguments),
         #[cfg(feature = "view")]
         Command::View(arguments) => view::run(&arguments),
+        Command::Completions(arguments) => {
+            let mut script = Vec::new();
+            clap_complete::generate(arguments.shell, &mut Arguments::command(), "organza", &mut script);
+            console::out(&String::from_utf8_lossy(&script))
+        }
         Command::Schema => console::out(&(organza::scene::schema() + "\n")),
     }
     .map(|()| 0)

@@ -10,6 +10,7 @@ use crate::data_file::DataFile;
 use crate::lamps::lamps;
 use crate::number::{color, list, rounded, significant};
 use crate::preset::{Preset, Wish};
+use convert::ColorMap;
 use look::{Object, all_stand, drawn_steps, objects, takes_preset};
 use organza::scene::{
     DEFAULT_AZIMUTH, FoundCamera, LoadOptions, ROOT_KEY, name_in_memory, parse, relative_path, root_for,
@@ -67,6 +68,12 @@ pub fn first_scene(
     let root = root_for(scene_file, on_disk)?;
     let root = root.map(|root| text_of(&root)).transpose()?;
     if wish.preset.is_some() && !data.iter().any(|file| takes_preset(file, wish)) {
+        let is_look = wish.color_by.is_some() && wish.preset.as_ref().and_then(Preset::map).is_none();
+        if is_look {
+            let names: Vec<&str> = ColorMap::names().collect();
+            let message = "--preset names the look of a volume, and --color-by needs a colour map";
+            return Err(Error::usage(message, format!("name one of {}", names.join(", "))));
+        }
         let message =
             "--preset is for volumes, and as a colour map for points and meshes by a column, and no file is drawn so";
         return Err(Error::usage(message, "leave it out; in a scene `color` of an object is the colour of a mesh"));

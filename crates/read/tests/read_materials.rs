@@ -47,6 +47,13 @@ fn faces_have_the_diffuse_colours_of_their_materials() {
     assert_eq!(mesh.opacity.iter().copied().fold(1.0, f32::min), 0.75);
     assert_eq!(notes.remarks, ["a material states no number from 0 to 1 as its `d`, which is left out"]);
     std::fs::write(folder.join("a.mtl"), MTL).unwrap();
+    // What is clear is not there, and counts for no bounds.
+    std::fs::write(folder.join("a.mtl"), MTL.replace("d 0.5", "d 0")).unwrap();
+    let far = OBJ.replace("v 0 1 0", "v 0 90 0");
+    let (mesh, _) = read(&folder, &far);
+    assert_eq!((mesh.triangles.len(), colors(&mesh)), (1, vec![[[1.0, 0.0, 0.0]; 3]]));
+    assert_eq!(mesh.position, [Vec3::ZERO, Vec3::X, Vec3::X + Vec3::Y]);
+    std::fs::write(folder.join("a.mtl"), MTL).unwrap();
     // In a folder below, by another system's separator, of several files; the later of two materials counts.
     std::fs::write(folder.join("sub/b.mtl"), "newmtl green\nKd 0.25\n").unwrap();
     let (mesh, _) = read(&folder, &OBJ.replace("mtllib a.mtl", "mtllib a.mtl sub\\b.mtl"));

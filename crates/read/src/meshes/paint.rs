@@ -97,6 +97,7 @@ impl Painting {
         }
         let vertices = 0..mesh.position.len() as u32;
         let colors: Vec<[f32; 4]> = vertices.map(|v| self.at(v)).collect();
+        mesh.color = colors.iter().map(|[r, g, b, _]| [*r, *g, *b]).collect();
         if self.paints.iter().any(|p| p.alpha != Alpha::Ignored) {
             let opacity = |(v, color): (usize, &[f32; 4])| match self.alpha_of(v as u32) {
                 Alpha::Blended => color[3].clamp(0.0, 1.0),
@@ -110,14 +111,46 @@ impl Painting {
                 Alpha::Blended => mesh.opacity.is_empty() || t.iter().any(|v| alpha(*v) > 0.0),
             };
             let are_there: Vec<bool> = mesh.triangles.iter().map(is_there).collect();
-            keep(&mut mesh.triangles, &are_there);
-            for column in mesh.columns.iter_mut().filter(|column| column.association == Association::Triangle) {
-                keep(&mut column.values, &are_there);
-            }
+            leave_out(&mut mesh, &are_there);
         }
-        mesh.color = colors.iter().map(|[r, g, b, _]| [*r, *g, *b]).collect();
         Ok(mesh)
     }
+}
+
+/// Leaves out triangles that are not there, with the vertices that no other triangle has: they would count for bounds.
+fn leave_out(mesh: &mut Mesh, are_there: &[bool]) {
+    if are_there.iter().all(|is_there| *is_there) {
+        return;
+    }
+    let mut stays = vec![true; mesh.position.len()];
+    let of_triangles =
+        |is_kept: bool| mesh.triangles.iter().zip(are_there).filter(move |(_, there)| **there == is_kept);
+    of_triangles(false).for_each(|(t, _)| t.iter().for_each(|v| stays[*v as usize] = false));
+    of_triangles(true).for_each(|(t, _)| t.iter().for_each(|v| stays[*v as usize] = true));
+    keep(&mut mesh.triangles, are_there);
+    keep(&mut mesh.position, &stays);
+    keep(&mut mesh.normal, &stays);
+    keep(&mut mesh.color, &stays);
+    keep(&mut mesh.opacity, &stays);
+    for column in &mut mesh.columns {
+        keep(
+            &mut column.values,
+            match column.association {
+                Association::Vertex => &stays,
+                Association::Triangle => are_there,
+            },
+        );
+    }
+    let mut new = 0;
+    let ranks: Vec<u32> = stays
+        .iter()
+        .map(|stays| {
+            let rank = new;
+            new += u32::from(*stays);
+            rank
+        })
+        .collect();
+    mesh.triangles.iter_mut().flatten().for_each(|v| *v = ranks[*v as usize]);
 }
 
 /// Keeps entries that are there.
