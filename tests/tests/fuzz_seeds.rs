@@ -37,8 +37,13 @@ fn seeds_of_formulas_and_transfer_functions_parse() {
 
 #[test]
 fn seeds_of_files_with_others_beside_them_are_read_whole() {
-    let targets =
-        [("obj_beside", "a.obj"), ("gltf_beside", "a.gltf"), ("metaimage_beside", "a.mhd"), ("nrrd_beside", "a.nhdr")];
+    let targets = [
+        ("obj_beside", "a.obj"),
+        ("gltf_beside", "a.gltf"),
+        ("metaimage_beside", "a.mhd"),
+        ("nrrd_beside", "a.nhdr"),
+        ("vti_beside", "a.vtm"),
+    ];
     for (target, name) in targets {
         for (path, seed) in seeds(target) {
             let folder = tempfile::tempdir().unwrap();

@@ -189,13 +189,9 @@ fn an_array_of_a_vtk_file_is_drawn_said_and_can_be_chosen() {
     place.expect(
         3,
         &["render", "foam.vtk", "--color-by", "q", "-o", "q.png"],
-        "expected an array among p, T, found 'q'",
+        "expected an array among p, T, U:magnitude, found 'q'",
     );
-    place.expect(
-        3,
-        &["render", "t.toml", "--set", "object.foam.array='U'", "-o", "q.png"],
-        "3 numbers of 4 bytes a voxel",
-    );
+    place.expect(3, &["render", "t.toml", "--set", "object.foam.array='U:w'", "-o", "q.png"], "found 'U:w'");
 }
 
 /// What is scaled is as dense as it was.

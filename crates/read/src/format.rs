@@ -72,7 +72,7 @@ pub(crate) fn format_of(path: &Path, content: &[u8]) -> Option<Format> {
     if content.get(344..347).is_some_and(|magic| magic == b"n+1" || magic == b"ni1") {
         return Some(Format::Nifti);
     }
-    // NIfTI-2, which its reader names.
+    // NIfTI-2.
     if content.get(4..7).is_some_and(|magic| magic == b"n+2" || magic == b"ni2") {
         return Some(Format::Nifti);
     }
@@ -116,7 +116,9 @@ pub(crate) fn by_name(path: &Path) -> Option<Format> {
         "e57" => Some(Format::E57),
         "nii" | "hdr" => Some(Format::Nifti),
         "mha" | "mhd" => Some(Format::MetaImage),
-        "vti" | "vtu" | "vtp" => Some(Format::VtkXml),
+        "vti" | "vtr" | "vts" | "vtu" | "vtp" => Some(Format::VtkXml),
+        // Lists of such files.
+        "pvti" | "pvtr" | "pvts" | "pvtu" | "pvtp" | "vtm" | "pvd" => Some(Format::VtkXml),
         "vtk" => Some(Format::Vtk),
         "raw" => Some(Format::Raw),
         "splat" => Some(Format::Splat),

@@ -412,7 +412,7 @@ fn parse_as(
         Format::Nifti => nifti::read(stream, params, &mut reading.notes).map(Loaded::Grid),
         Format::MetaImage => metaimage::read(stream, place, params, &mut reading.notes).map(Loaded::Grid),
         #[cfg(feature = "vti")]
-        Format::VtkXml => vti::read(&stream.rest()?, reading),
+        Format::VtkXml => vti::read(&stream.rest()?, place, reading),
         #[cfg(feature = "vtk")]
         Format::Vtk => vtk::read(&stream.rest()?, reading),
         Format::Raw => raw::read(stream, path, params, &mut reading.notes).map(Loaded::Grid),

@@ -25,3 +25,5 @@ pub(crate) mod statements;
 pub(crate) mod stl;
 #[cfg(any(feature = "obj", feature = "gltf", feature = "ply"))]
 pub(crate) mod texture;
+#[cfg(any(feature = "obj", feature = "vti", feature = "vtk"))]
+pub(crate) mod tubes;

@@ -155,6 +155,15 @@ impl<'a> Reading<'a> {
         Self { params, progress, notes: Notes::default() }
     }
 
+    /// The same file with other parameters; takes the notes, which are to be given back.
+    #[cfg(feature = "vti")]
+    pub(crate) fn within<'p>(&mut self, params: &'p ReadParams) -> Reading<'p>
+    where
+        'a: 'p,
+    {
+        Reading { params, progress: self.progress, notes: std::mem::take(&mut self.notes) }
+    }
+
     /// Counts a fault that is mended; with [`ReadParams::strict`] it is the error that it stands for.
     pub(crate) fn mend(
         &mut self,

@@ -8,6 +8,8 @@ pub(crate) mod metaimage;
 pub(crate) mod nifti;
 pub(crate) mod nrrd;
 pub(crate) mod raw;
+#[cfg(any(feature = "vti", feature = "vtk"))]
+pub(crate) mod rectilinear;
 pub(crate) mod selection;
 pub(crate) mod voxels;
 #[cfg(feature = "vti")]

@@ -4,6 +4,9 @@ use crate::read_samples::cells::{vtk_cells, vtk_surface, vtp, vtp_pieces, vtu, v
 use crate::read_samples::copc::copc;
 use crate::read_samples::e57::e57;
 use crate::read_samples::gaussians::{packed_ply, splat, spz, trained, trained_ply};
+use crate::read_samples::grids::{
+    vtk_polyhedra, vtk_rectilinear, vtk_structured, vtr, vts, vtu_polyhedra, vtu_quadratic,
+};
 use crate::read_samples::oldest::laz_oldest;
 use crate::read_samples::volumes::{self, metaimage, vti, vtk, vtk_scalars};
 use crate::read_samples::{
@@ -47,6 +50,10 @@ pub(crate) fn samples() -> Vec<(&'static str, Vec<u8>)> {
         ("rawblocks.vti", vti("raw", true)),
         ("base64blocks.vti", vti("base64", true)),
         ("binary.vtk", vtk_scalars(true)),
+        ("steps.vtr", vtr()),
+        ("steps.vtk", vtk_rectilinear(true)),
+        ("straight.vts", vts(0.0)),
+        ("straight.vtk", vtk_structured(true, 0.0)),
         ("colours.vtp", vtp()),
         ("pieces.vtp", vtp_pieces()),
         ("a_3x2x2_float32.raw", volumes::raw(false)),
@@ -109,5 +116,10 @@ pub(crate) fn bodies() -> Vec<(&'static str, Vec<u8>)> {
         ("pieces.vtu", vtu_pieces("binary", false)),
         ("cells.vtk", vtk_cells(false, false)),
         ("ends.vtk", vtk_cells(true, true)),
+        ("bent.vts", vts(0.1)),
+        ("faces.vtu", vtu_polyhedra(false)),
+        ("faces_of.vtu", vtu_polyhedra(true)),
+        ("faces.vtk", vtk_polyhedra(false)),
+        ("curved.vtu", vtu_quadratic()),
     ]
 }

@@ -9,9 +9,11 @@ mod read_copc;
 mod read_e57;
 #[cfg(all(feature = "off", feature = "gltf"))]
 mod read_gltf;
+mod read_grids;
 #[cfg(all(feature = "exr", feature = "png"))]
 mod read_images;
 mod read_las;
+mod read_lists;
 #[cfg(feature = "obj")]
 mod read_materials;
 #[cfg(feature = "obj")]

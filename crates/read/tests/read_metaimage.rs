@@ -70,6 +70,12 @@ fn its_space_is_turned_and_said_to_be() {
 }
 
 #[test]
+fn a_picture_is_not_called_damaged() {
+    let error = load("a.mha", &with("NDims = 3", "NDims = 2")).unwrap_err();
+    assert!(error.hint.starts_with("it is a picture, not a volume"), "{error}");
+}
+
+#[test]
 fn what_is_wrong_in_a_header_is_named_with_its_line() {
     for (from, to, beginning) in [
         ("= Image", "= Tube", "a.mha:1: expected ObjectType = Image"),

@@ -87,13 +87,72 @@ fn a_fourth_dimension_of_one_is_accepted_and_of_two_is_held_against_the_file() {
     );
 }
 
+/// The volume of [`nifti`] of bytes as NIfTI-2.
+fn nifti_2(big: bool) -> Vec<u8> {
+    let mut out = vec![0u8; 544];
+    let mut put = |at: usize, le: &[u8]| {
+        let bytes: Vec<u8> = if big { le.iter().rev().copied().collect() } else { le.to_vec() };
+        out[at..at + bytes.len()].copy_from_slice(&bytes);
+    };
+    put(0, &540i32.to_le_bytes());
+    put(12, &2i16.to_le_bytes());
+    put(14, &8i16.to_le_bytes());
+    [3i64, 3, 2, 2, 1, 1, 1, 1].iter().enumerate().for_each(|(i, n)| put(16 + 8 * i, &n.to_le_bytes()));
+    [1.0f64, 2.0, 3.0, 4.0].iter().enumerate().for_each(|(i, s)| put(104 + 8 * i, &s.to_le_bytes()));
+    put(168, &544i64.to_le_bytes());
+    put(176, &0.5f64.to_le_bytes());
+    put(184, &(-1f64).to_le_bytes());
+    put(348, &1i32.to_le_bytes());
+    let rows = [0.0f64, -2.0, 0.0, 10.0, 3.0, 0.0, 0.0, 20.0, 0.0, 0.0, 4.0, -30.0];
+    rows.iter().enumerate().for_each(|(i, v)| put(400 + 8 * i, &v.to_le_bytes()));
+    out[4..12].copy_from_slice(b"n+2\0\r\n\x1a\n");
+    out.extend(0..12);
+    out
+}
+
 #[test]
-fn nifti_2_is_named() {
-    for (name, big) in [("a.nii", false), ("a.file", true)] {
-        let mut content = vec![0; 600];
-        content[..4].copy_from_slice(&if big { 540i32.to_be_bytes() } else { 540i32.to_le_bytes() });
-        content[4..12].copy_from_slice(b"n+2\0\r\n\x1a\n");
-        let error = load(name, &content).unwrap_err().to_string();
-        assert!(error.contains("expected a NIfTI-1 header, found a NIfTI-2 header"), "{error}");
+fn nifti_2_holds_the_same_volume() {
+    let expected = grid(&nifti(NIFTI_U8, false));
+    for big in [false, true] {
+        let mut content = nifti_2(big);
+        assert_eq!(grid(&content), expected, "big {big}");
+        // The rotation, the place and the voxel size where there is no matrix.
+        let bytes = |value: f64| if big { value.to_be_bytes() } else { value.to_le_bytes() };
+        content[348..352].fill(0);
+        assert_eq!(grid(&content).axes, DMat3::from_diagonal(DVec3::new(2.0, 3.0, 4.0)));
+        content[344..348].copy_from_slice(&if big { 1i32.to_be_bytes() } else { 1i32.to_le_bytes() });
+        for (at, value) in [(104, -1.0), (368, std::f64::consts::FRAC_1_SQRT_2), (376, 1.0), (384, 2.0), (392, 3.0)] {
+            content[at..at + 8].copy_from_slice(&bytes(value));
+        }
+        let turned = DVec3::new(1.0 - 3.0, 2.0 + 2.0, 3.0 - 4.0);
+        assert!(grid(&content).position(1, 1, 1).distance(turned) < 1e-6, "{}", grid(&content).position(1, 1, 1));
     }
+    assert_eq!(grid(&gzip(&nifti_2(false))), expected);
+}
+
+#[test]
+fn what_is_wrong_in_nifti_2_is_named() {
+    let with = |at: usize, bytes: &[u8]| {
+        let mut content = nifti_2(false);
+        content[at..at + bytes.len()].copy_from_slice(bytes);
+        content
+    };
+    for (content, expected) in [
+        (with(24, &(1i64 << 60).to_le_bytes()), "v.nii@16: expected dimensions from 1 to 2147483647"),
+        (with(24, &[[255, 255, 255, 127, 0, 0, 0, 0]; 3].concat()), "v.nii@16: expected at most 2^45 voxels"),
+        (with(16, &(-3i64).to_le_bytes()), "v.nii@16: expected a volume of 3 dimensions"),
+        (with(12, &4i16.to_le_bytes()), "v.nii@544: expected 24 bytes of voxels (3 x 2 x 2 x 2 bytes), found 12"),
+        (with(12, &32i16.to_le_bytes()), "v.nii@12: expected a datatype of real scalars or colours"),
+        (with(168, &(1i64 << 60).to_le_bytes()), "v.nii@168: expected an offset of the voxels from 540"),
+        (with(168, &100i64.to_le_bytes()), "v.nii@168: expected an offset of the voxels from 540"),
+        (with(176, &f64::INFINITY.to_le_bytes()), "v.nii@176: expected a finite slope and intercept"),
+        (with(408, &0f64.to_le_bytes()), "v.nii@344: expected three independent finite steps"),
+        (with(4, b"ni2"), "v.nii@4: expected 'n+2', header and voxels in one file"),
+        (nifti_2(false)[..500].to_vec(), "v.nii@0: expected a header of 540 bytes, found 500 bytes"),
+    ] {
+        let error = load("v.nii", &content).unwrap_err().to_string();
+        assert!(error.starts_with(expected), "{error}");
+    }
+    let whole = nifti_2(true);
+    assert!((0..whole.len()).all(|length| load("v.nii", &whole[..length]).is_err()));
 }

@@ -20,7 +20,6 @@ const TESSELLATE: &str = "it holds no triangles: export it as STL, OBJ or glTF f
 const TO_PLY: &str = "convert it to PLY, LAS or LAZ, such as with CloudCompare";
 const TO_NRRD: &str = "convert it to NRRD or NIfTI, such as with 3D Slicer or ParaView";
 const TO_VTU: &str = "save it as one .vti, .vtu or .vtp, such as with ParaView";
-const PIECES: &str = "draw its pieces: give the .vti, .vtu or .vtp files that it names to `organza render` together";
 const TO_VTU_BY_MESHIO: &str = "convert it to .vtu, such as with `meshio convert` or ParaView";
 const TO_XYZ: &str = "convert it to points as text, such as with `gdal_translate -of XYZ FILE heights.xyz`";
 const TILES: &str = "name a tile that is .glb; `npx 3d-tiles-tools b3dmToGlb` makes such of .b3dm";
@@ -38,7 +37,7 @@ const fn by_extension(name: &'static str, extensions: &'static [&'static str], h
     Unread { name, marks: &[], extensions, hint }
 }
 
-const UNREAD: [Unread; 62] = [
+const UNREAD: [Unread; 61] = [
     Unread { name: "FBX", marks: &[(0, b"Kaydara FBX Binary"), (0, b"; FBX ")], extensions: &["fbx"], hint: TO_GLTF },
     Unread {
         name: "USD",
@@ -91,12 +90,7 @@ const UNREAD: [Unread; 62] = [
     by_extension("FreeSurfer", &["mgh", "mgz"], "convert it to NIfTI, such as with mri_convert"),
     by_extension("MRC", &["mrc", "map", "ccp4"], TO_NRRD),
     Unread { name: "NumPy", marks: &[(0, b"\x93NUMPY")], extensions: &["npy", "npz"], hint: TO_NRRD },
-    by_extension("another dataset of VTK", &["vts", "vtr", "vth"], TO_VTU),
-    by_extension(
-        "a list of the pieces of a VTK dataset",
-        &["vtm", "pvd", "pvtu", "pvtp", "pvti", "pvts", "pvtr"],
-        PIECES,
-    ),
+    by_extension("another dataset of VTK", &["vth", "vthb", "vtt"], TO_VTU),
     Unread {
         name: "a batched tile of 3D Tiles",
         marks: &[(0, b"b3dm"), (0, b"i3dm")],
@@ -137,7 +131,7 @@ const UNREAD: [Unread; 62] = [
     by_extension("a scene", &["toml", "json"], SCENE),
 ];
 
-const READ: &str = "PLY, .splat, SPZ, STL, OBJ, OFF, glTF, GLB, PCD, XYZ, CSV, LAS, LAZ, E57, NIfTI, NRRD, MetaImage, VTK images, cells and surfaces, raw voxels, \
+const READ: &str = "PLY, .splat, SPZ, STL, OBJ, OFF, glTF, GLB, PCD, XYZ, CSV, LAS, LAZ, E57, NIfTI, NRRD, MetaImage, VTK images, grids, cells, surfaces and lists of these, raw voxels, \
     Radiance HDR, OpenEXR and PNG files are read, each also inside gzip";
 
 fn error(unread: &Unread) -> ReadError {

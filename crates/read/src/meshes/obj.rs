@@ -2,12 +2,14 @@
 //!
 //! Read are `v` (with linear colours after the coordinates, if all have them), `vn`, `vt`, `f`, and of materials the diffuse
 //! colour and its texture (see `mtl.rs`), unless vertices have colours of their own. Vertices are split where materials
-//! meet. Groups, lines and curves are read over. The parser is our own: lines, columns and checked indices are asked of it.
+//! meet. Groups and curves are read over, and
+//! lines too but for a file of lines alone, which are tubes. The parser is our own: lines, columns and checked indices are asked of it.
 
 use super::fans::Fans;
 use super::mtl::Materials;
 use super::paint::corners::{BYTES_PER_CORNER, Corner, NONE, painted};
 use super::statements;
+use super::tubes::Tubes;
 use crate::error::{Place, ReadError};
 use crate::points::direction::unit;
 use crate::points::origin;
@@ -17,6 +19,7 @@ use crate::stream::input::Growing;
 use crate::text::{Line, Lines, Word};
 use crate::{Loaded, ReadParams};
 use splat_core::glam::{DVec3, Vec3};
+use splat_core::text::counted;
 use splat_core::{Mesh, RawPoints};
 use std::collections::HashMap;
 use std::path::Path;
@@ -25,13 +28,12 @@ use std::path::Path;
 const BYTES_PER_VERTEX: u64 = 24 + 12 + 12 + 12;
 
 /// Statements without a meaning here.
-pub(crate) const READ_OVER: [&[u8]; 19] = [
+pub(crate) const READ_OVER: [&[u8]; 18] = [
     b"vp",
     b"g",
     b"o",
     b"s",
     b"mg",
-    b"l",
     b"p",
     b"usemap",
     b"maplib",
@@ -57,6 +59,9 @@ struct Content<'a> {
     of_corner: HashMap<Corner, u32>,
     fans: Fans,
     faces: u64,
+    /// Points of lines, one line behind the other, and where each ends.
+    line_points: Vec<u32>,
+    line_ends: Vec<usize>,
     /// The corners of the current face.
     face: Vec<u32>,
     /// The first corner that names a normal before there is any.
@@ -68,6 +73,7 @@ struct Content<'a> {
 /// Memory of what is read.
 struct Held {
     vertices: Growing,
+    lines: Growing,
     normals: Growing,
     places: Growing,
     corners: Growing,
@@ -89,11 +95,14 @@ pub(crate) fn read(content: &[u8], place: Option<&Path>, reading: &mut Reading<'
         of_corner: HashMap::new(),
         fans: Fans::default(),
         faces: 0,
+        line_points: Vec::new(),
+        line_ends: Vec::new(),
         face: Vec::new(),
         without_normal: None,
         materials: Materials::new(place),
         held: Held {
             vertices: Growing::new("the vertices"),
+            lines: Growing::new("the lines"),
             normals: Growing::new("the normals"),
             places: Growing::new("the texture coordinates"),
             corners: Growing::new("the corners"),
@@ -126,8 +135,11 @@ impl Content<'_> {
             b"vn" => self.normal(keyword, words, reading.params),
             b"vt" => self.texture_place(words, reading.params),
             b"f" => self.face(keyword, words, reading),
+            // Lines that go on are read over: their points are not known here.
+            b"l" if !continued => self.line(words, reading.params),
             b"mtllib" => self.materials.library(line, reading),
             b"usemtl" => self.materials.choose(line, reading),
+            b"l" => Ok(()),
             other if READ_OVER.contains(&other) => Ok(()),
             _ => {
                 let hint = "is this a Wavefront OBJ file?";
@@ -222,6 +234,31 @@ impl Content<'_> {
         self.fans.add(self.faces, &self.face, keyword.place(), reading)
     }
 
+    /// A line through vertices, whose texture coordinates are not used.
+    fn line<'a>(&mut self, words: impl Iterator<Item = Word<'a>>, params: &ReadParams) -> Result<(), ReadError> {
+        let ends = (self.line_ends.len() + 1) * size_of::<usize>();
+        for word in words {
+            let part = word.text.split(|b| *b == b'/').next().unwrap_or_default();
+            let point = index(word, part, self.positions.len(), "vertices")?;
+            let points = (self.line_points.len() + 1) * size_of::<u32>();
+            self.held.lines.hold((points + ends) as u64, params)?;
+            input::reserve(&mut self.line_points, 1)?;
+            self.line_points.push(point);
+        }
+        self.held.lines.hold((size_of_val(self.line_points.as_slice()) + ends) as u64, params)?;
+        input::reserve(&mut self.line_ends, 1)?;
+        self.line_ends.push(self.line_points.len());
+        Ok(())
+    }
+
+    /// The tubes around the lines, if there are some.
+    fn tubes(&self, positions: &[Vec3], reading: &mut Reading<'_>) -> Result<Option<Tubes>, ReadError> {
+        let starts = [0].into_iter().chain(self.line_ends.iter().copied());
+        let lines = starts.zip(&self.line_ends).enumerate();
+        let lines = lines.map(|(rank, (start, end))| (rank as u32, &self.line_points[start..*end]));
+        Tubes::of(positions, lines, reading)
+    }
+
     /// The vertex of the mesh for `v`, `v/vt`, `v//vn` or `v/vt/vn`.
     fn corner(&mut self, word: Word<'_>, is_textured: bool, reading: &mut Reading<'_>) -> Result<u32, ReadError> {
         let mut parts = word.text.split(|b| *b == b'/');
@@ -283,6 +320,16 @@ impl Content<'_> {
         let colored = self.colors.len() == self.positions.len();
         if !self.places.is_empty() && (colored || self.materials.textures.is_empty()) {
             reading.notes.not_used([&b"vt"[..]]);
+        }
+        if self.faces > 0 && !self.line_ends.is_empty() {
+            reading.notes.not_used([counted(self.line_ends.len() as u64, "line").as_bytes()]);
+        }
+        if self.faces == 0
+            && let Some(tubes) = self.tubes(&offsets, reading)?
+        {
+            let color = if colored { tubes.of_vertices(&self.colors) } else { Vec::new() };
+            let vertices = Mesh { origin, color, ..Mesh::default() };
+            return Ok(Loaded::Mesh(tubes.into_mesh(vertices, reading)));
         }
         if self.faces == 0 {
             let color = if colored { self.colors } else { Vec::new() };

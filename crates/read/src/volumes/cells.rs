@@ -3,19 +3,23 @@
 mod kind;
 mod lists;
 mod resample;
+mod solid;
+pub(crate) mod structured;
 
 use super::selection::Selection;
 use crate::Loaded;
 use crate::error::{Place, ReadError};
 use crate::meshes::fans::Fans;
 use crate::meshes::opacity;
+use crate::meshes::tubes::Tubes;
 use crate::points::direction::unit;
 use crate::points::origin;
 use crate::reading::Reading;
 use crate::stream::input;
-use kind::{Kind, Shape};
-pub(crate) use lists::Lists;
-use resample::Body;
+pub(crate) use kind::POLYHEDRON;
+use kind::{HIDDEN, Kind, Shape};
+pub(crate) use lists::{CellSource, Lists};
+use resample::{Body, Faces};
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::srgb::linear_from_srgb;
 use splat_core::text::counted;
@@ -88,12 +92,12 @@ pub(crate) fn places(numbers: &[f64], place: Place, reading: &Reading<'_>) -> Re
 /// Kinds of cells out of their numbers.
 pub(crate) fn kinds(numbers: &[f64], place: Place) -> Result<Vec<u8>, ReadError> {
     let kind = |(i, number): (usize, &f64)| {
-        let fits = (0.0..=255.0).contains(number) && number.fract() == 0.0;
+        let fits = (0.0..255.0).contains(number) && number.fract() == 0.0;
         let found = || format!("{number} at cell {i}");
         if fits {
             Ok(*number as u8)
         } else {
-            Err(ReadError::input(place, "types of cells from 0 to 255", found(), HINT))
+            Err(ReadError::input(place, "types of cells from 0 to 254", found(), HINT))
         }
     };
     numbers.iter().enumerate().map(kind).collect()
@@ -179,7 +183,24 @@ impl Cells {
 
     /// Whether some cell encloses a volume.
     pub(crate) fn has_bodies(&self) -> bool {
-        self.kinds.iter().any(|number| Kind::of(*number).is_some_and(|kind| matches!(kind.shape, Shape::Body(_))))
+        let is_body = |kind: &Kind| matches!(kind.shape, Shape::Body(_) | Shape::Polyhedron);
+        self.kinds.iter().any(|number| Kind::of(*number).is_some_and(is_body))
+    }
+
+    /// Leaves out the cells that VTK marks as copies of those of another piece or as not to be seen; `marks` has a number of each cell.
+    pub(crate) fn hide(&mut self, marks: &[f64]) {
+        /// Bits of a copy, of a cell that finer ones stand for, and of one that is not to be seen.
+        const UNSEEN: u8 = 1 | 8 | 32;
+        for (kind, mark) in self.kinds.iter_mut().zip(marks) {
+            if (*mark as u8) & UNSEEN != 0 {
+                *kind = HIDDEN;
+            }
+        }
+    }
+
+    /// Whether some cells are left out.
+    pub(crate) fn has_hidden(&self) -> bool {
+        self.kinds.contains(&HIDDEN)
     }
 
     /// Refuses cells that are not read, and those that have not as many points as their kind.
@@ -190,18 +211,39 @@ impl Cells {
             return Err(ReadError::input(self.place, expected, found, HINT));
         }
         for (i, (number, corners)) in self.kinds.iter().zip(self.lists.iter()).enumerate() {
-            let Some(kind) = Kind::of(*number) else {
-                let hint = "read are tetrahedra, hexahedra, voxels, wedges, pyramids and flat cells; ParaView's filter Tetrahedralize makes \
-                    such of others";
+            let Some(kind) = Kind::of_cell(*number, corners.len()) else {
+                let hint = "read are cells of straight edges, quadratic ones, Lagrange and Bézier cells by their corners, and polyhedra; \
+                    ParaView's filter Tetrahedralize makes tetrahedra of others";
                 let found = format!("{} (type {number}) at cell {i}", kind::unread(*number));
-                return Err(ReadError::input(self.place, "cells of straight edges", found, hint));
+                return Err(ReadError::input(self.place, "cells of a kind that is read", found, hint));
             };
-            if kind.corners.is_some_and(|n| n != corners.len()) {
-                let expected = format!("{} points of cell {i}, a {}", kind.corners.unwrap_or(0), kind.name);
+            if let Some(expected) = kind.refused(corners.len()) {
+                let expected = format!("{expected} points of cell {i}, a {}", kind.name);
                 return Err(ReadError::input(self.place, expected, corners.len().to_string(), HINT));
+            }
+            if matches!(kind.shape, Shape::Polyhedron) && self.lists.faces(i).is_none() {
+                let expected = format!("the faces of cell {i}, a polyhedron");
+                return Err(ReadError::input(self.place, expected, "none", HINT));
             }
         }
         Ok(())
+    }
+
+    /// Says which cells are left out, and which are drawn by their corners alone.
+    fn remark_kinds(&self, reading: &mut Reading<'_>) {
+        let hidden = self.kinds.iter().filter(|kind| **kind == HIDDEN).count();
+        if hidden > 0 {
+            let hidden = counted(hidden as u64, "cell");
+            reading.notes.remark(format!("{hidden} that the file marks as copies or as hidden are left out"));
+        }
+        let is_cut = |(number, corners): &(&u8, &[u32])| {
+            Kind::of_cell(**number, corners.len()).is_some_and(|kind| kind.is_cut(corners.len()))
+        };
+        let cut = self.kinds.iter().zip(self.lists.iter()).filter(is_cut).count();
+        if cut > 0 {
+            let cut = counted(cut as u64, "curved cell");
+            reading.notes.remark(format!("{cut} drawn by the corners alone: points of higher order are not used"));
+        }
     }
 
     /// What the cells are: a volume, a mesh or points.
@@ -211,8 +253,10 @@ impl Cells {
         columns: PointColumns,
         reading: &mut Reading<'_>,
     ) -> Result<Loaded, ReadError> {
+        self.remark_kinds(reading);
         if self.has_bodies() {
-            let flat = self.kinds.len() - self.bodies().count();
+            let hidden = self.kinds.iter().filter(|kind| **kind == HIDDEN).count();
+            let flat = self.kinds.len() - hidden - self.bodies().count();
             if flat > 0 {
                 reading.notes.not_used([format!("{} without a volume", counted(flat as u64, "cell")).as_bytes()]);
             }
@@ -226,11 +270,23 @@ impl Cells {
         }
         let PointColumns { normal, color, opacity, mut named } = columns;
         let (fans, lines, cell_of) = self.fans(&named, reading)?;
-        if lines > 0 {
-            reading.notes.not_used([counted(lines as u64, "line").as_bytes()]);
-        }
         input::hold("the vertices", self.points.len() as u64 * BYTES_PER_VERTEX, reading.params)?;
         let (origin, position) = origin::relative(&self.points, self.place, |i| format!("point {i}"))?;
+        let tubes = if fans.is_none() { self.tubes(&position, reading)? } else { None };
+        if lines > 0 && tubes.is_none() {
+            reading.notes.not_used([counted(lines as u64, "line").as_bytes()]);
+        }
+        if let Some(tubes) = tubes {
+            for column in &mut named {
+                column.values = match column.association {
+                    Association::Vertex => tubes.of_vertices(&column.values),
+                    Association::Triangle => tubes.lines.iter().map(|line| column.values[*line as usize]).collect(),
+                };
+            }
+            let mut vertices = Mesh { origin, color: tubes.of_vertices(&color), columns: named, ..Mesh::default() };
+            opacity::give(&mut vertices, tubes.of_vertices(&opacity), &mut reading.notes);
+            return Ok(Loaded::Mesh(tubes.into_mesh(vertices, reading)));
+        }
         let Some(fans) = fans else {
             let opacity = opacity::meant(opacity, &mut reading.notes);
             named.retain(|column| column.association == Association::Vertex);
@@ -251,9 +307,23 @@ impl Cells {
     /// The cells that enclose a volume, each with its rank among all cells.
     fn bodies(&self) -> impl Iterator<Item = Body<'_>> {
         self.kinds.iter().zip(self.lists.iter()).enumerate().filter_map(|(cell, (number, corners))| {
-            let Shape::Body(faces) = Kind::of(*number)?.shape else { return None };
-            Some(Body { cell, corners, faces })
+            let kind = Kind::of_cell(*number, corners.len())?;
+            let faces = match kind.shape {
+                Shape::Body(solid) => Faces::Of(solid),
+                Shape::Polyhedron => Faces::Around(self.lists.faces(cell)?),
+                _ => return None,
+            };
+            Some(Body { cell, corners: kind.drawn(corners), faces })
         })
+    }
+
+    /// Tubes around the lines, if there are some.
+    fn tubes(&self, positions: &[Vec3], reading: &mut Reading<'_>) -> Result<Option<Tubes>, ReadError> {
+        let lines = self.kinds.iter().zip(self.lists.iter()).enumerate().filter_map(|(i, (number, corners))| {
+            let kind = Kind::of_cell(*number, corners.len())?;
+            matches!(kind.shape, Shape::Line).then(|| (i as u32, kind.drawn(corners)))
+        });
+        Tubes::of(positions, lines, reading)
     }
 
     /// The faces, if there are some, and the number of lines; and where columns of cells need it the cell of each triangle.
@@ -269,8 +339,20 @@ impl Cells {
         let mut lines = 0;
         for (i, (number, corners)) in self.kinds.iter().zip(self.lists.iter()).enumerate() {
             let mut add = |corners: &[u32], reading: &mut Reading<'_>| fans.add(i as u64, corners, self.place, reading);
-            match Kind::of(*number).map(|kind| kind.shape) {
-                Some(Shape::Face) => add(corners, reading)?,
+            let kind = Kind::of_cell(*number, corners.len());
+            match kind.map(|kind| kind.shape) {
+                Some(Shape::Face) => add(kind.map_or(corners, |kind| kind.drawn(corners)), reading)?,
+                Some(Shape::Faces(parts)) => {
+                    for part in parts {
+                        let corners: Vec<u32> = part.iter().map(|rank| corners[usize::from(*rank)]).collect();
+                        add(&corners, reading)?;
+                    }
+                }
+                Some(Shape::CurvedFace) => {
+                    let half = corners.len() / 2;
+                    let around = corners[..half].iter().zip(&corners[half..]).flat_map(|(a, b)| [*a, *b]);
+                    add(&around.collect::<Vec<_>>(), reading)?;
+                }
                 // Its second row runs the other way.
                 Some(Shape::Pixel) => add(&[corners[0], corners[1], corners[3], corners[2]], reading)?,
                 Some(Shape::Strip) => {
@@ -331,4 +413,10 @@ const NUMBERS: &str = "the numbers of an array";
 pub(crate) fn hold_lists(cells: usize, corners: usize, reading: &Reading<'_>) -> Result<(), ReadError> {
     let bytes = cells * (size_of::<usize>() + size_of::<u8>()) + corners * size_of::<u32>();
     input::hold("the cells of a piece", bytes as u64, reading.params)
+}
+
+/// Memory of the faces of polyhedra, which so many numbers tell of.
+pub(crate) fn hold_faces(numbers: usize, reading: &Reading<'_>) -> Result<(), ReadError> {
+    let bytes = numbers * (size_of::<usize>() + size_of::<u32>());
+    input::hold("the faces of polyhedra", bytes as u64, reading.params)
 }

@@ -4,6 +4,10 @@ use super::voxels::Kind;
 use crate::error::{Place, ReadError};
 use crate::{Notes, ReadParams};
 
+/// Bytes of a name that are shown, and by which it is asked for.
+#[cfg(any(feature = "vti", feature = "vtk"))]
+const LONGEST_NAME: usize = 40;
+
 /// Weights of red, green and blue in the luma of ITU-R BT.709.
 const LUMA: [f64; 3] = [0.2126, 0.7152, 0.0722];
 
@@ -14,6 +18,8 @@ pub(crate) enum Value {
     Number(u64),
     /// The luma of the first three, as they are stored: of one grey it is the number that stands for it.
     Luma,
+    /// The length of the vector that so many of them are.
+    Magnitude(u64),
 }
 
 impl Value {
@@ -22,8 +28,22 @@ impl Value {
         match self {
             Self::Number(i) => number(i as usize),
             Self::Luma => LUMA.iter().enumerate().map(|(i, weight)| weight * number(i)).sum(),
+            Self::Magnitude(numbers) => (0..numbers as usize).map(|i| number(i) * number(i)).sum::<f64>().sqrt(),
         }
     }
+}
+
+/// Most numbers of a tuple whose length is drawn, or one of which: those of a tensor.
+#[cfg(any(feature = "vti", feature = "vtk"))]
+const MOST_NUMBERS: u64 = 9;
+
+/// The array that is read.
+#[cfg(any(feature = "vti", feature = "vtk"))]
+pub(crate) struct Chosen {
+    /// Its rank among those that could be.
+    pub(crate) rank: usize,
+    /// The part of a vector that is the value; `None` for one number a tuple, and for colours.
+    pub(crate) value: Option<Value>,
 }
 
 /// An array of a file, as far as choosing one needs it.
@@ -45,41 +65,80 @@ impl Candidate {
         let is_color = matches!(self.numbers, 3 | 4) && matches!(self.kind, Some(Kind::U8 | Kind::U16));
         self.numbers == 1 || is_color
     }
+
+    /// Whether it is a vector, of which the length or one number can be read.
+    fn is_vector(&self) -> bool {
+        !self.is_field() && (2..=MOST_NUMBERS).contains(&self.numbers)
+    }
+
+    /// The name by which it is asked for where nothing else is said.
+    fn offered_name(&self) -> String {
+        if self.is_vector() { format!("{}:magnitude", self.name) } else { self.name.clone() }
+    }
+
+    /// The length of the vectors, if it has such.
+    fn magnitude(&self) -> Option<Value> {
+        self.is_vector().then_some(Value::Magnitude(self.numbers))
+    }
+
+    /// The value that a name asks for: that of the array of this name, or of a vector the part behind a colon.
+    fn value_named(&self, name: &str) -> Option<Option<Value>> {
+        if self.name == name {
+            return Some(self.magnitude());
+        }
+        let part = name.strip_prefix(self.name.as_str())?.strip_prefix(':').filter(|_| self.is_vector())?;
+        if part == "magnitude" {
+            return Some(self.magnitude());
+        }
+        let axis = ["x", "y", "z", "w"].iter().position(|axis| *axis == part).filter(|_| self.numbers <= 4);
+        let number = axis.map(|axis| axis as u64).or_else(|| part.parse().ok()).filter(|i| *i < self.numbers)?;
+        Some(Some(Value::Number(number)))
+    }
 }
 
-/// Rank of the array that is the field: the one that `params` name, else the one that the file does, else the first of one number a tuple, or of
-/// colours. Says what else could be chosen. `None` without arrays.
+/// The array that is the field: the one that `params` name, else the one that the file does, else the first of one number a tuple, or of
+/// colours, else the length of the first vector. Says what else could be chosen. `None` without arrays.
 #[cfg(any(feature = "vti", feature = "vtk"))]
 pub(crate) fn chosen_array(
     all: &[Candidate],
     place: Place,
     params: &ReadParams,
     notes: &mut Notes,
-) -> Result<Option<usize>, ReadError> {
+) -> Result<Option<Chosen>, ReadError> {
     let names = |but: usize| {
-        let others = all.iter().enumerate().filter(|(rank, array)| *rank != but && array.is_field());
-        others.map(|(_, array)| array.name.as_str()).collect::<Vec<_>>().join(", ")
+        let others = || all.iter().enumerate().filter(|(rank, _)| *rank != but).map(|(_, array)| array);
+        let fields = others().filter(|array| array.is_field());
+        let vectors = others().filter(|array| array.is_vector());
+        fields.chain(vectors).map(Candidate::offered_name).collect::<Vec<_>>().join(", ")
     };
     if let Some(name) = &params.array {
-        let rank = all.iter().position(|array| array.name == splat_core::text::escaped(name.as_bytes(), 40));
-        return rank.map(Some).ok_or_else(|| {
+        let name = splat_core::text::escaped(name.as_bytes(), LONGEST_NAME);
+        let named = |(rank, array): (usize, &Candidate)| array.value_named(&name).map(|value| Chosen { rank, value });
+        // A whole name comes before a part of a vector.
+        let exact = all.iter().enumerate().filter(|(_, array)| array.name == name).find_map(named);
+        return exact.or_else(|| all.iter().enumerate().find_map(named)).map(Some).ok_or_else(|| {
             let expected = format!("an array among {}", names(all.len()));
-            let found = format!("'{}'", splat_core::text::escaped(name.as_bytes(), 40));
-            ReadError::input(place, expected, found, "choose one of these; `organza info` names all arrays")
+            ReadError::input(
+                place,
+                expected,
+                format!("'{name}'"),
+                "choose one of these, or of a vector U its U:magnitude, U:x, U:y or U:z; `organza info` names all arrays",
+            )
         });
     }
-    let named = all.iter().position(|array| array.is_named);
-    let Some(rank) =
-        named.or_else(|| all.iter().position(Candidate::is_field)).or(if all.is_empty() { None } else { Some(0) })
-    else {
-        return Ok(None);
-    };
+    let found = all.iter().position(|array| array.is_named && !array.is_vector());
+    let found = found.or_else(|| all.iter().position(Candidate::is_field));
+    let found = found.or_else(|| all.iter().position(Candidate::is_vector));
+    let Some(rank) = found.or(if all.is_empty() { None } else { Some(0) }) else { return Ok(None) };
+    let shown = all[rank].offered_name();
     let others = names(rank);
     if !others.is_empty() {
-        let shown = &all[rank].name;
         notes.remark(format!("the array {shown} is drawn; `array` of a scene or --color-by chooses another: {others}"));
+    } else if all[rank].is_vector() {
+        let name = &all[rank].name;
+        notes.remark(format!("{shown} is drawn, the length of the vectors; --color-by {name}:0 chooses one number"));
     }
-    Ok(Some(rank))
+    Ok(Some(Chosen { rank, value: all[rank].magnitude() }))
 }
 
 /// The part of the stored numbers that is read.
@@ -122,6 +181,12 @@ impl Selection {
         Self { frames: 1, frame: 0, numbers: self.frames, value: Value::Number(self.frame) }
     }
 
+    /// The same with so many numbers a voxel, of which `value` is read.
+    #[cfg(any(feature = "vti", feature = "vtk"))]
+    pub(crate) fn with_value(self, numbers: u64, value: Value) -> Self {
+        Self { numbers, value, ..self }
+    }
+
     /// The same with `numbers` a voxel, which is a colour if they are three or four and `declared` to be one, or unsigned
     /// integers of 8 or 16 bits; other vectors are refused.
     pub(crate) fn with_numbers(
@@ -144,7 +209,7 @@ impl Selection {
         }
         let alpha = if numbers == 4 { "; alpha is not used" } else { "" };
         let luma = "colours: read is their luma, 0.2126 R + 0.7152 G + 0.0722 B of the numbers as they are stored";
-        notes.remarks.push(format!("{luma}{alpha}"));
+        notes.remark(format!("{luma}{alpha}"));
         Ok(Self { numbers, value: Value::Luma, ..self })
     }
 }

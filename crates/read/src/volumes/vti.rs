@@ -1,13 +1,17 @@
-//! VTK files in XML: images (`.vti`) and cells (`.vtu`) → a volume of scalars, of colours their luma; surfaces (`.vtp`) → a mesh.
+//! VTK files in XML: images (`.vti`), rectilinear grids (`.vtr`), structured grids (`.vts`) and cells (`.vtu`) → a volume of scalars, of
+//! colours their luma; surfaces (`.vtp`) → a mesh; lists of such files (`.pvtu` and the like, `.vtm`, `.pvd`) → what these are together.
 //!
 //! Arrays as text, in base64 or appended, raw or in base64, each also in blocks of zlib. Read is the array that is asked for, else the one
 //! that `Scalars` names, else the first of one number, of the points, else of the cells; others are named.
 
 mod data;
+mod listed;
+mod pasted;
 mod piece;
 
 use super::lattice;
-use super::selection::{Candidate, Selection, chosen_array};
+use super::rectilinear::Rectilinear;
+use super::selection::{Candidate, Selection, Value, chosen_array};
 use super::voxels::{Kind, Stored};
 use crate::error::{Place, ReadError};
 use crate::reading::Reading;
@@ -19,61 +23,124 @@ use roxmltree::{Document, Node};
 use splat_core::Grid;
 use splat_core::glam::{DMat3, DVec3};
 use splat_core::text::escaped;
+use std::path::Path;
 
 const HINT: &str = "the file is truncated or damaged, or its header states other sizes";
 
 /// What to do with datasets that are not read.
-const OTHER_DATASETS: &str = "other datasets of VTK are not read: in ParaView, Resample To Image and save it as .vti, or Append Datasets and save it as .vtu";
+const OTHER_DATASETS: &str = "other datasets of VTK, such as trees and tables, are not read: in ParaView, Resample To Image and save it as .vti, or \
+    Append Datasets and save it as .vtu";
 
 /// Most elements, attributes and texts of a file; real ones have some dozens.
 const MAX_NODES: u32 = 10_000;
 
 /// Datasets that are read.
-const DATASETS: [&str; 3] = ["ImageData", "UnstructuredGrid", "PolyData"];
+const DATASETS: [&str; 5] = ["ImageData", "RectilinearGrid", "StructuredGrid", "UnstructuredGrid", "PolyData"];
 
-/// Reads a file.
-pub(crate) fn read(content: &[u8], reading: &mut Reading<'_>) -> Result<Loaded, ReadError> {
+/// Reads a file, which lies at `place` if it is no part of memory.
+pub(crate) fn read(content: &[u8], place: Option<&Path>, reading: &mut Reading<'_>) -> Result<Loaded, ReadError> {
+    if listed::is_list(content) {
+        return listed::read(content, place, reading);
+    }
     let (appended, text) = Appended::split(content)?;
     input::hold("the description", if appended.is_some() { text.len() as u64 } else { 0 }, reading.params)?;
-    let document = xml::parse(&text, MAX_NODES).map_err(|e| {
-        let line = e.line.map(|(line, column)| Place::Line { line: line.into(), column: column.into() });
-        ReadError::input(line.unwrap_or(Place::Byte(e.byte as u64)), e.expected, e.found, HINT)
-    })?;
+    let document = parsed(&text)?;
     let dataset = dataset(&document)?;
     let encoding = Encoding::of(document.root_element(), content, appended)?;
-    if dataset.has_tag_name("ImageData") {
-        return image(dataset, &encoding, reading.params, &mut reading.notes).map(Loaded::Grid);
+    one(&piece::Source { dataset, encoding: &encoding, file: None }, reading)
+}
+
+/// Reads the dataset of one file.
+fn one(source: &piece::Source<'_, '_, '_>, reading: &mut Reading<'_>) -> Result<Loaded, ReadError> {
+    match source.dataset.tag_name().name() {
+        "ImageData" => image(source.dataset, source.encoding, reading).map(Loaded::Grid),
+        "RectilinearGrid" => rectilinear(source.dataset, source.encoding, reading).map(Loaded::Grid),
+        _ => piece::read(std::slice::from_ref(source), false, reading),
     }
-    piece::read(dataset, &encoding, reading)
+}
+
+/// The elements of a text.
+fn parsed(text: &str) -> Result<Document<'_>, ReadError> {
+    xml::parse(text, MAX_NODES).map_err(|e| {
+        let line = e.line.map(|(line, column)| Place::Line { line: line.into(), column: column.into() });
+        ReadError::input(line.unwrap_or(Place::Byte(e.byte as u64)), e.expected, e.found, HINT)
+    })
 }
 
 /// Reads the volume of an image.
-fn image(
-    image: Node<'_, '_>,
-    encoding: &Encoding<'_>,
-    params: &ReadParams,
-    notes: &mut Notes,
-) -> Result<Grid, ReadError> {
+fn image(image: Node<'_, '_>, encoding: &Encoding<'_>, reading: &mut Reading<'_>) -> Result<Grid, ReadError> {
     let lattice = Lattice::of(image)?;
     let piece = only_piece(image)?;
-    if extent(piece, "Extent")? != extent(image, "WholeExtent")? {
-        return Err(wrong(piece, "the WholeExtent in one Piece", piece.attribute("Extent").unwrap_or_default()));
-    }
-    let chosen = chosen(piece, params, notes)?;
-    let (array, is_of_cells) = chosen.ok_or_else(|| wrong(piece, "a DataArray in PointData or CellData", "none"))?;
-    not_used(image, &[array], notes);
+    let found = chosen_of(piece, reading)?;
+    not_used(image, &[found.array], &mut reading.notes);
     let mut origin = lattice.origin;
     let mut sizes = lattice.points;
-    if is_of_cells {
+    if found.is_of_cells {
         (origin, sizes) = lattice::of_cells(origin, &lattice.axes, lattice.points);
-        notes.remarks.push(format!("values of cells ({}): they lie at the middles", name(array)));
+        remark_middles(&found, reading);
     }
-    let selection = selection(array, params, notes)?;
-    let stored =
-        Stored { kind: kind(array)?, big_endian: encoding.big_endian, dims: sizes, selection, scaling: (1.0, 0.0) };
-    stored.check(lattice.place, HINT)?;
-    let values = encoding.values(array, &stored, params)?;
+    let values = lattice_values(&found, sizes, lattice.place, encoding, reading)?;
     Ok(Grid { origin, axes: lattice.axes, dims: sizes.map(|n| n as usize), values })
+}
+
+/// Reads the volume of a rectilinear grid.
+fn rectilinear(grid: Node<'_, '_>, encoding: &Encoding<'_>, reading: &mut Reading<'_>) -> Result<Grid, ReadError> {
+    let piece = only_piece(grid)?;
+    let coordinates = coordinates(piece, encoding, reading)?;
+    let found = chosen_of(piece, reading)?;
+    let element = child(piece, "Coordinates");
+    let used: Vec<Node<'_, '_>> = element.into_iter().flat_map(arrays).chain([found.array]).collect();
+    not_used(grid, &used, &mut reading.notes);
+    let of_values = if found.is_of_cells { coordinates.of_cells() } else { coordinates };
+    if found.is_of_cells {
+        remark_middles(&found, reading);
+    }
+    let values = lattice_values(&found, of_values.dims(), place(piece), encoding, reading)?;
+    of_values.grid(values, reading)
+}
+
+/// Says that a volume has the values of cells.
+fn remark_middles(found: &ChosenArray<'_, '_>, reading: &mut Reading<'_>) {
+    reading.notes.remarks.push(format!("values of cells ({}): they lie at the middles", name(found.array)));
+}
+
+/// The array of a piece of a lattice, which has to have one.
+fn chosen_of<'a, 'i>(piece: Node<'a, 'i>, reading: &mut Reading<'_>) -> Result<ChosenArray<'a, 'i>, ReadError> {
+    let chosen = chosen(piece, reading.params, &mut reading.notes)?;
+    chosen.ok_or_else(|| wrong(piece, "a DataArray in PointData or CellData", "none"))
+}
+
+/// The values of an array over a lattice of these sizes, which are told of at a place.
+fn lattice_values(
+    found: &ChosenArray<'_, '_>,
+    dims: [u64; 3],
+    place: Place,
+    encoding: &Encoding<'_>,
+    reading: &mut Reading<'_>,
+) -> Result<Vec<f32>, ReadError> {
+    let selection = found.selection(reading.params, &mut reading.notes)?;
+    let kind = kind(found.array)?;
+    let stored = Stored { kind, big_endian: encoding.big_endian, dims, selection, scaling: (1.0, 0.0) };
+    stored.check(place, HINT)?;
+    encoding.values(found.array, &stored, reading.params)
+}
+
+/// The coordinates of the points of a piece of a rectilinear grid.
+fn coordinates(piece: Node<'_, '_>, encoding: &Encoding<'_>, reading: &Reading<'_>) -> Result<Rectilinear, ReadError> {
+    let extent = extent(piece, "Extent")?;
+    let element = child(piece, "Coordinates").ok_or_else(|| wrong(piece, "an element Coordinates", "none"))?;
+    let found: Vec<_> = arrays(element).collect();
+    let &[x, y, z] = found.as_slice() else {
+        return Err(wrong(element, "three arrays of coordinates", &found.len().to_string()));
+    };
+    let along = |array: Node<'_, '_>, [low, high]: [i64; 2]| -> Result<Vec<f64>, ReadError> {
+        let numbers = encoding.numbers(array, (high - low + 1) as u64, reading)?;
+        Ok(numbers.to_vec())
+    };
+    let coordinates = [along(x, extent[0])?, along(y, extent[1])?, along(z, extent[2])?];
+    let coordinates = Rectilinear { coordinates, place: place(element) };
+    coordinates.check()?;
+    Ok(coordinates)
 }
 
 /// Where an element begins.
@@ -94,37 +161,22 @@ fn dataset<'a, 'i>(document: &'a Document<'i>) -> Result<Node<'a, 'i>, ReadError
     let root = document.root_element();
     let kind = root.attribute("type").unwrap_or_default();
     if !root.has_tag_name("VTKFile") || !DATASETS.contains(&kind) {
-        return Err(other_dataset(root, kind));
+        let expected = "a VTKFile of type ImageData, RectilinearGrid, StructuredGrid, UnstructuredGrid or PolyData";
+        return Err(ReadError { hint: OTHER_DATASETS, ..wrong(root, expected, kind) });
     }
     child(root, kind).ok_or_else(|| wrong(root, &format!("an element {kind}"), "none"))
 }
 
-/// The error for a dataset that is not read: of one that names files its pieces, else its kind.
-fn other_dataset(root: Node<'_, '_>, kind: &str) -> ReadError {
-    /// Most pieces that are named.
-    const MOST: usize = 4;
-    let expected = "a VTKFile of type ImageData, UnstructuredGrid or PolyData";
-    let of = |node: Node<'_, '_>| node.attribute("Source").or_else(|| node.attribute("file")).map(str::to_owned);
-    let pieces: Vec<String> = root.descendants().filter_map(of).collect();
-    if pieces.is_empty() {
-        return ReadError { hint: OTHER_DATASETS, ..wrong(root, expected, kind) };
-    }
-    let mut named: Vec<String> = pieces.iter().take(MOST).map(|piece| escaped(piece.as_bytes(), 60)).collect();
-    if pieces.len() > MOST {
-        named.push(format!("{} more", pieces.len() - MOST));
-    }
-    let found = format!("a {} of the pieces {}", escaped(kind.as_bytes(), 40), named.join(", "));
-    let hint = "draw its pieces: give the .vti, .vtu or .vtp files that it names to `organza render` together";
-    ReadError { hint, found, ..wrong(root, expected, kind) }
-}
-
-/// The piece of an image, which has to be the only one.
-fn only_piece<'a, 'i>(image: Node<'a, 'i>) -> Result<Node<'a, 'i>, ReadError> {
-    let pieces: Vec<_> = image.children().filter(|c| c.has_tag_name("Piece")).collect();
+/// The piece of a lattice, which has to be the only one and all of it.
+fn only_piece<'a, 'i>(lattice: Node<'a, 'i>) -> Result<Node<'a, 'i>, ReadError> {
+    let pieces: Vec<_> = lattice.children().filter(|c| c.has_tag_name("Piece")).collect();
     let &[piece] = pieces.as_slice() else {
-        let hint = "write the image as one piece";
-        return Err(ReadError { hint, ..wrong(image, "one Piece", &pieces.len().to_string()) });
+        let hint = "write the dataset as one piece";
+        return Err(ReadError { hint, ..wrong(lattice, "one Piece", &pieces.len().to_string()) });
     };
+    if extent(piece, "Extent")? != extent(lattice, "WholeExtent")? {
+        return Err(wrong(piece, "the WholeExtent in one Piece", piece.attribute("Extent").unwrap_or_default()));
+    }
     Ok(piece)
 }
 
@@ -152,7 +204,11 @@ struct Lattice {
 
 impl Lattice {
     fn of(image: Node<'_, '_>) -> Result<Self, ReadError> {
-        let extent = extent(image, "WholeExtent")?;
+        Self::within(image, extent(image, "WholeExtent")?)
+    }
+
+    /// The part between these indices.
+    fn within(image: Node<'_, '_>, extent: [[i64; 2]; 3]) -> Result<Self, ReadError> {
         let spacing = numbers(image, "Spacing")?.map_or(DVec3::ONE, DVec3::from_array);
         // Row by row.
         let direction =
@@ -161,8 +217,13 @@ impl Lattice {
         let first = DVec3::from_array([0, 1, 2].map(|i| extent[i][0] as f64));
         let origin = numbers(image, "Origin")?.map_or(DVec3::ZERO, DVec3::from_array) + axes * first;
         lattice::check(origin, &axes, place(image), HINT)?;
-        Ok(Self { points: extent.map(|[low, high]| (high - low + 1) as u64), origin, axes, place: place(image) })
+        Ok(Self { points: sizes(extent), origin, axes, place: place(image) })
     }
+}
+
+/// Points between indices, those included.
+fn sizes(extent: [[i64; 2]; 3]) -> [u64; 3] {
+    extent.map(|[low, high]| (high - low + 1) as u64)
 }
 
 /// The first and the last index along each axis.
@@ -180,12 +241,34 @@ fn arrays<'a, 'i>(data: Node<'a, 'i>) -> impl Iterator<Item = Node<'a, 'i>> + Cl
     data.children().filter(|c| c.has_tag_name("DataArray"))
 }
 
-/// The array that is read, and whether it belongs to the cells: of the points where one of them is a field, else of the cells.
+/// The array that is read.
+struct ChosenArray<'a, 'i> {
+    array: Node<'a, 'i>,
+    /// Whether it belongs to the cells.
+    is_of_cells: bool,
+    /// The part of a vector that is the value.
+    value: Option<Value>,
+}
+
+impl ChosenArray<'_, '_> {
+    /// Which of the numbers of a tuple is its value.
+    fn selection(&self, params: &ReadParams, notes: &mut Notes) -> Result<Selection, ReadError> {
+        let numbers = components(self.array)?;
+        let place = place(self.array);
+        let selection = Selection::of_frames(1, place, params, notes)?;
+        match self.value {
+            Some(value) => Ok(selection.with_value(numbers, value)),
+            None => selection.with_numbers(numbers, kind(self.array)?, false, place, notes),
+        }
+    }
+}
+
+/// The array that is read: of the points where one of them is a field, else of the cells.
 fn chosen<'a, 'i>(
     piece: Node<'a, 'i>,
     params: &ReadParams,
     notes: &mut Notes,
-) -> Result<Option<(Node<'a, 'i>, bool)>, ReadError> {
+) -> Result<Option<ChosenArray<'a, 'i>>, ReadError> {
     let data: Vec<_> = ["PointData", "CellData"].into_iter().filter_map(|name| child(piece, name)).collect();
     let mut all = Vec::new();
     let first = data.iter().find(|data| arrays(**data).next().is_some()).copied();
@@ -204,9 +287,12 @@ fn chosen<'a, 'i>(
         }
     }
     let (nodes, candidates): (Vec<_>, Vec<_>) = all.into_iter().unzip();
-    let rank = chosen_array(&candidates, place(piece), params, notes)?;
+    let chosen = chosen_array(&candidates, place(piece), params, notes)?;
     let is_of_cells = |array: Node<'_, '_>| array.parent_element().is_some_and(|of| of.has_tag_name("CellData"));
-    Ok(rank.map(|rank| (nodes[rank], is_of_cells(nodes[rank]))))
+    Ok(chosen.map(|chosen| {
+        let array = nodes[chosen.rank];
+        ChosenArray { array, is_of_cells: is_of_cells(array), value: chosen.value }
+    }))
 }
 
 /// Names the arrays that are not used.
@@ -244,11 +330,4 @@ fn kind(array: Node<'_, '_>) -> Result<Kind, ReadError> {
 fn components(array: Node<'_, '_>) -> Result<u64, ReadError> {
     let components = array.attribute("NumberOfComponents").unwrap_or("1");
     components.parse().map_err(|_| wrong(array, "a number of components", components))
-}
-
-/// Which of the numbers of a tuple is its value.
-fn selection(array: Node<'_, '_>, params: &ReadParams, notes: &mut Notes) -> Result<Selection, ReadError> {
-    let numbers = components(array)?;
-    let kind = kind(array)?;
-    Selection::of_frames(1, place(array), params, notes)?.with_numbers(numbers, kind, false, place(array), notes)
 }

@@ -5,6 +5,7 @@ pub(crate) mod cells;
 pub(crate) mod copc;
 pub(crate) mod e57;
 pub(crate) mod gaussians;
+pub(crate) mod grids;
 pub(crate) mod images;
 pub(crate) mod meshes;
 pub(crate) mod oldest;

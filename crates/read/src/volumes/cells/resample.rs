@@ -5,6 +5,8 @@
 //! integral of the field but for the samples that a border parts. Bodies are parted into tetrahedra around their middle and the middles of
 //! their faces, which neighbours agree on; the field is linear in each. A sample belongs to the first body that it lies in.
 
+use super::lists::FacesAround;
+use super::solid::{Middle, Solid};
 use super::{Field, HINT};
 use crate::error::{Place, ReadError};
 use crate::reading::Reading;
@@ -41,8 +43,15 @@ pub(super) struct Body<'a> {
     /// Its rank among all cells.
     pub(super) cell: usize,
     pub(super) corners: &'a [u32],
-    /// Faces around it; a tetrahedron has none and is itself.
-    pub(super) faces: &'static [&'static [u8]],
+    pub(super) faces: Faces<'a>,
+}
+
+/// The faces around a body.
+pub(super) enum Faces<'a> {
+    /// Those of a kind of VTK.
+    Of(&'static Solid),
+    /// Those of a polyhedron, which need not be wound alike.
+    Around(FacesAround<'a>),
 }
 
 /// Places and values of the corners of a tetrahedron.
@@ -52,20 +61,72 @@ impl Body<'_> {
     /// Gives the tetrahedra of the body to `take`.
     fn part(&self, corner: &impl Fn(u32) -> (DVec3, f64), mut take: impl FnMut(&Tetrahedron)) {
         let at = |i: u8| corner(self.corners[usize::from(i)]);
-        if self.faces.is_empty() {
+        let solid = match &self.faces {
+            Faces::Of(solid) => solid,
+            Faces::Around(faces) => {
+                let middle = mean(self.corners.iter().map(|rank| corner(*rank)));
+                for face in faces.iter() {
+                    part_face(
+                        middle,
+                        mean(face.iter().map(|rank| corner(*rank))),
+                        face,
+                        |rank| corner(*rank),
+                        &mut take,
+                    );
+                }
+                return;
+            }
+        };
+        if solid.faces.is_empty() {
             return take(&[at(0), at(1), at(2), at(3)]);
         }
-        let middle = mean((0..self.corners.len() as u8).map(at));
-        for face in self.faces {
-            match *face {
-                [a, b, c] => take(&[middle, at(*a), at(*b), at(*c)]),
-                _ => {
-                    let center = mean(face.iter().map(|i| at(*i)));
-                    for (i, a) in face.iter().enumerate() {
-                        take(&[middle, center, at(*a), at(face[(i + 1) % face.len()])]);
-                    }
-                }
+        let middle = middle_of(solid.middle, (0..self.corners.len() as u8).map(at), at);
+        for face in solid.faces {
+            let center = middle_of(face.middle, face.around.iter().map(|i| at(*i)), at);
+            part_face(middle, center, face.around, |i| at(*i), &mut take);
+        }
+    }
+
+    /// Whether its tetrahedra are inside out or not alike, unless it is folded.
+    fn is_wound(&self) -> bool {
+        matches!(self.faces, Faces::Of(_))
+    }
+}
+
+/// Gives the tetrahedra between the middle of a body and a face, around the center of that, to `take`.
+fn part_face<I>(
+    middle: (DVec3, f64),
+    center: (DVec3, f64),
+    around: &[I],
+    at: impl Fn(&I) -> (DVec3, f64),
+    take: &mut impl FnMut(&Tetrahedron),
+) {
+    match around {
+        [a, b, c] => take(&[middle, at(a), at(b), at(c)]),
+        _ => {
+            for (i, a) in around.iter().enumerate() {
+                take(&[middle, center, at(a), at(&around[(i + 1) % around.len()])]);
             }
+        }
+    }
+}
+
+/// The middle of points, of which `at` gives one of the cell by its rank.
+fn middle_of(
+    middle: Middle,
+    points: impl Iterator<Item = (DVec3, f64)> + Clone,
+    at: impl Fn(u8) -> (DVec3, f64),
+) -> (DVec3, f64) {
+    let weighted = |weights: &mut dyn Iterator<Item = f64>| {
+        let pairs = points.clone().zip(weights);
+        pairs.fold((DVec3::ZERO, 0.0), |(p, v), ((place, value), weight)| (p + weight * place, v + weight * value))
+    };
+    match middle {
+        Middle::Mean => mean(points),
+        Middle::Point(rank) => at(rank),
+        Middle::Alternating(corner, edge) => weighted(&mut [corner, edge].into_iter().cycle()),
+        Middle::Groups(groups) => {
+            weighted(&mut groups.iter().flat_map(|(n, weight)| std::iter::repeat_n(*weight, usize::from(*n))))
         }
     }
 }
@@ -146,7 +207,7 @@ impl Bounds {
             });
             sum += (right + wrong) / 6.0;
             // Faces that are not quite flat may part off next to nothing.
-            folded += usize::from(f64::min(right, wrong) > 1e-6 * f64::max(right, wrong));
+            folded += usize::from(body.is_wound() && f64::min(right, wrong) > 1e-6 * f64::max(right, wrong));
             for corner in body.corners {
                 (low, high) = (low.min(place(*corner).0), high.max(place(*corner).0));
             }
@@ -295,7 +356,9 @@ impl Lattice {
                     if part.taken[voxel] & bit == 0 {
                         part.taken[voxel] |= bit;
                         let value = (before + i as f64 * along).dot(DVec4::from_array(values));
-                        part.sums[voxel] += (value.clamp(least, most) * SHARE) as f32;
+                        // NaN is a gap; of four of them there is no range either.
+                        let value = if value.is_nan() { value } else { value.clamp(least, most) };
+                        part.sums[voxel] += (value * SHARE) as f32;
                     }
                 }
             }
@@ -320,10 +383,7 @@ fn inside(before: DVec4, along: DVec4, range: (f64, f64)) -> (f64, f64) {
 mod tests {
     use super::*;
     use crate::ReadParams;
-
-    /// A hexahedron from `low` to `high`, as VTK orders its corners.
-    const HEXAHEDRON: &[&[u8]] =
-        &[&[0, 3, 2, 1], &[4, 5, 6, 7], &[0, 1, 5, 4], &[1, 2, 6, 5], &[2, 3, 7, 6], &[3, 0, 4, 7]];
+    use crate::volumes::cells::solid::{HEXAHEDRON, TETRAHEDRON};
 
     fn block(low: DVec3, high: DVec3) -> Vec<DVec3> {
         let ends = [low, high];
@@ -346,7 +406,7 @@ mod tests {
             let linear = |p: DVec3| 1.0 + (p - shift).dot(DVec3::new(2.0, -0.5, 0.25));
             let field = Field::Points(points.iter().map(|p| linear(*p)).collect());
             let corners: Vec<u32> = (0..8).collect();
-            let grid = sampled(&points, &[Body { cell: 0, corners: &corners, faces: HEXAHEDRON }], &field);
+            let grid = sampled(&points, &[Body { cell: 0, corners: &corners, faces: Faces::Of(&HEXAHEDRON) }], &field);
             let [nx, ny, _] = grid.dims;
             for (n, v) in grid.values.iter().enumerate() {
                 let lattice = DVec3::new((n % nx) as f64, (n / nx % ny) as f64, (n / nx / ny) as f64);
@@ -365,7 +425,7 @@ mod tests {
         let sampled = |largest: f32| {
             let signs = [1.0, -1.0, 1.0, 1.0, 1.0, -1.0, 1.0, 1.0];
             let field = Field::Points(signs.map(|sign| sign * f64::from(largest)).to_vec());
-            sampled(&points, &[Body { cell: 0, corners: &corners, faces: HEXAHEDRON }], &field).values
+            sampled(&points, &[Body { cell: 0, corners: &corners, faces: Faces::Of(&HEXAHEDRON) }], &field).values
         };
         let small = sampled(1.0);
         let large = sampled(f32::MAX);
@@ -378,7 +438,7 @@ mod tests {
         let points = [DVec3::ZERO, DVec3::new(1.0, 0.1, 0.0), DVec3::new(0.2, 0.9, 0.1), DVec3::new(0.3, 0.2, 1.1)];
         let expected = volume(&points.map(|p| (p, 0.0))) / 6.0;
         for corners in [[0, 1, 2, 3], [0, 2, 1, 3]] {
-            let body = Body { cell: 0, corners: &corners, faces: &[] };
+            let body = Body { cell: 0, corners: &corners, faces: Faces::Of(&TETRAHEDRON) };
             let grid = sampled(&points, &[body], &Field::One);
             assert!((mass(&grid) / expected - 1.0).abs() < 5e-3, "{} for {expected}", mass(&grid));
             assert!(grid.values.iter().all(|v| (0.0..=1.0).contains(v)));
@@ -403,7 +463,7 @@ mod tests {
             })
             .collect();
         let bodies = |order: &[usize]| -> Vec<Body<'_>> {
-            order.iter().map(|c| Body { cell: *c, corners: &lists[*c], faces: HEXAHEDRON }).collect()
+            order.iter().map(|c| Body { cell: *c, corners: &lists[*c], faces: Faces::Of(&HEXAHEDRON) }).collect()
         };
         let forth: Vec<usize> = (0..lists.len()).collect();
         let grid = sampled(&points, &bodies(&forth), &Field::One);

@@ -187,6 +187,11 @@ impl Fields {
         match self.required("NDims")? {
             ("3", _) => Ok(3),
             ("4", _) => Ok(4),
+            ("2", place) => {
+                let hint = "it is a picture, not a volume: save it as PNG, or stack several into one volume, such as with Fiji (File > Import > Image Sequence, \
+                    File > Save As > Nrrd)";
+                Err(ReadError { hint, ..wrong(place, "NDims = 3, or 4 for a series of volumes", "2") })
+            }
             (other, place) => Err(wrong(place, "NDims = 3, or 4 for a series of volumes", other)),
         }
     }

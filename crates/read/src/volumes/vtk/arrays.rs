@@ -5,7 +5,7 @@ use crate::error::{Place, ReadError};
 use crate::reading::Reading;
 use crate::text::{Line, Lines, Word, Words};
 use crate::volumes::cells::Numbers;
-use crate::volumes::selection::{Candidate, chosen_array};
+use crate::volumes::selection::{Candidate, Selection, Value, chosen_array};
 use crate::volumes::voxels::Kind;
 use crate::{Notes, ReadParams};
 use splat_core::text::{counted, escaped};
@@ -58,6 +58,8 @@ enum Role {
     /// Scalars of bytes, which stand in a text as shares of 255.
     Colors,
     Normals,
+    /// Vectors and tensors, of which the length can be drawn.
+    Vectors,
     Field,
     /// Of the cells themselves.
     Part,
@@ -84,6 +86,21 @@ impl Array {
             numbers.all.push(word.decimal().filter(|v| v.is_nan()).map_or_else(|| word.number(), Ok)?);
         }
         Ok(numbers)
+    }
+
+    /// Which of the numbers of a tuple is its value: `value`, or what one number or a colour is.
+    pub(super) fn selection(
+        &self,
+        value: Option<Value>,
+        place: Place,
+        params: &ReadParams,
+        notes: &mut Notes,
+    ) -> Result<Selection, ReadError> {
+        let selection = Selection::of_frames(1, place, params, notes)?;
+        match value {
+            Some(value) => Ok(selection.with_value(self.numbers, value)),
+            None => selection.with_numbers(self.numbers, self.kind, false, self.place, notes),
+        }
     }
 
     /// Whether a text has shares of 255 in the place of its numbers.
@@ -127,12 +144,17 @@ impl<'a> Arrays<'a> {
         colors().find(|array| array.role == Role::Colors).or_else(|| colors().next())
     }
 
-    /// The array that is read: of the points where there are scalars or a field, else of the cells.
-    pub(super) fn chosen(&self, params: &ReadParams, notes: &mut Notes) -> Result<Option<&Array>, ReadError> {
-        let is_field = |array: &&Array| matches!(array.role, Role::Scalars | Role::Colors | Role::Field);
+    /// The array that is read, and the part of a vector that is the value: of the points where there are scalars or a field, else of the cells.
+    pub(super) fn chosen(
+        &self,
+        params: &ReadParams,
+        notes: &mut Notes,
+    ) -> Result<Option<(&Array, Option<Value>)>, ReadError> {
+        let is_field =
+            |array: &&Array| matches!(array.role, Role::Scalars | Role::Colors | Role::Vectors | Role::Field);
         let of = |of: Of| self.found.iter().filter(move |array| array.of == of).filter(is_field);
         let all: Vec<&Array> = of(Of::Points).chain(of(Of::Cells)).collect();
-        let first = all.first().map(|array| array.of);
+        let first = all.iter().find(|array| array.role != Role::Vectors).map(|array| array.of);
         let candidate = |array: &&Array| Candidate {
             name: array.name.clone(),
             numbers: array.numbers,
@@ -141,7 +163,7 @@ impl<'a> Arrays<'a> {
         };
         let candidates: Vec<Candidate> = all.iter().map(candidate).collect();
         let place = all.first().map_or(Place::File, |array| array.place);
-        Ok(chosen_array(&candidates, place, params, notes)?.map(|rank| all[rank]))
+        Ok(chosen_array(&candidates, place, params, notes)?.map(|chosen| (all[chosen.rank], chosen.value)))
     }
 
     /// Takes a line, and passes over the arrays that it announces.
@@ -166,10 +188,10 @@ impl<'a> Arrays<'a> {
                 return self.pass(&words, line, Kind::U8, whole(2)?, self.tuples, Role::Colors, lines);
             }
             b"SCALARS" => (Role::Scalars, if words.len() > 3 { whole(3)? } else { 1 }),
-            b"VECTORS" => (Role::Other, 3),
+            b"VECTORS" => (Role::Vectors, 3),
             b"NORMALS" => (Role::Normals, 3),
-            b"TENSORS" => (Role::Other, 9),
-            b"TENSORS6" => (Role::Other, 6),
+            b"TENSORS" => (Role::Vectors, 9),
+            b"TENSORS6" => (Role::Vectors, 6),
             b"TEXTURE_COORDINATES" => (Role::Other, whole(2)?),
             b"GLOBAL_IDS" | b"PEDIGREE_IDS" | b"EDGE_FLAGS" => (Role::Other, 1),
             _ => return Err(wrong(line, "SCALARS, FIELD or another keyword of this dataset")),

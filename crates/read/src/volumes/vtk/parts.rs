@@ -8,7 +8,7 @@ use crate::error::{Place, ReadError};
 use crate::meshes::named_arrays::{NamedArrays, SurfaceArray};
 use crate::reading::Reading;
 use crate::text::{Line, Lines, Word};
-use crate::volumes::cells::{self, Cells, Field, Lists, Numbers, PointColumns};
+use crate::volumes::cells::{self, CellSource, Cells, Field, Lists, Numbers, PointColumns, structured};
 use crate::volumes::selection::Selection;
 use crate::volumes::voxels::Kind;
 use splat_core::text::escaped;
@@ -81,33 +81,29 @@ fn take_cells<'a>(
 }
 
 /// The arrays of a file, and how to read them.
-struct Source<'a> {
-    content: &'a [u8],
-    is_binary: bool,
-    arrays: &'a Arrays<'a>,
+pub(super) struct Source<'a> {
+    pub(super) content: &'a [u8],
+    pub(super) is_binary: bool,
+    pub(super) arrays: &'a Arrays<'a>,
+    /// Points along each axis of a structured grid.
+    pub(super) dims: Option<[u64; 3]>,
     /// Where the file ends.
-    end: Place,
+    pub(super) end: Place,
 }
 
 /// What the arrays of a file are: a volume, a mesh or points.
-pub(super) fn read(
-    content: &[u8],
-    is_binary: bool,
-    dataset: Dataset,
-    arrays: &Arrays<'_>,
-    end: Place,
-    reading: &mut Reading<'_>,
-) -> Result<Loaded, ReadError> {
-    let source = Source { content, is_binary, arrays, end };
+pub(super) fn read(source: &Source<'_>, dataset: Dataset, reading: &mut Reading<'_>) -> Result<Loaded, ReadError> {
+    let arrays = source.arrays;
     let cells = source.cells(dataset, reading)?;
     cells.check()?;
     let mut field = Field::One;
     let mut columns = PointColumns::default();
     let mut used = Vec::new();
     if cells.has_bodies() {
-        if let Some(array) = arrays.chosen(reading.params, &mut reading.notes)? {
+        if let Some((array, value)) = arrays.chosen(reading.params, &mut reading.notes)? {
             used.push(array.place);
-            field = source.field(array, &cells, reading)?;
+            let selection = array.selection(value, array.place, reading.params, &mut reading.notes)?;
+            field = source.field(array, &selection, &cells, reading)?;
         }
     } else {
         if let Some(array) = arrays.normals() {
@@ -124,6 +120,11 @@ pub(super) fn read(
         columns.named = source.named(&cells, &mut used, reading)?;
     }
     reading.notes.not_used(arrays.all().filter(|a| !used.contains(&a.place)).map(|a| a.name.as_bytes()));
+    if let Some(dims) = source.dims
+        && let Some(grid) = structured::straight(&cells.points, dims, &field, reading)?
+    {
+        return Ok(Loaded::Grid(grid));
+    }
     cells.loaded(field, columns, reading)
 }
 
@@ -140,17 +141,20 @@ impl Source<'_> {
     fn cells(&self, dataset: Dataset, reading: &Reading<'_>) -> Result<Cells, ReadError> {
         let array = self.needed("POINTS")?;
         let points = cells::places(&self.numbers(array, reading)?, array.place, reading)?;
+        if let Some(dims) = self.dims {
+            return Cells::structured(points, dims, array.place, reading);
+        }
         let mut cells = Cells { points, lists: Lists::default(), kinds: Vec::new(), place: array.place };
         if dataset == Dataset::UnstructuredGrid {
-            let lists = self.lists("CELLS", cells.points.len(), reading)?;
-            (cells.lists, cells.place) =
-                lists.ok_or_else(|| ReadError::input(self.end, "CELLS", "the end of the file", HINT))?;
             let types = self.needed("CELL_TYPES")?;
             cells.kinds = cells::kinds(&self.numbers(types, reading)?, types.place)?;
+            let lists = self.lists("CELLS", cells.points.len(), &cells.kinds, reading)?;
+            (cells.lists, cells.place) =
+                lists.ok_or_else(|| ReadError::input(self.end, "CELLS", "the end of the file", HINT))?;
             return Ok(cells);
         }
         for (name, kind) in OF_POLYDATA {
-            if let Some((lists, place)) = self.lists(name, cells.points.len(), reading)? {
+            if let Some((lists, place)) = self.lists(name, cells.points.len(), &[], reading)? {
                 cells.append(&lists, kind);
                 cells.place = place;
             }
@@ -158,12 +162,25 @@ impl Source<'_> {
         Ok(cells)
     }
 
-    /// The cells of a part, if the file has it, and where they are told of.
-    fn lists(&self, name: &str, points: usize, reading: &Reading<'_>) -> Result<Option<(Lists, Place)>, ReadError> {
+    /// The cells of a part, if the file has it, and where they are told of; `kinds` are theirs where some may be polyhedra.
+    fn lists(
+        &self,
+        name: &str,
+        points: usize,
+        kinds: &[u8],
+        reading: &Reading<'_>,
+    ) -> Result<Option<(Lists, Place)>, ReadError> {
+        let hold = |cells: usize, numbers: usize| {
+            if kinds.contains(&cells::POLYHEDRON) {
+                cells::hold_faces(numbers, reading)?;
+            }
+            cells::hold_lists(cells, numbers, reading)
+        };
         if let Some(array) = self.arrays.part(name) {
             let numbers = self.numbers(array, reading)?;
-            cells::hold_lists(array.cells as usize, numbers.len(), reading)?;
-            return Ok(Some((Lists::counted(&numbers, array.cells, points, array.place)?, array.place)));
+            hold(array.cells as usize, numbers.len())?;
+            let source = CellSource { points, kinds, place: array.place };
+            return Ok(Some((Lists::counted(&numbers, array.cells, source)?, array.place)));
         }
         let [ends, corners] = BY_ENDS.map(|part| self.arrays.part(&format!("{name}.{part}")));
         let Some((ends, corners)) = ends.zip(corners) else { return Ok(None) };
@@ -176,8 +193,8 @@ impl Source<'_> {
             };
         };
         let of_cells = self.numbers(corners, reading)?;
-        cells::hold_lists(rest.len(), of_cells.len(), reading)?;
-        let lists = Lists::ending(rest, &of_cells, points, corners.place)?;
+        hold(rest.len(), of_cells.len())?;
+        let lists = Lists::ending(rest, &of_cells, CellSource { points, kinds, place: corners.place })?;
         Ok(Some((lists, corners.place)))
     }
 
@@ -221,18 +238,22 @@ impl Source<'_> {
     }
 
     /// The field that an array is, of colours their luma.
-    fn field(&self, array: &Array, cells: &Cells, reading: &mut Reading<'_>) -> Result<Field, ReadError> {
+    fn field(
+        &self,
+        array: &Array,
+        selection: &Selection,
+        cells: &Cells,
+        reading: &mut Reading<'_>,
+    ) -> Result<Field, ReadError> {
         let of_points = array.of == Of::Points;
         let (count, what) = if of_points { (cells.points.len(), "points") } else { (cells.kinds.len(), "cells") };
         cells::check_count(array.tuples, count, what, array.place)?;
-        let selection = Selection::of_frames(1, array.place, reading.params, &mut reading.notes)?;
-        let selection = selection.with_numbers(array.numbers, array.kind, false, array.place, &mut reading.notes)?;
         let mut numbers = self.numbers(array, reading)?;
         if self.is_of_shares(array) {
             // Shares have few digits, and stand for whole numbers.
             numbers.all.iter_mut().for_each(|n| *n = (255.0 * *n).round());
         }
         let name = escaped(array.name.as_bytes(), 40);
-        cells::field(&numbers, &selection, &name, of_points, array.place, reading)
+        cells::field(&numbers, selection, &name, of_points, array.place, reading)
     }
 }

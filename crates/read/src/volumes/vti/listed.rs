@@ -1,0 +1,241 @@
+//! Files of VTK that name others, beside them or below: the pieces of one dataset (`.pvtu`, `.pvtp`, `.pvti`, `.pvts`, `.pvtr`), blocks
+//! (`.vtm`, partitioned datasets) and the times of a series (`.pvd`).
+//!
+//! All files are in memory together, because arrays are joined over pieces. A list may name lists.
+
+use super::data::{Appended, Encoding};
+use super::pasted;
+use super::piece::{self, Source, in_file};
+use super::{HINT, MAX_NODES, dataset, one, parsed, place, wrong};
+use crate::error::{Place, ReadError};
+use crate::reading::Reading;
+use crate::stream::beside::{Beside, from_uri};
+use crate::stream::input::{self, Content};
+use crate::volumes::selection::Selection;
+use crate::{Loaded, ReadParams};
+use roxmltree::{Document, Node};
+use splat_core::text::{counted, escaped};
+use std::borrow::Cow;
+use std::path::Path;
+
+/// How often a list may name a list.
+const DEEPEST: usize = 4;
+
+/// Bytes of a file in which its root element begins.
+const HEAD: usize = 4096;
+
+/// Kinds of datasets whose pieces are listed; `P` stands before them.
+const OF_PIECES: [&str; 5] = ["PImageData", "PRectilinearGrid", "PStructuredGrid", "PUnstructuredGrid", "PPolyData"];
+
+/// Kinds of datasets of blocks.
+const OF_BLOCKS: [&str; 3] = ["vtkMultiBlockDataSet", "vtkPartitionedDataSet", "vtkPartitionedDataSetCollection"];
+
+/// A series of datasets by their times.
+const OF_TIMES: &str = "Collection";
+
+/// What the files of a list are to each other.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Together {
+    /// Pieces of one dataset with the same arrays.
+    Pieces,
+    /// The same of an image or a rectilinear grid.
+    Lattice,
+    Blocks,
+}
+
+/// A file that a list names.
+struct Member {
+    name: String,
+    content: Content,
+}
+
+/// The files of a list.
+struct Members {
+    files: Vec<Member>,
+    together: Together,
+}
+
+/// The kind of dataset that a file announces in its root element.
+fn kind_of(content: &[u8]) -> Option<&str> {
+    let head = &content[..content.len().min(HEAD)];
+    let mark = b"<VTKFile";
+    let start = head.windows(mark.len()).position(|window| window == mark)? + mark.len();
+    let tag = &head[start..];
+    let tag = &tag[..tag.iter().position(|b| *b == b'>')?];
+    let tag = std::str::from_utf8(tag).ok()?;
+    let value = tag.split_once("type=").filter(|(before, _)| before.ends_with(char::is_whitespace))?.1;
+    let quote = value.chars().next().filter(|quote| matches!(quote, '"' | '\''))?;
+    value[1..].split_once(quote).map(|(kind, _)| kind)
+}
+
+fn is_kind_of_list(kind: &str) -> bool {
+    OF_PIECES.contains(&kind) || OF_BLOCKS.contains(&kind) || kind == OF_TIMES
+}
+
+/// Whether a file names others.
+pub(super) fn is_list(content: &[u8]) -> bool {
+    kind_of(content).is_some_and(is_kind_of_list)
+}
+
+/// Reads what the files of a list are together.
+pub(super) fn read(content: &[u8], path: Option<&Path>, reading: &mut Reading<'_>) -> Result<Loaded, ReadError> {
+    let members = Members::of(content, path, reading)?;
+    // One time of a series is chosen already.
+    let params = ReadParams { frame: 0, ..reading.params.clone() };
+    let mut within = reading.within(&params);
+    let loaded = members.loaded(&mut within);
+    reading.notes = within.notes;
+    loaded
+}
+
+/// The files that a list names, one after the other, and what is said of them.
+struct Names {
+    names: Vec<String>,
+    together: Together,
+}
+
+impl Members {
+    fn of(content: &[u8], path: Option<&Path>, reading: &mut Reading<'_>) -> Result<Self, ReadError> {
+        let mut files = Vec::new();
+        let together = collect(content, path, &mut Found { folder: String::new(), depth: 0 }, &mut files, reading)?;
+        Ok(Self { files, together })
+    }
+
+    /// What the files are together.
+    fn loaded(&self, reading: &mut Reading<'_>) -> Result<Loaded, ReadError> {
+        let mut texts: Vec<(Option<Appended>, Cow<'_, str>)> = Vec::new();
+        for member in &self.files {
+            texts.push(Appended::split(&member.content).map_err(|e| in_file(Some(&member.name), e))?);
+        }
+        let bytes = texts.iter().filter(|(appended, _)| appended.is_some()).map(|(_, text)| text.len() as u64).sum();
+        input::hold("the descriptions", bytes, reading.params)?;
+        let mut documents = Vec::new();
+        for (member, (_, text)) in self.files.iter().zip(&texts) {
+            documents.push(parsed(text).map_err(|e| in_file(Some(&member.name), e))?);
+        }
+        let mut encodings = Vec::new();
+        for (member, (document, (appended, _))) in self.files.iter().zip(documents.iter().zip(&texts)) {
+            let encoding = Encoding::of(document.root_element(), &member.content, appended.clone());
+            encodings.push(encoding.map_err(|e| in_file(Some(&member.name), e))?);
+        }
+        let mut sources = Vec::new();
+        for (member, (document, encoding)) in self.files.iter().zip(documents.iter().zip(&encodings)) {
+            let file = Some(member.name.as_str());
+            let dataset = dataset(document).map_err(|e| in_file(file, e))?;
+            sources.push(Source { dataset, encoding, file });
+        }
+        if let [source] = sources.as_slice() {
+            return one(source, reading).map_err(|e| in_file(source.file, e));
+        }
+        match self.together {
+            Together::Lattice => pasted::read(&sources, reading).map(Loaded::Grid),
+            Together::Pieces => piece::read(&sources, false, reading),
+            Together::Blocks => {
+                let blocks = counted(sources.len() as u64, "block");
+                reading
+                    .notes
+                    .remark(format!("{blocks} drawn as one; where one lacks the array that is drawn it draws nothing"));
+                piece::read(&sources, true, reading)
+            }
+        }
+    }
+}
+
+/// Where a list was found.
+struct Found {
+    /// Its folder below that of the first list, with a slash behind it.
+    folder: String,
+    depth: usize,
+}
+
+/// Opens the files of a list and of those in it.
+fn collect(
+    content: &[u8],
+    path: Option<&Path>,
+    found: &mut Found,
+    files: &mut Vec<Member>,
+    reading: &mut Reading<'_>,
+) -> Result<Together, ReadError> {
+    let text = std::str::from_utf8(content)
+        .map_err(|e| ReadError::input(Place::Byte(e.valid_up_to() as u64), "UTF-8 text", "another byte", HINT))?;
+    let document = parsed(text)?;
+    let Names { names, mut together } = Names::of(&document, reading)?;
+    let is_alone = names.len() == 1;
+    for name in names {
+        reading.go_on()?;
+        if files.len() >= MAX_NODES as usize {
+            let expected = format!("at most {MAX_NODES} files");
+            return Err(ReadError::input(Place::File, expected, "more", "draw a part of them"));
+        }
+        let name = format!("{}{}", found.folder, from_uri(&name));
+        let mut stream = Beside::new(path).open(&name, "a file of the list", reading.params)?;
+        if stream.peek(2)? == [0x1f, 0x8b] {
+            stream = stream.gunzip();
+        }
+        let content = stream.rest().map_err(|e| in_file(Some(&name), e))?;
+        if !is_list(&content) {
+            files.push(Member { name, content });
+            continue;
+        }
+        if found.depth == DEEPEST {
+            let expected = format!("lists of lists at most {DEEPEST} deep");
+            return Err(in_file(
+                Some(&name),
+                ReadError::input(Place::File, expected, "a deeper one", "does it name itself?"),
+            ));
+        }
+        let folder = name.rfind('/').map_or_else(String::new, |end| name[..=end].to_owned());
+        let below = collect(&content, path, &mut Found { folder, depth: found.depth + 1 }, files, reading);
+        let below = below.map_err(|e| in_file(Some(&name), e))?;
+        if is_alone {
+            together = below;
+        }
+    }
+    Ok(together)
+}
+
+impl Names {
+    fn of(document: &Document<'_>, reading: &mut Reading<'_>) -> Result<Self, ReadError> {
+        let root = document.root_element();
+        let kind = root.attribute("type").unwrap_or_default();
+        let names = |element: &str, attribute: &str| -> Vec<String> {
+            let named = root.descendants().filter(|node| node.has_tag_name(element));
+            // A piece that is empty has no file.
+            let names = named.filter_map(|node| node.attribute(attribute)).filter(|name| !name.is_empty());
+            names.map(str::to_owned).collect()
+        };
+        let (names, together) = match kind {
+            "PImageData" | "PRectilinearGrid" => (names("Piece", "Source"), Together::Lattice),
+            kind if OF_PIECES.contains(&kind) => (names("Piece", "Source"), Together::Pieces),
+            OF_TIMES => (at_a_time(root, reading)?, Together::Blocks),
+            _ => (names("DataSet", "file"), Together::Blocks),
+        };
+        if names.is_empty() {
+            return Err(wrong(root, "a list that names files", "none"));
+        }
+        Ok(Self { names, together })
+    }
+}
+
+/// The files of the time that is asked for, of a series.
+fn at_a_time(root: Node<'_, '_>, reading: &mut Reading<'_>) -> Result<Vec<String>, ReadError> {
+    let mut files: Vec<(f64, String)> = Vec::new();
+    for node in root.descendants().filter(|node| node.has_tag_name("DataSet")) {
+        let text = node.attribute("timestep").unwrap_or("0");
+        let time = text.trim().parse::<f64>().ok().filter(|time| time.is_finite());
+        let time = time.ok_or_else(|| wrong(node, "a finite number as timestep", text))?;
+        files.extend(node.attribute("file").map(|file| (time, file.to_owned())));
+    }
+    let mut times: Vec<f64> = files.iter().map(|(time, _)| *time).collect();
+    times.sort_by(f64::total_cmp);
+    times.dedup();
+    if times.len() > 1 || reading.params.frame > 0 {
+        Selection::of_frames(times.len() as u64, place(root), reading.params, &mut reading.notes)?;
+    }
+    let Some(time) = times.get(reading.params.frame as usize).copied() else { return Ok(Vec::new()) };
+    if times.len() > 1 {
+        let name = files.iter().find(|(other, _)| *other == time).map_or("", |(_, file)| file.as_str());
+        reading.notes.remark(format!("time {time} of a series, the file {}", escaped(name.as_bytes(), 60)));
+    }
+    Ok(files.into_iter().filter(|(other, _)| *other == time).map(|(_, file)| file).collect())
+}

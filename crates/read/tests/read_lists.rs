@@ -1,0 +1,344 @@
+//! Files of VTK that name others: pieces, blocks and times.
+#![cfg(all(feature = "vti", feature = "vtk"))]
+
+use crate::read_samples::cells::{vtp, vtp_pieces, vtu, vtu_pieces};
+use crate::read_samples::grids::{array, linear, vtk_file, vts, vtu_of, words};
+use crate::read_samples::{gzip, load};
+use read::{Fault, Loaded, Notes, ReadError, ReadParams, file};
+use splat_core::{Grid, MemoryAccount};
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// A folder for the files of one test.
+struct Folder(PathBuf);
+
+impl Folder {
+    fn new(name: &str) -> Self {
+        let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("lists").join(name);
+        fs::create_dir_all(folder.join("below")).unwrap();
+        Self(folder)
+    }
+
+    fn write(&self, name: &str, content: impl AsRef<[u8]>) {
+        fs::write(self.0.join(name), content).unwrap();
+    }
+
+    fn read_with(&self, name: &str, params: &ReadParams) -> Result<(Loaded, Notes), ReadError> {
+        file(&self.0.join(name), params, None)
+    }
+
+    fn read(&self, name: &str) -> (Loaded, Notes) {
+        self.read_with(name, &ReadParams::default()).unwrap_or_else(|e| panic!("{e}"))
+    }
+
+    fn grid(&self, name: &str) -> (Grid, Notes) {
+        match self.read(name) {
+            (Loaded::Grid(grid), notes) => (grid, notes),
+            other => panic!("not a grid: {other:?}"),
+        }
+    }
+
+    #[track_caller]
+    fn refused(&self, name: &str, expected: &str) {
+        let error = self.read_with(name, &ReadParams::default()).unwrap_err();
+        assert!(error.to_string().contains(expected), "{error}");
+    }
+}
+
+/// A list of pieces of a dataset; `more` are attributes of the dataset.
+fn pieces(kind: &str, more: &str, files: &[&str]) -> String {
+    let pieces: String = files.iter().map(|name| format!("<Piece Source=\"{name}\"/>\n")).collect();
+    vtk_file(kind, &format!("<{kind} GhostLevel=\"0\" {more}>\n<PPointData/>\n{pieces}</{kind}>\n"))
+}
+
+/// A dataset of blocks, of which all but the first are nested.
+fn blocks(files: &[&str]) -> String {
+    let block = |name: &&str| format!("<DataSet index=\"0\" file=\"{name}\"/>\n");
+    let nested: String = files[1..].iter().map(block).collect();
+    let content = format!(
+        "<vtkMultiBlockDataSet>\n{}<Block index=\"1\">{nested}</Block>\n</vtkMultiBlockDataSet>\n",
+        block(&files[0])
+    );
+    vtk_file("vtkMultiBlockDataSet", &content)
+}
+
+/// The pieces of a file of several as files of one each.
+fn split(content: &[u8]) -> Vec<String> {
+    let text = String::from_utf8(content.to_vec()).unwrap();
+    let (head, rest) = text.split_once("<Piece").unwrap();
+    let (pieces, tail) = rest.rsplit_once("</Piece>").unwrap();
+    pieces
+        .split("</Piece>")
+        .map(|piece| {
+            let piece = piece.trim_start().strip_prefix("<Piece").unwrap_or(piece);
+            format!("{head}<Piece{piece}</Piece>{tail}")
+        })
+        .collect()
+}
+
+#[test]
+fn pieces_in_files_are_what_they_are_in_one() {
+    let folder = Folder::new("pieces");
+    let of_cells = split(&vtu_pieces("ascii", false));
+    assert_eq!(of_cells.len(), 3);
+    of_cells.iter().enumerate().for_each(|(i, piece)| folder.write(&format!("below/a_{i}.vtu"), piece));
+    let names = ["below/a_0.vtu", "below/a_1.vtu", "below/a_2.vtu"];
+    folder.write("a.pvtu", pieces("PUnstructuredGrid", "", &names));
+    let (found, notes) = folder.grid("a.pvtu");
+    let Loaded::Grid(expected) = load("a.vtu", &vtu_pieces("ascii", false)).unwrap() else { panic!("no volume") };
+    assert_eq!(found, expected);
+    assert_eq!(notes.unused, ["CellData.of_cells", "1 cell without a volume"]);
+    assert_eq!(notes.format, "VtkXml");
+    // One of them inside gzip, and names as addresses.
+    folder.write("below/a 0.vtu.gz", gzip(of_cells[0].as_bytes()));
+    folder.write("b.pvtu", pieces("PUnstructuredGrid", "", &["below/a%200.vtu.gz", names[1], names[2]]));
+    assert_eq!(folder.grid("b.pvtu").0, expected);
+    // A list of one file is that file.
+    folder.write("whole.vtu", vtu("binary", true));
+    folder.write("one.pvtu", pieces("PUnstructuredGrid", "", &["whole.vtu"]));
+    assert_eq!(folder.grid("one.pvtu").0, folder.grid("whole.vtu").0);
+    let of_faces = split(&vtp_pieces());
+    of_faces.iter().enumerate().for_each(|(i, piece)| folder.write(&format!("s_{i}.vtp"), piece));
+    folder.write("s.pvtp", pieces("PPolyData", "", &["s_0.vtp", "s_1.vtp"]));
+    folder.write("s.vtp", vtp_pieces());
+    let (Loaded::Mesh(found), Loaded::Mesh(expected)) = (folder.read("s.pvtp").0, folder.read("s.vtp").0) else {
+        panic!()
+    };
+    assert_eq!((found.triangles, found.color, found.position), (expected.triangles, expected.color, expected.position));
+    folder.write("g.vts", vts(0.1));
+    folder.write("g.pvts", pieces("PStructuredGrid", "WholeExtent=\"0 2 0 3 0 1\"", &["g.vts"]));
+    assert_eq!(folder.grid("g.pvts").0, folder.grid("g.vts").0);
+}
+
+/// Indices of the first and the last point along each axis.
+type Extent = [[i64; 2]; 3];
+
+fn words_of(extent: Extent) -> String {
+    words(extent.concat()).trim().to_owned()
+}
+
+/// A piece of an image with the linear field of its indices on its points, and on its cells that of their first points.
+fn image(extent: Extent, spacing: &str) -> String {
+    let values = |[x, y, z]: Extent| -> String {
+        let row = |j: i64, k: i64| (x[0]..=x[1]).map(move |i| linear([i, j, k].map(|n| n as f64)));
+        words((z[0]..=z[1]).flat_map(|k| (y[0]..=y[1]).flat_map(move |j| row(j, k))))
+    };
+    let cells = extent.map(|[low, high]| [low, (high - 1).max(low)]);
+    let words = words_of(extent);
+    let content = format!(
+        "<ImageData WholeExtent=\"{words}\" Origin=\"1 2 3\" Spacing=\"{spacing}\">\n<Piece Extent=\"{words}\">\n<PointData>\n{}\
+         </PointData>\n<CellData>\n{}</CellData>\n</Piece>\n</ImageData>\n",
+        array("Float64", "p", 1, &values(extent)),
+        array("Float64", "c", 1, &values(cells)),
+    );
+    vtk_file("ImageData", &content)
+}
+
+#[test]
+fn pieces_of_an_image_are_put_together_at_their_places() {
+    let folder = Folder::new("images");
+    let whole = [[0, 4], [-1, 2], [2, 5]];
+    folder.write("whole.vti", image(whole, "1 2 0.5"));
+    // They share a layer of points, and overlap by two.
+    folder.write("a_0.vti", image([[0, 4], [-1, 1], [2, 5]], "1 2 0.5"));
+    folder.write("a_1.vti", image([[0, 2], [0, 2], [2, 5]], "1 2 0.5"));
+    folder.write("a_2.vti", image([[2, 4], [1, 2], [2, 5]], "1 2 0.5"));
+    let extent = format!("WholeExtent=\"{}\"", words_of(whole));
+    folder.write("a.pvti", pieces("PImageData", &extent, &["a_0.vti", "a_1.vti", "a_2.vti"]));
+    let chosen = |name: &str, array: &str| {
+        let params = ReadParams { array: Some(array.to_owned()), ..ReadParams::default() };
+        folder.read_with(name, &params).unwrap_or_else(|e| panic!("{e}")).0
+    };
+    for array in ["p", "c"] {
+        assert_eq!(chosen("a.pvti", array), chosen("whole.vti", array), "{array}");
+    }
+    // What no piece has is a gap.
+    folder.write("gap.pvti", pieces("PImageData", &extent, &["a_0.vti", "a_2.vti"]));
+    let (found, notes) = folder.grid("gap.pvti");
+    assert_eq!(
+        found.values.iter().filter(|v| v.is_nan()).count(),
+        2 * 4,
+        "points 0 and 1 of the last row of four layers"
+    );
+    assert!(notes.remarks.iter().any(|r| r.starts_with("8 of 80 voxels are NaN")), "{:?}", notes.remarks);
+    folder.write("other.vti", image([[2, 4], [1, 2], [2, 5]], "1 2 0.25"));
+    folder.write("other.pvti", pieces("PImageData", &extent, &["a_0.vti", "other.vti"]));
+    folder.refused(
+        "other.pvti",
+        "the file 'other.vti' of the list: the Origin, Spacing and Direction of the other pieces",
+    );
+    folder.write("far.vti", image([[2_000_000, 2_000_001], [0, 1], [0, 1]], "1 2 0.5"));
+    folder.write("far.pvti", pieces("PImageData", &extent, &["a_0.vti", "far.vti"]));
+    folder.refused("far.pvti", "expected pieces that lie side by side, found 2000002 x");
+    folder.write("named.vti", image([[0, 4], [-1, 2], [2, 5]], "1 2 0.5").replace("Name=\"p\"", "Name=\"q\""));
+    folder.write("named.pvti", pieces("PImageData", &extent, &["a_0.vti", "named.vti"]));
+    folder
+        .refused("named.pvti", "the file 'named.vti' of the list: an array 'p' in PointData, which another Piece has");
+}
+
+#[test]
+fn pieces_of_a_rectilinear_grid_are_put_together_and_made_even() {
+    let folder = Folder::new("rectilinear");
+    let along = [0.0, 1.0, 3.0, 4.0];
+    let part = |first: usize, last: usize| {
+        let coordinates = [words(&along[first..=last]), "0 1 ".to_owned(), "0 1 ".to_owned()];
+        let axes: String = coordinates.iter().map(|axis| array("Float64", "c", 1, axis)).collect();
+        let points = (0..4)
+            .flat_map(|n| along[first..=last].iter().map(move |x| linear([*x, f64::from(n % 2), f64::from(n / 2)])));
+        let extent = format!("{first} {last} 0 1 0 1");
+        let content = format!(
+            "<RectilinearGrid WholeExtent=\"{extent}\">\n<Piece Extent=\"{extent}\">\n<PointData>\n{}</PointData>\n<Coordinates>\n{axes}\
+             </Coordinates>\n</Piece>\n</RectilinearGrid>\n",
+            array("Float64", "p", 1, &words(points))
+        );
+        vtk_file("RectilinearGrid", &content)
+    };
+    folder.write("whole.vtr", part(0, 3));
+    folder.write("a_0.vtr", part(0, 1));
+    folder.write("a_1.vtr", part(1, 3));
+    folder.write("a.pvtr", pieces("PRectilinearGrid", "WholeExtent=\"0 3 0 1 0 1\"", &["a_0.vtr", "a_1.vtr"]));
+    let (found, notes) = folder.grid("a.pvtr");
+    assert_eq!(found, folder.grid("whole.vtr").0);
+    assert_eq!(found.dims, [5, 2, 2]);
+    assert!(notes.unused.is_empty(), "{:?}", notes.unused);
+    folder.write("a_2.vtr", part(3, 3));
+    folder.write("b.pvtr", pieces("PRectilinearGrid", "WholeExtent=\"0 3 0 1 0 1\"", &["a_0.vtr", "a_2.vtr"]));
+    folder.refused("b.pvtr", "expected coordinates along x that rise or fall throughout, found 1 at point 1 and NaN");
+}
+
+#[test]
+fn blocks_are_drawn_as_one_and_may_lack_an_array() {
+    let folder = Folder::new("blocks");
+    let corner = |x: f64| [[x, 0.0, 0.0], [x + 1.0, 0.0, 0.0], [x, 1.0, 0.0], [x, 0.0, 1.0]];
+    let cell = |x: f64| vtu_of(&corner(x), &[&[0, 1, 2, 3]], &[10], "");
+    folder.write("below/0.vtu", cell(0.0));
+    folder.write("below/1.vtu", cell(1.0).replace("Name=\"p\"", "Name=\"q\""));
+    folder.write("below/2.vti", image([[2, 3], [0, 1], [0, 1]], "1 1 1").replace("Origin=\"1 2 3\"", ""));
+    folder.write("a.vtm", blocks(&["below/0.vtu", "below/1.vtu", "below/2.vti"]));
+    let (found, notes) = folder.grid("a.vtm");
+    let high = found.origin + found.axes * splat_core::glam::DVec3::from_array(found.dims.map(|n| n as f64 - 0.5));
+    assert!((high - splat_core::glam::DVec3::new(3.0, 1.0, 1.0)).length() < 1e-9, "{high}");
+    // The second one has no p: it is a gap.
+    let value = |x: f64| {
+        let [nx, ny, _] = found.dims;
+        let place = |n: usize| found.position(n % nx, n / nx % ny, n / nx / ny);
+        let target = splat_core::glam::DVec3::new(x, 0.2, 0.2);
+        let order = |a: &usize, b: &usize| place(*a).distance(target).total_cmp(&place(*b).distance(target));
+        let nearest = (0..found.values.len()).min_by(order).unwrap();
+        (found.values[nearest], linear(place(nearest).to_array()) as f32)
+    };
+    assert!((value(0.2).0 - value(0.2).1).abs() < 1e-4 && (value(2.5).0 - value(2.5).1).abs() < 1e-4);
+    assert!(value(1.2).0.is_nan());
+    let said = "3 blocks drawn as one; where one lacks the array that is drawn it draws nothing";
+    assert!(notes.remarks.iter().any(|r| r == said), "{:?}", notes.remarks);
+    // Surfaces of which one has no colours have none.
+    folder.write("s.vtp", vtp());
+    folder.write(
+        "t.vtp",
+        String::from_utf8(vtp())
+            .unwrap()
+            .replace("Name=\"paint\" NumberOfComponents=\"3\"", "Name=\"x\"")
+            .replace("255 0 0 0 255 0 0 0 255 0 0 0", "1 2 3 4"),
+    );
+    folder.write("s.vtm", blocks(&["s.vtp", "t.vtp"]));
+    let Loaded::Mesh(mesh) = folder.read("s.vtm").0 else { panic!("no mesh") };
+    assert_eq!((mesh.triangles.len(), mesh.color.len()), (4, 0));
+    folder.write("same.vtm", blocks(&["s.vtp", "s.vtp"]));
+    let Loaded::Mesh(mesh) = folder.read("same.vtm").0 else { panic!("no mesh") };
+    assert_eq!(mesh.color.len(), 8);
+}
+
+#[test]
+fn a_time_of_a_series_is_chosen_by_frame() {
+    let folder = Folder::new("times");
+    let tetrahedron = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+    let at = |value: &str| {
+        let text = vtu_of(&tetrahedron, &[&[0, 1, 2, 3]], &[10], "");
+        text.replace(&words(tetrahedron.map(linear)), value)
+    };
+    folder.write("t0.vtu", at("5 5 5 5 "));
+    folder.write("t1.vtu", at("7 7 7 7 "));
+    folder.write("p1.pvtu", pieces("PUnstructuredGrid", "", &["t1.vtu"]));
+    let times = |first: &str| {
+        let content = format!(
+            "<Collection>\n<DataSet timestep=\"0.5\" part=\"0\" file=\"p1.pvtu\"/>\n<DataSet timestep=\"{first}\" file=\"t0.vtu\"/>\n\
+             </Collection>\n"
+        );
+        vtk_file("Collection", &content)
+    };
+    folder.write("a.pvd", times("0.25"));
+    let frame = |frame: u64| folder.read_with("a.pvd", &ReadParams { frame, ..ReadParams::default() });
+    let most = |loaded: &Loaded| match loaded {
+        Loaded::Grid(grid) => grid.values.iter().copied().fold(0.0, f32::max),
+        other => panic!("no volume: {other:?}"),
+    };
+    let (first, notes) = frame(0).unwrap();
+    assert_eq!(most(&first), 5.0);
+    assert_eq!(notes.remarks[..2], ["frame 0 of 2; `frame` chooses another", "time 0.25 of a series, the file t0.vtu"]);
+    assert_eq!(most(&frame(1).unwrap().0), 7.0);
+    let beyond = frame(2).unwrap_err().to_string();
+    assert!(beyond.contains("expected a `frame` from 0 to 1, as the file has 2 volumes, found `frame` 2"), "{beyond}");
+    folder.write("b.pvd", times("soon"));
+    folder.refused("b.pvd", "expected a finite number as timestep, found 'soon'");
+}
+
+#[test]
+fn what_is_wrong_in_a_list_is_named() {
+    let folder = Folder::new("wrong");
+    let missing = |name: &str| pieces("PUnstructuredGrid", "", &[name]);
+    for (name, content, expected) in [
+        ("a.pvtu", missing("none.vtu"), "expected a file of the list 'none.vtu': a file, found no such file"),
+        (
+            "b.pvtu",
+            missing("../lists.vtu"),
+            "a file of the list: a file in the same folder or below, found '../lists.vtu'",
+        ),
+        ("c.pvtu", missing("http://x/a.vtu"), "a file of the list: a file in the same folder or below"),
+        ("d.pvtu", missing("d.pvtu"), "lists of lists at most 4 deep, found a deeper one"),
+        (
+            "e.pvtu",
+            vtk_file("PUnstructuredGrid", "<PUnstructuredGrid/>"),
+            "expected a list that names files, found 'none'",
+        ),
+        ("f.pvtu", missing("f.txt"), "the file 'f.txt' of the list: XML"),
+        ("g.pvtu", missing("g.vtu"), "the file 'g.vtu' of the list: 27 numbers, found '"),
+        ("h.vtm", blocks(&["whole.vtu", "h.vtt"]), "the file 'h.vtt' of the list: a VTKFile of type ImageData"),
+    ] {
+        folder.write("f.txt", "no elements");
+        folder.write("whole.vtu", vtu("ascii", false));
+        folder.write("g.vtu", String::from_utf8(vtu("ascii", false)).unwrap().replacen("0 0 0 2", "0 0 2", 1));
+        folder.write("h.vtt", vtk_file("Table", "<Table/>"));
+        folder.write(name, content);
+        folder.refused(name, expected);
+    }
+    let in_memory = load("a.pvtu", missing("a.vtu").as_bytes()).unwrap_err().to_string();
+    assert!(in_memory.contains("all of it in one file, as it was read from memory"), "{in_memory}");
+    // A file that is named a thousand times is in memory as often, which the limit knows.
+    folder.write("large.vtu", [&vtu("ascii", false)[..], &[b' '; 1 << 16]].concat());
+    folder.write("many.pvtu", pieces("PUnstructuredGrid", "", &["large.vtu"; 1000]));
+    let params = ReadParams { memory: MemoryAccount::new(1 << 23), ..ReadParams::default() };
+    let error = folder.read_with("many.pvtu", &params).unwrap_err();
+    assert_eq!(error.fault, Fault::Limit, "{error}");
+}
+
+/// A list is cut anywhere, or its bits are turned: an error or something valid, never a panic.
+#[test]
+fn a_damaged_list_is_an_error_or_valid() {
+    let folder = Folder::new("damage");
+    folder.write("a.vti", image([[0, 2], [0, 1], [0, 1]], "1 1 1"));
+    folder.write("b.vti", image([[2, 3], [0, 1], [0, 1]], "1 1 1"));
+    for whole in [pieces("PImageData", "", &["a.vti", "b.vti"]), blocks(&["a.vti", "b.vti"])] {
+        for length in 0..whole.len() - "</VTKFile>\n".len() {
+            folder.write("cut.pvti", &whole[..length]);
+            assert!(folder.read_with("cut.pvti", &ReadParams::default()).is_err(), "{length}");
+        }
+        for bit in (0..whole.len() * 8).step_by(11) {
+            let mut turned = whole.clone().into_bytes();
+            turned[bit / 8] ^= 1 << (bit % 8);
+            folder.write("turned.pvti", turned);
+            if let Ok((Loaded::Grid(grid), _)) = folder.read_with("turned.pvti", &ReadParams::default()) {
+                assert_eq!(grid.values.len(), grid.dims.iter().product::<usize>());
+            }
+        }
+    }
+}
