@@ -143,6 +143,39 @@ fn pieces_are_one_dataset_with_the_columns_of_all() {
     assert!((mass(&grid("a.vtu", of_cells.as_bytes()).0) / (6.0 + 4.25 / 3.0) - 1.0).abs() < 1e-3);
 }
 
+/// Lines alone are tubes with the columns of their points and their own; beside faces they are counted.
+#[test]
+fn lines_alone_are_tubes() {
+    let legacy = "# vtk DataFile Version 3.0\nx\nASCII\nDATASET POLYDATA\nPOINTS 4 float\n0 0 0 1 0 0 0 0 1 0 3 1\n\
+        LINES 2 6\n2 0 1\n2 2 3\nCELL_DATA 2\nSCALARS rank float 1\nLOOKUP_TABLE default\n7 8\n\
+        POINT_DATA 4\nSCALARS heat float 1\nLOOKUP_TABLE default\n1 2 3 4\n";
+    let params = ReadParams { columns: vec!["heat".to_owned(), "rank".to_owned()], ..ReadParams::default() };
+    let (Loaded::Mesh(found), notes) = bytes("a.vtk", legacy.as_bytes(), &params, None).unwrap() else {
+        panic!("mesh")
+    };
+    found.validate().unwrap();
+    assert_eq!((found.position.len(), found.triangles.len()), (4 * 6, 2 * (12 + 8)));
+    let column = |name: &str| found.columns.iter().find(|c| c.name == name).unwrap().values.clone();
+    assert_eq!(column("heat")[5..7], [1.0, 2.0]);
+    assert_eq!(column("rank")[19..21], [7.0, 8.0]);
+    // The diagonal of 1, 3 and 1 is √11.
+    let radius = 11f32.sqrt() / 500.0;
+    let away = found.position[0] + found.origin.as_vec3();
+    assert!((away.length() / radius - 1.0).abs() < 1e-3, "{away}");
+    assert!(notes.remarks[0].starts_with("2 lines drawn as tubes of radius 0.0066"), "{:?}", notes.remarks);
+    assert!(notes.unused.is_empty(), "{:?}", notes.unused);
+    let obj = "v 0 0 0 1 0 0\nv 1 0 0 1 0 0\nv 1 1 0 0 0 1\nl 1 2/7 -1\n";
+    let (found, notes) = mesh("a.obj", obj.as_bytes());
+    assert_eq!((found.position.len(), found.color[17], found.color[0]), (18, [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]));
+    assert!(notes.remarks[0].starts_with("1 line drawn as tubes"), "{:?}", notes.remarks);
+    let (_, notes) = mesh("a.obj", format!("{obj}f 1 2 3\n").as_bytes());
+    assert_eq!(notes.unused, ["1 line"]);
+    refused("a.obj", "v 0 0 0\nl 1 2\n", "a.obj:2:5: expected an index from 1 to 1");
+    // Without any length there are points.
+    let (Loaded::Points(points), notes) = read("a.obj", b"v 0 0 0\nv 0 0 0\nl 1 2\n") else { panic!("points") };
+    assert_eq!((points.len(), notes.unused), (2, vec!["1 line".to_owned()]));
+}
+
 #[test]
 fn points_without_cells_are_a_cloud() {
     let text = String::from_utf8(vtp()).unwrap().replace("NumberOfPolys=\"1\"", "NumberOfPolys=\"0\"");

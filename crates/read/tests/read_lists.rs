@@ -274,10 +274,18 @@ fn a_time_of_a_series_is_chosen_by_frame() {
     };
     let (first, notes) = frame(0).unwrap();
     assert_eq!(most(&first), 5.0);
-    assert_eq!(notes.remarks[..2], ["frame 0 of 2; `frame` chooses another", "time 0.25 of a series, the file t0.vtu"]);
+    let said = "time 0.25, 0 of 2 counted from 0; `frame` chooses another";
+    assert!(notes.remarks.iter().any(|r| r == said), "{:?}", notes.remarks);
     assert_eq!(most(&frame(1).unwrap().0), 7.0);
     let beyond = frame(2).unwrap_err().to_string();
     assert!(beyond.contains("expected a `frame` from 0 to 1, as the file has 2 volumes, found `frame` 2"), "{beyond}");
+    // Of surfaces no frame can be chosen.
+    folder.write("t0.vtu", vtp());
+    let (Loaded::Mesh(_), notes) = folder.read("a.pvd") else { panic!("no mesh") };
+    let said = "time 0.25, 0 of 2 counted from 0; of another draw its file";
+    assert!(notes.remarks.iter().any(|r| r == said), "{:?}", notes.remarks);
+    let error = folder.read_with("p1.pvtu", &ReadParams { frame: 1, ..ReadParams::default() }).unwrap_err();
+    assert!(error.to_string().contains("expected `frame` 0, as the file has one volume"), "{error}");
     folder.write("b.pvd", times("soon"));
     folder.refused("b.pvd", "expected a finite number as timestep, found 'soon'");
 }

@@ -313,23 +313,22 @@ impl Content<'_> {
     }
 
     fn finish(self, reading: &mut Reading<'_>) -> Result<Loaded, ReadError> {
-        if let Some(error) = self.without_normal.filter(|_| !self.normals.is_empty()) {
-            return Err(error);
+        if let Some(error) = self.without_normal.as_ref().filter(|_| !self.normals.is_empty()) {
+            return Err(error.clone());
         }
         let (origin, offsets) = origin::relative(&self.positions, Place::File, |i| format!("vertex {}", i + 1))?;
         let colored = self.colors.len() == self.positions.len();
         if !self.places.is_empty() && (colored || self.materials.textures.is_empty()) {
             reading.notes.not_used([&b"vt"[..]]);
         }
-        if self.faces > 0 && !self.line_ends.is_empty() {
-            reading.notes.not_used([counted(self.line_ends.len() as u64, "line").as_bytes()]);
-        }
-        if self.faces == 0
-            && let Some(tubes) = self.tubes(&offsets, reading)?
-        {
+        let tubes = if self.faces == 0 { self.tubes(&offsets, reading)? } else { None };
+        if let Some(tubes) = tubes {
             let color = if colored { tubes.of_vertices(&self.colors) } else { Vec::new() };
             let vertices = Mesh { origin, color, ..Mesh::default() };
             return Ok(Loaded::Mesh(tubes.into_mesh(vertices, reading)));
+        }
+        if !self.line_ends.is_empty() {
+            reading.notes.not_used([counted(self.line_ends.len() as u64, "line").as_bytes()]);
         }
         if self.faces == 0 {
             let color = if colored { self.colors } else { Vec::new() };

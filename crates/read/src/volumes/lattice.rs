@@ -5,7 +5,7 @@ use splat_core::glam::{DMat3, DVec3};
 
 /// Most that the longest step of a lattice may be of the shortest. Long steps are split into such as the shortest, so that a
 /// damaged number would make thousands of voxels of each.
-const MAX_ASPECT: f64 = 1000.0;
+pub(crate) const MAX_ASPECT: f64 = 1000.0;
 
 /// Refuses axes that span no volume, or of which one is out of all proportion.
 pub(crate) fn check(origin: DVec3, axes: &DMat3, place: Place, hint: &'static str) -> Result<(), ReadError> {

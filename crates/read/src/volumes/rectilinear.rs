@@ -122,8 +122,11 @@ impl Rectilinear {
 fn even_dims(axes: &[Axis<'_>; 3], left: u64) -> ([usize; 3], bool) {
     // Something has to be left for what is made of the voxels.
     let most = MOST.min(left as f64 / (2 * size_of::<f32>()) as f64);
+    // A step beside which another is out of all proportion would be refused.
+    let longest = axes.iter().map(|axis| if axis.is_even { axis.most } else { axis.least }).fold(0.0, f64::max);
+    let shortest = 1.001 * longest / lattice::MAX_ASPECT;
     let dims = |scale: f64| {
-        let along = |axis: &Axis<'_>| if axis.is_even { axis.count() as f64 } else { axis.even_count(scale) };
+        let along = |axis: &Axis<'_>| if axis.is_even { axis.count() as f64 } else { axis.even_count(scale, shortest) };
         DVec3::new(along(&axes[0]), along(&axes[1]), along(&axes[2]))
     };
     let is_finest = |dims: DVec3| axes.iter().zip(dims.to_array()).all(|(axis, n)| axis.is_even || n <= 2.0);
@@ -132,7 +135,8 @@ fn even_dims(axes: &[Axis<'_>; 3], left: u64) -> ([usize; 3], bool) {
     while dims(scale).element_product() > most && !is_finest(dims(scale)) && scale.is_finite() {
         scale *= COARSER;
     }
-    (dims(scale).to_array().map(|n| n as usize), scale > 1.0)
+    let is_coarse = scale > 1.0 || axes.iter().any(|axis| !axis.is_even && axis.least < shortest);
+    (dims(scale).to_array().map(|n| n as usize), is_coarse)
 }
 
 /// The first point of a lattice of so many voxels, and its steps; an axis of one point has the shortest step of the others.
@@ -173,8 +177,11 @@ fn told(axes: &[Axis<'_>; 3], dims: [usize; 3], is_coarse: bool, lost: f64) -> S
     let steps = uneven.map(|(axis, name)| format!("from {} to {} along {name}", axis.least, axis.most));
     let steps = steps.collect::<Vec<_>>().join(", ");
     let [x, y, z] = dims;
-    let coarse =
-        if is_coarse { ", coarser than the least step because of their number or the memory limit" } else { "" };
+    let coarse = if is_coarse {
+        ", coarser than the least step because of other steps, the number of voxels or the memory limit"
+    } else {
+        ""
+    };
     let lost = 100.0 * lost;
     format!(
         "steps {steps}: interpolated linearly as {x} x {y} x {z} voxels of even steps{coarse}; at the points of the file the values differ \
@@ -220,10 +227,10 @@ impl<'a> Axis<'a> {
         }
     }
 
-    /// Points of even steps that are so many times as long as the least.
-    fn even_count(&self, scale: f64) -> f64 {
+    /// Points of even steps that are so many times as long as the least of the axis, or as `shortest`.
+    fn even_count(&self, scale: f64, shortest: f64) -> f64 {
         // A step that is a part too many in 10⁶ is the rounding of a whole number of them.
-        ((self.length() / (self.least * scale) - 1e-6).ceil() + 1.0).max(2.0)
+        ((self.length() / (self.least.max(shortest) * scale) - 1e-6).ceil() + 1.0).max(2.0)
     }
 
     /// The coordinate of point `i`, counted from the first along the axis.

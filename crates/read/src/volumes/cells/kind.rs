@@ -53,8 +53,9 @@ pub(super) struct Kind {
 const CURVED_TRIANGLE: Shape = Shape::Faces(&[&[0, 3, 5], &[3, 1, 4], &[5, 4, 2], &[3, 4, 5]]);
 /// Four triangles at the corners, and what is between them.
 const CURVED_QUAD: Shape = Shape::Faces(&[&[0, 4, 7], &[4, 1, 5], &[5, 2, 6], &[6, 3, 7], &[4, 5, 6], &[4, 6, 7]]);
-/// Four quads around the middle.
-const BIQUADRATIC_QUAD: Shape = Shape::Faces(&[&[0, 4, 8, 7], &[4, 1, 5, 8], &[8, 5, 2, 6], &[7, 8, 6, 3]]);
+/// Eight triangles around the middle.
+const BIQUADRATIC_QUAD: Shape =
+    Shape::Faces(&[&[0, 4, 8], &[4, 1, 8], &[1, 5, 8], &[5, 2, 8], &[2, 6, 8], &[6, 3, 8], &[3, 7, 8], &[7, 0, 8]]);
 /// Two quads side by side.
 const QUADRATIC_LINEAR_QUAD: Shape = Shape::Faces(&[&[0, 4, 5, 3], &[4, 1, 2, 5]]);
 

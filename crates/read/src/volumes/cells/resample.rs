@@ -54,13 +54,20 @@ pub(super) enum Faces<'a> {
     Around(FacesAround<'a>),
 }
 
-/// Places and values of the corners of a tetrahedron.
-type Tetrahedron = [(DVec3, f64); 4];
+/// A place and the value there.
+#[derive(Debug, Clone, Copy)]
+struct Knot {
+    place: DVec3,
+    value: f64,
+}
+
+/// The corners of a tetrahedron.
+type Tetrahedron = [Knot; 4];
 
 impl Body<'_> {
     /// Gives the tetrahedra of the body to `take`.
-    fn part(&self, corner: &impl Fn(u32) -> (DVec3, f64), mut take: impl FnMut(&Tetrahedron)) {
-        let at = |i: u8| corner(self.corners[usize::from(i)]);
+    fn part(&self, corner: &impl Fn(u32) -> Knot, mut take: impl FnMut(&Tetrahedron)) {
+        let knot = |i: u8| corner(self.corners[usize::from(i)]);
         let solid = match &self.faces {
             Faces::Of(solid) => solid,
             Faces::Around(faces) => {
@@ -78,16 +85,16 @@ impl Body<'_> {
             }
         };
         if solid.faces.is_empty() {
-            return take(&[at(0), at(1), at(2), at(3)]);
+            return take(&[knot(0), knot(1), knot(2), knot(3)]);
         }
-        let middle = middle_of(solid.middle, (0..self.corners.len() as u8).map(at), at);
+        let middle = middle_of(solid.middle, (0..self.corners.len() as u8).map(knot), knot);
         for face in solid.faces {
-            let center = middle_of(face.middle, face.around.iter().map(|i| at(*i)), at);
-            part_face(middle, center, face.around, |i| at(*i), &mut take);
+            let center = middle_of(face.middle, face.around.iter().map(|i| knot(*i)), knot);
+            part_face(middle, center, face.around, |i| knot(*i), &mut take);
         }
     }
 
-    /// Whether its tetrahedra are inside out or not alike, unless it is folded.
+    /// Whether its faces are wound alike, so that tetrahedra of both signs tell that it is folded.
     fn is_wound(&self) -> bool {
         matches!(self.faces, Faces::Of(_))
     }
@@ -95,35 +102,34 @@ impl Body<'_> {
 
 /// Gives the tetrahedra between the middle of a body and a face, around the center of that, to `take`.
 fn part_face<I>(
-    middle: (DVec3, f64),
-    center: (DVec3, f64),
+    middle: Knot,
+    center: Knot,
     around: &[I],
-    at: impl Fn(&I) -> (DVec3, f64),
+    knot: impl Fn(&I) -> Knot,
     take: &mut impl FnMut(&Tetrahedron),
 ) {
     match around {
-        [a, b, c] => take(&[middle, at(a), at(b), at(c)]),
+        [a, b, c] => take(&[middle, knot(a), knot(b), knot(c)]),
         _ => {
             for (i, a) in around.iter().enumerate() {
-                take(&[middle, center, at(a), at(&around[(i + 1) % around.len()])]);
+                take(&[middle, center, knot(a), knot(&around[(i + 1) % around.len()])]);
             }
         }
     }
 }
 
-/// The middle of points, of which `at` gives one of the cell by its rank.
-fn middle_of(
-    middle: Middle,
-    points: impl Iterator<Item = (DVec3, f64)> + Clone,
-    at: impl Fn(u8) -> (DVec3, f64),
-) -> (DVec3, f64) {
+/// The middle of points, of which `knot` gives one of the cell by its rank.
+fn middle_of(middle: Middle, points: impl Iterator<Item = Knot> + Clone, knot: impl Fn(u8) -> Knot) -> Knot {
     let weighted = |weights: &mut dyn Iterator<Item = f64>| {
-        let pairs = points.clone().zip(weights);
-        pairs.fold((DVec3::ZERO, 0.0), |(p, v), ((place, value), weight)| (p + weight * place, v + weight * value))
+        let none = Knot { place: DVec3::ZERO, value: 0.0 };
+        points.clone().zip(weights).fold(none, |sum, (knot, weight)| Knot {
+            place: sum.place + weight * knot.place,
+            value: sum.value + weight * knot.value,
+        })
     };
     match middle {
         Middle::Mean => mean(points),
-        Middle::Point(rank) => at(rank),
+        Middle::Point(rank) => knot(rank),
         Middle::Alternating(corner, edge) => weighted(&mut [corner, edge].into_iter().cycle()),
         Middle::Groups(groups) => {
             weighted(&mut groups.iter().flat_map(|(n, weight)| std::iter::repeat_n(*weight, usize::from(*n))))
@@ -131,15 +137,15 @@ fn middle_of(
     }
 }
 
-fn mean(corners: impl Iterator<Item = (DVec3, f64)> + Clone) -> (DVec3, f64) {
+fn mean(corners: impl Iterator<Item = Knot> + Clone) -> Knot {
     let count = corners.clone().count() as f64;
-    let (place, value) = corners.fold((DVec3::ZERO, 0.0), |(p, v), (q, w)| (p + q, v + w));
-    (place / count, value / count)
+    let (place, value) = corners.fold((DVec3::ZERO, 0.0), |(p, v), knot| (p + knot.place, v + knot.value));
+    Knot { place: place / count, value: value / count }
 }
 
 /// Six times the volume, negative for one that is inside out.
 fn volume([a, b, c, d]: &Tetrahedron) -> f64 {
-    (b.0 - a.0).cross(c.0 - a.0).dot(d.0 - a.0)
+    (b.place - a.place).cross(c.place - a.place).dot(d.place - a.place)
 }
 
 /// The volume of a field over bodies, whose cells are told of at a place.
@@ -193,7 +199,7 @@ struct Bounds {
 impl Bounds {
     /// `None` without a volume, or for one that is no number.
     fn of(points: &[DVec3], bodies: &[Body<'_>]) -> Option<Self> {
-        let place = |corner: u32| (points[corner as usize], 0.0);
+        let place = |corner: u32| Knot { place: points[corner as usize], value: 0.0 };
         let mut low = DVec3::INFINITY;
         let mut high = DVec3::NEG_INFINITY;
         let mut sum = 0.0;
@@ -209,7 +215,8 @@ impl Bounds {
             // Faces that are not quite flat may part off next to nothing.
             folded += usize::from(body.is_wound() && f64::min(right, wrong) > 1e-6 * f64::max(right, wrong));
             for corner in body.corners {
-                (low, high) = (low.min(place(*corner).0), high.max(place(*corner).0));
+                let corner = points[*corner as usize];
+                (low, high) = (low.min(corner), high.max(corner));
             }
         }
         let size = high - low;
@@ -285,7 +292,7 @@ impl Lattice {
                 let (from, to) = heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), z| (l.min(z), h.max(z)));
                 if to >= first * self.sample.z && from <= end * self.sample.z {
                     let value = |corner: u32| field.at(body.cell, corner) - self.outside;
-                    let corner = |c: u32| (points[c as usize] - self.low, value(c));
+                    let corner = |c: u32| Knot { place: points[c as usize] - self.low, value: value(c) };
                     body.part(&corner, |t| self.fill(t, &mut part));
                 }
             }
@@ -301,11 +308,12 @@ impl Lattice {
 
     /// Refuses bodies of that volume together which overlap so often that most of the work would be for nothing.
     fn check_work(&self, points: &[DVec3], bodies: &[Body<'_>], volume: f64) -> Result<(), ReadError> {
-        let place = |corner: u32| (points[corner as usize] - self.low, 0.0);
+        let place = |corner: u32| Knot { place: points[corner as usize] - self.low, value: 0.0 };
         let mut rows = 0.0;
         for body in bodies {
             body.part(&place, |t| {
-                let (low, high) = t.iter().fold((t[0].0, t[0].0), |(l, h), (p, _)| (l.min(*p), h.max(*p)));
+                let (low, high) =
+                    t.iter().fold((t[0].place, t[0].place), |(l, h), knot| (l.min(knot.place), h.max(knot.place)));
                 let across = ((high - low) / self.sample).ceil() + 1.0;
                 rows += across.y * across.z;
             });
@@ -327,8 +335,8 @@ impl Lattice {
 
     /// Takes the samples that lie within a tetrahedron and in no body before it.
     fn fill(&self, tetrahedron: &Tetrahedron, part: &mut Part<'_>) {
-        let [a, b, c, d] = tetrahedron.map(|(place, _)| place);
-        let values = tetrahedron.map(|(_, value)| value);
+        let [a, b, c, d] = tetrahedron.map(|knot| knot.place);
+        let values = tetrahedron.map(|knot| knot.value);
         let edges = DMat3::from_cols(b - a, c - a, d - a);
         let determinant = edges.determinant();
         if !(determinant.is_finite() && determinant != 0.0) {
@@ -436,7 +444,7 @@ mod tests {
     #[test]
     fn a_tetrahedron_keeps_its_volume_inside_out_too() {
         let points = [DVec3::ZERO, DVec3::new(1.0, 0.1, 0.0), DVec3::new(0.2, 0.9, 0.1), DVec3::new(0.3, 0.2, 1.1)];
-        let expected = volume(&points.map(|p| (p, 0.0))) / 6.0;
+        let expected = volume(&points.map(|place| Knot { place, value: 0.0 })) / 6.0;
         for corners in [[0, 1, 2, 3], [0, 2, 1, 3]] {
             let body = Body { cell: 0, corners: &corners, faces: Faces::Of(&TETRAHEDRON) };
             let grid = sampled(&points, &[body], &Field::One);

@@ -12,9 +12,9 @@ use crate::reading::Reading;
 use crate::stream::beside::{Beside, from_uri};
 use crate::stream::input::{self, Content};
 use crate::volumes::selection::Selection;
-use crate::{Loaded, ReadParams};
+use crate::{Loaded, Notes, ReadParams};
 use roxmltree::{Document, Node};
-use splat_core::text::{counted, escaped};
+use splat_core::text::counted;
 use std::borrow::Cow;
 use std::path::Path;
 
@@ -49,10 +49,19 @@ struct Member {
     content: Content,
 }
 
-/// The files of a list.
-struct Members {
+/// The files of a list and of the lists in it.
+struct Members<'p> {
+    /// Where the first list lies.
+    path: Option<&'p Path>,
     files: Vec<Member>,
-    together: Together,
+    series: Option<Series>,
+}
+
+/// Which time of a series is read.
+struct Series {
+    time: f64,
+    frame: u64,
+    count: usize,
 }
 
 /// The kind of dataset that a file announces in its root element.
@@ -79,30 +88,123 @@ pub(super) fn is_list(content: &[u8]) -> bool {
 
 /// Reads what the files of a list are together.
 pub(super) fn read(content: &[u8], path: Option<&Path>, reading: &mut Reading<'_>) -> Result<Loaded, ReadError> {
-    let members = Members::of(content, path, reading)?;
+    let mut members = Members { path, files: Vec::new(), series: None };
+    let together = members.collect(content, &Found { folder: String::new(), depth: 0 }, reading)?;
+    if members.series.is_none() {
+        Selection::of_frames(1, Place::File, reading.params, &mut Notes::default())?;
+    }
     // One time of a series is chosen already.
     let params = ReadParams { frame: 0, ..reading.params.clone() };
     let mut within = reading.within(&params);
-    let loaded = members.loaded(&mut within);
+    let loaded = members.loaded(together, &mut within);
     reading.notes = within.notes;
-    loaded
+    let loaded = loaded?;
+    if let Some(Series { time, frame, count }) = members.series.filter(|series| series.count > 1) {
+        let other = match &loaded {
+            Loaded::Grid(_) => "`frame` chooses another",
+            _ => "of another draw its file",
+        };
+        reading.notes.remark(format!("time {time}, {frame} of {count} counted from 0; {other}"));
+    }
+    Ok(loaded)
 }
 
-/// The files that a list names, one after the other, and what is said of them.
+/// Where a list was found.
+struct Found {
+    /// Its folder below that of the first list, with a slash behind it.
+    folder: String,
+    depth: usize,
+}
+
+/// The files that a list names.
 struct Names {
     names: Vec<String>,
     together: Together,
 }
 
-impl Members {
-    fn of(content: &[u8], path: Option<&Path>, reading: &mut Reading<'_>) -> Result<Self, ReadError> {
-        let mut files = Vec::new();
-        let together = collect(content, path, &mut Found { folder: String::new(), depth: 0 }, &mut files, reading)?;
-        Ok(Self { files, together })
+impl Members<'_> {
+    /// Opens the files of a list and of those in it.
+    fn collect(&mut self, content: &[u8], found: &Found, reading: &mut Reading<'_>) -> Result<Together, ReadError> {
+        let text = std::str::from_utf8(content)
+            .map_err(|e| ReadError::input(Place::Byte(e.valid_up_to() as u64), "UTF-8 text", "another byte", HINT))?;
+        let document = parsed(text)?;
+        let Names { names, mut together } = self.names(&document, reading)?;
+        let is_alone = names.len() == 1;
+        for name in names {
+            reading.go_on()?;
+            if self.files.len() >= MAX_NODES as usize {
+                let expected = format!("at most {MAX_NODES} files");
+                return Err(ReadError::input(Place::File, expected, "more", "draw a part of them"));
+            }
+            let name = format!("{}{}", found.folder, from_uri(&name));
+            let mut stream = Beside::new(self.path).open(&name, "a file of the list", reading.params)?;
+            if stream.peek(2)? == [0x1f, 0x8b] {
+                stream = stream.gunzip();
+            }
+            let content = stream.rest().map_err(|e| in_file(Some(&name), e))?;
+            if !is_list(&content) {
+                self.files.push(Member { name, content });
+                continue;
+            }
+            if found.depth == DEEPEST {
+                let expected = format!("lists of lists at most {DEEPEST} deep");
+                let error = ReadError::input(Place::File, expected, "a deeper one", "does it name itself?");
+                return Err(in_file(Some(&name), error));
+            }
+            let folder = name.rfind('/').map_or_else(String::new, |end| name[..=end].to_owned());
+            let below = self.collect(&content, &Found { folder, depth: found.depth + 1 }, reading);
+            let below = below.map_err(|e| in_file(Some(&name), e))?;
+            if is_alone {
+                together = below;
+            }
+        }
+        Ok(together)
+    }
+
+    /// The files that a list names, of a series those of the time that is asked for.
+    fn names(&mut self, document: &Document<'_>, reading: &Reading<'_>) -> Result<Names, ReadError> {
+        let root = document.root_element();
+        let kind = root.attribute("type").unwrap_or_default();
+        let named = |element: &str, attribute: &str| -> Vec<String> {
+            let named = root.descendants().filter(|node| node.has_tag_name(element));
+            // A piece that is empty has no file.
+            let names = named.filter_map(|node| node.attribute(attribute)).filter(|name| !name.is_empty());
+            names.map(str::to_owned).collect()
+        };
+        let (names, together) = match kind {
+            "PImageData" | "PRectilinearGrid" => (named("Piece", "Source"), Together::Lattice),
+            kind if OF_PIECES.contains(&kind) => (named("Piece", "Source"), Together::Pieces),
+            OF_TIMES => (self.at_a_time(root, reading)?, Together::Blocks),
+            _ => (named("DataSet", "file"), Together::Blocks),
+        };
+        if names.is_empty() {
+            return Err(wrong(root, "a list that names files", "none"));
+        }
+        Ok(Names { names, together })
+    }
+
+    /// The files of the time that is asked for, of a series.
+    fn at_a_time(&mut self, root: Node<'_, '_>, reading: &Reading<'_>) -> Result<Vec<String>, ReadError> {
+        let mut files: Vec<(f64, String)> = Vec::new();
+        for node in root.descendants().filter(|node| node.has_tag_name("DataSet")) {
+            let text = node.attribute("timestep").unwrap_or("0");
+            let time = text.trim().parse::<f64>().ok().filter(|time| time.is_finite());
+            let time = time.ok_or_else(|| wrong(node, "a finite number as timestep", text))?;
+            files.extend(node.attribute("file").map(|file| (time, file.to_owned())));
+        }
+        let mut times: Vec<f64> = files.iter().map(|(time, _)| *time).collect();
+        times.sort_by(f64::total_cmp);
+        times.dedup();
+        let frame = reading.params.frame;
+        // Its remark is another one of surfaces, which are not read yet.
+        Selection::of_frames(times.len().max(1) as u64, place(root), reading.params, &mut Notes::default())?;
+        let Some(time) = times.get(frame as usize).copied() else { return Ok(Vec::new()) };
+        self.series = Some(Series { time, frame, count: times.len() });
+        Ok(files.into_iter().filter(|(other, _)| *other == time).map(|(_, file)| file).collect())
     }
 
     /// What the files are together.
-    fn loaded(&self, reading: &mut Reading<'_>) -> Result<Loaded, ReadError> {
+    fn loaded(&self, together: Together, reading: &mut Reading<'_>) -> Result<Loaded, ReadError> {
         let mut texts: Vec<(Option<Appended>, Cow<'_, str>)> = Vec::new();
         for member in &self.files {
             texts.push(Appended::split(&member.content).map_err(|e| in_file(Some(&member.name), e))?);
@@ -127,7 +229,7 @@ impl Members {
         if let [source] = sources.as_slice() {
             return one(source, reading).map_err(|e| in_file(source.file, e));
         }
-        match self.together {
+        match together {
             Together::Lattice => pasted::read(&sources, reading).map(Loaded::Grid),
             Together::Pieces => piece::read(&sources, false, reading),
             Together::Blocks => {
@@ -139,103 +241,4 @@ impl Members {
             }
         }
     }
-}
-
-/// Where a list was found.
-struct Found {
-    /// Its folder below that of the first list, with a slash behind it.
-    folder: String,
-    depth: usize,
-}
-
-/// Opens the files of a list and of those in it.
-fn collect(
-    content: &[u8],
-    path: Option<&Path>,
-    found: &mut Found,
-    files: &mut Vec<Member>,
-    reading: &mut Reading<'_>,
-) -> Result<Together, ReadError> {
-    let text = std::str::from_utf8(content)
-        .map_err(|e| ReadError::input(Place::Byte(e.valid_up_to() as u64), "UTF-8 text", "another byte", HINT))?;
-    let document = parsed(text)?;
-    let Names { names, mut together } = Names::of(&document, reading)?;
-    let is_alone = names.len() == 1;
-    for name in names {
-        reading.go_on()?;
-        if files.len() >= MAX_NODES as usize {
-            let expected = format!("at most {MAX_NODES} files");
-            return Err(ReadError::input(Place::File, expected, "more", "draw a part of them"));
-        }
-        let name = format!("{}{}", found.folder, from_uri(&name));
-        let mut stream = Beside::new(path).open(&name, "a file of the list", reading.params)?;
-        if stream.peek(2)? == [0x1f, 0x8b] {
-            stream = stream.gunzip();
-        }
-        let content = stream.rest().map_err(|e| in_file(Some(&name), e))?;
-        if !is_list(&content) {
-            files.push(Member { name, content });
-            continue;
-        }
-        if found.depth == DEEPEST {
-            let expected = format!("lists of lists at most {DEEPEST} deep");
-            return Err(in_file(
-                Some(&name),
-                ReadError::input(Place::File, expected, "a deeper one", "does it name itself?"),
-            ));
-        }
-        let folder = name.rfind('/').map_or_else(String::new, |end| name[..=end].to_owned());
-        let below = collect(&content, path, &mut Found { folder, depth: found.depth + 1 }, files, reading);
-        let below = below.map_err(|e| in_file(Some(&name), e))?;
-        if is_alone {
-            together = below;
-        }
-    }
-    Ok(together)
-}
-
-impl Names {
-    fn of(document: &Document<'_>, reading: &mut Reading<'_>) -> Result<Self, ReadError> {
-        let root = document.root_element();
-        let kind = root.attribute("type").unwrap_or_default();
-        let names = |element: &str, attribute: &str| -> Vec<String> {
-            let named = root.descendants().filter(|node| node.has_tag_name(element));
-            // A piece that is empty has no file.
-            let names = named.filter_map(|node| node.attribute(attribute)).filter(|name| !name.is_empty());
-            names.map(str::to_owned).collect()
-        };
-        let (names, together) = match kind {
-            "PImageData" | "PRectilinearGrid" => (names("Piece", "Source"), Together::Lattice),
-            kind if OF_PIECES.contains(&kind) => (names("Piece", "Source"), Together::Pieces),
-            OF_TIMES => (at_a_time(root, reading)?, Together::Blocks),
-            _ => (names("DataSet", "file"), Together::Blocks),
-        };
-        if names.is_empty() {
-            return Err(wrong(root, "a list that names files", "none"));
-        }
-        Ok(Self { names, together })
-    }
-}
-
-/// The files of the time that is asked for, of a series.
-fn at_a_time(root: Node<'_, '_>, reading: &mut Reading<'_>) -> Result<Vec<String>, ReadError> {
-    let mut files: Vec<(f64, String)> = Vec::new();
-    for node in root.descendants().filter(|node| node.has_tag_name("DataSet")) {
-        let text = node.attribute("timestep").unwrap_or("0");
-        let time = text.trim().parse::<f64>().ok().filter(|time| time.is_finite());
-        let time = time.ok_or_else(|| wrong(node, "a finite number as timestep", text))?;
-        files.extend(node.attribute("file").map(|file| (time, file.to_owned())));
-    }
-    let mut times: Vec<f64> = files.iter().map(|(time, _)| *time).collect();
-    times.sort_by(f64::total_cmp);
-    times.dedup();
-    if times.len() > 1 || reading.params.frame > 0 {
-        Selection::of_frames(times.len() as u64, place(root), reading.params, &mut reading.notes)?;
-    }
-    let Some(time) = times.get(reading.params.frame as usize).copied() else { return Ok(Vec::new()) };
-    if times.len() > 1 {
-        let name = files.iter().find(|(other, _)| *other == time).map_or("", |(_, file)| file.as_str());
-        reading.notes.remark(format!("time {time} of a series, the file {}", escaped(name.as_bytes(), 60)));
-    }
-    Ok(files.into_iter().filter(|(other, _)| *other == time).map(|(_, file)| file).collect())
 }

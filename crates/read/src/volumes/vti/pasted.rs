@@ -117,7 +117,9 @@ fn pasted(
         let Some(inner) = values_within(part.extent, whole, found.is_of_cells) else { continue };
         let told = |e: ReadError| in_file(part.source.file, e);
         let array = part.array(found).map_err(told)?;
-        not_used(part.source.dataset, &[array.array], &mut reading.notes);
+        let coordinates = child(part.node, "Coordinates").into_iter().flat_map(super::arrays);
+        let used: Vec<Node<'_, '_>> = coordinates.chain([array.array]).collect();
+        not_used(part.source.dataset, &used, &mut reading.notes);
         let dims = sizes(inner);
         let read = lattice_values(&array, dims, place(part.node), part.source.encoding, reading).map_err(told)?;
         let [mx, my, _] = dims.map(|n| n as usize);
