@@ -194,6 +194,56 @@ fn an_array_of_a_vtk_file_is_drawn_said_and_can_be_chosen() {
     place.expect(3, &["render", "t.toml", "--set", "object.foam.array='U:w'", "-o", "q.png"], "found 'U:w'");
 }
 
+/// A ball in the left or in the right half of a grid whose steps are twice as long in the middle.
+fn steps(x: f64) -> String {
+    let along: Vec<f64> = (0..16).map(|i| [0.0, 0.05][usize::from(i > 7)] + 0.05 * f64::from(i)).collect();
+    let mut values = String::new();
+    for k in &along {
+        for j in &along {
+            for i in &along {
+                write!(values, "{} ", (1.0 - distance([*i, *j, *k], [x, 0.4, 0.4]) / 0.15).max(0.0)).unwrap();
+            }
+        }
+    }
+    let numbers = along.iter().map(|c| format!("{c} ")).collect::<String>();
+    let array = |name: &str, text: &str| {
+        format!("<DataArray type=\"Float32\" Name=\"{name}\" format=\"ascii\">{text}</DataArray>")
+    };
+    format!(
+        "<VTKFile type=\"RectilinearGrid\" byte_order=\"LittleEndian\"><RectilinearGrid WholeExtent=\"0 15 0 15 0 15\">\
+         <Piece Extent=\"0 15 0 15 0 15\"><PointData>{}</PointData><Coordinates>{}{}{}</Coordinates></Piece></RectilinearGrid></VTKFile>",
+        array("p", &values),
+        array("x", &numbers),
+        array("y", &numbers),
+        array("z", &numbers)
+    )
+}
+
+#[test]
+fn a_series_of_files_is_drawn_by_its_times() {
+    let place = Place::new("");
+    place.write("left.vtr", steps(0.2));
+    place.write("right.vtr", steps(0.6));
+    place.write(
+        "a.pvd",
+        "<VTKFile type=\"Collection\"><Collection><DataSet timestep=\"2\" file=\"right.vtr\"/>\
+         <DataSet timestep=\"1\" file=\"left.vtr\"/></Collection></VTKFile>",
+    );
+    let (alpha, told) = seen(&place, "a.pvd", &[]);
+    let [left, right] = halves(&alpha);
+    assert!(left > 0.3 && right < 0.1, "{left} {right}");
+    assert!(told.contains("time 1, 0 of 2 counted from 0; `frame` chooses another"), "{told}");
+    assert!(told.contains("voxels of even steps; at the points of the file the values differ by at most"), "{told}");
+    place.expect(0, &["init", "a.pvd", "-o", "a.toml"], "");
+    let view =
+        ["render", "a.toml", "-o", "b.exr", "--size", "24x24", "--azimuth", "0", "--elevation", "0", "--up", "y"];
+    said(&place, &[&view[..], &["--set", "object.a.frame=1"]].concat());
+    let [left, right] = halves(&picture_of(&place.path("b.exr")).opacity());
+    assert!(right > 0.3 && left < 0.1, "{left} {right}");
+    let info = String::from_utf8(place.expect(0, &["info", "a.pvd"], "").stdout).unwrap();
+    assert!(info.contains("volume, read as VtkXml"), "{info}");
+}
+
 /// What is scaled is as dense as it was.
 #[test]
 fn the_opacity_of_a_volume_follows_its_scale() {

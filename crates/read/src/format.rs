@@ -118,7 +118,7 @@ pub(crate) fn by_name(path: &Path) -> Option<Format> {
         "mha" | "mhd" => Some(Format::MetaImage),
         "vti" | "vtr" | "vts" | "vtu" | "vtp" => Some(Format::VtkXml),
         // Lists of such files.
-        "pvti" | "pvtr" | "pvts" | "pvtu" | "pvtp" | "vtm" | "pvd" => Some(Format::VtkXml),
+        "pvti" | "pvtr" | "pvts" | "pvtu" | "pvtp" | "vtm" | "vtpd" | "vtpc" | "pvd" => Some(Format::VtkXml),
         "vtk" => Some(Format::Vtk),
         "raw" => Some(Format::Raw),
         "splat" => Some(Format::Splat),

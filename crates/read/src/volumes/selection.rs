@@ -46,6 +46,10 @@ pub(crate) struct Chosen {
     pub(crate) value: Option<Value>,
 }
 
+/// VTK's name of the array that marks copies and hidden cells, and is no field.
+#[cfg(any(feature = "vti", feature = "vtk"))]
+pub(crate) const GHOSTS: &str = "vtkGhostType";
+
 /// An array of a file, as far as choosing one needs it.
 #[cfg(any(feature = "vti", feature = "vtk"))]
 pub(crate) struct Candidate {

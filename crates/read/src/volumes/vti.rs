@@ -8,10 +8,11 @@ mod data;
 mod listed;
 mod pasted;
 mod piece;
+mod pieces;
 
 use super::lattice;
 use super::rectilinear::Rectilinear;
-use super::selection::{Candidate, Selection, Value, chosen_array};
+use super::selection::{Candidate, GHOSTS, Selection, Value, chosen_array};
 use super::voxels::{Kind, Stored};
 use crate::error::{Place, ReadError};
 use crate::reading::Reading;
@@ -47,15 +48,15 @@ pub(crate) fn read(content: &[u8], place: Option<&Path>, reading: &mut Reading<'
     let document = parsed(&text)?;
     let dataset = dataset(&document)?;
     let encoding = Encoding::of(document.root_element(), content, appended)?;
-    one(&piece::Source { dataset, encoding: &encoding, file: None }, reading)
+    one(&pieces::Source { dataset, encoding: &encoding, file: None }, reading)
 }
 
 /// Reads the dataset of one file.
-fn one(source: &piece::Source<'_, '_, '_>, reading: &mut Reading<'_>) -> Result<Loaded, ReadError> {
+fn one(source: &pieces::Source<'_, '_, '_>, reading: &mut Reading<'_>) -> Result<Loaded, ReadError> {
     match source.dataset.tag_name().name() {
         "ImageData" => image(source.dataset, source.encoding, reading).map(Loaded::Grid),
         "RectilinearGrid" => rectilinear(source.dataset, source.encoding, reading).map(Loaded::Grid),
-        _ => piece::read(std::slice::from_ref(source), false, reading),
+        _ => pieces::read(std::slice::from_ref(source), false, reading),
     }
 }
 
@@ -279,7 +280,7 @@ fn chosen<'a, 'i>(
             let named = escaped(named.as_bytes(), 40);
             notes.remark(format!("there is no array '{named}', which Scalars names: another is read"));
         }
-        for array in arrays(*data) {
+        for array in arrays(*data).filter(|array| array.attribute("Name") != Some(GHOSTS)) {
             let is_named = first == Some(*data) && named.is_some() && array.attribute("Name") == named;
             let name = name(array);
             let kind = kind(array).ok();

@@ -114,6 +114,11 @@ impl<'a> Encoding<'a> {
         Ok(Self { content, big_endian, word, is_compressed, appended, counted: Cell::default() })
     }
 
+    /// Bytes of the file.
+    pub(super) fn bytes(&self) -> u64 {
+        self.content.len() as u64
+    }
+
     /// The values of an array.
     pub(super) fn values(
         &self,

@@ -5,7 +5,7 @@
 
 use super::data::{Appended, Encoding};
 use super::pasted;
-use super::piece::{self, Source, in_file};
+use super::pieces::{self, Source, in_file};
 use super::{HINT, MAX_NODES, dataset, one, parsed, place, wrong};
 use crate::error::{Place, ReadError};
 use crate::reading::Reading;
@@ -231,13 +231,13 @@ impl Members<'_> {
         }
         match together {
             Together::Lattice => pasted::read(&sources, reading).map(Loaded::Grid),
-            Together::Pieces => piece::read(&sources, false, reading),
+            Together::Pieces => pieces::read(&sources, false, reading),
             Together::Blocks => {
                 let blocks = counted(sources.len() as u64, "block");
                 reading
                     .notes
                     .remark(format!("{blocks} drawn as one; where one lacks the array that is drawn it draws nothing"));
-                piece::read(&sources, true, reading)
+                pieces::read(&sources, true, reading)
             }
         }
     }

@@ -1,6 +1,6 @@
 //! Images and rectilinear grids whose pieces lie in several files → one volume.
 
-use super::piece::{Source, in_file};
+use super::pieces::{Source, in_file};
 use super::{
     ChosenArray, HINT, Lattice, child, chosen, coordinates, extent, lattice, lattice_values, not_used, place,
     remark_middles, sizes, wrong,

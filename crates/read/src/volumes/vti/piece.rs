@@ -1,25 +1,15 @@
-//! The pieces of an unstructured or structured grid or of polygonal data in XML, of one file or several → cells: points of one behind those of
-//! the other, arrays joined by name.
+//! One piece of an unstructured or structured grid or of polygonal data in XML: its points, its cells and the numbers of its arrays.
 
 use super::data::Encoding;
-use super::{
-    ChosenArray, HINT, Lattice, arrays, child, chosen, components, coordinates, extent, kind, name, not_used, place,
-    sizes, wrong,
-};
-use crate::Loaded;
-use crate::error::{Place, ReadError};
-use crate::meshes::named_arrays::{NamedArrays, SurfaceArray};
+use super::{Lattice, arrays, child, components, coordinates, extent, kind, place, sizes, wrong};
+use crate::error::ReadError;
 use crate::reading::Reading;
 use crate::stream::input;
-use crate::volumes::cells::{self, CellSource, Cells, Field, Lists, Numbers, PointColumns, structured};
+use crate::volumes::cells::{self, CellSource, Cells, Lists, Numbers};
+use crate::volumes::selection::GHOSTS;
 use crate::volumes::voxels::Kind;
 use roxmltree::Node;
 use splat_core::glam::DVec3;
-use splat_core::text::{counted, escaped};
-use splat_core::{Association, MeshColumn};
-
-/// VTK's name of the array that marks copies and hidden cells.
-const GHOSTS: &str = "vtkGhostType";
 
 /// Arrays of the faces of polyhedra: faces and where those of each cell end, up to version 9.3 of VTK; from there on the points of faces, where
 /// each face ends among them, faces of cells, and where those of each cell end.
@@ -35,219 +25,14 @@ const OF_POLYDATA: [(&str, &str, u8); 4] = [
     ("Polys", "NumberOfPolys", cells::POLYGONS),
 ];
 
-/// A dataset of a file, and how its arrays are stored.
-pub(super) struct Source<'e, 'a, 'i> {
-    pub(super) dataset: Node<'a, 'i>,
+/// A piece, how its arrays are stored, and how many points and cells it has.
+pub(super) struct Piece<'e, 'a, 'i> {
+    pub(super) node: Node<'a, 'i>,
     pub(super) encoding: &'e Encoding<'e>,
     /// The name of the file where a list names it.
     pub(super) file: Option<&'e str>,
-}
-
-/// A piece, how its arrays are stored, and how many points and cells it has.
-struct Piece<'e, 'a, 'i> {
-    node: Node<'a, 'i>,
-    encoding: &'e Encoding<'e>,
-    file: Option<&'e str>,
-    points: u64,
-    cells: u64,
-}
-
-/// The pieces of a dataset.
-struct Pieces<'e, 'a, 'i> {
-    list: Vec<Piece<'e, 'a, 'i>>,
-    /// Whether they are blocks, of which some may lack an array that others have.
-    are_blocks: bool,
-}
-
-/// The error of a file that a list names.
-pub(super) fn in_file(file: Option<&str>, error: ReadError) -> ReadError {
-    let Some(file) = file else { return error };
-    ReadError {
-        expected: format!("the file '{}' of the list: {}", escaped(file.as_bytes(), 60), error.expected),
-        ..error
-    }
-}
-
-/// What the pieces of datasets are together: a volume, a mesh or points. Blocks need not have the same arrays.
-pub(super) fn read(
-    sources: &[Source<'_, '_, '_>],
-    are_blocks: bool,
-    reading: &mut Reading<'_>,
-) -> Result<Loaded, ReadError> {
-    let mut used = Vec::new();
-    let mut pieces = Pieces { list: Vec::new(), are_blocks };
-    let mut all: Option<Cells> = None;
-    let mut dims = None;
-    for Source { dataset, encoding, file } in sources {
-        for node in dataset.children().filter(|c| c.has_tag_name("Piece")) {
-            reading.go_on()?;
-            let mut piece = Piece { node, encoding, file: *file, points: 0, cells: 0 };
-            let cells = piece.checked_cells(&mut used, reading).map_err(|e| in_file(*file, e))?;
-            (piece.points, piece.cells) = (cells.points.len() as u64, cells.kinds.len() as u64);
-            let is_lattice = dataset.has_tag_name("StructuredGrid") && !cells.has_hidden();
-            dims = if is_lattice && pieces.list.is_empty() { Some(sizes(extent(node, "Extent")?)) } else { None };
-            pieces.list.push(piece);
-            match &mut all {
-                Some(all) => all.join(cells, reading)?,
-                None => all = Some(cells),
-            }
-        }
-    }
-    let Some(cells) = all else {
-        let none = ReadError::input(Place::File, "a Piece", "'none'", HINT);
-        return Err(sources.first().map_or(none, |source| wrong(source.dataset, "a Piece", "none")));
-    };
-    let mut field = Field::One;
-    let mut columns = PointColumns::default();
-    if cells.has_bodies() {
-        if let Some(chosen) = pieces.chosen(reading)? {
-            let array = chosen.array;
-            let selection = chosen.selection(reading.params, &mut reading.notes)?;
-            let numbers = pieces.joined(array, &mut used, reading)?;
-            field = cells::field(&numbers, &selection, &name(array), !chosen.is_of_cells, place(array), reading)?;
-        }
-    } else {
-        if let Some(array) = pieces.common(normals_of) {
-            columns.normal = cells::normals(&pieces.joined(array, &mut used, reading)?);
-        }
-        if let Some(array) = pieces.common(colors_of) {
-            let numbers = pieces.joined(array, &mut used, reading)?;
-            columns.color = cells::colors(&numbers, components(array)?, 255.0);
-            columns.opacity = cells::opacities(&numbers, components(array)?, 255.0);
-        }
-        columns.named = pieces.named(&mut used, reading)?;
-    }
-    let mut datasets: Vec<Node<'_, '_>> = sources.iter().map(|source| source.dataset).collect();
-    datasets.dedup();
-    datasets.iter().for_each(|dataset| not_used(*dataset, &used, &mut reading.notes));
-    if let Some(dims) = dims
-        && let Some(grid) = structured::straight(&cells.points, dims, &field, reading)?
-    {
-        return Ok(Loaded::Grid(grid));
-    }
-    cells.loaded(field, columns, reading)
-}
-
-impl<'a, 'i> Pieces<'_, 'a, 'i> {
-    /// The array that is the field: of the first piece that has one, as pieces without points or cells have none.
-    fn chosen(&self, reading: &mut Reading<'_>) -> Result<Option<ChosenArray<'a, 'i>>, ReadError> {
-        let has_data = |node: Node<'a, 'i>| {
-            ["PointData", "CellData"]
-                .iter()
-                .any(|name| child(node, name).is_some_and(|data| arrays(data).next().is_some()))
-        };
-        let first = self.list.iter().find(|piece| has_data(piece.node));
-        let Some(first) = first else { return Ok(None) };
-        chosen(first.node, reading.params, &mut reading.notes).map_err(|e| in_file(first.file, e))
-    }
-
-    /// The array of the points of the first piece that has one, as `find` finds it; of blocks all that have points have to have such a one.
-    fn common(&self, find: impl Fn(Node<'a, 'i>) -> Option<Node<'a, 'i>>) -> Option<Node<'a, 'i>> {
-        let found = |piece: &Piece<'_, 'a, 'i>| child(piece.node, "PointData").and_then(&find);
-        let first = self.list.iter().find_map(found)?;
-        let mut with_points = self.list.iter().filter(|piece| self.are_blocks && piece.points > 0);
-        with_points.all(|piece| found(piece).is_some_and(|other| is_alike(first, other))).then_some(first)
-    }
-
-    /// Columns of points and of cells that are asked for; those that could be are used.
-    fn named(&self, used: &mut Vec<Node<'a, 'i>>, reading: &mut Reading<'_>) -> Result<Vec<MeshColumn>, ReadError> {
-        let pieces = &self.list;
-        let mut named = NamedArrays::new(reading.params);
-        for (element, association) in [("PointData", Association::Vertex), ("CellData", Association::Triangle)] {
-            let Some(data) = pieces.iter().find_map(|piece| child(piece.node, element)) else { continue };
-            for array in arrays(data).filter(|array| kind(*array).is_ok()) {
-                if used.contains(&array) {
-                    continue;
-                }
-                let name = array.attribute("Name").unwrap_or_default();
-                let surface = SurfaceArray { name, association, numbers: components(array)? };
-                if name.is_empty() || !surface.is_offered() {
-                    continue;
-                }
-                let numbers = if named.needs(&surface) { Some(self.joined(array, used, reading)?) } else { None };
-                named.take(&surface, numbers.as_deref());
-                let same = |other: &Node<'_, '_>| other.attribute("Name") == Some(name);
-                let data = pieces.iter().filter_map(|piece| child(piece.node, element));
-                used.extend(data.flat_map(|data| arrays(data).filter(same).collect::<Vec<_>>()));
-            }
-        }
-        Ok(named.finish(&mut reading.notes))
-    }
-
-    /// The numbers of an array of one piece, and before and behind them those of the arrays of its name in the others.
-    fn joined(
-        &self,
-        array: Node<'a, 'i>,
-        used: &mut Vec<Node<'a, 'i>>,
-        reading: &Reading<'_>,
-    ) -> Result<Numbers, ReadError> {
-        let of = array.parent_element().map_or("", |data| data.tag_name().name());
-        let mut all = Numbers::room(0, reading)?;
-        for piece in &self.list {
-            reading.go_on()?;
-            let tuples = if of == "PointData" { piece.points } else { piece.cells };
-            let same = |other: &Node<'_, '_>| other.attribute("Name") == array.attribute("Name");
-            let is_here = array.ancestors().any(|around| around == piece.node);
-            let own =
-                if is_here { Some(array) } else { child(piece.node, of).and_then(|data| arrays(data).find(same)) };
-            let own = own.filter(|own| !self.are_blocks || is_alike(array, *own));
-            let Some(own) = own else {
-                if tuples == 0 {
-                    continue;
-                }
-                if self.are_blocks {
-                    let gap = components(array)?.checked_mul(tuples);
-                    let gap =
-                        gap.ok_or_else(|| wrong(array, "a number of values within the file", &tuples.to_string()))?;
-                    all.reserve(gap)?;
-                    all.all.extend(std::iter::repeat_n(f64::NAN, gap as usize));
-                    continue;
-                }
-                let hint = "write the dataset as one piece, or give all its pieces the same arrays";
-                let expected = format!("an array '{}' in {of}, which another Piece has", name(array));
-                return Err(ReadError { hint, ..wrong(piece.node, &expected, "none") });
-            };
-            used.push(own);
-            let numbers = components(array)?;
-            if !is_alike(array, own) {
-                let kind = array.attribute("type").unwrap_or_default();
-                let expected =
-                    format!("{} of type {kind}, as the array has in another Piece", counted(numbers, "component"));
-                let found = format!("{} of {}", components(own)?, own.attribute("type").unwrap_or_default());
-                return Err(wrong(own, &expected, &found));
-            }
-            let more = piece.numbers(own, tuples, reading).map_err(|e| in_file(piece.file, e))?;
-            all.reserve(more.len() as u64)?;
-            all.all.extend(&more.all);
-        }
-        Ok(all)
-    }
-}
-
-/// Whether two arrays have numbers of the same type, as many a tuple.
-fn is_alike(array: Node<'_, '_>, other: Node<'_, '_>) -> bool {
-    ["type", "NumberOfComponents"].iter().all(|name| array.attribute(*name) == other.attribute(*name))
-}
-
-/// The array that points take their normals from: the one that the file calls so.
-fn normals_of<'a, 'i>(data: Node<'a, 'i>) -> Option<Node<'a, 'i>> {
-    arrays(data).find(|a| is_named(data, "Normals", a) && a.attribute("NumberOfComponents") == Some("3"))
-}
-
-/// The array that points take their colours from: the one that the file shows, else the first that can be.
-fn colors_of<'a, 'i>(data: Node<'a, 'i>) -> Option<Node<'a, 'i>> {
-    let is_color = |a: &Node<'_, '_>| {
-        let is_of_bytes = kind(*a).is_ok_and(|kind| kind == Kind::U8);
-        is_of_bytes && matches!(a.attribute("NumberOfComponents"), Some("3" | "4"))
-    };
-    let mut colors = arrays(data).filter(is_color);
-    colors.clone().find(|a| is_named(data, "Scalars", a)).or_else(|| colors.next())
-}
-
-/// Whether an attribute of all arrays names this one.
-fn is_named(data: Node<'_, '_>, attribute: &str, array: &Node<'_, '_>) -> bool {
-    let named = data.attribute(attribute);
-    named.is_some() && array.attribute("Name") == named
+    pub(super) points: u64,
+    pub(super) cells: u64,
 }
 
 impl<'a, 'i> Piece<'_, 'a, 'i> {
@@ -258,7 +43,12 @@ impl<'a, 'i> Piece<'_, 'a, 'i> {
     }
 
     /// All numbers of an array of so many tuples.
-    fn numbers(&self, array: Node<'_, '_>, tuples: u64, reading: &Reading<'_>) -> Result<Numbers, ReadError> {
+    pub(super) fn numbers(
+        &self,
+        array: Node<'_, '_>,
+        tuples: u64,
+        reading: &Reading<'_>,
+    ) -> Result<Numbers, ReadError> {
         let count = components(array)?.checked_mul(tuples);
         let count = count.ok_or_else(|| wrong(array, "a number of values within the file", &tuples.to_string()))?;
         self.encoding.numbers(array, count, reading)
@@ -271,7 +61,11 @@ impl<'a, 'i> Piece<'_, 'a, 'i> {
     }
 
     /// The cells, each of a kind that is read.
-    fn checked_cells(&self, used: &mut Vec<Node<'a, 'i>>, reading: &Reading<'_>) -> Result<Cells, ReadError> {
+    pub(super) fn checked_cells(
+        &self,
+        used: &mut Vec<Node<'a, 'i>>,
+        reading: &Reading<'_>,
+    ) -> Result<Cells, ReadError> {
         let mut cells = self.cells(used, reading)?;
         let marks =
             child(self.node, "CellData").and_then(|data| arrays(data).find(|a| a.attribute("Name") == Some(GHOSTS)));
@@ -286,12 +80,7 @@ impl<'a, 'i> Piece<'_, 'a, 'i> {
     }
 
     /// The points of a piece, so many of them.
-    fn points(
-        &self,
-        count: u64,
-        used: &mut Vec<Node<'a, 'i>>,
-        reading: &Reading<'_>,
-    ) -> Result<(Vec<DVec3>, Place), ReadError> {
+    fn points(&self, count: u64, used: &mut Vec<Node<'a, 'i>>, reading: &Reading<'_>) -> Result<Vec<DVec3>, ReadError> {
         let points = child(self.node, "Points").and_then(|points| arrays(points).next());
         let points = points.ok_or_else(|| wrong(self.node, "an element Points with a DataArray", "none"))?;
         if components(points)? != 3 {
@@ -299,7 +88,7 @@ impl<'a, 'i> Piece<'_, 'a, 'i> {
         }
         used.push(points);
         let numbers = self.numbers(points, count, reading)?;
-        Ok((cells::places(&numbers, place(points), reading)?, place(points)))
+        cells::places(&numbers, place(points), reading)
     }
 
     /// The points between indices of an image, of a rectilinear grid or of a structured grid, and the cells between them.
@@ -316,9 +105,11 @@ impl<'a, 'i> Piece<'_, 'a, 'i> {
             || wrong(self.node, "at most 4294967295 points", self.node.attribute("Extent").unwrap_or_default());
         let count = count.ok_or_else(too_many)?;
         if dataset.has_tag_name("StructuredGrid") {
-            let (points, _) = self.points(count, used, reading)?;
+            let points = self.points(count, used, reading)?;
             return Cells::structured(points, dims, place(self.node), reading);
         }
+        // They are not in the file, whose arrays have as many numbers.
+        input::check_packed(count, self.encoding.bytes(), "a file of VTK")?;
         input::hold("the points of a lattice", count * size_of::<DVec3>() as u64, reading.params)?;
         let mut points = Vec::new();
         input::reserve(&mut points, count as usize)?;
@@ -343,7 +134,7 @@ impl<'a, 'i> Piece<'_, 'a, 'i> {
         {
             return self.structured(dataset, used, reading);
         }
-        let (points, _) = self.points(self.count("NumberOfPoints")?, used, reading)?;
+        let points = self.points(self.count("NumberOfPoints")?, used, reading)?;
         let mut cells = Cells { points, lists: Lists::default(), kinds: Vec::new(), place: place(self.node) };
         if is_of(&"UnstructuredGrid") {
             let element = child(self.node, "Cells").ok_or_else(|| wrong(self.node, "an element Cells", "none"))?;

@@ -5,7 +5,7 @@ use crate::error::{Place, ReadError};
 use crate::reading::Reading;
 use crate::text::{Line, Lines, Word, Words};
 use crate::volumes::cells::Numbers;
-use crate::volumes::selection::{Candidate, Selection, Value, chosen_array};
+use crate::volumes::selection::{Candidate, GHOSTS, Selection, Value, chosen_array};
 use crate::volumes::voxels::Kind;
 use crate::{Notes, ReadParams};
 use splat_core::text::{counted, escaped};
@@ -150,8 +150,9 @@ impl<'a> Arrays<'a> {
         params: &ReadParams,
         notes: &mut Notes,
     ) -> Result<Option<(&Array, Option<Value>)>, ReadError> {
-        let is_field =
-            |array: &&Array| matches!(array.role, Role::Scalars | Role::Colors | Role::Vectors | Role::Field);
+        let is_field = |array: &&Array| {
+            matches!(array.role, Role::Scalars | Role::Colors | Role::Vectors | Role::Field) && array.name != GHOSTS
+        };
         let of = |of: Of| self.found.iter().filter(move |array| array.of == of).filter(is_field);
         let all: Vec<&Array> = of(Of::Points).chain(of(Of::Cells)).collect();
         let first = all.iter().find(|array| array.role != Role::Vectors).map(|array| array.of);
