@@ -105,21 +105,24 @@ fn a_gap_of_a_rectilinear_grid_does_not_spread_to_what_is_measured() {
     assert!(notes.remarks[0].contains("at most 0.00 %"), "{:?}", notes.remarks);
 }
 
-/// A tiny step beside a long axis would make more voxels than memory holds, and steps out of all proportion.
+/// A tiny step beside a long axis would make steps out of all proportion, and tiny steps along two more voxels than anybody can hold.
 #[test]
-fn a_step_that_is_tiny_makes_no_more_voxels_than_there_is_memory_for() {
-    let content = String::from_utf8(vtr()).unwrap().replace("0 1 3 4 \n", "0 1e-9 3 4\n");
-    let within = |bytes: u64| {
-        let params = ReadParams { memory: MemoryAccount::new(bytes), ..ReadParams::default() };
-        let (loaded, notes) = bytes_with(&content, &params);
+fn a_step_that_is_tiny_makes_no_more_voxels_than_can_be_held() {
+    let dims = |content: &str| {
+        let (loaded, notes) = bytes_with(content, &ReadParams::default());
         assert!(notes.remarks[0].contains("even steps, coarser than the least step"), "{:?}", notes.remarks);
         assert!(loaded.values.iter().all(|v| v.is_finite()));
         loaded.dims
     };
+    let tiny = String::from_utf8(vtr()).unwrap().replace("0 1 3 4 \n", "0 1e-9 3 4\n");
     // A thousandth of the 2 along z.
-    assert_eq!(within(1 << 30), [2000, 3, 2]);
-    let dims = within(64 << 10);
-    assert!(dims[0] * 6 * 8 <= 64 << 10 && dims[0] > 900, "{dims:?}");
+    assert_eq!(dims(&tiny), [2000, 3, 2]);
+    let [x, y, z] = dims(&tiny.replace("0 0.5 1 \n", "0 1e-9 1\n").replace("2 4 \n", "2 2.002\n"));
+    assert!(x * y * z <= 1 << 24 && 4 * x * y * z > 3 << 24, "{x} {y} {z}");
+    // What is made of them is held against the limit.
+    let params = ReadParams { memory: MemoryAccount::new(32 << 10), ..ReadParams::default() };
+    let error = bytes("a.vtr", tiny.as_bytes(), &params, None).unwrap_err();
+    assert_eq!(error.fault, Fault::Limit, "{error}");
 }
 
 fn bytes_with(content: &str, params: &ReadParams) -> (Grid, Notes) {

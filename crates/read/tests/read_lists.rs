@@ -243,6 +243,19 @@ fn blocks_are_drawn_as_one_and_may_lack_an_array() {
     folder.write("s.vtm", blocks(&["s.vtp", "t.vtp"]));
     let Loaded::Mesh(mesh) = folder.read("s.vtm").0 else { panic!("no mesh") };
     assert_eq!((mesh.triangles.len(), mesh.color.len()), (4, 0));
+    folder.write(
+        "same.vtpc",
+        blocks(&["s.vtp", "s.vtp"]).replace("vtkMultiBlockDataSet", "vtkPartitionedDataSetCollection"),
+    );
+    let Loaded::Mesh(mesh) = folder.read("same.vtpc").0 else { panic!("no mesh") };
+    assert_eq!(mesh.color.len(), 8);
+    // An image of a few bytes does not stand for millions of points.
+    let huge = image([[0, 1], [0, 1], [0, 1]], "1 1 1").replace("\"0 1 0 1 0 1\"", "\"0 499 0 499 0 499\"");
+    folder.write("huge.vti", huge);
+    folder.write("huge.vtm", blocks(&["huge.vti", "s.vtp"]));
+    let error = folder.read_with("huge.vtm", &ReadParams::default()).unwrap_err();
+    assert_eq!(error.fault, Fault::Limit, "{error}");
+    assert!(error.to_string().contains("for each byte of a file of VTK, found 125000000 from"), "{error}");
     folder.write("same.vtm", blocks(&["s.vtp", "s.vtp"]));
     let Loaded::Mesh(mesh) = folder.read("same.vtm").0 else { panic!("no mesh") };
     assert_eq!(mesh.color.len(), 8);
@@ -336,7 +349,7 @@ fn a_damaged_list_is_an_error_or_valid() {
     folder.write("a.vti", image([[0, 2], [0, 1], [0, 1]], "1 1 1"));
     folder.write("b.vti", image([[2, 3], [0, 1], [0, 1]], "1 1 1"));
     for whole in [pieces("PImageData", "", &["a.vti", "b.vti"]), blocks(&["a.vti", "b.vti"])] {
-        for length in 0..whole.len() - "</VTKFile>\n".len() {
+        for length in 0..whole.len() {
             folder.write("cut.pvti", &whole[..length]);
             assert!(folder.read_with("cut.pvti", &ReadParams::default()).is_err(), "{length}");
         }

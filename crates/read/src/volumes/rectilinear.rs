@@ -16,7 +16,9 @@ const HINT: &str = "the file is truncated or damaged, or its header states other
 /// How far a coordinate may lie from its place at even steps, in mean steps: what rounding to single precision does to times and angles.
 const EVEN: f64 = 1e-3;
 
-/// Voxels that are made of a grid of uneven steps, at most.
+/// Voxels that are made of a grid of uneven steps: as many as this, or so many for each of its points, and no more than the most.
+const ALWAYS: f64 = (1u64 << 24) as f64;
+const PER_POINT: f64 = 8.0;
 const MOST: f64 = (1u64 << 27) as f64;
 
 /// By what the steps grow until the voxels fit.
@@ -91,7 +93,7 @@ impl Rectilinear {
     pub(crate) fn grid(&self, values: Vec<f32>, reading: &mut Reading<'_>) -> Result<Grid, ReadError> {
         let axes = self.axes()?;
         let stored = [0, 1, 2].map(|axis| self.coordinates[axis].len());
-        let (dims, is_coarse) = even_dims(&axes, reading.params.memory.left());
+        let (dims, is_coarse) = even_dims(&axes);
         let (origin, steps) = lattice_of(&axes, dims);
         let diagonal = DMat3::from_diagonal(steps);
         lattice::check(origin, &diagonal, self.place, "resample the grid onto even steps, such as with ParaView")?;
@@ -118,10 +120,10 @@ impl Rectilinear {
     }
 }
 
-/// Voxels along each axis for even steps, and whether these are longer than the least of the file; `left` bytes may be taken.
-fn even_dims(axes: &[Axis<'_>; 3], left: u64) -> ([usize; 3], bool) {
-    // Something has to be left for what is made of the voxels.
-    let most = MOST.min(left as f64 / (2 * size_of::<f32>()) as f64);
+/// Voxels along each axis for even steps, and whether these are longer than the least of the file.
+fn even_dims(axes: &[Axis<'_>; 3]) -> ([usize; 3], bool) {
+    let points: f64 = axes.iter().map(|axis| axis.count() as f64).product();
+    let most = (PER_POINT * points).clamp(ALWAYS, MOST);
     // A step beside which another is out of all proportion would be refused.
     let longest = axes.iter().map(|axis| if axis.is_even { axis.most } else { axis.least }).fold(0.0, f64::max);
     let shortest = 1.001 * longest / lattice::MAX_ASPECT;
@@ -177,11 +179,8 @@ fn told(axes: &[Axis<'_>; 3], dims: [usize; 3], is_coarse: bool, lost: f64) -> S
     let steps = uneven.map(|(axis, name)| format!("from {} to {} along {name}", axis.least, axis.most));
     let steps = steps.collect::<Vec<_>>().join(", ");
     let [x, y, z] = dims;
-    let coarse = if is_coarse {
-        ", coarser than the least step because of other steps, the number of voxels or the memory limit"
-    } else {
-        ""
-    };
+    let coarse =
+        if is_coarse { ", coarser than the least step because of other steps or the number of voxels" } else { "" };
     let lost = 100.0 * lost;
     format!(
         "steps {steps}: interpolated linearly as {x} x {y} x {z} voxels of even steps{coarse}; at the points of the file the values differ \

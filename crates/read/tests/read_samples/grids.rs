@@ -28,7 +28,7 @@ pub(crate) fn array(kind: &str, name: &str, components: usize, text: &str) -> St
 }
 
 pub(crate) fn vtk_file(kind: &str, content: &str) -> String {
-    format!("<VTKFile type=\"{kind}\" version=\"1.0\" byte_order=\"LittleEndian\">\n{content}</VTKFile>\n")
+    format!("<VTKFile type=\"{kind}\" version=\"1.0\" byte_order=\"LittleEndian\">\n{content}</VTKFile>")
 }
 
 /// A rectilinear grid in XML with values of its points.
