@@ -110,7 +110,7 @@ impl Rectilinear {
         even.par_chunks_mut(dims[0] * dims[1]).enumerate().try_for_each(|(k, plane)| {
             reading.go_on()?;
             for (n, value) in plane.iter_mut().enumerate() {
-                *value = uneven.between([to[0][n % dims[0]], to[1][n / dims[0]], to[2][k]]) as f32;
+                *value = uneven.between(to[0][n % dims[0]], to[1][n / dims[0]], to[2][k]) as f32;
             }
             Ok::<(), ReadError>(())
         })?;
@@ -157,11 +157,11 @@ fn lattice_of(axes: &[Axis<'_>; 3], dims: [usize; 3]) -> (DVec3, DVec3) {
 /// The most by which the even values differ from those of the file at its points, as a share of their range.
 fn lost(uneven: Values<'_>, even: Values<'_>, axes: &[Axis<'_>; 3]) -> f64 {
     let [nx, ny, _] = uneven.dims;
-    let at = [0, 1, 2].map(|rank| axes[rank].places_within(even.dims[rank]));
+    let places = [0, 1, 2].map(|rank| axes[rank].places_within(even.dims[rank]));
     let most = |a: f64, b: f64| a.max(b);
     let lost = uneven.values.par_chunks(nx * ny).enumerate().map(|(k, plane)| {
         let difference = |(n, value): (usize, &f32)| {
-            let difference = even.between([at[0][n % nx], at[1][n / nx], at[2][k]]) - f64::from(*value);
+            let difference = even.between(places[0][n % nx], places[1][n / nx], places[2][k]) - f64::from(*value);
             if difference.is_nan() { 0.0 } else { difference.abs() }
         };
         plane.iter().enumerate().map(difference).fold(0.0, most)
@@ -273,8 +273,7 @@ impl<'a> Axis<'a> {
 
 impl Values<'_> {
     /// The value between neighbours along all three axes.
-    fn between(&self, places: [Between; 3]) -> f64 {
-        let [x, y, z] = places;
+    fn between(&self, x: Between, y: Between, z: Between) -> f64 {
         let [nx, ny, _] = self.dims;
         let row = |j: usize, k: usize| {
             let value = |i: usize| f64::from(self.values[i + nx * (j + ny * k)]);

@@ -27,7 +27,7 @@ struct Polyhedra {
 /// The faces around one polyhedron.
 #[derive(Clone, Copy)]
 pub(super) struct FacesAround<'a> {
-    all: &'a Polyhedra,
+    polyhedra: &'a Polyhedra,
     first: usize,
     end: usize,
 }
@@ -35,10 +35,10 @@ pub(super) struct FacesAround<'a> {
 impl<'a> FacesAround<'a> {
     /// The points of each face.
     pub(super) fn iter(self) -> impl Iterator<Item = &'a [u32]> {
-        let Self { all, first, end } = self;
+        let Self { polyhedra, first, end } = self;
         (first..end).map(move |face| {
-            let start = face.checked_sub(1).map_or(0, |before| all.ends_of_faces[before]);
-            &all.corners[start..all.ends_of_faces[face]]
+            let start = face.checked_sub(1).map_or(0, |before| polyhedra.ends_of_faces[before]);
+            &polyhedra.corners[start..polyhedra.ends_of_faces[face]]
         })
     }
 }
@@ -167,10 +167,10 @@ impl Lists {
 
     /// The faces around a cell; `None` where it is told of none.
     pub(super) fn faces(&self, cell: usize) -> Option<FacesAround<'_>> {
-        let all = &self.polyhedra;
-        let rank = all.cells.binary_search(&cell).ok()?;
-        let first = rank.checked_sub(1).map_or(0, |before| all.ends[before]);
-        Some(FacesAround { all, first, end: all.ends[rank] })
+        let polyhedra = &self.polyhedra;
+        let rank = polyhedra.cells.binary_search(&cell).ok()?;
+        let first = rank.checked_sub(1).map_or(0, |before| polyhedra.ends[before]);
+        Some(FacesAround { polyhedra, first, end: polyhedra.ends[rank] })
     }
 
     /// Bytes that it holds.
