@@ -162,7 +162,7 @@ fn lines_alone_are_tubes() {
     let radius = 11f32.sqrt() / 500.0;
     let away = found.position[0] + found.origin.as_vec3();
     assert!((away.length() / radius - 1.0).abs() < 1e-3, "{away}");
-    assert!(notes.remarks[0].starts_with("2 lines drawn as tubes of radius 0.0066"), "{:?}", notes.remarks);
+    assert!(notes.remarks[0].starts_with("2 lines drawn as tubes whose radius is a 500th"), "{:?}", notes.remarks);
     assert!(notes.unused.is_empty(), "{:?}", notes.unused);
     let obj = "v 0 0 0 1 0 0\nv 1 0 0 1 0 0\nv 1 1 0 0 0 1\nl 1 2/7 -1\n";
     let (found, notes) = mesh("a.obj", obj.as_bytes());

@@ -121,9 +121,8 @@ impl Tubes {
     /// The mesh, which says what it is; the rest of `vertices` is that of the vertices of the tubes.
     pub(crate) fn into_mesh(self, vertices: Mesh, reading: &mut Reading<'_>) -> Mesh {
         let lines = counted(self.count, "line");
-        let radius = self.radius;
         reading.notes.remark(format!(
-            "{lines} drawn as tubes of radius {radius}, a 500th of their extent; write tubes as triangles for another radius, such as with \
+            "{lines} drawn as tubes whose radius is a 500th of the extent; write tubes as triangles for another radius, such as with \
              ParaView's filter Tube"
         ));
         Mesh { position: self.position, normal: self.normal, triangles: self.triangles, ..vertices }

@@ -33,6 +33,8 @@ pub(super) struct Piece<'e, 'a, 'i> {
     pub(super) file: Option<&'e str>,
     pub(super) points: u64,
     pub(super) cells: u64,
+    /// Whether some of its cells enclose a volume.
+    pub(super) has_bodies: bool,
 }
 
 impl<'a, 'i> Piece<'_, 'a, 'i> {

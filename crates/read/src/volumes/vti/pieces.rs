@@ -91,9 +91,11 @@ impl<'e, 'a, 'i> Pieces<'e, 'a, 'i> {
         for Source { dataset, encoding, file } in sources {
             for node in dataset.children().filter(|c| c.has_tag_name("Piece")) {
                 reading.go_on()?;
-                let mut piece = Piece { node, encoding, file: *file, points: 0, cells: 0 };
+                let mut piece = Piece { node, encoding, file: *file, points: 0, cells: 0, has_bodies: false };
                 let cells = piece.checked_cells(used, reading).map_err(|e| in_file(*file, e))?;
-                (piece.points, piece.cells) = (cells.points.len() as u64, cells.kinds.len() as u64);
+                piece.points = cells.points.len() as u64;
+                piece.cells = cells.kinds.len() as u64;
+                piece.has_bodies = cells.has_bodies();
                 self.list.push(piece);
                 match &mut joined {
                     Some(joined) => joined.join(cells, reading)?,
@@ -114,14 +116,14 @@ impl<'e, 'a, 'i> Pieces<'e, 'a, 'i> {
         if is_grid && !cells.has_hidden() { extent(piece.node, "Extent").map(sizes).map(Some) } else { Ok(None) }
     }
 
-    /// The array that is the field: of the first piece that has one, as pieces without points or cells have none.
+    /// The array that is the field: of the first piece that has bodies and arrays, as what has none may have other ones.
     fn chosen(&self, reading: &mut Reading<'_>) -> Result<Option<ChosenArray<'a, 'i>>, ReadError> {
-        let has_data = |node: Node<'a, 'i>| {
-            ["PointData", "CellData"]
-                .iter()
-                .any(|name| child(node, name).is_some_and(|data| arrays(data).next().is_some()))
+        let has_arrays = |name: &&str, piece: &Piece<'_, 'a, 'i>| {
+            child(piece.node, name).is_some_and(|data| arrays(data).next().is_some())
         };
-        let first = self.list.iter().find(|piece| has_data(piece.node));
+        let has_data =
+            |piece: &&Piece<'_, 'a, 'i>| ["PointData", "CellData"].iter().any(|name| has_arrays(name, piece));
+        let first = self.list.iter().filter(|piece| piece.has_bodies).find(has_data);
         let Some(first) = first else { return Ok(None) };
         chosen(first.node, reading.params, &mut reading.notes).map_err(|e| in_file(first.file, e))
     }
