@@ -249,6 +249,12 @@ fn blocks_are_drawn_as_one_and_may_lack_an_array() {
     );
     let Loaded::Mesh(mesh) = folder.read("same.vtpc").0 else { panic!("no mesh") };
     assert_eq!(mesh.color.len(), 8);
+    // The field is that of bodies, whatever surfaces come before them.
+    folder.write("mixed.vtm", blocks(&["s.vtp", "below/0.vtu"]));
+    let (mixed, notes) = folder.grid("mixed.vtm");
+    assert!(mixed.values.iter().copied().fold(0.0, f32::max) > 1.9, "{notes:?}");
+    assert!(notes.remarks.contains(&"the field is p, of the points".to_owned()), "{notes:?}");
+    assert!(notes.unused.contains(&"1 cell without a volume".to_owned()), "{notes:?}");
     // An image of a few bytes does not stand for millions of points.
     let huge = image([[0, 1], [0, 1], [0, 1]], "1 1 1").replace("\"0 1 0 1 0 1\"", "\"0 499 0 499 0 499\"");
     folder.write("huge.vti", huge);
