@@ -30,10 +30,20 @@ impl View {
 
     /// The status and the body of an answer.
     fn get(&self, path: &str) -> (u16, Vec<u8>) {
+        self.ask(&format!("GET /{}/{path}", self.token), "", "")
+    }
+
+    /// Sends JSON.
+    fn post(&self, path: &str, body: &str) {
+        let headers = format!("Content-Type: application/json\r\nContent-Length: {}\r\n", body.len());
+        let (status, answer) = self.ask(&format!("POST /{}/{path}?client=a", self.token), &headers, body);
+        assert_eq!(status, 200, "{}", String::from_utf8_lossy(&answer));
+    }
+
+    fn ask(&self, line: &str, headers: &str, body: &str) -> (u16, Vec<u8>) {
         let mut stream = TcpStream::connect(&self.address).unwrap();
-        let head =
-            format!("GET /{}/{path} HTTP/1.1\r\nHost: {}\r\nConnection: close\r\n\r\n", self.token, self.address);
-        stream.write_all(head.as_bytes()).unwrap();
+        let request = format!("{line} HTTP/1.1\r\nHost: {}\r\nConnection: close\r\n{headers}\r\n{body}", self.address);
+        stream.write_all(request.as_bytes()).unwrap();
         let mut answer = Vec::new();
         stream.read_to_end(&mut answer).unwrap();
         let end = answer.windows(4).position(|bytes| bytes == b"\r\n\r\n").unwrap();
@@ -95,6 +105,61 @@ fn saved_files_are_those_of_render_with_the_same_changes() {
 }
 
 #[test]
+fn a_saved_scene_opens_from_where_the_browser_put_it() {
+    let place = Place::new(SMALL_SCENE);
+    place.write("corner.xyz", "0 0 0\n1 0 0\n0 1 0\n0 0 1\n");
+    let view = View::start(&place, &["corner.xyz", "--size", "40x30"]);
+    place.write("view.png", view.saved("picture.png"));
+    let text = view.saved("scene");
+    assert_eq!(view.interrupted().0, Some(0));
+    let downloads = tempfile::tempdir().unwrap();
+    let folder = downloads.path().join("home/someone/downloads");
+    std::fs::create_dir_all(&folder).unwrap();
+    std::fs::write(folder.join("corner.toml"), text).unwrap();
+    let scene = folder.join("corner.toml");
+    place.expect(0, &["render", scene.to_str().unwrap(), "-o", "again.png"], "");
+    assert_eq!(place.pixels("again.png"), place.pixels("view.png"));
+}
+
+#[test]
+fn a_view_that_is_killed_leaves_a_recording_that_plays() {
+    let place = Place::new(&format!("{SMALL_SCENE}{FOG}"));
+    let mut view = View::start(&place, &["s.toml", "--record", "events.json"]);
+    for exposure in [1.0, 2.0] {
+        view.post("events", &format!("[{{\"do\": \"exposure\", \"stops\": {exposure}}}]"));
+    }
+    view.child.kill().unwrap();
+    view.child.wait().unwrap();
+    let told = "[\n{\"do\":\"exposure\",\"stops\":1.0},\n{\"do\":\"exposure\",\"stops\":2.0}\n]\n";
+    assert_eq!(String::from_utf8(place.bytes("events.json")).unwrap(), told);
+    let again = View::start(&place, &["s.toml", "--play", "events.json"]);
+    let (_, state) = again.get("state?client=a");
+    assert!(String::from_utf8(state).unwrap().contains("\"exposure\":2.0"));
+    assert_eq!(again.interrupted().0, Some(0));
+}
+
+#[test]
+fn a_scene_that_changes_is_seen_as_it_is_now() {
+    let place = Place::new(&format!("{SMALL_SCENE}{FOG}"));
+    let view = View::start(&place, &["s.toml", "--watch"]);
+    let before = view.saved("picture.png");
+    let wait_for = |text: &str| {
+        let end = Instant::now() + Duration::from_secs(30);
+        while !String::from_utf8(view.get("state?client=a&after=0").1).unwrap().contains(text) {
+            assert!(Instant::now() < end, "{text}");
+            std::thread::sleep(Duration::from_millis(50));
+        }
+    };
+    place.write("s.toml", format!("{SMALL_SCENE}{FOG}nonsense = 1\n"));
+    wait_for("nonsense");
+    assert!(view.saved("picture.png") == before);
+    place.write("s.toml", format!("{SMALL_SCENE}{}", FOG.replace("1.5", "15")));
+    wait_for("\"failure\":null");
+    assert!(view.saved("picture.png") != before);
+    assert_eq!(view.interrupted().0, Some(0));
+}
+
+#[test]
 fn data_files_are_seen_as_render_draws_them() {
     let place = Place::new(SMALL_SCENE);
     place.write("corner.xyz", "0 0 0\n1 0 0\n0 1 0\n0 0 1\n");
@@ -130,7 +195,7 @@ fn what_cannot_be_viewed_is_refused_before_an_address_is_printed() {
         (4, &["s.toml", "--play", "none.json"], "cannot read the events"),
         (4, &["s.toml", "--record", "fly.json"], "fly.json"),
         (4, &["none.toml"], "none.toml"),
-        (2, &["s.toml", "--listen", "localhost"], "expected a numeric address"),
+        (2, &["s.toml", "--listen", "example.org"], "expected `localhost` or a numeric address"),
         (2, &["s.toml", "--backend", "ash"], "--backend ash is for `organza render`"),
         (2, &["s.toml", "--force"], "--record"),
     ] {

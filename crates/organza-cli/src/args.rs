@@ -482,7 +482,10 @@ pub(super) struct ViewArguments {
     /// Begin with the events of a file, as --record writes it
     #[arg(long, value_name = "EVENTS.json")]
     pub(super) play: Option<PathBuf>,
-    /// Write what is done on the page to a file when the view ends
+    /// Read the scene and its data again when they change
+    #[arg(long)]
+    pub(super) watch: bool,
+    /// Write what is done on the page to a file, as it is done
     #[arg(long, value_name = "EVENTS.json")]
     pub(super) record: Option<PathBuf>,
     /// Replace a recording that exists

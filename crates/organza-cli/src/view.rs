@@ -8,7 +8,7 @@ use super::session::{overrides, parse_scene, processor_only, render_options, unu
 use organza::output::{Target, Targets};
 use organza::scene::LoadOptions;
 use organza::{Error, InMemory, Progress, printable};
-use organza_view::{Ended, MOST_EVENTS, Opening, Server, Session, read_events, write_events};
+use organza_view::{Ended, MOST_EVENTS, Opening, Recording, Server, Session, Watch, read_events};
 use serde_json::json;
 use splat_core::MemoryAccount;
 use std::net::{Ipv4Addr, SocketAddr};
@@ -18,7 +18,9 @@ use std::sync::Arc;
 /// Serves a page of the scene until it is closed or the command is interrupted. Whatever can be refused is refused before any work.
 pub(super) fn run(arguments: &ViewArguments) -> Result<(), Error> {
     processor_only(&arguments.scene)?;
-    let record = arguments.record.as_ref().map(|path| Target::new(path, arguments.force)).transpose()?;
+    for path in &arguments.record {
+        Target::new(path, arguments.force)?;
+    }
     let played = arguments.play.as_ref().map(|path| read_events(path)).transpose()?.unwrap_or_default();
     let address = arguments.listen.unwrap_or(SocketAddr::from((Ipv4Addr::LOCALHOST, 0)));
     let server = Server::bind(address)?;
@@ -36,16 +38,19 @@ pub(super) fn run(arguments: &ViewArguments) -> Result<(), Error> {
             address.ip()
         ));
     }
-    tell(&server.url(), arguments)?;
+    if let Some(path) = &arguments.record {
+        let mut recording = Recording::begin(path, arguments.force)?;
+        recording.add(&played);
+        session.record(recording);
+    }
     let session = Arc::new(session);
+    let watch = arguments.watch.then(|| Watch::begin(&session)).transpose()?;
+    tell(&server.url(), arguments)?;
     let ended = server.run(&session, &ending);
+    drop(watch);
     session.close();
-    if let Some(target) = &record {
-        let events = session.recorded();
-        if events.len() == MOST_EVENTS {
-            console::warn(&format!("--record: the recording ends at {MOST_EVENTS} events"));
-        }
-        write_events(target, &events)?;
+    if session.end_recording()? {
+        console::warn(&format!("--record: the recording ends at {MOST_EVENTS} events"));
     }
     if ended? == Ended::PagesClosed {
         console::remark("the page is closed, and the view with it");

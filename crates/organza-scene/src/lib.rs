@@ -46,7 +46,7 @@ pub use load::{MAX_SCENE_BYTES, load, parse, read, schema};
 pub use material::model::SceneMaterial;
 pub use object::model::{SceneObject, Up, UpBy};
 pub use object::points_look::PointsLook;
-pub use paths::{ROOT_KEY, relative_path, root_for};
+pub use paths::{PATH_KEYS, ROOT_KEY, folder_above, relative_path, root_for};
 pub use render::layer_choice::{LAYER_NAMES, LayerChoice};
 pub use render::settings::{
     Aligned, Bending, Classify, Collisions, Coverage, Goal, Grouping, OpaqueSurfels, ParticlesSettings, PointsSettings,

@@ -8,6 +8,9 @@ use std::path::{Component, Path, PathBuf};
 /// The key of a scene that names a further folder for data.
 pub const ROOT_KEY: &str = "root";
 
+/// The keys of a scene whose texts are paths of files or folders.
+pub const PATH_KEYS: [&str; 7] = ["environment", "image", "images", "mesh", "points", "texture", "volume"];
+
 /// Where data may lie.
 pub(crate) struct Paths {
     /// The scene's folder as it was named.
@@ -142,6 +145,16 @@ pub fn root_for<'p>(scene_file: &Path, files: impl IntoIterator<Item = &'p Path>
     Ok(all.map(|all| relative_path(&folder, &all).unwrap_or(all)))
 }
 
+/// The deepest folder that holds all these files, absolute, links followed: the key `root` of a scene that may lie anywhere. `None` where no
+/// folder does, as between drives, or without files.
+pub fn folder_above<'p>(files: impl IntoIterator<Item = &'p Path>) -> Option<PathBuf> {
+    // A file that is not there is hidden, perhaps: its folder may be.
+    let real = |path: &Path| path.canonicalize().or_else(|_| std::path::absolute(path)).ok();
+    let folders = files.into_iter().map(|file| real(file).and_then(|file| file.parent().map(Path::to_owned)));
+    let folder = folders.reduce(|one, other| Some(common(&one?, &other?)))??;
+    (!folder.as_os_str().is_empty()).then_some(folder)
+}
+
 /// The way from a folder to a file or folder, both as the system knows them; `None` where there is none, as between drives.
 pub fn relative_path(folder: &Path, to: &Path) -> Option<PathBuf> {
     let shared = common(folder, to);
@@ -183,5 +196,14 @@ mod tests {
         assert_eq!(way("/a/b/c", "/a/x/y.ply"), Path::new("../../x/y.ply"));
         assert_eq!(way("/a", "/a"), Path::new("."));
         assert_eq!(common("/a/bc".as_ref(), "/a/bd".as_ref()), Path::new("/a"));
+    }
+
+    #[test]
+    fn a_folder_is_found_above_files_that_are_not_there() {
+        let above = |files: &[&str]| folder_above(files.iter().map(Path::new));
+        let files = ["/nowhere/a/b/c.ply", "/nowhere/a/d.ply"];
+        assert_eq!(above(&files), Some(PathBuf::from("/nowhere/a")));
+        assert_eq!(above(&files[..1]), Some(PathBuf::from("/nowhere/a/b")));
+        assert_eq!(above(&[]), None);
     }
 }

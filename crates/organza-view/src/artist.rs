@@ -1,33 +1,43 @@
 //! The thread that draws: of every request a coarse picture first, then the whole one, always the newest request alone.
 
-use crate::desk::{Desk, Request};
-use crate::picture::{Drawn, Level, Size};
+use crate::coarse::{BUDGET, DEPTH_LAYER, Detail, drawing_time};
+use crate::curve::values_of;
+use crate::depths::Depths;
+use crate::desk::{Desk, Request, Task};
+use crate::picture::{Drawn, Level};
 use crate::viewpoint::Viewpoint;
-use organza::scene::Scene;
-use organza::{Error, Files, Progress, RenderOptions, Sequence};
+use organza::scene::{Scene, SceneObject, Source, Technique};
+use organza::{Error, Files, Progress, Render, RenderOptions, Sequence};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::{Duration, Instant};
-
-/// A picture that takes no longer follows a drag.
-const FLUENT: Duration = Duration::from_millis(100);
 
 /// How long a request has to be the newest before its whole picture is begun: events of a drag come more often.
 const PAUSE: Duration = Duration::from_millis(120);
 
-/// Most pixels of the whole picture along each side of one of the coarse picture.
-const COARSEST: u32 = 8;
+/// Pixels up to which a coarse picture comes before it is known whether the whole one is refused: a screen's.
+const SURE_PIXELS: u64 = 1920 * 1200;
 
 /// What draws, and what it keeps from one picture to the next: files, splats and shadow maps where the camera alone has moved.
 pub(crate) struct Artist {
-    sequence: Sequence,
+    /// Coarse pictures.
+    coarse: Sequence,
+    /// Whole ones, once there was one.
+    whole: Option<Sequence>,
     options: RenderOptions,
-    /// Pixels of the whole picture along each side of one of the coarse picture.
-    divisor: u32,
+    detail: Detail,
+    /// Share of the splats of the last coarse picture.
+    made_share: Option<f64>,
+    /// The scene of the last request whose coarse pictures `points` refused.
+    refused: Option<Scene>,
     /// Time and pixels of the last whole picture.
     last_whole: Option<Pace>,
+    /// Most pixels that were found to be within the limits.
+    accepted: u64,
+    /// What is read from disk has changed when this does.
+    edition: u64,
 }
 
-/// How long a picture took.
+/// How long a picture took, beside what serves the next view.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Pace {
     time: Duration,
@@ -36,16 +46,31 @@ struct Pace {
 
 impl Artist {
     pub(crate) fn new(files: Files, options: RenderOptions) -> Self {
-        Self { sequence: Sequence::of_files(files), options, divisor: 4, last_whole: None }
+        Self {
+            coarse: Sequence::of_previews(files),
+            whole: None,
+            options,
+            detail: Detail::default(),
+            made_share: None,
+            refused: None,
+            last_whole: None,
+            accepted: SURE_PIXELS,
+            edition: 0,
+        }
     }
 
     /// Draws what comes to the desk until that is closed.
     pub(crate) fn work(mut self, desk: &Desk) {
         while let Some(request) = desk.take() {
+            if request.edition != self.edition {
+                self.forget();
+                desk.forget_values();
+                self.edition = request.edition;
+            }
             let drawn = catch_unwind(AssertUnwindSafe(|| self.draw(desk, &request)));
             let outcome = drawn.unwrap_or_else(|_| {
                 // What was kept may be half made.
-                self.sequence = Sequence::default();
+                self.forget();
                 Err(Error::Internal("drawing this picture failed; the next one begins from nothing".into()))
             });
             if let Err(error) = outcome {
@@ -54,70 +79,150 @@ impl Artist {
         }
     }
 
+    /// Lets everything go that was read and made.
+    fn forget(&mut self) {
+        self.coarse = Sequence::of_previews(Files::default());
+        self.whole = None;
+        self.made_share = None;
+        self.refused = None;
+        self.last_whole = None;
+        self.accepted = SURE_PIXELS;
+    }
+
     /// Draws a request, as far as no other comes.
     fn draw(&mut self, desk: &Desk, request: &Request) -> Result<(), Error> {
         let generation = request.generation;
-        let progress = desk.begin(generation, Level::Coarse);
+        let progress = desk.begin(generation, Task::Coarse);
         // Settled once for both levels: what `auto` chooses depends on the size of the picture.
-        let (scene, found) = organza::settled(&request.scene, &self.options, &progress, self.sequence.files())?;
+        let (scene, found) = organza::settled(&request.scene, &self.options, &progress, self.coarse.files())?;
         let scene = scene.into_owned();
         if request.has_own_camera {
             let first =
                 found.map_or_else(|| Viewpoint::of_scene(&scene), |f| Viewpoint::of_camera(&f.camera, f.target));
             desk.set_own(first);
         }
-        if !self.is_fluent(&scene) {
-            let mut coarse = scene.clone();
-            let size = Size::of_scene(&scene).divided(self.divisor);
-            coarse.camera.size = [size.width, size.height];
-            let drawn = self.render(&coarse, request, Level::Coarse, &progress)?;
-            self.divisor = next_divisor(self.divisor, drawn.time);
-            desk.publish(drawn)?;
+        let pixels = scene.camera.pixels();
+        if pixels > self.accepted {
+            // Nobody is shown the beginning of a picture that is refused.
+            let options = self.options.clone();
+            self.whole().prepare(&scene, &options, &progress)?;
+            self.accepted = pixels;
+        }
+        let is_fluent = self.is_fluent(&scene);
+        if !is_fluent {
+            // The whole picture tells what is wrong, if that is not the coarse one alone.
+            if let Err(Error::Cancelled) = self.draw_coarse(&scene, desk, request, &progress, Showing::Page) {
+                return Err(Error::Cancelled);
+            }
             if !desk.stays_newest(generation, PAUSE) {
                 return Err(Error::Cancelled);
             }
         }
-        let progress = desk.begin(generation, Level::Whole);
-        let drawn = self.render(&scene, request, Level::Whole, &progress)?;
-        self.last_whole = Some(Pace { time: drawn.time, pixels: scene.camera.pixels() });
-        desk.publish(drawn)
-    }
-
-    /// Whether the whole picture is as fast as a coarse one has to be, by the last one.
-    fn is_fluent(&self, scene: &Scene) -> bool {
-        self.last_whole.is_some_and(|pace| pace.time <= FLUENT && scene.camera.pixels() <= pace.pixels)
-    }
-
-    fn render(&mut self, scene: &Scene, request: &Request, level: Level, progress: &Progress) -> Result<Drawn, Error> {
+        let progress = desk.begin(generation, Task::Whole);
         let start = Instant::now();
-        let render = self.sequence.render(scene, &self.options, progress)?;
+        let options = self.options.clone();
+        let render = self.whole().render(&scene, &options, &progress)?;
         // An average that was interrupted is a picture, but not that of the scene.
         if render.sets.is_some_and(|sets| sets.interrupted) {
             return Err(Error::Cancelled);
         }
-        Ok(Drawn::new(render, scene, &request.told, request.generation, level, start.elapsed()))
+        self.last_whole = Some(Pace { time: drawing_time(&render.cost), pixels });
+        desk.publish(Drawn::new(render, &scene, request, Level::Whole, start.elapsed()))?;
+        // What a first drag would wait for, and the depths below the pointer, are made while nobody waits.
+        while !(desk.has_depths(generation) && self.made_share == Some(self.detail.share)) {
+            if !desk.stays_newest(generation, PAUSE) {
+                return Err(Error::Cancelled);
+            }
+            let progress = desk.begin(generation, Task::Ahead);
+            let drawn = self.draw_coarse(&scene, desk, request, &progress, Showing::Nobody);
+            desk.end();
+            match drawn {
+                Ok(()) => {}
+                Err(Error::Cancelled) => return Err(Error::Cancelled),
+                // The picture is there; what cannot be coarse has no place below the pointer.
+                Err(_) => break,
+            }
+        }
+        let is_volume = |object: &&SceneObject| object.visible && matches!(object.source, Source::Volume(_));
+        for object in scene.objects.iter().filter(is_volume).filter(|object| !desk.has_values(&object.name)) {
+            let progress = desk.begin(generation, Task::Ahead);
+            let values = values_of(&scene, object, self.coarse.files(), &self.options, &progress)?;
+            desk.end();
+            if let Some(values) = values {
+                desk.keep_values(&object.name, values);
+            }
+        }
+        Ok(())
+    }
+
+    /// The sequence of whole pictures, which begins with the files that coarse ones have read.
+    fn whole(&mut self) -> &mut Sequence {
+        let files = self.coarse.files();
+        self.whole.get_or_insert_with(|| Sequence::of_files(files.clone()))
+    }
+
+    /// Whether the whole picture is as fast as a coarse one has to be, by the last one.
+    fn is_fluent(&self, scene: &Scene) -> bool {
+        self.last_whole.is_some_and(|pace| pace.time <= BUDGET && scene.camera.pixels() <= pace.pixels)
+    }
+
+    /// Draws a coarse picture and keeps its depths.
+    fn draw_coarse(
+        &mut self,
+        scene: &Scene,
+        desk: &Desk,
+        request: &Request,
+        progress: &Progress,
+        showing: Showing,
+    ) -> Result<(), Error> {
+        let start = Instant::now();
+        let (coarse, render) = self.render_coarse(scene, request.layer.as_deref(), progress)?;
+        if render.sets.is_some_and(|sets| sets.interrupted) {
+            return Err(Error::Cancelled);
+        }
+        let time = start.elapsed();
+        self.made_share = Some(self.detail.share);
+        self.detail = self.detail.next(&render.cost);
+        if let Some(depth) = render.layers.scalar(DEPTH_LAYER) {
+            desk.keep_depths(Depths { generation: request.generation, camera: coarse.camera, depth: depth.to_vec() });
+        }
+        match showing {
+            Showing::Page => desk.publish(Drawn::new(render, &coarse, request, Level::Coarse, time)),
+            Showing::Nobody => Ok(()),
+        }
+    }
+
+    /// A coarse picture by `points`, or by the scene's own technique where that refuses it.
+    fn render_coarse(
+        &mut self,
+        scene: &Scene,
+        layer: Option<&str>,
+        progress: &Progress,
+    ) -> Result<(Scene, Render), Error> {
+        if !self.refused.as_ref().is_some_and(|refused| differ_in_camera_alone(refused, scene)) {
+            let coarse = self.detail.of_scene(scene, layer, Some(Technique::Points));
+            match self.coarse.render(&coarse, &self.options, progress) {
+                Ok(render) => return Ok((coarse, render)),
+                Err(Error::Input { .. } | Error::Usage { .. } | Error::Scene(_) | Error::Limit(_)) => {
+                    self.refused = Some(scene.clone());
+                }
+                Err(error) => return Err(error),
+            }
+        }
+        let coarse = self.detail.of_scene(scene, layer, None);
+        let render = self.coarse.render(&coarse, &self.options, progress)?;
+        Ok((coarse, render))
     }
 }
 
-/// The divisor of the next coarse picture, after one that took so long.
-fn next_divisor(divisor: u32, time: Duration) -> u32 {
-    if time > 2 * FLUENT {
-        (divisor * 2).min(COARSEST)
-    } else if time < FLUENT / 3 {
-        (divisor / 2).max(2)
-    } else {
-        divisor
-    }
+/// Who sees a coarse picture.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Showing {
+    Page,
+    /// Its depths are kept, and what was made for it.
+    Nobody,
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn coarse_pictures_keep_to_their_time() {
-        let next = |divisor, ms| next_divisor(divisor, Duration::from_millis(ms));
-        assert_eq!([next(4, 80), next(4, 201), next(8, 900)], [4, 8, 8]);
-        assert_eq!([next(4, 20), next(2, 1), next(8, 30)], [2, 2, 4]);
-    }
+fn differ_in_camera_alone(a: &Scene, b: &Scene) -> bool {
+    *a == Scene { camera: a.camera, target: a.target, sha256: a.sha256.clone(), ..b.clone() }
 }

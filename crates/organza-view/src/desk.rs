@@ -1,10 +1,14 @@
 //! Where a session leaves what is to be drawn, and the artist what is drawn. Only the newest request counts.
 
-use crate::picture::{Drawn, Level, Picture};
+use crate::curve::Values;
+use crate::depths::Depths;
+use crate::picture::{Drawn, EffectRow, Level, Picture};
 use crate::viewpoint::Viewpoint;
+use crate::wording::{self, Said};
 use organza::scene::Scene;
 use organza::{Error, Progress};
 use serde::Serialize;
+use std::collections::BTreeMap;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 use tokio::sync::watch;
@@ -17,6 +21,10 @@ pub(crate) struct Request {
     pub(crate) scene: Scene,
     /// What files tell of the scene.
     pub(crate) told: String,
+    /// The layer that the page shows in the place of the beauty.
+    pub(crate) layer: Option<String>,
+    /// Grows when files are to be read anew.
+    pub(crate) edition: u64,
     /// Whether the camera is the scene's own, whose place may follow from the data.
     pub(crate) has_own_camera: bool,
 }
@@ -32,9 +40,27 @@ pub struct Failure {
     pub hint: String,
 }
 
+impl Failure {
+    fn of_error(generation: u64, error: &Error) -> Self {
+        let Said { message, hint } = wording::said(error);
+        Self { generation, message, hint }
+    }
+}
+
+/// What the artist does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Task {
+    /// A coarse picture, which is finished whatever comes, so that a long drag shows pictures.
+    Coarse,
+    /// A whole picture.
+    Whole,
+    /// What the next request will ask for; no page hears of it.
+    Ahead,
+}
+
 /// A picture in the making.
 struct AtWork {
-    level: Level,
+    task: Task,
     progress: Arc<Progress>,
 }
 
@@ -49,6 +75,9 @@ struct Papers {
     pictures: u64,
     picture: Option<Arc<Picture>>,
     whole: Option<Arc<Drawn>>,
+    depths: Option<Arc<Depths>>,
+    /// How often values of volumes occur, by the names of the objects.
+    curves: BTreeMap<String, Values>,
     failure: Option<Failure>,
     /// The viewpoint of the scene's own camera.
     own: Viewpoint,
@@ -71,6 +100,10 @@ pub(crate) struct Seen {
     pub(crate) drawing: Option<(String, f64)>,
     /// Generation of the last whole picture.
     pub(crate) whole: Option<u64>,
+    /// Effects of the last whole picture: a coarse one has a plan of its own.
+    pub(crate) effects: Option<Vec<EffectRow>>,
+    /// How often values of volumes occur, by the names of the objects.
+    pub(crate) curves: BTreeMap<String, Values>,
 }
 
 impl Desk {
@@ -83,6 +116,8 @@ impl Desk {
             pictures: 0,
             picture: None,
             whole: None,
+            depths: None,
+            curves: BTreeMap::new(),
             failure: None,
             own,
             is_closed: false,
@@ -119,8 +154,14 @@ impl Desk {
             version: papers.version,
             picture: papers.picture.clone(),
             failure: papers.failure.clone(),
-            drawing: papers.at_work.as_ref().map(|at_work| at_work.progress.report()),
+            drawing: papers
+                .at_work
+                .as_ref()
+                .filter(|at_work| at_work.task != Task::Ahead)
+                .map(|at_work| at_work.progress.report()),
             whole: papers.whole.as_ref().map(|whole| whole.generation),
+            effects: papers.whole.as_ref().map(|whole| whole.effects().to_vec()),
+            curves: papers.curves.clone(),
         }
     }
 
@@ -138,10 +179,10 @@ impl Desk {
         self.papers().own = own;
     }
 
-    /// Asks for a picture in the place of all others. A whole one in the making is stopped; a coarse one is finished, so that a long drag shows pictures.
+    /// Asks for a picture in the place of all others. What is in the making is stopped, unless it is a coarse picture.
     pub(crate) fn ask(&self, request: Request) {
         let mut papers = self.papers();
-        if let Some(AtWork { level: Level::Whole, progress }) = &papers.at_work {
+        if let Some(AtWork { task: Task::Whole | Task::Ahead, progress }) = &papers.at_work {
             progress.cancel();
         }
         papers.failure = None;
@@ -173,16 +214,68 @@ impl Desk {
         }
     }
 
-    /// Begins a picture of a request: its progress, which stops where the desk is closed or, of a whole one, where another request comes.
-    pub(crate) fn begin(&self, generation: u64, level: Level) -> Arc<Progress> {
+    /// Begins a task for a request: its progress, which stops where the desk is closed or, unless the picture is coarse, where another request comes.
+    pub(crate) fn begin(&self, generation: u64, task: Task) -> Arc<Progress> {
         let mut papers = self.papers();
         let progress = Arc::new(Progress::new());
         let is_old = papers.newest.as_ref().is_some_and(|newest| newest.generation > generation);
-        if papers.is_closed || (level == Level::Whole && is_old) {
+        if papers.is_closed || (task != Task::Coarse && is_old) {
             progress.cancel();
         }
-        papers.at_work = Some(AtWork { level, progress: Arc::clone(&progress) });
+        papers.at_work = Some(AtWork { task, progress: Arc::clone(&progress) });
         progress
+    }
+
+    /// Ends a task of which no page hears.
+    pub(crate) fn end(&self) {
+        self.papers().at_work = None;
+    }
+
+    /// Keeps the depths of a coarse picture, in the place of those before.
+    pub(crate) fn keep_depths(&self, depths: Depths) {
+        let mut papers = self.papers();
+        papers.depths = Some(Arc::new(depths));
+        self.tell(papers);
+    }
+
+    /// Keeps how often values of a volume occur.
+    pub(crate) fn keep_values(&self, object: &str, values: Values) {
+        let mut papers = self.papers();
+        papers.curves.insert(object.to_owned(), values);
+        self.tell(papers);
+    }
+
+    /// Forgets what is known of data.
+    pub(crate) fn forget_values(&self) {
+        self.papers().curves.clear();
+    }
+
+    /// Whether it is known how often values of a volume occur.
+    pub(crate) fn has_values(&self, object: &str) -> bool {
+        self.papers().curves.contains_key(object)
+    }
+
+    /// Whether there are depths of a state.
+    pub(crate) fn has_depths(&self, generation: u64) -> bool {
+        self.papers().depths.as_ref().is_some_and(|depths| depths.generation == generation)
+    }
+
+    /// Waits for the depths of the newest request; `None` where they do not come in time.
+    pub(crate) fn wait_for_depths(&self, patience: Duration) -> Option<Arc<Depths>> {
+        let end = Instant::now() + patience;
+        let mut papers = self.papers();
+        loop {
+            let generation = papers.newest.as_ref().map_or(0, |newest| newest.generation);
+            if let Some(depths) = papers.depths.as_ref().filter(|depths| depths.generation == generation) {
+                return Some(Arc::clone(depths));
+            }
+            let left = end.saturating_duration_since(Instant::now());
+            let has_failed = papers.failure.as_ref().is_some_and(|failure| failure.generation == generation);
+            if papers.is_closed || has_failed || left.is_zero() {
+                return None;
+            }
+            papers = self.changed.wait_timeout(papers, left).unwrap_or_else(PoisonError::into_inner).0;
+        }
     }
 
     /// Waits a while for another request; whether this one is still the newest, and the desk open.
@@ -218,13 +311,21 @@ impl Desk {
         Ok(())
     }
 
+    /// Says why the present state cannot be made anew; its picture stays.
+    pub(crate) fn refuse(&self, error: &Error) {
+        let mut papers = self.papers();
+        let generation = papers.newest.as_ref().map_or(0, |newest| newest.generation);
+        papers.failure = Some(Failure::of_error(generation, error));
+        self.tell(papers);
+    }
+
     /// Says that there is no picture of a state, where it is still the newest.
     pub(crate) fn fail(&self, generation: u64, error: &Error) {
         let mut papers = self.papers();
         papers.at_work = None;
         let is_newest = papers.newest.as_ref().is_some_and(|newest| newest.generation == generation);
         if is_newest && !matches!(error, Error::Cancelled) {
-            papers.failure = Some(Failure { generation, message: error.to_string(), hint: error.hint().to_owned() });
+            papers.failure = Some(Failure::of_error(generation, error));
         }
         self.tell(papers);
     }

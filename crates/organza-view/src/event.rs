@@ -7,6 +7,9 @@ use serde::{Deserialize, Serialize};
 /// Largest number of a drag, in heights of the picture, and of steps of a wheel: more is no hand's.
 const MOST: f64 = 1000.0;
 
+/// Most stops by which a light is made brighter or darker: more is black, or burnt out.
+const MOST_STOPS: f64 = 32.0;
+
 /// One thing that a person does. In JSON an object whose key `do` names it, such as `{"do": "orbit", "right": 0.1, "up": 0}`.
 ///
 /// ```
@@ -73,6 +76,41 @@ pub enum Event {
         /// Whether it is simulated.
         switch: Switch,
     },
+    /// Makes a light brighter or darker than the scene has it.
+    LightIntensity {
+        /// Label of the light: its name, or its place in the scene's list.
+        light: String,
+        /// Stops; 0 is what the scene says.
+        stops: f64,
+    },
+    /// Sets from where a light comes: parallel light, or one that stands in a place, which then goes around the centre of the first view.
+    LightDirection {
+        /// Label of the light.
+        light: String,
+        /// Degrees about +Y, from +Z towards +X.
+        azimuth: f64,
+        /// Degrees above the horizon, −90 to 90.
+        elevation: f64,
+    },
+    /// Sets whether a light casts shadows.
+    LightShadow {
+        /// Label of the light.
+        light: String,
+        /// Whether it does.
+        shadow: bool,
+    },
+    /// Sets the transfer function of a volume.
+    Transfer {
+        /// Name of the object.
+        object: String,
+        /// Its control points by rising value, [`MOST_KNOTS`] at most; `None` for what the scene says.
+        knots: Option<Vec<Knot>>,
+    },
+    /// Shows a layer of the picture in the place of the beauty.
+    Layer {
+        /// As scenes name it, such as `depth.median`; `None` for the beauty.
+        layer: Option<String>,
+    },
     /// Sets the exposure of the displayed picture.
     Exposure {
         /// Stops.
@@ -86,6 +124,21 @@ pub enum Event {
         height: u32,
     },
 }
+
+/// A control point of a transfer function.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Knot {
+    /// Value of the volume.
+    pub value: f64,
+    /// Linear colour, each channel ≥ 0.
+    pub color: [f64; 3],
+    /// Extinction, 1/world unit, ≥ 0.
+    pub extinction: f64,
+}
+
+/// Most control points of a transfer function that is drawn by hand.
+pub const MOST_KNOTS: usize = 256;
 
 /// Whether an effect is simulated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -135,6 +188,13 @@ impl Event {
             Self::Opacity { opacity: Some(opacity), .. } if !(0.0..=1.0).contains(opacity) => {
                 Err(bad("opacity", "opacity", "0 to 1", *opacity))
             }
+            Self::LightIntensity { stops, .. } => within("light_intensity", "stops", *stops, MOST_STOPS),
+            Self::LightDirection { azimuth, elevation, .. } => {
+                within("light_direction", "azimuth", *azimuth, 360.0)?;
+                within("light_direction", "elevation", *elevation, 90.0)
+            }
+            Self::Transfer { knots: Some(knots), .. } => check_knots(knots),
+            Self::Transfer { knots: None, .. } | Self::LightShadow { .. } | Self::Layer { .. } => Ok(()),
             Self::Reset {} | Self::Show { .. } | Self::Opacity { .. } | Self::Effect { .. } => Ok(()),
             Self::Exposure { .. } | Self::Size { .. } => Ok(()),
         }
@@ -147,6 +207,21 @@ impl Event {
             Self::Orbit { .. } | Self::Pan { .. } | Self::Zoom { .. } | Self::LookFrom { .. } | Self::Reset {}
         )
     }
+}
+
+fn check_knots(knots: &[Knot]) -> Result<(), Error> {
+    if !(1..=MOST_KNOTS).contains(&knots.len()) {
+        let found = knots.len();
+        let message = format!("`knots`: expected 1 to {MOST_KNOTS} control points, found {found}");
+        return Err(Error::input("event `transfer`", message, ""));
+    }
+    for knot in knots {
+        let numbers = [knot.value, knot.extinction].into_iter().chain(knot.color);
+        if let Some(number) = numbers.into_iter().find(|number| !number.is_finite()) {
+            return Err(bad("transfer", "knots", "finite numbers", number));
+        }
+    }
+    Ok(())
 }
 
 fn within(event: &str, key: &str, number: f64, most: f64) -> Result<(), Error> {
@@ -173,6 +248,15 @@ mod tests {
             Event::Show { object: "a \"b\"".into(), visible: false },
             Event::Opacity { object: "c".into(), opacity: None },
             Event::Effect { name: "shadow.sun".into(), switch: Switch::Off },
+            Event::LightIntensity { light: "sun".into(), stops: -0.5 },
+            Event::LightDirection { light: "0".into(), azimuth: 120.0, elevation: 45.0 },
+            Event::LightShadow { light: "0".into(), shadow: false },
+            Event::Transfer { object: "head".into(), knots: None },
+            Event::Transfer {
+                object: "head".into(),
+                knots: Some(vec![Knot { value: 30.5, color: [0.1, 0.2, 0.3], extinction: 2.0 }]),
+            },
+            Event::Layer { layer: Some("normal".into()) },
             Event::Exposure { stops: -2.0 },
             Event::Size { width: 640, height: 360 },
         ];
@@ -206,6 +290,17 @@ mod tests {
             Event::LookFrom { azimuth: 0.0, elevation: 0.0, distance: None, centre: Some([f64::NAN, 0.0, 0.0]) },
             Event::Exposure { stops: f64::NAN },
             Event::Opacity { object: "a".into(), opacity: Some(1.5) },
+            Event::LightIntensity { light: "a".into(), stops: 33.0 },
+            Event::LightDirection { light: "a".into(), azimuth: 0.0, elevation: -91.0 },
+            Event::Transfer { object: "a".into(), knots: Some(Vec::new()) },
+            Event::Transfer {
+                object: "a".into(),
+                knots: Some(vec![Knot { value: f64::NAN, color: [0.0; 3], extinction: 0.0 }]),
+            },
+            Event::Transfer {
+                object: "a".into(),
+                knots: Some(vec![Knot { value: 0.0, color: [0.0; 3], extinction: 0.0 }; MOST_KNOTS + 1]),
+            },
         ] {
             let error = event.check().unwrap_err();
             assert!(error.to_string().contains("expected"), "{event:?}: {error}");

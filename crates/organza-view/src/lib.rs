@@ -32,8 +32,13 @@
 
 mod artist;
 mod clients;
+mod coarse;
+mod curve;
+mod depths;
 mod desk;
 mod event;
+mod layer_image;
+mod lights;
 mod picture;
 mod recording;
 mod scene_text;
@@ -43,14 +48,20 @@ mod session;
 mod state;
 mod token;
 mod viewpoint;
+mod watch;
+mod wording;
 
-pub use event::{Event, Switch};
-pub use picture::{EffectRow, Facts, Level, Picture, Size};
-pub use recording::{MOST_EVENTS, read_events, write_events};
+pub use curve::{CurveRow, Values};
+pub use depths::PicturePlace;
+pub use event::{Event, Knot, MOST_KNOTS, Switch};
+pub use lights::{Direction, LightRow};
+pub use picture::{EffectRow, Facts, Legend, Level, Mark, PassRow, Picture, Size};
+pub use recording::{MOST_EVENTS, Recording, read_events};
 pub use server::{Ended, Server};
 pub use session::{Failure, ObjectRow, Session, Shown};
 pub use state::Opening;
 pub use viewpoint::Viewpoint;
+pub use watch::Watch;
 
 /// The page's example compiles and holds.
 #[cfg(doctest)]

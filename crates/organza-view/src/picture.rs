@@ -1,10 +1,13 @@
 //! A finished picture: the bytes that the page shows, and what is to be said about it.
 
+use crate::desk::Request;
 use crate::event::Switch;
-use organza::output::{self, Format, Metadata, Params};
+use crate::layer_image::{self, Radiance};
+use crate::wording;
+use organza::output::{self, Format, Metadata, Params, displayed};
 use organza::plan::{Effect, Plan};
-use organza::scene::{EffectKind, Scene, SwitchedEffect};
-use organza::{Error, Layers, Render};
+use organza::scene::{ColorScale, EffectKind, ScaleNumbers, Scene, SwitchedEffect};
+use organza::{Error, Layers, Render, pass};
 use serde::{Deserialize, Serialize};
 use std::time::Duration;
 
@@ -35,7 +38,7 @@ impl Size {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Level {
-    /// Fewer pixels, for as long as the whole picture takes.
+    /// Fewer pixels and splats, for as long as the whole picture takes.
     Coarse,
     /// The picture of `organza render`.
     Whole,
@@ -54,6 +57,8 @@ pub struct Facts {
     pub size: Size,
     /// Time of drawing, milliseconds by the clock.
     pub ms: f64,
+    /// Share of the splats that are drawn, 1 where it is whole.
+    pub splat_share: f64,
     /// Name of the technique, or of several.
     pub technique: String,
     /// Sets of particles that were averaged, where it is an average.
@@ -64,6 +69,88 @@ pub struct Facts {
     pub notes: Vec<String>,
     /// The effects of the plan that something in the scene causes.
     pub effects: Vec<EffectRow>,
+    /// The passes that were predicted or that ran, in the order of their running.
+    pub passes: Vec<PassRow>,
+    /// What the colours of objects stand for.
+    pub legends: Vec<Legend>,
+}
+
+/// A pass of a render with its time.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct PassRow {
+    /// What it is called, such as `tsm build`.
+    pub name: String,
+    /// Predicted time by the clock, milliseconds; `None` for one that was not.
+    pub predicted_ms: Option<f64>,
+    /// Measured time, milliseconds; `None` for one that did not run, as what it makes was kept.
+    pub measured_ms: Option<f64>,
+}
+
+impl PassRow {
+    fn of_render(render: &Render) -> Vec<Self> {
+        let threads = rayon::current_num_threads();
+        let predicted = render.predicted.passes();
+        let mut rows: Vec<Self> = Vec::new();
+        let stages = render.cost.stages.iter().map(|stage| (stage.name.as_str(), None, Some(1e3 * stage.seconds)));
+        let counted =
+            predicted.map(|pass| (pass.pass, Some(1e3 * pass.seconds(&render.predicted.rates, threads)), None));
+        for (name, predicted_ms, measured_ms) in counted.chain(stages) {
+            let sum = |a: Option<f64>, b: Option<f64>| a.map_or(b, |a| Some(a + b.unwrap_or(0.0)));
+            match rows.iter_mut().find(|row| row.name == name) {
+                Some(row) => {
+                    row.predicted_ms = sum(row.predicted_ms, predicted_ms);
+                    row.measured_ms = sum(row.measured_ms, measured_ms);
+                }
+                None => rows.push(Self { name: name.to_owned(), predicted_ms, measured_ms }),
+            }
+        }
+        rows
+    }
+}
+
+/// What the colours of an object stand for.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Legend {
+    /// The object, and the column that gives it its colours.
+    pub title: String,
+    /// Whether colours between two marks are those between theirs; else each mark stands alone.
+    pub is_even: bool,
+    /// Numbers, rising, with their colours.
+    pub marks: Vec<Mark>,
+}
+
+/// A number of a legend.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Mark {
+    /// The number.
+    pub number: f64,
+    /// sRGB as it is displayed.
+    pub color: [u8; 3],
+    /// What it means, such as `ground`.
+    pub meaning: Option<&'static str>,
+}
+
+/// Marks of a colour map: colours between them are even to the eye.
+const MARKS: u32 = 16;
+
+/// Most whole numbers of a legend.
+const MOST_NUMBERS: usize = 24;
+
+impl Legend {
+    fn new(scale: &ColorScale) -> Self {
+        let mark =
+            |number: f64| Mark { number, color: scale.color(number).map(displayed), meaning: scale.meaning(number) };
+        let title = scale.column.as_ref().map_or_else(|| scale.object.clone(), |by| format!("{}: {by}", scale.object));
+        match &scale.numbers {
+            ScaleNumbers::Range([low, high]) => {
+                let number = |i: u32| low + (high - low) * f64::from(i) / f64::from(MARKS);
+                Self { title, is_even: true, marks: (0..=MARKS).map(number).map(mark).collect() }
+            }
+            ScaleNumbers::Each(numbers) => {
+                Self { title, is_even: false, marks: numbers.iter().take(MOST_NUMBERS).copied().map(mark).collect() }
+            }
+        }
+    }
 }
 
 /// An effect of the plan, as a row of the page.
@@ -85,6 +172,20 @@ pub struct EffectRow {
     pub switch: Switch,
     /// Why it cannot be switched; `None` where it can.
     pub fixed: Option<&'static str>,
+    /// Predicted milliseconds of its passes, by the clock; `None` for an effect that has no pass of its own.
+    pub predicted_ms: Option<f64>,
+    /// Measured milliseconds of its passes; `None` also where what they make was kept.
+    pub measured_ms: Option<f64>,
+}
+
+/// The passes that run for effects of a kind alone; those of one kind share them.
+const fn passes_of(kind: EffectKind) -> &'static [&'static str] {
+    match kind {
+        EffectKind::Shadow => &[pass::SHADOW_MAP],
+        EffectKind::Translucency => &[pass::SORT, pass::SPLAT],
+        EffectKind::Opaque => &[pass::OPAQUE],
+        _ => &[],
+    }
 }
 
 impl EffectRow {
@@ -102,6 +203,31 @@ impl EffectRow {
             bound: effect.bound.number(),
             switch: switched.map_or(Switch::Auto, |is_on| if is_on { Switch::On } else { Switch::Off }),
             fixed: kind.map_or(Some("no scene can switch it"), EffectKind::fixed_because),
+            predicted_ms: None,
+            measured_ms: None,
+        }
+    }
+
+    /// What kind of effect it is.
+    fn kind(&self) -> Option<EffectKind> {
+        let word = self.name.split('.').next()?;
+        EffectKind::ALL.into_iter().find(|kind| kind.word() == word)
+    }
+
+    /// Adds the times of the passes that run for effects alone, in equal parts to those of a kind that are simulated.
+    fn add_times(rows: &mut [Self], passes: &[PassRow]) {
+        for kind in EffectKind::ALL {
+            let is_simulated = |row: &&mut Self| row.called_for && !row.lacking && row.kind() == Some(kind);
+            let mut simulated: Vec<&mut Self> = rows.iter_mut().filter(is_simulated).collect();
+            let parts = simulated.len() as f64;
+            let of_kind = || passes.iter().filter(|pass| passes_of(kind).contains(&pass.name.as_str()));
+            let sum = |time: fn(&PassRow) -> Option<f64>| of_kind().filter_map(time).reduce(|a, b| a + b);
+            let predicted = sum(|pass| pass.predicted_ms);
+            let measured = sum(|pass| pass.measured_ms);
+            for row in &mut simulated {
+                row.predicted_ms = predicted.map(|ms| ms / parts);
+                row.measured_ms = measured.map(|ms| ms / parts);
+            }
         }
     }
 
@@ -127,26 +253,20 @@ pub(crate) struct Drawn {
     /// The state that it shows.
     pub(crate) generation: u64,
     pub(crate) level: Level,
-    pub(crate) time: Duration,
     layers: Layers,
     metadata: Metadata,
     params: Params,
     facts: Facts,
+    /// The layer that the page shows in the place of the beauty.
+    layer: Option<String>,
 }
 
 impl Drawn {
-    /// A render of a scene; `text` is what its files tell of the scene.
-    pub(crate) fn new(
-        render: Render,
-        scene: &Scene,
-        text: &str,
-        generation: u64,
-        level: Level,
-        time: Duration,
-    ) -> Self {
+    /// A render of a scene that was asked for.
+    pub(crate) fn new(render: Render, scene: &Scene, request: &Request, level: Level, time: Duration) -> Self {
         let metadata = Metadata {
             scene_sha256: scene.sha256.clone(),
-            scene: text.to_owned(),
+            scene: request.told.clone(),
             technique: render.plan.technique.clone(),
             seed: scene.render.seed,
             backend: render.backend.clone(),
@@ -155,19 +275,38 @@ impl Drawn {
         };
         let has_background = scene.background != [0.0; 3] || scene.environment.is_some();
         let params = Params { has_background, ..Params::default() };
+        let passes = PassRow::of_render(&render);
+        let mut effects = EffectRow::of_plan(&render.plan, scene);
+        EffectRow::add_times(&mut effects, &passes);
         let facts = Facts {
             number: 0,
-            generation,
+            generation: request.generation,
             level,
+            splat_share: scene.render.splat_share,
             size: Size::of_scene(scene),
             ms: 1e3 * time.as_secs_f64(),
             technique: render.plan.technique.clone(),
             sets: metadata.sets,
-            effects: EffectRow::of_plan(&render.plan, scene),
-            warnings: render.warnings,
+            effects,
+            passes,
+            legends: render.scales.iter().map(Legend::new).collect(),
+            warnings: render.warnings.iter().map(|warning| wording::sentence(warning)).collect(),
             notes: render.notes,
         };
-        Self { generation, level, time, layers: render.layers, metadata, params, facts }
+        Self {
+            generation: request.generation,
+            level,
+            layers: render.layers,
+            metadata,
+            params,
+            facts,
+            layer: request.layer.clone(),
+        }
+    }
+
+    /// The effects of its plan.
+    pub(crate) fn effects(&self) -> &[EffectRow] {
+        &self.facts.effects
     }
 
     /// The bytes of a file of this format, as `organza render` writes it.
@@ -183,13 +322,44 @@ impl Drawn {
     /// # Errors
     /// As [`Drawn::file`].
     pub(crate) fn picture(&self, number: u64) -> Result<Picture, Error> {
-        Ok(Picture { png: self.file(Format::Png)?, facts: Facts { number, ..self.facts.clone() } })
+        let shown = self.layer.as_deref().and_then(|layer| layer_image::shown(&self.layers, layer));
+        let png = match shown {
+            None => self.file(Format::Png)?,
+            Some((layers, radiance)) => {
+                let exposure = if radiance == Radiance::Exposed { self.metadata.exposure } else { 0.0 };
+                let metadata = Metadata { exposure, ..self.metadata.clone() };
+                output::encode(&layers, &metadata, Format::Png, &Params::default())?.0
+            }
+        };
+        Ok(Picture { png, facts: Facts { number, ..self.facts.clone() } })
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn effects_of_a_kind_share_the_time_of_their_pass() {
+        let row = |name: &str, called_for| EffectRow {
+            name: name.into(),
+            what: "",
+            called_for,
+            lacking: false,
+            reason: String::new(),
+            bound: None,
+            switch: Switch::Auto,
+            fixed: None,
+            predicted_ms: None,
+            measured_ms: None,
+        };
+        let mut rows = [row("shadow.a", true), row("shadow.b", false), row("shadow.c", true), row("light.a", true)];
+        let pass = |name: &str, predicted_ms, measured_ms| PassRow { name: name.into(), predicted_ms, measured_ms };
+        let passes = [pass(pass::SHADOW_MAP, Some(30.0), Some(8.0)), pass(pass::SHADE, Some(4.0), Some(4.0))];
+        EffectRow::add_times(&mut rows, &passes);
+        let times: Vec<_> = rows.iter().map(|row| row.predicted_ms.zip(row.measured_ms)).collect();
+        assert_eq!(times, [Some((15.0, 4.0)), None, Some((15.0, 4.0)), None]);
+    }
 
     #[test]
     fn a_coarse_picture_has_a_pixel_at_least() {

@@ -2,28 +2,116 @@
 
 use crate::state::Source;
 use organza::Error;
-use organza::scene::{Override, printable};
+use organza::scene::{self, Override, PATH_KEYS, ROOT_KEY};
 use serde_json::Value as Json;
+use std::path::{Path, PathBuf};
 use toml_edit::{DocumentMut, InlineTable, Item, Table, TableLike, Value};
 
 /// The text of a scene with these changes as values: TOML keeps its comments, JSON has its keys in order of the alphabet.
 pub(crate) fn changed(source: &Source, overrides: &[Override]) -> Result<String, Error> {
     let text = String::from_utf8_lossy(&source.text);
     let text = text.strip_prefix('\u{feff}').unwrap_or(&text);
-    if source.is_json() { changed_json(text, overrides) } else { changed_toml(source, text, overrides) }
+    if source.is_json() { changed_json(text, overrides) } else { changed_toml(text, overrides) }
 }
 
-fn changed_toml(source: &Source, text: &str, overrides: &[Override]) -> Result<String, Error> {
+fn changed_toml(text: &str, overrides: &[Override]) -> Result<String, Error> {
     let mut document: DocumentMut = text.parse().map_err(|e| internal(&format!("its text: {e}")))?;
     for change in overrides {
         expand_auto(&mut document);
         let value: Value = change.toml().parse().map_err(|e| internal(&format!("the value of a change: {e}")))?;
         set_in_table(document.as_table_mut(), change.path(), value).ok_or_else(|| internal(change.flag()))?;
     }
-    // The text is saved elsewhere, as a browser does.
-    let folder = std::path::absolute(&source.file).ok();
-    let folder = folder.as_deref().and_then(std::path::Path::parent).map_or_else(String::new, printable);
-    Ok(format!("# As `organza view` showed it. Paths are relative to {folder}.\n{document}"))
+    Ok(document.to_string())
+}
+
+/// The same text with absolute paths: a browser saves it in a folder of its own. `data` are the files that its scene names.
+pub(crate) fn anywhere(source: &Source, text: &str, data: &[PathBuf]) -> Result<String, Error> {
+    let root = scene::folder_above(data.iter().map(PathBuf::as_path));
+    let root = root.as_deref().and_then(Path::to_str);
+    let folder = source.file.parent().unwrap_or(Path::new(""));
+    if source.is_json() {
+        let mut document: Json = serde_json::from_str(text).map_err(|e| internal(&format!("its text: {e}")))?;
+        if let Some(root) = root {
+            document[ROOT_KEY] = root.into();
+        }
+        name_in_json(&mut document, Names::Other, folder);
+        return Ok(format!("{document:#}\n"));
+    }
+    let mut document: DocumentMut = text.parse().map_err(|e| internal(&format!("its text: {e}")))?;
+    let table = document.as_table_mut();
+    name_in_table(table, folder);
+    if let Some(root) = root {
+        set_in_table(table, &[ROOT_KEY.to_owned()], root.into()).ok_or_else(|| internal(ROOT_KEY))?;
+    }
+    Ok(format!("# As `organza view` showed it: its paths are absolute.\n{document}"))
+}
+
+/// What a text names.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Names {
+    File,
+    Other,
+}
+
+impl Names {
+    fn by(key: &str) -> Self {
+        // The folder of data is named once for all.
+        if PATH_KEYS.contains(&key) { Self::File } else { Self::Other }
+    }
+}
+
+/// The absolute path of a file or folder that a scene in `folder` names; `None` for data in memory.
+fn absolute(folder: &Path, text: &str) -> Option<String> {
+    if scene::name_in_memory(text.as_ref()).is_some() {
+        return None;
+    }
+    let path = std::path::absolute(folder.join(text)).ok()?;
+    // Of a link the name counts, whose ending is that of the format; the way to it does not.
+    let real =
+        path.parent().zip(path.file_name()).and_then(|(above, name)| Some(above.canonicalize().ok()?.join(name)));
+    real.unwrap_or(path).to_str().map(str::to_owned)
+}
+
+fn name_in_table(table: &mut dyn TableLike, folder: &Path) {
+    for (key, item) in table.iter_mut() {
+        let names = Names::by(key.get());
+        match item {
+            Item::Table(table) => name_in_table(table, folder),
+            Item::ArrayOfTables(tables) => tables.iter_mut().for_each(|table| name_in_table(table, folder)),
+            Item::Value(value) => name_in_value(value, names, folder),
+            Item::None => {}
+        }
+    }
+}
+
+fn name_in_value(value: &mut Value, names: Names, folder: &Path) {
+    match value {
+        Value::String(text) if names == Names::File => {
+            if let Some(path) = absolute(folder, text.value()) {
+                let decor = text.decor().clone();
+                *value = path.into();
+                *value.decor_mut() = decor;
+            }
+        }
+        Value::InlineTable(table) => name_in_table(table, folder),
+        Value::Array(list) => list.iter_mut().for_each(|item| name_in_value(item, Names::Other, folder)),
+        _ => {}
+    }
+}
+
+fn name_in_json(value: &mut Json, names: Names, folder: &Path) {
+    match value {
+        Json::String(text) if names == Names::File => {
+            if let Some(path) = absolute(folder, text) {
+                *text = path;
+            }
+        }
+        Json::Object(table) => {
+            table.iter_mut().for_each(|(key, value)| name_in_json(value, Names::by(key), folder));
+        }
+        Json::Array(list) => list.iter_mut().for_each(|item| name_in_json(item, Names::Other, folder)),
+        _ => {}
+    }
 }
 
 fn internal(what: &str) -> Error {
@@ -211,6 +299,39 @@ mod tests {
             for comment in ["# the first", "# two panes", "# glass", "# half"] {
                 assert!(written.contains(comment), "{comment}: {written}");
             }
+        }
+    }
+
+    #[test]
+    fn paths_lead_from_anywhere_to_the_same_files() {
+        let place = tempfile::tempdir().unwrap();
+        let place = place.path().canonicalize().unwrap();
+        let (scenes, data) = (place.join("a/scenes"), place.join("a/data"));
+        for folder in [&scenes, &data] {
+            std::fs::create_dir_all(folder).unwrap();
+        }
+        let mesh = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+        std::fs::write(data.join("b.obj"), mesh).unwrap();
+        std::fs::write(scenes.join("mesh"), mesh).unwrap();
+        let toml = format!(
+            "{HEAD}{CAMERA}[[object]]\nname = \"mesh\" # kept\nmesh = \"../data/b.obj\" # a triangle\n\
+             [[object]]\nname = \"inner\"\nvisible = false\nvolume = \"none.nrrd\"\n\
+             transfer = [{{ value = 0, color = [1, 1, 1], extinction = 1 }}]\n"
+        );
+        let json = r#"{ "version": 1, "camera": "auto", "object": [{ "name": "mesh", "mesh": "../data/b.obj" }] }"#;
+        for (file, text) in [("s.toml", toml.as_str()), ("s.json", json)] {
+            let source = source(scenes.join(file).to_str().unwrap(), text);
+            let before = source.scene(Vec::new()).unwrap();
+            let moved = anywhere(&source, text, &before.files()[1..]).unwrap();
+            // Far from there, and without a way to the data but by its name.
+            let away = place.join("b/c/d/away").with_extension(file.rsplit('.').next().unwrap());
+            std::fs::create_dir_all(away.parent().unwrap()).unwrap();
+            let after = scene::parse(&away, moved.as_bytes(), &scene::LoadOptions::default()).unwrap();
+            let path = |scene: &scene::Scene| scene.objects[0].source.path().unwrap().canonicalize().unwrap();
+            assert_eq!(path(&after), path(&before), "{moved}");
+            assert_eq!(after.objects[0].source.path().unwrap(), data.join("b.obj"));
+            assert_eq!(after.objects[0].name, "mesh");
+            assert!(file == "s.json" || (moved.contains("# a triangle") && moved.contains("# kept")), "{moved}");
         }
     }
 

@@ -1,9 +1,11 @@
 //! Requests and their answers: who may ask, and for what.
 
 use crate::clients::{Admission, Clients, MOST_CLIENTS};
+use crate::depths::PicturePlace;
 use crate::event::Event;
 use crate::session::Session;
 use crate::token::Token;
+use crate::wording::{self, Said};
 use http_body_util::{BodyExt, Full, LengthLimitError, Limited};
 use hyper::body::{Bytes, Incoming};
 use hyper::header::{self, HeaderMap, HeaderName, HeaderValue};
@@ -32,6 +34,7 @@ const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; i
 
 const PAGE: &str = include_str!("page/page.html");
 const SCRIPT: &str = include_str!("page/page.js");
+const CURVE: &str = include_str!("page/curve.js");
 const STYLE: &str = include_str!("page/page.css");
 
 /// What answers are made from.
@@ -78,7 +81,8 @@ impl Refusal {
             Error::Internal(_) => StatusCode::INTERNAL_SERVER_ERROR,
             _ => StatusCode::UNPROCESSABLE_ENTITY,
         };
-        Self { status, message: error.to_string(), hint: error.hint().to_owned() }
+        let Said { message, hint } = wording::said(error);
+        Self { status, message, hint }
     }
 
     fn answer(self) -> Answer {
@@ -99,10 +103,12 @@ fn of_type(content: &'static str, body: impl Into<Bytes>) -> Answer {
 enum Route<'p> {
     Page,
     Script,
+    Curve,
     Style,
     State,
     Picture,
     Events,
+    Centre,
     Leave,
     Save(&'p str),
 }
@@ -112,10 +118,12 @@ impl<'p> Route<'p> {
         Some(match path {
             "" => Self::Page,
             "page.js" => Self::Script,
+            "curve.js" => Self::Curve,
             "page.css" => Self::Style,
             "state" => Self::State,
             "picture" => Self::Picture,
             "events" => Self::Events,
+            "centre" => Self::Centre,
             "leave" => Self::Leave,
             "save/picture.png" | "save/picture.exr" | "save/scene" => Self::Save(path.strip_prefix("save/")?),
             _ => return None,
@@ -124,7 +132,7 @@ impl<'p> Route<'p> {
 
     const fn method(&self) -> Method {
         match self {
-            Self::Events | Self::Leave => Method::POST,
+            Self::Events | Self::Centre | Self::Leave => Method::POST,
             _ => Method::GET,
         }
     }
@@ -146,6 +154,7 @@ async fn answered(counter: &Arc<Counter>, request: Request<Incoming>) -> Result<
     match route {
         Route::Page => return Ok(of_type("text/html; charset=utf-8", PAGE)),
         Route::Script => return Ok(of_type("text/javascript; charset=utf-8", SCRIPT)),
+        Route::Curve => return Ok(of_type("text/javascript; charset=utf-8", CURVE)),
         Route::Style => return Ok(of_type("text/css; charset=utf-8", STYLE)),
         _ => {}
     }
@@ -159,8 +168,12 @@ async fn answered(counter: &Arc<Counter>, request: Request<Incoming>) -> Result<
         Route::State => state(&counter.session, query.number("after")?).await,
         Route::Picture => picture(&counter.session, query.number("after")?).await,
         Route::Events => events(&counter.session, request).await,
+        Route::Centre => {
+            let place = PicturePlace { right: query.share("right")?, down: query.share("down")? };
+            centre(&counter.session, place).await
+        }
         Route::Save(what) => saved(&counter.session, what).await,
-        Route::Page | Route::Script | Route::Style | Route::Leave => {
+        Route::Page | Route::Script | Route::Curve | Route::Style | Route::Leave => {
             Err(Refusal::new(StatusCode::NOT_FOUND, "there is nothing here"))
         }
     };
@@ -228,6 +241,25 @@ impl<'q> Query<'q> {
         let number = self.value(key).unwrap_or("0").parse();
         number.map_err(|_| Refusal::new(StatusCode::BAD_REQUEST, "`after`: expected a whole number"))
     }
+
+    fn share(&self, key: &str) -> Result<f64, Refusal> {
+        let share = self.value(key).and_then(|value| value.parse().ok()).filter(|share| (0.0..=1.0).contains(share));
+        let message = format!("`{key}`: expected a share of the picture, 0 to 1");
+        share.ok_or_else(|| Refusal::new(StatusCode::BAD_REQUEST, &message))
+    }
+}
+
+/// Turns the scene around what is seen at a place, and answers with the state.
+async fn centre(session: &Arc<Session>, place: PicturePlace) -> Result<Answer, Refusal> {
+    let waiting = Arc::clone(session);
+    // Depths come with the next coarse picture: other requests are answered meanwhile.
+    let found = tokio::task::spawn_blocking(move || waiting.centre_on(place)).await;
+    let found =
+        found.map_err(|_| Refusal::new(StatusCode::INTERNAL_SERVER_ERROR, "looking below the pointer failed"))?;
+    if !found.map_err(|e| Refusal::of_error(&e))? {
+        return Err(Refusal::new(StatusCode::NOT_FOUND, "nothing is seen there that the view could be centred on"));
+    }
+    Ok(of_type("application/json", shown(session)?))
 }
 
 /// The state behind a version: at once where it is newer, else when it is, or after a while.

@@ -1,18 +1,22 @@
 //! A view without a window: events go in, pictures and the state come out.
 
 use crate::artist::Artist;
+use crate::curve::CurveRow;
+use crate::depths::PicturePlace;
 pub use crate::desk::Failure;
 use crate::desk::{Desk, Request, Seen};
 use crate::event::Event;
-use crate::picture::{Drawn, Facts, Picture, Size};
-use crate::recording::MOST_EVENTS;
+use crate::lights::{LightRow, direction_of, kind_of as kind_of_light};
+use crate::picture::{Drawn, EffectRow, Facts, Picture, Size};
+use crate::recording::Recording;
 use crate::scene_text;
 use crate::state::{Opening, Source, State};
 use crate::viewpoint::Viewpoint;
 use organza::output::Format;
-use organza::scene::{self, Scene, SceneObject};
+use organza::scene::{self, Scene, SceneLight, SceneObject};
 use organza::{Error, Progress};
 use serde::Serialize;
+use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
@@ -20,6 +24,9 @@ use tokio::sync::watch;
 
 /// How long a session waits for its artist when it ends: passes hear of it at their next step.
 const FAREWELL: Duration = Duration::from_millis(600);
+
+/// How long whoever asks for the place below the pointer waits for a coarse picture of it.
+const LOOK_BELOW: Duration = Duration::from_secs(10);
 
 /// A scene that is viewed: its state, and the thread that draws it.
 pub struct Session {
@@ -38,7 +45,11 @@ struct Studio {
     /// The scene of the state.
     scene: Scene,
     generation: u64,
-    recorded: Vec<Event>,
+    /// Grows when files are to be read anew.
+    edition: u64,
+    /// Whether the scene's text was read from its file; one that is made of data files has none.
+    is_on_disk: bool,
+    recording: Option<Recording>,
 }
 
 /// What a page shows beside the picture.
@@ -58,6 +69,12 @@ pub struct Shown {
     pub exposure: f64,
     /// The objects of the scene, in its order.
     pub objects: Vec<ObjectRow>,
+    /// The lights of the scene, in its order.
+    pub lights: Vec<LightRow>,
+    /// The effects of the newest picture, the whole one of the state where there is one, with the present switches.
+    pub effects: Vec<EffectRow>,
+    /// The layer in the place of the beauty.
+    pub layer: Option<String>,
     /// What is to be said of the newest picture.
     pub picture: Option<Facts>,
     /// The picture in the making.
@@ -92,6 +109,8 @@ pub struct ObjectRow {
     pub visible: bool,
     /// Opacity of one crossing, 0 to 1; `None` for a medium, which has none.
     pub opacity: Option<f64>,
+    /// The transfer function of a volume.
+    pub curve: Option<CurveRow>,
 }
 
 /// A picture in the making.
@@ -110,6 +129,7 @@ impl Session {
     /// Those of [`scene::parse`], and those of reading data where that places the camera.
     pub fn open(opening: Opening, progress: &Progress) -> Result<Self, Error> {
         let Opening { title, file, text, load, options, files } = opening;
+        let is_on_disk = file.is_file();
         let source = Source { file, text, load };
         let stated = source.scene(source.load.overrides.clone())?;
         let first = Viewpoint::of_scene(&organza::fitted(&stated, &options, progress, &files)?.0);
@@ -120,7 +140,8 @@ impl Session {
         let thread = thread.map_err(|e| Error::Internal(format!("a thread that draws: {e}")))?;
         let state = State::default();
         let scene = stated.clone();
-        let studio = Studio { title, source, stated, state, scene, generation: 0, recorded: Vec::new() };
+        let studio =
+            Studio { title, source, stated, state, scene, generation: 0, edition: 0, is_on_disk, recording: None };
         let session = Self { desk, studio: Mutex::new(studio), artist: Mutex::new(Some(thread)) };
         session.apply(&[])?;
         Ok(session)
@@ -140,35 +161,83 @@ impl Session {
         let first = self.desk.own();
         let mut state = studio.state.clone();
         events.iter().try_for_each(|event| state.apply(event, &studio.stated, &first))?;
-        let overrides = studio.source.overrides(&state, &studio.stated)?;
-        let told = studio.source.told(&overrides);
-        let scene = studio.source.scene(overrides)?;
-        let has_own_camera = state.viewpoint().is_none();
-        studio.generation += 1;
-        let generation = studio.generation;
-        self.desk.ask(Request { generation, scene: scene.clone(), told, has_own_camera });
-        (studio.state, studio.scene) = (state, scene);
-        let room = MOST_EVENTS.saturating_sub(studio.recorded.len());
-        studio.recorded.extend(events.iter().take(room).cloned());
+        studio.take(state, &self.desk)?;
+        if let Some(recording) = &mut studio.recording {
+            recording.add(events);
+        }
         Ok(())
     }
 
-    /// The events so far, [`MOST_EVENTS`] at most.
-    pub fn recorded(&self) -> Vec<Event> {
-        self.studio().recorded.clone()
+    /// Turns the scene around what is seen at a place of the picture: it comes to the middle, at the same distance. Whether there is anything.
+    ///
+    /// # Errors
+    /// As [`Session::apply`].
+    pub fn centre_on(&self, place: PicturePlace) -> Result<bool, Error> {
+        let Some(depths) = self.desk.wait_for_depths(LOOK_BELOW) else { return Ok(false) };
+        let Some(centre) = depths.point_at(place) else { return Ok(false) };
+        let viewpoint = self.studio().state.viewpoint().copied().unwrap_or_else(|| self.desk.own());
+        self.apply(&[Event::LookFrom {
+            azimuth: viewpoint.azimuth.to_degrees(),
+            elevation: viewpoint.elevation.to_degrees(),
+            distance: None,
+            centre: Some(centre.to_array()),
+        }])?;
+        Ok(true)
+    }
+
+    /// Records events from now on.
+    pub fn record(&self, recording: Recording) {
+        self.studio().recording = Some(recording);
+    }
+
+    /// Ends the recording; whether it holds as many events as one may.
+    ///
+    /// # Errors
+    /// [`Error::Io`] where not all events could be written.
+    pub fn end_recording(&self) -> Result<bool, Error> {
+        let recording = self.studio().recording.take();
+        recording.map_or(Ok(false), Recording::end)
+    }
+
+    /// The files that the scene is made of, and its own.
+    pub fn files(&self) -> Vec<PathBuf> {
+        self.studio().stated.files()
+    }
+
+    /// Reads the scene's file and its data anew, and asks for a picture with the present changes. A scene that is made of data files keeps its text.
+    pub fn reload(&self) {
+        let mut studio = self.studio();
+        studio.edition += 1;
+        if let Err(error) = studio.reread().and_then(|state| studio.take(state, &self.desk)) {
+            self.desk.refuse(&error);
+        }
     }
 
     /// What a page shows beside the picture.
     pub fn shown(&self) -> Shown {
         let studio = self.studio();
-        let Seen { version, picture, failure, drawing, whole } = self.desk.seen();
+        let Seen { version, picture, failure, drawing, whole, effects, curves } = self.desk.seen();
         let viewpoint = studio.state.viewpoint().copied().unwrap_or_else(|| self.desk.own());
         let row = |object: &SceneObject| ObjectRow {
             name: object.name.clone(),
             kind: kind_of(&object.source),
             visible: object.visible,
             opacity: (!object.source.is_medium()).then(|| studio.scene.opacity_of(object)),
+            curve: CurveRow::of_object(object, curves.get(&object.name)),
         };
+        let light = |(rank, light): (usize, &SceneLight)| LightRow {
+            name: light.label.clone(),
+            kind: kind_of_light(light),
+            stops: studio.state.stops_of(rank),
+            direction: direction_of(light, studio.stated.target),
+            shadow: light.shadow,
+        };
+        let switched = |effect: &EffectRow| EffectRow {
+            switch: studio.state.switch_of(&effect.name).unwrap_or(effect.switch),
+            ..effect.clone()
+        };
+        let facts = picture.as_ref().map(|picture| &picture.facts);
+        let effects = effects.as_deref().or(facts.map(|facts| facts.effects.as_slice())).unwrap_or_default();
         Shown {
             version,
             generation: studio.generation,
@@ -182,6 +251,9 @@ impl Session {
             },
             exposure: studio.scene.render.exposure,
             objects: studio.scene.objects.iter().map(row).collect(),
+            lights: studio.scene.lights.iter().enumerate().map(light).collect(),
+            effects: effects.iter().map(switched).collect(),
+            layer: studio.state.layer().map(str::to_owned),
             picture: picture.map(|picture| picture.facts.clone()),
             drawing: drawing.map(|(stage, share)| Drawing { stage, share }),
             is_whole: whole == Some(studio.generation),
@@ -228,8 +300,16 @@ impl Session {
         let load = scene::LoadOptions { overrides: Vec::new(), ..source.load.clone() };
         let mut read = scene::parse(&source.file, text.as_bytes(), &load)?;
         read.sha256.clone_from(&scene.sha256);
+        let differs = || Error::Internal("the text of this scene is not read as the scene that is seen".into());
         if read != *scene {
-            return Err(Error::Internal("the text of this scene is not read as the scene that is seen".into()));
+            return Err(differs());
+        }
+        let data: Vec<PathBuf> = scene.files().into_iter().filter(|file| *file != source.file).collect();
+        let text = scene_text::anywhere(source, &text, &data)?;
+        let load = scene::LoadOptions { allow_path: false, sandbox: false, ..load };
+        let moved = scene::parse(&source.file, text.as_bytes(), &load)?;
+        if moved.files().len() != scene.files().len() {
+            return Err(differs());
         }
         Ok(text)
     }
@@ -257,6 +337,44 @@ impl Session {
         if thread.is_finished() {
             let _ = thread.join();
         }
+    }
+}
+
+impl Studio {
+    /// Takes a state in the place of the present one, and asks for its picture.
+    ///
+    /// # Errors
+    /// What its scene is refused for; the present state stays.
+    fn take(&mut self, state: State, desk: &Desk) -> Result<(), Error> {
+        let overrides = self.source.overrides(&state, &self.stated)?;
+        let told = self.source.told(&overrides);
+        let scene = self.source.scene(overrides)?;
+        self.generation += 1;
+        desk.ask(Request {
+            generation: self.generation,
+            scene: scene.clone(),
+            told,
+            edition: self.edition,
+            has_own_camera: state.viewpoint().is_none(),
+            layer: state.layer().map(str::to_owned),
+        });
+        self.state = state;
+        self.scene = scene;
+        Ok(())
+    }
+
+    /// Reads the scene's file again; the changes of objects and lights that it still has stay.
+    fn reread(&mut self) -> Result<State, Error> {
+        if !self.is_on_disk {
+            return Ok(self.state.clone());
+        }
+        let text = scene::read(&self.source.file)?;
+        let source = Source { text, file: self.source.file.clone(), load: self.source.load.clone() };
+        let stated = source.scene(source.load.overrides.clone())?;
+        let state = self.state.of_another_scene(&self.stated, &stated);
+        self.source = source;
+        self.stated = stated;
+        Ok(state)
     }
 }
 

@@ -1,6 +1,7 @@
 //! What a person has changed of a scene, and the scene that follows.
 
-use crate::event::{Event, Switch};
+use crate::event::{Event, Knot, Switch};
+use crate::lights::{Direction, LightChange};
 use crate::picture::Size;
 use crate::viewpoint::Viewpoint;
 use organza::scene::{self, LoadOptions, Override, Scene, printable, shown};
@@ -76,10 +77,11 @@ impl Source {
 }
 
 /// What is changed of an object.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default)]
 struct ObjectChange {
     visible: Option<bool>,
     opacity: Option<f64>,
+    knots: Option<Vec<Knot>>,
 }
 
 /// What a person has changed of a scene.
@@ -90,6 +92,10 @@ pub(crate) struct State {
     exposure: Option<f64>,
     /// By rank in the scene.
     objects: BTreeMap<usize, ObjectChange>,
+    /// By rank in the scene.
+    lights: BTreeMap<usize, LightChange>,
+    /// The layer in the place of the beauty.
+    layer: Option<String>,
     effects: BTreeMap<String, Switch>,
 }
 
@@ -97,6 +103,38 @@ impl State {
     /// The viewpoint, where a person has moved it.
     pub(crate) fn viewpoint(&self) -> Option<&Viewpoint> {
         self.viewpoint.as_ref()
+    }
+
+    /// The layer in the place of the beauty.
+    pub(crate) fn layer(&self) -> Option<&str> {
+        self.layer.as_deref()
+    }
+
+    /// The same changes of a scene that was edited: those of objects and lights go by their names.
+    pub(crate) fn of_another_scene(&self, before: &Scene, after: &Scene) -> Self {
+        let object = |(rank, change): (&usize, &ObjectChange)| {
+            let name = &before.objects.get(*rank)?.name;
+            Some((after.objects.iter().position(|object| object.name == *name)?, change.clone()))
+        };
+        let light = |(rank, change): (&usize, &LightChange)| {
+            let label = &before.lights.get(*rank)?.label;
+            Some((after.lights.iter().position(|light| light.label == *label)?, *change))
+        };
+        Self {
+            objects: self.objects.iter().filter_map(object).collect(),
+            lights: self.lights.iter().filter_map(light).collect(),
+            ..self.clone()
+        }
+    }
+
+    /// Stops by which a light is brighter than the scene has it.
+    pub(crate) fn stops_of(&self, light: usize) -> f64 {
+        self.lights.get(&light).and_then(|change| change.stops).unwrap_or(0.0)
+    }
+
+    /// Who decides of an effect.
+    pub(crate) fn switch_of(&self, effect: &str) -> Option<Switch> {
+        self.effects.get(effect).copied()
     }
 
     /// Takes an event in; `first` is the viewpoint of the scene's own camera. Numbers that a scene refuses are for [`Source::scene`] to find.
@@ -126,6 +164,22 @@ impl State {
             Event::Effect { name, switch } => {
                 self.effects.insert(name.clone(), *switch);
             }
+            Event::LightIntensity { light, stops } => self.change_light(scene, light)?.stops = Some(*stops),
+            Event::LightDirection { light, azimuth, elevation } => {
+                let direction = Direction { azimuth: *azimuth, elevation: *elevation };
+                self.change_light(scene, light)?.direction = Some(direction);
+            }
+            Event::LightShadow { light, shadow } => self.change_light(scene, light)?.shadow = Some(*shadow),
+            Event::Transfer { object, knots } => {
+                let is_volume =
+                    |o: &scene::SceneObject| o.name == *object && matches!(o.source, scene::Source::Volume(_));
+                if knots.is_some() && !scene.objects.iter().any(is_volume) {
+                    let message = format!("expected the name of a volume, found `{}`", shown(object));
+                    return Err(Error::input("event `transfer`", message, "volumes alone have a curve here"));
+                }
+                self.change(scene, object)?.knots.clone_from(knots);
+            }
+            Event::Layer { layer } => self.layer.clone_from(layer),
             Event::Exposure { stops } => self.exposure = Some(*stops),
             Event::Size { width, height } => self.size = Some(Size { width: *width, height: *height }),
         }
@@ -140,6 +194,20 @@ impl State {
             Error::input("event", format!("expected the name of an object, found `{}`", shown(name)), hint)
         })?;
         Ok(self.objects.entry(rank).or_default())
+    }
+
+    fn change_light(&mut self, scene: &Scene, label: &str) -> Result<&mut LightChange, Error> {
+        let rank = scene.lights.iter().position(|light| light.label == label);
+        let rank = rank.ok_or_else(|| {
+            let labels: Vec<String> = scene.lights.iter().map(|light| format!("`{}`", shown(&light.label))).collect();
+            let hint = if labels.is_empty() {
+                "the scene has none".into()
+            } else {
+                format!("the scene has {}", labels.join(", "))
+            };
+            Error::input("event", format!("expected the name of a light, found `{}`", shown(label)), hint)
+        })?;
+        Ok(self.lights.entry(rank).or_default())
     }
 
     /// The changes as those of the command line: `organza render SCENE` with them draws the same picture.
@@ -159,6 +227,20 @@ impl State {
             if let Some(opacity) = change.opacity {
                 changes.push(Override::parse(&format!("object.{key}.opacity={opacity:?}"))?);
             }
+            if let Some(knots) = &change.knots {
+                changes.push(Override::parse(&format!("object.{key}.transfer={}", transfer(knots)))?);
+            }
+        }
+        for (rank, change) in &self.lights {
+            let Some(light) = scene.lights.get(*rank) else { continue };
+            for (key, value) in change.keys(light, scene.target) {
+                changes.push(Override::parse(&format!("light.{rank}.{key}={value}"))?);
+            }
+        }
+        if let Some(layer) = &self.layer {
+            let mut layers: Vec<String> = scene.render.layers.names().map(|name| format!("{name:?}")).collect();
+            layers.push(format!("{layer:?}"));
+            changes.push(Override::parse(&format!("render.layers=[{}]", layers.join(", ")))?);
         }
         if let Some(exposure) = self.exposure {
             changes.push(Override::parse(&format!("render.exposure={exposure:?}"))?);
@@ -176,6 +258,15 @@ fn key_of(scene: &Scene, rank: usize) -> String {
     let is_plain = |c: char| c.is_alphanumeric() || "_-".contains(c);
     let is_word = !name.is_empty() && name.chars().all(is_plain) && name.parse::<usize>().is_err();
     if is_word { name.to_owned() } else { rank.to_string() }
+}
+
+/// Control points as a scene has them.
+fn transfer(knots: &[Knot]) -> String {
+    let knot = |knot: &Knot| {
+        let Knot { value, color: [red, green, blue], extinction } = knot;
+        format!("{{ value = {value:?}, color = [{red:?}, {green:?}, {blue:?}], extinction = {extinction:?} }}")
+    };
+    format!("[{}]", knots.iter().map(knot).collect::<Vec<_>>().join(", "))
 }
 
 /// The camera of a viewpoint as a change of the scene.
@@ -278,6 +369,34 @@ mod tests {
     }
 
     #[test]
+    fn a_light_is_brighter_comes_from_elsewhere_and_casts_no_shadow() {
+        let light = || "sun".to_owned();
+        let scene = after(&[
+            Event::LightIntensity { light: light(), stops: 1.0 },
+            Event::LightDirection { light: light(), azimuth: 90.0, elevation: 0.0 },
+            Event::LightShadow { light: light(), shadow: false },
+        ])
+        .unwrap();
+        let found = &scene.lights[0];
+        assert_eq!((found.light.intensity, found.shadow), ([2.0; 3], false));
+        let splat_core::LightShape::Directional { direction } = found.light.shape else { panic!("{found:?}") };
+        assert!((direction - splat_core::glam::DVec3::NEG_X).length() < 1e-12, "{direction}");
+        let again = after(&[
+            Event::LightIntensity { light: light(), stops: 1.0 },
+            Event::LightIntensity { light: light(), stops: 0.0 },
+        ]);
+        assert_eq!(again.unwrap(), after(&[]).unwrap());
+    }
+
+    #[test]
+    fn a_layer_is_kept_beside_those_of_the_scene() {
+        let scene = after(&[Event::Layer { layer: Some("normal".into()) }]).unwrap();
+        assert_eq!(scene.render.layers.names().collect::<Vec<_>>(), ["normal"]);
+        let back = [Event::Layer { layer: Some("normal".into()) }, Event::Layer { layer: None }];
+        assert_eq!(after(&back).unwrap(), after(&[]).unwrap());
+    }
+
+    #[test]
     fn an_effect_is_left_to_the_plan_again() {
         let switch = |switch| Event::Effect { name: "shadow.sun".into(), switch };
         assert_eq!(after(&[switch(Switch::On), switch(Switch::Auto)]).unwrap().render.effects, []);
@@ -299,6 +418,12 @@ mod tests {
             Event::Effect { name: "shadow.moon".into(), switch: Switch::Off },
             Event::Effect { name: "translucency".into(), switch: Switch::Off },
             Event::Effect { name: String::new(), switch: Switch::Off },
+            Event::LightShadow { light: "moon".into(), shadow: false },
+            Event::Transfer {
+                object: "pane".into(),
+                knots: Some(vec![Knot { value: 0.0, color: [1.0; 3], extinction: 1.0 }]),
+            },
+            Event::Layer { layer: Some("no\"thing".into()) },
             Event::Size { width: 0, height: 4 },
             Event::Orbit { right: f64::NAN, up: 0.0 },
         ] {

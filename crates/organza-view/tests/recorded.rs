@@ -4,8 +4,10 @@
 use organza::output::{Format, Metadata, Params, displayed_bytes, encode};
 use organza::scene::{LoadOptions, Scene, parse};
 use organza::{Progress, RenderOptions, render};
-use organza_view::{Event, Level, Opening, Session, Switch};
+use organza_view::{Event, Knot, Level, Opening, PicturePlace, Recording, Session, Switch, read_events};
+use std::path::Path;
 use std::sync::Arc;
+use std::time::{Duration, Instant};
 
 const HEAD: &str = r#"version = 1
 [camera]
@@ -152,6 +154,9 @@ fn an_effect_that_is_switched_returns_to_the_same_bits() {
 #[test]
 fn events_that_a_scene_refuses_change_nothing() {
     let session = session(HEAD);
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("events.json");
+    session.record(Recording::begin(&path, false).unwrap());
     let before = session.whole_picture().unwrap();
     let orbit = Event::Orbit { right: 0.2, up: 0.0 };
     for bad in [
@@ -166,7 +171,7 @@ fn events_that_a_scene_refuses_change_nothing() {
         assert!(!error.to_string().is_empty(), "{bad:?}");
     }
     assert_eq!(session.shown().generation, 1);
-    assert_eq!(session.recorded(), []);
+    assert_eq!(read_events(&path).unwrap(), []);
     assert!(Arc::ptr_eq(&session.whole_picture().unwrap(), &before));
 }
 
@@ -190,7 +195,7 @@ fn a_drag_ends_in_the_picture_of_its_last_event_and_stops_the_others() {
     // Whole pictures of 300 sets take long: of 40 requests hardly any is drawn but the last.
     for _ in 0..40 {
         session.apply(&[Event::Orbit { right: 0.01, up: 0.0 }]).unwrap();
-        std::thread::sleep(std::time::Duration::from_millis(2));
+        std::thread::sleep(Duration::from_millis(2));
     }
     let picture = session.whole_picture().unwrap();
     assert_eq!((picture.facts.generation, picture.facts.sets), (41, Some(300)));
@@ -219,9 +224,221 @@ fn a_coarse_picture_says_that_it_is_one() {
 fn a_closed_session_leaves_no_thread_and_waits_for_none() {
     let sets = "[render]\ntechnique = \"particles\"\n[render.particles]\nrepeat_level = 100000\n";
     let session = session(&format!("{HEAD}{sets}"));
-    std::thread::sleep(std::time::Duration::from_millis(100));
-    let start = std::time::Instant::now();
+    std::thread::sleep(Duration::from_millis(100));
+    let start = Instant::now();
     session.close();
     assert!(start.elapsed().as_secs_f64() < 1.0);
     assert!(session.whole_picture().is_err());
+}
+
+#[test]
+fn nothing_is_drawn_of_a_picture_that_is_refused() {
+    let options = RenderOptions { max_memory: 1 << 30, ..RenderOptions::default() };
+    let session = Session::open(Opening::of_text("scene.toml", HEAD, options), &Progress::new()).unwrap();
+    let before = session.whole_picture().unwrap();
+    session.apply(&[Event::Size { width: 8192, height: 8192 }]).unwrap();
+    let failure = session.whole_picture().unwrap_err();
+    assert!(Arc::ptr_eq(&session.picture().unwrap(), &before));
+    // A page has no command line.
+    assert!(failure.hint.starts_with("choose a smaller size"), "{failure:?}");
+    let bad = Event::Size { width: 0, height: 4 };
+    session.apply(&[Event::Size { width: 48, height: 36 }]).unwrap();
+    session.apply(&[bad]).unwrap_err();
+    assert_shows_its_scene(&session, "as before");
+}
+
+#[test]
+fn coarse_pictures_have_fewer_splats_and_the_depths_of_the_scene() {
+    let text = format!("{}[render]\ntechnique = \"sheets\"\n", HEAD.replace("size = [48, 36]", "size = [400, 300]"));
+    let session = session(&text);
+    let first = loop {
+        if let Some(picture) = session.picture() {
+            break picture;
+        }
+        std::thread::yield_now();
+    };
+    let facts = &first.facts;
+    assert_eq!((facts.level, facts.technique.as_str()), (Level::Coarse, "points"));
+    assert!(facts.splat_share < 1.0 && facts.size.width < 400, "{facts:?}");
+    let whole = session.whole_picture().unwrap();
+    assert_eq!((whole.facts.splat_share, whole.facts.technique.as_str()), (1.0, "sheets"));
+}
+
+#[test]
+fn a_double_click_centres_on_what_is_seen() {
+    let from_the_front = HEAD.replace("position = [1, 1, 4]", "position = [0, 0, 4]");
+    let session = session(&from_the_front.replace(FOG, PANE));
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("events.json");
+    session.record(Recording::begin(&path, false).unwrap());
+    for name in ["fog", "ball"] {
+        session.apply(&[Event::Show { object: name.into(), visible: false }]).unwrap();
+    }
+    let before = session.shown().viewpoint;
+    // The wall at z = -1.5 fills the middle, and a point of it right of there.
+    for place in [PicturePlace { right: 0.5, down: 0.5 }, PicturePlace { right: 0.7, down: 0.4 }] {
+        assert!(session.centre_on(place).unwrap());
+        let centre = session.shown().viewpoint.centre;
+        assert!((centre[2] + 1.5).abs() < 0.05, "{centre:?}");
+    }
+    let after = session.shown().viewpoint;
+    assert!((after.distance / before.distance - 1.0).abs() < 1e-12 && after.centre[0] > 0.2 && after.centre[1] > 0.05);
+    // Beside the wall there is nothing.
+    session.apply(&[Event::Zoom { steps: -12.0 }]).unwrap();
+    assert!(!session.centre_on(PicturePlace { right: 0.01, down: 0.01 }).unwrap());
+    // What is recorded needs no picture.
+    let events = read_events(&path).unwrap();
+    assert_eq!(events.iter().filter(|event| matches!(event, Event::LookFrom { centre: Some(_), .. })).count(), 2);
+}
+
+#[test]
+fn a_light_is_changed_as_the_scene_would_have_it() {
+    let session = session(HEAD);
+    let dark = session.whole_picture().unwrap();
+    let light = || "sun".to_owned();
+    session.apply(&[Event::LightIntensity { light: light(), stops: 1.0 }]).unwrap();
+    assert_shows_its_scene(&session, "brighter");
+    assert_eq!(saved(&session).lights[0].light.intensity, [40.0; 3]);
+    let row = session.shown().lights[0].clone();
+    assert_eq!((row.kind, row.stops, row.shadow), ("point", 1.0, true));
+    session
+        .apply(&[
+            Event::LightDirection { light: light(), azimuth: 90.0, elevation: 0.0 },
+            Event::LightShadow { light: light(), shadow: false },
+        ])
+        .unwrap();
+    assert_shows_its_scene(&session, "from the right");
+    let found = session.shown().lights[0].direction.unwrap();
+    assert!((found.azimuth - 90.0).abs() < 1e-9 && found.elevation.abs() < 1e-9);
+    assert!(pixels(&session.whole_picture().unwrap().png) != pixels(&dark.png));
+}
+
+/// A volume whose value is its height, 0 to 7.
+fn write_volume(folder: &Path) {
+    let head = b"NRRD0004\ntype: uint8\ndimension: 3\nsizes: 8 8 8\nencoding: raw\nspacings: 0.25 0.25 0.25\n\n";
+    let voxels = (0..512u32).map(|i| (i / 64) as u8);
+    std::fs::write(folder.join("ramp.nrrd"), head.iter().copied().chain(voxels).collect::<Vec<u8>>()).unwrap();
+}
+
+const VOLUME: &str = r#"version = 1
+[camera]
+position = [1, 1, 8]
+target = [1, 1, 1]
+size = [32, 24]
+[ambient]
+color = [1, 1, 1]
+[[object]]
+name = "ramp"
+volume = "ramp.nrrd" # heights
+transfer = [
+  { value = 0, color = [1, 1, 1], extinction = 0 },
+  { value = 7, color = [1, 0.5, 0.25], extinction = 2 }, # the top
+]
+"#;
+
+/// Waits until something holds, for a minute at most.
+fn wait_for(what: &str, mut holds: impl FnMut() -> bool) {
+    let end = Instant::now() + Duration::from_secs(60);
+    while !holds() {
+        assert!(Instant::now() < end, "{what} does not come");
+        std::thread::sleep(Duration::from_millis(10));
+    }
+}
+
+#[test]
+fn a_curve_is_drawn_over_the_values_and_saved() {
+    let folder = tempfile::tempdir().unwrap();
+    write_volume(folder.path());
+    let file = folder.path().join("scene.toml");
+    let session = Session::open(Opening::of_text(&file, VOLUME, RenderOptions::default()), &Progress::new()).unwrap();
+    let before = session.whole_picture().unwrap();
+    let curve = || session.shown().objects[0].curve.clone().unwrap();
+    assert_eq!(curve().knots[1], Knot { value: 7.0, color: [1.0, 0.5, 0.25], extinction: 2.0 });
+    wait_for("the histogram", || curve().values.is_some());
+    let values = curve().values.unwrap();
+    assert_eq!((values.low, values.high, values.heights.len()), (0.0, 7.0, 128));
+    // 64 voxels of each value.
+    assert_eq!(values.heights.iter().filter(|height| **height == 1.0).count(), 8);
+    let knots = vec![
+        Knot { value: 3.5, color: [0.1, 0.2, 0.3], extinction: 0.0 },
+        Knot { value: 4.25, color: [0.1, 0.2, 0.3], extinction: 12.5 },
+    ];
+    session.apply(&[Event::Transfer { object: "ramp".into(), knots: Some(knots.clone()) }]).unwrap();
+    assert_eq!(curve().knots, knots);
+    let after = session.whole_picture().unwrap();
+    assert!(pixels(&after.png) != pixels(&before.png));
+    // The saved scene is this one, wherever it lies.
+    let text = session.scene_text().unwrap();
+    assert!(text.contains("# heights"), "{text}");
+    let away = tempfile::tempdir().unwrap();
+    let elsewhere = away.path().join("a/b/c.toml");
+    std::fs::create_dir_all(elsewhere.parent().unwrap()).unwrap();
+    let scene = parse(&elsewhere, text.as_bytes(), &LoadOptions::default()).unwrap();
+    assert!(pixels(&after.png) == drawn_alone(&scene));
+    let falling = vec![knots[1], knots[0]];
+    let refused = session.apply(&[Event::Transfer { object: "ramp".into(), knots: Some(falling) }]).unwrap_err();
+    assert!(refused.to_string().contains("value"), "{refused}");
+    session.apply(&[Event::Transfer { object: "ramp".into(), knots: None }]).unwrap();
+    assert!(pixels(&session.whole_picture().unwrap().png) == pixels(&before.png));
+}
+
+#[test]
+fn a_layer_is_shown_in_the_place_of_the_beauty_and_files_keep_the_beauty() {
+    let session = session(HEAD);
+    let beauty = session.whole_picture().unwrap();
+    let mut shown = vec![pixels(&beauty.png)];
+    for layer in ["normal", "depth.median", "shadow", "object", "direct", "background"] {
+        session.apply(&[Event::Layer { layer: Some(layer.into()) }]).unwrap();
+        let picture = session.whole_picture().unwrap();
+        shown.push(pixels(&picture.png));
+        assert_eq!(session.shown().layer.as_deref(), Some(layer));
+        assert!(pixels(&session.file(Format::Png).unwrap().unwrap()) == shown[0], "{layer}");
+    }
+    for (rank, one) in shown.iter().enumerate() {
+        assert!(shown[..rank].iter().all(|other| other != one), "picture {rank} is another one");
+    }
+    let refused = session.apply(&[Event::Layer { layer: Some("none".into()) }]).unwrap_err();
+    assert!(refused.to_string().contains("none"), "{refused}");
+    session.apply(&[Event::Layer { layer: None }]).unwrap();
+    assert!(pixels(&session.whole_picture().unwrap().png) == shown[0]);
+}
+
+#[test]
+fn files_that_change_are_read_again_and_broken_ones_are_told() {
+    let folder = tempfile::tempdir().unwrap();
+    write_volume(folder.path());
+    let file = folder.path().join("scene.toml");
+    std::fs::write(&file, VOLUME).unwrap();
+    let session = Session::open(Opening::of_text(&file, VOLUME, RenderOptions::default()), &Progress::new()).unwrap();
+    session.apply(&[Event::Exposure { stops: 1.0 }]).unwrap();
+    let before = session.whole_picture().unwrap();
+    // Another scene, with the changes of the view.
+    std::fs::write(&file, VOLUME.replace("extinction = 2", "extinction = 20")).unwrap();
+    session.reload();
+    let denser = session.whole_picture().unwrap();
+    assert!(pixels(&denser.png) != pixels(&before.png));
+    assert_eq!(session.shown().exposure, 1.0);
+    assert_shows_its_scene_at(&session, &file);
+    // A broken one: its place is told, and the picture stays.
+    std::fs::write(&file, VOLUME.replace("[ambient]", "[ambience]")).unwrap();
+    session.reload();
+    let failure = session.shown().failure.unwrap();
+    assert!(failure.message.contains("scene.toml:6"), "{failure:?}");
+    assert!(Arc::ptr_eq(&session.picture().unwrap(), &denser));
+    // Broken data, too.
+    std::fs::write(&file, VOLUME).unwrap();
+    std::fs::write(folder.path().join("ramp.nrrd"), b"NRRD0004\n").unwrap();
+    session.reload();
+    let failure = session.whole_picture().unwrap_err();
+    assert!(failure.message.contains("ramp.nrrd"), "{failure:?}");
+    write_volume(folder.path());
+    session.reload();
+    assert!(pixels(&session.whole_picture().unwrap().png) == pixels(&before.png));
+    assert_eq!(session.shown().failure, None);
+}
+
+fn assert_shows_its_scene_at(session: &Session, file: &Path) {
+    let text = session.scene_text().unwrap();
+    let scene = parse(file, text.as_bytes(), &LoadOptions::default()).unwrap();
+    assert!(pixels(&session.whole_picture().unwrap().png) == drawn_alone(&scene));
 }

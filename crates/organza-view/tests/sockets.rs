@@ -104,7 +104,9 @@ impl Answer {
 #[test]
 fn the_page_and_its_parts_are_served_under_one_policy() {
     let running = Running::start();
-    for (path, content) in [("", "text/html"), ("page.js", "text/javascript"), ("page.css", "text/css")] {
+    for (path, content) in
+        [("", "text/html"), ("page.js", "text/javascript"), ("curve.js", "text/javascript"), ("page.css", "text/css")]
+    {
         let answer = running.get(path);
         assert_eq!(answer.status, 200, "{path}");
         assert!(answer.head.contains(content), "{path}: {}", answer.head);
@@ -140,6 +142,23 @@ fn events_change_the_state_or_say_why_not() {
     let plain = running.ask(&format!("POST /{}/events?client=a", running.token), &headers, "[]");
     assert_eq!(plain.status, 415);
     assert_eq!(running.session.shown().generation, 2);
+}
+
+#[test]
+fn a_place_of_the_picture_is_brought_to_the_middle() {
+    let running = Running::start();
+    let centre =
+        |query: &str| running.ask(&format!("POST /{}/centre?client=a&{query}", running.token), &running.host(), "");
+    let answer = centre("right=0.5&down=0.5");
+    assert_eq!(answer.status, 200, "{}", answer.body);
+    // Half of the light is absorbed 0.46 units behind the front of the fog.
+    let [x, y, z] = running.session.shown().viewpoint.centre;
+    assert!(x.abs() < 0.1 && y.abs() < 0.1 && (z - 0.54).abs() < 0.2, "{x} {y} {z}");
+    assert_eq!(centre("right=0&down=0").status, 404);
+    for query in ["right=2&down=0", "right=0.5", "right=NaN&down=0", "right=a&down=b"] {
+        assert_eq!(centre(query).status, 400, "{query}");
+    }
+    assert_eq!(running.get("centre?client=a&right=0.5&down=0.5").status, 405);
 }
 
 #[test]

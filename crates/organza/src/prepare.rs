@@ -74,7 +74,8 @@ pub fn explain_from(
     files: &Files,
 ) -> Result<Explanation, Error> {
     let (scene, found) = settled(scene, options, progress, files)?;
-    let Prepared { scene, loaded, planned, mut explanation } = prepare(&scene, options, progress, files, None)?;
+    let Prepared { scene, loaded, planned, mut explanation } =
+        prepare(&scene, options, progress, files, None, EyeMap::WhereNeeded)?;
     let frame = Frame::new(&scene, &loaded, &planned.plan, progress);
     let mut folds: Vec<Box<dyn Fold + '_>> =
         planned.plan.techniques.iter().map(|technique| (row(*technique).begin)(&frame)).collect();
@@ -105,6 +106,15 @@ pub(crate) struct Prepared<'a> {
     pub(crate) explanation: Explanation,
 }
 
+/// Whether light that a thick splat sends to the eye is attenuated within it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum EyeMap {
+    /// Wherever splats are thick.
+    WhereNeeded,
+    /// Never: a preview is as bright within a few percent, and its map would be built anew for each view.
+    Never,
+}
+
 /// Loads and plans; `made` is what was loaded of another scene that serves this one, and its plan where [`turned`] says that it serves, too.
 pub(crate) fn prepare<'a>(
     scene: &'a Scene,
@@ -112,6 +122,7 @@ pub(crate) fn prepare<'a>(
     progress: &Progress,
     files: &Files,
     made: Option<(Loaded, Option<Planned>)>,
+    eye_map: EyeMap,
 ) -> Result<Prepared<'a>, Error> {
     let mut cost = CostRecord::default();
     memory::check("the image", memory::image_bytes(scene), options.max_memory)?;
@@ -140,7 +151,7 @@ pub(crate) fn prepare<'a>(
     let mut scene = Cow::Borrowed(scene);
     let mut gathering = 0;
     let planned = match planned {
-        Some(planned) => plan_counted(&scene, &loaded, options, Effects::of(&planned), Some(planned.plan))?,
+        Some(planned) => plan_counted(&scene, &loaded, options, Effects::of(&planned), Some(planned.plan), eye_map)?,
         None => {
             let both = loaded.cloud.bytes().saturating_mul(2);
             let mut effects = plan_effects(&scene, &loaded, &[], 0.0, both <= options.max_memory)?;
@@ -157,7 +168,7 @@ pub(crate) fn prepare<'a>(
                 effects = plan_effects(&scene, &loaded, &left_out, spent, both <= options.max_memory)?;
             }
             effects.plan.left_out = switched;
-            plan_counted(&scene, &loaded, options, effects, None)?
+            plan_counted(&scene, &loaded, options, effects, None, eye_map)?
         }
     };
     let plan = planned.plan.clone();
@@ -292,7 +303,7 @@ pub fn plan_loaded(scene: &Scene, loaded: &Loaded, options: &RenderOptions) -> R
 /// The same with what it takes and follows from. Effects of objects are kept, whatever their bounds.
 pub(crate) fn plan_alone(scene: &Scene, loaded: &Loaded, options: &RenderOptions) -> Result<Planned, Error> {
     let effects = plan_effects(scene, loaded, &[], 0.0, false)?;
-    plan_counted(scene, loaded, options, effects, None)
+    plan_counted(scene, loaded, options, effects, None, EyeMap::WhereNeeded)
 }
 
 /// Refuses 3D Gaussians, images as footprints, and splats of media that a file has beside others, where a technique leaves them out.
@@ -339,6 +350,7 @@ fn plan_counted(
     options: &RenderOptions,
     effects: Effects,
     before: Option<Plan>,
+    eye_map: EyeMap,
 ) -> Result<Planned, Error> {
     check_samples(scene)?;
     let is_new = before.is_none();
@@ -378,7 +390,7 @@ fn plan_counted(
     // Of the view, which may be another than that of the maps.
     plan.set_eye_table(None);
     let left = left.saturating_sub(shadows::bytes(plan.tables()));
-    if plan.shadow_maps.contains(&true) {
+    if eye_map == EyeMap::WhereNeeded && plan.shadow_maps.contains(&true) {
         let eye = shadows::eye_table(loaded, &plan.shown, &plan.draws, left)?;
         plan.set_eye_table(eye);
     }

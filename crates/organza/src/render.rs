@@ -12,7 +12,7 @@ use crate::frame::{Frame, KeptGroups, Leaves};
 use crate::load::Loaded;
 use crate::load::files::Files;
 use crate::plan::Plan;
-use crate::prepare::{Explanation, Planned, Prepared, prepare, settled, splats_serve, turned};
+use crate::prepare::{Explanation, EyeMap, Planned, Prepared, prepare, settled, splats_serve, turned};
 use crate::scene::{FoundCamera, Scene, SceneObject, Technique};
 use crate::technique::{Checkpoint, Kept, Session, Sets};
 use crate::{CostRecord, Error, Layers, Progress, RenderOptions, doubts};
@@ -74,6 +74,8 @@ pub(crate) struct Left {
     by: Vec<Technique>,
     /// Whether no other frame comes.
     is_still: bool,
+    /// Whether frames are previews, which have no map of the eye.
+    pub(crate) is_preview: bool,
 }
 
 /// What was made of the last frame's scene.
@@ -101,6 +103,22 @@ impl Left {
         let bytes = Arrived::bytes_of(loaded.cloud.len()).saturating_mul(plan.tables().count() as u64);
         let fits = bytes <= (max_memory / Self::SHARE).min(max_memory.saturating_sub(other));
         (!self.is_still && fits).then_some(bytes)
+    }
+
+    /// Takes what was made of another frame, as far as it serves this one.
+    fn take_made(&mut self, scene: &Scene) -> (Option<(Loaded, Option<Planned>)>, Leaves) {
+        // What serves no longer makes room.
+        match self.made.take() {
+            Some(made) if turned(&made.scene, scene) => (Some((made.loaded, Some(made.planned))), made.leaves),
+            Some(made) if splats_serve(&made.scene, scene, &made.loaded) => {
+                (Some((made.loaded, None)), Leaves::default())
+            }
+            _ => Default::default(),
+        }
+    }
+
+    const fn eye_map(&self) -> EyeMap {
+        if self.is_preview { EyeMap::Never } else { EyeMap::WhereNeeded }
     }
 
     /// Lets files go that take more than their share, or than is left beside `other` bytes, or that no frame needs; sets may take what
@@ -160,14 +178,10 @@ pub(crate) fn render_keeping(
     };
     let mut checkpoint = options.checkpoint.as_ref().map(open).transpose()?;
     let helper = options.device.as_deref().map(Helper::new);
-    // What serves no longer makes room.
-    let (made, mut leaves) = match left.made.take() {
-        Some(made) if turned(&made.scene, scene) => (Some((made.loaded, Some(made.planned))), made.leaves),
-        Some(made) if splats_serve(&made.scene, scene, &made.loaded) => (Some((made.loaded, None)), Leaves::default()),
-        _ => Default::default(),
-    };
+    let (made, mut leaves) = left.take_made(scene);
     let stated = scene;
-    let Prepared { scene, loaded, planned, explanation } = prepare(stated, options, progress, &left.files, made)?;
+    let Prepared { scene, loaded, planned, explanation } =
+        prepare(stated, options, progress, &left.files, made, left.eye_map())?;
     let scene = &*scene;
     let plan = &planned.plan;
     let bytes = planned.memory.total();
@@ -225,6 +239,21 @@ pub(crate) fn render_keeping(
     let scales = loaded.scales.clone();
     left.made = (!left.is_still && is_whole).then(|| Made { scene: stated.clone(), loaded, planned, leaves });
     Ok(Render { layers, cost, plan: shown, predicted, sets, warnings, notes, scales, found, backend })
+}
+
+/// Loads and plans a frame, and keeps what was made for drawing it.
+pub(crate) fn prepare_keeping(
+    scene: &Scene,
+    options: &RenderOptions,
+    progress: &Progress,
+    left: &mut Left,
+) -> Result<(), Error> {
+    let (scene, _) = settled(scene, options, progress, &left.files)?;
+    let (made, leaves) = left.take_made(&scene);
+    let Prepared { loaded, planned, .. } = prepare(&scene, options, progress, &left.files, made, left.eye_map())?;
+    let is_whole = planned.plan.left_out.is_empty();
+    left.made = is_whole.then(|| Made { scene: scene.into_owned(), loaded, planned, leaves });
+    Ok(())
 }
 
 #[cfg(test)]

@@ -102,9 +102,16 @@ pub(super) fn parse_bytes(text: &str) -> Result<u64, String> {
 /// A numeric address, with or without a port: port 0 is any that is free.
 #[cfg(feature = "view")]
 pub(super) fn parse_address(text: &str) -> Result<SocketAddr, String> {
-    let with_port = text.parse::<SocketAddr>().ok();
-    let alone = || text.parse::<IpAddr>().ok().map(|ip| SocketAddr::new(ip, 0));
-    with_port.or_else(alone).ok_or_else(|| "expected a numeric address, such as 127.0.0.1:8000 or ::1".into())
+    // The one name that needs no look-up, and means the same everywhere.
+    let numeric = match text.strip_prefix("localhost") {
+        Some(rest) if rest.is_empty() || rest.starts_with(':') => format!("127.0.0.1{rest}"),
+        _ => text.to_owned(),
+    };
+    let with_port = numeric.parse::<SocketAddr>().ok();
+    let alone = || numeric.parse::<IpAddr>().ok().map(|ip| SocketAddr::new(ip, 0));
+    with_port
+        .or_else(alone)
+        .ok_or_else(|| "expected `localhost` or a numeric address, such as 127.0.0.1:8000 or ::1".into())
 }
 
 #[cfg(test)]
@@ -117,7 +124,12 @@ mod tests {
         let read = |text| parse_address(text).ok().map(|address| address.to_string());
         assert_eq!(read("127.0.0.1:8000").as_deref(), Some("127.0.0.1:8000"));
         assert_eq!([read("0.0.0.0"), read("::1")].map(Option::unwrap), ["0.0.0.0:0", "[::1]:0"]);
-        assert!(["", "localhost", "a.example:80", "127.0.0.1:99999", ":80"].iter().all(|t| read(t).is_none()));
+        assert_eq!([read("localhost"), read("localhost:80")].map(Option::unwrap), ["127.0.0.1:0", "127.0.0.1:80"]);
+        assert!(
+            ["", "localhost:", "localhosts", "a.localhost", "a.example:80", "127.0.0.1:99999", ":80"]
+                .iter()
+                .all(|t| read(t).is_none())
+        );
     }
 
     #[test]

@@ -8,6 +8,7 @@ const canvas = at("picture");
 const pen = canvas.getContext("2d");
 
 let shown = null;
+let rank = 0;
 let isOpen = true;
 
 // ---- events to the server: those of a drag are added up while the one before is on its way ----
@@ -18,7 +19,9 @@ let isSending = false;
 function add(event) {
   const last = waiting[waiting.length - 1];
   const adds = { orbit: ["right", "up"], pan: ["right", "up"], zoom: ["steps"] }[event.do];
-  const replaces = { exposure: [], size: [], opacity: ["object"] }[event.do];
+  const replaces = {
+    exposure: [], size: [], opacity: ["object"], transfer: ["object"], light_intensity: ["light"], light_direction: ["light"],
+  }[event.do];
   if (last && adds && last.do === event.do) {
     for (const key of adds) last[key] += event[key];
   } else if (last && replaces && last.do === event.do && replaces.every((key) => last[key] === event[key])) {
@@ -133,7 +136,11 @@ function show(found, isAgain = false) {
   at("title").title = found.title;
   showStatus(found);
   showObjects(found.objects);
-  showEffects(found.picture ? found.picture.effects : []);
+  showLights(found.lights);
+  showEffects(found.effects);
+  if (found.picture && found.picture.level === "whole") showPasses(found.picture.passes);
+  if (found.picture) showLegends(found.picture.legends);
+  if (document.activeElement !== at("layer")) at("layer").value = found.layer || "";
   if (document.activeElement !== at("exposure")) at("exposure").value = found.exposure;
   at("exposure-value").textContent = `${found.exposure > 0 ? "+" : ""}${found.exposure} EV`;
   for (const side of ["width", "height"]) {
@@ -149,7 +156,8 @@ function showStatus(found) {
   const words = [];
   if (picture) {
     const ms = picture.ms < 10 ? picture.ms.toFixed(1) : Math.round(picture.ms);
-    words.push(picture.level === "whole" ? "whole" : `coarse, ${picture.size.width} × ${picture.size.height} pixels`, `${ms} ms`);
+    const share = picture.splat_share < 1 ? `, 1/${Math.round(1 / picture.splat_share)} of the splats` : "";
+    words.push(picture.level === "whole" ? "whole" : `coarse, ${picture.size.width} × ${picture.size.height} pixels${share}`, `${ms} ms`);
     if (picture.level === "whole") words.push(`${picture.size.width} × ${picture.size.height}`);
     words.push(picture.technique);
     if (picture.sets) words.push(`${picture.sets} sets`);
@@ -193,16 +201,26 @@ function element(name, values = {}, children = []) {
   return made;
 }
 
-/// Rows are made once for each name, and filled anew: what has the focus keeps it.
-const rows = { objects: new Map(), effects: new Map() };
-function rowsOf(list, items, make, fill) {
+/// Rows are made once for each name, and filled anew: what has the focus keeps it, and nothing moves below the pointer. Of a list in groups a row that is
+/// gone stays where it was, and a new one comes behind the others of its group.
+const rows = { objects: new Map(), lights: new Map(), effects: new Map() };
+function rowsOf(list, items, make, fill, group) {
   const known = rows[list];
   const names = items.map((item) => item.name);
-  if (names.join("\n") !== [...known.keys()].join("\n")) {
+  if (!group && names.join("\n") !== [...known.keys()].join("\n")) {
     known.clear();
-    for (const item of items) known.set(item.name, make(item));
-    at(list).replaceChildren(...[...known.values()].map((row) => row.item));
+    at(list).replaceChildren();
   }
+  for (const item of items) {
+    if (known.has(item.name)) continue;
+    const row = make(item);
+    row.group = group ? group(item) : 0;
+    known.set(item.name, row);
+    const behind = [...at(list).children].find((child) => Number(child.dataset.group) > row.group);
+    row.item.dataset.group = row.group;
+    at(list).insertBefore(row.item, behind || null);
+  }
+  for (const [name, row] of known) row.item.classList.toggle("gone", !names.includes(name));
   for (const item of items) fill(known.get(item.name), item);
 }
 
@@ -214,10 +232,10 @@ function showObjects(objects) {
       row.value.textContent = object.opacity.toFixed(2);
       row.opacity.disabled = !object.visible;
     }
+    if (row.curve) row.curve.show(object.curve);
   });
 }
 
-let rank = 0;
 function makeObject(object) {
   const id = `object-${(rank += 1)}`;
   const visible = element("input", { type: "checkbox", id });
@@ -237,8 +255,156 @@ function makeObject(object) {
     });
     children.push(element("span", { className: "opacity" }, [element("span", { textContent: "Opacity" }), row.opacity, row.value]));
   }
+  if (object.curve) {
+    row.curve = new Curve(object.name, (knots) => add({ do: "transfer", object: object.name, knots }));
+    children.push(row.curve.panel);
+  }
   row.item = element("li", { className: "object" }, children);
   return row;
+}
+
+function showLights(lights) {
+  at("lights-panel").hidden = lights.length === 0;
+  rowsOf("lights", lights, makeLight, (row, light) => {
+    const isHeld = (input) => document.activeElement === input;
+    row.shadow.checked = light.shadow;
+    if (!isHeld(row.stops)) row.stops.value = light.stops;
+    row.value.textContent = `${light.stops > 0 ? "+" : ""}${Number(light.stops.toFixed(2))} EV`;
+    if (!row.azimuth || !light.direction) return;
+    for (const side of ["azimuth", "elevation"]) {
+      if (!isHeld(row[side])) row[side].value = Math.round(light.direction[side]);
+    }
+    row.ball.show(light.direction);
+  });
+}
+
+function makeLight(light) {
+  const row = {};
+  const id = `light-${(rank += 1)}`;
+  row.stops = element("input", { type: "range", min: -6, max: 6, step: 0.25, "aria-label": `Intensity of light ${light.name}, stops` });
+  row.value = element("output");
+  row.stops.addEventListener("input", () => add({ do: "light_intensity", light: light.name, stops: Number(row.stops.value) }));
+  row.shadow = element("input", { type: "checkbox", id });
+  row.shadow.addEventListener("change", () => add({ do: "light_shadow", light: light.name, shadow: row.shadow.checked }));
+  const children = [
+    element("span", { className: "name", textContent: light.name }),
+    element("span", { className: "kind", textContent: light.kind }),
+    element("label", { className: "tick", htmlFor: id }, [row.shadow, element("span", { textContent: "shadow" })]),
+    element("span", { className: "slider" }, [element("span", { textContent: "Intensity" }), row.stops, row.value]),
+  ];
+  if (light.direction) {
+    const turn = () => {
+      const [azimuth, elevation] = [Number(row.azimuth.value), Number(row.elevation.value)];
+      if (Math.abs(azimuth) <= 360 && Math.abs(elevation) <= 90) add({ do: "light_direction", light: light.name, azimuth, elevation });
+    };
+    const number = (label, most) => {
+      const input = element("input", { type: "number", min: -most, max: most, step: 1, "aria-label": `${label} of light ${light.name}, degrees` });
+      input.addEventListener("change", turn);
+      return input;
+    };
+    row.azimuth = number("Azimuth", 180);
+    row.elevation = number("Elevation", 90);
+    row.ball = new Ball((direction) => {
+      row.azimuth.value = Math.round(direction.azimuth);
+      row.elevation.value = Math.round(direction.elevation);
+      turn();
+    });
+    children.push(element("span", { className: "direction" }, [
+      row.ball.canvas,
+      element("label", {}, [element("span", { textContent: "Azimuth" }), row.azimuth, "°"]),
+      element("label", {}, [element("span", { textContent: "Elevation" }), row.elevation, "°"]),
+    ]));
+  }
+  row.item = element("li", { className: "light" }, children);
+  return row;
+}
+
+/// From where a light comes: the half of a ball that is above, seen from above, or the one below. Dragged, it follows the pointer.
+class Ball {
+  constructor(take) {
+    this.canvas = element("canvas", { width: 112, height: 112, className: "ball", title: "Drag: from where the light comes, seen from above" });
+    this.canvas.setAttribute("aria-hidden", "true");
+    this.direction = { azimuth: 0, elevation: 0 };
+    const move = (event) => {
+      const box = this.canvas.getBoundingClientRect();
+      const x = (2 * (event.clientX - box.left)) / box.width - 1;
+      const z = (2 * (event.clientY - box.top)) / box.height - 1;
+      const level = Math.min(1, Math.hypot(x, z) / 0.9);
+      const sign = this.direction.elevation < 0 ? -1 : 1;
+      this.show({ azimuth: (Math.atan2(x, z) * 180) / Math.PI, elevation: (sign * Math.acos(level) * 180) / Math.PI });
+      take(this.direction);
+    };
+    this.canvas.addEventListener("pointerdown", (event) => {
+      this.canvas.setPointerCapture(event.pointerId);
+      move(event);
+    });
+    this.canvas.addEventListener("pointermove", (event) => {
+      if (event.buttons & 1) move(event);
+    });
+  }
+
+  show(direction) {
+    this.direction = direction;
+    const pen = this.canvas.getContext("2d");
+    const style = getComputedStyle(document.documentElement);
+    const side = this.canvas.width;
+    const radius = 0.45 * side;
+    pen.clearRect(0, 0, side, side);
+    pen.strokeStyle = style.getPropertyValue("--line");
+    pen.lineWidth = 2;
+    for (const part of [1, 0.5]) {
+      pen.beginPath();
+      pen.arc(side / 2, side / 2, radius * part, 0, 2 * Math.PI);
+      pen.stroke();
+    }
+    const [azimuth, elevation] = [direction.azimuth, direction.elevation].map((degrees) => (degrees * Math.PI) / 180);
+    const level = radius * Math.cos(elevation);
+    pen.beginPath();
+    pen.arc(side / 2 + level * Math.sin(azimuth), side / 2 + level * Math.cos(azimuth), 7, 0, 2 * Math.PI);
+    pen.fillStyle = pen.strokeStyle = style.getPropertyValue("--accent");
+    if (elevation >= 0) pen.fill();
+    pen.stroke();
+  }
+}
+
+const milliseconds = (ms) => (ms === null ? "–" : ms < 10 ? ms.toFixed(1) : String(Math.round(ms)));
+
+function showPasses(passes) {
+  const cells = (pass) => [
+    element("th", { scope: "row", textContent: pass.name }),
+    element("td", { textContent: milliseconds(pass.predicted_ms) }),
+    element("td", { textContent: milliseconds(pass.measured_ms) }),
+  ];
+  at("passes").tBodies[0].replaceChildren(...passes.map((pass) => element("tr", {}, cells(pass))));
+}
+
+let legends = "";
+function showLegends(found) {
+  const text = JSON.stringify(found);
+  if (text === legends) return;
+  legends = text;
+  at("legends").hidden = found.length === 0;
+  const css = (color) => `rgb(${color.join(" ")})`;
+  at("legends").replaceChildren(...found.map((legend) => {
+    const title = element("p", { textContent: legend.title });
+    if (!legend.is_even) {
+      const mark = (item) => {
+        const square = element("span", { className: "square" });
+        square.style.background = css(item.color);
+        return element("li", {}, [square, item.meaning ? `${short(item.number)} ${item.meaning}` : short(item.number)]);
+      };
+      return element("div", { className: "legend" }, [title, element("ul", {}, legend.marks.map(mark))]);
+    }
+    const bar = element("span", { className: "bar" });
+    bar.style.background = `linear-gradient(to right, ${legend.marks.map((mark) => css(mark.color)).join(", ")})`;
+    const [first, last] = [legend.marks[0], legend.marks[legend.marks.length - 1]];
+    const ends = element("p", { className: "ends" }, [element("span", { textContent: short(first.number) }), element("span", { textContent: short(last.number) })]);
+    return element("div", { className: "legend" }, [title, bar, ends]);
+  }));
+}
+
+function short(number) {
+  return String(Number(number.toPrecision(4)));
 }
 
 /// What can be switched comes first; objects have their own panel.
@@ -246,16 +412,22 @@ function order(effect) {
   return effect.fixed ? 2 : effect.name.startsWith("object.") ? 1 : 0;
 }
 
-function showEffects(unordered) {
-  const effects = [...unordered].sort((a, b) => order(a) - order(b));
+function showEffects(effects) {
   rowsOf("effects", effects, makeEffect, (row, effect) => {
     row.item.classList.toggle("left-out", !effect.called_for);
     row.bound.textContent = boundText(effect.bound);
     row.why.textContent = effect.reason;
     const isDrawn = effect.called_for && !effect.lacking;
     row.state.textContent = effect.fixed || (effect.lacking ? "lacking" : isDrawn ? "simulated" : "left out");
+    row.cost.textContent = costText(effect);
     for (const [word, input] of Object.entries(row.inputs)) input.checked = effect.switch === word;
-  });
+  }, order);
+}
+
+function costText(effect) {
+  if (effect.predicted_ms === null && effect.measured_ms === null) return "";
+  const measured = effect.measured_ms === null ? "kept" : `${milliseconds(effect.measured_ms)} ms`;
+  return effect.predicted_ms === null ? measured : `${measured}, predicted ${milliseconds(effect.predicted_ms)}`;
 }
 
 function boundText(bound) {
@@ -269,8 +441,9 @@ function boundText(bound) {
 function makeEffect(effect) {
   const row = { inputs: {} };
   row.bound = element("span", { className: "bound" });
-  row.why = element("p", { className: "why" });
+  row.why = element("summary");
   row.state = element("span", { className: "state" });
+  row.cost = element("span", { className: "cost", title: "Time of its passes in the last whole picture" });
   const group = `effect-${(rank += 1)}`;
   const switches = effect.fixed ? [] : ["auto", "on", "off"].map((word) => {
     const input = element("input", { type: "radio", name: group, value: word });
@@ -280,11 +453,11 @@ function makeEffect(effect) {
   });
   const name = element("span", { className: "name", textContent: effect.name, title: effect.what });
   const head = element("div", { className: "head" }, [name, row.bound]);
-  const choice = element("div", {}, [row.state]);
+  const choice = element("div", { className: "choice" }, [row.state, row.cost]);
   if (switches.length > 0) {
     choice.prepend(element("span", { className: "switch", role: "radiogroup", "aria-label": `${effect.name}, ${effect.what}` }, switches));
   }
-  row.item = element("li", { className: "effect" }, [head, row.why, choice]);
+  row.item = element("li", { className: "effect" }, [head, element("details", { className: "why" }, [row.why]), choice]);
   return row;
 }
 
@@ -333,6 +506,35 @@ stage.addEventListener("pointerup", release);
 stage.addEventListener("pointercancel", release);
 stage.addEventListener("contextmenu", (event) => event.preventDefault());
 
+/// The place in the picture below the pointer, or its middle; nothing beside it.
+let pointer = null;
+stage.addEventListener("pointermove", (event) => (pointer = { x: event.clientX, y: event.clientY }));
+stage.addEventListener("pointerleave", () => (pointer = null));
+function pictureBelow(place) {
+  const box = stage.getBoundingClientRect();
+  const height = pictureHeight();
+  const width = shown ? (height * shown.size.width) / shown.size.height : box.width;
+  if (!place) return { right: 0.5, down: 0.5 };
+  const right = 0.5 + (place.x - box.left - box.width / 2) / width;
+  const down = 0.5 + (place.y - box.top - box.height / 2) / height;
+  const isInside = right >= 0 && right <= 1 && down >= 0 && down <= 1;
+  return isInside ? { right, down } : null;
+}
+
+async function centre(place) {
+  const below = pictureBelow(place);
+  if (!below || !isOpen) return;
+  try {
+    const answer = await fetch(`centre?client=${client}&right=${below.right.toFixed(6)}&down=${below.down.toFixed(6)}`, { method: "POST" });
+    const found = await answer.json();
+    trouble(answer.ok ? "" : sentence(found));
+    if (answer.ok) show(found);
+  } catch {
+    lost();
+  }
+}
+stage.addEventListener("dblclick", (event) => centre({ x: event.clientX, y: event.clientY }));
+
 stage.addEventListener("wheel", (event) => {
   event.preventDefault();
   const pixels = event.deltaMode === 1 ? event.deltaY * 33 : event.deltaY;
@@ -349,6 +551,7 @@ const keys = {
   "1": () => look(0, 0),
   "3": () => look(90, 0),
   "7": () => look(0, 90),
+  c: () => centre(pointer),
   r: () => add({ do: "reset" }),
   s: () => save("picture.png"),
   h: () => at("keys").showModal(),
@@ -366,7 +569,8 @@ document.addEventListener("keydown", (event) => {
     event.preventDefault();
     return;
   }
-  if (isTyping && event.target.type === "number") return;
+  if (isTyping && (event.target.type === "number" || event.target.matches("select"))) return;
+  if (event.target.closest(".curve")) return;
   const key = keys[event.key.length === 1 ? event.key.toLowerCase() : event.key];
   if (key) {
     key();
@@ -378,6 +582,7 @@ document.addEventListener("keydown", (event) => {
 
 at("reset").addEventListener("click", () => add({ do: "reset" }));
 at("help").addEventListener("click", () => at("keys").showModal());
+at("layer").addEventListener("change", () => add({ do: "layer", layer: at("layer").value || null }));
 at("exposure").addEventListener("input", () => add({ do: "exposure", stops: Number(at("exposure").value) }));
 
 function setSize(width, height) {

@@ -20,7 +20,9 @@ pub(super) type Fitted = (SharedField, DAabb);
 /// What was made, beside what it was made of.
 type Made<K, V> = RefCell<Vec<(K, V)>>;
 
-/// The files of a scene that were read, so that whoever looked at them before can hand them to [`crate::render_from`].
+/// The files of a scene that were read, so that whoever looked at them before can hand them to [`crate::render_from`]. A clone
+/// shares what was read so far, and its memory.
+#[derive(Clone)]
 pub struct Files {
     /// Memory that files take, while they are read and as long as they are kept.
     memory: MemoryAccount,

@@ -1,7 +1,7 @@
 //! Frames of one scene, one after the other: what was sampled for one serves the next.
 
 use crate::load::files::Files;
-use crate::render::{Left, render_keeping};
+use crate::render::{Left, prepare_keeping, render_keeping};
 use crate::scene::Scene;
 use crate::{Error, Progress, Render, RenderOptions};
 
@@ -68,6 +68,13 @@ impl Sequence {
         sequence
     }
 
+    /// Begins with files that were read before, for previews: light that a thick splat sends to the eye is not attenuated within it.
+    pub fn of_previews(files: Files) -> Self {
+        let mut sequence = Self::of_files(files);
+        sequence.left.is_preview = true;
+        sequence
+    }
+
     /// The files that were read so far.
     pub fn files(&self) -> &Files {
         &self.left.files
@@ -77,6 +84,15 @@ impl Sequence {
     /// kept of it.
     pub fn add(&mut self, frame: &Scene) {
         self.left.add(frame);
+    }
+
+    /// Reads, converts and plans a frame without drawing it: a frame that would be refused is refused here. What is made serves
+    /// [`Sequence::render`] of this frame.
+    ///
+    /// # Errors
+    /// As [`crate::render`].
+    pub fn prepare(&mut self, frame: &Scene, options: &RenderOptions, progress: &Progress) -> Result<(), Error> {
+        prepare_keeping(frame, options, progress, &mut self.left)
     }
 
     /// Draws one of the frames.

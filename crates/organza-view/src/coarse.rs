@@ -1,0 +1,154 @@
+//! How a coarse picture is less than the whole one, so that it keeps to a time.
+
+use crate::picture::Size;
+use organza::scene::{LayerChoice, Scene, Technique};
+use organza::{CostRecord, pass};
+use std::time::Duration;
+
+/// Time of a coarse picture: ten a second follow a hand.
+pub(crate) const BUDGET: Duration = Duration::from_millis(100);
+
+/// Most pixels of the whole picture along each side of one of the coarse picture: at 8 a picture of 960 × 540 has 120 × 68.
+const COARSEST: u32 = 8;
+
+/// Least share of the splats: below it a dense object is a handful of discs.
+const LEAST_SHARE: f64 = 1.0 / 256.0;
+
+/// A share that is made anew takes so much of the time alone, so that the next frames stay within it.
+const MARGIN: f64 = 0.6;
+
+/// Most points that an extended light is taken for, where its penumbra is to be guessed alone.
+const LIGHT_POINTS: u32 = 4;
+
+/// Most sets of particles that are averaged.
+const SETS: u32 = 4;
+
+/// The layer of which depths under a pointer are read.
+pub(crate) const DEPTH_LAYER: &str = "depth.median";
+
+/// Passes whose results serve the next view.
+const ONCE: [&str; 4] = [pass::READ, pass::CONVERT, pass::SHADOW_MAP, pass::GROUP];
+
+/// Passes whose time follows the pixels.
+const OF_PIXELS: [&str; 3] = [pass::OPAQUE, pass::SPLAT, pass::FINISH];
+
+/// How much of a picture is drawn.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Detail {
+    /// Pixels of the whole picture along each side of one of the coarse picture.
+    pub(crate) divisor: u32,
+    /// Share of the splats, in (0, 1].
+    pub(crate) share: f64,
+}
+
+impl Default for Detail {
+    fn default() -> Self {
+        Self { divisor: 4, share: 0.25 }
+    }
+}
+
+impl Detail {
+    /// The detail of the next picture, after one that cost this. Another share is converted anew, which takes a while: it changes where pixels alone
+    /// do not help, and then by as much as helps for good.
+    pub(crate) fn next(self, cost: &CostRecord) -> Self {
+        let budget = BUDGET.as_secs_f64();
+        let time = drawing_time(cost).as_secs_f64();
+        let of_pixels = seconds(cost, |name| OF_PIXELS.contains(&name));
+        if time > 1.3 * budget {
+            let is_by_pixels = of_pixels > 0.5 * time && self.divisor < COARSEST;
+            if is_by_pixels {
+                return Self { divisor: 2 * self.divisor, ..self };
+            }
+            return Self { share: self.share_within(MARGIN * budget / time), ..self };
+        }
+        if time < budget / 3.0 && self.divisor > 2 {
+            return Self { divisor: self.divisor / 2, ..self };
+        }
+        self
+    }
+
+    /// The greatest power of two that is at most this part of the share.
+    fn share_within(self, part: f64) -> f64 {
+        let mut share = self.share;
+        while share > LEAST_SHARE && share > self.share * part {
+            share /= 2.0;
+        }
+        share
+    }
+
+    /// A scene with this detail: of the same view, with fewer pixels and splats, and one depth for each pixel. By `points`, which thins out, where
+    /// that draws the scene.
+    pub(crate) fn of_scene(self, scene: &Scene, layer: Option<&str>, technique: Option<Technique>) -> Scene {
+        let mut coarse = scene.clone();
+        let size = Size::of_scene(scene).divided(self.divisor);
+        coarse.camera.size = [size.width, size.height];
+        // Shadows are planned for all views at once, as in an animation: the plan serves while the scene is turned.
+        coarse.frames = Some(2);
+        coarse.lights.iter_mut().for_each(|light| light.samples = light.samples.min(LIGHT_POINTS));
+        let settings = &mut coarse.render;
+        settings.antialias = 1;
+        settings.splat_share *= self.share;
+        settings.particles.repeat_level = settings.particles.repeat_level.min(SETS);
+        settings.particles.target_error = None;
+        settings.layers = LayerChoice::default();
+        for name in [DEPTH_LAYER].into_iter().chain(layer) {
+            // The whole scene was refused for a name that is unknown.
+            let _ = settings.layers.add(name);
+        }
+        if let Some(technique) = technique {
+            settings.technique = technique;
+            coarse.objects.iter_mut().for_each(|object| object.technique = Some(technique));
+        }
+        coarse
+    }
+}
+
+/// Time of what each view takes anew.
+pub(crate) fn drawing_time(cost: &CostRecord) -> Duration {
+    Duration::try_from_secs_f64(seconds(cost, |name| !ONCE.contains(&name))).unwrap_or(Duration::MAX)
+}
+
+fn seconds(cost: &CostRecord, counts: impl Fn(&str) -> bool) -> f64 {
+    cost.stages.iter().filter(|stage| counts(&stage.name)).map(|stage| stage.seconds).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use organza::CostRecord;
+
+    /// A cost with these milliseconds.
+    fn cost(passes: &[(&str, f64)]) -> CostRecord {
+        let mut cost = CostRecord::default();
+        for (name, ms) in passes {
+            cost.measure(name, |_| Ok::<_, ()>(())).unwrap();
+            cost.stages.last_mut().unwrap().seconds = ms / 1e3;
+        }
+        cost
+    }
+
+    #[test]
+    fn what_takes_the_time_is_made_less() {
+        let now = Detail { divisor: 4, share: 0.25 };
+        let after = |passes: &[(&str, f64)]| now.next(&cost(passes));
+        // Pixels take the time: fewer of them.
+        assert_eq!(after(&[(pass::SHADE, 50.0), (pass::SPLAT, 150.0)]), Detail { divisor: 8, share: 0.25 });
+        // Splats do: 60 ms of 400 ms are 0.15, of which the power of two is an eighth.
+        assert_eq!(after(&[(pass::SHADE, 390.0), (pass::SPLAT, 10.0)]), Detail { divisor: 4, share: 0.25 / 8.0 });
+        // Within the time nothing changes, and what happens once does not count.
+        assert_eq!(after(&[(pass::READ, 900.0), (pass::CONVERT, 900.0), (pass::SHADE, 80.0)]), now);
+        // There is time for more pixels, not for another conversion.
+        assert_eq!(after(&[(pass::SHADE, 20.0)]), Detail { divisor: 2, share: 0.25 });
+        let finest = Detail { divisor: 2, share: 0.25 };
+        assert_eq!(finest.next(&cost(&[(pass::SHADE, 1.0)])), finest);
+    }
+
+    #[test]
+    fn detail_ends_somewhere() {
+        let mut detail = Detail::default();
+        for _ in 0..40 {
+            detail = detail.next(&cost(&[(pass::SHADE, 5e3), (pass::SPLAT, 6e3)]));
+        }
+        assert_eq!((detail.divisor, detail.share), (COARSEST, LEAST_SHARE));
+    }
+}

@@ -1,0 +1,123 @@
+//! What a person changes of a light.
+
+use organza::scene::SceneLight;
+use serde::Serialize;
+use splat_core::LightShape;
+use splat_core::glam::DVec3;
+
+/// From where something comes, degrees.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Direction {
+    /// About +Y, from +Z towards +X, −180 to 180.
+    pub azimuth: f64,
+    /// Above the horizon, −90 to 90.
+    pub elevation: f64,
+}
+
+impl Direction {
+    /// The direction of a vector, of any length above 0.
+    fn of_vector(vector: DVec3) -> Self {
+        let level = libm::hypot(vector.x, vector.z);
+        Self {
+            azimuth: libm::atan2(vector.x, vector.z).to_degrees(),
+            elevation: libm::atan2(vector.y, level).to_degrees(),
+        }
+    }
+
+    /// Unit vector.
+    fn vector(self) -> DVec3 {
+        let (sine, cosine) = libm::sincos(self.azimuth.to_radians());
+        let (height, level) = libm::sincos(self.elevation.to_radians());
+        DVec3::new(level * sine, height, level * cosine)
+    }
+}
+
+/// A light, as a row of the page.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct LightRow {
+    /// How effects call it: its name, or its place in the scene's list.
+    pub name: String,
+    /// What it is, in a word.
+    pub kind: &'static str,
+    /// Stops by which it is brighter than the scene has it.
+    pub stops: f64,
+    /// From where it comes; `None` where its place does not say that.
+    pub direction: Option<Direction>,
+    /// Whether it casts shadows.
+    pub shadow: bool,
+}
+
+/// What is changed of a light.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(crate) struct LightChange {
+    pub(crate) stops: Option<f64>,
+    pub(crate) direction: Option<Direction>,
+    pub(crate) shadow: Option<bool>,
+}
+
+impl LightChange {
+    /// The changes as keys of the light with values in TOML; `centre` is what a light in a place goes around.
+    pub(crate) fn keys(&self, light: &SceneLight, centre: DVec3) -> Vec<(&'static str, String)> {
+        let mut keys = Vec::new();
+        if let Some(stops) = self.stops.filter(|stops| *stops != 0.0) {
+            let is_parallel = matches!(light.light.shape, LightShape::Directional { .. });
+            let key = if is_parallel { "irradiance" } else { "intensity" };
+            let factor = libm::exp2(stops);
+            let channels = light.light.intensity.map(|channel| format!("{:?}", (f64::from(channel) * factor) as f32));
+            keys.push((key, format!("[{}]", channels.join(", "))));
+        }
+        let vector = |v: DVec3| format!("[{:?}, {:?}, {:?}]", v.x, v.y, v.z);
+        match (self.direction, &light.light.shape) {
+            (Some(from), LightShape::Directional { .. }) => keys.push(("direction", vector(-from.vector()))),
+            (Some(from), LightShape::Point { position } | LightShape::Sphere { center: position, .. }) => {
+                let distance = (*position - centre).length();
+                keys.push(("position", vector(centre + from.vector() * distance)));
+            }
+            _ => {}
+        }
+        if let Some(shadow) = self.shadow {
+            keys.push(("shadow", shadow.to_string()));
+        }
+        keys
+    }
+}
+
+/// From where a light comes, seen from a centre; `None` for one that shines to a side of its own.
+pub(crate) fn direction_of(light: &SceneLight, centre: DVec3) -> Option<Direction> {
+    let vector = match light.light.shape {
+        LightShape::Directional { direction } => -direction,
+        LightShape::Point { position } | LightShape::Sphere { center: position, .. } => position - centre,
+        _ => return None,
+    };
+    (vector.length() > 0.0).then(|| Direction::of_vector(vector))
+}
+
+/// What a light is, in a word.
+pub(crate) fn kind_of(light: &SceneLight) -> &'static str {
+    match light.light.shape {
+        LightShape::Point { .. } => "point",
+        LightShape::Directional { .. } => "parallel light",
+        LightShape::Spot { .. } => "spot",
+        LightShape::Patch { .. } => "patch",
+        LightShape::Sphere { .. } => "sphere",
+        LightShape::Disk { .. } => "disc",
+        LightShape::Rect { .. } => "rectangle",
+        _ => "light",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_direction_comes_back_from_its_vector() {
+        for (azimuth, elevation) in [(0.0, 0.0), (90.0, 0.0), (-135.0, 30.0), (20.0, -80.0)] {
+            let direction = Direction { azimuth, elevation };
+            let again = Direction::of_vector(direction.vector() * 7.0);
+            assert!((again.azimuth - azimuth).abs() < 1e-12 && (again.elevation - elevation).abs() < 1e-12);
+        }
+        assert!((Direction { azimuth: 90.0, elevation: 0.0 }.vector() - DVec3::X).length() < 1e-15);
+        assert!((Direction { azimuth: 0.0, elevation: 90.0 }.vector() - DVec3::Y).length() < 1e-15);
+    }
+}
