@@ -181,7 +181,7 @@ fn an_interrupt_ends_it_within_a_second_while_it_draws() {
     let view = View::start(&place, &["s.toml", "--size", "320x240", "--record", "events.json"]);
     std::thread::sleep(Duration::from_millis(300));
     assert_eq!(view.interrupted().0, Some(0));
-    assert_eq!(place.bytes("events.json"), b"[]\n");
+    assert_eq!(place.bytes("events.json"), b"[\n]\n");
 }
 
 #[test]

@@ -18,9 +18,7 @@ use std::sync::Arc;
 /// Serves a page of the scene until it is closed or the command is interrupted. Whatever can be refused is refused before any work.
 pub(super) fn run(arguments: &ViewArguments) -> Result<(), Error> {
     processor_only(&arguments.scene)?;
-    for path in &arguments.record {
-        Target::new(path, arguments.force)?;
-    }
+    arguments.record.as_ref().map(|path| Target::new(path, arguments.force)).transpose()?;
     let played = arguments.play.as_ref().map(|path| read_events(path)).transpose()?.unwrap_or_default();
     let address = arguments.listen.unwrap_or(SocketAddr::from((Ipv4Addr::LOCALHOST, 0)));
     let server = Server::bind(address)?;

@@ -182,7 +182,10 @@ impl Artist {
         }
         let time = start.elapsed();
         self.made_share = Some(self.detail.share);
-        self.detail = self.detail.next(&render.cost);
+        self.detail = match showing {
+            Showing::Page => self.detail.next(&render.cost),
+            Showing::Nobody => self.detail.at_rest(&render.cost),
+        };
         if let Some(depth) = render.layers.scalar(DEPTH_LAYER) {
             desk.keep_depths(Depths { generation: request.generation, camera: coarse.camera, depth: depth.to_vec() });
         }

@@ -31,7 +31,6 @@
 #![forbid(unsafe_code)]
 
 mod artist;
-mod clients;
 mod coarse;
 mod curve;
 mod depths;
@@ -43,10 +42,8 @@ mod picture;
 mod recording;
 mod scene_text;
 mod server;
-mod serving;
 mod session;
 mod state;
-mod token;
 mod viewpoint;
 mod watch;
 mod wording;

@@ -1,18 +1,22 @@
 //! The server of the page: sockets, their limits, and when it ends.
 
-use crate::clients::Clients;
-use crate::serving::{Counter, answer};
+mod clients;
+mod serving;
+mod token;
+
 use crate::session::Session;
-use crate::token::Token;
+use clients::Clients;
 use hyper::server::conn::http1;
 use hyper::service::service_fn;
 use hyper_util::rt::{TokioIo, TokioTimer};
 use organza::{Error, Progress};
+use serving::{Counter, answer};
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr};
 use std::path::Path;
 use std::pin::pin;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
+use token::Token;
 use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::Semaphore;
 use tokio::time::{sleep, timeout};

@@ -18,6 +18,7 @@ const CHUNK: usize = 1 << 14;
 const UNIT: f64 = (1u64 << 29) as f64;
 
 /// What is known of how bright a loaded scene can be.
+#[derive(Clone)]
 pub(crate) struct Brightness {
     /// The most radiance that comes of each light in any channel, W·m⁻²·sr⁻¹, scattered or reflected once: the irradiance at the nearest place of what
     /// receives it, all points of the light together, times the peak of its material. Infinite where a lamp may lie on a point without extent.

@@ -5,7 +5,7 @@ mod facts;
 pub(crate) mod media;
 mod seen;
 
-use crate::brightness;
+use crate::brightness::{self, Brightness};
 use crate::choose::settle;
 use crate::choose::{choose, plan, row, same_forms, technique_of, techniques, unshown};
 use crate::cost::{Count, Prediction, Translucent};
@@ -95,6 +95,21 @@ pub(crate) struct Planned {
     pub(crate) plan: Plan,
     pub(crate) memory: Memory,
     statistics: Statistics,
+    census: SplatCensus,
+}
+
+/// Counts and bounds of all splats, which no camera changes.
+#[derive(Clone)]
+struct SplatCensus {
+    counts: Census,
+    brightness: Brightness,
+}
+
+impl SplatCensus {
+    fn new(scene: &Scene, loaded: &Loaded) -> Self {
+        let counts = Census::of(&loaded.cloud, &loaded.materials, &loaded.objects, &loaded.footprints);
+        Self { counts, brightness: brightness::of_scene(scene, loaded) }
+    }
 }
 
 /// What drawing reads.
@@ -146,6 +161,8 @@ pub(crate) fn prepare<'a>(
     // Of fields of a file the file alone knows what it holds.
     let inputs = cost.stages.iter().filter(|s| s.name == pass::READ).map(|s| s.bytes).sum::<u64>().max(files.bytes());
     let loading = memory::loading_bytes(&loaded, inputs);
+    // The camera alone has moved where there is a plan.
+    let census = planned.as_ref().map(|planned| planned.census.clone());
     // Shadows are judged by what a view shows, in an animation by all that there is.
     let planned = planned.filter(|_| scene.frames.is_some());
     let mut scene = Cow::Borrowed(scene);
@@ -154,7 +171,8 @@ pub(crate) fn prepare<'a>(
         Some(planned) => plan_counted(&scene, &loaded, options, Effects::of(&planned), Some(planned.plan), eye_map)?,
         None => {
             let both = loaded.cloud.bytes().saturating_mul(2);
-            let mut effects = plan_effects(&scene, &loaded, &[], 0.0, both <= options.max_memory)?;
+            let census = census.unwrap_or_else(|| SplatCensus::new(&scene, &loaded));
+            let mut effects = plan_effects(&scene, &loaded, census, &[], 0.0, both <= options.max_memory)?;
             let mut left_out: Vec<Effect> = Vec::new();
             let mut switched: Vec<SwitchedEffect> = Vec::new();
             while !effects.plan.left_out.is_empty() {
@@ -165,7 +183,8 @@ pub(crate) fn prepare<'a>(
                 gathering = gathering.max(if loaded.reduce(&scene, &reduced) { both } else { 0 });
                 scene = Cow::Owned(reduced);
                 let spent = left_out.iter().filter_map(|effect| effect.bound.number()).sum();
-                effects = plan_effects(&scene, &loaded, &left_out, spent, both <= options.max_memory)?;
+                let census = SplatCensus::new(&scene, &loaded);
+                effects = plan_effects(&scene, &loaded, census, &left_out, spent, both <= options.max_memory)?;
             }
             effects.plan.left_out = switched;
             plan_counted(&scene, &loaded, options, effects, None, eye_map)?
@@ -302,7 +321,7 @@ pub fn plan_loaded(scene: &Scene, loaded: &Loaded, options: &RenderOptions) -> R
 
 /// The same with what it takes and follows from. Effects of objects are kept, whatever their bounds.
 pub(crate) fn plan_alone(scene: &Scene, loaded: &Loaded, options: &RenderOptions) -> Result<Planned, Error> {
-    let effects = plan_effects(scene, loaded, &[], 0.0, false)?;
+    let effects = plan_effects(scene, loaded, SplatCensus::new(scene, loaded), &[], 0.0, false)?;
     plan_counted(scene, loaded, options, effects, None, EyeMap::WhereNeeded)
 }
 
@@ -332,6 +351,7 @@ struct Effects {
     statistics: Statistics,
     /// The plan but for its shadow maps.
     plan: Plan,
+    census: SplatCensus,
     /// The objects as boxes, where the plan is of one view.
     shadowing: Option<Shadowing>,
 }
@@ -339,7 +359,8 @@ struct Effects {
 impl Effects {
     /// Those that were planned before.
     fn of(planned: &Planned) -> Self {
-        Self { statistics: planned.statistics.clone(), plan: planned.plan.clone(), shadowing: None }
+        let Planned { plan, statistics, census, .. } = planned;
+        Self { statistics: statistics.clone(), plan: plan.clone(), census: census.clone(), shadowing: None }
     }
 }
 
@@ -354,7 +375,7 @@ fn plan_counted(
 ) -> Result<Planned, Error> {
     check_samples(scene)?;
     let is_new = before.is_none();
-    let Effects { statistics, mut plan, shadowing } = effects;
+    let Effects { statistics, mut plan, census, shadowing } = effects;
     let all = techniques(scene);
     let used = all.iter().filter(|t| statistics.translucent_of(**t).is_some() || row(**t).meets_discs);
     // They take turns, and each keeps what it has.
@@ -396,7 +417,7 @@ fn plan_counted(
     }
     let memory = memory.with_maps(shadows::bytes(plan.tables()));
     memory::check("rendering", memory.total(), options.max_memory)?;
-    Ok(Planned { plan, memory, statistics })
+    Ok(Planned { plan, memory, statistics, census })
 }
 
 /// The plan of a loaded scene but for its shadow maps, and what it follows from.
@@ -408,6 +429,7 @@ fn plan_counted(
 fn plan_effects(
     scene: &Scene,
     loaded: &Loaded,
+    census: SplatCensus,
     left_out: &[Effect],
     spent: f64,
     objects_may_go: bool,
@@ -418,16 +440,15 @@ fn plan_effects(
         .map(|(object, planned)| PlannedObject { technique: technique_of(object, scene), ..planned.clone() })
         .collect();
     let made: Vec<u64> = loaded.splats.iter().map(|s| s.made).collect();
-    let counts = Census::of(&loaded.cloud, &loaded.materials, &loaded.objects, &loaded.footprints);
-    let mut statistics = Statistics { counts, ..Statistics::default() };
+    let mut statistics = Statistics { counts: census.counts, ..Statistics::default() };
     statistics.lights = light_statistics(&loaded.lights, &scene.render.effects);
     statistics.media = media::of_scene(scene, loaded);
     statistics.scatters_again = carried::of_scene(scene).is_some() && scene.render.sheets.scattering().is_some();
-    let brightness = brightness::of_scene(scene, loaded);
+    let brightness = &census.brightness;
     // Of light that is scattered again and again no bound is known.
     if !statistics.scatters_again {
-        let radiances = brightness.lights;
-        statistics.lights.iter_mut().zip(radiances).for_each(|(light, radiance)| light.radiance = radiance);
+        let radiances = &brightness.lights;
+        statistics.lights.iter_mut().zip(radiances).for_each(|(light, radiance)| light.radiance = *radiance);
     }
     statistics.brightest = if statistics.scatters_again { f64::INFINITY } else { brightness.anything };
     statistics.switched = scene.render.effects.clone();
@@ -474,7 +495,7 @@ fn plan_effects(
     plan.draws = plan.by.iter().zip(&plan.is_own).map(|(by, own)| draws(by) && !own).collect();
     techniques(scene).into_iter().for_each(|t| (row(t).plans)(scene, loaded, &mut plan));
     plan.estimates = settle::all_estimates(scene, &loaded.facts);
-    Ok(Effects { statistics, plan, shadowing: Some(shadowing) })
+    Ok(Effects { statistics, plan, census, shadowing: Some(shadowing) })
 }
 
 /// Finds how much each light can lose, where it may cast shadows.

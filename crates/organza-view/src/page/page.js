@@ -427,7 +427,7 @@ function showEffects(effects) {
 function costText(effect) {
   if (effect.predicted_ms === null && effect.measured_ms === null) return "";
   const measured = effect.measured_ms === null ? "kept" : `${milliseconds(effect.measured_ms)} ms`;
-  return effect.predicted_ms === null ? measured : `${measured}, predicted ${milliseconds(effect.predicted_ms)}`;
+  return effect.predicted_ms === null ? measured : `${measured} (${milliseconds(effect.predicted_ms)})`;
 }
 
 function boundText(bound) {
@@ -443,7 +443,7 @@ function makeEffect(effect) {
   row.bound = element("span", { className: "bound" });
   row.why = element("summary");
   row.state = element("span", { className: "state" });
-  row.cost = element("span", { className: "cost", title: "Time of its passes in the last whole picture" });
+  row.cost = element("span", { className: "cost", title: "Measured time of its passes in the last whole picture, and the predicted one" });
   const group = `effect-${(rank += 1)}`;
   const switches = effect.fixed ? [] : ["auto", "on", "off"].map((word) => {
     const input = element("input", { type: "radio", name: group, value: word });

@@ -1,10 +1,10 @@
 //! Requests and their answers: who may ask, and for what.
 
-use crate::clients::{Admission, Clients, MOST_CLIENTS};
+use super::clients::{Admission, Clients, MOST_CLIENTS};
+use super::token::Token;
 use crate::depths::PicturePlace;
 use crate::event::Event;
 use crate::session::Session;
-use crate::token::Token;
 use crate::wording::{self, Said};
 use http_body_util::{BodyExt, Full, LengthLimitError, Limited};
 use hyper::body::{Bytes, Incoming};
@@ -32,10 +32,10 @@ const PATIENCE_WHILE_DRAWING: Duration = Duration::from_millis(250);
 const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; connect-src 'self'; \
                       base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
-const PAGE: &str = include_str!("page/page.html");
-const SCRIPT: &str = include_str!("page/page.js");
-const CURVE: &str = include_str!("page/curve.js");
-const STYLE: &str = include_str!("page/page.css");
+const PAGE: &str = include_str!("../page/page.html");
+const SCRIPT: &str = include_str!("../page/page.js");
+const CURVE: &str = include_str!("../page/curve.js");
+const STYLE: &str = include_str!("../page/page.css");
 
 /// What answers are made from.
 pub(crate) struct Counter {
