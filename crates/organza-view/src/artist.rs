@@ -117,6 +117,8 @@ impl Artist {
             if !desk.stays_newest(generation, PAUSE) {
                 return Err(Error::Cancelled);
             }
+            // The coarse picture has read the files.
+            self.count_values(&scene, desk, generation)?;
         }
         let progress = desk.begin(generation, Task::Whole);
         let start = Instant::now();
@@ -143,12 +145,17 @@ impl Artist {
                 Err(_) => break,
             }
         }
+        self.count_values(&scene, desk, generation)
+    }
+
+    /// Counts how often the values of volumes occur, where that is not known.
+    fn count_values(&self, scene: &Scene, desk: &Desk, generation: u64) -> Result<(), Error> {
         let is_volume = |object: &&SceneObject| object.visible && matches!(object.source, Source::Volume(_));
         for object in scene.objects.iter().filter(is_volume).filter(|object| !desk.has_values(&object.name)) {
             let progress = desk.begin(generation, Task::Ahead);
-            let values = values_of(&scene, object, self.coarse.files(), &self.options, &progress)?;
+            let values = values_of(scene, object, self.coarse.files(), &self.options, &progress);
             desk.end();
-            if let Some(values) = values {
+            if let Some(values) = values? {
                 desk.keep_values(&object.name, values);
             }
         }

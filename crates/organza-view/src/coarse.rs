@@ -17,6 +17,12 @@ const LEAST_SHARE: f64 = 1.0 / 256.0;
 /// A share that is made anew takes so much of the time alone, so that the next frames stay within it.
 const MARGIN: f64 = 0.6;
 
+/// Budgets from which on a picture is made less: times vary by as much by themselves.
+const TOO_LONG: f64 = 1.3;
+
+/// Budgets from which on a hand would rather wait once than for each picture.
+const SLUGGISH: f64 = 4.0;
+
 /// Most points that an extended light is taken for, where its penumbra is to be guessed alone.
 const LIGHT_POINTS: u32 = 4;
 
@@ -48,28 +54,15 @@ impl Default for Detail {
 }
 
 impl Detail {
-    /// The detail of the next picture, after one that cost this. Another share is converted anew, which takes a while: it changes where pixels alone
-    /// do not help, and then by as much as helps for good.
+    /// The detail of the next picture, after one that cost this. Pixels give way first, where they take the time. Another share is converted anew,
+    /// which a hand waits for: it changes where pictures would hardly follow the hand, and then by as much as helps for good.
     pub(crate) fn next(self, cost: &CostRecord) -> Self {
-        let budget = BUDGET.as_secs_f64();
-        let time = drawing_time(cost).as_secs_f64();
-        let of_pixels = seconds(cost, |name| OF_PIXELS.contains(&name));
-        if time > 1.3 * budget {
-            let is_by_pixels = of_pixels > 0.5 * time && self.divisor < COARSEST;
-            if is_by_pixels {
-                return Self { divisor: 2 * self.divisor, ..self };
-            }
-            return Self { share: self.share_within(MARGIN * budget / time), ..self };
-        }
-        if time < budget / 3.0 && self.divisor > 2 {
-            return Self { divisor: self.divisor / 2, ..self };
-        }
-        self
+        self.within(cost, SLUGGISH)
     }
 
-    /// The same while nobody waits: what would take a quarter of the time, and less, gets more splats.
+    /// The same while nobody waits: a share that takes too long gives way at once, and one that takes a quarter of the time, and less, gets more.
     pub(crate) fn at_rest(self, cost: &CostRecord) -> Self {
-        let next = self.next(cost);
+        let next = self.within(cost, TOO_LONG);
         let room = MARGIN * BUDGET.as_secs_f64() / drawing_time(cost).as_secs_f64().max(f64::MIN_POSITIVE);
         if next.share < self.share || room < 4.0 {
             return next;
@@ -79,6 +72,23 @@ impl Detail {
             share *= 2.0;
         }
         Self { share: share.min(1.0), ..next }
+    }
+
+    /// The next detail; the share changes from `budgets` on, in times of the budget.
+    fn within(self, cost: &CostRecord, budgets: f64) -> Self {
+        let budget = BUDGET.as_secs_f64();
+        let time = drawing_time(cost).as_secs_f64();
+        let of_pixels = seconds(cost, |name| OF_PIXELS.contains(&name));
+        if time > TOO_LONG * budget && of_pixels > 0.5 * time && self.divisor < COARSEST {
+            return Self { divisor: 2 * self.divisor, ..self };
+        }
+        if time > budgets * budget {
+            return Self { share: self.share_within(MARGIN * budget / time), ..self };
+        }
+        if time < budget / 3.0 && self.divisor > 2 {
+            return Self { divisor: self.divisor / 2, ..self };
+        }
+        self
     }
 
     /// The greatest power of two that is at most this part of the share.
@@ -147,8 +157,11 @@ mod tests {
         let after = |passes: &[(&str, f64)]| now.next(&cost(passes));
         // Pixels take the time: fewer of them.
         assert_eq!(after(&[(pass::SHADE, 50.0), (pass::SPLAT, 150.0)]), Detail { divisor: 8, share: 0.25 });
-        // Splats do: 60 ms of 400 ms are 0.15, of which the power of two is an eighth.
-        assert_eq!(after(&[(pass::SHADE, 390.0), (pass::SPLAT, 10.0)]), Detail { divisor: 4, share: 0.25 / 8.0 });
+        // Splats do: 60 ms of 480 ms are an eighth.
+        assert_eq!(after(&[(pass::SHADE, 470.0), (pass::SPLAT, 10.0)]), Detail { divisor: 4, share: 0.25 / 8.0 });
+        // A drag does not wait for a conversion that saves little; at rest nobody waits.
+        let slow = [(pass::SHADE, 230.0), (pass::SPLAT, 10.0)];
+        assert_eq!((after(&slow), now.at_rest(&cost(&slow))), (now, Detail { divisor: 4, share: 0.25 / 4.0 }));
         // Within the time nothing changes, and what happens once does not count.
         assert_eq!(after(&[(pass::READ, 900.0), (pass::CONVERT, 900.0), (pass::SHADE, 80.0)]), now);
         // There is time for more pixels, not for another conversion.

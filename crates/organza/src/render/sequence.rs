@@ -183,4 +183,44 @@ mod tests {
             }
         }
     }
+
+    fn has_pass(render: &Render, name: &str) -> bool {
+        render.cost.stages.iter().any(|stage| stage.name == name)
+    }
+
+    #[test]
+    fn a_frame_that_was_prepared_is_drawn_from_what_was_made() {
+        let options = RenderOptions::default();
+        let progress = Progress::new();
+        let scene = changed(&[]);
+        let mut sequence = Sequence::default();
+        sequence.prepare(&scene, &options, &progress).unwrap();
+        let kept = sequence.render(&scene, &options, &progress).unwrap();
+        let alone = render(&scene, &options, &progress).unwrap();
+        assert!(!has_pass(&kept, crate::pass::READ) && has_pass(&alone, crate::pass::READ));
+        assert_eq!((&kept.layers, &kept.plan), (&alone.layers, &alone.plan));
+        // What would be refused is refused before it is drawn.
+        let large = changed(&["camera.size=[8192, 8192]"]);
+        let little = RenderOptions { max_memory: 1 << 28, ..options };
+        let refused = sequence.prepare(&large, &little, &progress).unwrap_err().to_string();
+        assert_eq!(refused, render(&large, &little, &progress).unwrap_err().to_string());
+    }
+
+    #[test]
+    fn previews_of_thick_media_have_no_map_of_the_eye() {
+        let options = RenderOptions::default();
+        let progress = Progress::new();
+        let thick = "object.fog.medium_box={ min = [-1, -1, -1], max = [1, 1, 1], extinction = 30, spacing = 0.25 }";
+        let mut preview = Sequence::of_previews(Files::default());
+        let mut sequence = Sequence::default();
+        for position in ["[0.2, 0.1, 4]", "[1, 0.5, 4]"] {
+            let mut scene =
+                changed(&[thick, "material.smoke.medium.extinction=1", &format!("camera.position={position}")]);
+            // As one frame of many, it is planned once for all views.
+            scene.frames = Some(2);
+            let draw = |sequence: &mut Sequence| sequence.render(&scene, &options, &progress).unwrap();
+            assert!(has_pass(&draw(&mut sequence), crate::pass::EYE_MAP));
+            assert!(!has_pass(&draw(&mut preview), crate::pass::EYE_MAP));
+        }
+    }
 }
