@@ -116,6 +116,9 @@ class Curve {
   }
 
   draw() {
+    // Two pixels for one of the page, however wide the panel is: knots stay round.
+    const pixels = 2 * this.canvas.clientWidth;
+    if (pixels > 0 && this.canvas.width !== pixels) this.canvas.width = pixels;
     const pen = this.canvas.getContext("2d");
     const style = getComputedStyle(document.documentElement);
     const { width, height } = this.canvas;

@@ -379,7 +379,9 @@ function showPasses(passes) {
 }
 
 let legends = "";
-function showLegends(found) {
+function showLegends(every) {
+  // One colour alone stands for nothing.
+  const found = every.filter((legend) => !legend.is_even || new Set(legend.marks.map((mark) => mark.color.join())).size > 1);
   const text = JSON.stringify(found);
   if (text === legends) return;
   legends = text;

@@ -214,8 +214,8 @@ mod tests {
         let mut preview = Sequence::of_previews(Files::default());
         let mut sequence = Sequence::default();
         for position in ["[0.2, 0.1, 4]", "[1, 0.5, 4]"] {
-            let mut scene =
-                changed(&[thick, "material.smoke.medium.extinction=1", &format!("camera.position={position}")]);
+            let position = format!("camera.position={position}");
+            let mut scene = changed(&[thick, position.as_str()]);
             // As one frame of many, it is planned once for all views.
             scene.frames = Some(2);
             let draw = |sequence: &mut Sequence| sequence.render(&scene, &options, &progress).unwrap();
