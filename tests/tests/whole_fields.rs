@@ -194,14 +194,15 @@ fn an_array_of_a_vtk_file_is_drawn_said_and_can_be_chosen() {
     place.expect(3, &["render", "t.toml", "--set", "object.foam.array='U:w'", "-o", "q.png"], "found 'U:w'");
 }
 
-/// A ball in the left or in the right half of a grid whose steps are twice as long in the middle.
-fn steps(x: f64) -> String {
+/// Balls at these places along x, in a grid whose steps are twice as long in the middle.
+fn steps(balls: &[f64]) -> String {
     let along: Vec<f64> = (0..16).map(|i| [0.0, 0.05][usize::from(i > 7)] + 0.05 * f64::from(i)).collect();
     let mut values = String::new();
     for k in &along {
         for j in &along {
             for i in &along {
-                write!(values, "{} ", (1.0 - distance([*i, *j, *k], [x, 0.4, 0.4]) / 0.15).max(0.0)).unwrap();
+                let ball = |x: &f64| (1.0 - distance([*i, *j, *k], [*x, 0.4, 0.4]) / 0.15).max(0.0);
+                write!(values, "{} ", balls.iter().map(ball).sum::<f64>()).unwrap();
             }
         }
     }
@@ -222,24 +223,31 @@ fn steps(x: f64) -> String {
 #[test]
 fn a_series_of_files_is_drawn_by_its_times() {
     let place = Place::new("");
-    place.write("left.vtr", steps(0.2));
-    place.write("right.vtr", steps(0.6));
+    place.write("one.vtr", steps(&[0.4]));
+    place.write("two.vtr", steps(&[0.15, 0.65]));
     place.write(
         "a.pvd",
-        "<VTKFile type=\"Collection\"><Collection><DataSet timestep=\"2\" file=\"right.vtr\"/>\
-         <DataSet timestep=\"1\" file=\"left.vtr\"/></Collection></VTKFile>",
+        "<VTKFile type=\"Collection\"><Collection><DataSet timestep=\"2\" file=\"two.vtr\"/>\
+         <DataSet timestep=\"1\" file=\"one.vtr\"/></Collection></VTKFile>",
     );
     let (alpha, told) = seen(&place, "a.pvd", &[]);
-    let [left, right] = halves(&alpha);
-    assert!(left > 0.3 && right < 0.1, "{left} {right}");
+    // One ball stands in the middle of the picture, and two beside it.
+    let middle = |alpha: &[f64]| alpha[12 * 24 + 12];
+    assert!(middle(&alpha) > 0.3, "{}", middle(&alpha));
     assert!(told.contains("time 1, 0 of 2 counted from 0; `frame` chooses another"), "{told}");
     assert!(told.contains("voxels of even steps; at the points of the file the values differ by at most"), "{told}");
-    place.expect(0, &["init", "a.pvd", "-o", "a.toml"], "");
-    let view =
-        ["render", "a.toml", "-o", "b.exr", "--size", "24x24", "--azimuth", "0", "--elevation", "0", "--up", "y"];
-    said(&place, &[&view[..], &["--set", "object.a.frame=1"]].concat());
-    let [left, right] = halves(&picture_of(&place.path("b.exr")).opacity());
-    assert!(right > 0.3 && left < 0.1, "{left} {right}");
+    place.write(
+        "s.toml",
+        "version = 1\n[camera]\nauto = true\nazimuth = 0\nelevation = 0\nsize = [24, 24]\n[ambient]\ncolor = [1, 1, 1]\n[[object]]\n\
+         name = 'a'\nvolume = 'a.pvd'\nframe = 1\nunit_length = 0.05\ntransfer = [{ value = 0, color = [1, 1, 1], opacity = 0 }, \
+         { value = 1, color = [1, 1, 1], opacity = 0.9 }]\n",
+    );
+    said(&place, &["render", "s.toml", "-o", "b.exr"]);
+    let alpha = picture_of(&place.path("b.exr")).opacity();
+    let [left, right] = halves(&alpha);
+    assert!(middle(&alpha) < 0.1 && left > 0.3 && (left - right).abs() < 0.02, "{} {left} {right}", middle(&alpha));
+    let beyond = ["render", "s.toml", "-o", "c.exr", "--set", "object.a.frame=2"];
+    place.expect(3, &beyond, "expected a `frame` from 0 to 1, as the file has 2 volumes");
     let info = String::from_utf8(place.expect(0, &["info", "a.pvd"], "").stdout).unwrap();
     assert!(info.contains("volume, read as VtkXml"), "{info}");
 }
