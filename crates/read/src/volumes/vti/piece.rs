@@ -131,8 +131,7 @@ impl<'a, 'i> Piece<'_, 'a, 'i> {
     fn cells(&self, used: &mut Vec<Node<'a, 'i>>, reading: &Reading<'_>) -> Result<Cells, ReadError> {
         let dataset = self.node.parent_element();
         let is_of = |name: &&str| dataset.is_some_and(|dataset| dataset.has_tag_name(*name));
-        if let Some(dataset) =
-            dataset.filter(|_| ["ImageData", "RectilinearGrid", "StructuredGrid"].iter().any(|n| is_of(n)))
+        if let Some(dataset) = dataset.filter(|_| ["ImageData", "RectilinearGrid", "StructuredGrid"].iter().any(is_of))
         {
             return self.structured(dataset, used, reading);
         }
