@@ -27,6 +27,8 @@ pub(crate) struct Artist {
     detail: Detail,
     /// Share of the splats of the last coarse picture.
     made_share: Option<f64>,
+    /// The share that coarse pictures get while nobody waits, by the time of the last one.
+    rested_share: f64,
     /// The scene of the last request whose coarse pictures `points` refused.
     refused: Option<Scene>,
     /// Time and pixels of the last whole picture.
@@ -52,6 +54,7 @@ impl Artist {
             options,
             detail: Detail::default(),
             made_share: None,
+            rested_share: Detail::default().share,
             refused: None,
             last_whole: None,
             accepted: SURE_PIXELS,
@@ -130,6 +133,7 @@ impl Artist {
         }
         self.last_whole = Some(Pace { time: drawing_time(&render.cost), pixels });
         desk.publish(Drawn::new(render, &scene, request, Level::Whole, start.elapsed()))?;
+        self.detail.share = self.rested_share;
         // What a first drag would wait for, and the depths below the pointer, are made while nobody waits.
         while !(desk.has_depths(generation) && self.made_share == Some(self.detail.share)) {
             if !desk.stays_newest(generation, PAUSE) {
@@ -189,9 +193,11 @@ impl Artist {
         }
         let time = start.elapsed();
         self.made_share = Some(self.detail.share);
+        let rested = self.detail.at_rest(&render.cost);
+        self.rested_share = rested.share;
         self.detail = match showing {
             Showing::Page => self.detail.next(&render.cost),
-            Showing::Nobody => self.detail.at_rest(&render.cost),
+            Showing::Nobody => rested,
         };
         if let Some(depth) = render.layers.scalar(DEPTH_LAYER) {
             desk.keep_depths(Depths { generation: request.generation, camera: coarse.camera, depth: depth.to_vec() });
