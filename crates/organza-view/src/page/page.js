@@ -93,7 +93,8 @@ function lost() {
 }
 
 function sentence(error) {
-  return error.hint ? `${error.message}. ${error.hint}` : error.message;
+  const capital = (text) => text.charAt(0).toUpperCase() + text.slice(1);
+  return error.hint ? `${capital(error.message)}. ${capital(error.hint)}.` : capital(error.message);
 }
 
 let problem = "";
