@@ -76,6 +76,12 @@ pub(super) fn write_first(
             hint,
         ));
     }
+    let has_map = data.iter().any(|d| matches!(d.data, SourceData::Points(_) | SourceData::Mesh(_)));
+    if (wish.color_range.is_some() || wish.is_logarithmic) && !has_map {
+        let named = if wish.is_logarithmic { "--log" } else { "--color-range" };
+        let message = format!("{named} is for the colours of points and meshes, and no file has such");
+        return Err(Error::usage(message, "the `transfer` of a volume has its values: `organza init` writes it"));
+    }
     let written = first_scene(&data, scene_file, wish, &InMemory::default(), (files, options, &progress))?;
     written.remarks.iter().for_each(|remark| console::remark(remark));
     // The scene says what it uses of the files.

@@ -304,13 +304,14 @@ fn refuse_options_of(formats: &[Format], options: &[Flag], outputs: &[PathBuf]) 
     let has_format = |path: &PathBuf| Format::of_path(path).is_ok_and(|found| formats.contains(&found));
     let given = options.iter().find(|option| option.is_given).filter(|_| !outputs.iter().any(has_format));
     let Some(Flag { name, .. }) = given else { return Ok(()) };
-    let kind = match formats[0] {
+    let name_of = |format: &Format| match format {
         Format::Png => "PNG",
         Format::Exr => "EXR",
         Format::Jpeg => "JPEG",
     };
-    let hint = format!("add -o NAME.{}", kind.to_ascii_lowercase());
-    Err(Error::usage(format!("{name} is for {kind} files, and no output is one"), hint))
+    let kinds: Vec<&str> = formats.iter().map(name_of).collect();
+    let hint = format!("add -o NAME.{}", kinds[0].to_ascii_lowercase());
+    Err(Error::usage(format!("{name} is for {} files, and no output is one", kinds.join(" and ")), hint))
 }
 
 #[cfg(test)]

@@ -329,7 +329,8 @@ mod tests {
         let gap = [0.0, 0.0, 1.0];
         let (picture, left) = drawn([960, 540], 0.5, &[ColorScale { gap: Some(gap), ..heights() }]);
         let (plain, _) = drawn([960, 540], 0.5, &[heights()]);
-        let blue = |picture: &[[f32; 3]]| picture.iter().filter(|pixel| **pixel == gap).count();
+        let is_blue = |pixel: &&[f32; 3]| pixel[2] > 0.999 && pixel[0] < 0.001;
+        let blue = |picture: &[[f32; 3]]| picture.iter().filter(is_blue).count();
         assert_eq!((left, blue(&plain)), (0, 0));
         // A square of a bar's width: 17 pixels a side.
         assert_eq!(blue(&picture), 17 * 17);

@@ -61,6 +61,7 @@ pub(crate) fn values_of(
     let Source::Volume(volume) = &object.source else { return Ok(None) };
     let mut limits = options.read_params();
     limits.frame = volume.frame;
+    limits.array.clone_from(&object.array);
     let SourceData::Grid(grid) = files.data(scene, &volume.path, &limits, progress)? else { return Ok(None) };
     let finite = grid.values.iter().copied().filter(|value| value.is_finite());
     let range = finite.fold([f32::INFINITY, f32::NEG_INFINITY], |[low, high], value| [low.min(value), high.max(value)]);

@@ -131,8 +131,10 @@ impl Session {
         let Opening { title, file, text, load, options, files } = opening;
         let is_on_disk = file.is_file();
         let source = Source { file, text, load };
-        let stated = source.scene(source.load.overrides.clone())?;
+        let mut stated = source.scene(source.load.overrides.clone())?;
         let first = Viewpoint::of_scene(&organza::fitted(&stated, &options, progress, &files)?.0);
+        // Where the scene has its camera found, this is what lights go around.
+        stated.target = first.centre;
         let desk = Arc::new(Desk::new(first));
         let artist = Artist::new(files, options);
         let board = Arc::clone(&desk);
@@ -370,7 +372,10 @@ impl Studio {
         }
         let text = scene::read(&self.source.file)?;
         let source = Source { text, file: self.source.file.clone(), load: self.source.load.clone() };
-        let stated = source.scene(source.load.overrides.clone())?;
+        let mut stated = source.scene(source.load.overrides.clone())?;
+        if stated.fit.is_some() {
+            stated.target = self.stated.target;
+        }
         let state = self.state.of_another_scene(&self.stated, &stated);
         self.source = source;
         self.stated = stated;

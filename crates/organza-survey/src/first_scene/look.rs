@@ -267,7 +267,9 @@ fn volume_keys(grid: &Grid, matter: Option<&Matter>, look: Option<&Look>) -> Str
         text,
         "unit_length = {unit}     # opacities below are over this length: a smaller one makes all denser\ntransfer = ["
     );
-    let step = matter.map_or(1.0, |m| 1e-4 * (m.last - m.first).abs());
+    // A volume of one value states that as it is.
+    let alone = || 1e-6 * transfer.points[0].value.abs();
+    let step = matter.map_or_else(alone, |m| 1e-4 * (m.last - m.first).abs());
     for point in &transfer.points {
         // With three digits nothing may become 1, which no medium has.
         let opacity = optics::opacity(transfer.extinction * point.weight * unit_length).min(0.999);

@@ -75,7 +75,7 @@ mod tests {
     #[test]
     fn keys_of_lattices_are_named_where_slabs_hold_none() {
         let text = "version = 1\n[camera]\nposition = [0, 0, 4]\ntarget = [0, 0, 0]\nsize = [64, 48]\n\
-                    [[object]]\nname = 'pane'\nopacity = 0.5\nrectangle = { center = [0, 0, 0], u = [1, 0, 0], v = [0, 1, 0] }\n\
+                    [[object]]\nname = 'pane'\nopacity = 0.5\nrectangle = { center = [0, 0, 0], u = [1, 0, 0], v = [0, 1, 0], spacing = 0.1 }\n\
                     [render]\ntechnique = 'sheets'\nsheets = { kernel = 'linear', slab_width = 0.1 }\n";
         let scene = parse("s.toml".as_ref(), text.as_bytes(), &LoadOptions::default()).unwrap();
         let expected = "render.sheets.kernel has no part in this picture: no medium on a lattice is drawn by the technique `sheets`";
