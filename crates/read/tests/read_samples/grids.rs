@@ -68,6 +68,8 @@ pub(crate) fn vtk_rectilinear(binary: bool) -> Vec<u8> {
     let values: Vec<f64> = rectilinear_points().into_iter().map(linear).collect();
     out.extend(b"POINT_DATA 24\nSCALARS p float 1\nLOOKUP_TABLE default\n");
     out.extend(floats(binary, &values));
+    // A line end that could be cut off is none of its data.
+    out.pop();
     out
 }
 
@@ -97,13 +99,16 @@ pub(crate) fn vts(bend: f64) -> Vec<u8> {
 pub(crate) fn vtk_structured(binary: bool, bend: f64) -> Vec<u8> {
     let points = structured_points(bend);
     let values: Vec<f64> = points.iter().copied().map(linear).collect();
-    [
+    let mut out = [
         (head(binary, "STRUCTURED_GRID") + "DIMENSIONS 3 4 2\nPOINTS 24 float\n").into_bytes(),
         floats(binary, &points.concat()),
         b"POINT_DATA 24\nSCALARS p float 1\nLOOKUP_TABLE default\n".to_vec(),
         floats(binary, &values),
     ]
-    .concat()
+    .concat();
+    // As above.
+    out.pop();
+    out
 }
 
 /// Corners of a box from 0 to (2, 1, 1), and the tip of a pyramid on its side x = 2.
