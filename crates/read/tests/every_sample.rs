@@ -53,7 +53,6 @@ pub(crate) fn samples() -> Vec<(&'static str, Vec<u8>)> {
         ("steps.vtr", vtr()),
         ("steps.vtk", vtk_rectilinear(true)),
         ("straight.vts", vts(0.0)),
-        ("straight.vtk", vtk_structured(true, 0.0)),
         ("colours.vtp", vtp()),
         ("pieces.vtp", vtp_pieces()),
         ("a_3x2x2_float32.raw", volumes::raw(false)),
@@ -105,6 +104,7 @@ pub(crate) fn text_samples() -> Vec<(&'static str, Vec<u8>)> {
         ("arrays.vtk", vtk(true)),
         ("levels.laz", copc(&[5, 20])),
         ("surface.vtk", vtk_surface(true, false)),
+        ("straight.vtk", vtk_structured(true, 0.0)),
     ]
 }
 
