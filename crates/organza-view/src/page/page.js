@@ -93,8 +93,8 @@ function lost() {
 }
 
 function sentence(error) {
-  const capital = (text) => text.charAt(0).toUpperCase() + text.slice(1);
-  return error.hint ? `${capital(error.message)}. ${capital(error.hint)}.` : capital(error.message);
+  // A message may begin with the name of a file, which keeps its letters.
+  return error.hint ? `${error.message}. ${error.hint.charAt(0).toUpperCase()}${error.hint.slice(1)}.` : error.message;
 }
 
 let problem = "";
