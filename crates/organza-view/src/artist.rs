@@ -17,6 +17,9 @@ const PAUSE: Duration = Duration::from_millis(120);
 /// Pixels up to which a coarse picture comes before it is known whether the whole one is refused: a screen's.
 const SURE_PIXELS: u64 = 1920 * 1200;
 
+/// Coarse pictures that are drawn at rest until one keeps to its time, at most: pixels give way twice, and splats once or twice.
+const MOST_TRIES: usize = 6;
+
 /// What draws, and what it keeps from one picture to the next: files, splats and shadow maps where the camera alone has moved.
 pub(crate) struct Artist {
     /// Coarse pictures.
@@ -25,10 +28,8 @@ pub(crate) struct Artist {
     whole: Option<Sequence>,
     options: RenderOptions,
     detail: Detail,
-    /// Share of the splats of the last coarse picture.
-    made_share: Option<f64>,
-    /// The share that coarse pictures get while nobody waits, by the time of the last one.
-    rested_share: f64,
+    /// The detail that coarse pictures get while nobody waits, by the time of the last one; `None` where that had it.
+    rested: Option<Detail>,
     /// The scene of the last request whose coarse pictures `points` refused.
     refused: Option<Scene>,
     /// Time and pixels of the last whole picture.
@@ -53,8 +54,7 @@ impl Artist {
             whole: None,
             options,
             detail: Detail::default(),
-            made_share: None,
-            rested_share: Detail::default().share,
+            rested: None,
             refused: None,
             last_whole: None,
             accepted: SURE_PIXELS,
@@ -86,7 +86,7 @@ impl Artist {
     fn forget(&mut self) {
         self.coarse = Sequence::of_previews(Files::default());
         self.whole = None;
-        self.made_share = None;
+        self.rested = None;
         self.refused = None;
         self.last_whole = None;
         self.accepted = SURE_PIXELS;
@@ -133,9 +133,12 @@ impl Artist {
         }
         self.last_whole = Some(Pace { time: drawing_time(&render.cost), pixels });
         desk.publish(Drawn::new(render, &scene, request, Level::Whole, start.elapsed()))?;
-        self.detail.share = self.rested_share;
         // What a first drag would wait for, and the depths below the pointer, are made while nobody waits.
-        while !(desk.has_depths(generation) && self.made_share == Some(self.detail.share)) {
+        for _ in 0..MOST_TRIES {
+            if desk.has_depths(generation) && self.rested.is_none() {
+                break;
+            }
+            self.detail = self.rested.unwrap_or(self.detail);
             if !desk.stays_newest(generation, PAUSE) {
                 return Err(Error::Cancelled);
             }
@@ -192,9 +195,10 @@ impl Artist {
             return Err(Error::Cancelled);
         }
         let time = start.elapsed();
-        self.made_share = Some(self.detail.share);
         let rested = self.detail.at_rest(&render.cost);
-        self.rested_share = rested.share;
+        // More pixels cost nothing before they are drawn.
+        let is_rested = rested.share == self.detail.share && rested.divisor <= self.detail.divisor;
+        self.rested = (!is_rested).then_some(rested);
         self.detail = match showing {
             Showing::Page => self.detail.next(&render.cost),
             Showing::Nobody => rested,
