@@ -234,7 +234,7 @@ pub(super) struct SceneArguments {
     /// Exposure of PNG files, stops; EXR files keep radiance
     #[arg(long, value_name = "EV", allow_negative_numbers = true, value_parser = parse_finite)]
     pub(super) exposure: Option<f64>,
-    /// What lies behind all: a name such as white, black, grey or skyblue, or #rrggbb, as it is displayed without exposure
+    /// Colour of the background: a name such as white, black, grey or skyblue, or #rrggbb, as it is displayed without exposure
     #[arg(long, value_name = "COLOUR", value_parser = parse_color)]
     pub(super) background: Option<[f32; 3]>,
     /// Images to keep besides beauty and alpha, such as direct,shadow,depth

@@ -31,7 +31,7 @@ const LEAST_BAR: f64 = 6.0;
 /// Greatest height of a panel over that of the picture, and greatest width over its width: the middle stays free.
 const HIGHEST: f64 = 0.62;
 const WIDEST: f64 = 0.3;
-/// What the colour of no number is called.
+/// Text beside the colour of what has no number.
 const NO_NUMBER: &str = "no number";
 /// Most whole numbers of one panel.
 const MOST_ROWS: usize = 24;

@@ -16,7 +16,7 @@ const DROPLETS: [f32; 3] = [3.4, 3.4, 3.5];
 
 /// Hounsfield units of what lets bones show, from flesh to their dense shell, and of the surface of a body.
 const BONES: [f64; 4] = [130.0, 220.0, 450.0, 1100.0];
-/// What is soft around bones: its edge in air, flesh, and how much of a bone's extinction it has.
+/// The film of soft tissue around bones: Hounsfield units of its edge in air and of flesh; then its extinction over that of bone.
 const FILM: [f64; 2] = [-400.0, -150.0];
 const FILM_WEIGHT: f64 = 0.012;
 const FLESH: [f32; 3] = [0.78, 0.42, 0.32];

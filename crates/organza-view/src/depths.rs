@@ -27,7 +27,8 @@ impl Depths {
     pub(crate) fn point_at(&self, place: PicturePlace) -> Option<DVec3> {
         let [width, height] = self.camera.size;
         let pixel = |share: f64, side: u32| ((share * f64::from(side)).max(0.0) as u32).min(side.saturating_sub(1));
-        let (column, row) = (pixel(place.right, width), pixel(place.down, height));
+        let column = pixel(place.right, width);
+        let row = pixel(place.down, height);
         let depth = f64::from(*self.depth.get(row as usize * width as usize + column as usize)?);
         if !(depth.is_finite() && depth > 0.0) {
             return None;

@@ -1,4 +1,4 @@
-//! What a person changes of a light.
+//! Changes of a light: its intensity, its shadow, its direction.
 
 use organza::scene::SceneLight;
 use serde::Serialize;

@@ -306,7 +306,8 @@ mod tests {
     fn paths_lead_from_anywhere_to_the_same_files() {
         let place = tempfile::tempdir().unwrap();
         let place = place.path().canonicalize().unwrap();
-        let (scenes, data) = (place.join("a/scenes"), place.join("a/data"));
+        let scenes = place.join("a/scenes");
+        let data = place.join("a/data");
         for folder in [&scenes, &data] {
             std::fs::create_dir_all(folder).unwrap();
         }

@@ -28,7 +28,7 @@ pub enum ScaleNumbers {
 }
 
 impl ColorScale {
-    /// That of points, of which those without a number have the colour `plain`; `None` where no point has a number.
+    /// The scale of points; those without a number have the colour `plain`. `None` where no point has a number.
     pub fn of_points(object: &str, by: &ColorBy, colored: &Colored, plain: [f32; 3]) -> Option<Self> {
         let numbers = match (&by.colors, colored.range) {
             (PointColors::Map { .. }, range) => ScaleNumbers::Range(range.filter(|_| colored.has_numbers())?),

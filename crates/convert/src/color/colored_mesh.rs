@@ -18,6 +18,8 @@ use std::sync::Arc;
 const TOLERANCE: f32 = 1.0 / 64.0;
 /// Most triangles that a mesh is divided into; one that has more already keeps them.
 const MOST: usize = 2 << 20;
+/// Parts of a triangle between whose corners nothing can be interpolated: two for each.
+const PARTS: usize = 6;
 /// Edges looked at by one task.
 const CHUNK: usize = 1024;
 
@@ -66,7 +68,7 @@ pub fn colored_mesh(
     let looks = Looks { by, colored: &colored, plain: splat.color };
     match association {
         Association::Vertex => {
-            part_at_borders(&mut mesh, &looks);
+            said.extend(part_at_borders(&mut mesh, &looks));
             said.extend(divide(&mut mesh, &looks));
         }
         Association::Triangle => part(&mut mesh),
@@ -168,20 +170,23 @@ fn divide(mesh: &mut Mesh, looks: &Looks<'_>) -> Option<String> {
 }
 
 /// Parts triangles between whose corners nothing can be interpolated, in barycentric cells of the corners: two triangles for each, between the corner, the
-/// middles of its edges and the middle of the triangle.
-fn part_at_borders(mesh: &mut Mesh, looks: &Looks<'_>) {
+/// middles of its edges and the middle of the triangle. Says where there would be too many, and colours blend instead.
+fn part_at_borders(mesh: &mut Mesh, looks: &Looks<'_>) -> Option<String> {
     let values = &mesh.columns[0].values;
     let is_parted = |t: &[u32; 3]| {
         let numbers = t.map(|v| values[v as usize]);
         !(looks.are_alike(numbers[0], numbers[1]) && looks.are_alike(numbers[0], numbers[2]))
     };
-    if !mesh.triangles.iter().any(is_parted) {
-        return;
+    let count = mesh.triangles.par_iter().filter(|t| is_parted(t)).count();
+    if count == 0 {
+        return None;
     }
-    let [parted, whole]: [Vec<[u32; 3]>; 2] = {
-        let (parted, whole) = mesh.triangles.iter().copied().partition(is_parted);
-        [parted, whole]
-    };
+    if mesh.triangles.len() + (PARTS - 1) * count > MOST {
+        return Some(format!(
+            "colours blend in {count} faces between classes or beside gaps: parting them would make too many"
+        ));
+    }
+    let (parted, whole): (Vec<[u32; 3]>, Vec<[u32; 3]>) = mesh.triangles.iter().copied().partition(is_parted);
     smooth(mesh);
     mesh.color.clear();
     mesh.triangles = whole;
@@ -196,6 +201,7 @@ fn part_at_borders(mesh: &mut Mesh, looks: &Looks<'_>) {
             mesh.triangles.extend([[t[k], to_next, middle], [t[k], middle, to_last]]);
         }
     }
+    None
 }
 
 /// A vertex in the middle of a corner and others, with the mean number of those that are like the corner's.
@@ -316,6 +322,22 @@ mod tests {
             areas[usize::from(colors[0] == seven)] += 0.5 * (b - a).cross(c - a).length();
         }
         assert!((areas[0] - 2.0).abs() < 1e-6 && (areas[1] - 2.0).abs() < 1e-6, "{areas:?}");
+    }
+
+    #[test]
+    fn too_many_faces_between_classes_blend_and_that_is_said() {
+        // Strips of triangles between two rows of vertices, each of a class of its own.
+        let steps = MOST as u32 / 8;
+        let position =
+            (0..=steps).flat_map(|i| [Vec3::new(i as f32, 0.0, 0.0), Vec3::new(i as f32, 1.0, 0.0)]).collect();
+        let strip = |i: u32| [[2 * i, 2 * i + 2, 2 * i + 1], [2 * i + 1, 2 * i + 2, 2 * i + 3]];
+        let triangles: Vec<[u32; 3]> = (0..steps).flat_map(strip).collect();
+        let values = (0..2 * (steps + 1)).map(f64::from).collect();
+        let columns = vec![MeshColumn { name: "heat".into(), association: Association::Vertex, values }];
+        let mesh = Mesh { position, triangles: triangles.clone(), columns, ..Mesh::default() };
+        let shown = colored_by_heat(mesh.into(), PointColors::Distinct);
+        assert_eq!(shown.mesh.triangles, triangles);
+        assert!(shown.said[1].starts_with("colours blend in 524288 faces"), "{:?}", shown.said);
     }
 
     #[test]

@@ -161,8 +161,8 @@ fn causes(shown: &PointsShown<'_>) -> String {
 /// How colours arose, of what has one number each: a point, a vertex or a face.
 pub(crate) fn said_of_colors(by: &ColorBy, colored: &Colored, each: &str) -> String {
     if !colored.has_numbers() {
-        let all = plural(each);
-        return format!("no number of `{}` can be shown: all {all} have the object's colour", by.column);
+        let colored = plural(each);
+        return format!("no number of `{}` can be shown: all {colored} have the object's colour", by.column);
     }
     let colors = match (&by.colors, colored.range) {
         (PointColors::Map { map, scale, .. }, Some([low, high])) => {

@@ -39,7 +39,7 @@ impl Ticks {
 }
 
 impl Ticks {
-    /// Those of a range above 0 by whose logarithms numbers lie: powers of ten, and 2 and 5 times these where there are few.
+    /// Ticks of a logarithmic range, which lies above 0: powers of ten, and 2 and 5 times these where there are few.
     pub(super) fn of_powers(range: [f64; 2], most: usize) -> Self {
         let [low, high] = range;
         if !(low > 0.0 && high > low && high.is_finite()) {

@@ -197,20 +197,22 @@ fn object(file: &DataFile, preset: Option<&Preset>, colors: Option<String>) -> O
     }
 }
 
+/// Hounsfield units below which nothing in a body lies but air: half of the way to water.
+const LIGHTEST: f64 = -500.0;
+
 /// How a volume looks: a computed field in the colours of a map and labels in such, a computed tomogram as bones in a film, unless its look has a name. What scanners measure comes in whole numbers, in
 /// Hounsfield units, or in formats that state how the patient lies.
 fn volume_look(grid: &Grid, matter: Option<&Matter>, preset: Option<&Preset>, is_scan: bool) -> Option<Look> {
-    let is_field =
-        || !is_scan && !matter.is_some_and(Matter::has_units) && grid.values.iter().any(|value| value.fract() != 0.0);
+    // Around a body lies air, of about -1000: a field around 0 has no Hounsfield units, whatever its range.
+    let has_units = matter.is_some_and(|matter| matter.has_units() && matter.air.is_none_or(|air| air < LIGHTEST));
+    let is_field = || !is_scan && !has_units && grid.values.iter().any(|value| value.fract() != 0.0);
     let look = preset.map(|preset| &preset.0);
-    if let (false, None | Some(Look::Map(_)), Some(labels)) =
-        (matter.is_some_and(Matter::has_units), look, Labels::of(grid))
-    {
+    if let (false, None | Some(Look::Map(_)), Some(labels)) = (has_units, look, Labels::of(grid)) {
         let map = if let Some(Look::Map(map)) = look { *map } else { ColorMap::VIRIDIS };
         return Some(Look::Labels(map, labels));
     }
     match look {
-        None if matter.is_some_and(Matter::has_units) => Some(Look::Tomogram),
+        None if has_units => Some(Look::Tomogram),
         None if is_field() => {
             let has_both_signs = matter.is_some_and(|matter| matter.opposite.is_some());
             Some(Look::Field(if has_both_signs { ColorMap::COOLWARM } else { ColorMap::VIRIDIS }))
@@ -309,6 +311,12 @@ mod tests {
         assert_eq!(look(&units, None, false), Some(Look::Tomogram));
         let both = ball(|r| libm::exp(-r / 12.0) - libm::exp(-(r - 20.0).abs() / 12.0));
         assert_eq!(look(&both, None, false), Some(Look::Field(ColorMap::COOLWARM)));
+        // Two lobes with the range of a tomogram.
+        let sign = |i: usize| if i < 864 { 1500.0 } else { -1500.0 };
+        let values = field.values.iter().enumerate().map(|(i, value)| sign(i) * value).collect();
+        let lobes = Grid { values, ..field };
+        assert!(Matter::of(&lobes).is_some_and(|matter| matter.has_units()));
+        assert!(matches!(look(&lobes, None, false), Some(Look::Field(_))));
     }
 
     #[test]
