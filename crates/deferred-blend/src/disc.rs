@@ -234,10 +234,10 @@ impl Disc {
     /// The rays of pixels at some offsets from [`Disc::center`].
     #[inline(always)]
     pub(crate) fn meet<S: Simd>(&self, simd: S, [dx, dy]: [Lanes<S>; 2]) -> Meeting<S> {
-        let of = |v: f32| Lanes::splat(simd, v);
-        let linear = |at: f32, slope: [f32; 2]| of(slope[1]).mul_add(dy, of(slope[0]).mul_add(dx, of(at)));
+        let lanes = |v: f32| Lanes::splat(simd, v);
+        let linear = |at: f32, slope: [f32; 2]| lanes(slope[1]).mul_add(dy, lanes(slope[0]).mul_add(dx, lanes(at)));
         let facing = linear(self.facing, self.facing_slope);
-        let inverse = of(1.0) / facing;
+        let inverse = lanes(1.0) / facing;
         // Not by a map of an array: the compiler does not inline that, and calls a function for every instruction.
         let u = linear(self.along[0], self.along_slope[0]) * inverse;
         let v = linear(self.along[1], self.along_slope[1]) * inverse;

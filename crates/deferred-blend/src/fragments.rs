@@ -127,16 +127,19 @@ fn meet_block<S: Simd>(
     corner: [usize; 2],
     pixels: &mut [Vec<Fragment>; PIXELS],
 ) {
-    let of = |v: f32| Lanes::splat(simd, v);
+    let lanes = |v: f32| Lanes::splat(simd, v);
     let disc = &discs.discs[i as usize];
     let look = &discs.looks[i as usize];
     let kernel = &discs.kernels[look.footprint as usize];
     let first = position(b * PIXELS, corner[0], corner[1]);
     for lane in (0..PIXELS).step_by(Lanes::<S>::COUNT) {
         let Meeting { facing, distance_sq, depth, .. } = disc.meet(simd, offsets(simd, disc, first, lane));
-        let weight = kernel.profile(simd, (of(1.0) - distance_sq).max(of(0.0)).where_less(distance_sq, of(1.0)));
+        let weight =
+            kernel.profile(simd, (lanes(1.0) - distance_sq).max(lanes(0.0)).where_less(distance_sq, lanes(1.0)));
         let mut hits = [[0.0; MAX_LANES]; 4];
-        for (value, to) in [weight.where_less(of(0.0), depth), depth, distance_sq, facing.abs()].iter().zip(&mut hits) {
+        for (value, to) in
+            [weight.where_less(lanes(0.0), depth), depth, distance_sq, facing.abs()].iter().zip(&mut hits)
+        {
             value.store(to);
         }
         for k in 0..Lanes::<S>::COUNT {

@@ -200,10 +200,10 @@ impl<S: Simd> Frame<S> {
 /// The share of `own` that `other` covers.
 #[inline(always)]
 fn covered<S: Simd>(simd: S, lane: usize, own: &Side, other: &Side, gap: f32) -> Lanes<S> {
-    let of = |v: f32| Lanes::splat(simd, v);
-    let zero = of(0.0);
-    let one = of(1.0);
-    let least = of(LEAST);
+    let lanes = |v: f32| Lanes::splat(simd, v);
+    let zero = lanes(0.0);
+    let one = lanes(1.0);
+    let least = lanes(LEAST);
     let a = load(simd, lane, &own.axes[0]);
     let b = load(simd, lane, &own.axes[1]);
     let offset = load(simd, lane, &own.offset);
@@ -229,8 +229,8 @@ fn covered<S: Simd>(simd: S, lane: usize, own: &Side, other: &Side, gap: f32) ->
     let half = root / by.abs();
     let low = (center - half).max(zero - one);
     let high = (center + half).min(one);
-    let middle = of(0.5) * (low + high);
-    let half = (of(0.5) * (high - low)).max(zero);
+    let middle = lanes(0.5) * (low + high);
+    let half = (lanes(0.5) * (high - low)).max(zero);
     let slope = u.s.mul_add(u.t, v.s * v.t) * per_square;
     let start = u.s.mul_add(u.center, v.s * v.center) * per_square;
     // d₁ is nowhere constant along s.
@@ -238,11 +238,11 @@ fn covered<S: Simd>(simd: S, lane: usize, own: &Side, other: &Side, gap: f32) ->
     let per = one / distance.s;
     let strip_slope = distance.t * per;
     let strip_start = distance.center * per;
-    let reach = of(0.5 * gap) * (one + ratio) * per.abs();
+    let reach = lanes(0.5 * gap) * (one + ratio) * per.abs();
     let root_square = root * root;
     let mut sum = zero;
     for [node, weight] in NODES {
-        let t = half.mul_add(of(node), middle);
+        let t = half.mul_add(lanes(node), middle);
         let mine = (one - t * t).max(zero).sqrt();
         let passes = by.mul_add(t, zero - at);
         let yours = (root_square - passes * passes).max(zero).sqrt() * per_square;
@@ -250,9 +250,9 @@ fn covered<S: Simd>(simd: S, lane: usize, own: &Side, other: &Side, gap: f32) ->
         let strip = strip_start - strip_slope * t;
         let from = (zero - mine).max(center - yours).max(strip - reach);
         let to = mine.min(center + yours).min(strip + reach);
-        sum = (to - from).max(zero).mul_add(of(weight), sum);
+        sum = (to - from).max(zero).mul_add(lanes(weight), sum);
     }
-    (half * sum * of(1.0 / PI)).min(one)
+    (half * sum * lanes(1.0 / PI)).min(one)
 }
 
 #[cfg(test)]

@@ -71,13 +71,13 @@ impl Rules {
     /// A disc met by pixels from `lane` on of the block whose first pixel is `first`.
     #[inline(always)]
     pub(super) fn hit<S: Simd>(&self, simd: S, disc: &Disc, first: [usize; 2], lane: usize) -> Hit<S> {
-        let of = |v: f32| Lanes::splat(simd, v);
+        let lanes = |v: f32| Lanes::splat(simd, v);
         let Meeting { facing, inverse, distance_sq, depth } = disc.meet(simd, offsets(simd, disc, first, lane));
-        let far = of(f32::INFINITY);
-        let depth = depth.where_less_or(distance_sq, of(1.0), far);
-        let depth = depth.where_less_or(of(0.0), depth, far);
-        let across = of(self.gap * disc.radius) * inverse.abs().min(of(MOST_OBLIQUE));
-        Hit { depth, limit: depth + across.max(depth * of(LEAST_EPSILON)), distance_sq, facing }
+        let far = lanes(f32::INFINITY);
+        let depth = depth.where_less_or(distance_sq, lanes(1.0), far);
+        let depth = depth.where_less_or(lanes(0.0), depth, far);
+        let across = lanes(self.gap * disc.radius) * inverse.abs().min(lanes(MOST_OBLIQUE));
+        Hit { depth, limit: depth + across.max(depth * lanes(LEAST_EPSILON)), distance_sq, facing }
     }
 }
 
@@ -85,8 +85,8 @@ impl<S: Simd> Hit<S> {
     /// w of Eq. 1 where a ray hits.
     #[inline(always)]
     pub(super) fn weight(&self, simd: S, kernel: &Kernel) -> Lanes<S> {
-        let of = |v: f32| Lanes::splat(simd, v);
-        kernel.profile(simd, (of(1.0) - self.distance_sq).max(of(0.0))).max(of(LEAST_WEIGHT))
+        let lanes = |v: f32| Lanes::splat(simd, v);
+        kernel.profile(simd, (lanes(1.0) - self.distance_sq).max(lanes(0.0))).max(lanes(LEAST_WEIGHT))
     }
 }
 
@@ -146,12 +146,12 @@ impl Block {
     #[inline(always)]
     pub(super) fn hide<S: Simd>(&mut self, simd: S, lane: usize, hit: &Hit<S>, rules: &Rules, rank: u32) {
         let at = |line: &Line| Lanes::load(simd, &line.0[lane..]);
-        let of = |v: f32| Lanes::splat(simd, v);
-        let solid = |v: Lanes<S>| v.where_less_or(hit.distance_sq, of(rules.core), of(f32::INFINITY));
+        let lanes = |v: f32| Lanes::splat(simd, v);
+        let solid = |v: Lanes<S>| v.where_less_or(hit.distance_sq, lanes(rules.core), lanes(f32::INFINITY));
         let near = at(&self.near);
         let depth = solid(hit.depth);
         at(&self.limit).min(solid(hit.limit)).store(&mut self.limit.0[lane..]);
-        of(f32::from_bits(rank)).where_less_or(depth, near, at(&self.disc)).store(&mut self.disc.0[lane..]);
+        lanes(f32::from_bits(rank)).where_less_or(depth, near, at(&self.disc)).store(&mut self.disc.0[lane..]);
         hit.facing.where_less_or(depth, near, at(&self.facing)).store(&mut self.facing.0[lane..]);
         near.min(depth).store(&mut self.near.0[lane..]);
     }
@@ -189,8 +189,8 @@ impl Block {
         [depth, own_limit, side]: [Lanes<S>; 3],
         weight: Lanes<S>,
     ) -> Lanes<S> {
-        let of = |v: f32| Lanes::splat(simd, v);
-        let weight = (weight * of(FACING_AWAY)).where_less_or(side, of(0.0), weight);
+        let lanes = |v: f32| Lanes::splat(simd, v);
+        let weight = (weight * lanes(FACING_AWAY)).where_less_or(side, lanes(0.0), weight);
         let limit = self.limit(simd, lane);
         let near = Lanes::load(simd, &self.near.0[lane..]);
         let weight = weight.where_less(depth, limit).where_less(near, own_limit);
@@ -203,12 +203,12 @@ impl Block {
     /// Below 0 where a disc of some N and normal shows another side than the nearest.
     #[inline(always)]
     pub(super) fn side<S: Simd>(&self, simd: S, lane: usize, facing: Lanes<S>, normal: Vec3) -> Lanes<S> {
-        let of = |v: f32| Lanes::splat(simd, v);
+        let lanes = |v: f32| Lanes::splat(simd, v);
         let front = |axis: usize| Lanes::load(simd, &self.front[axis].0[lane..]);
         let a = front(0);
         let b = front(1);
         let c = front(2);
-        facing * of(normal.x).mul_add(a, of(normal.y).mul_add(b, of(normal.z) * c))
+        facing * lanes(normal.x).mul_add(a, lanes(normal.y).mul_add(b, lanes(normal.z) * c))
     }
 
     /// Adds the values of one disc.
@@ -225,11 +225,11 @@ impl Block {
     pub(super) fn normalize<S: Simd>(&self, simd: S, b: usize, tile: &mut Tile) {
         for lane in (0..PIXELS).step_by(Lanes::<S>::COUNT) {
             let at = |line: &Line| Lanes::load(simd, &line.0[lane..]);
-            let of = |v: f32| Lanes::splat(simd, v);
+            let lanes = |v: f32| Lanes::splat(simd, v);
             // Where groups have kept none of what is seen the nearest disc stands for all.
             let near = at(&self.near);
-            let weight = at(&self.weight).max(of(NO_WEIGHT));
-            let far = of(f32::INFINITY);
+            let weight = at(&self.weight).max(lanes(NO_WEIGHT));
+            let far = lanes(f32::INFINITY);
             let pixel = b * PIXELS + lane;
             (near + at(&self.depth) / weight).where_less_or(near, far, far).store(&mut tile.depth[pixel..]);
             let channels = tile.channels.chunks_exact_mut(AREA).zip(&self.nearest).zip(&self.sums);

@@ -89,7 +89,7 @@ pub(super) fn keep<S: Simd>(
     block: &mut Block,
     images: &mut GroupImages,
 ) {
-    let of = |v: f32| Lanes::splat(simd, v);
+    let lanes = |v: f32| Lanes::splat(simd, v);
     images.met = Default::default();
     for &i in list {
         let disc = &discs.discs[i as usize];
@@ -98,7 +98,7 @@ pub(super) fn keep<S: Simd>(
             block.hide(simd, lane, &hit, rules, i);
             let Hit { depth, limit, distance_sq, .. } = hit;
             // What is hidden already is never seen; by Eq. 14 it takes the place of what is, in whatever order both come.
-            let beyond = if rules.floor.is_some() { of(f32::INFINITY) } else { block.limit(simd, lane) };
+            let beyond = if rules.floor.is_some() { lanes(f32::INFINITY) } else { block.limit(simd, lane) };
             if !depth.any_less(beyond) {
                 continue;
             }
@@ -107,12 +107,12 @@ pub(super) fn keep<S: Simd>(
                 Some(floor) => behind(simd, image, lane, [floored(simd, floor, depth), distance_sq]),
                 None => depth - Lanes::load(simd, &image.depth.0[lane..]),
             };
-            if !behind.any_less(of(0.0)) {
+            if !behind.any_less(lanes(0.0)) {
                 continue;
             }
             let kernel = &discs.kernels[discs.looks[i as usize].footprint as usize];
             let keep = |line: &mut Line, new: Lanes<S>| {
-                new.where_less_or(behind, of(0.0), Lanes::load(simd, &line.0[lane..])).store(&mut line.0[lane..]);
+                new.where_less_or(behind, lanes(0.0), Lanes::load(simd, &line.0[lane..])).store(&mut line.0[lane..]);
             };
             if let Some(floor) = rules.floor {
                 keep(&mut image.step, floored(simd, floor, depth));
@@ -122,7 +122,7 @@ pub(super) fn keep<S: Simd>(
             keep(&mut image.limit, limit);
             keep(&mut image.weight, hit.weight(simd, kernel));
             keep(&mut image.facing, hit.facing);
-            keep(&mut image.disc, of(f32::from_bits(i)));
+            keep(&mut image.disc, lanes(f32::from_bits(i)));
         }
     }
 }
@@ -139,10 +139,10 @@ fn behind<S: Simd>(simd: S, image: &GroupImage, lane: usize, [step, place]: [Lan
 #[inline(always)]
 fn floored<S: Simd>(simd: S, range: [f32; 2], depth: Lanes<S>) -> Lanes<S> {
     let [near, per_depth] = range;
-    let of = |v: f32| Lanes::splat(simd, v);
-    let steps = (depth - of(near)) * of(per_depth);
-    let whole = (steps + of(TO_WHOLE)) - of(TO_WHOLE);
-    whole - of(1.0).where_less(steps, whole)
+    let lanes = |v: f32| Lanes::splat(simd, v);
+    let steps = (depth - lanes(near)) * lanes(per_depth);
+    let whole = (steps + lanes(TO_WHOLE)) - lanes(TO_WHOLE);
+    whole - lanes(1.0).where_less(steps, whole)
 }
 
 /// Fig. 6: of all images those discs are summed that no other hides.

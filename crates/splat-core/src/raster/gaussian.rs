@@ -89,8 +89,8 @@ impl Projector<'_> {
 /// Optical depth of a fragment whose s is `distance_sq`: −ln(1 − α).
 #[inline(always)]
 pub(super) fn optical_depth<S: Simd>(simd: S, opacity: f32, distance_sq: Lanes<S>) -> Lanes<S> {
-    let of = |v: f32| Lanes::splat(simd, v);
-    let alpha = (of(opacity) * distance_sq.exp_neg()).min(of(Gaussians::MOST_OPACITY));
-    let tau = of(0.0) - (of(1.0) - alpha).logarithm();
-    of(0.0).where_less_or(alpha, of(Gaussians::LEAST_OPACITY), tau)
+    let lanes = |v: f32| Lanes::splat(simd, v);
+    let alpha = (lanes(opacity) * distance_sq.exp_neg()).min(lanes(Gaussians::MOST_OPACITY));
+    let tau = lanes(0.0) - (lanes(1.0) - alpha).logarithm();
+    lanes(0.0).where_less_or(alpha, lanes(Gaussians::LEAST_OPACITY), tau)
 }

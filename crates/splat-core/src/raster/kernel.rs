@@ -125,39 +125,39 @@ impl Kernel {
     /// w at t = max(1 − s, 0), 1 − e^−q·(1 + q + q²/2) at the centre.
     #[inline(always)]
     pub fn profile<S: Simd>(&self, simd: S, t: Lanes<S>) -> Lanes<S> {
-        let of = |v: f32| Lanes::splat(simd, v);
+        let lanes = |v: f32| Lanes::splat(simd, v);
         if self.smooth {
             // Pairs first: half the latency of Horner's scheme.
             let g = &self.g;
             let t2 = t * t;
-            let a = of(g[1]).mul_add(t, of(g[0]));
-            let b = of(g[3]).mul_add(t, of(g[2]));
-            let c = of(g[5]).mul_add(t, of(g[4]));
-            let d = of(g[7]).mul_add(t, of(g[6]));
+            let a = lanes(g[1]).mul_add(t, lanes(g[0]));
+            let b = lanes(g[3]).mul_add(t, lanes(g[2]));
+            let c = lanes(g[5]).mul_add(t, lanes(g[4]));
+            let d = lanes(g[7]).mul_add(t, lanes(g[6]));
             let low = b.mul_add(t2, a);
             let high = d.mul_add(t2, c);
             return high.mul_add(t2 * t2, low) * (t2 * t);
         }
-        let q = of(self.sharpness);
+        let q = lanes(self.sharpness);
         let r = q * t;
-        let taper = of(self.rim) * (of(1.0) + r + of(0.5) * r * r);
-        ((q - r).exp_neg() - taper).max(of(0.0)).where_less(of(0.0), t)
+        let taper = lanes(self.rim) * (lanes(1.0) + r + lanes(0.5) * r * r);
+        ((q - r).exp_neg() - taper).max(lanes(0.0)).where_less(lanes(0.0), t)
     }
 
     /// Share of the kernel before a plane across the ray, `distance` behind its centre in units of [`Kernel::half_width`]·R.
     #[inline(always)]
     pub(crate) fn share_before<S: Simd>(&self, simd: S, distance: Lanes<S>) -> Lanes<S> {
-        let of = |v: f32| Lanes::splat(simd, v);
-        let t = distance.max(of(-1.0)).min(of(1.0));
+        let lanes = |v: f32| Lanes::splat(simd, v);
+        let t = distance.max(lanes(-1.0)).min(lanes(1.0));
         // Not `map`, which is not compiled into code for vectors.
         let [a, b, c, d, e, f] = self.share;
-        let [a, b, c, d, e, f] = [of(a), of(b), of(c), of(d), of(e), of(f)];
-        let before = of(1.0) + t;
-        let behind = of(1.0) - t;
+        let [a, b, c, d, e, f] = [lanes(a), lanes(b), lanes(c), lanes(d), lanes(e), lanes(f)];
+        let before = lanes(1.0) + t;
+        let behind = lanes(1.0) - t;
         let square = t * t;
         let [before, behind] = [before * before, behind * behind];
         let correction = a + square * (b + square * (c + square * (d + square * (e + square * f))));
-        let triweight = of(0.5) - t * (of(0.906_25) - t * (of(0.625) - t * of(0.156_25)));
+        let triweight = lanes(0.5) - t * (lanes(0.906_25) - t * (lanes(0.625) - t * lanes(0.156_25)));
         before * before * (triweight + t * (behind * behind) * correction)
     }
 }

@@ -82,8 +82,8 @@ impl Disc<'_> {
         match self.special {
             None => {
                 let s = run.distance_sq(simd, &self.splat);
-                let of = |v: f32| Lanes::splat(simd, v);
-                [kernel.profile(simd, (of(1.0) - s).max(of(0.0))), run.depth(simd, &self.depth)]
+                let lanes = |v: f32| Lanes::splat(simd, v);
+                [kernel.profile(simd, (lanes(1.0) - s).max(lanes(0.0))), run.depth(simd, &self.depth)]
             }
             Some(disc) => special::profile(
                 simd,
@@ -287,7 +287,7 @@ impl OpaqueTile {
     /// Step 2: weights of all fragments within ε-z of the nearest.
     #[inline(always)]
     fn blend<S: Simd>(&mut self, simd: S, projected: &Projected, disc: &Disc<'_>, values: &[f32]) {
-        let of = |v: f32| Lanes::splat(simd, v);
+        let lanes = |v: f32| Lanes::splat(simd, v);
         let runs = Runs::new(simd, &disc.splat, projected.size, [self.x, self.y]);
         self.fragments += runs.pixels();
         for run in runs {
@@ -296,15 +296,15 @@ impl OpaqueTile {
             // Behind by how much; where there is no surface −∞, and nothing counts. Before it lie the rims of nearer surfaces.
             let [profile, depth] = disc.profile(simd, run, projected.kernel(&disc.splat), projected);
             let behind = depth - nearest;
-            let amount = of(disc.splat.peak) * profile;
-            let near = amount.where_less(behind.abs(), of(EPSILON_Z * disc.depth.extent));
-            let weight = near.where_less(nearest, of(f32::INFINITY));
+            let amount = lanes(disc.splat.peak) * profile;
+            let near = amount.where_less(behind.abs(), lanes(EPSILON_Z * disc.depth.extent));
+            let weight = near.where_less(nearest, lanes(f32::INFINITY));
             let add = |plane: &mut [f32], v: Lanes<S>| (Lanes::load(simd, plane) + v).store(plane);
             add(&mut self.weight[k..], weight);
-            let finite = behind.where_less(nearest, of(f32::INFINITY));
+            let finite = behind.where_less(nearest, lanes(f32::INFINITY));
             add(&mut self.depth_sum[k..], weight * finite);
             for (c, value) in values.iter().enumerate() {
-                add(&mut self.channels[c * AREA + k..], weight * of(*value));
+                add(&mut self.channels[c * AREA + k..], weight * lanes(*value));
             }
         }
     }

@@ -200,7 +200,7 @@ struct Centers<S: Simd> {
 impl Projector<'_> {
     #[inline(always)]
     fn project<S: Simd>(&self, simd: S, attributes: &Attributes, image: &mut Image) {
-        let of = |v: f32| Lanes::splat(simd, v);
+        let lanes = |v: f32| Lanes::splat(simd, v);
         let load = |column: &Column| Lanes::load(simd, column);
         let centers = self.centers(simd, attributes);
         let shapes = match (attributes.any_medium, attributes.any_disc) {
@@ -209,16 +209,16 @@ impl Projector<'_> {
             (true, true) => {
                 let media = self.media(simd, attributes, &centers);
                 let discs = self.discs(simd, attributes, &centers);
-                media.where_less(load(&attributes.disc), of(0.0), &discs)
+                media.where_less(load(&attributes.disc), lanes(0.0), &discs)
             }
         };
         let [x, y, z] = centers.position;
-        (of(self.half.x) + x * centers.px_per_world).store(&mut image.center[0]);
-        (of(self.half.y) - y * centers.px_per_world).store(&mut image.center[1]);
+        (lanes(self.half.x) + x * centers.px_per_world).store(&mut image.center[0]);
+        (lanes(self.half.y) - y * centers.px_per_world).store(&mut image.center[1]);
         // Where a ray meets a disc through the eye plane is told from where that is seen.
-        z.where_less_or(of(0.0), shapes.near, centers.before).store(&mut image.depth);
+        z.where_less_or(lanes(0.0), shapes.near, centers.before).store(&mut image.depth);
         // Comparisons with NaN are false: what is no number has no image.
-        shapes.peak.where_less(of(0.0), shapes.peak).store(&mut image.peak);
+        shapes.peak.where_less(lanes(0.0), shapes.peak).store(&mut image.peak);
         shapes.near.store(&mut image.near);
         for k in 0..3 {
             shapes.conic[k].store(&mut image.conic[k]);
@@ -232,21 +232,28 @@ impl Projector<'_> {
 
     #[inline(always)]
     fn centers<S: Simd>(&self, simd: S, attributes: &Attributes) -> Centers<S> {
-        let of = |v: f32| Lanes::splat(simd, v);
+        let lanes = |v: f32| Lanes::splat(simd, v);
         let position = self.rotate(simd, &attributes.position);
         let t = self.view.translation;
-        let position = [position[0] + of(t.x), position[1] + of(t.y), position[2] + of(t.z)];
+        let position = [position[0] + lanes(t.x), position[1] + lanes(t.y), position[2] + lanes(t.z)];
         let [x, y, z] = position;
-        let filter_px = Lanes::load(simd, &attributes.cutoff) * of(self.filter_sigma_px);
+        let filter_px = Lanes::load(simd, &attributes.cutoff) * lanes(self.filter_sigma_px);
         if self.orthographic {
-            return Centers { position, before: z, px_per_world: of(self.focal), u: of(0.0), v: of(0.0), filter_px };
+            return Centers {
+                position,
+                before: z,
+                px_per_world: lanes(self.focal),
+                u: lanes(0.0),
+                v: lanes(0.0),
+                filter_px,
+            };
         }
         let before = z;
-        let least = Lanes::load(simd, &attributes.radius) * of(LEAST_DEPTH);
-        let side = (of(0.0) - least).where_less_or(z, of(0.0), least);
+        let least = Lanes::load(simd, &attributes.radius) * lanes(LEAST_DEPTH);
+        let side = (lanes(0.0) - least).where_less_or(z, lanes(0.0), least);
         let z = side.where_less_or(z.abs(), least, z);
         let position = [x, y, z];
-        Centers { before, position, px_per_world: of(self.focal) / z, u: x / z, v: y / z, filter_px }
+        Centers { before, position, px_per_world: lanes(self.focal) / z, u: x / z, v: y / z, filter_px }
     }
 
     /// Into view space, in the order of operations of [`ViewTransform::depth`].
@@ -318,10 +325,10 @@ impl Projector<'_> {
     /// `ratio_sq` (R/z)². Everything where the ball reaches the eye plane.
     #[inline(always)]
     fn extent_of_ball<S: Simd>(&self, simd: S, slope: Lanes<S>, length_sq: Lanes<S>, ratio_sq: Lanes<S>) -> Lanes<S> {
-        let of = |v: f32| Lanes::splat(simd, v);
+        let lanes = |v: f32| Lanes::splat(simd, v);
         let across = (ratio_sq * (length_sq - ratio_sq)).sqrt();
-        let extent = (slope.abs() * ratio_sq + across) / (of(1.0) - ratio_sq) * of(self.focal);
-        extent.where_less_or(ratio_sq, of(1.0), of(f32::INFINITY))
+        let extent = (slope.abs() * ratio_sq + across) / (lanes(1.0) - ratio_sq) * lanes(self.focal);
+        extent.where_less_or(ratio_sq, lanes(1.0), lanes(f32::INFINITY))
     }
 
     /// `peak` where a ball about the centre, or about its mirror image at the eye, reaches into the image; else 0.
@@ -329,8 +336,8 @@ impl Projector<'_> {
     fn in_view<S: Simd>(&self, simd: S, centers: &Centers<S>, radius: Lanes<S>, peak: Lanes<S>) -> Lanes<S> {
         let [x, y, z] = centers.position;
         let across = |v: Lanes<S>, reach: f32, peak: Lanes<S>| {
-            let of = |v: f32| Lanes::splat(simd, v);
-            peak.where_less(v.abs() - z.abs() * of(reach), radius * of((1.0 + reach * reach).sqrt()))
+            let lanes = |v: f32| Lanes::splat(simd, v);
+            peak.where_less(v.abs() - z.abs() * lanes(reach), radius * lanes((1.0 + reach * reach).sqrt()))
         };
         across(y, self.reach.y, across(x, self.reach.x, peak))
     }
@@ -402,17 +409,17 @@ impl Projector<'_> {
         half_extent: [Lanes<S>; 2],
         peak: Lanes<S>,
     ) -> (Lanes<S>, [Lanes<S>; 2], Lanes<S>) {
-        let of = |v: f32| Lanes::splat(simd, v);
+        let lanes = |v: f32| Lanes::splat(simd, v);
         let z = centers.before;
         let along = (axes[0][2] * axes[0][2] + axes[1][2] * axes[1][2]).sqrt();
-        let peak = peak.where_less(of(0.0), z + along);
+        let peak = peak.where_less(lanes(0.0), z + along);
         if self.orthographic {
-            return (of(1.0).where_less_or(z, along, of(-1.0)), half_extent, peak);
+            return (lanes(1.0).where_less_or(z, along, lanes(-1.0)), half_extent, peak);
         }
         let radius = dot(axes[0], axes[0]).max(dot(axes[1], axes[1])).sqrt();
-        let everywhere = |extent: Lanes<S>| of(f32::INFINITY).where_less_or(z, radius, extent);
+        let everywhere = |extent: Lanes<S>| lanes(f32::INFINITY).where_less_or(z, radius, extent);
         let seen = self.in_view(simd, centers, radius, peak).where_less_or(z, radius, peak);
-        (of(1.0).where_less_or(z, radius, of(-1.0)), half_extent.map(everywhere), seen)
+        (lanes(1.0).where_less_or(z, radius, lanes(-1.0)), half_extent.map(everywhere), seen)
     }
 
     /// Semi-axes of the discs in view space.
@@ -423,24 +430,24 @@ impl Projector<'_> {
         attributes: &Attributes,
         normal: [Lanes<S>; 3],
     ) -> ([Lanes<S>; 3], [Lanes<S>; 3]) {
-        let of = |v: f32| Lanes::splat(simd, v);
+        let lanes = |v: f32| Lanes::splat(simd, v);
         let radius = Lanes::load(simd, &attributes.radius);
         // Two vectors across the normal (Duff et al. 2017, "Building an Orthonormal Basis, Revisited").
         let [x, y, z] = normal;
-        let sign = of(-1.0).where_less_or(z, of(0.0), of(1.0));
-        let a = of(-1.0) / (sign + z);
+        let sign = lanes(-1.0).where_less_or(z, lanes(0.0), lanes(1.0));
+        let a = lanes(-1.0) / (sign + z);
         let b = x * y * a;
-        let mut axis_u = [b * radius, (sign + y * y * a) * radius, (of(0.0) - y) * radius];
+        let mut axis_u = [b * radius, (sign + y * y * a) * radius, (lanes(0.0) - y) * radius];
         if attributes.any_tangent {
             let tangent = self.rotate(simd, &attributes.tangent);
             let elliptical = tangent[0].abs().max(tangent[1].abs()).max(tangent[2].abs());
             for k in 0..3 {
-                axis_u[k] = tangent[k].where_less_or(of(0.0), elliptical, axis_u[k]);
+                axis_u[k] = tangent[k].where_less_or(lanes(0.0), elliptical, axis_u[k]);
             }
         }
         let across = cross(normal, axis_u);
         let length = dot(across, across).sqrt();
-        let scale = (radius / length).where_less(of(0.0), length);
+        let scale = (radius / length).where_less(lanes(0.0), length);
         (axis_u, [across[0] * scale, across[1] * scale, across[2] * scale])
     }
 

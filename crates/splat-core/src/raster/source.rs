@@ -126,18 +126,18 @@ impl<'a> Source<'a> {
     /// τ by the kernel alone, from s as [`Run::distance_sq`] has it.
     #[inline(always)]
     pub(crate) fn of_kernel<S: Simd>(&self, simd: S, s: Lanes<S>, run: Run<S>, rays: &TileRays) -> Lanes<S> {
-        let of = |v: f32| Lanes::splat(simd, v);
+        let lanes = |v: f32| Lanes::splat(simd, v);
         let t = if self.splat.kind == SplatKind::Medium {
-            s.negate_mul_add(rays.factors(simd, run), of(1.0))
+            s.negate_mul_add(rays.factors(simd, run), lanes(1.0))
         } else {
-            of(1.0) - s
+            lanes(1.0) - s
         };
-        of(self.splat.peak) * self.kernel.profile(simd, t.max(of(0.0)))
+        lanes(self.splat.peak) * self.kernel.profile(simd, t.max(lanes(0.0)))
     }
 
     #[inline(always)]
     fn before_the_eye<S: Simd>(&self, simd: S, run: Run<S>, rays: &TileRays) -> Lanes<S> {
-        let of = |v: f32| Lanes::splat(simd, v);
+        let lanes = |v: f32| Lanes::splat(simd, v);
         let medium = self.splat.kind == SplatKind::Medium;
         let mut tau = self.of_kernel(simd, run.distance_sq(simd, self.splat), run, rays);
         if self.is_met && !rays.opaque.is_empty() {
@@ -145,9 +145,9 @@ impl<'a> Source<'a> {
             tau = if medium {
                 // What is seen is the part between the eye and the surface, as a share of all before the eye.
                 let [per_depth, per_front] = self.depth.slope;
-                let distance = (opaque - of(self.depth.center)) * of(per_depth);
-                let behind = of(1.0) - self.kernel.share_before(simd, distance);
-                tau * behind.negate_mul_add(of(per_front), of(1.0)).max(of(0.0))
+                let distance = (opaque - lanes(self.depth.center)) * lanes(per_depth);
+                let behind = lanes(1.0) - self.kernel.share_before(simd, distance);
+                tau * behind.negate_mul_add(lanes(per_front), lanes(1.0)).max(lanes(0.0))
             } else {
                 tau.where_less(run.depth(simd, &self.depth), opaque)
             };
@@ -167,13 +167,13 @@ impl<'a> Source<'a> {
 
     #[inline(always)]
     fn of_special<S: Simd>(&self, simd: S, run: Run<S>, rays: &TileRays, disc: &SpecialDisc) -> Lanes<S> {
-        let of = |v: f32| Lanes::splat(simd, v);
+        let lanes = |v: f32| Lanes::splat(simd, v);
         let [profile, depth] = special::profile(simd, run, self.splat, disc, self.kernel, rays.is_perspective);
-        let mut tau = of(self.splat.peak) * profile;
+        let mut tau = lanes(self.splat.peak) * profile;
         if disc.slab[1] > 0.0 && rays.is_perspective {
-            let w = of(disc.center) / depth;
+            let w = lanes(disc.center) / depth;
             let ray = rays.factors(simd, run).sqrt();
-            tau = tau * of(disc.slab[1]) / ((of(disc.slab[0]) * w).abs() * ray).max(of(1e-3));
+            tau = tau * lanes(disc.slab[1]) / ((lanes(disc.slab[0]) * w).abs() * ray).max(lanes(1e-3));
         }
         if !rays.opaque.is_empty() {
             tau = tau.where_less(depth, Lanes::load(simd, &rays.opaque[run.pixel()..]));

@@ -191,9 +191,9 @@ impl<S: Simd> pulp::NullaryFnOnce for Shown<'_, S> {
     #[inline(always)]
     fn call(self) -> [Lanes<S>; 2] {
         let Self { simd, run, splat, disc, kernel, perspective, asked } = self;
-        let of = |v: f32| Lanes::splat(simd, v);
+        let lanes = |v: f32| Lanes::splat(simd, v);
         let [s, depth] = run.meet(simd, splat, disc, perspective);
-        let formula = kernel.profile(simd, (of(1.0) - s).max(of(0.0)));
+        let formula = kernel.profile(simd, (lanes(1.0) - s).max(lanes(0.0)));
         let (Some(pattern), Some(frame)) = (&kernel.pattern, &disc.image) else {
             return match asked {
                 Asked::Profile => [formula, depth],
@@ -220,7 +220,7 @@ impl<S: Simd> pulp::NullaryFnOnce for Shown<'_, S> {
         let seen = Lanes::load(simd, &out);
         match asked {
             Asked::Profile => [seen, depth],
-            Asked::Solid => [of(1.0).where_less_or(seen, of(1.0), of(0.0)), depth],
+            Asked::Solid => [lanes(1.0).where_less_or(seen, lanes(1.0), lanes(0.0)), depth],
         }
     }
 }

@@ -154,7 +154,7 @@ impl Conic {
     /// Of a splat, where its runs are.
     #[inline(always)]
     pub(crate) fn fill<S: Simd>(&mut self, simd: S, splat: &ProjectedSplat, runs: &Runs<S>) {
-        let of = |v: f32| Lanes::splat(simd, v);
+        let lanes = |v: f32| Lanes::splat(simd, v);
         let rows = runs.y..runs.y + runs.blocks / (runs.x1 - runs.x0).max(1);
         for lane in (0..PIXELS).step_by(Lanes::<S>::COUNT) {
             for x in runs.x0..runs.x1 {
@@ -162,8 +162,8 @@ impl Conic {
             }
             for y in rows.clone() {
                 let dy = offset(simd, runs.origin[1], y, &Y[lane..]);
-                (of(splat.conic[1]) * dy).store(&mut self.mixed[y % COLUMNS].0[lane..]);
-                (of(splat.conic[2]) * dy * dy).store(&mut self.square[y % COLUMNS].0[lane..]);
+                (lanes(splat.conic[1]) * dy).store(&mut self.mixed[y % COLUMNS].0[lane..]);
+                (lanes(splat.conic[2]) * dy * dy).store(&mut self.square[y % COLUMNS].0[lane..]);
             }
         }
     }
@@ -218,9 +218,9 @@ impl<S: Simd> Run<S> {
     /// s of each pixel; for a medium in perspective yet to be multiplied by the pixel's 1/|d|².
     #[inline(always)]
     pub fn distance_sq(&self, simd: S, splat: &ProjectedSplat) -> Lanes<S> {
-        let of = |v: f32| Lanes::splat(simd, v);
-        let along = of(splat.conic[0]).mul_add(self.dx, of(splat.conic[1]) * self.dy);
-        along.mul_add(self.dx, of(splat.conic[2]) * self.dy * self.dy)
+        let lanes = |v: f32| Lanes::splat(simd, v);
+        let along = lanes(splat.conic[0]).mul_add(self.dx, lanes(splat.conic[1]) * self.dy);
+        along.mul_add(self.dx, lanes(splat.conic[2]) * self.dy * self.dy)
     }
 
     /// [`Run::distance_sq`] of the splat that `conic` was made of, bit for bit.
@@ -237,20 +237,20 @@ impl<S: Simd> Run<S> {
     /// s and view depths of a special disc. Where it lies behind the eye, s is 1 and the depth the largest number.
     #[inline(always)]
     pub fn meet(&self, simd: S, splat: &ProjectedSplat, disc: &SpecialDisc, perspective: bool) -> [Lanes<S>; 2] {
-        let of = |v: f32| Lanes::splat(simd, v);
+        let lanes = |v: f32| Lanes::splat(simd, v);
         let mut s = self.distance_sq(simd, splat);
         let rise = self.rise(simd, disc);
         if !disc.crosses {
-            return [s, of(disc.center) + rise.max(of(-disc.extent)).min(of(disc.extent))];
+            return [s, lanes(disc.center) + rise.max(lanes(-disc.extent)).min(lanes(disc.extent))];
         }
-        let mut depth = of(disc.center) + rise;
+        let mut depth = lanes(disc.center) + rise;
         if perspective {
-            let w = of(1.0) - rise / of(disc.center);
+            let w = lanes(1.0) - rise / lanes(disc.center);
             s = s / (w * w);
-            depth = of(disc.center) / w;
+            depth = lanes(disc.center) / w;
         }
-        let depth = depth.min(of(f32::MAX));
-        [s.where_less_or(of(0.0), depth, of(1.0)), depth.where_less_or(of(0.0), depth, of(f32::MAX))]
+        let depth = depth.min(lanes(f32::MAX));
+        [s.where_less_or(lanes(0.0), depth, lanes(1.0)), depth.where_less_or(lanes(0.0), depth, lanes(f32::MAX))]
     }
 
     /// Places on a special disc in units of its semi-axes, from pixels about its centre by `to_disc`.
@@ -262,12 +262,12 @@ impl<S: Simd> Run<S> {
         disc: &SpecialDisc,
         perspective: bool,
     ) -> [[f32; MAX_LANES]; 2] {
-        let of = |v: f32| Lanes::splat(simd, v);
+        let lanes = |v: f32| Lanes::splat(simd, v);
         let [a, b, c, d] = *to_disc;
-        let mut x = of(a) * self.dx + of(b) * self.dy;
-        let mut y = of(c) * self.dx + of(d) * self.dy;
+        let mut x = lanes(a) * self.dx + lanes(b) * self.dy;
+        let mut y = lanes(c) * self.dx + lanes(d) * self.dy;
         if disc.crosses && perspective {
-            let w = of(1.0) - self.rise(simd, disc) / of(disc.center);
+            let w = lanes(1.0) - self.rise(simd, disc) / lanes(disc.center);
             (x, y) = (x / w, y / w);
         }
         let mut places = [[0.0; MAX_LANES]; 2];
@@ -279,16 +279,16 @@ impl<S: Simd> Run<S> {
     /// How much deeper a disc lies than at its centre, as a plane seen by parallel rays.
     #[inline(always)]
     fn rise(&self, simd: S, disc: &SpecialDisc) -> Lanes<S> {
-        let of = |v: f32| Lanes::splat(simd, v);
-        of(disc.slope[0]) * self.dx + of(disc.slope[1]) * self.dy
+        let lanes = |v: f32| Lanes::splat(simd, v);
+        lanes(disc.slope[0]) * self.dx + lanes(disc.slope[1]) * self.dy
     }
 
     /// View depths: the plane of a disc.
     #[inline(always)]
     pub fn depth(&self, simd: S, depth: &ProjectedDepth) -> Lanes<S> {
-        let of = |v: f32| Lanes::splat(simd, v);
-        let offset = of(depth.slope[0]) * self.dx + of(depth.slope[1]) * self.dy;
-        of(depth.center) + offset.max(of(-depth.extent)).min(of(depth.extent))
+        let lanes = |v: f32| Lanes::splat(simd, v);
+        let offset = lanes(depth.slope[0]) * self.dx + lanes(depth.slope[1]) * self.dy;
+        lanes(depth.center) + offset.max(lanes(-depth.extent)).min(lanes(depth.extent))
     }
 }
 

@@ -291,18 +291,18 @@ pub(crate) fn continuous<S: Simd, const C: usize>(
     distance: f32,
     ramp: f32,
 ) -> [f32; C] {
-    let of = |v| Lanes::splat(simd, v);
-    let place = of(distance);
-    let half = of(0.5);
-    let inverse = of(0.5 / ramp);
-    let none = of(0.0);
-    let whole = of(1.0);
+    let lanes = |v| Lanes::splat(simd, v);
+    let place = lanes(distance);
+    let half = lanes(0.5);
+    let inverse = lanes(0.5 / ramp);
+    let none = lanes(0.0);
+    let whole = lanes(1.0);
     let mut sums = [[0.0; WINDOW]; C];
     // The last that lies wholly before stands for all before it.
     let mut n = begin.saturating_sub(1);
     while n < list.len() {
         let (at, total) = list.window(n);
-        let left = of((list.len() - n).min(2 * WINDOW) as f32);
+        let left = lanes((list.len() - n).min(2 * WINDOW) as f32);
         for l in (0..WINDOW).step_by(Lanes::<S>::COUNT) {
             let share = |l: usize| {
                 // Nothing of what follows the list.
