@@ -16,8 +16,8 @@ fn scene(wall: &str, fog: &str, light: &str) -> String {
         )
 }
 
-/// Names of the passes that ran, from `--cost`.
-fn passes(scene: &str) -> Vec<String> {
+/// The passes that ran, from `--cost`.
+fn cost(scene: &str) -> Vec<Value> {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("s.toml"), scene).unwrap();
     let mut command = organza();
@@ -25,7 +25,12 @@ fn passes(scene: &str) -> Vec<String> {
     let out = command.output().unwrap();
     assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
     let cost: Value = serde_json::from_slice(&std::fs::read(folder.path().join("cost.json")).unwrap()).unwrap();
-    cost.as_array().unwrap().iter().map(|stage| stage["name"].as_str().unwrap().to_owned()).collect()
+    cost.as_array().unwrap().clone()
+}
+
+/// Their names.
+fn passes(scene: &str) -> Vec<String> {
+    cost(scene).iter().map(|stage| stage["name"].as_str().unwrap().to_owned()).collect()
 }
 
 fn ran(scene: &str, pass: &str) -> bool {
@@ -50,6 +55,23 @@ fn x7_sorting_is_for_translucent_and_opaque_resolution_for_opaque_splats() {
     let solid = passes(&scene("", "visible = false", ""));
     assert!(!solid.contains(&"hbsort".into()) && !solid.contains(&"splat".into()));
     assert!(!ran(&scene("visible = false", "", ""), "opaque"));
+}
+
+#[test]
+fn x7_what_opaque_splats_hide_is_not_shaded() {
+    // A wall before all of the view, and what lies behind it alone.
+    let screen = "[[object]]\nname = 'screen'\nrectangle = { center = [0, 0, 1], u = [2, 0, 0], v = [0, 2, 0], spacing = 0.05 }\n";
+    let shaded = |text: &str| {
+        let stages = cost(text);
+        stages.iter().find(|stage| stage["name"] == "shade").map_or(0, |stage| stage["items_in"].as_u64().unwrap())
+    };
+    let alone = scene("visible = false", "visible = false", "shadow = false") + screen;
+    let before = scene("", "", "shadow = false") + screen;
+    assert_eq!(shaded(&alone), shaded(&before));
+    assert_eq!(draw(&alone), draw(&before));
+    // A technique that reads them all.
+    let whole = before.replace("technique = 'points'", "technique = 'reference'");
+    assert!(shaded(&whole) > shaded(&before));
 }
 
 #[test]

@@ -147,7 +147,7 @@ pub fn compare(
     progress.enter();
     let loaded = load(&scene, options, progress, &Files::default())?;
     let plan = plan_loaded(&scene, &loaded, options)?;
-    let frame = Frame::new(&scene, &loaded, &plan, progress);
+    let frame = Frame::new(&scene, &loaded, &plan, progress).with_hidden();
     let mut cost = CostRecord::default();
     let shaded = frame.shaded(&mut cost)?;
     let sorter = Sorter {

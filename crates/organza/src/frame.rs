@@ -58,7 +58,11 @@ pub struct Frame<'a> {
     light_points: OnceCell<Vec<LightPoint>>,
     maps: OnceCell<Maps>,
     shaded: OnceCell<Shaded>,
+    /// Opaque splats alone, from when they were shaded until they are asked for.
+    solid: Cell<Option<OpaqueImage>>,
     opaque: OnceCell<OpaqueImage>,
+    /// Whether its radiance serves this picture alone: what the frame's opaque splats hide needs none then.
+    is_one_picture: bool,
 }
 
 /// Groups that frames of an animation keep: of translucent discs, and of opaque ones, for an object may have both.
@@ -114,7 +118,9 @@ impl<'a> Frame<'a> {
             light_points: OnceCell::new(),
             maps: OnceCell::new(),
             shaded: OnceCell::new(),
+            solid: Cell::default(),
             opaque: OnceCell::new(),
+            is_one_picture: true,
         }
     }
 
@@ -122,6 +128,13 @@ impl<'a> Frame<'a> {
     pub(crate) fn helped_by(mut self, device: Option<(&'a Helper<'a>, bool)>) -> Self {
         self.helper = device.map(|(helper, _)| helper);
         self.device_composites = device.is_some_and(|(_, composites)| composites);
+        self
+    }
+
+    /// With the radiance of what opaque splats hide, too, for pictures of other views or without what hides it.
+    #[must_use]
+    pub fn with_hidden(mut self) -> Self {
+        self.is_one_picture = false;
         self
     }
 

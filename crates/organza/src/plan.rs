@@ -135,6 +135,8 @@ pub struct Plan {
     pub exact: Vec<bool>,
     /// For each object, by its rank: whether its translucent splats are drawn as they are, with the radiance that the frame gives them.
     pub draws: Vec<bool>,
+    /// Whether no technique asks for the radiance of splats that opaque ones hide.
+    pub skips_hidden: bool,
 }
 
 impl Plan {

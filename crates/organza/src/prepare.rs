@@ -489,6 +489,7 @@ fn plan_effects(
     plan.bends = is_bent;
     plan.by = scene.objects.iter().map(|o| technique_of(o, scene)).collect();
     plan.exact = plan.by.iter().map(|by| row(*by).meets_discs).collect();
+    plan.skips_hidden = visible(scene).all(|o| row(technique_of(o, scene)).skips_hidden);
     plan.is_own = vec![false; scene.objects.len()];
     loaded.own.iter().for_each(|own| plan.is_own[own.object] = true);
     let draws = |by: &Technique| row(*by).draws_splats && !statistics.lit_as_drawn;

@@ -85,6 +85,8 @@ pub(crate) struct Row {
     pub(crate) gaussians: bool,
     /// Whether rays meet the opaque discs of its objects exactly; else the frame draws these as splats.
     pub(crate) meets_discs: bool,
+    /// Whether splats whose every pixel lies behind opaque ones count for nothing in it, so that they need no radiance.
+    pub(crate) skips_hidden: bool,
     /// The pass that [`Fold::prepare`] and [`Fold::check`] run, before all others, where something is its own.
     pub(crate) prepares: Option<&'static str>,
     /// Its passes; the last one comes behind opaque surfaces, those before it come before footprints.
@@ -236,6 +238,8 @@ pub(crate) static TABLE: [Row; 5] = [
         foresees: sheets::foresees,
         foresees_bytes: sheets::foresees_bytes,
         how: "are composited in slabs, volumes classified after reconstruction",
+        // Slabs, and not splats, end at what is opaque.
+        skips_hidden: false,
         form: Some(sheets::form),
         makes_alike: |a, b| a.sheets.slicing == b.sheets.slicing,
         thickest_body: Some(4.0),
@@ -264,6 +268,7 @@ pub(crate) static TABLE: [Row; 5] = [
         bumps: surfels::bumps,
         gaussians: false,
         meets_discs: true,
+        skips_hidden: false,
         by_device: false,
         steps: &[SORT, Step { pass: pass::SURFELS, stage: stage::SURFELS, counts: surfels::counts }],
         bytes: surfels::bytes,
@@ -277,6 +282,8 @@ pub(crate) static TABLE: [Row; 5] = [
         is_offered: |_| false,
         estimates: |asked| estimates::of_discs(Technique::Reference, asked),
         how: "are sorted pixel by pixel, exactly, which is slow",
+        // Its depths are rounded otherwise than those of the opaque ones.
+        skips_hidden: false,
         by_device: false,
         steps: &[Step {
             pass: pass::REFERENCE,
@@ -321,6 +328,7 @@ const POINTS: Row = Row {
     draws_splats: true,
     gaussians: true,
     meets_discs: false,
+    skips_hidden: true,
     prepares: None,
     steps: &[SORT, FOLD],
     by_device: true,

@@ -2,7 +2,8 @@
 //!
 //! 1. [`project`] turns all splats into image-space footprints: exact in perspective for media (the squared distance of a
 //!    ray from a centre is a quadratic form in the pixel offset over |d|²), an affine conic for tangent discs and Gaussians.
-//! 2. [`resolve_opaque`] finds the nearest opaque surface of each pixel by ε-z and normalised weights Σwc/Σw.
+//! 2. [`resolve_opaque`] finds the nearest opaque surface of each pixel by ε-z and normalised weights Σwc/Σw. [`NearestSurfaces`] and [`Cover`] tell
+//!    which splats are seen at all, before any is shaded.
 //! 3. [`fold`] composites translucent splats in a [`crate::SliceOrder`] in front of it.
 //! 4. [`finish`] adds the opaque surface and the background, and box-filters samples to pixels.
 //!
@@ -36,7 +37,7 @@ pub mod triangles;
 pub use crate::Accumulation;
 pub use cost::{Expected, expected, objects_in_view, tile_bytes};
 pub use finish::{Background, FinishInput, GlassImage, finish};
-pub use opaque::{OpaqueImage, OpaqueInput, resolve_opaque};
+pub use opaque::{Cover, NearestSurfaces, OpaqueImage, OpaqueInput, resolve_opaque};
 pub use project::{ProjectInput, project, project_into};
 pub use projected::{Detail, Projected, ProjectedDepth, ProjectedSplat, SpecialDisc};
 pub use pulp;

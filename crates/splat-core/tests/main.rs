@@ -6,6 +6,7 @@ mod closed_forms;
 mod drawn;
 mod environment;
 mod extended_lights;
+mod hidden;
 mod image_footprints;
 mod lattice;
 mod opaque_rim;

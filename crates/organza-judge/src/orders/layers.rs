@@ -61,7 +61,7 @@ fn without_layers(scene: &Scene) -> Option<String> {
 fn truth(scene: &Scene, loaded: &Loaded, options: &RenderOptions, progress: &Progress) -> Result<Image<Linear>, Error> {
     let plan = plan_loaded(scene, loaded, options)?;
     progress.enter();
-    let frame = Frame::new(scene, loaded, &plan, progress);
+    let frame = Frame::new(scene, loaded, &plan, progress).with_hidden();
     let mut cost = CostRecord::default();
     let values = &frame.shaded(&mut cost)?.values;
     let settings = &scene.render.surfels;

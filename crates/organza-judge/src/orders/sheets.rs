@@ -253,7 +253,7 @@ fn largest_steps(
     steps: i32,
     progress: &Progress,
 ) -> Result<Vec<f64>, Error> {
-    let mut frame = Frame::new(splats.scene, splats.loaded, splats.plan, progress);
+    let mut frame = Frame::new(splats.scene, splats.loaded, splats.plan, progress).with_hidden();
     let camera = smaller(turned(&splats.loaded.camera, splats.middle, degrees));
     frame.camera = camera;
     let sigma = frame.raster_params().resampling_sigma_px;

@@ -50,7 +50,9 @@ pub(super) fn passes(statistics: &Statistics, shadow_maps: &[bool]) -> Vec<Plann
     };
     if which != "opaque" || opaque > 0 {
         pass(pass::PROJECT, format!("{which} splats"));
-        pass(pass::SHADE, format!("{which} splats in view"));
+        let skips_hidden = opaque > 0 && statistics.techniques.iter().all(|t| row(*t).skips_hidden);
+        let seen = if skips_hidden { "that nothing opaque hides" } else { "in view" };
+        pass(pass::SHADE, format!("{which} splats {seen}"));
     }
     if let Some(opaque_things) = what_is_opaque(statistics).filter(|_| opaque > 0 || !statistics.lit_as_drawn) {
         pass(pass::OPAQUE, opaque_things);

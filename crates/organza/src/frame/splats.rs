@@ -3,11 +3,14 @@
 use super::Frame;
 use crate::pass;
 use crate::{CostRecord, Error, stage};
+use rayon::prelude::*;
 use splat_core::raster::{
-    self, Detail, FinishInput, GlassImage, OpaqueImage, OpaqueInput, ProjectInput, Projected, RasterCounts,
+    self, Cover, Detail, FinishInput, GlassImage, NearestSurfaces, OpaqueImage, OpaqueInput, ProjectInput, Projected,
+    RasterCounts,
 };
-use splat_core::shade::{Within, shade_into, shade_within};
+use splat_core::shade::{ChannelLayout, LitBy, Within, shade_into, shade_within};
 use splat_core::{Accumulator, Layers, SplatKind, StageCost};
+use tsm::ShadowMap;
 
 /// The drawn splats, ready to be composited, by id.
 #[derive(Default)]
@@ -19,9 +22,18 @@ pub struct Shaded {
     pub channels: usize,
 }
 
+/// What light a splat has, and which numbers of it are kept.
+struct Shading<'a> {
+    lights: &'a [LitBy<'a>],
+    /// The eye's map, where media are lit within.
+    eye: Option<&'a ShadowMap>,
+    layout: ChannelLayout,
+}
+
 impl Frame<'_> {
-    /// Footprints and radiance of the drawn splats in view; of those out of view the radiance is 0, but where bent rays may see them. The
-    /// passes that were run for it are added to `cost`.
+    /// Footprints and radiance of the drawn splats in view; of those out of view the radiance is 0, but where bent rays may see them, and so it is of
+    /// those that opaque ones hide, where no technique asks for them ([`Plan::skips_hidden`](crate::Plan)). The passes that were run for it are added
+    /// to `cost`.
     ///
     /// # Errors
     /// [`Error::Cancelled`], and those of [`Frame::maps`].
@@ -33,29 +45,91 @@ impl Frame<'_> {
         let Shaded { projected, mut values, .. } = self.before.take();
         let projected = self.project(projected, cost)?;
         let eye = self.eye_map(cost)?;
-        let layout = self.layout();
-        self.progress.begin(stage::SHADE);
-        cost.measure(pass::SHADE, |stage| {
-            let lights = self.lit_by(&shadows);
+        let shading = Shading { lights: &self.lit_by(&shadows), eye: eye.as_ref(), layout: self.layout() };
+        if self.skips_hidden() {
+            let mut stages = CostRecord::default();
+            self.shade_seen(&mut values, &projected, &shading, &mut stages)?;
+            stages.join(pass::SHADE);
+            stages.join(pass::OPAQUE);
+            cost.stages.extend(stages.stages);
+        } else {
+            self.progress.begin(stage::SHADE);
             let bends = self.plan.bends;
+            let splats = if bends { self.drawn().len() as u64 } else { projected.visible() };
+            self.shade(&mut values, &shading, &|i| bends || projected.is_visible(i), splats, cost)?;
+        }
+        self.tick()?;
+        Ok(self.shaded.get_or_init(|| Shaded { projected, values, channels: shading.layout.count() }))
+    }
+
+    /// Whether splats that opaque ones hide get no light.
+    fn skips_hidden(&self) -> bool {
+        self.is_one_picture && self.plan.skips_hidden && !self.device_composites && !self.solid_ids().is_empty()
+    }
+
+    /// Radiance of what is seen: of the opaque splats that some sample shows, which become an image, and of the translucent ones that do not lie behind it.
+    fn shade_seen(
+        &self,
+        values: &mut Vec<f32>,
+        projected: &Projected,
+        shading: &Shading<'_>,
+        cost: &mut CostRecord,
+    ) -> Result<(), Error> {
+        let ids = self.solid_ids();
+        let kind = &self.drawn().kind;
+        let is_solid = |i: usize| kind[i] == SplatKind::Opaque;
+        let refused = |e| Error::from_core("opaque splats", e);
+        self.progress.begin(stage::OPAQUE);
+        let nearest = cost.measure(pass::OPAQUE, |_| {
+            NearestSurfaces::find(projected, ids, self.layers.object, Some(self.progress)).map_err(refused)
+        })?;
+        self.progress.begin(stage::SHADE);
+        self.shade(values, shading, &|i| nearest.shows(i), nearest.shown(), cost)?;
+        let image = cost.measure(pass::OPAQUE, |stage| {
+            stage.items_in = ids.len() as u64;
+            let channels = shading.layout.count() as u32;
+            let (image, counts) = nearest.resolve(values, channels, Some(self.progress)).map_err(refused)?;
+            record(stage, &counts);
+            Ok::<_, Error>(image)
+        })?;
+        if ids.len() < kind.len() {
+            let cover = Cover::new(&image, projected.size);
+            let splats = (0..kind.len()).into_par_iter().with_min_len(1 << 14);
+            let is_seen = |i: usize| !is_solid(i) && projected.is_visible(i) && !cover.hides(projected, i);
+            let seen: Vec<bool> = splats.map(is_seen).collect();
+            let count = seen.iter().filter(|is_seen| **is_seen).count() as u64;
+            self.shade(values, shading, &|i| seen[i], count, cost)?;
+        }
+        self.solid.set(Some(image));
+        Ok(())
+    }
+
+    /// Radiance of those of the drawn splats that `is_one` says, so many `splats`, and 0 of the others.
+    fn shade(
+        &self,
+        values: &mut Vec<f32>,
+        shading: &Shading<'_>,
+        is_one: &(dyn Fn(usize) -> bool + Sync),
+        splats: u64,
+        cost: &mut CostRecord,
+    ) -> Result<(), Error> {
+        cost.measure(pass::SHADE, |stage| {
+            let Shading { lights, eye, layout } = shading;
             let progress = Some(self.progress);
-            let is_one = |i| bends || projected.is_visible(i);
-            let input = &self.shading(&lights);
-            let shaded = match &eye {
+            let input = &self.shading(lights);
+            let shaded = match eye {
                 Some(eye) => {
-                    let within = Within { input, eye, footprints: &self.loaded.footprints };
-                    shade_within(&mut values, &within, is_one, &layout, progress)
+                    let within = Within { input, eye: *eye, footprints: &self.loaded.footprints };
+                    shade_within(values, &within, is_one, layout, progress)
                 }
-                None => shade_into(&mut values, input, is_one, &layout, progress),
+                None => shade_into(values, input, is_one, layout, progress),
             };
             shaded.map_err(|e| Error::from_core("shading", e))?;
-            stage.items_in = if bends { self.drawn().len() as u64 } else { projected.visible() };
-            stage.items_out = stage.items_in;
+            stage.items_in = splats;
+            stage.items_out = splats;
             stage.bytes = 4 * values.len() as u64;
             Ok::<_, Error>(())
-        })?;
-        self.tick()?;
-        Ok(self.shaded.get_or_init(|| Shaded { projected, values, channels: layout.count() }))
+        })
     }
 
     /// Depths are for opaque splats and what they hide, for what polygons part, for depth layers, and for telling objects apart.
@@ -121,19 +195,23 @@ impl Frame<'_> {
         let alone = self.shaded.get().is_none() && !ids.is_empty();
         let by_device = if alone { self.solid_by_device(ids, cost)? } else { None };
         let mut image = by_device.unwrap_or_default();
-        if !ids.is_empty() && image.depth.is_empty() {
-            let Shaded { projected, values, channels } = self.shaded(cost)?;
-            self.progress.begin(stage::OPAQUE);
-            image = cost.measure(pass::OPAQUE, |stage| {
-                stage.items_in = ids.len() as u64;
-                let objects = self.layers.object;
-                let input = OpaqueInput { projected, ids, values, channels: *channels as u32, objects };
-                let resolved = raster::resolve_opaque(&input, Some(self.progress));
-                let (image, counts) = resolved.map_err(|e| Error::from_core("opaque splats", e))?;
-                record(stage, &counts);
-                Ok::<_, Error>(image)
-            })?;
+        if ids.is_empty() || !image.depth.is_empty() {
+            return Ok(image);
         }
+        let Shaded { projected, values, channels } = self.shaded(cost)?;
+        if let Some(image) = self.solid.take() {
+            return Ok(image);
+        }
+        self.progress.begin(stage::OPAQUE);
+        image = cost.measure(pass::OPAQUE, |stage| {
+            stage.items_in = ids.len() as u64;
+            let objects = self.layers.object;
+            let input = OpaqueInput { projected, ids, values, channels: *channels as u32, objects };
+            let resolved = raster::resolve_opaque(&input, Some(self.progress));
+            let (image, counts) = resolved.map_err(|e| Error::from_core("opaque splats", e))?;
+            record(stage, &counts);
+            Ok::<_, Error>(image)
+        })?;
         Ok(image)
     }
 

@@ -63,17 +63,16 @@ impl TileRays {
     pub(crate) fn place(&self, source: &Source<'_>) -> Place {
         let ProjectedDepth { center, slope, extent, .. } = source.depth;
         let [near, far] = self.ends;
-        let splat = source.splat;
-        let (before, behind) = if self.opaque.is_empty() {
-            (true, false)
-        } else if source.special.is_some() || splat.is_gaussian() {
-            (false, false)
-        } else if splat.kind == SplatKind::Medium {
-            let [near, far] = [near, far].map(|opaque| (opaque - center) * slope[0]);
-            (near >= 1.0, far <= -1.0 && slope[1] >= 1.0)
+        let before = if self.opaque.is_empty() {
+            true
+        } else if source.special.is_some() || source.splat.is_gaussian() {
+            false
+        } else if source.splat.kind == SplatKind::Medium {
+            (near - center) * slope[0] >= 1.0
         } else {
-            (center + extent < near, center - extent >= far)
+            center + extent < near
         };
+        let behind = !self.opaque.is_empty() && source.is_behind(far);
         match (before, behind) {
             (true, _) => Place::Before,
             (_, true) => Place::Behind,
@@ -103,6 +102,19 @@ impl<'a> Source<'a> {
             depth: projected.depths.get(i as usize).copied().unwrap_or_default(),
             kernel: projected.kernel(splat),
             is_met: true,
+        }
+    }
+
+    /// Whether it lies behind surfaces that are nowhere farther than so deep, as far as it is told without a look at pixels.
+    #[inline(always)]
+    pub(crate) fn is_behind(&self, farthest: f32) -> bool {
+        let ProjectedDepth { center, slope, extent, .. } = self.depth;
+        if self.special.is_some() || self.splat.is_gaussian() {
+            false
+        } else if self.splat.kind == SplatKind::Medium {
+            (farthest - center) * slope[0] <= -1.0 && slope[1] >= 1.0
+        } else {
+            center - extent >= farthest
         }
     }
 
