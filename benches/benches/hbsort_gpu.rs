@@ -41,7 +41,7 @@ fn measure(device: &mut dyn Executor, splats: usize) -> Result<(), Box<dyn std::
     let recorded = record(Capacities { splats: splats as u32, kept: splats as u32 });
     let uploads = recorded.uploads(&cloud, None, &camera, &params)?;
     let inputs = recorded.inputs(&uploads);
-    let mut all = vec![Lanes::Portable, Lanes::of(device.adapter())];
+    let mut all = vec![Lanes::Portable, Lanes::for_adapter(device.adapter())];
     all.dedup();
     let mut ways = Vec::new();
     for lanes in all {

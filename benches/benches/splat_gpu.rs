@@ -56,7 +56,7 @@ fn ready(
     input: &FoldInput<'_>,
     empty: &Accumulator,
 ) -> Result<(Recorded, Box<dyn Ready>), DeviceError> {
-    let lanes = Lanes::of(device.adapter());
+    let lanes = Lanes::for_adapter(device.adapter());
     let mut made = |entries| {
         let recorded = record(input.capacities(empty, entries)).expect("a size that is recorded");
         let ready = device.prepare(&recorded.recording.by(lanes))?;

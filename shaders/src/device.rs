@@ -145,7 +145,7 @@ pub struct Run {
 impl Run {
     /// The bytes that were read of a buffer; none if the recording does not read it.
     pub fn bytes(&self, buffer: BufferId) -> &[u8] {
-        self.reads.iter().find(|(of, _)| *of == buffer).map_or(&[], |(_, bytes)| bytes)
+        self.reads.iter().find(|(read, _)| *read == buffer).map_or(&[], |(_, bytes)| bytes)
     }
 }
 
@@ -285,16 +285,16 @@ mod tests {
     fn a_software_driver_is_never_chosen_silently() {
         let software = adapter("llvmpipe", AdapterKind::Software);
         assert_eq!(Choice::Gpu.pick(std::slice::from_ref(&software)), None);
-        let all = [
+        let adapters = [
             software,
             adapter("small", AdapterKind::Integrated),
             adapter("odd", AdapterKind::Other),
             adapter("large", AdapterKind::Discrete),
         ];
-        assert_eq!(Choice::Gpu.pick(&all), Some(3));
-        assert_eq!(Choice::Gpu.pick(&all[..3]), Some(1));
-        assert_eq!(Choice::Software.pick(&all), Some(0));
-        assert_eq!(Choice::Named("mal".to_owned()).pick(&all), Some(1));
-        assert_eq!([Choice::Place(3).pick(&all), Choice::Place(4).pick(&all)], [Some(3), None]);
+        assert_eq!(Choice::Gpu.pick(&adapters), Some(3));
+        assert_eq!(Choice::Gpu.pick(&adapters[..3]), Some(1));
+        assert_eq!(Choice::Software.pick(&adapters), Some(0));
+        assert_eq!(Choice::Named("mal".to_owned()).pick(&adapters), Some(1));
+        assert_eq!([Choice::Place(3).pick(&adapters), Choice::Place(4).pick(&adapters)], [Some(3), None]);
     }
 }

@@ -14,7 +14,7 @@ pub struct Joined {
 impl Joined {
     /// The buffer of the whole that stands for this one of the joined recording; of another recording none, which
     /// [`Recording::check`] finds.
-    pub fn of(&self, buffer: BufferId) -> BufferId {
+    pub fn buffer(&self, buffer: BufferId) -> BufferId {
         self.places.get(buffer.index()).copied().unwrap_or(BufferId(u32::MAX))
     }
 
@@ -23,7 +23,7 @@ impl Joined {
         &self,
         inputs: impl IntoIterator<Item = (BufferId, &'a [u8])>,
     ) -> impl Iterator<Item = (BufferId, &'a [u8])> {
-        inputs.into_iter().map(|(buffer, bytes)| (self.of(buffer), bytes))
+        inputs.into_iter().map(|(buffer, bytes)| (self.buffer(buffer), bytes))
     }
 }
 
@@ -36,7 +36,7 @@ impl Recording {
         for step in &other.steps {
             match step {
                 Step::Upload(_) => {}
-                Step::Read(buffer) => self.read(joined.of(*buffer)),
+                Step::Read(buffer) => self.read(joined.buffer(*buffer)),
                 Step::Dispatch(dispatch) => self.steps.push(Step::Dispatch(moved(dispatch, &joined))),
             }
         }
@@ -48,7 +48,7 @@ impl Recording {
     pub fn join_uploads(&mut self, other: &Recording, shared: &[(BufferId, BufferId)]) -> Joined {
         let mut places = Vec::with_capacity(other.buffers.len());
         for (at, buffer) in (0u32..).zip(&other.buffers) {
-            let known = shared.iter().find(|(of, _)| of.0 == at).map(|(_, to)| *to);
+            let known = shared.iter().find(|(from, _)| from.0 == at).map(|(_, to)| *to);
             places.push(known.unwrap_or_else(|| self.scratch(buffer.name, buffer.bytes)));
             if let Some(Buffer { bytes, .. }) = known.and_then(|to| self.buffers.get_mut(to.index())) {
                 *bytes = buffer.bytes.max(*bytes);
@@ -58,9 +58,9 @@ impl Recording {
         let mut uploads = self.steps.iter().take_while(|step| matches!(step, Step::Upload(_))).count();
         for step in &other.steps {
             if let Step::Upload(buffer) = step
-                && !shared.iter().any(|(of, _)| of == buffer)
+                && !shared.iter().any(|(from, _)| from == buffer)
             {
-                self.steps.insert(uploads, Step::Upload(joined.of(*buffer)));
+                self.steps.insert(uploads, Step::Upload(joined.buffer(*buffer)));
                 uploads += 1;
             }
         }
@@ -79,16 +79,16 @@ impl Recording {
 
     /// Reads back these buffers alone, of those that are read.
     pub fn read_only(&mut self, buffers: &[BufferId]) {
-        self.steps.retain(|step| !matches!(step, Step::Read(of) if !buffers.contains(of)));
+        self.steps.retain(|step| !matches!(step, Step::Read(read) if !buffers.contains(read)));
     }
 }
 
 fn moved(dispatch: &Dispatch, joined: &Joined) -> Dispatch {
     let groups = match dispatch.groups {
-        Groups::Indirect { buffer, offset } => Groups::Indirect { buffer: joined.of(buffer), offset },
+        Groups::Indirect { buffer, offset } => Groups::Indirect { buffer: joined.buffer(buffer), offset },
         direct @ Groups::Direct(_) => direct,
     };
-    let buffers = dispatch.buffers.iter().map(|buffer| joined.of(*buffer)).collect();
+    let buffers = dispatch.buffers.iter().map(|buffer| joined.buffer(*buffer)).collect();
     Dispatch { groups, buffers, ..dispatch.clone() }
 }
 
@@ -111,9 +111,9 @@ mod tests {
     #[test]
     fn what_one_leaves_the_other_takes_up() {
         let (mut first, [scan, numbers, sums]) = reduced(64);
-        let (second, of) = reduced(128);
-        let joined = first.join(&second, &[(of[0], scan), (of[1], sums)]);
-        assert_eq!([joined.of(of[0]), joined.of(of[1])], [scan, sums]);
+        let (second, buffers) = reduced(128);
+        let joined = first.join(&second, &[(buffers[0], scan), (buffers[1], sums)]);
+        assert_eq!([joined.buffer(buffers[0]), joined.buffer(buffers[1])], [scan, sums]);
         let text = "\
 buffer  0 scan             8 bytes
 buffer  1 numbers          64 bytes
@@ -131,18 +131,18 @@ read sums
         // The second run waits for the first, as if both had been recorded at once.
         let waits = barriers(&first);
         assert!(waits[4].iter().any(|wait| wait.buffer == sums && wait.from == crate::Use::KernelWrite));
-        first.read_only(&[joined.of(of[2])]);
+        first.read_only(&[joined.buffer(buffers[2])]);
         assert_eq!(first.steps().iter().filter(|s| matches!(s, Step::Read(_))).count(), 1);
-        let inputs: Vec<_> = joined.inputs([(of[0], &[1u8; 8][..]), (of[2], &[])]).map(|(b, _)| b).collect();
-        assert_eq!(inputs, [scan, joined.of(of[2])]);
+        let inputs: Vec<_> = joined.inputs([(buffers[0], &[1u8; 8][..]), (buffers[2], &[])]).map(|(b, _)| b).collect();
+        assert_eq!(inputs, [scan, joined.buffer(buffers[2])]);
         assert_eq!(numbers.index(), 1);
     }
 
     #[test]
     fn dispatches_are_repeated_on_the_same_buffers() {
         let (mut whole, [scan, _, sums]) = reduced(64);
-        let (other, of) = reduced(128);
-        let joined = whole.join_uploads(&other, &[(of[0], scan)]);
+        let (other, buffers) = reduced(128);
+        let joined = whole.join_uploads(&other, &[(buffers[0], scan)]);
         for offset in [0, 4] {
             whole.join_dispatches(&other, &joined, Groups::Indirect { buffer: sums, offset });
         }
@@ -178,7 +178,7 @@ scan_reduce sums@4 scan numbers sums*
             larger.scratch("x", 4);
         }
         let strange = larger.scratch("x", 4);
-        first.dispatch(&SCAN_SPINE, Groups::cover(1), &[scan, joined.of(strange)], &[]);
+        first.dispatch(&SCAN_SPINE, Groups::cover(1), &[scan, joined.buffer(strange)], &[]);
         let fault = first.check().expect_err("a stranger").to_string();
         assert!(fault.ends_with("a buffer of another recording"), "{fault}");
     }

@@ -53,7 +53,7 @@ pub enum Lanes {
 
 impl Lanes {
     /// What suits a device: subgroups where it has all that kernels take of them.
-    pub fn of(adapter: &Adapter) -> Self {
+    pub fn for_adapter(adapter: &Adapter) -> Self {
         if SubgroupOps::ALL.beyond(adapter.subgroup_ops).is_none() { Self::Subgroup } else { Self::Portable }
     }
 }
@@ -143,10 +143,13 @@ mod tests {
         for (had, what) in [(SubgroupOps::NONE, "sums of subgroups"), (sums, "shuffles of subgroups")] {
             let refused = adapter(had).accept(&sort().by(Lanes::Subgroup));
             assert!(matches!(refused, Err(DeviceError::Lacking { what: found, .. }) if found == what), "{refused:?}");
-            assert_eq!(Lanes::of(&adapter(had)), Lanes::Portable);
+            assert_eq!(Lanes::for_adapter(&adapter(had)), Lanes::Portable);
             assert_eq!(adapter(had).accept(&sort()), Ok(()));
         }
-        let all = adapter(SubgroupOps::ALL);
-        assert_eq!((all.accept(&sort().by(Lanes::Subgroup)), Lanes::of(&all)), (Ok(()), Lanes::Subgroup));
+        let capable = adapter(SubgroupOps::ALL);
+        assert_eq!(
+            (capable.accept(&sort().by(Lanes::Subgroup)), Lanes::for_adapter(&capable)),
+            (Ok(()), Lanes::Subgroup)
+        );
     }
 }

@@ -59,7 +59,7 @@ macro_rules! layouts {
         )*
 
         /// Name, fields and size in bytes of every shared struct.
-        pub fn all() -> Vec<(&'static str, Vec<$crate::Field>, usize)> {
+        pub fn structs() -> Vec<(&'static str, Vec<$crate::Field>, usize)> {
             use $crate::Layout;
             vec![$((<$name>::NAME, <$name>::fields(), size_of::<$name>())),*]
         }

@@ -83,7 +83,7 @@ fn cover(blocks: u32) -> [u32; 2] {
 
 impl SortState {
     /// A sort of this many entries, where their number is known before: what the device would have prepared.
-    pub fn of(entries: u32) -> Self {
+    pub fn for_entries(entries: u32) -> Self {
         let blocks = entries.div_ceil(SORT_BLOCK);
         let [sort_groups_x, sort_groups_y] = cover(blocks);
         let [scan_groups_x, scan_groups_y] = cover(digit_counts(entries).div_ceil(SCAN_BLOCK));

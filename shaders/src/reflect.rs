@@ -94,11 +94,11 @@ fn read(op: u32, words: &[u32], ids: &mut Ids, module: &mut Module) {
 
 fn finish(ids: &Ids, module: &mut Module) {
     for (kind, id, class) in &ids.variables {
-        let of = |what| ids.decorations.get(&(*id, what)).copied();
+        let decoration = |what| ids.decorations.get(&(*id, what)).copied();
         match *class {
             STORAGE_BUFFER => {
-                let place = (of(DESCRIPTOR_SET).unwrap_or(0), of(BINDING).unwrap_or(0));
-                module.buffers.insert(place, of(NON_WRITABLE).is_some());
+                let place = (decoration(DESCRIPTOR_SET).unwrap_or(0), decoration(BINDING).unwrap_or(0));
+                module.buffers.insert(place, decoration(NON_WRITABLE).is_some());
             }
             PUSH_CONSTANT => {
                 let block = ids.pointees.get(kind).and_then(|pointee| ids.struct_sizes.get(pointee));

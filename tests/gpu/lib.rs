@@ -73,7 +73,7 @@ impl Device {
 
     /// The portable kernels, and those by subgroups where the device has them.
     pub fn lanes(&self) -> Vec<Lanes> {
-        let mut lanes = vec![Lanes::Portable, Lanes::of(self.adapter())];
+        let mut lanes = vec![Lanes::Portable, Lanes::for_adapter(self.adapter())];
         lanes.dedup();
         lanes
     }

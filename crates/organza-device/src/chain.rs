@@ -194,7 +194,7 @@ fn run_on(
         return Ok(Err(Reason::TooLarge));
     };
     let mut looked_up = None;
-    let lanes = Lanes::of(device.adapter());
+    let lanes = Lanes::for_adapter(device.adapter());
     loop {
         let whole = Whole::record(&rooms, &attributes, splats.input, splats.layout, sorts, &casts)?;
         let mut ready = match device.prepare(&whole.recording.by(lanes)) {
@@ -208,7 +208,7 @@ fn run_on(
         let run = |inputs: &[(BufferId, &[u8])]| ready.run(inputs).map_err(Failure::from);
         let run = whole.with_inputs(splats, &all, &attributes, &received, accumulator, run)?;
         let (projected, joined) = &whole.project;
-        let projection = run.bytes(joined.of(projected.state));
+        let projection = run.bytes(joined.buffer(projected.state));
         if project::through_the_eye(projection)? > 0 {
             return Ok(Err(Reason::ThroughTheEye));
         }

@@ -187,7 +187,7 @@ impl<'a> Folding<'a> {
                 let nearest = Nearest::of(device.adapter());
                 let generated =
                     light.with(scene, ensemble, |lighting| record_generated(room, nearest, lighting, sources))?;
-                let ready = device.prepare(&generated.recording.by(Lanes::of(device.adapter())))?;
+                let ready = device.prepare(&generated.recording.by(Lanes::for_adapter(device.adapter())))?;
                 (generated, ready)
             }
         });
@@ -223,7 +223,7 @@ impl<'a> Folding<'a> {
             None => {
                 let nearest = Nearest::of(device.adapter());
                 let recorded = light.with(scene, ensemble, |lighting| record(room, nearest, lighting))?;
-                let ready = device.prepare(&recorded.recording.by(Lanes::of(device.adapter())))?;
+                let ready = device.prepare(&recorded.recording.by(Lanes::for_adapter(device.adapter())))?;
                 (recorded, ready)
             }
         });

@@ -158,7 +158,7 @@ fn inspect(backend: &dyn Backend, place: usize, adapter: Adapter, input: &Inputs
     let missing = [
         (clockless, "timestamps"),
         (adapter.subgroup == 0, "the size of a subgroup"),
-        (Lanes::of(&adapter) == Lanes::Portable, "operations of subgroups"),
+        (Lanes::for_adapter(&adapter) == Lanes::Portable, "operations of subgroups"),
     ];
     let missing = missing.into_iter().filter(|(lacks, _)| *lacks).map(|(_, what)| what).collect();
     Passport { backend: backend.name(), adapter, missing, recordings }

@@ -190,7 +190,7 @@ impl Recorded {
         Ok(Uploads {
             bytes: [
                 bytemuck::bytes_of(&view).to_vec(),
-                bytemuck::bytes_of(&SortState::of(entries)).to_vec(),
+                bytemuck::bytes_of(&SortState::for_entries(entries)).to_vec(),
                 bytemuck::bytes_of(&Scan::of_digits(entries)).to_vec(),
                 cells,
                 distances,

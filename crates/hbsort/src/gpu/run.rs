@@ -28,7 +28,7 @@ pub fn slice_cloud_on(
         0 => all,
         most => most.min(all),
     };
-    let lanes = Lanes::of(device.adapter());
+    let lanes = Lanes::for_adapter(device.adapter());
     let prepared = most_that_fits(most, LEAST, |splats| {
         let recorded = record(Capacities { splats, kept: splats });
         Ok::<_, Error>(device.prepare(&recorded.recording.by(lanes)).map(|ready| (recorded, ready)))

@@ -23,7 +23,7 @@ pub(super) fn join(recording: &mut Recording, rooms: &[CastRoom], attributes: &A
     let mut shadows: Vec<Shadow> = Vec::new();
     for (light, room) in (0u32..).zip(rooms) {
         let shadow = record_shadow(*room, light);
-        let received = shadows.first().map(|(first, joined)| (shadow.received, joined.of(first.received)));
+        let received = shadows.first().map(|(first, joined)| (shadow.received, joined.buffer(first.received)));
         let known: Vec<_> = shadow.attributes().shared(attributes).into_iter().chain(received).collect();
         let joined = recording.join(&shadow.recording, &known);
         shadows.push((shadow, joined));
@@ -46,7 +46,7 @@ pub(super) fn uploads(
 pub(super) fn had_room(shadows: &[Shadow], run: &Run, rooms: &mut [CastRoom]) -> Result<bool, Failure> {
     let mut had = true;
     for ((shadow, joined), room) in shadows.iter().zip(rooms) {
-        match shadow.cast.found(run.bytes(joined.of(shadow.cast.state))) {
+        match shadow.cast.found(run.bytes(joined.buffer(shadow.cast.state))) {
             Err(tsm::Error::Overflow(Overflow { needed, .. }))
                 if u32::try_from(needed).is_ok_and(|n| n > room.entries) =>
             {

@@ -58,28 +58,28 @@ impl Whole {
         let in_project = recording.join(&projected.recording, &positions);
         let at = at.of(&in_project);
         let shadows = shadows::join(&mut recording, casts, &at);
-        let received = shadows.first().map(|(shadow, joined)| (shaded.received, joined.of(shadow.received)));
+        let received = shadows.first().map(|(shadow, joined)| (shaded.received, joined.buffer(shadow.received)));
         let known: Vec<_> = shaded.attributes.shared(&at).into_iter().chain(received).collect();
         let in_shade = recording.join(&shaded.recording, &known);
         let mut resolve = None;
         if let Some(solid) = rooms.solid {
             let resolved = resolve::record(solid)?;
             let known =
-                [(resolved.splats, in_project.of(projected.splats)), (resolved.values, in_shade.of(shaded.values))];
+                [(resolved.splats, in_project.buffer(projected.splats)), (resolved.values, in_shade.buffer(shaded.values))];
             let joined = recording.join(&resolved.recording, &known);
             resolve = Some((resolved, joined));
         }
         let mut taken =
-            vec![(composite.splats, in_project.of(projected.splats)), (composite.values, in_shade.of(shaded.values))];
+            vec![(composite.splats, in_project.buffer(projected.splats)), (composite.values, in_shade.buffer(shaded.values))];
         if let (Some(sort), Some(sorted)) = (&sort, composite.sorted) {
             taken.extend([(composite.order, sort.places), (sorted, sort.state)]);
         }
-        taken.extend(resolve.iter().map(|(resolved, joined)| (composite.opaque, joined.of(resolved.image))));
+        taken.extend(resolve.iter().map(|(resolved, joined)| (composite.opaque, joined.buffer(resolved.image))));
         let in_composite = recording.join(&composite.recording, &taken);
         let read =
-            [in_project.of(projected.state), in_composite.of(composite.state), in_composite.of(composite.planes)];
-        let of_shadows = shadows.iter().map(|(shadow, joined)| joined.of(shadow.cast.state));
-        let of_solid = resolve.iter().flat_map(|(r, joined)| [r.state, r.image].map(|buffer| joined.of(buffer)));
+            [in_project.buffer(projected.state), in_composite.buffer(composite.state), in_composite.buffer(composite.planes)];
+        let of_shadows = shadows.iter().map(|(shadow, joined)| joined.buffer(shadow.cast.state));
+        let of_solid = resolve.iter().flat_map(|(r, joined)| [r.state, r.image].map(|buffer| joined.buffer(buffer)));
         recording.read_only(&read.into_iter().chain(of_shadows).chain(of_solid).collect::<Vec<_>>());
         Ok(Self {
             recording,
@@ -97,9 +97,9 @@ impl Whole {
     /// Whether all entries had room; those that had not get what they need.
     pub(super) fn had_room(&self, run: &Run, rooms: &mut Rooms) -> Result<bool, Failure> {
         let (composite, joined) = &self.composite;
-        let mut had = grown(composite.counts(run.bytes(joined.of(composite.state))), &mut rooms.all.entries)?;
+        let mut had = grown(composite.counts(run.bytes(joined.buffer(composite.state))), &mut rooms.all.entries)?;
         if let (Some((resolved, joined)), Some(solid)) = (&self.resolve, &mut rooms.solid) {
-            had &= grown(resolved.counts(run.bytes(joined.of(resolved.state))), &mut solid.entries)?;
+            had &= grown(resolved.counts(run.bytes(joined.buffer(resolved.state))), &mut solid.entries)?;
         }
         Ok(had)
     }
@@ -112,12 +112,12 @@ impl Whole {
         too_long: impl Fn(&Counts) -> bool,
     ) -> Result<(Option<Counts>, Option<OpaqueImage>), Failure> {
         let (composite, joined) = &self.composite;
-        let bytes = |buffer| run.bytes(joined.of(buffer));
+        let bytes = |buffer| run.bytes(joined.buffer(buffer));
         let mut counts = composite.counts(bytes(composite.state))?;
         let mut opaque = None;
         if let Some((resolved, joined)) = &self.resolve {
             let (image, of_solid) =
-                resolved.finish([resolved.state, resolved.image].map(|b| run.bytes(joined.of(b))))?;
+                resolved.finish([resolved.state, resolved.image].map(|b| run.bytes(joined.buffer(b))))?;
             counts = counts.and(&of_solid);
             opaque = Some(image);
         }

@@ -141,7 +141,7 @@ pub fn record_generated(
     r.read(found);
     let [.., of_sets, of_particles] = projection.inputs;
     let in_whole = r.join(&projection.recording, &[(of_sets, sets), (of_particles, particles)]);
-    let sums = in_whole.of(projection.sums);
+    let sums = in_whole.buffer(projection.sums);
     let sources = inputs;
     Ok(Generated {
         recording,
@@ -245,7 +245,7 @@ impl Generated {
         let scan = Scan { count: sources.chunks().saturating_mul(self.capacities.levels), total: 0 };
         let mut inputs: Inputs<'a> = vec![(self.scan, Cow::Owned(bytemuck::bytes_of(&scan).to_vec()))];
         let around = self.projection.inputs.into_iter().zip(around).chain(self.projection.tables(scene)?);
-        inputs.extend(around.map(|(buffer, bytes)| (self.in_whole.of(buffer), bytes)));
+        inputs.extend(around.map(|(buffer, bytes)| (self.in_whole.buffer(buffer), bytes)));
         for (twin, (_, buffers)) in sources.twins.iter().zip(&self.sources) {
             let tables = twin.tables.iter().map(|words| Cow::Borrowed(bytemuck::cast_slice(words)));
             inputs.extend(buffers.iter().copied().zip(tables));
@@ -260,7 +260,7 @@ impl Generated {
         inputs: impl IntoIterator<Item = (BufferId, &'a [u8])>,
     ) -> impl Iterator<Item = (BufferId, Cow<'a, [u8]>)> {
         let inputs = self.projection.shadow_inputs(light, inputs);
-        inputs.map(|(buffer, bytes)| (self.in_whole.of(buffer), bytes))
+        inputs.map(|(buffer, bytes)| (self.in_whole.buffer(buffer), bytes))
     }
 
     /// What a run of the next sets needs beside the tables: which they are, and the particles that the device does not make.
@@ -276,7 +276,7 @@ impl Generated {
         };
         let mut inputs: Inputs<'static> = sources.twins.iter().zip(&self.sources).map(of_object).collect();
         let nobody = self.projection.lit.iter().map(Lit::nobody);
-        inputs.extend(nobody.map(|(buffer, bytes)| (self.in_whole.of(buffer), Cow::Owned(bytes))));
+        inputs.extend(nobody.map(|(buffer, bytes)| (self.in_whole.buffer(buffer), Cow::Owned(bytes))));
         if let Some(given) = &self.given {
             inputs.extend(given.sample(&self.capacities, sources, scene, first)?);
         }

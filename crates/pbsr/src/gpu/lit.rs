@@ -150,7 +150,7 @@ impl Lit {
         let mut shadows: Vec<Joined> = Vec::new();
         for shadow in lighting.shadows {
             let first = lighting.shadows.first().zip(shadows.first());
-            let received = first.map(|(first, joined)| (shadow.received, joined.of(first.received)));
+            let received = first.map(|(first, joined)| (shadow.received, joined.buffer(first.received)));
             let shared = shadow.attributes.shared(&seen.attributes).into_iter();
             let shared: Vec<_> = shared.chain([(shadow.shares, seen.shares)]).chain(received).collect();
             shadows.push(r.join_uploads(shadow.recording, &shared));
@@ -163,7 +163,7 @@ impl Lit {
             layout: params.layout(),
         });
         let first = lighting.shadows.first().zip(shadows.first());
-        let received = first.map(|(first, joined)| (shade.received, joined.of(first.received)));
+        let received = first.map(|(first, joined)| (shade.received, joined.buffer(first.received)));
         let shared: Vec<_> = shade.attributes.shared(&seen.attributes).into_iter().chain(received).collect();
         let in_shade = r.join_uploads(&shade.recording, &shared);
         let parts = u64::from(seen.parts) * u64::from(capacities.levels);
@@ -211,7 +211,7 @@ impl Lit {
                 r.join_dispatches(shadow.recording, joined, each);
             }
             r.join_dispatches(&self.shade.recording, &self.in_shade, each);
-            let values = self.in_shade.of(self.shade.values);
+            let values = self.in_shade.buffer(self.shade.values);
             r.dispatch(&kernels::PBSR_SUM, each, &[view, found, listed, values, sums], &[at]);
         }
     }

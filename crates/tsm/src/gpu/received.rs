@@ -64,12 +64,12 @@ pub fn record_received(room: Room, attributes: AttributeRoom, light: u32) -> Rec
     let received = last.scratch("received", 12 * u64::from(splats) * (1 + u64::from(light)));
     last.dispatch(&kernels::TSM_HAND_ON, each, &[own_frame, own_lights, shares, received], &[light]);
     last.read(received);
-    let in_last = r.join(&last, &[(own_frame, frame), (own_lights, in_look_up.of(look_up.lights))]);
-    let received = in_last.of(received);
-    let shares = in_last.of(shares);
+    let in_last = r.join(&last, &[(own_frame, frame), (own_lights, in_look_up.buffer(look_up.lights))]);
+    let received = in_last.buffer(received);
+    let shares = in_last.buffer(shares);
     r.read_only(&[received]);
-    let view = in_look_up.of(look_up.view);
-    let map = look_up.map.map(|buffer| in_look_up.of(buffer));
+    let view = in_look_up.buffer(look_up.view);
+    let map = look_up.map.map(|buffer| in_look_up.buffer(buffer));
     RecordedReceived { recording, attributes, shares, received, frame, view, map, look_up, splats, frame_words }
 }
 

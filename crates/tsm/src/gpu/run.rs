@@ -15,7 +15,7 @@ const LEAST: u32 = 4096;
 /// [`Error::Device`] for what the device refuses.
 pub fn map_on(device: &mut dyn Executor, deposits: &Deposits) -> Result<Option<(ShadowMap, Vec<PassTime>)>, Error> {
     let most = Capacities::most(device.adapter().binding_bytes, deposits.channels() as u32);
-    let lanes = Lanes::of(device.adapter());
+    let lanes = Lanes::for_adapter(device.adapter());
     let all = u32::try_from(deposits.entries().iter().sum::<u64>()).unwrap_or(u32::MAX);
     let prepared = most_that_fits(most.entries.min(all), LEAST, |entries| {
         let batches = deposits.batches(Capacities { entries, ..most })?;

@@ -37,7 +37,7 @@ pub fn record_map(room: CastRoom) -> RecordedMap {
     let from = [cast.list_view, cast.sort, cast.digits, cells, distances, absorbances];
     let shared: Vec<_> = lists.inputs.into_iter().zip(from).collect();
     let in_lists = recording.join(&lists.recording, &shared);
-    let lists = [lists.spans, lists.distances, lists.totals].map(|buffer| in_lists.of(buffer));
+    let lists = [lists.spans, lists.distances, lists.totals].map(|buffer| in_lists.buffer(buffer));
     recording.read_only(&[[cast.state].as_slice(), &lists].concat());
     RecordedMap { recording, cast, lists }
 }
@@ -108,7 +108,7 @@ pub fn record_shadow(room: CastRoom, light: u32) -> RecordedShadow {
     let shared = last.map.into_iter().zip(known).chain([(last.frame, cast.view)]);
     let shared: Vec<_> = shared.chain(last.attributes.shared(&cast.attributes)).collect();
     let joined = recording.join(&last.recording, &shared);
-    let [received, shares, shadow_view] = [last.received, last.shares, last.view].map(|buffer| joined.of(buffer));
+    let [received, shares, shadow_view] = [last.received, last.shares, last.view].map(|buffer| joined.buffer(buffer));
     recording.read_only(&[cast.state, received]);
     RecordedShadow { recording, cast, received, shares, shadow_view }
 }

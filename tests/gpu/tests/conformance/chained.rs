@@ -105,8 +105,8 @@ fn four_stages_in_one_submission_are_the_cpu_s_picture() {
         let c = whole.join(
             &composite.recording,
             &[
-                (composite.splats, p.of(project.splats)),
-                (composite.values, s.of(shade.values)),
+                (composite.splats, p.buffer(project.splats)),
+                (composite.values, s.buffer(shade.values)),
                 (composite.order, sort.places),
                 (composite.sorted.unwrap(), sort.state),
             ],
@@ -136,9 +136,9 @@ fn four_stages_in_one_submission_are_the_cpu_s_picture() {
         inputs.extend(c.inputs(composite.inputs(&into)));
         inputs.retain(|(_, bytes)| !bytes.is_empty());
         let run = device.run(&whole, &inputs).unwrap();
-        let read = [composite.state, composite.planes].map(|b| run.bytes(c.of(b)));
+        let read = [composite.state, composite.planes].map(|b| run.bytes(c.buffer(b)));
         let counts = composite.finish(read, &mut gpu).unwrap();
-        assert_eq!(projection::visible(run.bytes(p.of(project.state))).unwrap(), projected.visible());
+        assert_eq!(projection::visible(run.bytes(p.buffer(project.state))).unwrap(), projected.visible());
         assert!(counts.longest > 100 && counts.longest < counts.entries);
 
         let largest = values.iter().fold(0.0, |most: f32, v| most.max(*v));

@@ -266,7 +266,7 @@ fn two_lights_in_one_submission() {
     shared.push((second.received, first.received));
     let joined = whole.join(&second.recording, &shared);
     // Read where all lights have left it.
-    whole.read_only(&[first.cast.state, joined.of(second.cast.state)]);
+    whole.read_only(&[first.cast.state, joined.buffer(second.cast.state)]);
     whole.read(first.received);
     whole.check().unwrap();
     let shares = (0..3000).map(|i| i as f32 / 3000.0).collect::<Vec<_>>();
@@ -278,7 +278,7 @@ fn two_lights_in_one_submission() {
     inputs.retain(|(_, bytes)| !bytes.is_empty());
     let run = device.run(&whole, &inputs).unwrap();
     first.cast.found(run.bytes(first.cast.state)).unwrap();
-    second.cast.found(run.bytes(joined.of(second.cast.state))).unwrap();
+    second.cast.found(run.bytes(joined.buffer(second.cast.state))).unwrap();
     let received = lights(run.bytes(first.received));
     assert_eq!(received.len(), 6000);
     for (k, case) in cases.iter().enumerate() {

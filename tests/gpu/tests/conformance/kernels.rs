@@ -55,7 +55,7 @@ fn sorted(device: &mut Device, lanes: Lanes, keys: &[u32], shift: u32, scans: bo
         r.dispatch(&kernels::RADIX_SCATTER, groups, &scattered, &[shift]);
     }
     to.iter().for_each(|buffer| r.read(*buffer));
-    let of_sort = SortState::of(n);
+    let of_sort = SortState::for_entries(n);
     let of_scan = Scan::of_digits(n);
     let companions: Vec<u32> = (0..n).map(|i| i ^ 0x5555).collect();
     let inputs = [
@@ -112,7 +112,7 @@ fn what_a_device_cannot_do_across_subgroups_is_refused_by_name() {
     without.subgroup_ops = SubgroupOps::NONE;
     let refused = without.accept(&r.by(Lanes::Subgroup));
     assert_eq!(refused, Err(DeviceError::Lacking { kernel: "scan_spine_subgroup", what: "sums of subgroups" }));
-    assert_eq!((without.accept(&r.by(Lanes::of(&without))), Lanes::of(&without)), (Ok(()), Lanes::Portable));
+    assert_eq!((without.accept(&r.by(Lanes::for_adapter(&without))), Lanes::for_adapter(&without)), (Ok(()), Lanes::Portable));
     // Lavapipe has them by either executor, as wide as its vectors.
     assert_eq!(device.lanes(), [Lanes::Portable, Lanes::Subgroup]);
     if let Ok(bits) = std::env::var("LP_NATIVE_VECTOR_WIDTH") {

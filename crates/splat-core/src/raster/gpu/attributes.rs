@@ -49,7 +49,7 @@ impl AttributeBuffers {
 
     /// Where they lie in the whole that their recording was joined to.
     pub fn of(&self, joined: &Joined) -> Self {
-        let [positions, radii, looks, frames] = self.all().map(|buffer| joined.of(buffer));
+        let [positions, radii, looks, frames] = self.all().map(|buffer| joined.buffer(buffer));
         Self { positions, radii, looks, frames }
     }
 
