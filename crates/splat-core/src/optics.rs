@@ -33,13 +33,13 @@ pub fn faintest(materials: &[Material]) -> f32 {
 pub fn too_faint(cloud: &Cloud, materials: &[Material], objects: usize) -> Vec<usize> {
     let faintest = faintest(materials);
     // Whether an object has splats, and one that is seen.
-    let mut of = vec![[false; 2]; objects];
+    let mut visibility = vec![[false; 2]; objects];
     for i in 0..cloud.len() {
         let is_seen = cloud.kind[i] != SplatKind::Medium || cloud.cross_section[i] > faintest * cloud.radius[i].powi(2);
-        let [has_splats, is_one_seen] = &mut of[cloud.object[i] as usize];
+        let [has_splats, is_one_seen] = &mut visibility[cloud.object[i] as usize];
         (*has_splats, *is_one_seen) = (true, *is_one_seen | is_seen);
     }
-    (0..objects).filter(|object| of[*object] == [true, false]).collect()
+    (0..objects).filter(|object| visibility[*object] == [true, false]).collect()
 }
 
 /// How the opacity of a translucent surface depends on the angle at which it is crossed.

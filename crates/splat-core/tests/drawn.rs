@@ -135,7 +135,7 @@ fn a_gaussian_is_its_opacity_around_every_place_and_a_surface_cuts_it_in_depth()
         degree: 0,
         harmonics: vec![[0.0; 3]],
     });
-    let sum = |of: &dyn Fn(DVec3) -> f64| axes.iter().map(|a| of(*a)).sum::<f64>();
+    let sum = |term: &dyn Fn(DVec3) -> f64| axes.iter().map(|a| term(*a)).sum::<f64>();
     let xx = sum(&|a| a.x * a.x);
     let yy = sum(&|a| a.y * a.y);
     let xy = sum(&|a| a.x * a.y);
@@ -212,7 +212,7 @@ fn a_pixel_is_the_mean_of_its_samples_in_every_band_of_rows() {
         for x in 0..width {
             let pixel = (y * width + x) as usize;
             let four = [0, 1, 2, 3].map(|s| ((2 * y + s / 2) * 2 * width + 2 * x + s % 2) as usize);
-            let mean = |of: &dyn Fn(usize) -> f32| four.iter().map(|&k| of(k)).sum::<f32>() / 4.0;
+            let mean = |value: &dyn Fn(usize) -> f32| four.iter().map(|&k| value(k)).sum::<f32>() / 4.0;
             let through = |k: usize| (-acc.optical_depth[0][k]).exp();
             assert!((alpha[pixel] - mean(&|k| 1.0 - through(k))).abs() < 1e-6, "{x} {y}");
             for c in 0..3 {

@@ -12,10 +12,10 @@ use splat_core::{
 const SIZE: u32 = 96;
 
 /// Coverages of an image of `size` pixels by a function of the place, 0 to 1 from the top left.
-fn image(size: [u32; 2], of: impl Fn(f64, f64) -> f64) -> FootprintImage {
+fn image(size: [u32; 2], function: impl Fn(f64, f64) -> f64) -> FootprintImage {
     let at = |i: u32, n: u32| (f64::from(i) + 0.5) / f64::from(n);
     let pixels = (0..size[1]).flat_map(|j| (0..size[0]).map(move |i| (i, j)));
-    let coverage: Vec<f32> = pixels.map(|(i, j)| of(at(i, size[0]), at(j, size[1])) as f32).collect();
+    let coverage: Vec<f32> = pixels.map(|(i, j)| function(at(i, size[0]), at(j, size[1])) as f32).collect();
     FootprintImage::new(size, &coverage).unwrap()
 }
 

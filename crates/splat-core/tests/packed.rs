@@ -47,9 +47,9 @@ fn cloud(n: u64) -> Cloud {
 }
 
 fn range(values: impl Iterator<Item = f32>) -> [f64; 2] {
-    let of = values.map(f64::from).fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], v| [a.min(v), b.max(v)]);
-    assert!(of[0] <= of[1]);
-    of
+    let range = values.map(f64::from).fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], v| [a.min(v), b.max(v)]);
+    assert!(range[0] <= range[1]);
+    range
 }
 
 /// What steps are even in.
@@ -78,8 +78,8 @@ fn every_number_is_off_by_half_a_step_of_its_block_at_most() {
     );
     let all: Vec<usize> = (0..cloud.len()).collect();
     for block in all.chunks(256) {
-        let pairs = |of: &dyn Fn(&Cloud, usize) -> f32| -> Vec<(f32, f32)> {
-            block.iter().map(|i| (of(&cloud, *i), of(&found, *i))).collect()
+        let pairs = |number: &dyn Fn(&Cloud, usize) -> f32| -> Vec<(f32, f32)> {
+            block.iter().map(|i| (number(&cloud, *i), number(&found, *i))).collect()
         };
         let [even, root]: [Measure; 2] = [|v| v, f64::sqrt];
         for axis in 0..3 {
@@ -96,12 +96,12 @@ fn every_number_is_off_by_half_a_step_of_its_block_at_most() {
         let colors = block.iter().flat_map(|i| cloud.color[*i].into_iter().zip(found.color[*i]));
         check("color", &colors.chain([(0.0, 0.0)]).collect::<Vec<_>>(), 255.0, root);
     }
-    for (name, of) in [
+    for (name, vector) in [
         ("normal", (|c, i| c.normal[i]) as fn(&Cloud, usize) -> Vec3),
         ("shading normal", |c, i| c.shading_normal[i]),
         ("tangent", |c, i| c.tangent[i]),
     ] {
-        let pair = |i: &usize| [of(&cloud, *i), of(&found, *i)].map(|v| v.as_dvec3().normalize_or_zero());
+        let pair = |i: &usize| [vector(&cloud, *i), vector(&found, *i)].map(|v| v.as_dvec3().normalize_or_zero());
         let pairs: Vec<_> = all.iter().map(pair).collect();
         assert!(pairs.iter().all(|[a, b]| a.length() == 0.0 || a.dot(*b) > 0.0), "{name}");
         assert!(pairs.iter().all(|[a, b]| (*a == DVec3::ZERO) == (*b == DVec3::ZERO)), "{name}");
@@ -167,7 +167,7 @@ fn a_splat_with_a_normal_takes_less_than_sixteen_bytes() {
 #[test]
 fn x1_any_number_of_threads_packs_and_unpacks_the_same_bits() {
     let cloud = cloud(20_000);
-    let of = |threads: usize| {
+    let packed_by = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| {
             let packed = PackedCloud::new(&cloud).unwrap();
@@ -175,8 +175,8 @@ fn x1_any_number_of_threads_packs_and_unpacks_the_same_bits() {
             (packed, again)
         })
     };
-    let one = of(1);
-    assert!([2, 3, 7].into_iter().all(|threads| of(threads) == one));
+    let one = packed_by(1);
+    assert!([2, 3, 7].into_iter().all(|threads| packed_by(threads) == one));
 }
 
 #[test]

@@ -26,10 +26,10 @@ fn seen(mesh: &Mesh, camera: &Camera) -> TriangleImage {
 }
 
 /// How many triangles each pixel meets: every triangle is drawn by itself.
-fn coverage(of: &Mesh, camera: &Camera) -> Vec<u32> {
+fn coverage(whole: &Mesh, camera: &Camera) -> Vec<u32> {
     let mut count = vec![0; (camera.size[0] * camera.size[1]) as usize];
-    for triangle in &of.triangles {
-        let one = mesh(triangle.map(|v| of.position[v as usize]).to_vec(), vec![[0, 1, 2]]);
+    for triangle in &whole.triangles {
+        let one = mesh(triangle.map(|v| whole.position[v as usize]).to_vec(), vec![[0, 1, 2]]);
         let hits = seen(&one, camera).hits;
         count.iter_mut().zip(hits).for_each(|(n, hit)| *n += u32::from(hit != TriangleHit::NONE));
     }
@@ -127,11 +127,11 @@ fn hv11_from_within_a_room_every_pixel_meets_one_wall_at_its_distance() {
 }
 
 /// The nearest triangle of a ray by solving for it, with its barycentric coordinates and the least of them all.
-fn slow(of: &Mesh, [from, along]: [DVec3; 2]) -> (Option<(f64, usize, DVec3)>, f64) {
+fn slow(whole: &Mesh, [from, along]: [DVec3; 2]) -> (Option<(f64, usize, DVec3)>, f64) {
     let mut nearest: Option<(f64, usize, DVec3)> = None;
     let mut margin: f64 = f64::INFINITY;
-    for (t, triangle) in of.triangles.iter().enumerate() {
-        let [a, b, c] = triangle.map(|v| of.position[v as usize].as_dvec3() - from);
+    for (t, triangle) in whole.triangles.iter().enumerate() {
+        let [a, b, c] = triangle.map(|v| whole.position[v as usize].as_dvec3() - from);
         let normal = (b - a).cross(c - a);
         let depth = a.dot(normal) / along.dot(normal);
         let p = along * depth;
@@ -298,32 +298,32 @@ fn hv11_layers_are_what_each_triangle_shows_by_itself_nearest_first() {
     let heap = mesh((0..120).map(corner).collect(), triangles);
     for projection in [LENS, PARALLEL] {
         let camera = camera(DVec3::new(0.3, 0.2, 7.0), DVec3::ZERO, projection, [37, 41]);
-        let of = |hidden: &[f32], most: u64| {
+        let layers = |hidden: &[f32], most: u64| {
             let none = (f32::INFINITY, u32::MAX);
             let keep = |_: usize, at: &TriangleLayer| (at.depth, at.hit.triangle);
             resolve_layers(&placed(&heap), &camera, hidden, most, none, keep, None)
         };
-        let all = of(&[], u64::MAX).unwrap();
+        let all = layers(&[], u64::MAX).unwrap();
         let nearest = seen(&heap, &camera);
         let counts = coverage(&heap, &camera);
         let hidden: Vec<f32> = nearest.depth.iter().map(|depth| depth + 1.0).collect();
-        let before = of(&hidden, u64::MAX).unwrap();
+        let before = layers(&hidden, u64::MAX).unwrap();
         let mut most = 0;
         let mut sum = 0;
         for (k, count) in counts.iter().enumerate() {
-            let own = all.of(k);
+            let own = all.at_pixel(k);
             assert_eq!(own.len() as u32, *count, "pixel {k}");
             assert!(own.windows(2).all(|w| w[0].0 < w[1].0 || (w[0].0 == w[1].0 && w[0].1 < w[1].1)), "{own:?}");
             assert_eq!(own.first().map_or(f32::INFINITY, |first| first.0), nearest.depth[k]);
             let expected: Vec<_> = own.iter().copied().filter(|layer| layer.0 < hidden[k]).collect();
-            assert_eq!(before.of(k), expected, "pixel {k}");
+            assert_eq!(before.at_pixel(k), expected, "pixel {k}");
             (most, sum) = (most.max(own.len()), sum + own.len());
         }
         assert!(most > 8 && sum > 2000, "{most} {sum}");
         assert_eq!(count_layers(&placed(&heap), &camera).unwrap(), sum as u64);
         // One byte less is refused before it is taken.
-        assert!(of(&[], 8 * sum as u64).is_ok());
-        let Err(Error::Limit(said)) = of(&[], 8 * sum as u64 - 1) else { panic!("not refused") };
+        assert!(layers(&[], 8 * sum as u64).is_ok());
+        let Err(Error::Limit(said)) = layers(&[], 8 * sum as u64 - 1) else { panic!("not refused") };
         assert_eq!((said.needed, said.limit), (8 * sum as u64, Some(8 * sum as u64 - 1)));
     }
 }

@@ -49,14 +49,14 @@ impl Whole {
         let materials = room.materials;
         let projected =
             project::record(project::Capacities { attributes, footprints, materials, depth: room.needs_depth() })?;
-        let shaded = shade::record(shade::Capacities::of(input, attributes, layout));
+        let shaded = shade::record(shade::Capacities::for_input(input, attributes, layout));
         let composite = if sorts { follow::record(room)? } else { record(room)? };
         let mut recording = sort.as_ref().map_or_else(Recording::default, |sort| sort.recording.clone());
         let at = &projected.attributes;
         let positions: Vec<_> =
             sort.iter().flat_map(|sort| [(at.positions, sort.positions), (at.radii, sort.radii)]).collect();
         let in_project = recording.join(&projected.recording, &positions);
-        let at = at.of(&in_project);
+        let at = at.in_joined(&in_project);
         let shadows = shadows::join(&mut recording, casts, &at);
         let received = shadows.first().map(|(shadow, joined)| (shaded.received, joined.buffer(shadow.received)));
         let known: Vec<_> = shaded.attributes.shared(&at).into_iter().chain(received).collect();

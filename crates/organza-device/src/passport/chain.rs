@@ -132,7 +132,7 @@ impl ChainInput {
         let layout = ChannelLayout::default();
         let ids: Vec<u32> = (0..SPLATS).collect();
         self.lit(|input| {
-            let recorded = shade::record(shade::Capacities::of(input, attributes.room(), layout));
+            let recorded = shade::record(shade::Capacities::for_input(input, attributes.room(), layout));
             let uploads = recorded.uploads(input, &attributes, &shade::received(input, &ids, None)?)?;
             let mut inputs: Vec<(BufferId, &[u8])> = recorded.inputs(&uploads).to_vec();
             inputs.extend(attributes.inputs(&recorded.attributes));

@@ -187,7 +187,7 @@ impl Lit {
         let found = seen.found;
         let listed = seen.seen;
         let shares = seen.shares;
-        let [positions, radii, looks, frames] = seen.attributes.all();
+        let [positions, radii, looks, frames] = seen.attributes.buffers();
         for part in 0..seen.parts {
             let first = part * seen.at_once;
             let at = level * seen.parts + part;

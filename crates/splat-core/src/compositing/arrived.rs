@@ -22,7 +22,7 @@ use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 pub struct Arrived {
     /// Bits of what arrives at each splat: of red and green, and of blue; [`UNKNOWN`] where nobody asked yet. In this form a share is
     /// written as it is read, eight bytes and four: a load that takes two stores together waits for both to leave the processor.
-    of: Vec<[AtomicU64; 2]>,
+    shares: Vec<[AtomicU64; 2]>,
 }
 
 /// No bits of shares, which are numbers.
@@ -44,7 +44,7 @@ impl Arrived {
     /// Nothing known yet of a cloud's first `splats` splats. Of others nothing is remembered.
     pub fn new(splats: usize) -> Self {
         let unknown = || [AtomicU64::new(UNKNOWN), AtomicU64::new(UNKNOWN)];
-        Self { of: std::iter::repeat_with(unknown).take(splats).collect() }
+        Self { shares: std::iter::repeat_with(unknown).take(splats).collect() }
     }
 
     /// Bytes that it takes of so many splats.
@@ -54,16 +54,16 @@ impl Arrived {
 
     #[inline]
     fn known(&self, splat: usize) -> Option<[f32; 3]> {
-        let of = self.of.get(splat)?;
-        let known = [of[0].load(Relaxed), of[1].load(Relaxed)];
+        let stored = self.shares.get(splat)?;
+        let known = [stored[0].load(Relaxed), stored[1].load(Relaxed)];
         known.iter().all(|bits| *bits != UNKNOWN).then(|| unpacked(known))
     }
 
     /// Whoever asks at the same time finds the same numbers.
     #[inline]
     fn remember(&self, splat: usize, share: [f32; 3]) {
-        if let Some(of) = self.of.get(splat) {
-            of.iter().zip(packed(share)).for_each(|(of, bits)| of.store(bits, Relaxed));
+        if let Some(stored) = self.shares.get(splat) {
+            stored.iter().zip(packed(share)).for_each(|(word, bits)| word.store(bits, Relaxed));
         }
     }
 

@@ -225,17 +225,17 @@ impl DepthProfile {
         Self { first, median, mean, m2: sigma * sigma * absorbed, knot: [last, total], medium: Medium::default() }
     }
 
-    /// Goes on with the profile of what lies behind, whose optical depth is `own`; `before` is that of all so far. Mean and
+    /// Goes on with the profile of what lies behind, whose total is `optical_depth`; `before` is that of all so far. Mean and
     /// deviation are exact. Where the first depth, or the median, is reached in it depends on the curve of what it hides; between
     /// its known depths that is taken as linear.
-    pub fn append(&mut self, behind: &Self, before: f32, own: f32) {
+    pub fn append(&mut self, behind: &Self, before: f32, optical_depth: f32) {
         self.close(before, f32::INFINITY);
         if before <= 0.0 {
             *self = *behind;
             return;
         }
         let mut behind = *behind;
-        behind.close(own, f32::INFINITY);
+        behind.close(optical_depth, f32::INFINITY);
         let total = before + behind.knot[1];
         if behind.knot[1] <= 0.0 {
             return;

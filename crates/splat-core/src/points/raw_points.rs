@@ -138,11 +138,13 @@ impl RawPoints {
     /// `None` where the points have no such column.
     pub fn column(&self, name: &str, up: DVec3) -> Option<Vec<f64>> {
         let along = |axis: DVec3| Some((0..self.len()).map(|i| self.exact_position(i).dot(axis)).collect());
-        let own = |name: &str| self.own_column(name).map(<[f64]>::to_vec);
+        let own_column = |name: &str| self.own_column(name).map(<[f64]>::to_vec);
         let some =
             |column: &[f32]| (!column.is_empty()).then(|| column.iter().map(|v| f64::from(*v)).collect::<Vec<f64>>());
-        if let Some(own) = own(name).or_else(|| own(unaliased(name))).or_else(|| self.ready.column(unaliased(name))) {
-            return Some(own);
+        if let Some(values) =
+            own_column(name).or_else(|| own_column(unaliased(name))).or_else(|| self.ready.column(unaliased(name)))
+        {
+            return Some(values);
         }
         match unaliased(name) {
             "value" => some(&self.value),
@@ -186,9 +188,9 @@ impl RawPoints {
             ("classification", !self.classification.is_empty()),
             ("opacity", !self.opacity.is_empty()),
         ];
-        let all = some.into_iter().filter(|(_, is_there)| *is_there).map(|(name, _)| name);
-        let own = self.columns.iter().map(|c| c.name.as_str());
-        all.chain(["x", "y", "z", "height"]).chain(own).chain(self.ready.columns().map(|column| column.name))
+        let attributes = some.into_iter().filter(|(_, is_there)| *is_there).map(|(name, _)| name);
+        let columns = self.columns.iter().map(|c| c.name.as_str());
+        attributes.chain(["x", "y", "z", "height"]).chain(columns).chain(self.ready.columns().map(|column| column.name))
     }
 
     /// Bytes held by the columns, all of them counted: position, normal, colour, value, opacity, class, integers and further ones; and
@@ -285,13 +287,16 @@ mod tests {
             columns: vec![column("return_number", [1.0, 3.0])],
             ..RawPoints::default()
         };
-        let of = |points: &RawPoints, name: &str| points.column(name, DVec3::Z);
-        assert_eq!(of(&points, "intensity"), Some(vec![7.0, 8.0]));
-        assert_eq!(of(&points, "class"), Some(vec![2.0, 6.0]));
-        assert_eq!(of(&points, "return"), Some(vec![1.0, 3.0]));
-        assert_eq!([of(&points, "x"), of(&points, "height")], [Some(vec![1e7, 1e7 + 0.25]), Some(vec![5.0, 7.0])]);
-        assert_eq!([of(&points, "opacity"), of(&points, "gps_time")], [None, None]);
+        let numbers = |points: &RawPoints, name: &str| points.column(name, DVec3::Z);
+        assert_eq!(numbers(&points, "intensity"), Some(vec![7.0, 8.0]));
+        assert_eq!(numbers(&points, "class"), Some(vec![2.0, 6.0]));
+        assert_eq!(numbers(&points, "return"), Some(vec![1.0, 3.0]));
+        assert_eq!(
+            [numbers(&points, "x"), numbers(&points, "height")],
+            [Some(vec![1e7, 1e7 + 0.25]), Some(vec![5.0, 7.0])]
+        );
+        assert_eq!([numbers(&points, "opacity"), numbers(&points, "gps_time")], [None, None]);
         points.columns.push(column("height", [0.5, 0.75]));
-        assert_eq!(of(&points, "height"), Some(vec![0.5, 0.75]));
+        assert_eq!(numbers(&points, "height"), Some(vec![0.5, 0.75]));
     }
 }

@@ -43,15 +43,16 @@ impl ReadySplats {
 
     /// Numbers of a column beside places, by its name in a file.
     pub fn column(&self, name: &str) -> Option<Vec<f64>> {
-        let of = self.columns().find(|column| column.name == name)?;
-        Some((0..self.cloud.len()).map(|i| (of.get)(&self.cloud.get(i))).collect())
+        let column = self.columns().find(|column| column.name == name)?;
+        Some((0..self.cloud.len()).map(|i| (column.get)(&self.cloud.get(i))).collect())
     }
 
     /// The columns beside places that these splats have.
     pub fn columns(&self) -> impl Iterator<Item = &'static SplatColumn> {
-        let some =
-            |of: &&SplatColumns| !self.cloud.is_empty() && of.is_there.is_none_or(|is_there| is_there(&self.cloud));
-        COLUMNS.iter().skip(1).filter(some).flat_map(|of| of.columns)
+        let some = |group: &&SplatColumns| {
+            !self.cloud.is_empty() && group.is_there.is_none_or(|is_there| is_there(&self.cloud))
+        };
+        COLUMNS.iter().skip(1).filter(some).flat_map(|group| group.columns)
     }
 
     /// Name, least and greatest number of each of those columns.

@@ -45,7 +45,7 @@ impl Accumulator {
         let green = planes / 2;
         let depths = self.depth.iter_mut().zip(&behind.depth);
         let optical = before[green].iter().zip(&behind.optical_depth[green]);
-        depths.zip(optical).for_each(|((to, from), (before, own))| to.append(from, *before, *own));
+        depths.zip(optical).for_each(|((to, from), (before, depth))| to.append(from, *before, *depth));
         let objects = self.object.iter_mut().zip(&behind.object);
         objects.filter(|(to, _)| **to == u32::MAX).for_each(|(to, from)| *to = *from);
         for (to, from) in self.optical_depth.iter_mut().zip(&behind.optical_depth) {

@@ -80,7 +80,7 @@ pub fn bin(projected: &Projected, ids: &[u32]) -> Bins {
 
 /// Bins what lies in rectangles of pixels [x0, x1, y0, y1) of an image of `size`, given by id; an empty rectangle is in no tile.
 pub fn bin_rectangles(size: [u32; 2], ids: &[u32], rectangle: impl Fn(u32) -> [u32; 4] + Sync) -> Bins {
-    bin_by(size, ids, |id| Coverage::of(rectangle(id)), &rectangle)
+    bin_by(size, ids, |id| Coverage::from_bounds(rectangle(id)), &rectangle)
 }
 
 fn bin_by(
@@ -152,7 +152,7 @@ mod tests {
     #[test]
     fn every_splat_is_listed_once_in_each_tile_that_it_touches() {
         let bounds = [[0, 1, 0, 1], [31, 33, 0, 1], [0, 0, 0, 0], [0, 64, 0, 64]];
-        let coverage = bounds.map(Coverage::of).to_vec();
+        let coverage = bounds.map(Coverage::from_bounds).to_vec();
         let projected = Projected { coverage, size: [64, 64], ..Projected::default() };
         let bins = bin(&projected, &[3, 0, 2, 1]);
         let lists: Vec<Vec<u32>> = (0..bins.tiles()).map(|t| bins.tile(t).flatten().copied().collect()).collect();

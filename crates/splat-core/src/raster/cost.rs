@@ -37,8 +37,8 @@ pub fn tile_bytes(cloud: &Cloud, camera: &Camera) -> u64 {
     let lists = cloud.position.par_chunks(CHUNK).zip(cloud.radius.par_chunks(CHUNK));
     let stride = cloud.len().div_ceil(COUNTED).max(1);
     let counted = |(p, r): (&[Vec3], &[f32])| -> f64 {
-        let all: f64 = p.iter().zip(r).step_by(stride).map(tiles).sum();
-        all * p.len() as f64 / p.len().div_ceil(stride) as f64
+        let sampled: f64 = p.iter().zip(r).step_by(stride).map(tiles).sum();
+        sampled * p.len() as f64 / p.len().div_ceil(stride) as f64
     };
     let entries: Vec<f64> = lists.map(counted).collect();
     let starts = entries.len() as f64 * f64::from(columns * rows);
@@ -87,10 +87,10 @@ pub fn expected(cloud: &Cloud, camera: &Camera, is_one: impl Fn(usize) -> bool) 
         if seen { (std::f64::consts::PI * radius * radius).clamp(4.0, picture) } else { 0.0 }
     };
     let stride = cloud.len().div_ceil(LOOKED_AT).max(1);
-    let mut all = Expected::default();
+    let mut total = Expected::default();
     for i in (0..cloud.len()).step_by(stride).filter(|i| is_one(*i)) {
-        all.splats += stride as f64;
-        all.fragments += stride as f64 * footprint(i);
+        total.splats += stride as f64;
+        total.fragments += stride as f64 * footprint(i);
     }
-    all
+    total
 }

@@ -34,7 +34,7 @@ impl Projector<'_> {
             let (seen, depth) = self.gaussian(cloud.position[first + l], g).unwrap_or_default();
             *splat = ProjectedSplat { material: splat.material, footprint: splat.footprint, kind: splat.kind, ..seen };
             splat.set_gaussian();
-            *coverage = if splat.peak > 0.0 { Coverage::of(splat.bounds(self.size)) } else { Coverage::NONE };
+            *coverage = if splat.peak > 0.0 { Coverage::from_bounds(splat.bounds(self.size)) } else { Coverage::NONE };
             if let Some(to) = depths.get_mut(l) {
                 let per_depth = 1.0 / (kernel.half_width * kernel.cutoff * depth.core[0]);
                 *to = ProjectedDepth { core: [per_depth, 0.0, 0.0], ..depth };
@@ -64,7 +64,7 @@ impl Projector<'_> {
         let m = axes.map(to_image);
         let filter = Gaussians::FILTER_VARIANCE * self.filter_sigma_px * self.filter_sigma_px;
         let area_sq = [(0, 1), (0, 2), (1, 2)].map(|(i, j)| m[i].perp_dot(m[j]).powi(2)).iter().sum::<f32>();
-        let sum = |of: &dyn Fn(usize) -> f32| of(0) + of(1) + of(2);
+        let sum = |term: &dyn Fn(usize) -> f32| term(0) + term(1) + term(2);
         let trace = sum(&|k| m[k].length_squared());
         let xx = sum(&|k| m[k].x * m[k].x) + filter;
         let yy = sum(&|k| m[k].y * m[k].y) + filter;

@@ -172,7 +172,7 @@ struct Image<'a> {
 }
 
 impl<'a> Image<'a> {
-    fn of(input: &FoldInput<'a>) -> Self {
+    fn new(input: &FoldInput<'a>) -> Self {
         let FoldInput { projected, order, materials, opaque, direction, params, .. } = *input;
         let size = projected.size;
         let perspective = projected.perspective;
@@ -302,7 +302,7 @@ impl Recorded {
     /// [`Error::Invalid`] for an id that no splat has and for what only the CPU does: half precision, depth and object
     /// planes.
     pub fn uploads(&self, input: &FoldInput<'_>, accumulator: &Accumulator) -> Result<Uploads, Error> {
-        let image = Image::of(input);
+        let image = Image::new(input);
         self.check_image(&image, accumulator)?;
         self.check_splats(input)?;
         let splats = self.splats(input)?;

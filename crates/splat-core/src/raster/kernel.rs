@@ -261,9 +261,9 @@ mod tests {
                 let narrow = constant + slope * s;
                 [w, w * narrow, w * narrow * s].iter().zip(&mut sums).for_each(|(add, sum)| *sum += add);
             }
-            let [all, narrow, width] = sums;
-            assert!((narrow / all - 1.0).abs() < 1e-5, "cutoff {cutoff}: {}", narrow / all);
-            assert!((width / all - cell * cell / 6.0).abs() < 1e-5, "cutoff {cutoff}: {}", width / all);
+            let [whole, narrow, width] = sums;
+            assert!((narrow / whole - 1.0).abs() < 1e-5, "cutoff {cutoff}: {}", narrow / whole);
+            assert!((width / whole - cell * cell / 6.0).abs() < 1e-5, "cutoff {cutoff}: {}", width / whole);
         }
     }
 

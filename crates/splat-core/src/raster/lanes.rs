@@ -120,9 +120,9 @@ impl<S: Simd> Lanes<S> {
     #[inline(always)]
     pub fn where_less_or(self, a: Self, b: Self, other: Self) -> Self {
         let simd = self.simd;
-        let own = simd.transmute_u32s_f32s(self.value);
+        let this = simd.transmute_u32s_f32s(self.value);
         let other = simd.transmute_u32s_f32s(other.value);
-        let bits = simd.select_u32s(simd.less_than_f32s(a.value, b.value), own, other);
+        let bits = simd.select_u32s(simd.less_than_f32s(a.value, b.value), this, other);
         Self { simd, value: simd.transmute_f32s_u32s(bits) }
     }
 
@@ -135,22 +135,24 @@ impl<S: Simd> Lanes<S> {
     /// e^−x for x ≥ 0, as [`exp_neg`] in every bit.
     #[inline(always)]
     pub fn exp_neg(self) -> Self {
-        let (simd, of) = (self.simd, |v| Self::splat(self.simd, v));
-        let t = (self * of(-std::f32::consts::LOG2_E)).max(of(-127.0));
-        let shifted = t + of(MAGIC);
-        let f = t - (shifted - of(MAGIC));
+        let simd = self.simd;
+        let lanes = |v| Self::splat(simd, v);
+        let t = (self * lanes(-std::f32::consts::LOG2_E)).max(lanes(-127.0));
+        let shifted = t + lanes(MAGIC);
+        let f = t - (shifted - lanes(MAGIC));
         let g = f * f;
-        let high = (of(EXP2[4]) + of(EXP2[5]) * f) + of(EXP2[6]) * g;
-        let p = (of(EXP2[0]) + of(EXP2[1]) * f) + g * ((of(EXP2[2]) + of(EXP2[3]) * f) + g * high);
+        let high = (lanes(EXP2[4]) + lanes(EXP2[5]) * f) + lanes(EXP2[6]) * g;
+        let p = (lanes(EXP2[0]) + lanes(EXP2[1]) * f) + g * ((lanes(EXP2[2]) + lanes(EXP2[3]) * f) + g * high);
         let exponent = simd.wrapping_dyn_shl_u32s(simd.transmute_u32s_f32s(shifted.value), simd.splat_u32s(23));
         let bits = simd.add_u32s(simd.transmute_u32s_f32s(p.value), exponent);
-        Self { simd, value: simd.transmute_f32s_u32s(bits) }.where_less(of(-126.0), t)
+        Self { simd, value: simd.transmute_f32s_u32s(bits) }.where_less(lanes(-126.0), t)
     }
 
     /// The natural logarithm of a normal number > 0: an error below 2·10⁻⁷ of it, or of 10⁻⁷ near 1.
     #[inline(always)]
     pub fn logarithm(self) -> Self {
-        let (simd, of) = (self.simd, |v| Self::splat(self.simd, v));
+        let simd = self.simd;
+        let lanes = |v| Self::splat(simd, v);
         // Bits of 1/√2, so that what is left of the number lies around 1; 127 more make the exponent a natural number.
         let whole = |v: u32| simd.splat_u32s(v);
         let above = simd.add_u32s(simd.transmute_u32s_f32s(self.value), whole((127 << 23) - 0x3f35_04f3));
@@ -159,15 +161,15 @@ impl<S: Simd> Lanes<S> {
         let rest = simd.sub_u32s(simd.transmute_u32s_f32s(self.value), scale);
         // The bits of 2²³ and a natural number below are those of their sum.
         let exponent = simd.transmute_f32s_u32s(simd.add_u32s(exponent, whole(0x4b00_0000)));
-        let exponent = Self { simd, value: exponent } - of(8_388_608.0 + 127.0);
-        let f = Self { simd, value: simd.transmute_f32s_u32s(rest) } - of(1.0);
-        let mut p = of(LN[0]);
+        let exponent = Self { simd, value: exponent } - lanes(8_388_608.0 + 127.0);
+        let f = Self { simd, value: simd.transmute_f32s_u32s(rest) } - lanes(1.0);
+        let mut p = lanes(LN[0]);
         for c in &LN[1..] {
-            p = p.mul_add(f, of(*c));
+            p = p.mul_add(f, lanes(*c));
         }
         let square = f * f;
-        let low = exponent.mul_add(of(LN_2[1]), p * f * square) - of(0.5) * square;
-        exponent.mul_add(of(LN_2[0]), f + low)
+        let low = exponent.mul_add(lanes(LN_2[1]), p * f * square) - lanes(0.5) * square;
+        exponent.mul_add(lanes(LN_2[0]), f + low)
     }
 
     /// Whether `self` < `other` in any lane.
@@ -179,9 +181,9 @@ impl<S: Simd> Lanes<S> {
     /// 1 − e^−x for 0 ≤ x ≤ ½, relative error below 2·10⁻⁷: tiny x keep their digits.
     #[inline(always)]
     pub fn opacity_of_small(self) -> Self {
-        let of = |v| Self::splat(self.simd, v);
-        let low = of(OPACITY[1]).mul_add(self, of(OPACITY[0]));
-        let high = of(OPACITY[3]).mul_add(self, of(OPACITY[2]));
+        let lanes = |v| Self::splat(self.simd, v);
+        let low = lanes(OPACITY[1]).mul_add(self, lanes(OPACITY[0]));
+        let high = lanes(OPACITY[3]).mul_add(self, lanes(OPACITY[2]));
         let x2 = self * self;
         (high.mul_add(x2, low)).mul_add(x2, self)
     }
@@ -189,20 +191,20 @@ impl<S: Simd> Lanes<S> {
     /// 1 − e^−x for any x ≥ 0: [`Lanes::opacity_of_small`] where it holds, the exponential elsewhere.
     #[inline(always)]
     pub fn opacity(self) -> Self {
-        let of = |v| Self::splat(self.simd, v);
-        let small = self.min(of(SMALL)).opacity_of_small();
-        small.where_less_or(self, of(SMALL), of(1.0) - self.exp_neg())
+        let lanes = |v| Self::splat(self.simd, v);
+        let small = self.min(lanes(SMALL)).opacity_of_small();
+        small.where_less_or(self, lanes(SMALL), lanes(1.0) - self.exp_neg())
     }
 
     /// Rounded to half precision (11 bits, least normal number 2⁻¹⁴), at most 65504.
     #[inline(always)]
     pub fn to_half(self) -> Self {
-        let of = |v| Self::splat(self.simd, v);
+        let lanes = |v| Self::splat(self.simd, v);
         // Veltkamp's splitting keeps 11 of 24 bits; below 2⁻¹⁴ the unit is 2⁻²⁴, that of a float near 0.75.
-        let scaled = self * of(8193.0);
+        let scaled = self * lanes(8193.0);
         let normal = scaled - (scaled - self);
-        let tiny = (self + of(0.75)) - of(0.75);
-        tiny.where_less_or(self.abs(), of(1.0 / 16384.0), normal).min(of(65504.0)).max(of(-65504.0))
+        let tiny = (self + lanes(0.75)) - lanes(0.75);
+        tiny.where_less_or(self.abs(), lanes(1.0 / 16384.0), normal).min(lanes(65504.0)).max(lanes(-65504.0))
     }
 }
 

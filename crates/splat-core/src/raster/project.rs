@@ -274,30 +274,31 @@ impl Projector<'_> {
 
     #[inline(always)]
     fn media<S: Simd>(&self, simd: S, attributes: &Attributes, centers: &Centers<S>) -> Shapes<S> {
-        let (of, load) = (|v: f32| Lanes::splat(simd, v), |column: &Column| Lanes::load(simd, column));
+        let lanes = |v: f32| Lanes::splat(simd, v);
+        let load = |column: &Column| Lanes::load(simd, column);
         let Centers { px_per_world, u, v, filter_px, .. } = *centers;
         let radius = load(&attributes.radius);
         let filter_world = filter_px / px_per_world;
         let radius_sq = radius * radius + filter_world * filter_world;
         let reach_sq = px_per_world * px_per_world * radius_sq;
-        let scale = of(1.0) / reach_sq;
-        let x_sq = of(1.0) + u * u;
-        let y_sq = of(1.0) + v * v;
+        let scale = lanes(1.0) / reach_sq;
+        let x_sq = lanes(1.0) + u * u;
+        let y_sq = lanes(1.0) + v * v;
         let mut peak = load(&attributes.cross_section) * load(&attributes.norm) / radius_sq;
         let mut half_extent = [reach_sq.sqrt(); 2];
         if !self.orthographic {
-            let ratio_sq = reach_sq / of(self.focal * self.focal);
+            let ratio_sq = reach_sq / lanes(self.focal * self.focal);
             half_extent = [self.extent_of_ball(simd, u, x_sq, ratio_sq), self.extent_of_ball(simd, v, y_sq, ratio_sq)];
             peak = self.in_view(simd, centers, radius_sq.sqrt(), peak);
         }
         Shapes {
             // y runs down in the image, so the mixed term changes its sign.
-            conic: [y_sq * scale, of(2.0) * (u * v * scale), x_sq * scale],
+            conic: [y_sq * scale, lanes(2.0) * (u * v * scale), x_sq * scale],
             peak,
             half_extent,
-            slope: [of(1.0) / (radius * load(&attributes.half_width)), of(1.0)],
-            core: [of(0.0); 3],
-            near: of(-1.0),
+            slope: [lanes(1.0) / (radius * load(&attributes.half_width)), lanes(1.0)],
+            core: [lanes(0.0); 3],
+            near: lanes(-1.0),
         }
     }
 
@@ -344,7 +345,8 @@ impl Projector<'_> {
 
     #[inline(always)]
     fn discs<S: Simd>(&self, simd: S, attributes: &Attributes, centers: &Centers<S>) -> Shapes<S> {
-        let (of, load) = (|v: f32| Lanes::splat(simd, v), |column: &Column| Lanes::load(simd, column));
+        let lanes = |v: f32| Lanes::splat(simd, v);
+        let load = |column: &Column| Lanes::load(simd, column);
         let Centers { px_per_world, u, v, filter_px, .. } = *centers;
         let normal = self.rotate(simd, &attributes.normal);
         let (axis_u, axis_v) = self.disc_axes(simd, attributes, normal);
@@ -363,37 +365,37 @@ impl Projector<'_> {
         let conic_of = |filter_sq: Lanes<S>| {
             let xx = trace_x + filter_sq;
             let yy = trace_y + filter_sq;
-            let inverse = of(1.0) / (area_sq + filter_sq * (trace_x + trace_y) + filter_sq * filter_sq);
-            ([yy * inverse, of(-2.0) * (mixed * inverse), xx * inverse], [xx, yy], inverse)
+            let inverse = lanes(1.0) / (area_sq + filter_sq * (trace_x + trace_y) + filter_sq * filter_sq);
+            ([yy * inverse, lanes(-2.0) * (mixed * inverse), xx * inverse], [xx, yy], inverse)
         };
         let (conic, [xx, yy], inverse) = conic_of(filter_sq);
-        let (core, ..) = conic_of(of(CORE_FILTER_PX * CORE_FILTER_PX));
+        let (core, ..) = conic_of(lanes(CORE_FILTER_PX * CORE_FILTER_PX));
         let radius_sq = dot(axis_u, axis_u).sqrt() * dot(axis_v, axis_v).sqrt();
         // The filter spreads the same optical depth over a larger image area.
         let spread = (area_sq * inverse).sqrt();
         let mut peak = load(&attributes.cross_section) * load(&attributes.norm) / radius_sq * spread;
         // A slab is thicker along a slanted ray; one over |cos| is cut as `SurfaceOpacity` cuts it.
         let (along, length) = if self.orthographic {
-            (normal[2], of(1.0))
+            (normal[2], lanes(1.0))
         } else {
-            (dot(normal, [u, v, of(1.0)]), (u * u + v * v + of(1.0)).sqrt())
+            (dot(normal, [u, v, lanes(1.0)]), (u * u + v * v + lanes(1.0)).sqrt())
         };
-        let slab = peak / (along.abs() / length).max(of(1e-3));
-        peak = slab.where_less_or(load(&attributes.crossing), of(0.0), peak);
+        let slab = peak / (along.abs() / length).max(lanes(1e-3));
+        peak = slab.where_less_or(load(&attributes.crossing), lanes(0.0), peak);
         // The side of the plane that the eye is on: for a centre behind the eye `along` has the other sign.
         let facing = if self.orthographic { along } else { along * centers.position[2] };
-        let away = of(FACING_AWAY).where_less_or(of(0.0), facing, of(1.0));
-        peak = peak * away.where_less_or(load(&attributes.opaque), of(0.0), of(1.0));
+        let away = lanes(FACING_AWAY).where_less_or(lanes(0.0), facing, lanes(1.0));
+        peak = peak * away.where_less_or(load(&attributes.opaque), lanes(0.0), lanes(1.0));
         let (near, half_extent, peak) = self.near_discs(simd, centers, [axis_u, axis_v], [xx.sqrt(), yy.sqrt()], peak);
         // An edge-on plane has no slope that could be used; its fragments stay at the centre's depth.
-        let per_px = of(1.0) / (along * px_per_world);
-        let usable = |slope: Lanes<S>| slope.where_less(of(1e-4), along.abs());
+        let per_px = lanes(1.0) / (along * px_per_world);
+        let usable = |slope: Lanes<S>| slope.where_less(lanes(1e-4), along.abs());
         Shapes {
             conic,
             core,
             peak,
             half_extent,
-            slope: [usable(of(0.0) - normal[0] * per_px), usable(normal[1] * per_px)],
+            slope: [usable(lanes(0.0) - normal[0] * per_px), usable(normal[1] * per_px)],
             near,
         }
     }
@@ -467,7 +469,7 @@ impl Projector<'_> {
             };
             splat.set_half_extent([image.half_extent[0][l], image.half_extent[1][l]]);
             let shown = splat.peak > self.faintest;
-            *coverage = if shown { Coverage::of(splat.bounds(self.size)) } else { Coverage::NONE };
+            *coverage = if shown { Coverage::from_bounds(splat.bounds(self.size)) } else { Coverage::NONE };
         }
     }
 }

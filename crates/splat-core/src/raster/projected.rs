@@ -257,7 +257,7 @@ impl Coverage {
 
     /// Of the pixel rectangle [x0, x1, y0, y1).
     #[inline(always)]
-    pub(crate) fn of(bounds: [u32; 4]) -> Self {
+    pub(crate) fn from_bounds(bounds: [u32; 4]) -> Self {
         let [x0, x1, y0, y1] = bounds;
         let tile = |v: u32| v / TILE as u32;
         let word = tile(x0)
@@ -290,11 +290,11 @@ mod tests {
         for bounds in [[0, 1, 0, 1], [31, 33, 0, 32], [65_535, 65_536, 0, 3], [0, 65_536, 5, 6], [0, 1024, 0, 1000]] {
             let t = TILE as u32;
             let expected = [[bounds[0] / t, bounds[2] / t], [(bounds[1] - 1) / t, (bounds[3] - 1) / t]];
-            let coverage = Coverage::of(bounds);
+            let coverage = Coverage::from_bounds(bounds);
             assert_eq!(coverage.tiles(|| bounds), expected.map(|v| v.map(|v| v as usize)));
             assert_ne!(coverage, Coverage::NONE);
         }
-        assert_eq!(Coverage::of([3, 3, 0, 1]), Coverage::NONE);
+        assert_eq!(Coverage::from_bounds([3, 3, 0, 1]), Coverage::NONE);
     }
 
     #[test]

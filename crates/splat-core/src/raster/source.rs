@@ -54,7 +54,7 @@ impl TileRays {
         if opaque.iter().all(|d| *d == f32::INFINITY) {
             opaque.clear();
         }
-        let ends = [f32::min, f32::max].map(|of| opaque.iter().copied().reduce(of).unwrap_or(f32::INFINITY));
+        let ends = [f32::min, f32::max].map(|extreme| opaque.iter().copied().reduce(extreme).unwrap_or(f32::INFINITY));
         Self { factors: projected.ray_factors(corner), is_perspective: projected.is_perspective(), opaque, ends }
     }
 
@@ -233,23 +233,23 @@ mod tests {
 
         fn with_simd<S: Simd>(self, simd: S) -> Vec<u32> {
             let Self(source, rays, corner, size) = self;
-            let mut all = Vec::new();
+            let mut bits = Vec::new();
             for run in Runs::new(simd, source.splat, size, corner) {
                 let mut tau = vec![0.0; Lanes::<S>::COUNT];
                 source.optical_depth(simd, run, rays).store(&mut tau);
-                all.extend(tau.into_iter().map(f32::to_bits));
+                bits.extend(tau.into_iter().map(f32::to_bits));
             }
-            all
+            bits
         }
     }
 
     #[test]
     fn what_lies_before_or_behind_all_that_is_opaque_is_what_each_pixel_finds() {
         let size = [96, 64];
-        let unit = |i: usize, of: u64| rng::unit_f32(3, of, i as u64, 0);
+        let unit = |i: usize, stream: u64| rng::unit_f32(3, stream, i as u64, 0);
         let mut cloud = Cloud::new(DVec3::ZERO);
         for i in 0..8000 {
-            let [x, y, z, u, v] = [0, 1, 2, 3, 4].map(|of| unit(i, of) - 0.5);
+            let [x, y, z, u, v] = [0, 1, 2, 3, 4].map(|stream| unit(i, stream) - 0.5);
             let (kind, normal) = match i % 2 {
                 0 => (SplatKind::Medium, Vec3::ZERO),
                 _ => (SplatKind::Surface, Vec3::new(u, v, 0.3).normalize()),

@@ -116,12 +116,14 @@ fn turn(u: Vec2, v: Vec2) -> Mat2 {
 }
 
 /// Half the difference of the eigenvalues of a conic.
-fn half_difference([a, b, c]: [f32; 3]) -> f32 {
+fn half_difference(conic: [f32; 3]) -> f32 {
+    let [a, b, c] = conic;
     (0.25 * (a - c) * (a - c) + 0.25 * b * b).sqrt()
 }
 
 /// The symmetric root of a conic a·x² + b·xy + c·y².
-fn root([a, b, c]: [f32; 3]) -> Mat2 {
+fn root(conic: [f32; 3]) -> Mat2 {
+    let [a, b, c] = conic;
     let mixed = 0.5 * b;
     let determinant = (a * c - mixed * mixed).max(0.0).sqrt();
     let scale = 1.0 / (a + c + 2.0 * determinant).max(f32::MIN_POSITIVE).sqrt();

@@ -185,9 +185,10 @@ impl Camera {
             let half = 0.5 * f64::from(self.size[axis]) / focal;
             sign * p[axis] > half * if self.is_orthographic() { 1.0 } else { p.z }
         };
-        let all = |is_outside: &dyn Fn(DVec3) -> bool| corners.iter().all(|c| is_outside(self.view_from_world(*c)));
-        let beside = |axis: usize| [-1.0, 1.0].into_iter().any(|sign| all(&|p| beyond(p, axis, sign)));
-        !(all(&|p| p.z <= 0.0) || beside(0) || beside(1))
+        let every_corner =
+            |is_outside: &dyn Fn(DVec3) -> bool| corners.iter().all(|c| is_outside(self.view_from_world(*c)));
+        let beside = |axis: usize| [-1.0, 1.0].into_iter().any(|sign| every_corner(&|p| beyond(p, axis, sign)));
+        !(every_corner(&|p| p.z <= 0.0) || beside(0) || beside(1))
     }
 
     /// The ray through image position (x, y), pixels from the top left corner: its unit direction in world space, and the solid angle

@@ -9,17 +9,17 @@ const MOST: usize = 4;
 type Present = u32;
 
 /// Depths, rising, that part things of up to 32 `kinds` so that these can be composited in turns: each span of depths has a kind, from 0.
-/// Where one kind is alone it is not cut; where several lie at the same depths these are cut into `wanted` parts, all together.
+/// Where one kind is alone it is not cut; where several lie at the same depths these are cut into `pieces` intervals, all together.
 ///
 /// ```
 /// // Fog from 0 to 10, with a pane of another kind in it.
 /// assert_eq!(splat_core::turns(&[(0, [0.0, 10.0]), (1, [4.0, 4.5])], 2, 1), [4.0, 4.5]);
 /// ```
-pub fn turns(spans: &[(usize, [f32; 2])], kinds: usize, wanted: usize) -> Vec<f32> {
-    let cuts = cuts(&stretches(spans, kinds), wanted);
+pub fn turns(spans: &[(usize, [f32; 2])], kinds: usize, pieces: usize) -> Vec<f32> {
+    let cuts = cuts(&stretches(spans, kinds), pieces);
     match cuts[..] {
-        [near, .., far] if cuts.len() > MOST * wanted => {
-            (0..=wanted).map(|k| near + (far - near) * (k as f32 / wanted as f32)).collect()
+        [near, .., far] if cuts.len() > MOST * pieces => {
+            (0..=pieces).map(|k| near + (far - near) * (k as f32 / pieces as f32)).collect()
         }
         _ => cuts,
     }
@@ -47,12 +47,12 @@ fn stretches(spans: &[(usize, [f32; 2])], kinds: usize) -> Vec<(Range<f32>, Pres
     stretches
 }
 
-/// Depths at which kinds change, and those between that cut what several share into `wanted` parts, all together.
-fn cuts(stretches: &[(Range<f32>, Present)], wanted: usize) -> Vec<f32> {
+/// Depths at which kinds change, and those between that cut what several share into `pieces` intervals, all together.
+fn cuts(stretches: &[(Range<f32>, Present)], pieces: usize) -> Vec<f32> {
     let is_shared = |present: Present| present.count_ones() > 1;
     let length = |range: &Range<f32>| range.end - range.start;
     let shared: f32 = stretches.iter().filter(|s| is_shared(s.1)).map(|s| length(&s.0)).sum();
-    let step = shared / wanted as f32;
+    let step = shared / pieces as f32;
     let mut cuts: Vec<f32> = Vec::new();
     let mut last = None;
     for (range, present) in stretches {

@@ -54,7 +54,7 @@ pub struct Capacities {
 
 impl Capacities {
     /// Room for these splats of the input.
-    pub fn of(input: &ShadeInput<'_>, attributes: AttributeRoom, layout: ChannelLayout) -> Self {
+    pub fn for_input(input: &ShadeInput<'_>, attributes: AttributeRoom, layout: ChannelLayout) -> Self {
         let materials = input.materials.len() as u32;
         let lights = input.lights.len() as u32;
         Self { attributes, materials, lights, shadows: shadowed(input.lights).count() as u32, layout }
@@ -98,7 +98,7 @@ pub fn record(capacities: Capacities) -> Recorded {
     let tables = r.input("shade tables", 16 * vectors);
     let received = r.input("received", 12 * splats * u64::from(shadows));
     let values = r.scratch("values", 4 * splats * layout.count() as u64);
-    let [positions, radii, looks, frames] = attributes.all();
+    let [positions, radii, looks, frames] = attributes.buffers();
     let bound = [view, positions, radii, looks, frames, tables, received, values];
     r.dispatch(&kernels::SPLAT_SHADE, Groups::cover(room.splats.div_ceil(BLOCK)), &bound, &[]);
     r.read(values);
@@ -138,7 +138,7 @@ pub fn suits(input: &ShadeInput<'_>) -> Result<(), &'static str> {
 pub fn received(input: &ShadeInput<'_>, ids: &[u32], progress: Option<&Progress>) -> Result<Vec<[f32; 3]>, Error> {
     let quiet = Progress::new();
     let progress = progress.unwrap_or(&quiet);
-    let mut all = Vec::new();
+    let mut irradiances = Vec::new();
     for lit in shadowed(input.lights) {
         let mut column = vec![[0.0; 3]; ids.len()];
         column.par_chunks_mut(CHUNK).zip(ids.par_chunks(CHUNK)).for_each(|(to, ids)| {
@@ -150,10 +150,10 @@ pub fn received(input: &ShadeInput<'_>, ids: &[u32], progress: Option<&Progress>
                 *to = super::received(input, i as usize, lit.shadow, irradiance);
             }
         });
-        all.append(&mut column);
+        irradiances.append(&mut column);
     }
     progress.tick(0)?;
-    Ok(all)
+    Ok(irradiances)
 }
 
 /// How much of a shadow each of the splats `ids` takes, in \[0, 1\]: one number for all where they are alike.

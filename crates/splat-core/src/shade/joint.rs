@@ -152,11 +152,11 @@ impl MediumCell {
     /// The depths of one channel, from what a map has.
     fn depth(&self, looked: &Looked, channel: usize, towards: Vec3) -> DepthAbout {
         let Looked { middle, beyond, slope } = *looked;
-        let own = self.optical_depth[channel];
+        let optical_depth = self.optical_depth[channel];
         // Beside an edge of somebody's shadow a map falls by any amount.
-        let grown = slope.length().min(own / LEAST_COSINE);
-        let normal = if slope.length() > FLAT * own { slope.normalize() } else { towards };
-        let within = own / normal.dot(towards).max(LEAST_COSINE);
+        let grown = slope.length().min(optical_depth / LEAST_COSINE);
+        let normal = if slope.length() > FLAT * optical_depth { slope.normalize() } else { towards };
+        let within = optical_depth / normal.dot(towards).max(LEAST_COSINE);
         let across = if self.absorbs { grown.max(within) } else { grown };
         if across <= 0.0 {
             return DepthAbout { before: middle, across: Vec3::ZERO };
@@ -304,10 +304,10 @@ mod tests {
     /// ∫ e^(−l(s) − e·s) ds/∫ e^(−e·s) ds over a cell from the eye's face on, in f64 by Simpson's rule.
     fn by_quadrature(light: [f64; 2], eye: f64) -> f64 {
         const STEPS: usize = 20_000;
-        let sum = |of: &dyn Fn(f64) -> f64| {
+        let sum = |integrand: &dyn Fn(f64) -> f64| {
             let term = |k: usize| {
                 let weight = if k == 0 || k == STEPS { 1.0 } else { [2.0, 4.0][k % 2] };
-                weight * of(k as f64 / STEPS as f64)
+                weight * integrand(k as f64 / STEPS as f64)
             };
             (0..=STEPS).map(term).sum::<f64>()
         };

@@ -97,7 +97,7 @@ impl Point<'_> {
                 if by_phase { (self.scatter(to_light), 0.0) } else { m.reflect(self.normal, to_light, self.to_eye) };
             Incoming { irradiance, diffuse, specular }
         });
-        Radiance::of(m, self.color, by_phase, ambient, incoming, transmittance)
+        Radiance::new(m, self.color, by_phase, ambient, incoming, transmittance)
     }
 
     /// Single scattering per unit irradiance: the factor on the colour.
@@ -121,7 +121,7 @@ pub(super) struct Incoming {
 impl Radiance {
     /// Of a colour and a material that scatter or reflect what comes to them; `transmittance` is asked as by [`Point::radiance`].
     #[inline]
-    pub(super) fn of(
+    pub(super) fn new(
         m: &Material,
         color: [f32; 3],
         by_phase: bool,

@@ -115,13 +115,13 @@ impl<'a> Scattering<'a> {
                 thick[k] = ThickSplat::new(within, i);
             }
         }
-        for (rank, (lit, of)) in input.lights.iter().zip(&mut *lights).enumerate() {
+        for (rank, (lit, light)) in input.lights.iter().zip(&mut *lights).enumerate() {
             asked.clear();
             for (k, i) in splats.clone().enumerate().filter(|(_, i)| is_one(*i)) {
-                let arriving = lit.light.intensity.map(|intensity| intensity * of.falloff[k]);
-                of.irradiance[k] = arriving.map(|e| if e > TRACE { e } else { 0.0 });
-                of.share[k] = [1.0; 3];
-                if is_attenuated(of.irradiance[k], shadow_share(input, i)) {
+                let arriving = lit.light.intensity.map(|intensity| intensity * light.falloff[k]);
+                light.irradiance[k] = arriving.map(|e| if e > TRACE { e } else { 0.0 });
+                light.share[k] = [1.0; 3];
+                if is_attenuated(light.irradiance[k], shadow_share(input, i)) {
                     asked.push(i);
                 }
             }
@@ -129,7 +129,7 @@ impl<'a> Scattering<'a> {
                 let through = shadow.at_splats(asked, &|i| Receiver::of_splat(input.cloud, i));
                 for (i, through) in asked.iter().zip(through) {
                     let coefficient = shadow_share(input, *i);
-                    of.share[i - first] = match &thick[i - first] {
+                    light.share[i - first] = match &thick[i - first] {
                         Some(splat) => splat.received(input, *i, rank, through, coefficient),
                         None => passing(through, coefficient),
                     };
@@ -141,12 +141,15 @@ impl<'a> Scattering<'a> {
                 out.fill(0.0);
                 continue;
             }
-            let incoming =
-                |of: &OfLight| Incoming { irradiance: of.irradiance[k], diffuse: of.leaving[k], specular: 0.0 };
+            let incoming = |light: &OfLight| Incoming {
+                irradiance: light.irradiance[k],
+                diffuse: light.leaving[k],
+                specular: 0.0,
+            };
             let incoming = lights.iter().map(incoming);
             let color = input.cloud.color[i];
             let radiance =
-                Radiance::of(material, color, true, input.ambient, incoming, |rank, _| lights[rank].share[k]);
+                Radiance::new(material, color, true, input.ambient, incoming, |rank, _| lights[rank].share[k]);
             let cloud = input.cloud;
             let to_eye = Vec3::from_array(to_eye.map(|axis| axis[k]));
             let normal = facing(cloud.kind[i], cloud.normal_of(i), cloud.shading_normal_of(i), to_eye);
@@ -246,7 +249,7 @@ mod tests {
     fn cloud(splats: usize) -> Cloud {
         let mut cloud = Cloud::new(DVec3::new(3.0, -2.0, 7.0));
         for i in 0..splats as u64 {
-            let [x, y, z, r, red] = [0, 1, 2, 3, 4].map(|of| rng::unit_f32(9, of, i, 0));
+            let [x, y, z, r, red] = [0, 1, 2, 3, 4].map(|stream| rng::unit_f32(9, stream, i, 0));
             let (position, radius) = match i {
                 9 => (Vec3::splat(0.25), 1e-8),
                 _ => (Vec3::new(x, y, z) - 0.5, 0.01 + 0.1 * r),

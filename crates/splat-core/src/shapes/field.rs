@@ -130,8 +130,8 @@ mod tests {
                 let p = DVec3::from_array([0, 1, 2].map(|a| rng::unit(5, 0, i, a) * 4.0 - 2.0)) * scale;
                 let largest = |m: DMat3| m.to_cols_array().into_iter().fold(0.0, |most: f64, e| most.max(e.abs()));
                 let found = wave.hessian(p);
-                let own = wave.own_hessian(p);
-                let error = largest(found - own) / largest(own);
+                let exact = wave.own_hessian(p);
+                let error = largest(found - exact) / largest(exact);
                 assert!(error < 2e-9, "{p} at {scale}: {error:e}");
             }
             // At the origin nothing but the field's own size is known.

@@ -115,8 +115,9 @@ impl Gaussians {
                 // Degrees do not mix.
                 let band = terms(degree - 1)..terms(degree);
                 for k in band.clone() {
-                    let of = |c: usize| band.clone().map(|j| matrix[k][j] * f64::from(from[j][c])).sum::<f64>() as f32;
-                    to[k] = [of(0), of(1), of(2)];
+                    let turned =
+                        |c: usize| band.clone().map(|j| matrix[k][j] * f64::from(from[j][c])).sum::<f64>() as f32;
+                    to[k] = [turned(0), turned(1), turned(2)];
                 }
             }
         }
@@ -193,11 +194,11 @@ impl Gaussians {
     /// Order by the bits of all numbers.
     fn compare(&self, a: usize, b: usize) -> Ordering {
         let (n, bits) = (self.terms(), |v: f32| v.to_bits());
-        let all = |i: usize| {
+        let numbers = |i: usize| {
             let axes = self.axes[i].into_iter().flat_map(|axis| axis.to_array());
             axes.chain([self.opacity[i]]).chain(self.harmonics[i * n..][..n].iter().flatten().copied()).map(bits)
         };
-        all(a).cmp(all(b))
+        numbers(a).cmp(numbers(b))
     }
 }
 
@@ -286,17 +287,17 @@ mod tests {
         let second = cloud(3, 2);
         let mut plain = Cloud::new(DVec3::ZERO);
         plain.push(&Splat::default());
-        let mut all = Cloud::new(DVec3::ZERO);
-        [&plain, &first, &second].into_iter().for_each(|part| all.append(part));
-        all.validate().unwrap();
+        let mut joined = Cloud::new(DVec3::ZERO);
+        [&plain, &first, &second].into_iter().for_each(|part| joined.append(part));
+        joined.validate().unwrap();
         let d = Vec3::new(0.36, 0.48, 0.8);
-        assert_eq!(all.color_along(0, d), [1.0; 3]);
-        (0..3).for_each(|i| assert_eq!(all.color_along(1 + i, d), first.color_along(i, d)));
-        (0..2).for_each(|i| assert_eq!(all.color_along(4 + i, d), second.color_along(i, d)));
-        let picked = all.gather(&[5, 0]);
+        assert_eq!(joined.color_along(0, d), [1.0; 3]);
+        (0..3).for_each(|i| assert_eq!(joined.color_along(1 + i, d), first.color_along(i, d)));
+        (0..2).for_each(|i| assert_eq!(joined.color_along(4 + i, d), second.color_along(i, d)));
+        let picked = joined.gather(&[5, 0]);
         assert_eq!((picked.color_along(0, d), picked.gaussian_of(1)), (second.color_along(1, d), None));
-        all.gaussian[1] = 99;
-        assert!(all.validate().unwrap_err().to_string().contains("gaussian"));
+        joined.gaussian[1] = 99;
+        assert!(joined.validate().unwrap_err().to_string().contains("gaussian"));
     }
 
     #[test]
@@ -325,9 +326,9 @@ mod tests {
 
     #[test]
     fn the_order_of_splats_does_not_depend_on_their_places_in_the_table() {
-        let all = cloud(2, 40);
+        let whole = cloud(2, 40);
         let ids: Vec<u32> = (0..40).rev().collect();
-        let mut turned = all.gather(&ids);
+        let mut turned = whole.gather(&ids);
         // The table is turned around as well.
         let mut table = some(2, 40);
         table.axes.reverse();
@@ -339,6 +340,6 @@ mod tests {
             cloud.canonicalize();
             (0..40).map(|i| cloud.color_along(i, Vec3::Y)).collect::<Vec<_>>()
         };
-        assert_eq!(colors(all), colors(turned));
+        assert_eq!(colors(whole), colors(turned));
     }
 }

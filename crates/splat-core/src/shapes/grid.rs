@@ -169,8 +169,9 @@ mod tests {
         let bcc = BccGrid { planes };
         for k in [4, 5] {
             let here = bcc.position(2, 2, k);
-            let all = (0..250).map(|n| bcc.position(n % 5, n / 5 % 5, n / 25).distance(here)).filter(|d| *d > 0.0);
-            let near: Vec<f64> = all.filter(|d| *d < 1.01 * edge).collect();
+            let distances =
+                (0..250).map(|n| bcc.position(n % 5, n / 5 % 5, n / 25).distance(here)).filter(|d| *d > 0.0);
+            let near: Vec<f64> = distances.filter(|d| *d < 1.01 * edge).collect();
             let corners = near.iter().filter(|d| (*d - 0.75f64.sqrt() * edge).abs() < 1e-12).count();
             let faces = near.iter().filter(|d| (*d - edge).abs() < 1e-12).count();
             assert_eq!((corners, faces, near.len()), (8, 6, 14), "plane {k}");

@@ -121,10 +121,10 @@ mod tests {
     fn rotated_coefficients_are_those_of_the_rotated_function() {
         let by = DQuat::from_xyzw(0.3, -0.5, 0.2, 0.7).normalize();
         let matrix = rotation(by);
-        let of = |k: usize| f64::from((k * 37 % 11) as u32) - 5.0;
+        let coefficient = |k: usize| f64::from((k * 37 % 11) as u32) - 5.0;
         for d in [DVec3::X, DVec3::new(0.6, 0.0, -0.8), DVec3::new(2.0, -3.0, 6.0) / 7.0] {
-            let before: f64 = basis(by.inverse() * d).iter().enumerate().map(|(k, y)| y * of(k)).sum();
-            let turned = |row: &[f64; MOST]| row.iter().enumerate().map(|(k, m)| m * of(k)).sum::<f64>();
+            let before: f64 = basis(by.inverse() * d).iter().enumerate().map(|(k, y)| y * coefficient(k)).sum();
+            let turned = |row: &[f64; MOST]| row.iter().enumerate().map(|(k, m)| m * coefficient(k)).sum::<f64>();
             let after: f64 = basis(d).iter().zip(&matrix).map(|(y, row)| y * turned(row)).sum();
             assert!((before - after).abs() < 1e-12, "{d}: {before} {after}");
         }

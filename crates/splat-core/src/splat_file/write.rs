@@ -13,13 +13,13 @@ use std::fmt::Write as _;
 /// If a splat is a Gaussian.
 pub fn splats_to_ply(cloud: &Cloud, objects: &[String], materials: &[String], footprints: &FootprintStack) -> Vec<u8> {
     assert!(cloud.gaussians.is_empty(), "invariant: Gaussians have a format of their own");
-    let some = |of: &&SplatColumns| of.is_there.is_none_or(|is_there| is_there(cloud));
+    let some = |group: &&SplatColumns| group.is_there.is_none_or(|is_there| is_there(cloud));
     let groups: Vec<&SplatColumns> = COLUMNS.iter().filter(some).collect();
-    let columns: Vec<&SplatColumn> = groups.iter().flat_map(|of| of.columns).collect();
+    let columns: Vec<&SplatColumn> = groups.iter().flat_map(|group| group.columns).collect();
     let mut head = head(cloud, objects, materials, footprints);
-    for of in &groups {
-        let names: Vec<&str> = of.columns.iter().map(|column| column.name).collect();
-        let _ = writeln!(head, "comment {}: {}", names.join(" "), of.meaning);
+    for group in &groups {
+        let names: Vec<&str> = group.columns.iter().map(|column| column.name).collect();
+        let _ = writeln!(head, "comment {}: {}", names.join(" "), group.meaning);
     }
     let _ = writeln!(head, "element vertex {}", cloud.len());
     for column in &columns {

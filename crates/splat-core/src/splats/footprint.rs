@@ -71,8 +71,12 @@ impl Footprint {
     /// count for where it lies along a ray: see [`crate::DepthFragment::narrow`].
     #[cfg(feature = "raster")]
     pub fn narrowing(&self) -> [f32; 2] {
-        let [all, first, second] = self.moments();
-        crate::compositing::depth_profile::narrowing(first / all, second / all, f64::from(self.spacing_for_radius(1.0)))
+        let [whole, first, second] = self.moments();
+        crate::compositing::depth_profile::narrowing(
+            first / whole,
+            second / whole,
+            f64::from(self.spacing_for_radius(1.0)),
+        )
     }
 
     /// ∫sⁿ·w ds over \[0, 1\] for n = 0, 1, 2, from w = e^−q·Σ_{k≥3} (qt)^k/k!, t = 1 − s, whose terms are all positive.
@@ -204,10 +208,10 @@ mod tests {
             let f = Footprint { cutoff };
             let n = 200_000;
             let at = |i: i32| (f64::from(i) + 0.5) / f64::from(n) * 2.0 - 1.0;
-            let all: f64 = (0..n).map(|i| f.profile(at(i) * at(i))).sum();
+            let total: f64 = (0..n).map(|i| f.profile(at(i) * at(i))).sum();
             for x in [-1.5, -1.0, -0.6, -0.1, 0.0, 0.3, 0.9, 1.0, 2.0] {
                 let before: f64 = (0..n).filter(|i| at(*i) < x).map(|i| f.profile(at(i) * at(i))).sum();
-                assert!((f.share_before(x) - before / all).abs() < 2e-5, "cutoff {cutoff}, {x}");
+                assert!((f.share_before(x) - before / total).abs() < 2e-5, "cutoff {cutoff}, {x}");
                 assert!((f.share_before(x) + f.share_before(-x) - 1.0).abs() < 1e-14);
             }
         }

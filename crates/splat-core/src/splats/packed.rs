@@ -77,7 +77,7 @@ impl PackedCloud {
         }
         let ranges = (0..cloud.len().div_ceil(BLOCK)).into_par_iter().with_min_len(FEW);
         let (mut blocks, lists): (Vec<Block>, Vec<Vec<Look>>) =
-            ranges.map(|b| Block::of(cloud, b * BLOCK..cloud.len().min((b + 1) * BLOCK))).unzip();
+            ranges.map(|b| Block::new(cloud, b * BLOCK..cloud.len().min((b + 1) * BLOCK))).unzip();
         let mut first = 0;
         for (block, looks) in blocks.iter_mut().zip(&lists) {
             block.first_look = first;
@@ -85,7 +85,7 @@ impl PackedCloud {
         }
         let looks = lists.concat();
         let place_of_look = |i: usize| {
-            let look = Look::of(cloud, i);
+            let look = Look::from_splat(cloud, i);
             let first = blocks[i / BLOCK].first_look as usize;
             looks[first..].iter().position(|l| *l == look).unwrap_or(0) as u8
         };
@@ -178,11 +178,11 @@ impl PackedCloud {
 fn by_block<Q: Sync, T: Clone + Default + Send>(
     blocks: &[Block],
     from: &[Q],
-    of: impl Fn(&Block, &Q) -> T + Sync,
+    entry: impl Fn(&Block, &Q) -> T + Sync,
 ) -> Vec<T> {
     let mut out = vec![T::default(); from.len()];
     let parts = out.par_chunks_mut(BLOCK).zip(from.par_chunks(BLOCK)).zip(blocks).with_min_len(FEW);
     // Loops over one block each, of which what they read of it leaves vectors of lanes.
-    parts.for_each(|((out, from), block)| out.iter_mut().zip(from).for_each(|(to, v)| *to = of(block, v)));
+    parts.for_each(|((out, from), block)| out.iter_mut().zip(from).for_each(|(to, v)| *to = entry(block, v)));
     out
 }

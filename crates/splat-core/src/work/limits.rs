@@ -112,7 +112,7 @@ mod tests {
         );
         let rounded = Exceeded { needed: 10_u64.pow(18), ..few.clone() };
         assert_eq!(rounded.to_string(), "a cloud needs 1.000e18 splats, the limit is 2");
-        let of = few.of("object 'fog'", "");
-        assert_eq!(of.to_string(), "object 'fog': a cloud needs 3 splats, the limit is 2");
+        let named = few.of("object 'fog'", "");
+        assert_eq!(named.to_string(), "object 'fog': a cloud needs 3 splats, the limit is 2");
     }
 }

@@ -132,7 +132,7 @@ pub fn record_cast(room: CastRoom) -> RecordedCast {
     let state = r.scratch("cast state", size_of::<CastState>() as u64);
 
     let each = Groups::cover(room.casters.div_ceil(GROUP));
-    let [positions, radii, looks, frames] = attributes.all();
+    let [positions, radii, looks, frames] = attributes.buffers();
     let cast = [view, casters, positions, radii, looks, frames, tables, footprints];
     r.dispatch(&kernels::TSM_CAST, each, &cast, &[]);
     r.dispatch(&kernels::TSM_COUNT, each, &[view, footprints, opaque, directions, counts.numbers], &[]);

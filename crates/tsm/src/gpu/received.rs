@@ -52,7 +52,7 @@ pub fn record_received(room: Room, attributes: AttributeRoom, light: u32) -> Rec
     let r = &mut recording;
     let frame = r.input("frame", size_of::<CastView>() as u64);
     let attributes = AttributeBuffers::record(r, attributes);
-    let [positions, radii, looks, frames] = attributes.all();
+    let [positions, radii, looks, frames] = attributes.buffers();
     let each = Groups::cover(splats.div_ceil(GROUP));
     let receivers = r.scratch("receivers", 32 * u64::from(splats));
     r.dispatch(&kernels::TSM_RECEIVE, each, &[frame, positions, radii, looks, frames, receivers], &[]);

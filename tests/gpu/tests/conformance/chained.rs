@@ -96,12 +96,12 @@ fn four_stages_in_one_submission_are_the_cpu_s_picture() {
         let layers = room.footprints;
         let room_for = projection::Capacities { attributes: held, footprints: layers, materials: 1, depth: false };
         let project = projection::record(room_for).unwrap();
-        let shade = shading::record(shading::Capacities::of(&input, attributes.room(), layout));
+        let shade = shading::record(shading::Capacities::for_input(&input, attributes.room(), layout));
         let composite = follow::record(room).unwrap();
         let mut whole = sort.recording.clone();
         let held = &project.attributes;
         let p = whole.join(&project.recording, &[(held.positions, sort.positions), (held.radii, sort.radii)]);
-        let s = whole.join(&shade.recording, &shade.attributes.shared(&held.of(&p)));
+        let s = whole.join(&shade.recording, &shade.attributes.shared(&held.in_joined(&p)));
         let c = whole.join(
             &composite.recording,
             &[

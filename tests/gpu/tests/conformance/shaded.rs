@@ -89,7 +89,7 @@ fn objects() -> Vec<Object> {
 
 fn on_device(device: &mut Device, input: &ShadeInput<'_>, layout: ChannelLayout) -> Vec<f32> {
     let attributes = Attributes::new(input.cloud, None).unwrap();
-    let recorded = record(Capacities::of(input, attributes.room(), layout));
+    let recorded = record(Capacities::for_input(input, attributes.room(), layout));
     let ids: Vec<u32> = (0..input.cloud.len() as u32).collect();
     let light = received(input, &ids, None).unwrap();
     let uploads = recorded.uploads(input, &attributes, &light).unwrap();
@@ -175,7 +175,7 @@ fn what_single_precision_does_not_resolve_is_said() {
         let objects = &objects[..];
         let ambient = [0.0; 3];
         let input = ShadeInput { cloud, materials: &materials, objects, lights: &lights, ambient, camera: &camera };
-        (suits(&input), Capacities::of(&input, Attributes::new(cloud, None).unwrap().room(), ChannelLayout::default()))
+        (suits(&input), Capacities::for_input(&input, Attributes::new(cloud, None).unwrap().room(), ChannelLayout::default()))
     };
     assert_eq!(asks(spot(0.3, 0.6), 64.0).0, Ok(()));
     assert!(asks(spot(0.3, 0.3), 64.0).0.is_err() && asks(spot(0.3, 0.6), 65.0).0.is_err());

@@ -67,7 +67,7 @@ impl LightLayers {
         let columns = width.div_ceil(BLOCK);
         let mut nearest = vec![f32::INFINITY; columns * (camera.size[1] as usize).div_ceil(BLOCK)];
         for k in 0..width * camera.size[1] as usize {
-            if let Some(first) = layers.of(k).first() {
+            if let Some(first) = layers.at_pixel(k).first() {
                 let least = &mut nearest[k / width / BLOCK * columns + k % width / BLOCK];
                 *least = least.min(first.depth);
             }
@@ -85,7 +85,7 @@ impl LightLayers {
     pub(super) fn through(&self, k: usize, place: &Beside, depth: f32, is_other: impl Fn(f32) -> bool) -> Vec3 {
         let Beside { step, reach, is_parallel } = *place;
         let mut sum = Vec3::ZERO;
-        for layer in self.layers.of(k) {
+        for layer in self.layers.at_pixel(k) {
             let there = layer.depth;
             if there - reach >= depth {
                 break;

@@ -43,21 +43,21 @@ impl AttributeBuffers {
     }
 
     /// In the order of bindings.
-    pub fn all(&self) -> [BufferId; 4] {
+    pub fn buffers(&self) -> [BufferId; 4] {
         [self.positions, self.radii, self.looks, self.frames]
     }
 
     /// Where they lie in the whole that their recording was joined to.
-    pub fn of(&self, joined: &Joined) -> Self {
-        let [positions, radii, looks, frames] = self.all().map(|buffer| joined.buffer(buffer));
+    pub fn in_joined(&self, joined: &Joined) -> Self {
+        let [positions, radii, looks, frames] = self.buffers().map(|buffer| joined.buffer(buffer));
         Self { positions, radii, looks, frames }
     }
 
     /// Each beside its twin, as [`Recording::join`] takes them.
     pub fn shared(&self, with: &Self) -> [(BufferId, BufferId); 4] {
-        let own = self.all();
-        let other = with.all();
-        std::array::from_fn(|k| (own[k], other[k]))
+        let buffers = self.buffers();
+        let others = with.buffers();
+        std::array::from_fn(|k| (buffers[k], others[k]))
     }
 }
 
@@ -130,7 +130,7 @@ impl Attributes {
 
     /// The bytes with the buffers that they go to.
     pub fn inputs(&self, buffers: &AttributeBuffers) -> [(BufferId, &[u8]); 4] {
-        let buffers = buffers.all();
+        let buffers = buffers.buffers();
         std::array::from_fn(|k| (buffers[k], &self.bytes[k][..]))
     }
 

@@ -105,7 +105,7 @@ pub fn record(capacities: Capacities) -> Result<Recorded, Error> {
     let splats = r.scratch("splats", 4 * words * u64::from(room.splats));
     let state = r.scratch("projected", size_of::<ProjectState>() as u64);
     r.dispatch(&kernels::SPLAT_NOTHING, Groups::cover(1), &[state], &[]);
-    let [positions, radii, looks, frames] = attributes.all();
+    let [positions, radii, looks, frames] = attributes.buffers();
     let bound = [view, positions, radii, looks, frames, tables, splats, state];
     r.dispatch(&kernels::SPLAT_PROJECT, Groups::cover(room.splats.div_ceil(BLOCK)), &bound, &[]);
     r.read(splats);
@@ -152,11 +152,11 @@ impl Recorded {
             footprints: footprints.len() as u32,
             unused: 0,
         };
-        let of = |f: &Footprint| {
+        let rows = |f: &Footprint| {
             let [a, b, c, d, e, g] = share_terms(f);
             [[f.norm() as f32, f.cutoff, half_width(f), 0.0], [a, b, c, d], [e, g, 0.0, 0.0]]
         };
-        let footprints = footprints.iter().flat_map(of);
+        let footprints = footprints.iter().flat_map(rows);
         let slab = |m: &Material| f32::from(u8::from(m.surface_opacity == SurfaceOpacity::ThinSlab));
         let tables: Vec<[f32; 4]> =
             footprints.chain(input.materials.iter().map(|m| [slab(m), 0.0, 0.0, 0.0])).collect();

@@ -14,15 +14,15 @@ const CHUNK: usize = 1 << 12;
 
 /// Depth of each pixel, and what `keep` makes of the nearest triangle there; +∞ and `none` where there is none.
 pub(super) fn resolve<T: Copy + Send>(
-    of: &Meshes<'_>,
+    meshes: &Meshes<'_>,
     none: T,
     keep: impl Fn(u32, u32, &Crossing) -> T + Sync,
     progress: Option<&Progress>,
 ) -> Result<(Vec<f32>, Vec<T>), Error> {
     let quiet = Progress::new();
     let progress = progress.unwrap_or(&quiet);
-    let [width, height] = of.camera.size.map(|s| s as usize);
-    let found = Found::new(of);
+    let [width, height] = meshes.camera.size.map(|s| s as usize);
+    let found = Found::new(meshes);
     progress.add_total(height.div_ceil(ROWS) as u64);
     let mut depth = vec![f32::INFINITY; width * height];
     let mut kept = vec![none; width * height];
@@ -32,7 +32,7 @@ pub(super) fn resolve<T: Copy + Send>(
             return;
         }
         let mut nearest = vec![f64::INFINITY; depth.len()];
-        found.meet(of, b, |k, (_, piece), at| {
+        found.meet(meshes, b, |k, (_, piece), at| {
             if at.depth < nearest[k] {
                 (nearest[k], kept[k]) = (at.depth, keep(piece.mesh, piece.triangle, at));
             }
@@ -50,18 +50,23 @@ pub(super) struct Found {
 }
 
 impl Found {
-    pub(super) fn new(of: &Meshes<'_>) -> Self {
-        let pieces = pieces(of);
-        Self { lists: Lists::new(&pieces, of.camera.size[1]), pieces }
+    pub(super) fn new(meshes: &Meshes<'_>) -> Self {
+        let pieces = pieces(meshes);
+        Self { lists: Lists::new(&pieces, meshes.camera.size[1]), pieces }
     }
 
     /// Hands on all that rays of a band meet, triangle by triangle in their order: the pixel in the band, the piece of a triangle and its rank, the place.
     #[inline]
-    pub(super) fn meet(&self, of: &Meshes<'_>, band: usize, mut hand_on: impl FnMut(usize, (u32, &Piece), &Crossing)) {
-        let [width, height] = of.camera.size;
-        for id in self.lists.of(band) {
+    pub(super) fn meet(
+        &self,
+        meshes: &Meshes<'_>,
+        band: usize,
+        mut hand_on: impl FnMut(usize, (u32, &Piece), &Crossing),
+    ) {
+        let [width, height] = meshes.camera.size;
+        for id in self.lists.in_band(band) {
             let piece = &self.pieces[*id as usize];
-            let plane = Plane::new(of, of.triangle(piece.mesh, piece.triangle));
+            let plane = Plane::new(meshes, meshes.triangle(piece.mesh, piece.triangle));
             let rows = piece.rows(height);
             for y in rows.start.max(band * ROWS)..rows.end.min((band + 1) * ROWS) {
                 for x in piece.span(y, width) {
@@ -72,30 +77,31 @@ impl Found {
     }
 
     /// How many of them there are in a band.
-    pub(super) fn count(&self, of: &Meshes<'_>, band: usize) -> u64 {
-        let [width, height] = of.camera.size;
+    pub(super) fn count(&self, meshes: &Meshes<'_>, band: usize) -> u64 {
+        let [width, height] = meshes.camera.size;
         let rows = |piece: &Piece| {
             let rows = piece.rows(height);
             rows.start.max(band * ROWS)..rows.end.min((band + 1) * ROWS)
         };
         let of_piece = |piece: &Piece| rows(piece).map(|y| piece.span(y, width).len() as u64).sum::<u64>();
-        self.lists.of(band).iter().map(|id| of_piece(&self.pieces[*id as usize])).sum()
+        self.lists.in_band(band).iter().map(|id| of_piece(&self.pieces[*id as usize])).sum()
     }
 }
 
 /// All pieces of all triangles, in their order.
-fn pieces(of: &Meshes<'_>) -> Vec<Piece> {
-    let mut all = Vec::new();
-    for (mesh, triangles) in of.triangles.iter().enumerate() {
+fn pieces(meshes: &Meshes<'_>) -> Vec<Piece> {
+    let mut pieces = Vec::new();
+    for (mesh, triangles) in meshes.triangles.iter().enumerate() {
         let chunk = |(chunk, triangles): (usize, &[[u32; 3]])| {
-            let mut own = Vec::new();
-            (0..triangles.len()).for_each(|k| Piece::push(of, mesh as u32, (chunk * CHUNK + k) as u32, &mut own));
-            own
+            let mut of_chunk = Vec::new();
+            (0..triangles.len())
+                .for_each(|k| Piece::push(meshes, mesh as u32, (chunk * CHUNK + k) as u32, &mut of_chunk));
+            of_chunk
         };
         let chunks: Vec<Vec<Piece>> = triangles.par_chunks(CHUNK).enumerate().map(chunk).collect();
-        chunks.into_iter().for_each(|mut own| all.append(&mut own));
+        chunks.into_iter().for_each(|mut of_chunk| pieces.append(&mut of_chunk));
     }
-    all
+    pieces
 }
 
 /// Pieces by band, in their order.
@@ -124,7 +130,7 @@ impl Lists {
         Self { starts, ids }
     }
 
-    fn of(&self, band: usize) -> &[u32] {
+    fn in_band(&self, band: usize) -> &[u32] {
         &self.ids[self.starts[band]..self.starts[band + 1]]
     }
 }

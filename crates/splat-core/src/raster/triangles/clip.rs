@@ -36,52 +36,52 @@ impl Polygon {
 }
 
 /// What of a triangle can be projected; nothing where it lies behind, far beside, or is no number.
-pub(super) fn clip(of: &Meshes<'_>, triangle: [DVec3; 3]) -> Polygon {
+pub(super) fn clip(meshes: &Meshes<'_>, triangle: [DVec3; 3]) -> Polygon {
     let mut polygon = Polygon { corners: [DVec3::ZERO; MOST], count: 0 };
     if triangle.iter().all(|p| p.is_finite()) {
         triangle.into_iter().for_each(|p| polygon.push(p));
     }
     for plane in 0..PLANES {
-        if polygon.corners().iter().any(|p| inside(of, plane, *p) < 0.0) {
-            polygon = cut(of, plane, &polygon);
+        if polygon.corners().iter().any(|p| inside(meshes, plane, *p) < 0.0) {
+            polygon = cut(meshes, plane, &polygon);
         }
     }
     polygon
 }
 
-fn cut(of: &Meshes<'_>, plane: usize, polygon: &Polygon) -> Polygon {
+fn cut(meshes: &Meshes<'_>, plane: usize, polygon: &Polygon) -> Polygon {
     let mut out = Polygon { corners: [DVec3::ZERO; MOST], count: 0 };
     let corners = polygon.corners();
     for (k, &here) in corners.iter().enumerate() {
         let next = corners[(k + 1) % corners.len()];
-        let [own, other] = [here, next].map(|p| inside(of, plane, p));
-        if own >= 0.0 {
+        let [inside_here, inside_next] = [here, next].map(|p| inside(meshes, plane, p));
+        if inside_here >= 0.0 {
             out.push(here);
         }
-        if (own >= 0.0) != (other >= 0.0) {
-            out.push(crossing(here, next, own, other));
+        if (inside_here >= 0.0) != (inside_next >= 0.0) {
+            out.push(crossing(here, next, inside_here, inside_next));
         }
     }
     out
 }
 
 /// Where an edge meets a plane, the same from both ends.
-fn crossing(a: DVec3, b: DVec3, own: f64, other: f64) -> DVec3 {
+fn crossing(a: DVec3, b: DVec3, inside_a: f64, inside_b: f64) -> DVec3 {
     let key = |p: DVec3| p.to_array().map(f64::to_bits);
     if key(a) > key(b) {
-        return crossing(b, a, other, own);
+        return crossing(b, a, inside_b, inside_a);
     }
-    a + (b - a) * (own / (own - other))
+    a + (b - a) * (inside_a / (inside_a - inside_b))
 }
 
 /// How far inside of a plane a place is.
-fn inside(of: &Meshes<'_>, plane: usize, p: DVec3) -> f64 {
-    let reach = if of.camera.is_orthographic() { GUARD } else { GUARD * p.z };
+fn inside(meshes: &Meshes<'_>, plane: usize, p: DVec3) -> f64 {
+    let reach = if meshes.camera.is_orthographic() { GUARD } else { GUARD * p.z };
     match plane {
-        0 => p.z - of.near,
-        1 => reach - of.focal * p.x,
-        2 => reach + of.focal * p.x,
-        3 => reach - of.focal * p.y,
-        _ => reach + of.focal * p.y,
+        0 => p.z - meshes.near,
+        1 => reach - meshes.focal * p.x,
+        2 => reach + meshes.focal * p.x,
+        3 => reach - meshes.focal * p.y,
+        _ => reach + meshes.focal * p.y,
     }
 }

@@ -27,8 +27,8 @@ pub(super) struct Plane {
 }
 
 impl Plane {
-    pub(super) fn new(of: &Meshes<'_>, triangle: [DVec3; 3]) -> Self {
-        let is_parallel = of.camera.is_orthographic();
+    pub(super) fn new(meshes: &Meshes<'_>, triangle: [DVec3; 3]) -> Self {
+        let is_parallel = meshes.camera.is_orthographic();
         let weight = |k: usize| {
             let a = triangle[(k + 1) % 3];
             let b = triangle[(k + 2) % 3];
@@ -39,9 +39,9 @@ impl Plane {
                 let normal = a.cross(b);
                 (normal.x, normal.y, normal.z)
             };
-            let column = x / of.focal;
-            let row = -y / of.focal;
-            let [width, height] = of.camera.size.map(|s| 0.5 * f64::from(s) - 0.5);
+            let column = x / meshes.focal;
+            let row = -y / meshes.focal;
+            let [width, height] = meshes.camera.size.map(|s| 0.5 * f64::from(s) - 0.5);
             DVec3::new(rest - column * width - row * height, column, row)
         };
         Self { weights: [weight(0), weight(1), weight(2)], depths: triangle.map(|p| p.z), is_parallel }
@@ -57,7 +57,8 @@ impl Plane {
         let turned = raw.map(|w| if whole < 0.0 { -w } else { w }.max(0.0));
         let sum = turned[0] + turned[1] + turned[2];
         let barycentric = if sum > 0.0 { turned.map(|w| w / sum) } else { [1.0 / 3.0; 3] };
-        let mixed = |of: [f64; 3]| of[0] * self.depths[0] + of[1] * self.depths[1] + of[2] * self.depths[2];
+        let mixed =
+            |weights: [f64; 3]| weights[0] * self.depths[0] + weights[1] * self.depths[1] + weights[2] * self.depths[2];
         let slope = [1, 2].map(|axis| {
             let step = self.weights.map(|w| w[axis]);
             let grows = if self.is_parallel { mixed(step) } else { step[0] + step[1] + step[2] };

@@ -26,24 +26,24 @@ pub struct TriangleLayer {
 pub struct TriangleLayers<T> {
     /// Where the list of each pixel begins, row by row from the top left; and the end of the last.
     starts: Vec<u32>,
-    all: Vec<T>,
+    layers: Vec<T>,
 }
 
 impl<T> TriangleLayers<T> {
     /// Those of pixel `k`, nearest first; equally near ones in the order of meshes and triangles.
     #[inline]
-    pub fn of(&self, k: usize) -> &[T] {
-        &self.all[self.starts[k] as usize..self.starts[k + 1] as usize]
+    pub fn at_pixel(&self, k: usize) -> &[T] {
+        &self.layers[self.starts[k] as usize..self.starts[k + 1] as usize]
     }
 
     /// The lists, one after the other, and where that of each pixel begins, with the end of the last.
     pub fn into_lists(self) -> (Vec<u32>, Vec<T>) {
-        (self.starts, self.all)
+        (self.starts, self.layers)
     }
 
     /// Bytes of the lists.
     pub fn bytes(&self) -> u64 {
-        (size_of_val(&*self.starts) + size_of_val(&*self.all)) as u64
+        (size_of_val(&*self.starts) + size_of_val(&*self.layers)) as u64
     }
 }
 
@@ -61,31 +61,31 @@ pub fn resolve_layers<T: Copy + Send + Sync>(
     keep: impl Fn(usize, &TriangleLayer) -> T + Sync,
     progress: Option<&Progress>,
 ) -> Result<TriangleLayers<T>, Error> {
-    let of = &Meshes::new(meshes, camera)?;
+    let meshes = &Meshes::new(meshes, camera)?;
     let quiet = Progress::new();
     let progress = progress.unwrap_or(&quiet);
     let [width, height] = camera.size.map(|s| s as usize);
-    let found = bands::Found::new(of);
+    let found = bands::Found::new(meshes);
     progress.add_total(height.div_ceil(ROWS) as u64);
     let is_before = |k: usize, at: &Crossing| hidden.get(k).is_none_or(|hidden| at.depth < f64::from(*hidden));
     // starts[k + 1] first counts.
     let mut starts = vec![0u32; width * height + 1];
     starts[1..].par_chunks_mut(width * ROWS).enumerate().for_each(|(band, counts)| {
         let first = band * ROWS * width;
-        found.meet(of, band, |k, _, at| counts[k] += u32::from(is_before(first + k, at)));
+        found.meet(meshes, band, |k, _, at| counts[k] += u32::from(is_before(first + k, at)));
     });
     let total = starts.iter().map(|n| u64::from(*n)).sum::<u64>();
     let needed = (total * size_of::<T>() as u64).max(if total > u64::from(u32::MAX) { u64::MAX } else { 0 });
     let hint = "use fewer or smaller translucent meshes, a smaller picture, or fewer pixels of the light's";
     Exceeded::check("layers of translucent triangles", needed, most, "bytes", hint).map_err(Error::Limit)?;
     (1..starts.len()).for_each(|k| starts[k] += starts[k - 1]);
-    let mut all = vec![none; total as usize];
+    let mut layers = vec![none; total as usize];
     let mut lists = Vec::new();
-    let mut rest = &mut all[..];
+    let mut rest = &mut layers[..];
     for first in (0..width * height).step_by(width * ROWS) {
-        let own = &starts[first..=(first + width * ROWS).min(width * height)];
-        let (list, behind) = rest.split_at_mut((own[own.len() - 1] - own[0]) as usize);
-        lists.push((own, list));
+        let band_starts = &starts[first..=(first + width * ROWS).min(width * height)];
+        let (list, behind) = rest.split_at_mut((band_starts[band_starts.len() - 1] - band_starts[0]) as usize);
+        lists.push((band_starts, list));
         rest = behind;
     }
     lists.into_par_iter().enumerate().for_each(|(band, (starts, list))| {
@@ -97,20 +97,20 @@ pub fn resolve_layers<T: Copy + Send + Sync>(
         let mut ends: Vec<u32> = starts[..starts.len() - 1].iter().map(|start| start - base).collect();
         // Depths in double precision, and the order of equal ones.
         let mut met = vec![(f64::INFINITY, 0u32, none); list.len()];
-        found.meet(of, band, |k, (id, piece), at| {
+        found.meet(meshes, band, |k, (id, piece), at| {
             if is_before(first + k, at) {
                 met[ends[k] as usize] = (at.depth, id, keep(first + k, &layer(piece, at)));
                 ends[k] += 1;
             }
         });
         for pixel in starts.windows(2) {
-            let own = &mut met[(pixel[0] - base) as usize..(pixel[1] - base) as usize];
-            own.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+            let of_pixel = &mut met[(pixel[0] - base) as usize..(pixel[1] - base) as usize];
+            of_pixel.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         }
         list.iter_mut().zip(met).for_each(|(to, (.., kept))| *to = kept);
     });
     progress.tick(0)?;
-    Ok(TriangleLayers { starts, all })
+    Ok(TriangleLayers { starts, layers })
 }
 
 /// How many triangles the rays of all pixels meet: as long are the lists of [`resolve_layers`] together, where nothing hides any.
@@ -118,9 +118,9 @@ pub fn resolve_layers<T: Copy + Send + Sync>(
 /// # Errors
 /// As [`super::resolve`].
 pub fn count_layers(meshes: &[PlacedMesh<'_>], camera: &Camera) -> Result<u64, Error> {
-    let of = &Meshes::new(meshes, camera)?;
-    let found = bands::Found::new(of);
-    Ok((0..(camera.size[1] as usize).div_ceil(ROWS)).into_par_iter().map(|band| found.count(of, band)).sum())
+    let meshes = &Meshes::new(meshes, camera)?;
+    let found = bands::Found::new(meshes);
+    Ok((0..(camera.size[1] as usize).div_ceil(ROWS)).into_par_iter().map(|band| found.count(meshes, band)).sum())
 }
 
 fn layer(piece: &Piece, at: &Crossing) -> TriangleLayer {

@@ -25,15 +25,18 @@ pub(super) struct Piece {
 
 impl Piece {
     /// Appends what of a triangle may cover a pixel of the picture.
-    pub(super) fn push(of: &Meshes<'_>, mesh: u32, triangle: u32, to: &mut Vec<Self>) {
-        let polygon = clip(of, of.triangle(mesh, triangle));
-        let mut corners = polygon.corners().iter().map(|p| snapped(of, *p));
+    pub(super) fn push(meshes: &Meshes<'_>, mesh: u32, triangle: u32, to: &mut Vec<Self>) {
+        let polygon = clip(meshes, meshes.triangle(mesh, triangle));
+        let mut corners = polygon.corners().iter().map(|p| snapped(meshes, *p));
         let (Some(first), Some(mut second)) = (corners.next(), corners.next()) else { return };
         for third in corners {
             let area = cross(first, second, third);
             let corners = if area < 0 { [first, third, second] } else { [first, second, third] };
             let piece = Self { mesh, triangle, corners };
-            if area != 0 && !piece.rows(of.camera.size[1]).is_empty() && !piece.columns(of.camera.size[0]).is_empty() {
+            if area != 0
+                && !piece.rows(meshes.camera.size[1]).is_empty()
+                && !piece.columns(meshes.camera.size[0]).is_empty()
+            {
                 to.push(piece);
             }
             second = third;
@@ -96,9 +99,9 @@ impl CeilingDivision for i64 {
 }
 
 /// Place of a clipped corner in the picture.
-fn snapped(of: &Meshes<'_>, p: DVec3) -> [i32; 2] {
-    let scale = if of.camera.is_orthographic() { of.focal } else { of.focal / p.z };
-    let [width, height] = of.camera.size.map(|s| 0.5 * f64::from(s));
+fn snapped(meshes: &Meshes<'_>, p: DVec3) -> [i32; 2] {
+    let scale = if meshes.camera.is_orthographic() { meshes.focal } else { meshes.focal / p.z };
+    let [width, height] = meshes.camera.size.map(|s| 0.5 * f64::from(s));
     let place = |middle: f64, offset: f64| {
         let pixels = middle + offset.clamp(-GUARD, GUARD);
         (pixels * PIXEL as f64 + 0.5).floor() as i32

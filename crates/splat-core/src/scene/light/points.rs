@@ -27,19 +27,19 @@ impl Light {
     /// project to an even disc in every direction, and radiate equally in all directions. As n grows, what they give tends to
     /// what the whole light gives.
     pub fn points(&self, n: u32) -> Vec<Self> {
-        let all = f64::from(n);
-        let intensity = self.intensity.map(|i| (f64::from(i) / all) as f32);
+        let count = f64::from(n);
+        let intensity = self.intensity.map(|i| (f64::from(i) / count) as f32);
         let share = |shape| Self { shape, intensity };
         match self.shape {
             LightShape::Sphere { center, radius } => {
-                let place = |i| LightShape::Point { position: center + in_ball(i, all) * radius };
+                let place = |i| LightShape::Point { position: center + in_ball(i, count) * radius };
                 (0..n).map(|i| share(place(i))).collect()
             }
             LightShape::Disk { center, normal, radius } => {
                 let u = normal.any_orthonormal_vector();
                 let v = normal.cross(u);
                 let place = |i| {
-                    let (x, y) = in_disc(i, all);
+                    let (x, y) = in_disc(i, count);
                     LightShape::Patch { position: center + (u * x + v * y) * radius, normal }
                 };
                 (0..n).map(|i| share(place(i))).collect()
@@ -47,7 +47,7 @@ impl Light {
             LightShape::Rect { center, u, v } => {
                 let normal = rect_normal(u, v);
                 let place = |i| {
-                    let (s, t) = in_square(i, all);
+                    let (s, t) = in_square(i, count);
                     LightShape::Patch { position: center + u * s + v * t, normal }
                 };
                 (0..n).map(|i| share(place(i))).collect()

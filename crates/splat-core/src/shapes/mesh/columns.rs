@@ -55,8 +55,8 @@ impl Mesh {
     /// assert!(mesh.column("heat", DVec3::Y).is_none());
     /// ```
     pub fn column(&self, name: &str, up: DVec3) -> Option<MeshColumn> {
-        if let Some(own) = self.columns.iter().find(|column| column.name == name) {
-            return Some(own.clone());
+        if let Some(column) = self.columns.iter().find(|column| column.name == name) {
+            return Some(column.clone());
         }
         let axis = match name {
             "x" => DVec3::X,

@@ -69,18 +69,18 @@ fn parted(mesh: &mut Mesh) -> Vec<u32> {
     }
     for around in corners.chunk_by(|a, b| a.0 == b.0) {
         let v = around[0].0;
-        let mut own = vec![v; around.len()];
+        let mut vertices = vec![v; around.len()];
         let sides = sides(&mesh.triangles, &planes, around);
         let mut is_first = true;
         for (i, (_, triangle)) in around.iter().enumerate() {
             if sides[i] != i {
-                own[i] = own[sides[i]];
+                vertices[i] = vertices[sides[i]];
             } else if !std::mem::take(&mut is_first) {
-                own[i] = (mesh.position.len() + from.len()) as u32;
+                vertices[i] = (mesh.position.len() + from.len()) as u32;
                 from.push(v);
             }
             let ids = &mut mesh.triangles[*triangle as usize];
-            *ids = ids.map(|id| if id == v { own[i] } else { id });
+            *ids = ids.map(|id| if id == v { vertices[i] } else { id });
         }
     }
     from
@@ -98,9 +98,9 @@ fn corners_at_creases(mesh: &Mesh, planes: &[DVec3]) -> Vec<Corner> {
     for (v, plane) in corners() {
         leans[v] |= plane != DVec3::ZERO && plane.dot(middle[v]) < HALF * middle[v].length();
     }
-    let of = |(i, t): (usize, &[u32; 3])| t.map(|v| (v, i as u32));
+    let of_triangle = |(i, t): (usize, &[u32; 3])| t.map(|v| (v, i as u32));
     let whole = mesh.triangles.iter().enumerate().filter(|(i, _)| planes[*i] != DVec3::ZERO);
-    let mut found: Vec<Corner> = whole.flat_map(of).filter(|(v, _)| leans[*v as usize]).collect();
+    let mut found: Vec<Corner> = whole.flat_map(of_triangle).filter(|(v, _)| leans[*v as usize]).collect();
     found.par_sort_unstable();
     found
 }

@@ -44,7 +44,8 @@ pub fn halve_edges(mesh: &mut Mesh, edges: &[[u32; 2]]) -> Vec<u32> {
 }
 
 /// Appends a vertex in the middle between two.
-fn push_middle(mesh: &mut Mesh, [a, b]: [usize; 2]) {
+fn push_middle(mesh: &mut Mesh, edge: [usize; 2]) {
+    let [a, b] = edge;
     // Halved before they are added: their sum may be more than a number can be.
     mesh.position.push(0.5 * mesh.position[a] + 0.5 * mesh.position[b]);
     if !mesh.normal.is_empty() {
@@ -72,9 +73,10 @@ mod tests {
     #[test]
     fn numbers_follow_and_the_area_stays() {
         // Two triangles with a common edge; all subsets of the five edges.
-        let all: [[u32; 2]; 5] = [[0, 1], [0, 2], [0, 3], [1, 2], [2, 3]];
+        let candidates: [[u32; 2]; 5] = [[0, 1], [0, 2], [0, 3], [1, 2], [2, 3]];
         for subset in 0..32u32 {
-            let edges: Vec<[u32; 2]> = (0..5).filter(|i| subset >> i & 1 == 1).map(|i| all[i as usize]).collect();
+            let edges: Vec<[u32; 2]> =
+                (0..5).filter(|i| subset >> i & 1 == 1).map(|i| candidates[i as usize]).collect();
             let mut mesh = Mesh::rectangle(DVec3::ZERO, DVec3::X, DVec3::Y);
             mesh.opacity = vec![0.0, 1.0, 1.0, 0.0];
             let column =

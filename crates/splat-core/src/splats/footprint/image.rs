@@ -143,14 +143,14 @@ impl FootprintImage {
     pub(crate) fn seen(&self, level: f32, place: [f32; 2], factor: impl Fn(&Level) -> f32) -> (f32, f32) {
         let fine = level as usize;
         let share = level - fine as f32;
-        let of = |k: usize| self.levels.get(k).map_or(0.0, |l| l.at(self.half, place) * factor(l));
+        let coverage = |k: usize| self.levels.get(k).map_or(0.0, |l| l.at(self.half, place) * factor(l));
         let formula = match self.levels.len() {
             n if fine >= n => 1.0,
             n if fine + 1 == n => share,
             _ => 0.0,
         };
-        let first = of(fine);
-        (if share > 0.0 { first * (1.0 - share) + of(fine + 1) * share } else { first }, formula)
+        let first = coverage(fine);
+        (if share > 0.0 { first * (1.0 - share) + coverage(fine + 1) * share } else { first }, formula)
     }
 }
 
@@ -192,15 +192,15 @@ impl Level {
         let along =
             |i: usize, n: usize, half: f32| (2.0 * (i as f32 + 0.5 - border as f32) / (PLACES * n) as f32 - 1.0) * half;
         let places = |n: usize| PLACES * n + 2 * border;
-        let mut all = Vec::with_capacity(places(columns) * places(rows));
+        let mut samples = Vec::with_capacity(places(columns) * places(rows));
         for j in 0..places(rows) {
             let y = along(j, rows, half[1]);
             for i in 0..places(columns) {
                 let x = along(i, columns, half[0]);
-                all.push(if x * x + y * y < 1.0 { self.at(half, [x, y]) } else { 0.0 });
+                samples.push(if x * x + y * y < 1.0 { self.at(half, [x, y]) } else { 0.0 });
             }
         }
-        all
+        samples
     }
 }
 
@@ -223,6 +223,6 @@ fn averaged(size: [usize; 2], pixels: &[f32], to: [usize; 2]) -> ([usize; 2], Ve
         };
         covered(height, to[1], y).map(|(j, share)| share * row(j)).sum::<f64>().min(1.0) as f32
     };
-    let all = (0..to[1]).flat_map(|y| (0..to[0]).map(move |x| (x, y)));
-    (to, all.map(|(x, y)| pixel(x, y)).collect())
+    let places = (0..to[1]).flat_map(|y| (0..to[0]).map(move |x| (x, y)));
+    (to, places.map(|(x, y)| pixel(x, y)).collect())
 }

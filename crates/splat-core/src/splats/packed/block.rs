@@ -15,7 +15,7 @@ pub(super) struct Look {
 }
 
 impl Look {
-    pub(super) fn of(cloud: &Cloud, i: usize) -> Self {
+    pub(super) fn from_splat(cloud: &Cloud, i: usize) -> Self {
         Self {
             object: cloud.object[i],
             material: cloud.material[i],
@@ -110,7 +110,7 @@ fn range_of(values: impl Iterator<Item = f32>) -> [f32; 2] {
 
 impl Block {
     /// Of some splats of a cloud, and their looks.
-    pub(super) fn of(cloud: &Cloud, splats: Range<usize>) -> (Self, Vec<Look>) {
+    pub(super) fn new(cloud: &Cloud, splats: Range<usize>) -> (Self, Vec<Look>) {
         let range = |column: &[f32]| range_of(column.get(splats.clone()).unwrap_or(&[]).iter().copied());
         let box_of = Aabb::of_points(&cloud.position[splats.clone()]);
         let lengths = cloud.tangent.get(splats.clone()).unwrap_or(&[]).iter().map(|t| t.length());
@@ -127,7 +127,7 @@ impl Block {
             first_look: 0,
         };
         let mut looks = Vec::new();
-        for look in splats.map(|i| Look::of(cloud, i)) {
+        for look in splats.map(|i| Look::from_splat(cloud, i)) {
             if !looks.contains(&look) {
                 looks.push(look);
             }

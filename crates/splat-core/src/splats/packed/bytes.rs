@@ -51,7 +51,7 @@ impl PackedCloud {
     /// [`Error::Invalid`] where there are fewer bytes than the counts say, or more, for a kind that there is not, and for a splat whose look
     /// is not in the list.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, Error> {
-        let mut rest = Rest { bytes, all: bytes.len() };
+        let mut rest = Rest { bytes, total: bytes.len() };
         let [count, looks, columns] = rest.rows(3, u64::from_le_bytes)?[..] else { return Err(rest.short()) };
         let [count, looks] = [count, looks].map(|n| usize::try_from(n).unwrap_or(usize::MAX));
         let has = |k: usize| if columns >> k & 1 == 1 { count } else { 0 };
@@ -113,7 +113,8 @@ impl PackedCloud {
 }
 
 /// A look; `None` for a kind that there is not.
-fn look([a, b, c, d, e, f, footprint, kind]: [u8; 8]) -> Option<Look> {
+fn look(bytes: [u8; 8]) -> Option<Look> {
+    let [a, b, c, d, e, f, footprint, kind] = bytes;
     let kinds = [SplatKind::Medium, SplatKind::Surface, SplatKind::Opaque];
     Some(Look {
         object: u32::from_le_bytes([a, b, c, d]),
@@ -132,10 +133,10 @@ impl Block {
         let rooted = |r: Rooted| [r.low, r.root, r.step];
         let evens = [x, y, z, self.value, self.shadow_coefficient].map(even);
         let roots = [self.radius, self.cross_section, self.color, self.crossing_depth, self.tangent].map(rooted);
-        let mut all = [0.0; BLOCK_NUMBERS];
-        all[..10].copy_from_slice(evens.as_flattened());
-        all[10..].copy_from_slice(roots.as_flattened());
-        all
+        let mut numbers = [0.0; BLOCK_NUMBERS];
+        numbers[..10].copy_from_slice(evens.as_flattened());
+        numbers[10..].copy_from_slice(roots.as_flattened());
+        numbers
     }
 
     fn of_numbers(n: &[f32; BLOCK_NUMBERS], first_look: u32) -> Self {
@@ -159,18 +160,18 @@ impl Block {
 struct Rest<'a> {
     bytes: &'a [u8],
     /// How many there were.
-    all: usize,
+    total: usize,
 }
 
 impl Rest<'_> {
     fn short(&self) -> Error {
-        Error::invalid("packed cloud", 0, "bytes", self.all, "as many as its counts say, more than these")
+        Error::invalid("packed cloud", 0, "bytes", self.total, "as many as its counts say, more than these")
     }
 
     /// Rows of `N` bytes each.
-    fn rows<const N: usize, T>(&mut self, count: usize, of: impl Fn([u8; N]) -> T) -> Result<Vec<T>, Error> {
+    fn rows<const N: usize, T>(&mut self, count: usize, decode: impl Fn([u8; N]) -> T) -> Result<Vec<T>, Error> {
         let (rows, rest) = self.bytes.split_at_checked(count.saturating_mul(N)).ok_or_else(|| self.short())?;
         self.bytes = rest;
-        Ok(rows.as_chunks::<N>().0.iter().map(|row| of(*row)).collect())
+        Ok(rows.as_chunks::<N>().0.iter().map(|row| decode(*row)).collect())
     }
 }

@@ -12,8 +12,10 @@ pub(super) fn steps(n: Vec3) -> [i8; 2] {
     let flat = Vec2::new(n.x, n.y);
     let corner = if n.z < 0.0 { folded(flat) } else { flat } * STEPS;
     let low = corner.floor();
-    let of = |dx: f32, dy: f32| (low + Vec2::new(dx, dy)).clamp(Vec2::splat(-STEPS), Vec2::splat(STEPS)).to_array();
-    let candidates = [of(0.0, 0.0), of(1.0, 0.0), of(0.0, 1.0), of(1.0, 1.0)].map(|s| s.map(|v| v as i8));
+    let candidate =
+        |dx: f32, dy: f32| (low + Vec2::new(dx, dy)).clamp(Vec2::splat(-STEPS), Vec2::splat(STEPS)).to_array();
+    let candidates = [candidate(0.0, 0.0), candidate(1.0, 0.0), candidate(0.0, 1.0), candidate(1.0, 1.0)]
+        .map(|s| s.map(|v| v as i8));
     let along = |steps: &[i8; 2]| normal(*steps).dot(n);
     candidates.into_iter().max_by(|a, b| along(a).total_cmp(&along(b))).unwrap_or_default()
 }
