@@ -40,8 +40,8 @@ pub(crate) struct Ranges {
 impl Ranges {
     /// Ranges of a power of two of cells, as many as `entries` in all call for.
     pub(crate) fn new(cells: usize, entries: f64) -> Self {
-        let wanted = (entries / RANGE_ENTRIES).clamp(RANGES[0], RANGES[1]) as usize;
-        let shift = cells.div_ceil(wanted).next_power_of_two().ilog2();
+        let ranges = (entries / RANGE_ENTRIES).clamp(RANGES[0], RANGES[1]) as usize;
+        let shift = cells.div_ceil(ranges).next_power_of_two().ilog2();
         Self { shift, count: (cells.max(1)).div_ceil(1 << shift), cells }
     }
 }
@@ -70,7 +70,7 @@ pub(crate) struct Parted<const C: usize> {
     start: Vec<u32>,
     cell: Vec<u32>,
     distance: Vec<f32>,
-    own: Vec<[f32; C]>,
+    absorbance: Vec<[f32; C]>,
 }
 
 impl<const C: usize> Parted<C> {
@@ -88,17 +88,17 @@ impl<const C: usize> Parted<C> {
         }
         let mut cell = vec![0u32; n];
         let mut distance = vec![0f32; n];
-        let mut own = vec![[0f32; C]; n];
-        for ((&c, d), a) in cells.iter().zip(&entries.distance).zip(&entries.own) {
+        let mut absorbance = vec![[0f32; C]; n];
+        for ((&c, d), a) in cells.iter().zip(&entries.distance).zip(&entries.absorbance) {
             let slot = &mut start[(c >> ranges.shift) as usize];
             let i = *slot as usize;
             cell[i] = c;
             distance[i] = *d;
-            own[i] = *a;
+            absorbance[i] = *a;
             *slot += 1;
         }
         // Now every slot holds where its range ends.
-        Self { start, cell, distance, own }
+        Self { start, cell, distance, absorbance }
     }
 
     #[inline]
@@ -117,7 +117,7 @@ impl<const C: usize> Parted<C> {
     pub(crate) fn entries_of(&self, ranges: Range<usize>) -> (&[u32], &[f32], &[[f32; C]]) {
         let begin = if ranges.is_empty() { 0 } else { self.range(ranges.start).start };
         let end = if ranges.is_empty() { 0 } else { self.range(ranges.end - 1).end };
-        (&self.cell[begin..end], &self.distance[begin..end], &self.own[begin..end])
+        (&self.cell[begin..end], &self.distance[begin..end], &self.absorbance[begin..end])
     }
 }
 
@@ -136,10 +136,10 @@ impl<const C: usize> Lists<C> {
     /// Gathers, sorts and sums; a list stops when its least absorbed channel reaches `limit`. There are fewer than 2³²
     /// entries.
     pub(crate) fn new(parted: &[Parted<C>], ranges: Ranges, limit: f32) -> Self {
-        let all: usize = parted.iter().map(Parted::len).sum();
+        let entries: usize = parted.iter().map(Parted::len).sum();
         let mut span = vec![[0u32; 2]; ranges.cells];
-        let mut distance = vec![0f32; all + WINDOW + 1];
-        let mut total = vec![[0f32; C]; all + WINDOW + 1];
+        let mut distance = vec![0f32; entries + WINDOW + 1];
+        let mut total = vec![[0f32; C]; entries + WINDOW + 1];
         let mut tasks = Vec::with_capacity(ranges.count);
         let mut distances = distance.as_mut_slice();
         let mut totals = total.as_mut_slice();
@@ -205,7 +205,7 @@ struct Gathered<const C: usize> {
     /// As [`pack`] makes them.
     key: Vec<u64>,
     /// By slot; unused for one channel.
-    own: Vec<[f32; C]>,
+    absorbance: Vec<[f32; C]>,
     spare: Vec<u64>,
 }
 
@@ -249,35 +249,36 @@ impl<const C: usize> Task<'_, C> {
             span[0] = sum;
             sum += span[1];
         }
-        let Gathered { key, own, spare } = gathered;
+        let Gathered { key, absorbance, spare } = gathered;
         key.resize(sum as usize, 0);
         if C > 1 {
-            own.resize(sum as usize, [0.0; C]);
+            absorbance.resize(sum as usize, [0.0; C]);
         }
         for part in parted {
             let range = part.range(self.range);
-            let entries = part.cell[range.clone()].iter().zip(&part.distance[range.clone()]).zip(&part.own[range]);
+            let entries =
+                part.cell[range.clone()].iter().zip(&part.distance[range.clone()]).zip(&part.absorbance[range]);
             for ((c, d), a) in entries {
                 let slot = &mut self.span[(c - base) as usize][0];
                 key[*slot as usize] = pack(*d, a, *slot);
                 if C > 1 {
-                    own[*slot as usize] = *a;
+                    absorbance[*slot as usize] = *a;
                 }
                 *slot += 1;
             }
         }
-        let mut all = 0;
+        let mut count = 0;
         for [start, kept] in self.span {
             let end = *start as usize;
             let begin = end - *kept as usize;
             sort(&mut key[begin..end], spare);
             let distance = &mut self.distance[begin..end];
             let total = &mut self.total[begin..end];
-            *kept = sum_up(&key[begin..end], own, stop, distance, total);
+            *kept = sum_up(&key[begin..end], absorbance, stop, distance, total);
             *start = (begin as u32).wrapping_add(self.first);
-            all += u64::from(*kept);
+            count += u64::from(*kept);
         }
-        all
+        count
     }
 }
 
@@ -285,7 +286,7 @@ impl<const C: usize> Task<'_, C> {
 #[inline(always)]
 fn sum_up<const C: usize>(
     list: &[u64],
-    own: &[[f32; C]],
+    absorbances: &[[f32; C]],
     stop: i64,
     distance: &mut [f32],
     total: &mut [[f32; C]],
@@ -293,7 +294,7 @@ fn sum_up<const C: usize>(
     let mut sum = [0i64; C];
     let mut kept = 0;
     for (i, &key) in list.iter().enumerate() {
-        let part = unpack(key, own);
+        let part = unpack(key, absorbances);
         // One entry is held below 2¹⁷ and a sum below 2¹⁸, so that none overflows.
         (0..C).for_each(|c| sum[c] = (sum[c] + (f64::from(part[c]).min(131_072.0) * FIXED) as i64).min(i64::MAX / 4));
         distance[kept] = f32::from_bits((key >> 32) as u32);
@@ -310,15 +311,15 @@ fn sum_up<const C: usize>(
 
 /// A key to sort by: the distance in the upper half; in the lower half the absorbance if there is one, else its slot.
 #[inline(always)]
-fn pack<const C: usize>(distance: f32, own: &[f32; C], slot: u32) -> u64 {
-    let rest = if C == 1 { own[0].to_bits() } else { slot };
+fn pack<const C: usize>(distance: f32, absorbance: &[f32; C], slot: u32) -> u64 {
+    let rest = if C == 1 { absorbance[0].to_bits() } else { slot };
     u64::from(distance.max(f32::MIN_POSITIVE).to_bits()) << 32 | u64::from(rest)
 }
 
 /// The absorbance of a key.
 #[inline(always)]
-fn unpack<const C: usize>(key: u64, own: &[[f32; C]]) -> [f32; C] {
-    if C == 1 { [f32::from_bits(key as u32); C] } else { own[key as u32 as usize] }
+fn unpack<const C: usize>(key: u64, absorbances: &[[f32; C]]) -> [f32; C] {
+    if C == 1 { [f32::from_bits(key as u32); C] } else { absorbances[key as u32 as usize] }
 }
 
 #[cfg(test)]

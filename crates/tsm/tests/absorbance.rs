@@ -19,10 +19,10 @@ fn absorbances_of_a_slanted_layer_are_even_where_transmittances_are_not() {
     let light = Light { shape: LightShape::Directional { direction }, intensity: [1.0; 3] };
     let params = Params { tolerance: 1e-30, ..Params::default() };
     let map = ShadowMap::build(&Scene::from(&cloud), &light, &params, None).unwrap();
-    let numbers = |of: &dyn Fn(&Receiver) -> f32| -> [f32; 2] {
+    let numbers = |number: &dyn Fn(&Receiver) -> f32| -> [f32; 2] {
         let places = (9..16).flat_map(|x| (9..16).map(move |z| Vec3::new(x as f32, -0.5, z as f32)));
         let all: Vec<f32> = places
-            .map(|position| of(&Receiver { position, normal: Vec3::ZERO, radius, kind: SplatKind::Medium }))
+            .map(|position| number(&Receiver { position, normal: Vec3::ZERO, radius, kind: SplatKind::Medium }))
             .collect();
         let mean = all.iter().sum::<f32>() / all.len() as f32;
         [mean, all.iter().fold(0.0, |most, a| f32::max(most, (a - mean).abs()))]

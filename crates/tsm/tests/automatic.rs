@@ -99,8 +99,8 @@ fn ts16_finer_splats_have_better_shadows() {
 fn predictions_say_what_is_chosen_and_by_what() {
     let cloud = smooth_ball(0.06, 1.5, 1.0);
     for light in [point_light(DVec3::Z * 4.0), point_light(DVec3::ZERO), directional(DVec3::Z)] {
-        let of = |params: &Params| Deposits::predict(&Scene::from(&cloud), &light, params).unwrap();
-        let free = of(&Params::default());
+        let predicted = |params: &Params| Deposits::predict(&Scene::from(&cloud), &light, params).unwrap();
+        let free = predicted(&Params::default());
         let map = build(&cloud, &light, &Params::default());
         assert_eq!(free, map.prediction());
         assert_eq!(free.size[0] * free.size[1], map.counts().cells);
@@ -108,9 +108,9 @@ fn predictions_say_what_is_chosen_and_by_what() {
         assert!((0.6..1.4).contains(&ratio), "{:?}: {ratio}", light.shape);
         // Less memory, coarser cells that fit.
         let max_bytes = free.bytes / 3;
-        let less = of(&Params { limits: Limits::bytes(max_bytes), ..Params::default() });
+        let less = predicted(&Params { limits: Limits::bytes(max_bytes), ..Params::default() });
         assert!(less.limit == Limit::Memory && less.bytes <= max_bytes && less.size[0] < free.size[0], "{less:?}");
-        assert_eq!(of(&Params { resolution: Resolution::Cells(32), ..Params::default() }).limit, Limit::Asked);
+        assert_eq!(predicted(&Params { resolution: Resolution::Cells(32), ..Params::default() }).limit, Limit::Asked);
     }
 }
 

@@ -24,7 +24,7 @@ fn the_lists_are_as_kept_in_text() {
 #[test]
 fn look_ups_are_as_kept_in_text() {
     let map = deposits().into_map();
-    let room = Room { entries: 100_000, ..Room::of(&map, 5000).unwrap() };
+    let room = Room { entries: 100_000, ..Room::for_map(&map, 5000).unwrap() };
     let recorded = record_look_up(Room { cells: 6000, directions: 1500, ..room });
     let found = recorded.recording.to_string();
     assert_eq!(found, include_str!("look_up.txt"), "now:\n{found}");
@@ -34,7 +34,7 @@ fn look_ups_are_as_kept_in_text() {
 #[test]
 fn look_ups_refuse_what_they_have_no_room_for() {
     let map = deposits().into_map();
-    let room = Room::of(&map, 10).unwrap();
+    let room = Room::for_map(&map, 10).unwrap();
     let refused = |room| record_look_up(room).map(&map).unwrap_err();
     assert!(record_look_up(room).map(&map).is_ok());
     assert!(matches!(refused(Room { cells: room.cells - 1, ..room }), Error::Overflow(Overflow { what: "cells", .. })));
@@ -57,7 +57,7 @@ fn look_ups_refuse_what_they_have_no_room_for() {
     // Polar angles are the CPU's.
     let polar = Params { mapping: tsm::MappingChoice::PolarAzimuth, ..Params::default() };
     let light = point_light(DVec3::new(0.3, 2.5, 0.2));
-    assert_eq!(Room::of(&crate::common::build(&mixed(100, DVec3::ZERO), &light, &polar), 10), None);
+    assert_eq!(Room::for_map(&crate::common::build(&mixed(100, DVec3::ZERO), &light, &polar), 10), None);
 }
 
 #[test]
@@ -77,7 +77,7 @@ fn the_lists_that_look_ups_are_given_are_those_of_the_map() {
 
 /// Compares all lists that a device is given with those that the map tells; how many entries stand beside others of their cell.
 fn compare_lists(map: &ShadowMap, has_opaque: bool) -> usize {
-    let recorded = record_look_up(Room::of(map, 1).unwrap());
+    let recorded = record_look_up(Room::for_map(map, 1).unwrap());
     let uploads = recorded.map(map).unwrap();
     let receivers = recorded.receivers(map, &uploads, &[]).unwrap();
     let given = recorded.inputs(Some(&uploads), &receivers);

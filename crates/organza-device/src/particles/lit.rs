@@ -25,7 +25,7 @@ pub(super) fn why_not(scene: &Scene<'_>, ensemble: &Ensemble, shadows: &[Shadow<
     if is_shown(scene, params) {
         return None;
     }
-    if shadows.iter().any(|(map, _)| Room::of(map, 0).is_none()) {
+    if shadows.iter().any(|(map, _)| Room::for_map(map, 0).is_none()) {
         return Some("particles in shadow maps of polar angles are lit by the processor");
     }
     suits(scene).err()
@@ -41,7 +41,7 @@ impl Light {
             return Self(None);
         }
         let seen = room.seen();
-        let rooms = shadows.iter().filter_map(|(map, _)| Room::of(map, seen.splats));
+        let rooms = shadows.iter().filter_map(|(map, _)| Room::for_map(map, seen.splats));
         Self(Some((0u32..).zip(rooms).map(|(light, room)| record_received(room, seen, light)).collect()))
     }
 

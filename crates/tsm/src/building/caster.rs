@@ -73,12 +73,12 @@ pub(crate) struct Extinction {
 
 impl Default for Extinction {
     fn default() -> Self {
-        Self::of(&Material::default())
+        Self::from_material(&Material::default())
     }
 }
 
 impl Extinction {
-    pub(crate) fn of(material: &Material) -> Self {
+    pub(crate) fn from_material(material: &Material) -> Self {
         Self { rgb: material.extinction_rgb, opacity: material.surface_opacity }
     }
 }
@@ -123,7 +123,7 @@ pub(crate) struct Casters<'a> {
 impl<'a> Casters<'a> {
     pub(crate) fn new(scene: &Scene<'a>, params: &'a Params) -> Self {
         let Scene { cloud, materials, objects } = *scene;
-        let extinctions: Vec<_> = materials.iter().map(Extinction::of).collect();
+        let extinctions: Vec<_> = materials.iter().map(Extinction::from_material).collect();
         let is_coloured = |e: &Extinction| e.rgb[0] != e.rgb[1] || e.rgb[1] != e.rgb[2];
         Self {
             cloud,

@@ -169,18 +169,18 @@ impl<M: Mapping, const C: usize> Deposit<'_, M, C> {
     fn put_row(&mut self, caster: &Caster, total: f32, first: u32, row: u32, used: usize, shares: &[f32; BLOCK]) {
         let [columns, _] = self.mapping.size();
         let cell = row * columns + first;
-        let own: [f32; BLOCK] =
+        let absorbances: [f32; BLOCK] =
             std::array::from_fn(|k| total * shares[k] * self.mapping.inverse_measure(first + k as u32, row));
         let media = &mut self.scratch.media;
         let window = self.opaque.get(cell as usize..).and_then(|from| from.first_chunk::<BLOCK>());
-        let is_clear = window.is_some_and(|w| w.iter().fold(true, |all, d| all & (*d >= caster.distance)));
+        let is_clear = window.is_some_and(|w| w.iter().fold(true, |is_clear, d| is_clear & (*d >= caster.distance)));
         if is_clear || self.opaque.is_empty() {
-            media.extend(cell, caster.distance, used, &own, &caster.extinction.rgb);
+            media.extend(cell, caster.distance, used, &absorbances, &caster.extinction.rgb);
             return;
         }
         for k in 0..used {
             if self.opaque.get(cell as usize + k).is_none_or(|d| *d >= caster.distance) {
-                media.push(cell + k as u32, caster.distance, own[k], &caster.extinction.rgb);
+                media.push(cell + k as u32, caster.distance, absorbances[k], &caster.extinction.rgb);
             }
         }
     }
@@ -328,10 +328,10 @@ mod tests {
     }
 
     fn sorted(entries: &Entries<1>) -> Vec<[u32; 3]> {
-        let entry = |i: usize| [entries.cell[i], entries.distance[i].to_bits(), entries.own[i][0].to_bits()];
-        let mut all: Vec<_> = (0..entries.len).map(entry).collect();
-        all.sort_unstable();
-        all
+        let entry = |i: usize| [entries.cell[i], entries.distance[i].to_bits(), entries.absorbance[i][0].to_bits()];
+        let mut words: Vec<_> = (0..entries.len).map(entry).collect();
+        words.sort_unstable();
+        words
     }
 
     /// Checks entries of both ways, and returns how many splats went side by side.

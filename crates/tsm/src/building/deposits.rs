@@ -124,7 +124,8 @@ fn entries<const C: usize>(parts: &Parted2<C>) -> [u64; 2] {
 }
 
 fn lists<const C: usize>(parts: &Parted2<C>, ranges: Ranges, limit: f32) -> Matter<C> {
-    let [media, surfaces] = [0, 1].map(|of| (entries(parts)[of] > 0).then(|| Lists::new(&parts[of], ranges, limit)));
+    let [media, surfaces] =
+        [0, 1].map(|kind| (entries(parts)[kind] > 0).then(|| Lists::new(&parts[kind], ranges, limit)));
     Matter { media, surfaces }
 }
 

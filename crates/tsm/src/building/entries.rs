@@ -9,7 +9,7 @@ pub(crate) struct Entries<const C: usize> {
     pub(crate) len: usize,
     pub(crate) cell: Vec<u32>,
     pub(crate) distance: Vec<f32>,
-    pub(crate) own: Vec<[f32; C]>,
+    pub(crate) absorbance: Vec<[f32; C]>,
 }
 
 impl<const C: usize> Entries<C> {
@@ -23,31 +23,31 @@ impl<const C: usize> Entries<C> {
             let room = (2 * self.len).max(16_384);
             self.cell.resize(room, 0);
             self.distance.resize(room, 0.0);
-            self.own.resize(room, [0.0; C]);
+            self.absorbance.resize(room, [0.0; C]);
         }
     }
 
-    /// Adds one entry of absorbance `own`·`rgb`.
+    /// Adds one entry, whose absorbance is `absorbance`·`rgb` by channel.
     #[inline(always)]
-    pub(crate) fn push(&mut self, cell: u32, distance: f32, own: f32, rgb: &[f32; 3]) {
+    pub(crate) fn push(&mut self, cell: u32, distance: f32, absorbance: f32, rgb: &[f32; 3]) {
         self.grow();
         let i = self.len;
         self.cell[i] = cell;
         self.distance[i] = distance;
-        self.own[i] = std::array::from_fn(|c| own * rgb[c]);
+        self.absorbance[i] = std::array::from_fn(|c| absorbance * rgb[c]);
         self.len += 1;
     }
 
     /// Adds entries at one distance in the `used` ≤ `BLOCK` cells from `cell` on.
     #[inline(always)]
-    pub(crate) fn extend(&mut self, cell: u32, distance: f32, used: usize, own: &[f32; BLOCK], rgb: &[f32; 3]) {
+    pub(crate) fn extend(&mut self, cell: u32, distance: f32, used: usize, absorbance: &[f32; BLOCK], rgb: &[f32; 3]) {
         self.grow();
         // Whole blocks, without a loop: what is not used is written over.
         let range = self.len..self.len + BLOCK;
         self.cell[range.clone()].copy_from_slice(&std::array::from_fn::<_, BLOCK, _>(|k| cell + k as u32));
         self.distance[range.clone()].copy_from_slice(&[distance; BLOCK]);
-        let own: [[f32; C]; BLOCK] = own.map(|a| std::array::from_fn(|c| a * rgb[c]));
-        self.own[range].copy_from_slice(&own);
+        let absorbance: [[f32; C]; BLOCK] = absorbance.map(|a| std::array::from_fn(|c| a * rgb[c]));
+        self.absorbance[range].copy_from_slice(&absorbance);
         self.len += used;
     }
 
@@ -58,11 +58,11 @@ impl<const C: usize> Entries<C> {
         let range = self.len..self.len + LANES;
         let to_cell = &mut self.cell[range.clone()];
         let to_distance = &mut self.distance[range.clone()];
-        let to_own = &mut self.own[range];
-        if cells.is_kept.iter().fold(true, |all, kept| all & kept) {
+        let to_absorbance = &mut self.absorbance[range];
+        if cells.is_kept.iter().fold(true, |kept, next| kept & next) {
             to_cell.copy_from_slice(&cells.cell);
             to_distance.copy_from_slice(distance);
-            (0..LANES).for_each(|l| to_own[l] = std::array::from_fn(|c| cells.own[l] * rgb[c][l]));
+            (0..LANES).for_each(|l| to_absorbance[l] = std::array::from_fn(|c| cells.absorbance[l] * rgb[c][l]));
             self.len += LANES;
             return;
         }
@@ -71,7 +71,7 @@ impl<const C: usize> Entries<C> {
         for l in 0..LANES {
             to_cell[kept] = cells.cell[l];
             to_distance[kept] = distance[l];
-            to_own[kept] = std::array::from_fn(|c| cells.own[l] * rgb[c][l]);
+            to_absorbance[kept] = std::array::from_fn(|c| cells.absorbance[l] * rgb[c][l]);
             kept += usize::from(cells.is_kept[l]);
         }
         self.len += kept;
@@ -83,6 +83,6 @@ impl<const C: usize> Entries<C> {
 pub(crate) struct Cells {
     pub(crate) cell: Lane<u32>,
     /// Absorbance.
-    pub(crate) own: Lane,
+    pub(crate) absorbance: Lane,
     pub(crate) is_kept: Lane<bool>,
 }

@@ -216,16 +216,17 @@ impl<M: Mapping, const C: usize> Target<'_, M, C> {
         }
     }
 
-    /// Column `k` in row `j` of each footprint.
+    /// Returns the cell in row `place[0]` and column `place[1]` of each footprint.
     #[inline(always)]
-    fn cells(&self, total: &Lane, rows: &Axes, height: &Lane, columns: &mut Axes, [j, k]: [i32; 2]) -> Cells {
+    fn cells(&self, total: &Lane, rows: &Axes, height: &Lane, columns: &mut Axes, place: [i32; 2]) -> Cells {
+        let [j, k] = place;
         let width = self.mapping.size()[0];
-        let mut cells = Cells { cell: [0; LANES], own: [0.0; LANES], is_kept: [false; LANES] };
+        let mut cells = Cells { cell: [0; LANES], absorbance: [0.0; LANES], is_kept: [false; LANES] };
         for l in 0..LANES {
             let share = columns.next_share(l, k);
             let [column, row] = [columns.first[l].wrapping_add(k), rows.first[l].wrapping_add(j)];
             let inverse_measure = self.mapping.inverse_measure(column as u32, row as u32);
-            cells.own[l] = total[l] * (share * height[l]) * inverse_measure;
+            cells.absorbance[l] = total[l] * (share * height[l]) * inverse_measure;
             cells.cell[l] = (row as u32).wrapping_mul(width).wrapping_add(column as u32);
             cells.is_kept[l] = (column <= columns.last[l]) & (row <= rows.last[l]);
         }

@@ -43,7 +43,8 @@ impl Spread {
     }
 
     #[inline(always)]
-    pub(crate) fn of_disc(axes: [Vec3; 2], [gu, gv]: [Vec3; 2]) -> Self {
+    pub(crate) fn of_disc(axes: [Vec3; 2], gradients: [Vec3; 2]) -> Self {
+        let [gu, gv] = gradients;
         let u = axes.map(|a| gu.dot(a));
         let v = axes.map(|a| gv.dot(a));
         Self { uu: u[0] * u[0] + u[1] * u[1], vv: v[0] * v[0] + v[1] * v[1], uv: u[0] * v[0] + u[1] * v[1] }
@@ -78,7 +79,8 @@ impl Spread {
     }
 
     /// The ellipse under a linear map of the table, given by its rows.
-    fn mapped(self, [a, b]: [Vec2; 2]) -> Self {
+    fn mapped(self, rows: [Vec2; 2]) -> Self {
+        let [a, b] = rows;
         let product = |a: Vec2, b: Vec2| a.x * b.x * self.uu + (a.x * b.y + a.y * b.x) * self.uv + a.y * b.y * self.vv;
         Self { uu: product(a, a), vv: product(b, b), uv: product(a, b) }
     }

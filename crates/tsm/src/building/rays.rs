@@ -35,10 +35,10 @@ pub(crate) const MOST_SAMPLES: u32 = 32;
 /// rule: where the table is creased along edges of cells, rays at even distances would miss a share of a footprint that goes as the
 /// square of these.
 #[inline(always)]
-pub(crate) fn place(ray: u32, of: u32) -> f32 {
+pub(crate) fn place(ray: u32, rays: u32) -> f32 {
     const FROM_MIDDLE: f32 = 0.577_350_26;
     let ray_of_pair = if ray.is_multiple_of(2) { -FROM_MIDDLE } else { FROM_MIDDLE };
-    if of == 1 { 0.5 } else { ((ray / 2 * 2 + 1) as f32 + ray_of_pair) / of as f32 }
+    if rays == 1 { 0.5 } else { ((ray / 2 * 2 + 1) as f32 + ray_of_pair) / rays as f32 }
 }
 
 /// Rays by component: base, then direction.

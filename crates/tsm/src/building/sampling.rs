@@ -183,7 +183,8 @@ fn meet_disc(caster: &Caster, ray: &Ray, parallel: bool) -> Option<Sample> {
 
 /// Squared distance of a point of the disc's plane from its centre, in semi-axes.
 #[inline(always)]
-pub(crate) fn disc_coordinate([a, b]: [Vec3; 2], hit: Vec3) -> f32 {
+pub(crate) fn disc_coordinate(axes: [Vec3; 2], hit: Vec3) -> f32 {
+    let [a, b] = axes;
     (hit.dot(a) / a.length_squared()).powi(2) + (hit.dot(b) / b.length_squared()).powi(2)
 }
 

@@ -32,10 +32,10 @@ fn sort_short<const MOST: usize>(list: &mut [u64]) {
     let mut distance = [i32::MAX; MOST];
     distance.iter_mut().zip(&*list).for_each(|(d, key)| *d = (key >> 32) as i32);
     let mut sorted = [0u64; MOST];
-    for (own, keys) in distance.chunks_exact(LANES).zip(list.chunks(LANES)) {
+    for (chunk, keys) in distance.chunks_exact(LANES).zip(list.chunks(LANES)) {
         let mut less = [0i32; LANES];
         for other in &distance[..n] {
-            (0..LANES).for_each(|l| less[l] += i32::from(*other < own[l]));
+            (0..LANES).for_each(|l| less[l] += i32::from(*other < chunk[l]));
         }
         for (key, less) in keys.iter().zip(less) {
             let mut rank = less as usize;

@@ -61,9 +61,9 @@ impl Deposits {
     pub fn batches(&self, most: Capacities) -> Result<Vec<Batch>, Error> {
         let count = self.ranges.count();
         let mut batches: Vec<Batch> = Vec::new();
-        for (of, r) in (0..2).flat_map(|of| (0..count).map(move |r| (of, r))) {
+        for (kind, r) in (0..2).flat_map(|kind| (0..count).map(move |r| (kind, r))) {
             let cells = (self.ranges.first_cell(r + 1) - self.ranges.first_cell(r)) as u64;
-            let entries = self.entries_in(of, r);
+            let entries = self.entries_in(kind, r);
             for (what, needed, had) in [("entries", entries, most.entries), ("cells", cells, most.cells)] {
                 if needed > u64::from(had) {
                     return Err(Error::Overflow(Overflow { what, needed, had: had.into() }));
@@ -73,14 +73,14 @@ impl Deposits {
                 |b: &&mut Batch| b.entries + entries <= most.entries.into() && b.cells + cells <= most.cells.into();
             match batches.last_mut().filter(fits) {
                 Some(batch) => {
-                    let known = &mut batch.ranges[of];
+                    let known = &mut batch.ranges[kind];
                     *known = if known.start == known.end { r..r + 1 } else { known.start..r + 1 };
                     batch.cells += cells;
                     batch.entries += entries;
                 }
                 None => {
                     let mut ranges = [0..0, 0..0];
-                    ranges[of] = r..r + 1;
+                    ranges[kind] = r..r + 1;
                     batches.push(Batch { ranges, cells, entries });
                 }
             }
@@ -88,13 +88,13 @@ impl Deposits {
         Ok(batches)
     }
 
-    fn entries_in(&self, of: usize, range: usize) -> u64 {
+    fn entries_in(&self, kind: usize, range: usize) -> u64 {
         fn sum<const C: usize>(parts: &[Parted<C>], range: usize) -> u64 {
             parts.iter().map(|p| p.entries_of(range..range + 1).0.len() as u64).sum()
         }
         match &self.parts {
-            Parts::Mono(parts) => sum(&parts[of], range),
-            Parts::Rgb(parts) => sum(&parts[of], range),
+            Parts::Mono(parts) => sum(&parts[kind], range),
+            Parts::Rgb(parts) => sum(&parts[kind], range),
         }
     }
 
@@ -116,10 +116,10 @@ impl Deposits {
         for (parts, ranges) in parts.iter().zip(&batch.ranges) {
             let first = self.ranges.first_cell(ranges.start) as u32;
             for part in parts {
-                let (cell, distance, own) = part.entries_of(ranges.clone());
+                let (cell, distance, absorbance) = part.entries_of(ranges.clone());
                 cells.extend(cell.iter().flat_map(|c| (c - first + before).to_ne_bytes()));
                 distances.extend_from_slice(bytemuck::cast_slice(distance));
-                absorbances.extend_from_slice(bytemuck::cast_slice(own));
+                absorbances.extend_from_slice(bytemuck::cast_slice(absorbance));
             }
             before += self.cells_of(ranges) as u32;
         }
@@ -150,25 +150,25 @@ where
     [f32; C]: Pod,
 {
     let mut batches = batches.into_iter();
-    let mut all = batches.next().unwrap_or(Listed { spans: Vec::new(), distances: Vec::new(), totals: Vec::new() });
+    let mut listed = batches.next().unwrap_or(Listed { spans: Vec::new(), distances: Vec::new(), totals: Vec::new() });
     for more in batches {
-        let before = all.distances.len() as u32;
-        all.spans.extend(more.spans.iter().map(|[begin, kept]| [begin.wrapping_add(before), *kept]));
-        all.distances.extend(more.distances);
-        all.totals.extend(more.totals);
+        let before = listed.distances.len() as u32;
+        listed.spans.extend(more.spans.iter().map(|[begin, kept]| [begin.wrapping_add(before), *kept]));
+        listed.distances.extend(more.distances);
+        listed.totals.extend(more.totals);
     }
     let expected = [2 * cells as u64, entries[0] + entries[1], (entries[0] + entries[1]) * C as u64];
-    let found = [all.spans.len(), all.distances.len(), all.totals.len()].map(|n| n as u64);
+    let found = [listed.spans.len(), listed.distances.len(), listed.totals.len()].map(|n| n as u64);
     for ((what, expected), found) in ["spans", "distances", "totals"].into_iter().zip(expected).zip(found) {
         if expected != found {
             return Err(Error::ReadBack { what, expected: 4 * expected, found: 4 * found });
         }
     }
     let of_media = entries[0] as usize;
-    let mut surfaces = all.spans.split_off(cells);
+    let mut surfaces = listed.spans.split_off(cells);
     surfaces.iter_mut().for_each(|[begin, _]| *begin = begin.wrapping_sub(entries[0] as u32));
-    let distances = all.distances.split_off(of_media);
-    let totals = all.totals.split_off(of_media * C);
+    let distances = listed.distances.split_off(of_media);
+    let totals = listed.totals.split_off(of_media * C);
     let lists = |spans: Vec<[u32; 2]>, distances: Vec<f32>, totals: &[f32]| {
         if distances.is_empty() {
             return Ok(None);
@@ -177,7 +177,10 @@ where
         let lists = Lists::from_parts(spans, distances, bytemuck::cast_slice(totals).to_vec());
         lists.map(Some).ok_or(Error::ReadBack { what: "spans", expected: 8 * cells, found: 0 })
     };
-    Ok(Matter { media: lists(all.spans, all.distances, &all.totals)?, surfaces: lists(surfaces, distances, &totals)? })
+    Ok(Matter {
+        media: lists(listed.spans, listed.distances, &listed.totals)?,
+        surfaces: lists(surfaces, distances, &totals)?,
+    })
 }
 
 impl Recorded {

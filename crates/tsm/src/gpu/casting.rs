@@ -56,7 +56,7 @@ impl Given {
     fn add<const C: usize>(&mut self, entries: &Entries<C>, behind: u32) {
         self.cells.extend(entries.cell[..entries.len].iter().map(|cell| cell + behind));
         self.distances.extend_from_slice(&entries.distance[..entries.len]);
-        self.absorbances.extend_from_slice(entries.own[..entries.len].as_flattened());
+        self.absorbances.extend_from_slice(entries.absorbance[..entries.len].as_flattened());
     }
 
     fn append(&mut self, other: Self) {

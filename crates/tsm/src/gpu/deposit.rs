@@ -199,12 +199,12 @@ impl RecordedCast {
 
     fn check(&self, casting: &Casting) -> Result<(), Error> {
         let needed = casting.room(self.room.attributes, u32::try_from(casting.given()).unwrap_or(u32::MAX));
-        let of = |room: &CastRoom| {
+        let sizes = |room: &CastRoom| {
             let flags = [room.opaque, room.planes].map(u32::from);
             [room.casters, room.entries, room.cells, room.directions, room.tables, flags[0], flags[1]]
         };
         let names = ["casters", "entries", "cells", "directions", "tables", "opaque discs", "planes"];
-        for ((what, needed), had) in names.into_iter().zip(of(&needed)).zip(of(&self.room)) {
+        for ((what, needed), had) in names.into_iter().zip(sizes(&needed)).zip(sizes(&self.room)) {
             if needed > had {
                 return Err(Error::Overflow(Overflow { what, needed: needed.into(), had: had.into() }));
             }

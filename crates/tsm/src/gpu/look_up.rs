@@ -8,7 +8,7 @@
 //! rounding of a receiver's distance, its step may fall on the other side.
 //!
 //! Positions are subtracted from the light's in f64 by the CPU. Tables of polar angles take arc functions in f64, which
-//! devices do not have: their look-ups are the CPU's ([`Room::of`]).
+//! devices do not have: their look-ups are the CPU's ([`Room::for_map`]).
 
 use super::batches::read;
 use crate::mapping::{Mapping, Table, with_mapping};
@@ -45,7 +45,7 @@ pub struct Room {
 impl Room {
     /// Room for this map and so many receivers; `None` where its look-ups are the CPU's: a table of polar angles, or 2³²
     /// entries and more.
-    pub fn of(map: &ShadowMap, receivers: u32) -> Option<Self> {
+    pub fn for_map(map: &ShadowMap, receivers: u32) -> Option<Self> {
         let directions = match &map.table {
             Table::Octahedral(table) => table.quarter().len() as u32,
             Table::Planar(_) => 0,
@@ -122,10 +122,10 @@ impl RecordedLookUp {
     /// # Errors
     /// [`Error::Overflow`] for a map that is larger or otherwise than the room.
     pub fn map(&self, map: &ShadowMap) -> Result<MapUploads, Error> {
-        let needed = Room::of(map, 0);
-        let of = |room: &Room| [room.cells, room.entries, room.directions, u32::from(room.opaque)];
-        let had = of(&self.room);
-        let needed = needed.as_ref().map_or([u32::MAX; 4], of);
+        let needed = Room::for_map(map, 0);
+        let sizes = |room: &Room| [room.cells, room.entries, room.directions, u32::from(room.opaque)];
+        let had = sizes(&self.room);
+        let needed = needed.as_ref().map_or([u32::MAX; 4], sizes);
         let names = ["cells", "entries", "directions", "opaque discs"];
         for ((what, needed), had) in names.into_iter().zip(needed).zip(had) {
             if needed > had {
@@ -177,20 +177,20 @@ impl RecordedLookUp {
             let is_surface = f32::from(u8::from(receiver.kind != SplatKind::Medium));
             [p.x, p.y, p.z, lift, n.x, n.y, n.z, is_surface]
         };
-        let all: Vec<[f32; 8]> = receivers.par_iter().with_min_len(1 << 12).map(words).collect();
+        let rows: Vec<[f32; 8]> = receivers.par_iter().with_min_len(1 << 12).map(words).collect();
         let view = ShadowView { receivers: receivers.len() as u32, ..uploads.view };
         Ok(ReceiverUploads {
             view: bytemuck::bytes_of(&view).to_vec(),
-            receivers: bytemuck::cast_slice(&all).to_vec(),
+            receivers: bytemuck::cast_slice(&rows).to_vec(),
             count: receivers.len(),
         })
     }
 
     /// The uploads of a run with the buffers that they go to. The map of the run before stays unless one is given.
     pub fn inputs<'a>(&self, map: Option<&'a MapUploads>, receivers: &'a ReceiverUploads) -> Vec<(BufferId, &'a [u8])> {
-        let own = [(self.view, receivers.view.as_slice()), (self.receivers, &receivers.receivers)];
+        let of_receivers = [(self.view, receivers.view.as_slice()), (self.receivers, &receivers.receivers)];
         let of_map = map.into_iter().flat_map(|map| self.map.into_iter().zip(map.bytes.iter().map(Vec::as_slice)));
-        own.into_iter().chain(of_map).collect()
+        of_receivers.into_iter().chain(of_map).collect()
     }
 
     /// Transmittances per channel, from the bytes that were read back of [`RecordedLookUp::lights`] after a run with these

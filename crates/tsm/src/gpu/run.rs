@@ -16,8 +16,8 @@ const LEAST: u32 = 4096;
 pub fn map_on(device: &mut dyn Executor, deposits: &Deposits) -> Result<Option<(ShadowMap, Vec<PassTime>)>, Error> {
     let most = Capacities::most(device.adapter().binding_bytes, deposits.channels() as u32);
     let lanes = Lanes::for_adapter(device.adapter());
-    let all = u32::try_from(deposits.entries().iter().sum::<u64>()).unwrap_or(u32::MAX);
-    let prepared = most_that_fits(most.entries.min(all), LEAST, |entries| {
+    let total = u32::try_from(deposits.entries().iter().sum::<u64>()).unwrap_or(u32::MAX);
+    let prepared = most_that_fits(most.entries.min(total), LEAST, |entries| {
         let batches = deposits.batches(Capacities { entries, ..most })?;
         let largest = |number: fn(&Batch) -> u64| batches.iter().map(number).max().unwrap_or(0) as u32;
         let recorded = record(Capacities { entries: largest(Batch::entries), cells: largest(Batch::cells), ..most });

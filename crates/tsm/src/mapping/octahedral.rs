@@ -275,15 +275,15 @@ fn across_line(q: Vec2, side: f32, upper: bool, rows: bool) -> Across {
 fn across_diagonal(q: Vec2, side: f32, upper: bool) -> Across {
     let sum = (q.x + q.y) / side;
     let difference = (q.x - q.y) / side;
-    let (sign, own) = if upper { (1.0, sum) } else { (-1.0, 2.0 - sum) };
+    let (sign, r) = if upper { (1.0, sum) } else { (-1.0, 2.0 - sum) };
     // Far from the diagonal, where only footprints of the size of the table reach across it, any slope does.
-    let own = own.max(LEAST_CONTINUED);
-    let other = (2.0 - own * own).max(0.0).sqrt();
-    let along = own / other;
-    let across = other / own;
+    let r = r.max(LEAST_CONTINUED);
+    let other = (2.0 - r * r).max(0.0).sqrt();
+    let along = r / other;
+    let across = other / r;
     let there = Vec2::splat(if upper { 2.0 - other } else { other }) + Vec2::new(1.0, -1.0) * (difference * across);
     // With dS′ = along·dS and dD′ = across·dD + lean·dS of the sum S = X + Y: the area stays.
-    let lean = -sign * 2.0 * difference / (other * own * own);
+    let lean = -sign * 2.0 * difference / (other * r * r);
     let [x, y] = [along + lean, along - lean];
     let jacobian = [Vec2::new(x + across, x - across) * 0.5, Vec2::new(y - across, y + across) * 0.5];
     (there * (0.5 * side), jacobian, [-sign, -sign, sign * side])

@@ -83,7 +83,7 @@ impl Sizes {
     }
 
     /// Sizes and numbers of casters.
-    fn all(&self) -> impl Iterator<Item = (f64, f64)> {
+    fn sizes_and_counts(&self) -> impl Iterator<Item = (f64, f64)> {
         let used = self.0.iter().enumerate().filter(|(_, weight)| **weight > 0);
         used.map(|(k, weight)| (Self::size(k), *weight as f64 / Self::WHOLE as f64))
     }
@@ -191,15 +191,15 @@ impl Appearance {
     /// Entries that translucent casters make in a table of `cells` cells of side `cell` (angle, tangent or length).
     pub(crate) fn entries(&self, cell: f64, cells: f64) -> f64 {
         let made = |size| entries_of(size, cell / self.unit, self.apparent == Apparent::Length).min(cells);
-        self.radius.all().map(|(size, count)| count * made(size)).sum()
+        self.radius.sizes_and_counts().map(|(size, count)| count * made(size)).sum()
     }
 
     /// Cells that casters of all kinds overlap: what work goes by. Larger cells are fewer.
     pub(crate) fn covered(&self, cell: f64, cells: f64) -> f64 {
         let kernel = |size: f64| cells_along(HALF_OF_RADIUS * size * self.unit / cell).powi(2).min(cells);
         let disc = |size: f64| (1.0 + 1.8 * size * self.unit / cell).powi(2).min(cells);
-        let kernels = self.radius.all().map(|(size, count)| count * kernel(size)).sum::<f64>();
-        kernels + self.disc.all().map(|(size, count)| count * disc(size)).sum::<f64>()
+        let kernels = self.radius.sizes_and_counts().map(|(size, count)| count * kernel(size)).sum::<f64>();
+        kernels + self.disc.sizes_and_counts().map(|(size, count)| count * disc(size)).sum::<f64>()
     }
 
     /// Casters that have a place.

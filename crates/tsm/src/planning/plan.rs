@@ -50,7 +50,7 @@ pub(crate) fn plan(casters: &Casters<'_>, survey: &Survey, light: &Light, room: 
         Kind::Parallel => Apparent::Length,
     };
     let look = Appearance::new(casters, &frame, apparent);
-    let shape = Extent::of(&kind, &look);
+    let shape = Extent::new(&kind, &look);
     let (cell, limit) = match casters.params.resolution {
         Resolution::Auto => automatic_cell(casters, survey, &look, &shape, room),
         Resolution::Cells(n) => (shape.side / f64::from(n), Limit::Asked),
@@ -155,7 +155,7 @@ impl std::ops::Deref for Extent {
 }
 
 impl Extent {
-    fn of(kind: &Kind, look: &Appearance) -> Self {
+    fn new(kind: &Kind, look: &Appearance) -> Self {
         let planar = |perspective, limit: Option<f32>| {
             let limit = Vec2::splat(limit.map_or(MAX_TANGENT, |t| 1.05 * t));
             let [mut low, mut high] = look.window;

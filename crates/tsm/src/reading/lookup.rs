@@ -48,7 +48,7 @@ impl Transmittance for ShadowMap {
         const NONE: Receiver =
             Receiver { position: Vec3::ZERO, normal: Vec3::ZERO, radius: 0.0, kind: SplatKind::Medium };
         let mut receivers = [NONE; TOGETHER];
-        receivers.iter_mut().zip(splats).for_each(|(of, splat)| *of = receiver(*splat));
+        receivers.iter_mut().zip(splats).for_each(|(entry, splat)| *entry = receiver(*splat));
         pulp::Arch::new().dispatch(LookUp::<TOGETHER, false> { map: self, receivers: &receivers[..splats.len()] })
     }
 }
@@ -327,20 +327,20 @@ pub(crate) fn continuous<S: Simd, const C: usize>(
 
 /// A channel of some absorbances.
 #[inline(always)]
-fn column<S: Simd, const C: usize>(simd: S, of: &[[f32; C]; WINDOW], from: usize, c: usize) -> Lanes<S> {
+fn column<S: Simd, const C: usize>(simd: S, absorbances: &[[f32; C]; WINDOW], from: usize, c: usize) -> Lanes<S> {
     if C == 1 {
-        return Lanes::load(simd, &of.as_flattened()[from..]);
+        return Lanes::load(simd, &absorbances.as_flattened()[from..]);
     }
     let mut column = [0.0; WINDOW];
-    (0..Lanes::<S>::COUNT).for_each(|l| column[l] = of[from + l][c]);
+    (0..Lanes::<S>::COUNT).for_each(|l| column[l] = absorbances[from + l][c]);
     Lanes::load(simd, &column)
 }
 
 /// Sum of all, in the same order on every machine.
 #[inline(always)]
-fn added(of: &[f32; WINDOW]) -> f32 {
+fn added(absorbances: &[f32; WINDOW]) -> f32 {
     let mut four = Vec4::ZERO;
-    (0..WINDOW).step_by(4).for_each(|l| four += Vec4::from_slice(&of[l..]));
+    (0..WINDOW).step_by(4).for_each(|l| four += Vec4::from_slice(&absorbances[l..]));
     (four.x + four.z) + (four.y + four.w)
 }
 
@@ -363,10 +363,10 @@ mod tests {
 
     /// Lists of cells from entries of a cell, a distance and an absorbance each.
     fn lists(cells: usize, entries: &[(u32, f32, f32)]) -> Lists<1> {
-        let mut all = Entries::<1>::default();
-        entries.iter().for_each(|&(cell, distance, a)| all.push(cell, distance, a, &[1.0; 3]));
+        let mut built = Entries::<1>::default();
+        entries.iter().for_each(|&(cell, distance, a)| built.push(cell, distance, a, &[1.0; 3]));
         let ranges = Ranges::new(cells, entries.len() as f64);
-        Lists::new(&[Parted::new(&all, ranges)], ranges, 1e6)
+        Lists::new(&[Parted::new(&built, ranges)], ranges, 1e6)
     }
 
     /// [`continuous`] by whatever the machine has.
@@ -385,8 +385,8 @@ mod tests {
     fn absorbance(lists: &Lists<1>, cell: u32, distance: f32, ramp: f32) -> f32 {
         let spans = [lists.span(cell); 4];
         let [begin, ..] = lists.places(&[spans], &[[distance - ramp; 4]], 1, |d, nearest| d <= nearest)[0];
-        let of = || Continuous(lists.list_at(spans[0]), begin, [distance, ramp]);
-        let [widest, none] = [pulp::Arch::new().dispatch(of()), of().with_simd(pulp::Scalar::new())];
+        let continuous = || Continuous(lists.list_at(spans[0]), begin, [distance, ramp]);
+        let [widest, none] = [pulp::Arch::new().dispatch(continuous()), continuous().with_simd(pulp::Scalar::new())];
         assert_eq!(widest.to_bits(), none.to_bits());
         widest
     }
@@ -423,7 +423,7 @@ mod tests {
     #[test]
     fn windows_of_entries_absorb_as_each_of_them_does() {
         // Lists of all lengths, so that windows end anywhere in them, and one of thousands, in many ranges of cells.
-        let unit = |i: u64, of: u64| splat_core::rng::unit_f32(9, 1, i, of);
+        let unit = |i: u64, sample: u64| splat_core::rng::unit_f32(9, 1, i, sample);
         let lengths: Vec<u64> = (0..400).map(|cell| if cell == 77 { 10_000 } else { cell % 45 }).collect();
         let entries: Vec<(u32, f32, f32)> = lengths
             .iter()

@@ -51,8 +51,8 @@ impl ShadowMap {
             entries.push((*d, [f32::INFINITY; 3]));
         }
         let mut sum = [0.0f32; 3];
-        let running = entries.into_iter().map(|(distance, own)| {
-            (0..3).for_each(|c| sum[c] += own[c]);
+        let running = entries.into_iter().map(|(distance, absorbance)| {
+            (0..3).for_each(|c| sum[c] += absorbance[c]);
             (self.frame.world_length(distance), sum)
         });
         running.collect()
@@ -273,19 +273,19 @@ fn whole_absorbance<const C: usize>(matter: &Matter<C>, cell: u32) -> f32 {
 }
 
 fn own_absorbances<const C: usize>(matter: &Matter<C>, cell: u32, cells: u32) -> Vec<(f32, [f32; 3])> {
-    let mut own = Vec::new();
+    let mut absorbances = Vec::new();
     if cell >= cells {
-        return own;
+        return absorbances;
     }
     for lists in [&matter.media, &matter.surfaces].into_iter().flatten() {
         let mut before = [0.0; C];
         let list = lists.list(cell);
         for (distance, total) in list.distance().iter().zip(list.total()) {
-            own.push((*distance, std::array::from_fn(|c| total[c.min(C - 1)] - before[c.min(C - 1)])));
+            absorbances.push((*distance, std::array::from_fn(|c| total[c.min(C - 1)] - before[c.min(C - 1)])));
             before = *total;
         }
     }
-    own
+    absorbances
 }
 
 /// Where the absorbance of a cell first reaches `absorbance` in every channel: the entries of media, each spread evenly over

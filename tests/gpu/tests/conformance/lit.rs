@@ -158,7 +158,7 @@ fn by_device(
 ) -> Ensemble {
     let seen = room.seen();
     let mut ensemble = Ensemble::new(room.size, &way.params).unwrap();
-    let rooms = maps.iter().map(|(map, _)| Room::of(map, seen.splats).unwrap());
+    let rooms = maps.iter().map(|(map, _)| Room::for_map(map, seen.splats).unwrap());
     let recorded: Vec<_> = (0..).zip(rooms).map(|(light, room)| record_received(room, seen, light)).collect();
     let shadows: Vec<_> = recorded
         .iter()

@@ -187,7 +187,7 @@ fn look_ups_are_the_cpu_s_within_the_tolerance() {
         let cloud = mixed(4000, origin, &ALL);
         let map = deposits(&cloud, coloured, &light, params).into_map();
         let receivers = receivers(&cloud);
-        let recorded = record_look_up(Room::of(&map, 3000).unwrap());
+        let recorded = record_look_up(Room::for_map(&map, 3000).unwrap());
         recorded.recording.check().unwrap();
         let mut ready = device.prepare(&recorded.recording).unwrap();
         let uploads = recorded.map(&map).unwrap();
