@@ -91,7 +91,7 @@ fn take_marks(first: u32, out: &mut [u32], slice_starts: &mut [u32]) {
     let mut slice_starts = slice_starts.iter_mut();
     for (place, ids) in (first..).step_by(SCAN).zip(out.chunks_mut(SCAN)) {
         // Most slices are longer than this: no mark, and nothing to write.
-        if ids.iter().fold(0, |all, id| all | id) & MARK == 0 {
+        if ids.iter().fold(0, |bits, id| bits | id) & MARK == 0 {
             continue;
         }
         for ((place, id), start) in (place..).zip(ids).filter(|(_, id)| **id & MARK != 0).zip(&mut slice_starts) {

@@ -48,8 +48,8 @@ impl<D: Fn(usize) -> f32 + Sync, I: Fn(u32) -> u32 + Sync> DepthBits<'_, D, I> {
             return if keys.bits <= DIGIT_BITS { self.order_few_keys(b, keys, out) } else { self.order_large(b, out) };
         }
         // Each thread of the pool has its own leaf, so no lock waits.
-        let own = rayon::current_thread_index().unwrap_or(0) % leaves.len();
-        let mut leaf = leaves[own].lock().unwrap_or_else(PoisonError::into_inner);
+        let thread = rayon::current_thread_index().unwrap_or(0) % leaves.len();
+        let mut leaf = leaves[thread].lock().unwrap_or_else(PoisonError::into_inner);
         let sorted = self.order_in_leaf(b, keys, &mut leaf, out.len());
         self.mark_slices(out, sorted)
     }
@@ -64,10 +64,10 @@ impl<D: Fn(usize) -> f32 + Sync, I: Fn(u32) -> u32 + Sync> DepthBits<'_, D, I> {
         let mut from = &mut from[..n];
         let mut to = &mut to[..n];
         let parts = self.distributed.parts(b).flat_map(|(_, part)| [part]);
-        scatter(parts, |e| digits.of(e, 0), &mut counts[..DIGITS], from);
+        scatter(parts, |e| digits.digit(e, 0), &mut counts[..DIGITS], from);
         for pass in 1..passes {
             let cursors = &mut counts[pass as usize * DIGITS..][..DIGITS];
-            scatter([&*from], |e| digits.of(e, pass), cursors, to);
+            scatter([&*from], |e| digits.digit(e, pass), cursors, to);
             std::mem::swap(&mut from, &mut to);
         }
         from
@@ -79,15 +79,15 @@ impl<D: Fn(usize) -> f32 + Sync, I: Fn(u32) -> u32 + Sync> DepthBits<'_, D, I> {
         let [low, middle, high] = [0, 1, 2].map(|pass| pass * DIGITS);
         for (_, part) in self.distributed.parts(b) {
             match digits.passes {
-                1 => part.iter().for_each(|&e| counts[digits.of(e, 0)] += 1),
+                1 => part.iter().for_each(|&e| counts[digits.digit(e, 0)] += 1),
                 2 => part.iter().for_each(|&e| {
-                    counts[low + digits.of(e, 0)] += 1;
-                    counts[middle + digits.of(e, 1)] += 1;
+                    counts[low + digits.digit(e, 0)] += 1;
+                    counts[middle + digits.digit(e, 1)] += 1;
                 }),
                 _ => part.iter().for_each(|&e| {
-                    counts[low + digits.of(e, 0)] += 1;
-                    counts[middle + digits.of(e, 1)] += 1;
-                    counts[high + digits.of(e, 2)] += 1;
+                    counts[low + digits.digit(e, 0)] += 1;
+                    counts[middle + digits.digit(e, 1)] += 1;
+                    counts[high + digits.digit(e, 2)] += 1;
                 }),
             }
         }
@@ -104,7 +104,7 @@ impl<D: Fn(usize) -> f32 + Sync, I: Fn(u32) -> u32 + Sync> DepthBits<'_, D, I> {
         self.count(b, digits, &mut cursors);
         for (_, part) in self.distributed.parts(b) {
             for &entry in part {
-                let cursor = &mut cursors[digits.of(entry, 0)];
+                let cursor = &mut cursors[digits.digit(entry, 0)];
                 out[*cursor as usize] = (self.id_of)(entry as u32);
                 *cursor += 1;
             }
@@ -169,7 +169,7 @@ struct Digits {
 impl Digits {
     /// Digit `pass` of an entry, the least significant first.
     #[inline(always)]
-    fn of(self, entry: u64, pass: u32) -> usize {
+    fn digit(self, entry: u64, pass: u32) -> usize {
         // A key of 32 bits is never shifted by more than 22.
         let digit = ((entry >> 32) as u32 - self.first) >> (pass * self.width);
         digit as usize & ((1 << self.width) - 1) & (DIGITS - 1)

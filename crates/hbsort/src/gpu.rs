@@ -212,7 +212,7 @@ fn slices_of(slicing: &Slicing, keys: impl ExactSizeIterator<Item = u32>) -> (Ve
             continue;
         }
         let slice = slicing.slice_of(depth);
-        if current.is_none_or(|(of, _)| of != slice) {
+        if current.is_none_or(|(last, _)| last != slice) {
             starts.push(at);
             indices.push(slice);
             current = Some((slice, slicing.surely_within(slice)));

@@ -203,10 +203,10 @@ mod tests {
         for sizes in [&[ids.len()][..], &[1000, 1, ids.len() - 1001]] {
             let mut rest = &ids[..];
             let part = |size: &usize| {
-                let (own, others) = rest.split_at(*size);
+                let (taken, others) = rest.split_at(*size);
                 rest = others;
-                let bytes = read_back(&cloud, own);
-                recorded.sorted([&bytes[0], &bytes[1], &bytes[2]], &cloud, Some(own)).unwrap()
+                let bytes = read_back(&cloud, taken);
+                recorded.sorted([&bytes[0], &bytes[1], &bytes[2]], &cloud, Some(taken)).unwrap()
             };
             let parts: Vec<Sorted> = sizes.iter().map(part).collect();
             assert_eq!(join(&parts, &cloud, Some(&ids), &params).unwrap(), expected, "{sizes:?}");

@@ -22,11 +22,11 @@ pub fn slice_cloud_on(
     camera: &Camera,
     params: &Params,
 ) -> Result<(SliceOrder, Vec<PassTime>), Error> {
-    let all = ids.len().max(1) as u32;
+    let splats = ids.len().max(1) as u32;
     let most = match Capacities::most_splats(device.adapter().binding_bytes) {
         // The device refuses, and says why.
-        0 => all,
-        most => most.min(all),
+        0 => splats,
+        most => most.min(splats),
     };
     let lanes = Lanes::for_adapter(device.adapter());
     let prepared = most_that_fits(most, LEAST, |splats| {
