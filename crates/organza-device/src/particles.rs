@@ -184,7 +184,7 @@ impl<'a> Folding<'a> {
         let (generated, ready) = self.making.insert(match kept {
             Some(kept) => kept,
             None => {
-                let nearest = Nearest::of(device.adapter());
+                let nearest = Nearest::for_adapter(device.adapter());
                 let generated =
                     light.with(scene, ensemble, |lighting| record_generated(room, nearest, lighting, sources))?;
                 let ready = device.prepare(&generated.recording.by(Lanes::for_adapter(device.adapter())))?;
@@ -221,7 +221,7 @@ impl<'a> Folding<'a> {
         let (recorded, ready) = self.uploading.insert(match kept {
             Some(kept) => kept,
             None => {
-                let nearest = Nearest::of(device.adapter());
+                let nearest = Nearest::for_adapter(device.adapter());
                 let recorded = light.with(scene, ensemble, |lighting| record(room, nearest, lighting))?;
                 let ready = device.prepare(&recorded.recording.by(Lanes::for_adapter(device.adapter())))?;
                 (recorded, ready)

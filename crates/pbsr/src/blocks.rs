@@ -156,8 +156,8 @@ fn pick(slots: &[(u32, u16)], bits: u64) -> usize {
     let slot = (((bits >> 32) * slots.len() as u64) >> 32) as usize;
     let (share, other) = slots[slot];
     // A selection, not a branch: which it is cannot be foreseen.
-    let own = 0usize.wrapping_sub(usize::from((bits as u32) < share));
-    slot & own | usize::from(other) & !own
+    let mask = 0usize.wrapping_sub(usize::from((bits as u32) < share));
+    slot & mask | usize::from(other) & !mask
 }
 
 /// One alias table; returns the sum of the rates.

@@ -78,7 +78,7 @@ pub enum Nearest {
 
 impl Nearest {
     /// The better of those that a device can.
-    pub fn of(adapter: &Adapter) -> Self {
+    pub fn for_adapter(adapter: &Adapter) -> Self {
         if adapter.wide_atomics { Self::Wide } else { Self::Ranked }
     }
 }

@@ -296,8 +296,8 @@ mod tests {
         assert_eq!((view.wide, view.thin), (k > 1.0, k < 1.0));
         if k > 1.0 {
             let foot = projector.widened(x, y, k);
-            let all = (foot.y[0]..foot.y[1]).flat_map(|y| (foot.x[0]..foot.x[1]).map(move |x| [x, y]));
-            return all.filter(|[x, y]| foot.covers(*x, *y)).collect();
+            let pixels = (foot.y[0]..foot.y[1]).flat_map(|y| (foot.x[0]..foot.x[1]).map(move |x| [x, y]));
+            return pixels.filter(|[x, y]| foot.covers(*x, *y)).collect();
         }
         let seen = (view.tile[0] as usize) < tiling.tiles();
         if seen && (k >= 1.0 || random < k) { vec![[x as i32, y as i32]] } else { Vec::new() }
@@ -344,10 +344,10 @@ mod tests {
                     let u = |c| rng::unit_f32(5, 0, i, c);
                     // Whole pixels around the axis, so that all phases are met, and no widened particle is cut.
                     let p = Vec3::new((u(0) - 0.5) * width, (u(1) - 0.5) * width, -depth as f32);
-                    let own = s / pixel_area(&camera, p.as_dvec3());
+                    let share = s / pixel_area(&camera, p.as_dvec3());
                     hits += project(&projector, p, u(2)).len() as f64;
-                    expected += own;
-                    variance += own;
+                    expected += share;
+                    variance += share;
                 }
                 assert!((hits - expected).abs() < 4.5 * f64::sqrt(variance), "k {k}: {hits} for {expected}");
             }

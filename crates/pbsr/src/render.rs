@@ -90,13 +90,13 @@ impl Renderer {
         let channels = ensemble.params;
         let Scene { lights, shadow_origin, ambient, camera, .. } = *scene;
         let shader = Shader { lights, shadow_origin, ambient, camera, channels };
-        let all = Resolve { scene, plan, shader: &shader, tasks: &self.tasks, batch };
+        let resolve = Resolve { scene, plan, shader: &shader, tasks: &self.tasks, batch };
         let mut tiles = ensemble.tiles();
         let tiles = tiles.par_iter_mut().enumerate();
         if channels.colored_extinction {
-            tiles.for_each_init(Colored::new, |nearest, (t, sums)| nearest.fold(&all, t, sums));
+            tiles.for_each_init(Colored::new, |nearest, (t, sums)| nearest.fold(&resolve, t, sums));
         } else {
-            tiles.for_each_init(Nearest::new, |nearest, (t, sums)| nearest.fold(&all, t, sums));
+            tiles.for_each_init(Nearest::new, |nearest, (t, sums)| nearest.fold(&resolve, t, sums));
         }
     }
 }

@@ -150,11 +150,11 @@ impl KeptSets {
     pub fn new(sampler: &dyn Sampler, first: u64, n: usize) -> Self {
         let runs = runs(sampler);
         let one = |set: u64, run: &Run| {
-            let mut all = Particles::default();
+            let mut particles = Particles::default();
             let mut scratch = Particles::default();
-            all.reserve((run.expected * 1.1) as usize + 64);
-            run.chunks.clone().for_each(|c| all.append(sampler.chunk(set, c, &mut scratch)));
-            all
+            particles.reserve((run.expected * 1.1) as usize + 64);
+            run.chunks.clone().for_each(|c| particles.append(sampler.chunk(set, c, &mut scratch)));
+            particles
         };
         let kept = |set: u64| runs.par_iter().map(|run| one(set, run)).collect();
         Self {

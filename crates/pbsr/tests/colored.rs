@@ -54,8 +54,8 @@ fn the_stated_error_is_that_of_the_sets() {
     let camera = front(16);
     let meshes = [0.5, -0.5].map(|z| rectangle(Vec3::Z * z, Vec3::X * 4.0, Vec3::Y * 4.0, 2));
     let s = pixel_area(&camera, DVec3::Z);
-    let of = |k: usize, color| MeshSampler::new(&meshes[k], &surface(0.6, s, color, k as u64), None).unwrap();
-    let samplers = [of(0, [1.0, 0.5, 0.25]), of(1, [0.25, 0.5, 2.0])];
+    let sampler = |k: usize, color| MeshSampler::new(&meshes[k], &surface(0.6, s, color, k as u64), None).unwrap();
+    let samplers = [sampler(0, [1.0, 0.5, 0.25]), sampler(1, [0.25, 0.5, 2.0])];
     let objects = [tinted(&samplers[0], [1.0, 0.5, 0.25]), tinted(&samplers[1], [0.25, 0.5, 1.0])];
     // A wall behind one half.
     let depth = (0..256).map(|k| if k % 16 < 8 { 6.0 } else { f32::INFINITY }).collect();
@@ -104,12 +104,12 @@ mod deep {
         for (camera, scale) in [(&front, 1.0), (&front, 0.1), (&oblique, 1.0), (&oblique, 0.3)] {
             let s = scale * pixel_area(camera, DVec3::Z * 0.5);
             let meshes = [0.5, -0.5].map(|z| rectangle(Vec3::Z * z, Vec3::X * 4.0, Vec3::Y * 4.0, 2));
-            let of = |mesh, tau: f64, seed| {
+            let sampler = |mesh, tau: f64, seed| {
                 let params = surface(-(-tau).exp_m1(), s, [0.0; 3], seed);
                 let flat = SurfaceParams { surface_opacity: splat_core::optics::SurfaceOpacity::PerCrossing, ..params };
                 MeshSampler::new(mesh, &flat, None).unwrap()
             };
-            let samplers = [of(&meshes[0], a, 1), of(&meshes[1], b, 2)];
+            let samplers = [sampler(&meshes[0], a, 1), sampler(&meshes[1], b, 2)];
             let objects = [tinted(&samplers[0], shares[0].map(|k| 3.0 * k)), tinted(&samplers[1], shares[1])];
             let mut ensemble = Ensemble::new([32, 32], &APART).unwrap();
             fold_into(&scene(camera, &objects), &mut ensemble, LEVELS);

@@ -27,7 +27,7 @@ fn deviation(colors: impl Iterator<Item = [f32; 3]>) -> (f64, f64) {
         }
     }
     let sigma = |c: usize| (squares[c] / n).sqrt() / n.sqrt();
-    let worst = |of: &dyn Fn(usize) -> f64| (0..3).map(of).fold(0.0, f64::max);
+    let worst = |number: &dyn Fn(usize) -> f64| (0..3).map(number).fold(0.0, f64::max);
     (worst(&|c| (sum[c] / n).abs() / sigma(c)), worst(&|c| sigma(c) / f64::from(COLOR[c])))
 }
 

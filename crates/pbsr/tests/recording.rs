@@ -67,7 +67,7 @@ impl Shadow {
         Self { recording, attributes, shares, received }
     }
 
-    fn of(&self) -> ShadowOf<'_> {
+    fn parts(&self) -> ShadowOf<'_> {
         let Self { recording, attributes, shares, received } = self;
         ShadowOf { recording, attributes, shares: *shares, received: *received }
     }
@@ -76,7 +76,7 @@ impl Shadow {
 #[test]
 fn lit_levels_are_as_kept_in_text() {
     let shadows = [0, 1].map(|light| Shadow::new(ROOM.seen(), light));
-    let shadows: Vec<_> = shadows.iter().map(Shadow::of).collect();
+    let shadows: Vec<_> = shadows.iter().map(Shadow::parts).collect();
     let lighting = Lighting { params: EnsembleParams::default(), lights: 2, shadows: &shadows };
     let found = record(ROOM, Nearest::Ranked, Some(&lighting)).unwrap().recording;
     found.check().unwrap();

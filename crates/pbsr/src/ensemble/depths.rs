@@ -43,7 +43,7 @@ struct Span {
 
 impl Span {
     /// One sample.
-    fn of(depth: f32) -> Self {
+    fn from_depth(depth: f32) -> Self {
         Self { low: depth, high: depth, mean: depth, count: 1 }
     }
 
@@ -81,7 +81,7 @@ fn put<const N: usize>(spans: &mut [Span; N], depth: f32, rank: f32) {
         spans[i].add(depth);
         return;
     }
-    let mut carried = Span::of(depth);
+    let mut carried = Span::from_depth(depth);
     if used < N {
         for span in &mut spans[i..=used] {
             std::mem::swap(span, &mut carried);
@@ -196,16 +196,16 @@ impl DepthSum {
             return [behind, behind, behind, if solid.is_some() { 0.0 } else { f32::INFINITY }];
         }
         let n = f64::from(hits);
-        let all = f64::from(levels.max(hits));
+        let sets = f64::from(levels.max(hits));
         let step = f64::from(far - near) / f64::from(STEPS);
         let steps = self.sum as f64 / n;
         let variance = (self.square as f64 / n - steps * steps).max(0.0) * step * step;
-        let own = f64::from(near) + steps * step;
-        let share = if solid.is_some() { n / all } else { 1.0 };
-        let beyond = if solid.is_some() { f64::from(behind) } else { own };
-        let mean = share * own + (1.0 - share) * beyond;
-        let spread = share * (1.0 - share) * (own - beyond).powi(2);
-        let median = at_rank(&self.spans, 0.5 * all).unwrap_or(behind);
+        let mean_of_hits = f64::from(near) + steps * step;
+        let share = if solid.is_some() { n / sets } else { 1.0 };
+        let beyond = if solid.is_some() { f64::from(behind) } else { mean_of_hits };
+        let mean = share * mean_of_hits + (1.0 - share) * beyond;
+        let spread = share * (1.0 - share) * (mean_of_hits - beyond).powi(2);
+        let median = at_rank(&self.spans, 0.5 * sets).unwrap_or(behind);
         let blocks = levels / BLOCK;
         let first = if blocks == 0 {
             self.nearest
@@ -226,8 +226,8 @@ impl DepthSum {
         let head = [sum as u32, (sum >> 32) as u32, square as u32, (square >> 32) as u32];
         let spans = self.spans.iter().chain(&self.blocks);
         let spans = spans.flat_map(|s| [s.low.to_bits(), s.high.to_bits(), s.mean.to_bits(), s.count]);
-        let all = head.into_iter().chain(spans).chain([self.block, self.nearest.to_bits()]);
-        words.iter_mut().zip(all).for_each(|(to, word)| *to = word);
+        let values = head.into_iter().chain(spans).chain([self.block, self.nearest.to_bits()]);
+        words.iter_mut().zip(values).for_each(|(to, word)| *to = word);
         words
     }
 

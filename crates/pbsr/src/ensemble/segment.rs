@@ -66,7 +66,7 @@ impl Ensemble {
         let samples = self.read(background, occluder);
         let errors = samples.scalar("std_error").expect("invariant: an ensemble has an error");
         let pixels = PixelSamples { size: self.size(), antialias };
-        let all = pixels.per_pixel() as f32;
-        LayerData::Scalar(pixels.map(|at| at.map(|k| errors[k] * errors[k]).sum::<f32>().sqrt() / all))
+        let count = pixels.per_pixel() as f32;
+        LayerData::Scalar(pixels.map(|at| at.map(|k| errors[k] * errors[k]).sum::<f32>().sqrt() / count))
     }
 }

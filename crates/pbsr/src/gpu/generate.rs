@@ -195,8 +195,9 @@ fn count(
     sources: &Sources,
     inputs: &[(BufferId, Vec<BufferId>)],
     levels: u32,
-    [arrivals, counts]: [BufferId; 2],
+    outputs: [BufferId; 2],
 ) {
+    let [arrivals, counts] = outputs;
     for (twin, (source, tables)) in sources.twins.iter().zip(inputs).filter(|(twin, _)| !twin.is_given()) {
         let each = twin.source.chunks.saturating_mul(levels);
         let arrive = [*source, tables[0], arrivals, counts];

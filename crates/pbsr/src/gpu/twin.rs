@@ -94,9 +94,9 @@ impl Sources {
         let twin = |o: &Object<'_>| o.sampler.twin().unwrap_or_else(|| sampled(o.sampler));
         let mut twins: Vec<Twin> = scene.objects.iter().map(twin).collect();
         let expected = |o: &Object<'_>| o.sampler.expected_particles();
-        let all: f64 = scene.objects.iter().map(expected).sum();
+        let total: f64 = scene.objects.iter().map(expected).sum();
         let of_given = scene.objects.iter().zip(&twins).filter(|(_, twin)| twin.is_given());
-        let given_share = of_given.map(|(o, _)| expected(o)).sum::<f64>() / all.max(1.0);
+        let given_share = of_given.map(|(o, _)| expected(o)).sum::<f64>() / total.max(1.0);
         let all_chunks: u32 = twins.iter().map(|t| t.source.chunks).sum();
         let mut first_chunk = 0;
         for (twin, object) in twins.iter_mut().zip(0u32..) {

@@ -206,8 +206,8 @@ mod tests {
             let p = DVec3::from_array([0, 1, 2].map(|a| rng::unit(1, 2, i, a) * 2.0 - 1.0));
             let cell = ((p + 1.0) * 32.0).floor() / 32.0 - 1.0 + 1.0 / 64.0;
             let (low, high) = field.bound(cell, radius).unwrap();
-            let own = field.bound_in(cell, radius).unwrap();
-            assert!((own..=own + 1e-9).contains(&high), "looked up {high}, its own {own}");
+            let exact = field.bound_in(cell, radius).unwrap();
+            assert!((exact..=exact + 1e-9).contains(&high), "looked up {high}, its own {exact}");
             let value = field.value(p);
             assert!(low <= value && value <= high && high <= field.max, "{p}: {value} in {low} … {high}");
             positive += u32::from(value > 0.0);

@@ -79,7 +79,7 @@ impl<'a> MetropolisSampler<'a> {
         chains: &MetropolisParams,
         density: Option<Density<'a>>,
     ) -> Result<Self, Error> {
-        Self::of(grid, Cow::Borrowed(transfer), params, chains, density)
+        Self::with_transfer(grid, Cow::Borrowed(transfer), params, chains, density)
     }
 
     /// The same by a transfer function that it keeps.
@@ -93,10 +93,10 @@ impl<'a> MetropolisSampler<'a> {
         chains: &MetropolisParams,
         density: Option<Density<'a>>,
     ) -> Result<Self, Error> {
-        Self::of(grid, Cow::Owned(transfer), params, chains, density)
+        Self::with_transfer(grid, Cow::Owned(transfer), params, chains, density)
     }
 
-    fn of(
+    fn with_transfer(
         grid: &'a Grid,
         transfer: Cow<'a, TransferFunction>,
         params: &VolumeParams,
@@ -105,7 +105,7 @@ impl<'a> MetropolisSampler<'a> {
     ) -> Result<Self, Error> {
         check(chains.particles_per_chain >= 1, "particles_per_chain", chains.particles_per_chain, "at least 1")?;
         check(chains.stride >= 1, "stride", chains.stride, "at least 1")?;
-        let cells = GridSampler::of(grid, transfer, params, None)?;
+        let cells = GridSampler::with_transfer(grid, transfer, params, None)?;
         const POINTS: [f32; 2] = [0.211_324_87, 0.788_675_1];
         let of_cell = |&Cell { at, .. }: &Cell| {
             let lattice = cells.lattice();
@@ -188,13 +188,13 @@ impl Sampler for MetropolisSampler<'_> {
     fn chunk<'a>(&'a self, set: u64, chunk: usize, scratch: &'a mut Particles) -> &'a Particles {
         scratch.clear();
         let mut stream = Stream::new(self.cells.params.seed, Stage::Metropolis, set, chunk as u64);
-        let wanted = stream.poisson(self.expected(chunk)) as usize;
-        scratch.reserve(wanted);
+        let count = stream.poisson(self.expected(chunk)) as usize;
+        scratch.reserve(count);
         let mut made = 0;
-        while made < wanted {
+        while made < count {
             let mut place = self.anywhere(&mut stream);
             (0..self.chains.burn_in).for_each(|n| self.step(&mut place, n, &mut stream));
-            for _ in 0..self.chains.particles_per_chain.min((wanted - made) as u32) {
+            for _ in 0..self.chains.particles_per_chain.min((count - made) as u32) {
                 made += 1;
                 (0..self.chains.stride).for_each(|n| self.step(&mut place, n, &mut stream));
                 let at = self.cells.cells[place.cell].at;

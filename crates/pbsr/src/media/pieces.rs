@@ -17,7 +17,7 @@ pub(crate) const SEVERAL: u32 = u32::MAX;
 /// The pieces, in order.
 #[derive(Debug, Clone)]
 pub(crate) struct Pieces {
-    all: Vec<Piece>,
+    pieces: Vec<Piece>,
 }
 
 impl Pieces {
@@ -30,13 +30,13 @@ impl Pieces {
             let color = std::array::from_fn(|c| (to.color[c] - from.color[c]) * inverse);
             Piece { from, color, extinction: (to.extinction - from.extinction) * inverse }
         };
-        Self { all: (0..points.len()).map(piece).collect() }
+        Self { pieces: (0..points.len()).map(piece).collect() }
     }
 
     /// Number of pieces.
     #[cfg(feature = "gpu")]
     pub(crate) fn len(&self) -> usize {
-        self.all.len()
+        self.pieces.len()
     }
 
     /// Value, colour, extinction and their changes of each piece, as kernels read them.
@@ -47,20 +47,20 @@ impl Pieces {
             let [dr, dg, db] = p.color;
             [p.from.value, r, g, b, p.from.extinction, dr, dg, db, p.extinction].map(f32::to_bits)
         };
-        self.all.iter().flat_map(words).collect()
+        self.pieces.iter().flat_map(words).collect()
     }
 
     /// The piece in which all values `low ..= high` lie, if there is one that spares a search.
-    pub(crate) fn of(&self, low: f32, high: f32) -> u32 {
-        let after = self.all.partition_point(|p| p.from.value <= low);
-        let ends = self.all.get(after).is_none_or(|next| high <= next.from.value);
+    pub(crate) fn containing(&self, low: f32, high: f32) -> u32 {
+        let after = self.pieces.partition_point(|p| p.from.value <= low);
+        let ends = self.pieces.get(after).is_none_or(|next| high <= next.from.value);
         if after > 0 && ends { (after - 1) as u32 } else { SEVERAL }
     }
 
     /// Colour and extinction at a value of a piece.
     #[inline(always)]
     pub(crate) fn at(&self, piece: u32, value: f32) -> TransferPoint {
-        let Piece { from, color, extinction } = &self.all[piece as usize];
+        let Piece { from, color, extinction } = &self.pieces[piece as usize];
         let t = value - from.value;
         TransferPoint {
             value,
@@ -80,9 +80,12 @@ mod tests {
         let transfer = TransferFunction::new(vec![point(-1.0, 0.5), point(0.25, 2.0), point(1.0, 0.0)]);
         let transfer = transfer.unwrap_or_else(|e| panic!("{e}"));
         let pieces = Pieces::new(&transfer);
-        assert_eq!([pieces.of(-2.0, 0.0), pieces.of(0.0, 0.5), pieces.of(-2.0, -1.5)], [SEVERAL; 3]);
+        assert_eq!(
+            [pieces.containing(-2.0, 0.0), pieces.containing(0.0, 0.5), pieces.containing(-2.0, -1.5)],
+            [SEVERAL; 3]
+        );
         for (low, high, piece) in [(-1.0, 0.25, 0), (0.25, 1.0, 1), (0.3, 0.4, 1), (1.0, 9.0, 2), (2.0, 3.0, 2)] {
-            assert_eq!(pieces.of(low, high), piece);
+            assert_eq!(pieces.containing(low, high), piece);
             for k in 0..=10 {
                 let value = low + (high - low) * k as f32 / 10.0;
                 let found = pieces.at(piece, value);

@@ -106,7 +106,8 @@ pub(crate) fn corners(grid: &Grid, at: u32) -> [f32; 8] {
 
 /// Value and lattice gradient at a place in \[0, 1\]³ of a cell with these values at its corners.
 #[inline(always)]
-pub(crate) fn interpolate([a0, a1, b0, b1, c0, c1, d0, d1]: [f32; 8], share: [f32; 3]) -> (f32, Vec3) {
+pub(crate) fn interpolate(corners: [f32; 8], share: [f32; 3]) -> (f32, Vec3) {
+    let [a0, a1, b0, b1, c0, c1, d0, d1] = corners;
     let [fx, fy, fz] = share;
     let mix = |a: f32, b: f32, t: f32| a + (b - a) * t;
     let [da, db, dc, dd] = [a1 - a0, b1 - b0, c1 - c0, d1 - d0];

@@ -104,9 +104,9 @@ impl Shares {
         let parts: Vec<f64> = (0..STEPS).map(of_step).collect();
         let sums = |parts: &mut dyn Iterator<Item = &f64>| {
             let mut sum = 0.0;
-            let mut all: Vec<f64> = parts.map(|part| (sum, sum += part).0).collect();
-            all.push(sum);
-            all
+            let mut running: Vec<f64> = parts.map(|part| (sum, sum += part).0).collect();
+            running.push(sum);
+            running
         };
         let inside = sums(&mut parts.iter());
         let mut outside = sums(&mut parts.iter().rev());

@@ -74,7 +74,7 @@ impl<'a> SplatSampler<'a> {
     /// out of range or shadow coefficients that differ, [`Error::Empty`] for a cloud without cross-section, [`Error::Limit`] for more than 4·10⁹
     /// particles a set.
     pub fn new(cloud: &'a Cloud, params: &SplatParams) -> Result<Self, Error> {
-        Self::of(Cow::Borrowed(cloud), params)
+        Self::with_cloud(Cow::Borrowed(cloud), params)
     }
 
     /// The same of a cloud that it keeps.
@@ -82,10 +82,10 @@ impl<'a> SplatSampler<'a> {
     /// # Errors
     /// As [`SplatSampler::new`].
     pub fn owning(cloud: Cloud, params: &SplatParams) -> Result<Self, Error> {
-        Self::of(Cow::Owned(cloud), params)
+        Self::with_cloud(Cow::Owned(cloud), params)
     }
 
-    fn of(cloud: Cow<'a, Cloud>, params: &SplatParams) -> Result<Self, Error> {
+    fn with_cloud(cloud: Cow<'a, Cloud>, params: &SplatParams) -> Result<Self, Error> {
         positive(params.cross_section, "cross_section")?;
         let cap = params.opaque_optical_depth;
         crate::error::check(cap > 0.0 && cap <= 64.0, "opaque_optical_depth", cap, "a number in (0, 64]")?;

@@ -105,7 +105,7 @@ impl<'a> GridSampler<'a> {
         params: &VolumeParams,
         density: Option<Density<'a>>,
     ) -> Result<Self, Error> {
-        Self::of(grid, Cow::Borrowed(transfer), params, density)
+        Self::with_transfer(grid, Cow::Borrowed(transfer), params, density)
     }
 
     /// The same by a transfer function that it keeps.
@@ -118,10 +118,10 @@ impl<'a> GridSampler<'a> {
         params: &VolumeParams,
         density: Option<Density<'a>>,
     ) -> Result<Self, Error> {
-        Self::of(grid, Cow::Owned(transfer), params, density)
+        Self::with_transfer(grid, Cow::Owned(transfer), params, density)
     }
 
-    pub(crate) fn of(
+    pub(crate) fn with_transfer(
         grid: &'a Grid,
         transfer: Cow<'a, TransferFunction>,
         params: &VolumeParams,
@@ -200,7 +200,7 @@ fn row_of_cells(grid: &Grid, transfer: &TransferFunction, pieces: &Pieces, first
         let high = left.1.max(right.1);
         let most = largest_extinction(transfer, low, high);
         if most > 0.0 {
-            found.push(Cell { at: i as u32, most, piece: pieces.of(low, high) });
+            found.push(Cell { at: i as u32, most, piece: pieces.containing(low, high) });
         }
         left = right;
     }

@@ -234,12 +234,12 @@ impl Staging {
         }
     }
     /// A block with particles that are widened or whose k depends on their normal.
-    fn one_by_one(&mut self, of: &Particles, range: Range<usize>, with: &Filling<'_>, key: u64, before: u64) {
+    fn one_by_one(&mut self, particles: &Particles, range: Range<usize>, with: &Filling<'_>, key: u64, before: u64) {
         let projector = with.projector;
         let outside = with.tiling.tiles() as u32;
         for (j, i) in range.enumerate() {
-            let normal = of.normal[i];
-            let color = of.color[i];
+            let normal = particles.normal[i];
+            let color = particles.color[i];
             let number = before + i as u64;
             let x = self.view.x[j];
             let y = self.view.y[j];
@@ -248,7 +248,7 @@ impl Staging {
             let tile = self.view.tile[j];
             let place = self.view.place[j];
             if normal.is_per_crossing() {
-                k *= projector.cosine(of.position[i], normal);
+                k *= projector.cosine(particles.position[i], normal);
             }
             if k > 1.0 {
                 let foot = projector.widened(x, y, k);

@@ -36,21 +36,21 @@ impl Colored {
     }
 
     /// Adds all sets of a batch to tile `t`.
-    pub(crate) fn fold(&mut self, all: &Resolve<'_>, t: usize, sums: &mut TileSums<'_>) {
-        let columns = all.plan.tiling.columns;
+    pub(crate) fn fold(&mut self, resolve: &Resolve<'_>, t: usize, sums: &mut TileSums<'_>) {
+        let columns = resolve.plan.tiling.columns;
         self.corner = [t % columns * TILE, t / columns * TILE];
-        all.limits(self.corner, &mut self.limit);
+        resolve.limits(self.corner, &mut self.limit);
         self.nearest.iter_mut().zip(&self.limit).for_each(|(nearest, limit)| *nearest = [*limit; 3]);
-        for set in 0..all.batch {
-            for record in all.of_set(set).flat_map(|task| task.tile(t)) {
+        for set in 0..resolve.batch {
+            for record in resolve.of_set(set).flat_map(|task| task.tile(t)) {
                 let nearest = &mut self.nearest[record.pixel()];
                 let hides = record.channels();
                 for c in (0..3).filter(|c| hides >> c & 1 == 1) {
                     nearest[c] = record.key().min(nearest[c]);
                 }
             }
-            for task in all.of_set(set) {
-                self.add(task, t, all, sums);
+            for task in resolve.of_set(set) {
+                self.add(task, t, resolve, sums);
             }
             for k in self.touched.drain(..) {
                 let (mask, luminance) = std::mem::take(&mut self.shown[k as usize]);
@@ -60,8 +60,8 @@ impl Colored {
     }
 
     /// Shades what is seen of one task, adds it, and clears the buffers behind it.
-    fn add(&mut self, task: &Task, t: usize, all: &Resolve<'_>, sums: &mut TileSums<'_>) {
-        let params = &all.shader.channels;
+    fn add(&mut self, task: &Task, t: usize, resolve: &Resolve<'_>, sums: &mut TileSums<'_>) {
+        let params = &resolve.shader.channels;
         let mut values = [0.0; MAX_CHANNELS];
         for (record, normal) in task.tile(t).iter().zip(task.normals(t)) {
             let pixel = record.pixel();
@@ -77,7 +77,7 @@ impl Colored {
             if mask == 0 {
                 continue;
             }
-            all.shade(record, *normal, task.object, self.corner, &mut values);
+            resolve.shade(record, *normal, task.object, self.corner, &mut values);
             let shown = &mut self.shown[pixel];
             if shown.0 == 0 {
                 self.touched.push(pixel as u32);

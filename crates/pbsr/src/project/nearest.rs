@@ -37,18 +37,18 @@ impl Nearest {
     }
 
     /// Adds all sets of a batch to tile `t`.
-    pub(crate) fn fold(&mut self, all: &Resolve<'_>, t: usize, sums: &mut TileSums<'_>) {
-        let columns = all.plan.tiling.columns;
+    pub(crate) fn fold(&mut self, resolve: &Resolve<'_>, t: usize, sums: &mut TileSums<'_>) {
+        let columns = resolve.plan.tiling.columns;
         self.corner = [t % columns * TILE, t / columns * TILE];
-        if all.scene.occluder.is_some() {
+        if resolve.scene.occluder.is_some() {
             self.limit.resize(AREA, OPEN);
-            all.limits(self.corner, &mut self.limit);
+            resolve.limits(self.corner, &mut self.limit);
             self.nearest.copy_from_slice(&self.limit);
         }
-        for set in 0..all.batch {
-            self.collect(all, set, t);
-            self.add(all, set, t, sums);
-            if set % flat::SETS == flat::SETS - 1 || set == all.batch - 1 {
+        for set in 0..resolve.batch {
+            self.collect(resolve, set, t);
+            self.add(resolve, set, t, sums);
+            if set % flat::SETS == flat::SETS - 1 || set == resolve.batch - 1 {
                 self.flat.drain(sums);
             }
         }
@@ -56,8 +56,8 @@ impl Nearest {
 
     /// The nearest particle of each pixel among all objects of one set.
     #[inline]
-    fn collect(&mut self, all: &Resolve<'_>, set: usize, t: usize) {
-        for task in all.of_set(set) {
+    fn collect(&mut self, resolve: &Resolve<'_>, set: usize, t: usize) {
+        for task in resolve.of_set(set) {
             for record in task.tile(t) {
                 let nearest = &mut self.nearest[record.pixel()];
                 *nearest = record.key().min(*nearest);
@@ -67,15 +67,15 @@ impl Nearest {
 
     /// Shades what is seen of that set, adds it, and clears the buffer.
     #[inline]
-    fn add(&mut self, all: &Resolve<'_>, set: usize, t: usize, sums: &mut TileSums<'_>) {
-        for task in all.of_set(set) {
+    fn add(&mut self, resolve: &Resolve<'_>, set: usize, t: usize, sums: &mut TileSums<'_>) {
+        for task in resolve.of_set(set) {
             let records = task.tile(t);
-            if all.plan.shaded[task.object as usize] {
+            if resolve.plan.shaded[task.object as usize] {
                 let n = self.see(records, |i, _| i as u32);
-                self.shade(n, task, t, all, sums);
+                self.shade(n, task, t, resolve, sums);
             } else {
                 let n = self.see(records, |_, record| record.pixel() as u32);
-                let look = &all.scene.objects[task.object as usize].look;
+                let look = &resolve.scene.objects[task.object as usize].look;
                 let shown = Shown { emission: look.material.emission, color_unit: look.color_unit };
                 self.flat.add(&self.seen[..n], &self.colors, shown, sums.inverse_unit);
             }
@@ -106,14 +106,14 @@ impl Nearest {
         n
     }
 
-    fn shade(&self, n: usize, task: &Task, t: usize, all: &Resolve<'_>, sums: &mut TileSums<'_>) {
-        let params = &all.shader.channels;
+    fn shade(&self, n: usize, task: &Task, t: usize, resolve: &Resolve<'_>, sums: &mut TileSums<'_>) {
+        let params = &resolve.shader.channels;
         let records = task.tile(t);
         let normals = task.normals(t);
         let mut values = [0.0; MAX_CHANNELS];
         for &i in &self.seen[..n] {
             let record = &records[i as usize];
-            all.shade(record, normals[i as usize], task.object, self.corner, &mut values);
+            resolve.shade(record, normals[i as usize], task.object, self.corner, &mut values);
             sums.add(params, record.pixel(), &values[..params.channels()]);
             sums.locate(params, record.pixel(), task.set, record.depth);
             sums.name(record.pixel(), record.depth, task.object);

@@ -242,9 +242,9 @@ impl Sampler for BrownianSampler<'_> {
         scratch.clear();
         let q = opacity::hit_probability(self.params.cross_section, self.report.area, 1.0);
         let rounding = Stream::new(self.params.seed, Stage::Brownian, set, u64::MAX).unit();
-        let all = opacity::whole_count(self.number, q, rounding);
+        let count = opacity::whole_count(self.number, q, rounding);
         let first = chunk as u64 * CHUNK;
-        let (places, ..) = self.run(set, chunk as u64, all.saturating_sub(first).min(CHUNK));
+        let (places, ..) = self.run(set, chunk as u64, count.saturating_sub(first).min(CHUNK));
         let color = Steps::new(self.params.color);
         scratch.reserve(places.len());
         for p in places {

@@ -257,27 +257,27 @@ mod tests {
     }
 
     fn particles(sampler: &LatticeSampler<'_>, sets: u64) -> Particles {
-        let mut all = Particles::default();
+        let mut particles = Particles::default();
         let mut scratch = Particles::default();
         for set in 0..sets {
-            (0..sampler.chunks()).for_each(|c| all.append(sampler.chunk(set, c, &mut scratch)));
+            (0..sampler.chunks()).for_each(|c| particles.append(sampler.chunk(set, c, &mut scratch)));
         }
-        all
+        particles
     }
 
     #[test]
     fn planes_of_any_direction_have_the_same_density() {
         let normals = [DVec3::X, DVec3::Y, DVec3::Z, DVec3::new(1.0, 2.0, -3.0), DVec3::new(-0.3, 1.0, 0.1)];
         let planes = normals.into_iter().enumerate();
-        for ((k, normal), interpolation) in planes.flat_map(|plane| BOTH.map(|of| (plane, of))) {
+        for ((k, normal), interpolation) in planes.flat_map(|plane| BOTH.map(|interpolation| (plane, interpolation))) {
             let n = normal.normalize();
             // A linear field stays one on any lattice, by both.
             let grid = lattice(|p| p.dot(n));
             let params = params(k as u64);
             let sampler = LatticeSampler::new(&grid, interpolation, 0.01, &params).unwrap();
-            let all = particles(&sampler, 8);
+            let found = particles(&sampler, 8);
             let middle = grid.axes * DVec3::new(13.0, 16.0, 10.0);
-            let inside = all.position.iter().filter(|p| {
+            let inside = found.position.iter().filter(|p| {
                 let d = p.as_dvec3() - middle;
                 assert!((d.dot(n) - 0.01).abs() < 1e-5);
                 d.length_squared() < 0.3 * 0.3
@@ -286,7 +286,7 @@ mod tests {
                 8.0 * std::f64::consts::PI * (0.3f64.powi(2) - 0.01f64.powi(2)) * params.particles_per_area();
             let off = (inside.count() as f64 - expected) / expected.sqrt();
             assert!(off.abs() < 4.0, "{normal}: {off} deviations of {expected}");
-            assert!(all.normal.iter().all(|m| (m.get().as_dvec3() - n).length() < 1e-3));
+            assert!(found.normal.iter().all(|m| (m.get().as_dvec3() - n).length() < 1e-3));
         }
     }
 
@@ -299,13 +299,13 @@ mod tests {
         // Trilinear pieces of a ball are flatter by half a percent or so.
         for (interpolation, off) in BOTH.into_iter().zip([0.02, 0.006]) {
             let sampler = LatticeSampler::new(&grid, interpolation, 0.55, &params(9)).unwrap();
-            let all = particles(&sampler, 8);
-            assert!((all.len() as f64 / expected - 1.0).abs() < off, "{} of {expected}", all.len());
+            let found = particles(&sampler, 8);
+            assert!((found.len() as f64 / expected - 1.0).abs() < off, "{} of {expected}", found.len());
             assert!((sampler.area() / area - 1.0).abs() < 0.03 && sampler.active_cells() > 500);
-            assert!((sampler.expected_particles() * 8.0 / all.len() as f64 - 1.0).abs() < 0.02);
+            assert!((sampler.expected_particles() * 8.0 / found.len() as f64 - 1.0).abs() < 0.02);
             for axis in 0..3 {
-                let above = all.position.iter().filter(|p| p[axis] > middle[axis]).count() as f64;
-                let half = all.len() as f64 / 2.0;
+                let above = found.position.iter().filter(|p| p[axis] > middle[axis]).count() as f64;
+                let half = found.len() as f64 / 2.0;
                 assert!((above / half - 1.0).abs() < 0.01, "{axis}: {above} of {half}");
             }
         }
@@ -321,8 +321,8 @@ mod tests {
         let expected = 4.0 * params(3).particles_per_area();
         for interpolation in BOTH {
             let new = |grid, level| LatticeSampler::new(grid, interpolation, level, &params(3));
-            let all = particles(&new(&grid, 2.0).unwrap(), 4);
-            assert!((all.len() as f64 - expected).abs() < 4.0 * expected.sqrt(), "{} of {expected}", all.len());
+            let found = particles(&new(&grid, 2.0).unwrap(), 4);
+            assert!((found.len() as f64 - expected).abs() < 4.0 * expected.sqrt(), "{} of {expected}", found.len());
             for level in [-1.0, 0.0, 4.5] {
                 assert!(matches!(new(&grid, level), Err(Error::Empty { .. })), "{level}");
             }

@@ -129,7 +129,7 @@ impl Leaf {
 
     /// All leaves of some cells, level by level, those of larger cubes first; and the cubes that were taken for empty though no bound says
     /// so. A set has so many particles on a unit of area.
-    pub(crate) fn all(surface: &ImplicitSurface<'_>, cells: &Cells, per_area: f64) -> (Vec<Self>, Vec<Empty>) {
+    pub(crate) fn subdivide(surface: &ImplicitSurface<'_>, cells: &Cells, per_area: f64) -> (Vec<Self>, Vec<Empty>) {
         let mut leaves = Vec::new();
         let mut empty = Vec::new();
         let mut corners = cells.active.clone();
@@ -152,8 +152,8 @@ impl Leaf {
             let room = |error: f64| if error == GOOD { LEAVES / 2 } else { most };
             let fits = |error: &f64| level < deepest && leaves.len() + cubes.len() + more(poor(*error)) <= room(*error);
             // Where graphs would become too many, open leaves alone are divided: their lines cost the most.
-            let wanted = [GOOD, USABLE].into_iter().skip(usize::from(level >= GRAPH_LEVELS));
-            let error = wanted.into_iter().find(fits).unwrap_or(f64::INFINITY);
+            let errors = [GOOD, USABLE].into_iter().skip(usize::from(level >= GRAPH_LEVELS));
+            let error = errors.into_iter().find(fits).unwrap_or(f64::INFINITY);
             let is_divided = |cube: &Cube| error < f64::INFINITY && cube.is_poor(error);
             let large: Vec<DVec3> = cubes.iter().filter(|cube| is_divided(cube)).map(|cube| cube.corner).collect();
             leaves.reserve_exact(cubes.len() - large.len());
@@ -431,16 +431,16 @@ mod tests {
         let bounds = DAabb::around(DVec3::ZERO, DVec3::ONE);
         let surface = ImplicitSurface { field: &Ridges, level: 0.0, bounds, inside: None };
         let cells = Cells::new(&surface, 24);
-        let of = |per_area: f64| {
-            let (leaves, _) = Leaf::all(&surface, &cells, per_area);
+        let counts = |per_area: f64| {
+            let (leaves, _) = Leaf::subdivide(&surface, &cells, per_area);
             let least = leaves.iter().map(|leaf| leaf.side).fold(f64::INFINITY, f64::min);
             // What was divided last.
             let lines = Leaf::open(DVec3::ZERO, 2.0 * least).reach() * per_area;
             assert!(leaves.len() <= if lines > WORTH { MOST_LEAVES } else { LEAVES }, "{}, {lines}", leaves.len());
             (leaves.len(), leaves.iter().filter(|leaf| leaf.graph.is_some()).count())
         };
-        let few = of(1e3);
-        let many = of(1e6);
+        let few = counts(1e3);
+        let many = counts(1e6);
         assert!(few.0 <= LEAVES && (LEAVES..=MOST_LEAVES).contains(&many.0), "{few:?}, {many:?}");
         // Between the ridges there are graphs.
         assert!(few.1 < 100 && many.1 > 100_000, "{few:?}, {many:?}");

@@ -144,7 +144,7 @@ impl<'a> LineSampler<'a> {
         let origin = cells.middle().ok_or(empty("the field's bound excludes the level in the whole box"))?;
         // A density factor multiplies optical depth.
         let per_area = params.particles_per_area() * density.as_ref().map_or(1.0, |d| d.max);
-        let (leaves, empty_cubes) = Leaf::all(surface, &cells, per_area);
+        let (leaves, empty_cubes) = Leaf::subdivide(surface, &cells, per_area);
         let blocks = Blocks::new(leaves.len(), |l| leaves[l].reach() * per_area)?;
         let mut sum = 0.0;
         let reaches: Vec<f64> = leaves.iter().map(|l| (sum += l.reach(), sum).1).collect();
@@ -226,15 +226,15 @@ impl<'a> LineSampler<'a> {
             self.search(leaf, &line, 16, &mut fine);
             ([roots, self.inside(&line, &fine), unproven, fine.broken], area)
         };
-        let all: Vec<([u64; 4], f64)> = (0..SURVEY_LINES).into_par_iter().with_min_len(64).map(one).collect();
-        let count = |k: usize| all.iter().map(|(n, _)| n[k]).sum();
+        let surveyed: Vec<([u64; 4], f64)> = (0..SURVEY_LINES).into_par_iter().with_min_len(64).map(one).collect();
+        let count = |k: usize| surveyed.iter().map(|(n, _)| n[k]).sum();
         self.report = LineReport {
             lines: u64::from(SURVEY_LINES),
             roots: count(0),
             fine_roots: count(1),
             unproven: count(2),
             broken: count(3),
-            area: all.iter().map(|(_, area)| area).sum::<f64>() / f64::from(SURVEY_LINES) * self.reach(),
+            area: surveyed.iter().map(|(_, area)| area).sum::<f64>() / f64::from(SURVEY_LINES) * self.reach(),
             ..self.report
         };
         // What is missed has an area too.

@@ -109,14 +109,15 @@ impl<'a> MeshSampler<'a> {
     }
 
     /// Appends the particles of some arrivals, column by column, so that none waits for another's look-ups.
-    fn place(&self, batch: &Batch<1>, own: Steps, particles: &mut Particles) {
+    fn place(&self, batch: &Batch<1>, base_color: Steps, particles: &mut Particles) {
         let mut places = [[0.0; 2]; BATCH];
         places.iter_mut().zip(&batch.bits[0]).for_each(|(at, bits)| *at = folded(pair(*bits)));
-        let all = || batch.elements[..batch.len].iter().zip(&places);
+        let arrivals = || batch.elements[..batch.len].iter().zip(&places);
         let first = particles.position.len();
-        particles.position.extend(all().map(|(t, at)| point(corners(self.mesh, *t), *at)));
-        particles.normal.extend(all().map(|(t, at)| self.normal(*t, *at)));
-        let colors = all().zip(&particles.position[first..]).map(|((t, at), p)| self.color(*t, *at, own).at(*p));
+        particles.position.extend(arrivals().map(|(t, at)| point(corners(self.mesh, *t), *at)));
+        particles.normal.extend(arrivals().map(|(t, at)| self.normal(*t, *at)));
+        let colors =
+            arrivals().zip(&particles.position[first..]).map(|((t, at), p)| self.color(*t, *at, base_color).at(*p));
         particles.color.extend(colors);
     }
 
@@ -141,10 +142,10 @@ impl<'a> MeshSampler<'a> {
     }
 
     #[inline]
-    fn color(&self, t: usize, place: [f32; 2], own: Steps) -> Steps {
+    fn color(&self, t: usize, place: [f32; 2], base_color: Steps) -> Steps {
         let [u, v] = place;
         match &*self.mesh.color {
-            [] => own,
+            [] => base_color,
             colors => {
                 let [a, b, c] = self.mesh.triangles[t].map(|i| colors[i as usize]);
                 let at = |k: usize| (a[k] * (1.0 - u - v) + b[k] * u + c[k] * v) * self.params.color[k];
@@ -177,7 +178,8 @@ fn folded(place: [f32; 2]) -> [f32; 2] {
 }
 
 #[inline]
-fn point([a, b, c]: [Vec3; 3], place: [f32; 2]) -> Vec3 {
+fn point(triangle: [Vec3; 3], place: [f32; 2]) -> Vec3 {
+    let [a, b, c] = triangle;
     let [u, v] = place;
     a + (b - a) * u + (c - a) * v
 }
@@ -198,11 +200,11 @@ impl Poisson for MeshSampler<'_> {
     }
 
     fn fill(&self, set: u64, chunk: usize, particles: &mut Particles) {
-        let own = Steps::new(self.params.color);
+        let base_color = Steps::new(self.params.color);
         let seed = self.params.seed;
         let blocks = &self.sets.blocks;
         if self.density.is_none() && self.fading.is_none() {
-            blocks.batches(seed, Stage::Mesh, set, chunk, |batch| self.place(batch, own, particles));
+            blocks.batches(seed, Stage::Mesh, set, chunk, |batch| self.place(batch, base_color, particles));
             return;
         }
         blocks.arrivals(seed, Stage::Mesh, set, chunk, |t, stream| {
@@ -222,7 +224,7 @@ impl Poisson for MeshSampler<'_> {
                     stream.unit() * most < fading.depth(self.opacity(t, at))
                 });
             if is_kept {
-                particles.push(p, self.normal(t, at), self.color(t, at, own).at(p));
+                particles.push(p, self.normal(t, at), self.color(t, at, base_color).at(p));
             }
         });
     }

@@ -62,7 +62,8 @@ impl Line<'_> {
     }
 
     /// `slopes` are those at both ends, where they are known.
-    fn search(&self, [a, b]: [At; 2], slopes: [Option<f64>; 2], depth: u32, found: &mut Found) {
+    fn search(&self, ends: [At; 2], slopes: [Option<f64>; 2], depth: u32, found: &mut Found) {
+        let [a, b] = ends;
         let crosses = (a.f < 0.0) != (b.f < 0.0);
         if !crosses && self.excluded(a, b, depth) {
             return;
@@ -265,8 +266,8 @@ mod tests {
     fn a_piece_without_roots_has_none_and_a_root_on_a_border_one() {
         assert!(found(&Roots(&[2.0, 3.0]), 0.0, 1.0).roots.is_empty());
         let pieces = [(0.0, 0.25), (0.25, 0.5), (0.5, 1.0)];
-        let all: usize = pieces.iter().map(|(a, b)| found(&Roots(&[0.25]), *a, *b).roots.len()).sum();
-        assert_eq!(all, 1);
+        let count: usize = pieces.iter().map(|(a, b)| found(&Roots(&[0.25]), *a, *b).roots.len()).sum();
+        assert_eq!(count, 1);
         assert_eq!(found(&Roots(&[f64::NAN]), 0.0, 1.0).broken, 1);
     }
 }

@@ -222,10 +222,10 @@ impl Field {
     /// The nearer of the two spheres; of any other field itself.
     fn sphere_at(p: DVec3, field: &Field) -> Field {
         let Field::Two { radius, apart } = field else { return *field };
-        let of = |k: usize| (DVec3::X * apart * [-1.0, 1.0][k], radius[k]);
-        let value = |k: usize| (p - of(k).0).length() - of(k).1;
+        let sphere = |k: usize| (DVec3::X * apart * [-1.0, 1.0][k], radius[k]);
+        let value = |k: usize| (p - sphere(k).0).length() - sphere(k).1;
         let k = usize::from(value(1) < value(0));
-        Field::Sphere { middle: of(k).0, radius: of(k).1, scale: 1.0 }
+        Field::Sphere { middle: sphere(k).0, radius: sphere(k).1, scale: 1.0 }
     }
 }
 
@@ -343,12 +343,12 @@ impl ScalarField for Field {
             Field::Two { .. } => {
                 // |p − c|² − r² of the nearer sphere, as a bound of both.
                 let Field::Two { radius: r, apart } = self else { return None };
-                let of = |k: usize| {
+                let range = |k: usize| {
                     let (a, b) = squares((p - DVec3::X * apart * [-1.0, 1.0][k]).length());
                     (a - r[k] * r[k], b - r[k] * r[k])
                 };
-                let a = of(0);
-                let b = of(1);
+                let a = range(0);
+                let b = range(1);
                 pad((a.0.min(b.0), a.1.max(b.1)))
             }
             Field::Ellipsoid { axes } => {

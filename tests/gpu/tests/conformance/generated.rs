@@ -170,7 +170,7 @@ pub(crate) fn empty() -> Ensemble {
 pub(crate) fn by_device(device: &mut Device, scene: &Scene<'_>, runs: u32) -> Ensemble {
     let sources = Sources::new(scene).unwrap();
     let mut ensemble = empty();
-    let generated = record_generated(ROOM, Nearest::of(device.adapter()), None, &sources).unwrap();
+    let generated = record_generated(ROOM, Nearest::for_adapter(device.adapter()), None, &sources).unwrap();
     let mut prepared = device.prepare(&generated.recording).unwrap();
     let tables = generated.tables(&sources, scene, &ensemble).unwrap();
     for run in 0..runs {
@@ -199,7 +199,7 @@ pub(crate) fn pixels() -> impl Iterator<Item = (u32, u32)> {
 /// Sets and particles of the first run, made by the device, with the states of its streams; and uploaded ones.
 fn particles(device: &mut Device, scene: &Scene<'_>) -> ([[Vec<u32>; 2]; 2], Vec<u32>) {
     let sources = Sources::new(scene).unwrap();
-    let mut generated = record_generated(ROOM, Nearest::of(device.adapter()), None, &sources).unwrap();
+    let mut generated = record_generated(ROOM, Nearest::for_adapter(device.adapter()), None, &sources).unwrap();
     let wanted = [generated.sets, generated.particles, generated.arrivals];
     wanted.iter().for_each(|buffer| generated.recording.read(*buffer));
     let mut inputs = generated.tables(&sources, scene, &empty()).unwrap();
@@ -328,7 +328,7 @@ fn room_is_told(world: &World, samplers: [&dyn Sampler; 3]) {
         let sources = Sources::new(scene).unwrap();
         let mut run = |room: Capacities| {
             let mut ensemble = empty();
-            let generated = record_generated(room, Nearest::of(device.adapter()), None, &sources).unwrap();
+            let generated = record_generated(room, Nearest::for_adapter(device.adapter()), None, &sources).unwrap();
             let mut inputs = generated.tables(&sources, scene, &ensemble).unwrap();
             inputs.extend(generated.next(&sources, scene, &ensemble).unwrap());
             let inputs: Vec<_> = inputs.iter().map(|(buffer, bytes)| (*buffer, &bytes[..])).collect();

@@ -266,7 +266,7 @@ fn ambient_light_alone_and_lights_without_maps() {
             let scene =
                 Scene { objects, lights, shadow_origin: DVec3::ZERO, ambient: [0.4, 0.5, 0.6], camera, occluder: None };
             let expected = by_processor(&scene, ALL, 2 * ROOM.levels);
-            let way = Way { params: ALL, nearest: Nearest::of(device.adapter()), made: true };
+            let way = Way { params: ALL, nearest: Nearest::for_adapter(device.adapter()), made: true };
             let (same, near, brightest) = agreement(&expected, &by_device(&mut device, &scene, &[], way, ROOM));
             assert!(
                 same >= 1.0 - OTHERS && near >= 1.0 - 2.0 * OTHERS && brightest > 0.05,
@@ -286,7 +286,7 @@ fn faults_of_light_are_found() {
     let lights = world.lights();
     let maps = world.maps();
     let lights = lit(&lights, &maps);
-    let way = Way { params: EnsembleParams::default(), nearest: Nearest::of(device.adapter()), made: false };
+    let way = Way { params: EnsembleParams::default(), nearest: Nearest::for_adapter(device.adapter()), made: false };
     world.with(VIEWS[0], 0.7, false, |objects, camera| {
         let scene =
             Scene { objects, lights: &lights, shadow_origin: world.origin, ambient: [0.1; 3], camera, occluder: None };
@@ -327,7 +327,7 @@ fn widened_particles_are_lit_as_the_cpu_s_in_the_mean() {
         let scene =
             Scene { objects, lights: &lights, shadow_origin: world.origin, ambient: [0.1; 3], camera, occluder: None };
         let expected = by_processor(&scene, EnsembleParams::default(), 2 * ROOM.levels);
-        let way = Way { params: EnsembleParams::default(), nearest: Nearest::of(device.adapter()), made: false };
+        let way = Way { params: EnsembleParams::default(), nearest: Nearest::for_adapter(device.adapter()), made: false };
         let found = by_device(&mut device, &scene, &with_maps, way, ROOM);
         // Places within pixels are others, by chance: pixels differ, their mean does not.
         let (same, near, _) = agreement(&expected, &found);
@@ -351,7 +351,7 @@ fn too_little_room_and_other_lights_are_refused() {
         let mut ensemble = Ensemble::new(SIZE, &ALL).unwrap();
         let lighting = Lighting { params: ALL, lights: 3, shadows: &[] };
         let room = Capacities { of_set: 10, ..ROOM };
-        let generated = record_generated(room, Nearest::of(device.adapter()), Some(&lighting), &sources).unwrap();
+        let generated = record_generated(room, Nearest::for_adapter(device.adapter()), Some(&lighting), &sources).unwrap();
         let mut inputs = generated.tables(&sources, &scene, &ensemble).unwrap();
         inputs.extend(generated.next(&sources, &scene, &ensemble).unwrap());
         let inputs: Vec<_> = inputs.iter().map(|(buffer, bytes)| (*buffer, &bytes[..])).collect();
@@ -468,7 +468,7 @@ mod deep {
     }
 
     fn ways(device: &Device) -> Vec<Nearest> {
-        let best = Nearest::of(device.adapter());
+        let best = Nearest::for_adapter(device.adapter());
         if best == Nearest::Wide { vec![Nearest::Ranked, best] } else { vec![best] }
     }
 }

@@ -33,7 +33,7 @@ fn object(sampler: &dyn Sampler, turn: f64, emission: [f32; 3]) -> Object<'_> {
 fn both(scene: &Scene<'_>) -> [Ensemble; 2] {
     let mut device = open().unwrap();
     let mut ways = vec![Nearest::Ranked];
-    ways.extend((Nearest::of(device.adapter()) == Nearest::Wide).then_some(Nearest::Wide));
+    ways.extend((Nearest::for_adapter(device.adapter()) == Nearest::Wide).then_some(Nearest::Wide));
     let empty = Ensemble::new(SIZE, &EnsembleParams { radiance_unit: 0.5, ..EnsembleParams::default() }).unwrap();
     let mut cpu = empty.clone();
     let mut gpu = empty;

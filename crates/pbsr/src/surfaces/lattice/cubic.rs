@@ -65,12 +65,12 @@ fn at_border(grid: &Grid, corner: [u32; 3], level: f32, block: &mut Block) {
 fn extrapolate(block: &mut Block, axis: usize, beyond: usize, near: usize, far: usize) {
     for p in 0..4 {
         for q in 0..4 {
-            let of = |s: usize| match axis {
+            let index = |s: usize| match axis {
                 0 => [p, q, s],
                 1 => [p, s, q],
                 _ => [s, p, q],
             };
-            let [a, b, c] = [of(beyond), of(near), of(far)];
+            let [a, b, c] = [index(beyond), index(near), index(far)];
             block[a[0]][a[1]][a[2]] = 2.0 * block[b[0]][b[1]][b[2]] - block[c[0]][c[1]][c[2]];
         }
     }
@@ -140,7 +140,8 @@ pub(super) fn along(block: &Block, axis: usize, place: [f32; 3]) -> [f32; 4] {
 }
 
 #[inline(always)]
-fn control([a, b, c, d]: [f32; 4]) -> [f32; 4] {
+fn control(values: [f32; 4]) -> [f32; 4] {
+    let [a, b, c, d] = values;
     [b, b + (c - a) * (1.0 / 6.0), c - (d - b) * (1.0 / 6.0), c]
 }
 
@@ -240,8 +241,9 @@ fn may_pass(block: &Block) -> bool {
     below && above
 }
 
-/// First corners of the cells of a row that the surface may pass; (j, k) is that of its first corners.
-pub(super) fn passed_in_row(grid: &Grid, level: f32, [j, k]: [usize; 2]) -> Vec<u32> {
+/// First corners of the cells of a row that the surface may pass; `row` is (j, k) of its first corners.
+pub(super) fn passed_in_row(grid: &Grid, level: f32, row: [usize; 2]) -> Vec<u32> {
+    let [j, k] = row;
     let [nx, ny, nz] = grid.dims;
     let mut low = vec![f32::INFINITY; nx];
     let mut high = vec![f32::NEG_INFINITY; nx];
@@ -287,8 +289,8 @@ mod tests {
     /// Cell and weights of the four values along an axis of `n` lattice points.
     fn axis(n: usize, at: f64) -> (isize, [f64; 4]) {
         let cell = (at.floor() as isize).clamp(0, n as isize - 2);
-        let of = |m: usize| hermite(std::array::from_fn(|i| f64::from(u8::from(i == m))), at - cell as f64);
-        let [mut a, mut b, mut c, mut d] = [0, 1, 2, 3].map(of);
+        let weight = |m: usize| hermite(std::array::from_fn(|i| f64::from(u8::from(i == m))), at - cell as f64);
+        let [mut a, mut b, mut c, mut d] = [0, 1, 2, 3].map(weight);
         if cell == 0 {
             (a, b, c) = (0.0, b + 2.0 * a, c - a);
         }
@@ -422,8 +424,8 @@ mod tests {
             for corner @ [i, j, k] in cells {
                 let at = ((k * dims[1] + j) * dims[0] + i) as u32;
                 let at_place = |n: u64| {
-                    let of = |a: usize| corner[a] as f64 + rng::unit(7, 0, n, a as u64);
-                    value(&grid, [of(0), of(1), of(2)]) < 6.5
+                    let coordinate = |a: usize| corner[a] as f64 + rng::unit(7, 0, n, a as u64);
+                    value(&grid, [coordinate(0), coordinate(1), coordinate(2)]) < 6.5
                 };
                 let below = (0..300).filter(|n| at_place(*n)).count();
                 let known = passed.contains(&at);
