@@ -67,7 +67,7 @@ fn one_group(scene: &Scene, method: Method, groups: u32) -> Picture {
     let members = recipe.group(cloud, None).expect("groups");
     let eye = (loaded.camera.position - cloud.origin).as_vec3();
     let cosine = |i: usize| cloud.normal[i].dot((eye - cloud.position[i]).normalize());
-    let is_seen = |i: &u32| members.groups().of()[*i as usize] == 0 && cosine(*i as usize) > 0.0;
+    let is_seen = |i: &u32| members.groups().by_disc()[*i as usize] == 0 && cosine(*i as usize) > 0.0;
     let ids: Vec<u32> = (0..cloud.len() as u32).filter(is_seen).collect();
     let values: Vec<f32> = (0..cloud.len()).map(|i| 0.7 * cosine(i).max(0.0)).collect();
     let camera = &loaded.camera.with_samples(2);

@@ -49,8 +49,8 @@ impl Blended {
     pub fn behind(mut self, before: Option<GlassImage>) -> Self {
         match (&mut self.glass, before) {
             (Some(image), Some(before)) => {
-                for (sum, own) in image.mirrored.iter_mut().zip(before.mirrored) {
-                    sum.iter_mut().zip(own).for_each(|(sum, own)| *sum += own);
+                for (sum, plane) in image.mirrored.iter_mut().zip(before.mirrored) {
+                    sum.iter_mut().zip(plane).for_each(|(sum, value)| *sum += value);
                 }
             }
             (None, before) => self.glass = before,

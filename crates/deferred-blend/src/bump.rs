@@ -150,12 +150,12 @@ mod tests {
         let image = ridges(1);
         let bump = Bump { height: 0.3, size: 1.0, octaves: 0, seed: 0 };
         let at = DVec3::new(0.2, 0.0, 0.2);
-        let of = |normal: DVec3, pixel: f64| image_slope(&bump, &image, at, normal.normalize(), pixel);
-        let half = 0.5 * (of(DVec3::X, 1e-3) + of(DVec3::Z, 1e-3));
-        assert!(of(DVec3::new(1.0, 0.0, 1.0), 1e-3).distance(half) < 1e-12);
-        assert!(of(DVec3::new(1.0, 0.0, 0.1), 1e-3).distance(of(DVec3::X, 1e-3)) < 1e-3);
-        assert!(of(DVec3::Z, 0.25).length() < of(DVec3::Z, 1e-3).length());
-        assert!(of(DVec3::Z, 1.0).length() < 1e-6, "the mean of a slope over a whole image");
+        let slope = |normal: DVec3, pixel: f64| image_slope(&bump, &image, at, normal.normalize(), pixel);
+        let half = 0.5 * (slope(DVec3::X, 1e-3) + slope(DVec3::Z, 1e-3));
+        assert!(slope(DVec3::new(1.0, 0.0, 1.0), 1e-3).distance(half) < 1e-12);
+        assert!(slope(DVec3::new(1.0, 0.0, 0.1), 1e-3).distance(slope(DVec3::X, 1e-3)) < 1e-3);
+        assert!(slope(DVec3::Z, 0.25).length() < slope(DVec3::Z, 1e-3).length());
+        assert!(slope(DVec3::Z, 1.0).length() < 1e-6, "the mean of a slope over a whole image");
     }
 
     #[test]

@@ -233,7 +233,8 @@ pub(crate) struct Meeting<S: Simd> {
 impl Disc {
     /// The rays of pixels at some offsets from [`Disc::center`].
     #[inline(always)]
-    pub(crate) fn meet<S: Simd>(&self, simd: S, [dx, dy]: [Lanes<S>; 2]) -> Meeting<S> {
+    pub(crate) fn meet<S: Simd>(&self, simd: S, offset: [Lanes<S>; 2]) -> Meeting<S> {
+        let [dx, dy] = offset;
         let lanes = |v: f32| Lanes::splat(simd, v);
         let linear = |at: f32, slope: [f32; 2]| lanes(slope[1]).mul_add(dy, lanes(slope[0]).mul_add(dx, lanes(at)));
         let facing = linear(self.facing, self.facing_slope);
@@ -315,10 +316,10 @@ impl<'a> View<'a> {
         let distance = normal.dot(center);
         let facing_slope = [normal.x / self.focal, -normal.y / self.focal];
         let of_axis = |a: DVec3| {
-            let own = a.dot(center);
+            let along_center = a.dot(center);
             let scale = 1.0 / a.length_squared();
-            let at = if crosses { (distance * a.z - own * normal.z) * scale } else { 0.0 };
-            let slope = |e: f64, n: f64| ((distance * e - own * n) * scale) as f32;
+            let at = if crosses { (distance * a.z - along_center * normal.z) * scale } else { 0.0 };
+            let slope = |e: f64, n: f64| ((distance * e - along_center * n) * scale) as f32;
             (at as f32, [slope(a.x / self.focal, facing_slope[0]), slope(-a.y / self.focal, facing_slope[1])])
         };
         let along = axes.map(of_axis);

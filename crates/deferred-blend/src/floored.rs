@@ -116,10 +116,10 @@ impl<'a> Floor<'a> {
         // The conservative test of Fig. 6: within ε of the nearest, not of a neighbour.
         let end = fragments.iter().position(|f| !rule.joins(input.discs, nearest, f)).unwrap_or(fragments.len());
         // I = α·C_F + (1 − α)·C_O
-        let mut all = algorithm_1(&fragments[end..], input, self, ray, sizes);
-        let front = Layer::of(&fragments[..end], input, ray, sizes);
-        all.behind(&front.values, front.opacity, sizes);
-        all
+        let mut blended = algorithm_1(&fragments[end..], input, self, ray, sizes);
+        let front = Layer::from_fragments(&fragments[..end], input, ray, sizes);
+        blended.behind(&front.values, front.opacity, sizes);
+        blended
     }
 }
 
@@ -137,12 +137,12 @@ fn algorithm_1(
     for group in 0..count {
         let mut image = Blended::NOTHING;
         let mut last = f32::INFINITY;
-        let own = |f: &&Fragment| floor.groups.has(input.discs.ids[f.disc as usize] as usize, group);
-        for fragment in fragments.iter().filter(own).rev() {
+        let is_member = |f: &&Fragment| floor.groups.has(input.discs.ids[f.disc as usize] as usize, group);
+        for fragment in fragments.iter().filter(is_member).rev() {
             let step = floor.step(fragment.depth);
             if step < last {
                 last = step;
-                let shown = Layer::of(std::slice::from_ref(fragment), input, ray, sizes);
+                let shown = Layer::from_fragments(std::slice::from_ref(fragment), input, ray, sizes);
                 image.behind(&shown.values, shown.opacity, sizes);
             }
         }

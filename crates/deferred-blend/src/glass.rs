@@ -5,7 +5,7 @@
 
 use crate::cone::{Cone, onward};
 use crate::interface::cross;
-use crate::surfaces::{Surfaces, Wanted};
+use crate::surfaces::{RayTarget, Surfaces};
 use crate::trace::{Inside, trace};
 use splat_core::Material;
 use splat_core::glam::Vec3;
@@ -44,7 +44,7 @@ pub struct Glass<'a> {
 impl Glass<'_> {
     /// Radiance along a ray that nothing bends any more.
     pub(crate) fn seen(&self, from: Vec3, along: Vec3, cone: Cone) -> [f32; 3] {
-        match self.surfaces.nearest(from, along, Wanted::Opaque) {
+        match self.surfaces.nearest(from, along, RayTarget::Opaque) {
             Some(met) => met.radiance,
             None => (self.sky)(along, cone.solid_angle()),
         }
@@ -173,24 +173,24 @@ impl<'m> Path<'m> {
         if glass.bending == Bending::Traced {
             // What lies around this object has absorbed up to here.
             for (_, material, from) in self.inside.iter().filter(|(object, ..)| *object != layer.object) {
-                let own = glass.absorbed(material, layer.distance - from);
-                passage.inside.iter_mut().zip(own).for_each(|(sum, own)| *sum += own);
+                let depths = glass.absorbed(material, layer.distance - from);
+                passage.inside.iter_mut().zip(depths).for_each(|(sum, depth)| *sum += depth);
             }
         }
-        let inside = Inside::of(self.inside.iter().map(|(object, material, _)| (*object, *material)));
+        let inside = Inside::new(self.inside.iter().map(|(object, material, _)| (*object, *material)));
         self.bent = Some(Bent { along, cone, place: layer.place, inside });
     }
 
     /// Opacity of a layer: where layers are counted, that of the nearest of its object (Eq. 15).
-    pub(crate) fn opacity(&mut self, object: u32, own: [f32; 3], bending: Bending) -> [f32; 3] {
+    pub(crate) fn opacity(&mut self, object: u32, opacity: [f32; 3], bending: Bending) -> [f32; 3] {
         if bending != Bending::Power {
-            return own;
+            return opacity;
         }
-        match self.nearest.iter().find(|(of, _)| *of == object) {
+        match self.nearest.iter().find(|(other, _)| *other == object) {
             Some((_, nearest)) => *nearest,
             None => {
-                self.nearest.push((object, own));
-                own
+                self.nearest.push((object, opacity));
+                opacity
             }
         }
     }
@@ -200,8 +200,8 @@ impl<'m> Path<'m> {
         if self.leaves_out(glass) {
             return [0.0; 3];
         }
-        let of = |(_, material, from): &(u32, &Material, f32)| glass.absorbed(material, distance - from);
-        self.inside.iter().map(of).fold([0.0; 3], |sum, own| std::array::from_fn(|c| sum[c] + own[c]))
+        let absorbed = |(_, material, from): &(u32, &Material, f32)| glass.absorbed(material, distance - from);
+        self.inside.iter().map(absorbed).fold([0.0; 3], |sum, depths| std::array::from_fn(|c| sum[c] + depths[c]))
     }
 
     /// What is seen behind all layers where the ray was bent. `hits` tells whether an opaque surface lies straight on.

@@ -61,7 +61,7 @@ pub const MOST_GROUPS: u32 = 256;
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Groups {
     count: u32,
-    of: Vec<u8>,
+    by_disc: Vec<u8>,
     further: Further,
 }
 
@@ -73,21 +73,21 @@ struct Further {
 }
 
 impl Groups {
-    /// Groups told from outside: `of` holds the group of each disc, by its place in the cloud.
+    /// Groups told from outside: `by_disc` holds the group of each disc, by its place in the cloud.
     ///
     /// # Errors
     /// [`Error::Parameter`] for a count outside 1..=256 and for a disc whose group is not below the count.
-    pub fn new(count: u32, of: Vec<u8>) -> Result<Self, Error> {
+    pub fn new(count: u32, by_disc: Vec<u8>) -> Result<Self, Error> {
         check_count(count)?;
-        if let Some(group) = of.iter().find(|&&group| u32::from(group) >= count) {
+        if let Some(group) = by_disc.iter().find(|&&group| u32::from(group) >= count) {
             return Err(Error::parameter("group of a disc", group, "below the number of groups"));
         }
-        Ok(Self::of_each(count, of))
+        Ok(Self::of_each(count, by_disc))
     }
 
     /// Groups that were made here.
-    fn of_each(count: u32, of: Vec<u8>) -> Self {
-        Self { count, of, further: Further::default() }
+    fn of_each(count: u32, by_disc: Vec<u8>) -> Self {
+        Self { count, by_disc, further: Further::default() }
     }
 
     /// The same groups with discs added to them, such as [`extended::duplicates`]: for each group the places of those in the cloud.
@@ -95,11 +95,11 @@ impl Groups {
     /// # Panics
     /// If a place is out of range.
     pub fn with_further(self, added: &[Vec<u32>]) -> Self {
-        let mut rows: Vec<Vec<u8>> = vec![Vec::new(); self.of.len()];
+        let mut rows: Vec<Vec<u8>> = vec![Vec::new(); self.by_disc.len()];
         for (group, places) in (0u8..).zip(added) {
             places.iter().for_each(|&place| rows[place as usize].push(group));
         }
-        Self { further: Further::of(rows.iter().map(Vec::as_slice)), ..self }
+        Self { further: Further::from_rows(rows.iter().map(Vec::as_slice)), ..self }
     }
 
     /// Number of groups K; a group may be empty.
@@ -108,8 +108,8 @@ impl Groups {
     }
 
     /// Group of each disc, by its place in the cloud, less than [`Groups::count`].
-    pub fn of(&self) -> &[u8] {
-        &self.of
+    pub fn by_disc(&self) -> &[u8] {
+        &self.by_disc
     }
 
     /// Groups that the disc at a place was added to.
@@ -124,25 +124,25 @@ impl Groups {
     /// Whether the disc at a place is a member of a group, by itself or because it was added.
     #[inline]
     pub fn has(&self, place: usize, group: u32) -> bool {
-        u32::from(self.of[place]) == group || self.further(place).iter().any(|g| u32::from(*g) == group)
+        u32::from(self.by_disc[place]) == group || self.further(place).iter().any(|g| u32::from(*g) == group)
     }
 
     /// Bytes held.
     pub fn bytes(&self) -> u64 {
         let Further { starts, groups } = &self.further;
-        (size_of_val(&*self.of) + size_of_val(&**starts) + size_of_val(&**groups)) as u64
+        (size_of_val(&*self.by_disc) + size_of_val(&**starts) + size_of_val(&**groups)) as u64
     }
 }
 
 impl Further {
     /// Rows in the order of the discs; all empty ones are none.
-    fn of<'a>(rows: impl Iterator<Item = &'a [u8]>) -> Self {
-        let mut all = Self { starts: vec![0], groups: Vec::new() };
+    fn from_rows<'a>(rows: impl Iterator<Item = &'a [u8]>) -> Self {
+        let mut further = Self { starts: vec![0], groups: Vec::new() };
         for row in rows {
-            all.groups.extend_from_slice(row);
-            all.starts.push(all.groups.len() as u32);
+            further.groups.extend_from_slice(row);
+            further.starts.push(further.groups.len() as u32);
         }
-        if all.groups.is_empty() { Self::default() } else { all }
+        if further.groups.is_empty() { Self::default() } else { further }
     }
 }
 

@@ -122,8 +122,8 @@ mod tests {
         for t in 0..bins.tiles() {
             let mut lists = BlockLists::default();
             lists.fill(discs, &bins, t);
-            let visit = |_: usize, own: &mut [Fragment]| {
-                own.sort_unstable_by(|a, b| {
+            let visit = |_: usize, pixel: &mut [Fragment]| {
+                pixel.sort_unstable_by(|a, b| {
                     compared += 1;
                     a.depth.total_cmp(&b.depth)
                 });

@@ -143,9 +143,9 @@ fn average(input: &Averaged<'_>, params: &Params, progress: Option<&Progress>) -
     let rows = if input.by_rank { discs.ids.len() } else { *last as usize + 1 };
     assert!(input.values.len() >= rows * input.channels as usize, "invariant: values of every disc");
     if let Passes::OnePlusOne { groups, .. } = input.passes
-        && groups.of().len() <= *last as usize
+        && groups.by_disc().len() <= *last as usize
     {
-        return Err(Error::parameter("number of discs in groups", groups.of().len(), "that of the cloud"));
+        return Err(Error::parameter("number of discs in groups", groups.by_disc().len(), "that of the cloud"));
     }
     let bins = memory::bin(input)?;
     let quiet = Progress::new();
@@ -157,8 +157,8 @@ fn average(input: &Averaged<'_>, params: &Params, progress: Option<&Progress>) -
         .map_init(
             || Scratch::new(input),
             |scratch, t| {
-                let wanted = progress.tick(1).is_ok() && !bins.is_empty(t);
-                wanted.then(|| {
+                let is_drawn = progress.tick(1).is_ok() && !bins.is_empty(t);
+                is_drawn.then(|| {
                     scratch.lists.fill(discs, &bins, t);
                     let mut tile = Tile::new(input.channels as usize);
                     let corner = bins.corner(t);

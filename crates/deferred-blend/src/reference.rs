@@ -192,7 +192,7 @@ fn blend(hits: &[Hit], input: &DiscInput<'_>, ray: f64, values: &[f32], sizes: [
         let tau = f64::from(cloud.crossing_depth_of(hit.id, spacing)) * slab;
         let opacity: [f64; 3] =
             std::array::from_fn(|p| share * optics::opacity(tau * f64::from(material.extinction_rgb[p])));
-        layer.opacity.iter_mut().zip(opacity).take(planes).for_each(|(sum, own)| *sum += own);
+        layer.opacity.iter_mut().zip(opacity).take(planes).for_each(|(sum, share)| *sum += share);
         for (c, sum) in layer.values.iter_mut().enumerate() {
             let plane = ChannelLayout::plane_of(c, channels, planes);
             *sum += opacity[plane] * f64::from(values[hit.id * channels + c]);

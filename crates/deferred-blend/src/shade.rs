@@ -45,7 +45,7 @@ pub(crate) struct Attributes {
 }
 
 impl Attributes {
-    fn of(cloud: &Cloud, i: usize) -> Self {
+    fn from_cloud(cloud: &Cloud, i: usize) -> Self {
         let face = cloud.normal_of(i);
         let normal = cloud.shading_normal_of(i);
         Self { face, normal, color: cloud.color[i], radius: cloud.radius[i] }
@@ -58,7 +58,8 @@ impl Attributes {
         [a, b, c, d, e, f, g, h, i, self.radius]
     }
 
-    fn from_array([a, b, c, d, e, f, g, h, i, radius]: [f32; ATTRIBUTES]) -> Self {
+    fn from_array(values: [f32; ATTRIBUTES]) -> Self {
+        let [a, b, c, d, e, f, g, h, i, radius] = values;
         Self { face: Vec3::new(a, b, c), normal: Vec3::new(d, e, f), color: [g, h, i], radius }
     }
 }
@@ -67,10 +68,10 @@ impl Light<'_> {
     /// What each disc of the cloud brings to an average, its normals on the viewer's side; by place in the cloud.
     pub(crate) fn attributes(&self, i: usize) -> [f32; ATTRIBUTES] {
         let cloud = self.input.cloud;
-        let own = Attributes::of(cloud, i);
+        let disc = Attributes::from_cloud(cloud, i);
         let to_eye = self.toward_eye(cloud.position[i]);
-        let side = |n: Vec3| if own.face.dot(to_eye) < 0.0 { -n } else { n };
-        Attributes { face: side(own.face), normal: side(own.normal), ..own }.to_array()
+        let side = |n: Vec3| if disc.face.dot(to_eye) < 0.0 { -n } else { n };
+        Attributes { face: side(disc.face), normal: side(disc.normal), ..disc }.to_array()
     }
 
     /// Of an opaque pixel, from averages of [`Light::attributes`].
@@ -88,21 +89,22 @@ impl Light<'_> {
         plane: impl Fn(usize) -> usize,
         out: &mut [f32; MAX_CHANNELS],
     ) {
-        let of = |f: &Fragment| Attributes::of(self.input.cloud, place.discs.ids[f.disc as usize] as usize);
-        let first = of(&fragments[0]);
+        let attributes =
+            |f: &Fragment| Attributes::from_cloud(self.input.cloud, place.discs.ids[f.disc as usize] as usize);
+        let first = attributes(&fragments[0]);
         let mut sum = Attributes { face: Vec3::ZERO, normal: Vec3::ZERO, color: [0.0; 3], radius: 0.0 };
         let mut weights = 0.0;
         let mut shares = [0.0; 3];
         for fragment in fragments {
-            let own = of(fragment);
-            let side = if own.face.dot(first.face) < 0.0 { -fragment.weight } else { fragment.weight };
-            sum.face += own.face * side;
-            sum.normal += own.normal * side;
-            sum.radius += (own.radius - first.radius) * fragment.weight;
+            let disc = attributes(fragment);
+            let side = if disc.face.dot(first.face) < 0.0 { -fragment.weight } else { fragment.weight };
+            sum.face += disc.face * side;
+            sum.normal += disc.normal * side;
+            sum.radius += (disc.radius - first.radius) * fragment.weight;
             weights += fragment.weight;
             let own_share = share(fragment);
             for c in 0..3 {
-                sum.color[c] += own_share[plane(c)] * (own.color[c] - first.color[c]);
+                sum.color[c] += own_share[plane(c)] * (disc.color[c] - first.color[c]);
                 shares[c] += own_share[plane(c)];
             }
         }

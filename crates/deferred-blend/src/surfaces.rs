@@ -77,7 +77,7 @@ struct Hit {
 
 /// What a ray may meet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Wanted {
+pub(crate) enum RayTarget {
     /// Opaque surfaces alone.
     Opaque,
     /// All, but not the layer that the ray leaves, which is of this object.
@@ -166,14 +166,14 @@ impl<'a> Surfaces<'a> {
     /// How often a ray crosses each translucent object.
     fn crossings(&self, mut from: Vec3, along: Vec3) -> BTreeMap<(u32, u16), usize> {
         let mut counts = BTreeMap::new();
-        let mut wanted = Wanted::AllBut(u32::MAX);
+        let mut target = RayTarget::AllBut(u32::MAX);
         for _ in 0..MOST_CROSSINGS {
-            let Some(met) = self.nearest(from, along, wanted) else { break };
+            let Some(met) = self.nearest(from, along, target) else { break };
             if !met.is_opaque {
                 *counts.entry((met.object, met.material_id)).or_default() += 1;
             }
             from += along * met.distance;
-            wanted = Wanted::AllBut(met.object);
+            target = RayTarget::AllBut(met.object);
         }
         counts
     }
@@ -191,33 +191,33 @@ impl<'a> Surfaces<'a> {
     }
 
     /// The nearest layer from a place along a unit vector; `None` where there is none.
-    pub(crate) fn nearest(&self, from: Vec3, along: Vec3, wanted: Wanted) -> Option<Met<'_>> {
+    pub(crate) fn nearest(&self, from: Vec3, along: Vec3, target: RayTarget) -> Option<Met<'_>> {
         let bvh = self.bvh.as_ref()?;
         let mut nearest: Option<(f32, usize)> = None;
         bvh.ray_traverse(Ray::new(from.into(), along.into(), 0.0, f32::INFINITY), &mut RayHit::none(), |_, i| {
             let k = bvh.primitive_indices[i] as usize;
             let hit = self.discs[k].meet(from, along);
-            let nearer = nearest.is_none_or(|(t, of)| (hit.along, k) < (t, of));
-            if hit.along > 0.0 && hit.distance_sq < CORE && nearer && self.counts(k, &hit, wanted) {
+            let nearer = nearest.is_none_or(|(t, other)| (hit.along, k) < (t, other));
+            if hit.along > 0.0 && hit.distance_sq < CORE && nearer && self.counts(k, &hit, target) {
                 nearest = Some((hit.along, k));
             }
             nearest.map_or(f32::INFINITY, |(t, _)| t)
         });
-        nearest.map(|(t, k)| self.average(from, along, wanted, t, k))
+        nearest.map(|(t, k)| self.average(from, along, target, t, k))
     }
 
-    fn counts(&self, k: usize, hit: &Hit, wanted: Wanted) -> bool {
+    fn counts(&self, k: usize, hit: &Hit, target: RayTarget) -> bool {
         let disc = &self.discs[k];
-        match wanted {
-            Wanted::Opaque => disc.is_opaque,
-            Wanted::AllBut(object) => {
+        match target {
+            RayTarget::Opaque => disc.is_opaque,
+            RayTarget::AllBut(object) => {
                 disc.look.object != object || hit.along * hit.cosine.abs().max(LEAST_FACING) >= SAME * disc.radius
             }
         }
     }
 
     /// The layer that a disc belongs to, which a ray meets at some distance.
-    fn average(&self, from: Vec3, along: Vec3, wanted: Wanted, nearest: f32, first: usize) -> Met<'_> {
+    fn average(&self, from: Vec3, along: Vec3, target: RayTarget, nearest: f32, first: usize) -> Met<'_> {
         let bvh = self.bvh.as_ref().expect("invariant: something was met");
         let first = &self.discs[first];
         let reach = SAME / LEAST_FACING * self.largest[first.look.object as usize];
@@ -234,20 +234,20 @@ impl<'a> Surfaces<'a> {
             let apart = (hit.along - nearest).abs() * hit.cosine.abs().max(LEAST_FACING);
             let same = disc.look.object == first.look.object && disc.is_opaque == first.is_opaque;
             let near = hit.along > 0.0 && hit.distance_sq < 1.0 && apart < SAME * disc.radius;
-            if !(same && near && self.counts(k, &hit, wanted)) {
+            if !(same && near && self.counts(k, &hit, target)) {
                 return;
             }
             let profile = self.footprints.layers()[disc.look.footprint as usize].profile(f64::from(hit.distance_sq));
             let weight = profile as f32 * if disc.is_opaque && hit.cosine > 0.0 { FACES_AWAY } else { 1.0 };
             let side = if disc.shading_normal.dot(first.shading_normal) < 0.0 { -weight } else { weight };
-            let own = self.color(disc.id as usize);
+            let color = self.color(disc.id as usize);
             weights += weight;
             distance += weight * (hit.along - nearest);
             normal += side * disc.shading_normal;
             for c in 0..3 {
                 let share = if disc.is_opaque { 1.0 } else { disc.look.opacity(c, hit.cosine.abs()) };
                 opacity[c] += weight * share;
-                radiance[c] += weight * share * own[c];
+                radiance[c] += weight * share * color[c];
             }
         });
         Met {
@@ -265,8 +265,8 @@ impl<'a> Surfaces<'a> {
 
     /// All effects of a splat.
     fn color(&self, id: usize) -> [f32; 3] {
-        let own = &self.values[id * self.layout.count()..][..self.layout.colors()];
-        own.chunks_exact(3).fold([0.0; 3], |sum, effect| std::array::from_fn(|c| sum[c] + effect[c]))
+        let effects = &self.values[id * self.layout.count()..][..self.layout.colors()];
+        effects.chunks_exact(3).fold([0.0; 3], |sum, effect| std::array::from_fn(|c| sum[c] + effect[c]))
     }
 }
 

@@ -72,23 +72,23 @@ impl Tile {
             if exp_neg(least) < params.transmittance_cutoff {
                 return;
             }
-            let own = &fragments[layer.clone()];
-            let mut blended = Layer::of(own, input, &ray, sizes);
+            let layer_fragments = &fragments[layer.clone()];
+            let mut blended = Layer::from_fragments(layer_fragments, input, &ray, sizes);
             if blended.depth >= limit {
                 break;
             }
             let mut passage = Passage::CLEAR;
             if let Some((glass, path)) = &mut way
-                && let Some(material) = bound_matter(own, input)
+                && let Some(material) = bound_matter(layer_fragments, input)
             {
                 if path.leaves_out(glass) {
                     continue;
                 }
-                let [rank, of_object] = count(own[0].object, layer.start, limit, fragments, layers);
+                let [rank, of_object] = count(layer_fragments[0].object, layer.start, limit, fragments, layers);
                 let place = ray.at(blended.depth);
                 let distance = ray.length * blended.depth;
-                let (normal, curvature) = normal(own, input);
-                let object = own[0].object;
+                let (normal, curvature) = normal(layer_fragments, input);
+                let object = layer_fragments[0].object;
                 let cone = ray.cone.after(distance);
                 let layers = of_object;
                 let bound = Bound { material, object, rank, layers, normal, curvature, cone, place, distance };
@@ -96,7 +96,7 @@ impl Tile {
                 blended.set_opacity(path.opacity(object, blended.opacity, glass.bending), sizes);
             }
             if input.range.contains(&blended.depth) {
-                self.add(k, &blended, &passage, own[0].object);
+                self.add(k, &blended, &passage, layer_fragments[0].object);
                 self.layers += 1;
             }
         }
@@ -215,8 +215,8 @@ impl Tile {
             plane[k] += enters[ChannelLayout::plane_of(c, count, planes)] * layer.values[c];
         }
         for (p, plane) in self.optical_depth.iter_mut().enumerate() {
-            let of = |share: f32| (-libm::log1pf(-share)).min(OPAQUE);
-            plane[k] += of(layer.opacity[p]) + of(passage.reflectance[channel_of(p, planes)]);
+            let optical_depth = |share: f32| (-libm::log1pf(-share)).min(OPAQUE);
+            plane[k] += optical_depth(layer.opacity[p]) + optical_depth(passage.reflectance[channel_of(p, planes)]);
         }
         let after = self.optical_depth[planes / 2][k];
         if after <= before {
@@ -233,8 +233,8 @@ impl Tile {
     pub(crate) fn store(self, to: &mut Accumulator, glass: Option<&mut GlassImage>) {
         let [x, y] = self.corner;
         let planes = to.optical_depth.iter_mut().chain(&mut to.channels);
-        for (plane, own) in planes.zip(self.optical_depth.iter().chain(&self.channels)) {
-            for_each_span(to.size, x, y, |tile, image| plane[image].copy_from_slice(&own[tile]));
+        for (plane, values) in planes.zip(self.optical_depth.iter().chain(&self.channels)) {
+            for_each_span(to.size, x, y, |tile, image| plane[image].copy_from_slice(&values[tile]));
         }
         if !self.depth.is_empty() {
             for_each_span(to.size, x, y, |tile, image| to.depth[image].copy_from_slice(&self.depth[tile]));
@@ -303,8 +303,8 @@ fn cross_layers<'m>(
 fn count(object: u32, start: usize, limit: f32, fragments: &[Fragment], layers: &[Range<usize>]) -> [u32; 2] {
     let of_object = layers.iter().filter(|l| fragments[l.start].object == object);
     let rank = of_object.clone().take_while(|l| l.start != start).count() as u32;
-    let all = of_object.take_while(|l| mean_depth(&fragments[(*l).clone()]) < limit).count() as u32;
-    [rank, all]
+    let before_surface = of_object.take_while(|l| mean_depth(&fragments[(*l).clone()]) < limit).count() as u32;
+    [rank, before_surface]
 }
 
 /// The channel that stands for a plane of optical depth.

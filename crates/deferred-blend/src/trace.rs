@@ -7,7 +7,7 @@
 use crate::cone::{Cone, onward};
 use crate::glass::Glass;
 use crate::interface::cross;
-use crate::surfaces::{Met, Wanted};
+use crate::surfaces::{Met, RayTarget};
 use splat_core::Material;
 use splat_core::glam::Vec3;
 
@@ -22,7 +22,7 @@ const LEAST_SHARE: f32 = 1e-4;
 pub(crate) struct Inside<'m>(Vec<(u32, &'m Material)>);
 
 impl<'m> Inside<'m> {
-    pub(crate) fn of(objects: impl Iterator<Item = (u32, &'m Material)>) -> Self {
+    pub(crate) fn new(objects: impl Iterator<Item = (u32, &'m Material)>) -> Self {
         Self(objects.collect())
     }
 
@@ -33,7 +33,7 @@ impl<'m> Inside<'m> {
     /// Through a surface of an object: out of it, or into it.
     fn crossed(&self, object: u32, material: &'m Material) -> Self {
         let mut other = self.clone();
-        match other.0.iter().rposition(|(of, _)| *of == object) {
+        match other.0.iter().rposition(|(entered, _)| *entered == object) {
             Some(at) => _ = other.0.remove(at),
             None => other.0.push((object, material)),
         }
@@ -55,7 +55,7 @@ pub(crate) fn trace<'m>(
     let mut share = [1.0f32; 3];
     let mut leaves = inside.0.last().map_or(u32::MAX, |(object, _)| *object);
     for _ in 0..MOST_SURFACES {
-        let Some(met) = glass.surfaces.nearest(from, along, Wanted::AllBut(leaves)) else {
+        let Some(met) = glass.surfaces.nearest(from, along, RayTarget::AllBut(leaves)) else {
             add(&mut sum, share, (glass.sky)(along, cone.solid_angle()));
             return sum;
         };
@@ -78,8 +78,8 @@ pub(crate) fn trace<'m>(
         let passes = share.map(|s| s * (1.0 - mirrored));
         if mirrored > 0.5 {
             if mirrored < 1.0 {
-                let (own, left) = through(&met, passes);
-                add(&mut sum, [1.0; 3], own);
+                let (shown, left) = through(&met, passes);
+                add(&mut sum, [1.0; 3], shown);
                 add(&mut sum, left, glass.seen(from, crossing.bent, passing));
             }
             share = share.map(|s| s * mirrored);
@@ -88,8 +88,8 @@ pub(crate) fn trace<'m>(
             if mirrored > 0.0 {
                 add(&mut sum, share.map(|s| s * mirrored), glass.seen(from, crossing.mirrored, thrown));
             }
-            let (own, left) = through(&met, passes);
-            add(&mut sum, [1.0; 3], own);
+            let (shown, left) = through(&met, passes);
+            add(&mut sum, [1.0; 3], shown);
             (share, along, cone, inside) = (left, crossing.bent, passing, beyond);
         }
         if share.iter().all(|s| *s < LEAST_SHARE) {
@@ -102,8 +102,8 @@ pub(crate) fn trace<'m>(
 
 /// What a layer shows of its own in light of some share, and what it leaves of that.
 fn through(met: &Met<'_>, share: [f32; 3]) -> ([f32; 3], [f32; 3]) {
-    let own = std::array::from_fn(|c| share[c] * met.radiance[c]);
-    (own, std::array::from_fn(|c| share[c] * (1.0 - met.opacity[c])))
+    let radiance = std::array::from_fn(|c| share[c] * met.radiance[c]);
+    (radiance, std::array::from_fn(|c| share[c] * (1.0 - met.opacity[c])))
 }
 
 fn add(sum: &mut [f32; 3], share: [f32; 3], radiance: [f32; 3]) {

@@ -91,7 +91,7 @@ fn db10_edges_and_groups_far_away_are_those_at_hand() {
             let reach = f64::from(far.radius[i]) + f64::from(far.radius[j]);
             // At 10⁷ f64 has 2·10⁻⁹.
             assert!(place(i).distance(place(j)) < reach + 1e-8, "{i} {j}");
-            assert_ne!(same.of()[i], same.of()[j]);
+            assert_ne!(same.by_disc()[i], same.by_disc()[j]);
         }
     }
 }

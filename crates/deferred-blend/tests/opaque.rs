@@ -157,9 +157,9 @@ fn db1_opaque_discs_of_one_color_show_that_color_to_the_last_bit() {
     for passes in ways {
         let picture = resolve(&scene, &Params { disc_scale: 1.0, gap: 4.0, ..Params::default() }, passes);
         let seen = (0..48 * 36).filter(|&k| picture.image.depth[k] < f32::INFINITY);
-        let of = |k: usize| [0, 1, 2].map(|c| picture.image.channels[c][k]);
+        let color = |k: usize| [0, 1, 2].map(|c| picture.image.channels[c][k]);
         assert!(seen.clone().count() > 400);
-        assert!(seen.clone().all(|k| of(k) == [0.7, 1.0 / 3.0, 1e-30]));
+        assert!(seen.clone().all(|k| color(k) == [0.7, 1.0 / 3.0, 1e-30]));
     }
 }
 
@@ -213,8 +213,8 @@ fn groups_that_do_not_overlap_lose_nothing() {
         let picture = resolve(&scene, &params, passes);
         let apart = |&k: &usize| {
             let depth = (picture.image.depth[k] - expected.image.depth[k]).abs();
-            let of = |c: usize| (picture.image.channels[c][k] - expected.image.channels[c][k]).abs();
-            depth.max(of(0)).max(of(1)).max(of(2))
+            let difference = |c: usize| (picture.image.channels[c][k] - expected.image.channels[c][k]).abs();
+            depth.max(difference(0)).max(difference(1)).max(difference(2))
         };
         let worst = others.iter().map(apart).fold(0.0, f32::max);
         assert!(worst < 2e-5, "{name}: {worst:e}");

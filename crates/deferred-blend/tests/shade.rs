@@ -148,8 +148,8 @@ fn highlights_have_fewer_facets_where_light_falls_on_pixels() {
         let picture = &sunny.draw(pixels, layout, Some(Passes::TwoPlusOne))[6];
         let off = |k: usize| Some(f64::from(picture[k] - exact(k)?));
         let ripple = |k: usize| Some(off(k + 1)? - off(k)?);
-        let rms = |of: &dyn Fn(usize) -> Option<f64>| {
-            let squares: Vec<f64> = (0..picture.len() - 1).filter_map(of).map(|v| v * v).collect();
+        let rms = |error: &dyn Fn(usize) -> Option<f64>| {
+            let squares: Vec<f64> = (0..picture.len() - 1).filter_map(error).map(|v| v * v).collect();
             (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()
         };
         [rms(&off), rms(&ripple)]

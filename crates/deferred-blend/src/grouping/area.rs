@@ -45,13 +45,13 @@ pub(crate) fn epsilon_of(a: &Surfel, b: &Surfel, gap: f32) -> f64 {
 
 /// For each entry of the graph's lists the share of the node's disc that its neighbour covers, over 1/65535.
 pub(crate) fn covered_shares(graph: &OverlapGraph, gap: f32) -> Vec<u16> {
-    fill(graph, gap, |own, _| (own * WHOLE as f32 + 0.5) as u16)
+    fill(graph, gap, |share, _| (share * WHOLE as f32 + 0.5) as u16)
 }
 
 /// For each entry the mean of the shares that both discs cover of one another, over 1/65535; the same from both sides.
 /// No edge has less than 1: discs that overlap by Eq. 5 alone should not share a group either where others may.
 pub(crate) fn mutual_shares(graph: &OverlapGraph, gap: f32) -> Vec<u16> {
-    fill(graph, gap, |own, other| ((0.5 * (own + other) * WHOLE as f32 + 0.5) as u16).max(1))
+    fill(graph, gap, |share, converse| ((0.5 * (share + converse) * WHOLE as f32 + 0.5) as u16).max(1))
 }
 
 /// One value for each entry of the graph's lists, made of the shares that the node's disc and its neighbour have covered.
@@ -68,9 +68,9 @@ fn fill(graph: &OverlapGraph, gap: f32, value: impl Fn(f32, f32) -> u16 + Sync) 
             for (k, pair) in (0..part.len()).zip(&mut entries) {
                 pairs.set(k, pair.map(|n| graph.surfel(n)), pair.map(|n| &planes[n]));
             }
-            let [own, other] = pulp::Arch::new().dispatch(Covered { pairs: &pairs, gap });
-            let shares = own.into_iter().zip(other);
-            part.iter_mut().zip(shares).for_each(|(to, (own, other))| *to = value(own, other));
+            let [forward, converse] = pulp::Arch::new().dispatch(Covered { pairs: &pairs, gap });
+            let shares = forward.into_iter().zip(converse);
+            part.iter_mut().zip(shares).for_each(|(to, (share, converse))| *to = value(share, converse));
         }
     });
     values
@@ -108,10 +108,10 @@ struct Pairs([Side; 2]);
 impl Pairs {
     /// Pair `k`; either disc sees the other as it would be seen if it came second.
     fn set(&mut self, k: usize, discs: [&Surfel; 2], planes: [&Plane; 2]) {
-        for (own, side) in self.0.iter_mut().enumerate() {
-            let disc = discs[own];
-            let other = discs[1 - own];
-            let Plane([first, second]) = planes[own];
+        for (i, side) in self.0.iter_mut().enumerate() {
+            let disc = discs[i];
+            let other = discs[1 - i];
+            let Plane([first, second]) = planes[i];
             let unit = 1.0 / f64::from(disc.reach);
             let [a, b] = &mut side.axes;
             put(a, k, *first);
@@ -197,17 +197,17 @@ impl<S: Simd> Frame<S> {
     }
 }
 
-/// The share of `own` that `other` covers.
+/// The share of `disc` that `other` covers.
 #[inline(always)]
-fn covered<S: Simd>(simd: S, lane: usize, own: &Side, other: &Side, gap: f32) -> Lanes<S> {
+fn covered<S: Simd>(simd: S, lane: usize, disc: &Side, other: &Side, gap: f32) -> Lanes<S> {
     let lanes = |v: f32| Lanes::splat(simd, v);
     let zero = lanes(0.0);
     let one = lanes(1.0);
     let least = lanes(LEAST);
-    let a = load(simd, lane, &own.axes[0]);
-    let b = load(simd, lane, &own.axes[1]);
-    let offset = load(simd, lane, &own.offset);
-    let ratio = Lanes::load(simd, &own.ratio[lane..]);
+    let a = load(simd, lane, &disc.axes[0]);
+    let b = load(simd, lane, &disc.axes[1]);
+    let offset = load(simd, lane, &disc.offset);
+    let ratio = Lanes::load(simd, &disc.ratio[lane..]);
     // t along the offset, in units of the semi-axes.
     let x = dot(a, offset) / dot(a, a);
     let y = dot(b, offset) / dot(b, b);

@@ -71,16 +71,16 @@ pub fn duplicates(
     let most = (f64::from(params.most_clipped) * WHOLE) as u64;
     let of_group = |group: u32| {
         check_cancelled(progress)?;
-        Ok(added(graph, &shares, groups, [u64::from(group), most]))
+        Ok(added(graph, &shares, groups, u64::from(group), most))
     };
     (0..groups.count()).into_par_iter().map(of_group).collect()
 }
 
 /// The two steps of the paper for one group.
-fn added(graph: &OverlapGraph, shares: &[u16], groups: &Groups, [group, most]: [u64; 2]) -> Vec<u32> {
+fn added(graph: &OverlapGraph, shares: &[u16], groups: &Groups, group: u64, most: u64) -> Vec<u32> {
     let mut clipped = vec![0u64; graph.nodes()];
     let mut is_in: Vec<bool> =
-        (0..graph.nodes()).map(|node| u64::from(groups.of()[graph.place(node)]) == group).collect();
+        (0..graph.nodes()).map(|node| u64::from(groups.by_disc()[graph.place(node)]) == group).collect();
     for (node, clipped) in clipped.iter_mut().enumerate() {
         let covering = graph.neighbors(node).iter().zip(&shares[graph.row(node)]);
         *clipped = covering.filter(|(n, _)| is_in[**n as usize]).map(|(_, &share)| u64::from(share)).sum();
@@ -132,15 +132,15 @@ pub fn enlarged_radii(
 ) -> Result<Vec<Enlarged>, Error> {
     check_gap(params.gap)?;
     let surfels = surfels::read(cloud, params.disc_scale)?;
-    if groups.of().len() != surfels.len() {
-        return Err(Error::parameter("number of grouped discs", groups.of().len(), "that of the cloud"));
+    if groups.by_disc().len() != surfels.len() {
+        return Err(Error::parameter("number of grouped discs", groups.by_disc().len(), "that of the cloud"));
     }
     let most = covering_factor(groups.count().max(LEAST_GROUPS))?;
     let search = |factor| Search { factor, max_bytes: params.max_bytes, progress };
-    let all = OverlapGraph::with_edges(&surfels, &search(1.0), |a, b| a.overlaps(b, 1.0))?;
-    let surface = Cover::new(&all, params.gap).area(1.0);
+    let graph = OverlapGraph::with_edges(&surfels, &search(1.0), |a, b| a.overlaps(b, 1.0))?;
+    let surface = Cover::new(&graph, params.gap).area(1.0);
     let enlarge = |group: u32| {
-        let is_member = |surfel: &&Surfel| u32::from(groups.of()[surfel.place as usize]) == group;
+        let is_member = |surfel: &&Surfel| u32::from(groups.by_disc()[surfel.place as usize]) == group;
         let members: Vec<Surfel> = surfels.iter().filter(is_member).copied().collect();
         let graph = OverlapGraph::with_edges(&members, &search(most), |a, b| a.overlaps(b, most))?;
         Ok(Cover::new(&graph, params.gap).enlarged(surface, most))
@@ -190,8 +190,8 @@ impl<'a> Cover<'a> {
     /// Eq. 11 with all radii `factor` times as large: the area that is covered at least once.
     fn area(&self, factor: f64) -> f64 {
         let nodes: Vec<usize> = (0..self.graph.nodes()).collect();
-        let of = |&node: &usize| area(self.graph.surfel(node)) * self.own_share(node, factor);
-        let sums: Vec<f64> = nodes.par_chunks(CHUNK).map(|part| part.iter().map(of).sum()).collect();
+        let covered_area = |&node: &usize| area(self.graph.surfel(node)) * self.own_share(node, factor);
+        let sums: Vec<f64> = nodes.par_chunks(CHUNK).map(|part| part.iter().map(covered_area).sum()).collect();
         sums.iter().sum::<f64>() * factor * factor
     }
 

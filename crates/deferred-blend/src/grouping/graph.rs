@@ -144,15 +144,15 @@ impl OverlapGraph {
         let mut sizes: Vec<u64> = (0..surfels.len()).map(|node| row(node).len() as u64).collect();
         // Ascending, so partners of larger discs are the last ones.
         let larger = |node: usize| {
-            let own = &neighbors[row(node)];
-            &own[own.partition_point(|&n| (n as usize) < ends[node])..]
+            let list = &neighbors[row(node)];
+            &list[list.partition_point(|&n| (n as usize) < ends[node])..]
         };
         (0..surfels.len()).for_each(|node| larger(node).iter().for_each(|&n| sizes[n as usize] += 1));
         let total = sizes.iter().sum();
         if total > search.most_entries() {
             return Err(search.exceeded(total));
         }
-        let mut all = vec![0; total as usize];
+        let mut lists = vec![0; total as usize];
         let mut new_starts = vec![0u32];
         let mut end = 0;
         new_starts.extend(sizes.iter().map(|&size| {
@@ -162,15 +162,15 @@ impl OverlapGraph {
         // Nodes come in order of size, so smaller partners, which come first in a list, are in it before the list's own.
         let mut next: Vec<u32> = new_starts.clone();
         for node in 0..surfels.len() {
-            let own = &neighbors[row(node)];
+            let list = &neighbors[row(node)];
             let at = next[node] as usize;
-            all[at..at + own.len()].copy_from_slice(own);
+            lists[at..at + list.len()].copy_from_slice(list);
             for &n in larger(node) {
-                all[next[n as usize] as usize] = node as u32;
+                lists[next[n as usize] as usize] = node as u32;
                 next[n as usize] += 1;
             }
         }
-        Ok(Self { surfels, starts: new_starts, neighbors: all })
+        Ok(Self { surfels, starts: new_starts, neighbors: lists })
     }
 
     /// Number of nodes, one for each disc.
@@ -222,7 +222,7 @@ impl OverlapGraph {
     /// # Panics
     /// If `groups` are not of the graph's cloud.
     pub fn overlaps(&self, groups: &Groups) -> Vec<[u32; 2]> {
-        let group = |node: usize| groups.of()[self.place(node)];
+        let group = |node: usize| groups.by_disc()[self.place(node)];
         let pairs = (0..self.nodes()).into_par_iter().with_min_len(CHUNK).flat_map_iter(|node| {
             let later = self.neighbors(node).iter().filter(move |&&n| n as usize > node);
             later.filter(move |&&n| group(n as usize) == group(node)).map(move |&n| {
@@ -239,8 +239,8 @@ impl OverlapGraph {
     /// # Panics
     /// If `groups` are not of the graph's cloud.
     pub fn mean_overlap(&self, groups: &Groups) -> f64 {
-        let group = |node: usize| groups.of()[self.place(node)];
-        let of = |node: usize| -> f64 {
+        let group = |node: usize| groups.by_disc()[self.place(node)];
+        let overlap = |node: usize| -> f64 {
             let a = &self.surfels[node];
             let same = self.neighbors(node).iter().filter(|&&n| group(n as usize) == group(node));
             same.map(|&n| {
@@ -251,7 +251,7 @@ impl OverlapGraph {
             .sum()
         };
         let nodes: Vec<usize> = (0..self.nodes()).collect();
-        let sums: Vec<f64> = nodes.par_chunks(CHUNK).map(|part| part.iter().map(|&node| of(node)).sum()).collect();
+        let sums: Vec<f64> = nodes.par_chunks(CHUNK).map(|part| part.iter().map(|&node| overlap(node)).sum()).collect();
         sums.iter().sum::<f64>() / (self.nodes().max(1)) as f64
     }
 
@@ -272,7 +272,7 @@ impl OverlapGraph {
             let list = self.neighbors(node as usize);
             list.first().copied().unwrap_or(0) ^ list.last().copied().unwrap_or(0)
         };
-        black_box(nodes.iter().map(ends).fold(0, |all, end| all ^ end));
+        black_box(nodes.iter().map(ends).fold(0, |bits, end| bits ^ end));
     }
 
     pub(crate) fn surfel(&self, node: usize) -> &Surfel {

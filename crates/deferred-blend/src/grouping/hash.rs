@@ -233,9 +233,9 @@ impl Part {
                 *group = cell.group(table.multiplier, table.params.groups);
                 let mut is_tagged = false;
                 if table.may_wait(surfel) {
-                    let [own, nearer] = cell.tags();
-                    is_tagged = (tags[own / 64] >> (own % 64) | tags[nearer / 64] >> (nearer % 64)) & 1 == 1;
-                    tags[own / 64] |= 1 << (own % 64);
+                    let [here, nearer] = cell.tags();
+                    is_tagged = (tags[here / 64] >> (here % 64) | tags[nearer / 64] >> (nearer % 64)) & 1 == 1;
+                    tags[here / 64] |= 1 << (here % 64);
                 }
                 waits.push(is_tagged);
             }

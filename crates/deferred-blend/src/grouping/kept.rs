@@ -44,7 +44,7 @@ impl KeptGroups {
     /// The groups of the same discs in another order, or `None` where they are not the same.
     ///
     /// Discs that lie nearer to one another than a 64th of the radius may take one another's groups.
-    pub fn of(&self, places: &[DVec3], radius: f64) -> Option<Membership> {
+    pub fn for_discs(&self, places: &[DVec3], radius: f64) -> Option<Membership> {
         let near = NEAR * self.radius;
         if places.len() != self.places.len() || (radius - self.radius).abs() > near {
             return None;
@@ -52,19 +52,19 @@ impl KeptGroups {
         let mut first = 0;
         let mut is_taken = vec![false; self.places.len()];
         let mut from = vec![0; places.len()];
-        for wanted in sorted(places) {
-            while first < is_taken.len() && (is_taken[first] || self.places[first].along < wanted.along - near) {
+        for sought in sorted(places) {
+            while first < is_taken.len() && (is_taken[first] || self.places[first].along < sought.along - near) {
                 first += 1;
             }
-            let reach = self.places[first..].iter().take_while(|place| place.along <= wanted.along + near);
+            let reach = self.places[first..].iter().take_while(|place| place.along <= sought.along + near);
             let free = (first..).zip(reach).filter(|(k, _)| !is_taken[*k]);
-            let distance = |place: &Place| place.at.distance_squared(wanted.at);
+            let distance = |place: &Place| place.at.distance_squared(sought.at);
             let (k, nearest) = free.min_by(|a, b| distance(a.1).total_cmp(&distance(b.1)))?;
             if distance(nearest) > near * near {
                 return None;
             }
             is_taken[k] = true;
-            from[wanted.disc as usize] = nearest.disc;
+            from[sought.disc as usize] = nearest.disc;
         }
         Some(self.membership.rearranged(&from))
     }
@@ -102,8 +102,8 @@ impl GroupsOfObjects {
         let place = |p: &Vec3| rotation.inverse() * (cloud.origin + p.as_dvec3() - translation) / scale;
         let places: Vec<DVec3> = cloud.position.iter().map(place).collect();
         let radius = f64::from(cloud.radius.iter().copied().fold(f32::INFINITY, f32::min)) / scale;
-        let kept = self.0.get(&rank).filter(|(of, _)| of == recipe);
-        if let Some(found) = kept.and_then(|(_, groups)| groups.of(&places, radius)) {
+        let kept = self.0.get(&rank).filter(|(kept, _)| kept == recipe);
+        if let Some(found) = kept.and_then(|(_, groups)| groups.for_discs(&places, radius)) {
             return Ok((found, false));
         }
         let members = recipe.group(cloud, progress)?;
@@ -120,7 +120,7 @@ impl GroupsOfObjects {
         &mut self,
         cloud: &Cloud,
         ids: &[u32],
-        of: impl Fn(usize) -> (Similarity, Recipe),
+        placed_recipe: impl Fn(usize) -> (Similarity, Recipe),
         progress: Option<&Progress>,
     ) -> Result<(Membership, u64), (usize, Error)> {
         let mut of_object: BTreeMap<usize, Vec<u32>> = BTreeMap::new();
@@ -130,7 +130,7 @@ impl GroupsOfObjects {
         let mut parts = Vec::new();
         let mut anew = 0;
         for (&rank, ids) in &of_object {
-            let (transform, recipe) = of(rank);
+            let (transform, recipe) = placed_recipe(rank);
             let discs = cloud.gather(ids);
             let members = self.members(rank, &discs, &transform, &recipe, progress);
             let (members, is_new) = members.map_err(|e| (rank, e))?;

@@ -34,7 +34,7 @@ impl Membership {
 
     /// Number of discs.
     pub fn discs(&self) -> usize {
-        self.groups.of.len()
+        self.groups.by_disc.len()
     }
 
     /// Bytes held.
@@ -47,9 +47,9 @@ impl Membership {
     /// # Panics
     /// If a place is out of range.
     pub fn rearranged(&self, from: &[u32]) -> Self {
-        let Groups { count, of, .. } = &self.groups;
-        let mut groups = Groups::of_each(*count, from.iter().map(|&i| of[i as usize]).collect());
-        groups.further = super::Further::of(from.iter().map(|&i| self.groups.further(i as usize)));
+        let Groups { count, by_disc, .. } = &self.groups;
+        let mut groups = Groups::of_each(*count, from.iter().map(|&i| by_disc[i as usize]).collect());
+        groups.further = super::Further::from_rows(from.iter().map(|&i| self.groups.further(i as usize)));
         let reach =
             if self.reach.is_empty() { Vec::new() } else { from.iter().map(|&i| self.reach[i as usize]).collect() };
         Self { groups, reach }
@@ -63,7 +63,7 @@ impl Membership {
     /// If a place is out of range, or a part has not as many places as discs.
     pub fn join(discs: usize, parts: &[(&[u32], Self)]) -> Self {
         let count = parts.iter().map(|(_, part)| part.groups.count).max().unwrap_or(1);
-        let mut of: Vec<u8> = vec![0; discs];
+        let mut by_disc: Vec<u8> = vec![0; discs];
         let mut rows: Vec<Vec<u8>> = Vec::new();
         let has_rows = parts.iter().any(|(_, p)| p.groups.count < count || !p.groups.further.starts.is_empty());
         rows.resize(if has_rows { discs } else { 0 }, Vec::new());
@@ -71,21 +71,21 @@ impl Membership {
         for (places, part) in parts {
             assert_eq!(places.len(), part.discs(), "invariant: one place a disc");
             for (i, &place) in places.iter().enumerate() {
-                let own = part.groups.of[i];
+                let first = part.groups.by_disc[i];
                 let place = place as usize;
-                of[place] = own;
+                by_disc[place] = first;
                 if let Some(row) = rows.get_mut(place) {
                     let again = |group: u8| (u32::from(group)..count).step_by(part.groups.count as usize);
-                    let all = std::iter::once(own).chain(part.groups.further(i).iter().copied()).flat_map(again);
-                    row.extend(all.map(|group| group as u8).filter(|group| *group != own));
+                    let members = std::iter::once(first).chain(part.groups.further(i).iter().copied()).flat_map(again);
+                    row.extend(members.map(|group| group as u8).filter(|group| *group != first));
                 }
                 if let Some(reach) = reach.get_mut(place) {
                     *reach = part.reach(i);
                 }
             }
         }
-        let mut groups = Groups::of_each(count, of);
-        groups.further = super::Further::of(rows.iter().map(Vec::as_slice));
+        let mut groups = Groups::of_each(count, by_disc);
+        groups.further = super::Further::from_rows(rows.iter().map(Vec::as_slice));
         Self { groups, reach }
     }
 }

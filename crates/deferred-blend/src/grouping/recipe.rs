@@ -65,19 +65,19 @@ impl Recipe {
     pub fn group(&self, cloud: &Cloud, progress: Option<&Progress>) -> Result<Membership, Error> {
         check_count(self.groups)?;
         let max_bytes = listed(cloud.len() as u64);
-        let all = |relaxation: Relaxation| {
+        let overlaps = |relaxation: Relaxation| {
             OverlapGraph::build(cloud, &GraphParams { disc_scale: self.disc_scale, relaxation, max_bytes }, progress)
         };
         let mut graph = None;
         let groups = match self.method {
             Method::Minimum { factor } => {
-                let relaxed = all(Relaxation { factor, ..Relaxation::default() })?;
+                let relaxed = overlaps(Relaxation { factor, ..Relaxation::default() })?;
                 let groups = minimum_coloring(&relaxed, self.groups, progress)?.groups;
                 graph = (factor == 1.0).then_some(relaxed);
                 groups
             }
             Method::Weighted => {
-                let graph = graph.insert(all(Relaxation::default())?);
+                let graph = graph.insert(overlaps(Relaxation::default())?);
                 let params = WeightedParams { groups: self.groups, gap: self.gap, ..WeightedParams::default() };
                 weighted_coloring(graph, &params, progress)?
             }
@@ -113,7 +113,7 @@ impl Recipe {
             }
             Coverage::Bound => vec![covering_factor(groups.count())?.max(1.0); groups.count() as usize],
         };
-        let reach = groups.of().iter().map(|&group| factors[usize::from(group)] as f32).collect();
+        let reach = groups.by_disc().iter().map(|&group| factors[usize::from(group)] as f32).collect();
         Ok(Membership { groups, reach })
     }
 

@@ -90,14 +90,14 @@ pub fn weighted_coloring(
 /// If `groups` are not of the graph's cloud.
 pub fn weighted_cost(graph: &OverlapGraph, groups: &Groups, gap: f32) -> Result<f64, Error> {
     check_gap(gap)?;
-    let (shares, group) = (mutual_shares(graph, gap), |node: usize| groups.of()[graph.place(node)]);
-    let of = |node: usize| -> f64 {
-        let all = graph.neighbors(node).iter().map(|&n| n as usize).zip(&shares[graph.row(node)]);
-        let later = all.filter(|&(n, _)| n > node && group(n) == group(node));
+    let (shares, group) = (mutual_shares(graph, gap), |node: usize| groups.by_disc()[graph.place(node)]);
+    let overlap = |node: usize| -> f64 {
+        let edges = graph.neighbors(node).iter().map(|&n| n as usize).zip(&shares[graph.row(node)]);
+        let later = edges.filter(|&(n, _)| n > node && group(n) == group(node));
         later.map(|(n, &share)| f64::from(share) / WHOLE * bend(graph, node, n)).sum()
     };
     let nodes: Vec<usize> = (0..graph.nodes()).collect();
-    let sums: Vec<f64> = nodes.par_chunks(CHUNK).map(|part| part.iter().map(|&node| of(node)).sum()).collect();
+    let sums: Vec<f64> = nodes.par_chunks(CHUNK).map(|part| part.iter().map(|&node| overlap(node)).sum()).collect();
     Ok(sums.iter().sum())
 }
 
@@ -168,9 +168,9 @@ impl<'a> Vertices<'a> {
 
     /// Moves a vertex to a group with less overlap, if there is one; those that it overlaps there come into the queue.
     fn improve(&mut self, node: usize, waits: &mut [bool]) {
-        let own = self.own_overlap(node);
+        let current = self.own_overlap(node);
         let (best, overlap) = self.minimize_overlap(node);
-        if overlap >= own {
+        if overlap >= current {
             return;
         }
         self.group[node] = best;
@@ -192,13 +192,13 @@ impl<'a> Vertices<'a> {
     }
 
     fn own_overlap(&self, node: usize) -> u64 {
-        let own = self.edges(node).filter(|&(n, _)| self.group[n] == self.group[node]);
-        own.map(|(_, share)| u64::from(share)).sum()
+        let same_group = self.edges(node).filter(|&(n, _)| self.group[n] == self.group[node]);
+        same_group.map(|(_, share)| u64::from(share)).sum()
     }
 
     fn own_weight(&self, node: usize) -> f64 {
-        let own = self.edges(node).filter(|&(n, _)| self.group[n] == self.group[node]);
-        own.map(|(n, share)| self.weight(node, n, share)).sum()
+        let same_group = self.edges(node).filter(|&(n, _)| self.group[n] == self.group[node]);
+        same_group.map(|(n, share)| self.weight(node, n, share)).sum()
     }
 }
 

@@ -46,6 +46,16 @@ pub(super) struct Hit<S: Simd> {
     pub(super) facing: Lanes<S>,
 }
 
+/// Discs that are weighed at a block of pixels, one a lane.
+pub(super) struct DiscLanes<S: Simd> {
+    /// View depth.
+    pub(super) depth: Lanes<S>,
+    /// z + ε, as [`Hit::limit`].
+    pub(super) limit: Lanes<S>,
+    /// As [`Block::side`] returns it.
+    pub(super) side: Lanes<S>,
+}
+
 /// How discs hide one another.
 pub(super) struct Rules {
     gap: f32,
@@ -164,10 +174,10 @@ impl Block {
             self.front.iter_mut().zip(front.to_array()).for_each(|(line, n)| line.0[k] = n);
         }
         let seen = self.near.0.map(|depth| if depth < f32::INFINITY { 1.0 } else { 0.0 });
-        for_each_disc(&self.disc, seen, |disc, own| {
+        for_each_disc(&self.disc, seen, |disc, shown| {
             for (line, value) in self.nearest.iter_mut().zip(values_of(input, disc)) {
-                for (nearest, own) in line.0.iter_mut().zip(own) {
-                    *nearest = if *own > 0.0 { *value } else { *nearest };
+                for (nearest, shown) in line.0.iter_mut().zip(shown) {
+                    *nearest = if *shown > 0.0 { *value } else { *nearest };
                 }
             }
         });
@@ -180,16 +190,11 @@ impl Block {
     }
 
     /// Adds discs at some depth and limit, one a lane, to Σw and Σwz. Returns their weights, 0 for those that are hidden, and for rims of
-    /// nearer surfaces, which lie farther than their ε before what hides. `side` is of [`Block::side`].
+    /// nearer surfaces, which lie farther than their ε before what hides.
     #[inline(always)]
-    pub(super) fn weigh<S: Simd>(
-        &mut self,
-        simd: S,
-        lane: usize,
-        [depth, own_limit, side]: [Lanes<S>; 3],
-        weight: Lanes<S>,
-    ) -> Lanes<S> {
+    pub(super) fn weigh<S: Simd>(&mut self, simd: S, lane: usize, discs: DiscLanes<S>, weight: Lanes<S>) -> Lanes<S> {
         let lanes = |v: f32| Lanes::splat(simd, v);
+        let DiscLanes { depth, limit: own_limit, side } = discs;
         let weight = (weight * lanes(FACING_AWAY)).where_less_or(side, lanes(0.0), weight);
         let limit = self.limit(simd, lane);
         let near = Lanes::load(simd, &self.near.0[lane..]);
@@ -248,13 +253,13 @@ impl Block {
 pub(super) fn for_each_disc(discs: &Line, mut weights: [f32; PIXELS], mut visit: impl FnMut(f32, &[f32; PIXELS])) {
     while let Some(first) = weights.iter().position(|weight| *weight > 0.0) {
         let disc = discs.0[first];
-        let mut own = [0.0; PIXELS];
-        for ((rest, own), other) in weights.iter_mut().zip(&mut own).zip(&discs.0) {
-            let is_own = other.to_bits() == disc.to_bits();
-            *own = if is_own { *rest } else { 0.0 };
-            *rest = if is_own { 0.0 } else { *rest };
+        let mut of_disc = [0.0; PIXELS];
+        for ((rest, shown), other) in weights.iter_mut().zip(&mut of_disc).zip(&discs.0) {
+            let is_same = other.to_bits() == disc.to_bits();
+            *shown = if is_same { *rest } else { 0.0 };
+            *rest = if is_same { 0.0 } else { *rest };
         }
-        visit(disc, &own);
+        visit(disc, &of_disc);
     }
 }
 

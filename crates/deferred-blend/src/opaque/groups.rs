@@ -5,7 +5,7 @@
 //! keeps the disc, so the time of the walk does not grow with the number of channels.
 
 use super::Averaged;
-use super::block::{Block, Hit, Rules, for_each_disc, line, values_of};
+use super::block::{Block, DiscLanes, Hit, Rules, for_each_disc, line, values_of};
 use crate::disc::Discs;
 use crate::grouping::{Groups, MOST_GROUPS};
 use splat_core::raster::lanes::Lanes;
@@ -54,7 +54,7 @@ impl GroupImages {
 
     /// The image of a group, empty if it was not met.
     #[inline(always)]
-    fn of(&mut self, group: u8) -> &mut GroupImage {
+    fn image(&mut self, group: u8) -> &mut GroupImage {
         let word = &mut self.met[usize::from(group / 64)];
         let bit = 1 << (group % 64);
         let image = &mut self.images[usize::from(group)];
@@ -102,9 +102,9 @@ pub(super) fn keep<S: Simd>(
             if !depth.any_less(beyond) {
                 continue;
             }
-            let image = images.of(groups.of()[discs.ids[i as usize] as usize]);
+            let image = images.image(groups.by_disc()[discs.ids[i as usize] as usize]);
             let behind = match rules.floor {
-                Some(floor) => behind(simd, image, lane, [floored(simd, floor, depth), distance_sq]),
+                Some(floor) => behind(simd, image, lane, floored(simd, floor, depth), distance_sq),
                 None => depth - Lanes::load(simd, &image.depth.0[lane..]),
             };
             if !behind.any_less(lanes(0.0)) {
@@ -130,7 +130,7 @@ pub(super) fn keep<S: Simd>(
 /// By Eq. 14: below 0 where a disc is before an image. Steps are whole or the same, places differ by less than 1, so the sign is that of
 /// the first difference that is not 0.
 #[inline(always)]
-fn behind<S: Simd>(simd: S, image: &GroupImage, lane: usize, [step, place]: [Lanes<S>; 2]) -> Lanes<S> {
+fn behind<S: Simd>(simd: S, image: &GroupImage, lane: usize, step: Lanes<S>, place: Lanes<S>) -> Lanes<S> {
     let at = |line: &Line| Lanes::load(simd, &line.0[lane..]);
     (step - at(&image.step)).mul_add(Lanes::splat(simd, 4.0), place - at(&image.place))
 }
@@ -156,13 +156,13 @@ pub(super) fn composite<S: Simd>(simd: S, input: &Averaged<'_>, images: &GroupIm
             let weight = Lanes::load(simd, &image.weight.0[lane..]);
             weight.where_less(depth, block.limit(simd, lane)).store(&mut weights[lane..]);
         }
-        for_each_disc(&image.disc, weights, |disc, own| {
+        for_each_disc(&image.disc, weights, |disc, shown| {
             let normal = input.discs.normals[disc.to_bits() as usize];
             for lane in (0..PIXELS).step_by(Lanes::<S>::COUNT) {
                 let at = |line: &Line| Lanes::load(simd, &line.0[lane..]);
                 let side = block.side(simd, lane, at(&image.facing), normal);
-                let bounds = [at(&image.depth), at(&image.limit), side];
-                let weight = block.weigh(simd, lane, bounds, Lanes::load(simd, &own[lane..]));
+                let discs = DiscLanes { depth: at(&image.depth), limit: at(&image.limit), side };
+                let weight = block.weigh(simd, lane, discs, Lanes::load(simd, &shown[lane..]));
                 block.add(simd, lane, weight, values_of(input, disc));
             }
         });

@@ -19,8 +19,8 @@ pub(super) fn resolve(
     let attributes: Vec<f32> = discs.ids.par_iter().flat_map_iter(|&i| light.attributes(i as usize)).collect();
     let max_bytes = input.max_bytes.saturating_sub(size_of_val(&*attributes) as u64);
     let values = &attributes;
-    let of = Averaged { discs, values, by_rank: true, channels: ATTRIBUTES as u32, objects, passes, max_bytes };
-    let mut seen = average(&of, params, progress)?;
+    let averaged = Averaged { discs, values, by_rank: true, channels: ATTRIBUTES as u32, objects, passes, max_bytes };
+    let mut seen = average(&averaged, params, progress)?;
     seen.counts.bytes += size_of_val(&*attributes) as u64;
     let Opaque { image, disc, .. } = &mut seen;
     if disc.is_empty() {

@@ -12,11 +12,11 @@ use splat_core::raster::tile::{AREA, BLOCKS};
 pub(super) fn bin(input: &Averaged<'_>) -> Result<Bins, Error> {
     let discs = input.discs;
     let tiles = |low: u32, high: u32| u64::from(high.div_ceil(TILE as u32).saturating_sub(low / TILE as u32));
-    let of = |disc: &Disc| {
+    let tile_count = |disc: &Disc| {
         let [x0, x1, y0, y1] = disc.pixels;
         tiles(x0, x1) * tiles(y0, y1)
     };
-    let entries: u64 = discs.discs.par_iter().with_min_len(4096).map(of).sum();
+    let entries: u64 = discs.discs.par_iter().with_min_len(4096).map(tile_count).sum();
     afford(input, 4 * entries)?;
     let mut ranks: Vec<u32> = (0..discs.discs.len() as u32).collect();
     // By place in the cloud, so that the order of the discs does not matter.

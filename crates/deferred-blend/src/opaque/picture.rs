@@ -52,10 +52,11 @@ pub(super) fn assemble(input: &Averaged<'_>, tiles: &[Option<Tile>], bins: &Bins
 /// A plane of the picture, a row of tiles by a task.
 fn copy<T: Copy + Send + Sync>(
     tiles: &[Option<Tile>],
-    [width, _]: [u32; 2],
+    size: [u32; 2],
     plane: &mut [T],
     part: impl Fn(&Tile) -> &[T] + Sync,
 ) {
+    let [width, _] = size;
     let row = width as usize;
     let bands = plane.par_chunks_mut(TILE * row).zip(tiles.par_chunks(row.div_ceil(TILE)));
     bands.for_each(|(band, tiles)| {

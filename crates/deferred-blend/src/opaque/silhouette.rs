@@ -27,8 +27,8 @@ pub(super) fn turned(light: &Light<'_>, discs: &Discs, image: &OpaqueImage, disc
     let one = |k: usize| {
         let radius = light.input.cloud.radius[*disc.get(k).filter(|disc| **disc != u32::MAX)? as usize];
         let to_eye = light.toward_eye(discs.place(&discs.ray([k % width, k / width]), image.depth[k]));
-        let own = normal(k, 0);
-        if own.dot(to_eye).abs() > EDGE_ON {
+        let here = normal(k, 0);
+        if here.dot(to_eye).abs() > EDGE_ON {
             return None;
         }
         let reach = radius / discs.pixel_width(image.depth[k]);
@@ -45,8 +45,8 @@ pub(super) fn turned(light: &Light<'_>, discs: &Discs, image: &OpaqueImage, disc
         };
         let around: Vec3 = asked.filter_map(neighbor).sum();
         let mirror = |n: Vec3| to_eye * (2.0 * n.dot(to_eye)) - n;
-        (mirror(own).dot(around) > own.dot(around)).then(|| {
-            let [a, b, c] = mirror(own).to_array();
+        (mirror(here).dot(around) > here.dot(around)).then(|| {
+            let [a, b, c] = mirror(here).to_array();
             let [d, e, f] = mirror(normal(k, 3)).to_array();
             (k, [a, b, c, d, e, f])
         })

@@ -1,7 +1,7 @@
 //! 2+1 passes: visibility splatting at an offset of ε, then the sums of Eq. 1 (section 3.1).
 
 use super::Averaged;
-use super::block::{Block, Rules, values_of};
+use super::block::{Block, DiscLanes, Rules, values_of};
 use crate::disc::Discs;
 use splat_core::raster::lanes::Lanes;
 use splat_core::raster::pulp::Simd;
@@ -29,7 +29,12 @@ pub(super) fn sum<S: Simd>(simd: S, list: &[u32], input: &Averaged<'_>, rules: &
             if hit.depth.any_less(block.limit(simd, lane)) {
                 let kernel = &discs.kernels[discs.looks[i as usize].footprint as usize];
                 let side = block.side(simd, lane, hit.facing, discs.normals[i as usize]);
-                let weight = block.weigh(simd, lane, [hit.depth, hit.limit, side], hit.weight(simd, kernel));
+                let weight = block.weigh(
+                    simd,
+                    lane,
+                    DiscLanes { depth: hit.depth, limit: hit.limit, side },
+                    hit.weight(simd, kernel),
+                );
                 block.add(simd, lane, weight, values_of(input, f32::from_bits(i)));
             }
         }

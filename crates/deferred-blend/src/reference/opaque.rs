@@ -44,7 +44,7 @@ pub fn opaque(
         };
         let mut kept: Vec<Hit> = Vec::new();
         for hit in &hits {
-            match kept.iter_mut().find(|other| groups.of()[other.id] == groups.of()[hit.id]) {
+            match kept.iter_mut().find(|other| groups.by_disc()[other.id] == groups.by_disc()[hit.id]) {
                 Some(other) if key(hit) < key(other) => *other = *hit,
                 Some(_) => {}
                 None => kept.push(*hit),
@@ -61,7 +61,7 @@ pub fn opaque(
     let weight =
         |hit: &Hit| hit.weight.max(2f64.powi(-60)) * if seen(hit).dot(front) < 0.0 { 1.0 / 256.0 } else { 1.0 };
     let weights: f64 = hits.iter().map(weight).sum();
-    let mean = |of: &dyn Fn(&Hit) -> f64| hits.iter().map(|hit| weight(hit) * of(hit)).sum::<f64>() / weights;
+    let mean = |term: &dyn Fn(&Hit) -> f64| hits.iter().map(|hit| weight(hit) * term(hit)).sum::<f64>() / weights;
     let value = |c: usize| mean(&|hit| f64::from(values[hit.id * channels + c]));
     Some(Seen { depth: mean(&|hit| hit.depth), values: (0..channels).map(value).collect(), disc: nearest.id })
 }

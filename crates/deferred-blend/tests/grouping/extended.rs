@@ -20,7 +20,7 @@ fn every_disc_that_a_group_leaves_open_joins_it() {
     let added = duplicates(&graph, &groups, &params, None).expect("in range");
     assert_eq!(added.len(), 4);
     for (group, places) in (0u8..).zip(&added) {
-        assert!(places.iter().all(|&place| groups.of()[place as usize] != group));
+        assert!(places.iter().all(|&place| groups.by_disc()[place as usize] != group));
         assert!(places.is_sorted_by(|a, b| a < b));
     }
     let all: usize = added.iter().map(Vec::len).sum();

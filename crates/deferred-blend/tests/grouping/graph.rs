@@ -9,11 +9,11 @@ use splat_core::{Cloud, Progress, Splat, rng};
 
 /// Pairs of an overlap graph by places in the cloud.
 pub(super) fn edges(graph: &OverlapGraph) -> Vec<[usize; 2]> {
-    let of = |node: usize| {
+    let edges_of_node = |node: usize| {
         let place = graph.place(node);
         graph.neighbors(node).iter().map(move |&n| [place, graph.place(n as usize)])
     };
-    let mut edges: Vec<[usize; 2]> = (0..graph.nodes()).flat_map(of).collect();
+    let mut edges: Vec<[usize; 2]> = (0..graph.nodes()).flat_map(edges_of_node).collect();
     edges.sort_unstable();
     edges
 }

@@ -35,8 +35,8 @@ fn eight_groups_have_the_table_of_figure_9() {
     for (i, position) in cloud.position.iter().enumerate() {
         let [x, y] = [position.x, position.y].map(|v| (v.floor() as i32).rem_euclid(8));
         let row = rows.get(y as usize);
-        assert!(row.is_none_or(|row| row[x as usize] == groups.of()[i]), "{position}");
-        assert_eq!(i32::from(groups.of()[i]), (3 * x + y) % 8);
+        assert!(row.is_none_or(|row| row[x as usize] == groups.by_disc()[i]), "{position}");
+        assert_eq!(i32::from(groups.by_disc()[i]), (3 * x + y) % 8);
     }
 }
 
@@ -69,9 +69,9 @@ fn db11_groups_of_a_plane_are_of_one_size_for_any_number() {
     for (groups, collisions) in
         [2, 3, 7, 8, 16].map(|k| (k, Collisions::Keep)).into_iter().chain([(8, Collisions::Resolve)])
     {
-        let of = grouped(&flat(), groups, collisions);
+        let assigned = grouped(&flat(), groups, collisions);
         let counts: Vec<usize> =
-            (0..groups as u8).map(|group| of.of().iter().filter(|&&g| g == group).count()).collect();
+            (0..groups as u8).map(|group| assigned.by_disc().iter().filter(|&&g| g == group).count()).collect();
         let least = counts.iter().min();
         let most = counts.iter().max();
         assert!(least.zip(most).is_some_and(|(least, most)| *most <= 2 * least), "{groups}: {counts:?}");
@@ -83,7 +83,7 @@ fn db11_places_of_more_radii_than_a_number_can_count_are_grouped() {
     let mut cloud = lattice(4);
     cloud.radius.iter_mut().for_each(|radius| *radius = 1e-30);
     for collisions in [Collisions::Keep, Collisions::Resolve] {
-        assert_eq!(grouped(&cloud, 5, collisions).of().len(), 64);
+        assert_eq!(grouped(&cloud, 5, collisions).by_disc().len(), 64);
     }
 }
 
@@ -91,7 +91,7 @@ fn db11_places_of_more_radii_than_a_number_can_count_are_grouped() {
 fn db9_discs_at_one_place_spread_over_all_groups() {
     let groups = grouped(&one_place(4000), 8, Collisions::Resolve);
     for group in 0..8 {
-        assert_eq!(groups.of().iter().filter(|&&of| of == group).count(), 500);
+        assert_eq!(groups.by_disc().iter().filter(|&&found| found == group).count(), 500);
     }
 }
 
@@ -123,7 +123,7 @@ fn discs_of_eight_groups_cover_a_plane_with_the_radius_of_figure_10() {
 #[test]
 fn nothing_and_a_single_disc_are_grouped() {
     for cloud in least() {
-        assert_eq!(grouped(&cloud, 8, Collisions::Resolve).of().len(), cloud.len());
+        assert_eq!(grouped(&cloud, 8, Collisions::Resolve).by_disc().len(), cloud.len());
     }
 }
 

@@ -32,15 +32,15 @@ fn everything(cloud: &Cloud, unit: f64) -> Everything {
     let near = Collisions::ResolveNear { eye: cloud.origin, distance: unit };
     let hashed = |collisions| {
         let params = HashParams { collisions, ..HashParams::default() };
-        hash_grouping(cloud, &params, None).expect("a valid cloud").of().to_vec()
+        hash_grouping(cloud, &params, None).expect("a valid cloud").by_disc().to_vec()
     };
     Everything {
         edges: edges(&graph),
         added: duplicates(&graph, &four, &DuplicateParams::default(), None).expect("in range"),
         enlarged: enlarged_radii(cloud, &four, &EnlargeParams::default(), None).expect("in range"),
         groups: [
-            minimum.of().to_vec(),
-            four.of().to_vec(),
+            minimum.by_disc().to_vec(),
+            four.by_disc().to_vec(),
             hashed(Collisions::Keep),
             hashed(Collisions::Resolve),
             hashed(near),

@@ -19,7 +19,7 @@ fn no_edge_lies_within_a_group() {
             let graph = graph(&cloud, factor);
             let coloring = minimum_coloring(&graph, 256, None).expect("in range");
             let groups = &coloring.groups;
-            assert!(edges(&graph).iter().all(|&[i, j]| groups.of()[i] != groups.of()[j]));
+            assert!(edges(&graph).iter().all(|&[i, j]| groups.by_disc()[i] != groups.by_disc()[j]));
             assert_eq!((coloring.overlaps, graph.overlaps(groups).len()), (0, 0));
             assert_eq!(graph.mean_overlap(groups), 0.0);
             assert!(groups.count() as usize <= graph.max_degree() + 1);
@@ -40,7 +40,7 @@ fn colors_are_those_of_largest_first() {
     for node in order {
         let taken: Vec<u8> = graph.neighbors(node).iter().filter_map(|&n| colors[n as usize]).collect();
         colors[node] = (0..=255).find(|color| !taken.contains(color));
-        assert_eq!(colors[node], Some(groups.of()[graph.place(node)]));
+        assert_eq!(colors[node], Some(groups.by_disc()[graph.place(node)]));
     }
 }
 
@@ -68,7 +68,7 @@ fn db9_ten_thousand_discs_at_one_place_take_as_many_groups_as_there_may_be() {
 fn nothing_and_a_single_disc_are_one_group() {
     for cloud in least() {
         let coloring = minimum_coloring(&graph(&cloud, 1.0), 256, None).expect("in range");
-        assert_eq!((coloring.groups.count(), coloring.groups.of().len()), (1, cloud.len()));
+        assert_eq!((coloring.groups.count(), coloring.groups.by_disc().len()), (1, cloud.len()));
     }
 }
 

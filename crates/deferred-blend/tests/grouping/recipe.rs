@@ -30,13 +30,13 @@ fn coverage_adds_members_or_reach_and_changes_no_group() {
         assert_eq!((own.discs(), further(&own), reach(&own)), (cloud.len(), 0, 1.0), "{method:?}");
         for coverage in [Coverage::Duplicates, Coverage::Enlarged, Coverage::Bound] {
             let covers = members(&cloud, Recipe { method, coverage, ..RECIPE });
-            assert_eq!(covers.groups().of(), own.groups().of(), "{method:?} {coverage:?}");
+            assert_eq!(covers.groups().by_disc(), own.groups().by_disc(), "{method:?} {coverage:?}");
             let adds = coverage == Coverage::Duplicates;
             assert_eq!((further(&covers) > cloud.len() / 10, reach(&covers) > 1.1), (adds, !adds), "{coverage:?}");
             for i in 0..cloud.len() {
                 let groups = covers.groups();
-                let of: Vec<u32> = (0..groups.count()).filter(|g| groups.has(i, *g)).collect();
-                assert_eq!(of.len(), 1 + groups.further(i).len(), "no group twice");
+                let members: Vec<u32> = (0..groups.count()).filter(|g| groups.has(i, *g)).collect();
+                assert_eq!(members.len(), 1 + groups.further(i).len(), "no group twice");
             }
         }
     }
@@ -50,23 +50,23 @@ fn an_object_that_moved_has_its_groups_again() {
     let places: Vec<DVec3> = cloud.position.iter().map(|p| p.as_dvec3()).collect();
     let radius = f64::from(cloud.radius.iter().copied().fold(f32::INFINITY, f32::min));
     let kept = KeptGroups::new(&places, radius, own.clone());
-    assert_eq!(kept.of(&places, radius), Some(own.clone()));
+    assert_eq!(kept.for_discs(&places, radius), Some(own.clone()));
     // Elsewhere, rounded there, back again, in another order.
     let turn = DQuat::from_rotation_y(0.7) * DQuat::from_rotation_x(0.2);
     let moved = |p: &DVec3| turn.inverse() * ((turn * *p + DVec3::splat(9.0)).as_vec3().as_dvec3() - DVec3::splat(9.0));
     let order: Vec<usize> = (0..cloud.len()).map(|i| i * 1001 % cloud.len()).collect();
     let again: Vec<DVec3> = order.iter().map(|&i| moved(&places[i])).collect();
-    let found = kept.of(&again, radius).expect("the same discs");
+    let found = kept.for_discs(&again, radius).expect("the same discs");
     for (k, &i) in order.iter().enumerate() {
-        assert_eq!(found.groups().of()[k], own.groups().of()[i]);
+        assert_eq!(found.groups().by_disc()[k], own.groups().by_disc()[i]);
         assert_eq!(found.groups().further(k), own.groups().further(i));
     }
     // Other discs are not the same.
     let mut other = places.clone();
     other[17] += DVec3::X * 0.1 * radius;
-    assert_eq!(kept.of(&other, radius), None);
-    assert_eq!(kept.of(&places[1..], radius), None);
-    assert_eq!(kept.of(&places, 1.1 * radius), None);
+    assert_eq!(kept.for_discs(&other, radius), None);
+    assert_eq!(kept.for_discs(&places[1..], radius), None);
+    assert_eq!(kept.for_discs(&places, 1.1 * radius), None);
 }
 
 #[test]
@@ -74,16 +74,16 @@ fn discs_at_one_place_keep_their_groups_between_them() {
     let cloud = one_place(500);
     let own = members(&cloud, Recipe { method: Method::Hash(Collisions::Resolve), ..RECIPE });
     let places = vec![DVec3::ONE; 500];
-    let found = KeptGroups::new(&places, 0.24, own.clone()).of(&places, 0.24).expect("the same discs");
-    let count = |m: &Membership, g: u8| m.groups().of().iter().filter(|of| **of == g).count();
+    let found = KeptGroups::new(&places, 0.24, own.clone()).for_discs(&places, 0.24).expect("the same discs");
+    let count = |m: &Membership, g: u8| m.groups().by_disc().iter().filter(|group| **group == g).count();
     (0..4).for_each(|g| assert_eq!(count(&found, g), count(&own, g)));
 }
 
 #[test]
 fn an_object_of_fewer_groups_is_in_every_image() {
     let part = |groups: u32, discs: usize| {
-        let of = (0..discs).map(|i| (i % groups as usize) as u8).collect();
-        Membership::from(Groups::new(groups, of).expect("below the count"))
+        let by_disc = (0..discs).map(|i| (i % groups as usize) as u8).collect();
+        Membership::from(Groups::new(groups, by_disc).expect("below the count"))
     };
     let all = Membership::join(10, &[(&[0, 1, 2, 3], part(2, 4)), (&[4, 5, 6, 7, 8], part(5, 5))]);
     assert_eq!(all.groups().count(), 5);

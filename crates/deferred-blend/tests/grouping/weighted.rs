@@ -67,7 +67,7 @@ fn db9_discs_at_one_place_fill_all_groups_alike() {
     let graph = graph(&one_place(1000));
     let groups = weighted_coloring(&graph, &with(8), None).expect("in range");
     for group in 0..8 {
-        assert_eq!(groups.of().iter().filter(|&&of| of == group).count(), 125);
+        assert_eq!(groups.by_disc().iter().filter(|&&found| found == group).count(), 125);
     }
 }
 
@@ -75,7 +75,7 @@ fn db9_discs_at_one_place_fill_all_groups_alike() {
 fn nothing_and_a_single_disc_are_grouped() {
     for cloud in least() {
         let groups = weighted_coloring(&graph(&cloud), &with(8), None).expect("in range");
-        assert_eq!((groups.count(), groups.of()), (8, vec![0; cloud.len()].as_slice()));
+        assert_eq!((groups.count(), groups.by_disc()), (8, vec![0; cloud.len()].as_slice()));
     }
 }
 

@@ -32,9 +32,9 @@ fn perm_opaque_pictures_do_not_depend_on_the_order_of_discs() {
     assert_eq!(pictures(&scene, &groups), one);
     // Where each group has one disc a pixel, the order of the cloud does not matter either.
     let order: Vec<u32> = scene.ids.clone();
-    let of = order.iter().map(|&i| groups.of()[i as usize]).collect();
+    let by_disc = order.iter().map(|&i| groups.by_disc()[i as usize]).collect();
     let shuffled = Scene::new(scene.cloud.gather(&order), view());
-    let other = pictures(&shuffled, &Groups::new(5, of).expect("below the count"));
+    let other = pictures(&shuffled, &Groups::new(5, by_disc).expect("below the count"));
     for (one, other) in one[1..].iter().zip(&other[1..]) {
         assert_eq!(one.image, other.image);
     }
