@@ -102,7 +102,7 @@ fn measured(of_a_voxel: f64) -> [[f64; 2]; 3] {
     };
     let frames: Vec<Frame> = (0..4).map(frame).collect();
     let square = |a: &[f32], b: &[f32]| a.iter().zip(b).map(|(a, b)| f64::from(a - b).powi(2)).sum::<f64>();
-    let of = |pick: fn(&Frame) -> &[Vec<f32>; 2]| {
+    let errors = |pick: fn(&Frame) -> &[Vec<f32>; 2]| {
         let rmse =
             (0..2).map(|c| square(&pick(&frames[0])[c], &frames[0].3[c])).sum::<f64>() / (2 * SIZE * SIZE) as f64;
         let step = |a: &[Vec<f32>; 2], b: &[Vec<f32>; 2]| (0..2).map(|c| largest(&a[c], &b[c])).fold(0.0, f32::max);
@@ -110,7 +110,7 @@ fn measured(of_a_voxel: f64) -> [[f64; 2]; 3] {
         [rmse.sqrt(), f64::from(steps.fold(0.0, f32::max))]
     };
     assert_eq!(frames[0].0.size, [SIZE as u32; 2]);
-    [of(|f| &f.1), of(|f| &f.2), of(|f| &f.3)]
+    [errors(|f| &f.1), errors(|f| &f.2), errors(|f| &f.3)]
 }
 
 /// The paper says that they do. Two colours that meet in a plane do not show it: sheets blur the plane as their kernels do, twice along the view.

@@ -17,11 +17,11 @@ fn smooth(p: DVec3) -> f64 {
 }
 
 /// Mean and largest angle, degrees, between the normals of a sphere that is seen and its radii.
-fn off_a_sphere(of: &SheetInput<'_>, radius: f64, gradients: Gradients) -> [f64; 2] {
+fn off_a_sphere(input: &SheetInput<'_>, radius: f64, gradients: Gradients) -> [f64; 2] {
     let layout = ChannelLayout::new(&LayerSet { normal: true, ..LayerSet::default() });
-    let camera = of.camera;
+    let camera = input.camera;
     let mut out = Accumulator::new(camera.size, 1, layout.count(), false, false);
-    let sheets = prepare(of.clone(), &Params { gradients, slab_width: Some(0.02), ..exact() }, None).unwrap();
+    let sheets = prepare(input.clone(), &Params { gradients, slab_width: Some(0.02), ..exact() }, None).unwrap();
     sheets.fold(f32::NEG_INFINITY..f32::INFINITY, &[], &layout, &mut out, None).unwrap();
     let first = layout.normal().unwrap();
     let mut sum = 0.0;
@@ -57,8 +57,8 @@ fn normals_of_a_sphere_are_its_radii_by_sheets_and_better_by_a_gradient_volume()
     for mut seen in [volume(&cartesian, &tf, &material), bcc_volume(&bcc, &tf, &material)] {
         seen.normals = true;
         let volumes = [seen];
-        let of = input(&volumes, &camera, &[]);
-        let [sheets, exact] = [Gradients::Sheets, VOLUME].map(|gradients| off_a_sphere(&of, radius, gradients));
+        let sphere = input(&volumes, &camera, &[]);
+        let [sheets, exact] = [Gradients::Sheets, VOLUME].map(|gradients| off_a_sphere(&sphere, radius, gradients));
         let packing = seen.packing;
         assert!(sheets[0] < 0.35 && sheets[1] < 1.1, "{packing:?}: {sheets:?}");
         assert!(exact[0] < 0.27 && exact[1] < 0.8 && exact[0] < 0.9 * sheets[0], "{packing:?}: {exact:?}, {sheets:?}");

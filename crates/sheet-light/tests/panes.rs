@@ -101,25 +101,25 @@ fn crossing(test: impl Fn(&HalfInput<'_>)) {
 }
 
 /// What slabs across the view show of it, and the depths of its wall.
-fn across_view(of: &HalfInput<'_>, params: &Params) -> (Accumulator, Accumulator, Vec<f32>) {
-    let mut half = Accumulator::new(of.sheets.camera.size, 1, 3, true, true);
-    let wall = fold(of, &HalfParams { sheets: *params, ..HalfParams::default() }, &BEAUTY, &mut half, None).unwrap();
+fn across_view(scene: &HalfInput<'_>, params: &Params) -> (Accumulator, Accumulator, Vec<f32>) {
+    let mut half = Accumulator::new(scene.sheets.camera.size, 1, 3, true, true);
+    let wall = fold(scene, &HalfParams { sheets: *params, ..HalfParams::default() }, &BEAUTY, &mut half, None).unwrap();
     let depth = wall.polygons.depth;
-    let input = SheetInput { lights: of.mapped.clone(), ..of.sheets.clone() };
-    (draw(&input, (of.polygons, &depth), params, &[]), half, depth)
+    let input = SheetInput { lights: scene.mapped.clone(), ..scene.sheets.clone() };
+    (draw(&input, (scene.polygons, &depth), params, &[]), half, depth)
 }
 
 #[test]
 fn panes_that_cross_in_a_volume_are_those_of_a_sweep_along_the_view() {
-    crossing(|of| {
-        let (own, half, depth) = across_view(of, &exact());
+    crossing(|scene| {
+        let (own, half, depth) = across_view(scene, &exact());
         let pixels = own.object.len();
         let seen = |object: u32| own.object.iter().filter(|o| **o == object).count();
         let found = [depth.iter().filter(|d| d.is_finite()).count(), seen(3), seen(4)];
         assert!(found.iter().all(|count| *count > 15), "{found:?} pixels of the wall and the panes");
         let by = [largest(&own.optical_depth[0], &half.optical_depth[0]), apart(&own, &half)];
         assert!(by.iter().all(|by| *by < 1e-5), "{by:?}");
-        let first = |of: &Accumulator, k: usize| of.depth[k].depths(of.optical_depth[0][k], None)[0];
+        let first = |picture: &Accumulator, k: usize| picture.depth[k].depths(picture.optical_depth[0][k], None)[0];
         for k in (0..pixels).filter(|k| own.object[*k] >= 3 && own.optical_depth[0][*k] > 0.0) {
             assert_eq!(own.object[k], half.object[k], "pixel {k}");
             let by = (first(&own, k) - first(&half, k)).abs();
@@ -130,10 +130,10 @@ fn panes_that_cross_in_a_volume_are_those_of_a_sweep_along_the_view() {
 
 #[test]
 fn any_number_of_threads_gives_the_same_bits_with_panes() {
-    crossing(|of| {
+    crossing(|scene| {
         let with = |threads: usize| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-            pool.install(|| across_view(of, &Params::default()).0)
+            pool.install(|| across_view(scene, &Params::default()).0)
         };
         let one = with(1);
         [2, 3, 7].into_iter().for_each(|threads| assert_eq!(with(threads), one, "{threads} threads"));

@@ -44,7 +44,7 @@ fn views(high: DVec3) -> [(Camera, bool); 3] {
 
 /// A few high voxels in a deep field: what shows are their kernels to the rim, where values are those of voxels as far away on the other side. One that
 /// is left out wrongly is missed there, by the value, or by the gradient, or where a shadow is interpolated.
-fn is_drawn_as_with_all(of: Volume<'_>, high: DVec3, kernel: KernelShape) {
+fn is_drawn_as_with_all(volume: Volume<'_>, high: DVec3, kernel: KernelShape) {
     let few = above(0.0);
     let all = above(1e-9);
     // Thin slabs: what a neighbourhood has beyond two kernels is a small part of a step.
@@ -53,12 +53,12 @@ fn is_drawn_as_with_all(of: Volume<'_>, high: DVec3, kernel: KernelShape) {
     let lights = [LitBy { slide: None, light: Light { shape, intensity: [2.0, 1.5, 1.0] }, shadow: Some(&Slope as _) }];
     for (camera, normals) in views(high) {
         let with = |transfer| {
-            let volumes = [Volume { transfer, normals, ..of }];
+            let volumes = [Volume { transfer, normals, ..volume }];
             draw(&input(&volumes, &camera, &lights), &params).unwrap()
         };
         let (found, needed) = with(&few);
         let (expected, whole) = with(&all);
-        let what = format!("{:?}, {kernel:?}, normals {normals}, {:?}", of.packing, camera.projection);
+        let what = format!("{:?}, {kernel:?}, normals {normals}, {:?}", volume.packing, camera.projection);
         let counts = format!("{} of {} voxels", needed.visible, whole.visible);
         assert!(needed.visible * 3 < whole.visible, "{what}: {counts}");
         assert!(expected.channels[0].iter().filter(|c| **c > 0.01).count() > 30, "{what}");

@@ -29,21 +29,21 @@ fn parts_of_a_sheet_that_received_nothing_are_not_shaded() {
 fn pixels_that_are_opaque_are_not_shaded() {
     // Slabs of an optical depth of 1, of which four leave less than the threshold; what is done is looked for every four slabs, and kernels
     // reach two slabs before the block.
-    let of = |params: &Params| {
+    let counted = |params: &Params| {
         let block = grid([40, 40, 64], cubic(0.25), |_| 1.0);
         counts(&block, &[(0.0, 4.0)], 6.0, 96, params)
     };
     let cut = Params { transmittance_cutoff: Params::PAPERS_CUTOFF, ..exact() };
-    let full = of(&exact());
-    let early = of(&cut);
+    let full = counted(&exact());
+    let early = counted(&cut);
     let a_pixel = |counts: SheetCounts| counts.shaded as f64 / (96.0 * 96.0);
     println!("pixels shaded: {:.1} a pixel of the picture, {:.1} with the threshold", a_pixel(full), a_pixel(early));
     assert!(a_pixel(full) >= 64.0 && (4.0..=4.0 + 4.0 + 4.0).contains(&a_pixel(early)), "{full:?}, {early:?}");
     // Beside pixels that are seen through: half of the block is thin.
     let half = grid([40, 40, 64], cubic(0.25), |p| if p.x < 0.0 { 1.0 } else { 0.0 });
-    let of = |params: &Params| counts(&half, &[(0.0, 0.01), (1.0, 4.0)], 6.0, 96, params);
-    let full = of(&exact());
-    let early = of(&cut);
+    let counted = |params: &Params| counts(&half, &[(0.0, 0.01), (1.0, 4.0)], 6.0, 96, params);
+    let full = counted(&exact());
+    let early = counted(&cut);
     println!("half of it is thin: {:.1}, {:.1} with the threshold", a_pixel(full), a_pixel(early));
     assert!(a_pixel(full) >= 64.0 && a_pixel(early) < 0.5 * a_pixel(full) + 0.5 * 12.0, "{full:?}, {early:?}");
 }
@@ -53,7 +53,7 @@ fn x6_traces_of_matter_and_light_are_not_drawn() {
     let half = grid([24; 3], cubic(0.25), |p| if p.x < 0.0 { 1.0 } else { 0.0 });
     let material = Material::default();
     let camera = parallel([0.0, 0.0, 30.0], 6.0, [48, 48]);
-    let of = |extinction: f32, intensity: f32| {
+    let drawn = |extinction: f32, intensity: f32| {
         let shape = LightShape::Directional { direction: DVec3::new(0.6, 0.0, -0.8) };
         let lights = [LitBy { slide: None, light: Light { shape, intensity: [intensity; 3] }, shadow: None }];
         let tf = transfer(&[(0.0, extinction), (0.5, extinction), (1.0, 1e-6)]);
@@ -62,23 +62,23 @@ fn x6_traces_of_matter_and_light_are_not_drawn() {
         let (out, counts) = draw(&input, &exact()).unwrap();
         (out.optical_depth, out.channels, counts.records)
     };
-    let nothing = of(0.0, 1.0);
-    let trace = of(1e-36, 1.0);
+    let nothing = drawn(0.0, 1.0);
+    let trace = drawn(1e-36, 1.0);
     assert!(trace == nothing && trace.2 > 0);
     // Matter that is not yet a trace takes all voxels.
-    assert!(of(1e-12, 1.0).2 > trace.2);
-    assert_eq!(of(0.0, 1e-39).1, of(0.0, 0.0).1);
+    assert!(drawn(1e-12, 1.0).2 > trace.2);
+    assert_eq!(drawn(0.0, 1e-39).1, drawn(0.0, 0.0).1);
     assert!(nothing.1.iter().flatten().any(|v| *v > 0.0));
 }
 
 #[test]
 fn fragments_a_voxel_do_not_follow_the_number_of_slabs_and_shading_does() {
     let block = grid([24; 3], cubic(0.25), |_| 1.0);
-    let of = |width: f64| {
+    let counted = |width: f64| {
         let params = Params { slab_width: Some(width), ..exact() };
         counts(&block, &[(0.0, 0.1)], 3.0, 48, &params)
     };
-    let series = [0.25, 0.125, 0.0625].map(of);
+    let series = [0.25, 0.125, 0.0625].map(counted);
     let a_voxel = |counts: &SheetCounts| counts.fragments as f64 / counts.records as f64;
     for (n, counts) in series.iter().enumerate() {
         let fragments = a_voxel(counts);

@@ -450,10 +450,10 @@ impl<'a> View<'a> {
     /// Mean extinctions on the way of light to the present slab, by volume.
     fn means(&self, light: &Image, sums: &Sums, place: DVec3, extinction: &[f64]) -> Vec<f64> {
         let around = self.around(light, place);
-        let mean = |(sums, own): (&Vec<[f64; 2]>, &f64)| {
+        let mean = |(sums, extinction): (&Vec<[f64; 2]>, &f64)| {
             let [tau, length] =
                 [0, 1].map(|n| around.iter().map(|near| near.weight * sums[near.pixel][n]).sum::<f64>());
-            if length > 0.0 { tau / length } else { *own }
+            if length > 0.0 { tau / length } else { *extinction }
         };
         sums.iter().zip(extinction).map(mean).collect()
     }

@@ -114,18 +114,18 @@ impl<'a> Gathered<'a> {
 
     /// Bytes of what is kept beside the file's own values.
     pub(crate) fn bytes(&self) -> u64 {
-        let own = if matches!(self.values, Cow::Owned(_)) { 4 * self.values.len() as u64 } else { 0 };
-        own + self.bricks.bytes()
+        let owned = if matches!(self.values, Cow::Owned(_)) { 4 * self.values.len() as u64 } else { 0 };
+        owned + self.bricks.bytes()
     }
 
-    /// Reads the sheets of a batch in the pixels that are `wanted`, a bit each. Pixels.
+    /// Reads the sheets of a batch in the pixels of `mask`, a bit each. Returns the number of pixels.
     #[inline(always)]
     pub(crate) fn batch<S: Simd>(
         &self,
         simd: S,
         lines: &SheetLines<'_>,
         batch: u32,
-        wanted: &[u64; SIDE],
+        mask: &[u64; SIDE],
         sheets: &mut Sheets,
     ) -> u64 {
         let mut pixels = 0;
@@ -138,11 +138,11 @@ impl<'a> Gathered<'a> {
         for slab in first..first + BATCH {
             for y in 0..SIDE {
                 let mut tags = 0;
-                if is_seen && wanted[y] != 0 {
+                if is_seen && mask[y] != 0 {
                     let row = Row::new(lines.place(slab, 0, y), lines.place(slab, SIDE - 1, y));
                     if self.bricks.is_any(&row.between(0, SIDE - 1)) {
                         let inside = lines.inside(simd, slab, y);
-                        tags = self.row(simd, &row, wanted[y] & inside, sheets.begin_values(slab, y));
+                        tags = self.row(simd, &row, mask[y] & inside, sheets.begin_values(slab, y));
                     }
                 }
                 pixels += u64::from(tags.count_ones());
@@ -152,13 +152,13 @@ impl<'a> Gathered<'a> {
         pixels
     }
 
-    /// Values of the pixels of a row that are wanted and may show anything, and which these are, a bit each.
+    /// Values of the pixels of a row that `mask` has and that may show anything, and which these are, a bit each.
     #[inline(always)]
-    fn row<S: Simd>(&self, simd: S, row: &Row, wanted: u64, out: &mut [f32]) -> u64 {
+    fn row<S: Simd>(&self, simd: S, row: &Row, mask: u64, out: &mut [f32]) -> u64 {
         let mut tags = 0;
         for x in (0..SIDE).step_by(Lanes::<S>::COUNT) {
             let bits = ((1 << Lanes::<S>::COUNT) - 1) << x & ((1 << SIDE) - 1);
-            if wanted & bits == 0 {
+            if mask & bits == 0 {
                 continue;
             }
             let part = row.between(x, x + Lanes::<S>::COUNT - 1);

@@ -221,7 +221,7 @@ fn light_with_an_extent_comes_through_panes_as_that_of_its_points() {
         };
         let one = draw(&soft, &params, 1);
         let many = draw(&HalfInput { polygons: &all, ..input(volumes, &camera, &points) }, &params, 1);
-        let mean = |of: &[f32]| of.iter().map(|v| f64::from(*v)).sum::<f64>() / of.len() as f64;
+        let mean = |values: &[f32]| values.iter().map(|v| f64::from(*v)).sum::<f64>() / values.len() as f64;
         for [one, many] in
             [[&one.1.polygons.channels[0], &many.1.polygons.channels[0]], [&one.0.channels[0], &many.0.channels[0]]]
         {
@@ -340,8 +340,8 @@ fn hv11_a_pane_seen_and_lit_along_its_plane_gives_numbers_and_any_threads_the_sa
         let one = shown(1);
         let numbers = one.channels.iter().chain(&one.optical_depth).flatten();
         assert!(numbers.clone().all(|v| v.is_finite() && *v >= 0.0));
-        let bits = |of: &Accumulator| {
-            of.channels.iter().chain(&of.optical_depth).flatten().map(|v| v.to_bits()).collect::<Vec<u32>>()
+        let bits = |picture: &Accumulator| {
+            picture.channels.iter().chain(&picture.optical_depth).flatten().map(|v| v.to_bits()).collect::<Vec<u32>>()
         };
         for threads in [2, 3, 7] {
             assert!(bits(&shown(threads)) == bits(&one), "{threads} threads");

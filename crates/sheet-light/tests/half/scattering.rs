@@ -157,9 +157,9 @@ fn ms04_without_albedo_nothing_is_done_and_no_bit_changes() {
     let lights = [sun([1.0, 2.0, 1.0])];
     let input = input(&volumes, &camera, &lights);
     let counts = draw(&input, &params(Scattering::None)).unwrap().1;
-    let wanted = draw(&input, &params(BOTH)).unwrap().1;
-    assert!(counts.scatter_passes == 0 && wanted.scatter_passes > 0);
-    assert_eq!((counts.eye_fragments, counts.light_fragments), (wanted.eye_fragments, wanted.light_fragments));
+    let scattered = draw(&input, &params(BOTH)).unwrap().1;
+    assert!(counts.scatter_passes == 0 && scattered.scatter_passes > 0);
+    assert_eq!((counts.eye_fragments, counts.light_fragments), (scattered.eye_fragments, scattered.light_fragments));
 }
 
 #[test]
@@ -411,12 +411,12 @@ fn media_that_share_cells_mix_by_their_scattering() {
     let same = medium(0.9, 0.4);
     let dark = medium(0.6, 0.4);
     let bright = medium(1.0, 0.4);
-    let of =
+    let balanced =
         |volumes: &[sheet_light::Volume<'_>]| balance(&input(volumes, &camera, &lights), &params(BOTH), 0).unwrap();
-    let whole = of(&[volume(&grid, &sum, &same)]);
+    let whole = balanced(&[volume(&grid, &sum, &same)]);
     // Twice the voxels share the same place: the cells are no larger, for that is what two volumes pay for.
     for (a, b) in [(&same, &same), (&dark, &bright)] {
-        let parts = of(&[volume(&grid, &one, a), volume(&grid, &other, b)]);
+        let parts = balanced(&[volume(&grid, &one, a), volume(&grid, &other, b)]);
         let off = (parts.reflected[0] - whole.reflected[0]).abs() / whole.incident[0];
         assert!(off < 0.01, "{off}: {parts:?}, not {whole:?}");
     }
@@ -433,13 +433,13 @@ fn a_far_lamp_is_a_sun() {
     let at = DVec3::new(1.0, 2.0, 3.0).normalize() * 2e3;
     let mut far = lamp(at.to_array());
     far.light.intensity = [4e6; 3];
-    let of = |light: LitBy<'static>| {
+    let lit_by = |light: LitBy<'static>| {
         let params = HalfParams { voxels_per_cell: 8, ..params(BOTH) };
         let input = input(&volumes, &camera, std::slice::from_ref(&light));
         (draw_apart(&input, &params).0, balance(&input, &params, 0).unwrap())
     };
-    let one = of(far);
-    let other = of(sun([1.0, 2.0, 3.0]));
+    let one = lit_by(far);
+    let other = lit_by(sun([1.0, 2.0, 3.0]));
     let brightest = other.0.channels[MORE].iter().copied().fold(0.0, f32::max);
     let off = largest(&one.0.channels[MORE], &other.0.channels[MORE]) / brightest;
     assert!(off < 0.01, "{off}");

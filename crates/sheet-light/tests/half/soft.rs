@@ -284,11 +284,11 @@ fn against_points(light: &Extended<'static>, points: u32, camera: &Camera) -> [f
     let material = scattering();
     let grid = grid([24, 24, 24], cubic(0.2), lumps);
     let volumes = [volume(&grid, &tf, &material)];
-    let of = |input: HalfInput<'_>| draw(&input, &exact(None)).unwrap().0.channels[1].clone();
-    let truth = of(input(&volumes, camera, &as_points(light, points)));
-    let found = of(soft(&volumes, camera, vec![*light]));
+    let drawn = |input: HalfInput<'_>| draw(&input, &exact(None)).unwrap().0.channels[1].clone();
+    let truth = drawn(input(&volumes, camera, &as_points(light, points)));
+    let found = drawn(soft(&volumes, camera, vec![*light]));
     let centre = Extended { samples: 1, lit: LitBy { slide: None, light: central(&light.lit.light), shadow: None } };
-    let hard = of(soft(&volumes, camera, vec![centre]));
+    let hard = drawn(soft(&volumes, camera, vec![centre]));
     let rmse = |a: &[f32]| {
         let squares: f64 = a.iter().zip(&truth).map(|(a, b)| f64::from(a - b).powi(2)).sum();
         (squares / a.len() as f64).sqrt()

@@ -62,7 +62,7 @@ fn profile(light: &Extended<'static>, tau: f64, is_beside: bool) -> Vec<[f64; 2]
     let beside = block([0.0, -0.6, 1.98], [1.8, 0.6, 2.02], 0.2);
     let opaque = constant(400.0);
     let black = Material { single_scattering_albedo: 0.0, ..scattering() };
-    let of = |casts_shadow: bool| {
+    let lit = |casts_shadow: bool| {
         let mut cloud = Cloud::new(DVec3::ZERO);
         plane(&mut cloud, (DVec3::ZERO, DVec3::Z), 2.0, 3.0, &Splat::default());
         // Discs stand for half a step to either side.
@@ -74,8 +74,8 @@ fn profile(light: &Extended<'static>, tau: f64, is_beside: bool) -> Vec<[f64; 2]
         let volumes = if is_beside { &volumes[..] } else { &[] };
         draw(&with(&shown, soft(volumes, &camera, vec![*light])), &fine(50.0)).0
     };
-    let dark = of(true);
-    let open = of(false);
+    let dark = lit(true);
+    let open = lit(false);
     let places = (0..550).filter_map(|k| {
         let (from, along) = ray(&camera, k % 110, k / 110);
         let place = from - along * (from.z / along.z);

@@ -58,8 +58,8 @@ pub(super) fn plane(cloud: &mut Cloud, (at, normal): (DVec3, DVec3), half: f64, 
     }
 }
 
-pub(super) fn with<'a>(of: &'a Shown, input: HalfInput<'a>) -> HalfInput<'a> {
-    HalfInput { splats: Some(of.splats()), ..input }
+pub(super) fn with<'a>(shown: &'a Shown, input: HalfInput<'a>) -> HalfInput<'a> {
+    HalfInput { splats: Some(shown.splats()), ..input }
 }
 
 /// Radiance of the middle pixel over its opacity.
@@ -282,8 +282,8 @@ fn splats_that_sweeps_cannot_take_are_refused() {
         Shown::new(cloud, &camera, vec![lambert()], slab_width)
     };
     let lights: [LitBy<'_>; 1] = [sun([0.0, 0.0, 1.0])];
-    let refused = |of: &Shown, params: &HalfParams| {
-        draw(&with(of, input(&[], &camera, &lights)), params).err().unwrap().to_string()
+    let refused = |scene: &Shown, params: &HalfParams| {
+        draw(&with(scene, input(&[], &camera, &lights)), params).err().unwrap().to_string()
     };
     let opaque = refused(&shown(SplatKind::Opaque, 1.0), &exact(None));
     assert!(opaque.contains("splat 0 is opaque"), "{opaque}");

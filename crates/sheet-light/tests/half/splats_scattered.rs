@@ -136,12 +136,12 @@ fn a_thin_pane_shows_what_the_medium_scatters_to_either_side_of_it() {
     let lambert = lambert();
     for (eye, expected) in on_either_side() {
         let camera = parallel([0.0, 0.0, eye], 2.0, [9, 9]);
-        let of = |color: [f32; 3]| {
+        let radiance = |color: [f32; 3]| {
             let shown = Shown::new(pane(0.0, (15.0, 0.25), 0.05, color), &camera, vec![lambert], 0.1);
             middle(Some(&shown), &camera)[1]
         };
         // Of a white one more than of a black one, behind half of the slab.
-        let found = PI * (of([1.0; 3]) - of([0.0; 3])) / (-(-0.05f64).exp_m1() * (-1f64).exp());
+        let found = PI * (radiance([1.0; 3]) - radiance([0.0; 3])) / (-(-0.05f64).exp_m1() * (-1f64).exp());
         assert!((found - expected).abs() < 0.03, "eye {eye}: {found}, not {expected}");
     }
 }
@@ -154,13 +154,13 @@ fn volumes_that_reflect_about_their_gradient_show_what_the_medium_scatters_as_a_
         let camera = parallel([0.0, 0.0, eye], 2.0, [9, 9]);
         // Values fall towards the eye. What it takes of the light is lost to the medium: as little as can be told.
         let thin = grid([48, 48, 4], DMat3::from_diagonal(DVec3::new(0.5, 0.5, 0.05)), |p| -p.z * eye);
-        let of = |color: [f32; 3]| {
+        let radiance = |color: [f32; 3]| {
             let point = TransferPoint { value: 0.0, color, extinction: (tau / 0.2) as f32 };
             let tf = TransferFunction::new(vec![point]).unwrap();
             let facets = Volume { normals: true, ..volume(&thin, &tf, &material) };
             middle_beside(&[facets], None, &camera)[1]
         };
-        let found = PI * (of([1.0; 3]) - of([0.0; 3])) / (-(-tau).exp_m1() * (-1f64).exp());
+        let found = PI * (radiance([1.0; 3]) - radiance([0.0; 3])) / (-(-tau).exp_m1() * (-1f64).exp());
         println!("eye {eye}: {found}, {expected}");
         assert!((found - expected).abs() < 0.03, "eye {eye}: {found}, not {expected}");
     }

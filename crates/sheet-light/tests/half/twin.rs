@@ -141,8 +141,8 @@ fn hv_splats_among_volumes_are_those_of_the_twin() {
                 [(sun([1.0, 3.0, 2.0]), None), (sun([-1.0, 2.0, -3.0]), Some(0.3)), (bright, Some(0.4))]
             {
                 let lights = [light];
-                let of = with(&shown, input(volumes, &camera, &lights));
-                let [tau, color] = differences(&of, &exact(slab_width));
+                let scene = with(&shown, input(volumes, &camera, &lights));
+                let [tau, color] = differences(&scene, &exact(slab_width));
                 let what = (volumes.len(), slab_width, light.light.shape);
                 assert!(tau < 1e-5 && color < 2e-4, "{what:?}: {tau:e} {color:e}");
             }
@@ -166,11 +166,11 @@ fn hv_polygons_among_volumes_are_those_of_the_twin_but_at_the_edges_of_shadows()
     for camera in [parallel([3.0, 4.0, 8.0], 5.0, [40, 36]), perspective([2.0, 5.0, 8.0], 38.0, [36, 40])] {
         for (light, slab_width) in [(sun([1.0, 3.0, 2.0]), None), (bright, Some(0.3))] {
             let lights = [light];
-            let of = HalfInput { polygons: &all, ..input(&volumes, &camera, &lights) };
+            let scene = HalfInput { polygons: &all, ..input(&volumes, &camera, &lights) };
             let params = HalfParams { most_light_pixels: 1024, ..exact(slab_width) };
             let mut out = Accumulator::new(camera.size, 1, 3, false, false);
-            let drawn = fold(&of, &params, &BEAUTY, &mut out, None).unwrap();
-            let twin = reference::draw(&of, &params).unwrap();
+            let drawn = fold(&scene, &params, &BEAUTY, &mut out, None).unwrap();
+            let twin = reference::draw(&scene, &params).unwrap();
             let behind = &drawn.polygons.channels[1];
             let mut apart = Vec::new();
             let mut shown = 0;

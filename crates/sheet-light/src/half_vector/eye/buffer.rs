@@ -193,9 +193,9 @@ impl Pixels {
     pub(crate) fn add_colors(&self, band: &Band, colors: usize, to: &mut Accumulator) {
         for row in band.rows.clone() {
             let from = (row - band.top) * band.stride;
-            for (to, own) in to.channels.iter_mut().zip(&self.values).take(colors) {
+            for (to, plane) in to.channels.iter_mut().zip(&self.values).take(colors) {
                 let to = &mut to[row * band.width..][..band.width];
-                to.iter_mut().zip(&own[from..]).for_each(|(to, own)| *to += own);
+                to.iter_mut().zip(&plane[from..]).for_each(|(to, value)| *to += value);
             }
         }
     }

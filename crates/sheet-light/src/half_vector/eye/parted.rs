@@ -27,11 +27,11 @@ impl OneSlab<'_> {
             let n = if is_last_first { most - step } else { step };
             // The n-th part lies before the n-th polygon, as the eye sees it.
             let mut splats = [0.0; MAX_LANES];
-            for (lane, own) in of_lanes.iter().enumerate() {
-                let ends = [n.checked_sub(1), Some(n)].map(|n| n.filter(|n| *n < own.count()));
-                let [before, behind] = ends.map(|n| n.map(|n| panes.depths(own, n)));
+            for (lane, crossed) in of_lanes.iter().enumerate() {
+                let ends = [n.checked_sub(1), Some(n)].map(|n| n.filter(|n| *n < crossed.count()));
+                let [before, behind] = ends.map(|n| n.map(|n| panes.depths(crossed, n)));
                 let [first, last] = if is_back_to_front { [behind, before] } else { [before, behind] };
-                if n > own.count() {
+                if n > crossed.count() {
                     // Fewer polygons, so no part.
                     self.part.from[lane] = f32::INFINITY;
                     self.part.to[lane] = f32::NEG_INFINITY;
@@ -73,8 +73,8 @@ impl OneSlab<'_> {
         n: usize,
     ) {
         let mut fragments = Fragments::NONE;
-        for (lane, own) in of_lanes.iter().enumerate().filter(|(_, own)| n < own.count()) {
-            panes.write(own, n, lane, &mut fragments);
+        for (lane, crossed) in of_lanes.iter().enumerate().filter(|(_, crossed)| n < crossed.count()) {
+            panes.write(crossed, n, lane, &mut fragments);
         }
         let mut before = [0.0; MAX_LANES];
         let green = self.eye.pixels.planes / 2;
@@ -84,8 +84,8 @@ impl OneSlab<'_> {
         }
         self.eye.pixels.append(simd, chunk.k, &fragments);
         if self.keeps_depths() {
-            for (lane, own) in of_lanes.iter().enumerate().filter(|(_, own)| n < own.count()) {
-                let depth = f64::from(panes.depths(own, n).view);
+            for (lane, crossed) in of_lanes.iter().enumerate().filter(|(_, crossed)| n < crossed.count()) {
+                let depth = f64::from(panes.depths(crossed, n).view);
                 let tau = fragments.optical_depth[green][lane];
                 self.eye.pixels.add_depth(chunk.k + lane, depth, depth, before[lane], tau);
             }

@@ -163,9 +163,9 @@ impl Illumination<'_> {
             (0..3).for_each(|p| (0..2).for_each(|n| tau[p][n][lane] = of_each[p][n]));
         }
         for p in 0..3 {
-            let [before, own] = [0, 1].map(|n| Lanes::load(simd, &tau[p][n]));
+            let [before, within] = [0, 1].map(|n| Lanes::load(simd, &tau[p][n]));
             let before = soft.as_ref().map_or(before, |soft| before * soft.share[p]);
-            (0..NODES).for_each(|n| to[p][n] = to[p][n] + before + own);
+            (0..NODES).for_each(|n| to[p][n] = to[p][n] + before + within);
         }
     }
 

@@ -238,8 +238,8 @@ impl<S: Simd> Ways<S> {
     /// How far before a place light is amidst its way through the volume in the slab.
     #[inline(always)]
     pub(crate) fn amidst(&self, simd: S) -> Lanes<S> {
-        let [_, own] = self.lengths(simd);
-        own.mul_add(Lanes::splat(simd, 0.5), self.leaves)
+        let [_, length] = self.lengths(simd);
+        length.mul_add(Lanes::splat(simd, 0.5), self.leaves)
     }
 
     /// Optical depth towards the light, of one extinction before the slab and another within it.

@@ -236,7 +236,7 @@ impl PolygonImage {
 
     /// Adds a share of another one.
     pub(crate) fn add(&mut self, other: &Self, share: f32) {
-        self.values.iter_mut().zip(&other.values).for_each(|(to, own)| *to += share * own);
+        self.values.iter_mut().zip(&other.values).for_each(|(to, value)| *to += share * value);
         for (to, from) in self.received.iter_mut().zip(&other.received) {
             to.shadowed += share * from.shadowed;
             to.whole += share * from.whole;

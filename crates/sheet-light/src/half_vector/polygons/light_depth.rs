@@ -166,7 +166,7 @@ impl LightDepths {
 
     /// Share of the light that polygons let through to a world position, by channel, which lies on a surface of this normal or in the open.
     pub(crate) fn visibility(&self, world: DVec3, face: Option<Vec3>) -> [f32; 3] {
-        self.each(world, face).fold(Vec3::ZERO, |sum, own| sum + own).to_array()
+        self.each(world, face).fold(Vec3::ZERO, |sum, share| sum + share).to_array()
     }
 
     /// The same by the points of the light, of all channels together.

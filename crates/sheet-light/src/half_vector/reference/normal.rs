@@ -34,10 +34,10 @@ impl View<'_> {
             let q = self.place(&eye.camera, pixel, 0.5 * (part.near + part.far));
             Some(DVec4::new(q.x, q.y, q.z, part.value))
         };
-        let Some(own) = sample([0; 3]) else {
+        let Some(here) = sample([0; 3]) else {
             return Vec3::ZERO;
         };
-        let difference = |step: [isize; 3]| sample(step).unwrap_or(own) - sample(step.map(|n| -n)).unwrap_or(own);
+        let difference = |step: [isize; 3]| sample(step).unwrap_or(here) - sample(step.map(|n| -n)).unwrap_or(here);
         let rows = [[1, 0, 0], [0, 1, 0], [0, 0, 1]].map(difference);
         let [x, y, mut z] = rows.map(|row| row.truncate());
         // Without a neighbour across the slabs there is no gradient across them.

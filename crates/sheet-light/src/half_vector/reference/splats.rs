@@ -92,12 +92,12 @@ impl<'a> Splats<'a> {
     /// Comes to a slab: what its splats keep from those behind them, and what comes to those that ask there.
     pub(super) fn enter(&mut self, slab: u32, view: &View<'_>, light: &Image, sums: &Sums, lit: &LitBy<'_>) {
         let mut pixels = std::mem::take(&mut self.pixels);
-        for (at, [before, own, depths]) in pixels.iter_mut().enumerate() {
-            *before += *own;
-            (*own, *depths) = (0.0, 0.0);
+        for (at, [before, within, depths]) in pixels.iter_mut().enumerate() {
+            *before += *within;
+            (*within, *depths) = (0.0, 0.0);
             for i in self.of_slab(slab).filter(|i| self.casts(*i)) {
                 let tau = self.optical_depth(&self.seen_by_light, light, i, at);
-                *own += tau;
+                *within += tau;
                 *depths += tau * (self.places[i].z / view.frame.slabs.width - f64::from(slab));
             }
         }
@@ -127,9 +127,9 @@ impl<'a> Splats<'a> {
     /// Optical depth of what a pixel of the light has up to a depth in the present slab, in slabs: that slab's as if it lay spread over a slab's width
     /// about its mean depth.
     fn of_pixel(&self, pixel: usize, depth: f64) -> f64 {
-        let [before, own, depths] = self.pixels[pixel];
-        let mean = depths / own.max(f64::MIN_POSITIVE);
-        before + own * (depth - mean + 0.5).clamp(0.0, 1.0)
+        let [before, within, depths] = self.pixels[pixel];
+        let mean = depths / within.max(f64::MIN_POSITIVE);
+        before + within * (depth - mean + 0.5).clamp(0.0, 1.0)
     }
 
     /// Mean optical depth, and mean transmittance, of the splats before a place in the present slab.

@@ -135,7 +135,7 @@ fn fill(cell: &mut Cell, grid: &LightGrid, lattices: &[Lattice<'_>], node: GridN
 
 /// Mean asymmetry of all that is scattered, 0 where nothing is.
 pub(crate) fn mean_asymmetry(cells: &[Cell]) -> f64 {
-    let sum = |of: fn(&Cell) -> [f32; 3]| cells.iter().flat_map(of).map(f64::from).sum::<f64>();
+    let sum = |color: fn(&Cell) -> [f32; 3]| cells.iter().flat_map(color).map(f64::from).sum::<f64>();
     let scattering = sum(|cell| cell.scattering);
     if scattering > 0.0 { sum(|cell| cell.forward) / scattering } else { 0.0 }
 }

@@ -73,7 +73,7 @@ impl Scene {
             if others.is_empty() {
                 others = through;
             } else {
-                others.iter_mut().zip(through).for_each(|(to, own)| (0..3).for_each(|c| to[c] *= own[c]));
+                others.iter_mut().zip(through).for_each(|(to, share)| (0..3).for_each(|c| to[c] *= share[c]));
             }
         }
         Self {

@@ -94,7 +94,7 @@ impl<'a> SplatLight<'a> {
 
     /// Sets what some of them get.
     pub(crate) fn set(&mut self, ids: &[u32], through: &[[f32; 3]]) {
-        ids.iter().zip(through).for_each(|(id, own)| self.through[*id as usize] = *own);
+        ids.iter().zip(through).for_each(|(id, share)| self.through[*id as usize] = *share);
     }
 
     /// Optical depth at a splat beside that of the volumes from the light's centre, of a light with an extent, by channel: what its points change,
@@ -107,9 +107,9 @@ impl<'a> SplatLight<'a> {
 
     /// Attenuates what some of them get by what volumes let through.
     pub(crate) fn attenuate(&mut self, ids: &[u32], volumes: &[[f32; 3]]) {
-        for (id, own) in ids.iter().zip(volumes) {
+        for (id, share) in ids.iter().zip(volumes) {
             let through = &mut self.through[*id as usize];
-            (0..3).for_each(|c| through[c] *= own[c]);
+            (0..3).for_each(|c| through[c] *= share[c]);
         }
     }
 
@@ -144,9 +144,9 @@ impl<'a> SplatLight<'a> {
 
     /// Ends a slab: its splats lie before all that comes.
     pub(crate) fn leave(&mut self) {
-        for (sum, own) in self.sums.iter_mut().zip(self.squares.lines()) {
-            if let Some(own) = own {
-                sum.join(own);
+        for (sum, line) in self.sums.iter_mut().zip(self.squares.lines()) {
+            if let Some(line) = line {
+                sum.join(line);
             }
         }
     }

@@ -171,9 +171,9 @@ mod tests {
         for n in 0..10_000 {
             let x = f64::from(n) / 1000.0 - 5.0;
             worst = worst.max((both(x) - normalized(x, &shape)).abs());
-            let sums = [0, 1].map(|of| {
+            let sums = [0, 1].map(|side| {
                 (0..6)
-                    .map(|i| if of == 0 { both(x - f64::from(i)) } else { normalized(x - f64::from(i), &shape) })
+                    .map(|i| if side == 0 { both(x - f64::from(i)) } else { normalized(x - f64::from(i), &shape) })
                     .sum::<f64>()
             });
             edge[0] += (sums[0] - sums[1]).powi(2) / 10_000.0;
