@@ -27,8 +27,8 @@ fn image(bytes: &[u8]) -> Image<Display> {
 }
 
 fn theirs(test: &[u8], reference: &[u8], pixels_per_degree: f32) -> (f64, Vec<f64>) {
-    let of = |bytes: &[u8]| FlipImageRgb8::with_data(SIZE[0] as u32, SIZE[1] as u32, bytes);
-    let map = nv_flip::flip(of(reference), of(test), pixels_per_degree);
+    let image = |bytes: &[u8]| FlipImageRgb8::with_data(SIZE[0] as u32, SIZE[1] as u32, bytes);
+    let map = nv_flip::flip(image(reference), image(test), pixels_per_degree);
     let mean = f64::from(FlipPool::from_image(&map).mean());
     (mean, map.to_vec().into_iter().map(f64::from).collect())
 }

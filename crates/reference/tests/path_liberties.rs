@@ -105,19 +105,19 @@ fn around_a_lamp_inside_a_medium_shadow_is_linear_in_its_coefficient_and_gain_a_
     let camera = parallel(DVec3::Z * 5.0, DVec3::ZERO, 1.2, [2, 2]);
     let ball = Density::Ball { center: DVec3::ZERO, radius: 1.0 };
     let lamp = LightSource::Point { position: DVec3::new(0.05, 0.0, 0.1), intensity: [1.0; 3] };
-    let of = |liberty: Liberty, unshadowed: bool| {
+    let radiance = |liberty: Liberty, unshadowed: bool| {
         let media = vec![Medium { liberty, ..Medium::new(ball, 2.0, 0.9) }];
         let scene = Scene { media, lights: vec![lamp], unshadowed: vec![unshadowed], ..Scene::default() };
         trace(&scene, &camera, &settings(40_000)).radiance
     };
     let nature = Liberty::default();
-    let share = |k: f64| of(Liberty { shadow_coefficient: k, ..nature }, false);
+    let share = |k: f64| radiance(Liberty { shadow_coefficient: k, ..nature }, false);
     let none = share(0.0);
     let half = share(0.5);
     let full = share(1.0);
-    let free = of(nature, true);
-    let ghost = of(Liberty { casts_shadow: false, ..nature }, false);
-    let bright = of(Liberty { gain: 4.0, ..nature }, false);
+    let free = radiance(nature, true);
+    let ghost = radiance(Liberty { casts_shadow: false, ..nature }, false);
+    let bright = radiance(Liberty { gain: 4.0, ..nature }, false);
     for k in 0..4 {
         let at = |s: &reference::Statistics| (s.mean[k][0], s.standard_error[k][0]);
         let same = |a: (f64, f64), b: (f64, f64), what: &str| {
@@ -135,7 +135,7 @@ fn around_a_lamp_inside_a_medium_shadow_is_linear_in_its_coefficient_and_gain_a_
 #[test]
 fn what_cannot_be_followed_is_refused() {
     let ball = Density::Ball { center: DVec3::ZERO, radius: 1.0 };
-    let of = |liberty| Scene {
+    let scene_with = |liberty| Scene {
         media: vec![Medium { liberty, ..Medium::new(ball, 1.0, 0.5) }],
         lights: vec![sun()],
         ..Scene::default()
@@ -144,7 +144,7 @@ fn what_cannot_be_followed_is_refused() {
     let traced = |scene: &Scene<'_>, rules| {
         path_trace(scene, &camera, &PathSettings { samples: 2, rules, ..PathSettings::default() }, None)
     };
-    let bright = of(Liberty { gain: 2.0, ..Liberty::default() });
+    let bright = scene_with(Liberty { gain: 2.0, ..Liberty::default() });
     assert!(traced(&bright, PathRules::default()).unwrap_err().to_string().contains("bounces"));
     assert!(traced(&bright, PathRules { max_bounces: Some(3), ..PathRules::default() }).is_ok());
     for bad in [
@@ -152,13 +152,13 @@ fn what_cannot_be_followed_is_refused() {
         Liberty { gain: -1.0, ..Liberty::default() },
         Liberty { shadow_coefficient: 1.5, ..Liberty::default() },
     ] {
-        assert!(traced(&of(bad), PathRules::default()).is_err(), "{bad:?}");
+        assert!(traced(&scene_with(bad), PathRules::default()).is_err(), "{bad:?}");
     }
-    let two = Scene { unshadowed: vec![true, false], ..of(Liberty::default()) };
+    let two = Scene { unshadowed: vec![true, false], ..scene_with(Liberty::default()) };
     assert!(traced(&two, PathRules::default()).is_err());
     // The marcher follows nature alone.
     let marched = |scene: &Scene<'_>| march_image(scene, &camera, &MarchParams::default(), None);
-    assert!(marched(&of(Liberty::default())).is_ok());
+    assert!(marched(&scene_with(Liberty::default())).is_ok());
     assert!(marched(&bright).is_err());
-    assert!(marched(&Scene { unshadowed: vec![true], ..of(Liberty::default()) }).is_err());
+    assert!(marched(&Scene { unshadowed: vec![true], ..scene_with(Liberty::default()) }).is_err());
 }

@@ -161,16 +161,16 @@ fn an_environment_that_lights_nothing_is_seen_straight_and_by_dielectrics_alone(
         let seen = |surfaces: Vec<Surface<'_>>| {
             trace(&Scene { surfaces, environment: environment.clone(), ..Scene::default() }, &camera, &settings)
         };
-        let of = |kind: SurfaceKind| Surface { mesh: &mesh, material: white(kind) };
-        assert_mean(&seen(vec![of(glass)]), |_| [1.0; 3], 4.5, "glass");
+        let surface = |kind: SurfaceKind| Surface { mesh: &mesh, material: white(kind) };
+        assert_mean(&seen(vec![surface(glass)]), |_| [1.0; 3], 4.5, "glass");
         // Two crossings, and nothing reflected.
-        assert_mean(&seen(vec![of(pane)]), |_| [0.64, 0.25, 0.01], 4.5, "pane");
+        assert_mean(&seen(vec![surface(pane)]), |_| [0.64, 0.25, 0.01], 4.5, "pane");
         // A white box inside of the glass is not lit by what comes through it.
         let inside = Surface { mesh: &inner, material: white(SurfaceKind::Opaque) };
-        for surfaces in [vec![of(SurfaceKind::Opaque)], vec![inside]] {
+        for surfaces in [vec![surface(SurfaceKind::Opaque)], vec![inside]] {
             assert!(seen(surfaces).radiance.mean.iter().flatten().all(|m| *m == 0.0));
         }
-        let reflected = seen(vec![of(glass), inside]);
+        let reflected = seen(vec![surface(glass), inside]);
         let r: f64 = 0.04;
         assert!(
             reflected.radiance.mean.iter().flatten().all(|m| *m > 0.2 * r && *m < 0.2),

@@ -169,7 +169,7 @@ fn closest_any_and_all_hits_are_those_of_brute_force() {
             let target = DVec3::new(u(3), u(4), u(5)) * 0.8;
             let ray = Ray { origin: far + from, direction: (target - from).normalize() };
             let expected = brute_force(&mesh, &ray);
-            visibility.all(&ray, f64::INFINITY, &mut all);
+            visibility.hits(&ray, f64::INFINITY, &mut all);
             let ids: Vec<u32> = all.iter().map(|h| h.triangle).collect();
             assert_eq!(ids, expected.iter().map(|h| h.1).collect::<Vec<_>>(), "ray {i} from {far}");
             let closest = visibility.closest(&ray, f64::INFINITY);
@@ -194,7 +194,7 @@ fn aligned_rays_cross_a_closed_box_twice() {
     for i in -3..=3 {
         for j in -3..=3 {
             let ray = Ray { origin: DVec3::new(f64::from(i) / 4.0, f64::from(j) / 4.0, 5.0), direction: DVec3::NEG_Z };
-            visibility.all(&ray, f64::INFINITY, &mut all);
+            visibility.hits(&ray, f64::INFINITY, &mut all);
             let t: Vec<f64> = all.iter().map(|h| h.t).collect();
             assert_eq!(t, [4.0, 6.0], "{i} {j}");
         }

@@ -141,8 +141,8 @@ impl Classified {
 
     /// Largest extinction of the values in a box of the world.
     pub(crate) fn upper(&self, bounds: &DAabb) -> f64 {
-        let of = DAabb::of_points(bounds.corners().map(|c| self.index(c)));
-        let Some(cells) = clamped_cells(&of, self.last()) else { return 0.0 };
+        let index_box = DAabb::of_points(bounds.corners().map(|c| self.index(c)));
+        let Some(cells) = clamped_cells(&index_box, self.last()) else { return 0.0 };
         let mut low = f32::INFINITY;
         let mut high = f32::NEG_INFINITY;
         let [nx, ny, _] = self.grid.dims;
@@ -210,7 +210,8 @@ struct Cubic([f64; 4]);
 
 impl Cubic {
     /// Through its values at 0, 1/3, 2/3 and 1.
-    fn through([a, b, c, d]: [f64; 4]) -> Self {
+    fn through(values: [f64; 4]) -> Self {
+        let [a, b, c, d] = values;
         // Newton's form: what is 0 stays 0 of values that are alike.
         let first = b - a;
         let second = c - 2.0 * b + a;
@@ -277,9 +278,9 @@ mod tests {
     fn lattice_points_have_their_own_extinction_and_nothing_lies_outside() {
         let v = volume();
         for (i, j, k) in [(0, 0, 0), (3, 2, 1), (5, 4, 3)] {
-            let own = v.transfer.at(v.grid.at_clamped(i, j, k)).extinction;
+            let expected = v.transfer.at(v.grid.at_clamped(i, j, k)).extinction;
             let found = v.extinction(v.grid.position(i as usize, j as usize, k as usize));
-            assert!((found - f64::from(own)).abs() < 1e-4, "{found} and {own}");
+            assert!((found - f64::from(expected)).abs() < 1e-4, "{found} and {expected}");
         }
         let DAabb { min: low, max: high } = v.bounds();
         assert_eq!((v.extinction(low - 0.01), v.extinction(high + 0.01)), (0.0, 0.0));

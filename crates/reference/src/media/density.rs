@@ -137,8 +137,8 @@ impl<'a> Lattice<'a> {
     }
 
     fn upper(&self, bounds: &DAabb) -> f64 {
-        let of = DAabb::of_points(bounds.corners().map(|c| self.index(c)));
-        let Some([x, y, z]) = clamped_cells(&of, self.last) else { return 0.0 };
+        let index_box = DAabb::of_points(bounds.corners().map(|c| self.index(c)));
+        let Some([x, y, z]) = clamped_cells(&index_box, self.last) else { return 0.0 };
         let [nx, ny, _] = self.grid.dims;
         let rows = z.flat_map(|k| y.clone().map(move |j| (k * ny + j) * nx));
         rows.map(|row| self.grid.values[row + x.start()..=row + x.end()].iter().fold(0.0f32, |m, v| m.max(*v)))
@@ -217,8 +217,8 @@ impl Density<'_> {
 
     /// A number that no density inside the box exceeds.
     pub fn upper(&self, bounds: &DAabb) -> f64 {
-        let own = self.bounds();
-        if bounds.max.cmplt(own.min).any() || bounds.min.cmpgt(own.max).any() {
+        let support = self.bounds();
+        if bounds.max.cmplt(support.min).any() || bounds.min.cmpgt(support.max).any() {
             return 0.0;
         }
         let middle = bounds.min + bounds.size() * 0.5;

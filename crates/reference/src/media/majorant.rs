@@ -28,18 +28,18 @@ impl MajorantGrid {
     /// The grid of some media, or `None` when nothing can collide.
     pub(crate) fn new(media: &[Medium<'_>]) -> Option<Self> {
         let some = media.iter().filter(|m| m.largest_extinction() > 0.0);
-        let bounds = some.fold(DAabb::EMPTY, |all, m| all.union(m.density.bounds()));
+        let bounds = some.fold(DAabb::EMPTY, |bounds, m| bounds.union(m.density.bounds()));
         if !bounds.is_solid() {
             return None;
         }
         let size = bounds.size();
         let finest = |a: usize| {
-            let wanted = media.iter().map(|m| {
+            let details = media.iter().map(|m| {
                 let share = size[a] / m.density.bounds().size()[a];
                 (m.density.detail()[a] as f64 * share).ceil() as usize
             });
             // Several media share cells: a few cells each keep them apart.
-            wanted.max().unwrap_or(1).max(if media.len() > 1 { 16 } else { 1 }).min(64)
+            details.max().unwrap_or(1).max(if media.len() > 1 { 16 } else { 1 }).min(64)
         };
         let dims = [finest(0), finest(1), finest(2)];
         let cell = size / DVec3::from_array(dims.map(|d| d as f64));

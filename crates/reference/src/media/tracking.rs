@@ -116,11 +116,11 @@ impl<'a> Volume<'a> {
         let mut left = rng.unit() * sigma;
         let mut chosen = members[0] as usize;
         for &m in members {
-            let own = self.media[m as usize].extinction[0] * self.media[m as usize].density.value(p);
-            if own > 0.0 {
+            let extinction = self.media[m as usize].extinction[0] * self.media[m as usize].density.value(p);
+            if extinction > 0.0 {
                 chosen = m as usize;
             }
-            left -= own;
+            left -= extinction;
             if left < 0.0 {
                 break;
             }
@@ -145,12 +145,12 @@ impl<'a> Volume<'a> {
         for &m in members {
             let medium = &self.media[m as usize];
             let density = medium.density.value(p);
-            let own = medium.extinction.map(|e| e * density);
-            let share: f64 = (0..3).map(|c| weight[c].abs() * own[c]).sum();
-            (0..3).for_each(|c| sum[c] += own[c]);
+            let extinction = medium.extinction.map(|e| e * density);
+            let share: f64 = (0..3).map(|c| weight[c].abs() * extinction[c]).sum();
+            (0..3).for_each(|c| sum[c] += extinction[c]);
             total += share;
             if share > 0.0 && (share == total || rng.unit() * total < share) {
-                (chosen, of_chosen, share_of_chosen) = (m as usize, own, share);
+                (chosen, of_chosen, share_of_chosen) = (m as usize, extinction, share);
             }
         }
         self.count_violation(sum.iter().fold(0.0, |a: f64, s| a.max(*s)), majorant);

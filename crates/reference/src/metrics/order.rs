@@ -66,13 +66,13 @@ impl Rays {
             let n = depths.len() as f64;
             (wrong_pairs(&depths) as f64, 0.5 * n * (n - 1.0).max(0.0), backtrack(&depths))
         };
-        let all: Vec<(f64, f64, f64)> = self.fragments.par_iter().map(of_ray).collect();
+        let of_rays: Vec<(f64, f64, f64)> = self.fragments.par_iter().map(of_ray).collect();
         let rays = self.rays.max(1) as f64;
         Disorder {
             rays: self.rays,
-            wrong_pairs_per_ray: all.iter().map(|r| r.0).sum::<f64>() / rays,
-            pairs_per_ray: all.iter().map(|r| r.1).sum::<f64>() / rays,
-            worst_backtrack: all.iter().map(|r| r.2).fold(0.0, f64::max),
+            wrong_pairs_per_ray: of_rays.iter().map(|r| r.0).sum::<f64>() / rays,
+            pairs_per_ray: of_rays.iter().map(|r| r.1).sum::<f64>() / rays,
+            worst_backtrack: of_rays.iter().map(|r| r.2).fold(0.0, f64::max),
         }
     }
 }

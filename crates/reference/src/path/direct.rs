@@ -112,9 +112,9 @@ impl Tracer<'_> {
                 let share = medium.toward(p, to_light, -travel);
                 let factor = density * medium.liberty.gain;
                 for c in 0..3 {
-                    let own = factor * medium.extinction[c] * share[c];
-                    sum[c] += own;
-                    dimmed[c] += medium.liberty.shadow_coefficient * own;
+                    let scattered = factor * medium.extinction[c] * share[c];
+                    sum[c] += scattered;
+                    dimmed[c] += medium.liberty.shadow_coefficient * scattered;
                 }
             }
         }

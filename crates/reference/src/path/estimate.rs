@@ -198,9 +198,9 @@ fn one_sample(
 }
 
 fn finish(camera: &Camera, settings: &PathSettings, pixels: &[Pixel], samples: u32, violations: u64) -> Estimate {
-    let collect = |of: fn(&Pixel) -> &Running| Statistics {
-        mean: pixels.iter().map(|p| of(p).mean).collect(),
-        standard_error: pixels.iter().map(|p| of(p).standard_error()).collect(),
+    let collect = |running: fn(&Pixel) -> &Running| Statistics {
+        mean: pixels.iter().map(|p| running(p).mean).collect(),
+        standard_error: pixels.iter().map(|p| running(p).standard_error()).collect(),
     };
     Estimate {
         size: camera.size,

@@ -145,7 +145,7 @@ fn fragments(
     y: usize,
     surface_depth: f64,
 ) -> Vec<Fragment> {
-    let mut all: Vec<Fragment> = Vec::new();
+    let mut fragments: Vec<Fragment> = Vec::new();
     for &i in ids {
         let splat = splats[i as usize].as_ref().expect("invariant: listed splats exist");
         let Some(f) = splat.fragment(input, x, y) else { continue };
@@ -156,11 +156,11 @@ fn fragments(
         };
         if seen > 0.0 {
             let depth = if input.order == Order::Centre { splat.depth } else { f.depth };
-            all.push(Fragment { splat: i, depth, optical_depth: f.amount * seen, distance_sq: f.distance_sq });
+            fragments.push(Fragment { splat: i, depth, optical_depth: f.amount * seen, distance_sq: f.distance_sq });
         }
     }
-    all.sort_by(|a, b| a.depth.total_cmp(&b.depth).then(a.splat.cmp(&b.splat)));
-    all
+    fragments.sort_by(|a, b| a.depth.total_cmp(&b.depth).then(a.splat.cmp(&b.splat)));
+    fragments
 }
 
 struct Pixel {

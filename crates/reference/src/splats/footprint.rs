@@ -243,8 +243,10 @@ impl<'a> Splat<'a> {
         let shown = self.pattern.zip(seen);
         let formula = |s: f64| profile(s, self.cutoff_sq_half);
         (s < 1.0 && peak > 0.0).then(|| Fragment {
-            is_solid: shown.as_ref().map_or(core <= CORE, |(of, seen)| of.is_solid(seen, formula(core.min(1.0)))),
-            amount: peak * shown.as_ref().map_or(formula(s), |(of, seen)| of.profile(seen, formula(s))),
+            is_solid: shown
+                .as_ref()
+                .map_or(core <= CORE, |(pattern, seen)| pattern.is_solid(seen, formula(core.min(1.0)))),
+            amount: peak * shown.as_ref().map_or(formula(s), |(pattern, seen)| pattern.profile(seen, formula(s))),
             depth: self.depth + offset,
             distance_sq: s,
             middle: self.depth + offset,
@@ -275,13 +277,13 @@ pub(crate) struct Profile {
 
 /// Of each footprint; norms by numerical integration: shares no closed form with the fast path.
 pub(crate) fn profiles(footprints: &FootprintStack) -> Vec<Profile> {
-    let of = |(id, layer): (usize, &splat_core::Footprint)| {
+    let layer_profile = |(id, layer): (usize, &splat_core::Footprint)| {
         let q = 0.5 * f64::from(layer.cutoff) * f64::from(layer.cutoff);
         let norm = 1.0 / (PI * simpson(|s| profile(s, q)));
         let pattern = footprints.image(id).map(|image| Pattern::new(image, |s| profile(s, q), norm));
         Profile { norm, pattern }
     };
-    footprints.layers().iter().enumerate().map(of).collect()
+    footprints.layers().iter().enumerate().map(layer_profile).collect()
 }
 
 /// Simpson's rule over [0, 1].

@@ -107,10 +107,11 @@ impl Pattern {
     }
 
     fn seen(&self, level: f64, place: DVec2, factor: impl Fn(&Table) -> f64, formula: f64) -> f64 {
-        let of = |k: usize| self.levels.get(k).map_or(formula, |table| factor(table) * table.at(self.half, place));
+        let coverage =
+            |k: usize| self.levels.get(k).map_or(formula, |table| factor(table) * table.at(self.half, place));
         let fine = level.floor();
         let share = level - fine;
-        of(fine as usize) * (1.0 - share) + if share > 0.0 { share * of(fine as usize + 1) } else { 0.0 }
+        coverage(fine as usize) * (1.0 - share) + if share > 0.0 { share * coverage(fine as usize + 1) } else { 0.0 }
     }
 }
 

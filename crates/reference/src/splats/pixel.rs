@@ -48,7 +48,7 @@ impl PixelSum {
         }
         let middle = self.planes() / 2;
         let before = self.optical_depth[middle];
-        self.optical_depth.iter_mut().zip(optical_depth).for_each(|(sum, own)| *sum += own);
+        self.optical_depth.iter_mut().zip(optical_depth).for_each(|(sum, depth)| *sum += depth);
         let behind = self.optical_depth[middle];
         if behind <= before {
             return;
@@ -63,14 +63,14 @@ impl PixelSum {
 
     /// Whether pixel `k` of an accumulator has what was stored of it.
     pub fn is_rounded_in(&self, accumulator: &Accumulator, k: usize) -> bool {
-        let same = |planes: &[Vec<f32>], own: &[f64]| planes.iter().zip(own).all(|(plane, v)| plane[k] == *v as f32);
+        let same = |planes: &[Vec<f32>], sums: &[f64]| planes.iter().zip(sums).all(|(plane, v)| plane[k] == *v as f32);
         same(&accumulator.optical_depth, &self.optical_depth) && same(&accumulator.channels, &self.channels)
     }
 
     /// Rounds it into pixel `k` of an accumulator.
     pub fn store(&self, accumulator: &mut Accumulator, k: usize) {
-        let store = |planes: &mut [Vec<f32>], own: &[f64]| {
-            planes.iter_mut().zip(own).for_each(|(plane, v)| plane[k] = *v as f32);
+        let store = |planes: &mut [Vec<f32>], sums: &[f64]| {
+            planes.iter_mut().zip(sums).for_each(|(plane, v)| plane[k] = *v as f32);
         };
         store(&mut accumulator.optical_depth, &self.optical_depth);
         store(&mut accumulator.channels, &self.channels);

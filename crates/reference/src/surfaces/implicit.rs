@@ -160,12 +160,12 @@ impl<'a> Renderer<'a> {
         (found.unresolved, found.proven) = (0, true);
         for (surface, implicit) in self.scene.implicits.iter().enumerate() {
             let Some((a, b)) = ray.clip(&implicit.bounds, 0.0, t1) else { continue };
-            let own = crossings(implicit.field, ray, a, b, &self.scene.roots);
-            found.unresolved += own.unresolved;
-            found.proven &= own.proven;
-            found.crossings.extend(own.roots.into_iter().map(|t| Crossing { t, surface, hit: None }));
+            let crossed = crossings(implicit.field, ray, a, b, &self.scene.roots);
+            found.unresolved += crossed.unresolved;
+            found.proven &= crossed.proven;
+            found.crossings.extend(crossed.roots.into_iter().map(|t| Crossing { t, surface, hit: None }));
         }
-        self.visibility.all(ray, t1, &mut found.hits);
+        self.visibility.hits(ray, t1, &mut found.hits);
         let first = self.scene.implicits.len();
         let of_mesh = |h: &Hit| Crossing { t: h.t, surface: first + h.mesh as usize, hit: Some(*h) };
         found.crossings.extend(found.hits.iter().map(of_mesh));
@@ -251,13 +251,13 @@ impl<'a> Renderer<'a> {
         self.find(&ray, distance, found);
         let mut left = [1.0; 3];
         for crossing in &found.crossings {
-            let own = match (&from.hit, &crossing.hit) {
+            let is_same = match (&from.hit, &crossing.hit) {
                 (Some(a), Some(b)) => a.id == b.id,
                 // The root itself, found again to its rounding.
                 (None, None) => from.surface == crossing.surface && crossing.t <= self.rounding(at, from.surface),
                 _ => false,
             };
-            if !own {
+            if !is_same {
                 let opacity = self.opacity(&ray, crossing);
                 (0..3).for_each(|c| left[c] *= 1.0 - opacity[c]);
             }

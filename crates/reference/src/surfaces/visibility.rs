@@ -178,7 +178,7 @@ impl Visibility {
     }
 
     /// All hits before distance `t1` into `out`, sorted by distance, then id.
-    pub fn all(&self, ray: &Ray, t1: f64, out: &mut Vec<Hit>) {
+    pub fn hits(&self, ray: &Ray, t1: f64, out: &mut Vec<Hit>) {
         out.clear();
         let (Some(bvh), Some(local)) = (self.bvh.as_ref(), self.local(ray, t1)) else { return };
         bvh.ray_traverse_anyhit(local.ray, |_, i| {
