@@ -52,7 +52,7 @@ impl CombinedField {
     /// # Errors
     /// [`Error::Invalid`] without fields.
     pub fn union(fields: Vec<SharedField>) -> Result<Self, Error> {
-        Self::of(fields, false)
+        Self::with_fields(fields, false)
     }
 
     /// What lies in all of the fields.
@@ -60,7 +60,7 @@ impl CombinedField {
     /// # Errors
     /// [`Error::Invalid`] without fields.
     pub fn intersection(fields: Vec<SharedField>) -> Result<Self, Error> {
-        Self::of(fields, true)
+        Self::with_fields(fields, true)
     }
 
     /// What lies in `a` but not in `b`.
@@ -73,7 +73,7 @@ impl CombinedField {
         Self { parts: vec![Part { field: a, sign: -1.0 }], greatest: true }
     }
 
-    fn of(fields: Vec<SharedField>, greatest: bool) -> Result<Self, Error> {
+    fn with_fields(fields: Vec<SharedField>, greatest: bool) -> Result<Self, Error> {
         if fields.is_empty() {
             return Err(Error::invalid("combination", 0, "fields", 0, "at least one field"));
         }
@@ -119,13 +119,13 @@ impl ScalarField for CombinedField {
 
     fn bound(&self, p: DVec3, radius: f64) -> Option<(f64, f64)> {
         let pick = |a: f64, b: f64| if self.greatest { a.max(b) } else { a.min(b) };
-        let mut all: Option<(f64, f64)> = None;
+        let mut bounds: Option<(f64, f64)> = None;
         for part in &self.parts {
             let (low, high) = part.field.bound(p, radius)?;
             let (low, high) = if part.sign < 0.0 { (-high, -low) } else { (low, high) };
-            all = Some(all.map_or((low, high), |(l, h)| (pick(l, low), pick(h, high))));
+            bounds = Some(bounds.map_or((low, high), |(l, h)| (pick(l, low), pick(h, high))));
         }
-        all
+        bounds
     }
 
     fn steepest(&self, p: DVec3, radius: f64) -> Option<f64> {

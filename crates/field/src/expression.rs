@@ -89,8 +89,8 @@ impl ScalarField for ExpressionField {
         let small = Run::is_small(&self.program);
         for (at, out) in at.chunks(LANES).zip(out.chunks_mut(LANES)) {
             // Lanes without a place of their own take the first.
-            let all = std::array::from_fn(|i| at.get(i).copied().unwrap_or(at[0]));
-            let found: Slopes<LANES> = pulp::Arch::new().dispatch(Run { program: &self.program, small, at: all });
+            let places = std::array::from_fn(|i| at.get(i).copied().unwrap_or(at[0]));
+            let found: Slopes<LANES> = pulp::Arch::new().dispatch(Run { program: &self.program, small, at: places });
             out.iter_mut().zip(at).enumerate().for_each(|(i, (out, p))| *out = self.checked(&found, i, *p));
         }
     }

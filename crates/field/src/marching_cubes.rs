@@ -124,8 +124,8 @@ fn count(signs: &Signs) -> Result<(Vec<Row>, [usize; 2]), Error> {
 }
 
 /// Elements of each layer.
-fn starts(rows: &[Row], per_layer: usize, of: fn(&Row) -> u32, total: usize) -> Vec<usize> {
-    let first: Vec<usize> = rows.iter().step_by(per_layer).map(|r| of(r) as usize).chain([total]).collect();
+fn starts(rows: &[Row], per_layer: usize, count: fn(&Row) -> u32, total: usize) -> Vec<usize> {
+    let first: Vec<usize> = rows.iter().step_by(per_layer).map(|r| count(r) as usize).chain([total]).collect();
     first.windows(2).map(|w| w[1] - w[0]).collect()
 }
 

@@ -68,8 +68,8 @@ impl Solid {
         let bounds = match combination {
             Combination::Union => boxes.fold(DAabb::EMPTY, DAabb::union),
             Combination::Intersection => {
-                let all = DAabb::new(DVec3::NEG_INFINITY, DVec3::INFINITY);
-                boxes.fold(all, |a, b| DAabb::new(a.min.max(b.min), a.max.min(b.max)))
+                let everywhere = DAabb::new(DVec3::NEG_INFINITY, DVec3::INFINITY);
+                boxes.fold(everywhere, |a, b| DAabb::new(a.min.max(b.min), a.max.min(b.max)))
             }
             Combination::Difference => parts[0].bounds,
         };
@@ -166,8 +166,8 @@ struct ClosedField {
 impl ClosedField {
     /// How far `p` lies beyond the farthest wall, negative within all, and the normal of that.
     fn beyond(&self, p: DVec3) -> (f64, DVec3) {
-        let all = self.sides.iter().map(|(normal, offset)| (normal.dot(p) - offset, *normal));
-        all.fold((f64::NEG_INFINITY, DVec3::ZERO), |most, side| if side.0 > most.0 { side } else { most })
+        let distances = self.sides.iter().map(|(normal, offset)| (normal.dot(p) - offset, *normal));
+        distances.fold((f64::NEG_INFINITY, DVec3::ZERO), |most, side| if side.0 > most.0 { side } else { most })
     }
 
     /// Whether a wall counts at `p`, not the field. Where a field has no value outside, as a root has none, the wall does.

@@ -52,7 +52,8 @@ impl Jet {
         }
     }
 
-    fn combine(self, other: Self, [f, a, b, aa, ab, bb]: Partials) -> Self {
+    fn combine(self, other: Self, partials: Partials) -> Self {
+        let [f, a, b, aa, ab, bb] = partials;
         let g = self.gradient;
         let h = other.gradient;
         Self {

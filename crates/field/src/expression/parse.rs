@@ -103,8 +103,8 @@ impl Parser<'_> {
         self.chars.get(self.at).copied()
     }
 
-    fn take(&mut self, wanted: &[char]) -> Option<char> {
-        let c = self.peek().filter(|c| wanted.contains(c))?;
+    fn take(&mut self, accepted: &[char]) -> Option<char> {
+        let c = self.peek().filter(|c| accepted.contains(c))?;
         self.at += 1;
         Some(c)
     }

@@ -69,17 +69,19 @@ impl Stencil<4> {
 }
 
 impl Control<2> {
-    /// The ends of the stretch `a` ≤ `b` of a cell, both 0 to 1.
+    /// Weights at both ends of a stretch of a cell: `ends` are ascending, both 0 to 1.
     #[inline(always)]
-    pub(super) fn linear(cell: usize, [a, b]: [f64; 2], n: usize) -> Self {
+    pub(super) fn linear(cell: usize, ends: [f64; 2], n: usize) -> Self {
+        let [a, b] = ends;
         Self { index: [cell, (cell + 1).min(n - 1)], row: [[1.0 - a, a], [1.0 - b, b]] }
     }
 }
 
 impl Control<4> {
-    /// Bernstein control points of the cubic on the stretch `a` ≤ `b` of a cell, both 0 to 1.
+    /// Bernstein control points of the cubic on a stretch of a cell: `ends` are ascending, both 0 to 1.
     #[inline(always)]
-    pub(super) fn catmull_rom(cell: usize, [a, b]: [f64; 2], n: usize) -> Self {
+    pub(super) fn catmull_rom(cell: usize, ends: [f64; 2], n: usize) -> Self {
+        let [a, b] = ends;
         if n < 2 {
             return Self { index: [0; 4], row: [[0.0, 1.0, 0.0, 0.0]; 4] };
         }

@@ -96,8 +96,8 @@ impl Signs {
             let here = rows.map(|r| r[w]);
             let ahead = rows.map(|r| Self::ahead(r, w));
             let any = (0..4).fold(0, |a, r| a | here[r] | ahead[r]);
-            let all = (0..4).fold(u64::MAX, |a, r| a & here[r] & ahead[r]);
-            let mut crossed = any & !all & self.cells(w);
+            let every = (0..4).fold(u64::MAX, |a, r| a & here[r] & ahead[r]);
+            let mut crossed = any & !every & self.cells(w);
             while crossed != 0 {
                 let i = crossed.trailing_zeros();
                 crossed &= crossed - 1;

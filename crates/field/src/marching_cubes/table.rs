@@ -72,7 +72,7 @@ fn lines(case: u8) -> [Option<usize>; 12] {
 
 fn triangles(case: u8) -> Vec<[u8; 3]> {
     let mut next = lines(case);
-    let mut all = Vec::new();
+    let mut triangles = Vec::new();
     for start in 0..12 {
         let mut polygon = Vec::new();
         let mut edge = start;
@@ -81,10 +81,10 @@ fn triangles(case: u8) -> Vec<[u8; 3]> {
             edge = n;
         }
         if !polygon.is_empty() {
-            all.extend(cut(&polygon).expect("invariant: every polygon has a cut, see the test of the table"));
+            triangles.extend(cut(&polygon).expect("invariant: every polygon has a cut, see the test of the table"));
         }
     }
-    all
+    triangles
 }
 
 /// Triangles of a polygon whose diagonals lie in no face.

@@ -128,8 +128,8 @@ impl Ball {
     /// The shape of a ball that was enlarged because its cell has no samples, `distance` from them at its middle: their
     /// plane where that agrees, within a part of how far the nearest is, and a constant elsewhere.
     pub(super) fn beside(&self, distance: f64, nearest: f64) -> Shape {
-        let all: Vec<usize> = (0..self.samples.len()).collect();
-        let plane = Shape::smooth(self.height(&all, false));
+        let ids: Vec<usize> = (0..self.samples.len()).collect();
+        let plane = Shape::smooth(self.height(&ids, false));
         let off = (plane.pieces[0].constant - distance).abs();
         if off <= AGREES * nearest && self.believes(&plane) {
             plane
@@ -246,12 +246,12 @@ impl Ball {
         last: bool,
         scratch: &mut Scratch,
     ) -> Option<Fit> {
-        let all: Vec<usize> = (0..self.samples.len()).collect();
+        let ids: Vec<usize> = (0..self.samples.len()).collect();
         let tolerance = asked.error / self.radius;
-        let few = all.len() <= 2 * asked.samples;
+        let few = ids.len() <= 2 * asked.samples;
         // A cell that can be divided needs no error beyond the tolerance.
         let enough = if few || last { f64::INFINITY } else { tolerance };
-        let over = self.turns_over(self.mean_normal(&all));
+        let over = self.turns_over(self.mean_normal(&ids));
         let mut best: Option<Fit> = None;
         let mut offer = |fit: Fit| {
             if fit.error < best.as_ref().map_or(f64::INFINITY, |b| b.error) {
@@ -261,7 +261,7 @@ impl Ball {
         };
         let mut done = false;
         if !over || few || last {
-            done = offer(self.fit(Shape::smooth(self.height(&all, true)), enough));
+            done = offer(self.fit(Shape::smooth(self.height(&ids, true)), enough));
         }
         if !done
             && over
@@ -275,7 +275,7 @@ impl Ball {
             });
         }
         if best.is_none() && (few || last) {
-            let shape = Shape::smooth(self.height(&all, false));
+            let shape = Shape::smooth(self.height(&ids, false));
             best = Some(Fit { error: self.error(&shape, f64::INFINITY), shape });
         }
         best

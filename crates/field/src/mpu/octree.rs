@@ -98,19 +98,19 @@ impl Build<'_> {
         }
         let before = self.asked.support * half * 12f64.sqrt();
         self.tree.within(center, before, &mut scratch.ids);
-        let own = scratch.ids.len();
+        let inside = scratch.ids.len();
         let mut radius = before;
         let support = Support { center, inverse: 1.0 / before };
-        if own < self.asked.samples {
+        if inside < self.asked.samples {
             self.tree.nearest(center, self.asked.samples, &mut scratch.nearest);
             let farthest = scratch.nearest.last().map_or(0.0, |n| n.0.sqrt());
             radius = before.max(ENLARGED * farthest);
             self.tree.within(center, radius, &mut scratch.ids);
         }
         let ball = Ball::new(self.tree, &scratch.ids, center, radius, before);
-        let grazes = || own > 0 && before > GRAZES * self.sides.spacing(scratch.nearest[0].1);
-        let last = own < self.asked.samples && !grazes() || depth >= self.asked.depth;
-        if own == 0 {
+        let grazes = || inside > 0 && before > GRAZES * self.sides.spacing(scratch.nearest[0].1);
+        let last = inside < self.asked.samples && !grazes() || depth >= self.asked.depth;
+        if inside == 0 {
             let distance = self.sides.distance(center, &scratch.nearest);
             let shape = ball.beside(distance / radius, scratch.nearest[0].0.sqrt() / radius);
             return Part::Leaf { support, shape: rescaled(shape, radius, before), error: 0.0 };
@@ -177,8 +177,8 @@ impl Octree {
         let mut report =
             MpuReport { samples: tree.samples.len() as u64, tolerance: asked.error, ..MpuReport::default() };
         octree.place(root, 0, 0, &mut report);
-        let all: Vec<u32> = (0..octree.supports.len() as u32).collect();
-        let cells = octree.cells(0, center, half, 0, &all);
+        let ids: Vec<u32> = (0..octree.supports.len() as u32).collect();
+        let cells = octree.cells(0, center, half, 0, &ids);
         octree.ranges = vec![[f64::INFINITY, f64::NEG_INFINITY]; octree.nodes.len()];
         for cell in cells {
             octree.list.extend(cell.list);

@@ -16,7 +16,8 @@ pub(super) struct Quadric {
 
 impl Quadric {
     /// n·y − h(u, v) with h = a·u² + b·uv + c·v² + d·u + e·v + f in the frame (e₁, e₂, n).
-    pub(super) fn height(frame: [DVec3; 3], [a, b, c, d, e, f]: [f64; 6]) -> Self {
+    pub(super) fn height(frame: [DVec3; 3], coefficients: [f64; 6]) -> Self {
+        let [a, b, c, d, e, f] = coefficients;
         let [u, v, n] = frame;
         let product =
             |p: DVec3, q: DVec3| 0.5 * DVec3::new(p.y * q.z + p.z * q.y, p.z * q.x + p.x * q.z, p.x * q.y + p.y * q.x);

@@ -172,15 +172,15 @@ mod tests {
             let mut found = Vec::new();
             for i in 0..50 {
                 let p = sample(1000 + i).position * 1.5;
-                let mut all: Vec<(f64, u32)> =
+                let mut distances: Vec<(f64, u32)> =
                     (0..n).map(|j| (tree.samples[j].position.distance_squared(p), j as u32)).collect();
                 tree.within(p, 0.4, &mut ids);
-                let expected: Vec<u32> = all.iter().filter(|e| e.0 <= 0.4 * 0.4).map(|e| e.1).collect();
+                let expected: Vec<u32> = distances.iter().filter(|e| e.0 <= 0.4 * 0.4).map(|e| e.1).collect();
                 assert_eq!(ids, expected);
-                all.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-                all.truncate(9);
+                distances.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+                distances.truncate(9);
                 tree.nearest(p, 9, &mut found);
-                assert_eq!(found, all);
+                assert_eq!(found, distances);
             }
         }
     }

@@ -61,9 +61,9 @@ impl<'a> Sides<'a> {
             if progress.is_cancelled() {
                 return 0.0;
             }
-            let own = &tree.samples[i];
-            tree.nearest(own.position, 2 * AROUND + 1, found);
-            found.retain(|e| tree.samples[e.1 as usize].normal.dot(own.normal) > ONE_SIDE);
+            let sample = &tree.samples[i];
+            tree.nearest(sample.position, 2 * AROUND + 1, found);
+            found.retain(|e| tree.samples[e.1 as usize].normal.dot(sample.normal) > ONE_SIDE);
             found.truncate(AROUND + 1);
             // The farthest lies on the rim of the disc.
             found.last().map_or(0.0, |e: &(f64, u32)| PI * e.0 / (found.len() as f64 - 0.5))
@@ -102,8 +102,8 @@ impl<'a> Sides<'a> {
             } else if 2 * node < self.tree.nodes() {
                 stack.extend([2 * node + 1, 2 * node]);
             } else {
-                let own = self.tree.span(node);
-                let each = self.tree.samples[own.clone()].iter().zip(&self.areas[own]);
+                let span = self.tree.span(node);
+                let each = self.tree.samples[span.clone()].iter().zip(&self.areas[span]);
                 sum += each.map(|(s, a)| flux(s.normal * *a, s.position - p)).sum::<f64>();
             }
         }
