@@ -12,7 +12,7 @@
 //!
 //! `at_most` holds always: memory that is not to be exceeded is planned with it.
 
-use crate::common::columns::Wanted;
+use crate::common::columns::ColumnSet;
 use crate::field_points::{area, coarse_mesh, density_lattice, surface_lattice, surface_spacing};
 use crate::mesh::borders::open_edges;
 use crate::mesh::mesh_points;
@@ -48,14 +48,14 @@ pub struct Prediction {
 }
 
 impl Prediction {
-    fn new(splats: f64, at_most: Option<f64>, wanted: Wanted) -> Self {
+    fn new(splats: f64, at_most: Option<f64>, columns: ColumnSet) -> Self {
         // Floats become the nearest integer in range.
         let splats = splats.round() as u64;
-        Self { splats, at_most: at_most.map(|n| n as u64), bytes: splats.saturating_mul(wanted.bytes_per_splat()) }
+        Self { splats, at_most: at_most.map(|n| n as u64), bytes: splats.saturating_mul(columns.bytes_per_splat()) }
     }
 
-    fn exact(splats: f64, wanted: Wanted) -> Self {
-        Self::new(splats, Some(splats), wanted)
+    fn exact(splats: f64, columns: ColumnSet) -> Self {
+        Self::new(splats, Some(splats), columns)
     }
 }
 
@@ -74,7 +74,7 @@ impl Prediction {
 /// As the conversion.
 pub fn mesh(mesh: &Mesh, params: &MeshParams) -> Result<Prediction, ConvertError> {
     let plan = mesh_points::plan(mesh, params)?;
-    Ok(Prediction::exact(plan.report.splats as f64, plan.wanted))
+    Ok(Prediction::exact(plan.report.splats as f64, plan.columns))
 }
 
 /// Of [`crate::raw_to_surfels`]; with merged duplicates as if there were none.
@@ -83,7 +83,7 @@ pub fn mesh(mesh: &Mesh, params: &MeshParams) -> Result<Prediction, ConvertError
 /// As the conversion.
 pub fn raw_points(points: &RawPoints, params: &SurfelParams) -> Result<Prediction, ConvertError> {
     surfels::check(points, params)?;
-    Ok(Prediction::exact(points.len() as f64, surfels::wanted(points, params)))
+    Ok(Prediction::exact(points.len() as f64, surfels::column_set(points, params)))
 }
 
 /// Of [`crate::raw_to_matter`].
@@ -93,8 +93,8 @@ pub fn raw_points(points: &RawPoints, params: &SurfelParams) -> Result<Predictio
 pub fn raw_matter(points: &RawPoints, params: &MatterParams) -> Result<Prediction, ConvertError> {
     matter::check(points, params)?;
     let splats = matter::count(points, params) as f64;
-    params.splat.check_cloud(splats, matter::wanted(points, params))?;
-    Ok(Prediction::exact(splats, matter::wanted(points, params)))
+    params.splat.check_cloud(splats, matter::column_set(points, params))?;
+    Ok(Prediction::exact(splats, matter::column_set(points, params)))
 }
 
 /// Of [`crate::volume_to_points`].
@@ -108,14 +108,14 @@ pub fn volume(grid: &Grid, tf: &TransferFunction, params: &VolumeParams) -> Resu
     let factors = lattice_factors(grid, params)?;
     let keep = Keep::new(tf, grid, params);
     if factors == [1; 3] {
-        return Ok(Prediction::exact(keep.count() as f64, params.wanted()));
+        return Ok(Prediction::exact(keep.count() as f64, params.column_set()));
     }
     let finer = factors.iter().map(|f| *f as f64).product::<f64>();
     // Cells around the border of what has extinction count too: finer ones are as much thinner, and about half of them bend little
     // enough to go by their voxel.
     let inside = keep.count_voxels() as f64;
     let kept = inside + (keep.count() as f64 - inside).max(0.0) / (2.0 * libm::cbrt(finer));
-    Ok(Prediction::new(kept * finer, Some(grid.values.len() as f64 * finer), params.wanted()))
+    Ok(Prediction::new(kept * finer, Some(grid.values.len() as f64 * finer), params.column_set()))
 }
 
 /// Of [`crate::surface_to_points`]; the field is looked at on a coarse lattice.
@@ -132,8 +132,8 @@ pub fn surface<F: ScalarField + ?Sized>(
     let coarse = if params.shows() { coarse_mesh(field, bounds, spacing, &params.splat)? } else { Mesh::default() };
     // As if it were smooth.
     let tangent = params.splat.shows_images() || params.opacity >= 1.0 && !open_edges(&coarse).is_empty();
-    let wanted = Wanted { tangent, ..mesh_points::wanted(params.opacity) };
-    Ok(Prediction::new(ZERO_SET_EXCESS * area(&coarse) / (spacing * spacing), None, wanted))
+    let columns = ColumnSet { tangent, ..mesh_points::column_set(params.opacity) };
+    Ok(Prediction::new(ZERO_SET_EXCESS * area(&coarse) / (spacing * spacing), None, columns))
 }
 
 /// About how many values of the field [`crate::surface_to_points`] asks for: a field whose bounds exclude nothing is
@@ -202,11 +202,11 @@ pub fn medium(medium: &HomogeneousMedium, clips: &[Clip], params: &SplatParams) 
         lattice.offsets().filter(|offset| cut(*offset) > 0.0).count() as f64
     };
     Ok(match medium.body {
-        MediumBody::Box(_) => Prediction::exact(kept, Wanted::default()),
+        MediumBody::Box(_) => Prediction::exact(kept, ColumnSet::default()),
         MediumBody::Ball { .. } => {
             // Cells that the surface cuts count whole: a shell of about half a cell.
             let inside = std::f64::consts::PI / 6.0 * (libm::cbrt(cells) + 1.0).powi(3);
-            Prediction::new(inside.min(kept), Some(kept), Wanted::default())
+            Prediction::new(inside.min(kept), Some(kept), ColumnSet::default())
         }
     })
 }
@@ -220,9 +220,9 @@ pub fn rectangle(rectangle: &Rectangle, opacity: f64, params: &SplatParams) -> R
     params.check()?;
     params.check_spacing(spacing * params.transform.scale)?;
     let splats = rectangle_counts(u, v, spacing).iter().product();
-    let wanted = rectangle_columns(opacity, params);
-    params.check_cloud(splats, wanted)?;
-    Ok(Prediction::exact(splats, wanted))
+    let columns = rectangle_columns(opacity, params);
+    params.check_cloud(splats, columns)?;
+    Ok(Prediction::exact(splats, columns))
 }
 
 /// Lattice points from `low` on, times the share of a coarser lattice in the same box that is `positive`.
@@ -246,5 +246,5 @@ fn sampled(
     let cell = |i: usize| at([i % coarse[0], i / coarse[0] % coarse[1], i / coarse[0] / coarse[1]]);
     let hits = (0..points).filter(|i| positive(cell(*i))).count();
     let lattice = [0, 1, 2].map(|a| dims[a] as f64 * factors[a] as f64).iter().product::<f64>();
-    Prediction::new(lattice * hits as f64 / points.max(1) as f64, Some(lattice), params.wanted())
+    Prediction::new(lattice * hits as f64 / points.max(1) as f64, Some(lattice), params.column_set())
 }

@@ -169,8 +169,8 @@ fn meshes_and_splats_end_at_the_border_of_the_domain() {
         mesh.validate().unwrap();
         let at = |i: u32| mesh.origin + mesh.position[i as usize].as_dvec3();
         let highest = (0..mesh.position.len() as u32).map(|i| at(i).z).fold(f64::MIN, f64::max);
-        let of = |t: &[u32; 3]| 0.5 * (at(t[1]) - at(t[0])).cross(at(t[2]) - at(t[0])).length();
-        (mesh.triangles.iter().map(of).sum::<f64>(), highest, mesh)
+        let triangle_area = |t: &[u32; 3]| 0.5 * (at(t[1]) - at(t[0])).cross(at(t[2]) - at(t[0])).length();
+        (mesh.triangles.iter().map(triangle_area).sum::<f64>(), highest, mesh)
     };
     let (whole, top, uncut) = area(&*a);
     assert!((top - 1.0).abs() < 1e-3);
@@ -224,11 +224,11 @@ fn area_and_volume(solid: &Solid) -> [f64; 2] {
     let (cloud, _) = surface_to_points(solid.field.as_ref(), solid.bounds, &params, None).unwrap();
     let area = cloud.cross_section.iter().map(|k| f64::from(*k)).sum::<f64>() / std::f64::consts::LN_2;
     let mesh = field_to_mesh(solid.field.as_ref(), solid.bounds, solid.step, &SplatParams::default(), None).unwrap();
-    let of = |t: &[u32; 3]| {
+    let tetrahedron = |t: &[u32; 3]| {
         let [a, b, c] = t.map(|v| mesh.position[v as usize].as_dvec3());
         a.dot(b.cross(c)) / 6.0
     };
-    [area, mesh.triangles.iter().map(of).sum()]
+    [area, mesh.triangles.iter().map(tetrahedron).sum()]
 }
 
 /// Area that is lost at most where an edge of so much length is cut off within a cell of the lattice, √2 steps wide.

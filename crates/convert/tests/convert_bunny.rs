@@ -57,8 +57,8 @@ fn weights(cloud: &Cloud, tau: f64, points: &[(DVec3, DVec3)]) -> Vec<f64> {
 }
 
 /// Mean weight and the 5 % and 95 % quantiles at about this many splats.
-fn coverage(mesh: &Mesh, wanted: u64) -> (f64, f64, f64) {
-    let params = MeshParams { density: Density::Splats(wanted), opacity: 0.5, ..MeshParams::default() };
+fn coverage(mesh: &Mesh, splats: u64) -> (f64, f64, f64) {
+    let params = MeshParams { density: Density::Splats(splats), opacity: 0.5, ..MeshParams::default() };
     let (cloud, report) = mesh_to_points(mesh, &params, None).unwrap();
     cloud.validate().unwrap();
     let tau = optics::optical_depth(0.5);

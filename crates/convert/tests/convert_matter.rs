@@ -121,7 +121,7 @@ fn points_that_become_one_keep_their_mass_their_middle_and_their_colour() {
     let points = scattered();
     let moments = |cloud: &Cloud| {
         let share = |i: usize| f64::from(cloud.cross_section[i]);
-        let sum = |of: &dyn Fn(usize) -> DVec3| (0..cloud.len()).map(|i| share(i) * of(i)).sum::<DVec3>();
+        let sum = |vector: &dyn Fn(usize) -> DVec3| (0..cloud.len()).map(|i| share(i) * vector(i)).sum::<DVec3>();
         let place = sum(&|i| cloud.position[i].as_dvec3());
         [DVec3::splat(mass(cloud)), place, sum(&|i| Vec3::from_array(cloud.color[i]).as_dvec3())]
     };
@@ -145,11 +145,15 @@ fn neither_order_nor_threads_nor_a_shift_nor_a_power_of_two_changes_a_bit() {
         let once = medium(&points, &params).0;
         let mut order: Vec<usize> = (0..points.len()).collect();
         order.sort_by_key(|i| rng::bits(3, 0, *i as u64, 0));
-        let of = |values: &[f64]| order.iter().map(|i| values[*i]).collect();
+        let reordered = |values: &[f64]| order.iter().map(|i| values[*i]).collect();
         let shuffled = RawPoints {
             position: order.iter().map(|i| points.position[*i]).collect(),
             color: order.iter().map(|i| points.color[*i]).collect(),
-            columns: points.columns.iter().map(|c| Column { name: c.name.clone(), values: of(&c.values) }).collect(),
+            columns: points
+                .columns
+                .iter()
+                .map(|c| Column { name: c.name.clone(), values: reordered(&c.values) })
+                .collect(),
             ..RawPoints::default()
         };
         assert_eq!(medium(&shuffled, &params).0, once, "shuffled");
@@ -177,13 +181,14 @@ fn neither_order_nor_threads_nor_a_shift_nor_a_power_of_two_changes_a_bit() {
 
 #[test]
 fn few_points_and_lone_ones_have_finite_matter() {
-    let of = |position: Vec<Vec3>| medium(&RawPoints { position, ..RawPoints::default() }, &MatterParams::default());
-    assert_eq!(of(Vec::new()).0.len(), 0);
-    assert_eq!(of(vec![Vec3::X]).1.volume, 1.0);
-    assert_eq!(of(vec![Vec3::ZERO, Vec3::X]).0.len(), 2);
+    let matter =
+        |position: Vec<Vec3>| medium(&RawPoints { position, ..RawPoints::default() }, &MatterParams::default());
+    assert_eq!(matter(Vec::new()).0.len(), 0);
+    assert_eq!(matter(vec![Vec3::X]).1.volume, 1.0);
+    assert_eq!(matter(vec![Vec3::ZERO, Vec3::X]).0.len(), 2);
     let mut points = lattice();
     points.position.push(Vec3::splat(1000.0));
-    let (cloud, report) = of(points.position);
+    let (cloud, report) = matter(points.position);
     assert_eq!(report.lone, 1);
     let said = report.said().unwrap();
     assert!(said.starts_with("1 of 1729 points lie so far from others"), "{said}");
@@ -251,8 +256,8 @@ fn text(radius: &str) -> String {
 fn columns_of_matter_are_kept_where_points_become_a_medium_and_only_named_elsewhere() {
     for (name, content) in [("a.ply", ply("0.75")), ("a.pcd", pcd("0.75")), ("a.csv", text("0.75"))] {
         let (points, notes) = read(name, &content);
-        let of = |column: &str| points.column(column, DVec3::Y).unwrap();
-        assert_eq!((of("radius"), of("extinction")), (vec![0.5, 0.75], vec![3.0, 4.0]), "{name}");
+        let column_of = |column: &str| points.column(column, DVec3::Y).unwrap();
+        assert_eq!((column_of("radius"), column_of("extinction")), (vec![0.5, 0.75], vec![3.0, 4.0]), "{name}");
         assert!(notes.unused.is_empty(), "{name}: {:?}", notes.unused);
         let (surface, notes) = bytes(name, content.as_bytes(), &ReadParams::default(), None).unwrap();
         assert_eq!(notes.unused, ["extinction"], "{name}");

@@ -293,10 +293,10 @@ fn x1_any_number_of_threads_gives_the_same_bits() {
 
 #[test]
 fn a_number_of_splats_is_met() {
-    for wanted in [2_000u64, 30_000, 400_000] {
-        let params = MeshParams { density: Density::Splats(wanted), ..MeshParams::default() };
+    for count in [2_000u64, 30_000, 400_000] {
+        let params = MeshParams { density: Density::Splats(count), ..MeshParams::default() };
         let splats = mesh_to_points(&sphere(16), &params, None).unwrap().1.splats as f64;
-        assert!((splats / wanted as f64 - 1.0).abs() < 0.25, "{splats} of {wanted}");
+        assert!((splats / count as f64 - 1.0).abs() < 0.25, "{splats} of {count}");
     }
 }
 

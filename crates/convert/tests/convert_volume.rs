@@ -31,15 +31,15 @@ fn cv07_linear_fields_have_exact_gradients_on_top_of_any_offset() {
 #[test]
 fn cv07_sheared_and_mirrored_lattices_map_gradients_to_space() {
     let axes = DMat3::from_cols(DVec3::new(-0.5, 0.0, 0.0), DVec3::new(0.25, 1.0, 0.0), DVec3::new(0.0, 0.5, 2.0));
-    let wanted = DVec3::new(3.0, -2.0, 1.0);
+    let slope = DVec3::new(3.0, -2.0, 1.0);
     let mut grid = grid([6, 5, 4], DVec3::ONE, |_, _, _| 0.0);
     grid.axes = axes;
     for n in 0..grid.values.len() {
         let p = grid.position(n % 6, n / 6 % 5, n / 30);
-        grid.values[n] = wanted.dot(p) as f32;
+        grid.values[n] = slope.dot(p) as f32;
     }
     for g in sobel_gradient(&grid) {
-        assert!((g.as_dvec3() - wanted).length() < 1e-5, "{g}");
+        assert!((g.as_dvec3() - slope).length() < 1e-5, "{g}");
     }
 }
 

@@ -41,7 +41,7 @@ fn inner(cloud: &Cloud, side: u32, across: f32) -> Vec<usize> {
 /// Σ K·w at a place of the plane y = 0, which discs lie in.
 fn depth_at(cloud: &Cloud, place: DVec2) -> f64 {
     let footprint = Footprint::default();
-    let of = |i: usize| {
+    let disc_depth = |i: usize| {
         let radius = f64::from(cloud.radius[i]);
         let tangent = cloud.tangent_of(i).as_dvec3();
         let long = if tangent == DVec3::ZERO { DVec3::X * radius } else { tangent };
@@ -51,7 +51,7 @@ fn depth_at(cloud: &Cloud, place: DVec2) -> f64 {
         let square = (way.dot(along) / long.length()).powi(2) + (way.dot(along.cross(DVec3::Y)) / radius).powi(2);
         f64::from(cloud.cross_section[i]) * footprint.norm() / (radius * long.length()) * footprint.profile(square)
     };
-    (0..cloud.len()).map(of).sum()
+    (0..cloud.len()).map(disc_depth).sum()
 }
 
 #[test]

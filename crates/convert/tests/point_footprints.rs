@@ -14,14 +14,14 @@ fn stack() -> FootprintStack {
     FootprintStack::default().with_image(2, Arc::new(FootprintImage::new([1, 2], &[0.25, 1.0]).unwrap()))
 }
 
-fn splat(of: &[u8], by_column: bool) -> SplatParams {
-    let choice = FootprintChoice { stack: stack(), of: of.to_vec(), by_column, seed: 7, turn: 0.0 };
-    let profile = stack().layers()[usize::from(of[0])];
-    SplatParams { footprint: of[0], profile, footprints: Some(Arc::new(choice)), ..SplatParams::default() }
+fn splat(ids: &[u8], by_column: bool) -> SplatParams {
+    let choice = FootprintChoice { stack: stack(), of: ids.to_vec(), by_column, seed: 7, turn: 0.0 };
+    let profile = stack().layers()[usize::from(ids[0])];
+    SplatParams { footprint: ids[0], profile, footprints: Some(Arc::new(choice)), ..SplatParams::default() }
 }
 
-fn params(of: &[u8], by_column: bool) -> SurfelParams {
-    SurfelParams { splat: splat(of, by_column), ..SurfelParams::default() }
+fn params(ids: &[u8], by_column: bool) -> SurfelParams {
+    SurfelParams { splat: splat(ids, by_column), ..SurfelParams::default() }
 }
 
 /// A wall of 12 x 12 points that faces +Z, in some order.

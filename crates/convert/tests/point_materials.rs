@@ -37,9 +37,9 @@ fn a_column_gives_each_point_its_material_with_colour_and_opacity() {
     let params = SurfelParams { splat: choice(), ..SurfelParams::default() };
     let cloud = surfels(&points, &params);
     for i in 0..cloud.len() {
-        let of = [CLAY, GLASS][by_parity(cloud.position[i]) as usize];
-        assert_eq!((cloud.material[i], cloud.color[i]), (of.id, of.color));
-        let kind = if of.opacity < 1.0 { SplatKind::Surface } else { SplatKind::Opaque };
+        let material = [CLAY, GLASS][by_parity(cloud.position[i]) as usize];
+        assert_eq!((cloud.material[i], cloud.color[i]), (material.id, material.color));
+        let kind = if material.opacity < 1.0 { SplatKind::Surface } else { SplatKind::Opaque };
         assert_eq!(cloud.kind[i], kind);
     }
     // Colours of the file and an opacity that the object states count before those of materials.
@@ -78,8 +78,8 @@ fn splats_keep_the_numbers_that_their_colours_are_of_where_that_is_asked_for() {
     let heat = |p: Vec3| f64::from(p.x + 12.0 * p.y) * 0.5;
     let asked = PointsShown { color_by: Some(&by), keeps_values: true, ..PointsShown::default() };
     let splat = SplatParams::default();
-    let of = |points: RawPoints, shown: &PointsShown<'_>| shown_points(points.into(), shown, &splat).unwrap();
-    let points = of(wall("heat", heat), &asked).points;
+    let points_shown = |points: RawPoints, shown: &PointsShown<'_>| shown_points(points.into(), shown, &splat).unwrap();
+    let points = points_shown(wall("heat", heat), &asked).points;
     let cloud = surfels(&points, &SurfelParams { values: true, ..SurfelParams::default() });
     assert!((0..144).all(|i| f64::from(cloud.value[i]) == heat(cloud.position[i])));
     assert!(surfels(&points, &SurfelParams::default()).value.is_empty());
@@ -95,7 +95,7 @@ fn splats_keep_the_numbers_that_their_colours_are_of_where_that_is_asked_for() {
     }
     // A value is a number: where one is missing none is kept, and that is said.
     for missing in [f64::NAN, 1e300] {
-        let gaps = of(wall("heat", |p| if p == Vec3::X { missing } else { p.x.into() }), &asked);
+        let gaps = points_shown(wall("heat", |p| if p == Vec3::X { missing } else { p.x.into() }), &asked);
         assert!(gaps.points.value.is_empty());
         let said = "splats keep no values: 1 point without a number that f32 holds";
         assert_eq!(gaps.said.last().map(String::as_str), Some(said));

@@ -197,8 +197,8 @@ fn splats_are_moved_chosen_and_coloured_as_points_are() {
         made(&surfaces, &SurfelParams::default()),
         all.gather(&(0..20).map(|i| 3 * i + 1).collect::<Vec<u32>>())
     );
-    let of = |name: &str| points.column(name, DVec3::Y).unwrap();
-    assert_eq!((of("value")[3], of("crossing_depth")[0]), (f64::from(all.value[3]), 0.0));
+    let numbers = |name: &str| points.column(name, DVec3::Y).unwrap();
+    assert_eq!((numbers("value")[3], numbers("crossing_depth")[0]), (f64::from(all.value[3]), 0.0));
     assert!(points.column_names().any(|name| name == "cross_section") && points.column("heat", DVec3::Y).is_none());
 }
 

@@ -13,12 +13,12 @@ use splat_core::{
 use std::sync::Arc;
 
 /// A lattice of n³ points over a cube about 0 with half a side `reach`, sheared, with the values of a function.
-fn grid(n: usize, reach: f64, of: impl Fn(DVec3) -> f64) -> Arc<Grid> {
+fn grid(n: usize, reach: f64, value: impl Fn(DVec3) -> f64) -> Arc<Grid> {
     let step = 2.0 * reach / (n - 1) as f64;
     let axes = DMat3::from_cols(DVec3::X, DVec3::new(0.1, 1.0, 0.0), DVec3::Z) * step;
     let origin = -(axes * DVec3::splat(0.5 * (n - 1) as f64));
     let at = |i: usize| origin + axes * DVec3::from_array([i % n, i / n % n, i / n / n].map(|k| k as f64));
-    Grid { origin, axes, dims: [n; 3], values: (0..n * n * n).map(|i| of(at(i)) as f32).collect() }.into()
+    Grid { origin, axes, dims: [n; 3], values: (0..n * n * n).map(|i| value(at(i)) as f32).collect() }.into()
 }
 
 /// From red at 0 to blue at 1, `share` of opacity at both ends.

@@ -226,16 +226,16 @@ pub(crate) fn colored_numbers(numbers: Vec<f64>, by: &ColorBy, splat: &SplatPara
 
 /// The least whole numbers that occur, rising.
 fn present(numbers: &[f64]) -> Vec<f64> {
-    let least = |mut all: Vec<f64>| {
-        all.sort_unstable_by(f64::total_cmp);
-        all.dedup();
-        all.truncate(MOST_PRESENT);
-        all
+    let least = |mut values: Vec<f64>| {
+        values.sort_unstable_by(f64::total_cmp);
+        values.dedup();
+        values.truncate(MOST_PRESENT);
+        values
     };
     // −0 is 0.
     let of_chunk = |chunk: &[f64]| least(chunk.iter().filter(|n| n.is_finite()).map(|n| n.round() + 0.0).collect());
     let of_chunks = numbers.par_chunks(CHUNK).map(of_chunk);
-    of_chunks.reduce(Vec::new, |all, more| least([all, more].concat()))
+    of_chunks.reduce(Vec::new, |first, second| least([first, second].concat()))
 }
 
 /// The numbers below which the first and all but the last hundredth of a column lie; gaps do not count.
@@ -275,7 +275,7 @@ mod tests {
         RawPoints { position: vec![Vec3::ZERO; columns[0].values.len()], columns, ..RawPoints::default() }
     }
 
-    fn of(values: Vec<f64>, colors: PointColors) -> Colored {
+    fn colored_column(values: Vec<f64>, colors: PointColors) -> Colored {
         let by = ColorBy { column: "it".into(), colors };
         colored(&points(values), &by, DVec3::Y, &SplatParams { color: [0.5, 0.25, 0.125], ..SplatParams::default() })
             .expect("a column that is there")
@@ -284,9 +284,9 @@ mod tests {
     #[test]
     fn a_ramp_has_the_map_s_own_colours_at_its_ends_and_in_its_middle() {
         let map = ColorMap::VIRIDIS;
-        let of_range = of(vec![-3.0, -2.0, 0.0, 2.0, 9.0], PointColors::map_over(map, [-2.0, 2.0]));
+        let of_range = colored_column(vec![-3.0, -2.0, 0.0, 2.0, 9.0], PointColors::map_over(map, [-2.0, 2.0]));
         assert_eq!(of_range.color, [0.0, 0.0, 0.5, 1.0, 1.0].map(|place| map.at(place)));
-        let of_data = of((0..=100).map(f64::from).collect(), PointColors::map(map));
+        let of_data = colored_column((0..=100).map(f64::from).collect(), PointColors::map(map));
         assert_eq!(of_data.range, Some([1.0, 99.0]));
         assert_eq!([of_data.color[0], of_data.color[50], of_data.color[100]], [map.at(0.0), map.at(0.5), map.at(1.0)]);
     }
@@ -295,7 +295,7 @@ mod tests {
     fn a_logarithmic_map_has_powers_at_equal_places_and_leaves_out_what_has_none() {
         let map = ColorMap::VIRIDIS;
         let colors = PointColors::Map { map, range: Some([1e-2, 1e2]), scale: MapScale::Logarithmic };
-        let found = of(vec![1e-2, 1e-1, 1.0, 1e2, 0.0, -5.0], colors);
+        let found = colored_column(vec![1e-2, 1e-1, 1.0, 1e2, 0.0, -5.0], colors);
         for (color, place) in found.color.iter().zip([0.0, 0.25, 0.5, 1.0]) {
             let expected = map.at(place);
             assert!((0..3).all(|c| (color[c] - expected[c]).abs() < 1e-6), "{color:?} for {expected:?}");
@@ -303,7 +303,7 @@ mod tests {
         assert_eq!((found.gaps, &found.color[4..]), (2, &[[0.5, 0.25, 0.125]; 2][..]));
         // Percentiles are those of the numbers that show.
         let colors = PointColors::Map { map, range: None, scale: MapScale::Logarithmic };
-        assert_eq!(of(vec![-1.0, 0.0, 1.0, 10.0], colors).range, Some([1.0, 10.0]));
+        assert_eq!(colored_column(vec![-1.0, 0.0, 1.0, 10.0], colors).range, Some([1.0, 10.0]));
         for place in [0.0, 0.3, 1.0] {
             let scale = MapScale::Logarithmic;
             assert!((scale.place(scale.number(place, [2.0, 5.0]), [2.0, 5.0]) - place).abs() < 1e-12);
@@ -313,37 +313,37 @@ mod tests {
     #[test]
     fn a_diverging_map_has_nothing_in_its_middle() {
         let map = ColorMap::named("coolwarm").expect("a map");
-        assert_eq!(of(vec![-1.0, 0.0, 3.0], PointColors::map(map)).range, Some([-3.0, 3.0]));
-        assert_eq!(of(vec![1.0, 2.0, 3.0], PointColors::map(map)).range, Some([1.0, 3.0]));
+        assert_eq!(colored_column(vec![-1.0, 0.0, 3.0], PointColors::map(map)).range, Some([-3.0, 3.0]));
+        assert_eq!(colored_column(vec![1.0, 2.0, 3.0], PointColors::map(map)).range, Some([1.0, 3.0]));
     }
 
     #[test]
     fn neither_the_order_nor_a_shift_nor_a_scale_changes_a_colour() {
         let numbers: Vec<f64> = (0..999).map(|i| f64::from(i * 37 % 999)).collect();
         let colors = || PointColors::map(ColorMap::TURBO);
-        let once = of(numbers.clone(), colors()).color;
-        let mut back = of(numbers.iter().rev().copied().collect(), colors()).color;
+        let once = colored_column(numbers.clone(), colors()).color;
+        let mut back = colored_column(numbers.iter().rev().copied().collect(), colors()).color;
         back.reverse();
         assert_eq!(once, back);
-        assert_eq!(once, of(numbers.iter().map(|n| 1024.0 * n + 1e7).collect(), colors()).color);
+        assert_eq!(once, colored_column(numbers.iter().map(|n| 1024.0 * n + 1e7).collect(), colors()).color);
     }
 
     #[test]
     fn a_column_of_one_number_has_the_middle_and_gaps_have_the_object_s_colour() {
-        let found = of(vec![4.0, f64::NAN, 4.0, f64::INFINITY], PointColors::map(ColorMap::TURBO));
+        let found = colored_column(vec![4.0, f64::NAN, 4.0, f64::INFINITY], PointColors::map(ColorMap::TURBO));
         let middle = ColorMap::TURBO.at(0.5);
-        let own = [0.5, 0.25, 0.125];
-        assert_eq!((found.color, found.gaps), (vec![middle, own, middle, own], 2));
-        assert_eq!(of(vec![f64::NAN], PointColors::map(ColorMap::TURBO)).color, [own]);
+        let object_color = [0.5, 0.25, 0.125];
+        assert_eq!((found.color, found.gaps), (vec![middle, object_color, middle, object_color], 2));
+        assert_eq!(colored_column(vec![f64::NAN], PointColors::map(ColorMap::TURBO)).color, [object_color]);
     }
 
     #[test]
     fn classes_have_colours_of_their_own_and_others_come_in_turns() {
-        let found = of(vec![2.0, 6.0, 64.0, 76.0, 255.0, -1.0, 2.2], PointColors::Classes).color;
+        let found = colored_column(vec![2.0, 6.0, 64.0, 76.0, 255.0, -1.0, 2.2], PointColors::Classes).color;
         assert_eq!(found[0], linear_from_hex(0xa67c52));
         assert!(found[0] != found[1] && found[2] == found[3] && found[6] == found[0]);
         assert_eq!([class_name(2), class_name(6), class_name(64)], [Some("ground"), Some("building"), None]);
-        let turns = of(vec![0.0, 12.0, -12.0, 1.0, 1e300], PointColors::Distinct).color;
+        let turns = colored_column(vec![0.0, 12.0, -12.0, 1.0, 1e300], PointColors::Distinct).color;
         assert!(turns[0] == turns[1] && turns[0] == turns[2] && turns[0] != turns[3]);
     }
 
@@ -351,7 +351,7 @@ mod tests {
     fn a_transfer_function_gives_its_colours() {
         let point = |value, red| TransferPoint { value, color: [red, 0.0, 1.0], extinction: 0.0 };
         let transfer = TransferFunction::new(vec![point(0.0, 0.0), point(4.0, 1.0)]).expect("rising values");
-        let found = of(vec![1.0, 9.0], PointColors::Transfer(transfer, Classified::No));
+        let found = colored_column(vec![1.0, 9.0], PointColors::Transfer(transfer, Classified::No));
         assert_eq!((found.color, found.classified), (vec![[0.25, 0.0, 1.0], [1.0, 0.0, 1.0]], Vec::new()));
     }
 
@@ -359,9 +359,10 @@ mod tests {
     fn a_transfer_function_classifies_and_gaps_stay_what_they_are() {
         let point = |value, extinction| TransferPoint { value, color: [1.0; 3], extinction };
         let transfer = TransferFunction::new(vec![point(0.0, 0.0), point(4.0, 1.0)]).expect("rising values");
-        let of = |by| of(vec![-1.0, 1.0, f64::NAN, 9.0], PointColors::Transfer(transfer.clone(), by)).classified;
-        assert_eq!(of(Classified::Opacity), [0.0, 0.25, 1.0, 1.0]);
-        assert_eq!(of(Classified::Extinction), [0.0, 0.25, 0.0, 1.0]);
+        let classified =
+            |by| colored_column(vec![-1.0, 1.0, f64::NAN, 9.0], PointColors::Transfer(transfer.clone(), by)).classified;
+        assert_eq!(classified(Classified::Opacity), [0.0, 0.25, 1.0, 1.0]);
+        assert_eq!(classified(Classified::Extinction), [0.0, 0.25, 0.0, 1.0]);
     }
 
     #[test]

@@ -117,8 +117,8 @@ mod tests {
     fn maps_for_measures_grow_brighter_all_along() {
         let luminance = |c: [f32; 3]| 0.2126 * c[0] + 0.7152 * c[1] + 0.0722 * c[2];
         for map in [VIRIDIS, MAGMA, INFERNO, PLASMA, CIVIDIS, GREY] {
-            let all: Vec<f32> = (0..=90).map(|i| luminance(map.at(f64::from(i) / 90.0))).collect();
-            assert!(all.windows(2).all(|w| w[1] > w[0]), "{map:?}");
+            let luminances: Vec<f32> = (0..=90).map(|i| luminance(map.at(f64::from(i) / 90.0))).collect();
+            assert!(luminances.windows(2).all(|w| w[1] > w[0]), "{map:?}");
         }
     }
 }

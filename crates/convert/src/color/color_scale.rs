@@ -99,7 +99,7 @@ mod tests {
     use splat_core::glam::{DVec3, Vec3};
     use splat_core::{RawPoints, TransferPoint};
 
-    fn of(heights: &[f32], colors: PointColors) -> Option<ColorScale> {
+    fn survey_scale(heights: &[f32], colors: PointColors) -> Option<ColorScale> {
         let position = heights.iter().map(|y| Vec3::Y * *y).collect();
         let by = ColorBy { column: "height".into(), colors };
         let points = RawPoints { position, ..RawPoints::default() };
@@ -109,29 +109,30 @@ mod tests {
 
     #[test]
     fn a_map_is_told_from_end_to_end_in_the_colours_of_the_points() {
-        let scale = of(&[2.0, 4.0, 10.0], PointColors::map_over(ColorMap::TURBO, [2.0, 10.0])).expect("a scale");
+        let scale =
+            survey_scale(&[2.0, 4.0, 10.0], PointColors::map_over(ColorMap::TURBO, [2.0, 10.0])).expect("a scale");
         assert_eq!(scale.numbers, ScaleNumbers::Range([2.0, 10.0]));
         assert_eq!([2.0, 4.0, 11.0].map(|n| scale.color(n)), [0.0, 0.25, 1.0].map(|place| ColorMap::TURBO.at(place)));
-        assert_eq!(of(&[f32::NAN], PointColors::map(ColorMap::TURBO)), None);
+        assert_eq!(survey_scale(&[f32::NAN], PointColors::map(ColorMap::TURBO)), None);
     }
 
     #[test]
     fn classes_are_those_that_occur_with_their_meanings() {
-        let scale = of(&[6.0, 2.0, 6.2, 70.0, 2.0], PointColors::Classes).expect("a scale");
+        let scale = survey_scale(&[6.0, 2.0, 6.2, 70.0, 2.0], PointColors::Classes).expect("a scale");
         assert_eq!(scale.numbers, ScaleNumbers::Each(vec![2.0, 6.0, 70.0]));
         assert_eq!([2.0, 6.0, 70.0].map(|n| scale.meaning(n)), [Some("ground"), Some("building"), None]);
-        assert_eq!(of(&[2.0], PointColors::Distinct).expect("a scale").meaning(2.0), None);
+        assert_eq!(survey_scale(&[2.0], PointColors::Distinct).expect("a scale").meaning(2.0), None);
     }
 
     #[test]
     fn of_a_transfer_function_the_part_that_shows_is_told_and_all_where_nothing_tells() {
-        let of = |extinctions: &[f32]| {
+        let numbers = |extinctions: &[f32]| {
             let point = |(i, e): (usize, &f32)| TransferPoint { value: i as f32, color: [1.0; 3], extinction: *e };
             let transfer = TransferFunction::new(extinctions.iter().enumerate().map(point).collect()).expect("rising");
             ColorScale::of_values("head", &transfer).numbers
         };
-        assert_eq!(of(&[0.0, 0.0, 1.0, 0.0, 0.0]), ScaleNumbers::Range([1.0, 3.0]));
-        assert_eq!(of(&[1.0, 0.0, 0.0]), ScaleNumbers::Range([0.0, 1.0]));
-        assert_eq!(of(&[0.0, 0.0, 0.0]), ScaleNumbers::Range([0.0, 2.0]));
+        assert_eq!(numbers(&[0.0, 0.0, 1.0, 0.0, 0.0]), ScaleNumbers::Range([1.0, 3.0]));
+        assert_eq!(numbers(&[1.0, 0.0, 0.0]), ScaleNumbers::Range([0.0, 1.0]));
+        assert_eq!(numbers(&[0.0, 0.0, 0.0]), ScaleNumbers::Range([0.0, 2.0]));
     }
 }

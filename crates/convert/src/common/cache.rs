@@ -139,13 +139,13 @@ impl Cache {
             }
         }
         others.sort();
-        let mut all: u64 = others.iter().map(|(_, _, bytes)| bytes).sum();
+        let mut used: u64 = others.iter().map(|(_, _, bytes)| bytes).sum();
         for (_, path, bytes) in others {
-            if all + needed <= self.max_bytes {
+            if used + needed <= self.max_bytes {
                 break;
             }
             fs::remove_file(path)?;
-            all -= bytes;
+            used -= bytes;
         }
         Ok(())
     }
@@ -179,8 +179,9 @@ fn read<T: Pod>(file: &Path, key: &[u8; 32], count: usize) -> io::Result<Option<
     opened.read_exact(&mut head)?;
     opened.read_exact(bytemuck::cast_slice_mut(&mut numbers))?;
     let (magic, rest) = head.split_at(MAGIC.len());
-    let (of, hash) = rest.split_at(32);
-    if magic != MAGIC || of != key || hash != Sha256::digest(bytemuck::cast_slice::<T, u8>(&numbers)).as_slice() {
+    let (stored_key, hash) = rest.split_at(32);
+    if magic != MAGIC || stored_key != key || hash != Sha256::digest(bytemuck::cast_slice::<T, u8>(&numbers)).as_slice()
+    {
         return Err(damaged());
     }
     // When it was used last; where that cannot be written, it goes sooner.

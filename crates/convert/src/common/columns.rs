@@ -12,7 +12,7 @@ pub(crate) const CHUNK: usize = 1 << 14;
 
 /// Which optional columns a conversion fills.
 #[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct Wanted {
+pub(crate) struct ColumnSet {
     /// Unit normals.
     pub(crate) normal: bool,
     /// Normals of shading.
@@ -29,7 +29,7 @@ pub(crate) struct Wanted {
     pub(crate) gaussian: Option<u8>,
 }
 
-impl Wanted {
+impl ColumnSet {
     /// Bytes of one splat in all columns.
     pub(crate) fn bytes_per_splat(self) -> u64 {
         let required = size_of::<Vec3>() + 2 * size_of::<f32>() + size_of::<[f32; 3]>();
@@ -48,27 +48,27 @@ pub(crate) fn size_columns(
     cloud: &mut Cloud,
     n: usize,
     kind: SplatKind,
-    wanted: Wanted,
+    columns: ColumnSet,
     params: &SplatParams,
 ) -> Result<(), ConvertError> {
     check_kind(kind, params)?;
-    params.check_cloud(n as f64, wanted)?;
-    let full = |_| params.exceeded(n as f64 * wanted.bytes_per_splat() as f64, None, "bytes");
+    params.check_cloud(n as f64, columns)?;
+    let full = |_| params.exceeded(n as f64 * columns.bytes_per_splat() as f64, None, "bytes");
     sized(&mut cloud.position, n).map_err(full)?;
     sized(&mut cloud.radius, n).map_err(full)?;
     sized(&mut cloud.cross_section, n).map_err(full)?;
     sized(&mut cloud.color, n).map_err(full)?;
-    sized(&mut cloud.normal, if wanted.normal { n } else { 0 }).map_err(full)?;
-    sized(&mut cloud.shading_normal, if wanted.shading_normal { n } else { 0 }).map_err(full)?;
-    sized(&mut cloud.tangent, if wanted.tangent { n } else { 0 }).map_err(full)?;
-    sized(&mut cloud.shadow_coefficient, if wanted.shadow_coefficient { n } else { 0 }).map_err(full)?;
-    sized(&mut cloud.value, if wanted.value { n } else { 0 }).map_err(full)?;
-    sized(&mut cloud.crossing_depth, if wanted.crossing_depth { n } else { 0 }).map_err(full)?;
+    sized(&mut cloud.normal, if columns.normal { n } else { 0 }).map_err(full)?;
+    sized(&mut cloud.shading_normal, if columns.shading_normal { n } else { 0 }).map_err(full)?;
+    sized(&mut cloud.tangent, if columns.tangent { n } else { 0 }).map_err(full)?;
+    sized(&mut cloud.shadow_coefficient, if columns.shadow_coefficient { n } else { 0 }).map_err(full)?;
+    sized(&mut cloud.value, if columns.value { n } else { 0 }).map_err(full)?;
+    sized(&mut cloud.crossing_depth, if columns.crossing_depth { n } else { 0 }).map_err(full)?;
     constant(&mut cloud.kind, n, kind);
     constant(&mut cloud.material, n, params.material);
     constant(&mut cloud.footprint, n, params.footprint);
     constant(&mut cloud.object, n, params.object);
-    sized(&mut cloud.gaussian, if wanted.gaussian.is_some() { n } else { 0 }).map_err(full)?;
+    sized(&mut cloud.gaussian, if columns.gaussian.is_some() { n } else { 0 }).map_err(full)?;
     cloud.gaussians = Arc::default();
     Ok(())
 }

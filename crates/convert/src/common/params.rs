@@ -2,7 +2,7 @@
 
 #[cfg(feature = "cache")]
 use crate::Cache;
-use crate::common::columns::Wanted;
+use crate::common::columns::ColumnSet;
 use crate::{ConvertError, FootprintChoice, PointMaterial};
 use splat_core::{Exceeded, Footprint, Limits, Similarity};
 use std::sync::Arc;
@@ -138,9 +138,9 @@ impl SplatParams {
     }
 
     /// Refuses a cloud of more splats or bytes than the limits.
-    pub(crate) fn check_cloud(&self, splats: f64, wanted: Wanted) -> Result<(), ConvertError> {
+    pub(crate) fn check_cloud(&self, splats: f64, columns: ColumnSet) -> Result<(), ConvertError> {
         self.check_count(splats)?;
-        self.check_limit(splats * wanted.bytes_per_splat() as f64, self.limits.max_bytes, "bytes")
+        self.check_limit(splats * columns.bytes_per_splat() as f64, self.limits.max_bytes, "bytes")
     }
 
     /// Refuses more of something than the limit.

@@ -30,11 +30,11 @@ pub(crate) fn clipped_by(mesh: Arc<Mesh>, clips: &[Clip], mut cut: impl FnMut(Me
     if clips.is_empty() {
         return mesh;
     }
-    let mut all = Arc::unwrap_or_clone(mesh);
-    if all.normal.is_empty() {
-        all.normal = vertex_normals(&all);
+    let mut whole = Arc::unwrap_or_clone(mesh);
+    if whole.normal.is_empty() {
+        whole.normal = vertex_normals(&whole);
     }
-    clips.iter().flat_map(Clip::half_spaces).fold(all, |mesh, (normal, offset)| cut(mesh, normal, offset)).into()
+    clips.iter().flat_map(Clip::half_spaces).fold(whole, |mesh, (normal, offset)| cut(mesh, normal, offset)).into()
 }
 
 /// A vertex on the border of a half-space.

@@ -76,7 +76,7 @@ pub fn lidded_mesh(mesh: Arc<Mesh>, clips: &[Clip]) -> (Arc<Mesh>, LidReport) {
 
 /// Adds the lid between edges along a plane.
 fn close(mesh: &mut Mesh, normal: DVec3, edges: &[[Rim; 2]], report: &mut LidReport) {
-    let mut outlines = Outlines::of(mesh, edges);
+    let mut outlines = Outlines::from_edges(mesh, edges);
     outlines.close(report);
     let (places, triangles) = fill(&outlines, normal);
     let first = mesh.position.len() as u32;
@@ -108,7 +108,7 @@ struct Edge {
 
 impl Outlines {
     /// Edges that two triangles have, one each way, are none.
-    fn of(mesh: &Mesh, edges: &[[Rim; 2]]) -> Self {
+    fn from_edges(mesh: &Mesh, edges: &[[Rim; 2]]) -> Self {
         let mut rims = Vec::new();
         let mut known = HashMap::new();
         let mut times = BTreeMap::new();

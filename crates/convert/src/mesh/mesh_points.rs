@@ -11,7 +11,7 @@
 //! Deviation from the paper: it gives each piece the opacity of the surface, which multiplies where discs overlap.
 
 use crate::ConvertError;
-use crate::common::columns::{self, Wanted};
+use crate::common::columns::{self, ColumnSet};
 use crate::common::params::{Density, SplatParams};
 use crate::mesh::borders::{Borders, open_edges};
 use crate::mesh::pieces::Pieces;
@@ -54,8 +54,8 @@ impl MeshParams {
 }
 
 /// Columns of the splats of a mesh of some opacity, but for those that not all meshes need.
-pub(crate) fn wanted(opacity: f64) -> Wanted {
-    Wanted { normal: true, crossing_depth: opacity < 1.0, ..Wanted::default() }
+pub(crate) fn column_set(opacity: f64) -> ColumnSet {
+    ColumnSet { normal: true, crossing_depth: opacity < 1.0, ..ColumnSet::default() }
 }
 
 /// What the conversion of a mesh did.
@@ -139,12 +139,12 @@ pub fn mesh_to_points_into(
     cloud.origin = p.transform.apply(mesh.origin);
     let is_opaque = params.opacity >= 1.0 && mesh.opacity.is_empty();
     let kind = if is_opaque { SplatKind::Opaque } else { SplatKind::Surface };
-    columns::size_columns(cloud, report.splats as usize, kind, plan.wanted, p)?;
+    columns::size_columns(cloud, report.splats as usize, kind, plan.columns, p)?;
     progress.add_total(report.splats);
     if report.splats > 0 {
         let pieces = Pieces::new(mesh, params, &plan);
         pieces.emit(cloud, progress)?;
-        if mesh.opacity.is_empty() && plan.wanted.crossing_depth {
+        if mesh.opacity.is_empty() && plan.columns.crossing_depth {
             cloud.crossing_depth.fill(optics::optical_depth(params.opacity) as f32);
         }
         if !plan.borders.is_empty() {
@@ -165,7 +165,7 @@ pub(crate) struct Plan {
     pub(crate) normal: Vec<Vec3>,
     /// Edges where an opaque surface ends.
     borders: Vec<[u32; 2]>,
-    pub(crate) wanted: Wanted,
+    pub(crate) columns: ColumnSet,
     pub(crate) report: MeshReport,
 }
 
@@ -201,15 +201,15 @@ pub(crate) fn plan(mesh: &Mesh, params: &MeshParams) -> Result<Plan, ConvertErro
     let has_opaque = mesh.opacity.is_empty() || mesh.opacity.contains(&1.0);
     let ends = params.opacity >= 1.0 && has_opaque && !p.shows_images();
     let borders = if ends { open_edges(mesh) } else { Vec::new() };
-    let of_opacity = wanted(params.opacity);
-    let wanted = Wanted {
+    let of_opacity = column_set(params.opacity);
+    let columns = ColumnSet {
         tangent: !borders.is_empty() || p.shows_images(),
         crossing_depth: of_opacity.crossing_depth || !mesh.opacity.is_empty(),
         ..of_opacity
     };
-    let mut plan = Plan { measures, starts, normal, borders, wanted, report };
+    let mut plan = Plan { measures, starts, normal, borders, columns, report };
     let triangles = (0..mesh.triangles.len()).into_par_iter().with_min_len(4096);
-    plan.wanted.shading_normal = triangles.any(|i| plan.is_flat(mesh, i, plane(mesh, i)));
+    plan.columns.shading_normal = triangles.any(|i| plan.is_flat(mesh, i, plane(mesh, i)));
     Ok(plan)
 }
 
@@ -237,7 +237,7 @@ pub fn flatten_leaning(mesh: &mut Mesh, least: f64) {
         return;
     }
     for i in 0..mesh.triangles.len() {
-        let [ids, own] = [mesh.triangles[i].map(|v| v as usize), [0, 1, 2].map(|k| mesh.position.len() + k)];
+        let [ids, copies] = [mesh.triangles[i].map(|v| v as usize), [0, 1, 2].map(|k| mesh.position.len() + k)];
         let normals = ids.map(|v| mesh.normal[v]);
         let plane = plane(mesh, i).as_vec3();
         if !leans(normals, plane) || subdivide::measure(corners(mesh, &mesh.triangles[i])).area <= least {
@@ -248,7 +248,7 @@ pub fn flatten_leaning(mesh: &mut Mesh, least: f64) {
             mesh.push_copy(v);
             mesh.normal.push(side);
         }
-        mesh.triangles[i] = own.map(|v| v as u32);
+        mesh.triangles[i] = copies.map(|v| v as u32);
     }
 }
 
@@ -274,20 +274,20 @@ fn spacing(mesh: &Mesh, measures: &[Measure], params: &MeshParams, report: &Mesh
     }
 }
 
-/// The spacing that gives about `wanted` splats: whole pieces are up to four times too many at √(A/n), so the count is
+/// The spacing that gives about this many splats: whole pieces are up to four times too many at √(A/n), so the count is
 /// corrected a few times. Triangles that are finer already stay as they are.
-fn spacing_for(measures: &[Measure], wanted: u64, report: &MeshReport, scale: f64) -> f64 {
-    let first = (report.area / wanted as f64).sqrt();
+fn spacing_for(measures: &[Measure], splats: u64, report: &MeshReport, scale: f64) -> f64 {
+    let first = (report.area / splats as f64).sqrt();
     let mut spacing = first;
     for _ in 0..5 {
         let h = spacing / scale;
         let estimate: f64 = measures.iter().map(|m| m.longest_sq.sqrt() / h).sum();
         // Needles whose length alone exceeds any sensible count are left for the limit to refuse.
-        if wanted > u64::from(u32::MAX) || estimate > 1e10 {
+        if splats > u64::from(u32::MAX) || estimate > 1e10 {
             break;
         }
         let count: u64 = measures.par_iter().with_min_len(4096).map(|m| subdivide::split(m, h).pieces()).sum();
-        let ratio = count as f64 / wanted as f64;
+        let ratio = count as f64 / splats as f64;
         if (0.97..=1.03).contains(&ratio) || count == report.triangles - report.degenerate {
             break;
         }

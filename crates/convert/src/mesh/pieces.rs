@@ -188,10 +188,10 @@ impl Corners {
     fn new(pieces: &Pieces<'_>, triangle: usize) -> Self {
         let ids = pieces.mesh.triangles[triangle].map(|v| v as usize);
         let position = ids.map(|v| pieces.position[v]);
-        let own = plane(pieces.mesh, triangle);
-        let plane = (pieces.rotation * own).as_vec3();
+        let face = plane(pieces.mesh, triangle);
+        let plane = (pieces.rotation * face).as_vec3();
         let normal = ids.map(|v| if pieces.normal[v] == Vec3::ZERO { plane } else { pieces.normal[v] });
-        let is_flat = pieces.plan.is_flat(pieces.mesh, triangle, own);
+        let is_flat = pieces.plan.is_flat(pieces.mesh, triangle, face);
         let plane = if normal.iter().sum::<Vec3>().dot(plane) < 0.0 { -plane } else { plane };
         let color = (!pieces.mesh.color.is_empty()).then(|| ids.map(|v| Vec3::from(pieces.mesh.color[v])));
         let opacity = (!pieces.mesh.opacity.is_empty()).then(|| ids.map(|v| pieces.mesh.opacity[v]));

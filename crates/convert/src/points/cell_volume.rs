@@ -137,10 +137,10 @@ fn mean_cubes(bounds: &[[Lanes; 3]], rays: &[Vec3; PAIRS]) -> Lanes {
     }
     // How many directions count, and the sum of t³: of all, and of those of each pair that lead to the neighbours. Orbits are summed by themselves, so
     // that f32 rounds short sums.
-    let mut all = [[0.0; WIDTH]; 2];
+    let mut whole = [[0.0; WIDTH]; 2];
     let mut half = [[0.0; WIDTH]; 2];
     for orbit in rays.chunks_exact(ORBIT) {
-        let mut all_of_orbit = [[0.0; WIDTH]; 2];
+        let mut whole_of_orbit = [[0.0; WIDTH]; 2];
         let mut half_of_orbit = [[0.0; WIDTH]; 2];
         for ray in orbit {
             let mut ahead = [0.0; WIDTH];
@@ -156,8 +156,8 @@ fn mean_cubes(bounds: &[[Lanes; 3]], rays: &[Vec3; PAIRS]) -> Lanes {
                 let leads = ray.x * inwards[0][i] + ray.y * inwards[1][i] + ray.z * inwards[2][i] >= 0.0;
                 let [is_ahead, before] = cubed(ahead[i]);
                 let [is_behind, after] = cubed(behind[i]);
-                all_of_orbit[0][i] += is_ahead + is_behind;
-                all_of_orbit[1][i] += before + after;
+                whole_of_orbit[0][i] += is_ahead + is_behind;
+                whole_of_orbit[1][i] += before + after;
                 // Where the direction that leads to the neighbours is open, the opposite one stands for it.
                 let takes_ahead = if leads { is_ahead > 0.0 } else { is_behind == 0.0 };
                 half_of_orbit[0][i] += if takes_ahead { is_ahead } else { is_behind };
@@ -166,15 +166,15 @@ fn mean_cubes(bounds: &[[Lanes; 3]], rays: &[Vec3; PAIRS]) -> Lanes {
         }
         for k in 0..2 {
             for i in 0..WIDTH {
-                all[k][i] += all_of_orbit[k][i];
+                whole[k][i] += whole_of_orbit[k][i];
                 half[k][i] += half_of_orbit[k][i];
             }
         }
     }
     let mut means = [0.0; WIDTH];
     for i in 0..WIDTH {
-        let is_closed = all[0][i] == 2.0 * PAIRS as f32;
-        means[i] = if is_closed { all[1][i] / all[0][i] } else { half[1][i] / half[0][i] };
+        let is_closed = whole[0][i] == 2.0 * PAIRS as f32;
+        means[i] = if is_closed { whole[1][i] / whole[0][i] } else { half[1][i] / half[0][i] };
     }
     means
 }
@@ -267,8 +267,8 @@ mod tests {
         let plane: Vec<Vec3> = lattice(0.0).into_iter().filter(|p| p.z == 0.0).collect();
         let line: Vec<Vec3> = plane.iter().copied().filter(|p| p.y == 0.0).collect();
         for (points, most) in [(&plane[..], 4.0), (&line[..], 60.0), (&line[..2], 4.0), (&line[..3], 8.0)] {
-            let all = volumes(points);
-            assert!(all.iter().all(|v| (0.3..most).contains(v)), "{} points: {all:?}", points.len());
+            let found = volumes(points);
+            assert!(found.iter().all(|v| (0.3..most).contains(v)), "{} points: {found:?}", points.len());
         }
     }
 }

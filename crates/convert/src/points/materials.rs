@@ -46,14 +46,16 @@ pub(crate) fn with_materials(
     params: &SplatParams,
     has_opacity: bool,
 ) -> Result<Arc<RawPoints>, ConvertError> {
-    let Some(of) = materials_of(&points, params)?.filter(|_| points.ready.cloud.is_empty()) else { return Ok(points) };
-    let mut own = Arc::unwrap_or_clone(points);
-    if own.color.is_empty() {
-        own.color = (0..own.position.len()).map(|i| of(i).color).collect();
+    let Some(material_of) = materials_of(&points, params)?.filter(|_| points.ready.cloud.is_empty()) else {
+        return Ok(points);
+    };
+    let mut colored = Arc::unwrap_or_clone(points);
+    if colored.color.is_empty() {
+        colored.color = (0..colored.position.len()).map(|i| material_of(i).color).collect();
     }
     if !has_opacity {
-        own.opacity.resize(own.position.len(), 1.0);
-        own.opacity.iter_mut().enumerate().for_each(|(i, opacity)| *opacity *= of(i).opacity as f32);
+        colored.opacity.resize(colored.position.len(), 1.0);
+        colored.opacity.iter_mut().enumerate().for_each(|(i, opacity)| *opacity *= material_of(i).opacity as f32);
     }
-    Ok(own.into())
+    Ok(colored.into())
 }

@@ -9,7 +9,7 @@
 //! Points at one place share its volume, and points that become one have the sum of their cross-sections.
 
 use crate::ConvertError;
-use crate::common::columns::{self, CHUNK, Wanted};
+use crate::common::columns::{self, CHUNK, ColumnSet};
 use crate::common::convert_error::check_cancelled;
 use crate::common::params::SplatParams;
 use crate::points::place_order::{canonical_order, distinct_places};
@@ -278,7 +278,7 @@ fn emit(
     let p = &params.splat;
     let t = &params.splat.transform;
     let mut cloud = Cloud::new(t.apply(points.origin));
-    columns::size_columns(&mut cloud, merged.len(), SplatKind::Medium, wanted(points, params), p)?;
+    columns::size_columns(&mut cloud, merged.len(), SplatKind::Medium, column_set(points, params), p)?;
     let matter = OfMatter::new(points);
     // By what the points of one splat are weighed.
     let amount = |i: usize| matter.amount(i, cells[i].volume * t.scale.powi(3));
@@ -297,9 +297,9 @@ fn emit(
             let mut mean_reach = 0.0;
             for i in ids.iter().map(|i| *i as usize) {
                 let share = amount(i) / total;
-                let own = points.color.get(i).filter(|_| params.colors).unwrap_or(&p.color);
+                let point_color = points.color.get(i).filter(|_| params.colors).unwrap_or(&p.color);
                 place += share * points.position[i].as_dvec3();
-                tint += share * Vec3::from_array(*own).as_dvec3();
+                tint += share * Vec3::from_array(*point_color).as_dvec3();
                 mean_reach += share * reach(i);
             }
             // The kernel of several is at least as wide as that of a voxel of theirs.
@@ -310,10 +310,10 @@ fn emit(
             *color = tint.as_vec3().to_array();
         },
     );
-    let mean = |splat: usize, of: &(dyn Fn(usize) -> f64 + Sync)| -> f64 {
+    let mean = |splat: usize, term: &(dyn Fn(usize) -> f64 + Sync)| -> f64 {
         let ids = || merged.points_of(splat).iter().map(|i| *i as usize);
         let total: f64 = ids().map(amount).sum();
-        ids().map(|i| amount(i) / total * of(i)).sum()
+        ids().map(|i| amount(i) / total * term(i)).sum()
     };
     let coefficients = cloud.shadow_coefficient.par_iter_mut().enumerate().with_min_len(CHUNK);
     coefficients.for_each(|(splat, coefficient)| {
@@ -325,10 +325,10 @@ fn emit(
 }
 
 /// Which columns the splats fill.
-pub(crate) fn wanted(points: &RawPoints, params: &MatterParams) -> Wanted {
-    Wanted {
+pub(crate) fn column_set(points: &RawPoints, params: &MatterParams) -> ColumnSet {
+    ColumnSet {
         shadow_coefficient: points.own_column(SHADOW_COEFFICIENT).is_some(),
         value: params.values && !points.value.is_empty(),
-        ..Wanted::default()
+        ..ColumnSet::default()
     }
 }

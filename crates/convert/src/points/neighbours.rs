@@ -304,11 +304,11 @@ impl Tree {
         let mut place = leaf;
         for (level, nodes) in self.levels.iter().enumerate() {
             let node = place / WIDTH;
-            let own = place % WIDTH;
+            let home = place % WIDTH;
             let distances = nodes[node].distances_squared(&nearest.bounds, nearest.unit);
             // Siblings that differ in the last bits alone are nearest.
             for bits in 1..WIDTH {
-                let slot = own ^ bits;
+                let slot = home ^ bits;
                 let index = (node * WIDTH + slot) as u32;
                 self.look(Waiting { distance_squared: distances[slot], level: level as u32, index }, nearest, stack);
             }
@@ -615,12 +615,12 @@ mod tests {
     #[test]
     fn squares_of_tiny_and_huge_distances_do_not_vanish() {
         let points: Vec<Vec3> = (0..40).map(|i| Vec3::new(i as f32, 0.3 * (i * i % 7) as f32, 0.0)).collect();
-        let all = |factor: f32| {
+        let neighbours = |factor: f32| {
             let scaled: Vec<Vec3> = points.iter().map(|p| *p * factor).collect();
             by_tree(&scaled, 5)
         };
-        assert_eq!(all(1.0), all(1e-10f32.log2().floor().exp2()));
-        assert_eq!(all(1.0), all((-100f32).exp2()));
-        assert_eq!(all(1.0), all(100f32.exp2()));
+        assert_eq!(neighbours(1.0), neighbours(1e-10f32.log2().floor().exp2()));
+        assert_eq!(neighbours(1.0), neighbours((-100f32).exp2()));
+        assert_eq!(neighbours(1.0), neighbours(100f32.exp2()));
     }
 }

@@ -84,9 +84,9 @@ pub(crate) fn orient(
 pub(crate) fn encloses(places: &[Place]) -> bool {
     /// What is left of a body that lacks its base is less, of half a ball it is a half, of terrain nearly 1.
     const OPEN: f64 = 0.25;
-    let add = |(sum, all): (DVec3, f64), p: &Place| (sum + p.normal.as_dvec3() * p.area, all + p.area);
-    let (sum, all) = places.iter().fold((DVec3::ZERO, 0.0), add);
-    sum.length() < OPEN * all
+    let add = |(sum, area): (DVec3, f64), p: &Place| (sum + p.normal.as_dvec3() * p.area, area + p.area);
+    let (sum, area) = places.iter().fold((DVec3::ZERO, 0.0), add);
+    sum.length() < OPEN * area
 }
 
 fn face(n: Vec3, side: DVec3) -> Vec3 {
@@ -140,7 +140,7 @@ fn propagate(
             }
             let n = face(normals[i as usize], normals[lead.from as usize].as_dvec3());
             normals[i as usize] = n;
-            for &j in neighbours.of(i).iter().chain(incoming.of(i)) {
+            for &j in neighbours.around(i).iter().chain(incoming.around(i)) {
                 let lead = &mut leads[j as usize];
                 if lead.is_turned {
                     continue;
@@ -188,7 +188,7 @@ struct Incoming {
 impl Incoming {
     fn new(neighbours: &Neighbours, places: usize) -> Self {
         let one_sided = |i: u32| {
-            let ids = neighbours.of(i).iter().filter(move |j| !neighbours.of(**j).contains(&i));
+            let ids = neighbours.around(i).iter().filter(move |j| !neighbours.around(**j).contains(&i));
             ids.map(move |j| Arrow { from: i, to: *j })
         };
         let chunk = |first: usize| {
@@ -213,7 +213,7 @@ impl Incoming {
         Self { starts, ids }
     }
 
-    fn of(&self, i: u32) -> &[u32] {
+    fn around(&self, i: u32) -> &[u32] {
         &self.ids[self.starts[i as usize] as usize..self.starts[i as usize + 1] as usize]
     }
 }
@@ -236,7 +236,7 @@ mod tests {
     fn by_one_heap(normals: &mut [Vec3], position: &[Vec3], neighbours: &Neighbours) {
         let mut both_ways = vec![Vec::new(); normals.len()];
         for i in 0..normals.len() as u32 {
-            for &j in neighbours.of(i) {
+            for &j in neighbours.around(i) {
                 both_ways[i as usize].push(j);
                 both_ways[j as usize].push(i);
             }

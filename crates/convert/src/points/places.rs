@@ -56,7 +56,7 @@ pub(crate) struct Neighbours {
 
 impl Neighbours {
     /// The neighbours of one place.
-    pub(crate) fn of(&self, place: u32) -> &[u32] {
+    pub(crate) fn around(&self, place: u32) -> &[u32] {
         let first = place as usize * self.of_each;
         &self.ids[first..first + self.of_each]
     }

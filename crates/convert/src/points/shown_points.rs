@@ -75,13 +75,13 @@ pub fn shown_points(
     };
     check_ready(&points, shown, splat)?;
     if !(shown.keep.is_empty() && shown.clip.is_empty()) {
-        let all = points.len();
+        let before = points.len();
         if shown.as_matter {
             points = with_cells(Arc::unwrap_or_clone(points), splat, None)?.into();
         }
         points = kept(&points, shown.keep, shown.clip, shown.up).into();
-        if points.is_empty() && all > 0 {
-            said.push(format!("nothing is left of {all} points{}", causes(shown)));
+        if points.is_empty() && before > 0 {
+            said.push(format!("nothing is left of {before} points{}", causes(shown)));
         }
     }
     if let Some(spacing) = shown.spacing {
@@ -92,31 +92,31 @@ pub fn shown_points(
         let colored = colored(&points, by, shown.up, splat)?;
         said.push(said_of_colors(by, &colored, "point"));
         scale = ColorScale::of_points(&splat.object_name, by, &colored, splat.color);
-        let mut own = Arc::unwrap_or_clone(points);
-        if !own.gaussians.is_empty() {
-            own.gaussians.recolor(&colored.color);
+        let mut recolored = Arc::unwrap_or_clone(points);
+        if !recolored.gaussians.is_empty() {
+            recolored.gaussians.recolor(&colored.color);
         }
         match by.colors {
-            PointColors::Transfer(_, Classified::Opacity) => multiply(&mut own.opacity, &colored.classified),
+            PointColors::Transfer(_, Classified::Opacity) => multiply(&mut recolored.opacity, &colored.classified),
             PointColors::Transfer(_, Classified::Extinction) => {
                 let factors: Vec<f64> = colored.classified.iter().map(|factor| f64::from(*factor)).collect();
-                match own.columns.iter_mut().find(|column| column.name == EXTINCTION) {
+                match recolored.columns.iter_mut().find(|column| column.name == EXTINCTION) {
                     Some(column) => multiply(&mut column.values, &factors),
-                    None => own.columns.push(Column { name: EXTINCTION.to_owned(), values: factors }),
+                    None => recolored.columns.push(Column { name: EXTINCTION.to_owned(), values: factors }),
                 }
             }
             _ => {}
         }
-        own.color = colored.color;
+        recolored.color = colored.color;
         if shown.keeps_values {
-            own.value = colored.numbers.iter().map(|number| *number as f32).collect();
-            let gaps = own.value.iter().filter(|value| !value.is_finite()).count() as u64;
+            recolored.value = colored.numbers.iter().map(|number| *number as f32).collect();
+            let gaps = recolored.value.iter().filter(|value| !value.is_finite()).count() as u64;
             if gaps > 0 {
-                own.value.clear();
+                recolored.value.clear();
                 said.push(format!("splats keep no values: {} without a number that f32 holds", counted(gaps, "point")));
             }
         }
-        points = own.into();
+        points = recolored.into();
     }
     Ok(ShownPoints { points, said, scale })
 }
@@ -154,8 +154,8 @@ fn multiply<T: Copy + std::ops::Mul<Output = T>>(column: &mut Vec<T>, factors: &
 fn causes(shown: &PointsShown<'_>) -> String {
     let columns: Vec<String> = shown.keep.iter().map(|kept| format!("`keep.{}`", kept.column)).collect();
     let clip = (!shown.clip.is_empty()).then(|| "`clip`".to_owned());
-    let all: Vec<String> = columns.into_iter().chain(clip).collect();
-    format!(" by {}", all.join(" and "))
+    let keys: Vec<String> = columns.into_iter().chain(clip).collect();
+    format!(" by {}", keys.join(" and "))
 }
 
 /// How colours arose, of what has one number each: a point, a vertex or a face.

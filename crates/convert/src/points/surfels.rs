@@ -16,7 +16,7 @@
 use crate::ConvertError;
 #[cfg(feature = "cache")]
 use crate::common::cache::Key;
-use crate::common::columns::{self, CHUNK, Wanted};
+use crate::common::columns::{self, CHUNK, ColumnSet};
 use crate::common::convert_error::check_cancelled;
 use crate::common::params::SplatParams;
 use crate::points::discs::{DiscShape, DiscSize, Discs};
@@ -253,15 +253,15 @@ pub(crate) fn check(points: &RawPoints, params: &SurfelParams) -> Result<(), Con
     if params.largest_spacing.is_nan() || params.largest_spacing < 1.0 {
         return Err(p.bad("largest_spacing", params.largest_spacing, "a number ≥ 1"));
     }
-    let own = match (points.gaussians.is_empty(), points.ready.cloud.is_empty()) {
+    let expected_size = match (points.gaussians.is_empty(), points.ready.cloud.is_empty()) {
         (true, true) => None,
         (false, _) => Some("none: 3D Gaussians have sizes of their own"),
         (true, false) => Some("none: splats of a file have sizes of their own"),
     };
-    if let (Some(size), Some(expected)) = (params.size, own) {
+    if let (Some(size), Some(expected)) = (params.size, expected_size) {
         return Err(p.bad("size", size, expected));
     }
-    if let (DiscShape::Elliptical, Some(expected)) = (params.shape, own) {
+    if let (DiscShape::Elliptical, Some(expected)) = (params.shape, expected_size) {
         return Err(p.bad("discs", params.shape, expected));
     }
     if let Some(size) = params.size.filter(|size| !size.is_length()) {
@@ -318,20 +318,20 @@ impl Sorted {
 }
 
 /// Which columns surfels fill.
-pub(crate) fn wanted(points: &RawPoints, params: &SurfelParams) -> Wanted {
+pub(crate) fn column_set(points: &RawPoints, params: &SurfelParams) -> ColumnSet {
     if !points.gaussians.is_empty() {
-        return gaussian_points::wanted(points, params);
+        return gaussian_points::column_set(points, params);
     }
     if !points.ready.cloud.is_empty() {
-        return from_splats::wanted(points);
+        return from_splats::column_set(points);
     }
-    Wanted {
+    ColumnSet {
         normal: true,
         tangent: Discs::new(points, params).are_elliptical() || shows_images(points, params),
         shadow_coefficient: points.own_column(SHADOW_COEFFICIENT).is_some(),
         value: params.values && !points.value.is_empty(),
         crossing_depth: !is_opaque(points, params),
-        ..Wanted::default()
+        ..ColumnSet::default()
     }
 }
 
@@ -361,14 +361,14 @@ fn emit(
     let surfels = sorted.surfels(params.merge_duplicates);
     let of_surface = crossing_depth(params.opacity);
     let crossing = |point: u32| match points.opacity.get(point as usize) {
-        Some(own) => crossing_depth(params.opacity * f64::from(*own)),
+        Some(opacity) => crossing_depth(params.opacity * f64::from(*opacity)),
         None => of_surface,
     };
     report.splats = surfels.len() as u64;
     let mut cloud = Cloud::new(t.apply(points.origin));
-    let wanted = wanted(points, params);
-    let kind = if wanted.crossing_depth { SplatKind::Surface } else { SplatKind::Opaque };
-    columns::size_columns(&mut cloud, surfels.len(), kind, wanted, &params.splat)?;
+    let filled = column_set(points, params);
+    let kind = if filled.crossing_depth { SplatKind::Surface } else { SplatKind::Opaque };
+    columns::size_columns(&mut cloud, surfels.len(), kind, filled, &params.splat)?;
     let discs = Discs::new(points, params);
     // In the axes of the file.
     let normal_of = |place: u32, point: u32| {
@@ -376,7 +376,7 @@ fn emit(
         if given == Vec3::ZERO { sorted.places[place as usize].normal } else { given }
     };
     let disc_of =
-        |place: u32, point: u32| discs.of(point as usize, &sorted.places[place as usize], normal_of(place, point));
+        |place: u32, point: u32| discs.disc(point as usize, &sorted.places[place as usize], normal_of(place, point));
     let columns =
         (&mut cloud.position, &mut cloud.normal, &mut cloud.radius, &mut cloud.cross_section, &mut cloud.color);
     columns.into_par_iter().zip(&surfels).with_min_len(CHUNK).for_each(
@@ -402,8 +402,13 @@ fn emit(
     coefficients.for_each(|(coefficient, s)| *coefficient = shares[s.1 as usize] as f32);
     let values = cloud.value.par_iter_mut().zip(&surfels).with_min_len(CHUNK);
     values.for_each(|(v, s)| *v = points.value[s.1 as usize]);
-    if let Some(of) = materials_of(points, &params.splat)? {
-        cloud.material.par_iter_mut().zip(&surfels).with_min_len(CHUNK).for_each(|(id, s)| *id = of(s.1 as usize).id);
+    if let Some(material_of) = materials_of(points, &params.splat)? {
+        cloud
+            .material
+            .par_iter_mut()
+            .zip(&surfels)
+            .with_min_len(CHUNK)
+            .for_each(|(id, s)| *id = material_of(s.1 as usize).id);
     }
     let ids = points.own_column(FOOTPRINT);
     let stated = |k: usize| ids.map_or(0.0, |ids| ids[surfels[k].1 as usize]);

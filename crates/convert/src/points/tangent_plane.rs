@@ -182,8 +182,8 @@ mod tests {
 
     /// The same neighbours for all, around a point that is not at their mean.
     fn normal(offsets: &[DVec3]) -> Option<DVec3> {
-        let all: Vec<Offset> = offsets.iter().map(|o| o.as_vec3().to_array().map(|c| [c; WIDTH])).collect();
-        let normals = fit_normals(&all);
+        let lanes: Vec<Offset> = offsets.iter().map(|o| o.as_vec3().to_array().map(|c| [c; WIDTH])).collect();
+        let normals = fit_normals(&lanes);
         assert!(normals.iter().all(|n| *n == normals[0]));
         normals[0]
     }
@@ -217,7 +217,7 @@ mod tests {
         assert_eq!(normal(&(1..5).map(line).collect::<Vec<_>>()), None);
         assert_eq!(normal(&[DVec3::ZERO; 4]), None);
         // Nor have those that are spread to all sides alike.
-        let all = [DVec3::X, DVec3::Y, DVec3::Z, DVec3::NEG_X, DVec3::NEG_Y, DVec3::NEG_Z];
-        assert_eq!(normal(&all), None);
+        let axes = [DVec3::X, DVec3::Y, DVec3::Z, DVec3::NEG_X, DVec3::NEG_Y, DVec3::NEG_Z];
+        assert_eq!(normal(&axes), None);
     }
 }

@@ -37,8 +37,8 @@ pub fn thinned(points: &RawPoints, spacing: f64, params: &SplatParams) -> Result
     let cells = cells(points, spacing);
     let ranges: Vec<&[([f64; 3], u32)]> = cells.chunk_by(|a, b| a.0 == b.0).collect();
     let mean = |column: &[Vec3]| -> Vec<Vec3> {
-        let of = |r: &&[([f64; 3], u32)]| mean(r, |i| column[i].as_dvec3()).as_vec3();
-        if column.is_empty() { Vec::new() } else { ranges.par_iter().with_min_len(CHUNK).map(of).collect() }
+        let cell_mean = |r: &&[([f64; 3], u32)]| mean(r, |i| column[i].as_dvec3()).as_vec3();
+        if column.is_empty() { Vec::new() } else { ranges.par_iter().with_min_len(CHUNK).map(cell_mean).collect() }
     };
     let color: Vec<Vec3> = points.color.iter().map(|c| Vec3::from_array(*c)).collect();
     let numbers = |column: &[f32]| -> Vec<f32> {
@@ -46,11 +46,11 @@ pub fn thinned(points: &RawPoints, spacing: f64, params: &SplatParams) -> Result
         mean(&column).into_iter().map(|v| v.x).collect()
     };
     let column = |c: &Column| {
-        let of = |r: &&[([f64; 3], u32)]| match is_id(&c.name) {
+        let cell_value = |r: &&[([f64; 3], u32)]| match is_id(&c.name) {
             true => c.values[r[0].1 as usize],
             false => r.iter().map(|(_, i)| c.values[*i as usize]).sum::<f64>() / r.len() as f64,
         };
-        Column { name: c.name.clone(), values: ranges.iter().map(of).collect() }
+        Column { name: c.name.clone(), values: ranges.iter().map(cell_value).collect() }
     };
     let first = |r: &&[([f64; 3], u32)]| points.classification[r[0].1 as usize];
     Ok(RawPoints {
@@ -87,8 +87,8 @@ pub(crate) fn cells(points: &RawPoints, spacing: f64) -> Vec<([f64; 3], u32)> {
     cells
 }
 
-fn mean(cell: &[([f64; 3], u32)], of: impl Fn(usize) -> DVec3) -> DVec3 {
-    cell.iter().map(|(_, i)| of(*i as usize)).sum::<DVec3>() / cell.len() as f64
+fn mean(cell: &[([f64; 3], u32)], vector: impl Fn(usize) -> DVec3) -> DVec3 {
+    cell.iter().map(|(_, i)| vector(*i as usize)).sum::<DVec3>() / cell.len() as f64
 }
 
 #[cfg(test)]

@@ -206,8 +206,8 @@ mod tests {
     use super::*;
 
     fn cells(offsets: &[DVec3], normal: DVec3) -> Cells {
-        let all: Vec<Offset> = offsets.iter().map(|o| o.as_vec3().to_array().map(|c| [c; WIDTH])).collect();
-        voronoi_sides(&all, &[normal; WIDTH]).cells()
+        let lanes: Vec<Offset> = offsets.iter().map(|o| o.as_vec3().to_array().map(|c| [c; WIDTH])).collect();
+        voronoi_sides(&lanes, &[normal; WIDTH]).cells()
     }
 
     fn lattice() -> Vec<DVec3> {
@@ -252,8 +252,8 @@ mod tests {
                 (0..10).map(|i| u * unit(i, 0) + v * unit(i, 1) + normal * 0.1 * unit(i, 2)).collect();
             offsets.sort_by(|a, b| a.length().total_cmp(&b.length()));
             let half = CELL_LIMIT * offsets[9].length();
-            let all: Vec<Offset> = offsets.iter().map(|o| o.as_vec3().to_array().map(|c| [c; WIDTH])).collect();
-            let [u, v] = axes_of(&all, 0, normal);
+            let lanes: Vec<Offset> = offsets.iter().map(|o| o.as_vec3().to_array().map(|c| [c; WIDTH])).collect();
+            let [u, v] = axes_of(&lanes, 0, normal);
             let mut corners = vec![[-half, -half], [half, -half], [half, half], [-half, half]];
             for o in &offsets {
                 let q = [o.dot(u), o.dot(v)];

@@ -1,15 +1,15 @@
 //! Splats of a file become those of an object: as they are, or as its transform moves them.
 
-use crate::common::columns::Wanted;
+use crate::common::columns::ColumnSet;
 use crate::points::materials::materials_of;
 use crate::{ConvertError, SurfelParams};
 use splat_core::glam::DQuat;
 use splat_core::{Cloud, RawPoints};
 
 /// Which columns they fill.
-pub(crate) fn wanted(points: &RawPoints) -> Wanted {
+pub(crate) fn column_set(points: &RawPoints) -> ColumnSet {
     let cloud = &points.ready.cloud;
-    Wanted {
+    ColumnSet {
         normal: !cloud.normal.is_empty(),
         shading_normal: !cloud.shading_normal.is_empty(),
         tangent: !cloud.tangent.is_empty(),
@@ -24,7 +24,7 @@ pub(crate) fn wanted(points: &RawPoints) -> Wanted {
 pub(crate) fn to_cloud(points: &RawPoints, params: &SurfelParams) -> Result<Cloud, ConvertError> {
     let (splat, t) = (&params.splat, &params.splat.transform);
     check_footprints(points, params)?;
-    splat.check_cloud(points.len() as f64, wanted(points))?;
+    splat.check_cloud(points.len() as f64, column_set(points))?;
     let mut cloud = points.ready.cloud.clone();
     cloud.origin = t.apply(cloud.origin);
     if t.scale != 1.0 || t.rotation != DQuat::IDENTITY {
@@ -38,7 +38,7 @@ pub(crate) fn to_cloud(points: &RawPoints, params: &SurfelParams) -> Result<Clou
         normals.for_each(|normal| *normal = t.rotate(normal.as_dvec3()).as_vec3());
     }
     match materials_of(points, splat)? {
-        Some(of) => cloud.material.iter_mut().enumerate().for_each(|(i, id)| *id = of(i).id),
+        Some(material_of) => cloud.material.iter_mut().enumerate().for_each(|(i, id)| *id = material_of(i).id),
         None => cloud.material.fill(splat.material),
     }
     cloud.footprint.fill(splat.footprint);
@@ -58,11 +58,11 @@ fn check_footprints(points: &RawPoints, params: &SurfelParams) -> Result<(), Con
         return Err(params.splat.bad_text("footprint", "an image".to_owned(), expected));
     }
     let cutoffs = &points.ready.cutoffs;
-    let own = params.splat.profile.cutoff;
+    let object_cutoff = params.splat.profile.cutoff;
     let cutoff = |footprint: &u8| cutoffs.get(usize::from(*footprint)).copied().unwrap_or_default();
-    match points.ready.cloud.footprint.iter().map(cutoff).find(|cutoff| *cutoff != own) {
+    match points.ready.cloud.footprint.iter().map(cutoff).find(|cutoff| *cutoff != object_cutoff) {
         Some(other) => {
-            let found = format!("cut at {own} standard deviations, where splats of the file are at {other}");
+            let found = format!("cut at {object_cutoff} standard deviations, where splats of the file are at {other}");
             let expected = "the one that they were made with, by `footprints` and `footprint`; \
                             `keep` parts a file by its column `footprint`";
             Err(params.splat.bad_text("footprint", found, expected))

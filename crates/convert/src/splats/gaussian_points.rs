@@ -5,7 +5,7 @@
 //! σ² = (((ab)^p + (ac)^p + (bc)^p)/3)^(1/p) with p = 1.6075. The ball has the optical depth of the Gaussian through its middle,
 //! τ = −ln(1 − o), and all over: opacity has the shape of a Gaussian, so K = ∫−ln(1 − o·G) dA = 2πσ²·Li₂(o).
 
-use crate::common::columns::{self, CHUNK, Wanted};
+use crate::common::columns::{self, CHUNK, ColumnSet};
 use crate::{ConvertError, SurfelParams};
 use rayon::prelude::*;
 use splat_core::{Cloud, Footprint, Gaussians, RawPoints, SplatKind, glam::Vec3, optics};
@@ -18,16 +18,16 @@ const POWER: f64 = 1.6075;
 const THINNEST: f64 = 1e-3;
 
 /// Which columns they fill.
-pub(crate) fn wanted(points: &RawPoints, params: &SurfelParams) -> Wanted {
+pub(crate) fn column_set(points: &RawPoints, params: &SurfelParams) -> ColumnSet {
     let degree = if params.colors { points.gaussians.degree } else { 0 };
-    Wanted { tangent: true, gaussian: Some(degree), ..Wanted::default() }
+    ColumnSet { tangent: true, gaussian: Some(degree), ..ColumnSet::default() }
 }
 
 /// The cloud of points that were checked.
 pub(crate) fn to_cloud(points: &RawPoints, params: &SurfelParams) -> Result<Cloud, ConvertError> {
     let (splat, t) = (&params.splat, &params.splat.transform);
     let mut cloud = Cloud::new(t.apply(points.origin));
-    columns::size_columns(&mut cloud, points.len(), SplatKind::Medium, wanted(points, params), splat)?;
+    columns::size_columns(&mut cloud, points.len(), SplatKind::Medium, column_set(points, params), splat)?;
     let gaussians = seen(points, params);
     let columns = (
         (&mut cloud.position, &mut cloud.radius, &mut cloud.cross_section),
@@ -128,8 +128,8 @@ mod tests {
             // ∫−ln(1 − o·e^(−t)) 2π dt, t = ½ρ².
             let n = 200_000;
             let depth = |i: i32| -(-f64::from(opacity) * (-20.0 * (f64::from(i) + 0.5) / f64::from(n)).exp()).ln_1p();
-            let all = 2.0 * PI * (0..n).map(depth).sum::<f64>() * 20.0 / f64::from(n);
-            assert!((k / all - 1.0).abs() < 1e-5, "{cutoff} {opacity}: {k} {all}");
+            let integral = 2.0 * PI * (0..n).map(depth).sum::<f64>() * 20.0 / f64::from(n);
+            assert!((k / integral - 1.0).abs() < 1e-5, "{cutoff} {opacity}: {k} {integral}");
         }
         assert_eq!(ball(&axes, 0.0, &Footprint::default())[1], 0.0);
     }

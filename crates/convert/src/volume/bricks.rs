@@ -61,8 +61,9 @@ pub(crate) fn range_of_rows(
     js: Range<usize>,
     ks: Range<usize>,
     part: Range<usize>,
-    [lows, highs]: &mut [Vec<f32>; 2],
+    ranges: &mut [Vec<f32>; 2],
 ) {
+    let [lows, highs] = ranges;
     let [nx, ny, _] = lattice.dims;
     for from in part.clone().step_by(SIDE) {
         let columns = from..part.end.min(from + SIDE);

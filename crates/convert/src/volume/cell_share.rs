@@ -20,7 +20,7 @@ impl CellShares {
     }
 
     /// Share of the cell around a lattice point that lies within, from 0 to 1: exact for one plane and for planes across each other.
-    pub(crate) fn of(&self, index: DVec3) -> f64 {
+    pub(crate) fn at(&self, index: DVec3) -> f64 {
         self.planes.iter().map(|(normal, offset)| below(*normal, offset - normal.dot(index))).product()
     }
 }
@@ -29,24 +29,24 @@ impl CellShares {
 ///
 /// Of the cube [0, 1]ⁿ and a normal a > 0 it is Σ over subsets S of the axes of (−1)^|S|·max(t − Σ a of S, 0)ⁿ/(n!·Π a).
 fn below(normal: DVec3, distance: f64) -> f64 {
-    let all = normal.abs().to_array();
-    let half = 0.5 * (all[0] + all[1] + all[2]);
+    let components = normal.abs().to_array();
+    let half = 0.5 * (components[0] + components[1] + components[2]);
     if distance >= half || distance <= -half {
         return if distance > 0.0 { 1.0 } else { 0.0 };
     }
-    let largest = all.into_iter().fold(0.0, f64::max);
+    let largest = components.into_iter().fold(0.0, f64::max);
     let mut a = [0.0; 3];
     let mut n = 0;
-    for component in all.into_iter().filter(|c| *c > FLAT * largest) {
+    for component in components.into_iter().filter(|c| *c > FLAT * largest) {
         a[n] = component / largest;
         n += 1;
     }
     let a = &a[..n];
     let t = distance / largest + 0.5 * a.iter().sum::<f64>();
     let term = |subset: usize| {
-        let of = a.iter().enumerate().filter(|(i, _)| subset >> i & 1 == 1).map(|(_, a)| a).sum::<f64>();
+        let corner = a.iter().enumerate().filter(|(i, _)| subset >> i & 1 == 1).map(|(_, a)| a).sum::<f64>();
         let sign = if subset.count_ones().is_multiple_of(2) { 1.0 } else { -1.0 };
-        sign * (t - of).max(0.0).powi(n as i32)
+        sign * (t - corner).max(0.0).powi(n as i32)
     };
     let sum: f64 = (0..1 << n).map(term).sum();
     let factorial = [1.0, 1.0, 2.0, 6.0][n];
@@ -89,7 +89,7 @@ mod tests {
         let grid = Grid { origin: DVec3::new(1e6, 0.0, 0.0), axes, dims: [4; 3], values: vec![0.0; 64] };
         let middle = grid.position(2, 1, 3);
         let shares = CellShares::new(&[Clip::HalfSpace { normal: DVec3::Y, offset: middle.y }], grid.origin, axes);
-        assert!((shares.of(DVec3::new(2.0, 1.0, 3.0)) - 0.5).abs() < 1e-9);
-        assert_eq!([shares.of(DVec3::new(2.0, 0.0, 3.0)), shares.of(DVec3::new(2.0, 3.0, 3.0))], [1.0, 0.0]);
+        assert!((shares.at(DVec3::new(2.0, 1.0, 3.0)) - 0.5).abs() < 1e-9);
+        assert_eq!([shares.at(DVec3::new(2.0, 0.0, 3.0)), shares.at(DVec3::new(2.0, 3.0, 3.0))], [1.0, 0.0]);
     }
 }

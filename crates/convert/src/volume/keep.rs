@@ -169,7 +169,7 @@ impl<'a> Keep<'a> {
     fn share(&self, n: usize, k: usize) -> f64 {
         let nx = self.lattice.dims[0];
         let index = || DVec3::new((n % nx) as f64, (n / nx) as f64, k as f64);
-        self.cut.as_ref().map_or(1.0, |cut| cut.of(index()))
+        self.cut.as_ref().map_or(1.0, |cut| cut.at(index()))
     }
 }
 

@@ -145,7 +145,7 @@ impl CloudShape {
             1.0 + MOST_TURBULENCE * self.amplitude + MERGE_WIDTH * libm::log(self.ellipsoids.len().max(1) as f64);
         let around = |e: &Ellipsoid| DAabb::around(e.center, e.radii * reach);
         let DAabb { min: mut low, max: high } =
-            self.ellipsoids.iter().fold(DAabb::EMPTY, |all, e| all.union(around(e)));
+            self.ellipsoids.iter().fold(DAabb::EMPTY, |bounds, e| bounds.union(around(e)));
         if let Some(base) = self.base.filter(|_| !self.ellipsoids.is_empty()) {
             low.y = low.y.max(base - MOST_TURBULENCE * BASE_WAVE * self.amplitude * self.mean_height()).min(high.y);
         }

@@ -3,7 +3,7 @@
 //! A lattice whose cells tile the shape exactly: Σ K = σ_t·V and Σ K = τ₁·A hold to rounding, so the optical depth along a
 //! ray is the closed form convolved with the kernel. For tests, and for scenes that want just a slab of fog.
 
-use crate::common::columns::Wanted;
+use crate::common::columns::ColumnSet;
 use crate::mesh::borders::Borders;
 use crate::mesh::mesh_points;
 use crate::splats::footprints::choose_by_place;
@@ -150,8 +150,8 @@ pub(crate) fn rectangle_counts(u: DVec3, v: DVec3, spacing: f64) -> [f64; 2] {
 }
 
 /// Columns of a parallelogram's cloud.
-pub(crate) fn rectangle_columns(opacity: f64, params: &SplatParams) -> Wanted {
-    Wanted { tangent: opacity >= 1.0 || params.shows_images(), ..mesh_points::wanted(opacity) }
+pub(crate) fn rectangle_columns(opacity: f64, params: &SplatParams) -> ColumnSet {
+    ColumnSet { tangent: opacity >= 1.0 || params.shows_images(), ..mesh_points::column_set(opacity) }
 }
 
 fn template(params: &SplatParams) -> Splat {
@@ -187,7 +187,7 @@ impl Lattice {
             return Err(params.bad("extinction", extinction, "a finite number ≥ 0"));
         }
         let counts = (extent / spacing).to_array().map(|n| n.ceil().max(1.0));
-        params.check_cloud(counts.iter().product(), Wanted::default())?;
+        params.check_cloud(counts.iter().product(), ColumnSet::default())?;
         let step = extent / DVec3::from_array(counts);
         Ok(Self { step, counts: counts.map(|n| n as u64), center: (min + max) * 0.5, extinction })
     }
@@ -196,7 +196,7 @@ impl Lattice {
     pub(crate) fn cut(&self, clips: &[Clip]) -> impl Fn(DVec3) -> f64 + use<> {
         let shares = CellShares::new(clips, self.center, DMat3::from_diagonal(self.step));
         let step = self.step;
-        move |offset| shares.of(offset / step)
+        move |offset| shares.at(offset / step)
     }
 
     /// The extinction of each cell at its middle, times `share(offset)`.

@@ -73,9 +73,9 @@ impl<'a> Sobel<'a> {
     }
 
     /// Gradients of some rows of the slab of constant `k`, x fastest; of `out`, which is for all of them, the rest stays as it is.
-    pub(crate) fn slab(&self, k: usize, wanted: Range<usize>, rows: &mut Rows, out: &mut [Vec3]) {
+    pub(crate) fn slab(&self, k: usize, js: Range<usize>, rows: &mut Rows, out: &mut [Vec3]) {
         rows.resize(self.grid.dims[0]);
-        pulp::Arch::new().dispatch(Slab { sobel: self, k, wanted, rows, out });
+        pulp::Arch::new().dispatch(Slab { sobel: self, k, js, rows, out });
     }
 
     /// The last direction, along the row.
@@ -117,7 +117,7 @@ impl<'a> Sobel<'a> {
 struct Slab<'a> {
     sobel: &'a Sobel<'a>,
     k: usize,
-    wanted: Range<usize>,
+    js: Range<usize>,
     rows: &'a mut Rows,
     out: &'a mut [Vec3],
 }
@@ -127,11 +127,11 @@ impl pulp::NullaryFnOnce for Slab<'_> {
 
     #[inline(always)]
     fn call(self) {
-        let Self { sobel, k, wanted, rows, out } = self;
+        let Self { sobel, k, js, rows, out } = self;
         let [nx, ny, nz] = sobel.grid.dims;
         let reference = sobel.grid.values[k * nx * ny + nx * ny / 2];
-        let mut loaded = wanted.start.saturating_sub(1);
-        for j in wanted {
+        let mut loaded = js.start.saturating_sub(1);
+        for j in js {
             while loaded < ny.min(j + 2) {
                 rows.load(sobel.grid, loaded, k, reference);
                 loaded += 1;

@@ -6,7 +6,7 @@
 //! voxel's cell where the function bends within it (`classify.rs`); normals are −∇v/|∇v| of the values by the Sobel operator.
 
 use crate::ConvertError;
-use crate::common::columns::{self, Wanted};
+use crate::common::columns::{self, ColumnSet};
 use crate::common::convert_error::check_cancelled;
 use crate::common::params::SplatParams;
 use crate::volume::classify::Class;
@@ -58,8 +58,8 @@ impl Default for VolumeParams {
 
 impl VolumeParams {
     /// Which columns the splats fill.
-    pub(crate) fn wanted(&self) -> Wanted {
-        Wanted { normal: self.normals, value: self.values, ..Wanted::default() }
+    pub(crate) fn column_set(&self) -> ColumnSet {
+        ColumnSet { normal: self.normals, value: self.values, ..ColumnSet::default() }
     }
 
     /// Checks what does not depend on the volume.
@@ -184,8 +184,8 @@ fn convert(
     report.omitted = slabs.iter().map(|s| s.omitted).sum();
     report.omitted_optical_depth = slabs.iter().fold(0.0f64, |m, s| m.max(f64::from(s.thickest))) * longest_path;
     let mut cloud = Cloud::new(p.transform.apply(lattice.origin));
-    let wanted = params.wanted();
-    columns::size_columns(&mut cloud, n, SplatKind::Medium, wanted, p)?;
+    let filled = params.column_set();
+    columns::size_columns(&mut cloud, n, SplatKind::Medium, filled, p)?;
     cloud.radius.par_iter_mut().with_min_len(columns::CHUNK).for_each(|r| *r = report.radius as f32);
     let emit = Emit { lattice, tf, params, sobel: Sobel::new(lattice), cell: lattice.cell_volume() * scale.powi(3) };
     report.without_normal = emit.run(&slabs, &mut cloud, progress)?;
@@ -262,7 +262,7 @@ impl Emit<'_> {
         for (s, &n) in slab.kept.iter().enumerate() {
             let i = n as usize % nx;
             let j = n as usize / nx;
-            let at = match averaged.next_if(|(of, _)| *of as usize == s) {
+            let at = match averaged.next_if(|(rank, _)| *rank as usize == s) {
                 Some((_, mean)) => *mean,
                 None => {
                     let at = self.tf.at(values[n as usize]);

@@ -42,12 +42,12 @@ type Triangles = ConstrainedDelaunayTriangulation<Corner>;
 pub(super) fn fill(outlines: &Outlines, normal: DVec3) -> (Vec<Place>, Vec<[usize; 3]>) {
     let mut places = Vec::new();
     let mut triangles = Vec::new();
-    let Some(plane) = Plane::of(outlines, normal) else { return (places, triangles) };
-    let Some(all) = triangulated(outlines, &plane) else { return (places, triangles) };
-    let (region, middles) = regions(&all);
+    let Some(plane) = Plane::through(outlines, normal) else { return (places, triangles) };
+    let Some(flat) = triangulated(outlines, &plane) else { return (places, triangles) };
+    let (region, middles) = regions(&flat);
     let inside = inside(outlines, &plane, &middles);
-    let mut known = vec![None; all.num_vertices()];
-    for face in all.inner_faces().filter(|face| inside[region[face.fix().index()]]) {
+    let mut known = vec![None; flat.num_vertices()];
+    for face in flat.inner_faces().filter(|face| inside[region[face.fix().index()]]) {
         triangles.push(face.vertices().map(|vertex| {
             *known[vertex.fix().index()].get_or_insert_with(|| {
                 let Corner { at, rim, is_crossing } = *vertex.data();
@@ -72,7 +72,7 @@ struct Plane {
 
 impl Plane {
     /// `None` where there are no outlines.
-    fn of(outlines: &Outlines, normal: DVec3) -> Option<Self> {
+    fn through(outlines: &Outlines, normal: DVec3) -> Option<Self> {
         let place = |edge: &Edge| outlines.rims[edge.ends[0]].place;
         let offset = normal.dot(place(outlines.edges.first()?));
         let size = normal.abs();
@@ -116,26 +116,26 @@ fn triangulated(outlines: &Outlines, plane: &Plane) -> Option<Triangles> {
             rim
         }));
     }
-    let mut all = Triangles::bulk_load(corners).ok()?;
+    let mut triangles = Triangles::bulk_load(corners).ok()?;
     let mut handles: Vec<Option<FixedVertexHandle>> = vec![None; first.len()];
-    all.vertices().for_each(|vertex| handles[vertex.data().rim] = Some(vertex.fix()));
+    triangles.vertices().for_each(|vertex| handles[vertex.data().rim] = Some(vertex.fix()));
     for edge in &outlines.edges {
         let [from, to] = edge.ends.map(|rim| handles[first[rim]?]);
         let from = from?;
         let to = to?;
-        if from != to && all.try_add_constraint(from, to).is_empty() {
+        if from != to && triangles.try_add_constraint(from, to).is_empty() {
             let crossing = |at| Corner { at, rim: edge.ends[0], is_crossing: true };
-            all.add_constraint_and_split(from, to, crossing);
+            triangles.add_constraint_and_split(from, to, crossing);
         }
     }
-    Some(all)
+    Some(triangles)
 }
 
 /// For each face the number of its region, which outlines are around; and in each region the middle of its largest triangle.
-fn regions(all: &Triangles) -> (Vec<usize>, Vec<DVec2>) {
-    let mut region = vec![usize::MAX; all.num_all_faces()];
+fn regions(triangles: &Triangles) -> (Vec<usize>, Vec<DVec2>) {
+    let mut region = vec![usize::MAX; triangles.num_all_faces()];
     let mut middles = Vec::new();
-    for face in all.inner_faces() {
+    for face in triangles.inner_faces() {
         if region[face.fix().index()] != usize::MAX {
             continue;
         }
