@@ -15,7 +15,7 @@ pub(crate) struct At<'a> {
 
 impl<'a> At<'a> {
     /// The whole document.
-    pub(crate) fn of(document: &'a Document<'a>) -> Self {
+    pub(crate) fn root(document: &'a Document<'a>) -> Self {
         Self { document, path: Vec::new() }
     }
 

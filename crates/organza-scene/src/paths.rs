@@ -134,15 +134,15 @@ pub fn root_for<'p>(scene_file: &Path, files: impl IntoIterator<Item = &'p Path>
     let folder = Path::new(".").join(folder_of(scene_file));
     let real = |path: &Path| path.canonicalize().map_err(|e| Error::io(path, "cannot find", e));
     let (folder, root) = (real(&folder)?, real(&default_root(&folder)?)?);
-    let mut all: Option<PathBuf> = None;
+    let mut shared: Option<PathBuf> = None;
     for file in files {
         let file = real(file)?;
         if !file.starts_with(&root) {
             let above = file.parent().unwrap_or(&file);
-            all = Some(all.map_or(above.to_owned(), |all| common(&all, above)));
+            shared = Some(shared.map_or(above.to_owned(), |shared| common(&shared, above)));
         }
     }
-    Ok(all.map(|all| relative_path(&folder, &all).unwrap_or(all)))
+    Ok(shared.map(|shared| relative_path(&folder, &shared).unwrap_or(shared)))
 }
 
 /// The deepest folder that holds all these files, absolute, links followed: the key `root` of a scene that may lie anywhere. `None` where no

@@ -45,7 +45,7 @@ fn check_stop(
     }
     let light = stop.light as usize;
     check_light_index(&at, light, lights)?;
-    let of_light = |path: &Vec<String>| path[0] == "light" && path.get(1).is_none_or(|of| *of == light.to_string());
+    let of_light = |path: &Vec<String>| path[0] == "light" && path.get(1).is_none_or(|rank| *rank == light.to_string());
     if tracks.paths.iter().any(of_light) {
         return Err(at.key("light").error("`light`: a track changes it", "name a light that stays as it is"));
     }
@@ -72,17 +72,17 @@ struct Tracks<'a> {
 impl Tracks<'_> {
     /// The object whose place a track sets.
     fn moves(&self, track: usize) -> Option<usize> {
-        let [list, of, transform, key] = &self.paths[track][..] else { return None };
+        let [list, object, transform, key] = &self.paths[track][..] else { return None };
         let is_place = [list, transform, key] == ["object", "transform", "translate"];
-        let named = self.objects.iter().position(|o| o.name == *of);
-        named.or_else(|| of.parse().ok().filter(|k| *k < self.objects.len())).filter(|_| is_place)
+        let named = self.objects.iter().position(|o| o.name == *object);
+        named.or_else(|| object.parse().ok().filter(|k| *k < self.objects.len())).filter(|_| is_place)
     }
 
     /// Whether a track changes what lies at these keys of an object, or within.
     fn change(&self, track: usize, rank: usize, keys: &[&str]) -> bool {
         let path = &self.paths[track];
-        let is_of = path.get(1).is_none_or(|of| *of == self.objects[rank].name || *of == rank.to_string());
-        path[0] == "object" && is_of && path.iter().skip(2).zip(keys).all(|(a, b)| a == b)
+        let is_object = path.get(1).is_none_or(|name| *name == self.objects[rank].name || *name == rank.to_string());
+        path[0] == "object" && is_object && path.iter().skip(2).zip(keys).all(|(a, b)| a == b)
     }
 
     /// Whether any track changes an object.

@@ -38,7 +38,7 @@ pub(crate) fn check_animation(at: &At<'_>, raw: &RawAnimation) -> Result<u32, Er
 
 /// Whether a track changes a key of a table, or the whole table.
 pub(crate) fn moves(raw: &RawAnimation, table: &str, key: &str) -> bool {
-    let changes = |path: Vec<String>| path[0] == table && path.get(1).is_none_or(|of| of == key);
+    let changes = |path: Vec<String>| path[0] == table && path.get(1).is_none_or(|changed| changed == key);
     raw.track.iter().filter_map(|track| path_of(track).ok()).any(changes)
 }
 
@@ -49,7 +49,7 @@ const LOOKS: [&str; 8] =
 /// Whether a track changes the shape of the object of this rank and name.
 pub(crate) fn deforms(raw: &RawAnimation, rank: usize, name: &str) -> bool {
     let changes = |path: Vec<String>| {
-        let of_object = path.get(1).is_none_or(|of| of == name || *of == rank.to_string());
+        let of_object = path.get(1).is_none_or(|object| object == name || *object == rank.to_string());
         path[0] == "object" && of_object && path.get(2).is_none_or(|key| !LOOKS.contains(&key.as_str()))
     };
     raw.track.iter().filter_map(|track| path_of(track).ok()).any(changes)
@@ -59,7 +59,7 @@ pub(crate) fn deforms(raw: &RawAnimation, rank: usize, name: &str) -> bool {
 pub(crate) fn apply(document: &mut Document<'_>, frame: u32) -> Result<(), Error> {
     let Some(node) = entry(&document.root, "animation").cloned() else { return Ok(()) };
     let raw: RawAnimation = from_node(document, &node)?;
-    check_animation(&At::of(document).key("animation"), &raw)?;
+    check_animation(&At::root(document).key("animation"), &raw)?;
     let written = entry(&node, "track").map_or(&[][..], items);
     for (track, written) in raw.track.iter().zip(written) {
         let keys = entry(written, "keys").map_or(&[][..], items);

@@ -43,9 +43,9 @@ pub(crate) fn check_footprints(
                 layers.push(check_cutoff(&at, *cutoff)?);
                 images.push(None);
             }
-            NumberOr::Table(of) => {
-                let layer = check_cutoff(&at.key("cutoff"), of.cutoff.unwrap_or(3.0))?;
-                for (path, place) in check_paths(&at, of, paths)? {
+            NumberOr::Table(raw) => {
+                let layer = check_cutoff(&at.key("cutoff"), raw.cutoff.unwrap_or(3.0))?;
+                for (path, place) in check_paths(&at, raw, paths)? {
                     layers.push(layer);
                     images.push(Some(read_image(&place, &path, options)?));
                     files.push(path);
@@ -75,8 +75,8 @@ fn check_cutoff(at: &At<'_>, cutoff: f64) -> Result<Footprint, Error> {
 }
 
 /// The files that a table names, and where it does.
-fn check_paths<'a>(at: &At<'a>, of: &RawImages, paths: &Paths) -> Result<Vec<(PathBuf, At<'a>)>, Error> {
-    match (&of.image, &of.images) {
+fn check_paths<'a>(at: &At<'a>, raw: &RawImages, paths: &Paths) -> Result<Vec<(PathBuf, At<'a>)>, Error> {
+    match (&raw.image, &raw.images) {
         (Some(image), None) => {
             let at = at.key("image");
             Ok(vec![(paths.resolve(&at, image)?, at)])
@@ -94,7 +94,7 @@ fn check_paths<'a>(at: &At<'a>, of: &RawImages, paths: &Paths) -> Result<Vec<(Pa
             of_root.map(|path| Ok((path?, at.clone()))).collect()
         }
         _ => {
-            let found = if of.image.is_some() { "both" } else { "none" };
+            let found = if raw.image.is_some() { "both" } else { "none" };
             Err(at.error(
                 format!("expected one of `image` and `images`, found {found}"),
                 "such as { image = \"leaf.png\" }",
@@ -183,33 +183,34 @@ pub(crate) fn check_choice(
         Some(NumberOr::Number(id)) => (Some(vec![check_footprint(&at_key, *id, stack)?]), &plain),
         Some(NumberOr::Table(chosen)) => {
             let at_of = at_key.key("of");
-            let of = chosen.of.as_ref().map(|of| {
-                let ids = of.iter().enumerate().map(|(i, id)| check_footprint(&at_of.index(i), f64::from(*id), stack));
+            let ids = chosen.of.as_ref().map(|listed| {
+                let ids =
+                    listed.iter().enumerate().map(|(i, id)| check_footprint(&at_of.index(i), f64::from(*id), stack));
                 ids.collect::<Result<Vec<u8>, Error>>()
             });
-            (of.transpose()?, chosen)
+            (ids.transpose()?, chosen)
         }
     };
-    if stated.as_ref().is_some_and(|of| of.is_empty() || of.len() > MOST) {
+    if stated.as_ref().is_some_and(|ids| ids.is_empty() || ids.len() > MOST) {
         return Err(at_key.key("of").error(format!("`of`: expected 1 to {MOST} footprints"), "such as [1, 2]"));
     }
     let by_column = stated.is_none() && matches!(source, Source::Points(_));
-    let of = stated.unwrap_or_else(|| vec![of_material.unwrap_or(0)]);
+    let ids = stated.unwrap_or_else(|| vec![of_material.unwrap_or(0)]);
     let shows_images =
-        if by_column { stack.has_images() } else { of.iter().any(|id| stack.image(usize::from(*id)).is_some()) };
+        if by_column { stack.has_images() } else { ids.iter().any(|id| stack.image(usize::from(*id)).is_some()) };
     let turn = at_key.number("turn", chosen.turn.unwrap_or(0.0), 0.0..=180.0)?.to_radians();
     if chosen.turn.is_some() && !shows_images {
         return Err(at_key.key("turn").error("`turn` belongs to footprints that are images", "`of` names none"));
     }
-    if chosen.seed.is_some() && of.len() == 1 && turn == 0.0 {
+    if chosen.seed.is_some() && ids.len() == 1 && turn == 0.0 {
         let message = "`seed` is of what is chosen by chance, and there is one footprint and no turn";
         return Err(at_key.key("seed").error(message, "give more in `of`, or a `turn`"));
     }
-    if source.is_medium() && of.iter().any(|id| stack.image(usize::from(*id)).is_some()) {
+    if source.is_medium() && ids.iter().any(|id| stack.image(usize::from(*id)).is_some()) {
         let message = "a medium has no image as a footprint: it lies in the plane of a disc";
         return Err(at_key.error(message, "name a formula of `footprints`"));
     }
-    Ok(FootprintChoice { stack: stack.clone(), of, by_column, seed: chosen.seed.unwrap_or(0).into(), turn })
+    Ok(FootprintChoice { stack: stack.clone(), of: ids, by_column, seed: chosen.seed.unwrap_or(0).into(), turn })
 }
 
 /// A footprint by its index.

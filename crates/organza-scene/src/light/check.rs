@@ -45,7 +45,7 @@ fn check_name(at: &At<'_>, name: &str) -> Result<(), Error> {
 
 /// Checks one light, without its label.
 fn check_light(at: &At<'_>, raw: &RawLight, paths: &Paths) -> Result<SceneLight, Error> {
-    let of = |shape, intensity, shadow| SceneLight {
+    let scene_light = |shape, intensity, shadow| SceneLight {
         label: String::new(),
         light: Light { shape, intensity },
         slide: None,
@@ -54,22 +54,22 @@ fn check_light(at: &At<'_>, raw: &RawLight, paths: &Paths) -> Result<SceneLight,
     };
     let extended = |shape, intensity, samples, shadow| {
         let samples = at.whole("samples", samples, 1..=MOST_LIGHT_SAMPLES)?;
-        Ok(SceneLight { samples, ..of(shape, at.color("intensity", intensity)?, shadow) })
+        Ok(SceneLight { samples, ..scene_light(shape, at.color("intensity", intensity)?, shadow) })
     };
     match *raw {
         RawLight::Point { position, intensity, shadow, .. } => {
             let position = at.vector("position", position)?;
-            Ok(of(LightShape::Point { position }, at.color("intensity", intensity)?, shadow))
+            Ok(scene_light(LightShape::Point { position }, at.color("intensity", intensity)?, shadow))
         }
         RawLight::Directional { direction, irradiance, shadow, .. } => {
             let shape = LightShape::Directional { direction: at.direction("direction", direction)? };
             let slide = check_slide(at, &slide_keys(raw), &shape, paths)?;
-            Ok(SceneLight { slide, ..of(shape, at.color("irradiance", irradiance)?, shadow) })
+            Ok(SceneLight { slide, ..scene_light(shape, at.color("irradiance", irradiance)?, shadow) })
         }
         RawLight::Spot { intensity, shadow, .. } => {
             let shape = spot_shape(at, raw)?;
             let slide = check_slide(at, &slide_keys(raw), &shape, paths)?;
-            Ok(SceneLight { slide, ..of(shape, at.color("intensity", intensity)?, shadow) })
+            Ok(SceneLight { slide, ..scene_light(shape, at.color("intensity", intensity)?, shadow) })
         }
         RawLight::Sphere { position, radius, intensity, samples, shadow, .. } => {
             let center = at.vector("position", position)?;

@@ -21,19 +21,24 @@ pub struct LightPoint {
 impl LightPoint {
     /// How it is called.
     pub fn name(&self) -> String {
-        let Self { label, rank: [k, all], .. } = self;
-        if *all > 1 { format!("point {k} of light {label}") } else { format!("light {label}") }
+        let Self { label, rank: [k, count], .. } = self;
+        if *count > 1 { format!("point {k} of light {label}") } else { format!("light {label}") }
     }
 }
 
 /// The points of all lights, sorted by their bits so that the order of the file does not matter.
 pub fn light_points(lights: &[SceneLight]) -> Vec<LightPoint> {
     let mut light_points = Vec::new();
-    for (of, whole) in lights.iter().enumerate() {
+    for (rank, whole) in lights.iter().enumerate() {
         let points = whole.light.points(whole.samples);
         let count = points.len();
-        let point =
-            |(k, light)| LightPoint { label: whole.label.clone(), light, whole: whole.light, of, rank: [k, count] };
+        let point = |(k, light)| LightPoint {
+            label: whole.label.clone(),
+            light,
+            whole: whole.light,
+            of: rank,
+            rank: [k, count],
+        };
         light_points.extend(points.into_iter().enumerate().map(point));
     }
     light_points.sort_by_cached_key(|point| (point.light.bits(), lights[point.of].shadow));

@@ -36,8 +36,8 @@ pub(crate) fn check_materials<'a>(
     let mut materials = vec![default];
     for (name, material) in raw {
         let at = at.key(name);
-        let of = |id: u32| check_footprint(&at.key("footprint"), f64::from(id), footprints);
-        let footprint = material.footprint.map(of).transpose()?;
+        let footprint_id = |id: u32| check_footprint(&at.key("footprint"), f64::from(id), footprints);
+        let footprint = material.footprint.map(footprint_id).transpose()?;
         materials.push(SceneMaterial { footprint, ..check_material(&at, name, material, paths)? });
     }
     Ok(materials)

@@ -74,7 +74,7 @@ fn check_sampled(at: &At<'_>, objects: &[SceneObject], render: &RenderSettings) 
     }
     let message =
         "`volume_sampler`: the technique `particles` draws no volume, density, cloud or homogeneous medium here";
-    Err(At::of(at.document).key("render").key("particles").key("volume_sampler").error(message, "leave it out"))
+    Err(At::root(at.document).key("render").key("particles").key("volume_sampler").error(message, "leave it out"))
 }
 
 /// Whether an object bends light: `surfels` draw it, and `auto` gives it to them.
@@ -113,14 +113,14 @@ fn check_bounds(at: &At<'_>, objects: &[SceneObject], materials: &[SceneMaterial
         if !material.material.bounds_matter() {
             continue;
         }
-        let of = format!("material `{}` has an index or `absorption_inside`", crate::shown(&material.name));
+        let subject = format!("material `{}` has an index or `absorption_inside`", crate::shown(&material.name));
         let at = at.index(i);
         if object.source.is_medium() {
-            let message = format!("{of}, which surfaces bound, and this is a medium");
+            let message = format!("{subject}, which surfaces bound, and this is a medium");
             return Err(at.error(message, "use another material, or a surface"));
         }
         if object.opacity.unwrap_or(material.opacity) >= 1.0 {
-            let message = format!("{of}, and nothing passes a surface whose opacity is 1");
+            let message = format!("{subject}, and nothing passes a surface whose opacity is 1");
             return Err(at.error(message, "set an `opacity` below 1; 0 is clear glass"));
         }
     }

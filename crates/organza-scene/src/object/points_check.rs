@@ -144,9 +144,10 @@ fn check_scale(at: &At<'_>, scale: Option<RawMapScale>, range: Option<[f64; 2]>)
 }
 
 /// Two numbers of which the first is below the second.
-fn check_range(at: &At<'_>, [low, high]: [f64; 2]) -> Result<[f64; 2], Error> {
+fn check_range(at: &At<'_>, range: [f64; 2]) -> Result<[f64; 2], Error> {
+    let [low, high] = range;
     if low.abs() <= LARGEST && high.abs() <= LARGEST && low < high {
-        return Ok([low, high]);
+        return Ok(range);
     }
     let message = format!("expected a lowest and a highest number up to {LARGEST:e}, found {low} and {high}");
     Err(at.error(message, "such as [0, 255]"))

@@ -31,11 +31,11 @@ impl Scene {
 
     /// What the points of an object choose their materials from, if they do.
     pub fn point_materials(&self, object: &SceneObject) -> Option<Arc<[PointMaterial]>> {
-        let of = |id: &usize| {
+        let point_material = |id: &usize| {
             let SceneMaterial { color, opacity, .. } = self.materials[*id];
             PointMaterial { id: *id as u16, color, opacity }
         };
-        (!object.materials.is_empty()).then(|| object.materials.iter().map(of).collect())
+        (!object.materials.is_empty()).then(|| object.materials.iter().map(point_material).collect())
     }
 }
 

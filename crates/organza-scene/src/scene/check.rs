@@ -34,7 +34,7 @@ pub(crate) fn scene(
     turn: Option<Turn>,
     sha256: String,
 ) -> Result<Scene, Error> {
-    let at = At::of(document);
+    let at = At::root(document);
     if raw.version != 1 {
         let message = format!("`version`: expected 1, found {}", raw.version);
         return Err(at.key("version").error(message, "this version of Organza reads scenes of version 1"));
@@ -152,5 +152,5 @@ fn check_aligned(at: &At<'_>, camera: &Camera, render: &RenderSettings) -> Resul
 }
 
 fn at_materials<'a>(at: &At<'a>) -> At<'a> {
-    At::of(at.document).key("material")
+    At::root(at.document).key("material")
 }

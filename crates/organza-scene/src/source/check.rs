@@ -126,12 +126,12 @@ pub(crate) fn check_source(
 
 /// The solids that become one, and how.
 fn solids(raw: &RawObject) -> Option<(&[RawPart], Combination)> {
-    let all = [
+    let keys = [
         (&raw.union, Combination::Union),
         (&raw.intersection, Combination::Intersection),
         (&raw.difference, Combination::Difference),
     ];
-    all.into_iter().find_map(|(parts, how)| Some((parts.as_deref()?, how)))
+    keys.into_iter().find_map(|(parts, how)| Some((parts.as_deref()?, how)))
 }
 
 /// Points as samples of a surface, or as matter.

@@ -54,7 +54,7 @@ pub(crate) fn check_combined(
 }
 
 fn check_part(at: &At<'_>, raw: &RawPart, paths: &Paths) -> Result<Source, Error> {
-    let all = |key: &'static str, combination, parts: &Option<Vec<RawPart>>| {
+    let combined = |key: &'static str, combination, parts: &Option<Vec<RawPart>>| {
         let parts = parts.as_ref()?;
         Some(check_combined(&at.key(key), combination, parts, paths).map(Source::Combined))
     };
@@ -62,9 +62,9 @@ fn check_part(at: &At<'_>, raw: &RawPart, paths: &Paths) -> Result<Source, Error
         raw.implicit.as_ref().map(|i| check_implicit(&at.key("implicit"), i).map(Source::Implicit)),
         raw.isosurface.as_ref().map(|i| check_isosurface(&at.key("isosurface"), i, paths).map(Source::Isosurface)),
         raw.level_set.as_ref().map(|l| check_level_set(&at.key("level_set"), l, paths).map(Source::LevelSet)),
-        all("union", Combination::Union, &raw.union),
-        all("intersection", Combination::Intersection, &raw.intersection),
-        all("difference", Combination::Difference, &raw.difference),
+        combined("union", Combination::Union, &raw.union),
+        combined("intersection", Combination::Intersection, &raw.intersection),
+        combined("difference", Combination::Difference, &raw.difference),
     ];
     let mut found = found.into_iter().flatten();
     match (found.next(), found.next()) {
