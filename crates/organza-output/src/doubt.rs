@@ -9,12 +9,12 @@ const GREY: f64 = 0.18;
 /// `beauty` is radiance, `exposure` in stops.
 pub fn doubt(beauty: &[[f32; 3]], exposure: f64) -> Option<String> {
     let gain = libm::exp2(exposure) as f32;
-    let all = |byte: u8| beauty.iter().flatten().all(|v| displayed(v * gain) == byte);
+    let is_everywhere = |byte: u8| beauty.iter().flatten().all(|v| displayed(v * gain) == byte);
     let stops = |radiance: f32| libm::log2(GREY / f64::from(radiance)).round();
     if beauty.is_empty() {
         return None;
     }
-    if all(0) {
+    if is_everywhere(0) {
         let brightest = beauty.iter().flatten().fold(0.0, |most, v| f32::max(most, *v));
         return Some(if brightest > 0.0 {
             let stops = stops(brightest);
@@ -25,7 +25,7 @@ pub fn doubt(beauty: &[[f32; 3]], exposure: f64) -> Option<String> {
                 .to_owned()
         });
     }
-    if all(255) {
+    if is_everywhere(255) {
         let darkest = beauty.iter().flatten().fold(f32::INFINITY, |least, v| f32::min(least, *v));
         let stops = if darkest.is_finite() { stops(darkest) } else { -60.0 };
         return Some(format!(

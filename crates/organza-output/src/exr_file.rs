@@ -48,7 +48,7 @@ pub(super) fn encode(
     }
     let fail = |e: exr::error::Error| Error::Internal(format!("EXR encoder: {e}"));
     let mut attributes = LayerAttributes::default();
-    for (name, value) in texts::of(metadata) {
+    for (name, value) in texts::pairs(metadata) {
         attributes.other.insert(Text::from(name), text(&value));
     }
     let size = Vec2(layers.size[0] as usize, layers.size[1] as usize);

@@ -74,8 +74,8 @@ pub(super) fn draw(canvas: &mut Canvas<'_>, scales: &[ColorScale]) -> u64 {
             .collect::<Option<Vec<_>>>()
     });
     let panels = panels.unwrap_or_default();
-    let all: f64 = panels.iter().map(|panel| panel.height + margin).sum();
-    let mut top = (0.5 * (height - all + margin)).round();
+    let stacked: f64 = panels.iter().map(|panel| panel.height + margin).sum();
+    let mut top = (0.5 * (height - stacked + margin)).round();
     for panel in &panels {
         panel.draw(canvas, width - margin - panel.width, top, capital);
         top += panel.height + margin;
@@ -84,9 +84,9 @@ pub(super) fn draw(canvas: &mut Canvas<'_>, scales: &[ColorScale]) -> u64 {
 }
 
 /// What a scale is of, with its object where others are of the same name.
-fn title(scale: &ColorScale, all: &[ColorScale]) -> String {
+fn title(scale: &ColorScale, scales: &[ColorScale]) -> String {
     let Some(column) = &scale.column else { return scale.object.clone() };
-    let is_alone = all.iter().filter(|other| other.column.as_ref() == Some(column)).count() < 2;
+    let is_alone = scales.iter().filter(|other| other.column.as_ref() == Some(column)).count() < 2;
     if is_alone { column.clone() } else { format!("{}: {column}", scale.object) }
 }
 
@@ -138,7 +138,7 @@ fn told(spacing: MapScale, range: [f64; 2], bar: f64, capital: f64) -> Vec<(f64,
     let [low, high] = range;
     let most = (bar / (2.0 * LINE * capital)) as usize;
     let Ticks { ends, round } = match spacing {
-        MapScale::Linear => Ticks::of(range, most),
+        MapScale::Linear => Ticks::new(range, most),
         MapScale::Logarithmic => Ticks::of_powers(range, most),
     };
     let near = LINE * capital / bar;
@@ -241,13 +241,13 @@ mod tests {
     use super::*;
     use organza_scene::{ColorMap, PointColors};
 
-    fn of(column: Option<&str>, colors: PointColors, numbers: ScaleNumbers) -> ColorScale {
+    fn survey_scale(column: Option<&str>, colors: PointColors, numbers: ScaleNumbers) -> ColorScale {
         ColorScale { object: "survey".into(), column: column.map(str::to_owned), colors, numbers, gap: None }
     }
 
     fn heights() -> ColorScale {
         let map = PointColors::map(ColorMap::VIRIDIS);
-        of(Some("height"), map, ScaleNumbers::Range([405.0, 513.0]))
+        survey_scale(Some("height"), map, ScaleNumbers::Range([405.0, 513.0]))
     }
 
     /// A picture of one brightness with legends: its samples, and how many had no room.
@@ -312,7 +312,7 @@ mod tests {
     #[test]
     fn whole_numbers_have_a_row_each_with_what_they_mean() {
         let numbers: Vec<f64> = (0..64).map(f64::from).collect();
-        let scale = of(Some("class"), PointColors::Classes, ScaleNumbers::Each(numbers.clone()));
+        let scale = survey_scale(Some("class"), PointColors::Classes, ScaleNumbers::Each(numbers.clone()));
         let rows = rows_of(&scale, &numbers, 5).expect("room for rows");
         assert_eq!(rows[2], (Some(scale.color(2.0)), "2 ground".to_owned()));
         assert_eq!(rows[4], (None, "and 60 more".to_owned()));
@@ -339,10 +339,10 @@ mod tests {
     #[test]
     fn names_tell_objects_apart_where_columns_do_not_and_long_ones_are_shortened() {
         let other = ColorScale { object: "scan".into(), ..heights() };
-        let volume = of(None, PointColors::Distinct, ScaleNumbers::Range([0.0, 1.0]));
-        let all = [heights(), other, volume];
-        assert_eq!(all.each_ref().map(|s| title(s, &all)), ["survey: height", "scan: height", "survey"]);
-        assert_eq!(title(&all[0], &all[..1]), "height");
+        let volume = survey_scale(None, PointColors::Distinct, ScaleNumbers::Range([0.0, 1.0]));
+        let scales = [heights(), other, volume];
+        assert_eq!(scales.each_ref().map(|s| title(s, &scales)), ["survey: height", "scan: height", "survey"]);
+        assert_eq!(title(&scales[0], &scales[..1]), "height");
         assert_eq!(shortened("a long name".into(), |text| text.len() < 9), "a lon...");
         assert_eq!(drawn([480, 270], 0.5, &[ColorScale { column: Some("w".repeat(256)), ..heights() }]).1, 0);
     }

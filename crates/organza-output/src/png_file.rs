@@ -56,7 +56,7 @@ fn written(
     encoder.set_color(color);
     encoder.set_depth(depth);
     encoder.set_source_srgb(SrgbRenderingIntent::Perceptual);
-    for (name, text) in texts::of(metadata) {
+    for (name, text) in texts::pairs(metadata) {
         encoder.add_itxt_chunk(name.to_owned(), text)?;
     }
     encoder.write_header()?.write_image_data(pixels)

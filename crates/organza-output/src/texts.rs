@@ -6,7 +6,7 @@ use super::Metadata;
 const LONGEST_SCENE: usize = 1 << 16;
 
 /// The pairs; texts without anything to say are left out.
-pub(super) fn of(metadata: &Metadata) -> Vec<(&'static str, String)> {
+pub(super) fn pairs(metadata: &Metadata) -> Vec<(&'static str, String)> {
     let mut texts = vec![
         ("organza:version", env!("CARGO_PKG_VERSION").to_owned()),
         ("organza:scene_sha256", metadata.scene_sha256.clone()),

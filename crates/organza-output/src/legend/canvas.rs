@@ -37,7 +37,8 @@ impl<'a> Canvas<'a> {
     }
 
     /// Writes a text from a place on the line that it stands on.
-    pub(super) fn text(&mut self, text: &str, [x, y]: [f64; 2], capital: f64, color: [f32; 3]) {
+    pub(super) fn text(&mut self, text: &str, origin: [f64; 2], capital: f64, color: [f32; 3]) {
+        let [x, y] = origin;
         let unit = capital / glyphs::CAPITAL;
         let mut left = x;
         for character in text.chars() {
@@ -88,7 +89,8 @@ impl<'a> Canvas<'a> {
 }
 
 /// From a line between two ends, which may be one place, to a place.
-fn distance([from, to]: [[f64; 2]; 2], place: [f64; 2]) -> f64 {
+fn distance(line: [[f64; 2]; 2], place: [f64; 2]) -> f64 {
+    let [from, to] = line;
     let along = [to[0] - from[0], to[1] - from[1]];
     let off = [place[0] - from[0], place[1] - from[1]];
     let squared = along[0] * along[0] + along[1] * along[1];

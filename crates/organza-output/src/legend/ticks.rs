@@ -20,7 +20,7 @@ pub(super) struct Ticks {
 
 impl Ticks {
     /// Those of a range, of which at most so many are round; of one number alone that is all.
-    pub(super) fn of(range: [f64; 2], most: usize) -> Self {
+    pub(super) fn new(range: [f64; 2], most: usize) -> Self {
         let [low, high] = range;
         let span = high - low;
         if !(span > 0.0 && span.is_finite() && most > 0) {
@@ -43,7 +43,7 @@ impl Ticks {
     pub(super) fn of_powers(range: [f64; 2], most: usize) -> Self {
         let [low, high] = range;
         if !(low > 0.0 && high > low && high.is_finite()) {
-            return Self::of(range, 0);
+            return Self::new(range, 0);
         }
         let digits = last_digit(low)..=last_digit(high);
         let within = |times: f64, digit: i32| {
@@ -106,7 +106,7 @@ mod tests {
     use super::*;
 
     fn texts(range: [f64; 2], most: usize) -> (Vec<String>, Vec<String>) {
-        let ticks = Ticks::of(range, most);
+        let ticks = Ticks::new(range, most);
         (ticks.ends.map(|(_, text)| text).into(), ticks.round.into_iter().map(|(_, text)| text).collect())
     }
 
@@ -125,11 +125,11 @@ mod tests {
     fn there_are_never_more_than_asked_for_and_the_same_for_a_range_in_other_units() {
         for (low, high) in [(0.0, 1.0), (-3.0, 7.0), (1.1, 1.2), (637_000.0, 637_500.0)] {
             for most in 1..12 {
-                let ticks = Ticks::of([low, high], most);
+                let ticks = Ticks::new([low, high], most);
                 assert!(ticks.round.len() <= most + 1, "{low} {high} {most}: {ticks:?}");
                 let around = 1e-6 * (high - low);
                 assert!(ticks.round.iter().all(|(n, _)| (low - around..high + around).contains(n)), "{ticks:?}");
-                let kilo = Ticks::of([1000.0 * low, 1000.0 * high], most);
+                let kilo = Ticks::new([1000.0 * low, 1000.0 * high], most);
                 assert_eq!(kilo.round.len(), ticks.round.len(), "{low} {high} {most}");
             }
         }
