@@ -185,8 +185,8 @@ fn run_on(
     entries: u32,
     accumulator: &mut Accumulator,
 ) -> Result<Result<Chained, Reason>, Failure> {
-    let all = [splats.ids, splats.solid].concat();
-    let attributes = Attributes::new(splats.input.cloud, Some(&all))?;
+    let ids = [splats.ids, splats.solid].concat();
+    let attributes = Attributes::new(splats.input.cloud, Some(&ids))?;
     // No more than a kernel sees: whether that is enough the device says.
     let most = u32::try_from(device.adapter().binding_bytes / 4).unwrap_or(u32::MAX);
     let mut rooms = splats.rooms(&attributes, accumulator, entries, most);
@@ -201,12 +201,12 @@ fn run_on(
             Err(DeviceError::TooLarge { .. } | DeviceError::Memory { .. }) => return Ok(Err(Reason::TooLarge)),
             ready => ready?,
         };
-        let received = looked_up.take().map_or_else(|| splats.received(&all), Ok)?;
+        let received = looked_up.take().map_or_else(|| splats.received(&ids), Ok)?;
         if splats.progress.is_cancelled() {
             return Err(Error::Cancelled.into());
         }
         let run = |inputs: &[(BufferId, &[u8])]| ready.run(inputs).map_err(Failure::from);
-        let run = whole.with_inputs(splats, &all, &attributes, &received, accumulator, run)?;
+        let run = whole.with_inputs(splats, &ids, &attributes, &received, accumulator, run)?;
         let (projected, joined) = &whole.project;
         let projection = run.bytes(joined.buffer(projected.state));
         if project::through_the_eye(projection)? > 0 {
@@ -228,8 +228,8 @@ fn run_on(
 
 impl Splats<'_> {
     /// What the maps of the lights let through to these splats, where it is uploaded.
-    fn received(&self, all: &[u32]) -> Result<Vec<[f32; 3]>, Error> {
-        if self.castings.is_empty() { shade::received(self.input, all, Some(self.progress)) } else { Ok(Vec::new()) }
+    fn received(&self, ids: &[u32]) -> Result<Vec<[f32; 3]>, Error> {
+        if self.castings.is_empty() { shade::received(self.input, ids, Some(self.progress)) } else { Ok(Vec::new()) }
     }
 
     /// Room for so many entries of translucent splats, and as many as opaque ones may have.
@@ -240,7 +240,7 @@ impl Splats<'_> {
         let footprints = self.footprints.layers().len() as u32;
         let solid = !self.solid.is_empty();
         let objects = !accumulator.object.is_empty();
-        let all = Capacities {
+        let composite = Capacities {
             size,
             planes: accumulator.optical_depth.len() as u32,
             channels,
@@ -256,6 +256,6 @@ impl Splats<'_> {
         let listed = self.solid.len() as u32;
         let entries = room_for(self.solid.len()).min(most);
         let resolved = resolve::Capacities { size, channels, splats, listed, entries, footprints, objects };
-        Rooms { all, solid: solid.then_some(resolved) }
+        Rooms { composite, solid: solid.then_some(resolved) }
     }
 }

@@ -55,12 +55,12 @@ pub struct ListedDevice {
 /// # Errors
 /// When a driver fails to say what there is.
 pub fn devices() -> Result<Vec<ListedDevice>, Error> {
-    let mut all = Vec::new();
+    let mut devices = Vec::new();
     for backend in backends() {
         let found = listed(&*backend)?;
-        all.extend(found.into_iter().map(|adapter| ListedDevice { backend: backend.name(), adapter }));
+        devices.extend(found.into_iter().map(|adapter| ListedDevice { backend: backend.name(), adapter }));
     }
-    Ok(all)
+    Ok(devices)
 }
 
 /// What one backend reaches.

@@ -110,10 +110,10 @@ mod tests {
             ids
         };
         let apart = order(&|p| p.x * a + p.y * b + p.z * c + t);
-        let all = order(&|p| p.z.mul_add(c, p.y.mul_add(b, p.x * a)) + t);
+        let every = order(&|p| p.z.mul_add(c, p.y.mul_add(b, p.x * a)) + t);
         let last = order(&|p| p.z.mul_add(c, p.x * a + p.y * b) + t);
         let first = order(&|p| p.y.mul_add(b, p.x * a) + p.z * c + t);
-        for fused in [all, last, first] {
+        for fused in [every, last, first] {
             let moved = apart.iter().zip(&fused).filter(|(i, j)| i != j).count();
             assert!(moved > 50, "{moved}");
         }

@@ -38,8 +38,8 @@ pub(super) fn uploads(
     ids: &[u32],
     shares: &[f32],
 ) -> Result<Vec<ShadowUploads>, Failure> {
-    let all = shadows.iter().zip(castings);
-    all.map(|((shadow, _), casting)| Ok(shadow.uploads(casting, Some(ids), shares)?)).collect()
+    let pairs = shadows.iter().zip(castings);
+    pairs.map(|((shadow, _), casting)| Ok(shadow.uploads(casting, Some(ids), shares)?)).collect()
 }
 
 /// Whether all entries of a run had room; those that had not get what they need.

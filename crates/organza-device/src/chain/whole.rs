@@ -27,7 +27,7 @@ pub(super) struct Whole {
 
 /// Room for all splats and for the opaque ones.
 pub(super) struct Rooms {
-    pub(super) all: Capacities,
+    pub(super) composite: Capacities,
     pub(super) solid: Option<resolve::Capacities>,
 }
 
@@ -40,7 +40,7 @@ impl Whole {
         sorts: bool,
         casts: &[CastRoom],
     ) -> Result<Self, Error> {
-        let room = rooms.all;
+        let room = rooms.composite;
         // The translucent ones come first.
         let sorted = order::Capacities { splats: room.ordered, kept: room.ordered };
         let sort = sorts.then(|| order::record(sorted));
@@ -64,20 +64,27 @@ impl Whole {
         let mut resolve = None;
         if let Some(solid) = rooms.solid {
             let resolved = resolve::record(solid)?;
-            let known =
-                [(resolved.splats, in_project.buffer(projected.splats)), (resolved.values, in_shade.buffer(shaded.values))];
+            let known = [
+                (resolved.splats, in_project.buffer(projected.splats)),
+                (resolved.values, in_shade.buffer(shaded.values)),
+            ];
             let joined = recording.join(&resolved.recording, &known);
             resolve = Some((resolved, joined));
         }
-        let mut taken =
-            vec![(composite.splats, in_project.buffer(projected.splats)), (composite.values, in_shade.buffer(shaded.values))];
+        let mut taken = vec![
+            (composite.splats, in_project.buffer(projected.splats)),
+            (composite.values, in_shade.buffer(shaded.values)),
+        ];
         if let (Some(sort), Some(sorted)) = (&sort, composite.sorted) {
             taken.extend([(composite.order, sort.places), (sorted, sort.state)]);
         }
         taken.extend(resolve.iter().map(|(resolved, joined)| (composite.opaque, joined.buffer(resolved.image))));
         let in_composite = recording.join(&composite.recording, &taken);
-        let read =
-            [in_project.buffer(projected.state), in_composite.buffer(composite.state), in_composite.buffer(composite.planes)];
+        let read = [
+            in_project.buffer(projected.state),
+            in_composite.buffer(composite.state),
+            in_composite.buffer(composite.planes),
+        ];
         let of_shadows = shadows.iter().map(|(shadow, joined)| joined.buffer(shadow.cast.state));
         let of_solid = resolve.iter().flat_map(|(r, joined)| [r.state, r.image].map(|buffer| joined.buffer(buffer)));
         recording.read_only(&read.into_iter().chain(of_shadows).chain(of_solid).collect::<Vec<_>>());
@@ -97,7 +104,7 @@ impl Whole {
     /// Whether all entries had room; those that had not get what they need.
     pub(super) fn had_room(&self, run: &Run, rooms: &mut Rooms) -> Result<bool, Failure> {
         let (composite, joined) = &self.composite;
-        let mut had = grown(composite.counts(run.bytes(joined.buffer(composite.state))), &mut rooms.all.entries)?;
+        let mut had = grown(composite.counts(run.bytes(joined.buffer(composite.state))), &mut rooms.composite.entries)?;
         if let (Some((resolved, joined)), Some(solid)) = (&self.resolve, &mut rooms.solid) {
             had &= grown(resolved.counts(run.bytes(joined.buffer(resolved.state))), &mut solid.entries)?;
         }
@@ -132,7 +139,7 @@ impl Whole {
     pub(super) fn with_inputs<T>(
         &self,
         splats: &Splats<'_>,
-        all: &[u32],
+        splat_ids: &[u32],
         attributes: &Attributes,
         received: &[[f32; 3]],
         accumulator: &Accumulator,
@@ -146,7 +153,7 @@ impl Whole {
         let view = order::view_bytes(origin, count, camera, sort);
         let of_object = |id: &u32| input.cloud.object[*id as usize];
         let objects: Vec<u32> =
-            if accumulator.object.is_empty() { Vec::new() } else { all.iter().map(of_object).collect() };
+            if accumulator.object.is_empty() { Vec::new() } else { splat_ids.iter().map(of_object).collect() };
         // Where nothing sorts they come in their order.
         let order: Vec<u32> = if self.sort.is_some() { Vec::new() } else { (0..count).collect() };
         let (projected, in_project) = &self.project;
@@ -159,8 +166,8 @@ impl Whole {
         } else {
             shaded.uploads_beside_light(input, attributes)?
         };
-        let shares = shade::shadow_shares(input, all);
-        let cast = shadows::uploads(&self.shadows, splats.castings, all, &shares)?;
+        let shares = shade::shadow_shares(input, splat_ids);
+        let cast = shadows::uploads(&self.shadows, splats.castings, splat_ids, &shares)?;
         let direction = sort.direction;
         let params = raster;
         let order = &order[..];
@@ -239,13 +246,13 @@ mod tests {
             depths: false,
             objects: false,
         };
-        let rooms = Rooms { all: room, solid: None };
+        let rooms = Rooms { composite: room, solid: None };
         let whole =
             Whole::record(&rooms, &attributes, &input, ChannelLayout::default(), true, &[]).expect("a recording");
         whole.recording.check().expect("no fault");
-        let steps = |of: fn(&Step) -> Option<BufferId>| -> Vec<&str> {
+        let steps = |buffer: fn(&Step) -> Option<BufferId>| -> Vec<&str> {
             let buffers = whole.recording.buffers();
-            whole.recording.steps().iter().filter_map(of).map(|b| buffers[b.index()].name).collect()
+            whole.recording.steps().iter().filter_map(buffer).map(|b| buffers[b.index()].name).collect()
         };
         let uploads = steps(|step| if let Step::Upload(b) = step { Some(*b) } else { None });
         let expected = [

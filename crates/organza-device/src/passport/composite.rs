@@ -81,8 +81,8 @@ impl CompositeInput {
 /// How two accumulators of one plane agree.
 pub(super) fn accumulators(found: &Accumulator, expected: &Accumulator) -> Agreement {
     let transmittances = |a: &Accumulator| a.optical_depth[0].iter().map(|tau| libm::expf(-tau)).collect::<Vec<f32>>();
-    let of = |a: &Accumulator| [a.channels.concat(), transmittances(a)].concat();
-    numbers(&of(found), &of(expected), "radiance")
+    let radiance = |a: &Accumulator| [a.channels.concat(), transmittances(a)].concat();
+    numbers(&radiance(found), &radiance(expected), "radiance")
 }
 
 /// How numbers up to 1 agree.

@@ -64,8 +64,12 @@ impl OpaqueInput {
         let uploads = recorded.uploads(&input)?;
         let run = device.run(&recorded.recording, &recorded.inputs(&uploads))?;
         let (found, _) = recorded.finish([recorded.state, recorded.image].map(|buffer| run.bytes(buffer)))?;
-        let of = |image: &OpaqueImage| image.channels.concat();
-        Ok(Found { items: SPLATS.into(), agreement: agreement(&of(&found), &of(&expected)), passes: run.passes })
+        let channels = |image: &OpaqueImage| image.channels.concat();
+        Ok(Found {
+            items: SPLATS.into(),
+            agreement: agreement(&channels(&found), &channels(&expected)),
+            passes: run.passes,
+        })
     }
 }
 
