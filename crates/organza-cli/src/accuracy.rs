@@ -91,13 +91,13 @@ fn truth(
     options: &Options,
     progress: &Progress,
 ) -> Result<Result<Truth, String>, Error> {
-    let mut own = truth::truth(scene, render, Orders::of(scene), options.truth_samples(), progress)?;
-    if let Ok(own) = &mut own
-        && let Ok(all) = truth::truth(scene, render, Orders::All, options.truth_samples(), progress)?
+    let mut truth_of_scene = truth::truth(scene, render, Orders::of(scene), options.truth_samples(), progress)?;
+    if let Ok(scene_orders) = &mut truth_of_scene
+        && let Ok(every_order) = truth::truth(scene, render, Orders::All, options.truth_samples(), progress)?
     {
-        own.all_orders = Some(own.beside(&all)?);
+        scene_orders.all_orders = Some(scene_orders.beside(&every_order)?);
     }
-    Ok(own)
+    Ok(truth_of_scene)
 }
 
 /// The study of `particles`, by the limit and the truth of `points`; or why there is none.

@@ -124,7 +124,7 @@ fn add(sum: &mut Vec<Pass>, passes: Vec<Pass>) {
 /// How many times the built-in figure an item takes here, as its pass does; of a pass that did not run, as all passes do together.
 fn ratio(passes: &[Pass], item: Item) -> f64 {
     let known = passes.iter().find(|pass| pass.name == item.pass());
-    let sum = |of: fn(&Pass) -> f64| passes.iter().map(of).sum::<f64>();
+    let sum = |number: fn(&Pass) -> f64| passes.iter().map(number).sum::<f64>();
     known.map_or_else(|| sum(|p| p.measured) / sum(|p| p.predicted), |pass| pass.measured / pass.predicted)
 }
 

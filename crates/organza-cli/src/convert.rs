@@ -146,7 +146,7 @@ fn check_name(path: &Path) -> Result<&Path, Error> {
 
 /// What is said of pictures says nothing of splats.
 fn refuse_of_pictures(scene: &SceneArguments) -> Result<(), Error> {
-    let all = [
+    let options = [
         ("--technique", scene.technique.is_some()),
         ("--target-error", scene.target_error.is_some()),
         ("--repeat-level", scene.repeat_level.is_some()),
@@ -155,7 +155,7 @@ fn refuse_of_pictures(scene: &SceneArguments) -> Result<(), Error> {
         ("--layers", scene.layers.is_some()),
         ("--effect", !scene.effect.is_empty()),
     ];
-    let named = all.into_iter().find(|(_, on)| *on);
+    let named = options.into_iter().find(|(_, on)| *on);
     named.map_or(Ok(()), |(name, _)| {
         Err(Error::usage(format!("{name} is for pictures, and splats are asked for"), "leave it out"))
     })

@@ -164,13 +164,13 @@ pub(super) fn is_scene(path: &Path) -> bool {
 
 /// What is said of data files alone says nothing of a scene.
 fn refuse_wishes(first: &FirstArguments) -> Result<(), Error> {
-    let all = [
+    let options = [
         ("--preset", first.preset.is_some()),
         ("--color-by", first.color_by.is_some()),
         ("--up", first.up.is_some()),
         ("--ground", first.ground),
     ];
-    let named = all.into_iter().find(|(_, on)| *on);
+    let named = options.into_iter().find(|(_, on)| *on);
     named.map_or(Ok(()), |(name, _)| {
         Err(Error::usage(format!("{name} is for data files, and a scene is given"), "change the scene"))
     })

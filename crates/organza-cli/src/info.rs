@@ -127,7 +127,7 @@ fn file_document(facts: &Facts) -> Value {
         "histogram": facts.histogram.as_ref().map(histogram),
         "quantiles": facts.quantiles.iter().map(|(share, value)| json!([share, value])).collect::<Value>(),
         "columns": facts.columns.iter().map(|(name, range)| (name.clone(), json!(range))).collect::<Value>(),
-        "columns_of": facts.associations.iter().map(|(name, of)| (name.clone(), json!(of.name()))).collect::<Value>(),
+        "columns_of": facts.associations.iter().map(|(name, association)| (name.clone(), json!(association.name()))).collect::<Value>(),
         "faults": faults,
         "not_used": facts.unused,
         "remarks": facts.remarks,

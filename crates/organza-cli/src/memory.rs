@@ -21,9 +21,9 @@ fn least_limit(root: &Path) -> Option<u64> {
         // One without a limit says `max`, or a number beyond any memory.
         fs::read_to_string(root.join(file)).ok()?.trim().parse().ok()
     });
-    let own = text("proc/self/limits");
-    let own = own.lines().filter_map(soft_limit);
-    machine.into_iter().chain(groups).chain(own).min()
+    let limits = text("proc/self/limits");
+    let limits = limits.lines().filter_map(soft_limit);
+    machine.into_iter().chain(groups).chain(limits).min()
 }
 
 /// `MemTotal` in bytes.

@@ -176,12 +176,12 @@ pub(super) fn cost_text(cost: &CostRecord) -> String {
 
 /// Columns as wide as they need to be; `align` has `l` or `r` for each.
 pub(super) fn table<const N: usize>(head: [&str; N], align: &str, rows: impl Iterator<Item = [String; N]>) -> String {
-    let mut all = vec![head.map(str::to_owned)];
-    all.extend(rows.map(|row| row.map(|cell| organza::escape_controls(&cell).into_owned())));
-    let width = |column: usize| all.iter().map(|row| row[column].chars().count()).max().unwrap_or(0);
+    let mut lines = vec![head.map(str::to_owned)];
+    lines.extend(rows.map(|row| row.map(|cell| organza::escape_controls(&cell).into_owned())));
+    let width = |column: usize| lines.iter().map(|row| row[column].chars().count()).max().unwrap_or(0);
     let widths: [usize; N] = std::array::from_fn(width);
     let mut text = String::new();
-    for row in &all {
+    for row in &lines {
         let mut line = String::new();
         for ((cell, width), side) in row.iter().zip(widths).zip(align.chars()) {
             let padding = " ".repeat(width - cell.chars().count());

@@ -292,12 +292,12 @@ pub(super) fn overrides(a: &SceneArguments, is_made: bool) -> Result<Vec<Overrid
     }
     let options = options.into_iter().map(|(flag, path, value)| Override::from_option(flag, path, &value));
     check_switches(&a.effect)?;
-    let mut all = if is_made { Vec::new() } else { camera_overrides(&a.first)? };
+    let mut changes = if is_made { Vec::new() } else { camera_overrides(&a.first)? };
     let effects = a.effect.iter().map(|text| Override::of_effect(text));
     for change in options.chain(a.set.iter().map(|text| Override::parse(text))).chain(effects) {
-        all.push(change?);
+        changes.push(change?);
     }
-    Ok(all)
+    Ok(changes)
 }
 
 /// A text as TOML, which takes JSON's quotes and escapes.

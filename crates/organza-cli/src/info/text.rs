@@ -180,7 +180,7 @@ fn faults(facts: &Facts, text: &mut Lines) {
         (faults.isolated, ["vertex", "vertices"], " of no triangle".to_owned()),
     ];
     let there = found.into_iter().filter(|(count, ..)| *count > 0);
-    let there: Vec<String> = there.map(|(count, of, what)| counted(count, of) + &what).collect();
+    let there: Vec<String> = there.map(|(count, noun, what)| counted(count, noun) + &what).collect();
     if there.is_empty() {
         text.add("faults", "none: a closed surface");
     }
