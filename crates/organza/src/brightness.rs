@@ -83,11 +83,11 @@ impl Receiver {
 /// How bright a loaded scene can be, before this background.
 pub(crate) fn of_scene(scene: &Scene, loaded: &Loaded) -> Brightness {
     let mut of_objects = splats(loaded);
-    let as_they_are: Vec<Receiver> = loaded.own.iter().map(|own| as_it_is(loaded, own)).collect();
+    let as_they_are: Vec<Receiver> = loaded.own.iter().map(|native| as_it_is(loaded, native)).collect();
     let points = light_points(&loaded.lights);
     let mut lights: Vec<f64> = vec![0.0; loaded.lights.len()];
     let mut sent = vec![0.0f64; of_objects.len()];
-    let ranks = loaded.own.iter().map(|own| own.object);
+    let ranks = loaded.own.iter().map(|native| native.object);
     let receivers = of_objects.iter().zip(0..).chain(as_they_are.iter().zip(ranks));
     for (receiver, object) in receivers.filter(|(receiver, _)| receiver.response > 0.0) {
         let mut received = vec![0.0; loaded.lights.len()];
@@ -100,8 +100,8 @@ pub(crate) fn of_scene(scene: &Scene, loaded: &Loaded) -> Brightness {
         }
         sent[object] = sent[object].max(received.iter().sum::<f64>() * receiver.response);
     }
-    for (receiver, own) in as_they_are.iter().zip(&loaded.own) {
-        of_objects[own.object].join(&Receiver { bounds: DAabb::EMPTY, ..*receiver });
+    for (receiver, native) in as_they_are.iter().zip(&loaded.own) {
+        of_objects[native.object].join(&Receiver { bounds: DAabb::EMPTY, ..*receiver });
     }
     let ambient = f64::from(scene.ambient.into_iter().fold(0.0, f32::max));
     let background = match &loaded.images.environment {
@@ -119,11 +119,11 @@ pub(crate) fn of_scene(scene: &Scene, loaded: &Loaded) -> Brightness {
 }
 
 /// What an object is that is drawn from its own data. How much it hides splats do not tell.
-fn as_it_is(loaded: &Loaded, own: &Own) -> Receiver {
-    let material = &loaded.materials[own.material];
-    let color = f64::from(own.brightest_color());
+fn as_it_is(loaded: &Loaded, native: &Own) -> Receiver {
+    let material = &loaded.materials[native.material];
+    let color = f64::from(native.brightest_color());
     Receiver {
-        bounds: own.world_box(),
+        bounds: native.world_box(),
         spread: 0.0,
         response: material.brightest(color, true),
         ambient: ambient_share(material, color),

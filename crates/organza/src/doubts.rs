@@ -214,12 +214,12 @@ fn outside(scene: &Scene, loaded: &Loaded, seen: &[bool]) -> Vec<String> {
     let camera = &scene.camera;
     let looks = format!("the camera at {} looks along {}", place(camera.position), place(camera.axes[2]));
     if !lost.is_empty() && !seen.contains(&true) {
-        let all = lost.iter().fold(DAabb::EMPTY, |all, (_, b)| all.union(*b));
+        let hull = lost.iter().fold(DAabb::EMPTY, |hull, (_, b)| hull.union(*b));
         return vec![format!(
             "the camera sees nothing: all objects lie from {} to {}, and {looks}; set camera.target to {}",
-            place(all.min),
-            place(all.max),
-            place(all.center())
+            place(hull.min),
+            place(hull.max),
+            place(hull.center())
         )];
     }
     // The body of a lamp stands where its light is, seen or not.
@@ -246,27 +246,27 @@ fn lights(loaded: &Loaded) -> impl Iterator<Item = DVec3> {
 fn seen(loaded: &Loaded) -> Vec<bool> {
     let view = &loaded.camera;
     let mut seen = objects_in_view(&loaded.cloud, view, loaded.objects.len());
-    for own in &loaded.own {
-        seen[own.object] |= view.may_see_hull(&own.world_box().corners());
+    for native in &loaded.own {
+        seen[native.object] |= view.may_see_hull(&native.world_box().corners());
     }
     seen
 }
 
 /// The objects that are not seen and not empty, with their bounds in the normalized world.
 fn bounds(loaded: &Loaded, seen: &[bool]) -> Vec<(usize, DAabb)> {
-    let mut of = vec![DAabb::EMPTY; seen.len()];
+    let mut boxes = vec![DAabb::EMPTY; seen.len()];
     let unseen = |id: usize| !seen[id];
     if !(0..seen.len()).any(unseen) {
         return Vec::new();
     }
-    let mut add = |id: usize, b: DAabb| of[id] = of[id].union(b);
+    let mut add = |id: usize, b: DAabb| boxes[id] = boxes[id].union(b);
     loaded.own.iter().filter(|o| unseen(o.object)).for_each(|o| add(o.object, o.world_box()));
     let cloud = &loaded.cloud;
     for (object, position) in cloud.object.iter().zip(&cloud.position).filter(|(o, _)| unseen(**o as usize)) {
         let p = cloud.origin + position.as_dvec3();
         add(*object as usize, DAabb::new(p, p));
     }
-    of.into_iter().enumerate().filter(|(_, b)| !b.is_empty()).collect()
+    boxes.into_iter().enumerate().filter(|(_, b)| !b.is_empty()).collect()
 }
 
 /// Lights that are not scattered as often as was asked for.

@@ -131,7 +131,7 @@ impl Loaded {
         keep(&mut self.planned, &stays);
         keep(&mut self.splats, &stays);
         keep(&mut self.convertible, &stays);
-        self.own.retain(|own| !is_gone(own.object));
+        self.own.retain(|native| !is_gone(native.object));
         let left: Vec<u32> =
             (0..self.cloud.len() as u32).filter(|i| !is_gone(self.cloud.object[*i as usize] as usize)).collect();
         self.cloud = self.cloud.gather(&left);
@@ -143,7 +143,7 @@ impl Loaded {
         let mut objects = self.objects.clone();
         let mut hide =
             |object: usize| (objects[object].casts_shadow, objects[object].shadow_coefficient) = (false, 0.0);
-        self.own.iter().for_each(|own| hide(own.object));
+        self.own.iter().for_each(|native| hide(native.object));
         let kinds = self.cloud.kind.iter().zip(&self.cloud.object);
         kinds.filter(|(kind, _)| **kind != SplatKind::Opaque).for_each(|(_, object)| hide(*object as usize));
         objects
@@ -258,12 +258,12 @@ impl Inputs<'_> {
     ) -> Result<Loaded, Error> {
         let Self { loading, mut prepared, mut images, mut lights, mut warnings, statistics, facts } = self;
         let Loading { scene, progress, files, options } = loading;
-        let mut early = spare.map(|_| loading.own(&mut prepared, &planned, &mut warnings)).transpose()?;
-        if let (Some(own), Some(spare)) = (&mut early, spare)
-            && spare(own, &planned, &statistics, &lights)?
+        let mut early = spare.map(|_| loading.natives(&mut prepared, &planned, &mut warnings)).transpose()?;
+        if let (Some(natives), Some(spare)) = (&mut early, spare)
+            && spare(natives, &planned, &statistics, &lights)?
         {
             planned.iter_mut().filter(|p| p.form.is_own()).for_each(|p| p.splats = None);
-            own.iter_mut().for_each(|own| own.has_splats = false);
+            natives.iter_mut().for_each(|native| native.has_splats = false);
         }
         let mut splats = loading.counts(&prepared, &planned)?;
         let convertible = prepared.iter().map(|p| p.prediction.splats).collect();
@@ -271,12 +271,12 @@ impl Inputs<'_> {
         let points = lights.iter().map(SceneLight::count).sum();
         let work = before_conversion(scene, &splats, &planned, points, beside);
         progress.plan(options.rates.stages(&work));
-        let mut own = early.map_or_else(|| loading.own(&mut prepared, &planned, &mut warnings), Ok)?;
+        let mut natives = early.map_or_else(|| loading.natives(&mut prepared, &planned, &mut warnings), Ok)?;
         let converted = planned.iter().filter(|p| p.splats.is_some()).count();
         let mut cloud = Cloud::default();
-        if converted > 0 || own.is_empty() {
+        if converted > 0 || natives.is_empty() {
             cloud = cost.measure(pass::CONVERT, |stage| {
-                let cloud = merge(loading.clouds(prepared, &planned, &own, &mut splats, &mut warnings)?);
+                let cloud = merge(loading.clouds(prepared, &planned, &natives, &mut splats, &mut warnings)?);
                 stage.items_in = converted as u64;
                 stage.items_out = cloud.len() as u64;
                 stage.bytes = cloud.bytes();
@@ -284,7 +284,7 @@ impl Inputs<'_> {
             })?;
         }
         let mut camera = scene.camera;
-        let exponent = normalize(&mut cloud, &mut own, &mut camera, &mut lights, &mut images.slides);
+        let exponent = normalize(&mut cloud, &mut natives, &mut camera, &mut lights, &mut images.slides);
         cloud.canonicalize();
         let objects: Vec<Object> = scene.objects.iter().map(object::entry).collect();
         if scene.render.splat_share < 1.0 {
@@ -296,10 +296,10 @@ impl Inputs<'_> {
             count_anew(&mut splats, &cloud, &objects);
         }
         cloud.validate().map_err(|e| out_of_range(scene, &cloud, e))?;
-        warnings.extend(unseen(scene, &cloud, &materials, own.is_empty()));
+        warnings.extend(unseen(scene, &cloud, &materials, natives.is_empty()));
         Ok(Loaded {
             cloud,
-            own,
+            own: natives,
             statistics,
             facts,
             planned,
@@ -348,11 +348,11 @@ fn out_of_range(scene: &Scene, cloud: &Cloud, error: splat_core::Error) -> Error
 
 /// The materials of the scene, and after them the one of colours that are shown as they are, if there are any.
 fn materials(scene: &Scene, prepared: &[Prepared<'_>]) -> Vec<Material> {
-    let mut all: Vec<Material> = scene.materials.iter().map(|m| m.material).collect();
-    if let (true, Some(default)) = (prepared.iter().any(|p| p.as_it_is), all.first().copied()) {
-        all.push(Material { shading: Shading::Unlit, ..default });
+    let mut materials: Vec<Material> = scene.materials.iter().map(|m| m.material).collect();
+    if let (true, Some(default)) = (prepared.iter().any(|p| p.as_it_is), materials.first().copied()) {
+        materials.push(Material { shading: Shading::Unlit, ..default });
     }
-    all
+    materials
 }
 
 /// What the planner asks of all lights.
@@ -379,15 +379,15 @@ fn merge(mut clouds: Vec<Cloud>) -> Cloud {
     let key = |o: &DVec3| o.to_array();
     let origins = clouds.iter().filter(|c| !c.is_empty()).map(|c| c.origin);
     let least = origins.min_by(|a, b| key(a).partial_cmp(&key(b)).unwrap_or(Ordering::Equal));
-    let mut all = Cloud::new(least.unwrap_or(DVec3::ZERO));
-    all.reserve(clouds.iter().map(Cloud::len).sum());
-    clouds.iter().for_each(|c| all.append(c));
-    all
+    let mut merged = Cloud::new(least.unwrap_or(DVec3::ZERO));
+    merged.reserve(clouds.iter().map(Cloud::len).sum());
+    clouds.iter().for_each(|c| merged.append(c));
+    merged
 }
 
 /// All lights, sorted by their bits so that the order of the file does not matter.
 fn lights(scene: &Scene) -> Vec<SceneLight> {
-    let mut all = scene.lights.clone();
-    all.sort_by_cached_key(|l| (l.light.bits(), l.shadow, l.samples, format!("{:?}", l.slide)));
-    all
+    let mut lights = scene.lights.clone();
+    lights.sort_by_cached_key(|l| (l.light.bits(), l.shadow, l.samples, format!("{:?}", l.slide)));
+    lights
 }

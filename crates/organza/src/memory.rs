@@ -16,7 +16,7 @@ pub(crate) struct Memory {
     /// Splats, and what is made for each.
     pub(crate) splats: u64,
     /// Objects that particles are sampled from as they are.
-    pub(crate) own: u64,
+    pub(crate) native: u64,
     /// The environment, what lights shine through, and heights of bumps.
     pub(crate) images: u64,
     /// Averaging sets of particles.
@@ -32,7 +32,7 @@ impl Memory {
         Self {
             image: image_bytes(scene),
             splats: splat_bytes(loaded, &camera, layout(scene)),
-            own: own_bytes(loaded),
+            native: own_bytes(loaded),
             images: loaded.images.bytes(),
             average,
             maps: 0,
@@ -46,7 +46,7 @@ impl Memory {
 
     /// All of it.
     pub(crate) fn total(&self) -> u64 {
-        let others = [self.splats, self.own, self.images, self.average, self.maps];
+        let others = [self.splats, self.native, self.images, self.average, self.maps];
         others.into_iter().fold(self.image, u64::saturating_add)
     }
 }
@@ -91,16 +91,16 @@ fn splat_bytes(loaded: &Loaded, camera: &Camera, layout: ChannelLayout) -> u64 {
 /// Bytes of what particles are sampled from, files that objects share once, and of the tables for that.
 fn own_bytes(loaded: &Loaded) -> u64 {
     let mut grids: Vec<*const Grid> = Vec::new();
-    let of = |own: &Own| {
-        let known = own.grid().is_some_and(|grid| {
+    let native_bytes = |native: &Own| {
+        let known = native.grid().is_some_and(|grid| {
             let at = std::ptr::from_ref(grid);
             let known = grids.contains(&at);
             grids.push(at);
             known
         });
-        own.table_bytes + if known { 0 } else { own.bytes() }
+        native.table_bytes + if known { 0 } else { native.bytes() }
     };
-    loaded.own.iter().map(of).sum()
+    loaded.own.iter().map(native_bytes).sum()
 }
 
 /// Refuses what needs more than the limit.

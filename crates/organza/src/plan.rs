@@ -189,14 +189,14 @@ impl Plan {
         let mut tables = tables;
         let others = tables.split_off(points.len().min(tables.len()));
         let beside = if self.carried.is_empty() { ", beside opaque triangles" } else { ", of what is opaque" };
-        let of = |tables: &[Option<ShadowTable>], beside: &str| -> Vec<PlannedPass> {
+        let passes = |tables: &[Option<ShadowTable>], beside: &str| -> Vec<PlannedPass> {
             let one = |(table, point): (&Option<ShadowTable>, &LightPoint)| {
                 let reason = table.as_ref()?.describe(&(point.name() + beside));
                 Some(PlannedPass { name: pass::SHADOW_MAP.into(), reason })
             };
             tables.iter().zip(points).filter_map(one).collect()
         };
-        let made = [of(&tables, ""), of(&others, beside)].concat();
+        let made = [passes(&tables, ""), passes(&others, beside)].concat();
         if let Some(at) = self.passes.iter().position(|p| p.name == pass::SHADOW_MAP) {
             self.passes.retain(|p| p.name != pass::SHADOW_MAP);
             self.passes.splice(at..at, made);

@@ -24,7 +24,7 @@ struct Seen {
 struct BySeen {
     technique: Technique,
     splats: Expected,
-    own: OwnWork,
+    own_work: OwnWork,
 }
 
 impl Seen {
@@ -34,7 +34,7 @@ impl Seen {
         let translucent = of_each.map(|(technique, fold)| BySeen {
             technique: *technique,
             splats: expected(frame, Some(*technique)),
-            own: fold.own_work(ranges),
+            own_work: fold.own_work(ranges),
         });
         let translucent = translucent.collect();
         Self { opaque: expected(frame, None), translucent, ranges: ranges.len() as f64 }
@@ -109,12 +109,12 @@ fn surfaces(frame: &Frame<'_>, seen: &Seen) -> Vec<CountedPass> {
         let row = row(by.technique);
         let is_drawn = plan.by.iter().zip(&plan.draws).any(|(by_object, draws)| *by_object == by.technique && *draws);
         drawn += if is_drawn { by.splats.splats } else { 0.0 };
-        let ranges = by.own.ranges.map_or(seen.ranges, |ranges| ranges as f64);
+        let ranges = by.own_work.ranges.map_or(seen.ranges, |ranges| ranges as f64);
         let translucent = Translucent {
             splats: by.splats.splats,
             fragments: by.splats.fragments,
-            of_own_data: by.own.items,
-            slab_samples: by.own.slab_samples,
+            of_own_data: by.own_work.items,
+            slab_samples: by.own_work.slab_samples,
             ranges,
             any: plan.passes.iter().any(|p| row.steps.last().is_some_and(|step| step.pass == p.name)),
         };
@@ -219,17 +219,17 @@ fn preferred(frame: &Frame<'_>, seen: &Seen) -> Option<Change> {
     let mut splats = seen.translucent.iter().map(|by| by.splats).fold(Expected::default(), sum);
     // Objects from their own data become splats of that radius.
     let mut converted = Vec::new();
-    for own in &loaded.own {
-        let rank = visible().position(|(_, object)| object == own.object)?;
+    for native in &loaded.own {
+        let rank = visible().position(|(_, object)| object == native.object)?;
         let number = loaded.convertible[rank] as f64;
         converted.push(Count::new(Item::of_conversion(loaded.splats[rank].conversion), number));
-        let extent = Extent::new(&own.world_box(), &frame.camera);
-        let radius = own.radius * extent.samples_per_unit;
+        let extent = Extent::new(&native.world_box(), &frame.camera);
+        let radius = native.radius * extent.samples_per_unit;
         let footprint = (std::f64::consts::PI * radius * radius).clamp(4.0, samples(scene));
         let fragments = number * extent.share * footprint;
         splats = sum(splats, Expected { splats: number, fragments });
     }
-    let by = BySeen { technique: first.technique, splats, own: OwnWork::default() };
+    let by = BySeen { technique: first.technique, splats, own_work: OwnWork::default() };
     let drawn = splats.splats;
     let maps = plan.shadow_maps_built() as f64;
     let as_splats = Seen { opaque: seen.opaque, translucent: vec![by], ranges: 1.0 };

@@ -43,10 +43,10 @@ fn spans(frame: &Frame<'_>) -> Vec<(usize, [f32; 2])> {
             meet(object, [z - radius, z + radius]);
         }
     }
-    for own in &loaded.own {
-        for corner in own.world_box().corners() {
+    for native in &loaded.own {
+        for corner in native.world_box().corners() {
             let z = frame.camera.view_from_world(corner).z as f32;
-            meet(own.object, [z, z]);
+            meet(native.object, [z, z]);
         }
     }
     let farthest = of_object.iter().map(|s| s[1]).filter(|z| z.is_finite()).fold(0.0, f32::max);

@@ -297,14 +297,14 @@ impl Statistics {
     /// Whether a technique has translucent splats to draw, or nothing that would be there in their place.
     pub fn may_have_splats(&self, technique: Technique) -> bool {
         let counts = self.translucent_by.iter().find(|(t, _)| *t == technique).map(|t| t.1);
-        counts.is_none_or(|[splats, own]| splats > 0 || own == 0)
+        counts.is_none_or(|[splats, natives]| splats > 0 || natives == 0)
     }
 
     /// What is translucent and drawn by a technique, or from its own data, in words; `None` for nothing.
     pub fn translucent_of(&self, technique: Technique) -> Option<String> {
-        let [splats, own] = self.translucent_by.iter().find(|(t, _)| *t == technique)?.1;
-        let by_own = if own == 1 { "1 object by its".to_owned() } else { format!("{own} objects by their") };
-        match (splats, own) {
+        let [splats, natives] = self.translucent_by.iter().find(|(t, _)| *t == technique)?.1;
+        let by_own = if natives == 1 { "1 object by its".to_owned() } else { format!("{natives} objects by their") };
+        match (splats, natives) {
             (0, 0) => None,
             (n, 0) => Some(format!("{n} translucent splats")),
             (0, _) => Some(format!("{by_own} own data")),

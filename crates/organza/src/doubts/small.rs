@@ -52,7 +52,7 @@ fn boxes(loaded: &Loaded) -> Vec<DAabb> {
         let around = DAabb::around(cloud.origin + position.as_dvec3(), DVec3::splat(f64::from(*radius)));
         boxes[*object as usize] = boxes[*object as usize].union(around);
     }
-    let add = |own: &Own| boxes[own.object] = boxes[own.object].union(own.world_box());
+    let add = |native: &Own| boxes[native.object] = boxes[native.object].union(native.world_box());
     loaded.own.iter().for_each(add);
     boxes
 }

@@ -47,7 +47,7 @@ struct Look<'a> {
 impl Frame<'_> {
     /// Estimates what the cells of the shadow maps are too coarse for, where maps were made, from splats at even distances in the list.
     pub(crate) fn coarse(&self) -> Option<Coarse> {
-        let maps = &self.maps.get()?.all;
+        let maps = &self.maps.get()?.of_all;
         let sides = maps.iter().flatten().flat_map(|map| map.prediction().size);
         let cells = sides.max()? as u32;
         let splats = self.drawn().len();

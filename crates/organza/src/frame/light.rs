@@ -14,10 +14,10 @@ use tsm::{Deposits, ShadowMap};
 /// The shadow maps of a frame, for each point of a light. They serve other frames of the same splats, whatever the camera.
 pub(crate) struct Maps {
     /// Of all casters.
-    pub(super) all: Vec<Option<ShadowMap>>,
+    pub(super) of_all: Vec<Option<ShadowMap>>,
     /// Of [`Plan::others`].
     of_others: Vec<Option<ShadowMap>>,
-    /// What arrived through each of `all` at the splats that are drawn.
+    /// What arrived through each of `of_all` at the splats that are drawn.
     arrived: Vec<Arrived>,
     made_as: MadeAs,
 }
@@ -39,7 +39,7 @@ impl Maps {
 
     /// The limit that the cells of each map ended at.
     pub(crate) fn limits(&self) -> impl Iterator<Item = tsm::Limit> {
-        self.all.iter().chain(&self.of_others).flatten().map(|map| map.prediction().limit)
+        self.of_all.iter().chain(&self.of_others).flatten().map(|map| map.prediction().limit)
     }
 
     fn made_as(plan: &Plan) -> MadeAs {
@@ -72,7 +72,7 @@ impl<'a> Frame<'a> {
     /// # Errors
     /// [`Error::Cancelled`]; [`Error::Limit`] where a map needs more bytes than the plan leaves for it.
     pub fn maps(&self, cost: &mut CostRecord) -> Result<&[Option<ShadowMap>], Error> {
-        Ok(&self.all_maps(cost)?.all)
+        Ok(&self.all_maps(cost)?.of_all)
     }
 
     /// The same of the casters that no light is carried through, or of those beside opaque triangles ([`Plan::others`]); empty where there are no
@@ -89,11 +89,11 @@ impl<'a> Frame<'a> {
         let others = plan.others(self.loaded).unwrap_or_default();
         let mut done = Done { maps: 0, left: plan.shadow_bytes };
         let casting = |point: usize| self.casting(point);
-        let all = self.shadow_maps(&plan.shadow_tables, &casting, &mut done, cost)?;
+        let of_all = self.shadow_maps(&plan.shadow_tables, &casting, &mut done, cost)?;
         let of_others = self.shadow_maps(&plan.other_tables, &|_| others.clone(), &mut done, cost)?;
         let remembered = if self.remembers { self.drawn().len() } else { 0 };
-        let arrived = all.iter().map(|map| Arrived::new(map.as_ref().map_or(0, |_| remembered))).collect();
-        Ok(self.maps.get_or_init(|| Maps { all, of_others, arrived, made_as: Maps::made_as(plan) }))
+        let arrived = of_all.iter().map(|map| Arrived::new(map.as_ref().map_or(0, |_| remembered))).collect();
+        Ok(self.maps.get_or_init(|| Maps { of_all, of_others, arrived, made_as: Maps::made_as(plan) }))
     }
 
     /// The objects, of which those cast shadows that the picture could show of a point of a light.
@@ -103,8 +103,8 @@ impl<'a> Frame<'a> {
 
     /// Shadows of the points of all lights by which splats are shaded that are drawn.
     pub(super) fn shadows_of_drawn(&self, cost: &mut CostRecord) -> Result<Vec<Option<Remembered<'_>>>, Error> {
-        let Maps { all, arrived, .. } = self.all_maps(cost)?;
-        Ok(all.iter().zip(arrived).map(|(map, arrived)| Some(arrived.through(map.as_ref()?))).collect())
+        let Maps { of_all, arrived, .. } = self.all_maps(cost)?;
+        Ok(of_all.iter().zip(arrived).map(|(map, arrived)| Some(arrived.through(map.as_ref()?))).collect())
     }
 
     fn shadow_maps(
@@ -194,8 +194,8 @@ impl<'a> Frame<'a> {
 
     /// Points of lights that have an intensity, without shadows, each with what is there for it.
     pub(crate) fn with_light<T>(&self, of_each: impl Iterator<Item = T>) -> impl Iterator<Item = (LitBy<'_>, T)> {
-        let all = self.light_points().iter().zip(of_each).filter(|(point, _)| point.light.intensity != [0.0; 3]);
-        all.map(|(point, of)| (self.lit(point), of))
+        let lit_points = self.light_points().iter().zip(of_each).filter(|(point, _)| point.light.intensity != [0.0; 3]);
+        lit_points.map(|(point, value)| (self.lit(point), value))
     }
 
     /// A point of a light behind its slide, without shadows.

@@ -57,7 +57,7 @@ impl Frame<'_> {
 
     /// Whether any triangles stay triangles.
     pub(super) fn has_polygons(&self) -> bool {
-        self.loaded.own.iter().any(|own| own.form.is_polygons())
+        self.loaded.own.iter().any(|native| native.form.is_polygons())
     }
 
     /// The opaque ones of the drawn splats, those that rays meet exactly, or the others.

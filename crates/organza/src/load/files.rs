@@ -239,14 +239,14 @@ impl Files {
 /// What was made of this already, or makes it.
 pub(crate) fn once<K: PartialEq, V: Clone>(
     made: &Made<K, V>,
-    of: K,
+    key: K,
     make: impl FnOnce() -> Result<V, Error>,
 ) -> Result<V, Error> {
-    if let Some((_, known)) = made.borrow().iter().find(|(known, _)| *known == of) {
+    if let Some((_, known)) = made.borrow().iter().find(|(known, _)| *known == key) {
         return Ok(known.clone());
     }
     let value = make()?;
-    made.borrow_mut().push((of, value.clone()));
+    made.borrow_mut().push((key, value.clone()));
     Ok(value)
 }
 
@@ -256,11 +256,11 @@ fn real(path: &Path) -> PathBuf {
 }
 
 /// Adds what is not said yet.
-fn add(all: &RefCell<Vec<String>>, sentences: impl IntoIterator<Item = String>) {
-    let mut all = all.borrow_mut();
+fn add(noted: &RefCell<Vec<String>>, sentences: impl IntoIterator<Item = String>) {
+    let mut noted = noted.borrow_mut();
     for sentence in sentences {
-        if !all.contains(&sentence) {
-            all.push(sentence);
+        if !noted.contains(&sentence) {
+            noted.push(sentence);
         }
     }
 }

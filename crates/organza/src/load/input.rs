@@ -181,7 +181,8 @@ pub(super) fn input<'a>(object: &'a SceneObject, context: &Context<'_>) -> Resul
             Input::Volume(grid, transfer, context.volume_params(splat))
         }
         Source::Implicit(_) | Source::Isosurface(_) | Source::LevelSet(_) | Source::Combined(_) => {
-            surface(solid(&object.source, object, context)?, object, splat, opacity)?
+            let (solid, isosurface) = solid(&object.source, object, context)?;
+            surface(solid, isosurface, object, splat, opacity)?
         }
         Source::Slice(source) => slice(source, object, splat, opacity, context)?,
         Source::Density(density @ DensitySource { bounds, spacing, extinction, .. }) => {
@@ -267,8 +268,8 @@ fn solid(source: &Source, object: &SceneObject, context: &Context<'_>) -> Result
             let inside = source.inside;
             let grid = convert::gaps_outside(&grid, source.level as f32, inside).map_or(grid, Arc::new);
             let solid = Solid::of_volume(grid.clone(), interpolation, source.level, inside);
-            let of = Isosurface { grid, interpolation, level: source.level as f32, inside };
-            (solid.map_err(|e| refuse(&source.path, &e, ""))?, Some(of))
+            let isosurface = Isosurface { grid, interpolation, level: source.level as f32, inside };
+            (solid.map_err(|e| refuse(&source.path, &e, ""))?, Some(isosurface))
         }
         Source::LevelSet(source) => {
             let (field, bounds) = level_set(source, object, context)?;
@@ -287,7 +288,8 @@ fn solid(source: &Source, object: &SceneObject, context: &Context<'_>) -> Result
 
 /// A surface of a field.
 fn surface<'a>(
-    (solid, isosurface): (Solid, Option<Isosurface>),
+    solid: Solid,
+    isosurface: Option<Isosurface>,
     object: &SceneObject,
     splat: SplatParams,
     opacity: f64,

@@ -100,26 +100,26 @@ impl<'a> Loading<'a> {
     }
 
     /// The objects that are drawn from their own data.
-    pub(super) fn own(
+    pub(super) fn natives(
         &self,
         prepared: &mut [Prepared<'_>],
         planned: &[PlannedObject],
         warnings: &mut Vec<String>,
     ) -> Result<Vec<Own>, Error> {
-        let mut all = Vec::new();
+        let mut natives = Vec::new();
         for (((id, _), p), plan) in self.visible().zip(prepared).zip(planned) {
             if !plan.form.is_own() {
                 continue;
             }
-            let own = Own::new(p, plan, &self.context(id, 0, 0));
-            let own = own.map_err(|e| self.named(&self.scene.objects[id], e))?;
-            if own.is_none() {
+            let native = Own::new(p, plan, &self.context(id, 0, 0));
+            let native = native.map_err(|e| self.named(&self.scene.objects[id], e))?;
+            if native.is_none() {
                 let name = crate::shown(&self.scene.objects[id].name);
                 warnings.push(format!("object '{name}' shows nothing: nothing of it was found"));
             }
-            all.extend(own);
+            natives.extend(native);
         }
-        Ok(all)
+        Ok(natives)
     }
 
     /// The clouds of all objects that become splats.
@@ -127,22 +127,22 @@ impl<'a> Loading<'a> {
         &self,
         prepared: Vec<Prepared<'_>>,
         planned: &[PlannedObject],
-        own: &[Own],
+        natives: &[Own],
         splats: &mut [SplatCount],
         warnings: &mut Vec<String>,
     ) -> Result<Vec<Cloud>, Error> {
         let mut clouds: Vec<Cloud> = Vec::new();
-        let mut used: u64 = own.iter().map(Own::bytes).sum();
+        let mut used: u64 = natives.iter().map(Own::bytes).sum();
         let mut made = 0;
         // Both are in the order of the scene.
-        let mut own = own.iter().peekable();
+        let mut natives = natives.iter().peekable();
         for ((((id, object), p), plan), count) in self.visible().zip(prepared).zip(planned).zip(splats) {
-            let of = own.next_if(|o| o.object == id);
+            let native = natives.next_if(|o| o.object == id);
             if plan.splats.is_none() {
                 continue;
             }
             self.progress.begin(&cost::converting(&object.name));
-            let cloud = object::convert(&p, of, &self.context(id, used, made), warnings);
+            let cloud = object::convert(&p, native, &self.context(id, used, made), warnings);
             let cloud = cloud.map_err(|e| self.named(object, e))?;
             if cloud.is_empty() {
                 warnings.push(format!("object '{}' has no splats", crate::shown(&object.name)));

@@ -10,12 +10,12 @@ use splat_core::{Camera, Cloud, DAabb, Slide};
 /// Lengths scale with 2^−e, cross-sections and point intensities with 2^−2e; directional irradiance stays.
 pub(super) fn normalize(
     cloud: &mut Cloud,
-    own: &mut [Own],
+    natives: &mut [Own],
     camera: &mut Camera,
     lights: &mut [SceneLight],
     slides: &mut [Option<Slide>],
 ) -> i32 {
-    let diagonal = diagonal(cloud, own);
+    let diagonal = diagonal(cloud, natives);
     if !(diagonal.is_finite() && diagonal > 0.0) {
         return 0;
     }
@@ -23,7 +23,7 @@ pub(super) fn normalize(
     let scale = libm::exp2(f64::from(exponent)).recip();
     cloud.scale_world(scale);
     camera.scale_world(scale);
-    own.iter_mut().for_each(|o| o.scale_world(scale));
+    natives.iter_mut().for_each(|o| o.scale_world(scale));
     for light in lights {
         light.light = light.light.scaled(scale);
     }
@@ -32,12 +32,12 @@ pub(super) fn normalize(
 }
 
 /// Of the bounds of all splats and objects.
-fn diagonal(cloud: &Cloud, own: &[Own]) -> f64 {
+fn diagonal(cloud: &Cloud, natives: &[Own]) -> f64 {
     let bounds = cloud.bounds();
-    if own.is_empty() {
+    if natives.is_empty() {
         return f64::from(bounds.diagonal());
     }
     // Nothing stays nothing: its corners are infinite.
     let splats = DAabb::new(cloud.origin + bounds.min.as_dvec3(), cloud.origin + bounds.max.as_dvec3());
-    own.iter().map(Own::world_box).fold(splats, DAabb::union).diagonal()
+    natives.iter().map(Own::world_box).fold(splats, DAabb::union).diagonal()
 }

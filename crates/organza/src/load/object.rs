@@ -147,10 +147,10 @@ impl Prepared<'_> {
     }
 }
 
-/// Converts one object; a lattice that `own` has already is not made again.
+/// Converts one object; a lattice that `native` has already is not made again.
 pub(super) fn convert(
     prepared: &Prepared<'_>,
-    own: Option<&Own>,
+    native: Option<&Own>,
     context: &Context<'_>,
     warnings: &mut Vec<String>,
 ) -> Result<Cloud, Error> {
@@ -162,12 +162,13 @@ pub(super) fn convert(
     let cloud = match &prepared.input {
         Input::Mesh(name, mesh, params) => {
             let made = convert::mesh_to_points(mesh, &MeshParams { splat, ..params.clone() }, Some(progress));
-            made.inspect(|(_, of)| warnings.extend(of.said().map(|said| format!("{name}: {said}")))).map(|c| c.0)
+            made.inspect(|(_, report)| warnings.extend(report.said().map(|said| format!("{name}: {said}"))))
+                .map(|c| c.0)
         }
         Input::Points(path, points, params) => {
             let made = convert::raw_to_surfels(points, &SurfelParams { splat, ..params.clone() }, Some(progress));
             let named = |said| format!("{}: {said} (--merge-duplicates)", crate::printable(path));
-            made.inspect(|(_, of)| warnings.extend(of.said().map(named))).map(|c| c.0)
+            made.inspect(|(_, report)| warnings.extend(report.said().map(named))).map(|c| c.0)
         }
         Input::Matter(path, points, params) => {
             let made = convert::raw_to_matter(points, &MatterParams { splat, ..params.clone() }, Some(progress));
@@ -190,7 +191,7 @@ pub(super) fn convert(
             let convert = |grid: &Grid, transfer: &TransferFunction| {
                 convert::volume_to_points(grid, transfer, &params, Some(progress)).map(|c| c.0)
             };
-            match own.map(|o| &o.body) {
+            match native.map(|o| &o.body) {
                 Some(Body::Cells { grid, transfer, .. }) => convert(grid, transfer),
                 _ => procedural(shape, *spacing, &params.splat, context).and_then(|(grid, tf)| convert(&grid, &tf)),
             }

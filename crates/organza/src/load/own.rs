@@ -253,10 +253,10 @@ fn data(
         Input::Surface(field, bounds, params, isosurface) => {
             let spacing = params.density.spacing() / params.splat.transform.scale;
             let stated = context.scene.objects[context.id].spacing;
-            let trilinear = isosurface.as_ref().filter(|of| of.interpolation == Interpolation::Trilinear);
-            if let (Form::Triangles, Some(of), None) = (source, trilinear, stated) {
+            let trilinear = isosurface.as_ref().filter(|surface| surface.interpolation == Interpolation::Trilinear);
+            if let (Form::Triangles, Some(surface), None) = (source, trilinear, stated) {
                 // Marching cubes on the volume's own steps, as the paper has it (section 5).
-                let mesh = field::isosurface_to_mesh(&of.grid, f64::from(of.level), of.inside);
+                let mesh = field::isosurface_to_mesh(&surface.grid, f64::from(surface.level), surface.inside);
                 return Ok(meshed(mesh.map_err(|e| Error::from_core("an isosurface", e))?));
             }
             if source == Form::Triangles {
@@ -301,7 +301,7 @@ fn field_data(prepared: &Prepared<'_>, field: BoundedExtinction) -> Option<Data>
         _ => 0.0,
     };
     let (seen, side) = field.seen();
-    let bounds = seen.fold(DAabb::EMPTY, |all, p| all.union(DAabb::around(p, 0.5 * side)));
+    let bounds = seen.fold(DAabb::EMPTY, |bounds, p| bounds.union(DAabb::around(p, 0.5 * side)));
     let some = field.max() > 0.0;
     some.then_some((Body::Field(field), bounds, spacing))
 }

@@ -173,7 +173,7 @@ pub fn render_within(
     let possible = rungs(&scene, !loaded.cloud.is_empty()).into_iter().filter(|rung| alike.contains(&rung.antialias));
     let size = scene.camera.size;
     let candidates =
-        possible.map(|rung| Candidate { rung, seconds: trial.seconds(rung, size), error: errors.of(rung) });
+        possible.map(|rung| Candidate { rung, seconds: trial.seconds(rung, size), error: errors.expected(rung) });
     let ladder = ladder(asked, candidates.collect());
     let mut search = Search { drawing, goal: *goal, asked, ladder, trial, loaded, cost, found, begun };
     let chosen = match goal.budget_ms {

@@ -145,11 +145,11 @@ impl Errors {
     }
 
     /// What settings are expected to err by.
-    pub(super) fn of(&self, rung: Rung) -> ExpectedError {
+    pub(super) fn expected(&self, rung: Rung) -> ExpectedError {
         if rung == self.asked {
             return ExpectedError::default();
         }
-        ExpectedError { rmse: self.rmse.of(rung, self.asked), flip: self.flip.of(rung, self.asked) }
+        ExpectedError { rmse: self.rmse.error(rung, self.asked), flip: self.flip.error(rung, self.asked) }
     }
 }
 
@@ -187,8 +187,9 @@ impl Curves {
         }
     }
 
-    fn of(&self, rung: Rung, asked: Rung) -> f64 {
-        let samples = self.samples.iter().find(|of| of.antialias == rung.antialias).map_or(0.0, |of| of.error);
+    fn error(&self, rung: Rung, asked: Rung) -> f64 {
+        let samples =
+            self.samples.iter().find(|sample| sample.antialias == rung.antialias).map_or(0.0, |sample| sample.error);
         let thinned = self.scale * libm::pow(asked.splat_share / rung.splat_share - 1.0, self.order);
         let is_alike = rung.antialias == asked.antialias && rung.splat_share == asked.splat_share;
         let sets = f64::from(rung.sets).recip();
@@ -256,7 +257,7 @@ mod tests {
             for of_a_set in [0.0, 0.05] {
                 let curves = curves(Rung { splat_share: share, sets: 8, ..ASKED }, 1.0, of_a_set);
                 let near = |rung: Rung, expected: f64| {
-                    let found = curves.of(rung, ASKED);
+                    let found = curves.error(rung, ASKED);
                     assert!((found - expected).abs() < 1e-9, "{rung:?}: {found} {expected}");
                 };
                 let eighth = Rung { splat_share: 0.125, ..ASKED };
@@ -272,7 +273,7 @@ mod tests {
     fn in_a_larger_picture_fewer_samples_err_less_and_fewer_splats_more() {
         let same = curves(ASKED, 1.0, 0.0);
         let larger = curves(ASKED, 1.0 / 16.0, 0.0);
-        let times = |rung: Rung| larger.of(rung, ASKED) / same.of(rung, ASKED);
+        let times = |rung: Rung| larger.error(rung, ASKED) / same.error(rung, ASKED);
         assert!((times(Rung { antialias: 1, ..ASKED }) - 0.5).abs() < 1e-9);
         assert!((times(Rung { splat_share: 0.5, ..ASKED }) - 2.0).abs() < 1e-9);
     }

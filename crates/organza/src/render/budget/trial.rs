@@ -158,12 +158,12 @@ mod tests {
         let near = |found: f64, expected: f64| assert!((found / expected - 1.0).abs() < 1e-9, "{found} {expected}");
         // 500 × 500 pixels of 2 × 2 samples are as many as the trial's.
         near(trial.drawing(rung, [500, 500]), seconds(1.0, 1.0, 1.0, 1.0));
-        let all = Rung { splat_share: 1.0, ..rung };
-        near(trial.drawing(all, [500, 500]), seconds(16.0, 4.0, 1.0, 1.0));
-        near(trial.drawing(Rung { antialias: 4, ..all }, [500, 500]), seconds(16.0, 4.0, 4.0, 4.0));
-        near(trial.seconds(all, [500, 500]), 16.0 + 0.5 + seconds(16.0, 4.0, 1.0, 1.0));
+        let whole = Rung { splat_share: 1.0, ..rung };
+        near(trial.drawing(whole, [500, 500]), seconds(16.0, 4.0, 1.0, 1.0));
+        near(trial.drawing(Rung { antialias: 4, ..whole }, [500, 500]), seconds(16.0, 4.0, 4.0, 4.0));
+        near(trial.seconds(whole, [500, 500]), 16.0 + 0.5 + seconds(16.0, 4.0, 1.0, 1.0));
         // Without a clock nothing of it counts.
         let by_figures = trial.by(&Rates::default());
-        near(by_figures.seconds(all, [500, 500]), by_figures.drawing(all, [500, 500]));
+        near(by_figures.seconds(whole, [500, 500]), by_figures.drawing(whole, [500, 500]));
     }
 }
