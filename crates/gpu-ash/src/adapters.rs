@@ -28,7 +28,7 @@ pub fn adapters() -> Result<Vec<Adapter>, DeviceError> {
 pub(crate) fn find(instance: &Instance) -> Result<Vec<Found>, DeviceError> {
     // SAFETY: the instance is alive.
     let physicals = unsafe { instance.raw.enumerate_physical_devices() };
-    let physicals = physicals.map_err(failure::of("vkEnumeratePhysicalDevices"))?;
+    let physicals = physicals.map_err(failure::in_call("vkEnumeratePhysicalDevices"))?;
     Ok(physicals.into_iter().filter_map(|physical| describe(instance, physical)).collect())
 }
 

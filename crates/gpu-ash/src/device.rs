@@ -67,7 +67,7 @@ impl Device {
         }
         // SAFETY: the adapter belongs to the instance; every device has robust access, and this one was asked for the rest.
         let raw = unsafe { instance.raw.create_device(found.physical, &info, None) };
-        let raw = raw.map_err(failure::of("vkCreateDevice"))?;
+        let raw = raw.map_err(failure::in_call("vkCreateDevice"))?;
         // SAFETY: the device was made with one queue of this family.
         let queue = unsafe { raw.get_device_queue(found.family, 0) };
         #[cfg(feature = "losing")]

@@ -5,7 +5,7 @@ use gpu_allocator::AllocationError;
 use splat_shaders::DeviceError;
 
 /// Names the call that failed.
-pub(crate) fn of(call: &'static str) -> impl Fn(vk::Result) -> DeviceError {
+pub(crate) fn in_call(call: &'static str) -> impl Fn(vk::Result) -> DeviceError {
     move |result| match result {
         vk::Result::ERROR_DEVICE_LOST => DeviceError::Lost,
         result => DeviceError::Driver { call, why: format!("{result:?}") },

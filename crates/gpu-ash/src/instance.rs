@@ -68,7 +68,7 @@ impl Instance {
 fn without_driver(result: vk::Result) -> DeviceError {
     match result {
         vk::Result::ERROR_INCOMPATIBLE_DRIVER => DeviceError::NoDevice { why: "no Vulkan driver".to_owned() },
-        result => failure::of("vkCreateInstance")(result),
+        result => failure::in_call("vkCreateInstance")(result),
     }
 }
 
@@ -84,7 +84,7 @@ impl Watch {
             .user_data((&raw const *messages).cast_mut().cast());
         // SAFETY: the messages are boxed and live until the messenger is destroyed.
         let messenger = unsafe { functions.create_debug_utils_messenger(&info, None) };
-        let messenger = messenger.map_err(failure::of("vkCreateDebugUtilsMessengerEXT"))?;
+        let messenger = messenger.map_err(failure::in_call("vkCreateDebugUtilsMessengerEXT"))?;
         Ok(Self { functions, messenger, messages })
     }
 }
@@ -110,7 +110,7 @@ unsafe extern "system" fn note(
 fn has_layer(entry: &ash::Entry) -> Result<bool, DeviceError> {
     // SAFETY: no more than a loaded library is asked for.
     let layers = unsafe { entry.enumerate_instance_layer_properties() };
-    let layers = layers.map_err(failure::of("vkEnumerateInstanceLayerProperties"))?;
+    let layers = layers.map_err(failure::in_call("vkEnumerateInstanceLayerProperties"))?;
     Ok(layers.iter().any(|layer| layer.layer_name_as_c_str() == Ok(LAYER)))
 }
 

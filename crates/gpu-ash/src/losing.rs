@@ -26,10 +26,10 @@ static WATCHED: Mutex<Vec<Watched>> = Mutex::new(Vec::new());
 pub(crate) fn watch(raw: &ash::Device, queue: vk::Queue) -> ash::Device {
     let mut table = raw.fp_v1_0().clone();
     let watched = Watched { queue, submit: table.queue_submit, fate: Fate::Works };
-    let mut all = WATCHED.lock().unwrap_or_else(PoisonError::into_inner);
+    let mut queues = WATCHED.lock().unwrap_or_else(PoisonError::into_inner);
     // A queue's number may be that of a device that has ended.
-    all.retain(|w| w.queue != queue);
-    all.push(watched);
+    queues.retain(|w| w.queue != queue);
+    queues.push(watched);
     table.queue_submit = submit;
     let later = (raw.fp_v1_1().clone(), raw.fp_v1_2().clone(), raw.fp_v1_3().clone());
     ash::Device::from_parts_1_3(raw.handle(), table, later.0, later.1, later.2)
@@ -37,8 +37,8 @@ pub(crate) fn watch(raw: &ash::Device, queue: vk::Queue) -> ash::Device {
 
 /// From now on this becomes of the device.
 pub(crate) fn mark(queue: vk::Queue, fate: Fate) {
-    let mut all = WATCHED.lock().unwrap_or_else(PoisonError::into_inner);
-    all.iter_mut().filter(|w| w.queue == queue).for_each(|w| w.fate = fate);
+    let mut queues = WATCHED.lock().unwrap_or_else(PoisonError::into_inner);
+    queues.iter_mut().filter(|w| w.queue == queue).for_each(|w| w.fate = fate);
 }
 
 /// # Safety
@@ -49,11 +49,11 @@ unsafe extern "system" fn submit(
     work: *const vk::SubmitInfo<'_>,
     fence: vk::Fence,
 ) -> vk::Result {
-    let all = WATCHED.lock().unwrap_or_else(PoisonError::into_inner);
-    match all.iter().find(|w| w.queue == queue) {
+    let queues = WATCHED.lock().unwrap_or_else(PoisonError::into_inner);
+    match queues.iter().find(|w| w.queue == queue) {
         Some(Watched { fate: Fate::Works, submit, .. }) => {
             let submit = *submit;
-            drop(all);
+            drop(queues);
             // SAFETY: the caller's promise is passed on to the function that it is made for.
             unsafe { submit(queue, count, work, fence) }
         }

@@ -48,19 +48,19 @@ impl Buffer {
         let device = &memory.logical.raw;
         let info = vk::BufferCreateInfo::default().size(bytes).usage(usage);
         // SAFETY: the device lives as long as `memory`; a size of 0 never comes here.
-        let raw = unsafe { device.create_buffer(&info, None) }.map_err(failure::of("vkCreateBuffer"))?;
+        let raw = unsafe { device.create_buffer(&info, None) }.map_err(failure::in_call("vkCreateBuffer"))?;
         let mut buffer = Self { raw, allocation: None, memory: memory.clone() };
         // SAFETY: the buffer is the device's.
         let requirements = unsafe { device.get_buffer_memory_requirements(raw) };
         let allocation_scheme = AllocationScheme::GpuAllocatorManaged;
-        let wanted = AllocationCreateDesc { name, requirements, location, linear: true, allocation_scheme };
+        let request = AllocationCreateDesc { name, requirements, location, linear: true, allocation_scheme };
         let mut allocator = memory.allocator.lock().unwrap_or_else(PoisonError::into_inner);
-        let allocation = allocator.allocate(&wanted).map_err(failure::of_memory(bytes))?;
+        let allocation = allocator.allocate(&request).map_err(failure::of_memory(bytes))?;
         drop(allocator);
         // SAFETY: memory of the kind and size that the buffer requires, bound once and to nothing else.
         let bound = unsafe { device.bind_buffer_memory(raw, allocation.memory(), allocation.offset()) };
         buffer.allocation = Some(allocation);
-        bound.map_err(failure::of("vkBindBufferMemory"))?;
+        bound.map_err(failure::in_call("vkBindBufferMemory"))?;
         Ok(buffer)
     }
 

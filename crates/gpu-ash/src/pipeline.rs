@@ -41,20 +41,20 @@ impl Pipeline {
         let sets = vk::DescriptorSetLayoutCreateInfo::default().bindings(&bindings);
         // SAFETY: the info and what it points to outlive the call.
         self.set_layout = unsafe { device.create_descriptor_set_layout(&sets, None) }
-            .map_err(failure::of("vkCreateDescriptorSetLayout"))?;
+            .map_err(failure::in_call("vkCreateDescriptorSetLayout"))?;
         let set_layouts = [self.set_layout];
         let push =
             [vk::PushConstantRange::default().stage_flags(vk::ShaderStageFlags::COMPUTE).size(kernel.push_bytes)];
         let push = if kernel.push_bytes > 0 { &push[..] } else { &[] };
         let layout = vk::PipelineLayoutCreateInfo::default().set_layouts(&set_layouts).push_constant_ranges(push);
         // SAFETY: as above.
-        self.layout =
-            unsafe { device.create_pipeline_layout(&layout, None) }.map_err(failure::of("vkCreatePipelineLayout"))?;
+        self.layout = unsafe { device.create_pipeline_layout(&layout, None) }
+            .map_err(failure::in_call("vkCreatePipelineLayout"))?;
         let words = kernel.words();
         let module = vk::ShaderModuleCreateInfo::default().code(&words);
         // SAFETY: the words are a committed module, which was validated when it was compiled.
         self.module =
-            unsafe { device.create_shader_module(&module, None) }.map_err(failure::of("vkCreateShaderModule"))?;
+            unsafe { device.create_shader_module(&module, None) }.map_err(failure::in_call("vkCreateShaderModule"))?;
         let stage = vk::PipelineShaderStageCreateInfo::default()
             .stage(vk::ShaderStageFlags::COMPUTE)
             .module(self.module)
@@ -62,7 +62,7 @@ impl Pipeline {
         let info = [vk::ComputePipelineCreateInfo::default().stage(stage).layout(self.layout)];
         // SAFETY: module and layout were made above, for each other: a test holds the table of kernels against them.
         let made = unsafe { device.create_compute_pipelines(vk::PipelineCache::null(), &info, None) };
-        let made = made.map_err(|(_, result)| failure::of("vkCreateComputePipelines")(result))?;
+        let made = made.map_err(|(_, result)| failure::in_call("vkCreateComputePipelines")(result))?;
         self.raw = made.first().copied().unwrap_or_default();
         Ok(())
     }

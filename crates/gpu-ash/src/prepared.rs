@@ -78,9 +78,9 @@ impl Prepared {
     fn take_memory(&mut self, device: &Device, recording: &Recording) -> Result<(), DeviceError> {
         use vk::BufferUsageFlags as Usage;
         let memory = device.memory();
-        let all = Usage::STORAGE_BUFFER | Usage::INDIRECT_BUFFER | Usage::TRANSFER_SRC | Usage::TRANSFER_DST;
+        let device_usage = Usage::STORAGE_BUFFER | Usage::INDIRECT_BUFFER | Usage::TRANSFER_SRC | Usage::TRANSFER_DST;
         for b in recording.buffers() {
-            self.buffers.push(Buffer::new(memory, b.name, b.bytes, all, MemoryLocation::GpuOnly)?);
+            self.buffers.push(Buffer::new(memory, b.name, b.bytes, device_usage, MemoryLocation::GpuOnly)?);
         }
         for step in recording.steps() {
             let (id, usage, location, side) = match step {
@@ -88,11 +88,11 @@ impl Prepared {
                 Step::Read(id) => (*id, Usage::TRANSFER_DST, MemoryLocation::GpuToCpu, &mut self.reads),
                 Step::Dispatch(_) => continue,
             };
-            let of = &recording.buffers()[id.index()];
-            let mut buffer = Buffer::new(memory, of.name, of.bytes, usage, location)?;
+            let recorded = &recording.buffers()[id.index()];
+            let mut buffer = Buffer::new(memory, recorded.name, recorded.bytes, usage, location)?;
             // Nobody reads what other programs left there.
             buffer.bytes_mut().fill(0);
-            side.push(Beside { id, name: of.name, bytes: of.bytes, buffer });
+            side.push(Beside { id, name: recorded.name, bytes: recorded.bytes, buffer });
         }
         Ok(())
     }
@@ -109,23 +109,24 @@ impl Prepared {
         let pool = vk::CommandPoolCreateInfo::default().queue_family_index(family);
         // SAFETY: the infos and what they point to outlive the calls; `Drop` destroys what was made.
         unsafe {
-            self.sets = device.create_descriptor_pool(&sets, None).map_err(failure::of("vkCreateDescriptorPool"))?;
-            self.pool = device.create_command_pool(&pool, None).map_err(failure::of("vkCreateCommandPool"))?;
+            self.sets =
+                device.create_descriptor_pool(&sets, None).map_err(failure::in_call("vkCreateDescriptorPool"))?;
+            self.pool = device.create_command_pool(&pool, None).map_err(failure::in_call("vkCreateCommandPool"))?;
             let fence = vk::FenceCreateInfo::default();
-            self.fence = device.create_fence(&fence, None).map_err(failure::of("vkCreateFence"))?;
+            self.fence = device.create_fence(&fence, None).map_err(failure::in_call("vkCreateFence"))?;
             if self.steps > 0 {
                 let each = vk::CommandBufferAllocateInfo::default()
                     .command_pool(self.pool)
                     .command_buffer_count(commands as u32);
                 self.commands =
-                    device.allocate_command_buffers(&each).map_err(failure::of("vkAllocateCommandBuffers"))?;
+                    device.allocate_command_buffers(&each).map_err(failure::in_call("vkAllocateCommandBuffers"))?;
                 self.batches = batches(&vec![f64::INFINITY; commands]);
             }
             if self.logical.found.tick_ns > 0.0 {
                 let clock = vk::QueryPoolCreateInfo::default()
                     .query_type(vk::QueryType::TIMESTAMP)
                     .query_count(self.steps as u32 + 1);
-                self.clock = device.create_query_pool(&clock, None).map_err(failure::of("vkCreateQueryPool"))?;
+                self.clock = device.create_query_pool(&clock, None).map_err(failure::in_call("vkCreateQueryPool"))?;
             }
         }
         Ok(())
@@ -143,7 +144,8 @@ impl Prepared {
             if at % steps_of_one == 0 {
                 let begin = vk::CommandBufferBeginInfo::default();
                 // SAFETY: the command buffer is new and nobody else has it.
-                unsafe { device.begin_command_buffer(raw, &begin) }.map_err(failure::of("vkBeginCommandBuffer"))?;
+                unsafe { device.begin_command_buffer(raw, &begin) }
+                    .map_err(failure::in_call("vkBeginCommandBuffer"))?;
             }
             if at == 0 {
                 commands.start_clock(self.steps as u32 + 1);
@@ -170,7 +172,7 @@ impl Prepared {
             }
             if (at + 1) % steps_of_one == 0 {
                 // SAFETY: the command buffer is being recorded.
-                unsafe { device.end_command_buffer(raw) }.map_err(failure::of("vkEndCommandBuffer"))?;
+                unsafe { device.end_command_buffer(raw) }.map_err(failure::in_call("vkEndCommandBuffer"))?;
             }
         }
         Ok(())
@@ -183,7 +185,7 @@ impl Prepared {
         let info = vk::DescriptorSetAllocateInfo::default().descriptor_pool(self.sets).set_layouts(&layouts);
         // SAFETY: the pool was made with room for every dispatch's set.
         let made =
-            unsafe { device.allocate_descriptor_sets(&info) }.map_err(failure::of("vkAllocateDescriptorSets"))?;
+            unsafe { device.allocate_descriptor_sets(&info) }.map_err(failure::in_call("vkAllocateDescriptorSets"))?;
         let set = made.first().copied().unwrap_or_default();
         let whole = |id: &BufferId| {
             [vk::DescriptorBufferInfo::default().buffer(self.buffers[id.index()].raw).range(vk::WHOLE_SIZE)]
@@ -234,20 +236,20 @@ impl Prepared {
         // then no run comes here. The commands hold what they use, `self` holds that, and leaves only after the wait, or
         // never.
         unsafe {
-            device.reset_fences(&[self.fence]).map_err(failure::of("vkResetFences"))?;
+            device.reset_fences(&[self.fence]).map_err(failure::in_call("vkResetFences"))?;
             for batch in &self.batches {
                 let work = [vk::SubmitInfo::default().command_buffers(&self.commands[batch.clone()])];
-                device.queue_submit(*queue, &work, vk::Fence::null()).map_err(failure::of("vkQueueSubmit"))?;
+                device.queue_submit(*queue, &work, vk::Fence::null()).map_err(failure::in_call("vkQueueSubmit"))?;
             }
             // It is signalled when all that was submitted before has ended.
-            device.queue_submit(*queue, &[], self.fence).map_err(failure::of("vkQueueSubmit"))?;
+            device.queue_submit(*queue, &[], self.fence).map_err(failure::in_call("vkQueueSubmit"))?;
             drop(queue);
             match device.wait_for_fences(&[self.fence], true, patience) {
                 Err(vk::Result::TIMEOUT) => {
                     self.hung = true;
                     Err(DeviceError::Lost)
                 }
-                waited => waited.map_err(failure::of("vkWaitForFences")),
+                waited => waited.map_err(failure::in_call("vkWaitForFences")),
             }
         }
     }
@@ -261,7 +263,7 @@ impl Prepared {
         let flags = vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WAIT;
         // SAFETY: the pool has one query for every step and one more, all written by the run that has ended.
         unsafe { self.logical.raw.get_query_pool_results(self.clock, 0, &mut ticks, flags) }
-            .map_err(failure::of("vkGetQueryPoolResults"))?;
+            .map_err(failure::in_call("vkGetQueryPoolResults"))?;
         let found = &self.logical.found;
         let between = |t: &[u64]| (t[1].wrapping_sub(t[0]) & found.tick_mask) as f64 * found.tick_ns;
         let took: Vec<f64> = ticks.windows(2).map(between).collect();
