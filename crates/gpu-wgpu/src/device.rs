@@ -63,13 +63,13 @@ impl Device {
             let names: Vec<&str> = adapters.iter().map(|a| a.name.as_str()).collect();
             return Err(DeviceError::NoDevice { why: format!("{choice:?} of [{}]", names.join(", ")) });
         };
-        let wanted = wgpu::DeviceDescriptor {
+        let request = wgpu::DeviceDescriptor {
             required_features: features(&found[at]),
             // All that the adapter has: a buffer is refused by its own limits alone.
             required_limits: found[at].limits(),
             ..wgpu::DeviceDescriptor::default()
         };
-        let opened = pollster::block_on(found[at].request_device(&wanted));
+        let opened = pollster::block_on(found[at].request_device(&request));
         let driver = |e: wgpu::RequestDeviceError| DeviceError::Driver { call: "request_device", why: e.to_string() };
         let (raw, queue) = opened.map_err(driver)?;
         let faults = Arc::new(Faults::default());

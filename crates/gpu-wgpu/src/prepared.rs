@@ -59,11 +59,11 @@ impl Prepared {
         let queue = queue.clone();
         let faults = faults.clone();
         use wgpu::BufferUsages as Usage;
-        let all = Usage::STORAGE | Usage::INDIRECT | Usage::COPY_SRC | Usage::COPY_DST;
-        let buffers: Vec<_> = recording.buffers().iter().map(|b| buffer(&raw, b.name, b.bytes, all)).collect();
+        let device_usage = Usage::STORAGE | Usage::INDIRECT | Usage::COPY_SRC | Usage::COPY_DST;
+        let buffers: Vec<_> = recording.buffers().iter().map(|b| buffer(&raw, b.name, b.bytes, device_usage)).collect();
         let met = |id: BufferId| {
-            let of = &recording.buffers()[id.index()];
-            Met { id, name: of.name, bytes: of.bytes }
+            let recorded = &recording.buffers()[id.index()];
+            Met { id, name: recorded.name, bytes: recorded.bytes }
         };
         let mut uploads = Vec::new();
         let mut given = Vec::new();
@@ -218,10 +218,10 @@ impl Prepared {
 impl Clock {
     fn new(device: &wgpu::Device, count: u32) -> Self {
         use wgpu::BufferUsages as Usage;
-        let wanted = wgpu::QuerySetDescriptor { label: None, ty: wgpu::QueryType::Timestamp, count };
+        let descriptor = wgpu::QuerySetDescriptor { label: None, ty: wgpu::QueryType::Timestamp, count };
         let bytes = 8 * u64::from(count);
         Self {
-            queries: device.create_query_set(&wanted),
+            queries: device.create_query_set(&descriptor),
             resolved: buffer(device, "ticks", bytes, Usage::QUERY_RESOLVE | Usage::COPY_SRC),
             seen: buffer(device, "ticks seen", bytes, Usage::MAP_READ | Usage::COPY_DST),
         }
