@@ -85,8 +85,8 @@ mod tests {
     #[test]
     fn assets_are_listed_with_their_credit() {
         let bunny = ("assets/bunny/bunny.ply", "ply");
-        let said = run(&Repo::of(&[bunny, ("assets/bunny/ORIGIN.txt", "who")])).expect("credited");
+        let said = run(&Repo::in_memory(&[bunny, ("assets/bunny/ORIGIN.txt", "who")])).expect("credited");
         assert!(said.contains("3  assets/bunny/bunny.ply  (assets/bunny/ORIGIN.txt)"), "{said}");
-        assert!(run(&Repo::of(&[bunny])).is_err());
+        assert!(run(&Repo::in_memory(&[bunny])).is_err());
     }
 }

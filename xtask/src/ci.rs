@@ -172,7 +172,7 @@ mod tests {
     fn every_feature_is_checked_alone() {
         let [a, b, c, d] = ["organza-a", "b", "c", "organza-d"].map(|name| format!("[package]\nname = \"{name}\"\n"));
         let a = a + "[features]\ndefault = [\"ply\"]\nply = [\"dep:x\"]\nlas = []\n[dependencies]\ny = \"1\"\n";
-        let repo = Repo::of(&[
+        let repo = Repo::in_memory(&[
             ("crates/a/Cargo.toml", &a),
             ("crates/b/Cargo.toml", &b),
             ("crates/c/Cargo.toml", &c),
@@ -200,7 +200,7 @@ mod tests {
     #[test]
     fn a_step_that_fails_is_named() {
         let failing = Work::Task(|_| Err("why".to_owned()));
-        assert_eq!(perform(&failing, &Repo::of(&[])), Err("why".to_owned()));
+        assert_eq!(perform(&failing, &Repo::in_memory(&[])), Err("why".to_owned()));
         let nowhere = Repo { root: "no/such/folder".into(), files: Vec::new() };
         let why = perform(&Work::Cargo(vec![split("check")], &[]), &nowhere).expect_err("no folder to run in");
         assert!(why.starts_with("`cargo check` did not start"), "{why}");

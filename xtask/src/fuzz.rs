@@ -47,11 +47,14 @@ impl Plan {
     /// The targets that are asked for, of those that there are.
     fn chosen<'a>(&self, repo: &'a Repo) -> Result<Vec<&'a str>, String> {
         let names = repo.rust().filter_map(|(path, _)| path.strip_prefix(TARGETS)?.strip_suffix(".rs"));
-        let all: Vec<&str> = names.collect();
-        if let Some(unknown) = self.targets.iter().find(|asked| !all.contains(&asked.as_str())) {
-            return Err(format!("no such target: {unknown}; there are {}", all.join(", ")));
+        let targets: Vec<&str> = names.collect();
+        if let Some(unknown) = self.targets.iter().find(|asked| !targets.contains(&asked.as_str())) {
+            return Err(format!("no such target: {unknown}; there are {}", targets.join(", ")));
         }
-        Ok(all.into_iter().filter(|name| self.targets.is_empty() || self.targets.iter().any(|t| t == name)).collect())
+        Ok(targets
+            .into_iter()
+            .filter(|name| self.targets.is_empty() || self.targets.iter().any(|t| t == name))
+            .collect())
     }
 }
 
@@ -136,7 +139,7 @@ fn fuzz(repo: &Repo, target: &str, seconds: u64) -> Result<Run, String> {
     let start = Instant::now();
     let out = nightly(repo, &words)?;
     let text = String::from_utf8_lossy(&out.stderr);
-    let run = Run::of(target, &text, start.elapsed().as_secs())?;
+    let run = Run::from_output(target, &text, start.elapsed().as_secs())?;
     if out.status.success() != run.found.is_empty() {
         return Err(format!("{target} ended with {}\n{text}", out.status));
     }
@@ -161,8 +164,11 @@ mod tests {
 
     #[test]
     fn targets_are_the_files_in_their_folder() {
-        let repo =
-            Repo::of(&[("fuzz/fuzz_targets/las.rs", ""), ("fuzz/fuzz_targets/ply.rs", ""), ("fuzz/src/lib.rs", "")]);
+        let repo = Repo::in_memory(&[
+            ("fuzz/fuzz_targets/las.rs", ""),
+            ("fuzz/fuzz_targets/ply.rs", ""),
+            ("fuzz/src/lib.rs", ""),
+        ]);
         let chosen = |words: &[&str]| Plan::parse(words).expect("a plan").chosen(&repo);
         assert_eq!(chosen(&[]), Ok(vec!["las", "ply"]));
         assert_eq!(chosen(&["ply"]), Ok(vec!["ply"]));
@@ -171,7 +177,7 @@ mod tests {
 
     #[test]
     fn seeds_lie_in_the_folder_of_their_target() {
-        let repo = Repo::of(&[("fuzz/seeds/image/a", ""), ("scenes/a.toml", "")]);
+        let repo = Repo::in_memory(&[("fuzz/seeds/image/a", ""), ("scenes/a.toml", "")]);
         assert_eq!(seeds(&repo, "image").as_deref(), Some("fuzz/seeds/image"));
         assert_eq!(seeds(&repo, "scene").as_deref(), Some("scenes"));
         assert_eq!(seeds(&repo, "ply"), None);

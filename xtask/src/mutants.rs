@@ -72,7 +72,7 @@ pub(crate) fn run(repo: &Repo, words: &[&str]) -> Outcome {
         let install = "install with `cargo install cargo-mutants --locked`";
         return Ok(format!("mutants: SKIPPED, missing: cargo-mutants; {install}"));
     }
-    let mut all = Found::default();
+    let mut total = Found::default();
     let shard = format!("{}/{}", plan.shard.from, plan.shard.every);
     for (package, features) in plan.crates {
         let to = format!("target/mutants/{package}");
@@ -86,12 +86,12 @@ pub(crate) fn run(repo: &Repo, words: &[&str]) -> Outcome {
         }
         let found = Found::read(&repo.root.join(&to).join("mutants.out"))?;
         println!("<== {package}: {}", found.text());
-        all.caught += found.caught;
-        all.survived.extend(found.survived);
+        total.caught += found.caught;
+        total.survived.extend(found.survived);
     }
-    let said = std::iter::once(format!("mutants: {}", all.text())).chain(all.survived.iter().cloned());
+    let said = std::iter::once(format!("mutants: {}", total.text())).chain(total.survived.iter().cloned());
     let said = said.collect::<Vec<_>>().join("\n");
-    if all.share() <= MOST_SURVIVORS { Ok(said) } else { Err(said) }
+    if total.share() <= MOST_SURVIVORS { Ok(said) } else { Err(said) }
 }
 
 fn mutants(repo: &Repo, words: &[&str]) -> Result<std::process::ExitStatus, String> {
@@ -126,8 +126,9 @@ impl Found {
     }
 
     fn text(&self) -> String {
-        let (survived, all) = (self.survived.len(), self.caught + self.survived.len());
-        format!("{survived} of {all} planted faults survived ({:.0} %)", 100.0 * self.share())
+        let survived = self.survived.len();
+        let planted = self.caught + survived;
+        format!("{survived} of {planted} planted faults survived ({:.0} %)", 100.0 * self.share())
     }
 }
 

@@ -43,7 +43,7 @@ fn read(repo: &Repo) -> Result<Vec<Ledger>, String> {
     let sources = repo.texts().filter(|(path, _)| path.starts_with(FOLDER) && path.ends_with(".toml"));
     let with_times = |(path, text): (&str, &str)| {
         let mut ledger = Ledger::parse(path, text)?;
-        let times = Times::of(repo, path)?;
+        let times = Times::for_ledger(repo, path)?;
         for row in &mut ledger.rows {
             if let Some(why) = times::by_hand(row) {
                 return Err(format!("{path}: {}: {why}", row.id));
@@ -58,8 +58,8 @@ fn read(repo: &Repo) -> Result<Vec<Ledger>, String> {
 
 fn summary(ledgers: &[Ledger]) -> String {
     let rows = || ledgers.iter().flat_map(|l| &l.rows);
-    let of = |verdict| format!("{} {}", rows().filter(|r| r.verdict == verdict).count(), verdict.words());
-    format!("papers: {} rows: {}", rows().count(), Verdict::ALL.map(of).join(", "))
+    let count = |verdict| format!("{} {}", rows().filter(|r| r.verdict == verdict).count(), verdict.words());
+    format!("papers: {} rows: {}", rows().count(), Verdict::ALL.map(count).join(", "))
 }
 
 #[cfg(test)]
@@ -70,7 +70,7 @@ mod tests {
         claim = \"c\"\ncode = \"src/a.rs::f\"\ntest = \"f_holds\"\nours = \"1\"\nverdict = \"holds\"\nreason = \"r\"\n";
 
     fn repo(page: &str, code: &str) -> Repo {
-        Repo::of(&[("docs/papers/t.toml", DATA), (PAGE, page), ("src/a.rs", code)])
+        Repo::in_memory(&[("docs/papers/t.toml", DATA), (PAGE, page), ("src/a.rs", code)])
     }
 
     #[test]
@@ -91,7 +91,8 @@ mod tests {
     fn times_come_from_the_file_beside_the_ledger() {
         let csv = ("docs/papers/t-times.csv", "what,low_ms,mean_ms,high_ms,elements\n\"sort/1\",1,2,3,\n");
         let data = DATA.replace("ours = \"1\"", "ours = \"{sort/1}\"");
-        let ours = |files: &[(&str, &str)]| read(&Repo::of(files)).map(|ledgers| ledgers[0].rows[0].ours.clone());
+        let ours =
+            |files: &[(&str, &str)]| read(&Repo::in_memory(files)).map(|ledgers| ledgers[0].rows[0].ours.clone());
         let ledger = ("docs/papers/t.toml", data.as_str());
         assert_eq!(ours(&[ledger, csv]), Ok("2.00 ms".to_owned()));
         let why = "docs/papers/t.toml: Eq. 1: no benchmark {sort/1} in its -times.csv";

@@ -63,9 +63,9 @@ fn packages(repo: &Repo, paths: &[String]) -> BTreeSet<String> {
     // What is a workspace of its own has no tests here.
     let manifests =
         repo.texts().filter(|(path, text)| path.ends_with("Cargo.toml") && !text.contains("\n[workspace]\n"));
-    let all: Vec<(String, String)> = manifests.filter_map(named).collect();
+    let folders: Vec<(String, String)> = manifests.filter_map(named).collect();
     let owner = |path: &String| {
-        let above = all.iter().filter(|(folder, _)| path.starts_with(folder.as_str()));
+        let above = folders.iter().filter(|(folder, _)| path.starts_with(folder.as_str()));
         above.max_by_key(|(folder, _)| folder.len()).map(|(_, name)| name.clone())
     };
     paths.iter().filter_map(owner).collect()
@@ -83,7 +83,7 @@ mod tests {
         let files = [("crates/tsm/Cargo.toml", &tsm), ("tests/Cargo.toml", &tests), ("tests/gpu/Cargo.toml", &gpu)];
         let files = [&files[..], &[("fuzz/Cargo.toml", &fuzz)]].concat();
         let files: Vec<(&str, &str)> = files.iter().map(|(path, text)| (*path, text.as_str())).collect();
-        let repo = Repo::of(&files);
+        let repo = Repo::in_memory(&files);
         let paths =
             ["crates/tsm/src/reading/lookup.rs", "tests/gpu/lib.rs", "fuzz/src/lib.rs", "README.md"].map(str::to_owned);
         let found = packages(&repo, &paths);

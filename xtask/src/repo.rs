@@ -73,7 +73,7 @@ impl Repo {
 
     /// A tree that exists in memory only.
     #[cfg(test)]
-    pub(crate) fn of(files: &[(&str, &str)]) -> Self {
+    pub(crate) fn in_memory(files: &[(&str, &str)]) -> Self {
         let file = |&(path, text): &(&str, &str)| File {
             path: path.to_owned(),
             bytes: text.len() as u64,

@@ -54,7 +54,7 @@ mod tests {
 
     #[test]
     fn a_finding_fails_the_task() {
-        let said = run(&Repo::of(&[("src/a.rs", "fn a() {}\n")])).expect_err("no head");
+        let said = run(&Repo::in_memory(&[("src/a.rs", "fn a() {}\n")])).expect_err("no head");
         assert!(said.starts_with("tidy found 1\n  heads: src/a.rs"), "{said}");
     }
 }

@@ -27,7 +27,7 @@ pub(super) struct Run {
 
 impl Run {
     /// What libFuzzer says of it, and how long it took.
-    pub(super) fn of(target: &str, said: &str, seconds: u64) -> Result<Self, String> {
+    pub(super) fn from_output(target: &str, said: &str, seconds: u64) -> Result<Self, String> {
         let wrong = |what: &str| format!("{target}: libFuzzer did not say {what}\n{said}");
         let executions =
             said.lines().find_map(|l| l.strip_prefix("stat::number_of_executed_units:")?.trim().parse().ok());
@@ -94,11 +94,11 @@ mod tests {
         let end = "#2 INITED cov: 10 ft: 11 corp: 1/2b\n#512\tpulse  cov: 345 ft: 400 corp: 9/1kb\nDone 700 runs in 61 second(s)\n\
             stat::number_of_executed_units: 700\n";
         let run = Run { target: "a".into(), seconds: 61, executions: 700, edges: 345, found: vec![] };
-        assert_eq!(Run::of("a", end, 61), Ok(run.clone()));
+        assert_eq!(Run::from_output("a", end, 61), Ok(run.clone()));
         let crash = "#512\tNEW    cov: 345 ft: 400\nstat::number_of_executed_units: 9\nartifact_prefix='x'; Test unit written to x/crash-1\n";
         let found = vec!["x/crash-1".to_owned()];
-        assert_eq!(Run::of("a", crash, 7), Ok(Run { seconds: 7, executions: 9, found, ..run }));
-        assert!(Run::of("a", "error: no such target", 0).is_err());
+        assert_eq!(Run::from_output("a", crash, 7), Ok(Run { seconds: 7, executions: 9, found, ..run }));
+        assert!(Run::from_output("a", "error: no such target", 0).is_err());
     }
 
     #[test]

@@ -37,7 +37,7 @@ mod tests {
     fn a_case_without_a_test_is_found() {
         let page = "| id | danger | |\n|---|---|---|\n| CV5 | a | |\n| HV9a | b | |\n| X1 | c | |\n| X2 | d | |\n";
         let source = "fn cv05_holds() {}\nfn hv09a_holds() {}\nfn bi24_x1_holds() {}\n// fn x2_gone() {}\n";
-        let repo = Repo::of(&[(PAGE, page), ("src/a.rs", source)]);
+        let repo = Repo::in_memory(&[(PAGE, page), ("src/a.rs", source)]);
         assert_eq!(untested(&repo), ["docs/hard-cases.md: X2 has no test of that name"]);
     }
 }

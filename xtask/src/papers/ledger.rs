@@ -104,7 +104,8 @@ fn list(words: &str) -> Vec<String> {
 }
 
 /// The values of exactly these keys.
-fn take<const N: usize>(path: &str, (line, fields): Fields, keys: [&str; N]) -> Result<[String; N], String> {
+fn take<const N: usize>(path: &str, table: Fields, keys: [&str; N]) -> Result<[String; N], String> {
+    let (line, fields) = table;
     if let Some((stray, _)) = fields.iter().find(|(key, _)| !keys.contains(&key.as_str())) {
         return Err(format!("{path}:{line}: unknown key {stray}"));
     }

@@ -45,7 +45,8 @@ fn tests(known: &HashSet<String>, row: &Row) -> Vec<String> {
     let unknown = row.tests.iter().filter(|test| !exists(test));
     let unknown = unknown.map(|test| format!("{}: no source has the test {test}", row.id));
     let is_decided = matches!(row.verdict, Verdict::Holds | Verdict::Differs);
-    let is_shown = !row.tests.is_empty() || row.code.iter().any(|place| RAN.iter().any(|of| place.starts_with(of)));
+    let is_shown =
+        !row.tests.is_empty() || row.code.iter().any(|place| RAN.iter().any(|folder| place.starts_with(folder)));
     let bare = (is_decided && !is_shown).then(|| format!("{}: no test and no benchmark shows what is said", row.id));
     let is_named = !row.tests.is_empty() || !row.code.is_empty();
     let built = (row.verdict == Verdict::NotBuilt && is_named)
@@ -75,7 +76,7 @@ mod tests {
         let none = String::new;
         let ledger = Ledger { title: none(), authors: none(), year: none(), note: none(), rows: vec![row] };
         let source = "struct Map;\nimpl Map {\n    fn build() {}\n}\n// fn gone() {}\nfn ts01_holds() {}\n";
-        missing(&Repo::of(&[("src/map.rs", source)]), &[ledger])
+        missing(&Repo::in_memory(&[("src/map.rs", source)]), &[ledger])
     }
 
     #[test]

@@ -28,7 +28,7 @@ pub(crate) struct Times(Vec<(String, Span)>);
 
 impl Times {
     /// The times that belong to a ledger.
-    pub(crate) fn of(repo: &Repo, ledger: &str) -> Result<Self, String> {
+    pub(crate) fn for_ledger(repo: &Repo, ledger: &str) -> Result<Self, String> {
         let path = ledger.replace(".toml", "-times.csv");
         repo.text(&path).map_or_else(|| Ok(Self::default()), |text| Self::parse(&path, text))
     }

@@ -39,7 +39,7 @@ mod tests {
 
     #[test]
     fn a_folder_without_credit_is_found() {
-        let repo = Repo::of(&[
+        let repo = Repo::in_memory(&[
             ("assets/README.md", "about"),
             ("assets/bunny/bunny.ply", "ply"),
             ("assets/bunny/ORIGIN.txt", "who"),
@@ -50,7 +50,7 @@ mod tests {
 
     #[test]
     fn too_many_bytes_are_found() {
-        let mut repo = Repo::of(&[("assets/LICENSE", "")]);
+        let mut repo = Repo::in_memory(&[("assets/LICENSE", "")]);
         let file = |bytes| File { path: "assets/large.bin".to_owned(), bytes, text: None };
         repo.files.push(file(MAX_BYTES));
         assert!(assets(&repo).is_empty());

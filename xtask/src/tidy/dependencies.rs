@@ -107,7 +107,7 @@ fn manifest(path: &str, text: &str) -> Vec<String> {
         return vec![format!("{path}: expected a package name")];
     };
     let name = plain(&package);
-    let Some((_, may_know)) = MAY_KNOW.iter().find(|(of, _)| *of == name) else {
+    let Some((_, may_know)) = MAY_KNOW.iter().find(|(package, _)| *package == name) else {
         return vec![format!("{path}: crate {name} has no row in the table of xtask/src/tidy/dependencies.rs")];
     };
     let mut found = Vec::new();
@@ -152,7 +152,7 @@ mod tests {
 
     fn found(name: &str, dependencies: &str) -> Vec<String> {
         let text = format!("[package]\nname = \"{name}\"\n{dependencies}");
-        direction(&Repo::of(&[("crates/c/Cargo.toml", &text)]))
+        direction(&Repo::in_memory(&[("crates/c/Cargo.toml", &text)]))
     }
 
     #[test]
@@ -160,8 +160,8 @@ mod tests {
         assert!(found("tsm", "[dependencies]\nsplat-core.workspace = true\nglam.workspace = true\n").is_empty());
         let wrong = found("tsm", "[dependencies]\nhbsort.workspace = true\n");
         assert_eq!(wrong, ["crates/c/Cargo.toml:4: tsm may not depend on hbsort"]);
-        let own = "[dev-dependencies]\norganza-tsm = { path = \".\", features = [\"reference\"] }\n";
-        assert!(found("organza-tsm", own).is_empty());
+        let itself = "[dev-dependencies]\norganza-tsm = { path = \".\", features = [\"reference\"] }\n";
+        assert!(found("organza-tsm", itself).is_empty());
     }
 
     #[test]

@@ -60,12 +60,12 @@ fn floor(module: &str) -> Option<usize> {
 
 /// What the crate exports at its root, each with the module that it is from.
 fn exports(lib: &str) -> Vec<(&str, &str)> {
-    let mut all = Vec::new();
+    let mut exports = Vec::new();
     for (at, _) in lib.match_indices("pub use ") {
         let (module, rest) = lib[at + "pub use ".len()..].split_once("::").unwrap_or_default();
-        all.extend(names(rest).into_iter().map(|name| (name, module)));
+        exports.extend(names(rest).into_iter().map(|name| (name, module)));
     }
-    all
+    exports
 }
 
 /// The module of the house that a file belongs to.
@@ -103,7 +103,7 @@ mod tests {
 
     #[test]
     fn a_name_from_above_is_found_in_paths_and_groups() {
-        let found = |path: &str, text: &str| upward(&Repo::of(&[(path, text)]));
+        let found = |path: &str, text: &str| upward(&Repo::in_memory(&[(path, text)]));
         let load = "crates/organza/src/load/own.rs";
         assert!(found(load, "use crate::form::Form;\nuse crate::{Error, pass};\n").is_empty());
         assert!(found(load, "use crate::load::files::Files;\n").is_empty());
@@ -118,14 +118,14 @@ mod tests {
     #[test]
     fn what_the_root_exports_belongs_to_its_module() {
         let lib = ("crates/organza/src/lib.rs", "pub use error::Error;\npub use render::{Render, render};\n");
-        let found = |text: &str| upward(&Repo::of(&[lib, ("crates/organza/src/plan.rs", text)]));
+        let found = |text: &str| upward(&Repo::in_memory(&[lib, ("crates/organza/src/plan.rs", text)]));
         assert!(found("use crate::Error;\n").is_empty());
         assert_eq!(found("use crate::{Error, Render};\n").len(), 1);
     }
 
     #[test]
     fn a_module_without_a_floor_is_found() {
-        let said = upward(&Repo::of(&[("crates/organza/src/attic/box.rs", "")]));
+        let said = upward(&Repo::in_memory(&[("crates/organza/src/attic/box.rs", "")]));
         assert!(said.len() == 1 && said[0].contains("attic has no floor"), "{said:?}");
     }
 }

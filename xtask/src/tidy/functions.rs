@@ -57,7 +57,7 @@ mod tests {
         let text = "//! A.\nfn a(x: f64) -> f64 {\n    // x.exp()\n    libm::exp(x) + x.sin() + f64::exp2(x) + x.expand()\n}\n";
         let tests = "#[cfg(test)]\nmod tests {\n    fn b() {\n        1f64.exp();\n    }\n}\n";
         let text = format!("{text}{tests}");
-        let found = platform(&Repo::of(&[("crates/tsm/src/a.rs", &text), ("crates/reference/src/a.rs", &text)]));
+        let found = platform(&Repo::in_memory(&[("crates/tsm/src/a.rs", &text), ("crates/reference/src/a.rs", &text)]));
         assert_eq!(found.len(), 2, "{found:?}");
         assert!(found.iter().all(|f| f.starts_with("crates/tsm/src/a.rs:4: ")), "{found:?}");
     }

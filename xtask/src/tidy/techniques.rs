@@ -47,7 +47,7 @@ mod tests {
     #[test]
     fn a_technique_is_named_in_its_table_and_in_tests_alone() {
         let line = "fn first() -> Technique {\n    Technique::Sheets\n}\n";
-        let found = |path: &str, text: &str| named(&Repo::of(&[(path, text)]));
+        let found = |path: &str, text: &str| named(&Repo::in_memory(&[(path, text)]));
         let told = found("crates/organza/src/frame.rs", line);
         assert!(told.len() == 1 && told[0].starts_with("crates/organza/src/frame.rs:2:"), "{told:?}");
         assert!(found("crates/organza/src/technique.rs", line).is_empty());
@@ -58,7 +58,7 @@ mod tests {
 
     #[test]
     fn an_engine_is_called_in_a_technique_alone() {
-        let found = |path: &str, text: &str| named(&Repo::of(&[(path, text)]));
+        let found = |path: &str, text: &str| named(&Repo::in_memory(&[(path, text)]));
         let told = found("crates/organza/src/frame.rs", "fn f() {}\nuse sheet_light::Volume;\n");
         assert!(told.len() == 1 && told[0].starts_with("crates/organza/src/frame.rs:2:"), "{told:?}");
         assert!(found("crates/organza/src/technique/sheets.rs", "use sheet_light::Volume;\n").is_empty());

@@ -96,23 +96,23 @@ mod tests {
 
     #[test]
     fn a_file_without_a_head_is_found() {
-        let repo = Repo::of(&[("a.rs", "//! A.\n"), ("b.rs", "// B.\n"), ("c.md", "C\n")]);
+        let repo = Repo::in_memory(&[("a.rs", "//! A.\n"), ("b.rs", "// B.\n"), ("c.md", "C\n")]);
         assert_eq!(heads(&repo), ["b.rs: expected //! on the first line"]);
     }
 
     #[test]
     fn a_foreign_path_is_found() {
         for foreign in FOREIGN {
-            let repo = Repo::of(&[("notes.md", &format!("one\nsee {foreign}x\n"))]);
+            let repo = Repo::in_memory(&[("notes.md", &format!("one\nsee {foreign}x\n"))]);
             assert_eq!(foreign_paths(&repo), [format!("notes.md:2: found {foreign}")]);
         }
-        assert!(foreign_paths(&Repo::of(&[("notes.md", "shared/x work/y ./home\n")])).is_empty());
+        assert!(foreign_paths(&Repo::in_memory(&[("notes.md", "shared/x work/y ./home\n")])).is_empty());
     }
 
     #[test]
     fn a_private_registry_is_found() {
         let lock = format!("source = {REGISTRY}\nsource = \"registry+https://mirror.example\"\n");
-        let repo = Repo::of(&[("Cargo.lock", &lock), (".cargo/config.toml", "[source.crates-io]\n")]);
+        let repo = Repo::in_memory(&[("Cargo.lock", &lock), (".cargo/config.toml", "[source.crates-io]\n")]);
         let found = foreign_paths(&repo);
         assert_eq!(found.len(), 2, "{found:?}");
         assert!(found[0].starts_with("Cargo.lock:2") && found[1].starts_with(".cargo/config.toml:1"), "{found:?}");
@@ -121,22 +121,25 @@ mod tests {
     #[test]
     fn an_ignored_test_is_found() {
         let text = "//! T.\n// #[ignore]\nconst A: &str = \"#[ignore]\";\n#[test]\n#[ignore = \"slow\"]\nfn t() {}\n";
-        let found = ignored_tests(&Repo::of(&[("a.rs", text)]));
+        let found = ignored_tests(&Repo::in_memory(&[("a.rs", text)]));
         assert_eq!(found, ["a.rs:5: found #[ignore]; let the test run, or remove it"]);
     }
 
     #[test]
     fn a_silenced_lint_without_a_reason_is_found() {
         let text = "#[allow(dead_code)]\n#[allow(dead_code, reason = \"r\")]\n#[cfg_attr(x, expect(unused))]\n";
-        let found = reasons(&Repo::of(&[("a.rs", text)]));
+        let found = reasons(&Repo::in_memory(&[("a.rs", text)]));
         assert_eq!(found.len(), 2, "{found:?}");
         assert!(found[0].starts_with("a.rs:1:") && found[1].starts_with("a.rs:3:"), "{found:?}");
     }
 
     #[test]
     fn a_crate_without_a_page_is_found() {
-        let repo =
-            Repo::of(&[("crates/a/Cargo.toml", ""), ("crates/b/Cargo.toml", ""), ("crates/a/README.md", "# a\n")]);
+        let repo = Repo::in_memory(&[
+            ("crates/a/Cargo.toml", ""),
+            ("crates/b/Cargo.toml", ""),
+            ("crates/a/README.md", "# a\n"),
+        ]);
         assert_eq!(crate_pages(&repo), ["crates/b/README.md is missing"]);
     }
 
@@ -144,7 +147,7 @@ mod tests {
     fn an_example_that_no_test_compiles_is_found() {
         let found = |page: &str, library: &str| {
             let files = [("crates/a/Cargo.toml", ""), ("crates/a/README.md", page), ("crates/a/src/lib.rs", library)];
-            crate_pages(&Repo::of(&files))
+            crate_pages(&Repo::in_memory(&files))
         };
         let page = "# a\n```rust\nlet a = 1;\n```\n```toml\n[dependencies]\n```\n";
         let library = "//! A.\n/// The page.\n#[cfg(doctest)]\n#[doc = include_str!(\"../README.md\")]\nstruct Page;\n";
@@ -160,7 +163,7 @@ mod tests {
     fn a_feature_that_no_page_names_is_found() {
         let manifest = "[features]\ndefault = [\"las\"]\nlas = []\nply = []\n";
         let page = "# a\n`las` reads LAS, as ply does.\n";
-        let repo = Repo::of(&[("crates/a/Cargo.toml", manifest), ("crates/a/README.md", page)]);
+        let repo = Repo::in_memory(&[("crates/a/Cargo.toml", manifest), ("crates/a/README.md", page)]);
         assert_eq!(crate_pages(&repo), ["crates/a/README.md does not say what the feature `ply` is for"]);
     }
 }
