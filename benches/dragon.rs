@@ -31,12 +31,12 @@ pub fn mean_degree(graph: &OverlapGraph) -> f64 {
 }
 
 /// The share of the cut-off radius that gives a mean degree at c = 1.
-pub fn disc_scale(cloud: &Cloud, wanted: f64) -> f32 {
+pub fn disc_scale(cloud: &Cloud, degree: f64) -> f32 {
     let mut low = 0.0f32;
     let mut high = 1.0f32;
     for _ in 0..12 {
         let middle = 0.5 * (low + high);
-        if mean_degree(&overlap_graph(cloud, middle, 1.0)) < wanted { low = middle } else { high = middle }
+        if mean_degree(&overlap_graph(cloud, middle, 1.0)) < degree { low = middle } else { high = middle }
     }
     high
 }

@@ -42,8 +42,8 @@ fn head() -> Grid {
 fn meshes(c: &mut Criterion) {
     let mesh = bunny();
     let mut group = c.benchmark_group("mesh_to_points");
-    for wanted in [440_000, 620_000, 1_840_000, 10_000_000] {
-        let params = MeshParams { density: Density::Splats(wanted), ..MeshParams::default() };
+    for count in [440_000, 620_000, 1_840_000, 10_000_000] {
+        let params = MeshParams { density: Density::Splats(count), ..MeshParams::default() };
         let mut cloud = Cloud::default();
         let Ok(report) = mesh_to_points_into(&mesh, &params, &mut cloud, None) else { continue };
         group.throughput(Throughput::Elements(report.splats));

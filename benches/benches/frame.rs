@@ -101,10 +101,10 @@ impl Passes {
     }
 
     /// What is taken of each pass's seconds, which rise.
-    fn print(mut self, frame: &str, of: impl Fn(&[f64]) -> f64) {
+    fn print(mut self, frame: &str, statistic: impl Fn(&[f64]) -> f64) {
         for (name, seconds) in &mut self.0 {
             seconds.sort_by(f64::total_cmp);
-            println!("{name:>16} {:8.1} ms", of(seconds) * 1e3);
+            println!("{name:>16} {:8.1} ms", statistic(seconds) * 1e3);
             record(&format!("frame/{frame}/{name}"), &seconds.iter().map(|s| 1e3 * s).collect::<Vec<_>>(), self.1);
         }
     }

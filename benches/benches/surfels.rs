@@ -97,7 +97,7 @@ fn compare(a: &Opaque, b: &Opaque) -> (f64, f64) {
     let apart = |k: usize| (0..3).map(move |c| a.image.channels[c][k] - b.image.channels[c][k]).map(f32::abs);
     let seen: Vec<f64> =
         (0..a.disc.len()).filter(|&k| a.disc[k] != u32::MAX).map(|k| f64::from(apart(k).fold(0.0, f32::max))).collect();
-    let mean = |of: &dyn Fn(f64) -> f64| seen.iter().map(|d| of(*d)).sum::<f64>() / seen.len() as f64;
+    let mean = |number: &dyn Fn(f64) -> f64| seen.iter().map(|d| number(*d)).sum::<f64>() / seen.len() as f64;
     (mean(&|d| d * d).sqrt(), mean(&|d| f64::from(u8::from(d > 1.0 / 255.0))))
 }
 

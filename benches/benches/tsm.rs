@@ -109,11 +109,11 @@ fn look_up(map: &ShadowMap, cloud: &Cloud, ids: &[usize]) -> f32 {
 }
 
 fn look_up_together(map: &ShadowMap, cloud: &Cloud, ids: &[usize]) -> f32 {
-    let of = |ids: &[usize]| -> f32 {
+    let sum = |ids: &[usize]| -> f32 {
         let light = map.at_splats(ids, &|i| Receiver::of_splat(cloud, i));
         light[..ids.len()].iter().map(|[red, ..]| red).sum()
     };
-    ids.par_chunks(TOGETHER).with_min_len(256).map(of).sum()
+    ids.par_chunks(TOGETHER).with_min_len(256).map(sum).sum()
 }
 
 /// A dragon of as many discs as the paper's has points, opaque and translucent, and a cloud, a medium.

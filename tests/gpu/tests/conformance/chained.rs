@@ -142,7 +142,7 @@ fn four_stages_in_one_submission_are_the_cpu_s_picture() {
         assert!(counts.longest > 100 && counts.longest < counts.entries);
 
         let largest = values.iter().fold(0.0, |most: f32, v| most.max(*v));
-        let far = |a: &[f32], b: &[f32], of: f32| a.iter().zip(b).all(|(a, b)| (a - b).abs() <= TOLERANCE * of);
+        let far = |a: &[f32], b: &[f32], scale: f32| a.iter().zip(b).all(|(a, b)| (a - b).abs() <= TOLERANCE * scale);
         let through = |a: &Accumulator| a.optical_depth[0].iter().map(|tau| (-tau).exp()).collect::<Vec<f32>>();
         assert!(through(&gpu).iter().any(|t| *t < 0.5));
         assert!(far(&through(&cpu), &through(&gpu), 1.0), "{direction:?}");

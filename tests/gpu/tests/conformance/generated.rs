@@ -200,14 +200,14 @@ pub(crate) fn pixels() -> impl Iterator<Item = (u32, u32)> {
 fn particles(device: &mut Device, scene: &Scene<'_>) -> ([[Vec<u32>; 2]; 2], Vec<u32>) {
     let sources = Sources::new(scene).unwrap();
     let mut generated = record_generated(ROOM, Nearest::for_adapter(device.adapter()), None, &sources).unwrap();
-    let wanted = [generated.sets, generated.particles, generated.arrivals];
-    wanted.iter().for_each(|buffer| generated.recording.read(*buffer));
+    let buffers = [generated.sets, generated.particles, generated.arrivals];
+    buffers.iter().for_each(|buffer| generated.recording.read(*buffer));
     let mut inputs = generated.tables(&sources, scene, &empty()).unwrap();
     inputs.extend(generated.next(&sources, scene, &empty()).unwrap());
     let inputs: Vec<_> = inputs.iter().map(|(buffer, bytes)| (*buffer, &bytes[..])).collect();
     let run = device.run(&generated.recording, &inputs).unwrap();
     assert_eq!(device.take_messages(), [""; 0]);
-    let [sets, particles, arrivals] = wanted.map(|buffer| words(run.bytes(buffer)));
+    let [sets, particles, arrivals] = buffers.map(|buffer| words(run.bytes(buffer)));
     let recorded = record(ROOM, Nearest::Ranked, None).unwrap();
     let uploads = recorded.uploads(scene, &empty()).unwrap();
     let inputs = recorded.inputs(&uploads);

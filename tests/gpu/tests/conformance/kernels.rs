@@ -112,7 +112,10 @@ fn what_a_device_cannot_do_across_subgroups_is_refused_by_name() {
     without.subgroup_ops = SubgroupOps::NONE;
     let refused = without.accept(&r.by(Lanes::Subgroup));
     assert_eq!(refused, Err(DeviceError::Lacking { kernel: "scan_spine_subgroup", what: "sums of subgroups" }));
-    assert_eq!((without.accept(&r.by(Lanes::for_adapter(&without))), Lanes::for_adapter(&without)), (Ok(()), Lanes::Portable));
+    assert_eq!(
+        (without.accept(&r.by(Lanes::for_adapter(&without))), Lanes::for_adapter(&without)),
+        (Ok(()), Lanes::Portable)
+    );
     // Lavapipe has them by either executor, as wide as its vectors.
     assert_eq!(device.lanes(), [Lanes::Portable, Lanes::Subgroup]);
     if let Ok(bits) = std::env::var("LP_NATIVE_VECTOR_WIDTH") {

@@ -327,7 +327,8 @@ fn widened_particles_are_lit_as_the_cpu_s_in_the_mean() {
         let scene =
             Scene { objects, lights: &lights, shadow_origin: world.origin, ambient: [0.1; 3], camera, occluder: None };
         let expected = by_processor(&scene, EnsembleParams::default(), 2 * ROOM.levels);
-        let way = Way { params: EnsembleParams::default(), nearest: Nearest::for_adapter(device.adapter()), made: false };
+        let way =
+            Way { params: EnsembleParams::default(), nearest: Nearest::for_adapter(device.adapter()), made: false };
         let found = by_device(&mut device, &scene, &with_maps, way, ROOM);
         // Places within pixels are others, by chance: pixels differ, their mean does not.
         let (same, near, _) = agreement(&expected, &found);
@@ -351,7 +352,8 @@ fn too_little_room_and_other_lights_are_refused() {
         let mut ensemble = Ensemble::new(SIZE, &ALL).unwrap();
         let lighting = Lighting { params: ALL, lights: 3, shadows: &[] };
         let room = Capacities { of_set: 10, ..ROOM };
-        let generated = record_generated(room, Nearest::for_adapter(device.adapter()), Some(&lighting), &sources).unwrap();
+        let generated =
+            record_generated(room, Nearest::for_adapter(device.adapter()), Some(&lighting), &sources).unwrap();
         let mut inputs = generated.tables(&sources, &scene, &ensemble).unwrap();
         inputs.extend(generated.next(&sources, &scene, &ensemble).unwrap());
         let inputs: Vec<_> = inputs.iter().map(|(buffer, bytes)| (*buffer, &bytes[..])).collect();

@@ -151,9 +151,10 @@ fn pb16_equals_share_a_pixel_fairly() {
     let view = Projection::Orthographic { height: 2.0 };
     let camera = Camera::look_at(DVec3::Z * 4.0, DVec3::ZERO, DVec3::Y, view, SIZE).unwrap();
     let s = pixel_area(&camera, DVec3::Z);
-    let of = |color, seed| SurfaceParams { opacity: 0.9, cross_section: s, color, seed, ..SurfaceParams::default() };
-    let white = MeshSampler::new(&mesh, &of([1.0; 3], 1), None).unwrap();
-    let black = MeshSampler::new(&mesh, &of([0.0; 3], 2), None).unwrap();
+    let params =
+        |color, seed| SurfaceParams { opacity: 0.9, cross_section: s, color, seed, ..SurfaceParams::default() };
+    let white = MeshSampler::new(&mesh, &params([1.0; 3], 1), None).unwrap();
+    let black = MeshSampler::new(&mesh, &params([0.0; 3], 2), None).unwrap();
     let objects = [object(&white, 0.0, [0.0; 3]), object(&black, 0.0, [0.0; 3])];
     let scene = Scene {
         objects: &objects,

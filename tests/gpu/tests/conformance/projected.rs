@@ -67,9 +67,9 @@ fn apart(a: &[u32], b: &[u32]) -> (f32, bool) {
     let extents = |w: u32| [w & 0xffff, w >> 16];
     let steps = extents(a[6]).into_iter().zip(extents(b[6])).map(|(a, b)| a.abs_diff(b)).max().unwrap();
     let share = |places: std::ops::Range<usize>| {
-        let of = |words: &[u32]| words[places.clone()].iter().map(|w| f32::from_bits(*w)).collect::<Vec<_>>();
-        let a = of(a);
-        let b = of(b);
+        let numbers = |words: &[u32]| words[places.clone()].iter().map(|w| f32::from_bits(*w)).collect::<Vec<_>>();
+        let a = numbers(a);
+        let b = numbers(b);
         let largest = a.iter().fold(f32::MIN_POSITIVE, |most, v| most.max(v.abs()));
         a.iter().zip(&b).map(|(a, b)| (a - b).abs() / largest).fold(0.0, f32::max)
     };

@@ -70,7 +70,7 @@ fn others(a: &OpaqueImage, b: &OpaqueImage) -> f64 {
     let n = a.depth.len();
     assert_eq!([b.depth.len(), b.channels.len(), b.object.len()], [n, a.channels.len(), a.object.len()]);
     // What is no number is another.
-    let near = |a: f32, b: f32, of: f32| a == b || (a - b).abs() <= TOLERANCE * of;
+    let near = |a: f32, b: f32, scale: f32| a == b || (a - b).abs() <= TOLERANCE * scale;
     let same = |k: &usize| {
         near(a.depth[*k], b.depth[*k], 3.0)
             && a.object.get(*k) == b.object.get(*k)

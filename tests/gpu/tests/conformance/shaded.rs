@@ -175,7 +175,10 @@ fn what_single_precision_does_not_resolve_is_said() {
         let objects = &objects[..];
         let ambient = [0.0; 3];
         let input = ShadeInput { cloud, materials: &materials, objects, lights: &lights, ambient, camera: &camera };
-        (suits(&input), Capacities::for_input(&input, Attributes::new(cloud, None).unwrap().room(), ChannelLayout::default()))
+        (
+            suits(&input),
+            Capacities::for_input(&input, Attributes::new(cloud, None).unwrap().room(), ChannelLayout::default()),
+        )
     };
     assert_eq!(asks(spot(0.3, 0.6), 64.0).0, Ok(()));
     assert!(asks(spot(0.3, 0.3), 64.0).0.is_err() && asks(spot(0.3, 0.6), 65.0).0.is_err());
