@@ -22,7 +22,7 @@ pub(super) fn run(arguments: &InfoArguments) -> Result<(), Error> {
         return console::out(&if arguments.json { format!("{document:#}\n") } else { text::lines(&document) });
     }
     let facts = facts(&arguments.file, memory::default_limit(), arguments.strict)?;
-    facts.mended.iter().for_each(|line| console::warn(line));
+    facts.mended.iter().chain(&facts.warnings).for_each(|line| console::warn(line));
     if arguments.json {
         return console::out(&format!("{:#}\n", file_document(&facts)));
     }
@@ -132,6 +132,7 @@ fn file_document(facts: &Facts) -> Value {
         "not_used": facts.unused,
         "remarks": facts.remarks,
         "mended": facts.mended,
+        "warnings": facts.warnings,
         "up": facts.up.name(),
         "up_is_stated": facts.is_up_stated,
         "stands_along": facts.stands.map(UpAxis::name),

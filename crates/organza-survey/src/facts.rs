@@ -60,6 +60,8 @@ pub struct Facts {
     pub remarks: Vec<String>,
     /// What was mended in the file or left out of it, one sentence a kind of fault.
     pub mended: Vec<String>,
+    /// What of the data a picture does not show as it is, one sentence each.
+    pub warnings: Vec<String>,
     /// The axis that points up where a scene says `up = "auto"`.
     pub up: UpAxis,
     /// Whether the file's format says so; else it is y, as nothing says another.
@@ -91,6 +93,7 @@ pub fn facts(path: &Path, max_bytes: u64, strict: bool) -> Result<Facts, Error> 
     let unused = notes.unused.iter().filter(|name| !is_column(name)).cloned().collect();
     let remarks = notes.remarks.into_iter().chain(facts.remarks).collect();
     let mended = notes.mended.iter().map(Mended::to_string).collect();
+    let warnings = notes.warnings;
     let stated = stated_up_axis(path);
     let stands = facts.bounds.filter(|_| stated.is_none()).and_then(|bounds| match facts.kind {
         "mesh" => stands_along(bounds),
@@ -100,7 +103,7 @@ pub fn facts(path: &Path, max_bytes: u64, strict: bool) -> Result<Facts, Error> 
     });
     let up = stated.unwrap_or_default();
     let is_up_stated = stated.is_some();
-    Ok(Facts { bytes, format: notes.format, unused, remarks, mended, up, is_up_stated, stands, ..facts })
+    Ok(Facts { bytes, format: notes.format, unused, remarks, mended, warnings, up, is_up_stated, stands, ..facts })
 }
 
 impl Facts {

@@ -28,6 +28,10 @@ pub enum Fix {
     InsideOut,
     /// A few bytes follow the last facet of a binary STL: they are read over.
     TrailingBytes,
+    /// The faces of a polyhedron do not close: what lies between them and its middle is drawn.
+    OpenPolyhedron,
+    /// No point of a polyhedron sees all of its faces: what lies between them and its middle is drawn, which reaches beyond it.
+    HiddenFaces,
 }
 
 /// All faults of one kind that were mended in a file. Prints as one line: `FILE:LINE: 2 faces …`.
@@ -42,7 +46,7 @@ pub struct Mended {
     pub count: u64,
     /// Where the first of them is.
     pub place: Place,
-    /// The number of the first face, as the file's format counts; `None` for what is no fault of a face.
+    /// The number of the first face, of polyhedra the cell, as the file's format counts; `None` for what is no fault of a face.
     pub face: Option<u64>,
 }
 
@@ -75,10 +79,22 @@ impl fmt::Display for Mended {
             Fix::TrailingBytes => {
                 by("byte after the last facet is read over", "bytes after the last facet are read over")
             }
+            Fix::OpenPolyhedron => by(
+                "polyhedron has faces that do not close and is drawn as what lies between them and its middle",
+                "polyhedra have faces that do not close and are drawn as what lies between them and their middles",
+            ),
+            Fix::HiddenFaces => by(
+                "polyhedron has faces that no point inside sees all of and is drawn larger than it is",
+                "polyhedra have faces that no point inside sees all of and are drawn larger than they are",
+            ),
         })?;
+        let face_or_cell = match fix {
+            Fix::OpenPolyhedron | Fix::HiddenFaces => "cell",
+            _ => "face",
+        };
         match face {
-            Some(face) if *count > 1 => write!(f, " (the first is face {face})"),
-            Some(face) => write!(f, " (face {face})"),
+            Some(face) if *count > 1 => write!(f, " (the first is {face_or_cell} {face})"),
+            Some(face) => write!(f, " ({face_or_cell} {face})"),
             None => Ok(()),
         }
     }
@@ -106,11 +122,18 @@ pub struct Notes {
     pub columns: Vec<NamedColumn>,
     /// What was made of the data that its user should know, one sentence without a full stop each.
     pub remarks: Vec<String>,
+    /// What of the data a picture will not show as it is, one sentence without a full stop each: more than a remark.
+    pub warnings: Vec<String>,
     /// What was mended in it, one entry a kind of fault.
     pub mended: Vec<Mended>,
 }
 
 impl Notes {
+    /// What is doubtful of a picture of the data of a file of this name, one sentence each.
+    pub fn doubts<'n>(&'n self, file: &'n str) -> impl Iterator<Item = String> + 'n {
+        self.mended.iter().map(Mended::to_string).chain(self.warnings.iter().map(move |said| format!("{file}: {said}")))
+    }
+
     /// All of it but what was mended, one sentence each, for a file of this name that was read; `unused` are columns that were read and
     /// nobody asks for.
     pub fn sentences<'u>(&self, file: &str, unused: impl IntoIterator<Item = &'u str>) -> Vec<String> {

@@ -152,24 +152,39 @@ fn pieces_of_an_image_are_put_together_at_their_places() {
     for array in ["p", "c"] {
         assert_eq!(chosen("a.pvti", array), chosen("whole.vti", array), "{array}");
     }
-    // What no piece has is a gap.
+    // A hole, a part that is not what the list says, and two values at one place.
     folder.write("gap.pvti", pieces("PImageData", &extent, &["a_0.vti", "a_2.vti"]));
-    let (found, notes) = folder.grid("gap.pvti");
-    assert_eq!(
-        found.values.iter().filter(|v| v.is_nan()).count(),
-        2 * 4,
-        "points 0 and 1 of the last row of four layers"
+    folder.refused(
+        "gap.pvti",
+        "expected pieces that have all points of the extent 0 4 -1 2 2 5, found none with those of the extent 0 1 2 2 2 5",
     );
-    assert!(notes.remarks.iter().any(|r| r.starts_with("8 of 80 voxels are NaN")), "{:?}", notes.remarks);
+    let of_two = pieces("PImageData", &extent, &["a_0.vti", "a_1.vti", "a_2.vti"]);
+    let stated = of_two.replace("<Piece Source=\"a_1.vti\"", "<Piece Extent=\"0 3 0 2 2 5\" Source=\"a_1.vti\"");
+    folder.write("stated.pvti", stated);
+    folder.refused("stated.pvti", "'a_1.vti' of the list: the Extent 0 3 0 2 2 5, as the list has it, found '0 2 0 2 2 5'");
+    let part = image([[0, 2], [0, 2], [2, 5]], "1 2 0.5");
+    let at_zero = linear([0.0, 0.0, 2.0]);
+    folder.write("a_3.vti", part.replacen(&format!("{at_zero} "), "77 ", 1));
+    folder.write("values.pvti", pieces("PImageData", &extent, &["a_0.vti", "a_3.vti", "a_2.vti"]));
+    folder.refused(
+        "values.pvti",
+        &format!("'a_3.vti' of the list: the value at 0 0 2 of p to be {at_zero}, as another piece has it, found 77"),
+    );
+    folder.write("type.vti", part.replace("Float64\" Name=\"p\"", "Float32\" Name=\"p\""));
+    folder.write("type.pvti", pieces("PImageData", &extent, &["a_0.vti", "type.vti", "a_2.vti"]));
+    folder.refused("type.pvti", "'type.vti' of the list: 1 numbers of Float64 a tuple, as the array has in another piece");
     folder.write("other.vti", image([[2, 4], [1, 2], [2, 5]], "1 2 0.25"));
-    folder.write("other.pvti", pieces("PImageData", &extent, &["a_0.vti", "other.vti"]));
+    folder.write("other.pvti", pieces("PImageData", &extent, &["a_0.vti", "a_1.vti", "other.vti"]));
     folder.refused(
         "other.pvti",
         "the file 'other.vti' of the list: the Origin, Spacing and Direction of the other pieces",
     );
     folder.write("far.vti", image([[2_000_000, 2_000_001], [0, 1], [0, 1]], "1 2 0.5"));
     folder.write("far.pvti", pieces("PImageData", &extent, &["a_0.vti", "far.vti"]));
-    folder.refused("far.pvti", "expected pieces that lie side by side, found 2000002 x");
+    folder.refused("far.pvti", "expected pieces within the extent 0 4 -1 2 2 5, found 'far.vti' with 2000000 2000001 0 1 0 1");
+    let whole_extent = "WholeExtent=\"0 2000001 -1 2 2 5\"";
+    folder.write("long.pvti", pieces("PImageData", whole_extent, &["a_0.vti", "a_1.vti", "a_2.vti"]));
+    folder.refused("long.pvti", "found none with those of the extent 5 2000001 -1 2 2 5");
     folder.write("named.vti", image([[0, 4], [-1, 2], [2, 5]], "1 2 0.5").replace("Name=\"p\"", "Name=\"q\""));
     folder.write("named.pvti", pieces("PImageData", &extent, &["a_0.vti", "named.vti"]));
     folder
@@ -203,7 +218,78 @@ fn pieces_of_a_rectilinear_grid_are_put_together_and_made_even() {
     assert!(notes.unused.is_empty(), "{:?}", notes.unused);
     folder.write("a_2.vtr", part(3, 3));
     folder.write("b.pvtr", pieces("PRectilinearGrid", "WholeExtent=\"0 3 0 1 0 1\"", &["a_0.vtr", "a_2.vtr"]));
-    folder.refused("b.pvtr", "expected coordinates along x that rise or fall throughout, found 1 at point 1 and NaN");
+    folder.refused("b.pvtr", "found none with those of the extent 2 2 0 1 0 1");
+    folder.write("a_3.vtr", part(1, 3).replace("1 3 4 ", "1.25 3 4 "));
+    folder.write("c.pvtr", pieces("PRectilinearGrid", "WholeExtent=\"0 3 0 1 0 1\"", &["a_0.vtr", "a_3.vtr"]));
+    folder.refused(
+        "c.pvtr",
+        "'a_3.vtr' of the list: the coordinate 1 along x to be 1, as another piece has it, found 1.25",
+    );
+}
+
+/// A piece of a structured grid with points at their indices, moved along x, and their linear field.
+fn bent(extent: Extent, shift: f64) -> String {
+    let [x, y, z] = extent;
+    let row = |j: i64, k: i64| (x[0]..=x[1]).map(move |i| [i as f64 + 0.1 * (j * j) as f64 + shift, j as f64, k as f64]);
+    let points: Vec<[f64; 3]> =
+        (z[0]..=z[1]).flat_map(|k| (y[0]..=y[1]).flat_map(move |j| row(j, k).collect::<Vec<_>>())).collect();
+    let extent = words_of(extent);
+    let content = format!(
+        "<StructuredGrid WholeExtent=\"{extent}\">\n<Piece Extent=\"{extent}\">\n<PointData>\n{}</PointData>\n<Points>\n{}</Points>\n\
+         </Piece>\n</StructuredGrid>\n",
+        array("Float64", "p", 1, &words(points.iter().map(|p| linear(*p)))),
+        array("Float64", "Points", 3, &words(points.concat()))
+    );
+    vtk_file("StructuredGrid", &content)
+}
+
+#[test]
+fn pieces_of_a_structured_grid_have_to_meet_and_fill_the_whole() {
+    let folder = Folder::new("structured");
+    let whole = "WholeExtent=\"0 4 0 2 0 1\"";
+    folder.write("whole.vts", bent([[0, 4], [0, 2], [0, 1]], 0.0));
+    folder.write("a_0.vts", bent([[0, 2], [0, 2], [0, 1]], 0.0));
+    for (name, content, expected) in [
+        ("a_1.vts", bent([[2, 4], [0, 2], [0, 1]], 0.0), None),
+        (
+            "a_2.vts",
+            bent([[2, 4], [0, 2], [0, 1]], 0.5),
+            Some("point 2 0 0 at [2, 0, 0], where 'a_0.vts' has it, found [2.5, 0, 0] in 'a_2.vts'"),
+        ),
+        ("a_3.vts", bent([[1, 4], [0, 2], [0, 1]], 0.0), Some("found 'a_0.vts' with the extent 0 2 0 2 0 1 and 'a_3.vts' with 1 4 0 2 0 1")),
+        ("a_4.vts", bent([[3, 4], [0, 2], [0, 1]], 0.0), Some("all cells of the extent 0 4 0 2 0 1, found none with those of the extent 2 2 0 1 0 0")),
+        ("a_5.vts", bent([[2, 3], [0, 2], [0, 1]], 0.0), Some("found none with those of the extent 3 3 0 1 0 0")),
+    ] {
+        folder.write(name, content);
+        folder.write("a.pvts", pieces("PStructuredGrid", whole, &["a_0.vts", name]));
+        match expected {
+            Some(expected) => folder.refused("a.pvts", expected),
+            None => assert_eq!(folder.grid("a.pvts").0, folder.grid("whole.vts").0),
+        }
+    }
+}
+
+#[test]
+fn one_piece_alone_says_that_it_is_one_and_names_its_list() {
+    let folder = Folder::new("alone");
+    let whole = "WholeExtent=\"0 4 0 1 0 1\"";
+    let part = |extent: Extent| image(extent, "1 1 1").replace(&format!("WholeExtent=\"{}\"", words_of(extent)), whole);
+    folder.write("p_0.vti", part([[0, 2], [0, 1], [0, 1]]));
+    folder.write("p_1.vti", part([[2, 4], [0, 1], [0, 1]]));
+    let (found, notes) = folder.grid("p_1.vti");
+    assert_eq!((found.dims, found.origin.x), ([3, 2, 2], 3.0));
+    let said = "this file has the piece 2 4 0 1 0 1 of a dataset of 0 4 0 1 0 1, and only that is drawn";
+    assert!(notes.warnings[0].starts_with(said), "{:?}", notes.warnings);
+    folder.write("p.pvti", pieces("PImageData", whole, &["p_0.vti", "p_1.vti"]));
+    let (_, notes) = folder.grid("p_1.vti");
+    let said = "this file is one piece of the dataset whose list is 'p.pvti', which draws all of it";
+    assert!(notes.remarks.iter().any(|r| r == said), "{:?}", notes.remarks);
+    let (_, notes) = folder.grid("p.pvti");
+    assert!(notes.warnings.is_empty() && !notes.remarks.iter().any(|r| r.contains("one piece")), "{notes:?}");
+    folder.write("p_2.vti", part([[2, 5], [0, 1], [0, 1]]));
+    folder.refused("p_2.vti", "expected a Piece within the WholeExtent, found '2 5 0 1 0 1'");
+    fs::remove_file(folder.0.join("p_0.vti")).unwrap();
+    folder.refused("p.pvti", "a file of the list 'p_0.vti': a file, found no such file");
 }
 
 #[test]

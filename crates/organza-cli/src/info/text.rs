@@ -83,6 +83,7 @@ pub(super) fn of_facts(file: &Path, facts: &Facts) -> String {
     }
     facts.remarks.iter().for_each(|remark| text.add("remark", remark));
     facts.mended.iter().for_each(|mended| text.add("mended", mended));
+    facts.warnings.iter().for_each(|warning| text.add("warning", warning));
     text.0
 }
 

@@ -4,7 +4,7 @@ use crate::scene::{ExtractSource, Scene, SourceData, Stop};
 use crate::{Error, RenderOptions};
 use convert::ColorScale;
 use field::SharedField;
-use read::{Loaded, Mended, Notes, ReadParams};
+use read::{Loaded, Notes, ReadParams};
 use splat_core::{DAabb, MemoryAccount, Mesh, Progress, RawPoints, Reservation};
 use std::cell::{Cell, RefCell};
 use std::collections::HashMap;
@@ -136,7 +136,7 @@ impl Files {
                 read
             }
         };
-        add(&self.mended, made.mended.iter().map(Mended::to_string));
+        add(&self.mended, made.doubts(&name));
         let points = if let SourceData::Points(points) = data { Some(points) } else { None };
         let unused = points.into_iter().flat_map(|points| points.not_asked_for(&limits.columns));
         add(&self.notes, notes.sentences(&name, unused));
@@ -181,7 +181,7 @@ impl Files {
         self.notes.borrow().clone()
     }
 
-    /// What was mended in the files, one sentence a kind of fault.
+    /// What was mended in the files, and what of their data a picture does not show as it is, one sentence each.
     pub fn mended(&self) -> Vec<String> {
         self.mended.borrow().clone()
     }
@@ -202,7 +202,7 @@ impl Files {
         let (data, notes) = read.map_err(|e| Error::from_read(path, &e))?;
         let what = crate::printable(path);
         let mut held = memory.take(&what, data.bytes()).map_err(Error::Limit)?;
-        add(&self.mended, notes.mended.iter().map(Mended::to_string));
+        add(&self.mended, notes.doubts(&crate::printable(path)));
         let data = match data {
             Loaded::Mesh(mut mesh) => {
                 let _parted = memory.take(&what, splat_core::crease_bytes(&mesh)).map_err(Error::Limit)?;

@@ -2,6 +2,7 @@
 
 use crate::points::extras::LONGEST_NAME;
 use crate::reading::NamedColumn;
+use crate::volumes::selection::length_is_drawn;
 use crate::{Notes, ReadParams};
 use splat_core::text::escaped;
 use splat_core::{Association, MeshColumn};
@@ -30,6 +31,8 @@ pub(crate) struct NamedArrays<'p> {
     params: &'p ReadParams,
     kept: Vec<MeshColumn>,
     told: Vec<NamedColumn>,
+    /// Vectors that are asked for by their name alone.
+    by_length: Vec<String>,
 }
 
 impl SurfaceArray<'_> {
@@ -65,7 +68,7 @@ impl Part {
 
 impl<'p> NamedArrays<'p> {
     pub(crate) fn new(params: &'p ReadParams) -> Self {
-        Self { params, kept: Vec::new(), told: Vec::new() }
+        Self { params, kept: Vec::new(), told: Vec::new(), by_length: Vec::new() }
     }
 
     /// The name by which a column is asked for: one of faces that vertices have too is told by what it belongs to.
@@ -76,13 +79,27 @@ impl<'p> NamedArrays<'p> {
     /// Whether the numbers of an array are needed.
     pub(crate) fn needs(&self, array: &SurfaceArray<'_>) -> bool {
         let is_asked = |(name, _): (String, Part)| self.params.columns.contains(&self.own_name(name));
-        array.is_offered() && (self.params.ranges || array.columns().into_iter().any(is_asked))
+        let is_needed = self.params.ranges || self.bare_name(array).is_some() || array.columns().into_iter().any(is_asked);
+        array.is_offered() && is_needed
+    }
+
+    /// The name of a vector that is asked for alone, which stands for its length.
+    fn bare_name(&self, array: &SurfaceArray<'_>) -> Option<String> {
+        let name = escaped(array.name.as_bytes(), LONGEST_NAME);
+        let length = format!("{name}:magnitude");
+        let own = if self.told.iter().any(|told| told.name == length) { format!("face:{name}") } else { name };
+        (array.numbers > 1 && self.params.columns.contains(&own)).then_some(own)
     }
 
     /// Takes an array, with its numbers where they are needed.
     pub(crate) fn take(&mut self, array: &SurfaceArray<'_>, numbers: Option<&[f64]>) {
         if !array.is_offered() {
             return;
+        }
+        if let Some((name, numbers)) = self.bare_name(array).zip(numbers) {
+            let values = numbers.chunks_exact(array.numbers as usize).map(|tuple| Part::Magnitude.of(tuple)).collect();
+            self.by_length.push(name.clone());
+            self.kept.push(MeshColumn { name, association: array.association, values });
         }
         for (name, part) in array.columns() {
             let name = self.own_name(name);
@@ -100,6 +117,7 @@ impl<'p> NamedArrays<'p> {
     /// The columns that are kept; tells the notes of all.
     pub(crate) fn finish(self, notes: &mut Notes) -> Vec<MeshColumn> {
         notes.columns.extend(self.told);
+        self.by_length.iter().for_each(|name| notes.remark(length_is_drawn(name)));
         self.kept
     }
 }

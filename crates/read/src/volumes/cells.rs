@@ -2,6 +2,8 @@
 
 mod kind;
 mod lists;
+mod parting;
+mod polyhedron;
 mod resample;
 mod solid;
 pub(crate) mod structured;
@@ -265,7 +267,8 @@ impl Cells {
             }
             let count = self.bodies().count() as u64;
             input::hold("the bodies", count * size_of::<Body<'_>>() as u64, reading.params)?;
-            let bodies: Vec<Body<'_>> = self.bodies().collect();
+            let mut bodies: Vec<Body<'_>> = self.bodies().collect();
+            polyhedron::check(&self.points, &mut bodies, self.place, reading)?;
             return resample::grid(&self.points, &bodies, self.place, &field, reading).map(Loaded::Grid);
         }
         let PointColumns { normal, color, opacity, mut named } = columns;
@@ -310,7 +313,7 @@ impl Cells {
             let kind = Kind::of_cell(*number, corners.len())?;
             let faces = match kind.shape {
                 Shape::Body(solid) => Faces::Of(solid),
-                Shape::Polyhedron => Faces::Around(self.lists.faces(cell)?),
+                Shape::Polyhedron => Faces::Around(self.lists.faces(cell)?, None),
                 _ => return None,
             };
             Some(Body { cell, corners: kind.drawn(corners), faces })

@@ -1,7 +1,8 @@
 //! Rectilinear grids (`vti`, `vtk`): a lattice whose steps differ becomes one of even steps.
 //!
 //! Values between the points of the file are interpolated linearly along each axis. The even step is the least step of the file, so that
-//! little is lost; what is lost at the points of the file is measured and said.
+//! little is lost; where that made too many voxels, a voxel has the mean of what lies within half a step of it. What is lost at the points of the
+//! file is measured and said.
 
 use super::lattice;
 use crate::error::{Place, ReadError};
@@ -23,6 +24,12 @@ const MOST: f64 = (1u64 << 27) as f64;
 
 /// By what the steps grow until the voxels fit.
 const COARSER: f64 = 1.1;
+
+/// The share of the range from which what is lost is worth a warning.
+const MUCH: f64 = 0.05;
+
+/// How much longer than the least step of the file an even one is that means are taken over.
+const LONGER: f64 = 1.001;
 
 /// Coordinates of the points along x, y and z, and where they are told of.
 pub(crate) struct Rectilinear {
@@ -102,20 +109,25 @@ impl Rectilinear {
         }
         let count = dims.iter().product::<usize>();
         input::hold("the voxels of even steps", (count * size_of::<f32>()) as u64, reading.params)?;
-        let to = [0, 1, 2].map(|rank| axes[rank].places_of(dims[rank]));
+        let uneven = Values { dims: stored, values: &values };
+        let means = uneven.means(&axes, dims, reading)?;
+        let source = means.as_ref().map_or(uneven, |(dims, values)| Values { dims: *dims, values });
+        let to = [0, 1, 2].map(|rank| {
+            if source.dims[rank] == stored[rank] { axes[rank].places_of(dims[rank]) } else { as_they_are(dims[rank]) }
+        });
         let mut even = Vec::new();
         input::reserve(&mut even, count)?;
         even.resize(count, 0f32);
-        let uneven = Values { dims: stored, values: &values };
         even.par_chunks_mut(dims[0] * dims[1]).enumerate().try_for_each(|(k, plane)| {
             reading.go_on()?;
             for (n, value) in plane.iter_mut().enumerate() {
-                *value = uneven.between(to[0][n % dims[0]], to[1][n / dims[0]], to[2][k]) as f32;
+                *value = source.between(to[0][n % dims[0]], to[1][n / dims[0]], to[2][k]) as f32;
             }
             Ok::<(), ReadError>(())
         })?;
         let lost = lost(uneven, Values { dims, values: &even }, &axes);
-        reading.notes.remarks.push(told(&axes, dims, is_coarse, lost));
+        let said = told(&axes, dims, is_coarse, lost);
+        if lost > MUCH { reading.notes.warnings.push(said) } else { reading.notes.remarks.push(said) }
         Ok(Grid { origin, axes: diagonal, dims, values: even })
     }
 }
@@ -152,6 +164,11 @@ fn lattice_of(axes: &[Axis<'_>; 3], dims: [usize; 3]) -> (DVec3, DVec3) {
     let shortest = if shortest.is_finite() { shortest } else { 1.0 };
     let signed = [0, 1, 2].map(|rank| if steps[rank] > 0.0 { axes[rank].sign * steps[rank] } else { shortest });
     (DVec3::from_array([0, 1, 2].map(|rank| axes[rank].coordinates[0])), DVec3::from_array(signed))
+}
+
+/// Places of points that stay where they are.
+fn as_they_are(count: usize) -> Vec<Between> {
+    (0..count).map(|i| Between { low: i, high: i, weight: 0.0 }).collect()
 }
 
 /// The most by which the even values differ from those of the file at its points, as a share of their range.
@@ -241,7 +258,7 @@ impl<'a> Axis<'a> {
     fn places_of(&self, count: usize) -> Vec<Between> {
         let last = self.count() - 1;
         if self.is_even || count == 1 {
-            return (0..count).map(|i| Between { low: i, high: i, weight: 0.0 }).collect();
+            return as_they_are(count);
         }
         let step = self.length() / (count - 1) as f64;
         let mut low = 0;
@@ -254,6 +271,37 @@ impl<'a> Axis<'a> {
             Between { low, high: low + 1, weight: weight.clamp(0.0, 1.0) }
         };
         (0..count).map(place).collect()
+    }
+
+    /// The weights of the points of the file in the means around so many of even steps: the rank of the first, and its weight and those behind it. A mean is
+    /// over half a step to both sides, at the ends over nothing, so that a linear field stays as it is.
+    fn means_of(&self, count: usize) -> Vec<(usize, Vec<f64>)> {
+        let step = self.length() / (count - 1) as f64;
+        let last = self.count() - 1;
+        let mut low = 0;
+        let mean = |i: usize| {
+            if i == 0 || i + 1 == count {
+                return (if i == 0 { 0 } else { last }, vec![1.0]);
+            }
+            let from = (i as f64 - 0.5) * step;
+            let to = (i as f64 + 0.5) * step;
+            while low + 1 < last && self.along(low + 1) <= from {
+                low += 1;
+            }
+            let mut weights = vec![0.0];
+            let mut rank = low;
+            while rank < last && self.along(rank) < to {
+                let ends = [self.along(rank), self.along(rank + 1)];
+                let part = [ends[0].max(from), ends[1].min(to)];
+                let share = (part[1] - part[0]).max(0.0) / step;
+                let middle = (0.5 * (part[0] + part[1]) - ends[0]) / (ends[1] - ends[0]);
+                weights[rank - low] += share * (1.0 - middle);
+                weights.push(share * middle);
+                rank += 1;
+            }
+            (low, weights)
+        };
+        (0..count).map(mean).collect()
     }
 
     /// Where the points of the file lie among so many of even steps.
@@ -272,6 +320,45 @@ impl<'a> Axis<'a> {
 }
 
 impl Values<'_> {
+    /// Sizes and values with means along the axes whose steps in so many voxels are longer than the least of the file; `None` without such axes.
+    fn means(
+        &self,
+        axes: &[Axis<'_>; 3],
+        dims: [usize; 3],
+        reading: &Reading<'_>,
+    ) -> Result<Option<([usize; 3], Vec<f32>)>, ReadError> {
+        let mut found: Option<([usize; 3], Vec<f32>)> = None;
+        for (rank, axis) in axes.iter().enumerate() {
+            let is_longer = dims[rank] > 1 && axis.length() / (dims[rank] - 1) as f64 > LONGER * axis.least;
+            if axis.is_even || !is_longer || dims[rank] == axis.count() {
+                continue;
+            }
+            let before = found.as_ref().map_or(*self, |(dims, values)| Values { dims: *dims, values });
+            let mut sizes = before.dims;
+            sizes[rank] = dims[rank];
+            let count = sizes.iter().product::<usize>();
+            input::hold("the means along an axis", (count * size_of::<f32>()) as u64, reading.params)?;
+            let mut means = Vec::new();
+            input::reserve(&mut means, count)?;
+            means.resize(count, 0f32);
+            let weights = axis.means_of(dims[rank]);
+            let stride: usize = before.dims[..rank].iter().product();
+            means.par_chunks_mut(sizes[0] * sizes[1]).enumerate().try_for_each(|(k, plane)| {
+                reading.go_on()?;
+                for (n, mean) in plane.iter_mut().enumerate() {
+                    let mut place = [n % sizes[0], n / sizes[0], k];
+                    let (first, weights) = &weights[place[rank]];
+                    place[rank] = *first;
+                    let first = place[0] + before.dims[0] * (place[1] + before.dims[1] * place[2]);
+                    *mean = mean_of(weights, |i| f64::from(before.values[first + i * stride])) as f32;
+                }
+                Ok::<(), ReadError>(())
+            })?;
+            found = Some((sizes, means));
+        }
+        Ok(found)
+    }
+
     /// The value between neighbours along all three axes.
     fn between(&self, x: Between, y: Between, z: Between) -> f64 {
         let [nx, ny, _] = self.dims;
@@ -281,6 +368,20 @@ impl Values<'_> {
         };
         mixed(z, |k| mixed(y, |j| row(j, k)))
     }
+}
+
+/// The weighted mean of the values that are numbers; NaN where they have less than half of the weight.
+fn mean_of(weights: &[f64], value: impl Fn(usize) -> f64) -> f64 {
+    let mut sum = 0.0;
+    let mut whole = 0.0;
+    for (i, weight) in weights.iter().enumerate().filter(|(_, weight)| **weight > 0.0) {
+        let value = value(i);
+        if !value.is_nan() {
+            sum += weight * value;
+            whole += weight;
+        }
+    }
+    if whole < 0.5 { f64::NAN } else { sum / whole }
 }
 
 /// The weighted mean of two neighbours; one of no weight may be NaN.

@@ -60,7 +60,15 @@ pub(crate) struct Candidate {
     pub(crate) kind: Option<Kind>,
     /// Whether the file says that it is the one to show.
     pub(crate) is_named: bool,
+    /// Whether it belongs to the cells.
+    pub(crate) is_of_cells: bool,
 }
+
+/// What stands before the name of an array of the cells, and of one of the points, where both have it.
+#[cfg(any(feature = "vti", feature = "vtk"))]
+const OF_CELLS: &str = "cell:";
+#[cfg(any(feature = "vti", feature = "vtk"))]
+const OF_POINTS: &str = "point:";
 
 #[cfg(any(feature = "vti", feature = "vtk"))]
 impl Candidate {
@@ -75,9 +83,12 @@ impl Candidate {
         !self.is_field() && (2..=MOST_NUMBERS).contains(&self.numbers)
     }
 
-    /// The name by which it is asked for where nothing else is said.
-    fn offered_name(&self) -> String {
-        if self.is_vector() { format!("{}:magnitude", self.name) } else { self.name.clone() }
+    /// The name by which it is asked for where nothing else is said; arrays of cells that have the name of one of points are told by what they belong to.
+    fn offered_name(&self, all: &[Self]) -> String {
+        let is_shared = self.is_of_cells && all.iter().any(|other| !other.is_of_cells && other.name == self.name);
+        let of = if is_shared { OF_CELLS } else { "" };
+        let part = if self.is_vector() { ":magnitude" } else { "" };
+        format!("{of}{}{part}", self.name)
     }
 
     /// The length of the vectors, if it has such.
@@ -85,8 +96,10 @@ impl Candidate {
         self.is_vector().then_some(Value::Magnitude(self.numbers))
     }
 
-    /// The value that a name asks for: that of the array of this name, or of a vector the part behind a colon.
+    /// The value that a name asks for: that of the array of this name, with or without what it belongs to, or of a vector the part behind a colon.
     fn value_named(&self, name: &str) -> Option<Option<Value>> {
+        let of = if self.is_of_cells { OF_CELLS } else { OF_POINTS };
+        let name = name.strip_prefix(of).unwrap_or(name);
         if self.name == name {
             return Some(self.magnitude());
         }
@@ -113,14 +126,21 @@ pub(crate) fn chosen_array(
         let others = || all.iter().enumerate().filter(|(rank, _)| *rank != but).map(|(_, array)| array);
         let fields = others().filter(|array| array.is_field());
         let vectors = others().filter(|array| array.is_vector());
-        fields.chain(vectors).map(Candidate::offered_name).collect::<Vec<_>>().join(", ")
+        fields.chain(vectors).map(|array| array.offered_name(all)).collect::<Vec<_>>().join(", ")
     };
     if let Some(name) = &params.array {
         let name = splat_core::text::escaped(name.as_bytes(), LONGEST_NAME);
         let named = |(rank, array): (usize, &Candidate)| array.value_named(&name).map(|value| Chosen { rank, value });
         // A whole name comes before a part of a vector.
         let exact = all.iter().enumerate().filter(|(_, array)| array.name == name).find_map(named);
-        return exact.or_else(|| all.iter().enumerate().find_map(named)).map(Some).ok_or_else(|| {
+        let found = exact.or_else(|| all.iter().enumerate().find_map(named));
+        if let Some(array) = found.as_ref().map(|found| &all[found.rank]).filter(|array| array.is_vector()) {
+            let bare = [OF_CELLS, OF_POINTS].iter().find_map(|of| name.strip_prefix(of)).unwrap_or(&name);
+            if array.name == bare {
+                notes.remark(length_is_drawn(&name));
+            }
+        }
+        return found.map(Some).ok_or_else(|| {
             let expected = format!("an array among {}", names(all.len()));
             ReadError::input(
                 place,
@@ -134,7 +154,7 @@ pub(crate) fn chosen_array(
     let found = found.or_else(|| all.iter().position(Candidate::is_field));
     let found = found.or_else(|| all.iter().position(Candidate::is_vector));
     let Some(rank) = found.or(if all.is_empty() { None } else { Some(0) }) else { return Ok(None) };
-    let shown = all[rank].offered_name();
+    let shown = all[rank].offered_name(all);
     let others = names(rank);
     if !others.is_empty() {
         notes.remark(format!("the array {shown} is drawn; `array` of a scene or --color-by chooses another: {others}"));
@@ -143,6 +163,11 @@ pub(crate) fn chosen_array(
         notes.remark(format!("{shown} is drawn, the length of the vectors; --color-by {name}:0 chooses one number"));
     }
     Ok(Some(Chosen { rank, value: all[rank].magnitude() }))
+}
+
+/// The remark that a vector is drawn by its length because it is asked for by its name alone.
+pub(crate) fn length_is_drawn(name: &str) -> String {
+    format!("{name} is a vector: its length is drawn, {name}:magnitude; {name}:x, {name}:y … or {name}:0 … choose one number")
 }
 
 /// The part of the stored numbers that is read.

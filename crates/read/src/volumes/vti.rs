@@ -5,6 +5,7 @@
 //! that `Scalars` names, else the first of one number, of the points, else of the cells; others are named.
 
 mod data;
+mod extents;
 mod listed;
 mod pasted;
 mod piece;
@@ -48,6 +49,11 @@ pub(crate) fn read(content: &[u8], place: Option<&Path>, reading: &mut Reading<'
     let document = parsed(&text)?;
     let dataset = dataset(&document)?;
     let encoding = Encoding::of(document.root_element(), content, appended)?;
+    let list = place.and_then(listed::naming);
+    if let Some(list) = &list {
+        let list = escaped(list.as_bytes(), 60);
+        reading.notes.remark(format!("this file is one piece of the dataset whose list is '{list}', which draws all of it"));
+    }
     one(&pieces::Source { dataset, encoding: &encoding, file: None }, reading)
 }
 
@@ -70,8 +76,8 @@ fn parsed(text: &str) -> Result<Document<'_>, ReadError> {
 
 /// Reads the volume of an image.
 fn image(image: Node<'_, '_>, encoding: &Encoding<'_>, reading: &mut Reading<'_>) -> Result<Grid, ReadError> {
-    let lattice = Lattice::of(image)?;
-    let piece = only_piece(image)?;
+    let piece = only_piece(image, reading)?;
+    let lattice = Lattice::within(image, extent(piece, "Extent")?)?;
     let found = chosen_of(piece, reading)?;
     not_used(image, &[found.array], &mut reading.notes);
     let mut origin = lattice.origin;
@@ -86,7 +92,7 @@ fn image(image: Node<'_, '_>, encoding: &Encoding<'_>, reading: &mut Reading<'_>
 
 /// Reads the volume of a rectilinear grid.
 fn rectilinear(grid: Node<'_, '_>, encoding: &Encoding<'_>, reading: &mut Reading<'_>) -> Result<Grid, ReadError> {
-    let piece = only_piece(grid)?;
+    let piece = only_piece(grid, reading)?;
     let coordinates = coordinates(piece, encoding, reading)?;
     let found = chosen_of(piece, reading)?;
     let element = child(piece, "Coordinates");
@@ -168,17 +174,33 @@ fn dataset<'a, 'i>(document: &'a Document<'i>) -> Result<Node<'a, 'i>, ReadError
     child(root, kind).ok_or_else(|| wrong(root, &format!("an element {kind}"), "none"))
 }
 
-/// The piece of a lattice, which has to be the only one and all of it.
-fn only_piece<'a, 'i>(lattice: Node<'a, 'i>) -> Result<Node<'a, 'i>, ReadError> {
+/// The piece of a lattice, which has to be the only one; warns where it is a part of the whole.
+fn only_piece<'a, 'i>(lattice: Node<'a, 'i>, reading: &mut Reading<'_>) -> Result<Node<'a, 'i>, ReadError> {
     let pieces: Vec<_> = lattice.children().filter(|c| c.has_tag_name("Piece")).collect();
     let &[piece] = pieces.as_slice() else {
         let hint = "write the dataset as one piece";
         return Err(ReadError { hint, ..wrong(lattice, "one Piece", &pieces.len().to_string()) });
     };
-    if extent(piece, "Extent")? != extent(lattice, "WholeExtent")? {
-        return Err(wrong(piece, "the WholeExtent in one Piece", piece.attribute("Extent").unwrap_or_default()));
-    }
+    warn_of_part(piece, lattice, reading)?;
     Ok(piece)
+}
+
+/// Warns where the only piece of a file is a part of its dataset. Refuses one that reaches beyond it.
+fn warn_of_part(piece: Node<'_, '_>, dataset: Node<'_, '_>, reading: &mut Reading<'_>) -> Result<(), ReadError> {
+    let part = extent(piece, "Extent")?;
+    let whole = extent(dataset, "WholeExtent")?;
+    let text = |node: Node<'_, '_>, name: &str| escaped(node.attribute(name).unwrap_or_default().as_bytes(), 60);
+    if part.iter().zip(&whole).any(|(part, whole)| part[0] < whole[0] || part[1] > whole[1]) {
+        return Err(wrong(piece, "a Piece within the WholeExtent", piece.attribute("Extent").unwrap_or_default()));
+    }
+    if part != whole {
+        reading.notes.warnings.push(format!(
+            "this file has the piece {} of a dataset of {}, and only that is drawn; the list of all pieces (.pvti, .pvtr, .pvts) draws the whole",
+            text(piece, "Extent"),
+            text(dataset, "WholeExtent")
+        ));
+    }
+    Ok(())
 }
 
 /// The name of an array, as it may be shown.
@@ -204,10 +226,6 @@ struct Lattice {
 }
 
 impl Lattice {
-    fn of(image: Node<'_, '_>) -> Result<Self, ReadError> {
-        Self::within(image, extent(image, "WholeExtent")?)
-    }
-
     /// The part between these indices.
     fn within(image: Node<'_, '_>, extent: [[i64; 2]; 3]) -> Result<Self, ReadError> {
         let spacing = numbers(image, "Spacing")?.map_or(DVec3::ONE, DVec3::from_array);
@@ -284,7 +302,8 @@ fn chosen<'a, 'i>(
             let is_named = first == Some(*data) && named.is_some() && array.attribute("Name") == named;
             let name = name(array);
             let kind = kind(array).ok();
-            all.push((array, Candidate { name, numbers: components(array)?, kind, is_named }));
+            let is_of_cells = data.has_tag_name("CellData");
+            all.push((array, Candidate { name, numbers: components(array)?, kind, is_named, is_of_cells }));
         }
     }
     let (nodes, candidates): (Vec<_>, Vec<_>) = all.into_iter().unzip();

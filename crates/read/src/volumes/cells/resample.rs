@@ -3,9 +3,11 @@
 //! A voxel is the mean of eight samples, in the middles of its eighths: those within a body have its field there, those within none
 //! the value outside. So a field that is linear over a voxel's cells has its value at the voxel's middle, and the volume has the
 //! integral of the field but for the samples that a border parts. Bodies are parted into tetrahedra around their middle and the middles of
-//! their faces, which neighbours agree on; the field is linear in each. A sample belongs to the first body that it lies in.
+//! their faces, which neighbours agree on; the field is linear in each. A sample belongs to the first body that it lies in. Voxels
+//! with bodies that samples miss are parted exactly (`parting`).
 
 use super::lists::FacesAround;
+use super::parting::{Parting, Planes};
 use super::solid::{Middle, Solid};
 use super::{Field, HINT};
 use crate::error::{Place, ReadError};
@@ -14,8 +16,9 @@ use crate::stream::input;
 use crate::volumes::lattice;
 use rayon::prelude::*;
 use splat_core::Grid;
-use splat_core::glam::{DMat3, DVec3, DVec4};
+use splat_core::glam::{DMat3, DVec3, DVec4, USizeVec3};
 use splat_core::text::counted;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Voxels of the volume: no fewer in its bounds, and no more.
 const FEWEST: f64 = 64.0 * 64.0 * 64.0;
@@ -24,6 +27,16 @@ const MOST: f64 = 256.0 * 256.0 * 256.0;
 const MOST_ALONG: f64 = 65536.0;
 /// Voxels of a body of mean size, between those.
 const VOXELS_PER_BODY: f64 = 8.0;
+/// The share of bodies that may be thinner than a sample before voxels become smaller, how much smaller at most, and the memory that a voxel then
+/// takes until it is drawn.
+const THINNEST: f64 = 0.25;
+const SMALLER: f64 = 2.0;
+const BYTES_OF_A_VOXEL: f64 = 64.0;
+/// The share of the samples that its volume stands for below which a body is parted exactly.
+const MISSED: f64 = 0.5;
+/// Shares of the volume and of the bodies from which those that samples miss are worth a warning.
+const MUCH: f64 = 0.01;
+const MANY: f64 = 0.05;
 /// Samples of a voxel along an axis.
 const SAMPLES: usize = 2;
 /// By what a sample is multiplied in the sum of its voxel, a power of two: differences of values may be twice as large as a value, and sums of so
@@ -50,28 +63,32 @@ pub(super) struct Body<'a> {
 pub(super) enum Faces<'a> {
     /// Those of a kind of VTK.
     Of(&'static Solid),
-    /// Those of a polyhedron, which need not be wound alike.
-    Around(FacesAround<'a>),
+    /// Those of a polyhedron, which need not be wound alike, and the point that sees them all where the mean of its corners does not.
+    Around(FacesAround<'a>, Option<DVec3>),
 }
 
 /// A place and the value there.
 #[derive(Debug, Clone, Copy)]
-struct Knot {
-    place: DVec3,
-    value: f64,
+pub(super) struct Knot {
+    pub(super) place: DVec3,
+    pub(super) value: f64,
 }
 
 /// The corners of a tetrahedron.
-type Tetrahedron = [Knot; 4];
+pub(super) type Tetrahedron = [Knot; 4];
 
 impl Body<'_> {
     /// Gives the tetrahedra of the body to `take`.
-    fn part(&self, corner: &impl Fn(u32) -> Knot, mut take: impl FnMut(&Tetrahedron)) {
+    pub(super) fn part(&self, corner: &impl Fn(u32) -> Knot, mut take: impl FnMut(&Tetrahedron)) {
         let knot = |i: u8| corner(self.corners[usize::from(i)]);
         let solid = match &self.faces {
             Faces::Of(solid) => solid,
-            Faces::Around(faces) => {
-                let middle = mean(self.corners.iter().map(|rank| corner(*rank)));
+            Faces::Around(faces, seeing) => {
+                let corners = self.corners.iter().map(|rank| corner(*rank));
+                let middle = match seeing {
+                    Some(place) => linear_at(*place, corners),
+                    None => mean(corners),
+                };
                 for face in faces.iter() {
                     part_face(
                         middle,
@@ -127,24 +144,46 @@ fn middle_of(middle: Middle, points: impl Iterator<Item = Knot> + Clone, knot: i
             value: sum.value + weight * knot.value,
         })
     };
+    // Beside a point without a value its neighbours have theirs.
+    let has_gap = points.clone().any(|knot| knot.value.is_nan());
+    let middle_by_weights = |knot: Knot| if has_gap { Knot { value: mean(points.clone()).value, ..knot } } else { knot };
     match middle {
         Middle::Mean => mean(points),
-        Middle::Point(rank) => knot(rank),
-        Middle::Alternating(corner, edge) => weighted(&mut [corner, edge].into_iter().cycle()),
+        Middle::Point(rank) => {
+            let point = knot(rank);
+            if point.value.is_nan() { Knot { value: mean(points).value, ..point } } else { point }
+        }
+        Middle::Alternating(corner, edge) => middle_by_weights(weighted(&mut [corner, edge].into_iter().cycle())),
         Middle::Groups(groups) => {
-            weighted(&mut groups.iter().flat_map(|(n, weight)| std::iter::repeat_n(*weight, usize::from(*n))))
+            let weights = groups.iter().flat_map(|(n, weight)| std::iter::repeat_n(*weight, usize::from(*n)));
+            middle_by_weights(weighted(&mut weights.into_iter()))
         }
     }
 }
 
-fn mean(corners: impl Iterator<Item = Knot> + Clone) -> Knot {
+/// The mean of points; its value is that of those that have one.
+pub(super) fn mean(corners: impl Iterator<Item = Knot> + Clone) -> Knot {
     let count = corners.clone().count() as f64;
-    let (place, value) = corners.fold((DVec3::ZERO, 0.0), |(p, v), knot| (p + knot.place, v + knot.value));
-    Knot { place: place / count, value: value / count }
+    let place = corners.clone().map(|knot| knot.place).sum::<DVec3>() / count;
+    let (sum, with_value) = corners.map(|knot| knot.value).filter(|value| !value.is_nan()).fold((0.0, 0.0), |(s, n), v| (s + v, n + 1.0));
+    Knot { place, value: sum / with_value }
+}
+
+/// A place, with the value there of the linear field that fits those of the corners best.
+fn linear_at(place: DVec3, corners: impl Iterator<Item = Knot> + Clone) -> Knot {
+    let mean = mean(corners.clone());
+    let none = (DMat3::ZERO, DVec3::ZERO);
+    let (squares, products) = corners.filter(|knot| !knot.value.is_nan()).fold(none, |(squares, products), knot| {
+        let from = knot.place - mean.place;
+        (squares + DMat3::from_cols(from.x * from, from.y * from, from.z * from), products + from * (knot.value - mean.value))
+    });
+    let gradient = squares.inverse() * products;
+    let slope = if gradient.is_finite() { gradient } else { DVec3::ZERO };
+    Knot { place, value: mean.value + slope.dot(place - mean.place) }
 }
 
 /// Six times the volume, negative for one that is inside out.
-fn volume([a, b, c, d]: &Tetrahedron) -> f64 {
+pub(super) fn volume([a, b, c, d]: &Tetrahedron) -> f64 {
     (b.place - a.place).cross(c.place - a.place).dot(d.place - a.place)
 }
 
@@ -165,7 +204,7 @@ pub(super) fn grid(
             "check the places of the points, or scale the data",
         )
     })?;
-    let dims = bounds.dims(bodies.len() as f64);
+    let dims = bounds.dims(bodies.len() as f64, bounds.thinnest(points, bodies, reading)?, reading);
     let step = bounds.size / DVec3::from_array(dims.map(|n| n as f64));
     let origin = bounds.low + 0.5 * step;
     let axes = DMat3::from_diagonal(step);
@@ -174,7 +213,7 @@ pub(super) fn grid(
     let outside = least.fold(0.0, f64::min);
     let lattice = Lattice { low: bounds.low, sample: step / SAMPLES as f64, dims, outside };
     lattice.check_work(points, bodies, bounds.volume)?;
-    let values = lattice.filled(points, bodies, field, reading)?;
+    let (values, missed) = lattice.filled(points, bodies, field, reading)?;
     let [x, y, z] = dims;
     let cells = counted(bodies.len() as u64, "cell");
     let remarks = &mut reading.notes.remarks;
@@ -182,6 +221,12 @@ pub(super) fn grid(
     match bounds.folded {
         0 => {}
         folded => remarks.push(format!("{folded} of the cells are folded; what they cover twice counts once")),
+    }
+    if missed.bodies > 0 {
+        let share = missed.volume / bounds.volume;
+        let said = missed.said(bodies.len(), share);
+        let is_much = share >= MUCH || missed.bodies as f64 >= MANY * bodies.len() as f64 || !missed.is_parted;
+        if is_much { reading.notes.warnings.push(said) } else { reading.notes.remarks.push(said) }
     }
     Ok(Grid { origin, axes, dims, values })
 }
@@ -224,11 +269,37 @@ impl Bounds {
         (fits(sum) && fits(size.element_product())).then_some(Self { low, size, volume: sum, folded })
     }
 
-    /// Voxels along each axis for so many bodies.
-    fn dims(&self, bodies: f64) -> [usize; 3] {
+    /// The thickness that all but the thinnest bodies have: the volume over the sides of a box around it, but for the shortest one.
+    fn thinnest(&self, points: &[DVec3], bodies: &[Body<'_>], reading: &Reading<'_>) -> Result<f64, ReadError> {
+        input::hold("the thickness of cells", (bodies.len() * size_of::<f64>()) as u64, reading.params)?;
+        let mut all = Vec::new();
+        input::reserve(&mut all, bodies.len())?;
+        for body in bodies {
+            let place = |corner: u32| Knot { place: points[corner as usize], value: 0.0 };
+            let mut of_body = 0.0;
+            body.part(&place, |t| of_body += volume(t).abs() / 6.0);
+            let corners = body.corners.iter().map(|corner| points[*corner as usize]);
+            let none = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+            let (low, high) = corners.fold(none, |(l, h), p| (l.min(p), h.max(p)));
+            let sides = high - low;
+            let thickness = of_body * sides.min_element() / sides.element_product();
+            all.extend((thickness > 0.0 && thickness.is_finite()).then_some(thickness));
+        }
+        let rank = (THINNEST * all.len() as f64) as usize;
+        if rank >= all.len() {
+            return Ok(f64::INFINITY);
+        }
+        Ok(*all.select_nth_unstable_by(rank, f64::total_cmp).1)
+    }
+
+    /// Voxels along each axis for so many bodies, of which most have at least that thickness.
+    fn dims(&self, bodies: f64, thickness: f64, reading: &Reading<'_>) -> [usize; 3] {
         let all = self.size.element_product();
         let of_a_body = libm::cbrt(self.volume / (bodies * VOXELS_PER_BODY));
-        let mut step = of_a_body.min(libm::cbrt(all / FEWEST)).max(libm::cbrt(all / MOST));
+        let usual = of_a_body.min(libm::cbrt(all / FEWEST));
+        let memory = reading.params.memory.left() as f64 / BYTES_OF_A_VOXEL;
+        let least = (usual / SMALLER).max(libm::cbrt(all / memory)).min(usual);
+        let mut step = usual.min(SAMPLES as f64 * thickness).max(least).max(libm::cbrt(all / MOST));
         loop {
             let dims = (self.size / step).round().max(DVec3::ONE);
             // Along a short side there is one voxel more than would be its share.
@@ -236,6 +307,36 @@ impl Bounds {
                 return dims.to_array().map(|n| n as usize);
             }
             step *= 1.25;
+        }
+    }
+}
+
+/// Bodies with fewer samples than their volume stands for.
+struct Missed {
+    /// Which of the bodies, how many, and their volume.
+    ranks: Vec<usize>,
+    bodies: usize,
+    volume: f64,
+    /// Voxels of the volume.
+    dims: [usize; 3],
+    /// Whether they are parted exactly between voxels.
+    is_parted: bool,
+}
+
+impl Missed {
+    /// What there is to say of them, of so many bodies; `share` is that of the volume.
+    fn said(&self, bodies: usize, share: f64) -> String {
+        let [x, y, z] = self.dims;
+        let what = format!(
+            "{} of {} cells, with {:.2} % of their volume, are thinner than the samples of {x} x {y} x {z} voxels",
+            self.bodies,
+            bodies,
+            100.0 * share
+        );
+        if self.is_parted {
+            format!("{what}: a voxel has the mean of all cells in it, and single ones do not show")
+        } else {
+            format!("{what}, and too many to be parted: some are drawn as thick as a sample, others not at all; draw a part of the dataset")
         }
     }
 }
@@ -263,47 +364,113 @@ struct Part<'a> {
 }
 
 impl Lattice {
-    /// The values of all voxels.
+    /// The values of all voxels, and which bodies have too few samples.
     fn filled(
         &self,
         points: &[DVec3],
         bodies: &[Body<'_>],
         field: &Field,
         reading: &Reading<'_>,
-    ) -> Result<Vec<f32>, ReadError> {
+    ) -> Result<(Vec<f32>, Missed), ReadError> {
         let [nx, ny, nz] = self.dims;
         let count = nx * ny * nz;
-        let bytes = count * (size_of::<f32>() + size_of::<u8>());
+        let bytes = count * (size_of::<f32>() + size_of::<u8>()) + bodies.len() * size_of::<AtomicU64>();
         input::hold("the voxels", bytes as u64, reading.params)?;
         let mut sums = Vec::new();
         let mut taken = Vec::new();
+        let mut met: Vec<AtomicU64> = Vec::new();
         input::reserve(&mut sums, count)?;
         input::reserve(&mut taken, count)?;
+        input::reserve(&mut met, bodies.len())?;
         sums.resize(count, 0f32);
         taken.resize(count, 0u8);
+        met.resize_with(bodies.len(), AtomicU64::default);
         let planes = nz.div_ceil(PARTS);
         let parts = sums.par_chunks_mut(nx * ny * planes).zip(taken.par_chunks_mut(nx * ny * planes)).enumerate();
         parts.try_for_each(|(i, (sums, taken))| {
             reading.go_on()?;
             let [first, end] = [i * planes, (i + 1) * planes].map(|plane| (plane.min(nz) * SAMPLES) as f64);
             let mut part = Part { samples: [first, end - 1.0], sums, taken };
-            for body in bodies {
+            for (body, met) in bodies.iter().zip(&met) {
                 let heights = body.corners.iter().map(|corner| points[*corner as usize].z - self.low.z);
                 let (from, to) = heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), z| (l.min(z), h.max(z)));
                 if to >= first * self.sample.z && from <= end * self.sample.z {
                     let value = |corner: u32| field.at(body.cell, corner) - self.outside;
                     let corner = |c: u32| Knot { place: points[c as usize] - self.low, value: value(c) };
-                    body.part(&corner, |t| self.fill(t, &mut part));
+                    body.part(&corner, |t| {
+                        met.fetch_add(self.fill(t, &mut part), Ordering::Relaxed);
+                    });
                 }
             }
             Ok::<(), ReadError>(())
         })?;
         drop(taken);
+        let mut missed = self.missed(points, bodies, &met);
+        if missed.bodies > 0 {
+            let parts = self.parted(points, bodies, field, &missed, reading)?;
+            missed.is_parted = parts.iter().all(Parting::is_whole);
+            if missed.is_parted {
+                for (part, sums) in parts.iter().zip(sums.chunks_mut(nx * ny * planes)) {
+                    part.means().for_each(|(voxel, mean)| sums[voxel] = (0.5 * mean) as f32);
+                }
+            }
+        }
         // A sum that was rounded may lie a little beyond the largest value.
         let low = f64::from(f32::MIN);
         let high = f64::from(f32::MAX);
         sums.par_iter_mut().for_each(|v| *v = (self.outside + 2.0 * f64::from(*v)).clamp(low, high) as f32);
-        Ok(sums)
+        Ok((sums, missed))
+    }
+
+    /// The bodies that were met by fewer samples than their volume stands for.
+    fn missed(&self, points: &[DVec3], bodies: &[Body<'_>], met: &[AtomicU64]) -> Missed {
+        let place = |corner: u32| Knot { place: points[corner as usize] - self.low, value: 0.0 };
+        let of_a_sample = self.sample.element_product();
+        let mut missed = Missed { ranks: Vec::new(), bodies: 0, volume: 0.0, dims: self.dims, is_parted: false };
+        for (rank, body) in bodies.iter().enumerate() {
+            let mut size = 0.0;
+            body.part(&place, |t| size += volume(t).abs() / 6.0);
+            if (met[rank].load(Ordering::Relaxed) as f64) < MISSED * size / of_a_sample {
+                missed.ranks.push(rank);
+                missed.volume += size;
+            }
+        }
+        missed.bodies = missed.ranks.len();
+        missed
+    }
+
+    /// The voxels that missed bodies touch, with what all bodies put into them.
+    fn parted(
+        &self,
+        points: &[DVec3],
+        bodies: &[Body<'_>],
+        field: &Field,
+        missed: &Missed,
+        reading: &Reading<'_>,
+    ) -> Result<Vec<Parting>, ReadError> {
+        let [nx, ny, nz] = self.dims;
+        let planes = nz.div_ceil(PARTS);
+        let step = SAMPLES as f64 * self.sample;
+        let parting = |i: usize| -> Result<Parting, ReadError> {
+            reading.go_on()?;
+            let along_z = i * planes..((i + 1) * planes).min(nz);
+            let mut parting = Parting::new(Planes { dims: USizeVec3::new(nx, ny, nz), along_z }, reading)?;
+            let knot = |body: &Body<'_>, c: u32| Knot {
+                place: (points[c as usize] - self.low) / step,
+                value: field.at(body.cell, c) - self.outside,
+            };
+            for body in missed.ranks.iter().map(|rank| &bodies[*rank]) {
+                parting.mark(body, &|c| knot(body, c));
+            }
+            input::hold("the shares of voxels", parting.bytes(), reading.params)?;
+            if !parting.is_empty() {
+                for body in bodies {
+                    parting.fill(body, &|c| knot(body, c));
+                }
+            }
+            Ok(parting)
+        };
+        (0..nz.div_ceil(planes)).into_par_iter().map(parting).collect()
     }
 
     /// Refuses bodies of that volume together which overlap so often that most of the work would be for nothing.
@@ -333,15 +500,16 @@ impl Lattice {
         Err(ReadError::limit("cells that lie side by side", found, hint))
     }
 
-    /// Takes the samples that lie within a tetrahedron and in no body before it.
-    fn fill(&self, tetrahedron: &Tetrahedron, part: &mut Part<'_>) {
+    /// Takes the samples that lie within a tetrahedron and in no body before it. Returns how many lie in it, those included.
+    fn fill(&self, tetrahedron: &Tetrahedron, part: &mut Part<'_>) -> u64 {
         let [a, b, c, d] = tetrahedron.map(|knot| knot.place);
         let values = tetrahedron.map(|knot| knot.value);
         let edges = DMat3::from_cols(b - a, c - a, d - a);
         let determinant = edges.determinant();
         if !(determinant.is_finite() && determinant != 0.0) {
-            return;
+            return 0;
         }
+        let mut met = 0;
         // Barycentric coordinates of the first sample of a row, and what each step adds.
         let inverse = edges.inverse();
         let weights = |w: DVec3| DVec4::new(-w.element_sum(), w.x, w.y, w.z);
@@ -358,7 +526,9 @@ impl Lattice {
                 let before = DVec4::X + weights(inverse * (row - a));
                 let (from, to) = inside(before, along, (first.x, last.x));
                 let plane = k / SAMPLES - part.samples[0] as usize / SAMPLES;
-                for i in rows(from.ceil(), to.floor()) {
+                let within = rows(from.ceil(), to.floor());
+                met += within.len() as u64;
+                for i in within {
                     let voxel = i / SAMPLES + nx * (j / SAMPLES + ny * plane);
                     let bit = 1 << (i % SAMPLES + SAMPLES * (j % SAMPLES + SAMPLES * (k % SAMPLES)));
                     if part.taken[voxel] & bit == 0 {
@@ -371,6 +541,7 @@ impl Lattice {
                 }
             }
         }
+        met
     }
 }
 

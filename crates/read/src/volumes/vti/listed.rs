@@ -4,10 +4,11 @@
 //! All files are in memory together, because arrays are joined over pieces. A list may name lists.
 
 use super::data::{Appended, Encoding};
+use super::extents::{self, Extent, Filling};
 use super::pasted;
 use super::pieces::{self, Source, in_file};
-use super::{HINT, MAX_NODES, dataset, one, parsed, place, wrong};
-use crate::error::{Place, ReadError};
+use super::{HINT, MAX_NODES, dataset, extent, one, parsed, place, wrong};
+use crate::error::{Fault, Place, ReadError};
 use crate::reading::Reading;
 use crate::stream::beside::{Beside, from_uri};
 use crate::stream::input::{self, Content};
@@ -43,10 +44,19 @@ enum Together {
     Blocks,
 }
 
+/// Files of a folder that are looked at for a list, and bytes of one, at most.
+const MOST_FILES: usize = 4096;
+const MOST_BYTES: u64 = 1 << 20;
+
+/// Extensions of lists of pieces.
+const EXTENSIONS: [&str; 5] = ["pvti", "pvtr", "pvts", "pvtu", "pvtp"];
+
 /// A file that a list names.
 struct Member {
     name: String,
     content: Content,
+    /// Which part of the whole the list says that it is.
+    extent: Option<Extent>,
 }
 
 /// The files of a list and of the lists in it.
@@ -55,6 +65,8 @@ struct Members<'p> {
     path: Option<&'p Path>,
     files: Vec<Member>,
     series: Option<Series>,
+    /// The whole of the pieces of a grid.
+    whole: Option<Extent>,
 }
 
 /// Which time of a series is read.
@@ -86,9 +98,22 @@ pub(super) fn is_list(content: &[u8]) -> bool {
     kind_of(content).is_some_and(is_kind_of_list)
 }
 
+/// Indices that an element states, if it does.
+fn stated(node: Node<'_, '_>, name: &str) -> Result<Option<Extent>, ReadError> {
+    node.attribute(name).map(|_| extent(node, name)).transpose()
+}
+
+/// The error of a file that a list names and that cannot be opened.
+fn missing(error: ReadError) -> ReadError {
+    if error.fault != Fault::FileSystem {
+        return error;
+    }
+    ReadError { hint: "fetch the pieces that the list names, too, or draw those that there are one by one", ..error }
+}
+
 /// Reads what the files of a list are together.
 pub(super) fn read(content: &[u8], path: Option<&Path>, reading: &mut Reading<'_>) -> Result<Loaded, ReadError> {
-    let mut members = Members { path, files: Vec::new(), series: None };
+    let mut members = Members { path, files: Vec::new(), series: None, whole: None };
     let together = members.collect(content, &Found { folder: String::new(), depth: 0 }, reading)?;
     if members.series.is_none() {
         Selection::of_frames(1, Place::File, reading.params, &mut Notes::default())?;
@@ -118,8 +143,34 @@ struct Found {
 
 /// The files that a list names.
 struct Names {
-    names: Vec<String>,
+    names: Vec<Named>,
     together: Together,
+}
+
+/// A file that a list names, and which part of the whole it says that that is.
+struct Named {
+    name: String,
+    extent: Option<Extent>,
+}
+
+/// The list beside a file that names it as a piece, if its name has a number and there is one.
+pub(super) fn naming(path: &Path) -> Option<String> {
+    let name = path.file_name()?.to_str()?;
+    let (stem, _) = name.rsplit_once('.')?;
+    let digits = stem.bytes().rev().take_while(u8::is_ascii_digit).count();
+    if digits == 0 {
+        return None;
+    }
+    let mentions = format!("\"{name}\"");
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let lists = std::fs::read_dir(folder).ok()?.take(MOST_FILES).flatten().map(|entry| entry.path());
+    let mut lists: Vec<_> = lists
+        .filter(|list| list.extension().is_some_and(|found| EXTENSIONS.iter().any(|known| found == *known)))
+        .filter(|list| list.metadata().is_ok_and(|about| about.is_file() && about.len() <= MOST_BYTES))
+        .collect();
+    lists.sort();
+    let found = lists.into_iter().find(|list| std::fs::read_to_string(list).is_ok_and(|text| text.contains(&mentions)));
+    found?.file_name()?.to_str().map(str::to_owned)
 }
 
 impl Members<'_> {
@@ -130,20 +181,21 @@ impl Members<'_> {
         let document = parsed(text)?;
         let Names { names, mut together } = self.names(&document, reading)?;
         let is_alone = names.len() == 1;
-        for name in names {
+        for Named { name, extent } in names {
             reading.go_on()?;
             if self.files.len() >= MAX_NODES as usize {
                 let expected = format!("at most {MAX_NODES} files");
                 return Err(ReadError::input(Place::File, expected, "more", "draw a part of them"));
             }
             let name = format!("{}{}", found.folder, from_uri(&name));
-            let mut stream = Beside::new(self.path).open(&name, "a file of the list", reading.params)?;
+            let stream = Beside::new(self.path).open(&name, "a file of the list", reading.params);
+            let mut stream = stream.map_err(missing)?;
             if stream.peek(2)? == [0x1f, 0x8b] {
                 stream = stream.gunzip();
             }
             let content = stream.rest().map_err(|e| in_file(Some(&name), e))?;
             if !is_list(&content) {
-                self.files.push(Member { name, content });
+                self.files.push(Member { name, content, extent });
                 continue;
             }
             if found.depth == DEEPEST {
@@ -165,18 +217,24 @@ impl Members<'_> {
     fn names(&mut self, document: &Document<'_>, reading: &Reading<'_>) -> Result<Names, ReadError> {
         let root = document.root_element();
         let kind = root.attribute("type").unwrap_or_default();
-        let named = |element: &str, attribute: &str| -> Vec<String> {
-            let named = root.descendants().filter(|node| node.has_tag_name(element));
+        let named = |element: &str, attribute: &str| -> Result<Vec<Named>, ReadError> {
+            let nodes = root.descendants().filter(|node| node.has_tag_name(element));
             // A piece that is empty has no file.
-            let names = named.filter_map(|node| node.attribute(attribute)).filter(|name| !name.is_empty());
-            names.map(str::to_owned).collect()
+            let named = nodes.filter_map(|node| Some((node, node.attribute(attribute).filter(|name| !name.is_empty())?)));
+            let named = named.map(|(node, name)| Ok(Named { name: name.to_owned(), extent: stated(node, "Extent")? }));
+            named.collect()
         };
         let (names, together) = match kind {
-            "PImageData" | "PRectilinearGrid" => (named("Piece", "Source"), Together::Lattice),
-            kind if OF_PIECES.contains(&kind) => (named("Piece", "Source"), Together::Pieces),
-            OF_TIMES => (self.at_a_time(root, reading)?, Together::Blocks),
-            _ => (named("DataSet", "file"), Together::Blocks),
+            "PImageData" | "PRectilinearGrid" => (named("Piece", "Source")?, Together::Lattice),
+            kind if OF_PIECES.contains(&kind) => (named("Piece", "Source")?, Together::Pieces),
+            OF_TIMES => {
+                let files = self.at_a_time(root, reading)?.into_iter();
+                (files.map(|name| Named { name, extent: None }).collect(), Together::Blocks)
+            }
+            _ => (named("DataSet", "file")?, Together::Blocks),
         };
+        let grid = root.children().find(|node| node.has_tag_name(kind));
+        self.whole = grid.map(|grid| stated(grid, "WholeExtent")).transpose()?.flatten();
         if names.is_empty() {
             return Err(wrong(root, "a list that names files", "none"));
         }
@@ -225,6 +283,17 @@ impl Members<'_> {
             let file = Some(member.name.as_str());
             let dataset = dataset(document).map_err(|e| in_file(file, e))?;
             sources.push(Source { dataset, encoding, file });
+        }
+        let stated: Vec<Option<Extent>> = self.files.iter().map(|member| member.extent).collect();
+        let is_grid = |source: &Source<'_, '_, '_>| !["UnstructuredGrid", "PolyData"].contains(&source.dataset.tag_name().name());
+        if together != Together::Blocks && sources.iter().all(is_grid) {
+            let parts = extents::parts(&sources, &stated)?;
+            if together == Together::Lattice {
+                extents::check_filled(&parts, self.whole, Filling::Points)?;
+            } else {
+                extents::check_beside(&parts)?;
+                extents::check_filled(&parts, self.whole, Filling::Cells)?;
+            }
         }
         if let [source] = sources.as_slice() {
             return one(source, reading).map_err(|e| in_file(source.file, e));

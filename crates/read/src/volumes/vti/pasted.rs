@@ -1,5 +1,6 @@
 //! Images and rectilinear grids whose pieces lie in several files → one volume.
 
+use super::extents::{self, Extent, Filling};
 use super::pieces::{Source, in_file};
 use super::{
     ChosenArray, HINT, Lattice, child, chosen, coordinates, extent, lattice, lattice_values, not_used, place,
@@ -15,9 +16,6 @@ use splat_core::Grid;
 /// Voxels between the pieces for each of a piece, at most: more are a damaged index.
 const MOST_EMPTY: u64 = 64;
 
-/// Indices of the first and the last point along each axis.
-type Extent = [[i64; 2]; 3];
-
 /// A piece, and where it lies.
 struct Part<'s, 'e, 'a, 'i> {
     source: &'s Source<'e, 'a, 'i>,
@@ -25,7 +23,10 @@ struct Part<'s, 'e, 'a, 'i> {
     extent: Extent,
 }
 
-/// Reads the volume of all pieces. Voxels of none of them are NaN, which is a gap.
+/// How far apart two pieces may have a coordinate that they share, of the distance to its neighbour: what rounding to single precision does.
+const SAME: f64 = 1e-3;
+
+/// Reads the volume of all pieces, which agree where they share points or cells.
 pub(super) fn read(sources: &[Source<'_, '_, '_>], reading: &mut Reading<'_>) -> Result<Grid, ReadError> {
     let mut parts = Vec::new();
     for source in sources {
@@ -49,6 +50,7 @@ pub(super) fn read(sources: &[Source<'_, '_, '_>], reading: &mut Reading<'_>) ->
     let place = place(first.node);
     check_whole(whole, &parts, place)?;
     if found.is_of_cells {
+        extents::check_filled(&extents::parts(sources, &[])?, None, Filling::Cells)?;
         remark_middles(&found, reading);
     }
     let values = pasted(&parts, &found, whole, reading)?;
@@ -126,7 +128,15 @@ fn pasted(
         let start = [0, 1, 2].map(|axis| (inner[axis][0] - outer[axis][0]) as usize);
         for (n, row) in read.chunks_exact(mx).enumerate() {
             let first = start[0] + nx * (start[1] + n % my + ny * (start[2] + n / my));
-            values[first..first + mx].copy_from_slice(row);
+            let there = &mut values[first..first + mx];
+            if let Some(i) = (0..mx).find(|i| !there[*i].is_nan() && there[*i] != row[*i]) {
+                let [j, k] = [n % my, n / my].map(|n| n as i64);
+                let index = [inner[0][0] + i as i64, inner[1][0] + j, inner[2][0] + k];
+                let what = format!("the value at {} {} {} of {}", index[0], index[1], index[2], super::name(array.array));
+                let [expected, found] = [there[i], row[i]].map(f64::from);
+                return Err(extents::differ(&what, expected, found, part.source.file, place(part.node)));
+            }
+            there.copy_from_slice(row);
         }
     }
     Ok(values)
@@ -145,7 +155,16 @@ fn joined(
         let found = coordinates(part.node, part.source.encoding, reading).map_err(|e| in_file(part.source.file, e))?;
         for (axis, coordinates) in found.coordinates.iter().enumerate() {
             let first = (part.extent[axis][0] - whole[axis][0]) as usize;
-            joined[axis][first..first + coordinates.len()].copy_from_slice(coordinates);
+            let there = &mut joined[axis][first..first + coordinates.len()];
+            for (i, coordinate) in coordinates.iter().enumerate() {
+                let step = coordinates.get(i + 1).or(coordinates.get(i.wrapping_sub(1))).map_or(0.0, |c| c - coordinate);
+                if (there[i] - coordinate).abs() > SAME * step.abs() {
+                    let index = part.extent[axis][0] + i as i64;
+                    let what = format!("the coordinate {index} along {}", ["x", "y", "z"][axis]);
+                    return Err(extents::differ(&what, there[i], *coordinate, part.source.file, super::place(part.node)));
+                }
+                there[i] = *coordinate;
+            }
         }
     }
     Ok(Rectilinear { coordinates: joined, place })
@@ -162,6 +181,7 @@ impl<'a, 'i> Part<'_, '_, 'a, 'i> {
             let expected = format!("an array '{}' in {element}, which another Piece has", super::name(found.array));
             wrong(self.node, &expected, "none")
         })?;
+        extents::check_alike(found.array, array)?;
         Ok(ChosenArray { array, is_of_cells: found.is_of_cells, value: found.value })
     }
 }

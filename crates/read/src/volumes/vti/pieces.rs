@@ -2,8 +2,11 @@
 //! the other, arrays joined by name.
 
 use super::data::Encoding;
+use super::extents;
 use super::piece::Piece;
-use super::{ChosenArray, HINT, arrays, child, chosen, components, extent, kind, name, not_used, place, sizes, wrong};
+use super::{
+    ChosenArray, HINT, arrays, child, chosen, components, extent, kind, name, not_used, place, sizes, warn_of_part, wrong,
+};
 use crate::Loaded;
 use crate::error::{Place, ReadError};
 use crate::meshes::named_arrays::{NamedArrays, SurfaceArray};
@@ -47,6 +50,14 @@ pub(super) fn read(
     let mut used = Vec::new();
     let mut pieces = Pieces { list: Vec::new(), are_blocks };
     let cells = pieces.cells(sources, &mut used, reading)?;
+    if !are_blocks && sources.iter().all(|source| source.dataset.has_tag_name("StructuredGrid")) {
+        if let [source] = sources
+            && let [piece] = pieces.list.as_slice()
+        {
+            warn_of_part(piece.node, source.dataset, reading)?;
+        }
+        extents::check_points(&extents::parts(sources, &[])?, &cells.points)?;
+    }
     let dims = pieces.lattice(&cells)?;
     let mut field = Field::One;
     let mut columns = PointColumns::default();

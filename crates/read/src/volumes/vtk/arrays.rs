@@ -161,6 +161,7 @@ impl<'a> Arrays<'a> {
             numbers: array.numbers,
             kind: Some(array.kind),
             is_named: Some(array.of) == first && matches!(array.role, Role::Scalars | Role::Colors),
+            is_of_cells: array.of == Of::Cells,
         };
         let candidates: Vec<Candidate> = all.iter().map(candidate).collect();
         let place = all.first().map_or(Place::File, |array| array.place);
