@@ -61,6 +61,7 @@ pub use splat_core;
 pub use splats::footprints::FootprintChoice;
 pub use volume::body_centred::body_centred;
 pub use volume::gaps::{gaps_of_value, gaps_outside, transparent_gaps};
+pub use volume::label_surfaces::{label_surface_bytes, label_surfaces};
 pub use volume::odd_values::{FillValue, Strays, without_value, written_value};
 #[cfg(feature = "noise")]
 pub use volume::procedural::{CloudShape, Ellipsoid, procedural_cloud};

@@ -6,6 +6,7 @@ pub(crate) mod cell_share;
 pub(crate) mod classify;
 pub(crate) mod gaps;
 pub(crate) mod keep;
+pub(crate) mod label_surfaces;
 pub(crate) mod odd_values;
 #[cfg(feature = "noise")]
 pub(crate) mod procedural;

@@ -1,6 +1,7 @@
 //! What is in a data file, measured: for `organza info`.
 
 use crate::histogram::Histogram;
+use crate::labels::Labels;
 use crate::mesh_faults::{MeshFaults, mesh_faults};
 use crate::spacing::{duplicates, median_spacing};
 use crate::stands::{cloud_stands_along, lies_flat_along, stands_along};
@@ -239,6 +240,7 @@ fn of_grid(grid: &Grid) -> Facts {
             .into_iter()
             .flatten()
             .take(1)
+            .chain(Labels::of(grid).map(|labels| labels.said()))
             .collect(),
         quantiles: fine.iter().flat_map(|f| SHARES.map(|share| (share, f.quantile(share)))).collect(),
         ..Facts::default()

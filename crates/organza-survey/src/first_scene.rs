@@ -17,6 +17,7 @@ use organza::scene::{
 };
 use organza::{Error, Files, InMemory, Progress, RenderOptions, SourceData, printable};
 use splat_core::glam::DVec3;
+use splat_core::text::counted;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
@@ -90,7 +91,7 @@ pub fn first_scene(
         let _ = writeln!(camera, "elevation = {elevation:?}");
     }
     let _ = writeln!(camera, "size = {:?}", wish.size);
-    let drawn = render_text(data, wish, objects.iter().all(Object::is_labels));
+    let drawn = render_text(data, wish, objects.iter().all(|object| object.labels().is_some()));
     let seen: String = objects.iter().map(Object::material).chain(objects.iter().map(Object::text)).collect();
     let first = head(&camera) + &seen + &drawn;
     let load = LoadOptions { turntable: wish.turntable, in_memory: in_memory.clone(), ..LoadOptions::default() };
@@ -112,7 +113,7 @@ pub fn first_scene(
         text += &ground(&found);
     }
     text += &drawn;
-    Ok(Written { text, found, remarks: up_remarks(data, wish).chain(degree_remarks(data)).collect() })
+    Ok(Written { text, found, remarks: up_remarks(data, wish).chain(degree_remarks(data)).chain(label_remarks(data, &objects)).collect() })
 }
 
 /// What is said of the axis that points up, of each file that says nothing of it.
@@ -129,19 +130,28 @@ fn up_remarks<'a>(data: &'a [DataFile], wish: &'a Wish) -> impl Iterator<Item = 
     data.iter().filter(unsaid).map(one)
 }
 
+/// What is said of volumes that are drawn as surfaces of labels.
+fn label_remarks<'a>(data: &'a [DataFile], objects: &'a [Object]) -> impl Iterator<Item = String> + 'a {
+    data.iter().zip(objects).filter_map(|(file, object)| {
+        let labels = counted(object.labels()? as u64, "label");
+        let path = printable(&file.path);
+        Some(format!("{path}: whole numbers that look like {labels}: each region has its surface and its colour; --preset mri draws amounts"))
+    })
+}
+
 /// What is said of files whose points are drawn in metres.
 fn degree_remarks(data: &[DataFile]) -> impl Iterator<Item = String> + '_ {
     let said = "x and y look like degrees beside heights in metres, and are drawn as metres; without `degrees` a scene keeps them";
     data.iter().filter(|file| file.degrees).map(move |file| format!("{}: {said}", printable(&file.path)))
 }
 
-/// How it is drawn, where that is not as everything is: volumes alone by sheets, whose smooth edges need no more than one sample a pixel. Voxels of
-/// labels have their colours before these are interpolated: between two labels others would show.
+/// How it is drawn, where that is not as everything is: volumes alone by sheets, whose smooth edges need no more than one sample a pixel. Labels are
+/// surfaces.
 fn render_text(data: &[DataFile], wish: &Wish, are_labels: bool) -> String {
     let steps_of = |d: &DataFile| if let SourceData::Grid(grid) = &d.data { Some(drawn_steps(grid)) } else { None };
     let steps: Option<Vec<[f64; 2]>> = data.iter().map(steps_of).collect();
     let is_cloud = wish.preset.as_ref().is_some_and(Preset::is_cloud);
-    let Some(steps) = steps.filter(|_| !is_cloud && !wish.ground) else { return String::new() };
+    let Some(steps) = steps.filter(|_| !is_cloud && !wish.ground && !are_labels) else { return String::new() };
     let mut text =
         "\n[render]\ntechnique = \"sheets\"     # sharp; \"points\" is softer and quicker\nantialias = 1\n".to_owned();
     let least = steps.iter().fold(f64::INFINITY, |least, [step, _]| least.min(*step));
@@ -152,9 +162,6 @@ fn render_text(data: &[DataFile], wish: &Wish, are_labels: bool) -> String {
             sheets,
             "slab_width = {width}     # half a voxel: wider ones take less time, and show on flat surfaces"
         );
-    }
-    if are_labels {
-        sheets += "classify = \"before\"     # each voxel in the colour of its label: after interpolation others would show between two\n";
     }
     if !sheets.is_empty() {
         text += &format!("\n[render.sheets]\n{sheets}");

@@ -1,6 +1,7 @@
 //! Volumes of labels: whole numbers that name regions, 0 what belongs to none. Their values are no amounts: none of them is thinner than another.
 
 use splat_core::Grid;
+use splat_core::text::counted;
 use std::collections::BTreeSet;
 
 /// Share of neighbours that have the same label, of those of which one has a label: regions are larger than their borders.
@@ -10,8 +11,10 @@ const JUMPS: f64 = 0.25;
 /// The share of [`SAME`], and most numbers, of labels whatever touches what: regions that lie within each other may rise by steps, too.
 const NESTED: f64 = 0.9;
 const FEW: usize = 64;
-/// Numbers from which a volume of few values has labels, whatever these are; fewer ones have to follow each other.
+/// Numbers from which a volume of few values has labels, whatever these are; fewer ones have to be small, so many times their count at most. Amounts of
+/// phantoms are hundreds.
 const MANY: usize = 5;
+const SMALL: usize = 4;
 /// Most labels that are counted.
 const MOST: usize = 4096;
 
@@ -20,6 +23,17 @@ const MOST: usize = 4096;
 pub(crate) struct Labels(pub(crate) Vec<f64>);
 
 impl Labels {
+    /// What is said of them.
+    pub(crate) fn said(&self) -> String {
+        /// Labels up to which each is named.
+        const NAMED: usize = 16;
+        let known = || self.0.iter().filter(|label| **label > 0.0);
+        let names: Vec<String> = known().take(NAMED).map(f64::to_string).collect();
+        let more = if known().count() > NAMED { " …" } else { "" };
+        let count = counted(known().count() as u64, "label");
+        format!("its whole numbers look like {count}, not amounts: {}{more}; `mesh = ` draws the surface of each", names.join(", "))
+    }
+
     /// `None` for a volume whose values are amounts.
     pub(crate) fn of(grid: &Grid) -> Option<Self> {
         let is_label = |value: &f32| value.is_nan() || (*value >= 0.0 && value.fract() == 0.0);
@@ -59,13 +73,16 @@ impl Labels {
                 return None;
             }
         }
+        let highest = known.last().copied().unwrap_or(0) as usize;
         let jump = jumps as f64 >= JUMPS * others as f64;
         let are_nested = same as f64 >= NESTED * touching as f64 && known.len() <= FEW;
-        if !jump && !are_nested {
+        // A quantity that rises from 2 to 7 takes what lies between.
+        let has_holes = highest >= known.len() && known.len() <= FEW && highest < SMALL * known.len();
+        if !jump && !are_nested && !has_holes {
             return None;
         }
-        let highest = known.last().copied().unwrap_or(0) as usize;
-        let are_numbered = known.len() >= MANY || (known.len() >= 3 && highest < 2 * known.len());
+        let are_small = highest < SMALL * known.len();
+        let are_numbered = known.len() >= MANY || (known.len() >= 3 && are_small);
         are_numbered.then(|| Self(known.into_iter().map(|label| label as f64).collect()))
     }
 }
@@ -116,6 +133,23 @@ mod tests {
         };
         let shells = Grid { dims: [20; 3], ..volume(shell) };
         assert_eq!(Labels::of(&finer(&shells, 4)).map(|l| l.0.len()), Some(6));
+        // The same in few voxels with a number that is left out, and two regions with small numbers.
+        let ball = |center: usize, radius: usize| {
+            move |x: usize, y: usize, z: usize| {
+                [x.abs_diff(center), y.abs_diff(10), z.abs_diff(10)].iter().map(|d| d * d).sum::<usize>() < radius * radius
+            }
+        };
+        let [around, inner, core] = [ball(10, 9), ball(10, 6), ball(10, 3)];
+        let nested = volume(|x, y, z| match (around(x, y, z), inner(x, y, z), core(x, y, z)) {
+            (_, _, true) => 7.0,
+            (_, true, _) => 2.0,
+            (true, ..) => 1.0,
+            _ => 0.0,
+        });
+        assert_eq!(Labels::of(&nested), Some(Labels(vec![0.0, 1.0, 2.0, 7.0])));
+        let [left, right] = [ball(5, 4), ball(14, 4)];
+        let two = volume(|x, y, z| if left(x, y, z) { 3.0 } else if right(x, y, z) { 7.0 } else { 0.0 });
+        assert_eq!(Labels::of(&two), Some(Labels(vec![0.0, 3.0, 7.0])));
         // What rises by steps, and what scatters.
         assert_eq!(Labels::of(&volume(|x, y, z| ((x + y + z) / 4) as f32)), None);
         assert_eq!(Labels::of(&volume(|x, y, z| ((x * 7919 + y * 104_729 + z * 31) % 251) as f32)), None);

@@ -45,6 +45,8 @@ const BOTH_SIDES: f64 = 0.01;
 
 /// Hounsfield units between which values are taken for such.
 const UNITS: [f64; 2] = [-500.0, 100.0];
+/// Hounsfield units below which nothing in a body lies but air: half of the way to water.
+const LIGHTEST: f64 = -500.0;
 
 impl Matter {
     /// `None` for a volume of one value.
@@ -61,7 +63,9 @@ impl Matter {
         }
         let [low, air, high] = [0.1, 0.5, 0.9].map(|share| quantile_of(&mut border, share));
         let has_air = high - low < QUIET * spread;
-        let is_signed = histogram.low < 0.0 && histogram.high > 0.0 && has_both_signs(&histogram);
+        // Air around a body is what most of a tomogram is; where nothing is quiet, the range has to tell.
+        let is_of_units = is_in_units(&histogram) && (!has_air || air < LIGHTEST);
+        let is_signed = histogram.low < 0.0 && histogram.high > 0.0 && !is_of_units && has_both_signs(&histogram);
         if !has_air {
             let last = histogram.quantile(0.998);
             if is_signed {
@@ -85,9 +89,10 @@ impl Matter {
         Some(Self { histogram, air: Some(air), first, last, opposite })
     }
 
-    /// Whether values look like Hounsfield units, of air to bone.
+    /// Whether values look like Hounsfield units, of air to bone: around a body lies air, of about -1000. A field around 0 has none, whatever its
+    /// range.
     pub(crate) fn has_units(&self) -> bool {
-        self.histogram.low < UNITS[0] && self.histogram.high > UNITS[1]
+        is_in_units(&self.histogram) && self.air.is_none_or(|air| air < LIGHTEST)
     }
 
     /// The value that parts what is dense from the rest of matter: bone from flesh.
@@ -108,10 +113,15 @@ impl Matter {
     }
 }
 
-/// Whether both ends of the values lie about as far from 0, and they are no Hounsfield units.
+/// Whether both ends of the values lie about as far from 0.
 fn has_both_signs(histogram: &Histogram) -> bool {
     let [low, high] = [histogram.low.abs(), histogram.high.abs()];
-    low.min(high) >= BOTH_SIGNS * low.max(high) && !(histogram.low < UNITS[0] && histogram.high > UNITS[1])
+    low.min(high) >= BOTH_SIGNS * low.max(high)
+}
+
+/// Whether values reach from air to bone, as Hounsfield units do.
+fn is_in_units(histogram: &Histogram) -> bool {
+    histogram.low < UNITS[0] && histogram.high > UNITS[1]
 }
 
 /// First and last value of the matter above or below air.
@@ -231,6 +241,9 @@ mod tests {
         let ramp = Grid { origin: DVec3::ZERO, axes: DMat3::IDENTITY, dims: [16; 3], values };
         let matter = Matter::of(&ramp).unwrap();
         assert!(matter.first == 0.0 && matter.last > 7.0 && matter.opposite.unwrap()[1] < -7.0, "{matter:?}");
+        // With the range of a tomogram, too: around it is 0, not air.
+        let values = both.values.iter().map(|v| 15.0 * v).collect();
+        assert!(Matter::of(&Grid { values, ..both.clone() }).is_some_and(|m| m.opposite.is_some() && !m.has_units()));
         // Hounsfield units have both signs and are none of those.
         assert_eq!(Matter::of(&ball(-1000.0, 40.0, 900.0)).unwrap().opposite, None);
     }

@@ -1,6 +1,5 @@
 //! What a user may wish of a first scene.
 
-use crate::labels::Labels;
 use crate::paraview::Sampled;
 use convert::ColorMap;
 use organza::Error;
@@ -28,8 +27,6 @@ pub(crate) enum Look {
     Map(ColorMap),
     /// The same of a computed field: thin and without light, so that colours stand for values and its middle is seen.
     Field(ColorMap),
-    /// Regions by their labels, each as dense as the others, in the colours of a map.
-    Labels(ColorMap, Labels),
     /// Colours, and opacities where there are some, of a preset of ParaView.
     Sampled(Sampled),
 }

@@ -1,7 +1,6 @@
 //! Transfer functions of volumes that are seen for the first time: colours by a preset, extinction so that a view ray through
 //! matter loses about as much light as the preset wants, whatever the volume's size, steps and values are.
 
-use crate::labels::Labels;
 use crate::matter::Matter;
 use crate::preset::Look;
 use convert::ColorMap;
@@ -117,7 +116,6 @@ fn points(matter: &Matter, look: Option<&Look>) -> (Vec<Point>, f64) {
         }
         Some(Look::Cloud) => (vec![of_body(0.0, DROPLETS, 0.0), of_body(1.0, DROPLETS, 1.0)], 5.0),
         Some(Look::Map(map)) => (of_map(*map, of_body), 8.0),
-        Some(Look::Labels(map, labels)) => (of_labels(*map, labels), 8.0),
         Some(Look::Field(map)) => (of_map(*map, of_body), 4.0),
         Some(Look::Tomogram) => {
             let [low, high] = BONE;
@@ -180,25 +178,6 @@ fn of_both_signs(matter: &Matter, opposite: [f64; 2], map: ColorMap) -> Vec<Poin
     (0..2).flat_map(|side| (0..=STEPS).map(move |step| (side, step))).map(|(side, step)| one(side, step)).collect()
 }
 
-/// Labels that are as dense as each other, each with its colour by rank; what has none, 0, is nothing.
-fn of_labels(map: ColorMap, labels: &Labels) -> Vec<Point> {
-    /// How far beyond nothing a label begins.
-    const EDGE: f64 = 0.5;
-    let known: Vec<f64> = labels.0.iter().copied().filter(|label| *label > 0.0).collect();
-    let last = known.len().saturating_sub(1).max(1);
-    let every = known.len().div_ceil(MOST_LABELS).max(1);
-    let color = |rank: usize| map.at(rank as f64 / last as f64);
-    let nothing =
-        labels.0.first().filter(|label| **label == 0.0).map(|_| Point { value: 0.0, color: color(0), weight: 0.0 });
-    let edge = nothing.map(|nothing| Point { value: EDGE, weight: 1.0, ..nothing });
-    let of_known = known.iter().enumerate().filter(|(rank, _)| rank % every == 0 || rank + 1 == known.len());
-    let of_known = of_known.map(|(rank, label)| Point { value: *label, color: color(rank), weight: 1.0 });
-    nothing.into_iter().chain(edge).chain(of_known).collect()
-}
-
-/// Labels up to which each is written with its colour.
-const MOST_LABELS: usize = 64;
-
 /// Values at places between two.
 fn between(from: f64, to: f64, places: [f64; 4]) -> [f64; 4] {
     places.map(|place| from + place * (to - from))
@@ -247,7 +226,7 @@ mod tests {
     }
 
     #[test]
-    fn both_signs_and_all_labels_show_and_gaps_do_not() {
+    fn both_signs_show_and_gaps_do_not() {
         let mut grid = cube(1.0);
         // Half of the cube has the other sign.
         (0..24 * 24 * 12).for_each(|i| grid.values[i] = -grid.values[i]);
@@ -259,13 +238,6 @@ mod tests {
             assert!(plus > 0.9 && minus > 0.9 && zero == 0.0, "{plus} {minus} {zero}");
             assert_eq!(transfer.weight(f64::NAN), 0.0);
         }
-        let labels = Labels(vec![0.0, 1.0, 2.0, 3.0, 11.0]);
-        let points = of_labels(ColorMap::VIRIDIS, &labels);
-        let transfer = Transfer { points: rising(points), extinction: 1.0 };
-        assert!([1.0, 2.0, 3.0, 11.0].iter().all(|label| transfer.weight(*label) == 1.0));
-        assert_eq!(transfer.weight(0.0), 0.0);
-        let colors: Vec<[f32; 3]> = transfer.points[2..].iter().map(|p| p.color).collect();
-        assert!((1..colors.len()).all(|i| !colors[..i].contains(&colors[i])), "{colors:?}");
     }
 
     #[test]

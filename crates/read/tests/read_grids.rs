@@ -6,7 +6,7 @@ use crate::read_samples::grids::{
     vtk_rectilinear, vtk_structured, vtr, vtr_of, vts, vtu_of, vtu_polyhedra, vtu_quadratic, words,
 };
 use crate::read_samples::load;
-use read::{Fault, Loaded, Notes, ReadParams, bytes};
+use read::{Fault, Fix, Loaded, Notes, ReadParams, bytes};
 use splat_core::glam::DVec3;
 use splat_core::{Grid, MemoryAccount, Mesh};
 
@@ -74,7 +74,33 @@ fn what_uneven_steps_lose_is_measured() {
     let (found, notes) = grid("a.vtr", coarse.as_bytes());
     // At 2 and 3 the tent over 2.5 is 1 − 0.5/1.5.
     assert!((found.values[2] - 2.0 / 3.0).abs() < 1e-6 && (found.values[3] - 2.0 / 3.0).abs() < 1e-6);
-    assert!(notes.remarks[0].contains("at most 33.33 % of their range"), "{:?}", notes.remarks);
+    assert!(notes.warnings[0].contains("at most 33.33 % of their range"), "{notes:?}");
+}
+
+/// Steps that grow by a twelfth each, far too many of the least for a volume: a voxel has the mean around it, and a linear field stays as it is.
+#[test]
+fn steps_out_of_all_proportion_become_means() {
+    let along: Vec<f64> = (0..240).scan(0.0, |x, k| Some(std::mem::replace(x, *x + 1.08f64.powi(k)))).collect();
+    let last = along[239];
+    let file = |value: &dyn Fn(usize) -> f64| {
+        let axes = [words(&along), "0 1 ".to_owned(), "0 1 ".to_owned()];
+        let axes: String = axes.iter().map(|axis| array("Float64", "c", 1, axis)).collect();
+        let values = (0..4).flat_map(|_| (0..240).map(value));
+        let content = format!(
+            "<RectilinearGrid WholeExtent=\"0 239 0 1 0 1\">\n<Piece Extent=\"0 239 0 1 0 1\">\n<PointData>\n{}</PointData>\n\
+             <Coordinates>\n{axes}</Coordinates>\n</Piece>\n</RectilinearGrid>\n",
+            array("Float64", "p", 1, &words(values))
+        );
+        vtk_file("RectilinearGrid", &content)
+    };
+    let (found, notes) = grid("a.vtr", file(&|k| along[k] / last).as_bytes());
+    let n = found.dims[0];
+    assert!(notes.warnings.is_empty() && n < 5_000_000, "{n} {notes:?}");
+    assert!(found.values[..n].iter().enumerate().all(|(i, v)| (f64::from(*v) - i as f64 / (n - 1) as f64).abs() < 1e-5));
+    // Every second point is 1: all of that is lost where steps are small, its mean is not.
+    let (found, notes) = grid("a.vtr", file(&|k| (k % 2) as f64).as_bytes());
+    assert!(notes.warnings.len() == 1 && notes.warnings[0].contains("% of their range"), "{notes:?}");
+    assert!((found.values[1] - 0.5).abs() < 0.1, "{}", found.values[1]);
 }
 
 #[test]
@@ -285,6 +311,66 @@ fn what_is_wrong_in_polyhedra_is_named() {
     refused("a.vtu", &again, "expected faces of two polyhedra at most");
     let legacy = String::from_utf8(vtk_polyhedra(true)).unwrap();
     refused("a.vtk", &legacy.replacen("6 4 0 3 2 1", "6 4 0 3 2 9", 1), "expected points of cell 0 among the 9");
+}
+
+/// A polyhedron with these faces, full of 1.
+fn polyhedron(points: &[[f64; 3]], faces: &[Vec<usize>]) -> String {
+    let stream: Vec<usize> =
+        [faces.len()].into_iter().chain(faces.iter().flat_map(|face| [&[face.len()], &face[..]].concat())).collect();
+    let arrays = array("Int64", "faces", 1, &words(&stream)) + &array("Int64", "faceoffsets", 1, &stream.len().to_string());
+    let corners: Vec<usize> = (0..points.len()).collect();
+    let values = words(points.iter().copied().map(linear));
+    vtu_of(points, &[&corners], &[42], &arrays).replacen(&values, &words(vec![1; points.len()]), 1)
+}
+
+/// Prisms and double pyramids over a polygon, from −1 to 1; tips of pyramids lie over (1.3, 0).
+fn over(floor: &[[f64; 2]], is_prism: bool) -> (Vec<[f64; 3]>, Vec<Vec<usize>>) {
+    let n = floor.len();
+    let layer = |z: f64| floor.iter().map(move |[x, y]| [*x, *y, z]);
+    let next = |i: usize| (i + 1) % n;
+    if is_prism {
+        let sides = (0..n).map(|i| vec![i, next(i), n + next(i), n + i]);
+        (layer(-1.0).chain(layer(1.0)).collect(), [(0..n).rev().collect(), (n..2 * n).collect()].into_iter().chain(sides).collect())
+    } else {
+        let tips = [[1.3, 0.0, 1.0], [1.3, 0.0, -1.0]];
+        let sides = (0..n).flat_map(|i| [vec![i, next(i), n], vec![next(i), i, n + 1]]);
+        (layer(0.0).chain(tips).collect(), sides.collect())
+    }
+}
+
+/// What is drawn of a polyhedron is what its faces enclose, or that it is not is counted.
+#[test]
+fn polyhedra_are_filled_as_their_faces_enclose_them_or_counted() {
+    let square = [[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]];
+    let (points, mut faces) = over(&square, true);
+    let (found, notes) = grid("a.vtu", polyhedron(&points, &faces).as_bytes());
+    assert!((mass(&found) - 8.0).abs() < 1e-3 && notes.mended.is_empty(), "{}", mass(&found));
+    // Faces need not be wound alike.
+    faces[2].reverse();
+    let (found, notes) = grid("a.vtu", polyhedron(&points, &faces).as_bytes());
+    assert!((mass(&found) - 8.0).abs() < 1e-3 && notes.mended.is_empty(), "{notes:?}");
+    faces.pop();
+    let open = polyhedron(&points, &faces);
+    let (_, notes) = grid("a.vtu", open.as_bytes());
+    assert_eq!(notes.mended.iter().map(|m| (m.fix, m.count, m.face)).collect::<Vec<_>>(), [(Fix::OpenPolyhedron, 1, Some(0))]);
+    let said = notes.mended[0].to_string();
+    assert!(said.contains("1 polyhedron has faces that do not close") && said.ends_with("(cell 0)"), "{said}");
+    let strict = ReadParams { strict: true, ..ReadParams::default() };
+    let error = bytes("a.vtu", open.as_bytes(), &strict, None).unwrap_err().to_string();
+    assert!(error.contains("expected faces that close around the inside of cell 0, a polyhedron"), "{error}");
+    // An arrow head, whose corners have their mean behind its notch: from there its wings hide each other.
+    let arrow = [[4.0, 0.0], [0.0, 2.0], [-0.3, 1.9], [1.0, 0.0], [-0.3, -1.9], [0.0, -2.0]];
+    let twice_area: f64 = (0..6).map(|i| [arrow[i], arrow[(i + 1) % 6]]).map(|[a, b]| a[0] * b[1] - a[1] * b[0]).sum();
+    let (points, faces) = over(&arrow, false);
+    let (found, notes) = grid("a.vtu", polyhedron(&points, &faces).as_bytes());
+    let expected = twice_area / 3.0;
+    assert!(notes.mended.is_empty(), "{notes:?}");
+    assert!((mass(&found) / expected - 1.0).abs() < 1e-2, "{} for {expected}", mass(&found));
+    // No point sees all of a hook.
+    let hook = [[0.0, 0.0], [4.0, 0.0], [4.0, 3.0], [3.0, 3.0], [3.0, 1.0], [0.0, 1.0]];
+    let (points, faces) = over(&hook, true);
+    let (_, notes) = grid("a.vtu", polyhedron(&points, &faces).as_bytes());
+    assert_eq!(notes.mended.iter().map(|m| (m.fix, m.count)).collect::<Vec<_>>(), [(Fix::HiddenFaces, 1)]);
 }
 
 /// A field that is linear stays so, and the middles of edges count: a field of their own is seen.

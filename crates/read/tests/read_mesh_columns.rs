@@ -87,6 +87,34 @@ fn arrays_of_vtk_have_components_and_names_that_are_taken_are_told_apart() {
     assert_eq!(notes.unused, ["1 line"]);
 }
 
+/// Its length is meant, in volumes as in meshes, and that is said; arrays of cells that have the name of one of points are told by what they belong to.
+#[test]
+fn a_vector_by_its_name_alone_is_its_length_and_arrays_of_one_name_are_both_there() {
+    let of_points = "POINT_DATA 4\nVECTORS U double\n3 4 0 0 0 1 0 0 2 0 0 3\nCELL_DATA 1\nVECTORS U double\n0 6 8\n";
+    let vtk = "# vtk DataFile Version 3.0\na\nASCII\nDATASET POLYDATA\nPOINTS 4 float\n0 0 0 1 0 0 1 1 0 0 1 0\nPOLYGONS 1 5\n4 0 1 2 3\n";
+    let (mesh, notes) = read("a.vtk", &format!("{vtk}{of_points}"), &["U", "face:U"]).unwrap();
+    let values = |name: &str| &mesh.columns.iter().find(|c| c.name == name).unwrap().values;
+    assert_eq!(*values("U"), [5.0, 1.0, 2.0, 3.0]);
+    assert_eq!(*values("face:U"), [10.0, 10.0]);
+    let said = "U is a vector: its length is drawn, U:magnitude; U:x, U:y … or U:0 … choose one number";
+    assert!(notes.remarks.iter().any(|r| r == said), "{:?}", notes.remarks);
+    let volume = "# vtk DataFile Version 3.0\na\nASCII\nDATASET STRUCTURED_POINTS\nDIMENSIONS 3 2 2\nORIGIN 0 0 0\nSPACING 1 1 1\n\
+        POINT_DATA 12\nVECTORS U double\n3 4 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 1\n\
+        SCALARS p double 1\nLOOKUP_TABLE default\n1 2 3 4 5 6 7 8 9 10 11 12\nCELL_DATA 2\nSCALARS p double 1\nLOOKUP_TABLE default\n70 80\n";
+    let drawn = |array: Option<&str>| {
+        let params = ReadParams { array: array.map(str::to_owned), ..ReadParams::default() };
+        let (loaded, notes) = bytes("a.vtk", volume.as_bytes(), &params, None).unwrap();
+        let Loaded::Grid(grid) = loaded else { panic!("no volume") };
+        (grid.values, notes.remarks.join("; "))
+    };
+    let (values, told) = drawn(Some("U"));
+    assert!(values[0] == 5.0 && told.contains(said), "{told}");
+    assert_eq!(drawn(Some("cell:p")).0, [70.0, 80.0]);
+    assert_eq!(drawn(Some("p")).0, drawn(Some("point:p")).0);
+    let (values, told) = drawn(None);
+    assert!(values.len() == 12 && told.contains("the array p is drawn; `array` of a scene or --color-by chooses another: cell:p, U:magnitude"), "{told}");
+}
+
 /// A binary STL of two facets with these attribute bytes.
 fn stl(header: &[u8], attributes: [u16; 2]) -> Vec<u8> {
     let mut content = header.to_vec();

@@ -39,8 +39,8 @@ pub(super) struct Object {
     material: Option<(&'static str, &'static str, bool)>,
     /// Further keys.
     keys: String,
-    /// Whether it is a volume of labels.
-    is_labels: bool,
+    /// How many labels it has, if it is a volume of such.
+    labels: Option<usize>,
 }
 
 impl Object {
@@ -51,9 +51,9 @@ impl Object {
         format!("\n[[object]]\nname = {}\n# {about}\n{key} = {}\n{material}{keys}", quoted(name), quoted(path))
     }
 
-    /// Whether it is a volume of labels.
-    pub(super) fn is_labels(&self) -> bool {
-        self.is_labels
+    /// How many labels it has, if it is a volume of such.
+    pub(super) fn labels(&self) -> Option<usize> {
+        self.labels
     }
 
     /// The table of its material, where it is the first that has it.
@@ -151,7 +151,7 @@ fn object(file: &DataFile, preset: Option<&Preset>, colors: Option<String>) -> O
         source: (key, String::new()),
         material,
         keys,
-        is_labels: false,
+        labels: None,
     };
     match &file.data {
         SourceData::Mesh(mesh) => {
@@ -180,6 +180,23 @@ fn object(file: &DataFile, preset: Option<&Preset>, colors: Option<String>) -> O
         }
         SourceData::Grid(grid) => {
             let matter = Matter::of(grid);
+            let is_as_it_is = file.array.is_none() && file.nodata.is_none();
+            if let Some(Labels(known)) = labels(grid, matter.as_ref(), preset).filter(|_| is_as_it_is) {
+                let labels = known.iter().filter(|label| **label > 0.0).count();
+                let map = preset.and_then(Preset::map).map_or("distinct", |map| map.name());
+                let keys = format!(
+                    "# Whole numbers that name regions: the surface of each, in its own colour; 0 is nothing. `volume` in the place of `mesh` takes them for amounts.\n\
+                     color_by = {{ column = \"label\", map = \"{map}\" }}\n"
+                );
+                let about = format!(
+                    "{} × {} × {} voxels of {labels} labels; {}",
+                    grid.dims[0],
+                    grid.dims[1],
+                    grid.dims[2],
+                    sides(extent(grid))
+                );
+                return Object { labels: Some(labels), ..of("mesh", about, clay, keys) };
+            }
             let look = volume_look(grid, matter.as_ref(), preset, file.stated_up.is_some());
             let material = match look {
                 Some(Look::Cloud) => DROPLETS,
@@ -189,28 +206,25 @@ fn object(file: &DataFile, preset: Option<&Preset>, colors: Option<String>) -> O
             let about =
                 format!("{} × {} × {} voxels; {}", grid.dims[0], grid.dims[1], grid.dims[2], sides(extent(grid)));
             let keys = volume_keys(grid, matter.as_ref(), look.as_ref());
-            let is_labels = matches!(look, Some(Look::Labels(..)));
-            Object { is_labels, ..of("volume", about, Some((material.0, material.1, false)), keys) }
+            of("volume", about, Some((material.0, material.1, false)), keys)
         }
         // Images are refused when they are read.
         SourceData::Image(_) => of("environment", String::new(), None, String::new()),
     }
 }
 
-/// Hounsfield units below which nothing in a body lies but air: half of the way to water.
-const LIGHTEST: f64 = -500.0;
+/// The labels of a volume that has such, unless its look is that of amounts.
+fn labels(grid: &Grid, matter: Option<&Matter>, preset: Option<&Preset>) -> Option<Labels> {
+    let is_of_amounts = preset.is_some_and(|preset| preset.map().is_none());
+    if is_of_amounts || matter.is_some_and(Matter::has_units) { None } else { Labels::of(grid) }
+}
 
-/// How a volume looks: a computed field in the colours of a map and labels in such, a computed tomogram as bones in a film, unless its look has a name. What scanners measure comes in whole numbers, in
+/// How a volume looks: a computed field in the colours of a map, a computed tomogram as bones in a film, unless its look has a name. What scanners measure comes in whole numbers, in
 /// Hounsfield units, or in formats that state how the patient lies.
 fn volume_look(grid: &Grid, matter: Option<&Matter>, preset: Option<&Preset>, is_scan: bool) -> Option<Look> {
-    // Around a body lies air, of about -1000: a field around 0 has no Hounsfield units, whatever its range.
-    let has_units = matter.is_some_and(|matter| matter.has_units() && matter.air.is_none_or(|air| air < LIGHTEST));
+    let has_units = matter.is_some_and(Matter::has_units);
     let is_field = || !is_scan && !has_units && grid.values.iter().any(|value| value.fract() != 0.0);
     let look = preset.map(|preset| &preset.0);
-    if let (false, None | Some(Look::Map(_)), Some(labels)) = (has_units, look, Labels::of(grid)) {
-        let map = if let Some(Look::Map(map)) = look { *map } else { ColorMap::VIRIDIS };
-        return Some(Look::Labels(map, labels));
-    }
     match look {
         None if has_units => Some(Look::Tomogram),
         None if is_field() => {
@@ -255,12 +269,8 @@ fn volume_keys(grid: &Grid, matter: Option<&Matter>, look: Option<&Look>) -> Str
             significant(spacing, 3)
         );
     }
-    match (look, matter.and_then(|m| m.opposite)) {
-        (Some(Look::Labels(..)), _) => {
-            text += "# Whole numbers that name regions: each has the colour of its rank, and all are as dense; 0 is nothing.\n"
-        }
-        (_, Some(_)) => text += "# Values of both signs: those near 0 do not show.\n",
-        _ => {}
+    if matter.is_some_and(|m| m.opposite.is_some()) {
+        text += "# Values of both signs: those near 0 do not show.\n";
     }
     if let Some(air) = matter.and_then(|m| m.air) {
         let _ = writeln!(text, "# Around it the values are about {}.", significant(air, 3));
@@ -315,7 +325,7 @@ mod tests {
         let sign = |i: usize| if i < 864 { 1500.0 } else { -1500.0 };
         let values = field.values.iter().enumerate().map(|(i, value)| sign(i) * value).collect();
         let lobes = Grid { values, ..field };
-        assert!(Matter::of(&lobes).is_some_and(|matter| matter.has_units()));
+        assert!(Matter::of(&lobes).is_some_and(|matter| !matter.has_units() && matter.opposite.is_some()));
         assert!(matches!(look(&lobes, None, false), Some(Look::Field(_))));
     }
 

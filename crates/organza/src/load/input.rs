@@ -358,8 +358,24 @@ fn read_scattered(path: &Path, context: &Context<'_>) -> Result<(Arc<RawPoints>,
 fn read_mesh(path: &Path, context: &Context<'_>) -> Result<Arc<Mesh>, Error> {
     match context.read(path)? {
         SourceData::Mesh(mesh) => Ok(mesh),
+        SourceData::Grid(grid) => labels(path, &grid, context),
         _ => Err(Error::wrong_kind(path, "a mesh with faces", "use `points = ` or `volume = ` for this file")),
     }
+}
+
+/// The surfaces between the labels of a volume, without their column where nobody asks for it.
+fn labels(path: &Path, grid: &Grid, context: &Context<'_>) -> Result<Arc<Mesh>, Error> {
+    let name = crate::printable(path).to_string();
+    let bytes = convert::label_surface_bytes(grid);
+    let _held = context.files.memory(context.options).take(&name, bytes).map_err(Error::Limit)?;
+    let mesh = convert::label_surfaces(grid, &name).map_err(|error| match error {
+        convert::ConvertError::Parameter { parameter, found, expected, .. } => {
+            let message = format!("{parameter} is {found}, expected {expected}");
+            Error::input(&name, message, "use `volume = ` or `isosurface = ` for this file, whose values are amounts")
+        }
+        other => other.into(),
+    })?;
+    Ok(mesh.into())
 }
 
 /// Points whose degrees became metres, where the object says that they have such.

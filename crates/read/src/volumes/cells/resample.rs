@@ -15,7 +15,7 @@ use crate::reading::Reading;
 use crate::stream::input;
 use crate::volumes::lattice;
 use rayon::prelude::*;
-use splat_core::Grid;
+use splat_core::{DAabb, Grid};
 use splat_core::glam::{DMat3, DVec3, DVec4, USizeVec3};
 use splat_core::text::counted;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -32,6 +32,8 @@ const VOXELS_PER_BODY: f64 = 8.0;
 const THINNEST: f64 = 0.25;
 const SMALLER: f64 = 2.0;
 const BYTES_OF_A_VOXEL: f64 = 64.0;
+/// Voxels that bodies touch, all together, up to which voxels become smaller: beyond it their parting takes long.
+const MOST_TOUCHED: f64 = (1u64 << 22) as f64;
 /// The share of the samples that its volume stands for below which a body is parted exactly.
 const MISSED: f64 = 0.5;
 /// Shares of the volume and of the bodies from which those that samples miss are worth a warning.
@@ -204,7 +206,10 @@ pub(super) fn grid(
             "check the places of the points, or scale the data",
         )
     })?;
-    let dims = bounds.dims(bodies.len() as f64, bounds.thinnest(points, bodies, reading)?, reading);
+    let usual = bounds.usual_step(bodies.len() as f64);
+    let fine = bounds.fine_step(usual, thinnest(points, bodies, reading)?, reading);
+    let is_fine = fine < usual && touched(points, bodies, fine) <= MOST_TOUCHED;
+    let dims = bounds.dims(if is_fine { fine } else { usual });
     let step = bounds.size / DVec3::from_array(dims.map(|n| n as f64));
     let origin = bounds.low + 0.5 * step;
     let axes = DMat3::from_diagonal(step);
@@ -229,6 +234,36 @@ pub(super) fn grid(
         if is_much { reading.notes.warnings.push(said) } else { reading.notes.remarks.push(said) }
     }
     Ok(Grid { origin, axes, dims, values })
+}
+
+/// The low and the high corner of the box around a body.
+fn box_around(points: &[DVec3], body: &Body<'_>) -> DAabb {
+    DAabb::of_points(body.corners.iter().map(|corner| points[*corner as usize]))
+}
+
+/// The thickness that all but the thinnest bodies have: the volume over the sides of a box around it, but for the shortest one.
+fn thinnest(points: &[DVec3], bodies: &[Body<'_>], reading: &Reading<'_>) -> Result<f64, ReadError> {
+    input::hold("the thickness of cells", size_of_val(bodies) as u64, reading.params)?;
+    let mut all = Vec::new();
+    input::reserve(&mut all, bodies.len())?;
+    for body in bodies {
+        let place = |corner: u32| Knot { place: points[corner as usize], value: 0.0 };
+        let mut of_body = 0.0;
+        body.part(&place, |t| of_body += volume(t).abs() / 6.0);
+        let sides = box_around(points, body).size();
+        let thickness = of_body * sides.min_element() / sides.element_product();
+        all.extend((thickness > 0.0 && thickness.is_finite()).then_some(thickness));
+    }
+    let rank = (THINNEST * all.len() as f64) as usize;
+    if rank >= all.len() {
+        return Ok(f64::INFINITY);
+    }
+    Ok(*all.select_nth_unstable_by(rank, f64::total_cmp).1)
+}
+
+/// Voxels with that side that boxes around bodies touch, all together.
+fn touched(points: &[DVec3], bodies: &[Body<'_>], step: f64) -> f64 {
+    bodies.iter().map(|body| (box_around(points, body).size() / step + 1.0).element_product()).sum()
 }
 
 /// Where the bodies lie.
@@ -269,37 +304,23 @@ impl Bounds {
         (fits(sum) && fits(size.element_product())).then_some(Self { low, size, volume: sum, folded })
     }
 
-    /// The thickness that all but the thinnest bodies have: the volume over the sides of a box around it, but for the shortest one.
-    fn thinnest(&self, points: &[DVec3], bodies: &[Body<'_>], reading: &Reading<'_>) -> Result<f64, ReadError> {
-        input::hold("the thickness of cells", (bodies.len() * size_of::<f64>()) as u64, reading.params)?;
-        let mut all = Vec::new();
-        input::reserve(&mut all, bodies.len())?;
-        for body in bodies {
-            let place = |corner: u32| Knot { place: points[corner as usize], value: 0.0 };
-            let mut of_body = 0.0;
-            body.part(&place, |t| of_body += volume(t).abs() / 6.0);
-            let corners = body.corners.iter().map(|corner| points[*corner as usize]);
-            let none = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-            let (low, high) = corners.fold(none, |(l, h), p| (l.min(p), h.max(p)));
-            let sides = high - low;
-            let thickness = of_body * sides.min_element() / sides.element_product();
-            all.extend((thickness > 0.0 && thickness.is_finite()).then_some(thickness));
-        }
-        let rank = (THINNEST * all.len() as f64) as usize;
-        if rank >= all.len() {
-            return Ok(f64::INFINITY);
-        }
-        Ok(*all.select_nth_unstable_by(rank, f64::total_cmp).1)
-    }
-
-    /// Voxels along each axis for so many bodies, of which most have at least that thickness.
-    fn dims(&self, bodies: f64, thickness: f64, reading: &Reading<'_>) -> [usize; 3] {
+    /// The side of a voxel where so many bodies are of about one size.
+    fn usual_step(&self, bodies: f64) -> f64 {
         let all = self.size.element_product();
         let of_a_body = libm::cbrt(self.volume / (bodies * VOXELS_PER_BODY));
-        let usual = of_a_body.min(libm::cbrt(all / FEWEST));
+        of_a_body.min(libm::cbrt(all / FEWEST)).max(libm::cbrt(all / MOST))
+    }
+
+    /// The side of a voxel with a sample in bodies of that thickness, as far as memory goes.
+    fn fine_step(&self, usual: f64, thickness: f64, reading: &Reading<'_>) -> f64 {
+        let all = self.size.element_product();
         let memory = reading.params.memory.left() as f64 / BYTES_OF_A_VOXEL;
-        let least = (usual / SMALLER).max(libm::cbrt(all / memory)).min(usual);
-        let mut step = usual.min(SAMPLES as f64 * thickness).max(least).max(libm::cbrt(all / MOST));
+        (SAMPLES as f64 * thickness).max(usual / SMALLER).max(libm::cbrt(all / MOST.min(memory)))
+    }
+
+    /// Voxels along each axis with about that side.
+    fn dims(&self, step: f64) -> [usize; 3] {
+        let mut step = step;
         loop {
             let dims = (self.size / step).round().max(DVec3::ONE);
             // Along a short side there is one voxel more than would be its share.
@@ -622,6 +643,83 @@ mod tests {
             assert!((mass(&grid) / expected - 1.0).abs() < 5e-3, "{} for {expected}", mass(&grid));
             assert!(grid.values.iter().all(|v| (0.0..=1.0).contains(v)));
         }
+    }
+
+    /// Flat blocks one on the other, between these heights.
+    fn layers(heights: &[f64]) -> (Vec<DVec3>, Vec<Vec<u32>>) {
+        let square = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
+        let points = heights.iter().flat_map(|z| square.map(|[x, y]| DVec3::new(x, y, *z))).collect();
+        let cells = (0..heights.len() as u32 - 1).map(|k| (4 * k..4 * k + 8).collect()).collect();
+        (points, cells)
+    }
+
+    fn hexahedra(cells: &[Vec<u32>]) -> Vec<Body<'_>> {
+        let body = |(cell, corners)| Body { cell, corners: Vec::as_slice(corners), faces: Faces::Of(&HEXAHEDRON) };
+        cells.iter().enumerate().map(body).collect()
+    }
+
+    fn sampled_with_notes(points: &[DVec3], bodies: &[Body<'_>], field: &Field) -> (Grid, crate::Notes) {
+        let params = ReadParams::default();
+        let mut reading = Reading::new(&params, None);
+        let grid = grid(points, bodies, Place::File, field, &mut reading).unwrap();
+        (grid, reading.notes)
+    }
+
+    /// Every voxel has the mean of the layers in it, as the integral of a step function has it.
+    #[test]
+    fn layers_thinner_than_a_voxel_keep_their_integral_and_are_told() {
+        let n = 260;
+        let heights: Vec<f64> = (0..=n).map(|k| f64::from(k) / f64::from(n)).collect();
+        let (points, cells) = layers(&heights);
+        let values: Vec<f64> = (0..n).map(|k| f64::from(k % 2 + k % 7)).collect();
+        let field = Field::Cells(values.clone());
+        let (found, notes) = sampled_with_notes(&points, &hexahedra(&cells), &field);
+        let expected = values.iter().sum::<f64>() / f64::from(n);
+        assert!((mass(&found) / expected - 1.0).abs() < 1e-6, "{} for {expected}", mass(&found));
+        let [nx, ny, nz] = found.dims;
+        for (k, plane) in found.values.chunks(nx * ny).enumerate() {
+            let ends = [k, k + 1].map(|k| k as f64 / nz as f64);
+            let shares = heights.windows(2).map(|pair| (pair[1].min(ends[1]) - pair[0].max(ends[0])).max(0.0) * nz as f64);
+            let expected: f64 = shares.zip(&values).map(|(share, value)| share * value).sum();
+            assert!(plane.iter().all(|v| (f64::from(*v) - expected).abs() < 1e-5), "{k}: {} for {expected}", plane[0]);
+        }
+        assert_eq!(notes.warnings.len(), 1, "{notes:?}");
+        assert!(notes.warnings[0].contains(" of 260 cells, with ") && notes.warnings[0].contains("a voxel has the mean"));
+    }
+
+    /// A voxel's half is no thinner than they are.
+    #[test]
+    fn voxels_become_smaller_for_thin_layers() {
+        let heights: Vec<f64> = (0..=100).map(|k| 0.01 * f64::from(k)).collect();
+        let (points, cells) = layers(&heights);
+        let field = Field::Cells((0..100).map(|k| f64::from(k % 2)).collect());
+        let (found, notes) = sampled_with_notes(&points, &hexahedra(&cells), &field);
+        assert!(found.dims[2] > 64 && notes.warnings.is_empty(), "{:?} {notes:?}", found.dims);
+        assert!((mass(&found) / 0.5 - 1.0).abs() < 1e-2, "{}", mass(&found));
+    }
+
+    #[test]
+    fn a_sheet_far_thinner_than_a_sample_is_there_with_all_of_its_mass() {
+        let (mut points, mut cells) = layers(&[0.0, 1.0]);
+        points.extend(layers(&[2.0, 2.0001]).0);
+        cells.push((8..16).collect());
+        let (found, notes) = sampled_with_notes(&points, &hexahedra(&cells), &Field::Cells(vec![0.0, 1e4]));
+        assert!((mass(&found) - 1.0).abs() < 1e-4, "{}", mass(&found));
+        assert!(notes.warnings.is_empty() || notes.warnings[0].starts_with("1 of 2 cells"), "{notes:?}");
+        assert!(notes.remarks.iter().chain(&notes.warnings).any(|said| said.contains("1 of 2 cells, with 0.01 %")));
+    }
+
+    #[test]
+    fn a_point_without_a_value_takes_what_is_beside_it_and_not_the_cell() {
+        let points = block(DVec3::ZERO, DVec3::ONE);
+        let values = (0..8).map(|i| if i == 6 { f64::NAN } else { 3.0 }).collect();
+        let corners: Vec<u32> = (0..8).collect();
+        let body = Body { cell: 0, corners: &corners, faces: Faces::Of(&HEXAHEDRON) };
+        let found = sampled(&points, &[body], &Field::Points(values)).values;
+        let gaps = found.iter().filter(|v| v.is_nan()).count() as f64 / found.len() as f64;
+        // Six of its 24 tetrahedra have the point, and voxels at their border count among them.
+        assert!(gaps > 0.25 && gaps < 0.29, "{gaps}");
+        assert!(found.iter().all(|v| v.is_nan() || (v - 3.0).abs() < 1e-6));
     }
 
     #[test]

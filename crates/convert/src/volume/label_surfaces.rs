@@ -1,0 +1,274 @@
+//! A volume of labels → the surfaces between its regions.
+//!
+//! Voxels have the region of their whole number, 0 and NaN none. Every cell between eight voxels of several regions gets one vertex, every two
+//! neighbours of different regions one quadrilateral (surface nets, Gibson 1998): a surface lies halfway between two
+//! voxels, and no label shows that neither of them has. Vertices are moved towards their neighbours, within their cell, so that steps of voxels do not show.
+
+use crate::ConvertError;
+use rayon::prelude::*;
+use splat_core::glam::DVec3;
+use splat_core::{Association, Grid, Mesh, MeshColumn};
+
+/// The name of the column of labels.
+const LABEL: &str = "label";
+
+/// The largest label: beyond it single precision leaves numbers out.
+const MOST: f32 = 16_777_216.0;
+
+/// How often vertices are moved, and how far from the middle of their cell they may be, in voxels: far less than the half at which a region of one voxel
+/// would collapse.
+const PASSES: usize = 6;
+const REACH: f64 = 0.3;
+
+/// A cell without a vertex.
+const NONE: u32 = u32::MAX;
+
+/// Layers of cells are those before a layer of voxels, and one behind the last.
+struct Nets<'a> {
+    grid: &'a Grid,
+    /// Vertices of the cells of this layer and the one before it.
+    layers: [Vec<u32>; 2],
+    /// In voxels from the first.
+    vertices: Vec<DVec3>,
+    quads: Vec<[u32; 4]>,
+    labels: Vec<f32>,
+}
+
+/// The surfaces of the regions of a volume of whole numbers from 0 on, with the column `label` of faces. `object` is named in errors.
+///
+/// # Errors
+/// [`ConvertError::Parameter`] for a value that is no label, and for more vertices than a mesh can have.
+pub fn label_surfaces(grid: &Grid, object: &str) -> Result<Mesh, ConvertError> {
+    let is_label = |value: &f32| value.is_nan() || (0.0..=MOST).contains(value) && value.fract() == 0.0;
+    if let Some(value) = grid.values.par_iter().find_first(|value| !is_label(value)) {
+        return Err(ConvertError::Parameter {
+            object: object.to_owned(),
+            parameter: "a voxel of a mesh of labels",
+            found: value.to_string(),
+            expected: "a whole number from 0 to 16777216",
+        });
+    }
+    let [nx, ny, nz] = grid.dims;
+    let cells = (nx + 1) * (ny + 1);
+    let layers = [vec![NONE; cells], vec![NONE; cells]];
+    let mut nets = Nets { grid, layers, vertices: Vec::new(), quads: Vec::new(), labels: Vec::new() };
+    for k in 0..=nz {
+        nets.layers.swap(0, 1);
+        nets.make_vertices(k);
+        nets.make_quads(k);
+        if nets.vertices.len() >= NONE as usize {
+            return Err(ConvertError::Parameter {
+                object: object.to_owned(),
+                parameter: "the number of vertices between labels",
+                found: nets.vertices.len().to_string(),
+                expected: "at most 4294967294",
+            });
+        }
+    }
+    nets.relax();
+    Ok(nets.into_mesh())
+}
+
+/// Bytes that [`label_surfaces`] of a volume takes.
+pub fn label_surface_bytes(grid: &Grid) -> u64 {
+    /// Bytes of a quad and of a vertex while surfaces are made, of which there are about as many.
+    const OF_A_BORDER: u64 = 16 + 4 + 2 * (12 + 8) + 2 * (24 + 12) + 24 + 8;
+    let [nx, ny, _] = grid.dims;
+    let differ = |a: &f32, b: &f32| label(*a) != label(*b);
+    let of_row = |(row, values): (usize, &[f32])| {
+        let at_ends = [values.first(), values.last()].into_iter().flatten().filter(|v| label(**v) != 0.0).count();
+        let along = values.windows(2).filter(|pair| differ(&pair[0], &pair[1])).count();
+        let against = |before: Option<usize>, is_first: bool| match before.filter(|_| !is_first) {
+            Some(before) => grid.values[before * nx..][..nx].iter().zip(values).filter(|(a, b)| differ(a, b)).count(),
+            None => values.iter().filter(|v| label(**v) != 0.0).count(),
+        };
+        at_ends + along + against(row.checked_sub(1), row % ny == 0) + against(row.checked_sub(ny), row < ny)
+    };
+    let borders: usize = grid.values.par_chunks(nx.max(1)).enumerate().map(of_row).sum();
+    // What ends at the far sides is less than all of it.
+    borders as u64 * OF_A_BORDER * 5 / 4
+}
+
+/// The region of a value; 0 is none.
+fn label(value: f32) -> f32 {
+    if value.is_nan() { 0.0 } else { value }
+}
+
+impl Nets<'_> {
+    /// The label of a voxel, counted from 1; 0 outside.
+    fn at(&self, x: usize, y: usize, z: usize) -> f32 {
+        let [nx, ny, nz] = self.grid.dims;
+        let is_inside = (1..=nx).contains(&x) && (1..=ny).contains(&y) && (1..=nz).contains(&z);
+        if is_inside { label(self.grid.values[x - 1 + nx * (y - 1 + ny * (z - 1))]) } else { 0.0 }
+    }
+
+    /// The vertices of a layer of cells, each at the mean of the places between voxels of different labels.
+    fn make_vertices(&mut self, k: usize) {
+        let [nx, ny, _] = self.grid.dims;
+        for j in 0..=ny {
+            for i in 0..=nx {
+                let corner = |c: usize| self.at(i + (c & 1), j + (c >> 1 & 1), k + (c >> 2));
+                let corners: [f32; 8] = std::array::from_fn(corner);
+                let place = |c: usize| DVec3::new((c & 1) as f64, (c >> 1 & 1) as f64, (c >> 2) as f64);
+                let mut sum = DVec3::ZERO;
+                let mut count = 0.0;
+                for axis in 0..3 {
+                    for low in (0..8usize).filter(|c| c & (1 << axis) == 0) {
+                        let high = low | 1 << axis;
+                        if corners[low] != corners[high] {
+                            sum += 0.5 * (place(low) + place(high));
+                            count += 1.0;
+                        }
+                    }
+                }
+                let rank = i + (nx + 1) * j;
+                self.layers[1][rank] = if count > 0.0 {
+                    self.vertices.push(DVec3::new(i as f64, j as f64, k as f64) - 1.0 + sum / count);
+                    (self.vertices.len() - 1) as u32
+                } else {
+                    NONE
+                };
+            }
+        }
+    }
+
+    /// The faces that a layer of cells completes: across z in it, across x and y between it and the one before.
+    fn make_quads(&mut self, k: usize) {
+        let [nx, ny, _] = self.grid.dims;
+        let cell = |layer: usize, i: usize, j: usize| (layer, i + (nx + 1) * j);
+        for j in 0..=ny {
+            for i in 0..=nx {
+                let inside = self.at(i, j, k);
+                if i > 0 && j > 0 {
+                    let cells = [cell(1, i - 1, j - 1), cell(1, i, j - 1), cell(1, i, j), cell(1, i - 1, j)];
+                    self.add(inside, self.at(i, j, k + 1), cells);
+                }
+                if k > 0 && j > 0 {
+                    let cells = [cell(0, i, j - 1), cell(0, i, j), cell(1, i, j), cell(1, i, j - 1)];
+                    self.add(inside, self.at(i + 1, j, k), cells);
+                }
+                if k > 0 && i > 0 {
+                    let cells = [cell(0, i - 1, j), cell(1, i - 1, j), cell(1, i, j), cell(0, i, j)];
+                    self.add(inside, self.at(i, j + 1, k), cells);
+                }
+            }
+        }
+    }
+
+    /// A face between two voxels, if they differ; `cells` are those between them, by layer and rank, around the direction from the first to the second.
+    fn add(&mut self, first: f32, second: f32, cells: [(usize, usize); 4]) {
+        if first == second {
+            return;
+        }
+        let mut around = cells.map(|(layer, rank)| self.layers[layer][rank]);
+        // Wound so that it is seen from outside of the region whose label it has, the greater one.
+        if second > first {
+            around.reverse();
+        }
+        self.quads.push(around);
+        self.labels.push(first.max(second));
+    }
+
+    /// Moves vertices towards the means of their neighbours.
+    fn relax(&mut self) {
+        // Cells lie around the half voxels.
+        let middles: Vec<DVec3> = self.vertices.iter().map(|v| v.floor() + 0.5).collect();
+        let mut sums = vec![(DVec3::ZERO, 0u32); self.vertices.len()];
+        for _ in 0..PASSES {
+            sums.fill((DVec3::ZERO, 0));
+            for quad in &self.quads {
+                for (i, vertex) in quad.iter().enumerate() {
+                    let sum = &mut sums[*vertex as usize];
+                    sum.0 += self.vertices[quad[(i + 1) % 4] as usize] + self.vertices[quad[(i + 3) % 4] as usize];
+                    sum.1 += 2;
+                }
+            }
+            self.vertices.par_iter_mut().zip(&sums).zip(&middles).for_each(|((vertex, (sum, count)), middle)| {
+                if *count > 0 {
+                    let mean = *sum / f64::from(*count);
+                    *vertex = mean.clamp(*middle - REACH, *middle + REACH);
+                }
+            });
+        }
+    }
+
+    fn into_mesh(self) -> Mesh {
+        let Self { grid, vertices, quads, labels, .. } = self;
+        let [nx, ny, nz] = grid.dims.map(|n| n as f64);
+        let origin = grid.origin + grid.axes * (0.5 * (DVec3::new(nx, ny, nz) - 1.0));
+        let position = vertices.par_iter().map(|v| (grid.origin + grid.axes * *v - origin).as_vec3()).collect();
+        let is_mirrored = grid.axes.determinant() < 0.0;
+        let halves = |[a, b, c, d]: [u32; 4]| if is_mirrored { [[a, c, b], [a, d, c]] } else { [[a, b, c], [a, c, d]] };
+        let triangles = quads.into_iter().flat_map(halves).collect();
+        let values = labels.into_iter().flat_map(|label| [f64::from(label); 2]).collect();
+        let columns = vec![MeshColumn { name: LABEL.to_owned(), association: Association::Triangle, values }];
+        Mesh { origin, position, triangles, columns, ..Mesh::default() }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use splat_core::glam::DMat3;
+
+    /// Two boxes side by side with the labels 2 and 7, in nothing.
+    fn boxes(axes: DMat3) -> Grid {
+        let value = |n: usize| {
+            let [x, y, z] = [n % 12, n / 12 % 8, n / 96];
+            let is_inside = (2..6).contains(&y) && (2..6).contains(&z);
+            match x {
+                2..6 if is_inside => 2.0,
+                6..10 if is_inside => 7.0,
+                _ if n == 0 => f32::NAN,
+                _ => 0.0,
+            }
+        };
+        Grid { origin: DVec3::new(5.0, 0.0, 1e6), axes, dims: [12, 8, 8], values: (0..12 * 64).map(value).collect() }
+    }
+
+    fn enclosed(mesh: &Mesh) -> f64 {
+        let corner = |v: u32| mesh.position[v as usize].as_dvec3();
+        mesh.triangles.iter().map(|[a, b, c]| corner(*a).dot(corner(*b).cross(corner(*c))) / 6.0).sum()
+    }
+
+    #[test]
+    fn surfaces_have_the_labels_beside_them_and_close_around_the_regions() {
+        for mirror in [1.0, -1.0] {
+            let axes = DMat3::from_diagonal(DVec3::new(mirror, 2.0, 1.0));
+            let grid = boxes(axes);
+            let mesh = label_surfaces(&grid, "a").unwrap();
+            mesh.validate().unwrap();
+            let labels = &mesh.columns[0].values;
+            assert_eq!((mesh.columns[0].name.as_str(), labels.len()), ("label", mesh.triangles.len()));
+            assert!(labels.iter().all(|label| *label == 2.0 || *label == 7.0), "{labels:?}");
+            // 4 x 4 voxels at each end and between both, 8 x 4 on each side.
+            assert_eq!(mesh.triangles.len(), 2 * (3 * 16 + 4 * 32));
+            // All but the face between both enclose 8 x 4 x 4 voxels of the volume 2, less what edges lose.
+            let outer: Vec<[u32; 3]> = mesh
+                .triangles
+                .iter()
+                .filter(|t| {
+                    let middle = t.iter().map(|v| mesh.position[*v as usize].x).sum::<f32>() / 3.0;
+                    middle.abs() > 0.05
+                })
+                .copied()
+                .collect();
+            assert_eq!(outer.len(), 2 * (2 * 16 + 4 * 32));
+            let volume = enclosed(&Mesh { triangles: outer, ..mesh.clone() });
+            assert!(volume > 0.85 * 256.0 && volume < 256.0, "{volume}");
+            assert!(label_surface_bytes(&grid) >= mesh.bytes());
+        }
+    }
+
+    #[test]
+    fn a_voxel_alone_and_one_at_the_border_have_surfaces_and_amounts_are_refused() {
+        let mut grid = Grid { values: vec![0.0; 12 * 64], ..boxes(DMat3::IDENTITY) };
+        grid.values[0] = 3.0;
+        let mesh = label_surfaces(&grid, "a").unwrap();
+        assert_eq!((mesh.triangles.len(), mesh.position.len()), (12, 8));
+        assert!(enclosed(&mesh) > 0.0);
+        grid.values[5] = 0.5;
+        let error = label_surfaces(&grid, "a").unwrap_err().to_string();
+        assert!(error.contains("is 0.5, expected a whole number from 0 to 16777216"), "{error}");
+    }
+}
