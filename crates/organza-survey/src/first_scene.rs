@@ -270,8 +270,7 @@ mod tests {
         for unlike in [vec![file(DVec3::new(0.1, 0.1, 2.5))], vec![file(DVec3::ONE), file(DVec3::splat(20.0))]] {
             assert!(text(&unlike).contains("sheets") && !text(&unlike).contains("slab_width"));
         }
-        let labels = render_text(&[file(DVec3::ONE)], &Wish::default(), true);
-        assert!(labels.contains("\n[render.sheets]\nslab_width = 0.5 ") && labels.contains("\nclassify = \"before\" "));
+        assert_eq!(render_text(&[file(DVec3::ONE)], &Wish::default(), true), "");
         assert_eq!(render_text(&[file(DVec3::ONE)], &Wish { ground: true, ..Wish::default() }, false), "");
     }
 }

@@ -136,7 +136,8 @@ fn a_gap_of_a_rectilinear_grid_does_not_spread_to_what_is_measured() {
 fn a_step_that_is_tiny_makes_no_more_voxels_than_can_be_held() {
     let dims = |content: &str| {
         let (loaded, notes) = bytes_with(content, &ReadParams::default());
-        assert!(notes.remarks[0].contains("even steps, coarser than the least step"), "{:?}", notes.remarks);
+        let said = notes.remarks.iter().chain(&notes.warnings).next();
+        assert!(said.is_some_and(|said| said.contains("even steps, coarser than the least step")), "{notes:?}");
         assert!(loaded.values.iter().all(|v| v.is_finite()));
         loaded.dims
     };
@@ -173,7 +174,8 @@ fn what_is_wrong_in_a_rectilinear_grid_is_named() {
         ("Coordinates", "Places", "expected an element Coordinates, found 'none'"),
         ("Extent=\"0 3 0 2 0 1\"", "Extent=\"0 3 0 2 0 2\"", "expected 3 numbers, found '2'"),
         ("Extent=\"0 3 0 2 0 1\"", "Extent=\"0 2147483647 0 2 0 1\"", "expected 2147483648 numbers, found '4'"),
-        ("<Piece Extent=\"0 3", "<Piece Extent=\"0 2", "expected the WholeExtent in one Piece"),
+        ("<Piece Extent=\"0 3", "<Piece Extent=\"0 2", "expected 3 numbers, found '4'"),
+        ("<Piece Extent=\"0 3", "<Piece Extent=\"0 4", "expected a Piece within the WholeExtent, found '0 4 0 2 0 1'"),
         ("PointData", "Nothing", "expected a DataArray in PointData or CellData"),
     ] {
         assert!(text.contains(from), "{from}");

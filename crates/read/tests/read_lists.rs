@@ -164,7 +164,8 @@ fn pieces_of_an_image_are_put_together_at_their_places() {
     folder.refused("stated.pvti", "'a_1.vti' of the list: the Extent 0 3 0 2 2 5, as the list has it, found '0 2 0 2 2 5'");
     let part = image([[0, 2], [0, 2], [2, 5]], "1 2 0.5");
     let at_zero = linear([0.0, 0.0, 2.0]);
-    folder.write("a_3.vti", part.replacen(&format!("{at_zero} "), "77 ", 1));
+    assert!(part.contains("\n0 1 2 2 "));
+    folder.write("a_3.vti", part.replacen("\n0 1 2 2 ", "\n77 1 2 2 ", 1));
     folder.write("values.pvti", pieces("PImageData", &extent, &["a_0.vti", "a_3.vti", "a_2.vti"]));
     folder.refused(
         "values.pvti",

@@ -80,7 +80,7 @@ fn what_is_wrong_in_a_file_is_named() {
         ),
         ("header_type", "compressor=\"vtkLZMADataCompressor\" header_type", "found 'vtkLZMADataCompressor'"),
         ("WholeExtent=\"0 2", "WholeExtent=\"0 -1", "expected six rising indices in WholeExtent"),
-        ("WholeExtent=\"0 2", "WholeExtent=\"0 3", "expected the WholeExtent in one Piece, found '0 2 0 1 0 1'"),
+        ("WholeExtent=\"0 2", "WholeExtent=\"0 1", "expected a Piece within the WholeExtent, found '0 2 0 1 0 1'"),
         ("0 2 0 1 0 1", "0 2 0 1 0 2", "expected 18 voxels, found 12"),
         ("0 2 0 1 0 1", "0 2 0 1 0 0", "expected the end of the voxels, found '2'"),
         ("0 2 0 1 0 1", "-2147483648 2147483647 0 2147483647 0 1", "expected at most 2^45 voxels"),

@@ -64,6 +64,7 @@ pub(super) fn body(
                 return no("meshes whose vertices have opacities are not path-traced");
             }
             FileData::Mesh(mesh) => mesh,
+            FileData::Grid(_) => return no("surfaces of labels are not path-traced"),
             _ => {
                 return Err(Error::wrong_kind(
                     path,

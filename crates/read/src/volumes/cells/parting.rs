@@ -1,19 +1,26 @@
 //! Cells that samples miss, parted exactly between voxels.
 //!
 //! A layer that is thinner than the distance of samples has one of them by chance or none at all. So every voxel that such a cell
-//! touches is computed anew: all cells in it are cut along its sides into tetrahedra, over each of which a linear field has the integral of its mean value. The
-//! integral over those voxels is exact, also of cells far thinner than a voxel.
+//! touches is computed anew, exactly, from all cells in it. What a tetrahedron and a voxel share is what lies below the faces of the tetrahedron that look up,
+//! less what lies below those that look down. A face is clipped to the column of a voxel; over the polygon that is left the field is integrated
+//! up to the face or the voxel's top.
 
 use super::resample::{Body, Knot, Tetrahedron, volume};
 use crate::error::ReadError;
 use crate::reading::Reading;
 use crate::stream::input;
-use splat_core::glam::{DVec3, USizeVec3};
+use splat_core::glam::{DMat3, DVec3, USizeVec3};
 use std::ops::Range;
 
-/// Pieces that are cut in a part of the volume, at most: beyond that samples have to do. Voxels that are looked at count as a share of one.
-const MOST_PIECES: u64 = 1 << 23;
+/// Faces in voxels that are integrated over in a part of the volume, at most: beyond that samples have to do. Voxels that are looked at count as a share of
+/// one.
+const MOST_PIECES: u64 = 1 << 22;
 const VOXELS_OF_A_PIECE: u64 = 32;
+
+/// Faces of a tetrahedron by ranks of its corners, wound outwards where its volume is positive.
+const FACES: [[usize; 3]; 4] = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]];
+/// Corners of a triangle that is clipped at six planes, at most.
+const MOST_CORNERS: usize = 9;
 
 /// The rank of a voxel that no thin cell touches.
 const NONE: u32 = u32::MAX;
@@ -88,7 +95,7 @@ impl Parting {
 
     /// Puts a cell into the voxels that are marked.
     pub(super) fn fill(&mut self, body: &Body<'_>, corner: &impl Fn(u32) -> Knot) {
-        body.part(corner, |tetrahedron| self.cut(tetrahedron));
+        body.part(corner, |tetrahedron| self.put(tetrahedron));
     }
 
     /// Whether all cells were parted.
@@ -134,48 +141,164 @@ impl Parting {
         })
     }
 
-    /// Cuts a tetrahedron until each piece lies in one voxel.
-    fn cut(&mut self, tetrahedron: &Tetrahedron) {
+    /// Adds what a tetrahedron and each marked voxel share.
+    fn put(&mut self, tetrahedron: &Tetrahedron) {
         if !self.is_whole() {
             return;
         }
         let Some(touched) = self.touched(tetrahedron) else { return };
-        let across = touched.last - touched.first;
-        let sizes = across + USizeVec3::ONE;
-        self.pieces += 1 + (sizes.x * sizes.y * sizes.z) as u64 / VOXELS_OF_A_PIECE;
+        let sizes = touched.last - touched.first + USizeVec3::ONE;
+        self.pieces += (sizes.x * sizes.y * sizes.z) as u64 / VOXELS_OF_A_PIECE;
         if self.rows(&touched).all(|row| self.ranks[row].iter().all(|rank| *rank == NONE)) {
             return;
         }
-        // Along z it may reach beyond the planes, where it is cut off.
-        let reach = |high: f64, last: usize| high > (last + 1) as f64;
-        let [low, high] = [f64::min, f64::max].map(|of| tetrahedron.iter().map(|k| k.place.z).reduce(of).unwrap_or(0.0));
-        let cut_off = if reach(high, touched.last.z) && touched.last.z + 1 < self.planes.dims.z {
-            Some((2, touched.last.z + 1))
-        } else if low < touched.first.z as f64 && touched.first.z > 0 {
-            Some((2, touched.first.z))
-        } else {
-            None
-        };
-        let longest = [across.x, across.y, across.z].into_iter().enumerate().max_by_key(|(_, n)| *n);
-        let halved = longest.filter(|(_, n)| *n > 0).map(|(axis, n)| (axis, touched.first[axis] + n.div_ceil(2)));
-        match cut_off.or(halved) {
-            Some((axis, plane)) => parted(tetrahedron, axis, plane as f64, &mut |piece| self.cut(piece)),
-            None => self.put(tetrahedron, touched.first),
+        let is_gap = tetrahedron.iter().any(|corner| corner.value.is_nan());
+        let corners = tetrahedron.map(|corner| if is_gap { Knot { value: 0.0, ..corner } } else { corner });
+        let Some(field) = Linear::of(&corners) else { return };
+        for face in FACES {
+            let [a, b, c] = face.map(|rank| corners[rank]);
+            let polygon = Polygon::of(if field.is_turned { [a, c, b] } else { [a, b, c] });
+            for i in polygon.voxels(0, touched.first.x..touched.last.x + 1) {
+                let strip = polygon.within(0, i as f64);
+                for j in strip.voxels(1, touched.first.y..touched.last.y + 1) {
+                    let column = strip.within(1, j as f64);
+                    for k in touched.first.z..=touched.last.z {
+                        self.put_below(&column, USizeVec3::new(i, j, k), &field, is_gap);
+                    }
+                }
+            }
         }
     }
 
-    fn put(&mut self, tetrahedron: &Tetrahedron, voxel: USizeVec3) {
+    /// Adds what of a voxel lies below a part of a face.
+    fn put_below(&mut self, face: &Polygon, voxel: USizeVec3, field: &Linear, is_gap: bool) {
         let USizeVec3 { x: nx, y: ny, .. } = self.planes.dims;
         let rank = self.ranks[voxel.x + nx * (voxel.y + ny * (voxel.z - self.planes.along_z.start))];
         let Some(share) = self.shares.get_mut(rank as usize) else { return };
-        let size = volume(tetrahedron).abs() / 6.0;
-        let value = tetrahedron.iter().map(|knot| 0.25 * knot.value).sum::<f64>();
-        if value.is_nan() {
+        self.pieces += 1;
+        let floor = voxel.z as f64;
+        let [size, sum] = field.below(face, floor);
+        if is_gap {
             share.gap += size;
         } else {
             share.filled += size;
-            share.sum += size * value;
+            share.sum += sum;
         }
+    }
+}
+
+/// A field that is linear over a tetrahedron.
+struct Linear {
+    /// Its slope along z.
+    slope: f64,
+    /// Whether the tetrahedron is inside out.
+    is_turned: bool,
+}
+
+impl Linear {
+    /// `None` for corners without a volume.
+    fn of(corners: &Tetrahedron) -> Option<Self> {
+        let size = volume(corners);
+        let [a, b, c, d] = corners.map(|corner| corner.place);
+        let inverse = DMat3::from_cols(b - a, c - a, d - a).inverse();
+        let [first, rest @ ..] = corners.map(|corner| corner.value);
+        let slope = inverse.z_axis.dot(DVec3::from_array(rest) - first);
+        (size != 0.0 && slope.is_finite()).then_some(Self { slope, is_turned: size < 0.0 })
+    }
+
+    /// The volume below a face within a layer of voxels that begins at a height, and the integral of the field over it; both negative for a face that
+    /// looks down.
+    fn below(&self, face: &Polygon, floor: f64) -> [f64; 2] {
+        let over_layer = face.clipped(2, floor + 1.0, 1.0).sum(|at| [1.0, at.value + self.slope * (floor + 0.5 - at.place.z)]);
+        let in_layer = face.within(2, floor).sum(|at| {
+            let height = at.place.z - floor;
+            [height, height * (at.value - 0.5 * self.slope * height)]
+        });
+        [over_layer[0] + in_layer[0], over_layer[1] + in_layer[1]]
+    }
+}
+
+/// A part of a face.
+#[derive(Clone, Copy)]
+struct Polygon {
+    corners: [Knot; MOST_CORNERS],
+    count: usize,
+}
+
+impl Polygon {
+    fn of([a, b, c]: [Knot; 3]) -> Self {
+        let mut corners = [a; MOST_CORNERS];
+        corners[1] = b;
+        corners[2] = c;
+        Self { corners, count: 3 }
+    }
+
+    fn corners(&self) -> &[Knot] {
+        &self.corners[..self.count]
+    }
+
+    /// Those of a range of voxels that it meets along an axis.
+    fn voxels(&self, axis: usize, range: Range<usize>) -> Range<usize> {
+        let places = self.corners().iter().map(|corner| corner.place[axis]);
+        let (low, high) = places.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), p| (l.min(p), h.max(p)));
+        let first = low.floor().max(range.start as f64) as usize;
+        let end = high.ceil().max(0.0).min(range.end as f64) as usize;
+        first..end
+    }
+
+    /// The part in the voxels from a plane on to the next one.
+    fn within(&self, axis: usize, plane: f64) -> Self {
+        self.clipped(axis, plane, 1.0).clipped(axis, plane + 1.0, -1.0)
+    }
+
+    /// The part above a plane across an axis, or below it where `side` is −1.
+    fn clipped(&self, axis: usize, plane: f64, side: f64) -> Self {
+        let corners = self.corners();
+        let over = |corner: &Knot| side * (corner.place[axis] - plane);
+        if corners.iter().all(|corner| over(corner) >= 0.0) {
+            return *self;
+        }
+        let mut part = Self { count: 0, ..*self };
+        for (i, corner) in corners.iter().enumerate() {
+            let next = &corners[(i + 1) % corners.len()];
+            let ends = [over(corner), over(next)];
+            if ends[0] >= 0.0 {
+                part.push(*corner);
+            }
+            if (ends[0] > 0.0 && ends[1] < 0.0) || (ends[0] < 0.0 && ends[1] > 0.0) {
+                let share = ends[0] / (ends[0] - ends[1]);
+                let mut place = corner.place + share * (next.place - corner.place);
+                place[axis] = plane;
+                part.push(Knot { place, value: corner.value + share * (next.value - corner.value) });
+            }
+        }
+        part
+    }
+
+    /// A corner more; a polygon has no more than there is room for, as each plane adds one.
+    fn push(&mut self, corner: Knot) {
+        if let Some(place) = self.corners.get_mut(self.count) {
+            *place = corner;
+            self.count += 1;
+        }
+    }
+
+    /// The integrals over its projection along z of two quantities that are quadratic over it: the means at the middles of the edges of its triangles.
+    fn sum(&self, quantities: impl Fn(Knot) -> [f64; 2]) -> [f64; 2] {
+        let mut sum = [0.0; 2];
+        let Some((first, rest)) = self.corners().split_first() else { return sum };
+        for pair in rest.windows(2) {
+            let corners = [*first, pair[0], pair[1]];
+            let [u, v] = [pair[0], pair[1]].map(|corner| corner.place - first.place);
+            let area = 0.5 * (u.x * v.y - u.y * v.x);
+            for i in 0..3 {
+                let ends = [corners[i], corners[(i + 1) % 3]];
+                let place = 0.5 * (ends[0].place + ends[1].place);
+                let found = quantities(Knot { place, value: 0.5 * (ends[0].value + ends[1].value) });
+                sum = [sum[0] + area / 3.0 * found[0], sum[1] + area / 3.0 * found[1]];
+            }
+        }
+        sum
     }
 }
 
@@ -193,45 +316,6 @@ impl Share {
     }
 }
 
-/// Gives the pieces of a tetrahedron on both sides of a plane across an axis to `take`.
-fn parted(tetrahedron: &Tetrahedron, axis: usize, plane: f64, take: &mut impl FnMut(&Tetrahedron)) {
-    let mut corners = *tetrahedron;
-    corners.sort_by(|a, b| b.place[axis].total_cmp(&a.place[axis]));
-    let [a, b, c, d] = corners;
-    let between = |above: Knot, below: Knot| {
-        let share = (plane - below.place[axis]) / (above.place[axis] - below.place[axis]);
-        let mut place = below.place + share * (above.place - below.place);
-        place[axis] = plane;
-        Knot { place, value: (1.0 - share) * below.value + share * above.value }
-    };
-    // Three corners at each end, of which each hangs together with one at the other.
-    let mut prism = |[x, y, z]: [Knot; 3], [u, v, w]: [Knot; 3]| {
-        for piece in [[x, y, z, w], [x, y, v, w], [x, u, v, w]] {
-            if volume(&piece) != 0.0 {
-                take(&piece);
-            }
-        }
-    };
-    match corners.iter().filter(|corner| corner.place[axis] > plane).count() {
-        1 => {
-            let [x, y, z] = [between(a, b), between(a, c), between(a, d)];
-            prism([x, y, z], [b, c, d]);
-            take(&[a, x, y, z]);
-        }
-        2 => {
-            let [p, q, r, s] = [between(a, c), between(a, d), between(b, c), between(b, d)];
-            prism([a, p, q], [b, r, s]);
-            prism([c, p, r], [d, q, s]);
-        }
-        3 => {
-            let [x, y, z] = [between(a, d), between(b, d), between(c, d)];
-            prism([x, y, z], [a, b, c]);
-            take(&[d, x, y, z]);
-        }
-        _ => take(tetrahedron),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -240,30 +324,32 @@ mod tests {
         Knot { place, value: 1.0 + place.dot(DVec3::new(2.0, -1.0, 0.5)) }
     }
 
-    /// Corners on the plane, too.
+    /// Whichever way it is wound; corners lie on planes of voxels, too.
     #[test]
-    fn pieces_have_the_volume_and_the_integral_of_the_whole() {
+    fn what_voxels_share_with_a_tetrahedron_is_all_of_it() {
         let corners = [
             DVec3::new(0.2, 0.1, 0.3),
             DVec3::new(3.4, 0.0, 1.0),
             DVec3::new(0.5, 2.9, 1.0),
-            DVec3::new(1.0, 1.2, 4.1),
+            DVec3::new(1.0, 1.2, 4.0),
         ];
-        for turn in 0..4 {
-            let tetrahedron: Tetrahedron = std::array::from_fn(|i| knot(corners[(i + turn) % 4]));
-            for (axis, plane) in [(0, 1.0), (0, 2.0), (1, 1.0), (2, 1.0), (2, 2.0), (0, 0.5), (1, 1.2)] {
-                let integral = |t: &Tetrahedron| volume(t).abs() * t.iter().map(|k| k.value).sum::<f64>();
-                let mut size = 0.0;
-                let mut sum = 0.0;
-                parted(&tetrahedron, axis, plane, &mut |piece| {
-                    size += volume(piece).abs();
-                    sum += integral(piece);
-                    let sides = piece.iter().map(|k| k.place[axis] - plane);
-                    assert!(sides.clone().all(|side| side <= 0.0) || sides.clone().all(|side| side >= 0.0));
-                });
-                assert!((size - volume(&tetrahedron).abs()).abs() < 1e-12 * size, "{axis} {plane}: {size}");
-                assert!((sum - integral(&tetrahedron)).abs() < 1e-12 * sum.abs(), "{axis} {plane}: {sum}");
-            }
+        for order in [[0, 1, 2, 3], [1, 0, 2, 3]] {
+            let tetrahedron: Tetrahedron = order.map(|i| knot(corners[i]));
+            let params = crate::ReadParams::default();
+            let planes = Planes { dims: USizeVec3::new(4, 3, 4), along_z: 0..4 };
+            let mut parting = Parting::new(planes, &Reading::new(&params, None)).unwrap();
+            parting.ranks.iter_mut().enumerate().for_each(|(voxel, rank)| *rank = voxel as u32);
+            parting.shares.resize(48, Share::default());
+            parting.put(&tetrahedron);
+            let size = volume(&tetrahedron).abs() / 6.0;
+            let mean = tetrahedron.iter().map(|corner| 0.25 * corner.value).sum::<f64>();
+            let filled: f64 = parting.shares.iter().map(|share| share.filled).sum();
+            let sum: f64 = parting.shares.iter().map(|share| share.sum).sum();
+            assert!((filled - size).abs() < 1e-12 && (sum - size * mean).abs() < 1e-12, "{filled} {size} {sum}");
+            // The voxel in its middle is full, and has the field of its own middle.
+            let middle = &parting.shares[1 + 4 * (1 + 3)];
+            assert!(parting.shares.iter().all(|share| (-1e-12..1.0 + 1e-12).contains(&share.filled)));
+            assert!(middle.filled > 0.5, "{}", middle.filled);
         }
     }
 }

@@ -7,7 +7,7 @@ use super::HINT;
 use super::resample::{Body, Faces};
 use crate::error::{Place, ReadError};
 use crate::reading::{Fix, Reading};
-use splat_core::glam::DVec3;
+use splat_core::glam::{DMat3, DVec3};
 
 /// By what part of the volume the parts may exceed what the faces enclose: faces that are not flat are rounded so far.
 const ROUNDING: f64 = 1e-6;
@@ -59,7 +59,8 @@ pub(super) fn check(
         if sees_all(mean, &triangles) {
             continue;
         }
-        *seeing = seeing_point(mean, &triangles).filter(|point| sees_all(*point, &triangles));
+        let point = seeing_point(mean, &triangles).filter(|point| sees_all(*point, &triangles));
+        *seeing = point.and_then(|point| weights(point, mean, body.corners, points));
         if seeing.is_none() {
             reading.mend(Fix::HiddenFaces, place, Some(cell as u64), || {
                 strict("a point inside that sees all faces", "faces that hide others")
@@ -67,6 +68,15 @@ pub(super) fn check(
         }
     }
     Ok(())
+}
+
+/// The weights by which corners have a point as their sum, and as its value that of the linear field that fits them best; `None` of flat ones.
+fn weights(point: DVec3, mean: DVec3, corners: &[u32], points: &[DVec3]) -> Option<Vec<f64>> {
+    let from_mean = || corners.iter().map(|corner| points[*corner as usize] - mean);
+    let squares = from_mean().fold(DMat3::ZERO, |sum, from| sum + DMat3::from_cols(from.x * from, from.y * from, from.z * from));
+    let towards = squares.inverse() * (point - mean);
+    let even = 1.0 / corners.len() as f64;
+    towards.is_finite().then(|| from_mean().map(|from| even + towards.dot(from)).collect())
 }
 
 /// Which faces have to be turned so that all are wound alike; `None` where an edge has not two faces, or they cannot be.
