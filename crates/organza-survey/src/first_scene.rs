@@ -113,7 +113,11 @@ pub fn first_scene(
         text += &ground(&found);
     }
     text += &drawn;
-    Ok(Written { text, found, remarks: up_remarks(data, wish).chain(degree_remarks(data)).chain(label_remarks(data, &objects)).collect() })
+    Ok(Written {
+        text,
+        found,
+        remarks: up_remarks(data, wish).chain(degree_remarks(data)).chain(label_remarks(data, &objects)).collect(),
+    })
 }
 
 /// What is said of the axis that points up, of each file that says nothing of it.

@@ -31,7 +31,10 @@ impl Labels {
         let names: Vec<String> = known().take(NAMED).map(f64::to_string).collect();
         let more = if known().count() > NAMED { " …" } else { "" };
         let count = counted(known().count() as u64, "label");
-        format!("its whole numbers look like {count}, not amounts: {}{more}; `mesh = ` draws the surface of each", names.join(", "))
+        format!(
+            "its whole numbers look like {count}, not amounts: {}{more}; `mesh = ` draws the surface of each",
+            names.join(", ")
+        )
     }
 
     /// `None` for a volume whose values are amounts.
@@ -136,7 +139,8 @@ mod tests {
         // The same in few voxels with a number that is left out, and two regions with small numbers.
         let ball = |center: usize, radius: usize| {
             move |x: usize, y: usize, z: usize| {
-                [x.abs_diff(center), y.abs_diff(10), z.abs_diff(10)].iter().map(|d| d * d).sum::<usize>() < radius * radius
+                [x.abs_diff(center), y.abs_diff(10), z.abs_diff(10)].iter().map(|d| d * d).sum::<usize>()
+                    < radius * radius
             }
         };
         let [around, inner, core] = [ball(10, 9), ball(10, 6), ball(10, 3)];
@@ -148,7 +152,15 @@ mod tests {
         });
         assert_eq!(Labels::of(&nested), Some(Labels(vec![0.0, 1.0, 2.0, 7.0])));
         let [left, right] = [ball(5, 4), ball(14, 4)];
-        let two = volume(|x, y, z| if left(x, y, z) { 3.0 } else if right(x, y, z) { 7.0 } else { 0.0 });
+        let two = volume(|x, y, z| {
+            if left(x, y, z) {
+                3.0
+            } else if right(x, y, z) {
+                7.0
+            } else {
+                0.0
+            }
+        });
         assert_eq!(Labels::of(&two), Some(Labels(vec![0.0, 3.0, 7.0])));
         // What rises by steps, and what scatters.
         assert_eq!(Labels::of(&volume(|x, y, z| ((x + y + z) / 4) as f32)), None);

@@ -96,7 +96,9 @@ fn steps_out_of_all_proportion_become_means() {
     let (found, notes) = grid("a.vtr", file(&|k| along[k] / last).as_bytes());
     let n = found.dims[0];
     assert!(notes.warnings.is_empty() && n < 5_000_000, "{n} {notes:?}");
-    assert!(found.values[..n].iter().enumerate().all(|(i, v)| (f64::from(*v) - i as f64 / (n - 1) as f64).abs() < 1e-5));
+    assert!(
+        found.values[..n].iter().enumerate().all(|(i, v)| (f64::from(*v) - i as f64 / (n - 1) as f64).abs() < 1e-5)
+    );
     // Every second point is 1: all of that is lost where steps are small, its mean is not.
     let (found, notes) = grid("a.vtr", file(&|k| (k % 2) as f64).as_bytes());
     assert!(notes.warnings.len() == 1 && notes.warnings[0].contains("% of their range"), "{notes:?}");
@@ -319,7 +321,8 @@ fn what_is_wrong_in_polyhedra_is_named() {
 fn polyhedron(points: &[[f64; 3]], faces: &[Vec<usize>]) -> String {
     let stream: Vec<usize> =
         [faces.len()].into_iter().chain(faces.iter().flat_map(|face| [&[face.len()], &face[..]].concat())).collect();
-    let arrays = array("Int64", "faces", 1, &words(&stream)) + &array("Int64", "faceoffsets", 1, &stream.len().to_string());
+    let arrays =
+        array("Int64", "faces", 1, &words(&stream)) + &array("Int64", "faceoffsets", 1, &stream.len().to_string());
     let corners: Vec<usize> = (0..points.len()).collect();
     let values = words(points.iter().copied().map(linear));
     vtu_of(points, &[&corners], &[42], &arrays).replacen(&values, &words(vec![1; points.len()]), 1)
@@ -332,7 +335,10 @@ fn over(floor: &[[f64; 2]], is_prism: bool) -> (Vec<[f64; 3]>, Vec<Vec<usize>>) 
     let next = |i: usize| (i + 1) % n;
     if is_prism {
         let sides = (0..n).map(|i| vec![i, next(i), n + next(i), n + i]);
-        (layer(-1.0).chain(layer(1.0)).collect(), [(0..n).rev().collect(), (n..2 * n).collect()].into_iter().chain(sides).collect())
+        (
+            layer(-1.0).chain(layer(1.0)).collect(),
+            [(0..n).rev().collect(), (n..2 * n).collect()].into_iter().chain(sides).collect(),
+        )
     } else {
         let tips = [[1.3, 0.0, 1.0], [1.3, 0.0, -1.0]];
         let sides = (0..n).flat_map(|i| [vec![i, next(i), n], vec![next(i), i, n + 1]]);
@@ -354,7 +360,10 @@ fn polyhedra_are_filled_as_their_faces_enclose_them_or_counted() {
     faces.pop();
     let open = polyhedron(&points, &faces);
     let (_, notes) = grid("a.vtu", open.as_bytes());
-    assert_eq!(notes.mended.iter().map(|m| (m.fix, m.count, m.face)).collect::<Vec<_>>(), [(Fix::OpenPolyhedron, 1, Some(0))]);
+    assert_eq!(
+        notes.mended.iter().map(|m| (m.fix, m.count, m.face)).collect::<Vec<_>>(),
+        [(Fix::OpenPolyhedron, 1, Some(0))]
+    );
     let said = notes.mended[0].to_string();
     assert!(said.contains("1 polyhedron has faces that do not close") && said.ends_with("(cell 0)"), "{said}");
     let strict = ReadParams { strict: true, ..ReadParams::default() };

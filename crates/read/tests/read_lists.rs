@@ -161,7 +161,10 @@ fn pieces_of_an_image_are_put_together_at_their_places() {
     let of_two = pieces("PImageData", &extent, &["a_0.vti", "a_1.vti", "a_2.vti"]);
     let stated = of_two.replace("<Piece Source=\"a_1.vti\"", "<Piece Extent=\"0 3 0 2 2 5\" Source=\"a_1.vti\"");
     folder.write("stated.pvti", stated);
-    folder.refused("stated.pvti", "'a_1.vti' of the list: the Extent 0 3 0 2 2 5, as the list has it, found '0 2 0 2 2 5'");
+    folder.refused(
+        "stated.pvti",
+        "'a_1.vti' of the list: the Extent 0 3 0 2 2 5, as the list has it, found '0 2 0 2 2 5'",
+    );
     let part = image([[0, 2], [0, 2], [2, 5]], "1 2 0.5");
     let at_zero = linear([0.0, 0.0, 2.0]);
     assert!(part.contains("\n0 1 2 2 "));
@@ -173,7 +176,10 @@ fn pieces_of_an_image_are_put_together_at_their_places() {
     );
     folder.write("type.vti", part.replace("Float64\" Name=\"p\"", "Float32\" Name=\"p\""));
     folder.write("type.pvti", pieces("PImageData", &extent, &["a_0.vti", "type.vti", "a_2.vti"]));
-    folder.refused("type.pvti", "'type.vti' of the list: 1 numbers of Float64 a tuple, as the array has in another piece");
+    folder.refused(
+        "type.pvti",
+        "'type.vti' of the list: 1 numbers of Float64 a tuple, as the array has in another piece",
+    );
     folder.write("other.vti", image([[2, 4], [1, 2], [2, 5]], "1 2 0.25"));
     folder.write("other.pvti", pieces("PImageData", &extent, &["a_0.vti", "a_1.vti", "other.vti"]));
     folder.refused(
@@ -182,7 +188,10 @@ fn pieces_of_an_image_are_put_together_at_their_places() {
     );
     folder.write("far.vti", image([[2_000_000, 2_000_001], [0, 1], [0, 1]], "1 2 0.5"));
     folder.write("far.pvti", pieces("PImageData", &extent, &["a_0.vti", "far.vti"]));
-    folder.refused("far.pvti", "expected pieces within the extent 0 4 -1 2 2 5, found 'far.vti' with 2000000 2000001 0 1 0 1");
+    folder.refused(
+        "far.pvti",
+        "expected pieces within the extent 0 4 -1 2 2 5, found 'far.vti' with 2000000 2000001 0 1 0 1",
+    );
     let whole_extent = "WholeExtent=\"0 2000001 -1 2 2 5\"";
     folder.write("long.pvti", pieces("PImageData", whole_extent, &["a_0.vti", "a_1.vti", "a_2.vti"]));
     folder.refused("long.pvti", "found none with those of the extent 5 2000001 -1 2 2 5");
@@ -231,7 +240,8 @@ fn pieces_of_a_rectilinear_grid_are_put_together_and_made_even() {
 /// A piece of a structured grid with points at their indices, moved along x, and their linear field.
 fn bent(extent: Extent, shift: f64) -> String {
     let [x, y, z] = extent;
-    let row = |j: i64, k: i64| (x[0]..=x[1]).map(move |i| [i as f64 + 0.1 * (j * j) as f64 + shift, j as f64, k as f64]);
+    let row =
+        |j: i64, k: i64| (x[0]..=x[1]).map(move |i| [i as f64 + 0.1 * (j * j) as f64 + shift, j as f64, k as f64]);
     let points: Vec<[f64; 3]> =
         (z[0]..=z[1]).flat_map(|k| (y[0]..=y[1]).flat_map(move |j| row(j, k).collect::<Vec<_>>())).collect();
     let extent = words_of(extent);
@@ -257,8 +267,16 @@ fn pieces_of_a_structured_grid_have_to_meet_and_fill_the_whole() {
             bent([[2, 4], [0, 2], [0, 1]], 0.5),
             Some("point 2 0 0 at [2, 0, 0], where 'a_0.vts' has it, found [2.5, 0, 0] in 'a_2.vts'"),
         ),
-        ("a_3.vts", bent([[1, 4], [0, 2], [0, 1]], 0.0), Some("found 'a_0.vts' with the extent 0 2 0 2 0 1 and 'a_3.vts' with 1 4 0 2 0 1")),
-        ("a_4.vts", bent([[3, 4], [0, 2], [0, 1]], 0.0), Some("all cells of the extent 0 4 0 2 0 1, found none with those of the extent 2 2 0 1 0 0")),
+        (
+            "a_3.vts",
+            bent([[1, 4], [0, 2], [0, 1]], 0.0),
+            Some("found 'a_0.vts' with the extent 0 2 0 2 0 1 and 'a_3.vts' with 1 4 0 2 0 1"),
+        ),
+        (
+            "a_4.vts",
+            bent([[3, 4], [0, 2], [0, 1]], 0.0),
+            Some("all cells of the extent 0 4 0 2 0 1, found none with those of the extent 2 2 0 1 0 0"),
+        ),
         ("a_5.vts", bent([[2, 3], [0, 2], [0, 1]], 0.0), Some("found none with those of the extent 3 3 0 1 0 0")),
     ] {
         folder.write(name, content);

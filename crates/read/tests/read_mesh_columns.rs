@@ -112,7 +112,13 @@ fn a_vector_by_its_name_alone_is_its_length_and_arrays_of_one_name_are_both_ther
     assert_eq!(drawn(Some("cell:p")).0, [70.0, 80.0]);
     assert_eq!(drawn(Some("p")).0, drawn(Some("point:p")).0);
     let (values, told) = drawn(None);
-    assert!(values.len() == 12 && told.contains("the array p is drawn; `array` of a scene or --color-by chooses another: cell:p, U:magnitude"), "{told}");
+    assert!(
+        values.len() == 12
+            && told.contains(
+                "the array p is drawn; `array` of a scene or --color-by chooses another: cell:p, U:magnitude"
+            ),
+        "{told}"
+    );
 }
 
 /// A binary STL of two facets with these attribute bytes.

@@ -79,7 +79,8 @@ impl<'p> NamedArrays<'p> {
     /// Whether the numbers of an array are needed.
     pub(crate) fn needs(&self, array: &SurfaceArray<'_>) -> bool {
         let is_asked = |(name, _): (String, Part)| self.params.columns.contains(&self.own_name(name));
-        let is_needed = self.params.ranges || self.bare_name(array).is_some() || array.columns().into_iter().any(is_asked);
+        let is_needed =
+            self.params.ranges || self.bare_name(array).is_some() || array.columns().into_iter().any(is_asked);
         array.is_offered() && is_needed
     }
 

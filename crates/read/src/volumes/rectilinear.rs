@@ -127,7 +127,11 @@ impl Rectilinear {
         })?;
         let lost = lost(uneven, Values { dims, values: &even }, &axes);
         let said = told(&axes, dims, is_coarse, lost);
-        if lost > MUCH { reading.notes.warnings.push(said) } else { reading.notes.remarks.push(said) }
+        if lost > MUCH {
+            reading.notes.warnings.push(said)
+        } else {
+            reading.notes.remarks.push(said)
+        }
         Ok(Grid { origin, axes: diagonal, dims, values: even })
     }
 }

@@ -167,7 +167,9 @@ pub(crate) fn chosen_array(
 
 /// The remark that a vector is drawn by its length because it is asked for by its name alone.
 pub(crate) fn length_is_drawn(name: &str) -> String {
-    format!("{name} is a vector: its length is drawn, {name}:magnitude; {name}:x, {name}:y … or {name}:0 … choose one number")
+    format!(
+        "{name} is a vector: its length is drawn, {name}:magnitude; {name}:x, {name}:y … or {name}:0 … choose one number"
+    )
 }
 
 /// The part of the stored numbers that is read.

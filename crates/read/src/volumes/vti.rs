@@ -52,7 +52,9 @@ pub(crate) fn read(content: &[u8], place: Option<&Path>, reading: &mut Reading<'
     let list = place.and_then(listed::naming);
     if let Some(list) = &list {
         let list = escaped(list.as_bytes(), 60);
-        reading.notes.remark(format!("this file is one piece of the dataset whose list is '{list}', which draws all of it"));
+        reading
+            .notes
+            .remark(format!("this file is one piece of the dataset whose list is '{list}', which draws all of it"));
     }
     one(&pieces::Source { dataset, encoding: &encoding, file: None }, reading)
 }

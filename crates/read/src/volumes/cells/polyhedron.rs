@@ -73,7 +73,8 @@ pub(super) fn check(
 /// The weights by which corners have a point as their sum, and as its value that of the linear field that fits them best; `None` of flat ones.
 fn weights(point: DVec3, mean: DVec3, corners: &[u32], points: &[DVec3]) -> Option<Vec<f64>> {
     let from_mean = || corners.iter().map(|corner| points[*corner as usize] - mean);
-    let squares = from_mean().fold(DMat3::ZERO, |sum, from| sum + DMat3::from_cols(from.x * from, from.y * from, from.z * from));
+    let squares =
+        from_mean().fold(DMat3::ZERO, |sum, from| sum + DMat3::from_cols(from.x * from, from.y * from, from.z * from));
     let towards = squares.inverse() * (point - mean);
     let even = 1.0 / corners.len() as f64;
     towards.is_finite().then(|| from_mean().map(|from| even + towards.dot(from)).collect())

@@ -15,9 +15,9 @@ use crate::reading::Reading;
 use crate::stream::input;
 use crate::volumes::lattice;
 use rayon::prelude::*;
-use splat_core::{DAabb, Grid};
 use splat_core::glam::{DMat3, DVec3, DVec4, USizeVec3};
 use splat_core::text::counted;
+use splat_core::{DAabb, Grid};
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Voxels of the volume: no fewer in its bounds, and no more.
@@ -34,6 +34,9 @@ const SMALLER: f64 = 2.0;
 const BYTES_OF_A_VOXEL: f64 = 64.0;
 /// Voxels that bodies touch, all together, up to which voxels become smaller: beyond it their parting takes long.
 const MOST_TOUCHED: f64 = (1u64 << 22) as f64;
+/// Voxels that bodies which samples miss touch, all together, up to which they are parted, and the bytes that a voxel takes for it.
+const MOST_PARTED: f64 = (1u64 << 26) as f64;
+const BYTES_OF_A_PARTED_VOXEL: u64 = 28;
 /// The share of the samples that its volume stands for below which a body is parted exactly.
 const MISSED: f64 = 0.5;
 /// Shares of the volume and of the bodies from which those that samples miss are worth a warning.
@@ -148,7 +151,8 @@ fn middle_of(middle: Middle, points: impl Iterator<Item = Knot> + Clone, knot: i
     };
     // Beside a point without a value its neighbours have theirs.
     let has_gap = points.clone().any(|knot| knot.value.is_nan());
-    let middle_by_weights = |knot: Knot| if has_gap { Knot { value: mean(points.clone()).value, ..knot } } else { knot };
+    let middle_by_weights =
+        |knot: Knot| if has_gap { Knot { value: mean(points.clone()).value, ..knot } } else { knot };
     match middle {
         Middle::Mean => mean(points),
         Middle::Point(rank) => {
@@ -167,7 +171,8 @@ fn middle_of(middle: Middle, points: impl Iterator<Item = Knot> + Clone, knot: i
 pub(super) fn mean(corners: impl Iterator<Item = Knot> + Clone) -> Knot {
     let count = corners.clone().count() as f64;
     let place = corners.clone().map(|knot| knot.place).sum::<DVec3>() / count;
-    let (sum, with_value) = corners.map(|knot| knot.value).filter(|value| !value.is_nan()).fold((0.0, 0.0), |(s, n), v| (s + v, n + 1.0));
+    let (sum, with_value) =
+        corners.map(|knot| knot.value).filter(|value| !value.is_nan()).fold((0.0, 0.0), |(s, n), v| (s + v, n + 1.0));
     Knot { place, value: sum / with_value }
 }
 
@@ -351,7 +356,9 @@ impl Missed {
         if self.is_parted {
             format!("{what}: a voxel has the mean of all cells in it, and single ones do not show")
         } else {
-            format!("{what}, and too many to be parted: some are drawn as thick as a sample, others not at all; draw a part of the dataset")
+            format!(
+                "{what}, and too many to be parted: some are drawn as thick as a sample, others not at all; draw a part of the dataset"
+            )
         }
     }
 }
@@ -421,7 +428,7 @@ impl Lattice {
         })?;
         drop(taken);
         let mut missed = self.missed(points, bodies, &met);
-        if missed.bodies > 0 {
+        if missed.bodies > 0 && self.can_part(points, bodies, &missed, reading) {
             let parts = self.parted(points, bodies, field, &missed, reading)?;
             missed.is_parted = parts.iter().all(Parting::is_whole);
             if missed.is_parted {
@@ -452,6 +459,15 @@ impl Lattice {
         }
         missed.bodies = missed.ranks.len();
         missed
+    }
+
+    /// Whether there is time and memory to part missed bodies.
+    fn can_part(&self, points: &[DVec3], bodies: &[Body<'_>], missed: &Missed, reading: &Reading<'_>) -> bool {
+        let voxels = self.dims.iter().map(|n| *n as u64).product::<u64>();
+        let step = SAMPLES as f64 * self.sample;
+        let boxes = missed.ranks.iter().map(|rank| box_around(points, &bodies[*rank]).size() / step + 1.0);
+        let touched: f64 = boxes.map(DVec3::element_product).sum();
+        voxels * BYTES_OF_A_PARTED_VOXEL <= reading.params.memory.left() && touched <= MOST_PARTED
     }
 
     /// The voxels that missed bodies touch, with what all bodies put into them.
@@ -673,12 +689,15 @@ mod tests {
         let [nx, ny, nz] = found.dims;
         for (k, plane) in found.values.chunks(nx * ny).enumerate() {
             let ends = [k, k + 1].map(|k| k as f64 / nz as f64);
-            let shares = heights.windows(2).map(|pair| (pair[1].min(ends[1]) - pair[0].max(ends[0])).max(0.0) * nz as f64);
+            let shares =
+                heights.windows(2).map(|pair| (pair[1].min(ends[1]) - pair[0].max(ends[0])).max(0.0) * nz as f64);
             let expected: f64 = shares.zip(&values).map(|(share, value)| share * value).sum();
             assert!(plane.iter().all(|v| (f64::from(*v) - expected).abs() < 1e-5), "{k}: {} for {expected}", plane[0]);
         }
         assert_eq!(notes.warnings.len(), 1, "{notes:?}");
-        assert!(notes.warnings[0].contains(" of 230 cells, with ") && notes.warnings[0].contains("a voxel has the mean"));
+        assert!(
+            notes.warnings[0].contains(" of 230 cells, with ") && notes.warnings[0].contains("a voxel has the mean")
+        );
     }
 
     /// A voxel's half is no thinner than they are.

@@ -43,7 +43,10 @@ fn shown(extent: Extent) -> String {
 
 /// How a part is called: by its file, or by its extent.
 fn called(part: &Part<'_>) -> String {
-    part.file.map_or_else(|| format!("the Piece {}", shown(part.extent)), |file| format!("'{}'", escaped(file.as_bytes(), 60)))
+    part.file.map_or_else(
+        || format!("the Piece {}", shown(part.extent)),
+        |file| format!("'{}'", escaped(file.as_bytes(), 60)),
+    )
 }
 
 /// The parts of files. Refuses one that is not the part that the list says; `stated` are those of each file.
@@ -191,7 +194,12 @@ pub(super) fn check_points(parts: &[Part<'_>], points: &[DVec3]) -> Result<(), R
 
 /// Refuses a number of a grid that two parts have differently: the coordinate or the value at an index.
 pub(super) fn differ(what: &str, expected: f64, found: f64, file: Option<&str>, place: Place) -> ReadError {
-    let error = ReadError::input(place, format!("{what} to be {expected}, as another piece has it"), found.to_string(), DISAGREE);
+    let error = ReadError::input(
+        place,
+        format!("{what} to be {expected}, as another piece has it"),
+        found.to_string(),
+        DISAGREE,
+    );
     in_file(file, ReadError { hint: DISAGREE, ..error })
 }
 

@@ -220,7 +220,8 @@ impl Members<'_> {
         let named = |element: &str, attribute: &str| -> Result<Vec<Named>, ReadError> {
             let nodes = root.descendants().filter(|node| node.has_tag_name(element));
             // A piece that is empty has no file.
-            let named = nodes.filter_map(|node| Some((node, node.attribute(attribute).filter(|name| !name.is_empty())?)));
+            let named =
+                nodes.filter_map(|node| Some((node, node.attribute(attribute).filter(|name| !name.is_empty())?)));
             let named = named.map(|(node, name)| Ok(Named { name: name.to_owned(), extent: stated(node, "Extent")? }));
             named.collect()
         };
@@ -285,7 +286,8 @@ impl Members<'_> {
             sources.push(Source { dataset, encoding, file });
         }
         let stated: Vec<Option<Extent>> = self.files.iter().map(|member| member.extent).collect();
-        let is_grid = |source: &Source<'_, '_, '_>| !["UnstructuredGrid", "PolyData"].contains(&source.dataset.tag_name().name());
+        let is_grid =
+            |source: &Source<'_, '_, '_>| !["UnstructuredGrid", "PolyData"].contains(&source.dataset.tag_name().name());
         if together != Together::Blocks && sources.iter().all(is_grid) {
             let parts = extents::parts(&sources, &stated)?;
             if together == Together::Lattice {

@@ -132,7 +132,8 @@ fn pasted(
             if let Some(i) = (0..mx).find(|i| !there[*i].is_nan() && there[*i] != row[*i]) {
                 let [j, k] = [n % my, n / my].map(|n| n as i64);
                 let index = [inner[0][0] + i as i64, inner[1][0] + j, inner[2][0] + k];
-                let what = format!("the value at {} {} {} of {}", index[0], index[1], index[2], super::name(array.array));
+                let what =
+                    format!("the value at {} {} {} of {}", index[0], index[1], index[2], super::name(array.array));
                 let [expected, found] = [there[i], row[i]].map(f64::from);
                 return Err(extents::differ(&what, expected, found, part.source.file, place(part.node)));
             }
@@ -157,11 +158,18 @@ fn joined(
             let first = (part.extent[axis][0] - whole[axis][0]) as usize;
             let there = &mut joined[axis][first..first + coordinates.len()];
             for (i, coordinate) in coordinates.iter().enumerate() {
-                let step = coordinates.get(i + 1).or(coordinates.get(i.wrapping_sub(1))).map_or(0.0, |c| c - coordinate);
+                let step =
+                    coordinates.get(i + 1).or(coordinates.get(i.wrapping_sub(1))).map_or(0.0, |c| c - coordinate);
                 if (there[i] - coordinate).abs() > SAME * step.abs() {
                     let index = part.extent[axis][0] + i as i64;
                     let what = format!("the coordinate {index} along {}", ["x", "y", "z"][axis]);
-                    return Err(extents::differ(&what, there[i], *coordinate, part.source.file, super::place(part.node)));
+                    return Err(extents::differ(
+                        &what,
+                        there[i],
+                        *coordinate,
+                        part.source.file,
+                        super::place(part.node),
+                    ));
                 }
                 there[i] = *coordinate;
             }

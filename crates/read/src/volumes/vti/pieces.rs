@@ -5,7 +5,8 @@ use super::data::Encoding;
 use super::extents;
 use super::piece::Piece;
 use super::{
-    ChosenArray, HINT, arrays, child, chosen, components, extent, kind, name, not_used, place, sizes, warn_of_part, wrong,
+    ChosenArray, HINT, arrays, child, chosen, components, extent, kind, name, not_used, place, sizes, warn_of_part,
+    wrong,
 };
 use crate::Loaded;
 use crate::error::{Place, ReadError};
