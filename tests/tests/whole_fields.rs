@@ -162,12 +162,19 @@ fn no_label_is_thinner_than_another() {
         if inside(p[0]) && inside(p[1]) { [1.0, 2.0, 3.0, 40.0][rank] } else { 0.0 }
     };
     place.write("labels.nrrd", nrrd("short", [20, 20, 8], label));
-    let (alpha, _) = seen(&place, "labels.nrrd", &[]);
-    let quarter = |right: bool, low: bool| {
+    let (alpha, told) = seen(&place, "labels.nrrd", &[]);
+    assert!(told.contains("whole numbers that look like 4 labels: each region has its surface"), "{told}");
+    let quarter = |alpha: &[f64], right: bool, low: bool| {
         let here = |i: usize| (i % 24 >= 12) == right && (i / 24 >= 12) == low;
         alpha.iter().enumerate().filter(|(i, _)| here(*i)).map(|(_, a)| *a).fold(0.0, f64::max)
     };
-    let all = [quarter(false, false), quarter(true, false), quarter(false, true), quarter(true, true)];
+    let quarters =
+        |alpha: &[f64]| [[false, false], [true, false], [false, true], [true, true]].map(|[r, l]| quarter(alpha, r, l));
+    let all = quarters(&alpha);
+    for technique in ["points", "surfels", "sheets", "particles", "reference"] {
+        let (of_technique, _) = seen(&place, "labels.nrrd", &["--technique", technique]);
+        assert!(quarters(&of_technique).iter().all(|a| *a > 0.8), "{technique}: {:?}", quarters(&of_technique));
+    }
     // One bar alone would stand in the middle of the picture.
     assert!(all.iter().all(|a| *a > 0.8) && alpha[12 * 24 + 12] < 0.1, "{all:?} {}", alpha[12 * 24 + 12]);
 }
