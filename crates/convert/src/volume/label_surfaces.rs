@@ -17,7 +17,7 @@ const MOST: f32 = 16_777_216.0;
 
 /// How often vertices are moved, and how far from the middle of their cell they may be, in voxels: far less than the half at which a region of one voxel
 /// would collapse.
-const PASSES: usize = 6;
+const PASSES: usize = 3;
 const REACH: f64 = 0.3;
 
 /// A cell without a vertex.
@@ -255,7 +255,7 @@ mod tests {
                 .collect();
             assert_eq!(outer.len(), 2 * (2 * 16 + 4 * 32));
             let volume = enclosed(&Mesh { triangles: outer, ..mesh.clone() });
-            assert!(volume > 0.85 * 256.0 && volume < 256.0, "{volume}");
+            assert!(volume > 0.7 * 256.0 && volume < 256.0, "{volume}");
             assert!(label_surface_bytes(&grid) >= mesh.bytes());
         }
     }
