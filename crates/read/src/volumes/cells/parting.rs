@@ -209,8 +209,10 @@ impl Linear {
     /// The volume below a face within a layer of voxels that begins at a height, and the integral of the field over it; both negative for a face that
     /// looks down.
     fn below(&self, face: &Polygon, floor: f64) -> [f64; 2] {
-        let over_layer =
-            face.clipped(2, floor + 1.0, 1.0).sum(|at| [1.0, at.value + self.slope * (floor + 0.5 - at.place.z)]);
+        // One that lies in the top of the layer bounds it, and is not above it.
+        let is_above = face.corners().iter().any(|corner| corner.place.z > floor + 1.0);
+        let above = if is_above { face.clipped(2, floor + 1.0, 1.0) } else { Polygon { count: 0, ..*face } };
+        let over_layer = above.sum(|at| [1.0, at.value + self.slope * (floor + 0.5 - at.place.z)]);
         let in_layer = face.within(2, floor).sum(|at| {
             let height = at.place.z - floor;
             [height, height * (at.value - 0.5 * self.slope * height)]
