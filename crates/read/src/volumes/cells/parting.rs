@@ -291,11 +291,9 @@ impl Polygon {
         let mut sum = [0.0; 2];
         let Some((first, rest)) = self.corners().split_first() else { return sum };
         for pair in rest.windows(2) {
-            let corners = [*first, pair[0], pair[1]];
             let [u, v] = [pair[0], pair[1]].map(|corner| corner.place - first.place);
             let area = 0.5 * (u.x * v.y - u.y * v.x);
-            for i in 0..3 {
-                let ends = [corners[i], corners[(i + 1) % 3]];
+            for ends in [[*first, pair[0]], [pair[0], pair[1]], [pair[1], *first]] {
                 let place = 0.5 * (ends[0].place + ends[1].place);
                 let found = quantities(Knot { place, value: 0.5 * (ends[0].value + ends[1].value) });
                 sum = [sum[0] + area / 3.0 * found[0], sum[1] + area / 3.0 * found[1]];

@@ -66,8 +66,8 @@ pub(super) fn parts<'s>(
                 let error = ReadError { hint: DISAGREE, ..wrong(*node, &expected, &shown(found)) };
                 return Err(in_file(source.file, error));
             }
-            let ghosts = child(*node, "CellData").into_iter().flat_map(arrays);
-            let has_ghosts = ghosts.into_iter().any(|array| array.attribute("Name") == Some(GHOSTS));
+            let mut of_cells = child(*node, "CellData").into_iter().flat_map(arrays);
+            let has_ghosts = of_cells.any(|array| array.attribute("Name") == Some(GHOSTS));
             parts.push(Part { extent: found, file: source.file, has_ghosts, place: place(*node) });
         }
     }
@@ -110,9 +110,8 @@ pub(super) fn check_filled(parts: &[Part<'_>], whole: Option<Extent>, filling: F
         };
         let part = filled(parts[next].extent);
         let mut rest = hole;
-        for axis in 0..3 {
+        for (axis, [first, last]) in part.into_iter().enumerate() {
             let [low, high] = rest[axis];
-            let [first, last] = part[axis];
             let mut beside = |ends: [i64; 2]| {
                 if ends[0] <= ends[1] {
                     let mut beside = rest;
