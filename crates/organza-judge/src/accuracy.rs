@@ -15,6 +15,7 @@
 mod changes;
 mod frontier;
 mod knob;
+mod ladder;
 mod limit;
 mod measure;
 mod plot;
@@ -24,6 +25,7 @@ mod report;
 mod resolve;
 mod sampled;
 mod settings;
+mod shown;
 mod study;
 mod verdict;
 
@@ -34,6 +36,7 @@ pub use knob::points::{Facts, in_points, points};
 pub use knob::sheets::{in_sheets, sheets};
 pub use knob::surfels::{in_surfels, surfels};
 pub use knob::{Knob, Request, Skipped, Step, Sweep, Theory};
+pub use ladder::{RUNGS_ASIDE, Rung, knobs_of, ladder};
 pub use limit::Limit;
 pub use measure::{Distance, Frame, Renderer, Timed};
 pub use random::{SEEDS, Yardsticks, random_study};
@@ -41,6 +44,7 @@ pub use report::{Absent, Machine, Report, write};
 pub use resolve::{Curve, CurvePoint, Settled, settle};
 pub use sampled::Sampled;
 pub use settings::Setting;
+pub use shown::{Apart, DifferencePicture, apart, difference_picture};
 pub use study::{Draw, Outcome, Study, least_seconds, study};
 pub use verdict::verdict;
 

@@ -1,5 +1,6 @@
 //! The thread that draws: of every request a coarse picture first, then the whole one, always the newest request alone.
 
+use crate::accuracy::Scale;
 use crate::coarse::{BUDGET, DEPTH_LAYER, Detail, drawing_time};
 use crate::curve::values_of;
 use crate::depths::Depths;
@@ -34,6 +35,10 @@ pub(crate) struct Artist {
     refused: Option<Scene>,
     /// Time and pixels of the last whole picture.
     last_whole: Option<Pace>,
+    /// Settings from fast to exact.
+    scale: Option<Scale>,
+    /// The scene of the last whole picture, with the accuracy that it states.
+    stated: Option<Scene>,
     /// Most pixels that were found to be within the limits.
     accepted: u64,
     /// What is read from disk has changed when this does.
@@ -57,6 +62,8 @@ impl Artist {
             rested: None,
             refused: None,
             last_whole: None,
+            scale: None,
+            stated: None,
             accepted: SURE_PIXELS,
             edition: 0,
         }
@@ -89,6 +96,8 @@ impl Artist {
         self.rested = None;
         self.refused = None;
         self.last_whole = None;
+        self.scale = None;
+        self.stated = None;
         self.accepted = SURE_PIXELS;
     }
 
@@ -99,6 +108,12 @@ impl Artist {
         // Settled once for both levels: what `auto` chooses depends on the size of the picture.
         let (scene, found) = organza::settled(&request.scene, &self.options, &progress, self.coarse.files())?;
         let scene = scene.into_owned();
+        // Coarse pictures are as fast as they have to be, whatever the accuracy of the whole one.
+        let stated = if request.accuracy.set.is_empty() {
+            scene.clone()
+        } else {
+            organza::settled(&request.stated, &self.options, &progress, self.coarse.files())?.0.into_owned()
+        };
         if request.has_own_camera {
             let first =
                 found.map_or_else(|| Viewpoint::of_scene(&scene), |f| Viewpoint::of_camera(&f.camera, f.target));
@@ -111,10 +126,11 @@ impl Artist {
             self.whole().prepare(&scene, &options, &progress)?;
             self.accepted = pixels;
         }
-        let is_fluent = self.is_fluent(&scene);
-        if !is_fluent {
+        // Of another accuracy alone, the picture that is there shows more than a coarse one.
+        let is_seen = self.stated.as_ref() == Some(&stated) && !request.accuracy.set.is_empty();
+        if !is_seen && !self.is_fluent(&scene) {
             // The whole picture tells what is wrong, if that is not the coarse one alone.
-            if let Err(Error::Cancelled) = self.draw_coarse(&scene, desk, request, &progress, Showing::Page) {
+            if let Err(Error::Cancelled) = self.draw_coarse(&stated, desk, request, &progress, Showing::Page) {
                 return Err(Error::Cancelled);
             }
             if !desk.stays_newest(generation, PAUSE) {
@@ -133,6 +149,7 @@ impl Artist {
         }
         self.last_whole = Some(Pace { time: drawing_time(&render.cost), pixels });
         desk.publish(Drawn::new(render, &scene, request, Level::Whole, start.elapsed()))?;
+        self.stated = Some(stated.clone());
         // What a first drag would wait for, and the depths below the pointer, are made while nobody waits.
         for _ in 0..MOST_TRIES {
             if desk.has_depths(generation) && self.rested.is_none() {
@@ -143,7 +160,7 @@ impl Artist {
                 return Err(Error::Cancelled);
             }
             let progress = desk.begin(generation, Task::Ahead);
-            let drawn = self.draw_coarse(&scene, desk, request, &progress, Showing::Nobody);
+            let drawn = self.draw_coarse(&stated, desk, request, &progress, Showing::Nobody);
             desk.end();
             match drawn {
                 Ok(()) => {}
@@ -152,7 +169,51 @@ impl Artist {
                 Err(_) => break,
             }
         }
-        self.count_values(&scene, desk, generation)
+        self.count_values(&scene, desk, generation)?;
+        self.measure(&stated, desk, request)
+    }
+
+    /// Says of settings from fast to exact what they are predicted to take, and of the whole picture how exact it is, while nobody waits.
+    fn measure(&mut self, stated: &Scene, desk: &Desk, request: &Request) -> Result<(), Error> {
+        if !desk.wants_rungs() {
+            return Ok(());
+        }
+        let generation = request.generation;
+        let options = self.options.clone();
+        let progress = desk.begin(generation, Task::Ahead);
+        let mut scale = self.scale.take().filter(|scale| scale.is_of(stated));
+        if scale.is_none() {
+            scale = match Scale::new(stated, self.whole(), &options, &progress) {
+                Err(Error::Cancelled) => return Err(Error::Cancelled),
+                // The picture is there, and has no positions.
+                found => found.unwrap_or(None),
+            };
+        }
+        let Some(mut scale) = scale else {
+            desk.end();
+            desk.keep_rungs(Vec::new());
+            return Ok(());
+        };
+        scale.see(stated);
+        desk.keep_rungs(scale.rows());
+        let mut tried = Vec::new();
+        let predicted = loop {
+            match scale.predict_next(self.whole(), &options, &progress, &mut tried) {
+                Ok(true) if progress.is_cancelled() => break Err(Error::Cancelled),
+                Ok(true) => {}
+                Ok(false) => break Ok(()),
+                Err(error) => break Err(error),
+            }
+        };
+        desk.keep_rungs(scale.rows());
+        let measured = predicted.and_then(|()| match desk.whole().filter(|whole| whole.generation == generation) {
+            Some(drawn) => scale.measure(&request.accuracy, &drawn),
+            None => Ok(()),
+        });
+        desk.keep_rungs(scale.rows());
+        desk.end();
+        self.scale = Some(scale);
+        measured
     }
 
     /// Counts how often the values of volumes occur, where that is not known.

@@ -1,8 +1,10 @@
 //! Where a session leaves what is to be drawn, and the artist what is drawn. Only the newest request counts.
 
+use crate::accuracy::RungRow;
 use crate::curve::Values;
 use crate::depths::Depths;
 use crate::picture::{Drawn, EffectRow, Level, Picture};
+use crate::state::Accuracy;
 use crate::viewpoint::Viewpoint;
 use crate::wording::{self, Said};
 use organza::scene::Scene;
@@ -19,6 +21,10 @@ pub(crate) struct Request {
     /// States of a session are counted from 1.
     pub(crate) generation: u64,
     pub(crate) scene: Scene,
+    /// The same scene with the accuracy that it states.
+    pub(crate) stated: Scene,
+    /// The position between fast and exact.
+    pub(crate) accuracy: Accuracy,
     /// What files tell of the scene.
     pub(crate) told: String,
     /// The layer that the page shows in the place of the beauty.
@@ -78,6 +84,8 @@ struct Papers {
     depths: Option<Arc<Depths>>,
     /// How often values of volumes occur, by the names of the objects.
     curves: BTreeMap<String, Values>,
+    /// Settings from fast to exact; `None` before a page asks for them.
+    rungs: Option<Vec<RungRow>>,
     failure: Option<Failure>,
     /// The viewpoint of the scene's own camera.
     own: Viewpoint,
@@ -104,6 +112,8 @@ pub(crate) struct Seen {
     pub(crate) effects: Option<Vec<EffectRow>>,
     /// How often values of volumes occur, by the names of the objects.
     pub(crate) curves: BTreeMap<String, Values>,
+    /// Settings from fast to exact; `None` before a page asks for them.
+    pub(crate) rungs: Option<Vec<RungRow>>,
 }
 
 impl Desk {
@@ -118,6 +128,7 @@ impl Desk {
             whole: None,
             depths: None,
             curves: BTreeMap::new(),
+            rungs: None,
             failure: None,
             own,
             is_closed: false,
@@ -162,6 +173,7 @@ impl Desk {
             whole: papers.whole.as_ref().map(|whole| whole.generation),
             effects: papers.whole.as_ref().map(|whole| whole.effects().to_vec()),
             curves: papers.curves.clone(),
+            rungs: papers.rungs.clone(),
         }
     }
 
@@ -243,6 +255,28 @@ impl Desk {
         let mut papers = self.papers();
         papers.curves.insert(object.to_owned(), values);
         self.tell(papers);
+    }
+
+    /// Asks for settings from fast to exact; whether nobody had asked before.
+    pub(crate) fn ask_for_rungs(&self) -> bool {
+        let mut papers = self.papers();
+        let is_first = papers.rungs.is_none();
+        papers.rungs.get_or_insert_default();
+        is_first
+    }
+
+    /// Whether a page has asked for settings from fast to exact.
+    pub(crate) fn wants_rungs(&self) -> bool {
+        self.papers().rungs.is_some()
+    }
+
+    /// Keeps settings from fast to exact, in the place of those before.
+    pub(crate) fn keep_rungs(&self, rungs: Vec<RungRow>) {
+        let mut papers = self.papers();
+        if papers.rungs.as_ref() != Some(&rungs) {
+            papers.rungs = Some(rungs);
+            self.tell(papers);
+        }
     }
 
     /// Forgets what is known of data.

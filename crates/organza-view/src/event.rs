@@ -1,7 +1,8 @@
 //! What a person does to a view, as data: the page sends it, files record it, tests play it.
 
 use organza::Error;
-use organza::scene::short;
+use organza::scene::{Override, short, shown};
+use organza_judge::accuracy::RUNGS_ASIDE;
 use serde::{Deserialize, Serialize};
 
 /// Largest number of a drag, in heights of the picture, and of steps of a wheel: more is no hand's.
@@ -111,6 +112,13 @@ pub enum Event {
         /// As scenes name it, such as `depth.median`; `None` for the beauty.
         layer: Option<String>,
     },
+    /// Trades accuracy for time.
+    Accuracy {
+        /// Position of the slider, from fastest to most exact; 0 is what the scene states.
+        step: i32,
+        /// The settings that it stands for, each as `--set` takes it, such as `render.antialias=4`; settings of the render alone.
+        set: Vec<String>,
+    },
     /// Sets the exposure of the displayed picture.
     Exposure {
         /// Stops.
@@ -194,6 +202,10 @@ impl Event {
                 within("light_direction", "elevation", *elevation, 90.0)
             }
             Self::Transfer { knots: Some(knots), .. } => check_knots(knots),
+            Self::Accuracy { step, set } => {
+                within("accuracy", "step", f64::from(*step), f64::from(RUNGS_ASIDE))?;
+                settings(set).map(|_| ())
+            }
             Self::Transfer { knots: None, .. } | Self::LightShadow { .. } | Self::Layer { .. } => Ok(()),
             Self::Reset {} | Self::Show { .. } | Self::Opacity { .. } | Self::Effect { .. } => Ok(()),
             Self::Exposure { .. } | Self::Size { .. } => Ok(()),
@@ -222,6 +234,38 @@ fn check_knots(knots: &[Knot]) -> Result<(), Error> {
         }
     }
     Ok(())
+}
+
+/// Most settings that a position of accuracy stands for.
+const MOST_SETTINGS: usize = 64;
+
+/// Tables of a scene whose keys trade accuracy for time.
+const TABLES: [&str; 6] = ["render", "shadow", "points", "particles", "sheets", "surfels"];
+
+/// The settings of an event as changes of a scene.
+///
+/// # Errors
+/// [`Error::Input`] for what is no setting of the render: an event can neither read files nor change what is seen.
+pub(crate) fn settings(set: &[String]) -> Result<Vec<Override>, Error> {
+    let bad = |message: String| Error::input("event `accuracy`", message, "");
+    if set.len() > MOST_SETTINGS {
+        return Err(bad(format!("`set`: expected at most {MOST_SETTINGS} settings, found {}", set.len())));
+    }
+    let setting = |text: &String| {
+        let change = Override::parse(text)?;
+        let is_of_render = match change.path() {
+            [first, _] => first == "render",
+            [first, table, _] if first == "render" => TABLES[1..].contains(&table.as_str()),
+            [first, _, key] => first == "object" && key == "lattice",
+            _ => false,
+        };
+        let is_other = ["exposure", "layers", "technique"].iter().any(|key| change.path()[1..] == [(*key).to_owned()]);
+        let is_table = change.toml().contains(['{', '[']);
+        let expected = "expected a setting of the render that trades accuracy for time";
+        let is_setting = is_of_render && !is_other && !is_table;
+        is_setting.then_some(change).ok_or_else(|| bad(format!("`set`: {expected}, found `{}`", shown(text))))
+    };
+    set.iter().map(setting).collect()
 }
 
 fn within(event: &str, key: &str, number: f64, most: f64) -> Result<(), Error> {
@@ -257,6 +301,7 @@ mod tests {
                 knots: Some(vec![Knot { value: 30.5, color: [0.1, 0.2, 0.3], extinction: 2.0 }]),
             },
             Event::Layer { layer: Some("normal".into()) },
+            Event::Accuracy { step: -2, set: vec!["render.antialias=1".into(), "render.points.exact=false".into()] },
             Event::Exposure { stops: -2.0 },
             Event::Size { width: 640, height: 360 },
         ];
@@ -293,6 +338,12 @@ mod tests {
             Event::LightIntensity { light: "a".into(), stops: 33.0 },
             Event::LightDirection { light: "a".into(), azimuth: 0.0, elevation: -91.0 },
             Event::Transfer { object: "a".into(), knots: Some(Vec::new()) },
+            Event::Accuracy { step: 4, set: Vec::new() },
+            Event::Accuracy { step: 1, set: vec!["object.a.mesh=b.ply".into()] },
+            Event::Accuracy { step: 1, set: vec!["render.effects.shadow=off".into()] },
+            Event::Accuracy { step: 1, set: vec!["render={ antialias = 4 }".into()] },
+            Event::Accuracy { step: 1, set: vec!["render.exposure=3".into()] },
+            Event::Accuracy { step: 1, set: vec!["render.antialias=4".into(); MOST_SETTINGS + 1] },
             Event::Transfer {
                 object: "a".into(),
                 knots: Some(vec![Knot { value: f64::NAN, color: [0.0; 3], extinction: 0.0 }]),

@@ -30,6 +30,7 @@
 //! ```
 #![forbid(unsafe_code)]
 
+mod accuracy;
 mod artist;
 mod coarse;
 mod curve;
@@ -48,6 +49,7 @@ mod viewpoint;
 mod watch;
 mod wording;
 
+pub use accuracy::RungRow;
 pub use curve::{CurveRow, Values};
 pub use depths::PicturePlace;
 pub use event::{Event, Knot, MOST_KNOTS, Switch};
@@ -55,7 +57,7 @@ pub use lights::{Direction, LightRow};
 pub use picture::{EffectRow, Facts, Legend, Level, Mark, PassRow, Picture, Size};
 pub use recording::{MOST_EVENTS, Recording, read_events};
 pub use server::{Ended, Server};
-pub use session::{Failure, ObjectRow, Session, Shown};
+pub use session::{Failure, ObjectRow, Session, Shown, ShownAccuracy};
 pub use state::Opening;
 pub use viewpoint::Viewpoint;
 pub use watch::Watch;

@@ -317,6 +317,25 @@ impl Drawn {
         Ok(output::encode(&self.layers, &self.metadata, format, &self.params)?.0)
     }
 
+    /// The beauty as it is displayed: red, green and blue of each pixel, row by row from the top left.
+    ///
+    /// # Errors
+    /// As [`Drawn::file`].
+    pub(crate) fn displayed(&self) -> Result<Vec<u8>, Error> {
+        Ok(output::displayed_bytes(&self.layers, &self.metadata, &self.params)?)
+    }
+
+    /// Its size.
+    pub(crate) const fn size(&self) -> Size {
+        self.facts.size
+    }
+
+    /// Time of its passes but reading and conversion, milliseconds.
+    pub(crate) fn drawing_ms(&self) -> f64 {
+        let is_drawing = |row: &&PassRow| ![pass::READ, pass::CONVERT].contains(&row.name.as_str());
+        self.facts.passes.iter().filter(is_drawing).filter_map(|row| row.measured_ms).sum()
+    }
+
     /// The picture of the page, counted as `number`.
     ///
     /// # Errors

@@ -1,5 +1,6 @@
 //! A view without a window: events go in, pictures and the state come out.
 
+use crate::accuracy::RungRow;
 use crate::artist::Artist;
 use crate::curve::CurveRow;
 use crate::depths::PicturePlace;
@@ -75,6 +76,8 @@ pub struct Shown {
     pub effects: Vec<EffectRow>,
     /// The layer in the place of the beauty.
     pub layer: Option<String>,
+    /// Settings from fast to exact; `None` before a page asks for them.
+    pub accuracy: Option<ShownAccuracy>,
     /// What is to be said of the newest picture.
     pub picture: Option<Facts>,
     /// The picture in the making.
@@ -83,6 +86,17 @@ pub struct Shown {
     pub is_whole: bool,
     /// Why the newest state has no picture.
     pub failure: Option<Failure>,
+}
+
+/// Settings from fast to exact, as the page shows them.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ShownAccuracy {
+    /// The position that was chosen; 0 is what the scene states.
+    pub step: i32,
+    /// The settings that were chosen, as `--set` takes them.
+    pub set: Vec<String>,
+    /// The positions, from the fastest; empty before a whole picture with the scene's own settings is drawn.
+    pub rungs: Vec<RungRow>,
 }
 
 /// Where the eye is, as the page shows it.
@@ -187,6 +201,15 @@ impl Session {
         Ok(true)
     }
 
+    /// Asks for settings from fast to exact, which [`Shown::accuracy`] has from then on.
+    ///
+    /// # Errors
+    /// As [`Session::apply`].
+    pub fn ask_for_accuracy(&self) -> Result<(), Error> {
+        // What they follow from is at hand while a picture is drawn.
+        if self.desk.ask_for_rungs() { self.apply(&[]) } else { Ok(()) }
+    }
+
     /// Records events from now on.
     pub fn record(&self, recording: Recording) {
         self.studio().recording = Some(recording);
@@ -218,7 +241,7 @@ impl Session {
     /// What a page shows beside the picture.
     pub fn shown(&self) -> Shown {
         let studio = self.studio();
-        let Seen { version, picture, failure, drawing, whole, effects, curves } = self.desk.seen();
+        let Seen { version, picture, failure, drawing, whole, effects, curves, rungs } = self.desk.seen();
         let viewpoint = studio.state.viewpoint().copied().unwrap_or_else(|| self.desk.own());
         let row = |object: &SceneObject| ObjectRow {
             name: object.name.clone(),
@@ -256,6 +279,11 @@ impl Session {
             lights: studio.scene.lights.iter().enumerate().map(light).collect(),
             effects: effects.iter().map(switched).collect(),
             layer: studio.state.layer().map(str::to_owned),
+            accuracy: rungs.map(|rungs| ShownAccuracy {
+                step: studio.state.accuracy().step,
+                set: studio.state.accuracy().texts(),
+                rungs,
+            }),
             picture: picture.map(|picture| picture.facts.clone()),
             drawing: drawing.map(|(stage, share)| Drawing { stage, share }),
             is_whole: whole == Some(studio.generation),
@@ -351,10 +379,17 @@ impl Studio {
         let overrides = self.source.overrides(&state, &self.stated)?;
         let told = self.source.told(&overrides);
         let scene = self.source.scene(overrides)?;
+        let stated = if state.accuracy().set.is_empty() {
+            scene.clone()
+        } else {
+            self.source.scene(self.source.overrides(&state.at_stated_accuracy(), &self.stated)?)?
+        };
         self.generation += 1;
         desk.ask(Request {
             generation: self.generation,
             scene: scene.clone(),
+            stated,
+            accuracy: state.accuracy().clone(),
             told,
             edition: self.edition,
             has_own_camera: state.viewpoint().is_none(),

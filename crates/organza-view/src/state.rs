@@ -1,6 +1,6 @@
 //! What a person has changed of a scene, and the scene that follows.
 
-use crate::event::{Event, Knot, Switch};
+use crate::event::{Event, Knot, Switch, settings};
 use crate::lights::{Direction, LightChange};
 use crate::picture::Size;
 use crate::viewpoint::Viewpoint;
@@ -84,6 +84,21 @@ struct ObjectChange {
     knots: Option<Vec<Knot>>,
 }
 
+/// A position between fast and exact, and the settings that it stands for.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(crate) struct Accuracy {
+    /// 0 is what the scene states.
+    pub(crate) step: i32,
+    pub(crate) set: Vec<Override>,
+}
+
+impl Accuracy {
+    /// The settings as `--set` takes them.
+    pub(crate) fn texts(&self) -> Vec<String> {
+        self.set.iter().map(|change| change.flag().trim_start_matches("--set ").to_owned()).collect()
+    }
+}
+
 /// What a person has changed of a scene.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct State {
@@ -97,9 +112,20 @@ pub(crate) struct State {
     /// The layer in the place of the beauty.
     layer: Option<String>,
     effects: BTreeMap<String, Switch>,
+    accuracy: Accuracy,
 }
 
 impl State {
+    /// The position between fast and exact.
+    pub(crate) const fn accuracy(&self) -> &Accuracy {
+        &self.accuracy
+    }
+
+    /// The same with the accuracy that the scene states.
+    pub(crate) fn at_stated_accuracy(&self) -> Self {
+        Self { accuracy: Accuracy::default(), ..self.clone() }
+    }
+
     /// The viewpoint, where a person has moved it.
     pub(crate) fn viewpoint(&self) -> Option<&Viewpoint> {
         self.viewpoint.as_ref()
@@ -180,6 +206,7 @@ impl State {
                 self.change(scene, object)?.knots.clone_from(knots);
             }
             Event::Layer { layer } => self.layer.clone_from(layer),
+            Event::Accuracy { step, set } => self.accuracy = Accuracy { step: *step, set: settings(set)? },
             Event::Exposure { stops } => self.exposure = Some(*stops),
             Event::Size { width, height } => self.size = Some(Size { width: *width, height: *height }),
         }
@@ -248,6 +275,7 @@ impl State {
         for (name, switch) in &self.effects {
             changes.push(Override::of_effect(&format!("{name}={}", switch.word()))?);
         }
+        changes.extend(self.accuracy.set.iter().cloned());
         Ok(changes)
     }
 }
@@ -394,6 +422,18 @@ mod tests {
         assert_eq!(scene.render.layers.names().collect::<Vec<_>>(), ["normal"]);
         let back = [Event::Layer { layer: Some("normal".into()) }, Event::Layer { layer: None }];
         assert_eq!(after(&back).unwrap(), after(&[]).unwrap());
+    }
+
+    #[test]
+    fn settings_of_accuracy_are_the_scene_s_and_are_taken_back() {
+        let accuracy = |step, set: &[&str]| Event::Accuracy { step, set: set.iter().map(|s| (*s).to_owned()).collect() };
+        let fast = accuracy(-3, &["render.antialias=1", "render.splat_share=0.25", "render.shadow.cells=64"]);
+        let scene = after(std::slice::from_ref(&fast)).unwrap();
+        let render = &scene.render;
+        assert_eq!((render.antialias, render.splat_share, render.shadow.cells), (1, 0.25, Some(64)));
+        assert_eq!(after(&[fast, accuracy(0, &[])]).unwrap(), after(&[]).unwrap());
+        // What the scene refuses is refused.
+        assert!(after(&[accuracy(1, &["render.antialias=99"])]).is_err());
     }
 
     #[test]

@@ -404,6 +404,56 @@ fn a_layer_is_shown_in_the_place_of_the_beauty_and_files_keep_the_beauty() {
 }
 
 #[test]
+fn accuracy_is_predicted_and_measured_and_is_that_of_the_scene() {
+    let session = session(&format!("{HEAD}[render]\ntechnique = \"points\"\nantialias = 2\n"));
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("events.json");
+    session.record(Recording::begin(&path, false).unwrap());
+    let own = session.whole_picture().unwrap();
+    assert_eq!(session.shown().accuracy, None, "nobody has asked");
+    session.ask_for_accuracy().unwrap();
+    let rungs = || session.shown().accuracy.map_or_else(Vec::new, |accuracy| accuracy.rungs);
+    let rung = |step: i32| rungs().into_iter().find(|rung| rung.step == step);
+    let wait_for_measured = |step| wait_for("a measured position", || rung(step).is_some_and(|rung| rung.rmse.is_some()));
+    wait_for_measured(0);
+    let first = rungs();
+    assert_eq!(first.iter().map(|rung| rung.step).collect::<Vec<_>>(), [-3, -2, -1, 0, 1, 2, 3]);
+    let predicted: Vec<f64> = first.iter().map(|rung| rung.predicted_ms.unwrap()).collect();
+    assert!(predicted.windows(2).all(|pair| pair[0] < pair[1]), "{predicted:?}");
+    let stated = rung(0).unwrap();
+    assert!(stated.set.is_empty() && stated.is_reference && stated.rmse == Some(0.0) && stated.measured_ms > Some(0.0));
+    assert!(first.iter().filter(|rung| rung.measured_ms.is_some()).count() == 1);
+    let choose = |step| {
+        let rung = rung(step).unwrap();
+        assert!(rung.lines.contains("[render"), "{}", rung.lines);
+        session.apply(&[Event::Accuracy { step, set: rung.set }]).unwrap();
+        assert_shows_its_scene(&session, &format!("position {step}"));
+        assert_eq!(session.shown().accuracy.unwrap().step, step);
+    };
+    choose(-3);
+    wait_for_measured(-3);
+    let fastest = rung(-3).unwrap();
+    assert!(fastest.rmse > Some(1e-3) && fastest.flip > Some(1e-3) && !fastest.is_reference, "{fastest:?}");
+    // What is more exact is what all are compared with.
+    choose(3);
+    wait_for_measured(3);
+    let most_exact = rung(3).unwrap();
+    assert!(most_exact.is_reference && most_exact.rmse == Some(0.0));
+    let of_own = rung(0).unwrap();
+    assert!(!of_own.is_reference && of_own.rmse > Some(0.0) && of_own.rmse < rung(-3).unwrap().rmse, "{of_own:?}");
+    // From elsewhere nothing is measured yet; the positions are the same.
+    session.apply(&[Event::Orbit { right: 0.1, up: 0.0 }]).unwrap();
+    session.whole_picture().unwrap();
+    wait_for("the picture from there", || rung(3).is_some_and(|rung| rung.is_reference && rung.rmse == Some(0.0)) && rung(0).is_some_and(|rung| rung.rmse.is_none()));
+    assert_eq!(rung(-3).unwrap().set, fastest.set);
+    // The scene's own accuracy has its own bits again.
+    session.apply(&[Event::Reset {}, Event::Accuracy { step: 0, set: Vec::new() }]).unwrap();
+    assert!(pixels(&session.whole_picture().unwrap().png) == pixels(&own.png));
+    let events = read_events(&path).unwrap();
+    assert_eq!(events.iter().filter(|event| matches!(event, Event::Accuracy { .. })).count(), 3);
+}
+
+#[test]
 fn files_that_change_are_read_again_and_broken_ones_are_told() {
     let folder = tempfile::tempdir().unwrap();
     write_volume(folder.path());

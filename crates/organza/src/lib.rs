@@ -66,7 +66,7 @@ pub use organza_scene::{InMemory, SourceData, escape_controls, printable, shown}
 pub use prepare::{Explanation, explain, explain_from, fitted, load, plan_loaded, same_splats, seen, settled};
 pub use render::budget::{Expected, ExpectedError, GivenUp, WithinGoal, render_within};
 pub use render::sequence::Sequence;
-pub use render::{Render, render, render_from};
+pub use render::{Foreseen, Render, render, render_from};
 pub use shadows::{ShadowTable, shadow_params};
 pub use splat_core::{CostRecord, Layers, Progress};
 pub use statistics::{Conversion, SplatCount};

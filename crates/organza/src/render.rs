@@ -12,9 +12,13 @@ use crate::frame::{Frame, KeptGroups, Leaves};
 use crate::load::Loaded;
 use crate::load::files::Files;
 use crate::plan::Plan;
-use crate::prepare::{Explanation, EyeMap, Planned, Prepared, prepare, settled, splats_serve, turned};
+use crate::predict::prediction;
+use crate::prepare::{
+    Explanation, EyeMap, Planned, Prepared, plan_alone, prepare, same_splats, settled, splats_serve, turned,
+};
+use crate::ranges::ranges;
 use crate::scene::{FoundCamera, Scene, SceneObject, Technique};
-use crate::technique::{Checkpoint, Kept, Session, Sets};
+use crate::technique::{Checkpoint, Fold, Kept, Session, Sets};
 use crate::{CostRecord, Error, Layers, Progress, RenderOptions, doubts};
 use convert::ColorScale;
 use splat_core::Arrived;
@@ -43,6 +47,18 @@ pub struct Render {
     pub found: Option<FoundCamera>,
     /// What drew it: `cpu`, or the interface and the device that helped.
     pub backend: String,
+}
+
+/// A frame that is planned and not drawn.
+pub struct Foreseen<'f> {
+    /// What techniques would read.
+    pub frame: &'f Frame<'f>,
+    /// Its data.
+    pub loaded: &'f Loaded,
+    /// What would be done and why.
+    pub plan: &'f Plan,
+    /// Counted work and its time.
+    pub predicted: &'f Prediction,
 }
 
 /// Renders a scene. The technique `particles` has a picture at any time: cancelled after two sets, it is that of the sets
@@ -254,6 +270,42 @@ pub(crate) fn prepare_keeping(
     let is_whole = planned.plan.left_out.is_empty();
     left.made = is_whole.then(|| Made { scene: scene.into_owned(), loaded, planned, leaves });
     Ok(())
+}
+
+/// Plans a frame from the splats of the frame that was drawn last, and shows the plan with its predicted work; `None` where splats would be made anew. What
+/// was made stays for the next frame.
+pub(crate) fn plan_keeping<T>(
+    scene: &Scene,
+    options: &RenderOptions,
+    progress: &Progress,
+    left: &mut Left,
+    look: impl FnOnce(&Foreseen<'_>) -> Result<T, Error>,
+) -> Result<Option<T>, Error> {
+    let Some(Made { scene: before, loaded, .. }) = &mut left.made else { return Ok(None) };
+    let share = scene.render.splat_share / before.render.splat_share;
+    let mut of_all = scene.clone();
+    of_all.render.splat_share = before.render.splat_share;
+    if share > 1.0 || before.camera != scene.camera || !same_splats(before, &of_all) {
+        return Ok(None);
+    }
+    let everything = loaded.keep_share(share);
+    loaded.retarget(scene);
+    let found = plan_alone(scene, loaded, options).and_then(|planned| {
+        let frame = Frame::new(scene, loaded, &planned.plan, progress);
+        let predicted = foreseen(&frame, options)?;
+        look(&Foreseen { frame: &frame, loaded, plan: &planned.plan, predicted: &predicted })
+    });
+    loaded.take_back(everything);
+    loaded.retarget(before);
+    found.map(Some)
+}
+
+/// The predicted work of a frame before it is drawn.
+fn foreseen(frame: &Frame<'_>, options: &RenderOptions) -> Result<Prediction, Error> {
+    let begin = |technique: &Technique| (row(*technique).begin)(frame);
+    let mut folds: Vec<Box<dyn Fold + '_>> = frame.plan.techniques.iter().map(begin).collect();
+    folds.iter_mut().try_for_each(|fold| fold.check(options, &mut CostRecord::default()))?;
+    Ok(prediction(frame, &folds, &ranges(frame), options))
 }
 
 #[cfg(test)]

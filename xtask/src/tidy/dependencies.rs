@@ -44,7 +44,7 @@ const MAY_KNOW: [(&str, &[&str]); 27] = [
         &["splat-core", "read", "field", "convert", "tsm", "hbsort", "deferred-blend", "reference", "organza"],
     ),
     ("organza-survey", &["splat-core", "read", "convert", "organza"]),
-    ("organza-view", &["splat-core", "organza", "organza-survey"]),
+    ("organza-view", &["splat-core", "organza", "organza-judge", "organza-survey"]),
     ("organza-cli", &["splat-core", "read", "convert", "organza", "organza-judge", "organza-survey", "organza-view"]),
     ("organza-python", &["splat-core", "convert", "organza", "organza-judge", "organza-survey"]),
     (

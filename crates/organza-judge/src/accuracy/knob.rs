@@ -59,6 +59,8 @@ pub struct Knob {
     pub end_is_exact: bool,
     /// Expected order, where there is one.
     pub theory: Option<Theory>,
+    /// [`Step::size`] of the scene's own setting; `None` for a choice, and where it is not known.
+    pub own: Option<f64>,
     /// Whether the knob takes part in settings that turn all knobs together.
     pub joint: bool,
 }

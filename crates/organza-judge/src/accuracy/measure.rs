@@ -1,6 +1,7 @@
 //! Drawing with a clock, and the distance of a picture from a reference.
 
 use super::{Facts, Request};
+use organza::plan::Plan;
 use organza::scene::Scene;
 use organza::{
     CostRecord, Error, Files, Loaded, Planned, Progress, RenderOptions, draw_loaded, load, plan_loaded, same_splats,
@@ -163,18 +164,10 @@ impl<'a> Renderer<'a> {
         let progress = self.progress;
         let (loaded, _) = self.load(scene)?;
         let plan = plan_loaded(scene, loaded, options)?;
-        let translucent: Vec<u32> =
-            (0u32..).zip(&loaded.cloud.kind).filter(|(_, k)| **k != SplatKind::Opaque).map(|(i, _)| i).collect();
-        let thickness = loaded.slice_thickness.map_or(hbsort::Thickness::Auto, hbsort::Thickness::World);
-        let params = hbsort::Params { thickness, ..hbsort::Params::default() };
-        let mut scratch = hbsort::Scratch::default();
-        let order = hbsort::slice_cloud(&loaded.cloud, Some(&translucent), &loaded.camera, &params, &mut scratch)
-            .map_err(|e| Error::Internal(e.to_string()))?;
-        let visible = !order.input_from_sorted.is_empty();
         let frame = organza::Frame::new(scene, loaded, &plan, progress);
         let maps = frame.maps(&mut CostRecord::default())?;
         Ok(Facts {
-            slice_thickness: visible.then(|| order.thickness * f64::from(loaded.exponent).exp2()),
+            slice_thickness: slice_thickness(loaded)?,
             cells: maps.iter().flatten().map(|m| longest_side(m.table())).max(),
             bytes_per_splat: bytes_per_splat(&loaded.cloud),
         })
@@ -241,6 +234,31 @@ impl<'a> Renderer<'a> {
         let loaded = &mut self.loaded[at].1;
         loaded.retarget(scene);
         Ok((loaded, seconds))
+    }
+}
+
+/// Thickness of the slices in which the translucent splats of a scene are ordered, world units; `None` where none is in view.
+fn slice_thickness(loaded: &Loaded) -> Result<Option<f64>, Error> {
+    let translucent: Vec<u32> =
+        (0u32..).zip(&loaded.cloud.kind).filter(|(_, k)| **k != SplatKind::Opaque).map(|(i, _)| i).collect();
+    let thickness = loaded.slice_thickness.map_or(hbsort::Thickness::Auto, hbsort::Thickness::World);
+    let params = hbsort::Params { thickness, ..hbsort::Params::default() };
+    let mut scratch = hbsort::Scratch::default();
+    let order = hbsort::slice_cloud(&loaded.cloud, Some(&translucent), &loaded.camera, &params, &mut scratch)
+        .map_err(|e| Error::Internal(e.to_string()))?;
+    let is_visible = !order.input_from_sorted.is_empty();
+    Ok(is_visible.then(|| order.thickness * f64::from(loaded.exponent).exp2()))
+}
+
+impl Facts {
+    /// What follows from a plan alone: cells of shadow tables are those that it predicts, and nothing is packed.
+    ///
+    /// # Errors
+    /// [`Error::Internal`] where splats cannot be ordered.
+    pub fn of_plan(loaded: &Loaded, plan: &Plan) -> Result<Self, Error> {
+        let longest = |table: &organza::ShadowTable| table.predicted.size[0].max(table.predicted.size[1]);
+        let cells = plan.tables().map(longest).max().map(|cells| cells.min(u64::from(u32::MAX)) as u32);
+        Ok(Self { slice_thickness: slice_thickness(loaded)?, cells, bytes_per_splat: None })
     }
 }
 

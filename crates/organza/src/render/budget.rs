@@ -15,19 +15,15 @@ mod rung;
 mod small;
 mod trial;
 
-use super::{Left, Made, Render, render_keeping};
-use crate::choose::row;
+use super::{Left, Made, Render, foreseen, render_keeping};
 use crate::choose::settle;
 use crate::cost::Rates;
 use crate::frame::{Frame, Leaves};
 use crate::load::Loaded;
 use crate::load::files::Files;
 use crate::pass;
-use crate::predict::prediction;
 use crate::prepare::{Planned, fitted, load_measured, plan_alone};
-use crate::ranges::ranges;
 use crate::scene::{FoundCamera, Goal, Scene};
-use crate::technique::Fold;
 use crate::{CostRecord, Error, Progress, RenderOptions};
 use errors::Errors;
 pub use errors::ExpectedError;
@@ -345,10 +341,7 @@ fn drawing_seconds(
 ) -> Result<f64, Error> {
     let progress = Progress::new();
     let frame = Frame::new(scene, loaded, &planned.plan, &progress);
-    let mut folds: Vec<Box<dyn Fold + '_>> =
-        planned.plan.techniques.iter().map(|technique| (row(*technique).begin)(&frame)).collect();
-    folds.iter_mut().try_for_each(|fold| fold.check(options, &mut CostRecord::default()))?;
-    let work = prediction(&frame, &folds, &ranges(&frame), options).drawing;
+    let work = foreseen(&frame, options)?.drawing;
     Ok(work.iter().map(|pass| pass.seconds(rates, rayon::current_num_threads())).sum())
 }
 

@@ -1,7 +1,7 @@
 //! Frames of one scene, one after the other: what was sampled for one serves the next.
 
 use crate::load::files::Files;
-use crate::render::{Left, prepare_keeping, render_keeping};
+use crate::render::{Foreseen, Left, plan_keeping, prepare_keeping, render_keeping};
 use crate::scene::Scene;
 use crate::{Error, Progress, Render, RenderOptions};
 
@@ -93,6 +93,21 @@ impl Sequence {
     /// As [`crate::render`].
     pub fn prepare(&mut self, frame: &Scene, options: &RenderOptions, progress: &Progress) -> Result<(), Error> {
         prepare_keeping(frame, options, progress, &mut self.left)
+    }
+
+    /// Plans a frame that differs from the one drawn last in settings of the render alone, and shows `look` what it would take; `None` where other
+    /// splats are needed. Nothing is drawn or read, and what was made stays.
+    ///
+    /// # Errors
+    /// As [`crate::render`], and those of `look`.
+    pub fn foresee<T>(
+        &mut self,
+        frame: &Scene,
+        options: &RenderOptions,
+        progress: &Progress,
+        look: impl FnOnce(&Foreseen<'_>) -> Result<T, Error>,
+    ) -> Result<Option<T>, Error> {
+        plan_keeping(frame, options, progress, &mut self.left, look)
     }
 
     /// Draws one of the frames.
@@ -204,6 +219,28 @@ mod tests {
         let little = RenderOptions { max_memory: 1 << 28, ..options };
         let refused = sequence.prepare(&large, &little, &progress).unwrap_err().to_string();
         assert_eq!(refused, render(&large, &little, &progress).unwrap_err().to_string());
+    }
+
+    #[test]
+    fn a_frame_is_foreseen_from_splats_that_stay() {
+        let options = RenderOptions::default();
+        let progress = Progress::new();
+        let scene = changed(&[]);
+        let mut sequence = Sequence::default();
+        let seconds = |foreseen: &Foreseen<'_>| Ok(foreseen.predicted.drawing.iter().map(|p| p.seconds(&options.rates, 1)).sum());
+        assert_eq!(sequence.foresee(&scene, &options, &progress, seconds).unwrap(), None::<f64>, "nothing was drawn yet");
+        let drawn = sequence.render(&scene, &options, &progress).unwrap();
+        let mut of = |changes: &[&str]| sequence.foresee(&changed(changes), &options, &progress, seconds).unwrap();
+        let own: f64 = of(&[]).unwrap();
+        let fewer = of(&["render.splat_share=0.25"]).unwrap();
+        let finer = of(&["render.antialias=8"]).unwrap();
+        assert!(fewer < own && own < finer, "{fewer} {own} {finer}");
+        // Of another opacity splats are others.
+        assert_eq!(of(&["object.pane.opacity=0.5"]), None);
+        // The splats are those from before.
+        let again = sequence.render(&scene, &options, &progress).unwrap();
+        assert!(!has_pass(&again, crate::pass::READ));
+        assert_eq!(again.layers, drawn.layers);
     }
 
     #[test]

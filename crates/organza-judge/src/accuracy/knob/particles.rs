@@ -26,7 +26,7 @@ pub fn particles(scene: &Scene, facts: &Facts, options: &Options) -> Result<Swee
         scene.render.particles.repeat_level = finest;
         scene.render.particles.target_error = None;
     }
-    let mut knobs = vec![repeat_level(levels)];
+    let mut knobs = vec![repeat_level(own, levels)];
     let mut skipped = Vec::new();
     for (name, knob) in [
         ("surface sampler", surface_sampler(&scene)),
@@ -48,7 +48,7 @@ pub fn particles(scene: &Scene, facts: &Facts, options: &Options) -> Result<Swee
     })
 }
 
-fn repeat_level(levels: &[u32]) -> Knob {
+fn repeat_level(own: u32, levels: &[u32]) -> Knob {
     let step = |level: &u32| Step {
         label: format!("{level} sets"),
         size: Some(f64::from(*level).recip()),
@@ -65,6 +65,7 @@ fn repeat_level(levels: &[u32]) -> Knob {
         ends: Vec::new(),
         end_is_exact: true,
         theory: Some(Theory { low: 0.47, high: 0.53, why: "the mean of L independent sets spreads as L^-1/2" }),
+        own: Some(f64::from(own).recip()),
         joint: false,
     }
 }
@@ -99,6 +100,7 @@ fn surface_sampler(scene: &Scene) -> Result<Knob, String> {
         ends: Vec::new(),
         end_is_exact: true,
         theory: None,
+        own: None,
         joint: false,
     })
 }
@@ -121,6 +123,7 @@ fn brownian_step(scene: &Scene, quick: bool) -> Result<Knob, String> {
         ends: Vec::new(),
         end_is_exact: true,
         theory: None,
+        own: None,
         joint: false,
     })
 }
@@ -149,6 +152,7 @@ fn volume_sampler(scene: &Scene) -> Result<Knob, String> {
         ends: Vec::new(),
         end_is_exact: true,
         theory: None,
+        own: None,
         joint: false,
     })
 }

@@ -36,16 +36,16 @@ pub fn points(scene: &Scene, facts: &Facts, options: &Options) -> Sweep {
     };
     // One line a knob; a technique with others has a list of its own.
     let knobs = [
-        ("slice thickness", slices(facts, options)),
+        ("slice thickness", slices(scene, facts, options)),
         ("order", order(facts, options)),
         ("shadow table cells", cells(facts, options)),
         ("shadow table mapping", mapping(scene, facts)),
         ("absorbance cut", absorbance_cut(facts, options)),
-        ("transmittance cut", transmittance_cut(facts, options)),
-        ("samples", samples(options)),
+        ("transmittance cut", transmittance_cut(scene, facts, options)),
+        ("samples", samples(scene, options)),
         ("resampling filter", Ok(resampling_filter())),
         ("splat spacing", spacing(scene, options)),
-        ("share of splats", splat_share(options)),
+        ("share of splats", splat_share(scene, options)),
         ("packed splats", packed(facts)),
         ("accumulation", accumulation(facts)),
         (tables::NAME, footprint_tables(scene, options)),
@@ -80,7 +80,7 @@ pub fn in_points(scene: &Scene) -> Scene {
     scene.drawn_by(Technique::Points)
 }
 
-fn slices(facts: &Facts, options: &Options) -> Result<Knob, String> {
+fn slices(scene: &Scene, facts: &Facts, options: &Options) -> Result<Knob, String> {
     let own = facts.slice_thickness.ok_or(NO_TRANSLUCENT)?;
     let factors: &[f64] =
         if options.quick { &[16.0, 4.0, 2.0, 1.0] } else { &[64.0, 32.0, 16.0, 8.0, 4.0, 2.0, 1.0, 0.5] };
@@ -104,6 +104,7 @@ fn slices(facts: &Facts, options: &Options) -> Result<Knob, String> {
             why: "pairs in wrong order grow with ε and so does their difference in colour: 2 where colour is smooth; \
                   1 where it is not; 1/2 where few pixels, whose number grows with ε, are wrong altogether",
         }),
+        own: Some(if scene.render.points.exact { 0.0 } else { own }),
         joint: true,
     })
 }
@@ -124,6 +125,7 @@ fn order(facts: &Facts, options: &Options) -> Result<Knob, String> {
         ends: Vec::new(),
         end_is_exact: false,
         theory: None,
+        own: None,
         joint: false,
     })
 }
@@ -148,12 +150,13 @@ pub(super) fn cells(facts: &Facts, options: &Options) -> Result<Knob, String> {
             why: "2 where shadows are smooth (linear interpolation); 1/2 where they have hard borders, whose share of \
                   the picture shrinks like the cells",
         }),
+        own: Some(own.recip()),
         joint: true,
     })
 }
 
 /// Fewer splats, each for several.
-fn splat_share(options: &Options) -> Result<Knob, String> {
+fn splat_share(scene: &Scene, options: &Options) -> Result<Knob, String> {
     let parts: &[f64] = if options.quick { &[16.0, 4.0, 2.0] } else { &[64.0, 16.0, 8.0, 4.0, 2.0] };
     let at = |part: &f64| step(format!("1/{part}"), part.sqrt(), part.recip());
     Ok(Knob {
@@ -168,6 +171,7 @@ fn splat_share(options: &Options) -> Result<Knob, String> {
             high: 2.0,
             why: "edges are as unsharp as splats are apart, and their share of the picture grows alike: 1; 2 where all is smooth",
         }),
+        own: Some(scene.render.splat_share.sqrt().recip()),
         joint: false,
     })
 }
@@ -189,6 +193,7 @@ fn mapping(scene: &Scene, facts: &Facts) -> Result<Knob, String> {
         ends: Vec::new(),
         end_is_exact: false,
         theory: None,
+        own: None,
         joint: false,
     })
 }
@@ -208,13 +213,14 @@ pub(super) fn absorbance_cut(facts: &Facts, options: &Options) -> Result<Knob, S
             high: 2.0,
             why: "light behind the cut is at most e^-A_cut: 1 where every shadow is that deep, more where deep ones are rare",
         }),
+        own: None,
         joint: true,
     })
 }
 
-fn transmittance_cut(facts: &Facts, options: &Options) -> Result<Knob, String> {
+fn transmittance_cut(scene: &Scene, facts: &Facts, options: &Options) -> Result<Knob, String> {
     facts.slice_thickness.ok_or(NO_TRANSLUCENT)?;
-    Ok(cutoffs(options))
+    Ok(Knob { own: Some(scene.render.points.transmittance_cutoff), ..cutoffs(options) })
 }
 
 /// Transmittances at which pixels are finished.
@@ -234,11 +240,12 @@ pub(super) fn cutoffs(options: &Options) -> Knob {
             high: 2.0,
             why: "what lies behind the cut is seen through at most T_cut: 1 where every pixel reaches it, more where few do",
         }),
+        own: None,
         joint: true,
     }
 }
 
-pub(super) fn samples(options: &Options) -> Result<Knob, String> {
+pub(super) fn samples(scene: &Scene, options: &Options) -> Result<Knob, String> {
     let sides: &[f64] = if options.quick { &[1.0, 2.0, 4.0] } else { &[1.0, 2.0, 4.0, 8.0] };
     let label = |n: f64| format!("{n} x {n} a pixel");
     let end = 32.0 * finer(options);
@@ -257,6 +264,7 @@ pub(super) fn samples(options: &Options) -> Result<Knob, String> {
             high: 2.0,
             why: "2 where the picture is smooth inside a pixel; 1 to 3/2 at edges, by their direction",
         }),
+        own: Some(f64::from(scene.render.antialias).recip()),
         joint: true,
     })
 }
@@ -271,6 +279,7 @@ fn resampling_filter() -> Knob {
         ends: Vec::new(),
         end_is_exact: false,
         theory: None,
+        own: None,
         joint: false,
     }
 }
@@ -287,6 +296,7 @@ fn accumulation(facts: &Facts) -> Result<Knob, String> {
         ends: Vec::new(),
         end_is_exact: false,
         theory: None,
+        own: None,
         joint: false,
     })
 }
@@ -312,6 +322,7 @@ pub(super) fn spacing(scene: &Scene, options: &Options) -> Result<Knob, String> 
             high: 2.0,
             why: "2 for smooth fields; less where a field has detail below the spacing, or surfaces end",
         }),
+        own: Some(1.0),
         joint: false,
     })
 }
@@ -330,6 +341,7 @@ fn packed(facts: &Facts) -> Result<Knob, String> {
         ends: Vec::new(),
         end_is_exact: false,
         theory: None,
+        own: None,
         joint: false,
     })
 }

@@ -33,19 +33,19 @@ pub fn sheets(scene: &Scene, slab_width: Option<f64>, facts: &Facts, options: &O
         ("reconstruction", reconstruction(scene, slab_width.is_some())),
         ("kernel radius", in_splatted(&|_| radius())),
         ("kernel deviation", in_splatted(&|_| deviation())),
-        ("kernel sections", in_splatted(&|_| sections(options))),
+        ("kernel sections", in_splatted(&|_| sections(scene, options))),
         ("buffer format", if is_gathered { Err(GATHERED.to_owned()) } else { Ok(buffers()) }),
         ("gradients", gradients(scene)),
         ("shadow table cells", cells(facts, options)),
         ("absorbance cut", absorbance_cut(facts, options)),
-        ("transmittance cut", Ok(transmittance_cut(options))),
+        ("transmittance cut", Ok(transmittance_cut(scene, options))),
         ("light buffer", light_buffer(scene)),
         ("soft shadows", soft_shadows(scene)),
         ("cells of scattered light", scattered_cells(scene, options)),
         ("cone of scattered light", scattered_cone(scene)),
         ("classification", classification(scene)),
         ("lattice", lattice(scene)),
-        ("samples", samples(options)),
+        ("samples", samples(scene, options)),
     ];
     for (name, knob) in knobs {
         match knob {
@@ -83,12 +83,14 @@ fn slabs(own: f64, options: &Options) -> Knob {
             high: 2.0,
             why: "2 where values are smooth along the view, which a slab averages; 1 at surfaces, which it smears by its width",
         }),
+        own: Some(own),
         joint: true,
     }
 }
 
-fn transmittance_cut(options: &Options) -> Knob {
-    Knob { set: |request, value| request.scene.render.sheets.transmittance_cutoff = value, ..cutoffs(options) }
+fn transmittance_cut(scene: &Scene, options: &Options) -> Knob {
+    let own = Some(scene.render.sheets.transmittance_cutoff);
+    Knob { set: |request, value| request.scene.render.sheets.transmittance_cutoff = value, own, ..cutoffs(options) }
 }
 
 /// Pixels of light buffers, where slabs have some.
@@ -135,7 +137,7 @@ fn scattering(request: &mut Request) -> Option<&mut Scattering> {
 
 /// How coarse the cells of reflectances are.
 fn scattered_cells(scene: &Scene, options: &Options) -> Result<Knob, String> {
-    scene.render.sheets.scattering().ok_or(SCATTERED_ONCE)?;
+    let own = scene.render.sheets.scattering().ok_or(SCATTERED_ONCE)?.voxels_per_cell;
     let voxels: &[f64] = if options.quick { &[256.0, 64.0, 16.0] } else { &[1024.0, 256.0, 64.0, 32.0, 16.0] };
     let at = |n: f64| step(format!("{n} voxels a cell"), n.cbrt(), n);
     Ok(Knob {
@@ -154,6 +156,7 @@ fn scattered_cells(scene: &Scene, options: &Options) -> Result<Knob, String> {
             high: 2.0,
             why: "2 inside of media, 1 where light leaves them or ends, for that is at a face of a cell",
         }),
+        own: Some(f64::from(own).cbrt()),
         joint: true,
     })
 }
@@ -255,6 +258,7 @@ fn choices(name: &'static str, set: fn(&mut Request, f64), steps: &[(impl AsRef<
         ends: Vec::new(),
         end_is_exact: false,
         theory: None,
+        own: None,
         joint: false,
     }
 }
@@ -278,7 +282,7 @@ fn deviation() -> Knob {
 }
 
 /// Places within a slab at which kernels begin; the paper has 64.
-fn sections(options: &Options) -> Knob {
+fn sections(scene: &Scene, options: &Options) -> Knob {
     let counts: &[f64] = if options.quick { &[1.0, 4.0, 16.0] } else { &[1.0, 2.0, 4.0, 8.0, 16.0, 64.0] };
     let at = |n: f64| step(format!("{n} a slab"), n.recip(), n);
     Knob {
@@ -294,6 +298,7 @@ fn sections(options: &Options) -> Knob {
             why: "kernels are moved along the view by up to half of what places are apart: 1, more where neighbours make up for it; 1/2 \
                   where few pixels, at the borders of what is seen, change altogether",
         }),
+        own: Some(f64::from(scene.render.sheets.kernel_sections).recip()),
         joint: true,
     }
 }

@@ -29,8 +29,8 @@ pub fn surfels(scene: &Scene, facts: &Facts, options: &Options) -> Sweep {
         ("coverage", grouped(scene, coverage())),
         ("shadow table cells", cells(facts, options)),
         ("absorbance cut", absorbance_cut(facts, options)),
-        ("transmittance cut", Ok(transmittance_cut(options))),
-        ("samples", samples(options)),
+        ("transmittance cut", Ok(transmittance_cut(scene, options))),
+        ("samples", samples(scene, options)),
         ("splat spacing", spacing(scene, options)),
     ];
     for (name, knob) in knobs {
@@ -51,8 +51,9 @@ pub fn in_surfels(scene: &Scene) -> Scene {
     scene
 }
 
-fn transmittance_cut(options: &Options) -> Knob {
-    Knob { set: |request, value| request.scene.render.surfels.transmittance_cutoff = value, ..cutoffs(options) }
+fn transmittance_cut(scene: &Scene, options: &Options) -> Knob {
+    let own = Some(scene.render.surfels.transmittance_cutoff);
+    Knob { set: |request, value| request.scene.render.surfels.transmittance_cutoff = value, own, ..cutoffs(options) }
 }
 
 fn disc_scale() -> Knob {
@@ -71,7 +72,7 @@ fn choices(name: &'static str, set: fn(&mut Request, f64), steps: Vec<Step>) -> 
     let end_is_exact = false;
     let theory = None;
     let joint = false;
-    Knob { name, size_meaning: "", set, steps, ends, end_is_exact, theory, joint }
+    Knob { name, size_meaning: "", set, steps, ends, end_is_exact, theory, own: None, joint }
 }
 
 fn layers() -> Knob {

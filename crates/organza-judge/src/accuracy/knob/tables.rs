@@ -38,6 +38,7 @@ pub(super) fn footprint_tables(scene: &Scene, options: &Options) -> Result<Knob,
             high: 2.0,
             why: "2: bilinear between texels; less where discs are hardly larger than pixels",
         }),
+        own: None,
         joint: false,
     })
 }
