@@ -27,7 +27,8 @@ pub(super) fn run(arguments: &ViewArguments) -> Result<(), Error> {
     let ending = Arc::new(Progress::new());
     signals::stops(&ending);
     if let Some(path) = &arguments.play {
-        session.apply(&played).map_err(|e| Error::input(printable(path), e.to_string(), e.hint()))?;
+        let left_out = session.play(&played).map_err(|e| Error::input(printable(path), e.to_string(), e.hint()))?;
+        left_out_events(&printable(path), &left_out).iter().for_each(|sentence| console::warn(sentence));
     }
     if !address.ip().is_loopback() {
         console::warn(&format!(
@@ -54,6 +55,19 @@ pub(super) fn run(arguments: &ViewArguments) -> Result<(), Error> {
         console::remark("the page is closed, and the view with it");
     }
     Ok(())
+}
+
+/// Most events that are named one by one where the scene does not have what they name.
+const MOST_NAMED: usize = 5;
+
+/// What is said of recorded events that are left out.
+fn left_out_events(file: &str, left_out: &[String]) -> Vec<String> {
+    let mut sentences: Vec<String> =
+        left_out.iter().take(MOST_NAMED).map(|sentence| format!("{file}: {sentence}; it is left out")).collect();
+    if left_out.len() > MOST_NAMED {
+        sentences.push(format!("{file}: {} more events are left out", left_out.len() - MOST_NAMED));
+    }
+    sentences
 }
 
 /// Reads the scene, or makes one of data files, and begins to draw it.

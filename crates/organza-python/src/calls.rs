@@ -21,11 +21,11 @@ const FIRST: &str = "scene.toml";
 #[derive(FromPyObject)]
 pub(crate) struct How<'py> {
     #[pyo3(item)]
-    threads: Option<usize>,
+    pub(crate) threads: Option<usize>,
     #[pyo3(item)]
     max_memory: Option<u64>,
     #[pyo3(item)]
-    progress: Option<Bound<'py, PyAny>>,
+    pub(crate) progress: Option<Bound<'py, PyAny>>,
     #[pyo3(item)]
     drop_invalid: bool,
     #[pyo3(item)]
@@ -33,7 +33,7 @@ pub(crate) struct How<'py> {
 }
 
 impl How<'_> {
-    fn options(&self) -> RenderOptions {
+    pub(crate) fn options(&self) -> RenderOptions {
         let defaults = RenderOptions::default();
         RenderOptions {
             max_memory: self.max_memory.unwrap_or(defaults.max_memory),
@@ -48,9 +48,9 @@ impl How<'_> {
 #[derive(FromPyObject)]
 pub(crate) struct Given {
     #[pyo3(item)]
-    text: String,
+    pub(crate) text: String,
     #[pyo3(item)]
-    file: PathBuf,
+    pub(crate) file: PathBuf,
     #[pyo3(item)]
     data: HashMap<String, Py<Data>>,
     /// Width and height, where the scene's are not meant.
@@ -71,7 +71,7 @@ pub(crate) struct Given {
 }
 
 impl Given {
-    fn in_memory(&self) -> PyResult<InMemory> {
+    pub(crate) fn in_memory(&self) -> PyResult<InMemory> {
         let mut in_memory = InMemory::default();
         for (name, data) in &self.data {
             in_memory.insert(name, data.get().data.clone()).map_err(|error| raised(&error.into()))?;
@@ -79,7 +79,8 @@ impl Given {
         Ok(in_memory)
     }
 
-    fn scene(&self, in_memory: InMemory, options: &RenderOptions) -> Result<Scene, Error> {
+    /// How its document is read.
+    pub(crate) fn load(&self, in_memory: InMemory, options: &RenderOptions) -> Result<LoadOptions, Error> {
         let mut overrides = Vec::new();
         for effect in &self.effects {
             overrides.push(Override::of_effect(effect)?);
@@ -87,7 +88,7 @@ impl Given {
         if let Some([width, height]) = self.size {
             overrides.push(Override::parse(&format!("camera.size=[{width}, {height}]"))?);
         }
-        let load = LoadOptions {
+        Ok(LoadOptions {
             allow_path: true,
             memory: MemoryAccount::new(options.max_memory),
             in_memory,
@@ -95,7 +96,11 @@ impl Given {
             frame: self.frame,
             turntable: self.turntable,
             ..LoadOptions::default()
-        };
+        })
+    }
+
+    fn scene(&self, in_memory: InMemory, options: &RenderOptions) -> Result<Scene, Error> {
+        let load = self.load(in_memory, options)?;
         let mut scene = parse(&self.file, self.text.as_bytes(), &load)?;
         if self.transparent && !scene.render.layers.add("background") {
             return Err(Error::Internal("there is no layer of the background".into()));

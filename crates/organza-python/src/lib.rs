@@ -14,6 +14,7 @@ mod data;
 mod errors;
 mod picture;
 mod running;
+mod view;
 
 /// The parts of the extension that the package uses.
 #[pyo3::pymodule(name = "_organza", gil_used = false)]
@@ -26,4 +27,6 @@ mod organza_module {
     use crate::errors::{InputError, LimitError};
     #[pymodule_export]
     use crate::picture::Picture;
+    #[pymodule_export]
+    use crate::view::{View, view};
 }

@@ -1,7 +1,8 @@
 //! The thread that draws: of every request a coarse picture first, then the whole one, always the newest request alone.
 
 use crate::accuracy::Scale;
-use crate::coarse::{BUDGET, DEPTH_LAYER, Detail, drawing_time};
+use crate::below::DataOfObject;
+use crate::coarse::{BUDGET, DEPTH_LAYER, Detail, OBJECT_LAYER, drawing_time};
 use crate::curve::values_of;
 use crate::depths::Depths;
 use crate::desk::{Desk, Request, Task};
@@ -9,6 +10,7 @@ use crate::picture::{Drawn, Level};
 use crate::viewpoint::Viewpoint;
 use organza::scene::{Scene, SceneObject, Source, Technique};
 use organza::{Error, Files, Progress, Render, RenderOptions, Sequence};
+use splat_core::LayerData;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::{Duration, Instant};
 
@@ -170,6 +172,7 @@ impl Artist {
             }
         }
         self.count_values(&scene, desk, generation)?;
+        self.leave_data(&scene, desk);
         self.measure(&stated, desk, request)
     }
 
@@ -230,6 +233,18 @@ impl Artist {
         Ok(())
     }
 
+    /// Leaves what objects are made of on the desk, as far as files are kept: it is neither read anew nor held.
+    fn leave_data(&self, scene: &Scene, desk: &Desk) {
+        let files = self.coarse.files();
+        for object in scene.objects.iter().filter(|object| object.visible) {
+            let frame = if let Source::Volume(volume) = &object.source { volume.frame } else { 0 };
+            let data = object.source.path().and_then(|path| files.kept(scene, path, frame));
+            if let Some(data) = data.as_ref().and_then(DataOfObject::new) {
+                desk.keep_data(&object.name, data);
+            }
+        }
+    }
+
     /// The sequence of whole pictures, which begins with the files that coarse ones have read.
     fn whole(&mut self) -> &mut Sequence {
         let files = self.coarse.files();
@@ -265,7 +280,12 @@ impl Artist {
             Showing::Nobody => rested,
         };
         if let Some(depth) = render.layers.scalar(DEPTH_LAYER) {
-            desk.keep_depths(Depths { generation: request.generation, camera: coarse.camera, depth: depth.to_vec() });
+            let object = match render.layers.images.get(OBJECT_LAYER) {
+                Some(LayerData::Id(ids)) => ids.clone(),
+                _ => Vec::new(),
+            };
+            let depth = depth.to_vec();
+            desk.keep_depths(Depths { generation: request.generation, camera: coarse.camera, depth, object });
         }
         match showing {
             Showing::Page => desk.publish(Drawn::new(render, &coarse, request, Level::Coarse, time)),

@@ -32,6 +32,9 @@ const SETS: u32 = 4;
 /// The layer of which depths under a pointer are read.
 pub(crate) const DEPTH_LAYER: &str = "depth.median";
 
+/// The layer of which objects under a pointer are read.
+pub(crate) const OBJECT_LAYER: &str = "object";
+
 /// Passes whose results serve the next view.
 const ONCE: [&str; 4] = [pass::READ, pass::CONVERT, pass::SHADOW_MAP, pass::GROUP];
 
@@ -115,7 +118,7 @@ impl Detail {
         settings.particles.repeat_level = settings.particles.repeat_level.min(SETS);
         settings.particles.target_error = None;
         settings.layers = LayerChoice::default();
-        for name in [DEPTH_LAYER].into_iter().chain(layer) {
+        for name in [DEPTH_LAYER, OBJECT_LAYER].into_iter().chain(layer) {
             // The whole scene was refused for a name that is unknown.
             let _ = settings.layers.add(name);
         }

@@ -1,6 +1,7 @@
 //! Where a session leaves what is to be drawn, and the artist what is drawn. Only the newest request counts.
 
 use crate::accuracy::RungRow;
+use crate::below::DataOfObject;
 use crate::curve::Values;
 use crate::depths::Depths;
 use crate::picture::{Drawn, EffectRow, Level, Picture};
@@ -84,6 +85,8 @@ struct Papers {
     depths: Option<Arc<Depths>>,
     /// How often values of volumes occur, by the names of the objects.
     curves: BTreeMap<String, Values>,
+    /// What objects are made of, by their names.
+    data: BTreeMap<String, DataOfObject>,
     /// Settings from fast to exact; `None` before a page asks for them.
     rungs: Option<Vec<RungRow>>,
     failure: Option<Failure>,
@@ -128,6 +131,7 @@ impl Desk {
             whole: None,
             depths: None,
             curves: BTreeMap::new(),
+            data: BTreeMap::new(),
             rungs: None,
             failure: None,
             own,
@@ -152,6 +156,11 @@ impl Desk {
             is_news
         });
         self.changed.notify_all();
+    }
+
+    /// Tells whoever waits that something beside the pictures has changed.
+    pub(crate) fn tell_change(&self) {
+        self.tell(self.papers());
     }
 
     /// Versions as they come.
@@ -281,7 +290,26 @@ impl Desk {
 
     /// Forgets what is known of data.
     pub(crate) fn forget_values(&self) {
-        self.papers().curves.clear();
+        let mut papers = self.papers();
+        papers.curves.clear();
+        papers.data.clear();
+    }
+
+    /// Keeps what an object is made of, for as long as something else does.
+    pub(crate) fn keep_data(&self, object: &str, data: DataOfObject) {
+        self.papers().data.insert(object.to_owned(), data);
+    }
+
+    /// What an object is made of.
+    pub(crate) fn data_of(&self, object: &str) -> Option<DataOfObject> {
+        self.papers().data.get(object).cloned()
+    }
+
+    /// The depths of the newest request, where they are there.
+    pub(crate) fn depths(&self) -> Option<Arc<Depths>> {
+        let papers = self.papers();
+        let generation = papers.newest.as_ref().map_or(0, |newest| newest.generation);
+        papers.depths.clone().filter(|depths| depths.generation == generation)
     }
 
     /// Whether it is known how often values of a volume occur.

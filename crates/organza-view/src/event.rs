@@ -112,6 +112,11 @@ pub enum Event {
         /// As scenes name it, such as `depth.median`; `None` for the beauty.
         layer: Option<String>,
     },
+    /// Draws the scene by another technique, objects that name one of their own left out.
+    Technique {
+        /// As scenes name it, such as `sheets`; `None` for what the scene says.
+        technique: Option<String>,
+    },
     /// Trades accuracy for time.
     Accuracy {
         /// Position of the slider, from fastest to most exact; 0 is what the scene states.
@@ -207,6 +212,7 @@ impl Event {
                 settings(set).map(|_| ())
             }
             Self::Transfer { knots: None, .. } | Self::LightShadow { .. } | Self::Layer { .. } => Ok(()),
+            Self::Technique { .. } => Ok(()),
             Self::Reset {} | Self::Show { .. } | Self::Opacity { .. } | Self::Effect { .. } => Ok(()),
             Self::Exposure { .. } | Self::Size { .. } => Ok(()),
         }
@@ -302,6 +308,7 @@ mod tests {
             },
             Event::Layer { layer: Some("normal".into()) },
             Event::Accuracy { step: -2, set: vec!["render.antialias=1".into(), "render.points.exact=false".into()] },
+            Event::Technique { technique: Some("sheets".into()) },
             Event::Exposure { stops: -2.0 },
             Event::Size { width: 640, height: 360 },
         ];

@@ -32,7 +32,9 @@
 
 mod accuracy;
 mod artist;
+mod below;
 mod coarse;
+mod compare;
 mod curve;
 mod depths;
 mod desk;
@@ -50,13 +52,15 @@ mod watch;
 mod wording;
 
 pub use accuracy::RungRow;
+pub use below::{Below, NamedValue};
+pub use compare::{Comparison, KeptRow};
 pub use curve::{CurveRow, Values};
 pub use depths::PicturePlace;
 pub use event::{Event, Knot, MOST_KNOTS, Switch};
 pub use lights::{Direction, LightRow};
 pub use picture::{EffectRow, Facts, Legend, Level, Mark, PassRow, Picture, Size};
 pub use recording::{MOST_EVENTS, Recording, read_events};
-pub use server::{Ended, Server};
+pub use server::{Ended, Framing, Server};
 pub use session::{Failure, ObjectRow, Session, Shown, ShownAccuracy};
 pub use state::Opening;
 pub use viewpoint::Viewpoint;

@@ -3,7 +3,7 @@
 use organza::scene::SceneLight;
 use serde::Serialize;
 use splat_core::LightShape;
-use splat_core::glam::DVec3;
+use splat_core::glam::{DQuat, DVec3};
 
 /// From where something comes, degrees.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -55,9 +55,16 @@ pub(crate) struct LightChange {
     pub(crate) shadow: Option<bool>,
 }
 
+/// Which key says where a spot shines to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Aim {
+    Direction,
+    Target,
+}
+
 impl LightChange {
-    /// The changes as keys of the light with values in TOML; `centre` is what a light in a place goes around.
-    pub(crate) fn keys(&self, light: &SceneLight, centre: DVec3) -> Vec<(&'static str, String)> {
+    /// The changes as keys of the light with values in TOML; `centre` is what a light in a place goes around, and with it the side that it shines to.
+    pub(crate) fn keys(&self, light: &SceneLight, centre: DVec3, aim: Aim) -> Vec<(&'static str, String)> {
         let mut keys = Vec::new();
         if let Some(stops) = self.stops.filter(|stops| *stops != 0.0) {
             let is_parallel = matches!(light.light.shape, LightShape::Directional { .. });
@@ -73,7 +80,14 @@ impl LightChange {
                 let distance = (*position - centre).length();
                 keys.push(("position", vector(centre + from.vector() * distance)));
             }
-            _ => {}
+            (Some(from), shape) => {
+                if let Some(place) = place_of(shape).filter(|place| *place != centre) {
+                    let turn = DQuat::from_rotation_arc((place - centre).normalize(), from.vector());
+                    keys.push(("position", vector(centre + turn * (place - centre))));
+                    keys.extend(turned(shape, turn, centre, aim).map(|(key, value)| (key, vector(value))));
+                }
+            }
+            (None, _) => {}
         }
         if let Some(shadow) = self.shadow {
             keys.push(("shadow", shadow.to_string()));
@@ -82,12 +96,34 @@ impl LightChange {
     }
 }
 
-/// From where a light comes, seen from a centre; `None` for one that shines to a side of its own.
+/// Where a light stands.
+fn place_of(shape: &LightShape) -> Option<DVec3> {
+    Some(match *shape {
+        LightShape::Point { position } | LightShape::Spot { position, .. } | LightShape::Patch { position, .. } => position,
+        LightShape::Sphere { center, .. } | LightShape::Disk { center, .. } | LightShape::Rect { center, .. } => center,
+        _ => return None,
+    })
+}
+
+/// The keys that say to which side a light shines, turned about a centre.
+fn turned(shape: &LightShape, turn: DQuat, centre: DVec3, aim: Aim) -> impl Iterator<Item = (&'static str, DVec3)> {
+    let [first, second] = match *shape {
+        LightShape::Spot { position, direction, .. } => match aim {
+            Aim::Direction => [Some(("direction", turn * direction)), None],
+            Aim::Target => [Some(("target", centre + turn * (position + direction - centre))), None],
+        },
+        LightShape::Disk { normal, .. } => [Some(("normal", turn * normal)), None],
+        LightShape::Rect { u, v, .. } => [Some(("u", turn * u)), Some(("v", turn * v))],
+        _ => [None, None],
+    };
+    [first, second].into_iter().flatten()
+}
+
+/// From where a light comes, seen from a centre; `None` for one that stands there.
 pub(crate) fn direction_of(light: &SceneLight, centre: DVec3) -> Option<Direction> {
     let vector = match light.light.shape {
         LightShape::Directional { direction } => -direction,
-        LightShape::Point { position } | LightShape::Sphere { center: position, .. } => position - centre,
-        _ => return None,
+        _ => place_of(&light.light.shape)? - centre,
     };
     (vector.length() > 0.0).then(|| Direction::of_vector(vector))
 }

@@ -1,5 +1,6 @@
 //! A finished picture: the bytes that the page shows, and what is to be said about it.
 
+use crate::depths::PicturePlace;
 use crate::desk::Request;
 use crate::event::Switch;
 use crate::layer_image::{self, Radiance};
@@ -9,6 +10,7 @@ use organza::plan::{Effect, Plan};
 use organza::scene::{ColorScale, EffectKind, ScaleNumbers, Scene, SwitchedEffect};
 use organza::{Error, Layers, Render, pass};
 use serde::{Deserialize, Serialize};
+use splat_core::LayerData;
 use std::time::Duration;
 
 /// Width and height of a picture, pixels.
@@ -317,6 +319,41 @@ impl Drawn {
         Ok(output::encode(&self.layers, &self.metadata, format, &self.params)?.0)
     }
 
+    /// What the page shows in the place of the beauty, with how it is displayed.
+    fn shown(&self) -> Option<(Layers, Metadata)> {
+        let (layers, radiance) = self.layer.as_deref().and_then(|layer| layer_image::shown(&self.layers, layer))?;
+        let exposure = if radiance == Radiance::Exposed { self.metadata.exposure } else { 0.0 };
+        Some((layers, Metadata { exposure, ..self.metadata.clone() }))
+    }
+
+    /// The picture of the page in bytes, as [`Drawn::displayed`] has the beauty.
+    ///
+    /// # Errors
+    /// As [`Drawn::file`].
+    pub(crate) fn displayed_as_shown(&self) -> Result<Vec<u8>, Error> {
+        match self.shown() {
+            None => self.displayed(),
+            Some((layers, metadata)) => Ok(output::displayed_bytes(&layers, &metadata, &Params::default())?),
+        }
+    }
+
+    /// What is to be said about it.
+    pub(crate) const fn facts(&self) -> &Facts {
+        &self.facts
+    }
+
+    /// Name and numbers of the layer that the page shows, at a place of the picture.
+    pub(crate) fn number_at(&self, place: PicturePlace) -> Option<(String, Vec<f64>)> {
+        let name = self.layer.clone().unwrap_or_else(|| "beauty".to_owned());
+        let pixel = place.pixel(self.layers.size[0], self.layers.size[1]);
+        let numbers = match self.layers.images.get(name.as_str())? {
+            LayerData::Rgb(pixels) => pixels.get(pixel)?.iter().map(|channel| f64::from(*channel)).collect(),
+            LayerData::Scalar(numbers) => vec![f64::from(*numbers.get(pixel)?)],
+            LayerData::Id(ids) => vec![f64::from(*ids.get(pixel)?)],
+        };
+        Some((name, numbers))
+    }
+
     /// The beauty as it is displayed: red, green and blue of each pixel, row by row from the top left.
     ///
     /// # Errors
@@ -341,14 +378,9 @@ impl Drawn {
     /// # Errors
     /// As [`Drawn::file`].
     pub(crate) fn picture(&self, number: u64) -> Result<Picture, Error> {
-        let shown = self.layer.as_deref().and_then(|layer| layer_image::shown(&self.layers, layer));
-        let png = match shown {
+        let png = match self.shown() {
             None => self.file(Format::Png)?,
-            Some((layers, radiance)) => {
-                let exposure = if radiance == Radiance::Exposed { self.metadata.exposure } else { 0.0 };
-                let metadata = Metadata { exposure, ..self.metadata.clone() };
-                output::encode(&layers, &metadata, Format::Png, &Params::default())?.0
-            }
+            Some((layers, metadata)) => output::encode(&layers, &metadata, Format::Png, &Params::default())?.0,
         };
         Ok(Picture { png, facts: Facts { number, ..self.facts.clone() } })
     }

@@ -11,7 +11,7 @@ use hyper::service::service_fn;
 use hyper_util::rt::{TokioIo, TokioTimer};
 use organza::{Error, Progress};
 use serving::{Counter, answer};
-use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr};
+use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, UdpSocket};
 use std::path::Path;
 use std::pin::pin;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -45,6 +45,16 @@ pub struct Server {
     listener: std::net::TcpListener,
     address: SocketAddr,
     token: Token,
+    framing: Framing,
+}
+
+/// Which pages may show the page inside of theirs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Framing {
+    /// None.
+    Nobody,
+    /// Those of this machine, as notebooks are.
+    ThisMachine,
 }
 
 /// Why a server has ended.
@@ -66,17 +76,19 @@ impl Server {
         let listener = std::net::TcpListener::bind(address).map_err(fail)?;
         listener.set_nonblocking(true).map_err(fail)?;
         let address = listener.local_addr().map_err(fail)?;
-        Ok(Self { listener, address, token: Token::new()? })
+        Ok(Self { listener, address, token: Token::new()?, framing: Framing::Nobody })
+    }
+
+    /// The same with other pages around its own.
+    #[must_use]
+    pub fn framed_by(self, framing: Framing) -> Self {
+        Self { framing, ..self }
     }
 
     /// The address of the page, with its token.
     pub fn url(&self) -> String {
-        // What listens everywhere is reached from here by the loopback.
-        let ip = match self.address.ip() {
-            IpAddr::V4(ip) if ip.is_unspecified() => IpAddr::V4(Ipv4Addr::LOCALHOST),
-            IpAddr::V6(ip) if ip.is_unspecified() => IpAddr::V6(Ipv6Addr::LOCALHOST),
-            ip => ip,
-        };
+        let ip = self.address.ip();
+        let ip = if ip.is_unspecified() { own_address(ip) } else { ip };
         format!("http://{}/{}/", SocketAddr::new(ip, self.address.port()), self.token.text())
     }
 
@@ -88,9 +100,9 @@ impl Server {
         let internal = |e: std::io::Error| Error::Internal(format!("the server of the page: {e}"));
         let runtime =
             tokio::runtime::Builder::new_current_thread().enable_io().enable_time().build().map_err(internal)?;
-        let Self { listener, address, token } = self;
+        let Self { listener, address, token, framing } = self;
         let clients = Mutex::new(Clients::default());
-        let counter = Arc::new(Counter { session: Arc::clone(session), clients, token, address });
+        let counter = Arc::new(Counter { session: Arc::clone(session), clients, token, address, framing });
         let ended = runtime.block_on(async {
             let listener = TcpListener::from_std(listener).map_err(internal)?;
             tokio::spawn(accept(listener, Arc::clone(&counter)));
@@ -107,6 +119,22 @@ impl Server {
         runtime.shutdown_timeout(FAREWELL);
         ended
     }
+}
+
+/// The address by which other machines reach this one: the one from which it would send to them. Without a network it is the loopback's.
+fn own_address(everywhere: IpAddr) -> IpAddr {
+    // Addresses for documentation, which no machine has. A datagram socket that is connected sends nothing.
+    let [loopback, far] = match everywhere {
+        IpAddr::V4(_) => [IpAddr::V4(Ipv4Addr::LOCALHOST), IpAddr::V4(Ipv4Addr::new(192, 0, 2, 1))],
+        IpAddr::V6(_) => {
+            [IpAddr::V6(Ipv6Addr::LOCALHOST), IpAddr::V6(Ipv6Addr::new(0x2001, 0xdb8, 0, 0, 0, 0, 0, 1))]
+        }
+    };
+    let found = UdpSocket::bind((everywhere, 0)).and_then(|socket| {
+        socket.connect((far, 9))?;
+        socket.local_addr()
+    });
+    found.map(|address| address.ip()).ok().filter(|ip| !ip.is_unspecified()).unwrap_or(loopback)
 }
 
 async fn accept(listener: TcpListener, counter: Arc<Counter>) {

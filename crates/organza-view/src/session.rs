@@ -2,13 +2,15 @@
 
 use crate::accuracy::RungRow;
 use crate::artist::Artist;
+use crate::below::{Below, below};
+use crate::compare::{Comparison, Kept, KeptRow};
 use crate::curve::CurveRow;
 use crate::depths::PicturePlace;
 pub use crate::desk::Failure;
 use crate::desk::{Desk, Request, Seen};
 use crate::event::Event;
 use crate::lights::{LightRow, direction_of, kind_of as kind_of_light};
-use crate::picture::{Drawn, EffectRow, Facts, Picture, Size};
+use crate::picture::{Drawn, EffectRow, Facts, Level, Picture, Size};
 use crate::recording::Recording;
 use crate::scene_text;
 use crate::state::{Opening, Source, State};
@@ -33,6 +35,8 @@ const LOOK_BELOW: Duration = Duration::from_secs(10);
 pub struct Session {
     desk: Arc<Desk>,
     studio: Mutex<Studio>,
+    /// The picture that was kept, with how the last one differs from it.
+    kept: Mutex<Option<(Arc<Kept>, Option<Arc<Comparison>>)>>,
     artist: Mutex<Option<JoinHandle<()>>>,
 }
 
@@ -78,6 +82,10 @@ pub struct Shown {
     pub layer: Option<String>,
     /// Settings from fast to exact; `None` before a page asks for them.
     pub accuracy: Option<ShownAccuracy>,
+    /// The technique that was chosen; `None` for what the scene says.
+    pub technique: Option<String>,
+    /// The picture that was kept.
+    pub kept: Option<KeptRow>,
     /// What is to be said of the newest picture.
     pub picture: Option<Facts>,
     /// The picture in the making.
@@ -158,7 +166,7 @@ impl Session {
         let scene = stated.clone();
         let studio =
             Studio { title, source, stated, state, scene, generation: 0, edition: 0, is_on_disk, recording: None };
-        let session = Self { desk, studio: Mutex::new(studio), artist: Mutex::new(Some(thread)) };
+        let session = Self { desk, studio: Mutex::new(studio), kept: Mutex::new(None), artist: Mutex::new(Some(thread)) };
         session.apply(&[])?;
         Ok(session)
     }
@@ -199,6 +207,81 @@ impl Session {
             centre: Some(centre.to_array()),
         }])?;
         Ok(true)
+    }
+
+    /// Takes recorded events in. What names something that the scene does not have is left out; returns one sentence for each such event.
+    ///
+    /// # Errors
+    /// What a scene with the other events is refused for; the state is then as before.
+    pub fn play(&self, events: &[Event]) -> Result<Vec<String>, Error> {
+        let mut studio = self.studio();
+        let first = self.desk.own();
+        let mut state = studio.state.clone();
+        let mut left_out = Vec::new();
+        for (rank, event) in events.iter().enumerate() {
+            // An event that fails changes nothing.
+            if let Err(error) = state.apply(event, &studio.stated, &first) {
+                left_out.push(format!("event {rank}: {error}"));
+            }
+        }
+        studio.take(state, &self.desk)?;
+        if let Some(recording) = &mut studio.recording {
+            recording.add(events);
+        }
+        Ok(left_out)
+    }
+
+    fn kept(&self) -> MutexGuard<'_, Option<(Arc<Kept>, Option<Arc<Comparison>>)>> {
+        self.kept.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Keeps the whole picture of the present state to compare others with, in the place of the one before; false while it is drawn.
+    pub fn keep(&self) -> bool {
+        let step = self.studio().state.accuracy().step;
+        let picture = self.picture();
+        let Some(drawn) = self.finished() else { return false };
+        let Some(picture) = picture.filter(|picture| picture.facts.generation == drawn.generation) else { return false };
+        if picture.facts.level != Level::Whole {
+            return false;
+        }
+        *self.kept() = Some((Arc::new(Kept::new(drawn, picture, step)), None));
+        self.desk.tell_change();
+        true
+    }
+
+    /// Lets the picture go that was kept.
+    pub fn let_go(&self) {
+        *self.kept() = None;
+        self.desk.tell_change();
+    }
+
+    /// The picture that was kept.
+    pub fn kept_picture(&self) -> Option<Arc<Picture>> {
+        self.kept().as_ref().map(|(kept, _)| Arc::clone(&kept.picture))
+    }
+
+    /// How the whole picture of the present state differs from the one that was kept; `None` without either.
+    ///
+    /// # Errors
+    /// [`Error::Output`] for a picture that cannot be displayed.
+    pub fn comparison(&self) -> Result<Option<Arc<Comparison>>, Error> {
+        let Some(drawn) = self.finished() else { return Ok(None) };
+        let Some((kept, known)) = self.kept().clone() else { return Ok(None) };
+        if let Some(known) = known.filter(|known| known.generation == drawn.generation) {
+            return Ok(Some(known));
+        }
+        let found = Arc::new(kept.compared(&drawn)?);
+        if let Some((_, known)) = self.kept().as_mut().filter(|(now, _)| Arc::ptr_eq(now, &kept)) {
+            *known = Some(Arc::clone(&found));
+        }
+        Ok(Some(found))
+    }
+
+    /// What lies below a place of the picture; `None` before depths of the present view are known.
+    pub fn below(&self, place: PicturePlace) -> Option<Below> {
+        let depths = self.desk.depths()?;
+        let scene = self.studio().scene.clone();
+        Some(below(place, &scene, &depths, self.finished().as_deref(), |object| self.desk.data_of(object)))
     }
 
     /// Asks for settings from fast to exact, which [`Shown::accuracy`] has from then on.
@@ -284,6 +367,8 @@ impl Session {
                 set: studio.state.accuracy().texts(),
                 rungs,
             }),
+            technique: studio.state.technique().map(str::to_owned),
+            kept: self.kept().as_ref().map(|(kept, _)| kept.row.clone()),
             picture: picture.map(|picture| picture.facts.clone()),
             drawing: drawing.map(|(stage, share)| Drawing { stage, share }),
             is_whole: whole == Some(studio.generation),

@@ -1,12 +1,12 @@
 //! What a person has changed of a scene, and the scene that follows.
 
 use crate::event::{Event, Knot, Switch, settings};
-use crate::lights::{Direction, LightChange};
+use crate::lights::{Aim, Direction, LightChange};
 use crate::picture::Size;
 use crate::viewpoint::Viewpoint;
 use organza::scene::{self, LoadOptions, Override, Scene, printable, shown};
 use organza::{Error, Files, InMemory, RenderOptions};
-use splat_core::{MemoryAccount, Projection};
+use splat_core::{LightShape, MemoryAccount, Projection};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -52,9 +52,23 @@ impl Source {
         self.file.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("json"))
     }
 
+    /// For each light of the scene, which key says where it shines to: a scene has one of the two for a spot.
+    fn aims(&self, scene: &Scene) -> Vec<Aim> {
+        let aim = |(rank, light): (usize, &scene::SceneLight)| {
+            if !matches!(light.light.shape, LightShape::Spot { .. }) {
+                return Aim::Direction;
+            }
+            let stated = Override::parse(&format!("light.{rank}.direction=[0, -1, 0]"));
+            let changes = stated.map(|change| [self.load.overrides.clone(), vec![change]].concat());
+            let is_direction = changes.map_err(Error::from).and_then(|changes| self.scene(changes)).is_ok();
+            if is_direction { Aim::Direction } else { Aim::Target }
+        };
+        scene.lights.iter().enumerate().map(aim).collect()
+    }
+
     /// All changes: those of the command line, then those of the view.
     pub(crate) fn overrides(&self, state: &State, scene: &Scene) -> Result<Vec<Override>, Error> {
-        Ok([self.load.overrides.clone(), state.overrides(scene)?].concat())
+        Ok([self.load.overrides.clone(), state.overrides(scene, |scene| self.aims(scene))?].concat())
     }
 
     /// The scene with these changes.
@@ -112,6 +126,7 @@ pub(crate) struct State {
     /// The layer in the place of the beauty.
     layer: Option<String>,
     effects: BTreeMap<String, Switch>,
+    technique: Option<String>,
     accuracy: Accuracy,
 }
 
@@ -119,6 +134,11 @@ impl State {
     /// The position between fast and exact.
     pub(crate) const fn accuracy(&self) -> &Accuracy {
         &self.accuracy
+    }
+
+    /// The technique that was chosen.
+    pub(crate) fn technique(&self) -> Option<&str> {
+        self.technique.as_deref()
     }
 
     /// The same with the accuracy that the scene states.
@@ -206,6 +226,11 @@ impl State {
                 self.change(scene, object)?.knots.clone_from(knots);
             }
             Event::Layer { layer } => self.layer.clone_from(layer),
+            Event::Technique { technique } => {
+                self.technique.clone_from(technique);
+                // Another technique has other settings.
+                self.accuracy = Accuracy::default();
+            }
             Event::Accuracy { step, set } => self.accuracy = Accuracy { step: *step, set: settings(set)? },
             Event::Exposure { stops } => self.exposure = Some(*stops),
             Event::Size { width, height } => self.size = Some(Size { width: *width, height: *height }),
@@ -238,7 +263,7 @@ impl State {
     }
 
     /// The changes as those of the command line: `organza render SCENE` with them draws the same picture.
-    fn overrides(&self, scene: &Scene) -> Result<Vec<Override>, Error> {
+    fn overrides(&self, scene: &Scene, aims: impl Fn(&Scene) -> Vec<Aim>) -> Result<Vec<Override>, Error> {
         let size = self.size.unwrap_or(Size::of_scene(scene));
         let mut changes = Vec::new();
         if let Some(viewpoint) = &self.viewpoint {
@@ -258,9 +283,12 @@ impl State {
                 changes.push(Override::parse(&format!("object.{key}.transfer={}", transfer(knots)))?);
             }
         }
+        let is_turned = self.lights.values().any(|change| change.direction.is_some());
+        let aims = if is_turned { aims(scene) } else { Vec::new() };
         for (rank, change) in &self.lights {
+            let aim = aims.get(*rank).copied().unwrap_or(Aim::Direction);
             let Some(light) = scene.lights.get(*rank) else { continue };
-            for (key, value) in change.keys(light, scene.target) {
+            for (key, value) in change.keys(light, scene.target, aim) {
                 changes.push(Override::parse(&format!("light.{rank}.{key}={value}"))?);
             }
         }
@@ -274,6 +302,9 @@ impl State {
         }
         for (name, switch) in &self.effects {
             changes.push(Override::of_effect(&format!("{name}={}", switch.word()))?);
+        }
+        if let Some(technique) = &self.technique {
+            changes.push(Override::parse(&format!("render.technique={technique:?}"))?);
         }
         changes.extend(self.accuracy.set.iter().cloned());
         Ok(changes)

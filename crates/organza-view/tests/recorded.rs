@@ -454,6 +454,101 @@ fn accuracy_is_predicted_and_measured_and_is_that_of_the_scene() {
 }
 
 #[test]
+fn a_picture_that_is_kept_is_compared_with_what_follows() {
+    let session = session(HEAD);
+    assert!(session.comparison().unwrap().is_none());
+    let first = session.whole_picture().unwrap();
+    assert!(session.keep());
+    assert!(Arc::ptr_eq(&session.kept_picture().unwrap(), &first));
+    let same = session.comparison().unwrap().unwrap();
+    assert_eq!((same.rmse, same.flip, same.gain), (Some(0.0), Some(0.0), Some(1.0)));
+    // By another technique.
+    session.apply(&[Event::Technique { technique: Some("points".into()) }]).unwrap();
+    assert_shows_its_scene(&session, "by points");
+    assert_eq!(session.whole_picture().unwrap().facts.technique, "points");
+    session.apply(&[Event::Exposure { stops: 1.0 }]).unwrap();
+    let brighter = session.whole_picture().unwrap();
+    let found = session.comparison().unwrap().unwrap();
+    let sum = |png: &[u8]| pixels(png).iter().map(|byte| f64::from(*byte) / 255.0).sum::<f64>();
+    // A mean difference is no larger than the root of the mean square.
+    let mean = (sum(&brighter.png) - sum(&first.png)) / (3.0 * 48.0 * 36.0);
+    assert!(found.rmse.unwrap() >= mean && mean > 0.05 && found.flip > Some(0.01), "{found:?}");
+    assert_eq!(pixels(&found.png).len(), 3 * 48 * 36);
+    assert!(Arc::ptr_eq(&session.comparison().unwrap().unwrap(), &found), "it is compared once");
+    // Another size is not compared, and a layer is as it is shown.
+    session.apply(&[Event::Size { width: 20, height: 20 }]).unwrap();
+    session.whole_picture().unwrap();
+    assert_eq!(session.comparison().unwrap().unwrap().rmse, None);
+    session.let_go();
+    assert!(session.comparison().unwrap().is_none() && session.kept_picture().is_none());
+    assert!(session.apply(&[Event::Technique { technique: Some("magic".into()) }]).is_err());
+}
+
+#[test]
+fn what_lies_below_the_pointer_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    write_volume(folder.path());
+    let file = folder.path().join("scene.toml");
+    let dense = VOLUME.replace("extinction = 0 }", "extinction = 90 }").replace("extinction = 2 }", "extinction = 90 }");
+    let session = Session::open(Opening::of_text(&file, dense, RenderOptions::default()), &Progress::new()).unwrap();
+    let picture = session.whole_picture().unwrap();
+    let middle = PicturePlace { right: 0.5, down: 0.5 };
+    wait_for("what lies below", || session.below(middle).is_some_and(|below| !below.values.is_empty()));
+    let below = session.below(middle).unwrap();
+    // The middle of the picture is the point (1, 1, 1): the front of the ramp, whose value is its height, 7 at z = 1.75.
+    let [x, y, z] = below.position.unwrap();
+    assert!((x - 1.0).abs() < 0.2 && (y - 1.0).abs() < 0.2 && (1.4..2.1).contains(&z), "{below:?}");
+    assert!((below.depth.unwrap() - (8.0 - z)).abs() < 1e-3, "{below:?}");
+    assert_eq!((below.object.as_deref(), below.layer.as_str(), below.numbers.len()), (Some("ramp"), "beauty", 3));
+    assert_eq!(below.values[0].name, "value");
+    assert!((below.values[0].value - (z / 0.25).min(7.0)).abs() < 1e-6, "{below:?}");
+    let nothing = session.below(PicturePlace { right: 0.0, down: 0.0 }).unwrap();
+    assert_eq!((nothing.position, nothing.object), (None, None));
+    assert!(picture.facts.level == Level::Whole);
+}
+
+#[test]
+fn recorded_events_that_name_nothing_of_the_scene_are_left_out() {
+    let session = session(HEAD);
+    let renamed = Event::LightShadow { light: "moon".into(), shadow: false };
+    let left_out = session.play(&[renamed, Event::Exposure { stops: 1.0 }]).unwrap();
+    assert!(left_out.len() == 1 && left_out[0].starts_with("event 0: ") && left_out[0].contains("moon"), "{left_out:?}");
+    assert_eq!(session.shown().exposure, 1.0);
+    assert!(session.play(&[Event::Exposure { stops: 1e9 }]).is_err());
+}
+
+#[test]
+fn spots_and_discs_are_turned_with_the_side_that_they_shine_to() {
+    let spot = "kind = \"spot\"\nposition = [0, 3, 4]\nouter = 30\nintensity = [20, 20, 20]\n";
+    let disc = "kind = \"disk\"\nposition = [0, 3, 4]\nnormal = [0, -3, -4]\nradius = 0.5\nintensity = [20, 20, 20]\n";
+    let rect = "kind = \"rect\"\nposition = [0, 3, 4]\nu = [-0.5, 0, 0]\nv = [0, 0.4, -0.3]\nintensity = [20, 20, 20]\n";
+    let point = "kind = \"point\"\nposition = [2, 4, 1]\nintensity = [20, 20, 20]\n";
+    for light in [
+        format!("{spot}target = [0, 0, 0]\n"),
+        format!("{spot}direction = [0, -3, -4]\n"),
+        disc.to_owned(),
+        rect.to_owned(),
+    ] {
+        let session = session(&HEAD.replace(point, &light));
+        let name = "sun".to_owned();
+        session.apply(&[Event::LightDirection { light: name, azimuth: 90.0, elevation: 0.0 }]).unwrap();
+        let shape = saved(&session).lights[0].light.shape;
+        use splat_core::LightShape;
+        let (place, to) = match shape {
+            LightShape::Spot { position, direction, .. } => (position, direction),
+            LightShape::Disk { center, normal, .. } => (center, normal),
+            LightShape::Rect { center, u, v } => (center, u.cross(v).normalize()),
+            other => panic!("{other:?}"),
+        };
+        // It stands as far away, to the right, and shines to the middle as before.
+        assert!((place - splat_core::glam::DVec3::X * 5.0).length() < 1e-9, "{light}: {place}");
+        assert!((to + splat_core::glam::DVec3::X).length() < 1e-9, "{light}: {to}");
+        let row = session.shown().lights[0].direction.unwrap();
+        assert!((row.azimuth - 90.0).abs() < 1e-9 && row.elevation.abs() < 1e-9);
+    }
+}
+
+#[test]
 fn files_that_change_are_read_again_and_broken_ones_are_told() {
     let folder = tempfile::tempdir().unwrap();
     write_volume(folder.path());

@@ -104,9 +104,15 @@ impl Answer {
 #[test]
 fn the_page_and_its_parts_are_served_under_one_policy() {
     let running = Running::start();
-    for (path, content) in
-        [("", "text/html"), ("page.js", "text/javascript"), ("curve.js", "text/javascript"), ("page.css", "text/css")]
-    {
+    let script = "text/javascript";
+    for (path, content) in [
+        ("", "text/html"),
+        ("page.js", script),
+        ("curve.js", script),
+        ("judge.js", script),
+        ("save.js", script),
+        ("page.css", "text/css"),
+    ] {
         let answer = running.get(path);
         assert_eq!(answer.status, 200, "{path}");
         assert!(answer.head.contains(content), "{path}: {}", answer.head);
@@ -159,6 +165,91 @@ fn a_place_of_the_picture_is_brought_to_the_middle() {
         assert_eq!(centre(query).status, 400, "{query}");
     }
     assert_eq!(running.get("centre?client=a&right=0.5&down=0.5").status, 405);
+}
+
+#[test]
+fn a_picture_is_kept_compared_and_let_go() {
+    let running = Running::start();
+    let post = |path: &str| running.ask(&format!("POST /{}/{path}?client=a", running.token), &running.host(), "");
+    assert_eq!(running.get("kept?client=a").status, 404);
+    running.session.whole_picture().unwrap();
+    assert_eq!(running.get("comparison?client=a").status, 404);
+    let kept = post("keep");
+    assert!(kept.status == 200 && kept.body.contains("\"kept\":{\"number\":"), "{}", kept.body);
+    assert_eq!(running.post(r#"[{"do": "exposure", "stops": 1}]"#).status, 200);
+    running.session.whole_picture().unwrap();
+    let comparison = running.get("comparison?client=a");
+    assert!(comparison.body.contains("\"rmse\":0.") && !comparison.body.contains("png"), "{}", comparison.body);
+    for path in ["kept", "difference"] {
+        assert!(running.get(&format!("{path}?client=a")).head.contains("image/png"), "{path}");
+    }
+    assert_eq!(post("let-go").status, 200);
+    assert_eq!(running.get("difference?client=a").status, 404);
+    let accuracy = post("accuracy");
+    assert!(accuracy.status == 200 && accuracy.body.contains("\"accuracy\":{\"step\":0"), "{}", accuracy.body);
+}
+
+#[test]
+fn values_below_the_pointer_are_told() {
+    let running = Running::start();
+    running.session.whole_picture().unwrap();
+    let end = Instant::now() + Duration::from_secs(30);
+    let below = loop {
+        let answer = running.get("below?client=a&right=0.5&down=0.5");
+        if answer.status == 200 {
+            break answer;
+        }
+        // Depths come after the whole picture where that is fast.
+        assert!(answer.status == 404 && Instant::now() < end, "{}", answer.body);
+        std::thread::sleep(Duration::from_millis(20));
+    };
+    assert!(below.body.contains("\"object\":\"fog\"") && below.body.contains("\"layer\":\"beauty\""), "{}", below.body);
+    let beside = running.get("below?client=a&right=0&down=0");
+    assert!(beside.body.contains("\"position\":null,\"object\":null"), "{}", beside.body);
+    assert_eq!(running.get("below?client=a&right=2&down=0").status, 400);
+}
+
+/// Bytes of memory that this process holds.
+fn memory() -> u64 {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:"));
+    line.and_then(|line| line.trim().split(' ').next()?.parse::<u64>().ok()).map_or(0, |kib| kib << 10)
+}
+
+#[test]
+fn a_gigabyte_is_refused_and_ten_thousand_sockets_leave_nothing() {
+    let running = Running::start();
+    let Running { token, address, .. } = &running;
+    running.session.whole_picture().unwrap();
+    let before = memory();
+    // Announced, or in chunks of unknown number: either ends after a little.
+    let chunk = [b" ".repeat(1 << 16), b"\r\n".to_vec()].concat();
+    for length in ["Content-Length: 1073741824", "Transfer-Encoding: chunked"] {
+        let mut stream = TcpStream::connect(address).unwrap();
+        stream.set_write_timeout(Some(Duration::from_secs(12))).unwrap();
+        let head = format!(
+            "POST /{token}/events?client=a HTTP/1.1\r\nHost: {address}\r\nContent-Type: application/json\r\n{length}\r\n\r\n"
+        );
+        stream.write_all(head.as_bytes()).unwrap();
+        let is_chunked = length.starts_with('T');
+        let mut sent = 0u64;
+        while sent < 1 << 30 {
+            let head = if is_chunked { &b"10000\r\n"[..] } else { &b""[..] };
+            let body = if is_chunked { &chunk[..] } else { &chunk[..1 << 16] };
+            if stream.write_all(head).and_then(|()| stream.write_all(body)).is_err() {
+                break;
+            }
+            sent += 1 << 16;
+        }
+        assert!(sent < 1 << 26, "{length}: {sent} bytes were taken");
+    }
+    for _ in 0..100 {
+        let sockets: Vec<TcpStream> = (0..100).filter_map(|_| TcpStream::connect(address).ok()).collect();
+        drop(sockets);
+    }
+    assert_eq!(running.get("").status, 200);
+    let more = memory().saturating_sub(before);
+    assert!(more < 64 << 20, "{more} bytes");
 }
 
 #[test]

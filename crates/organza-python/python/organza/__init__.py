@@ -13,14 +13,17 @@ from organza.drawing import explain, render, turntable
 from organza.picture import Picture
 from organza.scene import Scene
 from organza.transfers import transfer
+from organza.viewing import View, view
 
 __all__ = [
     "InputError",
     "LimitError",
     "Picture",
     "Scene",
+    "View",
     "explain",
     "render",
     "transfer",
     "turntable",
+    "view",
 ]

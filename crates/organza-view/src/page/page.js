@@ -118,6 +118,7 @@ async function takePicture(answer) {
   image.close();
   at("waiting").hidden = true;
   if (shown) showMark(shown);
+  placeDivider();
 }
 
 /// Says of a picture that is not the whole one of the present state what it is.
@@ -139,6 +140,9 @@ function show(found, isAgain = false) {
   showObjects(found.objects);
   showLights(found.lights);
   showEffects(found.effects);
+  showAccuracy(found);
+  showCompare(found);
+  if (document.activeElement !== at("technique")) at("technique").value = found.technique || "";
   if (found.picture && found.picture.level === "whole") showPasses(found.picture.passes);
   if (found.picture) showLegends(found.picture.legends);
   if (document.activeElement !== at("layer")) at("layer").value = found.layer || "";
@@ -555,6 +559,8 @@ const keys = {
   "3": () => look(90, 0),
   "7": () => look(0, 90),
   c: () => centre(pointer),
+  v: () => toggleCursor(),
+  k: () => keep(),
   r: () => add({ do: "reset" }),
   s: () => save("picture.png"),
   h: () => at("keys").showModal(),
@@ -566,6 +572,7 @@ document.addEventListener("keydown", (event) => {
   if (event.ctrlKey || event.metaKey || event.altKey || at("keys").open) return;
   const isTyping = event.target.matches("input, select, textarea");
   const arrow = arrows[event.key];
+  if (cursor && !isTyping && moveCursor(event)) return;
   if (arrow && !isTyping) {
     const [right, up] = arrow;
     add(event.shiftKey ? { do: "pan", right: right * 0.05, up: up * 0.05 } : { do: "orbit", right: right / 36, up: up / 36 });
@@ -585,6 +592,7 @@ document.addEventListener("keydown", (event) => {
 
 at("reset").addEventListener("click", () => add({ do: "reset" }));
 at("help").addEventListener("click", () => at("keys").showModal());
+at("technique").addEventListener("change", () => add({ do: "technique", technique: at("technique").value || null }));
 at("layer").addEventListener("change", () => add({ do: "layer", layer: at("layer").value || null }));
 at("exposure").addEventListener("input", () => add({ do: "exposure", stops: Number(at("exposure").value) }));
 
@@ -597,6 +605,16 @@ for (const side of ["width", "height"]) {
 // A pixel of the picture is one of the screen.
 at("fill").addEventListener("click", () => setSize(stage.clientWidth * devicePixelRatio, stage.clientHeight * devicePixelRatio));
 
+function stemOfTitle() {
+  return shown.title.split(", ")[0].replace(/\.gz$/i, "").replace(/\.[^.]*$/, "") || "picture";
+}
+
+function download(blob, name) {
+  const address = URL.createObjectURL(blob);
+  element("a", { href: address, download: name }).click();
+  setTimeout(() => URL.revokeObjectURL(address), 10000);
+}
+
 async function save(what) {
   if (what !== "scene" && !(shown && shown.is_whole)) {
     trouble("The whole picture is not drawn yet; save it when it is.");
@@ -608,12 +626,9 @@ async function save(what) {
       trouble(sentence(await answer.json()));
       return;
     }
-    const stem = shown.title.split(", ")[0].replace(/\.gz$/i, "").replace(/\.[^.]*$/, "") || "picture";
+    const stem = stemOfTitle();
     const ending = what === "scene" ? (shown.title.endsWith(".json") ? "view.json" : "view.toml") : what.split(".")[1];
-    const address = URL.createObjectURL(await answer.blob());
-    const link = element("a", { href: address, download: `${stem}.${ending}` });
-    link.click();
-    setTimeout(() => URL.revokeObjectURL(address), 10000);
+    download(await answer.blob(), `${stem}.${ending}`);
     trouble("");
   } catch {
     lost();
@@ -628,5 +643,3 @@ window.addEventListener("pagehide", () => navigator.sendBeacon(`leave?client=${c
 // A page that comes back as it was left is a new one to the server.
 window.addEventListener("pageshow", (event) => event.persisted && location.reload());
 
-follow("state", () => (shown ? shown.version : 0), async (answer) => show(await answer.json()));
-follow("picture", () => number, takePicture);

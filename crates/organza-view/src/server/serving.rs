@@ -1,7 +1,9 @@
 //! Requests and their answers: who may ask, and for what.
 
 use super::clients::{Admission, Clients, MOST_CLIENTS};
+use super::Framing;
 use super::token::Token;
+use crate::compare::Comparison;
 use crate::depths::PicturePlace;
 use crate::event::Event;
 use crate::session::Session;
@@ -12,6 +14,7 @@ use hyper::header::{self, HeaderMap, HeaderName, HeaderValue};
 use hyper::{Method, Request, Response, StatusCode};
 use organza::Error;
 use organza::output::Format;
+use serde::Serialize;
 use serde_json::json;
 use std::net::{IpAddr, SocketAddr};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -32,9 +35,16 @@ const PATIENCE_WHILE_DRAWING: Duration = Duration::from_millis(250);
 const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; connect-src 'self'; \
                       base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
+/// The same with pages of this machine around it.
+const POLICY_OF_THIS_MACHINE: &str = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; \
+                                      connect-src 'self'; base-uri 'none'; form-action 'none'; \
+                                      frame-ancestors http://localhost:* http://127.0.0.1:* http://[::1]:*";
+
 const PAGE: &str = include_str!("../page/page.html");
 const SCRIPT: &str = include_str!("../page/page.js");
 const CURVE: &str = include_str!("../page/curve.js");
+const JUDGE: &str = include_str!("../page/judge.js");
+const SAVE: &str = include_str!("../page/save.js");
 const STYLE: &str = include_str!("../page/page.css");
 
 /// What answers are made from.
@@ -43,6 +53,7 @@ pub(crate) struct Counter {
     pub(crate) clients: Mutex<Clients>,
     pub(crate) token: Token,
     pub(crate) address: SocketAddr,
+    pub(crate) framing: Framing,
 }
 
 type Answer = Response<Full<Bytes>>;
@@ -51,8 +62,9 @@ type Answer = Response<Full<Bytes>>;
 pub(crate) async fn answer(counter: &Arc<Counter>, request: Request<Incoming>) -> Answer {
     let mut answer = answered(counter, request).await.unwrap_or_else(Refusal::answer);
     let headers = answer.headers_mut();
+    let policy = if counter.framing == Framing::Nobody { POLICY } else { POLICY_OF_THIS_MACHINE };
     for (name, value) in [
-        (header::CONTENT_SECURITY_POLICY, POLICY),
+        (header::CONTENT_SECURITY_POLICY, policy),
         (header::X_CONTENT_TYPE_OPTIONS, "nosniff"),
         (header::REFERRER_POLICY, "no-referrer"),
         (header::CACHE_CONTROL, "no-store"),
@@ -102,13 +114,19 @@ fn of_type(content: &'static str, body: impl Into<Bytes>) -> Answer {
 /// What is asked for, behind the token.
 enum Route<'p> {
     Page,
-    Script,
-    Curve,
+    Script(&'static str),
     Style,
     State,
     Picture,
     Events,
     Centre,
+    Below,
+    Accuracy,
+    Keep,
+    LetGo,
+    Kept,
+    Comparison,
+    Difference,
     Leave,
     Save(&'p str),
 }
@@ -117,13 +135,22 @@ impl<'p> Route<'p> {
     fn of(path: &'p str) -> Option<Self> {
         Some(match path {
             "" => Self::Page,
-            "page.js" => Self::Script,
-            "curve.js" => Self::Curve,
+            "page.js" => Self::Script(SCRIPT),
+            "curve.js" => Self::Script(CURVE),
+            "judge.js" => Self::Script(JUDGE),
+            "save.js" => Self::Script(SAVE),
             "page.css" => Self::Style,
             "state" => Self::State,
             "picture" => Self::Picture,
             "events" => Self::Events,
             "centre" => Self::Centre,
+            "below" => Self::Below,
+            "accuracy" => Self::Accuracy,
+            "keep" => Self::Keep,
+            "let-go" => Self::LetGo,
+            "kept" => Self::Kept,
+            "comparison" => Self::Comparison,
+            "difference" => Self::Difference,
             "leave" => Self::Leave,
             "save/picture.png" | "save/picture.exr" | "save/scene" => Self::Save(path.strip_prefix("save/")?),
             _ => return None,
@@ -132,7 +159,7 @@ impl<'p> Route<'p> {
 
     const fn method(&self) -> Method {
         match self {
-            Self::Events | Self::Centre | Self::Leave => Method::POST,
+            Self::Events | Self::Centre | Self::Accuracy | Self::Keep | Self::LetGo | Self::Leave => Method::POST,
             _ => Method::GET,
         }
     }
@@ -153,8 +180,7 @@ async fn answered(counter: &Arc<Counter>, request: Request<Incoming>) -> Result<
     let query = Query(uri.query().unwrap_or(""));
     match route {
         Route::Page => return Ok(of_type("text/html; charset=utf-8", PAGE)),
-        Route::Script => return Ok(of_type("text/javascript; charset=utf-8", SCRIPT)),
-        Route::Curve => return Ok(of_type("text/javascript; charset=utf-8", CURVE)),
+        Route::Script(text) => return Ok(of_type("text/javascript; charset=utf-8", text)),
         Route::Style => return Ok(of_type("text/css; charset=utf-8", STYLE)),
         _ => {}
     }
@@ -169,11 +195,40 @@ async fn answered(counter: &Arc<Counter>, request: Request<Incoming>) -> Result<
         Route::Picture => picture(&counter.session, query.number("after")?).await,
         Route::Events => events(&counter.session, request).await,
         Route::Centre => {
-            let place = PicturePlace { right: query.share("right")?, down: query.share("down")? };
-            centre(&counter.session, place).await
+            centre(&counter.session, query.place()?).await
+        }
+        Route::Below => below(&counter.session, query.place()?).await,
+        Route::Accuracy => {
+            counter.session.ask_for_accuracy().map_err(|e| Refusal::of_error(&e))?;
+            Ok(of_type("application/json", shown(&counter.session)?))
+        }
+        Route::Keep => {
+            let message = "the whole picture is not drawn yet; keep it when it is";
+            let refused = || Refusal::new(StatusCode::SERVICE_UNAVAILABLE, message);
+            counter.session.keep().then_some(()).ok_or_else(refused)?;
+            Ok(of_type("application/json", shown(&counter.session)?))
+        }
+        Route::LetGo => {
+            counter.session.let_go();
+            Ok(of_type("application/json", shown(&counter.session)?))
+        }
+        Route::Kept => {
+            let kept = counter.session.kept_picture();
+            let refused = || Refusal::new(StatusCode::NOT_FOUND, "no picture is kept");
+            Ok(of_type("image/png", kept.ok_or_else(refused)?.png.clone()))
+        }
+        Route::Comparison => {
+            let found = comparison(&counter.session).await?;
+            Ok(of_type("application/json", json_of(&*found)?))
+        }
+        Route::Difference => {
+            let found = comparison(&counter.session).await?;
+            let refused = || Refusal::new(StatusCode::NOT_FOUND, "the two pictures are not compared");
+            let png = Some(found.png.clone()).filter(|png| !png.is_empty());
+            Ok(of_type("image/png", png.ok_or_else(refused)?))
         }
         Route::Save(what) => saved(&counter.session, what).await,
-        Route::Page | Route::Script | Route::Curve | Route::Style | Route::Leave => {
+        Route::Page | Route::Script(_) | Route::Style | Route::Leave => {
             Err(Refusal::new(StatusCode::NOT_FOUND, "there is nothing here"))
         }
     };
@@ -247,6 +302,10 @@ impl<'q> Query<'q> {
         let message = format!("`{key}`: expected a share of the picture, 0 to 1");
         share.ok_or_else(|| Refusal::new(StatusCode::BAD_REQUEST, &message))
     }
+
+    fn place(&self) -> Result<PicturePlace, Refusal> {
+        Ok(PicturePlace { right: self.share("right")?, down: self.share("down")? })
+    }
 }
 
 /// Turns the scene around what is seen at a place, and answers with the state.
@@ -273,7 +332,31 @@ async fn state(session: &Session, after: u64) -> Result<Answer, Refusal> {
 }
 
 fn shown(session: &Session) -> Result<Vec<u8>, Refusal> {
-    let bytes = serde_json::to_vec(&session.shown());
+    json_of(&session.shown())
+}
+
+/// What lies below a place of the picture.
+async fn below(session: &Arc<Session>, place: PicturePlace) -> Result<Answer, Refusal> {
+    let session = Arc::clone(session);
+    // The nearest of many points takes a while.
+    let found = tokio::task::spawn_blocking(move || session.below(place)).await;
+    let found = found.map_err(|_| Refusal::new(StatusCode::INTERNAL_SERVER_ERROR, "looking below the pointer failed"))?;
+    let refused = || Refusal::new(StatusCode::NOT_FOUND, "depths of this view are not known yet");
+    Ok(of_type("application/json", json_of(&found.ok_or_else(refused)?)?))
+}
+
+/// How the present picture differs from the one that was kept.
+async fn comparison(session: &Arc<Session>) -> Result<Arc<Comparison>, Refusal> {
+    let session = Arc::clone(session);
+    // What the eye makes of two pictures takes a while.
+    let found = tokio::task::spawn_blocking(move || session.comparison()).await;
+    let found = found.map_err(|_| Refusal::new(StatusCode::INTERNAL_SERVER_ERROR, "comparing two pictures failed"))?;
+    let refused = || Refusal::new(StatusCode::NOT_FOUND, "no picture is kept, or the present one is not drawn yet");
+    found.map_err(|e| Refusal::of_error(&e))?.ok_or_else(refused)
+}
+
+fn json_of(document: &impl Serialize) -> Result<Vec<u8>, Refusal> {
+    let bytes = serde_json::to_vec(document);
     bytes.map_err(|e| Refusal::new(StatusCode::INTERNAL_SERVER_ERROR, &format!("the state is no JSON: {e}")))
 }
 

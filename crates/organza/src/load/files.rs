@@ -98,6 +98,14 @@ impl Files {
         }
     }
 
+    /// The data of a source of a scene where they are at hand, of a series those of one frame: nothing is read.
+    pub fn kept(&self, scene: &Scene, source: &Path, frame: u64) -> Option<SourceData> {
+        if let Some(data) = scene.in_memory.get(source) {
+            return Some(data.clone());
+        }
+        self.read.borrow().get(&(real(source), frame)).map(|(_, read)| read.0.clone())
+    }
+
     /// The same without keeping a file: for whoever keeps what is made from it.
     pub(super) fn data_once(
         &self,

@@ -1,0 +1,159 @@
+//! What lies below the pointer: the number of the layer, the depth, the place, the object, and what its data say there.
+
+use crate::depths::{Depths, PicturePlace};
+use crate::picture::Drawn;
+use organza::SourceData;
+use organza::scene::{Scene, SceneObject};
+use serde::Serialize;
+use splat_core::glam::DVec3;
+use splat_core::{Grid, RawPoints};
+use std::sync::{Arc, Weak};
+
+/// Most columns of points that are told.
+const MOST_COLUMNS: usize = 4;
+
+/// What lies below the pointer.
+#[derive(Debug, Clone, PartialEq, Serialize, Default)]
+pub struct Below {
+    /// The layer that is shown, and `beauty` where none is chosen.
+    pub layer: String,
+    /// Its numbers there: radiances of three channels, a vector, or one number; none before the whole picture is drawn.
+    pub numbers: Vec<f64>,
+    /// View depth at which half of the light is absorbed, world units.
+    pub depth: Option<f64>,
+    /// Where that is, world units.
+    pub position: Option<[f64; 3]>,
+    /// The object that is seen first.
+    pub object: Option<String>,
+    /// What its data say there.
+    pub values: Vec<NamedValue>,
+}
+
+/// A number of an object's data.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct NamedValue {
+    /// `value` of a volume; the name of a column of points.
+    pub name: String,
+    /// The number; of points that of the nearest one.
+    pub value: f64,
+}
+
+/// Data of an object, as long as something else keeps them.
+#[derive(Debug, Clone)]
+pub(crate) enum DataOfObject {
+    Volume(Weak<Grid>),
+    Points(Weak<RawPoints>),
+}
+
+impl DataOfObject {
+    /// `None` for data whose numbers are not told.
+    pub(crate) fn new(data: &SourceData) -> Option<Self> {
+        match data {
+            SourceData::Grid(grid) => Some(Self::Volume(Arc::downgrade(grid))),
+            SourceData::Points(points) => Some(Self::Points(Arc::downgrade(points))),
+            SourceData::Mesh(_) | SourceData::Image(_) => None,
+        }
+    }
+
+    /// The numbers at a place, world units; none where data are not kept.
+    fn at(&self, object: &SceneObject, place: DVec3) -> Vec<NamedValue> {
+        let transform = &object.transform;
+        let local = transform.rotation.inverse() * (place - transform.translation) / transform.scale;
+        match self {
+            Self::Volume(grid) => grid.upgrade().and_then(|grid| of_volume(&grid, local)).into_iter().collect(),
+            Self::Points(points) => points.upgrade().map_or_else(Vec::new, |points| of_points(&points, local)),
+        }
+    }
+}
+
+/// The value of a volume between its voxels; `None` outside.
+fn of_volume(grid: &Grid, place: DVec3) -> Option<NamedValue> {
+    let at = grid.axes.inverse() * (place - grid.origin);
+    let is_inside = (0..3).all(|k| at[k] >= -0.5 && at[k] <= grid.dims[k] as f64 - 0.5);
+    if !is_inside {
+        return None;
+    }
+    let low = at.floor();
+    let share = at - low;
+    let value = |corner: usize| {
+        let step = |k: usize| (corner >> k & 1) as isize;
+        let weight = (0..3).map(|k| if step(k) == 1 { share[k] } else { 1.0 - share[k] }).product::<f64>();
+        // A voxel without a value has no share in it.
+        let value = grid.at_clamped(low.x as isize + step(0), low.y as isize + step(1), low.z as isize + step(2));
+        if weight > 0.0 { weight * f64::from(value) } else { 0.0 }
+    };
+    let value: f64 = (0..8).map(value).sum();
+    value.is_finite().then(|| NamedValue { name: "value".to_owned(), value })
+}
+
+/// The numbers of the nearest point.
+fn of_points(points: &RawPoints, place: DVec3) -> Vec<NamedValue> {
+    let place = (place - points.origin).as_vec3();
+    let distance = |(rank, position): (usize, &splat_core::glam::Vec3)| (rank, position.distance_squared(place));
+    let nearest = points.position.iter().enumerate().map(distance).min_by(|a, b| a.1.total_cmp(&b.1));
+    let Some((rank, _)) = nearest else { return Vec::new() };
+    let of_columns =
+        points.columns.iter().filter_map(|column| Some((column.name.clone(), *column.values.get(rank)?)));
+    let own = points.value.get(rank).map(|value| (points.value_name().to_owned(), f64::from(*value)));
+    let class = points.classification.get(rank).map(|class| ("classification".to_owned(), f64::from(*class)));
+    let named = of_columns.chain(own).chain(class).filter(|(_, value)| value.is_finite());
+    named.map(|(name, value)| NamedValue { name, value }).take(MOST_COLUMNS).collect()
+}
+
+/// What lies below a place of the picture.
+pub(crate) fn below(
+    place: PicturePlace,
+    scene: &Scene,
+    depths: &Depths,
+    whole: Option<&Drawn>,
+    data: impl Fn(&str) -> Option<DataOfObject>,
+) -> Below {
+    let (layer, numbers) = whole.and_then(|whole| whole.number_at(place)).unwrap_or_default();
+    let position = depths.point_at(place);
+    let object = position.and_then(|_| scene.objects.get(depths.object_at(place)?));
+    let values = object
+        .zip(position)
+        .and_then(|(object, position)| Some(data(&object.name)?.at(object, position)))
+        .unwrap_or_default();
+    Below {
+        layer,
+        numbers,
+        depth: depths.depth_at(place),
+        position: position.map(DVec3::into),
+        object: object.map(|object| object.name.clone()),
+        values,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use splat_core::glam::{DMat3, Vec3};
+
+    #[test]
+    fn a_volume_is_linear_between_its_voxels() {
+        // The value is i + 10 j + 100 k.
+        let value = |n: usize| (n % 2 + 10 * (n / 2 % 2) + 100 * (n / 4)) as f32;
+        let grid = Grid {
+            origin: DVec3::new(1.0, 2.0, 3.0),
+            axes: DMat3::from_diagonal(DVec3::splat(0.5)),
+            dims: [2, 2, 2],
+            values: (0..8).map(value).collect(),
+        };
+        let found = of_volume(&grid, DVec3::new(1.25, 2.5, 3.125)).unwrap();
+        assert!((found.value - (0.5 + 10.0 + 25.0)).abs() < 1e-12);
+        assert_eq!(of_volume(&grid, DVec3::ZERO), None);
+    }
+
+    #[test]
+    fn points_tell_the_columns_of_the_nearest() {
+        let points = RawPoints {
+            position: vec![Vec3::ZERO, Vec3::X],
+            value: vec![5.0, 7.0],
+            columns: vec![splat_core::Column { name: "height".into(), values: vec![1.5, f64::NAN] }],
+            ..RawPoints::default()
+        };
+        let of = |x| of_points(&points, DVec3::new(x, 0.1, 0.0)).iter().map(|v| v.value).collect::<Vec<_>>();
+        assert_eq!((of(0.2), of(0.9)), (vec![1.5, 5.0], vec![7.0]));
+    }
+}
