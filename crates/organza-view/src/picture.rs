@@ -337,11 +337,6 @@ impl Drawn {
         }
     }
 
-    /// What is to be said about it.
-    pub(crate) const fn facts(&self) -> &Facts {
-        &self.facts
-    }
-
     /// Name and numbers of the layer that the page shows, at a place of the picture.
     pub(crate) fn number_at(&self, place: PicturePlace) -> Option<(String, Vec<f64>)> {
         let name = self.layer.clone().unwrap_or_else(|| "beauty".to_owned());
