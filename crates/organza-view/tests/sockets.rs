@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use organza::{Progress, RenderOptions};
-use organza_view::{Ended, Opening, Server, Session};
+use organza_view::{Ended, Framing, Opening, Server, Session};
 use std::io::{Read, Write};
 use std::net::{SocketAddr, TcpStream};
 use std::sync::Arc;
@@ -30,9 +30,13 @@ struct Running {
 
 impl Running {
     fn start() -> Self {
+        Self::start_framed(Framing::Nobody)
+    }
+
+    fn start_framed(framing: Framing) -> Self {
         let opening = Opening::of_text("scene.toml", SCENE, RenderOptions::default());
         let session = Arc::new(Session::open(opening, &Progress::new()).unwrap());
-        let server = Server::bind("127.0.0.1:0".parse().unwrap()).unwrap();
+        let server = Server::bind("127.0.0.1:0".parse().unwrap()).unwrap().framed_by(framing);
         let url = server.url();
         let rest = url.strip_prefix("http://").unwrap();
         let (address, token) = rest.trim_end_matches('/').split_once('/').unwrap();
@@ -129,6 +133,15 @@ fn the_page_and_its_parts_are_served_under_one_policy() {
     assert!(running.get("save/picture.png?client=a").head.contains("image/png"));
     assert!(running.get("save/picture.exr?client=a").head.contains("image/x-exr"));
     assert!(running.get("save/scene?client=a").body.contains("medium_box"));
+}
+
+#[test]
+fn notebooks_of_this_machine_may_show_the_page_where_that_is_allowed() {
+    let running = Running::start_framed(Framing::ThisMachine);
+    let answer = running.get("");
+    let policy = answer.head.lines().find(|line| line.starts_with("content-security-policy:")).unwrap();
+    assert!(policy.ends_with("frame-ancestors http://localhost:* http://127.0.0.1:* http://[::1]:*"), "{policy}");
+    assert!(policy.contains("default-src 'none'; script-src 'self'"));
 }
 
 #[test]

@@ -129,6 +129,8 @@ async function compare(row, key) {
     lost();
   }
   comparing = false;
+  // The scene may have changed meanwhile.
+  if (shown && shown.kept && shown.is_whole && `${kept}/${shown.generation}` !== key) showCompare(shown);
 }
 
 /// Shows the kept picture, or the difference, over the present one.
