@@ -64,13 +64,8 @@ impl Scale {
             Ok(knobs_of(stated, &foreseen.plan.techniques, &facts, slab_width))
         };
         let Some(knobs) = sequence.foresee(stated, options, progress, look)? else { return Ok(None) };
-        let mut scale = Self {
-            stated: stated.clone(),
-            knobs,
-            rungs: Vec::new(),
-            rows: Vec::new(),
-            pictures: BTreeMap::new(),
-        };
+        let mut scale =
+            Self { stated: stated.clone(), knobs, rungs: Vec::new(), rows: Vec::new(), pictures: BTreeMap::new() };
         scale.see(stated);
         Ok(Some(scale))
     }

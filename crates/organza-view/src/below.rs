@@ -92,8 +92,7 @@ fn of_points(points: &RawPoints, place: DVec3) -> Vec<NamedValue> {
     let distance = |(rank, position): (usize, &splat_core::glam::Vec3)| (rank, position.distance_squared(place));
     let nearest = points.position.iter().enumerate().map(distance).min_by(|a, b| a.1.total_cmp(&b.1));
     let Some((rank, _)) = nearest else { return Vec::new() };
-    let of_columns =
-        points.columns.iter().filter_map(|column| Some((column.name.clone(), *column.values.get(rank)?)));
+    let of_columns = points.columns.iter().filter_map(|column| Some((column.name.clone(), *column.values.get(rank)?)));
     let own = points.value.get(rank).map(|value| (points.value_name().to_owned(), f64::from(*value)));
     let class = points.classification.get(rank).map(|class| ("classification".to_owned(), f64::from(*class)));
     let named = of_columns.chain(own).chain(class).filter(|(_, value)| value.is_finite());

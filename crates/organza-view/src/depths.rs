@@ -78,7 +78,8 @@ mod tests {
                 right: 0.5 + seen.x / scale * camera.focal_px() / 40.0,
                 down: 0.5 - seen.y / scale * camera.focal_px() / 30.0,
             };
-            let depths = Depths { generation: 1, camera, depth: vec![seen.z as f32; 40 * 30], object: vec![2; 40 * 30] };
+            let depths =
+                Depths { generation: 1, camera, depth: vec![seen.z as f32; 40 * 30], object: vec![2; 40 * 30] };
             assert_eq!((depths.object_at(place), depths.depth_at(place)), (Some(2), Some(f64::from(seen.z as f32))));
             let found = depths.point_at(place).unwrap();
             assert!((found - point).length() < 1e-6, "{found}");
@@ -90,7 +91,8 @@ mod tests {
     #[test]
     fn places_beside_the_picture_are_at_its_border() {
         let camera = Camera::look_at(DVec3::Z, DVec3::ZERO, DVec3::Y, Projection::Perspective { fov_y: 0.6 }, [4, 3]);
-        let depths = Depths { generation: 1, camera: camera.unwrap(), depth: vec![1.0; 12], object: vec![u32::MAX; 12] };
+        let depths =
+            Depths { generation: 1, camera: camera.unwrap(), depth: vec![1.0; 12], object: vec![u32::MAX; 12] };
         for share in [-1.0, 0.0, 1.0, 2.0, f64::NAN] {
             let found = depths.point_at(PicturePlace { right: share, down: share });
             assert!(found.is_some());

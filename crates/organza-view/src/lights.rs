@@ -99,7 +99,9 @@ impl LightChange {
 /// Where a light stands.
 fn place_of(shape: &LightShape) -> Option<DVec3> {
     Some(match *shape {
-        LightShape::Point { position } | LightShape::Spot { position, .. } | LightShape::Patch { position, .. } => position,
+        LightShape::Point { position } | LightShape::Spot { position, .. } | LightShape::Patch { position, .. } => {
+            position
+        }
         LightShape::Sphere { center, .. } | LightShape::Disk { center, .. } | LightShape::Rect { center, .. } => center,
         _ => return None,
     })

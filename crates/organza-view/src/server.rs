@@ -126,9 +126,7 @@ fn own_address(everywhere: IpAddr) -> IpAddr {
     // Addresses for documentation, which no machine has. A datagram socket that is connected sends nothing.
     let [loopback, far] = match everywhere {
         IpAddr::V4(_) => [IpAddr::V4(Ipv4Addr::LOCALHOST), IpAddr::V4(Ipv4Addr::new(192, 0, 2, 1))],
-        IpAddr::V6(_) => {
-            [IpAddr::V6(Ipv6Addr::LOCALHOST), IpAddr::V6(Ipv6Addr::new(0x2001, 0xdb8, 0, 0, 0, 0, 0, 1))]
-        }
+        IpAddr::V6(_) => [IpAddr::V6(Ipv6Addr::LOCALHOST), IpAddr::V6(Ipv6Addr::new(0x2001, 0xdb8, 0, 0, 0, 0, 0, 1))],
     };
     let found = UdpSocket::bind((everywhere, 0)).and_then(|socket| {
         socket.connect((far, 9))?;

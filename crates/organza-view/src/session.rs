@@ -166,7 +166,8 @@ impl Session {
         let scene = stated.clone();
         let studio =
             Studio { title, source, stated, state, scene, generation: 0, edition: 0, is_on_disk, recording: None };
-        let session = Self { desk, studio: Mutex::new(studio), kept: Mutex::new(None), artist: Mutex::new(Some(thread)) };
+        let session =
+            Self { desk, studio: Mutex::new(studio), kept: Mutex::new(None), artist: Mutex::new(Some(thread)) };
         session.apply(&[])?;
         Ok(session)
     }
@@ -240,7 +241,9 @@ impl Session {
         let step = self.studio().state.accuracy().step;
         let picture = self.picture();
         let Some(drawn) = self.finished() else { return false };
-        let Some(picture) = picture.filter(|picture| picture.facts.generation == drawn.generation) else { return false };
+        let Some(picture) = picture.filter(|picture| picture.facts.generation == drawn.generation) else {
+            return false;
+        };
         if picture.facts.level != Level::Whole {
             return false;
         }

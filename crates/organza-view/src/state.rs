@@ -457,7 +457,8 @@ mod tests {
 
     #[test]
     fn settings_of_accuracy_are_the_scene_s_and_are_taken_back() {
-        let accuracy = |step, set: &[&str]| Event::Accuracy { step, set: set.iter().map(|s| (*s).to_owned()).collect() };
+        let accuracy =
+            |step, set: &[&str]| Event::Accuracy { step, set: set.iter().map(|s| (*s).to_owned()).collect() };
         let fast = accuracy(-3, &["render.antialias=1", "render.splat_share=0.25", "render.shadow.cells=64"]);
         let scene = after(std::slice::from_ref(&fast)).unwrap();
         let render = &scene.render;

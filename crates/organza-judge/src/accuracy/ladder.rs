@@ -186,13 +186,14 @@ mod tests {
     fn a_rung_is_the_scene_with_what_it_says() {
         let scene = scene(&[]);
         let rungs = rungs(&scene, &[Technique::Points]);
-        assert_eq!(rungs.iter().map(|rung| rung.step).collect::<Vec<_>>(), [-3, -2, -1, 0, 1, 2, 3]);
+        // Two positions of samples and of slices are finer: the first of three would be the scene's own.
+        assert_eq!(rungs.iter().map(|rung| rung.step).collect::<Vec<_>>(), [-3, -2, -1, 0, 2, 3]);
         for rung in &rungs {
             let sets = rung.sets(&scene);
             assert_eq!(self::scene(&sets).render, rung.request.scene.render, "{sets:?}");
             assert_eq!(sets.is_empty(), rung.step == 0);
         }
-        let [fastest, .., exact] = &rungs[..] else { panic!("seven rungs") };
+        let [fastest, .., exact] = &rungs[..] else { panic!("several rungs") };
         assert_eq!((fastest.request.scene.render.antialias, exact.request.scene.render.antialias), (1, 8));
         assert_eq!((fastest.request.scene.render.splat_share, exact.request.scene.render.splat_share), (0.0156, 1.0));
         assert!(exact.request.scene.render.points.exact && !fastest.request.scene.render.points.exact);

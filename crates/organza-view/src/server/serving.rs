@@ -1,7 +1,7 @@
 //! Requests and their answers: who may ask, and for what.
 
-use super::clients::{Admission, Clients, MOST_CLIENTS};
 use super::Framing;
+use super::clients::{Admission, Clients, MOST_CLIENTS};
 use super::token::Token;
 use crate::compare::Comparison;
 use crate::depths::PicturePlace;
@@ -194,9 +194,7 @@ async fn answered(counter: &Arc<Counter>, request: Request<Incoming>) -> Result<
         Route::State => state(&counter.session, query.number("after")?).await,
         Route::Picture => picture(&counter.session, query.number("after")?).await,
         Route::Events => events(&counter.session, request).await,
-        Route::Centre => {
-            centre(&counter.session, query.place()?).await
-        }
+        Route::Centre => centre(&counter.session, query.place()?).await,
         Route::Below => below(&counter.session, query.place()?).await,
         Route::Accuracy => {
             counter.session.ask_for_accuracy().map_err(|e| Refusal::of_error(&e))?;
@@ -340,7 +338,8 @@ async fn below(session: &Arc<Session>, place: PicturePlace) -> Result<Answer, Re
     let session = Arc::clone(session);
     // The nearest of many points takes a while.
     let found = tokio::task::spawn_blocking(move || session.below(place)).await;
-    let found = found.map_err(|_| Refusal::new(StatusCode::INTERNAL_SERVER_ERROR, "looking below the pointer failed"))?;
+    let found =
+        found.map_err(|_| Refusal::new(StatusCode::INTERNAL_SERVER_ERROR, "looking below the pointer failed"))?;
     let refused = || Refusal::new(StatusCode::NOT_FOUND, "depths of this view are not known yet");
     Ok(of_type("application/json", json_of(&found.ok_or_else(refused)?)?))
 }

@@ -227,8 +227,13 @@ mod tests {
         let progress = Progress::new();
         let scene = changed(&[]);
         let mut sequence = Sequence::default();
-        let seconds = |foreseen: &Foreseen<'_>| Ok(foreseen.predicted.drawing.iter().map(|p| p.seconds(&options.rates, 1)).sum());
-        assert_eq!(sequence.foresee(&scene, &options, &progress, seconds).unwrap(), None::<f64>, "nothing was drawn yet");
+        let seconds =
+            |foreseen: &Foreseen<'_>| Ok(foreseen.predicted.drawing.iter().map(|p| p.seconds(&options.rates, 1)).sum());
+        assert_eq!(
+            sequence.foresee(&scene, &options, &progress, seconds).unwrap(),
+            None::<f64>,
+            "nothing was drawn yet"
+        );
         let drawn = sequence.render(&scene, &options, &progress).unwrap();
         let mut of = |changes: &[&str]| sequence.foresee(&changed(changes), &options, &progress, seconds).unwrap();
         let own: f64 = of(&[]).unwrap();
