@@ -1,5 +1,7 @@
 //! Settings of the viewed scene from fast to exact, with what each is predicted to take, and what it took and showed once it was drawn.
 
+pub(crate) mod compare;
+
 use crate::picture::{Drawn, Size};
 use crate::state::Accuracy;
 use organza::cost::Prediction;
@@ -11,6 +13,11 @@ use std::collections::BTreeMap;
 
 /// Most pixels of pictures that are compared: the perceived difference of more takes seconds.
 const MOST_PIXELS: u64 = 4 << 20;
+
+/// Whether pictures of a size are compared.
+fn is_compared(size: Size) -> bool {
+    u64::from(size.width) * u64::from(size.height) <= MOST_PIXELS
+}
 
 /// A position between fast and exact, as a row of the page.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -138,7 +145,7 @@ impl Scale {
         };
         row.measured_ms = Some(drawn.drawing_ms());
         let Size { width, height } = drawn.size();
-        if u64::from(width) * u64::from(height) > MOST_PIXELS {
+        if !is_compared(drawn.size()) {
             return Ok(());
         }
         let best = |pictures: &BTreeMap<i32, Vec<u8>>| pictures.last_key_value().map(|(step, _)| *step);

@@ -1,10 +1,10 @@
 //! The thread that draws: of every request a coarse picture first, then the whole one, always the newest request alone.
 
 use crate::accuracy::Scale;
-use crate::below::DataOfObject;
 use crate::coarse::{BUDGET, DEPTH_LAYER, Detail, OBJECT_LAYER, drawing_time};
 use crate::curve::values_of;
 use crate::depths::Depths;
+use crate::depths::below::DataOfObject;
 use crate::desk::{Desk, Request, Task};
 use crate::picture::{Drawn, Level};
 use crate::viewpoint::Viewpoint;

@@ -1,5 +1,7 @@
 //! Which place of the scene lies below the pointer, and which object.
 
+pub(crate) mod below;
+
 use splat_core::Camera;
 use splat_core::glam::DVec3;
 

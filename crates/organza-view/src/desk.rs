@@ -1,9 +1,9 @@
 //! Where a session leaves what is to be drawn, and the artist what is drawn. Only the newest request counts.
 
 use crate::accuracy::RungRow;
-use crate::below::DataOfObject;
 use crate::curve::Values;
 use crate::depths::Depths;
+use crate::depths::below::DataOfObject;
 use crate::picture::{Drawn, EffectRow, Level, Picture};
 use crate::state::Accuracy;
 use crate::viewpoint::Viewpoint;

@@ -32,9 +32,7 @@
 
 mod accuracy;
 mod artist;
-mod below;
 mod coarse;
-mod compare;
 mod curve;
 mod depths;
 mod desk;
@@ -52,10 +50,10 @@ mod watch;
 mod wording;
 
 pub use accuracy::RungRow;
-pub use below::{Below, NamedValue};
-pub use compare::{Comparison, KeptRow};
+pub use accuracy::compare::{Comparison, KeptRow};
 pub use curve::{CurveRow, Values};
 pub use depths::PicturePlace;
+pub use depths::below::{Below, NamedValue};
 pub use event::{Event, Knot, MOST_KNOTS, Switch};
 pub use lights::{Direction, LightRow};
 pub use picture::{EffectRow, Facts, Legend, Level, Mark, PassRow, Picture, Size};

@@ -1,11 +1,11 @@
 //! A view without a window: events go in, pictures and the state come out.
 
 use crate::accuracy::RungRow;
+use crate::accuracy::compare::{Comparison, Kept, KeptRow};
 use crate::artist::Artist;
-use crate::below::{Below, below};
-use crate::compare::{Comparison, Kept, KeptRow};
 use crate::curve::CurveRow;
 use crate::depths::PicturePlace;
+use crate::depths::below::{Below, below};
 pub use crate::desk::Failure;
 use crate::desk::{Desk, Request, Seen};
 use crate::event::Event;

@@ -111,11 +111,20 @@ at("turntable").addEventListener("click", turntable);
 
 // ---- the address of a view ----
 
+/// What an address may do: events that say how the scene is seen, and change nothing of it.
+const OF_VIEW = ["look_from", "exposure", "layer", "technique", "accuracy"];
+
 function copyView() {
   if (!shown) return;
   const eye = shown.viewpoint;
-  const numbers = [eye.azimuth, eye.elevation, eye.distance, ...eye.centre].map((number) => Number(number.toPrecision(9)));
-  history.replaceState(null, "", `#view=${numbers.join(",")}`);
+  const events = [
+    { do: "look_from", azimuth: eye.azimuth, elevation: eye.elevation, distance: eye.distance, centre: eye.centre },
+    { do: "exposure", stops: shown.exposure },
+    { do: "layer", layer: shown.layer },
+    { do: "technique", technique: shown.technique },
+  ];
+  if (shown.accuracy) events.push({ do: "accuracy", step: shown.accuracy.step, set: shown.accuracy.set });
+  history.replaceState(null, "", `#${encodeURIComponent(JSON.stringify(events))}`);
   const done = () => {
     at("copy-view").textContent = "Copied";
     setTimeout(() => (at("copy-view").textContent = "Copy view"), 2000);
@@ -125,12 +134,17 @@ function copyView() {
 }
 at("copy-view").addEventListener("click", copyView);
 
-/// Looks from where the address says.
+/// Shows the scene as the address says.
 function takeView() {
-  const found = /^#view=([-+.\de,]+)$/i.exec(location.hash);
-  const numbers = found ? found[1].split(",").map(Number) : [];
-  if (numbers.length !== 6 || !numbers.every(Number.isFinite)) return;
-  look_from({ azimuth: numbers[0], elevation: numbers[1], distance: numbers[2], centre: numbers.slice(3) });
+  if (location.hash.length < 2) return;
+  try {
+    const events = JSON.parse(decodeURIComponent(location.hash.slice(1)));
+    for (const event of events) {
+      if (OF_VIEW.includes(event.do)) add(event);
+    }
+  } catch {
+    trouble("The address ends in a view that cannot be read; the scene is shown as it is.");
+  }
 }
 window.addEventListener("hashchange", takeView);
 takeView();

@@ -3,7 +3,7 @@
 use super::Framing;
 use super::clients::{Admission, Clients, MOST_CLIENTS};
 use super::token::Token;
-use crate::compare::Comparison;
+use crate::accuracy::compare::Comparison;
 use crate::depths::PicturePlace;
 use crate::event::Event;
 use crate::session::Session;

@@ -1,13 +1,11 @@
 //! A picture that is kept beside the present one, and what differs between the two.
 
+use super::is_compared;
 use crate::picture::{Drawn, Picture, Size};
 use organza::Error;
 use organza_judge::accuracy::{apart, difference_picture};
 use serde::Serialize;
 use std::sync::Arc;
-
-/// Most pixels of pictures that are compared: the perceived difference of more takes seconds.
-const MOST_PIXELS: u64 = 4 << 20;
 
 /// A whole picture that was kept, as the page lists it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -72,7 +70,7 @@ impl Kept {
             gain: None,
             png: Vec::new(),
         };
-        if self.row.size != drawn.size() || u64::from(width) * u64::from(height) > MOST_PIXELS {
+        if self.row.size != drawn.size() || !is_compared(drawn.size()) {
             return Ok(nothing);
         }
         let before = self.drawn.displayed_as_shown()?;
