@@ -87,6 +87,21 @@ impl Scale {
         turned == *stated
     }
 
+    /// Forgets what was predicted and measured, where the scene is another one or is seen from elsewhere; whether its knobs are those of the scene.
+    pub(crate) fn forget_unless(&mut self, stated: &Scene) -> bool {
+        if self.stated != *stated {
+            self.pictures.clear();
+            for row in &mut self.rows {
+                row.predicted_ms = None;
+                row.measured_ms = None;
+                row.rmse = None;
+                row.flip = None;
+                row.is_reference = false;
+            }
+        }
+        self.is_of(stated)
+    }
+
     /// Takes the scene as it is seen now: what was measured from elsewhere is forgotten.
     pub(crate) fn see(&mut self, stated: &Scene) {
         if self.stated == *stated && !self.rows.is_empty() {

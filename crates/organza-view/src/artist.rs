@@ -121,6 +121,11 @@ impl Artist {
                 found.map_or_else(|| Viewpoint::of_scene(&scene), |f| Viewpoint::of_camera(&f.camera, f.target));
             desk.set_own(first);
         }
+        if desk.wants_rungs() {
+            // What was measured of another scene, or from elsewhere, says nothing of this one.
+            self.scale = self.scale.take().and_then(|mut scale| scale.forget_unless(&stated).then_some(scale));
+            desk.keep_rungs(self.scale.as_ref().map_or_else(Vec::new, Scale::rows));
+        }
         let pixels = scene.camera.pixels();
         if pixels > self.accepted {
             // Nobody is shown the beginning of a picture that is refused.

@@ -112,7 +112,7 @@ pub enum Event {
         /// As scenes name it, such as `depth.median`; `None` for the beauty.
         layer: Option<String>,
     },
-    /// Draws the scene by another technique, objects that name one of their own left out.
+    /// Draws the scene by another technique, also objects that name one of their own.
     Technique {
         /// As scenes name it, such as `sheets`; `None` for what the scene says.
         technique: Option<String>,

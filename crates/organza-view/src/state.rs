@@ -305,6 +305,11 @@ impl State {
         }
         if let Some(technique) = &self.technique {
             changes.push(Override::parse(&format!("render.technique={technique:?}"))?);
+            // Objects that name one of their own would stay as they are.
+            for (rank, _) in scene.objects.iter().enumerate().filter(|(_, object)| object.technique.is_some()) {
+                let key = key_of(scene, rank);
+                changes.push(Override::parse(&format!("object.{key}.technique={technique:?}"))?);
+            }
         }
         changes.extend(self.accuracy.set.iter().cloned());
         Ok(changes)
@@ -466,6 +471,25 @@ mod tests {
         assert_eq!(after(&[fast, accuracy(0, &[])]).unwrap(), after(&[]).unwrap());
         // What the scene refuses is refused.
         assert!(after(&[accuracy(1, &["render.antialias=99"])]).is_err());
+    }
+
+    #[test]
+    fn a_technique_is_that_of_every_object() {
+        let text = SCENE.replace(
+            "spacing = 0.1 }\n        [[object]]\n        name = \"fog\"",
+            "spacing = 0.1 }\n        technique = \"surfels\"\n        [[object]]\n        name = \"fog\"",
+        );
+        let Opening { file, text, load, .. } = Opening::of_text("a.toml", text, RenderOptions::default());
+        let source = Source { file, text, load };
+        let scene = source.scene(Vec::new()).unwrap();
+        assert_eq!(scene.objects[1].technique, Some(scene::Technique::Surfels));
+        let mut state = State::default();
+        let event = Event::Technique { technique: Some("points".into()) };
+        state.apply(&event, &scene, &Viewpoint::of_scene(&scene)).unwrap();
+        let changed = source.scene(source.overrides(&state, &scene).unwrap()).unwrap();
+        assert_eq!(changed.render.technique, scene::Technique::Points);
+        assert_eq!(changed.objects[1].technique, Some(scene::Technique::Points));
+        assert!(changed.objects[0].technique.is_none());
     }
 
     #[test]

@@ -103,14 +103,19 @@ function showCompare(found) {
   }
   if (!found.kept) return;
   const key = `${kept}/${found.generation}`;
+  if (key !== compared) at("compare-text").textContent = `${keptText(found.kept)}. Compared once the present picture is whole.`;
   if (found.is_whole && key !== compared && !comparing) compare(found.kept, key);
   placeDivider();
 }
 
+function keptText(row) {
+  const position = row.step === 0 ? "" : `, ${POSITIONS[row.step]}`;
+  return `Kept: ${row.technique}${position}, ${milliseconds(row.ms)} ms`;
+}
+
 async function compare(row, key) {
   comparing = true;
-  const position = row.step === 0 ? "" : `, ${POSITIONS[row.step]}`;
-  const name = `Kept: ${row.technique}${position}, ${milliseconds(row.ms)} ms`;
+  const name = keptText(row);
   try {
     const answer = await fetch(`comparison?client=${client}`);
     if (answer.ok) {
@@ -235,6 +240,12 @@ function belowText(below) {
 
 stage.addEventListener("pointermove", (event) => {
   if (pointers.size > 0 || event.pointerType === "touch") return;
+  const place = pictureBelow({ x: event.clientX, y: event.clientY });
+  if (place) lookBelow(place, false);
+});
+
+// A touch has no pointer that hovers.
+stage.addEventListener("click", (event) => {
   const place = pictureBelow({ x: event.clientX, y: event.clientY });
   if (place) lookBelow(place, false);
 });
