@@ -136,7 +136,7 @@ impl Scale {
         tried: &mut Vec<i32>,
     ) -> Result<bool, Error> {
         let is_open = |row: &&mut RungRow| row.predicted_ms.is_none() && !tried.contains(&row.step);
-        let mut open = self.rungs.iter().zip(&mut self.rows).filter(|(_, row)| is_open(&row));
+        let mut open = self.rungs.iter().zip(&mut self.rows).filter(|(_, row)| is_open(row));
         let Some((rung, row)) = open.next() else { return Ok(false) };
         tried.push(row.step);
         let time = |foreseen: &Foreseen<'_>| Ok(drawing_ms(foreseen.predicted));

@@ -35,9 +35,17 @@ const LOOK_BELOW: Duration = Duration::from_secs(10);
 pub struct Session {
     desk: Arc<Desk>,
     studio: Mutex<Studio>,
-    /// The picture that was kept, with how the last one differs from it.
-    kept: Mutex<Option<(Arc<Kept>, Option<Arc<Comparison>>)>>,
+    /// The picture that was kept.
+    kept: Mutex<Option<Keeping>>,
     artist: Mutex<Option<JoinHandle<()>>>,
+}
+
+/// A picture that was kept.
+#[derive(Clone)]
+struct Keeping {
+    kept: Arc<Kept>,
+    /// How the last picture that was compared differs from it.
+    comparison: Option<Arc<Comparison>>,
 }
 
 /// What events change.
@@ -232,7 +240,7 @@ impl Session {
         Ok(left_out)
     }
 
-    fn kept(&self) -> MutexGuard<'_, Option<(Arc<Kept>, Option<Arc<Comparison>>)>> {
+    fn kept(&self) -> MutexGuard<'_, Option<Keeping>> {
         self.kept.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -247,7 +255,7 @@ impl Session {
         if picture.facts.level != Level::Whole {
             return false;
         }
-        *self.kept() = Some((Arc::new(Kept::new(drawn, picture, step)), None));
+        *self.kept() = Some(Keeping { kept: Arc::new(Kept::new(drawn, picture, step)), comparison: None });
         self.desk.tell_change();
         true
     }
@@ -260,7 +268,7 @@ impl Session {
 
     /// The picture that was kept.
     pub fn kept_picture(&self) -> Option<Arc<Picture>> {
-        self.kept().as_ref().map(|(kept, _)| Arc::clone(&kept.picture))
+        self.kept().as_ref().map(|keeping| Arc::clone(&keeping.kept.picture))
     }
 
     /// How the whole picture of the present state differs from the one that was kept; `None` without either.
@@ -269,13 +277,13 @@ impl Session {
     /// [`Error::Output`] for a picture that cannot be displayed.
     pub fn comparison(&self) -> Result<Option<Arc<Comparison>>, Error> {
         let Some(drawn) = self.finished() else { return Ok(None) };
-        let Some((kept, known)) = self.kept().clone() else { return Ok(None) };
-        if let Some(known) = known.filter(|known| known.generation == drawn.generation) {
+        let Some(Keeping { kept, comparison }) = self.kept().clone() else { return Ok(None) };
+        if let Some(known) = comparison.filter(|known| known.generation == drawn.generation) {
             return Ok(Some(known));
         }
         let found = Arc::new(kept.compared(&drawn)?);
-        if let Some((_, known)) = self.kept().as_mut().filter(|(now, _)| Arc::ptr_eq(now, &kept)) {
-            *known = Some(Arc::clone(&found));
+        if let Some(keeping) = self.kept().as_mut().filter(|keeping| Arc::ptr_eq(&keeping.kept, &kept)) {
+            keeping.comparison = Some(Arc::clone(&found));
         }
         Ok(Some(found))
     }
@@ -371,7 +379,7 @@ impl Session {
                 rungs,
             }),
             technique: studio.state.technique().map(str::to_owned),
-            kept: self.kept().as_ref().map(|(kept, _)| kept.row.clone()),
+            kept: self.kept().as_ref().map(|keeping| keeping.kept.row.clone()),
             picture: picture.map(|picture| picture.facts.clone()),
             drawing: drawing.map(|(stage, share)| Drawing { stage, share }),
             is_whole: whole == Some(studio.generation),

@@ -418,7 +418,7 @@ fn accuracy_is_predicted_and_measured_and_is_that_of_the_scene() {
         |step| wait_for("a measured position", || rung(step).is_some_and(|rung| rung.rmse.is_some()));
     wait_for_measured(0);
     let first = rungs();
-    // Two positions of samples and of slices are finer: the first of three would be the scene's own.
+    // Two positions of samples are finer: the first of three would be the scene's own.
     assert_eq!(first.iter().map(|rung| rung.step).collect::<Vec<_>>(), [-3, -2, -1, 0, 2, 3]);
     let predicted: Vec<f64> = first.iter().map(|rung| rung.predicted_ms.unwrap()).collect();
     assert!(predicted.windows(2).all(|pair| pair[0] < pair[1]), "{predicted:?}");

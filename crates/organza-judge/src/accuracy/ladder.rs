@@ -1,13 +1,16 @@
 //! Settings of one scene from fast to exact, for a hand to slide along: the knobs of its techniques, turned together to both sides of what it states.
 
 use super::{Facts, Knob, Options, Request, Step, changes, points, sheets, surfels};
-use organza::scene::{Scene, Technique};
+use organza::scene::{Reconstruction, Scene, Technique};
 
 /// Positions to each side of the scene's own settings.
 pub const RUNGS_ASIDE: i32 = 3;
 
 /// Knobs that no setting of a report turns together with others, and a ladder does: more splats and more sets are more work for a smaller error.
 const ALONE: [&str; 2] = ["share of splats", "repeat level"];
+
+/// The knob of kernels that are splatted, which turned would have a volume splatted that the plan gathers.
+const OF_SPLATTED: &str = "kernel sections";
 
 /// A setting of a ladder.
 #[derive(Debug, Clone, PartialEq)]
@@ -39,7 +42,9 @@ pub fn knobs_of(scene: &Scene, techniques: &[Technique], facts: &Facts, slab_wid
             Technique::Particles => super::particles(scene, facts, &options).map_or_else(|_| Vec::new(), |s| s.knobs),
             Technique::Auto => Vec::new(),
         };
-        let is_turned = |knob: &Knob| knob.joint || ALONE.contains(&knob.name);
+        let is_splatted = scene.render.sheets.reconstruction == Reconstruction::Splat;
+        let is_turned =
+            |knob: &Knob| (knob.joint || ALONE.contains(&knob.name)) && (is_splatted || knob.name != OF_SPLATTED);
         knobs.extend(found.into_iter().filter(is_turned).map(|knob| (*technique, knob)));
     }
     // Opaque surfaces have points' splats whatever draws the rest: what a scene shares is turned once.
@@ -120,9 +125,12 @@ impl<'k> Positions<'k> {
 
     /// The position of a rung; `None` for the scene's own.
     fn at(&self, step: i32) -> Option<&'k Step> {
+        let rungs = RUNGS_ASIDE as usize;
         let side = if step < 0 { &self.coarser } else { &self.finer };
-        // The last rung is the last position; a knob with fewer positions than rungs keeps the scene's own for longer.
-        let count = step.unsigned_abs() as usize * side.len() / RUNGS_ASIDE as usize;
+        // Far from the scene's own little time is left to gain; the most exact rung is the end. A knob with fewer positions than rungs keeps the
+        // scene's own for longer.
+        let length = if step < 0 { side.len().min(rungs) } else { side.len() };
+        let count = step.unsigned_abs() as usize * length / rungs;
         count.checked_sub(1).map(|rank| side[rank])
     }
 }
@@ -186,7 +194,7 @@ mod tests {
     fn a_rung_is_the_scene_with_what_it_says() {
         let scene = scene(&[]);
         let rungs = rungs(&scene, &[Technique::Points]);
-        // Two positions of samples and of slices are finer: the first of three would be the scene's own.
+        // Two positions of samples are finer: the first of three would be the scene's own.
         assert_eq!(rungs.iter().map(|rung| rung.step).collect::<Vec<_>>(), [-3, -2, -1, 0, 2, 3]);
         for rung in &rungs {
             let sets = rung.sets(&scene);
@@ -195,10 +203,10 @@ mod tests {
         }
         let [fastest, .., exact] = &rungs[..] else { panic!("several rungs") };
         assert_eq!((fastest.request.scene.render.antialias, exact.request.scene.render.antialias), (1, 8));
-        assert_eq!((fastest.request.scene.render.splat_share, exact.request.scene.render.splat_share), (0.0156, 1.0));
+        assert_eq!((fastest.request.scene.render.splat_share, exact.request.scene.render.splat_share), (0.125, 1.0));
         assert!(exact.request.scene.render.points.exact && !fastest.request.scene.render.points.exact);
-        // Sixty-four times the scene's own thickness, with three digits.
-        assert_eq!(fastest.request.scene.render.points.slice_thickness, Some(0.79));
+        // The scene orders splats exactly; its thickness would be that of the fact, and twice that, with three digits.
+        assert_eq!(fastest.request.scene.render.points.slice_thickness, Some(0.0247));
     }
 
     #[test]
@@ -208,6 +216,8 @@ mod tests {
         let count = |name: &str| knobs.iter().filter(|knob| knob.name == name).count();
         // Pixels have one number of samples; either technique has a cut of its own.
         assert_eq!([count("samples"), count("transmittance cut"), count("slab width")], [1, 2, 1]);
+        // What the plan gathers stays gathered.
+        assert_eq!(count(OF_SPLATTED), 0);
     }
 
     #[test]
