@@ -183,11 +183,11 @@ impl<F: Fn(usize) -> bool> pulp::WithSimd for ShadeChunk<'_, F> {
             let together = scattering.map_or(0, |by| by.together(i, end));
             let out = &mut values[(i - first) * channels..][..together.max(1) * channels];
             match scattering {
-                Some(by) if together > 0 => {
+                Some(by) if together > 0 && (i..i + together).any(is_one) => {
                     by.light(simd, i..i + together, &mut batch);
                     by.shade(i, is_one, layout, &mut batch, out);
                 }
-                _ if is_one(i) => {
+                _ if together == 0 && is_one(i) => {
                     let (radiance, normal) = shaded.splat(i);
                     radiance.write(normal, layout, out);
                 }
