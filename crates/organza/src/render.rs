@@ -285,6 +285,8 @@ pub(crate) fn plan_keeping<T>(
     let share = scene.render.splat_share / before.render.splat_share;
     let mut of_all = scene.clone();
     of_all.render.splat_share = before.render.splat_share;
+    // Other settings are another text.
+    of_all.sha256.clone_from(&before.sha256);
     if share > 1.0 || before.camera != scene.camera || !same_splats(before, &of_all) {
         return Ok(None);
     }
