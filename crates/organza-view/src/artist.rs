@@ -5,7 +5,7 @@ use crate::coarse::{BUDGET, DEPTH_LAYER, Detail, OBJECT_LAYER, drawing_time};
 use crate::curve::values_of;
 use crate::depths::Depths;
 use crate::depths::below::DataOfObject;
-use crate::desk::{Desk, Request, Task};
+use crate::desk::{Desk, Job, Request, Task};
 use crate::picture::{Drawn, Level};
 use crate::viewpoint::Viewpoint;
 use organza::scene::{Scene, SceneObject, Source, Technique};
@@ -73,7 +73,14 @@ impl Artist {
 
     /// Draws what comes to the desk until that is closed.
     pub(crate) fn work(mut self, desk: &Desk) {
-        while let Some(request) = desk.take() {
+        while let Some(job) = desk.take() {
+            let request = match job {
+                Job::Draw(request) => request,
+                Job::Measure(request) => {
+                    self.answer(desk, &request);
+                    continue;
+                }
+            };
             if request.edition != self.edition {
                 self.forget();
                 desk.forget_values();
@@ -89,6 +96,17 @@ impl Artist {
                 desk.fail(request.generation, &error);
             }
         }
+    }
+
+    /// Says of the last whole picture how exact it is; a failure leaves that open, for the picture is there.
+    fn answer(&mut self, desk: &Desk, request: &Request) {
+        let Some(stated) = self.stated.clone() else { return };
+        let measured = catch_unwind(AssertUnwindSafe(|| self.measure(&stated, desk, request)));
+        if measured.is_err() {
+            // What was kept may be half made.
+            self.forget();
+        }
+        desk.end();
     }
 
     /// Lets everything go that was read and made.

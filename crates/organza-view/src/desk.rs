@@ -71,6 +71,15 @@ struct AtWork {
     progress: Arc<Progress>,
 }
 
+/// What the artist is to do next.
+#[derive(Debug)]
+pub(crate) enum Job {
+    /// Draw a request.
+    Draw(Arc<Request>),
+    /// Say of the request whose whole picture is there how exact it is.
+    Measure(Arc<Request>),
+}
+
 /// What lies on the desk.
 struct Papers {
     /// Grows with every change.
@@ -89,6 +98,8 @@ struct Papers {
     data: BTreeMap<String, DataOfObject>,
     /// Settings from fast to exact; `None` before a page asks for them.
     rungs: Option<Vec<RungRow>>,
+    /// Whether they were asked for since a picture was measured.
+    is_asked: bool,
     failure: Option<Failure>,
     /// The viewpoint of the scene's own camera.
     own: Viewpoint,
@@ -133,6 +144,7 @@ impl Desk {
             curves: BTreeMap::new(),
             data: BTreeMap::new(),
             rungs: None,
+            is_asked: false,
             failure: None,
             own,
             is_closed: false,
@@ -219,8 +231,8 @@ impl Desk {
         self.tell(papers);
     }
 
-    /// Waits for a request that was not taken yet; `None` where the desk is closed.
-    pub(crate) fn take(&self) -> Option<Arc<Request>> {
+    /// Waits for a request that was not taken yet, or for a question about the last one; `None` where the desk is closed.
+    pub(crate) fn take(&self) -> Option<Job> {
         let mut papers = self.papers();
         loop {
             if papers.is_closed {
@@ -229,7 +241,15 @@ impl Desk {
             let newest = papers.newest.clone().filter(|request| request.generation > papers.taken);
             if let Some(request) = newest {
                 papers.taken = request.generation;
-                return Some(request);
+                return Some(Job::Draw(request));
+            }
+            if std::mem::take(&mut papers.is_asked) {
+                let whole = papers.whole.as_ref().map(|whole| whole.generation);
+                let drawn = papers.newest.clone().filter(|request| Some(request.generation) == whole);
+                if let Some(request) = drawn {
+                    return Some(Job::Measure(request));
+                }
+                // The next whole picture is measured.
             }
             papers = self.changed.wait(papers).unwrap_or_else(PoisonError::into_inner);
         }
@@ -266,12 +286,14 @@ impl Desk {
         self.tell(papers);
     }
 
-    /// Asks for settings from fast to exact; whether nobody had asked before.
-    pub(crate) fn ask_for_rungs(&self) -> bool {
+    /// Asks for settings from fast to exact, where nobody has asked before.
+    pub(crate) fn ask_for_rungs(&self) {
         let mut papers = self.papers();
-        let is_first = papers.rungs.is_none();
-        papers.rungs.get_or_insert_default();
-        is_first
+        if papers.rungs.is_none() {
+            papers.rungs = Some(Vec::new());
+            papers.is_asked = true;
+            self.tell(papers);
+        }
     }
 
     /// Whether a page has asked for settings from fast to exact.

@@ -295,13 +295,9 @@ impl Session {
         Some(below(place, &scene, &depths, self.finished().as_deref(), |object| self.desk.data_of(object)))
     }
 
-    /// Asks for settings from fast to exact, which [`Shown::accuracy`] has from then on.
-    ///
-    /// # Errors
-    /// As [`Session::apply`].
-    pub fn ask_for_accuracy(&self) -> Result<(), Error> {
-        // What they follow from is at hand while a picture is drawn.
-        if self.desk.ask_for_rungs() { self.apply(&[]) } else { Ok(()) }
+    /// Asks for settings from fast to exact, which [`Shown::accuracy`] has once the whole picture is drawn.
+    pub fn ask_for_accuracy(&self) {
+        self.desk.ask_for_rungs();
     }
 
     /// Records events from now on.

@@ -411,12 +411,13 @@ fn accuracy_is_predicted_and_measured_and_is_that_of_the_scene() {
     session.record(Recording::begin(&path, false).unwrap());
     let own = session.whole_picture().unwrap();
     assert_eq!(session.shown().accuracy, None, "nobody has asked");
-    session.ask_for_accuracy().unwrap();
+    session.ask_for_accuracy();
     let rungs = || session.shown().accuracy.map_or_else(Vec::new, |accuracy| accuracy.rungs);
     let rung = |step: i32| rungs().into_iter().find(|rung| rung.step == step);
     let wait_for_measured =
         |step| wait_for("a measured position", || rung(step).is_some_and(|rung| rung.rmse.is_some()));
     wait_for_measured(0);
+    assert_eq!(session.shown().generation, 1, "nothing is drawn anew for it");
     let first = rungs();
     // Two positions of samples are finer: the first of three would be the scene's own.
     assert_eq!(first.iter().map(|rung| rung.step).collect::<Vec<_>>(), [-3, -2, -1, 0, 2, 3]);

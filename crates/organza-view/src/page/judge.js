@@ -34,7 +34,7 @@ function showAccuracy(found) {
   if (rungs.length === 0) {
     at("accuracy-text").textContent = accuracy.set.length > 0
       ? `Drawn with ${accuracy.set.join(", ")}. Positions are known once the scene was drawn as it is.`
-      : "Comes with the next whole picture.";
+      : "Comes with the whole picture.";
     return;
   }
   slider.max = rungs.length - 1;

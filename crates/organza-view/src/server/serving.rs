@@ -197,7 +197,7 @@ async fn answered(counter: &Arc<Counter>, request: Request<Incoming>) -> Result<
         Route::Centre => centre(&counter.session, query.place()?).await,
         Route::Below => below(&counter.session, query.place()?).await,
         Route::Accuracy => {
-            counter.session.ask_for_accuracy().map_err(|e| Refusal::of_error(&e))?;
+            counter.session.ask_for_accuracy();
             Ok(of_type("application/json", shown(&counter.session)?))
         }
         Route::Keep => {
