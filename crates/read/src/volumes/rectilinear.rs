@@ -64,6 +64,26 @@ struct Values<'a> {
     values: &'a [f32],
 }
 
+/// Values whose means were taken along some axes.
+struct Means {
+    dims: [usize; 3],
+    values: Vec<f32>,
+}
+
+/// A mean of points of the file along an axis.
+struct Mean {
+    /// The rank of the first of them.
+    first: usize,
+    /// The weights of it and of those behind it.
+    weights: Vec<f64>,
+}
+
+impl Means {
+    fn lattice(&self) -> Values<'_> {
+        Values { dims: self.dims, values: &self.values }
+    }
+}
+
 impl Rectilinear {
     /// Points along each axis.
     pub(crate) fn dims(&self) -> [u64; 3] {
@@ -111,7 +131,7 @@ impl Rectilinear {
         input::hold("the voxels of even steps", (count * size_of::<f32>()) as u64, reading.params)?;
         let uneven = Values { dims: stored, values: &values };
         let means = uneven.means(&axes, dims, reading)?;
-        let source = means.as_ref().map_or(uneven, |(dims, values)| Values { dims: *dims, values });
+        let source = means.as_ref().map_or(uneven, Means::lattice);
         let to = [0, 1, 2].map(|rank| {
             if source.dims[rank] == stored[rank] { axes[rank].places_of(dims[rank]) } else { as_they_are(dims[rank]) }
         });
@@ -277,15 +297,14 @@ impl<'a> Axis<'a> {
         (0..count).map(place).collect()
     }
 
-    /// The weights of the points of the file in the means around so many of even steps: the rank of the first, and its weight and those behind it. A mean is
-    /// over half a step to both sides, at the ends over nothing, so that a linear field stays as it is.
-    fn means_of(&self, count: usize) -> Vec<(usize, Vec<f64>)> {
+    /// The means around so many points of even steps. A mean is over half a step to both sides, at the ends over nothing, so that a linear field stays as it is.
+    fn means_of(&self, count: usize) -> Vec<Mean> {
         let step = self.length() / (count - 1) as f64;
         let last = self.count() - 1;
         let mut low = 0;
         let mean = |i: usize| {
             if i == 0 || i + 1 == count {
-                return (if i == 0 { 0 } else { last }, vec![1.0]);
+                return Mean { first: if i == 0 { 0 } else { last }, weights: vec![1.0] };
             }
             let from = (i as f64 - 0.5) * step;
             let to = (i as f64 + 0.5) * step;
@@ -303,7 +322,7 @@ impl<'a> Axis<'a> {
                 weights.push(share * middle);
                 rank += 1;
             }
-            (low, weights)
+            Mean { first: low, weights }
         };
         (0..count).map(mean).collect()
     }
@@ -324,20 +343,15 @@ impl<'a> Axis<'a> {
 }
 
 impl Values<'_> {
-    /// Sizes and values with means along the axes whose steps in so many voxels are longer than the least of the file; `None` without such axes.
-    fn means(
-        &self,
-        axes: &[Axis<'_>; 3],
-        dims: [usize; 3],
-        reading: &Reading<'_>,
-    ) -> Result<Option<([usize; 3], Vec<f32>)>, ReadError> {
-        let mut found: Option<([usize; 3], Vec<f32>)> = None;
+    /// The values with means along the axes whose steps in so many voxels are longer than the least of the file; `None` without such axes.
+    fn means(&self, axes: &[Axis<'_>; 3], dims: [usize; 3], reading: &Reading<'_>) -> Result<Option<Means>, ReadError> {
+        let mut found: Option<Means> = None;
         for (rank, axis) in axes.iter().enumerate() {
             let is_longer = dims[rank] > 1 && axis.length() / (dims[rank] - 1) as f64 > LONGER * axis.least;
             if axis.is_even || !is_longer || dims[rank] == axis.count() {
                 continue;
             }
-            let before = found.as_ref().map_or(*self, |(dims, values)| Values { dims: *dims, values });
+            let before = found.as_ref().map_or(*self, Means::lattice);
             let mut sizes = before.dims;
             sizes[rank] = dims[rank];
             let count = sizes.iter().product::<usize>();
@@ -351,14 +365,14 @@ impl Values<'_> {
                 reading.go_on()?;
                 for (n, mean) in plane.iter_mut().enumerate() {
                     let mut place = [n % sizes[0], n / sizes[0], k];
-                    let (first, weights) = &weights[place[rank]];
+                    let Mean { first, weights } = &weights[place[rank]];
                     place[rank] = *first;
                     let first = place[0] + before.dims[0] * (place[1] + before.dims[1] * place[2]);
                     *mean = mean_of(weights, |i| f64::from(before.values[first + i * stride])) as f32;
                 }
                 Ok::<(), ReadError>(())
             })?;
-            found = Some((sizes, means));
+            found = Some(Means { dims: sizes, values: means });
         }
         Ok(found)
     }
