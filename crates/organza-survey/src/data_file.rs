@@ -107,6 +107,16 @@ impl DataFile {
         }
     }
 
+    /// The value of a volume outside of the cells that it was sampled from; `None` where no cells of its format become a volume.
+    pub(crate) fn value_outside(&self) -> Option<f64> {
+        /// Formats of grids of cells.
+        const CELLS: [&str; 4] = ["vtu", "pvtu", "vts", "pvts"];
+        let SourceData::Grid(grid) = &self.data else { return None };
+        let extension = self.path.extension()?.to_str()?.to_ascii_lowercase();
+        let least = || grid.values.iter().copied().fold(0.0, f32::min);
+        CELLS.contains(&extension.as_str()).then(|| f64::from(least()))
+    }
+
     /// A name for its object: that of the file, with what would part a path of `--set` replaced.
     pub(crate) fn name(&self) -> String {
         if let Some(name) = scene::name_in_memory(&self.path) {

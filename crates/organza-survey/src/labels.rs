@@ -11,8 +11,8 @@ const JUMPS: f64 = 0.25;
 /// The share of [`SAME`], and most numbers, of labels whatever touches what: regions that lie within each other may rise by steps, too.
 const NESTED: f64 = 0.9;
 const FEW: usize = 64;
-/// Numbers from which a volume of few values has labels, whatever these are; fewer ones have to be small, so many times their count at most. Amounts of
-/// phantoms are hundreds.
+/// Numbers from which a volume of few values has labels, whatever these are; fewer ones have to be small, so many times their count at most, or have no
+/// common divisor. Amounts of phantoms are hundreds.
 const MANY: usize = 5;
 const SMALL: usize = 4;
 /// Most labels that are counted.
@@ -85,9 +85,15 @@ impl Labels {
             return None;
         }
         let are_small = highest < SMALL * known.len();
-        let are_numbered = known.len() >= MANY || (known.len() >= 3 && are_small);
+        let are_counts = || known.iter().fold(0, |a, b| common_divisor(a, *b)) == 1;
+        let are_numbered = known.len() >= MANY || (known.len() >= 3 && (are_small || are_counts()));
         are_numbered.then(|| Self(known.into_iter().map(|label| label as f64).collect()))
     }
+}
+
+/// The greatest common divisor.
+fn common_divisor(a: u64, b: u64) -> u64 {
+    if b == 0 { a } else { common_divisor(b, a % b) }
 }
 
 #[cfg(test)]
@@ -151,7 +157,7 @@ mod tests {
             _ => 0.0,
         });
         assert_eq!(Labels::of(&nested), Some(Labels(vec![0.0, 1.0, 2.0, 7.0])));
-        let [left, right] = [ball(5, 4), ball(14, 4)];
+        let [left, right] = [ball(5, 5), ball(15, 5)];
         let two = volume(|x, y, z| {
             if left(x, y, z) {
                 3.0
@@ -162,6 +168,9 @@ mod tests {
             }
         });
         assert_eq!(Labels::of(&two), Some(Labels(vec![0.0, 3.0, 7.0])));
+        let hippocampi =
+            Grid { values: two.values.iter().map(|v| [0.0, 17.0, 53.0][(*v as usize).div_ceil(4)]).collect(), ..two };
+        assert_eq!(Labels::of(&hippocampi), Some(Labels(vec![0.0, 17.0, 53.0])));
         // What rises by steps, and what scatters.
         assert_eq!(Labels::of(&volume(|x, y, z| ((x + y + z) / 4) as f32)), None);
         assert_eq!(Labels::of(&volume(|x, y, z| ((x * 7919 + y * 104_729 + z * 31) % 251) as f32)), None);

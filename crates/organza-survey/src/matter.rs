@@ -51,6 +51,12 @@ const LIGHTEST: f64 = -500.0;
 impl Matter {
     /// `None` for a volume of one value.
     pub(crate) fn of(grid: &Grid) -> Option<Self> {
+        Self::in_surroundings(grid, None)
+    }
+
+    /// The same of a volume that was sampled from cells and has this value outside of them: cells may fill its border, and what is quiet there is matter
+    /// then.
+    pub(crate) fn in_surroundings(grid: &Grid, outside: Option<f64>) -> Option<Self> {
         let range = usual_range(&grid.values)?;
         let histogram = Histogram::new(&grid.values, range, BINS);
         let spread = histogram.high - histogram.low;
@@ -63,6 +69,7 @@ impl Matter {
         }
         let [low, air, high] = [0.1, 0.5, 0.9].map(|share| quantile_of(&mut border, share));
         let has_air = high - low < QUIET * spread;
+        let [low, air, high] = outside.filter(|_| has_air).map_or([low, air, high], |outside| [outside; 3]);
         // Air around a body is what most of a tomogram is; where nothing is quiet, the range has to tell.
         let is_of_units = is_in_units(&histogram) && (!has_air || air < LIGHTEST);
         let is_signed = histogram.low < 0.0 && histogram.high > 0.0 && !is_of_units && has_both_signs(&histogram);
@@ -260,6 +267,16 @@ mod tests {
         grid.values[16 * 32 * 32 + 16 * 32 + 16] = f32::NAN;
         let matter = Matter::of(&grid).unwrap();
         assert!((matter.first - whole.first).abs() < 1.0 && (matter.last - whole.last).abs() < 1.0);
+    }
+
+    #[test]
+    fn a_hole_in_cells_that_fill_the_box_is_no_matter() {
+        let hole = ball(300.5, 0.0, 0.0);
+        let matter = Matter::in_surroundings(&hole, Some(0.0)).unwrap();
+        assert_eq!(matter.air, Some(0.0));
+        assert!(matter.first > 0.0 && matter.last > 300.0, "{matter:?}");
+        // Of what comes from elsewhere the border tells.
+        assert!((Matter::of(&hole).unwrap().air.unwrap() - 300.5).abs() < 2.0);
     }
 
     #[test]

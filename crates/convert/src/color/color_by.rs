@@ -37,11 +37,16 @@ const CLASSES: [(&str, u32); 19] = [
     ("high noise", 0xff2f8f),
 ];
 
-/// Colours that are told apart, for whole numbers without a meaning of their own, in turns.
+/// Colours that are told apart, for whole numbers without a meaning of their own, in turns. Each turn begins [`SKIPPED`] colours later, and after the
+/// first one colours become lighter or darker: numbers that are a turn apart differ.
 const DISTINCT: [u32; 12] = [
     0x4e79a7, 0xf28e2b, 0x59a14f, 0xe15759, 0x76b7b2, 0xedc948, 0xb07aa1, 0x9c755f, 0x86bcb6, 0xff9da7, 0x5b6abf,
     0xb6992d,
 ];
+
+const SKIPPED: f64 = 5.0;
+/// How much of white or black is in the colours of a turn.
+const TINTS: [(f32, f32); 3] = [(0.0, 0.0), (0.4, 1.0), (0.45, 0.0)];
 
 /// How numbers become colours.
 #[derive(Debug, Clone, PartialEq)]
@@ -260,8 +265,12 @@ fn class_color(number: f64) -> [f32; 3] {
 }
 
 fn distinct(number: f64) -> [f32; 3] {
-    let turns = DISTINCT.len() as f64;
-    linear_from_hex(DISTINCT[(number.round().rem_euclid(turns) as usize).min(DISTINCT.len() - 1)])
+    let colors = DISTINCT.len() as f64;
+    let number = number.round();
+    let turn = libm::floor(number / colors);
+    let place = (number + SKIPPED * turn).rem_euclid(colors) as usize;
+    let (share, tint) = TINTS[(turn.rem_euclid(TINTS.len() as f64) as usize).min(TINTS.len() - 1)];
+    linear_from_hex(DISTINCT[place.min(DISTINCT.len() - 1)]).map(|channel| channel + share * (tint - channel))
 }
 
 #[cfg(test)]
@@ -279,6 +288,19 @@ mod tests {
         let by = ColorBy { column: "it".into(), colors };
         colored(&points(values), &by, DVec3::Y, &SplatParams { color: [0.5, 0.25, 0.125], ..SplatParams::default() })
             .expect("a column that is there")
+    }
+
+    #[test]
+    fn whole_numbers_near_each_other_have_unlike_colours() {
+        let numbers: Vec<f64> = (-12..60).map(f64::from).collect();
+        let color = colored_column(numbers.clone(), PointColors::Distinct).color;
+        for i in 0..numbers.len() {
+            for k in i + 1..numbers.len().min(i + 24) {
+                let apart = (0..3).map(|c| (color[i][c] - color[k][c]).abs()).fold(0.0, f32::max);
+                assert!(apart > 0.02, "{} and {}: {:?}", numbers[i], numbers[k], color[i]);
+            }
+        }
+        assert_eq!(color[12], linear_from_hex(DISTINCT[0]));
     }
 
     #[test]
@@ -338,13 +360,13 @@ mod tests {
     }
 
     #[test]
-    fn classes_have_colours_of_their_own_and_others_come_in_turns() {
+    fn classes_have_colours_of_their_own_and_others_those_of_whole_numbers() {
         let found = colored_column(vec![2.0, 6.0, 64.0, 76.0, 255.0, -1.0, 2.2], PointColors::Classes).color;
         assert_eq!(found[0], linear_from_hex(0xa67c52));
-        assert!(found[0] != found[1] && found[2] == found[3] && found[6] == found[0]);
+        assert!(found[0] != found[1] && found[2] != found[3] && found[6] == found[0]);
         assert_eq!([class_name(2), class_name(6), class_name(64)], [Some("ground"), Some("building"), None]);
-        let turns = colored_column(vec![0.0, 12.0, -12.0, 1.0, 1e300], PointColors::Distinct).color;
-        assert!(turns[0] == turns[1] && turns[0] == turns[2] && turns[0] != turns[3]);
+        let whole = colored_column(vec![64.0, 255.0, -1.0, 1e300], PointColors::Distinct).color;
+        assert_eq!([found[2], found[4], found[5]], [whole[0], whole[1], whole[2]]);
     }
 
     #[test]

@@ -14,7 +14,7 @@ use std::ops::Range;
 
 /// Faces in voxels that are integrated over in a part of the volume, at most: beyond that samples have to do. Voxels that are looked at count as a share of
 /// one.
-const MOST_PIECES: u64 = 1 << 22;
+const MOST_PIECES: u64 = 1 << 26;
 const VOXELS_OF_A_PIECE: u64 = 32;
 
 /// Faces of a tetrahedron by ranks of its corners, wound outwards where its volume is positive.
