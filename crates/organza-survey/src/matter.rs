@@ -49,13 +49,14 @@ const UNITS: [f64; 2] = [-500.0, 100.0];
 const LIGHTEST: f64 = -500.0;
 
 impl Matter {
-    /// `None` for a volume of one value.
+    /// That of a volume of which nothing else is known.
+    #[cfg(test)]
     pub(crate) fn of(grid: &Grid) -> Option<Self> {
         Self::in_surroundings(grid, None)
     }
 
-    /// The same of a volume that was sampled from cells and has this value outside of them: cells may fill its border, and what is quiet there is matter
-    /// then.
+    /// That of a volume that may have been sampled from cells, with a value `outside` of them: they may fill its border, and what is quiet there is matter
+    /// then. `None` for a volume of one value.
     pub(crate) fn in_surroundings(grid: &Grid, outside: Option<f64>) -> Option<Self> {
         let range = usual_range(&grid.values)?;
         let histogram = Histogram::new(&grid.values, range, BINS);
