@@ -32,7 +32,7 @@ struct Shading<'a> {
 
 impl Frame<'_> {
     /// Footprints and radiance of the drawn splats in view; of those out of view the radiance is 0, but where bent rays may see them, and so it is of
-    /// those that opaque ones hide, where no technique asks for them ([`Plan::skips_hidden`](crate::Plan)). The passes that were run for it are added
+    /// those that opaque ones hide, where no technique asks for them ([`Plan::skips_hidden`](crate::plan::Plan::skips_hidden)). The passes that were run for it are added
     /// to `cost`.
     ///
     /// # Errors
