@@ -46,7 +46,7 @@ const DISTINCT: [u32; 12] = [
 
 const SKIPPED: f64 = 5.0;
 /// How much of white or black is in the colours of a turn.
-const TINTS: [(f32, f32); 3] = [(0.0, 0.0), (0.4, 1.0), (0.45, 0.0)];
+const TINTS: [(f32, f32); 3] = [(0.0, 0.0), (0.5, 1.0), (0.6, 0.0)];
 
 /// How numbers become colours.
 #[derive(Debug, Clone, PartialEq)]
