@@ -86,9 +86,9 @@ impl Candidate {
     /// The name by which it is asked for where nothing else is said; arrays of cells that have the name of one of points are told by what they belong to.
     fn offered_name(&self, all: &[Self]) -> String {
         let is_shared = self.is_of_cells && all.iter().any(|other| !other.is_of_cells && other.name == self.name);
-        let of = if is_shared { OF_CELLS } else { "" };
+        let owner = if is_shared { OF_CELLS } else { "" };
         let part = if self.is_vector() { ":magnitude" } else { "" };
-        format!("{of}{}{part}", self.name)
+        format!("{owner}{}{part}", self.name)
     }
 
     /// The length of the vectors, if it has such.
@@ -98,8 +98,8 @@ impl Candidate {
 
     /// The value that a name asks for: that of the array of this name, with or without what it belongs to, or of a vector the part behind a colon.
     fn value_named(&self, name: &str) -> Option<Option<Value>> {
-        let of = if self.is_of_cells { OF_CELLS } else { OF_POINTS };
-        let name = name.strip_prefix(of).unwrap_or(name);
+        let owner = if self.is_of_cells { OF_CELLS } else { OF_POINTS };
+        let name = name.strip_prefix(owner).unwrap_or(name);
         if self.name == name {
             return Some(self.magnitude());
         }
@@ -135,7 +135,7 @@ pub(crate) fn chosen_array(
         let exact = all.iter().enumerate().filter(|(_, array)| array.name == name).find_map(named);
         let found = exact.or_else(|| all.iter().enumerate().find_map(named));
         if let Some(array) = found.as_ref().map(|found| &all[found.rank]).filter(|array| array.is_vector()) {
-            let bare = [OF_CELLS, OF_POINTS].iter().find_map(|of| name.strip_prefix(of)).unwrap_or(&name);
+            let bare = [OF_CELLS, OF_POINTS].iter().find_map(|owner| name.strip_prefix(owner)).unwrap_or(&name);
             if array.name == bare {
                 notes.remark(length_is_drawn(&name));
             }

@@ -243,21 +243,21 @@ fn box_around(points: &[DVec3], body: &Body<'_>) -> DAabb {
 /// The thickness that all but the thinnest bodies have: the volume over the sides of a box around it, but for the shortest one.
 fn thinnest(points: &[DVec3], bodies: &[Body<'_>], reading: &Reading<'_>) -> Result<f64, ReadError> {
     input::hold("the thickness of cells", size_of_val(bodies) as u64, reading.params)?;
-    let mut all = Vec::new();
-    input::reserve(&mut all, bodies.len())?;
+    let mut thicknesses = Vec::new();
+    input::reserve(&mut thicknesses, bodies.len())?;
     for body in bodies {
         let place = |corner: u32| Knot { place: points[corner as usize], value: 0.0 };
         let mut of_body = 0.0;
         body.part(&place, |t| of_body += volume(t).abs() / 6.0);
         let sides = box_around(points, body).size();
         let thickness = of_body * sides.min_element() / sides.element_product();
-        all.extend((thickness > 0.0 && thickness.is_finite()).then_some(thickness));
+        thicknesses.extend((thickness > 0.0 && thickness.is_finite()).then_some(thickness));
     }
-    let rank = (THINNEST * all.len() as f64) as usize;
-    if rank >= all.len() {
+    let rank = (THINNEST * thicknesses.len() as f64) as usize;
+    if rank >= thicknesses.len() {
         return Ok(f64::INFINITY);
     }
-    Ok(*all.select_nth_unstable_by(rank, f64::total_cmp).1)
+    Ok(*thicknesses.select_nth_unstable_by(rank, f64::total_cmp).1)
 }
 
 /// Voxels with that side that boxes around bodies touch, all together.
