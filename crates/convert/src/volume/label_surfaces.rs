@@ -85,7 +85,7 @@ pub fn label_surface_bytes(grid: &Grid) -> u64 {
         at_ends + along + against(row.checked_sub(1), row % ny == 0) + against(row.checked_sub(ny), row < ny)
     };
     let borders: usize = grid.values.par_chunks(nx.max(1)).enumerate().map(of_row).sum();
-    // What ends at the far sides is less than all of it.
+    // Faces at the far sides of the volume are not counted above: a quarter more has room for them.
     borders as u64 * OF_A_BORDER * 5 / 4
 }
 

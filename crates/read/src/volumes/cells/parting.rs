@@ -157,7 +157,7 @@ impl Parting {
         let Some(field) = Linear::of(&corners) else { return };
         for face in FACES {
             let [a, b, c] = face.map(|rank| corners[rank]);
-            let polygon = Polygon::of(if field.is_turned { [a, c, b] } else { [a, b, c] });
+            let polygon = if field.is_turned { Polygon::triangle(a, c, b) } else { Polygon::triangle(a, b, c) };
             for i in polygon.voxels(0, touched.first.x..touched.last.x + 1) {
                 let strip = polygon.within(0, i as f64);
                 for j in strip.voxels(1, touched.first.y..touched.last.y + 1) {
@@ -229,7 +229,7 @@ struct Polygon {
 }
 
 impl Polygon {
-    fn of([a, b, c]: [Knot; 3]) -> Self {
+    fn triangle(a: Knot, b: Knot, c: Knot) -> Self {
         let mut corners = [a; MOST_CORNERS];
         corners[1] = b;
         corners[2] = c;

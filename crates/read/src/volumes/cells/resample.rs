@@ -184,7 +184,8 @@ fn weighted(weights: &[f64], corners: impl Iterator<Item = Knot> + Clone) -> Kno
 }
 
 /// Six times the volume, negative for one that is inside out.
-pub(super) fn volume([a, b, c, d]: &Tetrahedron) -> f64 {
+pub(super) fn volume(tetrahedron: &Tetrahedron) -> f64 {
+    let [a, b, c, d] = tetrahedron;
     (b.place - a.place).cross(c.place - a.place).dot(d.place - a.place)
 }
 
