@@ -157,11 +157,12 @@ pub fn resolve_opaque(
 ///
 /// ```
 /// use splat_core::raster::{Detail, NearestSurfaces, Params, ProjectInput, project};
-/// use splat_core::{Camera, Cloud, FootprintStack, Material, Projection, Splat, SplatKind, glam::DVec3};
+/// use splat_core::{Camera, Cloud, FootprintStack, Material, Projection, Splat, SplatKind};
+/// use splat_core::glam::{DVec3, Vec3};
 ///
 /// // Two discs, one behind the other.
 /// let mut cloud = Cloud::new(DVec3::ZERO);
-/// let disc = Splat { kind: SplatKind::Opaque, radius: 0.5, cross_section: 0.7, ..Splat::default() };
+/// let disc = Splat { kind: SplatKind::Opaque, normal: Vec3::Z, radius: 0.5, cross_section: 0.7, ..Splat::default() };
 /// cloud.push(&disc);
 /// cloud.push(&Splat { position: [0.0, 0.0, -1.0].into(), radius: 0.2, ..disc });
 /// let view = Projection::Orthographic { height: 2.0 };
