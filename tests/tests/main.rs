@@ -74,6 +74,7 @@ mod thick_media;
 mod triangles;
 mod truth;
 #[cfg(all(unix, feature = "view"))]
+mod vectorised;
 mod view;
 mod whole_fields;
 

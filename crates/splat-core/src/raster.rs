@@ -41,7 +41,7 @@ pub use opaque::{Cover, NearestSurfaces, OpaqueImage, OpaqueInput, resolve_opaqu
 pub use project::{ProjectInput, project, project_into};
 pub use projected::{Detail, Projected, ProjectedDepth, ProjectedSplat, SpecialDisc};
 pub use pulp;
-pub use translucent::{FoldInput, fold};
+pub use translucent::{FoldInput, Reached, fold};
 
 /// What rasterization may trade.
 #[derive(Debug, Clone, Copy, PartialEq)]

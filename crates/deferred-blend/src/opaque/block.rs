@@ -157,10 +157,12 @@ impl Block {
     pub(super) fn hide<S: Simd>(&mut self, simd: S, lane: usize, hit: &Hit<S>, rules: &Rules, rank: u32) {
         let at = |line: &Line| Lanes::load(simd, &line.0[lane..]);
         let lanes = |v: f32| Lanes::splat(simd, v);
-        let solid = |v: Lanes<S>| v.where_less_or(hit.distance_sq, lanes(rules.core), lanes(f32::INFINITY));
+        let core = lanes(rules.core);
+        let far = lanes(f32::INFINITY);
         let near = at(&self.near);
-        let depth = solid(hit.depth);
-        at(&self.limit).min(solid(hit.limit)).store(&mut self.limit.0[lane..]);
+        let depth = hit.depth.where_less_or(hit.distance_sq, core, far);
+        let limit = hit.limit.where_less_or(hit.distance_sq, core, far);
+        at(&self.limit).min(limit).store(&mut self.limit.0[lane..]);
         lanes(f32::from_bits(rank)).where_less_or(depth, near, at(&self.disc)).store(&mut self.disc.0[lane..]);
         hit.facing.where_less_or(depth, near, at(&self.facing)).store(&mut self.facing.0[lane..]);
         near.min(depth).store(&mut self.near.0[lane..]);

@@ -111,20 +111,24 @@ pub(super) fn keep<S: Simd>(
                 continue;
             }
             let kernel = &discs.kernels[discs.looks[i as usize].footprint as usize];
-            let keep = |line: &mut Line, new: Lanes<S>| {
-                new.where_less_or(behind, lanes(0.0), Lanes::load(simd, &line.0[lane..])).store(&mut line.0[lane..]);
-            };
             if let Some(floor) = rules.floor {
-                keep(&mut image.step, floored(simd, floor, depth));
-                keep(&mut image.place, distance_sq);
+                keep_nearer(simd, &mut image.step, lane, behind, floored(simd, floor, depth));
+                keep_nearer(simd, &mut image.place, lane, behind, distance_sq);
             }
-            keep(&mut image.depth, depth);
-            keep(&mut image.limit, limit);
-            keep(&mut image.weight, hit.weight(simd, kernel));
-            keep(&mut image.facing, hit.facing);
-            keep(&mut image.disc, lanes(f32::from_bits(i)));
+            keep_nearer(simd, &mut image.depth, lane, behind, depth);
+            keep_nearer(simd, &mut image.limit, lane, behind, limit);
+            keep_nearer(simd, &mut image.weight, lane, behind, hit.weight(simd, kernel));
+            keep_nearer(simd, &mut image.facing, lane, behind, hit.facing);
+            keep_nearer(simd, &mut image.disc, lane, behind, lanes(f32::from_bits(i)));
         }
     }
+}
+
+/// Writes the new numbers to a line, from `lane` on, where `behind` is below 0.
+#[inline(always)]
+fn keep_nearer<S: Simd>(simd: S, line: &mut Line, lane: usize, behind: Lanes<S>, new: Lanes<S>) {
+    let numbers = &mut line.0[lane..];
+    new.where_less_or(behind, Lanes::splat(simd, 0.0), Lanes::load(simd, numbers)).store(numbers);
 }
 
 /// By Eq. 14: below 0 where a disc is before an image. Steps are whole or the same, places differ by less than 1, so the sign is that of

@@ -5,11 +5,11 @@ use crate::pass;
 use crate::{CostRecord, Error, stage};
 use rayon::prelude::*;
 use splat_core::raster::{
-    self, Cover, Detail, FinishInput, GlassImage, NearestSurfaces, OpaqueImage, OpaqueInput, ProjectInput, Projected,
-    RasterCounts,
+    self, Cover, Detail, FinishInput, FoldInput, GlassImage, NearestSurfaces, OpaqueImage, OpaqueInput, ProjectInput,
+    Projected, RasterCounts, Reached,
 };
 use splat_core::shade::{ChannelLayout, LitBy, Within, shade_into, shade_within};
-use splat_core::{Accumulator, Layers, SplatKind, StageCost};
+use splat_core::{Accumulator, Direction, Layers, SplatKind, StageCost};
 use tsm::ShadowMap;
 
 /// The drawn splats, ready to be composited, by id.
@@ -28,6 +28,8 @@ struct Shading<'a> {
     /// The eye's map, where media are lit within.
     eye: Option<&'a ShadowMap>,
     layout: ChannelLayout,
+    /// The translucent splats of the whole picture in the order in which they are composited, front to back, where that is known.
+    order: Option<&'a [u32]>,
 }
 
 impl Frame<'_> {
@@ -38,6 +40,12 @@ impl Frame<'_> {
     /// # Errors
     /// [`Error::Cancelled`], and those of [`Frame::maps`].
     pub fn shaded(&self, cost: &mut CostRecord) -> Result<&Shaded, Error> {
+        self.shaded_in_order(None, cost)
+    }
+
+    /// The same for a picture that is composited in this order, front to back and once: the radiance of splats behind finished pixels is 0, where media are
+    /// thick enough for that to save more than it costs.
+    pub(crate) fn shaded_in_order(&self, order: Option<&[u32]>, cost: &mut CostRecord) -> Result<&Shaded, Error> {
         if let Some(shaded) = self.shaded.get() {
             return Ok(shaded);
         }
@@ -45,8 +53,12 @@ impl Frame<'_> {
         let Shaded { projected, mut values, .. } = self.before.take();
         let projected = self.project(projected, cost)?;
         let eye = self.eye_map(cost)?;
-        let shading = Shading { lights: &self.lit_by(&shadows), eye: eye.as_ref(), layout: self.layout() };
-        if self.skips_hidden() {
+        // The light within thick media takes up to 25 look-ups a splat and lamp, and most of their splats lie behind finished pixels.
+        // Surfaces that are drawn apart from splats would keep pixels open behind which these finish them.
+        let all_opaque_are_splats = !self.has_polygons() && self.solid_of(true).is_empty();
+        let order = order.filter(|_| eye.is_some() && all_opaque_are_splats);
+        let shading = Shading { lights: &self.lit_by(&shadows), eye: eye.as_ref(), layout: self.layout(), order };
+        if self.skips_hidden(order) {
             let mut stages = CostRecord::default();
             self.shade_seen(&mut values, &projected, &shading, &mut stages)?;
             stages.join(pass::SHADE);
@@ -62,12 +74,14 @@ impl Frame<'_> {
         Ok(self.shaded.get_or_init(|| Shaded { projected, values, channels: shading.layout.count() }))
     }
 
-    /// Whether splats that opaque ones hide get no light.
-    fn skips_hidden(&self) -> bool {
-        self.is_one_picture && self.plan.skips_hidden && !self.device_composites && !self.solid_ids().is_empty()
+    /// Whether splats get no light that opaque ones hide, or that the compositing of all translucent ones in this order does not reach.
+    fn skips_hidden(&self, order: Option<&[u32]>) -> bool {
+        let hides = order.is_some() || !self.solid_ids().is_empty();
+        self.is_one_picture && self.plan.skips_hidden && !self.device_composites && hides
     }
 
-    /// Radiance of what is seen: of the opaque splats that some sample shows, which become an image, and of the translucent ones that do not lie behind it.
+    /// Radiance of what is seen: of the opaque splats that some sample shows, which become an image, and of the translucent ones that do not lie behind
+    /// it, nor behind finished pixels.
     fn shade_seen(
         &self,
         values: &mut Vec<f32>,
@@ -75,9 +89,53 @@ impl Frame<'_> {
         shading: &Shading<'_>,
         cost: &mut CostRecord,
     ) -> Result<(), Error> {
+        let image = self.shade_seen_solid(values, projected, shading, cost)?;
+        self.progress.begin(stage::SHADE);
+        if let Some(order) = shading.order {
+            let params = self.raster_params();
+            let input = FoldInput {
+                projected,
+                order,
+                values: &[],
+                materials: &self.loaded.materials,
+                opaque: &image,
+                direction: Direction::FrontToBack,
+                params: &params,
+            };
+            let planes = self.plan.optical_depth_planes;
+            let reached = cost.measure(pass::SHADE, |stage| {
+                let reached = Reached::find(&input, planes, Some(self.progress));
+                let reached = reached.map_err(|e| Error::from_core("compositing", e))?;
+                stage.fragments = reached.counts().fragments;
+                Ok::<_, Error>(reached)
+            })?;
+            self.shade(values, shading, &|i| reached.has(i), reached.count(), cost)?;
+        } else if self.solid_ids().len() < projected.splats.len() {
+            let kind = &self.drawn().kind;
+            let cover = Cover::new(&image, projected.size);
+            let splats = (0..kind.len()).into_par_iter().with_min_len(1 << 14);
+            let is_seen =
+                |i: usize| kind[i] != SplatKind::Opaque && projected.is_visible(i) && !cover.hides(projected, i);
+            let seen: Vec<bool> = splats.map(is_seen).collect();
+            let count = seen.iter().filter(|is_seen| **is_seen).count() as u64;
+            self.shade(values, shading, &|i| seen[i], count, cost)?;
+        }
+        self.solid.set(Some(image));
+        Ok(())
+    }
+
+    /// The image of the opaque splats, and the radiance of those that some sample shows; an empty one where nothing is opaque.
+    fn shade_seen_solid(
+        &self,
+        values: &mut Vec<f32>,
+        projected: &Projected,
+        shading: &Shading<'_>,
+        cost: &mut CostRecord,
+    ) -> Result<OpaqueImage, Error> {
         let ids = self.solid_ids();
-        let kind = &self.drawn().kind;
-        let is_solid = |i: usize| kind[i] == SplatKind::Opaque;
+        if ids.is_empty() {
+            return Ok(OpaqueImage::default());
+        }
         let refused = |e| Error::from_core("opaque splats", e);
         self.progress.begin(stage::OPAQUE);
         let nearest = cost.measure(pass::OPAQUE, |_| {
@@ -85,23 +143,13 @@ impl Frame<'_> {
         })?;
         self.progress.begin(stage::SHADE);
         self.shade(values, shading, &|i| nearest.shows(i), nearest.shown(), cost)?;
-        let image = cost.measure(pass::OPAQUE, |stage| {
+        cost.measure(pass::OPAQUE, |stage| {
             stage.items_in = ids.len() as u64;
             let channels = shading.layout.count() as u32;
             let (image, counts) = nearest.resolve(values, channels, Some(self.progress)).map_err(refused)?;
             record(stage, &counts);
             Ok::<_, Error>(image)
-        })?;
-        if ids.len() < kind.len() {
-            let cover = Cover::new(&image, projected.size);
-            let splats = (0..kind.len()).into_par_iter().with_min_len(1 << 14);
-            let is_seen = |i: usize| !is_solid(i) && projected.is_visible(i) && !cover.hides(projected, i);
-            let seen: Vec<bool> = splats.map(is_seen).collect();
-            let count = seen.iter().filter(|is_seen| **is_seen).count() as u64;
-            self.shade(values, shading, &|i| seen[i], count, cost)?;
-        }
-        self.solid.set(Some(image));
-        Ok(())
+        })
     }
 
     /// Radiance of those of the drawn splats that `is_one` says, so many `splats`, and 0 of the others.
@@ -114,7 +162,7 @@ impl Frame<'_> {
         cost: &mut CostRecord,
     ) -> Result<(), Error> {
         cost.measure(pass::SHADE, |stage| {
-            let Shading { lights, eye, layout } = shading;
+            let Shading { lights, eye, layout, .. } = shading;
             let progress = Some(self.progress);
             let input = &self.shading(lights);
             let shaded = match eye {

@@ -47,9 +47,11 @@ impl Fold for Points<'_> {
                 None => order,
             });
         }
-        frame.shaded(cost)?;
-        frame.opaque(cost)?;
         let order = self.order.as_ref().expect("invariant: the order was made above");
+        // Ranges of other techniques' things between them would finish pixels earlier.
+        let in_one_go = whole && order.direction == Direction::FrontToBack;
+        frame.shaded_in_order(in_one_go.then_some(&order.input_from_sorted), cost)?;
+        frame.opaque(cost)?;
         composite(frame, order, range, into, cost)
     }
 }

@@ -144,6 +144,7 @@ impl<'a> Lamp<'a> {
 
 impl SlideInView<'_> {
     /// What it lets through, as [`Slide::passing`] has it: places by lanes, look-ups one by one.
+    #[inline(always)]
     fn passing<S: Simd>(&self, simd: S, places: &[Lanes<S>; 3], spread: f32) -> [Lanes<S>; 3] {
         let broadcast = |v: f32| Lanes::splat(simd, v);
         let way = [
@@ -151,7 +152,10 @@ impl SlideInView<'_> {
             places[1] - broadcast(self.origin.y),
             places[2] - broadcast(self.origin.z),
         ];
-        let depth = self.axis.map_or(broadcast(1.0), |axis| dot(&way, &vector(simd, axis)));
+        let mut depth = broadcast(1.0);
+        if let Some(axis) = self.axis {
+            depth = dot(&way, &vector(simd, axis));
+        }
         let half = broadcast(0.5);
         let mut numbers = [[0.0; MAX_LANES]; 3];
         let sides = [dot(&way, &vector(simd, self.across)), dot(&way, &vector(simd, self.down)), depth];
@@ -185,13 +189,13 @@ impl Reflector<'_> {
     ) {
         let (to_light, share) = lamp.arriving(simd, &spots.places, self.spread);
         let (factor, specular) = self.factors(simd, spots, &to_light);
-        let passing = lamp.slide.as_ref().map(|slide| slide.passing(simd, &spots.places, self.spread));
+        let mut passing = [Lanes::splat(simd, 1.0); 3];
+        if let Some(slide) = &lamp.slide {
+            passing = slide.passing(simd, &spots.places, self.spread);
+        }
         for c in 0..3 {
-            let mut irradiance = share * Lanes::splat(simd, lamp.intensity[c]);
-            if let Some(passing) = &passing {
-                irradiance = irradiance * passing[c];
-            }
-            irradiance = irradiance.where_less(Lanes::splat(simd, TRACE), irradiance);
+            let irradiance = share * Lanes::splat(simd, lamp.intensity[c]) * passing[c];
+            let irradiance = irradiance.where_less(Lanes::splat(simd, TRACE), irradiance);
             let arrives = if lamp.has_shadow { irradiance * self.taken(simd, through[c]) } else { irradiance };
             lit.radiance[c] = arrives.mul_add(spots.color[c].mul_add(factor, specular), lit.radiance[c]);
             if c == 1 {

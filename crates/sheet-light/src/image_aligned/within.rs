@@ -35,7 +35,7 @@ pub(crate) struct Within {
 }
 
 /// The part of a ray in a slab.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct RayPart {
     /// Its middle, and its way to the eye, in lattice coordinates from the rim on.
     pub(crate) middle: Vec3,

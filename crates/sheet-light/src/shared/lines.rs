@@ -38,6 +38,7 @@ pub(crate) struct Backdrop<'a> {
 }
 
 /// Splats that lie in neighbouring pixels, green.
+#[derive(Default)]
 pub(crate) struct PixelDepths {
     pub(crate) optical_depth: [f32; MAX_LANES],
     /// Mean view depth, and mean thickness; 0 where depths are not kept.

@@ -96,12 +96,25 @@ impl<S: Simd> Lanes<S> {
         Self { simd: self.simd, value: self.simd.sqrt_f32s(self.value) }
     }
 
+    /// The bits of the numbers. The methods of `pulp` that name this, and others that it makes of them (`abs_f32s`, `and_f32s`, `select_f32s`), may
+    /// stay calls through memory within vectorised code.
+    #[inline(always)]
+    fn bits(self) -> S::u32s {
+        pulp::cast(self.value)
+    }
+
+    /// The numbers of some bits.
+    #[inline(always)]
+    fn from_bits(simd: S, bits: S::u32s) -> Self {
+        Self { simd, value: pulp::cast(bits) }
+    }
+
     /// The absolute value.
     #[inline(always)]
     pub fn abs(self) -> Self {
-        // `abs_f32s` and `select_f32s` of pulp may stay calls, through memory, within what is vectorised.
-        let all_but_sign = self.simd.splat_f32s(f32::from_bits(0x7fff_ffff));
-        Self { simd: self.simd, value: self.simd.and_f32s(self.value, all_but_sign) }
+        let simd = self.simd;
+        let bits = simd.and_u32s(self.bits(), simd.splat_u32s(0x7fff_ffff));
+        Self::from_bits(simd, bits)
     }
 
     /// The lesser of the two; neither may be NaN.
@@ -120,10 +133,8 @@ impl<S: Simd> Lanes<S> {
     #[inline(always)]
     pub fn where_less_or(self, a: Self, b: Self, other: Self) -> Self {
         let simd = self.simd;
-        let this = simd.transmute_u32s_f32s(self.value);
-        let other = simd.transmute_u32s_f32s(other.value);
-        let bits = simd.select_u32s(simd.less_than_f32s(a.value, b.value), this, other);
-        Self { simd, value: simd.transmute_f32s_u32s(bits) }
+        let bits = simd.select_u32s(simd.less_than_f32s(a.value, b.value), self.bits(), other.bits());
+        Self::from_bits(simd, bits)
     }
 
     /// `self` where `a` < `b`, 0 elsewhere.
@@ -143,9 +154,9 @@ impl<S: Simd> Lanes<S> {
         let g = f * f;
         let high = (lanes(EXP2[4]) + lanes(EXP2[5]) * f) + lanes(EXP2[6]) * g;
         let p = (lanes(EXP2[0]) + lanes(EXP2[1]) * f) + g * ((lanes(EXP2[2]) + lanes(EXP2[3]) * f) + g * high);
-        let exponent = simd.wrapping_dyn_shl_u32s(simd.transmute_u32s_f32s(shifted.value), simd.splat_u32s(23));
-        let bits = simd.add_u32s(simd.transmute_u32s_f32s(p.value), exponent);
-        Self { simd, value: simd.transmute_f32s_u32s(bits) }.where_less(lanes(-126.0), t)
+        let exponent = simd.wrapping_dyn_shl_u32s(shifted.bits(), simd.splat_u32s(23));
+        let bits = simd.add_u32s(p.bits(), exponent);
+        Self::from_bits(simd, bits).where_less(lanes(-126.0), t)
     }
 
     /// The natural logarithm of a normal number > 0: an error below 2·10⁻⁷ of it, or of 10⁻⁷ near 1.
@@ -155,14 +166,13 @@ impl<S: Simd> Lanes<S> {
         let lanes = |v| Self::splat(simd, v);
         // Bits of 1/√2, so that what is left of the number lies around 1; 127 more make the exponent a natural number.
         let whole = |v: u32| simd.splat_u32s(v);
-        let above = simd.add_u32s(simd.transmute_u32s_f32s(self.value), whole((127 << 23) - 0x3f35_04f3));
+        let above = simd.add_u32s(self.bits(), whole((127 << 23) - 0x3f35_04f3));
         let exponent = simd.wrapping_dyn_shr_u32s(above, whole(23));
         let scale = simd.wrapping_dyn_shl_u32s(simd.sub_u32s(exponent, whole(127)), whole(23));
-        let rest = simd.sub_u32s(simd.transmute_u32s_f32s(self.value), scale);
+        let rest = simd.sub_u32s(self.bits(), scale);
         // The bits of 2²³ and a natural number below are those of their sum.
-        let exponent = simd.transmute_f32s_u32s(simd.add_u32s(exponent, whole(0x4b00_0000)));
-        let exponent = Self { simd, value: exponent } - lanes(8_388_608.0 + 127.0);
-        let f = Self { simd, value: simd.transmute_f32s_u32s(rest) } - lanes(1.0);
+        let exponent = Self::from_bits(simd, simd.add_u32s(exponent, whole(0x4b00_0000))) - lanes(8_388_608.0 + 127.0);
+        let f = Self::from_bits(simd, rest) - lanes(1.0);
         let mut p = lanes(LN[0]);
         for c in &LN[1..] {
             p = p.mul_add(f, lanes(*c));

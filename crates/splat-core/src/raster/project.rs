@@ -336,11 +336,12 @@ impl Projector<'_> {
     #[inline(always)]
     fn in_view<S: Simd>(&self, simd: S, centers: &Centers<S>, radius: Lanes<S>, peak: Lanes<S>) -> Lanes<S> {
         let [x, y, z] = centers.position;
-        let across = |v: Lanes<S>, reach: f32, peak: Lanes<S>| {
-            let lanes = |v: f32| Lanes::splat(simd, v);
-            peak.where_less(v.abs() - z.abs() * lanes(reach), radius * lanes((1.0 + reach * reach).sqrt()))
-        };
-        across(y, self.reach.y, across(x, self.reach.x, peak))
+        let mut peak = peak;
+        for (v, reach) in [(x, self.reach.x), (y, self.reach.y)] {
+            let outside = v.abs() - z.abs() * Lanes::splat(simd, reach);
+            peak = peak.where_less(outside, radius * Lanes::splat(simd, (1.0 + reach * reach).sqrt()));
+        }
+        peak
     }
 
     #[inline(always)]
@@ -362,14 +363,18 @@ impl Projector<'_> {
         let mixed = ju[0] * ju[1] + jv[0] * jv[1];
         // (J Jᵀ + filter)⁻¹, its determinant |J|² + filter²·trace(JJᵀ) + filter⁴ written so that an edge-on disc does not
         // cancel.
-        let conic_of = |filter_sq: Lanes<S>| {
-            let xx = trace_x + filter_sq;
-            let yy = trace_y + filter_sq;
-            let inverse = lanes(1.0) / (area_sq + filter_sq * (trace_x + trace_y) + filter_sq * filter_sq);
-            ([yy * inverse, lanes(-2.0) * (mixed * inverse), xx * inverse], [xx, yy], inverse)
-        };
-        let (conic, [xx, yy], inverse) = conic_of(filter_sq);
-        let (core, ..) = conic_of(lanes(CORE_FILTER_PX * CORE_FILTER_PX));
+        let core_filter_sq = lanes(CORE_FILTER_PX * CORE_FILTER_PX);
+        let trace = trace_x + trace_y;
+        let core_inverse = lanes(1.0) / (area_sq + core_filter_sq * trace + core_filter_sq * core_filter_sq);
+        let core = [
+            (trace_y + core_filter_sq) * core_inverse,
+            lanes(-2.0) * (mixed * core_inverse),
+            (trace_x + core_filter_sq) * core_inverse,
+        ];
+        let xx = trace_x + filter_sq;
+        let yy = trace_y + filter_sq;
+        let inverse = lanes(1.0) / (area_sq + filter_sq * trace + filter_sq * filter_sq);
+        let conic = [yy * inverse, lanes(-2.0) * (mixed * inverse), xx * inverse];
         let radius_sq = dot(axis_u, axis_u).sqrt() * dot(axis_v, axis_v).sqrt();
         // The filter spreads the same optical depth over a larger image area.
         let spread = (area_sq * inverse).sqrt();
@@ -389,15 +394,9 @@ impl Projector<'_> {
         let (near, half_extent, peak) = self.near_discs(simd, centers, [axis_u, axis_v], [xx.sqrt(), yy.sqrt()], peak);
         // An edge-on plane has no slope that could be used; its fragments stay at the centre's depth.
         let per_px = lanes(1.0) / (along * px_per_world);
-        let usable = |slope: Lanes<S>| slope.where_less(lanes(1e-4), along.abs());
-        Shapes {
-            conic,
-            core,
-            peak,
-            half_extent,
-            slope: [usable(lanes(0.0) - normal[0] * per_px), usable(normal[1] * per_px)],
-            near,
-        }
+        let right = (lanes(0.0) - normal[0] * per_px).where_less(lanes(1e-4), along.abs());
+        let down = (normal[1] * per_px).where_less(lanes(1e-4), along.abs());
+        Shapes { conic, core, peak, half_extent, slope: [right, down], near }
     }
 
     /// Which discs reach through the eye plane, where they may lie in the image, and the peaks of those that may be seen. In
@@ -419,9 +418,10 @@ impl Projector<'_> {
             return (lanes(1.0).where_less_or(z, along, lanes(-1.0)), half_extent, peak);
         }
         let radius = dot(axes[0], axes[0]).max(dot(axes[1], axes[1])).sqrt();
-        let everywhere = |extent: Lanes<S>| lanes(f32::INFINITY).where_less_or(z, radius, extent);
+        let far = lanes(f32::INFINITY);
+        let half_extent = [far.where_less_or(z, radius, half_extent[0]), far.where_less_or(z, radius, half_extent[1])];
         let seen = self.in_view(simd, centers, radius, peak).where_less_or(z, radius, peak);
-        (lanes(1.0).where_less_or(z, radius, lanes(-1.0)), half_extent.map(everywhere), seen)
+        (lanes(1.0).where_less_or(z, radius, lanes(-1.0)), half_extent, seen)
     }
 
     /// Semi-axes of the discs in view space.

@@ -53,16 +53,22 @@ impl<S: Simd> Shapes<S> {
     /// `self` where `a` < `b`, `other` elsewhere.
     #[inline(always)]
     pub(super) fn where_less(&self, a: Lanes<S>, b: Lanes<S>, other: &Self) -> Self {
-        let choose = |one: Lanes<S>, other: Lanes<S>| one.where_less_or(a, b, other);
-        let pair = |one: [Lanes<S>; 2], other: [Lanes<S>; 2]| [choose(one[0], other[0]), choose(one[1], other[1])];
-        let conic = |[a, b, c]: [Lanes<S>; 3], [d, e, f]: [Lanes<S>; 3]| [choose(a, d), choose(b, e), choose(c, f)];
-        Self {
-            conic: conic(self.conic, other.conic),
-            core: conic(self.core, other.core),
-            peak: choose(self.peak, other.peak),
-            half_extent: pair(self.half_extent, other.half_extent),
-            near: choose(self.near, other.near),
-            slope: pair(self.slope, other.slope),
+        let mut chosen = Self {
+            conic: self.conic,
+            core: self.core,
+            peak: self.peak.where_less_or(a, b, other.peak),
+            half_extent: self.half_extent,
+            near: self.near.where_less_or(a, b, other.near),
+            slope: self.slope,
+        };
+        for k in 0..3 {
+            chosen.conic[k] = self.conic[k].where_less_or(a, b, other.conic[k]);
+            chosen.core[k] = self.core[k].where_less_or(a, b, other.core[k]);
         }
+        for k in 0..2 {
+            chosen.half_extent[k] = self.half_extent[k].where_less_or(a, b, other.half_extent[k]);
+            chosen.slope[k] = self.slope[k].where_less_or(a, b, other.slope[k]);
+        }
+        chosen
     }
 }

@@ -4,6 +4,9 @@
 //! rounding however many splats there are, and 1 − e^−τ comes from a series, so tiny τ keep their digits. A = Στ is what
 //! leaves the tile; a fold that goes on begins with T = e^−A. Back to front is the twin: C ← C + (1 − e^−τ)·(c − C).
 //!
+//! A block of pixels that let nothing more through is finished, so most splats of a thick medium are passed over. [`Reached`] finds the others before
+//! they are shaded: it folds optical depths alone, by the same steps, so it finishes every block at the same splat.
+//!
 //! A medium that straddles an opaque surface counts with the share of its kernel in front of it, as it does at the eye plane: no
 //! seam where a cloud meets the ground. A disc that reaches through the eye plane counts where its plane lies before the eye.
 
@@ -18,6 +21,7 @@ use crate::shade::ChannelLayout;
 use crate::{Accumulator, DepthProfile, Direction, Error, Material, Progress, SplatKind};
 use pulp::Simd;
 use rayon::prelude::*;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// The state of one tile while splats are folded into it.
 struct Tile {
@@ -37,6 +41,8 @@ struct Tile {
     fragments: u64,
     /// A bit for each block that is finished.
     done: u64,
+    /// Ids of the splats that were composited, in list order; `None` when not asked for.
+    reached: Option<Vec<u32>>,
 }
 
 /// One bit for each block of a tile.
@@ -129,6 +135,92 @@ pub fn fold(
     Ok(counts)
 }
 
+/// The splats that [`fold`] composites into an empty accumulator, found before they are shaded: the values of all others are never read.
+///
+/// ```
+/// use splat_core::raster::{Detail, FoldInput, OpaqueImage, Params, ProjectInput, Reached, project};
+/// use splat_core::{Camera, Cloud, Direction, FootprintStack, Material, Projection, Splat};
+/// use splat_core::glam::{DVec3, Vec3};
+///
+/// // 100 wide splats of one optical depth each, one behind the other.
+/// let mut cloud = Cloud::new(DVec3::ZERO);
+/// for k in 0..100 {
+///     let position = Vec3::new(0.0, 0.0, -(k as f32));
+///     cloud.push(&Splat { position, radius: 20.0, cross_section: 250.0, ..Splat::default() });
+/// }
+/// let view = Projection::Orthographic { height: 2.0 };
+/// let camera = Camera::look_at(DVec3::Z * 40.0, DVec3::ZERO, DVec3::Y, view, [64, 64]).unwrap();
+/// let (footprints, materials, params) = (FootprintStack::default(), [Material::default()], Params::default());
+/// let input = ProjectInput { cloud: &cloud, camera: &camera, footprints: &footprints, materials: &materials, params: &params, detail: Detail::ALL };
+/// let projected = project(&input);
+/// let order: Vec<u32> = (0..100).collect();
+/// let opaque = OpaqueImage::default();
+/// let input = FoldInput { projected: &projected, order: &order, values: &[], materials: &materials, opaque: &opaque, direction: Direction::FrontToBack, params: &params };
+/// let reached = Reached::find(&input, 1, None).unwrap();
+/// // A transmittance of 1/1024 finishes a pixel, as soon as the batch of 64 splats is over.
+/// assert!(reached.has(0) && !reached.has(64));
+/// ```
+pub struct Reached {
+    /// A bit for each splat.
+    bits: Vec<u64>,
+    counts: RasterCounts,
+}
+
+impl Reached {
+    /// Finds them; `input.values` are not read, and `planes` are the accumulator's planes of optical depth, 1 or 3. One tick a tile.
+    ///
+    /// # Errors
+    /// [`Error::Cancelled`].
+    ///
+    /// # Panics
+    /// If `projected` lacks depths that an opaque image calls for; back to front, where all splats are composited.
+    pub fn find(input: &FoldInput<'_>, planes: usize, progress: Option<&Progress>) -> Result<Self, Error> {
+        let FoldInput { projected, order, opaque, direction, .. } = *input;
+        assert_eq!(direction, Direction::FrontToBack, "invariant: pixels are finished front to back");
+        let is_deep = opaque.depth.is_empty() || projected.depths.len() == projected.splats.len();
+        assert!(is_deep, "invariant: depths where they are needed");
+        let quiet = Progress::new();
+        let progress = progress.unwrap_or(&quiet);
+        let empty = Accumulator::new(projected.size, planes, 0, false, false);
+        let bins = bin(projected, order);
+        progress.add_total(bins.tiles() as u64);
+        let words = projected.splats.len().div_ceil(u64::BITS as usize);
+        let bits: Vec<AtomicU64> = (0..words).map(|_| AtomicU64::new(0)).collect();
+        let tiles = (0..bins.tiles()).into_par_iter().filter(|&t| progress.tick(1).is_ok() && !bins.is_empty(t));
+        let fragments = tiles.map(|t| {
+            let mut tile = Tile { reached: Some(Vec::new()), ..Tile::load(&empty, projected, opaque, &bins, t) };
+            pulp::Arch::new().dispatch(FoldTile { tile: &mut tile, bins: &bins, t, input });
+            for id in tile.reached.iter().flatten() {
+                bits[*id as usize / u64::BITS as usize].fetch_or(1 << (id % u64::BITS), Ordering::Relaxed);
+            }
+            tile.fragments
+        });
+        let counts = RasterCounts {
+            fragments: fragments.sum(),
+            splats: bins.splats(),
+            tile_entries: bins.entries(),
+            bytes: bins.bytes(),
+        };
+        progress.tick(0)?;
+        Ok(Self { bits: bits.into_iter().map(AtomicU64::into_inner).collect(), counts })
+    }
+
+    /// Whether splat `i` is composited.
+    pub fn has(&self, i: usize) -> bool {
+        self.bits[i / u64::BITS as usize] >> (i % u64::BITS as usize) & 1 == 1
+    }
+
+    /// The number of splats that are composited.
+    pub fn count(&self) -> u64 {
+        self.bits.iter().map(|word| u64::from(word.count_ones())).sum()
+    }
+
+    /// The work of finding them.
+    pub fn counts(&self) -> RasterCounts {
+        self.counts
+    }
+}
+
 /// One tile's work, in the form that [`pulp`] compiles once per instruction set.
 struct FoldTile<'a> {
     tile: &'a mut Tile,
@@ -181,9 +273,10 @@ impl FoldTile<'_> {
         let mut conic = Conic::new();
         for list in self.bins.tile(self.t) {
             for batch in list.chunks(BATCH) {
-                for ((&j, record), value) in batch.iter().zip(&mut records).zip(values.chunks_exact_mut(channels)) {
+                for (k, (&j, record)) in batch.iter().zip(&mut records).enumerate() {
                     *record = projected.splats[j as usize];
-                    value.copy_from_slice(&of_splats[j as usize * channels..][..channels]);
+                    let value = &of_splats[j as usize * channels..][..channels];
+                    values[k * channels..][..channels].copy_from_slice(value);
                 }
                 if deep {
                     batch.iter().zip(&mut depths).for_each(|(&j, depth)| *depth = projected.depths[j as usize]);
@@ -213,7 +306,10 @@ impl FoldTile<'_> {
                             && !splat.is_gaussian(),
                         value: &values[k * channels..][..channels],
                     };
-                    self.tile.splat::<S, FRONT, HALF, PLANES, CHANNELS>(simd, &splat, &mut conic);
+                    let is_composited = self.tile.splat::<S, FRONT, HALF, PLANES, CHANNELS>(simd, &splat, &mut conic);
+                    if let Some(reached) = self.tile.reached.as_mut().filter(|_| is_composited) {
+                        reached.push(j);
+                    }
                 }
                 if FRONT && self.tile.finish_blocks(params.transmittance_cutoff) {
                     return;
@@ -242,6 +338,7 @@ impl Tile {
             object,
             fragments: 0,
             done: 0,
+            reached: None,
         };
         tile.load_lines(acc);
         tile
@@ -297,13 +394,15 @@ impl Tile {
         self.done == u64::MAX
     }
 
+    /// Composites a splat into the blocks that are not finished. Returns whether there are any.
     #[inline(always)]
     fn splat<S: Simd, const FRONT: bool, const HALF: bool, const PLANES: usize, const CHANNELS: usize>(
         &mut self,
         simd: S,
         splat: &Splat<'_>,
         conic: &mut Conic,
-    ) {
+    ) -> bool {
+        let mut is_composited = false;
         let runs = Runs::new(simd, splat.source.splat, self.size, [self.x, self.y]);
         self.fragments += runs.pixels();
         let done = if FRONT { self.done } else { 0 };
@@ -312,19 +411,22 @@ impl Tile {
             conic.fill(simd, splat.source.splat, &runs);
             for run in runs {
                 if !is_in(done, run.block) {
+                    is_composited = true;
                     let s = run.distance_sq_by(simd, splat.source.splat, conic);
                     let tau = splat.source.of_kernel(simd, s, run, &self.rays);
                     self.composite::<S, FRONT, HALF, true, PLANES, CHANNELS>(simd, splat, run, tau);
                 }
             }
-            return;
+            return is_composited;
         }
         for run in runs {
             if !is_in(done, run.block) {
+                is_composited = true;
                 let tau = splat.source.optical_depth(simd, run, &self.rays);
                 self.composite::<S, FRONT, HALF, false, PLANES, CHANNELS>(simd, splat, run, tau);
             }
         }
+        is_composited
     }
 
     #[inline(always)]

@@ -154,7 +154,7 @@ impl ShadowMap {
                 let most = if ABSORBANCE { MOST } else { 1.0 };
                 (0..C).for_each(|c| light[r][c] = (sum[c] / seen).min(most));
             } else if let Some((target, place)) = self.target(mapping, receiver) {
-                light[r] = self.grazing(simd, mapping, matter, &target, place.at).map(number);
+                light[r] = self.grazing(mapping, matter, &target, place.at).map(number);
             }
         }
         light
@@ -177,15 +177,17 @@ impl ShadowMap {
 
     /// A plane that no near cell sees, being almost parallel to the light: it gets next to none, and no surface can be
     /// told to be before or behind it, so media alone shadow it.
-    fn grazing<S: Simd, M: Mapping, const C: usize>(
+    #[cold]
+    fn grazing<M: Mapping, const C: usize>(
         &self,
-        simd: S,
         mapping: &M,
         matter: &Matter<C>,
         target: &Target,
         at: Vec2,
     ) -> [f32; C] {
         let cell = mapping.wrap(floor(at.x), floor(at.y));
+        // Too rare to be vectorised, and the same in every bit.
+        let simd = pulp::Scalar::new();
         self.absorbed(simd, matter, &[[cell, None, None, None]], &[[[target.distance, 0.0]; 4]], 1)[0][0]
     }
 
@@ -304,12 +306,13 @@ pub(crate) fn continuous<S: Simd, const C: usize>(
         let (at, total) = list.window(n);
         let left = lanes((list.len() - n).min(2 * WINDOW) as f32);
         for l in (0..WINDOW).step_by(Lanes::<S>::COUNT) {
-            let share = |l: usize| {
-                // Nothing of what follows the list.
-                let most = whole.min(left - Lanes::load(simd, &INDEX[l..]));
-                ((place - Lanes::load(simd, &at[l..])) * inverse + half).min(most).max(none)
-            };
-            let part = share(l) - share(l + 1);
+            let [this, next] = [Lanes::load(simd, &at[l..]), Lanes::load(simd, &at[l + 1..])];
+            // Nothing of what follows the list.
+            let most = whole.min(left - Lanes::load(simd, &INDEX[l..]));
+            let most_next = whole.min(left - Lanes::load(simd, &INDEX[l + 1..]));
+            let share = ((place - this) * inverse + half).min(most).max(none);
+            let share_next = ((place - next) * inverse + half).min(most_next).max(none);
+            let part = share - share_next;
             for c in 0..C {
                 let total = column(simd, total, l, c);
                 (Lanes::load(simd, &sums[c][l..]) + total * part).store(&mut sums[c][l..]);

@@ -305,22 +305,22 @@ impl<const C: usize> WithSimd for First<'_, C> {
         let Self { matter, cell, absorbance, ramp } = self;
         let [media, surfaces] =
             [&matter.media, &matter.surfaces].map(|lists| lists.as_ref().map_or(List::NONE, |lists| lists.list(cell)));
-        let is_reached = |distance: f32| {
+        let ends = [media.distance().last().map(|d| d + ramp), surfaces.distance().last().copied()];
+        let end = ends.into_iter().flatten().reduce(f32::max)?;
+        // Distances are positive, and their bits in their order. The end is looked at first.
+        let mut before = 0;
+        let mut reached = end.to_bits() + 1;
+        let mut looked_at = end.to_bits();
+        while reached - before > 1 {
+            let distance = f32::from_bits(looked_at);
             let steps = surfaces.total_of(surfaces.distance().partition_point(|d| *d <= distance));
             let begin = media.distance().partition_point(|d| *d <= distance - ramp);
             let within = continuous(simd, media, begin, distance, ramp);
-            (0..C).all(|c| steps[c] + within[c] >= absorbance)
-        };
-        let ends = [media.distance().last().map(|d| d + ramp), surfaces.distance().last().copied()];
-        let end = ends.into_iter().flatten().reduce(f32::max).filter(|end| is_reached(*end))?;
-        // Distances are positive, and their bits in their order.
-        let mut before = 0;
-        let mut reached = end.to_bits();
-        while reached - before > 1 {
-            let middle = before + (reached - before) / 2;
-            *if is_reached(f32::from_bits(middle)) { &mut reached } else { &mut before } = middle;
+            let is_reached = (0..C).all(|c| steps[c] + within[c] >= absorbance);
+            *if is_reached { &mut reached } else { &mut before } = looked_at;
+            looked_at = before + (reached - before) / 2;
         }
-        Some(f32::from_bits(reached))
+        (reached <= end.to_bits()).then_some(f32::from_bits(reached))
     }
 }
 

@@ -5,6 +5,7 @@ use super::buffer::Fragments;
 use super::sheets::{Chunk, OneSlab};
 use crate::half_vector::polygons::panes::{OfPixel, PaneDepths, PaneSheets};
 use crate::shared::depths::{DepthSpans, share_before};
+use crate::shared::lines::PixelDepths;
 use crate::shared::pixel::Pixel;
 use splat_core::raster::lanes::{Lanes, MAX_LANES};
 use splat_core::raster::pulp::Simd;
@@ -20,7 +21,11 @@ impl OneSlab<'_> {
         let most = of_lanes.iter().map(OfPixel::count).max().unwrap_or(0);
         let first = Pixel { x: chunk.x, y: chunk.y };
         let splatted = self.work.splats.and_then(|splats| splats.squares.find(first, Lanes::<S>::COUNT));
-        let splatted = splatted.map(|found| found.lines.depths(simd, found.pixel));
+        // Within a closure nothing is vectorised.
+        let mut depths_of_splats = PixelDepths::default();
+        if let Some(found) = splatted {
+            depths_of_splats = found.lines.depths(simd, found.pixel);
+        }
         let is_last_first = self.prepends();
         let is_back_to_front = self.work.geometry.frame.back_to_front;
         for step in 0..=most {
@@ -40,23 +45,16 @@ impl OneSlab<'_> {
                 self.part.from[lane] = first.map_or(f32::NEG_INFINITY, |pane| pane.across_slabs);
                 self.part.to[lane] = last.map_or(f32::INFINITY, |pane| pane.across_slabs);
                 let share = |pane: PaneDepths| {
-                    let [depth, thickness] =
-                        splatted.as_ref().map_or([0.0; 2], |found| [found.depth[lane], found.thickness[lane]]);
-                    share_before(pane.view, depth, thickness)
+                    share_before(pane.view, depths_of_splats.depth[lane], depths_of_splats.thickness[lane])
                 };
                 splats[lane] = behind.map_or(1.0, share) - before.map_or(0.0, share);
             }
-            let draws_own = |this: &mut Self, n: Option<usize>| {
-                if let Some(n) = n.filter(|n| *n < most) {
-                    this.draw_panes(simd, chunk, panes, &of_lanes, n);
+            for draws_polygons in [is_last_first, !is_last_first] {
+                if !draws_polygons {
+                    self.draw(simd, chunk, splats);
+                } else if n < most {
+                    self.draw_panes(simd, chunk, panes, &of_lanes, n);
                 }
-            };
-            if is_last_first {
-                draws_own(self, Some(n));
-            }
-            self.draw(simd, chunk, splats);
-            if !is_last_first {
-                draws_own(self, Some(n));
             }
         }
         self.part = DepthSpans::WHOLE;

@@ -317,12 +317,13 @@ impl OneSlab<'_> {
         let middle = (near + far) * Lanes::splat(simd, 0.5);
         let middles = self.places(simd, chunk.k, middle);
         let places = stored(&middles);
-        let seen = lighting.scattered.is_some().then(|| {
+        let mut seen = None;
+        if lighting.scattered.is_some() {
             let [first, last] = if geometry.frame.back_to_front { [far, near] } else { [near, far] };
             let share = out.optical_depth[planes / 2].map(mean_depth);
             let depth = first + (last - first) * Lanes::load(simd, &share);
-            stored(&self.places(simd, chunk.k, depth))
-        });
+            seen = Some(stored(&self.places(simd, chunk.k, depth)));
+        }
         let stretch = Lanes::load(simd, &self.eye.band.stretch[chunk.k..]);
         let mut others = std::mem::take(&mut self.eye.others);
         let mut so_far = [[0.0; MAX_LANES]; 3];
@@ -510,14 +511,17 @@ impl OneSlab<'_> {
         medium.near.store(&mut ends[0]);
         medium.far.store(&mut ends[1]);
         let green = eye.pixels.planes / 2;
-        let splatted = splats.map(|splats| splats.found.lines.depths(simd, splats.found.pixel));
+        let mut depths_of_splats = PixelDepths::default();
+        if let Some(splats) = splats {
+            depths_of_splats = splats.found.lines.depths(simd, splats.found.pixel);
+        }
         for lane in 0..Lanes::<S>::COUNT.min(eye.band.width.saturating_sub(chunk.x)) {
             let optical_depth = fragments.optical_depth[green][lane];
             if optical_depth > 0.0 {
                 let pixel = Pixel { x: chunk.x + lane, y: chunk.y };
                 let ends = ends.map(|end| geometry.view_depth(pixel, end[lane]));
-                let of_lane = |found: &PixelDepths| [found.depth[lane], found.thickness[lane]].map(f64::from);
-                let [depth, thickness] = splatted.as_ref().map_or([0.0; 2], of_lane);
+                let depth = f64::from(depths_of_splats.depth[lane]);
+                let thickness = f64::from(depths_of_splats.thickness[lane]);
                 let half = 0.5 * thickness;
                 let mix = |volumes: f64, optical_depth: f64| match share[lane] {
                     // What has no part is of no meaning.

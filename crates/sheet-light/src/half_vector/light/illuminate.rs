@@ -73,7 +73,10 @@ impl Illumination<'_> {
         let broadcast = |v: f32| Lanes::splat(simd, v);
         let RayEnds { nearer, farther } = &asked.ends;
         let middle = asked.ends.place(broadcast(0.5));
-        let soft = self.buffer.soft.as_ref().map(|soft| soft.in_slab(simd, &middle, is_wanted, asked.lit));
+        let mut soft = None;
+        if let Some(buffer) = &self.buffer.soft {
+            soft = Some(buffer.in_slab(simd, &middle, is_wanted, asked.lit));
+        }
         let mut optical = [[broadcast(0.0); NODES]; 3];
         let mut bends = [broadcast(1.0); BENDS];
         let mut is_bent = broadcast(0.0);
@@ -163,9 +166,14 @@ impl Illumination<'_> {
             (0..3).for_each(|p| (0..2).for_each(|n| tau[p][n][lane] = of_each[p][n]));
         }
         for p in 0..3 {
-            let [before, within] = [0, 1].map(|n| Lanes::load(simd, &tau[p][n]));
-            let before = soft.as_ref().map_or(before, |soft| before * soft.share[p]);
-            (0..NODES).for_each(|n| to[p][n] = to[p][n] + before + within);
+            let mut before = Lanes::load(simd, &tau[p][0]);
+            let within = Lanes::load(simd, &tau[p][1]);
+            if let Some(soft) = soft {
+                before = before * soft.share[p];
+            }
+            for node in &mut to[p] {
+                *node = *node + before + within;
+            }
         }
     }
 

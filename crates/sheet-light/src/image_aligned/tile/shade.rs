@@ -190,12 +190,10 @@ impl Shader<'_> {
         }
         let half = splat(0.5 / slabs.width as f32);
         let least = splat(LEAST_WEIGHT);
-        let towards = |shift: Lanes<S>, slab: u32| {
-            let [v, weight] = reconstructed.sheets.load(simd, slab, y, x);
-            shift.max(zero) * half * (v - value).where_less(least, weight)
-        };
-        let after = towards(behind, slab + 1);
-        let before = towards(zero - behind, slab.max(1) - 1);
+        let [value_after, weight_after] = reconstructed.sheets.load(simd, slab + 1, y, x);
+        let [value_before, weight_before] = reconstructed.sheets.load(simd, slab.max(1) - 1, y, x);
+        let after = behind.max(zero) * half * (value_after - value).where_less(least, weight_after);
+        let before = (zero - behind).max(zero) * half * (value_before - value).where_less(least, weight_before);
         [value + after + before, weight]
     }
 
@@ -250,13 +248,24 @@ impl Shader<'_> {
     /// ∇v in view space, per slab width.
     #[inline(always)]
     fn gradient<S: Simd>(&self, simd: S, reconstructed: &Reconstructed<'_>, place: Place) -> [Lanes<S>; 3] {
-        let of_place = |slab: u32, y: usize, x: usize| self.sample(simd, reconstructed, Place { slab, y, x });
         let Place { slab, y, x } = place;
         let [value, _] = reconstructed.sheets.load(simd, slab, y, x);
-        let before = if slab > 0 { of_place(slab - 1, y, x) } else { [value, Lanes::splat(simd, 0.0)] };
-        let along = difference(simd, value, before, of_place(slab + 1, y, x));
-        let right = difference(simd, value, of_place(slab, y, x - 1), of_place(slab, y, x + 1));
-        let down = difference(simd, value, of_place(slab, y - 1, x), of_place(slab, y + 1, x));
+        let neighbours = [
+            Place { slab: slab.max(1) - 1, y, x },
+            Place { slab: slab + 1, y, x },
+            Place { slab, y, x: x - 1 },
+            Place { slab, y, x: x + 1 },
+            Place { slab, y: y - 1, x },
+            Place { slab, y: y + 1, x },
+        ];
+        let mut samples = [[value, Lanes::splat(simd, 0.0)]; 6];
+        // Before the first slab there is no sample.
+        for k in usize::from(slab == 0)..6 {
+            samples[k] = self.sample(simd, reconstructed, neighbours[k]);
+        }
+        let along = difference(simd, value, samples[0], samples[1]);
+        let right = difference(simd, value, samples[2], samples[3]);
+        let down = difference(simd, value, samples[4], samples[5]);
         let slabs = &reconstructed.prepared.slabs;
         let z = slabs.origin + (f64::from(slab) + 0.5) * slabs.width;
         let pixels = self.input.camera.focal_px() * slabs.width;
@@ -348,22 +357,26 @@ impl Shader<'_> {
         };
         let mut lit = Lit::dark(simd);
         if volume.material.shading != Shading::Unlit {
-            let shadows = reconstructed.prepared.shadows.as_ref();
-            let shadows = shadows
-                .map(|s| (s, s.neighbours.cells(simd, &reconstructed.prepared.voxels, &spots.places, lane_bits)));
             let mut through = [Lanes::splat(simd, 1.0); 3];
-            let within = reconstructed.prepared.within.as_ref().zip(shadows.as_ref());
-            let within = within.map(|(within, (shadows, cells))| {
-                (within, cells, parts(shadows.neighbours.lattice_from_place, spots, medium))
-            });
-            for (rank, lamp) in self.lamps.iter().enumerate() {
-                if let Some((shadows, cells)) = &shadows {
-                    through = shadows.transmittance(simd, cells, rank);
+            if let Some(shadows) = &reconstructed.prepared.shadows {
+                let cells = shadows.neighbours.cells(simd, &reconstructed.prepared.voxels, &spots.places, lane_bits);
+                let within = reconstructed.prepared.within.as_ref();
+                let mut ray_parts = [RayPart::default(); MAX_LANES];
+                if within.is_some() {
+                    ray_parts = parts(shadows.neighbours.lattice_from_place, spots, medium);
                 }
-                if let Some((within, cells, parts)) = &within {
-                    through = within_lanes(simd, through, |shares| within.replace(cells, rank, parts, shares));
+                for (rank, lamp) in self.lamps.iter().enumerate() {
+                    through = shadows.transmittance(simd, &cells, rank);
+                    if let Some(within) = within {
+                        through =
+                            within_lanes(simd, through, |shares| within.replace(&cells, rank, &ray_parts, shares));
+                    }
+                    reflector.add(simd, lamp, spots, &through, &mut lit);
                 }
-                reflector.add(simd, lamp, spots, &through, &mut lit);
+            } else {
+                for lamp in self.lamps {
+                    reflector.add(simd, lamp, spots, &through, &mut lit);
+                }
             }
         }
         let effects = reflector.effects(simd, spots, self.input.ambient, &lit);

@@ -136,7 +136,8 @@ impl Sheets {
 #[inline(always)]
 pub(crate) fn difference<S: Simd>(simd: S, value: Lanes<S>, before: [Lanes<S>; 2], after: [Lanes<S>; 2]) -> Lanes<S> {
     let half = Lanes::splat(simd, 0.5);
-    let choose = |[v, is]: [Lanes<S>; 2]| v.where_less_or(half, is, value);
     let steps = (before[1] + after[1]).max(half);
-    (choose(after) - choose(before)) / steps
+    let value_before = before[0].where_less_or(half, before[1], value);
+    let value_after = after[0].where_less_or(half, after[1], value);
+    (value_after - value_before) / steps
 }

@@ -255,7 +255,10 @@ impl Between<'_, '_> {
             shader.add(simd, &reconstructed, Place { slab, y, x }, picture, kept, fragments);
         }
         let inner = Pixel { x: x - 1, y: y - 1 };
-        let share = part.map_or([1.0; MAX_LANES], |spans| splats.sums.between(simd, inner, origin, spans));
+        let mut share = [1.0; MAX_LANES];
+        if let Some(spans) = part {
+            share = splats.sums.between(simd, inner, origin, spans);
+        }
         splats.sums.add(simd, inner, origin, &share, fragments);
         if fragments.any {
             if sheeted.slant.is_any() {
