@@ -77,6 +77,25 @@ fn x7_what_opaque_splats_hide_is_not_shaded() {
 }
 
 #[test]
+fn x7_what_lies_deep_in_a_thick_medium_is_not_shaded() {
+    let shaded = |text: &str| {
+        let stages = cost(text);
+        stages.iter().find(|stage| stage["name"] == "shade").map_or(0, |stage| stage["items_in"].as_u64().unwrap())
+    };
+    // Spacings of an optical depth of 2, ten of them one behind the other: of the fourth less than a thousandth is left.
+    let thick = |fog: &str| {
+        scene("visible = false", fog, "")
+            .replace("extinction = 2.0", "extinction = 20.0")
+            .replace("max = [3, 3, 0.3]", "max = [3, 3, 1.0]")
+    };
+    let all = shaded(&thick("").replace("extinction = 20.0", "extinction = 0.2"));
+    let reached = shaded(&thick(""));
+    assert!(reached > 0 && 2 * reached < all, "{reached} of {all}");
+    // Nothing is cut off, so all is reached.
+    assert_eq!(shaded(&(thick("") + "[render.points]\ntransmittance_cutoff = 0\n")), all);
+}
+
+#[test]
 fn x7_what_was_skipped_changes_no_pixel_by_more_than_the_tolerance() {
     // A fog so thin that its shadow is left out at the default tolerance, and simulated at a tighter one.
     let thin = scene("casts_shadow = false", "", "").replace("extinction = 2.0", "extinction = 0.000005");

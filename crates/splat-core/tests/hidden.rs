@@ -1,7 +1,9 @@
 //! What opaque surfaces hide is known before it is shaded: its values are never read.
 
 use glam::{DVec3, Vec3};
-use splat_core::raster::{Cover, Detail, FoldInput, NearestSurfaces, Params, ProjectInput, Projected, fold, project};
+use splat_core::raster::{
+    Cover, Detail, FoldInput, NearestSurfaces, OpaqueImage, Params, ProjectInput, Projected, Reached, fold, project,
+};
 use splat_core::{Accumulator, Camera, Cloud, Direction, FootprintStack, Material, Projection, Splat, SplatKind, rng};
 
 const SIZE: [u32; 2] = [160, 96];
@@ -115,6 +117,57 @@ fn values_of_hidden_splats_are_never_read() {
     }
     assert!(hidden_discs > 3000, "{hidden_discs}");
     assert!(hidden_translucent > 300, "{hidden_translucent}");
+}
+
+/// A folded image of these values, of one plane of optical depth or three.
+fn folded(input: &FoldInput<'_>, planes: usize, values: &[f32]) -> Accumulator {
+    let channels = values.len() / input.projected.splats.len();
+    let mut accumulator = Accumulator::new(SIZE, planes, channels, false, false);
+    fold(&FoldInput { values, ..*input }, &mut accumulator, None).unwrap();
+    accumulator
+}
+
+#[test]
+fn values_behind_finished_pixels_are_never_read() {
+    let views = [Projection::Perspective { fov_y: 0.9 }, Projection::Orthographic { height: 2.4 }];
+    let mut passed_over = 0;
+    for seed in 0..3 {
+        let mut cloud = cloud(seed);
+        // A hundred times as thick, so that pixels are finished early.
+        cloud.cross_section.iter_mut().for_each(|area| *area *= 100.0);
+        let camera = camera(views[seed as usize % 2]);
+        let projected = projected(&cloud, &camera);
+        let place = camera.view_from_offset(cloud.origin);
+        let mut order = ids(&cloud, false);
+        let depth = |id: &u32| place.depth(cloud.position[*id as usize]);
+        order.sort_by(|a, b| depth(a).total_cmp(&depth(b)));
+        let ones = vec![1.0; cloud.len()];
+        let solid = NearestSurfaces::find(&projected, &ids(&cloud, true), false, None).unwrap();
+        let behind = solid.resolve(&ones, 1, None).unwrap().0;
+        for (opaque, planes, channels) in [(OpaqueImage::default(), 1, 1), (behind.clone(), 1, 3), (behind, 3, 3)] {
+            let input = FoldInput {
+                projected: &projected,
+                order: &order,
+                values: &[],
+                materials: &[Material::default()],
+                opaque: &opaque,
+                direction: Direction::FrontToBack,
+                params: &Params::default(),
+            };
+            let reached = Reached::find(&input, planes, None).unwrap();
+            let values: Vec<f32> = (0..(channels * cloud.len()) as u64).map(|i| unit(seed, i, 9)).collect();
+            let mut of_reached = values.clone();
+            for id in order.iter().filter(|id| !reached.has(**id as usize)) {
+                passed_over += u32::from(projected.is_visible(*id as usize));
+                of_reached[*id as usize * channels..][..channels].fill(f32::NAN);
+            }
+            assert_eq!(reached.count(), order.iter().filter(|id| reached.has(**id as usize)).count() as u64);
+            let [whole, of_reached] = [values, of_reached].map(|values| folded(&input, planes, &values));
+            assert_eq!(whole.channels, of_reached.channels, "seed {seed}");
+            assert_eq!(whole.optical_depth, of_reached.optical_depth, "seed {seed}");
+        }
+    }
+    assert!(passed_over > 2500, "{passed_over}");
 }
 
 #[test]
