@@ -1,16 +1,15 @@
-//! What accuracy costs in time: each approximation's knob is swept, and every picture is judged by its error and its time.
+//! Accuracy against time: sweeps the knob of each approximation, and judges every picture by its error and its time.
 //!
 //! ```text
 //! Sweep (a technique's knobs) ─► settings ─► curves ─► limit ─► repeats, shuffled ─► Study ─► json, csv, html
 //! ```
 //! A technique joins by a [`Sweep`] of its own and a function that draws a [`Request`]; nothing else knows it.
 //!
-//! Two errors are kept apart. A knob's **own error** compares a picture with the one whose knob alone is at its end: it
-//! shows the order of convergence, undisturbed by the other knobs. The **error against the limit** compares with the
-//! picture whose knobs are all at their ends. Each reference states its own error (Richardson, from the fitted order),
-//! and no error below ten times that is drawn. A random technique without bias takes the limit of another, is drawn with
-//! several seeds, and shows intervals instead. A technique with a limit of its own stands beside the others where all are held against
-//! physical truth, and nowhere else.
+//! Two errors are kept apart. A knob's **own error** compares a picture with the one whose knob alone is at its end: it shows the
+//! order of convergence, undisturbed by the other knobs. The **error against the limit** compares with the picture whose knobs are all
+//! at their ends. Each reference has an error estimate (Richardson, from the fitted order). Plots leave out errors below ten times
+//! that estimate. A random technique without bias takes the limit of another, is drawn with several seeds, and shows intervals
+//! instead. A technique with a limit of its own stands beside the others where all are held against physical truth, and nowhere else.
 
 mod changes;
 mod frontier;
@@ -56,12 +55,12 @@ pub use crate::truth::Truth;
 
 use organza::scene::Scene;
 
-/// How much work a report may take.
+/// The amount of work that a report may take.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Options {
     /// A smaller picture, fewer steps, fewer repeats.
     pub quick: bool,
-    /// How often each knob's end is doubled beyond the default, for a reference with a smaller error of its own.
+    /// Doublings of each knob's end beyond the default; more make the reference more accurate.
     pub finer: u32,
     /// Seed of the order in which repeats are drawn.
     pub seed: u64,
@@ -88,7 +87,7 @@ impl Options {
         if self.quick { 64 } else { 1024 }
     }
 
-    /// Longest side of the picture, pixels, unless the user asked for a size.
+    /// Longest side of the picture, pixels, unless the user has requested a size.
     pub fn longest_side(&self) -> u32 {
         if self.quick { 192 } else { 320 }
     }

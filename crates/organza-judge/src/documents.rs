@@ -18,7 +18,7 @@ pub fn cost_json(cost: &CostRecord) -> Value {
     cost.stages.iter().map(stage).collect()
 }
 
-/// Where the camera is, and whether it was placed by itself.
+/// The camera's placement, and whether the fit chose it.
 pub fn camera_json(scene: &Scene, found: Option<&FoundCamera>) -> Value {
     let (camera, target) = found.map_or((&scene.camera, scene.target), |found| (&found.camera, found.target));
     json!({

@@ -1,4 +1,5 @@
-//! What each effect of a scene changes in its picture, and the time that it takes: drawn with it and without it.
+//! The change that each effect of a scene makes to the picture, and its time: the scene is drawn with the effect and
+//! without it.
 //!
 //! ```text
 //! scene as planned ─► picture ◄── compared ──► picture with one effect switched the other way
@@ -20,7 +21,7 @@ const INPUT: u8 = 3;
 /// Most times that a picture is drawn.
 const REPEATS: usize = 3;
 
-/// One effect, drawn the other way than the plan has it.
+/// A picture with one effect switched against the plan, compared with the planned picture.
 #[derive(Debug, Clone, PartialEq)]
 pub struct EffectChange {
     /// Its name.
@@ -40,9 +41,9 @@ pub struct EffectChange {
 pub struct Measured {
     /// Seconds of drawing as planned, loading and conversion left out.
     pub seconds: f64,
-    /// Those that could be switched, in the plan's order.
+    /// Effects that could be switched, in the plan's order.
     pub changes: Vec<EffectChange>,
-    /// Those that could not, with the reason.
+    /// Effects that could not be switched, with the reason.
     pub fixed: Vec<FixedEffect>,
     /// Largest difference of a displayed channel between the picture as planned and the one with everything that it leaves out; `None` where it
     /// leaves nothing out that could be switched on.
@@ -67,9 +68,10 @@ pub struct Switch {
     pub is_on: bool,
 }
 
-/// Draws a scene as planned and with each of its effects switched the other way; `switched` is the scene with effects switched as it is told.
+/// Draws a scene as planned and with each of its effects switched the other way; `switched` returns the scene with the given effects
+/// switched.
 ///
-/// What `switched` refuses as input or usage is an effect that cannot be switched.
+/// An effect counts as fixed if `switched` refuses it with an error of input or usage.
 ///
 /// # Errors
 /// Those of drawing the scene, and of `switched` but for the above.

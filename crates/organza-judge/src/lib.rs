@@ -1,4 +1,5 @@
-//! What Organza's pictures are worth: judged by a technique's own limit, by the exact order, by physics, by what each effect adds.
+//! Judges Organza's pictures: by the limit of their technique, by the exact order, by physics, and by the change that each effect
+//! makes.
 //!
 //! ```text
 //! scene ─┬─► accuracy   a technique's knobs are turned ─► error and time of every setting ─► frontier

@@ -1,11 +1,10 @@
-//! One scene by every ordering there is, against the truth of each pixel.
+//! Draws one scene with every ordering, and compares each picture with the exact order of every pixel.
 //!
-//! Splats are lit once; then the translucent ones are composited in each order, with nothing cut off, and compared with the
-//! picture in which the fragments of every pixel are sorted by their own depth, in f64. Opaque surfaces enter as in any
-//! render. So the order is all that differs. The technique `particles` stands beside them: it orders nothing; here its
-//! particles are sampled from the same splats, and its pictures of several seeds are judged by the same truth. So do sheets of several
-//! thicknesses, each with how much it pops as the view turns. So do the ways in which
-//! `surfels` tells layers apart, which have a truth of their own.
+//! Splats are lit once. Translucent splats are then composited in each order, without a cutoff. The reference sorts the fragments of
+//! every pixel by their depth, in f64. Opaque surfaces enter as in any render. So the order is all that differs. The technique
+//! `particles` stands beside them: it orders nothing; here its particles are sampled from the same splats, and its pictures of several
+//! seeds are judged by the same truth. So do sheets of several thicknesses, each with how much it pops as the view turns. The layer
+//! separations of `surfels` stand beside them too; their reference is another one, see [`Comparison::layers`].
 
 mod layers;
 mod report;
@@ -27,7 +26,7 @@ use sorter::{Ordering, Sorter};
 use splat_core::{Camera, Direction, Layers, SliceOrder};
 use std::time::Instant;
 
-/// How much work a comparison may take.
+/// The amount of work that a comparison may take.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Options {
     /// A smaller picture, fewer repeats, sets, sheets and frames.
@@ -35,7 +34,7 @@ pub struct Options {
 }
 
 impl Options {
-    /// Longest side of the picture, pixels, unless the user asked for a size.
+    /// Longest side of the picture, pixels, unless the user has requested a size.
     pub fn longest_side(&self) -> u32 {
         if self.quick { 120 } else { 240 }
     }
@@ -75,7 +74,7 @@ const RAYS: f64 = 20_000.0;
 /// Slices so many times thicker than the scene's own.
 const THICKER: [f64; 4] = [1.0, 8.0, 64.0, 512.0];
 
-/// What one ordering is worth.
+/// The picture of one ordering, with its errors, its time and its memory.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Ordered {
     /// Name of the ordering.
@@ -90,12 +89,12 @@ pub struct Ordered {
     pub seconds: Option<Spread>,
     /// Bytes of the order and of what making it took.
     pub bytes: u64,
-    /// What the seeds of a random technique say together, by the truth as limit.
+    /// Bias and noise over the seeds of a random technique, with the truth as limit.
     pub sampled: Option<Sampled>,
     /// Whether it averages the discs of a layer, and is judged by [`Comparison::layers`].
     pub of_layers: bool,
-    /// How much it pops: the largest step of a pixel between frames 0.1° apart, over that of fragments in exact order. Of sheets and of the order of
-    /// centres; `None` of others, and where nothing changes.
+    /// Popping: the largest step of a pixel between frames 0.1° apart, over that of fragments in exact order. Of sheets and of the order of centres;
+    /// `None` of others, and where nothing changes.
     pub pop: Option<f64>,
 }
 

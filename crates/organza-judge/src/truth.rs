@@ -1,11 +1,10 @@
 //! Physical truth of a scene: the same objects, materials and lights in the path tracer of `reference`, without splats.
 //!
-//! Light takes the paths of its [`Orders`]: those that the `points` technique simulates, emission, one scattering or reflection, shadows
-//! that translucent things colour; or more, as far as nature's, and [`Truth::beside`] says how much that is. What the scene asks otherwise than nature a path tracer can follow too (`reference::Liberty`):
-//! shadows that are turned off or weakened, and colours above 1, which scatter more light than arrives; the truth says so.
-//! A volume is classified where light meets it, and reflects about the gradient there where its material asks for that.
-//! What has no truth is named instead of being guessed at: raw points (nobody knows the surface that they sample), surfaces
-//! that scatter by a phase function.
+//! Light takes the paths of its [`Orders`]. The shortest set is that of the technique `points`: emission, one scattering or reflection, and coloured
+//! shadows of translucent objects. [`Truth::beside`] measures the difference to all orders. The path tracer follows a scene's departures from nature
+//! too (`reference::Liberty`): shadows that are turned off or weakened, and colours above 1, which scatter more light than arrives. The truth lists
+//! them. A volume is classified where light meets it, and reflects about the gradient there where its material asks for that. A scene without a
+//! truth gets a reason instead: raw points (the surface that they sample is unknown), or surfaces that scatter by a phase function.
 
 mod medium;
 mod object;
@@ -21,13 +20,13 @@ use std::path::Path;
 /// An unbiased estimate of what is seen, with its error.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Truth {
-    /// What it was computed by.
+    /// The method that computed it, in words.
     pub method: String,
     /// The estimate.
     pub image: Image<Linear>,
     /// Standard error of each pixel and channel, row by row from the top left.
     pub standard_error: Vec<[f64; 3]>,
-    /// What it leaves out, where that was asked for.
+    /// The difference to all orders of scattering, if it was requested.
     pub all_orders: Option<AllOrders>,
 }
 
@@ -43,7 +42,7 @@ pub struct AllOrders {
 }
 
 impl Truth {
-    /// What this truth of some orders of scattering leaves out beside that of `all`.
+    /// The difference between this truth of some orders of scattering and `all_orders`.
     ///
     /// # Errors
     /// [`Error::Internal`] for images of different sizes.
@@ -63,8 +62,8 @@ impl Truth {
     }
 }
 
-/// How often light is scattered or reflected on its way to the eye. Emission, ambient light and an environment,
-/// which the scene adds to what is seen, light nothing.
+/// The number of times that light is scattered or reflected on its way to the eye. Emission, ambient light and an
+/// environment, which the scene adds to what is seen, light nothing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Orders {
     /// Once.
@@ -76,7 +75,7 @@ pub enum Orders {
 }
 
 impl Orders {
-    /// Those that a picture of the scene shows.
+    /// The orders that a picture of the scene shows.
     pub fn of(scene: &Scene) -> Self {
         if scene.render.sheets.scattering().is_some() { Self::ByMedia } else { Self::One }
     }
@@ -101,7 +100,7 @@ impl Orders {
     }
 }
 
-/// Path-traces a scene with so many samples a pixel; `Err` of the inner result says why the scene has no truth.
+/// Path-traces a scene with so many samples a pixel; The inner `Err` is the reason why the scene has no truth.
 ///
 /// # Errors
 /// As [`organza::load`].

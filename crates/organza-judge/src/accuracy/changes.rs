@@ -1,4 +1,4 @@
-//! What to write into a scene file, so that it is drawn as a setting of a report was.
+//! The lines that make a scene file draw as a setting of a report did.
 
 use super::Request;
 use super::knob::points::spacing_factor;
@@ -22,14 +22,15 @@ pub struct Change {
 }
 
 impl Change {
-    /// What follows `--set` on the command line; `None` of a key that has to be left out, which `--set` cannot say.
+    /// The argument of `--set` on the command line; `None` for a key that has to be left out, because `--set` cannot
+    /// remove keys.
     pub fn set(&self) -> Option<String> {
         Some(format!("{}.{}={}", self.table, self.key, self.value.as_ref()?))
     }
 }
 
 /// The changes that turn a scene `as_written` into what a request draws, tables together. Spacings are not among them, since a
-/// source may state a resolution instead: [`lines()`] says by which factor they change.
+/// source may state a resolution instead: [`lines()`] adds the factor by which they change.
 pub fn changes(as_written: &Scene, request: &Request) -> Vec<Change> {
     let [before, after] = [&as_written.render, &request.scene.render].map(stated);
     let value_in = |list: &[Stated], table, key| list.iter().find(|s| (s.0, s.1) == (table, key)).map(|s| s.2.clone());
@@ -58,7 +59,7 @@ pub fn changes(as_written: &Scene, request: &Request) -> Vec<Change> {
     found
 }
 
-/// The same as TOML to copy. What cannot be a line of its own table stands in a comment.
+/// The same as TOML to copy. Settings that no line of a table can state become comments.
 pub fn lines(as_written: &Scene, request: &Request) -> String {
     let mut text = String::new();
     let mut open = String::new();

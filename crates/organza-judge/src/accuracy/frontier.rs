@@ -1,13 +1,13 @@
 //! The frontier: settings that nothing more accurate comes near in time.
 //!
-//! From the most accurate on, a setting is on the frontier if it is faster than the last one on it by more than times can
-//! be told apart. Errors that are equal to two digits count as one, and so do errors of random settings that differ by no more
-//! than their noise, and so do all that cannot be told from the limit: they are the most accurate, with an error of 0. The first
-//! setting in the report's order stands for those that are nearly as fast; so the scene's own does for knobs that change nothing.
+//! Settings are visited from the most accurate on. A setting is on the frontier if it is faster than the last setting there, by
+//! more than the uncertainty of times. Errors that agree to two digits count as equal, and so do errors of random settings that
+//! differ by no more than their noise. Errors within the limit's uncertainty count as 0, the most accurate. The first setting in
+//! the report's order represents all that are nearly as fast; so the scene's setting represents knobs that change nothing.
 //!
 //! A setting's time is the least of its repeats: other work of the machine adds to a repeat and never takes from it. Errors
-//! are the same in every run, so a frontier changes with the times alone: what it hangs on is repeated until it has held for
-//! some rounds.
+//! are the same in every run, so a frontier changes with the times alone. The settings that decide it are repeated until it
+//! has held for some rounds.
 
 /// Ratio of times that counts as different.
 pub const TOLD_APART: f64 = 1.1;
@@ -19,7 +19,7 @@ const NEAR: f64 = 1.25;
 /// A setting that may be on the frontier.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Candidate {
-    /// What it is known by.
+    /// The caller's identifier of the setting.
     pub id: usize,
     /// Its error, at least 0.
     pub error: f64,
@@ -70,7 +70,7 @@ fn two_digits(error: f64) -> (i32, i64) {
     (exponent, (error / 10f64.powi(exponent - 1)).round() as i64)
 }
 
-/// How long the frontier's settings are repeated.
+/// The rule that ends the repeats of the frontier's settings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Hold {
     /// Rounds for which it has to stay the same.

@@ -1,4 +1,4 @@
-//! What a technique can trade: its knobs, their steps from coarse to fine, and their ends.
+//! The approximations of a technique: its knobs, their steps from coarse to fine, and their ends.
 
 pub(super) mod particles;
 pub(super) mod points;
@@ -8,7 +8,7 @@ pub(super) mod tables;
 
 use organza::scene::Scene;
 
-/// What is to be drawn.
+/// A picture to draw: a scene, with the settings that scene files cannot state.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Request {
     /// The scene with its settings.
@@ -19,14 +19,14 @@ pub struct Request {
     pub packed: bool,
 }
 
-/// One position of a knob.
+/// A position of a knob.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Step {
     /// Value as the report shows it.
     pub label: String,
-    /// What goes to 0 as the knob becomes finer, such as a thickness; `None` for a choice.
+    /// A quantity that goes to 0 as the knob becomes finer, such as a thickness; `None` for a choice.
     pub size: Option<f64>,
-    /// What [`Knob::set`] is called with.
+    /// The argument of [`Knob::set`].
     pub value: f64,
 }
 
@@ -41,23 +41,23 @@ pub struct Theory {
     pub why: &'static str,
 }
 
-/// One approximation that can be made finer.
+/// An approximation that can be made finer.
 #[derive(Debug, Clone)]
 pub struct Knob {
     /// Name in reports.
     pub name: &'static str,
-    /// What [`Step::size`] is, with its unit.
+    /// The meaning of [`Step::size`], with its unit.
     pub size_meaning: &'static str,
     /// Turns the knob.
     pub set: fn(&mut Request, f64),
     /// Positions from coarse to fine.
     pub steps: Vec<Step>,
-    /// The finest position, which the others are judged by, and what stands in for it where it takes more memory than there
-    /// is; empty for a choice.
+    /// The finest position, which is the reference of the others, then its substitutes if it takes more memory than there
+    /// is. Empty for a choice.
     pub ends: Vec<Step>,
     /// Whether nothing is left of the approximation at its end.
     pub end_is_exact: bool,
-    /// Expected order, where there is one.
+    /// The order that theory expects, if theory states one.
     pub theory: Option<Theory>,
     /// [`Step::size`] of the scene's own setting; `None` for a choice, and where it is not known.
     pub own: Option<f64>,
@@ -74,14 +74,14 @@ pub struct Skipped {
     pub reason: String,
 }
 
-/// All that a technique can trade in one scene.
+/// The knobs of a technique in one scene.
 #[derive(Debug, Clone)]
 pub struct Sweep {
     /// Name of the technique.
     pub technique: &'static str,
     /// The scene as it stands.
     pub base: Request,
-    /// What the base is called in reports.
+    /// The name of the base in reports.
     pub base_label: String,
     /// Knobs that may matter.
     pub knobs: Vec<Knob>,

@@ -1,9 +1,9 @@
-//! Settings of one scene from fast to exact, for a hand to slide along: the knobs of its techniques, turned together to both sides of what it states.
+//! Settings of one scene from fast to exact, for a slider: the knobs of its techniques, turned together to both sides of the stated settings.
 
 use super::{Facts, Knob, Options, Request, Step, changes, points, sheets, surfels};
 use organza::scene::{Reconstruction, Scene, Technique};
 
-/// Positions to each side of the scene's own settings.
+/// Positions to each side of the settings that the scene states.
 pub const RUNGS_ASIDE: i32 = 3;
 
 /// Knobs that no setting of a report turns together with others, and a ladder does: more splats and more sets are more work for a smaller error.
@@ -19,12 +19,12 @@ pub struct Rung {
     pub step: i32,
     /// The knobs that are turned, each with its position.
     pub words: Vec<String>,
-    /// What is drawn.
+    /// The picture to draw.
     pub request: Request,
 }
 
 impl Rung {
-    /// What follows `--set` on the command line, one text for each setting.
+    /// The arguments of `--set` on the command line, a text for each setting.
     pub fn sets(&self, stated: &Scene) -> Vec<String> {
         changes(stated, &self.request).iter().filter_map(super::Change::set).collect()
     }

@@ -19,7 +19,7 @@ pub(super) const MOST_FINER: f64 = 64.0;
 pub struct Limit {
     /// The picture.
     pub image: Image<Linear>,
-    /// Sum of the own errors of the ends that it takes, RMSE of linear radiance.
+    /// Sum of the estimated errors of the ends that it takes, RMSE of linear radiance.
     pub own_error: f64,
     /// Own error of each end that it takes.
     pub parts: Vec<(&'static str, f64)>,

@@ -11,7 +11,7 @@ use splat_core::{Cloud, PackedCloud, SplatKind};
 use std::time::Instant;
 use tsm::mapping::{Mapping, Table};
 
-/// One drawn picture and what it took.
+/// A drawn picture with its time and its memory.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Frame {
     /// The beauty layer.
@@ -26,7 +26,7 @@ pub struct Frame {
     pub bytes: u64,
 }
 
-/// How far a picture is from a reference.
+/// The difference between a picture and a reference, by several measures.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Distance {
     /// Errors of linear radiance.
@@ -80,7 +80,7 @@ pub struct Timed {
 }
 
 impl Timed {
-    /// The first picture, if there is one.
+    /// The first picture, if any was drawn.
     pub fn image(&self) -> Option<&Image<Linear>> {
         self.images.first()
     }
@@ -151,7 +151,7 @@ impl<'a> Renderer<'a> {
         })
     }
 
-    /// What the knobs of a technique need to know of a scene that it draws.
+    /// The facts of a scene that the knobs of a technique need.
     ///
     /// # Errors
     /// As [`Renderer::draw`].
@@ -173,7 +173,7 @@ impl<'a> Renderer<'a> {
         })
     }
 
-    /// Width of the slabs that a scene by `sheets` has by its own setting, world units; `None` if no slab holds a volume or a splat.
+    /// Width of the slabs that a scene drawn by `sheets` states, world units; `None` if no slab holds a volume or a splat.
     ///
     /// # Errors
     /// As [`Renderer::draw`].
@@ -199,10 +199,10 @@ impl<'a> Renderer<'a> {
         })
     }
 
-    /// Why a scene cannot be drawn as its settings say, if it cannot.
+    /// The reason why a scene cannot be drawn with its settings, if it cannot.
     ///
     /// # Errors
-    /// As [`Renderer::draw`], but what the planner refuses is no error.
+    /// As [`Renderer::draw`], except that a refusal of the planner is no error.
     pub fn refused(&mut self, scene: &Scene) -> Result<Option<String>, Error> {
         self.within_stage(|renderer| renderer.refusal(scene))
     }
@@ -251,7 +251,7 @@ fn slice_thickness(loaded: &Loaded) -> Result<Option<f64>, Error> {
 }
 
 impl Facts {
-    /// What follows from a plan alone: cells of shadow tables are those that it predicts, and nothing is packed.
+    /// The facts that a plan alone gives: its predicted cells of shadow tables, and no packed splats.
     ///
     /// # Errors
     /// [`Error::Internal`] where splats cannot be ordered.

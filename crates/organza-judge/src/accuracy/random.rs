@@ -1,7 +1,7 @@
 //! The study of an unbiased random technique: every setting is drawn with several seeds, and means are given with intervals.
 //!
-//! The limit is another technique's: an expectation has no end that could be drawn. How the error falls with the repeats is
-//! read from the spread over seeds, which needs no reference; so no error is too small to be shown, and none is refused.
+//! The limit is another technique's: an expectation has no end that could be drawn. The spread over seeds gives the fall of
+//! the error with the repeats. It needs no reference, so no error is too small to be shown.
 
 use super::repeat::{Repeats, repeat_all};
 use super::settings::Settings;
@@ -14,15 +14,15 @@ use organza::{Error, Progress};
 use reference::metrics::{Image, Linear};
 use reference::statistics::fit_order;
 
-/// Seeds of every setting; each is one timed repeat too.
+/// Number of seeds of every setting. The picture of each seed is a timed repeat too.
 pub const SEEDS: usize = 5;
 
-/// What pictures of an expectation are judged by.
+/// The references of pictures whose expectation is known.
 #[derive(Debug)]
 pub struct Yardsticks<'a> {
     /// The limit of a technique whose expectation is the same.
     pub limit: &'a Limit,
-    /// The scene path-traced, or why there is none.
+    /// The path-traced scene, or the reason why it has no truth.
     pub truth: Result<Truth, String>,
 }
 

@@ -17,7 +17,7 @@ use std::path::{Path, PathBuf};
 /// What computed.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Machine {
-    /// Name of the processor, if the system tells it.
+    /// Name of the processor, if the system reports it.
     pub cpu: Option<String>,
     /// Operating system and architecture.
     pub system: String,
@@ -26,7 +26,7 @@ pub struct Machine {
 }
 
 impl Machine {
-    /// This machine and the threads of the current pool.
+    /// Describes this machine and the threads of the current pool.
     pub fn this() -> Self {
         let info = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
         let model = info.lines().find_map(|l| l.strip_prefix("model name")?.split_once(':').map(|(_, name)| name));
@@ -38,22 +38,22 @@ impl Machine {
     }
 }
 
-/// Everything that a report says.
+/// The contents of an accuracy report.
 #[derive(Debug, Clone)]
 pub struct Report {
     /// The scene as it was written, but for the size of the picture.
     pub scene: Scene,
-    /// How much work it took.
+    /// The options that bounded its work.
     pub options: Options,
     /// What computed.
     pub machine: Machine,
-    /// One for each technique.
+    /// The studies, one for each technique.
     pub studies: Vec<Study>,
     /// Techniques that were left out.
     pub absent: Vec<Absent>,
     /// The frontier over all techniques that share the first one's limit, from the most accurate to the fastest: study, setting.
     pub frontier: Vec<[usize; 2]>,
-    /// The frontier over all techniques by physical truth; empty where there is none.
+    /// The frontier over all techniques by physical truth; empty for a scene without a truth.
     pub frontier_by_truth: Vec<[usize; 2]>,
 }
 

@@ -1,9 +1,9 @@
-//! What a reference is worth: its own error, and which errors it can show.
+//! The error of a reference, and the errors that it can resolve.
 //!
 //! A knob's error against its end, E(h), is the true error less what the end leaves: e(h) = C·h^p, E(h) = C·(h^p − h_end^p)
-//! (Richardson). So own = e(h_end) = E(h)/((h/h_end)^p − 1) from the finest step, and p is fitted to E + own; the two
-//! are iterated. To be careful, p is the least of the fit and of the slope between the two finest steps. An error below
-//! ten times the reference's own error is not drawn.
+//! (Richardson). So own = e(h_end) = E(h)/((h/h_end)^p − 1) from the finest step, and p is fitted to E + own; the two are
+//! iterated. To be careful, p is the least of the fit and of the slope between the two finest steps. Plots leave out errors
+//! below ten times the reference's error.
 
 use super::Step;
 use reference::statistics::{Fit, fit_order};
@@ -17,7 +17,7 @@ const SATURATED: f64 = 0.9;
 /// Slopes below this say that a knob does not converge yet.
 const LEAST_ORDER: f64 = 0.25;
 
-/// One point of a convergence curve.
+/// A point of a convergence curve.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CurvePoint {
     /// Index of the setting.
@@ -30,7 +30,7 @@ pub struct CurvePoint {
     pub drawn: bool,
 }
 
-/// How a picture converges as one knob is turned.
+/// The convergence of a picture as one knob is turned.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Curve {
     /// The knob's name.
@@ -41,9 +41,9 @@ pub struct Curve {
     pub end_size: Option<f64>,
     /// Points from coarse to fine.
     pub points: Vec<CurvePoint>,
-    /// RMSE of the scene's own setting against the end.
+    /// RMSE of the scene's stated setting against the end.
     pub own_setting: f64,
-    /// What the end and the order are worth.
+    /// The error of the end, and the order of convergence.
     pub settled: Settled,
     /// Seconds that drawing the end took, once; `None` where it is one of the settings.
     pub end_seconds: Option<f64>,
@@ -73,8 +73,8 @@ impl Settled {
     }
 }
 
-/// Judges the end of a knob by errors against it. `points` are (size, error) from coarse to fine, `end` is the size of the
-/// end or `None` where it is exact, `floor` the error of rounding alone.
+/// Judges the end of a knob by errors against it. `points` are (size, error) from coarse to fine. `end` is the size of the
+/// end, `None` if the end is exact. `floor` is the error of rounding alone.
 pub fn settle(points: &[[f64; 2]], end: Option<f64>, floor: f64) -> Settled {
     let mut points: Vec<[f64; 2]> = points.iter().copied().filter(|p| p[1].is_finite()).collect();
     points.sort_by(|a, b| b[0].total_cmp(&a[0]));

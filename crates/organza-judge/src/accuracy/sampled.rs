@@ -1,9 +1,9 @@
-//! What the pictures of several seeds say together of a random setting.
+//! Bias and variance of a random setting, estimated from the pictures of several seeds.
 //!
-//! With n pictures x_i of expectation μ and variance σ² a pixel, and a reference r: the mean over i of RMSE(x_i, r) is what one
-//! picture costs, its 95 % interval follows from the spread (Student's t); the mean of (x_i − r)(x_j − r), i ≠ j, estimates
-//! (μ − r)², what no number of repeats removes; the mean of (x_i − r)² less that is σ², whatever r. All are means over pixels
-//! and channels.
+//! Each of n pictures x_i has expectation μ and variance σ² in a pixel; r is a reference. The mean over i of RMSE(x_i, r) is
+//! the error of one picture; its 95 % interval follows from the spread (Student's t). The mean of (x_i − r)(x_j − r), i ≠ j,
+//! estimates (μ − r)², the squared bias, which no number of repeats removes. The mean of (x_i − r)² less that estimate is σ²,
+//! for any r. Every mean is taken over pixels and channels.
 
 use super::Distance;
 use organza::Error;
@@ -13,16 +13,16 @@ use reference::statistics::{Mean, mean_with_interval, student_t_95};
 /// Several seeds of one setting.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sampled {
-    /// Pictures, each with a seed of its own.
+    /// Number of pictures, each with another seed.
     pub seeds: usize,
-    /// RMSE of one picture against the limit, and its interval: that of the mean over seeds, widened by the limit's own
+    /// RMSE of one picture against the limit, and its interval: that of the mean over seeds, widened by the limit's
     /// error.
     pub from_limit: Mean,
-    /// RMSE of one picture against physical truth, where there is one.
+    /// RMSE of one picture against physical truth, if the scene has a truth.
     pub from_truth: Option<Mean>,
     /// Standard deviation of one picture, root of the mean variance over pixels and channels.
     pub noise: f64,
-    /// RMS distance of the expectation from the limit; `None` where it cannot be told from 0 at 95 %.
+    /// RMS distance of the expectation from the limit; `None` if it does not differ from 0 at 95 %.
     pub bias: Option<f64>,
 }
 

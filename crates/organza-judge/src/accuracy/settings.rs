@@ -1,16 +1,15 @@
-//! From knobs to the settings that are drawn: the scene's own, each step of each knob alone, and knobs
-//! together.
+//! Turns knobs into the settings to draw: the stated setting, each step of each knob alone, and knobs together.
 
 use super::{Request, Step, Sweep};
 
-/// One setting of all knobs.
+/// A position of every knob.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Setting {
-    /// What is turned, and how far.
+    /// The knob that is turned, and its position, in words.
     pub label: String,
-    /// The knob that is turned alone; `None` for the scene's own setting and for several knobs together.
+    /// The knob that is turned alone; `None` for the scene's stated setting and for several knobs together.
     pub knob: Option<&'static str>,
-    /// What is drawn.
+    /// The picture to draw.
     pub request: Request,
 }
 

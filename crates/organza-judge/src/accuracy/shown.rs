@@ -4,7 +4,7 @@ use super::report::pictures::{difference, png};
 use organza::Error;
 use reference::metrics::{Display, Image, Viewing, compare, flip};
 
-/// How far a displayed picture is from another.
+/// The difference between two displayed pictures.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Apart {
     /// Root mean square of the differences of displayed numbers, 0 to 1.

@@ -14,7 +14,7 @@ use reference::metrics::{Image, Linear};
 /// Relative size of what f32 rounding leaves in a picture.
 const ROUNDING: f64 = 1e-7;
 
-/// What became of one setting.
+/// The outcome of one setting: its picture's errors and times, or its failure.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Outcome {
     /// The setting.
@@ -24,9 +24,9 @@ pub struct Outcome {
     /// Distance from the limit, the mean over seeds of a random setting; `None` where the setting was not drawn or turns a
     /// knob that the limit holds.
     pub from_limit: Option<Distance>,
-    /// Distance from physical truth, where there is one.
+    /// Distance from physical truth, if the scene has a truth.
     pub from_truth: Option<Distance>,
-    /// What its seeds say together; `None` of what is not random.
+    /// Bias and noise over its seeds; `None` of what is not random.
     pub sampled: Option<Sampled>,
     /// Whether the error against the limit is large enough to be drawn; a random setting has an interval instead.
     pub drawn: bool,
@@ -43,9 +43,9 @@ pub fn least_seconds(outcome: &Outcome) -> Option<f64> {
 pub struct Study {
     /// Name of the technique.
     pub technique: &'static str,
-    /// All settings; the first is the scene's own.
+    /// Outcomes of all settings; the first is the scene's stated setting.
     pub outcomes: Vec<Outcome>,
-    /// One curve for each knob with a size.
+    /// Convergence curves, one for each knob with a size.
     pub curves: Vec<Curve>,
     /// Knobs that were not turned.
     pub skipped: Vec<Skipped>,
@@ -83,9 +83,9 @@ pub type Draw<'a> = dyn FnMut(&Request) -> Result<Frame, Error> + 'a;
 /// Draws and judges.
 ///
 /// # Errors
-/// [`Error::Unresolved`] when the limit's own error is not ten times below that of the scene's own setting, or leaves fewer
-/// than three settings to draw; those of `draw`, but a setting that exceeds a limit of resources is noted and left out. A study that is
-/// cancelled once every picture is drawn has fewer times and is none.
+/// [`Error::Unresolved`] when the limit's own error is not ten times below that of the scene's own setting, or leaves fewer than three
+/// settings to draw; those of `draw`, but a setting that exceeds a limit of resources is noted and left out. A study that is cancelled
+/// after every picture is drawn has fewer times, and is no error.
 pub fn study(
     sweep: &Sweep,
     truth: Result<Truth, String>,

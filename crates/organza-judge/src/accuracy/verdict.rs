@@ -1,4 +1,4 @@
-//! What is said of a knob's curve, in words.
+//! The verdict on a knob's curve, in words.
 
 use super::{Curve, CurvePoint, Step, Study, least_seconds};
 use reference::statistics::Fit;
@@ -17,7 +17,7 @@ fn choices(study: &Study, curve: &Curve) -> String {
     format!("A choice: {}.", curve.points.iter().zip(steps).map(one).collect::<Vec<_>>().join("; "))
 }
 
-/// What was found of a knob's order of convergence, what theory says, and what its end is worth.
+/// Compares a knob's measured order of convergence with theory, and states the error of its end.
 pub fn verdict(study: &Study, curve: &Curve) -> String {
     if curve.points.iter().all(|p| p.size.is_none()) {
         return choices(study, curve);

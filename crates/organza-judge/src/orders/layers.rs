@@ -1,7 +1,7 @@
-//! Layers of surfaces, told apart in every way that the technique `surfels` has.
+//! Layers of surfaces, separated by every method of the technique `surfels`.
 //!
-//! They are held against every ray with every disc in f64, where all layers are averaged and composited: the paper's yardstick, depth
-//! peeling (Zhang and Pajarola 2007, section 6.3), without a limit to the number of layers.
+//! The reference meets every ray with every disc in f64, averages each layer and composites all of them. It is the paper's yardstick,
+//! depth peeling (Zhang and Pajarola 2007, section 6.3), without a limit to the number of layers.
 
 use super::{Ordered, by_technique, image};
 use ::reference::metrics::{Image, Linear};

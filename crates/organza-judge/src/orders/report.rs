@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-/// Everything that the files say.
+/// The contents of the report's files.
 #[derive(Debug, Clone)]
 pub struct OrdersReport {
     scene: String,
@@ -99,7 +99,8 @@ impl OrdersReport {
         format!("{document:#}\n")
     }
 
-    /// One line an ordering, after what all lines share: the scene, the picture's size, what computed.
+    /// The report as CSV: a row for each ordering. Every row begins with the scene, the picture's size and the
+    /// machine.
     pub fn csv(&self) -> String {
         let mut text = format!(
             "{SHARED_COLUMNS},ordering,slice_thickness_world,wrong_pairs_per_ray,pairs_per_ray,worst_backtrack_world,rmse_radiance,\

@@ -4,9 +4,9 @@
 //! composited from the eye on. Slabs lie across the view (Neophytou and Mueller 2005), across the axis of the world that is nearest to the view
 //! (Westover), or across the half vector of view and light (Zhang and Crawfis).
 //!
-//! What pops is looked for where something turns over: at the scene's own view, and at the nearest turns of the camera about the splats where
-//! another axis becomes the nearest, and where view and light are at right angles. Each turn has frames a tenth of a degree apart, of translucent
-//! splats alone, which are lit once for all of its frames, so that order is all that differs.
+//! Popping is measured where the slabs turn over: at the scene's view, at the nearest camera turn about the splats where another axis becomes the
+//! nearest, and at the nearest turn where view and light are at right angles. Each turn has frames a tenth of a degree apart, of translucent
+//! splats alone. The splats are lit once for all frames of a turn, so that frames differ by the order alone.
 
 use super::{Options, Ordered, exact_input, image};
 use ::reference::{Fragment, Input, fold_fragments};

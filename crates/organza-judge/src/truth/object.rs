@@ -1,4 +1,4 @@
-//! One object as the path tracer takes it: a density or a mesh in the world.
+//! An object in the path tracer's form: a density or a mesh in the world.
 
 use super::medium::{MediumBody, medium};
 use convert::SplatParams;

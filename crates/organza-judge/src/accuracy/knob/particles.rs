@@ -1,5 +1,5 @@
-//! Knobs of the technique `particles` (Tanaka 2012): the repeat level, how many sets are averaged; how implicit surfaces are
-//! sampled, the step of the paper's Brownian motion on them, and how media are.
+//! Knobs of the technique `particles` (Tanaka 2012): the repeat level, which is the number of averaged sets; the samplers of
+//! implicit surfaces and of media; the step of the paper's Brownian motion.
 
 use crate::accuracy::{Facts, Knob, Options, Request, Skipped, Step, Sweep, Theory};
 use organza::scene::{LayerChoice, Scene, Source, SurfaceSampler, Technique, VolumeSampler};
@@ -7,9 +7,9 @@ use organza::scene::{LayerChoice, Scene, Source, SurfaceSampler, Technique, Volu
 /// Steps of the Brownian motion, over the width of the surface; the paper's is 0.01.
 const BROWNIAN_STEPS: [f64; 4] = [0.08, 0.04, 0.02, 0.01];
 
-/// Knobs of `particles` in this scene, or why there are none.
+/// Knobs of `particles` in this scene, or the reason why it has no sweep.
 ///
-/// A picture of L sets costs L sets, so with [`Options::quick`] the scene's own level is cut down to the finest step.
+/// A picture of L sets costs L sets, so [`Options::quick`] caps the scene's level at the finest step.
 ///
 /// # Errors
 /// Why the technique has nothing to show.

@@ -5,12 +5,12 @@ use crate::accuracy::{Knob, Options, Request, Skipped, Step, Sweep, Theory};
 use organza::scene::{Scene, SceneObject, ShadowMapping, Source, Technique};
 use splat_core::{LightShape, raster::Accumulation};
 
-/// What has to be known of a loaded scene to choose the steps.
+/// The facts of a loaded scene that the steps depend on.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Facts {
-    /// Thickness of the slices that the scene's own setting gives, world units; `None` without translucent splats.
+    /// Thickness of the slices of the scene's stated setting, world units; `None` without translucent splats.
     pub slice_thickness: Option<f64>,
-    /// Most cells along a side of a shadow table as the scene's own setting gives them; `None` where no light gets one.
+    /// Most cells along a side of a shadow table, by the scene's stated setting; `None` where no light gets one.
     pub cells: Option<u32>,
     /// Bytes of a splat as they are and packed; `None` without splats, or where they cannot be packed.
     pub bytes_per_splat: Option<[f64; 2]>,

@@ -11,9 +11,9 @@ use splat_core::{Packing, Shading};
 
 /// Knobs of `sheets` in this scene.
 ///
-/// `slab_width` is that of the scene's own setting, world units; `None` if no slab holds a volume or a splat, as of translucent
-/// triangles, which are drawn as they are. Sheets have a limit of their own, because they have other kernels than splats and
-/// classify after reconstruction.
+/// `slab_width` is that of the scene's stated setting, world units; `None` if no slab holds a volume or a splat, as of
+/// translucent triangles, which are drawn as they are. Sheets have another limit than splats, because their kernels differ
+/// and they classify after reconstruction.
 pub fn sheets(scene: &Scene, slab_width: Option<f64>, facts: &Facts, options: &Options) -> Sweep {
     let in_slabs = |knob: &dyn Fn(f64) -> Knob| slab_width.map(knob).ok_or_else(|| NO_SLABS.to_owned());
     let is_gathered = scene.render.sheets.reconstruction == Reconstruction::Gather;

@@ -6,7 +6,7 @@ use organza::scene::{Collisions, Coverage, Grouping, LayerChoice, Scene, SurfelG
 
 /// Knobs of `surfels` in this scene.
 ///
-/// What surfels show has a limit of its own: discs of a layer are averaged, where points composite each.
+/// Surfels have another limit than points: they average the discs of a layer, where points composite each disc.
 pub fn surfels(scene: &Scene, facts: &Facts, options: &Options) -> Sweep {
     let mut base = Request { scene: in_surfels(scene), oversample: 1, packed: false };
     base.scene.render.layers = LayerChoice::default();

@@ -1,4 +1,4 @@
-//! The part of the page that says which setting to take: the frontier as a table, each row with lines for a scene file.
+//! The part of the page that recommends settings: the frontier as a table, each row with lines for a scene file.
 
 use crate::accuracy::plot::escaped;
 use crate::accuracy::resolve::MARGIN;
