@@ -1,4 +1,5 @@
-//! Settings of the viewed scene from fast to exact, with what each is predicted to take, and what it took and showed once it was drawn.
+//! Settings of the viewed scene from fast to exact. Each has its predicted time and, once it is drawn, its measured time and its
+//! picture.
 
 pub(crate) mod compare;
 
@@ -22,7 +23,7 @@ fn is_compared(size: Size) -> bool {
 /// A position between fast and exact, as a row of the page.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RungRow {
-    /// From fastest (negative) to most exact; 0 is what the scene states.
+    /// The setting's place, from fastest (negative) to most exact; 0 is the scene's stated setting.
     pub step: i32,
     /// The knobs that are turned, each with its position.
     pub words: Vec<String>,

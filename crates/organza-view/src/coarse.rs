@@ -1,4 +1,4 @@
-//! How a coarse picture is less than the whole one, so that it keeps to a time.
+//! The reductions that make a coarse picture keep to a time.
 
 use crate::picture::Size;
 use organza::scene::{LayerChoice, Scene, Technique};

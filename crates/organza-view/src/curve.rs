@@ -9,7 +9,7 @@ use serde::Serialize;
 /// Bins of a histogram on the page.
 const BINS: usize = 128;
 
-/// How often the values of a volume occur.
+/// A histogram of a volume's values.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Values {
     /// Least value.
@@ -25,7 +25,7 @@ pub struct Values {
 pub struct CurveRow {
     /// Its control points.
     pub knots: Vec<Knot>,
-    /// How often values occur, once that is counted.
+    /// The histogram, once it is counted.
     pub values: Option<Values>,
 }
 

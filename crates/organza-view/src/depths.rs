@@ -1,4 +1,4 @@
-//! Which place of the scene lies below the pointer, and which object.
+//! The place of the scene below the pointer, and the object there.
 
 pub(crate) mod below;
 

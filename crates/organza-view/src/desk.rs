@@ -1,4 +1,5 @@
-//! Where a session leaves what is to be drawn, and the artist what is drawn. Only the newest request counts.
+//! The desk between a session and its artist: the session leaves requests on it, the artist finished pictures. Only
+//! the newest request counts.
 
 use crate::accuracy::RungRow;
 use crate::curve::Values;
@@ -41,9 +42,9 @@ pub(crate) struct Request {
 pub struct Failure {
     /// The state.
     pub generation: u64,
-    /// What was found and what was expected.
+    /// The value that was found, and the expected one.
     pub message: String,
-    /// What to do; may be empty.
+    /// The remedy; may be empty.
     pub hint: String,
 }
 

@@ -1,4 +1,4 @@
-//! What a person does to a view, as data: the page sends it, files record it, tests play it.
+//! A person's actions in a view, as data: the page sends them, files record them, tests play them.
 
 use organza::Error;
 use organza::scene::{Override, short, shown};
@@ -11,7 +11,7 @@ const MOST: f64 = 1000.0;
 /// Most stops by which a light is made brighter or darker: more is black, or burnt out.
 const MOST_STOPS: f64 = 32.0;
 
-/// One thing that a person does. In JSON an object whose key `do` names it, such as `{"do": "orbit", "right": 0.1, "up": 0}`.
+/// An action of a person. In JSON an object whose key `do` names it, such as `{"do": "orbit", "right": 0.1, "up": 0}`.
 ///
 /// ```
 /// use organza_view::Event;
@@ -166,7 +166,7 @@ pub enum Switch {
 }
 
 impl Switch {
-    /// As scenes write it.
+    /// Its name in scene files.
     pub const fn word(self) -> &'static str {
         match self {
             Self::Auto => "auto",
@@ -177,7 +177,7 @@ impl Switch {
 }
 
 impl Event {
-    /// Refuses numbers that no hand makes. What scenes say of a number is for the scene to refuse.
+    /// Refuses numbers that no hand makes. Limits of scene keys are checked by the scene, not here.
     ///
     /// # Errors
     /// [`Error::Input`] that names the event and its key.

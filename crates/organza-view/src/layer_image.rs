@@ -1,4 +1,4 @@
-//! A layer of a picture as a picture of its own.
+//! Turns a layer of a picture into a displayable picture.
 
 use organza::Layers;
 use splat_core::LayerData;

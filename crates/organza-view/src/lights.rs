@@ -5,7 +5,7 @@ use serde::Serialize;
 use splat_core::LightShape;
 use splat_core::glam::{DQuat, DVec3};
 
-/// From where something comes, degrees.
+/// The direction that light comes from, degrees.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Direction {
     /// About +Y, from +Z towards +X, −180 to 180.
@@ -35,13 +35,13 @@ impl Direction {
 /// A light, as a row of the page.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct LightRow {
-    /// How effects call it: its name, or its place in the scene's list.
+    /// Its label in effects: its name, or its place in the scene's list.
     pub name: String,
-    /// What it is, in a word.
+    /// Its kind, in a word.
     pub kind: &'static str,
     /// Stops by which it is brighter than the scene has it.
     pub stops: f64,
-    /// From where it comes; `None` where its place does not say that.
+    /// The direction that its light comes from; `None` if its shape has no such direction.
     pub direction: Option<Direction>,
     /// Whether it casts shadows.
     pub shadow: bool,

@@ -1,4 +1,4 @@
-//! A finished picture: the bytes that the page shows, and what is to be said about it.
+//! A finished picture: the bytes that the page shows, and the facts about it.
 
 use crate::depths::PicturePlace;
 use crate::desk::Request;
@@ -36,7 +36,7 @@ impl Size {
     }
 }
 
-/// How much of a picture is drawn.
+/// The level of detail that a picture is drawn with.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Level {
@@ -46,16 +46,16 @@ pub enum Level {
     Whole,
 }
 
-/// What is to be said about a picture.
+/// The facts about a picture.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Facts {
     /// Pictures of a session are counted from 1.
     pub number: u64,
     /// The state that it shows; a session's states are counted from 1.
     pub generation: u64,
-    /// How much of it is drawn.
+    /// The level of detail that it is drawn with.
     pub level: Level,
-    /// Its own size, smaller than the page's where it is coarse.
+    /// Its size in pixels, smaller than the page's if it is coarse.
     pub size: Size,
     /// Time of drawing, milliseconds by the clock.
     pub ms: f64,
@@ -65,22 +65,22 @@ pub struct Facts {
     pub technique: String,
     /// Sets of particles that were averaged, where it is an average.
     pub sets: Option<u32>,
-    /// What a person should know of the input, one sentence each.
+    /// Warnings about the input, one sentence each.
     pub warnings: Vec<String>,
-    /// What files hold that the picture does not show, one sentence each.
+    /// Data of the files that the picture does not show, one sentence each.
     pub notes: Vec<String>,
     /// The effects of the plan that something in the scene causes.
     pub effects: Vec<EffectRow>,
     /// The passes that were predicted or that ran, in the order of their running.
     pub passes: Vec<PassRow>,
-    /// What the colours of objects stand for.
+    /// Legends of the objects' colours.
     pub legends: Vec<Legend>,
 }
 
 /// A pass of a render with its time.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PassRow {
-    /// What it is called, such as `tsm build`.
+    /// Its name, such as `tsm build`.
     pub name: String,
     /// Predicted time by the clock, milliseconds; `None` for one that was not.
     pub predicted_ms: Option<f64>,
@@ -110,7 +110,7 @@ impl PassRow {
     }
 }
 
-/// What the colours of an object stand for.
+/// The legend of an object's colours.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Legend {
     /// The object, and the column that gives it its colours.
@@ -128,7 +128,7 @@ pub struct Mark {
     pub number: f64,
     /// sRGB as it is displayed.
     pub color: [u8; 3],
-    /// What it means, such as `ground`.
+    /// Its meaning, such as `ground`.
     pub meaning: Option<&'static str>,
 }
 
@@ -158,9 +158,9 @@ impl Legend {
 /// An effect of the plan, as a row of the page.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct EffectRow {
-    /// What it is called, such as `shadow.sun`.
+    /// Its name, such as `shadow.sun`.
     pub name: String,
-    /// What effects of its kind are, in a few words.
+    /// A description of its kind, in a few words.
     pub what: &'static str,
     /// Whether it is simulated, or would be if a technique of the scene had it.
     pub called_for: bool,
@@ -170,11 +170,11 @@ pub struct EffectRow {
     pub reason: String,
     /// The most that any displayed pixel, 0 to 1, changes without it; `None` where no bound is known.
     pub bound: Option<f64>,
-    /// Who decides.
+    /// The authority that decides it: the plan, or the person.
     pub switch: Switch,
     /// Why it cannot be switched; `None` where it can.
     pub fixed: Option<&'static str>,
-    /// Predicted milliseconds of its passes, by the clock; `None` for an effect that has no pass of its own.
+    /// Predicted milliseconds of its passes, by the clock; `None` for an effect without a separate pass.
     pub predicted_ms: Option<f64>,
     /// Measured milliseconds of its passes; `None` also where what they make was kept.
     pub measured_ms: Option<f64>,
@@ -245,7 +245,7 @@ impl EffectRow {
 pub struct Picture {
     /// A PNG file, the one that `organza render` writes where the picture is whole.
     pub png: Vec<u8>,
-    /// What is to be said about it.
+    /// The facts about it.
     pub facts: Facts,
 }
 

@@ -49,7 +49,7 @@ pub fn read_events(path: &Path) -> Result<Vec<Event>, Error> {
     Ok(events)
 }
 
-/// A file of events that grows with them. It is a list that can be read after every event, also when the view is killed.
+/// A file of events that grows with them. The file is a readable list after every event, also if the view is killed.
 #[derive(Debug)]
 pub struct Recording {
     path: PathBuf,
@@ -82,7 +82,7 @@ impl Recording {
         Ok(Self { path: path.to_owned(), file, count: 0, failure: None })
     }
 
-    /// Adds events, [`MOST_EVENTS`] in all at most. What fails is told at the end.
+    /// Adds events, [`MOST_EVENTS`] in all at most. A failure is reported at the end.
     pub fn add(&mut self, events: &[Event]) {
         let events = &events[..events.len().min(MOST_EVENTS - self.count)];
         if events.is_empty() || self.failure.is_some() {

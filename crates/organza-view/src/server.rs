@@ -48,7 +48,7 @@ pub struct Server {
     framing: Framing,
 }
 
-/// Which pages may show the page inside of theirs.
+/// The pages that may embed this page.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Framing {
     /// None.
@@ -79,7 +79,7 @@ impl Server {
         Ok(Self { listener, address, token: Token::new()?, framing: Framing::Nobody })
     }
 
-    /// The same with other pages around its own.
+    /// Returns the server with another choice of pages that may embed its page.
     #[must_use]
     pub fn framed_by(self, framing: Framing) -> Self {
         Self { framing, ..self }

@@ -65,18 +65,18 @@ struct Studio {
     recording: Option<Recording>,
 }
 
-/// What a page shows beside the picture.
+/// The state that a page shows beside the picture.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Shown {
     /// Grows with every change.
     pub version: u64,
     /// The state; a session's states are counted from 1.
     pub generation: u64,
-    /// The names of the files that were asked for.
+    /// The names of the opened files.
     pub title: String,
     /// Size of the whole picture.
     pub size: Size,
-    /// Where the eye is.
+    /// The viewpoint of the eye.
     pub viewpoint: ShownViewpoint,
     /// Stops.
     pub exposure: f64,
@@ -84,17 +84,18 @@ pub struct Shown {
     pub objects: Vec<ObjectRow>,
     /// The lights of the scene, in its order.
     pub lights: Vec<LightRow>,
-    /// The effects of the newest picture, the whole one of the state where there is one, with the present switches.
+    /// The effects of the newest picture, with the present switches. The whole picture of the state counts as newest
+    /// once it is drawn.
     pub effects: Vec<EffectRow>,
     /// The layer in the place of the beauty.
     pub layer: Option<String>,
     /// Settings from fast to exact; `None` before a page asks for them.
     pub accuracy: Option<ShownAccuracy>,
-    /// The technique that was chosen; `None` for what the scene says.
+    /// The technique that was chosen; `None` for the technique that the scene states.
     pub technique: Option<String>,
     /// The picture that was kept.
     pub kept: Option<KeptRow>,
-    /// What is to be said of the newest picture.
+    /// The facts about the newest picture.
     pub picture: Option<Facts>,
     /// The picture in the making.
     pub drawing: Option<Drawing>,
@@ -111,11 +112,11 @@ pub struct ShownAccuracy {
     pub step: i32,
     /// The settings that were chosen, as `--set` takes them.
     pub set: Vec<String>,
-    /// The positions, from the fastest; empty before a whole picture with the scene's own settings is drawn.
+    /// The positions, from the fastest; empty before a whole picture with the scene's stated settings is drawn.
     pub rungs: Vec<RungRow>,
 }
 
-/// Where the eye is, as the page shows it.
+/// The viewpoint of the eye, as the page shows it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ShownViewpoint {
     /// Degrees about the pole.
@@ -133,7 +134,7 @@ pub struct ShownViewpoint {
 pub struct ObjectRow {
     /// Name of the object.
     pub name: String,
-    /// What it is made of, in a word.
+    /// The kind of its data, in a word.
     pub kind: &'static str,
     /// Whether it is drawn.
     pub visible: bool,
@@ -146,7 +147,7 @@ pub struct ObjectRow {
 /// A picture in the making.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Drawing {
-    /// What is done at present.
+    /// The stage at work.
     pub stage: String,
     /// Share done, 0 to 1.
     pub share: f64,
@@ -188,7 +189,7 @@ impl Session {
     /// Takes events in, all of them or none, and asks for a picture of the state behind the last.
     ///
     /// # Errors
-    /// What a scene with these changes is refused for; the state is then as before.
+    /// Errors of the scene with these changes; the state is then as before.
     pub fn apply(&self, events: &[Event]) -> Result<(), Error> {
         let mut studio = self.studio();
         let first = self.desk.own();
@@ -218,10 +219,10 @@ impl Session {
         Ok(true)
     }
 
-    /// Takes recorded events in. What names something that the scene does not have is left out; returns one sentence for each such event.
+    /// Takes recorded events in. Leaves out events that name something which the scene lacks, and returns a sentence for each.
     ///
     /// # Errors
-    /// What a scene with the other events is refused for; the state is then as before.
+    /// Errors of the scene with the other events; the state is then as before.
     pub fn play(&self, events: &[Event]) -> Result<Vec<String>, Error> {
         let mut studio = self.studio();
         let first = self.desk.own();
@@ -271,7 +272,7 @@ impl Session {
         self.kept().as_ref().map(|keeping| Arc::clone(&keeping.kept.picture))
     }
 
-    /// How the whole picture of the present state differs from the one that was kept; `None` without either.
+    /// The difference between the whole picture of the present state and the kept picture; `None` without either.
     ///
     /// # Errors
     /// [`Error::Output`] for a picture that cannot be displayed.
@@ -288,7 +289,8 @@ impl Session {
         Ok(Some(found))
     }
 
-    /// What lies below a place of the picture; `None` before depths of the present view are known.
+    /// The depth, the object and the data below a place of the picture; `None` before depths of the present view are
+    /// known.
     pub fn below(&self, place: PicturePlace) -> Option<Below> {
         let depths = self.desk.depths()?;
         let scene = self.studio().scene.clone();
@@ -314,7 +316,7 @@ impl Session {
         recording.map_or(Ok(false), Recording::end)
     }
 
-    /// The files that the scene is made of, and its own.
+    /// The scene file and the files that it reads.
     pub fn files(&self) -> Vec<PathBuf> {
         self.studio().stated.files()
     }
@@ -383,7 +385,7 @@ impl Session {
         }
     }
 
-    /// The newest picture, if there is one yet.
+    /// The newest picture, if any is drawn yet.
     pub fn picture(&self) -> Option<Arc<Picture>> {
         self.desk.seen().picture
     }
@@ -391,7 +393,7 @@ impl Session {
     /// Waits for the whole picture of the present state.
     ///
     /// # Errors
-    /// Why there is none.
+    /// The reason why no whole picture is drawn.
     pub fn whole_picture(&self) -> Result<Arc<Picture>, Failure> {
         self.desk.wait_for_whole()
     }

@@ -1,4 +1,4 @@
-//! What a person has changed of a scene, and the scene that follows.
+//! A person's changes to a scene, and the scene that follows from them.
 
 use crate::event::{Event, Knot, Switch, settings};
 use crate::lights::{Aim, Direction, LightChange};
@@ -13,15 +13,15 @@ use std::path::PathBuf;
 
 /// A scene that is to be viewed.
 pub struct Opening {
-    /// What the page is called: the names of the files that were asked for.
+    /// The title of the page: the names of the opened files.
     pub title: String,
     /// The scene's file, which gives the format and the folder that paths are relative to; it need not be there.
     pub file: PathBuf,
     /// Its text.
     pub text: Vec<u8>,
-    /// How it is loaded, with the changes from the command line.
+    /// The options that it is loaded with, among them the changes from the command line.
     pub load: LoadOptions,
-    /// What a render may take.
+    /// The limits of a render.
     pub options: RenderOptions,
     /// Files that were read before.
     pub files: Files,

@@ -19,8 +19,8 @@ const ROUNDING: f64 = 1e-9;
 const NEAREST: f64 = 1e-15;
 const FARTHEST: f64 = 1e15;
 
-/// Where the eye is, as a person turns it: on a ball around a centre, between two poles. It goes up to a pole and not beyond, so the picture never
-/// flips, and at a pole the azimuth still turns it.
+/// The eye's place as a person turns it: on a ball around a centre, between two poles. The eye goes up to a pole and not beyond, so the picture
+/// never flips. At a pole the azimuth still turns the picture.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Viewpoint {
     /// Radians about the pole; about +Y from +Z towards +X.
@@ -64,7 +64,7 @@ impl Viewpoint {
         self.centre + self.outwards() * self.distance
     }
 
-    /// What points up in the picture: the pole, or near it the way to the pole.
+    /// The up direction of the picture: the pole, or near it the direction to the pole.
     pub fn up(&self) -> DVec3 {
         if self.elevation.abs() < NEAR_POLE { self.pole } else { self.upwards() }
     }

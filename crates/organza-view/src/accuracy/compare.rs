@@ -30,7 +30,7 @@ pub(crate) struct Kept {
     drawn: Arc<Drawn>,
 }
 
-/// How the present picture differs from the one that was kept.
+/// The difference between the present picture and the kept one.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Comparison {
     /// Number of the picture that was kept.

@@ -1,4 +1,4 @@
-//! What lies below the pointer: the number of the layer, the depth, the place, the object, and what its data say there.
+//! The state below the pointer: the number of the layer, the depth, the place, the object, and the values of its data.
 
 use crate::depths::{Depths, PicturePlace};
 use crate::picture::Drawn;
@@ -12,7 +12,7 @@ use std::sync::{Arc, Weak};
 /// Most columns of points that are told.
 const MOST_COLUMNS: usize = 4;
 
-/// What lies below the pointer.
+/// The depth, the object and the data below the pointer.
 #[derive(Debug, Clone, PartialEq, Serialize, Default)]
 pub struct Below {
     /// The layer that is shown, and `beauty` where none is chosen.
@@ -21,11 +21,11 @@ pub struct Below {
     pub numbers: Vec<f64>,
     /// View depth at which half of the light is absorbed, world units.
     pub depth: Option<f64>,
-    /// Where that is, world units.
+    /// The place below the pointer, world units.
     pub position: Option<[f64; 3]>,
     /// The object that is seen first.
     pub object: Option<String>,
-    /// What its data say there.
+    /// The values of its data at that place.
     pub values: Vec<NamedValue>,
 }
 

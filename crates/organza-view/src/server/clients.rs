@@ -1,4 +1,4 @@
-//! Who looks at a session: at most two pages.
+//! The clients of a session: at most two pages.
 
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
