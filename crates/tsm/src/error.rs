@@ -2,7 +2,7 @@
 
 use splat_core::Exceeded;
 
-/// What can go wrong.
+/// Errors of building, reading and recording shadow maps.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {

@@ -1,8 +1,8 @@
 //! The light's frame: positions relative to the light (Gunjee 2007, Eq. 1), turned to the table's axes.
 //!
 //! P' = P − L is taken in f64, so that a scene at 1e7 keeps its digits. Lengths are divided by a power of two near the
-//! farthest caster, so that squares of 1e20 or 1e-23 neither overflow nor vanish, and scaling a scene by a power of two
-//! changes no bit of the table.
+//! farthest caster, so that squares of 1e20 or 1e-23 neither overflow nor vanish. A scene that is scaled by a power of
+//! two keeps every bit of its table.
 
 use splat_core::glam::{DMat3, DVec3, Mat3, Vec3};
 use std::cmp::Ordering;

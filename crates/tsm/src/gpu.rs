@@ -1,13 +1,13 @@
 //! Lists as a recording: the GPU's twin of [`Deposits::into_map`] (Gunjee 2007, section 4.1, step 3, which the paper leaves
 //! to the CPU and its GPU to future work).
 //!
-//! A radix sort by distance, then by cell, both stable; a segmented scan that begins anew at each cell adds the absorbances
-//! up, in blocks of 1024 entries (reduce, spine, apply; no workgroup waits for another); each cell finds by halves where its
-//! list reaches the limit; knots move to their places.
+//! Entries are sorted by distance, then by cell, with a stable radix sort. A segmented scan adds up the absorbances of each
+//! cell, in blocks of 1024 entries (reduce, spine, apply; no workgroup waits for another). Each cell bisects its list for
+//! the limit, and knots move to their places.
 //!
-//! The lists are the CPU's bit for bit on every device: sums are the same 64-bit fixed point, in pairs of 32-bit words,
-//! whose order does not matter, and all that is left are comparisons. The deposits are the CPU's, or made on the device too
-//! ([`record_map`]), where the map may stay ([`record_shadow`]).
+//! Lists equal the CPU's bit for bit on every device. Sums are the same 64-bit fixed point, in pairs of 32-bit words, and
+//! do not depend on their order; every other operation is a comparison. The deposits are the CPU's, or made on the device
+//! too ([`record_map`]), where the map may stay ([`record_shadow`]).
 //!
 //! A device's kernels see so many bytes of a buffer and no more ([`Capacities::most`]). Beyond, runs of cells are done one
 //! after the other ([`Deposits::batches`]) and joined on the host ([`Deposits::join`]): the same bits.
@@ -51,7 +51,7 @@ const SUM_BLOCK: u32 = 1024;
 /// Most entries: the upper bit of a knot's number is taken.
 const MOST_ENTRIES: u32 = i32::MAX as u32;
 
-/// What a recording makes room for.
+/// Capacities of a recording, in elements.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Capacities {
     /// Entries, fewer than 2³¹.
@@ -65,7 +65,7 @@ pub struct Capacities {
 /// The recorded lists and the buffers that the caller meets.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Recorded {
-    /// What the device is to do.
+    /// The commands of the device.
     pub recording: Recording,
     /// The room it has.
     pub capacities: Capacities,
@@ -163,7 +163,7 @@ impl Recorded {
     /// The bytes that the recording takes for a batch of these deposits.
     ///
     /// # Errors
-    /// [`Error::Overflow`] for more entries or cells than there is room for, or for channels other than its own.
+    /// [`Error::Overflow`] for more entries or cells than the capacities, or for other channels than the recording's.
     pub fn uploads(&self, deposits: &Deposits, batch: &Batch) -> Result<Uploads, Error> {
         let Capacities { entries, cells, channels } = self.capacities;
         let room = [

@@ -4,7 +4,7 @@ use crate::Error;
 use splat_core::optics::AbsorbanceModel;
 use splat_core::{FootprintStack, Limits};
 
-/// How directions become cells.
+/// The mapping from directions to cells.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum MappingChoice {
     /// Planar for directional lights, spots, and point lights that see all casters within 60° of their middle;
@@ -20,7 +20,7 @@ pub enum MappingChoice {
     Planar,
 }
 
-/// How fine the table is.
+/// The resolution of the table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Resolution {
     /// Cells of half a splat spacing for up to some ten thousand splats; then cells that stay as they are while a volume's
@@ -42,7 +42,7 @@ pub struct Params {
     /// Transmittance below which a list may stop, in (0, 1): A_cut = −ln(tolerance). The error of any receiver is at
     /// most `tolerance` times the unshadowed light.
     pub tolerance: f32,
-    /// How absorbance is made; [`AbsorbanceModel::Paper`] reproduces Gunjee 2007, with its limit of 2.0.
+    /// The model of absorbance; [`AbsorbanceModel::Paper`] reproduces Gunjee 2007, with its limit of 2.0.
     pub absorbance: AbsorbanceModel,
     /// Mean cells that a splat covers, which [`Resolution::Auto`] aims at for clouds of a million splats and more, ≥ 1.
     pub entries_per_splat: f32,

@@ -1,4 +1,4 @@
-//! What throws shadows, and the tables that it refers to.
+//! The casters of shadows, and the tables that they refer to.
 
 use splat_core::{Cloud, Material, Object};
 

@@ -67,12 +67,12 @@ impl ShadowMap {
         if matches!(self.absorbances, Absorbances::Mono(_)) { 1 } else { 3 }
     }
 
-    /// What the build was expected to cost.
+    /// The predicted cost of the build.
     pub fn prediction(&self) -> Prediction {
         self.prediction
     }
 
-    /// What the build did.
+    /// The counts of the build.
     pub fn counts(&self) -> Counts {
         self.counts
     }

@@ -67,7 +67,7 @@ impl Deposits {
         }
     }
 
-    /// What [`Deposits::new`] will cost, by looks at the casters alone.
+    /// Predicts the cost of [`Deposits::new`] from a survey of the casters.
     ///
     /// # Errors
     /// Those of [`ShadowMap::build`].

@@ -1,10 +1,11 @@
 //! Media side by side: the closed form of [`crate::building::overlap`] for many footprints at once.
 //!
-//! Nearly all translucent splats are media whose kernel overlaps a few cells away from every edge of the table. One loop
-//! maps their positions, another makes footprints of them. Those that are plain (no edge between octants, no sampling,
-//! at most [`MOST`] cells a side) queue by size, the others take the way of [`crate::building::deposit`]. A full queue is
-//! overlapped with its cells step by step: first row and first column of all footprints, first row and second column of
-//! all, and so on. The arithmetic is that of [`Axis`], so that a footprint leaves the same bits whichever way it takes.
+//! Nearly all translucent splats are media whose kernel overlaps a few cells away from every edge of the table. A loop
+//! maps their positions, and another makes footprints of them. Plain footprints (no edge between octants, no sampling,
+//! at most [`MOST`] cells a side) queue by size. The others take the way of [`crate::building::deposit`]. A full queue
+//! is overlapped with its cells step by step: first row and first column of all footprints, first row and second
+//! column of all, and so on. The arithmetic is that of [`Axis`], so that a footprint leaves the same bits whichever
+//! way it takes.
 
 use crate::building::caster::Casters;
 use crate::building::deposit::is_plain;

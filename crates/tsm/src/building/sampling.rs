@@ -1,8 +1,8 @@
 //! Sampling: a footprint on the rays of cells, exact for the ray's direction.
 //!
-//! For footprints of several cells, and for those that the table's derivatives at their centre do not describe. Nearer to
-//! the light than three radii, a splat is swept over the whole table with its optical depth along each half-ray; within
-//! one radius only the part of the kernel ahead of the light counts.
+//! Samples footprints of several cells, and footprints that the table's derivatives at their centre do not describe.
+//! Nearer to the light than three radii, a splat is swept over the whole table with its optical depth along each
+//! half-ray; within one radius only the part of the kernel ahead of the light counts.
 
 use crate::building::caster::Caster;
 use crate::building::rays::{MOST_SAMPLES, Rays, place};

@@ -1,7 +1,7 @@
 //! Sorting the entries of one cell by distance, by whichever way suits their number.
 //!
-//! A key holds the distance in its upper half: positive floats, ordered as integers. What the lower half holds does not
-//! matter, and the order of equal distances is free: they are merged by exact sums.
+//! A key holds the distance in its upper half: positive floats, ordered as integers. The content of the lower half does
+//! not matter, and the order of equal distances is free: exact sums merge them.
 
 /// Lists up to these lengths are sorted by counting.
 const SHORT: [usize; 2] = [64, 128];

@@ -1,9 +1,9 @@
-//! What the processor does before a device deposits: the survey of casters, the choice of the table, the nearest opaque discs,
-//! and the entries of those casters that the closed form does not take.
+//! Work of the processor before a device deposits: the survey of casters, the choice of the table, the nearest opaque discs,
+//! and the entries of casters that the closed form cannot treat.
 //!
-//! Nearly all translucent splats are plain (see `media.rs`): their footprint lies away from every edge of the table and is
-//! of few cells. They are the device's. The others (bent over an edge between octants, of many cells, near the light), and all
-//! of them in the paper's model, are the processor's, which hands on their entries.
+//! Nearly all translucent splats are plain (see `media.rs`): their footprint lies away from every edge of the table and is of
+//! few cells. These casters are the device's. The others (bent over an edge between octants, of many cells, near the light),
+//! and all of them in the paper's model, are the processor's, which hands on their entries.
 
 use crate::building::caster::Casters;
 use crate::building::deposit::{Deposit, Scratch};
@@ -144,7 +144,7 @@ impl Casting {
         self.given.cells.len() as u64
     }
 
-    /// Entries that there may be; how many there are the device says.
+    /// An upper bound of the entries; the device counts them.
     pub fn expected(&self) -> u32 {
         let predicted = (1.5 * self.map.prediction().entries).min(f64::from(MOST_ENTRIES)) as u64;
         (self.given() + 4 * self.casters()).max(predicted).clamp(1, MOST_ENTRIES.into()) as u32

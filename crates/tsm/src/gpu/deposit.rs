@@ -23,7 +23,7 @@ use splat_shaders::{BufferId, Groups, Overflow, Recording, kernels};
 /// Threads of a workgroup.
 const GROUP: u32 = 256;
 
-/// What a recording of deposits makes room for.
+/// Capacities of a recording of deposits, in elements.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct CastRoom {
     /// Splats and their attributes.
@@ -49,7 +49,7 @@ pub struct CastRoom {
 /// Recorded deposits and the buffers that the caller meets.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RecordedCast {
-    /// What the device is to do.
+    /// The commands of the device.
     pub recording: Recording,
     /// The room it has.
     pub room: CastRoom,
@@ -286,7 +286,7 @@ impl RecordedCast {
         std::iter::once(view).chain(buffers.zip(bytes)).filter(|(_, bytes)| !bytes.is_empty()).collect()
     }
 
-    /// How many entries there are, from the bytes that were read back of [`RecordedCast::state`].
+    /// The number of entries, from the bytes that were read back of [`RecordedCast::state`].
     ///
     /// # Errors
     /// [`Error::ReadBack`] for fewer bytes than a run gives, [`Error::Overflow`] where there was too little room for them.

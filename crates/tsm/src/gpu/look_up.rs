@@ -25,7 +25,7 @@ const GROUP: u32 = 256;
 /// Bytes of a receiver.
 const RECEIVER: u64 = 32;
 
-/// What a recording of look-ups makes room for.
+/// Capacities of a recording of look-ups, in elements.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Room {
     /// Receivers.
@@ -67,7 +67,7 @@ impl Room {
 /// Recorded look-ups and the buffer that the caller meets.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RecordedLookUp {
-    /// What the device is to do.
+    /// The commands of the device.
     pub recording: Recording,
     /// The room it has.
     pub room: Room,
@@ -117,7 +117,7 @@ pub fn record_look_up(room: Room) -> RecordedLookUp {
 }
 
 impl RecordedLookUp {
-    /// The bytes of a map that was asked for this room.
+    /// The uploads of a map that fits these capacities.
     ///
     /// # Errors
     /// [`Error::Overflow`] for a map that is larger or otherwise than the room.

@@ -1,5 +1,5 @@
-//! What splats receive of a light, from their attributes: receivers in the light's frame, look-ups, and the share of the shadow
-//! that each takes, in the form that shading reads it ([`splat_core::shade::gpu`]).
+//! Light that splats receive, from their attributes: receivers in the light's frame, look-ups, and each splat's share of the
+//! shadow, in the form that shading reads ([`splat_core::shade::gpu`]).
 //!
 //! The map is the processor's and uploaded, or [`super::record_shadow`] leaves it on the device. The splats may be those that
 //! kernels have made: whoever knows them joins the buffers.
@@ -17,7 +17,7 @@ const GROUP: u32 = 256;
 /// Recorded look-ups of splats, and the buffers that the caller meets.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RecordedReceived {
-    /// What the device is to do.
+    /// The commands of the device.
     pub recording: Recording,
     /// Input: the splats. Their cross-sections and materials are not read.
     pub attributes: AttributeBuffers,

@@ -14,7 +14,7 @@ use glam::{Vec2, Vec3};
 /// A ray of light through the table, in the light's frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ray {
-    /// Where distance is zero.
+    /// The point whose distance is zero.
     pub base: Vec3,
     /// Unit direction of travel.
     pub direction: Vec3,
@@ -29,10 +29,10 @@ pub struct Place {
     pub distance: f32,
 }
 
-/// How a position is seen from the light.
+/// The view of a position from the light.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct View {
-    /// Where it lies; of no meaning unless `is_seen`.
+    /// Its place in the table; arbitrary unless `is_seen`.
     pub place: Place,
     /// [`Mapping::gradients`] there.
     pub gradients: [Vec3; 2],
@@ -40,7 +40,7 @@ pub struct View {
     pub is_seen: bool,
 }
 
-/// From positions in the light's frame to cells, and back.
+/// Maps positions in the light's frame to cells, and back.
 ///
 /// The frame's origin is the light (for parallel light: a plane before all casters, at z = 0).
 pub trait Mapping: Sync {

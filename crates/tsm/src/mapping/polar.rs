@@ -27,7 +27,7 @@ pub struct PolarRange {
 }
 
 impl PolarRange {
-    /// All directions.
+    /// The whole sphere of directions.
     pub const SPHERE: Self = Self { polar: [0.0, PI], azimuth: [0.0, TAU] };
 }
 

@@ -1,4 +1,5 @@
-//! What the casters look like from the light, before any work: where a table has to look, and angular sizes.
+//! The appearance of the casters from the light, before any work: the directions that a table has to cover, and
+//! angular sizes.
 
 use crate::building::caster::Casters;
 use crate::building::deposit::{BENT, WIDE};

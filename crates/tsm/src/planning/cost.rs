@@ -1,4 +1,4 @@
-//! What a map costs: predicted before any work, counted afterwards.
+//! The cost of a map: predicted before any work, counted afterwards.
 
 use crate::mapping::Octahedral;
 use crate::planning::appearance::Appearance;
@@ -6,7 +6,7 @@ use crate::planning::survey::Survey;
 use splat_core::SplatKind;
 use std::fmt;
 
-/// What the size of a table's cells follows from.
+/// The rule that determines the size of a table's cells.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Limit {
     /// [`crate::Resolution::Cells`].
@@ -39,7 +39,7 @@ impl fmt::Display for Limit {
 pub struct Prediction {
     /// Columns and rows of the table.
     pub size: [u64; 2],
-    /// What its cells follow from.
+    /// The rule that determines its cells.
     pub limit: Limit,
     /// Entries that translucent splats deposit; of a ball 0.6 to 1.4 times the counted ones.
     pub entries: f64,
@@ -49,12 +49,12 @@ pub struct Prediction {
     pub map_bytes: u64,
 }
 
-/// What a build did.
+/// The counts of a build.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Counts {
     /// Splats that throw shadows.
     pub casters: u64,
-    /// Of them, translucent ones, which deposit entries.
+    /// Translucent casters among them, which deposit entries.
     pub translucent: u64,
     /// Cells of the table.
     pub cells: u64,

@@ -1,4 +1,4 @@
-//! From light and casters to a mapping: kind, frame, and number of cells; and the memory it will take.
+//! Chooses a mapping for a light and its casters: kind, frame, and number of cells. Predicts its memory.
 
 use crate::building::caster::Casters;
 use crate::frame::{Frame, axes_about, axes_along};

@@ -1,4 +1,4 @@
-//! What the casters are, before any work: bounds, kinds, channels, sizes.
+//! A survey of the casters, before any work: bounds, kinds, channels, sizes.
 
 use crate::building::caster::Casters;
 use crate::building::lanes::{LANES, Lane};

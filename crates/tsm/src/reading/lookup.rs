@@ -1,10 +1,10 @@
 //! Looking up the light that arrives: T = e^−A between the four nearest cells (Gunjee 2007, Eqs. 8 and 9).
 //!
 //! A medium's entry is spread evenly over half a spacing to either side of its distance, as its splat stands for a cell of
-//! the lattice that deep: A(d) = Σ_j a_j·clamp((d − d_j)/2r + ½). So a medium shadows itself by half its own absorbance,
-//! there are no bands, and light changes continuously with every distance, whether or not some are equal. A surface is a
-//! step at its tangent plane on the cell's ray. A receiving surface is compared at its own tangent plane on the same ray,
-//! lifted towards the light by half a splat: a plane then lies exactly on itself at any angle, in cells of any size.
+//! the lattice that deep: A(d) = Σ_j a_j·clamp((d − d_j)/2r + ½). So a medium shadows itself by half its absorbance, bands
+//! do not appear, and light changes continuously with every distance, also if several are equal. A surface is a step at
+//! its tangent plane on the cell's ray. A receiving surface is compared at its tangent plane on the same ray, lifted
+//! towards the light by half a splat. A plane then lies exactly on itself at any angle, in cells of any size.
 //!
 //! Cells are weighted so that their rays, weighted alike, meet the receiver. Where the table is smooth those are the
 //! bilinear weights of its place; across an edge between octants, where directions are not, the place is looked for.

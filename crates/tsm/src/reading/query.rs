@@ -105,8 +105,8 @@ impl ShadowMap {
         }
     }
 
-    /// Whether any entry lies within `radius` of `center` (relative to the cloud's origin), as seen from the light: on
-    /// the ray of some cell, between the distances at which that ray enters and leaves the sphere. Matter behind the
+    /// Whether any entry lies in a sphere, as seen from the light: on the ray of some cell, between the distances at
+    /// which that ray enters and leaves the sphere. `center` is relative to the cloud's origin. Matter behind the
     /// visible limit of its cell is not seen. Looks at every cell.
     pub fn collides(&self, center: Vec3, radius: f32) -> bool {
         let c = self.frame.position(center);
@@ -133,10 +133,10 @@ impl ShadowMap {
         inside || self.opaque.get(cell as usize).is_some_and(|d| (from..=to).contains(d))
     }
 
-    /// The last time from 0 to `end` up to which none of some places that move together has come past an entry of the cell that it lies in: behind
-    /// it by no more than two widths of that cell. 0 where one has from the beginning, and `end` where none ever does. `places` are those at time
-    /// 0, relative to the cloud's origin, and `moved` is how far they have gone. Between whole times they are looked at, along a straight way,
-    /// wherever they have gone a cell's width, but 256 times at most; where these steps are longer than a cell is wide, it is behind by no more than two of them.
+    /// The last time from 0 to `end` up to which none of some places that move together has come past an entry of the cell that it lies in: behind it
+    /// by no more than two widths of that cell. 0 where one has from the beginning, and `end` where none ever does. `places` are those at time 0,
+    /// relative to the cloud's origin, and `moved` is how far they have gone. Between whole times the places move straight, and each cell's width of
+    /// the way is tested, but at most 256 places of it. If these steps are longer than a cell is wide, the result is late by at most two steps.
     pub fn free_until(&self, places: &[Vec3], moved: &dyn Fn(f64) -> Vec3, end: u32) -> f64 {
         let mut free = 0.0;
         for begin in (0..=end).map(f64::from) {
@@ -185,11 +185,11 @@ impl ShadowMap {
         self.place_of(position).map_or(0.0, |(_, _, width)| self.frame.world_length(width))
     }
 
-    /// How far the transmittance at a receiver may be from that in much smaller cells, about, in \[0, 1\]; 0 outside the table.
+    /// Estimates the error of the transmittance at a receiver against much smaller cells, in \[0, 1\]; 0 outside the table.
     ///
-    /// What linear interpolation misses of a curve: the greatest third of a second difference of places half a cell apart, along the receiving plane,
-    /// up to a cell away on either side. It is h²/12 times the curvature for cells of a width h where light varies smoothly, the mean over a cell, and
-    /// a sixth in the middle of the edge of an opaque shadow.
+    /// The estimate is the error of linear interpolation: the greatest third of a second difference of places half a cell apart, along the receiving
+    /// plane, up to a cell away on either side. For smooth light and cells of width h the estimate is h²/12 times the curvature, the mean over a
+    /// cell. In the middle of an opaque shadow's edge it is a sixth.
     pub fn interpolation_error(&self, receiver: &Receiver) -> f32 {
         let Some((_, _, width)) = self.place_of(receiver.position) else { return 0.0 };
         let p = self.frame.position(receiver.position);
