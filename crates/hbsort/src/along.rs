@@ -1,7 +1,7 @@
 //! Slices along any direction: distances along an axis in the place of view depths.
 //!
-//! What sweeps through a cloud across another direction than the view's (sheets across the bisector of view and light, say)
-//! needs the same slices: the same integer index, the same two levels, the same exact order. Nothing is culled.
+//! Sweeps through a cloud across another direction than the view's, such as sheets across the bisector of view and light,
+//! need the same slices: the same integer index, the same two levels, the same exact order. Nothing is culled.
 
 use crate::project::{CULLED, Extremes};
 use crate::scratch::CHUNK;
@@ -20,7 +20,7 @@ const UNIT: f64 = 1e-6;
 /// The axis that slices lie across.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SliceAxis {
-    /// Where the distance is 0, world units.
+    /// The point whose distance is 0, world units.
     pub origin: DVec3,
     /// Direction in which distances grow, of unit length.
     pub direction: DVec3,
@@ -37,9 +37,9 @@ impl SliceAxis {
 
 /// Orders the splats of a cloud, or those of `ids` (strictly ascending), in slices of equal thickness along an axis.
 ///
-/// All is as in [`crate::slice_cloud`], with the distance of a splat's centre along the axis in the place of its view depth:
-/// [`SliceOrder::near`] is the least distance, and front to back is from there on. The difference of the two origins is
-/// taken in f64. Splats that are no finite numbers are left out, no others.
+/// Sorts as [`crate::slice_cloud`] does, with the distance of a splat's centre along the axis in the place of its view
+/// depth: [`SliceOrder::near`] is the least distance, and front to back is from there on. The difference of the two origins
+/// is taken in f64. Splats that are no finite numbers are left out, no others.
 ///
 /// ```
 /// use hbsort::{Direction, Params, Scratch, SliceAxis, Thickness, slice_along};

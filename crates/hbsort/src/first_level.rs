@@ -1,8 +1,8 @@
 //! Step 2 (Figure 9): every chunk of the input is distributed into the first-level buckets.
 //!
-//! Each chunk keeps its own buckets, side by side in its part of the entries, so that chunks need nothing from each
-//! other and all writes stay in the cache. A bucket of the whole is the concatenation of the chunks' buckets in the
-//! order of the chunks; it never moves.
+//! Each chunk has separate buckets, side by side in its part of the entries. So chunks share no data, and all writes
+//! stay in the cache. A bucket of the whole is the concatenation of the chunks' buckets in the order of the chunks;
+//! it never moves.
 
 use crate::scratch::CHUNK;
 use crate::slicing::Slicing;

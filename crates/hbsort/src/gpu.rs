@@ -41,7 +41,7 @@ pub use run::slice_cloud_on;
 /// Splats that a workgroup projects.
 const PROJECT_BLOCK: u32 = 1024;
 
-/// What a recording makes room for.
+/// Capacities of a recording, in elements.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Capacities {
     /// Splats that are looked at.
@@ -53,7 +53,7 @@ pub struct Capacities {
 /// The recorded sort and the buffers that the caller meets.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Recorded {
-    /// What the device is to do.
+    /// The commands of the device.
     pub recording: Recording,
     /// The room it has.
     pub capacities: Capacities,

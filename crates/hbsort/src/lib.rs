@@ -36,8 +36,8 @@
 //! scratch.recycle(order); // The next frame allocates nothing.
 //! ```
 //!
-//! O(n + slices) time; at most 8 bytes a splat plus the buckets beside the result ([`cost`]). The README says where
-//! this deviates from the paper and why.
+//! O(n + slices) time; at most 8 bytes a splat plus the buckets beside the result ([`cost`]). The README lists
+//! deviations from the paper, with their reasons.
 #![forbid(unsafe_code)]
 
 mod along;

@@ -1,9 +1,9 @@
-//! What the caller chooses: direction, slice thickness, exactness, limits.
+//! Parameters of a sort: direction, slice thickness, exactness, limits.
 
 use crate::Error;
 use splat_core::Direction;
 
-/// Where the slice thickness ε comes from.
+/// The source of the slice thickness ε.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum Thickness {
     /// The smallest splat radius (Gunjee 2007, section 4.2), or the first percentile of the radii when a few tiny
@@ -17,7 +17,7 @@ pub enum Thickness {
 /// Parameters of a sort.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Params {
-    /// Which end of the view comes first; default back to front, as in the paper.
+    /// The end of the view that comes first; default back to front, as in the paper.
     pub direction: Direction,
     /// Slice thickness ε.
     pub thickness: Thickness,

@@ -1,4 +1,4 @@
-//! The slow and obvious forms in f64: slices by a full sort, and the paper's own two levels of buckets.
+//! The slow and obvious forms in f64: slices by a full sort, and the paper's two levels of buckets.
 
 use crate::Params;
 use splat_core::{Camera, Cloud, Direction, Projection, ViewTransform};

@@ -11,7 +11,7 @@ pub(crate) const CHUNK: usize = 1 << 15;
 /// Splats that an order can name: the top bit of an id marks the first splat of a slice while sorting.
 pub(crate) const MOST_SPLATS: u64 = 1 << 31;
 
-/// How ε came about.
+/// The rule that determined ε.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum ThicknessRule {
     /// Nothing was kept: there are no slices.
@@ -25,7 +25,7 @@ pub enum ThicknessRule {
     Percentile,
 }
 
-/// How the splats were ordered.
+/// The method that ordered the splats.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Method {
     /// Nothing was kept.
@@ -38,14 +38,14 @@ pub enum Method {
     DepthBits,
 }
 
-/// What one sort did; [`Scratch::info`].
+/// The report of a sort; [`Scratch::info`].
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct SortInfo {
     /// Splats or depths that went in.
     pub items_in: u64,
-    /// Where ε came from.
+    /// The rule that determined ε.
     pub rule: ThicknessRule,
-    /// How the splats were ordered.
+    /// The method that ordered the splats.
     pub method: Method,
     /// Buckets of the first level: N of Eq. 11, or the key ranges of the order by depth bits.
     pub buckets: u32,
@@ -90,7 +90,7 @@ impl Scratch {
         Self::default()
     }
 
-    /// What the last successful sort did.
+    /// The report of the last successful sort.
     pub fn info(&self) -> &SortInfo {
         &self.info
     }

@@ -1,4 +1,4 @@
-//! From a view depth to its slice, and from a slice to the buckets of the two levels.
+//! Maps a view depth to its slice, and a slice to the buckets of the two levels.
 //!
 //! Gunjee 2007, Eqs. 10-13, with near, far = smallest and greatest kept depth and ε = slice thickness:
 //! ```text
