@@ -5,7 +5,7 @@
 //! equals); bounds are the same operations on the ends of intervals. Zero sets keep the edges where parts meet.
 //!
 //! Clipping is something else: a clipped surface has a border, not a lid. Its field is that of the whole surface, and
-//! [`ScalarField::in_domain`] says which zeros belong to it.
+//! [`ScalarField::in_domain`] decides which zeros belong to it.
 
 use splat_core::glam::{DMat3, DVec3};
 use splat_core::{Clip, Error, ScalarField};
@@ -47,7 +47,7 @@ impl std::fmt::Debug for CombinedField {
 }
 
 impl CombinedField {
-    /// What lies in any of the fields.
+    /// The union: the inside of any of the fields.
     ///
     /// # Errors
     /// [`Error::Invalid`] without fields.
@@ -55,7 +55,7 @@ impl CombinedField {
         Self::with_fields(fields, false)
     }
 
-    /// What lies in all of the fields.
+    /// The intersection: the inside of all fields.
     ///
     /// # Errors
     /// [`Error::Invalid`] without fields.
@@ -63,12 +63,12 @@ impl CombinedField {
         Self::with_fields(fields, true)
     }
 
-    /// What lies in `a` but not in `b`.
+    /// The difference: the inside of `a` without that of `b`.
     pub fn difference(a: SharedField, b: SharedField) -> Self {
         Self { parts: vec![Part { field: a, sign: 1.0 }, Part { field: b, sign: -1.0 }], greatest: true }
     }
 
-    /// What does not lie in `a`: the same surface, turned.
+    /// The complement of `a`: the same surface, turned.
     pub fn complement(a: SharedField) -> Self {
         Self { parts: vec![Part { field: a, sign: -1.0 }], greatest: true }
     }

@@ -1,8 +1,8 @@
-//! Why a field was refused; every message names the object and says what would be accepted.
+//! Errors of fields. Every message names the object and the accepted values.
 
 use splat_core::{Progress, glam::DVec3};
 
-/// What can go wrong while a field is made, or a surface of it.
+/// Errors of making a field, or a surface of it.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum FieldError {
     /// A parameter is outside its range.

@@ -1,8 +1,8 @@
 //! Scalar fields written as formulas in x, y and z.
 //!
-//! A formula is parsed once into a postfix program that runs over any number type: f64 gives values, [`jet::Jet`]
-//! exact first and second derivatives (forward differentiation, no step size), [`interval::Interval`] bounds over a box.
-//! The crates that parse formulas read −x^2 as (−x)^2 and report no column, so the parser is our own.
+//! A formula is parsed once into a postfix program that runs over any number type: f64 gives values, [`jet::Jet`] exact
+//! first and second derivatives (forward differentiation, no step size), [`interval::Interval`] bounds over a box. The
+//! parser is written here because the crates that parse formulas read −x^2 as (−x)^2 and report no column.
 
 pub(crate) mod interval;
 pub(crate) mod jet;

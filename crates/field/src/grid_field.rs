@@ -21,7 +21,7 @@ use splat_core::{Clip, DAabb, Error, Grid, Interpolation, ScalarField};
 use std::sync::Arc;
 use stencil::{Control, Stencil};
 
-/// Which side of an isosurface is inside, where the field is negative.
+/// The inner side of an isosurface, where the field is negative.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Inside {
     /// Where values are above the isovalue: bone in a scan, matter in a density.
@@ -79,7 +79,7 @@ pub struct GridField {
 impl GridField {
     /// The isosurface of `grid` at `isovalue` (units of its values).
     ///
-    /// Takes O(voxels) once, also where several isovalues are asked for: see [`GridField::with_isovalue`].
+    /// Takes O(voxels) once, also for several isovalues: see [`GridField::with_isovalue`].
     ///
     /// # Errors
     /// [`Error::Invalid`] or [`Error::ColumnLength`] for a grid that does not validate, steps that have no inverse in

@@ -1,7 +1,7 @@
-//! How far apart splats of an isosurface lie where nothing says it.
+//! The default distance between splats of an isosurface.
 //!
-//! One step of the lattice is enough where the surface is smooth beside it. A piece that is as small as a step or two keeps its area and its
-//! opacity only if its splats are finer: discs of the distance h err by about (h/r)² on a radius of curvature r.
+//! A spacing of a lattice step suffices if the surface is smooth at that scale. A piece that is as small as a step or two keeps its area and
+//! its opacity only if its splats are finer: discs of the distance h err by about (h/r)² on a radius of curvature r.
 
 use crate::Inside;
 use crate::marching_cubes::isosurface_to_mesh;
@@ -16,8 +16,8 @@ const MOST_SPLATS: f64 = 2e5;
 /// Voxels up to which a volume is called coarse, so that its surface is looked at.
 const MOST_VOXELS: usize = 1 << 22;
 
-/// The distance of the splats of an isosurface, in the unit of the grid's axes: one step of the lattice, or of a coarse volume a quarter of
-/// the radius of curvature that nine tenths of the surface exceed, as long as that makes no more than 200,000 splats.
+/// The distance of the splats of an isosurface, in the unit of the grid's axes. It is a step of the lattice. A coarse volume gets a quarter
+/// of the radius of curvature that nine tenths of the surface exceed, unless that makes more than 200,000 splats.
 ///
 /// # Errors
 /// As [`isosurface_to_mesh`].

@@ -1,6 +1,6 @@
 //! Scalar fields: formulas, isosurfaces of volumes, surfaces through points, solids of several; and triangles of their zero sets.
 //!
-//! A field is negative inside ([`splat_core::ScalarField`]). It knows its derivatives exactly and bounds itself over a ball.
+//! A field is negative inside ([`splat_core::ScalarField`]). A field has exact derivatives and bounds itself over a ball.
 //!
 //! ```
 //! use field::{CombinedField, ExpressionField};

@@ -1,7 +1,7 @@
 //! Isosurfaces of volumes as meshes: marching cubes (Lorensen and Cline 1987) in three passes over rows, as flying edges
 //! (Schroeder et al. 2015) do it.
 //!
-//! 1. One bit for each lattice point: at or above the isovalue ([`mod@signs`]).
+//! 1. Each lattice point gets a bit: at or above the isovalue ([`mod@signs`]).
 //! 2. Each row counts its crossed edges, one vertex each, and its triangles; sums give each row its place in the result.
 //! 3. Each row writes its vertices and its triangles. Words of 64 equal bits are passed over; a row knows the numbers of
 //!    the vertices of its neighbours by counting along. Layers are independent, so threads change nothing.

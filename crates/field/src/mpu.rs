@@ -32,7 +32,7 @@ use splat_core::{DAabb, Progress, ScalarField};
 /// Half the side of the cube over half the longest side of the points' box: closed surfaces end before the cube does.
 const MARGIN: f64 = 1.25;
 
-/// How scattered points become a field.
+/// Parameters of the field through scattered points.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MpuParams {
     /// Name of the object in messages.
@@ -62,7 +62,7 @@ impl Default for MpuParams {
     }
 }
 
-/// What the construction of a field from points did.
+/// The report of the construction of a field from points.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct MpuReport {
     /// Points given.
@@ -98,8 +98,8 @@ struct Tolerances {
 
 /// A field whose zero set passes by scattered points; see [`MpuField::through`].
 ///
-/// It is defined by the points in a cube around them ([`MpuField::bounds`]); elsewhere it has the value of the nearest
-/// place of the cube, and no surface ([`ScalarField::in_domain`]).
+/// The points define the field in a cube around them ([`MpuField::bounds`]). Elsewhere the field has the value of the
+/// nearest place of the cube, and no surface ([`ScalarField::in_domain`]).
 #[derive(Debug)]
 pub struct MpuField {
     origin: DVec3,

@@ -1,4 +1,4 @@
-//! Where in a box there is something: zeros of a field, extinction of a volume.
+//! Searches a box for content: zeros of a field, extinction of a volume.
 
 use crate::SharedField;
 use rayon::prelude::*;
@@ -20,7 +20,7 @@ const FAINT_DEPTH: f64 = 0.5 / 255.0;
 /// Cells along the longest side of a box, in which an implicit surface is looked for.
 const SURFACE_CELLS: f64 = 32.0;
 
-/// Where in a box a field may be zero, told by the field's own bound.
+/// A search for the places in a box where a field may be zero, by the field's bound.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ZeroSearch {
     /// The part of the box; the whole box where the field knows no bound.
@@ -51,8 +51,8 @@ impl ZeroSearch {
     }
 }
 
-/// Bounds of the lattice points to which a transfer function gives extinction, and one cell around them, no farther than voxels
-/// reach; those of all voxels where there are none.
+/// Bounds of the lattice points to which a transfer function gives extinction, and one cell around them, clipped to the voxels.
+/// Without such points, the bounds of all voxels.
 pub fn extinct_bounds(grid: &Grid, transfer: &TransferFunction) -> DAabb {
     let [nx, ny, _] = grid.dims;
     let mut low = DVec3::INFINITY;

@@ -8,7 +8,7 @@ use std::sync::Arc;
 /// Steps along a box around scattered points, one for each splat of the surface.
 const LEVEL_SET_STEPS: f64 = 192.0;
 
-/// What becomes of several solids.
+/// The combination of several solids.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Combination {
     /// What lies in any of them.
@@ -39,8 +39,8 @@ impl std::fmt::Debug for Solid {
 }
 
 impl Solid {
-    /// One of several; a part that reaches its walls ends flat there. It has the least step of its parts and no walls, and its box is a step
-    /// larger on each side than theirs, so that no face lies on the border.
+    /// One of several; a part that reaches its walls ends flat there. The combined solid has the least step of its parts and no walls. Its
+    /// box is a step larger on each side than theirs, so that no face lies on the border.
     ///
     /// ```
     /// use field::{Combination, ExpressionField, Solid};
@@ -89,7 +89,7 @@ impl Solid {
         Ok(Self { field: Arc::new(field), walls: Vec::new(), bounds, step })
     }
 
-    /// What lies inside of an isosurface of a volume, within the volume.
+    /// The solid inside of an isosurface of a volume, within the volume.
     ///
     /// # Errors
     /// As [`GridField::new`].
@@ -101,7 +101,7 @@ impl Solid {
         Ok(Self { field: Arc::new(field), walls, bounds, step })
     }
 
-    /// What lies inside of the surface through scattered points, within the box of the field that was laid through them.
+    /// The solid inside of the surface through scattered points, within the box of their field.
     pub fn of_points(field: SharedField, bounds: DAabb) -> Self {
         let step = bounds.size().max_element() / LEVEL_SET_STEPS;
         Self { field, walls: Vec::new(), bounds, step }.closed()

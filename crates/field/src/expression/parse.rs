@@ -16,11 +16,11 @@ use super::program::{Binary, MAX_STACK, Op, Program, Unary};
 pub struct ExpressionError {
     /// Column of the offending character, counted from 1.
     pub column: usize,
-    /// What stands there.
+    /// The text at that place.
     pub found: String,
-    /// What could stand there.
+    /// The accepted text at that place.
     pub expected: String,
-    /// What to do, beginning with "; ", or empty.
+    /// The remedy, beginning with "; ", or empty.
     pub hint: String,
 }
 

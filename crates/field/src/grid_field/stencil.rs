@@ -1,4 +1,4 @@
-//! One axis of an interpolation: which lattice values weigh how much at a place, and in the control points of a stretch.
+//! An axis of an interpolation: the weights of lattice values at a place, and in the control points of a stretch.
 //!
 //! Trilinear: (1 − t, t) on the two ends of a cell. Catmull-Rom (1974): the cubic through both ends of the cell with the
 //! central difference mᵢ = (vᵢ₊₁ − vᵢ₋₁)/2 as slope at each. Its Bernstein form has the control points

@@ -1,4 +1,4 @@
-//! Which lattice points are at or above the isovalue, one bit each, and the lattice edges in between.
+//! A bit for each lattice point, at or above the isovalue, and the crossed lattice edges.
 
 use rayon::prelude::*;
 use splat_core::Grid;

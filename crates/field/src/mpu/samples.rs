@@ -1,4 +1,4 @@
-//! Points with normals in an order of their own, and a tree to ask them for neighbours.
+//! Points with normals in the order of a tree, which finds their neighbours.
 //!
 //! Samples are sorted by place and normal, so neither the order of the input nor exact copies matter. The tree halves
 //! them at the median along the longest side of their box until sixteen are left; node i has the children 2i and 2i + 1.

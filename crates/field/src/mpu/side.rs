@@ -1,10 +1,9 @@
-//! How far a place without samples lies from them, and on which side (a deviation: the paper fits a shape there too).
+//! The distance and the side of a place without samples (a deviation: the paper fits a shape there too).
 //!
-//! A shape fitted to samples that all lie elsewhere tells little of the place: beside the rim of a thin sheet and beyond the
-//! tip of a horn their normals point aside, and a wrong sign makes a bubble of surface where there is none. So the
-//! samples are asked for the sign itself. The nearest tell n·(x − p), weighed by a Gaussian of how much farther than the
-//! nearest they are. Where that is small beside their distance they do not see x from above or below, and all samples
-//! tell by their winding number
+//! A shape that is fitted to samples elsewhere is unreliable here. Beside the rim of a thin sheet and beyond the tip of a
+//! horn their normals point aside, and a wrong sign makes a bubble of surface. So the sign is taken from the samples
+//! themselves. The nearest samples vote with n·(x − p), weighed by a Gaussian of their distance beyond the nearest. Where
+//! that is small beside their distance they do not see x from above or below, and all samples tell by their winding number
 //!
 //! w = Σ aᵢ nᵢ·(pᵢ − x)/(4π|pᵢ − x|³), aᵢ the area of a sample,
 //!
