@@ -1,4 +1,4 @@
-//! Elements (triangles, cells, splats) of given rates, in blocks, each block with its own alias table (Walker; Vose).
+//! Elements (triangles, cells, splats) of given rates, in blocks, each block with an alias table (Walker; Vose).
 //!
 //! A Poisson process on many elements is the sum of one on each block; within a block, each arrival picks its element by
 //! rate. A block's tables and the data of its elements stay in the nearest cache, and no set ever visits an element that

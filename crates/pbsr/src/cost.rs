@@ -1,4 +1,4 @@
-//! What folding costs: predicted from the samplers, counted while it runs.
+//! The cost of folding: predicted from the samplers, counted while it runs.
 
 use crate::project::bins::Task;
 use crate::scene::BYTES_IN_BATCH;
@@ -15,7 +15,7 @@ pub struct Prediction {
     pub ensemble_bytes: u64,
 }
 
-/// What was done.
+/// The counts of the work done.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Counts {
     /// Sets folded.

@@ -26,7 +26,7 @@ pub(crate) const BRIGHTEST: f32 = 65536.0;
 /// Weights of luminance, Rec.709.
 pub(crate) const LUMINANCE: [f32; 3] = [0.2126, 0.7152, 0.0722];
 
-/// What a pixel keeps beside hits and beauty.
+/// The layers that a pixel keeps beside hits and beauty.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct EnsembleParams {
     /// Each of [`splat_core::SHADED_EFFECTS`] apart.
@@ -49,7 +49,7 @@ pub struct EnsembleParams {
 }
 
 impl EnsembleParams {
-    /// What these layers take; `depth_range` is looked at where depths are among them.
+    /// The parameters that these layers require; `depth_range` is looked at where depths are among them.
     pub fn of_layers(layers: &LayerSet, colored_extinction: bool, depth_range: [f32; 2]) -> Self {
         Self {
             effects: layers.effects,
@@ -337,7 +337,7 @@ impl Ensemble {
         self.levels
     }
 
-    /// What a pixel keeps.
+    /// The layers that a pixel keeps.
     pub fn params(&self) -> &EnsembleParams {
         &self.params
     }

@@ -2,7 +2,7 @@
 
 use splat_core::Exceeded;
 
-/// What can go wrong.
+/// Errors of samplers, ensembles and recordings.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {

@@ -39,7 +39,7 @@ const BLOCK: u32 = 256;
 /// Words of a particle.
 const PARTICLE_WORDS: usize = 7;
 
-/// What a recording makes room for.
+/// Capacities of a recording, in elements.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Capacities {
     /// Width and height of the image, pixels, 1 to 32768 each.
@@ -66,7 +66,7 @@ fn sum_words(params: &EnsembleParams) -> usize {
     3 + 2 * params.channels()
 }
 
-/// How the nearest particle of a pixel is found; both find the same one.
+/// The method that finds the nearest particle of a pixel; both find the same one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Nearest {
     /// The nearest depth first, then the lowest rank at that depth: on any device.
@@ -86,7 +86,7 @@ impl Nearest {
 /// The recorded folding and the buffers that the caller meets.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Recorded {
-    /// What the device is to do.
+    /// The commands of the device.
     pub recording: Recording,
     /// The room it has.
     pub capacities: Capacities,
@@ -248,7 +248,8 @@ impl Recorded {
         nobody.chain(self.inputs.into_iter().zip(bytes)).collect()
     }
 
-    /// What light needs and what stays as it is from run to run: give it to the first, beside the inputs of the shadows.
+    /// The inputs of light and of everything that stays the same from run to run. The first run takes them, beside the
+    /// inputs of the shadows.
     ///
     /// # Errors
     /// [`Error::Parameter`] for a scene that [`suits`] refuses, or of other lights than there is room for;

@@ -9,7 +9,7 @@ use splat_core::optics::SurfaceOpacity;
 /// The most particles that one set of one sampler may have: ids are 32 bits.
 pub(crate) const MAX_PARTICLES: f64 = 4.0e9;
 
-/// What every sampler of surfaces needs.
+/// Parameters of every sampler of surfaces.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SurfaceParams {
     /// Opacity of one crossing at right angles, in \[0, 1\].
@@ -17,12 +17,12 @@ pub struct SurfaceParams {
     /// Particle cross-section s: the area of one pixel at the surface, world units², > 0; see
     /// [`crate::pixel_area`]. Smaller is finer and costs more particles.
     pub cross_section: f64,
-    /// How the opacity grows at grazing angles; the paper's surfaces are thin slabs.
+    /// The growth of the opacity at grazing angles; the paper's surfaces are thin slabs.
     pub surface_opacity: SurfaceOpacity,
     /// Factor on the optical depth of one crossing that `opacity` has in it already, > 0: opacities of a mesh's vertices are those of a crossing
     /// without it.
     pub extinction_factor: f64,
-    /// Linear Rec.709 colour of every particle, or the factor on a mesh's own colours; each channel ≥ 0.
+    /// Linear Rec.709 colour of every particle, or the factor on a mesh's vertex colours; each channel ≥ 0.
     pub color: [f32; 3],
     /// Optical depth at which an opaque surface is sampled, in (0, 64\]; see [`crate::opacity::capped_optical_depth`].
     pub opaque_optical_depth: f64,

@@ -4,8 +4,8 @@
 //! in pixels), or 1/f² (orthographic). A set has its opacity where s(p) is the cross-section s of its particles. Elsewhere
 //! it has s(p)/s times as many particles a pixel as it should have, so with k = s/s(p)
 //!
-//! - k ≤ 1: each particle is kept with probability k, by a number of its own. A binomial variable thinned is binomial: with
-//!   the share of particles that reach the pixel goes q to k·q = s/(S·cos θ), the same for all depths.
+//! - k ≤ 1: each particle is kept with probability k, by a random number that belongs to it. A binomial variable thinned is
+//!   binomial: with the share of particles that reach the pixel goes q to k·q = s/(S·cos θ), the same for all depths.
 //! - k > 1, nearer than the set was made for: the particle covers the pixels around which a square of side √k holds it, k
 //!   being the pixel's at the particle's depth. Each pixel is then hit with k times the probability, each particle at most
 //!   once: α is exact where the surface is flat over √k pixels, and blurred by them elsewhere. Fog around the eye has its
@@ -48,7 +48,7 @@ pub(crate) fn pixel_area_view(camera: &Camera, view: DVec3) -> f64 {
     }
 }
 
-/// View depths that particles lie between, of boxes that hold them told by their corners; \[0, 1\] without any.
+/// The range of view depths of particles, from the corners of boxes that hold them; \[0, 1\] without a box.
 pub fn depth_range(corners: impl Iterator<Item = DVec3>, camera: &Camera) -> [f32; 2] {
     let depths = corners.map(|p| camera.view_from_world(p).z.max(0.0) as f32);
     let [near, far] = depths.fold([f32::INFINITY, 0.0], |[near, far], z| [near.min(z), far.max(z)]);

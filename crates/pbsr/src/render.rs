@@ -1,7 +1,7 @@
 //! STEPS 1 to 3 for any number of sets: sample, project, keep the nearest of each pixel, add to the ensemble.
 //!
-//! Sets are folded in batches. First all (set, object, run of chunks) are sampled, projected and sorted by tile, each by
-//! one task; then each tile is taken by one task, which goes through the sets in order with a depth buffer of its own.
+//! Sets are folded in batches. First, a task for each (set, object, run of chunks) samples, projects and sorts its
+//! particles by tile. Then a task for each tile goes through the sets in order, with a depth buffer for that tile.
 //! Nothing is shared between tasks and every sum is in integers: the result has the same bits for any number of threads.
 //! Memory depends on the image and on the particles of one batch, never on the number of sets.
 

@@ -1,4 +1,4 @@
-//! What every source of particles offers (Tanaka 2012, STEP 1): independent sets, in chunks, from a counter.
+//! The interface of every source of particles (Tanaka 2012, STEP 1): independent sets, in chunks, from a counter.
 
 use crate::Particles;
 use crate::blocks::Blocks;
@@ -10,10 +10,10 @@ use std::ops::Range;
 
 /// A source of statistically independent particle sets.
 ///
-/// Chunk `c` of set `r` depends on (seed, r, c) alone, so sets need not be kept: whoever needs one again makes it again,
-/// and any number of threads makes the same. In one set, the particles of a sampler lie independently of each other, and
-/// a region of projected area A that faces the ray holds τ·A / [`Sampler::cross_section`] of them in the mean, τ being
-/// the optical depth of the surface or medium.
+/// Chunk `c` of set `r` depends on (seed, r, c) alone. So sets need not be kept: a set can be made again, and any number
+/// of threads makes the same. In one set, the particles of a sampler lie independently of each other. A region of
+/// projected area A that faces the ray holds τ·A / [`Sampler::cross_section`] of them in the mean, where τ is the
+/// optical depth of the surface or medium.
 pub trait Sampler: Sync {
     /// World position that all particle positions are relative to.
     fn origin(&self) -> DVec3;
@@ -135,8 +135,8 @@ pub(crate) fn runs(sampler: &dyn Sampler) -> Vec<Run> {
 
 /// Sets `first .. first + n` of another sampler, kept in memory: set r is kept set r mod n.
 ///
-/// For objects that are seen from many places, or that move: nothing is sampled again. Asking for more sets than are
-/// kept repeats them, and the images of the same set are not independent.
+/// They serve objects that are seen from many places, or that move, without another sampling. Asking for more sets
+/// than are kept repeats them, and the images of the same set are not independent.
 #[derive(Debug, Clone)]
 pub struct KeptSets {
     origin: DVec3,

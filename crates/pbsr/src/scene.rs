@@ -1,4 +1,4 @@
-//! What is seen, and how many sets of it are folded.
+//! The scene of particles, and the number of sets to fold.
 
 use crate::project::shade::Appearance;
 use crate::{Error, Sampler};
@@ -7,14 +7,14 @@ use splat_core::raster::OpaqueImage;
 use splat_core::shade::LitBy;
 use splat_core::{Camera, Limits, Similarity, glam};
 
-/// One object of the scene.
+/// An object of the scene.
 #[derive(Clone, Copy)]
 pub struct Object<'a> {
-    /// Where its particles come from.
+    /// The source of its particles.
     pub sampler: &'a dyn Sampler,
-    /// From the sampler's space to the world; moving an object needs no new particles.
+    /// The transform from the sampler's space to the world; a moved object needs no new particles.
     pub transform: Similarity,
-    /// How they look.
+    /// The appearance of its particles.
     pub look: Appearance,
 }
 
@@ -37,7 +37,7 @@ pub struct Scene<'a> {
     pub occluder: Option<&'a OpaqueImage>,
 }
 
-/// How many sets are folded, of what, and what that may take.
+/// The number of sets to fold, with the limits of memory.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FoldParams {
     /// Sets to add: what one call adds to the repeat level.

@@ -1,7 +1,7 @@
-//! Particles of another sampler in the colours of what lies where they are, and fewer where that takes them away: surfaces whose density of
-//! particles is a field (Tanaka 2012, section 6, "non-uniform surface sampling").
+//! Colours and thins the particles of another sampler by a field at their places: surfaces whose density of particles is a field (Tanaka
+//! 2012, section 6, "non-uniform surface sampling").
 //!
-//! A Poisson process of which each particle is kept by itself with probability p(x) is one of p(x) times the density, whatever made it.
+//! A Poisson process whose particles are kept independently with probability p(x) is a Poisson process of p(x) times the density.
 
 use crate::particles::PackedColor;
 use crate::{Particles, Sampler};

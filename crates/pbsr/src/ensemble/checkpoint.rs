@@ -13,7 +13,7 @@ const VERSION: u32 = 4;
 const HEADER: usize = 4 + 4 + 32 + 8 + 4 + 4 + 8 + 4;
 
 impl Ensemble {
-    /// All sums, with a tag that [`Ensemble::from_bytes`] asks for again.
+    /// Serializes all sums, with a tag that [`Ensemble::from_bytes`] compares.
     pub fn to_bytes(&self, tag: &[u8; 32]) -> Vec<u8> {
         let mut out = Vec::with_capacity(HEADER + self.bytes() as usize + 4);
         out.extend_from_slice(&MAGIC);

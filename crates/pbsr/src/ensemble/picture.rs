@@ -174,7 +174,7 @@ impl Ensemble {
         ((square - mean * mean).max(0.0) / (levels - 1.0)).sqrt()
     }
 
-    /// Root mean square of the standard error over all pixels, for a stop at a wanted error; infinite below two sets.
+    /// Root mean square of the standard error over all pixels, for a stop at a target error; infinite below two sets.
     pub fn rms_error(&self, background: &dyn Fn(u32, u32) -> [f32; 3], occluder: Option<&OpaqueImage>) -> f64 {
         let [w, h] = self.tiling.size;
         let mut sum = 0.0;

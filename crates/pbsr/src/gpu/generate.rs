@@ -25,7 +25,7 @@ pub type Inputs<'a> = Vec<(BufferId, Cow<'a, [u8]>)>;
 /// The recorded making and folding of sets.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Generated {
-    /// What the device is to do.
+    /// The commands of the device.
     pub recording: Recording,
     /// The room it has.
     pub capacities: Capacities,
@@ -231,7 +231,7 @@ impl super::Twin {
 }
 
 impl Generated {
-    /// What stays as it is from run to run: give it to the first.
+    /// The inputs that stay the same from run to run; the first run takes them.
     ///
     /// # Errors
     /// [`Error::Overflow`] and [`Error::Parameter`] as [`Recorded::uploads`].
@@ -264,7 +264,8 @@ impl Generated {
         inputs.map(|(buffer, bytes)| (self.in_whole.buffer(buffer), bytes))
     }
 
-    /// What a run of the next sets needs beside the tables: which they are, and the particles that the device does not make.
+    /// The inputs of a run of the next sets, beside the tables: the numbers of the sets, and the particles that the device
+    /// does not make.
     ///
     /// # Errors
     /// [`Error::Overflow`] when there is too little room for those: record again with what is needed.

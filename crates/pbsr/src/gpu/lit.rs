@@ -1,9 +1,9 @@
 //! Light on what is seen: shaded as splats are (`splat_core::shade::gpu`), with whatever says how much of each light arrives.
 //!
 //! A level first finds who is seen, as without light; those alone are listed, one a pixel, in the words of splats, and go
-//! through the recorded look-ups of each shadow map and through shading, over as many workgroups as were listed. What comes
-//! out is added where their pixels are, so that the order of the list changes nothing. Large images go in parts, which
-//! bounds what a level takes.
+//! through the recorded look-ups of each shadow map and through shading, over as many workgroups as were listed. The
+//! radiance is added at their pixels, so that the order of the list changes nothing. Large images go in parts, which bounds
+//! what a level takes.
 //!
 //! Places are those of the CPU: within a pixel in steps of 1/256, relative to the eye and in the world's axes, so that a scene
 //! far from its origin keeps its digits.
@@ -28,10 +28,10 @@ const SEEN_WORDS: u64 = 3;
 /// Most objects: each is a material of the shading's tables.
 const MOST_OBJECTS: usize = 1 << 16;
 
-/// What a recording makes room for, to light what is seen.
+/// Capacities of a recording that lights visible particles.
 #[derive(Debug, Clone, Copy)]
 pub struct Lighting<'a> {
-    /// What a hit brings; without depths, objects and extinction by channel.
+    /// The layers of a hit; without depths, objects and extinction by channel.
     pub params: EnsembleParams,
     /// Lights.
     pub lights: u32,
@@ -48,7 +48,7 @@ pub struct ShadowOf<'a> {
     pub attributes: &'a AttributeBuffers,
     /// Input: how much of a shadow each takes, f32.
     pub shares: BufferId,
-    /// What all receive of this light, behind those before, as [`splat_core::shade::gpu`] reads it.
+    /// The received light of all splats, behind that of the lights before, as [`splat_core::shade::gpu`] reads it.
     pub received: BufferId,
 }
 
@@ -66,7 +66,7 @@ pub(super) struct Lit {
 }
 
 impl Capacities {
-    /// Splats that light is asked for at once.
+    /// The capacity of splats that are lit at once.
     pub fn seen(&self) -> AttributeRoom {
         AttributeRoom { splats: self.pixels().min(AT_ONCE), frame_words: 3 }
     }

@@ -10,7 +10,7 @@ use std::sync::Arc;
 /// Cells along each side of the box, unless the medium is the same everywhere in it.
 const CELLS: u32 = 64;
 
-/// What has an extinction.
+/// A source of extinction.
 #[derive(Clone)]
 #[non_exhaustive]
 pub enum Matter {

@@ -15,12 +15,12 @@
 //!
 //! α(θ) = 1 − e^(−τ/cos θ), τ = −ln(1 − α)
 //!
-//! which is Tanaka 2012, Eq. 1, for n → ∞ at fixed n·s/S. The number of crossings is left as it comes: to cut it to a wanted
-//! n would make sets with many crossings thinner, and α depend on the rest of the surface.
+//! which is Tanaka 2012, Eq. 1, for n → ∞ at fixed n·s/S. The number of crossings is random. A cut to a fixed n would thin
+//! sets with many crossings, and α would depend on the rest of the surface.
 //!
 //! Where the field has no bound, or a fold finer than the places where a cube was looked at, pieces may be missed;
-//! [`LineReport`] says how many of a sample of lines gain roots when they are looked at 16 times as finely, and how much of
-//! the surface a sample of lines meets in cubes that were taken for empty.
+//! [`LineReport`] counts the lines of a sample that gain roots when they are searched 16 times as finely, and the surface
+//! that a sample of lines meets in cubes that were taken for empty.
 
 use crate::blocks::Blocks;
 use crate::error::check;
@@ -44,7 +44,7 @@ const STRAY_LINES: u32 = 4096;
 /// Crossings that are evaluated at once.
 const BATCH: usize = 128;
 
-/// What is known about the roots of a surface.
+/// The survey of a surface's roots.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct LineReport {
     /// Cells of the box.
@@ -70,7 +70,7 @@ pub struct LineReport {
 }
 
 impl LineReport {
-    /// Share of roots that are missed, as far as the survey can tell: the relative bias of the optical depth.
+    /// Share of missed roots, estimated by the survey: the relative bias of the optical depth.
     pub fn missed(&self) -> f64 {
         let unseen = self.fine_roots.saturating_sub(self.roots) as f64 / self.fine_roots.max(1) as f64;
         unseen + self.stray_area / (self.area + self.stray_area).max(f64::MIN_POSITIVE)
@@ -90,7 +90,7 @@ impl LineReport {
 /// Share of the roots of a surface that may be missed before it is said.
 const MISSED: f64 = 1e-3;
 
-/// How an implicit surface is looked for.
+/// Parameters of the search for an implicit surface.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct LineParams {
     /// Cells along the longest side of the surface's box, 1 to 1024; those in which it bends much are divided.
@@ -167,7 +167,7 @@ impl<'a> LineSampler<'a> {
         Ok(sampler)
     }
 
-    /// What is known about the roots.
+    /// The survey of the roots.
     pub fn report(&self) -> &LineReport {
         &self.report
     }

@@ -7,7 +7,7 @@
 //! corners and kept with probability τ over that, so that the opacity of a pixel is exact there too.
 //!
 //! Deviation: a Poisson number in place of a fixed n. The opacity of a pixel is then 1 − e^(−τ/cos θ) exactly, and each
-//! part of the mesh is sampled on its own.
+//! part of the mesh is sampled independently.
 
 use crate::blocks::{BATCH, Batch, Blocks};
 #[cfg(feature = "gpu")]

@@ -1,10 +1,10 @@
-//! All roots of f − c on a piece of a line.
+//! Finds all roots of f − c on a piece of a line.
 //!
 //! A piece is dropped when a bound of the field's gradient, or its own over the ball around the piece, excludes c. Where the
 //! ends differ in sign and the cubic with the values and slopes of both ends is monotone (slopes at most 3 times the chord's:
 //! de Boor and Swartz), there is one root, found by bracketing (Illinois). Otherwise slopes tell: where f runs towards c from
-//! both ends there is an extremum between, which is looked for; it either shows two roots, or a double root where
-//! it touches c, or none. What is left is halved, and after [`DEPTH`] halvings counted as unproven.
+//! both ends there is an extremum between, which is looked for; it either shows two roots, or a double root where it touches
+//! c, or none. The remaining pieces are halved, and after [`DEPTH`] halvings counted as unproven.
 
 use crate::surfaces::implicit::ImplicitSurface;
 use glam::DVec3;

@@ -1,4 +1,4 @@
-//! One step of the Brownian motion on an implicit surface (Tanaka 2012, Eqs. 2 and 3), and the way back onto it.
+//! A step of the Brownian motion on an implicit surface (Tanaka 2012, Eqs. 2 and 3), and the way back onto it.
 //!
 //! x ← x + P·dw − dt·∇f/|∇f|²·Tr(H·P), P = 1 − n·nᵀ, n = ∇f/|∇f|, ⟨dw_i·dw_j⟩ = 2·δ_ij·dt
 //!
@@ -86,7 +86,7 @@ impl<'a> Walk<'a> {
         (scale > 0.0 && scale.is_finite() && g.is_finite()).then(|| (g / scale, scale))
     }
 
-    /// The place on the surface next to `p` along the gradient, within 10⁻⁷ trust radii; `None` when there is none within
+    /// The place on the surface next to `p` along the gradient, within 10⁻⁷ trust radii; `None` if no root lies within
     /// the trust radius, or the gradient vanishes.
     pub fn project(&self, p: DVec3) -> Option<DVec3> {
         let mut x = p;
