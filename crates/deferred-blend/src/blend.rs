@@ -16,25 +16,25 @@ use splat_core::raster::pulp;
 use splat_core::{Accumulator, Progress};
 use std::ops::Range;
 
-/// What is blended.
+/// The input of a blend.
 #[derive(Clone)]
 pub struct BlendInput<'a> {
     /// The discs of a view.
     pub discs: &'a Discs,
-    /// What they show: as many numbers as the accumulator has channels.
+    /// Their values: as many numbers as the accumulator has channels.
     pub shown: Shown<'a>,
     /// View depth of what hides layers, by pixel; empty where nothing does.
     pub opaque: &'a [f32],
     /// View depths of the layers that are composited; the others are left out.
     pub range: Range<f32>,
-    /// How discs become layers.
+    /// The rule that forms layers from discs.
     pub layering: Layering<'a>,
-    /// How matter is drawn that surfaces bound; `None` where no material bounds any. By [`Layering::Algorithm1`] and [`Layering::Algorithm2`] light is
-    /// mirrored and bent at the nearest layer alone.
+    /// The rendering of matter that surfaces bound; `None` where no material bounds any. By [`Layering::Algorithm1`] and [`Layering::Algorithm2`]
+    /// light is mirrored and bent at the nearest layer alone.
     pub glass: Option<Glass<'a>>,
 }
 
-/// What was made beside the accumulator.
+/// The result of a blend, beside the accumulator.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Blended {
     /// Work that was done.

@@ -1,4 +1,4 @@
-//! How wide a ray is that stands for a pixel, and how fast it widens: what it sees of the sky is averaged over that.
+//! The width of a pixel's ray, and its growth: the sky is averaged over it.
 
 use crate::interface::Crossing;
 use splat_core::glam::Vec3;

@@ -1,8 +1,8 @@
 //! Discs as the rays of an image meet them, exactly in perspective.
 //!
 //! A disc has the centre c, the unit normal n and the semi-axes a and b. The ray of a pixel that lies (dx, dy) from the image of the
-//! centre has the direction d = c/c_z + e with e = (dx/f, −dy/f, 0), so that its z is view depth. It meets the disc's plane at the
-//! depth z = (n·c)/(n·d), and there, in units of the semi-axes, at
+//! centre has the direction d = c/c_z + e with e = (dx/f, −dy/f, 0), so that its z is view depth. The ray meets the disc's plane at
+//! the depth z = (n·c)/(n·d), and there, in units of the semi-axes, at
 //!
 //! (c_z/N)·(m·(e·a) − (N − m)·(c·a)/c_z)/|a|² along a, with m = n·c/c_z and N = n·d = m + n·e,
 //!
@@ -45,7 +45,7 @@ pub(crate) struct Disc {
     pub(crate) pixels: [u32; 4],
 }
 
-/// What discs are projected from.
+/// The input of a projection of discs.
 #[derive(Debug, Clone, Copy)]
 pub struct DiscInput<'a> {
     /// The splats.

@@ -1,4 +1,4 @@
-//! The paper's own transparency, to be held against layers that gaps tell apart: groups of discs, depths floored to steps (section 5.2).
+//! The paper's transparency, for comparison with layers that gaps separate: groups of discs, depths floored to steps (section 5.2).
 //!
 //! In a group discs do not overlap on a surface, so of each layer a pixel meets one, or none. Of two that it meets in one step of depth the
 //! farther one was drawn first, and the nearer fails the depth test: it is in the way of nothing, but shows nothing either. A surface
@@ -21,7 +21,7 @@ pub struct Floors<'a> {
     pub steps: u32,
 }
 
-/// How discs of a pixel become layers.
+/// The rule that forms a pixel's layers from its discs.
 #[derive(Debug, Clone, Copy, Default)]
 pub enum Layering<'a> {
     /// Layers are told apart by gaps in depth, each is averaged, all are composited.

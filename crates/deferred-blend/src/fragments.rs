@@ -1,7 +1,7 @@
-//! All fragments of a pixel: tiles of the image, blocks of a tile, pixels of a block.
+//! Collects the fragments of each pixel: tiles of the image, blocks of a tile, pixels of a block.
 //!
-//! A block has 16 pixels, so its fragments fit into the nearest cache however many layers there are, and memory does not grow with
-//! the number of discs that lie at one place times the image.
+//! A block has 16 pixels, so its fragments fit into the nearest cache for any number of layers. Memory does not grow with the
+//! image times the number of discs at one place.
 
 use crate::disc::{Disc, Discs, Meeting};
 use splat_core::raster::bins::Bins;

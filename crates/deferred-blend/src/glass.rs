@@ -13,7 +13,7 @@ use splat_core::glam::Vec3;
 /// Largest power of a ratio of indices; one over it is the least.
 const MOST_RATIO: f32 = 1e15;
 
-/// Where rays are bent.
+/// The places where rays are bent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Bending {
     /// At every surface that the bent ray meets.
@@ -26,14 +26,14 @@ pub enum Bending {
     Nearest,
 }
 
-/// How matter that surfaces bound is drawn.
+/// Settings for matter that surfaces bound.
 #[derive(Clone, Copy)]
 pub struct Glass<'a> {
-    /// Where rays are bent.
+    /// The places where rays are bent.
     pub bending: Bending,
     /// Radiance from infinitely far, by a unit vector of the camera's space and the solid angle around it.
     pub sky: &'a (dyn Fn(Vec3, f32) -> [f32; 3] + Sync),
-    /// What bent and mirrored rays may meet: opaque discs, and for [`Bending::Traced`] those that bound matter.
+    /// The targets of bent and mirrored rays: opaque discs, and for [`Bending::Traced`] those that bound matter.
     pub surfaces: &'a Surfaces<'a>,
     /// Whether opaque surfaces are seen straight on, as in the paper; then they should not be among `surfaces`.
     pub straight: bool,

@@ -57,7 +57,7 @@ use splat_core::Progress;
 /// Most groups: a disc's group takes one byte.
 pub const MOST_GROUPS: u32 = 256;
 
-/// For each disc, the group that it is a member of, and further ones that it was added to.
+/// The groups of each disc: the group that it belongs to, and further groups that it was added to.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Groups {
     count: u32,
@@ -73,7 +73,7 @@ struct Further {
 }
 
 impl Groups {
-    /// Groups told from outside: `by_disc` holds the group of each disc, by its place in the cloud.
+    /// Groups that the caller states: `by_disc` holds the group of each disc, by its place in the cloud.
     ///
     /// # Errors
     /// [`Error::Parameter`] for a count outside 1..=256 and for a disc whose group is not below the count.

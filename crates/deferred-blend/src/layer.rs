@@ -1,4 +1,4 @@
-//! One layer of a pixel: its discs, averaged (Eq. 1).
+//! A layer of a pixel: its discs, averaged (Eq. 1).
 
 use crate::BlendInput;
 use crate::cone::curvature;

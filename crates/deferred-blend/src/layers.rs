@@ -1,4 +1,4 @@
-//! Layers of a pixel: fragments of one surface, told from those of the next by gaps in depth.
+//! Layers of a pixel: fragments of one surface, separated from those of the next by gaps in depth.
 //!
 //! The paper floors depths to n steps (Eq. 10), and fragments of one step are one layer: a surface that crosses the end of a step is
 //! two layers there, and lets less light through. Gaps between neighbours have no such places.

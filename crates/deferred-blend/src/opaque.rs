@@ -1,5 +1,5 @@
-//! Opaque surfaces in one pass over the discs (Zhang and Pajarola 2007, sections 3.2 and 5.1), and in two, as point renderers had it
-//! before (section 3.1).
+//! Opaque surfaces in one pass over the discs (Zhang and Pajarola 2007, sections 3.2 and 5.1), and in two passes, as in earlier
+//! point renderers (section 3.1).
 //!
 //! | passes | over the discs | over the image |
 //! |---|---|---|
@@ -36,7 +36,7 @@ use splat_core::raster::pulp::{self, Simd};
 use splat_core::raster::tile::{BLOCKS, PIXELS};
 use splat_core::raster::{OpaqueImage, RasterCounts};
 
-/// How often the discs are walked over.
+/// The number of passes over the discs.
 #[derive(Debug, Clone, Copy)]
 pub enum Passes<'a> {
     /// 1+1: once, into images of groups, which are composited.
@@ -51,14 +51,14 @@ pub enum Passes<'a> {
     TwoPlusOne,
 }
 
-/// What is resolved.
+/// The input of a resolve.
 #[derive(Clone, Copy)]
 pub struct OpaqueInput<'a> {
     /// The discs of a view, all of them opaque.
     pub discs: &'a Discs,
-    /// What they show.
+    /// The values that they show.
     pub shown: Shown<'a>,
-    /// How many numbers that is; those of its layout for light on pixels.
+    /// The number of values of a disc; for light on pixels, the number of its layout.
     pub channels: u32,
     /// Whether objects are kept.
     pub objects: bool,
@@ -86,13 +86,13 @@ struct Averaged<'a> {
 pub struct Opaque {
     /// Depth, which is infinite where no surface covers a pixel, values and objects; averages by weight.
     pub image: OpaqueImage,
-    /// Of the nearest disc of each pixel its place in the cloud, `u32::MAX` where there is none.
+    /// The nearest disc of each pixel, by its place in the cloud; `u32::MAX` without a disc.
     pub disc: Vec<u32>,
     /// Work that was done. Fragments are those of all passes over the discs.
     pub counts: RasterCounts,
 }
 
-/// Draws opaque discs. One tick a tile. Everything is empty where there is no disc.
+/// Draws opaque discs. One tick a tile. Pixels without a disc stay empty.
 ///
 /// ```
 /// use deferred_blend::grouping::Groups;

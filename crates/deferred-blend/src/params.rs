@@ -1,8 +1,8 @@
-//! What blending may trade.
+//! Parameters of blending.
 
 use crate::Error;
 
-/// How discs become surfaces.
+/// Parameters of the surfaces that discs form.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Params {
     /// Radius within which a disc counts, over its cut-off radius, in \[0.45, 1\]. The kernel is drawn in with it: less is sharper

@@ -1,5 +1,5 @@
-//! Every ray with every disc, in f64: slow, and what the rest is judged by. It shares the gap rule's formula with
-//! [`blend`](crate::blend()), not its code, and none of its projection.
+//! Every ray with every disc, in f64: slow, and what the rest is judged by. The reference shares the gap rule's
+//! formula with [`blend`](crate::blend()), but neither code nor projection.
 
 mod opaque;
 
@@ -16,7 +16,7 @@ use std::ops::Range;
 /// Pixels along a side of the squares whose discs are looked for together.
 const SIDE: u32 = 8;
 
-/// One layer of a pixel.
+/// A layer of a pixel.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Layer {
     /// View depth: the discs' average by weight.
@@ -70,8 +70,8 @@ pub fn layers(
     layers
 }
 
-/// What a pixel shows, and what it lets through, of the layers nearer than its entry in `opaque`, which is empty where nothing is:
-/// pixels in rows, each as [`composite`] has it. `sizes` are those of [`layers`].
+/// The values and the transmittance of each pixel, in rows, from the layers nearer than its entry in `opaque`; see [`composite`].
+/// `opaque` may be empty. `sizes` are those of [`layers`].
 ///
 /// A square of pixels asks the discs whose balls its rays may meet.
 pub fn picture(

@@ -8,7 +8,7 @@ use splat_core::glam::Vec3;
 use splat_core::shade::{ChannelLayout, MAX_CHANNELS, Point, ShadeInput, arriving, facing};
 use splat_core::{Cloud, HeightImage, Receiver, Similarity};
 
-/// What discs show.
+/// The values that discs show.
 #[derive(Clone, Copy)]
 pub enum Shown<'a> {
     /// Numbers of each disc, which was shaded before it is blended: as many as there are channels, by place in the cloud.

@@ -104,7 +104,7 @@ pub(crate) struct Met<'a> {
 }
 
 impl<'a> Surfaces<'a> {
-    /// Of the discs `input.ids`; `values` are by place in the cloud, as `layout` says.
+    /// Of the discs `input.ids`; `values` are by place in the cloud, in the order of `layout`.
     pub fn new(input: &DiscInput<'_>, values: &'a [f32], layout: ChannelLayout) -> Self {
         let (rotation, shift) = into_view(input);
         let surface = |&id: &u32| {

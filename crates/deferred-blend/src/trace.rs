@@ -1,5 +1,5 @@
-//! A ray within and between bodies of glass, from the nearest layer of a pixel on: at each surface that it meets it goes on where most
-//! of its light goes, and of the rest it is told what is seen there when nothing bends it any more.
+//! Traces a ray within and between bodies of glass, from the nearest layer of a pixel on. At each surface the ray follows the larger
+//! part of its light. The smaller part takes the radiance of an unbent ray in its direction.
 //!
 //! Shares of light that pass and that are mirrored add up to 1 at every surface, so a world of one colour is that colour, whatever
 //! stands in it.

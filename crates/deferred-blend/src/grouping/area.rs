@@ -7,7 +7,7 @@
 //! its area exactly. Shares are within 0.01 for a lens of two circles, 0.025 for tilted ellipses, and 0.1 where discs are so
 //! steep to one another that ε cuts a strip out of them: they serve to compare overlaps.
 //!
-//! Places are subtracted in f64. What follows is in units of the disc, sixteen pairs of discs at a time.
+//! Places are subtracted in f64. The code works in units of the disc, sixteen pairs of discs at a time.
 
 use super::graph::{OverlapGraph, chunks, cut};
 use super::surfels::{CHUNK, Surfel};

@@ -33,7 +33,7 @@ const LEAST_GROUPS: u32 = 8;
 /// Change of a radius, as a share of it, that ends the iteration.
 const SETTLED: f64 = 1e-3;
 
-/// Which discs are added to further groups.
+/// Parameters of adding discs to further groups.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DuplicateParams {
     /// ε of Eq. 8 as a share of the discs' radius, > 0.
@@ -148,7 +148,7 @@ pub fn enlarged_radii(
     (0..groups.count()).map(enlarge).collect()
 }
 
-/// How radii are enlarged.
+/// Parameters of enlarging radii.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EnlargeParams {
     /// Radius of a disc over the cut-off radius of its splat, in (0, 1\].

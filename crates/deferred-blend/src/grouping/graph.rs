@@ -16,7 +16,7 @@ pub(crate) const FETCHED: usize = 32;
 /// Entries that a task finds before it tells of them.
 const COUNTED: usize = 1 << 16;
 
-/// Which overlapping discs may share a group all the same: the three modifications of section 4.1.
+/// Overlaps that a group may have: the three modifications of section 4.1.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Relaxation {
     /// (1): discs of one plane and one colour; `None` keeps their edges.
@@ -51,12 +51,12 @@ impl Default for Coplanar {
     }
 }
 
-/// How an overlap graph is built.
+/// Parameters of an overlap graph.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GraphParams {
     /// Radius of a disc over the cut-off radius of its splat, in (0, 1\]; see [`Params::disc_scale`](crate::Params::disc_scale).
     pub disc_scale: f32,
-    /// Which overlaps are no edges.
+    /// The overlaps that make no edges.
     pub relaxation: Relaxation,
     /// Most bytes of the lists of neighbours.
     pub max_bytes: u64,

@@ -31,7 +31,7 @@ const TAGS: usize = 16 * PART;
 /// Radii a step of the third coordinate of a tag.
 const STEP: f64 = 4.0;
 
-/// What is done with discs in a cell that has one already.
+/// The treatment of discs in a cell that has one already.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum Collisions {
     /// Nothing: they share its group, and overlap.
@@ -48,14 +48,14 @@ pub enum Collisions {
     },
 }
 
-/// How discs are grouped by hashing.
+/// Parameters of grouping by hashing.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HashParams {
     /// Number of groups K, 1 to 256.
     pub groups: u32,
     /// Radius of a disc over the cut-off radius of its splat, in (0, 1\]; see [`Params::disc_scale`](crate::Params::disc_scale).
     pub disc_scale: f32,
-    /// What is done with collisions.
+    /// The treatment of collisions.
     pub collisions: Collisions,
 }
 

@@ -111,8 +111,8 @@ impl GroupsOfObjects {
         Ok((members, true))
     }
 
-    /// The same for discs of a cloud that are given by their places, each object's by themselves; `of` says how an object lies in the world
-    /// and how its discs are grouped. The groups are by place in the cloud; beside them the number of discs that were grouped anew.
+    /// The same for discs of a cloud that are given by their places, each object's by themselves; `of` returns an object's transform to the
+    /// world, and the recipe of its groups. The groups are by place in the cloud; beside them the number of discs that were grouped anew.
     ///
     /// # Errors
     /// As [`Recipe::group`], with the object's rank.

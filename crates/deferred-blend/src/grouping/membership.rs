@@ -1,4 +1,4 @@
-//! Which groups draw a disc, and how large each draws it.
+//! The groups that draw a disc, and the radius in each.
 
 use super::Groups;
 

@@ -14,7 +14,7 @@ const LISTED: [u64; 2] = [512, 1 << 24];
 /// Bytes a disc of what is made beside lists: the disc twice, its group, what it covers.
 const BESIDE: u64 = 200;
 
-/// How discs are parted into groups.
+/// The method that forms groups of discs.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Method {
     /// Section 4.1, MGC: as few groups as are found, [`Recipe::groups`] at most.
@@ -28,7 +28,7 @@ pub enum Method {
     Hash(Collisions),
 }
 
-/// How each group comes to cover what it shows (section 4.4.2).
+/// The method by which each group covers the surface (section 4.4.2).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Coverage {
     /// It does not: groups have holes.
@@ -41,7 +41,7 @@ pub enum Coverage {
     Bound,
 }
 
-/// How the discs of an object are grouped.
+/// The recipe of an object's groups.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Recipe {
     /// How groups are found.

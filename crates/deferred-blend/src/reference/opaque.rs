@@ -5,7 +5,7 @@ use crate::disc::axes;
 use crate::{DiscInput, Params, Passes};
 use splat_core::{Footprint, glam::DVec3};
 
-/// What a pixel shows of opaque discs.
+/// A pixel's view of opaque discs.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Seen {
     /// View depth: the average by weight.
