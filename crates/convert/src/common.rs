@@ -1,4 +1,4 @@
-//! What all conversions share: parameters, errors, columns of clouds, results that are kept.
+//! Shared by all conversions: parameters, errors, columns of clouds, cached results.
 
 #[cfg(feature = "cache")]
 pub(crate) mod cache;

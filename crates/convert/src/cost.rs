@@ -36,7 +36,7 @@ pub const ZERO_SET_EXCESS: f64 = 2.0;
 /// Points along the longest side of the lattice that a field is looked at on.
 const COARSE: f64 = 32.0;
 
-/// What a conversion will make.
+/// The predicted result of a conversion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Prediction {
     /// Splats, see the table above.

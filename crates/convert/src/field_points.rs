@@ -165,7 +165,7 @@ pub(crate) fn area(mesh: &Mesh) -> f64 {
     mesh.triangles.iter().map(|t| subdivide::measure(corners(mesh, t)).area).sum()
 }
 
-/// How a density field becomes a medium.
+/// Parameters of the medium of a density field.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DensityParams {
     /// Attributes, normals, values, clipping; `splat.color` is the colour of the medium.

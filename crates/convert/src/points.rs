@@ -1,4 +1,4 @@
-//! Raw points become discs, a medium or a field: what is kept of them, and what their neighbours tell.
+//! Converts raw points to discs, a medium or a field: thinning, and estimates from their neighbours.
 
 pub(crate) mod cell_ellipse;
 pub(crate) mod cell_volume;

@@ -1,4 +1,4 @@
-//! Slow and obvious twins in f64, for tests and for whoever doubts the fast ones.
+//! Slow and obvious twins in f64, which tests compare the fast forms with.
 
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::{Cloud, Footprint, Grid, SplatKind};

@@ -1,5 +1,5 @@
-//! Colours of points by a column of theirs: by a map, by whole numbers, or by a transfer function, which may classify them too: say how opaque
-//! they are, or what they absorb.
+//! Colours points by one of their columns: by a map, by whole numbers, or by a transfer function. A transfer function may classify them too,
+//! by their opacity or their extinction.
 
 use crate::common::columns::CHUNK;
 use crate::{ColorMap, ConvertError, SplatParams};
@@ -79,7 +79,7 @@ pub enum MapScale {
     Logarithmic,
 }
 
-/// What the extinctions of a transfer function stand for that gives points their colours.
+/// The meaning of the extinctions in a transfer function that colours points.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Classified {
     /// Nothing: they are not used.
@@ -96,18 +96,18 @@ pub enum Classified {
 pub struct ColorBy {
     /// Its name, see [`RawPoints::column`] and [`splat_core::Mesh::column`].
     pub column: String,
-    /// What its numbers look like.
+    /// The colours of its numbers.
     pub colors: PointColors,
 }
 
-/// What points look like by a column.
+/// The appearance of points by a column.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Colored {
     /// Linear Rec.709, one a point.
     pub color: Vec<[f32; 3]>,
     /// The numbers of the column, of which gaps are not finite.
     pub numbers: Vec<f64>,
-    /// What a transfer function that classifies says of each point; empty for others.
+    /// The classification of each point by a transfer function; empty for one that only colours.
     pub classified: Vec<f32>,
     /// The numbers at the ends of a colour map.
     pub range: Option<[f64; 2]>,

@@ -41,12 +41,12 @@ const NAMED: [(&str, ColorMap); 8] = [
 impl ColorMap {
     /// Even to who cannot tell red from green, and brighter all along: the map of what asks for no other.
     pub const VIRIDIS: Self = VIRIDIS;
-    /// The whole rainbow, with the most steps that an eye tells apart.
+    /// The whole rainbow, with the most distinguishable steps.
     pub const TURBO: Self = TURBO;
     /// From blue by grey to red: the map of numbers with both signs, with 0 in its middle.
     pub const COOLWARM: Self = COOLWARM;
 
-    /// The map of a name, if there is one.
+    /// The map of a name; `None` for an unknown name.
     pub fn named(name: &str) -> Option<Self> {
         NAMED.iter().find(|(known, _)| *known == name).map(|(_, map)| *map)
     }

@@ -1,16 +1,16 @@
-//! What colours of a picture stand for: numbers of a column of points, or values of a volume.
+//! The meaning of a picture's colours: numbers of a column of points, or values of a volume.
 
 use crate::{ColorBy, Colored, MapScale, PointColors, class_name};
 use splat_core::TransferFunction;
 
-/// What the colours of an object stand for, as a legend beside its picture tells it.
+/// The meaning of an object's colours, for a legend beside its picture.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ColorScale {
     /// Name of the object.
     pub object: String,
     /// The column that its points take their colours from; `None` for the values of a volume.
     pub column: Option<String>,
-    /// What numbers look like.
+    /// The colours of numbers.
     pub colors: PointColors,
     /// The numbers that have colours.
     pub numbers: ScaleNumbers,
@@ -79,7 +79,7 @@ impl ColorScale {
         }
     }
 
-    /// What a whole number means, such as `ground` for the class 2 of LAS.
+    /// The meaning of a whole number, such as `ground` for the class 2 of LAS.
     pub fn meaning(&self, number: f64) -> Option<&'static str> {
         let is_class = matches!(self.colors, PointColors::Classes) && (0.0..=255.0).contains(&number);
         is_class.then(|| class_name(number as u8)).flatten()

@@ -25,8 +25,8 @@ pub struct SurfaceField {
 }
 
 impl SurfaceField {
-    /// The field of a volume in the coordinates of the surface before its transform. The extinctions of `transfer` stand for what
-    /// `classified` says: nothing, or a share of the surface's opacity.
+    /// The field of a volume in the coordinates of the surface before its transform. `classified` defines the meaning of the
+    /// extinctions of `transfer`: nothing, or a share of the surface's opacity.
     ///
     /// # Errors
     /// As [`GridField::new`].
@@ -52,8 +52,8 @@ impl SurfaceField {
         self.transfer.brightest()
     }
 
-    /// What the surface looks like at a place in its own coordinates, when one crossing of it has this opacity, below 1: its colour, and
-    /// the share of its optical depth that is left to it, in \[0, 1\]. `None` where the field is not known.
+    /// The surface's appearance at a place in object coordinates: its colour, and the remaining share of its optical depth, in \[0, 1\].
+    /// `opacity` is that of a crossing, below 1. `None` where the field is not known.
     pub fn at(&self, place: DVec3, opacity: f64) -> Option<([f32; 3], f64)> {
         let look = self.transfer.at(self.value(place)?);
         let faded = || optics::optical_depth(opacity * f64::from(look.extinction)) / optics::optical_depth(opacity);
@@ -64,9 +64,9 @@ impl SurfaceField {
         self.field.fills(place).then(|| self.field.value(place) as f32)
     }
 
-    /// Gives the splats of a surface the field's colours and opacities, and where `keeps_values` says so its values. A volume reaches
-    /// half a step beyond its outer lattice points; splats beyond that stay as they are. Returns what there is to say, a clause without
-    /// a full stop: how much of the surface that is.
+    /// Gives the splats of a surface the field's colours and opacities, and with `keeps_values` its values. A volume reaches half a
+    /// step beyond its outer lattice points; splats beyond that stay as they are. Returns what there is to say, a clause without a full
+    /// stop: how much of the surface that is.
     ///
     /// ```
     /// use convert::{Classified, Density, MeshParams, SurfaceField, mesh_to_points};

@@ -1,8 +1,8 @@
-//! What conversions have found out before, in a folder: never needed, and never believed without a look.
+//! Cache of earlier conversions, in a folder: never required, and validated before use.
 //!
-//! A file is named after the SHA-256 of all that its content was made from, and holds that of the content itself. What is another
-//! length, names another key or does not add up is made anew. Files appear whole, under their name, or not at all; those that were
-//! not used for longest go first where all together exceed the limit. Other files in the folder are not touched.
+//! A file is named after the SHA-256 of all that its content was made from, and holds that of the content itself. An entry of
+//! another length, another key or a wrong checksum is made again. Files appear whole, under their name, or not at all; those that
+//! were not used for longest go first where all together exceed the limit. Other files in the folder are not touched.
 
 use bytemuck::Pod;
 use sha2::{Digest, Sha256};
@@ -65,7 +65,8 @@ impl Cache {
         Self { folder: folder.into(), max_bytes, said: Mutex::default() }
     }
 
-    /// What was read and kept, and what could not be, one sentence each; one where nothing was asked of it.
+    /// Reports of the entries that were read and stored, and of failures, one sentence each; a single sentence if the
+    /// cache was not used.
     pub fn said(&self) -> Vec<String> {
         let said = self.sentences().clone();
         if said.is_empty() {

@@ -1,9 +1,9 @@
-//! Why a conversion was refused; every message names the object and says what would be accepted.
+//! Errors of conversions. Every message names the object and the accepted values.
 
 use field::FieldError;
 use splat_core::{Exceeded, Progress, glam::DVec3};
 
-/// What can go wrong between a mesh, a volume, raw points or a field and a cloud.
+/// Errors of converting a mesh, a volume, raw points or a field to a cloud.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ConvertError {

@@ -25,7 +25,8 @@ pub struct SplatParams {
     pub profile: Footprint,
     /// Which footprint each disc has, and how images lie; `None` for `footprint`, a formula.
     pub footprints: Option<Arc<FootprintChoice>>,
-    /// What a column `material` of raw points chooses from, by numbers from 0; `None` for `material`, one for all.
+    /// The materials that a column `material` of raw points chooses from, by numbers from 0; `None` for `material`,
+    /// one for all.
     pub materials: Option<Arc<[PointMaterial]>>,
     /// Object space → world space, applied in f64.
     pub transform: Similarity,
@@ -35,8 +36,8 @@ pub struct SplatParams {
     pub limits: Limits,
     /// Whether surfaces of opacity 0 become splats too: the matter that they bound may bend light.
     pub keep_clear: bool,
-    /// Where what takes long is kept from one conversion of the same input to the next: what neighbours tell of raw points. It changes no
-    /// result.
+    /// Where what takes long is kept from one conversion of the same input to the next: what neighbours tell of raw points. The cache
+    /// changes no result.
     #[cfg(feature = "cache")]
     pub cache: Option<Arc<Cache>>,
 }

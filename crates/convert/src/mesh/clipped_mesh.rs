@@ -6,10 +6,10 @@ use splat_core::{Clip, Mesh, vertex_normals};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// What lies of a mesh in all of the regions. It ends open at their borders, without a lid. Corners on a border are those of the line
-/// between the corners of the triangle, in f64 until they are stored, and one place for all triangles that meet there, whether these share
-/// vertices or have some at the same places; normals and colours are interpolated. A mesh without normals gets smooth ones, so that the
-/// cut does not change how it is shaded. Without regions the mesh is the same one.
+/// The part of a mesh that lies in all of the regions. The mesh ends open at their borders, without a lid. Corners on a border are those
+/// of the line between the corners of the triangle, in f64 until they are stored, and one place for all triangles that meet there,
+/// whether these share vertices or have some at the same places; normals and colours are interpolated. A mesh without normals gets smooth
+/// ones, so that the cut does not change how it is shaded. Without regions the mesh is the same one.
 ///
 /// ```
 /// use splat_core::{Clip, Mesh, glam::DVec3};

@@ -1,8 +1,9 @@
 //! Lids of bodies that are cut open: the section of a closed mesh by a plane, as triangles that close it again.
 //!
-//! What is kept of a closed mesh has edges along the plane that one triangle has alone. Vertices at one place are one vertex here, so
-//! meshes whose triangles share nothing are closed too. These edges are outlines; where one of them ends, the mesh is open, and no lid
-//! would close it; gaps that are small beside the outline, as pinholes of scans leave, are bridged. The lid has the outlines' own vertices, so nothing gapes between it and the walls.
+//! A clipped closed mesh has edges along the plane that belong to one triangle alone. Vertices at one place are one vertex here, so meshes whose
+//! triangles share nothing are closed too. These edges are outlines; where one of them ends, the mesh is open, and no lid would close it; gaps that
+//! are small beside the outline, as pinholes of scans leave, are bridged. The lid uses the vertices of the outlines, so no gap opens between lid and
+//! walls.
 //!
 //! Inside is where outlines go around, once or more often: bodies of one mesh may overlap, and the wall of a cavity goes around the other
 //! way. Where triangles of a mesh disagree on which side is outside, inside is what an odd number of outlines surrounds.
@@ -23,7 +24,7 @@ const LARGEST_GAP: f64 = 0.02;
 /// Most ends of an outline whose gaps are looked for: each is held against all others.
 const MOST_ENDS: usize = 256;
 
-/// What lids did.
+/// The report of lids.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct LidReport {
     /// Triangles of lids.
@@ -35,7 +36,7 @@ pub struct LidReport {
 }
 
 impl LidReport {
-    /// What there is to say of it, one sentence each without a full stop: that the mesh is open where it is cut.
+    /// Warnings that the mesh is open where it is cut, one sentence each without a full stop.
     pub fn said(&self) -> impl Iterator<Item = String> {
         let open = counted(self.open, "outline");
         let bridged = counted(self.bridged, "small gap");

@@ -1,12 +1,12 @@
 //! Meshes become disc splats: Gunjee 2007, section 4, "Converting the polygonal models".
 //!
-//! Every triangle is split into pieces of at most h² (see `subdivide.rs`); each piece becomes one disc at its
-//! centroid that stands for the piece's area a: K = τ₁·a for a translucent surface (τ₁ = −ln(1 − α) of one crossing),
-//! K = a for an opaque one. All discs of an object have the radius R = cutoff·0.8·h. So Σ a·norm/R²·profile is a
-//! quadrature of ∫ norm/R²·profile dA = 1 over the surface: splitting finer or coarser leaves the transmittance alone.
+//! Every triangle is split into pieces of at most h² (see `subdivide.rs`); each piece becomes one disc at its centroid
+//! that stands for the piece's area a: K = τ₁·a for a translucent surface (τ₁ = −ln(1 − α) of one crossing), K = a for
+//! an opaque one. The discs of an object have the same radius R = cutoff·0.8·h. So Σ a·norm/R²·profile is a quadrature
+//! of ∫ norm/R²·profile dA = 1 over the surface: splitting finer or coarser leaves the transmittance alone.
 //!
 //! A mesh with opacities of vertices has on each piece α times what they interpolate to at its centroid; a piece of which 1 comes is an opaque
-//! disc. Optical depth is found of that product, not interpolated, so the opacity of the surface is what its vertices say.
+//! disc. The optical depth follows from that product, without interpolation, so the opacity of the surface is that of its vertices.
 //!
 //! Deviation from the paper: it gives each piece the opacity of the surface, which multiplies where discs overlap.
 
@@ -58,7 +58,7 @@ pub(crate) fn column_set(opacity: f64) -> ColumnSet {
     ColumnSet { normal: true, crossing_depth: opacity < 1.0, ..ColumnSet::default() }
 }
 
-/// What the conversion of a mesh did.
+/// The report of a mesh's conversion.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct MeshReport {
     /// Triangles of the mesh.
@@ -78,7 +78,7 @@ pub struct MeshReport {
 }
 
 impl MeshReport {
-    /// What there is to say of it, one sentence without a full stop: that triangles became nothing.
+    /// Warns that triangles were dropped, in a sentence without a full stop.
     pub fn said(&self) -> Option<String> {
         (self.degenerate > 0).then(|| format!("{} without an area", counted(self.degenerate, "face")))
     }

@@ -26,7 +26,7 @@ pub fn looks_like_degrees(points: &RawPoints) -> bool {
     is_within && size.z >= STEEP * width && size.z <= width * LONGITUDE
 }
 
-/// The same points in metres east and north of the middle of their box, heights as they are. What their file stores as integers is forgotten.
+/// The same points in metres east and north of the middle of their box, heights as they are. The integers of their file are dropped.
 pub fn metres_of_degrees(points: &RawPoints) -> RawPoints {
     let middle = bounds(points).map_or(DVec3::ZERO, |bounds| bounds.center());
     let scale = DVec3::new(LONGITUDE * libm::cos(middle.y.to_radians()), LATITUDE, 1.0);

@@ -1,4 +1,5 @@
-//! How large the discs of points are, and along which way: by one size for all, as their file says, or as their neighbours lie.
+//! Size and orientation of the discs of points: one size for all, the values of their file, or an estimate from their
+//! neighbours.
 
 use crate::points::places::Place;
 use crate::{SplatParams, SurfelParams};
@@ -6,7 +7,7 @@ use splat_core::glam::{DVec3, Vec3};
 use splat_core::points::attributes::{FOOTPRINT, MATERIAL, RADIUS, TANGENT};
 use splat_core::{Camera, Footprint, RawPoints};
 
-/// How discs lie that their points say nothing of.
+/// The shape of discs whose points state none.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum DiscShape {
     /// Round: as wide as the farthest gap.

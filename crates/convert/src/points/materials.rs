@@ -6,7 +6,7 @@ use splat_core::points::attributes::MATERIAL;
 use std::borrow::Cow;
 use std::sync::Arc;
 
-/// A material that points may have, and what it says of those that say nothing themselves.
+/// A material that points may have, with its defaults for points that state no value.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PointMaterial {
     /// Its index in the materials of the scene.

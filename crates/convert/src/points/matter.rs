@@ -56,7 +56,7 @@ impl Default for MatterParams {
     }
 }
 
-/// What the conversion of raw points to a medium did.
+/// The report of a conversion of raw points to a medium.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct MatterReport {
     /// Points given.
@@ -65,7 +65,8 @@ pub struct MatterReport {
     pub duplicates: u64,
     /// Splats made: none of points without extinction.
     pub splats: u64,
-    /// Points whose cell was cut to the largest; none where masses and reaches are stated, and cells not asked for.
+    /// Points whose cell was cut to the largest; 0 if masses and reaches are stated, because no cells are computed
+    /// then.
     pub lone: u64,
     /// Median edge of the cubes with the volumes of the cells, world units; 0 without points, and without cells.
     pub median_spacing: f64,
@@ -74,7 +75,7 @@ pub struct MatterReport {
 }
 
 impl MatterReport {
-    /// What there is to say of it, one sentence without a full stop: that the cells of lone places were cut.
+    /// Warns that the cells of lone places were cut, in a sentence without a full stop.
     pub fn said(&self) -> Option<String> {
         let Self { lone, points, .. } = self;
         (*lone > 0).then(|| {

@@ -2,11 +2,11 @@
 //!
 //! Points are halved by planes across the longest side of what holds them, down to leaves of eight, so boxes adapt to the points' density and
 //! hardly overlap; eight boxes of one level make a box of the next, without pointers, in O(n log n). The eight points of a leaf lie close
-//! together and so do their neighbours: they are asked for at once, one point a lane. A query begins in its own leaf, so that its bound is tight
+//! together and so do their neighbours: a query serves all eight at once, a lane each. A query begins in its own leaf, so that its bound is tight
 //! at once, and climbs: at each level it looks into those of the seven siblings whose box is nearer to the leaf's box than the farthest k-th
 //! neighbour so far, and nearer to one of the eight points than that point's own. Each candidate is compared with eight queries; the k nearest of
-//! each are rows of lanes that a nearer candidate moves outwards. Of candidates as near as each other that with the least id counts as nearer,
-//! so boxes know their least ids: a point far out sees thousands of others at one distance, as far as f32 can tell.
+//! each are rows of lanes that a nearer candidate moves outwards. Of candidates as near as each other that with the least id counts as nearer, so
+//! boxes know their least ids: a point far out sees thousands of others at one distance, as far as f32 can tell.
 //!
 //! Squares of distances are ordinary numbers of f32 within 2⁻⁴⁸ of the extent and the extent. Points whose neighbours lie nearer ask again, in
 //! finer units.

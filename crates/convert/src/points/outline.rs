@@ -3,7 +3,7 @@
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::{Cloud, DAabb, Footprint, Mesh, RawPoints, Similarity, SplatKind};
 
-/// Points around data, in its own coordinates.
+/// Points around data, in the data's coordinates.
 #[derive(Debug)]
 pub enum Outline<'a> {
     /// The corners of all triangles.

@@ -1,7 +1,7 @@
 //! The pairs of places that wait for Prim's algorithm, the best first: a heap of heaps.
 //!
-//! Most pairs disagree much and wait for long; many of them are never taken. One heap of all has a path from its root to its leaves that
-//! no cache holds. Here pairs that disagree about as much share a box, and only the box that is taken from next is a heap.
+//! Most pairs disagree much and wait for long; many of them are never taken. In a single heap of all pairs, a path from root to leaves
+//! fits no cache. Here pairs that disagree about as much share a box, and only the box that is taken from next is a heap.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;

@@ -1,4 +1,4 @@
-//! What is known about each distinct place of raw points: normal, area and spacing, from its neighbours.
+//! Estimates at each distinct place of raw points: normal, area and spacing, from its neighbours.
 
 use crate::common::convert_error::check_cancelled;
 use crate::points::cell_ellipse::ellipse;

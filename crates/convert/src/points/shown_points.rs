@@ -1,4 +1,4 @@
-//! What is shown of raw points: those that are kept, as far apart as is asked for, in the colours of a column.
+//! Selects and colours raw points: thins them to the requested distance, and colours them by a column.
 
 use crate::points::discs::unused_by_discs;
 use crate::points::materials::with_materials;
@@ -13,7 +13,7 @@ use splat_core::text::counted;
 use splat_core::{Clip, Column, RawPoints};
 use std::sync::Arc;
 
-/// What is asked for; [`PointsShown::default`] leaves points as they are.
+/// The request; [`PointsShown::default`] leaves points as they are.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct PointsShown<'a> {
     /// Numbers of columns that are kept.
@@ -40,18 +40,18 @@ pub struct PointsShown<'a> {
     pub up: DVec3,
 }
 
-/// The points that are shown, and what there is to say of them.
+/// The selected points, with notes about them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ShownPoints {
     /// The points.
     pub points: Arc<RawPoints>,
     /// How their colours arose, that nothing is left, and what a medium does not use: one sentence without a full stop each.
     pub said: Vec<String>,
-    /// What their colours stand for, where they have those of a column.
+    /// The scale of their colours, if a column colours them.
     pub scale: Option<ColorScale>,
 }
 
-/// The points that are shown. What is not asked for changes nothing, not even a copy is made. Colours are those of points that were made one.
+/// The points that are shown. Steps that are not requested change nothing and make no copy. Colours are those of points that were made one.
 ///
 /// ```
 /// use convert::{PointsShown, SplatParams, shown_points};

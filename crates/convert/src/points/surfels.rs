@@ -45,7 +45,7 @@ pub struct SurfelParams {
     pub splat: SplatParams,
     /// Whether surfels keep the points' colours.
     pub colors: bool,
-    /// Opacity of one crossing, in \[0, 1\]; 1 makes the surface opaque. Points with opacities of their own have these times it.
+    /// Opacity of one crossing, in \[0, 1\]; 1 makes the surface opaque. Opacities of points are multiplied by it.
     pub opacity: f64,
     /// Neighbours that normals and areas come from, 3 to 32.
     pub neighbours: usize,
@@ -61,9 +61,10 @@ pub struct SurfelParams {
     pub lone_spacing: f64,
     /// How discs lie whose points have neither a size nor a tangent.
     pub shape: DiscShape,
-    /// The same diameter for all discs, round ones; `None` for what points say, or what bridges the gaps between neighbours.
+    /// The same diameter for all discs, round ones; `None` for the size that points state, or else the size that bridges the
+    /// gaps between neighbours.
     pub size: Option<DiscSize>,
-    /// Whose pixels those of `size` are, in the world.
+    /// The camera whose pixels `size` counts, in the world.
     pub camera: Option<Camera>,
 }
 
@@ -86,7 +87,7 @@ impl Default for SurfelParams {
     }
 }
 
-/// What the conversion of raw points did.
+/// The report of a conversion of raw points.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct SurfelReport {
     /// Points given.
@@ -106,7 +107,7 @@ pub struct SurfelReport {
 }
 
 impl SurfelReport {
-    /// What there is to say of it, one sentence without a full stop: that points at one place have each become a surfel.
+    /// Warns that points at one place have each become a surfel, in a sentence without a full stop.
     pub fn said(&self) -> Option<String> {
         let lie = if self.duplicates == 1 { "lies" } else { "lie" };
         (self.duplicates > 0 && self.splats == self.points)

@@ -19,7 +19,7 @@ const TURN: u64 = 0xf008;
 /// Sine of the angle between a disc's normal and +Y below which it lies flat.
 const FLAT: f64 = 1e-3;
 
-/// What an object's footprints are chosen from, and how.
+/// The choice of an object's footprints.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FootprintChoice {
     /// The footprints of the scene.

@@ -9,7 +9,7 @@ use std::sync::Arc;
 /// Most squares along one side of the plane.
 const MOST_SQUARES: f64 = 4096.0;
 
-/// A plane through a volume, in the volume's own space.
+/// A plane through a volume, in the volume's space.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Section {
     /// A point that the plane goes through.

@@ -18,7 +18,7 @@ const SUBDIVISION: i32 = 8;
 /// A homogeneous medium. Lengths are object units, before the transform of [`SplatParams`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HomogeneousMedium {
-    /// What it fills.
+    /// The body that it fills.
     pub body: MediumBody,
     /// Extinction σ_t, 1/world unit, ≥ 0.
     pub extinction: f64,
@@ -26,7 +26,7 @@ pub struct HomogeneousMedium {
     pub spacing: f64,
 }
 
-/// What a homogeneous medium fills.
+/// The body of a homogeneous medium.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum MediumBody {
     /// A box along the axes.
@@ -90,7 +90,7 @@ pub fn medium_to_grid(medium: &HomogeneousMedium, params: &SplatParams) -> Resul
 pub struct Rectangle {
     /// The middle, object space.
     pub center: DVec3,
-    /// One half-axis, object units.
+    /// The first half-axis, object units.
     pub u: DVec3,
     /// The other; not parallel to the first.
     pub v: DVec3,

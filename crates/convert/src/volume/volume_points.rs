@@ -77,7 +77,7 @@ impl VolumeParams {
     }
 }
 
-/// What the conversion of a volume did.
+/// The report of a volume's conversion.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct VolumeReport {
     /// Voxels of the grid.
@@ -92,7 +92,7 @@ pub struct VolumeReport {
     pub omitted: u64,
     /// Most optical depth that a straight ray lost by that; at most the parameter.
     pub omitted_optical_depth: f64,
-    /// Splats without a normal although normals were asked for: no gradient there.
+    /// Splats without a normal although normals were requested: the gradient vanishes there.
     pub without_normal: u64,
     /// Spacing h that the kernels follow, world units.
     pub spacing: f64,

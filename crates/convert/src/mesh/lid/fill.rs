@@ -1,4 +1,4 @@
-//! What outlines in a plane go around, as triangles: a constrained Delaunay triangulation, of which those parts stay that are inside.
+//! Triangulates the inside of outlines in a plane: a constrained Delaunay triangulation, reduced to its parts inside.
 //!
 //! The coordinate along the normal's largest component is left out, which is exact. Outlines of bodies that overlap cross: there they
 //! get a corner, which the walls have not.
