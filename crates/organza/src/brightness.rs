@@ -1,5 +1,5 @@
-//! How bright things can be: bounds of the radiance that comes of each light, of each object, and of anything, before anything is lit; and, from the same
-//! look at all splats, how much each object can hide.
+//! Bounds of radiance before anything is lit: of each light, of each object, and of the whole scene. The same pass over all splats bounds the opacity
+//! of each object.
 
 use crate::load::Loaded;
 use crate::load::own::Own;

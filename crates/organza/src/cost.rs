@@ -1,6 +1,7 @@
 //! The cost model: items of work, counted before the work is done, times the nanoseconds that an item takes.
 //!
-//! It drives the progress bar, `explain`, and the sentence about a long run. No picture depends on it: it reads no clock and decides nothing.
+//! The counted work drives the progress bar, `explain`, and the sentence about a long run. No picture depends on it: it reads no clock and
+//! decides nothing.
 
 mod loading;
 mod prediction;
@@ -11,7 +12,7 @@ pub use prediction::{Change, CountedPass, Prediction, announcement_of_frames, du
 pub(crate) use rates::Growth;
 pub use rates::{BUILT_IN_MACHINE, Item, Rates};
 
-/// How many items of one kind a pass handles.
+/// The number of items of one kind that a pass handles.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Count {
     /// The kind.

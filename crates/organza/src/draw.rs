@@ -61,13 +61,13 @@ pub(crate) fn draw_ranges(
 /// A scene that was loaded and planned.
 #[derive(Clone, Copy)]
 pub struct Planned<'a> {
-    /// What is drawn.
+    /// The scene to draw.
     pub scene: &'a Scene,
     /// Its data.
     pub loaded: &'a Loaded,
-    /// What [`plan_loaded`](crate::plan_loaded) makes of both.
+    /// The plan that [`plan_loaded`](crate::plan_loaded) makes from both.
     pub plan: &'a Plan,
-    /// What it may take.
+    /// The limits of the render.
     pub options: &'a RenderOptions,
 }
 

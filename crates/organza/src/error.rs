@@ -1,4 +1,4 @@
-//! Errors by whose fault they are; each has one exit code and says what to do.
+//! Errors by their cause: usage, input, limits, or a fault of the program. Each has one exit code and a hint.
 
 use organza_scene::{printable, shown};
 use splat_core::Exceeded;
@@ -162,7 +162,7 @@ impl Error {
         }
     }
 
-    /// What to do about it; may be empty.
+    /// The remedy; may be empty.
     pub fn hint(&self) -> &str {
         match self {
             Self::Scene(error) => error.hint(),

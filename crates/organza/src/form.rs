@@ -2,7 +2,7 @@
 
 use crate::scene::Technique;
 
-/// What a technique draws an object from.
+/// The form in which a technique draws an object.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Form {
     /// Opaque splats, which the frame draws.
@@ -51,20 +51,20 @@ impl Form {
         matches!(self, Self::Polygons | Self::Panes)
     }
 
-    /// Whether it is the object's own data, not its splats.
+    /// Whether it is the object's native data, not its splats.
     pub fn is_own(self) -> bool {
         !matches!(self, Self::Opaque | Self::Splats)
     }
 }
 
-/// How one object is drawn, and why.
+/// The planned technique and form of an object, with the reason.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PlannedObject {
     /// Name of the object.
     pub object: String,
-    /// What draws it.
+    /// The technique that draws it.
     pub technique: Technique,
-    /// What it is drawn from.
+    /// The form in which it is drawn.
     pub form: Form,
     /// Why from that.
     pub reason: &'static str,

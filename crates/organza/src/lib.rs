@@ -1,14 +1,15 @@
 //! Organza renders mixed, translucent 3D data — meshes, volumes, raw point clouds, implicit surfaces — into one image.
 //!
-//! This crate joins the stages: it reads a scene, asks what the scene calls for, runs those passes and writes images.
+//! This crate joins the stages: it reads a scene, plans the passes that the scene requires, runs them and writes
+//! images.
 //!
 //! ```text
 //! scene.toml ─► read ─► statistics ─► choose ─► convert ─► plan ─► frame ─► techniques in turns ─► finish ─► output
 //! ```
 //!
 //! Objects are read once, so that what is known of them chooses the technique of each, and the form that it takes. Only those
-//! forms are made. A frame makes what techniques share (shadow maps, opaque surfaces), and each technique folds its own objects
-//! into the picture from front to back.
+//! forms are made. A frame makes the data that techniques share (shadow maps, opaque surfaces). Each technique folds its
+//! objects into the picture from front to back.
 //!
 //! ```
 //! use organza::{Progress, RenderOptions, render, scene};

@@ -34,7 +34,8 @@ use std::cmp::Ordering;
 /// A scene in memory, normalized by a power of two (see [`Loaded::exponent`]) and ready for a technique.
 #[derive(Debug)]
 pub struct Loaded {
-    /// All splats in canonical order; also of translucent objects in `own`, which are not drawn, if they may cast shadows.
+    /// All splats in canonical order. Splats of translucent objects in `own` are among them if they may cast shadows;
+    /// those are not drawn.
     pub cloud: Cloud,
     /// Translucent objects in the form in which their technique takes them, where that is not splats.
     pub(crate) own: Vec<Own>,
@@ -56,7 +57,7 @@ pub struct Loaded {
     pub(crate) images: Images,
     /// Lights, whole, in an order that does not depend on the file's.
     pub lights: Vec<SceneLight>,
-    /// Slice thickness asked for, in the scale of the cloud.
+    /// Requested slice thickness, in the scale of the cloud.
     pub slice_thickness: Option<f64>,
     /// Lengths were multiplied by 2^−exponent.
     pub exponent: i32,
@@ -64,11 +65,11 @@ pub struct Loaded {
     pub splats: Vec<SplatCount>,
     /// Splats that every visible object would become, whether or not it does.
     pub(crate) convertible: Vec<u64>,
-    /// What a user should know of the input, one sentence each.
+    /// Warnings about the input, one sentence each.
     pub warnings: Vec<String>,
-    /// What files hold that is not drawn, and what was made of them, one sentence each.
+    /// Data of the files that is not drawn, and conversions of the data, one sentence each.
     pub notes: Vec<String>,
-    /// What colours stand for.
+    /// The scales behind the objects' colours.
     pub scales: Vec<ColorScale>,
 }
 
@@ -79,8 +80,8 @@ pub(crate) struct Everything {
 }
 
 impl Loaded {
-    /// Takes the camera and the slice thickness from a scene that differs from the loaded one in those and in
-    /// other render settings alone: its splats are these.
+    /// Takes the camera and the slice thickness from another scene. The scene may differ from the loaded one in these
+    /// and in other render settings alone, so that the splats serve it.
     pub fn retarget(&mut self, scene: &Scene) {
         self.camera = scene.camera;
         self.camera.scale_world(libm::exp2(f64::from(self.exponent)).recip());

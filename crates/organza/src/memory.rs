@@ -1,4 +1,4 @@
-//! What a render takes at its peak, counted before it begins.
+//! The peak memory of a render, counted before it begins.
 
 use crate::Error;
 use crate::load::own::Own;

@@ -1,4 +1,4 @@
-//! What a render may take, and how it treats doubtful input.
+//! Limits of a render, and its treatment of invalid input.
 
 use crate::cost::Rates;
 use crate::device::Device;
@@ -8,7 +8,7 @@ use splat_core::MemoryAccount;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-/// What a render may take and how it treats doubtful input.
+/// Limits of a render, and its treatment of invalid input.
 #[derive(Debug, Clone)]
 pub struct RenderOptions {
     /// Bytes that all buffers together may take: files while they are read and what is kept of them, images, checkpoints, splats, pictures.
@@ -19,10 +19,10 @@ pub struct RenderOptions {
     pub strict: bool,
     /// Make one point of points at the same place, for every object.
     pub merge_duplicates: bool,
-    /// File of the sums of the technique `particles`: read before, if it is there, and written every few seconds, at the
-    /// end and at an interrupt. A render that is stopped at any moment goes on from it and ends in the same bits.
+    /// File of the sums of the technique `particles`. It is read first, if it exists, and written every few seconds, at
+    /// the end and at an interrupt. A render that is stopped at any moment goes on from it and ends in the same bits.
     pub checkpoint: Option<PathBuf>,
-    /// Where conversions keep what takes long, and read it the next time; it changes no picture.
+    /// Cache of slow conversions, which later runs read; it changes no picture.
     pub cache: Option<Arc<Cache>>,
     /// The device on which the passes run that can, opened once for all pictures; `None`: the processor alone.
     pub device: Option<Arc<Device>>,
@@ -50,7 +50,7 @@ impl Default for RenderOptions {
 }
 
 impl RenderOptions {
-    /// What a file may ask for when it is read.
+    /// The limits that apply to a file as it is read.
     pub fn read_params(&self) -> ReadParams {
         let memory = MemoryAccount::new(self.max_memory);
         ReadParams { memory, drop_invalid: self.drop_invalid, strict: self.strict, ..ReadParams::default() }

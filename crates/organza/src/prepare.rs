@@ -1,4 +1,4 @@
-//! From a scene to what drawing reads: read, choose, convert, plan.
+//! Prepares a scene for drawing: read, choose, convert, plan.
 
 pub(crate) mod carried;
 mod facts;
@@ -33,23 +33,23 @@ use splat_core::shade::Census;
 use splat_core::{Exceeded, Material, SplatKind};
 use std::borrow::Cow;
 
-/// What a render would do, without doing it.
+/// The plan of a render, its cost and its memory, without a picture.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Explanation {
     /// Effects and passes with their reasons.
     pub plan: Plan,
-    /// What loading cost.
+    /// The cost of loading.
     pub cost: CostRecord,
     /// Bytes that rendering will take at its peak, see [`Explanation::plan`] for the passes that take them. Shadow maps are predicted from the sizes
-    /// of their casters as a light sees them; together they are held to what is allowed when they are built.
+    /// of their casters as a light sees them. The build keeps all of them within the limit.
     pub memory: u64,
     /// Counted work of a render, and its time.
     pub predicted: Prediction,
     /// Splats of every visible object, as predicted from its input and as made.
     pub splats: Vec<SplatCount>,
-    /// What a user should know of the input.
+    /// Warnings about the input.
     pub warnings: Vec<String>,
-    /// What files hold that a picture does not show, and what was made of them.
+    /// Data of the files that a picture does not show, and conversions of the data.
     pub notes: Vec<String>,
     /// The camera that was placed, where the scene leaves that to the data.
     pub found: Option<FoundCamera>,
@@ -239,8 +239,8 @@ fn without(stated: &Scene, left_out: &[SwitchedEffect]) -> Scene {
     scene
 }
 
-/// Whether what is loaded of one scene serves the other, after [`Loaded::retarget`]: whether they differ in the size of the
-/// picture and in settings of the render alone, and none of these decides what is made of an object.
+/// Whether the loaded data of one scene serves the other, after [`Loaded::retarget`]. The scenes may differ in the
+/// picture's size and in render settings that decide no object's form.
 pub fn same_splats(a: &Scene, b: &Scene) -> bool {
     let mut other = b.clone();
     other.camera.size = a.camera.size;

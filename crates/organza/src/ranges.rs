@@ -1,8 +1,8 @@
 //! The ranges of depth in which techniques take turns.
 //!
-//! Where one technique is alone at a depth, or none, there is nothing to take turns for. Where several lie at the same depths,
-//! `render.depth_ranges` says into how many ranges these are cut: inside of a range one technique's share hides the next one's
-//! whole, so their order is right to a range's thickness. Opacity is right whatever the number: transmittances multiply in any order.
+//! Depths with at most one technique need no turns. Depths that several techniques share are cut into `render.depth_ranges`
+//! ranges. Inside a range the share of one technique hides the whole share of the next, so their order is right to a range's
+//! thickness. Opacity is right whatever the number: transmittances multiply in any order.
 
 use crate::frame::Frame;
 use crate::scene::Technique;

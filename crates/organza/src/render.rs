@@ -1,4 +1,4 @@
-//! From a scene to images: prepare, draw.
+//! Renders a scene to images: prepare, draw.
 
 pub(crate) mod budget;
 pub(crate) mod sequence;
@@ -27,42 +27,42 @@ use std::path::PathBuf;
 /// A finished render.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Render {
-    /// The images that were asked for, beauty and alpha always.
+    /// The requested images, beauty and alpha always.
     pub layers: Layers,
-    /// What each pass cost.
+    /// The cost of each pass.
     pub cost: CostRecord,
-    /// What was done and why.
+    /// The plan that was carried out, with its reasons.
     pub plan: Plan,
     /// Counted work and its time, from before the drawing.
     pub predicted: Prediction,
     /// Sets that were averaged; `None` when the picture is not an average.
     pub sets: Option<Sets>,
-    /// What a user should know of the input, one sentence each.
+    /// Warnings about the input, one sentence each.
     pub warnings: Vec<String>,
-    /// What files hold that the picture does not show, and what was made of them, one sentence each.
+    /// Data of the files that the picture does not show, and conversions of the data, one sentence each.
     pub notes: Vec<String>,
-    /// What the colours of objects stand for, those of a column of points or of the values of a volume.
+    /// Scales of the objects' colours: of a column of points, or of the values of a volume.
     pub scales: Vec<ColorScale>,
     /// The camera that was placed for it, where the scene leaves that to the data.
     pub found: Option<FoundCamera>,
-    /// What drew it: `cpu`, or the interface and the device that helped.
+    /// The backend that drew it: `cpu`, or the interface and the device that helped.
     pub backend: String,
 }
 
 /// A frame that is planned and not drawn.
 pub struct Foreseen<'f> {
-    /// What techniques would read.
+    /// The frame that techniques would read.
     pub frame: &'f Frame<'f>,
     /// Its data.
     pub loaded: &'f Loaded,
-    /// What would be done and why.
+    /// The plan, with its reasons.
     pub plan: &'f Plan,
     /// Counted work and its time.
     pub predicted: &'f Prediction,
 }
 
-/// Renders a scene. The technique `particles` has a picture at any time: cancelled after two sets, it is that of the sets
-/// so far, and [`Render::sets`] says so.
+/// Renders a scene. The technique `particles` has a picture at any time. A render that is cancelled after two sets
+/// returns the picture of the finished sets, which [`Render::sets`] counts.
 ///
 /// # Errors
 /// [`Error::Input`] and [`Error::Io`] for data, [`Error::Limit`] before more memory is taken than allowed,
@@ -204,7 +204,7 @@ pub(crate) fn render_keeping(
     let remembers = left.remembers(&loaded, plan, options.max_memory, bytes);
     left.fit(options.max_memory, bytes + remembers.unwrap_or(0));
     let Explanation { plan: shown, mut cost, mut warnings, notes, .. } = explanation;
-    // A reason that is told already is enough.
+    // Do not warn of an empty picture if loading has already warned of the reason.
     let is_empty = loaded.cloud.is_empty() && loaded.own.is_empty();
     let doubtful = is_empty || warnings.len() > loaded.warnings.len();
     warnings.extend(settle::said(scene, &plan.estimates).warnings);

@@ -1,4 +1,4 @@
-//! What shadow maps are built by: shared by the plan, which tells their size beforehand, and the drawing.
+//! Parameters of shadow maps, shared by the plan, which predicts their size, and the drawing.
 
 mod casters;
 mod hiding;

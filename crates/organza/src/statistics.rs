@@ -6,10 +6,10 @@ use convert::cost::Prediction;
 use splat_core::DAabb;
 use splat_core::shade::Census;
 
-/// What the planner knows of one light.
+/// The planner's facts of a light.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct LightStatistics {
-    /// How effects call it.
+    /// Its label in effects.
     pub label: String,
     /// Whether it may cast shadows.
     pub casts_shadows: bool,
@@ -17,7 +17,7 @@ pub struct LightStatistics {
     pub is_dark: bool,
     /// Whether it has a size.
     pub is_extended: bool,
-    /// Points that it is for who lights by points, each with a shadow map of its own.
+    /// Number of point lights that stand for it, each with a shadow map.
     pub points: usize,
     /// Whether the scene switches the light on or off.
     pub is_on: Option<bool>,
@@ -29,7 +29,7 @@ pub struct LightStatistics {
     pub opacity: f64,
 }
 
-/// What the planner knows of a medium that scatters light by a phase function.
+/// The planner's facts of a medium that scatters light by a phase function.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MediumStatistics {
     /// Name of its object.
@@ -40,7 +40,7 @@ pub struct MediumStatistics {
     pub optical_depth: f64,
 }
 
-/// What is known of a medium that scatters light, before anything is converted. Lengths are in world units of the scene.
+/// Facts of a medium that scatters light, before anything is converted. Lengths are in world units of the scene.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MediumFacts {
     /// Rank of its object in the scene.
@@ -67,7 +67,7 @@ pub struct MediumFacts {
     pub outside_share: f64,
 }
 
-/// What is known of a mesh, before anything is converted.
+/// Facts of a mesh, before anything is converted.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MeshFacts {
     /// Rank of its object in the scene.
@@ -82,12 +82,12 @@ pub struct MeshFacts {
     pub bend: f64,
 }
 
-/// What is known of media and meshes, before anything is converted.
+/// Facts of media and meshes, before anything is converted.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct SourceFacts {
-    /// Of media that scatter light, in the order of the scene.
+    /// Facts of media that scatter light, in the order of the scene.
     pub media: Vec<MediumFacts>,
-    /// Of meshes, in the order of the scene.
+    /// Facts of meshes, in the order of the scene.
     pub meshes: Vec<MeshFacts>,
 }
 
@@ -103,7 +103,7 @@ impl SourceFacts {
     }
 }
 
-/// What the planner knows of the effects of one visible object, once it is loaded.
+/// The planner's facts of the effects of a visible object, once it is loaded.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ObjectFacts {
     /// Its name.
@@ -124,7 +124,7 @@ pub struct ObjectFacts {
     pub is_in_view: bool,
     /// The greatest optical depth that it has along a view ray, in the channel that has most; infinite where none is known.
     pub view_depth: f64,
-    /// For each light: the greatest optical depth that it has on the way of the light to anything that is seen; infinite where none is known.
+    /// For each light, the greatest optical depth of the object on the light's way to anything visible; infinite if no bound is known.
     pub light_depths: Vec<f64>,
 }
 
@@ -135,7 +135,7 @@ impl ObjectFacts {
     }
 }
 
-/// What an object is made of.
+/// The kind of an object's data.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum ObjectData {
     /// Raw points.
@@ -163,12 +163,12 @@ pub enum ObjectData {
     },
 }
 
-/// What the planner knows of one visible object before anything is converted.
+/// The planner's facts of a visible object before anything is converted.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ObjectStatistics {
     /// Its name.
     pub name: String,
-    /// What it is made of.
+    /// The kind of its data.
     pub data: ObjectData,
     /// Whether it is an opaque surface.
     pub opaque: bool,
@@ -176,9 +176,9 @@ pub struct ObjectStatistics {
     pub is_partly_opaque: bool,
     /// Whether the gradients of its values shade it or fill a layer.
     pub by_gradient: bool,
-    /// Whether its discs have the usual footprint, as far as objects and materials say, and it shows no field.
+    /// Whether objects and materials leave its discs the default footprint, and it shows no field.
     pub is_plain: bool,
-    /// How the scene has media sampled.
+    /// The sampler that the scene states for media.
     pub volumes_by: VolumeSampler,
     /// Whether it could cast a shadow.
     pub casts: bool,
@@ -186,7 +186,7 @@ pub struct ObjectStatistics {
     pub receives: bool,
 }
 
-/// What a splat is made of, where the time that takes differs.
+/// The conversion of a splat, by the time that it takes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Conversion {
     /// Of anything else: a piece of a surface, a voxel, a Gaussian.
@@ -208,7 +208,7 @@ pub struct SplatCount {
     pub exact: bool,
     /// Splats made.
     pub made: u64,
-    /// How one of them is made.
+    /// The conversion of each splat.
     pub conversion: Conversion,
 }
 
@@ -219,18 +219,19 @@ impl SplatCount {
     }
 }
 
-/// What the planner knows of a scene.
+/// The planner's facts of a scene.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Statistics {
-    /// How each visible object is drawn.
+    /// The planned form of each visible object.
     pub planned: Vec<PlannedObject>,
     /// Techniques that draw, in the order of their table.
     pub techniques: Vec<Technique>,
-    /// By technique: translucent splats that it draws or samples, and objects that it draws from their own data, opaque ones among them.
+    /// By technique: the translucent splats that it draws or samples, and the objects, also opaque ones, that it draws from their native
+    /// data.
     pub translucent_by: Vec<(Technique, [u64; 2])>,
     /// The splats, translucent ones as far as they are drawn; and among those that cast and receive shadows whole objects that have no splats.
     pub counts: Census,
-    /// What is known of the effects of each visible object.
+    /// Facts of the effects of each visible object.
     pub objects: Vec<ObjectFacts>,
     /// Whether the effects of objects are not left out, whatever their bounds.
     pub objects_stay: bool,
@@ -248,7 +249,7 @@ pub struct Statistics {
     pub media: Vec<MediumStatistics>,
     /// Whether the scene asks for light that is scattered again and again, of techniques that have it.
     pub scatters_again: bool,
-    /// Layers asked for beside beauty and alpha.
+    /// Requested layers beside beauty and alpha.
     pub layers: Vec<String>,
     /// Largest change of a displayed pixel that may be left out.
     pub tolerance: f64,
@@ -257,7 +258,7 @@ pub struct Statistics {
 }
 
 impl Statistics {
-    /// Objects that are drawn from their own data.
+    /// Number of objects that are drawn from their native data.
     pub fn own(&self) -> u64 {
         self.planned.iter().filter(|o| o.form.is_own()).count() as u64
     }
@@ -300,7 +301,7 @@ impl Statistics {
         counts.is_none_or(|[splats, natives]| splats > 0 || natives == 0)
     }
 
-    /// What is translucent and drawn by a technique, or from its own data, in words; `None` for nothing.
+    /// Describes the translucent splats and the native objects that a technique draws, in words; `None` for nothing.
     pub fn translucent_of(&self, technique: Technique) -> Option<String> {
         let [splats, natives] = self.translucent_by.iter().find(|(t, _)| *t == technique)?.1;
         let by_own = if natives == 1 { "1 object by its".to_owned() } else { format!("{natives} objects by their") };

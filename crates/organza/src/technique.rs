@@ -1,8 +1,8 @@
 //! The table of techniques: what each states before anything is converted, and how it begins. Nothing else in this crate knows their names.
 //!
-//! A technique folds what is translucent into an accumulator, front to back: all of it at once, or one range of depths after the
-//! other, in turns with other techniques. What it cannot fold in order, such as an average of random sets, fills a segment of its
-//! own, which [`Accumulator::append`] puts behind what was there. Opaque surfaces, light and shadows are the frame's.
+//! A technique folds translucent objects into an accumulator, front to back: all at once, or range by range of depths, in turns
+//! with other techniques. A result that has no order, such as an average of random sets, fills a separate segment, which
+//! [`Accumulator::append`] puts behind the accumulated one. Opaque surfaces, light and shadows are the frame's.
 //!
 //! Every technique fills the effects that shading gives; layers that one alone fills [`Technique::own_layers`] names, so that a scene
 //! is refused, at its line, where it asks another for them.
@@ -194,7 +194,7 @@ pub(crate) struct Session<'s> {
 pub struct Sets {
     /// Sets that were averaged.
     pub averaged: u32,
-    /// Most sets that were asked for.
+    /// Number of requested sets.
     pub asked: u32,
     /// Whether it was cancelled before there were enough.
     pub interrupted: bool,

@@ -7,7 +7,7 @@ const LONG: f64 = 20.0;
 /// A change is named where it takes at most this share of the predicted time.
 const WORTH_NAMING: f64 = 0.6;
 
-/// One pass with its counted work, before the work is done.
+/// A pass with its counted work, before the work is done.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CountedPass {
     /// Name, the same as in the plan and in the cost record.
@@ -16,7 +16,7 @@ pub struct CountedPass {
     pub stage: String,
     /// Items by kind.
     pub counts: Vec<Count>,
-    /// What repeats the work, such as "64 sets"; empty where nothing does.
+    /// The repetition of the work, such as "64 sets"; empty if the work is done once.
     pub repeats: String,
     /// Ranges of depth in which it takes turns with others; 1 where it runs once.
     pub rounds: usize,
@@ -64,7 +64,7 @@ pub struct Change {
 pub struct Prediction {
     /// Reading and conversion.
     pub loading: Vec<CountedPass>,
-    /// All that follows.
+    /// The passes that follow.
     pub drawing: Vec<CountedPass>,
     /// Keys that would change the counted work.
     pub changes: Vec<Change>,
@@ -95,7 +95,7 @@ impl Prediction {
         self.passes().map(|pass| pass.seconds(&self.rates, threads)).sum()
     }
 
-    /// A sentence about a render that is long on so many threads: its longest pass, the counted work, and the change that would shorten it
+    /// Warns of a render that is long on this number of threads: its longest pass, the counted work, and the change that would shorten it
     /// most. `None` for a short one.
     pub fn announcement(&self, threads: usize) -> Option<String> {
         let seconds = |passes: &[CountedPass]| passes.iter().map(|p| p.seconds(&self.rates, threads)).sum::<f64>();
@@ -142,7 +142,7 @@ fn number_text(number: f64) -> String {
     }
 }
 
-/// A time as people say it: "2 min 30 s", "4 s", "30 ms".
+/// A readable time: "2 min 30 s", "4 s", "30 ms".
 pub fn duration_text(seconds: f64) -> String {
     match seconds {
         s if s >= 5400.0 => format!("{:.1} h", s / 3600.0),

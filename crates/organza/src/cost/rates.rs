@@ -4,7 +4,7 @@ use super::{Count, CountedPass};
 use crate::pass;
 use crate::statistics::Conversion;
 
-/// Where the built-in figures were measured.
+/// The machine on which the built-in figures were measured.
 pub const BUILT_IN_MACHINE: &str = "AMD EPYC, one core, profile dev";
 
 /// A kind of item that a pass handles. The time of a pass is the sum over its kinds.
@@ -224,7 +224,7 @@ impl Rates {
         self.ns[item as usize]
     }
 
-    /// Where they are from.
+    /// Their origin.
     pub fn source(&self) -> &str {
         &self.source
     }

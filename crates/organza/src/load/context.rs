@@ -1,4 +1,4 @@
-//! What reading and converting an object need to know of the scene around it.
+//! The facts of the scene that reading and converting an object need.
 
 use super::files::Files;
 use crate::scene::{Scene, SceneObject, SourceData};

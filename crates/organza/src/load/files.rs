@@ -1,4 +1,4 @@
-//! What was read from files, shared by all objects and frames that are made from it: a file is read once.
+//! Cache of the files' data, shared by all objects and frames: a file is read once.
 
 use crate::scene::{ExtractSource, Scene, SourceData, Stop};
 use crate::{Error, RenderOptions};
@@ -40,7 +40,7 @@ pub struct Files {
     pub(crate) seen: Made<(ExtractSource, Scene), Arc<RawPoints>>,
     /// Most bytes that parts of the scene took while lights looked at them.
     pub(crate) most: Cell<u64>,
-    /// What was mended in them, or is doubtful.
+    /// Repairs of the files, and warnings about them.
     mended: RefCell<Vec<String>>,
     /// What the colours of the objects that were read last stand for.
     pub(super) scales: RefCell<Vec<ColorScale>>,
@@ -169,27 +169,27 @@ impl Files {
         Ok((SourceData::Mesh(mesh.into()), notes, held.into()))
     }
 
-    /// Forgets what there is to say of files, for whoever looked at them before a scene asks for what they hold.
+    /// Drops the notes about files, for callers that inspected the files before a scene uses them.
     pub fn forget_notes(&self) {
         self.notes.borrow_mut().clear();
     }
 
-    /// What was made of a file beside what its reader says.
+    /// Adds a note about a file, beside those of its reader.
     pub(crate) fn note(&self, path: &Path, said: impl IntoIterator<Item = impl std::fmt::Display>) {
         add(&self.notes, said.into_iter().map(|said| format!("{}: {said}", crate::printable(path))));
     }
 
-    /// What is doubtful of a file beside what its reader mends.
+    /// Adds a warning about a file, beside the repairs that its reader reports.
     pub(super) fn warn(&self, path: &Path, said: impl IntoIterator<Item = impl std::fmt::Display>) {
         add(&self.mended, said.into_iter().map(|said| format!("{}: {said}", crate::printable(path))));
     }
 
-    /// What the files hold that is not drawn, and what was made of them, one sentence each.
+    /// Data of the files that is not drawn, and conversions of the data, one sentence each.
     pub fn notes(&self) -> Vec<String> {
         self.notes.borrow().clone()
     }
 
-    /// What was mended in the files, and what of their data a picture does not show as it is, one sentence each.
+    /// Repairs of the files, and data that a picture shows changed, one sentence each.
     pub fn mended(&self) -> Vec<String> {
         self.mended.borrow().clone()
     }

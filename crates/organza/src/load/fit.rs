@@ -1,4 +1,4 @@
-//! Where the camera is that sees all of a scene: known once the data is read, before it is converted.
+//! Places the camera that sees all of a scene, after the data is read and before it is converted.
 
 use super::files::Files;
 use super::input::Input;

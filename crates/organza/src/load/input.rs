@@ -1,4 +1,4 @@
-//! What an object is made from: files read, formulas parsed, with the parameters of the conversion.
+//! The input of an object: files read, formulas parsed, with the parameters of the conversion.
 
 use super::context::Context;
 use super::files::{Fitted, once};

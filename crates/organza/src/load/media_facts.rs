@@ -1,4 +1,5 @@
-//! Facts of media that scatter light, from their data as it is and from a few places of it: cheap, and known before anything is converted.
+//! Facts of media that scatter light, from their unconverted data and from a few places of it: cheap, and known before anything is
+//! converted.
 
 use super::context::Context;
 use super::files::Files;

@@ -1,4 +1,4 @@
-//! Facts of meshes that tell how well discs stand for them: cheap, and known before anything is converted.
+//! Facts of meshes that bound the error of discs: cheap, and known before anything is converted.
 
 use super::files::Files;
 use super::loading::Loading;

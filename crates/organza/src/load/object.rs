@@ -1,4 +1,4 @@
-//! One object → its cloud.
+//! Converts an object to its cloud.
 
 use super::context::{self, Context};
 use super::input::{Input, input, shown_field};

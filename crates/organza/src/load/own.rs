@@ -1,6 +1,7 @@
 //! Translucent objects in a neutral form other than splats: a field, triangles, or a volume.
 //!
-//! Lengths and places are the object's own, so nothing is rounded where it lies far away; a transform leads to the world.
+//! Lengths and places are in the object's space, so an object far from the origin loses no precision; a transform leads
+//! to the world.
 
 use super::context::{self, Context};
 use super::input::{Input, Isosurface};

@@ -1,4 +1,4 @@
-//! What is known of the effects of each object once it is loaded.
+//! Facts of the effects of each object once it is loaded.
 
 use crate::brightness::ObjectBrightness;
 use crate::choose::{displayed, row, technique_of};

@@ -1,4 +1,5 @@
-//! What a scene leaves to what lights see of its parts, where things stop and what is extracted, and the camera that then sees all.
+//! Finds the values that a scene leaves to shadow maps: the places where objects stop, extracted surfaces, and the camera that then
+//! sees all.
 
 use super::{Loaded, load};
 use crate::load::files::{Files, once};
@@ -13,7 +14,8 @@ use std::borrow::Cow;
 use std::sync::Arc;
 use tsm::{Params, ShadowMap};
 
-/// The scene with what it leaves to its data: objects that stop stand where they do, what is extracted is found, the camera sees all; and that camera.
+/// Fills in the values that a scene leaves to its data: the places of objects that stop, the extracted surfaces, and the fitted camera. Returns the
+/// scene and that camera.
 ///
 /// # Errors
 /// As [`crate::render`] for data that cannot be read, and as [`seen`].
@@ -42,11 +44,10 @@ pub fn fitted<'s>(
     placed(settled, options, progress, files)
 }
 
-/// What [`fitted`] returns, with a named technique for every object, and the settings that the plan takes with them where the scene leaves them open:
-/// what is drawn.
+/// The scene to draw: that of [`fitted`], with a named technique for every object, and the plan's values of settings that the scene leaves open.
 ///
 /// # Errors
-/// As [`fitted`], and where a layer is asked for that no technique which `auto` may choose fills.
+/// As [`fitted`], and for a requested layer that no technique which `auto` may choose fills.
 pub fn settled<'s>(
     scene: &'s Scene,
     options: &RenderOptions,
@@ -57,7 +58,8 @@ pub fn settled<'s>(
     Ok((settle::settled(scene, options, progress, files)?, found))
 }
 
-/// The surface that a light, or its middle, sees first of some objects, by its shadow map of them alone (Gunjee 2007, Figure 15 a), in the world.
+/// The first surface of some objects that a light (an extended one from its middle) sees, in the world. It follows from a shadow map of these
+/// objects alone (Gunjee 2007, Figure 15 a).
 ///
 /// # Errors
 /// As [`crate::render`]; [`Error::Input`] where no ray meets the absorbance.

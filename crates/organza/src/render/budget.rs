@@ -1,4 +1,5 @@
-//! A picture within a time, or within an error: settings of the scene give way as far as they have to, or as far as they may.
+//! Renders a picture within a time, or within an error. Settings of the scene give way as far as the time requires, or as far
+//! as the error allows.
 //!
 //! ```text
 //! load ─► trial: a sixteenth of the splats, a quarter of the width ─► seconds of an item, by pass, here and now
@@ -44,7 +45,7 @@ const MOST_PLANS: u32 = 3;
 /// A rung is left out that takes more than this share of the time of the one before.
 const WORTH_A_RUNG: f64 = 0.85;
 
-/// One rung of the ladder: settings, and what is expected of them.
+/// A rung of the ladder: settings with their expected time and error.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Expected {
     /// Samples along each side of a pixel.
@@ -55,7 +56,7 @@ pub struct Expected {
     pub sets: Option<u32>,
     /// Time of planning and drawing.
     pub time: Duration,
-    /// Against the scene's own settings.
+    /// The expected error, against the scene's stated settings.
     pub error: ExpectedError,
 }
 
@@ -64,15 +65,16 @@ pub struct Expected {
 pub struct WithinGoal {
     /// The picture.
     pub render: Render,
-    /// What gave way; with these values the scene is drawn again to the same bits. Empty where the scene's own settings were taken.
+    /// The settings that gave way; with their values the scene is drawn again to the same bits. Empty if the scene's stated
+    /// settings were taken.
     pub given_up: Vec<GivenUp>,
     /// Time that was expected, from files read to picture finished.
     pub expected: Duration,
     /// Time that it took.
     pub taken: Duration,
-    /// Error that is expected, against the scene's own settings.
+    /// The expected error, against the scene's stated settings.
     pub error: ExpectedError,
-    /// The ladder, from the scene's own settings down.
+    /// The ladder, from the scene's stated settings down.
     pub ladder: Vec<Expected>,
 }
 
@@ -132,9 +134,10 @@ struct Chosen {
 }
 
 /// Renders a scene so that it keeps to a goal, on the threads that there are: of settings within the errors those that err least and fit the time;
-/// without a time, those that take least. What is drawn is what the scene draws with the settings that were taken.
+/// without a time, those that take least. The picture is that of the scene with the chosen settings.
 ///
-/// Errors are estimates from small pictures, against the picture with the scene's own settings: on the whole within a factor of two.
+/// Errors are estimates from small pictures, against the picture with the scene's stated settings: on the whole within a factor of
+/// two.
 ///
 /// # Errors
 /// [`Error::Limit`] where no settings keep to all of it, with the shortest time that does; else as [`crate::render`].

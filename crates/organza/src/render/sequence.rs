@@ -86,8 +86,8 @@ impl Sequence {
         self.left.add(frame);
     }
 
-    /// Reads, converts and plans a frame without drawing it: a frame that would be refused is refused here. What is made serves
-    /// [`Sequence::render`] of this frame.
+    /// Reads, converts and plans a frame without drawing it: a frame that would be refused is refused here.
+    /// [`Sequence::render`] of this frame reuses the prepared data.
     ///
     /// # Errors
     /// As [`crate::render`].

@@ -1,4 +1,4 @@
-//! Which objects cast a shadow that the picture could show: its cells are spent on those alone.
+//! Finds the objects whose shadows the picture could show. Shadow maps spend their cells on these alone.
 //!
 //! Objects are boxes here. Whatever may lie in the view receives as a whole, and whatever may lie between that and a light casts as a
 //! whole, so no shadow is lost; and the tables of a view that turns stay as they are while the same objects are in it.

@@ -1,4 +1,4 @@
-//! How much each object can hide: of what lies behind it in view, and of each light from anything that is seen.
+//! Bounds of each object's occlusion: of the view behind it, and of each light for anything visible.
 
 use super::casters::Shadowing;
 use super::eye;

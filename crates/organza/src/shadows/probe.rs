@@ -1,4 +1,4 @@
-//! How much of a light anything that is seen can lose, before any shadow map is built: a bound by tiles of the light's directions.
+//! A bound of the light that anything visible can lose, before any shadow map is built, by tiles of the light's directions.
 //!
 //! | light | tiles | a depth |
 //! |---|---|---|
@@ -9,7 +9,7 @@
 //! tiles under its footprint, the most that its footprint has there, so no ray in a tile can have more optical depth than the tile's sum. Footprints
 //! are taken as balls: one that is seen aslant, or is longer than wide, covers less. Sums are whole numbers, which know no order of threads.
 //!
-//! Most shadows are plain, and all light is a bound of what they take: a look at some splats in a few large tiles finds these first.
+//! Most shadows take all light, which is the trivial bound. A pass over some splats in a few large tiles finds these first.
 
 use super::casters::wider;
 use crate::load::Loaded;

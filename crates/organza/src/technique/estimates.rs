@@ -1,4 +1,4 @@
-//! What techniques err by, estimated from facts: by what `auto` compares them. No estimate is a bound.
+//! Errors of techniques, estimated from facts; `auto` compares techniques by them. No estimate is a bound.
 //!
 //! Light that a medium scatters again and again is brighter than what it scatters once by the factor R = H²·(1 + g₊·q⁴), where ω is the albedo, τ the
 //! optical depth, g₊ the mean cosine of scattering or 0, and

@@ -103,7 +103,7 @@ fn sort_params(frame: &Frame<'_>) -> hbsort::Params {
 
 impl Frame<'_> {
     /// Composites the splats of an order of [`Frame::drawn`] in front of the opaque ones, behind all that the accumulator holds, as
-    /// the technique `points` does. What that took is added to `cost`.
+    /// the technique `points` does. Adds the time and the counts to `cost`.
     ///
     /// # Errors
     /// [`Error::Cancelled`], and those of [`Frame::maps`].

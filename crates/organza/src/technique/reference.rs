@@ -1,5 +1,5 @@
-//! The `reference` technique: the same splats, exactly. All fragments of a pixel are sorted by their own depth and composited in f64, so nothing is
-//! left of slices, tables and single precision. It takes hundreds of times as long as `points`, which it judges.
+//! The `reference` technique: the same splats, exactly. The technique sorts all fragments of a pixel by their depth and composites them in f64, so
+//! no error of slices, tables and single precision is left. The technique takes hundreds of times as long as `points`, which it judges.
 
 use crate::frame::{Frame, Shaded};
 use crate::pass;

@@ -1,5 +1,5 @@
 //! The `sheets` technique (Neophytou and Mueller 2005): slabs across the view, front to back. Volumes are splatted value by value, and classified and
-//! shaded when a slab is complete, so zooms show no blur. What is no volume comes as splats, each in the slab of its centre, where extinctions add.
+//! shaded when a slab is complete, so zooms show no blur. Other objects come as splats, each in the slab of its centre, where extinctions add.
 //!
 //! Light comes from the same shadow maps as for all techniques; or, in slabs across the half vector of light and view, through these
 //! slabs themselves ([`half`]).
@@ -263,7 +263,7 @@ fn warn(frame: &Frame<'_>, volumes: &[Volume<'_>], warnings: &mut Vec<String>) {
 }
 
 impl<'a> Frame<'a> {
-    /// Width of the slabs in which the technique `sheets` draws what is its own in the plan, world units of the scene; `None` for
+    /// Width of the slabs in which the technique `sheets` draws its planned objects, world units of the scene; `None` for
     /// nothing. In half-vector slicing that of the first sweep.
     ///
     /// # Errors

@@ -1,5 +1,5 @@
-//! The `surfels` technique (Zhang and Pajarola 2007): translucent surfaces as discs that are averaged in each layer, by rays that meet
-//! them exactly, and layers that are composited in order.
+//! The `surfels` technique (Zhang and Pajarola 2007): translucent surfaces as discs. Rays meet the discs exactly, each layer averages
+//! its discs, and layers are composited in order.
 
 mod discs;
 mod glass;

@@ -1,6 +1,6 @@
-//! What settings are expected to err by, from a few small pictures: each setting is turned alone, and their errors add up as independent ones do.
+//! Expected errors of settings, from a few small pictures. Each setting is turned alone, and their errors add up as independent errors do.
 //!
-//! Every picture is compared with the small picture of the scene's own settings, as both are displayed.
+//! Every picture is compared with the small picture of the scene's stated settings, as both are displayed.
 //! - **Samples of a pixel**: each value is drawn. Edges are lines, whose pixels are a share of the picture that goes with one over its width, so their
 //!   RMSE goes with the root of the width of a pixel and their mean FLIP with the width; detail that is finer than pixels errs by the same at every
 //!   size. Powers between these are taken: a fourth, and three quarters.

@@ -1,4 +1,5 @@
-//! A trial: a small picture of a part of the splats, timed. Its counted work, scaled, tells the time of every rung.
+//! A trial: a small picture of a part of the splats, timed. Its counted work, scaled, predicts the time of every
+//! rung.
 
 use super::errors::Thinned;
 use super::rung::Rung;

@@ -1,8 +1,8 @@
 //! The sums of a render on disk, so that a render that was stopped goes on in the same bits.
 //!
-//! The file's tag is a hash of everything that its sums depend on: the version of the program, the checked scene without
-//! its count of sets, error and exposure, the views that kept sets serve, how doubtful input is treated, and the bytes of every file that the scene is
-//! made of. The count of sets may therefore be raised later.
+//! The file's tag is a hash of everything that its sums depend on. These are the version of the program; the checked scene without its count of sets,
+//! error and exposure; the views that kept sets serve; the treatment of invalid input; and the bytes of every file that the scene reads. The count of
+//! sets may therefore be raised later.
 
 use super::Kept;
 use crate::output::Target;

@@ -1,6 +1,6 @@
 //! The form from which the particles of an object are sampled.
 //!
-//! An object is sampled from its own data wherever a sampler knows them, and from its splats where those are the data (raw
+//! An object is sampled from its native data if a sampler accepts them, and from its splats if those are the data (raw
 //! points).
 
 use crate::form::Form;

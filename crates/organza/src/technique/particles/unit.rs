@@ -1,8 +1,8 @@
-//! The unit in which the sets of a frame sum radiance, so that no light is cut and none is lost, however bright or dim a scene is.
+//! The unit in which the sets of a frame sum radiance. It neither clips nor loses light, however bright or dim a scene is.
 //!
 //! Sums have steps of 2⁻²⁴ of the unit, and end at 2¹⁶ of it ([`pbsr::EnsembleParams::radiance_unit`]). The unit lies 2¹² below a bound of the
-//! radiance of any particle: the brightest light that could reach the box of an object, at the peak of its material. What is seen may be a
-//! million times dimmer, as where a lamp stands in the box, and still has steps of 1/60,000 of it.
+//! radiance of any particle: the brightest light that could reach the box of an object, at the peak of its material. Visible radiance may be a
+//! million times dimmer, as around a lamp in the box, and still has steps of 1/60,000 of it.
 
 use super::parts::Part;
 use crate::frame::Frame;

@@ -1,5 +1,5 @@
-//! The splats of a picture wholly by a device, where it composites and there is nothing that only the processor does. Where the
-//! device can, shadow maps are made there and stay there.
+//! The splats of a picture wholly by a device, where it composites and there is nothing that only the processor does. Builds
+//! shadow maps on the device, if it can, and keeps them there.
 
 use super::{Points, sort_params};
 use crate::Error;

@@ -1,4 +1,4 @@
-//! How slabs get the values of volumes: each voxel writes into them, or each of their pixels reads the lattice.
+//! Reconstruction of volumes in slabs: each voxel writes into them, or each of their pixels reads the lattice.
 
 use super::half;
 use crate::frame::Extent;

@@ -1,4 +1,4 @@
-//! What surfaces that bound matter mirror and bend.
+//! The mirrored and bent rays of surfaces that bound matter.
 
 use super::discs::disc_input;
 use crate::frame::Frame;

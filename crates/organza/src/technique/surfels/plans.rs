@@ -1,4 +1,4 @@
-//! What the technique adds to a plan, and what it does without.
+//! The passes and effects that the technique adds to a plan, and those that it lacks.
 
 use crate::load::Loaded;
 use crate::pass;

@@ -1,4 +1,4 @@
-//! The sampler of an object with data of its own, and what is doubtful about it.
+//! The sampler of a native object, with warnings about its data.
 
 use super::Source;
 use crate::load::own::{Body, Own};
