@@ -77,24 +77,24 @@ mod tests {
     #[test]
     fn only_formats_that_state_it_have_z() {
         let stated = |name: &str, content: &[u8]| of_content(Path::new(name), content);
-        let of = |name: &str, content: &[u8]| stated(name, content).unwrap_or_default();
+        let up_axis = |name: &str, content: &[u8]| stated(name, content).unwrap_or_default();
         assert_eq!(stated("a.glb", b"glTF\x02\0\0\0"), Some(UpAxis::Y));
         assert_eq!(stated("a.ply", b"ply\nformat ascii 1.0\n"), None);
-        assert_eq!(of("a", b"LASF\x01\x02"), UpAxis::Z);
-        assert_eq!(of("a.ply", b"ply\nformat ascii 1.0\n"), UpAxis::Y);
-        assert_eq!(of("a.stl", b"solid a\n"), UpAxis::Y);
-        assert_eq!(of("a.xyz", b"0 0 0\n"), UpAxis::Y);
-        assert_eq!(of("a.nii", &[0; 348]), UpAxis::Z);
-        assert_eq!(of("a", b"ObjectType = Image\nNDims = 3\n"), UpAxis::Z);
-        assert_eq!(of("a.vti", b"<VTKFile type=\"ImageData\">"), UpAxis::Y);
-        assert_eq!(of("a.raw", b"LASF"), UpAxis::Y);
-        assert_eq!(of("a.splat", &[0; 32]), UpAxis::MinusY);
-        assert_eq!(of("a.spz", b"NGSP"), UpAxis::Y);
+        assert_eq!(up_axis("a", b"LASF\x01\x02"), UpAxis::Z);
+        assert_eq!(up_axis("a.ply", b"ply\nformat ascii 1.0\n"), UpAxis::Y);
+        assert_eq!(up_axis("a.stl", b"solid a\n"), UpAxis::Y);
+        assert_eq!(up_axis("a.xyz", b"0 0 0\n"), UpAxis::Y);
+        assert_eq!(up_axis("a.nii", &[0; 348]), UpAxis::Z);
+        assert_eq!(up_axis("a", b"ObjectType = Image\nNDims = 3\n"), UpAxis::Z);
+        assert_eq!(up_axis("a.vti", b"<VTKFile type=\"ImageData\">"), UpAxis::Y);
+        assert_eq!(up_axis("a.raw", b"LASF"), UpAxis::Y);
+        assert_eq!(up_axis("a.splat", &[0; 32]), UpAxis::MinusY);
+        assert_eq!(up_axis("a.spz", b"NGSP"), UpAxis::Y);
         for name in ["float rot_0", "uint packed_rotation"] {
             let header = format!("ply\r\nelement vertex 1\r\nproperty {name}\r\nend_header\r\n");
-            assert_eq!(of("a.ply", header.as_bytes()), UpAxis::MinusY, "{name}");
+            assert_eq!(up_axis("a.ply", header.as_bytes()), UpAxis::MinusY, "{name}");
         }
-        assert_eq!(of("a.nrrd", b"NRRD0004\ntype: float\n\nspace: RAS\n"), UpAxis::Y);
+        assert_eq!(up_axis("a.nrrd", b"NRRD0004\ntype: float\n\nspace: RAS\n"), UpAxis::Y);
         for (space, up) in [
             ("RAS", UpAxis::Z),
             ("left-posterior-superior", UpAxis::Z),
@@ -104,7 +104,7 @@ mod tests {
             ("3D-right-handed", UpAxis::Y),
         ] {
             let header = format!("NRRD0005\r\ndimension: 3\r\nspace: {space}\r\n\r\n");
-            assert_eq!(of("a.nrrd", header.as_bytes()), up, "{space}");
+            assert_eq!(up_axis("a.nrrd", header.as_bytes()), up, "{space}");
         }
     }
 

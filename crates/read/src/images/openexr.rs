@@ -97,8 +97,8 @@ fn first_in_color(meta: &MetaData) -> Result<&Header, ReadError> {
     let names = |h: &Header| -> Vec<String> { h.channels.list.iter().map(|c| c.name.to_string()).collect() };
     let in_color = |h: &&Header| CHANNELS.iter().all(|c| names(h).iter().any(|n| n == c));
     let Some(header) = meta.headers.iter().find(in_color) else {
-        let all: Vec<String> = meta.headers.iter().flat_map(names).collect();
-        let found = format!("'{}'", escaped(all.join(" ").as_bytes(), 60));
+        let channels: Vec<String> = meta.headers.iter().flat_map(names).collect();
+        let found = format!("'{}'", escaped(channels.join(" ").as_bytes(), 60));
         return Err(ReadError::input(
             Place::File,
             "channels R, G and B",

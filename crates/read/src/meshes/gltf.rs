@@ -140,13 +140,13 @@ fn primitives<'a>(
     document: &'a Document,
     instances: &'a [Instance<'a>],
 ) -> Result<Vec<(&'a Primitive, &'a Instance<'a>)>, ReadError> {
-    let mut all = Vec::new();
+    let mut placed = Vec::new();
     for instance in instances {
         let meshes = &document.meshes;
         let mesh = meshes.get(instance.mesh).ok_or_else(|| missing("mesh", instance.mesh, meshes.len()))?;
-        all.extend(mesh.primitives.iter().map(|primitive| (primitive, instance)));
+        placed.extend(mesh.primitives.iter().map(|primitive| (primitive, instance)));
     }
-    Ok(all)
+    Ok(placed)
 }
 
 /// Names what the scene has beside meshes and their base colours.

@@ -58,7 +58,7 @@ impl SurfaceArray<'_> {
 }
 
 impl Part {
-    fn of(self, tuple: &[f64]) -> f64 {
+    fn number_of(self, tuple: &[f64]) -> f64 {
         match self {
             Self::Magnitude => tuple.iter().map(|number| number * number).sum::<f64>().sqrt(),
             Self::Component(i) => tuple[i],
@@ -88,8 +88,8 @@ impl<'p> NamedArrays<'p> {
     fn bare_name(&self, array: &SurfaceArray<'_>) -> Option<String> {
         let name = escaped(array.name.as_bytes(), LONGEST_NAME);
         let length = format!("{name}:magnitude");
-        let own = if self.told.iter().any(|told| told.name == length) { format!("face:{name}") } else { name };
-        (array.numbers > 1 && self.params.columns.contains(&own)).then_some(own)
+        let column = if self.told.iter().any(|told| told.name == length) { format!("face:{name}") } else { name };
+        (array.numbers > 1 && self.params.columns.contains(&column)).then_some(column)
     }
 
     /// Takes an array, with its numbers where they are needed.
@@ -98,7 +98,8 @@ impl<'p> NamedArrays<'p> {
             return;
         }
         if let Some((name, numbers)) = self.bare_name(array).zip(numbers) {
-            let values = numbers.chunks_exact(array.numbers as usize).map(|tuple| Part::Magnitude.of(tuple)).collect();
+            let values =
+                numbers.chunks_exact(array.numbers as usize).map(|tuple| Part::Magnitude.number_of(tuple)).collect();
             self.by_length.push(name.clone());
             self.kept.push(MeshColumn { name, association: array.association, values });
         }
@@ -106,7 +107,7 @@ impl<'p> NamedArrays<'p> {
             let name = self.own_name(name);
             let association = array.association;
             let tuples =
-                numbers.map(|numbers| numbers.chunks_exact(array.numbers as usize).map(|tuple| part.of(tuple)));
+                numbers.map(|numbers| numbers.chunks_exact(array.numbers as usize).map(|tuple| part.number_of(tuple)));
             let measured = tuples.clone().filter(|_| self.params.ranges).and_then(range);
             if let Some(values) = tuples.filter(|_| self.params.columns.contains(&name)) {
                 self.kept.push(MeshColumn { name: name.clone(), association, values: values.collect() });

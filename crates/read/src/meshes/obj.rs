@@ -335,8 +335,8 @@ impl Content<'_> {
             return Ok(Loaded::Points(RawPoints { origin, position: offsets, color, ..RawPoints::default() }));
         }
         drop(self.of_corner);
-        let of = |c: &Corner| self.normals.get(c[1] as usize).copied().unwrap_or(Vec3::ZERO);
-        let normals: Vec<Vec3> = self.corners.iter().map(of).collect();
+        let normal = |c: &Corner| self.normals.get(c[1] as usize).copied().unwrap_or(Vec3::ZERO);
+        let normals: Vec<Vec3> = self.corners.iter().map(normal).collect();
         let vertices = Mesh {
             origin,
             position: self.corners.iter().map(|c| offsets[c[0] as usize]).collect(),

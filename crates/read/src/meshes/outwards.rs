@@ -46,15 +46,15 @@ enum Side {
 /// Turns the triangles of parts that are inside out, and normals that contradict them. Returns the number of parts turned.
 pub(crate) fn turn_outwards(mesh: &mut Mesh) -> u64 {
     let part_of = parts(mesh);
-    let all = measured(mesh, &part_of);
-    let sides: Vec<Side> = all.iter().map(Part::side).collect();
-    if !sides.contains(&Side::In) && all.iter().all(|p| p.agreement >= 0) {
+    let parts = measured(mesh, &part_of);
+    let sides: Vec<Side> = parts.iter().map(Part::side).collect();
+    if !sides.contains(&Side::In) && parts.iter().all(|p| p.agreement >= 0) {
         return 0;
     }
-    let turned = turned(&all, &sides);
+    let turned = turned(&parts, &sides);
     // Normals that contradict the winding follow it where that is known.
-    let negated: Vec<bool> = (0..all.len())
-        .map(|i| sides[i] != Side::Unknown && all[i].agreement != 0 && (all[i].agreement < 0) != turned[i])
+    let negated: Vec<bool> = (0..parts.len())
+        .map(|i| sides[i] != Side::Unknown && parts[i].agreement != 0 && (parts[i].agreement < 0) != turned[i])
         .collect();
     for t in &mut mesh.triangles {
         if turned[part_of[t[0] as usize] as usize] {
@@ -66,7 +66,7 @@ pub(crate) fn turn_outwards(mesh: &mut Mesh) -> u64 {
             *n = -*n;
         }
     }
-    (0..all.len()).filter(|i| turned[*i] || negated[*i]).count() as u64
+    (0..parts.len()).filter(|i| turned[*i] || negated[*i]).count() as u64
 }
 
 /// The part of vertices that no triangle uses.
@@ -126,13 +126,13 @@ fn measured(mesh: &Mesh, part_of: &[u32]) -> Vec<Part> {
     let count = part_of.iter().filter(|p| **p != NO_PART).max().map_or(0, |p| *p as usize + 1);
     let none =
         Part { low: Vec3::INFINITY, high: Vec3::NEG_INFINITY, volume: 0, spanned: 0, area: [0; 3], agreement: 0 };
-    let mut all = vec![none; count];
+    let mut parts = vec![none; count];
     for (p, part) in mesh.position.iter().zip(part_of).filter(|(_, part)| **part != NO_PART) {
-        let part = &mut all[*part as usize];
+        let part = &mut parts[*part as usize];
         (part.low, part.high) = (part.low.min(*p), part.high.max(*p));
     }
     for t in &mesh.triangles {
-        let part = &mut all[part_of[t[0] as usize] as usize];
+        let part = &mut parts[part_of[t[0] as usize] as usize];
         let middle = part.middle();
         let factor = part.factor();
         let [a, b, c] = t.map(|v| (mesh.position[v as usize].as_dvec3() - middle) * factor);
@@ -146,7 +146,7 @@ fn measured(mesh: &Mesh, part_of: &[u32]) -> Vec<Part> {
             part.agreement += fixed(cross.dot((*m + *n + *o).as_dvec3()));
         }
     }
-    all
+    parts
 }
 
 /// A number below 2⁷ with a fixed point.
@@ -193,24 +193,25 @@ impl Part {
 
 /// Which parts are turned: those inside out that no known part holds, and all known ones that the largest part around them
 /// takes along.
-fn turned(all: &[Part], sides: &[Side]) -> Vec<bool> {
+fn turned(parts: &[Part], sides: &[Side]) -> Vec<bool> {
     let mut turned: Vec<bool> = sides.iter().map(|s| *s == Side::In).collect();
     if !(sides.contains(&Side::In) && sides.contains(&Side::Out)) {
         return turned;
     }
-    let mut known: Vec<usize> = (0..all.len()).filter(|i| sides[*i] != Side::Unknown).collect();
-    known.sort_by(|a, b| all[*a].low.x.total_cmp(&all[*b].low.x));
+    let mut known: Vec<usize> = (0..parts.len()).filter(|i| sides[*i] != Side::Unknown).collect();
+    known.sort_by(|a, b| parts[*a].low.x.total_cmp(&parts[*b].low.x));
     // Parts that begin before and may reach beyond, in the order of x.
     let mut open: Vec<usize> = Vec::new();
     let mut at = 0;
     for &part in &known {
-        open.retain(|o| all[*o].high.x >= all[part].low.x);
-        while at < known.len() && all[known[at]].low.x <= all[part].low.x {
+        open.retain(|o| parts[*o].high.x >= parts[part].low.x);
+        while at < known.len() && parts[known[at]].low.x <= parts[part].low.x {
             open.push(known[at]);
             at += 1;
         }
-        let around = open.iter().filter(|o| **o != part && all[**o].holds(&all[part]) && !all[part].holds(&all[**o]));
-        let size = |i: &&usize| (all[**i].volume_of_box(), all[**i].high.to_array(), all[**i].low.to_array());
+        let around =
+            open.iter().filter(|o| **o != part && parts[**o].holds(&parts[part]) && !parts[part].holds(&parts[**o]));
+        let size = |i: &&usize| (parts[**i].volume_of_box(), parts[**i].high.to_array(), parts[**i].low.to_array());
         let outermost = around.max_by(|a, b| size(a).partial_cmp(&size(b)).unwrap_or(std::cmp::Ordering::Equal));
         if let Some(outermost) = outermost {
             turned[part] = sides[*outermost] == Side::In;
@@ -241,13 +242,13 @@ mod tests {
     }
 
     fn join_all(meshes: &[Mesh]) -> Mesh {
-        let mut all = Mesh::default();
+        let mut whole = Mesh::default();
         for mesh in meshes {
-            let first = all.position.len() as u32;
-            all.position.extend(&mesh.position);
-            all.triangles.extend(mesh.triangles.iter().map(|t| t.map(|v| v + first)));
+            let first = whole.position.len() as u32;
+            whole.position.extend(&mesh.position);
+            whole.triangles.extend(mesh.triangles.iter().map(|t| t.map(|v| v + first)));
         }
-        all
+        whole
     }
 
     /// Number of parts that were turned, and which cubes are inwards afterwards.

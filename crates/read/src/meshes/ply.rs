@@ -61,7 +61,7 @@ fn unused(header: &Header, params: &ReadParams) -> Result<Vec<Vec<u8>>, ReadErro
     let is_index = |name: &[u8]| name == b"vertex_indices" || name == b"vertex_index";
     let mut names = Vec::new();
     for element in &header.elements {
-        let all = element.properties.iter().map(|p| p.name.as_slice());
+        let properties = element.properties.iter().map(|p| p.name.as_slice());
         match element.name.as_slice() {
             b"vertex" => {
                 let columns = columns::Columns::new(element, header.is_mesh(), params)?;
@@ -79,7 +79,7 @@ fn unused(header: &Header, params: &ReadParams) -> Result<Vec<Vec<u8>>, ReadErro
                 });
                 names.extend(unused.map(|p| [b"face.", p.name.as_slice()].concat()));
             }
-            other => names.extend(all.map(|n| [other, b".", n].concat())),
+            other => names.extend(properties.map(|n| [other, b".", n].concat())),
         }
     }
     Ok(names)

@@ -92,7 +92,7 @@ enum FacetColors {
 
 impl FacetColors {
     /// How the facets after a header have them; `None` where they have none.
-    fn of(header: &[u8], facets: &[[u8; FACET]]) -> Option<Self> {
+    fn from_header(header: &[u8], facets: &[[u8; FACET]]) -> Option<Self> {
         const MARK: &[u8] = b"COLOR=";
         let mark = header[..80].windows(MARK.len()).position(|bytes| bytes == MARK);
         if let Some([r, g, b, alpha]) = mark.and_then(|at| header[at + MARK.len()..80].first_chunk::<4>()) {
@@ -124,7 +124,7 @@ fn attribute(facet: &[u8; FACET]) -> u16 {
 fn binary(content: &[u8], reading: &mut Reading<'_>) -> Result<Mesh, ReadError> {
     let (header, content) = content.split_at(HEADER);
     let facets = content.as_chunks::<FACET>().0;
-    let colors = FacetColors::of(header, facets);
+    let colors = FacetColors::from_header(header, facets);
     if colors.is_none() && facets.iter().any(|facet| facet[48..] != [0; 2]) {
         reading.notes.remark("its facets have attribute bytes that are no colours, and are not used");
     }

@@ -31,7 +31,7 @@ pub(crate) struct Texture {
 
 /// Texels that several textures may share, with the memory that they take.
 struct Texels {
-    all: Vec<[u8; 4]>,
+    rgba: Vec<[u8; 4]>,
     _held: Reservation,
 }
 
@@ -89,9 +89,9 @@ impl Texture {
         let bytes = 4 * u64::from(width) * u64::from(height);
         let mut held = reading.params.memory.take(what, bytes.saturating_add(decoder.total_bytes()))?;
         let decoded = image::DynamicImage::from_decoder(decoder).map_err(|e| wrong(e.to_string()))?;
-        let all = bytemuck::allocation::cast_vec(decoded.into_rgba8().into_raw());
+        let rgba = bytemuck::allocation::cast_vec(decoded.into_rgba8().into_raw());
         held.set(what, bytes)?;
-        let texels = Arc::new(Texels { all, _held: held });
+        let texels = Arc::new(Texels { rgba, _held: held });
         Ok(Self { size: [width, height], texels, wrap: [Wrap::Repeat; 2], is_nearest: false })
     }
 
@@ -141,7 +141,7 @@ impl Texture {
                 }
             }
         });
-        let [r, g, b, alpha] = self.texels.all[j as usize * self.size[0] as usize + i as usize];
+        let [r, g, b, alpha] = self.texels.rgba[j as usize * self.size[0] as usize + i as usize];
         let linear: &[f32; 256] = &LINEAR;
         let [r, g, b] = [r, g, b].map(|c| linear[usize::from(c)]);
         [r, g, b, f32::from(alpha) / 255.0]

@@ -21,7 +21,7 @@ pub(crate) struct Levels {
     pub(crate) points: u64,
     /// How many levels are read, and how many there are.
     pub(crate) read: usize,
-    pub(crate) all: usize,
+    pub(crate) count: usize,
     /// Bytes at which their chunks begin, rising.
     chunks: Vec<u64>,
 }
@@ -35,11 +35,11 @@ impl Levels {
         let info =
             info.ok_or_else(|| damaged(record.at, format!("{INFO} bytes of COPC"), record.data.len().to_string()))?;
         let nodes = nodes(content, record.at, [number(info, ROOT), number(info, ROOT + 8)])?;
-        let all = nodes.iter().map(|node| node.level + 1).max().unwrap_or(0);
+        let count = nodes.iter().map(|node| node.level + 1).max().unwrap_or(0);
         let of_level = |level: usize| nodes.iter().filter(move |n| n.level == level);
         let mut points = 0u64;
         let mut read = 0;
-        for level in 0..all {
+        for level in 0..count {
             let more = of_level(level).fold(points, |n, node| n.saturating_add(node.points));
             if more > most && level > 0 {
                 break;
@@ -48,7 +48,7 @@ impl Levels {
         }
         let mut chunks: Vec<u64> = nodes.iter().filter(|n| n.level < read).map(|n| n.chunk).collect();
         chunks.sort_unstable();
-        Ok(Some(Self { points, read, all, chunks }))
+        Ok(Some(Self { points, read, count, chunks }))
     }
 
     /// Whether the chunk at a byte of the file belongs to them.

@@ -18,7 +18,7 @@ pub(crate) const UNFIT_HINT: &str = "points are drawn by this column: repair it,
 /// The further columns of a file while it is read, each by its rank among the fields of a point.
 #[derive(Default)]
 pub(crate) struct Extras {
-    all: Vec<Extra>,
+    list: Vec<Extra>,
     /// What their numbers belong to, of a mesh.
     association: Option<Association>,
     /// What was expected, and what was found.
@@ -45,10 +45,11 @@ impl Extras {
             let column = Column { name: String::from_utf8_lossy(name).into_owned(), values: Vec::new() };
             let is_attribute = attribute(&column.name, params.matter).is_some();
             let is_kept = is_attribute || params.columns.iter().any(asked);
-            let (is_read, range) = (is_kept || params.ranges, [f64::INFINITY, f64::NEG_INFINITY]);
+            let is_read = is_kept || params.ranges;
+            let range = [f64::INFINITY, f64::NEG_INFINITY];
             (is_kept || !spare).then_some(Extra { rank, column, is_kept, is_read, is_attribute, range })
         };
-        Self { all: columns.into_iter().filter_map(extra).collect(), association: None, unfit: None }
+        Self { list: columns.into_iter().filter_map(extra).collect(), association: None, unfit: None }
     }
 
     /// The same of a mesh, whose columns have no meaning but their numbers.
@@ -58,7 +59,7 @@ impl Extras {
         params: &ReadParams,
     ) -> Self {
         let mut extras = Self { association: Some(association), ..Self::new(columns, params) };
-        for extra in &mut extras.all {
+        for extra in &mut extras.list {
             extra.is_kept = params.columns.contains(&extra.column.name);
             extra.is_read = extra.is_kept || params.ranges;
             extra.is_attribute = false;
@@ -68,54 +69,54 @@ impl Extras {
 
     /// Leaves out the columns of these names.
     pub(crate) fn without(mut self, names: &[&[u8]]) -> Self {
-        self.all.retain(|extra| !names.contains(&extra.column.name.as_bytes()));
+        self.list.retain(|extra| !names.contains(&extra.column.name.as_bytes()));
         self
     }
 
     /// Whether there are any whose numbers are to be pushed.
     pub(crate) fn reads(&self) -> bool {
-        self.all.iter().any(|extra| extra.is_read)
+        self.list.iter().any(|extra| extra.is_read)
     }
 
     /// Ranks of the columns whose numbers are to be pushed.
     pub(crate) fn read(&self) -> impl Iterator<Item = usize> {
-        self.all.iter().filter(|e| e.is_read).map(|e| e.rank)
+        self.list.iter().filter(|e| e.is_read).map(|e| e.rank)
     }
 
     /// Whether the column of a rank is kept.
     pub(crate) fn keeps(&self, rank: usize) -> bool {
-        self.rank(rank).is_some_and(|i| self.all[i].is_kept)
+        self.rank(rank).is_some_and(|i| self.list[i].is_kept)
     }
 
     /// Where the column of a rank is: they are in the order of their ranks, and a file may have very many.
     fn rank(&self, rank: usize) -> Option<usize> {
-        self.all.binary_search_by_key(&rank, |e| e.rank).ok()
+        self.list.binary_search_by_key(&rank, |e| e.rank).ok()
     }
 
     /// Bytes that a point takes in the columns that are kept.
     pub(crate) fn bytes_per_point(&self) -> u64 {
-        8 * self.all.iter().filter(|e| e.is_kept).count() as u64
+        8 * self.list.iter().filter(|e| e.is_kept).count() as u64
     }
 
     /// Room for so many more points.
     pub(crate) fn reserve(&mut self, points: usize) -> Result<(), ReadError> {
-        self.all.iter_mut().filter(|e| e.is_kept).try_for_each(|e| input::reserve(&mut e.column.values, points))
+        self.list.iter_mut().filter(|e| e.is_kept).try_for_each(|e| input::reserve(&mut e.column.values, points))
     }
 
     /// What was expected in the place of a point's number in the column of a rank, where an attribute cannot have it.
     pub(crate) fn unfit(&self, rank: usize, number: f64) -> Option<&'static str> {
-        let extra = self.rank(rank).map(|i| &self.all[i]).filter(|e| e.is_attribute)?;
+        let extra = self.rank(rank).map(|i| &self.list[i]).filter(|e| e.is_attribute)?;
         expected(&extra.column.name, number)
     }
 
     /// Takes the numbers of a point by their ranks.
     pub(crate) fn push(&mut self, number: impl Fn(usize) -> f64) {
-        self.all.iter_mut().filter(|e| e.is_read).for_each(|e| e.push(number(e.rank)));
+        self.list.iter_mut().filter(|e| e.is_read).for_each(|e| e.push(number(e.rank)));
     }
 
     /// Takes the numbers of many points of the column of a rank.
     pub(crate) fn extend(&mut self, rank: usize, numbers: impl Iterator<Item = f64>) {
-        let Some(extra) = self.rank(rank).map(|i| &mut self.all[i]) else { return };
+        let Some(extra) = self.rank(rank).map(|i| &mut self.list[i]) else { return };
         for number in numbers {
             let Column { name, values } = &extra.column;
             let expected = if extra.is_attribute { expected(name, number) } else { None };
@@ -139,8 +140,8 @@ impl Extras {
             range: range(e),
             association: self.association,
         };
-        notes.columns.extend(self.all.iter().map(named));
-        self.all.into_iter().filter(|e| e.is_kept).map(|e| e.column).collect()
+        notes.columns.extend(self.list.iter().map(named));
+        self.list.into_iter().filter(|e| e.is_kept).map(|e| e.column).collect()
     }
 }
 

@@ -27,8 +27,12 @@ pub(crate) struct Gaussian {
     pub(crate) opacity: f64,
 }
 
-/// What is wrong with a Gaussian: what was expected, what was found, a hint.
-pub(crate) type Wrong = (&'static str, String, &'static str);
+/// The reason why a Gaussian is refused.
+pub(crate) struct Refused {
+    expected: &'static str,
+    found: String,
+    hint: &'static str,
+}
 
 /// Gaussians that were read so far.
 pub(crate) struct Gathered {
@@ -72,44 +76,45 @@ impl Gathered {
     /// Takes one with its coefficients, the constant first, or counts it as dropped if its numbers make no Gaussian.
     pub(crate) fn push(
         &mut self,
-        one: &Gaussian,
+        gaussian: &Gaussian,
         harmonics: impl ExactSizeIterator<Item = [f64; 3]>,
-    ) -> Result<(), Wrong> {
+    ) -> Result<(), Refused> {
         let before = self.points.gaussians.harmonics.len();
         let narrowed = harmonics.map(|h| h.map(|v| v as f32));
         self.points.gaussians.harmonics.extend(narrowed);
-        match self.checked(one, before) {
+        match self.checked(gaussian, before) {
             Ok(()) => Ok(()),
             Err(_) if self.drop_invalid => {
                 self.points.gaussians.harmonics.truncate(before);
                 self.points.dropped += 1;
                 Ok(())
             }
-            Err(wrong) => Err(wrong),
+            Err(reason) => Err(reason),
         }
     }
 
-    fn checked(&mut self, one: &Gaussian, first: usize) -> Result<(), Wrong> {
+    fn checked(&mut self, gaussian: &Gaussian, first: usize) -> Result<(), Refused> {
         const HINT: &str = "remove the Gaussian, or leave such points out with --drop-invalid";
-        let Gaussian { position, deviation, rotation: [w, x, y, z], opacity } = *one;
+        let refuse = |expected: &'static str, found: String| Err(Refused { expected, found, hint: HINT });
+        let Gaussian { position, deviation, rotation: [w, x, y, z], opacity } = *gaussian;
         if !position.is_finite() {
-            return Err(("a place of finite numbers", position.to_string(), HINT));
+            return refuse("a place of finite numbers", position.to_string());
         }
         let axes = deviation.as_vec3();
         if !(axes.is_finite() && axes.cmpge(splat_core::glam::Vec3::ZERO).all()) {
-            return Err(("deviations of a reasonable size, from 1e-34 to 1e34", deviation.to_string(), HINT));
+            return refuse("deviations of a reasonable size, from 1e-34 to 1e34", deviation.to_string());
         }
         let quaternion = DQuat::from_xyzw(x, y, z, w);
         let length = quaternion.length();
         if !(length.is_finite() && length > 1e-12) {
-            return Err(("a rotation that is no quaternion of zeros", quaternion.to_string(), HINT));
+            return refuse("a rotation that is no quaternion of zeros", quaternion.to_string());
         }
         if !(0.0..=1.0).contains(&opacity) {
-            return Err(("an opacity from 0 to 1", opacity.to_string(), HINT));
+            return refuse("an opacity from 0 to 1", opacity.to_string());
         }
         let g = &mut self.points.gaussians;
         if let Some(bad) = g.harmonics[first..].iter().find(|h| !h.iter().all(|v| v.abs() <= MOST_COEFFICIENT)) {
-            return Err(("colours of numbers from −10000 to 10000", format!("{bad:?}"), HINT));
+            return refuse("colours of numbers from −10000 to 10000", format!("{bad:?}"));
         }
         let constant = g.harmonics[first].map(f64::from);
         let turned = DMat3::from_quat(DQuat::from_xyzw(x / length, y / length, z / length, w / length));
@@ -149,6 +154,6 @@ impl Gathered {
 }
 
 /// The error of Gaussian `i` at a place.
-pub(crate) fn refused(place: Place, i: u64, (expected, found, hint): Wrong) -> ReadError {
-    ReadError::input(place, format!("{expected} for Gaussian {i}"), found, hint)
+pub(crate) fn refused(place: Place, i: u64, reason: Refused) -> ReadError {
+    ReadError::input(place, format!("{} for Gaussian {i}", reason.expected), reason.found, reason.hint)
 }

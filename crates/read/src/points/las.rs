@@ -57,13 +57,13 @@ pub(crate) fn read(content: Content, params: &ReadParams, notes: &mut Notes) -> 
     if let Some(most) = params.most_points.filter(|most| layout.compressed && *most < layout.count) {
         layout.levels = Levels::within(&content, &layout, most)?;
     }
-    if let Some(Levels { points, read, all, .. }) = layout.levels {
-        let of = format!(
+    if let Some(Levels { points, read, count, .. }) = layout.levels {
+        let selection = format!(
             "{points} of {} points, as at most {} are asked for",
             layout.count,
             params.most_points.unwrap_or(points)
         );
-        notes.remarks.push(format!("COPC, {read} of {all} levels of detail: {of}"));
+        notes.remarks.push(format!("COPC, {read} of {count} levels of detail: {selection}"));
     }
     // What the file cannot hold is its fault, not the limit's.
     let plain = (!layout.compressed).then(|| plain_records(&content, &layout)).transpose()?;

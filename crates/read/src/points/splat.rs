@@ -24,16 +24,16 @@ pub(crate) fn read(content: &[u8], reading: &mut Reading<'_>) -> Result<RawPoint
             reading.go_on()?;
         }
         let float = |k: usize| f64::from(f32::from_le_bytes([0, 1, 2, 3].map(|b| record[4 * k + b])));
-        let (share, signed) =
-            (|k: usize| f64::from(record[k]) / 255.0, |k: usize| (f64::from(record[k]) - 128.0) / 128.0);
-        let one = Gaussian {
+        let share = |k: usize| f64::from(record[k]) / 255.0;
+        let signed = |k: usize| (f64::from(record[k]) - 128.0) / 128.0;
+        let gaussian = Gaussian {
             position: DVec3::new(float(0), float(1), float(2)),
             deviation: DVec3::new(float(3), float(4), float(5)),
             rotation: [28, 29, 30, 31].map(signed),
             opacity: share(27),
         };
         let constant = [24, 25, 26].map(|k| (share(k) - 0.5) / CONSTANT);
-        gathered.push(&one, [constant].into_iter()).map_err(|wrong| refused(Place::Byte(32 * i), i, wrong))?;
+        gathered.push(&gaussian, [constant].into_iter()).map_err(|wrong| refused(Place::Byte(32 * i), i, wrong))?;
     }
     gathered.finish(Place::Byte(0))
 }

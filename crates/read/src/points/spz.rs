@@ -52,12 +52,12 @@ pub(crate) fn read(content: &[u8], reading: &mut Reading<'_>) -> Result<RawPoint
         if i.is_multiple_of(1 << 14) {
             reading.go_on()?;
         }
-        let of = |part: usize| &content[starts[part] + widths[part] * i..][..widths[part]];
-        let byte = |part: usize, k: usize| f64::from(of(part)[k]);
-        let one = Gaussian {
-            position: DVec3::from_array([0, 1, 2].map(|k| fixed(&of(0)[3 * k..], fraction))),
+        let bytes = |part: usize| &content[starts[part] + widths[part] * i..][..widths[part]];
+        let byte = |part: usize, k: usize| f64::from(bytes(part)[k]);
+        let gaussian = Gaussian {
+            position: DVec3::from_array([0, 1, 2].map(|k| fixed(&bytes(0)[3 * k..], fraction))),
             deviation: exponentials(DVec3::from_array([0, 1, 2].map(|k| byte(3, k) / 16.0 - 10.0))),
-            rotation: if version == 2 { first_three(of(4)) } else { smallest_three(of(4)) },
+            rotation: if version == 2 { first_three(bytes(4)) } else { smallest_three(bytes(4)) },
             opacity: byte(1, 0) / 255.0,
         };
         let constant = [0, 1, 2].map(|c| (byte(2, c) / 255.0 - 0.5) / COLOR_SCALE);
@@ -66,7 +66,7 @@ pub(crate) fn read(content: &[u8], reading: &mut Reading<'_>) -> Result<RawPoint
             k => [0, 1, 2].map(|c| (byte(5, 3 * (k - 1) + c) - 128.0) / 128.0),
         };
         let place = Place::Byte((starts[0] + widths[0] * i) as u64);
-        gathered.push(&one, (0..others + 1).map(harmonic)).map_err(|wrong| refused(place, i as u64, wrong))?;
+        gathered.push(&gaussian, (0..others + 1).map(harmonic)).map_err(|wrong| refused(place, i as u64, wrong))?;
     }
     gathered.finish(Place::Byte(HEADER as u64))
 }

@@ -32,7 +32,7 @@ impl DataOf<'_> {
             return read(stream, self.end.1);
         };
         let data = open(name, *place, self.header, params)?;
-        read(data, 0).map_err(|e| of(name, e))
+        read(data, 0).map_err(|e| naming_data_file(name, e))
     }
 }
 
@@ -50,11 +50,11 @@ fn open(name: &str, place: Place, header: Option<&Path>, params: &ReadParams) ->
     if header.and_then(|header| header.canonicalize().ok()).is_some_and(|h| path.canonicalize().is_ok_and(|p| p == h)) {
         return refused("a data file that is not the header itself");
     }
-    Stream::open(&path, params).map_err(|e| of(name, e))
+    Stream::open(&path, params).map_err(|e| naming_data_file(name, e))
 }
 
 /// An error of the data file, which is told of its header.
-fn of(name: &str, error: ReadError) -> ReadError {
+fn naming_data_file(name: &str, error: ReadError) -> ReadError {
     let expected = format!("the data file '{}': {}", escaped(name.as_bytes(), 60), error.expected);
     ReadError { expected, ..error }
 }

@@ -81,8 +81,8 @@ impl<'a> Buffers<'a> {
     }
 
     fn accessor(&self, index: usize) -> Result<&'a Accessor, ReadError> {
-        let all = &self.document.accessors;
-        all.get(index).ok_or_else(|| missing("accessor", index, all.len()))
+        let accessors = &self.document.accessors;
+        accessors.get(index).ok_or_else(|| missing("accessor", index, accessors.len()))
     }
 
     /// Entries that the accessor says that it has; none of one that is not there, or of which its reader says that the file cannot have as
@@ -150,23 +150,23 @@ impl<'a> Buffers<'a> {
         let count = accessor.count;
         let kind = accessor.component_type;
         let bytes = (count as u64).saturating_mul(size_of::<T>() as u64);
-        let mut all = Vec::new();
+        let mut entries = Vec::new();
         if let Some(view) = accessor.buffer_view {
             let what = format!("accessor {index}");
             let view = self.strided(view, accessor.byte_offset, count, width, kind, &what)?;
             input::check_bytes("an accessor", bytes, reading.params)?;
-            input::reserve(&mut all, count)?;
-            all.extend((0..count).map(|i| entry(&view, i)));
+            input::reserve(&mut entries, count)?;
+            entries.extend((0..count).map(|i| entry(&view, i)));
         } else if accessor.sparse.is_none() {
             return Err(wrong(format!("a buffer view of accessor {index}"), "none".into()));
         } else {
             // Zeros, of which nothing in the file tells that they are so many.
             input::check_packed(bytes, self.total, "glTF")?;
             input::check_bytes("an accessor", bytes, reading.params)?;
-            input::reserve(&mut all, count)?;
-            all.resize(count, zero);
+            input::reserve(&mut entries, count)?;
+            entries.resize(count, zero);
         }
-        let Some(sparse) = &accessor.sparse else { return Ok(all) };
+        let Some(sparse) = &accessor.sparse else { return Ok(entries) };
         let Stored { buffer_view, byte_offset, component_type } = sparse.indices;
         let what = format!("the sparse indices of accessor {index}");
         if !matches!(component_type, U8 | U16 | U32) {
@@ -178,10 +178,10 @@ impl<'a> Buffers<'a> {
         let values = self.strided(values.buffer_view, values.byte_offset, sparse.count, width, kind, &what)?;
         for i in 0..sparse.count {
             let place = stored(&places.bytes[i * places.stride..], places.kind) as usize;
-            let target = all.get_mut(place).ok_or_else(|| missing("entry of a sparse accessor", place, count))?;
+            let target = entries.get_mut(place).ok_or_else(|| missing("entry of a sparse accessor", place, count))?;
             *target = entry(&values, i);
         }
-        Ok(all)
+        Ok(entries)
     }
 
     /// `count` entries of `width` numbers from a byte of a view on, all of them inside it.

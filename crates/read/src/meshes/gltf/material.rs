@@ -76,7 +76,7 @@ impl<'a> Paints<'a> {
     }
 
     /// Rank of the paint of a material, which the same without its texture follows; and the coordinates of the texture.
-    pub(super) fn of(
+    pub(super) fn paint_of(
         &mut self,
         material: Option<usize>,
         reading: &mut Reading<'_>,
@@ -84,10 +84,10 @@ impl<'a> Paints<'a> {
         if let Some(known) = self.known.get(&material) {
             return Ok(*known);
         }
-        let all = &self.document.materials;
+        let materials = &self.document.materials;
         let none = Material::default();
         let stated = match material {
-            Some(index) => all.get(index).ok_or_else(|| missing("material", index, all.len()))?,
+            Some(index) => materials.get(index).ok_or_else(|| missing("material", index, materials.len()))?,
             None => &none,
         };
         let base = &stated.pbr_metallic_roughness;
@@ -98,9 +98,9 @@ impl<'a> Paints<'a> {
         }
         let mut coordinates = None;
         let mut texture = None;
-        if let Some(of) = &base.base_color_texture {
-            texture = self.texture(of.index, reading)?;
-            coordinates = texture.map(|_| coordinates_of(of)).transpose()?;
+        if let Some(stated_texture) = &base.base_color_texture {
+            texture = self.texture(stated_texture.index, reading)?;
+            coordinates = texture.map(|_| coordinates_of(stated_texture)).transpose()?;
         }
         let alpha = match stated.alpha_mode.as_deref() {
             Some("MASK") => Alpha::Cut(stated.alpha_cutoff.unwrap_or(0.5) as f32),
@@ -127,8 +127,8 @@ impl<'a> Paints<'a> {
         if let Some(known) = self.decoded.get(&index) {
             return Ok(*known);
         }
-        let all = &self.document.textures;
-        let texture = all.get(index).ok_or_else(|| missing("texture", index, all.len()))?;
+        let textures = &self.document.textures;
+        let texture = textures.get(index).ok_or_else(|| missing("texture", index, textures.len()))?;
         let found = match texture.source {
             Some(image) => self.image(image, reading)?,
             None => {
@@ -156,8 +156,8 @@ impl<'a> Paints<'a> {
 
     /// The decoded image; `None` where its file is missing, which a remark says.
     fn image(&mut self, index: usize, reading: &mut Reading<'_>) -> Result<Option<Texture>, ReadError> {
-        let all = &self.document.images;
-        let image = all.get(index).ok_or_else(|| missing("image", index, all.len()))?;
+        let images = &self.document.images;
+        let image = images.get(index).ok_or_else(|| missing("image", index, images.len()))?;
         let what = format!("image {index}");
         let origin = self.origin(image);
         if let Some(known) = origin.as_ref().and_then(|origin| self.images.get(origin)) {
@@ -203,9 +203,9 @@ fn decoded(content: &[u8], what: &str, reading: &mut Reading<'_>) -> Result<Opti
     Texture::decode(content, what, reading).map(Some)
 }
 
-fn coordinates_of(of: &TextureOf) -> Result<Coordinates, ReadError> {
-    let Some(transform) = &of.extensions.transform else {
-        return Ok(Coordinates { set: of.tex_coord, offset: Vec2::ZERO, turned: Mat2::IDENTITY });
+fn coordinates_of(stated: &TextureOf) -> Result<Coordinates, ReadError> {
+    let Some(transform) = &stated.extensions.transform else {
+        return Ok(Coordinates { set: stated.tex_coord, offset: Vec2::ZERO, turned: Mat2::IDENTITY });
     };
     let vector = |v: Option<[f64; 2]>, none: Vec2| v.map_or(none, |v| Vec2::from(v.map(|c| c as f32)));
     let [sin, cos] = [libm::sin(transform.rotation), libm::cos(transform.rotation)].map(|c| c as f32);
@@ -216,7 +216,7 @@ fn coordinates_of(of: &TextureOf) -> Result<Coordinates, ReadError> {
     if !(turned.is_finite() && offset.is_finite()) {
         return Err(wrong("a finite KHR_texture_transform".into(), "another one".into()));
     }
-    Ok(Coordinates { set: transform.tex_coord.unwrap_or(of.tex_coord), offset, turned })
+    Ok(Coordinates { set: transform.tex_coord.unwrap_or(stated.tex_coord), offset, turned })
 }
 
 /// Names what a material states beside its base colour.

@@ -148,7 +148,7 @@ fn vertices(
 ) -> Result<Vertices, ReadError> {
     let attribute = |name: &str| primitive.attributes.get(name).copied();
     let of_position = attribute("POSITION").ok_or_else(|| wrong("POSITION of a primitive".into(), "none".into()))?;
-    let (paint, coordinates) = paints.of(primitive.material, reading)?;
+    let (paint, coordinates) = paints.paint_of(primitive.material, reading)?;
     let set = coordinates.map(|c| format!("TEXCOORD_{}", c.set));
     let used = ["POSITION", "NORMAL", "COLOR_0"];
     let unused = primitive.attributes.keys().filter(|k| !used.contains(&k.as_str()) && Some(*k) != set.as_ref());
@@ -198,9 +198,9 @@ fn places(
         return Ok(None);
     };
     let stored = buffers.vectors::<2>(index, &set, reading)?;
-    let all: Vec<[f32; 2]> = stored.into_iter().map(|p| coordinates.place(p)).collect();
-    if all.iter().flatten().all(|c| c.is_finite()) {
-        return Ok(Some(all));
+    let places: Vec<[f32; 2]> = stored.into_iter().map(|p| coordinates.place(p)).collect();
+    if places.iter().flatten().all(|c| c.is_finite()) {
+        return Ok(Some(places));
     }
     Err(wrong(format!("finite {set}"), "another number".into()))
 }
@@ -214,9 +214,9 @@ fn normals(
 ) -> Result<Option<Vec<Vec3>>, ReadError> {
     let stored = buffers.vectors::<3>(index, "NORMAL", reading)?;
     let turned = normals_turn(scene_from_mesh);
-    let all: Vec<Vec3> = stored.iter().map(|n| unit(turned * Vec3::from(*n).as_dvec3())).collect();
-    if all.iter().all(|n| n.is_finite() && *n != Vec3::ZERO) {
-        return Ok(Some(all));
+    let normals: Vec<Vec3> = stored.iter().map(|n| unit(turned * Vec3::from(*n).as_dvec3())).collect();
+    if normals.iter().all(|n| n.is_finite() && *n != Vec3::ZERO) {
+        return Ok(Some(normals));
     }
     reading.notes.remark("a primitive has a normal without a direction: its triangles are flat");
     Ok(None)
@@ -231,20 +231,20 @@ fn normals_turn(scene_from_mesh: &DMat4) -> DMat3 {
 
 /// Linear colours of vertices, with their opacity or 1.
 fn colors(index: usize, buffers: &Buffers<'_>, reading: &Reading<'_>) -> Result<Vec<[f32; 4]>, ReadError> {
-    let all: Vec<[f32; 4]> = if buffers.width(index)? == 3 {
+    let colors: Vec<[f32; 4]> = if buffers.width(index)? == 3 {
         buffers.vectors::<3>(index, "COLOR_0", reading)?.into_iter().map(|[r, g, b]| [r, g, b, 1.0]).collect()
     } else {
         buffers.vectors::<4>(index, "COLOR_0", reading)?
     };
-    if let Some(color) = all.iter().flatten().find(|c| !(c.is_finite() && **c >= 0.0)) {
+    if let Some(color) = colors.iter().flatten().find(|c| !(c.is_finite() && **c >= 0.0)) {
         return Err(wrong("colours from 0 to 1 in COLOR_0".into(), color.to_string()));
     }
-    Ok(all.into_iter().map(|color| color.map(|c| c.min(1.0))).collect())
+    Ok(colors.into_iter().map(|color| color.map(|c| c.min(1.0))).collect())
 }
 
 /// Triangles of a list, a strip or a fan. Those with a corner twice join strips and are nothing by themselves.
 fn triangles(indices: &[u32], mode: u32) -> Result<Vec<[u32; 3]>, ReadError> {
-    let mut all: Vec<[u32; 3]> = match mode {
+    let mut triangles: Vec<[u32; 3]> = match mode {
         TRIANGLES => indices.as_chunks::<3>().0.to_vec(),
         STRIP => {
             let turned = |(i, t): (usize, &[u32])| if i % 2 == 0 { [t[0], t[1], t[2]] } else { [t[1], t[0], t[2]] };
@@ -256,6 +256,6 @@ fn triangles(indices: &[u32], mode: u32) -> Result<Vec<[u32; 3]>, ReadError> {
             return Err(ReadError::input(Place::File, expected, mode.to_string(), HINT));
         }
     };
-    all.retain(|[a, b, c]| a != b && b != c && a != c);
-    Ok(all)
+    triangles.retain(|[a, b, c]| a != b && b != c && a != c);
+    Ok(triangles)
 }

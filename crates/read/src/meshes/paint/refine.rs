@@ -36,7 +36,7 @@ type Edge = [u32; 2];
 pub(super) fn refine(mesh: &mut Mesh, painting: &mut Painting, reading: &mut Reading<'_>) -> Result<(), ReadError> {
     let before = mesh.triangles.len();
     let mut is_new = vec![true; before];
-    let (mut edges, mut longest) = wanted(mesh, painting, &is_new);
+    let (mut edges, mut longest) = edges_to_halve(mesh, painting, &is_new);
     // What is too long already stays so.
     let too_long = Some(longest).filter(|l| *l > LONGEST);
     let left_out = loop {
@@ -54,7 +54,7 @@ pub(super) fn refine(mesh: &mut Mesh, painting: &mut Painting, reading: &mut Rea
         let mut parts = vec![0u32; is_new.len()];
         parents.iter().for_each(|parent| parts[*parent as usize] += 1);
         is_new = parents.iter().map(|parent| parts[*parent as usize] > 1).collect();
-        (edges, longest) = wanted(mesh, painting, &is_new);
+        (edges, longest) = edges_to_halve(mesh, painting, &is_new);
     };
     let after = mesh.triangles.len();
     if after > before {
@@ -79,8 +79,8 @@ pub(super) fn refine(mesh: &mut Mesh, painting: &mut Painting, reading: &mut Rea
 
 /// The edges that new triangles want halved, in order, each once; and the longest, in texels, of a triangle that is not as
 /// its texture.
-fn wanted(mesh: &Mesh, painting: &Painting, is_new: &[bool]) -> (Vec<Edge>, f32) {
-    let of = |(t, is_new): (&[u32; 3], &bool)| {
+fn edges_to_halve(mesh: &Mesh, painting: &Painting, is_new: &[bool]) -> (Vec<Edge>, f32) {
+    let halved_edges = |(t, is_new): (&[u32; 3], &bool)| {
         let texture = painting.texture_of(t[0]).filter(|_| *is_new)?;
         let corners = t.map(|v| Vec2::from(painting.place[v as usize]));
         let alpha = painting.alpha_of(t[0]);
@@ -93,7 +93,7 @@ fn wanted(mesh: &Mesh, painting: &Painting, is_new: &[bool]) -> (Vec<Edge>, f32)
         Some((longest, (0..3).filter(is_long).map(|k| edge(t, k)).collect::<Vec<Edge>>()))
     };
     let found: Vec<(f32, Vec<Edge>)> =
-        mesh.triangles.par_iter().zip(is_new).with_min_len(CHUNK).filter_map(of).collect();
+        mesh.triangles.par_iter().zip(is_new).with_min_len(CHUNK).filter_map(halved_edges).collect();
     let longest = found.iter().map(|f| f.0).fold(0.0, f32::max);
     let mut edges: Vec<Edge> = found.into_iter().flat_map(|f| f.1).collect();
     edges.par_sort_unstable();

@@ -59,8 +59,8 @@ impl Columns {
         let mut found = [false; 11];
         // A mesh has no values: they are numbers as others.
         for (role, names) in ROLES.iter().enumerate().filter(|(role, _)| !(mesh && *role == VALUE)) {
-            let of = |name: &&str| vertex.properties.iter().position(|p| p.name == name.as_bytes());
-            let Some(index) = names.iter().find_map(of) else { continue };
+            let property_index = |name: &&str| vertex.properties.iter().position(|p| p.name == name.as_bytes());
+            let Some(index) = names.iter().find_map(property_index) else { continue };
             match vertex.properties[index] {
                 Property { shape: Shape::Scalar(kind), .. } => kept[index] = Some((role, kind)),
                 Property { line, .. } if role < NORMAL => {
@@ -167,18 +167,18 @@ impl Columns {
 
     /// Takes the record, or counts it as dropped if one of its numbers is not finite.
     fn end_record(&mut self) -> Result<(), (String, &'static str)> {
-        let of = |first: usize| DVec3::from_slice(&self.record[first..]);
+        let vector = |first: usize| DVec3::from_slice(&self.record[first..]);
         if !self.record.iter().all(|v| v.is_finite()) {
             self.points.dropped += 1;
             return Ok(());
         }
-        self.positions.push(of(POSITION));
+        self.positions.push(vector(POSITION));
         let [has_normal, has_color, has_value, has_opacity] = self.has;
         if has_normal {
-            self.points.normal.push(unit(of(NORMAL)));
+            self.points.normal.push(unit(vector(NORMAL)));
         }
         if has_color {
-            self.points.color.push(of(COLOR).as_vec3().to_array());
+            self.points.color.push(vector(COLOR).as_vec3().to_array());
         }
         if has_value {
             let value = self.record[VALUE] as f32;

@@ -102,7 +102,7 @@ fn trained<S: Source>(source: &mut S, element: &Element, reading: &mut Reading<'
         look(i, reading)?;
         read_record(source, element, &kept, &mut record)?;
         let [x, y, z, a, b, c, rw, rx, ry, rz, logit, red, green, blue, rest @ ..] = &record;
-        let one = Gaussian {
+        let gaussian = Gaussian {
             position: DVec3::new(*x, *y, *z),
             deviation: exponentials(DVec3::new(*a, *b, *c)),
             rotation: [*rw, *rx, *ry, *rz],
@@ -113,7 +113,7 @@ fn trained<S: Source>(source: &mut S, element: &Element, reading: &mut Reading<'
             0 => [*red, *green, *blue],
             k => [0, 1, 2].map(|c| rest[c * n + k - 1]),
         };
-        gathered.push(&one, (0..n + 1).map(harmonic)).map_err(|wrong| refused(source.place(), i, wrong))?;
+        gathered.push(&gaussian, (0..n + 1).map(harmonic)).map_err(|wrong| refused(source.place(), i, wrong))?;
         source.end_record()?;
     }
     let unused = element.properties.iter().zip(&kept).filter(|(_, slot)| slot.is_none());
@@ -149,7 +149,7 @@ fn table<S: Source, T>(
     source: &mut S,
     element: &Element,
     names: &[&str],
-    of: fn(f64) -> T,
+    convert: fn(f64) -> T,
     reading: &mut Reading<'_>,
 ) -> Result<Vec<T>, ReadError> {
     let place = |p: &Property| names.iter().position(|n| n.as_bytes() == p.name);
@@ -161,17 +161,17 @@ fn table<S: Source, T>(
     }
     let unused = element.properties.iter().zip(&slots).filter(|(_, slot)| slot.is_none());
     reading.notes.not_used(unused.map(|(p, _)| p.name.as_slice()));
-    let mut all = Vec::new();
+    let mut numbers = Vec::new();
     let each = (size_of::<T>() * names.len()) as u64;
     let what = format!("the packed element '{}'", splat_core::text::escaped(&element.name, 40));
     input::hold(&what, element.count.saturating_mul(each), reading.params)?;
-    input::reserve(&mut all, element.count as usize * names.len())?;
+    input::reserve(&mut numbers, element.count as usize * names.len())?;
     let mut row = vec![0.0; names.len()];
     for i in 0..element.count {
         look(i, reading)?;
         read_record(source, element, &slots, &mut row)?;
         source.end_record()?;
-        all.extend(row.iter().map(|v| of(*v)));
+        numbers.extend(row.iter().map(|v| convert(*v)));
     }
-    Ok(all)
+    Ok(numbers)
 }

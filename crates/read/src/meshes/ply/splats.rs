@@ -62,12 +62,12 @@ struct Said {
 
 impl Said {
     fn new(header: &Header) -> Result<Self, ReadError> {
-        let of = |key: &'static [u8]| header.comments.iter().filter(move |comment| comment.key == key);
+        let comments = |key: &'static [u8]| header.comments.iter().filter(move |comment| comment.key == key);
         let wrong = |comment: &Comment, expected: String| {
             Err(ReadError::input(at_line(comment.line), expected, shown(&comment.rest), HINT))
         };
         let missing = |what: String| Err(ReadError::input(at_line(header.body_line - 1), what, "none", HINT));
-        let Some(version) = of(b"splats").next() else {
+        let Some(version) = comments(b"splats").next() else {
             return missing(format!("a comment 'organza splats {VERSION}' in the header"));
         };
         if version.rest != VERSION.as_bytes() {
@@ -75,12 +75,12 @@ impl Said {
             let expected = format!("splats of version {VERSION}");
             return Err(ReadError::input(at_line(version.line), expected, shown(&version.rest), hint));
         }
-        let Some(origin) = of(b"origin").next() else {
+        let Some(origin) = comments(b"origin").next() else {
             return missing("a comment 'organza origin X Y Z' in the header".into());
         };
         let Some([x, y, z]) = numbers(origin) else { return wrong(origin, "three finite numbers".into()) };
         let mut cutoffs = Vec::new();
-        for footprint in of(b"footprint") {
+        for footprint in comments(b"footprint") {
             match numbers(footprint) {
                 Some([id, cutoff]) if id == cutoffs.len() as f64 && (1.0..=8.0).contains(&cutoff) => {
                     cutoffs.push(cutoff as f32);
@@ -113,7 +113,7 @@ fn numbers<const N: usize>(comment: &Comment) -> Option<[f64; N]> {
 
 /// The column of each property.
 fn columns(element: &Element) -> Result<Vec<&'static SplatColumn>, ReadError> {
-    let known = |p: &Property| COLUMNS.iter().flat_map(|of| of.columns).find(|c| c.name.as_bytes() == p.name);
+    let known = |p: &Property| COLUMNS.iter().flat_map(|group| group.columns).find(|c| c.name.as_bytes() == p.name);
     let mut columns = Vec::with_capacity(element.properties.len());
     for property in &element.properties {
         let Some(column) = known(property) else {
@@ -132,10 +132,10 @@ fn columns(element: &Element) -> Result<Vec<&'static SplatColumn>, ReadError> {
         columns.push(column);
     }
     let has = |name: &str| element.properties.iter().any(|p| p.name == name.as_bytes());
-    for of in &COLUMNS {
-        let first = of.columns.iter().find(|column| has(column.name));
-        let missing = of.columns.iter().find(|column| !has(column.name));
-        if let (Some(missing), true) = (missing, of.is_there.is_none() || first.is_some()) {
+    for group in &COLUMNS {
+        let first = group.columns.iter().find(|column| has(column.name));
+        let missing = group.columns.iter().find(|column| !has(column.name));
+        if let (Some(missing), true) = (missing, group.is_there.is_none() || first.is_some()) {
             let found = first.map_or_else(|| "none".to_owned(), |first| format!("'{}' alone", first.name));
             let expected = format!("a property '{}' of 'vertex'", missing.name);
             return Err(ReadError::input(at_line(element.line), expected, found, HINT));

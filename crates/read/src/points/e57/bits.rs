@@ -70,7 +70,7 @@ mod tests {
         let stored = Stored::Integer { least: -3, difference: 1000, scale: 0.5, offset: 10.0 };
         assert_eq!(stored.bits(), 10);
         let raws = [0u64, 1000, 513, 7, 999];
-        let packed = raws.iter().rev().fold(0u128, |all, raw| all << 10 | u128::from(*raw)).to_le_bytes();
+        let packed = raws.iter().rev().fold(0u128, |bits, raw| bits << 10 | u128::from(*raw)).to_le_bytes();
         let mut numbers = Numbers::new(stored, &packed[..7]);
         for raw in raws {
             assert_eq!(numbers.next(), Some((raw as f64 - 3.0) * 0.5 + 10.0));
@@ -83,8 +83,8 @@ mod tests {
 
     #[test]
     fn numbers_of_64_bits_are_read_at_any_bit() {
-        let all = Stored::Integer { least: i64::MIN, difference: u64::MAX, scale: 1.0, offset: 0.0 };
-        assert_eq!(Numbers::new(all, &5u64.to_le_bytes()).next(), Some(i64::MIN as f64 + 5.0));
+        let full_range = Stored::Integer { least: i64::MIN, difference: u64::MAX, scale: 1.0, offset: 0.0 };
+        assert_eq!(Numbers::new(full_range, &5u64.to_le_bytes()).next(), Some(i64::MIN as f64 + 5.0));
         let wide = Stored::Integer { least: 0, difference: u64::MAX >> 1, scale: 1.0, offset: 0.0 };
         let packed = (u128::from(u64::MAX >> 1) << 63 | 9).to_le_bytes();
         let mut numbers = Numbers::new(wide, &packed);

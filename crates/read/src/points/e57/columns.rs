@@ -111,10 +111,10 @@ impl Columns {
         let has = |names: [&str; 3]| scans.iter().any(|scan| ranks(scan, names).is_some());
         let has_intensity = scans.iter().any(|scan| rank(scan, INTENSITY).is_some());
         let has = [has(NORMAL), has(COLOR), has_intensity];
-        let all = scans.iter().try_fold(0u64, |n, scan| n.checked_add(scan.points)).unwrap_or(u64::MAX);
+        let point_count = scans.iter().try_fold(0u64, |n, scan| n.checked_add(scan.points)).unwrap_or(u64::MAX);
         let some = has.iter().zip([12, 12, 4]).filter(|(has, _)| **has).map(|(_, bytes)| bytes).sum::<u64>();
         let bytes = 36 + extras.bytes_per_point() + some;
-        input::hold("the points", all.saturating_mul(bytes), reading.params)?;
+        input::hold("the points", point_count.saturating_mul(bytes), reading.params)?;
         let positions = Vec::new();
         let points = RawPoints::default();
         Ok(Self { extras, names, positions, points, has, scans: 0, without: [0; 3] })
@@ -162,8 +162,9 @@ impl Columns {
             damaged(scan.place, expected, "fewer")
         })?;
         let limits = |ranks: [usize; 3]| {
-            let own = ranks.map(|i| scan.fields[i].range.filter(|[low, high]| low < high).unwrap_or([0.0, 1.0]));
-            (ranks, scan.colors.unwrap_or(own))
+            let field_limits =
+                ranks.map(|i| scan.fields[i].range.filter(|[low, high]| low < high).unwrap_or([0.0, 1.0]));
+            (ranks, scan.colors.unwrap_or(field_limits))
         };
         Ok(Ranks {
             place,
@@ -187,12 +188,12 @@ impl Columns {
         point: u64,
         reading: &Reading<'_>,
     ) -> Result<(), ReadError> {
-        let of = |ranks: [usize; 3]| DVec3::from_array(ranks.map(|i| row[i]));
+        let vector = |ranks: [usize; 3]| DVec3::from_array(ranks.map(|i| row[i]));
         let is_set = |rank: Option<usize>| rank.is_some_and(|i| row[i] != 0.0);
-        let own = of(ranks.place);
+        let stated_place = vector(ranks.place);
         let Pose { rotation, translation } = scan.pose;
-        let place = rotation * if ranks.is_spherical { cartesian(own) } else { own } + translation;
-        if is_set(ranks.no_place) || own.is_nan() {
+        let place = rotation * if ranks.is_spherical { cartesian(stated_place) } else { stated_place } + translation;
+        if is_set(ranks.no_place) || stated_place.is_nan() {
             self.without[0] += 1;
             self.points.dropped += 1;
             return Ok(());
@@ -203,7 +204,7 @@ impl Columns {
                 return Ok(());
             }
             let hint = "remove the point, or leave such points out with --drop-invalid";
-            let found = format!("{own} at point {point}");
+            let found = format!("{stated_place} at point {point}");
             return Err(ReadError { hint, ..damaged(scan.place, "finite coordinates", found) });
         }
         let value = ranks.intensity.filter(|_| !is_set(ranks.no_intensity)).map(|i| row[i] as f32);
@@ -218,7 +219,7 @@ impl Columns {
         self.extras.push(further);
         let [has_normal, has_color, has_value] = self.has;
         if has_normal {
-            let normal = ranks.normal.map(of).filter(|n| n.is_finite());
+            let normal = ranks.normal.map(vector).filter(|n| n.is_finite());
             self.points.normal.push(normal.map_or(Vec3::ZERO, |n| unit(rotation * n)));
         }
         if has_color {

@@ -169,7 +169,7 @@ impl Reader<'_> {
         let least = self.attribute(field, "minimum")?.unwrap_or(i64::MIN);
         let most = self.attribute(field, "maximum")?.unwrap_or(i64::MAX);
         let is_scaled = kind == "ScaledInteger";
-        let of = |name: &str, default: f64| -> Result<f64, ReadError> {
+        let coefficient = |name: &str, default: f64| -> Result<f64, ReadError> {
             let number = if is_scaled { self.attribute(field, name)?.unwrap_or(default) } else { default };
             if number.is_finite() {
                 Ok(number)
@@ -177,8 +177,8 @@ impl Reader<'_> {
                 Err(self.wrong(field, &format!("a finite {name}"), &number.to_string()))
             }
         };
-        let scale = of("scale", 1.0)?;
-        let offset = of("offset", 0.0)?;
+        let scale = coefficient("scale", 1.0)?;
+        let offset = coefficient("offset", 0.0)?;
         if most < least {
             return Err(self.wrong(field, &format!("{name} to have a maximum above its minimum"), &most.to_string()));
         }

@@ -64,17 +64,17 @@ impl Pages {
             content.copy_within(page * size..(page + 1) * size - SUM, page * (size - SUM));
         }
         content.truncate(pages * (size - SUM));
-        let mut all = Self { bytes: content, size, description: 0..0, _held: held };
-        let start = all.place(place, 24)?;
+        let mut file = Self { bytes: content, size, description: 0..0, _held: held };
+        let start = file.place(place, 24)?;
         let end = usize::try_from(description).ok().and_then(|n| start.checked_add(n));
-        let end = end.filter(|end| *end <= all.bytes.len());
-        let left = all.bytes.len() - start;
-        all.description = start
+        let end = end.filter(|end| *end <= file.bytes.len());
+        let left = file.bytes.len() - start;
+        file.description = start
             ..end.ok_or_else(|| {
                 damaged(32, format!("a description of at most {left} bytes"), description.to_string())
             })?;
         input::hold("the description", description.saturating_mul(DESCRIBED), reading.params)?;
-        Ok(all)
+        Ok(file)
     }
 
     /// Where among the bytes a place of the file lies, which is told of at a byte of it.

@@ -51,7 +51,7 @@ struct Number(u8);
 /// of extra bytes.
 pub(super) fn fields(layout: &Layout, described: &[u8]) -> Vec<Field> {
     let format = &layout.format;
-    let all = [
+    let kinds = [
         ("return_number", Kind::ReturnNumber, true),
         ("number_of_returns", Kind::NumberOfReturns, true),
         ("scan_angle", Kind::ScanAngle, true),
@@ -63,7 +63,7 @@ pub(super) fn fields(layout: &Layout, described: &[u8]) -> Vec<Field> {
         ("green", Kind::Color(1), format.has_color),
         ("blue", Kind::Color(2), format.has_color),
     ];
-    let there = all.into_iter().filter(|(.., is_there)| *is_there);
+    let there = kinds.into_iter().filter(|(.., is_there)| *is_there);
     there.map(|(name, kind, _)| Field { name: name.to_owned(), kind }).chain(extras(layout, described)).collect()
 }
 
@@ -88,7 +88,7 @@ fn extras(layout: &Layout, described: &[u8]) -> Vec<Field> {
         let eight = |at: usize| std::array::from_fn(|i| d[at + i]);
         let stated = |(at, bit): (usize, u8)| (options & bit != 0).then(|| f64::from_le_bytes(eight(at)));
         if (1..=10).contains(&kind) && !name.is_empty() {
-            let no_data = (options & NO_DATA.1 != 0).then(|| number.widened().of(&eight(NO_DATA.0)));
+            let no_data = (options & NO_DATA.1 != 0).then(|| number.widened().decode(&eight(NO_DATA.0)));
             let scale = stated(SCALE).unwrap_or(1.0);
             let offset = stated(OFFSET).unwrap_or(0.0);
             let extra = Extra { at, number, no_data, scale, offset };
@@ -102,14 +102,14 @@ fn extras(layout: &Layout, described: &[u8]) -> Vec<Field> {
 /// What a decoder of layers has to unpack for these fields beside what every file needs.
 pub(super) fn selection<'a>(fields: impl Iterator<Item = &'a Field>) -> DecompressionSelection {
     let base = DecompressionSelection::base().decompress_z().decompress_classification().decompress_intensity();
-    fields.fold(base.decompress_rgb(), |all, field| match field.kind {
-        Kind::ScanAngle => all.decompress_scan_angle(),
-        Kind::UserData => all.decompress_user_data(),
-        Kind::PointSourceId => all.decompress_point_source_id(),
-        Kind::NearInfrared => all.decompress_nir(),
-        Kind::Extra(_) => all.decompress_extra_bytes(),
+    fields.fold(base.decompress_rgb(), |selection, field| match field.kind {
+        Kind::ScanAngle => selection.decompress_scan_angle(),
+        Kind::UserData => selection.decompress_user_data(),
+        Kind::PointSourceId => selection.decompress_point_source_id(),
+        Kind::NearInfrared => selection.decompress_nir(),
+        Kind::Extra(_) => selection.decompress_extra_bytes(),
         // Returns lie with x and y; GPS times stay packed, since a damaged stream of them makes the decoder call itself until the stack is full.
-        Kind::ReturnNumber | Kind::NumberOfReturns | Kind::Color(_) | Kind::GpsTime => all,
+        Kind::ReturnNumber | Kind::NumberOfReturns | Kind::Color(_) | Kind::GpsTime => selection,
     })
 }
 
@@ -133,15 +133,15 @@ impl Field {
                 data.rgb().into_iter().for_each(|rgb| take(&mut rgb.map(|(r, g, b)| f64::from([r, g, b][c]))));
             }
             Kind::Extra(extra) => {
-                take(&mut data.raw_bytes().chunks_exact(data.record_len()).map(|record| extra.of(record)));
+                take(&mut data.raw_bytes().chunks_exact(data.record_len()).map(|record| extra.decode(record)));
             }
         }
     }
 }
 
 impl Extra {
-    fn of(&self, record: &[u8]) -> f64 {
-        let stored = self.number.of(&record[self.at..]);
+    fn decode(&self, record: &[u8]) -> f64 {
+        let stored = self.number.decode(&record[self.at..]);
         if self.no_data == Some(stored) { f64::NAN } else { stored * self.scale + self.offset }
     }
 }
@@ -157,7 +157,7 @@ impl Number {
     }
 
     /// The number that some bytes begin with.
-    fn of(self, bytes: &[u8]) -> f64 {
+    fn decode(self, bytes: &[u8]) -> f64 {
         let mut wide = [0; 8];
         wide[..self.bytes()].copy_from_slice(&bytes[..self.bytes()]);
         let bits = u64::from_le_bytes(wide);
@@ -191,7 +191,7 @@ mod tests {
             (10, &(-2.25f64).to_le_bytes(), -2.25),
         ];
         for (kind, bytes, expected) in cases {
-            assert_eq!(Number(kind).of(bytes), expected, "type {kind}");
+            assert_eq!(Number(kind).decode(bytes), expected, "type {kind}");
             assert_eq!(Number(kind).bytes(), bytes.len());
         }
     }

@@ -46,29 +46,29 @@ impl Columns {
     /// Finds the fields that are kept, and names the others.
     pub(super) fn new(header: &Header, reading: &mut Reading<'_>) -> Result<Self, ReadError> {
         let fields = &header.fields;
-        let of = |names: &[&str]| {
+        let field_index = |names: &[&str]| {
             let is = |f: &Field, name: &str| f.count == 1 && f.name.eq_ignore_ascii_case(name.as_bytes());
             names.iter().find_map(|name| fields.iter().position(|f| is(f, name)))
         };
         let needed = |name: &str| {
             let hint = "every point needs x, y and z";
-            of(&[name]).ok_or_else(|| {
+            field_index(&[name]).ok_or_else(|| {
                 ReadError::input(header.place_of_fields, format!("a field '{name}' of one number"), "none", hint)
             })
         };
         let position = [needed("x")?, needed("y")?, needed("z")?];
         // A normal with a missing component is none.
-        let normal = [["normal_x", "nx"], ["normal_y", "ny"], ["normal_z", "nz"]].map(|names| of(&names));
+        let normal = [["normal_x", "nx"], ["normal_y", "ny"], ["normal_z", "nz"]].map(|names| field_index(&names));
         let normal = if let [Some(x), Some(y), Some(z)] = normal { Some([x, y, z]) } else { None };
-        let color = of(&["rgb", "rgba"]).filter(|i| fields[*i].size == 4);
-        let value = of(&["intensity", "value", "i"]);
-        let is_intensity = of(&["intensity", "i"]).is_some_and(|rank| value == Some(rank));
+        let color = field_index(&["rgb", "rgba"]).filter(|i| fields[*i].size == 4);
+        let value = field_index(&["intensity", "value", "i"]);
+        let is_intensity = field_index(&["intensity", "i"]).is_some_and(|rank| value == Some(rank));
         let top = |i: usize| match (fields[i].kind, fields[i].size) {
             (Kind::Float, _) => 1.0,
             (_, 2) => 65_535.0,
             _ => 255.0,
         };
-        let opacity = of(&["opacity", "alpha"]).map(|i| (i, top(i)));
+        let opacity = field_index(&["opacity", "alpha"]).map(|i| (i, top(i)));
         let kept = position.into_iter().chain(normal.into_iter().flatten()).chain(color).chain(value);
         let kept: Vec<usize> = kept.chain(opacity.map(|o| o.0)).collect();
         let others = fields.iter().enumerate().filter(|(i, f)| !kept.contains(i) && f.name != b"_");
@@ -107,13 +107,13 @@ impl Columns {
     pub(super) fn reserve(&mut self, points: u64, reading: &Reading<'_>) -> Result<(), ReadError> {
         input::hold("the points", points.saturating_mul(self.bytes_per_point()), reading.params)?;
         let n = points as usize;
-        let of = |has: bool| if has { n } else { 0 };
+        let entries = |has: bool| if has { n } else { 0 };
         self.extras.reserve(n)?;
         input::reserve(&mut self.positions, n)?;
-        input::reserve(&mut self.points.normal, of(self.normal.is_some()))?;
-        input::reserve(&mut self.points.color, of(self.color.is_some()))?;
-        input::reserve(&mut self.points.value, of(self.value.is_some()))?;
-        input::reserve(&mut self.points.opacity, of(self.opacity.is_some()))
+        input::reserve(&mut self.points.normal, entries(self.normal.is_some()))?;
+        input::reserve(&mut self.points.color, entries(self.color.is_some()))?;
+        input::reserve(&mut self.points.value, entries(self.value.is_some()))?;
+        input::reserve(&mut self.points.opacity, entries(self.opacity.is_some()))
     }
 
     /// Room for one point after `before`.

@@ -50,27 +50,27 @@ pub(super) fn read<S: Source>(
     header: &Header,
     reading: &mut Reading<'_>,
 ) -> Result<RawPoints, ReadError> {
-    let mut all = Elements { chunks: Vec::new(), words: Vec::new(), rest: Vec::new(), degree: 0 };
+    let mut elements = Elements { chunks: Vec::new(), words: Vec::new(), rest: Vec::new(), degree: 0 };
     let mut place = at_line(header.body_line);
     let mut of_rest = None;
     for element in &header.elements {
         check_count(&source, element)?;
         match element.name.as_slice() {
-            b"chunk" => all.chunks = chunks(&mut source, element, reading)?,
+            b"chunk" => elements.chunks = chunks(&mut source, element, reading)?,
             b"vertex" => {
                 place = at_line(element.line);
-                all.words = table(&mut source, element, &WORDS, |v| v as u32, reading)?;
+                elements.words = table(&mut source, element, &WORDS, |v| v as u32, reading)?;
             }
             b"sh" => {
                 let n = element.properties.len();
                 let degree = degree_of(n / 3).filter(|degree| n.is_multiple_of(3) && *degree > 0);
-                all.degree = degree.ok_or_else(|| {
+                elements.degree = degree.ok_or_else(|| {
                     let hint = "coefficients of harmonics of degree 1, 2 or 3, for each colour";
                     ReadError::input(at_line(element.line), "9, 24 or 45 properties of 'sh'", n.to_string(), hint)
                 })?;
                 let names: Vec<String> = (0..n).map(|k| format!("f_rest_{k}")).collect();
                 let names: Vec<&str> = names.iter().map(String::as_str).collect();
-                all.rest = table(&mut source, element, &names, |v| v as u8, reading)?;
+                elements.rest = table(&mut source, element, &names, |v| v as u8, reading)?;
                 of_rest = Some(element);
             }
             _ => {
@@ -80,26 +80,26 @@ pub(super) fn read<S: Source>(
         }
     }
     source.finish()?;
-    let count = all.words.len() / WORDS.len();
+    let count = elements.words.len() / WORDS.len();
     let missing = |line, expected: String, found: usize| {
         Err(ReadError::input(line, expected, found.to_string(), "the file is truncated, or its header is damaged"))
     };
-    if all.chunks.len() / 18 < count.div_ceil(CHUNK) {
-        return missing(place, format!("a chunk for each {CHUNK} of {count} Gaussians"), all.chunks.len() / 18);
+    if elements.chunks.len() / 18 < count.div_ceil(CHUNK) {
+        return missing(place, format!("a chunk for each {CHUNK} of {count} Gaussians"), elements.chunks.len() / 18);
     }
     if let Some(element) = of_rest.filter(|element| element.count != count as u64) {
         return missing(at_line(element.line), format!("{count} records of 'sh'"), element.count as usize);
     }
-    let mut gathered = Gathered::new(count, all.degree, reading.params)?;
+    let mut gathered = Gathered::new(count, elements.degree, reading.params)?;
     for i in 0..count {
-        let (one, constant) = all.unpacked(i);
-        let n = all.rest.len() / count;
-        let rest = &all.rest[i * n..][..n];
+        let (gaussian, constant) = elements.unpacked(i);
+        let n = elements.rest.len() / count;
+        let rest = &elements.rest[i * n..][..n];
         let harmonic = |k: usize| match k {
             0 => constant,
             k => [0, 1, 2].map(|c| coefficient(rest[c * (n / 3) + k - 1])),
         };
-        gathered.push(&one, (0..n / 3 + 1).map(harmonic)).map_err(|wrong| refused(place, i as u64, wrong))?;
+        gathered.push(&gaussian, (0..n / 3 + 1).map(harmonic)).map_err(|wrong| refused(place, i as u64, wrong))?;
     }
     gathered.finish(place)
 }
@@ -121,14 +121,14 @@ impl Elements {
             [0, 1, 2].map(|k| bounds[first + k] + (bounds[first + 3 + k] - bounds[first + k]) * shares[k])
         };
         let [place, turn, size, color] = [0, 1, 2, 3].map(|k| self.words[4 * i + k]);
-        let one = Gaussian {
+        let gaussian = Gaussian {
             position: DVec3::from_array(between(0, triple(place))),
             deviation: exponentials(DVec3::from_array(between(6, triple(size)))),
             rotation: rotation(turn),
             opacity: share(color, 8),
         };
         let shares = [24, 16, 8].map(|shift| share(color >> shift, 8));
-        (one, between(12, shares).map(|c| (c - 0.5) / CONSTANT))
+        (gaussian, between(12, shares).map(|c| (c - 0.5) / CONSTANT))
     }
 }
 
@@ -146,11 +146,11 @@ fn triple(word: u32) -> [f64; 3] {
 /// A quaternion, w first, without its largest number, which is positive.
 fn rotation(word: u32) -> [f64; 4] {
     let others = [20, 10, 0].map(|shift| (share(word >> shift, 10) - 0.5) * SQRT_2);
-    let mut all = [0.0; 4];
+    let mut quaternion = [0.0; 4];
     let largest = (word >> 30) as usize;
-    all[largest] = (1.0 - others.iter().map(|v| v * v).sum::<f64>()).max(0.0).sqrt();
-    (0..4).filter(|k| *k != largest).zip(others).for_each(|(k, v)| all[k] = v);
-    all
+    quaternion[largest] = (1.0 - others.iter().map(|v| v * v).sum::<f64>()).max(0.0).sqrt();
+    (0..4).filter(|k| *k != largest).zip(others).for_each(|(k, v)| quaternion[k] = v);
+    quaternion
 }
 
 /// A coefficient from −4 to 4: the middle of the step that a byte stands for, and the ends for the first and the last.
