@@ -240,7 +240,7 @@ fn of_grid(grid: &Grid) -> Facts {
             .into_iter()
             .flatten()
             .take(1)
-            .chain(Labels::of(grid).map(|labels| labels.said()))
+            .chain(Labels::from_grid(grid).map(|labels| labels.said()))
             .collect(),
         quantiles: fine.iter().flat_map(|f| SHARES.map(|share| (share, f.quantile(share)))).collect(),
         ..Facts::default()

@@ -123,7 +123,7 @@ pub fn first_scene(
 /// What is said of the axis that points up, of each file that says nothing of it.
 fn up_remarks<'a>(data: &'a [DataFile], wish: &'a Wish) -> impl Iterator<Item = String> + 'a {
     let stand = all_stand(data);
-    let one = move |file: &DataFile| {
+    let remark = move |file: &DataFile| {
         let by = match file.stands.filter(|_| stand) {
             Some(axis) => format!("{} does, along which it stands: --up y turns it", axis.name()),
             None => "y does: --up z turns it".to_owned(),
@@ -131,7 +131,7 @@ fn up_remarks<'a>(data: &'a [DataFile], wish: &'a Wish) -> impl Iterator<Item = 
         format!("{}: nothing in it says which axis points up, so {by}", printable(&file.path))
     };
     let unsaid = |file: &&DataFile| file.stated_up.is_none() && wish.up.is_none();
-    data.iter().filter(unsaid).map(one)
+    data.iter().filter(unsaid).map(remark)
 }
 
 /// What is said of volumes that are drawn as surfaces of labels.
@@ -200,7 +200,8 @@ fn camera_text(found: &FoundCamera, azimuth: f64) -> String {
 
 /// A plane below all that is seen.
 fn ground(found: &FoundCamera) -> String {
-    let (bounds, size) = (found.bounds, found.bounds.diagonal());
+    let bounds = found.bounds;
+    let size = bounds.diagonal();
     let half = GROUND * size;
     let unit = 1e-4 * size;
     let center = DVec3::new(bounds.center().x, bounds.min.y, bounds.center().z);

@@ -57,12 +57,12 @@ impl Histogram {
 
     /// The value below which a share of all values lies, to the width of a bin.
     pub fn quantile(&self, share: f64) -> f64 {
-        let wanted = share * self.total() as f64;
+        let threshold = share * self.total() as f64;
         let mut below = 0.0;
         for (bin, count) in self.counts.iter().enumerate() {
             let with = below + *count as f64;
-            if *count > 0 && with >= wanted {
-                let part = ((wanted - below) / *count as f64).clamp(0.0, 1.0);
+            if *count > 0 && with >= threshold {
+                let part = ((threshold - below) / *count as f64).clamp(0.0, 1.0);
                 return self.low + (bin as f64 + part) * self.width();
             }
             below = with;

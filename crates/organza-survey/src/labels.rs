@@ -38,7 +38,7 @@ impl Labels {
     }
 
     /// `None` for a volume whose values are amounts.
-    pub(crate) fn of(grid: &Grid) -> Option<Self> {
+    pub(crate) fn from_grid(grid: &Grid) -> Option<Self> {
         let is_label = |value: &f32| value.is_nan() || (*value >= 0.0 && value.fract() == 0.0);
         if !grid.values.iter().all(is_label) {
             return None;
@@ -127,21 +127,21 @@ mod tests {
 
     #[test]
     fn regions_of_one_number_are_labels_and_amounts_are_none() {
-        assert_eq!(Labels::of(&bars(|rank| rank as f32)), Some(Labels(vec![0.0, 1.0, 2.0, 3.0, 4.0])));
-        assert_eq!(Labels::of(&bars(|rank| (rank * rank * 100) as f32)).map(|l| l.0.len()), Some(5));
-        assert_eq!(Labels::of(&bars(|rank| rank.min(2) as f32)).map(|l| l.0.len()), Some(3));
+        assert_eq!(Labels::from_grid(&bars(|rank| rank as f32)), Some(Labels(vec![0.0, 1.0, 2.0, 3.0, 4.0])));
+        assert_eq!(Labels::from_grid(&bars(|rank| (rank * rank * 100) as f32)).map(|l| l.0.len()), Some(5));
+        assert_eq!(Labels::from_grid(&bars(|rank| rank.min(2) as f32)).map(|l| l.0.len()), Some(3));
         // A mask, a phantom of two amounts, a fraction, a negative number.
-        assert_eq!(Labels::of(&bars(|_| 255.0)), None);
-        assert_eq!(Labels::of(&bars(|rank| if rank > 2 { 200.0 } else { 100.0 })), None);
-        assert_eq!(Labels::of(&bars(|rank| rank as f32 + 0.5)), None);
-        assert_eq!(Labels::of(&bars(|rank| -(rank as f32))), None);
+        assert_eq!(Labels::from_grid(&bars(|_| 255.0)), None);
+        assert_eq!(Labels::from_grid(&bars(|rank| if rank > 2 { 200.0 } else { 100.0 })), None);
+        assert_eq!(Labels::from_grid(&bars(|rank| rank as f32 + 0.5)), None);
+        assert_eq!(Labels::from_grid(&bars(|rank| -(rank as f32))), None);
         // Shells around each other.
         let shell = |x: usize, y: usize, z: usize| {
             let from_middle = [x, y, z].map(|n| n.abs_diff(10)).into_iter().max().unwrap_or(0);
             if from_middle < 9 { (5 - from_middle.min(8) / 2) as f32 } else { 0.0 }
         };
         let shells = Grid { dims: [20; 3], ..volume(shell) };
-        assert_eq!(Labels::of(&finer(&shells, 4)).map(|l| l.0.len()), Some(6));
+        assert_eq!(Labels::from_grid(&finer(&shells, 4)).map(|l| l.0.len()), Some(6));
         // The same in few voxels with a number that is left out, and two regions with small numbers.
         let ball = |center: usize, radius: usize| {
             move |x: usize, y: usize, z: usize| {
@@ -156,7 +156,7 @@ mod tests {
             (true, ..) => 1.0,
             _ => 0.0,
         });
-        assert_eq!(Labels::of(&nested), Some(Labels(vec![0.0, 1.0, 2.0, 7.0])));
+        assert_eq!(Labels::from_grid(&nested), Some(Labels(vec![0.0, 1.0, 2.0, 7.0])));
         let [left, right] = [ball(5, 5), ball(15, 5)];
         let two = volume(|x, y, z| {
             if left(x, y, z) {
@@ -167,12 +167,12 @@ mod tests {
                 0.0
             }
         });
-        assert_eq!(Labels::of(&two), Some(Labels(vec![0.0, 3.0, 7.0])));
+        assert_eq!(Labels::from_grid(&two), Some(Labels(vec![0.0, 3.0, 7.0])));
         let hippocampi =
             Grid { values: two.values.iter().map(|v| [0.0, 17.0, 53.0][(*v as usize).div_ceil(4)]).collect(), ..two };
-        assert_eq!(Labels::of(&hippocampi), Some(Labels(vec![0.0, 17.0, 53.0])));
+        assert_eq!(Labels::from_grid(&hippocampi), Some(Labels(vec![0.0, 17.0, 53.0])));
         // What rises by steps, and what scatters.
-        assert_eq!(Labels::of(&volume(|x, y, z| ((x + y + z) / 4) as f32)), None);
-        assert_eq!(Labels::of(&volume(|x, y, z| ((x * 7919 + y * 104_729 + z * 31) % 251) as f32)), None);
+        assert_eq!(Labels::from_grid(&volume(|x, y, z| ((x + y + z) / 4) as f32)), None);
+        assert_eq!(Labels::from_grid(&volume(|x, y, z| ((x * 7919 + y * 104_729 + z * 31) % 251) as f32)), None);
     }
 }

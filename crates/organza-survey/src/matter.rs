@@ -51,7 +51,7 @@ const LIGHTEST: f64 = -500.0;
 impl Matter {
     /// That of a volume of which nothing else is known.
     #[cfg(test)]
-    pub(crate) fn of(grid: &Grid) -> Option<Self> {
+    pub(crate) fn from_grid(grid: &Grid) -> Option<Self> {
         Self::in_surroundings(grid, None)
     }
 
@@ -174,20 +174,20 @@ fn usual_range(values: &[f32]) -> Option<[f64; 2]> {
 /// The values on the six sides of a volume, and the number of voxels there that have none.
 fn border(grid: &Grid) -> (Vec<f32>, usize) {
     let [nx, ny, nz] = grid.dims;
-    let mut all = Vec::new();
+    let mut border = Vec::new();
     for (row, values) in grid.values.chunks(nx).enumerate() {
         let j = row % ny;
         let k = row / ny;
         if j == 0 || k == 0 || j + 1 == ny || k + 1 == nz {
-            all.extend_from_slice(values);
+            border.extend_from_slice(values);
         } else {
-            all.extend([values[0], values[nx - 1]]);
+            border.extend([values[0], values[nx - 1]]);
         }
     }
-    let voxels = all.len();
-    all.retain(|value| !value.is_nan());
-    let gaps = voxels - all.len();
-    (all, gaps)
+    let voxels = border.len();
+    border.retain(|value| !value.is_nan());
+    let gaps = voxels - border.len();
+    (border, gaps)
 }
 
 #[cfg(test)]
@@ -216,7 +216,7 @@ mod tests {
     #[test]
     fn matter_is_told_from_the_air_at_the_border_whichever_is_higher() {
         for (air, flesh, core) in [(0.0, 100.0, 200.0), (-1000.0, 40.0, 900.0), (250.0, 120.0, 20.0)] {
-            let matter = Matter::of(&ball(air, flesh, core)).unwrap();
+            let matter = Matter::from_grid(&ball(air, flesh, core)).unwrap();
             let a = f64::from(air);
             let f = f64::from(flesh);
             let c = f64::from(core);
@@ -240,33 +240,35 @@ mod tests {
         let values = plus.values.iter().chain(&minus.values).enumerate();
         let values = values.map(|(i, v)| if i < plus.values.len() { *v } else { -*v }).collect();
         let both = Grid { dims: [32, 32, 64], values, ..plus };
-        let matter = Matter::of(&both).unwrap();
+        let matter = Matter::from_grid(&both).unwrap();
         let [first, last] = matter.opposite.unwrap();
         assert!(matter.first * first < 0.0 && matter.last * last < 0.0, "{matter:?}");
         assert!((matter.first + first).abs() < 5.0 && (matter.last + last).abs() < 5.0, "{matter:?}");
         // Without air too.
         let values = (0..4096).map(|i| (i % 16) as f32 - 7.5).collect();
         let ramp = Grid { origin: DVec3::ZERO, axes: DMat3::IDENTITY, dims: [16; 3], values };
-        let matter = Matter::of(&ramp).unwrap();
+        let matter = Matter::from_grid(&ramp).unwrap();
         assert!(matter.first == 0.0 && matter.last > 7.0 && matter.opposite.unwrap()[1] < -7.0, "{matter:?}");
         // With the range of a tomogram, too: around it is 0, not air.
         let values = both.values.iter().map(|v| 15.0 * v).collect();
-        assert!(Matter::of(&Grid { values, ..both.clone() }).is_some_and(|m| m.opposite.is_some() && !m.has_units()));
+        assert!(
+            Matter::from_grid(&Grid { values, ..both.clone() }).is_some_and(|m| m.opposite.is_some() && !m.has_units())
+        );
         // Hounsfield units have both signs and are none of those.
-        assert_eq!(Matter::of(&ball(-1000.0, 40.0, 900.0)).unwrap().opposite, None);
+        assert_eq!(Matter::from_grid(&ball(-1000.0, 40.0, 900.0)).unwrap().opposite, None);
     }
 
     #[test]
     fn what_has_no_value_is_nothing_and_all_else_is_matter() {
         let mut grid = ball(f32::NAN, 100.0, 200.0);
-        let matter = Matter::of(&grid).unwrap();
+        let matter = Matter::from_grid(&grid).unwrap();
         assert!(matter.air.is_none() && matter.first < 100.0 && matter.last > 199.0, "{matter:?}");
         assert_eq!(matter.histogram.total(), grid.values.iter().filter(|v| !v.is_nan()).count() as u64);
         // A gap within changes nothing.
         grid = ball(0.0, 100.0, 200.0);
-        let whole = Matter::of(&grid).unwrap();
+        let whole = Matter::from_grid(&grid).unwrap();
         grid.values[16 * 32 * 32 + 16 * 32 + 16] = f32::NAN;
-        let matter = Matter::of(&grid).unwrap();
+        let matter = Matter::from_grid(&grid).unwrap();
         assert!((matter.first - whole.first).abs() < 1.0 && (matter.last - whole.last).abs() < 1.0);
     }
 
@@ -277,7 +279,7 @@ mod tests {
         assert_eq!(matter.air, Some(0.0));
         assert!(matter.first > 0.0 && matter.last > 300.0, "{matter:?}");
         // Of what comes from elsewhere the border tells.
-        assert!((Matter::of(&hole).unwrap().air.unwrap() - 300.5).abs() < 2.0);
+        assert!((Matter::from_grid(&hole).unwrap().air.unwrap() - 300.5).abs() < 2.0);
     }
 
     #[test]
@@ -285,10 +287,10 @@ mod tests {
         let n = 16;
         let values = (0..n * n * n).map(|i| (i % n) as f32).collect();
         let ramp = Grid { origin: DVec3::ZERO, axes: DMat3::IDENTITY, dims: [n; 3], values };
-        let matter = Matter::of(&ramp).unwrap();
+        let matter = Matter::from_grid(&ramp).unwrap();
         assert_eq!(matter.air, None);
         assert!(matter.first < matter.last);
         let flat = Grid { values: vec![3.0; n * n * n], ..ramp };
-        assert_eq!(Matter::of(&flat), None);
+        assert_eq!(Matter::from_grid(&flat), None);
     }
 }

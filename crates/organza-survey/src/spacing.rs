@@ -30,10 +30,10 @@ pub(crate) fn duplicates(points: &[Vec3]) -> u64 {
 
 /// Each place of a point once.
 fn places(points: &[Vec3]) -> Vec<Vec3> {
-    let mut all: Vec<[u32; 3]> = points.iter().map(|p| p.to_array().map(|c| (c + 0.0).to_bits())).collect();
-    all.par_sort_unstable();
-    all.dedup();
-    all.into_iter().map(|bits| Vec3::from_array(bits.map(f32::from_bits))).collect()
+    let mut keys: Vec<[u32; 3]> = points.iter().map(|p| p.to_array().map(|c| (c + 0.0).to_bits())).collect();
+    keys.par_sort_unstable();
+    keys.dedup();
+    keys.into_iter().map(|bits| Vec3::from_array(bits.map(f32::from_bits))).collect()
 }
 
 /// Points in the order of the cells that they lie in.
@@ -144,9 +144,9 @@ mod tests {
             .collect();
         let lattice = Lattice::new(&points).unwrap();
         for p in &points {
-            let all =
+            let nearest =
                 points.iter().map(|q| f64::from(q.distance(*p))).filter(|d| *d > 0.0).fold(f64::INFINITY, f64::min);
-            assert_eq!(lattice.nearest(*p), all);
+            assert_eq!(lattice.nearest(*p), nearest);
         }
     }
 }

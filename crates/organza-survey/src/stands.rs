@@ -48,12 +48,15 @@ mod tests {
 
     #[test]
     fn layers_lie_flat_and_stand_along_their_thin_side() {
-        let of = |size: [f64; 3]| {
+        let up_axis = |size: [f64; 3]| {
             lies_flat_along(DAabb::new(DVec3::splat(7.0), DVec3::splat(7.0) + DVec3::from_array(size)))
         };
         // A terrain, a layer of clouds; a body, a wall that faces z, a layer along y, a plane.
-        assert_eq!([of([900.0, 700.0, 60.0]), of([64.0, 64.0, 16.0])], [Some(UpAxis::Z); 2]);
-        assert_eq!([of([2.0, 2.0, 1.8]), of([9.0, 1.0, 0.4]), of([9.0, 0.5, 9.0]), of([9.0, 9.0, 0.0])], [None; 4]);
+        assert_eq!([up_axis([900.0, 700.0, 60.0]), up_axis([64.0, 64.0, 16.0])], [Some(UpAxis::Z); 2]);
+        assert_eq!(
+            [up_axis([2.0, 2.0, 1.8]), up_axis([9.0, 1.0, 0.4]), up_axis([9.0, 0.5, 9.0]), up_axis([9.0, 9.0, 0.0])],
+            [None; 4]
+        );
         assert_eq!(
             cloud_stands_along(DAabb::new(DVec3::new(-1.0, -1.0, 0.0), DVec3::new(1.0, 1.0, 4.0))),
             Some(UpAxis::Z)
@@ -62,13 +65,13 @@ mod tests {
 
     #[test]
     fn things_stand_where_they_begin_at_zero_and_lie_about_it() {
-        let of =
+        let up_axis =
             |min: [f64; 3], max: [f64; 3]| stands_along(DAabb::new(DVec3::from_array(min), DVec3::from_array(max)));
-        assert_eq!(of([-2.0, -2.1, 0.01], [2.1, 2.0, 5.0]), Some(UpAxis::Z));
+        assert_eq!(up_axis([-2.0, -2.1, 0.01], [2.1, 2.0, 5.0]), Some(UpAxis::Z));
         // On y = 0, about the origin, beside it, flat.
-        assert_eq!(of([-2.0, 0.0, -2.0], [2.0, 5.0, 2.0]), None);
-        assert_eq!(of([-1.0; 3], [1.0; 3]), None);
-        assert_eq!(of([0.0; 3], [9.0; 3]), None);
-        assert_eq!(of([-1.0, -1.0, 0.0], [1.0, 1.0, 0.0]), None);
+        assert_eq!(up_axis([-2.0, 0.0, -2.0], [2.0, 5.0, 2.0]), None);
+        assert_eq!(up_axis([-1.0; 3], [1.0; 3]), None);
+        assert_eq!(up_axis([0.0; 3], [9.0; 3]), None);
+        assert_eq!(up_axis([-1.0, -1.0, 0.0], [1.0, 1.0, 0.0]), None);
     }
 }

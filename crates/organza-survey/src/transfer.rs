@@ -169,13 +169,13 @@ fn of_map(map: ColorMap, of_body: impl Fn(f64, [f32; 3], f64) -> Point) -> Vec<P
 fn of_both_signs(matter: &Matter, opposite: [f64; 2], map: ColorMap) -> Vec<Point> {
     const STEPS: usize = 8;
     let sides = [[matter.first, matter.last], opposite];
-    let one = |side: usize, step: usize| {
+    let point = |side: usize, step: usize| {
         let [first, last] = sides[side];
         let place = step as f64 / STEPS as f64;
         let sign = if last > first { 1.0 } else { -1.0 };
         Point { value: first + place * (last - first), color: map.at(0.5 + 0.5 * sign * place), weight: place * place }
     };
-    (0..2).flat_map(|side| (0..=STEPS).map(move |step| (side, step))).map(|(side, step)| one(side, step)).collect()
+    (0..2).flat_map(|side| (0..=STEPS).map(move |step| (side, step))).map(|(side, step)| point(side, step)).collect()
 }
 
 /// Values at places between two.
@@ -211,7 +211,7 @@ mod tests {
     fn a_ray_through_matter_loses_what_the_look_wants_whatever_the_unit() {
         for step in [0.001, 1.0, 250.0] {
             let grid = cube(step);
-            let matter = Matter::of(&grid).unwrap();
+            let matter = Matter::from_grid(&grid).unwrap();
             for look in
                 [None, Some(Look::Cloud), Some(Look::Map(ColorMap::VIRIDIS)), Some(Look::Field(ColorMap::VIRIDIS))]
             {
@@ -230,7 +230,7 @@ mod tests {
         let mut grid = cube(1.0);
         // Half of the cube has the other sign.
         (0..24 * 24 * 12).for_each(|i| grid.values[i] = -grid.values[i]);
-        let matter = Matter::of(&grid).unwrap();
+        let matter = Matter::from_grid(&grid).unwrap();
         for look in [None, Some(Look::Map(ColorMap::VIRIDIS)), Some(Look::Field(ColorMap::VIRIDIS))] {
             let transfer = Transfer::new(&grid, Some(&matter), look.as_ref());
             assert!(transfer.points.windows(2).all(|w| w[0].value < w[1].value), "{transfer:?}");
@@ -244,7 +244,7 @@ mod tests {
     fn values_rise_also_where_matter_is_darker_than_air() {
         let mut grid = cube(1.0);
         grid.values.iter_mut().for_each(|v| *v = 100.0 - *v);
-        let matter = Matter::of(&grid).unwrap();
+        let matter = Matter::from_grid(&grid).unwrap();
         let transfer = Transfer::new(&grid, Some(&matter), None);
         assert!(transfer.points.windows(2).all(|w| w[0].value < w[1].value));
         assert!(transfer.weight(0.0) > 0.9 && transfer.weight(100.0) < 0.01, "{transfer:?}");
@@ -266,7 +266,7 @@ mod tests {
                     flesh
                 };
             }
-            let matter = Matter::of(&grid).unwrap();
+            let matter = Matter::from_grid(&grid).unwrap();
             assert_eq!(matter.has_units(), units);
             let transfer = Transfer::new(&grid, Some(&matter), Some(&Look::CtBone));
             let [air, flesh, bone] = [air, flesh, bone].map(|v| transfer.weight(f64::from(v)));

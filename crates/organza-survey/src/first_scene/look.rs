@@ -76,7 +76,7 @@ pub(super) fn objects(data: &[DataFile], paths: &[String], wish: &Wish) -> Vec<O
     let mut materials: Vec<&str> = Vec::new();
     let mut clays = CLAYS.iter().cycle();
     let all_stand = all_stand(data);
-    let mut one = |(file, path): (&DataFile, &String)| {
+    let mut named_object = |(file, path): (&DataFile, &String)| {
         let mut name = file.name();
         let count = names.entry(name.clone()).or_insert(0);
         *count += 1;
@@ -124,7 +124,7 @@ pub(super) fn objects(data: &[DataFile], paths: &[String], wish: &Wish) -> Vec<O
         }
         Object { name, source: (object.source.0, path.clone()), ..object }
     };
-    data.iter().zip(paths).map(&mut one).collect()
+    data.iter().zip(paths).map(&mut named_object).collect()
 }
 
 /// Whether a preset changes how a file looks.
@@ -145,7 +145,7 @@ pub(super) fn all_stand(data: &[DataFile]) -> bool {
 
 fn object(file: &DataFile, preset: Option<&Preset>, colors: Option<String>) -> Object {
     let clay = Some((CLAY.0, CLAY.1, false));
-    let of = |key, about, material, keys| Object {
+    let bare = |key, about, material, keys| Object {
         about,
         name: String::new(),
         source: (key, String::new()),
@@ -161,21 +161,21 @@ fn object(file: &DataFile, preset: Option<&Preset>, colors: Option<String>) -> O
                 grouped(mesh.position.len() as u64),
                 sides(mesh.bounds())
             );
-            of("mesh", about, clay, colors.unwrap_or_default())
+            bare("mesh", about, clay, colors.unwrap_or_default())
         }
         SourceData::Points(points) => {
-            let all = points.position.iter().map(|p| points.origin + p.as_dvec3());
+            let positions = points.position.iter().map(|p| points.origin + p.as_dvec3());
             let what = match (points.gaussians.is_empty(), points.ready.cloud.is_empty()) {
                 (false, _) => "3D Gaussians",
                 (true, false) => "splats",
                 (true, true) => "points",
             };
-            let about = format!("{} {what}; {}", grouped(points.len() as u64), sides(DAabb::of_points(all)));
+            let about = format!("{} {what}; {}", grouped(points.len() as u64), sides(DAabb::of_points(positions)));
             let as_they_are = "# Colours of a photograph hold its light: they are shown as they are; name a material to light them.\n";
             match colors {
-                Some(colors) => of("points", about, clay, colors),
-                None if !file.has_colors() => of("points", about, clay, String::new()),
-                None => of("points", about, None, as_they_are.to_owned()),
+                Some(colors) => bare("points", about, clay, colors),
+                None if !file.has_colors() => bare("points", about, clay, String::new()),
+                None => bare("points", about, None, as_they_are.to_owned()),
             }
         }
         SourceData::Grid(grid) => {
@@ -195,7 +195,7 @@ fn object(file: &DataFile, preset: Option<&Preset>, colors: Option<String>) -> O
                     grid.dims[2],
                     sides(extent(grid))
                 );
-                return Object { labels: Some(labels), ..of("mesh", about, clay, keys) };
+                return Object { labels: Some(labels), ..bare("mesh", about, clay, keys) };
             }
             let look = volume_look(grid, matter.as_ref(), preset, file.stated_up.is_some());
             let material = match look {
@@ -206,17 +206,17 @@ fn object(file: &DataFile, preset: Option<&Preset>, colors: Option<String>) -> O
             let about =
                 format!("{} × {} × {} voxels; {}", grid.dims[0], grid.dims[1], grid.dims[2], sides(extent(grid)));
             let keys = volume_keys(grid, matter.as_ref(), look.as_ref());
-            of("volume", about, Some((material.0, material.1, false)), keys)
+            bare("volume", about, Some((material.0, material.1, false)), keys)
         }
         // Images are refused when they are read.
-        SourceData::Image(_) => of("environment", String::new(), None, String::new()),
+        SourceData::Image(_) => bare("environment", String::new(), None, String::new()),
     }
 }
 
 /// The labels of a volume that has such, unless its look is that of amounts.
 fn labels(grid: &Grid, matter: Option<&Matter>, preset: Option<&Preset>) -> Option<Labels> {
     let is_of_amounts = preset.is_some_and(|preset| preset.map().is_none());
-    if is_of_amounts || matter.is_some_and(Matter::has_units) { None } else { Labels::of(grid) }
+    if is_of_amounts || matter.is_some_and(Matter::has_units) { None } else { Labels::from_grid(grid) }
 }
 
 /// How a volume looks: a computed field in the colours of a map, a computed tomogram as bones in a film, unless its look has a name. What scanners measure comes in whole numbers, in
@@ -246,8 +246,8 @@ fn sides(bounds: DAabb) -> String {
 /// The least step of the lattice that a volume is drawn on, world units, and the largest one.
 pub(super) fn drawn_steps(grid: &Grid) -> [f64; 2] {
     let steps = [grid.axes.x_axis, grid.axes.y_axis, grid.axes.z_axis].map(|axis| axis.length());
-    let own = || [steps.into_iter().fold(f64::INFINITY, f64::min), steps.into_iter().fold(0.0, f64::max)];
-    coarser_spacing(grid).map_or_else(own, |spacing| [spacing; 2])
+    let grid_steps = || [steps.into_iter().fold(f64::INFINITY, f64::min), steps.into_iter().fold(0.0, f64::max)];
+    coarser_spacing(grid).map_or_else(grid_steps, |spacing| [spacing; 2])
 }
 
 /// The spacing that a large volume is drawn with instead of its own.
@@ -310,7 +310,7 @@ mod tests {
         let [bytes, units] = [ball(|r| (255.0 * libm::exp(-r / 12.0)).floor()), ball(|r| 900.0 - 60.1 * r)];
         let look = |grid: &Grid, name: Option<&str>, is_scan| {
             let preset = name.map(|name| Preset::named(name).expect("a look"));
-            volume_look(grid, Matter::of(grid).as_ref(), preset.as_ref(), is_scan)
+            volume_look(grid, Matter::from_grid(grid).as_ref(), preset.as_ref(), is_scan)
         };
         assert_eq!(look(&field, None, false), Some(Look::Field(ColorMap::VIRIDIS)));
         assert!(matches!(look(&field, Some("turbo"), false), Some(Look::Field(_))));
@@ -325,7 +325,7 @@ mod tests {
         let sign = |i: usize| if i < 864 { 1500.0 } else { -1500.0 };
         let values = field.values.iter().enumerate().map(|(i, value)| sign(i) * value).collect();
         let lobes = Grid { values, ..field };
-        assert!(Matter::of(&lobes).is_some_and(|matter| !matter.has_units() && matter.opposite.is_some()));
+        assert!(Matter::from_grid(&lobes).is_some_and(|matter| !matter.has_units() && matter.opposite.is_some()));
         assert!(matches!(look(&lobes, None, false), Some(Look::Field(_))));
     }
 

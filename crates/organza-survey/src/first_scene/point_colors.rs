@@ -63,11 +63,11 @@ fn classes(points: &RawPoints) -> String {
     let mut counts = [0u64; 256];
     points.classification.iter().for_each(|class| counts[usize::from(*class)] += 1);
     let there = (0..=255u8).map(|class| (class, counts[usize::from(class)])).filter(|(_, count)| *count > 0);
-    let one = |(class, count): (u8, u64)| {
+    let class_count = |(class, count): (u8, u64)| {
         let name = class_name(class).map(|name| format!(" ({name})")).unwrap_or_default();
         format!("{class}{name} {}", grouped(count))
     };
-    format!("Classes: {}.", there.map(one).collect::<Vec<_>>().join(", "))
+    format!("Classes: {}.", there.map(class_count).collect::<Vec<_>>().join(", "))
 }
 
 #[cfg(test)]
