@@ -137,7 +137,7 @@ impl Artist {
         if request.has_own_camera {
             let first =
                 found.map_or_else(|| Viewpoint::of_scene(&scene), |f| Viewpoint::of_camera(&f.camera, f.target));
-            desk.set_own(first);
+            desk.set_scene_viewpoint(first);
         }
         if desk.wants_rungs() {
             // What was measured of another scene, or from elsewhere, says nothing of this one.

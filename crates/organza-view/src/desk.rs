@@ -102,8 +102,8 @@ struct Papers {
     /// Whether they were asked for since a picture was measured.
     is_asked: bool,
     failure: Option<Failure>,
-    /// The viewpoint of the scene's own camera.
-    own: Viewpoint,
+    /// The viewpoint of the camera that the scene states.
+    scene_viewpoint: Viewpoint,
     is_closed: bool,
 }
 
@@ -132,7 +132,7 @@ pub(crate) struct Seen {
 }
 
 impl Desk {
-    pub(crate) fn new(own: Viewpoint) -> Self {
+    pub(crate) fn new(scene_viewpoint: Viewpoint) -> Self {
         let papers = Papers {
             version: 0,
             newest: None,
@@ -147,7 +147,7 @@ impl Desk {
             rungs: None,
             is_asked: false,
             failure: None,
-            own,
+            scene_viewpoint,
             is_closed: false,
         };
         Self { papers: Mutex::new(papers), changed: Condvar::new(), versions: watch::Sender::new(0) }
@@ -205,12 +205,12 @@ impl Desk {
     }
 
     /// The viewpoint of the scene's own camera.
-    pub(crate) fn own(&self) -> Viewpoint {
-        self.papers().own
+    pub(crate) fn scene_viewpoint(&self) -> Viewpoint {
+        self.papers().scene_viewpoint
     }
 
-    pub(crate) fn set_own(&self, own: Viewpoint) {
-        self.papers().own = own;
+    pub(crate) fn set_scene_viewpoint(&self, viewpoint: Viewpoint) {
+        self.papers().scene_viewpoint = viewpoint;
     }
 
     /// Asks for a picture in the place of all others. What is in the making is stopped, unless it is a coarse picture.

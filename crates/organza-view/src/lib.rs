@@ -4,9 +4,8 @@
 //! page ─ events ─► session ─► state ─► scene ─► artist ─► picture, coarse, then whole ─► page
 //! (src/page)       (session)  (state)            (artist)  (picture)
 //!        └─ server, serving: HTTP on the loopback, one token, two clients ─┘
-//! ```
-//! All but `server` and `serving` knows neither a window nor a network: a [`Session`] takes [`Event`]s and hands out pictures. The last picture of
-//! each state has the bits of [`organza::render`] of the same scene.
+//! ``` Only `server` and `serving` know a network, and no module knows a window: a [`Session`] takes [`Event`]s and returns pictures. The last
+//! picture of each state has the bits of [`organza::render`] of the same scene.
 //!
 //! ```
 //! use organza::RenderOptions;

@@ -192,7 +192,7 @@ impl Session {
     /// Errors of the scene with these changes; the state is then as before.
     pub fn apply(&self, events: &[Event]) -> Result<(), Error> {
         let mut studio = self.studio();
-        let first = self.desk.own();
+        let first = self.desk.scene_viewpoint();
         let mut state = studio.state.clone();
         events.iter().try_for_each(|event| state.apply(event, &studio.stated, &first))?;
         studio.take(state, &self.desk)?;
@@ -209,7 +209,7 @@ impl Session {
     pub fn centre_on(&self, place: PicturePlace) -> Result<bool, Error> {
         let Some(depths) = self.desk.wait_for_depths(LOOK_BELOW) else { return Ok(false) };
         let Some(centre) = depths.point_at(place) else { return Ok(false) };
-        let viewpoint = self.studio().state.viewpoint().copied().unwrap_or_else(|| self.desk.own());
+        let viewpoint = self.studio().state.viewpoint().copied().unwrap_or_else(|| self.desk.scene_viewpoint());
         self.apply(&[Event::LookFrom {
             azimuth: viewpoint.azimuth.to_degrees(),
             elevation: viewpoint.elevation.to_degrees(),
@@ -225,7 +225,7 @@ impl Session {
     /// Errors of the scene with the other events; the state is then as before.
     pub fn play(&self, events: &[Event]) -> Result<Vec<String>, Error> {
         let mut studio = self.studio();
-        let first = self.desk.own();
+        let first = self.desk.scene_viewpoint();
         let mut state = studio.state.clone();
         let mut left_out = Vec::new();
         for (rank, event) in events.iter().enumerate() {
@@ -334,7 +334,7 @@ impl Session {
     pub fn shown(&self) -> Shown {
         let studio = self.studio();
         let Seen { version, picture, failure, drawing, whole, effects, curves, rungs } = self.desk.seen();
-        let viewpoint = studio.state.viewpoint().copied().unwrap_or_else(|| self.desk.own());
+        let viewpoint = studio.state.viewpoint().copied().unwrap_or_else(|| self.desk.scene_viewpoint());
         let row = |object: &SceneObject| ObjectRow {
             name: object.name.clone(),
             kind: kind_of(&object.source),

@@ -93,9 +93,9 @@ fn of_points(points: &RawPoints, place: DVec3) -> Vec<NamedValue> {
     let nearest = points.position.iter().enumerate().map(distance).min_by(|a, b| a.1.total_cmp(&b.1));
     let Some((rank, _)) = nearest else { return Vec::new() };
     let of_columns = points.columns.iter().filter_map(|column| Some((column.name.clone(), *column.values.get(rank)?)));
-    let own = points.value.get(rank).map(|value| (points.value_name().to_owned(), f64::from(*value)));
+    let scalar = points.value.get(rank).map(|value| (points.value_name().to_owned(), f64::from(*value)));
     let class = points.classification.get(rank).map(|class| ("classification".to_owned(), f64::from(*class)));
-    let named = of_columns.chain(own).chain(class).filter(|(_, value)| value.is_finite());
+    let named = of_columns.chain(scalar).chain(class).filter(|(_, value)| value.is_finite());
     named.map(|(name, value)| NamedValue { name, value }).take(MOST_COLUMNS).collect()
 }
 
@@ -152,7 +152,7 @@ mod tests {
             columns: vec![splat_core::Column { name: "height".into(), values: vec![1.5, f64::NAN] }],
             ..RawPoints::default()
         };
-        let of = |x| of_points(&points, DVec3::new(x, 0.1, 0.0)).iter().map(|v| v.value).collect::<Vec<_>>();
-        assert_eq!((of(0.2), of(0.9)), (vec![1.5, 5.0], vec![7.0]));
+        let values_at = |x| of_points(&points, DVec3::new(x, 0.1, 0.0)).iter().map(|v| v.value).collect::<Vec<_>>();
+        assert_eq!((values_at(0.2), values_at(0.9)), (vec![1.5, 5.0], vec![7.0]));
     }
 }

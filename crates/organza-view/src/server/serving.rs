@@ -132,7 +132,7 @@ enum Route<'p> {
 }
 
 impl<'p> Route<'p> {
-    fn of(path: &'p str) -> Option<Self> {
+    fn from_path(path: &'p str) -> Option<Self> {
         Some(match path {
             "" => Self::Page,
             "page.js" => Self::Script(SCRIPT),
@@ -173,7 +173,7 @@ async fn answered(counter: &Arc<Counter>, request: Request<Incoming>) -> Result<
     if !counter.token.is(token) {
         return Err(unknown());
     }
-    let route = Route::of(path).ok_or_else(|| Refusal::new(StatusCode::NOT_FOUND, "there is nothing here"))?;
+    let route = Route::from_path(path).ok_or_else(|| Refusal::new(StatusCode::NOT_FOUND, "there is nothing here"))?;
     if *request.method() != route.method() {
         return Err(Refusal::new(StatusCode::METHOD_NOT_ALLOWED, "this address takes another method"));
     }
