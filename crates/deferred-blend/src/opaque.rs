@@ -107,11 +107,13 @@ pub struct Opaque {
 /// }
 /// let view = Projection::Orthographic { height: 4.0 };
 /// let camera = Camera::look_at(DVec3::Z * 3.0, DVec3::ZERO, DVec3::Y, view, [64, 64])?;
-/// let (footprints, materials, params) = (&FootprintStack::default(), &[Material::default()], &Params::default());
+/// let footprints = &FootprintStack::default();
+/// let materials = &[Material::default()];
+/// let params = &Params::default();
 /// let discs = Discs::project(&DiscInput { cloud: &cloud, ids: &[0, 1], camera: &camera, footprints, materials }, params);
 /// let passes = Passes::OnePlusOne { groups: &Groups::new(2, vec![0, 1])?, voronoi: true };
-/// let (values, max_bytes) = (&[0.2, 0.4], 1 << 30);
-/// let input = OpaqueInput { discs: &discs, shown: Shown::Discs(values), channels: 1, objects: false, passes, max_bytes };
+/// let values = &[0.2, 0.4];
+/// let input = OpaqueInput { discs: &discs, shown: Shown::Discs(values), channels: 1, objects: false, passes, max_bytes: 1 << 30 };
 /// let seen = resolve_opaque(&input, params, None)?;
 /// let middle = 32 * 64 + 36;
 /// assert!((seen.image.depth[middle] - 3.0).abs() < 1e-6 && (seen.image.channels[0][middle] - 0.3).abs() < 1e-6);

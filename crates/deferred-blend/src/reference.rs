@@ -88,7 +88,7 @@ pub fn picture(
         let [x, y] = squares_of(input, id, params);
         y.for_each(|y| x.clone().for_each(|x| squares[(y * columns + x) as usize].push(id)));
     }
-    let one = |k: u32| {
+    let pixel = |k: u32| {
         let x = k % width;
         let y = k / width;
         let ids = &squares[(y / SIDE * columns + x / SIDE) as usize];
@@ -97,7 +97,7 @@ pub fn picture(
         layers.retain(|layer| layer.depth < limit);
         composite(&layers, sizes[0], sizes[1])
     };
-    (0..width * height).into_par_iter().map(one).collect()
+    (0..width * height).into_par_iter().map(pixel).collect()
 }
 
 /// Columns and rows of squares in which the ball around a disc may lie.

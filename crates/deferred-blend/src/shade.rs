@@ -146,7 +146,8 @@ impl Light<'_> {
 
     /// ∇h of bumps on a surface across `normal`.
     fn slope(&self, place: &Place<'_>, position: Vec3, normal: Vec3) -> Vec3 {
-        let (cloud, material) = (self.input.cloud, self.input.cloud.material[place.disc] as usize);
+        let cloud = self.input.cloud;
+        let material = cloud.material[place.disc] as usize;
         let Similarity { scale, rotation, translation } = self.transforms[cloud.object[place.disc] as usize];
         let at = rotation.inverse() * (cloud.origin + position.as_dvec3() - translation) / scale;
         let bump = &self.input.materials[material].bump;

@@ -28,7 +28,8 @@ struct Part {
 /// use splat_core::{ScalarField, glam::DVec3};
 /// use std::sync::Arc;
 /// let parse = |text: &str| -> SharedField { Arc::new(ExpressionField::parse(text).unwrap()) };
-/// let (ball, slab) = (parse("x^2 + y^2 + z^2 - 1"), parse("z^2 - 0.25"));
+/// let ball = parse("x^2 + y^2 + z^2 - 1");
+/// let slab = parse("z^2 - 0.25");
 /// let ring = CombinedField::difference(ball, slab);
 /// assert!(ring.value(DVec3::ZERO) > 0.0 && ring.value(DVec3::Z * 0.75) < 0.0);
 /// ```

@@ -140,7 +140,8 @@ impl MpuField {
     /// use field::{MpuField, MpuParams, SurfaceSample};
     /// use splat_core::{ScalarField, glam::DVec3};
     /// let on_ball = |i: i32| {
-    ///     let (y, a) = (1.0 - 2.0 * (f64::from(i) + 0.5) / 2000.0, f64::from(i) * 2.399_963);
+    ///     let y = 1.0 - 2.0 * (f64::from(i) + 0.5) / 2000.0;
+    ///     let a = f64::from(i) * 2.399_963;
     ///     let place = DVec3::new(a.cos() * (1.0 - y * y).sqrt(), y, a.sin() * (1.0 - y * y).sqrt());
     ///     SurfaceSample { position: place, normal: place.normalize() }
     /// };

@@ -53,10 +53,17 @@ impl InsertionLists {
 pub fn optical_depth(cloud: &Cloud, footprints: &FootprintStack, from: DVec3, to: DVec3) -> f64 {
     let length = (to - from).length();
     let direction = (to - from) / length;
-    (0..cloud.len()).map(|i| one(cloud, footprints, i, from, direction, length)).sum()
+    (0..cloud.len()).map(|i| splat_absorbance(cloud, footprints, i, from, direction, length)).sum()
 }
 
-fn one(cloud: &Cloud, footprints: &FootprintStack, i: usize, from: DVec3, direction: DVec3, length: f64) -> f64 {
+fn splat_absorbance(
+    cloud: &Cloud,
+    footprints: &FootprintStack,
+    i: usize,
+    from: DVec3,
+    direction: DVec3,
+    length: f64,
+) -> f64 {
     let [radius, k] = [cloud.radius[i], cloud.cross_section[i]].map(f64::from);
     let centre = cloud.position[i].as_dvec3() - from;
     let footprint = footprints.layers()[cloud.footprint[i] as usize % footprints.layers().len()];

@@ -90,7 +90,8 @@ pub fn weighted_coloring(
 /// If `groups` are not of the graph's cloud.
 pub fn weighted_cost(graph: &OverlapGraph, groups: &Groups, gap: f32) -> Result<f64, Error> {
     check_gap(gap)?;
-    let (shares, group) = (mutual_shares(graph, gap), |node: usize| groups.by_disc()[graph.place(node)]);
+    let shares = mutual_shares(graph, gap);
+    let group = |node: usize| groups.by_disc()[graph.place(node)];
     let overlap = |node: usize| -> f64 {
         let edges = graph.neighbors(node).iter().map(|&n| n as usize).zip(&shares[graph.row(node)]);
         let later = edges.filter(|&(n, _)| n > node && group(n) == group(node));

@@ -24,7 +24,7 @@ pub(super) fn turned(light: &Light<'_>, discs: &Discs, image: &OpaqueImage, disc
         let at = |c: usize| image.channels[first + c][k];
         Vec3::new(at(0), at(1), at(2)).normalize_or_zero()
     };
-    let one = |k: usize| {
+    let turned_normals = |k: usize| {
         let radius = light.input.cloud.radius[*disc.get(k).filter(|disc| **disc != u32::MAX)? as usize];
         let to_eye = light.toward_eye(discs.place(&discs.ray([k % width, k / width]), image.depth[k]));
         let here = normal(k, 0);
@@ -51,5 +51,5 @@ pub(super) fn turned(light: &Light<'_>, discs: &Discs, image: &OpaqueImage, disc
             (k, [a, b, c, d, e, f])
         })
     };
-    (0..width * height).into_par_iter().filter_map(one).collect()
+    (0..width * height).into_par_iter().filter_map(turned_normals).collect()
 }

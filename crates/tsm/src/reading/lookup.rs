@@ -121,7 +121,8 @@ impl ShadowMap {
         receivers: &[Receiver],
     ) -> [[f32; C]; R] {
         let mut cells: Four<_, R> = [[None; 4]; R];
-        let (mut distances, mut weights): (Four<_, R>, Four<_, R>) = ([[[0.0; 2]; 4]; R], [[0.0; 4]; R]);
+        let mut distances: Four<_, R> = [[[0.0; 2]; 4]; R];
+        let mut weights: Four<_, R> = [[0.0; 4]; R];
         for (r, receiver) in receivers.iter().enumerate() {
             let Some((target, place)) = self.target(mapping, receiver) else { continue };
             let is_creased = mapping.is_creased(place.at, Vec2::ONE);
@@ -203,7 +204,8 @@ impl ShadowMap {
         n: usize,
     ) -> Four<[f32; C], R> {
         let mut absorbance: Four<_, R> = [[[0.0; C]; 4]; R];
-        let (mut nearest, mut surfaces): (Four<_, R>, Four<_, R>) = ([[0.0; 4]; R], [[0.0; 4]; R]);
+        let mut nearest: Four<_, R> = [[0.0; 4]; R];
+        let mut surfaces: Four<_, R> = [[0.0; 4]; R];
         let mut is_dark: Four<_, R> = [[false; 4]; R];
         for r in 0..n {
             for k in 0..4 {
