@@ -15,7 +15,6 @@ mod closed_forms;
 mod command;
 mod compositing;
 mod converted;
-mod doubts;
 mod effects;
 mod environment;
 mod every_key;
@@ -76,6 +75,7 @@ mod truth;
 #[cfg(all(unix, feature = "view"))]
 mod vectorised;
 mod view;
+mod warnings;
 mod whole_fields;
 
 /// What takes long and rarely fails where the others hold: `cargo xtask deep`.

@@ -34,7 +34,6 @@
 mod brightness;
 mod choose;
 pub mod cost;
-mod doubts;
 mod draw;
 mod error;
 mod form;
@@ -52,6 +51,7 @@ mod shadows;
 mod stage;
 pub mod statistics;
 mod technique;
+mod warnings;
 
 pub use convert::Cache;
 pub use draw::{Planned, draw_loaded};

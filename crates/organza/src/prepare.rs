@@ -26,7 +26,7 @@ use crate::scene::{
 use crate::shadows::{Probe, Shadowing};
 use crate::statistics::{ObjectData, ObjectStatistics, Statistics};
 use crate::technique::{Fold, Row};
-use crate::{CostRecord, Error, Progress, RenderOptions, SplatCount, doubts, shadows};
+use crate::{CostRecord, Error, Progress, RenderOptions, SplatCount, shadows, warnings};
 use convert::DiscSize;
 pub use seen::{fitted, seen, settled};
 use splat_core::shade::Census;
@@ -83,9 +83,9 @@ pub fn explain_from(
     explanation.predicted = prediction(&frame, &folds, &ranges(&frame), options);
     explanation.found = found;
     explanation.warnings.extend(settle::said(&scene, &explanation.plan.estimates).warnings);
-    explanation.warnings.extend(doubts::of_shadows(&explanation.plan.shadow_limits()));
-    explanation.warnings.extend(doubts::of_costly(explanation.plan.tables()));
-    explanation.warnings.extend(doubts::of_scattering(&explanation.plan));
+    explanation.warnings.extend(warnings::of_shadows(&explanation.plan.shadow_limits()));
+    explanation.warnings.extend(warnings::of_costly(explanation.plan.tables()));
+    explanation.warnings.extend(warnings::of_scattering(&explanation.plan));
     progress.finish();
     Ok(explanation)
 }
@@ -153,9 +153,9 @@ pub(crate) fn prepare<'a>(
         None => (load_measured(scene, options, progress, files, &mut cost)?, None),
     };
     let splats = loaded.splats.clone();
-    let notes_of_scene: Vec<String> = doubts::clear_shadows(scene, &loaded).collect();
+    let notes_of_scene: Vec<String> = warnings::clear_shadows(scene, &loaded).collect();
     let mut warnings = loaded.warnings.clone();
-    warnings.extend(doubts::of_scene(scene, &loaded));
+    warnings.extend(warnings::of_scene(scene, &loaded));
     warnings.extend(unshown(scene));
     warnings.extend(carried::unshadowed(scene, &loaded));
     // Of fields of a file the file alone knows what it holds.
@@ -194,11 +194,11 @@ pub(crate) fn prepare<'a>(
     let memory = planned.memory;
     let mut notes = loaded.notes.clone();
     notes.extend(notes_of_scene);
-    notes.extend(doubts::without_part(&scene));
+    notes.extend(warnings::without_part(&scene));
     let said = settle::said(&scene, &plan.estimates);
     // Of a technique that the plan chose a warning tells what it lacks.
     if said.warnings.is_empty() {
-        notes.extend(doubts::lacking(&plan));
+        notes.extend(warnings::lacking(&plan));
     }
     notes.extend(said.notes);
     let chosen = settle::foreseen_bytes(&scene, &loaded.facts);

@@ -19,7 +19,7 @@ use crate::prepare::{
 use crate::ranges::ranges;
 use crate::scene::{FoundCamera, Scene, SceneObject, Technique};
 use crate::technique::{Checkpoint, Fold, Kept, Session, Sets};
-use crate::{CostRecord, Error, Layers, Progress, RenderOptions, doubts};
+use crate::{CostRecord, Error, Layers, Progress, RenderOptions, warnings};
 use convert::ColorScale;
 use splat_core::Arrived;
 use std::path::PathBuf;
@@ -206,7 +206,7 @@ pub(crate) fn render_keeping(
     let Explanation { plan: shown, mut cost, mut warnings, notes, .. } = explanation;
     // Do not warn of an empty picture if loading has already warned of the reason.
     let is_empty = loaded.cloud.is_empty() && loaded.own.is_empty();
-    let doubtful = is_empty || warnings.len() > loaded.warnings.len();
+    let has_reason = is_empty || warnings.len() > loaded.warnings.len();
     warnings.extend(settle::said(scene, &plan.estimates).warnings);
     warnings.extend(drawn_anew(scene, &left.by, &plan.by));
     left.by.clone_from(&plan.by);
@@ -239,17 +239,17 @@ pub(crate) fn render_keeping(
         }
     };
     let Session { sets, predicted, .. } = session;
-    let is_judged = !doubtful && scene.frames.is_none();
-    let coarse = is_judged.then(|| frame.coarse()).flatten().and_then(doubts::of_cells);
+    let is_judged = !has_reason && scene.frames.is_none();
+    let coarse = is_judged.then(|| frame.coarse()).flatten().and_then(warnings::of_cells);
     let leaves = frame.leaves();
     let backend = helper.as_ref().map_or_else(|| "cpu".to_owned(), |helper| helper.name());
-    if !doubtful {
-        warnings.extend(doubts::of_picture(scene, &layers));
+    if !has_reason {
+        warnings.extend(warnings::of_picture(scene, &layers));
     }
-    warnings.extend(doubts::of_shadows(&leaves.shadow_limits(plan)));
-    warnings.extend(doubts::of_costly(plan.tables()));
+    warnings.extend(warnings::of_shadows(&leaves.shadow_limits(plan)));
+    warnings.extend(warnings::of_costly(plan.tables()));
     warnings.extend(coarse);
-    warnings.extend(doubts::of_scattering(plan));
+    warnings.extend(warnings::of_scattering(plan));
     warnings.extend(helper.as_ref().and_then(|_| left_to_processor(plan)));
     warnings.extend(helper.map(|helper| helper.said()).unwrap_or_default());
     let scales = loaded.scales.clone();

@@ -122,15 +122,15 @@ pub struct Notes {
     pub columns: Vec<NamedColumn>,
     /// What was made of the data that its user should know, one sentence without a full stop each.
     pub remarks: Vec<String>,
-    /// What of the data a picture will not show as it is, one sentence without a full stop each: more than a remark.
+    /// Data that a picture will show changed, one sentence without a full stop each: more than a remark.
     pub warnings: Vec<String>,
-    /// What was mended in it, one entry a kind of fault.
+    /// Repairs of the file, an entry for each kind of fault.
     pub mended: Vec<Mended>,
 }
 
 impl Notes {
-    /// What is doubtful of a picture of the data of a file of this name, one sentence each.
-    pub fn doubts<'n>(&'n self, file: &'n str) -> impl Iterator<Item = String> + 'n {
+    /// Warnings about pictures of the data, one sentence each; `file` is the file's name.
+    pub fn picture_warnings<'n>(&'n self, file: &'n str) -> impl Iterator<Item = String> + 'n {
         self.mended.iter().map(Mended::to_string).chain(self.warnings.iter().map(move |said| format!("{file}: {said}")))
     }
 

@@ -42,9 +42,9 @@ fn memory_stays_within_what_is_explained_effects_sum_to_beauty_and_nothing_is_do
         let name = scene.display();
         let explained = explained(&scene);
         let warnings = explained["warnings"].as_array().unwrap().iter().map(|w| w.as_str().unwrap());
-        let doubts: Vec<_> =
+        let warnings: Vec<_> =
             warnings.filter(|w| ["light", "camera", "picture"].iter().any(|of| w.contains(of))).collect();
-        assert!(doubts.is_empty(), "{name}: {doubts:?}");
+        assert!(warnings.is_empty(), "{name}: {warnings:?}");
 
         let bytes = explained["memory_bytes"].as_u64().unwrap();
         let folder = tempfile::tempdir().unwrap();

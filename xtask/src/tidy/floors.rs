@@ -19,7 +19,7 @@ const FLOORS: [&[&str]; 16] = [
     &["frame"],
     &["technique"],
     &["choose"],
-    &["doubts", "ranges"],
+    &["warnings", "ranges"],
     &["predict"],
     &["draw", "prepare"],
     &["render"],

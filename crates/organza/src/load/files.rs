@@ -144,7 +144,7 @@ impl Files {
                 read
             }
         };
-        add(&self.mended, made.doubts(&name));
+        add(&self.mended, made.picture_warnings(&name));
         let points = if let SourceData::Points(points) = data { Some(points) } else { None };
         let unused = points.into_iter().flat_map(|points| points.not_asked_for(&limits.columns));
         add(&self.notes, notes.sentences(&name, unused));
@@ -210,7 +210,7 @@ impl Files {
         let (data, notes) = read.map_err(|e| Error::from_read(path, &e))?;
         let what = crate::printable(path);
         let mut held = memory.take(&what, data.bytes()).map_err(Error::Limit)?;
-        add(&self.mended, notes.doubts(&crate::printable(path)));
+        add(&self.mended, notes.picture_warnings(&crate::printable(path)));
         let data = match data {
             Loaded::Mesh(mut mesh) => {
                 let _parted = memory.take(&what, splat_core::crease_bytes(&mesh)).map_err(Error::Limit)?;

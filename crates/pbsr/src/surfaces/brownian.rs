@@ -92,8 +92,8 @@ pub struct BrownianReport {
 const MISCOUNTED: f64 = 0.1;
 
 impl BrownianReport {
-    /// Where counting spheres count another area than there is, in words.
-    pub fn doubt(&self) -> Option<String> {
+    /// Warns, in words, if the counting spheres miscount the area.
+    pub fn warning(&self) -> Option<String> {
         let more = self.area / self.area_by_lines - 1.0;
         (more.abs() > MISCOUNTED).then(|| {
             format!(

@@ -76,8 +76,8 @@ impl LineReport {
         unseen + self.stray_area / (self.area + self.stray_area).max(f64::MIN_POSITIVE)
     }
 
-    /// What the survey could not settle, in words.
-    pub fn doubts(&self) -> impl Iterator<Item = String> {
+    /// Warnings about questions that the survey could not settle, in words.
+    pub fn warnings(&self) -> impl Iterator<Item = String> {
         let broken = (self.broken > 0)
             .then(|| format!("its field is not finite on {} pieces of {} lines", self.broken, self.lines));
         let percent = 100.0 * self.missed();
@@ -199,7 +199,7 @@ impl<'a> LineSampler<'a> {
 
     /// Fills the report: lines at even shares of all, so that each part of the surface has its own.
     fn survey(&mut self) {
-        let one = |i: u32| {
+        let line_counts = |i: u32| {
             let mut stream = Stream::new(self.params.seed, Stage::Survey, 0, u64::from(i));
             let leaf = self.leaf_at((f64::from(i) + stream.unit()) / f64::from(SURVEY_LINES));
             let mut fine = Found::default();
@@ -226,7 +226,8 @@ impl<'a> LineSampler<'a> {
             self.search(leaf, &line, 16, &mut fine);
             ([roots, self.inside(&line, &fine), unproven, fine.broken], area)
         };
-        let surveyed: Vec<([u64; 4], f64)> = (0..SURVEY_LINES).into_par_iter().with_min_len(64).map(one).collect();
+        let surveyed: Vec<([u64; 4], f64)> =
+            (0..SURVEY_LINES).into_par_iter().with_min_len(64).map(line_counts).collect();
         let count = |k: usize| surveyed.iter().map(|(n, _)| n[k]).sum();
         self.report = LineReport {
             lines: u64::from(SURVEY_LINES),
@@ -245,7 +246,7 @@ impl<'a> LineSampler<'a> {
     fn strays(&self, empty: &[Empty]) -> f64 {
         let reach = |side| Leaf::open(DVec3::ZERO, side).reach();
         let sum: f64 = empty.iter().map(|level| level.corners.len() as f64 * reach(level.side)).sum();
-        let one = |i: u32| {
+        let line_roots = |i: u32| {
             let mut stream = Stream::new(self.params.seed, Stage::Survey, 1, u64::from(i));
             let mut share = sum * (f64::from(i) + stream.unit()) / f64::from(STRAY_LINES);
             for Empty { corners, side } in empty {
@@ -261,7 +262,7 @@ impl<'a> LineSampler<'a> {
             0
         };
         let lines = if sum > 0.0 { STRAY_LINES } else { 0 };
-        let roots: u64 = (0..lines).into_par_iter().with_min_len(64).map(one).sum();
+        let roots: u64 = (0..lines).into_par_iter().with_min_len(64).map(line_roots).sum();
         roots as f64 / f64::from(STRAY_LINES) * sum
     }
 

@@ -15,44 +15,44 @@ const DEEPEST: f64 = 64.0;
 impl<'a> Source<'a> {
     pub(super) fn sampler(
         &self,
-        own: &'a Own,
+        native: &'a Own,
         warnings: &mut Vec<String>,
     ) -> Result<Box<dyn Sampler + 'a>, pbsr::Error> {
-        let bare = self.bare(own, warnings)?;
-        let Some((field, opacity)) = &own.field else { return Ok(bare) };
+        let bare = self.bare(native, warnings)?;
+        let Some((field, opacity)) = &native.field else { return Ok(bare) };
         let unit = self.look.color_unit;
         let shown = move |place| field.at(place, *opacity).map(|(color, share)| (color.map(|c| c / unit), share));
         Ok(Box::new(ShownSampler::new(bare, Box::new(shown), self.seed)))
     }
 
     /// The same without a field that it shows.
-    fn bare(&self, own: &'a Own, warnings: &mut Vec<String>) -> Result<Box<dyn Sampler + 'a>, pbsr::Error> {
-        let named = |doubt: String| format!("object '{}': {doubt}", crate::shown(&self.name));
-        Ok(match &own.body {
+    fn bare(&self, native: &'a Own, warnings: &mut Vec<String>) -> Result<Box<dyn Sampler + 'a>, pbsr::Error> {
+        let named = |warning: String| format!("object '{}': {warning}", crate::shown(&self.name));
+        Ok(match &native.body {
             Body::Surface { field, inside, spacing, step } => {
-                let bounds = own.bounds;
+                let bounds = native.bounds;
                 let surface = ImplicitSurface { field: field.as_ref(), level: 0.0, bounds, inside: Some(inside) };
                 let width = bounds.size().max_element();
                 let lines = LineParams::for_spacing(width, *spacing);
                 if let Some(step) = step {
                     let paper = BrownianParams::for_width(width);
                     let walk = BrownianParams { step: step * width, resolution: lines.resolution, ..paper };
-                    let sampler = BrownianSampler::new(&surface, &walk, &self.surface(own))?;
-                    warnings.extend(sampler.report().doubt().map(named));
+                    let sampler = BrownianSampler::new(&surface, &walk, &self.surface(native))?;
+                    warnings.extend(sampler.report().warning().map(named));
                     return Ok(Box::new(sampler));
                 }
-                let sampler = LineSampler::new(&surface, &lines, &self.surface(own), None)?;
-                warnings.extend(sampler.report().doubts().map(named));
+                let sampler = LineSampler::new(&surface, &lines, &self.surface(native), None)?;
+                warnings.extend(sampler.report().warnings().map(named));
                 Box::new(sampler)
             }
             Body::Lattice { grid, interpolation, level } => {
-                Box::new(LatticeSampler::new(grid, *interpolation, *level, &self.surface(own))?)
+                Box::new(LatticeSampler::new(grid, *interpolation, *level, &self.surface(native))?)
             }
-            Body::Triangles(mesh) => Box::new(MeshSampler::new(mesh, &self.surface(own), None)?),
+            Body::Triangles(mesh) => Box::new(MeshSampler::new(mesh, &self.surface(native), None)?),
             Body::Cells { grid, transfer, normals, cut, .. } => {
                 let params = VolumeParams {
                     cross_section: self.cross_section,
-                    extinction_scale: own.extinction_scale,
+                    extinction_scale: native.extinction_scale,
                     normals: *normals,
                     seed: self.seed,
                 };
@@ -64,15 +64,15 @@ impl<'a> Source<'a> {
                 let chains = MetropolisParams { stride, ..MetropolisParams::default() };
                 Box::new(MetropolisSampler::owning(grid, transfer, &params, &chains, kept)?)
             }
-            Body::Field(field) => self.field(own, field)?,
+            Body::Field(field) => self.field(native, field)?,
         })
     }
 
-    fn field<'b>(&self, own: &Own, field: &'b BoundedExtinction) -> Result<Box<dyn Sampler + 'b>, pbsr::Error> {
+    fn field<'b>(&self, native: &Own, field: &'b BoundedExtinction) -> Result<Box<dyn Sampler + 'b>, pbsr::Error> {
         let extinction = Density { field, max: field.max() };
         let bounds = field.bounds();
         let cells = field.cells();
-        let color = self.color(own);
+        let color = self.color(native);
         Ok(Box::new(FieldVolumeSampler::new(
             extinction,
             bounds,
@@ -81,18 +81,18 @@ impl<'a> Source<'a> {
     }
 
     /// The colour that the data's are multiplied with, in the unit of the object's colours.
-    fn color(&self, own: &Own) -> [f32; 3] {
-        own.color.map(|c| c / self.look.color_unit)
+    fn color(&self, native: &Own) -> [f32; 3] {
+        native.color.map(|c| c / self.look.color_unit)
     }
 
-    fn surface(&self, own: &Own) -> SurfaceParams {
+    fn surface(&self, native: &Own) -> SurfaceParams {
         SurfaceParams {
-            opacity: own.opacity,
+            opacity: native.opacity,
             cross_section: self.cross_section,
             surface_opacity: self.look.material.surface_opacity,
             // Without extinction there is no particle, whatever the factor.
-            extinction_factor: if own.extinction_factor > 0.0 { own.extinction_factor } else { 1.0 },
-            color: self.color(own),
+            extinction_factor: if native.extinction_factor > 0.0 { native.extinction_factor } else { 1.0 },
+            color: self.color(native),
             opaque_optical_depth: DEEPEST,
             seed: self.seed,
         }

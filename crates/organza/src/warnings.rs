@@ -1,5 +1,6 @@
-//! What a picture would fail to show, and what to change: a scene without light, things outside the view, a picture of one
-//! colour. None is an error, and none is said of an [animation]: there things come into view and fade.
+//! Warnings about content that a picture would fail to show, each with its remedy: a scene without light, objects outside
+//! the view, a picture of one colour. A warning is no error. An [animation] gets no such warnings, because its objects
+//! come into view and fade.
 
 mod keys;
 mod small;
@@ -118,7 +119,7 @@ fn turned_away(loaded: &Loaded) -> Vec<String> {
     let splats = (!cloud.is_empty()).then(|| cloud.bounds()).map(|b| DAabb::new(around(b.min), around(b.max)));
     let boxes: Vec<DAabb> = loaded.own.iter().map(Own::world_box).chain(splats).collect();
     let unit = libm::exp2(f64::from(loaded.exponent));
-    let one = |light: &SceneLight| {
+    let warning = |light: &SceneLight| {
         let shape = &light.light.shape;
         let at = shape.place()?;
         let normal = shape.normal()?;
@@ -133,7 +134,7 @@ fn turned_away(loaded: &Loaded) -> Vec<String> {
             )
         })
     };
-    loaded.lights.iter().filter_map(one).collect()
+    loaded.lights.iter().filter_map(warning).collect()
 }
 
 /// What is known of the medium of an object.
