@@ -87,7 +87,7 @@ fn sweep() -> Sweep {
                 ends: vec![slabs(256.0)],
                 end_is_exact: false,
                 theory: theory(2.0),
-                own: None,
+                scene_size: None,
                 joint: true,
             },
             Knob {
@@ -98,7 +98,7 @@ fn sweep() -> Sweep {
                 ends: vec![step(0.0, 0.0)],
                 end_is_exact: true,
                 theory: theory(1.0),
-                own: None,
+                scene_size: None,
                 joint: true,
             },
         ],

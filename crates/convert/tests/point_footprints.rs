@@ -15,7 +15,7 @@ fn stack() -> FootprintStack {
 }
 
 fn splat(ids: &[u8], by_column: bool) -> SplatParams {
-    let choice = FootprintChoice { stack: stack(), of: ids.to_vec(), by_column, seed: 7, turn: 0.0 };
+    let choice = FootprintChoice { stack: stack(), ids: ids.to_vec(), by_column, seed: 7, turn: 0.0 };
     let profile = stack().layers()[usize::from(ids[0])];
     SplatParams { footprint: ids[0], profile, footprints: Some(Arc::new(choice)), ..SplatParams::default() }
 }

@@ -5,8 +5,8 @@
 //! scene as planned ─► picture ◄── compared ──► picture with one effect switched the other way
 //!                        ▲
 //!                        └────── compared ──► picture with everything that was left out
-//! ```
-//! The plan of a scene leaves out what it has proved to be invisible, by bounds. This measures the changes that it bounded.
+//! ``` The plan of a scene leaves out what it has proved to be invisible, by bounds. This module measures the changes that
+//! the plan bounded.
 
 use organza::plan::{Effect, Plan};
 use organza::scene::{EffectKind, Scene};

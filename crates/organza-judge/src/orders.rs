@@ -165,7 +165,8 @@ pub fn compare(
     let rays = rays(&exact_input(&loaded, &frame.camera, shaded, frame.raster_params().resampling_sigma_px));
     let world = libm::exp2(f64::from(loaded.exponent));
     let sliced = THICKER.map(|f| Ordering::Slices(f * auto));
-    let all = [&[Ordering::Exact][..], &sliced, &[Ordering::Centre, Ordering::Distance, Ordering::Unsorted]].concat();
+    let orderings =
+        [&[Ordering::Exact][..], &sliced, &[Ordering::Centre, Ordering::Distance, Ordering::Unsorted]].concat();
     progress.leave();
     let mut draw = |ordering: Ordering| {
         progress.begin(&ordering.name(auto));
@@ -184,8 +185,8 @@ pub fn compare(
         let disorder = Some(disorder);
         Ok::<_, Error>(Ordered { thickness, disorder, seconds, bytes, ..Ordered::new(name, image) })
     };
-    let stages = all.iter().map(|ordering| (ordering.name(auto), 1.0));
-    let drawn = progress.within(ORDERS, stages, || all.iter().map(|o| draw(*o)).collect::<Result<Vec<_>, _>>());
+    let stages = orderings.iter().map(|ordering| (ordering.name(auto), 1.0));
+    let drawn = progress.within(ORDERS, stages, || orderings.iter().map(|o| draw(*o)).collect::<Result<Vec<_>, _>>());
     let orderings = drawn?;
     progress.begin(TRUTH);
     let start = Instant::now();
@@ -307,7 +308,7 @@ fn particles(
         progress.leave();
     }
     progress.leave();
-    let sampled = Sampled::of(&images, truth, 0.0, None)?;
+    let sampled = Sampled::new(&images, truth, 0.0, None)?;
     let name = format!("particles, {} sets: none needed", effort.sets());
     Ok(Ok(Ordered { sampled, ..Ordered::new(name, images.swap_remove(0)) }))
 }

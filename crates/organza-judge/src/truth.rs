@@ -46,13 +46,13 @@ impl Truth {
     ///
     /// # Errors
     /// [`Error::Internal`] for images of different sizes.
-    pub fn beside(&self, all: &Self) -> Result<AllOrders, Error> {
-        let errors = compare(&self.image, &all.image).map_err(|e| Error::Internal(e.to_string()))?;
+    pub fn beside(&self, all_orders: &Self) -> Result<AllOrders, Error> {
+        let errors = compare(&self.image, &all_orders.image).map_err(|e| Error::Internal(e.to_string()))?;
         let mean = |image: &Image<Linear>| {
             image.pixels().iter().flatten().sum::<f64>() / (3 * image.pixels().len()).max(1) as f64
         };
-        let mean = [mean(&self.image), mean(&all.image)];
-        Ok(AllOrders { rmse: errors.rmse, rms_standard_error: all.rms_standard_error(), mean })
+        let mean = [mean(&self.image), mean(&all_orders.image)];
+        Ok(AllOrders { rmse: errors.rmse, rms_standard_error: all_orders.rms_standard_error(), mean })
     }
 
     /// Root of the mean squared standard error: the RMSE that a perfect picture would show.

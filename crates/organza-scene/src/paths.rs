@@ -131,9 +131,10 @@ fn default_root(folder: &Path) -> Result<PathBuf, Error> {
 /// # Errors
 /// [`Error::Io`] for what is not there.
 pub fn root_for<'p>(scene_file: &Path, files: impl IntoIterator<Item = &'p Path>) -> Result<Option<PathBuf>, Error> {
-    let folder = Path::new(".").join(folder_of(scene_file));
+    let stated = Path::new(".").join(folder_of(scene_file));
     let real = |path: &Path| path.canonicalize().map_err(|e| Error::io(path, "cannot find", e));
-    let (folder, root) = (real(&folder)?, real(&default_root(&folder)?)?);
+    let folder = real(&stated)?;
+    let root = real(&default_root(&stated)?)?;
     let mut shared: Option<PathBuf> = None;
     for file in files {
         let file = real(file)?;

@@ -60,7 +60,8 @@ pub(crate) fn layout(scene: &Scene) -> ChannelLayout {
 /// Bytes of the accumulators and layers.
 pub(crate) fn image_bytes(scene: &Scene) -> u64 {
     let set = scene.render.layers.set();
-    let (pixels, samples) = (scene.camera.pixels(), scene.camera.with_samples(scene.render.antialias).pixels());
+    let pixels = scene.camera.pixels();
+    let samples = scene.camera.with_samples(scene.render.antialias).pixels();
     let channels = 4 * layout(scene).count() as u64;
     let profile = if set.depth { size_of::<DepthProfile>() as u64 } else { 0 };
     // Up to three optical depths, and an object.

@@ -168,7 +168,9 @@ pub(crate) fn prepare<'a>(
     let mut scene = Cow::Borrowed(scene);
     let mut gathering = 0;
     let planned = match planned {
-        Some(planned) => plan_counted(&scene, &loaded, options, Effects::of(&planned), Some(planned.plan), eye_map)?,
+        Some(planned) => {
+            plan_counted(&scene, &loaded, options, Effects::from_planned(&planned), Some(planned.plan), eye_map)?
+        }
         None => {
             let both = loaded.cloud.bytes().saturating_mul(2);
             let census = census.unwrap_or_else(|| SplatCensus::new(&scene, &loaded));
@@ -358,7 +360,7 @@ struct Effects {
 
 impl Effects {
     /// Those that were planned before.
-    fn of(planned: &Planned) -> Self {
+    fn from_planned(planned: &Planned) -> Self {
         let Planned { plan, statistics, census, .. } = planned;
         Self { statistics: statistics.clone(), plan: plan.clone(), census: census.clone(), shadowing: None }
     }
@@ -376,15 +378,16 @@ fn plan_counted(
     check_samples(scene)?;
     let is_new = before.is_none();
     let Effects { statistics, mut plan, census, shadowing } = effects;
-    let all = techniques(scene);
-    let used = all.iter().filter(|t| statistics.translucent_of(**t).is_some() || row(**t).meets_discs);
+    let scene_techniques = techniques(scene);
+    let used = scene_techniques.iter().filter(|t| statistics.translucent_of(**t).is_some() || row(**t).meets_discs);
     // They take turns, and each keeps what it has.
     let points = light_points(&loaded.lights);
     let camera = loaded.camera.with_samples(scene.render.antialias);
     let matter =
         Matter { scene, own: &loaded.own, planned: &plan.objects, cloud: Some(&loaded.cloud), camera: &camera };
-    let own = used.map(|t| (row(*t).bytes)(&matter, &points, statistics.counts.colored_extinction, options)).sum();
-    let memory = Memory::new(scene, loaded, own);
+    let technique_bytes =
+        used.map(|t| (row(*t).bytes)(&matter, &points, statistics.counts.colored_extinction, options)).sum();
+    let memory = Memory::new(scene, loaded, technique_bytes);
     memory::check("rendering", memory.total(), options.max_memory)?;
     // Shadow maps share what is left.
     let left = options.max_memory - memory.total();
@@ -402,8 +405,8 @@ fn plan_counted(
     if is_new || !is_cast_alike || !shadows::fit(plan.tables(), left) {
         let casting: Vec<_> = plan.casters.iter().map(|kept| shadows::casting(&loaded.objects, kept)).collect();
         let others = plan.others(loaded);
-        let wanted = carried::wanted_maps(loaded, &points, &casting, others.as_deref(), &plan);
-        let tables = shadows::tables(&scene.render, loaded, &wanted, left)?;
+        let requests = carried::requested_maps(loaded, &points, &casting, others.as_deref(), &plan);
+        let tables = shadows::tables(&scene.render, loaded, &requests, left)?;
         plan.set_shadow_tables(&points, tables, left);
     } else {
         plan.allow_shadows(left);
@@ -457,8 +460,9 @@ fn plan_effects(
     statistics.layers = scene.render.layers.names().map(str::to_owned).collect();
     statistics.tolerance = scene.render.tolerance;
     statistics = statistics.with_objects(&loaded.statistics, &planned, &made);
-    let unsplatted = loaded.own.iter().filter(|own| !own.has_splats && loaded.objects[own.object].casts_shadow);
-    unsplatted.for_each(|own| statistics.add_caster(own.optical_depth()));
+    let unsplatted =
+        loaded.own.iter().filter(|native| !native.has_splats && loaded.objects[native.object].casts_shadow);
+    unsplatted.for_each(|native| statistics.add_caster(native.optical_depth()));
     statistics.techniques = techniques(scene);
     // Those that draw something; where nothing is translucent, one that has nothing to do.
     let idle = |t: &Technique| statistics.translucent_of(*t).is_none();
@@ -491,9 +495,9 @@ fn plan_effects(
     plan.exact = plan.by.iter().map(|by| row(*by).meets_discs).collect();
     plan.skips_hidden = visible(scene).all(|o| row(technique_of(o, scene)).skips_hidden);
     plan.is_own = vec![false; scene.objects.len()];
-    loaded.own.iter().for_each(|own| plan.is_own[own.object] = true);
+    loaded.own.iter().for_each(|native| plan.is_own[native.object] = true);
     let draws = |by: &Technique| row(*by).draws_splats && !statistics.lit_as_drawn;
-    plan.draws = plan.by.iter().zip(&plan.is_own).map(|(by, own)| draws(by) && !own).collect();
+    plan.draws = plan.by.iter().zip(&plan.is_own).map(|(by, is_own)| draws(by) && !is_own).collect();
     techniques(scene).into_iter().for_each(|t| (row(t).plans)(scene, loaded, &mut plan));
     plan.estimates = settle::all_estimates(scene, &loaded.facts);
     Ok(Effects { statistics, plan, census, shadowing: Some(shadowing) })
@@ -546,10 +550,10 @@ pub(crate) fn load_measured(
     let by = visible(scene).map(|o| technique_of(o, scene));
     let planned = choose(inputs.statistics.iter().zip(by), &inputs.light_statistics());
     let spare = carried::of_scene(scene).map(|carries| {
-        move |own: &[Own], planned: &[PlannedObject], statistics: &[ObjectStatistics], lights: &[SceneLight]| {
+        move |natives: &[Own], planned: &[PlannedObject], statistics: &[ObjectStatistics], lights: &[SceneLight]| {
             carried::is_all(
                 carries,
-                &Matter { scene, own, planned, cloud: None, camera: &scene.camera },
+                &Matter { scene, own: natives, planned, cloud: None, camera: &scene.camera },
                 statistics,
                 lights,
             )

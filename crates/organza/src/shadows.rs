@@ -194,7 +194,7 @@ pub(crate) fn fit<'a>(tables: impl Iterator<Item = &'a ShadowTable> + Clone, max
 }
 
 /// A point of a light, and the objects whose splats cast shadows of it.
-pub(crate) type Wanted<'a> = (&'a LightPoint, &'a [Object]);
+pub(crate) type MapRequest<'a> = (&'a LightPoint, &'a [Object]);
 
 /// The table of each map that is wanted, where all together may take so many bytes: as fine as each would be alone,
 /// or, where that is too much, within an equal share of it.
@@ -204,27 +204,27 @@ pub(crate) type Wanted<'a> = (&'a LightPoint, &'a [Object]);
 pub(crate) fn tables(
     settings: &RenderSettings,
     loaded: &Loaded,
-    wanted: &[Option<Wanted<'_>>],
+    requests: &[Option<MapRequest<'_>>],
     max_bytes: u64,
 ) -> Result<Vec<Option<ShadowTable>>, Error> {
-    let alone = tables_within(settings, loaded, wanted, max_bytes)?;
+    let alone = tables_within(settings, loaded, requests, max_bytes)?;
     if bytes(alone.iter().flatten()) <= max_bytes {
         return Ok(alone);
     }
     let maps = alone.iter().flatten().count().max(1) as u64;
-    tables_within(settings, loaded, wanted, max_bytes / maps * 2 / 3)
+    tables_within(settings, loaded, requests, max_bytes / maps * 2 / 3)
 }
 
 fn tables_within(
     settings: &RenderSettings,
     loaded: &Loaded,
-    wanted: &[Option<Wanted<'_>>],
+    requests: &[Option<MapRequest<'_>>],
     max_bytes: u64,
 ) -> Result<Vec<Option<ShadowTable>>, Error> {
-    let maps = wanted.iter().flatten().count().max(1) as u64;
+    let maps = requests.iter().flatten().count().max(1) as u64;
     let thickest = thickest(loaded);
-    let table = |wanted: &Option<Wanted<'_>>| {
-        let Some((point, objects)) = wanted else { return Ok(None) };
+    let table = |request: &Option<MapRequest<'_>>| {
+        let Some((point, objects)) = request else { return Ok(None) };
         let light = &point.light;
         let tolerance = tolerance(settings, loaded, point, maps, thickest);
         let params = shadow_params(settings, loaded, tolerance, max_bytes);
@@ -240,7 +240,7 @@ fn tables_within(
         };
         Ok(Some(ShadowTable { predicted, tolerance, max_bytes, automatic_entries }))
     };
-    wanted.iter().map(table).collect()
+    requests.iter().map(table).collect()
 }
 
 /// What went wrong with the map of a light, or a point of one, of this name.

@@ -302,11 +302,11 @@ const SORT: Step =
 const FOLD: Step = Step { pass: pass::SPLAT, stage: stage::COMPOSITE, counts: composited };
 
 /// Splats whose fragments are composited, range by range.
-fn composited(scene: &Scene, all: &Translucent) -> Vec<Count> {
+fn composited(scene: &Scene, translucent: &Translucent) -> Vec<Count> {
     vec![
-        Count::new(Item::BlendedFragment, all.fragments),
-        Count::new(Item::BlendedSplat, all.splats),
-        Count::new(Item::RangeSample, samples(scene) * all.ranges),
+        Count::new(Item::BlendedFragment, translucent.fragments),
+        Count::new(Item::BlendedSplat, translucent.splats),
+        Count::new(Item::RangeSample, samples(scene) * translucent.ranges),
     ]
 }
 

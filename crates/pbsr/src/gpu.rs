@@ -344,7 +344,8 @@ fn object_of(scene: &Scene<'_>, object: &Object<'_>) -> ParticleObject {
     let sampler = object.sampler;
     let m = &object.look.material;
     let projector = Projector::new(scene.camera, sampler.origin(), &object.transform, sampler.cross_section());
-    let (wide, kind) = (|v: glam::Vec3| v.extend(0.0).to_array(), object.look.kind as u8);
+    let wide = |v: glam::Vec3| v.extend(0.0).to_array();
+    let kind = object.look.kind as u8;
     let [linear_x, linear_y, linear_z] = columns(&projector.linear);
     let [rotation_x, rotation_y, rotation_z] = columns(&projector.rotation);
     ParticleObject {

@@ -31,9 +31,8 @@
 //! let sampler = LineSampler::new(&ball, &LineParams { resolution: 16 }, &params, None).unwrap();
 //!
 //! let objects = [Object { sampler: &sampler, transform: Similarity::default(), look: Appearance::default() }];
-//! let (objects, lights, camera) = (&objects[..], &[][..], &camera);
 //! let shadow_origin = DVec3::ZERO;
-//! let scene = Scene { objects, lights, shadow_origin, ambient: [1.0; 3], camera, occluder: None };
+//! let scene = Scene { objects: &objects, lights: &[], shadow_origin, ambient: [1.0; 3], camera: &camera, occluder: None };
 //! let mut ensemble = Ensemble::new(camera.size, &EnsembleParams::default()).unwrap();
 //! Renderer::new().fold(&scene, &mut ensemble, &FoldParams { levels: 100, ..FoldParams::default() }, None).unwrap();
 //! let picture = ensemble.read(&|_, _| [0.0; 3], None);

@@ -68,7 +68,8 @@ pub fn nearest(scene: &Scene<'_>, set: u64) -> Vec<Option<Nearest>> {
 fn pixels(at: [f64; 2], side: impl Fn([f64; 2]) -> f64, size: [usize; 2]) -> Vec<usize> {
     let centre = |i: usize| [(i % size[0]) as f64 + 0.5, (i / size[0]) as f64 + 0.5];
     let holds = |i: &usize| {
-        let (centre, half) = (centre(*i), 0.5 * side(centre(*i)));
+        let centre = centre(*i);
+        let half = 0.5 * side(centre);
         (0..2).all(|a| centre[a] > at[a] - half && centre[a] <= at[a] + half)
     };
     (0..size[0] * size[1]).filter(holds).collect()

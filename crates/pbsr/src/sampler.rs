@@ -149,14 +149,14 @@ impl KeptSets {
     /// Samples `n` ≥ 1 sets from `first` on, in parallel. Each run of chunks is joined to one.
     pub fn new(sampler: &dyn Sampler, first: u64, n: usize) -> Self {
         let runs = runs(sampler);
-        let one = |set: u64, run: &Run| {
+        let particles_of = |set: u64, run: &Run| {
             let mut particles = Particles::default();
             let mut scratch = Particles::default();
             particles.reserve((run.expected * 1.1) as usize + 64);
             run.chunks.clone().for_each(|c| particles.append(sampler.chunk(set, c, &mut scratch)));
             particles
         };
-        let kept = |set: u64| runs.par_iter().map(|run| one(set, run)).collect();
+        let kept = |set: u64| runs.par_iter().map(|run| particles_of(set, run)).collect();
         Self {
             origin: sampler.origin(),
             cross_section: sampler.cross_section(),

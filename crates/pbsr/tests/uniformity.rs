@@ -251,34 +251,34 @@ fn pb13_pb14_splats() {
 
 /// A sampler with a fault.
 struct Planted {
-    of: Box<dyn Sampler>,
+    sampler: Box<dyn Sampler>,
     /// Every second set is the one before; else particles come in pairs.
     copies: bool,
 }
 
 impl Sampler for Planted {
     fn origin(&self) -> DVec3 {
-        self.of.origin()
+        self.sampler.origin()
     }
 
     fn cross_section(&self) -> f64 {
-        self.of.cross_section()
+        self.sampler.cross_section()
     }
 
     fn chunks(&self) -> usize {
-        self.of.chunks()
+        self.sampler.chunks()
     }
 
     fn expected(&self, chunk: usize) -> f64 {
-        self.of.expected(chunk)
+        self.sampler.expected(chunk)
     }
 
     fn chunk<'a>(&'a self, set: u64, chunk: usize, scratch: &'a mut Particles) -> &'a Particles {
         if self.copies {
-            return self.of.chunk(set / 2, chunk, scratch);
+            return self.sampler.chunk(set / 2, chunk, scratch);
         }
-        let mut own = Particles::default();
-        let found = self.of.chunk(set, chunk, &mut own);
+        let mut particles = Particles::default();
+        let found = self.sampler.chunk(set, chunk, &mut particles);
         scratch.position = found.position.iter().flat_map(|p| [*p, *p]).collect();
         scratch
     }
@@ -291,7 +291,7 @@ fn planted_copies_and_pairs_are_found() {
         Box::new(MeshSampler::new(mesh, &half(s), None).unwrap())
     };
     check(&square, in_cube, 2);
-    let copies = fault(&|s| Box::new(Planted { of: square(s), copies: true }), in_cube, 2).unwrap();
+    let copies = fault(&|s| Box::new(Planted { sampler: square(s), copies: true }), in_cube, 2).unwrap();
     assert!(copies.contains("sets 1 apart"), "{copies}");
-    assert!(fault(&|s| Box::new(Planted { of: square(s), copies: false }), in_cube, 2).is_some());
+    assert!(fault(&|s| Box::new(Planted { sampler: square(s), copies: false }), in_cube, 2).is_some());
 }

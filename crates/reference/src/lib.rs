@@ -31,7 +31,8 @@
 //! let camera = Camera::look_at(DVec3::Z * 4.0, DVec3::ZERO, DVec3::Y,
 //!     Projection::Orthographic { height: 1.0 }, [4, 4]).unwrap();
 //! let image = path_trace(&scene, &camera, &PathSettings::default(), None).unwrap();
-//! let (mean, error) = (image.radiance.mean[0][0], image.radiance.standard_error[0][0]);
+//! let mean = image.radiance.mean[0][0];
+//! let error = image.radiance.standard_error[0][0];
 //! assert!((mean - (-1.0f64).exp()).abs() < 5.0 * error);
 //! ```
 #![forbid(unsafe_code)]

@@ -64,9 +64,9 @@ fn what_a_cut_leaves_transmits_e_to_the_minus_tau_of_its_chord() {
     let oblique = Clip::HalfSpace { normal: DVec3::new(1.0, -2.0, 4.0), offset: 0.3 };
     let boxed = Clip::Box(DAabb::new(DVec3::new(-0.7, -9.0, -0.9), DVec3::new(9.0, 0.8, 0.75)));
     let mut apart = 0;
-    for (of, chord) in cases {
+    for (whole, chord) in cases {
         for clips in [&[oblique][..], &[oblique, boxed]] {
-            let medium = Medium::new(Density::Cut { of, clips }, 1.5, 0.0);
+            let medium = Medium::new(Density::Cut { whole, clips }, 1.5, 0.0);
             let scene = Scene { media: vec![medium], background: Some([1.0; 3]), ..Scene::default() };
             let left = |pixel: usize| {
                 let at = |k: usize| (k as f64 + 0.5) * 0.3 - 1.2;

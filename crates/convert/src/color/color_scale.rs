@@ -52,7 +52,8 @@ impl ColorScale {
     /// assert_eq!(ColorScale::of_values("head", &transfer).numbers, ScaleNumbers::Range([20.0, 300.0]));
     /// ```
     pub fn of_values(object: &str, transfer: &TransferFunction) -> Self {
-        let (points, shows) = (transfer.points(), |value: f32| transfer.at(value).extinction > 0.0);
+        let points = transfer.points();
+        let shows = |value: f32| transfer.at(value).extinction > 0.0;
         let first = points.iter().position(|p| shows(p.value)).unwrap_or(0);
         let last = points.iter().rposition(|p| shows(p.value)).unwrap_or(points.len() - 1);
         let [low, high] =

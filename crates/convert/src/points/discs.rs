@@ -80,7 +80,9 @@ impl<'a> Discs<'a> {
 
     /// The disc of point `i` across `normal`, a unit vector in the axes of the file.
     pub(crate) fn disc(&self, i: usize, known: &Place, normal: Vec3) -> Disc {
-        let (splat, t, core) = (&self.params.splat, &self.params.splat.transform, f64::from(Footprint::CORE));
+        let splat = &self.params.splat;
+        let t = &splat.transform;
+        let core = f64::from(Footprint::CORE);
         let place = || t.apply(self.points.origin + self.points.position[i].as_dvec3());
         if let Some(diameter) = self.params.size.and_then(|size| size.at(place(), self.params.camera.as_ref())) {
             let radius = 0.5 * diameter / core;

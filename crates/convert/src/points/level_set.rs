@@ -15,7 +15,8 @@ use splat_core::{Progress, RawPoints};
 /// use field::MpuParams;
 /// use splat_core::{RawPoints, ScalarField, glam::{DVec3, Vec3}};
 /// let turn = |i: i32| {
-///     let (y, a) = (1.0 - 2.0 * (i as f32 + 0.5) / 2000.0, i as f32 * 2.399_963);
+///     let y = 1.0 - 2.0 * (i as f32 + 0.5) / 2000.0;
+///     let a = i as f32 * 2.399_963;
 ///     Vec3::new(a.cos() * (1.0 - y * y).sqrt(), y, a.sin() * (1.0 - y * y).sqrt())
 /// };
 /// let ball: Vec<Vec3> = (0..2000).map(turn).collect();

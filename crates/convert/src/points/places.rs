@@ -156,7 +156,8 @@ fn leaf_places(offsets: &[Offset], params: &SurfelParams, out: &mut [Place]) {
     let lines = voronoi_sides(offsets, &normals);
     let cells = lines.cells();
     for (i, out) in out.iter_mut().enumerate() {
-        let (area, root) = (cells.area[i], cells.area[i].sqrt());
+        let area = cells.area[i];
+        let root = area.sqrt();
         let spacing = (std::f64::consts::SQRT_2 * cells.reach[i]).clamp(root, 2.0 * root);
         let normal = normals[i].as_vec3();
         let plane = planes[i].is_some().into();

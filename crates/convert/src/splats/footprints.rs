@@ -25,8 +25,8 @@ pub struct FootprintChoice {
     /// The footprints of the scene.
     pub stack: FootprintStack,
     /// Ids that are chosen from, at least one.
-    pub of: Vec<u8>,
-    /// Whether points have what a column `footprint` of their file says, where it has one.
+    pub ids: Vec<u8>,
+    /// Whether a column `footprint` of the points' file chooses, if the file has one.
     pub by_column: bool,
     /// Seed of the choice and of turns.
     pub seed: u64,
@@ -37,12 +37,12 @@ pub struct FootprintChoice {
 impl FootprintChoice {
     /// Whether all discs have the same, which is no image.
     fn is_one_formula(&self) -> bool {
-        self.of.len() == 1 && !self.has_images(false)
+        self.ids.len() == 1 && !self.has_images(false)
     }
 
     /// Whether all discs have the usual footprint, the first, and that is no image.
     pub fn is_usual(&self) -> bool {
-        self.of == [0] && self.is_one_formula()
+        self.ids == [0] && self.is_one_formula()
     }
 
     /// Whether some of those that are chosen from are images.
@@ -50,7 +50,7 @@ impl FootprintChoice {
         if by_column {
             self.stack.has_images()
         } else {
-            self.of.iter().any(|id| self.stack.image((*id).into()).is_some())
+            self.ids.iter().any(|id| self.stack.image((*id).into()).is_some())
         }
     }
 }
@@ -85,8 +85,8 @@ pub(crate) fn choose_footprints(
             }
             ids.for_each(|(i, id)| *id = column(i) as u8);
         }
-        None if choice.of.len() > 1 => ids.for_each(|(i, id)| {
-            *id = choice.of[(rng::bits(choice.seed, CHOICE, key(i), 0) % choice.of.len() as u64) as usize];
+        None if choice.ids.len() > 1 => ids.for_each(|(i, id)| {
+            *id = choice.ids[(rng::bits(choice.seed, CHOICE, key(i), 0) % choice.ids.len() as u64) as usize];
         }),
         None => {}
     }

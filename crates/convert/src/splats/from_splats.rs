@@ -22,7 +22,8 @@ pub(crate) fn column_set(points: &RawPoints) -> ColumnSet {
 
 /// The cloud of points that were checked. Without a transform it has the bits of the file.
 pub(crate) fn to_cloud(points: &RawPoints, params: &SurfelParams) -> Result<Cloud, ConvertError> {
-    let (splat, t) = (&params.splat, &params.splat.transform);
+    let splat = &params.splat;
+    let t = &splat.transform;
     check_footprints(points, params)?;
     splat.check_cloud(points.len() as f64, column_set(points))?;
     let mut cloud = points.ready.cloud.clone();

@@ -25,7 +25,8 @@ pub(crate) fn column_set(points: &RawPoints, params: &SurfelParams) -> ColumnSet
 
 /// The cloud of points that were checked.
 pub(crate) fn to_cloud(points: &RawPoints, params: &SurfelParams) -> Result<Cloud, ConvertError> {
-    let (splat, t) = (&params.splat, &params.splat.transform);
+    let splat = &params.splat;
+    let t = &splat.transform;
     let mut cloud = Cloud::new(t.apply(points.origin));
     columns::size_columns(&mut cloud, points.len(), SplatKind::Medium, column_set(points, params), splat)?;
     let gaussians = seen(points, params);

@@ -103,8 +103,8 @@ fn filled(grid: &Grid, value: impl Fn(Option<f32>) -> f32) -> Grid {
         }
         (count > 0).then(|| (sum / f64::from(count)) as f32)
     };
-    let one = |(voxel, known): (usize, &f32)| if known.is_nan() { value(beside(voxel)) } else { *known };
-    Grid { values: grid.values.iter().enumerate().map(one).collect(), ..*grid }
+    let filled = |(voxel, known): (usize, &f32)| if known.is_nan() { value(beside(voxel)) } else { *known };
+    Grid { values: grid.values.iter().enumerate().map(filled).collect(), ..*grid }
 }
 
 #[cfg(test)]

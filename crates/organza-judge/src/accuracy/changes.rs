@@ -97,26 +97,26 @@ fn stated_tables() -> impl Iterator<Item = &'static str> {
 
 /// All that knobs turn, as a scene would state it.
 fn stated(render: &RenderSettings) -> Vec<Stated> {
-    let mut all = vec![
+    let mut settings = vec![
         ("render", "technique", quoted(render.technique.name())),
         ("render", "antialias", render.antialias.to_string()),
         ("render", "splat_share", number(render.splat_share)),
     ];
-    shadow(render, &mut all);
-    points(render, &mut all);
-    particles(render, &mut all);
-    sheets(render, &mut all);
-    surfels(render, &mut all);
-    all
+    shadow(render, &mut settings);
+    points(render, &mut settings);
+    particles(render, &mut settings);
+    sheets(render, &mut settings);
+    surfels(render, &mut settings);
+    settings
 }
 
-fn shadow(render: &RenderSettings, all: &mut Vec<Stated>) {
+fn shadow(render: &RenderSettings, settings: &mut Vec<Stated>) {
     let mapping = match render.shadow.mapping {
         ShadowMapping::Auto => "auto",
         ShadowMapping::Octahedral => "octahedral",
         ShadowMapping::Polar => "polar",
     };
-    let mut add = |key, value| all.push(("render.shadow", key, value));
+    let mut add = |key, value| settings.push(("render.shadow", key, value));
     add("mapping", quoted(mapping));
     add("cells", render.shadow.cells.map_or_else(|| quoted("auto"), |n| n.to_string()));
     if let Some(cut) = render.shadow.absorbance_cut {
@@ -124,9 +124,9 @@ fn shadow(render: &RenderSettings, all: &mut Vec<Stated>) {
     }
 }
 
-fn points(render: &RenderSettings, all: &mut Vec<Stated>) {
+fn points(render: &RenderSettings, settings: &mut Vec<Stated>) {
     let points = &render.points;
-    let mut add = |key, value| all.push(("render.points", key, value));
+    let mut add = |key, value| settings.push(("render.points", key, value));
     add("slice_thickness", points.slice_thickness.map_or_else(|| quoted("auto"), number));
     add("exact", points.exact.to_string());
     add("transmittance_cutoff", number(points.transmittance_cutoff));
@@ -134,8 +134,8 @@ fn points(render: &RenderSettings, all: &mut Vec<Stated>) {
     add("accumulation", precision(points.accumulation));
 }
 
-fn particles(render: &RenderSettings, all: &mut Vec<Stated>) {
-    let mut add = |key, value| all.push(("render.particles", key, value));
+fn particles(render: &RenderSettings, settings: &mut Vec<Stated>) {
+    let mut add = |key, value| settings.push(("render.particles", key, value));
     add("repeat_level", render.particles.repeat_level.to_string());
     if let Some(error) = render.particles.target_error {
         add("target_error", number(error));
@@ -161,9 +161,9 @@ fn particles(render: &RenderSettings, all: &mut Vec<Stated>) {
     }
 }
 
-fn sheets(render: &RenderSettings, all: &mut Vec<Stated>) {
+fn sheets(render: &RenderSettings, settings: &mut Vec<Stated>) {
     let sheets = &render.sheets;
-    let mut add = |key, value| all.push(("render.sheets", key, value));
+    let mut add = |key, value| settings.push(("render.sheets", key, value));
     add("slab_width", sheets.slab_width.map_or_else(|| quoted("auto"), number));
     let reconstruction = match sheets.reconstruction {
         Reconstruction::Auto => "auto",
@@ -192,9 +192,9 @@ fn sheets(render: &RenderSettings, all: &mut Vec<Stated>) {
     }
 }
 
-fn surfels(render: &RenderSettings, all: &mut Vec<Stated>) {
+fn surfels(render: &RenderSettings, settings: &mut Vec<Stated>) {
     let surfels = &render.surfels;
-    let mut add = |key, value| all.push(("render.surfels", key, value));
+    let mut add = |key, value| settings.push(("render.surfels", key, value));
     add("disc_scale", number(surfels.disc_scale));
     add("gap", number(surfels.gap));
     add("transmittance_cutoff", number(surfels.transmittance_cutoff));
@@ -241,8 +241,8 @@ fn surfels(render: &RenderSettings, all: &mut Vec<Stated>) {
     add("coverage", quoted(coverage));
 }
 
-fn precision(of: Accumulation) -> String {
-    quoted(if of == Accumulation::F16 { "f16" } else { "f32" })
+fn precision(accumulation: Accumulation) -> String {
+    quoted(if accumulation == Accumulation::F16 { "f16" } else { "f32" })
 }
 
 fn quoted(word: &str) -> String {

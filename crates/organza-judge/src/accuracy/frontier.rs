@@ -139,15 +139,15 @@ mod tests {
 
     #[test]
     fn only_what_is_faster_than_all_that_is_better() {
-        let all = [
+        let candidates = [
             candidate(0, 1e-4, 10.0),
             candidate(1, 2e-4, 9.5),
             candidate(2, 1e-3, 4.0),
             candidate(3, 2e-3, 5.0),
             candidate(4, 1e-2, 1.0),
         ];
-        assert_eq!(frontier(&all), [0, 2, 4]);
-        assert_eq!(contenders(&all), [0, 1, 2, 4], "5 s are hopeless beside 4 s, 9.5 s beside 10 s are not");
+        assert_eq!(frontier(&candidates), [0, 2, 4]);
+        assert_eq!(contenders(&candidates), [0, 1, 2, 4], "5 s are hopeless beside 4 s, 9.5 s beside 10 s are not");
         assert_eq!(frontier(&[]), [0usize; 0]);
         assert_eq!(frontier(&[candidate(1, 1e-4, 2.0), candidate(7, 0.0, 1.0)]), [7], "exact and faster");
         assert_eq!(frontier(&[candidate(1, 1e-4, 0.5), candidate(7, 0.0, 1.0), candidate(8, 0.0, 0.9)]), [7, 1]);
@@ -168,29 +168,29 @@ mod tests {
     #[test]
     fn errors_that_differ_by_their_noise_count_as_one() {
         let noisy = |id, error, seconds| Candidate { half_width: 2e-4, ..candidate(id, error, seconds) };
-        let all = [noisy(0, 2.61e-3, 5.0), noisy(1, 2.4e-3, 9.0), noisy(2, 2.53e-3, 1.0)];
-        assert_eq!(frontier(&all), [2], "2.4, 2.53 and 2.61 are equal, and the third takes a fifth of the time");
+        let candidates = [noisy(0, 2.61e-3, 5.0), noisy(1, 2.4e-3, 9.0), noisy(2, 2.53e-3, 1.0)];
+        assert_eq!(frontier(&candidates), [2], "2.4, 2.53 and 2.61 are equal, and the third takes a fifth of the time");
         // 2.75e-3 is 3.5e-4 from the most accurate, whose difference is known within 2.8e-4.
-        let [first, second, third] = all;
+        let [first, second, third] = candidates;
         assert_eq!(frontier(&[first, second, third, noisy(3, 2.75e-3, 0.5)]), [2, 3]);
         // The same errors without noise differ.
-        let exact = all.map(|c| Candidate { half_width: 0.0, ..c });
+        let exact = candidates.map(|c| Candidate { half_width: 0.0, ..c });
         assert_eq!(frontier(&exact), [1, 2]);
     }
 
     #[test]
     fn repeats_end_when_the_frontier_held() {
-        let all = || vec![candidate(0, 1e-4, 2.0), candidate(1, 1e-3, 1.9), candidate(2, 1e-2, 3.0)];
+        let candidates = || vec![candidate(0, 1e-4, 2.0), candidate(1, 1e-3, 1.9), candidate(2, 1e-2, 3.0)];
         let rounds = Hold { calm: 3, most: 9 };
         let mut calls = Vec::new();
-        let same = hold(&mut all(), rounds, |id| {
+        let same = hold(&mut candidates(), rounds, |id| {
             calls.push(id);
             Ok::<_, Infallible>(2.0)
         });
         assert_eq!((same, calls), (Ok(vec![0]), vec![0, 1, 0, 1, 0, 1]), "the third is hopeless");
         // A time that was disturbed is found out, and the count begins anew.
         let mut round = 0;
-        let found = hold(&mut all(), rounds, |id| {
+        let found = hold(&mut candidates(), rounds, |id| {
             round += usize::from(id == 0);
             Ok::<_, Infallible>(if id == 1 && round == 2 { 1.0 } else { 2.0 })
         });
@@ -222,16 +222,16 @@ mod tests {
     #[test]
     fn a_rerun_gives_the_same_frontier_in_nine_of_ten_points() {
         let mut same = 0;
-        let mut all = 0;
+        let mut total = 0;
         let mut thin = usize::MAX;
         for pair in 0..100 {
             let a = rerun(2 * pair);
             let b = rerun(2 * pair + 1);
             same += a.iter().filter(|id| b.contains(id)).count();
-            all += a.len().max(b.len());
+            total += a.len().max(b.len());
             thin = thin.min(a.len());
         }
-        assert!(same as f64 >= 0.9 * f64::from(all as u32), "{same} of {all}");
+        assert!(same as f64 >= 0.9 * f64::from(total as u32), "{same} of {total}");
         assert!(thin >= 2, "a frontier of {thin} points proves nothing");
     }
 }

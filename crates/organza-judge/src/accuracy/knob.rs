@@ -59,8 +59,8 @@ pub struct Knob {
     pub end_is_exact: bool,
     /// The order that theory expects, if theory states one.
     pub theory: Option<Theory>,
-    /// [`Step::size`] of the scene's own setting; `None` for a choice, and where it is not known.
-    pub own: Option<f64>,
+    /// [`Step::size`] of the setting that the scene states; `None` for a choice, and where it is not known.
+    pub scene_size: Option<f64>,
     /// Whether the knob takes part in settings that turn all knobs together.
     pub joint: bool,
 }

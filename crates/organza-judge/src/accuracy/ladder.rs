@@ -108,7 +108,7 @@ struct Positions<'k> {
 impl<'k> Positions<'k> {
     /// `None` for a knob whose own position is not known.
     fn new(base: &Request, knob: &'k Knob) -> Option<Self> {
-        let own = knob.own?;
+        let scene_size = knob.scene_size?;
         let can_be_stated = |step: &&Step| {
             let request = turned(base, knob, step);
             let is_drawn = request.oversample == base.oversample && request.packed == base.packed;
@@ -118,8 +118,8 @@ impl<'k> Positions<'k> {
         steps.sort_by(|a, b| size(b).total_cmp(&size(a)));
         steps.dedup_by(|a, b| a.value == b.value);
         // Sizes that are as good as the scene's own are no step.
-        let coarser = steps.iter().rev().copied().filter(|step| size(step) > 1.05 * own).collect();
-        let finer = steps.into_iter().filter(|step| size(step) < 0.95 * own).collect();
+        let coarser = steps.iter().rev().copied().filter(|step| size(step) > 1.05 * scene_size).collect();
+        let finer = steps.into_iter().filter(|step| size(step) < 0.95 * scene_size).collect();
         Some(Self { coarser, finer })
     }
 
@@ -179,11 +179,11 @@ mod tests {
             for knob in &knobs {
                 let base = whole(&scene);
                 let Some(positions) = Positions::new(&base, knob) else { continue };
-                let own = knob.own.unwrap();
-                let of_rung = |step| positions.at(step).map_or(own, size);
+                let scene_size = knob.scene_size.unwrap();
+                let of_rung = |step| positions.at(step).map_or(scene_size, size);
                 let sizes: Vec<f64> = (-RUNGS_ASIDE..=RUNGS_ASIDE).map(of_rung).collect();
                 assert!(sizes.windows(2).all(|pair| pair[1] <= pair[0]), "{}: {sizes:?}", knob.name);
-                assert_eq!(sizes[3], own);
+                assert_eq!(sizes[3], scene_size);
             }
             let steps: Vec<i32> = rungs(&scene, &[technique]).iter().map(|rung| rung.step).collect();
             assert!(steps.contains(&0) && steps.contains(&-3) && steps.windows(2).all(|pair| pair[0] < pair[1]));

@@ -79,8 +79,8 @@ fn curve(
     for p in &mut points {
         p.drawn = p.size.is_some() && p.error.is_some_and(|e| e >= settled.least_drawn());
     }
-    let own = timed[0].image().map(|i| compare(i, &reference)).transpose();
-    let own_setting = own.map_err(|e| Error::Internal(e.to_string()))?.map_or(0.0, |e| e.rmse);
+    let errors = timed[0].image().map(|i| compare(i, &reference)).transpose();
+    let own_setting = errors.map_err(|e| Error::Internal(e.to_string()))?.map_or(0.0, |e| e.rmse);
     Ok(Some(Curve { knob: knob.name, end, end_size, points, own_setting, settled, end_seconds }))
 }
 
@@ -130,10 +130,10 @@ fn limit(sweep: &Sweep, curves: &[Curve], mut held: Vec<Skipped>, draw: &mut Dra
     let mut square = 0.0;
     let mut parts = Vec::new();
     for curve in best_first {
-        let own = own_error + curve.settled.own_error;
+        let joined_error = own_error + curve.settled.own_error;
         let apart = square + curve.own_setting * curve.own_setting;
-        if curve.end_size.is_none() || MARGIN * own <= apart.sqrt() {
-            (own_error, square) = (own, apart);
+        if curve.end_size.is_none() || MARGIN * joined_error <= apart.sqrt() {
+            (own_error, square) = (joined_error, apart);
             parts.push((curve.knob, curve.settled.own_error));
         } else {
             held.push(Skipped { knob: curve.knob, reason: why_held(curve, apart.sqrt(), own_error) });

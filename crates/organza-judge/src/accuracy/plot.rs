@@ -69,9 +69,10 @@ impl Axis {
     fn ticks(&self) -> Vec<(f64, bool)> {
         let decades = (self.high / self.low).log10();
         let first = self.low.log10().floor() as i32;
-        let all = (first..=first + decades.ceil() as i32 + 1).flat_map(|d| (1..10).map(move |m| (d, m)));
+        let ticks = (first..=first + decades.ceil() as i32 + 1).flat_map(|d| (1..10).map(move |m| (d, m)));
         let lettered = |m: i32| m == 1 || decades < 2.2 && matches!(m, 2 | 5) || decades < 0.7;
-        all.map(|(d, m)| (f64::from(m) * 10f64.powi(d), lettered(m)))
+        ticks
+            .map(|(d, m)| (f64::from(m) * 10f64.powi(d), lettered(m)))
             .filter(|(v, lettered)| (self.low..=self.high).contains(v) && (*lettered || decades < 4.0))
             .collect()
     }

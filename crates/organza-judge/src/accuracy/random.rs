@@ -38,7 +38,7 @@ pub fn random_study(
     draw: &mut Draw<'_>,
 ) -> Result<Study, Error> {
     let Yardsticks { limit, truth } = yardsticks;
-    let settings = Settings::of(sweep);
+    let settings = Settings::new(sweep);
     let mut timed = vec![Timed::default(); settings.list.len()];
     repeat_all(&settings, &mut timed, &Repeats { times: SEEDS, seeded: true, order: options.seed }, progress, draw)?;
     let exposure = sweep.base.scene.render.exposure;
@@ -88,12 +88,12 @@ fn judge(
     exposure: f64,
 ) -> Result<Outcome, Error> {
     let distance = |to: &Image<Linear>| -> Result<Option<Distance>, Error> {
-        let all: Result<Vec<Distance>, Error> =
+        let distances: Result<Vec<Distance>, Error> =
             timed.images.iter().map(|i| Distance::between(i, to, exposure)).collect();
-        Ok(Distance::mean(&all?))
+        Ok(Distance::mean(&distances?))
     };
     let from_limit = distance(&limit.image)?;
     let from_truth = truth.map(distance).transpose()?.flatten();
-    let sampled = Sampled::of(&timed.images, &limit.image, limit.own_error, truth)?;
+    let sampled = Sampled::new(&timed.images, &limit.image, limit.own_error, truth)?;
     Ok(Outcome { setting, drawn: from_limit.is_some(), timed, from_limit, from_truth, sampled })
 }

@@ -86,16 +86,16 @@ pub(crate) fn quoted(text: &str) -> String {
 impl Report {
     /// A report of studies of a scene on this machine.
     pub fn new(scene: &Scene, options: Options, studies: Vec<Study>, absent: Vec<Absent>) -> Self {
-        let places = |of: &[(usize, &Study)]| -> Vec<[usize; 2]> {
-            of.iter().flat_map(|(s, study)| (0..study.outcomes.len()).map(move |o| [*s, o])).collect()
+        let places = |chosen: &[(usize, &Study)]| -> Vec<[usize; 2]> {
+            chosen.iter().flat_map(|(s, study)| (0..study.outcomes.len()).map(move |o| [*s, o])).collect()
         };
-        let all: Vec<(usize, &Study)> = studies.iter().enumerate().collect();
-        let alike: Vec<_> = all.iter().copied().filter(|(_, s)| s.shares_limit_with(&studies[0])).collect();
+        let numbered: Vec<(usize, &Study)> = studies.iter().enumerate().collect();
+        let alike: Vec<_> = numbered.iter().copied().filter(|(_, s)| s.shares_limit_with(&studies[0])).collect();
         let by_limit = frontier(&candidates(alike.iter().flat_map(|(_, s)| &s.outcomes)));
-        let by_truth = frontier(&candidates_by_truth(all.iter().flat_map(|(_, s)| &s.outcomes)));
+        let by_truth = frontier(&candidates_by_truth(numbered.iter().flat_map(|(_, s)| &s.outcomes)));
         Self {
             frontier: by_limit.into_iter().map(|k| places(&alike)[k]).collect(),
-            frontier_by_truth: by_truth.into_iter().map(|k| places(&all)[k]).collect(),
+            frontier_by_truth: by_truth.into_iter().map(|k| places(&numbered)[k]).collect(),
             absent,
             scene: scene.clone(),
             options,

@@ -97,20 +97,20 @@ fn richardson(points: &[[f64; 2]], end: f64, floor: f64) -> (f64, Option<f64>) {
         // Nothing differs by more than rounding: so does the end.
         return (points.last().map_or(f64::INFINITY, |_| floor), None);
     };
-    let mut own = 0.0;
+    let mut end_error = 0.0;
     let mut order = 0.0;
     for _ in 0..30 {
-        let corrected: Vec<[f64; 2]> = above.iter().map(|p| [p[0], p[1] + own]).collect();
-        let all = fit_order(&corrected).map_or(0.0, |f| f.order);
+        let corrected: Vec<[f64; 2]> = above.iter().map(|p| [p[0], p[1] + end_error]).collect();
+        let fitted = fit_order(&corrected).map_or(0.0, |f| f.order);
         let last = fit_order(&corrected[corrected.len().saturating_sub(2)..]).map_or(0.0, |f| f.order);
-        order = all.min(last);
+        order = fitted.min(last);
         if order < LEAST_ORDER {
             // No convergence to build on: the end may be as wrong as the step before it.
             return (finest[1], Some(order));
         }
-        own = finest[1] / ((finest[0] / end).powf(order) - 1.0);
+        end_error = finest[1] / ((finest[0] / end).powf(order) - 1.0);
     }
-    (own.max(floor), Some(order))
+    (end_error.max(floor), Some(order))
 }
 
 #[cfg(test)]
@@ -126,8 +126,8 @@ mod tests {
         for order in [0.5, 1.0, 2.0] {
             let end: f64 = 0.125;
             let settled = settle(&law(order, end), Some(end), 0.0);
-            let own = 0.01 * end.powf(order);
-            assert!((settled.own_error / own - 1.0).abs() < 0.05, "{order}: {settled:?} {own}");
+            let end_error = 0.01 * end.powf(order);
+            assert!((settled.own_error / end_error - 1.0).abs() < 0.05, "{order}: {settled:?} {end_error}");
             assert!((settled.careful_order.unwrap() - order).abs() < 0.02, "{order}: {settled:?}");
         }
         // The finest of order 2 are drawn, of order 1/2 only the coarse ones would be ten times above.

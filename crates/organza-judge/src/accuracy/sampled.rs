@@ -31,7 +31,7 @@ impl Sampled {
     ///
     /// # Errors
     /// [`Error::Internal`] for unequal sizes.
-    pub fn of(
+    pub fn new(
         images: &[Image<Linear>],
         limit: &Image<Linear>,
         own_error: f64,
@@ -46,12 +46,12 @@ impl Sampled {
         let products = products(images, limit);
         let seeds: Vec<usize> = (0..images.len()).collect();
         let square = bias_square(&products, &seeds);
-        let own = seeds.iter().map(|&i| products[i][i]).sum::<f64>() / seeds.len() as f64;
+        let mean_square = seeds.iter().map(|&i| products[i][i]).sum::<f64>() / seeds.len() as f64;
         Ok(Some(Self {
             seeds: images.len(),
             from_limit,
             from_truth: truth.map(from).transpose()?.flatten(),
-            noise: (own - square).max(0.0).sqrt(),
+            noise: (mean_square - square).max(0.0).sqrt(),
             bias: (square > uncertainty(&products, &seeds)).then(|| square.sqrt()),
         }))
     }
@@ -90,16 +90,16 @@ fn uncertainty(products: &[Vec<f64>], seeds: &[usize]) -> f64 {
 
 impl Distance {
     /// Mean of each measure over pictures, the largest of the largest errors; `None` for none.
-    pub(super) fn mean(all: &[Self]) -> Option<Self> {
-        let n = all.len() as f64;
-        let mean = |f: &dyn Fn(&Self) -> f64| all.iter().map(f).sum::<f64>() / n;
-        let errors = |of: fn(&Self) -> &Errors| Errors {
-            rmse: mean(&|d| of(d).rmse),
-            bias: mean(&|d| of(d).bias),
-            mean_absolute: mean(&|d| of(d).mean_absolute),
-            max: all.iter().map(|d| of(d).max).fold(0.0, f64::max),
+    pub(super) fn mean(distances: &[Self]) -> Option<Self> {
+        let n = distances.len() as f64;
+        let mean = |f: &dyn Fn(&Self) -> f64| distances.iter().map(f).sum::<f64>() / n;
+        let errors = |select: fn(&Self) -> &Errors| Errors {
+            rmse: mean(&|d| select(d).rmse),
+            bias: mean(&|d| select(d).bias),
+            mean_absolute: mean(&|d| select(d).mean_absolute),
+            max: distances.iter().map(|d| select(d).max).fold(0.0, f64::max),
         };
-        (!all.is_empty()).then(|| Self {
+        (!distances.is_empty()).then(|| Self {
             linear: errors(|d| &d.linear),
             display: errors(|d| &d.display),
             psnr: mean(&|d| d.psnr),
@@ -127,24 +127,24 @@ mod tests {
     fn noise_and_bias_are_told_apart() {
         let limit = Image::from_radiance(SIZE, vec![[0.5; 3]; SIZE[0] * SIZE[1]]).unwrap();
         let images: Vec<_> = (0..5).map(|s| picture(s, 0.1, 0.02)).collect();
-        let found = Sampled::of(&images, &limit, 0.001, None).unwrap().unwrap();
+        let found = Sampled::new(&images, &limit, 0.001, None).unwrap().unwrap();
         // 9216 numbers of deviation 0.1 in five pictures: one standard error of the noise is 0.4 %, of the bias 4 %.
         assert!((found.noise / 0.1 - 1.0).abs() < 0.016, "{found:?}");
         assert!((found.bias.unwrap() / 0.02 - 1.0).abs() < 0.17, "{found:?}");
         let expected = 0.1f64.hypot(0.02);
         assert!((found.from_limit.mean - expected).abs() < found.from_limit.half_width, "{found:?}");
         assert!(found.from_limit.half_width > 0.001 && found.from_limit.half_width < 0.003, "{found:?}");
-        assert_eq!(Sampled::of(&images[..1], &limit, 0.0, None).unwrap(), None);
+        assert_eq!(Sampled::new(&images[..1], &limit, 0.0, None).unwrap(), None);
     }
 
     #[test]
     fn what_has_no_bias_hardly_ever_shows_one() {
         let limit = Image::from_radiance(SIZE, vec![[0.5; 3]; SIZE[0] * SIZE[1]]).unwrap();
-        let of = |run: u64| {
+        let bias = |run: u64| {
             let images: Vec<_> = (0..5).map(|s| picture(10 * run + s, 0.1, 0.0)).collect();
-            Sampled::of(&images, &limit, 0.0, None).unwrap().unwrap().bias
+            Sampled::new(&images, &limit, 0.0, None).unwrap().unwrap().bias
         };
-        let found: Vec<_> = (0..40).map(of).collect();
+        let found: Vec<_> = (0..40).map(bias).collect();
         let none = found.iter().filter(|b| b.is_none()).count();
         // On one side 2.5 % would show one: six or more of 40 in one case of a thousand.
         assert!(none >= 35, "{none} of 40");

@@ -22,9 +22,9 @@ pub(super) struct Settings {
 }
 
 impl Settings {
-    pub(super) fn of(sweep: &Sweep) -> Self {
-        let own = Setting { label: sweep.base_label.clone(), knob: None, request: sweep.base.clone() };
-        let mut settings = Self { list: vec![own], of_step: Vec::new() };
+    pub(super) fn new(sweep: &Sweep) -> Self {
+        let base = Setting { label: sweep.base_label.clone(), knob: None, request: sweep.base.clone() };
+        let mut settings = Self { list: vec![base], of_step: Vec::new() };
         for knob in &sweep.knobs {
             let add = |step: &Step| {
                 let label = format!("{}: {}", knob.name, step.label);

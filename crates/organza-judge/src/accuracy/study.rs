@@ -93,7 +93,7 @@ pub fn study(
     progress: &Progress,
     draw: &mut Draw<'_>,
 ) -> Result<Study, Error> {
-    let mut settings = Settings::of(sweep);
+    let mut settings = Settings::new(sweep);
     let mut timed = vec![Timed::default(); settings.list.len()];
     progress.enter();
     progress.plan(stages(sweep, settings.list.len() as f64, options));
@@ -104,8 +104,8 @@ pub fn study(
             attempt(&setting.request, timed, false, false, draw)
         })
     })?;
-    let own = timed[0].image().ok_or_else(|| unresolved(timed[0].failure.clone().unwrap_or_default(), ""))?;
-    let floor = ROUNDING * root_mean_square(own);
+    let picture = timed[0].image().ok_or_else(|| unresolved(timed[0].failure.clone().unwrap_or_default(), ""))?;
+    let floor = ROUNDING * root_mean_square(picture);
     let ends = sweep.knobs.iter().map(|k| (k.name, 1.0)).chain([(TOGETHER, 1.0)]);
     let (curves, limit) = progress.within(ENDS, ends, || converge(sweep, &settings, &timed, floor, progress, draw))?;
     let resolved: Vec<&str> = limit.parts.iter().map(|p| p.0).collect();
@@ -152,13 +152,13 @@ fn stages(sweep: &Sweep, settings: f64, options: &Options) -> [(&'static str, f6
 }
 
 fn refuse_unless_resolved(outcomes: &[Outcome], limit: &Limit, curves: &[Curve]) -> Result<(), Error> {
-    let own = outcomes[0].from_limit.as_ref().map_or(0.0, |d| d.linear.rmse);
+    let scene_error = outcomes[0].from_limit.as_ref().map_or(0.0, |d| d.linear.rmse);
     let drawn = outcomes.iter().filter(|o| o.drawn).count();
     // A scene whose own setting is the limit has no error to draw.
-    if (outcomes[0].drawn || own <= limit.own_error) && drawn >= 3 {
+    if (outcomes[0].drawn || scene_error <= limit.own_error) && drawn >= 3 {
         return Ok(());
     }
-    let target = own / MARGIN / limit.parts.len().max(1) as f64;
+    let target = scene_error / MARGIN / limit.parts.len().max(1) as f64;
     let blame =
         limit.parts.iter().filter(|p| p.1 > target).filter_map(|(knob, _)| {
             let settled = &curves.iter().find(|c| c.knob == *knob)?.settled;
@@ -172,7 +172,7 @@ fn refuse_unless_resolved(outcomes: &[Outcome], limit: &Limit, curves: &[Curve])
     let blame: Vec<String> = blame.chain(held).collect();
     let hint = format!("{}; --finer N doubles every end N times", blame.join("; "));
     let message = format!(
-        "the limit's own error is {:.1e}, the scene's own setting is {own:.1e} from it, and {drawn} of {} settings are at \
+        "the limit's own error is {:.1e}, the scene's own setting is {scene_error:.1e} from it, and {drawn} of {} settings are at \
          least ten times as far: expected three, and the scene's own among them unless it is the limit",
         limit.own_error,
         outcomes.len(),

@@ -8,13 +8,13 @@ use std::fmt::Write;
 fn choices(study: &Study, curve: &Curve) -> String {
     // A setting that two knobs share is called as the first calls it: the steps' own labels are meant.
     let steps = study.knobs.iter().filter(|k| k.name == curve.knob).flat_map(|k| &k.steps);
-    let one = |(p, Step { label, .. }): (&CurvePoint, &Step)| {
+    let step_result = |(p, Step { label, .. }): (&CurvePoint, &Step)| {
         let outcome = &study.outcomes[p.setting];
         let rmse = outcome.from_limit.as_ref().filter(|_| outcome.drawn).map(|d| format!("{:.2e}", d.linear.rmse));
         let ms = least_seconds(outcome).map_or_else(String::new, |s| format!(" in {:.0} ms", 1e3 * s));
         format!("{label} RMSE {}{ms}", rmse.as_deref().unwrap_or("not resolved"))
     };
-    format!("A choice: {}.", curve.points.iter().zip(steps).map(one).collect::<Vec<_>>().join("; "))
+    format!("A choice: {}.", curve.points.iter().zip(steps).map(step_result).collect::<Vec<_>>().join("; "))
 }
 
 /// Compares a knob's measured order of convergence with theory, and states the error of its end.

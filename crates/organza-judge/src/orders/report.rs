@@ -252,8 +252,8 @@ impl OrdersReport {
             data_uri(&exact)?
         );
         if let Ok(layers) = &self.comparison.layers {
-            let all = data_uri(&layers.display(self.exposure))?;
-            let _ = write!(html, "<img hidden id=\"layers\" alt=\"\" src=\"{all}\">");
+            let layers_uri = data_uri(&layers.display(self.exposure))?;
+            let _ = write!(html, "<img hidden id=\"layers\" alt=\"\" src=\"{layers_uri}\">");
         }
         html += "<div class=\"grid\">";
         self.figures(&mut html)?;
@@ -302,14 +302,14 @@ impl OrdersReport {
         for (k, o) in self.comparison.orderings.iter().enumerate() {
             let shown = self.shown(o);
             let (apart, gain) = difference(&shown, &truth(o, &self.comparison).display(self.exposure))?;
-            let of = if o.of_layers { "layers" } else { "truth" };
+            let truth_id = if o.of_layers { "layers" } else { "truth" };
             let a = data_uri(&shown)?;
             let d = data_uri(&apart)?;
             let name = &o.name;
             let _ = writeln!(
                 html,
                 "<figure class=\"flip\"><img src=\"{a}\" alt=\"{name}\"><h3>{name}</h3><button \
-                 aria-pressed=\"true\">ordering</button><button data-of=\"{of}\" aria-pressed=\"false\">truth</button><button \
+                 aria-pressed=\"true\">ordering</button><button data-of=\"{truth_id}\" aria-pressed=\"false\">truth</button><button \
                  data-of=\"d{k}\" aria-pressed=\"false\">difference x {gain}</button><img hidden id=\"d{k}\" alt=\"\" src=\"{d}\"></figure>"
             );
         }

@@ -174,8 +174,8 @@ impl<'a> Splats<'a> {
             steps.into_iter().find(|degrees| side(forward(*degrees)) != here)
         };
         let right_angle = self.to_light.and_then(|light| first(&|view| i32::from(view.dot(light) < 0.0)));
-        let all = [Some(0.0), first(&|view| nearest_axis(view) as i32), right_angle];
-        all.into_iter().flatten().collect()
+        let starts = [Some(0.0), first(&|view| nearest_axis(view) as i32), right_angle];
+        starts.into_iter().flatten().collect()
     }
 }
 
@@ -295,9 +295,9 @@ fn composite(input: &Input<'_>, fragments: &[Fragment], keys: &Keys) -> Pixel {
         for (_, f) in sheet {
             let material = &input.materials[usize::from(input.cloud.material[f.splat as usize])];
             for c in 0..3 {
-                let own = f.optical_depth * f64::from(material.extinction_rgb[c]);
-                depth[c] += own;
-                sum[c] += own * f64::from(input.values[f.splat as usize * input.channels + c]);
+                let channel_depth = f.optical_depth * f64::from(material.extinction_rgb[c]);
+                depth[c] += channel_depth;
+                sum[c] += channel_depth * f64::from(input.values[f.splat as usize * input.channels + c]);
             }
         }
         for c in (0..3).filter(|c| depth[*c] > 0.0) {

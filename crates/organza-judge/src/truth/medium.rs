@@ -72,7 +72,7 @@ impl MediumBody {
 
     /// For the tracer, of this density.
     pub(super) fn seen<'a>(&'a self, whole: &'a Density<'a>) -> Medium<'a> {
-        let density = if self.clips.is_empty() { *whole } else { Density::Cut { of: whole, clips: &self.clips } };
+        let density = if self.clips.is_empty() { *whole } else { Density::Cut { whole, clips: &self.clips } };
         let MediumBody { extinction, albedo, asymmetry, emission, glow, liberty, .. } = *self;
         let color = Some(&*self.color as ColorAt<'_>);
         let facets = self.mirrors.as_ref().map(|m| {

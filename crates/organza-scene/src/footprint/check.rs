@@ -210,7 +210,7 @@ pub(crate) fn check_choice(
         let message = "a medium has no image as a footprint: it lies in the plane of a disc";
         return Err(at_key.error(message, "name a formula of `footprints`"));
     }
-    Ok(FootprintChoice { stack: stack.clone(), of: ids, by_column, seed: chosen.seed.unwrap_or(0).into(), turn })
+    Ok(FootprintChoice { stack: stack.clone(), ids, by_column, seed: chosen.seed.unwrap_or(0).into(), turn })
 }
 
 /// A footprint by its index.

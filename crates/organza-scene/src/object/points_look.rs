@@ -49,8 +49,8 @@ impl PointsLook {
 impl SceneObject {
     /// The materials that its splats may have.
     pub fn material_ids(&self) -> impl Iterator<Item = usize> + Clone + '_ {
-        let one = self.materials.is_empty().then_some(self.material);
-        one.into_iter().chain(self.materials.iter().copied())
+        let single = self.materials.is_empty().then_some(self.material);
+        single.into_iter().chain(self.materials.iter().copied())
     }
 
     /// How its points become a medium of these attributes, if they do.

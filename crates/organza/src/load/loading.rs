@@ -47,7 +47,7 @@ impl<'a> Loading<'a> {
         self.progress.plan(self.options.rates.stages(&work));
         self.progress.begin(stage::READ);
         self.progress.add_total(self.visible().count() as u64);
-        let one = |(id, object): (usize, &'a SceneObject)| {
+        let prepared = |(id, object): (usize, &'a SceneObject)| {
             self.progress.tick(1).map_err(|_| Error::Cancelled)?;
             if let Some(reading) = cost::reading(object) {
                 self.progress.begin(&reading);
@@ -59,22 +59,22 @@ impl<'a> Loading<'a> {
             prepared.held = Some(held.map_err(Error::Limit)?);
             Ok(prepared)
         };
-        self.visible().map(one).collect()
+        self.visible().map(prepared).collect()
     }
 
     /// Reads every visible object.
     pub(super) fn inputs(&self) -> Result<Vec<Input<'a>>, Error> {
-        let one = |(id, object): (usize, &'a SceneObject)| {
+        let read_input = |(id, object): (usize, &'a SceneObject)| {
             self.progress.tick(0).map_err(|_| Error::Cancelled)?;
             input(object, &self.context(id, 0, 0)).map_err(|e| self.named(object, e))
         };
-        self.visible().map(one).collect()
+        self.visible().map(read_input).collect()
     }
 
     pub(super) fn statistics(&self, prepared: &[Prepared<'_>]) -> Vec<ObjectStatistics> {
-        let one =
+        let object_statistics =
             |((id, object), p): ((usize, &SceneObject), &Prepared<'_>)| p.statistics(object, &self.context(id, 0, 0));
-        self.visible().zip(prepared).map(one).collect()
+        self.visible().zip(prepared).map(object_statistics).collect()
     }
 
     /// Splats to be made; refuses those that do not fit.

@@ -7,7 +7,7 @@ use crate::frame::matter::{Carries, CarriesLight, Matter};
 use crate::load::Loaded;
 use crate::plan::{Effect, Plan};
 use crate::scene::{EffectKind, LightPoint, Scene, SceneLight, light_points};
-use crate::shadows::Wanted;
+use crate::shadows::MapRequest;
 use crate::shown;
 use crate::statistics::ObjectStatistics;
 use splat_core::shade::Census;
@@ -54,7 +54,7 @@ pub(crate) fn plan(scene: &Scene, loaded: &Loaded, points: &[LightPoint], plan: 
     plan.carried = points.iter().zip(carries).map(|(point, carries)| called_for(point) && carries.is_ok()).collect();
     // The layer is there even where nothing fills it.
     plan.scatters_again = asked.scatters_again;
-    let missing = loaded.own.iter().any(|own| !own.has_splats && loaded.objects[own.object].casts_shadow);
+    let missing = loaded.own.iter().any(|native| !native.has_splats && loaded.objects[native.object].casts_shadow);
     if missing && points.iter().zip(carries).any(|(point, carries)| called_for(point) && carries.is_err()) {
         return Err(Error::Internal("splats that a shadow map needs were not made".into()));
     }
@@ -75,9 +75,9 @@ pub(crate) fn plan(scene: &Scene, loaded: &Loaded, points: &[LightPoint], plan: 
     let effects: Vec<Effect> = (0..plan.shadow_maps.len())
         .filter(|light| told(*light))
         .map(|light| {
-            let own: Vec<_> =
+            let point_carries: Vec<_> =
                 points.iter().zip(carries).filter(|(point, _)| point.of == light).map(|(_, c)| c).collect();
-            let (called_for, reason) = way(&own, plan.shadow_maps[light], scattering);
+            let (called_for, reason) = way(&point_carries, plan.shadow_maps[light], scattering);
             let label = &loaded.lights[light].label;
             let soft = EffectKind::Soft.name(label);
             let soft = plan.effects.iter_mut().find(|effect| effect.name == soft && effect.called_for);
@@ -151,13 +151,13 @@ pub(crate) fn unshadowed(scene: &Scene, loaded: &Loaded) -> impl Iterator<Item =
 
 /// The maps that are wanted: one for each point of a light, of the objects that cast its shadows, and one for each point of [`Plan::others`], if there
 /// are any.
-pub(crate) fn wanted_maps<'a>(
+pub(crate) fn requested_maps<'a>(
     loaded: &Loaded,
     points: &'a [LightPoint],
     casting: &'a [Vec<Object>],
     others: Option<&'a [Object]>,
     plan: &Plan,
-) -> Vec<Option<Wanted<'a>>> {
+) -> Vec<Option<MapRequest<'a>>> {
     let called_for = |point: &LightPoint| plan.shadow_maps[point.of];
     let Some(others) = others else {
         let of_all = points.iter().zip(casting);
@@ -169,13 +169,13 @@ pub(crate) fn wanted_maps<'a>(
     let receives = if is_carried { beside.receivers > 0 } else { loaded.receives_beside_polygons() };
     // Without a technique that carries light, all light on triangles has a z-buffer.
     let asks_others = |k: usize| if is_carried { plan.carried[k] } else { called_for(&points[k]) };
-    let all = points.iter().zip(casting).enumerate().map(|(k, (point, objects))| {
-        let wanted = called_for(point) && (!asks_others(k) || receives);
-        wanted.then_some((point, &objects[..]))
+    let of_points = points.iter().zip(casting).enumerate().map(|(k, (point, objects))| {
+        let is_requested = called_for(point) && (!asks_others(k) || receives);
+        is_requested.then_some((point, &objects[..]))
     });
     let of_others = points.iter().enumerate().map(|(k, point)| {
-        let wanted = asks_others(k) && beside.casters > 0;
-        wanted.then_some((point, others))
+        let is_requested = asks_others(k) && beside.casters > 0;
+        is_requested.then_some((point, others))
     });
-    all.chain(of_others).collect()
+    of_points.chain(of_others).collect()
 }

@@ -42,7 +42,7 @@ pub(super) fn object_facts(
         let material = &loaded.materials[object.material];
         let Hiding { is_in_view, view_depth, light_depths } = hidings[rank].clone();
         let [red, green, blue] = material.absorption_inside;
-        let is_splats = loaded.own.iter().all(|own| own.object != rank);
+        let is_splats = loaded.own.iter().all(|native| native.object != rank);
         ObjectFacts {
             name: object.name.clone(),
             material: only_material(scene, object),
@@ -105,7 +105,7 @@ fn longest_way(scene: &Scene, loaded: &Loaded, is_bent: bool) -> f64 {
     }
     let cloud = &loaded.cloud;
     let eye = DAabb::new(loaded.camera.position, loaded.camera.position);
-    let objects = loaded.own.iter().fold(eye, |bounds, own| bounds.union(own.world_box()));
+    let objects = loaded.own.iter().fold(eye, |bounds, native| bounds.union(native.world_box()));
     let splat = |i: usize| {
         let reach = f64::from(cloud.radius[i].max(cloud.tangent_of(i).length()));
         DAabb::around(cloud.origin + cloud.position[i].as_dvec3(), DVec3::splat(reach))

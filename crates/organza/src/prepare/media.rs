@@ -34,10 +34,10 @@ impl Medium {
 /// The media of visible objects that scatter light by a phase function.
 pub(crate) fn of_scene(scene: &Scene, loaded: &Loaded) -> Vec<MediumStatistics> {
     let mut media = splats(loaded);
-    for own in &loaded.own {
+    for native in &loaded.own {
         // Of splats that stand for it more is known.
-        if media[own.object].extinction == 0.0 {
-            media[own.object] = as_it_is(loaded, own);
+        if media[native.object].extinction == 0.0 {
+            media[native.object] = as_it_is(loaded, native);
         }
     }
     let visible = scene.objects.iter().enumerate().filter(|(_, object)| object.visible);
@@ -65,9 +65,9 @@ fn scatters(material: &Material, has_normal: bool) -> bool {
 }
 
 /// An object that is drawn from its own data.
-fn as_it_is(loaded: &Loaded, own: &Own) -> Medium {
-    let material = &loaded.materials[own.material];
-    let has_normal = match &own.body {
+fn as_it_is(loaded: &Loaded, native: &Own) -> Medium {
+    let material = &loaded.materials[native.material];
+    let has_normal = match &native.body {
         Body::Cells { normals, .. } => *normals,
         Body::Field(_) => false,
         _ => return Medium::NOTHING,
@@ -75,13 +75,13 @@ fn as_it_is(loaded: &Loaded, own: &Own) -> Medium {
     if !scatters(material, has_normal) {
         return Medium::NOTHING;
     }
-    let bounds = own.world_box();
-    let extinction = match &own.body {
-        Body::Cells { .. } => own.optical_depth() / bounds.size().length().max(f64::MIN_POSITIVE),
+    let bounds = native.world_box();
+    let extinction = match &native.body {
+        Body::Cells { .. } => native.optical_depth() / bounds.size().length().max(f64::MIN_POSITIVE),
         // Its bound depends on the place.
         _ => f64::INFINITY,
     };
-    let albedo = f64::from(material.single_scattering_albedo) * f64::from(own.brightest_color());
+    let albedo = f64::from(material.single_scattering_albedo) * f64::from(native.brightest_color());
     Medium { bounds, extinction, albedo }
 }
 

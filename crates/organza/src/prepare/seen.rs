@@ -91,10 +91,10 @@ fn unseen(scene: &Scene, source: &ExtractSource, most: f32) -> Error {
         (format!("matter on rays of light {light} in {seen}"), "none".to_owned(), "look whether it casts shadows")
     };
     let message = format!("`absorbance`: expected {expected}, found {found}");
-    let own = |object: &&SceneObject| matches!(&object.source, Source::Extract(of) if of == source);
-    match (written, scene.objects.iter().find(own)) {
-        (Some(written), Some(own)) => {
-            written.error(&scene.file, &format!("object `{}`: {message}", shown(&own.name)), hint).into()
+    let is_extracted = |object: &&SceneObject| matches!(&object.source, Source::Extract(of) if of == source);
+    match (written, scene.objects.iter().find(is_extracted)) {
+        (Some(written), Some(object)) => {
+            written.error(&scene.file, &format!("object `{}`: {message}", shown(&object.name)), hint).into()
         }
         _ => Error::input(printable(&scene.file), message, hint),
     }
@@ -113,9 +113,9 @@ fn rounded_down(x: f32) -> String {
 /// The last time on an object's way at which none of its splats has come past what it stops at, in frames.
 fn stop_time(stop: &Stop, eye: &Eye<'_>) -> Result<f64, Error> {
     let (map, origin) = eye.map(stop.light, &|o| stop.objects.contains(&o.name))?;
-    let own = eye.splats(stop.light, &|o| o.name == eye.scene.objects[stop.object].name)?.cloud;
-    let start = own.origin - origin - stop.path.at(0.0);
-    let time = map.free_until(&own.position, &|time| (start + stop.path.at(time)).as_vec3(), stop.last);
+    let splats = eye.splats(stop.light, &|o| o.name == eye.scene.objects[stop.object].name)?.cloud;
+    let start = splats.origin - origin - stop.path.at(0.0);
+    let time = map.free_until(&splats.position, &|time| (start + stop.path.at(time)).as_vec3(), stop.last);
     eye.files.note(&eye.scene.file, stop.said(&eye.scene.objects[stop.object].name, time));
     Ok(time)
 }

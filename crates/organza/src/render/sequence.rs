@@ -43,7 +43,8 @@ use crate::{Error, Progress, Render, RenderOptions};
 /// };
 /// let scenes = [frame(0), frame(1)];
 /// let mut sequence = Sequence::new(&scenes);
-/// let (options, progress) = (RenderOptions::default(), Progress::new());
+/// let options = RenderOptions::default();
+/// let progress = Progress::new();
 /// let [first, second] = scenes.each_ref().map(|s| sequence.render(s, &options, &progress).unwrap());
 /// let sampled = |r: &organza::Render| r.cost.stages.iter().any(|s| s.name == "sample");
 /// assert!(sampled(&first) && !sampled(&second));
@@ -235,13 +236,14 @@ mod tests {
             "nothing was drawn yet"
         );
         let drawn = sequence.render(&scene, &options, &progress).unwrap();
-        let mut of = |changes: &[&str]| sequence.foresee(&changed(changes), &options, &progress, seconds).unwrap();
-        let own: f64 = of(&[]).unwrap();
-        let fewer = of(&["render.splat_share=0.25"]).unwrap();
-        let finer = of(&["render.antialias=8"]).unwrap();
-        assert!(fewer < own && own < finer, "{fewer} {own} {finer}");
+        let mut foreseen =
+            |changes: &[&str]| sequence.foresee(&changed(changes), &options, &progress, seconds).unwrap();
+        let as_stated: f64 = foreseen(&[]).unwrap();
+        let fewer = foreseen(&["render.splat_share=0.25"]).unwrap();
+        let finer = foreseen(&["render.antialias=8"]).unwrap();
+        assert!(fewer < as_stated && as_stated < finer, "{fewer} {as_stated} {finer}");
         // Of another opacity splats are others.
-        assert_eq!(of(&["object.pane.opacity=0.5"]), None);
+        assert_eq!(foreseen(&["object.pane.opacity=0.5"]), None);
         // The splats are those from before.
         let again = sequence.render(&scene, &options, &progress).unwrap();
         assert!(!has_pass(&again, crate::pass::READ));

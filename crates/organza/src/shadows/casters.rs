@@ -35,7 +35,10 @@ impl Shadowing {
             return Self { boxes: Vec::new(), shown: vec![true; objects] };
         }
         let mut boxes = boxes(&loaded.cloud, objects);
-        loaded.own.iter().for_each(|own: &Own| boxes[own.object] = boxes[own.object].union(own.world_box()));
+        loaded
+            .own
+            .iter()
+            .for_each(|native: &Own| boxes[native.object] = boxes[native.object].union(native.world_box()));
         let view = wider(&loaded.camera);
         let shown = boxes.iter().map(|bounds| !bounds.is_empty() && view.may_see_hull(&bounds.corners())).collect();
         Self { boxes, shown }
@@ -145,13 +148,13 @@ mod tests {
 
     #[test]
     fn no_shadow_of_a_box_is_lost() {
-        let unit = |k: u64, of: u64| rng::unit(7, 1, k, of);
+        let unit = |k: u64, index: u64| rng::unit(7, 1, k, index);
         let mut shadowed = 0;
         for k in 0..20_000 {
-            let some = |of: u64| DVec3::new(unit(k, of), unit(k, of + 1), unit(k, of + 2));
+            let some = |index: u64| DVec3::new(unit(k, index), unit(k, index + 1), unit(k, index + 2));
             let caster = DAabb::around(4.0 * some(0), 0.6 * some(3));
             let receiver = DAabb::around(4.0 * some(6), 0.6 * some(9));
-            let within = |bounds: &DAabb, of: u64| bounds.min + bounds.size() * some(of);
+            let within = |bounds: &DAabb, index: u64| bounds.min + bounds.size() * some(index);
             let at = within(&receiver, 12);
             let from = 4.0 * some(15);
             let direction = (within(&caster, 18) - at).normalize();

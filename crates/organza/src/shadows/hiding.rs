@@ -46,7 +46,7 @@ pub(crate) fn hiding(
     }
     let points = light_points(&loaded.lights);
     let casters: Vec<Vec<bool>> = points.iter().map(|point| view.shadowing.casters(&point.light)).collect();
-    let one = |rank: usize| {
+    let hiding = |rank: usize| {
         let sum = brightness[rank].sum_of_splats;
         let casts = |light: usize| {
             let of_light = points.iter().zip(&casters).filter(|(point, _)| point.of == light);
@@ -59,7 +59,7 @@ pub(crate) fn hiding(
             light_depths: (0..loaded.lights.len()).map(|light| if casts(light) { sum } else { 0.0 }).collect(),
         }
     };
-    let mut hidings: Vec<Hiding> = (0..brightness.len()).map(one).collect();
+    let mut hidings: Vec<Hiding> = (0..brightness.len()).map(hiding).collect();
     let hides = |hiding: &Hiding| hiding.view_depth > 0.0 || hiding.light_depths.iter().any(|depth| *depth > 0.0);
     let probed: Vec<usize> = (0..brightness.len())
         .filter(|rank| is_thin(*rank, brightness[*rank].thickest_splat) && hides(&hidings[*rank]))

@@ -92,7 +92,7 @@ impl<'a> Probe<'a> {
             true => DAabb::EMPTY,
             false => DAabb::new(origin + splats.min.as_dvec3(), origin + splats.max.as_dvec3()),
         };
-        let bounds = loaded.own.iter().fold(centers, |joined, own| joined.union(own.world_box()));
+        let bounds = loaded.own.iter().fold(centers, |joined, native| joined.union(native.world_box()));
         Self {
             loaded,
             view: (!leaves_view).then(|| wider(&loaded.camera)),
@@ -252,8 +252,8 @@ impl<'a> Probe<'a> {
                 }
             }
         });
-        for own in loaded.own.iter().filter(|own| loaded.objects[own.object].shadow_coefficient > 0.0) {
-            let ball = about(&own.world_box());
+        for native in loaded.own.iter().filter(|native| loaded.objects[native.object].shadow_coefficient > 0.0) {
+            let ball = about(&native.world_box());
             if self.may_be_seen(&ball) {
                 visit(ball);
             }
@@ -264,13 +264,14 @@ impl<'a> Probe<'a> {
     fn each_caster(&self, is_opaque: &AtomicBool, visit: &(dyn Fn(Ball, f64, Option<&Profile>) + Sync)) {
         let loaded = self.loaded;
         let cloud = &loaded.cloud;
-        let is_among = |own: &&Own| match self.casters {
+        let is_among = |native: &&Own| match self.casters {
             Casters::All => true,
-            Casters::Shadows(rank) | Casters::Seen(rank) => own.object == rank,
+            Casters::Shadows(rank) | Casters::Seen(rank) => native.object == rank,
         };
-        let casting = loaded.own.iter().filter(|own| !own.has_splats && loaded.objects[own.object].casts_shadow);
-        for own in casting.filter(is_among) {
-            visit(about(&own.world_box()), own.optical_depth(), None);
+        let casting =
+            loaded.own.iter().filter(|native| !native.has_splats && loaded.objects[native.object].casts_shadow);
+        for native in casting.filter(is_among) {
+            visit(about(&native.world_box()), native.optical_depth(), None);
         }
         let chunks = (0..cloud.len().div_ceil(CHUNK)).into_par_iter();
         chunks.for_each(|chunk| {

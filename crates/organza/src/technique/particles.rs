@@ -32,12 +32,12 @@ use splat_core::{Accumulator, LayerData};
 use std::ops::Range;
 
 /// Particles and samples of all sets.
-pub(crate) fn counts(scene: &Scene, all: &Translucent) -> Vec<Count> {
+pub(crate) fn counts(scene: &Scene, translucent: &Translucent) -> Vec<Count> {
     let sets = f64::from(scene.render.particles.repeat_level);
-    let is_there = f64::from(u8::from(all.any));
+    let is_there = f64::from(u8::from(translucent.any));
     vec![
-        Count::new(Item::Particle, all.of_own_data * sets),
-        Count::new(Item::SetSample, samples(scene) * sets * all.ranges * is_there),
+        Count::new(Item::Particle, translucent.of_own_data * sets),
+        Count::new(Item::SetSample, samples(scene) * sets * translucent.ranges * is_there),
     ]
 }
 
@@ -122,7 +122,7 @@ impl Fold for Particles<'_> {
         let interrupted = average.interrupted;
         session.sets = Some(Sets { averaged, asked, interrupted });
         let mut segment = frame.accumulator();
-        let objects: Vec<u32> = inside.iter().map(|part| part.of).collect();
+        let objects: Vec<u32> = inside.iter().map(|part| part.object).collect();
         average.ensemble.accumulate(&frame.layout(), &objects, &mut segment);
         into.append(&segment);
         self.average = (range == EVERYWHERE).then_some(average);
@@ -169,7 +169,7 @@ fn prepared<'a>(
         stage.items_in = sources.len() as u64;
         let mut parts = Vec::with_capacity(sources.len());
         for mut source in sources {
-            let sets = kept.and_then(|kept| kept.of(source.own_object()?));
+            let sets = kept.and_then(|kept| kept.sets_of(source.own_object()?));
             match sets {
                 Some(sets) => parts.push(source.part_of(parts::Particles::Kept(sets))),
                 None => parts.extend(source.part(warnings)?),

@@ -22,14 +22,14 @@ pub(crate) fn bytes(scene: &Scene) -> u64 {
 /// Begins a frame.
 pub(crate) fn begin<'a>(frame: &'a Frame<'a>) -> Box<dyn Fold + 'a> {
     let narrowing = frame.loaded.footprints.layers().iter().map(|f| f.narrowing()).collect();
-    Box::new(Exact { frame, own: None, pixels: Vec::new(), narrowing })
+    Box::new(Exact { frame, splats: None, pixels: Vec::new(), narrowing })
 }
 
 /// The splats of a frame that are composited exactly.
 struct Exact<'a> {
     frame: &'a Frame<'a>,
     /// Once they were gathered: the splats, and the values of each.
-    own: Option<(Cloud, Vec<f32>)>,
+    splats: Option<(Cloud, Vec<f32>)>,
     /// What the last range left, to go on from without rounding where nobody else has been in between.
     pixels: Vec<Pixel>,
     /// Of each footprint, see [`splat_core::Footprint::narrowing`].
@@ -48,10 +48,10 @@ impl Fold for Exact<'_> {
         let Shaded { values, channels, .. } = frame.shaded(cost)?;
         let opaque = frame.opaque(cost)?;
         let narrowing = &self.narrowing;
-        let (cloud, values) = self.own.get_or_insert_with(|| {
+        let (cloud, values) = self.splats.get_or_insert_with(|| {
             let ids = frame.translucent(Technique::Reference);
-            let of = ids.iter().flat_map(|i| &values[*i as usize * channels..][..*channels]);
-            (frame.drawn().gather(ids), of.copied().collect())
+            let gathered = ids.iter().flat_map(|i| &values[*i as usize * channels..][..*channels]);
+            (frame.drawn().gather(ids), gathered.copied().collect())
         });
         if cloud.is_empty() {
             return Ok(());
@@ -73,7 +73,7 @@ impl Fold for Exact<'_> {
             let last = &self.pixels;
             let pixel = |k: usize, fragments: &[Fragment]| {
                 let known = last.get(k).filter(|pixel| pixel.sum.is_rounded_in(begun, k));
-                let sum = known.map_or_else(|| PixelSum::of(begun, k), |pixel| pixel.sum.clone());
+                let sum = known.map_or_else(|| PixelSum::from_accumulator(begun, k), |pixel| pixel.sum.clone());
                 let mut pixel = Pixel { sum, fragments: 0 };
                 fragments.iter().filter(|f| range.contains(&f.depth)).for_each(|f| pixel.add(&input, f, narrowing));
                 pixel

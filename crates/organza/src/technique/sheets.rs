@@ -54,10 +54,10 @@ pub(crate) fn form(object: &ObjectStatistics) -> (Form, &'static str) {
 }
 
 /// Fragments in slabs, and the samples that slabs cover.
-pub(crate) fn counts(_: &Scene, all: &Translucent) -> Vec<Count> {
+pub(crate) fn counts(_: &Scene, translucent: &Translucent) -> Vec<Count> {
     vec![
-        Count::new(Item::SheetFragment, all.fragments + all.of_own_data),
-        Count::new(Item::SlabSample, all.slab_samples),
+        Count::new(Item::SheetFragment, translucent.fragments + translucent.of_own_data),
+        Count::new(Item::SlabSample, translucent.slab_samples),
     ]
 }
 
@@ -114,13 +114,13 @@ fn own_work(frame: &Frame<'_>) -> OwnWork {
         Reconstruction::Gather(GatherKernel::Gaussian) => form.visible,
         Reconstruction::Gather(GatherKernel::Linear) => LINEAR_SAMPLE * form.visible,
     };
-    let one = |own: &Own| {
-        let Body::Cells { grid, .. } = &own.body else { return OwnWork::default() };
-        let seen = Extent::new(&own.world_box(), &frame.camera);
-        let step = grid.shortest_step() * own.transform.scale;
+    let volume_work = |native: &Own| {
+        let Body::Cells { grid, .. } = &native.body else { return OwnWork::default() };
+        let seen = Extent::new(&native.world_box(), &frame.camera);
+        let step = grid.shortest_step() * native.transform.scale;
         let radius = extent * step * seen.samples_per_unit;
-        let voxels = own.voxels() as f64 * seen.share;
-        let slabs = own.world_box().diagonal() / step;
+        let voxels = native.voxels() as f64 * seen.share;
+        let slabs = native.world_box().diagonal() / step;
         let fragments = voxels * (std::f64::consts::PI * radius * radius).max(1.0);
         OwnWork {
             items: if is_splatted { sweeps * fragments } else { 0.0 },
@@ -128,7 +128,7 @@ fn own_work(frame: &Frame<'_>) -> OwnWork {
             ranges: None,
         }
     };
-    let volumes = frame.loaded.own.iter().filter(|own| own.technique == Technique::Sheets).map(one);
+    let volumes = frame.loaded.own.iter().filter(|native| native.technique == Technique::Sheets).map(volume_work);
     volumes.fold(OwnWork::default(), |sum, work| OwnWork {
         items: sum.items + work.items,
         slab_samples: sum.slab_samples + work.slab_samples,
@@ -138,7 +138,7 @@ fn own_work(frame: &Frame<'_>) -> OwnWork {
 
 /// Adds to a plan how slabs get the values of its volumes, and why.
 pub(crate) fn plans(scene: &Scene, loaded: &Loaded, plan: &mut Plan) {
-    let is_volume = |own: &Own| own.technique == Technique::Sheets && own.grid().is_some();
+    let is_volume = |native: &Own| native.technique == Technique::Sheets && native.grid().is_some();
     if !loaded.own.iter().any(is_volume) {
         return;
     }
@@ -164,10 +164,10 @@ pub(crate) use half::carries;
 
 /// Bytes of sheets of all slabs at once, of lists of voxels, and of polygons; slabs across the view count theirs when they make them.
 pub(crate) fn bytes(matter: &Matter<'_>, points: &[LightPoint], _: bool, options: &RenderOptions) -> u64 {
-    let panes: Vec<_> = matter.own.iter().filter(|own| own.form == Form::Panes).filter_map(Own::placed).collect();
+    let panes: Vec<_> = matter.own.iter().filter(|native| native.form == Form::Panes).filter_map(Own::placed).collect();
     let others = match half::is_asked(matter.scene) {
         true => half::bytes(matter, &panes, points, options),
-        false if matter.own.iter().any(|own| own.form.is_polygons()) => {
+        false if matter.own.iter().any(|native| native.form.is_polygons()) => {
             // One z-buffer lives at a time.
             let z_buffers = points.iter().any(|point| point.light.intensity != [0.0; 3]);
             polygon_bytes(matter.camera, u32::from(z_buffers), &HalfParams::default())
@@ -303,27 +303,27 @@ fn params(scene: &Scene, exponent: i32, options: &RenderOptions) -> Params {
 
 /// The volumes that are the technique's own.
 fn volumes<'a>(matter: &Matter<'a>) -> impl Iterator<Item = Volume<'a>> + use<'a> {
-    let Matter { scene, own, .. } = *matter;
-    own.iter().filter_map(move |own| {
-        let object = &scene.objects[own.object];
-        let material = &scene.materials[own.material].material;
+    let Matter { scene, own: natives, .. } = *matter;
+    natives.iter().filter_map(move |native| {
+        let object = &scene.objects[native.object];
+        let material = &scene.materials[native.material].material;
         let factor = f64::from(material.greatest_extinction());
-        let Body::Cells { grid, transfer, normals, body_centred, .. } = &own.body else { return None };
+        let Body::Cells { grid, transfer, normals, body_centred, .. } = &native.body else { return None };
         let (grid, packing) = match body_centred {
             Some(bcc) => (&bcc.planes, Packing::BodyCentred),
             None => (&**grid, Packing::Cartesian),
         };
-        (own.technique == Technique::Sheets && factor > 0.0).then(|| Volume {
+        (native.technique == Technique::Sheets && factor > 0.0).then(|| Volume {
             grid,
             packing,
-            transform: own.transform,
+            transform: native.transform,
             transfer,
             // The scale holds the material's factor, and leads to units of the object.
-            extinction_scale: own.extinction_scale / (factor * own.transform.scale),
+            extinction_scale: native.extinction_scale / (factor * native.transform.scale),
             material,
             normals: *normals,
             clip: &object.clip,
-            object: own.object as u32,
+            object: native.object as u32,
             shadow_coefficient: object.shadow_coefficient,
             casts_shadow: object.casts_shadow,
         })

@@ -51,11 +51,11 @@ pub(crate) fn bumps(scene: &Scene) -> Result<(), &'static str> {
 }
 
 /// Discs whose fragments are averaged and composited, range by range, and rays that are bent.
-pub(crate) fn counts(scene: &Scene, all: &Translucent) -> Vec<Count> {
+pub(crate) fn counts(scene: &Scene, translucent: &Translucent) -> Vec<Count> {
     let bends = scene.materials.iter().any(|m| m.material.bounds_matter());
     vec![
-        Count::new(Item::SurfelFragment, all.fragments),
-        Count::new(Item::SurfelSample, samples(scene) * all.ranges),
+        Count::new(Item::SurfelFragment, translucent.fragments),
+        Count::new(Item::SurfelSample, samples(scene) * translucent.ranges),
         Count::new(Item::BentSample, if bends { samples(scene) } else { 0.0 }),
     ]
 }

@@ -56,7 +56,7 @@ pub enum Density<'a> {
     /// Another density where all of these regions keep it, 0 elsewhere.
     Cut {
         /// The whole.
-        of: &'a Density<'a>,
+        whole: &'a Density<'a>,
         /// The regions, world space.
         clips: &'a [Clip],
     },
@@ -198,7 +198,7 @@ impl Density<'_> {
             Self::Field { field, bounds, .. } if bounds.contains(p) => field.value(p).max(0.0),
             Self::Inside { field, bounds } if bounds.contains(p) => f64::from(field.value(p) < 0.0),
             Self::Function { function, bounds, .. } if bounds.contains(p) => function(p).max(0.0),
-            Self::Cut { of, clips } if clips.iter().all(|clip| clip.keeps(p)) => of.value(p),
+            Self::Cut { whole, clips } if clips.iter().all(|clip| clip.keeps(p)) => whole.value(p),
             _ => 0.0,
         }
     }
@@ -211,7 +211,7 @@ impl Density<'_> {
             Self::Ball { center, radius } => DAabb::around(*center, DVec3::splat(*radius)),
             Self::Grid(lattice) => DAabb::of_points(lattice.corners()),
             Self::Volume(volume) => volume.bounds(),
-            Self::Cut { of, .. } => of.bounds(),
+            Self::Cut { whole, .. } => whole.bounds(),
         }
     }
 
@@ -236,9 +236,9 @@ impl Density<'_> {
             }
             Self::Inside { field, .. } => f64::from(field.bound(middle, reach).is_none_or(|(low, _)| low < 0.0)),
             Self::Function { majorant, .. } => *majorant,
-            Self::Cut { of, clips } => {
+            Self::Cut { whole, clips } => {
                 let may_be_kept = clips.iter().all(|clip| clip.may_keep(middle, reach));
-                if may_be_kept { of.upper(bounds) } else { 0.0 }
+                if may_be_kept { whole.upper(bounds) } else { 0.0 }
             }
         }
     }
@@ -246,7 +246,7 @@ impl Density<'_> {
     /// Whether the density is a polynomial of degree ≤ 3 between neighbouring [`Density::breaks`].
     pub(crate) fn is_piecewise_cubic(&self) -> bool {
         match self {
-            Self::Cut { of, .. } => of.is_piecewise_cubic(),
+            Self::Cut { whole, .. } => whole.is_piecewise_cubic(),
             _ => !matches!(self, Self::Field { .. } | Self::Function { .. }),
         }
     }
@@ -266,8 +266,8 @@ impl Density<'_> {
                     out.extend(crossings(*field, ray, a, b, &RootParams::default()).roots);
                 }
             }
-            Self::Cut { of, clips } => {
-                of.breaks(ray, t0, t1, out);
+            Self::Cut { whole, clips } => {
+                whole.breaks(ray, t0, t1, out);
                 // A ray along a border does not cross it: what is divided by 0 is not in the range.
                 let planes = clips.iter().flat_map(Clip::half_spaces);
                 let crossings = planes.map(|(n, offset)| (offset - n.dot(ray.origin)) / n.dot(ray.direction));
@@ -284,7 +284,7 @@ impl Density<'_> {
             Self::Field { .. } | Self::Inside { .. } => [32; 3],
             Self::Grid(lattice) => majorant_cells(lattice.grid.dims),
             Self::Volume(volume) => majorant_cells(volume.dims()),
-            Self::Cut { of, .. } => of.detail().map(|n| n.max(CUT_DETAIL)),
+            Self::Cut { whole, .. } => whole.detail().map(|n| n.max(CUT_DETAIL)),
         }
     }
 
@@ -302,7 +302,9 @@ impl Density<'_> {
             {
                 Err(Error::invalid("medium", index, "majorant", majorant, "a finite number ≥ 0"))
             }
-            Self::Cut { of, clips } => clips.iter().try_for_each(Clip::validate).and_then(|()| of.validate(index)),
+            Self::Cut { whole, clips } => {
+                clips.iter().try_for_each(Clip::validate).and_then(|()| whole.validate(index))
+            }
             _ => Ok(()),
         }
     }

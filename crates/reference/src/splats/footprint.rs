@@ -222,7 +222,8 @@ impl<'a> Splat<'a> {
             Shape::Gaussian(gaussian) => {
                 let d = at - self.center_px;
                 let amount = gaussian.optical_depth(d)?;
-                let (depth, middle) = (self.depth, self.depth + gaussian.depth_slope.dot(d));
+                let depth = self.depth;
+                let middle = depth + gaussian.depth_slope.dot(d);
                 return Some(Fragment { is_solid: false, amount, depth, distance_sq: 0.0, middle });
             }
             Shape::Ball { radius_sq } => {

@@ -17,7 +17,7 @@ impl PixelSum {
     ///
     /// # Panics
     /// If the accumulator has fewer pixels.
-    pub fn of(accumulator: &Accumulator, k: usize) -> Self {
+    pub fn from_accumulator(accumulator: &Accumulator, k: usize) -> Self {
         let at = |planes: &[Vec<f32>]| planes.iter().map(|plane| f64::from(plane[k])).collect();
         Self {
             optical_depth: at(&accumulator.optical_depth),
@@ -86,7 +86,7 @@ mod tests {
     #[test]
     fn tiny_optical_depths_add_up_where_single_precision_stalls() {
         let mut accumulator = Accumulator::new([1, 1], 1, 3, false, true);
-        let mut pixel = PixelSum::of(&accumulator, 0);
+        let mut pixel = PixelSum::from_accumulator(&accumulator, 0);
         let n = 1 << 20;
         for i in 0..n {
             let nowhere = |_: [f32; 2]| unreachable!("no depths are kept");

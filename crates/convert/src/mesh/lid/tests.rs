@@ -41,13 +41,13 @@ fn cube(low: Vec3, side: f32) -> Mesh {
 
 /// Several meshes as one.
 fn joined(meshes: &[Mesh]) -> Mesh {
-    let mut all = Mesh::default();
+    let mut whole = Mesh::default();
     for mesh in meshes {
-        let first = all.position.len() as u32;
-        all.position.extend(&mesh.position);
-        all.triangles.extend(mesh.triangles.iter().map(|t| t.map(|v| first + v)));
+        let first = whole.position.len() as u32;
+        whole.position.extend(&mesh.position);
+        whole.triangles.extend(mesh.triangles.iter().map(|t| t.map(|v| first + v)));
     }
-    all
+    whole
 }
 
 /// The volume by the divergence theorem, and whether each edge, by the bits of its places, is run through as often each way.
@@ -116,12 +116,12 @@ fn planes_of_faces_leave_all_or_nothing() {
 fn both_sides_of_a_plane_make_the_whole_and_a_box_beside_a_body_nothing() {
     let torus = torus(DVec3::ZERO);
     let normal = DVec3::new(0.48, 0.6, 0.64);
-    let all = volume_and_closed(&torus).0;
-    assert!((all / (2.0 * PI * PI * 2.0 * 0.25) - 1.0).abs() < 5e-3, "{all}");
+    let whole = volume_and_closed(&torus).0;
+    assert!((whole / (2.0 * PI * PI * 2.0 * 0.25) - 1.0).abs() < 5e-3, "{whole}");
     for height in [-0.7, 0.0, 0.31] {
         let sides = [(normal, height), (-normal, -height)].map(|(n, h)| cut_open(&torus, &[above(n, h)]).0);
         let [(a, a_closed), (b, b_closed)] = sides.each_ref().map(volume_and_closed);
-        assert!((a + b - all).abs() < 1e-5 * all && a_closed && b_closed, "{height}: {a} + {b} for {all}");
+        assert!((a + b - whole).abs() < 1e-5 * whole && a_closed && b_closed, "{height}: {a} + {b} for {whole}");
     }
     let hole = Clip::Box(DAabb::new(DVec3::splat(-0.5), DVec3::splat(0.5)));
     let (none, report) = cut_open(&torus, &[hole]);

@@ -20,13 +20,13 @@ pub fn particles(scene: &Scene, facts: &Facts, options: &Options) -> Result<Swee
     let mut scene = scene.drawn_by(Technique::Particles);
     // The report looks at beauty alone.
     scene.render.layers = LayerChoice::default();
-    let own = scene.render.particles.repeat_level;
-    let cut = options.quick && own > finest;
+    let sets = scene.render.particles.repeat_level;
+    let cut = options.quick && sets > finest;
     if cut {
         scene.render.particles.repeat_level = finest;
         scene.render.particles.target_error = None;
     }
-    let mut knobs = vec![repeat_level(own, levels)];
+    let mut knobs = vec![repeat_level(sets, levels)];
     let mut skipped = Vec::new();
     for (name, knob) in [
         ("surface sampler", surface_sampler(&scene)),
@@ -41,14 +41,18 @@ pub fn particles(scene: &Scene, facts: &Facts, options: &Options) -> Result<Swee
     Ok(Sweep {
         technique: "particles",
         base: Request { scene, oversample: 1, packed: false },
-        base_label: if cut { format!("the scene's own, but {finest} of {own} sets") } else { "the scene's own".into() },
+        base_label: if cut {
+            format!("the scene's own, but {finest} of {sets} sets")
+        } else {
+            "the scene's own".into()
+        },
         knobs,
         skipped,
         joint_levels: 0,
     })
 }
 
-fn repeat_level(own: u32, levels: &[u32]) -> Knob {
+fn repeat_level(sets: u32, levels: &[u32]) -> Knob {
     let step = |level: &u32| Step {
         label: format!("{level} sets"),
         size: Some(f64::from(*level).recip()),
@@ -65,7 +69,7 @@ fn repeat_level(own: u32, levels: &[u32]) -> Knob {
         ends: Vec::new(),
         end_is_exact: true,
         theory: Some(Theory { low: 0.47, high: 0.53, why: "the mean of L independent sets spreads as L^-1/2" }),
-        own: Some(f64::from(own).recip()),
+        scene_size: Some(f64::from(sets).recip()),
         joint: false,
     }
 }
@@ -100,7 +104,7 @@ fn surface_sampler(scene: &Scene) -> Result<Knob, String> {
         ends: Vec::new(),
         end_is_exact: true,
         theory: None,
-        own: None,
+        scene_size: None,
         joint: false,
     })
 }
@@ -123,7 +127,7 @@ fn brownian_step(scene: &Scene, quick: bool) -> Result<Knob, String> {
         ends: Vec::new(),
         end_is_exact: true,
         theory: None,
-        own: None,
+        scene_size: None,
         joint: false,
     })
 }
@@ -152,7 +156,7 @@ fn volume_sampler(scene: &Scene) -> Result<Knob, String> {
         ends: Vec::new(),
         end_is_exact: true,
         theory: None,
-        own: None,
+        scene_size: None,
         joint: false,
     })
 }

@@ -81,11 +81,11 @@ pub fn in_points(scene: &Scene) -> Scene {
 }
 
 fn slices(scene: &Scene, facts: &Facts, options: &Options) -> Result<Knob, String> {
-    let own = facts.slice_thickness.ok_or(NO_TRANSLUCENT)?;
+    let thickness = facts.slice_thickness.ok_or(NO_TRANSLUCENT)?;
     let factors: &[f64] =
         if options.quick { &[16.0, 4.0, 2.0, 1.0] } else { &[64.0, 32.0, 16.0, 8.0, 4.0, 2.0, 1.0, 0.5] };
     let mut steps: Vec<Step> =
-        factors.iter().map(|f| step(format!("{:.3} ({f} x)", f * own), f * own, f * own)).collect();
+        factors.iter().map(|f| step(format!("{:.3} ({f} x)", f * thickness), f * thickness, f * thickness)).collect();
     steps.push(Step { label: "exact".into(), size: None, value: 0.0 });
     Ok(Knob {
         name: "slice thickness",
@@ -104,7 +104,7 @@ fn slices(scene: &Scene, facts: &Facts, options: &Options) -> Result<Knob, Strin
             why: "pairs in wrong order grow with ε and so does their difference in colour: 2 where colour is smooth; \
                   1 where it is not; 1/2 where few pixels, whose number grows with ε, are wrong altogether",
         }),
-        own: Some(if scene.render.points.exact { 0.0 } else { own }),
+        scene_size: Some(if scene.render.points.exact { 0.0 } else { thickness }),
         joint: true,
     })
 }
@@ -125,15 +125,15 @@ fn order(facts: &Facts, options: &Options) -> Result<Knob, String> {
         ends: Vec::new(),
         end_is_exact: false,
         theory: None,
-        own: None,
+        scene_size: None,
         joint: false,
     })
 }
 
 pub(super) fn cells(facts: &Facts, options: &Options) -> Result<Knob, String> {
-    let own = f64::from(facts.cells.ok_or(NO_MAP)?);
+    let side = f64::from(facts.cells.ok_or(NO_MAP)?);
     let parts: &[f64] = if options.quick { &[16.0, 8.0, 4.0] } else { &[32.0, 16.0, 8.0, 4.0, 2.0] };
-    let count = move |part: f64| (own / part).round().clamp(1.0, MOST_CELLS);
+    let count = move |part: f64| (side / part).round().clamp(1.0, MOST_CELLS);
     let label = |n: f64| format!("{n} a side");
     let at = |part: &f64| step(label(count(*part)), count(*part).recip(), count(*part));
     let end = 0.5 / finer(options);
@@ -150,7 +150,7 @@ pub(super) fn cells(facts: &Facts, options: &Options) -> Result<Knob, String> {
             why: "2 where shadows are smooth (linear interpolation); 1/2 where they have hard borders, whose share of \
                   the picture shrinks like the cells",
         }),
-        own: Some(own.recip()),
+        scene_size: Some(side.recip()),
         joint: true,
     })
 }
@@ -171,7 +171,7 @@ fn splat_share(scene: &Scene, options: &Options) -> Result<Knob, String> {
             high: 2.0,
             why: "edges are as unsharp as splats are apart, and their share of the picture grows alike: 1; 2 where all is smooth",
         }),
-        own: Some(scene.render.splat_share.sqrt().recip()),
+        scene_size: Some(scene.render.splat_share.sqrt().recip()),
         joint: false,
     })
 }
@@ -193,7 +193,7 @@ fn mapping(scene: &Scene, facts: &Facts) -> Result<Knob, String> {
         ends: Vec::new(),
         end_is_exact: false,
         theory: None,
-        own: None,
+        scene_size: None,
         joint: false,
     })
 }
@@ -213,14 +213,14 @@ pub(super) fn absorbance_cut(facts: &Facts, options: &Options) -> Result<Knob, S
             high: 2.0,
             why: "light behind the cut is at most e^-A_cut: 1 where every shadow is that deep, more where deep ones are rare",
         }),
-        own: None,
+        scene_size: None,
         joint: true,
     })
 }
 
 fn transmittance_cut(scene: &Scene, facts: &Facts, options: &Options) -> Result<Knob, String> {
     facts.slice_thickness.ok_or(NO_TRANSLUCENT)?;
-    Ok(Knob { own: Some(scene.render.points.transmittance_cutoff), ..cutoffs(options) })
+    Ok(Knob { scene_size: Some(scene.render.points.transmittance_cutoff), ..cutoffs(options) })
 }
 
 /// Transmittances at which pixels are finished.
@@ -240,7 +240,7 @@ pub(super) fn cutoffs(options: &Options) -> Knob {
             high: 2.0,
             why: "what lies behind the cut is seen through at most T_cut: 1 where every pixel reaches it, more where few do",
         }),
-        own: None,
+        scene_size: None,
         joint: true,
     }
 }
@@ -264,7 +264,7 @@ pub(super) fn samples(scene: &Scene, options: &Options) -> Result<Knob, String> 
             high: 2.0,
             why: "2 where the picture is smooth inside a pixel; 1 to 3/2 at edges, by their direction",
         }),
-        own: Some(f64::from(scene.render.antialias).recip()),
+        scene_size: Some(f64::from(scene.render.antialias).recip()),
         joint: true,
     })
 }
@@ -279,7 +279,7 @@ fn resampling_filter() -> Knob {
         ends: Vec::new(),
         end_is_exact: false,
         theory: None,
-        own: None,
+        scene_size: None,
         joint: false,
     }
 }
@@ -296,7 +296,7 @@ fn accumulation(facts: &Facts) -> Result<Knob, String> {
         ends: Vec::new(),
         end_is_exact: false,
         theory: None,
-        own: None,
+        scene_size: None,
         joint: false,
     })
 }
@@ -322,7 +322,7 @@ pub(super) fn spacing(scene: &Scene, options: &Options) -> Result<Knob, String> 
             high: 2.0,
             why: "2 for smooth fields; less where a field has detail below the spacing, or surfaces end",
         }),
-        own: Some(1.0),
+        scene_size: Some(1.0),
         joint: false,
     })
 }
@@ -341,7 +341,7 @@ fn packed(facts: &Facts) -> Result<Knob, String> {
         ends: Vec::new(),
         end_is_exact: false,
         theory: None,
-        own: None,
+        scene_size: None,
         joint: false,
     })
 }

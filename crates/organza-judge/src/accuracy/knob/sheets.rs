@@ -29,7 +29,7 @@ pub fn sheets(scene: &Scene, slab_width: Option<f64>, facts: &Facts, options: &O
         joint_levels: if options.quick { 2 } else { 5 },
     };
     let knobs = [
-        ("slab width", in_slabs(&|own| slabs(own, options))),
+        ("slab width", in_slabs(&|width| slabs(width, options))),
         ("reconstruction", reconstruction(scene, slab_width.is_some())),
         ("kernel radius", in_splatted(&|_| radius())),
         ("kernel deviation", in_splatted(&|_| deviation())),
@@ -67,9 +67,9 @@ pub fn in_sheets(scene: &Scene) -> Scene {
     scene.drawn_by(Technique::Sheets)
 }
 
-fn slabs(own: f64, options: &Options) -> Knob {
+fn slabs(width: f64, options: &Options) -> Knob {
     let factors: &[f64] = if options.quick { &[8.0, 4.0, 2.0, 1.0] } else { &[16.0, 8.0, 4.0, 2.0, 1.0] };
-    let at = |factor: f64| step(format!("{:.3} ({factor} x)", factor * own), factor * own, factor * own);
+    let at = |factor: f64| step(format!("{:.3} ({factor} x)", factor * width), factor * width, factor * width);
     let end = 0.25 / finer(options);
     Knob {
         name: "slab width",
@@ -83,14 +83,18 @@ fn slabs(own: f64, options: &Options) -> Knob {
             high: 2.0,
             why: "2 where values are smooth along the view, which a slab averages; 1 at surfaces, which it smears by its width",
         }),
-        own: Some(own),
+        scene_size: Some(width),
         joint: true,
     }
 }
 
 fn transmittance_cut(scene: &Scene, options: &Options) -> Knob {
-    let own = Some(scene.render.sheets.transmittance_cutoff);
-    Knob { set: |request, value| request.scene.render.sheets.transmittance_cutoff = value, own, ..cutoffs(options) }
+    let scene_size = Some(scene.render.sheets.transmittance_cutoff);
+    Knob {
+        set: |request, value| request.scene.render.sheets.transmittance_cutoff = value,
+        scene_size,
+        ..cutoffs(options)
+    }
 }
 
 /// Pixels of light buffers, where slabs have some.
@@ -137,7 +141,7 @@ fn scattering(request: &mut Request) -> Option<&mut Scattering> {
 
 /// How coarse the cells of reflectances are.
 fn scattered_cells(scene: &Scene, options: &Options) -> Result<Knob, String> {
-    let own = scene.render.sheets.scattering().ok_or(SCATTERED_ONCE)?.voxels_per_cell;
+    let voxels_per_cell = scene.render.sheets.scattering().ok_or(SCATTERED_ONCE)?.voxels_per_cell;
     let voxels: &[f64] = if options.quick { &[256.0, 64.0, 16.0] } else { &[1024.0, 256.0, 64.0, 32.0, 16.0] };
     let at = |n: f64| step(format!("{n} voxels a cell"), n.cbrt(), n);
     Ok(Knob {
@@ -156,7 +160,7 @@ fn scattered_cells(scene: &Scene, options: &Options) -> Result<Knob, String> {
             high: 2.0,
             why: "2 inside of media, 1 where light leaves them or ends, for that is at a face of a cell",
         }),
-        own: Some(f64::from(own).cbrt()),
+        scene_size: Some(f64::from(voxels_per_cell).cbrt()),
         joint: true,
     })
 }
@@ -258,7 +262,7 @@ fn choices(name: &'static str, set: fn(&mut Request, f64), steps: &[(impl AsRef<
         ends: Vec::new(),
         end_is_exact: false,
         theory: None,
-        own: None,
+        scene_size: None,
         joint: false,
     }
 }
@@ -298,7 +302,7 @@ fn sections(scene: &Scene, options: &Options) -> Knob {
             why: "kernels are moved along the view by up to half of what places are apart: 1, more where neighbours make up for it; 1/2 \
                   where few pixels, at the borders of what is seen, change altogether",
         }),
-        own: Some(f64::from(scene.render.sheets.kernel_sections).recip()),
+        scene_size: Some(f64::from(scene.render.sheets.kernel_sections).recip()),
         joint: true,
     }
 }

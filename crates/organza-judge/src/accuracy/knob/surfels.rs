@@ -52,8 +52,12 @@ pub fn in_surfels(scene: &Scene) -> Scene {
 }
 
 fn transmittance_cut(scene: &Scene, options: &Options) -> Knob {
-    let own = Some(scene.render.surfels.transmittance_cutoff);
-    Knob { set: |request, value| request.scene.render.surfels.transmittance_cutoff = value, own, ..cutoffs(options) }
+    let scene_size = Some(scene.render.surfels.transmittance_cutoff);
+    Knob {
+        set: |request, value| request.scene.render.surfels.transmittance_cutoff = value,
+        scene_size,
+        ..cutoffs(options)
+    }
 }
 
 fn disc_scale() -> Knob {
@@ -72,7 +76,7 @@ fn choices(name: &'static str, set: fn(&mut Request, f64), steps: Vec<Step>) -> 
     let end_is_exact = false;
     let theory = None;
     let joint = false;
-    Knob { name, size_meaning: "", set, steps, ends, end_is_exact, theory, own: None, joint }
+    Knob { name, size_meaning: "", set, steps, ends, end_is_exact, theory, scene_size: None, joint }
 }
 
 fn layers() -> Knob {
@@ -92,7 +96,7 @@ fn layers() -> Knob {
 }
 
 /// What is turned of a scene's groups.
-fn of(request: &mut Request) -> &mut SurfelGroups {
+fn stated_groups(request: &mut Request) -> &mut SurfelGroups {
     request.scene.render.surfels.layers.groups_mut().expect("invariant: knobs of groups are for scenes that have some")
 }
 
@@ -104,12 +108,12 @@ fn grouped(scene: &Scene, knob: Knob) -> Result<Knob, String> {
 
 fn groups() -> Knob {
     let steps = [2.0, 4.0, 8.0, 16.0].map(|k| choice(&format!("{k} groups"), k)).to_vec();
-    choices("groups", |request, value| of(request).count = value as u32, steps)
+    choices("groups", |request, value| stated_groups(request).count = value as u32, steps)
 }
 
 fn grouping() -> Knob {
     let set = |request: &mut Request, value: f64| {
-        of(request).grouping = match value {
+        stated_groups(request).grouping = match value {
             0.0 => Grouping::Weighted,
             1.0 => Grouping::Minimum { factor: 1.0 },
             _ => Grouping::Hash(Collisions::Resolve),
@@ -119,14 +123,14 @@ fn grouping() -> Knob {
 }
 
 fn overlap_factor(scene: &Scene) -> Result<Knob, String> {
-    let set = |request: &mut Request, value: f64| of(request).grouping = Grouping::Minimum { factor: value };
+    let set = |request: &mut Request, value: f64| stated_groups(request).grouping = Grouping::Minimum { factor: value };
     let steps = [0.4, 0.6, 0.8, 1.0].map(|c| choice(&format!("c = {c}, MGC"), c)).to_vec();
     grouped(scene, choices("overlap factor", set, steps))
 }
 
 fn collisions(scene: &Scene) -> Knob {
     let set = |request: &mut Request, value: f64| {
-        of(request).grouping = Grouping::Hash(match value {
+        stated_groups(request).grouping = Grouping::Hash(match value {
             -1.0 => Collisions::Keep,
             0.0 => Collisions::Resolve,
             distance => Collisions::Near(distance),
@@ -141,7 +145,7 @@ fn collisions(scene: &Scene) -> Knob {
 
 fn coverage() -> Knob {
     let set = |request: &mut Request, value: f64| {
-        of(request).coverage = match value {
+        stated_groups(request).coverage = match value {
             0.0 => Coverage::Partial,
             1.0 => Coverage::Duplicates,
             2.0 => Coverage::Enlarged,

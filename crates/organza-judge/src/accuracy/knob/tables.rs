@@ -38,22 +38,22 @@ pub(super) fn footprint_tables(scene: &Scene, options: &Options) -> Result<Knob,
             high: 2.0,
             why: "2: bilinear between texels; less where discs are hardly larger than pixels",
         }),
-        own: None,
+        scene_size: None,
         joint: false,
     })
 }
 
 /// The objects whose discs are translucent and show one Gaussian, by rank, with it.
 fn tabled(scene: &Scene) -> impl Iterator<Item = (usize, Footprint)> + '_ {
-    let of = |(rank, object): (usize, &SceneObject)| {
+    let tabled_object = |(rank, object): (usize, &SceneObject)| {
         let is_surface = !object.source.is_medium() && !matches!(object.source, Source::Points(_));
-        let [id] = object.footprints.of[..] else { return None };
+        let [id] = object.footprints.ids[..] else { return None };
         let footprint = scene.footprints.layers()[usize::from(id)];
         let is_gaussian = scene.footprints.image(usize::from(id)).is_none() && footprint.cutoff * SQRT_2 <= 8.0;
         let is_drawn = object.visible && is_surface && scene.opacity_of(object) < 1.0;
         (is_drawn && is_gaussian).then_some((rank, footprint))
     };
-    scene.objects.iter().enumerate().filter_map(of)
+    scene.objects.iter().enumerate().filter_map(tabled_object)
 }
 
 /// Puts images of so many texels a side in the place of Gaussians; 0 leaves the formula. What knows formulas alone, shadows, and the filter,
@@ -67,7 +67,7 @@ fn tabulate(request: &mut Request, texels: f64) {
         let id = stack.layers().len() - 1;
         let object = &mut request.scene.objects[rank];
         let choice =
-            FootprintChoice { stack: stack.clone(), of: vec![id as u8], ..FootprintChoice::clone(&object.footprints) };
+            FootprintChoice { stack: stack.clone(), ids: vec![id as u8], ..FootprintChoice::clone(&object.footprints) };
         (object.footprints, request.scene.footprints) = (Arc::new(choice), stack);
     }
 }

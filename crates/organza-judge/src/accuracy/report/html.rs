@@ -58,26 +58,29 @@ fn rmse(o: &Outcome) -> Option<f64> {
 }
 
 fn summary(html: &mut String, study: &Study) {
-    let own = &study.outcomes[0];
+    let scene_outcome = &study.outcomes[0];
     let _ = write!(html, "<h2 class=\"technique\">Technique: {}</h2>\n<div class=\"cards\">", study.technique);
     let mut card = |value: String, what: &str| {
         let _ = write!(html, "<div class=\"card\"><b>{}</b><span>{what}</span></div>", escaped(&value));
     };
     let shown = |v: Option<f64>, text: fn(f64) -> String| v.map_or_else(|| "not measured".into(), text);
     card(
-        shown(least_seconds(own), |s| format!("{:.0} ms", 1e3 * s)),
-        &format!("{}, without loading", own.setting.label),
+        shown(least_seconds(scene_outcome), |s| format!("{:.0} ms", 1e3 * s)),
+        &format!("{}, without loading", scene_outcome.setting.label),
     );
-    card(shown(rmse(own), |e| format!("{e:.2e}")), "its RMSE against the limit, linear radiance");
-    card(shown(own.from_limit.as_ref().map(|d| d.flip), |f| format!("{f:.4}")), "its mean FLIP");
+    card(shown(rmse(scene_outcome), |e| format!("{e:.2e}")), "its RMSE against the limit, linear radiance");
+    card(shown(scene_outcome.from_limit.as_ref().map(|d| d.flip), |f| format!("{f:.4}")), "its mean FLIP");
     if study.is_random() {
-        let sampled = own.sampled;
+        let sampled = scene_outcome.sampled;
         card(shown(sampled.map(|s| s.from_limit.half_width), |h| format!("± {h:.1e}")), "95 % interval of the RMSE");
         card(shown(sampled.map(|s| s.noise), |n| format!("{n:.2e}")), "standard deviation of one picture");
         let bias = sampled.map(|s| s.bias.map_or_else(|| "none at 95 %".into(), |b| format!("{b:.1e}")));
         card(bias.unwrap_or_else(|| "not measured".into()), "RMS distance of the expectation from the limit");
     } else {
-        card(shown(own.from_limit.as_ref().map(|d| d.psnr), |p| format!("{p:.1} dB")), "its PSNR as displayed");
+        card(
+            shown(scene_outcome.from_limit.as_ref().map(|d| d.psnr), |p| format!("{p:.1} dB")),
+            "its PSNR as displayed",
+        );
         card(format!("{:.1e}", study.limit.own_error), "the limit's own error; nothing below ten times that is drawn");
     }
     *html += "</div>\n";
@@ -163,9 +166,10 @@ fn knob_plot(study: &Study, curve: &Curve, meaning: &str) -> Option<Plot> {
     let last = points.last()?.0[0];
     let mut series = Vec::new();
     if let Some(fit) = curve.settled.order() {
-        let own = if curve.end_size.is_some() { curve.settled.own_error } else { 0.0 };
+        let end_error = if curve.end_size.is_some() { curve.settled.own_error } else { 0.0 };
         let at = |k: usize| first * (last / first).powf(k as f64 / 24.0);
-        let line = (0..=24).map(at).map(|x| ([x, (fit.log_factor + fit.order * x.ln()).exp() - own], String::new()));
+        let line =
+            (0..=24).map(at).map(|x| ([x, (fit.log_factor + fit.order * x.ln()).exp() - end_error], String::new()));
         series.push(Series { color: "var(--soft)".into(), mark: Mark::Dashed, points: line.collect() });
     }
     series.push(Series { color: color(study, Some(curve.knob)).into(), mark: Mark::Dots, points });

@@ -49,11 +49,11 @@ fn study(scene: &Scene, study: &Study) -> Value {
             Ok(t) => json!({
                 "method": t.method,
                 "rms_standard_error": t.rms_standard_error(),
-                "all_orders": t.all_orders.map(|all| json!({
-                    "rmse": all.rmse,
-                    "rms_standard_error": all.rms_standard_error,
-                    "mean": all.mean[0],
-                    "mean_of_all": all.mean[1],
+                "all_orders": t.all_orders.map(|orders| json!({
+                    "rmse": orders.rmse,
+                    "rms_standard_error": orders.rms_standard_error,
+                    "mean": orders.mean[0],
+                    "mean_of_all": orders.mean[1],
                 })),
             }),
             Err(reason) => json!({ "missing": reason }),

@@ -100,7 +100,7 @@ impl Kept {
     }
 
     /// The sets of an object, by its rank in the scene.
-    pub(super) fn of(&self, object: usize) -> Option<Arc<KeptSets>> {
+    pub(super) fn sets_of(&self, object: usize) -> Option<Arc<KeptSets>> {
         self.of_object.get(&object).map(|entry| Arc::clone(&entry.sets))
     }
 }

@@ -35,7 +35,7 @@ pub(super) struct Source<'a> {
     seed: u64,
     volumes_by: VolumeSampler,
     /// Rank of the object in the scene.
-    of: u32,
+    object: u32,
     /// A box in the world that holds it.
     bounds: DAabb,
     /// The largest channel of its colours.
@@ -54,7 +54,7 @@ pub(super) struct Part<'a> {
     transform: Similarity,
     pub(super) look: Appearance,
     /// Rank of the object in the scene.
-    pub(super) of: u32,
+    pub(super) object: u32,
     /// A box in the world that holds it.
     pub(super) bounds: DAabb,
     /// The largest channel of its colours.
@@ -110,8 +110,8 @@ pub(super) fn sources<'a>(frame: &Frame<'a>) -> Vec<Source<'a>> {
         radii.sum += f64::from(*radius);
     }
     // What other techniques draw from data of its own is not drawn again.
-    let own = loaded.own.iter().filter(|own| own.technique == Technique::Particles);
-    own.map(|own| of_own(own, splats[own.object], frame)).chain(of_splats(frame)).collect()
+    let natives = loaded.own.iter().filter(|native| native.technique == Technique::Particles);
+    natives.map(|native| of_own(native, splats[native.object], frame)).chain(of_splats(frame)).collect()
 }
 
 /// The finest cross-section that a camera needs of an object, units² of the object.
@@ -132,28 +132,28 @@ struct Radii {
     sum: f64,
 }
 
-fn of_own<'a>(own: &'a Own, radii: Radii, frame: &Frame<'a>) -> Source<'a> {
+fn of_own<'a>(native: &'a Own, radii: Radii, frame: &Frame<'a>) -> Source<'a> {
     let Loaded { objects, materials, .. } = frame.loaded;
-    let material = materials[own.material];
-    let brightest_color = own.brightest_color();
+    let material = materials[native.material];
+    let brightest_color = native.brightest_color();
     // As its splats have it, where it has some.
-    let radius = if radii.splats > 0 { radii.sum / f64::from(radii.splats) } else { own.radius };
+    let radius = if radii.splats > 0 { radii.sum / f64::from(radii.splats) } else { native.radius };
     Source {
-        name: objects[own.object].name.clone(),
-        data: Data::Own(own),
-        transform: own.transform,
+        name: objects[native.object].name.clone(),
+        data: Data::Own(native),
+        transform: native.transform,
         look: Appearance {
             material,
-            kind: own.kind(),
+            kind: native.kind(),
             radius: radius as f32,
-            shadow_coefficient: objects[own.object].shadow_coefficient,
+            shadow_coefficient: objects[native.object].shadow_coefficient,
             color_unit: color_unit(brightest_color),
         },
-        cross_section: finest_area(&frame.camera, &own.transform, own.bounds),
-        seed: seed(frame, own.object as u32, own.kind()),
+        cross_section: finest_area(&frame.camera, &native.transform, native.bounds),
+        seed: seed(frame, native.object as u32, native.kind()),
         volumes_by: frame.settings.particles.volume_sampler,
-        of: own.object as u32,
-        bounds: own.world_box(),
+        object: native.object as u32,
+        bounds: native.world_box(),
         brightest_color,
     }
 }
@@ -201,7 +201,7 @@ fn of_splats<'a>(frame: &Frame<'a>) -> Vec<Source<'a>> {
         let name = objects[object as usize].name.clone();
         let transform = Similarity::default();
         let volumes_by = VolumeSampler::Auto;
-        Source { name, data, transform, look, cross_section, seed, volumes_by, of: object, bounds, brightest_color }
+        Source { name, data, transform, look, cross_section, seed, volumes_by, object, bounds, brightest_color }
     };
     of_object.into_iter().map(part).collect()
 }
@@ -210,7 +210,7 @@ impl<'a> Source<'a> {
     /// The object with data of its own, by its rank.
     pub(super) fn own_object(&self) -> Option<usize> {
         match &self.data {
-            Data::Own(own) => Some(own.object),
+            Data::Own(native) => Some(native.object),
             Data::Splats(_) => None,
         }
     }
@@ -222,8 +222,8 @@ impl<'a> Source<'a> {
 
     /// Makes particles fine enough for another view of an object with data of its own.
     pub(super) fn refine(&mut self, camera: &Camera, transform: &Similarity) {
-        if let Data::Own(own) = &self.data {
-            self.cross_section = self.cross_section.min(finest_area(camera, transform, own.bounds));
+        if let Data::Own(native) = &self.data {
+            self.cross_section = self.cross_section.min(finest_area(camera, transform, native.bounds));
         }
     }
 
@@ -234,9 +234,9 @@ impl<'a> Source<'a> {
                 let (cloud, params) = splats.as_mut();
                 SplatSampler::owning(std::mem::take(cloud), params).map(|s| Box::new(s) as Box<dyn Sampler>)
             }
-            Data::Own(own) => {
-                let own = *own;
-                self.sampler(own, warnings)
+            Data::Own(native) => {
+                let native = *native;
+                self.sampler(native, warnings)
             }
         };
         let name = || format!("object '{}'", crate::shown(&self.name));
@@ -257,7 +257,7 @@ impl<'a> Source<'a> {
             particles,
             transform: self.transform,
             look: self.look,
-            of: self.of,
+            object: self.object,
             bounds: self.bounds,
             brightest_color: self.brightest_color,
         }

@@ -78,7 +78,8 @@ impl Points<'_> {
 
     /// What throws the shadow of each light that has one, or `None` where no light has, and where a device does not make all of them.
     fn castings(&self, helper: &Helper<'_>, cost: &mut CostRecord) -> Result<Option<Vec<Casting>>, Error> {
-        let (frame, l) = (self.frame, self.frame.loaded);
+        let frame = self.frame;
+        let loaded = frame.loaded;
         if !frame.plan.shadow_maps.contains(&true) {
             return Ok(None);
         }
@@ -90,13 +91,13 @@ impl Points<'_> {
         for (rank, (point, table)) in frame.light_points().iter().zip(&frame.plan.shadow_tables).enumerate() {
             let light = &point.light;
             let Some(table) = table.filter(|_| light.intensity != [0.0; 3]) else { continue };
-            let params = table.params(frame.settings, l, frame.plan.shadow_bytes);
+            let params = table.params(frame.settings, loaded, frame.plan.shadow_bytes);
             frame.tick()?;
             let made = cost.measure(pass::SHADOW_MAP, |stage| {
-                stage.items_in = l.cloud.len() as u64;
+                stage.items_in = loaded.cloud.len() as u64;
                 let objects = frame.casting(rank);
                 let casting = Casting::new(
-                    &tsm::Scene { cloud: &l.cloud, materials: &l.materials, objects: &objects },
+                    &tsm::Scene { cloud: &loaded.cloud, materials: &loaded.materials, objects: &objects },
                     light,
                     &params,
                     Some(frame.progress),

@@ -114,7 +114,7 @@ pub(super) fn bytes(
     let (served, mapped): (Vec<_>, Vec<_>) =
         lamps.partition(|lamp| serves_extended(&bodies, matter.camera, lamp.0, lamp.1).is_ok());
     let samples = served.iter().map(|(_, samples)| *samples).max().unwrap_or(1);
-    let has_polygons = matter.own.iter().any(|own| own.form.is_polygons());
+    let has_polygons = matter.own.iter().any(|native| native.form.is_polygons());
     let polygons = if has_polygons { polygon_bytes(matter.camera, samples, &params) } else { 0 };
     let served = served.into_iter().map(|(light, samples)| SampledLight { light, samples });
     let of_light = |light| light_list_bytes(panes, &bodies, light, params.most_light_pixels);
@@ -133,7 +133,7 @@ pub(super) fn draw(
     // Opaque splats alone, to which polygons are added.
     let solid = frame.solid(cost)?;
     let means = mean_shadows(frame, cost)?;
-    let splats = OwnSplats::of(frame);
+    let splats = OwnSplats::new(frame);
     let mut input = input(frame, &solid.depth, &means, cost)?;
     input.polygons = &polygons;
     input.splats = splats.as_ref().map(|splats| splats.input(frame));

@@ -13,23 +13,23 @@ impl<'a> Frame<'a> {
     pub(super) fn polygons(&self) -> Vec<Polygons<'a>> {
         let loaded = self.loaded;
         let scene = self.scene;
-        let one = |own: &'a Own| {
-            let placed = own.placed()?;
-            let object = &loaded.objects[own.object];
-            let [r, g, b] = scene.materials[scene.objects[own.object].material].material.extinction_rgb;
-            own.form.is_polygons().then(|| Polygons {
+        let polygons = |native: &'a Own| {
+            let placed = native.placed()?;
+            let object = &loaded.objects[native.object];
+            let [r, g, b] = scene.materials[scene.objects[native.object].material].material.extinction_rgb;
+            native.form.is_polygons().then(|| Polygons {
                 placed,
-                material: &loaded.materials[own.material],
-                color: own.color,
+                material: &loaded.materials[native.material],
+                color: native.color,
                 // That of the channel that absorbs most is known.
-                optical_depth: optics::optical_depth(own.opacity) as f32 / r.max(g).max(b).max(f32::MIN_POSITIVE),
-                object: own.object as u32,
+                optical_depth: optics::optical_depth(native.opacity) as f32 / r.max(g).max(b).max(f32::MIN_POSITIVE),
+                object: native.object as u32,
                 shadow_coefficient: object.shadow_coefficient,
                 casts_shadow: object.casts_shadow,
-                radius: if own.has_splats { own.radius as f32 } else { 0.0 },
+                radius: if native.has_splats { native.radius as f32 } else { 0.0 },
             })
         };
-        loaded.own.iter().filter_map(one).collect()
+        loaded.own.iter().filter_map(polygons).collect()
     }
 
     /// What is seen of the opaque ones in the light that comes through shadow maps; without any pixel where there are none.

@@ -26,24 +26,24 @@ pub(super) struct Chosen {
 }
 
 /// The form that a scene states, or the plan chooses for it. `camera` is that of samples.
-pub(super) fn chosen(scene: &Scene, own: &[Own], camera: &Camera) -> Chosen {
+pub(super) fn chosen(scene: &Scene, natives: &[Own], camera: &Camera) -> Chosen {
     let settings = &scene.render.sheets;
     let kernel = match settings.kernel {
         SheetKernel::Gaussian => GatherKernel::Gaussian,
         SheetKernel::Linear => GatherKernel::Linear,
     };
-    let volumes = || own.iter().filter(|own| own.technique == Technique::Sheets && own.grid().is_some());
+    let volumes = || natives.iter().filter(|native| native.technique == Technique::Sheets && native.grid().is_some());
     let voxels: f64 = volumes().filter_map(Own::grid).map(|grid| grid.values.len() as f64).sum();
-    let visible = (volumes().map(|own| own.voxels() as f64).sum::<f64>() / voxels.max(1.0)).min(1.0);
+    let visible = (volumes().map(|native| native.voxels() as f64).sum::<f64>() / voxels.max(1.0)).min(1.0);
     let splat = |reason| Chosen { reconstruction: Reconstruction::Splat, reason, visible };
     let gather = |reason| Chosen { reconstruction: Reconstruction::Gather(kernel), reason, visible };
     let states_kernel = KernelShape { extent: settings.kernel_extent, sigma: settings.kernel_sigma }
         != KernelShape::default()
         || settings.kernel_sections != Params::default().sections;
-    let is_body_centred = |own: &Own| matches!(&own.body, Body::Cells { body_centred: Some(_), .. });
-    let samples_along_a_voxel = |own: &Own| {
-        let step = own.grid().map_or(0.0, |grid| grid.shortest_step() * own.transform.scale);
-        step * Extent::new(&own.world_box(), camera).samples_per_unit
+    let is_body_centred = |native: &Own| matches!(&native.body, Body::Cells { body_centred: Some(_), .. });
+    let samples_along_a_voxel = |native: &Own| {
+        let step = native.grid().map_or(0.0, |grid| grid.shortest_step() * native.transform.scale);
+        step * Extent::new(&native.world_box(), camera).samples_per_unit
     };
     match settings.reconstruction {
         scene::Reconstruction::Gather => return gather("the scene asks for it"),
@@ -62,9 +62,9 @@ pub(super) fn chosen(scene: &Scene, own: &[Own], camera: &Camera) -> Chosen {
         splat("slabs sum in half precision")
     } else if volumes().any(is_body_centred) {
         splat("a lattice is body-centred")
-    } else if volumes().any(|own| samples_along_a_voxel(own) < 1.0) {
+    } else if volumes().any(|native| samples_along_a_voxel(native) < 1.0) {
         splat("voxels are finer than samples, which splats average")
-    } else if volumes().all(|own| samples_along_a_voxel(own) > COARSE) {
+    } else if volumes().all(|native| samples_along_a_voxel(native) > COARSE) {
         splat("voxels are wider than five samples, and a splat fills many of these at once")
     } else if visible < SPARSE {
         splat("less than a quarter of the voxels has extinction, and a splat is made of these alone")

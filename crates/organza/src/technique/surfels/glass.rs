@@ -25,7 +25,8 @@ pub(super) fn surfaces<'a>(frame: &'a Frame<'a>, values: &'a [f32], stage: &mut 
     let settings = &frame.settings.surfels;
     let follows = settings.bending == scene::Bending::Traced;
     let is_met = |&i: &u32| {
-        let (i, bounds) = (i as usize, |m: u16| frame.loaded.materials[m as usize].bounds_matter());
+        let i = i as usize;
+        let bounds = |m: u16| frame.loaded.materials[m as usize].bounds_matter();
         match cloud.kind[i] {
             SplatKind::Opaque => settings.bent_behind,
             SplatKind::Surface => {

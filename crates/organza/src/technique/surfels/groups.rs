@@ -48,12 +48,12 @@ pub(super) fn members(
 ) -> Result<Membership, Error> {
     let transforms = super::discs::transforms(frame);
     let objects = &frame.scene.objects;
-    let of = |rank: usize| (transforms[rank], recipe(groups, frame, &objects[rank]));
+    let placed_recipe = |rank: usize| (transforms[rank], recipe(groups, frame, &objects[rank]));
     frame.progress.begin(stages::GROUP);
     cost.measure(pass::GROUP, |stage| {
         let groups = &mut *frame.groups.borrow_mut();
         let kept = if are_opaque { &mut groups.opaque } else { &mut groups.translucent };
-        let made = kept.members_of_all(frame.drawn(), ids, of, Some(frame.progress));
+        let made = kept.members_of_all(frame.drawn(), ids, placed_recipe, Some(frame.progress));
         let (all, anew) = made.map_err(|(rank, e)| refuse(&objects[rank], e))?;
         (stage.items_in, stage.items_out, stage.bytes) = (ids.len() as u64, anew, all.bytes());
         Ok(all)
@@ -83,7 +83,7 @@ pub(crate) fn counts(scene: &Scene, discs: f64) -> Vec<Count> {
 /// Bytes of grouping so many discs, of a cloud of these bytes.
 pub(super) fn bytes(scene: &Scene, discs: u64, cloud: u64) -> u64 {
     let settings = &scene.render.surfels;
-    let of = |groups: &SurfelGroups| {
+    let group_bytes = |groups: &SurfelGroups| {
         let method = match groups.grouping {
             Grouping::Hash(Collisions::Keep) => Method::Hash(grouping::Collisions::Keep),
             _ => Method::Weighted,
@@ -92,5 +92,5 @@ pub(super) fn bytes(scene: &Scene, discs: u64, cloud: u64) -> u64 {
         let recipe = Recipe { method, groups: groups.count, coverage, disc_scale: 1.0, gap: settings.gap as f32 };
         recipe.bytes(discs) + KeptGroups::place_bytes(discs) + cloud
     };
-    [settings.layers.groups(), settings.opaque.groups()].into_iter().flatten().map(of).sum()
+    [settings.layers.groups(), settings.opaque.groups()].into_iter().flatten().map(group_bytes).sum()
 }

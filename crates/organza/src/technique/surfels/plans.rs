@@ -46,8 +46,8 @@ pub(crate) fn plans(scene: &Scene, loaded: &Loaded, plan: &mut Plan) {
     }
     let of_groups = |name: &str, groups: &SurfelGroups| {
         let steps = groups.depth_steps.map_or_else(|| "steps as long as `gap`".to_owned(), |n| format!("{n} steps"));
-        let all = groups.describe(deforms);
-        format!("{name}: the images of {all} are averaged, in each the discs of {steps} of depth")
+        let described = groups.describe(deforms);
+        format!("{name}: the images of {described} are averaged, in each the discs of {steps} of depth")
     };
     let reason = match &settings.layers {
         SurfelLayers::Gaps => "all layers, told apart by gaps in depth".to_owned(),

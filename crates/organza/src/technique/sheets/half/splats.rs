@@ -14,7 +14,7 @@ pub(super) fn splat_bounds(matter: &Matter<'_>) -> Option<SplatBounds> {
 /// Ids of the translucent splats of objects that become nothing else.
 fn own_splats<'a>(matter: &Matter<'a>) -> impl Iterator<Item = u32> + use<'a> {
     let mut is_own = vec![false; matter.scene.objects.len()];
-    matter.own.iter().for_each(|own| is_own[own.object] = true);
+    matter.own.iter().for_each(|native| is_own[native.object] = true);
     let kinds = matter.cloud.into_iter().flat_map(|cloud| cloud.kind.iter().zip(&cloud.object));
     let is_one = move |kind: SplatKind, object: u32| kind != SplatKind::Opaque && !is_own[object as usize];
     (0..).zip(kinds).filter_map(move |(id, (kind, object))| is_one(*kind, *object).then_some(id))
@@ -28,7 +28,7 @@ pub(super) struct OwnSplats {
 }
 
 impl OwnSplats {
-    pub(super) fn of(frame: &Frame<'_>) -> Option<Self> {
+    pub(super) fn new(frame: &Frame<'_>) -> Option<Self> {
         let slab_width = splat_bounds(&frame.matter())?.slab_width;
         let cloud = frame.loaded.cloud.gather(&own_splats(&frame.matter()).collect::<Vec<u32>>());
         let projected = raster::project(&ProjectInput {
