@@ -8,6 +8,7 @@ use crate::common::convert_error::check_cancelled;
 use crate::common::params::{Density, SplatParams};
 use crate::mesh::mesh_points::{corners, mesh_to_points_into};
 use crate::mesh::subdivide;
+use crate::volume::gaps::ClassifiedGrid;
 use crate::volume::volume_points::{most_lattice_points, volume_to_points};
 use crate::{ConvertError, MeshParams, MeshReport, VolumeParams, VolumeReport};
 use field::{Lattice, surface_nets};
@@ -264,14 +265,14 @@ pub fn density_to_grid<F: ScalarField + ?Sized>(
     field: &F,
     bounds: DAabb,
     params: &DensityParams,
-) -> Result<(Grid, TransferFunction), ConvertError> {
+) -> Result<ClassifiedGrid, ConvertError> {
     let splat = &params.volume.splat;
     let mut grid = sample(field, &density_lattice(bounds, params)?, splat, &Progress::new())?;
     let extinction = params.extinction as f32;
     grid.values.iter_mut().for_each(|v| *v = (*v * extinction).max(0.0));
     let most = grid.values.iter().copied().fold(0.0, f32::max);
     let transfer = extinction_as_it_is(f64::from(most), splat)?;
-    Ok((grid, transfer))
+    Ok(ClassifiedGrid { grid, transfer })
 }
 
 /// The transfer function that takes values up to `most` as extinction, 1/world unit, in the splats' colour.

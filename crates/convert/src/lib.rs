@@ -31,7 +31,7 @@ pub use color::color_by::{Classified, ColorBy, Colored, MapScale, PointColors, c
 pub use color::color_map::ColorMap;
 pub use color::color_scale::{ColorScale, ScaleNumbers};
 pub use color::colored_mesh::{ColoredMesh, colored_mesh};
-pub use color::surface_field::SurfaceField;
+pub use color::surface_field::{SurfaceField, SurfaceLook};
 #[cfg(feature = "cache")]
 pub use common::cache::Cache;
 pub use common::convert_error::ConvertError;
@@ -42,7 +42,7 @@ pub use field_points::{
 };
 pub use mesh::clipped_mesh::clipped_mesh;
 #[cfg(feature = "lids")]
-pub use mesh::lid::{LidReport, lidded_mesh};
+pub use mesh::lid::{LidReport, LiddedMesh, lidded_mesh};
 pub use mesh::mesh_points::{MeshParams, MeshReport, flatten_leaning, mesh_to_points, mesh_to_points_into};
 pub use points::degrees::{looks_like_degrees, metres_of_degrees};
 pub use points::discs::{DiscShape, DiscSize};
@@ -60,7 +60,7 @@ pub use points::thin::thinned;
 pub use splat_core;
 pub use splats::footprints::FootprintChoice;
 pub use volume::body_centred::body_centred;
-pub use volume::gaps::{gaps_of_value, gaps_outside, transparent_gaps};
+pub use volume::gaps::{ClassifiedGrid, gaps_of_value, gaps_outside, transparent_gaps};
 pub use volume::label_surfaces::{label_surface_bytes, label_surfaces};
 pub use volume::odd_values::{FillValue, Strays, without_value, written_value};
 #[cfg(feature = "noise")]

@@ -45,7 +45,7 @@ mod weighted;
 
 pub use graph::{Coplanar, GraphParams, OverlapGraph, Relaxation};
 pub use hash::{Collisions, HashParams, covering_factor, hash_grouping};
-pub use kept::{GroupsOfObjects, KeptGroups};
+pub use kept::{CloudMembers, GroupsOfObjects, KeptGroups, ObjectError, ObjectMembers};
 pub use membership::Membership;
 pub use minimum::{Coloring, minimum_coloring};
 pub use recipe::{Coverage, Method, Recipe};

@@ -80,7 +80,7 @@ pub fn picture(
     values: &[f32],
     sizes: [usize; 2],
     opaque: &[f32],
-) -> Vec<(Vec<f64>, Vec<f64>)> {
+) -> Vec<Composited> {
     let [width, height] = input.camera.size;
     let columns = width.div_ceil(SIDE);
     let mut squares: Vec<Vec<u32>> = vec![Vec::new(); (columns * height.div_ceil(SIDE)) as usize];
@@ -120,17 +120,26 @@ fn squares_of(input: &DiscInput<'_>, id: u32, params: &Params) -> [Range<u32>; 2
     [range(center.x, camera.size[0]), range(-center.y, camera.size[1])]
 }
 
-/// Beauty and transmittance by plane of layers in order.
-pub fn composite(layers: &[Layer], planes: usize, channels: usize) -> (Vec<f64>, Vec<f64>) {
-    let mut sums = vec![0.0; channels];
-    let mut through = vec![1.0; planes];
+/// Layers of a pixel, composited.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Composited {
+    /// By channel.
+    pub values: Vec<f64>,
+    /// By plane of extinction, 0 to 1.
+    pub transmittance: Vec<f64>,
+}
+
+/// Composites layers in order.
+pub fn composite(layers: &[Layer], planes: usize, channels: usize) -> Composited {
+    let mut values = vec![0.0; channels];
+    let mut transmittance = vec![1.0; planes];
     for layer in layers {
-        for (c, sum) in sums.iter_mut().enumerate() {
-            *sum += through[ChannelLayout::plane_of(c, channels, planes)] * layer.values[c];
+        for (c, sum) in values.iter_mut().enumerate() {
+            *sum += transmittance[ChannelLayout::plane_of(c, channels, planes)] * layer.values[c];
         }
-        through.iter_mut().zip(layer.opacity).for_each(|(t, opacity)| *t *= 1.0 - opacity);
+        transmittance.iter_mut().zip(layer.opacity).for_each(|(t, opacity)| *t *= 1.0 - opacity);
     }
-    (sums, through)
+    Composited { values, transmittance }
 }
 
 /// From the eye, or a place of the eye's plane, along the view: the part along the camera's axis is 1.

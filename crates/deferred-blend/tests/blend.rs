@@ -20,10 +20,11 @@ fn agrees_with_the_twin(scene: &Scene, params: &Params) {
         let difference = |factor: f32| {
             let params = Params { gap: params.gap * factor, ..*params };
             let layers = reference::layers(&scene.input(), &params, [x, y], &scene.values, [1, 3]);
-            let (sums, through) = reference::composite(&layers, 1, 3);
-            let colors = sums.iter().zip(&picture.channels).map(|(sum, plane)| (sum - f64::from(plane[k])).abs());
-            let own = (1.0 - through[0] - f64::from(alpha(&picture, k))).abs();
-            (colors.fold(own, f64::max), layers.len())
+            let exact = reference::composite(&layers, 1, 3);
+            let colors =
+                exact.values.iter().zip(&picture.channels).map(|(sum, plane)| (sum - f64::from(plane[k])).abs());
+            let opacity = (1.0 - exact.transmittance[0] - f64::from(alpha(&picture, k))).abs();
+            (colors.fold(opacity, f64::max), layers.len())
         };
         let (same, layers) = difference(1.0);
         met += layers;

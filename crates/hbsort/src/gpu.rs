@@ -36,7 +36,7 @@ use splat_shaders::radix::{SCAN_BLOCK, Scanned, SortPass, sort_pass};
 use splat_shaders::{BufferId, Groups, Overflow, Recording};
 
 pub use parts::{Sorted, join};
-pub use run::slice_cloud_on;
+pub use run::{SliceRun, slice_cloud_on};
 
 /// Splats that a workgroup projects.
 const PROJECT_BLOCK: u32 = 1024;

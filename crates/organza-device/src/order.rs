@@ -11,6 +11,6 @@ pub fn order(helper: &Helper<'_>, cloud: &Cloud, ids: &[u32], camera: &Camera, p
         helper.leave("slices without order inside (render.points.exact = false) are made by the processor");
         return None;
     }
-    let (order, _) = helper.with(|device| Ok(slice_cloud_on(device, cloud, ids, camera, params)?))?;
-    Some(order)
+    let run = helper.with(|device| Ok(slice_cloud_on(device, cloud, ids, camera, params)?))?;
+    Some(run.order)
 }

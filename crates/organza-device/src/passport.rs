@@ -11,6 +11,7 @@ use crate::trial::OrderInput;
 use crate::{Error, Failure, Folding};
 use chain::ChainInput;
 use composite::CompositeInput;
+use hbsort::gpu::SliceRun;
 use opaque::OpaqueInput;
 use particles::ParticlesInput;
 use shadow::ShadowInput;
@@ -186,7 +187,7 @@ fn by_kernel(passes: &[PassTime]) -> Vec<KernelTime> {
 }
 
 fn check_order(device: &mut dyn Executor, input: &OrderInput) -> Result<Found, Failure> {
-    let (found, passes) = input.on(device)?;
+    let SliceRun { order: found, passes } = input.on(device)?;
     let agreement = order_agreement(&found, &input.by_processor()?);
     Ok(Found { items: SPLATS.into(), agreement, passes })
 }

@@ -13,5 +13,5 @@ pub fn shadow_map(helper: &Helper<'_>, deposits: &Deposits) -> Option<ShadowMap>
     if made.is_none() {
         helper.leave("a shadow map's cells have more entries than the device can see: the processor makes its lists");
     }
-    made.map(|(map, _)| map)
+    made.map(|run| run.map)
 }

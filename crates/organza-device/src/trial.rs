@@ -4,12 +4,12 @@
 //! alone: a driver that fuses what the processor rounds apart orders them otherwise.
 
 use crate::Failure;
-use hbsort::gpu::slice_cloud_on;
+use hbsort::gpu::{SliceRun, slice_cloud_on};
 use hbsort::{Params, Scratch, SliceOrder, slice_cloud};
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::raster::gpu::Attributes;
 use splat_core::{Camera, Cloud, Light, LightShape, Projection, Splat, SplatKind, rng};
-use splat_shaders::{Executor, PassTime};
+use splat_shaders::Executor;
 use tsm::gpu::{Casting, record_map};
 use tsm::{Deposits, Params as ShadowParams, Resolution};
 
@@ -21,7 +21,7 @@ const SEED: u64 = 0x5452_4941;
 /// Whether a device finds the processor's order of generated splats.
 pub(super) fn order_trial(device: &mut dyn Executor) -> Result<bool, Failure> {
     let input = OrderInput::new(SPLATS);
-    let (found, _) = input.on(device)?;
+    let found = input.on(device)?.order;
     Ok(found == input.by_processor()?)
 }
 
@@ -82,7 +82,7 @@ impl OrderInput {
         Self { cloud, camera, ids: (0..splats).collect(), params: Params { exact: true, ..Params::default() } }
     }
 
-    pub(super) fn on(&self, device: &mut dyn Executor) -> Result<(SliceOrder, Vec<PassTime>), Failure> {
+    pub(super) fn on(&self, device: &mut dyn Executor) -> Result<SliceRun, Failure> {
         Ok(slice_cloud_on(device, &self.cloud, &self.ids, &self.camera, &self.params)?)
     }
 

@@ -41,7 +41,7 @@ pub use casting::Casting;
 pub use deposit::{CastRoom, CastUploads, RecordedCast, record_cast};
 pub use look_up::{MapUploads, ReceiverUploads, RecordedLookUp, Room, record_look_up};
 pub use received::{ReceivedUploads, RecordedReceived, record_received};
-pub use run::map_on;
+pub use run::{MapRun, map_on};
 pub use shadow::{RecordedMap, RecordedShadow, ShadowUploads, record_map, record_shadow};
 
 /// Threads of a workgroup.

@@ -24,6 +24,15 @@ pub struct SurfaceField {
     classified: Classified,
 }
 
+/// The appearance of a surface at a place.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SurfaceLook {
+    /// Linear Rec.709.
+    pub color: [f32; 3],
+    /// The remaining share of the optical depth of a crossing, 0 to 1.
+    pub depth_share: f64,
+}
+
 impl SurfaceField {
     /// The field of a volume in the coordinates of the surface before its transform. `classified` defines the meaning of the
     /// extinctions of `transfer`: nothing, or a share of the surface's opacity.
@@ -52,12 +61,13 @@ impl SurfaceField {
         self.transfer.brightest()
     }
 
-    /// The surface's appearance at a place in object coordinates: its colour, and the remaining share of its optical depth, in \[0, 1\].
-    /// `opacity` is that of a crossing, below 1. `None` where the field is not known.
-    pub fn at(&self, place: DVec3, opacity: f64) -> Option<([f32; 3], f64)> {
+    /// The surface's appearance at a place in object coordinates. `opacity` is that of a crossing, below 1. `None` where the field is not
+    /// known.
+    pub fn at(&self, place: DVec3, opacity: f64) -> Option<SurfaceLook> {
         let look = self.transfer.at(self.value(place)?);
         let faded = || optics::optical_depth(opacity * f64::from(look.extinction)) / optics::optical_depth(opacity);
-        Some((look.color, if self.classified == Classified::Opacity { faded() } else { 1.0 }))
+        let depth_share = if self.classified == Classified::Opacity { faded() } else { 1.0 };
+        Some(SurfaceLook { color: look.color, depth_share })
     }
 
     fn value(&self, place: DVec3) -> Option<f32> {

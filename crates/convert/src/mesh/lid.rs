@@ -24,6 +24,14 @@ const LARGEST_GAP: f64 = 0.02;
 /// Most ends of an outline whose gaps are looked for: each is held against all others.
 const MOST_ENDS: usize = 256;
 
+/// A clipped mesh with lids.
+pub struct LiddedMesh {
+    /// The part that is kept, closed by lids where its outlines close.
+    pub mesh: Arc<Mesh>,
+    /// Counts of lids, and of outlines without one.
+    pub report: LidReport,
+}
+
 /// The report of lids.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct LidReport {
@@ -57,14 +65,14 @@ impl LidReport {
 /// let position = vec![Vec3::ZERO, Vec3::X * 2.0, Vec3::Y * 2.0, Vec3::Z * 2.0];
 /// let triangles = vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];
 /// let tetrahedron = Mesh { position, triangles, ..Mesh::default() };
-/// let (stump, report) = lidded_mesh(tetrahedron.into(), &[Clip::HalfSpace { normal: DVec3::Z, offset: 1.0 }]);
-/// let lid = stump.triangles.iter().filter(|t| t.iter().all(|v| stump.position[*v as usize].z == 1.0));
-/// assert_eq!((lid.count(), report.triangles, report.open), (1, 1, 0));
+/// let stump = lidded_mesh(tetrahedron.into(), &[Clip::HalfSpace { normal: DVec3::Z, offset: 1.0 }]);
+/// let lid = stump.mesh.triangles.iter().filter(|t| t.iter().all(|v| stump.mesh.position[*v as usize].z == 1.0));
+/// assert_eq!((lid.count(), stump.report.triangles, stump.report.open), (1, 1, 0));
 /// ```
 ///
 /// # Panics
 /// If an index is out of range, which [`Mesh::validate`] tells.
-pub fn lidded_mesh(mesh: Arc<Mesh>, clips: &[Clip]) -> (Arc<Mesh>, LidReport) {
+pub fn lidded_mesh(mesh: Arc<Mesh>, clips: &[Clip]) -> LiddedMesh {
     let mut report = LidReport::default();
     let closed = clipped_by(mesh, clips, |mesh, normal, offset| {
         let mut rims = Vec::new();
@@ -72,7 +80,7 @@ pub fn lidded_mesh(mesh: Arc<Mesh>, clips: &[Clip]) -> (Arc<Mesh>, LidReport) {
         close(&mut part, normal, &rims, &mut report);
         part
     });
-    (closed, report)
+    LiddedMesh { mesh: closed, report }
 }
 
 /// Adds the lid between edges along a plane.

@@ -14,10 +14,18 @@ fn has_gaps(grid: &Grid) -> bool {
     grid.values.iter().any(|value| value.is_nan())
 }
 
+/// A volume with the transfer function that classifies it.
+pub struct ClassifiedGrid {
+    /// Values without gaps.
+    pub grid: Grid,
+    /// Extinction and colour by value.
+    pub transfer: TransferFunction,
+}
+
 /// A volume and a transfer function with which voxels that are NaN draw nothing; `None` for a volume without such.
 ///
 /// The transfer function is the given one where that has values without extinction, else it is continued below all values.
-pub fn transparent_gaps(grid: &Grid, transfer: &TransferFunction) -> Option<(Grid, TransferFunction)> {
+pub fn transparent_gaps(grid: &Grid, transfer: &TransferFunction) -> Option<ClassifiedGrid> {
     if !has_gaps(grid) {
         return None;
     }
@@ -28,7 +36,7 @@ pub fn transparent_gaps(grid: &Grid, transfer: &TransferFunction) -> Option<(Gri
         within.min_by(|a, b| (a - near).abs().total_cmp(&(b - near).abs())).unwrap_or(near)
     };
     let lowest = finite(grid).fold(f32::INFINITY, f32::min);
-    Some((filled(grid, |near| nearest(near.unwrap_or(lowest))), transfer))
+    Some(ClassifiedGrid { grid: filled(grid, |near| nearest(near.unwrap_or(lowest))), transfer })
 }
 
 /// A volume whose voxels that are NaN lie outside of its surface at `level`, as far from it as their neighbours lie inside; `None` for one
@@ -128,15 +136,16 @@ mod tests {
     fn gaps_have_no_extinction_and_the_nearest_such_value() {
         let by = |points: &[[f32; 2]], values: &[f32]| transparent_gaps(&row(values), &transfer(points)).unwrap();
         // A ramp: the foot of it. A notch: its bottom. Air above matter: the value itself.
-        let (ramp, same) = by(&[[0.0, 0.0], [1.0, 0.0], [2.0, 5.0]], &[GAP, 3.0, GAP, 0.5]);
-        assert_eq!((ramp.values, same.points().len()), (vec![1.0, 3.0, 1.0, 0.5], 3));
-        assert_eq!(by(&[[-1.0, 2.0], [0.0, 0.0], [1.0, 2.0]], &[7.0, GAP]).0.values, [7.0, 0.0]);
-        assert_eq!(by(&[[0.0, 1.0], [1.0, 0.0]], &[9.0, GAP, GAP]).0.values[..2], [9.0, 9.0]);
+        let ramp = by(&[[0.0, 0.0], [1.0, 0.0], [2.0, 5.0]], &[GAP, 3.0, GAP, 0.5]);
+        assert_eq!((ramp.grid.values, ramp.transfer.points().len()), (vec![1.0, 3.0, 1.0, 0.5], 3));
+        assert_eq!(by(&[[-1.0, 2.0], [0.0, 0.0], [1.0, 2.0]], &[7.0, GAP]).grid.values, [7.0, 0.0]);
+        assert_eq!(by(&[[0.0, 1.0], [1.0, 0.0]], &[9.0, GAP, GAP]).grid.values[..2], [9.0, 9.0]);
     }
 
     #[test]
     fn a_transfer_function_without_a_clear_value_gets_one_below_all() {
-        let (grid, transfer) = transparent_gaps(&row(&[4.0, GAP, -8.0]), &transfer(&[[0.0, 1.0], [1.0, 3.0]])).unwrap();
+        let ClassifiedGrid { grid, transfer } =
+            transparent_gaps(&row(&[4.0, GAP, -8.0]), &transfer(&[[0.0, 1.0], [1.0, 3.0]])).unwrap();
         assert_eq!(transfer.at(grid.values[1]).extinction, 0.0);
         for (value, extinction) in [(-8.0, 1.0), (0.0, 1.0), (1.0, 3.0), (4.0, 3.0)] {
             assert_eq!(transfer.at(value).extinction, extinction, "{value}");

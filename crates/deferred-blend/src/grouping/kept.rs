@@ -84,9 +84,34 @@ impl KeptGroups {
 #[derive(Debug, Clone, Default)]
 pub struct GroupsOfObjects(BTreeMap<usize, (Recipe, KeptGroups)>);
 
+/// The groups of an object's discs.
+pub struct ObjectMembers {
+    /// By place in the object's cloud.
+    pub membership: Membership,
+    /// Whether the discs were grouped anew, because no kept groups fit them.
+    pub is_new: bool,
+}
+
+/// The groups of the discs of several objects.
+pub struct CloudMembers {
+    /// By place in the cloud.
+    pub membership: Membership,
+    /// Number of discs that were grouped anew.
+    pub regrouped: u64,
+}
+
+/// An object whose discs cannot be grouped.
+#[derive(Debug)]
+pub struct ObjectError {
+    /// The object's rank.
+    pub object: usize,
+    /// The reason.
+    pub error: Error,
+}
+
 impl GroupsOfObjects {
-    /// The groups of the discs of object `rank`, which `transform` has brought into the world, and whether they are new: those that were
-    /// kept, where the object has only moved, or new ones, which are kept.
+    /// Groups the discs of object `rank`, which `transform` has brought into the world. Returns the kept groups if the object has only
+    /// moved, else groups the discs anew and keeps the groups.
     ///
     /// # Errors
     /// As [`Recipe::group`].
@@ -97,22 +122,22 @@ impl GroupsOfObjects {
         transform: &Similarity,
         recipe: &Recipe,
         progress: Option<&Progress>,
-    ) -> Result<(Membership, bool), Error> {
+    ) -> Result<ObjectMembers, Error> {
         let Similarity { scale, rotation, translation } = *transform;
         let place = |p: &Vec3| rotation.inverse() * (cloud.origin + p.as_dvec3() - translation) / scale;
         let places: Vec<DVec3> = cloud.position.iter().map(place).collect();
         let radius = f64::from(cloud.radius.iter().copied().fold(f32::INFINITY, f32::min)) / scale;
         let kept = self.0.get(&rank).filter(|(kept, _)| kept == recipe);
-        if let Some(found) = kept.and_then(|(_, groups)| groups.for_discs(&places, radius)) {
-            return Ok((found, false));
+        if let Some(membership) = kept.and_then(|(_, groups)| groups.for_discs(&places, radius)) {
+            return Ok(ObjectMembers { membership, is_new: false });
         }
-        let members = recipe.group(cloud, progress)?;
-        self.0.insert(rank, (*recipe, KeptGroups::new(&places, radius, members.clone())));
-        Ok((members, true))
+        let membership = recipe.group(cloud, progress)?;
+        self.0.insert(rank, (*recipe, KeptGroups::new(&places, radius, membership.clone())));
+        Ok(ObjectMembers { membership, is_new: true })
     }
 
-    /// The same for discs of a cloud that are given by their places, each object's by themselves; `of` returns an object's transform to the
-    /// world, and the recipe of its groups. The groups are by place in the cloud; beside them the number of discs that were grouped anew.
+    /// Groups the discs `ids` of a cloud, each object's separately. `placed_recipe` returns an object's transform to the world, and the
+    /// recipe of its groups.
     ///
     /// # Errors
     /// As [`Recipe::group`], with the object's rank.
@@ -122,22 +147,22 @@ impl GroupsOfObjects {
         ids: &[u32],
         placed_recipe: impl Fn(usize) -> (Similarity, Recipe),
         progress: Option<&Progress>,
-    ) -> Result<(Membership, u64), (usize, Error)> {
+    ) -> Result<CloudMembers, ObjectError> {
         let mut of_object: BTreeMap<usize, Vec<u32>> = BTreeMap::new();
         for &id in ids {
             of_object.entry(cloud.object[id as usize] as usize).or_default().push(id);
         }
         let mut parts = Vec::new();
-        let mut anew = 0;
+        let mut regrouped = 0;
         for (&rank, ids) in &of_object {
             let (transform, recipe) = placed_recipe(rank);
             let discs = cloud.gather(ids);
             let members = self.members(rank, &discs, &transform, &recipe, progress);
-            let (members, is_new) = members.map_err(|e| (rank, e))?;
-            anew += if is_new { ids.len() as u64 } else { 0 };
-            parts.push((ids.as_slice(), members));
+            let ObjectMembers { membership, is_new } = members.map_err(|error| ObjectError { object: rank, error })?;
+            regrouped += if is_new { ids.len() as u64 } else { 0 };
+            parts.push((ids.as_slice(), membership));
         }
-        Ok((Membership::join(cloud.len(), &parts), anew))
+        Ok(CloudMembers { membership: Membership::join(cloud.len(), &parts), regrouped })
     }
 }
 

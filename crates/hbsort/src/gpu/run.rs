@@ -8,9 +8,17 @@ use splat_shaders::{Executor, Lanes, PassTime, most_that_fits};
 /// Splats of a part that is not halved any more where memory is short.
 const LEAST: u32 = 4096;
 
+/// An order of splats that a device has sorted.
+pub struct SliceRun {
+    /// The order, equal to the processor's bit for bit.
+    pub order: SliceOrder,
+    /// Times of all dispatches.
+    pub passes: Vec<PassTime>,
+}
+
 /// [`crate::slice_cloud`] of the splats `ids` of a cloud by a device, with [`Params::exact`]: the same order, bit for bit, where
 /// the device rounds products and sums one by one. Splats that it does not take all at once are sorted in parts, which are
-/// joined here. With the order come the times of all dispatches.
+/// joined here.
 ///
 /// # Errors
 /// [`Error::Device`] for what the device refuses, such as fewer than 4096 splats for which it has no memory; else those of
@@ -21,7 +29,7 @@ pub fn slice_cloud_on(
     ids: &[u32],
     camera: &Camera,
     params: &Params,
-) -> Result<(SliceOrder, Vec<PassTime>), Error> {
+) -> Result<SliceRun, Error> {
     let splats = ids.len().max(1) as u32;
     let most = match Capacities::most_splats(device.adapter().binding_bytes) {
         // The device refuses, and says why.
@@ -44,5 +52,5 @@ pub fn slice_cloud_on(
         Ok(sorted)
     };
     let parts = ids.chunks(recorded.capacities.splats as usize).map(&mut sort).collect::<Result<Vec<_>, _>>()?;
-    Ok((join(&parts, cloud, Some(ids), params)?, passes))
+    Ok(SliceRun { order: join(&parts, cloud, Some(ids), params)?, passes })
 }

@@ -3,7 +3,7 @@
 
 use super::{Chained, MOST_OF_A_TILE, Reason, Splats, room_for, run_on};
 use crate::Failure;
-use hbsort::gpu::slice_cloud_on;
+use hbsort::gpu::{SliceRun, slice_cloud_on};
 use splat_core::Accumulator;
 use splat_core::raster::RasterCounts;
 use splat_shaders::Executor;
@@ -19,7 +19,8 @@ pub(super) fn chain_in_parts(
     mut most: usize,
     accumulator: &mut Accumulator,
 ) -> Result<Result<Chained, Reason>, Failure> {
-    let (order, mut passes) = slice_cloud_on(device, splats.input.cloud, splats.ids, splats.input.camera, splats.sort)?;
+    let SliceRun { order, mut passes } =
+        slice_cloud_on(device, splats.input.cloud, splats.ids, splats.input.camera, splats.sort)?;
     let mut begun = accumulator.clone();
     let mut visible = 0;
     let mut raster = RasterCounts::default();

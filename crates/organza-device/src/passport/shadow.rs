@@ -5,7 +5,7 @@ use splat_core::glam::{DVec3, Vec3};
 use splat_core::raster::gpu::Attributes;
 use splat_core::{Cloud, Light, LightShape, Material, Progress, Receiver, Splat, SplatKind, Transmittance, rng};
 use splat_shaders::{DeviceError, Executor};
-use tsm::gpu::{Casting, map_on, record_shadow};
+use tsm::gpu::{Casting, MapRun, map_on, record_shadow};
 use tsm::{Deposits, Params, ShadowMap};
 
 /// Splats that throw shadows and receive them.
@@ -75,7 +75,8 @@ impl ShadowInput {
     /// The lists: equal bits, cell by cell.
     pub(super) fn check_lists(&self, device: &mut dyn Executor) -> Result<Found, Failure> {
         let made = map_on(device, &self.deposits)?;
-        let (found, passes) = made.ok_or(Failure::from(DeviceError::Memory { bytes: self.map.counts().bytes }))?;
+        let MapRun { map: found, passes } =
+            made.ok_or(Failure::from(DeviceError::Memory { bytes: self.map.counts().bytes }))?;
         let apart = |cell: u32| {
             let a = found.list(cell);
             let b = self.map.list(cell);

@@ -79,9 +79,10 @@ fn truth(scene: &Scene, loaded: &Loaded, options: &RenderOptions, progress: &Pro
     let sizes = [accumulator.optical_depth.len(), accumulator.channels.len()];
     let opaque = &frame.opaque(&mut cost)?.depth;
     let pixels = reference::picture(&input, &params, values, sizes, opaque);
-    for (k, (shown, through)) in pixels.iter().enumerate() {
-        accumulator.channels.iter_mut().zip(shown).for_each(|(plane, v)| plane[k] = *v as f32);
-        accumulator.optical_depth.iter_mut().zip(through).for_each(|(plane, t)| plane[k] = -libm::log(*t) as f32);
+    for (k, pixel) in pixels.iter().enumerate() {
+        accumulator.channels.iter_mut().zip(&pixel.values).for_each(|(plane, v)| plane[k] = *v as f32);
+        let planes = accumulator.optical_depth.iter_mut().zip(&pixel.transmittance);
+        planes.for_each(|(plane, t)| plane[k] = -libm::log(*t) as f32);
     }
     let layers = frame.finish(&accumulator, None, &mut cost)?;
     progress.leave();

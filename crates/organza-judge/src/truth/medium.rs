@@ -1,7 +1,7 @@
 //! A medium of the scene as the path tracer takes it: its density in the world, and what it does with light.
 
 use super::object::{FINER, ambient, liberty, read};
-use convert::SplatParams;
+use convert::{ClassifiedGrid, SplatParams};
 use field::ExpressionField;
 use glam::{DMat3, DQuat, DVec3};
 use organza::scene::{Scene, SceneObject, Source, VolumeSource};
@@ -202,7 +202,8 @@ fn shape(
                 return Err(Error::wrong_kind(path, "a volume", "use `mesh = ` or `points = ` for this file"));
             };
             let gapless = convert::transparent_gaps(&grid, transfer);
-            let (grid, transfer) = gapless.map_or((grid, transfer.clone()), |(grid, transfer)| (grid, transfer));
+            let ClassifiedGrid { grid, transfer } =
+                gapless.unwrap_or_else(|| ClassifiedGrid { grid, transfer: transfer.clone() });
             grid.validate().map_err(|e| Error::input(printable(path), e.to_string(), ""))?;
             (Shape::Volume(Arc::new(Classified::new(grid, transfer, &t))), 1.0)
         }

@@ -80,7 +80,7 @@ pub(super) fn body(
         }
     };
     let mesh = match &object.source {
-        Source::Mesh(_) => convert::lidded_mesh(mesh.into(), &object.clip).0,
+        Source::Mesh(_) => convert::lidded_mesh(mesh.into(), &object.clip).mesh,
         _ => convert::clipped_mesh(mesh.into(), &object.clip),
     };
     let mesh = Arc::unwrap_or_clone(mesh);

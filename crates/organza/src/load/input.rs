@@ -9,8 +9,8 @@ use crate::scene::{
 };
 use crate::statistics::{Conversion, ObjectData};
 use convert::{
-    CloudShape, Density, DensityParams, HomogeneousMedium, MatterParams, MediumBody, MeshParams, Section, ShownPoints,
-    SplatParams, SurfaceField, SurfelParams, VolumeParams,
+    ClassifiedGrid, CloudShape, Density, DensityParams, HomogeneousMedium, LiddedMesh, MatterParams, MediumBody,
+    MeshParams, Section, ShownPoints, SplatParams, SurfaceField, SurfelParams, VolumeParams,
 };
 use field::{ClippedField, Inside, MpuParams, SharedField, Solid};
 use pbsr::{BoundedExtinction, Matter};
@@ -222,8 +222,8 @@ fn own_mesh(path: &Path, object: &SceneObject, splat: &SplatParams, context: &Co
         // Another object asks for them.
         mesh = Mesh { columns: Vec::new(), ..Mesh::clone(&mesh) }.into();
     }
-    let (mesh, lids) = convert::lidded_mesh(mesh, &object.clip);
-    context.files.warn(path, lids.said());
+    let LiddedMesh { mesh, report } = convert::lidded_mesh(mesh, &object.clip);
+    context.files.warn(path, report.said());
     let has_others = object.color.is_some() && !mesh.color.is_empty();
     Ok(if has_others { Mesh { color: Vec::new(), ..Mesh::clone(&mesh) }.into() } else { mesh })
 }
@@ -411,7 +411,7 @@ pub(super) fn shown_field(object: &SceneObject, context: &Context<'_>) -> Result
 /// A volume whose voxels without a value draw nothing.
 fn without_gaps<'t>(grid: Arc<Grid>, transfer: &'t TransferFunction) -> (Arc<Grid>, Cow<'t, TransferFunction>) {
     match convert::transparent_gaps(&grid, transfer) {
-        Some((grid, transfer)) => (grid.into(), Cow::Owned(transfer)),
+        Some(ClassifiedGrid { grid, transfer }) => (grid.into(), Cow::Owned(transfer)),
         None => (grid, Cow::Borrowed(transfer)),
     }
 }

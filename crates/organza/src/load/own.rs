@@ -9,7 +9,7 @@ use super::object::{Prepared, procedural};
 use crate::Error;
 use crate::form::{Form, PlannedObject};
 use crate::scene::{SurfaceSampler, Technique};
-use convert::{SurfaceField, VolumeParams};
+use convert::{ClassifiedGrid, SurfaceField, VolumeParams};
 use field::{RegionField, SharedField, extinct_bounds};
 use glam::DVec3;
 use pbsr::{BoundedExtinction, LineParams, LineSampler};
@@ -284,7 +284,7 @@ fn data(
             cells(grid.into(), transfer, (params.normals, &params.clip))
         }
         Input::Density(field, bounds, params) => {
-            let (grid, transfer) = convert::density_to_grid(field.as_ref(), *bounds, params)?;
+            let ClassifiedGrid { grid, transfer } = convert::density_to_grid(field.as_ref(), *bounds, params)?;
             cells(grid.into(), transfer, (params.volume.normals, &params.volume.clip))
         }
         Input::Medium(medium, params, clip) => {
@@ -301,8 +301,7 @@ fn field_data(prepared: &Prepared<'_>, field: BoundedExtinction) -> Option<Data>
         Input::Medium(medium, ..) => medium.spacing,
         _ => 0.0,
     };
-    let (seen, side) = field.seen();
-    let bounds = seen.fold(DAabb::EMPTY, |bounds, p| bounds.union(DAabb::around(p, 0.5 * side)));
+    let bounds = field.occupied_cells().fold(DAabb::EMPTY, DAabb::union);
     let some = field.max() > 0.0;
     some.then_some((Body::Field(field), bounds, spacing))
 }

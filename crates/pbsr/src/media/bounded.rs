@@ -97,13 +97,13 @@ impl BoundedExtinction {
         size_of_val(self.most.as_slice()) as u64
     }
 
-    /// Middles of the cells that may have an extinction, and their sides.
-    pub fn seen(&self) -> (impl Iterator<Item = DVec3> + '_, DVec3) {
+    /// The cells that may have an extinction.
+    pub fn occupied_cells(&self) -> impl Iterator<Item = DAabb> + '_ {
         let n = self.cells as usize;
         let side = self.bounds.size() / f64::from(self.cells);
         let index = move |c: usize| DVec3::new((c % n) as f64, (c / n % n) as f64, (c / (n * n)) as f64);
         let some = self.most.iter().enumerate().filter(|(_, most)| **most > 0.0);
-        (some.map(move |(c, _)| self.bounds.min + side * (index(c) + 0.5)), side)
+        some.map(move |(c, _)| DAabb::around(self.bounds.min + side * (index(c) + 0.5), 0.5 * side))
     }
 }
 

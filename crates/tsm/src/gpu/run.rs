@@ -7,13 +7,21 @@ use splat_shaders::{Executor, Lanes, PassTime, most_that_fits};
 /// Entries of a batch that are not halved any more where memory is short.
 const LEAST: u32 = 4096;
 
+/// A shadow map that a device has listed.
+pub struct MapRun {
+    /// The map, equal to the processor's bit for bit.
+    pub map: ShadowMap,
+    /// Times of all dispatches.
+    pub passes: Vec<PassTime>,
+}
+
 /// [`Deposits::into_map`] by a device: the same map, bit for bit. Where its kernels do not see all entries at once, or it has no
-/// memory for them, runs of cells are done one after the other. With the map come the times of all dispatches. `None` where
-/// cells that lie together have more entries than the device can see.
+/// memory for them, runs of cells are done one after the other. `None` where cells that lie together have more entries than the
+/// device can see.
 ///
 /// # Errors
 /// [`Error::Device`] for what the device refuses.
-pub fn map_on(device: &mut dyn Executor, deposits: &Deposits) -> Result<Option<(ShadowMap, Vec<PassTime>)>, Error> {
+pub fn map_on(device: &mut dyn Executor, deposits: &Deposits) -> Result<Option<MapRun>, Error> {
     let most = Capacities::most(device.adapter().binding_bytes, deposits.channels() as u32);
     let lanes = Lanes::for_adapter(device.adapter());
     let total = u32::try_from(deposits.entries().iter().sum::<u64>()).unwrap_or(u32::MAX);
@@ -37,5 +45,5 @@ pub fn map_on(device: &mut dyn Executor, deposits: &Deposits) -> Result<Option<(
         Ok(listed)
     };
     let listed = batches.iter().map(&mut list).collect::<Result<Vec<_>, _>>()?;
-    Ok(Some((deposits.join(listed)?, passes)))
+    Ok(Some(MapRun { map: deposits.join(listed)?, passes }))
 }

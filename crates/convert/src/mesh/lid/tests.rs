@@ -9,8 +9,8 @@ fn above(normal: DVec3, offset: f64) -> Clip {
 }
 
 fn cut_open(mesh: &Mesh, clips: &[Clip]) -> (Mesh, LidReport) {
-    let (cut, report) = lidded_mesh(mesh.clone().into(), clips);
-    (Arc::unwrap_or_clone(cut), report)
+    let cut = lidded_mesh(mesh.clone().into(), clips);
+    (Arc::unwrap_or_clone(cut.mesh), cut.report)
 }
 
 /// A torus about the axis z, of radii 2 and 0.5.

@@ -5,7 +5,7 @@ use crate::frame::Frame;
 use crate::scene::{Collisions, Coverage, Grouping, Scene, SceneObject, SurfelGroups};
 use crate::{CostRecord, Error, escape_controls};
 use crate::{pass, stage as stages};
-use deferred_blend::grouping::{self, KeptGroups, Membership, Method, Recipe};
+use deferred_blend::grouping::{self, CloudMembers, KeptGroups, Membership, Method, Recipe};
 
 /// How the discs of an object are grouped, seen by some camera.
 fn recipe(groups: &SurfelGroups, frame: &Frame<'_>, object: &SceneObject) -> Recipe {
@@ -54,9 +54,12 @@ pub(super) fn members(
         let groups = &mut *frame.groups.borrow_mut();
         let kept = if are_opaque { &mut groups.opaque } else { &mut groups.translucent };
         let made = kept.members_of_all(frame.drawn(), ids, placed_recipe, Some(frame.progress));
-        let (all, anew) = made.map_err(|(rank, e)| refuse(&objects[rank], e))?;
-        (stage.items_in, stage.items_out, stage.bytes) = (ids.len() as u64, anew, all.bytes());
-        Ok(all)
+        let CloudMembers { membership, regrouped } =
+            made.map_err(|refused| refuse(&objects[refused.object], refused.error))?;
+        stage.items_in = ids.len() as u64;
+        stage.items_out = regrouped;
+        stage.bytes = membership.bytes();
+        Ok(membership)
     })
 }
 

@@ -21,7 +21,7 @@ impl<'a> Source<'a> {
         let bare = self.bare(native, warnings)?;
         let Some((field, opacity)) = &native.field else { return Ok(bare) };
         let unit = self.look.color_unit;
-        let shown = move |place| field.at(place, *opacity).map(|(color, share)| (color.map(|c| c / unit), share));
+        let shown = move |place| field.at(place, *opacity).map(|look| (look.color.map(|c| c / unit), look.depth_share));
         Ok(Box::new(ShownSampler::new(bare, Box::new(shown), self.seed)))
     }
 
