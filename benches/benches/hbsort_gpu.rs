@@ -41,10 +41,10 @@ fn measure(device: &mut dyn Executor, splats: usize) -> Result<(), Box<dyn std::
     let recorded = record(Capacities { splats: splats as u32, kept: splats as u32 });
     let uploads = recorded.uploads(&cloud, None, &camera, &params)?;
     let inputs = recorded.inputs(&uploads);
-    let mut all = vec![Lanes::Portable, Lanes::for_adapter(device.adapter())];
-    all.dedup();
+    let mut kinds = vec![Lanes::Portable, Lanes::for_adapter(device.adapter())];
+    kinds.dedup();
     let mut ways = Vec::new();
-    for lanes in all {
+    for lanes in kinds {
         let ready = device.prepare(&recorded.recording.by(lanes))?;
         ways.push(Way { lanes, ready, least: [f64::INFINITY; 3] });
     }

@@ -109,7 +109,7 @@ fn opaque(criterion: &mut Criterion) {
         scene.ids.sort_unstable();
         let discs = Discs::project(&scene.input(), &Params::default());
         let [most, few] = [0.8, 0.4].map(|factor| scene.groups(factor));
-        let all = scene.resolve(&discs, Passes::TwoPlusOne);
+        let resolved = scene.resolve(&discs, Passes::TwoPlusOne);
         for (name, passes) in [
             ("2+1".into(), Passes::TwoPlusOne),
             (format!("1+1, K = {}", most.count()), Passes::OnePlusOne { groups: &most, voronoi: false }),
@@ -120,7 +120,7 @@ fn opaque(criterion: &mut Criterion) {
             let before = processor_ms();
             let picture = scene.resolve(&discs, passes);
             let time = processor_ms() - before;
-            let (error, share) = compare(&all, &picture);
+            let (error, share) = compare(&resolved, &picture);
             println!("{name}: {time:.0} ms of processor time, RMSE {error:.1e}, {:.2} % over 1/255", 100.0 * share);
         }
     }

@@ -29,10 +29,10 @@ fn colored(graph: &OverlapGraph) -> Groups {
     minimum_coloring(graph, 256, None).expect("invariant: in range").groups
 }
 
-fn table_2(cloud: &Cloud, scale: f32, all: &OverlapGraph, add: &mut impl FnMut(String)) {
-    let overlap = |groups: &Groups| all.mean_overlap(groups);
+fn table_2(cloud: &Cloud, scale: f32, graph_of_all: &OverlapGraph, add: &mut impl FnMut(String)) {
+    let overlap = |groups: &Groups| graph_of_all.mean_overlap(groups);
     let params = WeightedParams { groups: GROUPS, ..WeightedParams::default() };
-    let weighted = weighted_coloring(all, &params, None).expect("invariant: in range");
+    let weighted = weighted_coloring(graph_of_all, &params, None).expect("invariant: in range");
     add(format!("2,dragon,WGC,{GROUPS},,,{:.3}", overlap(&weighted)));
     // The largest c in steps of 0.02 at which as many groups are enough.
     let mut steps = (1..=50).map(|k| 1.0 - 0.02 * k as f32).map(|c| (c, colored(&overlap_graph(cloud, scale, c))));
@@ -70,7 +70,7 @@ fn main() {
     for (name, discs, degree) in MODELS {
         let cloud = dragon(discs);
         let scale = disc_scale(&cloud, degree);
-        let all = overlap_graph(&cloud, scale, 1.0);
+        let graph_of_all = overlap_graph(&cloud, scale, 1.0);
         for c in FACTORS {
             let graph = overlap_graph(&cloud, scale, c);
             let groups = colored(&graph);
@@ -78,11 +78,11 @@ fn main() {
             let most = graph.max_degree();
             let mean = mean_degree(&graph);
             // A sum of nothing is −0.
-            let overlap = all.mean_overlap(&groups).abs();
+            let overlap = graph_of_all.mean_overlap(&groups).abs();
             add(format!("1,{name},MGC at c = {c},{count},{most},{mean:.1},{overlap:.3}"));
         }
         if name == "dragon" {
-            table_2(&cloud, scale, &all, &mut add);
+            table_2(&cloud, scale, &graph_of_all, &mut add);
         }
     }
     std::fs::write(to, rows.join("\n") + "\n").expect("a place for the table");

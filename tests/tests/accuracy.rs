@@ -137,11 +137,11 @@ fn a_technique_of_known_order_is_measured_as_such() {
     assert!((slabs.0 - 2.0).abs() < 0.05 && (cut.0 - 1.0).abs() < 1e-6, "{slabs:?} {cut:?}");
     assert!(study.curves.iter().all(|c| verdict(&study, c).contains("as theory says")));
     // The limit says how wrong it is: about (1/256)² of what one slab leaves.
-    let own = study.limit.own_error;
+    let stated_error = study.limit.own_error;
     let left = reference::metrics::compare(&study.limit.image, &exact_image()).unwrap().rmse;
-    assert!(left < 1.5 * own && own < 3.0 * left, "{own:e} {left:e}");
+    assert!(left < 1.5 * stated_error && stated_error < 3.0 * left, "{stated_error:e} {left:e}");
     let least = study.outcomes.iter().filter(|o| o.drawn).map(|o| o.from_limit.as_ref().unwrap().linear.rmse);
-    assert!(least.fold(f64::INFINITY, f64::min) >= 10.0 * own);
+    assert!(least.fold(f64::INFINITY, f64::min) >= 10.0 * stated_error);
     assert!(study.frontier.len() >= 3);
 }
 
@@ -407,9 +407,9 @@ fn knobs_that_cannot_matter_are_left_alone() {
         "footprint table size",
     ];
     assert_eq!(skipped, expected);
-    let all = points(&scene(), &ALL, &THOROUGH);
-    assert_eq!(all.skipped.len(), 1);
-    assert_eq!(all.knobs.len(), 12);
+    let sweep = points(&scene(), &ALL, &THOROUGH);
+    assert_eq!(sweep.skipped.len(), 1);
+    assert_eq!(sweep.knobs.len(), 12);
 }
 
 #[test]
@@ -430,9 +430,9 @@ fn what_a_report_says_to_write_gives_the_scene_that_it_drew() {
     let coarse = ["render.points.slice_thickness=0.25", "render.shadow.cells=99"];
     let mut tried = 0;
     let mut told = 0;
-    for own in [&[][..], &[half_vector], &scattered, &algorithm, &coarse] {
-        let own: Vec<String> = own.iter().map(|s| (*s).to_owned()).collect();
-        let written = parsed(&own);
+    for overrides in [&[][..], &[half_vector], &scattered, &algorithm, &coarse] {
+        let overrides: Vec<String> = overrides.iter().map(|s| (*s).to_owned()).collect();
+        let written = parsed(&overrides);
         let sweeps = [
             points(&written, &ALL, &THOROUGH),
             particles(&written, &ALL, &THOROUGH).unwrap(),
@@ -443,7 +443,8 @@ fn what_a_report_says_to_write_gives_the_scene_that_it_drew() {
             for step in &knob.steps {
                 let request = sweep.turned(knob, step);
                 let changes = changes(&written, &request);
-                let set: Vec<String> = own.iter().cloned().chain(changes.iter().filter_map(|c| c.set())).collect();
+                let set: Vec<String> =
+                    overrides.iter().cloned().chain(changes.iter().filter_map(|c| c.set())).collect();
                 let at = format!("{} by {}, {}: {set:?}", knob.name, sweep.technique, step.label);
                 let said = lines(&written, &request);
                 let times = format!("every object times {:?}", step.value);
@@ -510,12 +511,12 @@ mod deep {
             organza().args(["accuracy", "s.toml", "--quick", "--out", "r"]).current_dir(&folder).output().unwrap();
         assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
         let written: Value = serde_json::from_slice(&fs::read(folder.path().join("r/accuracy.json")).unwrap()).unwrap();
-        let of = |name: &str| {
+        let technique = |name: &str| {
             let techniques = written["techniques"].as_array().unwrap();
             techniques.iter().find(|t| t["technique"] == name).unwrap_or_else(|| panic!("{}", written["absent"]))
         };
-        let surfels = of("surfels");
-        assert_ne!(surfels["limit"], of("points")["limit"]);
+        let surfels = technique("surfels");
+        assert_ne!(surfels["limit"], technique("points")["limit"]);
         let settings = surfels["settings"].as_array().unwrap();
         for knob in ["disc scale", "gap"] {
             assert!(settings.iter().any(|s| s["knob"] == knob), "{knob}");

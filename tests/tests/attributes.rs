@@ -62,7 +62,7 @@ fn a_disc_with_a_tangent_has_the_opacity_of_its_ellipse_in_every_pixel() {
         let more = ["--technique", technique, "--set", "render.particles.repeat_level=400"];
         let alpha = draw_in(folder.path(), &scene(3.0, keys), &more).opacity();
         let moments = |alpha: &[f64]| {
-            let mut all = 0.0;
+            let mut total = 0.0;
             let mut sums = [0.0; 3];
             for (k, a) in alpha.iter().enumerate() {
                 let at = |i: usize| (i as f64 + 0.5) / 48.0 * 3.0 - 1.5;
@@ -70,10 +70,10 @@ fn a_disc_with_a_tangent_has_the_opacity_of_its_ellipse_in_every_pixel() {
                 let y = -at(k / 48);
                 let u = x * cos + y * sin;
                 let v = y * cos - x * sin;
-                all += a;
+                total += a;
                 [u * u, v * v, u * v].iter().zip(&mut sums).for_each(|(m, sum)| *sum += a * m);
             }
-            sums.map(|sum| sum / all)
+            sums.map(|sum| sum / total)
         };
         let [u, v, mixed] = moments(&alpha);
         let [of_u, of_v, _] = moments(&expected);
@@ -180,10 +180,10 @@ fn a_transfer_function_makes_points_opaque_and_thick_by_a_column() {
     let folder = tempfile::tempdir().unwrap();
     let heat = |x: f64, _: f64| if x < 0.0 { "10" } else { "30" }.to_owned();
     write(folder.path(), &plane("heat", [0.05, 0.05], heat));
-    let transfer = |of: [f64; 2], key: &str| {
+    let transfer = |factors: [f64; 2], key: &str| {
         format!(
             "color_by = {{ column = 'heat' }}\ntransfer = [{{ value = 0, color = [1, 1, 1], {key} = {} }}, {{ value = 40, color = [1, 1, 1], {key} = {} }}]\n",
-            of[0], of[1]
+            factors[0], factors[1]
         )
     };
     let halves = |keys: &str, technique: &str| {

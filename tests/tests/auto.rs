@@ -111,8 +111,8 @@ fn explain_says_what_techniques_err_by_and_warns_of_what_is_left_out_once() {
         (document, String::from_utf8_lossy(&out.stderr).into_owned())
     };
     let estimate = |document: &Value, technique: &str| {
-        let all = document["plan"]["estimates"].as_array().unwrap().clone();
-        let found = all.into_iter().find(|e| e["technique"] == technique).unwrap();
+        let estimates = document["plan"]["estimates"].as_array().unwrap().clone();
+        let found = estimates.into_iter().find(|e| e["technique"] == technique).unwrap();
         Told { error: found["displayed_error"].as_f64().unwrap(), draws: found["draws"] == true }
     };
     let (document, said) = told(&[]);

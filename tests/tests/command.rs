@@ -536,8 +536,8 @@ mod deep {
             let shadows = ["shadow lists", "shadow"];
             let splats = ["project", "shade", "composite", "opaque", "chain"];
             let particles = ["particles", "made particles", "lit particles"];
-            let all = [&["order"][..], &shadows, &splats, &particles].concat();
-            assert_eq!(names, all);
+            let stages = [&["order"][..], &shadows, &splats, &particles].concat();
+            assert_eq!(names, stages);
         }
     }
 }

@@ -51,8 +51,9 @@ fn scan() -> String {
 }
 
 fn objects(source: impl Fn(usize) -> String) -> String {
-    let one = |(i, [name, _, look]): (usize, &[&str; 3])| format!("[[object]]\nname = '{name}'\n{}{look}", source(i));
-    OBJECTS.iter().enumerate().map(one).collect()
+    let object =
+        |(i, [name, _, look]): (usize, &[&str; 3])| format!("[[object]]\nname = '{name}'\n{}{look}", source(i));
+    OBJECTS.iter().enumerate().map(object).collect()
 }
 
 /// A place with the scene, and one of the splats that are made of it.

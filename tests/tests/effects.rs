@@ -152,10 +152,10 @@ fn what_is_switched_off_is_as_if_the_scene_had_never_said_it() {
 fn a_material_that_objects_share_is_switched_for_one_of_them() {
     let second = "[[object]]\nname = 'mist'\nmaterial = 'fog'\n\
                   medium_ball = { center = [1, 0, 0], radius = 0.5, spacing = 0.1, extinction = 3 }\n";
-    let own = FOG.replace("'fog'\nmedium_ball", "'grey'\nmedium_ball");
+    let grey_fog = FOG.replace("'fog'\nmedium_ball", "'grey'\nmedium_ball");
     let grey = "[material.grey]\nmedium = { albedo = 0.5 }\n";
     let both = scene(&(second.to_owned() + FOG));
-    let apart = scene(&(second.to_owned() + &own + grey));
+    let apart = scene(&(second.to_owned() + &grey_fog + grey));
     let off = draw(&both, &["--effect", "color.fog=off"]);
     assert_eq!(off.sha256(1.0), draw(&apart, &[]).sha256(1.0));
     assert_ne!(off.sha256(1.0), draw(&both, &["--effect", "color.mist=off"]).sha256(1.0));

@@ -55,8 +55,8 @@ fn fault(
     technique: &'static str,
     known: &mut Before,
 ) -> Option<String> {
-    let of = (source, technique, entry.look, entry.with, entry.frame);
-    let before = known.entry(of).or_insert_with(|| look(folder, source, entry, technique, &[]));
+    let picture_key = (source, technique, entry.look, entry.with, entry.frame);
+    let before = known.entry(picture_key).or_insert_with(|| look(folder, source, entry, technique, &[]));
     let after = look(folder, source, entry, technique, &[entry.set]);
     let at = format!("{} with {source} by {technique}, {}", entry.key, entry.set);
     if let Err((_, error)) = before {
@@ -86,9 +86,9 @@ fn try_all(by_each: bool) {
         let by = |source| entry.techniques.iter().copied().filter(|t| entry.applies_to(source, t)).collect::<Vec<_>>();
         let mut with: Vec<_> = SOURCES.iter().map(|s| (s.name, by(s.name))).filter(|(_, by)| !by.is_empty()).collect();
         if !by_each {
-            let one = |(i, (source, by)): (usize, (_, Vec<_>))| (source, vec![by[(at + i) % by.len()]]);
+            let first_technique = |(i, (source, by)): (usize, (_, Vec<_>))| (source, vec![by[(at + i) % by.len()]]);
             let first = at % with.len().clamp(1, 6);
-            with = with.into_iter().enumerate().map(one).skip(first).step_by(6).collect();
+            with = with.into_iter().enumerate().map(first_technique).skip(first).step_by(6).collect();
         }
         for (source, technique) in with.iter().flat_map(|(source, by)| by.iter().map(|t| (*source, *t))) {
             tried += 1;

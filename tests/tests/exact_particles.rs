@@ -79,17 +79,17 @@ fn ten_scenes() -> Vec<Case> {
         [(0.0, RED), (1.0, GREEN), (2.0, BLUE)].map(at).to_vec()
     };
     let sheets_and_fog = || {
-        let mut all = behind_each_other();
-        all.push(disc(Vec3::Z * 0.75, Vec3::Z, 0.9, 0.4, [0.5; 3]));
-        all.push(disc(Vec3::Z * -0.75, Vec3::new(0.05, 0.0, 1.0), 0.9, 0.7, RED));
-        all
+        let mut cloud = behind_each_other();
+        cloud.push(disc(Vec3::Z * 0.75, Vec3::Z, 0.9, 0.4, [0.5; 3]));
+        cloud.push(disc(Vec3::Z * -0.75, Vec3::new(0.05, 0.0, 1.0), 0.9, 0.7, RED));
+        cloud
     };
     let stretched = || {
-        let mut all = three();
-        for (splat, length) in all.iter_mut().zip([0.5, 1.3, 1.0]) {
+        let mut cloud = three();
+        for (splat, length) in cloud.iter_mut().zip([0.5, 1.3, 1.0]) {
             splat.tangent = splat.normal.any_orthonormal_vector() * length;
         }
-        all
+        cloud
     };
     let steep = || {
         let turned = |k: f32, color| disc(Vec3::new(0.3 * k, 0.0, 0.0), Vec3::new(1.0, 0.2 * k, 0.35), 0.9, 0.3, color);
@@ -221,18 +221,18 @@ fn scores(moments: &Moments, exact: &[[f64; 4]]) -> [f64; 4] {
         sum.abs() / square.sqrt()
     };
     let often = |k: &usize| (50.0..levels - 50.0).contains(&(exact[*k][0] * levels));
-    let all: Vec<usize> = (0..exact.len()).collect();
+    let pixels: Vec<usize> = (0..exact.len()).collect();
     let block = |b: usize| -> Vec<usize> {
         let corner = b / BLOCKS * BLOCK * SIDE as usize + b % BLOCKS * BLOCK;
         let inside = |i: usize| corner + i / BLOCK * SIDE as usize + i % BLOCK;
         (0..BLOCK * BLOCK).map(inside).filter(often).collect()
     };
     let blocks = (0..BLOCKS * BLOCKS).map(block).filter(|pixels| pixels.len() >= BLOCK);
-    let of_pixels: Vec<f64> = all.iter().filter(|k| often(k)).map(|k| z(&[*k], 0)).collect();
+    let of_pixels: Vec<f64> = pixels.iter().filter(|k| often(k)).map(|k| z(&[*k], 0)).collect();
     [
         of_pixels.iter().copied().fold(0.0, f64::max),
         blocks.flat_map(|b| (0..4).map(move |c| (b.clone(), c))).map(|(b, c)| z(&b, c)).fold(0.0, f64::max),
-        (0..4).map(|c| z(&all, c)).fold(0.0, f64::max),
+        (0..4).map(|c| z(&pixels, c)).fold(0.0, f64::max),
         of_pixels.iter().map(|z| z * z - 1.0).sum::<f64>().abs() / (2.0 * of_pixels.len() as f64).sqrt(),
     ]
 }

@@ -162,8 +162,8 @@ mod deep {
             );
             let alpha = alpha(&picture);
             let ratio = |is_in: &dyn Fn(usize) -> bool| {
-                let of = |value: &dyn Fn(usize) -> f64| (0..alpha.len()).filter(|k| is_in(*k)).map(value).sum::<f64>();
-                of(&|k| 1.0 - alpha[k]) / of(&|k| (-2.0 * (z + 0.8) * stretch_of(k, angle)).exp())
+                let sum = |value: &dyn Fn(usize) -> f64| (0..alpha.len()).filter(|k| is_in(*k)).map(value).sum::<f64>();
+                sum(&|k| 1.0 - alpha[k]) / sum(&|k| (-2.0 * (z + 0.8) * stretch_of(k, angle)).exp())
             };
             // Particles beside the eye cover many pixels at once, the more the wider the angle.
             let to_border = |k: usize| [k % SIZE as usize, k / SIZE as usize].map(|v| v.min(SIZE as usize - 1 - v));

@@ -311,12 +311,12 @@ fn the_discs_of_a_few_points_are_seen_whole() {
             place.write(&file, auto("camera = \"auto\"").replace("mesh = \"mesh.obj\"", keys));
             seen(&file)
         };
-        let own = scene(&format!("points = \"few.xyz\"\n{keys}"));
+        let unscaled = scene(&format!("points = \"few.xyz\"\n{keys}"));
         // In another unit of length, a size in the world with it, what is seen is as wide.
         let keys = keys.replace("0.7", "0.91");
         let unit = "transform = { scale = 1.3, translate = [5, -7, 1e6] }";
         let scaled = scene(&format!("points = \"few.xyz\"\n{unit}\n{}", keys.replace("3.0", "2.307_692_3")));
-        assert!((own - scaled).abs() < 0.03, "{name}: {own} {scaled}");
+        assert!((unscaled - scaled).abs() < 0.03, "{name}: {unscaled} {scaled}");
     }
 }
 

@@ -28,24 +28,24 @@ fn some(n: u64) -> Vec<One> {
         z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
         (((z ^ (z >> 31)) >> 40) as f32 / (1u64 << 24) as f32).mul_add(2.0, -1.0)
     };
-    let one = |i: u64| {
-        let of = |k: u64, mean: f32, reach: f32| mean + reach * number(i, k);
-        let mut numbers = vec![of(0, 0.0, 2.0), of(1, 0.0, 2.0), of(2, 0.0, 2.0)];
-        numbers.extend((3..6).map(|k| of(k, 0.0, 1.5)));
-        numbers.push(of(6, 1.0, 6.0));
-        numbers.extend((7..10).map(|k| of(k, -2.6, 1.6)));
-        numbers.extend((10..14).map(|k| of(k, 0.0, 1.0)));
-        numbers.extend((14..59).map(|k| of(k, 0.0, 0.25)));
+    let gaussian = |i: u64| {
+        let around = |k: u64, mean: f32, reach: f32| mean + reach * number(i, k);
+        let mut numbers = vec![around(0, 0.0, 2.0), around(1, 0.0, 2.0), around(2, 0.0, 2.0)];
+        numbers.extend((3..6).map(|k| around(k, 0.0, 1.5)));
+        numbers.push(around(6, 1.0, 6.0));
+        numbers.extend((7..10).map(|k| around(k, -2.6, 1.6)));
+        numbers.extend((10..14).map(|k| around(k, 0.0, 1.0)));
+        numbers.extend((14..59).map(|k| around(k, 0.0, 0.25)));
         One { numbers }
     };
-    (0..n).map(one).collect()
+    (0..n).map(gaussian).collect()
 }
 
-fn write(path: &Path, all: &[One]) {
-    let mut text = format!("ply\nformat binary_little_endian 1.0\nelement vertex {}\n", all.len());
+fn write(path: &Path, gaussians: &[One]) {
+    let mut text = format!("ply\nformat binary_little_endian 1.0\nelement vertex {}\n", gaussians.len());
     names().iter().for_each(|name| text += &format!("property float {name}\n"));
     let mut out = (text + "end_header\n").into_bytes();
-    all.iter().flat_map(|one| &one.numbers).for_each(|v| out.extend(v.to_le_bytes()));
+    gaussians.iter().flat_map(|gaussian| &gaussian.numbers).for_each(|v| out.extend(v.to_le_bytes()));
     std::fs::write(path, out).unwrap();
 }
 
@@ -75,8 +75,9 @@ impl Eye {
 }
 
 /// The image model of Kerbl et al. 2023: sorted by the depth of centres, α = min(0.99, o·G), below 1/255 nothing; each colour decoded to light.
-fn oracle(all: &[One], eye: &Eye) -> Vec<[f64; 3]> {
-    let mut seen: Vec<(f64, DVec2, DMat2, f64, [f64; 3])> = all.iter().filter_map(|one| seen(one, eye)).collect();
+fn oracle(gaussians: &[One], eye: &Eye) -> Vec<[f64; 3]> {
+    let mut seen: Vec<(f64, DVec2, DMat2, f64, [f64; 3])> =
+        gaussians.iter().filter_map(|gaussian| seen(gaussian, eye)).collect();
     seen.sort_by(|a, b| a.0.total_cmp(&b.0));
     let pixel = |k: usize| {
         let at = DVec2::new((k % SIZE[0]) as f64 + 0.5, (k / SIZE[0]) as f64 + 0.5);
@@ -95,8 +96,8 @@ fn oracle(all: &[One], eye: &Eye) -> Vec<[f64; 3]> {
     (0..SIZE[0] * SIZE[1]).map(pixel).collect()
 }
 
-fn seen(one: &One, eye: &Eye) -> Option<(f64, DVec2, DMat2, f64, [f64; 3])> {
-    let n: Vec<f64> = one.numbers.iter().map(|v| f64::from(*v)).collect();
+fn seen(gaussian: &One, eye: &Eye) -> Option<(f64, DVec2, DMat2, f64, [f64; 3])> {
+    let n: Vec<f64> = gaussian.numbers.iter().map(|v| f64::from(*v)).collect();
     let position = DVec3::from_slice(&n);
     let [w, x, y, z] = [10, 11, 12, 13].map(|k| n[k] / n[10..14].iter().map(|v| v * v).sum::<f64>().sqrt());
     let turn = DMat3::from_cols(
@@ -117,8 +118,8 @@ fn seen(one: &One, eye: &Eye) -> Option<(f64, DVec2, DMat2, f64, [f64; 3])> {
     let most = DVec2::new(SIZE[0] as f64, SIZE[1] as f64) * 0.5 / eye.focal * 1.3;
     let slant = (c.truncate() / c.z).clamp(-most, most);
     let rows = [DVec3::new(1.0, 0.0, -slant.x), DVec3::new(0.0, 1.0, -slant.y)].map(|row| row * eye.focal / c.z);
-    let of = |i: usize, j: usize| rows[i].dot(covariance * rows[j]) + if i == j { 0.3 } else { 0.0 };
-    let in_image = DMat2::from_cols(DVec2::new(of(0, 0), of(0, 1)), DVec2::new(of(1, 0), of(1, 1)));
+    let entry = |i: usize, j: usize| rows[i].dot(covariance * rows[j]) + if i == j { 0.3 } else { 0.0 };
+    let in_image = DMat2::from_cols(DVec2::new(entry(0, 0), entry(0, 1)), DVec2::new(entry(1, 0), entry(1, 1)));
     let center = DVec2::new(SIZE[0] as f64, SIZE[1] as f64) * 0.5 + c.truncate() / c.z * eye.focal;
     let d = (position - eye.at).normalize();
     let color = [0, 1, 2].map(|k| {
@@ -152,18 +153,18 @@ fn harmonics(d: DVec3) -> [f64; 16] {
         _ => -15.0 * sin * sin * sin,
     };
     let factorial = |n: usize| (1..=n).map(|k| k as f64).product::<f64>();
-    let mut all = [0.0; 16];
+    let mut harmonics = [0.0; 16];
     for l in 0..4usize {
         for m in 0..=l {
             let norm = ((2 * l + 1) as f64 / (4.0 * std::f64::consts::PI) * factorial(l - m) / factorial(l + m)).sqrt();
             let value = norm * legendre(l, m) * if m == 0 { 1.0 } else { std::f64::consts::SQRT_2 };
-            all[l * l + l + m] = value * (m as f64 * around).cos();
+            harmonics[l * l + l + m] = value * (m as f64 * around).cos();
             if m > 0 {
-                all[l * l + l - m] = value * (m as f64 * around).sin();
+                harmonics[l * l + l - m] = value * (m as f64 * around).sin();
             }
         }
     }
-    all
+    harmonics
 }
 
 fn scene(view: usize, object: &str) -> String {
@@ -185,8 +186,8 @@ fn off(picture: &Picture, exact: &[[f64; 3]]) -> f64 {
 #[test]
 fn five_hundred_gaussians_are_what_an_exact_compositor_makes_of_them() {
     let folder = tempfile::tempdir().unwrap();
-    let all = some(500);
-    write(&folder.path().join("g.ply"), &all);
+    let gaussians = some(500);
+    write(&folder.path().join("g.ply"), &gaussians);
     // As the file says, y down; and turned, scaled and moved, where harmonics turn along.
     let down = DMat3::from_diagonal(DVec3::new(1.0, -1.0, -1.0));
     let [x, y, z] = [20.0f64, -35.0, 50.0].map(f64::to_radians);
@@ -198,7 +199,7 @@ fn five_hundred_gaussians_are_what_an_exact_compositor_makes_of_them() {
         (1, moved, Eye::new(VIEWS[1]).before(turned, 0.75, shift)),
     ];
     for (view, object, eye) in cases {
-        let exact = oracle(&all, &eye);
+        let exact = oracle(&gaussians, &eye);
         for technique in ["points", "reference"] {
             let picture = draw_in(folder.path(), &scene(view, object), &["--technique", technique]);
             let off = off(&picture, &exact);
@@ -207,20 +208,20 @@ fn five_hundred_gaussians_are_what_an_exact_compositor_makes_of_them() {
         }
     }
     // The comparison can fail.
-    let other = oracle(&all, &Eye::new(VIEWS[0]));
+    let other = oracle(&gaussians, &Eye::new(VIEWS[0]));
     assert!(off(&draw_in(folder.path(), &scene(0, ""), &[]), &other) > 0.1);
 }
 
 #[test]
 fn neither_the_order_of_the_file_nor_threads_nor_a_shift_change_gaussians() {
     let folder = tempfile::tempdir().unwrap();
-    let mut all = some(300);
+    let mut gaussians = some(300);
     let path = folder.path().join("g.ply");
-    write(&path, &all);
+    write(&path, &gaussians);
     let picture = draw_in(folder.path(), &scene(0, ""), &["--threads", "1"]);
     assert_eq!(draw_in(folder.path(), &scene(0, ""), &["--threads", "3"]).sha256(1.0), picture.sha256(1.0));
-    all.reverse();
-    write(&path, &all);
+    gaussians.reverse();
+    write(&path, &gaussians);
     assert_eq!(draw_in(folder.path(), &scene(0, ""), &[]).sha256(1.0), picture.sha256(1.0));
     let moved = scene(0, "transform = { translate = [1e7, 1e7, 1e7] }\n")
         .replace("[0.5, 1.0, 6.0]", "[10000000.5, 10000001.0, 10000006.0]");

@@ -121,11 +121,11 @@ fn x2_shifting_by_ten_million_changes_nothing_visible() {
 #[test]
 fn x8_light_is_additive_and_layers_sum_to_beauty() {
     let text = scene(1.0, 0.0, false);
-    let all = draw(&text, &[]);
+    let picture = draw(&text, &[]);
     // Drawn as one colour, which nobody summed.
     let plain = draw(&text.replace("layers = ['effects', 'depth', 'shadow']\n", ""), &[]);
     for c in ["R", "G", "B"] {
-        let largest = largest_difference(&sum_of_effects(&all, c), &plain.channel(c));
+        let largest = largest_difference(&sum_of_effects(&picture, c), &plain.channel(c));
         assert!(largest < 1e-5, "channel {c}: {largest:e}");
     }
     let objects = text.find("[[object]]").unwrap();
@@ -134,11 +134,11 @@ fn x8_light_is_additive_and_layers_sum_to_beauty() {
     for effect in ["direct.G", "scatter1.G"] {
         let both: Vec<f64> = first.channel(effect).iter().zip(second.channel(effect)).map(|(a, b)| a + b).collect();
         let brightest = both.iter().copied().fold(0.0, f64::max);
-        let largest = largest_difference(&both, &all.channel(effect));
+        let largest = largest_difference(&both, &picture.channel(effect));
         assert!(largest <= 1e-6 * brightest, "{effect} of two lights: {largest:e} of {brightest}");
     }
     let brighter = text.replace("20.0, 20.0, 20.0", "40.0, 40.0, 40.0").replace("0.5, 0.5, 0.5", "1.0, 1.0, 1.0");
-    let twice: Vec<f64> = all.channel("direct.G").iter().map(|v| 2.0 * v).collect();
+    let twice: Vec<f64> = picture.channel("direct.G").iter().map(|v| 2.0 * v).collect();
     let brightest = twice.iter().copied().fold(0.0, f64::max);
     let largest = largest_difference(&twice, &draw(&brighter, &[]).channel("direct.G"));
     assert!(largest <= 1e-6 * brightest, "twice the light: {largest:e} of {brightest}");
@@ -147,8 +147,9 @@ fn x8_light_is_additive_and_layers_sum_to_beauty() {
 /// A pixel of eight by eight samples is their mean, by points; the picture of eight by eight pixels has the same samples.
 #[test]
 fn ou1_one_pixel_is_the_mean_of_a_fine_picture() {
-    let of = |keys: &str| draw(&scene(1.0, 0.0, false).replace("size = [80, 60]\n[render]\nantialias = 2", keys), &[]);
-    let [one, fine] = ["size = [1, 1]\n[render]\nantialias = 8", "size = [8, 8]\n[render]\nantialias = 1"].map(of);
+    let picture =
+        |keys: &str| draw(&scene(1.0, 0.0, false).replace("size = [80, 60]\n[render]\nantialias = 2", keys), &[]);
+    let [one, fine] = ["size = [1, 1]\n[render]\nantialias = 8", "size = [8, 8]\n[render]\nantialias = 1"].map(picture);
     for name in ["R", "G", "B", "A"] {
         let one = one.channel(name);
         let fine = fine.channel(name);

@@ -50,8 +50,8 @@ fn x7_a_shadow_map_needs_a_caster_a_receiver_and_a_light() {
 
 #[test]
 fn x7_sorting_is_for_translucent_and_opaque_resolution_for_opaque_splats() {
-    let all = passes(&scene("", "", ""));
-    assert!(all.contains(&"hbsort".into()) && all.contains(&"splat".into()) && all.contains(&"opaque".into()));
+    let whole = passes(&scene("", "", ""));
+    assert!(whole.contains(&"hbsort".into()) && whole.contains(&"splat".into()) && whole.contains(&"opaque".into()));
     let solid = passes(&scene("", "visible = false", ""));
     assert!(!solid.contains(&"hbsort".into()) && !solid.contains(&"splat".into()));
     assert!(!ran(&scene("visible = false", "", ""), "opaque"));

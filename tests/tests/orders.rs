@@ -51,9 +51,11 @@ fn sheets_pop(report: &Value) {
         row(report, &name)[key].as_f64().unwrap()
     };
     for across in ["the view", "an axis", "the half vector"] {
-        let of = |key: &str| [1, 2, 4, 8].map(|voxels| value(across, voxels, key));
-        println!("{across}: pops {:.2?}, RMSE {:.4?}", of("pop_score"), of("rmse"));
-        assert!(of("rmse")[0] < of("rmse")[3] && of("slice_thickness")[3] == 8.0 * of("slice_thickness")[0]);
+        let values = |key: &str| [1, 2, 4, 8].map(|voxels| value(across, voxels, key));
+        println!("{across}: pops {:.2?}, RMSE {:.4?}", values("pop_score"), values("rmse"));
+        assert!(
+            values("rmse")[0] < values("rmse")[3] && values("slice_thickness")[3] == 8.0 * values("slice_thickness")[0]
+        );
     }
     // All sheets change at once.
     for voxels in [1, 2, 4, 8] {

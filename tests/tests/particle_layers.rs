@@ -173,13 +173,16 @@ fn x7_only_the_planes_that_are_asked_for_take_memory() {
         assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
         let cost: serde_json::Value =
             serde_json::from_slice(&std::fs::read(folder.path().join("c.json")).unwrap()).unwrap();
-        let of = cost.as_array().unwrap().iter().find(|s| s["name"] == "particles").unwrap();
-        of["bytes"].as_u64().unwrap() / (64 * 64)
+        let stage = cost.as_array().unwrap().iter().find(|s| s["name"] == "particles").unwrap();
+        stage["bytes"].as_u64().unwrap() / (64 * 64)
     };
     let grey = fog_and_plane("").replace("extinction_rgb", "# ");
-    let of = |layers: &str| bytes(&grey, layers);
-    assert_eq!([of("alpha"), of("std_error"), of("effects")], [36, 36, 108]);
-    assert_eq!([of("depth"), of("object"), of("depth.first,object")], [36 + 184, 36 + 8, 36 + 192]);
+    let grey_bytes = |layers: &str| bytes(&grey, layers);
+    assert_eq!([grey_bytes("alpha"), grey_bytes("std_error"), grey_bytes("effects")], [36, 36, 108]);
+    assert_eq!(
+        [grey_bytes("depth"), grey_bytes("object"), grey_bytes("depth.first,object")],
+        [36 + 184, 36 + 8, 36 + 192]
+    );
     assert_eq!(bytes(&fog_and_plane(""), "alpha"), 36 + 48);
     // Unequal numbers that are equal are none.
     assert_eq!(bytes(&grey.replace("[material.fog]", "[material.fog]\nextinction_rgb = [2, 2, 2]"), "alpha"), 36);
@@ -287,7 +290,7 @@ mod deep {
     fn depths_of(from: f64, to: f64, levels: u32, extinction: &dyn Fn(f64) -> f64) -> [[f64; 2]; 4] {
         const STEPS: usize = 200_000;
         let step = (to - from) / STEPS as f64;
-        let all = f64::from(levels);
+        let sets = f64::from(levels);
         let mut tau = 0.0f64;
         let mut moments = [0.0; 5];
         let mut found = [[f64::INFINITY, 0.0]; 4];
@@ -299,17 +302,17 @@ mod deep {
             let after = -(-tau).exp_m1();
             let density = sigma * (-tau).exp();
             if before < 1.0 / 255.0 && after >= 1.0 / 255.0 {
-                found[0] = [z, (0.69 * all / 255.0).sqrt().recip() / 255.0 / density];
+                found[0] = [z, (0.69 * sets / 255.0).sqrt().recip() / 255.0 / density];
             }
             if before < 0.5 && after >= 0.5 {
-                found[1] = [z, 0.5 / all.sqrt() / density];
+                found[1] = [z, 0.5 / sets.sqrt() / density];
             }
             (0..5).for_each(|k| moments[k] += (after - before) * (z - from).powi(k as i32));
         }
         let m = moments.map(|m| m / moments[0]);
         let mean = m[1];
         let variance = m[2] - m[1] * m[1];
-        let n = moments[0] * all;
+        let n = moments[0] * sets;
         let fourth = m[4] - 4.0 * m[3] * mean + 6.0 * m[2] * mean * mean - 3.0 * mean.powi(4);
         found[2] = [from + mean, (variance / n).sqrt()];
         found[3] = [variance.sqrt(), ((fourth - variance * variance) / (4.0 * variance * n)).sqrt()];

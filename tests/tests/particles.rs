@@ -127,7 +127,7 @@ const OWN: [(&str, &str, &str); 13] = [
     ("field", "c", "medium_box = { min = [-0.5, -0.5, -0.3], max = [0.5, 0.5, 0.3], extinction = 2, spacing = 0.025 }"),
 ];
 
-fn own(object: &str, head: &str) -> String {
+fn native(object: &str, head: &str) -> String {
     parallel_view(2.0, SIZE)
         + "[ambient]\ncolor = [0.1, 0.1, 0.1]\n[background]\ncolor = [0.1, 0.2, 0.4]\n\
            [material.a]\ncolor = [0.9, 0.4, 0.2]\nopacity = 0.6\nspecular = 0.2\n\
@@ -173,7 +173,7 @@ fn data() -> tempfile::TempDir {
 
 /// Luminance and its standard error, of so many sets by a sampler.
 fn sampled(folder: &std::path::Path, object: &str, sets: u32, by: &str) -> [Vec<f64>; 2] {
-    let text = own(object, "") + &format!("[render.particles]\nrepeat_level = {sets}\n{by}\n");
+    let text = native(object, "") + &format!("[render.particles]\nrepeat_level = {sets}\n{by}\n");
     let picture = draw_in(folder, &text, &["--technique", "particles", "--layers", "std_error"]);
     [luminance(&picture), picture.channel("std_error.A")]
 }
@@ -216,7 +216,7 @@ fn a_trilinear_isosurface_is_the_same_by_lines_along_its_lattice_and_by_random_o
     let [n, square, mean] = apart(&by("auto"), &by("lines"));
     assert!(n > 300.0 && (0.8..1.2).contains(&square) && mean.abs() < 2e-3, "{n} {square} {mean}");
     // What is clipped has an end that no lattice knows.
-    let clipped = own(&format!("{object}clip = [{{ normal = [0, 1, 1], point = [0, 0, 0.1] }}]\n"), "");
+    let clipped = native(&format!("{object}clip = [{{ normal = [0, 1, 1], point = [0, 0, 0.1] }}]\n"), "");
     std::fs::write(folder.path().join("s.toml"), clipped).unwrap();
     let mut command = organza();
     command.args(["explain", "s.toml", "--json", "--technique", "particles"]).current_dir(&folder);
@@ -249,7 +249,7 @@ fn a_brownian_motion_that_counts_too_much_area_says_so() {
         let folder = tempfile::tempdir().unwrap();
         let surface =
             format!("implicit = {{ expression = '{expression}', box = [[-1, -1, -1], [1, 1, 1]], spacing = 0.05 }}");
-        let text = own(&format!("material = 'a'\n{surface}\n"), "shadow = false\n")
+        let text = native(&format!("material = 'a'\n{surface}\n"), "shadow = false\n")
             + "[render.particles]\nsurface_sampler = 'brownian'\nrepeat_level = 2\n";
         std::fs::write(folder.path().join("s.toml"), text).unwrap();
         let mut command = organza();
@@ -285,16 +285,16 @@ fn x7_what_is_sampled_from_its_data_becomes_splats_only_for_a_shadow() {
         // What is done does not depend on how finely.
         let coarse = object.replace("spacing = 0.02", "spacing = 0.06").replace("spacing = 0.01", "spacing = 0.06");
         let object = format!("material = '{material}'\n{coarse}");
-        let text = own(&object, "shadow = false\n");
+        let text = native(&object, "shadow = false\n");
         let (names, plan) = passes(&text);
         let made = |plan: &serde_json::Value| plan["plan"]["samplers"][0]["becomes_splats"].is_string();
         assert_eq!(plan["plan"]["samplers"][0]["source"], sampler, "{object}");
         assert!(!names.contains(&"convert".to_owned()) && !made(&plan), "{names:?} {object}");
-        let (names, plan) = passes(&own(&object, ""));
+        let (names, plan) = passes(&native(&object, ""));
         // What is unlit receives no shadow.
         let shaded = material != "d";
         assert!(names.contains(&"convert".to_owned()) == shaded && made(&plan) == shaded, "{names:?} {object}");
-        let (names, _) = passes(&own(&format!("casts_shadow = false\n{object}"), ""));
+        let (names, _) = passes(&native(&format!("casts_shadow = false\n{object}"), ""));
         assert!(!names.contains(&"convert".to_owned()), "{names:?} {object}");
     }
 }
@@ -303,7 +303,7 @@ fn x7_what_is_sampled_from_its_data_becomes_splats_only_for_a_shadow() {
 fn pb08_doubtful_surfaces_are_reported_and_end() {
     let folder = tempfile::tempdir().unwrap();
     let run = |expression: &str, technique: &str| {
-        let text = own(
+        let text = native(
             &format!(
                 "material = 'a'\nimplicit = {{ expression = '{expression}', box = [[-1, -1, -1], [1, 1, 1]], spacing = 0.05 }}"
             ),
@@ -432,7 +432,7 @@ mod deep {
         let mut worst = Vec::new();
         for (sampler, material, object) in OWN {
             let (n, square, mean) =
-                against_points(folder.path(), &own(&format!("material = '{material}'\n{object}"), ""));
+                against_points(folder.path(), &native(&format!("material = '{material}'\n{object}"), ""));
             println!("{sampler}: {n} pixels, mean z² {square:.2}, mean difference {mean:.5}; {object}");
             worst.push((square, mean.abs()));
         }
@@ -447,7 +447,7 @@ mod deep {
         let mut found = Vec::new();
         for by in ["triangles", "brownian"] {
             let folder = tempfile::tempdir().unwrap();
-            let text = own(object, "") + &format!("[render.particles]\nsurface_sampler = '{by}'\n");
+            let text = native(object, "") + &format!("[render.particles]\nsurface_sampler = '{by}'\n");
             let (n, square, mean) = against_points(folder.path(), &text);
             println!("{by}: {n} pixels, mean z² {square:.2}, mean difference {mean:.5}");
             assert!(square < 2.0 && mean.abs() < 4e-3, "{by}: {square} {mean}");

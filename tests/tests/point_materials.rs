@@ -54,9 +54,17 @@ fn materials_and_values_of_points_survive_their_file() {
 
 #[test]
 fn a_list_without_its_column_and_a_column_without_its_list_are_named() {
-    let of = place("stuff,heat");
-    of.expect(3, &["render", "s.toml", "-o", "a.exr"], "materials is a file without such a column, expected one with");
-    let of = place("material,heat");
-    of.write("s.toml", format!("{HEAD}points = 'wall.csv'\nmaterial = 'clay'\n"));
-    of.expect(0, &["render", "s.toml", "-o", "a.exr"], "`material` of the file is not used: the object has one");
+    let place_of_columns = place("stuff,heat");
+    place_of_columns.expect(
+        3,
+        &["render", "s.toml", "-o", "a.exr"],
+        "materials is a file without such a column, expected one with",
+    );
+    let place_of_columns = place("material,heat");
+    place_of_columns.write("s.toml", format!("{HEAD}points = 'wall.csv'\nmaterial = 'clay'\n"));
+    place_of_columns.expect(
+        0,
+        &["render", "s.toml", "-o", "a.exr"],
+        "`material` of the file is not used: the object has one",
+    );
 }

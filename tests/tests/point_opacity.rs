@@ -8,8 +8,8 @@ use std::path::Path;
 fn plane(name: &str, left: f64, right: f64) -> String {
     let mut text = format!("x y z {name}\n");
     for (i, j) in (-30..30).flat_map(|i| (-30..30).map(move |j| (i, j))) {
-        let own = if i < 0 { left } else { right };
-        writeln!(text, "{} {} 0 {own}", 0.05 * (f64::from(i) + 0.5), 0.05 * (f64::from(j) + 0.5)).unwrap();
+        let opacity = if i < 0 { left } else { right };
+        writeln!(text, "{} {} 0 {opacity}", 0.05 * (f64::from(i) + 0.5), 0.05 * (f64::from(j) + 0.5)).unwrap();
     }
     text
 }

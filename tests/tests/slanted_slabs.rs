@@ -78,13 +78,13 @@ fn differences(view: View, tau: f64, spacing: f64, arguments: &[&str]) -> [Vec<f
     let picture = draw(&view.scene(tau, spacing), arguments);
     std::array::from_fn(|i| {
         let found = picture.channel(&format!("depth.{}.Z", NAMES[i]));
-        let of = |(k, found): (usize, &f64)| {
+        let error = |(k, found): (usize, &f64)| {
             let expected = view.depths(tau, k)[i];
             let off = if *found == expected { 0.0 } else { (found - expected) / spacing };
             assert!(off.is_finite(), "{}, pixel {k}: {found}, expected {expected}", NAMES[i]);
             off
         };
-        found.iter().enumerate().map(of).collect()
+        found.iter().enumerate().map(error).collect()
     })
 }
 

@@ -19,18 +19,18 @@ fn commands(page: &str) -> Vec<Vec<String>> {
 
 /// Words between blanks; quotes hold some together.
 fn words(line: &str) -> Vec<String> {
-    let mut all = Vec::new();
+    let mut words = Vec::new();
     let mut word = String::new();
     let mut quoted = false;
     for c in line.chars() {
         match c {
             '\'' => quoted = !quoted,
-            ' ' if !quoted => all.push(std::mem::take(&mut word)),
+            ' ' if !quoted => words.push(std::mem::take(&mut word)),
             c => word.push(c),
         }
     }
-    all.push(word);
-    all
+    words.push(word);
+    words
 }
 
 /// A head of a few voxels: a ball of tissue in air.

@@ -17,8 +17,8 @@ fn panes(layers: &str) -> String {
             0.5 * f64::from(k) - 0.75
         )
     };
-    let all: String = (0..4).map(pane).collect();
-    format!("{}{all}[render.surfels]\ntransmittance_cutoff = 0\n{layers}", parallel_view(2.0, 24))
+    let panes: String = (0..4).map(pane).collect();
+    format!("{}{panes}[render.surfels]\ntransmittance_cutoff = 0\n{layers}", parallel_view(2.0, 24))
 }
 
 #[test]
@@ -61,11 +61,11 @@ fn balls(keys: &str) -> String {
             r * r
         )
     };
-    let all: String = (0..4).map(ball).collect();
+    let balls: String = (0..4).map(ball).collect();
     format!(
         "version = 1\n[camera]\nposition = [0, 0.3, 4]\ntarget = [0, 0, 0]\nsize = [48, 36]\n[ambient]\ncolor = [0.2, 0.2, 0.2]\n\
          [[light]]\nkind = 'directional'\ndirection = [-0.6, -0.6, -0.5]\nirradiance = [2.4, 2.0, 1.6]\nshadow = false\n\
-         {all}[render]\nantialias = 1\n[render.surfels]\n{keys}"
+         {balls}[render]\nantialias = 1\n[render.surfels]\n{keys}"
     )
 }
 

@@ -161,9 +161,9 @@ fn glass_shows_opaque_surfaces_that_lie_out_of_view() {
         let axis = k % 3;
         let side = if k < 3 { 6 } else { -6 };
         let along = |a: usize, v: i32| {
-            let mut all = [0; 3];
-            all[a] = v;
-            all
+            let mut vector = [0; 3];
+            vector[a] = v;
+            vector
         };
         let [center, u, v] = [along(axis, side), along((axis + 1) % 3, 6), along((axis + 2) % 3, 6)];
         format!(

@@ -82,8 +82,8 @@ fn splats_are_shaded_only_where_somebody_shows_what_that_gives() {
         let mut ran: Vec<String> = drawn.cost.stages.into_iter().map(|s| s.name).collect();
         ran.dedup();
         for pass in ["project", "shade", "opaque", "surfels", "group"] {
-            let of = |names: &[String]| names.iter().any(|name| name == pass);
-            assert_eq!(of(&planned), of(&ran), "{pass}: {planned:?} {ran:?}");
+            let has_pass = |names: &[String]| names.iter().any(|name| name == pass);
+            assert_eq!(has_pass(&planned), has_pass(&ran), "{pass}: {planned:?} {ran:?}");
         }
         ran
     };

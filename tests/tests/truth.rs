@@ -255,9 +255,9 @@ fn left_out(objects: &str) -> AllOrders {
                 [[light]]\nkind = 'directional'\ndirection = [0, 0, -1]\nirradiance = [3, 3, 3]\n";
     let text = head.to_owned() + objects;
     let scene = scene::parse(Path::new("s.toml"), text.as_bytes(), &Default::default()).unwrap();
-    let all = truth(&scene, &RenderOptions::default(), Orders::All, SAMPLES, &Progress::new()).unwrap().unwrap();
-    assert!(all.method.contains("all orders"));
-    traced(&scene).unwrap().beside(&all).unwrap()
+    let all_orders = truth(&scene, &RenderOptions::default(), Orders::All, SAMPLES, &Progress::new()).unwrap().unwrap();
+    assert!(all_orders.method.contains("all orders"));
+    traced(&scene).unwrap().beside(&all_orders).unwrap()
 }
 
 #[test]

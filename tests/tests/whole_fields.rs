@@ -170,13 +170,13 @@ fn no_label_is_thinner_than_another() {
     };
     let quarters =
         |alpha: &[f64]| [[false, false], [true, false], [false, true], [true, true]].map(|[r, l]| quarter(alpha, r, l));
-    let all = quarters(&alpha);
+    let expected = quarters(&alpha);
     for technique in ["points", "surfels", "sheets", "particles", "reference"] {
         let (of_technique, _) = seen(&place, "labels.nrrd", &["--technique", technique]);
         assert!(quarters(&of_technique).iter().all(|a| *a > 0.8), "{technique}: {:?}", quarters(&of_technique));
     }
     // One bar alone would stand in the middle of the picture.
-    assert!(all.iter().all(|a| *a > 0.8) && alpha[12 * 24 + 12] < 0.1, "{all:?} {}", alpha[12 * 24 + 12]);
+    assert!(expected.iter().all(|a| *a > 0.8) && alpha[12 * 24 + 12] < 0.1, "{expected:?} {}", alpha[12 * 24 + 12]);
 }
 
 const FOAM: &str = "# vtk DataFile Version 3.0\nx\nASCII\nDATASET STRUCTURED_POINTS\nDIMENSIONS 2 2 2\nORIGIN 0 0 0\nSPACING 1 1 1\n\

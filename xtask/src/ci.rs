@@ -89,17 +89,17 @@ fn cargo(words: &[String], environment: &[(&str, &str)], repo: &Repo) -> Result<
 }
 
 fn steps() -> Vec<Step> {
-    let one = |line: &str| Work::Cargo(vec![split(line)], &[]);
+    let cargo = |line: &str| Work::Cargo(vec![split(line)], &[]);
     // With features and examples, as clippy has them: dependencies that it has checked are not checked again.
     let docs = format!("doc --workspace --no-deps --lib --examples --bin xtask --features {FEATURES},{DRIVER}");
     let docs = Work::Cargo(vec![split(&docs)], &[("RUSTDOCFLAGS", "-D warnings")]);
     let step = |name, work| Step { name, work };
     vec![
-        step("fmt", one("fmt --all --check")),
+        step("fmt", cargo("fmt --all --check")),
         step("tidy", Work::Task(tidy::run)),
         step("papers", Work::Task(papers::check)),
         step("deny", Work::Task(deny::run)),
-        step("clippy", one(&clippy())),
+        step("clippy", cargo(&clippy())),
         step("docs", docs),
         step("modules", Work::Task(vulkan::modules)),
         step("tests", Work::Task(vulkan::tests)),

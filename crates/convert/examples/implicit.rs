@@ -76,7 +76,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     }
     for (name, grid, isovalue) in [("gyroid", &*grid, 0.1), ("ball", &ball(256), 0.4)] {
         let mut triangles = 0;
-        let all = least(|| {
+        let surface = least(|| {
             triangles = isosurface_to_mesh(grid, isovalue, Inside::Below).map_or(0, |m| m.triangles.len());
         });
         let none = least(|| {
@@ -84,7 +84,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         });
         println!(
             "marching cubes, {name} 256³: {:.1} ms, {triangles} triangles; no surface {:.1} ms",
-            1e3 * all,
+            1e3 * surface,
             1e3 * none
         );
     }

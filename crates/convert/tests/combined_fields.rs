@@ -44,7 +44,7 @@ fn place(i: u64) -> DVec3 {
 #[test]
 fn combinations_are_sets_and_their_derivatives_those_of_the_active_part() {
     let (a, b) = balls();
-    let all = [
+    let fields = [
         CombinedField::union(vec![a.clone(), b.clone()]).unwrap(),
         CombinedField::intersection(vec![a.clone(), b.clone()]).unwrap(),
         CombinedField::difference(a.clone(), b.clone()),
@@ -56,7 +56,7 @@ fn combinations_are_sets_and_their_derivatives_those_of_the_active_part() {
         let x = a.value(p);
         let y = b.value(p);
         let inside = [x < 0.0 || y < 0.0, x < 0.0 && y < 0.0, x < 0.0 && y >= 0.0, x >= 0.0];
-        for (n, f) in all.iter().enumerate() {
+        for (n, f) in fields.iter().enumerate() {
             assert_eq!(f.value(p) < 0.0, inside[n], "{f:?}");
             seen[n][usize::from(inside[n])] += 1;
             assert_eq!(f.value_gradient(p), (f.value(p), f.gradient(p)));

@@ -112,8 +112,8 @@ fn a_point_stands_for_as_much_where_few_of_the_others_are_kept() {
     assert!(layer.said.is_empty());
     let (cloud, report) = medium(&layer.points, &MatterParams::default());
     assert_eq!(cloud.len() as u32, SIDE * SIDE);
-    let all = medium(&lattice(), &MatterParams::default()).1.volume;
-    assert!((report.volume * f64::from(SIDE) / all - 1.0).abs() < 1e-2, "{} of {all}", report.volume);
+    let whole_volume = medium(&lattice(), &MatterParams::default()).1.volume;
+    assert!((report.volume * f64::from(SIDE) / whole_volume - 1.0).abs() < 1e-2, "{} of {whole_volume}", report.volume);
 }
 
 #[test]
@@ -125,10 +125,10 @@ fn points_that_become_one_keep_their_mass_their_middle_and_their_colour() {
         let place = sum(&|i| cloud.position[i].as_dvec3());
         [DVec3::splat(mass(cloud)), place, sum(&|i| Vec3::from_array(cloud.color[i]).as_dvec3())]
     };
-    let all = medium(&points, &MatterParams::default()).0;
+    let full = medium(&points, &MatterParams::default()).0;
     let (few, _) = medium(&points, &MatterParams { spacing: Some(0.25), ..MatterParams::default() });
     assert!(few.len() <= 4 * 4 * 2 && few.len() > 20, "{}", few.len());
-    for (a, b) in moments(&all).into_iter().zip(moments(&few)) {
+    for (a, b) in moments(&full).into_iter().zip(moments(&few)) {
         assert!((a - b).length() < 1e-5 * a.length(), "{a} {b}");
     }
     // Eight of a lattice have the kernel of a voxel of theirs.

@@ -28,11 +28,11 @@ struct Steps {
 
 const EXACT: Steps = Steps { place: 1e-6, scale: 1e-6, turn: 1e-6, opacity: 1e-6, constant: 1e-6, others: 1e-6 };
 
-fn agree(name: &str, found: &RawPoints, all: &[Trained], degree: usize, steps: &Steps) {
+fn agree(name: &str, found: &RawPoints, written: &[Trained], degree: usize, steps: &Steps) {
     found.validate().unwrap();
     let g = &found.gaussians;
-    assert_eq!((found.len(), usize::from(g.degree)), (all.len(), degree), "{name}");
-    for (i, t) in all.iter().enumerate() {
+    assert_eq!((found.len(), usize::from(g.degree)), (written.len(), degree), "{name}");
+    for (i, t) in written.iter().enumerate() {
         let near = |what: &str, a: f64, b: f64, step: f64| assert!((a - b).abs() <= step, "{name} {i} {what}: {a} {b}");
         let place = found.exact_position(i);
         (0..3).for_each(|k| near("place", place[k], t.position[k], steps.place));
@@ -54,9 +54,9 @@ fn agree(name: &str, found: &RawPoints, all: &[Trained], degree: usize, steps: &
 #[test]
 fn trained_gaussians_come_back_from_text_and_bytes() {
     for degree in 0..4 {
-        let all: Vec<Trained> = (0..9).map(|i| trained(i, degree)).collect();
+        let written: Vec<Trained> = (0..9).map(|i| trained(i, degree)).collect();
         for encoding in ["ascii", "binary_little_endian"] {
-            agree(encoding, &points("a.ply", &trained_ply(&all, degree, encoding)), &all, degree, &EXACT);
+            agree(encoding, &points("a.ply", &trained_ply(&written, degree, encoding)), &written, degree, &EXACT);
         }
     }
     // Normals are named, for they are not used.
@@ -68,7 +68,7 @@ fn trained_gaussians_come_back_from_text_and_bytes() {
 #[test]
 fn packed_gaussians_come_back_within_the_steps_of_their_chunks() {
     for degree in [0, 1, 2, 3] {
-        let all: Vec<Trained> = (0..300).map(|i| trained(i, degree)).collect();
+        let written: Vec<Trained> = (0..300).map(|i| trained(i, degree)).collect();
         let steps = Steps {
             place: 4.01 / 1023.0,
             scale: 1.51 / 1023.0,
@@ -77,19 +77,19 @@ fn packed_gaussians_come_back_within_the_steps_of_their_chunks() {
             constant: 0.51 / 255.0,
             others: 4.01 / 256.0,
         };
-        agree("packed", &points("a.compressed.ply", &packed_ply(&all, degree)), &all, degree, &steps);
+        agree("packed", &points("a.compressed.ply", &packed_ply(&written, degree)), &written, degree, &steps);
     }
 }
 
 #[test]
 fn splat_files_keep_all_but_the_color_of_directions() {
-    let all: Vec<Trained> = (0..50).map(|i| trained(i, 2)).collect();
+    let written: Vec<Trained> = (0..50).map(|i| trained(i, 2)).collect();
     let half = 0.501 / 255.0;
     // Four numbers within half a step of 1/128, which an angle has twice.
     let turn = 2.0 * 2.0 * 0.501 / 128.0;
     let steps = Steps { turn, opacity: half, constant: half / CONSTANT, ..EXACT };
-    for (name, content) in [("a.splat", splat(&all)), ("a.splat.gz", gzip(&splat(&all)))] {
-        agree(name, &points(name, &content), &all, 0, &steps);
+    for (name, content) in [("a.splat", splat(&written)), ("a.splat.gz", gzip(&splat(&written)))] {
+        agree(name, &points(name, &content), &written, 0, &steps);
     }
 }
 
@@ -97,7 +97,7 @@ fn splat_files_keep_all_but_the_color_of_directions() {
 fn spz_of_both_versions_comes_back_within_its_steps() {
     for (version, turn) in [(2, 0.15), (3, 0.004)] {
         for degree in 0..4 {
-            let all: Vec<Trained> = (0..50).map(|i| trained(i, degree)).collect();
+            let written: Vec<Trained> = (0..50).map(|i| trained(i, degree)).collect();
             let steps = Steps {
                 place: 0.501 / 4096.0,
                 scale: 0.501 / 16.0,
@@ -106,11 +106,11 @@ fn spz_of_both_versions_comes_back_within_its_steps() {
                 constant: 0.501 / (255.0 * 0.15),
                 others: 0.501 / 128.0,
             };
-            let content = spz(&all, degree, version);
+            let content = spz(&written, degree, version);
             let name = format!("version {version}");
-            agree(&name, &points("a.spz", &gzip(&content)), &all, degree, &steps);
+            agree(&name, &points("a.spz", &gzip(&content)), &written, degree, &steps);
             // Its mark tells it, packed or not, whatever its name.
-            agree(&name, &points("unnamed", &content), &all, degree, &steps);
+            agree(&name, &points("unnamed", &content), &written, degree, &steps);
         }
     }
 }
@@ -166,26 +166,26 @@ fn what_is_wrong_with_gaussians_is_said_with_its_place() {
 
 #[test]
 fn gaussians_that_are_no_numbers_are_dropped_where_that_is_asked_for() {
-    let mut all: Vec<Trained> = (0..3).map(|i| trained(i, 1)).collect();
-    all[1].position[0] = f64::NAN;
+    let mut written: Vec<Trained> = (0..3).map(|i| trained(i, 1)).collect();
+    written[1].position[0] = f64::NAN;
     let params = ReadParams { drop_invalid: true, ..ReadParams::default() };
-    let file = trained_ply(&all, 1, "binary_little_endian");
+    let file = trained_ply(&written, 1, "binary_little_endian");
     let Loaded::Points(points) = bytes("a.ply", &file, &params, None).unwrap().0 else { panic!("no points") };
     assert_eq!(points.dropped, 1);
-    all.remove(1);
-    agree("dropped", &points, &all, 1, &EXACT);
+    written.remove(1);
+    agree("dropped", &points, &written, 1, &EXACT);
 }
 
 #[test]
 fn a_cloud_has_the_gaussians_and_balls_that_stand_for_them() {
-    let all: Vec<Trained> = (0..20).map(|i| trained(i, 3)).collect();
-    let points = points("a.ply", &trained_ply(&all, 3, "binary_little_endian"));
+    let written: Vec<Trained> = (0..20).map(|i| trained(i, 3)).collect();
+    let points = points("a.ply", &trained_ply(&written, 3, "binary_little_endian"));
     let cloud = raw_to_surfels(&points, &SurfelParams::default(), None).unwrap().0;
     cloud.validate().unwrap();
     assert_eq!(*cloud.gaussians, points.gaussians);
     let predicted = convert::cost::raw_points(&points, &SurfelParams::default()).unwrap();
     assert_eq!((predicted.splats, predicted.bytes), (20, cloud.bytes()));
-    for (i, t) in all.iter().enumerate() {
+    for (i, t) in written.iter().enumerate() {
         assert_eq!((cloud.gaussian_of(i), cloud.color[i]), (Some(i), points.color[i]));
         let footprint = splat_core::Footprint::default();
         let peak = footprint.norm() * footprint.profile(0.0) / f64::from(cloud.radius[i]).powi(2);
@@ -205,9 +205,9 @@ fn a_cloud_has_the_gaussians_and_balls_that_stand_for_them() {
 #[test]
 fn the_bulk_of_gaussians_leaves_the_farthest_out() {
     assert_eq!(RawPoints::default().bulk(), None);
-    let mut all: Vec<Trained> = (0..200).map(|i| trained(i, 0)).collect();
-    all[7].position = [1e4, -1e4, 1e4];
-    let bulk = points("a.ply", &trained_ply(&all, 0, "ascii")).bulk().unwrap();
+    let mut written: Vec<Trained> = (0..200).map(|i| trained(i, 0)).collect();
+    written[7].position = [1e4, -1e4, 1e4];
+    let bulk = points("a.ply", &trained_ply(&written, 0, "ascii")).bulk().unwrap();
     assert!(bulk.size().max_element() < 12.0 && bulk.size().min_element() > 7.0, "{bulk:?}");
     // Of few all count, with two deviations of each.
     let one = Trained { scale: [0.0; 3], ..trained(0, 0) };

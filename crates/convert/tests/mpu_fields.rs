@@ -52,8 +52,8 @@ fn misses(of: fn(u64) -> (DVec3, DVec3), field: &MpuField, report: &MpuReport) -
         let (v, g) = field.value_gradient(of(i).0);
         v.abs() / g.length() / report.tolerance
     };
-    let all: Vec<f64> = (1_000_000..1_003_000).map(distance).collect();
-    (all.iter().sum::<f64>() / all.len() as f64, all.iter().copied().fold(0.0, f64::max))
+    let distances: Vec<f64> = (1_000_000..1_003_000).map(distance).collect();
+    (distances.iter().sum::<f64>() / distances.len() as f64, distances.iter().copied().fold(0.0, f64::max))
 }
 
 #[test]

@@ -61,12 +61,13 @@ fn a_column_gives_each_point_its_footprint_and_images_stand_upright() {
 fn chance_depends_on_the_seed_and_on_places_in_the_file_alone() {
     let ids = |points: &RawPoints, params: &SurfelParams| {
         let cloud = surfels(points, params);
-        let mut all: Vec<_> = (0..cloud.len()).map(|i| (cloud.footprint[i], cloud.tangent[i].length() > 0.0)).collect();
+        let mut chosen: Vec<_> =
+            (0..cloud.len()).map(|i| (cloud.footprint[i], cloud.tangent[i].length() > 0.0)).collect();
         let key = |i: &usize| cloud.position[*i].to_array().map(|v| (v * 16.0).round() as i64);
         let mut order: Vec<usize> = (0..cloud.len()).collect();
         order.sort_by_key(key);
-        all = order.iter().map(|i| all[*i]).collect();
-        all
+        chosen = order.iter().map(|i| chosen[*i]).collect();
+        chosen
     };
     let first = ids(&wall(|i| i), &params(&[0, 1, 2], false));
     let share = |id: u8| first.iter().filter(|(found, _)| *found == id).count();

@@ -131,8 +131,8 @@ fn two_halves_of_a_plane_have_the_opacities_of_their_points() {
             assert!((through - (1.0 - factor * own)).abs() < 5e-4, "{x}, {factor}: {through}");
         }
         for i in 0..cloud.len() {
-            let own = if cloud.position[i].x < 12.0 { 0.25 } else { 0.75 };
-            assert_eq!(cloud.crossing_depth[i], optics::optical_depth(factor * own) as f32);
+            let point_opacity = if cloud.position[i].x < 12.0 { 0.25 } else { 0.75 };
+            assert_eq!(cloud.crossing_depth[i], optics::optical_depth(factor * point_opacity) as f32);
             assert_eq!(cloud.kind[i], SplatKind::Surface);
         }
     }

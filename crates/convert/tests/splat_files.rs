@@ -62,12 +62,12 @@ fn made(points: &RawPoints, params: &SurfelParams) -> Cloud {
 
 #[test]
 fn what_is_written_is_read_again_bit_by_bit() {
-    let all = cloud(200);
-    let points = read(&file(&all)).unwrap();
+    let written = cloud(200);
+    let points = read(&file(&written)).unwrap();
     let again = made(&points, &SurfelParams::default());
-    assert_eq!(again, all);
-    assert!(again.origin.to_array().map(f64::to_bits) == all.origin.to_array().map(f64::to_bits));
-    assert_eq!(file(&again), file(&all), "and written again the same bytes");
+    assert_eq!(again, written);
+    assert!(again.origin.to_array().map(f64::to_bits) == written.origin.to_array().map(f64::to_bits));
+    assert_eq!(file(&again), file(&written), "and written again the same bytes");
     // Columns that no splat has are not in the file.
     let mut plain = Cloud::new(DVec3::ZERO);
     plain.push(&Splat { position: Vec3::X, ..Splat::default() });
@@ -88,13 +88,13 @@ fn packed(cloud: &Cloud) -> Vec<u8> {
 
 #[test]
 fn packed_splats_are_read_as_they_unpack() {
-    let all = cloud(2000);
-    let unpacked = PackedCloud::new(&all).unwrap().unpack();
-    let points = read(&packed(&all)).unwrap();
+    let written = cloud(2000);
+    let unpacked = PackedCloud::new(&written).unwrap().unpack();
+    let points = read(&packed(&written)).unwrap();
     assert_eq!(made(&points, &SurfelParams::default()), unpacked);
     // Of what scans and meshes become, in their order.
     let mut discs = Cloud::new(DVec3::ZERO);
-    for i in (0..2000).map(|i| all.get(i)) {
+    for i in (0..2000).map(|i| written.get(i)) {
         let none = Vec3::ZERO;
         discs.push(&Splat {
             shading_normal: none,
@@ -144,11 +144,11 @@ fn wrong_packed_files_are_refused_with_their_place() {
 /// Any program may write the same numbers as text.
 #[test]
 fn text_of_the_same_numbers_is_the_same() {
-    let all = cloud(20);
-    let bytes = file(&all);
+    let written = cloud(20);
+    let bytes = file(&written);
     let end = bytes.windows(11).position(|w| w == b"end_header\n").unwrap() + 11;
     let mut text = String::from_utf8(bytes[..end].to_vec()).unwrap().replace("binary_little_endian", "ascii");
-    for s in (0..all.len()).map(|i| all.get(i)) {
+    for s in (0..written.len()).map(|i| written.get(i)) {
         let v = |v: Vec3| format!("{:?} {:?} {:?}", v.x, v.y, v.z);
         text += &format!(
             "{} {:?} {:?} {:?} {:?} {:?} {} {} {} {} {} {} {} {:?} {:?} {:?}\n",
@@ -170,23 +170,26 @@ fn text_of_the_same_numbers_is_the_same() {
             s.crossing_depth,
         );
     }
-    assert_eq!(made(&read(text.as_bytes()).unwrap(), &SurfelParams::default()), all);
+    assert_eq!(made(&read(text.as_bytes()).unwrap(), &SurfelParams::default()), written);
 }
 
 #[test]
 fn splats_are_moved_chosen_and_coloured_as_points_are() {
-    let all = cloud(60);
-    let points = read(&file(&all)).unwrap();
+    let written = cloud(60);
+    let points = read(&file(&written)).unwrap();
     let rotation = DQuat::from_rotation_y(0.5);
     let transform = Similarity { scale: 2.0, rotation, translation: DVec3::Z };
     let splat = SplatParams { transform, material: 3, object: 7, color: [0.5; 3], ..SplatParams::default() };
     let moved = made(&points, &SurfelParams { splat, colors: false, ..SurfelParams::default() });
-    for i in 0..all.len() {
-        let [a, b] = [&all, &moved].map(|c| c.origin + c.position[i].as_dvec3());
+    for i in 0..written.len() {
+        let [a, b] = [&written, &moved].map(|c| c.origin + c.position[i].as_dvec3());
         assert!((transform.apply(a) - b).length() < 1e-3, "{a} {b}");
-        assert_eq!([moved.radius[i], moved.cross_section[i]], [2.0 * all.radius[i], 4.0 * all.cross_section[i]]);
-        assert!((moved.normal[i].as_dvec3() - rotation * all.normal[i].as_dvec3()).length() < 1e-6);
-        assert!((moved.tangent_of(i).length() - 2.0 * all.tangent_of(i).length()).abs() < 1e-6);
+        assert_eq!(
+            [moved.radius[i], moved.cross_section[i]],
+            [2.0 * written.radius[i], 4.0 * written.cross_section[i]]
+        );
+        assert!((moved.normal[i].as_dvec3() - rotation * written.normal[i].as_dvec3()).length() < 1e-6);
+        assert!((moved.tangent_of(i).length() - 2.0 * written.tangent_of(i).length()).abs() < 1e-6);
         assert_eq!((moved.material[i], moved.object[i], moved.color[i]), (3, 7, [0.5; 3]));
     }
     let keep = [Kept { column: "kind".into(), within: Within::Range([1.0, 1.0]) }];
@@ -195,10 +198,10 @@ fn splats_are_moved_chosen_and_coloured_as_points_are() {
     assert_eq!(surfaces.ready.kinds(), [0, 20, 0]);
     assert_eq!(
         made(&surfaces, &SurfelParams::default()),
-        all.gather(&(0..20).map(|i| 3 * i + 1).collect::<Vec<u32>>())
+        written.gather(&(0..20).map(|i| 3 * i + 1).collect::<Vec<u32>>())
     );
     let numbers = |name: &str| points.column(name, DVec3::Y).unwrap();
-    assert_eq!((numbers("value")[3], numbers("crossing_depth")[0]), (f64::from(all.value[3]), 0.0));
+    assert_eq!((numbers("value")[3], numbers("crossing_depth")[0]), (f64::from(written.value[3]), 0.0));
     assert!(points.column_names().any(|name| name == "cross_section") && points.column("heat", DVec3::Y).is_none());
 }
 

@@ -23,8 +23,9 @@ pub(crate) fn by_turns(cloud: &Cloud, count: u32) -> Groups {
 /// The paper's ε: Σ|ΔR| + |ΔG| + |ΔB| of 8 bits a channel, a pixel.
 fn apart(a: &Accumulator, b: &Accumulator) -> f64 {
     let pixels = a.channels[0].len();
-    let one = |k: usize| (0..3).map(|c| 255.0 * f64::from((a.channels[c][k] - b.channels[c][k]).abs())).sum::<f64>();
-    (0..pixels).map(one).sum::<f64>() / pixels as f64
+    let difference =
+        |k: usize| (0..3).map(|c| 255.0 * f64::from((a.channels[c][k] - b.channels[c][k]).abs())).sum::<f64>();
+    (0..pixels).map(difference).sum::<f64>() / pixels as f64
 }
 
 fn alphas(picture: &Accumulator) -> impl Iterator<Item = f32> + '_ {
@@ -67,8 +68,9 @@ fn db3_floored_depths_attenuate_a_curved_surface_twice_where_a_step_ends() {
     let middle = |k: usize| ((k % 64) as f32 - 31.5).hypot((k / 64) as f32 - 23.5) < 8.0;
     let wrong = |layering: Layering<'_>| {
         let picture = draw(&scene, layering);
-        let own: Vec<f32> = alphas(&picture).enumerate().filter(|(k, _)| middle(*k)).map(|(_, alpha)| alpha).collect();
-        own.iter().filter(|alpha| (**alpha - 0.75).abs() > 1e-3).count() as f64 / own.len() as f64
+        let shown: Vec<f32> =
+            alphas(&picture).enumerate().filter(|(k, _)| middle(*k)).map(|(_, alpha)| alpha).collect();
+        shown.iter().filter(|alpha| (**alpha - 0.75).abs() > 1e-3).count() as f64 / shown.len() as f64
     };
     assert_eq!(wrong(Layering::Gaps), 0.0);
     let floored = [4, 16, 64].map(|steps| wrong(Layering::Algorithm1(Floors { groups: &groups, steps })));
@@ -125,10 +127,10 @@ fn errors_come_in_the_papers_order() {
     let params = HashParams { groups: 4, collisions: Collisions::Resolve, ..HashParams::default() };
     let groups = hash_grouping(&scene.cloud, &params, None).expect("a cloud");
     let floors = Floors { groups: &groups, steps: 40 };
-    let all = draw(&scene, Layering::Gaps);
+    let gaps = draw(&scene, Layering::Gaps);
     let [first, second, three, eight] =
         [Layering::Algorithm1(floors), Layering::Algorithm2(floors), Layering::Peeled(3), Layering::Peeled(8)]
-            .map(|layering| apart(&draw(&scene, layering), &all));
+            .map(|layering| apart(&draw(&scene, layering), &gaps));
     println!("ε: Algorithm 1 {first:.2}, Algorithm 2 {second:.2}, 3 layers {three:.2}, 8 layers {eight:.2}");
     assert!(second < first && first < three && eight < second, "{first} {second} {three} {eight}");
 }

@@ -237,9 +237,9 @@ fn db13_glass_is_the_same_whichever_way_its_normals_point() {
         cloud.normal.iter_mut().step_by(every).for_each(|n| *n = -*n);
         clear(cloud, [1.5; 3], view).draw_glass(&WHOLE, &in_sky(Bending::Traced, &|d, _| (d + Vec3::ONE).into()), &[]).1
     };
-    let all = drawn(1);
+    let whole = drawn(1);
     let third = drawn(3);
-    for (a, b) in all.behind.iter().zip(&third.behind).filter(|(a, _)| !a[0].is_nan()) {
+    for (a, b) in whole.behind.iter().zip(&third.behind).filter(|(a, _)| !a[0].is_nan()) {
         assert!((Vec3::from(*a) - Vec3::from(*b)).length() < 1e-4, "{a:?} {b:?}");
     }
 }
@@ -306,8 +306,8 @@ fn a_wall_behind_glass_is_seen_where_the_bent_ray_meets_it() {
         // What is mirrored at the second surface sees the sky, which is 9 as the middle of the wall.
         let share = fresnel(1.5, sine / 1.5);
         assert!((f64::from(behind[2]) - (1.0 + 8.0 * share)).abs() < 1e-5, "pixel {k}: {behind:?}");
-        let own = [0, 1].map(|c| (f64::from(behind[c]) - 9.0) / (1.0 - share));
-        worst = worst.max((own[0] - expected[0]).hypot(own[1] - expected[1]));
+        let bent = [0, 1].map(|c| (f64::from(behind[c]) - 9.0) / (1.0 - share));
+        worst = worst.max((bent[0] - expected[0]).hypot(bent[1] - expected[1]));
         straight = straight.min(if sine > 0.3 { (along.x.hypot(along.y) * 4.5 - off).abs() } else { f64::INFINITY });
     }
     // Colours are blended over discs that lie 0.05 apart, jittered: half of that.

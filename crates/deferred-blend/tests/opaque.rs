@@ -66,11 +66,11 @@ fn agrees_with_the_twin(scene: &Scene, (params, step): (&Params, f64), (name, pa
             Some([seen.depth, seen.values[0], seen.values[1], seen.values[2]])
         };
         let channel = |c: usize| f64::from(picture.image.channels[c][k]);
-        let own = [f64::from(picture.image.depth[k]), channel(0), channel(1), channel(2)];
+        let drawn = [f64::from(picture.image.depth[k]), channel(0), channel(1), channel(2)];
         let apart = |a: [f64; 4], b: [f64; 4]| a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
         let difference = |factor: f32| {
-            let Some(seen) = twin(factor, [0.0; 2]) else { return if own[0] == f64::INFINITY { 0.0 } else { 1.0 } };
-            let error = apart(seen, own);
+            let Some(seen) = twin(factor, [0.0; 2]) else { return if drawn[0] == f64::INFINITY { 0.0 } else { 1.0 } };
+            let error = apart(seen, drawn);
             if error < 2e-5 {
                 return error;
             }
@@ -134,8 +134,8 @@ fn db2_opaque_discs_a_million_units_away_are_one_surface() {
     let groups = minimum(&scene, &Params::default());
     let twin = |k: u32| {
         let at = [k % SIZE[0], k / SIZE[0]].map(|v| f64::from(v) + 0.5);
-        let all = Passes::TwoPlusOne;
-        reference::opaque(&scene.input(), &Params::default(), all, at, &scene.values, 3).expect("a large plane")
+        let passes = Passes::TwoPlusOne;
+        reference::opaque(&scene.input(), &Params::default(), passes, at, &scene.values, 3).expect("a large plane")
     };
     let twin: Vec<reference::Seen> = (0..SIZE[0] * SIZE[1]).map(twin).collect();
     for passes in [Passes::TwoPlusOne, plain(&groups), voronoi(&groups)] {

@@ -44,13 +44,13 @@ impl<'a> Sunny<'a> {
     /// Numbers of each disc, shaded before it is blended.
     fn of_discs(&self, layout: ChannelLayout) -> Vec<f32> {
         let input = self.input();
-        let one = |i: usize| {
+        let shaded = |i: usize| {
             let mut out = vec![0.0; layout.count()];
             let (radiance, normal) = shade_splat(&input, i);
             radiance.write(normal, &layout, &mut out);
             out
         };
-        (0..self.scene.cloud.len()).flat_map(one).collect()
+        (0..self.scene.cloud.len()).flat_map(shaded).collect()
     }
 
     /// Channels of the translucent picture, or of the opaque one.

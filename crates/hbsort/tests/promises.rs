@@ -55,10 +55,10 @@ fn a_subset_is_sorted_as_a_cloud_of_its_own() {
     for exact in [false, true] {
         let params = Params { exact, ..Params::default() };
         let subset = slice_cloud(&cloud, Some(&ids), &camera, &params, &mut scratch).unwrap();
-        let own = slice_cloud(&cloud.gather(&ids), None, &camera, &params, &mut scratch).unwrap();
-        let named: Vec<u32> = own.input_from_sorted.iter().map(|&k| ids[k as usize]).collect();
+        let gathered = slice_cloud(&cloud.gather(&ids), None, &camera, &params, &mut scratch).unwrap();
+        let named: Vec<u32> = gathered.input_from_sorted.iter().map(|&k| ids[k as usize]).collect();
         assert_eq!(subset.input_from_sorted, named);
-        assert_eq!((subset.slice_starts, subset.culled), (own.slice_starts, own.culled));
+        assert_eq!((subset.slice_starts, subset.culled), (gathered.slice_starts, gathered.culled));
     }
 }
 

@@ -65,8 +65,8 @@ fn traced(shape: &str, index: f64, side: usize, paths: u32) -> Truth {
 }
 
 /// The root of the mean squared difference of some pixels, without what the noise of path tracing has of it.
-fn rmse(seen: &[[f64; 3]], exact: &Truth, of: impl Fn(usize) -> bool) -> f64 {
-    let chosen: Vec<usize> = (0..seen.len()).filter(|k| of(*k)).collect();
+fn rmse(seen: &[[f64; 3]], exact: &Truth, chooses: impl Fn(usize) -> bool) -> f64 {
+    let chosen: Vec<usize> = (0..seen.len()).filter(|k| chooses(*k)).collect();
     let square =
         |k: usize, c: usize| (seen[k][c] - exact.image.pixels()[k][c]).powi(2) - exact.standard_error[k][c].powi(2);
     let sum: f64 = chosen.iter().flat_map(|&k| (0..3).map(move |c| (k, c))).map(|(k, c)| square(k, c)).sum();

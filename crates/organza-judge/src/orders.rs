@@ -165,7 +165,7 @@ pub fn compare(
     let rays = rays(&exact_input(&loaded, &frame.camera, shaded, frame.raster_params().resampling_sigma_px));
     let world = libm::exp2(f64::from(loaded.exponent));
     let sliced = THICKER.map(|f| Ordering::Slices(f * auto));
-    let orderings =
+    let planned =
         [&[Ordering::Exact][..], &sliced, &[Ordering::Centre, Ordering::Distance, Ordering::Unsorted]].concat();
     progress.leave();
     let mut draw = |ordering: Ordering| {
@@ -185,8 +185,8 @@ pub fn compare(
         let disorder = Some(disorder);
         Ok::<_, Error>(Ordered { thickness, disorder, seconds, bytes, ..Ordered::new(name, image) })
     };
-    let stages = orderings.iter().map(|ordering| (ordering.name(auto), 1.0));
-    let drawn = progress.within(ORDERS, stages, || orderings.iter().map(|o| draw(*o)).collect::<Result<Vec<_>, _>>());
+    let stages = planned.iter().map(|ordering| (ordering.name(auto), 1.0));
+    let drawn = progress.within(ORDERS, stages, || planned.iter().map(|o| draw(*o)).collect::<Result<Vec<_>, _>>());
     let orderings = drawn?;
     progress.begin(TRUTH);
     let start = Instant::now();

@@ -409,7 +409,7 @@ fn accuracy_is_predicted_and_measured_and_is_that_of_the_scene() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("events.json");
     session.record(Recording::begin(&path, false).unwrap());
-    let own = session.whole_picture().unwrap();
+    let first_picture = session.whole_picture().unwrap();
     assert_eq!(session.shown().accuracy, None, "nobody has asked");
     session.ask_for_accuracy();
     let rungs = || session.shown().accuracy.map_or_else(Vec::new, |accuracy| accuracy.rungs);
@@ -454,7 +454,7 @@ fn accuracy_is_predicted_and_measured_and_is_that_of_the_scene() {
     assert_eq!(rung(-3).unwrap().set, fastest.set);
     // The scene's own accuracy has its own bits again.
     session.apply(&[Event::Reset {}, Event::Accuracy { step: 0, set: Vec::new() }]).unwrap();
-    assert!(pixels(&session.whole_picture().unwrap().png) == pixels(&own.png));
+    assert!(pixels(&session.whole_picture().unwrap().png) == pixels(&first_picture.png));
     let events = read_events(&path).unwrap();
     assert_eq!(events.iter().filter(|event| matches!(event, Event::Accuracy { .. })).count(), 3);
 }

@@ -68,7 +68,7 @@ impl Running {
     fn ask(&self, line: &str, headers: &str, body: &str) -> Answer {
         let length = if body.is_empty() { String::new() } else { format!("Content-Length: {}\r\n", body.len()) };
         let request = format!("{line} HTTP/1.1\r\nConnection: close\r\n{headers}{length}\r\n{body}");
-        Answer::of(&self.raw(request.as_bytes()))
+        Answer::from_text(&self.raw(request.as_bytes()))
     }
 
     fn host(&self) -> String {
@@ -98,7 +98,7 @@ struct Answer {
 }
 
 impl Answer {
-    fn of(text: &str) -> Self {
+    fn from_text(text: &str) -> Self {
         let (head, body) = text.split_once("\r\n\r\n").unwrap_or((text, ""));
         let status = head.split(' ').nth(1).and_then(|status| status.parse().ok()).unwrap_or(0);
         Self { status, head: head.to_lowercase(), body: body.to_owned() }
@@ -343,7 +343,7 @@ fn malformed_and_oversized_requests_end() {
             "POST /{token}/events?client=a HTTP/1.1\r\nHost: {address}\r\nTransfer-Encoding: chunked\r\nContent-Length: 3\r\nContent-Type: application/json\r\n\r\nzz\r\n"
         ),
     ] {
-        let answer = Answer::of(&running.raw(request.as_bytes()));
+        let answer = Answer::from_text(&running.raw(request.as_bytes()));
         assert!(answer.status == 0 || answer.status >= 400, "{}: {}", &request[..40.min(request.len())], answer.status);
     }
     let body = format!("[{}]", " ".repeat(100 << 10));
@@ -353,7 +353,7 @@ fn malformed_and_oversized_requests_end() {
         "POST /{token}/events?client=a HTTP/1.1\r\nHost: {address}\r\nConnection: close\r\nContent-Type: application/json\r\nContent-Length: 1073741824\r\n\r\n"
     );
     let start = Instant::now();
-    assert!([413, 408].contains(&Answer::of(&running.raw(head.as_bytes())).status));
+    assert!([413, 408].contains(&Answer::from_text(&running.raw(head.as_bytes())).status));
     assert!(start.elapsed() < Duration::from_secs(10));
     assert_eq!(running.get("").status, 200);
 }
@@ -397,7 +397,7 @@ fn slow_sockets_hold_nobody() {
     stream.write_all(head.as_bytes()).unwrap();
     let mut answer = String::new();
     stream.read_to_string(&mut answer).unwrap();
-    assert_eq!(Answer::of(&answer).status, 408, "{answer}");
+    assert_eq!(Answer::from_text(&answer).status, 408, "{answer}");
 }
 
 #[test]

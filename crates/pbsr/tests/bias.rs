@@ -27,8 +27,8 @@ fn a_stack_of_planes_has_the_product_of_their_transmittances() {
         .zip(1..)
         .map(|((mesh, alpha), seed)| MeshSampler::new(mesh, &surface(alpha, s, seed), None).unwrap())
         .collect();
-    let all: Vec<&dyn Sampler> = samplers.iter().map(|s| s as &dyn Sampler).collect();
-    let ensemble = render(&camera, &all, 2000);
+    let samplers: Vec<&dyn Sampler> = samplers.iter().map(|s| s as &dyn Sampler).collect();
+    let ensemble = render(&camera, &samplers, 2000);
     let alpha = 1.0 - 0.7 * 0.95 * 0.4;
     let found = bias(&ensemble, &|_, _| Some(alpha));
     assert!(found.none(), "{found:?}");

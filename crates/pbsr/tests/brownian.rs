@@ -14,8 +14,9 @@ fn boxed(field: &Field, half: f64) -> ImplicitSurface<'_> {
 }
 
 fn walk_on(walk: &Walk<'_>, starts: &[DVec3], steps: u64) -> Vec<DVec3> {
-    let one = |(i, start): (usize, &DVec3)| (0..steps).fold(*start, |x, n| walk.step(x, 11, i as u64, n).unwrap_or(x));
-    starts.par_iter().enumerate().map(one).collect()
+    let walked =
+        |(i, start): (usize, &DVec3)| (0..steps).fold(*start, |x, n| walk.step(x, 11, i as u64, n).unwrap_or(x));
+    starts.par_iter().enumerate().map(walked).collect()
 }
 
 #[test]
@@ -141,9 +142,9 @@ fn pb12_walkers_do_not_hop_between_sheets_and_visit_all_components() {
     let params = SurfaceParams { opacity: 0.3, cross_section: 2e-4, ..SurfaceParams::default() };
     let brownian = BrownianParams::for_width(1.0);
     let sampler = BrownianSampler::new(&surface, &brownian, &params).unwrap();
-    let all = positions(&sampler, 0);
-    let left = all.iter().filter(|p| p.x < -0.2).count() as f64;
-    let expected = all.len() as f64 * 0.2;
+    let places = positions(&sampler, 0);
+    let left = places.iter().filter(|p| p.x < -0.2).count() as f64;
+    let expected = places.len() as f64 * 0.2;
     assert!((left - expected).abs() < 4.5 * (2.0 * expected).sqrt(), "{left} for {expected}");
 }
 

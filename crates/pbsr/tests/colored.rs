@@ -73,9 +73,9 @@ fn the_stated_error_is_that_of_the_sets() {
         let layers = read(&ensemble);
         for (k, p) in layers.rgb("beauty").unwrap().iter().enumerate() {
             let luminance = 0.2126 * f64::from(p[0]) + 0.7152 * f64::from(p[1]) + 0.0722 * f64::from(p[2]);
-            let all = luminance * f64::from(set);
-            let y = all - last[k];
-            (sums[k], squares[k], last[k]) = (sums[k] + y, squares[k] + y * y, all);
+            let total = luminance * f64::from(set);
+            let y = total - last[k];
+            (sums[k], squares[k], last[k]) = (sums[k] + y, squares[k] + y * y, total);
         }
     }
     let n = f64::from(LEVELS);
@@ -119,8 +119,8 @@ mod deep {
             for c in 0..3 {
                 let t = (-a * f64::from(shares[0][c]) - b * f64::from(shares[1][c])).exp();
                 let n = beauty.len() as f64;
-                let all = f64::from(LEVELS);
-                let error = (t * (1.0 - t) / all).sqrt();
+                let levels = f64::from(LEVELS);
+                let error = (t * (1.0 - t) / levels).sqrt();
                 let z = |k: usize| (f64::from(beauty[k][c]) - t) / error;
                 let mean = (0..beauty.len()).map(z).sum::<f64>() / n.sqrt();
                 let worst = (0..beauty.len()).map(|k| z(k).abs()).fold(0.0, f64::max);

@@ -340,8 +340,8 @@ mod deep {
         let mesh = rectangle(Vec3::ZERO, Vec3::new(0.8, 0.2, 0.9), Vec3::Y, 3);
         // Thinned out, and widened.
         for (s, surface_opacity) in [(5e-4, ThinSlab), (6e-3, ThinSlab), (2e-3, PerCrossing)] {
-            let own = SurfaceParams { surface_opacity, ..params(0.6, s, [0.25, 0.5, 1.0], 7) };
-            let sampler = MeshSampler::new(&mesh, &own, None).unwrap();
+            let surface = SurfaceParams { surface_opacity, ..params(0.6, s, [0.25, 0.5, 1.0], 7) };
+            let sampler = MeshSampler::new(&mesh, &surface, None).unwrap();
             let objects = objects(&[&sampler]);
             let scene = scene(&camera, &objects);
             let mut slow = vec![0u32; 70 * 60];

@@ -66,8 +66,8 @@ fn particles_are_uniform_in_the_voxels() {
             let index = grid.axes.inverse();
             let dims = DVec3::from_array(grid.dims.map(|n| n as f64));
             let mut bins = [[0u64; 24]; 3];
-            let all = positions(sampler.as_ref(), 5);
-            for p in &all {
+            let places = positions(sampler.as_ref(), 5);
+            for p in &places {
                 let at = (index * (*p - grid.origin) + 0.5) / dims;
                 assert!(at.min_element() > -1e-5 && at.max_element() < 1.0 + 1e-5, "lattice {g}, sampler {s}: {at}");
                 (0..3).for_each(|a| bins[a][((at[a] * 24.0) as usize).min(23)] += 1);
@@ -78,8 +78,8 @@ fn particles_are_uniform_in_the_voxels() {
             }
             let volume = grid.cell_volume() * dims.element_product();
             let expected = volume * f64::from(EXTINCTION) / params.cross_section;
-            let off = (all.len() as f64 - expected) / expected.sqrt();
-            assert!(off.abs() < 4.0, "lattice {g}, sampler {s}: {} particles for {expected}", all.len());
+            let off = (places.len() as f64 - expected) / expected.sqrt();
+            assert!(off.abs() < 4.0, "lattice {g}, sampler {s}: {} particles for {expected}", places.len());
         }
     }
 }

@@ -19,14 +19,14 @@ fn pb13_lines_are_uniform_on_spheres_and_ellipsoids() {
     // Equal heights cut equal areas from a sphere.
     let sampler =
         LineSampler::new(&boxed(&Field::UNIT, 1.1), &LineParams { resolution: 32 }, &params(0.5, 1e-4), None).unwrap();
-    let all = positions(&sampler, 0);
+    let places = positions(&sampler, 0);
     for axis in 0..3 {
         let mut bins = [0u64; 20];
-        all.iter().for_each(|p| bins[((p[axis] + 1.0) * 10.0).clamp(0.0, 19.0) as usize] += 1);
+        places.iter().for_each(|p| bins[((p[axis] + 1.0) * 10.0).clamp(0.0, 19.0) as usize] += 1);
         let chi2 = chi2_equal(&bins);
         assert!(chi2 < chi2_limit(19.0), "axis {axis}: χ² {chi2}");
     }
-    assert!(all.iter().all(|p| (p.length() - 1.0).abs() < 1e-6));
+    assert!(places.iter().all(|p| (p.length() - 1.0).abs() < 1e-6));
     let report = sampler.report();
     assert!((report.area / (4.0 * PI) - 1.0).abs() < 0.03, "{report:?}");
     // The same lines hold the same roots, however finely they are looked at.
@@ -47,10 +47,10 @@ fn pb13_lines_are_uniform_on_spheres_and_ellipsoids() {
     let low = below(-3.0);
     let high = below(3.0);
     let mut bins = [0u64; 20];
-    let all = positions(&sampler, 1);
-    all.iter().for_each(|p| bins[((below(p.z) - low) / (high - low) * 20.0).clamp(0.0, 19.0) as usize] += 1);
+    let places = positions(&sampler, 1);
+    places.iter().for_each(|p| bins[((below(p.z) - low) / (high - low) * 20.0).clamp(0.0, 19.0) as usize] += 1);
     let chi2 = chi2_equal(&bins);
-    assert!(chi2 < chi2_limit(19.0), "χ² {chi2} of {}", all.len());
+    assert!(chi2 < chi2_limit(19.0), "χ² {chi2} of {}", places.len());
 }
 
 #[test]
@@ -59,10 +59,10 @@ fn pb13_lines_are_uniform_on_tori_and_across_edges() {
     let field = Field::Torus { large: 0.7, small: 0.3 };
     let sampler =
         LineSampler::new(&boxed(&field, 1.1), &LineParams { resolution: 32 }, &params(0.5, 4e-5), None).unwrap();
-    let all = positions(&sampler, 0);
+    let places = positions(&sampler, 0);
     let mut tube = [0u64; 40];
     let mut ring = [0u64; 40];
-    for p in &all {
+    for p in &places {
         let phi = p.z.atan2(p.x.hypot(p.y) - 0.7);
         let share = 0.5 + (phi + 3.0 / 7.0 * phi.sin()) / (2.0 * PI);
         tube[((share * 40.0) as usize).min(39)] += 1;
@@ -73,15 +73,15 @@ fn pb13_lines_are_uniform_on_tori_and_across_edges() {
         assert!(chi2 < chi2_limit(39.0), "{name}: χ² {chi2}");
     }
     let expected = 4.0 * PI * PI * 0.7 * 0.3 * 2f64.ln() / 4e-5;
-    assert!((all.len() as f64 - expected).abs() < 4.5 * expected.sqrt(), "{} for {expected}", all.len());
+    assert!((places.len() as f64 - expected).abs() < 4.5 * expected.sqrt(), "{} for {expected}", places.len());
     let report = sampler.report();
     assert_eq!((report.graphs, report.missed()), (report.leaves, 0.0), "{report:?}");
     // The six faces of a cube, in rings of equal area around their middles: edges are where graphs end.
     let sampler =
         LineSampler::new(&boxed(&Field::Cube, 0.8), &LineParams { resolution: 20 }, &params(0.5, 4e-5), None).unwrap();
-    let all = positions(&sampler, 0);
+    let places = positions(&sampler, 0);
     let mut bins = [0u64; 60];
-    for p in &all {
+    for p in &places {
         let axis = (0..3).max_by(|a, b| p[*a].abs().total_cmp(&p[*b].abs())).unwrap();
         let across = (0..3).filter(|a| *a != axis).map(|a| p[a].abs()).fold(0.0, f64::max);
         let ring = ((across * across * 40.0) as usize).min(9);
@@ -91,7 +91,7 @@ fn pb13_lines_are_uniform_on_tori_and_across_edges() {
     // Up to three crossings of a line near an edge come together.
     assert!(chi2 < 1.1 * chi2_limit(59.0), "χ² {chi2}: {bins:?}");
     let expected = 6.0 * 2f64.ln() / 4e-5;
-    assert!((all.len() as f64 - expected).abs() < 4.5 * expected.sqrt(), "{} for {expected}", all.len());
+    assert!((places.len() as f64 - expected).abs() < 4.5 * expected.sqrt(), "{} for {expected}", places.len());
 }
 
 #[test]
@@ -159,10 +159,10 @@ fn pb09_double_roots_are_found_where_lines_touch_them() {
     let sampler =
         LineSampler::new(&boxed(&Field::Double, 1.1), &LineParams { resolution: 24 }, &params(0.5, 1e-4), None)
             .unwrap();
-    let all = positions(&sampler, 0);
-    assert!(all.iter().all(|p| (p.length() - 1.0).abs() < 1e-4), "all on the sphere");
+    let places = positions(&sampler, 0);
+    assert!(places.iter().all(|p| (p.length() - 1.0).abs() < 1e-4), "all on the sphere");
     let expected = 4.0 * PI * 0.5f64.ln().abs() / 1e-4;
-    assert!((all.len() as f64 - expected).abs() < 6.0 * expected.sqrt(), "{} for {expected}", all.len());
+    assert!((places.len() as f64 - expected).abs() < 6.0 * expected.sqrt(), "{} for {expected}", places.len());
     let report = sampler.report();
     // The survey's roots are few.
     let spread = 4.0 / (report.roots as f64).sqrt();
@@ -173,8 +173,8 @@ fn pb09_double_roots_are_found_where_lines_touch_them() {
 fn pb10_the_apex_of_a_cone_is_no_trouble() {
     let sampler =
         LineSampler::new(&boxed(&Field::Cone, 1.0), &LineParams { resolution: 20 }, &params(0.5, 1e-3), None).unwrap();
-    let all = positions(&sampler, 0);
-    assert!(all.iter().all(|p| p.is_finite() && p.abs().max_element() <= 1.0));
+    let places = positions(&sampler, 0);
+    assert!(places.iter().all(|p| p.is_finite() && p.abs().max_element() <= 1.0));
     // Two cones of height 1 and slope 1: 2·π·√2 within the box, as its corners are out of their reach.
     let report = sampler.report();
     assert!((report.area / (2.0 * PI * 2f64.sqrt()) - 1.0).abs() < 0.04, "{report:?}");
@@ -187,9 +187,9 @@ fn pb12_components_get_particles_by_their_areas() {
     let field = Field::Two { radius: [0.3, 0.6], apart: 0.7 };
     let surface = ImplicitSurface { bounds: DAabb::new(DVec3::splat(-1.4), DVec3::splat(1.4)), ..boxed(&field, 1.0) };
     let sampler = LineSampler::new(&surface, &LineParams { resolution: 32 }, &params(0.5, 1e-4), None).unwrap();
-    let all = positions(&sampler, 0);
-    let left = all.iter().filter(|p| p.x < -0.2).count() as f64;
-    let expected = all.len() as f64 * 0.2;
+    let places = positions(&sampler, 0);
+    let left = places.iter().filter(|p| p.x < -0.2).count() as f64;
+    let expected = places.len() as f64 * 0.2;
     assert!((left - expected).abs() < 4.5 * (expected * 2.0).sqrt(), "{left} for {expected}");
     // Two sheets far nearer to each other than a cell.
     let field = Field::Sheets { gap: 5e-4 };
@@ -222,20 +222,20 @@ fn open_surfaces_and_densities_take_their_share() {
     let upper = |p: DVec3| p.z > 0.0;
     let surface = ImplicitSurface { inside: Some(&upper), ..boxed(&Field::UNIT, 1.1) };
     let sampler = LineSampler::new(&surface, &LineParams { resolution: 24 }, &params(0.5, 1e-4), None).unwrap();
-    let all = positions(&sampler, 0);
-    assert!(all.iter().all(|p| p.z > 0.0));
+    let places = positions(&sampler, 0);
+    assert!(places.iter().all(|p| p.z > 0.0));
     let expected = 2.0 * PI * 0.5f64.ln().abs() / 1e-4;
     // Two crossings on a line widen the spread a little.
-    assert!((all.len() as f64 - expected).abs() < 6.0 * expected.sqrt(), "{} for {expected}", all.len());
+    assert!((places.len() as f64 - expected).abs() < 6.0 * expected.sqrt(), "{} for {expected}", places.len());
     // Density x, 0 for x < 0: the mean over the sphere is 1/4.
     let density = Density { field: &Field::Ramp, max: 1.0 };
     let sampler =
         LineSampler::new(&boxed(&Field::UNIT, 1.1), &LineParams { resolution: 24 }, &params(0.5, 1e-4), Some(density))
             .unwrap();
-    let all = positions(&sampler, 0);
+    let places = positions(&sampler, 0);
     let expected = 4.0 * PI * 0.25 * 0.5f64.ln().abs() / 1e-4;
-    assert!((all.len() as f64 - expected).abs() < 6.0 * expected.sqrt(), "{} for {expected}", all.len());
-    let mean = all.iter().map(|p| p.x).sum::<f64>() / all.len() as f64;
+    assert!((places.len() as f64 - expected).abs() < 6.0 * expected.sqrt(), "{} for {expected}", places.len());
+    let mean = places.iter().map(|p| p.x).sum::<f64>() / places.len() as f64;
     assert!((mean - 2.0 / 3.0).abs() < 0.01, "∫x²/∫x = 2/3, found {mean}");
 }
 

@@ -233,8 +233,8 @@ fn pb13_pb14_shares_of_surfaces() {
     assert!((number - expected).abs() < 4.0 * expected.sqrt(), "{number} of {expected}");
     // Where nothing is said of a place its particles stay as they are.
     let bare = MeshSampler::new(mesh, &half(COARSE), None).unwrap();
-    let all = positions(&bare, 3);
-    assert_eq!(positions(&ShownSampler::new(Box::new(bare), Box::new(|_| None), 5), 3), all);
+    let places = positions(&bare, 3);
+    assert_eq!(positions(&ShownSampler::new(Box::new(bare), Box::new(|_| None), 5), 3), places);
 }
 
 #[test]

@@ -28,9 +28,9 @@ fn main() -> std::io::Result<()> {
     };
     let textured = every_sample::textured().into_iter().map(|(name, content, _)| (name, content));
     let square = ("text.gltf", read_samples::square_gltf());
-    let all = every_sample::samples().into_iter().chain(every_sample::text_samples());
-    let all = all.chain(every_sample::bodies()).chain(textured).chain([square]);
-    for (name, content) in all {
+    let files = every_sample::samples().into_iter().chain(every_sample::text_samples());
+    let files = files.chain(every_sample::bodies()).chain(textured).chain([square]);
+    for (name, content) in files {
         let folder = Path::new(&folder).join(feature(name));
         std::fs::create_dir_all(&folder)?;
         std::fs::write(folder.join(name), content)?;

@@ -378,8 +378,9 @@ fn a_volume_is_in_memory_once() {
 
 #[test]
 fn memory_is_asked_for_before_it_is_taken_and_comes_back() {
-    let all = samples().into_iter().chain(text_samples()).chain(textured().into_iter().map(|(name, of, _)| (name, of)));
-    for (name, content) in all.chain(bodies()) {
+    let files =
+        samples().into_iter().chain(text_samples()).chain(textured().into_iter().map(|(name, of, _)| (name, of)));
+    for (name, content) in files.chain(bodies()) {
         let within = |bytes: u64| ReadParams { memory: MemoryAccount::new(bytes), ..ReadParams::default() };
         let ample = within(1 << 30);
         let (loaded, _) = bytes(name, &content, &ample, None).unwrap_or_else(|e| panic!("{name}: {e}"));

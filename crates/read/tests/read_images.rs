@@ -128,10 +128,10 @@ fn bi36_scanlines_with_impossible_runs_are_refused_with_their_place() {
 fn bi36_openexr_without_colours_deep_cropped_or_with_what_is_no_radiance() {
     let lines = (Compression::ZIP16, Blocks::ScanLines);
     for value in [f32::NAN, f32::INFINITY, -0.25] {
-        let of = |x: usize, y: usize| if [x, y] == [7, 3] { [1.0, value, 1.0] } else { [1.0; 3] };
+        let pixel = |x: usize, y: usize| if [x, y] == [7, 3] { [1.0, value, 1.0] } else { [1.0; 3] };
         let beginning =
             format!("a.exr: expected radiance: finite numbers ≥ 0, found {value} in channel G of pixel (7, 3)");
-        refused("a.exr", &exr_of(layer_of(["R", "G", "B"], lines, of)), &beginning);
+        refused("a.exr", &exr_of(layer_of(["R", "G", "B"], lines, pixel)), &beginning);
     }
     let depths = exr_of(layer_of(["Z", "normal.X", "Y"], lines, radiance));
     refused("a.exr", &depths, "a.exr: expected channels R, G and B, found 'Y Z normal.X'");

@@ -64,9 +64,9 @@ fn faces_have_the_diffuse_colours_of_their_materials() {
     let (mesh, _) = read(&folder, &OBJ.replace("usemtl", "g"));
     assert_eq!((mesh.color.len(), mesh.position.len()), (0, 4));
     // Colours of vertices are kept before those of materials.
-    let own = OBJ.replace("v 0 0 0", "v 0 0 0 0 0 1").replace("v 1 0 0", "v 1 0 0 0 0 1");
-    let own = own.replace("v 1 1 0", "v 1 1 0 0 0 1").replace("v 0 1 0", "v 0 1 0 0 0 1");
-    let (mesh, notes) = read(&folder, &own);
+    let colored = OBJ.replace("v 0 0 0", "v 0 0 0 0 0 1").replace("v 1 0 0", "v 1 0 0 0 0 1");
+    let colored = colored.replace("v 1 1 0", "v 1 1 0 0 0 1").replace("v 0 1 0", "v 0 1 0 0 0 1");
+    let (mesh, notes) = read(&folder, &colored);
     assert_eq!(
         (colors(&mesh)[0], notes.unused),
         ([[0.0, 0.0, 1.0]; 3], ["Ns", "vt", "Kd", "d"].map(str::to_owned).to_vec())

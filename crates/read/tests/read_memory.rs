@@ -34,7 +34,7 @@ fn limit(read: Result<(Loaded, Notes), ReadError>) -> ReadError {
 fn textured(count: usize, views: usize, image_of: impl Fn(usize) -> usize) -> Vec<u8> {
     let picture = image(SIDE, ImageFormat::Png);
     let binary = [square(&[]), picture.repeat(views)].concat();
-    let list = |n: usize, one: &dyn Fn(usize) -> String| (0..n).map(one).collect::<Vec<_>>().join(",");
+    let list = |n: usize, item: &dyn Fn(usize) -> String| (0..n).map(item).collect::<Vec<_>>().join(",");
     let primitive = |k: usize| {
         format!(r#"{{"attributes":{{"POSITION":0,"NORMAL":1,"TEXCOORD_0":2}},"indices":3,"material":{k},"mode":5}}"#)
     };
@@ -120,7 +120,7 @@ fn nodes_that_repeat_a_mesh_are_refused_before_the_first_is_read() {
     let nodes = 3000;
     let count = 20_000;
     let corners: Vec<u8> = (0..count * 3).flat_map(|k: u32| ((k * 7919 % 1000) as f32).to_le_bytes()).collect();
-    let list = |one: &dyn Fn(usize) -> String| (0..nodes).map(one).collect::<Vec<_>>().join(",");
+    let list = |item: &dyn Fn(usize) -> String| (0..nodes).map(item).collect::<Vec<_>>().join(",");
     let json = format!(
         r#"{{"asset":{{"version":"2.0"}},"scenes":[{{"nodes":[{}]}}],"nodes":[{}],"meshes":[{{"primitives":[{{"attributes":{{"POSITION":0}}}}]}}],
 "accessors":[{{"bufferView":0,"componentType":5126,"count":{count},"type":"VEC3"}}],"bufferViews":[{{"buffer":0,"byteLength":{}}}],

@@ -176,9 +176,9 @@ fn colours_become_their_luma_and_are_said_to() {
     for n in [3, 4] {
         let kinds = if n == 3 { "RGB-color" } else { "RGBA-color" };
         let field = |kind: &str| format!("sizes: {n} 2 1 1\nkinds: {kind} domain domain domain");
-        let of = if n == 3 { (128, 24) } else { (2304, 32) };
+        let kind_and_bits = if n == 3 { (128, 24) } else { (2304, 32) };
         for (name, content) in [
-            ("a.nii", nifti_of([3, 2, 1, 1, 1, 1, 1, 1], of, &colors(n))),
+            ("a.nii", nifti_of([3, 2, 1, 1, 1, 1, 1, 1], kind_and_bits, &colors(n))),
             ("a.nrrd", nrrd_of(&field(kinds), &colors(n))),
             ("vector.nrrd", nrrd_of(&field("vector"), &colors(n))),
             ("a.mha", with_channels(n, colors(n))),

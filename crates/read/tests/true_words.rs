@@ -275,8 +275,8 @@ fn what_a_file_states_and_nobody_draws_is_said() {
         let names = "f_dc_0 f_dc_1 f_dc_2 opacity scale_0 scale_1 scale_2 rot_0 rot_1 rot_2 rot_3";
         let properties: String =
             ["x", "y", "z"].into_iter().chain(names.split(' ')).map(|n| format!("property float {n}\n")).collect();
-        let one = |i: usize| format!("{} {} {} 0 0 0 1 {scale} {scale} {scale} 1 0 0 0\n", i % 5, i / 5 % 5, i / 25);
-        let records: String = (0..125).map(one).collect();
+        let record = |i: usize| format!("{} {} {} 0 0 0 1 {scale} {scale} {scale} 1 0 0 0\n", i % 5, i / 5 % 5, i / 25);
+        let records: String = (0..125).map(record).collect();
         format!("ply\nformat ascii 1.0\nelement vertex 125\n{properties}end_header\n{records}")
     };
     assert!(

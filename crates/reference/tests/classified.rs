@@ -101,8 +101,12 @@ fn bumpy() -> Classified {
 fn sums_of_steps_tend_to_the_integral_with_the_second_order() {
     let volume = bumpy();
     let (color, normal) = (|p: DVec3| volume.color(p), |p: DVec3| volume.normal(p));
-    let own = facets(&normal);
-    let medium = Medium { color: Some(&color), facets: Some(own), ..Medium::new(Density::Volume(&volume), 1.0, 0.5) };
+    let facets_of_volume = facets(&normal);
+    let medium = Medium {
+        color: Some(&color),
+        facets: Some(facets_of_volume),
+        ..Medium::new(Density::Volume(&volume), 1.0, 0.5)
+    };
     let to_light = DVec3::new(0.5, 0.3, 0.7).normalize();
     let light = LightSource::Directional { direction: -to_light, irradiance: [2.0; 3] };
     // Steps of one width for the eye and for the light, each by its middle, and the formulas once more.
@@ -120,11 +124,12 @@ fn sums_of_steps_tend_to_the_integral_with_the_second_order() {
             let n = volume.normal(p);
             if step > 0.0 && n != DVec3::ZERO {
                 let cosine = n.dot(to_light);
-                let share = if cosine > 0.0 { 1.0 - own.transmission } else { own.transmission };
+                let share =
+                    if cosine > 0.0 { 1.0 - facets_of_volume.transmission } else { facets_of_volume.transmission };
                 let mirrored = n * (2.0 * cosine) - to_light;
-                let lobe = mirrored.dot(-ray.direction).max(0.0).powf(own.shininess) * cosine.max(0.0);
-                let f = own.diffuse * volume.color(p)[1] * share * cosine.abs() / PI
-                    + own.specular * 14.0 / (2.0 * PI) * lobe;
+                let lobe = mirrored.dot(-ray.direction).max(0.0).powf(facets_of_volume.shininess) * cosine.max(0.0);
+                let f = facets_of_volume.diffuse * volume.color(p)[1] * share * cosine.abs() / PI
+                    + facets_of_volume.specular * 14.0 / (2.0 * PI) * lobe;
                 // The middle of the step, for the eye too.
                 sum += step * f * 2.0 * (-(tau + 0.5 * step) - optical_depth(p, steps)).exp();
             }

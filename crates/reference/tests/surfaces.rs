@@ -160,7 +160,7 @@ fn closest_any_and_all_hits_are_those_of_brute_force() {
     for far in [DVec3::ZERO, DVec3::splat(1e7)] {
         let mesh = Mesh { origin: far, ..mesh.clone() };
         let visibility = Visibility::new(&[&mesh]).unwrap();
-        let mut all = Vec::new();
+        let mut hits = Vec::new();
         let mut met = 0;
         for i in 0..400 {
             let u = |k| rng::unit(21, 0, i, k) - 0.5;
@@ -169,8 +169,8 @@ fn closest_any_and_all_hits_are_those_of_brute_force() {
             let target = DVec3::new(u(3), u(4), u(5)) * 0.8;
             let ray = Ray { origin: far + from, direction: (target - from).normalize() };
             let expected = brute_force(&mesh, &ray);
-            visibility.hits(&ray, f64::INFINITY, &mut all);
-            let ids: Vec<u32> = all.iter().map(|h| h.triangle).collect();
+            visibility.hits(&ray, f64::INFINITY, &mut hits);
+            let ids: Vec<u32> = hits.iter().map(|h| h.triangle).collect();
             assert_eq!(ids, expected.iter().map(|h| h.1).collect::<Vec<_>>(), "ray {i} from {far}");
             let closest = visibility.closest(&ray, f64::INFINITY);
             assert_eq!(closest.map(|h| h.triangle), expected.first().map(|h| h.1), "ray {i}");
@@ -190,12 +190,12 @@ fn aligned_rays_cross_a_closed_box_twice() {
     // Rays through corners, edges and diagonals, parallel to axes: no leak, no double count.
     let mesh = box_mesh(Vec3::splat(-1.0), Vec3::splat(1.0));
     let visibility = Visibility::new(&[&mesh]).unwrap();
-    let mut all = Vec::new();
+    let mut hits = Vec::new();
     for i in -3..=3 {
         for j in -3..=3 {
             let ray = Ray { origin: DVec3::new(f64::from(i) / 4.0, f64::from(j) / 4.0, 5.0), direction: DVec3::NEG_Z };
-            visibility.hits(&ray, f64::INFINITY, &mut all);
-            let t: Vec<f64> = all.iter().map(|h| h.t).collect();
+            visibility.hits(&ray, f64::INFINITY, &mut hits);
+            let t: Vec<f64> = hits.iter().map(|h| h.t).collect();
             assert_eq!(t, [4.0, 6.0], "{i} {j}");
         }
     }

@@ -21,11 +21,11 @@ fn absorbances_of_a_slanted_layer_are_even_where_transmittances_are_not() {
     let map = ShadowMap::build(&Scene::from(&cloud), &light, &params, None).unwrap();
     let numbers = |number: &dyn Fn(&Receiver) -> f32| -> [f32; 2] {
         let places = (9..16).flat_map(|x| (9..16).map(move |z| Vec3::new(x as f32, -0.5, z as f32)));
-        let all: Vec<f32> = places
+        let found: Vec<f32> = places
             .map(|position| number(&Receiver { position, normal: Vec3::ZERO, radius, kind: SplatKind::Medium }))
             .collect();
-        let mean = all.iter().sum::<f32>() / all.len() as f32;
-        [mean, all.iter().fold(0.0, |most, a| f32::max(most, (a - mean).abs()))]
+        let mean = found.iter().sum::<f32>() / found.len() as f32;
+        [mean, found.iter().fold(0.0, |most, a| f32::max(most, (a - mean).abs()))]
     };
     let [mean, ripple] = numbers(&|place| map.absorbance(place)[0]);
     let [brightest, uneven] = numbers(&|place| -map.transmittance(place)[0].ln());

@@ -23,10 +23,10 @@ fn ts16_every_cell_has_the_absorbance_of_a_ball_about_the_lamp() {
     let cloud = smooth_ball(0.05, 1.5, 1.0);
     for (resolution, bound) in SIZES {
         let map = octahedral(&cloud, resolution);
-        let own = |cell| f64::from(map.list(cell).last().map_or(0.0, |e| e.1[0]));
-        let mean = (0..map.cells()).map(own).sum::<f64>() / f64::from(map.cells());
+        let last = |cell| f64::from(map.list(cell).last().map_or(0.0, |e| e.1[0]));
+        let mean = (0..map.cells()).map(last).sum::<f64>() / f64::from(map.cells());
         let (error, at) = (0..map.cells()).fold((0.0f64, 0), |m, cell| {
-            let error = own(cell) / mean - 1.0;
+            let error = last(cell) / mean - 1.0;
             if error.abs() > m.0.abs() { (error, cell) } else { m }
         });
         let Table::Octahedral(table) = map.table() else { panic!("not octahedral") };

@@ -220,8 +220,8 @@ fn cross_section(map: &ShadowMap) -> f64 {
         Table::PolarAzimuth(m) => m.measure(cell),
         Table::Planar(m) => m.measure(cell),
     };
-    let own = |cell| map.list(cell).last().map_or(0.0, |e| f64::from(e.1[0])) * measure(cell) * 4.0;
-    (0..map.cells()).map(own).sum()
+    let cell_absorbance = |cell| map.list(cell).last().map_or(0.0, |e| f64::from(e.1[0])) * measure(cell) * 4.0;
+    (0..map.cells()).map(cell_absorbance).sum()
 }
 
 #[test]
@@ -416,9 +416,9 @@ fn papers_model_goes_dark_at_an_absorbance_of_two() {
     }
     let params = Params { absorbance: AbsorbanceModel::Paper, resolution: Resolution::Cells(64), ..Params::default() };
     let map = build(&cloud, &point_light(DVec3::ZERO), &params);
-    let own = 1.0 - (-1f32).exp();
+    let depth = 1.0 - (-1f32).exp();
     for k in 0..8 {
-        let expected = if k as f32 * own > 2.0 { 0.0 } else { (-own * k as f32).exp() };
+        let expected = if k as f32 * depth > 2.0 { 0.0 } else { (-depth * k as f32).exp() };
         let target = Receiver { kind: SplatKind::Medium, ..receiver(&cloud, k) };
         let light = map.transmittance(&target)[0];
         assert!((light - expected).abs() < 1e-5, "behind {k}: {light}, not {expected}");

@@ -49,11 +49,11 @@ fn look_ups_refuse_what_they_have_no_room_for() {
     let receivers = [crate::common::probe(splat_core::glam::Vec3::X); 11];
     let refused = recorded.receivers(&map, &uploads, &receivers).unwrap_err();
     assert_eq!(refused, Error::Overflow(Overflow { what: "receivers", needed: 11, had: 10 }));
-    let own = recorded.receivers(&map, &uploads, &receivers[..10]).unwrap();
-    assert_eq!(recorded.inputs(None, &own).len() + 5, recorded.inputs(Some(&uploads), &own).len());
-    let short = recorded.transmittances(&[0; 36], &own).unwrap_err();
+    let ten = recorded.receivers(&map, &uploads, &receivers[..10]).unwrap();
+    assert_eq!(recorded.inputs(None, &ten).len() + 5, recorded.inputs(Some(&uploads), &ten).len());
+    let short = recorded.transmittances(&[0; 36], &ten).unwrap_err();
     assert_eq!(short, Error::ReadBack { what: "lights", expected: 40, found: 36 });
-    assert_eq!(recorded.transmittances(&[0; 40], &own).unwrap(), [[0.0; 3]; 10]);
+    assert_eq!(recorded.transmittances(&[0; 40], &ten).unwrap(), [[0.0; 3]; 10]);
     // Polar angles are the CPU's.
     let polar = Params { mapping: tsm::MappingChoice::PolarAzimuth, ..Params::default() };
     let light = point_light(DVec3::new(0.3, 2.5, 0.2));
@@ -63,12 +63,14 @@ fn look_ups_refuse_what_they_have_no_room_for() {
 #[test]
 fn the_lists_that_look_ups_are_given_are_those_of_the_map() {
     let light = point_light(DVec3::new(0.3, 2.5, 0.2));
-    let all = mixed(4000, DVec3::ZERO);
+    let mixed_cloud = mixed(4000, DVec3::ZERO);
     for kinds in
         [&[SplatKind::Medium, SplatKind::Surface, SplatKind::Opaque][..], &[SplatKind::Medium], &[SplatKind::Surface]]
     {
         let mut cloud = splat_core::Cloud::new(DVec3::ZERO);
-        (0..all.len()).filter(|i| kinds.contains(&all.kind[*i])).for_each(|i| cloud.push(&all.get(i)));
+        (0..mixed_cloud.len())
+            .filter(|i| kinds.contains(&mixed_cloud.kind[*i]))
+            .for_each(|i| cloud.push(&mixed_cloud.get(i)));
         let map = common::build(&cloud, &light, &Params::default());
         let shared = compare_lists(&map, kinds.contains(&SplatKind::Opaque));
         assert!((shared > 100) == (kinds.len() > 1), "{kinds:?}: {shared} entries beside others of the same cell");
@@ -147,12 +149,12 @@ fn too_little_room_says_how_much() {
 #[test]
 fn batches_are_all_cells_in_order_and_small_enough() {
     let deposits = deposits();
-    let all: u64 = deposits.entries().iter().sum();
-    for (entries, cells) in [(all as u32 / 4, 4000), (all as u32, 10_000), (all as u32 / 3, 1 << 30)] {
+    let total: u64 = deposits.entries().iter().sum();
+    for (entries, cells) in [(total as u32 / 4, 4000), (total as u32, 10_000), (total as u32 / 3, 1 << 30)] {
         let batches = deposits.batches(Capacities { entries, cells, channels: 1 }).unwrap();
         assert!(batches.len() > 2, "{}", batches.len());
         assert!(batches.iter().all(|b| b.entries() <= entries.into() && b.cells() <= cells.into()));
-        assert_eq!(batches.iter().map(|b| b.entries()).sum::<u64>(), all);
+        assert_eq!(batches.iter().map(|b| b.entries()).sum::<u64>(), total);
     }
     let refused = deposits.batches(Capacities { entries: 3, cells: 1 << 30, channels: 1 });
     assert!(matches!(refused, Err(Error::Overflow(Overflow { what: "entries", had: 3, .. }))), "{refused:?}");
@@ -299,7 +301,7 @@ fn what_devices_do_not_deposit_is_refused_or_given() {
     let absorbance = splat_core::optics::AbsorbanceModel::Paper;
     let paper = casting(&Params { absorbance, ..Params::default() }).unwrap();
     assert!(paper.casters() == 0 && paper.given() > 0);
-    let all = deposits().entries().iter().sum::<u64>();
+    let total = deposits().entries().iter().sum::<u64>();
     let default = casting(&Params::default()).unwrap();
-    assert!(default.given() < all && u64::from(default.expected()) * 2 > all);
+    assert!(default.given() < total && u64::from(default.expected()) * 2 > total);
 }

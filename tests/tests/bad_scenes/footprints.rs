@@ -47,7 +47,7 @@ fn images_are_read_and_refused_with_file_key_and_hint() {
     std::fs::copy(path("grey.png"), path("some/b.png")).unwrap();
     std::fs::copy(path("grey.png"), path("some/a.PNG")).unwrap();
     let file = path("s.toml");
-    let of = |list: &str, more: &str| {
+    let parsed = |list: &str, more: &str| {
         let text = SCENE.replacen("version = 1", &format!("version = 1\nfootprints = {list}"), 1);
         parse(
             &file,
@@ -71,12 +71,12 @@ fn images_are_read_and_refused_with_file_key_and_hint() {
         ("[{ image = \"s.toml\" }]", "", "s.toml", ""),
         ("[3, { image = \"grey.png\" }]", "footprint = 1", "a medium has no image as a footprint", "a formula"),
     ] {
-        let error = of(list, more).expect_err(list);
+        let error = parsed(list, more).expect_err(list);
         assert_eq!(error.exit_code(), 3, "{error}");
         assert!(error.to_string().contains(expected) && error.hint().contains(hint), "{error}\n{}", error.hint());
     }
     // The folder's images follow one another by name, whatever the case of their endings.
-    let scene = of("[3, { images = \"some\" }, 2]", "").unwrap();
+    let scene = parsed("[3, { images = \"some\" }, 2]", "").unwrap();
     assert_eq!(scene.footprints.layers().iter().map(|l| l.cutoff).collect::<Vec<_>>(), [3.0, 3.0, 3.0, 2.0]);
     let named: Vec<_> = scene.footprint_files.iter().map(|path| path.file_name().unwrap()).collect();
     assert_eq!(named, ["a.PNG", "b.png"]);

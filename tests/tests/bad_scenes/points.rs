@@ -69,14 +69,17 @@ fn fields_are_shown_by_surfaces_that_say_how() {
     let extinct = "transfer = [{ value = 0, color = [1, 1, 1], extinction = 1 }]";
     surface(&format!("{field}\n{extinct}"), "a surface has no extinction");
     surface(&format!("{field}\n{ramp}\nunit_length = 1"), "`unit_length` belongs to");
-    let of =
+    let in_place_of_mesh =
         |source: &str, expected: &str| refused("mesh = \"a.ply\"", &format!("{source}\n{field}\n{ramp}"), expected);
-    of(
+    in_place_of_mesh(
         "medium_ball = { center = [0, 0, 0], radius = 1, extinction = 1, spacing = 0.1 }",
         "`field` belongs to surfaces",
     );
-    of("slice = { volume = \"b.nii\", center = [0, 0, 0], normal = [0, 0, 1] }", "a slice shows the values of its own");
-    of("points = \"a.las\"\ncolor_by = { column = \"z\" }", "`field` and `color_by` exclude each other");
+    in_place_of_mesh(
+        "slice = { volume = \"b.nii\", center = [0, 0, 0], normal = [0, 0, 1] }",
+        "a slice shows the values of its own",
+    );
+    in_place_of_mesh("points = \"a.las\"\ncolor_by = { column = \"z\" }", "`field` and `color_by` exclude each other");
 }
 
 #[test]

@@ -13,8 +13,9 @@ const PIXELS: f64 = 96.0 * 54.0;
 /// A small size in the shape of a scene's own picture, which shows what that shows.
 fn size(scene: &Path) -> String {
     let text = std::fs::read_to_string(scene).unwrap();
-    let own = text.lines().find_map(|line| line.strip_prefix("size = [")?.strip_suffix(']')?.split_once(", ")).unwrap();
-    let [width, height] = [own.0, own.1].map(|n| n.parse::<f64>().unwrap());
+    let sides =
+        text.lines().find_map(|line| line.strip_prefix("size = [")?.strip_suffix(']')?.split_once(", ")).unwrap();
+    let [width, height] = [sides.0, sides.1].map(|n| n.parse::<f64>().unwrap());
     let scale = (PIXELS / (width * height)).sqrt();
     format!("{:.0}x{:.0}", width * scale, height * scale)
 }
@@ -43,7 +44,7 @@ fn memory_stays_within_what_is_explained_effects_sum_to_beauty_and_nothing_is_do
         let explained = explained(&scene);
         let warnings = explained["warnings"].as_array().unwrap().iter().map(|w| w.as_str().unwrap());
         let warnings: Vec<_> =
-            warnings.filter(|w| ["light", "camera", "picture"].iter().any(|of| w.contains(of))).collect();
+            warnings.filter(|w| ["light", "camera", "picture"].iter().any(|word| w.contains(word))).collect();
         assert!(warnings.is_empty(), "{name}: {warnings:?}");
 
         let bytes = explained["memory_bytes"].as_u64().unwrap();

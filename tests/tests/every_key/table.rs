@@ -90,8 +90,8 @@ impl Entry {
     }
 
     pub(crate) fn expected(&self, source: &str, technique: &str) -> Expected {
-        let of = |(which, by, _): &&(Which, &[&str], Expected)| which.has(source) && by.contains(&technique);
-        self.but.iter().find(of).map_or(Expected::Changes, |b| b.2)
+        let applies = |(which, by, _): &&(Which, &[&str], Expected)| which.has(source) && by.contains(&technique);
+        self.but.iter().find(applies).map_or(Expected::Changes, |b| b.2)
     }
 
     pub(super) fn with(self, with: &'static [&'static str]) -> Self {

@@ -23,11 +23,11 @@ fn every_disc_that_a_group_leaves_open_joins_it() {
         assert!(places.iter().all(|&place| groups.by_disc()[place as usize] != group));
         assert!(places.is_sorted_by(|a, b| a < b));
     }
-    let all: usize = added.iter().map(Vec::len).sum();
-    assert!(all > 0 && all < 2 * cloud.len(), "{all}");
+    let count: usize = added.iter().map(Vec::len).sum();
+    assert!(count > 0 && count < 2 * cloud.len(), "{count}");
     let none = DuplicateParams { most_clipped: 0.0, ..params };
     let fewer: usize = duplicates(&graph, &groups, &none, None).expect("in range").iter().map(Vec::len).sum();
-    assert!(fewer < all, "{fewer} of {all}");
+    assert!(fewer < count, "{fewer} of {count}");
 }
 
 /// Two discs that do not touch and are of two groups join each the other's.

@@ -107,9 +107,9 @@ fn discs_that_hardly_touch_or_hardly_do_not_are_told_apart_in_f64() {
 #[test]
 fn each_relaxation_removes_its_edges_and_no_others() {
     let cloud = mixed(500);
-    let all = assert_same(&cloud, Relaxation::default());
+    let edges = assert_same(&cloud, Relaxation::default());
     let opposite = assert_same(&cloud, Relaxation { opposite: true, ..Relaxation::default() });
-    assert!(opposite < all * 2 / 3, "{opposite} of {all}");
+    assert!(opposite < edges * 2 / 3, "{opposite} of {edges}");
     let mut flat = flat();
     let none = assert_same(&flat, Relaxation { coplanar: Some(Coplanar::default()), ..Relaxation::default() });
     assert_eq!(none, 0, "one plane and one colour");

@@ -24,13 +24,13 @@ fn members(cloud: &Cloud, recipe: Recipe) -> Membership {
 fn coverage_adds_members_or_reach_and_changes_no_group() {
     let cloud = ball();
     for method in METHODS {
-        let own = members(&cloud, Recipe { method, ..RECIPE });
+        let plain = members(&cloud, Recipe { method, ..RECIPE });
         let further = |m: &Membership| (0..cloud.len()).map(|i| m.groups().further(i).len()).sum::<usize>();
         let reach = |m: &Membership| (0..cloud.len()).map(|i| m.reach(i)).fold(0.0, f32::max);
-        assert_eq!((own.discs(), further(&own), reach(&own)), (cloud.len(), 0, 1.0), "{method:?}");
+        assert_eq!((plain.discs(), further(&plain), reach(&plain)), (cloud.len(), 0, 1.0), "{method:?}");
         for coverage in [Coverage::Duplicates, Coverage::Enlarged, Coverage::Bound] {
             let covers = members(&cloud, Recipe { method, coverage, ..RECIPE });
-            assert_eq!(covers.groups().by_disc(), own.groups().by_disc(), "{method:?} {coverage:?}");
+            assert_eq!(covers.groups().by_disc(), plain.groups().by_disc(), "{method:?} {coverage:?}");
             let adds = coverage == Coverage::Duplicates;
             assert_eq!((further(&covers) > cloud.len() / 10, reach(&covers) > 1.1), (adds, !adds), "{coverage:?}");
             for i in 0..cloud.len() {
@@ -46,11 +46,11 @@ fn coverage_adds_members_or_reach_and_changes_no_group() {
 fn an_object_that_moved_has_its_groups_again() {
     let cloud = mixed(3000);
     let recipe = Recipe { coverage: Coverage::Duplicates, ..RECIPE };
-    let own = members(&cloud, recipe);
+    let grouped = members(&cloud, recipe);
     let places: Vec<DVec3> = cloud.position.iter().map(|p| p.as_dvec3()).collect();
     let radius = f64::from(cloud.radius.iter().copied().fold(f32::INFINITY, f32::min));
-    let kept = KeptGroups::new(&places, radius, own.clone());
-    assert_eq!(kept.for_discs(&places, radius), Some(own.clone()));
+    let kept = KeptGroups::new(&places, radius, grouped.clone());
+    assert_eq!(kept.for_discs(&places, radius), Some(grouped.clone()));
     // Elsewhere, rounded there, back again, in another order.
     let turn = DQuat::from_rotation_y(0.7) * DQuat::from_rotation_x(0.2);
     let moved = |p: &DVec3| turn.inverse() * ((turn * *p + DVec3::splat(9.0)).as_vec3().as_dvec3() - DVec3::splat(9.0));
@@ -58,8 +58,8 @@ fn an_object_that_moved_has_its_groups_again() {
     let again: Vec<DVec3> = order.iter().map(|&i| moved(&places[i])).collect();
     let found = kept.for_discs(&again, radius).expect("the same discs");
     for (k, &i) in order.iter().enumerate() {
-        assert_eq!(found.groups().by_disc()[k], own.groups().by_disc()[i]);
-        assert_eq!(found.groups().further(k), own.groups().further(i));
+        assert_eq!(found.groups().by_disc()[k], grouped.groups().by_disc()[i]);
+        assert_eq!(found.groups().further(k), grouped.groups().further(i));
     }
     // Other discs are not the same.
     let mut other = places.clone();
@@ -72,11 +72,11 @@ fn an_object_that_moved_has_its_groups_again() {
 #[test]
 fn discs_at_one_place_keep_their_groups_between_them() {
     let cloud = one_place(500);
-    let own = members(&cloud, Recipe { method: Method::Hash(Collisions::Resolve), ..RECIPE });
+    let grouped = members(&cloud, Recipe { method: Method::Hash(Collisions::Resolve), ..RECIPE });
     let places = vec![DVec3::ONE; 500];
-    let found = KeptGroups::new(&places, 0.24, own.clone()).for_discs(&places, 0.24).expect("the same discs");
+    let found = KeptGroups::new(&places, 0.24, grouped.clone()).for_discs(&places, 0.24).expect("the same discs");
     let count = |m: &Membership, g: u8| m.groups().by_disc().iter().filter(|group| **group == g).count();
-    (0..4).for_each(|g| assert_eq!(count(&found, g), count(&own, g)));
+    (0..4).for_each(|g| assert_eq!(count(&found, g), count(&grouped, g)));
 }
 
 #[test]
@@ -85,9 +85,9 @@ fn an_object_of_fewer_groups_is_in_every_image() {
         let by_disc = (0..discs).map(|i| (i % groups as usize) as u8).collect();
         Membership::from(Groups::new(groups, by_disc).expect("below the count"))
     };
-    let all = Membership::join(10, &[(&[0, 1, 2, 3], part(2, 4)), (&[4, 5, 6, 7, 8], part(5, 5))]);
-    assert_eq!(all.groups().count(), 5);
-    let images = |place: usize| (0..5).filter(|g| all.groups().has(place, *g)).collect::<Vec<_>>();
+    let joined = Membership::join(10, &[(&[0, 1, 2, 3], part(2, 4)), (&[4, 5, 6, 7, 8], part(5, 5))]);
+    assert_eq!(joined.groups().count(), 5);
+    let images = |place: usize| (0..5).filter(|g| joined.groups().has(place, *g)).collect::<Vec<_>>();
     assert_eq!((images(0), images(1), images(6)), (vec![0, 2, 4], vec![1, 3], vec![2]));
     assert_eq!(images(9), [0], "the others are in group 0");
 }

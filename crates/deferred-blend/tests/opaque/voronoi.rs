@@ -50,12 +50,12 @@ fn voronoi_depth_comes_nearer_to_all_discs_than_plain_depth() {
     cloud.color = cloud.normal.iter().map(|n| (*n * 0.5 + 0.5).to_array()).collect();
     let scene = Scene::new(cloud, camera(DVec3::new(0.0, 0.5, 3.0), [96, 72]));
     let params = Params::default();
-    let all = resolve(&scene, &params, Passes::TwoPlusOne);
+    let reference = resolve(&scene, &params, Passes::TwoPlusOne);
     let few = [1, 2, 4].map(|count| by_turns(&scene.cloud, count));
     let many = minimum(&scene, &params);
     let error = |passes: Passes<'_>| {
         let picture = resolve(&scene, &params, passes);
-        let planes = picture.image.channels.iter().zip(&all.image.channels);
+        let planes = picture.image.channels.iter().zip(&reference.image.channels);
         let squares = planes.flat_map(|(a, b)| a.iter().zip(b)).map(|(a, b)| f64::from(a - b).powi(2));
         (squares.sum::<f64>() / (3.0 * 96.0 * 72.0)).sqrt()
     };

@@ -47,7 +47,7 @@ impl<'a> Loading<'a> {
         self.progress.plan(self.options.rates.stages(&work));
         self.progress.begin(stage::READ);
         self.progress.add_total(self.visible().count() as u64);
-        let prepared = |(id, object): (usize, &'a SceneObject)| {
+        let prepare_object = |(id, object): (usize, &'a SceneObject)| {
             self.progress.tick(1).map_err(|_| Error::Cancelled)?;
             if let Some(reading) = cost::reading(object) {
                 self.progress.begin(&reading);
@@ -59,7 +59,7 @@ impl<'a> Loading<'a> {
             prepared.held = Some(held.map_err(Error::Limit)?);
             Ok(prepared)
         };
-        self.visible().map(prepared).collect()
+        self.visible().map(prepare_object).collect()
     }
 
     /// Reads every visible object.

@@ -177,12 +177,12 @@ pub(crate) fn chi2_equal(counts: &[u64]) -> f64 {
 /// All positions of one set.
 pub(crate) fn positions(sampler: &dyn Sampler, set: u64) -> Vec<DVec3> {
     let mut scratch = pbsr::Particles::default();
-    let mut all = Vec::new();
+    let mut places = Vec::new();
     for c in 0..sampler.chunks() {
         let particles = sampler.chunk(set, c, &mut scratch);
-        all.extend(particles.position.iter().map(|p| sampler.origin() + p.as_dvec3()));
+        places.extend(particles.position.iter().map(|p| sampler.origin() + p.as_dvec3()));
     }
-    all
+    places
 }
 
 /// scale · (|p − middle| − radius) and friends, with exact derivatives and bounds.

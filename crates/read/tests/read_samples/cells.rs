@@ -25,23 +25,23 @@ pub(crate) fn field([x, y, _]: [f32; 3]) -> f32 {
 }
 
 /// Numbers of a legacy file.
-fn numbers<const N: usize, T: Copy + ToString>(binary: bool, all: &[T], bytes: fn(T) -> [u8; N]) -> Vec<u8> {
+fn numbers<const N: usize, T: Copy + ToString>(binary: bool, values: &[T], bytes: fn(T) -> [u8; N]) -> Vec<u8> {
     if binary {
-        return [all.iter().flat_map(|v| bytes(*v)).collect(), vec![b'\n']].concat();
+        return [values.iter().flat_map(|v| bytes(*v)).collect(), vec![b'\n']].concat();
     }
-    (all.iter().map(T::to_string).collect::<Vec<_>>().join(" ") + "\n").into_bytes()
+    (values.iter().map(T::to_string).collect::<Vec<_>>().join(" ") + "\n").into_bytes()
 }
 
-fn floats(binary: bool, all: &[f32]) -> Vec<u8> {
-    numbers(binary, all, f32::to_be_bytes)
+fn floats(binary: bool, values: &[f32]) -> Vec<u8> {
+    numbers(binary, values, f32::to_be_bytes)
 }
 
-fn ints(binary: bool, all: &[i32]) -> Vec<u8> {
-    numbers(binary, all, i32::to_be_bytes)
+fn ints(binary: bool, values: &[i32]) -> Vec<u8> {
+    numbers(binary, values, i32::to_be_bytes)
 }
 
-fn longs(binary: bool, all: &[i64]) -> Vec<u8> {
-    numbers(binary, all, i64::to_be_bytes)
+fn longs(binary: bool, values: &[i64]) -> Vec<u8> {
+    numbers(binary, values, i64::to_be_bytes)
 }
 
 /// Cells as a legacy file tells of them: by their ends, or with counts.
@@ -128,14 +128,14 @@ fn in_pieces(encoding: &'static str, compressed: bool, parts: &[Part]) -> Vec<u8
         let data = if encoding == "ascii" || bytes.is_empty() { text } else { vti.base64(&bytes) };
         format!("<DataArray type=\"{kind}\" Name=\"{name}\" {more}format=\"{encoding}\">\n{data}\n</DataArray>\n")
     };
-    let text = |all: &[String]| all.join(" ");
-    let floats = |name: &str, more: &str, all: &[f32]| {
-        let words: Vec<String> = all.iter().map(f32::to_string).collect();
-        array("Float32", name, more, text(&words), all.iter().flat_map(|v| v.to_le_bytes()).collect())
+    let text = |values: &[String]| values.join(" ");
+    let floats = |name: &str, more: &str, values: &[f32]| {
+        let words: Vec<String> = values.iter().map(f32::to_string).collect();
+        array("Float32", name, more, text(&words), values.iter().flat_map(|v| v.to_le_bytes()).collect())
     };
-    let ints = |name: &str, all: &[i32]| {
-        let words: Vec<String> = all.iter().map(i32::to_string).collect();
-        array("Int32", name, "", text(&words), all.iter().flat_map(|v| v.to_le_bytes()).collect())
+    let ints = |name: &str, values: &[i32]| {
+        let words: Vec<String> = values.iter().map(i32::to_string).collect();
+        array("Int32", name, "", text(&words), values.iter().flat_map(|v| v.to_le_bytes()).collect())
     };
     let piece = |(points, corners, cells): &Part| {
         let points: Vec<[f32; 3]> = points.iter().map(|rank| POINTS[*rank]).collect();

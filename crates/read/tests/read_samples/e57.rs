@@ -24,8 +24,8 @@ pub(crate) fn sum(page: &mut [u8]) {
 
 /// Whole numbers in so many bits each.
 fn packed(numbers: &[u64], bits: u32) -> Vec<u8> {
-    let all = numbers.iter().rev().fold(0u128, |all, n| all << bits | u128::from(*n));
-    all.to_le_bytes()[..(numbers.len() * bits as usize).div_ceil(8)].to_vec()
+    let joined = numbers.iter().rev().fold(0u128, |joined, n| joined << bits | u128::from(*n));
+    joined.to_le_bytes()[..(numbers.len() * bits as usize).div_ceil(8)].to_vec()
 }
 
 fn doubles(numbers: &[f64]) -> Vec<u8> {

@@ -43,19 +43,19 @@ fn names(degree: usize) -> Vec<String> {
 fn numbers(t: &Trained) -> Vec<f64> {
     let logit = (t.opacity / (1.0 - t.opacity)).ln();
     let rest = (0..3).flat_map(|c| t.harmonics[1..].iter().map(move |h| h[c]));
-    let mut all = [&t.position[..], &[0.0; 3], &t.harmonics[0]].concat();
-    all.extend(rest);
-    all.push(logit);
-    all.extend(t.scale.iter().chain(&t.rotation));
-    all
+    let mut numbers = [&t.position[..], &[0.0; 3], &t.harmonics[0]].concat();
+    numbers.extend(rest);
+    numbers.push(logit);
+    numbers.extend(t.scale.iter().chain(&t.rotation));
+    numbers
 }
 
 /// As the trainer writes it: `encoding` is `ascii` or `binary_little_endian`.
-pub(crate) fn trained_ply(all: &[Trained], degree: usize, encoding: &str) -> Vec<u8> {
-    let mut text = format!("ply\nformat {encoding} 1.0\nelement vertex {}\n", all.len());
+pub(crate) fn trained_ply(gaussians: &[Trained], degree: usize, encoding: &str) -> Vec<u8> {
+    let mut text = format!("ply\nformat {encoding} 1.0\nelement vertex {}\n", gaussians.len());
     names(degree).iter().for_each(|name| text += &format!("property float {name}\n"));
     let mut out = (text + "end_header\n").into_bytes();
-    for t in all {
+    for t in gaussians {
         let numbers = numbers(t);
         if encoding == "ascii" {
             let line: Vec<String> = numbers.iter().map(|v| (*v as f32).to_string()).collect();
@@ -72,8 +72,8 @@ fn whole(share: f64, bits: u32) -> u32 {
     (share * most).round().clamp(0.0, most) as u32
 }
 
-fn range(all: &[Trained], of: impl Fn(&Trained) -> [f64; 3]) -> [[f64; 3]; 2] {
-    all.iter().map(of).fold([[f64::MAX; 3], [f64::MIN; 3]], |[low, high], v| {
+fn range(gaussians: &[Trained], numbers: impl Fn(&Trained) -> [f64; 3]) -> [[f64; 3]; 2] {
+    gaussians.iter().map(numbers).fold([[f64::MAX; 3], [f64::MIN; 3]], |[low, high], v| {
         [[0, 1, 2].map(|k| low[k].min(v[k])), [0, 1, 2].map(|k| high[k].max(v[k]))]
     })
 }
@@ -91,28 +91,28 @@ fn largest(rotation: &[f64; 4]) -> usize {
 }
 
 /// As PlayCanvas packs it, with bounds of colours and an element of other coefficients where the degree has some.
-pub(crate) fn packed_ply(all: &[Trained], degree: usize) -> Vec<u8> {
+pub(crate) fn packed_ply(gaussians: &[Trained], degree: usize) -> Vec<u8> {
     let bounds = ["x", "y", "z", "scale_x", "scale_y", "scale_z", "r", "g", "b"];
     let chunk = bounds.chunks(3).flat_map(|axes| ["min", "max"].map(|end| (end, axes)));
     let chunk: Vec<String> = chunk.flat_map(|(end, axes)| axes.iter().map(move |a| format!("{end}_{a}"))).collect();
-    let mut text = format!("ply\nformat binary_little_endian 1.0\nelement chunk {}\n", all.len().div_ceil(256));
+    let mut text = format!("ply\nformat binary_little_endian 1.0\nelement chunk {}\n", gaussians.len().div_ceil(256));
     chunk.iter().for_each(|name| text += &format!("property float {name}\n"));
-    text += &format!("element vertex {}\n", all.len());
+    text += &format!("element vertex {}\n", gaussians.len());
     ["position", "rotation", "scale", "color"].iter().for_each(|n| text += &format!("property uint packed_{n}\n"));
     let rest = 3 * ((degree + 1).pow(2) - 1);
     if rest > 0 {
-        text += &format!("element sh {}\n", all.len());
+        text += &format!("element sh {}\n", gaussians.len());
         (0..rest).for_each(|k| text += &format!("property uchar f_rest_{k}\n"));
     }
     let mut out = (text + "end_header\n").into_bytes();
     let color = |t: &Trained| t.harmonics[0].map(|c| 0.5 + CONSTANT * c);
     let ranges = |part: &[Trained]| [range(part, |t| t.position), range(part, |t| t.scale), range(part, color)];
-    for part in all.chunks(256) {
+    for part in gaussians.chunks(256) {
         for v in ranges(part).as_flattened().as_flattened() {
             out.extend((*v as f32).to_le_bytes());
         }
     }
-    for part in all.chunks(256) {
+    for part in gaussians.chunks(256) {
         let [place, scale, colors] = ranges(part);
         for t in part {
             let k = largest(&t.rotation);
@@ -126,7 +126,7 @@ pub(crate) fn packed_ply(all: &[Trained], degree: usize) -> Vec<u8> {
             words.iter().for_each(|word| out.extend(word.to_le_bytes()));
         }
     }
-    for t in all {
+    for t in gaussians {
         let rest = (0..3).flat_map(|c| t.harmonics[1..].iter().map(move |h| h[c]));
         out.extend(rest.map(|v| ((v / 8.0 + 0.5) * 256.0).floor().clamp(0.0, 255.0) as u8));
     }
@@ -138,9 +138,9 @@ fn byte(v: f64) -> u8 {
 }
 
 /// `.splat`, which keeps the constant alone.
-pub(crate) fn splat(all: &[Trained]) -> Vec<u8> {
+pub(crate) fn splat(gaussians: &[Trained]) -> Vec<u8> {
     let mut out = Vec::new();
-    for t in all {
+    for t in gaussians {
         t.position.iter().copied().chain(t.scale.map(f64::exp)).for_each(|v| out.extend((v as f32).to_le_bytes()));
         out.extend(t.harmonics[0].map(|c| byte(255.0 * (0.5 + CONSTANT * c))));
         out.push(byte(255.0 * t.opacity));
@@ -150,18 +150,18 @@ pub(crate) fn splat(all: &[Trained]) -> Vec<u8> {
 }
 
 /// SPZ of version 2 or 3 before gzip, with 12 bits behind the point.
-pub(crate) fn spz(all: &[Trained], degree: usize, version: u32) -> Vec<u8> {
+pub(crate) fn spz(gaussians: &[Trained], degree: usize, version: u32) -> Vec<u8> {
     let mut out = b"NGSP".to_vec();
     out.extend(version.to_le_bytes());
-    out.extend((all.len() as u32).to_le_bytes());
+    out.extend((gaussians.len() as u32).to_le_bytes());
     out.extend([degree as u8, 12, 0, 0]);
-    for v in all.iter().flat_map(|t| t.position) {
+    for v in gaussians.iter().flat_map(|t| t.position) {
         out.extend(&((v * 4096.0).round() as i32).to_le_bytes()[..3]);
     }
-    out.extend(all.iter().map(|t| byte(255.0 * t.opacity)));
-    out.extend(all.iter().flat_map(|t| t.harmonics[0].map(|c| byte(255.0 * (0.15 * c + 0.5)))));
-    out.extend(all.iter().flat_map(|t| t.scale.map(|s| byte(16.0 * (s + 10.0)))));
-    for t in all {
+    out.extend(gaussians.iter().map(|t| byte(255.0 * t.opacity)));
+    out.extend(gaussians.iter().flat_map(|t| t.harmonics[0].map(|c| byte(255.0 * (0.15 * c + 0.5)))));
+    out.extend(gaussians.iter().flat_map(|t| t.scale.map(|s| byte(16.0 * (s + 10.0)))));
+    for t in gaussians {
         let [w, x, y, z] = t.rotation;
         if version == 2 {
             out.extend([x, y, z].map(|v| byte(127.5 * (v + 1.0))));
@@ -175,6 +175,6 @@ pub(crate) fn spz(all: &[Trained], degree: usize, version: u32) -> Vec<u8> {
         });
         out.extend(word.to_le_bytes());
     }
-    out.extend(all.iter().flat_map(|t| t.harmonics[1..].as_flattened()).map(|v| byte(128.0 * v + 128.0)));
+    out.extend(gaussians.iter().flat_map(|t| t.harmonics[1..].as_flattened()).map(|v| byte(128.0 * v + 128.0)));
     out
 }

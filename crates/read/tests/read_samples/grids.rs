@@ -16,8 +16,8 @@ pub(crate) fn rectilinear_points() -> Vec<[f64; 3]> {
     z.iter().flat_map(|z| y.iter().flat_map(move |y| x.iter().map(move |x| [*x, *y, *z]))).collect()
 }
 
-pub(crate) fn words<T: Display>(all: impl IntoIterator<Item = T>) -> String {
-    all.into_iter().map(|v| format!("{v} ")).collect()
+pub(crate) fn words<T: Display>(values: impl IntoIterator<Item = T>) -> String {
+    values.into_iter().map(|v| format!("{v} ")).collect()
 }
 
 /// A `DataArray` in text.

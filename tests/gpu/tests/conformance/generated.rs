@@ -239,8 +239,8 @@ fn are_alike(device: &mut Device, world: &World, samplers: [&dyn Sampler; 3]) {
     let ([device, uploaded], _) = world.with(samplers, |scene| particles(device, scene));
     let [found, expected] = [places(&device), places(&uploaded)];
     let same = found.intersection(&expected).count() as f64;
-    let all = found.union(&expected).count() as f64;
-    assert!(expected.len() > 75_000 && same >= 0.9999 * all, "{same} of {all}");
+    let both = found.union(&expected).count() as f64;
+    assert!(expected.len() > 75_000 && same >= 0.9999 * both, "{same} of {both}");
     assert!((0..3).all(|object| expected.iter().any(|p| p[4] == object)));
     // Where no set has another number of particles, all stand in the same places: normals and colours are steps apart at
     // most, and thinning numbers equal.

@@ -231,8 +231,8 @@ fn agreement(a: &Ensemble, b: &Ensemble) -> (f64, f64, f32) {
         of_rgb.chain(of_shadow).fold(0.0, f32::max)
     };
     let near = (0..(width * height) as usize).filter(|k| far(*k) <= TOLERANCE * brightest.max(1.0)).count();
-    let all = f64::from(width * height);
-    (pixels().filter(same).count() as f64 / all, near as f64 / all, brightest)
+    let pixel_count = f64::from(width * height);
+    (pixels().filter(same).count() as f64 / pixel_count, near as f64 / pixel_count, brightest)
 }
 
 const ALL: EnsembleParams = EnsembleParams {

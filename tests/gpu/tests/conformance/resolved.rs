@@ -97,8 +97,8 @@ fn opaque_surfaces_are_the_cpu_s() {
             assert!(solid > 5000 && solid < found.depth.len(), "{solid}");
             assert!(counts.splats > 2000 && counts.splats <= ids.len() as u64, "{counts:?}");
             // The translucent ones are none of them: with those, or in another order of depths, it is another image.
-            let all: Vec<u32> = (0..cloud.len() as u32).collect();
-            let with_others = on_processor(&OpaqueInput { ids: &all, ..input });
+            let ids_of_all: Vec<u32> = (0..cloud.len() as u32).collect();
+            let with_others = on_processor(&OpaqueInput { ids: &ids_of_all, ..input });
             assert!(others(&with_others, &found) > 10.0 * OTHER_SHARE);
         }
     }

@@ -114,8 +114,8 @@ fn batches_joined_are_the_map_of_all() {
         let light = point(DVec3::new(0.4, 2.0, -0.3));
         let deposits = deposits(&mixed(4000, DVec3::ZERO, &ALL), coloured, &light, &Params::default());
         let expected = deposits.clone().into_map();
-        let all: u64 = deposits.entries().iter().sum();
-        let some = Capacities { entries: all as u32 / 5, cells: u32::MAX, channels: 1 };
+        let total: u64 = deposits.entries().iter().sum();
+        let some = Capacities { entries: total as u32 / 5, cells: u32::MAX, channels: 1 };
         let (found, batches) = on_device(&mut device, &deposits, some);
         assert!(found == expected && batches > 4, "{batches}");
     }
@@ -194,10 +194,10 @@ fn look_ups_are_the_cpu_s_within_the_tolerance() {
         let mut shadowed = 0;
         let mut most = 0f32;
         for (k, part) in receivers.chunks(3000).enumerate() {
-            let own = recorded.receivers(&map, &uploads, part).unwrap();
+            let uploaded = recorded.receivers(&map, &uploads, part).unwrap();
             // The map stays where it is for the runs behind the first.
-            let run = ready.run(&recorded.inputs((k == 0).then_some(&uploads), &own)).unwrap();
-            let found = recorded.transmittances(run.bytes(recorded.lights), &own).unwrap();
+            let run = ready.run(&recorded.inputs((k == 0).then_some(&uploads), &uploaded)).unwrap();
+            let found = recorded.transmittances(run.bytes(recorded.lights), &uploaded).unwrap();
             for (receiver, found) in part.iter().zip(found) {
                 let [least, greatest] = lights(&map, receiver);
                 shadowed += u32::from(least[0] > 0.01 && greatest[0] < 0.99);

@@ -137,13 +137,13 @@ impl Both {
     /// The greatest difference of a transmittance, or of a channel as a share of the greatest value.
     pub(crate) fn difference(&self) -> f32 {
         let [a, b] = [&self.cpu, &self.gpu];
-        let of = |a: &[Vec<f32>], b: &[Vec<f32>], map: fn(f32) -> f32| {
+        let largest = |a: &[Vec<f32>], b: &[Vec<f32>], map: fn(f32) -> f32| {
             let pairs = a.iter().zip(b).flat_map(|(a, b)| a.iter().zip(b));
             // What is no number is as far apart as can be.
             pairs.map(|(a, b)| (map(*a) - map(*b)).abs()).fold(0.0, |most: f32, d| if d <= most { most } else { d })
         };
-        let transmittances = of(&a.optical_depth, &b.optical_depth, |v| (-v).exp());
-        transmittances.max(of(&a.channels, &b.channels, |v| v / 3.0))
+        let transmittances = largest(&a.optical_depth, &b.optical_depth, |v| (-v).exp());
+        transmittances.max(largest(&a.channels, &b.channels, |v| v / 3.0))
     }
 
     /// Pixels that anything was added to.

@@ -63,9 +63,9 @@ fn apart(alone: &Render, helped: &Render) -> f32 {
     let beauty = |r: &Render| r.layers.rgb("beauty").unwrap().as_flattened().to_vec();
     let alpha = |r: &Render| r.layers.scalar("alpha").unwrap().to_vec();
     // What is no number is as far apart as can be.
-    let most = |a: Vec<f32>, b: Vec<f32>, of: f32| {
+    let most = |a: Vec<f32>, b: Vec<f32>, unit: f32| {
         assert_eq!(a.len(), b.len());
-        let pairs = a.iter().zip(&b).map(|(a, b)| (a - b).abs() / of);
+        let pairs = a.iter().zip(&b).map(|(a, b)| (a - b).abs() / unit);
         pairs.fold(0.0, |most: f32, d| if d <= most { most } else { d })
     };
     let brightest = beauty(alone).into_iter().fold(0.0, f32::max);
@@ -172,9 +172,9 @@ fn every_layer_that_is_shaded_is_the_processor_s() {
     let names = |r: &Render| r.layers.images.keys().copied().collect::<Vec<_>>();
     assert_eq!(names(&alone), names(&helped));
     for name in ["ambient", "direct", "scatter1", "normal"] {
-        let of = |r: &Render| r.layers.rgb(name).unwrap().as_flattened().to_vec();
-        let a = of(&alone);
-        let b = of(&helped);
+        let numbers = |r: &Render| r.layers.rgb(name).unwrap().as_flattened().to_vec();
+        let a = numbers(&alone);
+        let b = numbers(&helped);
         let largest = a.iter().fold(0.0, |most: f32, v| most.max(v.abs()));
         assert!(largest > 0.0 && a.iter().zip(&b).all(|(a, b)| (a - b).abs() <= TOLERANCE * largest), "{name}");
     }

@@ -31,9 +31,9 @@ fn apart(both: &Both, solid: &OpaqueImage) -> ([f32; 2], f64) {
             let a = depths(a, &both.cpu, k);
             let b = depths(b, &both.gpu, k);
             // Where nothing is, both say so; what is no number is as far apart as can be.
-            let of = |i: usize| if a[i] == b[i] { 0.0 } else { (a[i] - b[i]).abs().min(f32::INFINITY) };
-            other |= !(of(0) <= DEPTH_TOLERANCE && of(1) <= DEPTH_TOLERANCE);
-            (0..2).for_each(|i| off[i].push(of(2 + i)));
+            let apart = |i: usize| if a[i] == b[i] { 0.0 } else { (a[i] - b[i]).abs().min(f32::INFINITY) };
+            other |= !(apart(0) <= DEPTH_TOLERANCE && apart(1) <= DEPTH_TOLERANCE);
+            (0..2).for_each(|i| off[i].push(apart(2 + i)));
         }
         others += usize::from(other);
     }
