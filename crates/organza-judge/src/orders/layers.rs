@@ -17,7 +17,7 @@ const PEELED: [u32; 2] = [3, 8];
 pub(super) fn ways(
     scene: &Scene,
     loaded: &Loaded,
-    all: &mut Vec<Ordered>,
+    ordered: &mut Vec<Ordered>,
     options: &RenderOptions,
     progress: &Progress,
 ) -> Result<Result<Image<Linear>, String>, Error> {
@@ -34,7 +34,7 @@ pub(super) fn ways(
     let mut draw = |name: String, layers: SurfelLayers| {
         scene.render.surfels.layers = layers;
         let image = by_technique(Technique::Surfels, &scene, loaded, options, progress)?;
-        all.push(Ordered { of_layers: true, ..Ordered::new(name, image) });
+        ordered.push(Ordered { of_layers: true, ..Ordered::new(name, image) });
         Ok::<_, Error>(())
     };
     draw("layers by gaps".into(), SurfelLayers::Gaps)?;
