@@ -47,7 +47,7 @@ fn the_limit_of_splats_holds_for_the_scene_and_before_any_conversion() {
     assert!(matches!(error, Error::Limit(Exceeded { needed: 5600, limit: Some(5599), .. })), "{error}");
     assert!(error.to_string().contains("before conversion, most of them 'fog' with 4000"), "{error}");
     // Objects were counted, nothing was converted: only their own units are announced.
-    assert_eq!(progress.read().1, 5);
+    assert_eq!(progress.read().total, 5);
     // One splat less than all of them: an estimate lets it pass, the conversion does not.
     let error = load(&most(made - 1), &RenderOptions::default(), &Progress::new()).unwrap_err();
     assert_eq!(error.exit_code(), 5, "{error}");
@@ -70,7 +70,7 @@ fn an_interrupt_stops_loading() {
     let progress = Progress::new();
     let result = std::thread::scope(|scope| {
         scope.spawn(|| {
-            while progress.read().0 < 100_000 {
+            while progress.read().done < 100_000 {
                 std::thread::yield_now();
             }
             progress.cancel();

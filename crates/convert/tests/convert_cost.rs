@@ -6,7 +6,8 @@ use convert::*;
 use field::ExpressionField;
 use splat_core::glam::{DMat3, DVec3, Vec3};
 use splat_core::{
-    Clip, Cloud, DAabb, Grid, Limits, Mesh, Progress, RawPoints, Similarity, TransferFunction, TransferPoint, rng,
+    Clip, Cloud, DAabb, Grid, Limits, Mesh, Progress, RawPoints, Similarity, TransferFunction, TransferPoint, Units,
+    rng,
 };
 
 fn mesh() -> Mesh {
@@ -139,7 +140,7 @@ fn cv10_predictions_refuse_what_conversions_refuse() {
 fn interrupted(run: &dyn Fn(&Progress) -> Result<(), ConvertError>) {
     let progress = Progress::new();
     run(&progress).unwrap();
-    let (done, total) = progress.read();
+    let Units { done, total } = progress.read();
     assert!(done == total && total > 0, "{done} of {total}");
     let progress = Progress::new();
     progress.cancel();
@@ -148,7 +149,7 @@ fn interrupted(run: &dyn Fn(&Progress) -> Result<(), ConvertError>) {
     let progress = Progress::new();
     std::thread::scope(|scope| {
         scope.spawn(|| {
-            while progress.read().0 == 0 {
+            while progress.read().done == 0 {
                 std::thread::yield_now();
             }
             progress.cancel();

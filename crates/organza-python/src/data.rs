@@ -183,7 +183,7 @@ impl Data {
 
 /// Positions as drawing has them.
 fn relative(name: &str, positions: &[DVec3]) -> PyResult<Relative> {
-    Relative::of(positions, Vec::new()).map_err(|place| {
+    Relative::from_positions(positions, Vec::new()).map_err(|place| {
         let expected = "finite coordinates that fit 32-bit floats once the middle is subtracted";
         refused(name, expected, &format!("{} in row {place}", positions[place]))
     })

@@ -103,7 +103,7 @@ impl Error {
     /// An error of the nouns about the data of `what` (an object, a file).
     pub fn from_core(what: &str, error: splat_core::Error) -> Self {
         match error {
-            splat_core::Error::Limit(e) => Self::Limit(e.of(what, "use a larger `spacing` or a smaller image")),
+            splat_core::Error::Limit(e) => Self::Limit(e.owned_by(what, "use a larger `spacing` or a smaller image")),
             splat_core::Error::Cancelled => Self::Cancelled,
             other => Self::input(what, other.to_string(), ""),
         }
@@ -136,7 +136,7 @@ impl Error {
             Self::Limit(e) => Self::Limit(match file {
                 Some(file) => {
                     let hint = e.hint.clone();
-                    e.of(&printable(file), hint)
+                    e.owned_by(&printable(file), hint)
                 }
                 None => e,
             }),

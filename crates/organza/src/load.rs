@@ -167,7 +167,7 @@ impl Loaded {
         let (polygons, others): (Vec<&Own>, Vec<&Own>) = self.own.iter().partition(|data| data.form == Form::Polygons);
         polygons.iter().for_each(|data| objects[data.object].shadow_coefficient = 0.0);
         others.iter().any(|data| objects[data.object].shadow_coefficient > 0.0)
-            || Census::of(&self.cloud, &self.materials, &objects, &self.footprints).receivers > 0
+            || Census::new(&self.cloud, &self.materials, &objects, &self.footprints).receivers > 0
     }
 }
 
@@ -389,6 +389,6 @@ fn merge(mut clouds: Vec<Cloud>) -> Cloud {
 /// All lights, sorted by their bits so that the order of the file does not matter.
 fn lights(scene: &Scene) -> Vec<SceneLight> {
     let mut lights = scene.lights.clone();
-    lights.sort_by_cached_key(|l| (l.light.bits(), l.shadow, l.samples, format!("{:?}", l.slide)));
+    lights.sort_by_cached_key(|l| (l.light.key(), l.shadow, l.samples, format!("{:?}", l.slide)));
     lights
 }

@@ -107,7 +107,7 @@ struct SplatCensus {
 
 impl SplatCensus {
     fn new(scene: &Scene, loaded: &Loaded) -> Self {
-        let counts = Census::of(&loaded.cloud, &loaded.materials, &loaded.objects, &loaded.footprints);
+        let counts = Census::new(&loaded.cloud, &loaded.materials, &loaded.objects, &loaded.footprints);
         Self { counts, brightness: brightness::of_scene(scene, loaded) }
     }
 }

@@ -249,7 +249,7 @@ pub(crate) fn shadow_error(light: &str, error: &tsm::Error) -> Error {
     match error {
         tsm::Error::Limit(exceeded) => {
             let hint = "use fewer lights or samples of lights, fewer cells in render.shadow, or a larger --max-memory";
-            Error::Limit(exceeded.clone().of(&what, hint))
+            Error::Limit(exceeded.clone().owned_by(&what, hint))
         }
         tsm::Error::Core(splat_core::Error::Cancelled) => Error::Cancelled,
         other => Error::input(what, other.to_string(), ""),

@@ -20,11 +20,16 @@
 //! }
 //! let view = Projection::Orthographic { height: 3.0 };
 //! let camera = Camera::look_at(DVec3::Z * 4.0, DVec3::ZERO, DVec3::Y, view, [65, 65]).unwrap();
-//! let (footprints, materials, opaque) = (FootprintStack::default(), [Material::default()], OpaqueImage::default());
+//! let footprints = FootprintStack::default();
+//! let materials = &[Material::default()][..];
+//! let opaque = OpaqueImage::default();
 //! let params = &Params { resampling_sigma_px: 0.0, ..Params::default() };
-//! let (camera, materials, detail) = (&camera, &materials[..], Detail::ALL);
-//! let seen = ProjectInput { cloud: &cloud, camera, footprints: &footprints, materials, params, detail };
-//! let (projected, order, values, direction) = (&project(&seen), &[0, 1], &[1.0; 6], Direction::FrontToBack);
+//! let detail = Detail::ALL;
+//! let seen = ProjectInput { cloud: &cloud, camera: &camera, footprints: &footprints, materials, params, detail };
+//! let projected = &project(&seen);
+//! let order = &[0, 1];
+//! let values = &[1.0; 6];
+//! let direction = Direction::FrontToBack;
 //! let input = FoldInput { projected, order, values, materials, opaque: &opaque, direction, params };
 //! let mut picture = Accumulator::new(camera.size, 1, 3, false, false);
 //! fold(&input, &mut picture, None).unwrap();
@@ -71,8 +76,8 @@ pub use points::{Column, PointCell, PointLattice, RawPoints, ReadySplats};
 pub use relative::Relative;
 pub use scene::camera::{Camera, Projection, ViewTransform};
 pub use scene::environment::{Environment, RadianceImage};
-pub use scene::light::{Framing, Light, LightShape, Slide, SlideProjection};
-pub use scene::material::{Bump, Material, MaterialTable, Object, ObjectTable, Shading};
+pub use scene::light::{Framing, Incidence, Light, LightKey, LightShape, Slide, SlideProjection};
+pub use scene::material::{Bump, Material, MaterialTable, Object, ObjectTable, Reflection, Shading};
 pub use scene::phase::henyey_greenstein;
 pub use scene::transfer::{TransferFunction, TransferPoint};
 pub use scene::turns::turns;
@@ -92,7 +97,7 @@ pub use up_axis::UpAxis;
 pub use work::cost::{CostRecord, StageCost};
 pub use work::limits::{Exceeded, Limits};
 pub use work::memory_account::{MemoryAccount, Reservation};
-pub use work::progress::Progress;
+pub use work::progress::{Progress, Units};
 
 /// The page's example compiles and holds.
 #[cfg(doctest)]

@@ -23,13 +23,13 @@ impl Relative {
     /// ```
     /// use splat_core::{Relative, glam::DVec3};
     /// let far = [DVec3::new(5e6, 0.0, 0.0), DVec3::new(5e6 + 0.25, 0.0, 0.0)];
-    /// let Relative { origin, offsets } = Relative::of(&far, Vec::new()).unwrap();
+    /// let Relative { origin, offsets } = Relative::from_positions(&far, Vec::new()).unwrap();
     /// assert_eq!(origin + offsets[1].as_dvec3(), far[1]);
     /// ```
     ///
     /// # Errors
     /// The place of the first point that fits no f32, or is not finite.
-    pub fn of(positions: &[DVec3], room: Vec<Vec3>) -> Result<Self, usize> {
+    pub fn from_positions(positions: &[DVec3], room: Vec<Vec3>) -> Result<Self, usize> {
         let mut offsets = room;
         let Some(&first) = positions.first() else { return Ok(Self { origin: DVec3::ZERO, offsets }) };
         let mut lowest = first;
@@ -54,7 +54,7 @@ mod tests {
     use super::*;
 
     fn split(positions: &[DVec3]) -> Result<Relative, usize> {
-        Relative::of(positions, Vec::new())
+        Relative::from_positions(positions, Vec::new())
     }
 
     #[test]

@@ -16,7 +16,9 @@ pub use point::{Point, Radiance, arriving, facing};
 
 use crate::optics::TRACE;
 use crate::raster::Projected;
-use crate::{Camera, Cloud, DAabb, Error, Light, Material, Object, Progress, Receiver, Slide, Transmittance};
+use crate::{
+    Camera, Cloud, DAabb, Error, Incidence, Light, Material, Object, Progress, Receiver, Slide, Transmittance,
+};
 use glam::{DVec3, Vec3};
 use joint::ThickSplat;
 use point::{is_attenuated, passing};
@@ -42,11 +44,12 @@ impl LitBy<'_> {
     /// Direction to the light, and the unshadowed irradiance per channel, as [`Light::irradiance`] has them, behind the slide: the one
     /// place where light arrives, whoever asks. A trace of it ([`crate::optics::TRACE`]) is none.
     #[inline]
-    pub fn irradiance(&self, p: DVec3, spread: f64) -> (DVec3, [f32; 3]) {
-        let (to_light, irradiance) = self.light.irradiance(p, spread);
+    pub fn irradiance(&self, p: DVec3, spread: f64) -> Incidence<DVec3> {
+        let Incidence { to_light, irradiance } = self.light.irradiance(p, spread);
         let passing = self.slide.map_or([1.0; 3], |slide| slide.passing(p, spread));
         let arriving = |c: usize| irradiance[c] * passing[c];
-        (to_light, std::array::from_fn(|c| if arriving(c) > TRACE { arriving(c) } else { 0.0 }))
+        let irradiance = std::array::from_fn(|c| if arriving(c) > TRACE { arriving(c) } else { 0.0 });
+        Incidence { to_light, irradiance }
     }
 
     /// The most of it that a point in a box of the world could receive without shadows, in the channel that has most, W/m²; `spread` as for

@@ -2,8 +2,8 @@
 
 use glam::{DVec3, Vec3};
 use splat_core::{
-    Clip, Cloud, CostRecord, DAabb, DepthProfile, Error, FootprintImage, Gaussians, Light, LightShape, ScalarField,
-    SliceOrder, Splat, StageCost,
+    Clip, Cloud, CostRecord, DAabb, DepthProfile, Error, FootprintImage, Gaussians, Incidence, Light, LightShape,
+    ScalarField, SliceOrder, Splat, StageCost,
 };
 use std::f64::consts::FRAC_PI_2;
 
@@ -77,8 +77,8 @@ fn a_cone_that_ends_at_once_lights_its_edge_and_none_is_a_half_space() {
         intensity: [1.0; 3],
     };
     let sharp = spot(0.0, 0.0);
-    assert_eq!(sharp.irradiance(DVec3::Z * 2.0, 0.0), (-DVec3::Z, [0.25; 3]));
-    assert_eq!(sharp.irradiance(DVec3::new(0.1, 0.0, 2.0), 0.0).1, [0.0; 3]);
+    assert_eq!(sharp.irradiance(DVec3::Z * 2.0, 0.0), Incidence { to_light: -DVec3::Z, irradiance: [0.25; 3] });
+    assert_eq!(sharp.irradiance(DVec3::new(0.1, 0.0, 2.0), 0.0).irradiance, [0.0; 3]);
     assert!(spot(0.1, FRAC_PI_2 - 1e-9).validate(0).is_ok());
     assert!(matches!(spot(0.1, FRAC_PI_2).validate(0), Err(Error::Invalid { attribute: "cone", .. })));
 }

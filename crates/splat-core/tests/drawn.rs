@@ -256,7 +256,7 @@ fn only_what_is_translucent_can_absorb_in_colours() {
             let normal = if kind == SplatKind::Medium { Vec3::ZERO } else { Vec3::Z };
             cloud.push(&Splat { radius: 2.0, cross_section: 1.0, kind, material, normal, ..Splat::default() });
         }
-        Census::of(&cloud, &materials, &[Object::default()], &FootprintStack::default())
+        Census::new(&cloud, &materials, &[Object::default()], &FootprintStack::default())
     };
     use SplatKind::{Medium, Opaque, Surface};
     assert!(!count(&[(Medium, 0), (Surface, 0), (Opaque, 0), (Opaque, 1)]).colored_extinction);

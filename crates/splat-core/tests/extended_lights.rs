@@ -12,12 +12,12 @@ use std::f64::consts::PI;
 /// formula, over each other, minus 1.
 fn error(shape: LightShape, n: u32, [p, normal]: [DVec3; 2], exact: f64) -> f64 {
     let light = Light { shape, intensity: [1.0; 3] };
-    let one = |point: &Light| {
+    let received = |point: &Light| {
         point.validate(0).expect("a light");
-        let (to_light, irradiance) = point.irradiance(p, 0.0);
-        f64::from(irradiance[1]) * to_light.dot(normal).max(0.0)
+        let light = point.irradiance(p, 0.0);
+        f64::from(light.irradiance[1]) * light.to_light.dot(normal).max(0.0)
     };
-    light.points(n).iter().map(one).sum::<f64>() / exact - 1.0
+    light.points(n).iter().map(received).sum::<f64>() / exact - 1.0
 }
 
 /// A turned frame, so that no axis is special.
@@ -94,7 +94,7 @@ fn extended_lights_have_their_intensity_far_away_along_the_normal() {
             assert!(error(shape, n, [far, -z], 1e-8).abs() < 1e-3, "{shape:?}");
         }
         // The whole light where nobody makes points of it.
-        let whole = Light { shape, intensity: [1.0; 3] }.irradiance(far, 0.0).1[1];
+        let whole = Light { shape, intensity: [1.0; 3] }.irradiance(far, 0.0).irradiance[1];
         assert!((f64::from(whole) / 1e-8 - 1.0).abs() < 1e-6);
     }
 }

@@ -114,7 +114,8 @@ impl<'a> Splats<'a> {
         let radius = ids.iter().map(|id| f64::from(cloud.radius[*id as usize])).sum::<f64>() * share;
         let middle = ids.iter().map(|id| cloud.position[*id as usize].as_dvec3()).sum::<DVec3>() * share;
         let middle = cloud.origin + middle;
-        let to_light = loaded.lights.first().map(|light| light.light.irradiance(middle, 0.0).0.normalize_or_zero());
+        let to_light =
+            loaded.lights.first().map(|light| light.light.irradiance(middle, 0.0).to_light.normalize_or_zero());
         Self { scene, loaded, plan, radius, middle, to_light }
     }
 

@@ -41,7 +41,7 @@ pub fn light_points(lights: &[SceneLight]) -> Vec<LightPoint> {
         };
         light_points.extend(points.into_iter().enumerate().map(point));
     }
-    light_points.sort_by_cached_key(|point| (point.light.bits(), lights[point.of].shadow));
+    light_points.sort_by_cached_key(|point| (point.light.key(), lights[point.of].shadow));
     light_points
 }
 

@@ -269,7 +269,7 @@ fn light_at(scene: &Scene, bounds: &DAabb) -> LightThere {
     let mut outside = [0.0; 3];
     for (light, known) in scene.lights.iter().zip(&statistics).filter(|(_, known)| known.is_on != Some(false)) {
         let SceneLight { light, .. } = light;
-        let (_, irradiance) = light.irradiance(bounds.center(), SPREAD * bounds.diagonal());
+        let irradiance = light.irradiance(bounds.center(), SPREAD * bounds.diagonal()).irradiance;
         let is_outside = light.shape.place().is_none_or(|place| !bounds.contains(place));
         for channel in 0..3 {
             let received = f64::from(irradiance[channel]);

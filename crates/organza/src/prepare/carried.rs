@@ -164,7 +164,7 @@ pub(crate) fn requested_maps<'a>(
         return of_all.map(|(point, objects)| called_for(point).then_some((point, &objects[..]))).collect();
     };
     // Who receives light beside what it is carried through, and who casts shadows there.
-    let beside = Census::of(&loaded.cloud, &loaded.materials, others, &loaded.footprints);
+    let beside = Census::new(&loaded.cloud, &loaded.materials, others, &loaded.footprints);
     let is_carried = !plan.carried.is_empty();
     let receives = if is_carried { beside.receivers > 0 } else { loaded.receives_beside_polygons() };
     // Without a technique that carries light, all light on triangles has a z-buffer.

@@ -193,7 +193,7 @@ fn refuse(whose: &str, error: pbsr::Error) -> Error {
         pbsr::Error::Limit(exceeded) => {
             let hint =
                 "use a lower extinction or opacity, a smaller image or render.antialias, or a larger --max-memory";
-            Error::Limit(exceeded.of(whose, hint))
+            Error::Limit(exceeded.owned_by(whose, hint))
         }
         pbsr::Error::Field { .. } => Error::input(
             whose,

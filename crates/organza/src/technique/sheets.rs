@@ -364,7 +364,7 @@ fn refuse<'a>(frame: &'a Frame<'a>, error: sheet_light::Error) -> Error {
         sheet_light::Error::Cancelled => Error::Cancelled,
         sheet_light::Error::Limit(exceeded) => {
             let hint = "use a larger render.sheets.slab_width, a coarser volume, fewer translucent meshes or a larger --max-memory";
-            Error::Limit(exceeded.of("the scene", hint))
+            Error::Limit(exceeded.owned_by("the scene", hint))
         }
         sheet_light::Error::Volume { volume, source } => {
             let volume = volumes(&frame.matter()).nth(volume);

@@ -79,7 +79,7 @@ pub fn fold(
     let opaque = eye.solid.as_ref().map_or(input.opaque, |solid| &solid.opaque);
     let input = &HalfInput { opaque, ..input.clone() };
     let mut lights: Vec<CarriedLight<'_>> = carried(input).collect();
-    lights.sort_by_key(|light| (light.lit.light.bits(), light.samples));
+    lights.sort_by_key(|light| (light.lit.light.key(), light.samples));
     let sweeps = Sweeps { input, params, eye: &eye, layout, progress };
     let mut counts = HalfCounts::default();
     if !input.bodies().is_empty() {

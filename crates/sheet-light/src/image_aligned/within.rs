@@ -217,7 +217,7 @@ impl<'a, 'v> VoxelDepths<'a, 'v> {
         if optical_depth.iter().all(|depth| *depth <= PART * THIN) {
             return shadow.absorbance(&receiver).map(|middle| [middle, 0.0, 0.0, 0.0]);
         }
-        let (to_light, _) = lit.light.irradiance(world, 0.0);
+        let to_light = lit.light.irradiance(world, 0.0).to_light;
         let width = self.width as f32;
         let cell =
             MediumCell { position, width, radius: self.receivers.radius, optical_depth, absorbs: volume.casts_shadow };

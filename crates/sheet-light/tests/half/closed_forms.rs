@@ -181,7 +181,7 @@ mod deep {
             .iter()
             .flat_map(|eye| suns.map(|sun| (parallel(*eye, 4.0, [12, 12]), sun)))
         {
-            let to_light = sun.light.irradiance(DVec3::ZERO, 0.0).0;
+            let to_light = sun.light.irradiance(DVec3::ZERO, 0.0).to_light;
             for slab_width in [0.3, 0.4, 0.6, 0.77, 1.3] {
                 let lights = [sun];
                 let input = HalfInput { polygons: &floor, ..input(&volumes, &camera, &lights) };

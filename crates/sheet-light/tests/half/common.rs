@@ -90,8 +90,8 @@ pub(crate) fn single_scattering(
     let n = 1000;
     let at = |t: f64| {
         let place = from + along * t;
-        let (_, irradiance) = light.irradiance(place, spread);
-        let (to_light, _) = light.irradiance(place, 0.0);
+        let irradiance = light.irradiance(place, spread).irradiance;
+        let to_light = light.irradiance(place, 0.0).to_light;
         let way = inside(grid, place, to_light).map_or(0.0, |[_, leave]| leave.max(0.0));
         sigma * (-sigma * (t - near) - sigma * way).exp() * f64::from(irradiance[0])
     };

@@ -38,8 +38,8 @@ pub struct MeanTransmittance<'a>(pub Vec<&'a dyn Transmittance>);
 
 impl Transmittance for MeanTransmittance<'_> {
     fn transmittance(&self, receiver: &Receiver) -> [f32; 3] {
-        let sum = self.0.iter().fold([0.0; 3], |sum, one| {
-            let transmittance = one.transmittance(receiver);
+        let sum = self.0.iter().fold([0.0; 3], |sum, map| {
+            let transmittance = map.transmittance(receiver);
             [0, 1, 2].map(|c| sum[c] + transmittance[c])
         });
         sum.map(|v: f32| v / self.0.len() as f32)
@@ -47,8 +47,8 @@ impl Transmittance for MeanTransmittance<'_> {
 
     fn at_splats(&self, splats: &[usize], receiver: &dyn Fn(usize) -> Receiver) -> [[f32; 3]; TOGETHER] {
         let mut sum = [[0.0; 3]; TOGETHER];
-        for one in &self.0 {
-            let transmittances = one.at_splats(splats, receiver);
+        for map in &self.0 {
+            let transmittances = map.at_splats(splats, receiver);
             sum.as_flattened_mut().iter_mut().zip(transmittances.as_flattened()).for_each(|(sum, t)| *sum += t);
         }
         sum.map(|sum| sum.map(|v: f32| v / self.0.len() as f32))

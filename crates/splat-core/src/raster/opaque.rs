@@ -167,7 +167,9 @@ pub fn resolve_opaque(
 /// cloud.push(&Splat { position: [0.0, 0.0, -1.0].into(), radius: 0.2, ..disc });
 /// let view = Projection::Orthographic { height: 2.0 };
 /// let camera = Camera::look_at(DVec3::Z, DVec3::ZERO, DVec3::Y, view, [64, 64]).unwrap();
-/// let (footprints, materials, params) = (FootprintStack::default(), [Material::default()], Params::default());
+/// let footprints = FootprintStack::default();
+/// let materials = [Material::default()];
+/// let params = Params::default();
 /// let input = ProjectInput { cloud: &cloud, camera: &camera, footprints: &footprints, materials: &materials, params: &params, detail: Detail::ALL };
 /// let projected = project(&input);
 /// let nearest = NearestSurfaces::find(&projected, &[0, 1], false, None).unwrap();

@@ -19,13 +19,16 @@
 //!
 //!     fn with_simd<S: pulp::Simd>(self, simd: S) -> f32 {
 //!         let Self(projected, bins, t) = self;
-//!         let (corner, of) = (bins.corner(t), |v: f32| Lanes::splat(simd, v));
-//!         let (mut plane, factors) = (vec![0.0; AREA], projected.ray_factors(corner));
+//!         let corner = bins.corner(t);
+//!         let lanes = |v: f32| Lanes::splat(simd, v);
+//!         let mut plane = vec![0.0; AREA];
+//!         let factors = projected.ray_factors(corner);
 //!         for &id in bins.tile(t).flatten() {
 //!             let splat = &projected.splats[id as usize];
 //!             for run in Runs::new(simd, splat, projected.size, corner) {
 //!                 let s = run.distance_sq(simd, splat) * Lanes::load(simd, &factors[run.pixel()..]);
-//!                 let tau = of(splat.peak) * projected.kernel(splat).profile(simd, (of(1.0) - s).max(of(0.0)));
+//!                 let kernel = projected.kernel(splat);
+//!                 let tau = lanes(splat.peak) * kernel.profile(simd, (lanes(1.0) - s).max(lanes(0.0)));
 //!                 (Lanes::load(simd, &plane[run.pixel()..]) + tau).store(&mut plane[run.pixel()..]);
 //!             }
 //!         }
@@ -37,9 +40,11 @@
 //! cloud.push(&Splat { radius: 0.5, cross_section: 0.2, ..Splat::default() });
 //! let view = Projection::Orthographic { height: 2.0 };
 //! let camera = Camera::look_at(DVec3::Z, DVec3::ZERO, DVec3::Y, view, [64, 64]).unwrap();
-//! let (footprints, materials) = (&FootprintStack::default(), &[Material::default()]);
-//! let (cloud, camera, params, detail) = (&cloud, &camera, &Params::default(), Detail::ALL);
-//! let projected = project(&ProjectInput { cloud, camera, footprints, materials, params, detail });
+//! let footprints = &FootprintStack::default();
+//! let materials = &[Material::default()];
+//! let params = &Params::default();
+//! let input = ProjectInput { cloud: &cloud, camera: &camera, footprints, materials, params, detail: Detail::ALL };
+//! let projected = project(&input);
 //! let bins = bin(&projected, &[0]);
 //! let sum: f32 = (0..bins.tiles()).map(|t| pulp::Arch::new().dispatch(Sum(&projected, &bins, t))).sum();
 //! // ∫τ dA is the cross-section, whatever the splat's size: 32 pixels are one unit of length.

@@ -346,7 +346,8 @@ impl Tile {
 
     /// Optical depths, transmittances and channels. T stays 0 outside the image, where nothing shall keep a tile busy.
     fn load_lines(&mut self, acc: &Accumulator) {
-        let (planes, stride) = (self.planes, 2 * self.planes + self.channels);
+        let planes = self.planes;
+        let stride = 2 * planes + self.channels;
         for (p, plane) in acc.optical_depth.iter().chain(&acc.channels).enumerate() {
             let line = if p < planes { p } else { p + planes };
             for_each_span(self.size, self.x, self.y, |tile, image| {
@@ -362,7 +363,9 @@ impl Tile {
     }
 
     fn store(self, acc: &mut Accumulator) {
-        let (size, planes, stride) = (acc.size, self.planes, 2 * self.planes + self.channels);
+        let size = acc.size;
+        let planes = self.planes;
+        let stride = 2 * planes + self.channels;
         for (p, plane) in acc.optical_depth.iter_mut().chain(&mut acc.channels).enumerate() {
             let line = if p < planes { p } else { p + planes };
             for_each_span(size, self.x, self.y, |tile, image| {

@@ -42,7 +42,7 @@ mod view;
 use crate::{Camera, Error, Mesh, Progress, Similarity};
 use crossing::Crossing;
 use glam::Vec3;
-pub use layers::{TriangleLayer, TriangleLayers, count_layers, resolve_layers};
+pub use layers::{LayerLists, TriangleLayer, TriangleLayers, count_layers, resolve_layers};
 use view::Meshes;
 
 /// A mesh, and its place in the world.

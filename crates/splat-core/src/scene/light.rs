@@ -163,8 +163,8 @@ impl Light {
         }
     }
 
-    /// Shape and intensity as bits, the same for equal lights alone: a key that puts lights in an order of their own.
-    pub fn bits(&self) -> (u8, [u64; 9], [u32; 3]) {
+    /// A key that is the same for equal lights alone.
+    pub fn key(&self) -> LightKey {
         let zero = DVec3::ZERO;
         let (kind, vectors) = match self.shape {
             LightShape::Point { position } => (0, [position, zero, zero]),
@@ -180,7 +180,7 @@ impl Light {
         let mut shape = [0; 9];
         let numbers = vectors.iter().flat_map(|v| v.to_array());
         shape.iter_mut().zip(numbers).for_each(|(bits, number)| *bits = number.to_bits());
-        (kind, shape, self.intensity.map(f32::to_bits))
+        LightKey { kind, shape, intensity: self.intensity.map(f32::to_bits) }
     }
 
     /// The same light in a world whose lengths are `scale` times as large, so that everything there receives the same
@@ -214,7 +214,7 @@ impl Light {
     /// A light with an extent counts as one point at its centre. That is exact outside of a sphere that is seen whole, and
     /// far from what is flat; who lights what is nearer asks for [`Light::points`].
     #[inline]
-    pub fn irradiance(&self, p: DVec3, spread: f64) -> (DVec3, [f32; 3]) {
+    pub fn irradiance(&self, p: DVec3, spread: f64) -> Incidence<DVec3> {
         let from_point = |position: DVec3| {
             let to_light = position - p;
             let distance_sq = to_light.length_squared() + spread * spread;
@@ -241,8 +241,25 @@ impl Light {
             }
             LightShape::Rect { center, u, v } => from_patch(center, rect_normal(u, v)),
         };
-        (to_light, self.intensity.map(|i| (f64::from(i) * falloff) as f32))
+        Incidence { to_light, irradiance: self.intensity.map(|i| (f64::from(i) * falloff) as f32) }
     }
+}
+
+/// Light of a source at a point, without shadow.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Incidence<V> {
+    /// Direction to the source; shorter than 1 near a source, see [`Light::irradiance`].
+    pub to_light: V,
+    /// W/m² by channel, on a plane that faces the source.
+    pub irradiance: [f32; 3],
+}
+
+/// A light as bits, which orders lights.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct LightKey {
+    kind: u8,
+    shape: [u64; 9],
+    intensity: [u32; 3],
 }
 
 /// Unit normal of a rectangle with these half-axes, to the side that it shines to.
@@ -272,26 +289,26 @@ mod tests {
     fn ts01_a_splat_at_the_light_receives_a_finite_mean() {
         let light = light(LightShape::Point { position: DVec3::ONE });
         for offset in [0.0, 1e-12, 1e-3] {
-            let (to_light, irradiance) = light.irradiance(DVec3::ONE + DVec3::X * offset, 0.1);
+            let Incidence { to_light, irradiance } = light.irradiance(DVec3::ONE + DVec3::X * offset, 0.1);
             assert!((irradiance[0] / 200.0 - 1.0).abs() < 1e-3, "{offset}: {irradiance:?}");
             assert!(to_light.length() < 0.011);
         }
-        let (to_light, irradiance) = light.irradiance(DVec3::new(1.0, 1.0, -9.0), 0.1);
+        let Incidence { to_light, irradiance } = light.irradiance(DVec3::new(1.0, 1.0, -9.0), 0.1);
         assert!((irradiance[0] - 0.02).abs() < 1e-5 && (to_light - DVec3::Z).length() < 1e-4);
-        assert_eq!(light.irradiance(DVec3::ONE, 0.0).1, [0.0; 3]);
+        assert_eq!(light.irradiance(DVec3::ONE, 0.0).irradiance, [0.0; 3]);
     }
 
     #[test]
     fn a_patch_shines_to_one_side_with_the_cosine() {
         let patch = light(LightShape::Patch { position: DVec3::ONE, normal: DVec3::NEG_Y });
-        let at = |x: f64, y: f64| patch.irradiance(DVec3::ONE + DVec3::new(x, y, 0.0), 0.0).1[0];
+        let at = |x: f64, y: f64| patch.irradiance(DVec3::ONE + DVec3::new(x, y, 0.0), 0.0).irradiance[0];
         // I·cos θ/d²: 2 at a distance of 1 along the normal, and at 60° to it a half of that.
         assert_eq!(at(0.0, -1.0), 2.0);
         assert!((at(0.75f64.sqrt(), -0.5) - 1.0).abs() < 1e-6);
         // Nothing beside it and behind it, whatever receives it.
         assert_eq!([at(1.0, 0.0), at(0.5, 1.0)], [0.0; 2]);
-        assert_eq!(patch.irradiance(DVec3::ONE + DVec3::Y * 0.01, 0.1).1, [0.0; 3]);
-        assert!(patch.irradiance(DVec3::ONE - DVec3::Y * 0.01, 0.1).1[0] > 0.0);
+        assert_eq!(patch.irradiance(DVec3::ONE + DVec3::Y * 0.01, 0.1).irradiance, [0.0; 3]);
+        assert!(patch.irradiance(DVec3::ONE - DVec3::Y * 0.01, 0.1).irradiance[0] > 0.0);
     }
 
     #[test]

@@ -125,13 +125,13 @@ impl Material {
         self.index_inside() != [1.0; 3]
     }
 
-    /// Reflection of a surface per unit irradiance on a plane that faces the light: the factor on its colour, and what is
-    /// specular; 1/sr, unit vectors away from the surface, the normal on the viewer's side.
+    /// Reflection of a surface per unit irradiance on a plane that faces the light. Unit vectors point away from the surface,
+    /// the normal to the viewer's side.
     ///
     /// Lambert ρ/π·⟨n·l⟩, of which the share `transmission` goes to the other side, and energy-normalised Phong
     /// ρ_s·(m + 2)/2π·⟨r·v⟩^m·⟨n·l⟩ (Gunjee 2007, section 4.3).
     #[inline]
-    pub fn reflect(&self, normal: Vec3, to_light: Vec3, to_eye: Vec3) -> (f32, f32) {
+    pub fn reflect(&self, normal: Vec3, to_light: Vec3, to_eye: Vec3) -> Reflection {
         let cosine = normal.dot(to_light);
         let diffuse = cosine.max(0.0) * (1.0 - self.transmission) + (-cosine).max(0.0) * self.transmission;
         let mut specular = 0.0;
@@ -140,8 +140,17 @@ impl Material {
             let lobe = libm::powf(mirrored.dot(to_eye).max(0.0), self.shininess);
             specular = self.specular * (self.shininess + 2.0) / (2.0 * PI) * lobe * cosine;
         }
-        (self.diffuse / PI * diffuse, specular)
+        Reflection { diffuse: self.diffuse / PI * diffuse, specular }
     }
+}
+
+/// Reflected radiance per unit irradiance, 1/sr.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Reflection {
+    /// Factor on the surface's colour.
+    pub diffuse: f32,
+    /// Without colour.
+    pub specular: f32,
 }
 
 /// Materials by [`crate::Splat::material`].

@@ -28,7 +28,7 @@ impl Census {
     ///
     /// # Panics
     /// If an id of the cloud has no entry in its table, which [`Cloud::validate`] and the tables' makers see to.
-    pub fn of(cloud: &Cloud, materials: &[Material], objects: &[Object], footprints: &FootprintStack) -> Self {
+    pub fn new(cloud: &Cloud, materials: &[Material], objects: &[Object], footprints: &FootprintStack) -> Self {
         let norms: Vec<f64> = footprints.layers().iter().map(|f| f.norm()).collect();
         let mut census = Self { splats: cloud.len() as u64, ..Self::default() };
         for i in 0..cloud.len() {

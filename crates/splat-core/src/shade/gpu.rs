@@ -146,7 +146,7 @@ pub fn received(input: &ShadeInput<'_>, ids: &[u32], progress: Option<&Progress>
                 return;
             }
             for (to, &i) in to.iter_mut().zip(ids) {
-                let (_, irradiance) = point_of(input, i as usize).irradiance(lit);
+                let irradiance = point_of(input, i as usize).irradiance(lit).irradiance;
                 *to = super::received(input, i as usize, lit.shadow, irradiance);
             }
         });

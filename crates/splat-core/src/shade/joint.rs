@@ -284,7 +284,7 @@ impl ThickSplat {
         let lit = &input.lights[rank];
         let Some(shadow) = lit.shadow.filter(|_| through != [0.0; 3]) else { return passing(through, coefficient) };
         let place = input.cloud.origin + self.cell.position.as_dvec3();
-        let (to_light, _) = lit.light.irradiance(place, f64::from(self.cell.radius) / 3.0);
+        let to_light = lit.light.irradiance(place, f64::from(self.cell.radius) / 3.0).to_light;
         let absorbs = input.objects[input.cloud.object[i] as usize].casts_shadow;
         let cell = MediumCell { absorbs, ..self.cell };
         let depths = cell.depths(shadow, to_light.as_vec3().normalize_or_zero());

@@ -7,7 +7,7 @@
 
 use super::{ChannelLayout, LitBy};
 use crate::optics::TRACE;
-use crate::{Material, SHADED_EFFECTS, Shading, SplatKind, henyey_greenstein};
+use crate::{Incidence, Material, Reflection, SHADED_EFFECTS, Shading, SplatKind, henyey_greenstein};
 use glam::{DVec3, Vec3};
 
 /// One point being shaded.
@@ -74,10 +74,10 @@ pub(super) fn passing(transmittance: [f32; 3], coefficient: f32) -> [f32; 3] {
 impl Point<'_> {
     /// Direction to a light, and its irradiance here without shadow.
     #[inline]
-    pub fn irradiance(&self, lit: &LitBy<'_>) -> (Vec3, [f32; 3]) {
+    pub fn irradiance(&self, lit: &LitBy<'_>) -> Incidence<Vec3> {
         // σ = R/3 at the default cutoff.
-        let (to_light, irradiance) = lit.irradiance(self.position, f64::from(self.radius) / 3.0);
-        (to_light.as_vec3(), irradiance)
+        let Incidence { to_light, irradiance } = lit.irradiance(self.position, f64::from(self.radius) / 3.0);
+        Incidence { to_light: to_light.as_vec3(), irradiance }
     }
 
     /// Radiance towards the viewer under `lights` and the same ambient radiance from everywhere; `transmittance` gives the
@@ -92,9 +92,12 @@ impl Point<'_> {
         let m = self.material;
         let by_phase = m.shading == Shading::Phase || self.normal == Vec3::ZERO;
         let incoming = lights.map(|lit| {
-            let (to_light, irradiance) = self.irradiance(lit);
-            let (diffuse, specular) =
-                if by_phase { (self.scatter(to_light), 0.0) } else { m.reflect(self.normal, to_light, self.to_eye) };
+            let Incidence { to_light, irradiance } = self.irradiance(lit);
+            let Reflection { diffuse, specular } = if by_phase {
+                Reflection { diffuse: self.scatter(to_light), specular: 0.0 }
+            } else {
+                m.reflect(self.normal, to_light, self.to_eye)
+            };
             Incoming { irradiance, diffuse, specular }
         });
         Radiance::new(m, self.color, by_phase, ambient, incoming, transmittance)

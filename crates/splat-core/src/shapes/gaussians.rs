@@ -156,8 +156,9 @@ impl Gaussians {
     fn raised(&self, degree: u8) -> Self {
         let from = self.terms();
         let to = terms(degree);
-        let one = |given: &[[f32; 3]]| (0..to).map(|k| given.get(k).copied().unwrap_or([0.0; 3])).collect::<Vec<_>>();
-        Self { degree, harmonics: self.harmonics.chunks_exact(from).flat_map(one).collect(), ..self.clone() }
+        let padded =
+            |given: &[[f32; 3]]| (0..to).map(|k| given.get(k).copied().unwrap_or([0.0; 3])).collect::<Vec<_>>();
+        Self { degree, harmonics: self.harmonics.chunks_exact(from).flat_map(padded).collect(), ..self.clone() }
     }
 
     /// Checks that columns have one length, that numbers are finite and opacities shares.
@@ -193,7 +194,8 @@ impl Gaussians {
 
     /// Order by the bits of all numbers.
     fn compare(&self, a: usize, b: usize) -> Ordering {
-        let (n, bits) = (self.terms(), |v: f32| v.to_bits());
+        let n = self.terms();
+        let bits = |v: f32| v.to_bits();
         let numbers = |i: usize| {
             let axes = self.axes[i].into_iter().flat_map(|axis| axis.to_array());
             axes.chain([self.opacity[i]]).chain(self.harmonics[i * n..][..n].iter().flatten().copied()).map(bits)
@@ -304,8 +306,8 @@ mod tests {
     fn a_linear_color_that_is_the_same_from_everywhere_comes_back() {
         let given = [0.02, 0.5, 1.0];
         let harmonics = vec![Gaussians::constant(given)];
-        let one = Gaussians { axes: vec![[Vec3::X; 3]], opacity: vec![1.0], degree: 0, harmonics };
-        one.color(0, Vec3::X).iter().zip(given).for_each(|(c, expected)| assert!((c - expected).abs() < 1e-6, "{c}"));
+        let red = Gaussians { axes: vec![[Vec3::X; 3]], opacity: vec![1.0], degree: 0, harmonics };
+        red.color(0, Vec3::X).iter().zip(given).for_each(|(c, expected)| assert!((c - expected).abs() < 1e-6, "{c}"));
     }
 
     #[test]

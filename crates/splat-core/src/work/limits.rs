@@ -75,8 +75,8 @@ impl Exceeded {
         }
     }
 
-    /// The same said of something larger, `whose: what`, with the knob that is known there.
-    pub fn of(self, whose: &str, hint: impl Into<Cow<'static, str>>) -> Self {
+    /// Names the owner of the refused item, as `whose: what`, and takes the hint that is known there.
+    pub fn owned_by(self, whose: &str, hint: impl Into<Cow<'static, str>>) -> Self {
         Self { what: format!("{whose}: {}", self.what).into(), hint: hint.into(), ..self }
     }
 }
@@ -112,7 +112,7 @@ mod tests {
         );
         let rounded = Exceeded { needed: 10_u64.pow(18), ..few.clone() };
         assert_eq!(rounded.to_string(), "a cloud needs 1.000e18 splats, the limit is 2");
-        let named = few.of("object 'fog'", "");
+        let named = few.owned_by("object 'fog'", "");
         assert_eq!(named.to_string(), "object 'fog': a cloud needs 3 splats, the limit is 2");
     }
 }

@@ -43,6 +43,15 @@ impl std::fmt::Debug for Progress {
     }
 }
 
+/// Units of a stage.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Units {
+    /// Those that are done.
+    pub done: u64,
+    /// Those that were announced.
+    pub total: u64,
+}
+
 impl Progress {
     /// No work yet.
     pub fn new() -> Self {
@@ -163,9 +172,9 @@ impl Progress {
         self.heard.load(Relaxed)
     }
 
-    /// Units of the present stage, done and announced.
-    pub fn read(&self) -> (u64, u64) {
-        (self.done.load(Relaxed), self.total.load(Relaxed))
+    /// Units of the present stage.
+    pub fn read(&self) -> Units {
+        Units { done: self.done.load(Relaxed), total: self.total.load(Relaxed) }
     }
 
     /// The present stage, after those that it is a stage of, and the fraction of the whole that is done, 0 to 1, never less
@@ -175,7 +184,7 @@ impl Progress {
     }
 
     fn look(&self, course: &mut Course) -> (String, f64) {
-        let (done, total) = self.read();
+        let Units { done, total } = self.read();
         let share = if total > 0 { (done as f64 / total as f64).min(1.0) } else { 0.0 };
         let Stage { begin, end, .. } = course.frame().stage;
         course.reported = course.reported.max(begin + (end - begin) * share).min(1.0);

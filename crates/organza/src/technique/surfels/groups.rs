@@ -65,7 +65,7 @@ pub(super) fn members(
 
 fn refuse(object: &SceneObject, error: deferred_blend::Error) -> Error {
     match error {
-        deferred_blend::Error::Limit(exceeded) => Error::Limit(exceeded.of(
+        deferred_blend::Error::Limit(exceeded) => Error::Limit(exceeded.owned_by(
             &format!("object '{}'", escape_controls(&object.name)),
             "set render.surfels.grouping = \"hash\", collisions = \"keep\" and coverage = \"bound\", or a larger spacing",
         )),

@@ -159,7 +159,7 @@ impl<'a> PolygonLight<'a> {
     ) {
         let (point, radiance) = self.radiance(seen, rank, listed);
         if seen.polygons.is_lit() {
-            let whole: f32 = listed.lights.iter().map(|lit| point.irradiance(lit).1[1]).sum();
+            let whole: f32 = listed.lights.iter().map(|lit| point.irradiance(lit).irradiance[1]).sum();
             received.shadowed += radiance.shadow * whole;
             received.whole += whole;
         }

@@ -8,7 +8,7 @@ use crate::Error;
 use rayon::prelude::*;
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::optics::{self, SurfaceOpacity};
-use splat_core::raster::triangles::{PlacedMesh, TriangleHit, TriangleLayer, resolve, resolve_layers};
+use splat_core::raster::triangles::{LayerLists, PlacedMesh, TriangleHit, TriangleLayer, resolve, resolve_layers};
 use splat_core::shade::{ChannelLayout, Point, facing};
 use splat_core::{Camera, Material, Progress, Receiver, Shading, SplatKind};
 use std::ops::Range;
@@ -168,7 +168,7 @@ impl<'a> EyePanes<'a> {
         // What else is kept of each takes as much again and more.
         let most = most / bytes_of_a_pane(layout) * size_of::<Hit>() as u64;
         let layers = resolve_layers(&placed, camera, opaque, most, none, hit, Some(progress));
-        let (starts, hits) = layers.map_err(Error::of_polygons)?.into_lists();
+        let LayerLists { starts, layers: hits } = layers.map_err(Error::of_polygons)?.into_lists();
         Ok(Self { seen: Surfaces { meshes, hits }, starts })
     }
 

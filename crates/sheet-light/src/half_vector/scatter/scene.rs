@@ -28,7 +28,7 @@ pub(crate) struct Scene {
 
 /// Power per channel that enters a column of this area at its first face.
 pub(crate) fn entering(lit: &LitBy<'_>, place: DVec3, area: f64) -> [f64; 3] {
-    let irradiance = lit.light.irradiance(place, 0.0).1;
+    let irradiance = lit.light.irradiance(place, 0.0).irradiance;
     // A column of even width has this deviation.
     let passing = lit.slide.map_or([1.0; 3], |slide| slide.passing(place, (area / 12.0).sqrt()));
     [0, 1, 2].map(|c| f64::from(irradiance[c] * passing[c]) * area)

@@ -229,7 +229,7 @@ impl Penumbra {
 
 /// Share of each point of a light in what a place receives of it, and all of that over what the centre gives alone.
 pub(crate) fn received(light: &Light, points: &[Light], place: DVec3) -> (Vec<f32>, f64) {
-    let green = |light: &Light| f64::from(light.irradiance(place, 0.0).1[0]);
+    let green = |light: &Light| f64::from(light.irradiance(place, 0.0).irradiance[0]);
     let each: Vec<f64> = points.iter().map(green).collect();
     let centre: f64 = green(&Light { intensity: [1.0; 3], ..*light });
     let whole: f64 = each.iter().sum();

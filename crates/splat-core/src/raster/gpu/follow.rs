@@ -54,7 +54,8 @@ pub fn uploads(recorded: &Recorded, input: &Input<'_>, accumulator: &Accumulator
     let kernels = &kernels[..];
     let none = OpaqueImage::default();
     let ordered = order.len() as u32;
-    let (opaque, hidden) = (input.opaque.unwrap_or(&none), input.opaque.is_none());
+    let opaque = input.opaque.unwrap_or(&none);
+    let hidden = input.opaque.is_none();
     let image = Image { size, perspective, kernels, materials, opaque, direction, params, ordered, objects, hidden };
     recorded.check_image(&image, accumulator)?;
     let splats = recorded.capacities.splats as usize;

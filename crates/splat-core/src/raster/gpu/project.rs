@@ -134,7 +134,8 @@ impl Recorded {
         attributes.check(room.attributes, input.materials.len(), footprints.len())?;
         fits("footprints", footprints.len() as u64, room.footprints)?;
         fits("materials", input.materials.len() as u64, room.materials)?;
-        let (camera, turn) = (input.camera, input.camera.view_from_offset(input.origin));
+        let camera = input.camera;
+        let turn = camera.view_from_offset(input.origin);
         let size = camera.size.map(|s| s as f32);
         let view = ProjectView {
             axis_x: turn.rotation.x_axis.extend(0.0).to_array(),

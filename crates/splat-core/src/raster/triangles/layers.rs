@@ -29,6 +29,14 @@ pub struct TriangleLayers<T> {
     layers: Vec<T>,
 }
 
+/// The lists of all pixels, one after the other.
+pub struct LayerLists<T> {
+    /// The first layer of each pixel, and the end of the last pixel.
+    pub starts: Vec<u32>,
+    /// Nearest first in each pixel.
+    pub layers: Vec<T>,
+}
+
 impl<T> TriangleLayers<T> {
     /// Those of pixel `k`, nearest first; equally near ones in the order of meshes and triangles.
     #[inline]
@@ -36,9 +44,9 @@ impl<T> TriangleLayers<T> {
         &self.layers[self.starts[k] as usize..self.starts[k + 1] as usize]
     }
 
-    /// The lists, one after the other, and where that of each pixel begins, with the end of the last.
-    pub fn into_lists(self) -> (Vec<u32>, Vec<T>) {
-        (self.starts, self.layers)
+    /// The lists of all pixels.
+    pub fn into_lists(self) -> LayerLists<T> {
+        LayerLists { starts: self.starts, layers: self.layers }
     }
 
     /// Bytes of the lists.
