@@ -262,7 +262,7 @@ impl<'a> Sweep<'a> {
         let camera = &sight.camera;
         let opaque = self.input.opaque;
         let rim = usize::from(placed.iter().any(|v| v.compares));
-        let one = |b: usize| {
+        let eye_band = |b: usize| {
             let mut band = Band::new(b, rim, frame, camera, volumes);
             if !opaque.is_empty() {
                 band.end_at(opaque, frame, camera);
@@ -270,7 +270,7 @@ impl<'a> Sweep<'a> {
             let pixels = Pixels::new(&band, form, params.is_half());
             EyeBand::new(band, placed, pixels)
         };
-        (0..(camera.size[1] as usize).div_ceil(ROWS)).into_par_iter().map(one).collect()
+        (0..(camera.size[1] as usize).div_ceil(ROWS)).into_par_iter().map(eye_band).collect()
     }
 
     fn counts(&self, bands: &[EyeBand]) -> HalfCounts {
@@ -296,8 +296,8 @@ impl<'a> Sweep<'a> {
 
 /// Draws one slab in all bands of the eye's image. Number of footprint numbers.
 fn draw(bands: &mut [EyeBand], work: SlabWork<'_>) -> u64 {
-    let one = |(index, eye): (usize, &mut EyeBand)| {
+    let footprints = |(index, eye): (usize, &mut EyeBand)| {
         pulp::Arch::new().dispatch(OneSlab { work, index, eye, part: DepthSpans::WHOLE })
     };
-    bands.par_iter_mut().enumerate().map(one).sum()
+    bands.par_iter_mut().enumerate().map(footprints).sum()
 }

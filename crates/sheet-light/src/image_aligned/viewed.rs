@@ -260,7 +260,8 @@ impl Viewed {
     #[inline(always)]
     pub(crate) fn footprint(&self, scale: f64) -> PixelFootprint {
         if self.smallest * scale * scale >= self.least {
-            let (scale, inverse) = (scale as f32, (1.0 / scale) as f32);
+            let inverse = (1.0 / scale) as f32;
+            let scale = scale as f32;
             let PixelFootprint { conic: [a, b, c], half: [x, y] } = self.unit;
             let square = inverse * inverse;
             return PixelFootprint { conic: [a * square, b * square, c * square], half: [x * scale, y * scale] };

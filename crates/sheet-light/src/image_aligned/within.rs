@@ -59,8 +59,9 @@ impl Within {
             return Ok(None);
         }
         let voxels = VoxelDepths::new(receivers, origin);
-        let one = |lit: &LitBy<'_>| lit.shadow.map(|shadow| voxels.slopes_of_light(lit, shadow, progress)).transpose();
-        let of_lights = lights.iter().map(one).collect::<Result<_, _>>()?;
+        let slopes =
+            |lit: &LitBy<'_>| lit.shadow.map(|shadow| voxels.slopes_of_light(lit, shadow, progress)).transpose();
+        let of_lights = lights.iter().map(slopes).collect::<Result<_, _>>()?;
         let mut is_inside = voxels.of_each(progress, |place| voxels.value(place).is_some())?;
         is_inside.extend([false; 2]);
         let extinction_rgb = receivers.volume.material.extinction_rgb;

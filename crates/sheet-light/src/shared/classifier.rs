@@ -77,7 +77,7 @@ impl Classifier {
         let mut out = [[0.0; MAX_LANES]; 4];
         value.store(&mut values);
         for lane in 0..Lanes::<S>::COUNT {
-            let class = self.one(values[lane]);
+            let class = self.class_of(values[lane]);
             (0..4).for_each(|c| out[c][lane] = class[c]);
         }
         let load = |c: usize| Lanes::load(simd, &out[c]);
@@ -87,7 +87,7 @@ impl Classifier {
 
     /// Extinction, red, green and blue of one value.
     #[inline(always)]
-    pub(crate) fn one(&self, value: f32) -> [f32; 4] {
+    pub(crate) fn class_of(&self, value: f32) -> [f32; 4] {
         let upper = self.pieces.partition_point(|p| p.value <= value);
         let Some(i) = upper.checked_sub(1) else {
             return self.first;
@@ -204,7 +204,7 @@ mod tests {
             let base = Base::new(range(0.0, high), &tf);
             let classifier = Classifier::new(&tf, 1.0, base);
             for value in [0.0, 1e-43, 0.5 * high, high] {
-                let found = classifier.one(base.relative(value));
+                let found = classifier.class_of(base.relative(value));
                 assert!(found.iter().all(|v| v.is_finite()), "{value} of {high}: {found:?}");
                 assert!(value <= 1e-43 || found[0] == 1.0, "{value} of {high}: {found:?}");
             }

@@ -48,8 +48,9 @@ impl Shadows {
         if lights.iter().all(|lit| lit.shadow.is_none()) || receivers.volume.shadow_coefficient == 0.0 {
             return Ok(None);
         }
-        let one = |lit: &LitBy<'_>| lit.shadow.map(|shadow| look_up(receivers, shadow, origin, progress)).transpose();
-        let of_lights = lights.iter().map(one).collect::<Result<_, _>>()?;
+        let looked_up =
+            |lit: &LitBy<'_>| lit.shadow.map(|shadow| look_up(receivers, shadow, origin, progress)).transpose();
+        let of_lights = lights.iter().map(looked_up).collect::<Result<_, _>>()?;
         Ok(Some(Self { of_lights, neighbours: Neighbours::new(receivers) }))
     }
 

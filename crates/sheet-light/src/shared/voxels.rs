@@ -38,7 +38,8 @@ impl Voxels {
     /// The voxels of `lattice` whose kernels may matter, `hidden` being intervals of values that nothing is seen of, and `near` the voxels that have a
     /// share in anything that one of them shapes.
     pub(crate) fn needed(lattice: &Lattice<'_>, hidden: &[ValueRange], near: &Near) -> Self {
-        let (dims, words) = (lattice.dims, lattice.dims[0].div_ceil(64));
+        let dims = lattice.dims;
+        let words = dims[0].div_ceil(64);
         let mut needed = Self { dims, words, bits: vec![!0; words * dims[1] * dims[2]] };
         for interval in hidden.iter().take(MOST_INTERVALS) {
             let mut inside = Self::within(lattice, *interval);
@@ -118,7 +119,8 @@ impl Voxels {
 
     fn within(lattice: &Lattice<'_>, values: ValueRange) -> Self {
         let ValueRange { least: low, greatest: high } = values;
-        let (dims, words) = (lattice.dims, lattice.dims[0].div_ceil(64));
+        let dims = lattice.dims;
+        let words = dims[0].div_ceil(64);
         let mut bits = vec![0u64; words * dims[1] * dims[2]];
         let rows = bits.par_chunks_mut(words).enumerate().with_min_len(256);
         rows.for_each_init(Vec::new, |values: &mut Vec<f32>, (row, bits)| {

@@ -159,9 +159,9 @@ impl LightDepths {
     /// Bytes of the images.
     pub(crate) fn bytes(&self) -> u64 {
         let views = self.points.iter().flat_map(|point| &point.views);
-        let one =
+        let view_bytes =
             |view: &View| 12 * view.planes.depth.len() as u64 + view.layers.as_ref().map_or(0, LightLayers::bytes);
-        views.map(one).sum()
+        views.map(view_bytes).sum()
     }
 
     /// Share of the light that polygons let through to a world position, by channel, which lies on a surface of this normal or in the open.
@@ -202,7 +202,7 @@ impl LightDepths {
             return self.lit_through(&way, by_point);
         }
         if let [point] = &self.points[..] {
-            return LitWay::one(self.lit_by(point, &way));
+            return LitWay::lit(self.lit_by(point, &way));
         }
         let mut sum = 0.0;
         let mut moment = 0.0;
@@ -215,14 +215,14 @@ impl LightDepths {
             sum += point.share * (to - from);
             moment += point.share * 0.5 * (to - from) * (from + to);
         }
-        LitWay::one(if is_whole { Stretch::WHOLE } else { stretch_of(sum, moment) })
+        LitWay::lit(if is_whole { Stretch::WHOLE } else { stretch_of(sum, moment) })
     }
 
     /// Behind translucent polygons, whose shadows end in steps.
     fn lit_through(&self, way: &Way, by_point: &mut Vec<f32>) -> LitWay {
         let is_one = self.points.len() == 1;
         if is_one && let Some(is_lit) = self.is_whole(&self.points[0], way) {
-            return if is_lit { LitWay::one(Stretch::WHOLE) } else { LitWay::DARK };
+            return if is_lit { LitWay::lit(Stretch::WHOLE) } else { LitWay::DARK };
         }
         let length = self.points.iter().map(|point| pixels(point, way)).fold(0.0, f32::max);
         // Its ends tell what a short way has.

@@ -42,8 +42,8 @@ pub fn light_list_bytes(
     let bounds = DAabb::of_points(receivers.iter().copied());
     let middle = bounds.min + 0.5 * (bounds.max - bounds.min);
     let side = (side(most_pixels, light.samples) / COARSER).max(1);
-    let one = light.points(light.light.intensity).into_iter().next().unwrap_or(*light.light);
-    let cameras = views(&one, middle, panes, &receivers, side).unwrap_or_default();
+    let point = light.points(light.light.intensity).into_iter().next().unwrap_or(*light.light);
+    let cameras = views(&point, middle, panes, &receivers, side).unwrap_or_default();
     let bytes_of = |camera: &Camera| {
         let pixels: u64 = camera.size.into_iter().map(u64::from).product();
         LightLayers::bytes_of(pixels, count_layers(panes, camera).unwrap_or(0))

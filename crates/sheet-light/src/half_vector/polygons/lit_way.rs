@@ -53,7 +53,7 @@ impl LitWay {
     pub(crate) const DARK: Self = Self { parts: [WayPart::NONE; MOST_PARTS + 1], count: 0 };
 
     /// One part that is wholly lit.
-    pub(crate) fn one(stretch: Stretch) -> Self {
+    pub(crate) fn lit(stretch: Stretch) -> Self {
         let Stretch { from, to } = stretch;
         let mut way = Self::DARK;
         way.parts[0] = WayPart { from, to, through: Vec3::ONE };
@@ -129,6 +129,6 @@ mod tests {
         for (part, (from, share)) in way.parts().iter().zip(expected) {
             assert!((part.from - from / 9.0).abs() < 1e-6 && (part.through.x - share).abs() < 1e-6, "{part:?}");
         }
-        assert!(LitWay::one(Stretch::WHOLE).is_whole() && !way.is_whole() && !LitWay::DARK.is_whole());
+        assert!(LitWay::lit(Stretch::WHOLE).is_whole() && !way.is_whole() && !LitWay::DARK.is_whole());
     }
 }

@@ -53,7 +53,8 @@ impl<'a> Triangles<'a> {
 
     /// Those in a pixel of the eye that are opaque, or those that are not; nearest first.
     fn seen(&self, eye: &Image, pixel: usize, opaque: bool) -> Vec<Hit> {
-        let (camera, width) = (&eye.camera, eye.camera.size[0] as usize);
+        let camera = &eye.camera;
+        let width = camera.size[0] as usize;
         let (from, along) = camera.view_ray((pixel % width) as f64 + 0.5, (pixel / width) as f64 + 0.5);
         let [right, up, forward] = camera.axes;
         let world = |v: DVec3| right * v.x + up * v.y + forward * v.z;

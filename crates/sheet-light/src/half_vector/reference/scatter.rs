@@ -144,7 +144,9 @@ impl Diffuse {
 
     /// Gauss and Seidel's iteration over all columns of a channel.
     fn relax(&mut self, incoming: &[Vec<f64>], c: usize) {
-        let (grid, layers, width) = (self.grid, self.grid.layers, self.grid.columns[0]);
+        let grid = self.grid;
+        let layers = grid.layers;
+        let width = grid.columns[0];
         let slab = |x: usize, y: usize, k: usize| {
             let mut slab = Slab::new(self.cell(x, y, k), c, grid.length(Column { x, y }));
             let area = grid.area(k as f64 + 0.5);
@@ -179,7 +181,8 @@ impl Diffuse {
     /// ψ of one column between what its neighbours have: three unknowns an equation.
     fn column(&self, psi: &[f64], slabs: &[Slab], sides: &[[[f64; 2]; 4]], column: Column) -> Vec<f64> {
         let Column { x, y } = column;
-        let (grid, layers) = (self.grid, self.grid.layers);
+        let grid = self.grid;
+        let layers = grid.layers;
         let mut takes = Vec::new();
         let mut comes = Vec::new();
         for k in 0..=layers {
@@ -205,7 +208,9 @@ impl Diffuse {
 
     /// Writes ψ and the net flux of all faces.
     fn keep(&mut self, psi: &[f64], slabs: &[Vec<Slab>], sides: &[Vec<[[f64; 2]; 4]>], c: usize) {
-        let (grid, layers, width) = (self.grid, self.grid.layers, self.grid.columns[0]);
+        let grid = self.grid;
+        let layers = grid.layers;
+        let width = grid.columns[0];
         for (column, (x, y)) in self.columns().enumerate() {
             for k in 0..=layers {
                 let k_face = self.face(x, y, k);

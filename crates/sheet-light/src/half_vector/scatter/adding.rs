@@ -138,8 +138,8 @@ impl<'a> Adding<'a> {
     /// A sum over all faces, row by row, so that it knows no threads.
     fn sum(&self, term: impl Fn(usize) -> f64 + Sync) -> f64 {
         let rows = self.taken.len() / self.row;
-        let one = |y: usize| (y * self.row..(y + 1) * self.row).map(&term).sum::<f64>();
-        (0..rows).into_par_iter().map(one).collect::<Vec<f64>>().into_iter().sum()
+        let row_sum = |y: usize| (y * self.row..(y + 1) * self.row).map(&term).sum::<f64>();
+        (0..rows).into_par_iter().map(row_sum).collect::<Vec<f64>>().into_iter().sum()
     }
 
     fn each(&self, plane: &mut [f64], change: impl Fn(usize, &mut f64) + Sync) {

@@ -110,7 +110,8 @@ mod tests {
         assert_eq!(plane, start);
         let wide = Kernel::new(16.0);
         convolve(&mut plane, 8, &[wide.clone(), wide], 0.0);
-        let (sum, before): (f64, f64) = (plane.iter().sum(), start.iter().sum());
+        let sum: f64 = plane.iter().sum();
+        let before: f64 = start.iter().sum();
         assert!(plane.iter().all(|v| v.is_finite() && *v >= 0.0) && sum < before && sum > 0.0);
     }
 

@@ -63,7 +63,7 @@ impl SurfaceLight {
         let Scene { grid, cells, .. } = scene;
         let width = grid.columns[0];
         let layers = grid.layers;
-        let one = |(at, face): (usize, &[f32; NUMBERS])| {
+        let stored_face = |(at, face): (usize, &[f32; NUMBERS])| {
             let [x, level] = [at % width, at / width % (layers + 1)];
             let y = at / (width * (layers + 1));
             let sides = [level.saturating_sub(1), level.min(layers - 1)].map(|layer| (y * layers + layer) * width + x);
@@ -80,7 +80,7 @@ impl SurfaceLight {
         let emission = Emission { grid, cells, faces, sources, leaving: *leaving };
         Self {
             grid: *grid,
-            faces: faces.iter().enumerate().map(one).collect(),
+            faces: faces.iter().enumerate().map(stored_face).collect(),
             filled: filled(grid, cells),
             emitters: Emitters::new(&emission),
         }

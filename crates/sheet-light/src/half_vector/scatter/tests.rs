@@ -51,15 +51,15 @@ fn ms07_light_ahead_spreads_as_its_cone_says() {
     // All is scattered in the first layer, and nothing behind it.
     let sigma = (40.0 / grid.depth) as f32;
     let dense = Cell { extinction: [sigma; 3], scattering: [sigma; 3], ahead: [sigma; 3], ..Cell::default() };
-    let mut all = vec![Cell::default(); grid.cells()];
+    let mut cells = vec![Cell::default(); grid.cells()];
     let is_first = |at: usize| (at / width).is_multiple_of(layers);
-    all.iter_mut().enumerate().filter(|(at, _)| is_first(*at)).for_each(|(_, cell)| *cell = dense);
+    cells.iter_mut().enumerate().filter(|(at, _)| is_first(*at)).for_each(|(_, cell)| *cell = dense);
     let middle = [width / 2, height / 2];
     let mut entering = vec![0.0; width * height];
     entering[middle[1] * width + middle[0]] = 1.0;
     let entering = [entering.clone(), entering.clone(), entering];
     for cone in [0.05, 0.1, 0.2] {
-        let beam = Path { grid: &grid, cells: &all, entering: &entering, others: &[], cone }.march(0);
+        let beam = Path { grid: &grid, cells: &cells, entering: &entering, others: &[], cone }.march(0);
         assert!((beam.transmitted - 1.0).abs() < 1e-5, "{cone}: {}", beam.transmitted);
         for a in 0..2 {
             // Squares of distances at the far face: tan²·z²/3.

@@ -27,7 +27,7 @@ pub struct SplatBounds {
 
 impl SplatBounds {
     /// Those of some splats of a cloud, in slabs of half their mean radius, for neighbours are about as far apart; `None` without any.
-    pub fn of(cloud: &Cloud, ids: impl Iterator<Item = u32>) -> Option<Self> {
+    pub fn from_cloud(cloud: &Cloud, ids: impl Iterator<Item = u32>) -> Option<Self> {
         let mut bounds_of_splats = Aabb::EMPTY;
         let mut radii = 0.0f64;
         let mut count = 0u64;

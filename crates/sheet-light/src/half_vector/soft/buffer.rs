@@ -153,7 +153,7 @@ impl SoftBuffer {
         self.slab[self.filled.start * row..self.filled.end * row].fill(0.0);
         self.filled = part.rows.clone();
         let sources = &self.sources;
-        let one = |(n, to): (usize, &mut [f32])| {
+        let filled_row = |(n, to): (usize, &mut [f32])| {
             let y = part.rows.start + n;
             let mut any = false;
             for x in part.columns.clone() {
@@ -169,7 +169,7 @@ impl SoftBuffer {
             any
         };
         let rows = &mut self.slab[part.rows.start * row..part.rows.end * row];
-        rows.par_chunks_mut(row).enumerate().map(one).reduce(|| false, |a, b| a | b)
+        rows.par_chunks_mut(row).enumerate().map(filled_row).reduce(|| false, |a, b| a | b)
     }
 
     /// What the penumbra makes of the optical depth about places of the present slab, in the volumes. Points count by how much of the way there

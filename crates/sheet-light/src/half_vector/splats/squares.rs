@@ -76,15 +76,15 @@ impl Squares {
 
     /// Bytes of lists and sums.
     pub(crate) fn bytes(&self) -> u64 {
-        let one = |square: &Square| 4 * square.ids.len() as u64 + square.lines.bytes();
-        self.squares.iter().flatten().map(one).sum()
+        let square_bytes = |square: &Square| 4 * square.ids.len() as u64 + square.lines.bytes();
+        self.squares.iter().flatten().map(square_bytes).sum()
     }
 
     /// Puts the splats of a slab in the place of those before. Fragments.
     pub(crate) fn fill(&mut self, slab: Slab<'_>) -> u64 {
         let form = self.form;
-        let one = |square: &mut Square| pulp::Arch::new().dispatch(OneSquare { slab, form, square });
-        self.squares.par_iter_mut().flatten().map(one).sum()
+        let fragments = |square: &mut Square| pulp::Arch::new().dispatch(OneSquare { slab, form, square });
+        self.squares.par_iter_mut().flatten().map(fragments).sum()
     }
 
     /// The sums about a pixel; `None` where the slab has no splat in any of the `count` pixels from it on, which lie

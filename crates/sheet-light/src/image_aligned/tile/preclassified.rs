@@ -43,7 +43,7 @@ impl Preclassified {
         record: &Record,
         mask: &[u64; SIDE],
     ) -> u64 {
-        let [extinction, red, green, blue] = classifier.one(record.value);
+        let [extinction, red, green, blue] = classifier.class_of(record.value);
         let sums = [extinction, extinction * red, extinction * green, extinction * blue];
         let mut fragments = 0;
         // No closure: it would not be compiled for the vectors of its caller.

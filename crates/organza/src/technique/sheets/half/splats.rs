@@ -8,7 +8,7 @@ use splat_core::{Cloud, SplatKind};
 
 /// Where the splats are that sweeps draw; `None` without any, and before they are made.
 pub(super) fn splat_bounds(matter: &Matter<'_>) -> Option<SplatBounds> {
-    SplatBounds::of(matter.cloud?, own_splats(matter))
+    SplatBounds::from_cloud(matter.cloud?, own_splats(matter))
 }
 
 /// Ids of the translucent splats of objects that become nothing else.
