@@ -124,6 +124,10 @@ pub(super) fn measured_text(measured: &Measured, plan: &Plan, tolerance: f64) ->
     if let Some(change) = measured.left_out_together {
         text += &format!("all that is left out, simulated together, changes {}\n", share_text(change));
     }
+    if let Some(splats) = measured.lit.filter(|splats| splats.lit < splats.in_view) {
+        text +=
+            &format!("{} of {} splats in view got light: the others are seen nowhere\n", splats.lit, splats.in_view);
+    }
     text
 }
 

@@ -4,7 +4,7 @@
 
 use organza::scene::{LoadOptions, Override, Scene, parse};
 use organza::{Error, Files, Progress, RenderOptions};
-use organza_judge::effects::{Switch, measure};
+use organza_judge::effects::{LitSplats, Switch, measure};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
@@ -73,6 +73,7 @@ struct Drawn {
     name: String,
     rows: Vec<Row>,
     left_out_together: Option<f64>,
+    lit: Option<LitSplats>,
     tolerance: f64,
     predicted_seconds: f64,
     seconds: f64,
@@ -165,6 +166,7 @@ fn draw(path: &Path) -> Result<Drawn, Error> {
     Ok(Drawn {
         rows: measured.changes.iter().map(row).collect(),
         left_out_together: measured.left_out_together,
+        lit: measured.lit,
         tolerance: planned.render.tolerance,
         predicted_seconds: passes.map(|pass| pass.seconds(&explained.predicted.rates, threads)).sum(),
         seconds: measured.seconds,
@@ -217,6 +219,7 @@ fn tables(drawn: &[Drawn]) -> String {
          - Left out: {}. Forced on, {beyond} change a pixel by more than the tolerance; the most is {}.\n\
          - Called for: {}. Forced off, {seen} of these change some pixel by more than the tolerance.\n\
          - {over} changed a pixel by more than their bound. The bound is {:.1} times the change, in the median.\n\
+         - In part: in {} scenes, splats that are seen nowhere get no light.\n\
          - Predicted and measured times of drawing differ by a factor of {:.2} in the median, {:.1} at most.\n\n",
         drawn.len(),
         rows().count(),
@@ -224,11 +227,12 @@ fn tables(drawn: &[Drawn]) -> String {
         percent(most_off),
         on().count(),
         median(ratios),
+        drawn.iter().filter(|scene| scene.lit.is_some_and(|splats| splats.lit < splats.in_view)).count(),
         median(drawn.iter().map(ratio)),
         drawn.iter().map(ratio).fold(0.0, f64::max),
     );
-    text += "| scene | left out | all of it, forced on, changes | called for, and what a pixel changes without it | s predicted | s measured |\n\
-             |---|---|---|---|---|---|\n";
+    text += "| scene | left out | all of it, forced on, changes | splats that get light, of those in view | called for, and what a pixel changes without it | s predicted | s measured |\n\
+             |---|---|---|---|---|---|---|\n";
     for scene in drawn {
         let names = |is_on: bool| scene.rows.iter().filter(move |row| row.is_on == is_on);
         let left_out: Vec<String> = names(false).map(|row| format!("`{}`", row.effect)).collect();
@@ -236,9 +240,10 @@ fn tables(drawn: &[Drawn]) -> String {
         let together = scene.left_out_together.map_or_else(String::new, percent);
         writeln!(
             text,
-            "| {} | {} | {together} | {} | {:.2} | {:.2} |",
+            "| {} | {} | {together} | {} | {} | {:.2} | {:.2} |",
             scene.name,
             left_out.join(", "),
+            scene.lit.map_or_else(String::new, |splats| format!("{} of {}", splats.lit, splats.in_view)),
             called_for.collect::<Vec<_>>().join(", "),
             scene.predicted_seconds,
             scene.seconds,

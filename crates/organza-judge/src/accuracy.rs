@@ -2,7 +2,9 @@
 //!
 //! ```text
 //! Sweep (a technique's knobs) ─► settings ─► curves ─► limit ─► repeats, shuffled ─► Study ─► json, csv, html
-//! ``` A technique joins with a [`Sweep`] and a function that draws a [`Request`]; no other module knows it.
+//! ```
+//!
+//! A technique joins with a [`Sweep`] and a function that draws a [`Request`]; no other module knows it.
 //!
 //! Two errors are kept apart. A knob's **own error** compares a picture with the one whose knob alone is at its end: it shows the
 //! order of convergence, undisturbed by the other knobs. The **error against the limit** compares with the picture whose knobs are all

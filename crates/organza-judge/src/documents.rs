@@ -115,6 +115,7 @@ pub fn measured_json(measured: &Measured) -> Value {
     let fixed = |fixed: &FixedEffect| json!({ "name": fixed.name, "reason": fixed.reason });
     json!({
         "seconds": measured.seconds,
+        "splats": measured.lit.map(|splats| json!({ "lit": splats.lit, "in_view": splats.in_view })),
         "effects": measured.changes.iter().map(change).collect::<Value>(),
         "not_switched": measured.fixed.iter().map(fixed).collect::<Value>(),
         "left_out_together": measured.left_out_together,

@@ -5,7 +5,9 @@
 //! scene as planned ─► picture ◄── compared ──► picture with one effect switched the other way
 //!                        ▲
 //!                        └────── compared ──► picture with everything that was left out
-//! ``` The plan of a scene leaves out what it has proved to be invisible, by bounds. This module measures the changes that
+//! ```
+//!
+//! The plan of a scene leaves out what it has proved to be invisible, by bounds. This module measures the changes that
 //! the plan bounded.
 
 use organza::plan::{Effect, Plan};
@@ -48,6 +50,17 @@ pub struct Measured {
     /// Largest difference of a displayed channel between the picture as planned and the one with everything that it leaves out; `None` where it
     /// leaves nothing out that could be switched on.
     pub left_out_together: Option<f64>,
+    /// The splats that got light; `None` where no technique draws splats that were lit before.
+    pub lit: Option<LitSplats>,
+}
+
+/// The splats of a picture that got light. The others are seen nowhere: opaque ones or finished pixels hide them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct LitSplats {
+    /// The number of splats that got light.
+    pub lit: u64,
+    /// The number of splats in view.
+    pub in_view: u64,
 }
 
 /// An effect that was not switched.
@@ -89,7 +102,7 @@ pub fn measure(
     progress.plan((0..count).map(|rank| (stage(plan, rank), 1.0)));
     progress.begin(&stage(plan, 0));
     let planned = pictures.draw(scene)?;
-    let mut measured = Measured { seconds: planned.seconds, ..Measured::default() };
+    let mut measured = Measured { seconds: planned.seconds, lit: planned.lit, ..Measured::default() };
     let mut left_out = Vec::new();
     for (rank, effect) in plan.effects.iter().enumerate() {
         progress.begin(&stage(plan, rank + 1));
@@ -164,6 +177,7 @@ struct Pictures<'a> {
 struct Drawn {
     image: Image<Display>,
     seconds: f64,
+    lit: Option<LitSplats>,
 }
 
 impl Pictures<'_> {
@@ -191,7 +205,11 @@ impl Pictures<'_> {
         let is_drawing = |name: &str| name != pass::READ && name != pass::CONVERT;
         let drawing = render.cost.stages.iter().filter(|stage| is_drawing(&stage.name));
         let seconds = drawing.map(|stage| stage.seconds).sum();
-        Ok(Drawn { image: image.display(scene.render.exposure), seconds })
+        let stages = |pass: &'static str| render.cost.stages.iter().filter(move |stage| stage.name == pass);
+        let lit = stages(pass::SHADE).map(|stage| stage.items_in).reduce(|sum, items| sum + items);
+        let in_view = stages(pass::PROJECT).map(|stage| stage.items_out).reduce(|sum, items| sum + items);
+        let lit = lit.zip(in_view).map(|(lit, in_view)| LitSplats { lit, in_view });
+        Ok(Drawn { image: image.display(scene.render.exposure), seconds, lit })
     }
 }
 

@@ -6,7 +6,9 @@
 //!        ├─► orders     the same splats by every ordering, against each pixel's exact order
 //!        ├─► truth      the scene path-traced without splats
 //!        └─► effects    the picture with each effect and without it
-//! ``` Pictures are drawn by [`organza`] as any render is, by the processor alone; what is true comes from [`mod@reference`], in
+//! ```
+//!
+//! Pictures are drawn by [`organza`] as any render is, by the processor alone; what is true comes from [`mod@reference`], in
 //! f64. A technique joins with an [`accuracy::Sweep`] in `accuracy/`.
 #![forbid(unsafe_code)]
 

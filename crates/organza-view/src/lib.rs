@@ -4,7 +4,9 @@
 //! page ─ events ─► session ─► state ─► scene ─► artist ─► picture, coarse, then whole ─► page
 //! (src/page)       (session)  (state)            (artist)  (picture)
 //!        └─ server, serving: HTTP on the loopback, one token, two clients ─┘
-//! ``` Only `server` and `serving` know a network, and no module knows a window: a [`Session`] takes [`Event`]s and returns pictures. The last
+//! ```
+//!
+//! Only `server` and `serving` know a network, and no module knows a window: a [`Session`] takes [`Event`]s and returns pictures. The last
 //! picture of each state has the bits of [`organza::render`] of the same scene.
 //!
 //! ```

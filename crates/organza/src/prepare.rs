@@ -21,12 +21,13 @@ use crate::plan::{Effect, Plan};
 use crate::predict::prediction;
 use crate::ranges::ranges;
 use crate::scene::{
-    EffectKind, FoundCamera, Scene, SceneLight, SceneObject, Source, SwitchedEffect, Technique, light_points,
+    EffectKind, FoundCamera, LightPoint, Scene, SceneLight, SceneObject, Source, SwitchedEffect, Technique,
+    light_points,
 };
 use crate::shadows::{Probe, Shadowing};
 use crate::statistics::{ObjectData, ObjectStatistics, Statistics};
 use crate::technique::{Fold, Row};
-use crate::{CostRecord, Error, Progress, RenderOptions, SplatCount, shadows, warnings};
+use crate::{CostRecord, Error, Progress, RenderOptions, SplatCount, escape_controls, shadows, warnings};
 use convert::DiscSize;
 pub use seen::{fitted, seen, settled};
 use splat_core::shade::Census;
@@ -402,6 +403,12 @@ fn plan_counted(
     let is_cast_alike = casters == plan.casters;
     plan.casters = casters;
     plan.shown = shadowing.shown().to_vec();
+    if is_new {
+        for (rank, light) in loaded.lights.iter().enumerate() {
+            let name = EffectKind::Shadow.name(&light.label);
+            plan.note_idle_casters(&name, &idle_casters(scene, loaded, &points, &plan.casters, rank));
+        }
+    }
     if is_new || !is_cast_alike || !shadows::fit(plan.tables(), left) {
         let casting: Vec<_> = plan.casters.iter().map(|kept| shadows::casting(&loaded.objects, kept)).collect();
         let others = plan.others(loaded);
@@ -421,6 +428,20 @@ fn plan_counted(
     let memory = memory.with_maps(shadows::bytes(plan.tables()));
     memory::check("rendering", memory.total(), options.max_memory)?;
     Ok(Planned { plan, memory, statistics, census })
+}
+
+/// The names of visible objects that cast shadows, none of which a light throws upon anything that is seen: its maps leave them out.
+fn idle_casters(
+    scene: &Scene,
+    loaded: &Loaded,
+    points: &[LightPoint],
+    casters: &[Vec<bool>],
+    light: usize,
+) -> Vec<String> {
+    let is_kept = |rank: usize| points.iter().zip(casters).any(|(point, kept)| point.of == light && kept[rank]);
+    let objects = scene.objects.iter().zip(&loaded.objects).enumerate();
+    let idle = objects.filter(|(rank, (o, object))| o.visible && object.casts_shadow && !is_kept(*rank));
+    idle.map(|(_, (o, _))| escape_controls(&o.name).into_owned()).collect()
 }
 
 /// The plan of a loaded scene but for its shadow maps, and what it follows from.

@@ -6,7 +6,9 @@
 //!    └──► small pictures, one setting turned in each ──────────────► errors of settings
 //!                                                                          │
 //! every combination ─► those that none beats in both: the ladder ─► the first that fits the time, the last within the error ─► plan ─► draw
-//! ``` Counted work comes from the trial's counts, scaled with the quantity that an item grows with: splats, samples of the picture, or fragments of
+//! ```
+//!
+//! Counted work comes from the trial's counts, scaled with the quantity that an item grows with: splats, samples of the picture, or fragments of
 //! both. The chosen settings are planned in full before they are drawn. They give way to the next if the plan counts more work than the estimate.
 //! Without a time nothing is chosen by a clock: figures of a machine take its place.
 
