@@ -5,6 +5,7 @@ mod assets;
 mod dependencies;
 mod floors;
 mod functions;
+mod locks;
 mod techniques;
 mod text;
 
@@ -13,7 +14,7 @@ pub(crate) use assets::{MAX_BYTES, credit_of, in_assets};
 
 type Rule = fn(&Repo) -> Vec<String>;
 
-const RULES: [(&str, Rule); 10] = [
+const RULES: [(&str, Rule); 11] = [
     ("heads", text::heads),
     ("foreign paths", text::foreign_paths),
     ("ignored tests", text::ignored_tests),
@@ -24,6 +25,7 @@ const RULES: [(&str, Rule); 10] = [
     ("techniques", techniques::named),
     ("functions of the platform", functions::platform),
     ("assets", assets::assets),
+    ("locks", locks::locks),
 ];
 
 /// Applies every rule.
