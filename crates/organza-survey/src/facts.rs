@@ -80,7 +80,10 @@ pub fn facts(path: &Path, max_bytes: u64, strict: bool) -> Result<Facts, Error> 
     let params = ReadParams { memory: MemoryAccount::new(max_bytes), strict, ranges: true, ..ReadParams::default() };
     let read = read::file(path, &params, None);
     let (data, notes) = read.map_err(|e| Error::from_read(path, &e))?;
-    let bytes = std::fs::metadata(path).map_err(|e| Error::io(path, "cannot read", e))?.len();
+    let files = read::files_of(path).map_err(|e| Error::from_read(path, &e))?;
+    let length = |file: &Path| std::fs::metadata(file).map(|about| about.len());
+    let bytes = files.iter().map(|file| length(file)).sum::<Result<u64, _>>();
+    let bytes = bytes.map_err(|e| Error::io(path, "cannot read", e))?;
     let facts = match data {
         Loaded::Mesh(mesh) => of_mesh(&mesh, &notes.columns, up_axis(path)),
         Loaded::Points(points) => of_points(&points, &notes.columns, up_axis(path)),

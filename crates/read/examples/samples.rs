@@ -17,6 +17,7 @@ fn feature(name: &str) -> &str {
         "laz" => "las",
         "mha" => "metaimage",
         "nii" => "nifti",
+        "tif" => "tiff",
         "vtp" | "vtu" => "vti",
         extension => extension,
     }

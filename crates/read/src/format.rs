@@ -1,5 +1,6 @@
 //! Which format a file is of.
 
+pub(crate) mod folder;
 pub(crate) mod unread;
 pub(crate) mod up;
 
@@ -29,6 +30,7 @@ pub(crate) enum Format {
     Png,
     Splat,
     Spz,
+    Tiff,
 }
 
 /// The format of a file by its first bytes, else by the extension of its name.
@@ -59,6 +61,10 @@ pub(crate) fn format_of(path: &Path, content: &[u8]) -> Option<Format> {
     }
     if content.starts_with(b"\x89PNG\r\n\x1a\n") {
         return Some(Format::Png);
+    }
+    // TIFF and BigTIFF, of both byte orders.
+    if [&b"II*\0"[..], b"MM\0*", b"II+\0", b"MM\0+"].iter().any(|mark| content.starts_with(mark)) {
+        return Some(Format::Tiff);
     }
     if content.starts_with(b"NGSP") {
         return Some(Format::Spz);
@@ -123,6 +129,7 @@ pub(crate) fn by_name(path: &Path) -> Option<Format> {
         "raw" => Some(Format::Raw),
         "splat" => Some(Format::Splat),
         "spz" => Some(Format::Spz),
+        "tif" | "tiff" => Some(Format::Tiff),
         _ => None,
     }
 }

@@ -1,6 +1,6 @@
 //! Reading files: meshes (PLY, STL, OBJ, OFF, glTF), point clouds (PLY, OBJ, OFF, PCD, glTF, XYZ, CSV, LAS, LAZ, E57), 3D Gaussians (PLY, packed
 //! PLY, .splat, SPZ), volumes (NIfTI,
-//! NRRD, MetaImage, VTK, raw) and images of radiance (Radiance HDR, OpenEXR, PNG), each also inside gzip.
+//! NRRD, MetaImage, VTK, TIFF, folders of slices, raw) and images of radiance (Radiance HDR, OpenEXR, PNG), each also inside gzip.
 //!
 //! No input makes a reader panic or take memory that the file does not stand for: sizes that a header announces are
 //! checked against the length of the file before anything is allocated.
@@ -24,6 +24,7 @@
         feature = "nifti",
         feature = "vti",
         feature = "vtk",
+        feature = "tiff",
         feature = "exr",
         feature = "png"
     )),
@@ -38,6 +39,7 @@
 
 mod error;
 mod format;
+mod guarded;
 mod images;
 mod meshes;
 mod points;
@@ -49,13 +51,12 @@ mod volumes;
 pub use error::{Fault, Place, ReadError};
 pub use format::unread::is_foreign_json;
 pub use format::up::{stated_up_axis, up_axis};
-#[cfg(feature = "las")]
-pub use points::laz::panic_is_input_error;
+pub use guarded::panic_is_input_error;
 pub use reading::{Fix, Mended, NamedColumn, Notes};
 /// The nouns that this crate takes and returns.
 pub use splat_core;
 
-use format::{Format, format_of, is_raw, unread};
+use format::{Format, folder, format_of, is_raw, unread};
 #[cfg(feature = "exr")]
 use images::openexr;
 #[cfg(feature = "png")]
@@ -83,11 +84,15 @@ use splat_core::glam::DVec3;
 use splat_core::points::attributes::attribute;
 use splat_core::text::{counted, escaped, escaped_path};
 use splat_core::{Grid, MemoryAccount, Mesh, Progress, RadianceImage, RawPoints};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use stream::input;
 use stream::input::Stream;
 #[cfg(feature = "nifti")]
 use volumes::nifti;
+#[cfg(any(feature = "tiff", feature = "png"))]
+use volumes::slices;
+#[cfg(feature = "tiff")]
+use volumes::tiff;
 #[cfg(feature = "vti")]
 use volumes::vti;
 #[cfg(feature = "vtk")]
@@ -113,8 +118,8 @@ pub struct ReadParams {
     /// Columns of a mesh that are kept in [`Mesh::columns`], and columns of points that are kept in [`RawPoints::columns`] beside those that have a meaning, each by its name in the file or by one
     /// that [`RawPoints::column`] knows. One that a file of points has not is an error that names those that it has.
     pub columns: Vec<String>,
-    /// Name of the array of a VTK file that is the volume's field; `None` for the one that the file names, else the first of one number a
-    /// point or cell. One that the file has not is an error that names those that it has, as one of another format is.
+    /// Name of the array of a VTK file that is the volume's field, or of a channel of a TIFF stack; `None` for the one that the file names, else the first of one number a
+    /// point or cell, and the first channel. One that the file has not is an error that names those that it has, as one of another format is.
     pub array: Option<String>,
     /// Whether points may become a medium: columns `smoothing_length`, `extinction` and `mass` are kept too, beside those that are kept of all
     /// points where there are such, `radius`, `tx`, `ty`, `tz`, `shadow_coefficient`, `footprint` and `material`. Numbers that these cannot have are refused, see
@@ -184,7 +189,7 @@ impl Loaded {
     }
 }
 
-/// Reads a regular file, and says what there is to say of it; its first bytes tell the format, its extension only words the
+/// Reads a regular file, or a folder of slices, and says what there is to say of it; its first bytes tell the format, its extension only words the
 /// error if they do not. Reading stops where `progress` is cancelled.
 ///
 /// # Errors
@@ -194,9 +199,35 @@ pub fn file(path: &Path, params: &ReadParams, progress: Option<&Progress>) -> Re
     let name = escaped_path(path);
     let params = &ReadParams { memory: params.memory.part(), ..params.clone() };
     let mut reading = Reading::new(params, progress);
-    let stream = Stream::open(path, params);
-    let loaded = stream.and_then(|stream| whole(path, stream, Some(path), &mut reading));
+    let loaded = match std::fs::metadata(path) {
+        Ok(about) if about.is_dir() => whole_folder(path, &mut reading),
+        _ => Stream::open(path, params).and_then(|stream| whole(path, stream, Some(path), &mut reading)),
+    };
     Ok((loaded.map_err(|e| e.in_file(&name))?, reading.finish(&name)))
+}
+
+/// The files that a source is made of: itself, or of a folder those in it, in the order of their names.
+///
+/// # Errors
+/// [`ReadError`] for a folder that cannot be read.
+pub fn files_of(path: &Path) -> Result<Vec<PathBuf>, ReadError> {
+    if std::fs::metadata(path).is_ok_and(|about| about.is_dir()) {
+        return folder::files(path).map_err(|e| e.in_file(&escaped_path(path)));
+    }
+    Ok(vec![path.to_owned()])
+}
+
+/// The content of a folder, which has a file for each slice of a volume.
+fn whole_folder(path: &Path, reading: &mut Reading<'_>) -> Result<Loaded, ReadError> {
+    reading.go_on()?;
+    let files = folder::files(path)?;
+    #[cfg(any(feature = "tiff", feature = "png"))]
+    if slices::has_slices(&files) {
+        "Slices".clone_into(&mut reading.notes.format);
+        let loaded = slices::read(path, files, reading).map(Loaded::Grid)?;
+        return finished(loaded, reading);
+    }
+    Err(unread::folder(path))
 }
 
 /// Reads a file that is in memory already; `name` serves messages and tells the format where the content does not.
@@ -255,6 +286,9 @@ pub fn mesh_in_memory(name: &str, mesh: Mesh, params: &ReadParams) -> Result<(Me
     Ok((mesh, reading.finish(name)))
 }
 
+/// Formats of volumes of which one array, or one channel, is read.
+const WITH_ARRAYS: [&str; 3] = ["Vtk", "VtkXml", "Tiff"];
+
 /// The content with meshes turned outwards.
 fn whole(
     path: &Path,
@@ -263,17 +297,22 @@ fn whole(
     reading: &mut Reading<'_>,
 ) -> Result<Loaded, ReadError> {
     let loaded = parse(path, stream, place, reading)?;
+    finished(loaded, reading)
+}
+
+/// The content with meshes turned outwards, as far as the parameters fit it.
+fn finished(loaded: Loaded, reading: &mut Reading<'_>) -> Result<Loaded, ReadError> {
     if reading.params.frame > 0 && !matches!(loaded, Loaded::Grid(_)) {
         let expected = "a series of volumes";
         let found = "a file of another kind";
         return Err(ReadError::input(Place::File, expected, found, "leave out `frame`"));
     }
-    let has_array = matches!(loaded, Loaded::Grid(_)) && ["Vtk", "VtkXml"].contains(&reading.notes.format.as_str());
+    let has_array = matches!(loaded, Loaded::Grid(_)) && WITH_ARRAYS.contains(&reading.notes.format.as_str());
     if let (Some(name), false) = (&reading.params.array, has_array) {
         let found = format!("the array '{}', and a file without arrays", escaped(name.as_bytes(), LONGEST_NAME));
         return Err(ReadError::input(
             Place::File,
-            "a volume of VTK",
+            "a volume of VTK, or a TIFF stack",
             found,
             "leave out `array`, or `--color-by`, which names it on the command line",
         ));
@@ -415,6 +454,8 @@ fn parse_as(
         Format::VtkXml => vti::read(&stream.rest()?, place, reading),
         #[cfg(feature = "vtk")]
         Format::Vtk => vtk::read(&stream.rest()?, reading),
+        #[cfg(feature = "tiff")]
+        Format::Tiff => tiff::read(stream.rest()?, reading).map(Loaded::Grid),
         Format::Raw => raw::read(stream, path, params, &mut reading.notes).map(Loaded::Grid),
         Format::Hdr => radiance::read(&stream.rest()?, reading).map(Loaded::Image),
         #[cfg(feature = "exr")]

@@ -179,7 +179,7 @@ impl<'a> Reading<'a> {
     }
 
     /// The same file with other parameters; takes the notes, which are to be given back.
-    #[cfg(feature = "vti")]
+    #[cfg(any(feature = "vti", feature = "tiff", feature = "png"))]
     pub(crate) fn within<'p>(&mut self, params: &'p ReadParams) -> Reading<'p>
     where
         'a: 'p,

@@ -8,6 +8,7 @@ use crate::read_samples::grids::{
     vtk_polyhedra, vtk_rectilinear, vtk_structured, vtr, vts, vtu_polyhedra, vtu_quadratic,
 };
 use crate::read_samples::oldest::laz_oldest;
+use crate::read_samples::stacks::Stack;
 use crate::read_samples::volumes::{self, metaimage, vti, vtk, vtk_scalars};
 use crate::read_samples::{
     NIFTI_F32, gzip, image, images, las, nifti, nrrd, obj, off, pcd, plain_glb, ply_ascii, ply_binary, square_glb, stl,
@@ -62,6 +63,20 @@ pub(crate) fn samples() -> Vec<(&'static str, Vec<u8>)> {
         ("tiles.exr", images::exr(Compression::PIZ, Blocks::Tiles(Vec2(8, 4)))),
         ("plain.exr", images::exr(Compression::Uncompressed, Blocks::ScanLines)),
         ("a.png", images::png(image::ExtendedColorType::Rgb8, &images::png_bytes(3))),
+        ("strips.tif", Stack::default().bytes()),
+        ("lzw.tif", Stack { packing: 5, has_differences: true, big_endian: true, ..Stack::default() }.bytes()),
+        ("tiles.tiff", Stack { packing: 8, tile: 16, is_wide: true, bits: 32, format: 3, ..Stack::default() }.bytes()),
+        (
+            "runs.tif",
+            Stack {
+                packing: 32773,
+                bits: 8,
+                description: IMAGEJ.to_owned(),
+                resolution: Some(([3, 2], 1)),
+                ..Stack::default()
+            }
+            .bytes(),
+        ),
         ("trained.ply", trained_ply(&[trained(0, 1)], 1, "binary_little_endian")),
         ("words.ply", packed_ply(&[trained(0, 1), trained(1, 1)], 1)),
         ("splats.ply", splats(false)),
@@ -71,6 +86,9 @@ pub(crate) fn samples() -> Vec<(&'static str, Vec<u8>)> {
         ("new.spz", gzip(&spz(&[trained(0, 1), trained(1, 1)], 1, 3))),
     ]
 }
+
+/// What ImageJ says of a stack.
+const IMAGEJ: &str = "ImageJ=1.54f\nimages=4\nslices=4\nunit=mm\nspacing=2\n";
 
 /// Two splats as files have them.
 fn splats(packed: bool) -> Vec<u8> {

@@ -34,6 +34,8 @@ mod read_polygons;
 mod read_raw;
 mod read_samples;
 mod read_series;
+#[cfg(all(feature = "tiff", feature = "png"))]
+mod read_stacks;
 mod read_unread;
 mod read_volumes;
 mod read_vti;

@@ -183,7 +183,7 @@ fn formats_of_other_programs_name_their_way_out() {
         ("a.geo", b"EnSight", "an EnSight or Houdini geometry", "ParaView"),
         ("a.dem", b"x", "a digital elevation model", "gdal_translate"),
         ("a.slc", b"11111", "a VolVis volume", "NRRD"),
-        ("a.tif", b"II*\0", "a TIFF image", "stack of slices"),
+        ("a.czi", b"ZISRAWFILE", "a stack of a microscope", "TIFF"),
     ] {
         let refused = error(name, content);
         assert_eq!(refused.found, format!("{found}, which is not read"));
@@ -207,7 +207,7 @@ fn folders_are_named_by_what_they_hold_and_missing_files_by_their_name() {
     assert!(slices.found.contains("DICOM slices") && slices.hint.contains("dcm2niix"), "{slices}");
     let chunks = refused(within("a.zarr", ".zgroup", b"{}"));
     assert!(chunks.found.contains("Zarr") && chunks.hint.contains("NRRD"), "{chunks}");
-    let images = refused(within("stack", "z000.tif", b"II*\0"));
+    let images = refused(within("stack", "z000.jpg", b"\xff\xd8\xff"));
     assert!(images.found.contains("images") && images.hint.contains("Fiji"), "{images}");
     let other = refused(within("other", "a.txt", b"0 0 0"));
     assert_eq!((other.fault, other.found.as_str()), (Fault::FileSystem, "a directory"));

@@ -136,22 +136,34 @@ impl Scene {
                 self.in_memory.digest(&path, &mut hasher);
                 continue;
             }
-            // Asked before opening: opening a pipe waits for its writer.
-            let regular = std::fs::metadata(&path).and_then(|meta| match meta.is_file() {
-                true => Ok(()),
-                false => Err(std::io::Error::other("not a regular file")),
-            });
-            let copied = regular.and_then(|()| File::open(&path)).and_then(|mut file| {
-                let mut buffer = vec![0; 1 << 20];
-                loop {
-                    match file.read(&mut buffer)? {
-                        0 => return Ok(()),
-                        n => hasher.update(&buffer[..n]),
-                    }
-                }
-            });
-            copied.map_err(|source| Error::Io { path, action: "cannot read", source })?;
+            // A folder of slices is all of its files.
+            let parts = read::files_of(&path).map_err(|e| {
+                let source = std::io::Error::other(e.to_string());
+                Error::Io { path: path.clone(), action: "cannot read", source }
+            })?;
+            for path in parts {
+                digest_of_file(path, &mut hasher)?;
+            }
         }
         Ok(hasher.finalize().into())
     }
+}
+
+/// Adds the bytes of a regular file.
+fn digest_of_file(path: PathBuf, hasher: &mut Sha256) -> Result<(), Error> {
+    // Asked before opening: opening a pipe waits for its writer.
+    let regular = std::fs::metadata(&path).and_then(|meta| match meta.is_file() {
+        true => Ok(()),
+        false => Err(std::io::Error::other("not a regular file")),
+    });
+    let copied = regular.and_then(|()| File::open(&path)).and_then(|mut file| {
+        let mut buffer = vec![0; 1 << 20];
+        loop {
+            match file.read(&mut buffer)? {
+                0 => return Ok(()),
+                n => hasher.update(&buffer[..n]),
+            }
+        }
+    });
+    copied.map_err(|source| Error::Io { path, action: "cannot read", source })
 }

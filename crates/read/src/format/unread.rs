@@ -28,8 +28,7 @@ const TO_PLY_BY_TILES: &str =
 const EXTRACT: &str = "extract the files in it; one file inside gzip is read as it is";
 const IMAGE: &str =
     "an environment is read from Radiance HDR or OpenEXR, a light's texture from PNG too; convert the image";
-const STACK: &str = "a stack of slices is read from NRRD: save it so, such as with Fiji (File > Save As > Nrrd); an environment is read from \
-    Radiance HDR or OpenEXR";
+const STACK: &str = "a stack of slices is read from TIFF: save it so, such as with Fiji (File > Save As > Tiff)";
 const SPLATS: &str = "save it as PLY, compressed PLY, .splat or SPZ, such as with SuperSplat";
 const SCENE: &str = "it is a scene, not data: give it to `organza render`";
 
@@ -37,7 +36,7 @@ const fn by_extension(name: &'static str, extensions: &'static [&'static str], h
     Unread { name, marks: &[], extensions, hint }
 }
 
-const UNREAD: [Unread; 61] = [
+const UNREAD: [Unread; 60] = [
     Unread { name: "FBX", marks: &[(0, b"Kaydara FBX Binary"), (0, b"; FBX ")], extensions: &["fbx"], hint: TO_GLTF },
     Unread {
         name: "USD",
@@ -120,7 +119,6 @@ const UNREAD: [Unread; 61] = [
     by_extension("SEG-Y", &["sgy", "segy"], TO_NRRD),
     by_extension("a stack of a microscope", &["czi", "nd2", "lif", "lsm"], STACK),
     Unread { name: "a JPEG image", marks: &[(0, b"\xff\xd8\xff")], extensions: &["jpg", "jpeg"], hint: IMAGE },
-    Unread { name: "a TIFF image", marks: &[(0, b"II*\0"), (0, b"MM\0*")], extensions: &["tif", "tiff"], hint: STACK },
     by_extension("an image", &["webp", "bmp", "gif", "tga", "ktx2", "avif"], IMAGE),
     Unread { name: "a zip archive", marks: &[(0, b"PK\x03\x04")], extensions: &["zip"], hint: EXTRACT },
     Unread { name: "a tar archive", marks: &[(257, b"ustar")], extensions: &["tar", "tgz"], hint: EXTRACT },
@@ -131,7 +129,7 @@ const UNREAD: [Unread; 61] = [
     by_extension("a scene", &["toml", "json"], SCENE),
 ];
 
-const READ: &str = "PLY, .splat, SPZ, STL, OBJ, OFF, glTF, GLB, PCD, XYZ, CSV, LAS, LAZ, E57, NIfTI, NRRD, MetaImage, VTK images, grids, cells, surfaces and lists of these, raw voxels, \
+const READ: &str = "PLY, .splat, SPZ, STL, OBJ, OFF, glTF, GLB, PCD, XYZ, CSV, LAS, LAZ, E57, NIfTI, NRRD, MetaImage, VTK images, grids, cells, surfaces and lists of these, TIFF stacks, folders of TIFF or PNG slices, raw voxels, \
     Radiance HDR, OpenEXR and PNG files are read, each also inside gzip";
 
 fn error(unread: &Unread) -> ReadError {
@@ -234,9 +232,9 @@ pub(crate) fn folder(path: &Path) -> ReadError {
             "a folder of DICOM slices, which is not read",
             "make one volume of them: `dcm2niix FOLDER` writes NIfTI, 3D Slicer NRRD",
         ),
-        Some("a TIFF image" | "a JPEG image") => (
-            "a folder of images, which is not read",
-            "make one volume of slices, such as NRRD with Fiji (File > Import > Image Sequence, File > Save As > Nrrd)",
+        Some("a JPEG image") => (
+            "a folder of JPEG images, which is not read",
+            "make one volume of slices, such as a TIFF stack with Fiji (File > Import > Image Sequence, File > Save As > Tiff)",
         ),
         _ => return ReadError::file_system("a regular file", "a directory", "name a file in it"),
     };

@@ -5,8 +5,10 @@ use crate::check_image;
 use crate::error::{Place, ReadError};
 use crate::reading::Reading;
 use crate::stream::input::{check_deflated, hold, reserve};
+use crate::volumes::slices::Slice;
+use crate::volumes::voxels::Kind;
 use image::codecs::png::PngDecoder;
-use image::{DynamicImage, ImageDecoder};
+use image::{ColorType, DynamicImage, ImageDecoder};
 use splat_core::RadianceImage;
 use splat_core::srgb::linear_from_srgb;
 use splat_core::text::escaped;
@@ -19,12 +21,7 @@ const MARK: usize = 8;
 const DAMAGED: &str = "the file is truncated or damaged; save it anew, as PNG of 8 or 16 bits";
 
 pub(crate) fn read(content: &[u8], reading: &mut Reading<'_>) -> Result<RadianceImage, ReadError> {
-    let decoder = PngDecoder::new(Cursor::new(content)).map_err(damaged)?;
-    let (width, height) = decoder.dimensions();
-    check_image([width, height], reading.params)?;
-    // Rows are packed in whole bytes: a mask of black and white has one bit a pixel.
-    let row = u64::from(width) * u64::from(decoder.original_color_type().bits_per_pixel());
-    check_deflated(row.div_ceil(8) * u64::from(height), content.len() as u64, "the packed image")?;
+    let (decoder, [width, height]) = opened(content, reading)?;
     // Two copies exist at a time: the decoded image, and the same with four channels of 16 bits.
     let pixels = u64::from(width) * u64::from(height);
     hold("the decoded image", decoder.total_bytes().saturating_add(8 * pixels), reading.params)?;
@@ -52,6 +49,43 @@ pub(crate) fn read(content: &[u8], reading: &mut Reading<'_>) -> Result<Radiance
     let values: Vec<f32> = (0..=u16::MAX).map(|v| value(f64::from(v) / f64::from(u16::MAX))).collect();
     pixels.extend(decoded.into_rgb16().pixels().map(|p| p.0.map(|v| values[v as usize])));
     Ok(RadianceImage { size: [width, height], pixels })
+}
+
+/// The decoder of an image whose size is checked.
+fn opened<'c>(content: &'c [u8], reading: &Reading<'_>) -> Result<(PngDecoder<Cursor<&'c [u8]>>, [u32; 2]), ReadError> {
+    let decoder = PngDecoder::new(Cursor::new(content)).map_err(damaged)?;
+    let (width, height) = decoder.dimensions();
+    check_image([width, height], reading.params)?;
+    // Rows are packed in whole bytes: a mask of black and white has one bit a pixel.
+    let row = u64::from(width) * u64::from(decoder.original_color_type().bits_per_pixel());
+    check_deflated(row.div_ceil(8) * u64::from(height), content.len() as u64, "the packed image")?;
+    Ok((decoder, [width, height]))
+}
+
+/// Reads one slice of a volume: its numbers as they are stored.
+pub(crate) fn slice(content: &[u8], reading: &mut Reading<'_>) -> Result<Slice, ReadError> {
+    let (decoder, size) = opened(content, reading)?;
+    hold("the decoded image", 2 * decoder.total_bytes(), reading.params)?;
+    // Profiles and gammas are of displays; the numbers are what counts.
+    chunks(content)?;
+    let (numbers, is_color, kind) = match decoder.color_type() {
+        ColorType::L8 => (1, false, Kind::U8),
+        ColorType::La8 => (2, false, Kind::U8),
+        ColorType::Rgb8 => (3, true, Kind::U8),
+        ColorType::Rgba8 => (4, true, Kind::U8),
+        ColorType::L16 => (1, false, Kind::U16),
+        ColorType::La16 => (2, false, Kind::U16),
+        ColorType::Rgb16 => (3, true, Kind::U16),
+        ColorType::Rgba16 => (4, true, Kind::U16),
+        other => {
+            return Err(ReadError::input(Place::File, "8 or 16 bits a number", format!("{other:?}"), DAMAGED));
+        }
+    };
+    let mut bytes = Vec::new();
+    reserve(&mut bytes, decoder.total_bytes() as usize)?;
+    bytes.resize(decoder.total_bytes() as usize, 0);
+    decoder.read_image(&mut bytes).map_err(damaged)?;
+    Ok(Slice { size, kind, numbers, is_color, big_endian: cfg!(target_endian = "big"), bytes, width: None })
 }
 
 /// Names of the chunks, of which the file is made up to the last byte.

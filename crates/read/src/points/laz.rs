@@ -9,15 +9,14 @@ mod gps_time;
 use super::las::{self, Layout, VariableRecord};
 use crate::ReadParams;
 use crate::error::{Place, ReadError};
+use crate::guarded::guarded;
 use crate::stream::input;
 use ::laz::laszip::{ChunkTable, ChunkTableEntry};
 use ::laz::record::{LayeredPointRecordDecompressor, RecordDecompressor, SequentialPointRecordDecompressor};
 use ::laz::{DecompressionSelection, LazItem, LazItemRecordBuilder, LazItemType, LazVlr};
 use gps_time::GpsTimes;
 use rayon::prelude::*;
-use std::cell::Cell;
 use std::io::Cursor;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 
 /// Most decompressed bytes per compressed byte, past the first [`FREE`] bytes.
 const MAX_RATIO: u64 = 1000;
@@ -283,26 +282,4 @@ fn check_layers(at: usize, bytes: &[u8], points: u64, items: &[LazItem], layout:
     }
     let expected = format!("{points} points in layers that fill {} bytes", bytes.len());
     Err(damaged(at, &expected, format!("{:?} points in {needed:?} bytes", word(0))))
-}
-
-thread_local! {
-    static GUARDED: Cell<bool> = const { Cell::new(false) };
-}
-
-/// Whether this thread runs foreign decoding code whose panic becomes a [`ReadError`]; for a panic hook, which would
-/// otherwise report a damaged file as a bug.
-pub fn panic_is_input_error() -> bool {
-    GUARDED.get()
-}
-
-/// Runs the decoder and turns a panic into an error.
-///
-/// Last resort: whether an arithmetic-coded stream is valid shows only while it is decoded, the stream has no checksum,
-/// and the decoder indexes tables, divides and adds with what it finds there. Sizes are checked before, so that the
-/// decoder cannot exhaust memory; that no unwinding could catch.
-fn guarded<T>(work: impl FnOnce() -> Result<T, String>) -> Result<T, String> {
-    let before = GUARDED.replace(true);
-    let result = catch_unwind(AssertUnwindSafe(work));
-    GUARDED.set(before);
-    result.unwrap_or_else(|_| Err("a damaged compressed stream".to_owned()))
 }

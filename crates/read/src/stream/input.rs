@@ -273,7 +273,8 @@ pub(crate) fn check_deflated(bytes: u64, stored: u64, packed: &str) -> Result<()
     check_ratio_of(bytes, stored, MAX_DEFLATED, packed)
 }
 
-fn check_ratio_of(bytes: u64, stored: u64, most: u64, packed: &str) -> Result<(), ReadError> {
+/// Refuses more than so many bytes for each of `stored` bytes of something packed.
+pub(crate) fn check_ratio_of(bytes: u64, stored: u64, most: u64, packed: &str) -> Result<(), ReadError> {
     if bytes <= FREE || bytes / most <= stored {
         return Ok(());
     }

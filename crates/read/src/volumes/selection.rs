@@ -5,7 +5,7 @@ use crate::error::{Place, ReadError};
 use crate::{Notes, ReadParams};
 
 /// Bytes of a name that are shown, and by which it is asked for.
-#[cfg(any(feature = "vti", feature = "vtk"))]
+#[cfg(any(feature = "vti", feature = "vtk", feature = "tiff"))]
 const LONGEST_NAME: usize = 40;
 
 /// Weights of red, green and blue in the luma of ITU-R BT.709.
@@ -163,6 +163,29 @@ pub(crate) fn chosen_array(
         notes.remark(format!("{shown} is drawn, the length of the vectors; --color-by {name}:0 chooses one number"));
     }
     Ok(Some(Chosen { rank, value: all[rank].magnitude() }))
+}
+
+/// The channel of a stack of pictures that is read, of so many: the one that `params` name, else the first. Says what else could be chosen.
+#[cfg(feature = "tiff")]
+pub(crate) fn channel_of(channels: u64, params: &ReadParams, notes: &mut Notes) -> Result<u64, ReadError> {
+    const NAME: &str = "channel";
+    let Some(name) = &params.array else {
+        if channels > 1 {
+            notes.remark(format!(
+                "{NAME}1 of {channels} is drawn; `array` of a scene or --color-by chooses another: {NAME}2 to {NAME}{channels}"
+            ));
+        }
+        return Ok(0);
+    };
+    let number = name.strip_prefix(NAME).and_then(|number| number.parse::<u64>().ok());
+    number.filter(|number| (1..=channels).contains(number)).map(|number| number - 1).ok_or_else(|| {
+        let expected = match channels {
+            1 => format!("{NAME}1, the only one"),
+            _ => format!("a channel from {NAME}1 to {NAME}{channels}"),
+        };
+        let found = format!("'{}'", splat_core::text::escaped(name.as_bytes(), LONGEST_NAME));
+        ReadError::input(Place::File, expected, found, "choose one of these, or leave out `array`")
+    })
 }
 
 /// The remark that a vector is drawn by its length because it is asked for by its name alone.

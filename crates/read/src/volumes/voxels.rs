@@ -162,13 +162,19 @@ pub(crate) fn read(
         n if n > needed => return wrong(format!("more than {needed}"), LONGER),
         _ => {}
     }
-    if let Some(i) = values.par_iter().position_first(|v| v.is_infinite()) {
+    check_finite(&values).map_err(|(i, error)| {
         let place = Place::Byte(at + start + i as u64 * stored.voxel_bytes());
-        let found = format!("{} at voxel {i}", values[i]);
-        let hint = "scale the values, or write NaN where there is none: it draws nothing";
-        return Err(ReadError::input(place, "values that fit 32-bit floats", found, hint));
-    }
+        ReadError { place, ..error }
+    })?;
     Ok(values)
+}
+
+/// Refuses the first value that is infinite, with its rank.
+pub(crate) fn check_finite(values: &[f32]) -> Result<(), (usize, ReadError)> {
+    let Some(i) = values.par_iter().position_first(|v| v.is_infinite()) else { return Ok(()) };
+    let found = format!("{} at voxel {i}", values[i]);
+    let hint = "scale the values, or write NaN where there is none: it draws nothing";
+    Err((i, ReadError::input(Place::File, "values that fit 32-bit floats", found, hint)))
 }
 
 /// Reads the voxels behind so many bytes, with which the stream has to end; −1 for whatever comes before.
@@ -198,7 +204,7 @@ pub(crate) fn behind(
 }
 
 /// Room for the values of the volume.
-fn room(stored: &Stored, params: &ReadParams) -> Result<Vec<f32>, ReadError> {
+pub(crate) fn room(stored: &Stored, params: &ReadParams) -> Result<Vec<f32>, ReadError> {
     let mut values = Vec::new();
     input::hold("the voxels", stored.count() * size_of::<f32>() as u64, params)?;
     input::reserve(&mut values, stored.count() as usize)?;
@@ -224,7 +230,8 @@ fn frame(stream: &mut Stream<'_>, stored: &Stored, values: &mut Vec<f32>) -> Res
     Ok(got)
 }
 
-fn append(values: &mut Vec<f32>, raw: &[u8], stored: &Stored) {
+/// Adds the values of numbers that are stored so.
+pub(crate) fn append(values: &mut Vec<f32>, raw: &[u8], stored: &Stored) {
     macro_rules! decode {
         ($t:ty) => {{
             let (numbers, _) = raw.as_chunks::<{ size_of::<$t>() }>();

@@ -9,6 +9,7 @@ pub(crate) mod grids;
 pub(crate) mod images;
 pub(crate) mod meshes;
 pub(crate) mod oldest;
+pub(crate) mod stacks;
 pub(crate) mod volumes;
 
 pub(crate) use meshes::*;

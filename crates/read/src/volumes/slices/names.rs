@@ -1,0 +1,97 @@
+//! Names of slices: those of one series differ in one number, at equal steps.
+
+use super::HINT;
+use crate::Notes;
+use crate::error::{Place, ReadError};
+use crate::format::folder::{Part, parts};
+use splat_core::text::escaped;
+
+/// The name without its extension, whose digits count nothing.
+fn stem(name: &str) -> &str {
+    name.rsplit_once('.').map_or(name, |(stem, _)| stem)
+}
+
+/// Refuses names, in their order, that are not those of one series without gaps.
+pub(super) fn check(names: &[String], notes: &mut Notes) -> Result<(), ReadError> {
+    let quoted = |name: &str| format!("'{}'", escaped(name.as_bytes(), 60));
+    let [first, .., last] = names else {
+        let found = names.first().map_or_else(|| "none".to_owned(), |name| format!("one, {}", quoted(name)));
+        return Err(ReadError::input(Place::File, "two slices or more", found, HINT));
+    };
+    let all: Vec<Vec<Part>> = names.iter().map(|name| parts(stem(name))).collect();
+    let is_alike = |parts: &[Part]| {
+        parts.len() == all[0].len()
+            && parts.iter().zip(&all[0]).all(|pair| match pair {
+                (Part::Number(_), Part::Number(_)) => true,
+                (part, other) => part == other,
+            })
+    };
+    if let Some(other) = all.iter().position(|parts| !is_alike(parts)) {
+        if all.iter().flatten().all(|part| matches!(part, Part::Text(_))) {
+            let [first, last] = [first, last].map(|name| quoted(name));
+            notes.remark(format!("names without numbers: slices lie in the order of the alphabet, {first} to {last}"));
+            return Ok(());
+        }
+        let expected = format!("names that differ in one number, such as {}", quoted(first));
+        return Err(ReadError::input(Place::File, expected, quoted(&names[other]), HINT));
+    }
+    let differs = |at: &usize| all.iter().any(|parts| parts[*at] != all[0][*at]);
+    let places: Vec<usize> = (0..all[0].len()).filter(differs).collect();
+    let &[place] = places.as_slice() else {
+        let found = format!("{} and {}, which differ in {}", quoted(first), quoted(last), places.len());
+        return Err(ReadError::input(Place::File, "names that differ in one number", found, HINT));
+    };
+    let number = |parts: &Vec<Part>| if let Part::Number(number) = parts[place] { number } else { 0 };
+    let numbers: Vec<u128> = all.iter().map(number).collect();
+    let step = numbers.windows(2).map(|pair| pair[1] - pair[0]).min().unwrap_or(1);
+    let Some(gap) = numbers.windows(2).position(|pair| pair[1] - pair[0] != step || step == 0) else {
+        let step = if step == 1 { String::new() } else { format!(", every {step}th") };
+        let [first, last] = [first, last].map(|name| quoted(name));
+        notes.remark(format!("{} slices, {first} to {last}{step}", names.len()));
+        return Ok(());
+    };
+    let [before, behind] = [&names[gap], &names[gap + 1]].map(|name| quoted(name));
+    let (expected, found) = match step {
+        0 => ("one slice for each number".to_owned(), format!("{before} and {behind}")),
+        _ => (format!("the slice of number {} behind {before}", numbers[gap] + step), format!("{behind}")),
+    };
+    let hint = "put the missing slices into the folder, or number those that are there anew if they lie at equal steps";
+    Err(ReadError::input(Place::File, expected, found, hint))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn checked(names: &[&str]) -> Result<Vec<String>, String> {
+        let names: Vec<String> = names.iter().map(|name| (*name).to_owned()).collect();
+        let mut notes = Notes::default();
+        check(&names, &mut notes)
+            .map(|()| notes.remarks)
+            .map_err(|e| format!("expected {}, found {}", e.expected, e.found))
+    }
+
+    #[test]
+    fn gaps_doubles_and_other_names_are_refused_by_name() {
+        assert_eq!(checked(&["a1_2.tif", "a1_3.tif", "a1_4.tif"]).unwrap(), ["3 slices, 'a1_2.tif' to 'a1_4.tif'"]);
+        assert_eq!(checked(&["a0.tif", "a5.tif", "a10.tif"]).unwrap(), ["3 slices, 'a0.tif' to 'a10.tif', every 5th"]);
+        assert!(checked(&["back.png", "front.png"]).unwrap()[0].contains("order of the alphabet"));
+        for (names, said) in [
+            (&["a1.tif", "a2.tif", "a4.tif"][..], "expected the slice of number 3 behind 'a2.tif', found 'a4.tif'"),
+            (&["a1.tif", "a4.tif", "a5.tif"], "expected the slice of number 2 behind 'a1.tif', found 'a4.tif'"),
+            (&["a01.tif", "a1.tif", "a2.tif"], "expected one slice for each number, found 'a01.tif' and 'a1.tif'"),
+            (&["a1.tif", "b1.tif"], "expected names that differ in one number, such as 'a1.tif', found 'b1.tif'"),
+            (
+                &["a1b1.tif", "a2b2.tif"],
+                "expected names that differ in one number, found 'a1b1.tif' and 'a2b2.tif', which differ in 2",
+            ),
+            (&["a1.tif"], "expected two slices or more, found one, 'a1.tif'"),
+            (
+                &["a1.tif", "a1.tiff"],
+                "expected names that differ in one number, found 'a1.tif' and 'a1.tiff', which differ in 0",
+            ),
+        ] {
+            assert_eq!(checked(names).unwrap_err(), said);
+        }
+    }
+}
