@@ -113,7 +113,7 @@ impl Ordered {
 /// Pictures by every ordering, and the truth.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Comparison {
-    /// All orderings.
+    /// The outcomes of the orderings.
     pub orderings: Vec<Ordered>,
     /// Fragments sorted per pixel, in f64.
     pub truth: Image<Linear>,
@@ -123,7 +123,8 @@ pub struct Comparison {
     pub splats: u64,
     /// Why `particles`, which need no order, cannot show the scene; `None` where they do.
     pub without_particles: Option<String>,
-    /// The discs of each layer averaged, all layers composited, in f64; or why there are none.
+    /// The discs of each layer averaged, and all layers composited, in f64; or the reason why the scene has no
+    /// layers.
     pub layers: Result<Image<Linear>, String>,
     /// The stage that was interrupted, behind which nothing was compared; `None` where all was.
     pub interrupted: Option<&'static str>,

@@ -14,7 +14,7 @@ use organza::scene::Scene;
 use organza::{Error, printable};
 use std::path::{Path, PathBuf};
 
-/// What computed.
+/// The machine that computed.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Machine {
     /// Name of the processor, if the system reports it.

@@ -45,7 +45,7 @@ pub struct Curve {
     pub own_setting: f64,
     /// The error of the end, and the order of convergence.
     pub settled: Settled,
-    /// Seconds that drawing the end took, once; `None` where it is one of the settings.
+    /// Seconds that drawing the end took, once; `None` if the end is one of the settings.
     pub end_seconds: Option<f64>,
 }
 

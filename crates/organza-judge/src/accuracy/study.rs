@@ -83,9 +83,9 @@ pub type Draw<'a> = dyn FnMut(&Request) -> Result<Frame, Error> + 'a;
 /// Draws and judges.
 ///
 /// # Errors
-/// [`Error::Unresolved`] when the limit's own error is not ten times below that of the scene's own setting, or leaves fewer than three
-/// settings to draw; those of `draw`, but a setting that exceeds a limit of resources is noted and left out. A study that is cancelled
-/// after every picture is drawn has fewer times, and is no error.
+/// [`Error::Unresolved`] if the limit's error is not ten times below that of the scene's stated setting, or leaves fewer than three
+/// settings to draw. Errors of `draw`; a setting that exceeds a limit of resources is left out with a note instead. A study that is
+/// cancelled after every picture is drawn has fewer times, and is no error.
 pub fn study(
     sweep: &Sweep,
     truth: Result<Truth, String>,
