@@ -330,7 +330,7 @@ impl Session {
         }
     }
 
-    /// What a page shows beside the picture.
+    /// The state that a page shows beside the picture.
     pub fn shown(&self) -> Shown {
         let studio = self.studio();
         let Seen { version, picture, failure, drawing, whole, effects, curves, rungs } = self.desk.seen();
