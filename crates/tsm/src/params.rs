@@ -35,9 +35,9 @@ pub enum Resolution {
 /// Parameters of [`crate::ShadowMap::build`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct Params {
-    /// How directions become cells.
+    /// The mapping from directions to cells.
     pub mapping: MappingChoice,
-    /// How fine the table is.
+    /// The resolution of the table.
     pub resolution: Resolution,
     /// Transmittance below which a list may stop, in (0, 1): A_cut = −ln(tolerance). The error of any receiver is at
     /// most `tolerance` times the unshadowed light.

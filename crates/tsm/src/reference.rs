@@ -47,8 +47,8 @@ impl InsertionLists {
     }
 }
 
-/// Optical depth of all media and translucent surfaces between two offsets from the cloud's origin, in f64: media as
-/// three-dimensional kernels (a Gaussian along the ray, cut with the kernel), surfaces as crossings of discs. Infinite
+/// Optical depth of all media and translucent surfaces between two offsets from the cloud's origin, in f64. Media are
+/// three-dimensional kernels (a Gaussian along the ray, cut with the kernel), surfaces crossings of discs. Infinite
 /// through an opaque disc. Angle dependence of thin slabs and colours are left out.
 pub fn optical_depth(cloud: &Cloud, footprints: &FootprintStack, from: DVec3, to: DVec3) -> f64 {
     let length = (to - from).length();

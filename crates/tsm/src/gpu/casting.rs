@@ -71,8 +71,8 @@ impl Casting {
     /// is not plain.
     ///
     /// # Errors
-    /// Those of [`crate::Deposits::new`], and [`Error::Processor`] for a table of polar angles, a scene of a size that
-    /// single precision does not square, and more casters than can be counted.
+    /// Errors of [`crate::Deposits::new`]. [`Error::Processor`] for a table of polar angles, for a scene whose size
+    /// overflows single precision when squared, and for too many casters to count.
     pub fn new(scene: &Scene<'_>, light: &Light, params: &Params, progress: Option<&Progress>) -> Result<Self, Error> {
         let quiet = Progress::new();
         let progress = progress.unwrap_or(&quiet);

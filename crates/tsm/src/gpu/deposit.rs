@@ -160,8 +160,8 @@ pub fn record_cast(room: CastRoom) -> RecordedCast {
 }
 
 impl RecordedCast {
-    /// The bytes of a casting beside attributes: those of all splats of its cloud, or of the splats `ids` in their order, among
-    /// which all casters must be.
+    /// The bytes of a casting beside attributes, for all splats of its cloud, or for the splats `ids` in their order. All
+    /// casters must be among `ids`.
     ///
     /// # Errors
     /// [`Error::Overflow`] for more than there is room for, casters among the splats `ids` included.

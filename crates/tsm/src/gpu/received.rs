@@ -44,8 +44,8 @@ pub struct ReceivedUploads {
     shares: Vec<u8>,
 }
 
-/// Records what splats with this room receive of one light, the `light`th of those that have a shadow, in a map with this room;
-/// its receivers are the splats.
+/// Records the light that splats receive from the `light`th light with a shadow. `room` is the capacity of its map, and the
+/// receivers are the splats.
 pub fn record_received(room: Room, attributes: AttributeRoom, light: u32) -> RecordedReceived {
     let AttributeRoom { splats, frame_words } = attributes;
     let mut recording = Recording::default();
@@ -75,8 +75,8 @@ pub fn record_received(room: Room, attributes: AttributeRoom, light: u32) -> Rec
 
 impl RecordedReceived {
     /// The bytes of a map; positions of splats are relative to `origin`, those of the map's casters to `of_map`, both in the
-    /// world. `shares` says for each splat how much of a shadow it takes, or is one number for all, or none where a
-    /// recording before leaves one for each on the device.
+    /// world. `shares` has the share of a shadow that each splat takes, or a single number for all splats. It is empty if an
+    /// earlier recording leaves the shares on the device.
     ///
     /// # Errors
     /// [`Error::Overflow`] for a map that is larger or otherwise than the room, and for a wrong number of shares.

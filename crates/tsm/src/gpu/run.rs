@@ -15,9 +15,9 @@ pub struct MapRun {
     pub passes: Vec<PassTime>,
 }
 
-/// [`Deposits::into_map`] by a device: the same map, bit for bit. Where its kernels do not see all entries at once, or it has no
-/// memory for them, runs of cells are done one after the other. `None` where cells that lie together have more entries than the
-/// device can see.
+/// [`Deposits::into_map`] by a device: the same map, bit for bit. If its kernels cannot see all entries at once, or it has no
+/// memory for them, it lists the cells run by run. `None` where cells that lie together have more entries than the device can
+/// see.
 ///
 /// # Errors
 /// [`Error::Device`] for what the device refuses.

@@ -20,7 +20,7 @@ use splat_shaders::{BufferId, Overflow, Recording};
 /// Recorded deposits and lists, and the buffers that the caller meets.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RecordedMap {
-    /// What the device is to do.
+    /// The commands of the device.
     pub recording: Recording,
     /// Its deposits, whose buffers are those of the recording.
     pub cast: RecordedCast,
@@ -119,8 +119,8 @@ impl RecordedShadow {
         &self.cast.attributes
     }
 
-    /// The bytes of a casting beside attributes, as [`RecordedCast::uploads`]; `shares` says for each splat how much of a
-    /// shadow it takes, in \[0, 1\], or is one number for all.
+    /// The bytes of a casting beside attributes, as [`RecordedCast::uploads`]; `shares` has the share of a shadow that
+    /// each splat takes, in \[0, 1\], or a single number for all splats.
     ///
     /// # Errors
     /// As [`RecordedCast::uploads`].

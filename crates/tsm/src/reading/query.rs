@@ -70,8 +70,8 @@ impl ShadowMap {
         columns * rows
     }
 
-    /// Distance from the light, world units, at which the absorbance of a cell reaches `absorbance` in every channel, as
-    /// look-ups on its ray have it: a medium absorbs continuously, a surface at once. For parallel light it is the
+    /// Distance from the light, world units, at which the absorbance of a cell reaches `absorbance` in every channel. As
+    /// in look-ups on the cell's ray, a medium absorbs continuously, a surface at once. For parallel light it is the
     /// distance from the plane where the table starts. `None` if it never does.
     pub fn first_hit(&self, cell: u32, absorbance: f32) -> Option<f64> {
         self.hit_in_frame(cell, absorbance).map(|d| self.frame.world_length(d))
@@ -133,10 +133,10 @@ impl ShadowMap {
         inside || self.opaque.get(cell as usize).is_some_and(|d| (from..=to).contains(d))
     }
 
-    /// The last time from 0 to `end` up to which none of some places that move together has come past an entry of the cell that it lies in: behind it
-    /// by no more than two widths of that cell. 0 where one has from the beginning, and `end` where none ever does. `places` are those at time 0,
-    /// relative to the cloud's origin, and `moved` is how far they have gone. Between whole times the places move straight, and each cell's width of
-    /// the way is tested, but at most 256 places of it. If these steps are longer than a cell is wide, the result is late by at most two steps.
+    /// The last time from 0 to `end` before any of the moving places passes an entry of its cell. A place may then lie behind the entry by at most
+    /// two widths of the cell. 0 where one has from the beginning, and `end` where none ever does. `places` are those at time 0, relative to the
+    /// cloud's origin, and `moved` is how far they have gone. Between whole times the places move straight, and each cell's width of the way is
+    /// tested, but at most 256 places of it. If these steps are longer than a cell is wide, the result is late by at most two steps.
     pub fn free_until(&self, places: &[Vec3], moved: &dyn Fn(f64) -> Vec3, end: u32) -> f64 {
         let mut free = 0.0;
         for begin in (0..=end).map(f64::from) {
