@@ -16,8 +16,8 @@ const MOST_SPLATS: f64 = 2e5;
 /// Voxels up to which a volume is called coarse, so that its surface is looked at.
 const MOST_VOXELS: usize = 1 << 22;
 
-/// The distance of the splats of an isosurface, in the unit of the grid's axes. It is a step of the lattice. A coarse volume gets a quarter
-/// of the radius of curvature that nine tenths of the surface exceed, unless that makes more than 200,000 splats.
+/// The distance of the splats of an isosurface, in the unit of the grid's axes. The default is a step of the lattice. A coarse volume gets
+/// a quarter of the radius of curvature that nine tenths of the surface exceed, unless that makes more than 200,000 splats.
 ///
 /// # Errors
 /// As [`isosurface_to_mesh`].

@@ -71,10 +71,10 @@ pub fn extinct_bounds(grid: &Grid, transfer: &TransferFunction) -> DAabb {
     DAabb::of_points(DAabb::new(low, high).corners().map(|index| grid.origin + grid.axes * index))
 }
 
-/// The first and the last lattice point of every row within all regions to which a transfer function gives enough extinction to be seen, by
-/// itself or with what is beside it; of a lattice of few rows the corners around what is seen of each; where it gives none, the corners of
-/// [`extinct_bounds`]. A voxel is seen by an optical depth of half a grey level of eight bits, or by a fiftieth of the densest. `scale` is the
-/// length of a unit of the lattice in that of extinctions.
+/// The first and the last visible lattice point of every row, within all regions. A point is visible if a transfer function gives enough
+/// extinction to it, alone or with its neighbours. A lattice of few rows yields the corners around the visible part of each row. Without a
+/// visible point, the corners of [`extinct_bounds`]. A voxel is seen by an optical depth of half a grey level of eight bits, or by a fiftieth
+/// of the densest. `scale` is the length of a unit of the lattice in that of extinctions.
 pub fn visible_ends(grid: &Grid, transfer: &TransferFunction, scale: f64, clips: &[Clip]) -> Vec<DVec3> {
     let most = transfer.points().iter().fold(0.0, |most: f32, p| most.max(p.extinction));
     let least = (FAINT * most).min((FAINT_DEPTH / (libm::cbrt(grid.cell_volume()) * scale)) as f32);
