@@ -96,8 +96,8 @@ impl EnsembleParams {
         if self.colored_extinction { 3 } else { 1 }
     }
 
-    /// Bytes of the sums of an image, whose tiles are whole: a pixel has 36 for beauty, 8 more a further channel, 184 with
-    /// depths, 8 with objects, 48 more where extinction differs by channel.
+    /// Bytes of the sums of an image of whole tiles. A pixel has 36 for beauty, 8 more for each further channel, 184 for
+    /// depths, 8 for objects, and 48 more if extinction differs by channel.
     pub fn bytes(&self, size: [u64; 2]) -> u64 {
         let side = |s: u64| s.next_multiple_of(TILE as u64);
         side(size[0]).saturating_mul(side(size[1])).saturating_mul(self.bytes_per_pixel())

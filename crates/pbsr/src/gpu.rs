@@ -104,7 +104,7 @@ pub struct Uploads {
     bytes: Vec<Vec<u8>>,
 }
 
-/// Records the folding of sets with this room, of which nothing is lit and nothing kept but beauty, or as `lighting` says.
+/// Records the folding of sets with these capacities: unlit and for beauty alone, or with `lighting`.
 ///
 /// # Errors
 /// [`Error::Parameter`] for a size out of range, and for an ensemble that keeps depths, objects or extinction by channel.

@@ -22,8 +22,9 @@ use splat_core::optics;
 /// Below this cosine a surface is seen on edge; any q is then 1.
 const TINY_COSINE: f64 = 1e-300;
 
-/// q: the probability that one of the particles of area `area` falls on a pixel whose area at the surface is
-/// `cross_section`, seen at `cos_theta` to the normal. In \[0, 1\] for any input; 1 for an area of nothing.
+/// q: the probability that a particle, uniform over the area `area`, falls on a given pixel. The pixel's area at the
+/// surface is `cross_section`, seen at `cos_theta` to the normal. In \[0, 1\] for any input; 1 for an area of
+/// nothing.
 pub fn hit_probability(cross_section: f64, area: f64, cos_theta: f64) -> f64 {
     let q = cross_section / (area.max(0.0) * cos_theta.abs().max(TINY_COSINE));
     // 0/0 has no extent at all: certain to be hit by the pixel that holds it.

@@ -19,8 +19,7 @@ pub struct SurfaceParams {
     pub cross_section: f64,
     /// The growth of the opacity at grazing angles; the paper's surfaces are thin slabs.
     pub surface_opacity: SurfaceOpacity,
-    /// Factor on the optical depth of one crossing that `opacity` has in it already, > 0: opacities of a mesh's vertices are those of a crossing
-    /// without it.
+    /// Factor on the optical depth of a crossing, > 0. `opacity` includes it already; opacities of a mesh's vertices do not.
     pub extinction_factor: f64,
     /// Linear Rec.709 colour of every particle, or the factor on a mesh's vertex colours; each channel ≥ 0.
     pub color: [f32; 3],

@@ -67,8 +67,8 @@ impl PackedNormal {
     }
 }
 
-/// A linear colour in 32 bits: three mantissas of nine bits and one exponent, 2⁻²⁴ to 65408, relative error at most
-/// 1/512 of the largest channel where it is rounded to the nearest. Objects whose colours lie elsewhere have a
+/// A linear colour in 32 bits: three mantissas of nine bits and a shared exponent, 2⁻²⁴ to 65408. Rounded to the
+/// nearest, the relative error is at most 1/512 of the largest channel. Objects whose colours lie elsewhere have a
 /// [`color_unit`](crate::Appearance::color_unit).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct PackedColor(u32);
@@ -84,7 +84,7 @@ impl PackedColor {
         Steps::up_to(color, 511.5 - 1.0 / 32768.0).rounded(0.5)
     }
 
-    /// Packs a colour for a particle at a random place: rounded up or down by a hash of the place, so that the mean over
+    /// Packs a colour for a particle at a random place. A hash of the place rounds it up or down, so that the mean over
     /// many particles is the colour itself. Colours that need no rounding stay as they are.
     #[inline]
     pub fn at(color: [f32; 3], place: Vec3) -> Self {

@@ -135,8 +135,8 @@ pub(crate) fn runs(sampler: &dyn Sampler) -> Vec<Run> {
 
 /// Sets `first .. first + n` of another sampler, kept in memory: set r is kept set r mod n.
 ///
-/// They serve objects that are seen from many places, or that move, without another sampling. Asking for more sets
-/// than are kept repeats them, and the images of the same set are not independent.
+/// Kept sets serve objects that are seen from many places, or that move, without another sampling. Asking for more
+/// sets than are kept repeats them, and the images of the same set are not independent.
 #[derive(Debug, Clone)]
 pub struct KeptSets {
     origin: DVec3,

@@ -27,12 +27,12 @@ use std::borrow::Cow;
 #[cfg(feature = "gpu")]
 const DISC: u32 = 1 << 31;
 
-/// What a sampler of clouds needs.
+/// Parameters of a sampler of clouds.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SplatParams {
     /// Particle cross-section s: the area of one pixel at the cloud, world units², > 0.
     pub cross_section: f64,
-    /// How the opacity of surface splats grows at grazing angles.
+    /// The growth of the opacity of surface splats at grazing angles.
     pub surface_opacity: SurfaceOpacity,
     /// Optical depth at which opaque splats are sampled, in (0, 64\]; draw them by [`crate::Scene::occluder`] where they must be
     /// exact.

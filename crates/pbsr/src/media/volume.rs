@@ -36,7 +36,7 @@ use splat_core::{Grid, TransferFunction, glam};
 use splat_shaders::layouts::ParticleSource;
 use std::borrow::Cow;
 
-/// What a sampler of volumes needs.
+/// Parameters of a sampler of volumes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct VolumeParams {
     /// Particle cross-section s: the area of one pixel in the volume, world units², > 0.

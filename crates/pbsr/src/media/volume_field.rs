@@ -13,10 +13,10 @@ use crate::{Density, Error, PackedNormal, Particles};
 use glam::DVec3;
 use splat_core::{DAabb, glam};
 
-/// What a sampler of a field's medium needs.
+/// Parameters of a sampler of a field's medium.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FieldVolumeParams {
-    /// Cells along each axis of the box, 1 to 512: each has a bound of its own.
+    /// Cells along each axis of the box, 1 to 512; each cell has a bound.
     pub resolution: u32,
     /// Particle cross-section s: the area of one pixel in the medium, world units², > 0.
     pub cross_section: f64,
@@ -45,7 +45,7 @@ pub struct FieldVolumeSampler<'a> {
 }
 
 impl<'a> FieldVolumeSampler<'a> {
-    /// `extinction` in a box. Where the field knows no bound, `extinction.max` is taken, and values above it are cut.
+    /// `extinction` in a box. A field without a bound uses `extinction.max`, and values above it are cut.
     ///
     /// # Errors
     /// [`Error::Parameter`] for numbers out of range, [`Error::Empty`] when the extinction is bounded by 0 everywhere,

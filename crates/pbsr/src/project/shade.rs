@@ -7,10 +7,10 @@ use glam::{DVec3, Vec3};
 use splat_core::shade::{LitBy, MAX_CHANNELS, Point, arriving, facing};
 use splat_core::{Camera, Material, Receiver, SplatKind, glam};
 
-/// How the particles of an object look.
+/// The appearance of an object's particles.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Appearance {
-    /// How light becomes radiance.
+    /// The material, which turns light into radiance.
     pub material: Material,
     /// What casts and receives shadows: a medium attenuates its own light, a surface does not.
     pub kind: SplatKind,
