@@ -150,7 +150,7 @@ pub fn surface_evaluations<F: ScalarField + ?Sized>(
     Ok(field::evaluations(field, &surface_lattice(field, bounds, params)?))
 }
 
-/// How many values of a field [`crate::density_to_points`] asks for.
+/// The number of field values that [`crate::density_to_points`] evaluates.
 ///
 /// # Errors
 /// As the conversion.

@@ -28,9 +28,9 @@ const MOST_LOOKED_AT: u64 = u32::MAX as u64;
 
 /// Meshes the zero set of a field inside a box, cells of about `cell` (object units).
 ///
-/// Normals point to where the field is positive. Parts thinner than a cell are lost, and the surface ends within one
-/// cell of the box, and at the border of the field's own domain ([`ScalarField::in_domain`]). Blocks of cells are reported to
-/// `progress`, and work stops where that is cancelled.
+/// Normals point to where the field is positive. Parts thinner than a cell are lost. The surface ends within one cell of the
+/// box, and at the border of the field's domain ([`ScalarField::in_domain`]). Blocks of cells are reported to `progress`, and
+/// work stops where that is cancelled.
 ///
 /// ```
 /// use field::ExpressionField;
@@ -56,9 +56,9 @@ pub fn field_to_mesh<F: ScalarField + ?Sized>(
     Ok(surface_nets(field, &lattice, &splat.object_name, progress.unwrap_or(&Progress::new()))?)
 }
 
-/// The zero set of a field inside a box as triangles that are as fine as splats `spacing` apart (object units): cells of
-/// √2 `spacing`, vertices and normals of the field. Triangles whose middle lies beyond the border of the field's own domain
-/// are left out, so an open surface ends within one triangle of it.
+/// The zero set of a field inside a box as triangles that are as fine as splats `spacing` apart (object units): cells of √2
+/// `spacing`, vertices and normals of the field. Triangles whose middle lies beyond the border of the field's domain are
+/// left out, so an open surface ends within a triangle of the border.
 ///
 /// ```
 /// use splat_core::{Clip, DAabb, glam::DVec3};
@@ -256,8 +256,8 @@ pub fn field_to_grid<F: ScalarField + ?Sized>(
     sample(field, &lattice, splat, progress.unwrap_or(&Progress::new()))
 }
 
-/// A density as extinction, 1/world unit, at the middles of cells that fill its box, and the transfer function that takes it as
-/// it is: the same medium as [`density_to_points`], for who draws volumes.
+/// A density as a volume: extinction, 1/world unit, at the middles of cells that fill its box, with the identity as transfer
+/// function. The medium is that of [`density_to_points`], for techniques that draw volumes.
 ///
 /// # Errors
 /// As [`density_to_points`].

@@ -3,9 +3,9 @@
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::{Cloud, Footprint, Grid, SplatKind};
 
-/// Σ K·norm/R²·profile over the surface splats whose plane the line through `p` along `direction` crosses within their
-/// own radius of `p`: the optical depth of the one layer at `p` (its area share, 1, for opaque splats). `p` is relative
-/// to the cloud's origin.
+/// Optical depth of the layer at `p`: Σ K·norm/R²·profile over the surface splats whose plane the line through `p`
+/// along `direction` crosses within the splat's radius of `p`. For opaque splats it is the area share, 1. `p` is
+/// relative to the cloud's origin.
 pub fn layer_depth(cloud: &Cloud, profile: Footprint, p: DVec3, direction: DVec3) -> f64 {
     let norm = profile.norm();
     let mut sum = 0.0;

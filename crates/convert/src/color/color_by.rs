@@ -48,7 +48,7 @@ const SKIPPED: f64 = 5.0;
 /// How much of white or black is in the colours of a turn.
 const TINTS: [(f32, f32); 3] = [(0.0, 0.0), (0.5, 1.0), (0.6, 0.0)];
 
-/// How numbers become colours.
+/// The mapping from numbers to colours.
 #[derive(Debug, Clone, PartialEq)]
 pub enum PointColors {
     /// A colour map over a range of numbers.
@@ -69,7 +69,7 @@ pub enum PointColors {
     Transfer(TransferFunction, Classified),
 }
 
-/// How numbers lie along a colour map.
+/// The scale of numbers along a colour map.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum MapScale {
     /// As they are.
@@ -153,7 +153,7 @@ impl PointColors {
 }
 
 impl MapScale {
-    /// Where in a range a number lies, from 0 to 1 within; the middle of a range without a width.
+    /// The place of a number in a range, from 0 to 1 within; the middle of a range without a width.
     ///
     /// ```
     /// use convert::MapScale;

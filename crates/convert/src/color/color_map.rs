@@ -39,11 +39,11 @@ const NAMED: [(&str, ColorMap); 8] = [
 ];
 
 impl ColorMap {
-    /// Even to who cannot tell red from green, and brighter all along: the map of what asks for no other.
+    /// The default map: uniform also for red-green colour blindness, and increasing in brightness.
     pub const VIRIDIS: Self = VIRIDIS;
     /// The whole rainbow, with the most distinguishable steps.
     pub const TURBO: Self = TURBO;
-    /// From blue by grey to red: the map of numbers with both signs, with 0 in its middle.
+    /// From blue via grey to red: the map of numbers with both signs, with 0 in its middle.
     pub const COOLWARM: Self = COOLWARM;
 
     /// The map of a name; `None` for an unknown name.
@@ -81,7 +81,7 @@ impl ColorMap {
         self == COOLWARM
     }
 
-    /// How many colours it has, between which others are blended.
+    /// The number of its colours, between which others are blended.
     pub fn steps(self) -> usize {
         self.0.len()
     }

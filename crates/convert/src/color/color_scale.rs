@@ -42,7 +42,8 @@ impl ColorScale {
         (!is_empty).then(|| Self { object, column: Some(by.column.clone()), colors, numbers, gap })
     }
 
-    /// That of a volume or of a plane through one: of the values between the outermost that show, if extinctions tell which do.
+    /// The scale of a volume or of a plane through one. If the transfer function has extinctions, it spans the visible values
+    /// alone.
     ///
     /// ```
     /// use convert::{ColorScale, ScaleNumbers};
@@ -72,7 +73,7 @@ impl ColorScale {
         self.colors.at(number, range)
     }
 
-    /// How numbers of a range lie along its bar.
+    /// The scale of numbers along its bar.
     pub fn spacing(&self) -> MapScale {
         match self.colors {
             PointColors::Map { scale, .. } => scale,

@@ -28,7 +28,7 @@ const CHUNK: usize = 1024;
 pub struct ColoredMesh {
     /// The mesh, without columns.
     pub mesh: Arc<Mesh>,
-    /// How its colours arose, one sentence without a full stop each.
+    /// Notes about the origin of its colours, one sentence without a full stop each.
     pub said: Vec<String>,
     /// The numbers that its colours stand for; `None` where no number is known.
     pub scale: Option<ColorScale>,

@@ -75,8 +75,8 @@ impl SurfaceField {
     }
 
     /// Gives the splats of a surface the field's colours and opacities, and with `keeps_values` its values. A volume reaches half a
-    /// step beyond its outer lattice points; splats beyond that stay as they are. Returns what there is to say, a clause without a full
-    /// stop: how much of the surface that is.
+    /// step beyond its outer lattice points; splats beyond that stay as they are. Returns a warning about the share of such splats, a
+    /// clause without a full stop.
     ///
     /// ```
     /// use convert::{Classified, Density, MeshParams, SurfaceField, mesh_to_points};

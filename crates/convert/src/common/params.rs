@@ -23,7 +23,7 @@ pub struct SplatParams {
     pub footprint: u8,
     /// The profile that `footprint` stands for; it gives the ratio of cutoff radius to spacing.
     pub profile: Footprint,
-    /// Which footprint each disc has, and how images lie; `None` for `footprint`, a formula.
+    /// The choice of each disc's footprint, and of the orientation of images; `None` for `footprint`, a formula.
     pub footprints: Option<Arc<FootprintChoice>>,
     /// The materials that a column `material` of raw points chooses from, by numbers from 0; `None` for `material`,
     /// one for all.
@@ -36,8 +36,8 @@ pub struct SplatParams {
     pub limits: Limits,
     /// Whether surfaces of opacity 0 become splats too: the matter that they bound may bend light.
     pub keep_clear: bool,
-    /// Where what takes long is kept from one conversion of the same input to the next: what neighbours tell of raw points. The cache
-    /// changes no result.
+    /// Cache of slow results for later conversions of the same input: estimates from the neighbours of raw points. The cache changes
+    /// no result.
     #[cfg(feature = "cache")]
     pub cache: Option<Arc<Cache>>,
 }
@@ -62,7 +62,7 @@ impl Default for SplatParams {
     }
 }
 
-/// How far splats lie apart.
+/// The distance between splats.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum Density {
     /// Each splat stands for at most this much length (lattices) or for its square in area (surfaces), world units.

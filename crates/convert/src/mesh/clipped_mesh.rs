@@ -6,10 +6,10 @@ use splat_core::{Clip, Mesh, vertex_normals};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// The part of a mesh that lies in all of the regions. The mesh ends open at their borders, without a lid. Corners on a border are those
-/// of the line between the corners of the triangle, in f64 until they are stored, and one place for all triangles that meet there,
-/// whether these share vertices or have some at the same places; normals and colours are interpolated. A mesh without normals gets smooth
-/// ones, so that the cut does not change how it is shaded. Without regions the mesh is the same one.
+/// The part of a mesh that lies in all of the regions. The mesh ends open at their borders, without a lid. New corners lie on the edges
+/// of triangles, in f64 until they are stored. Triangles that meet there get the same place, whether they share vertices or have
+/// coinciding ones. Normals and colours are interpolated. A mesh without normals gets smooth ones, so that the cut does not change how it
+/// is shaded. Without regions the mesh is the same one.
 ///
 /// ```
 /// use splat_core::{Clip, Mesh, glam::DVec3};
@@ -20,7 +20,7 @@ use std::sync::Arc;
 /// ```
 ///
 /// # Panics
-/// If an index is out of range, which [`Mesh::validate`] tells.
+/// If an index is out of range; see [`Mesh::validate`].
 pub fn clipped_mesh(mesh: Arc<Mesh>, clips: &[Clip]) -> Arc<Mesh> {
     clipped_by(mesh, clips, |mesh, normal, offset| cut(mesh, normal, offset, None))
 }

@@ -71,7 +71,7 @@ impl LidReport {
 /// ```
 ///
 /// # Panics
-/// If an index is out of range, which [`Mesh::validate`] tells.
+/// If an index is out of range; see [`Mesh::validate`].
 pub fn lidded_mesh(mesh: Arc<Mesh>, clips: &[Clip]) -> LiddedMesh {
     let mut report = LidReport::default();
     let closed = clipped_by(mesh, clips, |mesh, normal, offset| {

@@ -26,7 +26,7 @@ use splat_core::{
     optics,
 };
 
-/// How a mesh becomes splats.
+/// Parameters of the conversion of a mesh to splats.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MeshParams {
     /// Attributes and limits.
@@ -226,9 +226,9 @@ fn leans(normals: [Vec3; 3], plane: Vec3) -> bool {
     normals.iter().any(|n| n.dot(plane).abs() < LEANING * n.length())
 }
 
-/// Gives the triangles larger than `least` (area, object units²) whose normals lean by more than 20° from their plane vertices of
-/// their own, with the plane's normal on the side of theirs: for who takes one normal both for where a surface lies and for
-/// how it is lit. A mesh without normals stays as it is.
+/// Separates triangles larger than `least` (area, object units²) whose normals lean by more than 20° from their plane. Their new
+/// vertices have the plane's normal, on the side of the old ones. This serves techniques that use a single normal for geometry
+/// and for shading. A mesh without normals stays as it is.
 ///
 /// # Panics
 /// If a vertex index is out of range, see [`Mesh::validate`].

@@ -15,8 +15,8 @@ const STEEP: f64 = 1000.0;
 /// Most degrees that points of one picture span.
 const WIDEST: f64 = 5.0;
 
-/// Whether x and y look like longitude and latitude, in degrees, and z like metres: within their ranges, a thousand times as high as wide, and
-/// flat once they are metres.
+/// Whether x and y look like longitude and latitude, in degrees, and z like metres. They are within their ranges, a thousand times as high as
+/// wide, and flat once converted to metres.
 pub fn looks_like_degrees(points: &RawPoints) -> bool {
     let Some(bounds) = bounds(points).filter(|_| points.len() >= FEWEST) else { return false };
     let size = bounds.size();

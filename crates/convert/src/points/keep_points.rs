@@ -3,7 +3,7 @@
 use splat_core::glam::DVec3;
 use splat_core::{Clip, Column, PointLattice, RawPoints};
 
-/// Which numbers of a column are kept. Gaps, see [`Column`], never are.
+/// The numbers of a column that are kept. Gaps, see [`Column`], never are.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Within {
     /// From the lowest to the highest, both of them too.

@@ -22,7 +22,7 @@ use splat_core::points::attributes::{
 };
 use splat_core::{Cloud, Column, Error, PointCell, Progress, RawPoints, SplatKind};
 
-/// How raw points become a medium.
+/// Parameters of the conversion of raw points to a medium.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MatterParams {
     /// Attributes and limits; `color` is for points without one.
@@ -86,7 +86,7 @@ impl MatterReport {
 
 /// Makes a cloud of medium splats of raw points.
 ///
-/// Columns of the points (`RawPoints::columns`) say more, each a number a point: `radius`, the reach of its kernel in units of the file, or
+/// Columns of the points (`RawPoints::columns`) add a number for each point: `radius`, the reach of its kernel in units of the file, or
 /// `smoothing_length`, half of that, > 0; `extinction`, a factor of the parameter, ≥ 0; `mass`, which the parameter is multiplied by in the
 /// place of a volume, ≥ 0; and `shadow_coefficient`, the share of a shadow that it receives, in \[0, 1\].
 ///

@@ -13,7 +13,7 @@ use rayon::prelude::*;
 use splat_core::Progress;
 use splat_core::glam::{DVec3, Vec3};
 
-/// Which side computed normals point to.
+/// The side that computed normals point to.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Orientation {
     /// Along this direction, object space: (0, 0, 1) for terrain whose z is up.

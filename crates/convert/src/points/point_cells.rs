@@ -6,7 +6,7 @@ use crate::{ConvertError, SplatParams};
 use splat_core::glam::Vec3;
 use splat_core::{PointCell, Progress, RawPoints};
 
-/// The points with what each of them stands for among all of them, so that it stands for as much among those of them that are kept. Of
+/// Computes the Voronoi cell of every point before thinning, so that kept points have the volume that they had in the full cloud. Of
 /// `splat` the name is used.
 ///
 /// # Errors

@@ -26,7 +26,7 @@ pub struct PointsShown<'a> {
     pub color_by: Option<&'a ColorBy>,
     /// Whether they stand for matter: then for as much as among all points, whichever are kept.
     pub as_matter: bool,
-    /// How the discs lie of points that are none.
+    /// The shape of discs whose points state none.
     pub shape: DiscShape,
     /// Whether all discs have one size.
     pub has_size: bool,
@@ -36,7 +36,7 @@ pub struct PointsShown<'a> {
     pub has_field: bool,
     /// Whether points that have the colours of a column have its numbers as their values.
     pub keeps_values: bool,
-    /// Where `height` grows.
+    /// The direction in which `height` grows.
     pub up: DVec3,
 }
 
@@ -45,7 +45,8 @@ pub struct PointsShown<'a> {
 pub struct ShownPoints {
     /// The points.
     pub points: Arc<RawPoints>,
-    /// How their colours arose, that nothing is left, and what a medium does not use: one sentence without a full stop each.
+    /// Notes: the origin of their colours, an empty selection, and columns that a medium does not use. Each is a sentence
+    /// without a full stop.
     pub said: Vec<String>,
     /// The scale of their colours, if a column colours them.
     pub scale: Option<ColorScale>,

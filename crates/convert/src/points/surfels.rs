@@ -38,7 +38,7 @@ use splat_core::{
     optics,
 };
 
-/// How raw points become surfels.
+/// Parameters of the conversion of raw points to surfels.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SurfelParams {
     /// Attributes and limits; `color` is for points without one.
@@ -49,7 +49,7 @@ pub struct SurfelParams {
     pub opacity: f64,
     /// Neighbours that normals and areas come from, 3 to 32.
     pub neighbours: usize,
-    /// Which side computed normals point to. Normals of the input stay as they are.
+    /// The side that computed normals point to. Normals of the input stay as they are.
     pub orientation: Orientation,
     /// Whether points at one place become one surfel.
     pub merge_duplicates: bool,
@@ -59,7 +59,7 @@ pub struct SurfelParams {
     pub largest_spacing: f64,
     /// Spacing of a point without any neighbour, world units.
     pub lone_spacing: f64,
-    /// How discs lie whose points have neither a size nor a tangent.
+    /// The shape of discs whose points have neither a size nor a tangent.
     pub shape: DiscShape,
     /// The same diameter for all discs, round ones; `None` for the size that points state, or else the size that bridges the
     /// gaps between neighbours.
@@ -115,11 +115,11 @@ impl SurfelReport {
     }
 }
 
-/// Makes surfels of raw points. Columns of the points (`RawPoints::columns`) say more, each a number a point: `radius`, the length in units of
-/// the file within which an opaque disc hides, > 0; `tx`, `ty` and `tz`, a semi-axis of a disc that is an ellipse, as long as it hides that way,
+/// Makes surfels of raw points. Columns of the points (`RawPoints::columns`) add a number for each point: `radius`, the length in units of the
+/// file within which an opaque disc hides, > 0; `tx`, `ty` and `tz`, a semi-axis of a disc that is an ellipse, as long as it hides that way,
 /// whose second one has that radius, and zero for a round disc; `shadow_coefficient`, the share of a shadow that it receives; and `footprint` and
-/// `material`, places in [`SplatParams::footprints`] and [`SplatParams::materials`]. Points that
-/// are Gaussians become splats that are seen as these, each one, also where several lie at one place; points that are splats stay what they are.
+/// `material`, places in [`SplatParams::footprints`] and [`SplatParams::materials`]. Points that are Gaussians become splats that are seen as
+/// these, each one, also where several lie at one place; points that are splats stay what they are.
 ///
 /// ```
 /// use splat_core::RawPoints;

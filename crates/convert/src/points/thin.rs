@@ -8,9 +8,9 @@ use splat_core::glam::{DVec3, Vec3};
 use splat_core::points::attributes::is_id;
 use splat_core::{Column, Gaussians, RawPoints, ReadySplats};
 
-/// Points that lie about `spacing` apart, units of the file, where the given ones lie closer: those of each cell of a
-/// lattice with that step become one with their mean place, normal, colour, value, opacity and further columns, and the class, `footprint` and
-/// `material` of the first. The lattice has a point at zero of the file's coordinates, so nothing depends on the order of the points.
+/// Thins points to a distance of about `spacing`, units of the file. The points of each cell of a lattice with that step become one point. It
+/// has their mean place, normal, colour, value, opacity and further columns, and the class, `footprint` and `material` of the first. The
+/// lattice has a point at zero of the file's coordinates, so nothing depends on the order of the points.
 ///
 /// ```
 /// use splat_core::RawPoints;

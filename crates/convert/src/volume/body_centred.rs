@@ -41,7 +41,7 @@ struct Taps {
 /// ```
 ///
 /// # Errors
-/// [`ConvertError::Input`] for a grid that is none, [`ConvertError::Limit`] before memory is taken.
+/// [`ConvertError::Input`] for an invalid grid, [`ConvertError::Limit`] before memory is taken.
 pub fn body_centred(grid: &Grid, params: &SplatParams) -> Result<BccGrid, ConvertError> {
     grid.validate().map_err(|e| params.input(e))?;
     let dims = sizes(grid.dims);

@@ -36,7 +36,7 @@ pub struct FillValue {
 /// A few voxels whose values lie far from all others.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Strays {
-    /// How many voxels.
+    /// Number of voxels.
     pub count: u64,
     /// Voxels in all.
     pub voxels: u64,

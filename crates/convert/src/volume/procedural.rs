@@ -48,7 +48,7 @@ pub struct CloudShape {
     pub lacunarity: f64,
     /// Strength of an octave over that of the one before, in (0, 1\].
     pub gain: f64,
-    /// How far turbulence moves the boundary, in mean radii of the ellipsoid, ≥ 0.
+    /// Displacement of the boundary by turbulence, in mean radii of the ellipsoid, ≥ 0.
     pub amplitude: f64,
     /// Frequency of the first octave, cells of noise per object unit, > 0.
     pub frequency: f64,

@@ -34,8 +34,8 @@ pub(crate) fn kernel_spacing(axes: &DMat3) -> f64 {
     1.0 / shortest.min((reciprocal * DVec3::NEG_ONE).length())
 }
 
-/// The grid on a lattice whose steps are `spacing` long at most (but for rounding) and as alike as whole numbers of cells allow, units of the
-/// grid: coarser or finer. It fills the same place; values are interpolated trilinearly.
+/// Resamples the grid, coarser or finer. The new steps are at most `spacing` long (but for rounding), units of the grid, and as alike as
+/// whole numbers of cells allow. The new grid fills the same place; values are interpolated trilinearly.
 ///
 /// ```
 /// use convert::{SplatParams, resampled};
@@ -47,7 +47,7 @@ pub(crate) fn kernel_spacing(axes: &DMat3) -> f64 {
 /// ```
 ///
 /// # Errors
-/// [`ConvertError::Parameter`] for a spacing that is no length, [`ConvertError::Input`] for a grid that is none,
+/// [`ConvertError::Parameter`] for a spacing that is no length, [`ConvertError::Input`] for an invalid grid,
 /// [`ConvertError::Limit`] before memory is taken.
 pub fn resampled(grid: &Grid, spacing: f64, params: &SplatParams) -> Result<Grid, ConvertError> {
     params.check_spacing(spacing)?;

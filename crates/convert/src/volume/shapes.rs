@@ -50,9 +50,9 @@ impl MediumBody {
     }
 }
 
-/// A homogeneous medium as splats, of which all regions of `clips` keep something. Cells that the surface of a ball cuts count with the
-/// share of their volume inside, and all together, before they are cut, with the volume 4/3·πr³ exactly; cells that a region cuts
-/// count with the share of them that is kept.
+/// A homogeneous medium as splats, of which all regions of `clips` keep something. Cells on the surface of a ball count with the share
+/// of their volume inside; before clipping, all cells together have the volume 4/3·πr³ exactly. Cells that a region cuts count with
+/// their kept share.
 ///
 /// # Errors
 /// [`ConvertError::Parameter`] for an empty box, a spacing or an extinction out of range, [`ConvertError::Limit`].

@@ -19,7 +19,7 @@ use splat_core::{
     glam::{DVec3, Vec3},
 };
 
-/// How a volume becomes splats.
+/// Parameters of the conversion of a volume to splats.
 #[derive(Debug, Clone, PartialEq)]
 pub struct VolumeParams {
     /// Attributes and limits; `color` is not used.
@@ -34,8 +34,8 @@ pub struct VolumeParams {
     pub values: bool,
     /// Optical depth that leaving out thin voxels may cost any straight ray, ≥ 0.
     pub omitted_optical_depth: f64,
-    /// Optical depth across a cell, ≥ 0, that may be wrong because the transfer function is taken at the voxel alone; cells
-    /// where more could be have its mean.
+    /// Tolerated error of the optical depth across a cell, ≥ 0, from a transfer function that is evaluated at the voxel
+    /// alone. Cells with a larger possible error take the mean of the transfer function.
     pub classification_error: f64,
     /// The regions to keep, object space. A cell that their borders cross has the extinction of the part of it that is kept.
     pub clip: Vec<Clip>,
