@@ -34,8 +34,8 @@ use std::cmp::Ordering;
 /// A scene in memory, normalized by a power of two (see [`Loaded::exponent`]) and ready for a technique.
 #[derive(Debug)]
 pub struct Loaded {
-    /// All splats in canonical order. Splats of translucent objects in `own` are among them if they may cast shadows;
-    /// those are not drawn.
+    /// The splats, in canonical order. Splats of translucent objects in `own` are among them if they may cast
+    /// shadows; those are not drawn.
     pub cloud: Cloud,
     /// Translucent objects in the form in which their technique takes them, where that is not splats.
     pub(crate) own: Vec<Own>,

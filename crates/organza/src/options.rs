@@ -19,8 +19,9 @@ pub struct RenderOptions {
     pub strict: bool,
     /// Make one point of points at the same place, for every object.
     pub merge_duplicates: bool,
-    /// File of the sums of the technique `particles`. It is read first, if it exists, and written every few seconds, at
-    /// the end and at an interrupt. A render that is stopped at any moment goes on from it and ends in the same bits.
+    /// File of the sums of the technique `particles`. The render reads the file first, if it exists, and writes it
+    /// every few seconds, at the end and at an interrupt. A render that is stopped at any moment goes on from it and
+    /// ends in the same bits.
     pub checkpoint: Option<PathBuf>,
     /// Cache of slow conversions, which later runs read; it changes no picture.
     pub cache: Option<Arc<Cache>>,

@@ -263,8 +263,8 @@ impl Statistics {
         self.planned.iter().filter(|o| o.form.is_own()).count() as u64
     }
 
-    /// Takes in how objects are drawn, of which each has become `made` splats: those of an object that is drawn from its own
-    /// data are not drawn, and where it became none it may receive shadows all the same.
+    /// Adds the planned forms of the objects, each with its `made` splats. Splats of an object that is drawn from its native
+    /// data are not drawn. Such an object may receive shadows even without splats.
     pub fn with_objects(mut self, objects: &[ObjectStatistics], planned: &[PlannedObject], made: &[u64]) -> Self {
         self.planned = planned.to_vec();
         for ((object, planned), made) in objects.iter().zip(planned).zip(made) {

@@ -73,7 +73,7 @@ pub struct Prediction {
 }
 
 impl Prediction {
-    /// All passes, in the order of running.
+    /// The passes, in the order of running.
     pub fn passes(&self) -> impl Iterator<Item = &CountedPass> {
         self.loading.iter().chain(&self.drawing)
     }

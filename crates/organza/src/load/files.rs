@@ -73,8 +73,8 @@ impl Files {
     /// Reads a file unless it was read with the same limits, and keeps what it holds.
     ///
     /// # Errors
-    /// [`Error::Io`], [`Error::Input`] or [`Error::TooLarge`] as its reader has them; too large is also what would take more memory
-    /// than `limits` allow beside the files that are kept.
+    /// [`Error::Io`], [`Error::Input`] or [`Error::TooLarge`] of its reader. A file is also too large if it takes more memory than
+    /// `limits` leave beside the cached files.
     pub fn read(&self, path: &Path, limits: &ReadParams, progress: &Progress) -> Result<SourceData, Error> {
         let read = self.known_or_read(path, limits, progress)?;
         self.read.borrow_mut().insert((real(path), limits.frame), (limits.clone(), read.clone()));

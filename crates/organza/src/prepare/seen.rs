@@ -58,8 +58,8 @@ pub fn settled<'s>(
     Ok((settle::settled(scene, options, progress, files)?, found))
 }
 
-/// The first surface of some objects that a light (an extended one from its middle) sees, in the world. It follows from a shadow map of these
-/// objects alone (Gunjee 2007, Figure 15 a).
+/// The first surface of some objects that a light (an extended one from its middle) sees, in the world. The surface follows from a shadow map
+/// of these objects alone (Gunjee 2007, Figure 15 a).
 ///
 /// # Errors
 /// As [`crate::render`]; [`Error::Input`] where no ray meets the absorbance.

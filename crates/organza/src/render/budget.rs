@@ -134,8 +134,8 @@ struct Chosen {
     expected: f64,
 }
 
-/// Renders a scene so that it keeps to a goal, on the threads that there are: of settings within the errors those that err least and fit the time;
-/// without a time, those that take least. The picture is that of the scene with the chosen settings.
+/// Renders a scene within a goal, on the threads of the current pool. Among settings within the errors it takes the most accurate that fit the
+/// time; without a time, the fastest. The picture is that of the scene with the chosen settings.
 ///
 /// Errors are estimates from small pictures, against the picture with the scene's stated settings: on the whole within a factor of
 /// two.

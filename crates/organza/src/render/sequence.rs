@@ -7,15 +7,15 @@ use crate::{Error, Progress, Render, RenderOptions};
 
 /// Draws the frames of an animation.
 ///
-/// Where a frame differs from the one before it in the camera alone, its splats, shadow maps and the light that arrived at splats serve
-/// again: it is drawn from them, its cost record has no pass `read`, `convert` or `tsm build`, and its picture is that of the frame drawn by
-/// itself, bit by bit. Light is remembered while it fits in a quarter of [`RenderOptions::max_memory`]. Scenes whose points are as large as some
-/// pixels, or whose light is carried by half-vector sheets, are made anew for each camera.
+/// A frame that differs from the one before in the camera alone reuses its splats, its shadow maps and the light that arrived at splats. Its
+/// cost record then has no pass `read`, `convert` or `tsm build`. Its picture equals that of the frame drawn alone, bit by bit. Light is
+/// remembered while it fits in a quarter of [`RenderOptions::max_memory`]. Scenes whose points are as large as some pixels, or whose light is
+/// carried by half-vector sheets, are made anew for each camera.
 ///
-/// The technique `particles` samples an object once, as finely as any frame needs it, and keeps the sets while they fit in a
-/// quarter of [`RenderOptions::max_memory`]: an object whose transform or visibility changes, or that is seen from another
-/// place, is not sampled again. The cost record of a frame has a pass `sample` where something was. Files are read once, while
-/// what they hold fits in another quarter.
+/// The technique `particles` samples an object once, as finely as any frame needs it. It keeps the sets while they fit in a
+/// quarter of [`RenderOptions::max_memory`]. So a change of transform, of visibility or of the viewpoint needs no new
+/// sampling. The cost record of a frame has a pass `sample` where something was. Files are read once, while what they hold
+/// fits in another quarter.
 ///
 /// ```
 /// use organza::{Progress, RenderOptions, Sequence, scene};

@@ -45,7 +45,7 @@ const OF_FLIP: OfWidth = OfWidth { samples: 0.75, splats: 0.0 };
 pub struct ExpectedError {
     /// Root mean square of the channels' differences, 0 to 1.
     pub rmse: f64,
-    /// Mean FLIP, 0 to 1, of the whole picture as it is looked at from 0.7 m on a screen 0.7 m wide with 3840 pixels.
+    /// Mean FLIP, 0 to 1, of the whole picture, seen from 0.7 m on a screen 0.7 m wide with 3840 pixels.
     pub flip: f64,
 }
 
