@@ -541,3 +541,14 @@ mod deep {
         }
     }
 }
+
+#[test]
+fn a_set_without_a_value_takes_away_what_is_there() {
+    let place = place();
+    place.expect(0, &["render", "s.toml", "-o", "a.png", "--set", "object.fog="], "");
+    place.expect(0, &["render", "s.toml", "-o", "b.png", "--set", "object.fog.visible=false"], "");
+    let [gone, hidden] = ["a.png", "b.png"].map(|file| image::open(place.path(file)).unwrap().to_rgb8());
+    assert_eq!(gone, hidden);
+    place.expect(2, &["render", "s.toml", "--set", "object.fog.nam="], "there is no `nam` to take away");
+    place.expect(3, &["render", "s.toml", "--set", "camera.size="], "expected a key `size` here, found none");
+}

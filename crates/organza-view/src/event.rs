@@ -266,7 +266,7 @@ pub(crate) fn settings(set: &[String]) -> Result<Vec<Override>, Error> {
             _ => false,
         };
         let is_other = ["exposure", "layers", "technique"].iter().any(|key| change.path()[1..] == [(*key).to_owned()]);
-        let is_table = change.toml().contains(['{', '[']);
+        let is_table = change.toml().is_some_and(|value| value.contains(['{', '[']));
         let expected = "expected a setting of the render that trades accuracy for time";
         let is_setting = is_of_render && !is_other && !is_table;
         is_setting.then_some(change).ok_or_else(|| bad(format!("`set`: {expected}, found `{}`", shown(text))))

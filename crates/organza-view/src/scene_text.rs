@@ -18,7 +18,11 @@ fn changed_toml(text: &str, overrides: &[Override]) -> Result<String, Error> {
     let mut document: DocumentMut = text.parse().map_err(|e| internal(&format!("its text: {e}")))?;
     for change in overrides {
         expand_auto(&mut document);
-        let value: Value = change.toml().parse().map_err(|e| internal(&format!("the value of a change: {e}")))?;
+        let Some(value) = change.toml() else {
+            remove_in_table(document.as_table_mut(), change.path()).ok_or_else(|| internal(change.flag()))?;
+            continue;
+        };
+        let value: Value = value.parse().map_err(|e| internal(&format!("the value of a change: {e}")))?;
         set_in_table(document.as_table_mut(), change.path(), value).ok_or_else(|| internal(change.flag()))?;
     }
     Ok(document.to_string())
@@ -178,6 +182,49 @@ fn set_in_value(found: &mut Value, path: &[String], value: Value) -> Option<()> 
     }
 }
 
+/// Takes away what is at the end of a path of keys; nothing where there is nothing.
+fn remove_in_table(table: &mut dyn TableLike, path: &[String]) -> Option<()> {
+    let (key, rest) = path.split_first()?;
+    if rest.is_empty() {
+        return table.remove(key).map(drop);
+    }
+    match table.get_mut(key)? {
+        Item::Table(table) => remove_in_table(table, rest),
+        Item::ArrayOfTables(tables) => {
+            let (key, rest) = rest.split_first()?;
+            let names = tables.iter().map(|table| table.get("name").and_then(Item::as_str));
+            let rank = rank_of(names, key)?;
+            let table = tables.get_mut(rank)?;
+            if !rest.is_empty() {
+                return remove_in_table(table, rest);
+            }
+            tables.remove(rank);
+            Some(())
+        }
+        Item::Value(found) => remove_in_value(found, rest),
+        Item::None => None,
+    }
+}
+
+fn remove_in_value(found: &mut Value, path: &[String]) -> Option<()> {
+    let (key, rest) = path.split_first()?;
+    match found {
+        Value::InlineTable(table) if rest.is_empty() => table.remove(key).map(drop),
+        Value::InlineTable(table) => remove_in_value(table.get_mut(key)?, rest),
+        Value::Array(list) => {
+            let name = |item: &Value| item.as_inline_table()?.get("name")?.as_str().map(str::to_owned);
+            let names: Vec<Option<String>> = list.iter().map(name).collect();
+            let rank = rank_of(names.iter().map(Option::as_deref), key).filter(|rank| *rank < list.len())?;
+            if rest.is_empty() {
+                list.remove(rank);
+                return Some(());
+            }
+            remove_in_value(list.get_mut(rank)?, rest)
+        }
+        _ => None,
+    }
+}
+
 /// The rank in a list that a key names, a number or a `name`.
 fn rank_of<'n>(mut names: impl Iterator<Item = Option<&'n str>>, key: &str) -> Option<usize> {
     key.parse().ok().or_else(|| names.position(|name| name == Some(key)))
@@ -206,7 +253,11 @@ fn changed_json(text: &str, overrides: &[Override]) -> Result<String, Error> {
         if document.get("camera").and_then(Json::as_str) == Some("auto") {
             document["camera"] = serde_json::json!({ "auto": true });
         }
-        let value: Value = change.toml().parse().map_err(|e| internal(&format!("the value of a change: {e}")))?;
+        let Some(value) = change.toml() else {
+            remove_in_json(&mut document, change.path()).ok_or_else(|| internal(change.flag()))?;
+            continue;
+        };
+        let value: Value = value.parse().map_err(|e| internal(&format!("the value of a change: {e}")))?;
         set_in_json(&mut document, change.path(), json(&value)).ok_or_else(|| internal(change.flag()))?;
     }
     Ok(format!("{document:#}\n"))
@@ -225,6 +276,24 @@ fn set_in_json(found: &mut Json, path: &[String], value: Json) -> Option<()> {
         Json::Array(list) => {
             let rank = rank_of(list.iter().map(|item| item.get("name")?.as_str()), key)?;
             set_in_json(list.get_mut(rank)?, rest, value)
+        }
+        _ => None,
+    }
+}
+
+fn remove_in_json(found: &mut Json, path: &[String]) -> Option<()> {
+    let (key, rest) = path.split_first()?;
+    match found {
+        Json::Object(table) if rest.is_empty() => table.remove(key).map(drop),
+        Json::Object(table) => remove_in_json(table.get_mut(key)?, rest),
+        Json::Array(list) => {
+            let names = list.iter().map(|item| item.get("name")?.as_str());
+            let rank = rank_of(names, key).filter(|rank| *rank < list.len())?;
+            if rest.is_empty() {
+                list.remove(rank);
+                return Some(());
+            }
+            remove_in_json(list.get_mut(rank)?, rest)
         }
         _ => None,
     }
@@ -271,6 +340,9 @@ mod tests {
             "render.exposure=1.5",
             "render.points={ exact = true }",
             "camera.size=[32, 24]",
+            "object.b.rectangle.spacing=0.2",
+            "object.0.visible=true",
+            "object.0.visible=",
         ];
         let mut changes: Vec<Override> = set.iter().map(|text| Override::parse(text).unwrap()).collect();
         changes.push(Override::of_effect("object.a=on").unwrap());

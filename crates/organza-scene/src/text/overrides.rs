@@ -16,12 +16,13 @@ use crate::{Error, MAX_SCENE_DEPTH, shown};
 pub struct Override {
     flag: String,
     path: Vec<String>,
-    value: Value,
+    /// `None` takes away what is there.
+    value: Option<Value>,
 }
 
 impl Override {
     /// From `PATH=VALUE`: keys with dots between them, in a list an index from 0 or an entry's `name`; the value in
-    /// TOML, where a plain word needs no quotes.
+    /// TOML, where a plain word needs no quotes. Without a value, what is at the path is taken away.
     ///
     /// # Errors
     /// [`Error::Usage`] naming what is wrong.
@@ -33,15 +34,16 @@ impl Override {
         let (path, value) = text.split_once('=').ok_or_else(|| bad("expected PATH=VALUE, found no `=`".into()))?;
         let path = split_path(path).map_err(bad)?;
         let value = value.trim();
+        if value.is_empty() {
+            return Ok(Self { flag: format!("--set {text}"), path, value: None });
+        }
         let is_word = |c: char| c.is_alphanumeric() || "_-./".contains(c);
         let parsed = match read_toml_value(value) {
             Ok(parsed) => parsed,
-            Err(_) if !value.is_empty() && value.chars().all(is_word) && !is_not_finite(value) => {
-                Value::Text(value.to_owned())
-            }
+            Err(_) if value.chars().all(is_word) && !is_not_finite(value) => Value::Text(value.to_owned()),
             Err(message) => return Err(bad(message)),
         };
-        Ok(Self { flag: format!("--set {text}"), path, value: parsed })
+        Ok(Self { flag: format!("--set {text}"), path, value: Some(parsed) })
     }
 
     /// From an option of its own: `flag` as it is shown in messages, a path, and a value in TOML.
@@ -51,7 +53,7 @@ impl Override {
     pub fn from_option(flag: String, path: &str, toml: &str) -> Result<Self, Error> {
         let bad = |message: String| Error::usage(format!("{}: {message}", shown(&flag)), "");
         let value = read_toml_value(toml).map_err(bad)?;
-        Ok(Self { path: path.split('.').map(str::to_owned).collect(), value, flag })
+        Ok(Self { path: path.split('.').map(str::to_owned).collect(), value: Some(value), flag })
     }
 
     /// From `NAME=on` or `NAME=off` of an effect, whose name may have dots in it.
@@ -66,7 +68,7 @@ impl Override {
             return Err(Error::usage(message, "`organza explain` lists the effects of a scene by name"));
         }
         let path = ["render", "effects", name].map(str::to_owned).to_vec();
-        Ok(Self { flag, path, value: Value::Text(switch.to_owned()) })
+        Ok(Self { flag, path, value: Some(Value::Text(switch.to_owned())) })
     }
 
     /// The option as it was written on the command line.
@@ -79,15 +81,16 @@ impl Override {
         &self.path
     }
 
-    /// The value as TOML on one line.
+    /// The value as TOML on one line; `None` takes away what is at the path.
     ///
     /// ```
     /// use organza_scene::Override;
     /// let change = Override::parse("camera={ size = [64, 48], fov_y = 35.5 }").unwrap();
-    /// assert_eq!((change.path().join("."), change.toml()), ("camera".into(), "{ size = [64, 48], fov_y = 35.5 }".into()));
+    /// assert_eq!((change.path().join("."), change.toml()), ("camera".into(), Some("{ size = [64, 48], fov_y = 35.5 }".into())));
+    /// assert_eq!(Override::parse("camera.fov_y=").unwrap().toml(), None);
     /// ```
-    pub fn toml(&self) -> String {
-        toml_of(&self.value)
+    pub fn toml(&self) -> Option<String> {
+        self.value.as_ref().map(toml_of)
     }
 }
 
@@ -143,11 +146,14 @@ pub(crate) fn apply(document: &mut Document<'_>, overrides: &[Override]) -> Resu
     for change in overrides {
         let place = Place::Flag(document.flags.len());
         document.flags.push(change.flag.clone());
-        let mut value = change.value.clone();
-        set_places(&mut value, place);
-        if let Err((message, hint)) = set(&mut document.root, &change.path, value, place) {
-            return Err(document.error(place, message, hint));
-        }
+        let done = match change.value.clone() {
+            None => remove(&mut document.root, &change.path),
+            Some(mut value) => {
+                set_places(&mut value, place);
+                set(&mut document.root, &change.path, value, place)
+            }
+        };
+        done.map_err(|(message, hint)| document.error(place, message, hint))?;
     }
     Ok(())
 }
@@ -199,6 +205,48 @@ pub(crate) fn set(root: &mut Node, path: &[String], value: Value, place: Place) 
     }
     *node = Node { place, value };
     Ok(())
+}
+
+/// Walks to the path's end and takes away what is there.
+fn remove(root: &mut Node, path: &[String]) -> Result<(), (String, String)> {
+    let Some((last, before)) = path.split_last() else { return Ok(()) };
+    let mut node = root;
+    for key in before {
+        node = match &mut node.value {
+            Value::Table(entries) => {
+                let index = index_in_table(entries, key)?;
+                &mut entries[index].node
+            }
+            Value::List(items) => {
+                let index = index_in_list(items, key)?;
+                &mut items[index]
+            }
+            other => return Err(not_here(key, other)),
+        };
+    }
+    match &mut node.value {
+        Value::Table(entries) => {
+            let index = index_in_table(entries, last)?;
+            entries.remove(index);
+        }
+        Value::List(items) => {
+            let index = index_in_list(items, last)?;
+            items.remove(index);
+        }
+        other => return Err(not_here(last, other)),
+    }
+    Ok(())
+}
+
+fn not_here(key: &str, found: &Value) -> (String, String) {
+    (format!("expected a table or a list before `{}`, found {}", shown(key), found.describe()), String::new())
+}
+
+/// An entry of a table that is to be taken away.
+fn index_in_table(entries: &[Entry], key: &str) -> Result<usize, (String, String)> {
+    let keys: Vec<&str> = entries.iter().map(|entry| entry.key.as_str()).collect();
+    let missing = || (format!("there is no `{}` to take away", shown(key)), suggest(key, &keys));
+    keys.iter().position(|known| *known == key).ok_or_else(missing)
 }
 
 /// An entry of a list by index, or by its `name`.
