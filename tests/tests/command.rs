@@ -84,6 +84,7 @@ fn exit_2_is_for_the_command_line() {
         (vec!["rendr"], "unrecognized subcommand"),
         (vec!["render", "s.toml", "-o", "a.gif"], "expected a name that ends in .exr, .png or .jpg"),
         (vec!["render", "s.toml", "-o", "a.jpg", "--transparent"], "--transparent is for PNG and EXR files"),
+        (vec!["render", "s.toml", "--material", "wax"], "--material is for data files, and a scene is given"),
         (vec!["render", "s.toml", "-o", "a.jpg", "--layers", "depth"], "--layers is for EXR files"),
         (vec!["render", "s.toml", "--background", "mauve"], "expected #rrggbb or one of black, white"),
         (vec!["render", "s.toml", "--background", "#12345g"], "expected #rrggbb or one of black, white"),

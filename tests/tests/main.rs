@@ -36,6 +36,7 @@ mod levels;
 mod light_effects;
 mod loading;
 mod many_forms;
+mod materials;
 mod matter;
 mod measured_effects;
 mod memory;

@@ -35,7 +35,7 @@ pub(super) struct Arguments {
 pub(super) enum Command {
     /// Renders a scene, or data files as they are, to EXR or PNG files.
     #[command(
-        after_help = "Examples:\n  organza render bunny.ply -o bunny.png\n  organza render head.nii.gz --preset mri --azimuth 200 -o head.png\n  organza render ground.laz bunny.ply --ground -o both.png\n  organza render ground.laz --color-by height --legend -o heights.png\n  organza render scene.toml -o picture.exr -o picture.png --layers effects,depth\n  organza render bunny.ply -o around.png --turntable 36\n  organza render scene.toml --set object.bunny.opacity=0.4 --technique surfels -o glass.png"
+        after_help = "Examples:\n  organza render bunny.ply -o bunny.png\n  organza render head.nii.gz --preset mri --azimuth 200 -o head.png\n  organza render ground.laz bunny.ply --ground -o both.png\n  organza render ground.laz --color-by height --legend -o heights.png\n  organza render scene.toml -o picture.exr -o picture.png --layers effects,depth\n  organza render bunny.ply --material wax --ground -o wax.png\n  organza render bunny.ply -o around.png --turntable 36\n  organza render scene.toml --set object.bunny.opacity=0.4 --technique surfels -o glass.png"
     )]
     Render(RenderArguments),
     /// Writes a first scene of data files, with comments, ready to edit.
@@ -152,6 +152,10 @@ pub(super) struct FirstArguments {
     /// Look of volumes, and the colour map of --color-by: ct-bone, ct-skin, mri, cloud, viridis, magma, inferno, plasma, cividis, turbo, grey, coolwarm, or a .json preset of ParaView
     #[arg(long, value_name = "NAME")]
     pub(super) preset: Option<String>,
+    /// Material of all surfaces, and of points and volumes that are a medium: glass, glass-red, water, wax, skin, milk, marble, smoke, cloud and others,
+    /// which docs/materials.md shows
+    #[arg(long, value_name = "NAME")]
+    pub(super) material: Option<String>,
     /// Column that points or meshes take their colours from, one of those that `organza info` lists, or array of a VTK volume; --preset names
     /// the colour map [default: the file's colours; of a LAS file without colours its classes where most points have one, else its values]
     #[arg(long, value_name = "COLUMN")]

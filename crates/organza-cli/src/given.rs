@@ -5,7 +5,7 @@ use super::console;
 use super::session::{check_backend, render_options, start_threads};
 use organza::scene::{self, DEFAULT_FILL, DEFAULT_SIZE, Override, UpAxis, short};
 use organza::{Error, Files, InMemory, Progress, RenderOptions, SourceData, printable};
-use organza_survey::{DataFile, Preset, Wish, Written, first_scene};
+use organza_survey::{DataFile, Preset, Wish, Written, first_scene, material_named};
 use read::is_foreign_json;
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -120,6 +120,7 @@ pub(super) fn wish(first: &FirstArguments, size: Option<[i64; 2]>, turntable: Op
         turntable,
         size,
         preset: first.preset.as_deref().map(Preset::named).transpose()?,
+        material: first.material.as_deref().map(material_named).transpose()?,
         color_by: first.color_by.clone(),
         color_range: first.color_range,
         is_logarithmic: first.log,
@@ -166,13 +167,19 @@ pub(super) fn is_scene(path: &Path) -> bool {
 fn refuse_wishes(first: &FirstArguments) -> Result<(), Error> {
     let options = [
         ("--preset", first.preset.is_some()),
+        ("--material", first.material.is_some()),
         ("--color-by", first.color_by.is_some()),
         ("--up", first.up.is_some()),
         ("--ground", first.ground),
     ];
     let named = options.into_iter().find(|(_, on)| *on);
     named.map_or(Ok(()), |(name, _)| {
-        Err(Error::usage(format!("{name} is for data files, and a scene is given"), "change the scene"))
+        let hint = if name == "--material" {
+            "name a `preset` in a table [material.NAME], or by --set"
+        } else {
+            "change the scene"
+        };
+        Err(Error::usage(format!("{name} is for data files, and a scene is given"), hint))
     })
 }
 

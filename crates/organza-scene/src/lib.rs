@@ -44,6 +44,7 @@ pub use light::points::{LightPoint, light_points};
 pub use load::options::LoadOptions;
 pub use load::{MAX_SCENE_BYTES, load, parse, read, schema};
 pub use material::model::SceneMaterial;
+pub use material::recipes::Recipe;
 pub use object::model::{SceneObject, Up, UpBy};
 pub use object::points_look::PointsLook;
 pub use paths::{PATH_KEYS, ROOT_KEY, folder_above, relative_path, root_for};
@@ -60,6 +61,7 @@ pub use source::model::{
     LevelSetSource, MOST_ABSORBANCE, MatterSource, SliceSource, Source, VolumeSource,
 };
 pub use splat_core::UpAxis;
+pub use text::de::nearest_name;
 pub use text::overrides::Override;
 pub use text::tree::MAX_SCENE_DEPTH;
 pub use written::Written;

@@ -11,9 +11,9 @@ use crate::lamps::lamps;
 use crate::number::{color, list, rounded, significant};
 use crate::preset::{Preset, Wish};
 use convert::ColorMap;
-use look::{Object, all_stand, drawn_steps, objects, takes_preset};
+use look::{Object, all_stand, check_material, drawn_steps, material_remarks, objects, takes_preset};
 use organza::scene::{
-    DEFAULT_AZIMUTH, FoundCamera, LoadOptions, ROOT_KEY, name_in_memory, parse, relative_path, root_for,
+    DEFAULT_AZIMUTH, FoundCamera, LoadOptions, ROOT_KEY, Recipe, name_in_memory, parse, relative_path, root_for,
 };
 use organza::{Error, Files, InMemory, Progress, RenderOptions, SourceData, printable};
 use splat_core::glam::DVec3;
@@ -80,6 +80,7 @@ pub fn first_scene(
         return Err(Error::usage(message, "leave it out; in a scene `color` of an object is the colour of a mesh"));
     }
     let objects = objects(data, &paths, wish);
+    check_material(data, &objects, wish)?;
     let azimuth = wish.azimuth.unwrap_or_else(|| default_azimuth(data));
     let head = |camera: &str| {
         let root =
@@ -101,7 +102,10 @@ pub fn first_scene(
     let camera = camera_text(&found, azimuth);
     let mut text =
         format!("# A first scene, written by `organza init`. Every key: docs/scene.md of Organza.\n{}", head(&camera));
-    let background = if data.iter().filter_map(DataFile::luminance).any(|l| l < IS_DARK) { BRIGHT } else { DARK };
+    let is_dark = wish.material.is_none() && data.iter().filter_map(DataFile::luminance).any(|l| l < IS_DARK);
+    // Clear matter shows what is behind it.
+    let is_clear = wish.material.is_some_and(Recipe::is_clear);
+    let background = if is_dark || is_clear { BRIGHT } else { DARK };
     let _ = write!(
         text,
         "\n[background]\ncolor = {}\n\n{}",
@@ -110,13 +114,17 @@ pub fn first_scene(
     );
     text += &seen;
     if wish.ground {
-        text += &ground(&found);
+        text += &ground(&found, is_clear);
     }
     text += &drawn;
     Ok(Written {
         text,
         found,
-        remarks: up_remarks(data, wish).chain(degree_remarks(data)).chain(label_remarks(data, &objects)).collect(),
+        remarks: up_remarks(data, wish)
+            .chain(degree_remarks(data))
+            .chain(label_remarks(data, &objects))
+            .chain(material_remarks(data, wish))
+            .collect(),
     })
 }
 
@@ -198,8 +206,13 @@ fn camera_text(found: &FoundCamera, azimuth: f64) -> String {
     text
 }
 
-/// A plane below all that is seen.
-fn ground(found: &FoundCamera) -> String {
+/// A plane below all that is seen, which may be seen through what is clear.
+fn ground(found: &FoundCamera, is_below_clear: bool) -> String {
+    let technique = if is_below_clear {
+        "# Of discs, which bent and mirrored rays meet.\n"
+    } else {
+        "technique = \"sheets\"     # lit in every pixel, so that shadows on it are sharp\n"
+    };
     let bounds = found.bounds;
     let size = bounds.diagonal();
     let half = GROUND * size;
@@ -210,7 +223,7 @@ fn ground(found: &FoundCamera) -> String {
     format!(
         "\n[[object]]\nname = \"ground\"\n\
          rectangle = {{ center = {}, u = {}, v = {}, spacing = {} }}\ncolor = {}\n\
-         technique = \"sheets\"     # lit in every pixel, so that shadows on it are sharp\n\
+         {technique}\
          casts_shadow = false     # nothing lies below it: the cells of shadow maps are left to what stands on it\n",
         list(center.to_array(), unit),
         list((right * half).to_array(), unit),

@@ -27,8 +27,8 @@ pub use facts::{Facts, facts};
 pub use first_scene::{Written, first_scene};
 pub use histogram::Histogram;
 pub use lamps::lights_of;
-pub use number::{counted, grouped, rounded};
-pub use preset::{Preset, Wish};
+pub use number::{counted, grouped, rounded, sized};
+pub use preset::{Preset, Wish, material_named};
 
 /// The page's example compiles and holds.
 #[cfg(doctest)]

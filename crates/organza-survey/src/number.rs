@@ -31,6 +31,24 @@ fn exponent(x: f64) -> i32 {
     text.split_once('e').and_then(|(_, power)| power.parse().ok()).unwrap_or(0)
 }
 
+/// A size of a file for people, in powers of a thousand, as disks are sold: `302 MB`.
+pub fn sized(bytes: u64) -> String {
+    const UNITS: [&str; 4] = ["kB", "MB", "GB", "TB"];
+    let mut size = bytes as f64;
+    if bytes < 1000 {
+        return format!("{bytes} bytes");
+    }
+    let mut unit = 0;
+    size /= 1000.0;
+    // 999.5 would round to 1000.
+    while size >= 999.5 && unit + 1 < UNITS.len() {
+        size /= 1000.0;
+        unit += 1;
+    }
+    let digits = if size < 9.995 { 2 } else { usize::from(size < 99.95) };
+    format!("{size:.digits$} {}", UNITS[unit])
+}
+
 /// A count with a comma after every third digit.
 pub fn grouped(count: u64) -> String {
     let digits = count.to_string();
@@ -52,6 +70,12 @@ pub fn counted(count: u64, [one, several]: [&str; 2]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn sizes_have_three_digits_and_a_unit() {
+        let texts = [999, 1_000, 12_345, 999_499, 999_500, 302_123_456, 7_250_000_000].map(sized);
+        assert_eq!(texts, ["999 bytes", "1.00 kB", "12.3 kB", "999 kB", "1.00 MB", "302 MB", "7.25 GB"]);
+    }
 
     #[test]
     fn numbers_have_the_digits_of_their_unit() {

@@ -3,7 +3,7 @@
 use crate::paraview::Sampled;
 use convert::ColorMap;
 use organza::Error;
-use organza::scene::{DEFAULT_FILL, DEFAULT_SIZE, UpAxis};
+use organza::scene::{DEFAULT_FILL, DEFAULT_SIZE, Recipe, UpAxis};
 use std::path::Path;
 
 /// How a volume is to look.
@@ -54,6 +54,19 @@ impl Preset {
     }
 }
 
+/// A material by its name.
+///
+/// # Errors
+/// [`Error::Usage`] for a name that there is not.
+pub fn material_named(name: &str) -> Result<&'static Recipe, Error> {
+    Recipe::named(name).ok_or_else(|| {
+        let names: Vec<&str> = Recipe::list().iter().map(|recipe| recipe.name).collect();
+        let message = format!("--material {}: there is no such material", organza::shown(name));
+        let near = organza::scene::nearest_name(name, &names).map(|near| format!("did you mean `{near}`? "));
+        Error::usage(message, format!("{}there are {}", near.unwrap_or_default(), names.join(", ")))
+    })
+}
+
 impl Preset {
     /// The colour map, if it is one.
     pub(crate) fn map(&self) -> Option<ColorMap> {
@@ -81,6 +94,8 @@ pub struct Wish {
     pub size: [u32; 2],
     /// How volumes look, and the colour map of points.
     pub preset: Option<Preset>,
+    /// The material of all surfaces, and of points and volumes that are a medium, instead of what data is drawn as by itself.
+    pub material: Option<&'static Recipe>,
     /// The column that points take their colours from; without it one is chosen where their file has no colours.
     pub color_by: Option<String>,
     /// The numbers at the two ends of its map, rising; `None` leaves that to the column.
@@ -102,6 +117,7 @@ impl Default for Wish {
             turntable: None,
             size: DEFAULT_SIZE,
             preset: None,
+            material: None,
             color_by: None,
             color_range: None,
             is_logarithmic: false,

@@ -363,6 +363,13 @@ fn materials() -> Vec<Entry> {
         of(OPEN, "material.cauchy.a", "material.m.cauchy.a=1.5").by(SURFELS).with(CAUCHY),
         of(OPEN, "material.cauchy.b", "material.m.cauchy.b=0").by(SURFELS).with(CAUCHY),
         of(OPEN, "material.absorption_inside", "material.m.absorption_inside=[1, 2, 3]").but_by(BUT_SURFELS, UNBENT),
+        of(OPEN, "material.half_length", "material.m.half_length=[1, 2, 3]").but_by(BUT_SURFELS, UNBENT),
+        of(All, "material.preset", "material.m.preset='milk'"),
+        of(Media, "material.metre", "material.m.metre=1500")
+            .with(&["material.m={preset='milk', metre=900}"])
+            .but(VOLUME, Nothing("`transfer` states it")),
+        of(All, "material.tint", "material.m.tint=[0.9, 0.5, 0.2]"),
+        of(Media, "material.medium.half_length", "material.m.medium={half_length=[0.5, 0.7, 1]}"),
         of(OPEN, "material.bump", "material.m.bump={height=0.1, size=0.5}").but_by(BUT_SURFELS, SMOOTH),
         of(OPEN, "material.bump.height", "material.m.bump.height=0.2").by(SURFELS).with(BUMPY),
         of(OPEN, "material.bump.size", "material.m.bump.size=1").by(SURFELS).with(BUMPY),

@@ -24,10 +24,14 @@ pub(crate) enum RawSurfaceOpacity {
 }
 
 /// A material.
-#[derive(Debug, Default, Deserialize, JsonSchema)]
+#[derive(Debug, Default, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default, expecting = "a table")]
 #[schemars(rename = "Material")]
 pub(crate) struct RawMaterial {
+    /// Name of a material that gives the keys that are not stated, such as "wax"; default none.
+    pub(crate) preset: Option<String>,
+    /// World units of a metre, by which `preset` gives lengths; default 1.
+    pub(crate) metre: Option<f64>,
     /// Linear Rec.709; default white.
     pub(crate) color: Option<[f64; 3]>,
     /// Opacity of one crossing of a surface, from 0 to 1; default 1.
@@ -48,6 +52,8 @@ pub(crate) struct RawMaterial {
     pub(crate) emission: [f64; 3],
     /// Extinction per channel relative to the extinction itself, each from 0; default [1, 1, 1].
     pub(crate) extinction_rgb: Option<[f64; 3]>,
+    /// Share of light per channel that passes one crossing of a surface, each from 0.001 to 1: `color`, `opacity` and `extinction_rgb` in one key.
+    pub(crate) tint: Option<[f64; 3]>,
     /// Extinction from the material's physics, instead of `extinction_rgb` and `medium.extinction`.
     pub(crate) absorption: Option<RawAbsorption>,
     /// Default "per_crossing".
@@ -62,12 +68,14 @@ pub(crate) struct RawMaterial {
     pub(crate) cauchy: Option<RawCauchy>,
     /// What the matter that a surface bounds absorbs, per channel, 1/world unit; default [0, 0, 0].
     pub(crate) absorption_inside: Option<[f64; 3]>,
+    /// The same by the distance after which half of the light is left, per channel, world units; instead of `absorption_inside`.
+    pub(crate) half_length: Option<[f64; 3]>,
     /// How surfaces are rough to light, by noise or an image that tilts their normals; default none.
     pub(crate) bump: Option<RawBump>,
 }
 
 /// Noise, or an image, as heights over a surface.
-#[derive(Debug, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, expecting = "a table")]
 #[schemars(rename = "Bump")]
 pub(crate) struct RawBump {
@@ -84,7 +92,7 @@ pub(crate) struct RawBump {
 }
 
 /// The refractive index a + b/λ², λ in µm (Cauchy).
-#[derive(Debug, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, expecting = "a table")]
 #[schemars(rename = "Cauchy")]
 pub(crate) struct RawCauchy {
@@ -95,7 +103,7 @@ pub(crate) struct RawCauchy {
 }
 
 /// Extinction 4πκ/λ per channel (Gunjee 2007, Eq. 7).
-#[derive(Debug, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, expecting = "a table")]
 #[schemars(rename = "Absorption")]
 pub(crate) struct RawAbsorption {
@@ -106,12 +114,14 @@ pub(crate) struct RawAbsorption {
 }
 
 /// A participating medium.
-#[derive(Debug, Default, Deserialize, JsonSchema)]
+#[derive(Debug, Default, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default, expecting = "a table")]
 #[schemars(rename = "Medium")]
 pub(crate) struct RawMedium {
     /// Extinction of objects that state none, 1/world unit.
     pub(crate) extinction: Option<f64>,
+    /// The same by the distance after which half of the light is left, per channel, world units; instead of `extinction` and `extinction_rgb`.
+    pub(crate) half_length: Option<[f64; 3]>,
     /// Single-scattering albedo, from 0 to 1; default 1, or 0 with `absorption`.
     pub(crate) albedo: Option<f64>,
     /// Mean cosine of scattering, between −1 and 1; default 0.

@@ -12,7 +12,7 @@ use crate::effects::switched::{switch, switch_lights};
 use crate::footprint::check::check_footprints;
 use crate::light::check::check_lights;
 use crate::load::options::{LoadOptions, Turn};
-use crate::material::check::{check_listed, check_materials, unknown_material};
+use crate::material::check::{NamedMaterials, check_listed, check_materials};
 use crate::object::check::{Named, check_object};
 use crate::object::drawn::check_drawn;
 use crate::object::raw::RawObject;
@@ -42,14 +42,15 @@ pub(crate) fn scene(
     let paths = Paths::new(&at.key(ROOT_KEY), document.file, raw.root.as_deref(), options)?;
     let at_footprints = at.key("footprints");
     let footprints = check_footprints(&at_footprints, raw.footprints.as_deref(), &paths, options)?;
-    let mut materials = check_materials(&at.key("material"), &raw.material, &paths, &footprints.stack)?;
+    let named_materials = check_materials(&at.key("material"), &raw.material, &paths, &footprints.stack, &raw.object)?;
     let extracts = raw.object.iter().filter_map(|object| object.extract.as_ref()?.objects.clone());
     let tracks = raw.animation.iter().flat_map(|animation| &animation.track);
     let stops = tracks.filter_map(|track| track.stop.as_ref()?.objects.clone());
     let seen = extracts.chain(stops).flatten().collect();
-    let named = Named { materials: &materials, footprints: &footprints.stack, paths: &paths, seen: &seen };
+    let named = Named { materials: &named_materials.list, footprints: &footprints.stack, paths: &paths, seen: &seen };
     let at_objects = at.key("object");
-    let mut objects = check_objects(&at_objects, raw.object, raw.animation.as_ref(), &named)?;
+    let mut objects = check_objects(&at_objects, raw.object, raw.animation.as_ref(), &named, &named_materials)?;
+    let mut materials = named_materials.list;
     check_extracts(&at_objects, &objects, raw.light.len())?;
     let mut render = check_render(&at.key("render"), &raw.render)?;
     let mut lights = check_lights(&at.key("light"), &raw.light, &paths)?;
@@ -103,10 +104,8 @@ fn check_objects(
     raw: Vec<RawObject>,
     animation: Option<&RawAnimation>,
     named: &Named<'_>,
+    materials: &NamedMaterials,
 ) -> Result<Vec<SceneObject>, Error> {
-    let materials = named.materials;
-    let named_materials: HashMap<&str, usize> =
-        materials.iter().enumerate().skip(1).map(|(i, m)| (m.name.as_str(), i)).collect();
     let mut objects: Vec<SceneObject> = Vec::with_capacity(raw.len());
     let mut first_of: HashMap<String, usize> = HashMap::new();
     for (i, object) in raw.into_iter().enumerate() {
@@ -116,11 +115,8 @@ fn check_objects(
             let message = format!("duplicate object name `{}`, first at {first}", crate::shown(&object.name));
             return Err(at.key("name").error(message, "each object needs a name of its own"));
         }
-        let of_name = |at: &At<'_>, name: &str| match named_materials.get(name) {
-            Some(i) => Ok(*i),
-            None => Err(unknown_material(at, &at_materials(at_objects), name, materials)),
-        };
-        let listed = check_listed(&at, &object, materials, of_name)?;
+        let of_name = |at: &At<'_>, name: &str| materials.of_object(at, &object, name);
+        let listed = check_listed(&at, &object, &materials.list, of_name)?;
         let named_one = object.material.as_deref().map(|name| of_name(&at.key("material"), name)).transpose()?;
         let material = named_one.or(listed.first().copied()).unwrap_or(0);
         // What is extracted changes with what it is extracted from.
@@ -149,8 +145,4 @@ fn check_aligned(at: &At<'_>, camera: &Camera, render: &RenderSettings) -> Resul
     }
     let message = "`aligned`: slabs along a lattice are seen by parallel rays alone";
     Err(at.error(message, "set camera.orthographic, or \"view\""))
-}
-
-fn at_materials<'a>(at: &At<'a>) -> At<'a> {
-    At::root(at.document).key("material")
 }

@@ -87,18 +87,21 @@ fn unexpected_in_words(found: Unexpected<'_>) -> String {
 
 /// "did you mean", when some known name is near.
 pub(crate) fn suggest(name: &str, known: &[&str]) -> String {
+    match nearest_name(name, known) {
+        Some(near) => format!("did you mean `{}`?", shown(near)),
+        None if known.is_empty() => String::new(),
+        None => format!("known here: {}", shown_list(known)),
+    }
+}
+
+/// The known name that is nearest to another one, where one is near enough to be meant.
+pub fn nearest_name<'a>(name: &str, known: &[&'a str]) -> Option<&'a str> {
     // Names cut short or with few letters changed. Long foreign names would cost time and fit nothing.
     let near = |k: &str| (strsim::damerau_levenshtein(name, k), strsim::jaro_winkler(name, k));
     let nearer = |a: &(usize, f64), b: &(usize, f64)| a.0.min(3).cmp(&b.0.min(3)).then(b.1.total_cmp(&a.1));
     let measured = known.iter().take_while(|_| name.len() <= 64).map(|k| (near(k), *k));
     let best = measured.min_by(|(a, _), (b, _)| nearer(a, b));
-    match best {
-        Some(((distance, similarity), k)) if distance <= 2 || similarity > 0.8 => {
-            format!("did you mean `{}`?", shown(k))
-        }
-        _ if known.is_empty() => String::new(),
-        _ => format!("known here: {}", shown_list(known)),
-    }
+    best.filter(|((distance, similarity), _)| *distance <= 2 || *similarity > 0.8).map(|(_, known)| known)
 }
 
 /// Names with commas between them, as many as a message may hold.

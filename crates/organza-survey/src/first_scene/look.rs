@@ -10,8 +10,10 @@ use crate::preset::{Look, Preset, Wish};
 use crate::stands::extent;
 use crate::transfer::Transfer;
 use convert::ColorMap;
-use organza::SourceData;
+use organza::scene::Recipe;
+use organza::{Error, SourceData, printable};
 use splat_core::{DAabb, Grid, optics};
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
@@ -35,8 +37,8 @@ pub(super) struct Object {
     name: String,
     /// `mesh`, `points` or `volume`, and the path.
     source: (&'static str, String),
-    /// Name and keys of its material; of several objects alike the first has it.
-    material: Option<(&'static str, &'static str, bool)>,
+    /// Its material.
+    material: Option<Material>,
     /// Further keys.
     keys: String,
     /// How many labels it has, if it is a volume of such.
@@ -47,7 +49,8 @@ impl Object {
     /// Its table.
     pub(super) fn text(&self) -> String {
         let Self { about, name, source: (key, path), keys, .. } = self;
-        let material = self.material.map_or_else(String::new, |(name, ..)| format!("material = \"{name}\"\n"));
+        let named = |material: &Material| format!("material = \"{}\"\n", material.name);
+        let material = self.material.as_ref().map_or_else(String::new, named);
         format!("\n[[object]]\nname = {}\n# {about}\n{key} = {}\n{material}{keys}", quoted(name), quoted(path))
     }
 
@@ -58,17 +61,47 @@ impl Object {
 
     /// The table of its material, where it is the first that has it.
     pub(super) fn material(&self) -> String {
-        match self.material {
-            Some((name, keys, true)) => format!("\n[material.{name}]\n{keys}"),
+        match &self.material {
+            Some(Material { name, keys, is_first: true }) => format!("\n[material.{name}]\n{keys}"),
             _ => String::new(),
         }
     }
 }
 
-const CLAY: (&str, &str) = ("clay", "specular = 0.015\nshininess = 20\n");
-const TISSUE: (&str, &str) = ("tissue", "shading = \"phong\"\nspecular = 0.08\nshininess = 24\n");
-const VALUES: (&str, &str) = ("values", "shading = \"unlit\"\n");
-const DROPLETS: (&str, &str) = ("droplets", "ambient = 0.6\nmedium = { albedo = 0.98, asymmetry = 0.3 }\n");
+/// A material of a first scene.
+#[derive(Clone)]
+struct Material {
+    name: &'static str,
+    keys: Cow<'static, str>,
+    /// Whether no object before has it: the table stands before its first object.
+    is_first: bool,
+}
+
+impl Material {
+    const fn new(name: &'static str, keys: &'static str) -> Self {
+        Self { name, keys: Cow::Borrowed(keys), is_first: false }
+    }
+
+    /// A material with a name, for data of this size.
+    fn of_recipe(recipe: &Recipe, is_medium: bool, size: f64) -> Self {
+        let mut keys = format!(
+            "preset = \"{}\"     # docs/materials.md of Organza; keys beside it take the place of its own\n",
+            recipe.name
+        );
+        if recipe.has_lengths(is_medium) {
+            let metre = significant(size / recipe.across_m, 3);
+            let across = recipe.across_m;
+            let _ =
+                writeln!(keys, "metre = {metre}     # world units of a metre, as if the data were {across} m across");
+        }
+        Self { name: recipe.name, keys: keys.into(), is_first: false }
+    }
+}
+
+const CLAY: Material = Material::new("clay", "specular = 0.015\nshininess = 20\n");
+const TISSUE: Material = Material::new("tissue", "shading = \"phong\"\nspecular = 0.08\nshininess = 24\n");
+const VALUES: Material = Material::new("values", "shading = \"unlit\"\n");
+const DROPLETS: Material = Material::new("droplets", "ambient = 0.6\nmedium = { albedo = 0.98, asymmetry = 0.3 }\n");
 
 /// The objects of all files, each with a name of its own.
 pub(super) fn objects(data: &[DataFile], paths: &[String], wish: &Wish) -> Vec<Object> {
@@ -76,6 +109,7 @@ pub(super) fn objects(data: &[DataFile], paths: &[String], wish: &Wish) -> Vec<O
     let mut materials: Vec<&str> = Vec::new();
     let mut clays = CLAYS.iter().cycle();
     let all_stand = all_stand(data);
+    let size = data.iter().filter_map(size_of).fold(0.0, f64::max);
     let mut named_object = |(file, path): (&DataFile, &String)| {
         let mut name = file.name();
         let count = names.entry(name.clone()).or_insert(0);
@@ -84,12 +118,20 @@ pub(super) fn objects(data: &[DataFile], paths: &[String], wish: &Wish) -> Vec<O
             name = format!("{name}-{count}");
         }
         let colors = match &file.data {
+            // A material by name shows no column unless that is asked for too.
+            SourceData::Points(_) if wish.material.is_some() && wish.color_by.is_none() => None,
             SourceData::Points(points) => point_colors(points, file.has_colors(), wish),
             SourceData::Mesh(_) => mesh_colors(wish),
             SourceData::Grid(_) | SourceData::Image(_) => None,
         };
-        let bare = if file.is_colored() || colors.is_some() { None } else { clays.next() };
+        let is_bare = !file.is_colored() && colors.is_none() && wish.material.is_none();
+        let bare = if is_bare { clays.next() } else { None };
+        let has_map = colors.is_some();
         let mut object = object(file, wish.preset.as_ref(), colors);
+        if let Some(recipe) = wish.material {
+            // Data without an extent is taken as one unit wide.
+            object.take(recipe, file, has_map, if size > 0.0 { size } else { 1.0 });
+        }
         if file.degrees {
             object.keys = format!("degrees = true     # x and y are longitude and latitude, z metres\n{}", object.keys);
         }
@@ -118,9 +160,9 @@ pub(super) fn objects(data: &[DataFile], paths: &[String], wish: &Wish) -> Vec<O
             object.keys =
                 format!("# All colours of the file are black, as if it had none: others are shown.\n{}", object.keys);
         }
-        if let Some((material, _, first)) = &mut object.material {
-            *first = !materials.contains(material);
-            materials.push(material);
+        if let Some(material) = &mut object.material {
+            material.is_first = !materials.contains(&material.name);
+            materials.push(material.name);
         }
         Object { name, source: (object.source.0, path.clone()), ..object }
     };
@@ -143,8 +185,78 @@ pub(super) fn all_stand(data: &[DataFile]) -> bool {
     data.iter().all(|file| file.stands.or(file.stated_up).is_some())
 }
 
+/// Whether a file is drawn as a medium: points are, where surfaces cannot have the material, and volumes are, unless labels make surfaces of them.
+fn is_medium(file: &DataFile, has_labels: bool, recipe: &Recipe) -> bool {
+    match &file.data {
+        SourceData::Grid(_) => !has_labels,
+        SourceData::Points(_) => !recipe.is_of_surfaces(),
+        SourceData::Mesh(_) | SourceData::Image(_) => false,
+    }
+}
+
+/// Refuses a material that a file cannot have.
+pub(super) fn check_material(data: &[DataFile], objects: &[Object], wish: &Wish) -> Result<(), Error> {
+    let Some(recipe) = wish.material else { return Ok(()) };
+    for (file, object) in data.iter().zip(objects) {
+        let is_medium = is_medium(file, object.labels.is_some(), recipe);
+        let fits = |recipe: &&Recipe| if is_medium { recipe.is_of_media() } else { recipe.is_of_surfaces() };
+        if fits(&recipe) {
+            continue;
+        }
+        let [needed, is] = if is_medium { ["surfaces", "a volume"] } else { ["volumes and points", "a surface"] };
+        let path = printable(&file.path);
+        let message = format!("--material {}: {needed} alone may have it, and {path} is {is}", recipe.name);
+        let names: Vec<&str> = Recipe::list().iter().filter(fits).map(|recipe| recipe.name).collect();
+        return Err(Error::usage(message, format!("materials of {is} are {}", names.join(", "))));
+    }
+    Ok(())
+}
+
+/// What is said of volumes that have a material by name.
+pub(super) fn material_remarks<'a>(data: &'a [DataFile], wish: &'a Wish) -> impl Iterator<Item = String> + 'a {
+    let of_volume = |file: &&DataFile| matches!(file.data, SourceData::Grid(_));
+    data.iter().filter(of_volume).filter(|_| wish.material.is_some()).map(|file| {
+        let path = printable(&file.path);
+        format!(
+            "{path}: colours and extinction are those of its `transfer`; of --material it takes how light is scattered"
+        )
+    })
+}
+
+/// The diagonal of the box of a file's data.
+fn size_of(file: &DataFile) -> Option<f64> {
+    let bounds = match &file.data {
+        SourceData::Mesh(mesh) => mesh.bounds(),
+        SourceData::Points(points) => DAabb::of_points(points.position.iter().map(|p| points.origin + p.as_dvec3())),
+        SourceData::Grid(grid) => extent(grid),
+        SourceData::Image(_) => return None,
+    };
+    Some(bounds.diagonal()).filter(|size| *size > 0.0)
+}
+
+impl Object {
+    /// Takes a material with a name, in the form in which its file has it; `size` is that of all data.
+    fn take(&mut self, recipe: &Recipe, file: &DataFile, has_map: bool, size: f64) {
+        let is_medium = is_medium(file, self.labels.is_some(), recipe);
+        self.material = Some(Material::of_recipe(recipe, is_medium, size));
+        if matches!(file.data, SourceData::Grid(_)) {
+            return;
+        }
+        if !has_map {
+            self.keys.clear();
+        }
+        if let (Some(rgb), true) = (recipe.color(), file.is_colored() && !has_map) {
+            let rgb = color(rgb.map(|channel| channel as f32));
+            let _ = writeln!(self.keys, "color = {rgb}     # that of the material: without it the file's count");
+        }
+        if is_medium {
+            self.keys += "as = \"medium\"\n";
+        }
+    }
+}
+
 fn object(file: &DataFile, preset: Option<&Preset>, colors: Option<String>) -> Object {
-    let clay = Some((CLAY.0, CLAY.1, false));
+    let clay = Some(CLAY);
     let bare = |key, about, material, keys| Object {
         about,
         name: String::new(),
@@ -206,7 +318,7 @@ fn object(file: &DataFile, preset: Option<&Preset>, colors: Option<String>) -> O
             let about =
                 format!("{} × {} × {} voxels; {}", grid.dims[0], grid.dims[1], grid.dims[2], sides(extent(grid)));
             let keys = volume_keys(grid, matter.as_ref(), look.as_ref());
-            bare("volume", about, Some((material.0, material.1, false)), keys)
+            bare("volume", about, Some(material), keys)
         }
         // Images are refused when they are read.
         SourceData::Image(_) => bare("environment", String::new(), None, String::new()),
