@@ -82,9 +82,15 @@ fn exit_2_is_for_the_command_line() {
     let place = place();
     for (arguments, stderr) in [
         (vec!["rendr"], "unrecognized subcommand"),
-        (vec!["render", "s.toml", "-o", "a.gif"], "expected a name that ends in .exr, .png or .jpg"),
-        (vec!["render", "s.toml", "-o", "a.jpg", "--transparent"], "--transparent is for PNG and EXR files"),
+        (vec!["render", "s.toml", "-o", "a.bmp"], "expected a name that ends in .exr, .png, .jpg or .webp"),
+        (vec!["render", "s.toml", "-o", "a.gif"], "a film has frames, and one picture is asked for"),
+        (
+            vec!["render", "s.toml", "-o", "a.mp4", "-o", "a.png", "--turntable", "2", "--transparent"],
+            "a film has no opacity",
+        ),
+        (vec!["render", "s.toml", "--fps", "30"], "--fps is for films, and no output is one"),
         (vec!["render", "s.toml", "--material", "wax"], "--material is for data files, and a scene is given"),
+        (vec!["render", "s.toml", "-o", "a.jpg", "--transparent"], "--transparent is for PNG, EXR and WebP files"),
         (vec!["render", "s.toml", "-o", "a.jpg", "--layers", "depth"], "--layers is for EXR files"),
         (vec!["render", "s.toml", "--background", "mauve"], "expected #rrggbb or one of black, white"),
         (vec!["render", "s.toml", "--background", "#12345g"], "expected #rrggbb or one of black, white"),
@@ -544,6 +550,37 @@ mod deep {
 }
 
 #[test]
+fn exit_0_a_webp_file_has_the_bytes_of_the_png_and_its_opacity() {
+    let place = place();
+    for transparent in [&[][..], &["--transparent"]] {
+        place.expect(0, &[&["render", "s.toml", "-o", "b.png", "-o", "b.webp", "--force"], transparent].concat(), "");
+        let [exact, found] = ["b.png", "b.webp"].map(|file| image::open(place.path(file)).unwrap());
+        assert_eq!(exact.to_rgba8(), found.to_rgba8());
+        assert_eq!(exact.color().has_alpha(), !transparent.is_empty());
+    }
+}
+
+#[test]
+fn exit_0_manual_pages_name_the_options() {
+    let place = place();
+    let text =
+        |arguments: &[&str]| String::from_utf8(place.expect(0, &[&["man"], arguments].concat(), "").stdout).unwrap();
+    assert!(text(&[]).contains("organza"));
+    assert!(text(&["render"]).contains("max\\-rmse"));
+    place.expect(2, &["man", "rendr"], "man: there is no command rendr");
+}
+
+#[test]
+fn exit_0_quiet_says_nothing_and_verbose_names_stages() {
+    let place = place();
+    let out = place.expect(0, &["render", "s.toml", "-o", "a.png", "-q"], "");
+    assert!(out.stdout.is_empty() && out.stderr.is_empty(), "{out:?}");
+    let out = place.expect(0, &["-v", "render", "s.toml", "-o", "b.png"], "");
+    assert!(String::from_utf8_lossy(&out.stderr).contains(" s, "), "{out:?}");
+    place.expect(2, &["render", "s.toml", "-q", "-v"], "cannot be used with");
+}
+
+#[test]
 fn a_set_without_a_value_takes_away_what_is_there() {
     let place = place();
     place.expect(0, &["render", "s.toml", "-o", "a.png", "--set", "object.fog="], "");
@@ -552,4 +589,48 @@ fn a_set_without_a_value_takes_away_what_is_there() {
     assert_eq!(gone, hidden);
     place.expect(2, &["render", "s.toml", "--set", "object.fog.nam="], "there is no `nam` to take away");
     place.expect(3, &["render", "s.toml", "--set", "camera.size="], "expected a key `size` here, found none");
+}
+
+/// A program of the name `ffmpeg` in a folder that is the whole search path.
+#[cfg(unix)]
+fn with_ffmpeg(place: &Place, script: Option<&str>, arguments: &[&str]) -> Output {
+    use std::os::unix::fs::PermissionsExt;
+    let folder = tempfile::tempdir().unwrap();
+    if let Some(script) = script {
+        let program = folder.path().join("ffmpeg");
+        fs::write(&program, format!("#!/bin/sh\nPATH=/usr/bin:/bin\n[ \"$1\" = -version ] && exit 0\n{script}\n"))
+            .unwrap();
+        fs::set_permissions(&program, fs::Permissions::from_mode(0o755)).unwrap();
+    }
+    let run = organza().args(arguments).current_dir(place.path(".")).env("PATH", folder.path()).output();
+    run.unwrap()
+}
+
+#[cfg(unix)]
+#[test]
+fn a_film_gets_the_pixels_of_all_frames_and_appears_whole_or_not_at_all() {
+    let place = place();
+    let film = ["render", "s.toml", "-o", "a.mp4", "--turntable", "3"];
+    // The last argument is the file; what comes through the pipe is kept.
+    let keeps = "for file; do :; done; cat > \"$file\"";
+    let out = with_ffmpeg(&place, Some(keeps), &film);
+    assert!(out.status.success(), "{out:?}");
+    assert!(String::from_utf8_lossy(&out.stdout).contains("wrote a.mp4 (3 frames, 3456 bytes)"), "{out:?}");
+    place.expect(0, &["render", "s.toml", "-o", "p.png", "--turntable", "3"], "");
+    let frames =
+        [0, 1, 2].map(|frame| image::open(place.path(&format!("p.000{frame}.png"))).unwrap().to_rgb8().into_raw());
+    assert_eq!(fs::read(place.path("a.mp4")).unwrap(), frames.concat());
+    assert_eq!(place.made(), ["a.mp4", "p.0000.png", "p.0001.png", "p.0002.png"]);
+    let failing = ["render", "s.toml", "-o", "b.mp4", "--turntable", "3"];
+    let cases = [
+        (Some("echo no such codec >&2; exit 1"), "b.mp4: ffmpeg failed: no such codec"),
+        (Some("cat > /dev/null; echo disk full >&2; exit 1"), "b.mp4: ffmpeg failed: disk full"),
+        (None, "b.mp4: a film is written by the program ffmpeg, which is not on the PATH"),
+    ];
+    for (script, words) in cases {
+        let out = with_ffmpeg(&place, script, &failing);
+        assert_eq!(out.status.code(), Some(2), "{out:?}");
+        assert!(String::from_utf8_lossy(&out.stderr).contains(words), "{out:?}");
+        assert!(!place.path("b.mp4").exists());
+    }
 }

@@ -77,7 +77,7 @@ fn a_legend_of_nothing_is_refused_before_any_work_and_one_without_room_is_told()
     place.expect(
         2,
         &["render", "plane.xyz", "--color-by", "heat", "--legend", "-o", "a.exr"],
-        "--legend is for PNG and JPEG files",
+        "--legend is for PNG, JPEG and WebP files",
     );
     let hidden = format!(
         "{}[[object]]\nname = 'plane'\npoints = 'plane.xyz'\nvisible = false\ncolor_by = {{ column = 'heat' }}\n",

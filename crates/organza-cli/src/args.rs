@@ -27,6 +27,12 @@ const EXAMPLES: &str = "Examples:
 #[derive(Debug, Parser)]
 #[command(name = "organza", version, disable_help_subcommand = true, after_help = EXAMPLES)]
 pub(super) struct Arguments {
+    /// Print no notes, no progress and no account of what was done: warnings, errors and --json alone
+    #[arg(short, long, global = true)]
+    pub(super) quiet: bool,
+    /// Print each stage of the work as it begins, with the time since the start
+    #[arg(short, long, global = true, conflicts_with = "quiet")]
+    pub(super) verbose: bool,
     #[command(subcommand)]
     pub(super) command: Command,
 }
@@ -35,7 +41,7 @@ pub(super) struct Arguments {
 pub(super) enum Command {
     /// Renders a scene, or data files as they are, to EXR or PNG files.
     #[command(
-        after_help = "Examples:\n  organza render bunny.ply -o bunny.png\n  organza render head.nii.gz --preset mri --azimuth 200 -o head.png\n  organza render ground.laz bunny.ply --ground -o both.png\n  organza render ground.laz --color-by height --legend -o heights.png\n  organza render scene.toml -o picture.exr -o picture.png --layers effects,depth\n  organza render bunny.ply --material wax --ground -o wax.png\n  organza render bunny.ply -o around.png --turntable 36\n  organza render scene.toml --set object.bunny.opacity=0.4 --technique surfels -o glass.png"
+        after_help = "Examples:\n  organza render bunny.ply -o bunny.png\n  organza render head.nii.gz --preset mri --azimuth 200 -o head.png\n  organza render ground.laz bunny.ply --ground -o both.png\n  organza render ground.laz --color-by height --legend -o heights.png\n  organza render scene.toml -o picture.exr -o picture.png --layers effects,depth\n  organza render bunny.ply --material wax --ground -o wax.png\n  organza render bunny.ply -o around.mp4 --turntable 100\n  organza render scene.toml --set object.bunny.opacity=0.4 --technique surfels -o glass.png"
     )]
     Render(RenderArguments),
     /// Writes a first scene of data files, with comments, ready to edit.
@@ -91,6 +97,11 @@ pub(super) enum Command {
         after_help = "Examples:\n  organza completions bash > ~/.local/share/bash-completion/completions/organza\n  organza completions zsh > ~/.zfunc/_organza"
     )]
     Completions(CompletionsArguments),
+    /// Prints the manual page of this command, or of one of its commands.
+    #[command(
+        after_help = "Examples:\n  organza man > organza.1\n  organza man render > organza-render.1\n  organza man render | man -l -"
+    )]
+    Man(ManArguments),
     /// Prints the JSON Schema of scene files.
     #[command(after_help = "Examples:\n  organza schema > scene.schema.json")]
     Schema,
@@ -113,7 +124,7 @@ impl Command {
             Self::Passport(a) => a.json,
             #[cfg(feature = "view")]
             Self::View(a) => a.scene.common.json,
-            Self::Completions(_) | Self::Schema => false,
+            Self::Completions(_) | Self::Man(_) | Self::Schema => false,
         }
     }
 }
@@ -123,6 +134,13 @@ pub(super) struct CompletionsArguments {
     /// The shell
     #[arg(value_name = "SHELL")]
     pub(super) shell: clap_complete::Shell,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct ManArguments {
+    /// One of the commands, such as render
+    #[arg(value_name = "COMMAND")]
+    pub(super) command: Option<String>,
 }
 
 /// An axis that may point up.
@@ -287,7 +305,7 @@ pub(super) struct GoalArguments {
 pub(super) struct RenderArguments {
     #[command(flatten)]
     pub(super) scene: SceneArguments,
-    /// Output, .png, .exr or .jpg; several are allowed [default: the scene's name with .png, or .exr where --layers or --half ask for what it alone
+    /// Output, .png, .exr, .jpg or .webp, or of frames a film, .mp4, .webm or .gif, by ffmpeg; several are allowed [default: the scene's name with .png, or .exr where --layers or --half ask for what it alone
     /// holds, in this folder]
     #[arg(short, long = "output", value_name = "FILE")]
     pub(super) output: Vec<PathBuf>,
@@ -301,12 +319,15 @@ pub(super) struct RenderArguments {
     /// Draw so many frames in a circle around all, to numbered files
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
     pub(super) turntable: Option<u32>,
+    /// Frames of a second of a film [default: 25]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=240))]
+    pub(super) fps: Option<u32>,
     #[command(flatten)]
     pub(super) goal: GoalArguments,
-    /// Write files with the opacity of each pixel in the place of the background: premultiplied in EXR, straight in PNG
+    /// Write files with the opacity of each pixel in the place of the background: premultiplied in EXR, straight in PNG and WebP
     #[arg(long)]
     pub(super) transparent: bool,
-    /// Draw into PNG and JPEG files what colours stand for: the maps of points by a column, the transfer functions of volumes
+    /// Draw into displayed pictures (PNG, JPEG, WebP, films) what colours stand for: the maps of points by a column, the transfer functions of volumes
     #[arg(long)]
     pub(super) legend: bool,
     /// Write PNG files with 16 bits a channel instead of 8

@@ -7,6 +7,7 @@ use organza::{Error, escape_controls, printable};
 use serde_json::json;
 use std::io::{self, ErrorKind, IsTerminal, Write};
 use std::path::Path;
+use std::sync::atomic::{AtomicU8, Ordering};
 
 /// Writes to stdout. A reader that went away, as `head` does, is no error.
 pub(super) fn out(text: &str) -> Result<(), Error> {
@@ -19,10 +20,10 @@ pub(super) fn out(text: &str) -> Result<(), Error> {
 
 /// Writes to stdout while a bar of progress may stand on stderr.
 pub(super) fn out_between(text: &str) -> Result<(), Error> {
-    if io::stderr().is_terminal() {
+    if io::stderr().is_terminal() && !is_quiet() {
         note("\r\x1b[2K");
     }
-    out(text)
+    account(text)
 }
 
 /// A path as a shell takes it in a command that is printed to be copied: in quotes where it has more than letters, digits and a few marks.
@@ -37,8 +38,44 @@ pub(super) fn note(text: &str) {
     let _ = io::stderr().lock().write_all(text.as_bytes());
 }
 
+/// How much is said beside warnings, errors and documents.
+static LOUDNESS: AtomicU8 = AtomicU8::new(USUAL);
+const QUIET: u8 = 0;
+const USUAL: u8 = 1;
+const VERBOSE: u8 = 2;
+
+/// Takes what the user says of it.
+pub(super) fn set_loudness(is_quiet: bool, is_verbose: bool) {
+    let loudness = if is_quiet {
+        QUIET
+    } else if is_verbose {
+        VERBOSE
+    } else {
+        USUAL
+    };
+    LOUDNESS.store(loudness, Ordering::Relaxed);
+}
+
+/// Whether nothing is said but warnings, errors and documents.
+pub(super) fn is_quiet() -> bool {
+    LOUDNESS.load(Ordering::Relaxed) == QUIET
+}
+
+/// Whether each stage is told as it begins.
+pub(super) fn is_verbose() -> bool {
+    LOUDNESS.load(Ordering::Relaxed) == VERBOSE
+}
+
+/// Writes an account of what was done to stdout, unless the user wants none.
+pub(super) fn account(text: &str) -> Result<(), Error> {
+    if is_quiet() { Ok(()) } else { out(text) }
+}
+
 /// Prints what is good to know as one line on stderr.
 pub(super) fn remark(text: &str) {
+    if is_quiet() {
+        return;
+    }
     note(&format!("note: {}\n", escape_controls(text)));
 }
 

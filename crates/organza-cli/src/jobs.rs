@@ -3,6 +3,7 @@
 
 use super::args::Backend;
 use super::args::{Frames, RenderArguments};
+use super::film;
 use super::given::{Given, given};
 use super::session::{
     Flag, goal_keys, goal_overrides, goal_remarks, overrides, parse_changed, parse_scene, render_options, unused_goal,
@@ -16,6 +17,9 @@ use std::path::{Path, PathBuf};
 /// Least digits of a frame's number in a file name.
 const DIGITS: usize = 4;
 
+/// Frames of a second of a film for which nothing else is asked.
+const DEFAULT_FPS: u32 = 25;
+
 /// All pictures of a run.
 pub(super) struct Jobs<'a> {
     arguments: &'a RenderArguments,
@@ -26,6 +30,8 @@ pub(super) struct Jobs<'a> {
     /// What it says itself of a goal, without the options of one.
     stated_goal: Goal,
     outputs: Vec<PathBuf>,
+    /// Films of all frames.
+    films: Vec<PathBuf>,
     /// First and last frame.
     frames: Option<[u32; 2]>,
 }
@@ -40,11 +46,15 @@ pub(super) struct Places {
 impl<'a> Jobs<'a> {
     /// Reads the scene, or makes one of data files, which are among the files then.
     pub(super) fn new(arguments: &'a RenderArguments) -> Result<(Self, Files), Error> {
-        let outputs = outputs(arguments)?;
+        let (films, outputs): (Vec<_>, Vec<_>) = outputs(arguments)?.into_iter().partition(|path| film::is_film(path));
         let is_numbered = arguments.frames.is_some() || arguments.turntable.is_some();
         // Data takes long to read: an output that is in the way is told before.
         for output in outputs.iter().filter(|_| !is_numbered) {
             Target::new(output, arguments.force)?;
+        }
+        for path in &films {
+            film::check_program(path)?;
+            Target::new(path, arguments.force)?;
         }
         let (given, files) = given(&arguments.scene, arguments.turntable)?;
         let still = parsed(arguments, &given, None)?;
@@ -56,7 +66,7 @@ impl<'a> Jobs<'a> {
         let stated_goal = parse_scene(&arguments.scene, &given, None, arguments.turntable)?.render.goal;
         let asked = arguments.frames.or(arguments.turntable.map(|_| Frames::All));
         let frames = asked.map(|frames| range(frames, &still)).transpose()?;
-        Ok((Self { arguments, given, still, stated_goal, outputs, frames }, files))
+        Ok((Self { arguments, given, still, stated_goal, outputs, films, frames }, files))
     }
 
     /// The scene as it is written.
@@ -127,7 +137,18 @@ impl<'a> Jobs<'a> {
         for frame in self.frames() {
             self.places(frame, |path, replace| targets.add(path, replace))?;
         }
+        for path in &self.films {
+            targets.add(path, self.arguments.force)?;
+        }
         Ok(Drawing::Frames(Box::new(sequence)))
+    }
+
+    /// The films, without frames yet.
+    pub(super) fn films(&self) -> Result<Vec<film::Film>, Error> {
+        let film = |path: &PathBuf| {
+            Ok(film::Film::new(Target::new(path, self.arguments.force)?, self.arguments.fps.unwrap_or(DEFAULT_FPS)))
+        };
+        self.films.iter().map(film).collect()
     }
 
     /// What a picture tells of its scene: the text, and in TOML the options that have changed it as comments.
@@ -281,16 +302,33 @@ fn outputs(arguments: &RenderArguments) -> Result<Vec<PathBuf>, Error> {
     let of_png = [Flag { name: "--deep", is_given: arguments.deep }];
     refuse_options_of(&[Format::Png], &of_png, &outputs)?;
     let of_displayed = [Flag { name: "--legend", is_given: arguments.legend }];
-    refuse_options_of(&[Format::Png, Format::Jpeg], &of_displayed, &outputs)?;
+    refuse_options_of(&[Format::Png, Format::Jpeg, Format::WebP], &of_displayed, &outputs)?;
     let of_opacity = [Flag { name: "--transparent", is_given: arguments.transparent }];
-    refuse_options_of(&[Format::Png, Format::Exr], &of_opacity, &outputs)?;
+    refuse_options_of(&[Format::Png, Format::Exr, Format::WebP], &of_opacity, &outputs)?;
     let of_exr = [
         Flag { name: "--layers", is_given: arguments.scene.layers.is_some() },
         Flag { name: "--half", is_given: arguments.half },
     ];
     refuse_options_of(&[Format::Exr], &of_exr, &outputs)?;
+    let film = outputs.iter().find(|path| film::is_film(path));
+    if let Some(film) = film
+        && arguments.frames.is_none()
+        && arguments.turntable.is_none()
+    {
+        let message = format!("{}: a film has frames, and one picture is asked for", printable(film));
+        return Err(Error::usage(message, "add --turntable N, or --frames for a scene with an animation"));
+    }
+    if let (Some(film), true) = (film, arguments.transparent) {
+        let message = format!("{}: a film has no opacity", printable(film));
+        return Err(Error::usage(message, "leave --transparent out, or write numbered PNG files"));
+    }
+    if film.is_none() && arguments.fps.is_some() {
+        return Err(Error::usage("--fps is for films, and no output is one", "add -o NAME.mp4"));
+    }
     for (i, path) in outputs.iter().enumerate() {
-        Format::of_path(path)?;
+        if !film::is_film(path) {
+            Format::of_path(path)?;
+        }
         let others = [&arguments.cost, &arguments.checkpoint];
         if outputs[..i].contains(path) || others.iter().any(|other| other.as_ref() == Some(path)) {
             return Err(Error::usage(format!("{}: this output is named twice", printable(path)), ""));
@@ -301,17 +339,25 @@ fn outputs(arguments: &RenderArguments) -> Result<Vec<PathBuf>, Error> {
 
 /// Refuses options of some formats where no output has one of these: they would change nothing.
 fn refuse_options_of(formats: &[Format], options: &[Flag], outputs: &[PathBuf]) -> Result<(), Error> {
-    let has_format = |path: &PathBuf| Format::of_path(path).is_ok_and(|found| formats.contains(&found));
+    // Frames of a film are displayed pictures, as those of a JPEG file are.
+    let format_of = |path: &PathBuf| if film::is_film(path) { Ok(Format::Jpeg) } else { Format::of_path(path) };
+    let has_format = |path: &PathBuf| format_of(path).is_ok_and(|found| formats.contains(&found));
     let given = options.iter().find(|option| option.is_given).filter(|_| !outputs.iter().any(has_format));
     let Some(Flag { name, .. }) = given else { return Ok(()) };
     let name_of = |format: &Format| match format {
         Format::Png => "PNG",
         Format::Exr => "EXR",
         Format::Jpeg => "JPEG",
+        Format::WebP => "WebP",
     };
     let kinds: Vec<&str> = formats.iter().map(name_of).collect();
+    let kinds_text = match kinds.split_last() {
+        Some((last, [])) => (*last).to_owned(),
+        Some((last, before)) => format!("{} and {last}", before.join(", ")),
+        None => String::new(),
+    };
     let hint = format!("add -o NAME.{}", kinds[0].to_ascii_lowercase());
-    Err(Error::usage(format!("{name} is for {} files, and no output is one", kinds.join(" and ")), hint))
+    Err(Error::usage(format!("{name} is for {kinds_text} files, and no output is one"), hint))
 }
 
 #[cfg(test)]

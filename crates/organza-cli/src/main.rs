@@ -14,6 +14,7 @@ mod convert;
 mod devices;
 mod explain;
 mod extract;
+mod film;
 mod given;
 mod info;
 mod init;
@@ -28,7 +29,7 @@ mod session;
 #[cfg(feature = "view")]
 mod view;
 
-use args::{Arguments, Command};
+use args::{Arguments, Command, ManArguments};
 use clap::{CommandFactory, Parser};
 use organza::Error;
 use std::panic::{self, AssertUnwindSafe};
@@ -46,6 +47,7 @@ fn main() -> ExitCode {
                 return 2;
             }
         };
+        console::set_loudness(arguments.quiet, arguments.verbose);
         let wants_json = arguments.command.wants_json();
         match run(arguments.command) {
             Ok(code) => code,
@@ -86,9 +88,32 @@ fn run(command: Command) -> Result<u8, Error> {
             clap_complete::generate(arguments.shell, &mut Arguments::command(), "organza", &mut script);
             console::out(&String::from_utf8_lossy(&script))
         }
+        Command::Man(arguments) => man(&arguments),
         Command::Schema => console::out(&(organza::scene::schema() + "\n")),
     }
     .map(|()| 0)
+}
+
+/// Prints the manual page of the command, or of one of its commands.
+fn man(arguments: &ManArguments) -> Result<(), Error> {
+    let mut command = Arguments::command();
+    command.build();
+    let command = match &arguments.command {
+        None => command,
+        Some(name) => {
+            let names = || command.get_subcommands().map(clap::Command::get_name).collect::<Vec<_>>().join(", ");
+            let missing = || {
+                Error::usage(
+                    format!("man: there is no command {}", organza::shown(name)),
+                    format!("there are {}", names()),
+                )
+            };
+            command.find_subcommand(name).ok_or_else(missing)?.clone()
+        }
+    };
+    let mut page = Vec::new();
+    clap_mangen::Man::new(command).render(&mut page).map_err(|e| Error::Internal(format!("manual page: {e}")))?;
+    console::out(&String::from_utf8_lossy(&page))
 }
 
 /// Runs `work`; a panic is a bug of ours, says so and gives 1.

@@ -5,7 +5,7 @@ use super::console::bar::with_bar;
 use super::jobs::{Drawing, Jobs, Places};
 use super::machine::rates;
 use super::session::{open_device, path_text, processor_only, render_options, without_effect};
-use super::{console, report};
+use super::{console, film, report};
 use organza::cost::announcement_of_frames;
 use organza::output::{self, Metadata, Target, WriteReport};
 use organza::scene::{FoundCamera, Goal, Scene, short};
@@ -179,23 +179,31 @@ impl Said {
     }
 
     /// Prints what is not printed yet.
-    fn print_reports(&self, is_json: bool, is_still: bool) -> Result<(), Error> {
+    fn print_reports(&self, is_json: bool, is_still: bool, films: &[film::Written]) -> Result<(), Error> {
         match (is_json, is_still) {
-            (false, _) => self.reports.iter().try_for_each(|report| console::out(report)),
+            (false, _) => {
+                self.reports.iter().try_for_each(|report| console::account(report))?;
+                film::print(films)
+            }
             (true, true) => self.reports.iter().try_for_each(|report| console::out(&format!("{report}\n"))),
-            (true, false) => self.print_frames(),
+            (true, false) => self.print_frames(films),
         }
     }
 
     /// A list of the documents of frames, as one document.
-    fn print_frames(&self) -> Result<(), Error> {
+    fn print_frames(&self, films: &[film::Written]) -> Result<(), Error> {
         console::out("{\n  \"frames\": [")?;
         for (i, report) in self.reports.iter().enumerate() {
             let before = if i == 0 { "\n" } else { ",\n" };
             let lines: Vec<String> = report.lines().map(|line| format!("    {line}")).collect();
             console::out(&format!("{before}{}", lines.join("\n")))?;
         }
-        console::out(if self.reports.is_empty() { "]\n}\n" } else { "\n  ]\n}\n" })
+        console::out(if self.reports.is_empty() { "]" } else { "\n  ]" })?;
+        if !films.is_empty() {
+            let film = |film: &film::Written| json!({ "path": path_text(&film.path), "frames": film.frames, "bytes": film.bytes });
+            console::out(&format!(",\n  \"films\": {}", films.iter().map(film).collect::<Value>()))?;
+        }
+        console::out("\n}\n")
     }
 }
 
@@ -219,6 +227,7 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<u8, Error> {
     let mut drawing = jobs.check(files)?;
     let options = RenderOptions { device: open_device(&arguments.scene)?, rates, ..render_options(&arguments.scene) };
     let is_json = arguments.scene.common.json;
+    let mut films = jobs.films()?;
     let mut said = Said::default();
     add_new(&mut said.warnings, without_effect(&arguments.scene, jobs.still()));
     add_new(&mut said.warnings, jobs.goal_sentences());
@@ -243,7 +252,7 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<u8, Error> {
             progress.plan([(job.stage(), 1.0), (LATER.to_owned(), (count - at - 1) as f64)]);
             progress.begin(&job.stage());
             progress.enter();
-            let one = job.run(arguments, &options, &mut drawing, progress)?;
+            let one = job.run(arguments, &options, &mut drawing, &mut films, progress)?;
             progress.leave();
             if at == 0 && !jobs.is_still() {
                 let seconds = one.predicted_seconds;
@@ -256,12 +265,13 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<u8, Error> {
                 break;
             }
         }
-        Ok(())
+        films.into_iter().filter_map(|film| film.finish().transpose()).collect::<Result<Vec<_>, Error>>()
     });
     // Of pictures before the one that failed what they say is worth knowing, but no document.
     said.print_sentences();
+    let films = outcome.as_ref().map_or(&[][..], Vec::as_slice);
     if outcome.is_ok() || !is_json {
-        said.print_reports(is_json, jobs.is_still())?;
+        said.print_reports(is_json, jobs.is_still(), films)?;
     }
     outcome?;
     Ok(match said.sets {
@@ -284,6 +294,7 @@ impl Job<'_> {
         arguments: &RenderArguments,
         options: &RenderOptions,
         drawing: &mut Drawing,
+        films: &mut [film::Film],
         progress: &Progress,
     ) -> Result<Done, Error> {
         let checkpoint = self.places.checkpoint.as_ref().map(|target| target.path().to_owned());
@@ -302,7 +313,7 @@ impl Job<'_> {
         progress.leave();
         progress.begin(WRITING);
         let mut warnings = render.warnings.clone();
-        let written = self.write_outputs(&render, kept.as_ref(), arguments, &mut warnings)?;
+        let written = self.write_outputs(&render, kept.as_ref(), arguments, films, &mut warnings)?;
         if let Some(target) = &self.places.cost {
             target.write(format!("{:#}\n", documents::cost_json(&render.cost)).as_bytes())?;
         }
@@ -336,6 +347,7 @@ impl Job<'_> {
         render: &Render,
         kept: Option<&Kept>,
         arguments: &RenderArguments,
+        films: &mut [film::Film],
         warnings: &mut Vec<String>,
     ) -> Result<Vec<(&Path, WriteReport)>, Error> {
         let metadata = self.metadata(render, kept);
@@ -376,6 +388,9 @@ impl Job<'_> {
                 warnings.push(format!("{path}: there is no room for {count} of the legends; use a larger --size"));
             }
             written.push((path, report));
+        }
+        for film in films {
+            film.add(render.layers.size, &output::displayed_bytes(&render.layers, &metadata, &params)?)?;
         }
         Ok(written)
     }

@@ -28,6 +28,7 @@ mod png_file;
 mod target;
 mod targets;
 mod texts;
+mod webp_file;
 
 pub use doubt::doubt;
 pub use error::Error;
@@ -100,6 +101,8 @@ pub enum Format {
     Png,
     /// JPEG with the displayed picture, which loses a little of it, and has neither an opacity nor texts.
     Jpeg,
+    /// WebP with the displayed picture, without losses, and with its opacity.
+    WebP,
 }
 
 impl Format {
@@ -115,9 +118,11 @@ impl Format {
             Ok(Self::Png)
         } else if extension.eq_ignore_ascii_case("jpg") || extension.eq_ignore_ascii_case("jpeg") {
             Ok(Self::Jpeg)
+        } else if extension.eq_ignore_ascii_case("webp") {
+            Ok(Self::WebP)
         } else {
-            let message =
-                format!("{}: expected a name that ends in .exr, .png or .jpg", organza_scene::printable(path));
+            let path = organza_scene::printable(path);
+            let message = format!("{path}: expected a name that ends in .exr, .png, .jpg or .webp");
             Err(Error::Usage { message, hint: "the format follows from the extension".into() })
         }
     }
@@ -152,6 +157,7 @@ pub fn encode(
         Format::Exr => exr_file::encode(layers, metadata, params, &mut report)?,
         Format::Png => png_file::encode(layers, metadata, params, &mut report)?,
         Format::Jpeg => jpeg_file::encode(layers, metadata, params, &mut report)?,
+        Format::WebP => webp_file::encode(layers, metadata, params, &mut report)?,
     };
     report.bytes = bytes.len() as u64;
     Ok((bytes, report))

@@ -14,6 +14,8 @@ use std::time::{Duration, Instant};
 const INTERVAL: Duration = Duration::from_millis(100);
 /// Time between two lines where there is no terminal, and before the first: short work is silent.
 const LINES: Duration = Duration::from_secs(10);
+/// Time between two looks at the stage where each is told.
+const STAGES: Duration = Duration::from_millis(20);
 /// Steps of the bar.
 const STEPS: f64 = 1000.0;
 
@@ -24,7 +26,11 @@ pub(crate) fn with_bar<T>(work: impl FnOnce(&Progress) -> Result<T, Error>) -> R
     let finished = AtomicBool::new(false);
     std::thread::scope(|scope| {
         let watch = || {
-            if std::io::stderr().is_terminal() {
+            if console::is_verbose() {
+                print_stages(&progress, &finished);
+            } else if console::is_quiet() {
+                return;
+            } else if std::io::stderr().is_terminal() {
                 draw_bar(&progress, &finished);
             } else {
                 print_lines(&progress, &finished);
@@ -81,6 +87,28 @@ fn print_lines(progress: &Progress, finished: &AtomicBool) {
         }
         print_announced(progress);
         std::thread::park_timeout(INTERVAL.min(next.saturating_sub(start.elapsed())));
+    }
+}
+
+/// A line for each stage as it begins.
+fn print_stages(progress: &Progress, finished: &AtomicBool) {
+    let start = Instant::now();
+    let mut last = String::new();
+    while !finished.load(Ordering::Relaxed) {
+        let (stage, fraction) = progress.report();
+        if stage != last {
+            let elapsed = start.elapsed();
+            let hundredths = elapsed.subsec_millis() / 10;
+            let stage_text = organza::escape_controls(&stage);
+            console::note(&format!(
+                "{}.{hundredths:02} s, {:.0} %: {stage_text}\n",
+                elapsed.as_secs(),
+                (100.0 * fraction).floor()
+            ));
+            last = stage;
+        }
+        print_announced(progress);
+        std::thread::park_timeout(STAGES);
     }
 }
 

@@ -2,7 +2,7 @@
 
 use organza::scene::UpAxis;
 use organza::{escape_controls, printable};
-use organza_survey::{Facts, Histogram, counted, grouped, rounded};
+use organza_survey::{Facts, Histogram, counted, grouped, rounded, sized};
 use serde_json::Value;
 use std::fmt::Write;
 use std::path::Path;
@@ -55,7 +55,8 @@ impl Lines {
 pub(super) fn of_facts(file: &Path, facts: &Facts) -> String {
     let mut text = Lines(String::new());
     text.add("file", printable(file));
-    text.add("kind", format!("{}, read as {}, {} bytes", facts.kind, facts.format, grouped(facts.bytes)));
+    let exact = if facts.bytes < 1000 { String::new() } else { format!(" ({} bytes)", grouped(facts.bytes)) };
+    text.add("kind", format!("{}, read as {}, {}{exact}", facts.kind, facts.format, sized(facts.bytes)));
     let counts = facts.counts.iter().map(|(name, n)| format!("{name} {}", grouped(*n)));
     text.add("counts", counts.collect::<Vec<_>>().join(", "));
     if !facts.attributes.is_empty() {
