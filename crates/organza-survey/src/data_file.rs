@@ -27,6 +27,8 @@ pub struct DataFile {
     pub nodata: Option<f32>,
     /// Why a volume has no such array.
     pub array_error: Option<Error>,
+    /// The value of a volume outside of the cells that it was sampled from; `None` where its voxels are those of the file.
+    pub value_outside: Option<f64>,
 }
 
 impl DataFile {
@@ -52,7 +54,8 @@ impl DataFile {
             }
         }
         let stated_up = stated_up_axis(path);
-        Ok(Self { array, array_error, ..Self::of_data(path, data, stated_up, wish)? })
+        let value_outside = files.value_outside(path);
+        Ok(Self { array, array_error, value_outside, ..Self::of_data(path, data, stated_up, wish)? })
     }
 
     /// Data that a program has in memory under this name, and the axis of it that points up, where that is known; of points all columns are there.
@@ -102,19 +105,10 @@ impl DataFile {
                     array: None,
                     nodata,
                     array_error: None,
+                    value_outside: None,
                 })
             }
         }
-    }
-
-    /// The value of a volume outside of the cells that it was sampled from; `None` where no cells of its format become a volume.
-    pub(crate) fn value_outside(&self) -> Option<f64> {
-        /// Formats of grids of cells.
-        const CELLS: [&str; 4] = ["vtu", "pvtu", "vts", "pvts"];
-        let SourceData::Grid(grid) = &self.data else { return None };
-        let extension = self.path.extension()?.to_str()?.to_ascii_lowercase();
-        let least = || grid.values.iter().copied().fold(0.0, f32::min);
-        CELLS.contains(&extension.as_str()).then(|| f64::from(least()))
     }
 
     /// A name for its object: that of the file, with what would part a path of `--set` replaced.
@@ -185,6 +179,7 @@ mod tests {
                 array: None,
                 nodata: None,
                 array_error: None,
+                value_outside: None,
             }
         };
         let black = file(vec![[0.0; 3]; 3]);
@@ -192,6 +187,25 @@ mod tests {
         let dark = file(vec![[0.0; 3], [0.0, 0.0, 1e-3]]);
         assert!(!dark.is_black() && dark.is_colored() && dark.luminance().is_some_and(|l| l > 0.0));
         assert!(!file(Vec::new()).is_black() && !file(Vec::new()).is_colored());
+    }
+
+    #[test]
+    fn the_value_outside_of_cells_comes_from_the_reader_whatever_the_ending() {
+        let folder = std::env::temp_dir().join(format!("organza-outside-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).expect("a folder");
+        let read = |name: &str, content: &str| {
+            let path = folder.join(name);
+            std::fs::write(&path, content).expect("a file");
+            let from = (&Files::default(), &RenderOptions::default(), &Progress::new());
+            DataFile::read(&path, &Wish::default(), from).expect("a volume").value_outside
+        };
+        let head = "# vtk DataFile Version 3.0\na\nASCII\nDATASET";
+        let cells =
+            "UNSTRUCTURED_GRID\nPOINTS 4 float\n0 0 0\n1 0 0\n0 1 0\n0 0 1\nCELLS 1 5\n4 0 1 2 3\nCELL_TYPES 1\n10";
+        assert_eq!(read("a.vtk", &format!("{head} {cells}\n")), Some(0.0));
+        let voxels = "STRUCTURED_POINTS\nDIMENSIONS 2 1 1\nORIGIN 0 0 0\nSPACING 1 1 1\nPOINT_DATA 2\nSCALARS a float\nLOOKUP_TABLE default\n1 2";
+        assert_eq!(read("b.vtk", &format!("{head} {voxels}\n")), None);
+        std::fs::remove_dir_all(&folder).expect("its own folder");
     }
 
     #[test]
@@ -207,6 +221,7 @@ mod tests {
                 array: None,
                 nodata: None,
                 array_error: None,
+                value_outside: None,
             }
             .name()
         };

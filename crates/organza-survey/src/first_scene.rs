@@ -280,6 +280,7 @@ mod tests {
                 array: None,
                 nodata: None,
                 array_error: None,
+                value_outside: None,
             }
         };
         let text = |files: &[DataFile]| render_text(files, &Wish::default(), false);

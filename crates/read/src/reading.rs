@@ -126,6 +126,8 @@ pub struct Notes {
     pub warnings: Vec<String>,
     /// Repairs of the file, an entry for each kind of fault.
     pub mended: Vec<Mended>,
+    /// The value of a volume outside of the cells that it was sampled from; `None` where its voxels are those of the file.
+    pub value_outside: Option<f64>,
 }
 
 impl Notes {

@@ -59,7 +59,19 @@ fn a_linear_field_of_points_is_linear_inside_and_keeps_its_integral() {
     let [nx, ny, nz] = grid.dims;
     let sampled = format!("2 cells, sampled as {nx} x {ny} x {nz} voxels; outside them the value is 0");
     assert_eq!(notes.remarks, ["the field is density, of the points".to_owned(), sampled]);
-    assert_eq!(notes.unused, ["1 cell without a volume"]);
+    assert_eq!((notes.unused, notes.value_outside), (vec!["1 cell without a volume".to_owned()], Some(0.0)));
+}
+
+#[test]
+fn cells_that_are_flat_are_counted_and_only_cells_have_a_value_outside() {
+    let text = "# vtk DataFile Version 3.0\nflat\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 5 float\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n1 1 0\n\
+                CELLS 3 15\n4 0 1 2 3\n4 0 1 2 4\n4 1 4 2 0\nCELL_TYPES 3\n10\n10\n10\nCELL_DATA 3\nSCALARS a float\nLOOKUP_TABLE default\n-2 1 1\n";
+    let (_, notes) = grid("a.vtk", text.as_bytes());
+    let flat = "2 cells of no volume, whose points lie in a plane: nothing is drawn of that";
+    assert!(notes.remarks.iter().any(|remark| remark == flat), "{:?}", notes.remarks);
+    assert_eq!(notes.value_outside, Some(-2.0));
+    let image = crate::read_samples::volumes::vti("ascii", false);
+    assert_eq!(grid("a.vti", &image).1.value_outside, None);
 }
 
 #[test]

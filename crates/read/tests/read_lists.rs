@@ -187,6 +187,20 @@ fn pieces_of_an_image_are_put_together_at_their_places() {
         "the file 'other.vti' of the list: the Origin, Spacing and Direction of the other pieces",
     );
     folder.write("far.vti", image([[2_000_000, 2_000_001], [0, 1], [0, 1]], "1 2 0.5"));
+    let listed = |stated: &str| pieces("PImageData", &format!("{extent} {stated}"), &["a_0.vti", "a_1.vti", "a_2.vti"]);
+    folder.write("listed.pvti", listed("Origin=\"1 2 3\" Spacing=\"1 2 0.5\" Direction=\"1 0 0 0 1 0 0 0 1\""));
+    assert_eq!(chosen("listed.pvti", "p"), chosen("whole.vti", "p"));
+    for (stated, said) in [
+        (
+            "Spacing=\"1 2 0.25\"",
+            "expected pieces of the Spacing that the list states, 1 2 0.25, found 1 2 0.5 in 'a_0.vti'",
+        ),
+        ("Origin=\"0 2 3\"", "expected pieces of the Origin that the list states, 0 2 3, found 1 2 3 in 'a_0.vti'"),
+        ("Direction=\"0 1 0 1 0 0 0 0 1\"", "expected pieces of the Direction that the list states"),
+    ] {
+        folder.write("listed.pvti", listed(stated));
+        folder.refused("listed.pvti", said);
+    }
     folder.write("far.pvti", pieces("PImageData", &extent, &["a_0.vti", "far.vti"]));
     folder.refused(
         "far.pvti",

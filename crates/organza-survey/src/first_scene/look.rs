@@ -291,7 +291,7 @@ fn object(file: &DataFile, preset: Option<&Preset>, colors: Option<String>) -> O
             }
         }
         SourceData::Grid(grid) => {
-            let matter = Matter::in_surroundings(grid, file.value_outside());
+            let matter = Matter::in_surroundings(grid, file.value_outside);
             let is_as_it_is = file.array.is_none() && file.nodata.is_none();
             if let Some(Labels(known)) = labels(grid, matter.as_ref(), preset).filter(|_| is_as_it_is) {
                 let labels = known.iter().filter(|label| **label > 0.0).count();

@@ -106,6 +106,14 @@ impl Files {
         self.read.borrow().get(&(real(source), frame)).map(|(_, read)| read.0.clone())
     }
 
+    /// The value of a volume that was read outside of the cells that it was sampled from; `None` where its voxels are those of the file, and of what was
+    /// not read.
+    pub fn value_outside(&self, path: &Path) -> Option<f64> {
+        let read = self.read.borrow();
+        let of_first_frame = read.get(&(real(path), 0));
+        of_first_frame.and_then(|(_, (_, notes, _))| notes.value_outside)
+    }
+
     /// The same without keeping a file: for whoever keeps what is made from it.
     pub(super) fn data_once(
         &self,

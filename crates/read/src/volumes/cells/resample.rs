@@ -53,6 +53,8 @@ const PARTS: usize = 16;
 /// by side stay far below; such as lie on each other a thousandfold would take minutes.
 const MOST_WORK: f64 = 256.0;
 const FREE_WORK: f64 = (1u64 << 28) as f64;
+/// The volume of a body over that of a cube as long as it up to which it has none: what rounding leaves of a flat one.
+const FLAT: f64 = 1e-14;
 /// How far outside a tetrahedron a sample may lie, in barycentric coordinates: between two neighbours nothing is left out.
 const SLACK: f64 = 1e-9;
 
@@ -223,6 +225,12 @@ pub(super) fn grid(
     let cells = counted(bodies.len() as u64, "cell");
     let remarks = &mut reading.notes.remarks;
     remarks.push(format!("{cells}, sampled as {x} x {y} x {z} voxels; outside them the value is {outside}"));
+    reading.notes.value_outside = Some(outside);
+    let remarks = &mut reading.notes.remarks;
+    if bounds.flat > 0 {
+        let flat = counted(bounds.flat, "cell");
+        remarks.push(format!("{flat} of no volume, whose points lie in a plane: nothing is drawn of that"));
+    }
     match bounds.folded {
         0 => {}
         folded => remarks.push(format!("{folded} of the cells are folded; what they cover twice counts once")),
@@ -274,6 +282,8 @@ struct Bounds {
     volume: f64,
     /// Bodies of which some tetrahedra are inside out and others not.
     folded: usize,
+    /// Bodies without a volume.
+    flat: u64,
 }
 
 impl Bounds {
@@ -284,6 +294,7 @@ impl Bounds {
         let mut high = DVec3::NEG_INFINITY;
         let mut sum = 0.0;
         let mut folded = 0;
+        let mut flat = 0;
         for body in bodies {
             let mut right = 0.0;
             let mut wrong = 0.0;
@@ -294,14 +305,14 @@ impl Bounds {
             sum += (right + wrong) / 6.0;
             // Faces that are not quite flat may part off next to nothing.
             folded += usize::from(body.is_wound() && f64::min(right, wrong) > 1e-6 * f64::max(right, wrong));
-            for corner in body.corners {
-                let corner = points[*corner as usize];
-                (low, high) = (low.min(corner), high.max(corner));
-            }
+            let around = box_around(points, body);
+            flat += u64::from((right + wrong) / 6.0 <= FLAT * around.size().max_element().powi(3));
+            low = low.min(around.min);
+            high = high.max(around.max);
         }
         let size = high - low;
         let fits = |v: f64| (1e-280..1e280).contains(&v);
-        (fits(sum) && fits(size.element_product())).then_some(Self { low, size, volume: sum, folded })
+        (fits(sum) && fits(size.element_product())).then_some(Self { low, size, volume: sum, folded, flat })
     }
 
     /// The side of a voxel where so many bodies are of about one size.

@@ -7,7 +7,7 @@ use super::data::{Appended, Encoding};
 use super::extents::{self, Extent, Filling};
 use super::pasted;
 use super::pieces::{self, Source, in_file};
-use super::{HINT, MAX_NODES, dataset, extent, one, parsed, place, wrong};
+use super::{HINT, MAX_NODES, dataset, extent, numbers, one, parsed, place, wrong};
 use crate::error::{Fault, Place, ReadError};
 use crate::reading::Reading;
 use crate::stream::beside::{Beside, from_uri};
@@ -15,7 +15,7 @@ use crate::stream::input::{self, Content};
 use crate::volumes::selection::Selection;
 use crate::{Loaded, Notes, ReadParams};
 use roxmltree::{Document, Node};
-use splat_core::text::counted;
+use splat_core::text::{counted, escaped};
 use std::borrow::Cow;
 use std::path::Path;
 
@@ -44,6 +44,13 @@ enum Together {
     Blocks,
 }
 
+/// Attributes of an image that say where its points lie, and how the axes of one lie that states no direction.
+const OF_LATTICE: [&str; 3] = ["Origin", "Spacing", "Direction"];
+const UNTURNED: [f64; 9] = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0];
+
+/// How far apart a number of the list and of a piece may be, of the largest of them: as much as six digits leave open.
+const SAME: f64 = 1e-6;
+
 /// Files of a folder that are looked at for a list, and bytes of one, at most.
 const MOST_FILES: usize = 4096;
 const MOST_BYTES: u64 = 1 << 20;
@@ -67,6 +74,15 @@ struct Members<'p> {
     series: Option<Series>,
     /// The whole of the pieces of a grid.
     whole: Option<Extent>,
+    /// Places and steps that the list states of the points of an image.
+    stated: Vec<StatedNumbers>,
+}
+
+/// The numbers of an attribute of a list, by its name.
+struct StatedNumbers {
+    name: &'static str,
+    numbers: Vec<f64>,
+    place: Place,
 }
 
 /// Which time of a series is read.
@@ -113,7 +129,7 @@ fn missing(error: ReadError) -> ReadError {
 
 /// Reads what the files of a list are together.
 pub(super) fn read(content: &[u8], path: Option<&Path>, reading: &mut Reading<'_>) -> Result<Loaded, ReadError> {
-    let mut members = Members { path, files: Vec::new(), series: None, whole: None };
+    let mut members = Members { path, files: Vec::new(), series: None, whole: None, stated: Vec::new() };
     let together = members.collect(content, &Found { folder: String::new(), depth: 0 }, reading)?;
     if members.series.is_none() {
         Selection::of_frames(1, Place::File, reading.params, &mut Notes::default())?;
@@ -236,6 +252,16 @@ impl Members<'_> {
         };
         let grid = root.children().find(|node| node.has_tag_name(kind));
         self.whole = grid.map(|grid| stated(grid, "WholeExtent")).transpose()?.flatten();
+        if let Some(grid) = grid.filter(|_| kind == "PImageData") {
+            for name in OF_LATTICE {
+                let numbers = if name == "Direction" {
+                    numbers::<9>(grid, name)?.map(Vec::from)
+                } else {
+                    numbers::<3>(grid, name)?.map(Vec::from)
+                };
+                self.stated.extend(numbers.map(|numbers| StatedNumbers { name, numbers, place: place(grid) }));
+            }
+        }
         if names.is_empty() {
             return Err(wrong(root, "a list that names files", "none"));
         }
@@ -262,6 +288,31 @@ impl Members<'_> {
         Ok(files.into_iter().filter(|(other, _)| *other == time).map(|(_, file)| file).collect())
     }
 
+    /// Refuses images that do not lie where the list says, or have other steps.
+    fn check_stated(&self, sources: &[Source<'_, '_, '_>]) -> Result<(), ReadError> {
+        for StatedNumbers { name, numbers: expected, place } in &self.stated {
+            for source in sources.iter().filter(|source| source.dataset.has_tag_name("ImageData")) {
+                let found = if *name == "Direction" {
+                    numbers::<9>(source.dataset, name).map(|found| found.unwrap_or(UNTURNED).to_vec())
+                } else {
+                    let usual = if *name == "Spacing" { 1.0 } else { 0.0 };
+                    numbers::<3>(source.dataset, name).map(|found| found.unwrap_or([usual; 3]).to_vec())
+                };
+                let found = found.map_err(|e| in_file(source.file, e))?;
+                let size = expected.iter().fold(0.0, |most: f64, number| most.max(number.abs()));
+                if expected.iter().zip(&found).any(|(a, b)| (a - b).abs() > SAME * size) {
+                    let told = |numbers: &[f64]| numbers.iter().map(f64::to_string).collect::<Vec<_>>().join(" ");
+                    let file = escaped(source.file.unwrap_or_default().as_bytes(), 60);
+                    let expected = format!("pieces of the {name} that the list states, {}", told(expected));
+                    let found = format!("{} in '{file}'", told(&found));
+                    let hint = "write the list and its pieces anew: one of them is of another run";
+                    return Err(ReadError::input(*place, expected, found, hint));
+                }
+            }
+        }
+        Ok(())
+    }
+
     /// What the files are together.
     fn loaded(&self, together: Together, reading: &mut Reading<'_>) -> Result<Loaded, ReadError> {
         let mut texts: Vec<(Option<Appended>, Cow<'_, str>)> = Vec::new();
@@ -284,6 +335,9 @@ impl Members<'_> {
             let file = Some(member.name.as_str());
             let dataset = dataset(document).map_err(|e| in_file(file, e))?;
             sources.push(Source { dataset, encoding, file });
+        }
+        if together == Together::Lattice {
+            self.check_stated(&sources)?;
         }
         let stated: Vec<Option<Extent>> = self.files.iter().map(|member| member.extent).collect();
         let is_grid =
