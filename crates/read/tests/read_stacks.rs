@@ -64,6 +64,14 @@ fn a_stack_of_each_packing_type_and_order_has_its_values() {
         let said = notes.remarks.iter().any(|remark| remark.contains("as they are stored"));
         assert_eq!(said, stack.meaning != 1, "{:?}", notes.remarks);
     }
+    // Tiles that reach beyond the page, of numbers that LZW hardly packs: each has a code of its own.
+    let noise = |i: u32| f64::from(i.wrapping_mul(2_654_435_761) >> 16);
+    let pages: Vec<Vec<f64>> = (0..2).map(|z| (0..37 * 41).map(|i| noise(z * 37 * 41 + i)).collect()).collect();
+    let noisy = Stack { packing: 5, tile: 16, size: [41, 37], pages: pages.clone(), ..plain };
+    let values: Vec<f32> = pages.concat().iter().map(|value| *value as f32).collect();
+    for (has_differences, big_endian) in [(false, false), (true, true)] {
+        assert!(volume(&Stack { has_differences, big_endian, ..noisy.clone() }).0.values == values);
+    }
     let signed = Stack { format: 2, pages: vec![vec![-5.0; 6]; 2], ..Stack::default() };
     assert!(volume(&signed).0.values.iter().all(|value| *value == -5.0));
 }
@@ -88,6 +96,7 @@ fn imagej_states_steps_channels_and_times() {
     assert_eq!((grid.values[0], grid.values[6]), (6.0, 18.0));
     let error = read(&stack("images=4\nslices=4").bytes(), &second).unwrap_err();
     assert!(error.to_string().contains("expected channel1, the only one, found 'channel2'"), "{error}");
+    assert!(refused(&stack("images=4\nchannels=4")).contains("found 4 channels of one slice"));
     let times = stack("images=4\nslices=2\nframes=2");
     let (grid, _) = read(&times.bytes(), &ReadParams { frame: 1, ..ReadParams::default() }).unwrap();
     assert_eq!((grid.values[0], grid.values[6]), (12.0, 18.0));

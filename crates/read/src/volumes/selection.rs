@@ -172,7 +172,7 @@ pub(crate) fn channel_of(channels: u64, params: &ReadParams, notes: &mut Notes) 
     let Some(name) = &params.array else {
         if channels > 1 {
             notes.remark(format!(
-                "{NAME}1 of {channels} is drawn; `array` of a scene or --color-by chooses another: {NAME}2 to {NAME}{channels}"
+                "{NAME}1 of {channels} is drawn; `array` of a scene or --color-by chooses another, up to {NAME}{channels}"
             ));
         }
         return Ok(0);

@@ -108,11 +108,6 @@ pub(super) fn slice(content: Content, reading: &mut Reading<'_>) -> Result<Slice
 /// Refuses pages that are not of one size and type.
 fn check_alike(all: &[Page]) -> Result<(), ReadError> {
     let first = &all[0];
-    if let [Page { shape, .. }] = all
-        && shape.size.contains(&1)
-    {
-        return Ok(());
-    }
     let Some(other) = all.iter().find(|page| page.shape != first.shape) else { return Ok(()) };
     let expected = format!("pages like the first, of {}", first.shape);
     let found = format!("{} at page {}", other.shape, other.rank + 1);
@@ -133,6 +128,11 @@ fn slots(all: &[Page], planes: &Planes, pages: &mut Pages) -> Result<Vec<Plane>,
                 "one page, a flat picture",
                 hint,
             ));
+        }
+        if planes.slices.count == 1 {
+            let found = format!("{} channels of one slice", planes.channels.count);
+            let hint = "if they are slices, say so: in Fiji Image > Properties, then File > Save As > Tiff";
+            return Err(ReadError::input(Place::File, "a stack of two slices or more", found, hint));
         }
         return Ok(all.iter().map(|page| Plane::Page(page.rank)).collect());
     }

@@ -21,7 +21,7 @@ const MOST_PACKED: u64 = 4096;
 const LEAST_PAGE: u64 = 64;
 /// Meanings of a number that is read as it is stored: white is 0, black is 0, a place in a list of colours.
 const WHITE_IS_ZERO: u16 = 0;
-const BLACK_IS_ZERO: u16 = 1;
+const BLACK_IS_ZERO: u64 = 1;
 const IN_PALETTE: u16 = 3;
 /// Bits of `NewSubfileType`: a smaller copy of another page, and a mask.
 const IS_COPY: u64 = 1 | 4;
@@ -44,6 +44,8 @@ pub(super) struct Shape {
     pub(super) is_color: bool,
     /// Whether each number of all pixels lies behind the other.
     is_planar: bool,
+    /// Columns and rows of a tile, where the page has such.
+    tile: Option<[u32; 2]>,
 }
 
 impl Shape {
@@ -198,7 +200,7 @@ impl Pages {
                     .remark("numbers stand for colours of a list, which is not used: they are read as they are stored"),
                 _ => reading.notes.remark("white is stored as 0: numbers are read as they are stored"),
             }
-            self.take_as_stored();
+            self.rewrite(Tag::PhotometricInterpretation, BLACK_IS_ZERO);
             self.seek(page)?;
         }
         let found =
@@ -245,12 +247,33 @@ impl Pages {
                 .notes
                 .not_used([format!("{} beside colours", counted(samples - u64::from(numbers), "number")).as_bytes()]);
         }
-        Ok(Shape { size: [width, height], kind, bits, numbers: numbers.into(), is_color, is_planar })
+        let shape = Shape {
+            size: [width, height],
+            kind,
+            bits,
+            numbers: numbers.into(),
+            is_color,
+            is_planar,
+            tile: self.take_whole_tiles(page, [width, height])?,
+        };
+        if let Some([across, down]) = shape.tile {
+            // The page's own bytes are held where it is decoded.
+            let tile = Shape { size: [across, down], ..shape }.bytes();
+            input::hold("a tile", tile, reading.params)?;
+            input::check_ratio_of(tile, self.len(), MOST_PACKED, "packed tiles")?;
+            if few && across % 8 != 0 {
+                return unread(format!("tiles of {across} numbers of {bits} bits"));
+            }
+            if numbers > 1 && samples != u64::from(numbers) {
+                return unread("tiles with numbers beside colours".to_owned());
+            }
+        }
+        Ok(shape)
     }
 
-    /// Rewrites the meaning of the numbers of the current page, which the decoder would invert or refuse.
-    fn take_as_stored(&mut self) {
-        let Some(pointer) = self.decoder.ifd_pointer() else { return };
+    /// Rewrites a whole number that describes the current page; whether it is there and has room for it.
+    fn rewrite(&mut self, tag: Tag, new: u64) -> bool {
+        let Some(pointer) = self.decoder.ifd_pointer() else { return false };
         let is_big_endian = self.is_big_endian();
         let content = self.decoder.inner().get_mut();
         let number = |content: &[u8], at: usize, length: usize| -> Option<u64> {
@@ -265,27 +288,84 @@ impl Pages {
         let count = number(content, start, head).unwrap_or(0) as usize;
         let entries =
             (0..count).map_while(|i| start.checked_add(head + i * entry).filter(|at| at + entry <= content.len()));
-        let meaning = u64::from(Tag::PhotometricInterpretation.to_u16());
-        let Some(at) = entries.into_iter().find(|at| number(content, *at, 2) == Some(meaning)) else { return };
+        let sought = u64::from(tag.to_u16());
+        let Some(at) = entries.into_iter().find(|at| number(content, *at, 2) == Some(sought)) else { return false };
         let length = match number(content, at + 2, 2) {
             Some(SHORT) => 2,
             Some(LONG) => 4,
-            _ => return,
+            _ => return false,
         };
+        if new >> (8 * length) != 0 {
+            return false;
+        }
         let value = &mut content[at + offset..at + offset + length];
-        value.fill(0);
-        value[if is_big_endian { length - 1 } else { 0 }] = BLACK_IS_ZERO as u8;
+        value.copy_from_slice(&new.to_le_bytes()[..length]);
+        if is_big_endian {
+            value.reverse();
+        }
+        true
+    }
+
+    /// Rewrites the size of the current page to whole tiles, if it has tiles: the decoder reads whole ones at once, and others row by row, which fails with
+    /// LZW.
+    fn take_whole_tiles(&mut self, page: usize, size: [u32; 2]) -> Result<Option<[u32; 2]>, ReadError> {
+        let sides =
+            [Tag::TileWidth, Tag::TileLength].map(|tag| self.number(tag).and_then(|side| u32::try_from(side).ok()));
+        let [Some(across), Some(down)] = sides else { return Ok(None) };
+        let whole = |size: u32, side: u32| u64::from(size.div_ceil(side.max(1))) * u64::from(side);
+        let is_rewritten = self.rewrite(Tag::ImageWidth, whole(size[0], across))
+            && self.rewrite(Tag::ImageLength, whole(size[1], down));
+        if !is_rewritten {
+            let found = format!("tiles of {across} x {down} for {} x {} pixels at page {}", size[0], size[1], page + 1);
+            return Err(ReadError::input(Place::File, "tiles that fit the page", found, DAMAGED));
+        }
+        Ok(Some([across, down]))
+    }
+
+    /// The stored numbers of a page, row by row, of a planar one plane by plane.
+    fn stored(&mut self, page: usize, shape: &Shape) -> Result<Vec<u8>, ReadError> {
+        let mut stored = Vec::new();
+        let Some(tile) = shape.tile else {
+            let layout = self.decoder.image_buffer_layout().map_err(|e| refused(page, &e))?;
+            input::reserve(&mut stored, layout.complete_len)?;
+            stored.resize(layout.complete_len, 0);
+            let read = guarded(|| Ok(self.decoder.read_image_bytes(&mut stored))).map_err(|_| broken(page))?;
+            read.map_err(|e| refused(page, &e))?;
+            return Ok(stored);
+        };
+        let planes = if shape.is_planar { shape.numbers as usize } else { 1 };
+        let bits = usize::from(shape.bits) * if shape.is_planar { 1 } else { shape.numbers as usize };
+        let row = |pixels: u32| (pixels as usize * bits).div_ceil(8);
+        let [width, height] = shape.size;
+        let plane = row(width) * height as usize;
+        input::reserve(&mut stored, planes * plane)?;
+        stored.resize(planes * plane, 0);
+        let mut numbers = Vec::new();
+        input::reserve(&mut numbers, row(tile[0]) * tile[1] as usize)?;
+        numbers.resize(row(tile[0]) * tile[1] as usize, 0);
+        let mut chunk = 0;
+        for start in (0..planes).map(|n| n * plane) {
+            for y in (0..height).step_by(tile[1] as usize) {
+                for x in (0..width).step_by(tile[0] as usize) {
+                    let read = guarded(|| Ok(self.decoder.read_chunk_bytes(chunk, &mut numbers)));
+                    read.map_err(|_| broken(page))?.map_err(|e| refused(page, &e))?;
+                    chunk += 1;
+                    let length = row(tile[0].min(width - x));
+                    let rows = (height - y).min(tile[1]) as usize;
+                    for (line, from) in numbers.chunks_exact(row(tile[0])).take(rows).enumerate() {
+                        let to = start + (y as usize + line) * row(width) + row(x);
+                        stored[to..to + length].copy_from_slice(&from[..length]);
+                    }
+                }
+            }
+        }
+        Ok(stored)
     }
 
     /// The numbers of a page, each in whole bytes in the order of this machine, those of a pixel side by side.
     pub(super) fn decode(&mut self, page: usize, shape: &Shape, numbers: &mut Vec<u8>) -> Result<(), ReadError> {
         self.seek(page)?;
-        let layout = self.decoder.image_buffer_layout().map_err(|e| refused(page, &e))?;
-        let mut stored = Vec::new();
-        input::reserve(&mut stored, layout.complete_len)?;
-        stored.resize(layout.complete_len, 0);
-        let read = guarded(|| Ok(self.decoder.read_image_bytes(&mut stored))).map_err(|_| broken(page))?;
-        read.map_err(|e| refused(page, &e))?;
+        let stored = self.stored(page, shape)?;
         numbers.clear();
         let size = shape.kind.size() as usize;
         if shape.bits < 8 {
