@@ -31,6 +31,7 @@ pub(crate) enum Format {
     Splat,
     Spz,
     Tiff,
+    Dicom,
 }
 
 /// The format of a file by its first bytes, else by the extension of its name.
@@ -61,6 +62,9 @@ pub(crate) fn format_of(path: &Path, content: &[u8]) -> Option<Format> {
     }
     if content.starts_with(b"\x89PNG\r\n\x1a\n") {
         return Some(Format::Png);
+    }
+    if crate::volumes::dicom::is_dicom(content) {
+        return Some(Format::Dicom);
     }
     // TIFF and BigTIFF, of both byte orders.
     if [&b"II*\0"[..], b"MM\0*", b"II+\0", b"MM\0+"].iter().any(|mark| content.starts_with(mark)) {
@@ -130,6 +134,7 @@ pub(crate) fn by_name(path: &Path) -> Option<Format> {
         "splat" => Some(Format::Splat),
         "spz" => Some(Format::Spz),
         "tif" | "tiff" => Some(Format::Tiff),
+        "dcm" | "dicom" | "ima" => Some(Format::Dicom),
         _ => None,
     }
 }

@@ -1,6 +1,6 @@
 //! Reading files: meshes (PLY, STL, OBJ, OFF, glTF), point clouds (PLY, OBJ, OFF, PCD, glTF, XYZ, CSV, LAS, LAZ, E57), 3D Gaussians (PLY, packed
 //! PLY, .splat, SPZ), volumes (NIfTI,
-//! NRRD, MetaImage, VTK, TIFF, folders of slices, raw) and images of radiance (Radiance HDR, OpenEXR, PNG), each also inside gzip.
+//! NRRD, MetaImage, DICOM, VTK, TIFF, folders of slices, raw) and images of radiance (Radiance HDR, OpenEXR, PNG), each also inside gzip.
 //!
 //! No input makes a reader panic or take memory that the file does not stand for: sizes that a header announces are
 //! checked against the length of the file before anything is allocated.
@@ -97,7 +97,7 @@ use volumes::tiff;
 use volumes::vti;
 #[cfg(feature = "vtk")]
 use volumes::vtk;
-use volumes::{metaimage, nrrd, raw};
+use volumes::{dicom, metaimage, nrrd, raw};
 
 /// How much a file may ask for, and what happens to what is wrong in it.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -118,8 +118,8 @@ pub struct ReadParams {
     /// Columns of a mesh that are kept in [`Mesh::columns`], and columns of points that are kept in [`RawPoints::columns`] beside those that have a meaning, each by its name in the file or by one
     /// that [`RawPoints::column`] knows. One that a file of points has not is an error that names those that it has.
     pub columns: Vec<String>,
-    /// Name of the array of a VTK file that is the volume's field, or of a channel of a TIFF stack; `None` for the one that the file names, else the first of one number a
-    /// point or cell, and the first channel. One that the file has not is an error that names those that it has, as one of another format is.
+    /// Name of the array of a VTK file that is the volume's field, of a channel of a TIFF stack, or the UID or description of a DICOM series; `None` for the one that the file names, else the first of one number a
+    /// point or cell, the first channel, and the series of most slices. One that the file has not is an error that names those that it has, as one of another format is.
     pub array: Option<String>,
     /// Whether points may become a medium: columns `smoothing_length`, `extinction` and `mass` are kept too, beside those that are kept of all
     /// points where there are such, `radius`, `tx`, `ty`, `tz`, `shadow_coefficient`, `footprint` and `material`. Numbers that these cannot have are refused, see
@@ -221,6 +221,11 @@ pub fn files_of(path: &Path) -> Result<Vec<PathBuf>, ReadError> {
 fn whole_folder(path: &Path, reading: &mut Reading<'_>) -> Result<Loaded, ReadError> {
     reading.go_on()?;
     let files = folder::files(path)?;
+    if files.iter().take(LOOKED_AT).any(|file| dicom::is_dicom(&unread::beginning(file))) {
+        "Dicom".clone_into(&mut reading.notes.format);
+        let loaded = dicom::read(files, None, reading).map(Loaded::Grid)?;
+        return finished(loaded, reading);
+    }
     #[cfg(any(feature = "tiff", feature = "png"))]
     if slices::has_slices(&files) {
         "Slices".clone_into(&mut reading.notes.format);
@@ -287,7 +292,7 @@ pub fn mesh_in_memory(name: &str, mesh: Mesh, params: &ReadParams) -> Result<(Me
 }
 
 /// Formats of volumes of which one array, or one channel, is read.
-const WITH_ARRAYS: [&str; 3] = ["Vtk", "VtkXml", "Tiff"];
+const WITH_ARRAYS: [&str; 4] = ["Vtk", "VtkXml", "Tiff", "Dicom"];
 
 /// The content with meshes turned outwards.
 fn whole(
@@ -312,7 +317,7 @@ fn finished(loaded: Loaded, reading: &mut Reading<'_>) -> Result<Loaded, ReadErr
         let found = format!("the array '{}', and a file without arrays", escaped(name.as_bytes(), LONGEST_NAME));
         return Err(ReadError::input(
             Place::File,
-            "a volume of VTK, or a TIFF stack",
+            "a volume of VTK or DICOM, or a TIFF stack",
             found,
             "leave out `array`, or `--color-by`, which names it on the command line",
         ));
@@ -389,6 +394,9 @@ fn missing_column(missing: &str, known: Vec<&str>, reading: &Reading<'_>) -> Rea
     ReadError::input(Place::File, expected, format!("`{shown}`"), hint)
 }
 
+/// Files of a folder that are looked at for what it holds.
+const LOOKED_AT: usize = 64;
+
 /// Bytes that tell the format.
 const MARK: usize = 4096;
 
@@ -449,6 +457,15 @@ fn parse_as(
         Format::E57 => e57::read(stream.rest()?, reading).map(Loaded::Points),
         #[cfg(feature = "nifti")]
         Format::Nifti => nifti::read(stream, params, &mut reading.notes).map(Loaded::Grid),
+        Format::Dicom => {
+            let Some(place) = place else {
+                let hint = "name the folder of the series, or its first file";
+                return Err(ReadError::input(Place::File, "a DICOM file in its folder", "one in memory", hint));
+            };
+            let folder = place.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+            drop(stream);
+            dicom::read(folder::files(folder)?, Some(place), reading).map(Loaded::Grid)
+        }
         Format::MetaImage => metaimage::read(stream, place, params, &mut reading.notes).map(Loaded::Grid),
         #[cfg(feature = "vti")]
         Format::VtkXml => vti::read(&stream.rest()?, place, reading),

@@ -2,6 +2,7 @@
 
 #[cfg(any(feature = "vti", feature = "vtk"))]
 pub(crate) mod cells;
+pub(crate) mod dicom;
 pub(crate) mod lattice;
 pub(crate) mod metaimage;
 #[cfg(feature = "nifti")]
@@ -34,7 +35,6 @@ fn upright(dims: [u64; 3], steps: DVec3) -> (DVec3, DMat3) {
 }
 
 /// A number to six digits, as it is told.
-#[cfg(any(feature = "tiff", feature = "png"))]
 fn rounded(number: f64) -> f64 {
     format!("{number:.5e}").parse().unwrap_or(number)
 }

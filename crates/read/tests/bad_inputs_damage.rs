@@ -23,6 +23,7 @@ mod read_samples;
 
 use every_sample::{bodies, samples, text_samples, textured};
 use read::{Fault, Loaded, ReadParams, bytes};
+use read_samples::dicom::Dicom;
 use read_samples::{e57, gzip, las, load, square_gltf};
 use splat_core::MemoryAccount;
 use std::process::Command;
@@ -392,4 +393,44 @@ fn memory_is_asked_for_before_it_is_taken_and_comes_back() {
         let error = bytes(name, &content, &within(held - 1), None).unwrap_err();
         assert_eq!(error.fault, Fault::Limit, "{name} within {}: {error}", held - 1);
     }
+}
+
+/// One of two slices of a series is cut, has a bit flipped, and bytes set to extremes.
+#[test]
+fn every_damage_of_a_slice_of_dicom_gives_an_error_or_a_valid_object() {
+    if !limited("every_damage_of_a_slice_of_dicom_gives_an_error_or_a_valid_object") {
+        return;
+    }
+    let folder = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("damaged-dicom");
+    std::fs::create_dir_all(&folder).unwrap();
+    for syntax in [".1", "", ".5"] {
+        let [whole, content] = [0, 1].map(|rank| Dicom { syntax, ..Dicom::at(rank) }.bytes());
+        std::fs::write(folder.join("a"), whole).unwrap();
+        let damaged = |content: &[u8]| {
+            std::fs::write(folder.join("b"), content).unwrap();
+            let loaded = read::file(&folder, &read::ReadParams::default(), None).map(|read| read.0);
+            loaded.as_ref().is_ok_and(|loaded| {
+                valid(loaded);
+                true
+            })
+        };
+        assert!(damaged(&content));
+        for length in 0..content.len() {
+            assert!(!damaged(&content[..length]), "{syntax} cut at {length}");
+        }
+        let mut changed = content.clone();
+        for at in (0..content.len()).step_by(stride().min(3)) {
+            changed[at] ^= 1 << (at % 8);
+            damaged(&changed);
+            for value in [0x00, 0x7f, 0x80, 0xff] {
+                for width in [1, 4] {
+                    let end = (at + width).min(content.len());
+                    changed[at..end].fill(value);
+                    damaged(&changed);
+                    changed[at..end].copy_from_slice(&content[at..end]);
+                }
+            }
+        }
+    }
+    std::fs::remove_dir_all(&folder).unwrap();
 }

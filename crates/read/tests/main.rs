@@ -6,6 +6,7 @@ mod read_assets;
 mod read_cells;
 mod read_columns;
 mod read_copc;
+mod read_dicom;
 mod read_e57;
 #[cfg(all(feature = "off", feature = "gltf"))]
 mod read_gltf;

@@ -204,7 +204,7 @@ fn folders_are_named_by_what_they_hold_and_missing_files_by_their_name() {
     };
     let refused = |path: PathBuf| file(&path, &ReadParams::default(), None).unwrap_err();
     let slices = refused(within("ct", "IM0001", &[&[0; 128][..], b"DICM"].concat()));
-    assert!(slices.found.contains("DICOM slices") && slices.hint.contains("dcm2niix"), "{slices}");
+    assert!(slices.expected.contains("slices of DICOM") && slices.hint.contains("dcm2niix"), "{slices}");
     let chunks = refused(within("a.zarr", ".zgroup", b"{}"));
     assert!(chunks.found.contains("Zarr") && chunks.hint.contains("NRRD"), "{chunks}");
     let images = refused(within("stack", "z000.jpg", b"\xff\xd8\xff"));

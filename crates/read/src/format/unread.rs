@@ -36,7 +36,7 @@ const fn by_extension(name: &'static str, extensions: &'static [&'static str], h
     Unread { name, marks: &[], extensions, hint }
 }
 
-const UNREAD: [Unread; 60] = [
+const UNREAD: [Unread; 59] = [
     Unread { name: "FBX", marks: &[(0, b"Kaydara FBX Binary"), (0, b"; FBX ")], extensions: &["fbx"], hint: TO_GLTF },
     Unread {
         name: "USD",
@@ -85,7 +85,6 @@ const UNREAD: [Unread; 60] = [
         hint: TO_NRRD,
     },
     Unread { name: "NetCDF", marks: &[(0, b"CDF\x01"), (0, b"CDF\x02")], extensions: &["nc"], hint: TO_NRRD },
-    Unread { name: "DICOM", marks: &[(128, b"DICM")], extensions: &["dcm", "dicom", "ima"], hint: TO_NRRD },
     by_extension("FreeSurfer", &["mgh", "mgz"], "convert it to NIfTI, such as with mri_convert"),
     by_extension("MRC", &["mrc", "map", "ccp4"], TO_NRRD),
     Unread { name: "NumPy", marks: &[(0, b"\x93NUMPY")], extensions: &["npy", "npz"], hint: TO_NRRD },
@@ -129,7 +128,7 @@ const UNREAD: [Unread; 60] = [
     by_extension("a scene", &["toml", "json"], SCENE),
 ];
 
-const READ: &str = "PLY, .splat, SPZ, STL, OBJ, OFF, glTF, GLB, PCD, XYZ, CSV, LAS, LAZ, E57, NIfTI, NRRD, MetaImage, VTK images, grids, cells, surfaces and lists of these, TIFF stacks, folders of TIFF or PNG slices, raw voxels, \
+const READ: &str = "PLY, .splat, SPZ, STL, OBJ, OFF, glTF, GLB, PCD, XYZ, CSV, LAS, LAZ, E57, NIfTI, NRRD, MetaImage, DICOM series, VTK images, grids, cells, surfaces and lists of these, TIFF stacks, folders of TIFF or PNG slices, raw voxels, \
     Radiance HDR, OpenEXR and PNG files are read, each also inside gzip";
 
 fn error(unread: &Unread) -> ReadError {
@@ -207,13 +206,10 @@ pub fn is_foreign_json(beginning: &[u8]) -> bool {
     json(beginning).is_some()
 }
 
-/// Files of a folder that are looked at.
-const LOOKED_AT: usize = 64;
-
 /// The error for a folder, which may hold slices or chunks of a volume.
 pub(crate) fn folder(path: &Path) -> ReadError {
     let entries = std::fs::read_dir(path).into_iter().flatten().flatten();
-    let mut files: Vec<_> = entries.map(|entry| entry.path()).take(LOOKED_AT).collect();
+    let mut files: Vec<_> = entries.map(|entry| entry.path()).take(crate::LOOKED_AT).collect();
     files.sort();
     let is_named =
         |names: &[&str]| files.iter().any(|f| f.file_name().is_some_and(|name| names.iter().any(|n| name == *n)));
@@ -228,10 +224,6 @@ pub(crate) fn folder(path: &Path) -> ReadError {
     }
     let found = files.iter().find_map(|file| marked(&beginning(file)).or_else(|| by_name(file)));
     let (found, hint) = match found.map(|unread| unread.name) {
-        Some("DICOM") => (
-            "a folder of DICOM slices, which is not read",
-            "make one volume of them: `dcm2niix FOLDER` writes NIfTI, 3D Slicer NRRD",
-        ),
         Some("a JPEG image") => (
             "a folder of JPEG images, which is not read",
             "make one volume of slices, such as a TIFF stack with Fiji (File > Import > Image Sequence, File > Save As > Tiff)",
@@ -242,7 +234,7 @@ pub(crate) fn folder(path: &Path) -> ReadError {
 }
 
 /// The first bytes of a file, those that tell its format; none of what cannot be read.
-fn beginning(path: &Path) -> Vec<u8> {
+pub(crate) fn beginning(path: &Path) -> Vec<u8> {
     let mut head = Vec::new();
     // Asked before opening: opening a FIFO waits for its writer.
     if std::fs::metadata(path).is_ok_and(|meta| meta.is_file())

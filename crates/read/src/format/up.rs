@@ -1,6 +1,8 @@
 //! Which axis of a file points up, where its format says so.
 
-use crate::{Format, format_of};
+use crate::format::folder;
+use crate::volumes::dicom::is_dicom;
+use crate::{Format, LOOKED_AT, format_of};
 use flate2::bufread::MultiGzDecoder;
 use splat_core::UpAxis;
 use std::fs::File;
@@ -23,7 +25,13 @@ pub fn up_axis(path: &Path) -> UpAxis {
 
 fn beginning(path: &Path) -> Option<Vec<u8>> {
     // Asked before opening: opening a FIFO waits for its writer.
-    if !std::fs::metadata(path).ok()?.is_file() {
+    let about = std::fs::metadata(path).ok()?;
+    if about.is_dir() {
+        // Slices of DICOM lie in a patient's space.
+        let files = folder::files(path).ok()?;
+        return files.iter().take(LOOKED_AT).find_map(|file| beginning(file).filter(|content| is_dicom(content)));
+    }
+    if !about.is_file() {
         return None;
     }
     let mut content = Vec::new();
@@ -39,7 +47,7 @@ fn beginning(path: &Path) -> Option<Vec<u8>> {
 
 fn of_content(path: &Path, content: &[u8]) -> Option<UpAxis> {
     match format_of(path, content)? {
-        Format::Las | Format::E57 | Format::Nifti | Format::MetaImage => Some(UpAxis::Z),
+        Format::Las | Format::E57 | Format::Dicom | Format::Nifti | Format::MetaImage => Some(UpAxis::Z),
         Format::Nrrd if is_of_a_body(content) => Some(UpAxis::Z),
         Format::Splat => Some(UpAxis::MinusY),
         Format::Ply if has_gaussians(content) => Some(UpAxis::MinusY),

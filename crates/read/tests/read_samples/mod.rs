@@ -3,6 +3,7 @@
 
 pub(crate) mod cells;
 pub(crate) mod copc;
+pub(crate) mod dicom;
 pub(crate) mod e57;
 pub(crate) mod gaussians;
 pub(crate) mod grids;

@@ -1,0 +1,368 @@
+//! DICOM: a series of slices, a file each in one folder → a volume in right, anterior, superior, of the values that slope and intercept make of the numbers
+//! (of CT these are Hounsfield units).
+//!
+//! Slices lie where `ImagePositionPatient` says; they have to lie at equal steps along a line, which may be tilted. The parser is written here because
+//! `dicom-object` 0.10 takes up to 4 GiB for a damaged length.
+
+mod elements;
+
+use super::lattice;
+use crate::ReadParams;
+use crate::error::{Place, ReadError};
+use crate::points::extras::LONGEST_NAME;
+use crate::reading::Reading;
+use crate::stream::input::{self, Stream};
+use crate::volumes::selection::Selection;
+pub(crate) use elements::is_dicom;
+use elements::{DAMAGED, Elements, Tag};
+use splat_core::Grid;
+use splat_core::glam::{DMat3, DVec3};
+use splat_core::text::{counted, escaped};
+use std::path::{Path, PathBuf};
+
+const HINT: &str = "convert the series, such as with `dcm2niix FOLDER`, which writes NIfTI";
+
+/// How the axes of a patient in DICOM, to the left and to the back, point along right, anterior and superior.
+const SIGNS: DVec3 = DVec3::new(-1.0, -1.0, 1.0);
+/// How far a slice may lie from its place between the others, over the step: positions are written with few digits.
+const SAME_PLACE: f64 = 0.02;
+/// How far directions of slices may differ, over their length.
+const SAME_DIRECTION: f64 = 1e-3;
+/// How far a slice may lie from the line of the others, over the step.
+const OFF_LINE: f64 = 0.1;
+/// Sine of the tilt from which it is told.
+const TILT: f64 = 1e-3;
+/// Most pixels along a side.
+const LONGEST: u16 = 16384;
+/// Bytes that tell the format.
+const HEAD: usize = 132;
+/// Bytes of memory that a slice takes until its numbers are read.
+const BYTES_OF_A_SLICE: u64 = 512;
+/// Most series that are named.
+const MOST_NAMED: usize = 8;
+
+const DESCRIPTION: Tag = Tag(0x08, 0x103e);
+const SERIES: Tag = Tag(0x20, 0x0e);
+const NUMBER: Tag = Tag(0x20, 0x13);
+const POSITION: Tag = Tag(0x20, 0x32);
+const ORIENTATION: Tag = Tag(0x20, 0x37);
+const SAMPLES: Tag = Tag(0x28, 0x02);
+const MEANING: Tag = Tag(0x28, 0x04);
+const FRAMES: Tag = Tag(0x28, 0x08);
+const ROWS: Tag = Tag(0x28, 0x10);
+const COLUMNS: Tag = Tag(0x28, 0x11);
+const SPACING: Tag = Tag(0x28, 0x30);
+const ALLOCATED: Tag = Tag(0x28, 0x100);
+const STORED: Tag = Tag(0x28, 0x101);
+const HIGHEST: Tag = Tag(0x28, 0x102);
+const IS_SIGNED: Tag = Tag(0x28, 0x103);
+const INTERCEPT: Tag = Tag(0x28, 0x1052);
+const SLOPE: Tag = Tag(0x28, 0x1053);
+
+/// What a file says of its slice.
+#[derive(Debug, Clone)]
+struct Slice {
+    file: PathBuf,
+    series: String,
+    description: String,
+    number: i64,
+    columns: u16,
+    rows: u16,
+    position: DVec3,
+    /// Steps from column to column and from row to row.
+    along_row: DVec3,
+    along_column: DVec3,
+    is_inverted: bool,
+}
+
+/// How its numbers are stored.
+struct Numbers {
+    bytes: usize,
+    /// Bits of a number, and bits below them.
+    bits: u32,
+    below: u32,
+    is_signed: bool,
+    slope: f64,
+    intercept: f64,
+}
+
+/// Reads the series of a folder that `params` name, else the one of most slices; of a file its own.
+pub(crate) fn read(files: Vec<PathBuf>, named: Option<&Path>, reading: &mut Reading<'_>) -> Result<Grid, ReadError> {
+    let mut slices: Vec<Slice> = Vec::new();
+    let mut own = None;
+    for file in files {
+        reading.go_on()?;
+        input::hold("the slices", (slices.len() as u64 + 1) * BYTES_OF_A_SLICE, reading.params)?;
+        let Some(slice) =
+            with_elements(&file, reading.params, |elements| slice(&file, elements)).map_err(|e| in_file(&file, e))?
+        else {
+            reading.notes.not_used([format!("file {}", name(&file)).as_bytes()]);
+            continue;
+        };
+        if named.is_some_and(|named| named.file_name() == file.file_name()) {
+            own = Some(slice.series.clone());
+        }
+        slices.push(slice);
+    }
+    if let (Some(named), None) = (named, &own) {
+        let found = format!("'{}', which has none", name(named));
+        return Err(ReadError::input(
+            Place::File,
+            "a DICOM file with a picture and the mark DICM at byte 128",
+            found,
+            HINT,
+        ));
+    }
+    let slices = of_series(slices, own, reading)?;
+    let slices = of_frame(slices, reading)?;
+    let (origin, axes) = placed(&slices, reading)?;
+    let first = &slices[0];
+    let dims = [first.columns.into(), first.rows.into(), slices.len()];
+    let count = dims[0] * dims[1];
+    lattice::check(origin, &axes, Place::File, HINT)?;
+    if first.is_inverted {
+        reading.notes.remark("low numbers are bright (MONOCHROME1): they are read as they are stored");
+    }
+    input::hold("a slice", 8 * count as u64, reading.params)?;
+    input::hold("the voxels", (4 * count * slices.len()) as u64, reading.params)?;
+    let mut values = Vec::new();
+    input::reserve(&mut values, count * slices.len())?;
+    for slice in &slices {
+        reading.go_on()?;
+        let read = with_elements(&slice.file, reading.params, |elements| {
+            let numbers = numbers(elements)?;
+            let pixels = elements.pixels(count, numbers.bytes)?;
+            values.extend(pixels.chunks_exact(numbers.bytes).map(|stored| numbers.value(stored)));
+            Ok(())
+        });
+        read.map_err(|e| in_file(&slice.file, e))?;
+    }
+    super::voxels::check_finite(&values).map_err(|(_, error)| error)?;
+    Ok(Grid { origin: SIGNS * origin, axes: DMat3::from_diagonal(SIGNS) * axes, dims, values })
+}
+
+/// What is made of the elements of a file, whose memory comes back after it; `T::default()` of a file of another format.
+fn with_elements<T: Default>(
+    file: &Path,
+    params: &ReadParams,
+    made: impl FnOnce(&Elements<'_>) -> Result<T, ReadError>,
+) -> Result<T, ReadError> {
+    let params = ReadParams { memory: params.memory.part(), ..params.clone() };
+    let mut stream = Stream::open(file, &params)?;
+    if !is_dicom(stream.peek(HEAD)?) {
+        return Ok(T::default());
+    }
+    let content = stream.rest()?;
+    made(&Elements::of(&content)?)
+}
+
+/// The slice of a file; `None` of one without a picture.
+fn slice(file: &Path, elements: &Elements<'_>) -> Result<Option<Slice>, ReadError> {
+    if !elements.has_pixels() {
+        return Ok(None);
+    }
+    let missing = |what: &str| ReadError::input(Place::File, what, "none, or another one", HINT);
+    if let Some(frames) = elements.text(FRAMES).filter(|frames| frames != "1") {
+        let found = format!("{} of them", escaped(frames.as_bytes(), 12));
+        return Err(ReadError::input(Place::File, "one frame a file", found, HINT));
+    }
+    let meaning = elements.text(MEANING).unwrap_or_default();
+    let is_grey = elements.short(SAMPLES).is_none_or(|samples| samples == 1) && meaning.starts_with("MONOCHROME");
+    if !is_grey {
+        let found = format!("{} as PhotometricInterpretation", escaped(meaning.as_bytes(), 20));
+        return Err(ReadError::input(Place::File, "one number a pixel", found, HINT));
+    }
+    let side = |tag| elements.short(tag).filter(|side| (1..=LONGEST).contains(side));
+    let columns = side(COLUMNS).ok_or_else(|| missing("Columns from 1 to 16384"))?;
+    let rows = side(ROWS).ok_or_else(|| missing("Rows from 1 to 16384"))?;
+    let position = elements.numbers(POSITION).ok_or_else(|| missing("three numbers of ImagePositionPatient"))?;
+    let [a, b, c, d, e, f] =
+        elements.numbers(ORIENTATION).ok_or_else(|| missing("six numbers of ImageOrientationPatient"))?;
+    let [row, column] = [DVec3::new(a, b, c), DVec3::new(d, e, f)];
+    let is_square =
+        [row.length(), column.length()].iter().all(|n| (n - 1.0).abs() < 0.01) && row.dot(column).abs() < 0.01;
+    if !is_square {
+        return Err(missing("two directions at right angles as ImageOrientationPatient"));
+    }
+    let [between_rows, between_columns] =
+        elements.numbers(SPACING).ok_or_else(|| missing("two numbers of PixelSpacing"))?;
+    if !(between_rows > 0.0 && between_columns > 0.0) {
+        return Err(missing("a PixelSpacing above 0"));
+    }
+    let stored = numbers(elements)?;
+    elements.check_room(usize::from(columns) * usize::from(rows), stored.bytes)?;
+    Ok(Some(Slice {
+        file: file.to_owned(),
+        series: elements.text(SERIES).unwrap_or_default(),
+        description: elements.text(DESCRIPTION).unwrap_or_default(),
+        number: elements.text(NUMBER).and_then(|number| number.parse().ok()).unwrap_or(0),
+        columns,
+        rows,
+        position: DVec3::from_array(position),
+        along_row: row * between_columns,
+        along_column: column * between_rows,
+        is_inverted: meaning == "MONOCHROME1",
+    }))
+}
+
+/// How the numbers of a file are stored.
+fn numbers(elements: &Elements<'_>) -> Result<Numbers, ReadError> {
+    let allocated = elements.short(ALLOCATED).unwrap_or(0);
+    let bits = elements.short(STORED).unwrap_or(allocated);
+    let highest = elements.short(HIGHEST).unwrap_or(bits.saturating_sub(1));
+    let is_whole = [8, 16, 32].contains(&allocated) && (1..=allocated).contains(&bits);
+    if !(is_whole && highest < allocated && highest + 1 >= bits) {
+        let found = format!("{bits} of {allocated}, the highest {highest}");
+        return Err(ReadError::input(Place::File, "bits of a number within 8, 16 or 32", found, DAMAGED));
+    }
+    let number = |tag, usual| match elements.text(tag) {
+        None => Ok(usual),
+        Some(_) => elements.numbers(tag).map(|[number]: [f64; 1]| number).ok_or_else(|| {
+            ReadError::input(Place::File, "a finite RescaleSlope and RescaleIntercept", "another text", DAMAGED)
+        }),
+    };
+    let slope = number(SLOPE, 1.0)?;
+    let intercept = number(INTERCEPT, 0.0)?;
+    let is_signed = elements.short(IS_SIGNED) == Some(1);
+    let below = u32::from(highest + 1 - bits);
+    Ok(Numbers { bytes: usize::from(allocated / 8), bits: bits.into(), below, is_signed, slope, intercept })
+}
+
+impl Numbers {
+    fn value(&self, stored: &[u8]) -> f32 {
+        let whole = stored.iter().rev().fold(0u64, |n, byte| n << 8 | u64::from(*byte));
+        // To the top of the word and back, which leaves out other bits and continues the sign.
+        let top = whole << (64 - self.bits - self.below);
+        let number = if self.is_signed {
+            (top.cast_signed() >> (64 - self.bits)) as f64
+        } else {
+            (top >> (64 - self.bits)) as f64
+        };
+        (number * self.slope + self.intercept) as f32
+    }
+}
+
+/// The slices of the series that is asked for.
+fn of_series(slices: Vec<Slice>, own: Option<String>, reading: &mut Reading<'_>) -> Result<Vec<Slice>, ReadError> {
+    let mut series: Vec<(String, String, usize)> = Vec::new();
+    for slice in &slices {
+        match series.iter_mut().find(|(known, _, _)| *known == slice.series) {
+            Some((_, _, count)) => *count += 1,
+            None => series.push((slice.series.clone(), slice.description.clone(), 1)),
+        }
+    }
+    // Those of most slices first, in the order of their names where they are alike.
+    series.sort_by(|a, b| (b.2, &a.0).cmp(&(a.2, &b.0)));
+    let told = |(uid, description, count): &(String, String, usize)| {
+        let description = escaped(description.as_bytes(), LONGEST_NAME);
+        format!("{} ({description}, {})", escaped(uid.as_bytes(), 64), counted(*count as u64, "slice"))
+    };
+    let all = || series.iter().take(MOST_NAMED).map(told).collect::<Vec<_>>().join(", ");
+    let asked = reading.params.array.as_ref();
+    let found = series.iter().find(|(uid, description, _)| match (asked, &own) {
+        (Some(asked), _) => asked == uid || asked == description,
+        (None, Some(own)) => own == uid,
+        (None, None) => true,
+    });
+    let Some(chosen) = found else {
+        let Some(asked) = asked else {
+            return Err(ReadError::input(Place::File, "slices of DICOM", "none", HINT));
+        };
+        let found = format!("'{}'", escaped(asked.as_bytes(), 64));
+        return Err(ReadError::input(Place::File, format!("a series among {}", all()), found, "choose one of these"));
+    };
+    if series.len() > 1 {
+        let others: Vec<String> = series.iter().filter(|one| one.0 != chosen.0).take(MOST_NAMED).map(told).collect();
+        let others = others.join(", ");
+        reading.notes.remark(format!(
+            "series {} is drawn; `array` of a scene or --color-by chooses another: {others}",
+            told(chosen)
+        ));
+    } else {
+        reading.notes.remark(format!("series {}", told(chosen)));
+    }
+    let uid = chosen.0.clone();
+    Ok(slices.into_iter().filter(|slice| slice.series == uid).collect())
+}
+
+/// The slices of one time, in their order along the normal: where several lie at each place, they are a series of times.
+fn of_frame(mut slices: Vec<Slice>, reading: &mut Reading<'_>) -> Result<Vec<Slice>, ReadError> {
+    let first = slices[0].clone();
+    let alike = |slice: &Slice| {
+        let near = |a: DVec3, b: DVec3| a.distance(b) <= SAME_DIRECTION * a.length();
+        [slice.columns, slice.rows] == [first.columns, first.rows]
+            && near(first.along_row, slice.along_row)
+            && near(first.along_column, slice.along_column)
+    };
+    if let Some(other) = slices.iter().find(|slice| !alike(slice)) {
+        let expected = format!("slices of one size, spacing and direction, as '{}' has them", name(&first.file));
+        return Err(ReadError::input(Place::File, expected, format!("others in '{}'", name(&other.file)), HINT));
+    }
+    let normal = first.along_row.cross(first.along_column).normalize_or_zero();
+    let depth = |slice: &Slice| slice.position.dot(normal);
+    slices.sort_by(|a, b| depth(a).total_cmp(&depth(b)).then(a.number.cmp(&b.number)).then(a.file.cmp(&b.file)));
+    let thickness = first.along_row.length();
+    let mut places: Vec<Vec<Slice>> = Vec::new();
+    for slice in slices {
+        match places.last_mut().filter(|place| depth(&slice) - depth(&place[0]) <= 1e-4 * thickness) {
+            Some(place) => place.push(slice),
+            None => places.push(vec![slice]),
+        }
+    }
+    let times = places[0].len();
+    if let Some(other) = places.iter().find(|place| place.len() != times) {
+        let more = if other.len() > times { other } else { &places[0] };
+        let [a, b] = [&more[0], more.last().unwrap_or(&more[0])].map(|slice| name(&slice.file));
+        let expected = "one slice at each place, or as many at each";
+        return Err(ReadError::input(Place::File, expected, format!("'{a}' and '{b}' at one place"), HINT));
+    }
+    let frame = Selection::of_frames(times as u64, Place::File, reading.params, &mut reading.notes)?.frame as usize;
+    Ok(places.into_iter().map(|mut place| place.swap_remove(frame)).collect())
+}
+
+/// Where the slices lie: the place of the first voxel and the steps, in the directions of DICOM.
+fn placed(slices: &[Slice], reading: &mut Reading<'_>) -> Result<(DVec3, DMat3), ReadError> {
+    let [first, .., last] = slices else {
+        let hint = "name the folder in which the other slices of the series lie";
+        return Err(ReadError::input(Place::File, "two slices or more", "one", hint));
+    };
+    let gaps: Vec<f64> = slices.windows(2).map(|pair| pair[1].position.distance(pair[0].position)).collect();
+    let mut sorted = gaps.clone();
+    sorted.sort_by(f64::total_cmp);
+    let usual = sorted[sorted.len() / 2];
+    if let Some(i) = gaps.iter().position(|gap| (gap - usual).abs() > SAME_PLACE * usual) {
+        let [a, b] = [&slices[i], &slices[i + 1]].map(|slice| name(&slice.file));
+        let found = format!("{} between '{a}' and '{b}'", super::rounded(gaps[i]));
+        let expected = format!("slices at equal steps of {}", super::rounded(usual));
+        let hint = "fetch the slices that are missing, or convert the series with dcm2niix";
+        return Err(ReadError::input(Place::File, expected, found, hint));
+    }
+    let step = (last.position - first.position) / gaps.len() as f64;
+    let is_off =
+        |(i, slice): &(usize, &Slice)| slice.position.distance(first.position + step * *i as f64) > OFF_LINE * usual;
+    if let Some((_, other)) = slices.iter().enumerate().find(is_off) {
+        let found = format!("'{}' beside it", name(&other.file));
+        return Err(ReadError::input(Place::File, "slices along one line", found, HINT));
+    }
+    let normal = first.along_row.cross(first.along_column).normalize_or_zero();
+    let sine = (step - normal * step.dot(normal)).length() / step.length();
+    if sine > TILT {
+        let degrees = super::rounded(libm::asin(sine.min(1.0)).to_degrees());
+        reading.notes.remark(format!("slices are tilted by {degrees} degrees, as by a gantry: voxels are sheared"));
+    }
+    reading.notes.remark("space: left-posterior-superior, converted to right-anterior-superior");
+    Ok((first.position, DMat3::from_cols(first.along_row, first.along_column, step)))
+}
+
+/// The error of one file, which names it.
+fn in_file(file: &Path, error: ReadError) -> ReadError {
+    if error.fault == crate::Fault::Cancelled {
+        return error;
+    }
+    let expected = format!("the slice '{}': {}", name(file), error.expected);
+    ReadError { expected, ..error }
+}
+
+fn name(path: &Path) -> String {
+    path.file_name().map(|name| escaped(name.as_encoded_bytes(), 60)).unwrap_or_default()
+}

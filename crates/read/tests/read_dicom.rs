@@ -1,0 +1,119 @@
+//! Series of DICOM: order, places, values, and what is refused.
+
+use crate::read_samples::dicom::Dicom;
+use read::{Fault, Loaded, Notes, ReadError, ReadParams, file};
+use splat_core::glam::DVec3;
+use splat_core::{Grid, UpAxis};
+use std::path::{Path, PathBuf};
+
+fn folder(name: &str, slices: &[Dicom]) -> PathBuf {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("dicom-{name}"));
+    // It is not there at the first run.
+    let _ = std::fs::remove_dir_all(&folder);
+    std::fs::create_dir_all(&folder).unwrap();
+    for (i, slice) in slices.iter().enumerate() {
+        std::fs::write(folder.join(format!("IM{i}")), slice.bytes()).unwrap();
+    }
+    folder
+}
+
+fn read(path: &Path, params: &ReadParams) -> Result<(Grid, Notes), ReadError> {
+    file(path, params, None).map(|(loaded, notes)| match loaded {
+        Loaded::Grid(grid) => (grid, notes),
+        _ => panic!("a volume"),
+    })
+}
+
+fn volume(path: &Path) -> (Grid, Notes) {
+    read(path, &ReadParams::default()).unwrap_or_else(|e| panic!("{e}"))
+}
+
+fn refused(name: &str, slices: &[Dicom]) -> String {
+    let error = read(&folder(name, slices), &ReadParams::default()).unwrap_err();
+    assert_eq!(error.fault, Fault::Input, "{error}");
+    error.to_string()
+}
+
+#[test]
+fn slices_lie_in_the_order_of_their_places_with_hounsfield_units() {
+    let expected: Vec<f32> = (-2..22).map(|v| 2.0 * v as f32 - 1000.0).collect();
+    for (syntax, bits) in [(".1", [16, 12]), ("", [16, 16]), (".5", [16, 12]), (".5", [8, 8]), (".1", [32, 20])] {
+        // The names have another order than the places.
+        let slices = [2, 0, 3, 1].map(|rank| Dicom { syntax, bits, ..Dicom::at(rank) });
+        let path = folder("order", &slices);
+        let (grid, notes) = volume(&path);
+        assert_eq!(grid.values, expected, "{syntax} {bits:?}");
+        assert_eq!((grid.dims, grid.origin), ([3, 2, 4], DVec3::new(-10.0, -20.0, 30.0)));
+        let axes = [grid.axes.x_axis, grid.axes.y_axis, grid.axes.z_axis];
+        assert_eq!(axes, [DVec3::new(-0.25, 0.0, 0.0), DVec3::new(0.0, -0.5, 0.0), DVec3::new(0.0, 0.0, 1.5)]);
+        assert_eq!((notes.format.as_str(), notes.remarks[0].as_str()), ("Dicom", "series 1.2.3 (head, 4 slices)"));
+        assert_eq!(read::stated_up_axis(&path), Some(UpAxis::Z));
+        // One file stands for its series.
+        assert_eq!(volume(&path.join("IM2")).0, grid);
+    }
+}
+
+#[test]
+fn of_several_series_the_one_of_most_slices_is_read_or_the_one_that_is_named() {
+    let other = |rank| Dicom { series: "1.2.4", description: "bone", ..Dicom::at(rank) };
+    let path = folder("series", &[Dicom::at(0), other(0), other(1), other(2), Dicom::at(1)]);
+    std::fs::write(path.join("notes.txt"), "of the day").unwrap();
+    let (grid, notes) = volume(&path);
+    assert_eq!((grid.dims[2], notes.unused), (3, vec!["file notes.txt".to_owned()]));
+    assert_eq!(
+        notes.remarks[0],
+        "series 1.2.4 (bone, 3 slices) is drawn; `array` of a scene or --color-by chooses another: 1.2.3 (head, 2 slices)"
+    );
+    for name in ["1.2.3", "head"] {
+        let params = ReadParams { array: Some(name.to_owned()), ..ReadParams::default() };
+        assert_eq!(read(&path, &params).unwrap().0.dims[2], 2);
+    }
+    assert_eq!(volume(&path.join("IM0")).0.dims[2], 2);
+    let error = read(&path, &ReadParams { array: Some("lung".to_owned()), ..ReadParams::default() }).unwrap_err();
+    assert!(
+        error
+            .to_string()
+            .contains("expected a series among 1.2.4 (bone, 3 slices), 1.2.3 (head, 2 slices), found 'lung'"),
+        "{error}"
+    );
+    let twice: Vec<Dicom> = [0, 1, 0, 1]
+        .into_iter()
+        .enumerate()
+        .map(|(i, rank)| Dicom { number: i as u32, values: vec![i as i32; 6], ..Dicom::at(rank) })
+        .collect();
+    let path = folder("times", &twice);
+    let second = read(&path, &ReadParams { frame: 1, ..ReadParams::default() }).unwrap().0;
+    assert_eq!([second.values[0], second.values[6]], [-996.0, -994.0]);
+    assert_eq!(volume(&path).0.values[0], -1000.0);
+}
+
+#[test]
+fn tilted_slices_are_sheared_and_gaps_and_other_slices_are_refused() {
+    let tilted: Vec<Dicom> =
+        (0..3).map(|i| Dicom { position: [0.0, 0.5 * f64::from(i), f64::from(i)], ..Dicom::at(i) }).collect();
+    let (grid, notes) = volume(&folder("tilted", &tilted));
+    assert_eq!(grid.axes.z_axis, DVec3::new(0.0, -0.5, 1.0));
+    assert!(notes.remarks.iter().any(|r| r.contains("tilted by 26.5651 degrees")), "{:?}", notes.remarks);
+    let [a, b, c, d] = [0, 1, 2, 4].map(Dicom::at);
+    let said = refused("gap", &[a.clone(), b.clone(), c.clone(), d]);
+    assert!(said.contains("expected slices at equal steps of 1.5, found 3 between 'IM2' and 'IM3'"), "{said}");
+    assert!(refused("double", &[a.clone(), b.clone(), b.clone()]).contains("'IM1' and 'IM2' at one place"));
+    assert!(refused("one", &[a.clone()]).contains("expected two slices or more, found one"));
+    let turned = Dicom { orientation: "0\\1\\0\\1\\0\\0", ..c.clone() };
+    assert!(refused("turned", &[a.clone(), b.clone(), turned]).contains("others in 'IM2'"));
+    for (slice, said) in [
+        (
+            Dicom { syntax: ".4.70", ..a.clone() },
+            "packed as JPEG, JPEG 2000 or a movie (1.2.840.10008.1.2.4.70)\nhint: convert the series, such as with `dcm2niix",
+        ),
+        (Dicom { syntax: ".2", ..a.clone() }, "big endian"),
+        (Dicom { frames: "20", ..a.clone() }, "expected the slice 'IM0': one frame a file, found 20 of them"),
+        (Dicom { meaning: "RGB", ..a.clone() }, "RGB as PhotometricInterpretation"),
+        (Dicom { orientation: "1\\0\\0\\1\\0\\0", ..a.clone() }, "two directions at right angles"),
+        (Dicom { orientation: "1\\0\\0", ..a.clone() }, "six numbers of ImageOrientationPatient"),
+        (Dicom { values: vec![0; 5], ..a.clone() }, "expected the slice 'IM0': 12 bytes of pixels, found 10"),
+    ] {
+        let error = refused("other", &[slice, b.clone()]);
+        assert!(error.contains(said), "{error}");
+    }
+}
