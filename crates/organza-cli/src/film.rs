@@ -128,7 +128,8 @@ impl Film {
         }
         let Some(started) = &mut self.started else { return Ok(()) };
         if started.size != size {
-            let [[width, height], [found, tall]] = [started.size, size];
+            let [width, height] = started.size;
+            let [found, tall] = size;
             let message =
                 format!("{}: frames of a film have one size: {width}x{height}, found {found}x{tall}", printable(&path));
             return Err(Error::usage(message, "let no track change `camera.size`, or write numbered pictures"));

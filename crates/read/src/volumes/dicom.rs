@@ -89,7 +89,7 @@ struct Numbers {
 /// Reads the series of a folder that `params` name, else the one of most slices; of a file its own.
 pub(crate) fn read(files: Vec<PathBuf>, named: Option<&Path>, reading: &mut Reading<'_>) -> Result<Grid, ReadError> {
     let mut slices: Vec<Slice> = Vec::new();
-    let mut own = None;
+    let mut series_of_file = None;
     for file in files {
         reading.go_on()?;
         input::hold("the slices", (slices.len() as u64 + 1) * BYTES_OF_A_SLICE, reading.params)?;
@@ -100,11 +100,11 @@ pub(crate) fn read(files: Vec<PathBuf>, named: Option<&Path>, reading: &mut Read
             continue;
         };
         if named.is_some_and(|named| named.file_name() == file.file_name()) {
-            own = Some(slice.series.clone());
+            series_of_file = Some(slice.series.clone());
         }
         slices.push(slice);
     }
-    if let (Some(named), None) = (named, &own) {
+    if let (Some(named), None) = (named, &series_of_file) {
         let found = format!("'{}', which has none", name(named));
         return Err(ReadError::input(
             Place::File,
@@ -113,7 +113,7 @@ pub(crate) fn read(files: Vec<PathBuf>, named: Option<&Path>, reading: &mut Read
             HINT,
         ));
     }
-    let slices = of_series(slices, own, reading)?;
+    let slices = of_series(slices, series_of_file, reading)?;
     let slices = of_frame(slices, reading)?;
     let (origin, axes) = placed(&slices, reading)?;
     let first = &slices[0];
@@ -243,7 +243,11 @@ impl Numbers {
 }
 
 /// The slices of the series that is asked for.
-fn of_series(slices: Vec<Slice>, own: Option<String>, reading: &mut Reading<'_>) -> Result<Vec<Slice>, ReadError> {
+fn of_series(
+    slices: Vec<Slice>,
+    series_of_file: Option<String>,
+    reading: &mut Reading<'_>,
+) -> Result<Vec<Slice>, ReadError> {
     let mut series: Vec<(String, String, usize)> = Vec::new();
     for slice in &slices {
         match series.iter_mut().find(|(known, _, _)| *known == slice.series) {
@@ -257,11 +261,11 @@ fn of_series(slices: Vec<Slice>, own: Option<String>, reading: &mut Reading<'_>)
         let description = escaped(description.as_bytes(), LONGEST_NAME);
         format!("{} ({description}, {})", escaped(uid.as_bytes(), 64), counted(*count as u64, "slice"))
     };
-    let all = || series.iter().take(MOST_NAMED).map(told).collect::<Vec<_>>().join(", ");
+    let listed = || series.iter().take(MOST_NAMED).map(told).collect::<Vec<_>>().join(", ");
     let asked = reading.params.array.as_ref();
-    let found = series.iter().find(|(uid, description, _)| match (asked, &own) {
+    let found = series.iter().find(|(uid, description, _)| match (asked, &series_of_file) {
         (Some(asked), _) => asked == uid || asked == description,
-        (None, Some(own)) => own == uid,
+        (None, Some(series)) => series == uid,
         (None, None) => true,
     });
     let Some(chosen) = found else {
@@ -269,10 +273,16 @@ fn of_series(slices: Vec<Slice>, own: Option<String>, reading: &mut Reading<'_>)
             return Err(ReadError::input(Place::File, "slices of DICOM", "none", HINT));
         };
         let found = format!("'{}'", escaped(asked.as_bytes(), 64));
-        return Err(ReadError::input(Place::File, format!("a series among {}", all()), found, "choose one of these"));
+        return Err(ReadError::input(
+            Place::File,
+            format!("a series among {}", listed()),
+            found,
+            "choose one of these",
+        ));
     };
     if series.len() > 1 {
-        let others: Vec<String> = series.iter().filter(|one| one.0 != chosen.0).take(MOST_NAMED).map(told).collect();
+        let others: Vec<String> =
+            series.iter().filter(|other| other.0 != chosen.0).take(MOST_NAMED).map(told).collect();
         let others = others.join(", ");
         reading.notes.remark(format!(
             "series {} is drawn; `array` of a scene or --color-by chooses another: {others}",
