@@ -98,7 +98,7 @@ fn tilted_slices_are_sheared_and_gaps_and_other_slices_are_refused() {
     let said = refused("gap", &[a.clone(), b.clone(), c.clone(), d]);
     assert!(said.contains("expected slices at equal steps of 1.5, found 3 between 'IM2' and 'IM3'"), "{said}");
     assert!(refused("double", &[a.clone(), b.clone(), b.clone()]).contains("'IM1' and 'IM2' at one place"));
-    assert!(refused("one", &[a.clone()]).contains("expected two slices or more, found one"));
+    assert!(refused("one", std::slice::from_ref(&a)).contains("expected two slices or more, found one"));
     let turned = Dicom { orientation: "0\\1\\0\\1\\0\\0", ..c.clone() };
     assert!(refused("turned", &[a.clone(), b.clone(), turned]).contains("others in 'IM2'"));
     for (slice, said) in [

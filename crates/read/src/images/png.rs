@@ -21,7 +21,8 @@ const MARK: usize = 8;
 const DAMAGED: &str = "the file is truncated or damaged; save it anew, as PNG of 8 or 16 bits";
 
 pub(crate) fn read(content: &[u8], reading: &mut Reading<'_>) -> Result<RadianceImage, ReadError> {
-    let (decoder, [width, height]) = opened(content, reading)?;
+    let decoder = opened(content, reading)?;
+    let (width, height) = decoder.dimensions();
     // Two copies exist at a time: the decoded image, and the same with four channels of 16 bits.
     let pixels = u64::from(width) * u64::from(height);
     hold("the decoded image", decoder.total_bytes().saturating_add(8 * pixels), reading.params)?;
@@ -52,19 +53,20 @@ pub(crate) fn read(content: &[u8], reading: &mut Reading<'_>) -> Result<Radiance
 }
 
 /// The decoder of an image whose size is checked.
-fn opened<'c>(content: &'c [u8], reading: &Reading<'_>) -> Result<(PngDecoder<Cursor<&'c [u8]>>, [u32; 2]), ReadError> {
+fn opened<'c>(content: &'c [u8], reading: &Reading<'_>) -> Result<PngDecoder<Cursor<&'c [u8]>>, ReadError> {
     let decoder = PngDecoder::new(Cursor::new(content)).map_err(damaged)?;
     let (width, height) = decoder.dimensions();
     check_image([width, height], reading.params)?;
     // Rows are packed in whole bytes: a mask of black and white has one bit a pixel.
     let row = u64::from(width) * u64::from(decoder.original_color_type().bits_per_pixel());
     check_deflated(row.div_ceil(8) * u64::from(height), content.len() as u64, "the packed image")?;
-    Ok((decoder, [width, height]))
+    Ok(decoder)
 }
 
 /// Reads one slice of a volume: its numbers as they are stored.
 pub(crate) fn slice(content: &[u8], reading: &mut Reading<'_>) -> Result<Slice, ReadError> {
-    let (decoder, size) = opened(content, reading)?;
+    let decoder = opened(content, reading)?;
+    let size = <[u32; 2]>::from(decoder.dimensions());
     hold("the decoded image", 2 * decoder.total_bytes(), reading.params)?;
     // Profiles and gammas are of displays; the numbers are what counts.
     chunks(content)?;

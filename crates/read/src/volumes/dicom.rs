@@ -104,7 +104,7 @@ pub(crate) fn read(files: Vec<PathBuf>, named: Option<&Path>, reading: &mut Read
         }
         slices.push(slice);
     }
-    if let (Some(named), None) = (named, &series_of_file) {
+    if let Some(named) = named.filter(|_| series_of_file.is_none()) {
         let found = format!("'{}', which has none", name(named));
         return Err(ReadError::input(
             Place::File,
@@ -137,7 +137,7 @@ pub(crate) fn read(files: Vec<PathBuf>, named: Option<&Path>, reading: &mut Read
         });
         read.map_err(|e| in_file(&slice.file, e))?;
     }
-    super::voxels::check_finite(&values).map_err(|(_, error)| error)?;
+    super::voxels::check_finite(&values, |_| Place::File)?;
     Ok(Grid { origin: SIGNS * origin, axes: DMat3::from_diagonal(SIGNS) * axes, dims, values })
 }
 
@@ -261,11 +261,11 @@ fn of_series(
         let description = escaped(description.as_bytes(), LONGEST_NAME);
         format!("{} ({description}, {})", escaped(uid.as_bytes(), 64), counted(*count as u64, "slice"))
     };
-    let listed = || series.iter().take(MOST_NAMED).map(told).collect::<Vec<_>>().join(", ");
+    let offered = || series.iter().take(MOST_NAMED).map(told).collect::<Vec<_>>().join(", ");
     let asked = reading.params.array.as_ref();
     let found = series.iter().find(|(uid, description, _)| match (asked, &series_of_file) {
         (Some(asked), _) => asked == uid || asked == description,
-        (None, Some(series)) => series == uid,
+        (None, Some(named)) => named == uid,
         (None, None) => true,
     });
     let Some(chosen) = found else {
@@ -275,14 +275,13 @@ fn of_series(
         let found = format!("'{}'", escaped(asked.as_bytes(), 64));
         return Err(ReadError::input(
             Place::File,
-            format!("a series among {}", listed()),
+            format!("a series among {}", offered()),
             found,
             "choose one of these",
         ));
     };
     if series.len() > 1 {
-        let others: Vec<String> =
-            series.iter().filter(|other| other.0 != chosen.0).take(MOST_NAMED).map(told).collect();
+        let others: Vec<String> = series.iter().filter(|one| one.0 != chosen.0).take(MOST_NAMED).map(told).collect();
         let others = others.join(", ");
         reading.notes.remark(format!(
             "series {} is drawn; `array` of a scene or --color-by chooses another: {others}",

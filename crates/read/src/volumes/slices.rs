@@ -119,7 +119,7 @@ pub(crate) fn read(folder: &Path, files: Vec<PathBuf>, reading: &mut Reading<'_>
     let Some((stored, _, width)) = like else {
         return Err(ReadError::input(Place::File, "slices", "none", HINT));
     };
-    voxels::check_finite(&values).map_err(|(_, error)| error)?;
+    voxels::check_finite(&values, |_| Place::File)?;
     let steps = steps(width, reading);
     let (origin, axes) = upright(stored.dims, steps);
     lattice::check(origin, &axes, Place::File, HINT)?;

@@ -32,13 +32,13 @@ enum Plane {
 /// Reads a volume.
 pub(crate) fn read(content: Content, reading: &mut Reading<'_>) -> Result<Grid, ReadError> {
     let mut pages = Pages::open(content)?;
-    let all = pages.list(reading)?;
-    let first = &all[0];
+    let listed = pages.list(reading)?;
+    let first = &listed[0];
     let shape = first.shape;
-    check_alike(&all)?;
+    check_alike(&listed)?;
     let description = Description::of(&mut pages, first)?;
-    let planes = description.planes(all.len() as u64, shape.numbers)?;
-    let slots = slots(&all, &planes, &mut pages)?;
+    let planes = description.planes(listed.len() as u64, shape.numbers)?;
+    let slots = slots(&listed, &planes, &mut pages)?;
     let frame = Selection::of_frames(planes.times.count, Place::File, reading.params, &mut reading.notes)?.frame;
     let (selection, channel) = chosen(shape, planes.channels.count, reading)?;
     if planes.are_times {
@@ -75,16 +75,16 @@ pub(crate) fn read(content: Content, reading: &mut Reading<'_>) -> Result<Grid, 
         };
         voxels::append(&mut values, &numbers, &stored);
     }
-    voxels::check_finite(&values).map_err(|(_, error)| error)?;
+    voxels::check_finite(&values, |_| Place::File)?;
     Ok(Grid { origin, axes, dims: stored.dims.map(|n| n as usize), values })
 }
 
 /// Reads one slice of a folder, a file of one page.
 pub(super) fn slice(content: Content, reading: &mut Reading<'_>) -> Result<Slice, ReadError> {
     let mut pages = Pages::open(content)?;
-    let all = pages.list(reading)?;
-    let [page] = all.as_slice() else {
-        let found = counted(all.len() as u64, "page");
+    let listed = pages.list(reading)?;
+    let [page] = listed.as_slice() else {
+        let found = counted(listed.len() as u64, "page");
         let hint = "name this file alone: its pages are the slices of a volume";
         return Err(ReadError::input(Place::File, "one slice a file, of one page", found, hint));
     };
@@ -106,9 +106,9 @@ pub(super) fn slice(content: Content, reading: &mut Reading<'_>) -> Result<Slice
 }
 
 /// Refuses pages that are not of one size and type.
-fn check_alike(all: &[Page]) -> Result<(), ReadError> {
-    let first = &all[0];
-    let Some(other) = all.iter().find(|page| page.shape != first.shape) else { return Ok(()) };
+fn check_alike(listed: &[Page]) -> Result<(), ReadError> {
+    let first = &listed[0];
+    let Some(other) = listed.iter().find(|page| page.shape != first.shape) else { return Ok(()) };
     let expected = format!("pages like the first, of {}", first.shape);
     let found = format!("{} at page {}", other.shape, other.rank + 1);
     let hint = "save the slices alone, such as with Fiji (Image > Duplicate, File > Save As > Tiff)";
@@ -116,9 +116,9 @@ fn check_alike(all: &[Page]) -> Result<(), ReadError> {
 }
 
 /// Where the numbers of each plane lie.
-fn slots(all: &[Page], planes: &Planes, pages: &mut Pages) -> Result<Vec<Plane>, ReadError> {
+fn slots(listed: &[Page], planes: &Planes, pages: &mut Pages) -> Result<Vec<Plane>, ReadError> {
     let expected = planes.count();
-    if expected == all.len() as u64 {
+    if expected == listed.len() as u64 {
         if expected == 1 {
             let hint = "name the folder in which a stack has a file for each slice, or save the stack as one file; heights of GeoTIFF are read as points: \
                 `gdal_translate -of XYZ FILE heights.xyz`";
@@ -134,10 +134,10 @@ fn slots(all: &[Page], planes: &Planes, pages: &mut Pages) -> Result<Vec<Plane>,
             let hint = "if they are slices, say so: in Fiji Image > Properties, then File > Save As > Tiff";
             return Err(ReadError::input(Place::File, "a stack of two slices or more", found, hint));
         }
-        return Ok(all.iter().map(|page| Plane::Page(page.rank)).collect());
+        return Ok(listed.iter().map(|page| Plane::Page(page.rank)).collect());
     }
     let wrong = || {
-        let found = counted(all.len() as u64, "page");
+        let found = counted(listed.len() as u64, "page");
         let hint = "save the stack as one file, such as with Fiji (File > Save As > Tiff)";
         Err(ReadError::input(
             Place::File,
@@ -146,7 +146,10 @@ fn slots(all: &[Page], planes: &Planes, pages: &mut Pages) -> Result<Vec<Plane>,
             hint,
         ))
     };
-    let ([first], true) = (all, planes.may_follow) else { return wrong() };
+    let [first] = listed else { return wrong() };
+    if !planes.may_follow {
+        return wrong();
+    }
     let Some(start) = pages.plain_start(first.rank) else { return wrong() };
     let bytes = first.shape.bytes();
     let end = expected.checked_mul(bytes).and_then(|bytes| start.checked_add(bytes));

@@ -162,19 +162,16 @@ pub(crate) fn read(
         n if n > needed => return wrong(format!("more than {needed}"), LONGER),
         _ => {}
     }
-    check_finite(&values).map_err(|(i, error)| {
-        let place = Place::Byte(at + start + i as u64 * stored.voxel_bytes());
-        ReadError { place, ..error }
-    })?;
+    check_finite(&values, |i| Place::Byte(at + start + i as u64 * stored.voxel_bytes()))?;
     Ok(values)
 }
 
-/// Refuses the first value that is infinite, with its rank.
-pub(crate) fn check_finite(values: &[f32]) -> Result<(), (usize, ReadError)> {
+/// Refuses the first value that is infinite; `place` tells where the value of a rank lies.
+pub(crate) fn check_finite(values: &[f32], place: impl Fn(usize) -> Place) -> Result<(), ReadError> {
     let Some(i) = values.par_iter().position_first(|v| v.is_infinite()) else { return Ok(()) };
     let found = format!("{} at voxel {i}", values[i]);
     let hint = "scale the values, or write NaN where there is none: it draws nothing";
-    Err((i, ReadError::input(Place::File, "values that fit 32-bit floats", found, hint)))
+    Err(ReadError::input(place(i), "values that fit 32-bit floats", found, hint))
 }
 
 /// Reads the voxels behind so many bytes, with which the stream has to end; −1 for whatever comes before.

@@ -54,6 +54,14 @@ impl Default for Stack {
     }
 }
 
+/// A strip or a tile: its first column and row, and how many it has of them.
+struct Part {
+    x: u32,
+    y: u32,
+    across: u32,
+    down: u32,
+}
+
 /// A tag with its type (2 text, 3 and 4 whole numbers of two and four bytes, 5 ratios) and its numbers.
 type Tag = (u16, u16, Vec<u64>);
 
@@ -93,7 +101,7 @@ impl Stack {
         let mut lengths = Vec::new();
         for y in (0..height).step_by(down as usize) {
             for x in (0..width).step_by(across as usize) {
-                let packed = self.packed(&self.chunk(rank, [x, y], [across, down]));
+                let packed = self.packed(&self.chunk(rank, Part { x, y, across, down }));
                 starts.push(out.len() as u64);
                 lengths.push(packed.len() as u64);
                 out.extend(packed);
@@ -136,7 +144,8 @@ impl Stack {
     }
 
     /// The numbers of a strip or a tile, 0 beyond the page.
-    fn chunk(&self, rank: usize, [x, y]: [u32; 2], [across, down]: [u32; 2]) -> Vec<u8> {
+    fn chunk(&self, rank: usize, part: Part) -> Vec<u8> {
+        let Part { x, y, across, down } = part;
         let mut chunk = Vec::new();
         let rows = if self.tile > 0 { y..y + down } else { y..(y + down).min(self.size[1]) };
         let numbers = usize::from(self.numbers);

@@ -18,16 +18,16 @@ pub(super) fn check(names: &[String], notes: &mut Notes) -> Result<(), ReadError
         let found = names.first().map_or_else(|| "none".to_owned(), |name| format!("one, {}", quoted(name)));
         return Err(ReadError::input(Place::File, "two slices or more", found, HINT));
     };
-    let all: Vec<Vec<Part>> = names.iter().map(|name| parts(stem(name))).collect();
+    let split: Vec<Vec<Part>> = names.iter().map(|name| parts(stem(name))).collect();
     let is_alike = |parts: &[Part]| {
-        parts.len() == all[0].len()
-            && parts.iter().zip(&all[0]).all(|pair| match pair {
+        parts.len() == split[0].len()
+            && parts.iter().zip(&split[0]).all(|pair| match pair {
                 (Part::Number(_), Part::Number(_)) => true,
                 (part, other) => part == other,
             })
     };
-    if let Some(other) = all.iter().position(|parts| !is_alike(parts)) {
-        if all.iter().flatten().all(|part| matches!(part, Part::Text(_))) {
+    if let Some(other) = split.iter().position(|parts| !is_alike(parts)) {
+        if split.iter().flatten().all(|part| matches!(part, Part::Text(_))) {
             let [first, last] = [first, last].map(|name| quoted(name));
             notes.remark(format!("names without numbers: slices lie in the order of the alphabet, {first} to {last}"));
             return Ok(());
@@ -35,14 +35,14 @@ pub(super) fn check(names: &[String], notes: &mut Notes) -> Result<(), ReadError
         let expected = format!("names that differ in one number, such as {}", quoted(first));
         return Err(ReadError::input(Place::File, expected, quoted(&names[other]), HINT));
     }
-    let differs = |at: &usize| all.iter().any(|parts| parts[*at] != all[0][*at]);
-    let places: Vec<usize> = (0..all[0].len()).filter(differs).collect();
+    let differs = |at: &usize| split.iter().any(|parts| parts[*at] != split[0][*at]);
+    let places: Vec<usize> = (0..split[0].len()).filter(differs).collect();
     let &[place] = places.as_slice() else {
         let found = format!("{} and {}, which differ in {}", quoted(first), quoted(last), places.len());
         return Err(ReadError::input(Place::File, "names that differ in one number", found, HINT));
     };
     let number = |parts: &Vec<Part>| if let Part::Number(number) = parts[place] { number } else { 0 };
-    let numbers: Vec<u128> = all.iter().map(number).collect();
+    let numbers: Vec<u128> = split.iter().map(number).collect();
     let step = numbers.windows(2).map(|pair| pair[1] - pair[0]).min().unwrap_or(1);
     let Some(gap) = numbers.windows(2).position(|pair| pair[1] - pair[0] != step || step == 0) else {
         let step = if step == 1 { String::new() } else { format!(", every {step}th") };
@@ -53,7 +53,7 @@ pub(super) fn check(names: &[String], notes: &mut Notes) -> Result<(), ReadError
     let [before, behind] = [&names[gap], &names[gap + 1]].map(|name| quoted(name));
     let (expected, found) = match step {
         0 => ("one slice for each number".to_owned(), format!("{before} and {behind}")),
-        _ => (format!("the slice of number {} behind {before}", numbers[gap] + step), format!("{behind}")),
+        _ => (format!("the slice of number {} behind {before}", numbers[gap] + step), behind.clone()),
     };
     let hint = "put the missing slices into the folder, or number those that are there anew if they lie at equal steps";
     Err(ReadError::input(Place::File, expected, found, hint))

@@ -51,11 +51,11 @@ impl Planes {
     }
 
     /// Planes whose runs follow each other, the fastest first.
-    fn nested(order: [Axis; 3], [slices, channels, times]: [u64; 3], may_follow: bool) -> Self {
+    fn nested(order: Order, counts: Counts, may_follow: bool) -> Self {
         let mut stride = 1u64;
         let mut runs = [Run { count: 1, stride: 1 }; 3];
-        for axis in order {
-            let count = [slices, channels, times][axis as usize];
+        for axis in order.0 {
+            let count = counts.along(axis);
             runs[axis as usize] = Run { count, stride };
             stride = stride.saturating_mul(count);
         }
@@ -76,17 +76,43 @@ enum Axis {
     Time,
 }
 
+/// Axes of the planes, the one that changes fastest first.
+#[derive(Debug, Clone, Copy)]
+struct Order([Axis; 3]);
+
 /// The channel of a pixel changes fastest, then the slice, then the time.
-const OF_IMAGEJ: [Axis; 3] = [Axis::Channel, Axis::Slice, Axis::Time];
+const OF_IMAGEJ: Order = Order([Axis::Channel, Axis::Slice, Axis::Time]);
+
+/// How many slices, channels and times there are.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Counts {
+    slices: u64,
+    channels: u64,
+    times: u64,
+}
+
+impl Counts {
+    fn along(self, axis: Axis) -> u64 {
+        match axis {
+            Axis::Slice => self.slices,
+            Axis::Channel => self.channels,
+            Axis::Time => self.times,
+        }
+    }
+
+    fn planes(self) -> Option<u64> {
+        self.slices.checked_mul(self.channels)?.checked_mul(self.times)
+    }
+}
 
 /// How the planes are stated.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Stated {
     Nothing,
     /// By the number of slices, channels and times.
-    ByImageJ([u64; 3]),
+    ByImageJ(Counts),
     /// The same by OME, and the order of the axes.
-    ByOme([u64; 3], [char; 3]),
+    ByOme(Counts, [char; 3]),
 }
 
 /// What the first page says.
@@ -135,11 +161,12 @@ impl Description {
     /// How so many pages of so many numbers a pixel are slices, channels and times.
     pub(super) fn planes(&self, pages: u64, numbers: u64) -> Result<Planes, ReadError> {
         match self.stated {
-            Stated::Nothing => Ok(Planes::nested(OF_IMAGEJ, [pages, 1, 1], false)),
+            Stated::Nothing => Ok(Planes::nested(OF_IMAGEJ, Counts { slices: pages, channels: 1, times: 1 }, false)),
             Stated::ByImageJ(counts) => Ok(Planes::nested(OF_IMAGEJ, counts, true)),
-            Stated::ByOme([slices, channels, times], order) => {
+            Stated::ByOme(counts, order) => {
                 // Numbers of a pixel are channels too.
-                let channels = if channels.is_multiple_of(numbers) { channels / numbers } else { channels };
+                let is_shared = counts.channels.is_multiple_of(numbers);
+                let channels = if is_shared { counts.channels / numbers } else { counts.channels };
                 let axis = |letter: char| match letter {
                     'Z' => Some(Axis::Slice),
                     'C' => Some(Axis::Channel),
@@ -154,7 +181,7 @@ impl Description {
                 if sorted != ['C', 'T', 'Z'] {
                     return Err(unknown_order(order));
                 }
-                Ok(Planes::nested([first, second, third], [slices, channels, times], false))
+                Ok(Planes::nested(Order([first, second, third]), Counts { channels, ..counts }, false))
             }
         }
     }
@@ -203,12 +230,13 @@ fn of_imagej(text: &str) -> Result<Description, ReadError> {
     let images = count("images")?.unwrap_or(1);
     let [channels, slices, times] = [count("channels")?, count("slices")?, count("frames")?];
     let counts = match (slices, channels, times) {
-        (None, None, None) => [images, 1, 1],
-        (slices, channels, times) => [slices, channels, times].map(|n| n.unwrap_or(1)),
+        (None, None, None) => Counts { slices: images, channels: 1, times: 1 },
+        (slices, channels, times) => {
+            Counts { slices: slices.unwrap_or(1), channels: channels.unwrap_or(1), times: times.unwrap_or(1) }
+        }
     };
-    let planes = counts.into_iter().try_fold(1u64, u64::checked_mul);
-    if planes != Some(images) {
-        let [slices, channels, times] = counts;
+    if counts.planes() != Some(images) {
+        let Counts { slices, channels, times } = counts;
         let expected = format!("{images} images, as the description of the first page says");
         let found = format!("{slices} slices of {channels} channels at {times} times");
         return Err(ReadError::input(Place::File, expected, found, HINT));
@@ -248,7 +276,7 @@ fn of_ome(text: &str) -> Result<Description, ReadError> {
     };
     let order: Vec<char> = pixels.attribute("DimensionOrder").unwrap_or("XYCZT").chars().collect();
     let order: [char; 5] = order.try_into().map_err(|_| unknown_order(['?'; 3]))?;
-    let counts = [count("SizeZ")?, count("SizeC")?, count("SizeT")?];
+    let counts = Counts { slices: count("SizeZ")?, channels: count("SizeC")?, times: count("SizeT")? };
     let lengths = [size("PhysicalSizeX")?, size("PhysicalSizeY")?, size("PhysicalSizeZ")?];
     let unit_of = |axis: &str| pixels.attribute(format!("PhysicalSize{axis}Unit").as_str()).unwrap_or("µm");
     let unit = unit_of("X");
