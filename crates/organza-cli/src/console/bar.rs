@@ -26,14 +26,12 @@ pub(crate) fn with_bar<T>(work: impl FnOnce(&Progress) -> Result<T, Error>) -> R
     let finished = AtomicBool::new(false);
     std::thread::scope(|scope| {
         let watch = || {
-            if console::is_verbose() {
-                print_stages(&progress, &finished);
-            } else if console::is_quiet() {
-                return;
-            } else if std::io::stderr().is_terminal() {
-                draw_bar(&progress, &finished);
-            } else {
-                print_lines(&progress, &finished);
+            let is_terminal = std::io::stderr().is_terminal();
+            match () {
+                () if console::is_verbose() => print_stages(&progress, &finished),
+                () if console::is_quiet() => {}
+                () if is_terminal => draw_bar(&progress, &finished),
+                () => print_lines(&progress, &finished),
             }
         };
         // Where there is no memory for a thread there is none for a picture.
