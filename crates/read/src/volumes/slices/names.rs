@@ -44,19 +44,22 @@ pub(super) fn check(names: &[String], notes: &mut Notes) -> Result<(), ReadError
     let number = |parts: &Vec<Part>| if let Part::Number(number) = parts[place] { number } else { 0 };
     let numbers: Vec<u128> = split.iter().map(number).collect();
     let step = numbers.windows(2).map(|pair| pair[1] - pair[0]).min().unwrap_or(1);
-    let Some(gap) = numbers.windows(2).position(|pair| pair[1] - pair[0] != step || step == 0) else {
+    let is_wrong = |pair: &[u128]| if step == 0 { pair[0] == pair[1] } else { pair[1] - pair[0] != step };
+    let Some(gap) = numbers.windows(2).position(is_wrong) else {
         let step = if step == 1 { String::new() } else { format!(", every {step}th") };
         let [first, last] = [first, last].map(|name| quoted(name));
         notes.remark(format!("{} slices, {first} to {last}{step}", names.len()));
         return Ok(());
     };
     let [before, behind] = [&names[gap], &names[gap + 1]].map(|name| quoted(name));
-    let (expected, found) = match step {
-        0 => ("one slice for each number".to_owned(), format!("{before} and {behind}")),
-        _ => (format!("the slice of number {} behind {before}", numbers[gap] + step), behind.clone()),
-    };
+    if step == 0 {
+        let hint = "take one of them out of the folder";
+        let found = format!("{before} and {behind}");
+        return Err(ReadError::input(Place::File, "one slice for each number", found, hint));
+    }
+    let expected = format!("the slice of number {} behind {before}", numbers[gap] + step);
     let hint = "put the missing slices into the folder, or number those that are there anew if they lie at equal steps";
-    Err(ReadError::input(Place::File, expected, found, hint))
+    Err(ReadError::input(Place::File, expected, behind, hint))
 }
 
 #[cfg(test)]
@@ -80,6 +83,10 @@ mod tests {
             (&["a1.tif", "a2.tif", "a4.tif"][..], "expected the slice of number 3 behind 'a2.tif', found 'a4.tif'"),
             (&["a1.tif", "a4.tif", "a5.tif"], "expected the slice of number 2 behind 'a1.tif', found 'a4.tif'"),
             (&["a01.tif", "a1.tif", "a2.tif"], "expected one slice for each number, found 'a01.tif' and 'a1.tif'"),
+            (
+                &["a1.tif", "a2.tif", "a03.tif", "a3.tif"],
+                "expected one slice for each number, found 'a03.tif' and 'a3.tif'",
+            ),
             (&["a1.tif", "b1.tif"], "expected names that differ in one number, such as 'a1.tif', found 'b1.tif'"),
             (
                 &["a1b1.tif", "a2b2.tif"],
