@@ -116,7 +116,6 @@ impl Frame<'_> {
         cost: &mut CostRecord,
     ) -> Result<(), Error> {
         let image = self.shade_seen_solid(values, projected, shading, cost)?;
-        self.progress.begin(stage::SHADE);
         if let Some(order) = shading.order {
             let params = self.raster_params();
             let input = FoldInput {
@@ -160,6 +159,7 @@ impl Frame<'_> {
     ) -> Result<OpaqueImage, Error> {
         let ids = self.solid_ids();
         if ids.is_empty() {
+            self.progress.begin(stage::SHADE);
             return Ok(OpaqueImage::default());
         }
         let refused = |e| Error::from_core("opaque splats", e);
