@@ -102,6 +102,15 @@ pub fn read_painted(data: &[u8]) {
     read_on_disk("a.obj", model);
 }
 
+/// Reads a file of DICOM with another one beside it, a half of the bytes each.
+pub fn read_slices(data: &[u8]) {
+    let folder = FOLDER.join("slices");
+    fs::create_dir_all(&folder).expect("a folder for slices");
+    let (first, second) = data.split_at(data.len() / 2);
+    write("slices/b.dcm", second);
+    read_on_disk("slices/a.dcm", first);
+}
+
 /// The bytes before and behind the first zero byte, which no header in text has.
 fn cut(data: &[u8]) -> (&[u8], &[u8]) {
     let end = data.iter().position(|byte| *byte == 0).unwrap_or(data.len());

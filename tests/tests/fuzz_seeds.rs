@@ -36,6 +36,18 @@ fn seeds_of_formulas_and_transfer_functions_parse() {
 }
 
 #[test]
+fn seeds_of_slices_are_a_volume() {
+    for (path, seed) in seeds("dicom") {
+        let folder = tempfile::tempdir().unwrap();
+        let (first, second) = seed.split_at(seed.len() / 2);
+        fs::write(folder.path().join("a.dcm"), first).unwrap();
+        fs::write(folder.path().join("b.dcm"), second).unwrap();
+        let (loaded, _) = file(&folder.path().join("a.dcm"), &ReadParams::default(), None).unwrap();
+        assert!(matches!(loaded, Loaded::Grid(grid) if grid.dims[2] == 2), "{path}");
+    }
+}
+
+#[test]
 fn seeds_of_files_with_others_beside_them_are_read_whole() {
     let targets = [
         ("obj_beside", "a.obj"),
