@@ -223,7 +223,7 @@ fn whole_folder(path: &Path, reading: &mut Reading<'_>) -> Result<Loaded, ReadEr
     let files = folder::files(path)?;
     if files.iter().take(LOOKED_AT).any(|file| dicom::is_dicom(&unread::beginning(file))) {
         "Dicom".clone_into(&mut reading.notes.format);
-        let loaded = dicom::read(files, None, reading).map(Loaded::Grid)?;
+        let loaded = dicom::read(path, None, reading).map(Loaded::Grid)?;
         return finished(loaded, reading);
     }
     #[cfg(any(feature = "tiff", feature = "png"))]
@@ -464,7 +464,7 @@ fn parse_as(
             };
             let folder = place.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
             drop(stream);
-            dicom::read(folder::files(folder)?, Some(place), reading).map(Loaded::Grid)
+            dicom::read(folder, Some(place), reading).map(Loaded::Grid)
         }
         Format::MetaImage => metaimage::read(stream, place, params, &mut reading.notes).map(Loaded::Grid),
         #[cfg(feature = "vti")]

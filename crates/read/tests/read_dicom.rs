@@ -117,3 +117,17 @@ fn tilted_slices_are_sheared_and_gaps_and_other_slices_are_refused() {
         assert!(error.contains(said), "{error}");
     }
 }
+
+#[cfg(unix)]
+#[test]
+fn links_out_of_the_folder_are_no_slices() {
+    let elsewhere = folder("elsewhere", &[Dicom::at(2)]);
+    let path = folder("links", &[Dicom::at(0), Dicom::at(1)]);
+    std::os::unix::fs::symlink(elsewhere.join("IM0"), path.join("IM2")).unwrap();
+    let (grid, notes) = read(&path, &ReadParams::default()).unwrap();
+    assert_eq!(grid.dims[2], 2);
+    assert!(notes.unused.iter().any(|what| what.contains("a link out of the folder")), "{:?}", notes.unused);
+    // A file that is named is read wherever it lies.
+    let (grid, _) = read(&path.join("IM2"), &ReadParams::default()).unwrap();
+    assert_eq!(grid.dims[2], 3);
+}

@@ -1,6 +1,7 @@
 //! Files of a folder in the order of their names: numbers count as numbers, so that slice2 comes before slice10.
 
 use crate::error::{Place, ReadError};
+use splat_core::text::escaped;
 use std::path::{Path, PathBuf};
 
 /// Most files of a folder.
@@ -29,6 +30,22 @@ pub(crate) fn files(folder: &Path) -> Result<Vec<PathBuf>, ReadError> {
         (parts(&name), name)
     });
     Ok(files)
+}
+
+/// Refuses a file of a folder that is a link out of it: a scene may not read what lies outside of its folder.
+pub(crate) fn check_inside(folder: &Path, file: &Path) -> Result<(), ReadError> {
+    // Links are followed before they are judged.
+    let lies_inside = match (folder.canonicalize(), file.canonicalize()) {
+        (Ok(folder), Ok(file)) => file.starts_with(folder),
+        _ => false,
+    };
+    if lies_inside {
+        return Ok(());
+    }
+    let name = file.file_name().map(|name| escaped(name.as_encoded_bytes(), 60)).unwrap_or_default();
+    let found = format!("'{name}', a link out of it");
+    let hint = "copy the slices into the folder";
+    Err(ReadError::input(Place::File, "slices that lie in the folder", found, hint))
 }
 
 /// A part of a name.

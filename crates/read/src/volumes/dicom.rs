@@ -9,6 +9,7 @@ mod elements;
 use super::lattice;
 use crate::ReadParams;
 use crate::error::{Place, ReadError};
+use crate::format::folder::{check_inside, files};
 use crate::points::extras::LONGEST_NAME;
 use crate::reading::Reading;
 use crate::stream::input::{self, Stream};
@@ -87,11 +88,16 @@ struct Numbers {
 }
 
 /// Reads the series of a folder that `params` name, else the one of most slices; of a file its own.
-pub(crate) fn read(files: Vec<PathBuf>, named: Option<&Path>, reading: &mut Reading<'_>) -> Result<Grid, ReadError> {
+pub(crate) fn read(folder: &Path, named: Option<&Path>, reading: &mut Reading<'_>) -> Result<Grid, ReadError> {
     let mut slices: Vec<Slice> = Vec::new();
     let mut series_of_file = None;
-    for file in files {
+    for file in files(folder)? {
         reading.go_on()?;
+        let is_named = named.is_some_and(|named| named.file_name() == file.file_name());
+        if !is_named && check_inside(folder, &file).is_err() {
+            reading.notes.not_used([format!("file {}, a link out of the folder", name(&file)).as_bytes()]);
+            continue;
+        }
         input::hold("the slices", (slices.len() as u64 + 1) * BYTES_OF_A_SLICE, reading.params)?;
         let Some(slice) =
             with_elements(&file, reading.params, |elements| slice(&file, elements)).map_err(|e| in_file(&file, e))?
@@ -99,7 +105,7 @@ pub(crate) fn read(files: Vec<PathBuf>, named: Option<&Path>, reading: &mut Read
             reading.notes.not_used([format!("file {}", name(&file)).as_bytes()]);
             continue;
         };
-        if named.is_some_and(|named| named.file_name() == file.file_name()) {
+        if is_named {
             series_of_file = Some(slice.series.clone());
         }
         slices.push(slice);

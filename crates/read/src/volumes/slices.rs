@@ -7,6 +7,7 @@ use super::voxels::{self, Kind, Stored};
 use super::{lattice, rounded, upright};
 use crate::ReadParams;
 use crate::error::{Fault, Place, ReadError};
+use crate::format::folder::check_inside;
 use crate::reading::Reading;
 use crate::stream::input::Stream;
 use splat_core::Grid;
@@ -80,24 +81,12 @@ pub(crate) fn read(folder: &Path, files: Vec<PathBuf>, reading: &mut Reading<'_>
     }
     let names: Vec<String> = slices.iter().map(|(_, file)| name_of(file)).collect();
     names::check(&names, &mut reading.notes)?;
-    // Links are followed before they are judged: a scene may not read what lies outside of its folder.
-    let root = folder.canonicalize().ok();
     let mut values = Vec::new();
     let mut like: Option<(Stored, String, Option<[f64; 2]>)> = None;
     for (picture, file) in &slices {
         reading.go_on()?;
         let told = |e: ReadError| in_slice(file, e);
-        let lies_inside =
-            root.as_ref().zip(file.canonicalize().ok()).is_some_and(|(root, file)| file.starts_with(root));
-        if !lies_inside {
-            let found = format!("'{}', a link out of it", shown(file));
-            return Err(ReadError::input(
-                Place::File,
-                "slices that lie in the folder",
-                found,
-                "copy the slices into the folder",
-            ));
-        }
+        check_inside(folder, file)?;
         let slice = slice(*picture, file, reading).map_err(told)?;
         if like.is_none() {
             let stored = stored(&slice, slices.len() as u64, reading).map_err(told)?;

@@ -150,7 +150,9 @@ pub fn fold(
 /// }
 /// let view = Projection::Orthographic { height: 2.0 };
 /// let camera = Camera::look_at(DVec3::Z * 40.0, DVec3::ZERO, DVec3::Y, view, [64, 64]).unwrap();
-/// let (footprints, materials, params) = (FootprintStack::default(), [Material::default()], Params::default());
+/// let footprints = FootprintStack::default();
+/// let materials = [Material::default()];
+/// let params = Params::default();
 /// let input = ProjectInput { cloud: &cloud, camera: &camera, footprints: &footprints, materials: &materials, params: &params, detail: Detail::ALL };
 /// let projected = project(&input);
 /// let order: Vec<u32> = (0..100).collect();
