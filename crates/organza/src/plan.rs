@@ -222,7 +222,13 @@ impl Plan {
 
     /// Takes in the table of the eye's map, which is built when splats are to be shaded.
     pub(crate) fn set_eye_table(&mut self, table: Option<ShadowTable>) {
+        const DEEP: &str = "; of those behind one another in thick media, where many are, up to the last that is seen";
         self.passes.retain(|p| p.name != pass::EYE_MAP);
+        let is_in_one_go = self.techniques == [Technique::Points] && self.skips_hidden;
+        for shading in self.passes.iter_mut().filter(|p| p.name == pass::SHADE) {
+            let reason = shading.reason.trim_end_matches(DEEP).to_owned();
+            shading.reason = if table.is_some() && is_in_one_go { reason + DEEP } else { reason };
+        }
         if let Some(table) = &table {
             let reason = table.describe("thick media send what light and eye share of each cell");
             let at = self.passes.iter().position(|p| p.name == pass::SHADE).unwrap_or(self.passes.len());
