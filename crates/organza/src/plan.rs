@@ -137,6 +137,8 @@ pub struct Plan {
     pub draws: Vec<bool>,
     /// Whether no technique asks for the radiance of splats that opaque ones hide.
     pub skips_hidden: bool,
+    /// Whether translucent splats get no light either that lie behind finished pixels in thick media.
+    pub skips_behind_finished: bool,
 }
 
 impl Plan {
@@ -224,10 +226,9 @@ impl Plan {
     pub(crate) fn set_eye_table(&mut self, table: Option<ShadowTable>) {
         const DEEP: &str = "; of those behind one another in thick media, where many are, up to the last that is seen";
         self.passes.retain(|p| p.name != pass::EYE_MAP);
-        let is_in_one_go = self.techniques == [Technique::Points] && self.skips_hidden;
         for shading in self.passes.iter_mut().filter(|p| p.name == pass::SHADE) {
             let reason = shading.reason.trim_end_matches(DEEP).to_owned();
-            shading.reason = if table.is_some() && is_in_one_go { reason + DEEP } else { reason };
+            shading.reason = if table.is_some() && self.skips_behind_finished { reason + DEEP } else { reason };
         }
         if let Some(table) = &table {
             let reason = table.describe("thick media send what light and eye share of each cell");

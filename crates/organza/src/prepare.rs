@@ -515,6 +515,8 @@ fn plan_effects(
     plan.by = scene.objects.iter().map(|o| technique_of(o, scene)).collect();
     plan.exact = plan.by.iter().map(|by| row(*by).meets_discs).collect();
     plan.skips_hidden = visible(scene).all(|o| row(technique_of(o, scene)).skips_hidden);
+    let skips_behind = matches!(techniques(scene)[..], [alone] if row(alone).skips_behind_finished);
+    plan.skips_behind_finished = plan.skips_hidden && skips_behind;
     plan.is_own = vec![false; scene.objects.len()];
     loaded.own.iter().for_each(|native| plan.is_own[native.object] = true);
     let draws = |by: &Technique| row(*by).draws_splats && !statistics.lit_as_drawn;

@@ -87,6 +87,8 @@ pub(crate) struct Row {
     pub(crate) meets_discs: bool,
     /// Whether splats whose every pixel lies behind opaque ones count for nothing in it, so that they need no radiance.
     pub(crate) skips_hidden: bool,
+    /// Whether translucent splats behind finished pixels get no light either, where it draws a picture alone.
+    pub(crate) skips_behind_finished: bool,
     /// The pass that [`Fold::prepare`] and [`Fold::check`] run, before all others, where something is its own.
     pub(crate) prepares: Option<&'static str>,
     /// Its passes; the last one comes behind opaque surfaces, those before it come before footprints.
@@ -224,6 +226,7 @@ pub(crate) static TABLE: [Row; 5] = [
         draws_splats: false,
         gaussians: false,
         prepares: Some(pass::SAMPLERS),
+        skips_behind_finished: false,
         steps: &[Step { pass: pass::PARTICLES, stage: stage::PARTICLES, counts: particles::counts }],
         is_random: true,
         repeats: |scene| format!("{} sets", scene.render.particles.repeat_level),
@@ -245,6 +248,7 @@ pub(crate) static TABLE: [Row; 5] = [
         thickest_body: Some(4.0),
         polygons: true,
         by_device: false,
+        skips_behind_finished: false,
         steps: &[Step { pass: pass::SHEETS, stage: stage::SHEETS, counts: sheets::counts }],
         bytes: sheets::bytes,
         carries: sheets::carries,
@@ -270,6 +274,7 @@ pub(crate) static TABLE: [Row; 5] = [
         meets_discs: true,
         skips_hidden: false,
         by_device: false,
+        skips_behind_finished: false,
         steps: &[SORT, Step { pass: pass::SURFELS, stage: stage::SURFELS, counts: surfels::counts }],
         bytes: surfels::bytes,
         plans: surfels::plans,
@@ -285,6 +290,7 @@ pub(crate) static TABLE: [Row; 5] = [
         // Its depths are rounded otherwise than those of the opaque ones.
         skips_hidden: false,
         by_device: false,
+        skips_behind_finished: false,
         steps: &[Step {
             pass: pass::REFERENCE,
             stage: stage::REFERENCE,
@@ -329,6 +335,7 @@ const POINTS: Row = Row {
     gaussians: true,
     meets_discs: false,
     skips_hidden: true,
+    skips_behind_finished: true,
     prepares: None,
     steps: &[SORT, FOLD],
     by_device: true,
