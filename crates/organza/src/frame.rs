@@ -58,6 +58,8 @@ pub struct Frame<'a> {
     light_points: OnceCell<Vec<LightPoint>>,
     maps: OnceCell<Maps>,
     shaded: OnceCell<Shaded>,
+    /// What thick media leave of some splats, from which light that is too coarse is told.
+    shown_shares: OnceCell<Vec<f32>>,
     /// Opaque splats alone, from when they were shaded until they are asked for.
     solid: Cell<Option<OpaqueImage>>,
     opaque: OnceCell<OpaqueImage>,
@@ -118,6 +120,7 @@ impl<'a> Frame<'a> {
             light_points: OnceCell::new(),
             maps: OnceCell::new(),
             shaded: OnceCell::new(),
+            shown_shares: OnceCell::new(),
             solid: Cell::default(),
             opaque: OnceCell::new(),
             is_one_picture: true,

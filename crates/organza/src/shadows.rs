@@ -90,7 +90,9 @@ pub fn shadow_params(settings: &RenderSettings, loaded: &Loaded, tolerance: f32,
 
 /// Parameters of the eye's map. `render.shadow` is about lights: its cells would cost the eye, which is near what it sees, many times more.
 pub(crate) fn eye_params(loaded: &Loaded, tolerance: f32, max_bytes: u64) -> Params {
-    Params { tolerance, footprints: loaded.footprints.clone(), limits: Limits::bytes(max_bytes), ..Params::default() }
+    let footprints = loaded.footprints.clone();
+    // It shows which splats are seen, and how steeply depths grow about them: its cells may be coarser than a light's.
+    Params { tolerance, footprints, refines_lit: false, limits: Limits::bytes(max_bytes), ..Params::default() }
 }
 
 /// Greatest optical depth of a spacing among the media of a loaded scene; 0 where it is thin everywhere.

@@ -1,6 +1,7 @@
 //! A map in the making: casters leave deposits in the cells that they cover, which are sorted and summed.
 
 pub(crate) mod caster;
+pub(crate) mod darkness;
 pub(crate) mod deposit;
 pub(crate) mod deposits;
 pub(crate) mod discs;

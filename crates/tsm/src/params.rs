@@ -46,6 +46,9 @@ pub struct Params {
     pub absorbance: AbsorbanceModel,
     /// Mean cells that a splat covers, which [`Resolution::Auto`] aims at for clouds of a million splats and more, ≥ 1.
     pub entries_per_splat: f32,
+    /// Whether [`Resolution::Auto`] spends on finer cells what splats behind darkness save. Else a table has as many entries as the lit splats alone would
+    /// have, and is made sooner.
+    pub refines_lit: bool,
     /// Factor ≥ 1 on the radius √(area/π) of an opaque disc, so that neighbouring discs leave no holes.
     pub opaque_dilation: f32,
     /// Distance, in spacings of the receiver's splats, by which a surface is lifted towards the light before it is
@@ -65,6 +68,7 @@ impl Default for Params {
             tolerance: 1e-5,
             absorbance: AbsorbanceModel::CrossSection,
             entries_per_splat: 6.0,
+            refines_lit: true,
             opaque_dilation: 1.5,
             bias: 0.5,
             footprints: FootprintStack::default(),

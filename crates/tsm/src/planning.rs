@@ -2,5 +2,6 @@
 
 pub(crate) mod appearance;
 pub(crate) mod cost;
+pub(crate) mod lit;
 pub(crate) mod plan;
 pub(crate) mod survey;

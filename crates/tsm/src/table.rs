@@ -46,16 +46,23 @@ impl Ranges {
     }
 }
 
+impl Ranges {
+    /// Cells of the table.
+    pub(crate) fn cells(self) -> usize {
+        self.cells
+    }
+
+    /// Cells of a range; the last one may have fewer.
+    pub(crate) fn cells_of_a_range(self) -> usize {
+        1 << self.shift
+    }
+}
+
 #[cfg(feature = "gpu")]
 impl Ranges {
     /// Number of ranges.
     pub(crate) fn count(self) -> usize {
         self.count
-    }
-
-    /// Cells of the table.
-    pub(crate) fn cells(self) -> usize {
-        self.cells
     }
 
     /// Where a range begins; the cells of the table for the one behind the last.
@@ -101,8 +108,9 @@ impl<const C: usize> Parted<C> {
         Self { start, cell, distance, absorbance }
     }
 
+    /// Where the entries of a range lie.
     #[inline]
-    fn range(&self, r: usize) -> Range<usize> {
+    pub(crate) fn range(&self, r: usize) -> Range<usize> {
         let begin = if r == 0 { 0 } else { self.start[r - 1] };
         begin as usize..self.start[r] as usize
     }
@@ -110,6 +118,21 @@ impl<const C: usize> Parted<C> {
     /// Number of entries.
     pub(crate) fn len(&self) -> usize {
         self.cell.len()
+    }
+
+    /// The cell of each entry.
+    pub(crate) fn cells(&self) -> &[u32] {
+        &self.cell
+    }
+
+    /// The distance of each entry.
+    pub(crate) fn distances(&self) -> &[f32] {
+        &self.distance
+    }
+
+    /// The absorbance of each entry.
+    pub(crate) fn absorbances(&self) -> &[[f32; C]] {
+        &self.absorbance
     }
 
     /// Cells, distances and absorbances of the entries of neighbouring ranges.

@@ -15,6 +15,9 @@ const LOOKED_AT: usize = 2048;
 /// Splats among which those are sought that are seen: one in sixteen may be.
 const CANDIDATES: usize = 16 * LOOKED_AT;
 
+/// Share of a splat that is seen, below which it is as good as hidden.
+const UNSEEN: f64 = 1e-3;
+
 /// The same light at every place.
 #[derive(Clone, Copy)]
 struct Even([f32; 3]);
@@ -50,10 +53,14 @@ impl Frame<'_> {
         let maps = &self.maps.get()?.of_all;
         let sides = maps.iter().flatten().flat_map(|map| map.prediction().size);
         let cells = sides.max()? as u32;
-        let splats = self.drawn().len();
-        let candidates = (0..splats).step_by(splats.div_ceil(CANDIDATES).max(1));
-        let candidates = candidates.filter_map(|i| self.sample(i));
-        let seen: Vec<Sample> = candidates.collect();
+        // Thick media hide most of themselves.
+        let shown = self.shown_shares.get();
+        let share = |candidate: usize| shown.map_or(1.0, |shares| f64::from(shares[candidate]));
+        let candidates = self.candidates().enumerate().filter(|(candidate, _)| share(*candidate) > UNSEEN);
+        let samples = candidates.filter_map(|(candidate, i)| {
+            self.sample(i).map(|sample| Sample { area: share(candidate) * sample.area, ..sample })
+        });
+        let seen: Vec<Sample> = samples.collect();
         let samples: Vec<&Sample> = seen.iter().step_by(seen.len().div_ceil(LOOKED_AT).max(1)).collect();
         let look = Look {
             input: self.shading(&[]),
@@ -67,6 +74,20 @@ impl Frame<'_> {
         let off = samples.iter().zip(is_off).filter(|(_, is_off)| *is_off).map(|(sample, _)| sample.area).sum::<f64>();
         let area = samples.iter().map(|sample| sample.area).sum::<f64>();
         (area > 0.0).then_some(Coarse { share: off / area, cells })
+    }
+
+    /// Splats at even distances in the list, among which those are sought that are seen.
+    fn candidates(&self) -> impl ExactSizeIterator<Item = usize> {
+        let splats = self.drawn().len();
+        (0..splats).step_by(splats.div_ceil(CANDIDATES).max(1))
+    }
+
+    /// What thick media leave of each candidate, by the eye's map, which is gone when the picture is there.
+    pub(super) fn shares_shown(&self, eye: &ShadowMap) -> Vec<f32> {
+        let cloud = self.drawn();
+        let candidates: Vec<usize> = self.candidates().collect();
+        let share = |i: &usize| eye.transmittance(&Receiver::of_splat(cloud, *i)).iter().sum::<f32>() / 3.0;
+        candidates.par_iter().map(share).collect()
     }
 
     /// A splat as it is seen; `None` where its centre is out of the view or behind opaque surfaces.

@@ -60,6 +60,9 @@ impl Frame<'_> {
         let Shaded { projected, mut values, .. } = self.before.take();
         let projected = self.project(projected, cost)?;
         let eye = self.eye_map(cost)?;
+        if let Some(eye) = &eye {
+            self.shown_shares.get_or_init(|| self.shares_shown(eye));
+        }
         // Surfaces that are drawn apart from splats would keep pixels open that splats behind them finish.
         let all_opaque_are_splats = !self.has_polygons() && self.solid_of(true).is_empty();
         let is_deep = |order: &&[u32]| eye.as_ref().is_some_and(|eye| self.is_deep(order, eye));

@@ -18,7 +18,7 @@
 
 use crate::building::caster::Caster;
 use crate::building::entries::Entries;
-use crate::building::media::MediaBatches;
+use crate::building::media::{MediaBatches, is_dark};
 use crate::building::overlap::{Ellipse, Sink, Spread};
 use crate::building::sampling::{NEAR, Sampled};
 use crate::building::shares::{Axis, BLOCK, between};
@@ -94,11 +94,26 @@ pub(crate) struct Scratch<const C: usize> {
     shares: Vec<(u32, f32)>,
 }
 
-/// What a table holds while it is filled: where opaque discs end every list, and the entries so far.
+/// Distances behind which cells take no entries; empty where there is no end.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Ends<'a> {
+    /// Of media: opaque discs, or where the cell is dark.
+    pub(crate) media: &'a [f32],
+    /// Of surfaces: opaque discs.
+    pub(crate) surfaces: &'a [f32],
+}
+
+impl<'a> Ends<'a> {
+    /// The distance of the nearest opaque disc of each cell.
+    pub(crate) fn opaque(distances: &'a [f32]) -> Self {
+        Self { media: distances, surfaces: distances }
+    }
+}
+
+/// What a table holds while it is filled: where lists end, and the entries so far.
 pub(crate) struct Deposit<'a, M: Mapping, const C: usize> {
     pub(crate) mapping: &'a M,
-    /// Distance of the nearest opaque disc of each cell; empty without any.
-    pub(crate) opaque: &'a [f32],
+    pub(crate) ends: Ends<'a>,
     pub(crate) scratch: &'a mut Scratch<C>,
 }
 
@@ -118,6 +133,12 @@ impl<M: Mapping, const C: usize> Deposit<'_, M, C> {
         let Some(at) = self.mapping.locate(caster.position).map(|place| place.at) else { return };
         let spread = Spread::new(caster, self.mapping.gradients(caster.position));
         let half = spread.half_extents();
+        // Beside a fold more cells may belong to it than those about it.
+        let is_about = caster.kind == SplatKind::Medium && close == 0.0 && !self.mapping.is_folded();
+        let ends = self.ends.media;
+        if is_about && !ends.is_empty() && is_dark(ends, self.mapping.size(), at, half + 1.0, caster.distance) {
+            return;
+        }
         let [least, most] = [half.min_element(), half.max_element()];
         let near = 1.0 - through(CLEAR, self.mapping.clearance(at, half));
         let corner = self.weight(caster, near * through(SMALL, least));
@@ -172,14 +193,15 @@ impl<M: Mapping, const C: usize> Deposit<'_, M, C> {
         let absorbances: [f32; BLOCK] =
             std::array::from_fn(|k| total * shares[k] * self.mapping.inverse_measure(first + k as u32, row));
         let media = &mut self.scratch.media;
-        let window = self.opaque.get(cell as usize..).and_then(|from| from.first_chunk::<BLOCK>());
+        let ends = self.ends.media;
+        let window = ends.get(cell as usize..).and_then(|from| from.first_chunk::<BLOCK>());
         let is_clear = window.is_some_and(|w| w.iter().fold(true, |is_clear, d| is_clear & (*d >= caster.distance)));
-        if is_clear || self.opaque.is_empty() {
+        if is_clear || ends.is_empty() {
             media.extend(cell, caster.distance, used, &absorbances, &caster.extinction.rgb);
             return;
         }
         for k in 0..used {
-            if self.opaque.get(cell as usize + k).is_none_or(|d| *d >= caster.distance) {
+            if ends.get(cell as usize + k).is_none_or(|d| *d >= caster.distance) {
                 media.push(cell + k as u32, caster.distance, absorbances[k], &caster.extinction.rgb);
             }
         }
@@ -249,14 +271,12 @@ impl<M: Mapping, const C: usize> Deposit<'_, M, C> {
             let parallel = self.mapping.is_parallel();
             distance = distance_on_plane(caster.position, caster.normal, caster.distance, &ray, parallel);
         }
-        if self.opaque.get(cell as usize).is_some_and(|d| *d < distance) {
+        let is_medium = caster.kind == SplatKind::Medium && caster.paper_absorbance.is_none();
+        let ends = if is_medium { self.ends.media } else { self.ends.surfaces };
+        if ends.get(cell as usize).is_some_and(|d| *d < distance) {
             return;
         }
-        let list = if caster.kind == SplatKind::Medium && caster.paper_absorbance.is_none() {
-            &mut self.scratch.media
-        } else {
-            &mut self.scratch.surfaces
-        };
+        let list = if is_medium { &mut self.scratch.media } else { &mut self.scratch.surfaces };
         list.push(cell, distance, absorbance, &caster.extinction.rgb);
     }
 }
@@ -345,15 +365,9 @@ mod tests {
         let mut scratch = Scratch::<1>::default();
         let Scratch { media, surfaces, media_batches, surface_batches, .. } = &mut scratch;
         if kind == SplatKind::Medium {
-            Target { mapping, opaque: &[], entries: media }.add_media(
-                &casters,
-                &frame,
-                &ids,
-                media_batches,
-                &mut others,
-            );
+            Target { mapping, ends: &[], entries: media }.add_media(&casters, &frame, &ids, media_batches, &mut others);
         } else {
-            Target { mapping, opaque: &[], entries: surfaces }.add_surfaces(
+            Target { mapping, ends: &[], entries: surfaces }.add_surfaces(
                 &casters,
                 &frame,
                 &ids,
@@ -363,7 +377,7 @@ mod tests {
         }
         let mut single = Scratch::<1>::default();
         for i in ids.iter().filter(|i| !others.contains(i)) {
-            Deposit { mapping, opaque: &[], scratch: &mut single }.add(&casters.get(
+            Deposit { mapping, ends: Ends::opaque(&[]), scratch: &mut single }.add(&casters.get(
                 *i as usize,
                 &frame,
                 mapping.is_parallel(),

@@ -1,9 +1,11 @@
 //! Everything that a map's build leaves before its lists are sorted and summed: by the processor, or by a device.
 
 use crate::building::caster::Casters;
-use crate::building::deposit::{Deposit, Scratch};
+use crate::building::darkness::Darkness;
+use crate::building::deposit::{Deposit, Ends, Scratch};
 use crate::building::media::Target;
 use crate::mapping::{Mapping, with_mapping};
+use crate::planning::lit::{ROUND_COUNT, Rounds};
 use crate::planning::plan::{Plan, plan};
 use crate::planning::survey::{CHUNK, Survey};
 use crate::shadow_map::{Absorbances, Matter, head};
@@ -129,7 +131,21 @@ fn lists<const C: usize>(parts: &Parted2<C>, ranges: Ranges, limit: f32) -> Matt
     Matter { media, surfaces }
 }
 
-fn deposit_all<M: Mapping, const C: usize>(
+/// Media and surfaces of chunks, parted by cells.
+type ChunksOf<const C: usize> = Vec<(Parted<C>, Parted<C>)>;
+
+/// What all chunks of a table share while it is filled.
+struct Filling<'a, M: Mapping> {
+    casters: &'a Casters<'a>,
+    plan: &'a Plan,
+    mapping: &'a M,
+    ranges: Ranges,
+    progress: &'a Progress,
+    /// Entries so far: held to the limit while they are made, for predictions may be half of them.
+    made: AtomicU64,
+}
+
+pub(crate) fn deposit_all<M: Mapping, const C: usize>(
     casters: &Casters<'_>,
     plan: &Plan,
     mapping: &M,
@@ -137,29 +153,62 @@ fn deposit_all<M: Mapping, const C: usize>(
     ranges: Ranges,
     progress: &Progress,
 ) -> Result<Parted2<C>, Error> {
-    let cloud = casters.cloud;
-    // Held to the limit while they are made: predictions may be half of it.
-    let made = AtomicU64::new(0);
-    let chunks: Vec<(Parted<C>, Parted<C>)> = (0..cloud.len().div_ceil(CHUNK))
-        .into_par_iter()
-        .map_init(Scratch::default, |scratch, c| {
-            let chunk = c * CHUNK..cloud.len().min((c + 1) * CHUNK);
-            progress.tick(chunk.len() as u64)?;
-            scratch.media.clear();
-            scratch.surfaces.clear();
-            pulp::Arch::new().dispatch(FillChunk {
-                casters,
-                plan,
-                deposit: Deposit { mapping, opaque, scratch },
-                chunk,
-            });
-            let more = (scratch.media.len + scratch.surfaces.len) as u64;
-            check_entries::<C>(made.fetch_add(more, Ordering::Relaxed) + more, &casters.params.limits)?;
-            Ok((Parted::new(&scratch.media, ranges), Parted::new(&scratch.surfaces, ranges)))
-        })
-        .collect::<Result<_, Error>>()?;
+    let filling = Filling { casters, plan, mapping, ranges, progress, made: AtomicU64::new(0) };
+    let chunks: ChunksOf<C> = match &plan.lit.rounds {
+        Some(rounds) => filling.by_rounds(rounds, opaque)?,
+        None => filling.fill_all(Ends::opaque(opaque), |splats| splats)?,
+    };
     let (media, surfaces) = chunks.into_iter().unzip();
     Ok([media, surfaces])
+}
+
+impl<M: Mapping> Filling<'_, M> {
+    /// Entries of all splats, chunk by chunk, of those that `select` leaves of each.
+    fn fill_all<const C: usize, I: Iterator<Item = usize> + Clone>(
+        &self,
+        ends: Ends<'_>,
+        select: impl Fn(Range<usize>) -> I + Sync,
+    ) -> Result<ChunksOf<C>, Error> {
+        let n = self.casters.cloud.len();
+        let chunks = (0..n.div_ceil(CHUNK)).into_par_iter();
+        chunks
+            .map_init(Scratch::default, |scratch, c| {
+                self.fill(scratch, ends, select(c * CHUNK..n.min((c + 1) * CHUNK)))
+            })
+            .collect()
+    }
+
+    /// Entries of some splats.
+    fn fill<const C: usize>(
+        &self,
+        scratch: &mut Scratch<C>,
+        ends: Ends<'_>,
+        splats: impl Iterator<Item = usize> + Clone,
+    ) -> Result<(Parted<C>, Parted<C>), Error> {
+        let Self { casters, plan, mapping, progress, .. } = *self;
+        progress.tick(splats.clone().count() as u64)?;
+        scratch.media.clear();
+        scratch.surfaces.clear();
+        let deposit = Deposit { mapping, ends, scratch };
+        pulp::Arch::new().dispatch(FillChunk { casters, plan, deposit, splats });
+        let more = (scratch.media.len + scratch.surfaces.len) as u64;
+        check_entries::<C>(self.made.fetch_add(more, Ordering::Relaxed) + more, &casters.params.limits)?;
+        Ok((Parted::new(&scratch.media, self.ranges), Parted::new(&scratch.surfaces, self.ranges)))
+    }
+
+    /// Entries of all splats, of those first that seem to be lit.
+    fn by_rounds<const C: usize>(&self, rounds: &Rounds, opaque: &[f32]) -> Result<ChunksOf<C>, Error> {
+        let round_of = rounds.of_splats(self.casters, &self.plan.frame);
+        let mut dark = Darkness::<C>::new(self.ranges, opaque, self.casters.params.absorbance_limit());
+        let mut chunks = ChunksOf::new();
+        for round in 0..ROUND_COUNT {
+            let ends = Ends { media: &dark.ends, surfaces: opaque };
+            let made = self.fill_all(ends, |splats| splats.filter(|&splat| round_of[splat] == round))?;
+            dark.add(&made);
+            chunks.extend(made);
+        }
+        Ok(chunks)
+    }
 }
 
 /// Holds the lists to what they may take.
@@ -176,23 +225,23 @@ pub(crate) fn check_entries<const C: usize>(entries: u64, limits: &Limits) -> Re
     Ok(())
 }
 
-/// The casters of one kind in a chunk.
+/// The casters of one kind among some splats.
 #[inline(always)]
-pub(crate) fn select(casters: &Casters<'_>, chunk: &Range<usize>, kind: SplatKind, ids: &mut Vec<u32>) {
+pub(crate) fn select(casters: &Casters<'_>, splats: impl Iterator<Item = usize>, kind: SplatKind, ids: &mut Vec<u32>) {
     ids.clear();
-    let is_wanted = |&i: &usize| casters.cloud.kind[i] == kind && casters.casts(i);
-    ids.extend(chunk.clone().filter(is_wanted).map(|i| i as u32));
+    let casts = |&i: &usize| casters.cloud.kind[i] == kind && casters.casts(i);
+    ids.extend(splats.filter(casts).map(|i| i as u32));
 }
 
 /// Deposits of one chunk of splats, in the form that [`pulp`] compiles once per instruction set.
-struct FillChunk<'a, M: Mapping, const C: usize> {
+struct FillChunk<'a, M: Mapping, I: Iterator<Item = usize> + Clone, const C: usize> {
     casters: &'a Casters<'a>,
     plan: &'a Plan,
     deposit: Deposit<'a, M, C>,
-    chunk: Range<usize>,
+    splats: I,
 }
 
-impl<M: Mapping, const C: usize> pulp::NullaryFnOnce for FillChunk<'_, M, C> {
+impl<M: Mapping, I: Iterator<Item = usize> + Clone, const C: usize> pulp::NullaryFnOnce for FillChunk<'_, M, I, C> {
     type Output = ();
 
     #[inline(always)]
@@ -205,15 +254,15 @@ impl<M: Mapping, const C: usize> pulp::NullaryFnOnce for FillChunk<'_, M, C> {
         if casters.has_opaque_discs() {
             let frame = &self.plan.frame;
             let mapping = self.deposit.mapping;
-            let opaque = self.deposit.opaque;
-            select(casters, &self.chunk, SplatKind::Medium, medium_ids);
-            select(casters, &self.chunk, SplatKind::Surface, surface_ids);
-            let mut target = Target { mapping, opaque, entries: media };
+            let ends = self.deposit.ends;
+            select(casters, self.splats.clone(), SplatKind::Medium, medium_ids);
+            select(casters, self.splats.clone(), SplatKind::Surface, surface_ids);
+            let mut target = Target { mapping, ends: ends.media, entries: media };
             target.add_media(casters, frame, medium_ids, media_batches, &mut others);
-            let mut target = Target { mapping, opaque, entries: surfaces };
+            let mut target = Target { mapping, ends: ends.surfaces, entries: surfaces };
             target.add_surfaces(casters, frame, surface_ids, surface_batches, &mut others);
         } else {
-            others.extend(self.chunk.filter(|&i| casters.casts(i)).map(|i| i as u32));
+            others.extend(self.splats.filter(|&i| casters.casts(i)).map(|i| i as u32));
         }
         for &i in &others {
             self.deposit.add(&casters.get(i as usize, &self.plan.frame, self.deposit.mapping.is_parallel()));

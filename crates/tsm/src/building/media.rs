@@ -148,8 +148,8 @@ impl MediaBatches {
 /// Where entries come from and go to.
 pub(crate) struct Target<'a, M: Mapping, const C: usize> {
     pub(crate) mapping: &'a M,
-    /// Distance of the nearest opaque disc of each cell; empty without any.
-    pub(crate) opaque: &'a [f32],
+    /// Distance behind which each cell takes no entries; empty where there is no end.
+    pub(crate) ends: &'a [f32],
     pub(crate) entries: &'a mut Entries<C>,
 }
 
@@ -168,6 +168,7 @@ impl<M: Mapping, const C: usize> Target<'_, M, C> {
         for batch in batches(ids) {
             load(splats, casters, batch, frame);
             fill(footprints, self.mapping, splats);
+            self.leave_out_dark(footprints, batch.len());
             for (l, &id) in batch.iter().enumerate() {
                 footprints.set(RGB, l, casters.extinction(id as usize).rgb);
             }
@@ -234,17 +235,57 @@ impl<M: Mapping, const C: usize> Target<'_, M, C> {
         cells
     }
 
-    /// Drops what lies behind opaque discs.
+    /// Takes out footprints that lie behind the ends of all their cells.
+    #[inline(always)]
+    fn leave_out_dark(&self, footprints: &mut Columns<FOOTPRINT>, n: usize) {
+        if self.ends.is_empty() {
+            return;
+        }
+        for l in 0..n {
+            if footprints.side[l] <= 0 {
+                continue;
+            }
+            let [x, y, half_x, half_y, slant, _, distance] = std::array::from_fn(|f| footprints.column[AT + f][l]);
+            let reach = Vec2::new(half_x + slant.abs() * half_y, half_y);
+            if is_dark(self.ends, self.mapping.size(), Vec2::new(x, y), reach, distance) {
+                footprints.side[l] = 0;
+            }
+        }
+    }
+
+    /// Drops what lies behind the ends of cells.
     #[inline(always)]
     fn hide(&self, cells: &mut Cells, distance: &Lane) {
-        if self.opaque.is_empty() {
+        if self.ends.is_empty() {
             return;
         }
         for l in 0..LANES {
-            let nearest = self.opaque.get(cells.cell[l] as usize).copied().unwrap_or(f32::INFINITY);
+            let nearest = self.ends.get(cells.cell[l] as usize).copied().unwrap_or(f32::INFINITY);
             cells.is_kept[l] &= nearest >= distance[l];
         }
     }
+}
+
+/// Whether all cells within `reach` of a place end before a distance; never where that leaves the table, which may go on at another edge.
+#[inline(always)]
+pub(crate) fn is_dark(ends: &[f32], size: [u32; 2], at: Vec2, reach: Vec2, distance: f32) -> bool {
+    let [columns, rows] = size;
+    let low = at - reach;
+    let high = at + reach;
+    let is_inside = (low.x >= 0.0) & (low.y >= 0.0) & (high.x < columns as f32) & (high.y < rows as f32);
+    if !is_inside {
+        return false;
+    }
+    // Loops, not closures: these would be calls in code for vectors.
+    for row in low.y as usize..=high.y as usize {
+        let row = row * columns as usize;
+        for end in &ends[row + low.x as usize..=row + high.x as usize] {
+            if *end >= distance {
+                return false;
+            }
+        }
+    }
+    true
 }
 
 /// Up to [`LANES`] splats in the light's frame; lanes without one keep what they had.

@@ -6,7 +6,7 @@
 //! and all of them in the paper's model, are the processor's, which hands on their entries.
 
 use crate::building::caster::Casters;
-use crate::building::deposit::{Deposit, Scratch};
+use crate::building::deposit::{Deposit, Ends, Scratch};
 use crate::building::deposits::{check_entries, select};
 use crate::building::entries::Entries;
 use crate::gpu::MOST_ENTRIES;
@@ -38,6 +38,8 @@ pub struct Casting {
     pub(super) has_planes: bool,
     /// Absorbance at which lists stop.
     pub(super) limit: f32,
+    /// Share of the casters that are lit, by which entries were predicted.
+    lit_share: f64,
     /// Materials, one for unknown ones, footprints.
     pub(super) tables: Vec<[f32; 4]>,
     pub(super) footprints: u32,
@@ -116,7 +118,7 @@ impl Casting {
                 progress.tick(chunk.len() as u64)?;
                 scratch.media.clear();
                 scratch.surfaces.clear();
-                let deposit = Deposit { mapping, opaque, scratch };
+                let deposit = Deposit { mapping, ends: Ends::opaque(opaque), scratch };
                 Ok(pulp::Arch::new().dispatch(PartChunk { casters, plan, deposit, chunk }))
             })
             .collect::<Result<_, Error>>()?;
@@ -131,7 +133,17 @@ impl Casting {
         let tables = tables(casters);
         let footprints = casters.kernels.len() as u32;
         let limit = casters.params.absorbance_limit();
-        Ok(Self { map, plain, given, channels: C as u32, has_planes, limit, tables, footprints })
+        Ok(Self {
+            map,
+            plain,
+            given,
+            channels: C as u32,
+            has_planes,
+            limit,
+            lit_share: plan.lit.share,
+            tables,
+            footprints,
+        })
     }
 
     /// Casters that the device deposits.
@@ -146,7 +158,8 @@ impl Casting {
 
     /// An upper bound of the entries; the device counts them.
     pub fn expected(&self) -> u32 {
-        let predicted = (1.5 * self.map.prediction().entries).min(f64::from(MOST_ENTRIES)) as u64;
+        // A device deposits what is not lit too.
+        let predicted = (1.5 / self.lit_share * self.map.prediction().entries).min(f64::from(MOST_ENTRIES)) as u64;
         (self.given() + 4 * self.casters()).max(predicted).clamp(1, MOST_ENTRIES.into()) as u32
     }
 
@@ -187,9 +200,9 @@ impl<M: Mapping, const C: usize> pulp::NullaryFnOnce for PartChunk<'_, M, C> {
         let mut others = Vec::new();
         if casters.has_opaque_discs() {
             let Scratch { media_batches, surface_batches, ids: [ids, ..], .. } = &mut *self.deposit.scratch;
-            select(casters, &self.chunk, SplatKind::Medium, ids);
+            select(casters, self.chunk.clone(), SplatKind::Medium, ids);
             media_batches.part(mapping, casters, frame, ids, &mut plain, &mut others);
-            select(casters, &self.chunk, SplatKind::Surface, ids);
+            select(casters, self.chunk.clone(), SplatKind::Surface, ids);
             surface_batches.part(mapping, casters, frame, ids, &mut plain, &mut others);
         } else {
             others.extend(self.chunk.filter(|&i| casters.casts(i)).map(|i| i as u32));

@@ -2,6 +2,7 @@
 
 use crate::mapping::Octahedral;
 use crate::planning::appearance::Appearance;
+use crate::planning::lit::Lit;
 use crate::planning::survey::Survey;
 use splat_core::SplatKind;
 use std::fmt;
@@ -70,13 +71,14 @@ pub struct Counts {
 pub(crate) fn predict(
     look: &Appearance,
     survey: &Survey,
+    lit: &Lit,
     cell: f64,
     size: [f64; 2],
     limit: Limit,
     octahedral: bool,
 ) -> Prediction {
     let cells = size[0] * size[1];
-    let entries = look.entries(cell, cells);
+    let entries = lit.share * look.entries(cell, cells);
     let channels = if survey.coloured { 3.0 } else { 1.0 };
     // A distance and its sum.
     let knot = 4.0 + 4.0 * channels;

@@ -345,7 +345,10 @@ fn column<S: Simd, const C: usize>(simd: S, absorbances: &[[f32; C]; WINDOW], fr
 #[inline(always)]
 fn added(absorbances: &[f32; WINDOW]) -> f32 {
     let mut four = Vec4::ZERO;
-    (0..WINDOW).step_by(4).for_each(|l| four += Vec4::from_slice(&absorbances[l..]));
+    // A loop, not a closure: this would be a call for each list.
+    for part in absorbances.as_chunks::<4>().0 {
+        four += Vec4::from_array(*part);
+    }
     (four.x + four.z) + (four.y + four.w)
 }
 

@@ -1,0 +1,172 @@
+//! Which casters light reaches: lists end where it is dark, so that what lies behind needs no entries.
+//!
+//! A look before any work sums the absorbance of media in a table of some 32 cells a side, in [`SLABS`] slabs of equal depth. What all nearer slabs of its
+//! cell absorb tells how deep a caster lies in the dark. It is a mean over many cells of the map, so it decides nothing but the order: the
+//! casters that seem to be lit are deposited first, and of the others those that the cells of the map do not hide
+//! ([`crate::building::darkness`]).
+
+use crate::building::caster::Casters;
+use crate::frame::Frame;
+use crate::mapping::{Mapping, Table, with_mapping};
+use crate::planning::survey::{CHUNK, Survey};
+use rayon::prelude::*;
+use splat_core::SplatKind;
+use splat_core::optics::AbsorbanceModel;
+use std::ops::Range;
+
+/// Slabs of equal depth between the nearest and the farthest place that a caster may have.
+const SLABS: usize = 64;
+/// Cells along the longer side of the table that is looked at.
+pub(crate) const LOOK_CELLS: f64 = 32.0;
+/// Media from which on the look may pay: fewer make a table in some milliseconds.
+const MANY: u64 = 65_536;
+/// Share of casters that seem to be lit above which the rest saves less than it costs.
+const WORTH: f64 = 0.75;
+/// Absorbance before a caster, over the visible limit, up to which it belongs to each round. The first is what seems to be lit, with room for cells
+/// that lie below the mean.
+const ROUNDS: [f64; 2] = [1.5, 6.0];
+/// Rounds in which casters are deposited.
+pub(crate) const ROUND_COUNT: u8 = ROUNDS.len() as u8 + 1;
+/// Absorbance in fixed point: 2¹⁶ units an absorbance of 1, so that the order of summing does not matter.
+const FIXED: f32 = 65_536.0;
+
+/// What is known of lit casters before any work.
+#[derive(Debug, Clone)]
+pub(crate) struct Lit {
+    /// Share of the casters that seem to be lit, in (0, 1].
+    pub(crate) share: f64,
+    /// Rounds in which casters are deposited; `None` where nearly all are lit.
+    pub(crate) rounds: Option<Rounds>,
+}
+
+impl Lit {
+    /// All casters are lit.
+    const EVERYWHERE: Self = Self { share: 1.0, rounds: None };
+
+    /// Looks at every medium among the casters through a coarse table.
+    pub(crate) fn new(casters: &Casters<'_>, survey: &Survey, frame: &Frame, coarse: Table) -> Self {
+        let media = survey.kinds[SplatKind::Medium as usize];
+        if media < MANY || casters.params.absorbance == AbsorbanceModel::Paper {
+            return Self::EVERYWHERE;
+        }
+        let (rounds, dark) = Rounds::new(casters, survey, frame, coarse);
+        let share = survey.casters.saturating_sub(dark).max(1) as f64 / survey.casters as f64;
+        if share < WORTH { Self { share, rounds: Some(rounds) } } else { Self::EVERYWHERE }
+    }
+}
+
+/// The round of each caster, by its place.
+#[derive(Debug, Clone)]
+pub(crate) struct Rounds {
+    coarse: Table,
+    near: f32,
+    /// Depth of a slab.
+    depth: f32,
+    /// Of each cell, slab by slab.
+    round: Vec<u8>,
+}
+
+/// Media by cell and slab: how many, and their absorbance.
+struct Columns {
+    count: Vec<u32>,
+    absorbance: Vec<u64>,
+}
+
+impl Rounds {
+    /// The rounds of casters, and how many do not belong to the first.
+    pub(crate) fn new(casters: &Casters<'_>, survey: &Survey, frame: &Frame, coarse: Table) -> (Self, u64) {
+        let across = frame.length(survey.bounds.diagonal()) + 2.0 * frame.length(survey.max_radius);
+        let near = (frame.extent() - 1.01 * across).max(0.0);
+        let depth = ((frame.extent() - near) / SLABS as f32).max(f32::MIN_POSITIVE);
+        let mut rounds = Self { coarse, near, depth, round: Vec::new() };
+        let n = casters.cloud.len();
+        // Few large parts: each carries a table.
+        let part = CHUNK.max(n.div_ceil(16));
+        let parts: Vec<Columns> = (0..n.div_ceil(part))
+            .into_par_iter()
+            .map(|c| {
+                let splats = c * part..n.min((c + 1) * part);
+                with_mapping!(&rounds.coarse, m => rounds.columns(m, casters, frame, splats))
+            })
+            .collect();
+        let Some(columns) = parts.into_iter().reduce(Columns::join) else { return (rounds, 0) };
+        let unit = f64::from(casters.params.absorbance_limit()) * f64::from(FIXED);
+        let limits = ROUNDS.map(|limit| (limit * unit) as u64);
+        let mut dark = 0;
+        for (counts, absorbances) in columns.count.chunks(SLABS).zip(columns.absorbance.chunks(SLABS)) {
+            let mut before = 0;
+            for (count, absorbance) in counts.iter().zip(absorbances) {
+                let round = limits.iter().filter(|limit| before >= **limit).count();
+                dark += if round > 0 { u64::from(*count) } else { 0 };
+                before += absorbance;
+                rounds.round.push(round as u8);
+            }
+        }
+        (rounds, dark)
+    }
+
+    fn columns<M: Mapping>(&self, coarse: &M, casters: &Casters<'_>, frame: &Frame, splats: Range<usize>) -> Columns {
+        let cloud = casters.cloud;
+        let [width, height] = coarse.size();
+        let len = width as usize * height as usize * SLABS;
+        let mut columns = Columns { count: vec![0; len], absorbance: vec![0; len] };
+        for i in splats {
+            if cloud.kind[i] != SplatKind::Medium || !casters.casts(i) {
+                continue;
+            }
+            let position = frame.position(cloud.position[i]);
+            let Some(slot) = self.slot(coarse, position) else { continue };
+            let cell = slot / SLABS as u32;
+            let area = if coarse.is_parallel() { 1.0 } else { position.length_squared() };
+            let [red, green, blue] = casters.extinction(i).rgb;
+            let least = frame.area(cloud.cross_section[i]) * red.min(green).min(blue);
+            let absorbance = least * coarse.inverse_measure(cell % width, cell / width) / area;
+            columns.count[slot as usize] += 1;
+            // The cast saturates, and 2³² of the greatest fit 64 bits.
+            columns.absorbance[slot as usize] += u64::from((absorbance * FIXED) as u32);
+        }
+        columns
+    }
+
+    /// Where a position of the light's frame is summed; `None` outside the table.
+    #[inline(always)]
+    fn slot<M: Mapping>(&self, coarse: &M, position: splat_core::glam::Vec3) -> Option<u32> {
+        let place = coarse.locate(position)?;
+        let [width, height] = coarse.size();
+        let column = (place.at.x.max(0.0) as u32).min(width - 1);
+        let row = (place.at.y.max(0.0) as u32).min(height - 1);
+        let slab = (((place.distance - self.near) / self.depth).max(0.0) as u32).min(SLABS as u32 - 1);
+        Some((row * width + column) * SLABS as u32 + slab)
+    }
+
+    /// The round of each splat; the first for what is no medium.
+    pub(crate) fn of_splats(&self, casters: &Casters<'_>, frame: &Frame) -> Vec<u8> {
+        with_mapping!(&self.coarse, m => self.of_splats_in(m, casters, frame))
+    }
+
+    fn of_splats_in<M: Mapping>(&self, coarse: &M, casters: &Casters<'_>, frame: &Frame) -> Vec<u8> {
+        let cloud = casters.cloud;
+        let mut rounds = vec![0; cloud.len()];
+        rounds.par_chunks_mut(CHUNK).enumerate().for_each(|(c, rounds)| {
+            let splats = c * CHUNK..c * CHUNK + rounds.len();
+            let kinds = &cloud.kind[splats.clone()];
+            for ((round, position), kind) in rounds.iter_mut().zip(&cloud.position[splats]).zip(kinds) {
+                if *kind != SplatKind::Medium {
+                    continue;
+                }
+                if let Some(slot) = self.slot(coarse, frame.position(*position)) {
+                    *round = self.round[slot as usize];
+                }
+            }
+        });
+        rounds
+    }
+}
+
+impl Columns {
+    fn join(mut self, other: Self) -> Self {
+        self.count.iter_mut().zip(other.count).for_each(|(to, from)| *to += from);
+        self.absorbance.iter_mut().zip(other.absorbance).for_each(|(to, from)| *to += from);
+        self
+    }
+}
