@@ -75,13 +75,26 @@ fn bi23_unknown_keys_suggest_the_nearest() {
             "position = [2",
             "radius = 1\nposition = [2",
             "8:1: unknown key `radius`",
-            "known here: name, position, intensity, shadow",
+            "known here: name, position, intensity, shadow, shadow_cells",
         ),
         ("[render]", "[rendr]", "20:2: unknown key `rendr`", "did you mean `render`?"),
     ];
     for (from, to, message, hint) in cases {
         assert_eq!(refusal(from, to), (message.to_owned(), hint.to_owned()));
     }
+}
+
+#[test]
+fn cells_of_a_shadow_map_that_is_not_made_are_refused_or_named() {
+    let light = "shadow = false\nshadow_cells = 64\nposition = [2";
+    let (message, hint) = refusal("position = [2", light);
+    assert_eq!(message, "9:16: `shadow_cells` beside `shadow = false`: this light has no shadow map");
+    assert_eq!(hint, "leave one of them out");
+    refused(
+        "position = [2",
+        "shadow_cells = 0\nposition = [2",
+        "8:16: `shadow_cells`: expected a whole number from 1 to 16384, found 0",
+    );
 }
 
 #[test]

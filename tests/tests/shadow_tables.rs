@@ -99,9 +99,9 @@ fn cells_that_cost_many_times_the_automatic_ones_are_told() {
     assert_eq!(told("render.shadow={cells='auto'}"), None);
 }
 
-/// What is told of the cells when the scene is drawn with so many.
-fn told(cells: u32) -> Option<String> {
-    let overrides = vec![Override::parse(&format!("render.shadow={{cells={cells}}}")).unwrap()];
+/// What is told of the cells when the scene is drawn with so many, of its light or of all.
+fn told(set: &str) -> Option<String> {
+    let overrides = vec![Override::parse(set).unwrap()];
     let options = LoadOptions { overrides, ..LoadOptions::default() };
     let scene = parse(Path::new("s.toml"), scene("[1, 0.8, 0]", "").as_bytes(), &options).unwrap();
     let render = organza::render(&scene, &RenderOptions::default(), &Progress::new()).unwrap();
@@ -110,8 +110,10 @@ fn told(cells: u32) -> Option<String> {
 
 #[test]
 fn cells_that_are_seen_are_told_with_what_would_do() {
-    let warning = told(24).unwrap();
-    let better: u32 = warning.split("cells = ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap();
-    assert!(better > 24, "{warning}");
-    assert_eq!(told(better), None, "{warning}");
+    let warning = told("render.shadow.cells=24").unwrap();
+    let better: u32 = warning.split("shadow_cells = ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap();
+    assert!(better > 24 && warning.contains("most by light 0"), "{warning}");
+    assert_eq!(told(&format!("light.0.shadow_cells={better}")), None, "{warning}");
+    // A light goes before all lights.
+    assert!(told("light.0.shadow_cells=24").unwrap().contains("most by light 0, whose map has 24 cells"));
 }

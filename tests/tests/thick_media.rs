@@ -159,6 +159,26 @@ fn slabs_are_bright_up_to_grazing_views_however_thick_a_spacing_is() {
     }
 }
 
+/// A box of 64 layers of 7 optical depths each, lit aslant: light falls within its outermost layer.
+#[test]
+fn the_shadow_of_a_thick_box_on_itself_has_no_stripes() {
+    let scene = |cells: &str| {
+        format!(
+            "version = 1\n[camera]\nposition = [7, 5, 8]\ntarget = [0, 0, 0]\nfov_y = 14\nsize = [96, 72]\n\
+             [[light]]\nkind = 'directional'\ndirection = [0.274, -0.732, -0.623]\nirradiance = [3, 3, 3]\nshadow_cells = {cells}\n\
+             [[object]]\nname = 'box'\nmaterial = 'box'\n\
+             medium_box = {{ min = [-1, -1, -1], max = [1, 1, 1], extinction = 224, spacing = 0.03125 }}\n\
+             [material.box]\nmedium = {{ albedo = 1 }}\n[render]\ntechnique = 'points'\n"
+        )
+    };
+    let found = draw(&scene("").replace("shadow_cells = \n", ""), &[]).channel("G");
+    let fine = draw(&scene("768"), &[]).channel("G");
+    let square = found.iter().zip(&fine).map(|(a, b)| (a - b).powi(2)).sum::<f64>();
+    let brightest = fine.iter().copied().fold(0.0, f64::max);
+    let rms = (square / fine.len() as f64).sqrt() / brightest;
+    assert!(rms < 0.01, "{rms}");
+}
+
 fn warnings(text: &str) -> Vec<String> {
     let scene = parse(Path::new("s.toml"), text.as_bytes(), &LoadOptions::default()).unwrap();
     let warnings = organza::render(&scene, &RenderOptions::default(), &Progress::new()).unwrap().warnings;

@@ -406,7 +406,8 @@ mod deep {
     fn without_cosine(whole: &SceneLight) -> Vec<SceneLight> {
         let bare = |point: Light| {
             let shape = LightShape::Point { position: point.shape.place().unwrap() };
-            SceneLight { label: "0".to_owned(), light: Light { shape, ..point }, slide: None, samples: 1, shadow: true }
+            let light = Light { shape, ..point };
+            SceneLight { label: "0".to_owned(), light, slide: None, samples: 1, shadow: true, shadow_cells: None }
         };
         whole.light.points(whole.samples).into_iter().map(bare).collect()
     }

@@ -8,3 +8,5 @@ pub(crate) const LARGEST_INTENSITY: f64 = 1e30;
 pub(crate) const SMALLEST: f64 = 1e-18;
 /// Most samples along one side of a region.
 pub(crate) const MOST_SAMPLES: f64 = 65536.0;
+/// Most cells along a side of a shadow map.
+pub(crate) const MOST_SHADOW_CELLS: u32 = 16384;

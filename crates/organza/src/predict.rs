@@ -187,7 +187,11 @@ fn conversion(counts: impl Iterator<Item = Count>) -> CountedPass {
 /// Shadow tables of the automatic resolution, where the scene asks for cells.
 fn automatic_cells(frame: &Frame<'_>, seen: &Seen) -> Option<Change> {
     frame.settings.shadow.cells?;
-    let counts = tables(frame).flat_map(|(table, point)| cast(frame, point, table.automatic_entries));
+    let counts = tables(frame).flat_map(|(table, point)| {
+        // What a light states stays.
+        let stated = point.shadow_cells.map(|_| table.predicted.entries);
+        cast(frame, point, stated.unwrap_or(table.automatic_entries))
+    });
     let mut passes = surfaces(frame, seen);
     passes.push(CountedPass::new(pass::SHADOW_MAP, pass::SHADOW_MAP.to_owned(), counts.collect()));
     Some(Change { key: "render.shadow.cells = \"auto\"".to_owned(), passes })

@@ -198,6 +198,7 @@ pub(crate) fn prepare<'a>(
     let mut notes = loaded.notes.clone();
     notes.extend(notes_of_scene);
     notes.extend(warnings::without_part(&scene));
+    notes.extend(warnings::idle_cells(&loaded.lights, &plan));
     let said = settle::said(&scene, &plan.estimates);
     // Of a technique that the plan chose a warning tells what it lacks.
     if said.warnings.is_empty() {

@@ -30,12 +30,14 @@ pub(crate) const EYE: &str = "the eye";
 const CELLS_BEHIND: f64 = 5.0;
 
 /// The part of a picture for which the cells of its shadow maps are too coarse.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Coarse {
     /// Share of what splats show in the picture whose displayed light is off by more than the tolerance, estimated.
     pub(crate) share: f64,
-    /// Cells along the longer side of the largest table.
+    /// Cells along the longer side of the table of the light that is off most.
     pub(crate) cells: u32,
+    /// How that light is called.
+    pub(crate) light: String,
 }
 
 /// The table of one light's shadow map, as it was chosen before any work.
@@ -43,6 +45,8 @@ pub(crate) struct Coarse {
 pub struct ShadowTable {
     /// Its size and work.
     pub predicted: tsm::Prediction,
+    /// Cells along a side that its light or `render.shadow` asks for.
+    pub cells: Option<u32>,
     /// Transmittance at which lists stop.
     pub tolerance: f32,
     /// Bytes within which its cells were chosen.
@@ -54,7 +58,7 @@ pub struct ShadowTable {
 impl ShadowTable {
     /// What it is built by, where it and those after it may take so many bytes.
     pub(crate) fn params(&self, settings: &RenderSettings, loaded: &Loaded, left: u64) -> Params {
-        shadow_params(settings, loaded, self.tolerance, self.max_bytes.min(left))
+        shadow_params(settings, loaded, self.cells, self.tolerance, self.max_bytes.min(left))
     }
 
     /// Absorbance at which lists stop.
@@ -71,8 +75,15 @@ impl ShadowTable {
     }
 }
 
-/// Parameters of a map with this tolerance, the transmittance at which its lists stop, which may take `max_bytes`.
-pub fn shadow_params(settings: &RenderSettings, loaded: &Loaded, tolerance: f32, max_bytes: u64) -> Params {
+/// Parameters of a map with so many cells along a side, or as many as it calls for, and with this tolerance, the transmittance at which its lists stop,
+/// which may take `max_bytes`.
+pub fn shadow_params(
+    settings: &RenderSettings,
+    loaded: &Loaded,
+    cells: Option<u32>,
+    tolerance: f32,
+    max_bytes: u64,
+) -> Params {
     let shadow = &settings.shadow;
     Params {
         mapping: match shadow.mapping {
@@ -80,7 +91,7 @@ pub fn shadow_params(settings: &RenderSettings, loaded: &Loaded, tolerance: f32,
             ShadowMapping::Octahedral => tsm::MappingChoice::Octahedral,
             ShadowMapping::Polar => tsm::MappingChoice::PolarAzimuth,
         },
-        resolution: shadow.cells.map_or(tsm::Resolution::Auto, tsm::Resolution::Cells),
+        resolution: cells.map_or(tsm::Resolution::Auto, tsm::Resolution::Cells),
         tolerance,
         footprints: loaded.footprints.clone(),
         limits: Limits::bytes(max_bytes),
@@ -159,7 +170,7 @@ pub(crate) fn eye_table(
     let objects = thick_objects(loaded, shown);
     let scene = tsm::Scene { cloud, materials: &loaded.materials, objects: &objects };
     let predicted = Deposits::predict(&scene, &eye(&loaded.camera), &params).map_err(|e| shadow_error(EYE, &e))?;
-    Ok(Some(ShadowTable { predicted, tolerance, max_bytes, automatic_entries: predicted.entries }))
+    Ok(Some(ShadowTable { predicted, cells: None, tolerance, max_bytes, automatic_entries: predicted.entries }))
 }
 
 /// Transmittance e^(−A_cut) below which the light of one lamp is lost in the picture: its brightest light times that changes no
@@ -229,7 +240,8 @@ fn tables_within(
         let Some((point, objects)) = request else { return Ok(None) };
         let light = &point.light;
         let tolerance = tolerance(settings, loaded, point, maps, thickest);
-        let params = shadow_params(settings, loaded, tolerance, max_bytes);
+        let cells = point.shadow_cells.or(settings.shadow.cells);
+        let params = shadow_params(settings, loaded, cells, tolerance, max_bytes);
         let scene = tsm::Scene { cloud: &loaded.cloud, materials: &loaded.materials, objects };
         let predict =
             |params: &Params| Deposits::predict(&scene, light, params).map_err(|e| shadow_error(&point.name(), &e));
@@ -240,7 +252,7 @@ fn tables_within(
                 predict(&Params { resolution: tsm::Resolution::Auto, ..params.clone() })?.entries
             }
         };
-        Ok(Some(ShadowTable { predicted, tolerance, max_bytes, automatic_entries }))
+        Ok(Some(ShadowTable { predicted, cells, tolerance, max_bytes, automatic_entries }))
     };
     requests.iter().map(table).collect()
 }

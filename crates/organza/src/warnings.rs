@@ -14,7 +14,7 @@ use crate::scene::{Scene, SceneLight, SceneObject, Source};
 use crate::shadows::{Coarse, thickness_of};
 use crate::{Layers, ShadowTable, escape_controls};
 use glam::DVec3;
-pub(crate) use keys::without_part;
+pub(crate) use keys::{idle_cells, without_part};
 use splat_core::raster::objects_in_view;
 use splat_core::shade::joint::MediumSpacing;
 use splat_core::{DAabb, Object, Projection, SplatKind};
@@ -282,17 +282,20 @@ pub(crate) fn of_scattering(plan: &Plan) -> Option<String> {
 
 /// Shadow maps whose cells are seen in the picture.
 pub(crate) fn of_cells(coarse: Coarse) -> Option<String> {
-    let Coarse { share, cells } = coarse;
+    let Coarse { share, cells, light } = coarse;
     // Edges of shadows are as wide as a cell, so the share goes with its width.
     let better = libm::ceil(f64::from(cells) * share / FEW / 64.0) * 64.0;
     (share > MANY).then(|| {
         let percent = libm::round(100.0 * share);
         let advice = if better <= MOST_CELLS {
-            format!("[render.shadow] with cells = {better} would do")
+            format!("shadow_cells = {better} of that [[light]] would do")
         } else {
             "more cells than a table may have would do".to_owned()
         };
-        format!("shadows are coarse: about {percent} % of what splats show is lit off by more than the tolerance, by {cells} cells a side: {advice}")
+        format!(
+            "shadows are coarse: about {percent} % of what splats show is lit off by more than the tolerance, most by light {light}, whose map has \
+             {cells} cells a side: {advice}"
+        )
     })
 }
 
@@ -313,7 +316,7 @@ pub(crate) fn of_costly<'a>(tables: impl Iterator<Item = &'a ShadowTable>) -> Op
     (entries >= COSTLY && times >= TIMES).then(|| {
         let [millions, times] = [1e-6 * entries, times].map(libm::round);
         format!(
-            "the cells of [render.shadow] make {millions} million entries of a shadow map, {times} times those of cells = \"auto\", \
+            "the cells that are asked for make {millions} million entries of a shadow map, {times} times those of cells = \"auto\", \
              and take as much longer to build"
         )
     })

@@ -12,6 +12,7 @@ pub(crate) fn entries() -> Vec<Entry> {
         one("light.directional.direction", "light.0.direction=[-2, -3, -1]").with(SUN),
         one("light.directional.irradiance", "light.0.irradiance=[1, 1, 1]").with(SUN),
         one("light.directional.shadow", "light.0.shadow=false").with(SUN),
+        one("light.directional.shadow_cells", "light.0.shadow_cells=2").with(SUN),
         one("light.spot.texture", "light.0.texture='sky.hdr'").with(SPOT),
         one("light.spot.texture_up", "light.0.texture_up=[1, 0, 0]").with(SLIDE),
         one("light.spot.texture_angle", "light.0.texture_angle=60").with(SLIDE),
@@ -34,6 +35,7 @@ pub(crate) fn entries() -> Vec<Entry> {
         all.push(one(key("position"), "light.0.position=[2, 2.9, 2]").with(with));
         all.push(one(key("intensity"), "light.0.intensity=[10, 10, 10]").with(with));
         all.push(one(key("shadow"), "light.0.shadow=false").with(with));
+        all.push(one(key("shadow_cells"), "light.0.shadow_cells=2").with(with));
         if matches!(kind, "sphere" | "disk" | "rect") {
             all.push(one(key("samples"), "light.0.samples=9").with(with));
         }

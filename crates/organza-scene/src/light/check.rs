@@ -1,9 +1,9 @@
 //! Checks of lights.
 
 use crate::at::At;
-use crate::light::raw::RawLight;
+use crate::light::raw::{RawLight, RawLightShadow};
 use crate::light::slide::{SlideKeys, check_slide};
-use crate::limits::{LARGEST, SMALLEST};
+use crate::limits::{LARGEST, MOST_SHADOW_CELLS, SMALLEST};
 use crate::paths::Paths;
 use crate::{Error, SceneLight, shown};
 use glam::DVec3;
@@ -28,7 +28,8 @@ pub(crate) fn check_lights(at_lights: &At<'_>, raw: &[RawLight], paths: &Paths) 
             }
         }
         let label = light.name().map_or_else(|| i.to_string(), str::to_owned);
-        lights.push(SceneLight { label, ..check_light(&at, light, paths)? });
+        let shadow_cells = check_shadow_cells(&at, &light.shadow())?;
+        lights.push(SceneLight { label, shadow_cells, ..check_light(&at, light, paths)? });
     }
     Ok(lights)
 }
@@ -43,7 +44,16 @@ fn check_name(at: &At<'_>, name: &str) -> Result<(), Error> {
     Ok(())
 }
 
-/// Checks one light, without its label.
+fn check_shadow_cells(at: &At<'_>, shadow: &RawLightShadow) -> Result<Option<u32>, Error> {
+    let Some(cells) = shadow.cells else { return Ok(None) };
+    if !shadow.is_cast {
+        let message = "`shadow_cells` beside `shadow = false`: this light has no shadow map".to_owned();
+        return Err(at.key("shadow_cells").error(message, "leave one of them out"));
+    }
+    at.whole("shadow_cells", cells, 1..=MOST_SHADOW_CELLS).map(Some)
+}
+
+/// Checks one light, without its label and the cells of its shadow map.
 fn check_light(at: &At<'_>, raw: &RawLight, paths: &Paths) -> Result<SceneLight, Error> {
     let scene_light = |shape, intensity, shadow| SceneLight {
         label: String::new(),
@@ -51,6 +61,7 @@ fn check_light(at: &At<'_>, raw: &RawLight, paths: &Paths) -> Result<SceneLight,
         slide: None,
         samples: 1,
         shadow,
+        shadow_cells: None,
     };
     let extended = |shape, intensity, samples, shadow| {
         let samples = at.whole("samples", samples, 1..=MOST_LIGHT_SAMPLES)?;

@@ -16,6 +16,8 @@ pub struct SceneLight {
     pub samples: u32,
     /// Whether it casts shadows.
     pub shadow: bool,
+    /// Cells along a side of its shadow map; `None` for those of [`crate::ShadowSettings`].
+    pub shadow_cells: Option<u32>,
 }
 
 /// The picture that a light shines through: its file, and how it lies.

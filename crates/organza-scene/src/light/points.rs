@@ -12,6 +12,8 @@ pub struct LightPoint {
     pub light: Light,
     /// The light that it is of.
     pub whole: Light,
+    /// Cells along a side of its shadow map, where its whole light states them.
+    pub shadow_cells: Option<u32>,
     /// The place of its whole light in the list that it is from.
     pub of: usize,
     /// Which of its points it is, and how many there are.
@@ -36,6 +38,7 @@ pub fn light_points(lights: &[SceneLight]) -> Vec<LightPoint> {
             label: whole.label.clone(),
             light,
             whole: whole.light,
+            shadow_cells: whole.shadow_cells,
             of: rank,
             rank: [k, count],
         };
@@ -66,6 +69,7 @@ mod tests {
             slide: None,
             samples,
             shadow,
+            shadow_cells: None,
         };
         let disk = LightShape::Disk { center: DVec3::Y, normal: DVec3::NEG_Y, radius: 0.5 };
         let lamp = LightShape::Point { position: DVec3::Y };

@@ -28,6 +28,8 @@ pub(crate) enum RawLight {
         /// Whether it casts shadows; default true.
         #[serde(default = "yes")]
         shadow: bool,
+        /// Cells along a side of its shadow map, 1 to 16384; default those of `render.shadow`.
+        shadow_cells: Option<u32>,
     },
     /// Parallel light.
     Directional {
@@ -48,6 +50,8 @@ pub(crate) enum RawLight {
         /// Whether it casts shadows; default true.
         #[serde(default = "yes")]
         shadow: bool,
+        /// Cells along a side of its shadow map, 1 to 16384; default those of `render.shadow`.
+        shadow_cells: Option<u32>,
     },
     /// A cone of light.
     Spot {
@@ -75,6 +79,8 @@ pub(crate) enum RawLight {
         /// Whether it casts shadows; default true.
         #[serde(default = "yes")]
         shadow: bool,
+        /// Cells along a side of its shadow map, 1 to 16384; default those of `render.shadow`.
+        shadow_cells: Option<u32>,
     },
     /// A sphere that shines outwards.
     Sphere {
@@ -92,6 +98,8 @@ pub(crate) enum RawLight {
         /// Whether it casts shadows; default true.
         #[serde(default = "yes")]
         shadow: bool,
+        /// Cells along a side of its shadow map, 1 to 16384; default those of `render.shadow`.
+        shadow_cells: Option<u32>,
     },
     /// A flat disc that shines to the side of its normal.
     Disk {
@@ -111,6 +119,8 @@ pub(crate) enum RawLight {
         /// Whether it casts shadows; default true.
         #[serde(default = "yes")]
         shadow: bool,
+        /// Cells along a side of its shadow map, 1 to 16384; default those of `render.shadow`.
+        shadow_cells: Option<u32>,
     },
     /// A flat parallelogram that shines to the side of u × v.
     Rect {
@@ -130,10 +140,30 @@ pub(crate) enum RawLight {
         /// Whether it casts shadows; default true.
         #[serde(default = "yes")]
         shadow: bool,
+        /// Cells along a side of its shadow map, 1 to 16384; default those of `render.shadow`.
+        shadow_cells: Option<u32>,
     },
 }
 
+/// What a light states of its shadow.
+pub(crate) struct RawLightShadow {
+    pub(crate) is_cast: bool,
+    pub(crate) cells: Option<u32>,
+}
+
 impl RawLight {
+    /// Whether it casts shadows, and the cells of its map.
+    pub(crate) fn shadow(&self) -> RawLightShadow {
+        match *self {
+            Self::Point { shadow, shadow_cells, .. }
+            | Self::Directional { shadow, shadow_cells, .. }
+            | Self::Spot { shadow, shadow_cells, .. }
+            | Self::Sphere { shadow, shadow_cells, .. }
+            | Self::Disk { shadow, shadow_cells, .. }
+            | Self::Rect { shadow, shadow_cells, .. } => RawLightShadow { is_cast: shadow, cells: shadow_cells },
+        }
+    }
+
     /// The name that the scene gives it.
     pub(crate) fn name(&self) -> Option<&str> {
         match self {

@@ -1,7 +1,7 @@
 //! Checks of the render settings.
 
 use crate::at::At;
-use crate::limits::{LARGEST, SMALLEST};
+use crate::limits::{LARGEST, MOST_SHADOW_CELLS, SMALLEST};
 use crate::render::raw::{
     Auto, RawAccumulation, RawAligned, RawClassify, RawDirection, RawGoal, RawGradients, RawKernel, RawMapping,
     RawParticles, RawPoints, RawReconstruction, RawRender, RawScattering, RawShadow, RawSheets, RawSlicing,
@@ -350,9 +350,12 @@ fn check_scattering(at: &At<'_>, raw: &RawSheets) -> Result<Option<Scattering>, 
 fn check_shadow(at: &At<'_>, raw: &RawShadow) -> Result<ShadowSettings, Error> {
     let cells = match raw.cells {
         None | Some(Auto::Auto) => None,
-        Some(Auto::Number(n)) if n.fract() == 0.0 && (1.0..=16384.0).contains(&n) => Some(n as u32),
+        Some(Auto::Number(n)) if n.fract() == 0.0 && (1.0..=f64::from(MOST_SHADOW_CELLS)).contains(&n) => {
+            Some(n as u32)
+        }
         Some(Auto::Number(n)) => {
-            let message = format!("`cells`: expected a whole number from 1 to 16384 or \"auto\", found {n}");
+            let message =
+                format!("`cells`: expected a whole number from 1 to {MOST_SHADOW_CELLS} or \"auto\", found {n}");
             return Err(at.key("cells").error(message, ""));
         }
     };

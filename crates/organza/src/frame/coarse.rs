@@ -51,8 +51,6 @@ impl Frame<'_> {
     /// Estimates what the cells of the shadow maps are too coarse for, where maps were made, from splats at even distances in the list.
     pub(crate) fn coarse(&self) -> Option<Coarse> {
         let maps = &self.maps.get()?.of_all;
-        let sides = maps.iter().flatten().flat_map(|map| map.prediction().size);
-        let cells = sides.max()? as u32;
         // Thick media hide most of themselves.
         let shown = self.shown_shares.get();
         let share = |candidate: usize| shown.map_or(1.0, |shares| f64::from(shares[candidate]));
@@ -69,11 +67,19 @@ impl Frame<'_> {
             // Rounding to bytes moves each by half a level.
             tolerance: (255.0 * self.settings.tolerance).max(1.0),
         };
-        // In the order of the list, so that the sum does not depend on threads.
-        let is_off: Vec<bool> = samples.par_iter().map(|sample| look.is_off(sample)).collect();
-        let off = samples.iter().zip(is_off).filter(|(_, is_off)| *is_off).map(|(sample, _)| sample.area).sum::<f64>();
+        // In the order of the list, so that sums do not depend on threads.
+        let worst: Vec<Option<usize>> = samples.par_iter().map(|sample| look.worst_light(sample)).collect();
+        let mut off = vec![0.0; look.lit.len()];
+        for (sample, worst) in samples.iter().zip(worst) {
+            if let Some(light) = worst {
+                off[light] += sample.area;
+            }
+        }
         let area = samples.iter().map(|sample| sample.area).sum::<f64>();
-        (area > 0.0).then_some(Coarse { share: off / area, cells })
+        let worst = (0..off.len()).max_by(|a, b| off[*a].total_cmp(&off[*b]))?;
+        let [columns, rows] = look.lit[worst].1?.prediction().size;
+        let light = self.with_intensity().nth(worst)?.label.clone();
+        (area > 0.0).then_some(Coarse { share: off.iter().sum::<f64>() / area, cells: columns.max(rows) as u32, light })
     }
 
     /// Splats at even distances in the list, among which those are sought that are seen.
@@ -117,8 +123,8 @@ impl Frame<'_> {
 }
 
 impl Look<'_> {
-    /// Whether the light of a splat is displayed off by more than the tolerance.
-    fn is_off(&self, sample: &Sample) -> bool {
+    /// The light whose map errs most at a splat, where what is displayed of its light is off by more than the tolerance.
+    fn worst_light(&self, sample: &Sample) -> Option<usize> {
         let splat = sample.splat;
         let receiver = Receiver::of_splat(self.input.cloud, splat);
         let arrives = |map: &Option<&ShadowMap>| Even(map.map_or([1.0; 3], |map| map.transmittance(&receiver)));
@@ -126,6 +132,8 @@ impl Look<'_> {
         let expected = self.radiance(splat, &through);
         // Lights err by themselves: their squares add up.
         let mut variance = [0.0; 3];
+        let mut worst = None;
+        let mut most = 0.0;
         for (rank, (_, map)) in self.lit.iter().enumerate() {
             // Nobody sees cells that are finer than a pixel.
             let is_seen = |map: &&ShadowMap| map.cell_width(receiver.position) * sample.px_per_world >= 1.0;
@@ -136,10 +144,17 @@ impl Look<'_> {
             let mut other = through.clone();
             other[rank] = Even(through[rank].0.map(|t| if t > 0.5 { t - error } else { t + error }.clamp(0.0, 1.0)));
             let radiance = self.radiance(splat, &other);
-            (0..3).for_each(|c| variance[c] += (radiance[c] - expected[c]).powi(2));
+            let squares = [0, 1, 2].map(|c| (radiance[c] - expected[c]).powi(2));
+            (0..3).for_each(|c| variance[c] += squares[c]);
+            let sum = squares.iter().sum::<f32>();
+            if sum > most {
+                most = sum;
+                worst = Some(rank);
+            }
         }
         let byte = |radiance: f32| f64::from(displayed(radiance.max(0.0) * self.gain));
-        (0..3).any(|c| byte(expected[c] + variance[c].sqrt()) - byte(expected[c]) > self.tolerance)
+        let is_off = (0..3).any(|c| byte(expected[c] + variance[c].sqrt()) - byte(expected[c]) > self.tolerance);
+        worst.filter(|_| is_off)
     }
 
     /// Radiance of a splat by such shares of each light.

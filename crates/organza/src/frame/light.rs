@@ -11,6 +11,9 @@ use splat_core::shade::{LitBy, ShadeInput};
 use splat_core::{Arrived, Object, Remembered, Transmittance};
 use tsm::{Deposits, ShadowMap};
 
+/// The intensity of a light that gives none.
+const DARK: [f32; 3] = [0.0; 3];
+
 /// The shadow maps of a frame, for each point of a light. They serve other frames of the same splats, whatever the camera.
 pub(crate) struct Maps {
     /// Of all casters.
@@ -192,9 +195,14 @@ impl<'a> Frame<'a> {
         self.with_light(maps.iter().map(Option::as_ref))
     }
 
+    /// Points of lights that have an intensity.
+    pub(crate) fn with_intensity(&self) -> impl Iterator<Item = &LightPoint> {
+        self.light_points().iter().filter(|point| point.light.intensity != DARK)
+    }
+
     /// Points of lights that have an intensity, without shadows, each with what is there for it.
     pub(crate) fn with_light<T>(&self, of_each: impl Iterator<Item = T>) -> impl Iterator<Item = (LitBy<'_>, T)> {
-        let lit_points = self.light_points().iter().zip(of_each).filter(|(point, _)| point.light.intensity != [0.0; 3]);
+        let lit_points = self.light_points().iter().zip(of_each).filter(|(point, _)| point.light.intensity != DARK);
         lit_points.map(|(point, value)| (self.lit(point), value))
     }
 

@@ -134,8 +134,10 @@ impl Eye<'_> {
         let loaded = self.splats(light, sees)?;
         let casters = tsm::Scene { cloud: &loaded.cloud, materials: &loaded.materials, objects: &loaded.objects };
         let left = self.options.max_memory.saturating_sub(loaded.cloud.bytes());
-        let params = shadow_params(&self.scene.render, &loaded, Params::default().tolerance, left);
-        let map = ShadowMap::build(&casters, &self.scene.lights[light].light.middle(), &params, Some(self.progress));
+        let whole = &self.scene.lights[light];
+        let cells = whole.shadow_cells.or(self.scene.render.shadow.cells);
+        let params = shadow_params(&self.scene.render, &loaded, cells, Params::default().tolerance, left);
+        let map = ShadowMap::build(&casters, &whole.light.middle(), &params, Some(self.progress));
         let map = map.map_err(|e| shadow_error(&format!("light {light}"), &e))?;
         self.files.most.set(self.files.most.get().max(loaded.cloud.bytes() + map.peak_bytes()));
         Ok((map, loaded.cloud.origin))

@@ -1,7 +1,8 @@
 //! Keys of techniques that draw nothing of a picture, or nothing that the keys are for.
 
 use crate::choose::technique_of;
-use crate::scene::{Scene, Technique, TechniqueKey};
+use crate::plan::Plan;
+use crate::scene::{Scene, SceneLight, Technique, TechniqueKey, light_points};
 
 /// Keys of `sheets` that say how a medium on a lattice is reconstructed.
 const OF_LATTICES: [&str; 8] = [
@@ -42,6 +43,21 @@ pub(crate) fn without_part(scene: &Scene) -> Vec<String> {
         Some(format!("{names} {have} no part in this picture: {what} is drawn by the technique `{technique}`"))
     };
     scene.technique_keys.chunk_by(|a, b| a.technique == b.technique).filter_map(sentence).collect()
+}
+
+/// One sentence for each light that states cells of a shadow map which nothing in the picture asks for.
+pub(crate) fn idle_cells(lights: &[SceneLight], plan: &Plan) -> Vec<String> {
+    let points = light_points(lights);
+    let has_map = |rank: usize| {
+        let maps = plan.shadow_tables.iter().zip(&points);
+        maps.filter(|(table, _)| table.is_some()).any(|(_, point)| point.of == rank)
+    };
+    let idle = lights.iter().enumerate().filter(|(rank, light)| light.shadow_cells.is_some() && !has_map(*rank));
+    idle.map(|(_, light)| {
+        let label = &light.label;
+        format!("light.{label}.shadow_cells has no part in this picture: no shadow map is made of this light")
+    })
+    .collect()
 }
 
 #[cfg(test)]
