@@ -47,6 +47,8 @@ pub struct ShadowTable {
     pub predicted: tsm::Prediction,
     /// Cells along a side that its light or `render.shadow` asks for.
     pub cells: Option<u32>,
+    /// Whether its light asks for them.
+    pub light_states_cells: bool,
     /// Transmittance at which lists stop.
     pub tolerance: f32,
     /// Bytes within which its cells were chosen.
@@ -170,7 +172,14 @@ pub(crate) fn eye_table(
     let objects = thick_objects(loaded, shown);
     let scene = tsm::Scene { cloud, materials: &loaded.materials, objects: &objects };
     let predicted = Deposits::predict(&scene, &eye(&loaded.camera), &params).map_err(|e| shadow_error(EYE, &e))?;
-    Ok(Some(ShadowTable { predicted, cells: None, tolerance, max_bytes, automatic_entries: predicted.entries }))
+    Ok(Some(ShadowTable {
+        predicted,
+        cells: None,
+        light_states_cells: false,
+        tolerance,
+        max_bytes,
+        automatic_entries: predicted.entries,
+    }))
 }
 
 /// Transmittance e^(−A_cut) below which the light of one lamp is lost in the picture: its brightest light times that changes no
@@ -252,7 +261,8 @@ fn tables_within(
                 predict(&Params { resolution: tsm::Resolution::Auto, ..params.clone() })?.entries
             }
         };
-        Ok(Some(ShadowTable { predicted, cells, tolerance, max_bytes, automatic_entries }))
+        let light_states_cells = point.shadow_cells.is_some();
+        Ok(Some(ShadowTable { predicted, cells, light_states_cells, tolerance, max_bytes, automatic_entries }))
     };
     requests.iter().map(table).collect()
 }

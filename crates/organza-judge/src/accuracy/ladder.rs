@@ -165,7 +165,8 @@ mod tests {
         parse("s.toml".as_ref(), TEXT.as_bytes(), &LoadOptions { overrides, ..LoadOptions::default() }).unwrap()
     }
 
-    const FACTS: Facts = Facts { slice_thickness: Some(0.012_345), cells: Some(512), bytes_per_splat: None };
+    const FACTS: Facts =
+        Facts { slice_thickness: Some(0.012_345), has_maps: true, cells: Some(512), bytes_per_splat: None };
 
     fn rungs(scene: &Scene, techniques: &[Technique]) -> Vec<Rung> {
         ladder(scene, &knobs_of(scene, techniques, &FACTS, Some(0.05)))

@@ -166,9 +166,15 @@ impl<'a> Renderer<'a> {
         let plan = plan_loaded(scene, loaded, options)?;
         let frame = organza::Frame::new(scene, loaded, &plan, progress);
         let maps = frame.maps(&mut CostRecord::default())?;
+        // Cells that a light states stay what they are.
+        let free = maps.iter().zip(&plan.shadow_tables).filter_map(|(map, table)| {
+            let table = table.as_ref()?;
+            map.as_ref().filter(|_| !table.light_states_cells)
+        });
         Ok(Facts {
             slice_thickness: slice_thickness(loaded)?,
-            cells: maps.iter().flatten().map(|m| longest_side(m.table())).max(),
+            has_maps: maps.iter().any(Option::is_some),
+            cells: free.map(|map| longest_side(map.table())).max(),
             bytes_per_splat: bytes_per_splat(&loaded.cloud),
         })
     }
@@ -257,8 +263,11 @@ impl Facts {
     /// [`Error::Internal`] where splats cannot be ordered.
     pub fn of_plan(loaded: &Loaded, plan: &Plan) -> Result<Self, Error> {
         let longest = |table: &organza::ShadowTable| table.predicted.size[0].max(table.predicted.size[1]);
-        let cells = plan.tables().map(longest).max().map(|cells| cells.min(u64::from(u32::MAX)) as u32);
-        Ok(Self { slice_thickness: slice_thickness(loaded)?, cells, bytes_per_splat: None })
+        let tables = || plan.shadow_tables.iter().chain(&plan.other_tables).flatten();
+        let free = tables().filter(|table| !table.light_states_cells);
+        let cells = free.map(longest).max().map(|cells| cells.min(u64::from(u32::MAX)) as u32);
+        let has_maps = tables().next().is_some();
+        Ok(Self { slice_thickness: slice_thickness(loaded)?, has_maps, cells, bytes_per_splat: None })
     }
 }
 

@@ -10,7 +10,9 @@ use splat_core::{LightShape, raster::Accumulation};
 pub struct Facts {
     /// Thickness of the slices of the scene's stated setting, world units; `None` without translucent splats.
     pub slice_thickness: Option<f64>,
-    /// Most cells along a side of a shadow table, by the scene's stated setting; `None` where no light gets one.
+    /// Whether any light gets a shadow map.
+    pub has_maps: bool,
+    /// Cells along the longest side of a shadow map, of lights that state no cells of their own; `None` without such.
     pub cells: Option<u32>,
     /// Bytes of a splat as they are and packed; `None` without splats, or where they cannot be packed.
     pub bytes_per_splat: Option<[f64; 2]>,
@@ -131,7 +133,8 @@ fn order(facts: &Facts, options: &Options) -> Result<Knob, String> {
 }
 
 pub(super) fn cells(facts: &Facts, options: &Options) -> Result<Knob, String> {
-    let side = f64::from(facts.cells.ok_or(NO_MAP)?);
+    let stated = if facts.has_maps { "lights state the cells of their shadow maps" } else { NO_MAP };
+    let side = f64::from(facts.cells.ok_or(stated)?);
     let parts: &[f64] = if options.quick { &[16.0, 8.0, 4.0] } else { &[32.0, 16.0, 8.0, 4.0, 2.0] };
     let count = move |part: f64| (side / part).round().clamp(1.0, MOST_CELLS);
     let label = |n: f64| format!("{n} a side");
@@ -177,7 +180,7 @@ fn splat_share(scene: &Scene, options: &Options) -> Result<Knob, String> {
 }
 
 fn mapping(scene: &Scene, facts: &Facts) -> Result<Knob, String> {
-    facts.cells.ok_or(NO_MAP)?;
+    facts.has_maps.then_some(()).ok_or(NO_MAP)?;
     let directional = |shape| matches!(shape, LightShape::Directional { .. });
     if scene.lights.iter().any(|l| l.shadow && directional(l.light.shape)) {
         return Err("a directional light takes the planar table alone".into());
@@ -199,7 +202,7 @@ fn mapping(scene: &Scene, facts: &Facts) -> Result<Knob, String> {
 }
 
 pub(super) fn absorbance_cut(facts: &Facts, options: &Options) -> Result<Knob, String> {
-    facts.cells.ok_or(NO_MAP)?;
+    facts.has_maps.then_some(()).ok_or(NO_MAP)?;
     let cuts: &[f64] = if options.quick { &[1.0, 2.0, 4.0] } else { &[0.5, 1.0, 2.0, 3.0, 4.0, 6.0] };
     Ok(Knob {
         name: "absorbance cut",
