@@ -73,6 +73,15 @@ pub fn read(name: &str, data: &[u8]) {
     }
 }
 
+/// Reads a table of labels as text.
+pub fn read_labels(data: &[u8]) {
+    if let Ok(table) = read::label_rows_of_bytes("a.ctbl", data, &params()) {
+        let is_label = |row: &read::LabelRow| (0.0..=1.0).contains(&row.opacity) && row.color.iter().all(|c| (0.0..=1.0).contains(c));
+        assert!(!table.rows.is_empty() && table.rows.iter().all(is_label), "a table that was read is valid");
+        assert!(table.rows.windows(2).all(|pair| pair[0].number < pair[1].number), "numbers rise");
+    }
+}
+
 /// Stops the fuzzer where a reader gave something that is not valid.
 fn check(loaded: &Loaded) {
     let valid = match loaded {

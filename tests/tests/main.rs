@@ -30,6 +30,7 @@ mod half_vector;
 mod in_memory;
 mod interrupts;
 mod invariances;
+mod labels;
 mod layers;
 mod legends;
 mod levels;

@@ -4,4 +4,5 @@ pub(crate) mod color_by;
 pub(crate) mod color_map;
 pub(crate) mod color_scale;
 pub(crate) mod colored_mesh;
+pub(crate) mod label_table;
 pub(crate) mod surface_field;

@@ -31,6 +31,7 @@ pub use color::color_by::{Classified, ColorBy, Colored, MapScale, PointColors, c
 pub use color::color_map::ColorMap;
 pub use color::color_scale::{ColorScale, ScaleNumbers};
 pub use color::colored_mesh::{ColoredMesh, colored_mesh};
+pub use color::label_table::{LARGEST_LABEL, Label, LabelTable};
 pub use color::surface_field::{SurfaceField, SurfaceLook};
 #[cfg(feature = "cache")]
 pub use common::cache::Cache;
@@ -61,7 +62,7 @@ pub use splat_core;
 pub use splats::footprints::FootprintChoice;
 pub use volume::body_centred::body_centred;
 pub use volume::gaps::{ClassifiedGrid, gaps_of_value, gaps_outside, transparent_gaps};
-pub use volume::label_surfaces::{label_surface_bytes, label_surfaces};
+pub use volume::label_surfaces::{label_surface_bytes, label_surfaces, said_of_labels};
 pub use volume::odd_values::{FillValue, Strays, without_value, written_value};
 #[cfg(feature = "noise")]
 pub use volume::procedural::{CloudShape, Ellipsoid, procedural_cloud};

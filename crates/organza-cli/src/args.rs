@@ -184,6 +184,9 @@ pub(super) struct FirstArguments {
     /// The colour map of --color-by goes by logarithms: numbers that are not above 0 have the object's colour
     #[arg(long, requires = "color_by")]
     pub(super) log: bool,
+    /// Names, colours and opacities of the labels of volumes: a .ctbl of 3D Slicer, a .lut or .txt of FreeSurfer, ITK-SNAP or FSL, or a .toml file
+    #[arg(long, value_name = "FILE")]
+    pub(super) labels: Option<PathBuf>,
     /// Axis of the data that points up [default: what the format of each file says, else y]
     #[arg(long, value_enum, allow_hyphen_values = true)]
     pub(super) up: Option<Axis>,
@@ -449,6 +452,9 @@ pub(super) struct OrdersArguments {
 pub(super) struct InfoArguments {
     /// Data file, or scene (.toml, .json)
     pub(super) file: PathBuf,
+    /// Table of the labels of a volume, whose names stand beside their numbers; as for `render`
+    #[arg(long, value_name = "FILE")]
+    pub(super) labels: Option<PathBuf>,
     /// Refuse a data file with faults that could be mended
     #[arg(long)]
     pub(super) strict: bool,

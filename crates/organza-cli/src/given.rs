@@ -5,8 +5,9 @@ use super::console;
 use super::session::{check_backend, render_options, start_threads};
 use organza::scene::{self, DEFAULT_FILL, DEFAULT_SIZE, Override, UpAxis, short};
 use organza::{Error, Files, InMemory, Progress, RenderOptions, SourceData, printable};
-use organza_survey::{DataFile, Preset, Wish, Written, first_scene, material_named};
+use organza_survey::{DataFile, NamedTable, Preset, Wish, Written, first_scene, material_named};
 use read::is_foreign_json;
+use splat_core::MemoryAccount;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
@@ -124,6 +125,7 @@ pub(super) fn wish(first: &FirstArguments, size: Option<[i64; 2]>, turntable: Op
         color_by: first.color_by.clone(),
         color_range: first.color_range,
         is_logarithmic: first.log,
+        labels: first.labels.as_deref().map(|path| NamedTable::read(path, &MemoryAccount::default())).transpose()?,
         up: first.up.map(|axis| match axis {
             Axis::Y => UpAxis::Y,
             Axis::Z => UpAxis::Z,
@@ -169,6 +171,7 @@ fn refuse_wishes(first: &FirstArguments) -> Result<(), Error> {
         ("--preset", first.preset.is_some()),
         ("--material", first.material.is_some()),
         ("--color-by", first.color_by.is_some()),
+        ("--labels", first.labels.is_some()),
         ("--up", first.up.is_some()),
         ("--ground", first.ground),
     ];
@@ -176,6 +179,8 @@ fn refuse_wishes(first: &FirstArguments) -> Result<(), Error> {
     named.map_or(Ok(()), |(name, _)| {
         let hint = if name == "--material" {
             "name a `preset` in a table [material.NAME], or by --set"
+        } else if name == "--labels" {
+            "set `labels` of the object, such as --set object.NAME.labels=FILE"
         } else {
             "change the scene"
         };

@@ -8,20 +8,27 @@ use super::session::path_text;
 use super::{console, memory};
 use organza::Error;
 use organza::scene::{self, Combination, LoadOptions, Scene, SceneObject, Source, UpAxis};
-use organza_survey::{Facts, Histogram, facts};
+use organza_survey::{Facts, Histogram, NamedTable, facts};
 use serde_json::{Value, json};
 use splat_core::{LightShape, MemoryAccount};
+use std::path::PathBuf;
 
 /// Describes a scene or a data file.
 pub(super) fn run(arguments: &InfoArguments) -> Result<(), Error> {
     if is_scene(&arguments.file) {
+        if arguments.labels.is_some() {
+            let hint = "leave it out: `labels` of an object names the table";
+            return Err(Error::usage("--labels is for data files, and a scene is given", hint));
+        }
         let InfoArguments { allow_path, sandbox, .. } = *arguments;
         let memory = MemoryAccount::new(memory::default_limit());
         let options = LoadOptions { allow_path, sandbox, memory, ..LoadOptions::default() };
         let document = scene_document(&scene::load(&arguments.file, &options)?);
         return console::out(&if arguments.json { format!("{document:#}\n") } else { text::lines(&document) });
     }
-    let facts = facts(&arguments.file, memory::default_limit(), arguments.strict)?;
+    let read_table = |path: &PathBuf| NamedTable::read(path, &MemoryAccount::new(memory::default_limit()));
+    let labels = arguments.labels.as_ref().map(read_table).transpose()?;
+    let facts = facts(&arguments.file, labels.as_ref(), memory::default_limit(), arguments.strict)?;
     facts.mended.iter().chain(&facts.warnings).for_each(|line| console::warn(line));
     if arguments.json {
         return console::out(&format!("{:#}\n", file_document(&facts)));
@@ -111,6 +118,8 @@ fn file_document(facts: &Facts) -> Value {
             "isolated_vertices": f.isolated,
         })
     });
+    let labels =
+        facts.labels.iter().map(|label| json!({ "number": label.number, "name": label.name, "voxels": label.voxels }));
     json!({
         "kind": facts.kind,
         "format": facts.format,
@@ -128,6 +137,7 @@ fn file_document(facts: &Facts) -> Value {
         "quantiles": facts.quantiles.iter().map(|(share, value)| json!([share, value])).collect::<Value>(),
         "columns": facts.columns.iter().map(|(name, range)| (name.clone(), json!(range))).collect::<Value>(),
         "columns_of": facts.associations.iter().map(|(name, association)| (name.clone(), json!(association.name()))).collect::<Value>(),
+        "labels": labels.collect::<Value>(),
         "faults": faults,
         "not_used": facts.unused,
         "remarks": facts.remarks,

@@ -40,6 +40,14 @@ pub enum Error {
         /// The system's answer.
         source: std::io::Error,
     },
+    /// A table of labels that the scene names is wrong.
+    #[error("{message}")]
+    Table {
+        /// The file, the place in it, what was expected and what was found.
+        message: String,
+        /// What to do; may be empty.
+        hint: String,
+    },
     /// The scene file is larger than it may be.
     #[error("{0}")]
     Limit(Exceeded),
@@ -52,7 +60,7 @@ impl Error {
     /// What to do about it; may be empty.
     pub fn hint(&self) -> &str {
         match self {
-            Self::Usage { hint, .. } | Self::Scene { hint, .. } => hint,
+            Self::Usage { hint, .. } | Self::Scene { hint, .. } | Self::Table { hint, .. } => hint,
             Self::Limit(exceeded) => &exceeded.hint,
             Self::Io { .. } => "",
             Self::Internal(_) => "this is a bug in Organza, please report it",

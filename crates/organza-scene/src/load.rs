@@ -24,7 +24,7 @@ pub const MAX_SCENE_BYTES: u64 = 16 << 20;
 
 /// Bytes that a character of a scene takes while it is read, at most: a digit and a comma are a value with its place, in a list with
 /// room for as many again.
-const BYTES_PER_CHARACTER: u64 = 96;
+pub(crate) const BYTES_PER_CHARACTER: u64 = 96;
 
 /// Reads and checks a scene file; JSON if its name ends in `.json`, else TOML. Of data files that are drawn
 /// only the beginning is looked at, for the axis that points up; images of footprints are read.
@@ -92,7 +92,8 @@ pub fn parse(file: &Path, bytes: &[u8], options: &LoadOptions) -> Result<Scene, 
     Ok(scene)
 }
 
-fn decode<'a>(file: &Path, bytes: &'a [u8]) -> Result<&'a str, Error> {
+/// The text of a file's bytes.
+pub(crate) fn decode<'a>(file: &Path, bytes: &'a [u8]) -> Result<&'a str, Error> {
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     std::str::from_utf8(bytes).map_err(|e| {
         let valid = std::str::from_utf8(&bytes[..e.valid_up_to()]).unwrap_or("");

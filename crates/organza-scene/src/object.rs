@@ -3,6 +3,8 @@
 pub(crate) mod check;
 pub(crate) mod color_scales;
 pub(crate) mod drawn;
+pub(crate) mod labels;
+pub(crate) mod labels_raw;
 pub(crate) mod lit;
 pub(crate) mod model;
 pub(crate) mod points_check;

@@ -9,7 +9,8 @@ use std::path::{Component, Path, PathBuf};
 pub const ROOT_KEY: &str = "root";
 
 /// The keys of a scene whose texts are paths of files or folders.
-pub const PATH_KEYS: [&str; 7] = ["environment", "image", "images", "mesh", "points", "texture", "volume"];
+pub const PATH_KEYS: [&str; 9] =
+    ["environment", "image", "images", "labels", "mesh", "points", "table", "texture", "volume"];
 
 /// Where data may lie.
 pub(crate) struct Paths {

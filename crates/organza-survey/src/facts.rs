@@ -1,12 +1,14 @@
 //! What is in a data file, measured: for `organza info`.
 
+use crate::NamedTable;
 use crate::histogram::Histogram;
 use crate::labels::Labels;
 use crate::mesh_faults::{MeshFaults, mesh_faults};
 use crate::spacing::{duplicates, median_spacing};
 use crate::stands::{cloud_stands_along, lies_flat_along, stands_along};
 use convert::{FillValue, Strays, looks_like_degrees};
-use organza::Error;
+use organza::scene::LabelTable;
+use organza::{Error, printable};
 use read::{Loaded, Mended, NamedColumn, ReadParams, stated_up_axis, up_axis};
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::{Aabb, Association, DAabb, Grid, MemoryAccount, Mesh, RadianceImage, RawPoints, UpAxis};
@@ -53,6 +55,8 @@ pub struct Facts {
     pub columns: Vec<(String, [f64; 2])>,
     /// The element, vertex or face, that each column of a mesh has a number for, by the column's name.
     pub associations: Vec<(String, Association)>,
+    /// Labels of a volume that has such, by rising number; 0, which is nothing, is left out.
+    pub labels: Vec<LabelFact>,
     /// Faults of a mesh.
     pub faults: Option<MeshFaults>,
     /// Columns, fields and statements of the file that are not used, as the file names them.
@@ -71,12 +75,25 @@ pub struct Facts {
     pub stands: Option<UpAxis>,
 }
 
-/// Reads a data file of at most `max_bytes` and measures it; `strict` refuses a file with a fault that could be mended.
+/// A label of a volume.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct LabelFact {
+    /// Its number.
+    pub number: u64,
+    /// Its name in the table, empty where that has none.
+    pub name: String,
+    /// Voxels that have it.
+    pub voxels: u64,
+    /// Whether the table hides it.
+    pub is_hidden: bool,
+}
+
+/// Reads a data file of at most `max_bytes` and measures it; `table` names the labels of a volume; `strict` refuses a file with a fault that could be mended.
 ///
 /// # Errors
 /// [`Error::Io`] for the file system, [`Error::Input`] for a file that is not what its name says, [`Error::Limit`] for
 /// one that would take more than `max_bytes`.
-pub fn facts(path: &Path, max_bytes: u64, strict: bool) -> Result<Facts, Error> {
+pub fn facts(path: &Path, table: Option<&NamedTable>, max_bytes: u64, strict: bool) -> Result<Facts, Error> {
     let params = ReadParams { memory: MemoryAccount::new(max_bytes), strict, ranges: true, ..ReadParams::default() };
     let read = read::file(path, &params, None);
     let (data, notes) = read.map_err(|e| Error::from_read(path, &e))?;
@@ -87,7 +104,7 @@ pub fn facts(path: &Path, max_bytes: u64, strict: bool) -> Result<Facts, Error> 
     let facts = match data {
         Loaded::Mesh(mesh) => of_mesh(&mesh, &notes.columns, up_axis(path)),
         Loaded::Points(points) => of_points(&points, &notes.columns, up_axis(path)),
-        Loaded::Grid(grid) => of_grid(&grid),
+        Loaded::Grid(grid) => of_grid(&grid, table),
         Loaded::Image(image) => of_image(&image),
         _ => return Err(Error::Internal("a reader gave data of no known kind".into())),
     };
@@ -95,7 +112,10 @@ pub fn facts(path: &Path, max_bytes: u64, strict: bool) -> Result<Facts, Error> 
     let columns: HashSet<&str> = notes.columns.iter().map(|column| column.name.as_str()).collect();
     let is_column = |name: &String| columns.contains(name.as_str());
     let unused = notes.unused.iter().filter(|name| !is_column(name)).cloned().collect();
-    let remarks = notes.remarks.into_iter().chain(facts.remarks).collect();
+    let of_table = table.into_iter().flat_map(|NamedTable { path, remarks, .. }| {
+        remarks.iter().map(move |remark| format!("{}: {remark}", printable(path)))
+    });
+    let remarks = notes.remarks.into_iter().chain(facts.remarks).chain(of_table).collect();
     let mended = notes.mended.iter().map(Mended::to_string).collect();
     let warnings = notes.warnings;
     let stated = stated_up_axis(path);
@@ -224,13 +244,17 @@ fn of_points(points: &RawPoints, further: &[NamedColumn], up: UpAxis) -> Facts {
     }
 }
 
-fn of_grid(grid: &Grid) -> Facts {
+fn of_grid(grid: &Grid, table: Option<&NamedTable>) -> Facts {
     let [x, y, z] = grid.dims;
     // The corners of the lattice bound it, sheared or not.
     let last = |bit: usize, n: usize| if bit == 0 { 0 } else { n.saturating_sub(1) };
     let corners = (0..8).map(|c| grid.position(last(c & 1, x), last(c & 2, y), last(c & 4, z)));
     let range = range_of(grid.values.iter().copied());
     let wide = (range[1] > range[0]).then(|| range.map(f64::from));
+    let labels = match table {
+        Some(named) => Labels::by_table(grid, &named.table),
+        None => Labels::from_grid(grid),
+    };
     let fine = wide.map(|range| Histogram::new(&grid.values, range, FINE_BINS));
     Facts {
         kind: "volume",
@@ -243,11 +267,29 @@ fn of_grid(grid: &Grid) -> Facts {
             .into_iter()
             .flatten()
             .take(1)
-            .chain(Labels::from_grid(grid).map(|labels| labels.said()))
+            .chain(labels.as_ref().map(Labels::said))
             .collect(),
+        labels: labels.map_or_else(Vec::new, |labels| label_facts(grid, &labels, table.map(|named| &named.table))),
         quantiles: fine.iter().flat_map(|f| SHARES.map(|share| (share, f.quantile(share)))).collect(),
         ..Facts::default()
     }
+}
+
+/// How many voxels have which label.
+fn label_facts(grid: &Grid, labels: &Labels, table: Option<&LabelTable>) -> Vec<LabelFact> {
+    let mut voxels = vec![0u64; labels.0.len()];
+    for value in grid.values.iter().filter(|value| **value > 0.0) {
+        if let Ok(rank) = labels.0.binary_search_by(|label| label.total_cmp(&f64::from(*value))) {
+            voxels[rank] += 1;
+        }
+    }
+    let fact = |(number, voxels): (&f64, u64)| LabelFact {
+        number: *number as u64,
+        name: table.and_then(|table| table.name(*number)).unwrap_or_default().to_owned(),
+        voxels,
+        is_hidden: table.is_some_and(|table| table.opacity(*number) == 0.0),
+    };
+    labels.0.iter().zip(voxels).filter(|(number, _)| **number > 0.0).map(fact).collect()
 }
 
 fn of_image(image: &RadianceImage) -> Facts {
@@ -268,7 +310,7 @@ mod tests {
     fn a_mirrored_volume_has_ordered_bounds() {
         let axes = DMat3::from_diagonal(DVec3::new(-1.0, 2.0, 3.0));
         let grid = Grid { origin: DVec3::ONE, axes, dims: [2, 2, 1], values: vec![3.0, -1.0, 2.0, 0.0] };
-        let facts = of_grid(&grid);
+        let facts = of_grid(&grid, None);
         assert_eq!(facts.bounds, Some(DAabb::new(DVec3::new(0.0, 1.0, 1.0), DVec3::new(1.0, 3.0, 1.0))));
         assert_eq!(facts.range, Some([-1.0, 3.0]));
         assert_eq!(facts.histogram.map(|h| h.total()), Some(4));

@@ -66,7 +66,8 @@ pub fn first_scene(
     let folder = folder_of(scene_file)?;
     let paths: Vec<String> = data.iter().map(|d| written_path(&d.path, &folder)).collect::<Result<_, _>>()?;
     let on_disk = data.iter().map(|d| d.path.as_path()).filter(|path| name_in_memory(path).is_none());
-    let root = root_for(scene_file, on_disk)?;
+    let tables = wish.labels.iter().map(|labels| labels.path.as_path());
+    let root = root_for(scene_file, on_disk.chain(tables))?;
     let root = root.map(|root| text_of(&root)).transpose()?;
     if wish.preset.is_some() && !data.iter().any(|file| takes_preset(file, wish)) {
         let is_look = wish.color_by.is_some() && wish.preset.as_ref().and_then(Preset::map).is_none();
@@ -79,7 +80,12 @@ pub fn first_scene(
             "--preset is for volumes, and as a colour map for points and meshes by a column, and no file is drawn so";
         return Err(Error::usage(message, "leave it out; in a scene `color` of an object is the colour of a mesh"));
     }
-    let objects = objects(data, &paths, wish);
+    let table = wish.labels.as_ref().map(|labels| written_path(&labels.path, &folder)).transpose()?;
+    let objects = objects(data, &paths, table.as_deref(), wish);
+    if let (Some(labels), true) = (&wish.labels, objects.iter().all(|object| object.labels().is_none())) {
+        let message = format!("--labels {}: no file is a volume of labels", printable(&labels.path));
+        return Err(Error::usage(message, "labels are whole numbers, all of which the table has; 0 is nothing"));
+    }
     check_material(data, &objects, wish)?;
     let azimuth = wish.azimuth.unwrap_or_else(|| default_azimuth(data));
     let head = |camera: &str| {

@@ -23,12 +23,12 @@ mod stands;
 mod transfer;
 
 pub use data_file::DataFile;
-pub use facts::{Facts, facts};
+pub use facts::{Facts, LabelFact, facts};
 pub use first_scene::{Written, first_scene};
 pub use histogram::Histogram;
 pub use lamps::lights_of;
 pub use number::{counted, grouped, rounded, sized};
-pub use preset::{Preset, Wish, material_named};
+pub use preset::{NamedTable, Preset, Wish, material_named};
 
 /// The page's example compiles and holds.
 #[cfg(doctest)]

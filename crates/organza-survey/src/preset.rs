@@ -3,8 +3,9 @@
 use crate::paraview::Sampled;
 use convert::ColorMap;
 use organza::Error;
-use organza::scene::{DEFAULT_FILL, DEFAULT_SIZE, Recipe, UpAxis};
-use std::path::Path;
+use organza::scene::{DEFAULT_FILL, DEFAULT_SIZE, LabelFile, LabelTable, Recipe, UpAxis, read_label_table};
+use splat_core::MemoryAccount;
+use std::path::{Path, PathBuf};
 
 /// How a volume is to look.
 #[derive(Debug, Clone, PartialEq)]
@@ -79,6 +80,28 @@ impl Preset {
     }
 }
 
+/// A table of labels with its file.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NamedTable {
+    /// The file, as it was named.
+    pub path: PathBuf,
+    /// Its labels.
+    pub table: LabelTable,
+    /// How the file was understood where that is not plain, one sentence without a full stop each.
+    pub remarks: Vec<String>,
+}
+
+impl NamedTable {
+    /// Reads a table.
+    ///
+    /// # Errors
+    /// As [`read_label_table`].
+    pub fn read(path: &Path, memory: &MemoryAccount) -> Result<Self, Error> {
+        let LabelFile { labels, remarks } = read_label_table(path, memory)?;
+        Ok(Self { path: path.to_owned(), table: labels, remarks })
+    }
+}
+
 /// What a user may say of a first scene; the rest follows from the data.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Wish {
@@ -102,6 +125,8 @@ pub struct Wish {
     pub color_range: Option<[f64; 2]>,
     /// Whether numbers lie along its map by their logarithms.
     pub is_logarithmic: bool,
+    /// The table of the labels of volumes that have such.
+    pub labels: Option<NamedTable>,
     /// Which axis of the data points up; `None` leaves that to the format of each file.
     pub up: Option<UpAxis>,
     /// Whether everything stands on a ground.
@@ -121,6 +146,7 @@ impl Default for Wish {
             color_by: None,
             color_range: None,
             is_logarithmic: false,
+            labels: None,
             up: None,
             ground: false,
         }

@@ -129,7 +129,7 @@ pub struct Mark {
     /// sRGB as it is displayed.
     pub color: [u8; 3],
     /// Its meaning, such as `ground`.
-    pub meaning: Option<&'static str>,
+    pub meaning: Option<String>,
 }
 
 /// Marks of a colour map: colours between them are even to the eye.
@@ -140,8 +140,11 @@ const MOST_NUMBERS: usize = 24;
 
 impl Legend {
     fn new(scale: &ColorScale) -> Self {
-        let mark =
-            |number: f64| Mark { number, color: scale.color(number).map(displayed), meaning: scale.meaning(number) };
+        let mark = |number: f64| Mark {
+            number,
+            color: scale.color(number).map(displayed),
+            meaning: scale.meaning(number).map(str::to_owned),
+        };
         let title = scale.column.as_ref().map_or_else(|| scale.object.clone(), |by| format!("{}: {by}", scale.object));
         match &scale.numbers {
             ScaleNumbers::Range([low, high]) => {

@@ -41,6 +41,7 @@ mod error;
 mod format;
 mod guarded;
 mod images;
+mod label_rows;
 mod meshes;
 mod points;
 mod reading;
@@ -52,6 +53,7 @@ pub use error::{Fault, Place, ReadError};
 pub use format::unread::is_foreign_json;
 pub use format::up::{stated_up_axis, up_axis};
 pub use guarded::panic_is_input_error;
+pub use label_rows::{LabelRow, LabelRows, label_rows, label_rows_of_bytes};
 pub use reading::{Fix, Mended, NamedColumn, Notes};
 /// The nouns that this crate takes and returns.
 pub use splat_core;

@@ -85,6 +85,8 @@ impl Folder {
         write("larger.xyz", &ball(0.75));
         write("grid.nrrd", &nrrd("", 1.0));
         write("other.nrrd", &nrrd("", 0.6));
+        write("labels.nrrd", &labels());
+        write("labels.toml", "1 = { color = '#ff2000' }\n2 = { color = '#20ff00' }\n");
         write("arrays.vtk", &arrays());
         write("series.nrrd", &series());
         write("body.nrrd", &nrrd("space: right-anterior-superior\n", 1.0));
@@ -221,6 +223,17 @@ fn nrrd(space: &str, most: f64) -> String {
          space origin: (-0.5,-0.5,-0.5)\nencoding: ascii\n\n"
     );
     text + &blob(most)
+}
+
+/// Two labels side by side, in nothing, on cells of 0.2.
+fn labels() -> String {
+    let inside = |n: i32| (1..5).contains(&n);
+    let label = |k: i32| match [k % 6, k / 6 % 6, k / 36] {
+        [x, y, z] if inside(x) && inside(y) && inside(z) => 1 + i32::from(x > 2),
+        _ => 0,
+    };
+    let header = nrrd("", 1.0).split_once("\n\n").unwrap().0.replace("float", "uchar");
+    header + "\n\n" + &(0..216).map(|k| format!("{}\n", label(k))).collect::<String>()
 }
 
 /// The blob and a fainter one as a series.

@@ -103,6 +103,7 @@ pub(crate) fn heading(table: &str) -> &'static str {
         "object.field" => "### Fields that surfaces show",
         "object.extract" => "### What a light sees",
         "object.color_by" | "object.point_size" => "### Raw points",
+        "object.labels" => "### Labels",
         "material" | "material.medium" | "material.absorption" | "material.cauchy" | "material.bump" => {
             "`[material.NAME]`"
         }

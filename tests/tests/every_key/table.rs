@@ -179,6 +179,7 @@ const RAW: Which = These(&["points", "plain points"]);
 const MESHES: Which = These(&["mesh", "plain mesh"]);
 const BY_Z: &[&str] = &["object.it.color_by={column='z'}"];
 const HOT: &[&str] = &["object.it.points='hot.xyz'", "object.it.color_by={column='heat'}"];
+const LABELS: &[&str] = &["object.it.mesh='labels.nrrd'", "object.it.labels={1={opacity=0.9}}"];
 const MATTER: &[&str] = &["object.it.as='medium'", "object.it.extinction=3"];
 const OWN_SPACING: Expected = Refused(2, "states its own spacing");
 const NO_TRANSFER: Expected = Refused(2, "belongs to a `volume` or `slice`, to a surface with a `field`, and");
@@ -234,6 +235,15 @@ fn objects() -> Vec<Entry> {
         of(MESHES, "object.color_by.scale", "object.it.color_by.scale='log'").with(BY_Z),
         one("object.color_by", "object.it.color_by={column='z'}")
             .but(All, Refused(2, "`color_by` belongs to `points`")),
+        of(MESHES, "object.labels", "object.it.labels='labels.toml'").with(LABELS),
+        of(MESHES, "object.labels.table", "object.it.labels.table='labels.toml'").with(LABELS),
+        of(MESHES, "object.labels.name", "object.it.labels.1.name='one'")
+            .with(LABELS)
+            .but(All, Nothing("a legend alone has names")),
+        of(MESHES, "object.labels.color", "object.it.labels.1.color='#ff2000'").with(LABELS),
+        of(MESHES, "object.labels.opacity", "object.it.labels.1.opacity=0.2").with(LABELS),
+        of(MESHES, "object.labels.visible", "object.it.labels.1.visible=false").with(LABELS),
+        one("object.labels", "object.it.labels={1='one'}").but(All, Refused(2, "`labels` belongs to a `mesh`")),
         of(HEAT, "object.color_by.column", "object.it.color_by.column='x'").with(HOT),
         of(HEAT, "object.color_by.map", "object.it.color_by.map='distinct'").with(HOT),
         of(HEAT, "object.color_by.range", "object.it.color_by.range=[0, 900]").with(HOT),

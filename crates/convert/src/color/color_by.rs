@@ -2,11 +2,12 @@
 //! by their opacity or their extinction.
 
 use crate::common::columns::CHUNK;
-use crate::{ColorMap, ConvertError, SplatParams};
+use crate::{ColorMap, ConvertError, LabelTable, SplatParams};
 use rayon::prelude::*;
 use splat_core::glam::DVec3;
 use splat_core::srgb::linear_from_hex;
 use splat_core::{RawPoints, TransferFunction};
+use std::sync::Arc;
 
 /// Shares of a column's numbers that its map spans where no range is stated: a few strays do not make all else one colour.
 const SHARES: [f64; 2] = [0.01, 0.99];
@@ -65,6 +66,8 @@ pub enum PointColors {
     Classes,
     /// Whole numbers, in twelve colours in turns.
     Distinct,
+    /// Whole numbers by a table, those that it lacks as [`PointColors::Distinct`].
+    Labels(Arc<LabelTable>),
     /// By control points, whose extinctions stand for that.
     Transfer(TransferFunction, Classified),
 }
@@ -113,7 +116,7 @@ pub struct Colored {
     pub range: Option<[f64; 2]>,
     /// Points whose number is a gap, see [`splat_core::Column`]; they have the colour of `splat`, and are neither made transparent nor absorb.
     pub gaps: u64,
-    /// Of [`PointColors::Classes`] and [`PointColors::Distinct`] the whole numbers that occur, rising, the least 64 of them.
+    /// Of [`PointColors::Classes`], [`PointColors::Distinct`] and [`PointColors::Labels`] the whole numbers that occur, rising, the least 64 of them.
     pub present: Vec<f64>,
 }
 
@@ -135,6 +138,11 @@ impl PointColors {
         Self::Map { map, range: Some(range), scale: MapScale::Linear }
     }
 
+    /// Whether numbers are whole, each with a colour of its own and nothing between two.
+    pub(crate) fn are_whole(&self) -> bool {
+        matches!(self, Self::Classes | Self::Distinct | Self::Labels(_))
+    }
+
     /// Whether a number has a colour: it is finite, and has a logarithm where that is asked for.
     pub(crate) fn shows(&self, number: f64) -> bool {
         let is_logarithmic = matches!(self, Self::Map { scale: MapScale::Logarithmic, .. });
@@ -147,6 +155,7 @@ impl PointColors {
             Self::Map { map, scale, .. } => map.at(scale.place(number, range)),
             Self::Classes => class_color(number),
             Self::Distinct => distinct(number),
+            Self::Labels(table) => table.color(number),
             Self::Transfer(transfer, _) => transfer.at(number as f32).color,
         }
     }
@@ -223,8 +232,7 @@ pub(crate) fn colored_numbers(numbers: Vec<f64>, by: &ColorBy, splat: &SplatPara
     let classifies = matches!(by.colors, PointColors::Transfer(_, Classified::Opacity | Classified::Extinction));
     let classified = if classifies { numbers.par_iter().map(classified).collect() } else { Vec::new() };
     let gaps = numbers.iter().filter(|n| !by.colors.shows(**n)).count() as u64;
-    let is_of_whole = matches!(by.colors, PointColors::Classes | PointColors::Distinct);
-    let present = if is_of_whole { present(&numbers) } else { Vec::new() };
+    let present = if by.colors.are_whole() { present(&numbers) } else { Vec::new() };
     let color = numbers.par_iter().map(color).collect();
     Colored { color, numbers, classified, range, gaps, present }
 }
@@ -264,7 +272,8 @@ fn class_color(number: f64) -> [f32; 3] {
     known.map_or_else(|| distinct(number), |(_, rgb)| linear_from_hex(*rgb))
 }
 
-fn distinct(number: f64) -> [f32; 3] {
+/// The colour of a whole number without a meaning.
+pub(crate) fn distinct(number: f64) -> [f32; 3] {
     let colors = DISTINCT.len() as f64;
     let number = number.round();
     let turn = libm::floor(number / colors);

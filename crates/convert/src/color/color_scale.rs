@@ -33,7 +33,9 @@ impl ColorScale {
         let numbers = match (&by.colors, colored.range) {
             (PointColors::Map { .. }, range) => ScaleNumbers::Range(range.filter(|_| colored.has_numbers())?),
             (PointColors::Transfer(transfer, _), _) => ScaleNumbers::Range(ends(transfer)),
-            (PointColors::Classes | PointColors::Distinct, _) => ScaleNumbers::Each(colored.present.clone()),
+            (PointColors::Classes | PointColors::Distinct | PointColors::Labels(_), _) => {
+                ScaleNumbers::Each(colored.present.clone())
+            }
         };
         let is_empty = matches!(&numbers, ScaleNumbers::Each(present) if present.is_empty());
         let object = object.to_owned();
@@ -81,10 +83,13 @@ impl ColorScale {
         }
     }
 
-    /// The meaning of a whole number, such as `ground` for the class 2 of LAS.
-    pub fn meaning(&self, number: f64) -> Option<&'static str> {
-        let is_class = matches!(self.colors, PointColors::Classes) && (0.0..=255.0).contains(&number);
-        is_class.then(|| class_name(number as u8)).flatten()
+    /// The meaning of a whole number, such as `ground` for the class 2 of LAS, and the name of a label.
+    pub fn meaning(&self, number: f64) -> Option<&str> {
+        match &self.colors {
+            PointColors::Classes if (0.0..=255.0).contains(&number) => class_name(number as u8),
+            PointColors::Labels(table) => table.name(number),
+            _ => None,
+        }
     }
 }
 
@@ -97,9 +102,10 @@ fn ends(transfer: &TransferFunction) -> [f64; 2] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{ColorMap, SplatParams, colored};
+    use crate::{ColorMap, Label, LabelTable, SplatParams, colored};
     use splat_core::glam::{DVec3, Vec3};
     use splat_core::{RawPoints, TransferPoint};
+    use std::sync::Arc;
 
     fn survey_scale(heights: &[f32], colors: PointColors) -> Option<ColorScale> {
         let position = heights.iter().map(|y| Vec3::Y * *y).collect();
@@ -124,6 +130,10 @@ mod tests {
         assert_eq!(scale.numbers, ScaleNumbers::Each(vec![2.0, 6.0, 70.0]));
         assert_eq!([2.0, 6.0, 70.0].map(|n| scale.meaning(n)), [Some("ground"), Some("building"), None]);
         assert_eq!(survey_scale(&[2.0], PointColors::Distinct).expect("a scale").meaning(2.0), None);
+        let liver = Label { name: "liver".into(), color: Some([0.25, 0.0, 0.0]), opacity: 1.0 };
+        let labels = PointColors::Labels(Arc::new(LabelTable::from_iter([(2, liver)])));
+        let scale = survey_scale(&[2.0, 6.0], labels).expect("a scale");
+        assert_eq!((scale.meaning(2.0), scale.color(2.0), scale.meaning(6.0)), (Some("liver"), [0.25, 0.0, 0.0], None));
     }
 
     #[test]

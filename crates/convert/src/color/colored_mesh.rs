@@ -79,12 +79,21 @@ pub fn colored_mesh(
         Association::Triangle => values.iter().flat_map(|number| [looks.at(*number); 3]).collect(),
     };
     mesh.color = shown.iter().map(|look| look.color).collect();
-    if matches!(by.colors, PointColors::Transfer(_, Classified::Opacity)) {
+    if has_opacities(by) {
         let stated = mesh.opacity.iter().copied().chain(std::iter::repeat(1.0));
         let opacity: Vec<f32> = shown.iter().zip(stated).map(|(look, stated)| look.opacity * stated).collect();
         mesh.opacity = if opacity.iter().all(|share| *share == 1.0) { Vec::new() } else { opacity };
     }
     Ok(ColoredMesh { mesh: mesh.into(), said, scale })
+}
+
+/// Whether numbers have opacities beside their colours.
+fn has_opacities(by: &ColorBy) -> bool {
+    match &by.colors {
+        PointColors::Transfer(_, Classified::Opacity) => true,
+        PointColors::Labels(table) => table.has_opacities(),
+        _ => false,
+    }
 }
 
 /// The look of a number.
@@ -109,6 +118,7 @@ impl Looks<'_> {
         }
         let opacity = match &self.by.colors {
             PointColors::Transfer(transfer, Classified::Opacity) => transfer.at(number as f32).extinction,
+            PointColors::Labels(table) => table.opacity(number),
             _ => 1.0,
         };
         Look {
@@ -119,11 +129,9 @@ impl Looks<'_> {
 
     /// Whether numbers between two have a meaning, or both have none.
     fn are_alike(&self, first: f64, last: f64) -> bool {
-        match self.by.colors {
-            _ if self.by.colors.shows(first) != self.by.colors.shows(last) => false,
-            PointColors::Classes | PointColors::Distinct => !first.is_finite() || first.round() == last.round(),
-            _ => true,
-        }
+        let colors = &self.by.colors;
+        let is_one_class = || !first.is_finite() || first.round() == last.round();
+        colors.shows(first) == colors.shows(last) && (!colors.are_whole() || is_one_class())
     }
 
     /// Whether what lies between two numbers looks otherwise than what lies between their looks.
@@ -144,7 +152,7 @@ impl Looks<'_> {
 /// Halves edges between whose ends other colours lie than the means of theirs; says what was done. Whole numbers that stand for classes have nothing
 /// between them.
 fn divide(mesh: &mut Mesh, looks: &Looks<'_>) -> Option<String> {
-    if matches!(looks.by.colors, PointColors::Classes | PointColors::Distinct) {
+    if looks.by.colors.are_whole() {
         return None;
     }
     let before = mesh.triangles.len();

@@ -2,23 +2,28 @@
 //!
 //! Voxels have the region of their whole number, 0 and NaN none. Every cell between eight voxels of several regions gets one vertex, every two
 //! neighbours of different regions one quadrilateral (surface nets, Gibson 1998): a surface lies halfway between two
-//! voxels, and no label shows that neither of them has. Vertices are moved towards their neighbours, within their cell, so that steps of voxels do not show.
+//! voxels, and no label shows that neither of them has. A surface between two regions belongs to the one of greater opacity, so that what lies within
+//! a translucent region is seen, else to that of the greater number. Vertices are moved towards their neighbours, within their cell, so that steps of voxels do not show.
 
-use crate::ConvertError;
+use crate::{ConvertError, LARGEST_LABEL, LabelTable};
 use rayon::prelude::*;
 use splat_core::glam::DVec3;
 use splat_core::{Association, Grid, Mesh, MeshColumn};
+use std::collections::BTreeSet;
 
 /// The name of the column of labels.
 const LABEL: &str = "label";
-
-/// The largest label: beyond it single precision leaves numbers out.
-const MOST: f32 = 16_777_216.0;
 
 /// How often vertices are moved, and how far from the middle of their cell they may be, in voxels: far less than the half at which a region of one voxel
 /// would collapse.
 const PASSES: usize = 3;
 const REACH: f64 = 0.3;
+
+/// Voxels looked at by one task.
+const CHUNK: usize = 1 << 16;
+
+/// Numbers whose opacity is listed rather than searched: those of 16 bits, which atlases have.
+const SMALL: u32 = 1 << 16;
 
 /// A cell without a vertex.
 const NONE: u32 = u32::MAX;
@@ -26,6 +31,8 @@ const NONE: u32 = u32::MAX;
 /// Layers of cells are those before a layer of voxels, and one behind the last.
 struct Nets<'a> {
     grid: &'a Grid,
+    /// The opacities of labels, where some are not opaque.
+    opacities: Option<Opacities<'a>>,
     /// Vertices of the cells of this layer and the one before it.
     layers: [Vec<u32>; 2],
     /// In voxels from the first.
@@ -34,12 +41,20 @@ struct Nets<'a> {
     labels: Vec<f32>,
 }
 
-/// The surfaces of the regions of a volume of whole numbers from 0 on, with the column `label` of faces. `object` is named in errors.
+/// The opacities of labels: every voxel asks for them.
+struct Opacities<'a> {
+    table: &'a LabelTable,
+    /// Those of the numbers below [`SMALL`].
+    small: Vec<f32>,
+}
+
+/// The surfaces of the regions of a volume of whole numbers from 0 on, with the column `label` of faces. Regions that `table` hides have none.
+/// `object` is named in errors.
 ///
 /// # Errors
 /// [`ConvertError::Parameter`] for a value that is no label, and for more vertices than a mesh can have.
-pub fn label_surfaces(grid: &Grid, object: &str) -> Result<Mesh, ConvertError> {
-    let is_label = |value: &f32| value.is_nan() || (0.0..=MOST).contains(value) && value.fract() == 0.0;
+pub fn label_surfaces(grid: &Grid, table: Option<&LabelTable>, object: &str) -> Result<Mesh, ConvertError> {
+    let is_label = |value: &f32| value.is_nan() || (0.0..=LARGEST_LABEL as f32).contains(value) && value.fract() == 0.0;
     if let Some(value) = grid.values.par_iter().find_first(|value| !is_label(value)) {
         return Err(ConvertError::Parameter {
             object: object.to_owned(),
@@ -51,7 +66,8 @@ pub fn label_surfaces(grid: &Grid, object: &str) -> Result<Mesh, ConvertError> {
     let [nx, ny, nz] = grid.dims;
     let cells = (nx + 1) * (ny + 1);
     let layers = [vec![NONE; cells], vec![NONE; cells]];
-    let mut nets = Nets { grid, layers, vertices: Vec::new(), quads: Vec::new(), labels: Vec::new() };
+    let opacities = table.filter(|table| table.has_opacities()).map(Opacities::new);
+    let mut nets = Nets { grid, opacities, layers, vertices: Vec::new(), quads: Vec::new(), labels: Vec::new() };
     for k in 0..=nz {
         nets.layers.swap(0, 1);
         nets.make_vertices(k);
@@ -67,6 +83,41 @@ pub fn label_surfaces(grid: &Grid, object: &str) -> Result<Mesh, ConvertError> {
     }
     nets.relax();
     Ok(nets.into_mesh())
+}
+
+/// What there is to say of the labels of a volume by a table: those that it hides, and those that it lacks; one sentence without a full stop each.
+pub fn said_of_labels(grid: &Grid, table: &LabelTable) -> Vec<String> {
+    let chunks = grid.values.par_chunks(CHUNK);
+    let of_chunk = |values: &[f32]| {
+        let mut found: BTreeSet<u32> = BTreeSet::new();
+        let mut last = 0.0;
+        for value in values.iter().filter(|value| **value > 0.0) {
+            if *value != last {
+                last = *value;
+                found.insert(last as u32);
+            }
+        }
+        found
+    };
+    let join = |mut one: BTreeSet<u32>, mut other: BTreeSet<u32>| {
+        one.append(&mut other);
+        one
+    };
+    let found = chunks.map(of_chunk).reduce(BTreeSet::new, join);
+    let hidden = found.iter().filter(|label| table.opacity(f64::from(**label)) == 0.0);
+    let missing = found.iter().filter(|label| table.get(f64::from(**label)).is_none());
+    let hidden = listed(hidden).map(|labels| format!("hidden by the table of labels: {labels}"));
+    let missing = listed(missing).map(|labels| format!("not in the table of labels, so in colours in turns: {labels}"));
+    hidden.into_iter().chain(missing).collect()
+}
+
+/// Some numbers in words.
+fn listed<'n>(labels: impl Iterator<Item = &'n u32>) -> Option<String> {
+    /// Numbers up to which each is named.
+    const NAMED: usize = 16;
+    let labels: Vec<String> = labels.map(u32::to_string).collect();
+    let more = if labels.len() > NAMED { format!(" and {} more", labels.len() - NAMED) } else { String::new() };
+    (!labels.is_empty()).then(|| labels[..labels.len().min(NAMED)].join(", ") + &more)
 }
 
 /// Bytes that [`label_surfaces`] of a volume takes.
@@ -89,6 +140,16 @@ pub fn label_surface_bytes(grid: &Grid) -> u64 {
     borders as u64 * OF_A_BORDER * 5 / 4
 }
 
+impl<'a> Opacities<'a> {
+    fn new(table: &'a LabelTable) -> Self {
+        Self { table, small: (0..SMALL).map(|number| table.opacity(f64::from(number))).collect() }
+    }
+
+    fn at(&self, label: f32) -> f32 {
+        self.small.get(label as usize).copied().unwrap_or_else(|| self.table.opacity(f64::from(label)))
+    }
+}
+
 /// The region of a value; 0 is none.
 fn label(value: f32) -> f32 {
     if value.is_nan() { 0.0 } else { value }
@@ -99,7 +160,25 @@ impl Nets<'_> {
     fn at(&self, x: usize, y: usize, z: usize) -> f32 {
         let [nx, ny, nz] = self.grid.dims;
         let is_inside = (1..=nx).contains(&x) && (1..=ny).contains(&y) && (1..=nz).contains(&z);
-        if is_inside { label(self.grid.values[x - 1 + nx * (y - 1 + ny * (z - 1))]) } else { 0.0 }
+        if !is_inside {
+            return 0.0;
+        }
+        let label = label(self.grid.values[x - 1 + nx * (y - 1 + ny * (z - 1))]);
+        if self.opacity(label) > 0.0 { label } else { 0.0 }
+    }
+
+    /// Opacity of the surface of a label.
+    fn opacity(&self, label: f32) -> f32 {
+        self.opacities.as_ref().map_or(1.0, |opacities| opacities.at(label))
+    }
+
+    /// Whether the surface between two labels is that of the second; nothing has no surface.
+    fn is_of_second(&self, first: f32, second: f32) -> bool {
+        if self.opacities.is_none() || first == 0.0 || second == 0.0 {
+            return second > first;
+        }
+        let by_opacity = self.opacity(first).total_cmp(&self.opacity(second));
+        by_opacity.then(first.total_cmp(&second)).is_lt()
     }
 
     /// The vertices of a layer of cells, each at the mean of the places between voxels of different labels.
@@ -161,12 +240,13 @@ impl Nets<'_> {
             return;
         }
         let mut around = cells.map(|(layer, rank)| self.layers[layer][rank]);
-        // Wound so that it is seen from outside of the region whose label it has, the greater one.
-        if second > first {
+        let is_of_second = self.is_of_second(first, second);
+        // Wound so that it is seen from outside of the region whose label it has.
+        if is_of_second {
             around.reverse();
         }
         self.quads.push(around);
-        self.labels.push(first.max(second));
+        self.labels.push(if is_of_second { second } else { first });
     }
 
     /// Moves vertices towards the means of their neighbours.
@@ -209,6 +289,7 @@ impl Nets<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Label;
     use splat_core::glam::DMat3;
 
     /// Two boxes side by side with the labels 2 and 7, in nothing.
@@ -236,7 +317,7 @@ mod tests {
         for mirror in [1.0, -1.0] {
             let axes = DMat3::from_diagonal(DVec3::new(mirror, 2.0, 1.0));
             let grid = boxes(axes);
-            let mesh = label_surfaces(&grid, "a").unwrap();
+            let mesh = label_surfaces(&grid, None, "a").unwrap();
             mesh.validate().unwrap();
             let labels = &mesh.columns[0].values;
             assert_eq!((mesh.columns[0].name.as_str(), labels.len()), ("label", mesh.triangles.len()));
@@ -261,14 +342,40 @@ mod tests {
     }
 
     #[test]
+    fn hidden_labels_have_no_surface_and_the_more_opaque_one_has_that_between_two() {
+        let grid = boxes(DMat3::IDENTITY);
+        let of_each = |opacities: [f32; 2]| {
+            let row = |(number, opacity)| (number, Label { opacity, ..Label::default() });
+            let table = LabelTable::from_iter([2, 7].into_iter().zip(opacities).map(row));
+            let mesh = label_surfaces(&grid, Some(&table), "a").unwrap();
+            let faces = |label: f64| mesh.columns[0].values.iter().filter(|value| **value == label).count() / 2;
+            ([faces(2.0), faces(7.0)], enclosed(&mesh))
+        };
+        // A box has an end of 16 faces at each side, 64 around it, and shares an end with the other.
+        assert_eq!(of_each([1.0, 1.0]).0, [80, 96]);
+        assert_eq!(of_each([1.0, 0.5]).0, [96, 80]);
+        assert_eq!(of_each([0.5, 0.5]).0, [80, 96]);
+        for (opacities, faces) in [([0.0, 1.0], [0, 96]), ([1.0, 0.0], [96, 0])] {
+            let (found, volume) = of_each(opacities);
+            assert_eq!(found, faces);
+            // One box of 64 voxels, closed and seen from outside, less what edges lose.
+            assert!(volume > 0.6 * 64.0 && volume < 64.0, "{volume}");
+        }
+        assert_eq!(of_each([0.0, 0.0]).0, [0, 0]);
+        let hidden = LabelTable::from_iter([(2, Label { opacity: 0.0, ..Label::default() })]);
+        let said = ["hidden by the table of labels: 2", "not in the table of labels, so in colours in turns: 7"];
+        assert_eq!(said_of_labels(&grid, &hidden), said);
+    }
+
+    #[test]
     fn a_voxel_alone_and_one_at_the_border_have_surfaces_and_amounts_are_refused() {
         let mut grid = Grid { values: vec![0.0; 12 * 64], ..boxes(DMat3::IDENTITY) };
         grid.values[0] = 3.0;
-        let mesh = label_surfaces(&grid, "a").unwrap();
+        let mesh = label_surfaces(&grid, None, "a").unwrap();
         assert_eq!((mesh.triangles.len(), mesh.position.len()), (12, 8));
         assert!(enclosed(&mesh) > 0.0);
         grid.values[5] = 0.5;
-        let error = label_surfaces(&grid, "a").unwrap_err().to_string();
+        let error = label_surfaces(&grid, None, "a").unwrap_err().to_string();
         assert!(error.contains("is 0.5, expected a whole number from 0 to 16777216"), "{error}");
     }
 }

@@ -7,6 +7,8 @@ use serde_json::Value;
 use std::fmt::Write;
 use std::path::Path;
 
+/// Labels up to which each has a line.
+const NAMED_LABELS: usize = 64;
 /// Widest bar of a histogram, characters.
 const BAR: f64 = 40.0;
 /// Distance from the origin over the size from which single precision shows: a hundred thousandth of the size is then a rounding step.
@@ -149,6 +151,14 @@ fn values(facts: &Facts, text: &mut Lines) {
     }
     if let Some(histogram) = &facts.histogram {
         bars(histogram, text);
+    }
+    for label in facts.labels.iter().take(NAMED_LABELS) {
+        let name = if label.name.is_empty() { String::new() } else { format!(" {}", label.name) };
+        let voxels = counted(label.voxels, ["voxel", "voxels"]);
+        text.add("label", format!("{}{name}: {voxels}{}", label.number, if label.is_hidden { ", hidden" } else { "" }));
+    }
+    if let Some(more) = facts.labels.len().checked_sub(NAMED_LABELS).filter(|more| *more > 0) {
+        text.add("labels", format!("and {more} more: --json has all"));
     }
     for (name, [low, high]) in &facts.columns {
         let unit = 1e-5 * (high - low).max(1e-300);

@@ -3,16 +3,18 @@
 use crate::at::At;
 use crate::footprint::check::check_choice;
 use crate::in_memory::name_of;
+use crate::object::labels::{LABEL_COLUMN, check_labels};
 use crate::object::points_check::check_points;
 use crate::object::raw::{RawLattice, RawObject, RawTransform, RawUp};
 use crate::paths::Paths;
 use crate::render::check::check_technique;
 use crate::source::check::check_source;
 use crate::source::field::{check_clip, check_shown_field};
-use crate::{Error, FieldSource, SceneMaterial, SceneObject, Source, Technique, Up, UpBy};
+use crate::{Error, FieldSource, ObjectLabels, SceneMaterial, SceneObject, Source, Technique, Up, UpBy};
+use convert::{ColorBy, PointColors};
 use glam::{DQuat, DVec3};
 use read::{stated_up_axis, up_axis};
-use splat_core::{FootprintStack, Packing, Similarity, UpAxis};
+use splat_core::{FootprintStack, MemoryAccount, Packing, Similarity, UpAxis};
 use std::collections::HashSet;
 use std::sync::Arc;
 
@@ -24,6 +26,8 @@ pub(crate) struct Named<'a> {
     pub(crate) materials: &'a [SceneMaterial],
     pub(crate) footprints: &'a FootprintStack,
     pub(crate) paths: &'a Paths,
+    /// On which tables of labels are while they are read.
+    pub(crate) memory: &'a MemoryAccount,
     /// Objects that lights are asked for: they are read even where they are invisible.
     pub(crate) seen: &'a HashSet<String>,
 }
@@ -53,6 +57,11 @@ pub(crate) fn check_object(
         RawUp::Z => by_scene(UpAxis::Z),
         RawUp::MinusY => by_scene(UpAxis::MinusY),
     };
+    let labels = check_labels(at, &raw, named.paths, named.memory)?;
+    let mut points = check_points(at, &raw)?;
+    if let Some(ObjectLabels { table, .. }) = &labels {
+        points.color_by = Some(ColorBy { column: LABEL_COLUMN.to_owned(), colors: PointColors::Labels(table.clone()) });
+    }
     Ok(SceneObject {
         transform: check_transform(&at.key("transform"), &raw.transform, up.axis)?,
         up,
@@ -73,7 +82,8 @@ pub(crate) fn check_object(
             .map(|v| v as f32),
         degrees: raw.degrees.unwrap_or(false),
         field,
-        points: check_points(at, &raw)?,
+        points,
+        labels,
         clip: raw
             .clip
             .iter()

@@ -1,6 +1,6 @@
 //! An object, checked.
 
-use crate::{FieldSource, PointsLook, Source, Technique};
+use crate::{FieldSource, ObjectLabels, PointsLook, Source, Technique};
 use convert::FootprintChoice;
 use splat_core::{Clip, Packing, Similarity, UpAxis};
 use std::path::Path;
@@ -37,6 +37,8 @@ pub struct SceneObject {
     pub field: Option<FieldSource>,
     /// How raw points look.
     pub points: PointsLook,
+    /// The labels of a volume whose surfaces it is.
+    pub labels: Option<ObjectLabels>,
     /// Regions that it is kept in, before the object's transform.
     pub clip: Vec<Clip>,
     /// Distance between splats, world units; `None` means that it is chosen from the data and the camera.
@@ -62,7 +64,8 @@ pub struct SceneObject {
 impl SceneObject {
     /// The files that it reads.
     pub fn paths(&self) -> impl Iterator<Item = &Path> {
-        self.source.paths().into_iter().chain(self.field.iter().map(|field| &*field.path))
+        let table = self.labels.iter().filter_map(|labels| labels.file.as_deref());
+        self.source.paths().into_iter().chain(self.field.iter().map(|field| &*field.path)).chain(table)
     }
 }
 

@@ -1,6 +1,7 @@
 //! Objects as they are written.
 
 use crate::footprint::raw::RawChoice;
+use crate::object::labels_raw::RawLabels;
 use crate::object::points_raw::{RawColorBy, RawDiscShape, RawPointForm, RawPointSize};
 use crate::source::raw::{
     RawClip, RawCloud, RawDensity, RawExtract, RawField, RawImplicit, RawIsosurface, RawLevelSet, RawMediumBall,
@@ -64,6 +65,8 @@ pub(crate) struct RawObject {
     pub(crate) extinction: Option<f64>,
     /// The column that `points` or a `mesh` take their colours from.
     pub(crate) color_by: Option<RawColorBy>,
+    /// Names, colours and opacities of the labels of a `mesh` that is a volume of labels: the path of a table, or labels by their numbers.
+    pub(crate) labels: Option<RawLabels>,
     /// Which `points` are drawn: classes by a list, other columns by their lowest and highest number.
     pub(crate) keep: Option<BTreeMap<String, Vec<f64>>>,
     /// Whether x and y of `points` are degrees of longitude and latitude, which become metres east and north of their middle, beside heights in

@@ -47,7 +47,13 @@ pub(crate) fn scene(
     let tracks = raw.animation.iter().flat_map(|animation| &animation.track);
     let stops = tracks.filter_map(|track| track.stop.as_ref()?.objects.clone());
     let seen = extracts.chain(stops).flatten().collect();
-    let named = Named { materials: &named_materials.list, footprints: &footprints.stack, paths: &paths, seen: &seen };
+    let named = Named {
+        materials: &named_materials.list,
+        footprints: &footprints.stack,
+        paths: &paths,
+        memory: &options.memory,
+        seen: &seen,
+    };
     let at_objects = at.key("object");
     let mut objects = check_objects(&at_objects, raw.object, raw.animation.as_ref(), &named, &named_materials)?;
     let mut materials = named_materials.list;

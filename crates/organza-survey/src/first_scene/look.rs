@@ -104,7 +104,7 @@ const VALUES: Material = Material::new("values", "shading = \"unlit\"\n");
 const DROPLETS: Material = Material::new("droplets", "ambient = 0.6\nmedium = { albedo = 0.98, asymmetry = 0.3 }\n");
 
 /// The objects of all files, each with a name of its own.
-pub(super) fn objects(data: &[DataFile], paths: &[String], wish: &Wish) -> Vec<Object> {
+pub(super) fn objects(data: &[DataFile], paths: &[String], table: Option<&str>, wish: &Wish) -> Vec<Object> {
     let mut names: BTreeMap<String, usize> = BTreeMap::new();
     let mut materials: Vec<&str> = Vec::new();
     let mut clays = CLAYS.iter().cycle();
@@ -127,7 +127,7 @@ pub(super) fn objects(data: &[DataFile], paths: &[String], wish: &Wish) -> Vec<O
         let is_bare = !file.is_colored() && colors.is_none() && wish.material.is_none();
         let bare = if is_bare { clays.next() } else { None };
         let has_map = colors.is_some();
-        let mut object = object(file, wish.preset.as_ref(), colors);
+        let mut object = object(file, wish, table, colors);
         if let Some(recipe) = wish.material {
             // Data without an extent is taken as one unit wide.
             object.take(recipe, file, has_map, if size > 0.0 { size } else { 1.0 });
@@ -255,7 +255,9 @@ impl Object {
     }
 }
 
-fn object(file: &DataFile, preset: Option<&Preset>, colors: Option<String>) -> Object {
+/// The object of a file; `table` is the path of the table of labels, as it is written.
+fn object(file: &DataFile, wish: &Wish, table: Option<&str>, colors: Option<String>) -> Object {
+    let preset = wish.preset.as_ref();
     let clay = Some(CLAY);
     let bare = |key, about, material, keys| Object {
         about,
@@ -293,12 +295,16 @@ fn object(file: &DataFile, preset: Option<&Preset>, colors: Option<String>) -> O
         SourceData::Grid(grid) => {
             let matter = Matter::in_surroundings(grid, file.value_outside);
             let is_as_it_is = file.array.is_none() && file.nodata.is_none();
-            if let Some(Labels(known)) = labels(grid, matter.as_ref(), preset).filter(|_| is_as_it_is) {
+            if let Some(Labels(known)) = labels(grid, matter.as_ref(), wish).filter(|_| is_as_it_is) {
                 let labels = known.iter().filter(|label| **label > 0.0).count();
                 let map = preset.and_then(Preset::map).map_or("distinct", |map| map.name());
+                let colors = match table {
+                    Some(path) => format!("labels = {}", quoted(path)),
+                    None => format!("color_by = {{ column = \"label\", map = \"{map}\" }}"),
+                };
                 let keys = format!(
                     "# Whole numbers that name regions: the surface of each, in its own colour; 0 is nothing. `volume` in the place of `mesh` takes them for amounts.\n\
-                     color_by = {{ column = \"label\", map = \"{map}\" }}\n"
+                     {colors}\n"
                 );
                 let about = format!(
                     "{} × {} × {} voxels of {labels} labels; {}",
@@ -326,7 +332,11 @@ fn object(file: &DataFile, preset: Option<&Preset>, colors: Option<String>) -> O
 }
 
 /// The labels of a volume that has such, unless its look is that of amounts.
-fn labels(grid: &Grid, matter: Option<&Matter>, preset: Option<&Preset>) -> Option<Labels> {
+fn labels(grid: &Grid, matter: Option<&Matter>, wish: &Wish) -> Option<Labels> {
+    if let Some(labels) = wish.labels.as_ref().and_then(|labels| Labels::by_table(grid, &labels.table)) {
+        return Some(labels);
+    }
+    let preset = wish.preset.as_ref();
     let is_of_amounts = preset.is_some_and(|preset| preset.map().is_none());
     if is_of_amounts || matter.is_some_and(Matter::has_units) { None } else { Labels::from_grid(grid) }
 }

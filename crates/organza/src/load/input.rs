@@ -4,8 +4,8 @@ use super::context::Context;
 use super::files::{Fitted, once};
 use crate::Error;
 use crate::scene::{
-    CombinedSource, DensitySource, FieldSource, LevelSetSource, MatterSource, SceneObject, SliceSource, Source,
-    SourceData, SurfaceSampler, VolumeSource,
+    CombinedSource, DensitySource, FieldSource, LevelSetSource, MatterSource, ObjectLabels, SceneObject, SliceSource,
+    Source, SourceData, SurfaceSampler, VolumeSource,
 };
 use crate::statistics::{Conversion, ObjectData};
 use convert::{
@@ -206,7 +206,7 @@ pub(super) fn input<'a>(object: &'a SceneObject, context: &Context<'_>) -> Resul
 
 /// The mesh of an object, in the colours that it has, cut and closed again.
 fn own_mesh(path: &Path, object: &SceneObject, splat: &SplatParams, context: &Context<'_>) -> Result<Arc<Mesh>, Error> {
-    let mut mesh = read_mesh(path, context)?;
+    let mut mesh = read_mesh(path, object.labels.as_ref(), context)?;
     let color_by = object.points.color_by.as_ref();
     // While it is cut, or gets other colours, there is another one.
     let is_colored = color_by.is_some() || !mesh.columns.is_empty();
@@ -355,26 +355,37 @@ fn read_scattered(path: &Path, context: &Context<'_>) -> Result<(Arc<RawPoints>,
     }
 }
 
-fn read_mesh(path: &Path, context: &Context<'_>) -> Result<Arc<Mesh>, Error> {
+fn read_mesh(path: &Path, known: Option<&ObjectLabels>, context: &Context<'_>) -> Result<Arc<Mesh>, Error> {
     match context.read(path)? {
         SourceData::Mesh(mesh) => Ok(mesh),
-        SourceData::Grid(grid) => labels(path, &grid, context),
+        SourceData::Grid(grid) => labels(path, &grid, known, context),
         _ => Err(Error::wrong_kind(path, "a mesh with faces", "use `points = ` or `volume = ` for this file")),
     }
 }
 
-/// The surfaces between the labels of a volume, without their column where nobody asks for it.
-fn labels(path: &Path, grid: &Grid, context: &Context<'_>) -> Result<Arc<Mesh>, Error> {
+/// The surfaces between the labels of a volume, with their column.
+fn labels(path: &Path, grid: &Grid, known: Option<&ObjectLabels>, context: &Context<'_>) -> Result<Arc<Mesh>, Error> {
     let name = crate::printable(path).to_string();
     let bytes = convert::label_surface_bytes(grid);
     let _held = context.files.memory(context.options).take(&name, bytes).map_err(Error::Limit)?;
-    let mesh = convert::label_surfaces(grid, &name).map_err(|error| match error {
+    let table = known.map(|known| &*known.table);
+    let mesh = convert::label_surfaces(grid, table, &name).map_err(|error| match error {
         convert::ConvertError::Parameter { parameter, found, expected, .. } => {
             let message = format!("{parameter} is {found}, expected {expected}");
             Error::input(&name, message, "use `volume = ` or `isosurface = ` for this file, whose values are amounts")
         }
         other => other.into(),
     })?;
+    if let Some(known) = known {
+        if let Some(file) = &known.file {
+            context.files.note(file, known.remarks.iter().cloned());
+        }
+        context.files.note(path, convert::said_of_labels(grid, &known.table));
+        if mesh.triangles.is_empty() {
+            let hint = "raise an `opacity` of `labels`, or set `visible` of one; in a table alpha 0 hides a label";
+            return Err(Error::input(&name, "expected a label that is shown, found none: all are hidden", hint));
+        }
+    }
     Ok(mesh.into())
 }
 

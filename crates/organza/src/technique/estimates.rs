@@ -45,8 +45,11 @@ impl<'a> Asked<'a> {
     /// Whether the object is opaque for certain. Raw points may each have an opacity of their own, and so may what shows a column.
     pub(crate) fn is_opaque(&self) -> bool {
         let object = self.object;
-        let is_classified =
-            object.points.color_by.as_ref().is_some_and(|by| matches!(by.colors, PointColors::Transfer(..)));
+        let is_classified = object.points.color_by.as_ref().is_some_and(|by| match &by.colors {
+            PointColors::Transfer(..) => true,
+            PointColors::Labels(table) => table.has_opacities(),
+            _ => false,
+        });
         let may_vary =
             object.field.is_some() || is_classified || !object.materials.is_empty() || object.source.is_of_points();
         let is_translucent = self.mesh().map_or(self.scene.opacity_of(object) < 1.0, |mesh| mesh.is_translucent);
