@@ -129,7 +129,11 @@ fn files_that_no_picture_can_be_made_of_are_refused_with_a_reason() {
     std::fs::create_dir(place.path("folder")).unwrap();
     for (code, arguments, stderr) in [
         (4, &["render", "missing.ply", "-o", "a.png"][..], "missing.ply: cannot read: no such file"),
-        (4, &["render", "folder", "-o", "a.png"], "folder: cannot read: expected a regular file, found a directory"),
+        (
+            4,
+            &["render", "folder", "-o", "a.png"],
+            "folder: cannot read: expected a file, or a folder of slices, found an empty",
+        ),
         (
             3,
             &["render", "other.dat", "-o", "a.png"],

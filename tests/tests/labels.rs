@@ -1,4 +1,4 @@
-//! Volumes of labels by tables of their names, colours and opacities, through the whole command.
+//! Volumes of labels by tables of their names, colours and opacities, and the size of voxels, through the whole command.
 
 use organza_tests::Place;
 
@@ -116,4 +116,18 @@ fn wrong_tables_are_refused_with_their_place() {
     let scene = ["render", "plain.toml", "--labels", "all.ctbl", "-o", "a.png"];
     place.expect(2, &scene, "--labels is for data files, and a scene is given");
     assert!(!place.made().contains(&"a.png".to_owned()));
+}
+
+#[test]
+fn a_size_of_voxels_takes_the_place_of_the_file_s() {
+    let place = place();
+    place.expect(0, &["init", "seg.nrrd", "--labels", "all.ctbl", "-o", "s2.toml"], "");
+    let text = String::from_utf8(place.bytes("s2.toml")).unwrap();
+    assert!(text.contains("labels = \"all.ctbl\""), "{text}");
+    place.write("s2.toml", text.replace("labels = ", "voxel_size = [1, 1, 3]\nlabels = "));
+    let out = place.expect(0, &["render", "s2.toml", "-o", "deep.png", "--size", "160x120"], "");
+    let said = String::from_utf8_lossy(&out.stderr).into_owned();
+    assert!(said.contains("voxels of 1 x 1 x 3 by `voxel_size`, in the place of 1 x 1 x 1"), "{said}");
+    let wrong = ["render", "s2.toml", "-o", "a.png", "--set", "object.0.voxel_size=[1, 0, 1]"];
+    place.expect(2, &wrong, "`voxel_size`: expected three numbers above 0");
 }

@@ -43,6 +43,8 @@ pub struct Prediction {
     pub splats: u64,
     /// Never more splats than that; `None` where nothing but the limit of the parameters is known.
     pub at_most: Option<u64>,
+    /// Whether `splats` are counted rather than estimated.
+    pub is_exact: bool,
     /// Bytes of the cloud with that many `splats`.
     pub bytes: u64,
 }
@@ -51,11 +53,12 @@ impl Prediction {
     fn new(splats: f64, at_most: Option<f64>, columns: ColumnSet) -> Self {
         // Floats become the nearest integer in range.
         let splats = splats.round() as u64;
-        Self { splats, at_most: at_most.map(|n| n as u64), bytes: splats.saturating_mul(columns.bytes_per_splat()) }
+        let bytes = splats.saturating_mul(columns.bytes_per_splat());
+        Self { splats, at_most: at_most.map(|n| n as u64), is_exact: false, bytes }
     }
 
     fn exact(splats: f64, columns: ColumnSet) -> Self {
-        Self::new(splats, Some(splats), columns)
+        Self { is_exact: true, ..Self::new(splats, Some(splats), columns) }
     }
 }
 

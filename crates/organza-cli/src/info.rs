@@ -129,6 +129,7 @@ fn file_document(facts: &Facts) -> Value {
         "bounds": facts.bounds.map(|b| [b.min.to_array(), b.max.to_array()]),
         "size": facts.bounds.map(|b| b.size().to_array()),
         "distance_from_origin_over_size": facts.far(),
+        "unit": facts.unit,
         "spacing": facts.spacing,
         "duplicate_points": facts.duplicates,
         "steps": facts.steps.map(|steps| steps.map(|s| s.to_array())),

@@ -1,6 +1,6 @@
 //! The displayed picture as a JPEG, for pages and letters: smaller than a PNG, and not exact.
 
-use super::{Metadata, Params, WriteReport, png_file};
+use super::{Metadata, Params, WriteReport, check_sides, png_file};
 use crate::Error;
 use image::ExtendedColorType;
 use image::codecs::jpeg::JpegEncoder;
@@ -23,10 +23,7 @@ pub(super) fn encode(
         let hint = "write a PNG or EXR file, or leave --transparent out";
         return Err(Error::Usage { message: "a JPEG file has no opacity".into(), hint: hint.into() });
     }
-    if width > MOST_PIXELS || height > MOST_PIXELS {
-        let message = format!("a JPEG file has at most {MOST_PIXELS} pixels a side, found {width}x{height}");
-        return Err(Error::Usage { message, hint: "write a PNG or EXR file".into() });
-    }
+    check_sides("JPEG", layers.size, MOST_PIXELS)?;
     let pixels = png_file::bytes(layers, metadata, params, report)?;
     let mut bytes = Vec::new();
     let encoded =

@@ -163,6 +163,19 @@ pub fn encode(
     Ok((bytes, report))
 }
 
+/// Refuses a picture that a format has no room for.
+///
+/// # Errors
+/// [`Error::Usage`] for more pixels along a side.
+fn check_sides(format: &str, size: [u32; 2], most: u32) -> Result<(), Error> {
+    let [width, height] = size;
+    if width <= most && height <= most {
+        return Ok(());
+    }
+    let message = format!("a {format} file has at most {most} pixels a side, found {width}x{height}");
+    Err(Error::Usage { message, hint: "write a PNG or EXR file".into() })
+}
+
 /// The displayed picture, as a PNG file of 8 bits a channel has it: red, green and blue of each pixel, row by row from the top left, and its opacity where
 /// the picture is to be transparent.
 ///

@@ -1,6 +1,6 @@
 //! The displayed picture as a WebP file without losses: the bytes of a PNG file of 8 bits a channel, in less room.
 
-use super::{Metadata, Params, WriteReport, png_file};
+use super::{Metadata, Params, WriteReport, check_sides, png_file};
 use crate::Error;
 use image::ExtendedColorType;
 use image::codecs::webp::WebPEncoder;
@@ -17,10 +17,7 @@ pub(super) fn encode(
     report: &mut WriteReport,
 ) -> Result<Vec<u8>, Error> {
     let [width, height] = layers.size;
-    if width > MOST_PIXELS || height > MOST_PIXELS {
-        let message = format!("a WebP file has at most {MOST_PIXELS} pixels a side, found {width}x{height}");
-        return Err(Error::Usage { message, hint: "write a PNG or EXR file".into() });
-    }
+    check_sides("WebP", layers.size, MOST_PIXELS)?;
     let pixels = png_file::bytes(layers, metadata, params, report)?;
     let color = if params.transparent { ExtendedColorType::Rgba8 } else { ExtendedColorType::Rgb8 };
     let mut bytes = Vec::new();

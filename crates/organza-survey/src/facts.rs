@@ -38,6 +38,8 @@ pub struct Facts {
     pub attributes: Vec<&'static str>,
     /// In the file's own coordinates; `None` for an empty file.
     pub bounds: Option<DAabb>,
+    /// The unit of lengths, such as `mm`, where the file or its format states one.
+    pub unit: Option<String>,
     /// Median distance of a point to its nearest neighbour, of a sample of 1000.
     pub spacing: Option<f64>,
     /// Points that lie where another one lies.
@@ -118,6 +120,7 @@ pub fn facts(path: &Path, table: Option<&NamedTable>, max_bytes: u64, strict: bo
     let remarks = notes.remarks.into_iter().chain(facts.remarks).chain(of_table).collect();
     let mended = notes.mended.iter().map(Mended::to_string).collect();
     let warnings = notes.warnings;
+    let unit = notes.unit;
     let stated = stated_up_axis(path);
     let stands = facts.bounds.filter(|_| stated.is_none()).and_then(|bounds| match facts.kind {
         "mesh" => stands_along(bounds),
@@ -127,7 +130,19 @@ pub fn facts(path: &Path, table: Option<&NamedTable>, max_bytes: u64, strict: bo
     });
     let up = stated.unwrap_or_default();
     let is_up_stated = stated.is_some();
-    Ok(Facts { bytes, format: notes.format, unused, remarks, mended, warnings, up, is_up_stated, stands, ..facts })
+    Ok(Facts {
+        bytes,
+        format: notes.format,
+        unit,
+        unused,
+        remarks,
+        mended,
+        warnings,
+        up,
+        is_up_stated,
+        stands,
+        ..facts
+    })
 }
 
 impl Facts {

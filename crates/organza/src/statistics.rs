@@ -214,8 +214,13 @@ pub struct SplatCount {
 
 impl SplatCount {
     pub(crate) fn predicted(object: &str, prediction: &Prediction, conversion: Conversion) -> Self {
-        let exact = prediction.at_most == Some(prediction.splats);
-        Self { object: object.to_owned(), predicted: prediction.splats, exact, made: 0, conversion }
+        Self {
+            object: object.to_owned(),
+            predicted: prediction.splats,
+            exact: prediction.is_exact,
+            made: 0,
+            conversion,
+        }
     }
 }
 

@@ -82,7 +82,7 @@ use points::las;
 use points::{pcd, splat, spz, xyz};
 use rayon::prelude::*;
 use reading::Reading;
-use splat_core::glam::DVec3;
+use splat_core::glam::{DMat3, DVec3};
 use splat_core::points::attributes::attribute;
 use splat_core::text::{counted, escaped, escaped_path};
 use splat_core::{Grid, MemoryAccount, Mesh, Progress, RadianceImage, RawPoints};
@@ -99,7 +99,7 @@ use volumes::tiff;
 use volumes::vti;
 #[cfg(feature = "vtk")]
 use volumes::vtk;
-use volumes::{dicom, metaimage, nrrd, raw};
+use volumes::{dicom, lattice, metaimage, nrrd, raw, rounded};
 
 /// How much a file may ask for, and what happens to what is wrong in it.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -123,6 +123,8 @@ pub struct ReadParams {
     /// Name of the array of a VTK file that is the volume's field, of a channel of a TIFF stack, or the UID or description of a DICOM series; `None` for the one that the file names, else the first of one number a
     /// point or cell, the first channel, and the series of most slices. One that the file has not is an error that names those that it has, as one of another format is.
     pub array: Option<String>,
+    /// The size of a voxel of a volume, in the place of the file's.
+    pub voxel_size: Option<VoxelSize>,
     /// Whether points may become a medium: columns `smoothing_length`, `extinction` and `mass` are kept too, beside those that are kept of all
     /// points where there are such, `radius`, `tx`, `ty`, `tz`, `shadow_coefficient`, `footprint` and `material`. Numbers that these cannot have are refused, see
     /// `convert::raw_to_matter` and `convert::raw_to_surfels`.
@@ -148,11 +150,36 @@ impl Default for ReadParams {
             most_points: None,
             columns: Vec::new(),
             array: None,
+            voxel_size: None,
             matter: false,
             ranges: false,
             is_data: false,
             is_coverage: false,
         }
+    }
+}
+
+/// Steps between the voxels of a volume along its three axes, finite and above 0.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct VoxelSize([f64; 3]);
+
+/// None of the steps is NaN.
+impl Eq for VoxelSize {}
+
+impl VoxelSize {
+    /// `None` unless all steps are finite and above 0.
+    ///
+    /// ```
+    /// use read::VoxelSize;
+    /// assert!(VoxelSize::new([0.5, 0.5, 2.0]).is_some() && VoxelSize::new([0.5, 0.0, 2.0]).is_none());
+    /// ```
+    pub fn new(steps: [f64; 3]) -> Option<Self> {
+        steps.iter().all(|step| step.is_finite() && *step > 0.0).then_some(Self(steps))
+    }
+
+    /// The steps.
+    pub fn steps(self) -> [f64; 3] {
+        self.0
     }
 }
 
@@ -314,6 +341,10 @@ fn finished(loaded: Loaded, reading: &mut Reading<'_>) -> Result<Loaded, ReadErr
         let found = "a file of another kind";
         return Err(ReadError::input(Place::File, expected, found, "leave out `frame`"));
     }
+    if reading.params.voxel_size.is_some() && !matches!(loaded, Loaded::Grid(_)) {
+        let hint = "leave out `voxel_size`; `transform` has a `scale`";
+        return Err(ReadError::input(Place::File, "a volume", "a file of another kind", hint));
+    }
     let has_array = matches!(loaded, Loaded::Grid(_)) && WITH_ARRAYS.contains(&reading.notes.format.as_str());
     if let (Some(name), false) = (&reading.params.array, has_array) {
         let found = format!("the array '{}', and a file without arrays", escaped(name.as_bytes(), LONGEST_NAME));
@@ -326,7 +357,13 @@ fn finished(loaded: Loaded, reading: &mut Reading<'_>) -> Result<Loaded, ReadErr
     }
     match loaded {
         Loaded::Points(points) => check_columns(&points, reading).map(|()| Loaded::Points(points)),
-        Loaded::Grid(grid) => remark_gaps(&grid, reading).map(|()| Loaded::Grid(grid)),
+        Loaded::Grid(mut grid) => {
+            remark_gaps(&grid, reading)?;
+            if let Some(size) = reading.params.voxel_size {
+                resize_voxels(&mut grid, size, &mut reading.notes)?;
+            }
+            Ok(Loaded::Grid(grid))
+        }
         Loaded::Mesh(mesh) => {
             check_mesh_columns(&mesh, reading)?;
             outwards(mesh, reading).map(Loaded::Mesh)
@@ -334,6 +371,33 @@ fn finished(loaded: Loaded, reading: &mut Reading<'_>) -> Result<Loaded, ReadErr
         Loaded::Image(image) => Ok(Loaded::Image(image)),
     }
 }
+
+/// Gives voxels the size that was asked for; what the file says of it no longer holds.
+fn resize_voxels(grid: &mut Grid, size: VoxelSize, notes: &mut Notes) -> Result<(), ReadError> {
+    const HINT: &str = "`voxel_size` and the places of the file are too unlike: check both";
+    let before = [grid.axes.x_axis, grid.axes.y_axis, grid.axes.z_axis];
+    let steps = size.steps();
+    let mut axes = before;
+    for (axis, step) in axes.iter_mut().zip(steps) {
+        *axis *= step / axis.length();
+    }
+    let axes = DMat3::from_cols(axes[0], axes[1], axes[2]);
+    // The corner of the lattice moves as its steps do, so that a stack lies as if its file stated them.
+    grid.origin = axes * (grid.axes.inverse() * grid.origin);
+    grid.axes = axes;
+    lattice::check(grid.origin, &grid.axes, Place::File, HINT)?;
+    notes.remarks.retain(|remark| !remark.starts_with(VOXELS_OF));
+    notes.unit = None;
+    let shown = |steps: [f64; 3]| steps.map(|step| rounded(step).to_string()).join(" x ");
+    let old = before.map(|axis| axis.length());
+    if old != steps {
+        notes.remark(format!("{VOXELS_OF} {} by `voxel_size`, in the place of {}", shown(steps), shown(old)));
+    }
+    Ok(())
+}
+
+/// The beginning of remarks about the size of voxels.
+const VOXELS_OF: &str = "voxels of";
 
 /// The mesh with parts that are inside out turned.
 fn outwards(mut mesh: Mesh, reading: &mut Reading<'_>) -> Result<Mesh, ReadError> {

@@ -120,6 +120,8 @@ pub struct Notes {
     pub unused: Vec<String>,
     /// Columns of points or of a mesh that have no meaning of their own, kept or not.
     pub columns: Vec<NamedColumn>,
+    /// The unit of its lengths, such as `mm`, where the file or its format states one.
+    pub unit: Option<String>,
     /// What was made of the data that its user should know, one sentence without a full stop each.
     pub remarks: Vec<String>,
     /// Data that a picture will show changed, one sentence without a full stop each: more than a remark.

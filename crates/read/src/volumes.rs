@@ -35,6 +35,6 @@ fn upright(dims: [u64; 3], steps: DVec3) -> (DVec3, DMat3) {
 }
 
 /// A number to six digits, as it is told.
-fn rounded(number: f64) -> f64 {
+pub(crate) fn rounded(number: f64) -> f64 {
     format!("{number:.5e}").parse().unwrap_or(number)
 }

@@ -171,8 +171,61 @@ fn colours_are_their_luma_and_other_pages_are_refused() {
     );
     let packed = Stack { packing: 7, ..Stack::default() };
     assert!(refused(&packed).contains("page 1") && refused(&packed).contains("save it without compression"));
+    let half = Stack { bits: 16, format: 3, ..Stack::default() };
+    let said = refused(&half);
+    assert!(said.contains("expected floats of 32 or 64 bits, found floats of 16 bits at page 1"), "{said}");
     let infinite = Stack { bits: 32, format: 3, pages: vec![vec![f64::INFINITY; 6]; 2], ..Stack::default() };
     assert!(refused(&infinite).contains("expected values that fit 32-bit floats, found inf at voxel 0"));
+}
+
+/// Writes a slice of 10 x 2 ranks in a list of colours, of so many bits each.
+fn listed(folder: &Path, name: &str, bits: u8, ranks: &[u8]) {
+    let depth =
+        [png::BitDepth::One, png::BitDepth::Two, png::BitDepth::Four, png::BitDepth::Eight][bits.ilog2() as usize];
+    let mut out = Vec::new();
+    let mut encoder = png::Encoder::new(&mut out, 10, 2);
+    encoder.set_color(png::ColorType::Indexed);
+    encoder.set_depth(depth);
+    encoder.set_palette((0..3 << bits).map(|k| (255 - k % 256) as u8).collect::<Vec<u8>>());
+    let pack = |ranks: &[u8]| {
+        ranks.iter().enumerate().fold(0u8, |byte, (i, rank)| byte | rank << (8 - bits as usize * (i + 1)))
+    };
+    let rows = ranks.chunks(10).flat_map(|row| row.chunks(8 / usize::from(bits)).map(pack).collect::<Vec<u8>>());
+    encoder.write_header().unwrap().write_image_data(&rows.collect::<Vec<u8>>()).unwrap();
+    std::fs::write(folder.join(name), out).unwrap();
+}
+
+#[test]
+fn slices_of_a_list_of_colours_are_ranks_in_it_of_any_depth() {
+    for bits in [1u8, 2, 4, 8] {
+        let path = folder(&format!("listed-{bits}"));
+        let ranks: Vec<u8> = (0..40u16).map(|k| (k * 7 % (1 << bits)) as u8).collect();
+        listed(&path, "s1.png", bits, &ranks[..20]);
+        listed(&path, "s2.png", bits, &ranks[20..]);
+        let (grid, notes) = of_folder(&path).unwrap();
+        assert_eq!(grid.values, ranks.iter().map(|rank| f32::from(*rank)).collect::<Vec<_>>(), "{bits}");
+        assert!(notes.remarks.iter().any(|remark| remark.starts_with("numbers stand for colours of a list")));
+        // Cut short, and in the middle of its list.
+        let whole = std::fs::read(path.join("s2.png")).unwrap();
+        for end in [whole.len() / 4, whole.len() / 2, whole.len() - 13] {
+            std::fs::write(path.join("s2.png"), &whole[..end]).unwrap();
+            assert!(of_folder(&path).unwrap_err().to_string().contains("the slice 's2.png'"));
+        }
+    }
+}
+
+#[test]
+fn a_size_of_voxels_is_that_of_the_request() {
+    let size = |steps| ReadParams { voxel_size: read::VoxelSize::new(steps), ..ReadParams::default() };
+    let bytes_of = Stack::default().bytes();
+    let (grid, notes) = read(&bytes_of, &size([0.5, 0.25, 4.0])).unwrap();
+    assert_eq!(steps(&grid).abs(), DVec3::new(0.5, 0.25, 4.0));
+    let (plain, _) = read(&bytes_of, &ReadParams::default()).unwrap();
+    assert_eq!(grid.origin, plain.origin * DVec3::new(0.5, 0.25, 4.0) / steps(&plain).abs());
+    assert!(notes.remarks.iter().any(|r| r.starts_with("voxels of 0.5 x 0.25 x 4 by `voxel_size`")), "{notes:?}");
+    assert_eq!(read::VoxelSize::new([1.0, f64::NAN, 1.0]), None);
+    let error = bytes("a.xyz", b"0 0 1\n2 0 1\n", &size([1.0; 3]), None).unwrap_err().to_string();
+    assert!(error.contains("expected a volume, found a file of another kind\nhint: leave out `voxel_size`"), "{error}");
 }
 
 /// A folder of this test, empty.

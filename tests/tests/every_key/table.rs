@@ -206,6 +206,9 @@ fn objects() -> Vec<Entry> {
         one("object.frame", "object.it.frame=1").but(All, Refused(2, "`frame` belongs to a `volume`")),
         of(VOLUME, "object.array", "object.it.array='other'").with(&["object.it.volume='arrays.vtk'"]),
         one("object.array", "object.it.array='other'").but(All, Refused(2, "`array` belongs to a `volume`")),
+        of(VOLUME, "object.voxel_size", "object.it.voxel_size=[0.15, 0.2, 0.2]"),
+        one("object.voxel_size", "object.it.voxel_size=[1, 1, 2]")
+            .but(All, Refused(2, "`voxel_size` belongs to a `volume`")),
         of(VOLUME, "object.nodata", "object.it.nodata=1"),
         one("object.nodata", "object.it.nodata=1").but(All, Refused(2, "`nodata` belongs to a `volume`")),
         of(All, "object.shadow_coefficient", "object.it.shadow_coefficient=0.2"),

@@ -97,13 +97,11 @@ fn places(facts: &Facts, text: &mut Lines) {
     let list = |v: [f64; 3]| v.map(|x| rounded(x, unit)).join("  ");
     text.add("lowest", list(bounds.min.to_array()));
     text.add("highest", list(bounds.max.to_array()));
-    text.add(
-        "size",
-        format!(
-            "{}, in the unit of the file, which does not tell it",
-            size.to_array().map(|x| rounded(x, unit)).join(" × ")
-        ),
-    );
+    let of_unit = match &facts.unit {
+        Some(name) => format!(", in {name}"),
+        None => ", in the unit of the file, which does not tell it".to_owned(),
+    };
+    text.add("size", size.to_array().map(|x| rounded(x, unit)).join(" × ") + &of_unit);
     if let Some(far) = facts.far().filter(|far| *far > FAR) {
         text.add(
             "far away",

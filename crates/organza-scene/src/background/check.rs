@@ -22,7 +22,8 @@ pub(crate) fn check_background(
     };
     if raw.color.is_some() {
         let message = "expected one of `color` and `environment`, found both";
-        return Err(at.key("environment").error(message, "an environment fills the whole background"));
+        let hint = "an environment fills the whole background: leave one of both out; `--background COLOUR` takes the place of both";
+        return Err(at.key("environment").error(message, hint));
     }
     let degrees = raw.rotate.unwrap_or(0.0);
     Ok((

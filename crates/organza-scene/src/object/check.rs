@@ -3,6 +3,7 @@
 use crate::at::At;
 use crate::footprint::check::check_choice;
 use crate::in_memory::name_of;
+use crate::limits::{LARGEST, SMALLEST};
 use crate::object::labels::{LABEL_COLUMN, check_labels};
 use crate::object::points_check::check_points;
 use crate::object::raw::{RawLattice, RawObject, RawTransform, RawUp};
@@ -13,7 +14,7 @@ use crate::source::field::{check_clip, check_shown_field};
 use crate::{Error, FieldSource, ObjectLabels, SceneMaterial, SceneObject, Source, Technique, Up, UpBy};
 use convert::{ColorBy, PointColors};
 use glam::{DQuat, DVec3};
-use read::{stated_up_axis, up_axis};
+use read::{VoxelSize, stated_up_axis, up_axis};
 use splat_core::{FootprintStack, MemoryAccount, Packing, Similarity, UpAxis};
 use std::collections::HashSet;
 use std::sync::Arc;
@@ -80,6 +81,7 @@ pub(crate) fn check_object(
             .map(|value| at.number("nodata", value, -GREATEST_VALUE..=GREATEST_VALUE))
             .transpose()?
             .map(|v| v as f32),
+        voxel_size: raw.voxel_size.map(|steps| check_voxel_size(at, steps)).transpose()?,
         degrees: raw.degrees.unwrap_or(false),
         field,
         points,
@@ -100,6 +102,17 @@ pub(crate) fn check_object(
         is_chosen: false,
         deforms: false,
         name: raw.name,
+    })
+}
+
+/// Steps between voxels.
+fn check_voxel_size(at: &At<'_>, steps: [f64; 3]) -> Result<VoxelSize, Error> {
+    let fits = |step: &f64| (SMALLEST..=LARGEST).contains(step);
+    let found = VoxelSize::new(steps).filter(|size| size.steps().iter().all(fits));
+    found.ok_or_else(|| {
+        let message =
+            format!("`voxel_size`: expected three numbers above 0, from {SMALLEST:e} to {LARGEST:e}, found {steps:?}");
+        at.key("voxel_size").error(message, "such as [0.5, 0.5, 2]: steps along x, y and from slice to slice")
     })
 }
 
@@ -169,6 +182,10 @@ fn refuse_what_does_not_apply(at: &At<'_>, raw: &RawObject, source: &Source) -> 
                 format!("`{key}` belongs to a `volume`, an `isosurface`, a `slice` and a surface with a `field`");
             return Err(at.key(key).error(message, ""));
         }
+    }
+    if raw.voxel_size.is_some() && !has_volume && raw.mesh.is_none() {
+        let message = "`voxel_size` belongs to a `volume`, an `isosurface`, a `slice`, a surface with a `field` and a `mesh` of labels";
+        return Err(at.key("voxel_size").error(message, ""));
     }
     let is_classified = raw.volume.is_some() || raw.slice.is_some();
     if raw.transfer.is_some() && !is_classified && raw.color_by.is_none() && raw.field.is_none() {

@@ -2,6 +2,7 @@
 
 use crate::{FieldSource, ObjectLabels, PointsLook, Source, Technique};
 use convert::FootprintChoice;
+use read::VoxelSize;
 use splat_core::{Clip, Packing, Similarity, UpAxis};
 use std::path::Path;
 use std::sync::Arc;
@@ -31,6 +32,8 @@ pub struct SceneObject {
     pub array: Option<String>,
     /// The value that voxels of its volume have which have none, beside NaN.
     pub nodata: Option<f32>,
+    /// Steps between the voxels of its volume, in the place of the file's.
+    pub voxel_size: Option<VoxelSize>,
     /// Whether x and y of its points are degrees, which become metres.
     pub degrees: bool,
     /// The field that it shows, a surface alone.

@@ -30,6 +30,8 @@ pub(crate) struct RawObject {
     pub(crate) array: Option<String>,
     /// The value of the voxels of a `volume`, `isosurface`, `slice` or `field` that have none, which draw nothing; default none but NaN.
     pub(crate) nodata: Option<f64>,
+    /// Steps between the voxels of a `volume`, `isosurface`, `slice`, `field` or `mesh` of labels along x, y and z of the file, in its unit; default those of the file.
+    pub(crate) voxel_size: Option<[f64; 3]>,
     /// Path of a raw point cloud.
     pub(crate) points: Option<String>,
     /// What a light sees first of other objects.

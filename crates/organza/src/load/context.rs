@@ -104,14 +104,25 @@ impl Context<'_> {
         let columns = self.scene.columns_of(path);
         let matter = self.scene.has_matter(path);
         let most_points = self.scene.render.max_points;
-        let params = ReadParams { columns, matter, most_points, ..self.options.read_params() };
+        // A surface with a field takes the size of the field's voxels.
+        let voxel_size =
+            self.object_read(path).filter(|object| object.field.is_none()).and_then(|object| object.voxel_size);
+        let params = ReadParams { columns, matter, most_points, voxel_size, ..self.options.read_params() };
         self.files.data(self.scene, path, &params, self.progress)
     }
 
     /// The same of one volume of a series.
     pub(super) fn read_frame(&self, path: &Path, frame: u64) -> Result<SourceData, Error> {
-        let array = self.scene.objects.get(self.id).and_then(|object| object.array.clone());
-        self.files.data(self.scene, path, &ReadParams { frame, array, ..self.options.read_params() }, self.progress)
+        let object = self.scene.objects.get(self.id);
+        let array = object.and_then(|object| object.array.clone());
+        let voxel_size = object.and_then(|object| object.voxel_size);
+        let params = ReadParams { frame, array, voxel_size, ..self.options.read_params() };
+        self.files.data(self.scene, path, &params, self.progress)
+    }
+
+    /// The object that is loaded, if this is the file of its source.
+    fn object_read(&self, path: &Path) -> Option<&SceneObject> {
+        self.scene.objects.get(self.id).filter(|object| object.source.path() == Some(path))
     }
 
     /// The value of voxels without one, where the object states it.

@@ -133,8 +133,8 @@ impl Files {
     /// creases; all else is taken where it lies.
     fn taken(&self, source: &Path, data: &SourceData, limits: &ReadParams) -> Result<Read, Error> {
         let name = crate::printable(source);
-        if limits.frame > 0 || limits.array.is_some() {
-            let message = "expected no `frame` and no `array`: data in memory is one";
+        if limits.frame > 0 || limits.array.is_some() || limits.voxel_size.is_some() {
+            let message = "expected no `frame`, no `array` and no `voxel_size`: data in memory is one, and has its own";
             return Err(Error::input(name, message, "leave them out, or hand over what they name"));
         }
         let from_read = |e: read::ReadError| Error::from_read(source, &e);

@@ -210,6 +210,10 @@ pub fn is_foreign_json(beginning: &[u8]) -> bool {
 pub(crate) fn folder(path: &Path) -> ReadError {
     let entries = std::fs::read_dir(path).into_iter().flatten().flatten();
     let mut files: Vec<_> = entries.map(|entry| entry.path()).take(crate::LOOKED_AT).collect();
+    if files.is_empty() {
+        let hint = "name a file, or a folder that holds the slices of one volume: DICOM, TIFF or PNG";
+        return ReadError::file_system("a file, or a folder of slices", "an empty folder", hint);
+    }
     files.sort();
     let is_named =
         |names: &[&str]| files.iter().any(|f| f.file_name().is_some_and(|name| names.iter().any(|n| name == *n)));

@@ -5,7 +5,7 @@ use crate::check_image;
 use crate::error::{Place, ReadError};
 use crate::reading::Reading;
 use crate::stream::input::{check_deflated, hold, reserve};
-use crate::volumes::slices::Slice;
+use crate::volumes::slices::{LISTED_COLORS, Slice};
 use crate::volumes::voxels::Kind;
 use image::codecs::png::PngDecoder;
 use image::{ColorType, DynamicImage, ImageDecoder};
@@ -17,6 +17,9 @@ use std::io::Cursor;
 /// Chunks that say other colours, or other pictures, than are read.
 const NOT_USED: [&[u8]; 5] = [b"gAMA", b"cHRM", b"iCCP", b"cICP", b"acTL"];
 const MARK: usize = 8;
+/// The byte of the header that says what colours are, and its value where they are those of a list.
+const COLOR_TYPE: usize = 25;
+const LISTED: u8 = 3;
 
 const DAMAGED: &str = "the file is truncated or damaged; save it anew, as PNG of 8 or 16 bits";
 
@@ -70,6 +73,9 @@ pub(crate) fn slice(content: &[u8], reading: &mut Reading<'_>) -> Result<Slice, 
     hold("the decoded image", 2 * decoder.total_bytes(), reading.params)?;
     // Profiles and gammas are of displays; the numbers are what counts.
     chunks(content)?;
+    if content.get(COLOR_TYPE) == Some(&LISTED) {
+        return indices(content, reading);
+    }
     let (numbers, is_color, kind) = match decoder.color_type() {
         ColorType::L8 => (1, false, Kind::U8),
         ColorType::La8 => (2, false, Kind::U8),
@@ -88,6 +94,41 @@ pub(crate) fn slice(content: &[u8], reading: &mut Reading<'_>) -> Result<Slice, 
     bytes.resize(decoder.total_bytes() as usize, 0);
     decoder.read_image(&mut bytes).map_err(damaged)?;
     Ok(Slice { size, kind, numbers, is_color, big_endian: cfg!(target_endian = "big"), bytes, width: None })
+}
+
+/// The numbers of a slice whose colours are a list, as a TIFF slice has them.
+fn indices(content: &[u8], reading: &mut Reading<'_>) -> Result<Slice, ReadError> {
+    let damaged = |e: ::png::DecodingError| {
+        ReadError::input(Place::File, "a complete PNG image", escaped(e.to_string().as_bytes(), 120), DAMAGED)
+    };
+    let mut decoder = ::png::Decoder::new(Cursor::new(content));
+    decoder.set_transformations(::png::Transformations::IDENTITY);
+    let mut decoder = decoder.read_info().map_err(damaged)?;
+    let ::png::Info { width, height, bit_depth, .. } = *decoder.info();
+    let bits = bit_depth as usize;
+    let Some(room) = decoder.output_buffer_size().filter(|_| matches!(bits, 1 | 2 | 4 | 8)) else {
+        return Err(ReadError::input(
+            Place::File,
+            "numbers of 1 to 8 bits in a list of colours",
+            bits.to_string(),
+            DAMAGED,
+        ));
+    };
+    let mut packed = Vec::new();
+    reserve(&mut packed, room)?;
+    packed.resize(room, 0);
+    let row = decoder.next_frame(&mut packed).map_err(damaged)?.line_size;
+    let mut bytes = Vec::new();
+    reserve(&mut bytes, width as usize * height as usize)?;
+    let mask = (u16::MAX >> (16 - bits)) as u8;
+    for row in packed.chunks_exact(row).take(height as usize) {
+        // The first number lies in the highest bits.
+        bytes.extend((0..width as usize).map(|x| row[x * bits / 8] >> (8 - bits - x * bits % 8) & mask));
+    }
+    reading.notes.remark(LISTED_COLORS);
+    let big_endian = cfg!(target_endian = "big");
+    let size = [width, height];
+    Ok(Slice { size, kind: Kind::U8, numbers: 1, is_color: false, big_endian, bytes, width: None })
 }
 
 /// Names of the chunks, of which the file is made up to the last byte.

@@ -171,9 +171,11 @@ pub(crate) fn channel_of(channels: u64, params: &ReadParams, notes: &mut Notes) 
     const NAME: &str = "channel";
     let Some(name) = &params.array else {
         if channels > 1 {
-            notes.remark(format!(
-                "{NAME}1 of {channels} is drawn; `array` of a scene or --color-by chooses another, up to {NAME}{channels}"
-            ));
+            let others = match channels {
+                2 => format!("{NAME}2"),
+                _ => format!("another, {NAME}2 to {NAME}{channels}"),
+            };
+            notes.remark(format!("{NAME}1 of {channels} is drawn; `array` of a scene or --color-by chooses {others}"));
         }
         return Ok(0);
     };

@@ -17,6 +17,10 @@ use std::path::{Path, PathBuf};
 
 const HINT: &str = "put the slices of one volume into a folder of their own, in one format, size and type";
 
+/// What is said of slices whose numbers are ranks in a list of colours.
+pub(crate) const LISTED_COLORS: &str =
+    "numbers stand for colours of a list, which is not used: they are read as they are stored";
+
 /// The numbers of one slice.
 pub(crate) struct Slice {
     /// Columns and rows.
@@ -118,12 +122,12 @@ pub(crate) fn read(folder: &Path, files: Vec<PathBuf>, reading: &mut Reading<'_>
 /// The steps between voxels, and what is told of them.
 fn steps(width: Option<[f64; 2]>, reading: &mut Reading<'_>) -> DVec3 {
     let Some([x, y]) = width else {
-        reading.notes.remark("voxels of 1 x 1 x 1: the files state no step. A TIFF stack of ImageJ does (Image > Properties in Fiji), an NRRD file by `spacings`");
+        reading.notes.remark("voxels of 1 x 1 x 1: the files state no step. `voxel_size` of an object does, a TIFF stack of ImageJ (Image > Properties in Fiji), an NRRD file by `spacings`");
         return DVec3::ONE;
     };
     let [wide, high] = [x, y].map(rounded);
     reading.notes.remark(format!(
-        "voxels of {wide} x {high} by the resolution of the first slice, and as deep as wide: a TIFF stack of ImageJ states the step between slices (Image > Properties in Fiji)"
+        "voxels of {wide} x {high} by the resolution of the first slice, and as deep as wide: `voxel_size` of an object, or a TIFF stack of ImageJ, states the step between slices (Image > Properties in Fiji)"
     ));
     DVec3::new(x, y, x)
 }

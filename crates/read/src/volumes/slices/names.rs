@@ -5,10 +5,34 @@ use crate::Notes;
 use crate::error::{Place, ReadError};
 use crate::format::folder::{Part, parts};
 use splat_core::text::escaped;
+use std::collections::BTreeMap;
 
 /// The name without its extension, whose digits count nothing.
 fn stem(name: &str) -> &str {
     name.rsplit_once('.').map_or(name, |(stem, _)| stem)
+}
+
+const OTHER_HINT: &str =
+    "take other files out of the folder: the slices of one volume need one of their own, in one format, size and type";
+
+/// Whether names differ in numbers alone.
+fn are_alike(parts: &[Part], others: &[Part]) -> bool {
+    let is_alike = |(part, other): (&Part, &Part)| match (part, other) {
+        (Part::Number(_), Part::Number(_)) => true,
+        _ => part == other,
+    };
+    parts.len() == others.len() && parts.iter().zip(others).all(is_alike)
+}
+
+/// The rank of the first of those names that most others are like.
+fn most_common(split: &[Vec<Part>]) -> usize {
+    let mut kinds: BTreeMap<Vec<Option<&Part>>, (usize, usize)> = BTreeMap::new();
+    for (rank, parts) in split.iter().enumerate() {
+        let kind = parts.iter().map(|part| if let Part::Text(_) = part { Some(part) } else { None });
+        kinds.entry(kind.collect()).or_insert((0, rank)).0 += 1;
+    }
+    let earlier = |rank: usize| std::cmp::Reverse(rank);
+    kinds.into_values().max_by_key(|(count, first)| (*count, earlier(*first))).map_or(0, |(_, first)| first)
 }
 
 /// Refuses names, in their order, that are not those of one series without gaps.
@@ -19,21 +43,17 @@ pub(super) fn check(names: &[String], notes: &mut Notes) -> Result<(), ReadError
         return Err(ReadError::input(Place::File, "two slices or more", found, HINT));
     };
     let split: Vec<Vec<Part>> = names.iter().map(|name| parts(stem(name))).collect();
-    let is_alike = |parts: &[Part]| {
-        parts.len() == split[0].len()
-            && parts.iter().zip(&split[0]).all(|pair| match pair {
-                (Part::Number(_), Part::Number(_)) => true,
-                (part, other) => part == other,
-            })
-    };
+    // The names of most files are those of the series: a picture of all of it may lie beside its slices.
+    let like_most = most_common(&split);
+    let is_alike = |parts: &[Part]| are_alike(parts, &split[like_most]);
     if let Some(other) = split.iter().position(|parts| !is_alike(parts)) {
         if split.iter().flatten().all(|part| matches!(part, Part::Text(_))) {
             let [first, last] = [first, last].map(|name| quoted(name));
             notes.remark(format!("names without numbers: slices lie in the order of the alphabet, {first} to {last}"));
             return Ok(());
         }
-        let expected = format!("names that differ in one number, such as {}", quoted(first));
-        return Err(ReadError::input(Place::File, expected, quoted(&names[other]), HINT));
+        let expected = format!("names that differ in one number, such as {}", quoted(&names[like_most]));
+        return Err(ReadError::input(Place::File, expected, quoted(&names[other]), OTHER_HINT));
     }
     let differs = |at: &usize| split.iter().any(|parts| parts[*at] != split[0][*at]);
     let places: Vec<usize> = (0..split[0].len()).filter(differs).collect();
@@ -86,6 +106,10 @@ mod tests {
             (
                 &["a1.tif", "a2.tif", "a03.tif", "a3.tif"],
                 "expected one slice for each number, found 'a03.tif' and 'a3.tif'",
+            ),
+            (
+                &["preview.tif", "slice_1.tif", "slice_2.tif"],
+                "expected names that differ in one number, such as 'slice_1.tif', found 'preview.tif'",
             ),
             (&["a1.tif", "b1.tif"], "expected names that differ in one number, such as 'a1.tif', found 'b1.tif'"),
             (

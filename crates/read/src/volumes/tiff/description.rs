@@ -191,14 +191,16 @@ impl Description {
         let [x, y, z] = self.lengths;
         let width = x.or(y);
         let steps = DVec3::new(x.or(y).unwrap_or(1.0), y.or(x).unwrap_or(1.0), z.or(width).unwrap_or(1.0));
-        let unit = if self.unit.is_empty() { String::new() } else { format!(" {}", escaped(self.unit.as_bytes(), 20)) };
+        let unit = escaped(self.unit.as_bytes(), 20);
+        notes.unit = (!unit.is_empty() && width.is_some()).then(|| unit.clone());
+        let unit = if unit.is_empty() { String::new() } else { format!(" {unit}") };
         let [x, y, depth] = steps.to_array().map(rounded);
         notes.remark(match (width, z) {
             (_, Some(_)) => format!("voxels of {x} x {y} x {depth}{unit}, as the file says"),
             (Some(_), None) => format!(
-                "voxels of {x} x {y}{unit} by the resolution of the pages, and as deep as wide: `spacing` of ImageJ (Image > Properties in Fiji) or PhysicalSizeZ of OME states the step between slices"
+                "voxels of {x} x {y}{unit} by the resolution of the pages, and as deep as wide: `voxel_size` of an object, `spacing` of ImageJ (Image > Properties in Fiji) or PhysicalSizeZ of OME states the step between slices"
             ),
-            (None, None) => "voxels of 1 x 1 x 1: no step is stated, as `spacing` and `unit` of ImageJ (Image > Properties in Fiji) or PhysicalSizeX, Y and Z of OME do".to_owned(),
+            (None, None) => "voxels of 1 x 1 x 1: no step is stated, as `voxel_size` of an object, `spacing` and `unit` of ImageJ (Image > Properties in Fiji) or PhysicalSizeX, Y and Z of OME do".to_owned(),
         });
         steps
     }

@@ -4,6 +4,7 @@ use crate::error::{Place, ReadError};
 use crate::guarded::guarded;
 use crate::reading::Reading;
 use crate::stream::input::{self, Content};
+use crate::volumes::slices::LISTED_COLORS;
 use crate::volumes::voxels::Kind;
 use splat_core::Reservation;
 use splat_core::text::{counted, escaped};
@@ -195,9 +196,7 @@ impl Pages {
         let meaning = self.number(Tag::PhotometricInterpretation).and_then(|meaning| u16::try_from(meaning).ok());
         if let Some(WHITE_IS_ZERO | IN_PALETTE) = meaning {
             match meaning {
-                Some(IN_PALETTE) => reading
-                    .notes
-                    .remark("numbers stand for colours of a list, which is not used: they are read as they are stored"),
+                Some(IN_PALETTE) => reading.notes.remark(LISTED_COLORS),
                 _ => reading.notes.remark("white is stored as 0: numbers are read as they are stored"),
             }
             self.rewrite(Tag::PhotometricInterpretation, BLACK_IS_ZERO);
@@ -234,6 +233,12 @@ impl Pages {
             Some(DecodingSampleType::I64) => Kind::I64,
             Some(DecodingSampleType::F32) => Kind::F32,
             Some(DecodingSampleType::F64) => Kind::F64,
+            _ if layout.sample_format == SampleFormat::IEEEFP => {
+                let found = format!("floats of {bits} bits at page {}", page + 1);
+                let hint = "save it with floats of 32 bits, such as with Fiji (Image > Type > 32-bit) or in Python: \
+                    tifffile.imwrite('FILE.tif', stack.astype('float32'))";
+                return Err(ReadError::input(Place::File, "floats of 32 or 64 bits", found, hint));
+            }
             _ => return unread(format!("{:?} of {bits} bits", layout.sample_format)),
         };
         if !is_whole {
