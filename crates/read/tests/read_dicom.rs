@@ -1,6 +1,6 @@
 //! Series of DICOM: order, places, values, and what is refused.
 
-use crate::read_samples::dicom::Dicom;
+use crate::read_samples::dicom::{Dicom, frames};
 use read::{Fault, Loaded, Notes, ReadError, ReadParams, file};
 use splat_core::glam::DVec3;
 use splat_core::{Grid, UpAxis};
@@ -107,7 +107,8 @@ fn tilted_slices_are_sheared_and_gaps_and_other_slices_are_refused() {
             "packed as JPEG, JPEG 2000 or a movie (1.2.840.10008.1.2.4.70)\nhint: convert the series, such as with `dcm2niix",
         ),
         (Dicom { syntax: ".2", ..a.clone() }, "big endian"),
-        (Dicom { frames: "20", ..a.clone() }, "expected the slice 'IM0': one frame a file, found 20 of them"),
+        (Dicom { frames: "20", ..a.clone() }, "expected the slice 'IM0': 240 bytes of pixels, found 12"),
+        (Dicom { frames: "0", ..a.clone() }, "expected the slice 'IM0': 1 to 65536 frames, found '0'"),
         (Dicom { meaning: "RGB", ..a.clone() }, "RGB as PhotometricInterpretation"),
         (Dicom { orientation: "1\\0\\0\\1\\0\\0", ..a.clone() }, "two directions at right angles"),
         (Dicom { orientation: "1\\0\\0", ..a.clone() }, "six numbers of ImageOrientationPatient"),
@@ -115,6 +116,41 @@ fn tilted_slices_are_sheared_and_gaps_and_other_slices_are_refused() {
     ] {
         let error = refused("other", &[slice, b.clone()]);
         assert!(error.contains(said), "{error}");
+    }
+}
+
+#[test]
+fn frames_of_one_file_lie_where_their_groups_say() {
+    let path = folder("frames", &[]);
+    let file = path.join("all.dcm");
+    for ends_by_delimiter in [false, true] {
+        // Frames are stored from the last to the first.
+        std::fs::write(&file, frames(&[33.0, 31.5, 30.0], ends_by_delimiter)).unwrap();
+        for source in [&file, &path] {
+            let (grid, notes) = volume(source);
+            assert_eq!((grid.dims, grid.origin), ([3, 2, 3], DVec3::new(-10.0, -20.0, 30.0)));
+            let axes = [grid.axes.x_axis, grid.axes.y_axis, grid.axes.z_axis];
+            assert_eq!(axes, [DVec3::new(-0.25, 0.0, 0.0), DVec3::new(0.0, -0.5, 0.0), DVec3::new(0.0, 0.0, 1.5)]);
+            let expected = [10, 4, -2].into_iter().flat_map(|first| first..first + 6);
+            assert_eq!(grid.values, expected.map(|v| 2.0 * v as f32 - 1000.0).collect::<Vec<_>>());
+            assert_eq!((notes.remarks[0].as_str(), notes.unit.as_deref()), ("series 1.2.5 (, 3 slices)", Some("mm")));
+        }
+    }
+    let error = |places: &[f64]| {
+        std::fs::write(&file, frames(places, false)).unwrap();
+        read(&file, &ReadParams::default()).unwrap_err().to_string()
+    };
+    let gap = error(&[30.0, 31.0, 32.0, 34.0]);
+    assert!(gap.contains("found 2 between 'all.dcm, frame 3' and 'all.dcm, frame 4'"), "{gap}");
+    assert!(error(&[30.0]).contains("two slices or more"));
+    // A place of a frame is missing, and each truncation ends in an error.
+    let whole = frames(&[30.0, 31.0], true);
+    let cut = whole.windows(4).position(|bytes| bytes == [0x20, 0, 0x13, 0x91]).unwrap();
+    let mut other = whole.clone();
+    other[cut + 2] = 0x14;
+    for content in (0..whole.len()).step_by(7).map(|end| &whole[..end]).chain([&other[..]]) {
+        std::fs::write(&file, content).unwrap();
+        assert!(read(&file, &ReadParams::default()).is_err(), "{}", content.len());
     }
 }
 

@@ -1,4 +1,4 @@
-//! DICOM: a series of slices, a file each in one folder → a volume in right, anterior, superior, of the values that slope and intercept make of the numbers
+//! DICOM: a series of slices, a file each in one folder, or frames of one file that says where each lies → a volume in right, anterior, superior, of the values that slope and intercept make of the numbers
 //! (of CT these are Hounsfield units).
 //!
 //! Slices lie where `ImagePositionPatient` says; they have to lie at equal steps along a line, which may be tilted. The parser is written here because
@@ -15,7 +15,7 @@ use crate::reading::Reading;
 use crate::stream::input::{self, Stream};
 use crate::volumes::selection::Selection;
 pub(crate) use elements::is_dicom;
-use elements::{DAMAGED, Elements, Tag};
+use elements::{DAMAGED, Elements, Packing, Tag};
 use splat_core::Grid;
 use splat_core::glam::{DMat3, DVec3};
 use splat_core::text::{counted, escaped};
@@ -37,12 +37,24 @@ const TILT: f64 = 1e-3;
 const LONGEST: u16 = 16384;
 /// Bytes that tell the format.
 const HEAD: usize = 132;
+/// Bytes of memory that a frame takes, and that what is found in a group takes for each of its bytes.
+const BYTES_OF_A_FRAME: u64 = 2 * BYTES_OF_A_SLICE;
+const MOST_OF_AN_ELEMENT: u64 = 6;
 /// Bytes of memory that a slice takes until its numbers are read.
 const BYTES_OF_A_SLICE: u64 = 512;
+/// Most frames of a file.
+const MOST_FRAMES: usize = 1 << 16;
 /// Most series that are named.
 const MOST_NAMED: usize = 8;
 
 const DESCRIPTION: Tag = Tag(0x08, 0x103e);
+/// Groups of what all frames of a file share, and of each frame; sequences within a group.
+const SHARED: Tag = Tag(0x5200, 0x9229);
+const PER_FRAME: Tag = Tag(0x5200, 0x9230);
+const PLANE_POSITION: Tag = Tag(0x20, 0x9113);
+const PLANE_ORIENTATION: Tag = Tag(0x20, 0x9116);
+const PIXEL_MEASURES: Tag = Tag(0x28, 0x9110);
+const VALUES: Tag = Tag(0x28, 0x9145);
 const SERIES: Tag = Tag(0x20, 0x0e);
 const NUMBER: Tag = Tag(0x20, 0x13);
 const POSITION: Tag = Tag(0x20, 0x32);
@@ -74,6 +86,11 @@ struct Slice {
     along_row: DVec3,
     along_column: DVec3,
     is_inverted: bool,
+    /// The rank of its frame in the file, and how many that has.
+    frame: usize,
+    frames: usize,
+    slope: f64,
+    intercept: f64,
 }
 
 /// How its numbers are stored.
@@ -83,8 +100,6 @@ struct Numbers {
     bits: u32,
     below: u32,
     is_signed: bool,
-    slope: f64,
-    intercept: f64,
 }
 
 /// Reads the series of a folder that `params` name, else the one of most slices; of a file its own.
@@ -99,16 +114,16 @@ pub(crate) fn read(folder: &Path, named: Option<&Path>, reading: &mut Reading<'_
             continue;
         }
         input::hold("the slices", (slices.len() as u64 + 1) * BYTES_OF_A_SLICE, reading.params)?;
-        let Some(slice) =
-            with_elements(&file, reading.params, |elements| slice(&file, elements)).map_err(|e| in_file(&file, e))?
-        else {
+        let of_file = with_elements(&file, reading.params, |elements| slices_of(&file, elements, reading.params));
+        let of_file = of_file.map_err(|e| in_file(&file, e))?;
+        let Some(first) = of_file.first() else {
             reading.notes.not_used([format!("file {}", name(&file)).as_bytes()]);
             continue;
         };
         if is_named {
-            series_of_file = Some(slice.series.clone());
+            series_of_file = Some(first.series.clone());
         }
-        slices.push(slice);
+        slices.extend(of_file);
     }
     if let Some(named) = named.filter(|_| series_of_file.is_none()) {
         let found = format!("'{}', which has none", name(named));
@@ -122,6 +137,7 @@ pub(crate) fn read(folder: &Path, named: Option<&Path>, reading: &mut Reading<'_
     let slices = of_series(slices, series_of_file, reading)?;
     let slices = of_frame(slices, reading)?;
     let (origin, axes) = placed(&slices, reading)?;
+    reading.notes.unit = Some("mm".to_owned());
     let first = &slices[0];
     let dims = [first.columns.into(), first.rows.into(), slices.len()];
     let count = dims[0] * dims[1];
@@ -133,15 +149,21 @@ pub(crate) fn read(folder: &Path, named: Option<&Path>, reading: &mut Reading<'_
     input::hold("the voxels", (4 * count * slices.len()) as u64, reading.params)?;
     let mut values = Vec::new();
     input::reserve(&mut values, count * slices.len())?;
-    for slice in &slices {
+    // Frames of one file are read at once.
+    for part in slices.chunk_by(|a, b| a.file == b.file) {
         reading.go_on()?;
-        let read = with_elements(&slice.file, reading.params, |elements| {
+        let first = &part[0];
+        let read = with_elements(&first.file, reading.params, |elements| {
             let numbers = numbers(elements)?;
-            let pixels = elements.pixels(count, numbers.bytes)?;
-            values.extend(pixels.chunks_exact(numbers.bytes).map(|stored| numbers.value(stored)));
+            let pixels = elements.pixels(count * first.frames, numbers.bytes)?;
+            let bytes = count * numbers.bytes;
+            for slice in part {
+                let stored = &pixels[slice.frame * bytes..][..bytes];
+                values.extend(stored.chunks_exact(numbers.bytes).map(|stored| slice.value(numbers.number(stored))));
+            }
             Ok(())
         });
-        read.map_err(|e| in_file(&slice.file, e))?;
+        read.map_err(|e| in_file(&first.file, e))?;
     }
     super::voxels::check_finite(&values, |_| Place::File)?;
     Ok(Grid { origin: SIGNS * origin, axes: DMat3::from_diagonal(SIGNS) * axes, dims, values })
@@ -162,16 +184,12 @@ fn with_elements<T: Default>(
     made(&Elements::of(&content)?)
 }
 
-/// The slice of a file; `None` of one without a picture.
-fn slice(file: &Path, elements: &Elements<'_>) -> Result<Option<Slice>, ReadError> {
+/// The slices of a file, one for each of its frames; none of one without a picture.
+fn slices_of(file: &Path, elements: &Elements<'_>, params: &ReadParams) -> Result<Vec<Slice>, ReadError> {
     if !elements.has_pixels() {
-        return Ok(None);
+        return Ok(Vec::new());
     }
     let missing = |what: &str| ReadError::input(Place::File, what, "none, or another one", HINT);
-    if let Some(frames) = elements.text(FRAMES).filter(|frames| frames != "1") {
-        let found = format!("{} of them", escaped(frames.as_bytes(), 12));
-        return Err(ReadError::input(Place::File, "one frame a file", found, HINT));
-    }
     let meaning = elements.text(MEANING).unwrap_or_default();
     let is_grey = elements.short(SAMPLES).is_none_or(|samples| samples == 1) && meaning.starts_with("MONOCHROME");
     if !is_grey {
@@ -181,34 +199,107 @@ fn slice(file: &Path, elements: &Elements<'_>) -> Result<Option<Slice>, ReadErro
     let side = |tag| elements.short(tag).filter(|side| (1..=LONGEST).contains(side));
     let columns = side(COLUMNS).ok_or_else(|| missing("Columns from 1 to 16384"))?;
     let rows = side(ROWS).ok_or_else(|| missing("Rows from 1 to 16384"))?;
-    let position = elements.numbers(POSITION).ok_or_else(|| missing("three numbers of ImagePositionPatient"))?;
-    let [a, b, c, d, e, f] =
-        elements.numbers(ORIENTATION).ok_or_else(|| missing("six numbers of ImageOrientationPatient"))?;
-    let [row, column] = [DVec3::new(a, b, c), DVec3::new(d, e, f)];
-    let is_square =
-        [row.length(), column.length()].iter().all(|n| (n - 1.0).abs() < 0.01) && row.dot(column).abs() < 0.01;
-    if !is_square {
-        return Err(missing("two directions at right angles as ImageOrientationPatient"));
-    }
-    let [between_rows, between_columns] =
-        elements.numbers(SPACING).ok_or_else(|| missing("two numbers of PixelSpacing"))?;
-    if !(between_rows > 0.0 && between_columns > 0.0) {
-        return Err(missing("a PixelSpacing above 0"));
-    }
+    let frames = match elements.text(FRAMES) {
+        None => 1,
+        Some(text) => text.parse().ok().filter(|frames| (1..=MOST_FRAMES).contains(frames)).ok_or_else(|| {
+            let found = format!("'{}'", escaped(text.as_bytes(), 12));
+            ReadError::input(Place::File, format!("1 to {MOST_FRAMES} frames"), found, DAMAGED)
+        })?,
+    };
     let stored = numbers(elements)?;
-    elements.check_room(usize::from(columns) * usize::from(rows), stored.bytes)?;
-    Ok(Some(Slice {
+    if frames > 1 && elements.packing != Packing::None {
+        let hint = "unpack it: `gdcmconv --raw IN OUT`";
+        return Err(ReadError::input(
+            Place::File,
+            "one frame a file, or frames that are not packed",
+            "packed frames",
+            hint,
+        ));
+    }
+    elements.check_room(usize::from(columns) * usize::from(rows) * frames, stored.bytes)?;
+    let groups = (elements.bytes_of(SHARED) + elements.bytes_of(PER_FRAME)) as u64;
+    input::hold("the frames", frames as u64 * BYTES_OF_A_FRAME + MOST_OF_AN_ELEMENT * groups, params)?;
+    let shared = elements.items(SHARED, 1)?;
+    let of_frames = elements.items(PER_FRAME, frames)?;
+    if frames > 1 && of_frames.len() != frames {
+        let expected = format!("the place of each of {frames} frames (PerFrameFunctionalGroupsSequence)");
+        return Err(ReadError::input(Place::File, expected, format!("{} of them", of_frames.len()), HINT));
+    }
+    let slice = Slice {
         file: file.to_owned(),
         series: elements.text(SERIES).unwrap_or_default(),
         description: elements.text(DESCRIPTION).unwrap_or_default(),
         number: elements.text(NUMBER).and_then(|number| number.parse().ok()).unwrap_or(0),
         columns,
         rows,
+        position: DVec3::ZERO,
+        along_row: DVec3::ZERO,
+        along_column: DVec3::ZERO,
+        is_inverted: meaning == "MONOCHROME1",
+        frame: 0,
+        frames,
+        slope: 1.0,
+        intercept: 0.0,
+    };
+    let each = |frame: usize| {
+        let groups: Vec<&Elements<'_>> = of_frames.get(frame).into_iter().chain(&shared).collect();
+        // Of several frames the number in the series is that of their order.
+        let number = if frames > 1 { frame as i64 } else { slice.number };
+        placed_frame(Slice { frame, number, ..slice.clone() }, elements, &groups)
+    };
+    (0..frames).map(each).collect()
+}
+
+/// The slice with what its frame's groups say of it, or those of all frames, or the file.
+fn placed_frame(slice: Slice, elements: &Elements<'_>, groups: &[&Elements<'_>]) -> Result<Slice, ReadError> {
+    let missing = |what: &str| ReadError::input(Place::File, what, "none, or another one", HINT);
+    let position = said(elements, groups, PLANE_POSITION, POSITION)?;
+    let position = position.ok_or_else(|| missing("three numbers of ImagePositionPatient"))?;
+    let orientation = said(elements, groups, PLANE_ORIENTATION, ORIENTATION)?;
+    let [a, b, c, d, e, f] = orientation.ok_or_else(|| missing("six numbers of ImageOrientationPatient"))?;
+    let [row, column] = [DVec3::new(a, b, c), DVec3::new(d, e, f)];
+    let is_square =
+        [row.length(), column.length()].iter().all(|n| (n - 1.0).abs() < 0.01) && row.dot(column).abs() < 0.01;
+    if !is_square {
+        return Err(missing("two directions at right angles as ImageOrientationPatient"));
+    }
+    let spacing = said(elements, groups, PIXEL_MEASURES, SPACING)?;
+    let [between_rows, between_columns] = spacing.ok_or_else(|| missing("two numbers of PixelSpacing"))?;
+    if !(between_rows > 0.0 && between_columns > 0.0) {
+        return Err(missing("a PixelSpacing above 0"));
+    }
+    let scaling = |tag, usual| match said(elements, groups, VALUES, tag)? {
+        Some([number]) => Ok(number),
+        None if elements.text(tag).is_none() => Ok(usual),
+        None => {
+            Err(ReadError::input(Place::File, "a finite RescaleSlope and RescaleIntercept", "another text", DAMAGED))
+        }
+    };
+    Ok(Slice {
         position: DVec3::from_array(position),
         along_row: row * between_columns,
         along_column: column * between_rows,
-        is_inverted: meaning == "MONOCHROME1",
-    }))
+        slope: scaling(SLOPE, 1.0)?,
+        intercept: scaling(INTERCEPT, 0.0)?,
+        ..slice
+    })
+}
+
+/// So many numbers of an element: of the first of some groups that has it in a sequence, else of the file.
+fn said<const N: usize>(
+    elements: &Elements<'_>,
+    groups: &[&Elements<'_>],
+    sequence: Tag,
+    tag: Tag,
+) -> Result<Option<[f64; N]>, ReadError> {
+    for group in groups {
+        if let Some(item) = group.items(sequence, 1)?.first()
+            && let Some(numbers) = item.numbers(tag)
+        {
+            return Ok(Some(numbers));
+        }
+    }
+    Ok(elements.numbers(tag))
 }
 
 /// How the numbers of a file are stored.
@@ -221,29 +312,30 @@ fn numbers(elements: &Elements<'_>) -> Result<Numbers, ReadError> {
         let found = format!("{bits} of {allocated}, the highest {highest}");
         return Err(ReadError::input(Place::File, "bits of a number within 8, 16 or 32", found, DAMAGED));
     }
-    let number = |tag, usual| match elements.text(tag) {
-        None => Ok(usual),
-        Some(_) => elements.numbers(tag).map(|[number]: [f64; 1]| number).ok_or_else(|| {
-            ReadError::input(Place::File, "a finite RescaleSlope and RescaleIntercept", "another text", DAMAGED)
-        }),
-    };
-    let slope = number(SLOPE, 1.0)?;
-    let intercept = number(INTERCEPT, 0.0)?;
     let is_signed = elements.short(IS_SIGNED) == Some(1);
     let below = u32::from(highest + 1 - bits);
-    Ok(Numbers { bytes: usize::from(allocated / 8), bits: bits.into(), below, is_signed, slope, intercept })
+    Ok(Numbers { bytes: usize::from(allocated / 8), bits: bits.into(), below, is_signed })
 }
 
 impl Numbers {
-    fn value(&self, stored: &[u8]) -> f32 {
+    /// A stored number.
+    fn number(&self, stored: &[u8]) -> f64 {
         let whole = stored.iter().rev().fold(0u64, |n, byte| n << 8 | u64::from(*byte));
         // To the top of the word and back, which leaves out other bits and continues the sign.
         let top = whole << (64 - self.bits - self.below);
-        let number = if self.is_signed {
-            (top.cast_signed() >> (64 - self.bits)) as f64
-        } else {
-            (top >> (64 - self.bits)) as f64
-        };
+        if self.is_signed { (top.cast_signed() >> (64 - self.bits)) as f64 } else { (top >> (64 - self.bits)) as f64 }
+    }
+}
+
+impl Slice {
+    /// Its file, and its frame where that has several.
+    fn shown(&self) -> String {
+        let file = name(&self.file);
+        if self.frames == 1 { file } else { format!("{file}, frame {}", self.frame + 1) }
+    }
+
+    /// The value of a stored number.
+    fn value(&self, number: f64) -> f32 {
         (number * self.slope + self.intercept) as f32
     }
 }
@@ -310,8 +402,8 @@ fn of_frame(mut slices: Vec<Slice>, reading: &mut Reading<'_>) -> Result<Vec<Sli
             && near(first.along_column, slice.along_column)
     };
     if let Some(other) = slices.iter().find(|slice| !alike(slice)) {
-        let expected = format!("slices of one size, spacing and direction, as '{}' has them", name(&first.file));
-        return Err(ReadError::input(Place::File, expected, format!("others in '{}'", name(&other.file)), HINT));
+        let expected = format!("slices of one size, spacing and direction, as '{}' has them", first.shown());
+        return Err(ReadError::input(Place::File, expected, format!("others in '{}'", other.shown()), HINT));
     }
     let normal = first.along_row.cross(first.along_column).normalize_or_zero();
     let depth = |slice: &Slice| slice.position.dot(normal);
@@ -327,7 +419,7 @@ fn of_frame(mut slices: Vec<Slice>, reading: &mut Reading<'_>) -> Result<Vec<Sli
     let times = places[0].len();
     if let Some(other) = places.iter().find(|place| place.len() != times) {
         let more = if other.len() > times { other } else { &places[0] };
-        let [a, b] = [&more[0], more.last().unwrap_or(&more[0])].map(|slice| name(&slice.file));
+        let [a, b] = [&more[0], more.last().unwrap_or(&more[0])].map(|slice| slice.shown());
         let expected = "one slice at each place, or as many at each";
         return Err(ReadError::input(Place::File, expected, format!("'{a}' and '{b}' at one place"), HINT));
     }
@@ -346,7 +438,7 @@ fn placed(slices: &[Slice], reading: &mut Reading<'_>) -> Result<(DVec3, DMat3),
     sorted.sort_by(f64::total_cmp);
     let usual = sorted[sorted.len() / 2];
     if let Some(i) = gaps.iter().position(|gap| (gap - usual).abs() > SAME_PLACE * usual) {
-        let [a, b] = [&slices[i], &slices[i + 1]].map(|slice| name(&slice.file));
+        let [a, b] = [&slices[i], &slices[i + 1]].map(|slice| slice.shown());
         let found = format!("{} between '{a}' and '{b}'", super::rounded(gaps[i]));
         let expected = format!("slices at equal steps of {}", super::rounded(usual));
         let hint = "fetch the slices that are missing, or convert the series with dcm2niix";
@@ -356,7 +448,7 @@ fn placed(slices: &[Slice], reading: &mut Reading<'_>) -> Result<(DVec3, DMat3),
     let is_off =
         |(i, slice): &(usize, &Slice)| slice.position.distance(first.position + step * *i as f64) > OFF_LINE * usual;
     if let Some((_, other)) = slices.iter().enumerate().find(is_off) {
-        let found = format!("'{}' beside it", name(&other.file));
+        let found = format!("'{}' beside it", other.shown());
         return Err(ReadError::input(Place::File, "slices along one line", found, HINT));
     }
     let normal = first.along_row.cross(first.along_column).normalize_or_zero();

@@ -102,6 +102,56 @@ impl Dicom {
     }
 }
 
+/// A file whose frames of the numbers −2 to 3 lie at these places along z, with what they share and their places in groups.
+pub(crate) fn frames(places: &[f64], ends_by_delimiter: bool) -> Vec<u8> {
+    let mut out = [&[0; 128][..], b"DICM"].concat();
+    let sequence = |tag: [u16; 2], items: &[Vec<u8>]| {
+        let mut out: Vec<u8> = tag.iter().flat_map(|part| part.to_le_bytes()).chain(*b"SQ\0\0").collect();
+        let unknown = u32::MAX.to_le_bytes();
+        let mut content = Vec::new();
+        for item in items {
+            content.extend(b"\xfe\xff\0\xe0");
+            content.extend(if ends_by_delimiter { unknown } else { (item.len() as u32).to_le_bytes() });
+            content.extend(item);
+            if ends_by_delimiter {
+                content.extend(b"\xfe\xff\x0d\xe0\0\0\0\0");
+            }
+        }
+        out.extend(if ends_by_delimiter { unknown } else { (content.len() as u32).to_le_bytes() });
+        out.extend(content);
+        if ends_by_delimiter {
+            out.extend(b"\xfe\xff\xdd\xe0\0\0\0\0");
+        }
+        out
+    };
+    let text = |tag: [u16; 2], value: &str| {
+        let mut out = Vec::new();
+        element(&mut out, true, tag, *b"DS", value.as_bytes());
+        out
+    };
+    let mut put = |tag: [u16; 2], kind: [u8; 2], value: &[u8]| element(&mut out, true, tag, kind, value);
+    put([2, 0x10], *b"UI", b"1.2.840.10008.1.2.1");
+    put([0x20, 0x0e], *b"UI", b"1.2.5");
+    put([0x28, 2], *b"US", &1u16.to_le_bytes());
+    put([0x28, 4], *b"CS", b"MONOCHROME2");
+    put([0x28, 8], *b"IS", places.len().to_string().as_bytes());
+    put([0x28, 0x10], *b"US", &SIZE[1].to_le_bytes());
+    put([0x28, 0x11], *b"US", &SIZE[0].to_le_bytes());
+    for (number, value) in [(0x100, 16u16), (0x101, 16), (0x102, 15), (0x103, 1)] {
+        put([0x28, number], *b"US", &value.to_le_bytes());
+    }
+    let measures = sequence([0x28, 0x9110], &[text([0x28, 0x30], "0.5\\0.25")]);
+    let directions = sequence([0x20, 0x9116], &[text([0x20, 0x37], "1\\0\\0\\0\\1\\0")]);
+    let scaling = [text([0x28, 0x1052], "-1000"), text([0x28, 0x1053], "2")].concat();
+    let shared = [directions, measures, sequence([0x28, 0x9145], &[scaling])].concat();
+    let place = |z: &f64| sequence([0x20, 0x9113], &[text([0x20, 0x32], &format!("10\\20\\{z}"))]);
+    out.extend(sequence([0x5200, 0x9229], &[shared]));
+    out.extend(sequence([0x5200, 0x9230], &places.iter().map(place).collect::<Vec<_>>()));
+    let pixels: Vec<u8> = (0..6 * places.len() as i16).flat_map(|k| (k - 2).to_le_bytes()).collect();
+    element(&mut out, true, [0x7fe0, 0x10], *b"OW", &pixels);
+    out
+}
+
 /// What marks a sequence of unknown length with a sequence in it; [`element`] writes it.
 const NESTED: &[u8] = b"nested";
 

@@ -1,8 +1,9 @@
 //! The elements of a DICOM file, little endian with types or without, as far as slices need them. Lengths are checked against the file before anything is
-//! taken for them; sequences are passed over.
+//! taken for them; sequences are passed over, and their items are elements of their own where they are asked for.
 
 use crate::error::{Place, ReadError};
 use splat_core::text::escaped;
+use std::borrow::Cow;
 use std::ops::Range;
 
 pub(super) const DAMAGED: &str = "the file is truncated or damaged; fetch it again";
@@ -47,6 +48,7 @@ pub(super) struct Elements<'c> {
     content: &'c [u8],
     found: Vec<(Tag, Range<usize>)>,
     pub(super) packing: Packing,
+    has_types: bool,
 }
 
 /// An element's header.
@@ -65,28 +67,22 @@ pub(crate) fn is_dicom(head: &[u8]) -> bool {
 
 impl<'c> Elements<'c> {
     pub(super) fn of(content: &'c [u8]) -> Result<Self, ReadError> {
-        let mut elements = Self { content, found: Vec::new(), packing: Packing::None };
+        let mut elements = Self { content, found: Vec::new(), packing: Packing::None, has_types: true };
         let mut at = START;
-        let mut has_types = true;
         let mut is_in_data = false;
         while at < content.len() {
             let is_of_file = elements.whole(at, 2)? == u64::from(OF_FILE);
             if !is_of_file && !is_in_data {
                 is_in_data = true;
-                has_types = elements.read_syntax()?;
+                elements.has_types = elements.read_syntax()?;
             }
-            let head = elements.head(at, has_types)?;
+            let head = elements.head(at, elements.has_types)?;
             at = match head.length {
                 UNDEFINED if head.tag == PIXELS => {
                     elements.found.push((PIXELS, head.start..content.len()));
                     content.len()
                 }
-                UNDEFINED => elements.end_of_sequence(&head, has_types)?,
-                length => {
-                    let end = elements.end(head.start, length)?;
-                    elements.found.push((head.tag, head.start..end));
-                    end
-                }
+                _ => elements.take(&head)?,
             };
             if elements.found.len() > MOST {
                 return Err(ReadError::input(
@@ -98,6 +94,49 @@ impl<'c> Elements<'c> {
             }
         }
         Ok(elements)
+    }
+
+    /// Takes the value of an element; gives its end.
+    fn take(&mut self, head: &Head) -> Result<usize, ReadError> {
+        let end = match head.length {
+            UNDEFINED => self.end_of_sequence(head, self.has_types)?,
+            length => self.end(head.start, length)?,
+        };
+        // What is of no known type has no types within.
+        if !head.is_unknown || head.length != UNDEFINED {
+            self.found.push((head.tag, head.start..end));
+        }
+        Ok(end)
+    }
+
+    /// The items of a sequence, at most so many; none where there is no such sequence.
+    pub(super) fn items(&self, tag: Tag, most: usize) -> Result<Vec<Elements<'c>>, ReadError> {
+        let Some((_, range)) = self.found.iter().find(|(found, _)| *found == tag) else { return Ok(Vec::new()) };
+        let mut items = Vec::new();
+        let mut at = range.start;
+        while at < range.end {
+            let head = self.head(at, self.has_types)?;
+            if head.tag == END_OF_SEQUENCE {
+                break;
+            }
+            if head.tag != ITEM || items.len() == most {
+                let expected = format!("at most {most} items of a sequence");
+                return Err(ReadError::input(Place::Byte(at as u64), expected, "another element", DAMAGED));
+            }
+            let mut item = Self { found: Vec::new(), ..*self };
+            let end = if head.length == UNDEFINED { range.end } else { self.end(head.start, head.length)? };
+            at = head.start;
+            while at < end {
+                let inner = item.head(at, item.has_types)?;
+                if inner.tag == END_OF_ITEM {
+                    at = inner.start;
+                    break;
+                }
+                at = item.take(&inner)?;
+            }
+            items.push(item);
+        }
+        Ok(items)
     }
 
     /// A whole number of the file.
@@ -194,6 +233,11 @@ impl<'c> Elements<'c> {
         self.content.get(range.clone())
     }
 
+    /// Bytes of a value; 0 where there is none.
+    pub(super) fn bytes_of(&self, tag: Tag) -> usize {
+        self.value(tag).map_or(0, <[u8]>::len)
+    }
+
     /// A text without the blanks and zeros that fill it.
     pub(super) fn text(&self, tag: Tag) -> Option<String> {
         let text = String::from_utf8_lossy(self.value(tag)?);
@@ -229,7 +273,7 @@ impl<'c> Elements<'c> {
     }
 
     /// The bytes of so many pixels of so many bytes each.
-    pub(super) fn pixels(&self, count: usize, bytes: usize) -> Result<Vec<u8>, ReadError> {
+    pub(super) fn pixels(&self, count: usize, bytes: usize) -> Result<Cow<'c, [u8]>, ReadError> {
         let value = self.value(PIXELS).unwrap_or_default();
         let start = value.as_ptr() as usize - self.content.as_ptr() as usize;
         let needed = count * bytes;
@@ -240,7 +284,7 @@ impl<'c> Elements<'c> {
         if self.packing == Packing::None {
             // One byte more makes their number even.
             return if value.len() == needed || value.len() == needed + needed % 2 {
-                Ok(value[..needed].to_vec())
+                Ok(Cow::Borrowed(&value[..needed]))
             } else {
                 wrong(value.len())
             };
@@ -275,7 +319,7 @@ impl<'c> Elements<'c> {
                 return wrong(filled * bytes);
             }
         }
-        Ok(pixels)
+        Ok(Cow::Owned(pixels))
     }
 }
 
