@@ -10,11 +10,11 @@ use super::session::{
 use super::{console, report};
 use organza::cost::Prediction;
 use organza::plan::Plan;
-use organza::scene::{FoundCamera, Scene, SceneObject, UpBy};
+use organza::scene::{FoundCamera, Scene, SceneObject};
 use organza::{CostRecord, Error, Files, Progress, RenderOptions, SplatCount, escape_controls};
 use organza_judge::documents;
 use organza_judge::effects::{self, Measured, Switch};
-use serde_json::{Value, json};
+use serde_json::json;
 
 /// Stages of a measured scene.
 const PICTURE: &str = "the picture as planned";
@@ -78,7 +78,7 @@ pub(super) fn run(arguments: &ExplainArguments) -> Result<(), Error> {
             "predicted": documents::predicted_json(&explained.predicted),
             "measured": explained.measured.as_ref().map(documents::measured_json),
             "memory_bytes": explained.prepared.as_ref().map(|p| p.memory),
-            "up": up_json(&scene),
+            "up": documents::up_json(&scene),
             "splats": explained.prepared.as_ref().map(|p| documents::splats_json(&p.splats)),
             "warnings": explained.warnings,
             "notes": explained.notes,
@@ -140,27 +140,10 @@ fn drawn(
     })
 }
 
-/// Visible objects from files, whose data has an axis that points up.
-fn from_files(scene: &Scene) -> impl Iterator<Item = &SceneObject> {
-    scene.objects.iter().filter(|o| o.visible && o.source.path().is_some())
-}
-
-fn up_json(scene: &Scene) -> Value {
-    from_files(scene).map(|o| json!({ "object": o.name, "axis": o.up.axis.name(), "by_file": o.up.by == UpBy::File, "by": up_by(o.up.by) })).collect()
-}
-
-/// What says which axis points up, for people.
-fn up_by(by: UpBy) -> &'static str {
-    match by {
-        UpBy::File => "by its file",
-        UpBy::Scene => "as the scene says",
-        UpBy::Nothing => "as nothing says another: transform = { up = \"z\" } of the object turns it",
-    }
-}
-
 fn up_text(scene: &Scene) -> String {
-    let line =
-        |o: &SceneObject| format!("{}: {} points up, {}\n", escape_controls(&o.name), o.up.axis.name(), up_by(o.up.by));
-    let lines: String = from_files(scene).map(line).collect();
+    let line = |o: &SceneObject| {
+        format!("{}: {} points up, {}\n", escape_controls(&o.name), o.up.axis.name(), documents::up_by(o.up.by))
+    };
+    let lines: String = documents::from_files(scene).map(line).collect();
     if lines.is_empty() { lines } else { format!("\n{lines}") }
 }

@@ -4,13 +4,12 @@ mod text;
 
 use super::args::InfoArguments;
 use super::given::is_scene;
-use super::session::path_text;
 use super::{console, memory};
 use organza::Error;
-use organza::scene::{self, Combination, LoadOptions, Scene, SceneObject, Source, UpAxis};
-use organza_survey::{Facts, Histogram, NamedTable, facts};
-use serde_json::{Value, json};
-use splat_core::{LightShape, MemoryAccount};
+use organza::scene::{self, LoadOptions};
+use organza_survey::documents::{facts_json, scene_json};
+use organza_survey::{NamedTable, facts};
+use splat_core::MemoryAccount;
 use std::path::PathBuf;
 
 /// Describes a scene or a data file.
@@ -23,7 +22,7 @@ pub(super) fn run(arguments: &InfoArguments) -> Result<(), Error> {
         let InfoArguments { allow_path, sandbox, .. } = *arguments;
         let memory = MemoryAccount::new(memory::default_limit());
         let options = LoadOptions { allow_path, sandbox, memory, ..LoadOptions::default() };
-        let document = scene_document(&scene::load(&arguments.file, &options)?);
+        let document = scene_json(&scene::load(&arguments.file, &options)?);
         return console::out(&if arguments.json { format!("{document:#}\n") } else { text::lines(&document) });
     }
     let read_table = |path: &PathBuf| NamedTable::read(path, &MemoryAccount::new(memory::default_limit()));
@@ -31,121 +30,7 @@ pub(super) fn run(arguments: &InfoArguments) -> Result<(), Error> {
     let facts = facts(&arguments.file, labels.as_ref(), memory::default_limit(), arguments.strict)?;
     facts.mended.iter().chain(&facts.warnings).for_each(|line| console::warn(line));
     if arguments.json {
-        return console::out(&format!("{:#}\n", file_document(&facts)));
+        return console::out(&format!("{:#}\n", facts_json(&facts)));
     }
     console::out(&text::of_facts(&arguments.file, &facts))
-}
-
-fn scene_document(scene: &Scene) -> Value {
-    let objects = scene.objects.iter().map(|o| {
-        json!({
-            "name": o.name,
-            "source": source_name(&o.source),
-            "path": source_path(o),
-            "up": o.up.axis.name(),
-            "material": scene.materials[o.material].name,
-            "materials": o.material_ids().map(|id| &scene.materials[id].name).collect::<Vec<_>>(),
-            "visible": o.visible,
-        })
-    });
-    let lights = scene.lights.iter().map(|l| {
-        json!({
-            "kind": light_name(&l.light.shape),
-            "intensity": l.light.intensity,
-            "points": l.samples,
-            "shadow": l.shadow,
-            "texture": l.slide.as_ref().map(|slide| path_text(&slide.path)),
-        })
-    });
-    json!({
-        "kind": "scene",
-        "sha256": scene.sha256,
-        "size": scene.camera.size,
-        "objects": objects.collect::<Value>(),
-        "lights": lights.collect::<Value>(),
-        "materials": scene.materials.iter().skip(1).map(|m| m.name.as_str()).collect::<Vec<_>>(),
-    })
-}
-
-fn source_name(source: &Source) -> &'static str {
-    match source {
-        Source::Mesh(_) => "mesh",
-        Source::Points(_) | Source::Matter(_) => "points",
-        Source::Extract(_) => "extract",
-        Source::Volume(_) => "volume",
-        Source::Implicit(_) => "implicit",
-        Source::Isosurface(_) => "isosurface",
-        Source::LevelSet(_) => "level_set",
-        Source::Combined(source) => match source.combination {
-            Combination::Union => "union",
-            Combination::Intersection => "intersection",
-            Combination::Difference => "difference",
-        },
-        Source::Slice(_) => "slice",
-        Source::Density(_) => "density",
-        Source::Cloud(_) => "cloud",
-        Source::Rectangle(_) => "rectangle",
-        Source::Medium(_) => "medium",
-    }
-}
-
-/// The file that it reads, or all of them.
-fn source_path(object: &SceneObject) -> Option<String> {
-    let paths: Vec<String> = object.paths().map(path_text).collect();
-    (!paths.is_empty()).then(|| paths.join(", "))
-}
-
-fn light_name(shape: &LightShape) -> &'static str {
-    match shape {
-        LightShape::Directional { .. } => "directional",
-        LightShape::Spot { .. } => "spot",
-        LightShape::Sphere { .. } => "sphere",
-        LightShape::Disk { .. } => "disk",
-        LightShape::Rect { .. } => "rect",
-        _ => "point",
-    }
-}
-
-fn file_document(facts: &Facts) -> Value {
-    let histogram = |h: &Histogram| json!({ "low": h.low, "high": h.high, "counts": h.counts });
-    let faults = facts.faults.map(|f| {
-        json!({
-            "open_edges": f.open_edges,
-            "holes": f.holes,
-            "crowded_edges": f.crowded_edges,
-            "duplicate_triangles": f.duplicates,
-            "degenerate_triangles": f.degenerate,
-            "isolated_vertices": f.isolated,
-        })
-    });
-    let labels =
-        facts.labels.iter().map(|label| json!({ "number": label.number, "name": label.name, "voxels": label.voxels }));
-    json!({
-        "kind": facts.kind,
-        "format": facts.format,
-        "bytes": facts.bytes,
-        "counts": facts.counts.iter().map(|(name, n)| ((*name).to_owned(), json!(n))).collect::<Value>(),
-        "attributes": facts.attributes,
-        "bounds": facts.bounds.map(|b| [b.min.to_array(), b.max.to_array()]),
-        "size": facts.bounds.map(|b| b.size().to_array()),
-        "distance_from_origin_over_size": facts.far(),
-        "unit": facts.unit,
-        "spacing": facts.spacing,
-        "duplicate_points": facts.duplicates,
-        "steps": facts.steps.map(|steps| steps.map(|s| s.to_array())),
-        "range": facts.range,
-        "histogram": facts.histogram.as_ref().map(histogram),
-        "quantiles": facts.quantiles.iter().map(|(share, value)| json!([share, value])).collect::<Value>(),
-        "columns": facts.columns.iter().map(|(name, range)| (name.clone(), json!(range))).collect::<Value>(),
-        "columns_of": facts.associations.iter().map(|(name, association)| (name.clone(), json!(association.name()))).collect::<Value>(),
-        "labels": labels.collect::<Value>(),
-        "faults": faults,
-        "not_used": facts.unused,
-        "remarks": facts.remarks,
-        "mended": facts.mended,
-        "warnings": facts.warnings,
-        "up": facts.up.name(),
-        "up_is_stated": facts.is_up_stated,
-        "stands_along": facts.stands.map(UpAxis::name),
-    })
 }

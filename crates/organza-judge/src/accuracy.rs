@@ -14,6 +14,7 @@
 
 mod changes;
 mod frontier;
+mod judging;
 mod knob;
 mod ladder;
 mod limit;
@@ -31,6 +32,7 @@ mod verdict;
 
 pub use changes::{Change, changes, lines};
 pub use frontier::{Candidate, Hold, TOLD_APART, frontier, hold};
+pub use judging::{Judged, judge};
 pub use knob::particles::particles;
 pub use knob::points::{Facts, in_points, points};
 pub use knob::sheets::{in_sheets, sheets};

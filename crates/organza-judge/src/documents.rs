@@ -3,7 +3,7 @@
 use crate::effects::{EffectChange, FixedEffect, Measured};
 use organza::cost::{CountedPass, Prediction};
 use organza::plan::{Estimate, Plan, PlannedObject};
-use organza::scene::{FoundCamera, Scene};
+use organza::scene::{FoundCamera, Scene, SceneObject, UpBy};
 use organza::{CostRecord, ShadowTable, SplatCount};
 use serde_json::{Value, json};
 
@@ -48,6 +48,25 @@ pub fn predicted_json(predicted: &Prediction) -> Value {
         "seconds": predicted.seconds(threads),
         "announcement": predicted.announcement(threads),
     })
+}
+
+/// Visible objects from files, whose data has an axis that points up.
+pub fn from_files(scene: &Scene) -> impl Iterator<Item = &SceneObject> {
+    scene.objects.iter().filter(|o| o.visible && o.source.path().is_some())
+}
+
+/// The axis that points up in the data of each object, and what states it.
+pub fn up_json(scene: &Scene) -> Value {
+    from_files(scene).map(|o| json!({ "object": o.name, "axis": o.up.axis.name(), "by_file": o.up.by == UpBy::File, "by": up_by(o.up.by) })).collect()
+}
+
+/// What says which axis points up, for people.
+pub fn up_by(by: UpBy) -> &'static str {
+    match by {
+        UpBy::File => "by its file",
+        UpBy::Scene => "as the scene says",
+        UpBy::Nothing => "as nothing says another: transform = { up = \"z\" } of the object turns it",
+    }
 }
 
 /// Splats by object as JSON.

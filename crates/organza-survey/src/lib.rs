@@ -8,6 +8,7 @@
 #![forbid(unsafe_code)]
 
 mod data_file;
+pub mod documents;
 mod facts;
 mod first_scene;
 mod histogram;
