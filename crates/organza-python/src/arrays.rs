@@ -4,6 +4,7 @@ use crate::errors::{LimitError, refused};
 use numpy::{Element, PyArrayDyn, PyArrayMethods, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use splat_core::glam::{DVec3, Vec3};
+use std::cell::Cell;
 
 /// A number that an array may hold.
 trait Number: Element + Copy {
@@ -78,41 +79,69 @@ pub(crate) fn check_rows(name: &str, array: &Bound<'_, PyAny>, rows: Option<usiz
     Ok(found[0])
 }
 
+/// Rows of three numbers, each as `made` makes it, read in one pass.
+fn rows<T>(
+    name: &str,
+    array: &Bound<'_, PyAny>,
+    count: Option<usize>,
+    made: impl Fn([f64; 3]) -> T + Copy,
+) -> PyResult<Vec<T>> {
+    let count = check_rows(name, array, count, 3)?;
+    macro_rules! try_kinds {
+        ($($kind:ty),*) => {$(
+            if let Ok(array) = array.cast::<PyArrayDyn<$kind>>() {
+                let array = array.try_readonly().map_err(|_| busy(name))?;
+                let array = array.as_array();
+                let mut rows = room(name, count)?;
+                let mut numbers = array.iter().map(|value| value.number());
+                while let (Some(x), Some(y), Some(z)) = (numbers.next(), numbers.next(), numbers.next()) {
+                    rows.push(made([x, y, z]));
+                }
+                return Ok(rows);
+            }
+        )*};
+    }
+    try_kinds!(f32, f64, i16, u8, i32, u16, i64, u32, i8, u64);
+    Err(refused(name, "an array of numbers", &kind_of(array)))
+}
+
 /// Positions, an array of n times 3.
 pub(crate) fn positions(name: &str, array: &Bound<'_, PyAny>) -> PyResult<Vec<DVec3>> {
-    check_rows(name, array, None, 3)?;
-    let numbers = column(name, array, |value| value)?;
-    let mut rows = room(name, numbers.len() / 3)?;
-    rows.extend(numbers.chunks_exact(3).map(DVec3::from_slice));
-    Ok(rows)
+    rows(name, array, None, DVec3::from_array)
 }
 
 /// Vectors of single precision, one a row.
-pub(crate) fn vectors(name: &str, array: &Bound<'_, PyAny>, rows: usize) -> PyResult<Vec<Vec3>> {
-    check_rows(name, array, Some(rows), 3)?;
-    let numbers = column(name, array, |value| value as f32)?;
-    let mut made = room(name, rows)?;
-    made.extend(numbers.chunks_exact(3).map(Vec3::from_slice));
-    Ok(made)
+pub(crate) fn vectors(name: &str, array: &Bound<'_, PyAny>, count: usize) -> PyResult<Vec<Vec3>> {
+    rows(name, array, Some(count), |row| DVec3::from_array(row).as_vec3())
 }
 
 /// Colours, one a row: linear numbers, or bytes of sRGB where the array is of bytes.
-pub(crate) fn colors(name: &str, array: &Bound<'_, PyAny>, rows: usize) -> PyResult<Vec<[f32; 3]>> {
-    check_rows(name, array, Some(rows), 3)?;
-    let is_bytes = array.cast::<PyArrayDyn<u8>>().is_ok();
-    let linear = |value: f64| if is_bytes { splat_core::srgb::decoded(value / 255.0) as f32 } else { value as f32 };
-    let numbers = column(name, array, linear)?;
-    Ok(numbers.as_chunks().0.to_vec())
+pub(crate) fn colors(name: &str, array: &Bound<'_, PyAny>, count: usize) -> PyResult<Vec<[f32; 3]>> {
+    if array.cast::<PyArrayDyn<u8>>().is_err() {
+        return rows(name, array, Some(count), |row| row.map(|value| value as f32));
+    }
+    let linear: Vec<f32> = (0..=255).map(|byte| splat_core::srgb::decoded(f64::from(byte) / 255.0) as f32).collect();
+    // A byte is an index of 256 entries.
+    rows(name, array, Some(count), |row| row.map(|byte| linear[byte as usize]))
 }
 
 /// Indices of vertices, three a triangle; the first that no vertex has is named.
 pub(crate) fn triangles(name: &str, array: &Bound<'_, PyAny>, vertices: usize) -> PyResult<Vec<[u32; 3]>> {
-    check_rows(name, array, None, 3)?;
-    let numbers = column(name, array, |value| value)?;
-    let is_index = |value: &f64| *value >= 0.0 && *value < vertices as f64 && value.fract() == 0.0;
-    if let Some(place) = numbers.iter().position(|value| !is_index(value)) {
-        let expected = format!("indices of {vertices} vertices, from 0");
-        return Err(refused(name, &expected, &format!("{} in face {}", numbers[place], place / 3)));
+    let wrong = Cell::new(None);
+    let place = Cell::new(0_usize);
+    let is_index = |value: f64| value >= 0.0 && value < vertices as f64 && value.fract() == 0.0;
+    let faces = rows(name, array, None, |face| {
+        if wrong.get().is_none() {
+            wrong.set(face.into_iter().find(|value| !is_index(*value)).map(|value| (value, place.get())));
+        }
+        place.set(place.get() + 1);
+        face.map(|index| index as u32)
+    })?;
+    match wrong.get() {
+        Some((value, face)) => {
+            let expected = format!("indices of {vertices} vertices, from 0");
+            Err(refused(name, &expected, &format!("{value} in face {face}")))
+        }
+        None => Ok(faces),
     }
-    Ok(numbers.as_chunks().0.iter().map(|face: &[f64; 3]| face.map(|index| index as u32)).collect())
 }

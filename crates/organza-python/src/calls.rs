@@ -1,8 +1,8 @@
-//! What the package calls: a first scene of data, a scene drawn, a scene explained.
+//! Calls of the package: a first scene of data, a scene drawn.
 
 use crate::data::Data;
 use crate::errors::{InputError, raised, refused};
-use crate::picture::{Picture, explained};
+use crate::picture::Picture;
 use crate::running::run;
 use convert::ColorMap;
 use organza::scene::{LoadOptions, Override, Scene, UpAxis, parse};
@@ -23,7 +23,7 @@ pub(crate) struct How<'py> {
     #[pyo3(item)]
     pub(crate) threads: Option<usize>,
     #[pyo3(item)]
-    max_memory: Option<u64>,
+    pub(crate) max_memory: Option<u64>,
     #[pyo3(item)]
     pub(crate) progress: Option<Bound<'py, PyAny>>,
     #[pyo3(item)]
@@ -55,7 +55,7 @@ pub(crate) struct Given {
     data: HashMap<String, Py<Data>>,
     /// Width and height, where the scene's are not meant.
     #[pyo3(item)]
-    size: Option<[u32; 2]>,
+    pub(crate) size: Option<[u32; 2]>,
     /// Whether the layer of a picture without its background is kept.
     #[pyo3(item)]
     transparent: bool,
@@ -99,8 +99,21 @@ impl Given {
         })
     }
 
-    fn scene(&self, in_memory: InMemory, options: &RenderOptions) -> Result<Scene, Error> {
-        let load = self.load(in_memory, options)?;
+    pub(crate) fn scene(&self, in_memory: InMemory, options: &RenderOptions) -> Result<Scene, Error> {
+        self.switched(in_memory, options, &[])
+    }
+
+    /// The scene with further effects switched, each `NAME=on` or `NAME=off`.
+    pub(crate) fn switched(
+        &self,
+        in_memory: InMemory,
+        options: &RenderOptions,
+        effects: &[String],
+    ) -> Result<Scene, Error> {
+        let mut load = self.load(in_memory, options)?;
+        for effect in effects {
+            load.overrides.push(Override::of_effect(effect)?);
+        }
         let mut scene = parse(&self.file, self.text.as_bytes(), &load)?;
         if self.transparent && !scene.render.layers.add("background") {
             return Err(Error::Internal("there is no layer of the background".into()));
@@ -118,19 +131,6 @@ pub(crate) fn render(py: Python<'_>, given: Given, how: How<'_>) -> PyResult<Pic
         let scene = given.scene(in_memory, &options)?;
         let picture = organza::render(&scene, &options, progress)?;
         Ok(Picture::new(&scene, &given.text, picture))
-    };
-    run(py, how.threads, how.progress.as_ref(), work)
-}
-
-/// Says what drawing a scene would do, a document in JSON.
-#[pyfunction]
-pub(crate) fn explain(py: Python<'_>, given: Given, how: How<'_>) -> PyResult<String> {
-    let options = how.options();
-    let in_memory = given.in_memory()?;
-    let work = |progress: &Progress| {
-        let scene = given.scene(in_memory, &options)?;
-        let explanation = organza::explain(&scene, &options, progress)?;
-        Ok(explained(&scene, &explanation).to_string())
     };
     run(py, how.threads, how.progress.as_ref(), work)
 }

@@ -11,6 +11,7 @@
 mod arrays;
 mod calls;
 mod data;
+mod documents;
 mod errors;
 mod picture;
 mod running;
@@ -20,9 +21,11 @@ mod view;
 #[pyo3::pymodule(name = "_organza", gil_used = false)]
 mod organza_module {
     #[pymodule_export]
-    use crate::calls::{check, explain, first_scene, lights_of, map_colors, render, toml_text};
+    use crate::calls::{check, first_scene, lights_of, map_colors, render, toml_text};
     #[pymodule_export]
     use crate::data::Data;
+    #[pymodule_export]
+    use crate::documents::{explain, info_of_file, info_of_scene, judge_accuracy, judge_orders};
     #[pymodule_export]
     use crate::errors::{InputError, LimitError};
     #[pymodule_export]

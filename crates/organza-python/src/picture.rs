@@ -1,25 +1,29 @@
 //! A finished picture: its layers as arrays, its files, and what is known of how it was drawn.
 
+use crate::arrays;
 use crate::errors::{raised, refused};
+use convert::ColorScale;
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods};
 use organza::output::{self, Format, Metadata, Params, Target};
-use organza::scene::Scene;
+use organza::scene::{LAYER_NAMES, Scene};
 use organza::{Error, Render};
 use organza_judge::documents;
 use pyo3::prelude::*;
-use pyo3::types::PyBytes;
+use pyo3::types::{PyBytes, PyDict};
 use serde_json::{Value, json};
-use splat_core::LayerData;
+use splat_core::{LayerData, Layers};
 use std::path::PathBuf;
 
 /// A picture that was drawn.
 #[pyclass(frozen, module = "organza._organza")]
 pub(crate) struct Picture {
-    render: Render,
+    layers: Layers,
     metadata: Metadata,
-    /// What a program may want to know, as JSON.
+    /// Camera, plan, costs, predictions, warnings and notes, as JSON.
     facts: String,
     has_background: bool,
+    /// What colours stand for; `None` of a picture that came from another process, which sends layers alone.
+    scales: Option<Vec<ColorScale>>,
 }
 
 impl Picture {
@@ -42,46 +46,121 @@ impl Picture {
             "notes": render.notes,
         });
         let has_background = scene.background != [0.0; 3] || scene.environment.is_some();
-        Self { metadata, facts: facts.to_string(), has_background, render }
+        let scales = Some(render.scales);
+        Self { metadata, facts: facts.to_string(), has_background, layers: render.layers, scales }
     }
 
     /// A picture without its background is made from a layer that is kept if it is asked for.
     fn check_transparent(&self, transparent: bool) -> PyResult<()> {
-        if transparent && self.render.layers.rgb("background").is_none() {
+        if transparent && self.layers.rgb("background").is_none() {
             let found = "one that was drawn without; draw it with `transparent=True`";
             return Err(refused("transparent", "a picture that keeps what lies behind it", found));
         }
         Ok(())
     }
 
-    fn params(&self, transparent: bool, deep: bool, half: bool, legend: bool) -> Params {
-        let legend = if legend { self.render.scales.clone() } else { Vec::new() };
-        Params { half, deep, transparent, has_background: self.has_background, legend }
+    fn params(&self, transparent: bool, deep: bool, half: bool, legend: bool) -> PyResult<Params> {
+        let legend = match (&self.scales, legend) {
+            (_, false) => Vec::new(),
+            (Some(scales), true) => scales.clone(),
+            (None, true) => {
+                let found = "one from another process, which sends layers without their legends; save it there";
+                return Err(refused("legend", "a picture that was drawn in this process", found));
+            }
+        };
+        Ok(Params { half, deep, transparent, has_background: self.has_background, legend })
     }
 }
 
 #[pymethods]
 impl Picture {
+    /// A picture of layers by name, each (height, width, 3) or (height, width), with the facts and the metadata of another.
+    #[staticmethod]
+    fn of_parts(layers: &Bound<'_, PyDict>, facts: String, metadata: &str) -> PyResult<Self> {
+        let broken = |error: &dyn std::fmt::Display| refused("the picture", "its metadata as JSON", &error.to_string());
+        let metadata: Value = serde_json::from_str(metadata).map_err(|error| broken(&error))?;
+        let mut made = Layers::default();
+        for (name, array) in layers {
+            let name: String = name.extract()?;
+            let Some(known) = LAYER_NAMES.iter().find(|known| **known == name) else {
+                return Err(refused("the layer", &format!("one of {}", LAYER_NAMES.join(", ")), &format!("'{name}'")));
+            };
+            let sides = arrays::shape(&name, &array)?;
+            let (&[height, width] | &[height, width, 3]) = sides.as_slice() else {
+                return Err(refused(&name, "the shape (height, width) or (height, width, 3)", &format!("{sides:?}")));
+            };
+            let side = |side: usize| u32::try_from(side).map_err(|_| refused(&name, "fewer pixels a side", "too many"));
+            let size = [side(width)?, side(height)?];
+            if !made.images.is_empty() && made.size != size {
+                return Err(refused(
+                    &name,
+                    &format!("the size {:?} of the other layers", made.size),
+                    &format!("{size:?}"),
+                ));
+            }
+            made.size = size;
+            let data = match (sides.len(), *known) {
+                (3, _) => LayerData::Rgb(arrays::column(&name, &array, |value| value as f32)?.as_chunks().0.to_vec()),
+                (_, "object") => LayerData::Id(arrays::column(&name, &array, |value| value as u32)?),
+                _ => LayerData::Scalar(arrays::column(&name, &array, |value| value as f32)?),
+            };
+            made.insert(known, data);
+        }
+        for (name, is_there) in [("beauty", made.rgb("beauty").is_some()), ("alpha", made.scalar("alpha").is_some())] {
+            if !is_there {
+                return Err(refused("the layers", &format!("a layer '{name}'"), "none"));
+            }
+        }
+        let text = |key: &str| metadata[key].as_str().unwrap_or_default().to_owned();
+        let sets = metadata["sets"].as_u64().and_then(|sets| u32::try_from(sets).ok());
+        Ok(Self {
+            layers: made,
+            metadata: Metadata {
+                scene_sha256: text("scene_sha256"),
+                scene: text("scene"),
+                technique: text("technique"),
+                seed: metadata["seed"].as_u64().unwrap_or_default(),
+                backend: text("backend"),
+                sets,
+                exposure: metadata["exposure"].as_f64().unwrap_or_default(),
+            },
+            facts,
+            has_background: metadata["has_background"].as_bool().unwrap_or_default(),
+            scales: None,
+        })
+    }
+
+    /// What files say of it beside its layers, a document in JSON.
+    #[getter]
+    fn metadata(&self) -> String {
+        let Metadata { scene_sha256, scene, technique, seed, backend, sets, exposure } = &self.metadata;
+        json!({
+            "scene_sha256": scene_sha256, "scene": scene, "technique": technique, "seed": seed, "backend": backend,
+            "sets": sets, "exposure": exposure, "has_background": self.has_background,
+        })
+        .to_string()
+    }
+
     /// Width and height, pixels.
     #[getter]
     fn size(&self) -> (u32, u32) {
-        let [width, height] = self.render.layers.size;
+        let [width, height] = self.layers.size;
         (width, height)
     }
 
     /// Names of its layers.
     #[getter]
     fn layers(&self) -> Vec<&'static str> {
-        self.render.layers.images.keys().copied().collect()
+        self.layers.images.keys().copied().collect()
     }
 
     /// A layer as an array of its own: (height, width, 3) or (height, width).
     fn layer<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyAny>> {
-        let Some(layer) = self.render.layers.images.get(name) else {
+        let Some(layer) = self.layers.images.get(name) else {
             let known = self.layers().join(", ");
             return Err(refused("the layer", &format!("one of {known}"), &format!("'{name}'")));
         };
-        let [width, height] = self.render.layers.size.map(|side| side as usize);
+        let [width, height] = self.layers.size.map(|side| side as usize);
         Ok(match layer {
             LayerData::Rgb(pixels) => {
                 let numbers: Bound<'py, PyArray1<f32>> = PyArray1::from_slice(py, pixels.as_flattened());
@@ -109,10 +188,10 @@ impl Picture {
     #[pyo3(signature = (transparent=false))]
     fn srgb8<'py>(&self, py: Python<'py>, transparent: bool) -> PyResult<Bound<'py, PyArray3<u8>>> {
         self.check_transparent(transparent)?;
-        let params = self.params(transparent, false, false, false);
-        let bytes = py.detach(|| output::displayed_bytes(&self.render.layers, &self.metadata, &params));
+        let params = self.params(transparent, false, false, false)?;
+        let bytes = py.detach(|| output::displayed_bytes(&self.layers, &self.metadata, &params));
         let bytes = bytes.map_err(|error| raised(&Error::Output(error)))?;
-        let [width, height] = self.render.layers.size.map(|side| side as usize);
+        let [width, height] = self.layers.size.map(|side| side as usize);
         PyArray1::from_vec(py, bytes).reshape([height, width, if transparent { 4 } else { 3 }])
     }
 
@@ -120,8 +199,8 @@ impl Picture {
     #[pyo3(signature = (transparent=false, deep=false, legend=false))]
     fn png<'py>(&self, py: Python<'py>, transparent: bool, deep: bool, legend: bool) -> PyResult<Bound<'py, PyBytes>> {
         self.check_transparent(transparent)?;
-        let params = self.params(transparent, deep, false, legend);
-        let encoded = py.detach(|| output::encode(&self.render.layers, &self.metadata, Format::Png, &params));
+        let params = self.params(transparent, deep, false, legend)?;
+        let encoded = py.detach(|| output::encode(&self.layers, &self.metadata, Format::Png, &params));
         let (bytes, _) = encoded.map_err(|error| raised(&Error::Output(error)))?;
         Ok(PyBytes::new(py, &bytes))
     }
@@ -139,11 +218,11 @@ impl Picture {
         force: bool,
     ) -> PyResult<Vec<String>> {
         self.check_transparent(transparent)?;
-        let params = self.params(transparent, deep, half, legend);
+        let params = self.params(transparent, deep, half, legend)?;
         let written = py.detach(|| {
             Format::of_path(&path)?;
             let target = Target::new(&path, force)?;
-            output::write(&self.render.layers, &self.metadata, &target, &params)
+            output::write(&self.layers, &self.metadata, &target, &params)
         });
         let report = written.map_err(|error| raised(&Error::Output(error)))?;
         let counts = [
@@ -161,18 +240,4 @@ impl Picture {
         }
         Ok(said)
     }
-}
-
-/// What a render that was not drawn would do.
-pub(crate) fn explained(scene: &Scene, explanation: &organza::Explanation) -> Value {
-    json!({
-        "camera": documents::camera_json(scene, explanation.found.as_ref()),
-        "plan": documents::plan_json(&explanation.plan),
-        "cost": documents::cost_json(&explanation.cost),
-        "predicted": documents::predicted_json(&explanation.predicted),
-        "splats": documents::splats_json(&explanation.splats),
-        "memory": explanation.memory,
-        "warnings": explanation.warnings,
-        "notes": explanation.notes,
-    })
 }

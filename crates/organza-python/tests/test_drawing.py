@@ -170,14 +170,6 @@ def test_threads_change_nothing():
     assert np.array_equal(one, many)
 
 
-def test_explain_says_what_a_picture_calls_for():
-    document = og.explain(volume_scene(ball()), size=SMALL)
-    names = [effect["name"] for effect in document["plan"]["effects"]]
-    assert "light.0" in names and document["memory"] > 0 and document["predicted"]["seconds"] >= 0
-    off = og.render(volume_scene(ball()), size=SMALL, effects={"shadow.0": "off"})
-    assert next(effect for effect in off.plan["effects"] if effect["name"] == "shadow.0")["called_for"] is False
-
-
 def test_a_camera_that_was_placed_may_be_placed_anew():
     scene = og.Scene.from_files(ASSETS / "meshes" / "dart.off", size=SMALL)
     scene.camera(azimuth=120)

@@ -9,7 +9,8 @@ order: ``values[k, j, i]`` lies at ``origin + i * step_x + j * step_y + k * step
 """
 
 from organza._organza import InputError, LimitError
-from organza.drawing import explain, render, turntable
+from organza.describing import accuracy, explain, info, orders
+from organza.drawing import render, turntable
 from organza.picture import Picture
 from organza.scene import Scene
 from organza.transfers import transfer
@@ -21,7 +22,10 @@ __all__ = [
     "Picture",
     "Scene",
     "View",
+    "accuracy",
     "explain",
+    "info",
+    "orders",
     "render",
     "transfer",
     "turntable",

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import json
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -12,9 +11,8 @@ import numpy as np
 from organza import _organza
 from organza._organza import InputError
 from organza.picture import Picture
+from organza.progressing import Progress, heard
 from organza.scene import Scene, scene_of
-
-Progress = Callable[[str, float], object]
 
 
 def render(
@@ -33,7 +31,7 @@ def render(
     max_memory: int | None = None,
     drop_invalid: bool = False,
     strict: bool = False,
-    progress: Progress | None = None,
+    progress: Any = None,
 ) -> Picture:
     """Draws a scene, or a first scene of files and data: what ``organza render`` draws of them.
 
@@ -59,7 +57,8 @@ def render(
     strict
         Refuse files with a fault that could be mended.
     progress
-        Called with the name of the stage and the share that is done, from 0 to 1.
+        True for a bar of tqdm, or lines where that is not installed; a bar of tqdm; or a function, called with the name of the stage and the share that is
+        done, from 0 to 1.
 
     Returns
     -------
@@ -74,43 +73,14 @@ def render(
     FileNotFoundError, OSError
         Files that cannot be read.
     """
-    how = _how(threads, max_memory, progress, drop_invalid, strict)
     wished = _wished(size, preset, color_by, up, ground, azimuth, elevation, fit)
-    scene = scene_of(what, wished, how)
-    picture = Picture(_organza.render(scene._given(how, effects, size, transparent), how), scene._remarks)
+    with heard(progress) as told:
+        how = _how(threads, max_memory, told, drop_invalid, strict)
+        scene = scene_of(what, wished, how)
+        picture = Picture(_organza.render(scene._given(how, effects, size, transparent), how), scene._remarks)
     for sentence in picture.warnings:
         warnings.warn(sentence, stacklevel=2)
     return picture
-
-
-def explain(
-    *what: Any,
-    size: tuple[int, int] | None = None,
-    preset: str | None = None,
-    color_by: str | None = None,
-    up: str | None = None,
-    ground: bool = False,
-    effects: dict[str, str] | None = None,
-    threads: int | None = None,
-    max_memory: int | None = None,
-    drop_invalid: bool = False,
-    strict: bool = False,
-    progress: Progress | None = None,
-) -> dict[str, Any]:
-    """Says what drawing a scene would do, without drawing it: effects with reasons and bounds, passes, predicted time and memory.
-
-    Parameters are those of :func:`render`.
-
-    Returns
-    -------
-    dict
-        The document of ``organza explain --json``: ``plan``, ``predicted``, ``cost``, ``splats``, ``memory``, ``warnings``, ``notes``, ``camera``.
-    """
-    how = _how(threads, max_memory, progress, drop_invalid, strict)
-    wished = _wished(size, preset, color_by, up, ground, None, None, None)
-    scene = scene_of(what, wished, how)
-    document: dict[str, Any] = json.loads(_organza.explain(scene._given(how, effects, size), how))
-    return document
 
 
 def turntable(
@@ -120,7 +90,7 @@ def turntable(
     size: tuple[int, int] | None = None,
     threads: int | None = None,
     max_memory: int | None = None,
-    progress: Progress | None = None,
+    progress: Any = None,
 ) -> Iterator[Picture]:
     """Draws a scene from all around, one picture after the other, as ``organza render --turntable`` does.
 
@@ -134,12 +104,26 @@ def turntable(
         As for :func:`render`.
     """
     frames = _whole("frames", frames) or 1
-    how = _how(threads, max_memory, progress, False, False)
     wished = _wished(size, None, None, None, False, None, None, None) | {"turntable": frames}
-    scene = scene_of((what,), wished, how)
+    scene = scene_of((what,), wished, _how(threads, max_memory, None, False, False))
     for frame in range(frames):
+        yield _frame(scene, frame, frames, size, threads, max_memory, progress)
+
+
+def _frame(
+    scene: Scene,
+    frame: int,
+    frames: int,
+    size: tuple[int, int] | None,
+    threads: int | None,
+    max_memory: int | None,
+    progress: Any = None,
+) -> Picture:
+    """A frame of a turn around a scene."""
+    with heard(progress) as told:
+        how = _how(threads, max_memory, told, False, False)
         given = scene._given(how, None, size) | {"frame": frame, "turntable": frames}
-        yield Picture(_organza.render(given, how), scene._remarks)
+        return Picture(_organza.render(given, how), scene._remarks)
 
 
 def _how(

@@ -18,6 +18,8 @@ class Picture:
     """A picture: layers as arrays, and what is known of how it was drawn.
 
     ``picture.rgb`` is what is seen, ``picture["depth.median"]`` another layer, if the scene's ``render.layers`` asks for it. A notebook shows it.
+
+    A picture can be pickled with its layers; its legends stay in the process that drew it.
     """
 
     def __init__(self, drawn: _organza.Picture, remarks: list[str]):
@@ -130,6 +132,15 @@ class Picture:
             raise FileExistsError(f"{os.fspath(path)}: this file exists already; force=True replaces it")
         for sentence in self._drawn.save(path, transparent, deep, half, legend, force):
             warnings.warn(sentence, stacklevel=2)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Layers and facts; the legends of colours stay in the process that drew it."""
+        layers = {name: self._drawn.layer(name) for name in self.layers}
+        return {"layers": layers, "facts": self._drawn.facts, "metadata": self._drawn.metadata, "remarks": self._remarks}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        drawn = _organza.Picture.of_parts(state["layers"], state["facts"], state["metadata"])
+        self.__init__(drawn, state["remarks"])  # type: ignore[misc]
 
     def _repr_png_(self) -> bytes:
         return self._drawn.png()

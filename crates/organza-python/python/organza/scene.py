@@ -310,6 +310,11 @@ class Scene:
         """Names of its objects."""
         return [thing["name"] for thing in self._document.get("object", [])]
 
+    @property
+    def notes(self) -> list[str]:
+        """What a first scene decided that a user may want otherwise, one sentence each."""
+        return list(self._remarks)
+
     def __repr__(self) -> str:
         return f"<organza.Scene {self._file}>" if self._text else f"<organza.Scene of {', '.join(self.objects) or 'nothing'}>"
 

@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from organza import _organza
-from organza.drawing import Progress, _how, _wished
+from organza.drawing import _how, _wished
+from organza.progressing import heard
 from organza.scene import scene_of
 
 
@@ -76,7 +77,7 @@ def view(
     max_memory: int | None = None,
     drop_invalid: bool = False,
     strict: bool = False,
-    progress: Progress | None = None,
+    progress: Any = None,
 ) -> View:
     """Shows a scene, or a first scene of files and data, on a page: what ``organza view`` shows of them.
 
@@ -92,9 +93,10 @@ def view(
     -------
     View
     """
-    how = _how(None, max_memory, progress, drop_invalid, strict)
     wished = _wished(size, preset, color_by, up, ground, azimuth, elevation, fit)
-    scene = scene_of(what, wished, how)
     paths = [Path(os.fspath(thing)).name for thing in what if isinstance(thing, (str, os.PathLike))]
     title = ", ".join(paths) or "scene"
-    return View(_organza.view(scene._given(how, effects, size), title, how), height)
+    with heard(progress) as told:
+        how = _how(None, max_memory, told, drop_invalid, strict)
+        scene = scene_of(what, wished, how)
+        return View(_organza.view(scene._given(how, effects, size), title, how), height)

@@ -1,0 +1,20 @@
+"""Shared by the tests: the repository's data, and the command that pictures and documents are compared with."""
+
+import os
+from pathlib import Path
+
+import pytest
+
+REPOSITORY = Path(__file__).resolve().parents[3]
+ASSETS = REPOSITORY / "assets"
+
+
+@pytest.fixture(scope="session")
+def command() -> str:
+    """The command `organza` of this repository; `cargo xtask python` builds it and names it."""
+    named = os.environ.get("ORGANZA_COMMAND")
+    places = [Path(named)] if named else [REPOSITORY / "target" / profile / "organza" for profile in ("debug", "release")]
+    found = next((place for place in places if place.is_file()), None)
+    if found is None:
+        pytest.skip("the command is not built: cargo build -p organza-cli")
+    return str(found)
