@@ -62,6 +62,9 @@ pub(crate) struct Given {
     /// Effects that are switched, such as `shadow.sun=off`.
     #[pyo3(item)]
     effects: Vec<String>,
+    /// Changes of its keys, such as `render.seed=3`.
+    #[pyo3(item)]
+    changes: Vec<String>,
     /// The frame of an animation or a turntable.
     #[pyo3(item)]
     frame: Option<u32>,
@@ -81,7 +84,7 @@ impl Given {
 
     /// How its document is read.
     pub(crate) fn load(&self, in_memory: InMemory, options: &RenderOptions) -> Result<LoadOptions, Error> {
-        let mut overrides = Vec::new();
+        let mut overrides = self.changes.iter().map(|change| Override::parse(change)).collect::<Result<Vec<_>, _>>()?;
         for effect in &self.effects {
             overrides.push(Override::of_effect(effect)?);
         }

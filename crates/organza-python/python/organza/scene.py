@@ -386,6 +386,7 @@ class Scene:
             "file": self._file,
             "data": self._data,
             "effects": switches,
+            "changes": [],
             "size": size,
             "transparent": transparent,
             "frame": None,
