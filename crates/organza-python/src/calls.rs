@@ -212,14 +212,14 @@ fn axis(name: &str) -> PyResult<UpAxis> {
     }
 }
 
-/// A first scene of files and data: its document in JSON, and what was decided that a user may want otherwise.
+/// A first scene of files and data: its document in JSON, decisions that a user may want otherwise, and its text, with paths from this folder.
 #[pyfunction]
 pub(crate) fn first_scene(
     py: Python<'_>,
     shown: Vec<Shown>,
     wished: Wished,
     how: How<'_>,
-) -> PyResult<(String, Vec<String>)> {
+) -> PyResult<(String, Vec<String>, String)> {
     let options = how.options();
     let wish = wished.wish()?;
     let mut in_memory = InMemory::default();
@@ -245,7 +245,7 @@ pub(crate) fn first_scene(
         let data = sources.into_iter().map(read).collect::<Result<Vec<_>, Error>>()?;
         let surveyed = (&files, &options, progress);
         let written = organza_survey::first_scene(&data, Path::new(FIRST), &wish, &in_memory, surveyed)?;
-        Ok((json_of_toml(&written.text)?, written.remarks))
+        Ok((json_of_toml(&written.text)?, written.remarks, written.text))
     };
     run(py, how.threads, None, work)
 }

@@ -7,6 +7,7 @@ import json
 import math
 import os
 from collections.abc import Container, Iterable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -22,9 +23,20 @@ _LIT_VOLUME = "lit volume"
 _LIT = {"shading": "phong", "specular": 0.08, "shininess": 24}
 # A scene that is made here lies nowhere: files that it names are relative to the working folder.
 _NOWHERE = "scene.json"
+# A first scene lies in the working folder, as far as its paths go.
+_FIRST = "scene.toml"
 # Sources of a first scene, and how one names data in memory.
 _SOURCES = ("mesh", "points", "volume")
 _MEMORY = "memory:"
+
+
+@dataclass(frozen=True)
+class _Written:
+    """A first scene as the command writes it, which is drawn as long as its document is not changed: a file then has the picture of the command."""
+
+    document: dict[str, Any]
+    text: str
+    file: str
 
 
 class Scene:
@@ -47,8 +59,9 @@ class Scene:
         self._text: str | None = None
         self._file = _NOWHERE
         self._data: dict[str, Data] = {}
-        # What a first scene decided.
+        # What a first scene decided, and how it is written.
         self._remarks: list[str] = []
+        self._written: _Written | None = None
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Scene:
@@ -320,13 +333,14 @@ class Scene:
 
     def __getstate__(self) -> dict[str, Any]:
         data = {name: (data.kind, data.arrays()) for name, data in self._data.items()}
-        return {"document": self._document, "text": self._text, "file": self._file, "data": data, "remarks": self._remarks}
+        return {"document": self._document, "text": self._text, "file": self._file, "data": data, "remarks": self._remarks, "written": self._written}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self._document = state["document"]
         self._text = state["text"]
         self._file = state["file"]
         self._remarks = state["remarks"]
+        self._written = state["written"]
         self._data = {name: getattr(Data, kind)(**arrays) for name, (kind, arrays) in state["data"].items()}
 
     def _check_open(self) -> None:
@@ -348,7 +362,7 @@ class Scene:
 
     def _first_keys(self, data: Data, name: str, preset: str | None) -> dict[str, Any]:
         """What a first scene says of a volume; its material becomes one of this scene."""
-        text, _ = _organza.first_scene([(name, data, "y")], _no_wish() | {"preset": preset}, _how())
+        text, _, _ = _organza.first_scene([(name, data, "y")], _no_wish() | {"preset": preset}, _how())
         first = json.loads(text)
         thing = first["object"][0]
         keys = {key: value for key, value in thing.items() if key not in ("name", "volume")}
@@ -394,6 +408,10 @@ class Scene:
         }
         if self._text is not None:
             return given
+        if self._written is not None and self._written.document == self._document:
+            # A size that it states already is no change of it.
+            is_stated = size is not None and list(size) == self._document.get("camera", {}).get("size")
+            return given | {"text": self._written.text, "file": self._written.file, "size": None if is_stated else size}
         document = copy.copy(self._document)
         camera = dict(document.get("camera", {}))
         if "position" not in camera:
@@ -428,7 +446,7 @@ def scene_of(what: tuple[Any, ...], wished: Mapping[str, Any], how: dict[str, An
         name = _free(name, data_by_name)
         data_by_name[name] = data
         shown.append((name, data, up))
-    text, remarks = _organza.first_scene(shown, dict(wished), how)
+    text, remarks, written = _organza.first_scene(shown, dict(wished), how)
     scene = Scene()
     scene._document = json.loads(text)
     scene._data = data_by_name
@@ -438,6 +456,7 @@ def scene_of(what: tuple[Any, ...], wished: Mapping[str, Any], how: dict[str, An
         for source in _SOURCES:
             if source in first and not first[source].startswith(_MEMORY):
                 first[source] = os.path.abspath(first[source])
+    scene._written = _Written(copy.deepcopy(scene._document), written, os.path.abspath(_FIRST))
     return scene
 
 
