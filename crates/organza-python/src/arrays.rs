@@ -6,6 +6,9 @@ use pyo3::prelude::*;
 use splat_core::glam::{DVec3, Vec3};
 use std::cell::Cell;
 
+/// Rows of an array that are counted: indices of splats have 32 bits, and one object makes several of a point.
+const MOST_ROWS: usize = i32::MAX as usize;
+
 /// A number that an array may hold.
 trait Number: Element + Copy {
     fn number(self) -> f64;
@@ -75,6 +78,12 @@ pub(crate) fn check_rows(name: &str, array: &Bound<'_, PyAny>, rows: Option<usiz
         let many = rows.map_or_else(|| "n".to_owned(), |rows| rows.to_string());
         let expected = if width == 1 { format!("the shape ({many},)") } else { format!("the shape ({many}, {width})") };
         return Err(refused(name, &expected, &format!("{found:?}")));
+    }
+    if found[0] > MOST_ROWS {
+        let found = found[0];
+        return Err(LimitError::new_err(format!(
+            "{name}: expected at most {MOST_ROWS} rows, found {found}; take a part of them"
+        )));
     }
     Ok(found[0])
 }

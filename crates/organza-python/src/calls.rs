@@ -74,10 +74,11 @@ pub(crate) struct Given {
 }
 
 impl Given {
-    pub(crate) fn in_memory(&self) -> PyResult<InMemory> {
+    /// The data that it names, which threads without the interpreter can have.
+    pub(crate) fn take_memory(&mut self) -> PyResult<InMemory> {
         let mut in_memory = InMemory::default();
-        for (name, data) in &self.data {
-            in_memory.insert(name, data.get().data.clone()).map_err(|error| raised(&error.into()))?;
+        for (name, data) in self.data.drain() {
+            in_memory.insert(&name, data.get().data.clone()).map_err(|error| raised(&error.into()))?;
         }
         Ok(in_memory)
     }
@@ -127,10 +128,10 @@ impl Given {
 
 /// Draws a scene.
 #[pyfunction]
-pub(crate) fn render(py: Python<'_>, given: Given, how: How<'_>) -> PyResult<Picture> {
+pub(crate) fn render(py: Python<'_>, mut given: Given, how: How<'_>) -> PyResult<Picture> {
     let options = how.options();
-    let in_memory = given.in_memory()?;
-    let work = |progress: &Progress| {
+    let in_memory = given.take_memory()?;
+    let work = move |progress: &Progress| {
         let scene = given.scene(in_memory, &options)?;
         let picture = organza::render(&scene, &options, progress)?;
         Ok(Picture::new(&scene, &given.text, picture))
@@ -140,11 +141,11 @@ pub(crate) fn render(py: Python<'_>, given: Given, how: How<'_>) -> PyResult<Pic
 
 /// The lights of a first scene for what a scene without lights shows, a document in JSON.
 #[pyfunction]
-pub(crate) fn lights_of(py: Python<'_>, given: Given, how: How<'_>) -> PyResult<String> {
+pub(crate) fn lights_of(py: Python<'_>, mut given: Given, how: How<'_>) -> PyResult<String> {
     let options = how.options();
-    let in_memory = given.in_memory()?;
+    let in_memory = given.take_memory()?;
     let is_turned = given.turntable.is_some();
-    let work = |progress: &Progress| {
+    let work = move |progress: &Progress| {
         let scene = given.scene(in_memory, &options)?;
         let lights = organza_survey::lights_of(&scene, is_turned, &Files::default(), &options, progress)?;
         json_of_toml(&lights)
@@ -236,7 +237,7 @@ pub(crate) fn first_scene(
             }
         });
     }
-    let work = |progress: &Progress| {
+    let work = move |progress: &Progress| {
         let files = Files::default();
         let read = |source: Source| match source {
             Source::File(path) => DataFile::read(&path, &wish, (&files, &options, progress)),

@@ -34,10 +34,10 @@ pub(crate) struct Effort {
 
 /// Explains what drawing a scene would do; `measure` draws it too, with each effect and without.
 #[pyfunction]
-pub(crate) fn explain(py: Python<'_>, given: Given, measure: bool, how: How<'_>) -> PyResult<String> {
+pub(crate) fn explain(py: Python<'_>, mut given: Given, measure: bool, how: How<'_>) -> PyResult<String> {
     let options = how.options();
-    let in_memory = given.in_memory()?;
-    let work = |progress: &Progress| {
+    let in_memory = given.take_memory()?;
+    let work = move |progress: &Progress| {
         let scene = given.scene(in_memory.clone(), &options)?;
         if !measure {
             return Ok(explained(&scene, organza::explain(&scene, &options, progress)?, None).to_string());
@@ -109,26 +109,26 @@ fn explained(scene: &Scene, explanation: Explanation, measured: Option<&Measured
 #[pyfunction]
 pub(crate) fn info_of_file(py: Python<'_>, file: PathBuf, how: How<'_>) -> PyResult<String> {
     let options = how.options();
-    let work = |_: &Progress| Ok(facts_json(&facts(&file, options.max_memory, options.strict)?).to_string());
+    let work = move |_: &Progress| Ok(facts_json(&facts(&file, options.max_memory, options.strict)?).to_string());
     run(py, how.threads, None, work)
 }
 
 /// Describes a scene.
 #[pyfunction]
-pub(crate) fn info_of_scene(py: Python<'_>, given: Given, how: How<'_>) -> PyResult<String> {
+pub(crate) fn info_of_scene(py: Python<'_>, mut given: Given, how: How<'_>) -> PyResult<String> {
     let options = how.options();
-    let in_memory = given.in_memory()?;
-    let work = |_: &Progress| Ok(scene_json(&given.scene(in_memory, &options)?).to_string());
+    let in_memory = given.take_memory()?;
+    let work = move |_: &Progress| Ok(scene_json(&given.scene(in_memory, &options)?).to_string());
     run(py, how.threads, None, work)
 }
 
 /// Draws a scene by every technique with each of its knobs turned, and judges error and time.
 #[pyfunction]
-pub(crate) fn judge_accuracy(py: Python<'_>, given: Given, effort: Effort, how: How<'_>) -> PyResult<String> {
+pub(crate) fn judge_accuracy(py: Python<'_>, mut given: Given, effort: Effort, how: How<'_>) -> PyResult<String> {
     let mut options = how.options();
-    let in_memory = given.in_memory()?;
+    let in_memory = given.take_memory()?;
     let has_memory = how.max_memory.is_some();
-    let work = |progress: &Progress| {
+    let work = move |progress: &Progress| {
         let mut scene = placed(&given.scene(in_memory, &options)?, &options)?;
         let extent = accuracy::Options { quick: effort.quick, finer: effort.finer, seed: scene.render.seed };
         if given.size.is_none() {
@@ -153,10 +153,10 @@ pub(crate) fn judge_accuracy(py: Python<'_>, given: Given, effort: Effort, how: 
 
 /// Draws a scene by every order of its splats, and compares each with the exact order.
 #[pyfunction]
-pub(crate) fn judge_orders(py: Python<'_>, given: Given, effort: Effort, how: How<'_>) -> PyResult<String> {
+pub(crate) fn judge_orders(py: Python<'_>, mut given: Given, effort: Effort, how: How<'_>) -> PyResult<String> {
     let options = how.options();
-    let in_memory = given.in_memory()?;
-    let work = |progress: &Progress| {
+    let in_memory = given.take_memory()?;
+    let work = move |progress: &Progress| {
         let mut scene = placed(&given.scene(in_memory, &options)?, &options)?;
         let extent = orders::Options { quick: effort.quick };
         if given.size.is_none() {

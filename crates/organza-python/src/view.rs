@@ -60,10 +60,10 @@ impl Drop for View {
 
 /// Serves a page of a scene on this machine.
 #[pyfunction]
-pub(crate) fn view(py: Python<'_>, given: Given, title: String, how: How<'_>) -> PyResult<View> {
+pub(crate) fn view(py: Python<'_>, mut given: Given, title: String, how: How<'_>) -> PyResult<View> {
     let options = how.options();
-    let in_memory = given.in_memory()?;
-    let work = |progress: &Progress| {
+    let in_memory = given.take_memory()?;
+    let work = move |progress: &Progress| {
         let load = given.load(in_memory, &options)?;
         let text = given.text.clone().into_bytes();
         let opening = Opening { title, file: given.file.clone(), text, load, options, files: Files::default() };

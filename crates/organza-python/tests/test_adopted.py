@@ -56,3 +56,84 @@ def test_nibabel_images_stand_up():
     scene = og.Scene()
     scene.add(image, transfer=og.transfer())
     assert og.render(scene, size=SMALL).alpha.max() > 0.1
+
+
+def world(side: int = 9) -> tuple[np.ndarray, np.ndarray]:
+    """Values along i, j, k with an off-centre block, and an affine with steps of their own."""
+    values = np.zeros((side, side + 1, side + 2), dtype=np.float32)
+    values[1:5, 2:8, 3:9] = np.random.default_rng(0).random((4, 6, 6)) + 1
+    affine = np.diag([2.0, 2.0, 3.0, 1.0])
+    affine[:3, 3] = (5.0, -7.0, 11.0)
+    return values, affine
+
+
+def test_an_image_of_nibabel_is_drawn_as_its_file(tmp_path):
+    nib = pytest.importorskip("nibabel")
+    values, affine = world()
+    image = nib.Nifti1Image(values, affine)
+    nib.save(image, tmp_path / "image.nii")
+    assert np.array_equal(og.render(image, size=SMALL).rgb, og.render(tmp_path / "image.nii", size=SMALL).rgb)
+
+
+def test_an_image_of_simpleitk_is_drawn_as_its_file(tmp_path):
+    sitk = pytest.importorskip("SimpleITK")
+    values, _ = world()
+    image = sitk.GetImageFromArray(values.transpose())
+    image.SetSpacing((2.0, 2.0, 3.0))
+    image.SetOrigin((5.0, -7.0, 11.0))
+    image.SetDirection((0.0, 1.0, 0.0, -1.0, 0.0, 0.0, 0.0, 0.0, 1.0))
+    for ending in ("nrrd", "mha"):
+        sitk.WriteImage(image, str(tmp_path / f"image.{ending}"))
+        assert np.array_equal(og.render(image, size=SMALL).rgb, og.render(tmp_path / f"image.{ending}", size=SMALL).rgb)
+
+
+def test_a_trimesh_with_a_texture_keeps_its_colours():
+    trimesh = pytest.importorskip("trimesh")
+    image_module = pytest.importorskip("PIL.Image")
+    box = trimesh.creation.box()
+    texture = image_module.new("RGB", (4, 4), (20, 200, 20))
+    box.visual = trimesh.visual.TextureVisuals(uv=np.zeros((len(box.vertices), 2)), image=texture)
+    red, green, _ = np.moveaxis(og.render(box, size=SMALL).rgb, -1, 0)
+    assert green.max() > 2 * red.max()
+
+
+def test_a_scene_and_points_of_trimesh():
+    trimesh = pytest.importorskip("trimesh")
+    both = trimesh.Scene([trimesh.creation.box(), trimesh.creation.icosphere().apply_translation([3, 0, 0])])
+    assert og.render(both, size=SMALL).alpha.max() > 0.9
+    assert og.render(trimesh.PointCloud(np.random.default_rng(0).random((200, 3))), size=SMALL).alpha.max() > 0.5
+
+
+def test_pyvista_grids_lines_and_cells():
+    pv = pytest.importorskip("pyvista")
+    cells = pv.ImageData(dimensions=(5, 6, 7))
+    cells.cell_data["heat"] = np.arange(4.0 * 5 * 6)
+    scene = og.Scene()
+    scene.add(cells, transfer=og.transfer(clim=(0, 120)))
+    assert og.render(scene, size=SMALL).alpha.max() > 0.05
+    assert og.render(pv.examples.cells.Hexahedron(), size=SMALL).alpha.max() > 0.9
+    assert og.render(pv.StructuredGrid(*np.meshgrid(*[np.arange(4.0)] * 3, indexing="ij")), size=SMALL).alpha.max() > 0.9
+    with pytest.raises(og.InputError, match="line"):
+        og.render(pv.Line())
+    with pytest.raises(og.InputError):
+        og.render(pv.PolyData())
+
+
+def test_labels_are_surfaces():
+    labels = np.zeros((12, 12, 12), dtype=np.int16)
+    for rank, corner in enumerate(np.ndindex(2, 2, 2)):
+        labels[tuple(slice(1 + 5 * place, 6 + 5 * place) for place in corner)] = rank + 1
+    scene = og.Scene()
+    scene.add(labels)
+    picture = og.render(labels, size=SMALL)
+    assert any("label" in note for note in picture.notes) and picture.alpha.max() > 0.9
+
+
+def test_data_of_open3d_by_its_names():
+    """Open3D itself is large: a class of its name stands for it."""
+    cloud_of = type("PointCloud", (), {"__module__": "open3d.geometry"})
+    cloud = cloud_of()
+    cloud.points = np.random.default_rng(0).random((200, 3))
+    cloud.colors = np.tile([1.0, 0.0, 0.0], (200, 1))
+    red, green, _ = np.moveaxis(og.render(cloud, size=SMALL).rgb, -1, 0)
+    assert red.max() > 2 * green.max()

@@ -96,19 +96,49 @@ def test_a_key_that_there_is_not_is_refused():
 def test_malformed_calls_never_end_the_interpreter():
     rng = np.random.default_rng(3)
     wrong = [None, 0, -1, 1.5, np.nan, "x", b"x", [], [[]], {}, object(), np.zeros(0), np.zeros((0, 3)), np.array("x"), np.zeros((2, 2, 2, 2)), CUBE, True]
+    wrong += [np.datetime64("2020"), np.zeros(3, complex), np.zeros(2, dtype=[("a", "f4")]), np.array([None]), 2**70, "\udc80", np.full((3, 3), 1e300)]
     calls = [
         lambda a, b: scene().add_points(a, values=b),
+        lambda a, b: scene().add_points(PLACES, radius=a, colormap=b, values=b),
+        lambda a, b: scene().add_points(PLACES, columns={"a": a}, color_by=b),
+        lambda a, b: scene().add_points(PLACES, columns=a, clim=b),
+        lambda a, b: scene().add_points(PLACES, opacity=a, name=b),
         lambda a, b: scene().add_mesh(a, b),
+        lambda a, b: scene().add_mesh(PLACES, [[0, 1, 2]], normals=a, colors=b),
         lambda a, b: scene().add_volume(a, spacing=b),
-        lambda a, b: scene().camera(position=a, target=b) or 1,
+        lambda a, b: scene().add_volume(CUBE, origin=a, direction=b),
+        lambda a, b: scene().add_volume(CUBE, preset=a, transfer=b),
+        lambda a, b: scene().add(a, name=b),
+        lambda a, b: scene().camera(position=a, target=b),
+        lambda a, b: scene().light(a, direction=b),
+        lambda a, b: scene().material(a, color=b),
         lambda a, b: og.render(a, size=b),
+        lambda a, b: og.render(PLACES, size=SMALL, effects=a, up=b),
+        lambda a, b: og.render(PLACES, size=SMALL, fit=a, azimuth=b),
+        lambda a, b: og.render(PLACES, size=SMALL, progress=a, max_memory=b),
+        lambda a, b: og.explain(a, effects=b),
+        lambda a, b: og.info(a, max_memory=b),
+        lambda a, b: og.accuracy(a, finer=b),
+        lambda a, b: og.orders(a, size=b),
+        lambda a, b: list(og.turntable(a, b)),
         lambda a, b: og.transfer(clim=a, opacity=b),
+        lambda a, b: og.transfer(a, unit_length=b),
+        lambda a, b: og.Scene.load(a),
+        lambda a, b: og.Scene.from_files(a, b),
         lambda a, b: scene().set(a, b),
     ]
-    for _ in range(200):
-        call = calls[rng.integers(len(calls))]
+    is_known = (ValueError, TypeError, MemoryError, OSError, KeyError, AttributeError, IndexError, OverflowError)
+    for rank in range(10 * len(calls)):
         one, other = (wrong[rng.integers(len(wrong))] for _ in range(2))
         try:
-            call(one, other)
-        except (ValueError, TypeError, MemoryError, OSError, KeyError, AttributeError, IndexError):
+            calls[rank % len(calls)](one, other)
+        except is_known:
             pass
+        except BaseException as error:
+            raise AssertionError(f"call {rank % len(calls)} of {one!r} and {other!r}: {error!r}") from error
+
+
+def test_sides_beyond_what_indices_count_are_refused():
+    many = np.broadcast_to(np.float32(0), (2**31, 3))
+    with pytest.raises(og.LimitError, match="positions: expected at most 2147483647 rows, found 2147483648"):
+        og.render(many, size=SMALL)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import warnings
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -13,6 +14,9 @@ from organza.transfers import transfer
 
 if TYPE_CHECKING:
     from organza.scene import Scene
+
+# Left and back to right and front.
+_HALF_TURN = np.array([-1.0, -1.0, 1.0])
 
 
 def add(scene: Scene, thing: Any, name: str | None, keys: Mapping[str, Any]) -> None:
@@ -81,6 +85,11 @@ def _vtk(thing: Any) -> tuple[str, str, dict[str, Any]] | None:
         if not hasattr(thing, "extract_surface"):
             raise InputError(f"expected points, a surface or an image of VTK, found {thing.GetClassName()}")
         thing = thing.extract_surface()
+    if thing.n_lines:
+        said = "lines are not drawn; `tube(radius=…)` makes surfaces of them"
+        if thing.n_lines == thing.n_cells:
+            raise InputError(f"expected points, faces or voxels, found lines alone: {said}")
+        warnings.warn(f"{thing.n_lines} {said}", stacklevel=5)
     is_surface = thing.n_cells > thing.n_verts + thing.n_lines
     colors = _vtk_colors(thing)
     if is_surface and thing.n_verts == 0:
@@ -170,15 +179,16 @@ def _nibabel(thing: Any) -> tuple[str, str, dict[str, Any]] | None:
 
 
 def _simpleitk(thing: Any) -> tuple[str, str, dict[str, Any]] | None:
-    """An image of SimpleITK, whose world has x to the left of the patient, y to the back, z up."""
+    """An image of SimpleITK. Its world has x to the left of the patient and y to the back; files of it are read with x to the right and y to the front, and
+    so is the image."""
     library = sys.modules.get("SimpleITK")
     if library is None or not isinstance(thing, library.Image):
         return None
     arguments = {
         "values": library.GetArrayViewFromImage(thing),
         "spacing": thing.GetSpacing(),
-        "origin": thing.GetOrigin(),
-        "direction": np.asarray(thing.GetDirection()).reshape(3, 3),
+        "origin": _HALF_TURN * thing.GetOrigin(),
+        "direction": _HALF_TURN[:, None] * np.asarray(thing.GetDirection()).reshape(3, 3),
         "transform": {"up": "z"},
     }
     return "volume", "image", arguments

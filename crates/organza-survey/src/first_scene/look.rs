@@ -12,6 +12,7 @@ use crate::transfer::Transfer;
 use convert::ColorMap;
 use organza::scene::Recipe;
 use organza::{Error, SourceData, printable};
+use read::stated_up_axis;
 use splat_core::{DAabb, Grid, optics};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -145,7 +146,9 @@ pub(super) fn objects(data: &[DataFile], paths: &[String], table: Option<&str>, 
         if let Some(array) = &file.array {
             object.keys = format!("array = {}\n{}", quoted(array), object.keys);
         }
-        if let Some(up) = wish.up.or(file.stands.filter(|_| all_stand)) {
+        // The scene reads the axis from a file's name; data in memory has none, so the text states what its maker knows.
+        let told = file.stated_up.filter(|_| stated_up_axis(&file.path).is_none());
+        if let Some(up) = wish.up.or(told).or(file.stands.filter(|_| all_stand)) {
             object.keys = format!("transform = {{ up = \"{}\" }}\n{}", up.name(), object.keys);
         } else if file.stated_up.is_none() {
             object.keys = format!(
