@@ -109,7 +109,7 @@ fn explained(scene: &Scene, explanation: Explanation, measured: Option<&Measured
 #[pyfunction]
 pub(crate) fn info_of_file(py: Python<'_>, file: PathBuf, how: How<'_>) -> PyResult<String> {
     let options = how.options();
-    let work = move |_: &Progress| Ok(facts_json(&facts(&file, options.max_memory, options.strict)?).to_string());
+    let work = move |_: &Progress| Ok(facts_json(&facts(&file, None, options.max_memory, options.strict)?).to_string());
     run(py, how.threads, None, work)
 }
 
