@@ -16,9 +16,10 @@ use std::fs;
 
 const SIZE: [usize; 2] = [24, 16];
 /// A scene without lights.
-const FEW: Facts = Facts { slice_thickness: Some(0.1), cells: None, bytes_per_splat: None };
+const FEW: Facts = Facts { slice_thickness: Some(0.1), has_maps: false, cells: None, bytes_per_splat: None };
 /// One with all that a knob may need.
-const ALL: Facts = Facts { slice_thickness: Some(0.1), cells: Some(64), bytes_per_splat: Some([48.0, 15.7]) };
+const ALL: Facts =
+    Facts { slice_thickness: Some(0.1), has_maps: true, cells: Some(64), bytes_per_splat: Some([48.0, 15.7]) };
 const OPTIONS: Options = Options { quick: true, finer: 0, seed: 1 };
 const THOROUGH: Options = Options { quick: false, ..OPTIONS };
 
