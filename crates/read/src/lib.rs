@@ -101,11 +101,11 @@ use volumes::vti;
 use volumes::vtk;
 use volumes::{dicom, lattice, metaimage, nrrd, raw, rounded};
 
-/// How much a file may ask for, and what happens to what is wrong in it.
+/// Limits of reading, the parts of a file to keep, and the treatment of its faults.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ReadParams {
-    /// Bytes that reading takes at a time: files that are read whole, what comes out of packed ones, images, and what is made of them. All
-    /// come back when the file is read; whoever keeps what it holds takes [`Loaded::bytes`] for that.
+    /// Account of the bytes that reading holds at a time: whole files, unpacked streams, images, and the data made of them.
+    /// All are released when the file is read; a caller that keeps the data accounts [`Loaded::bytes`] for it.
     pub memory: MemoryAccount,
     /// Whether points of a cloud with a coordinate that is not finite are left out and counted in
     /// [`RawPoints::dropped`] instead of refused. Vertices of a mesh are always refused.
@@ -429,7 +429,7 @@ fn remark_gaps(grid: &Grid, reading: &mut Reading<'_>) -> Result<(), ReadError> 
     Ok(())
 }
 
-/// Refuses columns that were asked for and are not there; what is kept is no longer named as not used.
+/// Refuses requested columns that the points lack, and removes kept columns from the notes about unused ones.
 fn check_columns(points: &RawPoints, reading: &mut Reading<'_>) -> Result<(), ReadError> {
     let missing = reading.params.columns.iter().find(|name| points.column(name, DVec3::Y).is_none());
     if let Some(missing) = missing {
@@ -440,13 +440,13 @@ fn check_columns(points: &RawPoints, reading: &mut Reading<'_>) -> Result<(), Re
     Ok(())
 }
 
-/// Refuses columns of a mesh that were asked for and are not there.
+/// Refuses requested columns that a mesh lacks.
 fn check_mesh_columns(mesh: &Mesh, reading: &Reading<'_>) -> Result<(), ReadError> {
     let Some(missing) = reading.params.columns.iter().find(|name| !mesh.has_column(name)) else { return Ok(()) };
     Err(missing_column(missing, mesh.column_names().collect(), reading))
 }
 
-/// The error of a column that data lacks which has those that are `known`, and those of its notes.
+/// Returns the error for a missing column; it lists the `known` columns and those of the notes.
 fn missing_column(missing: &str, known: Vec<&str>, reading: &Reading<'_>) -> ReadError {
     let further = reading.notes.columns.iter().map(|c| c.name.as_str()).filter(|name| !known.contains(name));
     let names: Vec<&str> = known.iter().copied().chain(further).collect();
