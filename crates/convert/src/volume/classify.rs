@@ -40,18 +40,18 @@ pub(crate) struct Classes<'a> {
     knots: Vec<f64>,
     /// Before the first knot, between knots, after the last.
     pieces: Vec<Piece>,
-    /// For each knot the change of slope of that of the four which changes most.
+    /// For each knot the greatest change of slope among the four integrands.
     bends: Vec<f64>,
-    /// Optical depth that a unit of extinction has in a cell, over what may be wrong with a cell's.
+    /// Optical depth of a unit of extinction along a cell, divided by the permitted error of a cell's optical depth.
     weight: f64,
-    /// For each piece the value up to which there is no extinction from any of its values on; −∞ where it has some.
+    /// For each piece without extinction, the greatest value up to which the extinction stays 0; −∞ for a piece with extinction.
     dark_until: Vec<f32>,
-    /// Sums of extinction above it are more than rounding.
+    /// Smaller sums of extinction are rounding errors.
     something: f64,
 }
 
 impl<'a> Classes<'a> {
-    /// `spacing` is a cell's, world units; `error` the optical depth of a cell that may be wrong.
+    /// `spacing` is the length of a cell, world units; `error` the permitted error of a cell's optical depth.
     pub(crate) fn new(tf: &'a TransferFunction, spacing: f64, error: f64) -> Self {
         let points = tf.points();
         let knots: Vec<f64> = points.iter().map(|p| f64::from(p.value)).collect();

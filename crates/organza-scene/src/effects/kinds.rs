@@ -102,7 +102,7 @@ impl EffectKind {
         }
     }
 
-    /// What the effect of a light or an object of this name is called, such as `shadow.sun`; the name of a scene's is not asked for.
+    /// Name of the effect of the light or object that is called `label`, such as `shadow.sun`. For an effect of the whole scene `label` is ignored.
     pub fn name(self, label: &str) -> String {
         match self.hangs_on() {
             HangsOn::Scene => self.word().to_owned(),

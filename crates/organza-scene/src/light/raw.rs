@@ -92,7 +92,7 @@ pub(crate) enum RawLight {
         radius: f64,
         /// Radiant intensity of the whole light per channel, seen from far away, W/sr or relative.
         intensity: [f64; 3],
-        /// Points that it is taken for by techniques that light by points; default 16.
+        /// Number of points that replace the light in techniques that light by points; default 16.
         #[serde(default = "sixteen")]
         samples: u32,
         /// Whether it casts shadows; default true.
@@ -113,7 +113,7 @@ pub(crate) enum RawLight {
         radius: f64,
         /// Radiant intensity of the whole light per channel, along its normal, seen from far away, W/sr or relative.
         intensity: [f64; 3],
-        /// Points that it is taken for by techniques that light by points; default 16.
+        /// Number of points that replace the light in techniques that light by points; default 16.
         #[serde(default = "sixteen")]
         samples: u32,
         /// Whether it casts shadows; default true.
@@ -134,7 +134,7 @@ pub(crate) enum RawLight {
         v: [f64; 3],
         /// Radiant intensity of the whole light per channel, along its normal, seen from far away, W/sr or relative.
         intensity: [f64; 3],
-        /// Points that it is taken for by techniques that light by points; default 16.
+        /// Number of points that replace the light in techniques that light by points; default 16.
         #[serde(default = "sixteen")]
         samples: u32,
         /// Whether it casts shadows; default true.

@@ -4,7 +4,7 @@ use crate::{MatterSource, Scene, SceneMaterial, SceneObject, Source};
 use convert::{ColorBy, DiscShape, DiscSize, Kept, MatterParams, PointMaterial, PointsShown, SplatParams};
 use std::sync::Arc;
 
-/// The look that a scene states for raw points. A mesh takes the colours of it, and other sources nothing.
+/// The look that a scene states for raw points. A mesh uses its colours alone; other sources ignore it.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct PointsLook {
     /// The column that they, or a mesh, take their colours from; `None` for those of the file, the object or its material.
@@ -17,13 +17,12 @@ pub struct PointsLook {
     pub shape: DiscShape,
     /// Diameter of their discs; `None` where it follows from their neighbours.
     pub size: Option<DiscSize>,
-    /// Whether splats keep the values that their points have, or the numbers of the column that these have their colours from; no picture
-    /// needs them.
+    /// Whether splats keep a number each: the point's value, or that of its colour column. Pictures do not need it.
     pub keeps_values: bool,
 }
 
 impl Scene {
-    /// Opacity of one crossing of the surfaces of an object; 1 where that is for the materials of its points to say.
+    /// Opacity of one crossing of the surfaces of an object; 1 if its points have materials of their own.
     pub fn opacity_of(&self, object: &SceneObject) -> f64 {
         let of_material = if object.materials.is_empty() { self.materials[object.material].opacity } else { 1.0 };
         object.opacity.unwrap_or(of_material)

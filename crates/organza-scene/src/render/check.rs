@@ -210,7 +210,7 @@ fn check_sheets(at: &At<'_>, raw: &RawSheets) -> Result<SheetsSettings, Error> {
         Some(Auto::Number(x)) => Some(at.length("slab_width", x)?),
     };
     let extent = at.number("kernel_extent", raw.kernel_extent.unwrap_or(2.0), 0.5..=8.0)?;
-    // As far from the rim as the default's, where only the extent is given.
+    // A scene that states the extent alone keeps the default's ratio of deviation to extent.
     let sigma = at.number("kernel_sigma", raw.kernel_sigma.unwrap_or(0.35 * extent), 0.125 * extent..=extent)?;
     let reconstruction = check_reconstruction(at, raw)?;
     Ok(SheetsSettings {
@@ -234,7 +234,7 @@ fn check_sheets(at: &At<'_>, raw: &RawSheets) -> Result<SheetsSettings, Error> {
     })
 }
 
-/// How slabs get their values: what gathering has not is refused beside it.
+/// Returns how slabs get their values. Keys that gathering ignores are refused beside it.
 fn check_reconstruction(at: &At<'_>, raw: &RawSheets) -> Result<Reconstruction, Error> {
     let splatted = [
         ("kernel_extent", raw.kernel_extent.is_some(), "their kernel has an extent of 2"),

@@ -18,7 +18,7 @@ pub struct Appearance {
     pub radius: f32,
     /// Share of the shadow that is received, in \[0, 1\].
     pub shadow_coefficient: f32,
-    /// A power of two, times which the colours of its particles are: for objects whose colours do not lie between 2⁻²⁴ and 65408.
+    /// A power of two by which the stored colours of its particles are multiplied, for colours outside of 2⁻²⁴ to 65408.
     pub color_unit: f32,
 }
 

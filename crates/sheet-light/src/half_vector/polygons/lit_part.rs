@@ -1,7 +1,7 @@
 //! Partial slabs for the light: of a ray's part in a slab, what polygons let light come to (section 4.1, Figure 7).
 //!
-//! Only that scatters light: of τ·∫₀¹ e^(−τx)·… dx the parts from a to b are left, each a ray's part of its own behind the optical depth
-//! τ·a, and what they have is weighed by the opacity of the whole.
+//! Only lit parts scatter. Of τ·∫₀¹ e^(−τx)·… dx keep the intervals [a, b] that are lit. Treat each as a ray of its own behind the optical
+//! depth τ·a, and weigh its result by the opacity of the whole ray.
 
 use super::light_depth::LightDepths;
 use super::lit_way::{MOST_PARTS, WayPart};

@@ -6,8 +6,8 @@
 //! u = ½ + d·across/w,  v = ½ + d·down/w.
 //!
 //! The frame around the picture lets nothing through, and nothing shines backwards, w ≤ 0. Between centres of texels look-ups are
-//! bilinear; at the border the last texel goes on to the edge. A receiver of deviation σ sees a mean: coarser pictures, each of half as
-//! many texels a side as the one before, are means over areas, and of two of them, of which the texels are 2σ wide, it sees a blend.
+//! bilinear; at the border the last texel goes on to the edge. A receiver of deviation σ sees a mean.
+//! It blends the two levels of an image pyramid (each of half as many texels a side) whose texels are nearest to 2σ.
 
 use super::LightShape;
 use crate::shapes::image_levels::{Border, ImageLevels};
