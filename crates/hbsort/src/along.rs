@@ -1,7 +1,7 @@
 //! Slices along any direction: distances along an axis in the place of view depths.
 //!
-//! Sweeps through a cloud across another direction than the view's, such as sheets across the bisector of view and light,
-//! need the same slices: the same integer index, the same two levels, the same exact order. Nothing is culled.
+//! Sweeps of a cloud along another axis than the view, such as sheets across the bisector of view and light,
+//! need the same slices: the same integer index, the same two levels, the same exact order. No splat is culled.
 
 use crate::project::{CULLED, Extremes};
 use crate::scratch::CHUNK;

@@ -1,4 +1,4 @@
-//! Orders to compare with: one comparison sort by centres, as most splatters have it, and none.
+//! Orders to compare with: one comparison sort by centres, as in most splatters, and no sort.
 
 use splat_core::glam::Vec3;
 use splat_core::{Camera, Cloud, SliceOrder};

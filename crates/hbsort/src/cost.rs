@@ -1,4 +1,4 @@
-//! Predicted work and memory of a sort, from its size alone; tests hold them against what is measured.
+//! Predicted work and memory of a sort, from its size alone; tests compare them with measured ones.
 
 use crate::depth_bits::{DIGITS, MOST_PASSES, leaf_capacity};
 use crate::ranges::{BINS, SAMPLERS, bucket_count};

@@ -1,8 +1,8 @@
 //! Whether most splats crowd into one first-level bucket of equal slices.
 //!
 //! A single thread sorts such a bucket, and the bucket's part of the result may outgrow the cache. The ranges of the
-//! order by depth bits hold about as many splats each, whatever the depths are, so a crowd is ordered by them: a finer
-//! order than slices ask for, in parallel. The answer depends on the depths alone, never on the number of threads.
+//! order by depth bits hold about as many splats each, whatever the depths are. So a crowd is ordered by them: in parallel, and
+//! finer than slices need. The answer depends on the depths alone, never on the number of threads.
 
 use crate::slicing::Slicing;
 

@@ -1,4 +1,4 @@
-//! Errors of the sort: parameters out of range, depths that are no numbers, too many splats, no memory.
+//! Errors of the sort: parameters out of range, depths that are not finite, too many splats, no memory.
 
 use splat_core::{Exceeded, glam::DVec3};
 

@@ -1,22 +1,22 @@
 //! The sort as a recording: cull and project, move the kept together, four passes of a stable radix sort.
 //!
 //! The order is that of [`crate::slice_cloud`] with [`Params::exact`], bit for bit: (slice, depth, id) is (depth, id),
-//! for the slice is a monotone function of the depth; depths come from the same products and sums, each rounded by
-//! itself; and every pass of the radix sort keeps equal digits in their order. Each pass counts digits per block of
+//! because the slice is a monotone function of the depth. Depths come from the same products and sums, each rounded by
+//! itself, and every pass of the radix sort keeps equal digits in their order. Each pass counts digits per block of
 //! 2048 splats, scans the counts (reduce, spine, apply) and scatters; no workgroup waits for another.
 //!
 //! Deviation from Gunjee 2007, section 4.2: no buckets of slices. A radix sort moves the same bytes for any ε, and the
 //! slices are cut from the sorted depths when they are read back.
 //!
-//! A device's kernels see so many bytes of a buffer and no more ([`Capacities::most_splats`]). Beyond, parts are sorted
-//! one after the other ([`Recorded::sorted`]) and joined on the host ([`join`]): the same order, bit for bit.
+//! A device limits how many bytes of a buffer its kernels can see ([`Capacities::most_splats`]). More splats are sorted in parts,
+//! one after the other ([`Recorded::sorted`]), and joined on the host ([`join`]): the same order, bit for bit.
 //!
 //! ```
 //! use hbsort::gpu::{Capacities, record};
 //!
 //! let recorded = record(Capacities { splats: 1_000_000, kept: 400_000 });
 //! recorded.recording.check().unwrap();
-//! // 20 bytes a splat come in and its key takes 4; what is kept goes to and fro between two tables of 8 bytes an entry.
+//! // A splat has 20 bytes of input and a key of 4; kept splats move to and fro between two tables of 8 bytes an entry.
 //! assert_eq!(recorded.recording.bytes() / 1_000_000, 30);
 //! ```
 

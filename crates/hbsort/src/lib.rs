@@ -1,7 +1,7 @@
 //! HBS, hierarchical bucket sort: slices of translucent splats in linear time.
 //!
-//! Translucent splats must be composited in the order of their depth, but splats closer together than the smallest of
-//! them is large may be composited in any order. So they are not sorted but sliced: Z. Gunjee et al., *Point Splatting
+//! Translucent splats must be composited in the order of their depth. Splats whose depths differ by less than the size of the smallest
+//! splat may be composited in any order. So they are sliced, and sorted within slices only if [`Params::exact`] is set: Z. Gunjee et al., *Point Splatting
 //! Based on Translucent Shadow Mapping and Hierarchical Bucket Sorting*, 2007, section 4.2, Eqs. 10-13, Figures 8-9.
 //!
 //! | symbol | here |

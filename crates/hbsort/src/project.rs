@@ -2,9 +2,9 @@
 //!
 //! A splat is the sphere of its cutoff radius r around its view position (x, y, z); of an elliptical disc r is the
 //! longer semi-axis. It is kept when z > −r and |x|·c − z·s − h ≤ r, the same for y: (c, s, h) = (cos φ, sin φ, 0) for
-//! a pinhole with half angle φ, (1, 0, half extent) for parallel rays; behind the eye with |z|, for the mirror image there of
-//! a pixel's ray passes such a splat, and a renderer counts the share of it that lies before the eye plane. Beyond the paper,
-//! which tests centres alone: a splat whose centre lies outside may still reach into the image.
+//! a pinhole with half angle φ, (1, 0, half extent) for parallel rays. Behind the eye the test takes |z|: the mirror image of
+//! a pixel's ray passes such a splat, and a renderer counts the share of it that lies before the eye plane. The paper
+//! tests centres alone, but a splat whose centre lies outside may still reach into the image.
 
 use crate::scratch::CHUNK;
 use glam::Vec3;

@@ -2,7 +2,7 @@
 //!
 //! Keys are the f32 bits of the depth, so a range adapts to near 1e-5 beside far 1e7, where slices of equal thickness
 //! do not (HARD_CASES BS4). Every eighth splat is counted in equal ranges ("bins") of the key; consecutive bins are
-//! joined. Which ranges come out changes the speed alone: any monotone map sorts.
+//! joined. The choice of ranges affects only the speed, because any monotone map sorts.
 
 use crate::first_level::{MOST_BUCKETS, distribute_chunk};
 use crate::scratch::CHUNK;

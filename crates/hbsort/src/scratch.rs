@@ -1,4 +1,4 @@
-//! Buffers that live from one sort to the next, and what the last sort did.
+//! Buffers that live from one sort to the next, and facts about the last sort.
 
 use crate::Error;
 use splat_core::{Exceeded, SliceOrder};

@@ -1,8 +1,8 @@
 //! The slice thickness ε from the splat radii.
 //!
 //! The paper takes the smallest size of all points (section 4.2, at the example of Figure 1). A single tiny splat
-//! among millions would then require millions of empty slices. So where the smallest radius asks for more than 2¹⁶
-//! slices and is less than a quarter of the first percentile, the percentile is taken.
+//! among millions would then require millions of empty slices. So the first percentile of the radii is used instead, if the smallest
+//! radius needs more than 2¹⁶ slices and is less than a quarter of that percentile.
 
 use crate::scratch::{CHUNK, ThicknessRule};
 use rayon::prelude::*;

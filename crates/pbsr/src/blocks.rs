@@ -1,7 +1,7 @@
 //! Elements (triangles, cells, splats) of given rates, in blocks, each block with an alias table (Walker; Vose).
 //!
 //! A Poisson process on many elements is the sum of one on each block; within a block, each arrival picks its element by
-//! rate. A block's tables and the data of its elements stay in the nearest cache, and no set ever visits an element that
+//! rate. A block's tables and the data of its elements stay in the first-level cache, and no set ever visits an element that
 //! gets no particle. Rates are summed in f64; one look-up resolves shares of 2⁻³² of a block.
 
 use crate::Error;

@@ -2,7 +2,7 @@
 //!
 //! Each set adds at most one hit a pixel: 1 to a u32, each channel to an i64 as a multiple of unit·2⁻²⁴, its square to a
 //! u64. Integer sums depend on no order, so any number of threads, any split into batches and any resumed run gives the
-//! same bits; what does depend on the order of the sets ([`crate::ensemble::depths`]) gets them in order.
+//! same bits. The distribution of depths ([`crate::ensemble::depths`]) does depend on the order of the sets, and gets them in order.
 //!
 //! Where extinction differs by channel, a set has at most one hit a pixel and channel, and hits are counted by channel.
 

@@ -1,18 +1,18 @@
 //! Projection and ensemble average as a recording: sets of particles, one level after the other, that were uploaded, or made
 //! on the device (`generate.rs`).
 //!
-//! A level is four dispatches: the depth buffer is cleared; each particle lowers the nearest depth of the pixels it
-//! reaches; among the particles at that depth one wins, by a permutation of the particles that is another for each pixel
-//! and set; the winner adds hit, colour and square of luminance. Where a device takes the least of 64 bits, depth and place
-//! in the permutation are one number and a level is two: particles lower it, and each pixel adds whom it names
-//! ([`Nearest`]). Sums are the integers of [`Ensemble`], in its own order
-//! of pixels, so what comes back is added to an ensemble as sets that the CPU folded are.
+//! A level is four dispatches. The depth buffer is cleared. Each particle lowers the nearest depth of the pixels it
+//! reaches. Among the particles at that depth one wins, by a permutation of the particles that differs for each pixel
+//! and set. The winner adds hit, colour and square of luminance. If a device has 64-bit atomic minima, depth and place
+//! in the permutation are one number and a level is two dispatches: particles lower the number, and each pixel adds the particle
+//! that it names ([`Nearest`]). Sums are the integers of [`Ensemble`], in its own order
+//! of pixels, so sums that are read back are added to an ensemble like sets that the CPU folded.
 //!
-//! Where something is lit, or more is kept than beauty, who is seen is listed and shaded before it adds (`lit.rs`).
+//! If particles are lit, or layers beside beauty are kept, the visible particles are listed and shaded before they are added (`lit.rs`).
 //!
-//! Deviations from the CPU: equals are ordered by another permutation, which is as fair; k takes a square root and a
-//! division that a GPU may round otherwise, so a particle in a million is thinned out on one side alone. Depths, objects and
-//! extinction by channel are the CPU's.
+//! Deviations from the CPU: particles of equal depth are ordered by another permutation, which is as fair. k takes a square root
+//! and a division that a GPU may round otherwise, so a particle in a million is thinned out on one side alone. Depths, objects and
+//! extinction by channel are left to the CPU.
 
 mod generate;
 mod lit;

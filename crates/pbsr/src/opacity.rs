@@ -10,7 +10,7 @@
 //! | q | probability that one particle falls on the pixel |
 //! | τ | optical depth −ln(1 − α) |
 //!
-//! The paper prints s/S cos θ; read from left to right, the opacity would fall at grazing angles. Meant is s/(S cos θ).
+//! The paper prints s/S cos θ. Read from left to right, the opacity would fall at grazing angles; it means s/(S cos θ).
 //! A fractional n becomes a whole number in each set by a rounding that keeps the **opacity** in the mean, not the
 //! number: with m + 1 particles in the share f = (1 − (1 − q)^frac)/q of the sets and m in the others,
 //! E\[(1 − q)^n\] = (1 − q)^m·(1 − f·q) = (1 − q)^(m + frac).

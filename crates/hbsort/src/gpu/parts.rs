@@ -1,4 +1,4 @@
-//! Orders of parts of a cloud, made one: for more splats than a device's kernels can see in one buffer.
+//! Merges the orders of parts of a cloud, for more splats than a device's kernels can see in one buffer.
 //!
 //! A part is a run of the ids. Parts are sorted one after the other by one recording, and merged here by (depth, id),
 //! which no two splats share: the result is that of all splats at once, however they were cut.

@@ -1,8 +1,8 @@
 //! An ensemble as bytes and back, exactly: a resumed render ends in the same bits as one that never stopped.
 //!
 //! Layout, little endian: `PBSR`, version, tag (32 bytes, the caller's: a hash of scene and parameters), width, height,
-//! flags, radiance unit, depth range, levels, hits, sums, squares, depths, objects, what tells channels apart, CRC-32 of all
-//! before.
+//! flags, radiance unit, depth range, levels, hits, sums, squares, depths, objects, sums by channel if extinction differs by
+//! channel, CRC-32 of all bytes before it.
 
 use crate::ensemble::depths::DepthSum;
 use crate::ensemble::{Apart, Ensemble, EnsembleParams, NearestObject};

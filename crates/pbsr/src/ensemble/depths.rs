@@ -1,20 +1,20 @@
 //! The distribution of the depths of one pixel's hits: moments, median and first passage, in memory that does not grow with
 //! the number of sets.
 //!
-//! A ray ends at its nearest particle, so over the sets the depths of the hits are samples of where light is absorbed, sets
-//! without a hit are light that passes, and what an occluder hides ends at its depth. Of L sets
+//! A ray ends at its nearest particle. So over the sets the depths of the hits are samples of the depth of absorption, and sets
+//! without a hit are light that passes. Behind an occluder nothing is sampled: the ray ends at its depth. Of L sets
 //!
 //! - mean and deviation are those of the samples, in steps of a millionth of the depth range: standard error σ/√n for n
 //!   hits;
 //! - the median, where T = 1/2, is the sample of rank L/2: standard error 1/(2·p·√L), p the density of depth there;
-//! - the first depth, where the opacity passes a = 1/255, is that which the nearest hit of a block of m sets lies before
-//!   in every other block: 1 − (1 − a)^m = 1/2 for m = 176.4. So it is the median of the nearest hits of blocks of
+//! - the first depth is the depth at which the opacity passes a = 1/255. Half of all blocks of m sets have their nearest hit
+//!   before it, if 1 − (1 − a)^m = 1/2, so m = 176.4. So it is the median of the nearest hits of blocks of
 //!   [`BLOCK`] sets: standard error a/√(0.69·a·L)/p, and a bias below that over √(number of blocks). Before one block is whole, it is the nearest hit so far.
 //!
 //! A rank is found in [`Span`]s: disjoint ranges of depth with the number of samples in each. A sample between all spans
-//! begins one of its own, and when there are too many the two neighbours with the least (samples × length) become one, those far from the wanted rank first. So
-//! the rank of each end is exact, a surface is a span without length, a gap stays empty, and only inside of a span
-//! the density of the samples is taken as linear, from their mean. (A streaming histogram after Y. Ben-Haim and E. Tom-Tov: *A Streaming Parallel
+//! begins a new span. When there are too many spans, the two neighbours with the least (samples × length) are merged, first those far from the requested rank. So
+//! the rank of each end is exact, a surface is a span without length, and a gap stays empty. Only inside of a span
+//! the density of the samples is assumed to be linear, from their mean. (A streaming histogram after Y. Ben-Haim and E. Tom-Tov: *A Streaming Parallel
 //! Decision Tree Algorithm*, JMLR 11, 2010, with ranges in place of points.)
 //!
 //! Spans depend on the order of the samples, which is that of the sets, for any number of threads and any batches.

@@ -2,10 +2,10 @@
 //!
 //! The value of a pixel in one set is a random variable; its mean is the picture, and
 //!
-//! standard error = √((Σy²/L − (Σy/L)²)/(L − 1)), y the luminance with what lies behind.
+//! standard error = √((Σy²/L − (Σy/L)²)/(L − 1)), y the luminance, background included.
 //!
 //! Where extinction differs by channel, y = h + Σ wᵢ·bᵢ over the channels i that the set leaves open, h the luminance of its
-//! hits, b what lies behind and w the weights of luminance. So with nᵢ sets that leave i open and nᵢⱼ that leave both open
+//! hits, b the background and w the weights of luminance. So with nᵢ sets that leave i open and nᵢⱼ that leave both open
 //!
 //! Σy² = Σh² + 2·Σᵢ wᵢbᵢ·(Σ h of the sets that leave i open) + Σᵢ wᵢ²bᵢ²·nᵢ + 2·Σ_{i<j} wᵢbᵢ·wⱼbⱼ·nᵢⱼ.
 

@@ -1,4 +1,4 @@
-//! An ensemble as a segment of a picture: means over the sets as what splats would leave in an accumulator.
+//! An ensemble as a segment of a picture: means over the sets, in the form that splats leave in an accumulator.
 
 use crate::Ensemble;
 use splat_core::raster::OpaqueImage;

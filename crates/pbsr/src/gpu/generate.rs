@@ -1,12 +1,12 @@
 //! Sets that the device makes itself, and folds: nothing of a set is uploaded, and none leaves the device.
 //!
-//! Each chunk of each set draws its Poisson number from its own counter; volumes count what stays of their arrivals; one
-//! scan over the chunks of all sets, objects and levels gives every particle its place, which is the one that it has among
-//! uploaded ones. Then each chunk is made by a workgroup, and the projection of uploaded sets goes on from there. Particles of
-//! samplers that have no twin are given run by run: their numbers are counts like those of chunks, and they move to their places.
+//! Each chunk of each set draws its Poisson number from its own counter. Volumes count the arrivals that thinning keeps. One
+//! scan over the chunks of all sets, objects and levels gives every particle its place, the same as among
+//! uploaded particles. Then a workgroup makes each chunk, and projection continues as for uploaded sets. Particles of
+//! samplers that have no twin are uploaded run by run: a run counts like a chunk, and its particles move to their places.
 //!
-//! Deviations from the CPU: a Poisson number takes logarithms in 32 bits, so in some chunks of 10⁵ it is another by one; a
-//! place takes products and sums alone and has the CPU's bits, a normal and a colour are at most one step off.
+//! Deviations from the CPU: a Poisson number takes logarithms in 32 bits, so in some chunks of 10⁵ it differs by one. A
+//! place takes products and sums alone and has the CPU's bits. A normal and a colour are at most one step off.
 
 use super::twin::{Maker, Sources, halves};
 use super::{Capacities, Lighting, Lit, Nearest, PARTICLE_WORDS, Recorded, record, room, sample, take_in};

@@ -1,15 +1,15 @@
-//! Light on what is seen: shaded as splats are (`splat_core::shade::gpu`), with whatever says how much of each light arrives.
+//! Light on visible particles: they are shaded as splats are (`splat_core::shade::gpu`), with the look-ups of each shadow map.
 //!
-//! A level first finds who is seen, as without light; those alone are listed, one a pixel, in the words of splats, and go
-//! through the recorded look-ups of each shadow map and through shading, over as many workgroups as were listed. The
-//! radiance is added at their pixels, so that the order of the list changes nothing. Large images go in parts, which bounds
-//! what a level takes.
+//! A level first finds the visible particles, as without light. They alone are listed, one a pixel, in the layout of splats. The
+//! list goes through the recorded look-ups of each shadow map and through shading, with as many workgroups as it needs. The
+//! radiance is added at their pixels, so the order of the list changes nothing. Large images are divided into parts, which bounds
+//! the memory of a level.
 //!
 //! Places are those of the CPU: within a pixel in steps of 1/256, relative to the eye and in the world's axes, so that a scene
 //! far from its origin keeps its digits.
 //!
-//! Deviations from the CPU: a particle that covers several pixels takes another place by chance in each; radiances agree
-//! within what shading and look-ups promise.
+//! Deviations from the CPU: a particle that covers several pixels has a place in each that is drawn anew. Radiances agree
+//! within the tolerances of shading and look-ups.
 
 use super::{BLOCK, Capacities, Inputs};
 use crate::{Ensemble, EnsembleParams, Error, Scene};

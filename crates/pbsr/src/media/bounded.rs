@@ -1,6 +1,6 @@
-//! A density as a field of extinction that is never negative and whose bounds are known, cell by cell, beforehand.
+//! A density as a field of extinction that is never negative, with bounds that are computed once for each cell.
 //!
-//! Particles are thinned out by value over bound, and ask for the bound of their cell each time: it is looked up.
+//! Each particle is kept with probability value/bound and needs the bound of its cell, so bounds are kept in a table.
 
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;

@@ -2,10 +2,10 @@
 //!
 //! A chain at x is offered, in turns, a uniform place of all cells with extinction and one within a cell's length of x; it
 //! goes there with probability min(1, σ(x')/σ(x)). Both offers are symmetric, so places have the density σ/∫σ dV, and a
-//! set gets a Poisson number of them of mean ∫σ dV/s. Cells at the border are longer (`places.rs`): chains go through cells
-//! as if all were alike, by σ times the volume of the cell.
+//! set gets a Poisson number of them of mean ∫σ dV/s. Cells at the border are longer (`places.rs`): chains move among cells
+//! as if these were of equal size, by σ times the volume of the cell.
 //!
-//! Where a density is given, each particle is kept with its share of the density's greatest, as exact thinning has it.
+//! With a density, each particle is kept with probability density/greatest density, which is exact thinning.
 //!
 //! The method of the literature, kept for comparison. Cell by cell ([`GridSampler`]) is faster and exact; here ∫σ dV is a
 //! sum over two Gauss points an axis of each cell, a chain starts with the density σ_max of its cell rather than σ, and a

@@ -1,4 +1,4 @@
-//! A transfer function in pieces between its points, with what is divided once.
+//! A transfer function in pieces between its points; quotients are computed once.
 
 use splat_core::{TransferFunction, TransferPoint};
 

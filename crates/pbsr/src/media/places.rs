@@ -1,9 +1,9 @@
 //! Places of particles in the cells of a grid, with value and gradient there, in lanes.
 //!
 //! A volume is made of voxels, each around its lattice point: n points along an axis span n steps. Cells lie between
-//! lattice points, and those at the border have the half steps beyond it too, where the value is the border's. So along an
-//! axis a cell reaches from 0, or −½ for the first one, to 1, or 1½ for the last one; where there is one lattice point
-//! alone, from −½ to ½.
+//! lattice points. Cells at the border include the half steps beyond it too, where the value is the border's. So along an
+//! axis a cell reaches from 0 (−½ for the first cell) to 1 (1½ for the last cell). An axis with a single lattice point
+//! has one cell, from −½ to ½.
 
 use crate::blocks::BATCH;
 use crate::stream::triple;

@@ -3,7 +3,7 @@
 //! A splat of cross-section K gets K/s particles in the mean, distributed as its kernel, so that a pixel at u from its
 //! centre sees K/s·s·w(u) = τ(u) of them: the optical depth of the splat along that ray.
 //!
-//! Where in the kernel, tables say (`radial.rs`): a uniform point of the ball or disc, found by rejection, is moved along its
+//! Tables give the place in the kernel (`radial.rs`): a uniform point of the ball or disc, found by rejection, is moved along its
 //! radius. A device does the same, in products and sums alone.
 
 use crate::blocks::{Batch, Blocks};

@@ -1,7 +1,7 @@
-//! Projected particles of one task, sorted by tile: a counting sort of a few thousand records in the nearest cache.
+//! Projected particles of one task, sorted by tile: a counting sort of a few thousand records in the first-level cache.
 //!
-//! Blocks of particles are projected in lanes, down to the tile. Those that are not kept are not picked out: they go to a
-//! tile of their own, behind all others.
+//! Blocks of particles are projected in lanes, down to the tile. Particles that are thinned out go to an extra
+//! tile behind all others, which costs less than to remove them from their lanes.
 
 use crate::project::tiles::{Tiling, place};
 use crate::project::{BLOCK, EVERYWHERE, Footing, Projector, View};

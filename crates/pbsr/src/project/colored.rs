@@ -1,7 +1,7 @@
-//! STEP 2, second half, where red, green and blue are hidden apart: three depth buffers for one set of particles.
+//! STEP 2, second half, if extinction differs by channel: three depth buffers for one set of particles.
 //!
 //! An object of extinction κ has the particles of its largest channel. Each hides channel c with probability κ_c/κ_max, by
-//! a number of its own. A Poisson process thinned out is Poisson, so in channel c the object is what it would be by
+//! a separate random number. A thinned Poisson process is Poisson, so in channel c the object is as if drawn with
 //! particles of κ_c alone: transmittance e^(−τ_c), without bias. A channel shows the nearest particle that hides it; a
 //! particle is shaded once for all channels that show it.
 

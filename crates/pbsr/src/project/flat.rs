@@ -1,7 +1,7 @@
-//! Particles that are shown as they are: their colours become sums in lanes, without shading.
+//! Unlit particles: their colours are summed in lanes, without shading.
 //!
-//! A tile has sums of its own, one row of 32 bytes a pixel, for at most [`SETS`] sets: so few that nothing overflows, so
-//! small that all stay in the second cache. Then they go to the ensemble, pixel after pixel, which memory likes better
+//! A tile has separate sums, one row of 32 bytes a pixel, for at most [`SETS`] sets. This limit excludes overflow and keeps
+//! the sums in the second-level cache. Then they are added to the ensemble, pixel after pixel, because that order uses memory better
 //! than hit after hit. The sums are those of [`TileSums::add`] to the bit.
 
 use crate::PackedColor;

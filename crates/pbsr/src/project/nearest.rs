@@ -1,4 +1,4 @@
-//! STEP 2, second half: the depth buffer of one tile (Tanaka 2012, section 2). Of the particles on a pixel the nearest is seen.
+//! STEP 2, second half: the depth buffer of one tile (Tanaka 2012, section 2). Each pixel shows its nearest particle.
 
 use crate::PackedColor;
 use crate::ensemble::TileSums;

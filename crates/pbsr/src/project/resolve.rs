@@ -1,4 +1,4 @@
-//! What every tile reads when its particles become pixels: the plan of a fold, its tasks, and the light on what is seen.
+//! Inputs of every tile when its particles become pixels: the plan of a fold, its tasks, and the light on visible particles.
 
 use crate::ensemble::Ensemble;
 use crate::error::check;

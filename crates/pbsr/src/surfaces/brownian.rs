@@ -2,7 +2,7 @@
 //!
 //! The number of particles comes from 100 counting spheres: balls of radius ρ around random places of the surface, in which
 //! a pilot run leaves n of its N₀ particles in the mean. The surface in such a ball has the area πρ² (exactly so on a
-//! sphere), so the whole has N₀·πρ²/n, and a set of N = N₀·πρ²/n·τ/s particles the wanted opacity.
+//! sphere). So the whole surface has N₀·πρ²/n, and a set of N = N₀·πρ²/n·τ/s particles has the requested opacity.
 //!
 //! Deviations from the paper:
 //! - Many short walks in place of one. Relaxation over a surface of width 1 takes 1/(2dt) steps, 10⁴ at √(2dt) = 0.01;

@@ -1,7 +1,7 @@
 //! Implicit surfaces f = c inside a box (Tanaka 2012, section 4), and the cells of the box that may hold a piece of them.
 //!
 //! The box is parted into cubes; an octree over them drops every cube where the field's `bound` over the ball around it
-//! excludes c. Where a field knows no bound, nothing is dropped, and whatever follows from it is reported as unproven.
+//! excludes c. If a field has no bound, no cube is dropped, and all results are reported as unproven.
 
 use crate::Error;
 use crate::error::check;

@@ -11,9 +11,8 @@
 //!
 //! A cube counts as a graph when the gradient at its corners, at places inside and on the face's points of the surface
 //! differs by less than [`TURN`] from that in the middle, so that f rises or falls along all its lines. With as steady a
-//! gradient, a cube at whose corners f is clearly on one side of c is empty. A cube that is neither, or is not well enough
-//! given by its graph, is divided; where there are
-//! too many already, it is left open: its lines are searched for all roots.
+//! gradient, a cube at whose corners f is clearly on one side of c is empty. A cube that is neither, or whose graph is not
+//! accurate enough, is divided. If there are too many cubes already, it is left open: its lines are searched for all roots.
 
 use crate::surfaces::implicit::{Cells, ImplicitSurface};
 use glam::{DMat3, DVec3};

@@ -18,7 +18,7 @@
 //! which is Tanaka 2012, Eq. 1, for n → ∞ at fixed n·s/S. The number of crossings is random. A cut to a fixed n would thin
 //! sets with many crossings, and α would depend on the rest of the surface.
 //!
-//! Where the field has no bound, or a fold finer than the places where a cube was looked at, pieces may be missed;
+//! Pieces may be missed if the field has no bound, or has folds finer than the samples of a cube.
 //! [`LineReport`] counts the lines of a sample that gain roots when they are searched 16 times as finely, and the surface
 //! that a sample of lines meets in cubes that were taken for empty.
 
