@@ -8,9 +8,9 @@
 //! | volume | cells with extinction; where steps are split voxels with extinction, times the factors | where none is split |
 //! | zero set | 2·A/h², A from a mesh of 48 cells a side | within some ten percent |
 //! | density, procedural cloud | lattice points times the share of a coarse lattice that is above zero | within some percent |
-//! | box, ball, parallelogram | cells, those that a cut leaves; of a ball π/6 of all | yes; a ball within some percent, one that is cut at most |
+//! | box, ball, parallelogram | cells that a cut leaves; for a ball π/6 of all | yes; a ball within some percent, a cut ball at most |
 //!
-//! `at_most` holds always: memory that is not to be exceeded is planned with it.
+//! `at_most` is an upper bound in every case; limits of memory are planned with it.
 
 use crate::common::columns::ColumnSet;
 use crate::field_points::{area, coarse_mesh, density_lattice, surface_lattice, surface_spacing};

@@ -1,4 +1,4 @@
-//! Triangles become discs, and what is done to triangles before: cut, closed again, divided.
+//! Triangles become discs. Before that they may be cut, closed again and divided.
 
 pub(crate) mod borders;
 pub(crate) mod clipped_mesh;

@@ -1,4 +1,4 @@
-//! Volumes and homogeneous bodies become media, and what is done to volumes before: gaps, resampling, sections.
+//! Volumes and homogeneous bodies become media. Before that volumes may have gaps filled, be resampled, or be cut by sections.
 
 pub(crate) mod body_centred;
 pub(crate) mod bricks;

@@ -1,11 +1,11 @@
-//! Bumps: noise or an image as heights over a surface, whose slope tilts the normal that light falls on (Blinn 1978), not the surface.
+//! Bumps: noise or an image as heights over a surface. Their slope tilts the shading normal (Blinn 1978), not the surface.
 //!
 //! h(p) = H·Σ N(2ᵏp/s)/2ᵏ, k < octaves, N the gradient noise of Perlin (2002) in the object's own space, so that bumps move with it, and
 //! n′ ∝ n − (∇h − (n·∇h)·n).
 //!
-//! An image is laid on the object from its six sides, whatever shape it has, and weighs by the fourth power of the cosine between normal and
-//! axis on each: where a surface faces an axis it shows that side's image alone, on a bend it blends them. Seen from a side across, +Y of the
-//! object is up in the image; from +Y, −Z is, and from −Y, +Z. Its lower left corner lies at the object's origin.
+//! An image is projected onto the object from six sides. Each side is weighed by the fourth power of the cosine between normal and
+//! axis: a surface that faces an axis shows that side's image alone, and a bend blends several. Seen from ±X and ±Z, +Y of the
+//! object is up in the image; seen from +Y, −Z is up, and seen from −Y, +Z. Its lower left corner lies at the object's origin.
 
 use splat_core::glam::{DVec3, IVec3};
 use splat_core::{Bump, HeightImage, rng};

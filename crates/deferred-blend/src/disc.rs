@@ -7,8 +7,8 @@
 //! (c_z/N)·(m·(e·a) − (N − m)·(c·a)/c_z)/|a|² along a, with m = n·c/c_z and N = n·d = m + n·e,
 //!
 //! and likewise along b. Numerators and N are linear in (dx, dy), and the numerators vanish at the centre, so nothing cancels in
-//! f32; no number is divided by m, which is 0 for a disc that is seen edge-on. Of a disc that reaches through the eye plane the
-//! image's middle takes the place of the centre: there both numerators have a constant, (n·c)·a_z − (a·c)·n_z over |a|². Parallel
+//! f32. No number is divided by m, which is 0 for a disc that is seen edge-on. For a disc that reaches through the eye plane the
+//! image's middle replaces the centre: there both numerators have a constant, (n·c)·a_z − (a·c)·n_z over |a|². Parallel
 //! rays have N = n_z everywhere and a depth that is linear in (dx, dy).
 
 use crate::Params;

@@ -1,7 +1,7 @@
 //! The paper's transparency, for comparison with layers that gaps separate: groups of discs, depths floored to steps (section 5.2).
 //!
-//! In a group discs do not overlap on a surface, so of each layer a pixel meets one, or none. Of two that it meets in one step of depth the
-//! farther one was drawn first, and the nearer fails the depth test: it is in the way of nothing, but shows nothing either. A surface
+//! In a group discs do not overlap on a surface, so a pixel meets at most one disc of each layer. If it meets two in one step of depth,
+//! the farther disc was drawn first and the nearer one fails the depth test: it neither hides anything nor is seen. A surface
 //! that crosses the end of a step attenuates twice there.
 
 use crate::disc::Ray;

@@ -1,7 +1,7 @@
 //! Collects the fragments of each pixel: tiles of the image, blocks of a tile, pixels of a block.
 //!
-//! A block has 16 pixels, so its fragments fit into the nearest cache for any number of layers. Memory does not grow with the
-//! image times the number of discs at one place.
+//! A block has 16 pixels, so its fragments fit into the first-level cache for any number of layers. Memory does not grow with the
+//! number of pixels times the number of discs at one place.
 
 use crate::disc::{Disc, Discs, Meeting};
 use splat_core::raster::bins::Bins;

@@ -1,7 +1,7 @@
-//! Matter that surfaces bound: light is mirrored and bent where it meets them, and what is inside absorbs (section 5.2.3).
+//! Bodies of glass: their surfaces mirror and bend light, and their inside absorbs it (section 5.2.3).
 //!
 //! The paper counts the layers l of a pixel, bends the ray once, at the nearest, by η^l, and lets (1 − α)^l through (Eqs. 15 and 16).
-//! That is here as a mode. Otherwise the ray goes on from the nearest layer as light does, and meets what it meets.
+//! `Bending::Power` is that mode. In the others the ray continues from the nearest layer in its bent direction.
 
 use crate::cone::{Cone, onward};
 use crate::interface::cross;

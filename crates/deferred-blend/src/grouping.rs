@@ -2,14 +2,14 @@
 //!
 //! Discs that share a group are drawn into one image, so they should not overlap. Three methods separate them:
 //!
-//! | method | paper | number of groups K | overlap that is left |
+//! | method | paper | number of groups K | remaining overlap |
 //! |---|---|---|---|
 //! | [`minimum_coloring`] | section 4.1, MGC | found | none beyond the [`Relaxation`] of the graph |
 //! | [`weighted_coloring`] | section 4.2, WGC, Eqs. 6-8 | given | little |
 //! | [`hash_grouping`] | section 4.3, Eq. 9 | given | more, at a fraction of the time |
 //!
-//! The colourings work on an [`OverlapGraph`] (Eq. 5). Groups hold for every view. [`extended`] covers the surface by each group
-//! alone (section 4.4). A [`Recipe`] makes groups and their coverage in one go, a [`KeptGroups`] finds them again when an object has moved.
+//! The colourings work on an [`OverlapGraph`] (Eq. 5). Groups are valid for every view. [`extended`] makes each group cover the surface
+//! alone (section 4.4). A [`Recipe`] makes groups and their coverage in one step. [`KeptGroups`] finds them again after an object has moved.
 //!
 //! No method depends on the order of the cloud, on the number of threads, on the cloud's origin, or on a scale by a power of two:
 //! ties are broken by the canonical order of the cloud ([`Cloud::canonical_order`](splat_core::Cloud::canonical_order)).

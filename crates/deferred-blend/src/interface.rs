@@ -1,4 +1,4 @@
-//! Light at an interface: a part is mirrored, the rest goes on in another direction (section 5.2.3).
+//! Light at an interface: a part is mirrored, the rest is refracted (section 5.2.3).
 
 use splat_core::glam::Vec3;
 

@@ -3,16 +3,16 @@
 //!
 //! | passes | over the discs | over the image |
 //! |---|---|---|
-//! | 1+1 | each group keeps the nearest disc of a pixel | those of all groups that nothing hides are averaged (Figs. 6 and 11) |
-//! | 2+1 | what the discs hide; then the sums over those that nothing hides | sums are divided by Σw |
+//! | 1+1 | each group keeps the nearest disc of a pixel | the discs of all groups that nothing hides are averaged (Figs. 6 and 11) |
+//! | 2+1 | the hiding depth; then the sums over discs that nothing hides | sums are divided by Σw |
 //!
 //! A disc whose core a ray meets at the depth z hides what lies behind z + ε. ε is [`Params::gap`] of the disc's radius across its plane,
 //! so it has no unit; where the disc is seen nearly edge-on, it is at most four times that along the ray. A pixel is the
-//! average by weight (Eq. 1) of all discs that nothing hides there; a rim that no core is near to, such as one over a silhouette, is not
+//! average by weight (Eq. 1) of all discs that nothing hides there. A rim without a core near it, such as a rim over a silhouette, is not
 //! seen. The core is [`Footprint::CORE`](splat_core::Footprint::CORE) of the cut-off radius, and ends where the surface does.
 //!
-//! The images of groups hold 16 pixels, those of a block, and only groups that a block meets are cleared and composited: neither
-//! time nor memory grows with the number of groups times the image.
+//! A group's image covers the 16 pixels of a block, and only groups that a block meets are cleared and composited. So neither
+//! time nor memory grows with the number of groups times the number of pixels.
 
 mod block;
 mod groups;

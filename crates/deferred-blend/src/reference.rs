@@ -1,4 +1,4 @@
-//! Every ray with every disc, in f64: slow, and what the rest is judged by. The reference shares the gap rule's
+//! Every ray with every disc, in f64: the slow form that tests compare with. The reference shares the gap rule's
 //! formula with [`blend`](crate::blend()), but neither code nor projection.
 
 mod opaque;

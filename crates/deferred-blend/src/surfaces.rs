@@ -1,4 +1,4 @@
-//! Discs as rays meet them that were bent or mirrored, and so come from elsewhere than the eye.
+//! Discs as bent or mirrored rays meet them, which do not start at the eye.
 
 use crate::DiscInput;
 use crate::cone::curvature;

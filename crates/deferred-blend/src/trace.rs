@@ -1,8 +1,8 @@
 //! Traces a ray within and between bodies of glass, from the nearest layer of a pixel on. At each surface the ray follows the larger
 //! part of its light. The smaller part takes the radiance of an unbent ray in its direction.
 //!
-//! Shares of light that pass and that are mirrored add up to 1 at every surface, so a world of one colour is that colour, whatever
-//! stands in it.
+//! The transmitted and the mirrored share add up to 1 at every surface. So in surroundings of one colour every ray has that colour, whatever
+//! bodies it meets.
 
 use crate::cone::{Cone, onward};
 use crate::glass::Glass;

@@ -2,8 +2,8 @@
 //!
 //! Numbers are interpolated between vertices, not colours: where the colours of a map between two vertices are not the mean of theirs, the edge is
 //! halved in all triangles that share it, until they are within [`TOLERANCE`]. Triangles with numbers of their own get vertices of their own, with the
-//! normals that these had. Between a class and another, and beside a vertex without a number, nothing is interpolated: such a triangle is parted into
-//! what lies nearest to each of its corners.
+//! normals that these had. Nothing is interpolated between two classes or beside a vertex without a number: such a triangle is divided into
+//! the regions nearest to each of its corners.
 
 use crate::color::color_by::colored_numbers;
 use crate::points::shown_points::said_of_colors;

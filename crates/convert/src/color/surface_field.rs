@@ -1,8 +1,8 @@
-//! A physical field that a surface shows where it lies: by its colour, and by how opaque it is (Tanaka 2012, section 5, has a dose
+//! A physical field that a surface shows at its points, by colour and opacity (Tanaka 2012, section 5, shows a dose
 //! beside the body that takes it; here it lies on the body's surface).
 //!
-//! Every splat has the value of the field at its centre, and of that the colour and the share of the surface's opacity that a
-//! transfer function says: α′ = α·share, so the optical depth of one crossing becomes τ′ = −ln(1 − α′), and K = τ′·a with the area
+//! Every splat takes the value of the field at its centre. A transfer function maps it to the colour and to a share of the surface's
+//! opacity, α′ = α·share. So the optical depth of one crossing becomes τ′ = −ln(1 − α′), and K = τ′·a with the area
 //! a that the splat stands for.
 
 use crate::common::columns::CHUNK;

@@ -1,8 +1,8 @@
 //! Cache of earlier conversions, in a folder: never required, and validated before use.
 //!
-//! A file is named after the SHA-256 of all that its content was made from, and holds that of the content itself. An entry of
-//! another length, another key or a wrong checksum is made again. Files appear whole, under their name, or not at all; those that
-//! were not used for longest go first where all together exceed the limit. Other files in the folder are not touched.
+//! A file is named after the SHA-256 of all inputs of its content, and holds the SHA-256 of the content itself. An entry of
+//! another length, another key or a wrong checksum is made again. Files appear whole, under their name, or not at all. If all together
+//! exceed the limit, the least recently used files are deleted first. Other files in the folder are not touched.
 
 use bytemuck::Pod;
 use sha2::{Digest, Sha256};

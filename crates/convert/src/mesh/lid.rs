@@ -1,12 +1,12 @@
 //! Lids of bodies that are cut open: the section of a closed mesh by a plane, as triangles that close it again.
 //!
-//! A clipped closed mesh has edges along the plane that belong to one triangle alone. Vertices at one place are one vertex here, so meshes whose
-//! triangles share nothing are closed too. These edges are outlines; where one of them ends, the mesh is open, and no lid would close it; gaps that
-//! are small beside the outline, as pinholes of scans leave, are bridged. The lid uses the vertices of the outlines, so no gap opens between lid and
+//! A clipped closed mesh has edges along the plane that belong to one triangle alone. Vertices at one place are merged, so meshes whose
+//! triangles share nothing are closed too. These edges form outlines. If an outline ends, the mesh is open, and no lid would close it. Gaps that
+//! are small beside the outline, such as pinholes of scans, are bridged. The lid uses the vertices of the outlines, so no gap opens between lid and
 //! walls.
 //!
-//! Inside is where outlines go around, once or more often: bodies of one mesh may overlap, and the wall of a cavity goes around the other
-//! way. Where triangles of a mesh disagree on which side is outside, inside is what an odd number of outlines surrounds.
+//! Points that outlines wind around, once or more often, are inside: bodies of one mesh may overlap, and the wall of a cavity goes around the other
+//! way. If triangles of a mesh disagree on which side is outside, points that an odd number of outlines surrounds are inside.
 
 mod fill;
 

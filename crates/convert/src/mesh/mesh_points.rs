@@ -5,8 +5,8 @@
 //! an opaque one. The discs of an object have the same radius R = cutoff·0.8·h. So Σ a·norm/R²·profile is a quadrature
 //! of ∫ norm/R²·profile dA = 1 over the surface: splitting finer or coarser leaves the transmittance alone.
 //!
-//! A mesh with opacities of vertices has on each piece α times what they interpolate to at its centroid; a piece of which 1 comes is an opaque
-//! disc. The optical depth follows from that product, without interpolation, so the opacity of the surface is that of its vertices.
+//! In a mesh with opacities of vertices, the opacity of a piece is α times their interpolated value at its centroid. A piece of opacity 1 is an
+//! opaque disc. The optical depth follows from that product, without interpolation, so the opacity of the surface is that of its vertices.
 //!
 //! Deviation from the paper: it gives each piece the opacity of the surface, which multiplies where discs overlap.
 

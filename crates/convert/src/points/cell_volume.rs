@@ -3,7 +3,7 @@
 //! Along a unit vector u the cell ends at t(u) = 1/max_j 2·(u·d_j)/|d_j|², d_j being the ways to the neighbours. Directions come in
 //! opposite pairs, so that one product serves two, and in orbits of the cube's rotations, so that data turned by 90° has the same cells. A direction in which the cell reaches farther than [`OPEN`] times the mean
 //! distance of the nearest neighbours is open: there the points end. A cell with open directions is completed to a symmetric
-//! one by its half that faces the neighbours, so at a border a point stands for what it stands for inside: of a cubic
+//! one by its half that faces the neighbours. So a point at a border has the same volume as inside: in a cubic
 //! lattice exactly at faces, and nearly at edges.
 
 use crate::ConvertError;

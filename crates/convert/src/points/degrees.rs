@@ -1,6 +1,6 @@
 //! Points whose x and y are degrees of longitude and latitude, beside heights in metres → metres.
 //!
-//! About the middle of the points the Earth is a plane here: what is drawn in one picture is small beside it. East is x, north y.
+//! The Earth is taken as a plane around the middle of the points, because a picture covers a small part of it. East is x, north y.
 
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::{DAabb, RawPoints};

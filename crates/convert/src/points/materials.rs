@@ -1,4 +1,4 @@
-//! Which material each point has, by a column of its file, as a column `footprint` chooses footprints.
+//! Chooses the material of each point by a column of its file, as the column `footprint` chooses footprints.
 
 use crate::{ConvertError, SplatParams};
 use splat_core::RawPoints;

@@ -2,9 +2,9 @@
 //!
 //! Gunjee 2007 takes points with all attributes, extinction and size among them; simulations and samples of clouds give places. Point
 //! i gets the volume Vᵢ of its cell ([`crate::points::cell_volume`]), the cross-section Kᵢ = σᵢ·Vᵢ and a kernel of the radius R = cutoff·0.8·Vᵢ^(1/3),
-//! as a voxel of that volume has, so that kernels sum to about σ within the points. Where the file states the reach of kernels,
-//! R is that, and K stays: a wider kernel blurs, and takes no matter away. Where it states masses, as of the equal particles of a
-//! simulation, Kᵢ = κᵢ·mᵢ, however dense the points lie, and σ is κ, an area a unit of mass.
+//! as a voxel of that volume has, so that kernels sum to about σ within the points. If the file states the reach of kernels,
+//! R is that reach and K is unchanged: a wider kernel blurs, and takes no matter away. If it states masses, as of the equal particles of a
+//! simulation, Kᵢ = κᵢ·mᵢ at any density of points, and σ is κ, an area a unit of mass.
 //!
 //! Points at one place share its volume, and points that become one have the sum of their cross-sections.
 

@@ -1,4 +1,4 @@
-//! Points around what is seen of some data, for cameras that are placed by it.
+//! Points around the visible part of data, for cameras that are placed by it.
 
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::{Cloud, DAabb, Footprint, Mesh, RawPoints, Similarity, SplatKind};

@@ -1,4 +1,4 @@
-//! The order that raw points have by themselves, so that the order of their file does not matter: along a Morton curve.
+//! The order of raw points along a Morton curve, so that the order of their file does not matter.
 
 use crate::common::columns::CHUNK;
 use rayon::prelude::*;

@@ -1,4 +1,4 @@
-//! What each of some points stands for if they are matter: its share of the Voronoi cell of its place.
+//! The volume of each point as matter: its share of the Voronoi cell of its place.
 
 use crate::points::cell_volume::cell_volumes;
 use crate::points::place_order::{canonical_order, distinct_places};

@@ -5,11 +5,11 @@
 //! R = cutoff·0.8·h with h = √2 times the cell's farthest corner, between √a and 2√a: on a square lattice that is the
 //! lattice's spacing, among scattered points it bridges the gaps.
 //!
-//! Points may bring an opacity each. It is multiplied by that of the surface; a point of which 1 comes is an opaque disc, for which
-//! τ₁ is infinite, beside the translucent discs of the others.
+//! Points may have an opacity each, which is multiplied by that of the surface. A point with the product 1 becomes an opaque disc, because
+//! its τ₁ is infinite, beside the translucent discs of the others.
 //!
-//! Points may bring the sizes of their discs, and a tangent each, along which a disc is an ellipse; without them ellipses may be as long and
-//! wide as the cells ([`crate::points::cell_ellipse`]). K stays: a wider disc blurs the surface and does not thicken it.
+//! Points may have sizes of their discs, and a tangent each, along which a disc is an ellipse. Without them ellipses may be as long and
+//! wide as the cells ([`crate::points::cell_ellipse`]). K is unchanged: a wider disc blurs the surface and does not thicken it.
 //!
 //! Points at one place share the area of that place, so duplicates neither darken it nor shrink radii to 0.
 

@@ -1,7 +1,7 @@
-//! Which footprint each disc of an object has, and how those lie that are images (Gunjee 2007, section 4.3: a texture for each point).
+//! Chooses the footprint of each disc of an object, and orients image footprints (Gunjee 2007, section 4.3: a texture for each point).
 //!
-//! A column chooses, or the place of a point by a seed, or the object has one for all. Radii keep their standard deviation: where the chosen
-//! footprint is cut elsewhere than that of the object, the disc is as much wider.
+//! The choice is by a column, by a hash of a point's place with a seed, or one footprint for the whole object. Discs keep their standard
+//! deviation: the radius of a disc is scaled by the ratio of the cut-offs of the chosen and the object's footprint.
 //!
 //! An image's right side points along the disc's tangent t and its top along n × t. Discs without a tangent get one: the top is as near to
 //! the world's +Y as the disc allows, of one that lies flat the right side to +X; turned about the normal by an angle that the seed tells.

@@ -1,4 +1,4 @@
-//! Splats of a file become those of an object: as they are, or as its transform moves them.
+//! Splats of a file become splats of an object: unchanged, or moved by its transform.
 
 use crate::common::columns::ColumnSet;
 use crate::points::materials::materials_of;

@@ -1,7 +1,7 @@
 //! Gaussians of a file become splats of a cloud.
 //!
-//! A splat that is seen as a Gaussian is, for shadows and whoever else takes splats for media, a ball whose variance σ² is that of a ball with
-//! the mean area of its shadows over all directions: by Cauchy a quarter of the surface, which Thomsen's formula gives within 1.1 %,
+//! The eye sees such a splat as a Gaussian. Shadows, and other code that takes splats for media, see a ball. Its variance σ² gives the ball
+//! the Gaussian's mean shadow area over all directions: by Cauchy a quarter of the surface, which Thomsen's formula gives within 1.1 %,
 //! σ² = (((ab)^p + (ac)^p + (bc)^p)/3)^(1/p) with p = 1.6075. The ball has the optical depth of the Gaussian through its middle,
 //! τ = −ln(1 − o), and all over: opacity has the shape of a Gaussian, so K = ∫−ln(1 − o·G) dA = 2πσ²·Li₂(o).
 

@@ -2,8 +2,8 @@
 //!
 //! A Cartesian lattice of spacing h holds a sphere of frequencies up to 1/2h, and the corners of a cube around it. Copies of a spectrum lie
 //! 1/h apart there; on a body-centred lattice of cell edge a they lie √2/a apart. So a = √2·h keeps copies of the sphere as
-//! far from each other, with 2/a³ = 0.7071/h³ points (Theußl, Möller, Gröller 2001; Neophytou, Mueller 2005, Table 1). What lies in the corners of the
-//! cube folds back.
+//! far from each other, with 2/a³ = 0.7071/h³ points (Theußl, Möller, Gröller 2001; Neophytou, Mueller 2005, Table 1). Frequencies in the corners of
+//! the cube fold back.
 //!
 //! Values are interpolated by the polynomials of degree 11 through the twelve lattice points around a place, axis by axis: constants and
 //! linear fields are exact, waves of four spacings and more err by 1/200 of their height at most. Beyond its faces the lattice goes

@@ -1,4 +1,4 @@
-//! Bricks of a lattice of which a transfer function shows nothing: no voxel of them needs to be looked at.
+//! Bricks of a lattice in which a transfer function has no extinction: their voxels are skipped.
 
 use crate::common::extremes::{greater, lesser};
 use crate::volume::classify::Classes;

@@ -1,4 +1,4 @@
-//! Voxels without a value (NaN) → such that draw nothing: every other part of this crate takes finite values alone.
+//! Replaces voxels without a value (NaN) by values without extinction, because all other code of this crate takes finite values alone.
 //!
 //! A gap gets the value without extinction that is nearest to the mean of its neighbours. So a ramp of opacity ends at the gap within one
 //! step of the lattice, as it ends at values that are transparent by themselves, and no other value of the transfer function shows between.

@@ -1,4 +1,4 @@
-//! Which voxels of a volume become splats, and with which colour and extinction.
+//! Selects the voxels of a volume that become splats, with their colours and extinctions.
 
 use crate::common::extremes::{greater, lesser};
 use crate::volume::bricks::{Bricks, range_of_rows};

@@ -1,8 +1,8 @@
 //! A volume of labels → the surfaces between its regions.
 //!
-//! Voxels have the region of their whole number, 0 and NaN none. Every cell between eight voxels of several regions gets one vertex, every two
-//! neighbours of different regions one quadrilateral (surface nets, Gibson 1998): a surface lies halfway between two
-//! voxels, and no label shows that neither of them has. A surface between two regions belongs to the one of greater opacity, so that what lies within
+//! The number of a voxel is its region; voxels of 0 and NaN have no region. Every cell between eight voxels of several regions gets one vertex, every two
+//! neighbours of different regions one quadrilateral (surface nets, Gibson 1998). So a surface lies halfway between two
+//! voxels, and shows no label but theirs. A surface between two regions belongs to the one of greater opacity, so that what lies within
 //! a translucent region is seen, else to that of the greater number. Vertices are moved towards their neighbours, within their cell, so that steps of voxels do not show.
 
 use crate::{ConvertError, LARGEST_LABEL, LabelTable};

@@ -1,4 +1,4 @@
-//! Values of a volume that stand apart from all others: fill values, which mean that there is none, and strays of a few voxels.
+//! Values of a volume far from all others: fill values of voxels without data, and strays of a few voxels.
 
 use rayon::prelude::*;
 use splat_core::Grid;

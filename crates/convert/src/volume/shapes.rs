@@ -1,7 +1,7 @@
 //! Homogeneous shapes in closed form: boxes and balls of a medium, flat parallelograms of a surface.
 //!
-//! A lattice whose cells tile the shape exactly: Σ K = σ_t·V and Σ K = τ₁·A hold to rounding, so the optical depth along a
-//! ray is the closed form convolved with the kernel. For tests, and for scenes that want just a slab of fog.
+//! The cells of a lattice tile the shape exactly: Σ K = σ_t·V and Σ K = τ₁·A hold to rounding. So the optical depth along a
+//! ray is the closed form convolved with the kernel. Tests use these shapes, and scenes that need a slab of fog.
 
 use crate::common::columns::ColumnSet;
 use crate::mesh::borders::Borders;

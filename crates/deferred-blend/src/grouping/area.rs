@@ -3,9 +3,9 @@
 //!
 //! In units of its semi-axes disc i is a unit circle. There the projection of disc j cuts a line of constant t, which runs along the offset of
 //! the centres, in a chord along s, the circle in another, and |d₁| < ε in a third. The length that all three share is integrated over
-//! t by Gauss-Chebyshev nodes of the second kind, which know that chords begin and end as square roots do: one disc alone has
-//! its area exactly. Shares are within 0.01 for a lens of two circles, 0.025 for tilted ellipses, and 0.1 where discs are so
-//! steep to one another that ε cuts a strip out of them: they serve to compare overlaps.
+//! t by Gauss-Chebyshev nodes of the second kind, which suit chords that begin and end like square roots: a single disc has
+//! its exact area. Shares are within 0.01 for a lens of two circles, 0.025 for tilted ellipses, and 0.1 where discs are so
+//! steep to one another that ε cuts a strip out of them. This suffices to compare overlaps.
 //!
 //! Places are subtracted in f64. The code works in units of the disc, sixteen pairs of discs at a time.
 

@@ -1,8 +1,8 @@
-//! Cells that discs near one another are found by, in near-linear time for any mixture of radii.
+//! Cells for finding discs near one another, in near-linear time for any mixture of radii.
 //!
-//! Discs are parted into levels by their reach, an octave each, and every level has a uniform lattice whose cells are as wide as two
-//! of its discs may lie apart. So a disc finds all partners of its level, and of each level with larger discs, in 3×3×3 cells. Cells
-//! that hold something are a sorted list, x running fastest, so that three cells along x are one run of it.
+//! Discs are divided into levels by their reach, an octave each. Every level has a uniform lattice whose cells are as wide as the greatest
+//! distance of two overlapping discs. So a disc finds all partners of its level, and of each level with larger discs, in 3×3×3 cells.
+//! Occupied cells are a sorted list, x running fastest, so that three cells along x are one run of it.
 
 use super::surfels::{CHUNK, Surfel};
 use rayon::prelude::*;

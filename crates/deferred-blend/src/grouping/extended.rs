@@ -1,11 +1,11 @@
 //! Groups that cover the surface each by itself, as transparent drawing needs (section 4.4.2).
 //!
-//! Two ways: [`duplicates`] adds discs of other groups where they are little covered, [`enlarged_radii`] makes the discs of a group
-//! larger (Eqs. 11-13). Where only a hash table is known, [`covering_factor`] tells a radius.
+//! Two ways: [`duplicates`] adds discs of other groups where a group covers little, [`enlarged_radii`] makes the discs of a group
+//! larger (Eqs. 11-13). For hashed groups, [`covering_factor`] returns a factor of the radius.
 //!
-//! Deviations: the paper takes splats in descending order of their clipped area and yet wants little overlap; here the least clipped
-//! comes first, which also lets a stale priority stand for the least. Eq. 11 with the area of overlap taken from both discs would take
-//! it twice; a region that m discs cover counts here as (m − 1)/m of it clipped from each, which makes Eqs. 11-13 exact. Random discs never
+//! Deviations: the paper takes splats in descending order of their clipped area and yet wants little overlap. Here the least clipped
+//! disc comes first, so a stale priority is a lower bound. Eq. 11 with the area of overlap taken from both discs would subtract
+//! it twice. Here a region that m discs cover is clipped by (m − 1)/m from each, which makes Eqs. 11-13 exact. Random discs never
 //! cover a surface wholly (their Eq. 13 has no limit), so radii are capped.
 
 use super::area::{WHOLE, covered_shares, epsilon_of};

@@ -1,4 +1,4 @@
-//! The overlap graph: nodes are discs, edges join those that overlap (Eq. 5), less what may share a group all the same.
+//! The overlap graph: nodes are discs, edges join discs that overlap (Eq. 5), except pairs that may share a group all the same.
 
 use super::cells::{self, Cells, Finder};
 use super::surfels::{self, CHUNK, MORE, Surfel};

@@ -4,12 +4,13 @@
 //! (Eq. 9). Cells have the groups of a table that repeats in both directions: (a·x + b·y) mod K with b = 1 and the multiplier a that sets the cells of one
 //! group farthest apart. For K = 8 that is the table of Figure 9, rows running along y.
 //!
-//! Deviations: the mean normal is that of 256 discs that follow one another in canonical order, in place of the leaf of a BSP tree,
-//! which is not needed for anything else here. (x, y) is rounded down, not towards 0, which would make the cells around the origin
-//! twice as wide. Two surfaces behind one another have the same (x, y); so the tags of Collisions have the third coordinate too, in steps
-//! of four radii, and tags lie in a table of bits of which a few are shared: that only lets a disc choose its group that need not. Collisions are
-//! looked for among 8,192 discs that follow one another in canonical order, and lie together: these stay in the nearer caches, no
-//! thread waits for another, and no list is kept; a disc at the border does not know those beyond.
+//! Deviations:
+//! - The mean normal is that of 256 consecutive discs in canonical order, not of the leaf of a BSP tree, which nothing else here needs.
+//! - (x, y) is rounded down, not towards 0, which would make the cells around the origin twice as wide.
+//! - Two surfaces behind one another have the same (x, y), so tags of collisions hold the third coordinate too, in steps of four radii.
+//! - Tags are bits of a table, a few of which are shared. A shared bit only makes a disc choose its group without need.
+//! - Collisions are looked for within parts of 8,192 consecutive discs in canonical order, which lie together. A part stays in the cache, no
+//!   thread waits for another, and no list is kept. Collisions across the border of two parts are not found.
 
 use super::lattice::Lattice;
 use super::surfels::{self, Surfel};

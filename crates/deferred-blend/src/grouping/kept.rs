@@ -1,4 +1,4 @@
-//! Groups that hold for every view: kept by the places of the discs on their object, and found again when the object has moved.
+//! Groups that are valid for every view. They are kept by the places of the discs on their object, and found again after the object has moved.
 
 use super::{Membership, Recipe};
 use crate::Error;

@@ -1,4 +1,4 @@
-//! Cells by which discs of one neighbourhood find one another: few, and the same again and again, so that no cell has to be looked for.
+//! Cells in which discs of one neighbourhood find one another. They are few and fixed, so no cell has to be searched for.
 
 use super::surfels::{MORE, Surfel};
 use splat_core::glam::{DVec3, Vec3};

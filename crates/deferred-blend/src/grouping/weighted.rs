@@ -10,10 +10,10 @@
 //! | `MinimizeOverlap` | the group whose discs share the least area with the disc, Σ ½(A_ij + A_ji); of equals the first |
 //!
 //! Where normals are equal every weight of Eq. 7 is 0 and both queues would have no order. There 1 − n_i·n_j counts as 2⁻¹⁰, so flat
-//! parts come after curved ones and among themselves in the order of overlapped area. Priorities are rounded to half octaves, and
-//! vertices of one priority come in the order of the graph, which is one of size and place. The paper's second queue takes a vertex in
-//! again and again; here it comes back when a neighbour has entered its group, so the queue runs empty: the overlapped area within
-//! groups falls with every change.
+//! parts come after curved ones, and among themselves in the order of overlapped area. Priorities are rounded to half octaves;
+//! vertices of one priority come in the order of the graph, which is by size and place. The paper's second queue takes a vertex
+//! again and again. Here a vertex returns when a neighbour has entered its group. Each change lowers the overlapped area within
+//! groups, so the queue runs empty.
 
 use super::area::{WHOLE, mutual_shares};
 use super::graph::{FETCHED, OverlapGraph};

@@ -1,4 +1,4 @@
-//! Sixteen pixels: what discs hide there, and sums over those that nothing hides.
+//! Sixteen pixels: the hiding depth, and sums over discs that nothing hides.
 
 use super::picture::Tile;
 use super::{Averaged, Passes};

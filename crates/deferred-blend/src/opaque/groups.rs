@@ -1,8 +1,8 @@
 //! 1+1 passes: a depth-colour image of each group (Fig. 11), by the depth of Eq. 14, and their composition (Fig. 6).
 //!
 //! Eq. 14 adds to a depth of n steps the distance from the disc's centre, as a share of a step. Added up in one number, a share
-//! loses its digits where n is large; here both are kept, and compared one after the other. In place of its colour an image
-//! keeps the disc, so the time of the walk does not grow with the number of channels.
+//! loses its digits where n is large. Here both are kept, and compared one after the other. An image
+//! keeps the id of the disc instead of its colour, so the time of the walk does not grow with the number of channels.
 
 use super::Averaged;
 use super::block::{Block, DiscLanes, Hit, Rules, for_each_disc, line, values_of};

@@ -1,4 +1,4 @@
-//! What a picture takes, told before it is taken.
+//! Predicts the memory of a picture before it is allocated.
 
 use super::{Averaged, Scratch};
 use crate::Error;

@@ -1,8 +1,8 @@
 //! Normals of discs that stick out over a silhouette.
 //!
 //! Behind the silhouette of a closed surface discs face away. Turned to the viewer their normals point inwards, and the disc is lit on the
-//! inside: a dark flap. Whether a normal n is of that kind nobody knows who sees one disc, and a scan does not know its outside. The surface
-//! beside it decides between n and its mirror image at the line of sight v, 2(n·v)v − n: the nearer one to the normals around is taken.
+//! inside: a dark flap. A single disc does not reveal whether its normal n is of that kind, and a scan does not know its outside. So the surface
+//! beside it decides between n and its mirror image at the line of sight v, 2(n·v)v − n: the one nearer to the normals around is taken.
 
 use crate::disc::Discs;
 use crate::shade::Light;
