@@ -1,8 +1,8 @@
 //! Meshes of zero sets end where their field's domain does ([`ScalarField::in_domain`]): triangles beyond it are left out,
-//! those across its border are cut along it.
+//! and triangles across its border are cut along it.
 //!
-//! The border is looked for on the edges of triangles by bisection: between a vertex inside and one outside there is
-//! exactly one end. A piece of the outside that touches no vertex is not seen.
+//! Bisection finds the border on the edges of triangles, on the assumption of one crossing between a vertex inside and a
+//! vertex outside. A piece of the outside that touches no vertex is not found.
 
 use rayon::prelude::*;
 use splat_core::{

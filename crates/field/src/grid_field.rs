@@ -6,8 +6,8 @@
 //! of the lattice (in lattice coordinates), so that it is bounded and no zero appears out there.
 //!
 //! A bound comes from control points: the interpolation of a cell stays between the least and the greatest of its
-//! corners (trilinear) or Bernstein control points (Catmull-Rom). Where ranges of whole cells exclude the surface they are
-//! the answer; else balls of at most two cells along each axis use the control points of the very box around the ball,
+//! corners (trilinear) or Bernstein control points (Catmull-Rom). The ranges of whole cells are the bound if they exclude the
+//! surface. Else balls of at most two cells along each axis use the control points of the box around the ball,
 //! which shrink onto the field with its radius.
 
 mod jet;

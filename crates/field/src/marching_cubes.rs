@@ -6,9 +6,9 @@
 //! 3. Each row writes its vertices and its triangles. Words of 64 equal bits are passed over; a row knows the numbers of
 //!    the vertices of its neighbours by counting along. Layers are independent, so threads change nothing.
 //!
-//! The table ([`mod@table`]) decides on each face by the face alone: the mesh is closed but where it meets the border of the
+//! The table ([`mod@table`]) decides on each face by the face alone. So the mesh is closed except at the border of the
 //! lattice, and every edge has two triangles, one each way. A value equal to the isovalue counts as above it. Vertices
-//! then coincide with a lattice point and triangles may have no area; they stay, so that the mesh stays closed, and
+//! then coincide with a lattice point, and triangles may have no area. They are kept, because the mesh must stay closed;
 //! `convert::mesh_to_points` counts and skips them.
 
 mod signs;

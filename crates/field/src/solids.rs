@@ -1,4 +1,4 @@
-//! Solids from solids: what lies inside of a field and within walls, which close it, and one of several by sets.
+//! Solids: the inside of a field, closed by walls, and combinations of several solids by set operations.
 
 use crate::{CombinedField, GridField, Inside, SharedField};
 use splat_core::glam::{DMat3, DVec3};

@@ -2,8 +2,8 @@
 //!
 //! Every cell of a lattice that the surface crosses gets one vertex, every lattice edge that it crosses one
 //! quadrilateral. The vertex begins at the mean of the crossings of the cell's edges and follows p ← p − f·∇f/|∇f|²,
-//! so positions and normals are those of the field, not of the lattice; only the topology is. The lattice is worked
-//! through in blocks; a block whose interval bound excludes zero is not evaluated. The mesh is cut where the field's domain
+//! so positions and normals are those of the field. Only the topology follows from the lattice. The lattice is processed
+//! in blocks; a block whose interval bound excludes zero is not evaluated. The mesh is cut where the field's domain
 //! ends.
 
 use crate::FieldError;

@@ -1,4 +1,4 @@
-//! What the driver says, in the words of executors.
+//! Translates errors of the driver into those of executors.
 
 use ash::vk;
 use gpu_allocator::AllocationError;

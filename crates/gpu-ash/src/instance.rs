@@ -1,4 +1,4 @@
-//! The loader, an instance, and what validation says.
+//! The loader, an instance, and the messages of validation.
 
 use crate::failure;
 use ash::{ext, vk};

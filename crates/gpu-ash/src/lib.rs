@@ -1,8 +1,8 @@
 //! Runs recordings of GPU work on Vulkan 1.1.
 //!
-//! A [`Device`] is opened by [`Choice`], which never means a software driver unless it says so. [`Device::prepare`]
-//! takes a recording's memory, compiles its kernels and writes its commands once; [`Prepared::run`] uploads, runs, and
-//! reads back, as often as one likes. Barriers come from what the recording declares to read and write.
+//! A [`Device`] is opened by [`Choice`]. `Choice::Gpu` never opens a software driver. [`Device::prepare`]
+//! allocates a recording's memory, compiles its kernels and writes its commands once. [`Prepared::run`] uploads, runs and
+//! reads back, any number of times. Barriers follow from the reads and writes that the recording declares.
 //!
 //! ```
 //! use gpu_ash::{Choice, Device, DeviceError, Validation};

@@ -1,5 +1,5 @@
-//! A driver that loses devices when a test wants it: `vkQueueSubmit` of the marked devices answers `VK_ERROR_DEVICE_LOST`,
-//! or takes work and never does it.
+//! A driver that loses devices on request of a test: `vkQueueSubmit` of the marked devices returns `VK_ERROR_DEVICE_LOST`,
+//! or accepts work and never does it.
 
 use ash::vk;
 use std::sync::{Mutex, PoisonError};

@@ -1,4 +1,4 @@
-//! A recording on the device: its memory, its commands, and how it is run.
+//! A recording on the device: its memory, its commands and its runs.
 
 use crate::commands::Commands;
 use crate::device::{Device, Logical};

@@ -1,4 +1,4 @@
-//! This executor by the words that all executors share.
+//! This executor behind the traits that all executors share.
 
 use crate::{Device, Prepared, adapters};
 use splat_shaders::{Adapter, Backend, Choice, DeviceError, Executor, Inputs, Ready, Recording, Run, Validation};

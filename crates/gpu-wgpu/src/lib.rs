@@ -1,8 +1,7 @@
 //! Runs recordings of GPU work through wgpu: the same names as `gpu-ash`, the same modules, no unsafe code.
 //!
-//! wgpu reads the SPIR-V through naga, adds checks of bounds, and finds the barriers by itself from what kernels declare
-//! of their bindings. What it says of a recording is a second opinion on the executor that works by the recording's own
-//! barriers.
+//! wgpu reads the SPIR-V through naga, adds checks of bounds, and derives barriers from the bindings that kernels declare.
+//! So its results are a second opinion on `gpu-ash`, which takes barriers from the recording.
 //!
 //! ```
 //! use gpu_wgpu::{Choice, Device, DeviceError, Validation};

@@ -1,4 +1,4 @@
-//! A recording on the device: its memory, its bindings, and how it is run.
+//! A recording on the device: its memory, its bindings and its runs.
 
 use crate::device::{Device, Faults};
 use splat_shaders::{BufferId, DeviceError, Dispatch, Groups, Inputs, PassTime, Recording, Run, Step, batches};

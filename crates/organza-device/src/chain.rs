@@ -1,9 +1,9 @@
-//! Splats from their attributes to the picture on a device, with nothing read back between: ordered, projected, shaded, the
-//! opaque ones resolved and the translucent ones composited in front of them by one joined recording; where all that throws
-//! shadows is among them, their shadows are made there too.
+//! Splats from their attributes to the picture on a device, without any read-back in between. One joined recording orders, projects
+//! and shades them, resolves the opaque splats, and composites the translucent ones in front. If all casters of shadows are among
+//! the splats, it makes their shadows too.
 //!
-//! The stages know nothing of each other; the buffers that they have in common are named here. Splats that the device does not
-//! take all at once go through it in parts, ordered before.
+//! The stages know nothing of each other; this module names the buffers that they share. Splats that do not fit the device
+//! at once are ordered first and then drawn in parts.
 
 mod parts;
 mod shadows;

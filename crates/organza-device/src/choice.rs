@@ -1,4 +1,4 @@
-//! Which device: by which backends, and which of theirs.
+//! The choice of a device: the backends to try, and which of their devices to open.
 
 use crate::Error;
 use splat_shaders::{Adapter, Backend, Choice, DeviceError};

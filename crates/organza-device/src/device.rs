@@ -1,4 +1,4 @@
-//! An opened device: one that is lost is opened once more in a picture, one that fails is given up and the processor goes on.
+//! An opened device. A lost device is opened once more in a picture. A failed one is given up, and the processor continues.
 
 use crate::trial::order_trial;
 use crate::{DeviceChoice, Error, Failure};

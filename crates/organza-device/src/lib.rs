@@ -1,26 +1,26 @@
 //! The stages of Organza on a GPU, beside the processor.
 //!
 //! Each stage records its own work (`hbsort::gpu`, `tsm::gpu`, `splat_core::raster::gpu`, `splat_core::shade::gpu`,
-//! `pbsr::gpu`) and knows no other. Here recordings are joined so that nothing is read back between them, and here it is settled
-//! what happens when a device refuses, is lost, or would round otherwise than the processor: the processor does the work, and one
-//! line says so.
+//! `pbsr::gpu`) and knows no other. This crate joins recordings so that nothing is read back between them. If a device
+//! refuses, is lost, or would round otherwise than the processor, the processor does the work, and one
+//! line reports it.
 //!
-//! | what | by | agrees with the processor |
+//! | work | item | agrees with the processor |
 //! |---|---|---|
 //! | lists of a shadow map | [`shadow_map`] | bit for bit |
 //! | exact order of translucent splats | [`order`] | bit for bit |
 //! | splats from their attributes to the picture | [`chain`] | 10⁻⁵ |
 //! | sets of particles | [`Folding`] | the hits of 99.9 % of the pixels, and their light up to 3·10⁻⁵ |
 //!
-//! A [`Device`] is opened once, for as many pictures as one likes; a [`Helper`] is its work on one of them.
+//! A [`Device`] is opened once and serves any number of pictures. A [`Helper`] is its work on one picture.
 //!
 //! ```
 //! use organza_device::{Choice, Device, DeviceChoice, Helper};
 //!
-//! // Without a GPU of this name that is an error; `DeviceChoice::auto(None)` leaves it to the processor then.
+//! // Without a GPU of this name, opening is an error; `DeviceChoice::auto(None)` leaves the work to the processor then.
 //! assert!(Device::open(&DeviceChoice::ash(Choice::Named("no such device".into()))).is_err());
 //! let device = Device::open(&DeviceChoice::auto(None)).unwrap();
-//! // Nothing was done yet by whatever was opened.
+//! // The opened device has not done any work yet.
 //! assert_eq!(Helper::new(&device).name(), "cpu");
 //! ```
 #![forbid(unsafe_code)]

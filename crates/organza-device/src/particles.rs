@@ -1,11 +1,11 @@
 //! Sets of particles, made, projected and averaged by a device.
 //!
-//! Where a sampler has a twin, the device makes its particles itself: tables go up once, and of a set nothing. Those of others the
-//! processor samples, and they are uploaded. Sets are independent, so as many go into one run as the
-//! device's kernels can see at once; what a run gave is added to the ensemble here, and a device that is lost costs no more
+//! If a sampler has a twin, the device makes its particles itself: only tables are uploaded, once. Other samplers run on the
+//! processor, and their particles are uploaded. Sets are independent, so a run takes as many as the
+//! device's kernels can see at once. The results of each run are added to the ensemble here, so a lost device costs no more
 //! than the sets of its last run.
 //!
-//! What is lit is lit there too, through the processor's shadow maps (`lit.rs`).
+//! The device also lights particles, through the processor's shadow maps (`lit.rs`).
 
 mod lit;
 

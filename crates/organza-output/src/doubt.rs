@@ -1,4 +1,4 @@
-//! What a finished picture shows too little of.
+//! Warnings about finished pictures of a single colour: black, white or another.
 
 use crate::displayed;
 

@@ -1,4 +1,4 @@
-//! What can be wrong with an output; each says what to do.
+//! Errors of outputs; each message states a remedy.
 
 use organza_scene::printable;
 use std::path::{Path, PathBuf};

@@ -7,7 +7,7 @@
 //! | shadow | shadow.A | | object | object.id (u32) |
 //! | direct … | direct.R direct.G direct.B | | opacity before a background | opacity.A |
 //!
-//! `R G B` are premultiplied with `A`, as the format has it: both are of the objects alone, or, where a background is part of the picture,
+//! `R G B` are premultiplied with `A`, as the format requires. Both are of the objects alone. If a background is part of the picture,
 //! `A` is 1.
 
 use super::{Metadata, Params, WriteReport, texts};

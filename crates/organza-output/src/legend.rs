@@ -1,8 +1,8 @@
-//! What colours stand for, drawn over the right border of a displayed picture: a bar of a colour map with its numbers, or the
+//! A legend over the right border of a displayed picture: the bar of a colour map with its numbers, or the
 //! colours of whole numbers.
 //!
-//! All lengths follow from the picture's shorter side, so that a larger picture has the same legend, larger. Panels darken what is behind
-//! them, so that white text is legible on anything.
+//! All lengths follow from the picture's shorter side, so the legend scales with the picture. Panels darken the picture behind
+//! them, so white text is legible on any picture.
 
 mod canvas;
 mod glyphs;

@@ -1,6 +1,6 @@
 //! Finished images as OpenEXR and PNG files, whole or not at all.
 //!
-//! A [`Target`] is checked before any work: it is no input, no other output spelled in a second way, and nothing that may not be
+//! A [`Target`] is checked before any work: it is neither an input, nor another output under a second spelling, nor a file that may not be
 //! replaced. [`write()`] makes the file in memory and gives it its name last.
 //!
 //! ```
@@ -14,7 +14,7 @@
 //! let target = Target::new(&folder.path().join("two.exr"), false).unwrap();
 //! let report = write(&layers, &Metadata::default(), &target, &Params::default()).unwrap();
 //! assert_eq!(report.bytes, std::fs::metadata(target.path()).unwrap().len());
-//! // It is there now, and is not replaced unasked.
+//! // The file exists now, and is not replaced without permission.
 //! assert!(Target::new(target.path(), false).is_err());
 //! ```
 #![forbid(unsafe_code)]

@@ -1,4 +1,4 @@
-//! One file that appears whole or not at all, and never in the place of something else.
+//! One file that appears whole or not at all, and replaces no other file without permission.
 
 use crate::Error;
 use std::fs::{self, File};

@@ -1,4 +1,4 @@
-//! What a file says about how it was made, as pairs of names and texts.
+//! Metadata about the origin of a file, as pairs of names and texts.
 
 use super::Metadata;
 

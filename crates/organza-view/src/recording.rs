@@ -1,4 +1,4 @@
-//! Files of events: what was done is played again.
+//! Files of events, which replay a session.
 
 use crate::event::Event;
 use organza::output::Target;

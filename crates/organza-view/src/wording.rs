@@ -1,4 +1,4 @@
-//! Errors in the words of the page: nobody there writes a command line.
+//! Errors in the words of the page, because its users type no command line.
 
 use organza::Error;
 

@@ -1,7 +1,7 @@
 //! Intervals: bounds of a formula over a box, widened by two ulps a step so that rounding cannot lose a value.
 //!
-//! Where a function is not defined on the whole interval the result is unknown (NaN), and stays unknown to the end:
-//! tanh of what may be undefined must not look bounded.
+//! If a function is not defined on the whole interval, the result is unknown (NaN), and stays unknown to the end:
+//! tanh of a value that may be undefined must not look bounded.
 
 use super::program::{Binary, Number, Unary};
 use std::f64::consts::{FRAC_PI_2, PI, TAU};

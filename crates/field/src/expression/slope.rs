@@ -1,4 +1,4 @@
-//! Numbers that carry their gradient, for several places at once: what [`super::jet`] does, without Hessians and in lanes.
+//! Numbers that carry their gradient, for several places at once: the arithmetic of [`super::jet`] without Hessians, in lanes.
 //!
 //! ∇f(a) = f′(a)·∇a; ∇f(a, b) = f_a·∇a + f_b·∇b.
 

@@ -1,7 +1,7 @@
 //! Ranges of an interpolated volume over boxes of cells: a pyramid of bounds of its control points.
 //!
-//! A node of the finest level covers 2×2×2 cells, a node of the next 2×2×2 nodes. A box is answered from the level where
-//! it meets at most three nodes along each axis: 27 look-ups however large it is, 1.15 bytes a voxel.
+//! A node of the finest level covers 2×2×2 cells, a node of the next 2×2×2 nodes. The range of a box is read from the level where
+//! it meets at most three nodes along each axis. So a box of any size takes 27 look-ups; the pyramid takes 1.15 bytes a voxel.
 
 use rayon::prelude::*;
 use splat_core::{Grid, Interpolation};

@@ -7,12 +7,12 @@
 //! agree on the side; d is the mean of their distances n·(q − p).
 //!
 //! [`RIDGE`] is added to the squares of second-order coefficients: it closes directions that few samples leave open in
-//! favour of the flattest shape. Where even a plane stays open the fit is the plane through the mean, across the mean
-//! normal.
+//! favour of the flattest shape. If the samples do not even determine a plane, the fit is the plane through the mean, across the
+//! mean normal.
 //!
-//! Deviations: the height field is tried first wherever it can be, edges and corners and quadrics only where it misses
-//! the tolerance, and the best of them is kept; a shape whose values run away where the ball has no samples is not
-//! taken ([`Ball::believes`]); a cell without samples of its own gets a plane or a constant of the sign that
+//! Deviations: the height field is tried first wherever it is possible. Edges, corners and quadrics are tried only if it misses
+//! the tolerance, and the best shape is kept. A shape whose values run away where the ball has no samples is
+//! rejected ([`Ball::believes`]). A cell without samples gets a plane, or a constant with the sign that
 //! [`mod@super::side`] finds.
 
 use super::quadric::{Quadric, Shape, active_piece};

@@ -1,12 +1,12 @@
 //! The adaptive octree (Ohtake et al. 2003, section 3): a cell whose shape misses the tolerance is divided.
 //!
 //! A cell of diagonal d has a support ball of radius R = αd around its middle. With fewer than N_min samples in it, the
-//! shape is fitted in a larger ball that holds N_min, and the cell is not divided where these are about as far apart as
-//! the ball is large: smaller cells would see the same samples. Subtrees are built in parallel and joined in order.
+//! shape is fitted in a larger ball that holds N_min. Such a cell is not divided if its samples are about as far apart as
+//! the ball is large, because smaller cells would see the same samples. Subtrees are built in parallel and joined in order.
 //!
-//! Deviations: the paper divides on unless the ball is empty; and it gives the larger ball the weight too, so that shapes
-//! of empty cells reach the surface. Here weight ends at αd: what is set where there are no samples has no weight at
-//! samples, which is nearer to them and three times as fast.
+//! Deviations: the paper divides on unless the ball is empty. It also gives the weight the larger ball, so that shapes
+//! of empty cells reach the surface. Here the weight ends at αd, so shapes of empty cells have no weight at
+//! samples: the surface is nearer to the samples, and the blend three times as fast.
 //!
 //! For evaluation each leaf cell lists the functions whose balls meet it, so that a place is answered by one descent and
 //! one list, and each node keeps the range of the blend over its cell.

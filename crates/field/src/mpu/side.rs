@@ -2,13 +2,13 @@
 //!
 //! A shape that is fitted to samples elsewhere is unreliable here. Beside the rim of a thin sheet and beyond the tip of a
 //! horn their normals point aside, and a wrong sign makes a bubble of surface. So the sign is taken from the samples
-//! themselves. The nearest samples vote with n·(x − p), weighed by a Gaussian of their distance beyond the nearest. Where
-//! that is small beside their distance they do not see x from above or below, and all samples tell by their winding number
+//! themselves. The nearest samples vote with n·(x − p), weighed by a Gaussian of their distance beyond the nearest. A vote that
+//! is small beside their distance means that x lies beside them, not above or below. Then the winding number of all samples decides
 //!
 //! w = Σ aᵢ nᵢ·(pᵢ − x)/(4π|pᵢ − x|³), aᵢ the area of a sample,
 //!
-//! which is 1 inside and 0 outside of a closed surface, and ½ behind and −½ before an open one; its mean at the samples
-//! themselves tells which of these they are. Samples far off count together (Barill, Dickson, Schmidt, Levin and Jacobson
+//! which is 1 inside and 0 outside of a closed surface, and ½ behind and −½ before an open one. Its mean at the samples
+//! shows whether the surface is closed or open. Samples far off count together (Barill, Dickson, Schmidt, Levin and Jacobson
 //! 2018, the first term of their series).
 
 use super::samples::SampleTree;

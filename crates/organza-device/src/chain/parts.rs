@@ -1,5 +1,5 @@
-//! The same for more splats than a device takes at once: ordered first, then projected, shaded and composited in parts, one
-//! after the other in compositing order. What has been composited goes on where the part before has left it.
+//! The same for more splats than fit a device at once. They are ordered first, then projected, shaded and composited in parts, one
+//! after the other in compositing order. Each part continues the composited picture of the part before.
 
 use super::{Chained, MOST_OF_A_TILE, Reason, Splats, room_for, run_on};
 use crate::Failure;

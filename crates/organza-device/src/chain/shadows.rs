@@ -1,4 +1,4 @@
-//! Shadows that are made where the splats are: deposits, lists and look-ups of each light among the recordings of the chain.
+//! Shadows made on the device: deposits, lists and look-ups of each light among the recordings of the chain.
 
 use crate::Failure;
 use splat_core::raster::gpu::{AttributeBuffers, Attributes};

@@ -1,4 +1,4 @@
-//! The recordings of the stages as one: which buffers they have in common, what is uploaded to them, and what is read back.
+//! The recordings of the stages as one: their shared buffers, uploads and read-backs.
 
 use super::{Splats, shadows};
 use crate::Failure;

@@ -1,4 +1,4 @@
-//! Light on the particles that are seen: the processor's shadow maps, uploaded once and looked up on the device.
+//! Light on the visible particles: the processor's shadow maps, uploaded once and looked up on the device.
 
 use crate::Failure;
 use pbsr::gpu::{Capacities, Lighting, ShadowOf, is_shown, suits};

@@ -1,4 +1,4 @@
-//! Sets of particles by both: uploaded and made by the device, shown as they are and lit through a shadow map.
+//! Sets of particles by both: uploaded, or made by the device; unlit, or lit through a shadow map.
 
 use super::{Agreement, Failure, Found, LEAST_SHARE, SIZE, ShadowInput};
 use crate::{Folding, Goal};

@@ -1,4 +1,4 @@
-//! The shadow map of a cloud of media, surfaces and opaque discs by both: its lists, and from splats to light in one go.
+//! The shadow map of a cloud of media, surfaces and opaque discs by both: its lists, and one recording from splats to light.
 
 use super::{Agreement, Failure, Found, LEAST_SHARE};
 use splat_core::glam::{DVec3, Vec3};

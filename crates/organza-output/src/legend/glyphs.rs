@@ -1,7 +1,7 @@
-//! Letters as lines that a pen draws, so that they are as sharp at any size.
+//! Letters as lines of a pen, so that they are sharp at any size.
 //!
-//! A glyph is a list of polylines, parted by commas; each point of one is two hexadecimal digits: how far to the right, and how far up.
-//! The line that letters stand on is at 3, small letters reach to 9, capitals and digits to 12, tails down to 0.
+//! A glyph is a list of polylines, separated by commas. Each point is two hexadecimal digits: its distance to the right, and its height.
+//! The baseline is at 3; small letters reach up to 9, capitals and digits to 12, and descenders down to 0.
 
 /// Height of a capital.
 pub(super) const CAPITAL: f64 = 9.0;

@@ -1,4 +1,4 @@
-//! Round numbers of a range, and what is written beside them.
+//! Round numbers of a range, and the texts beside them.
 
 /// From here on whole numbers are written with an exponent.
 const LONG: f64 = 1e7;

@@ -1,4 +1,4 @@
-//! A picture that is kept beside the present one, and what differs between the two.
+//! A picture that is kept beside the present one, and the differences between the two.
 
 use super::is_compared;
 use crate::picture::{Drawn, Picture, Size};

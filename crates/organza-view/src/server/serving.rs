@@ -1,4 +1,4 @@
-//! Requests and their answers: who may ask, and for what.
+//! Requests and their responses: routes, and the checks of clients.
 
 use super::Framing;
 use super::clients::{Admission, Clients, MOST_CLIENTS};
