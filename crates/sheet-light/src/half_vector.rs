@@ -11,7 +11,7 @@
 //! |---|---|
 //! | half way vector | [`HalfVector`] |
 //! | 3, 4: transform and bucket sort voxels | `slicing/buckets.rs` |
-//! | 12, 13: rasterize footprints | `slicing/sheet.rs` |
+//! | 12, 13: rasterize footprints | `slicing/sheet.rs`; `slicing/gathered.rs` where pixels read the lattice |
 //! | 16: gradients | `eye/gradient.rs` |
 //! | 17, 19: classify, illuminate | `eye/sheets.rs`, `eye/shade.rs` |
 //! | 20: composite | `eye/buffer.rs` |

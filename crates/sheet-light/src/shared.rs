@@ -4,6 +4,7 @@
 pub(crate) mod classifier;
 pub(crate) mod depths;
 pub(crate) mod error;
+pub(crate) mod gathered;
 pub(crate) mod gradient_volume;
 pub(crate) mod input;
 pub(crate) mod lattice;

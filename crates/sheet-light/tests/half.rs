@@ -3,6 +3,7 @@
 mod closed_forms;
 pub(crate) mod common;
 mod cut;
+mod gathered;
 mod hard_cases;
 mod invariances;
 mod panes;

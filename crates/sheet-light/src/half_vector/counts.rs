@@ -11,7 +11,7 @@ pub struct HalfCounts {
     pub sweeps: u64,
     /// Slabs of all sweeps, a few before and behind the volumes included.
     pub slabs: u64,
-    /// Footprint numbers added to the eye's sheets, whole vectors.
+    /// Footprint numbers added to the eye's sheets, or samples of lattices that these read, whole vectors.
     pub eye_fragments: u64,
     /// The same of the light's.
     pub light_fragments: u64,

@@ -20,10 +20,10 @@ use crate::half_vector::slicing::bodies::Bodies;
 use crate::half_vector::slicing::frame::Frame;
 use crate::half_vector::slicing::serves::{axis_of_view, other_axis, serves, serves_extended};
 use crate::shared::pixel::PixelForm;
-use crate::{Error, Params};
+use crate::{Error, Params, Reconstruction};
 use splat_core::raster::OpaqueImage;
 use splat_core::shade::ChannelLayout;
-use splat_core::{Accumulator, Camera, Light, Progress};
+use splat_core::{Accumulator, Camera, Light, Packing, Progress};
 
 /// What [`fold`] did.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -242,6 +242,10 @@ pub fn balance(input: &HalfInput<'_>, params: &HalfParams, light: usize) -> Resu
 fn check(input: &HalfInput<'_>, params: &HalfParams) -> Result<(), Error> {
     params.check()?;
     input.sheets.check()?;
+    let gathers = params.sheets.reconstruction != Reconstruction::Splat;
+    if gathers && input.sheets.volumes.iter().any(|v| v.packing != Packing::Cartesian) {
+        return Err(Error::parameter("reconstruction", "gathered of a body-centred lattice", "splatted"));
+    }
     if let Some(splats) = &input.sheets.splats {
         let found = format!("{} splats", splats.order.len());
         return Err(Error::parameter(

@@ -6,10 +6,12 @@ use crate::half_vector::light::buffer::LightBuffer;
 use crate::half_vector::slicing::axis::HalfVector;
 use crate::half_vector::slicing::buckets::{Buckets, records};
 use crate::half_vector::slicing::frame::Frame;
+use crate::half_vector::slicing::gathered::GatheredVolume;
 use crate::half_vector::slicing::placed::Placed;
 use crate::half_vector::slicing::sight::{Shape, Sight};
 use crate::shared::depths::DepthRange;
 use crate::shared::gradient_volume::GradientVolume;
+use crate::shared::params::Reconstruction;
 use crate::shared::pixel::Pixel;
 use crate::shared::shadows::Shadows;
 use crate::shared::voxels::Voxels;
@@ -19,14 +21,31 @@ use splat_core::glam::{DVec3, Vec3};
 use splat_core::shade::LitBy;
 
 /// Per-volume data of the voxels that may be seen, or that shape those.
-pub(crate) struct VolumeVoxels {
+pub(crate) struct VolumeVoxels<'a> {
     pub(crate) voxels: Voxels,
-    /// The voxels in the order in which the eye's sheets take them.
-    pub(crate) buckets: Buckets,
+    pub(crate) values: Values<'a>,
     /// Shadows of what light is not carried through, where a light has any.
     pub(crate) shadows: Option<Shadows>,
     /// Central-difference gradients, where normals come from a gradient volume.
     pub(crate) gradients: Option<GradientVolume>,
+}
+
+/// What sheets get the values of a volume from.
+pub(crate) enum Values<'a> {
+    /// The voxels in the order in which the eye's sheets take them.
+    Splatted(Buckets),
+    /// A lattice that pixels read.
+    Gathered(GatheredVolume<'a>),
+}
+
+impl Values<'_> {
+    /// Bytes of lists, or of a filtered lattice.
+    pub(crate) fn bytes(&self) -> u64 {
+        match self {
+            Self::Splatted(buckets) => buckets.bytes(),
+            Self::Gathered(volume) => volume.bytes(),
+        }
+    }
 }
 
 /// Everything of a sweep that does not depend on its light.
@@ -41,7 +60,7 @@ pub(crate) struct Geometry<'a> {
     pub(crate) gradients: Gradients,
     pub(crate) params: Params,
     /// By volume; empty until [`Geometry::sort_voxels`].
-    pub(crate) voxels: Vec<VolumeVoxels>,
+    pub(crate) voxels: Vec<VolumeVoxels<'a>>,
 }
 
 impl<'a> Geometry<'a> {
@@ -68,6 +87,14 @@ impl<'a> Geometry<'a> {
         progress: &Progress,
     ) -> Result<(), Error> {
         for (v, placed) in self.placed.iter().enumerate() {
+            if let Reconstruction::Gather(kernel) = self.params.reconstruction {
+                let (volume, lattice, voxels) = GatheredVolume::new(placed, kernel, &self.frame, &self.sight);
+                let receivers = placed.receivers(&voxels, lattice.rim);
+                let shadows = Shadows::new(&receivers, lights, shadow_origin, progress)?;
+                let gradients = GradientVolume::new(&receivers, &lattice, &self.params);
+                self.voxels.push(VolumeVoxels { voxels, values: Values::Gathered(volume), shadows, gradients });
+                continue;
+            }
             let shape = &self.shapes[v];
             let mut reach = placed.lattice_reach(shape.extent(), self.sight.widest_pixel(&self.frame, placed));
             if let Some(buffer) = &buffer {
@@ -84,7 +111,7 @@ impl<'a> Geometry<'a> {
                 buffer.push(lists);
             }
             let gradients = GradientVolume::new(&receivers, &lattice, &self.params);
-            self.voxels.push(VolumeVoxels { voxels, buckets, shadows, gradients });
+            self.voxels.push(VolumeVoxels { voxels, values: Values::Splatted(buckets), shadows, gradients });
         }
         Ok(())
     }

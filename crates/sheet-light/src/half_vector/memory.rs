@@ -15,6 +15,7 @@ use crate::half_vector::soft::buffer::SoftBuffer;
 use crate::half_vector::soft::penumbra::Penumbra;
 use crate::shared::gradient_volume::GradientVolume;
 use crate::shared::lattice::Lattice;
+use crate::shared::params::{GatherKernel, Reconstruction};
 use crate::shared::voxels::Voxels;
 use crate::{Error, Params, Volume};
 use splat_core::Camera;
@@ -78,9 +79,15 @@ pub fn bytes<'l>(
         / ROWS as u64;
     let voxels = |v: &Volume<'_>| {
         let dims = Lattice::new(v.grid, v.packing, [usize::MAX; 3]).dims;
-        // A record once in the order of the lattice and once for each image, with its bucket.
+        let of_values = match params.sheets.reconstruction {
+            // A record once in the order of the lattice and once for each image, with its bucket.
+            Reconstruction::Splat => 3 * 16 + 24,
+            // A filtered lattice is made of one that is filtered across alone.
+            Reconstruction::Gather(GatherKernel::Gaussian) => 8,
+            Reconstruction::Gather(GatherKernel::Linear) => 0,
+        };
         // The shadows of what is not carried, of the light of a sweep and of those without one.
-        let of_a_voxel = 3 * 16 + 24 + 8 * (1 + mapped as u64);
+        let of_a_voxel = of_values + 8 * (1 + mapped as u64);
         let count = dims.iter().map(|n| *n as u64).product::<u64>();
         Voxels::bytes(dims) + count * of_a_voxel + GradientVolume::bytes(count, v, &params.sheets)
     };

@@ -20,7 +20,9 @@ use crate::half_vector::slicing::placed::Placed;
 use crate::half_vector::slicing::serves::{axis_of_view, other_axis};
 use crate::half_vector::slicing::sight::{Shape, Sight};
 use crate::image_aligned::reference::Picture;
+use crate::shared::gathered::exact::Exact;
 use crate::shared::lattice::Lattice;
+use crate::shared::params::Reconstruction;
 use crate::shared::sections::{PHASES, sections};
 use crate::{Error, Volume};
 use polygons::{Hit, Triangles};
@@ -65,6 +67,8 @@ struct View<'a> {
     frame: Frame,
     placed: Vec<Placed<'a>>,
     voxels: Vec<Vec<Voxel>>,
+    /// Lattices that pixels read, by volume; or nothing.
+    gathered: Vec<Exact>,
     /// Of the kernels, by volume and phase.
     sections: Vec<Vec<Vec<f64>>>,
     polygons: Triangles<'a>,
@@ -203,7 +207,11 @@ impl<'a> View<'a> {
         let sections = placed.iter().map(|placed| of_phases(placed.reach / frame.slabs.width)).collect();
         let polygons = Triangles::new(input.polygons);
         let diffuse = scatter::Diffuse::new(volumes, lit, params);
-        Ok(Self { input, params, frame, placed, voxels, sections, polygons, diffuse })
+        let gathered = match params.sheets.reconstruction {
+            Reconstruction::Splat => Vec::new(),
+            Reconstruction::Gather(kernel) => volumes.iter().map(|volume| Exact::new(volume, kernel)).collect(),
+        };
+        Ok(Self { input, params, frame, placed, voxels, gathered, sections, polygons, diffuse })
     }
 
     fn image(&self, camera: Camera) -> Image {
@@ -345,6 +353,10 @@ impl<'a> View<'a> {
             return None;
         }
         let q = self.place(&image.camera, pixel, 0.5 * (near + far));
+        if let Some(gathered) = self.gathered.get(v) {
+            let placed = &self.placed[v];
+            return Some(Part { near, far, value: gathered.at(placed.axes.inverse() * (q - placed.start)) });
+        }
         // How many slabs it lies behind the slab's middle, which sections stand for.
         let behind = q.z / width - (f64::from(slab) + 0.5);
         let footprint = Footprint { cutoff: self.placed[v].cutoff as f32 };

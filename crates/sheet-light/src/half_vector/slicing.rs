@@ -6,6 +6,7 @@ pub(crate) mod bodies;
 pub(crate) mod buckets;
 pub(crate) mod by_slab;
 pub(crate) mod frame;
+pub(crate) mod gathered;
 pub(crate) mod placed;
 pub(crate) mod serves;
 pub(crate) mod sheet;

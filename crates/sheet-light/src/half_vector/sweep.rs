@@ -136,7 +136,7 @@ impl<'a> Sweep<'a> {
             }
             if let Some(buffer) = &mut self.lighting.buffer {
                 let splats = splats.as_ref().and_then(|splats| splats.light.as_ref());
-                counts.light_fragments += buffer.attenuate(slab, &self.geometry.frame, &self.geometry.placed, splats);
+                counts.light_fragments += buffer.attenuate(slab, &self.geometry, splats);
             }
             if let Some(splats) = &mut splats {
                 splats.leave();
@@ -278,7 +278,7 @@ impl<'a> Sweep<'a> {
         let buffer = self.lighting.buffer.as_ref();
         let scattered = self.lighting.scattered.as_ref();
         let light_bytes = buffer.map_or(0, LightBuffer::bytes) + scattered.map_or(0, Scattered::bytes);
-        let lists: u64 = voxels.iter().map(|v| v.buckets.bytes()).sum();
+        let lists: u64 = voxels.iter().map(|v| v.values.bytes()).sum();
         let eye: u64 = bands.iter().map(EyeBand::bytes).sum();
         HalfCounts {
             voxels: volumes.iter().map(|v| v.grid.values.len() as u64).sum(),

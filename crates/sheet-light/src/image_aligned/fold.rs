@@ -1,12 +1,12 @@
 //! The fold of prepared sheets over a range of depths.
 
 use super::counts::SheetCounts;
-use super::gather::Gathered;
 use super::panes::Panes;
 use super::prepared::Sheeted;
 use crate::Error;
 use crate::image_aligned::tile::fold_tile::{FoldTile, Scratch};
 use crate::shared::error::cancelled;
+use crate::shared::gathered::Gathered;
 use rayon::prelude::*;
 use splat_core::raster::bins::Bins;
 use splat_core::raster::pulp;

@@ -1,6 +1,5 @@
 //! Volumes and a view, ready to be folded.
 
-use super::gather::{Gathered, RIM};
 use super::light::Lamp;
 use super::panes::Panes;
 use super::segments::Segments;
@@ -10,6 +9,7 @@ use super::viewed::{PixelFootprint, Viewed, lacking};
 use super::within::Within;
 use crate::image_aligned::tile::ring::{Splatter, Taper};
 use crate::shared::classifier::{Base, Classifier};
+use crate::shared::gathered::{Gathered, RIM};
 use crate::shared::gradient_volume::GradientVolume;
 use crate::shared::input::SheetInput;
 use crate::shared::lattice::Lattice;

@@ -1,10 +1,10 @@
 //! The slow form in f64: the same sheets pixel by pixel and slab by slab, without tiles, vectors, rings, lists or skipped voxels.
 
-use super::gather::exact::Exact;
 use super::slant::Slant;
 use super::view_slabs::{slabs_of, stride};
 use super::viewed::{Viewed, eye_of, lacking};
 use crate::image_aligned::tile::near_eye::LEAST_APART;
+use crate::shared::gathered::exact::Exact;
 use crate::shared::gradient_volume::differences;
 use crate::shared::lattice::Lattice;
 use crate::shared::lattice_rays::{LatticeRays, ViewRay};

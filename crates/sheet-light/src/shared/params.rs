@@ -28,7 +28,7 @@ pub enum Reconstruction {
     /// Each voxel adds its kernel to the sheets that it touches (the paper).
     #[default]
     Splat,
-    /// Each pixel of a sheet reads the lattice. Of Cartesian lattices, classified afterwards, in slabs across the view.
+    /// Each pixel of a sheet reads the lattice. Of Cartesian lattices, classified afterwards.
     Gather(GatherKernel),
 }
 
@@ -130,9 +130,6 @@ impl Params {
         }
         if self.aligned != Aligned::View {
             return Err(Error::parameter("aligned", self.aligned, "View in half-vector sheets"));
-        }
-        if self.reconstruction != Reconstruction::Splat {
-            return Err(Error::parameter("reconstruction", self.reconstruction, "Splat in half-vector sheets"));
         }
         Ok(())
     }

@@ -1,6 +1,6 @@
 //! Constant media: optical depth and self shadow in closed form, whatever the slabs.
 
-use super::common::{draw, exact, input, inside, lamp, ray, scattering, single_scattering, sun};
+use super::common::{draw, exact, half_forms, input, inside, lamp, ray, scattering, single_scattering, sun};
 use super::polygons::{polygons, wall, white};
 use crate::common::{BEAUTY, constant, cubic, grid, parallel, perspective, transfer, volume};
 use sheet_light::half::{HalfInput, HalfParams, fold};
@@ -16,18 +16,20 @@ fn differences(grid: &Grid, sigma: f64, lit: &LitBy<'_>, camera: &Camera, params
     let material = scattering();
     let volumes = [volume(grid, &tf, &material)];
     let lights = [*lit];
-    let (out, _) = draw(&input(&volumes, camera, &lights), params).unwrap();
+    let forms = half_forms(params).map(|params| draw(&input(&volumes, camera, &lights), &params).unwrap().0);
     let width = camera.size[0] as usize;
     let mut worst = [0.0f64; 2];
     let mut seen = 0;
     // Kernels of extent 2 that receive light have a deviation of a third of it.
     let spread = 2.0 / 3.0 * grid.axes.x_axis.length();
-    for at in (0..out.optical_depth[0].len()).step_by(5) {
+    for at in (0..forms[0].optical_depth[0].len()).step_by(5) {
         let ray = ray(camera, at % width, at / width);
         let [light, tau] = single_scattering(grid, sigma, (&lit.light, spread), ray);
-        let found = f64::from(out.optical_depth[0][at]);
-        worst[0] = worst[0].max(((-found).exp() - (-tau).exp()).abs());
-        worst[1] = worst[1].max((f64::from(out.channels[0][at]) * 4.0 * PI - light).abs());
+        for out in &forms {
+            let found = f64::from(out.optical_depth[0][at]);
+            worst[0] = worst[0].max(((-found).exp() - (-tau).exp()).abs());
+            worst[1] = worst[1].max((f64::from(out.channels[0][at]) * 4.0 * PI - light).abs());
+        }
         seen += usize::from(tau > 0.0);
     }
     assert!(seen > 20, "the volume is out of the picture");
@@ -75,7 +77,11 @@ fn slab(tau: f64, slabs: f64, from: [f64; 3]) -> [f64; 2] {
     let camera = parallel([0.0, 0.0, 10.0], 2.0, [9, 9]);
     // A pixel of the light buffer is as wide as a step of the coarser lattice.
     let params = HalfParams { light_pixels: spacing.z / spacing.x, ..exact(Some(length / slabs)) };
-    let out = draw(&input(&volumes, &camera, &lights), &params).unwrap().0;
+    let forms = half_forms(&params).map(|params| draw(&input(&volumes, &camera, &lights), &params).unwrap().0);
+    let out = &forms[0];
+    for other in &forms[1..] {
+        assert_eq!((&other.optical_depth, &other.channels), (&out.optical_depth, &out.channels));
+    }
     [(-f64::from(out.optical_depth[0][40])).exp(), 4.0 * PI * f64::from(out.channels[0][40])]
 }
 
@@ -129,9 +135,11 @@ fn hv17_alpha_by_half_vector_slabs_is_that_by_view_slabs() {
             let own = exact(None);
             let view = crate::common::draw(&crate::common::input(&volumes, &camera, &[]), &own.sheets).unwrap().0;
             for light in [sun([2.0, 1.0, 1.0]), sun([-1.0, 1.0, -2.0]), lamp([9.0, 14.0, 8.0])] {
-                let half = draw(&input(&volumes, &camera, &[light]), &own).unwrap().0;
-                let worst = crate::common::largest(&through(&view), &through(&half));
-                assert!(worst < 1e-5, "{axes}, {:?}: {worst:e}", light.light.shape);
+                for own in half_forms(&own) {
+                    let half = draw(&input(&volumes, &camera, &[light]), &own).unwrap().0;
+                    let worst = crate::common::largest(&through(&view), &through(&half));
+                    assert!(worst < 1e-5, "{axes}, {:?}: {worst:e}", light.light.shape);
+                }
             }
         }
     }
@@ -182,11 +190,12 @@ mod deep {
             .flat_map(|eye| suns.map(|sun| (parallel(*eye, 4.0, [12, 12]), sun)))
         {
             let to_light = sun.light.irradiance(DVec3::ZERO, 0.0).to_light;
-            for slab_width in [0.3, 0.4, 0.6, 0.77, 1.3] {
+            let widths = [0.3, 0.4, 0.6, 0.77, 1.3];
+            for (slab_width, form) in widths.iter().flat_map(|width| [0, 1, 2].map(|form| (*width, form))) {
                 let lights = [sun];
                 let input = HalfInput { polygons: &floor, ..input(&volumes, &camera, &lights) };
                 let mut out = Accumulator::new(camera.size, 1, 3, false, true);
-                let drawn = fold(&input, &exact(Some(slab_width)), &BEAUTY, &mut out, None).unwrap();
+                let drawn = fold(&input, &half_forms(&exact(Some(slab_width)))[form], &BEAUTY, &mut out, None).unwrap();
                 for at in (0..144).step_by(7) {
                     let (from, along) = ray(&camera, at % 12, at / 12);
                     let what = format!("slabs {slab_width}, {to_light}, eye {}, pixel {at}", camera.position);

@@ -33,6 +33,11 @@ pub(crate) fn exact(slab_width: Option<f64>) -> HalfParams {
     }
 }
 
+/// Splatted, and gathered linearly and by the paper's kernel.
+pub(crate) fn half_forms(params: &HalfParams) -> [HalfParams; 3] {
+    crate::common::forms(&params.sheets).map(|sheets| HalfParams { sheets, ..*params })
+}
+
 pub(crate) fn input<'a>(volumes: &'a [Volume<'a>], camera: &'a Camera, lights: &'a [LitBy<'a>]) -> HalfInput<'a> {
     let volumes = volumes.to_vec();
     let lights = lights.to_vec();

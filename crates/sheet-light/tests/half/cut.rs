@@ -1,6 +1,6 @@
 //! Volumes that are cut along planes, and body-centred lattices: closed forms, the slow form, and what slabs across the view show of them.
 
-use super::common::{draw, exact, input, inside, ray, scattering, sun};
+use super::common::{draw, exact, half_forms, input, inside, ray, scattering, sun};
 use super::twin::differences;
 use crate::common::{
     bcc_volume, body_centred, constant, cubic, grid, largest, noise, parallel, perspective, transfer, volume,
@@ -34,16 +34,15 @@ fn apart(clip: &[Clip], from: [f64; 3], camera: &Camera, params: &HalfParams) ->
     let material = scattering();
     let light = sun(from);
     let volumes = [Volume { clip, ..volume(&grid, &tf, &material) }];
-    let out = draw(&input(&volumes, camera, &[light]), params).unwrap().0;
+    let forms = half_forms(params).map(|params| draw(&input(&volumes, camera, &[light]), &params).unwrap().0);
     let LightShape::Directional { direction } = light.light.shape else { panic!("the sun") };
     let mut worst = [0.0f64; 2];
     let mut cut = 0;
-    for at in (0..out.optical_depth[0].len()).step_by(7) {
+    for at in (0..forms[0].optical_depth[0].len()).step_by(7) {
         let (from, along) = ray(camera, at % 40, at / 40);
         let Some([near, far]) = kept(&grid, clip, from, along) else { continue };
         cut += usize::from(inside(&grid, from, along).is_some_and(|[n, f]| f - n > far - near + 1e-6));
         let through = (-sigma * (far - near)).exp();
-        worst[0] = worst[0].max(((-f64::from(out.optical_depth[0][at])).exp() - through).abs());
         let n = 2000;
         let step = (far - near) / f64::from(n);
         let lit = |i: i32| {
@@ -51,8 +50,11 @@ fn apart(clip: &[Clip], from: [f64; 3], camera: &Camera, params: &HalfParams) ->
             let way = kept(&grid, clip, from + along * (near + t), -direction).map_or(0.0, |[_, far]| far.max(0.0));
             sigma * step * (-sigma * (t + way)).exp()
         };
-        let found = f64::from(out.channels[0][at]) * 4.0 * PI;
-        worst[1] = worst[1].max((found - (0..n).map(lit).sum::<f64>()).abs());
+        let expected: f64 = (0..n).map(lit).sum();
+        for out in &forms {
+            worst[0] = worst[0].max(((-f64::from(out.optical_depth[0][at])).exp() - through).abs());
+            worst[1] = worst[1].max((f64::from(out.channels[0][at]) * 4.0 * PI - expected).abs());
+        }
     }
     assert!(cut > 8, "{cut} pixels are cut");
     worst

@@ -1,6 +1,6 @@
 //! Geometry, numbers and orders that break naive half-vector sheets.
 
-use super::common::{draw, exact, input, lamp, lit, scattering, sun};
+use super::common::{draw, exact, half_forms, input, lamp, lit, scattering, sun};
 use crate::common::{BEAUTY, apart, constant, cubic, grid, noise, parallel, perspective, transfer, volume};
 use sheet_light::half::{Bodies, HalfInput, HalfParams, HalfVector, LEAST_COSINE, Reason, fold, serves};
 use sheet_light::{Error, Params, Volume};
@@ -165,9 +165,10 @@ fn ia07_a_ramp_has_the_same_normal_everywhere() {
         let mut volumes = [volume(&grid, &tf, &material)];
         volumes[0].normals = true;
         for camera in [parallel([0.0, 0.0, 12.0], 9.0, [60, 60]), perspective([0.0, 0.0, 16.0], 30.0, [60, 60])] {
-            for light in [sun([1.0, 0.5, 1.0]), sun([1.0, 0.5, -1.0])] {
+            let lights = [sun([1.0, 0.5, 1.0]), sun([1.0, 0.5, -1.0])];
+            for (light, params) in lights.iter().flat_map(|light| half_forms(&exact(None)).map(|form| (*light, form))) {
                 let mut out = Accumulator::new(camera.size, 1, layout.count(), false, false);
-                fold(&input(&volumes, &camera, &[light]), &exact(None), &layout, &mut out, None).unwrap();
+                fold(&input(&volumes, &camera, &[light]), &params, &layout, &mut out, None).unwrap();
                 let first = layout.normal().unwrap();
                 for at in 0..3600 {
                     let opacity = 1.0 - (-out.optical_depth[0][at]).exp();
@@ -195,11 +196,13 @@ fn what_is_behind_an_opaque_surface_is_not_seen_but_lit_all_the_same() {
     for light in [sun([1.0, 0.0, 1.0]), sun([0.0, 0.0, -1.0])] {
         let lights = [light];
         let whole = input(&volumes, &camera, &lights);
-        let (out, _) = draw(&HalfInput { opaque: &opaque, ..whole }, &exact(None)).unwrap();
-        for (tau, depth) in out.optical_depth[0].iter().zip(&opaque) {
-            assert!((tau - 0.25 * (depth - 15.0)).abs() < 4e-6, "{tau} before {depth}");
+        for params in half_forms(&exact(None)) {
+            let (out, _) = draw(&HalfInput { opaque: &opaque, ..whole.clone() }, &params).unwrap();
+            for (tau, depth) in out.optical_depth[0].iter().zip(&opaque) {
+                assert!((tau - 0.25 * (depth - 15.0)).abs() < 4e-6, "{tau} before {depth}");
+            }
+            assert!(out.channels[0][39] > 1e-4);
         }
-        assert!(out.channels[0][39] > 1e-4);
     }
 }
 
@@ -210,9 +213,9 @@ fn depths_are_those_of_slabs_across_the_view() {
     let grid = grid([16, 16, 16], cubic(0.5), |p| 0.6 + 0.4 * (p.x + 0.5 * p.z).sin());
     let volumes = [volume(&grid, &tf, &material)];
     let camera = perspective([1.0, 2.0, 14.0], 30.0, [24, 24]);
-    let params = exact(Some(0.2));
-    let view = crate::common::draw(&crate::common::input(&volumes, &camera, &[]), &params.sheets).unwrap().0;
-    for light in [sun([1.0, 1.0, 2.0]), sun([1.0, 1.0, -2.0])] {
+    let lights = [sun([1.0, 1.0, 2.0]), sun([1.0, 1.0, -2.0])];
+    for (light, params) in lights.iter().flat_map(|light| half_forms(&exact(Some(0.2))).map(|form| (*light, form))) {
+        let view = crate::common::draw(&crate::common::input(&volumes, &camera, &[]), &params.sheets).unwrap().0;
         let half = draw(&input(&volumes, &camera, &[light]), &params).unwrap().0;
         for at in (0..576).filter(|at| view.optical_depth[0][*at] > 0.5) {
             let [one, other] = [&view, &half].map(|out| out.depth[at].depths(out.optical_depth[0][at], None));
@@ -233,12 +236,13 @@ fn pixels_that_are_done_err_by_no_more_than_what_they_hide() {
     let volumes = [volume(&grid, &tf, &material)];
     let lights = [sun([1.0, 1.0, 1.0])];
     let camera = perspective([2.0, 3.0, 12.0], 30.0, [60, 60]);
-    let full = draw(&input(&volumes, &camera, &lights), &exact(None)).unwrap().0;
-    let mut params = exact(None);
-    params.sheets.transmittance_cutoff = 0.02;
-    let early = draw(&input(&volumes, &camera, &lights), &params).unwrap().0;
-    let difference = apart(&full, &early);
-    assert!(difference > 0.0 && difference <= 0.02, "{difference}");
+    for mut params in half_forms(&exact(None)) {
+        let full = draw(&input(&volumes, &camera, &lights), &params).unwrap().0;
+        params.sheets.transmittance_cutoff = 0.02;
+        let early = draw(&input(&volumes, &camera, &lights), &params).unwrap().0;
+        let difference = apart(&full, &early);
+        assert!(difference > 0.0 && difference <= 0.02, "{difference}");
+    }
 }
 
 #[test]

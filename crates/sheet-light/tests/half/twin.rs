@@ -1,15 +1,30 @@
 //! Bands, buckets, bounds, lanes and closed forms of light against the slow form in f64.
 
-use super::common::{draw, exact, input, lamp, scattering, sun};
+use super::common::{draw, exact, half_forms, input, lamp, scattering, sun};
 use super::polygons::{polygons, wall, white};
 use super::splats::{Shown, lambert, plane, with};
 use crate::common::{BEAUTY, cubic, grid, noise, parallel, perspective, transfer, unlit, volume};
 use sheet_light::half::{HalfInput, HalfParams, Scattering, fold, reference};
 use splat_core::glam::{DMat3, DVec3};
-use splat_core::{Accumulator, Camera, Cloud, Light, Material, Splat, SplatKind, rng};
+use splat_core::{Accumulator, Camera, Cloud, Light, Material, Packing, Splat, SplatKind, rng};
+
+/// Greatest differences from the twin, in all forms that sheets of the volumes have: optical depth, colour times 4π.
+pub(crate) fn differences(input: &HalfInput<'_>, params: &HalfParams) -> [f64; 2] {
+    let is_cartesian = input.sheets.volumes.iter().all(|volume| volume.packing == Packing::Cartesian);
+    let forms = half_forms(params).into_iter().take(if is_cartesian { 3 } else { 1 });
+    let each = forms.enumerate().map(|(form, params)| {
+        let found = differences_of_form(input, &params);
+        println!("form {form}: {:e} {:e}", found[0], found[1]);
+        found.map(|difference| if form == 1 { difference / STEEPER } else { difference })
+    });
+    each.fold([0.0; 2], |worst, form| [worst[0].max(form[0]), worst[1].max(form[1])])
+}
+
+/// How much more rounding of places may do to what is gathered linearly: noise is blurred less, so that its values are steeper.
+const STEEPER: f64 = 4.0;
 
 /// Greatest differences from the twin: optical depth, colour times 4π.
-pub(crate) fn differences(input: &HalfInput<'_>, params: &HalfParams) -> [f64; 2] {
+pub(crate) fn differences_of_form(input: &HalfInput<'_>, params: &HalfParams) -> [f64; 2] {
     let (found, counts) = draw(input, params).unwrap();
     let twin = reference::draw(input, params).unwrap();
     let mut worst = [0.0f64; 2];

@@ -3,7 +3,7 @@
 use super::buffer::{Fragments, Pixels};
 use super::gradient::SheetsAround;
 use super::shade::{Lit, Through};
-use crate::half_vector::geometry::{Geometry, VolumeVoxels};
+use crate::half_vector::geometry::{Geometry, Values, VolumeVoxels};
 use crate::half_vector::light::illuminate::Asked;
 use crate::half_vector::light::path::{Places, RayEnds, stored};
 use crate::half_vector::lighting::Lighting;
@@ -164,7 +164,7 @@ impl pulp::WithSimd for OneSlab<'_> {
         let top = self.eye.band.top;
         let rows = self.eye.band.rows.clone();
         for y in rows.start - top..rows.end - top {
-            let spans = || volumes.clone().map(|v| &self.eye.sheet(v, slab).spans[y]);
+            let spans = || volumes.clone().map(|v| &self.eye.sheet(v, slab).shown[y]);
             let of_splats = splats.and_then(|splats| splats.squares.span(top + y));
             let of_panes = panes.and_then(|panes| panes.span(top + y));
             let inside = || spans().filter(|span| !span.is_empty()).chain(&of_splats).chain(&of_panes);
@@ -192,8 +192,13 @@ impl OneSlab<'_> {
         let EyeBand { band, sheets, .. } = &mut *self.eye;
         let kept = sheets[v].len();
         let sheet = &mut sheets[v][slab as usize % kept];
-        sheet.begin(simd, band, v, frame.slabs.faces(slab));
-        let splatter = Splatter { placed: &placed[v], sight, shape: &shapes[v], buckets: &voxels[v].buckets };
+        let faces = frame.slabs.faces(slab);
+        sheet.begin(simd, band, v, faces);
+        let buckets = match &voxels[v].values {
+            Values::Gathered(volume) => return sheet.gather(simd, volume, band, faces),
+            Values::Splatted(buckets) => buckets,
+        };
+        let splatter = Splatter { placed: &placed[v], sight, shape: &shapes[v], buckets };
         let fragments = sheet.splat(simd, &splatter, band, self.index, slab);
         sheet.finish(simd, band.stride);
         fragments
@@ -285,7 +290,7 @@ impl OneSlab<'_> {
         let sheet = self.eye.sheet(v, self.slab());
         let stride = self.eye.band.stride;
         // No closure: what is vectorised must be inlined.
-        if !sheet.spans[k / stride].contains(&(k % stride)) {
+        if !sheet.shown[k / stride].contains(&(k % stride)) {
             return None;
         }
         let [extinction, ..] = sheet.classify(simd, &self.work.geometry.placed[v], k);

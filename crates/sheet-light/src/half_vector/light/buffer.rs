@@ -6,6 +6,7 @@
 //! neighbours mislead, while the length on the way to any place is known in closed form.
 
 use crate::Volume;
+use crate::half_vector::geometry::{Geometry, Values};
 use crate::half_vector::input::HalfSplats;
 use crate::half_vector::slicing::band::{Band, ROWS};
 use crate::half_vector::slicing::buckets::Buckets;
@@ -107,18 +108,12 @@ impl LightBuffer {
 
     /// Reconstructs a slab in the light's image and attenuates by it (steps 11, 14 and 21 of the pseudocode); a light with an extent by the
     /// splats of the slab, too. Number of footprint numbers.
-    pub(crate) fn attenuate(
-        &mut self,
-        slab: u32,
-        frame: &Frame,
-        placed: &[Placed<'_>],
-        splats: Option<&SplatLight<'_>>,
-    ) -> u64 {
+    pub(crate) fn attenuate(&mut self, slab: u32, geometry: &Geometry<'_>, splats: Option<&SplatLight<'_>>) -> u64 {
         let Self { sight, shapes, buckets, bands, sums, volumes, soft } = self;
         // Splats alone have no sums here.
         let row = sight.camera.size[0] as usize * (*volumes).max(1);
         let chunks = sums.par_chunks_mut(row * ROWS);
-        let work = Attenuate { slab, frame, placed, sight, shapes, buckets };
+        let work = Attenuate { slab, geometry, sight, shapes, buckets };
         let band = |(index, (band, sums)): (usize, (&mut LightBand, &mut [Sums]))| {
             pulp::Arch::new().dispatch(OneBand { work: &work, index, band, sums })
         };
@@ -128,7 +123,7 @@ impl LightBuffer {
             if let Some(splats) = splats {
                 bands.par_iter_mut().for_each(|band| band.add_splats(splats));
             }
-            soft.add(frame.slabs.faces(slab), bands);
+            soft.add(geometry.frame.slabs.faces(slab), bands);
         }
         fragments
     }
@@ -169,8 +164,7 @@ impl LightBand {
 /// What all bands of a slab share.
 struct Attenuate<'a> {
     slab: u32,
-    frame: &'a Frame,
-    placed: &'a [Placed<'a>],
+    geometry: &'a Geometry<'a>,
     sight: &'a Sight,
     shapes: &'a [Shape],
     buckets: &'a [Buckets],
@@ -189,7 +183,8 @@ impl pulp::WithSimd for OneBand<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> u64 {
-        let Attenuate { slab, frame, placed, sight, shapes, buckets } = *self.work;
+        let Attenuate { slab, geometry, sight, shapes, buckets } = *self.work;
+        let Geometry { frame, placed, voxels, .. } = geometry;
         let LightBand { band, sheet, slab: depths } = self.band;
         let planes = depths.len() / (band.rows.len() * band.width);
         let faces = frame.slabs.faces(slab);
@@ -200,16 +195,24 @@ impl pulp::WithSimd for OneBand<'_> {
             if sheet.is_empty() {
                 continue;
             }
-            let splatter = Splatter { placed, sight, shape: &shapes[v], buckets: &buckets[v] };
-            fragments += sheet.splat(simd, &splatter, band, self.index, slab);
-            sheet.finish(simd, band.stride);
+            match &voxels[v].values {
+                Values::Gathered(volume) => fragments += sheet.gather(simd, volume, band, faces),
+                Values::Splatted(_) => {
+                    let splatter = Splatter { placed, sight, shape: &shapes[v], buckets: &buckets[v] };
+                    fragments += sheet.splat(simd, &splatter, band, self.index, slab);
+                    sheet.finish(simd, band.stride);
+                }
+            }
             for y in 0..band.stored {
                 let mut x = sheet.spans[y].start;
                 while x < sheet.spans[y].end {
                     let k = y * band.stride + x;
                     let depth = sheet.depth(simd, k, &DepthSpans::WHOLE);
                     let length = depth * Lanes::load(simd, &band.stretch[k..]);
-                    let extinction = sheet.classify(simd, placed, k)[0];
+                    let mut extinction = Lanes::splat(simd, 0.0);
+                    if sheet.shown[y].contains(&x) {
+                        extinction = sheet.classify(simd, placed, k)[0];
+                    }
                     let tau = extinction * length;
                     let count = Lanes::<S>::COUNT.min(band.width.saturating_sub(x));
                     let sums = &mut self.sums[(y * band.width + x) * volumes + v..];

@@ -20,6 +20,9 @@ pub(crate) const ROWS: usize = 16;
 /// Rays whose cosine to the slabs' normal is less than this share of what is served meet no volume.
 const FLAT: f64 = 0.5;
 
+/// What a ray that meets a volume moves along the slabs at most, per unit of depth.
+pub(crate) const STEEPEST: f64 = 1.0 / (FLAT * LEAST_COSINE);
+
 /// The rays of a band; planes of `stored` rows of `stride` numbers.
 #[derive(Debug, Clone)]
 pub(crate) struct Band {

@@ -107,10 +107,14 @@ impl<'a> Placed<'a> {
 
     /// Who receives shadows there: places are slab coordinates.
     pub(crate) fn receivers<'b>(&'b self, voxels: &'b Voxels, rim: [usize; 3]) -> Receivers<'b> {
+        Receivers { volume: self.volume, voxels, rim, radius: self.reach as f32, rows: self.lattice_rows() }
+    }
+
+    /// Rows of what leads from slab coordinates to lattice coordinates.
+    pub(crate) fn lattice_rows(&self) -> [[f64; 4]; 3] {
         let inverse = self.axes.inverse();
         let start = inverse * -self.start;
-        let rows = [0, 1, 2].map(|a| [inverse.row(a).x, inverse.row(a).y, inverse.row(a).z, start[a]]);
-        Receivers { volume: self.volume, voxels, rim, radius: self.reach as f32, rows }
+        [0, 1, 2].map(|a| [inverse.row(a).x, inverse.row(a).y, inverse.row(a).z, start[a]])
     }
 
     /// Slab coordinates of a lattice point, counted from the corner of a rim.

@@ -5,7 +5,8 @@
 //! volume, however wide and slanted slabs are.
 //!
 //! Across the slabs a section stands for the slab's middle. Where a face of the volume, the eye's plane or something opaque cuts the slab, the
-//! middle of what is left lies before or behind that: there the section is interpolated towards the neighbouring slab's, pixel by pixel.
+//! middle of what is left lies before or behind that: there the section is interpolated towards the neighbouring slab's, pixel by pixel. Sheets that are
+//! gathered ([`super::gathered`]) read the lattice at that very place.
 
 use super::band::Band;
 use super::buckets::{Buckets, Record};
@@ -49,10 +50,12 @@ pub(crate) struct Sheet {
     pub(crate) weights: Vec<f32>,
     /// By row: columns that may be inside, whole vectors.
     pub(crate) spans: Vec<Range<usize>>,
+    /// By row: those of them that may have a value.
+    pub(crate) shown: Vec<Range<usize>>,
     /// By row: columns of which all rays that are inside cross the whole slab, the longest run.
     whole: Vec<Range<usize>>,
     /// Rows of which any is inside.
-    rows: Range<usize>,
+    pub(super) rows: Range<usize>,
     /// Depths that the places lie between.
     depths: DepthRange,
 }
@@ -68,6 +71,7 @@ impl Sheet {
             values: plane(),
             weights: plane(),
             spans: vec![0..0; band.stored],
+            shown: vec![0..0; band.stored],
             whole: vec![0..0; band.stored],
             rows: 0..0,
             depths: DepthRange { near: 0.0, far: 0.0 },
@@ -98,12 +102,14 @@ impl Sheet {
             // What other pixels ask of these is whether they are inside.
             self.near[y * band.stride + old.start..y * band.stride + old.end].fill(f32::INFINITY);
             self.spans[y] = 0..0;
+            self.shown[y] = 0..0;
             if !is_met {
                 continue;
             }
             let columns = hit.columns.start / count * count..hit.columns.end.next_multiple_of(count);
             if self.begin_row(simd, band, volume, y, columns.clone(), faces) {
-                self.spans[y] = columns;
+                self.spans[y] = columns.clone();
+                self.shown[y] = columns;
                 self.rows = if self.rows.is_empty() { y } else { self.rows.start }..y + 1;
             }
         }

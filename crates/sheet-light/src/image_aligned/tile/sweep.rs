@@ -58,7 +58,7 @@ impl VolumeScratch {
         let mask = picture.mask(prepared.volume.normals && prepared.gradients.is_none());
         if let Some(gathered) = &prepared.gathered {
             let lines = SheetLines { rays: &prepared.rays, slopes, slabs: &prepared.slabs, crossings: &self.crossings };
-            counts.fragments += gathered.batch(simd, &lines, batch, &mask, &mut self.sheets);
+            counts.fragments += lines.batch(simd, gathered, batch, &mask, &mut self.sheets);
             return;
         }
         let splatter = prepared.splatter();
