@@ -187,6 +187,22 @@ fn sources_of_fields_are_checked_at_their_place() {
 }
 
 #[test]
+fn values_that_a_scene_may_leave_to_the_plan_are_named_with_auto() {
+    let whole = "expected a whole number or \"auto\", found";
+    refused("[render]", "[render]\nantialias = \"fine\"", &format!("21:13: {whole} the text \"fine\""));
+    refused("[render]", "[render]\nantialias = 2.5", &format!("21:13: {whole}"));
+    refused("[render]", "[render]\nantialias = -1", &format!("21:13: {whole}"));
+    let exact = "expected true, false or \"auto\", found";
+    refused("slice_thickness = \"auto\"", "exact = \"yes\"", &format!("{exact} the text \"yes\""));
+    refused("slice_thickness = \"auto\"", "exact = 1", &format!("{exact} the number 1"));
+    refused(
+        "slice_thickness = \"auto\"",
+        "accumulation = \"f64\"",
+        "expected one of \"auto\", \"f32\", \"f16\", found \"f64\"",
+    );
+}
+
+#[test]
 fn bi22_numbers_out_of_range_name_the_range() {
     refused("opacity = 0.3", "opacity = 1.0001", "19:11: `opacity`: expected a number from 0 to 1, found 1.0001");
     refused("opacity = 0.3", "color = [-1, 0, 0]", "19:10: `color`: expected numbers from 0 to 1e30, found -1");

@@ -26,6 +26,7 @@ fn metadata() -> Metadata {
     Metadata {
         scene_sha256: "ab".repeat(32),
         scene: "version = 1\n".into(),
+        left_out: String::new(),
         technique: "points".into(),
         seed: u64::MAX,
         backend: "cpu".into(),

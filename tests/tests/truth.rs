@@ -407,7 +407,9 @@ mod deep {
         let bare = |point: Light| {
             let shape = LightShape::Point { position: point.shape.place().unwrap() };
             let light = Light { shape, ..point };
-            SceneLight { label: "0".to_owned(), light, slide: None, samples: 1, shadow: true, shadow_cells: None }
+            let label = "0".to_owned();
+            let slide = None;
+            SceneLight { label, light, slide, samples: 1, states_samples: true, shadow: true, shadow_cells: None }
         };
         whole.light.points(whole.samples).into_iter().map(bare).collect()
     }

@@ -335,6 +335,7 @@ impl Job<'_> {
             scene_sha256: self.scene.sha256.clone(),
             scene: self.told.clone() + &changes.collect::<String>(),
             technique: render.plan.technique.clone(),
+            left_out: render.plan.left_out_text(),
             seed: self.scene.render.seed,
             backend: render.backend.clone(),
             sets: render.sets.map(|s| s.averaged),

@@ -85,6 +85,12 @@ pub(super) fn plan_text(plan: &Plan) -> String {
     text += "without it: how much a pixel as it is displayed could change at most, of black to white; - where no bound is known\n";
     text.push('\n');
     text += &estimates_text(plan);
+    let settings = plan.settings.iter().map(|setting| {
+        let by = if setting.is_stated { "scene" } else { "plan" };
+        [setting.key.clone(), setting.value.clone(), by.to_owned(), setting.reason.clone()]
+    });
+    text += &table(["setting", "value", "by", "why"], "llll", settings);
+    text.push('\n');
     let passes = plan.passes.iter().map(|p| [p.name.clone(), p.reason.clone()]);
     text += &table(["pass", "what for"], "ll", passes);
     if !plan.chosen().is_empty() {

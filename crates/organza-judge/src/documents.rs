@@ -2,7 +2,7 @@
 
 use crate::effects::{EffectChange, FixedEffect, Measured};
 use organza::cost::{CountedPass, Prediction};
-use organza::plan::{Estimate, Plan, PlannedObject};
+use organza::plan::{Estimate, Plan, PlannedObject, PlannedSetting};
 use organza::scene::{FoundCamera, Scene, SceneObject, UpBy};
 use organza::{CostRecord, ShadowTable, SplatCount};
 use serde_json::{Value, json};
@@ -90,6 +90,7 @@ pub fn plan_json(plan: &Plan) -> Value {
         "technique": plan.technique,
         "effects": effects.collect::<Value>(),
         "estimates": plan.estimates.iter().map(|e| estimate_json(plan, e)).collect::<Value>(),
+        "settings": plan.settings.iter().map(setting_json).collect::<Value>(),
         "passes": passes.collect::<Value>(),
         "optical_depth_planes": plan.optical_depth_planes,
         "shadow_maps": plan.shadow_maps,
@@ -106,6 +107,11 @@ fn estimate_json(plan: &Plan, estimate: &Estimate) -> Value {
         "displayed_error": error.is_finite().then_some(error),
         "draws": plan.is_drawn_as(estimate), "reason": estimate.words,
     })
+}
+
+fn setting_json(setting: &PlannedSetting) -> Value {
+    let PlannedSetting { key, value, is_stated, reason } = setting;
+    json!({ "key": key, "value": value, "stated": is_stated, "reason": reason })
 }
 
 fn table_json(t: &ShadowTable) -> Value {

@@ -50,6 +50,8 @@ pub struct Metadata {
     pub scene: String,
     /// Name of the technique that drew it.
     pub technique: String,
+    /// Effects that the picture lacks, each with its bound; empty where it lacks none.
+    pub left_out: String,
     /// Seed of everything random.
     pub seed: u64,
     /// Name of the backend that drew it.

@@ -14,6 +14,7 @@ pub(super) fn pairs(metadata: &Metadata) -> Vec<(&'static str, String)> {
         ("organza:seed", metadata.seed.to_string()),
         ("organza:backend", metadata.backend.clone()),
     ];
+    texts.extend((!metadata.left_out.is_empty()).then(|| ("organza:left_out", metadata.left_out.clone())));
     texts.extend(metadata.sets.map(|sets| ("organza:sets", sets.to_string())));
     texts
         .extend((1..=LONGEST_SCENE).contains(&metadata.scene.len()).then(|| ("organza:scene", metadata.scene.clone())));

@@ -32,6 +32,7 @@ impl Picture {
             scene_sha256: scene.sha256.clone(),
             scene: text.to_owned(),
             technique: render.plan.technique.clone(),
+            left_out: render.plan.left_out_text(),
             seed: scene.render.seed,
             backend: render.backend.clone(),
             sets: render.sets.map(|sets| sets.averaged),

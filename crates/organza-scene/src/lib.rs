@@ -53,7 +53,8 @@ pub use render::layer_choice::{LAYER_NAMES, LayerChoice};
 pub use render::settings::{
     Aligned, Bending, Classify, Collisions, Coverage, Goal, Grouping, OpaqueSurfels, ParticlesSettings, PointsSettings,
     Reconstruction, RenderSettings, Scattering, ShadowMapping, ShadowSettings, SheetKernel, SheetsSettings, Slicing,
-    SoftShadows, SurfaceSampler, SurfelGroups, SurfelLayers, SurfelsSettings, Technique, TechniqueKey, VolumeSampler,
+    SoftShadows, Stated, SurfaceSampler, SurfelGroups, SurfelLayers, SurfelsSettings, Technique, TechniqueKey,
+    VolumeSampler,
 };
 pub use scene::model::Scene;
 pub use shown::{escape_controls, place, printable, short, shown};

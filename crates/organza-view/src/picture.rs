@@ -273,6 +273,7 @@ impl Drawn {
             scene_sha256: scene.sha256.clone(),
             scene: request.told.clone(),
             technique: render.plan.technique.clone(),
+            left_out: render.plan.left_out_text(),
             seed: scene.render.seed,
             backend: render.backend.clone(),
             sets: render.sets.map(|sets| sets.averaged),

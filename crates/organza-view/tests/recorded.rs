@@ -122,6 +122,7 @@ fn files_are_those_of_the_command() {
         scene_sha256: scene.sha256.clone(),
         scene: HEAD.to_owned(),
         technique: render.plan.technique.clone(),
+        left_out: render.plan.left_out_text(),
         seed: scene.render.seed,
         backend: "cpu".into(),
         sets: None,

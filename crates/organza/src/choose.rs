@@ -5,9 +5,11 @@
 
 mod effects;
 mod passes;
+mod settings;
 pub(crate) mod settle;
 
 pub(crate) use effects::{displayed, plan, technique_effect};
+pub(crate) use settings::settings;
 
 use crate::escape_controls;
 use crate::form::{DRAWN, Form, PlannedObject};

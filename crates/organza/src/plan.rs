@@ -73,6 +73,30 @@ pub struct Estimate {
     pub words: String,
 }
 
+/// A setting that a scene states or leaves to the plan by `"auto"`, with the value that the picture has.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct PlannedSetting {
+    /// Its key, as a scene has it, such as `render.antialias`.
+    pub key: String,
+    /// The value that the picture is drawn with, as a scene has it.
+    pub value: String,
+    /// Whether the scene states a value.
+    pub is_stated: bool,
+    /// Why it has this value.
+    pub reason: String,
+}
+
+impl PlannedSetting {
+    /// A setting of which the scene states the value, or else the plan takes it for this reason.
+    pub(crate) fn new(key: impl Into<String>, value: impl ToString, is_stated: bool, reason: &str) -> Self {
+        let reason = if is_stated { STATED } else { reason };
+        Self { key: key.into(), value: value.to_string(), is_stated, reason: reason.to_owned() }
+    }
+}
+
+/// Why a setting has the value that a scene states.
+const STATED: &str = "the scene states it";
+
 /// One pass that will run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PlannedPass {
@@ -95,6 +119,8 @@ pub struct Plan {
     pub estimates: Vec<Estimate>,
     /// Effects of objects that are left out by their bounds: the picture is that of a scene without their causes.
     pub left_out: Vec<SwitchedEffect>,
+    /// Settings that have a part in the picture and that a scene may leave to the plan.
+    pub settings: Vec<PlannedSetting>,
     /// Passes in the order of running.
     pub passes: Vec<PlannedPass>,
     /// Planes of optical depth, or depth buffers of particles: 1 when all materials absorb red, green and blue alike, else 3.
@@ -145,6 +171,22 @@ impl Plan {
     /// Whether the picture shows light that was out of the view before.
     pub(crate) fn leaves_view(&self) -> bool {
         self.bends || self.scatters_again || self.carried.contains(&true)
+    }
+
+    /// The effects that the picture lacks, each with what a displayed pixel could change by it at most, as files of the picture name them; empty where it
+    /// lacks none. Those that would change nothing are not named.
+    pub fn left_out_text(&self) -> String {
+        let is_lacked = |effect: &&Effect| {
+            let is_off = !effect.called_for && !effect.is_absent && effect.bound != Bound::Nothing;
+            effect.is_lacking || is_off
+        };
+        let one = |effect: &Effect| {
+            let bound = effect.bound.number();
+            let most = bound.map_or("no bound is known".to_owned(), |share| format!("at most {:.2e}", share));
+            format!("{} ({most})", effect.name)
+        };
+        let lacked: Vec<String> = self.effects.iter().filter(is_lacked).map(one).collect();
+        lacked.join(", ")
     }
 
     /// Whether an estimate is of the technique that draws its object.
@@ -243,5 +285,32 @@ impl Plan {
         let tables = self.shadow_tables.iter_mut().chain(&mut self.other_tables).flatten();
         tables.for_each(|table| table.max_bytes = bytes);
         self.shadow_bytes = bytes;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_picture_names_what_it_lacks_with_bounds() {
+        let effect = |name: &str, called_for: bool, bound: Bound, is_lacking: bool| Effect {
+            name: name.into(),
+            what: "",
+            called_for,
+            reason: String::new(),
+            bound,
+            is_lacking,
+            is_absent: false,
+        };
+        let effects = vec![
+            effect("light.key", true, Bound::AtMost(1.0), false),
+            effect("light.fill", false, Bound::AtMost(0.00125), false),
+            effect("object.lamp", false, Bound::Nothing, false),
+            effect("scatter", true, Bound::Unknown, true),
+        ];
+        let plan = Plan { effects, ..Plan::default() };
+        assert_eq!(plan.left_out_text(), "light.fill (at most 1.25e-3), scatter (no bound is known)");
+        assert_eq!(Plan::default().left_out_text(), "");
     }
 }

@@ -7,7 +7,7 @@ mod seen;
 
 use crate::brightness::{self, Brightness};
 use crate::choose::settle;
-use crate::choose::{choose, plan, row, same_forms, technique_of, techniques, unshown};
+use crate::choose::{choose, plan, row, same_forms, settings, technique_of, techniques, unshown};
 use crate::cost::{Count, Prediction, Translucent};
 use crate::form::PlannedObject;
 use crate::frame::Frame;
@@ -428,6 +428,7 @@ fn plan_counted(
     }
     let memory = memory.with_maps(shadows::bytes(plan.tables()));
     memory::check("rendering", memory.total(), options.max_memory)?;
+    plan.settings = settings(scene, loaded, &plan);
     Ok(Planned { plan, memory, statistics, census })
 }
 

@@ -20,7 +20,7 @@ use crate::frame::matter::{CarriesLight, Matter};
 use crate::frame::{Frame, OpaqueEngines};
 use crate::load::Loaded;
 use crate::pass;
-use crate::plan::{Estimate, Plan};
+use crate::plan::{Estimate, Plan, PlannedSetting};
 use crate::scene::{LightPoint, RenderSettings, Scene, Technique};
 use crate::stage;
 use crate::statistics::{MediumFacts, ObjectStatistics};
@@ -106,6 +106,8 @@ pub(crate) struct Row {
     /// Settings with which it scatters light again and again, if it draws alone all that is translucent; `None` where it cannot or a scene states
     /// otherwise. `auto` takes them with the technique.
     pub(crate) scattering_again: fn(&RenderSettings) -> Option<RenderSettings>,
+    /// Settings of its own that have a part in a planned picture and that a scene may leave to the plan.
+    pub(crate) settings: fn(&Scene, &Loaded, &Plan) -> Vec<PlannedSetting>,
     /// Adds effects and passes of its own to the plan of a scene that it draws, and takes out what it does not need.
     pub(crate) plans: fn(&Scene, &Loaded, &mut Plan),
     /// What repeats its last pass, in words; empty where nothing does.
@@ -229,6 +231,7 @@ pub(crate) static TABLE: [Row; 5] = [
         skips_behind_finished: false,
         steps: &[Step { pass: pass::PARTICLES, stage: stage::PARTICLES, counts: particles::counts }],
         is_random: true,
+        settings: |_, _, _| Vec::new(),
         repeats: |scene| format!("{} sets", scene.render.particles.repeat_level),
         bytes: |matter, _, colored, options| particles::bytes(matter.scene, colored, options),
         begin: particles::begin,
@@ -255,6 +258,7 @@ pub(crate) static TABLE: [Row; 5] = [
         scatters_by: Some(
             "technique = \"sheets\" with [render.sheets] slicing = \"half_vector\" and scattering = \"forward_and_back\"",
         ),
+        settings: sheets::settings,
         plans: sheets::plans,
         scattering_again: |settings| {
             let sheets = settings.sheets.scattering_again()?;
@@ -272,6 +276,7 @@ pub(crate) static TABLE: [Row; 5] = [
         bumps: surfels::bumps,
         gaussians: false,
         meets_discs: true,
+        settings: |_, _, _| Vec::new(),
         skips_hidden: false,
         by_device: false,
         skips_behind_finished: false,
@@ -297,6 +302,7 @@ pub(crate) static TABLE: [Row; 5] = [
             counts: |_, all| vec![Count::new(Item::ExactFragment, all.fragments)],
         }],
         bytes: |matter, _, _, _| reference::bytes(matter.scene),
+        settings: |_, _, _| Vec::new(),
         begin: reference::begin,
         ..POINTS
     },
@@ -344,6 +350,7 @@ const POINTS: Row = Row {
     carries: |_| None,
     scatters_by: None,
     scattering_again: |_| None,
+    settings: points::settings,
     plans: |_, _, _| {},
     repeats: |_| String::new(),
     counts_groups: |_, _| Vec::new(),

@@ -5,6 +5,7 @@ use crate::light::raw::{RawLight, RawLightShadow};
 use crate::light::slide::{SlideKeys, check_slide};
 use crate::limits::{LARGEST, MOST_SHADOW_CELLS, SMALLEST};
 use crate::paths::Paths;
+use crate::render::raw::Whole;
 use crate::{Error, SceneLight, shown};
 use glam::DVec3;
 use splat_core::{Light, LightShape};
@@ -12,6 +13,9 @@ use std::collections::HashMap;
 
 /// Most points that an extended light may be taken for.
 const MOST_LIGHT_SAMPLES: u32 = 1_000_000;
+
+/// Points that the plan takes an extended light for.
+const SAMPLES: u32 = 16;
 
 /// Checks all lights.
 pub(crate) fn check_lights(at_lights: &At<'_>, raw: &[RawLight], paths: &Paths) -> Result<Vec<SceneLight>, Error> {
@@ -60,12 +64,15 @@ fn check_light(at: &At<'_>, raw: &RawLight, paths: &Paths) -> Result<SceneLight,
         light: Light { shape, intensity },
         slide: None,
         samples: 1,
+        states_samples: false,
         shadow,
         shadow_cells: None,
     };
     let extended = |shape, intensity, samples, shadow| {
-        let samples = at.whole("samples", samples, 1..=MOST_LIGHT_SAMPLES)?;
-        Ok(SceneLight { samples, ..scene_light(shape, at.color("intensity", intensity)?, shadow) })
+        let stated = Whole::stated(samples);
+        let samples = at.whole("samples", stated.unwrap_or(SAMPLES), 1..=MOST_LIGHT_SAMPLES)?;
+        let light = scene_light(shape, at.color("intensity", intensity)?, shadow);
+        Ok(SceneLight { samples, states_samples: stated.is_some(), ..light })
     };
     match *raw {
         RawLight::Point { position, intensity, shadow, .. } => {

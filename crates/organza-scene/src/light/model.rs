@@ -14,6 +14,8 @@ pub struct SceneLight {
     pub slide: Option<SlideSource>,
     /// Points that a technique which lights by points takes an extended light for, ≥ 1; 1 for any other.
     pub samples: u32,
+    /// Whether the scene states them; else the plan chooses.
+    pub states_samples: bool,
     /// Whether it casts shadows.
     pub shadow: bool,
     /// Cells along a side of its shadow map; `None` for those of [`crate::ShadowSettings`].

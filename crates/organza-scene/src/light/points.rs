@@ -68,6 +68,7 @@ mod tests {
             light: Light { shape, intensity: [6.0; 3] },
             slide: None,
             samples,
+            states_samples: true,
             shadow,
             shadow_cells: None,
         };

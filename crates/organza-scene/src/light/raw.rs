@@ -1,14 +1,11 @@
 //! Lights as they are written.
 
+use crate::render::raw::Whole;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
 fn yes() -> bool {
     true
-}
-
-fn sixteen() -> u32 {
-    16
 }
 
 /// A light.
@@ -92,9 +89,8 @@ pub(crate) enum RawLight {
         radius: f64,
         /// Radiant intensity of the whole light per channel, seen from far away, W/sr or relative.
         intensity: [f64; 3],
-        /// Number of points that replace the light in techniques that light by points; default 16.
-        #[serde(default = "sixteen")]
-        samples: u32,
+        /// Number of points that replace the light in techniques that light by points, or "auto" (the default): the plan takes 16.
+        samples: Option<Whole>,
         /// Whether it casts shadows; default true.
         #[serde(default = "yes")]
         shadow: bool,
@@ -113,9 +109,8 @@ pub(crate) enum RawLight {
         radius: f64,
         /// Radiant intensity of the whole light per channel, along its normal, seen from far away, W/sr or relative.
         intensity: [f64; 3],
-        /// Number of points that replace the light in techniques that light by points; default 16.
-        #[serde(default = "sixteen")]
-        samples: u32,
+        /// Number of points that replace the light in techniques that light by points, or "auto" (the default): the plan takes 16.
+        samples: Option<Whole>,
         /// Whether it casts shadows; default true.
         #[serde(default = "yes")]
         shadow: bool,
@@ -134,9 +129,8 @@ pub(crate) enum RawLight {
         v: [f64; 3],
         /// Radiant intensity of the whole light per channel, along its normal, seen from far away, W/sr or relative.
         intensity: [f64; 3],
-        /// Number of points that replace the light in techniques that light by points; default 16.
-        #[serde(default = "sixteen")]
-        samples: u32,
+        /// Number of points that replace the light in techniques that light by points, or "auto" (the default): the plan takes 16.
+        samples: Option<Whole>,
         /// Whether it casts shadows; default true.
         #[serde(default = "yes")]
         shadow: bool,

@@ -3,9 +3,9 @@
 use crate::at::At;
 use crate::limits::{LARGEST, MOST_SHADOW_CELLS, SMALLEST};
 use crate::render::raw::{
-    Auto, RawAccumulation, RawAligned, RawClassify, RawDirection, RawGoal, RawGradients, RawKernel, RawMapping,
+    Auto, Choice, RawAccumulation, RawAligned, RawClassify, RawDirection, RawGoal, RawGradients, RawKernel, RawMapping,
     RawParticles, RawPoints, RawReconstruction, RawRender, RawScattering, RawShadow, RawSheets, RawSlicing,
-    RawSoftShadows, RawSurfaceSampler, RawVolumeSampler,
+    RawSoftShadows, RawSurfaceSampler, RawVolumeSampler, Whole,
 };
 use crate::render::surfels_check::check_surfels;
 use crate::text::de::suggest;
@@ -13,7 +13,7 @@ use crate::text::tree::Value;
 use crate::{
     Aligned, Classify, Error, Goal, LAYER_NAMES, LayerChoice, ParticlesSettings, PointsSettings, Reconstruction,
     RenderSettings, Scattering, ShadowMapping, ShadowSettings, SheetKernel, SheetsSettings, Slicing, SoftShadows,
-    SurfaceSampler, Technique, TechniqueKey, VolumeSampler, shown,
+    Stated, SurfaceSampler, Technique, TechniqueKey, VolumeSampler, shown,
 };
 use splat_core::{Accumulation, Direction};
 
@@ -37,7 +37,13 @@ pub(crate) fn check_render(at: &At<'_>, raw: &RawRender) -> Result<RenderSetting
     Ok(RenderSettings {
         technique,
         is_chosen: false,
-        antialias: at.whole("antialias", raw.antialias.unwrap_or(2), 1..=8)?,
+        antialias: at.whole("antialias", Whole::stated(raw.antialias).unwrap_or(2), 1..=8)?,
+        stated: Stated {
+            antialias: Whole::stated(raw.antialias).is_some(),
+            exact: Choice::stated(raw.points.exact).is_some(),
+            accumulation_of_points: raw.points.accumulation != RawAccumulation::Auto,
+            accumulation_of_sheets: raw.sheets.accumulation != RawAccumulation::Auto,
+        },
         tolerance,
         exposure: at.number("exposure", raw.exposure.unwrap_or(0.0), -60.0..=60.0)?,
         depth_ranges: at.whole("depth_ranges", raw.depth_ranges.unwrap_or(16), 1..=1024)?,
@@ -175,7 +181,7 @@ fn check_points(at: &At<'_>, raw: &RawPoints) -> Result<PointsSettings, Error> {
     }
     Ok(PointsSettings {
         slice_thickness,
-        exact: raw.exact.unwrap_or(true),
+        exact: Choice::stated(raw.exact).unwrap_or(true),
         direction: match raw.direction {
             RawDirection::FrontToBack => Direction::FrontToBack,
             RawDirection::BackToFront => Direction::BackToFront,
@@ -189,7 +195,7 @@ fn check_points(at: &At<'_>, raw: &RawPoints) -> Result<PointsSettings, Error> {
 
 fn check_accumulation(raw: RawAccumulation) -> Accumulation {
     match raw {
-        RawAccumulation::F32 => Accumulation::F32,
+        RawAccumulation::Auto | RawAccumulation::F32 => Accumulation::F32,
         RawAccumulation::F16 => Accumulation::F16,
     }
 }

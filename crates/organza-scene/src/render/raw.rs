@@ -12,8 +12,8 @@ use std::collections::BTreeMap;
 pub(crate) struct RawRender {
     /// "auto", "points", "particles", "sheets", "surfels" or "reference"; default "auto", which is "points".
     pub(crate) technique: Option<String>,
-    /// Samples along each side of a pixel, 1 to 8; default 2.
-    pub(crate) antialias: Option<u32>,
+    /// Samples along each side of a pixel, 1 to 8, or "auto" (the default): the plan takes 2.
+    pub(crate) antialias: Option<Whole>,
     /// Largest change of a displayed pixel by what is not simulated, above 0, at most 1; default 1/255.
     pub(crate) tolerance: Option<f64>,
     /// Exposure of the displayed picture in stops; default 0.
@@ -107,7 +107,7 @@ pub(crate) struct RawSheets {
     pub(crate) kernel_sigma: Option<f64>,
     /// Sections of a kernel in a slab's width, the places within a slab where it may begin: a power of two up to 256, the default.
     pub(crate) kernel_sections: Option<u32>,
-    /// Precision of the sums of voxels in a slab and of slabs in a pixel, "f32" (default) or "f16".
+    /// Precision of the sums of voxels in a slab and of slabs in a pixel, "f32", "f16" or "auto" (the default): the plan takes "f32".
     pub(crate) accumulation: RawAccumulation,
     /// Where normals come from, "sheets" (default), differences of neighbouring pixels and slabs, or "volume", differences at voxels.
     pub(crate) gradients: RawGradients,
@@ -233,8 +233,8 @@ pub(crate) enum RawVolumeSampler {
 pub(crate) struct RawPoints {
     /// Thickness of a slice in world units, or "auto" (the default).
     pub(crate) slice_thickness: Option<Auto>,
-    /// Exact order inside slices too; default true.
-    pub(crate) exact: Option<bool>,
+    /// Exact order inside slices too, true, false or "auto" (the default): the plan takes true.
+    pub(crate) exact: Option<Choice>,
     /// "front_to_back" (default) or "back_to_front".
     pub(crate) direction: RawDirection,
     /// Composite only so many non-empty slices.
@@ -243,7 +243,7 @@ pub(crate) struct RawPoints {
     pub(crate) transmittance_cutoff: Option<f64>,
     /// Widen footprints to a pixel; default true.
     pub(crate) resampling_filter: Option<bool>,
-    /// Precision of the running sums, "f32" (default) or "f16".
+    /// Precision of the running sums, "f32", "f16" or "auto" (the default): the plan takes "f32".
     pub(crate) accumulation: RawAccumulation,
 }
 
@@ -263,6 +263,7 @@ pub(crate) enum RawDirection {
 #[schemars(rename = "Accumulation")]
 pub(crate) enum RawAccumulation {
     #[default]
+    Auto,
     F32,
     F16,
 }
@@ -370,5 +371,98 @@ impl JsonSchema for Auto {
 
     fn json_schema(_: &mut schemars::SchemaGenerator) -> schemars::Schema {
         schemars::json_schema!({ "anyOf": [{ "type": "number" }, { "const": "auto" }] })
+    }
+}
+
+/// A whole number, or "auto".
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Whole {
+    Auto,
+    Number(u32),
+}
+
+impl Whole {
+    /// The number that a scene states; `None` where it leaves the value to the plan.
+    pub(crate) fn stated(value: Option<Self>) -> Option<u32> {
+        match value {
+            None | Some(Self::Auto) => None,
+            Some(Self::Number(number)) => Some(number),
+        }
+    }
+}
+
+impl<'de> Deserialize<'de> for Whole {
+    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct WholeVisitor;
+        impl serde::de::Visitor<'_> for WholeVisitor {
+            type Value = Whole;
+            fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                f.write_str("a whole number or \"auto\"")
+            }
+            fn visit_i64<E: serde::de::Error>(self, v: i64) -> Result<Whole, E> {
+                let number = u32::try_from(v);
+                number.map(Whole::Number).map_err(|_| E::invalid_value(serde::de::Unexpected::Signed(v), &self))
+            }
+            fn visit_str<E: serde::de::Error>(self, v: &str) -> Result<Whole, E> {
+                if v == "auto" { Ok(Whole::Auto) } else { Err(E::invalid_value(serde::de::Unexpected::Str(v), &self)) }
+            }
+        }
+        deserializer.deserialize_any(WholeVisitor)
+    }
+}
+
+impl JsonSchema for Whole {
+    fn schema_name() -> std::borrow::Cow<'static, str> {
+        "Whole".into()
+    }
+
+    fn json_schema(_: &mut schemars::SchemaGenerator) -> schemars::Schema {
+        schemars::json_schema!({ "anyOf": [{ "type": "integer", "minimum": 0 }, { "const": "auto" }] })
+    }
+}
+
+/// True, false, or "auto".
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Choice {
+    Auto,
+    Is(bool),
+}
+
+impl Choice {
+    /// The value that a scene states; `None` where it leaves the value to the plan.
+    pub(crate) fn stated(value: Option<Self>) -> Option<bool> {
+        match value {
+            None | Some(Self::Auto) => None,
+            Some(Self::Is(is)) => Some(is),
+        }
+    }
+}
+
+impl<'de> Deserialize<'de> for Choice {
+    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct ChoiceVisitor;
+        impl serde::de::Visitor<'_> for ChoiceVisitor {
+            type Value = Choice;
+            fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                f.write_str("true, false or \"auto\"")
+            }
+            fn visit_bool<E: serde::de::Error>(self, v: bool) -> Result<Choice, E> {
+                Ok(Choice::Is(v))
+            }
+            fn visit_str<E: serde::de::Error>(self, v: &str) -> Result<Choice, E> {
+                if v == "auto" { Ok(Choice::Auto) } else { Err(E::invalid_value(serde::de::Unexpected::Str(v), &self)) }
+            }
+        }
+        deserializer.deserialize_any(ChoiceVisitor)
+    }
+}
+
+impl JsonSchema for Choice {
+    fn schema_name() -> std::borrow::Cow<'static, str> {
+        "Choice".into()
+    }
+
+    fn json_schema(_: &mut schemars::SchemaGenerator) -> schemars::Schema {
+        schemars::json_schema!({ "anyOf": [{ "type": "boolean" }, { "const": "auto" }] })
     }
 }

@@ -12,6 +12,8 @@ pub struct RenderSettings {
     pub is_chosen: bool,
     /// Samples along each side of a pixel, 1 to 8.
     pub antialias: u32,
+    /// The values that the scene states; the plan chooses those that it leaves open.
+    pub stated: Stated,
     /// How much any pixel of the displayed picture may change by what is not simulated, in (0, 1].
     pub tolerance: f64,
     /// Exposure of the displayed picture: radiance is multiplied by 2^exposure.
@@ -40,6 +42,19 @@ pub struct RenderSettings {
     pub sheets: SheetsSettings,
     /// Settings of the `surfels` technique.
     pub surfels: SurfelsSettings,
+}
+
+/// Whether a scene states the values which it may leave to the plan by `"auto"`, the default.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Stated {
+    /// [`RenderSettings::antialias`].
+    pub antialias: bool,
+    /// [`PointsSettings::exact`].
+    pub exact: bool,
+    /// [`PointsSettings::accumulation`].
+    pub accumulation_of_points: bool,
+    /// [`SheetsSettings::accumulation`].
+    pub accumulation_of_sheets: bool,
 }
 
 /// A key that is written in the table of a technique.

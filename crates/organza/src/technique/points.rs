@@ -4,13 +4,15 @@ mod on_device;
 
 use crate::device;
 use crate::frame::{Frame, Shaded, record};
+use crate::load::Loaded;
 use crate::pass;
-use crate::scene::Technique;
+use crate::plan::{Plan, PlannedSetting};
+use crate::scene::{Scene, Technique};
 use crate::technique::{EVERYWHERE, Fold, Session};
 use crate::{CostRecord, Error, stage};
 use splat_core::raster;
 use splat_core::raster::FoldInput;
-use splat_core::{Accumulator, Direction, SliceOrder};
+use splat_core::{Accumulation, Accumulator, Direction, SliceOrder};
 use std::borrow::Cow;
 use std::ops::Range;
 
@@ -85,17 +87,62 @@ pub(super) fn sorted(
     })
 }
 
+/// Why splats are in exact order inside slices whatever a scene states; `None` where it decides.
+fn exact_because(depths: bool, plan: &Plan, loaded: &Loaded) -> Option<&'static str> {
+    // Depths are made from splats in order, not from slices, and Gaussians were fitted to pictures in order. Of thick media the first splats
+    // hide the others of their slice.
+    if depths {
+        Some("layers of depth are made from splats in order")
+    } else if plan.eye_table.is_some() {
+        Some("the first splats of a thick medium hide the others of their slice")
+    } else if !loaded.cloud.gaussians.is_empty() {
+        Some("3D Gaussians were fitted to pictures in exact order")
+    } else {
+        None
+    }
+}
+
+/// Settings of the order and of the sums of translucent splats, where there are any.
+pub(crate) fn settings(scene: &Scene, loaded: &Loaded, plan: &Plan) -> Vec<PlannedSetting> {
+    if !plan.passes.iter().any(|planned| planned.name == pass::SORT) {
+        return Vec::new();
+    }
+    let points = &scene.render.points;
+    let stated = scene.render.stated;
+    let because = exact_because(scene.render.layers.set().depth, plan, loaded);
+    let plain = because.unwrap_or("splats that slices alone order are seen in another order, and cost nearly as much");
+    let key = "render.points.exact";
+    let exact = match because {
+        Some(reason) if !points.exact => PlannedSetting {
+            key: key.to_owned(),
+            value: "true".to_owned(),
+            is_stated: stated.exact,
+            reason: format!("the scene states false, and {reason}"),
+        },
+        _ => PlannedSetting::new(key, points.exact, stated.exact, plain),
+    };
+    let precision = precision(points.accumulation);
+    let is_stated = stated.accumulation_of_points;
+    vec![exact, PlannedSetting::new("render.points.accumulation", precision, is_stated, IN_F32)]
+}
+
+/// Why the plan takes single precision for sums.
+pub(crate) const IN_F32: &str = "sums of half precision stall where many terms are added";
+
+/// A precision, as a scene has it.
+pub(crate) fn precision(accumulation: Accumulation) -> &'static str {
+    match accumulation {
+        Accumulation::F32 => "\"f32\"",
+        Accumulation::F16 => "\"f16\"",
+    }
+}
+
 fn sort_params(frame: &Frame<'_>) -> hbsort::Params {
     let points = &frame.settings.points;
     hbsort::Params {
         direction: points.direction,
         thickness: frame.loaded.slice_thickness.map_or(hbsort::Thickness::Auto, hbsort::Thickness::World),
-        // Depths are made from splats in order, not from slices, and Gaussians were fitted to pictures in order. Of thick media the first splats
-        // hide the others of their slice.
-        exact: points.exact
-            || frame.layers.depth
-            || frame.plan.eye_table.is_some()
-            || !frame.loaded.cloud.gaussians.is_empty(),
+        exact: points.exact || exact_because(frame.layers.depth, frame.plan, frame.loaded).is_some(),
         margin_px: frame.filter_reach_px(),
         ..hbsort::Params::default()
     }

@@ -15,10 +15,10 @@ use crate::frame::{Extent, Frame, Shaded};
 use crate::load::Loaded;
 use crate::load::own::{Body, Own};
 use crate::pass;
-use crate::plan::{Bound, Effect, Plan};
+use crate::plan::{Bound, Effect, Plan, PlannedSetting};
 use crate::scene::{self, LightPoint, Scene, Technique};
 use crate::statistics::{MediumFacts, ObjectData, ObjectStatistics};
-use crate::technique::{Asked, Fold, OwnWork, Session};
+use crate::technique::{Asked, Fold, OwnWork, Session, points};
 use crate::{CostRecord, Error, RenderOptions, memory, stage};
 use sheet_light::half::{HalfParams, pane_bytes, polygon_bytes};
 use sheet_light::{
@@ -158,6 +158,13 @@ pub(crate) fn plans(scene: &Scene, loaded: &Loaded, plan: &mut Plan) {
         is_lacking: false,
         is_absent: false,
     });
+}
+
+/// The precision of the sums of slabs, which every planned picture of this technique has.
+pub(crate) fn settings(scene: &Scene, _: &Loaded, _: &Plan) -> Vec<PlannedSetting> {
+    let precision = points::precision(scene.render.sheets.accumulation);
+    let is_stated = scene.render.stated.accumulation_of_sheets;
+    vec![PlannedSetting::new("render.sheets.accumulation", precision, is_stated, points::IN_F32)]
 }
 
 pub(crate) use half::carries;
