@@ -57,6 +57,7 @@ mod point_materials;
 mod point_opacity;
 mod predicted;
 mod progress;
+mod random_effects;
 mod reading;
 mod scan_shadows;
 mod shadow_tables;

@@ -128,13 +128,16 @@ fn drawn(
     };
     let measured = effects::measure(&render.plan, &fitted, &switched, options, progress)?;
     progress.leave();
+    let mut warnings = render.warnings;
+    let contradictions = measured.contradictions(&render.plan);
+    warnings.extend(contradictions.into_iter().map(|sentence| format!("{sentence}: please report this scene")));
     Ok(Explained {
         plan: render.plan,
         cost: render.cost,
         predicted: render.predicted,
         prepared: None,
         measured: Some(measured),
-        warnings: render.warnings,
+        warnings,
         notes: render.notes,
         found: render.found,
     })

@@ -52,6 +52,44 @@ pub struct Measured {
     pub left_out_together: Option<f64>,
     /// The splats that got light; `None` where no technique draws splats that were lit before.
     pub lit: Option<LitSplats>,
+    /// Names of the passes that drew the picture as planned.
+    pub passes: Vec<String>,
+}
+
+/// By how much a displayed value may differ beyond a bound: splats of a scene without an object are rounded about another origin.
+const ROUNDING: f64 = 1e-5;
+
+impl Measured {
+    /// What the pictures contradict of the plan that they were drawn by, a sentence each: an effect that changes a pixel by more than its bound, effects that
+    /// were left out and change one by more than all of their bounds together, a pass that the plan does not have.
+    ///
+    /// A plan that was proved has none.
+    pub fn contradictions(&self, plan: &Plan) -> Vec<String> {
+        let percent = |share: f64| format!("{:.2} %", 100.0 * share);
+        let effect = |name: &str| plan.effects.iter().find(|effect| effect.name == name);
+        let mut found = Vec::new();
+        for change in &self.changes {
+            let bound = effect(&change.name).and_then(|effect| effect.bound.number());
+            if let Some(bound) = bound.filter(|bound| change.largest > bound + ROUNDING) {
+                let changes = percent(change.largest);
+                let bound = percent(bound);
+                found.push(format!("`{}` changes a pixel by {changes}, beyond its bound of {bound}", change.name));
+            }
+        }
+        let left_out = plan.effects.iter().filter(|effect| !is_simulated(effect) && !effect.is_absent);
+        let sum: Option<f64> = left_out.map(|effect| effect.bound.number()).sum();
+        if let (Some(change), Some(sum)) = (self.left_out_together, sum)
+            && change > sum + ROUNDING
+        {
+            let changes = percent(change);
+            let bounds = percent(sum);
+            found.push(format!("all that is left out changes a pixel by {changes}, beyond bounds of {bounds}"));
+        }
+        let is_planned = |name: &&String| plan.passes.iter().any(|pass| pass.name == **name);
+        let unasked = self.passes.iter().filter(|name| !is_planned(name));
+        found.extend(unasked.map(|name| format!("the pass `{name}` runs, which the plan does not have")));
+        found
+    }
 }
 
 /// The splats of a picture that got light. The others are seen nowhere: opaque ones or finished pixels hide them.
@@ -102,7 +140,8 @@ pub fn measure(
     progress.plan((0..count).map(|rank| (stage(plan, rank), 1.0)));
     progress.begin(&stage(plan, 0));
     let planned = pictures.draw(scene)?;
-    let mut measured = Measured { seconds: planned.seconds, lit: planned.lit, ..Measured::default() };
+    let mut measured =
+        Measured { seconds: planned.seconds, lit: planned.lit, passes: planned.passes.clone(), ..Measured::default() };
     let mut left_out = Vec::new();
     for (rank, effect) in plan.effects.iter().enumerate() {
         progress.begin(&stage(plan, rank + 1));
@@ -178,6 +217,7 @@ struct Drawn {
     image: Image<Display>,
     seconds: f64,
     lit: Option<LitSplats>,
+    passes: Vec<String>,
 }
 
 impl Pictures<'_> {
@@ -209,7 +249,8 @@ impl Pictures<'_> {
         let lit = stages(pass::SHADE).map(|stage| stage.items_in).reduce(|sum, items| sum + items);
         let in_view = stages(pass::PROJECT).map(|stage| stage.items_out).reduce(|sum, items| sum + items);
         let lit = lit.zip(in_view).map(|(lit, in_view)| LitSplats { lit, in_view });
-        Ok(Drawn { image: image.display(scene.render.exposure), seconds, lit })
+        let passes = render.cost.stages.iter().map(|stage| stage.name.clone()).collect();
+        Ok(Drawn { image: image.display(scene.render.exposure), seconds, lit, passes })
     }
 }
 
