@@ -27,16 +27,53 @@ impl Count {
     }
 }
 
+/// Counted work of a technique on objects that it draws from their own data.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct OwnWork {
+    /// Particles of a set over all ranges that take no longer than most, or fragments of voxels.
+    pub(crate) items: f64,
+    /// Particles of a set over all ranges that take longer, by what they are found in.
+    pub(crate) particles: FoundParticles,
+    /// Samples of the picture that a slab of sheets covers, times slabs and lights.
+    pub(crate) slab_samples: f64,
+    /// Rows of footprints in slabs of sweeps.
+    pub(crate) swept_rows: f64,
+    /// Samples of lights' images that are moved for points of lights, in all slabs.
+    pub(crate) soft_samples: f64,
+    /// Ranges of depth that it draws in; `None` where it does not pass over any.
+    pub(crate) ranges: Option<usize>,
+}
+
+/// Particles of a set by what they are found in.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct FoundParticles {
+    /// In cells of volumes.
+    pub(crate) in_cells: f64,
+    /// On lines through fields by formulas.
+    pub(crate) in_fields: f64,
+    /// On lines through cells that an isosurface passes, between eight lattice points.
+    pub(crate) in_lattices: f64,
+    /// The same by cubics between 64 of them.
+    pub(crate) in_cubics: f64,
+    /// On lines through surfaces of scattered points.
+    pub(crate) in_points: f64,
+}
+
+impl FoundParticles {
+    /// All of them.
+    pub(crate) fn sum(&self) -> f64 {
+        self.in_cells + self.in_fields + self.in_lattices + self.in_cubics + self.in_points
+    }
+}
+
 /// The translucent part of a scene that one technique draws.
 pub(crate) struct Translucent {
     /// Predicted number of its splats in view.
     pub(crate) splats: f64,
     /// Predicted number of fragments of their footprints.
     pub(crate) fragments: f64,
-    /// What the technique counts of objects that it draws from their own data: particles of a set over all ranges, fragments of voxels.
-    pub(crate) of_own_data: f64,
-    /// Samples of the picture that a slab of sheets covers, times slabs and lights.
-    pub(crate) slab_samples: f64,
+    /// What the technique counts of objects that it draws from their own data.
+    pub(crate) own_work: OwnWork,
     /// Ranges of depth.
     pub(crate) ranges: f64,
     /// Whether the technique draws anything, splats or objects from their own data.

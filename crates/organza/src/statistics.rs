@@ -191,6 +191,8 @@ pub struct ObjectStatistics {
 pub enum Conversion {
     /// Of anything else: a piece of a surface, a voxel, a Gaussian.
     Plain,
+    /// Of a piece of the zero set of a field, which is found by evaluating it.
+    Field,
     /// Of a raw point that becomes a disc, by its neighbours.
     SurfacePoint,
     /// Of a raw point that becomes a medium, by its neighbours.

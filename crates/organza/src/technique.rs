@@ -14,6 +14,7 @@ pub(crate) mod reference;
 pub(crate) mod sheets;
 pub(crate) mod surfels;
 
+pub(crate) use crate::cost::OwnWork;
 use crate::cost::{Count, Item, Prediction, Translucent, samples};
 use crate::form::{DRAWN, Form};
 use crate::frame::matter::{CarriesLight, Matter};
@@ -91,6 +92,8 @@ pub(crate) struct Row {
     pub(crate) skips_behind_finished: bool,
     /// The pass that [`Fold::prepare`] and [`Fold::check`] run, before all others, where something is its own.
     pub(crate) prepares: Option<&'static str>,
+    /// Counted work of that pass.
+    pub(crate) counts_preparing: fn(&Scene, &Loaded) -> Vec<Count>,
     /// Its passes; the last one comes behind opaque surfaces, those before it come before footprints.
     pub(crate) steps: &'static [Step],
     /// Whether a device may draw what it draws.
@@ -163,17 +166,6 @@ pub(crate) trait Fold {
     fn finish(&mut self, _: &mut Finished<'_>) {}
 }
 
-/// Counted work of a technique on objects that it draws from their own data.
-#[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct OwnWork {
-    /// Particles of one set, or fragments of voxels.
-    pub(crate) items: f64,
-    /// Samples that slabs cover, for each light.
-    pub(crate) slab_samples: f64,
-    /// Ranges of depth that it draws in; `None` where it does not pass over any.
-    pub(crate) ranges: Option<usize>,
-}
-
 /// All depths.
 pub(crate) const EVERYWHERE: Range<f32> = f32::NEG_INFINITY..f32::INFINITY;
 
@@ -228,6 +220,7 @@ pub(crate) static TABLE: [Row; 5] = [
         draws_splats: false,
         gaussians: false,
         prepares: Some(pass::SAMPLERS),
+        counts_preparing: particles::counts_preparing,
         skips_behind_finished: false,
         steps: &[Step { pass: pass::PARTICLES, stage: stage::PARTICLES, counts: particles::counts }],
         is_random: true,
@@ -343,6 +336,7 @@ const POINTS: Row = Row {
     skips_hidden: true,
     skips_behind_finished: true,
     prepares: None,
+    counts_preparing: |_, _| Vec::new(),
     steps: &[SORT, FOLD],
     by_device: true,
     is_random: false,

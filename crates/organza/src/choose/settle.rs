@@ -190,14 +190,7 @@ fn seconds(row: &Row, asked: &Asked<'_>) -> f64 {
     let converted = asked.medium().map_or(samples / SAMPLES_PER_SPLAT, |medium| medium.splats);
     let drawn = if draws_own_data { 0.0 } else { converted };
     let fragments = if draws_own_data { 0.0 } else { samples * FRAGMENTS_PER_SAMPLE };
-    let translucent = Translucent {
-        splats: drawn,
-        fragments,
-        of_own_data: own_work.items,
-        slab_samples: own_work.slab_samples,
-        ranges: 1.0,
-        any: true,
-    };
+    let translucent = Translucent { splats: drawn, fragments, own_work, ranges: 1.0, any: true };
     let mut counts: Vec<Count> = row.steps.iter().flat_map(|step| (step.counts)(scene, &translucent)).collect();
     if !(draws_own_data && carries) {
         counts.push(Count::new(Item::ConvertedSplat, converted));

@@ -1,6 +1,6 @@
 //! Counted work of loading: bytes of files, objects that are generated, splats that are converted.
 
-use super::{Count, CountedPass, Item, Translucent};
+use super::{Count, CountedPass, Item, OwnWork, Translucent};
 use crate::form::PlannedObject;
 use crate::scene::{Scene, SceneObject};
 use crate::{SplatCount, escape_controls, pass, printable, stage};
@@ -88,7 +88,7 @@ impl Translucent {
     /// Unknown, but there, before anything is converted: about as much as fills the picture, in particles of a set and in slabs.
     pub(crate) fn unknown(scene: &Scene) -> Self {
         let samples = samples(scene);
-        let slab_samples = SLABS * samples;
-        Self { splats: 0.0, fragments: 0.0, of_own_data: samples, slab_samples, ranges: 1.0, any: true }
+        let own_work = OwnWork { items: samples, slab_samples: SLABS * samples, ..OwnWork::default() };
+        Self { splats: 0.0, fragments: 0.0, own_work, ranges: 1.0, any: true }
     }
 }

@@ -62,7 +62,7 @@ pub struct Change {
 /// Counted work of a render, with the figures that make time of it.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Prediction {
-    /// Reading and conversion.
+    /// Reading, conversion, and what techniques prepare before they draw.
     pub loading: Vec<CountedPass>,
     /// The passes that follow.
     pub drawing: Vec<CountedPass>,

@@ -16,6 +16,8 @@ pub enum Item {
     GeneratedObject,
     /// A splat that is converted.
     ConvertedSplat,
+    /// A splat of the zero set of a field, which is found by evaluating it.
+    FieldSplat,
     /// A raw point that becomes a disc: its neighbours tell how it lies.
     SurfacePoint,
     /// A raw point that becomes a medium: its neighbours tell its volume.
@@ -50,14 +52,36 @@ pub enum Item {
     BlendedSplat,
     /// A sample of the accumulator, once for each range of depth.
     RangeSample,
-    /// A particle of one set.
+    /// A particle of one set, of triangles, splats, or a box or ball of a medium.
     Particle,
+    /// A particle of one set, in a cell of a volume.
+    CellParticle,
+    /// A particle of one set, where a line meets a field by a formula.
+    FieldParticle,
+    /// A particle of one set, where a line meets an isosurface in a cell, between its corners.
+    LatticeParticle,
+    /// A particle of one set, where a line meets an isosurface in a cell, by cubics.
+    CubicParticle,
+    /// A particle of one set, where a line meets a surface through scattered points.
+    ScatteredParticle,
+    /// A voxel that a sampler of particles looks at once.
+    SurveyedVoxel,
+    /// A cell that a sampler of particles searches for a surface through scattered points.
+    SearchedCell,
     /// A sample of one set of particles.
     SetSample,
     /// A fragment of a voxel or splat in a slab.
     SheetFragment,
+    /// A row of a footprint in one slab of a sweep, up to 16 samples of the eye's image or a light's.
+    SweptRow,
+    /// A sample of a light's image that is moved for a point of a light with a size, in one slab.
+    SoftSample,
     /// A sample that a slab covers, for each light.
     SlabSample,
+    /// A disc that is prepared for rays.
+    SurfelDisc,
+    /// A disc in the hierarchy of boxes that bent rays go through.
+    BoxedDisc,
     /// A fragment of a disc in a layer.
     SurfelFragment,
     /// A sample of a picture of layers of discs.
@@ -102,11 +126,13 @@ const fn row(item: Item, name: &'static str, words: &'static str, pass: &'static
 
 /// The built-in figures, measured on [`BUILT_IN_MACHINE`] by the command in benches/README.md, in the order of [`Item`]. Enlarged and grouped discs
 /// and exact fragments are of older benchmarks, points that become discs of a million normal points on one thread and on two; points that become a
-/// medium, and parallel shares, are estimates.
-static TABLE: [Row; 29] = [
+/// medium, and parallel shares, are estimates. Those of fields, of particles by kind, of sweeps and of discs are from pictures of `scenes/` that are
+/// 96 samples wide.
+static TABLE: [Row; 41] = [
     row(Item::FileByte, "file_byte", "bytes", pass::READ, 80.0, 0.0),
     row(Item::GeneratedObject, "generated_object", "objects", pass::READ, 1.5e7, 0.5),
     row(Item::ConvertedSplat, "converted_splat", "splats", pass::CONVERT, 400.0, 0.5),
+    row(Item::FieldSplat, "field_splat", "splats of fields", pass::CONVERT, 3500.0, 0.9),
     row(Item::SurfacePoint, "surface_point", "points that become discs", pass::CONVERT, 2700.0, 0.7),
     row(Item::MatterPoint, "matter_point", "points that become a medium", pass::CONVERT, 5000.0, 0.95),
     row(Item::CastSplat, "cast_splat", "splats", pass::SHADOW_MAP, 30.0, 0.9),
@@ -125,9 +151,20 @@ static TABLE: [Row; 29] = [
     row(Item::BlendedSplat, "blended_splat", "splats", pass::SPLAT, 100.0, 0.9),
     row(Item::RangeSample, "range_sample", "samples", pass::SPLAT, 20.0, 0.9),
     row(Item::Particle, "particle", "particles", pass::PARTICLES, 50.0, 0.95),
+    row(Item::CellParticle, "cell_particle", "particles of cells", pass::PARTICLES, 350.0, 0.95),
+    row(Item::FieldParticle, "field_particle", "particles of formulas", pass::PARTICLES, 300.0, 0.95),
+    row(Item::LatticeParticle, "lattice_particle", "particles of isosurfaces", pass::PARTICLES, 120.0, 0.95),
+    row(Item::CubicParticle, "cubic_particle", "particles of cubic isosurfaces", pass::PARTICLES, 1300.0, 0.95),
+    row(Item::ScatteredParticle, "scattered_particle", "particles through points", pass::PARTICLES, 1.2e4, 0.95),
+    row(Item::SurveyedVoxel, "surveyed_voxel", "voxels", pass::SAMPLERS, 35.0, 0.9),
+    row(Item::SearchedCell, "searched_cell", "cells about points", pass::SAMPLERS, 1e4, 0.9),
     row(Item::SetSample, "set_sample", "samples of sets", pass::PARTICLES, 250.0, 0.95),
     row(Item::SheetFragment, "sheet_fragment", "fragments", pass::SHEETS, 20.0, 0.9),
+    row(Item::SweptRow, "swept_row", "rows of footprints", pass::SHEETS, 110.0, 0.9),
+    row(Item::SoftSample, "soft_sample", "moved samples of lights", pass::SHEETS, 2.0, 0.9),
     row(Item::SlabSample, "slab_sample", "samples of slabs", pass::SHEETS, 50.0, 0.9),
+    row(Item::SurfelDisc, "surfel_disc", "discs", pass::SURFELS, 500.0, 0.9),
+    row(Item::BoxedDisc, "boxed_disc", "discs in boxes", pass::SURFELS, 2000.0, 0.5),
     row(Item::SurfelFragment, "surfel_fragment", "fragments", pass::SURFELS, 25.0, 0.9),
     row(Item::SurfelSample, "surfel_sample", "samples", pass::SURFELS, 500.0, 0.9),
     row(Item::BentSample, "bent_sample", "samples with bent rays", pass::SURFELS, 1.3e4, 0.9),
@@ -145,6 +182,7 @@ impl Item {
     pub(crate) fn of_conversion(conversion: Conversion) -> Self {
         match conversion {
             Conversion::Plain => Self::ConvertedSplat,
+            Conversion::Field => Self::FieldSplat,
             Conversion::SurfacePoint => Self::SurfacePoint,
             Conversion::MatterPoint => Self::MatterPoint,
         }
@@ -166,6 +204,7 @@ impl Item {
             Self::FileByte
             | Self::GeneratedObject
             | Self::ConvertedSplat
+            | Self::FieldSplat
             | Self::SurfacePoint
             | Self::MatterPoint
             | Self::CastSplat
@@ -173,6 +212,11 @@ impl Item {
             | Self::ShadowEntry
             | Self::LampEntry
             | Self::SortedSplat
+            | Self::SurveyedVoxel
+            | Self::SearchedCell
+            | Self::SoftSample
+            | Self::SurfelDisc
+            | Self::BoxedDisc
             | Self::GroupedDisc
             | Self::EnlargedDisc
             | Self::ProjectedSplat
@@ -184,13 +228,20 @@ impl Item {
             | Self::BlendedFragment
             | Self::RangeSample
             | Self::SheetFragment
+            | Self::SweptRow
             | Self::SlabSample
             | Self::SurfelFragment
             | Self::SurfelSample
             | Self::BentSample
             | Self::ExactFragment
             | Self::FinishedSample => Growth::Samples,
-            Self::Particle | Self::SetSample => Growth::Sets,
+            Self::Particle
+            | Self::CellParticle
+            | Self::FieldParticle
+            | Self::LatticeParticle
+            | Self::CubicParticle
+            | Self::ScatteredParticle
+            | Self::SetSample => Growth::Sets,
         }
     }
 

@@ -133,6 +133,7 @@ impl Input<'_> {
             }
             Self::Points(..) => Conversion::SurfacePoint,
             Self::Matter(..) => Conversion::MatterPoint,
+            Self::Surface(..) => Conversion::Field,
             _ => Conversion::Plain,
         }
     }

@@ -18,8 +18,10 @@ mod unit;
 
 use crate::cost::{Count, Item, Translucent, samples};
 use crate::frame::Frame;
+use crate::load::Loaded;
+use crate::load::own::{Body, Own};
 use crate::pass;
-use crate::scene::{Scene, SurfaceSampler};
+use crate::scene::{Scene, Source as SceneSource, SurfaceSampler, Technique};
 use crate::technique::{EVERYWHERE, Finished, Fold, OwnWork, Session};
 use crate::{CostRecord, Error, RenderOptions, Sets, stage};
 pub(crate) use checkpoint::Checkpoint;
@@ -27,18 +29,44 @@ use ensemble::{Average, average_bytes, fold, fold_params};
 pub(crate) use form::form;
 pub(crate) use kept::Kept;
 use parts::{Part, Source, sources};
+use pbsr::LineParams;
 use splat_core::raster::OpaqueImage;
-use splat_core::{Accumulator, LayerData};
+use splat_core::{Accumulator, Interpolation, LayerData};
 use std::ops::Range;
 
 /// Particles and samples of all sets.
 pub(crate) fn counts(scene: &Scene, translucent: &Translucent) -> Vec<Count> {
     let sets = f64::from(scene.render.particles.repeat_level);
     let is_there = f64::from(u8::from(translucent.any));
+    let OwnWork { items, particles, .. } = translucent.own_work;
     vec![
-        Count::new(Item::Particle, translucent.of_own_data * sets),
+        Count::new(Item::Particle, items * sets),
+        Count::new(Item::CellParticle, particles.in_cells * sets),
+        Count::new(Item::FieldParticle, particles.in_fields * sets),
+        Count::new(Item::LatticeParticle, particles.in_lattices * sets),
+        Count::new(Item::CubicParticle, particles.in_cubics * sets),
+        Count::new(Item::ScatteredParticle, particles.in_points * sets),
         Count::new(Item::SetSample, samples(scene) * sets * translucent.ranges * is_there),
     ]
+}
+
+/// Voxels of the volumes that particles are sampled from, of which samplers look at all for those that matter, and cells in which they search for surfaces
+/// through scattered points.
+pub(crate) fn counts_preparing(scene: &Scene, loaded: &Loaded) -> Vec<Count> {
+    let natives = || loaded.own.iter().filter(|native| native.technique == Technique::Particles);
+    let voxels = natives().filter_map(Own::grid).map(|grid| grid.values.len() as f64).sum();
+    let cells = |native: &Own| match &native.body {
+        Body::Surface { spacing, .. } if is_scattered(scene, native.object) => {
+            f64::from(LineParams::for_spacing(native.bounds.size().max_element(), *spacing).resolution).powi(3)
+        }
+        _ => 0.0,
+    };
+    vec![Count::new(Item::SurveyedVoxel, voxels), Count::new(Item::SearchedCell, natives().map(cells).sum())]
+}
+
+/// Whether an object is a surface through scattered points.
+fn is_scattered(scene: &Scene, object: usize) -> bool {
+    matches!(scene.objects[object].source, SceneSource::LevelSet(_))
 }
 
 /// Bytes of averaging the picture of a scene.
@@ -59,6 +87,23 @@ struct Particles<'a> {
     parts: Option<Vec<Part<'a>>>,
     /// The sets of the last range.
     average: Option<Average>,
+}
+
+impl Particles<'_> {
+    /// Adds the particles of a set of one part, by what they are found in.
+    fn add(&self, part: &Part<'_>, work: &mut OwnWork) {
+        let number = part.object().sampler.expected_particles();
+        let native = self.frame.loaded.own.iter().find(|native| native.object as u32 == part.object);
+        let is_scattered = is_scattered(self.frame.scene, part.object as usize);
+        match native.map(|native| &native.body) {
+            Some(Body::Cells { .. }) => work.particles.in_cells += number,
+            Some(Body::Lattice { interpolation: Interpolation::CatmullRom, .. }) => work.particles.in_cubics += number,
+            Some(Body::Lattice { .. }) => work.particles.in_lattices += number,
+            Some(Body::Surface { .. }) if is_scattered => work.particles.in_points += number,
+            Some(Body::Surface { .. }) => work.particles.in_fields += number,
+            _ => work.items += number,
+        }
+    }
 }
 
 impl Fold for Particles<'_> {
@@ -85,12 +130,15 @@ impl Fold for Particles<'_> {
     /// Every range samples whole sets of the objects that reach into it, and is passed over without any.
     fn own_work(&self, ranges: &[Range<f32>]) -> OwnWork {
         let parts = self.parts.as_deref().unwrap_or_default();
-        let of_range = |range: &Range<f32>| {
+        let mut work = OwnWork::default();
+        let mut drawn = 0;
+        for range in ranges {
             let inside = parts.iter().filter(|part| part.reaches(range, &self.frame.camera));
-            inside.map(|part| part.object().sampler.expected_particles()).sum::<f64>()
-        };
-        let of_ranges: Vec<f64> = ranges.iter().map(of_range).filter(|particles| *particles > 0.0).collect();
-        OwnWork { items: of_ranges.iter().sum(), ranges: Some(of_ranges.len()), ..OwnWork::default() }
+            let before = work.items + work.particles.sum();
+            inside.for_each(|part| self.add(part, &mut work));
+            drawn += usize::from(work.items + work.particles.sum() > before);
+        }
+        OwnWork { ranges: Some(drawn), ..work }
     }
 
     /// An interrupt after two sets leaves the picture of the sets so far.

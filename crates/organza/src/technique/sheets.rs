@@ -26,7 +26,7 @@ use sheet_light::{
     Splats, Volume, prepare,
 };
 use splat_core::raster::OpaqueImage;
-use splat_core::{Accumulator, Camera, Direction, Limits, Packing};
+use splat_core::{Accumulator, Camera, DAabb, Direction, Grid, Limits, Packing, TransferFunction};
 use std::ops::Range;
 
 /// Bytes of a sample that slabs across half vectors see or light, of a volume more there, of a cell of scattered light in both streams, and of a voxel.
@@ -56,8 +56,10 @@ pub(crate) fn form(object: &ObjectStatistics) -> (Form, &'static str) {
 /// Fragments in slabs, and the samples that slabs cover.
 pub(crate) fn counts(_: &Scene, translucent: &Translucent) -> Vec<Count> {
     vec![
-        Count::new(Item::SheetFragment, translucent.fragments + translucent.of_own_data),
-        Count::new(Item::SlabSample, translucent.slab_samples),
+        Count::new(Item::SheetFragment, translucent.fragments + translucent.own_work.items),
+        Count::new(Item::SweptRow, translucent.own_work.swept_rows),
+        Count::new(Item::SoftSample, translucent.own_work.soft_samples),
+        Count::new(Item::SlabSample, translucent.own_work.slab_samples),
     ]
 }
 
@@ -75,7 +77,7 @@ pub(crate) fn foresees(asked: &Asked<'_>, camera: &Camera) -> OwnWork {
     OwnWork {
         items: sweeps * medium.splats * seen.share * (std::f64::consts::PI * radius * radius).max(1.0),
         slab_samples: sweeps * seen.samples * slabs * (1.0 + lit),
-        ranges: None,
+        ..OwnWork::default()
     }
 }
 
@@ -103,7 +105,7 @@ fn own_work(frame: &Frame<'_>) -> OwnWork {
     let shining = frame.light_points().iter().filter(|point| point.light.intensity != [0.0; 3]);
     let is_half = half::is_asked(frame.scene);
     let lights = shining.filter(|point| !is_half || half::is_swept(frame.scene, point)).count() as f64;
-    let sweeps = if is_half { 2.0 * lights.max(1.0) } else { 1.0 };
+    let sweeps = if is_half { lights.max(1.0) } else { 1.0 };
     let lit = if is_half { 1.0 } else { lights };
     let extent = frame.settings.sheets.kernel_extent;
     let form = reconstruction::chosen(frame.scene, &frame.loaded.own, &frame.camera);
@@ -114,26 +116,72 @@ fn own_work(frame: &Frame<'_>) -> OwnWork {
         Reconstruction::Gather(GatherKernel::Gaussian) => form.visible,
         Reconstruction::Gather(GatherKernel::Linear) => LINEAR_SAMPLE * form.visible,
     };
+    let volumes = || frame.loaded.own.iter().filter(|native| native.technique == Technique::Sheets);
+    let step_of = |native: &Own| native.grid().map(|grid| grid.shortest_step() * native.transform.scale);
+    let least_step = volumes().filter_map(step_of).fold(f64::INFINITY, f64::min);
     let volume_work = |native: &Own| {
-        let Body::Cells { grid, .. } = &native.body else { return OwnWork::default() };
+        let Body::Cells { grid, transfer, .. } = &native.body else { return OwnWork::default() };
         let seen = Extent::new(&native.world_box(), &frame.camera);
         let step = grid.shortest_step() * native.transform.scale;
         let radius = extent * step * seen.samples_per_unit;
-        let voxels = native.voxels() as f64 * seen.share;
+        let voxels = native.voxels() as f64;
         let slabs = native.world_box().diagonal() / step;
-        let fragments = voxels * (std::f64::consts::PI * radius * radius).max(1.0);
+        let fragments = voxels * seen.share * (std::f64::consts::PI * radius * radius).max(1.0);
+        // A kernel reaches into so many slabs, which are as wide as the least step, and has rows in the images of the eye and of the light.
+        let sections = 2.0 * extent * step / least_step + 1.0;
+        let rows_of_eye = seen.share * rows(radius);
+        let rows_of_light = rows(extent * half::light_pixels(frame.scene) * step / least_step);
+        // What the eye sees of a slab, and what the light does.
+        let images = if is_half { 2.0 } else { 1.0 };
         OwnWork {
-            items: if is_splatted { sweeps * fragments } else { 0.0 },
-            slab_samples: sweeps * seen.samples * slabs * (1.0 + lit) * share_of_samples,
-            ranges: None,
+            items: if is_splatted && !is_half { fragments } else { 0.0 },
+            slab_samples: images * sweeps * seen.samples * slabs * (1.0 + lit) * share_of_samples,
+            swept_rows: if is_half {
+                sweeps * shaping_voxels(grid, transfer) * sections * (rows_of_eye + rows_of_light)
+            } else {
+                0.0
+            },
+            ..OwnWork::default()
         }
     };
-    let volumes = frame.loaded.own.iter().filter(|native| native.technique == Technique::Sheets).map(volume_work);
-    volumes.fold(OwnWork::default(), |sum, work| OwnWork {
-        items: sum.items + work.items,
-        slab_samples: sum.slab_samples + work.slab_samples,
-        ranges: None,
-    })
+    let mut sum = OwnWork::default();
+    for work in volumes().map(volume_work) {
+        sum.items += work.items;
+        sum.slab_samples += work.slab_samples;
+        sum.swept_rows += work.swept_rows;
+    }
+    let bounds = volumes().map(Own::world_box).reduce(DAabb::union);
+    let slabs = bounds.map_or(0.0, |bounds| bounds.diagonal() / least_step);
+    OwnWork { soft_samples: if is_half { half::soft_samples(frame, slabs) } else { 0.0 }, ..sum }
+}
+
+/// Voxels with extinction near them, about, from a look at some: they shape what is seen, and are splatted too.
+fn shaping_voxels(grid: &Grid, transfer: &TransferFunction) -> f64 {
+    const LOOKS: usize = 1 << 11;
+    // A voxel and one with extinction have a share in one place where their kernels, each of two spacings, meet.
+    const OFFSETS: [isize; 5] = [-3, -1, 0, 1, 3];
+    const FARTHEST: isize = 11;
+    let number = grid.values.len();
+    let stride = number.div_ceil(LOOKS).max(1);
+    let [columns, rows, _] = grid.dims;
+    let shapes = |at: usize| {
+        let i = (at % columns) as isize;
+        let j = (at / columns % rows) as isize;
+        let k = (at / columns / rows) as isize;
+        let has_extinction = |a: isize, b: isize, c: isize| {
+            a * a + b * b + c * c <= FARTHEST && transfer.at(grid.at_clamped(i + a, j + b, k + c)).extinction > 0.0
+        };
+        OFFSETS.iter().any(|c| OFFSETS.iter().any(|b| OFFSETS.iter().any(|a| has_extinction(*a, *b, *c))))
+    };
+    // An odd stride meets every column of a lattice whose rows are a power of two long.
+    (0..number).step_by(stride | 1).filter(|at| shapes(*at)).count() as f64 * (stride | 1) as f64
+}
+
+/// Rows of a footprint of this radius, samples, each once for 16 of its samples.
+fn rows(radius: f64) -> f64 {
+    const SAMPLES_OF_A_ROW: f64 = 16.0;
+    let width = (2.0 * radius).max(1.0);
+    width * (width / SAMPLES_OF_A_ROW).ceil()
 }
 
 /// Adds to a plan how slabs get the values of its volumes, and why.

@@ -54,6 +54,8 @@ pub(crate) fn bumps(scene: &Scene) -> Result<(), &'static str> {
 pub(crate) fn counts(scene: &Scene, translucent: &Translucent) -> Vec<Count> {
     let bends = scene.materials.iter().any(|m| m.material.bounds_matter());
     vec![
+        Count::new(Item::SurfelDisc, translucent.splats),
+        Count::new(Item::BoxedDisc, if bends { translucent.splats } else { 0.0 }),
         Count::new(Item::SurfelFragment, translucent.fragments),
         Count::new(Item::SurfelSample, samples(scene) * translucent.ranges),
         Count::new(Item::BentSample, if bends { samples(scene) } else { 0.0 }),

@@ -98,6 +98,22 @@ pub(super) fn is_swept(scene: &Scene, point: &LightPoint) -> bool {
     swept(scene, point).is_some()
 }
 
+/// Pixels of a light's image along the least step of a volume.
+pub(super) fn light_pixels(scene: &Scene) -> f64 {
+    match scene.render.sheets.slicing {
+        Slicing::HalfVector { light_pixels, .. } => light_pixels,
+        Slicing::View => 0.0,
+    }
+}
+
+/// Samples of lights' images that are moved in so many slabs, which lie one behind another across the volumes: of a slab and of its light, for each
+/// point of a light that takes one sweep.
+pub(super) fn soft_samples(frame: &Frame<'_>, slabs: f64) -> f64 {
+    let whole = frame.light_points().iter().filter(|point| is_whole(frame.scene, point));
+    let side = slabs * light_pixels(frame.scene);
+    2.0 * whole.count() as f64 * slabs * side * side
+}
+
 /// Bytes of the largest sweep, among such translucent polygons.
 pub(super) fn bytes(
     matter: &Matter<'_>,
