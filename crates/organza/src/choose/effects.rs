@@ -95,8 +95,8 @@ fn leave_out(kind: EffectKind, plan: &mut Plan, candidates: &[Candidate], is_on:
     }));
 }
 
-/// The effects of a kind that hang on objects: one for each object that has a cause, and one for each that the scene has no cause in only because it
-/// switches the effect off. `of_object` is asked for what the bound decides of an object whose effect is not switched.
+/// The effects of a kind that hang on objects: one for each object that causes the effect, and one for each object on which the scene switches it off.
+/// `of_object` is asked for what the bound decides of an object whose effect is not switched.
 fn object_candidates(
     row: &Row,
     statistics: &Statistics,
@@ -136,7 +136,7 @@ struct Open {
     off: String,
 }
 
-/// Of an effect whose decisions the plan has no more of than that it is told.
+/// For effects that the plan only reports.
 fn take_nothing(_: &mut Plan, _: &[Candidate], _: &[bool]) {}
 
 /// Adds an effect of a technique's own to a plan, which no bound leaves out.

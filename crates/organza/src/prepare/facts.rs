@@ -71,7 +71,9 @@ fn causes(scene: &Scene, object: &SceneObject, material: &Material, known: &Obje
         EffectKind::Bending | EffectKind::Dispersion | EffectKind::Absorption => is_bent_by(scene, object),
         EffectKind::Color => !known.opaque,
         EffectKind::Gradients => object.source.has_gradients() && !scene.lights.is_empty(),
-        _ => false,
+        // Each kind by name, so that a new one of objects is not forgotten here.
+        EffectKind::Light | EffectKind::Shadow | EffectKind::Soft => false,
+        EffectKind::Scatter | EffectKind::Translucency | EffectKind::Opaque | EffectKind::Layers => false,
     };
     let is_caused = |kind: EffectKind| {
         let of_any = || object.material_ids().any(|id| kind.is_of(&scene.materials[id].material));
