@@ -80,6 +80,47 @@ fn cells_of_a_shadow_table_are_announced_with_the_automatic_ones() {
     assert_eq!(automatic.announcement(1), None);
 }
 
+/// A ball of cells in slabs across half vectors, which the picture shows whole.
+const SWEPT: &str = "version = 1\n[camera]\nposition = [0, 0, 4]\ntarget = [0, 0, 0]\nsize = [48, 36]\n\
+    [[light]]\nkind = 'directional'\ndirection = [0, -1, -0.5]\nirradiance = [1, 1, 1]\n\
+    [[object]]\nname = 'fog'\nmaterial = 'fog'\n\
+    medium_ball = { center = [0, 0, 0], radius = 1, extinction = 2, spacing = 0.1 }\n\
+    [material.fog]\nmedium = { albedo = 0.9 }\n\
+    [render]\nantialias = 1\ntechnique = 'sheets'\nsheets = { slicing = 'half_vector' }\n";
+
+#[test]
+fn rows_of_sweeps_are_as_many_as_slabs_take() {
+    let rows = number(&predicted(SWEPT), Item::SweptRow);
+    let scene = parse(Path::new("s.toml"), SWEPT.as_bytes(), &LoadOptions::default()).unwrap();
+    let render = organza::render(&scene, &RenderOptions::default(), &Progress::new()).unwrap();
+    let taken: u64 = render.cost.stages.iter().filter(|s| s.name == "sheets").map(|s| s.fragments).sum();
+    // Vectors have 4, 8 or 16 numbers; a row of these few samples is one of 16, or as many as it needs.
+    let least = taken as f64 / 16.0;
+    let most = taken as f64 / 4.0;
+    assert!(rows > 0.5 * least && rows < 2.0 * most, "{rows} rows, {taken} footprint numbers");
+    // Two lights are two sweeps, and slabs across the view have none.
+    let second = "[[light]]\nkind = 'directional'\ndirection = [1, -1, -0.5]\nirradiance = [1, 1, 1]\n";
+    let two = number(&predicted(&SWEPT.replace("[[object]]", &format!("{second}[[object]]"))), Item::SweptRow);
+    assert!((two / rows - 2.0).abs() < 1e-9, "{two} of {rows}");
+    assert_eq!(number(&predicted(&SWEPT.replace("'half_vector'", "'view'")), Item::SweptRow), 0.0);
+}
+
+#[test]
+fn light_is_predicted_for_what_is_lit() {
+    let wall = "[[object]]\nname = 'wall'\ntechnique = 'TECHNIQUE'\n\
+                rectangle = { center = [0, 0, -2], u = [1, 0, 0], v = [0, 1, 0], spacing = 0.05 }\n[material.fog]";
+    let bare = LAMP.replace("[render.shadow]\ncells = 1024\n", "[render]\ntechnique = 'points'\n");
+    let with = |technique: &str| predicted(&bare.replace("[material.fog]", &wall.replace("TECHNIQUE", technique)));
+    let without = predicted(&bare);
+    let shaded = |predicted: &Prediction| number(predicted, Item::ShadedSplat);
+    let opaque = number(&with("points"), Item::OpaqueSplat);
+    // Some opaque splats hide others, and `reference` reads the light of all.
+    let by_points = shaded(&with("points")) - shaded(&without);
+    let by_reference = shaded(&with("reference")) - shaded(&without);
+    assert!(by_points > 0.2 * opaque && by_points < 0.8 * opaque, "{by_points} of {opaque}");
+    assert!(by_reference > 0.9 * opaque, "{by_reference} of {opaque}");
+}
+
 /// The sentence is there before the drawing, which is stopped as soon as it has come.
 #[test]
 fn a_long_render_is_announced_before_it_is_drawn() {
