@@ -28,6 +28,9 @@ pub(crate) fn run(repo: &Repo) -> Outcome {
     // What the package and its tests need beside it.
     call(repo, &python, &["-m", "pip", "install", "--quiet", "--find-links", wheels, "organza[test]"])?;
     call(repo, &python, &["-m", "mypy", "--strict", &format!("{PACKAGE}/python/organza")])?;
+    call(repo, &python, &["-m", "mypy.stubtest", "organza._organza"])?;
+    // Tests compare pictures and documents with those of the command, which they find in `target`.
+    call(repo, Path::new("cargo"), &["build", "--quiet", "-p", "organza-cli"])?;
     call(repo, &python, &["-m", "pytest", "-q", &format!("{PACKAGE}/tests")])?;
     Ok(format!("python: the package is tested; its wheel lies in {wheels}"))
 }

@@ -11,9 +11,9 @@ ASSETS = REPOSITORY / "assets"
 
 @pytest.fixture(scope="session")
 def command() -> str:
-    """The command `organza` of this repository; `cargo xtask python` builds it and names it."""
-    named = os.environ.get("ORGANZA_COMMAND")
-    places = [Path(named)] if named else [REPOSITORY / "target" / profile / "organza" for profile in ("debug", "release")]
+    """The command `organza` of this repository, which `cargo xtask python` builds."""
+    target = Path(os.environ.get("CARGO_TARGET_DIR", REPOSITORY / "target"))
+    places = [target / profile / "organza" for profile in ("debug", "release")]
     found = next((place for place in places if place.is_file()), None)
     if found is None:
         pytest.skip("the command is not built: cargo build -p organza-cli")

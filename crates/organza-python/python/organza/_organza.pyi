@@ -1,11 +1,32 @@
 from os import PathLike
-from typing import Any
+from typing import Any, final
 
 import numpy as np
+
+__all__ = [
+    "Data",
+    "InputError",
+    "LimitError",
+    "Picture",
+    "View",
+    "check",
+    "explain",
+    "first_scene",
+    "info_of_file",
+    "info_of_scene",
+    "judge_accuracy",
+    "judge_orders",
+    "lights_of",
+    "map_colors",
+    "render",
+    "toml_text",
+    "view",
+]
 
 class InputError(ValueError): ...
 class LimitError(MemoryError): ...
 
+@final
 class Data:
     @staticmethod
     def mesh(vertices: Any, faces: Any, normals: Any = None, colors: Any = None) -> Data: ...
@@ -28,6 +49,7 @@ class Data:
     def nbytes(self) -> int: ...
     def arrays(self) -> dict[str, Any]: ...
 
+@final
 class Picture:
     @staticmethod
     def of_parts(layers: dict[str, Any], facts: str, metadata: str) -> Picture: ...
@@ -52,6 +74,7 @@ class Picture:
         force: bool = False,
     ) -> list[str]: ...
 
+@final
 class View:
     @property
     def url(self) -> str: ...
