@@ -400,7 +400,7 @@ pub(crate) fn look(input: &DiscInput<'_>, i: usize) -> Look {
     Look { crossing, is_slab, footprint: cloud.footprint[i], material: cloud.material[i], object: cloud.object[i] }
 }
 
-/// What turns the cloud's space into the camera's, x right, y up, z along the view: after this vector was added, this turn.
+/// The map from the cloud's space to the camera's (x right, y up, z along the view): add the vector, then rotate by the matrix.
 pub(crate) fn into_view(input: &DiscInput<'_>) -> (DMat3, DVec3) {
     let [right, up, forward] = input.camera.axes;
     (DMat3::from_cols(right, up, forward).transpose(), input.cloud.origin - input.camera.position)

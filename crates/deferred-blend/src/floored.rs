@@ -47,7 +47,7 @@ impl Layering<'_> {
     }
 }
 
-/// What a pixel shows, and what it lets through.
+/// Values and transmittance of a pixel.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Blended {
     /// Values times opacity.

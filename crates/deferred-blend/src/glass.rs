@@ -73,7 +73,7 @@ pub(crate) struct Bound<'m> {
     pub(crate) distance: f32,
 }
 
-/// What a layer does to light beside its own opacity, by channel.
+/// The effect of a layer on light beside its opacity, by channel.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Passage {
     /// Share that is mirrored, in \[0, 1\].

@@ -13,7 +13,7 @@ use std::ops::Range;
 /// from one another, but no farther than this over ε.
 const LEAST_FACING: f32 = 0.25;
 
-/// What tells layers apart.
+/// The rule that separates layers.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct GapRule {
     gap: f32,

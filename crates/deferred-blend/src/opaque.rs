@@ -174,7 +174,7 @@ fn average(input: &Averaged<'_>, params: &Params, progress: Option<&Progress>) -
     Ok(picture::assemble(input, &tiles, &bins))
 }
 
-/// What one thread needs for a tile.
+/// Scratch memory of a thread for a tile.
 struct Scratch {
     lists: BlockLists,
     block: Block,

@@ -33,7 +33,7 @@ pub struct Light<'a> {
 /// Numbers of [`Attributes`].
 pub(crate) const ATTRIBUTES: usize = 10;
 
-/// What is averaged of discs.
+/// The attributes of discs that are averaged.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Attributes {
     /// The normal that the surface lies across.
@@ -65,7 +65,7 @@ impl Attributes {
 }
 
 impl Light<'_> {
-    /// What each disc of the cloud brings to an average, its normals on the viewer's side; by place in the cloud.
+    /// Attributes of disc `i` of the cloud for an average, with its normals on the viewer's side.
     pub(crate) fn attributes(&self, i: usize) -> [f32; ATTRIBUTES] {
         let cloud = self.input.cloud;
         let disc = Attributes::from_cloud(cloud, i);

@@ -57,7 +57,7 @@ pub struct Surfaces<'a> {
 struct Surface {
     center: Vec3,
     normal: Vec3,
-    /// What light is bent about.
+    /// The normal of refraction and reflection.
     shading_normal: Vec3,
     /// Semi-axes over their squared lengths.
     dual: [Vec3; 2],
@@ -75,7 +75,7 @@ struct Hit {
     cosine: f32,
 }
 
-/// What a ray may meet.
+/// The surfaces that a ray may meet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum RayTarget {
     /// Opaque surfaces alone.

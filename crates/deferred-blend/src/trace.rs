@@ -100,7 +100,7 @@ pub(crate) fn trace<'m>(
     sum
 }
 
-/// What a layer shows of its own in light of some share, and what it leaves of that.
+/// Returns the radiance that a layer adds to a ray of a given share, and the share behind it.
 fn through(met: &Met<'_>, share: [f32; 3]) -> ([f32; 3], [f32; 3]) {
     let radiance = std::array::from_fn(|c| share[c] * met.radiance[c]);
     (radiance, std::array::from_fn(|c| share[c] * (1.0 - met.opacity[c])))

@@ -34,7 +34,7 @@ pub enum FieldError {
     Cancelled,
 }
 
-/// What a parallel loop that left its work undone asks at its end.
+/// Returns the error of a parallel loop that was cancelled.
 pub(crate) fn check_cancelled(progress: &Progress) -> Result<(), FieldError> {
     if progress.is_cancelled() { Err(FieldError::Cancelled) } else { Ok(()) }
 }

@@ -41,7 +41,7 @@ impl Inside {
     }
 }
 
-/// What does not depend on the isovalue.
+/// Data of a volume that does not depend on the isovalue.
 #[derive(Debug)]
 struct Volume {
     grid: Arc<Grid>,

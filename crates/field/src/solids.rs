@@ -11,11 +11,11 @@ const LEVEL_SET_STEPS: f64 = 192.0;
 /// The combination of several solids.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Combination {
-    /// What lies in any of them.
+    /// The union of all solids.
     Union,
-    /// What lies in all of them.
+    /// The intersection of all solids.
     Intersection,
-    /// What lies in the first and in none of the others.
+    /// The first solid without all others.
     Difference,
 }
 

@@ -76,7 +76,7 @@ fn is_empty<F: ScalarField + ?Sized>(field: &F, lattice: &Lattice, first: [usize
     field.bound(low + half, half.length()).is_some_and(|(min, max)| min > 0.0 || max < 0.0)
 }
 
-/// What one block of cells contributes.
+/// The part of a mesh from one block of cells.
 #[derive(Default)]
 struct Part {
     /// Cell id, position and unit normal of each vertex.

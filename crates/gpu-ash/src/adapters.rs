@@ -80,7 +80,7 @@ fn wide_atomics(instance: &Instance, physical: vk::PhysicalDevice) -> bool {
     whole && atomics.shader_buffer_int64_atomics == vk::TRUE
 }
 
-/// What compute shaders can do across a subgroup.
+/// Returns the subgroup operations of compute shaders.
 fn subgroup_ops(had: &vk::PhysicalDeviceSubgroupProperties<'_>) -> SubgroupOps {
     use vk::SubgroupFeatureFlags as Ops;
     let has =

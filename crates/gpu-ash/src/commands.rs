@@ -6,7 +6,7 @@ use crate::pipeline::Pipeline;
 use ash::vk;
 use splat_shaders::{Barrier, Dispatch, Groups, Use};
 
-/// What commands are written with: a command buffer that is being recorded, and the recording's buffers.
+/// Writes commands into a command buffer; holds the recording's buffers.
 pub(crate) struct Commands<'a> {
     pub(crate) logical: &'a Logical,
     pub(crate) raw: vk::CommandBuffer,
@@ -48,7 +48,7 @@ impl Commands<'_> {
         unsafe { self.logical.raw.cmd_copy_buffer(self.raw, from, to, &whole) }
     }
 
-    /// What a copy wrote becomes visible to the processor.
+    /// Makes the writes of copies visible to the processor.
     pub(crate) fn copies_to_host(&self) {
         let barrier = [vk::MemoryBarrier::default()
             .src_access_mask(vk::AccessFlags::TRANSFER_WRITE)

@@ -84,13 +84,13 @@ impl Device {
         self.patience = patience;
     }
 
-    /// What makes the driver say from then on that the device is lost.
+    /// Returns a function after whose call the driver reports the device as lost.
     #[cfg(feature = "losing")]
     pub fn loss(&self) -> impl Fn() + Send + Sync + 'static {
         self.mark(crate::losing::Fate::Lost)
     }
 
-    /// What makes the driver take work from then on and never do it.
+    /// Returns a function after whose call the driver accepts work and never does it.
     #[cfg(feature = "losing")]
     pub fn hang(&self) -> impl Fn() + Send + Sync + 'static {
         self.mark(crate::losing::Fate::Hangs)
@@ -107,7 +107,7 @@ impl Device {
         &self.logical.found.adapter
     }
 
-    /// What validation said since the last call; empty when it is off, and when all is well.
+    /// Returns the messages of validation since the last call; empty when it is off, or without faults.
     pub fn take_messages(&self) -> Vec<String> {
         self.logical.instance.take_messages()
     }

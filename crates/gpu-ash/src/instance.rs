@@ -57,7 +57,7 @@ impl Instance {
         Ok(instance)
     }
 
-    /// What validation said so far, taken away; empty when it is off.
+    /// Returns and removes the messages of validation so far; empty when it is off.
     pub(crate) fn take_messages(&self) -> Vec<String> {
         let Some(watch) = &self.watch else { return Vec::new() };
         std::mem::take(&mut *watch.messages.lock().unwrap_or_else(PoisonError::into_inner))

@@ -4,7 +4,7 @@
 use ash::vk;
 use std::sync::{Mutex, PoisonError};
 
-/// What becomes of a device.
+/// The behaviour that a test requests of a device.
 #[derive(Clone, Copy)]
 pub(crate) enum Fate {
     Works,

@@ -48,7 +48,7 @@ pub enum Error {
     #[cfg(feature = "gpu")]
     #[error(transparent)]
     Overflow(#[from] splat_shaders::Overflow),
-    /// What was read back is no result of the recording.
+    /// The bytes that were read back are no result of the recording.
     #[cfg(feature = "gpu")]
     #[error("{found} bytes of {what} were read back, expected {expected}")]
     ReadBack {

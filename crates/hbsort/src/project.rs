@@ -14,7 +14,7 @@ use splat_core::{Camera, Cloud, ViewTransform};
 /// Splats that are projected at once, in vector registers.
 const LANES: usize = 16;
 
-/// What stands for the depth of a culled splat.
+/// Marks a culled splat in the place of its depth.
 pub(crate) const CULLED: f32 = f32::NAN;
 
 /// The side planes of the view, as two slopes by symmetry.

@@ -49,7 +49,7 @@ pub fn margin_inside(cloud: &Cloud, i: usize, camera: &Camera) -> f64 {
     side(p.x, camera.size[0]).min(side(p.y, camera.size[1])).min(p.z) + radius
 }
 
-/// What the paper's Eqs. 10-13 give when they are followed to the letter.
+/// Buckets of the paper's Eqs. 10-13, followed to the letter.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PaperBuckets {
     /// N of Eq. 11.

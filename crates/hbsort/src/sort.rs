@@ -47,7 +47,7 @@ pub fn slice_cloud(
     slice_projected(cloud, ids, Bits { extremes, order }, |id| projector.depth(id), params, scratch)
 }
 
-/// What a projection leaves: the bits of the depths, in the place of the ids that come of them, and their extremes.
+/// Results of a projection: the bits of the depths, in the place of the later ids, and their extremes.
 pub(crate) struct Bits {
     pub(crate) extremes: Extremes,
     pub(crate) order: SliceOrder,

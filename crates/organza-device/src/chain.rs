@@ -36,7 +36,7 @@ pub struct Splats<'a> {
     pub sort: &'a hbsort::Params,
     /// How they are rasterized; sums are in single precision whatever it says.
     pub raster: &'a Params,
-    /// What hides translucent splats, where opaque ones are resolved.
+    /// The opaque image that hides translucent splats.
     pub opaque: &'a OpaqueImage,
     /// For each light with a shadow what throws it, where all of that happens on the device; else none, and what the lights'
     /// maps let through is uploaded.
@@ -45,7 +45,7 @@ pub struct Splats<'a> {
     pub progress: &'a Progress,
 }
 
-/// What a device did.
+/// Results of a device.
 pub struct Chained {
     /// Splats that reach a pixel.
     pub visible: u64,
@@ -227,7 +227,7 @@ fn run_on(
 }
 
 impl Splats<'_> {
-    /// What the maps of the lights let through to these splats, where it is uploaded.
+    /// Returns the transmittances of the lights' maps at these splats, if they are uploaded.
     fn received(&self, ids: &[u32]) -> Result<Vec<[f32; 3]>, Error> {
         if self.castings.is_empty() { shade::received(self.input, ids, Some(self.progress)) } else { Ok(Vec::new()) }
     }

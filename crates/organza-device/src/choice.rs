@@ -41,7 +41,7 @@ impl DeviceChoice {
     }
 }
 
-/// What can be asked to compute beside the processor.
+/// A device that can be requested beside the processor.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ListedDevice {
     /// The backend that reaches it: `ash` or `wgpu`.
@@ -63,7 +63,7 @@ pub fn devices() -> Result<Vec<ListedDevice>, Error> {
     Ok(devices)
 }
 
-/// What one backend reaches.
+/// Lists the devices that one backend reaches.
 pub(crate) fn listed(backend: &dyn Backend) -> Result<Vec<Adapter>, Error> {
     match backend.adapters() {
         Err(DeviceError::NoDevice { .. }) => Ok(Vec::new()),

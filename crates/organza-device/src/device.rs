@@ -87,7 +87,7 @@ impl<'d> Helper<'d> {
         Self { device, history: Mutex::new(history) }
     }
 
-    /// What drew, as metadata and reports name it.
+    /// Name of the drawing device for metadata and reports.
     pub fn name(&self) -> String {
         match (held(&self.history).helped, held(&self.device.opened).is_some()) {
             (true, true) => self.device.name.clone(),
@@ -96,7 +96,7 @@ impl<'d> Helper<'d> {
         }
     }
 
-    /// What a user should know, one sentence each.
+    /// Returns messages for the user, one sentence each.
     pub fn said(self) -> Vec<String> {
         self.history.into_inner().unwrap_or_else(PoisonError::into_inner).said
     }

@@ -51,7 +51,7 @@ use splat_shaders::DeviceError;
 pub struct Error {
     /// The backends that were asked, as users write them.
     pub backend: String,
-    /// What each of them said.
+    /// The reason of each of them.
     pub why: String,
 }
 

@@ -33,7 +33,7 @@ pub struct Passport {
     pub backend: &'static str,
     /// The device. Of a software driver the timings are the processor's.
     pub adapter: Adapter,
-    /// What it does not have, one phrase each.
+    /// Missing features, one phrase each.
     pub missing: Vec<&'static str>,
     /// Every recording.
     pub recordings: Vec<Checked>,
@@ -61,7 +61,7 @@ pub struct Checked {
     pub passes: Vec<KernelTime>,
 }
 
-/// What a device found against what the processor found.
+/// Comparison of a device's results with the processor's.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Agreement {
     /// Whether that is enough: equal bits for the order and the lists of shadow maps, 10⁻⁵ for what
@@ -75,7 +75,7 @@ pub struct Agreement {
     pub mean: f64,
     /// Largest difference, in the unit.
     pub max: f64,
-    /// What differences are of: `places`, `absorbance`, `transmittance`, `radiance` or `of itself`.
+    /// The quantity of the differences: `places`, `absorbance`, `transmittance`, `radiance` or `of itself`.
     pub unit: &'static str,
 }
 
@@ -112,7 +112,7 @@ pub fn passport(name: &str) -> Result<Vec<Passport>, Error> {
     Ok(passports)
 }
 
-/// What all devices are tried with.
+/// Inputs of the recordings, the same for all devices.
 struct Inputs {
     order: OrderInput,
     shadow: ShadowInput,
@@ -165,7 +165,7 @@ fn inspect(backend: &dyn Backend, place: usize, adapter: Adapter, input: &Inputs
     Passport { backend: backend.name(), adapter, missing, recordings }
 }
 
-/// What a recording gave.
+/// Results of a recording.
 struct Found {
     items: u64,
     agreement: Agreement,

@@ -10,7 +10,7 @@ pub enum Error {
     /// The name of the file says nothing of its format.
     #[error("{message}")]
     Usage {
-        /// What was found and what was expected.
+        /// The found and the expected.
         message: String,
         /// What to do.
         hint: String,
@@ -20,7 +20,7 @@ pub enum Error {
     Io {
         /// The file or folder.
         path: PathBuf,
-        /// What was attempted, such as `cannot write`.
+        /// The failed action, such as `cannot write`.
         action: &'static str,
         /// The system's answer.
         source: std::io::Error,

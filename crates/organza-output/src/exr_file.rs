@@ -19,7 +19,7 @@ use splat_core::{LayerData, Layers};
 const LARGEST_HALF: f32 = 65504.0;
 /// Pictures of longer sides than this are packed by several threads.
 const LONGEST_ALONE: u32 = 256;
-/// What the sum of a pixel's samples may differ by, over the sum.
+/// Tolerance of the sum of a pixel's samples, as a share of the sum.
 const ROUNDING: f32 = 8.0 * f32::EPSILON;
 /// Type of a text in the file layout of OpenEXR, which limits neither its length nor its bytes.
 const TEXT: &str = "string";

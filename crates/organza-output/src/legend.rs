@@ -51,7 +51,7 @@ struct Panel<'a> {
     height: f64,
 }
 
-/// What stands below a title.
+/// The content of a panel below its title.
 enum Content {
     /// A bar of this height, pixels, with its ticks; the numbers at its ends come first.
     Bar(f64, Vec<(f64, String)>),
@@ -83,7 +83,7 @@ pub(super) fn draw(canvas: &mut Canvas<'_>, scales: &[ColorScale]) -> u64 {
     (scales.len() - panels.len()) as u64
 }
 
-/// What a scale is of, with its object where others are of the same name.
+/// Returns the title of a scale: its column, with its object if several scales have that column.
 fn title(scale: &ColorScale, scales: &[ColorScale]) -> String {
     let Some(column) = &scale.column else { return scale.object.clone() };
     let is_alone = scales.iter().filter(|other| other.column.as_ref() == Some(column)).count() < 2;

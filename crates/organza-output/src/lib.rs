@@ -40,7 +40,7 @@ use organza_scene::ColorScale;
 use splat_core::Layers;
 use std::path::Path;
 
-/// What a file says about how it was made.
+/// Metadata about the origin of a file.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Metadata {
     /// SHA-256 of the scene, lower-case hex.
@@ -75,11 +75,11 @@ pub struct Params {
     /// Whether beauty holds a background that is not black. An EXR file with one is opaque: its `A` is 1, and the opacity of what lies before
     /// the background is `opacity.A`, so that no compositing program adds the background twice.
     pub has_background: bool,
-    /// What colours stand for: a PNG file has a legend of each over its right border, as large as the picture asks for.
+    /// Colour scales. A PNG file has a legend of each over its right border, in proportion to the picture.
     pub legend: Vec<ColorScale>,
 }
 
-/// What had to be changed so that the file is valid.
+/// Counts of the changes that made the file valid.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct WriteReport {
     /// Bytes of the file.

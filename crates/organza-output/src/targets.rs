@@ -92,7 +92,7 @@ impl Targets {
 
 const TWICE: &str = "this output is named twice";
 
-/// What tells files and folders apart, however they are spelled.
+/// The identity of a file or folder, independent of the spelling of its path.
 #[cfg(unix)]
 type Identity = [u64; 2];
 #[cfg(not(unix))]

@@ -47,7 +47,7 @@ pub struct LightRow {
     pub shadow: bool,
 }
 
-/// What is changed of a light.
+/// Changes of a light.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct LightChange {
     pub(crate) stops: Option<f64>,
@@ -130,7 +130,7 @@ pub(crate) fn direction_of(light: &SceneLight, centre: DVec3) -> Option<Directio
     (vector.length() > 0.0).then(|| Direction::of_vector(vector))
 }
 
-/// What a light is, in a word.
+/// Returns the kind of a light in a word.
 pub(crate) fn kind_of(light: &SceneLight) -> &'static str {
     match light.light.shape {
         LightShape::Point { .. } => "point",

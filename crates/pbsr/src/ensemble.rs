@@ -169,7 +169,7 @@ impl NearestObject {
     }
 }
 
-/// What the error of the luminance needs where a set may hit a pixel in some channels alone.
+/// Sums for the error of the luminance, if a set may hit a pixel in some channels alone.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct Apart {
     /// Σ luminance of the hits of the sets that leave a channel open.
@@ -246,7 +246,7 @@ impl TileSums<'_> {
         luminance
     }
 
-    /// What pixel `k` shows of a set that hit it in some channels.
+    /// Adds a set that hit pixel `k` in the channels of `mask`, with the luminance of its hits.
     pub(crate) fn add_set(&mut self, k: usize, mask: u32, luminance: f32) {
         let apart = &mut self.apart[k];
         for c in 0..3 {

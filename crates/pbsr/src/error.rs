@@ -26,7 +26,7 @@ pub enum Error {
     /// There is nothing to sample: no surface in the box, no area, no extinction.
     #[error("particles: {what} is empty: {reason}")]
     Empty {
-        /// What was to be sampled.
+        /// The thing to be sampled.
         what: &'static str,
         /// Why nothing was found.
         reason: &'static str,

@@ -142,7 +142,7 @@ pub fn record(capacities: Capacities, nearest: Nearest, lighting: Option<&Lighti
     Ok(Recorded { recording, capacities, sums, inputs, lit })
 }
 
-/// What is dispatched level by level.
+/// The dispatches of each level.
 struct Levels<'a> {
     capacities: &'a Capacities,
     inputs: [BufferId; 5],

@@ -43,7 +43,7 @@ pub trait Sampler: Sync {
     }
 }
 
-/// What samplers of a Poisson number of particles share: elements with rates, in blocks.
+/// The common part of samplers with Poisson numbers of particles: elements with rates, in blocks.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct PoissonSets {
     pub(crate) origin: DVec3,
@@ -68,7 +68,7 @@ pub(crate) trait Poisson: Sync {
     /// Appends the particles of chunk `chunk` of set `set`.
     fn fill(&self, set: u64, chunk: usize, particles: &mut Particles);
 
-    /// What a device needs to do the same, if it can.
+    /// Tables from which a device makes the same sets; `None` if it cannot.
     #[cfg(feature = "gpu")]
     fn tables(&self) -> Option<Twin> {
         None

@@ -9,7 +9,7 @@ use splat_core::{glam, rng};
 /// The mean from which Poisson variables are drawn by rejection.
 pub(crate) const REJECTED_FROM: f64 = 12.0;
 
-/// What a counter is raised by from number to number (SplitMix64).
+/// Increment of a counter from number to number (SplitMix64).
 pub(crate) const GOLDEN: u64 = 0x9e37_79b9_7f4a_7c15;
 
 /// The first word of each counter names the sampler, so that two samplers of one seed share no numbers.

@@ -59,7 +59,7 @@ impl From<FieldError> for ConvertError {
     }
 }
 
-/// What a parallel loop that left its work undone asks at its end.
+/// Returns the error of a parallel loop that was cancelled.
 pub(crate) fn check_cancelled(progress: &Progress) -> Result<(), ConvertError> {
     if progress.is_cancelled() { Err(ConvertError::Cancelled) } else { Ok(()) }
 }

@@ -17,7 +17,7 @@ pub(crate) struct Lattice {
     discs: Vec<Disc>,
 }
 
-/// What is asked first of a disc.
+/// Data of a disc for the first test of an overlap.
 #[derive(Clone, Copy, Default)]
 struct Disc {
     center: Vec3,

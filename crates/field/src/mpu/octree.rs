@@ -31,7 +31,7 @@ const GRAZES: f64 = 2.5;
 /// Marks an entry of `Octree::nodes` as a leaf.
 const LEAF: u32 = 1 << 31;
 
-/// What a node is.
+/// The kind of a node.
 pub(super) enum Node {
     /// Index of the first of eight children; child bits are x, y, z from the lowest.
     Inner(usize),
@@ -77,7 +77,7 @@ enum Part {
     Inner(Vec<Part>),
 }
 
-/// What all cells share.
+/// Data that all cells share.
 struct Build<'a> {
     tree: &'a SampleTree,
     sides: Sides<'a>,

@@ -84,7 +84,7 @@ impl ChainInput {
         Self { cloud, camera, materials, objects, lights, footprints, projected }
     }
 
-    /// What shading reads, handed to `work`.
+    /// Passes the inputs of shading to `work`.
     fn lit<T>(&self, work: impl FnOnce(&ShadeInput<'_>) -> T) -> T {
         let veil: Option<&dyn Transmittance> = Some(&Veil);
         let lit = [(self.lights[0], veil), (self.lights[1], None)].map(|(light, shadow)| LitBy {

@@ -14,7 +14,7 @@ const SPLATS: u32 = 1 << 14;
 const ENTRIES: u32 = 1 << 19;
 /// The key of their random numbers.
 const SEED: u64 = 0x434f_4d50;
-/// What transmittances, and channels of values up to 1, may differ by.
+/// Tolerance of transmittances, and of channels of values up to 1.
 const TOLERANCE: f64 = 1e-5;
 
 /// Generated splats, by depth, with a colour each.

@@ -11,7 +11,7 @@ const BASE: f64 = 3.0;
 const BETWEEN: f64 = 2.6;
 /// Width of a blank, with what is between glyphs.
 const BLANK: f64 = 4.5;
-/// What stands for a character that has no glyph here.
+/// The glyph of unknown characters.
 const UNKNOWN: &str = "030c6c6303";
 
 /// The glyphs; a blank has none.

@@ -47,7 +47,7 @@ const JUDGE: &str = include_str!("../page/judge.js");
 const SAVE: &str = include_str!("../page/save.js");
 const STYLE: &str = include_str!("../page/page.css");
 
-/// What answers are made from.
+/// The state behind all responses.
 pub(crate) struct Counter {
     pub(crate) session: Arc<Session>,
     pub(crate) clients: Mutex<Clients>,
@@ -87,7 +87,7 @@ impl Refusal {
         Self { status, message: message.to_owned(), hint: String::new() }
     }
 
-    /// What a scene is refused for.
+    /// The response to an error of a scene.
     fn of_error(error: &Error) -> Self {
         let status = match error {
             Error::Internal(_) => StatusCode::INTERNAL_SERVER_ERROR,
@@ -111,7 +111,7 @@ fn of_type(content: &'static str, body: impl Into<Bytes>) -> Answer {
     answer
 }
 
-/// What is asked for, behind the token.
+/// The requested route, behind the token.
 enum Route<'p> {
     Page,
     Script(&'static str),

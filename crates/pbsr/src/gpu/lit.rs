@@ -94,7 +94,7 @@ fn with_input<T>(scene: &Scene<'_>, work: impl FnOnce(&ShadeInput<'_>) -> T) -> 
     })
 }
 
-/// What a level has found when light is asked for.
+/// Buffers in which a level has found its visible particles, if light is requested.
 pub(super) enum Winners {
     /// Limits, nearest depths, ranks.
     Ranked([BufferId; 3]),
@@ -216,7 +216,7 @@ impl Lit {
         }
     }
 
-    /// What stays as it is from run to run.
+    /// Inputs that do not change from run to run.
     pub(super) fn tables(&self, scene: &Scene<'_>) -> Result<Inputs<'static>, Error> {
         suits(scene).map_err(|why| Error::parameter("scene", why, "one that a device lights"))?;
         let lights = scene.lights.len();
@@ -229,7 +229,7 @@ impl Lit {
         Ok(inputs.collect())
     }
 
-    /// What each run begins with: nobody found yet, and one workgroup down and deep for those that will be.
+    /// Initial counts of each run: no visible particle yet, and one workgroup down and deep for those to come.
     pub(super) fn nobody(&self) -> (BufferId, Vec<u8>) {
         (self.found, bytemuck::cast_slice(&[[0u32, 0, 1, 1]].repeat(self.parts as usize)).to_vec())
     }

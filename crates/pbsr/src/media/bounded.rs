@@ -131,7 +131,7 @@ impl ScalarField for BoundedExtinction {
         }
     }
 
-    /// That of a whole cell where the ball is one around the middle of a cell.
+    /// The bound of a whole cell, if the ball lies around the middle of a cell.
     fn bound(&self, p: DVec3, radius: f64) -> Option<(f64, f64)> {
         let side = self.bounds.size() / f64::from(self.cells);
         let at = ((p - self.bounds.min) / side).clamp(DVec3::ZERO, DVec3::splat(f64::from(self.cells - 1)));

@@ -49,7 +49,7 @@ pub struct MetropolisSampler<'a> {
     chains: MetropolisParams,
     /// ∫σ dV / s.
     mean: f64,
-    /// What particles are kept by.
+    /// The density that thins out particles.
     density: Option<Density<'a>>,
     /// Cell of each lattice point, `u32::MAX` for none.
     cell_at: Vec<u32>,
@@ -71,7 +71,7 @@ impl<'a> MetropolisSampler<'a> {
     /// Finds the cells with extinction and integrates it. `density` multiplies the mean number of particles.
     ///
     /// # Errors
-    /// Those of [`GridSampler::new`]; [`Error::Parameter`] for counts of 0.
+    /// The errors of [`GridSampler::new`]; [`Error::Parameter`] for counts of 0.
     pub fn new(
         grid: &'a Grid,
         transfer: &'a TransferFunction,

@@ -22,7 +22,7 @@ const CELLS: usize = (OCTAVES << (23 - BELOW)) + 1;
 /// Steps of the integral over θ from the centre to the rim.
 const STEPS: usize = 2048;
 
-/// What is filled.
+/// The shape that is filled with points.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Shape {
     /// The kernel in space, whose projection is the footprint.

@@ -64,7 +64,7 @@ pub(crate) struct Task {
     pub(crate) particles: u64,
 }
 
-/// What a task does with its particles.
+/// Inputs of a task that projects its particles and sorts them by tile.
 pub(crate) struct Filling<'a> {
     pub(crate) sampler: &'a dyn Sampler,
     pub(crate) projector: &'a Projector,
@@ -77,7 +77,7 @@ pub(crate) struct Filling<'a> {
     pub(crate) depths: [f32; 2],
 }
 
-/// What a task needs beside its own: kept by each thread.
+/// Scratch memory of a task, kept by each thread.
 pub(crate) struct Staging {
     particles: Particles,
     view: View,

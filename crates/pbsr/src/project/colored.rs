@@ -15,7 +15,7 @@ use splat_core::shade::MAX_CHANNELS;
 pub(crate) struct Colored {
     /// [`Record::key`] of the nearest particle that hides each channel, or `limit` where none is.
     nearest: Vec<[u64; 3]>,
-    /// What a pixel starts with.
+    /// Initial depth of each pixel.
     limit: Vec<u64>,
     /// Of each pixel what the set shows so far: the channels that are hit, and their luminance.
     shown: Vec<(u32, f32)>,

@@ -22,7 +22,7 @@ const HITS: u32 = 56;
 #[repr(align(32))]
 struct Row([u64; 4]);
 
-/// What all particles of an object that is shown as it is have.
+/// Common data of all particles of an unlit object.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Shown {
     pub(crate) emission: [f32; 3],

@@ -15,7 +15,7 @@ const OPEN: u64 = solid(f32::INFINITY);
 pub(crate) struct Nearest {
     /// [`Record::key`] of the nearest particle, or `limit` where none is.
     nearest: Vec<u64>,
-    /// What a pixel starts with: the occluder's depth, and nothing is behind it or at it. Empty without an occluder.
+    /// Initial depth of each pixel: the occluder's, so that no particle at it or behind it is seen. Empty without an occluder.
     limit: Vec<u64>,
     /// Records of one task that are seen: their numbers, or their pixels and colours.
     seen: Vec<u32>,

@@ -13,7 +13,7 @@ use glam::{DMat3, DVec3, Mat3};
 use splat_core::shade::MAX_CHANNELS;
 use splat_core::{Camera, Limits, Shading, glam};
 
-/// What every tile reads.
+/// Inputs of every tile.
 pub(crate) struct Resolve<'a> {
     pub(crate) scene: &'a Scene<'a>,
     pub(crate) plan: &'a Plan,
@@ -74,7 +74,7 @@ pub(crate) const fn solid(depth: f32) -> u64 {
     (depth.to_bits() as u64) << 32
 }
 
-/// What is the same for all batches.
+/// Data that all batches share.
 pub(crate) struct Plan {
     pub(crate) tiling: Tiling,
     pub(crate) projectors: Vec<Projector>,

@@ -72,7 +72,7 @@ impl BrownianParams {
     }
 }
 
-/// What pilot run and counting spheres found.
+/// Results of the pilot run and its counting spheres.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct BrownianReport {
     /// Mean number of particles in a counting sphere, n.
@@ -122,7 +122,7 @@ impl<'a> BrownianSampler<'a> {
     /// Finds the surface, makes the pilot run and counts.
     ///
     /// # Errors
-    /// Those of [`LineSampler::new`]; [`Error::Parameter`] for numbers out of range; [`Error::Empty`] when no walker can
+    /// The errors of [`LineSampler::new`]; [`Error::Parameter`] for numbers out of range; [`Error::Empty`] when no walker can
     /// move, as on a surface that is singular everywhere, or when fewer than one of 64 lines meets the surface, as with a
     /// field that rounds to the level far around it.
     pub fn new(surface: &ImplicitSurface<'a>, walk: &BrownianParams, params: &SurfaceParams) -> Result<Self, Error> {
@@ -156,7 +156,7 @@ impl<'a> BrownianSampler<'a> {
         Ok(sampler)
     }
 
-    /// What the counting spheres found.
+    /// Returns the results of the counting spheres.
     pub fn report(&self) -> &BrownianReport {
         &self.report
     }

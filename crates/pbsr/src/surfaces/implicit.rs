@@ -69,7 +69,7 @@ impl ImplicitSurface<'_> {
     }
 }
 
-/// What a search for cells found.
+/// Counts of a search for cells.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct CellCounts {
     /// Cells of the box.

@@ -28,7 +28,7 @@ pub struct MeshSampler<'a> {
     mesh: &'a Mesh,
     params: SurfaceParams,
     density: Option<Density<'a>>,
-    /// What opacities of vertices mean; `None` for a mesh without.
+    /// Opacities of vertices; `None` for a mesh without.
     fading: Option<Fading>,
     sets: PoissonSets,
     /// Of each triangle, where the mesh has none of its own.

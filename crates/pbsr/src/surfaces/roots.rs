@@ -32,7 +32,7 @@ pub(crate) struct Line<'a> {
     pub(crate) steepest: f64,
 }
 
-/// What the search along a piece found.
+/// Results of the search along a piece.
 #[derive(Debug, Default)]
 pub(crate) struct Found {
     /// Roots, each with a place beside it where the gradient is not zero even if the root is a double one.
