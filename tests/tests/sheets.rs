@@ -63,8 +63,13 @@ const BALL: &str = "[[light]]\nkind = 'directional'\ndirection = [-0.4, -1, -0.6
 #[test]
 fn gathered_slabs_show_what_splatted_ones_do() {
     let scene = parallel_view(2.4, 48) + BALL;
-    let [splatted, gathered, linear] = FORMS.map(|form| in_sheets(&scene, &["--set", form]));
-    for channel in ["R", "G", "A", "scatter1.R"] {
+    let across_half_vectors = ["--set", "render.sheets.slicing='half_vector'"];
+    for (slicing, channel) in [&[][..], &across_half_vectors]
+        .into_iter()
+        .flat_map(|slicing| ["R", "G", "A", "scatter1.R"].map(|channel| (slicing, channel)))
+    {
+        let drawn = |form| in_sheets(&scene, &[slicing, &["--set", form]].concat());
+        let [splatted, gathered, linear] = FORMS.map(drawn);
         let a = splatted.channel(channel);
         let mean = a.iter().sum::<f64>() / a.len() as f64;
         assert!(mean > 0.02, "{channel}: mean {mean}");
@@ -80,6 +85,9 @@ fn gathered_slabs_show_what_splatted_ones_do() {
         assert!(error(&gathered) > 0.0 && error(&linear) > error(&gathered), "{channel}");
     }
 }
+
+const HALF_AND_KERNEL: &[&str] = &["render.sheets.slicing='half_vector'", "render.sheets.kernel_extent=3"];
+const HALF_AND_FINE: &[&str] = &["render.sheets.slicing='half_vector'", "object.ball.density.spacing=0.02"];
 
 #[test]
 fn explain_says_which_form_draws_and_why() {
@@ -101,7 +109,9 @@ fn explain_says_which_form_draws_and_why() {
         (&["render.sheets.classify='before'"], "splatted slabs", "before they are reconstructed"),
         (&["render.sheets.aligned='axis'", "camera.orthographic=2"], "splatted slabs", "along the lattice"),
         (&["render.sheets.accumulation='f16'"], "splatted slabs", "half precision"),
-        (&["render.sheets.slicing='half_vector'"], "splatted slabs", "half vectors"),
+        (&["render.sheets.slicing='half_vector'"], "gathered slabs", "half vectors"),
+        (HALF_AND_KERNEL, "splatted slabs", "a kernel that is splatted alone"),
+        (HALF_AND_FINE, "splatted slabs", "finer than samples"),
         (&["object.ball.density.spacing=0.02"], "splatted slabs", "finer than samples"),
         (&["object.ball.density.spacing=0.2"], "splatted slabs", "wider than five samples"),
         (&["object.ball.density.expression='exp(-2*(x^2+y^2+z^2)) - 0.8'"], "splatted slabs", "less than a quarter"),
@@ -124,7 +134,7 @@ fn what_gathered_slabs_have_not_is_refused_by_name() {
         ("reconstruction = 'gather', classify = 'before'", "`classify`"),
         ("reconstruction = 'gather', aligned = 'axis'", "`aligned`"),
         ("reconstruction = 'gather', accumulation = 'f16'", "`accumulation`"),
-        ("reconstruction = 'gather', slicing = 'half_vector'", "`slicing`"),
+        ("reconstruction = 'gather', slicing = 'half_vector', kernel_extent = 2", "`kernel_extent`"),
         ("kernel = 'linear', kernel_extent = 3", "`kernel_extent`"),
         ("kernel = 'linear', reconstruction = 'splat'", "`kernel`"),
         ("kernel = 'cubic'", "cubic"),

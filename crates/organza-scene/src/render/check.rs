@@ -249,7 +249,6 @@ fn check_reconstruction(at: &At<'_>, raw: &RawSheets) -> Result<Reconstruction, 
         ("classify", raw.classify == Some(RawClassify::Before), "they classify what they have reconstructed"),
         ("aligned", raw.aligned == Some(RawAligned::Axis), "they lie along the view"),
         ("accumulation", raw.accumulation == RawAccumulation::F16, "they sum nothing over voxels"),
-        ("slicing", raw.slicing == RawSlicing::HalfVector, "they lie across the view"),
     ];
     let is_linear = raw.kernel == Some(RawKernel::Linear);
     match raw.reconstruction {

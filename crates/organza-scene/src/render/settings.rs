@@ -189,7 +189,7 @@ impl SheetsSettings {
         let mut settings = *self;
         // Half vectors know neither of the other choices.
         let is_free = self.classify == Classify::After && self.aligned == Aligned::View;
-        if self.may_slice && is_free && self.reconstruction != Reconstruction::Gather {
+        if self.may_slice && is_free {
             settings.slicing = Slicing::HALF_VECTOR;
         }
         let Slicing::HalfVector { scattering, .. } = &mut settings.slicing else { return None };

@@ -344,7 +344,7 @@ fn params(scene: &Scene, exponent: i32, options: &RenderOptions) -> Params {
         slab_width: settings.slab_width.map(|width| width * unit),
         classify: if settings.classify == scene::Classify::Before { Classify::Before } else { Classify::After },
         aligned: if settings.aligned == scene::Aligned::Axis { Aligned::Axis } else { Aligned::View },
-        // Slabs across the view may be gathered instead.
+        // The plan may have them gathered instead.
         reconstruction: Reconstruction::Splat,
         kernel: KernelShape { extent: settings.kernel_extent, sigma: settings.kernel_sigma },
         sections: settings.kernel_sections,

@@ -187,8 +187,8 @@ fn reconstruction(scene: &Scene, has_slabs: bool) -> Result<Knob, String> {
     if !has_slabs || !scene.objects.iter().any(is_volume) {
         return Err("no volume lies in slabs".into());
     }
-    if sheets.slicing != Slicing::View || sheets.classify == Classify::Before || sheets.aligned == Aligned::Axis {
-        return Err("slabs across half vectors, along a lattice or of classified voxels are splatted alone".into());
+    if sheets.classify == Classify::Before || sheets.aligned == Aligned::Axis {
+        return Err("slabs along a lattice or of classified voxels are splatted alone".into());
     }
     let has_other_kernel = sheets.kernel_extent != 2.0 || sheets.kernel_sigma != 0.7 || sheets.kernel_sections != 256;
     if has_other_kernel || sheets.accumulation == Accumulation::F16 {

@@ -4,7 +4,7 @@
 
 mod splats;
 
-use super::{params, refuse, volumes};
+use super::{params, reconstruction, refuse, volumes};
 use crate::form::{Form, PlannedObject};
 use crate::frame::Frame;
 use crate::frame::matter::{Carries, CarriesLight, Matter};
@@ -125,7 +125,9 @@ pub(super) fn bytes(
     let splats = splat_bounds(matter);
     let bodies = Bodies { volumes: &volumes, splats };
     // Of counts alone: no length among the parameters plays a part.
-    let params = half_params(matter.scene, params(matter.scene, 0, options));
+    let form = reconstruction::chosen(matter.scene, matter.own, matter.camera);
+    let sheets = Params { reconstruction: form.reconstruction, ..params(matter.scene, 0, options) };
+    let params = half_params(matter.scene, sheets);
     let lamps = points.iter().filter_map(|point| swept(matter.scene, point));
     let (served, mapped): (Vec<_>, Vec<_>) =
         lamps.partition(|lamp| serves_extended(&bodies, matter.camera, lamp.0, lamp.1).is_ok());
@@ -153,7 +155,9 @@ pub(super) fn draw(
     let mut input = input(frame, &solid.depth, &means, cost)?;
     input.polygons = &polygons;
     input.splats = splats.as_ref().map(|splats| splats.input(frame));
-    let params = half_params(frame.scene, params(frame.scene, frame.loaded.exponent, session.options));
+    let form = reconstruction::chosen(frame.scene, &frame.loaded.own, &frame.camera);
+    let sheets = params(frame.scene, frame.loaded.exponent, session.options);
+    let params = half_params(frame.scene, Params { reconstruction: form.reconstruction, ..sheets });
     super::warn(frame, &input.sheets.volumes, session.warnings);
     frame.progress.begin(stage::SHEETS);
     frame.tick()?;

@@ -7,11 +7,11 @@ use crate::scene::{self, Scene, SheetKernel, Technique};
 use sheet_light::{GatherKernel, KernelShape, Params, Reconstruction};
 use splat_core::{Accumulation, Camera};
 
-/// Share of voxels with extinction below which the plan has volumes splatted: a splat is made of such a voxel alone, while a gathered slab looks for
+/// Share of voxels with extinction below which the plan has volumes splatted in slabs across the view: a splat is made of such a voxel alone, while a gathered slab looks for
 /// bricks that hold one. Both take as long at about a tenth of the voxels (a ball of 100³, 1.7 samples a voxel).
 const SPARSE: f64 = 0.25;
 
-/// Samples along a voxel above which the plan has volumes splatted: rows of a kernel are then filled many samples at once. Gathering takes 0.4 times as long at 1.3
+/// Samples along a voxel above which the plan has volumes splatted in slabs across the view: rows of a kernel are then filled many samples at once. Gathering takes 0.4 times as long at 1.3
 /// to 2.7 samples, as long at 5, and 1.2 times as long at 11 (balls of 50³ and 100³ of which most voxels have extinction).
 const COARSE: f64 = 5.0;
 
@@ -50,9 +50,7 @@ pub(super) fn chosen(scene: &Scene, natives: &[Own], camera: &Camera) -> Chosen 
         scene::Reconstruction::Splat => return splat("the scene asks for it"),
         scene::Reconstruction::Auto => {}
     }
-    if half::is_asked(scene) {
-        splat("slabs lie across half vectors, which are splatted alone")
-    } else if states_kernel {
+    if states_kernel {
         splat("the scene states a kernel that is splatted alone")
     } else if settings.classify == scene::Classify::Before {
         splat("values are classified before they are reconstructed")
@@ -64,6 +62,10 @@ pub(super) fn chosen(scene: &Scene, natives: &[Own], camera: &Camera) -> Chosen 
         splat("a lattice is body-centred")
     } else if volumes().any(|native| samples_along_a_voxel(native) < 1.0) {
         splat("voxels are finer than samples, which splats average")
+    } else if half::is_asked(scene) {
+        gather(
+            "slabs lie across half vectors, where a voxel is splatted into each of its slabs anew, for the eye and for each light",
+        )
     } else if volumes().all(|native| samples_along_a_voxel(native) > COARSE) {
         splat("voxels are wider than five samples, and a splat fills many of these at once")
     } else if visible < SPARSE {
