@@ -92,8 +92,9 @@ pub(crate) fn of_scene(scene: &Scene, loaded: &Loaded) -> Brightness {
     for (receiver, object) in receivers.filter(|(receiver, _)| receiver.response > 0.0) {
         let mut received = vec![0.0; loaded.lights.len()];
         for point in &points {
-            let lit = LitBy { light: point.light, slide: loaded.images.slides[point.of].as_ref(), shadow: None };
-            received[point.of] += lit.brightest_in(&receiver.bounds, receiver.spread);
+            let lit =
+                LitBy { light: point.light, slide: loaded.images.slides[point.light_index].as_ref(), shadow: None };
+            received[point.light_index] += lit.brightest_in(&receiver.bounds, receiver.spread);
         }
         for (brightest, received) in lights.iter_mut().zip(&received) {
             *brightest = brightest.max(received * receiver.response);

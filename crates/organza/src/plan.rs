@@ -167,6 +167,21 @@ pub struct Plan {
     pub skips_behind_finished: bool,
 }
 
+impl Effect {
+    /// Adds the names of objects whose shadows fall on nothing that is seen to the reason of a shadow.
+    pub(crate) fn note_idle_casters(&mut self, objects: &[String]) {
+        const NAMED: usize = 3;
+        if objects.is_empty() {
+            return;
+        }
+        let names: Vec<String> = objects.iter().take(NAMED).map(|name| format!("'{name}'")).collect();
+        let others = objects.len().saturating_sub(NAMED);
+        let more = if others > 0 { format!(" and {others} more") } else { String::new() };
+        self.reason +=
+            &format!("; left out of its maps: {}{more}, whose shadows fall on nothing that is seen", names.join(", "));
+    }
+}
+
 impl Plan {
     /// Whether the picture shows light that was out of the view before.
     pub(crate) fn leaves_view(&self) -> bool {
@@ -246,22 +261,6 @@ impl Plan {
             self.passes.splice(at..at, made);
         }
         (self.shadow_tables, self.other_tables, self.shadow_bytes) = (tables, others, bytes);
-    }
-
-    /// Adds the names of objects whose shadows fall on nothing that is seen to the reason of a shadow.
-    pub(crate) fn note_idle_casters(&mut self, shadow: &str, objects: &[String]) {
-        const NAMED: usize = 3;
-        let Some(effect) = self.effects.iter_mut().find(|effect| effect.name == shadow && effect.called_for) else {
-            return;
-        };
-        if objects.is_empty() {
-            return;
-        }
-        let names: Vec<String> = objects.iter().take(NAMED).map(|name| format!("'{name}'")).collect();
-        let others = objects.len().saturating_sub(NAMED);
-        let more = if others > 0 { format!(" and {others} more") } else { String::new() };
-        effect.reason +=
-            &format!("; left out of its maps: {}{more}, whose shadows fall on nothing that is seen", names.join(", "));
     }
 
     /// Takes in the table of the eye's map, which is built when splats are to be shaded.

@@ -21,10 +21,9 @@ use crate::plan::{Effect, Plan};
 use crate::predict::prediction;
 use crate::ranges::ranges;
 use crate::scene::{
-    EffectKind, FoundCamera, LightPoint, Scene, SceneLight, SceneObject, Source, SwitchedEffect, Technique,
-    light_points,
+    EffectKind, FoundCamera, Scene, SceneLight, SceneObject, Source, SwitchedEffect, Technique, light_points,
 };
-use crate::shadows::{Probe, Shadowing};
+use crate::shadows::{Probe, Shadowing, casters_by_light};
 use crate::statistics::{ObjectData, ObjectStatistics, Statistics};
 use crate::technique::{Fold, Row};
 use crate::{CostRecord, Error, Progress, RenderOptions, SplatCount, escape_controls, shadows, warnings};
@@ -33,6 +32,7 @@ pub use seen::{fitted, seen, settled};
 use splat_core::shade::Census;
 use splat_core::{Exceeded, Material, SplatKind};
 use std::borrow::Cow;
+use std::collections::HashMap;
 
 /// The plan of a render, its cost and its memory, without a picture.
 #[derive(Debug, Clone, PartialEq)]
@@ -405,9 +405,14 @@ fn plan_counted(
     plan.casters = casters;
     plan.shown = shadowing.shown().to_vec();
     if is_new {
-        for (rank, light) in loaded.lights.iter().enumerate() {
-            let name = EffectKind::Shadow.name(&light.label);
-            plan.note_idle_casters(&name, &idle_casters(scene, loaded, &points, &plan.casters, rank));
+        let casters = casters_by_light(loaded, &points, &plan.casters);
+        let named = loaded.lights.iter().zip(&casters);
+        let casters_of: HashMap<String, &Vec<bool>> =
+            named.map(|(light, casters)| (EffectKind::Shadow.name(&light.label), casters)).collect();
+        for effect in plan.effects.iter_mut().filter(|effect| effect.called_for) {
+            if let Some(casters) = casters_of.get(&effect.name) {
+                effect.note_idle_casters(&idle_casters(scene, loaded, casters));
+            }
         }
     }
     if is_new || !is_cast_alike || !shadows::fit(plan.tables(), left) {
@@ -432,18 +437,11 @@ fn plan_counted(
     Ok(Planned { plan, memory, statistics, census })
 }
 
-/// The names of visible objects that cast shadows, none of which a light throws upon anything that is seen: its maps leave them out.
-fn idle_casters(
-    scene: &Scene,
-    loaded: &Loaded,
-    points: &[LightPoint],
-    casters: &[Vec<bool>],
-    light: usize,
-) -> Vec<String> {
-    let is_kept = |rank: usize| points.iter().zip(casters).any(|(point, kept)| point.of == light && kept[rank]);
-    let objects = scene.objects.iter().zip(&loaded.objects).enumerate();
-    let idle = objects.filter(|(rank, (o, object))| o.visible && object.casts_shadow && !is_kept(*rank));
-    idle.map(|(_, (o, _))| escape_controls(&o.name).into_owned()).collect()
+/// The names of visible objects that cast shadows and are none of these casters.
+fn idle_casters(scene: &Scene, loaded: &Loaded, casters: &[bool]) -> Vec<String> {
+    let objects = scene.objects.iter().zip(&loaded.objects).zip(casters);
+    let idle = objects.filter(|((o, object), is_kept)| o.visible && object.casts_shadow && !**is_kept);
+    idle.map(|((o, _), _)| escape_controls(&o.name).into_owned()).collect()
 }
 
 /// The plan of a loaded scene but for its shadow maps, and what it follows from.
@@ -535,7 +533,8 @@ fn probe_shadows(scene: &Scene, loaded: &Loaded, is_bent: bool, statistics: &mut
     let probe = Probe::new(loaded, leaves_view);
     let points = light_points(&loaded.lights);
     for (k, light) in statistics.lights.iter_mut().enumerate().filter(|(_, light)| light.may_shadow()) {
-        let opacities = points.iter().filter(|point| point.of == k).map(|point| probe.greatest_opacity(&point.light));
+        let opacities =
+            points.iter().filter(|point| point.light_index == k).map(|point| probe.greatest_opacity(&point.light));
         light.opacity = opacities.fold(0.0, f64::max);
     }
 }

@@ -12,7 +12,7 @@ use splat_core::{Camera, Light, LightShape, Limits, Object};
 use tsm::{Deposits, Params};
 
 pub(crate) use casters::{Shadowing, casting};
-pub(crate) use hiding::{Hiding, View, hiding};
+pub(crate) use hiding::{Hiding, View, casters_by_light, hiding};
 pub(crate) use probe::Probe;
 
 /// Share of the tolerance that the ends of lists may take, of all lights together. Absorbance grows with its logarithm only, so
@@ -186,7 +186,8 @@ pub(crate) fn eye_table(
 /// displayed value by more than the lamp's part of the tolerance. Thick cells are lit by what is left behind them, too.
 fn tolerance(settings: &RenderSettings, loaded: &Loaded, point: &LightPoint, maps: u64, thickest: f64) -> f32 {
     let of_lights = || {
-        let passing = loaded.images.slides[point.of].as_ref().map_or(1.0, |slide| f64::from(slide.brightest()));
+        let passing =
+            loaded.images.slides[point.light_index].as_ref().map_or(1.0, |slide| f64::from(slide.brightest()));
         let brightest = passing * point.light.brightest_on(&loaded.cloud);
         let gain = DISPLAY_SLOPE * libm::exp2(settings.exposure) * brightest.max(f64::MIN_POSITIVE);
         CUT_SHARE * settings.tolerance / (gain * maps as f64)

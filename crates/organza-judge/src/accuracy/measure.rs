@@ -225,7 +225,7 @@ impl<'a> Renderer<'a> {
     /// The splats of a scene, converted now unless those at hand are the same; with the seconds that took.
     fn load(&mut self, scene: &Scene) -> Result<(&mut Loaded, Option<f64>), Error> {
         let mut seconds = None;
-        let at = self.loaded.iter().position(|(of, _)| same_splats(of, scene));
+        let at = self.loaded.iter().position(|(loaded_for, _)| same_splats(loaded_for, scene));
         let at = match at {
             Some(at) => at,
             None => {

@@ -15,7 +15,7 @@ pub struct LightPoint {
     /// Cells along a side of its shadow map, where its whole light states them.
     pub shadow_cells: Option<u32>,
     /// The place of its whole light in the list that it is from.
-    pub of: usize,
+    pub light_index: usize,
     /// Which of its points it is, and how many there are.
     pub rank: [usize; 2],
 }
@@ -39,12 +39,12 @@ pub fn light_points(lights: &[SceneLight]) -> Vec<LightPoint> {
             light,
             whole: whole.light,
             shadow_cells: whole.shadow_cells,
-            of: rank,
+            light_index: rank,
             rank: [k, count],
         };
         light_points.extend(points.into_iter().enumerate().map(point));
     }
-    light_points.sort_by_cached_key(|point| (point.light.key(), lights[point.of].shadow));
+    light_points.sort_by_cached_key(|point| (point.light.key(), lights[point.light_index].shadow));
     light_points
 }
 

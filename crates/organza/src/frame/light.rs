@@ -63,7 +63,7 @@ impl<'a> Frame<'a> {
     pub(crate) fn light_points(&self) -> &[LightPoint] {
         self.light_points.get_or_init(|| {
             let mut points = light_points(&self.loaded.lights);
-            for point in points.iter_mut().filter(|point| !self.plan.lights[point.of]) {
+            for point in points.iter_mut().filter(|point| !self.plan.lights[point.light_index]) {
                 point.light.intensity = [0.0; 3];
             }
             points
@@ -208,6 +208,6 @@ impl<'a> Frame<'a> {
 
     /// A point of a light behind its slide, without shadows.
     pub(crate) fn lit(&self, point: &LightPoint) -> LitBy<'_> {
-        LitBy { light: point.light, slide: self.loaded.images.slides[point.of].as_ref(), shadow: None }
+        LitBy { light: point.light, slide: self.loaded.images.slides[point.light_index].as_ref(), shadow: None }
     }
 }

@@ -31,7 +31,7 @@ pub(crate) fn is_all(
     }
     let points = light_points(lights);
     let answers = carries(matter, &points)?.points;
-    let is_no_shadow = |point: &LightPoint| !lights[point.of].shadow || point.light.intensity == [0.0; 3];
+    let is_no_shadow = |point: &LightPoint| !lights[point.light_index].shadow || point.light.intensity == [0.0; 3];
     let receives = |(o, planned): (&ObjectStatistics, &PlannedObject)| o.receives && !planned.form.is_own();
     Ok(!statistics.iter().zip(matter.planned).any(receives)
         && points.iter().zip(&answers).all(|(point, carries)| carries.is_ok() || is_no_shadow(point)))
@@ -50,7 +50,7 @@ pub(crate) fn plan(scene: &Scene, loaded: &Loaded, points: &[LightPoint], plan: 
         (false, _) => Scattering::Once,
     };
     let scatters_again = scattering == Scattering::Again;
-    let called_for = |point: &LightPoint| plan.shadow_maps[point.of];
+    let called_for = |point: &LightPoint| plan.shadow_maps[point.light_index];
     plan.carried = points.iter().zip(carries).map(|(point, carries)| called_for(point) && carries.is_ok()).collect();
     // The layer is there even where nothing fills it.
     plan.scatters_again = asked.scatters_again;
@@ -59,7 +59,7 @@ pub(crate) fn plan(scene: &Scene, loaded: &Loaded, points: &[LightPoint], plan: 
         return Err(Error::Internal("splats that a shadow map needs were not made".into()));
     }
     let is_left = |light: usize| {
-        plan.shadow_maps[light] && points.iter().zip(carries).any(|(point, c)| point.of == light && c.is_err())
+        plan.shadow_maps[light] && points.iter().zip(carries).any(|(point, c)| point.light_index == light && c.is_err())
     };
     plan.scattered_once = if scatters_again { (0..plan.shadow_maps.len()).filter(|l| is_left(*l)).count() } else { 0 };
     if let Some(scatter) = plan
@@ -76,7 +76,7 @@ pub(crate) fn plan(scene: &Scene, loaded: &Loaded, points: &[LightPoint], plan: 
         .filter(|light| told(*light))
         .map(|light| {
             let point_carries: Vec<_> =
-                points.iter().zip(carries).filter(|(point, _)| point.of == light).map(|(_, c)| c).collect();
+                points.iter().zip(carries).filter(|(point, _)| point.light_index == light).map(|(_, c)| c).collect();
             let (called_for, reason) = way(&point_carries, plan.shadow_maps[light], scattering);
             let label = &loaded.lights[light].label;
             let soft = EffectKind::Soft.name(label);
@@ -127,7 +127,7 @@ fn way(points: &[&Result<(), String>], has_shadow: bool, scattering: Scattering)
 
 /// How the shadow of a light with an extent becomes soft, in words; `None` for a light without one.
 fn softness(light: usize, points: &[LightPoint], asked: &Carries, is_carried: bool) -> Option<String> {
-    let k = points.iter().position(|point| point.of == light && point.whole.shape.is_extended())?;
+    let k = points.iter().position(|point| point.light_index == light && point.whole.shape.is_extended())?;
     let [_, all] = points[k].rank;
     let way = match (is_carried, asked.together) {
         (true, true) => format!("one sweep sees each slab from {all} points of it"),
@@ -158,7 +158,7 @@ pub(crate) fn requested_maps<'a>(
     others: Option<&'a [Object]>,
     plan: &Plan,
 ) -> Vec<Option<MapRequest<'a>>> {
-    let called_for = |point: &LightPoint| plan.shadow_maps[point.of];
+    let called_for = |point: &LightPoint| plan.shadow_maps[point.light_index];
     let Some(others) = others else {
         let of_all = points.iter().zip(casting);
         return of_all.map(|(point, objects)| called_for(point).then_some((point, &objects[..]))).collect();

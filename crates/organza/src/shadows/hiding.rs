@@ -46,12 +46,10 @@ pub(crate) fn hiding(
     }
     let points = light_points(&loaded.lights);
     let casters: Vec<Vec<bool>> = points.iter().map(|point| view.shadowing.casters(&point.light)).collect();
+    let casters = casters_by_light(loaded, &points, &casters);
     let hiding = |rank: usize| {
         let sum = brightness[rank].sum_of_splats;
-        let casts = |light: usize| {
-            let of_light = points.iter().zip(&casters).filter(|(point, _)| point.of == light);
-            loaded.objects[rank].casts_shadow && of_light.into_iter().any(|(_, casters)| casters[rank])
-        };
+        let casts = |light: usize| loaded.objects[rank].casts_shadow && casters[light][rank];
         let is_in_view = view.shadowing.shown()[rank];
         Hiding {
             is_in_view,
@@ -74,6 +72,15 @@ pub(crate) fn hiding(
     hidings
 }
 
+/// For each light and object, whether any point of the light throws its shadow, given the same of each point.
+pub(crate) fn casters_by_light(loaded: &Loaded, points: &[LightPoint], casters: &[Vec<bool>]) -> Vec<Vec<bool>> {
+    let mut by_light = vec![vec![false; loaded.objects.len()]; loaded.lights.len()];
+    for (point, casters) in points.iter().zip(casters) {
+        by_light[point.light_index].iter_mut().zip(casters).for_each(|(casts, of_point)| *casts |= of_point);
+    }
+    by_light
+}
+
 /// Looks at an object tile by tile.
 fn look(loaded: &Loaded, probe: &Probe<'_>, points: &[LightPoint], rank: usize, hiding: &mut Hiding) {
     if hiding.view_depth > 0.0 {
@@ -81,7 +88,7 @@ fn look(loaded: &Loaded, probe: &Probe<'_>, points: &[LightPoint], rank: usize, 
         hiding.view_depth = hiding.view_depth.min(depth);
     }
     for (light, known) in hiding.light_depths.iter_mut().enumerate().filter(|(_, known)| **known > 0.0) {
-        let of_light = points.iter().filter(|point| point.of == light);
+        let of_light = points.iter().filter(|point| point.light_index == light);
         let shadows = probe.with_casters(Casters::Shadows(rank));
         let depth = of_light.map(|point| shadows.greatest_depth(&point.light)).fold(0.0, f64::max);
         *known = known.min(depth);

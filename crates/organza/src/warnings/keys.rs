@@ -50,7 +50,7 @@ pub(crate) fn idle_cells(lights: &[SceneLight], plan: &Plan) -> Vec<String> {
     let points = light_points(lights);
     let has_map = |rank: usize| {
         let maps = plan.shadow_tables.iter().zip(&points);
-        maps.filter(|(table, _)| table.is_some()).any(|(_, point)| point.of == rank)
+        maps.filter(|(table, _)| table.is_some()).any(|(_, point)| point.light_index == rank)
     };
     let idle = lights.iter().enumerate().filter(|(rank, light)| light.shadow_cells.is_some() && !has_map(*rank));
     idle.map(|(_, light)| {

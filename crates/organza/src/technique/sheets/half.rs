@@ -196,9 +196,9 @@ fn mean_shadows<'a>(frame: &'a Frame<'a>, cost: &mut CostRecord) -> Result<Vec<(
     let points = frame.light_points().iter().zip(&frame.plan.carried).zip(maps);
     for ((point, _), map) in points.filter(|((point, carried), _)| **carried && is_whole(frame.scene, point)) {
         let Some(map) = map else { continue };
-        match means.iter_mut().find(|(of, _)| *of == point.of) {
+        match means.iter_mut().find(|(light, _)| *light == point.light_index) {
             Some((_, mean)) => mean.0.push(map),
-            None => means.push((point.of, MeanTransmittance(vec![map]))),
+            None => means.push((point.light_index, MeanTransmittance(vec![map]))),
         }
     }
     Ok(means)
@@ -224,7 +224,7 @@ fn input<'a>(
             (false, _) => mapped.push(lit),
             (true, false) => lights.push(lit),
             (true, true) if point.rank[0] == 0 => {
-                let mean = means.iter().find(|(of, _)| *of == point.of);
+                let mean = means.iter().find(|(light, _)| *light == point.light_index);
                 let lit = LitBy { light: point.whole, slide: None, shadow: mean.map(|(_, mean)| mean as _) };
                 extended.push(Extended { lit, samples: lamp(frame.scene, point).1 });
             }

@@ -65,7 +65,7 @@ impl<'a> Frame<'a> {
         let points = self.light_points().iter().enumerate().filter(|(_, point)| point.light.intensity != [0.0; 3]);
         let lamps = points.map(|(k, point)| PolygonLamp {
             lit: LitBy { shadow: maps.get(k).and_then(Option::as_ref).map(|map| map as _), ..self.lit(point) },
-            points: (has_z_buffers && plan.shadow_maps[point.of]).then_some(point.rank[1] as u32),
+            points: (has_z_buffers && plan.shadow_maps[point.light_index]).then_some(point.rank[1] as u32),
         });
         Ok(lamps.collect())
     }
