@@ -86,7 +86,7 @@ const SWEPT: &str = "version = 1\n[camera]\nposition = [0, 0, 4]\ntarget = [0, 0
     [[object]]\nname = 'fog'\nmaterial = 'fog'\n\
     medium_ball = { center = [0, 0, 0], radius = 1, extinction = 2, spacing = 0.1 }\n\
     [material.fog]\nmedium = { albedo = 0.9 }\n\
-    [render]\nantialias = 1\ntechnique = 'sheets'\nsheets = { slicing = 'half_vector' }\n";
+    [render]\nantialias = 1\ntechnique = 'sheets'\nsheets = { slicing = 'half_vector', reconstruction = 'splat' }\n";
 
 #[test]
 fn rows_of_sweeps_are_as_many_as_slabs_take() {
@@ -103,6 +103,8 @@ fn rows_of_sweeps_are_as_many_as_slabs_take() {
     let two = number(&predicted(&SWEPT.replace("[[object]]", &format!("{second}[[object]]"))), Item::SweptRow);
     assert!((two / rows - 2.0).abs() < 1e-9, "{two} of {rows}");
     assert_eq!(number(&predicted(&SWEPT.replace("'half_vector'", "'view'")), Item::SweptRow), 0.0);
+    // Pixels that read the lattice add no rows.
+    assert_eq!(number(&predicted(&SWEPT.replace("'splat'", "'gather'")), Item::SweptRow), 0.0);
 }
 
 #[test]

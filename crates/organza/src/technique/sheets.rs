@@ -136,7 +136,7 @@ fn own_work(frame: &Frame<'_>) -> OwnWork {
         OwnWork {
             items: if is_splatted && !is_half { fragments } else { 0.0 },
             slab_samples: images * sweeps * seen.samples * slabs * (1.0 + lit) * share_of_samples,
-            swept_rows: if is_half {
+            swept_rows: if is_half && is_splatted {
                 sweeps * shaping_voxels(grid, transfer) * sections * (rows_of_eye + rows_of_light)
             } else {
                 0.0
