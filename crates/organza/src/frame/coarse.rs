@@ -7,7 +7,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 use splat_core::shade::joint::{MediumSpacing, THIN};
 use splat_core::shade::{LitBy, ShadeInput, shade_splat};
-use splat_core::{FootprintStack, Receiver, SplatKind, Transmittance};
+use splat_core::{Receiver, SplatKind, Transmittance};
 use std::f64::consts::PI;
 use tsm::ShadowMap;
 
@@ -41,7 +41,6 @@ struct Sample {
 /// Light of a frame, and from which error on it is displayed off.
 struct Look<'a> {
     input: ShadeInput<'a>,
-    footprints: &'a FootprintStack,
     lit: Vec<(LitBy<'a>, Option<&'a ShadowMap>)>,
     /// Factor of the exposure.
     gain: f32,
@@ -64,7 +63,6 @@ impl Frame<'_> {
         let samples: Vec<&Sample> = seen.iter().step_by(seen.len().div_ceil(LOOKED_AT).max(1)).collect();
         let look = Look {
             input: self.shading(&[]),
-            footprints: &self.loaded.footprints,
             lit: self.shining(maps).collect(),
             gain: libm::exp2(self.settings.exposure) as f32,
             // Rounding to bytes moves each by half a level.
@@ -99,9 +97,15 @@ impl Frame<'_> {
         candidates.par_iter().map(share).collect()
     }
 
-    /// A splat as it is seen; `None` where its centre is out of the view or behind opaque surfaces.
+    /// A splat as it is seen; `None` where its centre is out of the view or behind opaque surfaces, and of thick media.
     fn sample(&self, i: usize) -> Option<Sample> {
         let cloud = self.drawn();
+        // A thick cell is lit at its faces, of which looks about its middle say nothing.
+        let spacing = MediumSpacing::of_splat(cloud, &self.loaded.footprints, i);
+        let extinction = self.loaded.materials[cloud.material[i] as usize].greatest_extinction();
+        if spacing.is_some_and(|spacing| spacing.optical_depth * extinction > THIN) {
+            return None;
+        }
         let camera = &self.camera;
         let centre = camera.view_from_offset(cloud.origin).apply(cloud.position[i]).as_dvec3();
         if centre.z <= 0.0 || !camera.may_see(centre, 0.0) {
@@ -130,13 +134,7 @@ impl Look<'_> {
     fn worst_light(&self, sample: &Sample) -> Option<usize> {
         let splat = sample.splat;
         let receiver = Receiver::of_splat(self.input.cloud, splat);
-        // The light of a thick cell is that of its lit part, and goes by how absorbance grows from place to place.
-        let thick = self.thickness(splat);
-        let lit_part = |map: &ShadowMap| map.absorbance(&receiver).map(|a| 0.5 * libm::expf(-(a - thick).max(0.0)));
-        let arrives = |map: &Option<&ShadowMap>| {
-            let through = |map: &ShadowMap| if thick > THIN { lit_part(map) } else { map.transmittance(&receiver) };
-            Even(map.map_or([1.0; 3], through))
-        };
+        let arrives = |map: &Option<&ShadowMap>| Even(map.map_or([1.0; 3], |map| map.transmittance(&receiver)));
         let through: Vec<Even> = self.lit.iter().map(|(_, map)| arrives(map)).collect();
         let expected = self.radiance(splat, &through);
         // Lights err by themselves: their squares add up.
@@ -146,13 +144,7 @@ impl Look<'_> {
         for (rank, (_, map)) in self.lit.iter().enumerate() {
             // Nobody sees cells that are finer than a pixel.
             let is_seen = |map: &&ShadowMap| map.cell_width(receiver.position) * sample.px_per_world >= 1.0;
-            let error = map.filter(is_seen).map_or(0.0, |map| {
-                if thick > THIN {
-                    through[rank].0[1] * -libm::expm1f(-map.absorbance_error(&receiver))
-                } else {
-                    map.interpolation_error(&receiver)
-                }
-            });
+            let error = map.filter(is_seen).map_or(0.0, |map| map.interpolation_error(&receiver));
             if error == 0.0 {
                 continue;
             }
@@ -170,14 +162,6 @@ impl Look<'_> {
         let byte = |radiance: f32| f64::from(displayed(radiance.max(0.0) * self.gain));
         let is_off = (0..3).any(|c| byte(expected[c] + variance[c].sqrt()) - byte(expected[c]) > self.tolerance);
         worst.filter(|_| is_off)
-    }
-
-    /// Optical depth of a spacing about a splat of a medium, in the channel that has most; 0 of what is no medium.
-    fn thickness(&self, splat: usize) -> f32 {
-        let cloud = self.input.cloud;
-        let material = &self.input.materials[cloud.material[splat] as usize];
-        let spacing = MediumSpacing::of_splat(cloud, self.footprints, splat);
-        spacing.map_or(0.0, |spacing| spacing.optical_depth * material.greatest_extinction())
     }
 
     /// Radiance of a splat by such shares of each light.

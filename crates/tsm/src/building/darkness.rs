@@ -143,13 +143,13 @@ mod tests {
         let sun = LightShape::Directional { direction: DVec3::new(0.2, -1.0, 0.1).normalize() };
         let cases = [
             (sun, MappingChoice::Auto),
-            (above.clone(), MappingChoice::Planar),
-            (above.clone(), MappingChoice::PolarAzimuth),
+            (above, MappingChoice::Planar),
+            (above, MappingChoice::PolarAzimuth),
             (above, MappingChoice::Octahedral),
             (within, MappingChoice::Octahedral),
         ];
         for (light, mapping) in cases {
-            let [whole, ended] = entries(&cloud, &materials, light.clone(), mapping);
+            let [whole, ended] = entries(&cloud, &materials, light, mapping);
             assert!(ended < whole, "{light:?}, {mapping:?}: {ended} of {whole}");
             println!("{mapping:?}: {ended} of {whole}");
         }

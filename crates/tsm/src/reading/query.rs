@@ -191,17 +191,6 @@ impl ShadowMap {
     /// plane, up to a cell away on either side. For smooth light and cells of width h the estimate is h²/12 times the curvature, the mean over a
     /// cell. In the middle of an opaque shadow's edge it is a sixth.
     pub fn interpolation_error(&self, receiver: &Receiver) -> f32 {
-        self.greatest_bend(receiver, &|receiver| self.transmittance(receiver)[1])
-    }
-
-    /// Estimates the error of the absorbance at a receiver against much smaller cells, as [`Self::interpolation_error`] does of the transmittance: within
-    /// thick media, whose light goes by how absorbance grows.
-    pub fn absorbance_error(&self, receiver: &Receiver) -> f32 {
-        self.greatest_bend(receiver, &|receiver| self.absorbance(receiver)[1])
-    }
-
-    /// The greatest third of a second difference of what `look_up` has of places half a cell apart.
-    fn greatest_bend(&self, receiver: &Receiver, look_up: &dyn Fn(&Receiver) -> f32) -> f32 {
         let Some((_, _, width)) = self.place_of(receiver.position) else { return 0.0 };
         let p = self.frame.position(receiver.position);
         let parallel = with_mapping!(&self.table, m => m.is_parallel());
@@ -215,7 +204,10 @@ impl ShadowMap {
             let along = if is_plane { across - towards * (normal.dot(across) / slope) } else { across };
             self.frame.world_direction(along) * (0.5 * self.frame.world_length(width)) as f32
         };
-        let through = |offset: Vec3| look_up(&Receiver { position: receiver.position + offset, ..*receiver });
+        let through = |offset: Vec3| {
+            let [.., green, _] = self.transmittance(&Receiver { position: receiver.position + offset, ..*receiver });
+            green
+        };
         let here = through(Vec3::ZERO);
         let across = [first, -first, towards.cross(first), first.cross(towards)].map(step);
         let bends = across.map(|step| (here - 2.0 * through(step) + through(2.0 * step)).abs() / 3.0);
