@@ -4,7 +4,7 @@ use crate::common::{
     BEAUTY, constant, cubic, draw, exact, grid, input, largest, noise, parallel, transfer, unlit, volume,
 };
 use crate::half::common::{draw as draw_half, exact as exact_half, input as half_input, scattering, sun};
-use crate::half::twin::differences as differences_half;
+use crate::half::twin::differences_of_form as differences_half;
 use crate::twin::differences;
 use sheet_light::half::{HalfParams, fold};
 use sheet_light::{Error, Params, prepare};
@@ -34,6 +34,7 @@ fn few_sections_are_those_of_the_twin_and_show() {
         let [tau, color] = differences(&view, &params);
         assert!(tau < 2e-5 && color < 1e-5, "{sections}: {tau:e} {color:e}");
         let of_half = HalfParams { sheets: params, ..exact_half(None) };
+        // Pixels that read the lattice have all sections.
         let [tau, color] = differences_half(&half, &of_half);
         assert!(tau < 2e-5 && color < 5e-5, "{sections}, half vector: {tau:e} {color:e}");
         // How far that is from all sections.
