@@ -36,6 +36,8 @@ struct Sample {
     area: f64,
     /// Pixels of a length of one at its centre.
     px_per_world: f64,
+    /// Whether it is of a thick medium.
+    is_thick: bool,
 }
 
 /// Light of a frame, and from which error on it is displayed off.
@@ -97,15 +99,12 @@ impl Frame<'_> {
         candidates.par_iter().map(share).collect()
     }
 
-    /// A splat as it is seen; `None` where its centre is out of the view or behind opaque surfaces, and of thick media.
+    /// A splat as it is seen; `None` where its centre is out of the view or behind opaque surfaces.
     fn sample(&self, i: usize) -> Option<Sample> {
         let cloud = self.drawn();
-        // A thick cell is lit at its faces, of which looks about its middle say nothing.
         let spacing = MediumSpacing::of_splat(cloud, &self.loaded.footprints, i);
         let extinction = self.loaded.materials[cloud.material[i] as usize].greatest_extinction();
-        if spacing.is_some_and(|spacing| spacing.optical_depth * extinction > THIN) {
-            return None;
-        }
+        let is_thick = spacing.is_some_and(|spacing| spacing.optical_depth * extinction > THIN);
         let camera = &self.camera;
         let centre = camera.view_from_offset(cloud.origin).apply(cloud.position[i]).as_dvec3();
         if centre.z <= 0.0 || !camera.may_see(centre, 0.0) {
@@ -125,13 +124,18 @@ impl Frame<'_> {
         let slant = if cloud.kind[i] == SplatKind::Medium { 1.0 } else { normal.as_dvec3().dot(towards).abs() };
         let area = f64::from(cloud.cross_section[i]).min(PI * radius * radius);
         let area = slant * area * px_per_world * px_per_world;
-        Some(Sample { splat: i, area, px_per_world: px_per_world / f64::from(self.settings.antialias) })
+        let px_per_world = px_per_world / f64::from(self.settings.antialias);
+        Some(Sample { splat: i, area, px_per_world, is_thick })
     }
 }
 
 impl Look<'_> {
     /// The light whose map errs most at a splat, where what is displayed of its light is off by more than the tolerance.
     fn worst_light(&self, sample: &Sample) -> Option<usize> {
+        // A thick cell is lit at its faces, of which looks about its middle say nothing.
+        if sample.is_thick {
+            return None;
+        }
         let splat = sample.splat;
         let receiver = Receiver::of_splat(self.input.cloud, splat);
         let arrives = |map: &Option<&ShadowMap>| Even(map.map_or([1.0; 3], |map| map.transmittance(&receiver)));
