@@ -124,6 +124,7 @@ impl Picture {
                 backend: text("backend"),
                 sets,
                 exposure: metadata["exposure"].as_f64().unwrap_or_default(),
+                left_out: text("left_out"),
             },
             facts,
             has_background: metadata["has_background"].as_bool().unwrap_or_default(),
@@ -134,10 +135,10 @@ impl Picture {
     /// What files say of it beside its layers, a document in JSON.
     #[getter]
     fn metadata(&self) -> String {
-        let Metadata { scene_sha256, scene, technique, seed, backend, sets, exposure } = &self.metadata;
+        let Metadata { scene_sha256, scene, technique, seed, backend, sets, exposure, left_out } = &self.metadata;
         json!({
             "scene_sha256": scene_sha256, "scene": scene, "technique": technique, "seed": seed, "backend": backend,
-            "sets": sets, "exposure": exposure, "has_background": self.has_background,
+            "sets": sets, "exposure": exposure, "left_out": left_out, "has_background": self.has_background,
         })
         .to_string()
     }
