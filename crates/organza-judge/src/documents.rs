@@ -60,7 +60,7 @@ pub fn up_json(scene: &Scene) -> Value {
     from_files(scene).map(|o| json!({ "object": o.name, "axis": o.up.axis.name(), "by_file": o.up.by == UpBy::File, "by": up_by(o.up.by) })).collect()
 }
 
-/// What says which axis points up, for people.
+/// The origin of the axis that points up, in words.
 pub fn up_by(by: UpBy) -> &'static str {
     match by {
         UpBy::File => "by its file",

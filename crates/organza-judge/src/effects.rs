@@ -60,7 +60,7 @@ pub struct Measured {
 const ROUNDING: f64 = 1e-5;
 
 impl Measured {
-    /// What the pictures contradict of the plan that they were drawn by, a sentence each: an effect that changes a pixel by more than its bound, effects that
+    /// Contradictions between the pictures and their plan, a sentence each: an effect that changes a pixel by more than its bound, effects that
     /// were left out and change one by more than all of their bounds together, a pass that the plan does not have.
     ///
     /// A plan that was proved has none.

@@ -22,7 +22,7 @@ pub(crate) struct Picture {
     /// Camera, plan, costs, predictions, warnings and notes, as JSON.
     facts: String,
     has_background: bool,
-    /// What colours stand for; `None` of a picture that came from another process, which sends layers alone.
+    /// Scales of the colours; `None` of a picture from another process, which sends layers alone.
     scales: Option<Vec<ColorScale>>,
 }
 
@@ -132,7 +132,7 @@ impl Picture {
         })
     }
 
-    /// What files say of it beside its layers, a document in JSON.
+    /// The texts of its files beside the layers, a document in JSON.
     #[getter]
     fn metadata(&self) -> String {
         let Metadata { scene_sha256, scene, technique, seed, backend, sets, exposure, left_out } = &self.metadata;

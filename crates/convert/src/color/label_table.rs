@@ -1,4 +1,4 @@
-//! What the whole numbers of a volume of labels stand for: a name, a colour and an opacity each.
+//! Tables of labels: each whole number of a volume of labels has a name, a colour and an opacity.
 
 use super::color_by::distinct;
 use std::collections::BTreeMap;

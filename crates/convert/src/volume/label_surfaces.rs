@@ -44,7 +44,7 @@ struct Nets<'a> {
 /// The opacities of labels: every voxel asks for them.
 struct Opacities<'a> {
     table: &'a LabelTable,
-    /// Those of the numbers below [`SMALL`].
+    /// Rows of the numbers below [`SMALL`].
     small: Vec<f32>,
 }
 
@@ -85,7 +85,7 @@ pub fn label_surfaces(grid: &Grid, table: Option<&LabelTable>, object: &str) -> 
     Ok(nets.into_mesh())
 }
 
-/// What there is to say of the labels of a volume by a table: those that it hides, and those that it lacks; one sentence without a full stop each.
+/// Sentences, without full stops, about the labels of a volume that a table hides, and those that the table lacks.
 pub fn said_of_labels(grid: &Grid, table: &LabelTable) -> Vec<String> {
     let chunks = grid.values.par_chunks(CHUNK);
     let of_chunk = |values: &[f32]| {

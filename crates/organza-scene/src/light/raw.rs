@@ -139,7 +139,7 @@ pub(crate) enum RawLight {
     },
 }
 
-/// What a light states of its shadow.
+/// The keys of a light about its shadow.
 pub(crate) struct RawLightShadow {
     pub(crate) is_cast: bool,
     pub(crate) cells: Option<u32>,

@@ -151,7 +151,7 @@ fn check_rows(at: &At<'_>, raw: &RawLabelTable) -> Result<LabelTable, Error> {
     let mut rows = Vec::with_capacity(raw.labels.len());
     for (key, label) in &raw.labels {
         let at = at.key(key);
-        // As it is written: `+3` and `03` are no keys.
+        // The digits alone: `+3` and `03` are no keys.
         let number = key.parse().ok().filter(|number: &u32| *number <= LARGEST_LABEL && number.to_string() == *key);
         let Some(number) = number else {
             let message =

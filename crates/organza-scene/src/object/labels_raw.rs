@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::marker::PhantomData;
 
-/// What is written as a text, or as something else.
+/// A value of a scene file that may be a text instead.
 #[derive(Debug)]
 pub(crate) enum TextOr<T> {
     Text(String),
