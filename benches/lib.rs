@@ -17,7 +17,7 @@ pub use frame::Frame;
 pub use head::HeadLike;
 pub use record::record;
 
-use organza::{Files, Loaded, Progress, RenderOptions, load, scene};
+use organza::{Context, Files, Loaded, Progress, RenderOptions, load, scene};
 use splat_core::{Camera, Cloud, glam::Vec3, rng};
 use std::path::Path;
 use std::sync::OnceLock;
@@ -31,8 +31,9 @@ pub fn outdoor() -> &'static Loaded {
     SCENE.get_or_init(|| {
         let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenes/outdoor.toml");
         let scene = scene::load(&file, &scene::LoadOptions::default()).expect("scenes/outdoor.toml");
-        load(&scene, &RenderOptions::default(), &Progress::new(), &Files::default())
-            .expect("the data of scenes/outdoor.toml")
+        let context =
+            Context { files: &Files::default(), options: &RenderOptions::default(), progress: &Progress::new() };
+        load(&scene, context).expect("the data of scenes/outdoor.toml")
     })
 }
 

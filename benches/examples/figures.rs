@@ -12,7 +12,7 @@
 use deferred_blend::grouping::{Collisions, Coverage, Method, Recipe};
 use deferred_blend::{DiscInput, Discs, OpaqueInput, Params, Passes, Shown, resolve_opaque};
 use organza::scene::{LoadOptions, Override, Scene, load, parse};
-use organza::{Files, Progress, RenderOptions, render};
+use organza::{Context, Files, Progress, RenderOptions, render};
 use std::path::Path;
 
 /// A tile.
@@ -58,8 +58,8 @@ fn drawn(scene: &Scene) -> Picture {
 
 /// The discs of one group that face the viewer.
 fn one_group(scene: &Scene, method: Method, groups: u32) -> Picture {
-    let loaded =
-        organza::load(scene, &RenderOptions::default(), &Progress::new(), &Files::default()).expect("the model");
+    let context = Context { files: &Files::default(), options: &RenderOptions::default(), progress: &Progress::new() };
+    let loaded = organza::load(scene, context).expect("the model");
     let cloud = &loaded.cloud;
     let params = Params::default();
     let Params { disc_scale, gap, .. } = params;

@@ -129,7 +129,7 @@ fn the_path_tracer_sees_the_same_environment_and_it_lights_nothing() {
     let options = organza::RenderOptions::default();
     let progress = organza::Progress::new();
     let layers = organza::render(&scene, &options, &progress).unwrap().layers;
-    let orders = organza_judge::truth::Orders::of(&scene);
+    let orders = organza_judge::truth::Orders::shown_by(&scene);
     let truth = organza_judge::truth::truth(&scene, &options, orders, 400, &progress).unwrap().unwrap();
     let mean = |pixels: &mut dyn Iterator<Item = [f64; 3]>| pixels.flatten().sum::<f64>() / (24.0 * 18.0 * 3.0);
     let beauty = layers.rgb("beauty").unwrap();

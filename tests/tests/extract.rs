@@ -1,6 +1,6 @@
 //! The surface that a light sees first, by `organza extract` and as an object; where things stop; and what is asked for in vain.
 
-use organza::scene;
+use organza::{Context, scene};
 use organza_tests::Place;
 use read::{Loaded, ReadParams, file};
 use serde_json::Value;
@@ -212,7 +212,8 @@ fn what_a_light_sees_is_kept_while_it_stays_and_frames_are_as_those_alone() {
     let frames = [0, 1, 2, 3].map(frame);
     let files = organza::Files::default();
     let points = frames.each_ref().map(|frame| {
-        let (fitted, _) = organza::fitted(frame, &options, &progress, &files).unwrap();
+        let (fitted, _) =
+            organza::fitted(frame, Context { files: &files, options: &options, progress: &progress }).unwrap();
         let scene::Source::Extract(source) = &fitted.objects[1].source else { panic!() };
         source.points.clone().unwrap()
     });

@@ -1,7 +1,7 @@
 //! Loading a scene: splats are counted before they are made, limits hold for the scene as a whole, interrupts are heard.
 
 use organza::scene::{LoadOptions, Scene, parse};
-use organza::{Error, Files, Loaded, Progress, RenderOptions, explain};
+use organza::{Context, Error, Files, Loaded, Progress, RenderOptions, explain};
 use splat_core::Exceeded;
 use std::path::Path;
 
@@ -19,7 +19,7 @@ fn scene(more: &str) -> Scene {
 
 /// Nothing was read before.
 fn load(scene: &Scene, options: &RenderOptions, progress: &Progress) -> Result<Loaded, Error> {
-    organza::load(scene, options, progress, &Files::default())
+    organza::load(scene, Context { files: &Files::default(), options, progress })
 }
 
 #[test]

@@ -229,7 +229,7 @@ fn the_path_tracer_has_the_same_light() {
     let options = organza::RenderOptions::default();
     let progress = organza::Progress::new();
     let layers = organza::render(&scene, &options, &progress).unwrap().layers;
-    let orders = organza_judge::truth::Orders::of(&scene);
+    let orders = organza_judge::truth::Orders::shown_by(&scene);
     let truth = organza_judge::truth::truth(&scene, &options, orders, 600, &progress).unwrap().unwrap();
     let beauty = layers.rgb("beauty").unwrap();
     let mean = truth.image.pixels().iter().map(|p| p[0]).sum::<f64>() / 256.0;

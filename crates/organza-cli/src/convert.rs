@@ -7,7 +7,7 @@ use super::given::given;
 use super::session::{parse_scene, path_text, processor_only, render_options, unused_goal};
 use organza::output::{Target, Targets};
 use organza::scene::{Scene, Technique};
-use organza::{Error, Files, Loaded, printable, shown};
+use organza::{Context, Error, Files, Loaded, printable, shown};
 use serde_json::{Value, json};
 use splat_core::splat_file::{packed_splats_to_ply, splats_to_ply};
 use splat_core::{Cloud, Shading};
@@ -18,7 +18,7 @@ pub(super) fn run(arguments: &ConvertArguments) -> Result<(), Error> {
     let (scene, files, target) = begin(&arguments.scene, &arguments.output, arguments.force)?;
     let options = render_options(&arguments.scene);
     let (loaded, bytes) = with_bar(|progress| {
-        let mut loaded = organza::load(&scene, &options, progress, &files)?;
+        let mut loaded = organza::load(&scene, Context { files: &files, options: &options, progress })?;
         refuse_gaussians(&loaded)?;
         refuse_images(&loaded)?;
         // A power of two: no bit of a splat is lost.

@@ -11,7 +11,7 @@ use super::{console, report};
 use organza::cost::Prediction;
 use organza::plan::Plan;
 use organza::scene::{FoundCamera, Scene, SceneObject};
-use organza::{CostRecord, Error, Files, Progress, RenderOptions, SplatCount, escape_controls};
+use organza::{Context, CostRecord, Error, Files, Progress, RenderOptions, SplatCount, escape_controls};
 use organza_judge::documents;
 use organza_judge::effects::{self, Measured, Switch};
 use serde_json::json;
@@ -51,7 +51,7 @@ pub(super) fn run(arguments: &ExplainArguments) -> Result<(), Error> {
         if arguments.measure {
             return drawn(&arguments.scene, &given, &scene, &options, progress, files);
         }
-        let explanation = organza::explain_from(&scene, &options, progress, &files)?;
+        let explanation = organza::explain_from(&scene, Context { files: &files, options: &options, progress })?;
         let organza::Explanation { plan, cost, memory, predicted, splats, warnings, notes, found } = explanation;
         let prepared = Some(Prepared { memory, splats });
         Ok(Explained { plan, cost, predicted, prepared, measured: None, warnings, notes, found })
@@ -115,7 +115,7 @@ fn drawn(
 ) -> Result<Explained, Error> {
     progress.plan([(PICTURE, 1.0), (EFFECTS, 4.0)]);
     progress.begin(PICTURE);
-    let fitted = organza::fitted(scene, options, progress, &files)?.0.into_owned();
+    let fitted = organza::fitted(scene, Context { files: &files, options, progress })?.0.into_owned();
     progress.enter();
     let render = organza::render_from(scene, options, progress, files)?;
     progress.leave();

@@ -6,7 +6,7 @@ use super::console::bar::with_bar;
 use super::convert::begin;
 use super::session::{path_text, render_options};
 use organza::scene::{ExtractSource, MOST_ABSORBANCE, Scene};
-use organza::{Error, printable};
+use organza::{Context, Error, printable};
 use serde_json::json;
 use splat_core::RawPoints;
 use std::fmt::Write as _;
@@ -17,7 +17,7 @@ pub(super) fn run(arguments: &ExtractArguments) -> Result<(), Error> {
     let source = source(arguments, &scene)?;
     let options = render_options(&arguments.scene);
     let points = with_bar(|progress| {
-        let points = organza::seen(&scene, &source, &options, progress, &files)?;
+        let points = organza::seen(&scene, &source, Context { files: &files, options: &options, progress })?;
         target.write(&ply(&points))?;
         progress.finish();
         Ok(points)

@@ -4,7 +4,7 @@ use super::args::{Axis, FirstArguments, SceneArguments};
 use super::console;
 use super::session::{check_backend, render_options, start_threads};
 use organza::scene::{self, DEFAULT_FILL, DEFAULT_SIZE, Override, UpAxis, short};
-use organza::{Error, Files, InMemory, Progress, RenderOptions, SourceData, printable};
+use organza::{Context, Error, Files, InMemory, Progress, RenderOptions, SourceData, printable};
 use organza_survey::{DataFile, NamedTable, Preset, Wish, Written, first_scene, material_named};
 use read::is_foreign_json;
 use splat_core::MemoryAccount;
@@ -63,7 +63,8 @@ pub(super) fn write_first(
     options: &RenderOptions,
 ) -> Result<Written, Error> {
     let progress = Progress::new();
-    let read = inputs.iter().map(|path| DataFile::read(path, wish, (files, options, &progress)));
+    let context = Context { files, options, progress: &progress };
+    let read = inputs.iter().map(|path| DataFile::read(path, wish, context));
     let mut data = read.collect::<Result<Vec<_>, _>>()?;
     let takes_colors =
         |d: &DataFile| matches!(d.data, SourceData::Points(_) | SourceData::Mesh(_)) || d.array.is_some();
@@ -83,7 +84,7 @@ pub(super) fn write_first(
         let message = format!("{named} is for the colours of points and meshes, and no file has such");
         return Err(Error::usage(message, "the `transfer` of a volume has its values: `organza init` writes it"));
     }
-    let written = first_scene(&data, scene_file, wish, &InMemory::default(), (files, options, &progress))?;
+    let written = first_scene(&data, scene_file, wish, &InMemory::default(), context)?;
     written.remarks.iter().for_each(|remark| console::remark(remark));
     // The scene says what it uses of the files.
     files.forget_notes();

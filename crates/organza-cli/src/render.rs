@@ -1,11 +1,14 @@
 //! `organza render`.
 
+pub(crate) mod film;
+mod jobs;
+
 use super::args::{GoalArguments, RenderArguments};
 use super::console::bar::with_bar;
-use super::jobs::{Drawing, Jobs, Places};
 use super::machine::rates;
 use super::session::{open_device, path_text, processor_only, render_options, without_effect};
-use super::{console, film, report};
+use super::{console, report};
+use jobs::{Drawing, Jobs, Places};
 use organza::cost::announcement_of_frames;
 use organza::output::{self, Metadata, Target, WriteReport};
 use organza::scene::{FoundCamera, Goal, Scene, short};

@@ -6,7 +6,7 @@ use super::given::{Given, camera_overrides, given};
 use super::memory;
 use organza::device::{Choice, Device, DeviceChoice};
 use organza::scene::{self, Goal, LoadOptions, Override, Scene, Source, Technique, short};
-use organza::{Cache, Error, Files, InMemory, Progress, RenderOptions, printable, shown};
+use organza::{Cache, Context, Error, Files, InMemory, Progress, RenderOptions, printable, shown};
 use splat_core::MemoryAccount;
 use std::path::Path;
 use std::sync::Arc;
@@ -17,7 +17,8 @@ pub(super) fn load_scene(command: &str, arguments: &SceneArguments) -> Result<Sc
     let scene = parse_scene(arguments, &given, None, None)?;
     let place = format!("`organza {command}`");
     unused_goal(&scene.render.goal, &place).iter().for_each(|sentence| console::warn(sentence));
-    Ok(organza::fitted(&scene, &render_options(arguments), &Progress::new(), &files)?.0.into_owned())
+    let context = Context { files: &files, options: &render_options(arguments), progress: &Progress::new() };
+    Ok(organza::fitted(&scene, context)?.0.into_owned())
 }
 
 /// The scene with the options of the command line, as it is written, at a frame of its animation, or at one of a turntable.
@@ -39,7 +40,8 @@ pub(super) fn parse_switched(
 ) -> Result<Scene, Error> {
     let changes = effects.iter().map(|effect| Override::of_effect(effect)).collect::<Result<Vec<_>, _>>()?;
     let scene = parse_changed(arguments, given, None, None, changes)?;
-    Ok(organza::fitted(&scene, &render_options(arguments), &Progress::new(), files)?.0.into_owned())
+    let context = Context { files, options: &render_options(arguments), progress: &Progress::new() };
+    Ok(organza::fitted(&scene, context)?.0.into_owned())
 }
 
 /// The scene with these changes behind all other options.

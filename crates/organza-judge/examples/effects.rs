@@ -5,7 +5,7 @@
 use organza::cost::CountedPass;
 use organza::plan::Plan;
 use organza::scene::{LoadOptions, Override, Scene, parse};
-use organza::{Error, Files, Progress, RenderOptions};
+use organza::{Context, Error, Files, Progress, RenderOptions};
 use organza_judge::effects::{LitSplats, Switch, measure};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -140,7 +140,8 @@ fn scene(path: &Path, switches: &[Switch]) -> Result<Scene, Error> {
     if longest > SIDE {
         scene.camera.size = scene.camera.size.map(|side| (side * SIDE).div_ceil(longest));
     }
-    Ok(organza::fitted(&scene, &RenderOptions::default(), &Progress::new(), &Files::default())?.0.into_owned())
+    let context = Context { files: &Files::default(), options: &RenderOptions::default(), progress: &Progress::new() };
+    Ok(organza::fitted(&scene, context)?.0.into_owned())
 }
 
 fn draw(path: &Path) -> Result<Drawn, Error> {

@@ -12,7 +12,7 @@
 
 use organza::plan::{Effect, Plan};
 use organza::scene::{EffectKind, Scene};
-use organza::{Error, Files, Progress, RenderOptions, pass};
+use organza::{Context, Error, Files, Progress, RenderOptions, pass};
 use reference::metrics::{Display, Image};
 
 /// A picture is drawn again until so many seconds have gone, at most [`REPEATS`] times; the fastest counts, as other programs only slow it down.
@@ -134,7 +134,7 @@ pub fn measure(
     progress: &Progress,
 ) -> Result<Measured, Error> {
     let pictures = Pictures { options, progress };
-    let (settled, _) = organza::settled(scene, options, progress, &Files::default())?;
+    let (settled, _) = organza::settled(scene, Context { files: &Files::default(), options, progress })?;
     let switched = |switches: &[Switch]| switched(switches).map(|other| by_techniques_of(&settled, other));
     let count = plan.effects.len() + 2;
     progress.plan((0..count).map(|rank| (stage(plan, rank), 1.0)));

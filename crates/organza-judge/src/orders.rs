@@ -17,7 +17,8 @@ use crate::accuracy::{SEEDS, Sampled};
 use hbsort::Thickness;
 use organza::scene::{LayerChoice, ParticlesSettings, Scene, Technique};
 use organza::{
-    CostRecord, Error, Files, Frame, Loaded, Planned, Progress, RenderOptions, Shaded, draw_loaded, load, plan_loaded,
+    Context, CostRecord, Error, Files, Frame, Loaded, Planned, Progress, RenderOptions, Shaded, draw_loaded, load,
+    plan_loaded,
 };
 use reference::metrics::{Disorder, Image, Linear, Rays};
 use reference::statistics::Spread;
@@ -145,7 +146,7 @@ pub fn compare(
     progress.plan([(LOAD, 2.0), (ORDERS, 8.0), (TRUTH, 8.0), (SHEETS, 8.0), (SETS_OF_PARTICLES, 8.0), (LAYERS, 8.0)]);
     progress.begin(LOAD);
     progress.enter();
-    let loaded = load(&scene, options, progress, &Files::default())?;
+    let loaded = load(&scene, Context { files: &Files::default(), options, progress })?;
     let plan = plan_loaded(&scene, &loaded, options)?;
     let frame = Frame::new(&scene, &loaded, &plan, progress).with_hidden();
     let mut cost = CostRecord::default();

@@ -11,7 +11,7 @@ mod object;
 
 use object::Body;
 use organza::scene::{Scene, SceneLight};
-use organza::{Error, Files, Progress, RenderOptions};
+use organza::{Context, Error, Files, Progress, RenderOptions};
 use reference::metrics::{Image, Linear, compare};
 use reference::{Environment, LatLong, Liberty, PathRules, PathSettings, PixelSampling, path_trace};
 use splat_core::RadianceImage;
@@ -76,7 +76,7 @@ pub enum Orders {
 
 impl Orders {
     /// The orders that a picture of the scene shows.
-    pub fn of(scene: &Scene) -> Self {
+    pub fn shown_by(scene: &Scene) -> Self {
         if scene.render.sheets.scattering().is_some() { Self::ByMedia } else { Self::One }
     }
 
@@ -111,7 +111,7 @@ pub fn truth(
     samples: u32,
     progress: &Progress,
 ) -> Result<Result<Truth, String>, Error> {
-    let (scene, _) = organza::fitted(scene, options, progress, &Files::default())?;
+    let (scene, _) = organza::fitted(scene, Context { files: &Files::default(), options, progress })?;
     let scene = &*scene;
     let mut bodies = Vec::new();
     for object in scene.objects.iter().filter(|o| o.visible) {

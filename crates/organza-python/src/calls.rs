@@ -6,7 +6,7 @@ use crate::picture::Picture;
 use crate::running::run;
 use convert::ColorMap;
 use organza::scene::{LoadOptions, Override, Scene, UpAxis, parse};
-use organza::{Error, Files, InMemory, Progress, RenderOptions};
+use organza::{Context, Error, Files, InMemory, Progress, RenderOptions};
 use organza_survey::{DataFile, Preset, Wish};
 use pyo3::prelude::*;
 use serde_json::Value;
@@ -147,7 +147,8 @@ pub(crate) fn lights_of(py: Python<'_>, mut given: Given, how: How<'_>) -> PyRes
     let is_turned = given.turntable.is_some();
     let work = move |progress: &Progress| {
         let scene = given.scene(in_memory, &options)?;
-        let lights = organza_survey::lights_of(&scene, is_turned, &Files::default(), &options, progress)?;
+        let context = Context { files: &Files::default(), options: &options, progress };
+        let lights = organza_survey::lights_of(&scene, is_turned, context)?;
         json_of_toml(&lights)
     };
     run(py, how.threads, None, work)
@@ -239,13 +240,13 @@ pub(crate) fn first_scene(
     }
     let work = move |progress: &Progress| {
         let files = Files::default();
+        let context = Context { files: &files, options: &options, progress };
         let read = |source: Source| match source {
-            Source::File(path) => DataFile::read(&path, &wish, (&files, &options, progress)),
+            Source::File(path) => DataFile::read(&path, &wish, context),
             Source::InMemory(data) => Ok(data),
         };
         let data = sources.into_iter().map(read).collect::<Result<Vec<_>, Error>>()?;
-        let surveyed = (&files, &options, progress);
-        let written = organza_survey::first_scene(&data, Path::new(FIRST), &wish, &in_memory, surveyed)?;
+        let written = organza_survey::first_scene(&data, Path::new(FIRST), &wish, &in_memory, context)?;
         Ok((json_of_toml(&written.text)?, written.remarks, written.text))
     };
     run(py, how.threads, None, work)

@@ -4,7 +4,7 @@ use crate::calls::{Given, How};
 use crate::running::run;
 use organza::output::Target;
 use organza::scene::Scene;
-use organza::{Error, Explanation, Files, Progress, RenderOptions, printable};
+use organza::{Context, Error, Explanation, Files, Progress, RenderOptions, printable};
 use organza_judge::accuracy::{self, Judged, Report};
 use organza_judge::effects::{self, Switch};
 use organza_judge::orders::{self, OrdersReport};
@@ -54,7 +54,8 @@ pub(crate) fn explain(py: Python<'_>, mut given: Given, measure: bool, how: How<
 
 /// The scene with a camera that has its place.
 fn placed(scene: &Scene, options: &RenderOptions) -> Result<Scene, Error> {
-    Ok(organza::fitted(scene, options, &Progress::new(), &Files::default())?.0.into_owned())
+    let context = Context { files: &Files::default(), options, progress: &Progress::new() };
+    Ok(organza::fitted(scene, context)?.0.into_owned())
 }
 
 /// A scene that is drawn as planned, then with each of its effects switched the other way.

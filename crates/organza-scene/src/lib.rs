@@ -42,7 +42,7 @@ pub use in_memory::{InMemory, SourceData, name_of as name_in_memory, source_of a
 pub use light::model::{SceneLight, SlideSource};
 pub use light::points::{LightPoint, light_points};
 pub use load::options::LoadOptions;
-pub use load::{MAX_SCENE_BYTES, load, parse, read, schema};
+pub use load::{load, parse, schema};
 pub use material::model::SceneMaterial;
 pub use material::recipes::Recipe;
 pub use object::labels::{ObjectLabels, Table as LabelFile, read_label_table};
@@ -64,6 +64,7 @@ pub use source::model::{
 };
 pub use splat_core::UpAxis;
 pub use text::de::nearest_name;
+pub use text::file::{MAX_SCENE_BYTES, read};
 pub use text::overrides::Override;
 pub use text::tree::MAX_SCENE_DEPTH;
 pub use written::Written;

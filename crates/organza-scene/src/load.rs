@@ -8,23 +8,16 @@ use crate::load::options::{LoadOptions, Turn};
 use crate::scene::check;
 use crate::scene::raw::RawScene;
 use crate::text::de;
+use crate::text::file::{BYTES_PER_CHARACTER, MAX_SCENE_BYTES, decode, read};
 use crate::text::json::read_json;
 use crate::text::overrides;
 use crate::text::toml::read_toml;
-use crate::text::tree::{Document, error_at};
+use crate::text::tree::Document;
 use crate::{Error, camera};
 use sha2::{Digest, Sha256};
 use splat_core::Exceeded;
-use std::io::Read;
 use std::path::Path;
 use std::sync::Arc;
-
-/// Largest scene file, bytes.
-pub const MAX_SCENE_BYTES: u64 = 16 << 20;
-
-/// Bytes that a character of a scene takes while it is read, at most: a digit and a comma are a value with its place, in a list with
-/// room for as many again.
-pub(crate) const BYTES_PER_CHARACTER: u64 = 96;
 
 /// Reads and checks a scene file; JSON if its name ends in `.json`, else TOML. Of data files that are drawn
 /// only the beginning is looked at, for the axis that points up; images of footprints are read.
@@ -34,23 +27,6 @@ pub(crate) const BYTES_PER_CHARACTER: u64 = 96;
 /// [`Error::Usage`] when an override is at fault.
 pub fn load(file: &Path, options: &LoadOptions) -> Result<Scene, Error> {
     parse(file, &read(file)?, options)
-}
-
-/// The bytes of a scene file, for [`parse`].
-///
-/// # Errors
-/// [`Error::Io`] for what cannot be read, or is no regular file.
-pub fn read(file: &Path) -> Result<Vec<u8>, Error> {
-    let fail = |e| Error::io(file, "cannot read the scene", e);
-    let meta = std::fs::metadata(file).map_err(fail)?;
-    if !meta.is_file() {
-        // A pipe or a device could block or never end.
-        return Err(fail(std::io::Error::other("not a regular file")));
-    }
-    let mut bytes = Vec::new();
-    let handle = std::fs::File::open(file).map_err(fail)?;
-    handle.take(MAX_SCENE_BYTES + 1).read_to_end(&mut bytes).map_err(fail)?;
-    Ok(bytes)
 }
 
 /// Checks the bytes of a scene file; `file` gives the format and the folder that paths are relative to.
@@ -90,16 +66,6 @@ pub fn parse(file: &Path, bytes: &[u8], options: &LoadOptions) -> Result<Scene, 
         scene.stops.clear();
     }
     Ok(scene)
-}
-
-/// The text of a file's bytes.
-pub(crate) fn decode<'a>(file: &Path, bytes: &'a [u8]) -> Result<&'a str, Error> {
-    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
-    std::str::from_utf8(bytes).map_err(|e| {
-        let valid = std::str::from_utf8(&bytes[..e.valid_up_to()]).unwrap_or("");
-        let found = bytes.get(e.valid_up_to()).copied().unwrap_or(0);
-        error_at(file, valid, valid.len(), format!("expected UTF-8, found the byte 0x{found:02x}"), "")
-    })
 }
 
 fn hash(bytes: &[u8], options: &LoadOptions) -> String {

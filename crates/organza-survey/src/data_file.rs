@@ -3,7 +3,7 @@
 use crate::facts::bounds_of;
 use crate::preset::Wish;
 use crate::stands::{cloud_stands_along, extent, lies_flat_along, stands_along};
-use organza::{Error, Files, Progress, RenderOptions, SourceData, printable, scene};
+use organza::{Context, Error, SourceData, printable, scene};
 use read::{ReadParams, stated_up_axis};
 use splat_core::UpAxis;
 use std::path::{Path, PathBuf};
@@ -36,11 +36,8 @@ impl DataFile {
     ///
     /// # Errors
     /// As [`Files::read`]; [`Error::Input`] for a file without points or faces, and for an image.
-    pub fn read(
-        path: &Path,
-        wish: &Wish,
-        (files, options, progress): (&Files, &RenderOptions, &Progress),
-    ) -> Result<Self, Error> {
+    pub fn read(path: &Path, wish: &Wish, context: Context<'_>) -> Result<Self, Error> {
+        let Context { files, options, progress } = context;
         let columns = wish.color_by.iter().cloned().collect();
         let mut data = files.read(path, &ReadParams { columns, ..options.read_params() }, progress)?;
         let mut array = None;
@@ -48,7 +45,10 @@ impl DataFile {
         if let (SourceData::Grid(_), Some(name)) = (&data, &wish.color_by) {
             let params = ReadParams { array: Some(name.clone()), ..options.read_params() };
             match files.read(path, &params, progress) {
-                Ok(of_array) => (data, array) = (of_array, Some(name.clone())),
+                Ok(of_array) => {
+                    data = of_array;
+                    array = Some(name.clone());
+                }
                 Err(Error::Cancelled) => return Err(Error::Cancelled),
                 Err(error) => array_error = Some(error),
             }
@@ -164,6 +164,7 @@ fn named(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use organza::{Files, Progress, RenderOptions};
     use splat_core::RawPoints;
 
     #[test]
@@ -196,8 +197,9 @@ mod tests {
         let read = |name: &str, content: &str| {
             let path = folder.join(name);
             std::fs::write(&path, content).expect("a file");
-            let from = (&Files::default(), &RenderOptions::default(), &Progress::new());
-            DataFile::read(&path, &Wish::default(), from).expect("a volume").value_outside
+            let context =
+                Context { files: &Files::default(), options: &RenderOptions::default(), progress: &Progress::new() };
+            DataFile::read(&path, &Wish::default(), context).expect("a volume").value_outside
         };
         let head = "# vtk DataFile Version 3.0\na\nASCII\nDATASET";
         let cells =

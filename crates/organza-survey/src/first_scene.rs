@@ -15,7 +15,7 @@ use look::{Object, all_stand, check_material, drawn_steps, material_remarks, obj
 use organza::scene::{
     DEFAULT_AZIMUTH, FoundCamera, LoadOptions, ROOT_KEY, Recipe, name_in_memory, parse, relative_path, root_for,
 };
-use organza::{Error, Files, InMemory, Progress, RenderOptions, SourceData, printable};
+use organza::{Context, Error, InMemory, SourceData, printable};
 use splat_core::glam::DVec3;
 use splat_core::text::counted;
 use std::fmt::Write;
@@ -61,7 +61,7 @@ pub fn first_scene(
     scene_file: &Path,
     wish: &Wish,
     in_memory: &InMemory,
-    (files, options, progress): (&Files, &RenderOptions, &Progress),
+    context: Context<'_>,
 ) -> Result<Written, Error> {
     let folder = folder_of(scene_file)?;
     let paths: Vec<String> = data.iter().map(|d| written_path(&d.path, &folder)).collect::<Result<_, _>>()?;
@@ -103,7 +103,7 @@ pub fn first_scene(
     let first = head(&camera) + &seen + &drawn;
     let load = LoadOptions { turntable: wish.turntable, in_memory: in_memory.clone(), ..LoadOptions::default() };
     let scene = parse(scene_file, first.as_bytes(), &load)?;
-    let found = organza::fitted(&scene, options, progress, files)?.1;
+    let found = organza::fitted(&scene, context)?.1;
     let found = found.ok_or_else(|| Error::Internal("a camera that was to be placed has no place".into()))?;
     let camera = camera_text(&found, azimuth);
     let mut text =

@@ -67,13 +67,13 @@ impl Labels {
         // Of each label its neighbours, and those of them that have it too.
         let mut counts = vec![[0u64; 2]; known.0.len()];
         each_pair(grid, |a, b| {
-            let rank = ranks.of(a);
+            let rank = ranks.rank(a);
             counts[rank][0] += 1;
             if a == b {
                 counts[rank][1] += 1;
                 return;
             }
-            let other = ranks.of(b);
+            let other = ranks.rank(b);
             counts[other][0] += 1;
             jumps += u64::from(rank.abs_diff(other) >= 2);
         });
@@ -172,7 +172,7 @@ impl<'a> Ranks<'a> {
         Self { known, listed }
     }
 
-    fn of(&self, value: f32) -> usize {
+    fn rank(&self, value: f32) -> usize {
         let value = f64::from(value);
         let searched = || self.known.partition_point(|label| *label < value).min(self.known.len().saturating_sub(1));
         self.listed.get(value as usize).map_or_else(searched, |rank| usize::from(*rank))

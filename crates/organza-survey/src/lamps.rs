@@ -3,7 +3,7 @@
 
 use crate::number::{color, list};
 use organza::scene::Scene;
-use organza::{Error, Files, Progress, RenderOptions};
+use organza::{Context, Error};
 use splat_core::Camera;
 use splat_core::glam::DVec3;
 use std::fmt::Write;
@@ -23,14 +23,8 @@ const FROM_BACK: [f64; 3] = [-0.25, 0.5, -0.9];
 ///
 /// # Errors
 /// As [`organza::fitted`], which finds the camera where the scene leaves that to the data.
-pub fn lights_of(
-    scene: &Scene,
-    around: bool,
-    files: &Files,
-    options: &RenderOptions,
-    progress: &Progress,
-) -> Result<String, Error> {
-    let (scene, found) = organza::fitted(scene, options, progress, files)?;
+pub fn lights_of(scene: &Scene, around: bool, context: Context<'_>) -> Result<String, Error> {
+    let (scene, found) = organza::fitted(scene, context)?;
     Ok(lamps(&found.map_or(scene.camera, |found| found.camera), around))
 }
 

@@ -9,7 +9,7 @@ use crate::desk::{Desk, Job, Request, Task};
 use crate::picture::{Drawn, Level};
 use crate::viewpoint::Viewpoint;
 use organza::scene::{Scene, SceneObject, Source, Technique};
-use organza::{Error, Files, Progress, Render, RenderOptions, Sequence};
+use organza::{Context, Error, Files, Progress, Render, RenderOptions, Sequence};
 use splat_core::LayerData;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::{Duration, Instant};
@@ -125,14 +125,15 @@ impl Artist {
     fn draw(&mut self, desk: &Desk, request: &Request) -> Result<(), Error> {
         let generation = request.generation;
         let progress = desk.begin(generation, Task::Coarse);
+        let context = Context { files: self.coarse.files(), options: &self.options, progress: &progress };
         // Settled once for both levels: what `auto` chooses depends on the size of the picture.
-        let (scene, found) = organza::settled(&request.scene, &self.options, &progress, self.coarse.files())?;
+        let (scene, found) = organza::settled(&request.scene, context)?;
         let scene = scene.into_owned();
         // Coarse pictures are as fast as they have to be, whatever the accuracy of the whole one.
         let stated = if request.accuracy.set.is_empty() {
             scene.clone()
         } else {
-            organza::settled(&request.stated, &self.options, &progress, self.coarse.files())?.0.into_owned()
+            organza::settled(&request.stated, context)?.0.into_owned()
         };
         if request.has_own_camera {
             let first =
@@ -247,7 +248,11 @@ impl Artist {
         let is_volume = |object: &&SceneObject| object.visible && matches!(object.source, Source::Volume(_));
         for object in scene.objects.iter().filter(is_volume).filter(|object| !desk.has_values(&object.name)) {
             let progress = desk.begin(generation, Task::Ahead);
-            let values = values_of(scene, object, self.coarse.files(), &self.options, &progress);
+            let values = values_of(
+                scene,
+                object,
+                Context { files: self.coarse.files(), options: &self.options, progress: &progress },
+            );
             desk.end();
             if let Some(values) = values? {
                 desk.keep_values(&object.name, values);

@@ -2,7 +2,7 @@
 
 use crate::event::Knot;
 use organza::scene::{SceneObject, Source};
-use organza::{Error, Files, Progress, RenderOptions, SourceData, scene::Scene};
+use organza::{Context, Error, SourceData, scene::Scene};
 use organza_survey::Histogram;
 use serde::Serialize;
 
@@ -51,18 +51,14 @@ fn number(single: f32) -> f64 {
 ///
 /// # Errors
 /// Those of reading the file.
-pub(crate) fn values_of(
-    scene: &Scene,
-    object: &SceneObject,
-    files: &Files,
-    options: &RenderOptions,
-    progress: &Progress,
-) -> Result<Option<Values>, Error> {
+pub(crate) fn values_of(scene: &Scene, object: &SceneObject, context: Context<'_>) -> Result<Option<Values>, Error> {
     let Source::Volume(volume) = &object.source else { return Ok(None) };
-    let mut limits = options.read_params();
+    let mut limits = context.options.read_params();
     limits.frame = volume.frame;
     limits.array.clone_from(&object.array);
-    let SourceData::Grid(grid) = files.data(scene, &volume.path, &limits, progress)? else { return Ok(None) };
+    let SourceData::Grid(grid) = context.files.data(scene, &volume.path, &limits, context.progress)? else {
+        return Ok(None);
+    };
     let finite = grid.values.iter().copied().filter(|value| value.is_finite());
     let range = finite.fold([f32::INFINITY, f32::NEG_INFINITY], |[low, high], value| [low.min(value), high.max(value)]);
     let [low, high] = range.map(f64::from);

@@ -17,7 +17,7 @@ use crate::state::{Opening, Source, State};
 use crate::viewpoint::Viewpoint;
 use organza::output::Format;
 use organza::scene::{self, Scene, SceneLight, SceneObject};
-use organza::{Error, Progress};
+use organza::{Context, Error, Progress};
 use serde::Serialize;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -163,7 +163,8 @@ impl Session {
         let is_on_disk = file.is_file();
         let source = Source { file, text, load };
         let mut stated = source.scene(source.load.overrides.clone())?;
-        let first = Viewpoint::of_scene(&organza::fitted(&stated, &options, progress, &files)?.0);
+        let first =
+            Viewpoint::of_scene(&organza::fitted(&stated, Context { files: &files, options: &options, progress })?.0);
         // Where the scene has its camera found, this is what lights go around.
         stated.target = first.centre;
         let desk = Arc::new(Desk::new(first));

@@ -106,28 +106,28 @@ mod tests {
 
     #[test]
     fn every_kind_of_data_has_its_sampler() {
-        let of = |o: ObjectStatistics| chosen(&[o], &[])[0].form;
-        assert_eq!(of(object(ObjectData::Points)), Form::Splats);
-        assert_eq!(of(object(ObjectData::Triangles)), Form::Triangles);
+        let form = |o: ObjectStatistics| chosen(&[o], &[])[0].form;
+        assert_eq!(form(object(ObjectData::Points)), Form::Splats);
+        assert_eq!(form(object(ObjectData::Triangles)), Form::Triangles);
         let surface = |looseness, by| object(ObjectData::Surface { looseness, on_lattice: false, by });
         let auto = |looseness| surface(looseness, SurfaceSampler::Auto);
-        assert_eq!(of(auto(2.6)), Form::Lines);
-        assert_eq!(of(auto(f64::INFINITY)), Form::Triangles);
-        assert_eq!(of(surface(f64::INFINITY, SurfaceSampler::Lines)), Form::Lines);
-        assert_eq!(of(surface(2.6, SurfaceSampler::Triangles)), Form::Triangles);
-        assert_eq!(of(surface(2.6, SurfaceSampler::Brownian { step: 0.01 })), Form::Brownian);
-        let on_lattice = |by| of(object(ObjectData::Surface { looseness: 0.0, on_lattice: true, by }));
+        assert_eq!(form(auto(2.6)), Form::Lines);
+        assert_eq!(form(auto(f64::INFINITY)), Form::Triangles);
+        assert_eq!(form(surface(f64::INFINITY, SurfaceSampler::Lines)), Form::Lines);
+        assert_eq!(form(surface(2.6, SurfaceSampler::Triangles)), Form::Triangles);
+        assert_eq!(form(surface(2.6, SurfaceSampler::Brownian { step: 0.01 })), Form::Brownian);
+        let on_lattice = |by| form(object(ObjectData::Surface { looseness: 0.0, on_lattice: true, by }));
         assert_eq!(on_lattice(SurfaceSampler::Auto), Form::Lattice);
         assert_eq!(on_lattice(SurfaceSampler::Lines), Form::Lines);
-        assert_eq!(of(object(ObjectData::Volume)), Form::Cells);
-        assert_eq!(of(object(ObjectData::Density { bounded: true })), Form::Field);
-        assert_eq!(of(object(ObjectData::Density { bounded: false })), Form::Cells);
+        assert_eq!(form(object(ObjectData::Volume)), Form::Cells);
+        assert_eq!(form(object(ObjectData::Density { bounded: true })), Form::Field);
+        assert_eq!(form(object(ObjectData::Density { bounded: false })), Form::Cells);
         let lit = ObjectStatistics { by_gradient: true, ..object(ObjectData::Density { bounded: true }) };
-        assert_eq!(of(lit), Form::Cells);
-        let by = |volumes_by, data| of(ObjectStatistics { volumes_by, ..object(data) });
+        assert_eq!(form(lit), Form::Cells);
+        let by = |volumes_by, data| form(ObjectStatistics { volumes_by, ..object(data) });
         assert_eq!(by(VolumeSampler::Cells, ObjectData::Density { bounded: true }), Form::Cells);
         assert_eq!(by(VolumeSampler::Metropolis { stride: 4 }, ObjectData::Volume), Form::Chains);
-        assert_eq!(of(ObjectStatistics { opaque: true, ..auto(2.6) }), Form::Opaque);
+        assert_eq!(form(ObjectStatistics { opaque: true, ..auto(2.6) }), Form::Opaque);
     }
 
     #[test]

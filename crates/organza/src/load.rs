@@ -1,6 +1,6 @@
 //! The objects of a scene become one cloud in canonical order, with its tables.
 
-mod context;
+pub(crate) mod context;
 pub(crate) mod files;
 mod fit;
 mod images;
@@ -10,22 +10,23 @@ mod media_facts;
 mod mesh_facts;
 mod normalize;
 pub(crate) mod object;
+mod object_context;
 pub(crate) mod own;
 
 use crate::cost::{Count, before_conversion};
 use crate::form::{Form, PlannedObject};
 use crate::scene::{Scene, SceneLight, SceneObject, SwitchedEffect};
 use crate::statistics::{LightStatistics, ObjectStatistics, SourceFacts};
-use crate::{CostRecord, Error, Progress, RenderOptions, SplatCount, pass};
-pub(crate) use context::{BYTES_PER_LATTICE_POINT, BYTES_PER_SPLAT};
+use crate::{CostRecord, Error, SplatCount, pass};
+use context::Context;
 use convert::ColorScale;
-use files::Files;
 pub(crate) use fit::placed;
 use glam::DVec3;
 use images::Images;
 use loading::Loading;
 use normalize::normalize;
 use object::Prepared;
+pub(crate) use object_context::{BYTES_PER_LATTICE_POINT, BYTES_PER_SPLAT};
 use own::Own;
 use splat_core::shade::Census;
 use splat_core::{Camera, Cloud, FootprintStack, Material, Object, Shading, SplatKind};
@@ -197,14 +198,9 @@ pub(crate) struct Inputs<'a> {
 ///
 /// # Errors
 /// Those of reading files.
-pub(crate) fn source_facts(
-    scene: &Scene,
-    options: &RenderOptions,
-    progress: &Progress,
-    files: &Files,
-) -> Result<SourceFacts, Error> {
-    let media = media_facts::media_facts(scene, options, progress, files)?;
-    let meshes = mesh_facts::mesh_facts(scene, options, progress, files)?;
+pub(crate) fn source_facts(scene: &Scene, context: Context<'_>) -> Result<SourceFacts, Error> {
+    let media = media_facts::media_facts(scene, context)?;
+    let meshes = mesh_facts::mesh_facts(scene, context)?;
     Ok(SourceFacts { media, meshes })
 }
 
@@ -217,16 +213,14 @@ pub(crate) type Spare<'a> =
 /// beside splats.
 pub(crate) fn read<'a>(
     scene: &'a Scene,
-    options: &'a RenderOptions,
-    progress: &'a Progress,
-    files: &'a Files,
+    context: Context<'a>,
     looks: &dyn Fn(&SceneObject) -> bool,
     beside: &[Count],
     cost: &mut CostRecord,
 ) -> Result<Inputs<'a>, Error> {
-    let loading = Loading { scene, options, progress, files };
+    let loading = Loading { scene, context };
     let lights = lights(scene);
-    files.scales.take();
+    context.files.scales.take();
     let (prepared, images) = cost.measure(pass::READ, |stage| {
         let prepared = loading.prepare(looks, beside)?;
         let images = loading.images(&lights)?;
@@ -238,8 +232,8 @@ pub(crate) fn read<'a>(
         Ok::<_, Error>((prepared, images))
     })?;
     let statistics = loading.statistics(&prepared);
-    let facts = source_facts(scene, options, progress, files)?;
-    Ok(Inputs { loading, prepared, images, lights, warnings: files.mended(), statistics, facts })
+    let facts = source_facts(scene, context)?;
+    Ok(Inputs { loading, prepared, images, lights, warnings: context.files.mended(), statistics, facts })
 }
 
 impl Inputs<'_> {
@@ -258,7 +252,8 @@ impl Inputs<'_> {
         cost: &mut CostRecord,
     ) -> Result<Loaded, Error> {
         let Self { loading, mut prepared, mut images, mut lights, mut warnings, statistics, facts } = self;
-        let Loading { scene, progress, files, options } = loading;
+        let Loading { scene, context } = loading;
+        let Context { files, options, progress } = context;
         let mut early = spare.map(|_| loading.natives(&mut prepared, &planned, &mut warnings)).transpose()?;
         if let (Some(natives), Some(spare)) = (&mut early, spare)
             && spare(natives, &planned, &statistics, &lights)?

@@ -3,6 +3,7 @@
 pub(crate) mod carried;
 mod facts;
 pub(crate) mod media;
+pub(crate) mod ranges;
 mod seen;
 
 use crate::brightness::{self, Brightness};
@@ -19,15 +20,15 @@ use crate::memory::{self, Memory};
 use crate::pass;
 use crate::plan::{Effect, Plan};
 use crate::predict::prediction;
-use crate::ranges::ranges;
 use crate::scene::{
     EffectKind, FoundCamera, Scene, SceneLight, SceneObject, Source, SwitchedEffect, Technique, light_points,
 };
 use crate::shadows::{Probe, Shadowing, casters_by_light};
 use crate::statistics::{ObjectData, ObjectStatistics, Statistics};
 use crate::technique::{Fold, Row};
-use crate::{CostRecord, Error, Progress, RenderOptions, SplatCount, escape_controls, shadows, warnings};
+use crate::{Context, CostRecord, Error, Progress, RenderOptions, SplatCount, escape_controls, shadows, warnings};
 use convert::DiscSize;
+use ranges::ranges;
 pub use seen::{fitted, seen, settled};
 use splat_core::shade::Census;
 use splat_core::{Exceeded, Material, SplatKind};
@@ -61,22 +62,17 @@ pub struct Explanation {
 /// # Errors
 /// As [`crate::render`].
 pub fn explain(scene: &Scene, options: &RenderOptions, progress: &Progress) -> Result<Explanation, Error> {
-    explain_from(scene, options, progress, &Files::default())
+    explain_from(scene, Context { files: &Files::default(), options, progress })
 }
 
 /// [`explain`] from files of which some were read before.
 ///
 /// # Errors
 /// As [`crate::render`].
-pub fn explain_from(
-    scene: &Scene,
-    options: &RenderOptions,
-    progress: &Progress,
-    files: &Files,
-) -> Result<Explanation, Error> {
-    let (scene, found) = settled(scene, options, progress, files)?;
-    let Prepared { scene, loaded, planned, mut explanation } =
-        prepare(&scene, options, progress, files, None, EyeMap::WhereNeeded)?;
+pub fn explain_from(scene: &Scene, context: Context<'_>) -> Result<Explanation, Error> {
+    let (scene, found) = settled(scene, context)?;
+    let Context { options, progress, .. } = context;
+    let Prepared { scene, loaded, planned, mut explanation } = prepare(&scene, context, None, EyeMap::WhereNeeded)?;
     let frame = Frame::new(&scene, &loaded, &planned.plan, progress);
     let mut folds: Vec<Box<dyn Fold + '_>> =
         planned.plan.techniques.iter().map(|technique| (row(*technique).begin)(&frame)).collect();
@@ -134,12 +130,11 @@ pub(crate) enum EyeMap {
 /// Loads and plans; `made` is what was loaded of another scene that serves this one, and its plan where [`turned`] says that it serves, too.
 pub(crate) fn prepare<'a>(
     scene: &'a Scene,
-    options: &RenderOptions,
-    progress: &Progress,
-    files: &Files,
+    context: Context<'_>,
     made: Option<(Loaded, Option<Planned>)>,
     eye_map: EyeMap,
 ) -> Result<Prepared<'a>, Error> {
+    let Context { files, options, .. } = context;
     let mut cost = CostRecord::default();
     memory::check("the image", memory::image_bytes(scene), options.max_memory)?;
     check_samples(scene)?;
@@ -147,11 +142,11 @@ pub(crate) fn prepare<'a>(
         Some((mut loaded, planned)) => {
             loaded.retarget(scene);
             if planned.is_none() {
-                loaded.relight(scene, source_facts(scene, options, progress, files)?);
+                loaded.relight(scene, source_facts(scene, context)?);
             }
             (loaded, planned)
         }
-        None => (load_measured(scene, options, progress, files, &mut cost)?, None),
+        None => (load_measured(scene, context, &mut cost)?, None),
     };
     let splats = loaded.splats.clone();
     let notes_of_scene: Vec<String> = warnings::clear_shadows(scene, &loaded).collect();
@@ -333,7 +328,8 @@ pub(crate) fn plan_alone(scene: &Scene, loaded: &Loaded, options: &RenderOptions
 fn check_splats(scene: &Scene, loaded: &Loaded) -> Result<(), Error> {
     let by = |object: &SceneObject| row(technique_of(object, scene));
     let refuse = |o: &SceneObject, what| Err(Error::input(crate::shown(&o.name), what, "use `points` or `reference`"));
-    let mut of_gaussians = visible(scene).zip(&loaded.statistics).filter(|(_, of)| of.data == ObjectData::Gaussians);
+    let mut of_gaussians =
+        visible(scene).zip(&loaded.statistics).filter(|(_, statistics)| statistics.data == ObjectData::Gaussians);
     if let Some((object, _)) = of_gaussians.find(|(object, _)| !by(object).gaussians) {
         return refuse(object, "3D Gaussians, which its technique does not draw");
     }
@@ -552,25 +548,19 @@ fn check_samples(scene: &Scene) -> Result<(), Error> {
 ///
 /// # Errors
 /// See [`crate::render`].
-pub fn load(scene: &Scene, options: &RenderOptions, progress: &Progress, files: &Files) -> Result<Loaded, Error> {
-    let (scene, _) = settled(scene, options, progress, files)?;
-    load_measured(&scene, options, progress, files, &mut CostRecord::default())
+pub fn load(scene: &Scene, context: Context<'_>) -> Result<Loaded, Error> {
+    let (scene, _) = settled(scene, context)?;
+    load_measured(&scene, context, &mut CostRecord::default())
 }
 
 /// [`load`] with entries in the cost record: reading, and conversion where something is converted.
-pub(crate) fn load_measured(
-    scene: &Scene,
-    options: &RenderOptions,
-    progress: &Progress,
-    files: &Files,
-    cost: &mut CostRecord,
-) -> Result<Loaded, Error> {
+pub(crate) fn load_measured(scene: &Scene, context: Context<'_>, cost: &mut CostRecord) -> Result<Loaded, Error> {
     let looks = |object: &SceneObject| row(technique_of(object, scene)).form.is_some();
     // The work on forms other than splats is not known yet; assume that each is present.
     let unknown = Translucent::unknown(scene);
     let steps = techniques(scene).into_iter().flat_map(|t| row(t).steps);
     let beside: Vec<Count> = steps.flat_map(|step| (step.counts)(scene, &unknown)).collect();
-    let inputs = load::read(scene, options, progress, files, &looks, &beside, cost)?;
+    let inputs = load::read(scene, context, &looks, &beside, cost)?;
     let by = visible(scene).map(|o| technique_of(o, scene));
     let planned = choose(inputs.statistics.iter().zip(by), &inputs.light_statistics());
     let spare = carried::of_scene(scene).map(|carries| {

@@ -1,26 +1,27 @@
 //! Renders a scene to images: prepare, draw.
 
 pub(crate) mod budget;
+pub(crate) mod draw;
 pub(crate) mod sequence;
 
 use crate::choose::settle;
 use crate::choose::{row, techniques};
 use crate::cost::Prediction;
 use crate::device::Helper;
-use crate::draw::draw;
 use crate::frame::{Frame, KeptGroups, Leaves};
 use crate::load::Loaded;
 use crate::load::files::Files;
 use crate::plan::Plan;
 use crate::predict::prediction;
+use crate::prepare::ranges::ranges;
 use crate::prepare::{
     Explanation, EyeMap, Planned, Prepared, plan_alone, prepare, same_splats, settled, splats_serve, turned,
 };
-use crate::ranges::ranges;
 use crate::scene::{FoundCamera, Scene, SceneObject, Technique};
 use crate::technique::{Checkpoint, Fold, Kept, Session, Sets};
-use crate::{CostRecord, Error, Layers, Progress, RenderOptions, warnings};
+use crate::{Context, CostRecord, Error, Layers, Progress, RenderOptions, warnings};
 use convert::ColorScale;
+use draw::draw;
 use splat_core::Arrived;
 use std::path::PathBuf;
 
@@ -181,7 +182,7 @@ pub(crate) fn render_keeping(
     progress: &Progress,
     left: &mut Left,
 ) -> Result<Render, Error> {
-    let (scene, found) = settled(scene, options, progress, &left.files)?;
+    let (scene, found) = settled(scene, Context { files: &left.files, options, progress })?;
     let scene = &*scene;
     let open = |path: &PathBuf| {
         if !matches!(techniques(scene)[..], [only] if row(only).is_random) {
@@ -197,7 +198,7 @@ pub(crate) fn render_keeping(
     let (made, mut leaves) = left.take_made(scene);
     let stated = scene;
     let Prepared { scene, loaded, planned, explanation } =
-        prepare(stated, options, progress, &left.files, made, left.eye_map())?;
+        prepare(stated, Context { files: &left.files, options, progress }, made, left.eye_map())?;
     let scene = &*scene;
     let plan = &planned.plan;
     let bytes = planned.memory.total();
@@ -264,9 +265,10 @@ pub(crate) fn prepare_keeping(
     progress: &Progress,
     left: &mut Left,
 ) -> Result<(), Error> {
-    let (scene, _) = settled(scene, options, progress, &left.files)?;
+    let (scene, _) = settled(scene, Context { files: &left.files, options, progress })?;
     let (made, leaves) = left.take_made(&scene);
-    let Prepared { loaded, planned, .. } = prepare(&scene, options, progress, &left.files, made, left.eye_map())?;
+    let Prepared { loaded, planned, .. } =
+        prepare(&scene, Context { files: &left.files, options, progress }, made, left.eye_map())?;
     let is_whole = planned.plan.left_out.is_empty();
     left.made = is_whole.then(|| Made { scene: scene.into_owned(), loaded, planned, leaves });
     Ok(())

@@ -79,7 +79,7 @@ pub fn label_rows(path: &Path, params: &ReadParams) -> Result<LabelRows, ReadErr
 /// [`ReadError`] as [`label_rows`] gives it.
 pub fn label_rows_of_bytes(name: &str, content: &[u8], params: &ReadParams) -> Result<LabelRows, ReadError> {
     let params = &ReadParams { memory: params.memory.part(), ..params.clone() };
-    whole(Stream::of(content, params), params).map_err(|e| e.in_file(&escaped(name.as_bytes(), usize::MAX)))
+    whole(Stream::in_memory(content, params), params).map_err(|e| e.in_file(&escaped(name.as_bytes(), usize::MAX)))
 }
 
 /// The table of a stream.

@@ -277,7 +277,7 @@ pub fn bytes(
     let shown = escaped(name.as_bytes(), usize::MAX);
     let params = &ReadParams { memory: params.memory.part(), ..params.clone() };
     let mut reading = Reading::new(params, progress);
-    let loaded = whole(Path::new(name), Stream::of(content, params), None, &mut reading);
+    let loaded = whole(Path::new(name), Stream::in_memory(content, params), None, &mut reading);
     Ok((loaded.map_err(|e| e.in_file(&shown))?, reading.finish(&shown)))
 }
 

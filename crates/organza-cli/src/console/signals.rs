@@ -98,7 +98,7 @@ fn at_work() -> std::sync::MutexGuard<'static, Option<Arc<Progress>>> {
 fn end_at_once() -> ! {
     console::note("error: interrupted\n");
     organza::output::abandon();
-    crate::film::abandon();
+    crate::render::film::abandon();
     std::process::exit(i32::from(Error::Cancelled.exit_code()))
 }
 

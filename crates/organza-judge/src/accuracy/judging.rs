@@ -88,7 +88,7 @@ fn truth(
     options: &Options,
     progress: &Progress,
 ) -> Result<Result<Truth, String>, Error> {
-    let mut truth_of_scene = truth::truth(scene, render, Orders::of(scene), options.truth_samples(), progress)?;
+    let mut truth_of_scene = truth::truth(scene, render, Orders::shown_by(scene), options.truth_samples(), progress)?;
     if let Ok(scene_orders) = &mut truth_of_scene
         && let Ok(every_order) = truth::truth(scene, render, Orders::All, options.truth_samples(), progress)?
     {

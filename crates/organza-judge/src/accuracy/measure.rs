@@ -4,7 +4,8 @@ use super::{Facts, Request};
 use organza::plan::Plan;
 use organza::scene::Scene;
 use organza::{
-    CostRecord, Error, Files, Loaded, Planned, Progress, RenderOptions, draw_loaded, load, plan_loaded, same_splats,
+    Context, CostRecord, Error, Files, Loaded, Planned, Progress, RenderOptions, draw_loaded, load, plan_loaded,
+    same_splats,
 };
 use reference::metrics::{Display, Errors, Image, Linear, Viewing, compare, epsilon_8_bit, flip, psnr};
 use splat_core::{Cloud, PackedCloud, SplatKind};
@@ -231,7 +232,8 @@ impl<'a> Renderer<'a> {
             None => {
                 self.loaded.truncate(1);
                 let start = Instant::now();
-                let loaded = load(scene, self.options, self.progress, &Files::default())?;
+                let loaded =
+                    load(scene, Context { files: &Files::default(), options: self.options, progress: self.progress })?;
                 seconds = Some(start.elapsed().as_secs_f64());
                 self.loaded.push((scene.clone(), loaded));
                 self.loaded.len() - 1

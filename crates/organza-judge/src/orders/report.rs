@@ -285,7 +285,7 @@ impl OrdersReport {
         }
         let legend: String = series
             .iter()
-            .map(|(name, of)| format!("<span><i style=\"background:{}\"></i>{name}</span>", of.color))
+            .map(|(name, series)| format!("<span><i style=\"background:{}\"></i>{name}</span>", series.color))
             .collect();
         let plot = Plot {
             size: [640.0, 320.0],

@@ -3,9 +3,9 @@
 use super::labels_raw::{RawLabel, RawLabelLook, RawLabelTable, TextOr};
 use super::raw::RawObject;
 use crate::at::At;
-use crate::load::{MAX_SCENE_BYTES, decode};
 use crate::paths::Paths;
 use crate::text::de;
+use crate::text::file::{self, BYTES_PER_CHARACTER, MAX_SCENE_BYTES, decode};
 use crate::text::toml::read_toml;
 use crate::text::tree::Document;
 use crate::{Error, printable, shown};
@@ -124,14 +124,14 @@ fn read_table(path: &Path, memory: &MemoryAccount) -> Result<Table, Error> {
 
 /// The table of a TOML file, whose rows are written as those of a scene.
 fn read_toml_table(path: &Path, memory: &MemoryAccount) -> Result<Table, Error> {
-    let bytes = crate::load::read(path).map_err(|error| match error {
+    let bytes = file::read(path).map_err(|error| match error {
         Error::Io { path, source, .. } => Error::Io { path, action: "cannot read the table of labels", source },
         other => other,
     })?;
     let what = format!("the table of labels {}", printable(path));
     let hint = "leave out labels that no volume has";
     Exceeded::check(what.clone(), bytes.len() as u64, MAX_SCENE_BYTES, "bytes", hint).map_err(Error::Limit)?;
-    let _held = memory.take(&what, bytes.len() as u64 * crate::load::BYTES_PER_CHARACTER).map_err(Error::Limit)?;
+    let _held = memory.take(&what, bytes.len() as u64 * BYTES_PER_CHARACTER).map_err(Error::Limit)?;
     let text = decode(path, &bytes)?;
     let root = read_toml(path, text)?;
     let document = Document { file: path, text, flags: Vec::new(), root };

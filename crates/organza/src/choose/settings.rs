@@ -37,7 +37,7 @@ mod tests {
     use super::*;
     use crate::prepare::{load, plan_loaded, settled};
     use crate::scene::{LoadOptions, Override, parse};
-    use crate::{Files, Progress, RenderOptions};
+    use crate::{Context, Files, Progress, RenderOptions};
 
     const SCENE: &str = "version = 1\n[camera]\nposition = [0, 0, 4]\ntarget = [0, 0, 0]\nsize = [16, 12]\n\
         [[light]]\nname = 'bulb'\nkind = 'sphere'\nposition = [0, 3, 2]\nradius = 0.2\nintensity = [9, 9, 9]\n\
@@ -52,8 +52,9 @@ mod tests {
         let options = RenderOptions::default();
         let progress = Progress::new();
         let files = Files::default();
-        let (scene, _) = settled(&scene, &options, &progress, &files).unwrap();
-        let loaded = load(&scene, &options, &progress, &files).unwrap();
+        let context = Context { files: &files, options: &options, progress: &progress };
+        let (scene, _) = settled(&scene, context).unwrap();
+        let loaded = load(&scene, context).unwrap();
         plan_loaded(&scene, &loaded, &options).unwrap().settings
     }
 

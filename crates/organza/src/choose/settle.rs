@@ -6,13 +6,12 @@
 
 use crate::choose::technique_of;
 use crate::cost::{Count, CountedPass, Item, Rates, Translucent, samples};
-use crate::load::files::Files;
 use crate::load::source_facts;
 use crate::plan::Estimate;
 use crate::scene::{EffectKind, RenderSettings, Scene, SceneObject, SwitchedEffect, Technique};
 use crate::statistics::SourceFacts;
 use crate::technique::{Asked, Row, TABLE, estimates, row};
-use crate::{Error, Progress, RenderOptions, pass};
+use crate::{Context, Error, pass};
 use std::borrow::Cow;
 
 /// How many times the time of the next way a way may take.
@@ -30,20 +29,15 @@ const ENTRIES_PER_SPLAT: f64 = 8.0;
 ///
 /// # Errors
 /// Those of reading media and meshes; [`Error::Input`] where a layer is asked for that no way fills.
-pub(crate) fn settled<'s>(
-    scene: Cow<'s, Scene>,
-    options: &RenderOptions,
-    progress: &Progress,
-    files: &Files,
-) -> Result<Cow<'s, Scene>, Error> {
+pub(crate) fn settled<'s>(scene: Cow<'s, Scene>, context: Context<'_>) -> Result<Cow<'s, Scene>, Error> {
     if is_settled(&scene) {
         return Ok(scene);
     }
-    let facts = source_facts(&scene, options, progress, files)?;
+    let facts = source_facts(&scene, context)?;
     let switched = SwitchedEffect::find(&scene.render.effects, EffectKind::Scatter, "");
     let has_layer = scene.render.layers.names().any(|name| name == SCATTERED);
     let asked_for = has_layer || switched == Some(true);
-    let fits = |way: &Way| !way.scatters_again || bytes(&scene, &facts, way) <= options.max_memory;
+    let fits = |way: &Way| !way.scatters_again || bytes(&scene, &facts, way) <= context.options.max_memory;
     let is_wanted = |way: &Way| if way.scatters_again { switched != Some(false) } else { !asked_for };
     let ways: Vec<Way> = ways(&scene, &facts).filter(is_wanted).filter(fits).collect();
     let Some(way) = chosen(&ways, scene.render.tolerance) else {
@@ -286,6 +280,7 @@ fn is_of_choice(scene: &Scene, estimate: &Estimate) -> bool {
 mod tests {
     use super::*;
     use crate::scene::parse;
+    use crate::{Files, Progress, RenderOptions};
 
     const VIEW: &str = "version = 1\n[camera]\nposition = [0, 0, 5]\ntarget = [0, 0, 0]\nsize = [64, 48]\n\
         [[light]]\nkind = 'directional'\ndirection = [0, -1, -1]\nirradiance = [3, 3, 3]\n\
@@ -300,7 +295,8 @@ mod tests {
 
     fn settled_with(text: &str, options: &RenderOptions) -> Result<Scene, Error> {
         let scene = parse("s.toml".as_ref(), text.as_bytes(), &crate::scene::LoadOptions::default()).unwrap();
-        settled(Cow::Owned(scene), options, &Progress::new(), &Files::default()).map(Cow::into_owned)
+        let context = Context { files: &Files::default(), options, progress: &Progress::new() };
+        settled(Cow::Owned(scene), context).map(Cow::into_owned)
     }
 
     fn techniques_of(parts: &[&str]) -> Vec<&'static str> {

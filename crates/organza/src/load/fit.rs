@@ -1,10 +1,10 @@
 //! Places the camera that sees all of a scene, after the data is read and before it is converted.
 
-use super::files::Files;
+use super::context::Context;
 use super::input::Input;
 use super::loading::Loading;
+use crate::Error;
 use crate::scene::{FoundCamera, Scene};
-use crate::{Error, Progress, RenderOptions};
 use convert::{ConvertError, DiscSize, Outline, SurfelParams, raw_to_matter, raw_to_surfels};
 use field::visible_ends;
 use splat_core::glam::{DVec2, Vec3};
@@ -17,12 +17,10 @@ const FEW: usize = 10_000;
 /// The scene with a camera that sees all visible objects, where it leaves the camera's place to the data, and that camera.
 pub(crate) fn placed<'s>(
     scene: Cow<'s, Scene>,
-    options: &RenderOptions,
-    progress: &Progress,
-    files: &Files,
+    context: Context<'_>,
 ) -> Result<(Cow<'s, Scene>, Option<FoundCamera>), Error> {
     let Some(fit) = scene.fit else { return Ok((scene, None)) };
-    let inputs = Loading { scene: &scene, options, progress, files }.inputs()?;
+    let inputs = Loading { scene: &scene, context }.inputs()?;
     let outlines: Vec<_> = inputs.iter().map(outline).collect();
     let found = fit.camera(&scene.camera, &|add| outlines.iter().for_each(|(outline, to)| outline.each(to, add)));
     let Some(found) = found else {
@@ -43,7 +41,7 @@ pub(crate) fn placed<'s>(
     };
     for input in &inputs {
         if let Input::Points(path, points, _) | Input::Matter(path, points, _) = input {
-            files.warn(path, crowded(points, &input.splat().transform, &found.camera));
+            context.files.warn(path, crowded(points, &input.splat().transform, &found.camera));
         }
     }
     let scene = Scene { camera: found.camera, target: found.target, fit: None, ..Scene::clone(&scene) };

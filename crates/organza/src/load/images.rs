@@ -76,15 +76,19 @@ impl Loading<'_> {
         bytes_of: fn([u32; 2]) -> u64,
         held: &mut Vec<Reservation>,
     ) -> Result<Arc<RadianceImage>, Error> {
-        self.progress.begin(&cost::reading_file(path));
-        let params = ReadParams { is_data, ..self.options.read_params() };
-        let SourceData::Image(image) = self.files.data(self.scene, path, &params, self.progress)? else {
+        self.context.progress.begin(&cost::reading_file(path));
+        let params = ReadParams { is_data, ..self.context.options.read_params() };
+        let SourceData::Image(image) = self.context.files.data(self.scene, path, &params, self.context.progress)?
+        else {
             let hint = "name a Radiance HDR, OpenEXR or PNG file";
             return Err(Error::wrong_kind(path, "an image of radiance", hint));
         };
         let hint = "use a smaller image, or a larger --max-memory";
-        let made =
-            self.files.memory(self.options).take(&format!("{} {what}", crate::printable(path)), bytes_of(image.size));
+        let made = self
+            .context
+            .files
+            .memory(self.context.options)
+            .take(&format!("{} {what}", crate::printable(path)), bytes_of(image.size));
         held.push(made.map_err(|e| Error::Limit(Exceeded { hint: hint.into(), ..e }))?);
         Ok(image)
     }

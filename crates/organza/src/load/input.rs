@@ -1,7 +1,7 @@
 //! The input of an object: files read, formulas parsed, with the parameters of the conversion.
 
-use super::context::Context;
 use super::files::{Fitted, once};
+use super::object_context::ObjectContext;
 use crate::Error;
 use crate::scene::{
     CombinedSource, DensitySource, FieldSource, LevelSetSource, MatterSource, ObjectLabels, SceneObject, SliceSource,
@@ -151,7 +151,7 @@ impl Input<'_> {
 }
 
 /// Reads one object.
-pub(super) fn input<'a>(object: &'a SceneObject, context: &Context<'_>) -> Result<Input<'a>, Error> {
+pub(super) fn input<'a>(object: &'a SceneObject, context: &ObjectContext<'_>) -> Result<Input<'a>, Error> {
     let splat = context.splat_params(object);
     let opacity = context.scene.opacity_of(object);
     context.files.scales.borrow_mut().extend(object.value_scale());
@@ -206,7 +206,12 @@ pub(super) fn input<'a>(object: &'a SceneObject, context: &Context<'_>) -> Resul
 }
 
 /// The mesh of an object, in the colours that it has, cut and closed again.
-fn own_mesh(path: &Path, object: &SceneObject, splat: &SplatParams, context: &Context<'_>) -> Result<Arc<Mesh>, Error> {
+fn own_mesh(
+    path: &Path,
+    object: &SceneObject,
+    splat: &SplatParams,
+    context: &ObjectContext<'_>,
+) -> Result<Arc<Mesh>, Error> {
     let mut mesh = read_mesh(path, object.labels.as_ref(), context)?;
     let color_by = object.points.color_by.as_ref();
     // While it is cut, or gets other colours, there is another one.
@@ -235,7 +240,7 @@ fn slice<'a>(
     object: &SceneObject,
     splat: SplatParams,
     opacity: f64,
-    context: &Context<'_>,
+    context: &ObjectContext<'_>,
 ) -> Result<Input<'a>, Error> {
     let grid = with_first_value(read_grid(&source.path, source.frame, context)?, &source.transfer);
     let spacing = object.spacing.map_or_else(|| grid.shortest_step(), |s| s / splat.transform.scale);
@@ -256,7 +261,11 @@ pub(super) struct Isosurface {
 }
 
 /// What a field and where it is known make; its step is the distance of its splats where the object states none.
-fn solid(source: &Source, object: &SceneObject, context: &Context<'_>) -> Result<(Solid, Option<Isosurface>), Error> {
+fn solid(
+    source: &Source,
+    object: &SceneObject,
+    context: &ObjectContext<'_>,
+) -> Result<(Solid, Option<Isosurface>), Error> {
     Ok(match source {
         Source::Implicit(source) => {
             let field = Arc::new(source.field()?);
@@ -323,7 +332,7 @@ pub(super) fn refuse(path: &Path, error: &splat_core::Error, hint: &str) -> Erro
 const BYTES_PER_FITTED_POINT: u64 = 128;
 
 /// The field that scattered points lie on, and its bounds.
-fn level_set(source: &LevelSetSource, object: &SceneObject, context: &Context<'_>) -> Result<Fitted, Error> {
+fn level_set(source: &LevelSetSource, object: &SceneObject, context: &ObjectContext<'_>) -> Result<Fitted, Error> {
     let fit = || {
         let params =
             MpuParams { object_name: object.name.clone(), tolerance: source.tolerance, ..MpuParams::default() };
@@ -341,7 +350,7 @@ fn level_set(source: &LevelSetSource, object: &SceneObject, context: &Context<'_
 }
 
 /// Scattered points with normals where the file has some; of a mesh its vertices.
-fn read_scattered(path: &Path, context: &Context<'_>) -> Result<(Arc<RawPoints>, Arc<Reservation>), Error> {
+fn read_scattered(path: &Path, context: &ObjectContext<'_>) -> Result<(Arc<RawPoints>, Arc<Reservation>), Error> {
     let (data, held) = context.read_once(path)?;
     match data {
         SourceData::Points(points) => {
@@ -356,7 +365,7 @@ fn read_scattered(path: &Path, context: &Context<'_>) -> Result<(Arc<RawPoints>,
     }
 }
 
-fn read_mesh(path: &Path, known: Option<&ObjectLabels>, context: &Context<'_>) -> Result<Arc<Mesh>, Error> {
+fn read_mesh(path: &Path, known: Option<&ObjectLabels>, context: &ObjectContext<'_>) -> Result<Arc<Mesh>, Error> {
     match context.read(path)? {
         SourceData::Mesh(mesh) => Ok(mesh),
         SourceData::Grid(grid) => labels(path, &grid, known, context),
@@ -365,7 +374,12 @@ fn read_mesh(path: &Path, known: Option<&ObjectLabels>, context: &Context<'_>) -
 }
 
 /// The surfaces between the labels of a volume, with their column.
-fn labels(path: &Path, grid: &Grid, known: Option<&ObjectLabels>, context: &Context<'_>) -> Result<Arc<Mesh>, Error> {
+fn labels(
+    path: &Path,
+    grid: &Grid,
+    known: Option<&ObjectLabels>,
+    context: &ObjectContext<'_>,
+) -> Result<Arc<Mesh>, Error> {
     let name = crate::printable(path).to_string();
     let bytes = convert::label_surface_bytes(grid);
     let _held = context.files.memory(context.options).take(&name, bytes).map_err(Error::Limit)?;
@@ -401,7 +415,7 @@ fn raw_points<'a>(
     points: Arc<RawPoints>,
     object: &SceneObject,
     splat: SplatParams,
-    context: &Context<'_>,
+    context: &ObjectContext<'_>,
 ) -> Result<Input<'a>, Error> {
     let ShownPoints { points, said, scale } = convert::shown_points(points, &object.points_shown(), &splat)?;
     context.files.note(path, said);
@@ -413,7 +427,7 @@ fn raw_points<'a>(
 }
 
 /// The field that a surface shows.
-pub(super) fn shown_field(object: &SceneObject, context: &Context<'_>) -> Result<Option<SurfaceField>, Error> {
+pub(super) fn shown_field(object: &SceneObject, context: &ObjectContext<'_>) -> Result<Option<SurfaceField>, Error> {
     let Some(FieldSource { path, frame, interpolation, transfer, classified }) = &object.field else { return Ok(None) };
     let grid = with_first_value(read_grid(path, *frame, context)?, transfer);
     let field = SurfaceField::new(grid, *interpolation, transfer.clone(), *classified);
@@ -434,7 +448,7 @@ fn with_first_value(grid: Arc<Grid>, transfer: &TransferFunction) -> Arc<Grid> {
     convert::gaps_of_value(&grid, first).map_or(grid, Arc::new)
 }
 
-fn read_grid(path: &Path, frame: u64, context: &Context<'_>) -> Result<Arc<Grid>, Error> {
+fn read_grid(path: &Path, frame: u64, context: &ObjectContext<'_>) -> Result<Arc<Grid>, Error> {
     match context.read_frame(path, frame)? {
         SourceData::Grid(grid) => with_known_values(grid, path, context),
         _ => Err(Error::wrong_kind(path, "a volume", "use `mesh = ` or `points = ` for this file")),
@@ -442,7 +456,7 @@ fn read_grid(path: &Path, frame: u64, context: &Context<'_>) -> Result<Arc<Grid>
 }
 
 /// A volume whose voxels of the value `nodata` have none. Values that look like such are warned of.
-fn with_known_values(grid: Arc<Grid>, path: &Path, context: &Context<'_>) -> Result<Arc<Grid>, Error> {
+fn with_known_values(grid: Arc<Grid>, path: &Path, context: &ObjectContext<'_>) -> Result<Arc<Grid>, Error> {
     let Some(nodata) = context.nodata() else {
         let fill = convert::FillValue::of_grid(&grid);
         // A fill value is not told as a stray too.

@@ -1,24 +1,22 @@
 //! The objects of a scene one after the other: read, counted, and converted.
 
-use super::context::{BYTES_PER_SPLAT, Context};
-use super::files::Files;
+use super::context::Context;
 use super::input::{Input, input};
 use super::object::{self, Prepared};
+use super::object_context::{BYTES_PER_SPLAT, ObjectContext};
 use super::own::Own;
 use crate::cost::{self, Count};
 use crate::form::PlannedObject;
 use crate::scene::{Scene, SceneObject};
 use crate::statistics::ObjectStatistics;
-use crate::{Error, Progress, RenderOptions, SplatCount, stage};
+use crate::{Error, SplatCount, stage};
 use splat_core::{Cloud, Exceeded};
 
 /// What loading reads.
 #[derive(Clone, Copy)]
 pub(super) struct Loading<'a> {
     pub(super) scene: &'a Scene,
-    pub(super) options: &'a RenderOptions,
-    pub(super) progress: &'a Progress,
-    pub(super) files: &'a Files,
+    pub(super) context: Context<'a>,
 }
 
 impl<'a> Loading<'a> {
@@ -26,9 +24,9 @@ impl<'a> Loading<'a> {
         self.scene.objects.iter().enumerate().filter(|(_, object)| object.visible)
     }
 
-    pub(super) fn context(&self, id: usize, used: u64, made: u64) -> Context<'a> {
-        let Self { scene, options, progress, files } = *self;
-        Context { scene, options, files, progress, id, used, made }
+    pub(super) fn context(&self, id: usize, used: u64, made: u64) -> ObjectContext<'a> {
+        let Self { scene, context: Context { files, options, progress } } = *self;
+        ObjectContext { scene, options, files, progress, id, used, made }
     }
 
     /// An error of an object with the file that its data is from.
@@ -44,18 +42,18 @@ impl<'a> Loading<'a> {
         beside: &[Count],
     ) -> Result<Vec<Prepared<'a>>, Error> {
         let work = cost::before_reading(self.scene, beside);
-        self.progress.plan(self.options.rates.stages(&work));
-        self.progress.begin(stage::READ);
-        self.progress.add_total(self.visible().count() as u64);
+        self.context.progress.plan(self.context.options.rates.stages(&work));
+        self.context.progress.begin(stage::READ);
+        self.context.progress.add_total(self.visible().count() as u64);
         let prepare_object = |(id, object): (usize, &'a SceneObject)| {
-            self.progress.tick(1).map_err(|_| Error::Cancelled)?;
+            self.context.progress.tick(1).map_err(|_| Error::Cancelled)?;
             if let Some(reading) = cost::reading(object) {
-                self.progress.begin(&reading);
+                self.context.progress.begin(&reading);
             }
             let prepared = object::prepare(object, &self.context(id, 0, 0), looks(object));
             let mut prepared = prepared.map_err(|e| self.named(object, e))?;
             let what = format!("object '{}'", crate::shown(&object.name));
-            let held = self.files.memory(self.options).take(&what, prepared.input.bytes()[1]);
+            let held = self.context.files.memory(self.context.options).take(&what, prepared.input.bytes()[1]);
             prepared.held = Some(held.map_err(Error::Limit)?);
             Ok(prepared)
         };
@@ -65,7 +63,7 @@ impl<'a> Loading<'a> {
     /// Reads every visible object.
     pub(super) fn inputs(&self) -> Result<Vec<Input<'a>>, Error> {
         let read_input = |(id, object): (usize, &'a SceneObject)| {
-            self.progress.tick(0).map_err(|_| Error::Cancelled)?;
+            self.context.progress.tick(0).map_err(|_| Error::Cancelled)?;
             input(object, &self.context(id, 0, 0)).map_err(|e| self.named(object, e))
         };
         self.visible().map(read_input).collect()
@@ -84,7 +82,7 @@ impl<'a> Loading<'a> {
         planned: &[PlannedObject],
     ) -> Result<Vec<SplatCount>, Error> {
         let mut splats: Vec<SplatCount> = Vec::new();
-        let left = self.files.memory(self.options).left();
+        let left = self.context.files.memory(self.context.options).left();
         let mut needed = 0;
         for ((object, p), plan) in self.visible().map(|v| v.1).zip(prepared).zip(planned) {
             let mut count = SplatCount::predicted(&object.name, &p.prediction, p.input.conversion());
@@ -141,7 +139,7 @@ impl<'a> Loading<'a> {
             if plan.splats.is_none() {
                 continue;
             }
-            self.progress.begin(&cost::converting(&object.name));
+            self.context.progress.begin(&cost::converting(&object.name));
             let cloud = object::convert(&p, native, &self.context(id, used, made), warnings);
             let cloud = cloud.map_err(|e| self.named(object, e))?;
             if cloud.is_empty() {

@@ -2,12 +2,12 @@
 //! converted.
 
 use super::context::Context;
-use super::files::Files;
 use super::light_statistics;
 use super::loading::Loading;
+use super::object_context::ObjectContext;
+use crate::Error;
 use crate::scene::{MatterSource, Scene, SceneLight, SceneObject, Source, SourceData, VolumeSource};
 use crate::statistics::MediumFacts;
-use crate::{Error, Progress, RenderOptions};
 use convert::MediumBody;
 use glam::{DMat3, DVec3};
 use splat_core::{DAabb, Grid, RawPoints, ScalarField, Shading};
@@ -27,13 +27,8 @@ const SPREAD: f64 = 0.25;
 ///
 /// # Errors
 /// Those of reading their files.
-pub(crate) fn media_facts(
-    scene: &Scene,
-    options: &RenderOptions,
-    progress: &Progress,
-    files: &Files,
-) -> Result<Vec<MediumFacts>, Error> {
-    let loading = Loading { scene, options, progress, files };
+pub(crate) fn media_facts(scene: &Scene, context: Context<'_>) -> Result<Vec<MediumFacts>, Error> {
+    let loading = Loading { scene, context };
     let is_lit = scene.lights.iter().any(|light| light.light.intensity.iter().any(|i| *i > 0.0));
     let mut facts = Vec::new();
     for (id, object) in loading.visible().filter(|(_, object)| is_lit && scatters(object, scene)) {
@@ -171,7 +166,7 @@ fn brightest(color: [f32; 3]) -> f64 {
 }
 
 /// Looks at a few places of an object; `None` for what is no medium, and for what nothing is known of.
-fn sampled(object: &SceneObject, context: &Context<'_>) -> Result<Option<Sampled>, Error> {
+fn sampled(object: &SceneObject, context: &ObjectContext<'_>) -> Result<Option<Sampled>, Error> {
     let color = brightest(object.color.unwrap_or(context.scene.materials[object.material].color));
     let scale = object.transform.scale;
     let of_box = |bounds: &DAabb, spacing: f64, look: &dyn Fn(DVec3) -> f64| {

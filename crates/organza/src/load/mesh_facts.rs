@@ -1,10 +1,10 @@
 //! Facts of meshes that bound the error of discs: cheap, and known before anything is converted.
 
-use super::files::Files;
+use super::context::Context;
 use super::loading::Loading;
+use crate::Error;
 use crate::scene::{Scene, SceneObject, Source, SourceData};
 use crate::statistics::MeshFacts;
-use crate::{Error, Progress, RenderOptions};
 use glam::DVec3;
 use splat_core::{Mesh, optics, vertex_normals};
 use std::borrow::Cow;
@@ -16,13 +16,8 @@ const FEW: usize = 1 << 16;
 ///
 /// # Errors
 /// Those of reading their files.
-pub(crate) fn mesh_facts(
-    scene: &Scene,
-    options: &RenderOptions,
-    progress: &Progress,
-    files: &Files,
-) -> Result<Vec<MeshFacts>, Error> {
-    let loading = Loading { scene, options, progress, files };
+pub(crate) fn mesh_facts(scene: &Scene, context: Context<'_>) -> Result<Vec<MeshFacts>, Error> {
+    let loading = Loading { scene, context };
     let mut facts = Vec::new();
     for (rank, object) in loading.visible() {
         let Source::Mesh(path) = &object.source else { continue };

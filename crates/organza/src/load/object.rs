@@ -1,7 +1,7 @@
 //! Converts an object to its cloud.
 
-use super::context::{self, Context};
 use super::input::{Input, input, shown_field};
+use super::object_context::{self, ObjectContext};
 use super::own::{Body, Own};
 use crate::Error;
 use crate::scene::{SceneObject, Source};
@@ -48,7 +48,7 @@ pub(super) fn entry(object: &SceneObject) -> Object {
 /// Reads one object and counts its splats; `sampled` where it may be drawn from its own data.
 pub(super) fn prepare<'a>(
     object: &'a SceneObject,
-    context: &Context<'_>,
+    context: &ObjectContext<'_>,
     sampled: bool,
 ) -> Result<Prepared<'a>, Error> {
     let mut input = input(object, context)?;
@@ -106,7 +106,7 @@ fn predict(input: &Input<'_>) -> Result<Prediction, ConvertError> {
         Input::Density(field, bounds, params) => cost::density(field.as_ref(), *bounds, params),
         Input::Procedural(shape, spacing, params) => cost::procedural(shape, *spacing, params),
         // Whether its splats fit is asked once it is known to become some.
-        Input::Medium(medium, params, clip) => cost::medium(medium, clip, &context::of_lattice(params)),
+        Input::Medium(medium, params, clip) => cost::medium(medium, clip, &object_context::of_lattice(params)),
         Input::Rectangle(r, opacity, params) => cost::rectangle(r, *opacity, params),
     }
 }
@@ -122,7 +122,7 @@ impl Prepared<'_> {
     }
 
     /// What the planner asks of the object.
-    pub(super) fn statistics(&self, object: &SceneObject, context: &Context<'_>) -> ObjectStatistics {
+    pub(super) fn statistics(&self, object: &SceneObject, context: &ObjectContext<'_>) -> ObjectStatistics {
         let material = &context.scene.materials[object.material].material;
         // Fields of measured data have tight bounds.
         let looseness =
@@ -151,7 +151,7 @@ impl Prepared<'_> {
 pub(super) fn convert(
     prepared: &Prepared<'_>,
     native: Option<&Own>,
-    context: &Context<'_>,
+    context: &ObjectContext<'_>,
     warnings: &mut Vec<String>,
 ) -> Result<Cloud, Error> {
     if let Some(too_many) = &prepared.too_many {
@@ -214,7 +214,7 @@ pub(super) fn procedural(
     shape: &CloudShape,
     spacing: f64,
     params: &SplatParams,
-    context: &Context<'_>,
+    context: &ObjectContext<'_>,
 ) -> Result<(Grid, TransferFunction), ConvertError> {
     let lattice = convert::procedural_cloud(shape, spacing, params, Some(context.progress))?;
     Ok((lattice, convert::extinction_as_it_is(shape.extinction, params)?))

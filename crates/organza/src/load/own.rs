@@ -3,9 +3,9 @@
 //! Lengths and places are in the object's space, so an object far from the origin loses no precision; a transform leads
 //! to the world.
 
-use super::context::{self, Context};
 use super::input::{Input, Isosurface};
 use super::object::{Prepared, procedural};
+use super::object_context::{self, ObjectContext};
 use crate::Error;
 use crate::form::{Form, PlannedObject};
 use crate::scene::{SurfaceSampler, Technique};
@@ -100,7 +100,7 @@ impl Own {
     pub(super) fn new(
         prepared: &mut Prepared<'_>,
         planned: &PlannedObject,
-        context: &Context<'_>,
+        context: &ObjectContext<'_>,
     ) -> Result<Option<Self>, Error> {
         let source = planned.form;
         let splat = prepared.input.splat().clone();
@@ -235,7 +235,7 @@ fn data(
     prepared: &Prepared<'_>,
     bounded: Option<BoundedExtinction>,
     source: Form,
-    context: &Context<'_>,
+    context: &ObjectContext<'_>,
 ) -> Result<Option<Data>, Error> {
     if let Some(field) = bounded {
         return Ok(field_data(prepared, field));
@@ -288,7 +288,7 @@ fn data(
             cells(grid.into(), transfer, (params.volume.normals, &params.volume.clip))
         }
         Input::Medium(medium, params, clip) => {
-            let grid = convert::medium_to_grid(medium, &context::of_lattice(params))?;
+            let grid = convert::medium_to_grid(medium, &object_context::of_lattice(params))?;
             cells(grid.into(), convert::extinction_as_it_is(medium.extinction, params)?, (false, clip))
         }
     })
@@ -311,7 +311,7 @@ fn volume(
     grid: &Arc<Grid>,
     transfer: &TransferFunction,
     params: &VolumeParams,
-    context: &Context<'_>,
+    context: &ObjectContext<'_>,
 ) -> Result<Data, Error> {
     let is_packed = context.scene.objects[context.id].packing == Packing::BodyCentred;
     let body_centred = is_packed.then(|| convert::body_centred(grid, &params.splat)).transpose()?;

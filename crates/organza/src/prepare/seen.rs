@@ -2,12 +2,12 @@
 //! sees all.
 
 use super::{Loaded, load};
-use crate::load::files::{Files, once};
+use crate::load::files::once;
 use crate::load::placed;
 use crate::memory::loading_bytes;
 use crate::scene::{ExtractSource, FoundCamera, Scene, SceneObject, Source, Stop};
 use crate::shadows::{shadow_error, shadow_params};
-use crate::{Error, Progress, RenderOptions, choose::settle, printable, shown};
+use crate::{Context, Error, choose::settle, printable, shown};
 use glam::DVec3;
 use splat_core::RawPoints;
 use std::borrow::Cow;
@@ -19,16 +19,11 @@ use tsm::{Params, ShadowMap};
 ///
 /// # Errors
 /// As [`crate::render`] for data that cannot be read, and as [`seen`].
-pub fn fitted<'s>(
-    scene: &'s Scene,
-    options: &RenderOptions,
-    progress: &Progress,
-    files: &Files,
-) -> Result<(Cow<'s, Scene>, Option<FoundCamera>), Error> {
+pub fn fitted<'s>(scene: &'s Scene, context: Context<'_>) -> Result<(Cow<'s, Scene>, Option<FoundCamera>), Error> {
     let mut settled = Cow::Borrowed(scene);
     for (stop, start) in scene.stops.iter().zip(scene.start.iter().cycle()) {
-        let find = || stop_time(stop, &Eye { scene: start, options, progress, files });
-        let time = once(&files.stopped, (Stop { frame: 0, ..stop.clone() }, start.clone()), find)?;
+        let find = || stop_time(stop, &Eye { scene: start, context });
+        let time = once(&context.files.stopped, (Stop { frame: 0, ..stop.clone() }, start.clone()), find)?;
         settled.to_mut().objects[stop.object].transform.translation = stop.path.at(time.min(stop.frame.into()));
     }
     for (i, object) in scene.objects.iter().enumerate().filter(|(_, object)| object.visible) {
@@ -36,26 +31,21 @@ pub fn fitted<'s>(
         let part = settled.part(source.light, |o| source.sees(o));
         // Wherever it is written.
         let what = ExtractSource { written: None, ..source.clone() };
-        files.seen.borrow_mut().retain(|((of, by), _)| *of != what || *by == part);
-        let find = || seen(&settled, source, options, progress, files).map(Arc::new);
-        let points = once(&files.seen, (what, part), find)?;
+        context.files.seen.borrow_mut().retain(|((known, by), _)| *known != what || *by == part);
+        let find = || seen(&settled, source, context).map(Arc::new);
+        let points = once(&context.files.seen, (what, part), find)?;
         settled.to_mut().objects[i].source = Source::Extract(ExtractSource { points: Some(points), ..source.clone() });
     }
-    placed(settled, options, progress, files)
+    placed(settled, context)
 }
 
 /// The scene to draw: that of [`fitted`], with a named technique for every object, and the plan's values of settings that the scene leaves open.
 ///
 /// # Errors
 /// As [`fitted`], and for a requested layer that no technique which `auto` may choose fills.
-pub fn settled<'s>(
-    scene: &'s Scene,
-    options: &RenderOptions,
-    progress: &Progress,
-    files: &Files,
-) -> Result<(Cow<'s, Scene>, Option<FoundCamera>), Error> {
-    let (scene, found) = fitted(scene, options, progress, files)?;
-    Ok((settle::settled(scene, options, progress, files)?, found))
+pub fn settled<'s>(scene: &'s Scene, context: Context<'_>) -> Result<(Cow<'s, Scene>, Option<FoundCamera>), Error> {
+    let (scene, found) = fitted(scene, context)?;
+    Ok((settle::settled(scene, context)?, found))
 }
 
 /// The first surface of some objects that a light (an extended one from its middle) sees, in the world. The surface follows from a shadow map
@@ -63,14 +53,8 @@ pub fn settled<'s>(
 ///
 /// # Errors
 /// As [`crate::render`]; [`Error::Input`] where no ray meets the absorbance.
-pub fn seen(
-    scene: &Scene,
-    source: &ExtractSource,
-    options: &RenderOptions,
-    progress: &Progress,
-    files: &Files,
-) -> Result<RawPoints, Error> {
-    let (map, origin) = Eye { scene, options, progress, files }.map(source.light, &|o| source.sees(o))?;
+pub fn seen(scene: &Scene, source: &ExtractSource, context: Context<'_>) -> Result<RawPoints, Error> {
+    let (map, origin) = Eye { scene, context }.map(source.light, &|o| source.sees(o))?;
     let points = map.first_surface(source.absorbance);
     if points.is_empty() {
         return Err(unseen(scene, source, map.most_absorbance()));
@@ -91,7 +75,8 @@ fn unseen(scene: &Scene, source: &ExtractSource, most: f32) -> Error {
         (format!("matter on rays of light {light} in {seen}"), "none".to_owned(), "look whether it casts shadows")
     };
     let message = format!("`absorbance`: expected {expected}, found {found}");
-    let is_extracted = |object: &&SceneObject| matches!(&object.source, Source::Extract(of) if of == source);
+    let is_extracted =
+        |object: &&SceneObject| matches!(&object.source, Source::Extract(extracted) if extracted == source);
     match (written, scene.objects.iter().find(is_extracted)) {
         (Some(written), Some(object)) => {
             written.error(&scene.file, &format!("object `{}`: {message}", shown(&object.name)), hint).into()
@@ -116,16 +101,14 @@ fn stop_time(stop: &Stop, eye: &Eye<'_>) -> Result<f64, Error> {
     let splats = eye.splats(stop.light, &|o| o.name == eye.scene.objects[stop.object].name)?.cloud;
     let start = splats.origin - origin - stop.path.at(0.0);
     let time = map.free_until(&splats.position, &|time| (start + stop.path.at(time)).as_vec3(), stop.last);
-    eye.files.note(&eye.scene.file, stop.said(&eye.scene.objects[stop.object].name, time));
+    eye.context.files.note(&eye.scene.file, stop.said(&eye.scene.objects[stop.object].name, time));
     Ok(time)
 }
 
 /// Who looks at a scene from its lights.
 struct Eye<'a> {
     scene: &'a Scene,
-    options: &'a RenderOptions,
-    progress: &'a Progress,
-    files: &'a Files,
+    context: Context<'a>,
 }
 
 impl Eye<'_> {
@@ -133,21 +116,24 @@ impl Eye<'_> {
     fn map(&self, light: usize, sees: &dyn Fn(&SceneObject) -> bool) -> Result<(ShadowMap, DVec3), Error> {
         let loaded = self.splats(light, sees)?;
         let casters = tsm::Scene { cloud: &loaded.cloud, materials: &loaded.materials, objects: &loaded.objects };
-        let left = self.options.max_memory.saturating_sub(loaded.cloud.bytes());
+        let left = self.context.options.max_memory.saturating_sub(loaded.cloud.bytes());
         let whole = &self.scene.lights[light];
         let cells = whole.shadow_cells.or(self.scene.render.shadow.cells);
         let params = shadow_params(&self.scene.render, &loaded, cells, Params::default().tolerance, left);
-        let map = ShadowMap::build(&casters, &whole.light.middle(), &params, Some(self.progress));
+        let map = ShadowMap::build(&casters, &whole.light.middle(), &params, Some(self.context.progress));
         let map = map.map_err(|e| shadow_error(&format!("light {light}"), &e))?;
-        self.files.most.set(self.files.most.get().max(loaded.cloud.bytes() + map.peak_bytes()));
+        self.context.files.most.set(self.context.files.most.get().max(loaded.cloud.bytes() + map.peak_bytes()));
         Ok((map, loaded.cloud.origin))
     }
 
     /// The splats of some objects alone, in the scale of the scene.
     fn splats(&self, light: usize, has: &dyn Fn(&SceneObject) -> bool) -> Result<Loaded, Error> {
         let scene = self.scene.part(light, has);
-        let mut loaded = load(&scene, self.options, self.progress, self.files)?;
-        self.files.most.set(self.files.most.get().max(loading_bytes(&loaded, self.files.bytes())));
+        let mut loaded = load(&scene, self.context)?;
+        self.context
+            .files
+            .most
+            .set(self.context.files.most.get().max(loading_bytes(&loaded, self.context.files.bytes())));
         // From the scale of the cloud to that of the scene: a power of two.
         loaded.cloud.scale_world(libm::exp2(loaded.exponent.into()));
         Ok(loaded)

@@ -26,7 +26,7 @@ use crate::load::files::Files;
 use crate::pass;
 use crate::prepare::{Planned, fitted, load_measured, plan_alone};
 use crate::scene::{FoundCamera, Goal, Scene};
-use crate::{CostRecord, Error, Progress, RenderOptions};
+use crate::{Context, CostRecord, Error, Progress, RenderOptions};
 use errors::Errors;
 pub use errors::ExpectedError;
 pub use rung::GivenUp;
@@ -149,14 +149,15 @@ pub fn render_within(
     progress: &Progress,
     files: Files,
 ) -> Result<WithinGoal, Error> {
-    let (stated, found) = fitted(scene, options, progress, &files)?;
-    let scene = settle::settled(Cow::Borrowed(&*stated), options, progress, &files)?;
+    let context = Context { files: &files, options, progress };
+    let (stated, found) = fitted(scene, context)?;
+    let scene = settle::settled(Cow::Borrowed(&*stated), context)?;
     let mut cost = CostRecord::default();
     let begun = Instant::now();
     let asked = Rung::of_scene(&scene);
     // All splats, of which settings that give way keep a share.
     let everything = Rung { splat_share: 1.0, ..asked }.applied_to(&scene);
-    let mut loaded = load_measured(&everything, options, progress, &files, &mut cost)?;
+    let mut loaded = load_measured(&everything, context, &mut cost)?;
     let drawing = Drawing { scene: &scene, options, progress };
     let mut trial = Trial::new(&drawing, &mut loaded)?;
     let errors = Errors::new(&drawing, &mut loaded, goal.budget_ms.is_some())?;
@@ -167,7 +168,7 @@ pub fn render_within(
     let mut alike = Vec::new();
     for antialias in antialias_values(asked) {
         let changed = Rung { antialias, ..asked }.applied_to(&stated);
-        let changed = settle::settled(Cow::Owned(changed), options, progress, &files)?;
+        let changed = settle::settled(Cow::Owned(changed), context)?;
         alike.extend(is_drawn_alike(&scene, &changed).then_some(antialias));
     }
     let possible = rungs(&scene, !loaded.cloud.is_empty()).into_iter().filter(|rung| alike.contains(&rung.antialias));

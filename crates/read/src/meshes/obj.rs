@@ -256,7 +256,7 @@ impl Content<'_> {
         let starts = [0].into_iter().chain(self.line_ends.iter().copied());
         let lines = starts.zip(&self.line_ends).enumerate();
         let lines = lines.map(|(rank, (start, end))| (rank as u32, &self.line_points[start..*end]));
-        Tubes::of(positions, lines, reading)
+        Tubes::around(positions, lines, reading)
     }
 
     /// The vertex of the mesh for `v`, `v/vt`, `v//vn` or `v/vt/vn`.

@@ -46,7 +46,7 @@ pub(crate) struct Tubes {
 
 impl Tubes {
     /// Tubes around lines, each with its rank and the ranks of its points; `None` where no line has a length.
-    pub(crate) fn of<'l>(
+    pub(crate) fn around<'l>(
         positions: &[Vec3],
         lines: impl Iterator<Item = (u32, &'l [u32])> + Clone,
         reading: &mut Reading<'_>,
@@ -137,7 +137,7 @@ mod tests {
 
     fn tubes(positions: &[Vec3], lines: &[&[u32]]) -> Option<Tubes> {
         let lines = lines.iter().enumerate().map(|(rank, line)| (rank as u32, *line));
-        Tubes::of(positions, lines, &mut Reading::new(&ReadParams::default(), None)).unwrap()
+        Tubes::around(positions, lines, &mut Reading::new(&ReadParams::default(), None)).unwrap()
     }
 
     fn volume(tubes: &Tubes) -> f64 {

@@ -54,7 +54,7 @@ impl<'a> Stream<'a> {
     }
 
     /// Bytes in memory.
-    pub(crate) fn of(content: &'a [u8], params: &ReadParams) -> Self {
+    pub(crate) fn in_memory(content: &'a [u8], params: &ReadParams) -> Self {
         let length = content.len() as u64;
         Self::new(content, Some(length), length, params)
     }

@@ -131,7 +131,7 @@ pub(crate) fn field(
     let notes = &mut reading.notes;
     let tuples = numbers.chunks_exact(selection.numbers as usize);
     input::hold("the field", 8 * tuples.len() as u64, params)?;
-    let values: Vec<f64> = tuples.map(|tuple| selection.value.of(|i| tuple[i])).collect();
+    let values: Vec<f64> = tuples.map(|tuple| selection.value.evaluate(|i| tuple[i])).collect();
     if let Some(i) = values.iter().position(|v| (*v as f32).is_infinite()) {
         let found = format!("{} at value {i} of {name}", values[i]);
         let hint = "scale the values, or write NaN where there is none: it draws nothing";
@@ -186,7 +186,7 @@ impl Cells {
     /// Whether some cell encloses a volume.
     pub(crate) fn has_bodies(&self) -> bool {
         let is_body = |kind: &Kind| matches!(kind.shape, Shape::Body(_) | Shape::Polyhedron);
-        self.kinds.iter().any(|number| Kind::of(*number).is_some_and(is_body))
+        self.kinds.iter().any(|number| Kind::numbered(*number).is_some_and(is_body))
     }
 
     /// Leaves out the cells that VTK marks as copies of those of another piece or as not to be seen; `marks` has a number of each cell.
@@ -326,7 +326,7 @@ impl Cells {
             let kind = Kind::of_cell(*number, corners.len())?;
             matches!(kind.shape, Shape::Line).then(|| (i as u32, kind.drawn(corners)))
         });
-        Tubes::of(positions, lines, reading)
+        Tubes::around(positions, lines, reading)
     }
 
     /// The faces, if there are some, and the number of lines; and where columns of cells need it the cell of each triangle.

@@ -181,7 +181,7 @@ fn with_elements<T: Default>(
         return Ok(T::default());
     }
     let content = stream.rest()?;
-    made(&Elements::of(&content)?)
+    made(&Elements::parse(&content)?)
 }
 
 /// The slices of a file, one for each of its frames; none of one without a picture.

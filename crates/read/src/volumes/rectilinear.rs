@@ -112,7 +112,7 @@ impl Rectilinear {
     }
 
     fn axes(&self) -> Result<[Axis<'_>; 3], ReadError> {
-        let axis = |rank: usize| Axis::of(&self.coordinates[rank], ["x", "y", "z"][rank], self.place);
+        let axis = |rank: usize| Axis::of_coordinates(&self.coordinates[rank], ["x", "y", "z"][rank], self.place);
         Ok([axis(0)?, axis(1)?, axis(2)?])
     }
 
@@ -230,7 +230,7 @@ fn told(axes: &[Axis<'_>; 3], dims: [usize; 3], is_coarse: bool, lost: f64) -> S
 }
 
 impl<'a> Axis<'a> {
-    fn of(coordinates: &'a [f64], name: &str, place: Place) -> Result<Self, ReadError> {
+    fn of_coordinates(coordinates: &'a [f64], name: &str, place: Place) -> Result<Self, ReadError> {
         let sign = if coordinates.len() > 1 && coordinates[1] < coordinates[0] { -1.0 } else { 1.0 };
         let mut axis = Self { coordinates, least: f64::INFINITY, most: 0.0, sign, is_even: true };
         for (i, pair) in coordinates.windows(2).enumerate() {

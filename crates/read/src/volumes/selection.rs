@@ -24,7 +24,7 @@ pub(crate) enum Value {
 
 impl Value {
     /// The value of a voxel with these numbers.
-    pub(crate) fn of(self, number: impl Fn(usize) -> f64) -> f64 {
+    pub(crate) fn evaluate(self, number: impl Fn(usize) -> f64) -> f64 {
         match self {
             Self::Number(i) => number(i as usize),
             Self::Luma => LUMA.iter().enumerate().map(|(i, weight)| weight * number(i)).sum(),

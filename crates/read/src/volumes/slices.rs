@@ -53,7 +53,7 @@ enum Picture {
 }
 
 impl Picture {
-    fn of(path: &Path) -> Option<Self> {
+    fn named(path: &Path) -> Option<Self> {
         match path.extension()?.to_str()?.to_ascii_lowercase().as_str() {
             #[cfg(feature = "tiff")]
             "tif" | "tiff" => Some(Self::Tiff),
@@ -66,14 +66,14 @@ impl Picture {
 
 /// Whether a folder has files that may be slices.
 pub(crate) fn has_slices(files: &[PathBuf]) -> bool {
-    files.iter().any(|file| Picture::of(file).is_some())
+    files.iter().any(|file| Picture::named(file).is_some())
 }
 
 /// Reads the volume of the slices of a folder.
 pub(crate) fn read(folder: &Path, files: Vec<PathBuf>, reading: &mut Reading<'_>) -> Result<Grid, ReadError> {
     let mut slices: Vec<(Picture, PathBuf)> = Vec::new();
     for file in files {
-        match Picture::of(&file) {
+        match Picture::named(&file) {
             Some(picture) => slices.push((picture, file)),
             None => reading.notes.not_used([format!("file {}", name_of(&file)).as_bytes()]),
         }

@@ -36,7 +36,7 @@ pub(crate) fn read(content: Content, reading: &mut Reading<'_>) -> Result<Grid, 
     let first = &listed[0];
     let shape = first.shape;
     check_alike(&listed)?;
-    let description = Description::of(&mut pages, first)?;
+    let description = Description::read(&mut pages, first)?;
     let planes = description.planes(listed.len() as u64, shape.numbers)?;
     let slots = slots(&listed, &planes, &mut pages)?;
     let frame = Selection::of_frames(planes.times.count, Place::File, reading.params, &mut reading.notes)?.frame;
@@ -92,7 +92,7 @@ pub(super) fn slice(content: Content, reading: &mut Reading<'_>) -> Result<Slice
     input::hold("a page", 2 * shape.bytes(), reading.params)?;
     let mut bytes = Vec::new();
     pages.decode(page.rank, &shape, &mut bytes)?;
-    let width = Description::of(&mut pages, page)?.width();
+    let width = Description::read(&mut pages, page)?.width();
     let big_endian = cfg!(target_endian = "big");
     Ok(Slice {
         size: shape.size,

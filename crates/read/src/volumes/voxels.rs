@@ -114,7 +114,7 @@ impl Stored {
 
     /// The value of a voxel with these numbers.
     fn value(&self, number: impl Fn(usize) -> f64) -> f32 {
-        let value = self.selection.value.of(number);
+        let value = self.selection.value.evaluate(number);
         match self.scaling {
             (1.0, 0.0) => value as f32,
             (slope, intercept) => (value * slope + intercept) as f32,
@@ -188,7 +188,7 @@ pub(crate) fn behind(
             let expected = format!("{} bytes of voxels at the end of the data", stored.bytes());
             return Err(ReadError::input(Place::File, expected, format!("{} bytes", data.len()), hint));
         };
-        return read(&mut Stream::of(&data[start as usize..], params), stored, params, hint);
+        return read(&mut Stream::in_memory(&data[start as usize..], params), stored, params, hint);
     }
     let inside = |n: u64| stream.left().is_none_or(|left| n <= left);
     match u64::try_from(skip).ok().filter(|n| inside(*n)) {

@@ -48,7 +48,7 @@ pub(crate) fn read(content: &[u8], place: Option<&Path>, reading: &mut Reading<'
     input::hold("the description", if appended.is_some() { text.len() as u64 } else { 0 }, reading.params)?;
     let document = parsed(&text)?;
     let dataset = dataset(&document)?;
-    let encoding = Encoding::of(document.root_element(), content, appended)?;
+    let encoding = Encoding::stated_by(document.root_element(), content, appended)?;
     let list = place.and_then(listed::naming);
     if let Some(list) = &list {
         let list = escaped(list.as_bytes(), 60);
@@ -310,7 +310,8 @@ fn chosen<'a, 'i>(
     }
     let (nodes, candidates): (Vec<_>, Vec<_>) = all.into_iter().unzip();
     let chosen = chosen_array(&candidates, place(piece), params, notes)?;
-    let is_of_cells = |array: Node<'_, '_>| array.parent_element().is_some_and(|of| of.has_tag_name("CellData"));
+    let is_of_cells =
+        |array: Node<'_, '_>| array.parent_element().is_some_and(|parent| parent.has_tag_name("CellData"));
     Ok(chosen.map(|chosen| {
         let array = nodes[chosen.rank];
         ChosenArray { array, is_of_cells: is_of_cells(array), value: chosen.value }
@@ -322,9 +323,9 @@ fn not_used(dataset: Node<'_, '_>, used: &[Node<'_, '_>], notes: &mut Notes) {
     let others = dataset.document().descendants().filter(|n| n.has_tag_name("DataArray") && !used.contains(n));
     let names: Vec<String> = others
         .map(|other| {
-            let of = other.parent_element().map_or("", |of| of.tag_name().name());
+            let association = other.parent_element().map_or("", |parent| parent.tag_name().name());
             let name = other.attribute("Name").unwrap_or("an array without a name");
-            if of == "PointData" { name.to_owned() } else { format!("{of}.{name}") }
+            if association == "PointData" { name.to_owned() } else { format!("{association}.{name}") }
         })
         .collect();
     notes.not_used(names.iter().map(String::as_bytes));

@@ -16,7 +16,7 @@ use crate::reading::Reading;
 use crate::stream::input::Stream;
 use crate::text::{Line, Lines, Words};
 use crate::{Loaded, ReadParams};
-use arrays::{Array, Arrays, Of, Part};
+use arrays::{Array, Arrays, Owner, Part};
 use splat_core::Grid;
 use splat_core::glam::{DMat3, DVec3};
 use splat_core::text::escaped;
@@ -90,7 +90,7 @@ fn image<'a>(
     lattice::check(points.origin, &axes, points.place, HINT)?;
     let mut origin = points.origin;
     let mut sizes = dims;
-    if array.of == Of::Cells {
+    if array.owner == Owner::Cells {
         (origin, sizes) = lattice::of_cells(origin, &axes, dims);
         notes
             .remarks
@@ -182,8 +182,8 @@ fn rectilinear<'a>(
         .chosen(reading.params, &mut reading.notes)?
         .ok_or_else(|| missing(&lines, "SCALARS, or an array of a FIELD, of POINT_DATA"))?;
     reading.notes.not_used(arrays.all().filter(|a| a.place != array.place).map(|a| a.name.as_bytes()));
-    let of_values = if array.of == Of::Cells { grid.of_cells() } else { grid };
-    if array.of == Of::Cells {
+    let of_values = if array.owner == Owner::Cells { grid.of_cells() } else { grid };
+    if array.owner == Owner::Cells {
         let name = escaped(array.name.as_bytes(), 40);
         reading.notes.remark(format!("values of cells ({name}): they lie at the middles"));
     }

@@ -8,7 +8,7 @@ use super::tile::sheets::Sheets;
 use super::tile::size::SIDE;
 use crate::shared::gathered::Gathered;
 use crate::shared::gathered::bricks::Box3;
-use crate::shared::lattice_rays::LatticeRays;
+use crate::shared::lattice::rays::LatticeRays;
 use crate::shared::slabs::{BATCH, Slabs};
 use crate::shared::vectors::COUNTING;
 use splat_core::glam::DVec3;

@@ -7,7 +7,7 @@ use crate::image_aligned::tile::near_eye::LEAST_APART;
 use crate::shared::gathered::exact::Exact;
 use crate::shared::gradient_volume::differences;
 use crate::shared::lattice::Lattice;
-use crate::shared::lattice_rays::{LatticeRays, ViewRay};
+use crate::shared::lattice::rays::{LatticeRays, ViewRay};
 use crate::shared::params::{Classify, Gradients, Reconstruction};
 use crate::shared::sections::{PHASES, sections};
 use crate::shared::slabs::Slabs;

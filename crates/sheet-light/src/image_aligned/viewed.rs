@@ -10,7 +10,7 @@
 //! In perspective the kernel is sheared along the ray through its voxel, so that one footprint serves all slabs.
 
 use super::slant::{Slant, plane_step};
-use crate::shared::near::Near;
+use crate::shared::lattice::near::Near;
 use crate::shared::params::Aligned;
 use crate::shared::sections::PHASES;
 use crate::shared::slabs::Slabs;

@@ -11,7 +11,7 @@
 
 use crate::Error;
 use crate::shared::error::cancelled;
-use crate::shared::neighbours::{Cells, Receivers, lanes};
+use crate::shared::lattice::neighbours::{Cells, Receivers, lanes};
 use rayon::prelude::*;
 use splat_core::glam::{DMat3, DVec3, Vec3};
 use splat_core::raster::lanes::MAX_LANES;

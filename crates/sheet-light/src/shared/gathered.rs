@@ -12,7 +12,7 @@ mod filter;
 use crate::Volume;
 use crate::shared::classifier::Base;
 use crate::shared::lattice::Lattice;
-use crate::shared::near::Near;
+use crate::shared::lattice::near::Near;
 use crate::shared::params::GatherKernel;
 use crate::shared::value_range::ValueRange;
 use crate::shared::vectors::NATURAL;

@@ -4,7 +4,7 @@
 //! quadratic ones wherever no difference reaches beyond a face.
 
 use super::lattice::Lattice;
-use super::neighbours::{Neighbours, Receivers, lanes};
+use super::lattice::neighbours::{Neighbours, Receivers, lanes};
 use super::params::Gradients;
 use super::voxels::Voxels;
 use crate::{Params, Volume};
@@ -101,7 +101,7 @@ pub(crate) fn differences(lattice: &Lattice<'_>, index: [usize; 3]) -> [f64; 3] 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::shared::near::Near;
+    use crate::shared::lattice::near::Near;
     use crate::shared::voxels::without_extinction;
     use splat_core::glam::{DMat3, DQuat};
     use splat_core::raster::pulp;

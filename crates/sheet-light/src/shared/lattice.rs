@@ -4,6 +4,10 @@
 //! wrong there. So the lattice goes on for as many voxels as kernels reach, v(−m) = 2·v(0) − v(m) along each axis: a linear field
 //! stays linear up to its faces, and a constant one constant. The volume itself does not grow.
 
+pub(crate) mod near;
+pub(crate) mod neighbours;
+pub(crate) mod rays;
+
 use splat_core::glam::DMat3;
 use splat_core::{Grid, Packing};
 

@@ -5,7 +5,7 @@
 //! voxels is interpolated trilinearly, as the values are that it lights.
 
 use super::error::cancelled;
-use super::neighbours::{Cells, Neighbours, Receivers, lanes};
+use super::lattice::neighbours::{Cells, Neighbours, Receivers, lanes};
 use crate::Error;
 use rayon::prelude::*;
 use splat_core::glam::DVec3;

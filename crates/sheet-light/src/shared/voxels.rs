@@ -5,7 +5,7 @@
 //! that it shapes are inside one such interval: an erosion of a set of voxels by a neighbourhood ([`Near`]), done on 64 voxels at once.
 
 use super::lattice::Lattice;
-use super::near::Near;
+use super::lattice::near::Near;
 use super::value_range::ValueRange;
 use rayon::prelude::*;
 use splat_core::TransferFunction;

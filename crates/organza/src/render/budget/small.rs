@@ -1,5 +1,6 @@
 //! Small pictures of a part of the splats: what trials and probes draw.
 
+use super::super::draw::draw;
 use super::rung::Rung;
 use crate::cost::Prediction;
 use crate::frame::Frame;
@@ -7,7 +8,7 @@ use crate::load::Loaded;
 use crate::prepare::plan_alone;
 use crate::scene::Scene;
 use crate::technique::Session;
-use crate::{CostRecord, Error, Layers, Progress, RenderOptions, draw};
+use crate::{CostRecord, Error, Layers, Progress, RenderOptions};
 use std::time::Instant;
 
 /// A scene that was loaded with all its splats, and what may be taken to draw it.
@@ -55,7 +56,7 @@ impl Drawing<'_> {
             predicted: Prediction::default(),
             announces: false,
         };
-        let layers = draw::draw(&frame, &mut session, &mut cost)?;
+        let layers = draw(&frame, &mut session, &mut cost)?;
         if session.sets.is_some_and(|sets| sets.interrupted) {
             return Err(Error::Cancelled);
         }

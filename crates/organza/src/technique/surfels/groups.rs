@@ -20,7 +20,7 @@ fn recipe(groups: &SurfelGroups, frame: &Frame<'_>, object: &SceneObject) -> Rec
         Grouping::Auto if object.deforms => Method::Hash(grouping::Collisions::Resolve),
         Grouping::Auto | Grouping::Weighted => Method::Weighted,
         Grouping::Minimum { factor } => Method::Minimum { factor: factor as f32 },
-        Grouping::Hash(of) => Method::Hash(collisions(of)),
+        Grouping::Hash(kind) => Method::Hash(collisions(kind)),
     };
     let settings = &frame.settings.surfels;
     let disc_scale = settings.disc_scale as f32;

@@ -127,17 +127,17 @@ const LEFT_OUT: Kind = kind(HIDDEN, "hidden cell", Points::Any, Shape::Hidden);
 
 impl Kind {
     /// The kind of a number, `None` for one that is not read.
-    pub(super) fn of(number: u8) -> Option<&'static Self> {
+    pub(super) fn numbered(number: u8) -> Option<&'static Self> {
         if number == HIDDEN { Some(&LEFT_OUT) } else { KINDS.iter().find(|kind| kind.number == number) }
     }
 
     /// The same of a cell of so many points: a Lagrange cell of second order is a quadratic one where its points stand alike.
     pub(super) fn of_cell(number: u8, points: usize) -> Option<&'static Self> {
         match (number, points) {
-            (69, 6) => Self::of(22),
-            (70, 9) => Self::of(28),
-            (71, 10) => Self::of(24),
-            _ => Self::of(number),
+            (69, 6) => Self::numbered(22),
+            (70, 9) => Self::numbered(28),
+            (71, 10) => Self::numbered(24),
+            _ => Self::numbered(number),
         }
     }
 

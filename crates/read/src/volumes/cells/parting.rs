@@ -154,7 +154,7 @@ impl Parting {
         }
         let is_gap = tetrahedron.iter().any(|corner| corner.value.is_nan());
         let corners = tetrahedron.map(|corner| if is_gap { Knot { value: 0.0, ..corner } } else { corner });
-        let Some(field) = Linear::of(&corners) else { return };
+        let Some(field) = Linear::through(&corners) else { return };
         for face in FACES {
             let [a, b, c] = face.map(|rank| corners[rank]);
             let polygon = if field.is_turned { Polygon::triangle(a, c, b) } else { Polygon::triangle(a, b, c) };
@@ -197,7 +197,7 @@ struct Linear {
 
 impl Linear {
     /// `None` for corners without a volume.
-    fn of(corners: &Tetrahedron) -> Option<Self> {
+    fn through(corners: &Tetrahedron) -> Option<Self> {
         let size = volume(corners);
         let [a, b, c, d] = corners.map(|corner| corner.place);
         let inverse = DMat3::from_cols(b - a, c - a, d - a).inverse();

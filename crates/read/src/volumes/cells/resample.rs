@@ -199,7 +199,7 @@ pub(super) fn grid(
     field: &Field,
     reading: &mut Reading<'_>,
 ) -> Result<Grid, ReadError> {
-    let bounds = Bounds::of(points, bodies).ok_or_else(|| {
+    let bounds = Bounds::around(points, bodies).ok_or_else(|| {
         let found = "cells that are flat, or too small or too large for their volume to be a number";
         ReadError::input(
             place,
@@ -288,7 +288,7 @@ struct Bounds {
 
 impl Bounds {
     /// `None` without a volume, or for one that is no number.
-    fn of(points: &[DVec3], bodies: &[Body<'_>]) -> Option<Self> {
+    fn around(points: &[DVec3], bodies: &[Body<'_>]) -> Option<Self> {
         let place = |corner: u32| Knot { place: points[corner as usize], value: 0.0 };
         let mut low = DVec3::INFINITY;
         let mut high = DVec3::NEG_INFINITY;

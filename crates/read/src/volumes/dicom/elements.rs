@@ -66,7 +66,7 @@ pub(crate) fn is_dicom(head: &[u8]) -> bool {
 }
 
 impl<'c> Elements<'c> {
-    pub(super) fn of(content: &'c [u8]) -> Result<Self, ReadError> {
+    pub(super) fn parse(content: &'c [u8]) -> Result<Self, ReadError> {
         let mut elements = Self { content, found: Vec::new(), packing: Packing::None, has_types: true };
         let mut at = START;
         let mut is_in_data = false;

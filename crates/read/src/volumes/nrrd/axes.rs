@@ -62,7 +62,7 @@ pub(super) enum Meaning {
 }
 
 /// The axes that these fields tell of; `end` is where the header ends.
-pub(super) fn of(fields: &Fields<'_>, end: Place) -> Result<Axes, ReadError> {
+pub(super) fn read(fields: &Fields<'_>, end: Place) -> Result<Axes, ReadError> {
     let (dimension, at) = fields.required("dimension", end)?;
     let rank = match dimension {
         "3" => 3,

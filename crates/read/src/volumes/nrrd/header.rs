@@ -88,7 +88,7 @@ pub(super) fn parse(content: &[u8]) -> Result<Header, ReadError> {
     let end = lines.offset();
     let last = lines.end();
     let lines = lines.number();
-    let axes = axes::of(&fields, last)?;
+    let axes = axes::read(&fields, last)?;
     let (name, at) = fields.required("type", last)?;
     let kind = kind_named(name).ok_or_else(|| {
         let expected = "a type of real scalars: 8- to 64-bit integers, float or double";

@@ -125,7 +125,7 @@ pub(super) struct Description {
 }
 
 impl Description {
-    pub(super) fn of(pages: &mut Pages, page: &Page) -> Result<Self, ReadError> {
+    pub(super) fn read(pages: &mut Pages, page: &Page) -> Result<Self, ReadError> {
         let text = pages.text(page.rank, Tag::ImageDescription)?.unwrap_or_default();
         let trimmed = text.trim_start_matches('\u{feff}').trim_start();
         if trimmed.starts_with('<') && trimmed.contains("<OME") {

@@ -82,7 +82,11 @@ struct Source<'a> {
 
 impl<'a> Encoding<'a> {
     /// What the root element says.
-    pub(super) fn of(root: Node<'_, '_>, content: &'a [u8], appended: Option<Appended>) -> Result<Self, ReadError> {
+    pub(super) fn stated_by(
+        root: Node<'_, '_>,
+        content: &'a [u8],
+        appended: Option<Appended>,
+    ) -> Result<Self, ReadError> {
         let attribute = |name: &str| root.attribute(name);
         let big_endian = match attribute("byte_order") {
             Some("LittleEndian") => false,
@@ -129,7 +133,7 @@ impl<'a> Encoding<'a> {
         match self.content_of(array, stored.bytes(), params)? {
             Content::Text(words) => voxels::whole_text(words, stored, params, HINT),
             Content::Bytes(bytes) => {
-                let values = voxels::read(&mut Stream::of(&bytes, params), stored, params, HINT);
+                let values = voxels::read(&mut Stream::in_memory(&bytes, params), stored, params, HINT);
                 values.map_err(|e| ReadError { place: place(array), ..e })
             }
         }

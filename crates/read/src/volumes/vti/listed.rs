@@ -327,7 +327,7 @@ impl Members<'_> {
         }
         let mut encodings = Vec::new();
         for (member, (document, (appended, _))) in self.files.iter().zip(documents.iter().zip(&texts)) {
-            let encoding = Encoding::of(document.root_element(), &member.content, appended.clone());
+            let encoding = Encoding::stated_by(document.root_element(), &member.content, appended.clone());
             encodings.push(encoding.map_err(|e| in_file(Some(&member.name), e))?);
         }
         let mut sources = Vec::new();

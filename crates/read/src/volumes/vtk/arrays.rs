@@ -16,7 +16,7 @@ const MAX_ARRAYS: usize = 4096;
 
 /// What an array belongs to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Of {
+pub(super) enum Owner {
     Points,
     Cells,
     /// Nothing in particular.
@@ -27,7 +27,7 @@ pub(super) enum Of {
 #[derive(Debug, Clone)]
 pub(super) struct Array {
     pub(super) name: String,
-    pub(super) of: Of,
+    pub(super) owner: Owner,
     /// Numbers of one point or cell, and how many there are of those.
     pub(super) numbers: u64,
     pub(super) tuples: u64,
@@ -113,14 +113,14 @@ impl Array {
 pub(super) struct Arrays<'a> {
     content: &'a [u8],
     is_binary: bool,
-    of: Of,
+    owner: Owner,
     tuples: u64,
     found: Vec<Array>,
 }
 
 impl<'a> Arrays<'a> {
     pub(super) fn new(content: &'a [u8], is_binary: bool) -> Self {
-        Self { content, is_binary, of: Of::File, tuples: 0, found: Vec::new() }
+        Self { content, is_binary, owner: Owner::File, tuples: 0, found: Vec::new() }
     }
 
     /// Those of points, cells and the file.
@@ -135,12 +135,12 @@ impl<'a> Arrays<'a> {
 
     /// Normals of the points.
     pub(super) fn normals(&self) -> Option<&Array> {
-        self.found.iter().find(|array| array.of == Of::Points && array.role == Role::Normals)
+        self.found.iter().find(|array| array.owner == Owner::Points && array.role == Role::Normals)
     }
 
     /// Colours of the points.
     pub(super) fn colors(&self) -> Option<&Array> {
-        let colors = || self.found.iter().filter(|array| array.of == Of::Points && array.is_of_colors());
+        let colors = || self.found.iter().filter(|array| array.owner == Owner::Points && array.is_of_colors());
         colors().find(|array| array.role == Role::Colors).or_else(|| colors().next())
     }
 
@@ -153,15 +153,15 @@ impl<'a> Arrays<'a> {
         let is_field = |array: &&Array| {
             matches!(array.role, Role::Scalars | Role::Colors | Role::Vectors | Role::Field) && array.name != GHOSTS
         };
-        let of = |of: Of| self.found.iter().filter(move |array| array.of == of).filter(is_field);
-        let all: Vec<&Array> = of(Of::Points).chain(of(Of::Cells)).collect();
-        let first = all.iter().find(|array| array.role != Role::Vectors).map(|array| array.of);
+        let owned_by = |owner: Owner| self.found.iter().filter(move |array| array.owner == owner).filter(is_field);
+        let all: Vec<&Array> = owned_by(Owner::Points).chain(owned_by(Owner::Cells)).collect();
+        let first = all.iter().find(|array| array.role != Role::Vectors).map(|array| array.owner);
         let candidate = |array: &&Array| Candidate {
             name: array.name.clone(),
             numbers: array.numbers,
             kind: Some(array.kind),
-            is_named: Some(array.of) == first && matches!(array.role, Role::Scalars | Role::Colors),
-            is_of_cells: array.of == Of::Cells,
+            is_named: Some(array.owner) == first && matches!(array.role, Role::Scalars | Role::Colors),
+            is_of_cells: array.owner == Owner::Cells,
         };
         let candidates: Vec<Candidate> = all.iter().map(candidate).collect();
         let place = all.first().map_or(Place::File, |array| array.place);
@@ -175,7 +175,7 @@ impl<'a> Arrays<'a> {
         let keyword = words.first().map(|w| w.text.to_ascii_uppercase()).unwrap_or_default();
         let (role, numbers) = match keyword.as_slice() {
             b"POINT_DATA" | b"CELL_DATA" => {
-                self.of = if keyword == b"POINT_DATA" { Of::Points } else { Of::Cells };
+                self.owner = if keyword == b"POINT_DATA" { Owner::Points } else { Owner::Cells };
                 self.tuples = whole(1)?;
                 return Ok(());
             }
@@ -291,11 +291,11 @@ impl<'a> Arrays<'a> {
         }
         lines.go_to(end, last);
         let name = words.get(1).map(|w| escaped(w.text, 40)).unwrap_or_default();
-        let of = self.of;
+        let owner = self.owner;
         let place = line.place();
         self.found.push(Array {
             name,
-            of,
+            owner,
             numbers,
             tuples,
             kind,

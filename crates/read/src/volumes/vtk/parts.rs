@@ -1,7 +1,7 @@
 //! Cells and polygons of legacy VTK files: `POINTS` with `CELLS` and `CELL_TYPES`, or with `VERTICES`, `LINES`, `POLYGONS` and
 //! `TRIANGLE_STRIPS`; cells as up to version 4, with counts between their points, and as from version 5, by their ends.
 
-use super::arrays::{Array, Arrays, Of, Part, kind, whole};
+use super::arrays::{Array, Arrays, Owner, Part, kind, whole};
 use super::{Dataset, HINT, next, wrong};
 use crate::Loaded;
 use crate::error::{Place, ReadError};
@@ -206,12 +206,12 @@ impl Source<'_> {
         reading: &mut Reading<'_>,
     ) -> Result<Vec<MeshColumn>, ReadError> {
         let mut named = NamedArrays::new(reading.params);
-        for element in [Of::Points, Of::Cells] {
+        for element in [Owner::Points, Owner::Cells] {
             let (association, count) = match element {
-                Of::Points => (Association::Vertex, cells.points.len()),
-                Of::Cells | Of::File => (Association::Triangle, cells.kinds.len()),
+                Owner::Points => (Association::Vertex, cells.points.len()),
+                Owner::Cells | Owner::File => (Association::Triangle, cells.kinds.len()),
             };
-            let arrays = self.arrays.all().filter(|array| array.of == element && array.tuples == count as u64);
+            let arrays = self.arrays.all().filter(|array| array.owner == element && array.tuples == count as u64);
             for array in arrays.filter(|array| !used.contains(&array.place)).collect::<Vec<_>>() {
                 let surface = SurfaceArray { name: &array.name, association, numbers: array.numbers };
                 if !surface.is_offered() {
@@ -245,7 +245,7 @@ impl Source<'_> {
         cells: &Cells,
         reading: &mut Reading<'_>,
     ) -> Result<Field, ReadError> {
-        let of_points = array.of == Of::Points;
+        let of_points = array.owner == Owner::Points;
         let (count, what) = if of_points { (cells.points.len(), "points") } else { (cells.kinds.len(), "cells") };
         cells::check_count(array.tuples, count, what, array.place)?;
         let mut numbers = self.numbers(array, reading)?;

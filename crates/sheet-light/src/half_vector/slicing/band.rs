@@ -6,7 +6,7 @@
 
 use super::frame::{Frame, Ray};
 use crate::Volume;
-use crate::shared::lattice_rays::{LatticeRays, ViewRay};
+use crate::shared::lattice::rays::{LatticeRays, ViewRay};
 use crate::shared::pixel::Pixel;
 use crate::shared::reason::LEAST_COSINE;
 use splat_core::Camera;

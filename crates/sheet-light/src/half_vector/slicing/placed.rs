@@ -3,8 +3,8 @@
 use super::frame::Frame;
 use crate::shared::classifier::{Base, Classifier};
 use crate::shared::lattice::Lattice;
-use crate::shared::near::Near;
-use crate::shared::neighbours::Receivers;
+use crate::shared::lattice::near::Near;
+use crate::shared::lattice::neighbours::Receivers;
 use crate::shared::sections::{PHASES, SectionTable};
 use crate::shared::value_range::ValueRange;
 use crate::shared::voxels::{Voxels, without_extinction};

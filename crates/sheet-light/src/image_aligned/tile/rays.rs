@@ -2,7 +2,7 @@
 
 use super::size::{AREA, SIDE, TILE};
 use crate::image_aligned::slant::Slant;
-use crate::shared::lattice_rays::{LatticeRays, ViewRay};
+use crate::shared::lattice::rays::{LatticeRays, ViewRay};
 use crate::shared::pixel::Pixel;
 use crate::shared::slabs::Slabs;
 use splat_core::Camera;

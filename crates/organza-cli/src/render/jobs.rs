@@ -1,16 +1,15 @@
 //! The pictures that `organza render` is asked for, checked before the first is drawn. Of a frame nothing is kept but what
 //! others need of it: an animation may have a million.
 
-use super::args::Backend;
-use super::args::{Frames, RenderArguments};
 use super::film;
-use super::given::{Given, given};
-use super::session::{
+use crate::args::{Backend, Frames, RenderArguments};
+use crate::given::{Given, given};
+use crate::session::{
     Flag, goal_keys, goal_overrides, goal_remarks, overrides, parse_changed, parse_scene, render_options, unused_goal,
 };
 use organza::output::{self, Format, Target, Targets};
 use organza::scene::{FoundCamera, Goal, Scene};
-use organza::{Error, Files, Progress, Render, RenderOptions, Sequence, WithinGoal, printable};
+use organza::{Context, Error, Files, Progress, Render, RenderOptions, Sequence, WithinGoal, printable};
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
@@ -181,7 +180,8 @@ impl<'a> Jobs<'a> {
         };
         let Some(sequence) = sequence else { return Ok((Cow::Owned(scene), None)) };
         let options = render_options(&self.arguments.scene);
-        let (fitted, found) = organza::fitted(&scene, &options, &Progress::new(), sequence.files())?;
+        let context = Context { files: sequence.files(), options: &options, progress: &Progress::new() };
+        let (fitted, found) = organza::fitted(&scene, context)?;
         Ok((Cow::Owned(fitted.into_owned()), found))
     }
 

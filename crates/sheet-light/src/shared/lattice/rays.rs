@@ -4,7 +4,7 @@
 //! pairs of planes in lattice coordinates. Lengths of neighbouring slabs add up to that of the whole, so a constant volume has
 //! e^−τ at any slab width and through any lens.
 
-use super::volume::Volume;
+use crate::shared::volume::Volume;
 use splat_core::glam::{DMat3, DVec3};
 use splat_core::{Camera, Clip, Similarity};
 

@@ -1,6 +1,6 @@
 //! Frames as one film, by the program ffmpeg: pixels go to it as they are drawn, and the file appears whole or not at all.
 
-use super::console;
+use crate::console;
 use organza::output::Target;
 use organza::{Error, printable};
 use std::io::Write;
@@ -232,7 +232,7 @@ fn at_work() -> MutexGuard<'static, Vec<(u32, PathBuf)>> {
 }
 
 /// Ends the programs that are at work and removes what they have written: for a process that ends at once.
-pub(super) fn abandon() {
+pub(crate) fn abandon() {
     let mut at_work = at_work();
     for (id, folder) in at_work.drain(..) {
         #[cfg(unix)]

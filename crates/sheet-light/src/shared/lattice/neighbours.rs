@@ -1,8 +1,8 @@
 //! The needed voxels around places, and how much each of them counts: trilinear in the lattice.
 
-use super::vectors::NATURAL;
-use super::voxels::{VoxelPair, Voxels};
 use crate::Volume;
+use crate::shared::vectors::NATURAL;
+use crate::shared::voxels::{VoxelPair, Voxels};
 use splat_core::Packing;
 use splat_core::raster::lanes::{Lanes, MAX_LANES};
 use splat_core::raster::pulp::Simd;

@@ -6,7 +6,7 @@ use crate::frame::Frame;
 use crate::load::Loaded;
 use crate::plan::Plan;
 use crate::predict::prediction;
-use crate::ranges::ranges;
+use crate::prepare::ranges::ranges;
 use crate::scene::Scene;
 use crate::technique::{Finished, Fold, Session};
 use crate::{CostRecord, Error, Layers, Progress, RenderOptions};
@@ -97,6 +97,7 @@ mod tests {
     use super::*;
     use crate::prepare::{load, plan_loaded};
     use crate::scene::{LoadOptions, parse};
+    use crate::{Context, Files};
     use splat_core::LayerData;
 
     /// Fog, a pane and a wall behind them, in every layer.
@@ -133,7 +134,8 @@ mod tests {
         let scene = parse("seam.toml".as_ref(), SCENE, &options).unwrap();
         let options = RenderOptions::default();
         let progress = Progress::new();
-        let loaded = load(&scene, &options, &progress, &crate::Files::default()).unwrap();
+        let context = Context { files: &Files::default(), options: &options, progress: &progress };
+        let loaded = load(&scene, context).unwrap();
         let plan = plan_loaded(&scene, &loaded, &options).unwrap();
         let frame = Frame::new(&scene, &loaded, &plan, &progress);
         let unit = libm::exp2(f64::from(-loaded.exponent)) as f32;
