@@ -10,6 +10,7 @@ pub(crate) mod matter;
 mod on_device;
 mod splats;
 
+use coarse::Shown;
 pub(crate) use engines::OpaqueEngines;
 pub(crate) use extent::Extent;
 pub(crate) use light::Maps;
@@ -58,8 +59,8 @@ pub struct Frame<'a> {
     light_points: OnceCell<Vec<LightPoint>>,
     maps: OnceCell<Maps>,
     shaded: OnceCell<Shaded>,
-    /// What thick media leave of some splats, from which light that is too coarse is told.
-    shown_shares: OnceCell<Vec<f32>>,
+    /// Splats that thick media leave something of, from which light that is too coarse is told.
+    shown: OnceCell<Vec<Shown>>,
     /// Opaque splats alone, from when they were shaded until they are asked for.
     solid: Cell<Option<OpaqueImage>>,
     opaque: OnceCell<OpaqueImage>,
@@ -120,7 +121,7 @@ impl<'a> Frame<'a> {
             light_points: OnceCell::new(),
             maps: OnceCell::new(),
             shaded: OnceCell::new(),
-            shown_shares: OnceCell::new(),
+            shown: OnceCell::new(),
             solid: Cell::default(),
             opaque: OnceCell::new(),
             is_one_picture: true,

@@ -36,6 +36,8 @@ pub(crate) struct Coarse {
     pub(crate) share: f64,
     /// Cells along the longer side of the table of the light that is off most.
     pub(crate) cells: u32,
+    /// Cells along that side by which few splats would be off.
+    pub(crate) better_cells: f64,
     /// How that light is called.
     pub(crate) light: String,
 }

@@ -19,9 +19,8 @@ use splat_core::raster::objects_in_view;
 use splat_core::shade::joint::MediumSpacing;
 use splat_core::{DAabb, Object, Projection, SplatKind};
 
-/// Share of splats in view that may be lit through cells that are too coarse for them, before that is told; and what cells are proposed for.
+/// Share of splats in view that may be lit through cells that are too coarse for them, before that is told.
 const MANY: f64 = 0.1;
-const FEW: f64 = 0.05;
 /// Most cells of a side that a scene may ask for.
 const MOST_CELLS: f64 = 16384.0;
 /// Entries of a shadow map that take some seconds to build, and how many times those of the automatic resolution are told.
@@ -282,9 +281,8 @@ pub(crate) fn of_scattering(plan: &Plan) -> Option<String> {
 
 /// Shadow maps whose cells are seen in the picture.
 pub(crate) fn of_cells(coarse: Coarse) -> Option<String> {
-    let Coarse { share, cells, light } = coarse;
-    // Edges of shadows are as wide as a cell, so the share goes with its width.
-    let better = libm::ceil(f64::from(cells) * share / FEW / 64.0) * 64.0;
+    let Coarse { share, cells, better_cells, light } = coarse;
+    let better = libm::ceil(better_cells / 64.0) * 64.0;
     (share > MANY).then(|| {
         let percent = libm::round(100.0 * share);
         let advice = if better <= MOST_CELLS {

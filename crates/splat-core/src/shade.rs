@@ -209,6 +209,14 @@ pub fn shade_splat(input: &ShadeInput<'_>, i: usize) -> (Radiance, Vec3) {
     Shaded { input, within: None }.splat(i)
 }
 
+/// [`shade_splat`], where media whose spacing is optically thick are lit within, by [`joint`].
+///
+/// # Panics
+/// If there is no such splat, or its material, object or footprint is out of range.
+pub fn shade_splat_within(within: &Within<'_>, i: usize) -> (Radiance, Vec3) {
+    Shaded { input: within.input, within: Some(*within) }.splat(i)
+}
+
 impl Shaded<'_> {
     /// Radiance of splat `i` towards the viewer, and the unit normal that it was shaded by.
     fn splat(&self, i: usize) -> (Radiance, Vec3) {

@@ -45,6 +45,7 @@ pub use error::Error;
 pub use params::{MappingChoice, Params, Resolution};
 pub use planning::cost::{Counts, Limit, Prediction};
 pub use reading::query::SurfacePoint;
+pub use reading::wider::Wider;
 pub use scene::Scene;
 pub use shadow_map::ShadowMap;
 /// The nouns that this crate takes and returns.

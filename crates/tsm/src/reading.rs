@@ -3,3 +3,4 @@
 pub(crate) mod lookup;
 pub(crate) mod patch;
 pub(crate) mod query;
+pub(crate) mod wider;

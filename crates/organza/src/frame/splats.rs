@@ -61,7 +61,7 @@ impl Frame<'_> {
         let projected = self.project(projected, cost)?;
         let eye = self.eye_map(cost)?;
         if let Some(eye) = &eye {
-            self.shown_shares.get_or_init(|| self.shares_shown(eye));
+            self.shown.get_or_init(|| self.shown(eye));
         }
         // Surfaces that are drawn apart from splats would keep pixels open that splats behind them finish.
         let all_opaque_are_splats = !self.has_polygons() && self.solid_of(true).is_empty();

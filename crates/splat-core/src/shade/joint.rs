@@ -33,7 +33,7 @@ use glam::Vec3;
 /// Optical depth of a spacing up to which the light at a splat's middle is that of the splat: it is right within 3·10⁻⁴ there.
 pub const THIN: f32 = 1.0 / 16.0;
 /// Optical depth of a spacing from which on the joint integral counts alone. Between the two both are mixed, so nothing jumps.
-const THICK: f32 = 1.0 / 8.0;
+pub const THICK: f32 = 1.0 / 8.0;
 /// Least cosine of light and lit face: beyond, a slab gets next to no light.
 const LEAST_COSINE: f32 = 0.2;
 /// Depth before a cell, in cells, up to which it is blur of the map: .28 at the face of a slab at 60°, see the tests.

@@ -2,7 +2,7 @@
 
 use crate::building::caster::Casters;
 use crate::building::darkness::Darkness;
-use crate::building::deposit::{Deposit, Ends, Scratch};
+use crate::building::deposit::{Deposit, Ends, Scratch, WIDE};
 use crate::building::media::Target;
 use crate::mapping::{Mapping, with_mapping};
 use crate::planning::lit::{ROUND_COUNT, Rounds};
@@ -189,7 +189,7 @@ impl<M: Mapping> Filling<'_, M> {
         progress.tick(splats.clone().count() as u64)?;
         scratch.media.clear();
         scratch.surfaces.clear();
-        let deposit = Deposit { mapping, ends, scratch };
+        let deposit = Deposit { mapping, ends, wide: plan.lit.wide, scratch };
         pulp::Arch::new().dispatch(FillChunk { casters, plan, deposit, splats });
         let more = (scratch.media.len + scratch.surfaces.len) as u64;
         check_entries::<C>(self.made.fetch_add(more, Ordering::Relaxed) + more, &casters.params.limits)?;
@@ -254,12 +254,12 @@ impl<M: Mapping, I: Iterator<Item = usize> + Clone, const C: usize> pulp::Nullar
         if casters.has_opaque_discs() {
             let frame = &self.plan.frame;
             let mapping = self.deposit.mapping;
-            let ends = self.deposit.ends;
+            let Deposit { ends, wide, .. } = self.deposit;
             select(casters, self.splats.clone(), SplatKind::Medium, medium_ids);
             select(casters, self.splats.clone(), SplatKind::Surface, surface_ids);
-            let mut target = Target { mapping, ends: ends.media, entries: media };
+            let mut target = Target { mapping, ends: ends.media, wide, entries: media };
             target.add_media(casters, frame, medium_ids, media_batches, &mut others);
-            let mut target = Target { mapping, ends: ends.surfaces, entries: surfaces };
+            let mut target = Target { mapping, ends: ends.surfaces, wide: WIDE, entries: surfaces };
             target.add_surfaces(casters, frame, surface_ids, surface_batches, &mut others);
         } else {
             others.extend(self.splats.filter(|&i| casters.casts(i)).map(|i| i as u32));

@@ -7,9 +7,9 @@
 /// Splats that are looked at together: so many that compilers keep loops of them loops.
 pub(crate) const LANES: usize = 64;
 /// Most cells along a side of what goes side by side.
-pub(crate) const MOST: i32 = 8;
+pub(crate) const MOST: i32 = 11;
 /// Queues for up to so many cells a side.
-const SIDES: [i32; 3] = [2, 4, MOST];
+const SIDES: [i32; 4] = [2, 4, 8, MOST];
 
 /// One number of each splat.
 pub(crate) type Lane<T = f32> = [T; LANES];

@@ -8,7 +8,7 @@
 //! way it takes.
 
 use crate::building::caster::Casters;
-use crate::building::deposit::is_plain;
+use crate::building::deposit::{Band, is_plain};
 use crate::building::entries::{Cells, Entries};
 use crate::building::lanes::{Columns, LANES, Lane, MOST, Queue, Queues, batches};
 use crate::building::overlap::{Ellipse, Spread, Widths};
@@ -131,6 +131,7 @@ impl MediaBatches {
     pub(crate) fn part<M: Mapping>(
         &mut self,
         mapping: &M,
+        wide: Band,
         casters: &Casters<'_>,
         frame: &Frame,
         ids: &[u32],
@@ -139,7 +140,7 @@ impl MediaBatches {
     ) {
         for batch in batches(ids) {
             load(&mut self.splats, casters, batch, frame);
-            fill(&mut self.footprints, mapping, &self.splats);
+            fill(&mut self.footprints, mapping, wide, &self.splats);
             self.footprints.part(batch, plain, others);
         }
     }
@@ -150,6 +151,8 @@ pub(crate) struct Target<'a, M: Mapping, const C: usize> {
     pub(crate) mapping: &'a M,
     /// Distance behind which each cell takes no entries; empty where there is no end.
     pub(crate) ends: &'a [f32],
+    /// Where rays begin to sample footprints of media.
+    pub(crate) wide: Band,
     pub(crate) entries: &'a mut Entries<C>,
 }
 
@@ -167,7 +170,7 @@ impl<M: Mapping, const C: usize> Target<'_, M, C> {
         let MediaBatches { splats, footprints, queues } = work;
         for batch in batches(ids) {
             load(splats, casters, batch, frame);
-            fill(footprints, self.mapping, splats);
+            fill(footprints, self.mapping, self.wide, splats);
             self.leave_out_dark(footprints, batch.len());
             for (l, &id) in batch.iter().enumerate() {
                 footprints.set(RGB, l, casters.extinction(id as usize).rgb);
@@ -309,7 +312,7 @@ fn load(splats: &mut Columns<SPLAT>, casters: &Casters<'_>, ids: &[u32], frame: 
 
 /// Footprints of media on the table.
 #[inline(always)]
-fn fill<M: Mapping>(footprints: &mut Columns<FOOTPRINT>, mapping: &M, splats: &Columns<SPLAT>) {
+fn fill<M: Mapping>(footprints: &mut Columns<FOOTPRINT>, mapping: &M, wide: Band, splats: &Columns<SPLAT>) {
     let parallel = mapping.is_parallel();
     let [x, y, z] = [0, 1, 2].map(|k| &splats.column[POSITION + k]);
     let [radius, cross_section, deviation] = [RADIUS, CROSS_SECTION, DEVIATION].map(|f| &splats.column[f]);
@@ -318,7 +321,7 @@ fn fill<M: Mapping>(footprints: &mut Columns<FOOTPRINT>, mapping: &M, splats: &C
         let distance = view.place.distance;
         let spread = Spread::of_ball(radius[l], view.gradients);
         let angle = if parallel { 0.0 } else { radius[l] / distance };
-        let (shape, side) = plain_footprint(mapping, &view, spread, angle, deviation[l]);
+        let (shape, side) = plain_footprint(mapping, wide, &view, spread, angle, deviation[l]);
         footprints.set(AT, l, shape);
         footprints.set(TOTAL, l, [cross_section[l] / if parallel { 1.0 } else { distance * distance }, distance]);
         footprints.side[l] = side;
@@ -329,6 +332,7 @@ fn fill<M: Mapping>(footprints: &mut Columns<FOOTPRINT>, mapping: &M, splats: &C
 #[inline(always)]
 pub(crate) fn plain_footprint<M: Mapping>(
     mapping: &M,
+    wide: Band,
     view: &View,
     spread: Spread,
     angle: f32,
@@ -341,7 +345,7 @@ pub(crate) fn plain_footprint<M: Mapping>(
     let low = at - reach;
     let high = at + reach;
     let is_inside = (low.x >= 1.0) & (low.y >= 1.0) & (high.x <= columns - 1.0) & (high.y <= rows - 1.0);
-    let is_plain = view.is_seen & is_inside & is_plain(mapping, at, spread, angle);
+    let is_plain = view.is_seen & is_inside & is_plain(mapping, wide, at, spread, angle);
     // Numbers of any size, which the others may have, count no cells.
     let (at, half) = if is_plain { (at, half) } else { (Vec2::ZERO, [1.0; 2]) };
     let [across, along] = [Axis::new(at.x, half[0]), Axis::new(at.y, half[1])];

@@ -6,7 +6,7 @@
 
 use crate::building::caster::{Caster, Casters};
 use crate::building::discs::Discs;
-use crate::building::lanes::{Columns, LANES, Lane, MOST, Queue, Queues, batches};
+use crate::building::lanes::{Columns, LANES, Lane, Queue, Queues, batches};
 use crate::building::overlap::Spread;
 use crate::building::sampling::{NEAR, disc_coordinate};
 use crate::frame::Frame;
@@ -14,6 +14,9 @@ use crate::mapping::{Mapping, Ray, floor};
 use glam::{Vec2, Vec3};
 use splat_core::glam;
 use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
+
+/// Most cells along a side of a disc that goes side by side with others.
+const MOST: f32 = 8.0;
 
 /// Columns of a disc on the table: position, normal, semi-axes, first cell, number of cells.
 const POSITION: usize = 0;
@@ -192,7 +195,7 @@ fn fill<M: Mapping>(windows: &mut Columns<COUNT>, mapping: &M, discs: &Discs) {
         let distance = view.place.distance;
         let is_far = parallel | (radius <= NEAR * distance);
         let reach = reach_of(mapping, Spread::of_disc(axes, view.gradients), radius / distance);
-        let is_small = (reach.x < 0.5 * MOST as f32) & (reach.y < 0.5 * MOST as f32);
+        let is_small = (reach.x < 0.5 * MOST) & (reach.y < 0.5 * MOST);
         let [u, v] = [cells_within(at.x, reach.x), cells_within(at.y, reach.y)];
         let is_inside = (u[0] >= 0) & (v[0] >= 0) & (u[1] < columns) & (v[1] < rows);
         let [nu, nv] = [u, v].map(|[first, last]| last.wrapping_sub(first).wrapping_add(1).max(0));

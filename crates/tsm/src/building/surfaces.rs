@@ -2,7 +2,7 @@
 //! plane.
 
 use crate::building::caster::Casters;
-use crate::building::deposit::{angle_gain, distance_on_plane};
+use crate::building::deposit::{WIDE, angle_gain, distance_on_plane};
 use crate::building::discs::Discs;
 use crate::building::entries::Cells;
 use crate::building::lanes::{Columns, LANES, Lane, Queue, Queues, batches};
@@ -98,7 +98,7 @@ fn fill<M: Mapping>(footprints: &mut Columns<SURFACE>, mapping: &M, discs: &Disc
         let distance = view.place.distance;
         let spread = Spread::of_disc(discs.axes(l), view.gradients);
         let angle = if parallel { 0.0 } else { discs.radius(l) / distance };
-        let (shape, side) = plain_footprint(mapping, &view, spread, angle, deviation[l]);
+        let (shape, side) = plain_footprint(mapping, WIDE, &view, spread, angle, deviation[l]);
         footprints.set(AT, l, shape);
         footprints.set(DISTANCE, l, [distance]);
         footprints.set(POSITION, l, position.to_array());

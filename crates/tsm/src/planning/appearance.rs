@@ -2,7 +2,7 @@
 //! angular sizes.
 
 use crate::building::caster::Casters;
-use crate::building::deposit::{BENT, WIDE};
+use crate::building::deposit::{BENT, Band, WIDE};
 use crate::building::lanes::{LANES, Lane};
 use crate::building::shares::{HALF_WIDTH, cells_along};
 use crate::frame::Frame;
@@ -189,9 +189,12 @@ impl Appearance {
         self.spacing.median().map(|size| size * self.unit)
     }
 
-    /// Entries that translucent casters make in a table of `cells` cells of side `cell` (angle, tangent or length).
-    pub(crate) fn entries(&self, cell: f64, cells: f64) -> f64 {
-        let made = |size| entries_of(size, cell / self.unit, self.apparent == Apparent::Length).min(cells);
+    /// Entries that translucent casters make in a table of `cells` cells of side `cell` (angle, tangent or length), where rays begin to sample
+    /// footprints of media at `wide`, and `media` is their share.
+    pub(crate) fn entries(&self, cell: f64, cells: f64, wide: Band, media: f64) -> f64 {
+        let parallel = self.apparent == Apparent::Length;
+        let by_band = |size, band| entries_of(size, cell / self.unit, band, parallel).min(cells);
+        let made = |size| media * by_band(size, wide) + (1.0 - media) * by_band(size, WIDE);
         self.radius.sizes_and_counts().map(|(size, count)| count * made(size)).sum()
     }
 
@@ -211,8 +214,8 @@ impl Appearance {
 
 /// Entries of a kernel of this apparent radius in cells of this side, by the ways that [`crate::building::deposit`] takes: in a band
 /// between two, both leave their entries.
-fn entries_of(radius: f64, cell: f64, parallel: bool) -> f64 {
-    let [wide, bent] = [WIDE, BENT].map(|band| band.map(f64::from));
+fn entries_of(radius: f64, cell: f64, wide: Band, parallel: bool) -> f64 {
+    let [wide, bent] = [wide, BENT].map(|band| band.map(f64::from));
     let across = radius / cell;
     let bend = if parallel { 0.0 } else { radius * across };
     let mut entries = 0.0;

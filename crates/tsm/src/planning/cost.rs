@@ -78,12 +78,14 @@ pub(crate) fn predict(
     octahedral: bool,
 ) -> Prediction {
     let cells = size[0] * size[1];
-    let entries = lit.share * look.entries(cell, cells);
+    let kinds = survey.kinds;
+    let [media, surfaces] = [SplatKind::Medium, SplatKind::Surface].map(|kind| kinds[kind as usize]);
+    let media_share = media as f64 / (media + surfaces).max(1) as f64;
+    let entries = lit.share * look.entries(cell, cells, lit.wide, media_share);
     let channels = if survey.coloured { 3.0 } else { 1.0 };
     // A distance and its sum.
     let knot = 4.0 + 4.0 * channels;
-    let kinds = survey.kinds;
-    let lists = u64::from(kinds[SplatKind::Medium as usize] > 0) + u64::from(kinds[SplatKind::Surface as usize] > 0);
+    let lists = u64::from(media > 0) + u64::from(surfaces > 0);
     let depth = 4.0 * u64::from(kinds[SplatKind::Opaque as usize] > 0) as f64;
     let directions = if octahedral { Octahedral::bytes(size[0] as u32) as f64 } else { 0.0 };
     let map = cells * (8.0 * lists as f64 + depth) + directions + entries * knot;

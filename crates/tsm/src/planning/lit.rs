@@ -6,20 +6,26 @@
 //! ([`crate::building::darkness`]).
 
 use crate::building::caster::Casters;
+use crate::building::deposit::{Band, WIDE, WIDE_WITHIN};
 use crate::frame::Frame;
 use crate::mapping::{Mapping, Table, with_mapping};
 use crate::planning::survey::{CHUNK, Survey};
 use rayon::prelude::*;
-use splat_core::SplatKind;
 use splat_core::optics::AbsorbanceModel;
+use splat_core::shade::joint::THICK;
+use splat_core::{Footprint, SplatKind};
 use std::ops::Range;
 
 /// Slabs of equal depth between the nearest and the farthest place that a caster may have.
 const SLABS: usize = 64;
 /// Cells along the longer side of the table that is looked at.
 pub(crate) const LOOK_CELLS: f64 = 32.0;
+/// Splats that are looked at for the thickness of media.
+const LOOKED_AT: usize = 4096;
 /// Media from which on the look may pay: fewer make a table in some milliseconds.
 const MANY: u64 = 65_536;
+/// The same of thick media, whose cells are finer.
+const FEW: u64 = 4096;
 /// Share of casters that seem to be lit above which the rest saves less than it costs.
 const WORTH: f64 = 0.75;
 /// Absorbance before a caster, over the visible limit, up to which it belongs to each round. The first is what seems to be lit, with room for cells
@@ -37,22 +43,54 @@ pub(crate) struct Lit {
     pub(crate) share: f64,
     /// Rounds in which casters are deposited; `None` where nearly all are lit.
     pub(crate) rounds: Option<Rounds>,
+    /// Whether light falls off within a spacing of most media, so that cells have to be fine.
+    pub(crate) is_steep: bool,
+    /// Where rays begin to sample footprints of media, whichever way the rounds are.
+    pub(crate) wide: Band,
 }
 
 impl Lit {
     /// All casters are lit.
-    const EVERYWHERE: Self = Self { share: 1.0, rounds: None };
+    const EVERYWHERE: Self = Self { share: 1.0, rounds: None, is_steep: false, wide: WIDE };
+    /// All are lit, and light falls off within a spacing.
+    const STEEP: Self = Self { is_steep: true, wide: WIDE_WITHIN, ..Self::EVERYWHERE };
 
     /// Looks at every medium among the casters through a coarse table.
     pub(crate) fn new(casters: &Casters<'_>, survey: &Survey, frame: &Frame, coarse: Table) -> Self {
         let media = survey.kinds[SplatKind::Medium as usize];
-        if media < MANY || casters.params.absorbance == AbsorbanceModel::Paper {
+        if media == 0 || casters.params.absorbance == AbsorbanceModel::Paper {
             return Self::EVERYWHERE;
+        }
+        let is_steep = is_thick(casters);
+        if media < if is_steep { FEW } else { MANY } {
+            return if is_steep { Self::STEEP } else { Self::EVERYWHERE };
         }
         let (rounds, dark) = Rounds::new(casters, survey, frame, coarse);
         let share = survey.casters.saturating_sub(dark).max(1) as f64 / survey.casters as f64;
-        if share < WORTH { Self { share, rounds: Some(rounds) } } else { Self::EVERYWHERE }
+        if share < WORTH {
+            Self { share, rounds: Some(rounds), is_steep: true, wide: WIDE_WITHIN }
+        } else if is_steep {
+            Self { share, ..Self::STEEP }
+        } else {
+            Self::EVERYWHERE
+        }
     }
+}
+
+/// Whether a spacing of most of the media that cast is optically thick, by a look at some at even distances in the list.
+fn is_thick(casters: &Casters<'_>) -> bool {
+    let cloud = casters.cloud;
+    let is_medium = |i: &usize| cloud.kind[*i] == SplatKind::Medium && cloud.gaussian_of(*i).is_none();
+    let looked_at = (0..cloud.len()).step_by(cloud.len().div_ceil(LOOKED_AT).max(1));
+    let mut media = 0;
+    let mut thick = 0;
+    for i in looked_at.filter(|i| is_medium(i) && casters.casts(*i)) {
+        let spacing = casters.kernel(i).deviation * cloud.radius[i] / Footprint::SIGMA_OVER_SPACING;
+        let most = casters.extinction(i).rgb.into_iter().fold(0.0, f32::max);
+        media += 1;
+        thick += u32::from(cloud.cross_section[i] * most > THICK * spacing * spacing);
+    }
+    2 * thick > media
 }
 
 /// The round of each caster, by its place.

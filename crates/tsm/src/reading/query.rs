@@ -171,7 +171,7 @@ impl ShadowMap {
     }
 
     /// The cell of a place, its distance from the light and the width of the cell there, both in the frame.
-    fn place_of(&self, place: Vec3) -> Option<(u32, f32, f32)> {
+    pub(crate) fn place_of(&self, place: Vec3) -> Option<(u32, f32, f32)> {
         let cell = self.cell_of(place)?;
         let p = self.frame.position(place);
         with_mapping!(&self.table, m => {
