@@ -6,6 +6,8 @@
 //! - `number name R G B A` (3D Slicer, FreeSurfer): from 0 to 255, A may be missing;
 //! - `number R G B A VIS MSH "name"` (ITK-SNAP): R, G and B from 0 to 255, A from 0 to 1; VIS and MSH are 0 where a label is hidden;
 //! - `number R G B name` (FSL): from 0 to 1.
+//!
+//! A table of one of the first two forms whose colours are all at most 1 has them from 0 to 1.
 
 use crate::error::{Place, ReadError};
 use crate::stream::input::{self, Stream};
@@ -43,6 +45,16 @@ pub struct LabelRows {
     pub rows: Vec<LabelRow>,
     /// How the table was understood where that is not plain, one sentence without a full stop each.
     pub remarks: Vec<String>,
+}
+
+/// A row as it is written.
+struct Written {
+    number: u32,
+    name: String,
+    /// R, G and B, and A, in the range of the form.
+    channels: [f64; 3],
+    alpha: f64,
+    is_hidden: bool,
 }
 
 /// The order of a row's columns.
@@ -91,13 +103,18 @@ fn whole(mut stream: Stream<'_>, params: &ReadParams) -> Result<LabelRows, ReadE
 
 /// The table of a text.
 fn table(content: &[u8], params: &ReadParams) -> Result<LabelRows, ReadError> {
+    let content = content.strip_prefix(b"\xef\xbb\xbf").unwrap_or(content);
+    if is_utf16(content) {
+        let hint = "save the table in UTF-8";
+        return Err(ReadError::input(Place::File, "a table of labels in UTF-8", "a text in UTF-16", hint));
+    }
     if content.contains(&0) {
         let hint = "tables of labels are text: .ctbl, .lut, .txt or .toml";
         return Err(ReadError::input(Place::File, "a table of labels", "a binary file", hint));
     }
     let mut lines = Lines::new(content);
     let mut columns = None;
-    let mut rows: BTreeMap<u32, LabelRow> = BTreeMap::new();
+    let mut rows: BTreeMap<u32, Written> = BTreeMap::new();
     let mut repeated = Vec::new();
     let mut held = input::Growing::new("the table of labels");
     while let Some(line) = lines.next()? {
@@ -107,16 +124,16 @@ fn table(content: &[u8], params: &ReadParams) -> Result<LabelRows, ReadError> {
             continue;
         }
         let columns = *columns.get_or_insert_with(|| Columns::of_row(&words));
-        let row = columns.row(line, &words)?;
+        let row = columns.row(line, &words).map_err(|error| of_separators(line).unwrap_or(error))?;
         held.hold((rows.len() as u64 + 1) * (BYTES_PER_ROW + LONGEST_NAME as u64), params)?;
         if let Some(before) = rows.insert(row.number, row) {
             repeated.push(before.number);
         }
     }
-    if rows.is_empty() {
+    let Some(columns) = columns else {
         let hint = "a row is `number name R G B A`, such as `3 liver 180 60 50 255`";
         return Err(ReadError::input(Place::File, "a row for each label", "none", hint));
-    }
+    };
     let mut remarks = Vec::new();
     if let Some(first) = repeated.first() {
         let rows = counted(repeated.len() as u64, "row");
@@ -124,13 +141,50 @@ fn table(content: &[u8], params: &ReadParams) -> Result<LabelRows, ReadError> {
             "label {first} stands more than once: of {rows} with a number that comes again the last counts"
         ));
     }
+    let [mut full, mut full_alpha] = columns.full();
+    let colors = || rows.values().flat_map(|row| row.channels);
+    // Bytes of a whole table that are all 0 or 1 would be black.
+    if full > 1.0 && colors().all(|channel| channel <= 1.0) && colors().any(|channel| channel > 0.0) {
+        full = 1.0;
+        let are_shares = rows.values().all(|row| row.alpha <= 1.0);
+        full_alpha = if are_shares { 1.0 } else { full_alpha };
+        let alphas =
+            if columns == (Columns::NameFirst { has_alpha: true }) && are_shares { ", and alphas too" } else { "" };
+        remarks.push(format!("no colour is above 1: colours are read from 0 to 1{alphas}, not from 0 to 255"));
+    }
     // FreeSurfer writes transparencies, 0 for all of its labels.
-    let are_all_clear = |rows: &BTreeMap<u32, LabelRow>| rows.values().all(|row| row.opacity == 0.0);
-    if matches!(columns, Some(Columns::NameFirst { has_alpha: true })) && are_all_clear(&rows) {
-        rows.values_mut().for_each(|row| row.opacity = 1.0);
+    if columns == (Columns::NameFirst { has_alpha: true }) && rows.values().all(|row| row.alpha == 0.0) {
+        rows.values_mut().for_each(|row| row.alpha = full_alpha);
         remarks.push("all alphas are 0, as in tables of FreeSurfer: its labels are opaque".to_owned());
     }
-    Ok(LabelRows { rows: rows.into_values().collect(), remarks })
+    let finished = |row: Written| LabelRow {
+        number: row.number,
+        name: row.name,
+        color: row.channels.map(|channel| linear_from_srgb(channel / full)),
+        opacity: if row.is_hidden { 0.0 } else { (row.alpha / full_alpha) as f32 },
+    };
+    Ok(LabelRows { rows: rows.into_values().map(finished).collect(), remarks })
+}
+
+/// Whether a text is UTF-16: it has its mark, or every other byte of its beginning is 0.
+fn is_utf16(content: &[u8]) -> bool {
+    /// Bytes that are looked at.
+    const BEGINNING: usize = 64;
+    let pairs = || content.chunks_exact(2).take(BEGINNING / 2);
+    let is_of = |zero: usize| pairs().count() >= 2 && pairs().all(|pair| pair[zero] == 0 && pair[1 - zero] != 0);
+    content.starts_with(b"\xff\xfe") || content.starts_with(b"\xfe\xff") || is_of(0) || is_of(1)
+}
+
+/// The error of a row whose columns lie between commas or semicolons.
+fn of_separators(line: Line<'_>) -> Option<ReadError> {
+    /// Fewer are those of a name.
+    const LEAST: usize = 3;
+    let count = |separator: u8| line.text.iter().filter(|byte| **byte == separator).count();
+    let (separator, named) =
+        [(b',', "commas"), (b';', "semicolons")].into_iter().find(|(byte, _)| count(*byte) >= LEAST)?;
+    let hint = "write blanks or tabulators in the place of commas and semicolons, and leave out a row of headings";
+    let found = format!("{named} ('{}')", char::from(separator));
+    Some(ReadError::input(line.place(), "columns between blanks, such as `3 liver 180 60 50 255`", found, hint))
 }
 
 impl Columns {
@@ -161,8 +215,17 @@ impl Columns {
         }
     }
 
+    /// The greatest number of a colour and of an alpha.
+    fn full(self) -> [f64; 2] {
+        match self {
+            Self::NameFirst { .. } => [255.0; 2],
+            Self::ItkSnap => [255.0, 1.0],
+            Self::Fsl => [1.0; 2],
+        }
+    }
+
     /// The label of a row.
-    fn row(self, line: Line<'_>, words: &[Word<'_>]) -> Result<LabelRow, ReadError> {
+    fn row(self, line: Line<'_>, words: &[Word<'_>]) -> Result<Written, ReadError> {
         let least = match self {
             Self::NameFirst { has_alpha } => 5 + usize::from(has_alpha),
             Self::ItkSnap => 8,
@@ -184,21 +247,36 @@ impl Columns {
             Self::ItkSnap => [1..4, 7..words.len()],
             Self::Fsl => [1..4, 4..words.len()],
         };
-        let full = if self == Self::Fsl { 1.0 } else { 255.0 };
+        let [full, full_alpha] = self.full();
         let mut channels = [0.0; 3];
         for (channel, word) in channels.iter_mut().zip(&words[color]) {
-            *channel = linear_from_srgb(within(*word, full)? / full);
+            *channel = self.within(*word, full)?;
         }
-        let opacity = match self {
-            Self::NameFirst { has_alpha: true } => within(words[words.len() - 1], 255.0)? / 255.0,
-            Self::ItkSnap if within(words[5], 1.0)? == 0.0 || within(words[6], 1.0)? == 0.0 => 0.0,
-            Self::ItkSnap => within(words[4], 1.0)?,
-            _ => 1.0,
+        let mut is_hidden = false;
+        let alpha = match self {
+            Self::NameFirst { has_alpha: true } => self.within(words[words.len() - 1], full_alpha)?,
+            Self::ItkSnap => {
+                is_hidden = self.within(words[5], 1.0)? == 0.0 || self.within(words[6], 1.0)? == 0.0;
+                self.within(words[4], full_alpha)?
+            }
+            _ => full_alpha,
         };
         let name: Vec<&[u8]> = words[name].iter().map(|word| word.text).collect();
         let name = name.join(&b' ');
         let unquoted = name.strip_prefix(b"\"").and_then(|name| name.strip_suffix(b"\"")).unwrap_or(&name);
-        Ok(LabelRow { number, name: escaped(unquoted, LONGEST_NAME), color: channels, opacity: opacity as f32 })
+        Ok(Written { number, name: escaped(unquoted, LONGEST_NAME), channels, alpha, is_hidden })
+    }
+
+    /// A number from 0 to another one.
+    fn within(self, word: Word<'_>, most: f64) -> Result<f64, ReadError> {
+        word.decimal().filter(|value| (0.0..=most).contains(value)).ok_or_else(|| {
+            let hint = match self {
+                Self::NameFirst { .. } => "rows `number name R G B A` have colours and alphas from 0 to 255",
+                Self::ItkSnap => "rows `number R G B A VIS MSH \"name\"` have colours from 0 to 255, and A, VIS and MSH from 0 to 1",
+                Self::Fsl => "rows `number R G B name` have colours from 0 to 1; colours from 0 to 255 stand behind the name, `number name R G B`",
+            };
+            ReadError::input(word.place(), format!("a number from 0 to {most}"), word.shown(), hint)
+        })
     }
 }
 
@@ -208,14 +286,6 @@ fn number(word: Word<'_>) -> Result<u32, ReadError> {
     found.map(|number| number as u32).ok_or_else(|| {
         let hint = "a row is `number name R G B A`, such as `3 liver 180 60 50 255`; `#` begins a comment";
         ReadError::input(word.place(), "the number of a label, whole, from 0 to 16777216", word.shown(), hint)
-    })
-}
-
-/// A number from 0 to another one.
-fn within(word: Word<'_>, most: f64) -> Result<f64, ReadError> {
-    word.decimal().filter(|value| (0.0..=most).contains(value)).ok_or_else(|| {
-        let hint = "colours and opacities have the range of the table's form, see docs/formats.md";
-        ReadError::input(word.place(), format!("a number from 0 to {most}"), word.shown(), hint)
     })
 }
 
@@ -258,6 +328,47 @@ mod tests {
         let found = read("3 a 255 0 0 255\n3 b 0 0 0 255\n").expect("a table");
         assert_eq!((found.rows.len(), found.rows[0].name.as_str()), (1, "b"));
         assert!(found.remarks[0].contains("label 3 stands more than once"), "{:?}", found.remarks);
+    }
+
+    #[test]
+    fn colours_of_at_most_1_are_read_from_0_to_1_in_every_form() {
+        for (text, opacity) in [
+            ("3 liver 1 0.5 0 1\n4 spleen 0 0 1 0.5\n", 1.0),
+            ("3 liver 1 0.5 0 255\n", 1.0),
+            ("3 liver 1 0.5 0 0\n", 1.0),
+            ("3 liver 1 0.5 0\n", 1.0),
+            ("3 1 0.5 0 0.25 1 1 \"liver\"\n", 0.25),
+        ] {
+            let found = read(text).expect(text);
+            assert_eq!((found.rows[0].color, found.rows[0].opacity), ([1.0, linear_from_srgb(0.5), 0.0], opacity));
+            assert!(found.remarks[0].starts_with("no colour is above 1"), "{text}: {:?}", found.remarks);
+        }
+        for text in ["0 Unknown 0 0 0 0\n", "3 liver 1 0 0 255\n4 spleen 2 0 0 255\n", "1 1 0.5 0 Frontal Pole\n"] {
+            let found = read(text).expect(text);
+            assert!(found.remarks.iter().all(|remark| !remark.contains("colour")), "{text}: {:?}", found.remarks);
+        }
+    }
+
+    #[test]
+    fn other_encodings_and_separators_are_named() {
+        let text = "3 liver 255 0 0 255\n";
+        let [low, high] =
+            [u16::to_le_bytes, u16::to_be_bytes].map(|bytes| text.encode_utf16().flat_map(bytes).collect::<Vec<u8>>());
+        for content in [[&b"\xff\xfe"[..], &low].concat(), [&b"\xfe\xff"[..], &high].concat(), low, high] {
+            let error = label_rows_of_bytes("a.lut", &content, &ReadParams::default()).expect_err("UTF-16").to_string();
+            assert!(error.starts_with("a.lut: expected a table of labels in UTF-8, found a text in UTF-16"), "{error}");
+        }
+        assert_eq!(read(&format!("\u{feff}{text}")).expect("a mark of UTF-8").rows[0].number, 3);
+        for (text, found) in [
+            ("number,name,R,G,B,A\n3,liver,255,0,0,255\n", "a.lut:1: expected columns between blanks"),
+            ("# a\n3, liver, 255, 0, 0, 255\n", "a.lut:2: expected columns between blanks"),
+            ("3 liver,255,0,0,255\n", "found commas"),
+            ("3;liver;255;0;0;255\n", "found semicolons"),
+        ] {
+            let error = read(text).expect_err(text).to_string();
+            assert!(error.contains(found), "{error}");
+        }
+        assert_eq!(read("3 left, right, up, down 255 0 0\n").expect("a name").rows[0].name, "left, right, up, down");
     }
 
     #[test]
