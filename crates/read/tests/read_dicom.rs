@@ -154,6 +154,38 @@ fn frames_of_one_file_lie_where_their_groups_say() {
     }
 }
 
+#[test]
+fn a_file_of_another_series_that_is_no_volume_is_left_out_and_named() {
+    let path = folder("beside", &[]);
+    std::fs::write(path.join("all.dcm"), frames(&[33.0, 31.5, 30.0], true)).unwrap();
+    let screen = Dicom { series: "1.2.9", description: "screen", meaning: "RGB", ..Dicom::at(0) };
+    let scout = Dicom { series: "1.2.8", description: "scout", orientation: "1\\0\\0", ..Dicom::at(0) };
+    let plain = Dicom { series: "1.2.7", description: "plain", ..Dicom::at(0) };
+    let movie = Dicom { series: "1.2.6", description: "movie", syntax: ".4.70", ..Dicom::at(0) };
+    for (name, slice) in [("a.dcm", &screen), ("b.dcm", &scout), ("c.dcm", &plain), ("d.dcm", &movie)] {
+        std::fs::write(path.join(name), slice.bytes()).unwrap();
+    }
+    std::fs::write(path.join("z.png"), b"\x89PNG").unwrap();
+    let (grid, notes) = volume(&path);
+    assert_eq!((grid.dims[2], notes.unused), (3, vec!["file z.png".to_owned()]));
+    assert_eq!(
+        notes.remarks[..4],
+        [
+            "another series is left out, as it is no volume: expected the slice 'a.dcm': one number a pixel, found RGB as PhotometricInterpretation",
+            "another series is left out, as it is no volume: expected the slice 'b.dcm': six numbers of ImageOrientationPatient, found none, or another one",
+            "another series is left out, as it is no volume: expected the slice 'd.dcm': little endian numbers, plain or packed as RLE, found a file that is packed as JPEG, JPEG 2000 or a movie (1.2.840.10008.1.2.4.70)",
+            "series 1.2.5 (, 3 slices) is drawn; `array` of a scene or --color-by chooses another: 1.2.7 (plain, 1 slice), 1.2.6 (movie, refused), 1.2.8 (scout, refused), 1.2.9 (screen, refused)",
+        ]
+    );
+    assert_eq!(volume(&path.join("all.dcm")).0, grid);
+    // The one that is named is refused for what is wrong with it.
+    let named = ReadParams { array: Some("screen".to_owned()), ..ReadParams::default() };
+    for (source, params) in [(path.join("a.dcm"), ReadParams::default()), (path, named)] {
+        let error = read(&source, &params).unwrap_err().to_string();
+        assert!(error.contains("RGB as PhotometricInterpretation"), "{error}");
+    }
+}
+
 #[cfg(unix)]
 #[test]
 fn links_out_of_the_folder_are_no_slices() {

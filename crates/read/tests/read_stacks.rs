@@ -144,6 +144,24 @@ fn ome_and_resolutions_state_steps() {
         let (grid, _) = read(&ome(order, "SizeZ=\"2\" SizeC=\"2\"").bytes(), &second).unwrap();
         assert_eq!(grid.values[0], first, "{order}");
     }
+    let named = |names: [&str; 2]| {
+        let plain = ome("XYZCT", "SizeZ=\"2\" SizeC=\"2\"");
+        let channels = names.map(|name| format!("<Channel Name=\"{name}\"/>")).concat();
+        let description =
+            plain.description.replace("PhysicalSizeZ=\"2\"/>", &format!("PhysicalSizeZ=\"2\">{channels}</Pixels>"));
+        Stack { description, ..plain }
+    };
+    let by_name = |name: &str| ReadParams { array: Some(name.to_owned()), ..ReadParams::default() };
+    let (_, notes) = volume(&named(["DAPI", "GFP \u{b5}"]));
+    assert_eq!(
+        notes.remarks[0],
+        "channel1 (DAPI) of 2 is drawn; `array` of a scene or --color-by chooses another by its name: channel2 (GFP \u{b5})"
+    );
+    for (name, first) in [("DAPI", 0.0), ("GFP \u{b5}", 12.0), ("channel2", 12.0)] {
+        assert_eq!(read(&named(["DAPI", "GFP \u{b5}"]).bytes(), &by_name(name)).unwrap().0.values[0], first, "{name}");
+    }
+    let error = read(&named(["DAPI", ""]).bytes(), &by_name("RFP")).unwrap_err().to_string();
+    assert!(error.contains("expected a channel among channel1 (DAPI), channel2, found 'RFP'"), "{error}");
     assert!(refused(&ome("XYZCT", "SizeZ=\"9\"")).contains("expected 9 pages"));
     assert!(refused(&ome("XYZZT", "SizeZ=\"4\"")).contains("expected a DimensionOrder"));
     assert!(

@@ -8,7 +8,7 @@ mod elements;
 
 use super::lattice;
 use crate::ReadParams;
-use crate::error::{Place, ReadError};
+use crate::error::{Fault, Place, ReadError};
 use crate::format::folder::{check_inside, files};
 use crate::points::extras::LONGEST_NAME;
 use crate::reading::Reading;
@@ -93,6 +93,20 @@ struct Slice {
     intercept: f64,
 }
 
+/// The slices of a file, or why it has none that can be read: it matters where its series is the one that is drawn.
+#[derive(Default)]
+struct OfFile {
+    slices: Vec<Slice>,
+    refused: Option<Refused>,
+}
+
+/// A file with a picture that cannot be read as a slice.
+struct Refused {
+    series: String,
+    description: String,
+    error: ReadError,
+}
+
 /// How its numbers are stored.
 struct Numbers {
     bytes: usize,
@@ -105,6 +119,7 @@ struct Numbers {
 /// Reads the series of a folder that `params` name, else the one of most slices; of a file its own.
 pub(crate) fn read(folder: &Path, named: Option<&Path>, reading: &mut Reading<'_>) -> Result<Grid, ReadError> {
     let mut slices: Vec<Slice> = Vec::new();
+    let mut refused: Vec<Refused> = Vec::new();
     let mut series_of_file = None;
     for file in files(folder)? {
         reading.go_on()?;
@@ -113,17 +128,19 @@ pub(crate) fn read(folder: &Path, named: Option<&Path>, reading: &mut Reading<'_
             reading.notes.not_used([format!("file {}, a link out of the folder", name(&file)).as_bytes()]);
             continue;
         }
-        input::hold("the slices", (slices.len() as u64 + 1) * BYTES_OF_A_SLICE, reading.params)?;
-        let of_file = with_elements(&file, reading.params, |elements| slices_of(&file, elements, reading.params));
+        input::hold("the slices", ((slices.len() + refused.len()) as u64 + 1) * BYTES_OF_A_SLICE, reading.params)?;
+        let of_file = with_elements(&file, reading.params, |elements| of_file(&file, elements, reading.params));
         let of_file = of_file.map_err(|e| in_file(&file, e))?;
-        let Some(first) = of_file.first() else {
+        let series = of_file.refused.as_ref().map(|refused| &refused.series);
+        let Some(series) = of_file.slices.first().map(|slice| &slice.series).or(series) else {
             reading.notes.not_used([format!("file {}", name(&file)).as_bytes()]);
             continue;
         };
         if is_named {
-            series_of_file = Some(first.series.clone());
+            series_of_file = Some(series.clone());
         }
-        slices.extend(of_file);
+        slices.extend(of_file.slices);
+        refused.extend(of_file.refused);
     }
     if let Some(named) = named.filter(|_| series_of_file.is_none()) {
         let found = format!("'{}', which has none", name(named));
@@ -134,7 +151,7 @@ pub(crate) fn read(folder: &Path, named: Option<&Path>, reading: &mut Reading<'_
             HINT,
         ));
     }
-    let slices = of_series(slices, series_of_file, reading)?;
+    let slices = of_series(slices, refused, series_of_file, reading)?;
     let slices = of_frame(slices, reading)?;
     let (origin, axes) = placed(&slices, reading)?;
     reading.notes.unit = Some("mm".to_owned());
@@ -184,11 +201,26 @@ fn with_elements<T: Default>(
     made(&Elements::parse(&content)?)
 }
 
+/// The slices of a file; what is wrong with one is kept beside its series.
+fn of_file(file: &Path, elements: &Elements<'_>, params: &ReadParams) -> Result<OfFile, ReadError> {
+    match slices_of(file, elements, params) {
+        Ok(slices) => Ok(OfFile { slices, refused: None }),
+        Err(error) if error.fault == Fault::Input => {
+            let series = elements.text(SERIES).unwrap_or_default();
+            let description = elements.text(DESCRIPTION).unwrap_or_default();
+            let refused = Some(Refused { series, description, error: in_file(file, error) });
+            Ok(OfFile { slices: Vec::new(), refused })
+        }
+        Err(error) => Err(error),
+    }
+}
+
 /// The slices of a file, one for each of its frames; none of one without a picture.
 fn slices_of(file: &Path, elements: &Elements<'_>, params: &ReadParams) -> Result<Vec<Slice>, ReadError> {
     if !elements.has_pixels() {
         return Ok(Vec::new());
     }
+    elements.check_packing()?;
     let missing = |what: &str| ReadError::input(Place::File, what, "none, or another one", HINT);
     let meaning = elements.text(MEANING).unwrap_or_default();
     let is_grey = elements.short(SAMPLES).is_none_or(|samples| samples == 1) && meaning.starts_with("MONOCHROME");
@@ -343,6 +375,7 @@ impl Slice {
 /// The slices of the series that is asked for.
 fn of_series(
     slices: Vec<Slice>,
+    refused: Vec<Refused>,
     series_of_file: Option<String>,
     reading: &mut Reading<'_>,
 ) -> Result<Vec<Slice>, ReadError> {
@@ -353,11 +386,17 @@ fn of_series(
             None => series.push((slice.series.clone(), slice.description.clone(), 1)),
         }
     }
+    for Refused { series: uid, description, .. } in &refused {
+        if !series.iter().any(|(known, _, _)| known == uid) {
+            series.push((uid.clone(), description.clone(), 0));
+        }
+    }
     // Those of most slices first, in the order of their names where they are alike.
     series.sort_by(|a, b| (b.2, &a.0).cmp(&(a.2, &b.0)));
     let told = |(uid, description, count): &(String, String, usize)| {
         let description = escaped(description.as_bytes(), LONGEST_NAME);
-        format!("{} ({description}, {})", escaped(uid.as_bytes(), 64), counted(*count as u64, "slice"))
+        let count = if *count == 0 { "refused".to_owned() } else { counted(*count as u64, "slice") };
+        format!("{} ({description}, {count})", escaped(uid.as_bytes(), 64))
     };
     let offered = || series.iter().take(MOST_NAMED).map(told).collect::<Vec<_>>().join(", ");
     let asked = reading.params.array.as_ref();
@@ -378,6 +417,24 @@ fn of_series(
             "choose one of these",
         ));
     };
+    let uid = chosen.0.clone();
+    let [of_chosen, of_others]: [Vec<Refused>; 2] = {
+        let (of_chosen, of_others) = refused.into_iter().partition(|refused| refused.series == uid);
+        [of_chosen, of_others]
+    };
+    if let Some(Refused { error, .. }) = of_chosen.into_iter().next() {
+        return Err(error);
+    }
+    for Refused { error, .. } in of_others.iter().take(MOST_NAMED) {
+        let named = format!(
+            "another series is left out, as it is no volume: expected {}, found {}",
+            error.expected, error.found
+        );
+        reading.notes.remark(named);
+    }
+    if let Some(further) = of_others.len().checked_sub(MOST_NAMED).filter(|further| *further > 0) {
+        reading.notes.remark(format!("{} more of other series are left out", counted(further as u64, "file")));
+    }
     if series.len() > 1 {
         let others: Vec<String> = series.iter().filter(|one| one.0 != chosen.0).take(MOST_NAMED).map(told).collect();
         let others = others.join(", ");
@@ -388,7 +445,6 @@ fn of_series(
     } else {
         reading.notes.remark(format!("series {}", told(chosen)));
     }
-    let uid = chosen.0.clone();
     Ok(slices.into_iter().filter(|slice| slice.series == uid).collect())
 }
 

@@ -165,10 +165,27 @@ pub(crate) fn chosen_array(
     Ok(Some(Chosen { rank, value: all[rank].magnitude() }))
 }
 
-/// The channel of a stack of pictures that is read, of so many: the one that `params` name, else the first. Says what else could be chosen.
+/// The channel of a stack of pictures that is read, of so many: the one that `params` name, else the first. Reports what else could be chosen. `names` are
+/// those that the file gives them, if it names each.
 #[cfg(feature = "tiff")]
-pub(crate) fn channel_of(channels: u64, params: &ReadParams, notes: &mut Notes) -> Result<u64, ReadError> {
+pub(crate) fn channel_of(
+    channels: u64,
+    names: &[String],
+    params: &ReadParams,
+    notes: &mut Notes,
+) -> Result<u64, ReadError> {
     const NAME: &str = "channel";
+    let names = if names.len() as u64 == channels { names } else { &[] };
+    let shown = |rank: usize| {
+        let name = names.get(rank).filter(|name| !name.is_empty());
+        let name = name.map_or_else(String::new, |name| {
+            format!(" ({})", splat_core::text::escaped(name.as_bytes(), LONGEST_NAME))
+        });
+        format!("{NAME}{}{name}", rank + 1)
+    };
+    if names.iter().any(|name| !name.is_empty()) {
+        return named_channel(names, &shown, params, notes);
+    }
     let Some(name) = &params.array else {
         if channels > 1 {
             let others = match channels {
@@ -186,6 +203,41 @@ pub(crate) fn channel_of(channels: u64, params: &ReadParams, notes: &mut Notes) 
             _ => format!("a channel from {NAME}1 to {NAME}{channels}"),
         };
         let found = format!("'{}'", splat_core::text::escaped(name.as_bytes(), LONGEST_NAME));
+        ReadError::input(Place::File, expected, found, "choose one of these, or leave out `array`")
+    })
+}
+
+/// One of the channels that a file names: by its name, or as `channelN`.
+#[cfg(feature = "tiff")]
+fn named_channel(
+    names: &[String],
+    shown: &dyn Fn(usize) -> String,
+    params: &ReadParams,
+    notes: &mut Notes,
+) -> Result<u64, ReadError> {
+    /// Channels up to which each is named.
+    const NAMED: usize = 16;
+    let listed = |but: Option<usize>| {
+        let shown: Vec<String> = (0..names.len()).filter(|rank| Some(*rank) != but).take(NAMED).map(shown).collect();
+        let more = names.len() - usize::from(but.is_some()) - shown.len();
+        shown.join(", ") + &if more > 0 { format!(" and {more} more") } else { String::new() }
+    };
+    let Some(asked) = &params.array else {
+        if names.len() == 1 {
+            return Ok(0);
+        }
+        let [first, count, others] = [shown(0), names.len().to_string(), listed(Some(0))];
+        notes.remark(format!(
+            "{first} of {count} is drawn; `array` of a scene or --color-by chooses another by its name: {others}"
+        ));
+        return Ok(0);
+    };
+    let by_number = asked.strip_prefix("channel").and_then(|number| number.parse::<usize>().ok());
+    let by_number = by_number.filter(|number| (1..=names.len()).contains(number)).map(|number| number - 1);
+    let rank = by_number.or_else(|| names.iter().position(|name| name == asked));
+    rank.map(|rank| rank as u64).ok_or_else(|| {
+        let found = format!("'{}'", splat_core::text::escaped(asked.as_bytes(), LONGEST_NAME));
+        let expected = format!("a channel among {}", listed(None));
         ReadError::input(Place::File, expected, found, "choose one of these, or leave out `array`")
     })
 }

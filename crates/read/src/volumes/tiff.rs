@@ -40,7 +40,7 @@ pub(crate) fn read(content: Content, reading: &mut Reading<'_>) -> Result<Grid, 
     let planes = description.planes(listed.len() as u64, shape.numbers)?;
     let slots = slots(&listed, &planes, &mut pages)?;
     let frame = Selection::of_frames(planes.times.count, Place::File, reading.params, &mut reading.notes)?.frame;
-    let (selection, channel) = chosen(shape, planes.channels.count, reading)?;
+    let (selection, channel) = chosen(shape, planes.channels.count, &description.channels, reading)?;
     if planes.are_times {
         reading.notes.remark("the file calls its pages times of one slice: they are drawn as slices");
     }
@@ -159,16 +159,21 @@ fn slots(listed: &[Page], planes: &Planes, pages: &mut Pages) -> Result<Vec<Plan
     Ok((0..expected).map(|rank| Plane::Byte(start + rank * bytes)).collect())
 }
 
-/// Which number of a pixel is read, and of which channel.
-fn chosen(shape: Shape, channels: u64, reading: &mut Reading<'_>) -> Result<(Selection, u64), ReadError> {
+/// Which number of a pixel is read, and of which channel; `names` are those that the file gives channels.
+fn chosen(
+    shape: Shape,
+    channels: u64,
+    names: &[String],
+    reading: &mut Reading<'_>,
+) -> Result<(Selection, u64), ReadError> {
     let whole = Selection { frames: 1, frame: 0, numbers: 1, value: Value::Number(0) };
     if shape.is_color {
-        let channel = channel_of(channels, reading.params, &mut reading.notes)?;
+        let channel = channel_of(channels, names, reading.params, &mut reading.notes)?;
         let selection = whole.with_numbers(shape.numbers, shape.kind, true, Place::File, &mut reading.notes)?;
         return Ok((selection, channel));
     }
     // Channels lie side by side in a pixel, or in pages of their own.
-    let channel = channel_of(channels * shape.numbers, reading.params, &mut reading.notes)?;
+    let channel = channel_of(channels * shape.numbers, names, reading.params, &mut reading.notes)?;
     let value = Value::Number(channel % shape.numbers);
     Ok((Selection { numbers: shape.numbers, value, ..whole }, channel / shape.numbers))
 }

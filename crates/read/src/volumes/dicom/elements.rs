@@ -28,6 +28,8 @@ const SYNTAX: Tag = Tag(2, 0x10);
 const PIXELS: Tag = Tag(0x7fe0, 0x10);
 /// Most bytes that a byte of packed pixels stands for: 128 of a run of two.
 const MOST_PACKED: usize = 64;
+/// How the names of syntaxes begin whose pixels are JPEG, JPEG 2000 or a movie.
+const MOVIES: &str = "1.2.840.10008.1.2.4.";
 /// Most elements of a file; real ones have some hundred.
 const MOST: usize = 1 << 16;
 
@@ -41,6 +43,8 @@ pub(super) enum Packing {
     None,
     /// Runs of bytes, a segment for each byte of a number.
     Runs,
+    /// Another way, which is not read; the other elements are plain.
+    Unread,
 }
 
 /// The elements of one file.
@@ -63,6 +67,12 @@ struct Head {
 /// Whether a file is DICOM by its first bytes.
 pub(crate) fn is_dicom(head: &[u8]) -> bool {
     head.get(PREAMBLE..START) == Some(MARK)
+}
+
+/// The error of a transfer syntax that is not read.
+fn unread_syntax(named: &str, syntax: &str) -> ReadError {
+    let found = format!("a file that is {named} ({})", escaped(syntax.as_bytes(), 64));
+    ReadError::input(Place::Byte(START as u64), "little endian numbers, plain or packed as RLE", found, CONVERT)
 }
 
 impl<'c> Elements<'c> {
@@ -212,20 +222,22 @@ impl<'c> Elements<'c> {
             "1.2.840.10008.1.2" => (Packing::None, false),
             "1.2.840.10008.1.2.1" => (Packing::None, true),
             "1.2.840.10008.1.2.5" => (Packing::Runs, true),
-            other => {
-                let name = match other {
-                    "1.2.840.10008.1.2.2" => "big endian",
-                    "1.2.840.10008.1.2.1.99" => "deflated",
-                    _ if other.starts_with("1.2.840.10008.1.2.4.") => "packed as JPEG, JPEG 2000 or a movie",
-                    _ => "of another transfer syntax",
-                };
-                let found = format!("a file that is {name} ({})", escaped(other.as_bytes(), 64));
-                let expected = "little endian numbers, plain or packed as RLE";
-                return Err(ReadError::input(Place::Byte(START as u64), expected, found, CONVERT));
-            }
+            other if other.starts_with(MOVIES) => (Packing::Unread, true),
+            "1.2.840.10008.1.2.2" => return Err(unread_syntax("big endian", &syntax)),
+            "1.2.840.10008.1.2.1.99" => return Err(unread_syntax("deflated", &syntax)),
+            _ => return Err(unread_syntax("of another transfer syntax", &syntax)),
         };
         self.packing = packing;
         Ok(has_types)
+    }
+
+    /// Refuses pixels that are packed in a way that is not read.
+    pub(super) fn check_packing(&self) -> Result<(), ReadError> {
+        let syntax = || self.text(SYNTAX).unwrap_or_default();
+        match self.packing {
+            Packing::None | Packing::Runs => Ok(()),
+            Packing::Unread => Err(unread_syntax("packed as JPEG, JPEG 2000 or a movie", &syntax())),
+        }
     }
 
     fn value(&self, tag: Tag) -> Option<&'c [u8]> {

@@ -122,6 +122,8 @@ pub(super) struct Description {
     /// Lengths of a voxel, where they are stated.
     lengths: [Option<f64>; 3],
     unit: String,
+    /// Names of channels by OME, empty for one without; not all channels may be listed.
+    pub(super) channels: Vec<String>,
 }
 
 impl Description {
@@ -131,7 +133,7 @@ impl Description {
         if trimmed.starts_with('<') && trimmed.contains("<OME") {
             return of_ome(trimmed);
         }
-        let mut found = Self { stated: Stated::Nothing, lengths: [None; 3], unit: String::new() };
+        let mut found = Self { stated: Stated::Nothing, lengths: [None; 3], unit: String::new(), channels: Vec::new() };
         if trimmed.starts_with("ImageJ=") {
             found = of_imagej(trimmed)?;
         }
@@ -249,7 +251,7 @@ fn of_imagej(text: &str) -> Result<Description, ReadError> {
     // The letter µ is written as an escape.
     let unit = value("unit").unwrap_or_default().replace("\\u00B5", "µ");
     let unit = if ["pixel", "pixels"].contains(&unit.as_str()) { String::new() } else { unit };
-    Ok(Description { stated: Stated::ByImageJ(counts), lengths: [None, None, spacing], unit })
+    Ok(Description { stated: Stated::ByImageJ(counts), lengths: [None, None, spacing], unit, channels: Vec::new() })
 }
 
 /// The text of OME.
@@ -287,7 +289,10 @@ fn of_ome(text: &str) -> Result<Description, ReadError> {
         let hint = "save it with one unit, such as with Fiji (Image > Properties)";
         return Err(ReadError::input(Place::File, format!("sizes of voxels in one unit, {unit}"), other, hint));
     }
-    Ok(Description { stated: Stated::ByOme(counts, [order[2], order[3], order[4]]), lengths, unit: unit.to_owned() })
+    let channels = pixels.children().filter(|node| node.has_tag_name_of("Channel"));
+    let channels = channels.map(|channel| channel.attribute("Name").unwrap_or_default().to_owned()).collect();
+    let stated = Stated::ByOme(counts, [order[2], order[3], order[4]]);
+    Ok(Description { stated, lengths, unit: unit.to_owned(), channels })
 }
 
 /// Elements by their name alone: each version of OME has a namespace.
