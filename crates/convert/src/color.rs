@@ -4,5 +4,6 @@ pub(crate) mod color_by;
 pub(crate) mod color_map;
 pub(crate) mod color_scale;
 pub(crate) mod colored_mesh;
+pub(crate) mod distinct;
 pub(crate) mod label_table;
 pub(crate) mod surface_field;

@@ -1,6 +1,7 @@
 //! Colours points by one of their columns: by a map, by whole numbers, or by a transfer function. A transfer function may classify them too,
 //! by their opacity or their extinction.
 
+use super::distinct::distinct;
 use crate::common::columns::CHUNK;
 use crate::{ColorMap, ConvertError, LabelTable, SplatParams};
 use rayon::prelude::*;
@@ -38,17 +39,6 @@ const CLASSES: [(&str, u32); 19] = [
     ("high noise", 0xff2f8f),
 ];
 
-/// Colours that are told apart, for whole numbers without a meaning of their own, in turns. Each turn begins [`SKIPPED`] colours later, and after the
-/// first one colours become lighter or darker: numbers that are a turn apart differ.
-const DISTINCT: [u32; 12] = [
-    0x4e79a7, 0xf28e2b, 0x59a14f, 0xe15759, 0x76b7b2, 0xedc948, 0xb07aa1, 0x9c755f, 0x86bcb6, 0xff9da7, 0x5b6abf,
-    0xb6992d,
-];
-
-const SKIPPED: f64 = 5.0;
-/// How much of white or black is in the colours of a turn.
-const TINTS: [(f32, f32); 3] = [(0.0, 0.0), (0.5, 1.0), (0.6, 0.0)];
-
 /// The mapping from numbers to colours.
 #[derive(Debug, Clone, PartialEq)]
 pub enum PointColors {
@@ -64,7 +54,7 @@ pub enum PointColors {
     },
     /// Whole numbers as classes of LAS, each in a colour of its own.
     Classes,
-    /// Whole numbers, in twelve colours in turns.
+    /// Whole numbers, in 256 colours that are told apart.
     Distinct,
     /// Whole numbers by a table, those that it lacks as [`PointColors::Distinct`].
     Labels(Arc<LabelTable>),
@@ -265,21 +255,11 @@ fn spread(numbers: &[f64], by: &ColorBy, map: ColorMap) -> [f64; 2] {
     if map.is_diverging() && low < 0.0 && high > 0.0 { [-end, end] } else { [low, high] }
 }
 
-/// The colour of a class; those that LAS leaves to users have [`DISTINCT`] ones.
+/// The colour of a class; those that LAS leaves to users have [`distinct`] ones.
 fn class_color(number: f64) -> [f32; 3] {
     let class = number.round();
     let known = (class >= 0.0).then(|| CLASSES.get(class as usize)).flatten();
     known.map_or_else(|| distinct(number), |(_, rgb)| linear_from_hex(*rgb))
-}
-
-/// The colour of a whole number without a meaning.
-pub(crate) fn distinct(number: f64) -> [f32; 3] {
-    let colors = DISTINCT.len() as f64;
-    let number = number.round();
-    let turn = libm::floor(number / colors);
-    let place = (number + SKIPPED * turn).rem_euclid(colors) as usize;
-    let (share, tint) = TINTS[(turn.rem_euclid(TINTS.len() as f64) as usize).min(TINTS.len() - 1)];
-    linear_from_hex(DISTINCT[place.min(DISTINCT.len() - 1)]).map(|channel| channel + share * (tint - channel))
 }
 
 #[cfg(test)]
@@ -309,7 +289,7 @@ mod tests {
                 assert!(apart > 0.02, "{} and {}: {:?}", numbers[i], numbers[k], color[i]);
             }
         }
-        assert_eq!(color[12], linear_from_hex(DISTINCT[0]));
+        assert_eq!(color[12], linear_from_hex(super::super::distinct::FIRST[0]));
     }
 
     #[test]

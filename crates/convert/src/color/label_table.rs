@@ -1,6 +1,6 @@
 //! Tables of labels: each whole number of a volume of labels has a name, a colour and an opacity.
 
-use super::color_by::distinct;
+use super::distinct::distinct;
 use std::collections::BTreeMap;
 
 /// The largest label: beyond it single precision leaves numbers out.
@@ -17,7 +17,7 @@ pub struct Label {
     pub opacity: f32,
 }
 
-/// Labels by their numbers. A number that it lacks is opaque, in one of twelve colours in turns.
+/// Labels by their numbers. A number that it lacks is opaque, in a colour that tells it from others.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct LabelTable {
     labels: BTreeMap<u32, Label>,

@@ -174,7 +174,7 @@ pub(crate) fn said_of_colors(by: &ColorBy, colored: &Colored, each: &str) -> Str
             format!("the map {} from {from} to {to}{by_logarithm}", map.name())
         }
         (PointColors::Transfer(..), _) => "the object's `transfer`".to_owned(),
-        (PointColors::Distinct, _) => "twelve colours in turns".to_owned(),
+        (PointColors::Distinct, _) => "256 colours that are told apart".to_owned(),
         (PointColors::Labels(_), _) => "the table of labels".to_owned(),
         _ => "the colours of classes".to_owned(),
     };
