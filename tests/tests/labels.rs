@@ -52,7 +52,7 @@ fn a_table_colours_labels_hides_them_and_makes_them_translucent() {
     assert!(red > 200 && green == 0 && blue > 200, "{red} {green} {blue}");
     assert!(said.contains("seg.nrrd: hidden by the table of labels: 9"), "{said}");
     let (_, said) = drawn("names.toml", "names.png");
-    assert!(said.contains("not in the table of labels, so in colours in turns: 4"), "{said}");
+    assert!(said.contains("not in the table of labels, so in colours of their numbers: 4"), "{said}");
     // The core is seen through the skin.
     drawn("clear.txt", "clear.png");
     let [clear, opaque] = ["clear.png", "all.png"].map(|name| place.pixels(name).to_rgb8());
@@ -81,11 +81,91 @@ fn names_stand_in_legends_and_in_what_info_says() {
 }
 
 #[test]
+fn labels_lie_in_the_intensities_beside_them_or_show_them() {
+    let place = place();
+    let header = "NRRD0004\ntype: float\ndimension: 3\nsizes: 24 16 16\nencoding: ascii\n\n".to_owned();
+    place.write("scan.nrrd", header + &(0..24 * 256).map(|k| format!("{}\n", k % 24)).collect::<String>());
+    let scene = |objects: &str| {
+        format!(
+            "version = 1\n[camera]\nauto = true\nsize = [96, 72]\n[[light]]\nkind = 'directional'\ndirection = [0, -1, -1]\nirradiance = 3\n{objects}"
+        )
+    };
+    let regions = "[[object]]\nname = 'regions'\nmesh = 'seg.nrrd'\nlabels = { 3 = 'core', 4 = { color = '#0000ff', opacity = 0.5 }, 9 = { visible = false } }\n";
+    let scan = "[[object]]\nname = 'scan'\nvolume = 'scan.nrrd'\nunit_length = 10\ntransfer = [{ value = 0, color = [0.4, 0.4, 0.4], opacity = 0 }, { value = 23, color = [1, 1, 1], opacity = 0.3 }]\n";
+    let field = "[[object]]\nname = 'shown'\nmesh = 'seg.nrrd'\nfield = { volume = 'scan.nrrd' }\ntransfer = [{ value = 0, color = [1, 0, 0] }, { value = 23, color = [0, 0, 1] }]\n";
+    let colored = "[[object]]\nname = 'shown'\nmesh = 'seg.nrrd'\ncolor_by = { volume = 'scan.nrrd' }\n";
+    for (name, objects) in
+        [("both", format!("{regions}{scan}")), ("alone", regions.to_owned()), ("field", field.to_owned())]
+    {
+        place.write(&format!("{name}.toml"), scene(&objects));
+        place.expect(0, &["render", &format!("{name}.toml"), "-o", &format!("{name}.png")], "");
+    }
+    assert!(place.bytes("both.png") != place.bytes("alone.png"));
+    let [red, _, blue] = hues(&place, "field.png");
+    assert!(red > 20 && blue > 20, "{red} {blue}");
+    place.write("colored.toml", scene(colored));
+    place.expect(
+        3,
+        &["render", "colored.toml"],
+        "unknown key `volume`\nhint: a surface shows another volume by `field`",
+    );
+}
+
+#[test]
+fn what_looks_like_labels_and_like_amounts_is_told_with_the_option_that_changes_it() {
+    let place = place();
+    let write = |name: &str, value: &dyn Fn(i32) -> i32| {
+        let header = "NRRD0004\ntype: short\ndimension: 3\nsizes: 16 16 16\nencoding: ascii\n\n".to_owned();
+        place.write(name, header + &(0..4096).map(|k| format!("{}\n", value(k))).collect::<String>());
+    };
+    let is_inside =
+        |k: i32| (4..12).contains(&(k % 16)) && (4..12).contains(&(k / 16 % 16)) && (4..12).contains(&(k / 256));
+    write("mask.nrrd", &|k| if is_inside(k) { 5 } else { 0 });
+    write("three.nrrd", &|k| if k / 256 < 8 { 1 } else { 2 + i32::from(k % 16 < 8) });
+    write("minus.nrrd", &|k| if is_inside(k) { 1 + k % 16 / 8 + 2 * (k / 16 % 16 / 8) } else { -1 });
+    let said = |arguments: &[&str]| {
+        let out = place.expect(0, arguments, "");
+        String::from_utf8_lossy(&[out.stdout, out.stderr].concat()).into_owned()
+    };
+    let doubt = "its 2 whole numbers (0, 5) are taken for amounts, not for labels: two numbers may be a mask, too";
+    let draw = |name: &'static str| ["render", name, "--size", "80x60", "--force", "-o", "a.png"];
+    for arguments in [&["info", "mask.nrrd"][..], &draw("mask.nrrd")] {
+        let text = said(arguments);
+        assert!(text.contains(doubt) && text.contains("--preset labels"), "{text}");
+    }
+    let text = said(&[&draw("mask.nrrd")[..], &["--preset", "labels"]].concat());
+    assert!(text.contains("1 label"), "{text}");
+    for name in ["three.nrrd", "minus.nrrd"] {
+        let text = said(&["info", name]);
+        assert!(text.contains("labels, not amounts"), "{text}");
+    }
+    let text = said(&draw("minus.nrrd"));
+    assert!(text.contains("its voxels of -1 belong to no region"), "{text}");
+    place.write("some.ctbl", "1 a 255 0 0 255\n2 b 0 255 0 255\n");
+    place.expect(
+        2,
+        &[&draw("mask.nrrd")[..], &["--labels", "some.ctbl"]].concat(),
+        "no file is a volume of labels; mask.nrrd: the table lacks 1 of its 1 number: 5",
+    );
+    place.write(
+        "half.nrrd",
+        "NRRD0004\ntype: float\ndimension: 3\nsizes: 2 2 2\nencoding: ascii\n\n0\n.5\n1\n2\n3\n4\n5\n6\n",
+    );
+    place.expect(
+        2,
+        &[&draw("half.nrrd")[..], &["--preset", "labels"]].concat(),
+        "--preset labels: no file is a volume of labels; half.nrrd: it has the value 0.5",
+    );
+}
+
+#[test]
 fn wrong_tables_are_refused_with_their_place() {
     let place = place();
     place.write("bad.ctbl", "3 core 255 0 0 255\n4 box 0 0 300 255\n");
     place.write("bad.toml", "three = \"core\"\n");
     place.write("key.toml", "3 = { nam = \"core\" }\n");
+    place.write("turned.toml", "liver = 12\n");
+    place.write("bare.toml", "12 = 3\n");
     place.write("hidden.toml", "3 = { visible = false }\n4 = { visible = false }\n9 = { opacity = 0 }\n");
     place.write(
         "scan.nrrd",
@@ -101,6 +181,8 @@ fn wrong_tables_are_refused_with_their_place() {
             "bad.toml:1:9: expected the number of a label, whole, from 0 to 16777216, found `three`",
         ),
         (3, "seg.nrrd", "key.toml", "key.toml:1:7: unknown key `nam`"),
+        (3, "seg.nrrd", "turned.toml", "behind the number of a label, such as 12 = \"liver\", found the number 12"),
+        (3, "seg.nrrd", "bare.toml", "behind the number of a label, such as 12 = \"liver\", found the number 3"),
         (
             4,
             "seg.nrrd",

@@ -167,7 +167,7 @@ pub(super) struct FirstArguments {
     /// Share of the picture's width or height that is filled, above 0, at most 1 [default: 0.9]
     #[arg(long, value_name = "SHARE", value_parser = parse_finite)]
     pub(super) fit: Option<f64>,
-    /// Look of volumes, and the colour map of --color-by: ct-bone, ct-skin, mri, cloud, viridis, magma, inferno, plasma, cividis, turbo, grey, coolwarm, or a .json preset of ParaView
+    /// Look of volumes, and the colour map of --color-by: ct-bone, ct-skin, mri, cloud, labels, viridis, magma, inferno, plasma, cividis, turbo, grey, coolwarm, or a .json preset of ParaView
     #[arg(long, value_name = "NAME")]
     pub(super) preset: Option<String>,
     /// Material of all surfaces, and of points and volumes that are a medium: glass, glass-red, water, wax, skin, milk, marble, smoke, cloud and others,

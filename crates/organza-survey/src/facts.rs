@@ -2,7 +2,7 @@
 
 use crate::NamedTable;
 use crate::histogram::Histogram;
-use crate::labels::Labels;
+use crate::labels::{Labels, Reading};
 use crate::mesh_faults::{MeshFaults, mesh_faults};
 use crate::spacing::{duplicates, median_spacing};
 use crate::stands::{cloud_stands_along, lies_flat_along, stands_along};
@@ -266,10 +266,26 @@ fn of_grid(grid: &Grid, table: Option<&NamedTable>) -> Facts {
     let corners = (0..8).map(|c| grid.position(last(c & 1, x), last(c & 2, y), last(c & 4, z)));
     let range = range_of(grid.values.iter().copied());
     let wide = (range[1] > range[0]).then(|| range.map(f64::from));
-    let labels = match table {
-        Some(named) => Labels::by_table(grid, &named.table),
+    let reading = match table {
+        Some(named) => Labels::by_table(grid, &named.table).map_or_else(
+            |reason| {
+                Reading::Doubtful(format!(
+                    "it is taken for amounts, not for labels of {}: {reason}",
+                    printable(&named.path)
+                ))
+            },
+            Reading::Labels,
+        ),
         None => Labels::from_grid(grid),
     };
+    let said_of_labels = match &reading {
+        Reading::Labels(labels) => Some(labels.said()),
+        Reading::Doubtful(said) => {
+            Some(format!("{said}; `mesh = ` or `--preset labels` draws the surface of each label"))
+        }
+        Reading::Amounts => None,
+    };
+    let labels = reading.labels();
     let fine = wide.map(|range| Histogram::new(&grid.values, range, FINE_BINS));
     Facts {
         kind: "volume",
@@ -282,7 +298,7 @@ fn of_grid(grid: &Grid, table: Option<&NamedTable>) -> Facts {
             .into_iter()
             .flatten()
             .take(1)
-            .chain(labels.as_ref().map(Labels::said))
+            .chain(said_of_labels)
             .collect(),
         labels: labels.map_or_else(Vec::new, |labels| label_facts(grid, &labels, table.map(|named| &named.table))),
         quantiles: fine.iter().flat_map(|f| SHARES.map(|share| (share, f.quantile(share)))).collect(),

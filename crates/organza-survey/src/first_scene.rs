@@ -82,9 +82,8 @@ pub fn first_scene(
     }
     let table = wish.labels.as_ref().map(|labels| written_path(&labels.path, &folder)).transpose()?;
     let objects = objects(data, &paths, table.as_deref(), wish);
-    if let (Some(labels), true) = (&wish.labels, objects.iter().all(|object| object.labels().is_none())) {
-        let message = format!("--labels {}: no file is a volume of labels", printable(&labels.path));
-        return Err(Error::usage(message, "labels are whole numbers, all of which the table has; 0 is nothing"));
+    if objects.iter().all(|object| object.labels().is_none()) {
+        check_labels(data, wish)?;
     }
     check_material(data, &objects, wish)?;
     let azimuth = wish.azimuth.unwrap_or_else(|| default_azimuth(data));
@@ -148,11 +147,36 @@ fn up_remarks<'a>(data: &'a [DataFile], wish: &'a Wish) -> impl Iterator<Item = 
     data.iter().filter(unsaid).map(remark)
 }
 
-/// What is said of volumes that are drawn as surfaces of labels.
+/// Refuses a table of labels, and the look of such, for files none of which is a volume of labels.
+fn check_labels(data: &[DataFile], wish: &Wish) -> Result<(), Error> {
+    let is_look = wish.preset.as_ref().is_some_and(Preset::is_labels);
+    let option = match &wish.labels {
+        Some(labels) => format!("--labels {}", printable(&labels.path)),
+        None if is_look => "--preset labels".to_owned(),
+        None => return Ok(()),
+    };
+    let reason = |file: &DataFile| {
+        let SourceData::Grid(grid) = &file.data else { return None };
+        let reason = look::stated_labels(grid, wish)?.err()?;
+        Some(format!("; {}: {reason}", printable(&file.path)))
+    };
+    let reasons: String = data.iter().filter_map(reason).collect();
+    let hint = if is_look {
+        "labels are whole numbers, 0 is nothing; leave the option out"
+    } else {
+        "labels are whole numbers, all of which the table has; 0 is nothing. --preset labels takes a volume for labels that lacks some"
+    };
+    Err(Error::usage(format!("{option}: no file is a volume of labels{reasons}"), hint))
+}
+
+/// Reports which volumes of whole numbers are drawn as surfaces of labels, and which could be but are not.
 fn label_remarks<'a>(data: &'a [DataFile], objects: &'a [Object]) -> impl Iterator<Item = String> + 'a {
     data.iter().zip(objects).filter_map(|(file, object)| {
-        let labels = counted(object.labels()? as u64, "label");
         let path = printable(&file.path);
+        if let Some(doubt) = object.doubt() {
+            return Some(format!("{path}: {doubt}; --preset labels draws the surface of each label"));
+        }
+        let labels = counted(object.labels()? as u64, "label");
         Some(format!("{path}: whole numbers that look like {labels}: each region has its surface and its colour; --preset mri draws amounts"))
     })
 }

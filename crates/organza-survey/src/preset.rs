@@ -24,6 +24,8 @@ pub(crate) enum Look {
     Mri,
     /// White droplets that scatter light.
     Cloud,
+    /// The surface of each label.
+    Labels,
     /// The colours of a map over the body of the values.
     Map(ColorMap),
     /// The same of a computed field: thin and without light, so that colours stand for values and its middle is seen.
@@ -33,8 +35,13 @@ pub(crate) enum Look {
 }
 
 /// The looks that have a name and are no colour map.
-const NAMED: [(&str, Look); 4] =
-    [("ct-bone", Look::CtBone), ("ct-skin", Look::CtSkin), ("mri", Look::Mri), ("cloud", Look::Cloud)];
+const NAMED: [(&str, Look); 5] = [
+    ("ct-bone", Look::CtBone),
+    ("ct-skin", Look::CtSkin),
+    ("mri", Look::Mri),
+    ("cloud", Look::Cloud),
+    ("labels", Look::Labels),
+];
 
 impl Preset {
     /// A preset by its name, or from a JSON file of ParaView by its path.
@@ -77,6 +84,11 @@ impl Preset {
     /// Whether matter scatters light as droplets do.
     pub(crate) fn is_cloud(&self) -> bool {
         self.0 == Look::Cloud
+    }
+
+    /// Whether whole numbers are labels, whatever they look like.
+    pub(crate) fn is_labels(&self) -> bool {
+        self.0 == Look::Labels
     }
 }
 

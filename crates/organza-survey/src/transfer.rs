@@ -109,7 +109,7 @@ fn points(matter: &Matter, look: Option<&Look>) -> (Vec<Point>, f64) {
         }
     }
     match look {
-        None | Some(Look::Mri) => {
+        None | Some(Look::Mri | Look::Labels) => {
             let [low, middle, high] = PLAIN;
             let ramp = [(0.0, low, 0.0), (0.25, low, 0.04), (0.5, middle, 0.22), (0.75, middle, 0.6), (1.0, high, 1.0)];
             (ramp.map(|(place, color, weight)| of_body(place, color, weight)).to_vec(), 12.0)

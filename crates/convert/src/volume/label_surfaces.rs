@@ -1,6 +1,6 @@
 //! A volume of labels → the surfaces between its regions.
 //!
-//! The number of a voxel is its region; voxels of 0 and NaN have no region. Every cell between eight voxels of several regions gets one vertex, every two
+//! The number of a voxel is its region; voxels of 0, −1 and NaN have no region. Every cell between eight voxels of several regions gets one vertex, every two
 //! neighbours of different regions one quadrilateral (surface nets, Gibson 1998). So a surface lies halfway between two
 //! voxels, and shows no label but theirs. A surface between two regions belongs to the one of greater opacity, so that what lies within
 //! a translucent region is seen, else to that of the greater number. Vertices are moved towards their neighbours, within their cell, so that steps of voxels do not show.
@@ -25,6 +25,9 @@ const CHUNK: usize = 1 << 16;
 /// Numbers whose opacity is listed rather than searched: those of 16 bits, which atlases have.
 const SMALL: u32 = 1 << 16;
 
+/// The number below 0 that voxels may have: programs that count regions from 0 write it where there is none.
+const NOTHING: f32 = -1.0;
+
 /// A cell without a vertex.
 const NONE: u32 = u32::MAX;
 
@@ -48,19 +51,21 @@ struct Opacities<'a> {
     small: Vec<f32>,
 }
 
-/// The surfaces of the regions of a volume of whole numbers from 0 on, with the column `label` of faces. Regions that `table` hides have none.
+/// The surfaces of the regions of a volume of whole numbers from 0 on, and −1 where there is none, with the column `label` of faces. Regions that `table` hides have none.
 /// `object` is named in errors.
 ///
 /// # Errors
 /// [`ConvertError::Parameter`] for a value that is no label, and for more vertices than a mesh can have.
 pub fn label_surfaces(grid: &Grid, table: Option<&LabelTable>, object: &str) -> Result<Mesh, ConvertError> {
-    let is_label = |value: &f32| value.is_nan() || (0.0..=LARGEST_LABEL as f32).contains(value) && value.fract() == 0.0;
+    let is_label = |value: &f32| {
+        value.is_nan() || *value == NOTHING || (0.0..=LARGEST_LABEL as f32).contains(value) && value.fract() == 0.0
+    };
     if let Some(value) = grid.values.par_iter().find_first(|value| !is_label(value)) {
         return Err(ConvertError::Parameter {
             object: object.to_owned(),
             parameter: "a voxel of a mesh of labels",
             found: value.to_string(),
-            expected: "a whole number from 0 to 16777216",
+            expected: "a whole number from 0 to 16777216, or -1 for no label",
         });
     }
     let [nx, ny, nz] = grid.dims;
@@ -107,7 +112,8 @@ pub fn said_of_labels(grid: &Grid, table: &LabelTable) -> Vec<String> {
     let hidden = found.iter().filter(|label| table.opacity(f64::from(**label)) == 0.0);
     let missing = found.iter().filter(|label| table.get(f64::from(**label)).is_none());
     let hidden = listed(hidden).map(|labels| format!("hidden by the table of labels: {labels}"));
-    let missing = listed(missing).map(|labels| format!("not in the table of labels, so in colours in turns: {labels}"));
+    let missing =
+        listed(missing).map(|labels| format!("not in the table of labels, so in colours of their numbers: {labels}"));
     hidden.into_iter().chain(missing).collect()
 }
 
@@ -152,7 +158,7 @@ impl<'a> Opacities<'a> {
 
 /// The region of a value; 0 is none.
 fn label(value: f32) -> f32 {
-    if value.is_nan() { 0.0 } else { value }
+    if value > 0.0 { value } else { 0.0 }
 }
 
 impl Nets<'_> {
@@ -363,7 +369,8 @@ mod tests {
         }
         assert_eq!(of_each([0.0, 0.0]).0, [0, 0]);
         let hidden = LabelTable::from_iter([(2, Label { opacity: 0.0, ..Label::default() })]);
-        let said = ["hidden by the table of labels: 2", "not in the table of labels, so in colours in turns: 7"];
+        let said =
+            ["hidden by the table of labels: 2", "not in the table of labels, so in colours of their numbers: 7"];
         assert_eq!(said_of_labels(&grid, &hidden), said);
     }
 
@@ -373,6 +380,9 @@ mod tests {
         grid.values[0] = 3.0;
         let mesh = label_surfaces(&grid, None, "a").unwrap();
         assert_eq!((mesh.triangles.len(), mesh.position.len()), (12, 8));
+        let around =
+            Grid { values: grid.values.iter().map(|v| if *v == 0.0 { -1.0 } else { *v }).collect(), ..grid.clone() };
+        assert_eq!(label_surfaces(&around, None, "a").unwrap(), mesh);
         assert!(enclosed(&mesh) > 0.0);
         grid.values[5] = 0.5;
         let error = label_surfaces(&grid, None, "a").unwrap_err().to_string();

@@ -35,12 +35,16 @@ pub(crate) struct RawLabelTable {
 
 /// How a label looks.
 #[derive(Debug, Default, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default, expecting = "a name or a table behind the number of a label, such as 12 = \"liver\"")]
+#[serde(
+    deny_unknown_fields,
+    default,
+    expecting = "a name or a table behind the number of a label, such as 12 = \"liver\""
+)]
 #[schemars(rename = "Label")]
 pub(crate) struct RawLabelLook {
     /// Its name in the legend; default none.
     pub(crate) name: Option<String>,
-    /// Its colour: three numbers, linear Rec.709, or "#rrggbb"; default one of twelve in turns.
+    /// Its colour: three numbers, linear Rec.709, or "#rrggbb"; default the colour of its number in the map `distinct`.
     pub(crate) color: Option<TextOr<[f64; 3]>>,
     /// Opacity of one crossing of its surface, from 0, which hides it, to 1, the default.
     pub(crate) opacity: Option<f64>,

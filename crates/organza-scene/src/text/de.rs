@@ -18,16 +18,24 @@ pub(crate) fn from_node<T: de::DeserializeOwned>(document: &Document<'_>, node: 
     T::deserialize(node).map_err(|e| document.error(e.place.unwrap_or(node.place), e.message, e.hint))
 }
 
-/// A key that was in another table once.
+/// A key that was in another table once, or that is looked for there.
 struct Moved {
     key: &'static str,
     /// A key of the table where it was.
     beside: &'static str,
-    /// Where it is.
-    to: &'static str,
+    /// Where it is, as a hint.
+    hint: &'static str,
 }
 
-const MOVED: [Moved; 1] = [Moved { key: "shadow", beside: "slice_thickness", to: "render.shadow" }];
+const MOVED: [Moved; 2] = [
+    Moved { key: "shadow", beside: "slice_thickness", hint: "it is `render.shadow` now" },
+    // Of `color_by`: users look for colours by a second volume there.
+    Moved {
+        key: "volume",
+        beside: "column",
+        hint: "a surface shows another volume by `field`; labels over intensities are two objects, a `mesh` of labels and a `volume`",
+    },
+];
 
 /// An error and, once known, its place.
 #[derive(Debug)]
@@ -139,7 +147,7 @@ impl de::Error for DeError {
 
     fn unknown_field(field: &str, expected: &'static [&'static str]) -> Self {
         let moved = MOVED.iter().find(|m| m.key == field && expected.contains(&m.beside));
-        let hint = moved.map_or_else(|| suggest(field, expected), |m| format!("it is `{}` now", m.to));
+        let hint = moved.map_or_else(|| suggest(field, expected), |m| m.hint.to_owned());
         Self::new(format!("unknown key `{}`", shown(field)), hint)
     }
 

@@ -3,7 +3,7 @@
 use super::point_colors::{mesh_colors, point_colors};
 use super::quoted;
 use crate::data_file::DataFile;
-use crate::labels::Labels;
+use crate::labels::{Labels, Reading};
 use crate::matter::Matter;
 use crate::number::{color, grouped, rounded, significant};
 use crate::preset::{Look, Preset, Wish};
@@ -13,6 +13,7 @@ use convert::ColorMap;
 use organza::scene::Recipe;
 use organza::{Error, SourceData, printable};
 use read::stated_up_axis;
+use splat_core::text::counted;
 use splat_core::{DAabb, Grid, optics};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -44,6 +45,8 @@ pub(super) struct Object {
     keys: String,
     /// How many labels it has, if it is a volume of such.
     labels: Option<usize>,
+    /// Why a volume that could have labels is drawn as amounts, a sentence.
+    doubt: Option<String>,
 }
 
 impl Object {
@@ -58,6 +61,11 @@ impl Object {
     /// How many labels it has, if it is a volume of such.
     pub(super) fn labels(&self) -> Option<usize> {
         self.labels
+    }
+
+    /// Why a volume that could have labels is drawn as amounts, a sentence.
+    pub(super) fn doubt(&self) -> Option<&str> {
+        self.doubt.as_deref()
     }
 
     /// The table of its material, where it is the first that has it.
@@ -269,6 +277,7 @@ fn object(file: &DataFile, wish: &Wish, table: Option<&str>, colors: Option<Stri
         material,
         keys,
         labels: None,
+        doubt: None,
     };
     match &file.data {
         SourceData::Mesh(mesh) => {
@@ -298,8 +307,16 @@ fn object(file: &DataFile, wish: &Wish, table: Option<&str>, colors: Option<Stri
         SourceData::Grid(grid) => {
             let matter = Matter::in_surroundings(grid, file.value_outside);
             let is_as_it_is = file.array.is_none() && file.nodata.is_none();
-            if let Some(Labels(known)) = labels(grid, matter.as_ref(), wish).filter(|_| is_as_it_is) {
-                let labels = known.iter().filter(|label| **label > 0.0).count();
+            let mut reading = reading(grid, matter.as_ref(), wish);
+            if let (Reading::Labels(known), false) = (&reading, is_as_it_is) {
+                let count = counted(known.regions().count() as u64, "label");
+                let keys = "a `mesh` of labels takes no `array` and no `nodata`";
+                reading = Reading::Doubtful(format!(
+                    "its whole numbers look like {count}, but are taken for amounts: {keys}"
+                ));
+            }
+            if let Reading::Labels(known) = &reading {
+                let labels = known.regions().count();
                 let map = preset.and_then(Preset::map).map_or("distinct", |map| map.name());
                 let colors = match table {
                     Some(path) => format!("labels = {}", quoted(path)),
@@ -327,21 +344,40 @@ fn object(file: &DataFile, wish: &Wish, table: Option<&str>, colors: Option<Stri
             let about =
                 format!("{} × {} × {} voxels; {}", grid.dims[0], grid.dims[1], grid.dims[2], sides(extent(grid)));
             let keys = volume_keys(grid, matter.as_ref(), look.as_ref());
-            bare("volume", about, Some(material), keys)
+            let doubt = if let Reading::Doubtful(said) = reading { Some(said) } else { None };
+            Object { doubt, ..bare("volume", about, Some(material), keys) }
         }
         // Images are refused when they are read.
         SourceData::Image(_) => bare("environment", String::new(), None, String::new()),
     }
 }
 
-/// The labels of a volume that has such, unless its look is that of amounts.
-fn labels(grid: &Grid, matter: Option<&Matter>, wish: &Wish) -> Option<Labels> {
-    if let Some(labels) = wish.labels.as_ref().and_then(|labels| Labels::by_table(grid, &labels.table)) {
-        return Some(labels);
+/// Whether a volume has labels: by the table or the look that is named, else by its numbers.
+fn reading(grid: &Grid, matter: Option<&Matter>, wish: &Wish) -> Reading {
+    if let Some(Ok(labels)) = stated_labels(grid, wish) {
+        return Reading::Labels(labels);
     }
     let preset = wish.preset.as_ref();
     let is_of_amounts = preset.is_some_and(|preset| preset.map().is_none());
-    if is_of_amounts || matter.is_some_and(Matter::has_units) { None } else { Labels::from_grid(grid) }
+    if is_of_amounts {
+        return Reading::Amounts;
+    }
+    match Labels::from_grid(grid) {
+        Reading::Labels(_) if matter.is_some_and(Matter::has_units) => {
+            let reason = "they have the range of Hounsfield units";
+            Reading::Doubtful(format!("its whole numbers are taken for amounts, not for labels: {reason}"))
+        }
+        reading => reading,
+    }
+}
+
+/// The labels of a volume by the table or the look that is named, or the reason why it has none; `None` where neither is.
+pub(super) fn stated_labels(grid: &Grid, wish: &Wish) -> Option<Result<Labels, String>> {
+    match &wish.labels {
+        _ if wish.preset.as_ref().is_some_and(Preset::is_labels) => Some(Labels::whole(grid)),
+        Some(labels) => Some(Labels::by_table(grid, &labels.table)),
+        None => None,
+    }
 }
 
 /// How a volume looks: a computed field in the colours of a map, a computed tomogram as bones in a film, unless its look has a name. What scanners measure comes in whole numbers, in

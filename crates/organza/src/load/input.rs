@@ -384,6 +384,9 @@ fn labels(
     let bytes = convert::label_surface_bytes(grid);
     let _held = context.files.memory(context.options).take(&name, bytes).map_err(Error::Limit)?;
     let table = known.map(|known| &*known.table);
+    if grid.values.contains(&-1.0) {
+        context.files.note(path, ["its voxels of -1 belong to no region, as those of 0".to_owned()]);
+    }
     let mesh = convert::label_surfaces(grid, table, &name).map_err(|error| match error {
         convert::ConvertError::Parameter { parameter, found, expected, .. } => {
             let message = format!("{parameter} is {found}, expected {expected}");
