@@ -43,10 +43,16 @@ pub(super) fn predicted_text(predicted: &Prediction) -> String {
 /// Splats by object as a table.
 pub(super) fn splats_text(splats: &[SplatCount]) -> String {
     let rows = splats.iter().map(|s| {
-        let about = if s.exact { "" } else { "about " };
-        [organza::escape_controls(&s.object).into_owned(), format!("{about}{}", s.predicted), s.made.to_string()]
+        let predicted = if s.exact { s.predicted.to_string() } else { format!("about {}", estimate(s.predicted)) };
+        [organza::escape_controls(&s.object).into_owned(), predicted, s.made.to_string()]
     });
     table(["object", "splats predicted", "splats"], "lrr", rows)
+}
+
+/// An estimated count to two digits: further ones would not be true.
+fn estimate(count: u64) -> u64 {
+    let unit = 10u64.pow(count.checked_ilog10().unwrap_or(0).saturating_sub(1));
+    count.saturating_add(unit / 2) / unit * unit
 }
 
 /// What techniques err by as a table; nothing where nothing is known to be wrong.
