@@ -37,6 +37,34 @@ fn exit_0_render_writes_all_outputs_and_nothing_else() {
 }
 
 #[test]
+fn options_and_sets_both_hold_and_contradictions_are_refused() {
+    let place = place();
+    let size = |arguments: &[&str]| {
+        let out = place.expect(0, &[&["render", "s.toml", "-o", "a.png", "--json"], arguments].concat(), "");
+        json_of(&out)["size"].clone()
+    };
+    let camera = "camera={ position = [0, 0, 5], target = [0, 0, 0], size = [8, 6] }";
+    let placed = "camera={ position = [0, 0, 5], target = [0, 0, 0] }";
+    assert_eq!(size(&["--set", camera]), serde_json::json!([8, 6]));
+    assert_eq!(size(&["--size", "20x10", "--set", placed]), serde_json::json!([20, 10]));
+    assert_eq!(size(&["--size", "8x6", "--set", camera]), serde_json::json!([8, 6]));
+    for (options, key) in [
+        (&["--size", "20x10", "--set", camera][..], "camera.size"),
+        (&["--technique", "surfels", "--set", "render={ technique = 'points' }"], "render.technique"),
+        (&["--background", "white", "--set", "background.color=[0, 0, 1]"], "background"),
+        (&["--budget", "500", "--set", "render.budget_ms=400"], "render.budget_ms"),
+        (&["--effect", "object.fog=off", "--set", "render.effects={ 'object.fog' = 'on' }"], "object.fog"),
+    ] {
+        let said = format!("{key}` has two values\nhint: leave one of both out");
+        place.expect(2, &[&["render", "s.toml", "-o", "b.png"], options].concat(), &said);
+    }
+    // A scene that is made of a file keeps the size, too.
+    place.write("a.xyz", "0 0 0\n1 0 0\n0 1 0\n0 0 1\n");
+    let made = ["render", "a.xyz", "-o", "c.png", "--json", "--size", "20x10", "--set", placed];
+    assert_eq!(json_of(&place.expect(0, &made, ""))["size"], serde_json::json!([20, 10]));
+}
+
+#[test]
 fn exit_0_the_default_output_is_the_scenes_name() {
     let place = place();
     place.expect(0, &["render", "s.toml"], "");

@@ -226,7 +226,7 @@ pub(super) struct SceneArguments {
     pub(super) inputs: Vec<PathBuf>,
     #[command(flatten)]
     pub(super) first: FirstArguments,
-    /// Change a value of the scene before it is checked, such as render.points.exact=true or object.cloud.visible=false
+    /// Change a value of the scene before it is checked, such as render.points.exact=true or object.cloud.visible=false; in order, before other options
     #[arg(long = "set", value_name = "PATH=VALUE")]
     pub(super) set: Vec<String>,
     /// Switch an effect that `organza explain` lists on or off whatever it changes, such as shadow.sun=off

@@ -256,13 +256,16 @@ pub(super) fn processor_only(arguments: &SceneArguments) -> Result<(), Error> {
     }
 }
 
-/// Options that stand for a value of the scene, then `--set` in order. A scene that was made of data files has the first of them already.
+/// `--set` in order, then options that stand for a value of the scene, then effects. A scene that was made of data files has the camera's options already,
+/// unless a `--set` replaces its camera.
 pub(super) fn overrides(a: &SceneArguments, is_made: bool) -> Result<Vec<Override>, Error> {
+    let sets = a.set.iter().map(|text| Override::parse(text)).collect::<Result<Vec<_>, _>>()?;
+    let has_camera = is_made && !sets.iter().any(|set| *set.path() == ["camera"]);
     let mut options: Vec<(String, &str, String)> = Vec::new();
     if let Some(name) = &a.technique {
         options.push((format!("--technique {name}"), "render.technique", quote(name)));
     }
-    if let Some([w, h]) = a.common.size.filter(|_| !is_made) {
+    if let Some([w, h]) = a.common.size.filter(|_| !has_camera) {
         options.push((format!("--size {w}x{h}"), "camera.size", format!("[{w}, {h}]")));
     }
     if let Some(seed) = a.seed {
@@ -294,12 +297,28 @@ pub(super) fn overrides(a: &SceneArguments, is_made: bool) -> Result<Vec<Overrid
     }
     let options = options.into_iter().map(|(flag, path, value)| Override::from_option(flag, path, &value));
     check_switches(&a.effect)?;
-    let mut changes = if is_made { Vec::new() } else { camera_overrides(&a.first)? };
+    let of_camera = if has_camera { Vec::new() } else { camera_overrides(&a.first)? };
     let effects = a.effect.iter().map(|text| Override::of_effect(text));
-    for change in options.chain(a.set.iter().map(|text| Override::parse(text))).chain(effects) {
+    let mut changes = sets;
+    for change in of_camera.into_iter().map(Ok).chain(options).chain(effects) {
         changes.push(change?);
     }
+    check_sets(&changes)?;
     Ok(changes)
+}
+
+/// Refuses a `--set` whose value another option takes the place of, rather than drop one of both.
+pub(super) fn check_sets(changes: &[Override]) -> Result<(), Error> {
+    let is_set = |change: &&Override| change.flag().starts_with("--set ");
+    let options = || changes.iter().filter(|change| !is_set(change));
+    for set in changes.iter().filter(is_set) {
+        if let Some(option) = options().find(|option| set.is_lost_by(option)) {
+            let key = option.path().join(".");
+            let message = format!("{} and {}: `{key}` has two values", shown(set.flag()), shown(option.flag()));
+            return Err(Error::usage(message, "leave one of both out; options take the place of what --set states"));
+        }
+    }
+    Ok(())
 }
 
 /// A text as TOML, which takes JSON's quotes and escapes.

@@ -5,7 +5,8 @@ use super::film;
 use crate::args::{Backend, Frames, RenderArguments};
 use crate::given::{Given, given};
 use crate::session::{
-    Flag, goal_keys, goal_overrides, goal_remarks, overrides, parse_changed, parse_scene, render_options, unused_goal,
+    Flag, check_sets, goal_keys, goal_overrides, goal_remarks, overrides, parse_changed, parse_scene, render_options,
+    unused_goal,
 };
 use organza::output::{self, Format, Target, Targets};
 use organza::scene::{FoundCamera, Goal, Scene};
@@ -206,6 +207,7 @@ impl<'a> Jobs<'a> {
 /// The scene with the options of the command line, and with the layer that files without a background are made with.
 fn parsed(arguments: &RenderArguments, given: &Given, frame: Option<u32>) -> Result<Scene, Error> {
     let goal = goal_overrides(&arguments.goal)?;
+    check_sets(&[overrides(&arguments.scene, given.is_made)?, goal.clone()].concat())?;
     let mut scene = parse_changed(&arguments.scene, given, frame, arguments.turntable, goal)?;
     let has_all = !arguments.transparent || scene.render.layers.add("background");
     has_all.then_some(scene).ok_or_else(|| Error::Internal("there is no layer of the background".into()))

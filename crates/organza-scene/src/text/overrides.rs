@@ -81,6 +81,29 @@ impl Override {
         &self.path
     }
 
+    /// Returns whether a later change takes the place of a value that this one states, by another value.
+    ///
+    /// ```
+    /// use organza_scene::Override;
+    /// let change = |text: &str| Override::parse(text).unwrap();
+    /// let size = change("camera.size=[64, 48]");
+    /// assert!(change("camera={ size = [9, 9], fov_y = 35 }").is_lost_by(&size));
+    /// assert!(!change("camera={ size = [64, 48] }").is_lost_by(&size));
+    /// assert!(!change("camera={ fov_y = 35 }").is_lost_by(&size));
+    /// assert!(change("background.color=red").is_lost_by(&change("background={ color = [1, 1, 1] }")));
+    /// ```
+    pub fn is_lost_by(&self, later: &Self) -> bool {
+        let Some(value) = &self.value else { return false };
+        let stated = |value: &Value| toml_of(value);
+        if let Some(below) = later.path.strip_prefix(&self.path[..]) {
+            let replaced = later.value.as_ref().map(stated);
+            return at_path(value, below).is_some_and(|value| Some(stated(value)) != replaced);
+        }
+        let Some(below) = self.path.strip_prefix(&later.path[..]) else { return false };
+        let left = later.value.as_ref().and_then(|value| at_path(value, below)).map(stated);
+        left != Some(stated(value))
+    }
+
     /// The value as TOML on one line; `None` takes away what is at the path.
     ///
     /// ```
@@ -92,6 +115,13 @@ impl Override {
     pub fn toml(&self) -> Option<String> {
         self.value.as_ref().map(toml_of)
     }
+}
+
+/// The value at a path of keys within another one.
+fn at_path<'v>(value: &'v Value, path: &[String]) -> Option<&'v Value> {
+    let [first, rest @ ..] = path else { return Some(value) };
+    let Value::Table(entries) = value else { return None };
+    at_path(&entries.iter().find(|entry| entry.key == *first)?.node.value, rest)
 }
 
 /// A value as TOML on one line, whose numbers are read as the same ones.
