@@ -90,7 +90,7 @@ fn a_legend_of_nothing_is_refused_before_any_work_and_one_without_room_is_told()
     place.write("empty.toml", shown.as_bytes());
     place.expect(0, &["render", "empty.toml", "--legend", "-o", "b.png"], "there is no legend: nothing that is drawn");
     let small = ["render", "plane.xyz", "--color-by", "heat", "--legend", "--size", "32x20", "-o", "c.png"];
-    place.expect(0, &small, "c.png: there is no room for 1 of the legends; use a larger --size");
+    place.expect(0, &small, "c.png: there is no room for a legend; use a larger --size");
 }
 
 /// A cube from −0.5 to 0.5 in text, of whose faces some are left out.

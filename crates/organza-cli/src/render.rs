@@ -387,14 +387,16 @@ impl Job<'_> {
                 ));
             }
             if report.without_room > 0 {
-                let path = printable(path);
-                let count = report.without_room;
-                warnings.push(format!("{path}: there is no room for {count} of the legends; use a larger --size"));
+                warnings.push(without_room(printable(path), report.without_room));
             }
             written.push((path, report));
         }
         for film in films {
-            film.add(render.layers.size, &output::displayed_bytes(&render.layers, &metadata, &params)?)?;
+            let (bytes, report) = output::displayed_with_report(&render.layers, &metadata, &params)?;
+            if report.without_room > 0 {
+                warnings.push(without_room("the film", report.without_room));
+            }
+            film.add(render.layers.size, &bytes)?;
         }
         Ok(written)
     }
@@ -444,4 +446,10 @@ impl Job<'_> {
         }
         document
     }
+}
+
+/// The warning that a picture has no room for some legends.
+fn without_room(picture: impl std::fmt::Display, count: u64) -> String {
+    let legends = if count == 1 { "a legend".to_owned() } else { format!("{count} legends") };
+    format!("{picture}: there is no room for {legends}; use a larger --size")
 }

@@ -184,7 +184,20 @@ fn check_sides(format: &str, size: [u32; 2], most: u32) -> Result<(), Error> {
 /// # Errors
 /// [`Error::Internal`] for layers without `beauty`, or for a transparent picture without `alpha` and `background`.
 pub fn displayed_bytes(layers: &Layers, metadata: &Metadata, params: &Params) -> Result<Vec<u8>, Error> {
-    png_file::bytes(layers, metadata, params, &mut WriteReport::default())
+    displayed_with_report(layers, metadata, params).map(|(bytes, _)| bytes)
+}
+
+/// The same, with the report of what the picture cannot show.
+///
+/// # Errors
+/// As [`displayed_bytes`].
+pub fn displayed_with_report(
+    layers: &Layers,
+    metadata: &Metadata,
+    params: &Params,
+) -> Result<(Vec<u8>, WriteReport), Error> {
+    let mut report = WriteReport::default();
+    png_file::bytes(layers, metadata, params, &mut report).map(|bytes| (bytes, report))
 }
 
 /// The page's example compiles and holds.

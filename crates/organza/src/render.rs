@@ -241,7 +241,9 @@ pub(crate) fn render_keeping(
     };
     let Session { sets, predicted, .. } = session;
     let is_judged = !has_reason && scene.frames.is_none();
-    let coarse = is_judged.then(|| frame.coarse()).flatten().and_then(warnings::of_cells);
+    let most_of_a_table = plan.tables().map(|table| table.max_bytes).max().unwrap_or(0);
+    let coarse = is_judged.then(|| frame.coarse()).flatten();
+    let coarse = coarse.and_then(|coarse| warnings::of_cells(coarse, most_of_a_table));
     let leaves = frame.leaves();
     let backend = helper.as_ref().map_or_else(|| "cpu".to_owned(), |helper| helper.name());
     if !has_reason {

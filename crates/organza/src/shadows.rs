@@ -40,6 +40,8 @@ pub(crate) struct Coarse {
     pub(crate) better_cells: f64,
     /// How that light is called.
     pub(crate) light: String,
+    /// Bytes that its table took at its peak.
+    pub(crate) bytes: u64,
 }
 
 /// The table of one light's shadow map, as it was chosen before any work.

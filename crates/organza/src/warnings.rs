@@ -23,6 +23,12 @@ use splat_core::{DAabb, Object, Projection, SplatKind};
 const MANY: f64 = 0.1;
 /// Most cells of a side that a scene may ask for.
 const MOST_CELLS: f64 = 16384.0;
+/// Cells are proposed in steps of so many.
+const CELLS_STEP: f64 = 64.0;
+/// The share of the memory up to which cells are proposed: their bytes are an estimate.
+const SURE: f64 = 0.75;
+/// How many times the cells of a side have to grow for the picture to change by it.
+const WORTH: f64 = 1.25;
 /// Entries of a shadow map that take some seconds to build, and how many times those of the automatic resolution are told.
 const COSTLY: f64 = 2e7;
 const TIMES: f64 = 4.0;
@@ -279,16 +285,26 @@ pub(crate) fn of_scattering(plan: &Plan) -> Option<String> {
     Some(format!("{lights} scattered once, though render.sheets.scattering asks for more: `organza explain` says why"))
 }
 
-/// Shadow maps whose cells are seen in the picture.
-pub(crate) fn of_cells(coarse: Coarse) -> Option<String> {
-    let Coarse { share, cells, better_cells, light } = coarse;
-    let better = libm::ceil(better_cells / 64.0) * 64.0;
+/// Shadow maps whose cells are seen in the picture; a table may take `max_bytes`.
+pub(crate) fn of_cells(coarse: Coarse, max_bytes: u64) -> Option<String> {
+    let Coarse { share, cells, better_cells, light, bytes } = coarse;
+    let cells = f64::from(cells);
+    let better = libm::ceil(better_cells / CELLS_STEP) * CELLS_STEP;
+    // Bytes go with the number of cells at least; less than what is allowed is proposed, as that is an estimate.
+    let fitting = cells * libm::sqrt(SURE * max_bytes as f64 / bytes.max(1) as f64);
+    let most = libm::floor(fitting.min(MOST_CELLS) / CELLS_STEP) * CELLS_STEP;
     (share > MANY).then(|| {
         let percent = libm::round(100.0 * share);
-        let advice = if better <= MOST_CELLS {
-            format!("shadow_cells = {better} of that [[light]] would do")
+        let limit = if most < MOST_CELLS { "that fit the memory" } else { "that a table may have" };
+        let advice = if better <= most {
+            format!("shadow_cells = {better} of that [[light]] leaves about a twentieth")
+        } else if most >= WORTH * cells {
+            let left = libm::round(100.0 * share * cells / most);
+            format!("shadow_cells = {most} of that [[light]], the most {limit}, leave about {left} %")
+        } else if most < MOST_CELLS {
+            "finer cells do not fit the memory: a larger --max-memory, or a larger `spacing` of what casts thin shadows, helps".to_owned()
         } else {
-            "more cells than a table may have would do".to_owned()
+            "no table has finer ones: a larger `spacing` of what casts thin shadows makes these softer, nothing else helps".to_owned()
         };
         format!(
             "shadows are coarse: about {percent} % of what splats show is lit off by more than the tolerance, most by light {light}, whose map has \

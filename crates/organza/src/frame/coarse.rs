@@ -122,11 +122,12 @@ impl Frame<'_> {
             left -= share;
             left < 0.0
         });
-        let [columns, rows] = look.lit[worst].1?.prediction().size;
+        let tsm::Prediction { size: [columns, rows], bytes, .. } = look.lit[worst].1?.prediction();
         let cells = columns.max(rows) as u32;
         let light = self.with_intensity().nth(worst)?.label.clone();
         let better_cells = f64::from(cells) * finer.map_or(1.0, |(finer, _)| *finer).max(finer_at_edges).max(1.0);
-        (area > 0.0).then_some(Coarse { share: by_light.iter().sum::<f64>() / area, cells, better_cells, light })
+        let share = by_light.iter().sum::<f64>() / area;
+        (area > 0.0).then_some(Coarse { share, cells, better_cells, light, bytes })
     }
 
     /// `None` where there are no shadow maps.
