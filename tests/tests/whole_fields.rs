@@ -315,7 +315,7 @@ fn which_axis_points_up_is_said_where_nothing_says_it() {
     );
     let explained = place.expect(0, &["explain", "s.toml"], "");
     let text = String::from_utf8_lossy(&explained.stdout).into_owned();
-    assert!(text.contains("cone: y points up, as nothing says another: transform = { up = \"z\" }"), "{text}");
+    assert!(text.contains("cone: y points up, as the file states no axis: transform = { up = \"z\" }"), "{text}");
     assert!(text.contains("of memory") && !text.contains("e0"), "{text}");
 }
 

@@ -65,7 +65,7 @@ pub fn up_by(by: UpBy) -> &'static str {
     match by {
         UpBy::File => "by its file",
         UpBy::Scene => "as the scene says",
-        UpBy::Nothing => "as nothing says another: transform = { up = \"z\" } of the object turns it",
+        UpBy::Nothing => "as the file states no axis: transform = { up = \"z\" } of the object turns it",
     }
 }
 

@@ -272,7 +272,7 @@ impl Plan {
             shading.reason = if table.is_some() && self.skips_behind_finished { reason + DEEP } else { reason };
         }
         if let Some(table) = &table {
-            let reason = table.describe("thick media send what light and eye share of each cell");
+            let reason = table.describe("light and view are integrated together in each cell of thick media");
             let at = self.passes.iter().position(|p| p.name == pass::SHADE).unwrap_or(self.passes.len());
             self.passes.insert(at, PlannedPass { name: pass::EYE_MAP.into(), reason });
         }

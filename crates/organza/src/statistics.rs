@@ -311,12 +311,12 @@ impl Statistics {
     /// Describes the translucent splats and the native objects that a technique draws, in words; `None` for nothing.
     pub fn translucent_of(&self, technique: Technique) -> Option<String> {
         let [splats, natives] = self.translucent_by.iter().find(|(t, _)| *t == technique)?.1;
-        let by_own = if natives == 1 { "1 object by its".to_owned() } else { format!("{natives} objects by their") };
+        let data = format!("data of {natives} object{}", if natives == 1 { "" } else { "s" });
         match (splats, natives) {
             (0, 0) => None,
             (n, 0) => Some(format!("{n} translucent splats")),
-            (0, _) => Some(format!("{by_own} own data")),
-            (n, _) => Some(format!("{n} translucent splats and {by_own} own data")),
+            (0, _) => Some(data),
+            (n, _) => Some(format!("{n} translucent splats and {data}")),
         }
     }
 }

@@ -8,7 +8,7 @@ use crate::scene::{Scene, SceneLight};
 /// The settings of a picture that is planned but for them: the technique, the samples of a pixel, those of lights, and what techniques add.
 pub(crate) fn settings(scene: &Scene, loaded: &Loaded, plan: &Plan) -> Vec<PlannedSetting> {
     let render = &scene.render;
-    let because = "errors of techniques are estimated: it is the fastest within the tolerance, or else errs least";
+    let because = "of all techniques it is the fastest whose estimated error is within the tolerance, or else the one that errs least";
     let mut settings = vec![
         PlannedSetting::new("render.technique", format!("\"{}\"", plan.technique), !render.is_chosen, because),
         PlannedSetting::new(

@@ -46,7 +46,11 @@ impl CountedPass {
     pub fn work(&self, rates: &Rates) -> String {
         let longest = self.counts.iter().max_by(|a, b| rates.seconds(a, 1).total_cmp(&rates.seconds(b, 1)));
         let repeats = if self.repeats.is_empty() { String::new() } else { format!(" of {}", self.repeats) };
-        longest.map_or_else(String::new, |c| format!("{} {}{repeats}", number_text(c.number), c.item.words()))
+        let words = |count: &Count| match (number_text(count.number), count.item.words()) {
+            (number, "objects") if number == "1" => "1 object".to_owned(),
+            (number, words) => format!("{number} {words}"),
+        };
+        longest.map_or_else(String::new, |count| words(count) + &repeats)
     }
 }
 

@@ -217,7 +217,7 @@ pub(crate) fn of_slabs(technique: Technique, asked: &Asked<'_>) -> Vec<Estimate>
     // What is scattered once is exact.
     let off = SCATTERED_ERROR * (1.0 - 1.0 / factor) * whole;
     let change = displayed_change(whole - off, whole, asked.settings.exposure);
-    let words = "light that it scatters again and again, in cells".to_owned();
+    let words = "light that it scatters again and again is averaged over cells".to_owned();
     let cells = (change > 0.0).then(|| asked.estimate(technique, "cells of scattered light", change, words));
     cells.into_iter().chain(too_dark(technique, asked, 1.0 - medium.outside_share)).collect()
 }

@@ -110,7 +110,7 @@ pub(crate) fn settings(scene: &Scene, loaded: &Loaded, plan: &Plan) -> Vec<Plann
     let points = &scene.render.points;
     let stated = scene.render.stated;
     let because = exact_because(scene.render.layers.set().depth, plan, loaded);
-    let plain = because.unwrap_or("splats that slices alone order are seen in another order, and cost nearly as much");
+    let plain = because.unwrap_or("slices alone leave splats within them out of order, and save little time");
     let key = "render.points.exact";
     let exact = match because {
         Some(reason) if !points.exact => PlannedSetting {

@@ -11,7 +11,7 @@ use super::{Row, take_nothing};
 use crate::plan::Bound;
 use crate::scene::{EffectKind, SwitchedEffect};
 use crate::statistics::{MediumStatistics, Statistics};
-use crate::technique::TABLE;
+use crate::technique::{TABLE, row};
 
 const WITHOUT: &str = "light is scattered once";
 
@@ -30,7 +30,7 @@ fn candidate(statistics: &Statistics) -> Candidate {
     }
     let bound = bound_of(media, statistics);
     let names: Vec<String> = media.iter().map(|medium| format!("'{}'", crate::shown(&medium.object))).collect();
-    let names = names.join(", ");
+    let names = listed(&names);
     let kind = EffectKind::Scatter;
     if SwitchedEffect::find(&statistics.switched, kind, "") == Some(false) {
         return Candidate::switched("", false, WITHOUT, bound);
@@ -40,11 +40,24 @@ fn candidate(statistics: &Statistics) -> Candidate {
         return Candidate::new("", Choice::Settled { is_on: true, reason, bound });
     }
     let drawing = statistics.techniques.iter().map(|technique| format!("`{}`", technique.name())).collect::<Vec<_>>();
+    let leave = if drawing.len() == 1 { "leaves" } else { "leave" };
+    // A technique that could is named by what the scene has it do instead.
+    let could = statistics.techniques.iter().any(|technique| row(*technique).scatters_by.is_some());
+    let as_set = if could { " as the scene sets it" } else { "" };
     let way =
         TABLE.iter().find_map(|row| row.scatters_by).map(|way| format!(": {way} asks for it")).unwrap_or_default();
-    let on = format!("{names} may scatter light again and again, which {} leaves out{way}", drawing.join(" and "));
+    let drawing = listed(&drawing);
+    let on = format!("{names} may scatter light again and again, which {drawing}{as_set} {leave} out{way}");
     let choice = Choice::Open { bound, on, off: format!("{names} would scatter too little light again") };
     Candidate { is_missing: true, ..Candidate::new("", choice) }
+}
+
+/// Names with commas, and "and" before the last one.
+fn listed(names: &[String]) -> String {
+    match names {
+        [before @ .., last] if !before.is_empty() => format!("{} and {last}", before.join(", ")),
+        _ => names.concat(),
+    }
 }
 
 /// The most that all orders from the second on add to a displayed pixel.

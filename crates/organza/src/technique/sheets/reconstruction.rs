@@ -64,12 +64,12 @@ pub(super) fn chosen(scene: &Scene, natives: &[Own], camera: &Camera) -> Chosen 
         splat("voxels are finer than samples, which splats average")
     } else if half::is_asked(scene) {
         gather(
-            "slabs lie across half vectors, where a voxel is splatted into each of its slabs anew, for the eye and for each light",
+            "slabs lie across half vectors, where splatting would draw a voxel into each of its slabs anew, for the eye and for each light",
         )
     } else if volumes().all(|native| samples_along_a_voxel(native) > COARSE) {
         splat("voxels are wider than five samples, and a splat fills many of these at once")
     } else if visible < SPARSE {
-        splat("less than a quarter of the voxels has extinction, and a splat is made of these alone")
+        splat("fewer than a quarter of the voxels have extinction, and these alone become splats")
     } else {
         gather(
             "a quarter of the voxels or more has extinction, and a pixel reads them in less time than all are splatted",
