@@ -55,6 +55,7 @@ fn seeds_of_files_with_others_beside_them_are_read_whole() {
         ("metaimage_beside", "a.mhd"),
         ("nrrd_beside", "a.nhdr"),
         ("vti_beside", "a.vtm"),
+        ("sog_beside", "meta.json"),
     ];
     for (target, name) in targets {
         for (path, seed) in seeds(target) {
@@ -72,6 +73,7 @@ fn seeds_of_files_with_others_beside_them_are_read_whole() {
             let is_whole = match &loaded {
                 Loaded::Mesh(mesh) => is_painted(mesh),
                 Loaded::Grid(grid) => grid.values.len() == 12,
+                Loaded::Points(points) => points.gaussians.len() == 4,
                 _ => false,
             };
             assert!(is_whole, "{path}: {loaded:?}, {notes:?}");

@@ -1,55 +1,13 @@
 //! 3D Gaussians: every kind of file gives the numbers that it was written from, within its own steps.
 
-use crate::read_samples::gaussians::{CONSTANT, Trained, packed_ply, splat, spz, trained, trained_ply};
+use crate::read_samples::gaussians::{
+    CONSTANT, EXACT, Steps, Trained, agree, packed_ply, points, splat, spz, trained, trained_ply,
+};
 use crate::read_samples::{gzip, load};
 use convert::{SurfelParams, raw_to_surfels};
 use read::{Loaded, ReadParams, bytes};
 use splat_core::RawPoints;
-use splat_core::glam::{DMat3, DQuat, DVec3};
-
-fn points(name: &str, content: &[u8]) -> RawPoints {
-    match load(name, content).unwrap() {
-        Loaded::Points(points) => points,
-        other => panic!("{other:?}"),
-    }
-}
-
-/// How far numbers may be off.
-struct Steps {
-    place: f64,
-    /// Of the logarithm of a deviation.
-    scale: f64,
-    /// Of an axis of unit length.
-    turn: f64,
-    opacity: f64,
-    constant: f64,
-    others: f64,
-}
-
-const EXACT: Steps = Steps { place: 1e-6, scale: 1e-6, turn: 1e-6, opacity: 1e-6, constant: 1e-6, others: 1e-6 };
-
-fn agree(name: &str, found: &RawPoints, written: &[Trained], degree: usize, steps: &Steps) {
-    found.validate().unwrap();
-    let g = &found.gaussians;
-    assert_eq!((found.len(), usize::from(g.degree)), (written.len(), degree), "{name}");
-    for (i, t) in written.iter().enumerate() {
-        let near = |what: &str, a: f64, b: f64, step: f64| assert!((a - b).abs() <= step, "{name} {i} {what}: {a} {b}");
-        let place = found.exact_position(i);
-        (0..3).for_each(|k| near("place", place[k], t.position[k], steps.place));
-        near("opacity", f64::from(g.opacity[i]), t.opacity, steps.opacity);
-        let [w, x, y, z] = t.rotation;
-        let turned = DMat3::from_quat(DQuat::from_xyzw(x, y, z, w));
-        for k in 0..3 {
-            let axis = g.axes[i][k].as_dvec3();
-            near("scale", axis.length().ln(), t.scale[k], steps.scale);
-            near("turn", axis.normalize().distance(turned.col(k)), 0.0, steps.turn);
-        }
-        for (k, (found, given)) in g.harmonics[i * g.terms()..].iter().zip(&t.harmonics[..g.terms()]).enumerate() {
-            let step = if k == 0 { steps.constant } else { steps.others };
-            (0..3).for_each(|c| near(&format!("harmonic {k}"), f64::from(found[c]), given[c], step));
-        }
-    }
-}
+use splat_core::glam::DVec3;
 
 #[test]
 fn trained_gaussians_come_back_from_text_and_bytes() {

@@ -30,6 +30,8 @@ pub(crate) enum Format {
     Png,
     Splat,
     Spz,
+    Sog,
+    Ksplat,
     Tiff,
     Dicom,
 }
@@ -73,6 +75,9 @@ pub(crate) fn format_of(path: &Path, content: &[u8]) -> Option<Format> {
     if content.starts_with(b"NGSP") {
         return Some(Format::Spz);
     }
+    if is_sog_archive(path, content) || is_sog_description(content) {
+        return Some(Format::Sog);
+    }
     if content.starts_with(b"glTF") {
         return Some(Format::Gltf);
     }
@@ -96,6 +101,27 @@ pub(crate) fn format_of(path: &Path, content: &[u8]) -> Option<Format> {
         return Some(Format::MetaImage);
     }
     named.or_else(|| stl::is_text(content).then_some(Format::Stl))
+}
+
+/// Whether an archive is one of SOG: by its extension, else by the name of its first file.
+fn is_sog_archive(path: &Path, content: &[u8]) -> bool {
+    /// Names that writers of SOG give their files, and where a name begins behind the head of an entry.
+    const NAMES: [&[u8]; 4] = [b"meta.json", b"means_l.webp", b"means_u.webp", b"quats.webp"];
+    const NAME: usize = 30;
+    if !content.starts_with(ZIP) {
+        return false;
+    }
+    let is_named = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("sog"));
+    is_named || NAMES.iter().any(|name| content.get(NAME..).is_some_and(|rest| rest.starts_with(name)))
+}
+
+/// The first bytes of a ZIP archive.
+pub(crate) const ZIP: &[u8] = b"PK\x03\x04";
+
+/// Whether a text is the description of SOG beside its images.
+pub(crate) fn is_sog_description(content: &[u8]) -> bool {
+    let has = |word: &[u8]| content.windows(word.len()).any(|window| window == word);
+    content.trim_ascii_start().starts_with(b"{") && has(b"\"means\"") && has(b"\"files\"") && has(b"\"mins\"")
 }
 
 /// It has no mark, but begins with one of two fields.
@@ -133,6 +159,8 @@ pub(crate) fn by_name(path: &Path) -> Option<Format> {
         "raw" => Some(Format::Raw),
         "splat" => Some(Format::Splat),
         "spz" => Some(Format::Spz),
+        "sog" => Some(Format::Sog),
+        "ksplat" => Some(Format::Ksplat),
         "tif" | "tiff" => Some(Format::Tiff),
         "dcm" | "dicom" | "ima" => Some(Format::Dicom),
         _ => None,

@@ -1,5 +1,5 @@
 //! Reading files: meshes (PLY, STL, OBJ, OFF, glTF), point clouds (PLY, OBJ, OFF, PCD, glTF, XYZ, CSV, LAS, LAZ, E57), 3D Gaussians (PLY, packed
-//! PLY, .splat, SPZ), volumes (NIfTI,
+//! PLY, .splat, .ksplat, SPZ, SOG), volumes (NIfTI,
 //! NRRD, MetaImage, DICOM, VTK, TIFF, folders of slices, raw) and images of radiance (Radiance HDR, OpenEXR, PNG), each also inside gzip.
 //!
 //! No input makes a reader panic or take memory that the file does not stand for: sizes that a header announces are
@@ -19,6 +19,7 @@
         feature = "obj",
         feature = "off",
         feature = "gltf",
+        feature = "sog",
         feature = "las",
         feature = "e57",
         feature = "nifti",
@@ -79,7 +80,9 @@ use points::e57;
 use points::extras::LONGEST_NAME;
 #[cfg(feature = "las")]
 use points::las;
-use points::{pcd, splat, spz, xyz};
+#[cfg(feature = "sog")]
+use points::sog;
+use points::{ksplat, pcd, splat, spz, xyz};
 use rayon::prelude::*;
 use reading::Reading;
 use splat_core::glam::{DMat3, DVec3};
@@ -254,6 +257,11 @@ fn whole_folder(path: &Path, reading: &mut Reading<'_>) -> Result<Loaded, ReadEr
         "Dicom".clone_into(&mut reading.notes.format);
         let loaded = dicom::read(path, None, reading).map(Loaded::Grid)?;
         return finished(loaded, reading);
+    }
+    #[cfg(feature = "sog")]
+    if let Some(description) = folder::sog_description(&files) {
+        let stream = Stream::open(description, reading.params)?;
+        return whole(description, stream, Some(description), reading);
     }
     #[cfg(any(feature = "tiff", feature = "png"))]
     if slices::has_slices(&files) {
@@ -482,7 +490,8 @@ fn parse(
     if reading.params.is_coverage && !matches!(format, Some(Format::Exr | Format::Png)) {
         return Err(unread::without_coverage(path, head, format));
     }
-    if let Some(error) = unread::by_mark(path, head) {
+    // An archive of SOG has the mark of other archives.
+    if let (false, Some(error)) = (matches!(format, Some(Format::Sog)), unread::by_mark(path, head)) {
         return Err(error);
     }
     if head.is_empty() && matches!(format, Some(Format::Obj | Format::Xyz)) {
@@ -513,7 +522,10 @@ fn parse_as(
         #[cfg(feature = "gltf")]
         Format::Gltf => gltf::read(&stream.rest()?, place, reading),
         Format::Splat => splat::read(&stream.rest()?, reading).map(Loaded::Points),
+        Format::Ksplat => ksplat::read(&stream.rest()?, reading).map(Loaded::Points),
         Format::Spz => spz::read(&stream.rest()?, reading).map(Loaded::Points),
+        #[cfg(feature = "sog")]
+        Format::Sog => sog::read(&stream.rest()?, place, reading).map(Loaded::Points),
         Format::Pcd => pcd::read(&stream.rest()?, reading).map(Loaded::Points),
         Format::Xyz => xyz::read(&stream.rest()?, params, &mut reading.notes).map(Loaded::Points),
         Format::Nrrd => nrrd::read(stream, place, params, &mut reading.notes).map(Loaded::Grid),

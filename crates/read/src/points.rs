@@ -7,12 +7,15 @@ pub(crate) mod direction;
 pub(crate) mod e57;
 pub(crate) mod extras;
 pub(crate) mod gaussians;
+pub(crate) mod ksplat;
 #[cfg(feature = "las")]
 pub(crate) mod las;
 #[cfg(feature = "las")]
 pub(crate) mod laz;
 pub(crate) mod origin;
 pub(crate) mod pcd;
+#[cfg(feature = "sog")]
+pub(crate) mod sog;
 pub(crate) mod splat;
 pub(crate) mod spz;
 pub(crate) mod xyz;

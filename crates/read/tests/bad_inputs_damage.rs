@@ -7,6 +7,7 @@
     feature = "obj",
     feature = "off",
     feature = "gltf",
+    feature = "sog",
     feature = "nifti",
     feature = "vti",
     feature = "vtk",

@@ -1,5 +1,6 @@
 //! A small file of each format and kind, by its name: for damage, and as seeds of fuzzing.
 
+use crate::read_samples::archives::{ksplat, sog};
 use crate::read_samples::cells::{vtk_cells, vtk_surface, vtp, vtp_pieces, vtu, vtu_pieces};
 use crate::read_samples::copc::copc;
 use crate::read_samples::e57::e57;
@@ -81,6 +82,9 @@ pub(crate) fn samples() -> Vec<(&'static str, Vec<u8>)> {
         ("words.ply", packed_ply(&[trained(0, 1), trained(1, 1)], 1)),
         ("splats.ply", splats(false)),
         ("packed_splats.ply", splats(true)),
+        ("a.sog", sog(&[trained(0, 1), trained(1, 1)], 1)),
+        ("whole.ksplat", ksplat(&[trained(0, 1)], 1, 0)),
+        ("small.ksplat", ksplat(&[trained(0, 1)], 1, 2)),
         ("a.splat", splat(&[trained(0, 0)])),
         ("old.spz", spz(&[trained(0, 1), trained(1, 1)], 1, 2)),
         ("new.spz", gzip(&spz(&[trained(0, 1), trained(1, 1)], 1, 3))),

@@ -8,6 +8,8 @@ mod read_columns;
 mod read_copc;
 mod read_dicom;
 mod read_e57;
+#[cfg(all(feature = "gltf", feature = "ply", feature = "sog"))]
+mod read_gaussians;
 #[cfg(all(feature = "off", feature = "gltf"))]
 mod read_gltf;
 mod read_grids;

@@ -21,7 +21,7 @@ fn formats_that_are_not_read_are_named_with_what_to_do() {
         ("a.jpg", b"\xff\xd8\xff\xe0", "a JPEG image", "convert the image"),
         ("a.zip", b"PK\x03\x04", "a zip archive", "extract"),
         ("a.tar.gz", &tar, "a tar archive", "extract"),
-        ("a.ksplat", b"\0\0\0\0", "a web kind of 3D Gaussian splats", "save it as PLY"),
+        ("lod-meta.json", b"{\"lodLevels\": 3}", "a streamed scene of SOG parts", "name the meta.json"),
         ("a.mtl", b"newmtl a", "OBJ materials", "give the OBJ file"),
         ("scene.toml", b"[camera]", "a scene", "organza render"),
         // The content counts, whatever the name says.

@@ -32,6 +32,12 @@ pub(crate) fn files(folder: &Path) -> Result<Vec<PathBuf>, ReadError> {
     Ok(files)
 }
 
+/// The description of SOG among the files of a folder, which its images lie beside.
+pub(crate) fn sog_description(files: &[PathBuf]) -> Option<&PathBuf> {
+    let is_named = |file: &&PathBuf| file.file_name().is_some_and(|name| name == "meta.json");
+    files.iter().find(is_named).filter(|file| super::is_sog_description(&super::unread::beginning(file)))
+}
+
 /// Refuses a file of a folder that is a link out of it: a scene may not read what lies outside of its folder.
 pub(crate) fn check_inside(folder: &Path, file: &Path) -> Result<(), ReadError> {
     // Links are followed before they are judged.

@@ -29,14 +29,14 @@ const EXTRACT: &str = "extract the files in it; one file inside gzip is read as 
 const IMAGE: &str =
     "an environment is read from Radiance HDR or OpenEXR, a light's texture from PNG too; convert the image";
 const STACK: &str = "a stack of slices is read from TIFF: save it so, such as with Fiji (File > Save As > Tiff)";
-const SPLATS: &str = "save it as PLY, compressed PLY, .splat or SPZ, such as with SuperSplat";
+const LEVELS: &str = "name the meta.json or the .sog file of one of its parts";
 const SCENE: &str = "it is a scene, not data: give it to `organza render`";
 
 const fn by_extension(name: &'static str, extensions: &'static [&'static str], hint: &'static str) -> Unread {
     Unread { name, marks: &[], extensions, hint }
 }
 
-const UNREAD: [Unread; 59] = [
+const UNREAD: [Unread; 58] = [
     Unread { name: "FBX", marks: &[(0, b"Kaydara FBX Binary"), (0, b"; FBX ")], extensions: &["fbx"], hint: TO_GLTF },
     Unread {
         name: "USD",
@@ -75,7 +75,6 @@ const UNREAD: [Unread; 59] = [
     by_extension("PTX", &["ptx"], TO_PLY),
     by_extension("ReCap", &["rcp", "rcs"], TO_PLY),
     by_extension("captured packets", &["pcap"], TO_PLY),
-    by_extension("a web kind of 3D Gaussian splats", &["ksplat", "sog"], SPLATS),
     Unread { name: "OpenVDB", marks: &[(0, b" BDV\0\0\0\0")], extensions: &["vdb"], hint: TO_NRRD },
     Unread { name: "NanoVDB", marks: &[(0, b"NanoVDB")], extensions: &["nvdb"], hint: TO_NRRD },
     Unread {
@@ -119,7 +118,7 @@ const UNREAD: [Unread; 59] = [
     by_extension("a stack of a microscope", &["czi", "nd2", "lif", "lsm"], STACK),
     Unread { name: "a JPEG image", marks: &[(0, b"\xff\xd8\xff")], extensions: &["jpg", "jpeg"], hint: IMAGE },
     by_extension("an image", &["webp", "bmp", "gif", "tga", "ktx2", "avif"], IMAGE),
-    Unread { name: "a zip archive", marks: &[(0, b"PK\x03\x04")], extensions: &["zip"], hint: EXTRACT },
+    Unread { name: "a zip archive", marks: &[(0, super::ZIP)], extensions: &["zip"], hint: EXTRACT },
     Unread { name: "a tar archive", marks: &[(257, b"ustar")], extensions: &["tar", "tgz"], hint: EXTRACT },
     Unread { name: "7z", marks: &[(0, b"7z\xbc\xaf\x27\x1c")], extensions: &["7z", "rar"], hint: EXTRACT },
     Unread { name: "xz", marks: &[(0, b"\xfd7zXZ\0")], extensions: &["xz"], hint: EXTRACT },
@@ -128,7 +127,7 @@ const UNREAD: [Unread; 59] = [
     by_extension("a scene", &["toml", "json"], SCENE),
 ];
 
-const READ: &str = "PLY, .splat, SPZ, STL, OBJ, OFF, glTF, GLB, PCD, XYZ, CSV, LAS, LAZ, E57, NIfTI, NRRD, MetaImage, DICOM series, VTK images, grids, cells, surfaces and lists of these, TIFF stacks, folders of TIFF or PNG slices, raw voxels, \
+const READ: &str = "PLY, .splat, .ksplat, SPZ, SOG, STL, OBJ, OFF, glTF, GLB, PCD, XYZ, CSV, LAS, LAZ, E57, NIfTI, NRRD, MetaImage, DICOM series, VTK images, grids, cells, surfaces and lists of these, TIFF stacks, folders of TIFF or PNG slices, raw voxels, \
     Radiance HDR, OpenEXR and PNG files are read, each also inside gzip";
 
 fn error(unread: &Unread) -> ReadError {
@@ -185,7 +184,8 @@ fn unknown(head: &[u8]) -> &'static str {
 }
 
 /// Formats of JSON that are no scene, by a key or a word that scenes have not.
-const IN_JSON: [(&[u8], Unread); 3] = [
+const IN_JSON: [(&[u8], Unread); 4] = [
+    (b"\"lodLevels\"", by_extension("a streamed scene of SOG parts", &[], LEVELS)),
     (b"\"geometricError\"", by_extension("a tileset of 3D Tiles", &[], TILES)),
     (b"\"CityJSON\"", by_extension("CityJSON", &[], "convert it to OBJ or glTF, such as with cjio")),
     (
@@ -203,7 +203,7 @@ fn json(head: &[u8]) -> Option<ReadError> {
 
 /// Whether a JSON file is data of another program and no scene, by its beginning.
 pub fn is_foreign_json(beginning: &[u8]) -> bool {
-    json(beginning).is_some()
+    json(beginning).is_some() || super::is_sog_description(beginning)
 }
 
 /// The error for a folder, which may hold slices or chunks of a volume.

@@ -27,8 +27,11 @@ fn beginning(path: &Path) -> Option<Vec<u8>> {
     // Asked before opening: opening a FIFO waits for its writer.
     let about = std::fs::metadata(path).ok()?;
     if about.is_dir() {
-        // Slices of DICOM lie in a patient's space.
         let files = folder::files(path).ok()?;
+        if let Some(description) = folder::sog_description(&files) {
+            return beginning(description);
+        }
+        // Slices of DICOM lie in a patient's space.
         return files.iter().take(LOOKED_AT).find_map(|file| beginning(file).filter(|content| is_dicom(content)));
     }
     if !about.is_file() {
@@ -49,7 +52,7 @@ fn of_content(path: &Path, content: &[u8]) -> Option<UpAxis> {
     match format_of(path, content)? {
         Format::Las | Format::E57 | Format::Dicom | Format::Nifti | Format::MetaImage => Some(UpAxis::Z),
         Format::Nrrd if is_of_a_body(content) => Some(UpAxis::Z),
-        Format::Splat => Some(UpAxis::MinusY),
+        Format::Splat | Format::Sog | Format::Ksplat => Some(UpAxis::MinusY),
         Format::Ply if has_gaussians(content) => Some(UpAxis::MinusY),
         Format::Gltf | Format::Spz => Some(UpAxis::Y),
         _ => None,
@@ -97,7 +100,10 @@ mod tests {
         assert_eq!(up_axis("a.vti", b"<VTKFile type=\"ImageData\">"), UpAxis::Y);
         assert_eq!(up_axis("a.raw", b"LASF"), UpAxis::Y);
         assert_eq!(up_axis("a.splat", &[0; 32]), UpAxis::MinusY);
+        assert_eq!(up_axis("a.ksplat", &[0, 1]), UpAxis::MinusY);
         assert_eq!(up_axis("a.spz", b"NGSP"), UpAxis::Y);
+        assert_eq!(up_axis("a.sog", b"PK\x03\x04"), UpAxis::MinusY);
+        assert_eq!(up_axis("meta.json", b"{\"means\":{\"mins\":[0],\"files\":[]}}"), UpAxis::MinusY);
         for name in ["float rot_0", "uint packed_rotation"] {
             let header = format!("ply\r\nelement vertex 1\r\nproperty {name}\r\nend_header\r\n");
             assert_eq!(up_axis("a.ply", header.as_bytes()), UpAxis::MinusY, "{name}");

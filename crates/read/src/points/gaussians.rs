@@ -17,6 +17,10 @@ const MOST_COEFFICIENT: f32 = 1e4;
 /// Logarithms of deviations: what an exponential makes of them stays a normal number.
 const LOGARITHMS: std::ops::RangeInclusive<f64> = -80.0..=80.0;
 
+/// The remark on Gaussians that were trained with the filter of Mip-Splatting.
+pub(crate) const ANTIALIASED: &str =
+    "its Gaussians were trained with a filter that keeps their light, and are drawn with that of others";
+
 /// One Gaussian in the axes and the unit of its file.
 pub(crate) struct Gaussian {
     pub(crate) position: DVec3,
@@ -33,6 +37,16 @@ pub(crate) struct Refused {
     found: String,
     hint: &'static str,
 }
+
+impl Refused {
+    /// Refuses a Gaussian for a reason that only its format knows.
+    pub(crate) fn new(expected: &'static str, found: String) -> Self {
+        Self { expected, found, hint: HINT }
+    }
+}
+
+/// The hint of every refused Gaussian.
+const HINT: &str = "remove the Gaussian, or leave such points out with --drop-invalid";
 
 /// Gaussians that were read so far.
 pub(crate) struct Gathered {
@@ -93,9 +107,17 @@ impl Gathered {
         }
     }
 
+    /// Refuses one that its format has already found invalid, or counts it as dropped.
+    pub(crate) fn refuse(&mut self, reason: Refused) -> Result<(), Refused> {
+        if !self.drop_invalid {
+            return Err(reason);
+        }
+        self.points.dropped += 1;
+        Ok(())
+    }
+
     fn checked(&mut self, gaussian: &Gaussian, first: usize) -> Result<(), Refused> {
-        const HINT: &str = "remove the Gaussian, or leave such points out with --drop-invalid";
-        let refuse = |expected: &'static str, found: String| Err(Refused { expected, found, hint: HINT });
+        let refuse = |expected: &'static str, found: String| Err(Refused::new(expected, found));
         let Gaussian { position, deviation, rotation: [w, x, y, z], opacity } = *gaussian;
         if !position.is_finite() {
             return refuse("a place of finite numbers", position.to_string());

@@ -5,7 +5,7 @@
 //! harmonic; logarithms of deviations sixteenths of a byte less 10. Version 2 has x, y and z of a rotation as bytes, version 3 the three
 //! smallest numbers of it in ten bits each with the place of the largest before them. Other harmonics are bytes around 128 over 128.
 
-use super::gaussians::{Gathered, Gaussian, exponentials, refused};
+use super::gaussians::{self, Gathered, Gaussian, exponentials, refused};
 use crate::error::{Place, ReadError};
 use crate::reading::Reading;
 use splat_core::glam::DVec3;
@@ -99,9 +99,7 @@ fn header(content: &[u8], reading: &mut Reading<'_>) -> Result<Header, ReadError
         return damaged(13, "at most 23 bits behind the point of a place", fraction);
     }
     if flags & ANTIALIASED != 0 {
-        reading.notes.remark(
-            "its Gaussians were trained with a filter that keeps their light, and are drawn with that of others",
-        );
+        reading.notes.remark(gaussians::ANTIALIASED);
     }
     Ok(Header { version, count: word(8) as usize, degree, fraction })
 }

@@ -1,5 +1,9 @@
-//! Small files of 3D Gaussians of every kind, written from the same numbers.
+//! Small files of 3D Gaussians of every kind, written from the same numbers, and how far what is read of them may be off.
 
+use super::load;
+use read::Loaded;
+use splat_core::RawPoints;
+use splat_core::glam::{DMat3, DQuat};
 use std::f64::consts::SQRT_2;
 
 /// The constant of the harmonic of degree 0.
@@ -86,7 +90,7 @@ fn triple(v: [f64; 3]) -> u32 {
     whole(v[0], 11) << 21 | whole(v[1], 10) << 11 | whole(v[2], 11)
 }
 
-fn largest(rotation: &[f64; 4]) -> usize {
+pub(crate) fn largest(rotation: &[f64; 4]) -> usize {
     (0..4).max_by(|a, b| rotation[*a].abs().total_cmp(&rotation[*b].abs())).unwrap()
 }
 
@@ -177,4 +181,51 @@ pub(crate) fn spz(gaussians: &[Trained], degree: usize, version: u32) -> Vec<u8>
     }
     out.extend(gaussians.iter().flat_map(|t| t.harmonics[1..].as_flattened()).map(|v| byte(128.0 * v + 128.0)));
     out
+}
+
+/// The points of a file that is right.
+pub(crate) fn points(name: &str, content: &[u8]) -> RawPoints {
+    match load(name, content).unwrap() {
+        Loaded::Points(points) => points,
+        other => panic!("{other:?}"),
+    }
+}
+
+/// How far numbers may be off.
+pub(crate) struct Steps {
+    pub(crate) place: f64,
+    /// Of the logarithm of a deviation.
+    pub(crate) scale: f64,
+    /// Of an axis of unit length.
+    pub(crate) turn: f64,
+    pub(crate) opacity: f64,
+    pub(crate) constant: f64,
+    pub(crate) others: f64,
+}
+
+pub(crate) const EXACT: Steps =
+    Steps { place: 1e-6, scale: 1e-6, turn: 1e-6, opacity: 1e-6, constant: 1e-6, others: 1e-6 };
+
+/// Compares what was read with what was written.
+pub(crate) fn agree(name: &str, found: &RawPoints, written: &[Trained], degree: usize, steps: &Steps) {
+    found.validate().unwrap();
+    let g = &found.gaussians;
+    assert_eq!((found.len(), usize::from(g.degree)), (written.len(), degree), "{name}");
+    for (i, t) in written.iter().enumerate() {
+        let near = |what: &str, a: f64, b: f64, step: f64| assert!((a - b).abs() <= step, "{name} {i} {what}: {a} {b}");
+        let place = found.exact_position(i);
+        (0..3).for_each(|k| near("place", place[k], t.position[k], steps.place));
+        near("opacity", f64::from(g.opacity[i]), t.opacity, steps.opacity);
+        let [w, x, y, z] = t.rotation;
+        let turned = DMat3::from_quat(DQuat::from_xyzw(x, y, z, w));
+        for k in 0..3 {
+            let axis = g.axes[i][k].as_dvec3();
+            near("scale", axis.length().ln(), t.scale[k], steps.scale);
+            near("turn", axis.normalize().distance(turned.col(k)), 0.0, steps.turn);
+        }
+        for (k, (found, given)) in g.harmonics[i * g.terms()..].iter().zip(&t.harmonics[..g.terms()]).enumerate() {
+            let step = if k == 0 { steps.constant } else { steps.others };
+            (0..3).for_each(|c| near(&format!("harmonic {k}"), f64::from(found[c]), given[c], step));
+        }
+    }
 }

@@ -1,6 +1,7 @@
 //! Small valid files of every format, made in memory.
 #![allow(dead_code, unused_imports, reason = "each test file uses some of them")]
 
+pub(crate) mod archives;
 pub(crate) mod cells;
 pub(crate) mod copc;
 pub(crate) mod dicom;

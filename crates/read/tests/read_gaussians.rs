@@ -1,0 +1,216 @@
+//! 3D Gaussians as web viewers and exchange formats write them.
+
+use crate::read_samples::archives::{ksplat, sog, sog_files, webp, zip};
+use crate::read_samples::gaussians::{CONSTANT, EXACT, Steps, Trained, agree, points, trained};
+use crate::read_samples::load;
+use read::{Loaded, Notes, ReadError, ReadParams, bytes, file, up_axis};
+use splat_core::UpAxis;
+use std::fs;
+use std::path::PathBuf;
+
+fn written(count: usize, degree: usize) -> Vec<Trained> {
+    (0..count).map(|i| trained(i, degree)).collect()
+}
+
+fn folder(name: &str) -> PathBuf {
+    let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(format!("gaussians-{name}"));
+    fs::create_dir_all(&folder).unwrap();
+    folder
+}
+
+fn read(name: &str, content: &[u8]) -> Result<(Loaded, Notes), ReadError> {
+    bytes(name, content, &ReadParams::default(), None)
+}
+
+#[track_caller]
+fn refused(name: &str, content: &[u8], expected: &str) {
+    let error = load(name, content).unwrap_err().to_string();
+    assert!(error.contains(expected), "{error}\nis not: {expected}");
+}
+
+/// Steps of SOG: half a step of the tables of the samples.
+fn sog_steps(is_coded: bool) -> Steps {
+    let opacity = if is_coded { 0.501 / 255.0 } else { 0.25 * 8.0 * 0.501 / 255.0 };
+    // The derivative of a place by its logarithm is 1 + |p|, at most 5.
+    let place = 5.0 * 2.0 * 5f64.ln() * 0.501 / 65535.0;
+    Steps { place, scale: 3.0 * 0.501 / 255.0, turn: 0.02, opacity, constant: 0.501 / 255.0, others: 0.501 / 255.0 }
+}
+
+#[test]
+fn sog_comes_back_within_its_steps() {
+    for degree in 0..4 {
+        // More than a row of the palette.
+        let written = written(70, degree);
+        agree("sog", &points("a.sog", &sog(&written, degree)), &written, degree, &sog_steps(true));
+        let oldest = zip(&sog_files(&written, degree, 1));
+        agree("version 1", &points("unnamed", &oldest), &written, degree, &sog_steps(false));
+    }
+}
+
+#[test]
+fn sog_lies_in_a_folder_too_or_in_one_of_an_archive() {
+    let written = written(5, 2);
+    let files = sog_files(&written, 2, 2);
+    let folder = folder("sog");
+    files.iter().for_each(|(name, content)| fs::write(folder.join(name), content).unwrap());
+    for path in [folder.clone(), folder.join("meta.json")] {
+        let (loaded, notes) = file(&path, &ReadParams::default(), None).unwrap();
+        let Loaded::Points(points) = loaded else { panic!("points") };
+        agree("folder", &points, &written, 2, &sog_steps(true));
+        assert_eq!((notes.format.as_str(), up_axis(&path)), ("Sog", UpAxis::MinusY));
+    }
+    let within: Vec<_> = files.iter().map(|(name, content)| (format!("scene/{name}"), content.clone())).collect();
+    agree("within", &points("a.sog", &zip(&within)), &written, 2, &sog_steps(true));
+    // Images are not looked for outside of the folder.
+    let json = String::from_utf8(files[0].1.clone()).unwrap().replace("means_l.webp", "../means_l.webp");
+    fs::write(folder.join("meta.json"), json).unwrap();
+    let error = file(&folder, &ReadParams::default(), None).unwrap_err().to_string();
+    assert!(error.contains("a file in the same folder or below"), "{error}");
+}
+
+/// The archive of a scene with one of its files changed.
+fn changed(name: &str, change: impl Fn(&[u8]) -> Vec<u8>) -> Vec<u8> {
+    let mut files = sog_files(&written(5, 1), 1, 2);
+    let (_, content) = files.iter_mut().find(|(file, _)| file == name).unwrap();
+    *content = change(content);
+    zip(&files)
+}
+
+fn described(from: &str, to: &str) -> Vec<u8> {
+    changed("meta.json", |content| {
+        let text = String::from_utf8(content.to_vec()).unwrap();
+        assert!(text.contains(from), "{text}");
+        text.replace(from, to).into_bytes()
+    })
+}
+
+#[test]
+fn what_is_wrong_with_sog_is_said() {
+    let mut without = sog_files(&written(5, 1), 1, 2);
+    without.remove(4);
+    for (content, expected) in [
+        (zip(&without), "'quats.webp': specified file not found"),
+        (zip(&without[1..]), "an archive without meta.json"),
+        (described("\"version\":2", "\"version\":3"), "expected version 1 or 2 in meta.json, found 3"),
+        (
+            described("\"count\":5,\"means\"", "\"means\""),
+            "a `count` of Gaussians in meta.json, at least 1, found none",
+        ),
+        (
+            described("\"count\":5,\"means\"", "\"count\":9,\"means\""),
+            "a pixel for each of 9 Gaussians, found 4 x 2 pixels",
+        ),
+        (
+            described("\"codebook\":[-4.0,", "\"codebook\":["),
+            "256 numbers in `scales.codebook` of meta.json, found 255",
+        ),
+        (described("\"bands\":1", "\"bands\":2"), "a width of 512 pixels of 'shN_centroids.webp', found 192 pixels"),
+        (
+            described("\"count\":5,\"bands\"", "\"count\":4,\"bands\""),
+            "a row of the palette of harmonics for Gaussian 0, found row 4 of 4",
+        ),
+        (described("\"quats\"", "\"quads\""), "missing field `quats`"),
+        (changed("quats.webp", |_| webp(&[[0; 4]; 8], 4)), "an alpha of a rotation from 252 to 255 for Gaussian"),
+        (
+            changed("sh0.webp", |content| content[..content.len() - 9].to_vec()),
+            "'sh0.webp' as a whole WebP or PNG image",
+        ),
+        (changed("sh0.webp", |_| b"BM".to_vec()), "'sh0.webp' as a whole WebP or PNG image"),
+        (b"{\"means\":".to_vec(), "a.sog: expected meta.json of SOG"),
+    ] {
+        refused("a.sog", &content, expected);
+    }
+    // A rotation of 255 is valid: the other values of black pixels are not.
+    let params = ReadParams { drop_invalid: true, ..ReadParams::default() };
+    let dropped =
+        changed("quats.webp", |_| webp(&[[128, 128, 128, 252], [0, 0, 0, 0], [9; 4], [9; 4], [128, 128, 128, 255]], 4));
+    let Loaded::Points(points) = bytes("a.sog", &dropped, &params, None).unwrap().0 else { panic!("points") };
+    assert_eq!((points.len(), points.dropped), (2, 3));
+}
+
+#[test]
+fn sog_says_what_it_is_of() {
+    let remarks = |content: &[u8]| read("a.sog", content).unwrap().1.remarks;
+    assert!(remarks(&described("\"version\":2", "\"version\":2,\"antialias\":true"))[0].contains("keeps their light"));
+    assert!(remarks(&described("\"version\":2", "\"version\":2,\"model\":\"new\""))[0].contains("'new'"));
+    // Discs have no third deviation; a first number of a table that is null lies a step below the second.
+    let flat = described("\"version\":2", "\"version\":2,\"model\":\"2dgs\"");
+    let flat = points("a.sog", &flat).gaussians;
+    assert!(flat.axes.iter().all(|axes| axes[2].length() == 0.0 && axes[1].length() > 0.0));
+    let patched = described("\"codebook\":[-4.0,", "\"codebook\":[null,");
+    agree("null", &points("a.sog", &patched), &written(5, 1), 1, &sog_steps(true));
+}
+
+#[test]
+fn damaged_images_of_sog_are_refused_or_valid() {
+    /// Every how manieth bit is flipped.
+    const STRIDE: usize = 7;
+    let files = sog_files(&written(5, 1), 1, 2);
+    for at in [1, 4, 6, 7] {
+        let (name, whole) = files[at].clone();
+        let with = |content: &[u8]| {
+            let mut files = files.clone();
+            files[at].1 = content.to_vec();
+            load("a.sog", &zip(&files))
+        };
+        for length in 0..whole.len() - 1 {
+            // The last byte of a chunk may be padding.
+            let is_refused = with(&whole[..length]).is_err();
+            assert!(is_refused || length + 2 > whole.len(), "{name}: {length} of {}", whole.len());
+        }
+        for bit in (0..8 * whole.len()).step_by(STRIDE) {
+            let mut content = whole.clone();
+            content[bit / 8] ^= 1 << (bit % 8);
+            if let Ok(Loaded::Points(points)) = with(&content) {
+                points.validate().unwrap();
+            }
+        }
+    }
+}
+
+#[test]
+fn ksplat_of_every_level_comes_back_within_its_steps() {
+    for level in 0..3 {
+        for degree in 0..3 {
+            // Full buckets, and one that is not full, in two sections.
+            let written = written(11, degree);
+            let half = 2f64.powi(-11);
+            let place = 5.0 / 32767.0 * 0.501 + 1e-6;
+            let packed = Steps { place, scale: 1.01 * half, turn: 4.0 * half, others: half, ..EXACT };
+            let steps = match level {
+                0 => EXACT,
+                1 => packed,
+                _ => Steps { others: 1.5 * 0.501 / 255.0, ..packed },
+            };
+            let steps = Steps { opacity: 0.501 / 255.0, constant: 0.501 / 255.0 / CONSTANT, ..steps };
+            let content = ksplat(&written, degree, level);
+            agree(&format!("level {level}"), &points("a.ksplat", &content), &written, degree, &steps);
+        }
+    }
+}
+
+#[test]
+fn what_is_wrong_with_ksplat_is_said() {
+    let with = |at: usize, to: u8| {
+        let mut content = ksplat(&written(4, 1), 1, 1);
+        content[at] = to;
+        content
+    };
+    let longer = [&with(0, 0)[..], &[0; 3]].concat();
+    for (content, expected) in [
+        (with(0, 1), "a.ksplat@0: expected version 0.1 of .ksplat, found version 1.1"),
+        (with(1, 0), "found version 0.0"),
+        (with(20, 3), "a.ksplat@20: expected a level of compression from 0 to 2, found 3"),
+        (with(16, 0), "at least one Gaussian, found none"),
+        (with(16, 5), "a.ksplat@16: expected 4 Gaussians, as the sections hold, found 5"),
+        (with(6, 1), "headers of sections, of 1024 bytes each"),
+        (with(4096, 3), "at most 2 Gaussians, for which there is room, found 3"),
+        (with(4096 + 40, 3), "harmonics of degree 0 to 2, found 3"),
+        (with(4096 + 20, 16), "12 bytes for the middle of a bucket, found 16"),
+        (with(4096 + 36, 0), "1 buckets with 2 Gaussians, found 0 with 0"),
+        (longer, "the end of the file after the last section, found 3 bytes more"),
+        (vec![0; 100], "a header of 4096 bytes, found 100 bytes"),
+    ] {
+        refused("a.ksplat", &content, expected);
+    }
+}
