@@ -112,8 +112,8 @@ fn what_is_wrong_with_gaussians_is_said_with_its_place() {
         ("a.ply", cut("f_rest_8", "f_rest_7"), "each property name once"),
         ("a.splat", vec![0; 33], "records of 32 bytes, at least one, found 33 bytes"),
         ("a.splat", Vec::new(), "records of 32 bytes"),
-        ("a.spz", bytes_of(4, 1), "a.spz@4: expected version 2 or 3, found 1"),
-        ("a.spz", bytes_of(12, 4), "harmonics of degree 0 to 3, found 4"),
+        ("a.spz", bytes_of(4, 5), "a.spz@4: expected version 1 to 4, found 5"),
+        ("a.spz", bytes_of(12, 5), "harmonics of degree 0 to 4, found 5"),
         ("a.spz", bytes_of(8, 2), "bytes for 2 Gaussians of degree 1"),
         ("a.spz", b"NGSP".to_vec(), "a header of 16 bytes"),
     ] {

@@ -1,10 +1,10 @@
 //! A small file of each format and kind, by its name: for damage, and as seeds of fuzzing.
 
-use crate::read_samples::archives::{ksplat, sog};
+use crate::read_samples::archives::{gaussian_glb, ksplat, sog, spz_glb};
 use crate::read_samples::cells::{vtk_cells, vtk_surface, vtp, vtp_pieces, vtu, vtu_pieces};
 use crate::read_samples::copc::copc;
 use crate::read_samples::e57::e57;
-use crate::read_samples::gaussians::{packed_ply, splat, spz, trained, trained_ply};
+use crate::read_samples::gaussians::{packed_ply, splat, spz, spz_4, trained, trained_ply};
 use crate::read_samples::grids::{
     vtk_polyhedra, vtk_rectilinear, vtk_structured, vtr, vts, vtu_polyhedra, vtu_quadratic,
 };
@@ -87,6 +87,10 @@ pub(crate) fn samples() -> Vec<(&'static str, Vec<u8>)> {
         ("small.ksplat", ksplat(&[trained(0, 1)], 1, 2)),
         ("a.splat", splat(&[trained(0, 0)])),
         ("old.spz", spz(&[trained(0, 1), trained(1, 1)], 1, 2)),
+        ("oldest.spz", spz(&[trained(0, 1)], 1, 1)),
+        ("latest.spz", spz_4(&[trained(0, 1), trained(1, 1)], 1)),
+        ("gaussians.glb", gaussian_glb(&[trained(0, 1), trained(1, 1)], 1)),
+        ("packed.glb", spz_glb(&gzip(&spz(&[trained(0, 1)], 1, 2)), true)),
         ("new.spz", gzip(&spz(&[trained(0, 1), trained(1, 1)], 1, 3))),
     ]
 }

@@ -1,8 +1,8 @@
 //! 3D Gaussians as web viewers and exchange formats write them.
 
-use crate::read_samples::archives::{ksplat, sog, sog_files, webp, zip};
-use crate::read_samples::gaussians::{CONSTANT, EXACT, Steps, Trained, agree, points, trained};
-use crate::read_samples::load;
+use crate::read_samples::archives::{gaussian_glb, gaussian_glb_with, ksplat, sog, sog_files, spz_glb, webp, zip};
+use crate::read_samples::gaussians::{CONSTANT, EXACT, Steps, Trained, agree, points, spz, spz_4, trained};
+use crate::read_samples::{gzip, load};
 use read::{Loaded, Notes, ReadError, ReadParams, bytes, file, up_axis};
 use splat_core::UpAxis;
 use std::fs;
@@ -213,4 +213,142 @@ fn what_is_wrong_with_ksplat_is_said() {
     ] {
         refused("a.ksplat", &content, expected);
     }
+}
+
+/// Steps of SPZ with 12 bits behind the point.
+fn spz_steps(place: f64, turn: f64) -> Steps {
+    Steps {
+        place,
+        scale: 0.501 / 16.0,
+        turn,
+        opacity: 0.501 / 255.0,
+        constant: 0.501 / (255.0 * 0.15),
+        others: 0.501 / 128.0,
+    }
+}
+
+#[test]
+fn spz_of_the_first_and_the_last_version_comes_back_within_its_steps() {
+    for degree in 0..4 {
+        let written = written(20, degree);
+        // Half floats below 4 are a 512th apart at most.
+        let first = gzip(&spz(&written, degree, 1));
+        agree("version 1", &points("a.spz", &first), &written, degree, &spz_steps(1.01 / 1024.0, 0.15));
+        let last = spz_4(&written, degree);
+        agree("version 4", &points("a.spz", &last), &written, degree, &spz_steps(0.501 / 4096.0, 0.004));
+    }
+    // Degree 4 is stored, and drawn to degree 3.
+    let mut fourth = written(3, 3);
+    fourth.iter_mut().for_each(|t| t.harmonics.resize(25, [0.25; 3]));
+    let content = spz_4(&fourth, 4);
+    agree("degree 4", &points("a.spz", &content), &fourth, 3, &spz_steps(0.501 / 4096.0, 0.004));
+    assert!(read("a.spz", &content).unwrap().1.warnings[0].contains("degree 4"));
+}
+
+#[test]
+fn what_is_wrong_with_spz_of_version_4_is_said() {
+    let whole = spz_4(&written(2, 1), 1);
+    let with = |at: usize, to: u8| {
+        let mut content = whole.clone();
+        content[at] = to;
+        content
+    };
+    let longer = [&whole[..], &[0]].concat();
+    let data = 32 + 6 * 16;
+    for (content, expected) in [
+        (with(15, 5), "a.spz@15: expected 6 parts for 2 Gaussians of degree 1, found 5"),
+        (with(16, 31), "a.spz@16: expected a list of 6 parts from byte 32 on"),
+        (with(19, 1), "a.spz@16: expected a list of 6 parts from byte 32 on"),
+        (with(40, 17), "a.spz@40: expected 18 bytes of part 0, found 17"),
+        (with(39, 1), "a.spz@32: expected part 0 within the"),
+        (with(data, 0), "expected 18 bytes packed with Zstandard"),
+        (longer, "the end of the file after the last part, found 1 bytes more"),
+        (whole[..20].to_vec(), "a header of 32 bytes, found 20 bytes"),
+        (with(4, 5), "a.spz@4: expected version 1 to 4, found 5"),
+    ] {
+        refused("a.spz", &content, expected);
+    }
+    // An extension of four bytes, and the one that states axes.
+    let mut extended = whole.clone();
+    extended[14] = 2;
+    extended[16] = 32 + 24;
+    let records = [[2, 0, 0xbe, 0xad, 4, 0, 0, 0, 9, 9, 9, 9], [3, 0, 0xbe, 0xad, 4, 0, 0, 0, 1, 0, 0, 0]];
+    extended.splice(32..32, records.as_flattened().iter().copied());
+    let notes = read("a.spz", &extended).unwrap().1;
+    assert_eq!(notes.unused, ["extension 0xadbe0002", "extension 0xadbe0003"]);
+    assert!(notes.warnings[0].contains("states its axes"), "{notes:?}");
+}
+
+#[test]
+fn gltf_has_gaussians_as_attributes() {
+    for degree in 0..4 {
+        let written = written(9, degree);
+        agree("glb", &points("a.glb", &gaussian_glb(&written, degree)), &written, degree, &EXACT);
+        let drafted = gaussian_glb_with(&written, degree, "\"colorSpace\":\"srgb_rec709_display\"", |s| s, "");
+        agree("draft", &points("a.glb", &drafted), &written, degree, &EXACT);
+        assert!(read("a.glb", &drafted).unwrap().1.remarks[0].contains("natural logarithms"));
+    }
+    // A node turns shapes and colours along: a half turn about y negates x and z.
+    let written = written(4, 1);
+    let node = "\"rotation\":[0,1,0,0],\"scale\":[2,2,2],\"translation\":[1,2,3],";
+    let turned = points("a.glb", &gaussian_glb_with(&written, 1, "\"projection\":\"perspective\"", f64::exp, node));
+    for (i, t) in written.iter().enumerate() {
+        let [x, y, z] = t.position;
+        let place = [1.0 - 2.0 * x, 2.0 + 2.0 * y, 3.0 - 2.0 * z];
+        assert!(turned.exact_position(i).distance(place.into()) < 1e-5, "{i}");
+        let axis = turned.gaussians.axes[i][0];
+        assert!((f64::from(axis.length()) / (2.0 * t.scale[0].exp()) - 1.0).abs() < 1e-5, "{i}");
+        // Harmonics of degree 1 are −y, z, −x.
+        let harmonics = &turned.gaussians.harmonics[4 * i..][..4];
+        for (k, sign) in [1.0, 1.0, -1.0, -1.0].into_iter().enumerate() {
+            assert!((f64::from(harmonics[k][0]) - sign * t.harmonics[k][0]).abs() < 1e-5, "{i} {k}");
+        }
+    }
+    let linear =
+        points("a.glb", &gaussian_glb_with(&written, 0, "\"colorSpace\":\"lin_rec709_display\"", f64::exp, ""));
+    for (i, t) in written.iter().enumerate() {
+        let stated = t.harmonics[0].map(|c| 0.5 + CONSTANT * c);
+        (0..3).for_each(|c| assert!((f64::from(linear.color[i][c]) - stated[c]).abs() < 1e-5, "{i}"));
+    }
+}
+
+#[test]
+fn gltf_has_gaussians_as_spz() {
+    let written = written(9, 2);
+    for content in [gzip(&spz(&written, 2, 2)), spz(&written, 2, 2)] {
+        for is_nested in [false, true] {
+            let file = spz_glb(&content, is_nested);
+            agree("spz", &points("a.glb", &file), &written, 2, &spz_steps(0.501 / 4096.0, 0.15));
+        }
+    }
+    let file = spz_glb(&spz_4(&written, 2), true);
+    agree("version 4", &points("a.glb", &file), &written, 2, &spz_steps(0.501 / 4096.0, 0.004));
+}
+
+#[test]
+fn what_is_wrong_with_gaussians_in_gltf_is_said() {
+    let with = |from: &str, to: &str| {
+        let content = gaussian_glb(&written(2, 1), 1);
+        let at = content.windows(from.len()).position(|w| w == from.as_bytes()).unwrap();
+        [&content[..at], to.as_bytes(), &content[at + from.len()..]].concat()
+    };
+    let node = |keys: &str| gaussian_glb_with(&written(2, 1), 1, "\"kernel2\":1", f64::exp, keys);
+    for (content, expected) in [
+        (with("\"mode\":0", "\"mode\":4"), "3D Gaussians in a primitive of points (mode 0), found mode 4"),
+        (with("SH_DEGREE_1_COEF_0", "SH_DEGREE_1_COEF_7"), "an attribute KHR_gaussian_splatting:SH_DEGREE_1_COEF_0"),
+        (with("splatting:OPACITY", "splatting:0PACITY"), "an attribute KHR_gaussian_splatting:OPACITY of 3D Gaussians"),
+        (
+            with("\"count\":2,\"type\":\"VEC4\"", "\"count\":1,\"type\":\"VEC4\""),
+            "2 entries of each attribute of 3D Gaussians, found 1",
+        ),
+        (node("\"scale\":[1,2,1],"), "moved, turned and scaled by one number"),
+        (
+            spz_glb(b"NGSP", true),
+            "a.glb: expected a header of 16 bytes in the SPZ file of buffer view 0, found 4 bytes",
+        ),
+    ] {
+        refused("a.glb", &content, expected);
+    }
+    let notes = read("a.glb", &with("\"ellipse\"", "\"sphere!\"")).unwrap().1;
+    assert_eq!(notes.remarks, ["its kernel 'sphere!' is not known: ellipse is taken in its place"]);
 }

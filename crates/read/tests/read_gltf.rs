@@ -244,7 +244,10 @@ fn what_a_file_requires_and_what_is_damaged_is_told() {
     let error = load("a.gltf", text.replace(";base64,", ";base63,").as_bytes()).unwrap_err().to_string();
     assert!(error.starts_with("a.gltf: expected base64 in the uri of buffer 0"), "{error}");
     let splats = r#""mode":5,"extensions":{"KHR_gaussian_splatting":{}}"#;
-    refused(&with(r#""mode":5"#, splats), "a.glb: expected triangles or points, found KHR_gaussian_splatting");
+    refused(
+        &with(r#""mode":5"#, splats),
+        "a.glb: expected 3D Gaussians in a primitive of points (mode 0), found mode 5",
+    );
 }
 
 #[test]

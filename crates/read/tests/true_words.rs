@@ -247,11 +247,13 @@ fn hints_name_options_that_there_are() {
     for (name, hint) in [
         ("KHR_draco_mesh_compression", "Compression switched off"),
         ("EXT_meshopt_compression", "gltfpack without -c"),
-        ("KHR_gaussian_splatting", "SPZ"),
+        ("KHR_gaussian_splatting_of_tomorrow", "SPZ"),
     ] {
         assert!(required(name).unwrap_err().hint.contains(hint), "{name}");
     }
-    assert!(["KHR_texture_basisu", "EXT_texture_webp"].iter().all(|name| required(name).is_ok()));
+    assert!(
+        ["KHR_texture_basisu", "EXT_texture_webp", "KHR_gaussian_splatting"].iter().all(|name| required(name).is_ok())
+    );
 }
 
 #[test]

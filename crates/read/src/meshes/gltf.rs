@@ -1,4 +1,4 @@
-//! glTF 2.0, `.gltf` and `.glb` → the meshes of its default scene as one, else its points.
+//! glTF 2.0, `.gltf` and `.glb` → the 3D Gaussians of its default scene, else its meshes as one, else its points.
 //!
 //! Nodes are applied in f64. Triangles, strips and fans are read; base colours of materials, their textures and the colours
 //! of vertices become colours of vertices (see `paint.rs`). Files that it names are opened in its own folder and below.
@@ -8,6 +8,7 @@
 mod accessor;
 mod container;
 mod document;
+mod gaussians;
 mod material;
 mod nodes;
 mod primitive;
@@ -33,7 +34,10 @@ const HINT: &str = "the file is damaged, or was written wrongly; try a glTF vali
 
 /// Extensions that may be required: those that are read, those that change neither shapes nor base colours, and kinds of images, without
 /// which surfaces have the factors of their colours.
-const UNDERSTOOD: [&str; 24] = [
+const UNDERSTOOD: [&str; 27] = [
+    gaussians::EXTENSIONS[0],
+    gaussians::EXTENSIONS[1],
+    gaussians::EXTENSIONS[2],
     "KHR_mesh_quantization",
     "KHR_texture_basisu",
     "EXT_texture_webp",
@@ -64,8 +68,7 @@ const UNDERSTOOD: [&str; 24] = [
 const DRACO: &str = "KHR_draco_mesh_compression";
 const MESHOPT: [&str; 2] = ["EXT_meshopt_compression", "KHR_meshopt_compression"];
 const SPLATS: &str = "KHR_gaussian_splatting";
-const SPLATS_HINT: &str =
-    "3D Gaussians are read from PLY, compressed PLY, .splat and SPZ: save them so, such as with SuperSplat";
+const SPLATS_HINT: &str = "save its Gaussians as PLY or SPZ, such as with SuperSplat, or without this extension";
 
 fn wrong(expected: String, found: String) -> ReadError {
     ReadError::input(Place::File, expected, found, HINT)
@@ -80,6 +83,14 @@ pub(crate) fn read(content: &[u8], place: Option<&Path>, reading: &mut Reading<'
     let instances = nodes::instances(&document)?;
     name_unused(&document, &instances, reading);
     let primitives = primitives(&document, &instances)?;
+    let (splats, primitives): (Vec<_>, Vec<_>) = primitives.into_iter().partition(|(p, _)| gaussians::is_one(p));
+    if !splats.is_empty() {
+        if !primitives.is_empty() {
+            let warning = "its meshes are not drawn beside its 3D Gaussians: save them as a file of their own";
+            reading.notes.warnings.push(warning.to_owned());
+        }
+        return gaussians::read(&splats, &buffers, reading).map(Loaded::Points);
+    }
     // An empty scene is an empty mesh.
     let is_mesh = primitives.is_empty() || primitives.iter().any(|(p, _)| p.mode != Some(POINTS));
     // Many nodes may show one mesh: together they are refused before the first is read.
@@ -89,9 +100,6 @@ pub(crate) fn read(content: &[u8], place: Option<&Path>, reading: &mut Reading<'
     let mut surface = Surface::default();
     for (primitive, instance) in primitives {
         reading.go_on()?;
-        if primitive.extensions.contains_key(SPLATS) {
-            return Err(ReadError::input(Place::File, "triangles or points", SPLATS, SPLATS_HINT));
-        }
         match primitive.mode {
             Some(1..=3) => reading.notes.not_used([&b"lines"[..]]),
             Some(POINTS) if is_mesh => reading.notes.not_used([&b"points"[..]]),
@@ -164,7 +172,7 @@ fn name_unused(document: &Document, instances: &[Instance<'_>], reading: &mut Re
     reading.notes.not_used(stated.iter().filter(|(_, is)| *is).map(|(name, _)| name.as_bytes()));
     reading.notes.not_used(nodes.iter().flat_map(|n| n.extensions.keys()).map(String::as_bytes));
     let primitives = instances.iter().filter_map(|i| document.meshes.get(i.mesh)).flat_map(|m| &m.primitives);
-    reading.notes.not_used(primitives.flat_map(|p| p.extensions.keys()).map(String::as_bytes));
+    reading.notes.not_used(primitives.flat_map(|p| p.extensions.others.keys()).map(String::as_bytes));
     if instances.is_empty() {
         reading.notes.remark("the default scene has no mesh");
     }

@@ -1,63 +1,104 @@
-//! SPZ of Niantic, versions 2 and 3, inside gzip or not: a header of 16 bytes, then all places, opacities, colours, deviations, rotations
-//! and harmonics one after the other.
+//! SPZ of Niantic, versions 1 to 4: all places, opacities, colours, deviations, rotations and harmonics one after the other. Versions 1 to 3
+//! have a header of 16 bytes and lie inside gzip or not; version 4 has one of 32 bytes, a list of its parts, and packs each with Zstandard.
 //!
-//! Places are whole numbers of 24 bits over 2^fraction; opacities bytes; colours bytes around ½ with a step of 1/(255·0.15) in the constant
-//! harmonic; logarithms of deviations sixteenths of a byte less 10. Version 2 has x, y and z of a rotation as bytes, version 3 the three
-//! smallest numbers of it in ten bits each with the place of the largest before them. Other harmonics are bytes around 128 over 128.
+//! Places are half floats in version 1, later whole numbers of 24 bits over 2^fraction; opacities bytes; colours bytes around ½ with a step
+//! of 1/(255·0.15) in the constant harmonic; logarithms of deviations sixteenths of a byte less 10. Versions 1 and 2 have x, y and z of a
+//! rotation as bytes, later ones the three smallest numbers of it in ten bits each with the place of the largest before them. Other harmonics
+//! are bytes around 128 over 128.
 
 use super::gaussians::{self, Gathered, Gaussian, exponentials, refused};
 use crate::error::{Place, ReadError};
 use crate::reading::Reading;
+use crate::stream::input;
+use half::f16;
 use splat_core::glam::DVec3;
 use splat_core::{Gaussians, RawPoints};
+use std::borrow::Cow;
 use std::f64::consts::FRAC_1_SQRT_2;
 
 /// Its first bytes, once it is unpacked.
 const MARK: &[u8] = b"NGSP";
-/// Bytes of the header.
+/// Bytes of the header up to version 3, and of the part that all versions have.
 const HEADER: usize = 16;
+/// Bytes of the header of version 4.
+const LONG_HEADER: usize = 32;
+/// Bytes of the entry of a part in the list of version 4: its packed and its unpacked length.
+const ENTRY: usize = 16;
 /// Step of the constant harmonic.
 const COLOR_SCALE: f64 = 0.15;
 /// The flag of Gaussians that were trained with a filter that keeps their light.
 const ANTIALIASED: u8 = 1;
+/// The flag of a file with extensions.
+const EXTENDED: u8 = 2;
+/// The extension that states other axes.
+const AXES: u32 = 0xadbe_0003;
+/// The highest degree that a file may have. Coefficients of degree 4 are read over.
+const MOST_STORED_DEGREE: u8 = 4;
+
+const TRUNCATED: &str = "the file is truncated or damaged; fetch it again";
 
 struct Header {
     version: u32,
     count: usize,
+    /// Degree of the stored harmonics.
     degree: u8,
     fraction: u8,
+    flags: u8,
 }
 
-/// Reads an SPZ file that is unpacked.
+/// Bytes of all Gaussians, part by part.
+struct Parts<'a> {
+    bytes: Vec<Cow<'a, [u8]>>,
+    /// Bytes of a Gaussian in each.
+    widths: [usize; 6],
+    /// Where places begin in the file, and bytes from one to the next; `None` where they are packed.
+    places: Option<usize>,
+}
+
+impl Parts<'_> {
+    fn of(&self, part: usize, i: usize) -> &[u8] {
+        &self.bytes[part][self.widths[part] * i..][..self.widths[part]]
+    }
+}
+
+/// Reads an SPZ file; up to version 3 it is unpacked from gzip already.
 pub(crate) fn read(content: &[u8], reading: &mut Reading<'_>) -> Result<RawPoints, ReadError> {
     let header = header(content, reading)?;
-    let Header { version, count, degree, fraction } = header;
-    let others = (usize::from(degree) + 1).pow(2) - 1;
-    let widths = [9, 1, 3, 3, if version == 2 { 3 } else { 4 }, 3 * others];
-    let bytes = HEADER as u128 + count as u128 * widths.iter().sum::<usize>() as u128;
-    if content.len() as u128 != bytes {
-        let expected = format!("{bytes} bytes for {count} Gaussians of degree {degree}");
-        let is_longer = content.len() as u128 > bytes;
-        let hint = if is_longer {
-            "the file holds more than its header announces: save it anew, such as with SuperSplat"
-        } else {
-            "the file is truncated or damaged; fetch it again"
-        };
-        return Err(ReadError::input(Place::Byte(content.len() as u64), expected, format!("{}", content.len()), hint));
+    let Header { version, count, degree: stored, fraction, .. } = header;
+    let coefficients = |degree: u8| (usize::from(degree) + 1).pow(2) - 1;
+    let place = if version == 1 { 6 } else { 9 };
+    let rotation = if version <= 2 { 3 } else { 4 };
+    let widths = [place, 1, 3, 3, rotation, 3 * coefficients(stored)];
+    let parts = if version == 4 {
+        unpacked(content, &header, widths, reading)?
+    } else {
+        stored_parts(content, &header, widths, reading)?
+    };
+    let degree = stored.min(Gaussians::MOST_DEGREE);
+    if degree < stored {
+        reading
+            .notes
+            .warnings
+            .push("its harmonics of degree 4 are left out: colours change less with the direction".to_owned());
     }
     let mut gathered = Gathered::new(count, degree, reading.params)?;
-    let starts = widths.iter().scan(HEADER, |at, width| Some(std::mem::replace(at, *at + width * count)));
-    let starts: Vec<usize> = starts.collect();
     for i in 0..count {
         if i.is_multiple_of(1 << 14) {
             reading.go_on()?;
         }
-        let bytes = |part: usize| &content[starts[part] + widths[part] * i..][..widths[part]];
-        let byte = |part: usize, k: usize| f64::from(bytes(part)[k]);
+        let byte = |part: usize, k: usize| f64::from(parts.of(part, i)[k]);
+        let coordinate = |k: usize| {
+            let bytes = parts.of(0, i);
+            if version == 1 {
+                f16::from_le_bytes([bytes[2 * k], bytes[2 * k + 1]]).to_f64()
+            } else {
+                fixed(&bytes[3 * k..], fraction)
+            }
+        };
         let gaussian = Gaussian {
-            position: DVec3::from_array([0, 1, 2].map(|k| fixed(&bytes(0)[3 * k..], fraction))),
+            position: DVec3::from_array([0, 1, 2].map(coordinate)),
             deviation: exponentials(DVec3::from_array([0, 1, 2].map(|k| byte(3, k) / 16.0 - 10.0))),
-            rotation: if version == 2 { first_three(bytes(4)) } else { smallest_three(bytes(4)) },
+            rotation: if version <= 2 { first_three(parts.of(4, i)) } else { smallest_three(parts.of(4, i)) },
             opacity: byte(1, 0) / 255.0,
         };
         let constant = [0, 1, 2].map(|c| (byte(2, c) / 255.0 - 0.5) / COLOR_SCALE);
@@ -65,10 +106,155 @@ pub(crate) fn read(content: &[u8], reading: &mut Reading<'_>) -> Result<RawPoint
             0 => constant,
             k => [0, 1, 2].map(|c| (byte(5, 3 * (k - 1) + c) - 128.0) / 128.0),
         };
-        let place = Place::Byte((starts[0] + widths[0] * i) as u64);
-        gathered.push(&gaussian, (0..others + 1).map(harmonic)).map_err(|wrong| refused(place, i as u64, wrong))?;
+        let place = parts.places.map_or(Place::File, |start| Place::Byte((start + widths[0] * i) as u64));
+        let taken = gathered.push(&gaussian, (0..coefficients(degree) + 1).map(harmonic));
+        taken.map_err(|wrong| refused(place, i as u64, wrong))?;
     }
     gathered.finish(Place::Byte(HEADER as u64))
+}
+
+/// The parts of versions 1 to 3, which follow each other.
+fn stored_parts<'a>(
+    content: &'a [u8],
+    header: &Header,
+    widths: [usize; 6],
+    reading: &mut Reading<'_>,
+) -> Result<Parts<'a>, ReadError> {
+    let Header { count, degree, flags, .. } = *header;
+    let bytes = HEADER as u128 + count as u128 * widths.iter().sum::<usize>() as u128;
+    let is_longer = content.len() as u128 > bytes;
+    if is_longer && flags & EXTENDED != 0 {
+        reading.notes.remark("its extensions are not read");
+    } else if content.len() as u128 != bytes {
+        let expected = format!("{bytes} bytes for {count} Gaussians of degree {degree}");
+        let hint = if is_longer {
+            "the file holds more than its header announces: save it anew, such as with SuperSplat"
+        } else {
+            TRUNCATED
+        };
+        return Err(ReadError::input(Place::Byte(content.len() as u64), expected, format!("{}", content.len()), hint));
+    }
+    let mut rest = &content[HEADER..];
+    let mut parts = Vec::new();
+    for width in widths {
+        let (part, behind) = rest.split_at(width * count);
+        parts.push(Cow::Borrowed(part));
+        rest = behind;
+    }
+    Ok(Parts { bytes: parts, widths, places: Some(HEADER) })
+}
+
+/// The parts of version 4, unpacked.
+#[cfg(feature = "spz4")]
+fn unpacked<'a>(
+    content: &'a [u8],
+    header: &Header,
+    widths: [usize; 6],
+    reading: &mut Reading<'_>,
+) -> Result<Parts<'a>, ReadError> {
+    use rayon::prelude::*;
+    let wrong = |at: usize, expected: String, found: String| {
+        Err(ReadError::input(Place::Byte(at as u64), expected, found, TRUNCATED))
+    };
+    if content.len() < LONG_HEADER {
+        return wrong(0, "a header of 32 bytes".to_owned(), format!("{} bytes", content.len()));
+    }
+    let number = |at: usize| u64::from_le_bytes(std::array::from_fn(|b| content[at + b]));
+    let list = u32::from_le_bytes(std::array::from_fn(|b| content[16 + b])) as usize;
+    let filled: Vec<usize> = (0..widths.len()).filter(|part| widths[*part] * header.count > 0).collect();
+    let stored = usize::from(content[15]);
+    if stored != filled.len() {
+        return wrong(
+            15,
+            format!("{} parts for {} Gaussians of degree {}", filled.len(), header.count, header.degree),
+            stored.to_string(),
+        );
+    }
+    let data = list.saturating_add(ENTRY * filled.len());
+    if list < LONG_HEADER || data > content.len() {
+        let expected = format!("a list of {} parts from byte 32 on, within {} bytes", filled.len(), content.len());
+        return wrong(16, expected, format!("one at byte {list}"));
+    }
+    if header.flags & EXTENDED != 0 {
+        name_extensions(&content[LONG_HEADER..list], reading);
+    }
+    let total = header.count as u64 * widths.iter().sum::<usize>() as u64;
+    input::check_packed(total, content.len() as u64, "SPZ")?;
+    input::hold("the unpacked parts", total, reading.params)?;
+    let mut at = data;
+    let mut found = Vec::new();
+    for (k, part) in filled.iter().enumerate() {
+        let entry = list + ENTRY * k;
+        let length = widths[*part] as u64 * header.count as u64;
+        if number(entry + 8) != length {
+            return wrong(entry + 8, format!("{length} bytes of part {k}"), number(entry + 8).to_string());
+        }
+        let packed = usize::try_from(number(entry)).ok().and_then(|length| content[at..].get(..length));
+        let Some(packed) = packed else {
+            return wrong(
+                entry,
+                format!("part {k} within the {} bytes of the file", content.len()),
+                format!("{} bytes from byte {at} on", number(entry)),
+            );
+        };
+        found.push((*part, at, packed, length as usize));
+        at += packed.len();
+    }
+    if at != content.len() {
+        return wrong(
+            at,
+            "the end of the file after the last part".to_owned(),
+            format!("{} bytes more", content.len() - at),
+        );
+    }
+    let unpack = |(part, at, packed, length): (usize, usize, &[u8], usize)| Ok((part, unpack(packed, at, length)?));
+    let done: Vec<(usize, Vec<u8>)> = found.into_par_iter().map(unpack).collect::<Result<_, ReadError>>()?;
+    let mut bytes = vec![Cow::Borrowed(&content[..0]); widths.len()];
+    done.into_iter().for_each(|(part, unpacked)| bytes[part] = Cow::Owned(unpacked));
+    Ok(Parts { bytes, widths, places: None })
+}
+
+/// Without its decoder version 4 is refused.
+#[cfg(not(feature = "spz4"))]
+fn unpacked<'a>(_: &'a [u8], _: &Header, _: [usize; 6], _: &mut Reading<'_>) -> Result<Parts<'a>, ReadError> {
+    Err(ReadError::input(Place::Byte(4), "SPZ up to version 3", "version 4", "build with the feature spz4"))
+}
+
+/// Unpacks the part at byte `at` of the file, which has to fill `length` bytes.
+#[cfg(feature = "spz4")]
+fn unpack(packed: &[u8], at: usize, length: usize) -> Result<Vec<u8>, ReadError> {
+    /// Encoders that do not know the length beforehand announce a window of up to 8 MiB.
+    const WINDOW: u64 = 8 << 20;
+    let wrong = |found: String| {
+        ReadError::input(Place::Byte(at as u64), format!("{length} bytes packed with Zstandard"), found, TRUNCATED)
+    };
+    let mut unpacked = Vec::new();
+    input::reserve(&mut unpacked, length)?;
+    unpacked.resize(length, 0);
+    let mut decoder = ruzstd::decoding::FrameDecoder::new();
+    decoder.set_max_window_size(WINDOW.max(length as u64));
+    // The decoder indexes tables with what it finds in a stream without a checksum.
+    let filled = crate::guarded::guarded(|| decoder.decode_all(packed, &mut unpacked).map_err(|e| e.to_string()));
+    match filled.map_err(wrong)? {
+        filled if filled == length => Ok(unpacked),
+        filled => Err(wrong(format!("{filled} bytes"))),
+    }
+}
+
+/// Names the extensions between the header and the list of parts: a type and a length, four bytes each, then the data.
+#[cfg(feature = "spz4")]
+fn name_extensions(mut records: &[u8], reading: &mut Reading<'_>) {
+    while let Some((head, rest)) = records.split_first_chunk::<8>() {
+        let kind = u32::from_le_bytes([head[0], head[1], head[2], head[3]]);
+        let length = u32::from_le_bytes([head[4], head[5], head[6], head[7]]) as usize;
+        reading.notes.not_used([format!("extension {kind:#010x}").as_bytes()]);
+        if kind == AXES {
+            let warning =
+                "an extension that is not read states its axes, and y is taken to point up: set `up`, or turn it";
+            reading.notes.warnings.push(warning.to_owned());
+        }
+        records = rest.get(length..).unwrap_or_default();
+    }
 }
 
 fn header(content: &[u8], reading: &mut Reading<'_>) -> Result<Header, ReadError> {
@@ -85,15 +271,15 @@ fn header(content: &[u8], reading: &mut Reading<'_>) -> Result<Header, ReadError
     let degree = head[12];
     let fraction = head[13];
     let flags = head[14];
-    if !(2..=3).contains(&version) {
-        let hint = "save it anew with a current program, as SPZ of version 3 or as PLY";
-        return Err(ReadError::input(Place::Byte(4), "version 2 or 3", version.to_string(), hint));
+    if !(1..=4).contains(&version) {
+        let hint = "save it anew as SPZ of version 4 or as PLY, such as with SuperSplat";
+        return Err(ReadError::input(Place::Byte(4), "version 1 to 4", version.to_string(), hint));
     }
-    let damaged = |at, expected, found: u8| {
+    let damaged = |at, expected: &str, found: u8| {
         Err(ReadError::input(Place::Byte(at), expected, found.to_string(), "the file is damaged"))
     };
-    if degree > Gaussians::MOST_DEGREE {
-        return damaged(12, "harmonics of degree 0 to 3", degree);
+    if degree > MOST_STORED_DEGREE {
+        return damaged(12, "harmonics of degree 0 to 4", degree);
     }
     if fraction > 23 {
         return damaged(13, "at most 23 bits behind the point of a place", fraction);
@@ -101,7 +287,7 @@ fn header(content: &[u8], reading: &mut Reading<'_>) -> Result<Header, ReadError
     if flags & ANTIALIASED != 0 {
         reading.notes.remark(gaussians::ANTIALIASED);
     }
-    Ok(Header { version, count: word(8) as usize, degree, fraction })
+    Ok(Header { version, count: word(8) as usize, degree, fraction, flags })
 }
 
 /// A whole number of 24 bits over 2^fraction.

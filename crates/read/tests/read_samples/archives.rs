@@ -1,6 +1,7 @@
-//! Small files of 3D Gaussians in the formats of the web: SOG and `.ksplat`, by the formulas of their documentation.
+//! Small files of 3D Gaussians in the formats of the web: SOG, `.ksplat` and glTF, by the formulas of their documentation.
 
 use super::gaussians::{CONSTANT, Trained, largest};
+use super::glb;
 use image::codecs::webp::WebPEncoder;
 use image::{ExtendedColorType, ImageEncoder};
 use std::f64::consts::SQRT_2;
@@ -233,4 +234,80 @@ pub(crate) fn ksplat(gaussians: &[Trained], degree: usize, level: u16) -> Vec<u8
     }
     out.extend(data);
     out
+}
+
+/// A file of glTF that shows Gaussians as the attributes of `KHR_gaussian_splatting`.
+pub(crate) fn gaussian_glb(gaussians: &[Trained], degree: usize) -> Vec<u8> {
+    gaussian_glb_with(gaussians, degree, "\"colorSpace\":\"srgb_rec709_display\"", f64::exp, "")
+}
+
+/// The same with other keys of the extension, another form of deviations and other keys of the node.
+pub(crate) fn gaussian_glb_with(
+    gaussians: &[Trained],
+    degree: usize,
+    keys: &str,
+    deviation: fn(f64) -> f64,
+    node: &str,
+) -> Vec<u8> {
+    let flat = |numbers: &dyn Fn(&Trained) -> Vec<f64>| -> Vec<u8> {
+        gaussians.iter().flat_map(|t| numbers(t)).flat_map(|v| (v as f32).to_le_bytes()).collect()
+    };
+    let mut attributes = vec![
+        ("POSITION".to_owned(), "VEC3", flat(&|t| t.position.to_vec())),
+        (
+            "KHR_gaussian_splatting:ROTATION".to_owned(),
+            "VEC4",
+            flat(&|t| {
+                let [w, x, y, z] = t.rotation;
+                vec![x, y, z, w]
+            }),
+        ),
+        ("KHR_gaussian_splatting:SCALE".to_owned(), "VEC3", flat(&|t| t.scale.map(deviation).to_vec())),
+        ("KHR_gaussian_splatting:OPACITY".to_owned(), "SCALAR", flat(&|t| vec![t.opacity])),
+    ];
+    for band in 0..=degree {
+        for k in 0..2 * band + 1 {
+            let name = format!("KHR_gaussian_splatting:SH_DEGREE_{band}_COEF_{k}");
+            attributes.push((name, "VEC3", flat(&|t| t.harmonics[band * band + k].to_vec())));
+        }
+    }
+    let mut binary = Vec::new();
+    let mut views = Vec::new();
+    let mut accessors = Vec::new();
+    let mut names = Vec::new();
+    for (i, (name, shape, content)) in attributes.into_iter().enumerate() {
+        views.push(format!("{{\"buffer\":0,\"byteOffset\":{},\"byteLength\":{}}}", binary.len(), content.len()));
+        let count = gaussians.len();
+        accessors.push(format!("{{\"bufferView\":{i},\"componentType\":5126,\"count\":{count},\"type\":\"{shape}\"}}"));
+        names.push(format!("\"{name}\":{i}"));
+        binary.extend(content);
+    }
+    let json = format!(
+        "{{\"asset\":{{\"version\":\"2.0\"}},\"extensionsUsed\":[\"KHR_gaussian_splatting\"],\"scenes\":[{{\"nodes\":[0]}}],\
+         \"nodes\":[{{{node}\"mesh\":0}}],\"meshes\":[{{\"primitives\":[{{\"mode\":0,\"attributes\":{{{}}},\
+         \"extensions\":{{\"KHR_gaussian_splatting\":{{\"kernel\":\"ellipse\",{keys}}}}}}}]}}],\"accessors\":[{}],\
+         \"bufferViews\":[{}],\"buffers\":[{{\"byteLength\":{}}}]}}",
+        names.join(","),
+        accessors.join(","),
+        views.join(","),
+        binary.len()
+    );
+    glb(&json, &binary)
+}
+
+/// A file of glTF around one of SPZ, by the extension within `KHR_gaussian_splatting` or by the draft before it.
+pub(crate) fn spz_glb(content: &[u8], is_nested: bool) -> Vec<u8> {
+    let extension = if is_nested {
+        "\"KHR_gaussian_splatting\":{\"extensions\":{\"KHR_gaussian_splatting_compression_spz_2\":{\"bufferView\":0}}}"
+    } else {
+        "\"KHR_spz_gaussian_splats_compression\":{\"bufferView\":0}"
+    };
+    let json = format!(
+        "{{\"asset\":{{\"version\":\"2.0\"}},\"extensionsRequired\":[\"KHR_gaussian_splatting\"],\"scenes\":[{{\"nodes\":[0]}}],\
+         \"nodes\":[{{\"mesh\":0}}],\"meshes\":[{{\"primitives\":[{{\"mode\":0,\"attributes\":{{\"POSITION\":0}},\
+         \"extensions\":{{{extension}}}}}]}}],\"accessors\":[{{\"componentType\":5126,\"count\":1,\"type\":\"VEC3\"}}],\
+         \"bufferViews\":[{{\"buffer\":0,\"byteLength\":{0}}}],\"buffers\":[{{\"byteLength\":{0}}}]}}",
+        content.len()
+    );
+    glb(&json, content)
 }

@@ -153,21 +153,62 @@ pub(crate) fn splat(gaussians: &[Trained]) -> Vec<u8> {
     out
 }
 
-/// SPZ of version 2 or 3 before gzip, with 12 bits behind the point.
-pub(crate) fn spz(gaussians: &[Trained], degree: usize, version: u32) -> Vec<u8> {
+fn spz_header(gaussians: &[Trained], degree: usize, version: u32) -> Vec<u8> {
     let mut out = b"NGSP".to_vec();
     out.extend(version.to_le_bytes());
     out.extend((gaussians.len() as u32).to_le_bytes());
     out.extend([degree as u8, 12, 0, 0]);
-    for v in gaussians.iter().flat_map(|t| t.position) {
-        out.extend(&((v * 4096.0).round() as i32).to_le_bytes()[..3]);
+    out
+}
+
+/// SPZ of version 1 to 3 before gzip, with 12 bits behind the point.
+pub(crate) fn spz(gaussians: &[Trained], degree: usize, version: u32) -> Vec<u8> {
+    let mut out = spz_header(gaussians, degree, version);
+    spz_parts(gaussians, version).into_iter().for_each(|part| out.extend(part));
+    out
+}
+
+/// SPZ of version 4, each part as one block that is packed by nothing but the form of Zstandard.
+pub(crate) fn spz_4(gaussians: &[Trained], degree: usize) -> Vec<u8> {
+    let mut out = spz_header(gaussians, degree, 4);
+    let parts: Vec<Vec<u8>> = spz_parts(gaussians, 4).into_iter().filter(|part| !part.is_empty()).collect();
+    out[15] = parts.len() as u8;
+    out.extend(32u32.to_le_bytes());
+    out.extend([0; 12]);
+    let packed: Vec<Vec<u8>> = parts.iter().map(|part| zstd(part)).collect();
+    for (part, packed) in parts.iter().zip(&packed) {
+        out.extend((packed.len() as u64).to_le_bytes());
+        out.extend((part.len() as u64).to_le_bytes());
     }
-    out.extend(gaussians.iter().map(|t| byte(255.0 * t.opacity)));
-    out.extend(gaussians.iter().flat_map(|t| t.harmonics[0].map(|c| byte(255.0 * (0.15 * c + 0.5)))));
-    out.extend(gaussians.iter().flat_map(|t| t.scale.map(|s| byte(16.0 * (s + 10.0)))));
+    packed.into_iter().for_each(|part| out.extend(part));
+    out
+}
+
+/// A frame of Zstandard (RFC 8878) of one segment, whose size has four bytes, with one raw block, the last.
+fn zstd(content: &[u8]) -> Vec<u8> {
+    let mut out = vec![0x28, 0xb5, 0x2f, 0xfd, 0xa0];
+    out.extend((content.len() as u32).to_le_bytes());
+    out.extend(&((content.len() as u32) << 3 | 1).to_le_bytes()[..3]);
+    out.extend(content);
+    out
+}
+
+/// Places, opacities, colours, deviations, rotations and harmonics of SPZ.
+fn spz_parts(gaussians: &[Trained], version: u32) -> [Vec<u8>; 6] {
+    let mut places = Vec::new();
+    for v in gaussians.iter().flat_map(|t| t.position) {
+        match version {
+            1 => places.extend(half::f16::from_f64(v).to_le_bytes()),
+            _ => places.extend(&((v * 4096.0).round() as i32).to_le_bytes()[..3]),
+        }
+    }
+    let opacities = gaussians.iter().map(|t| byte(255.0 * t.opacity)).collect();
+    let colors = gaussians.iter().flat_map(|t| t.harmonics[0].map(|c| byte(255.0 * (0.15 * c + 0.5)))).collect();
+    let scales = gaussians.iter().flat_map(|t| t.scale.map(|s| byte(16.0 * (s + 10.0)))).collect();
+    let mut out = Vec::new();
     for t in gaussians {
         let [w, x, y, z] = t.rotation;
-        if version == 2 {
+        if version <= 2 {
             out.extend([x, y, z].map(|v| byte(127.5 * (v + 1.0))));
             continue;
         }
@@ -179,8 +220,8 @@ pub(crate) fn spz(gaussians: &[Trained], degree: usize, version: u32) -> Vec<u8>
         });
         out.extend(word.to_le_bytes());
     }
-    out.extend(gaussians.iter().flat_map(|t| t.harmonics[1..].as_flattened()).map(|v| byte(128.0 * v + 128.0)));
-    out
+    let others = gaussians.iter().flat_map(|t| t.harmonics[1..].as_flattened()).map(|v| byte(128.0 * v + 128.0));
+    [places, opacities, colors, scales, out, others.collect()]
 }
 
 /// The points of a file that is right.

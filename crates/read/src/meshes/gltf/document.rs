@@ -69,7 +69,50 @@ pub(super) struct Primitive {
     /// How indices become triangles; those of a list by default.
     pub(super) mode: Option<u32>,
     pub(super) targets: Vec<IgnoredAny>,
-    pub(super) extensions: BTreeMap<String, IgnoredAny>,
+    pub(super) extensions: PrimitiveExtensions,
+}
+
+/// Extensions of a primitive.
+#[derive(Debug, Default, Deserialize)]
+#[serde(default)]
+pub(super) struct PrimitiveExtensions {
+    #[serde(rename = "KHR_gaussian_splatting")]
+    pub(super) gaussians: Option<GaussianExtension>,
+    /// A draft, before the one that lies within the extension above.
+    #[serde(rename = "KHR_spz_gaussian_splats_compression")]
+    pub(super) spz: Option<SpzExtension>,
+    /// Those that are not read.
+    #[serde(flatten)]
+    pub(super) others: BTreeMap<String, IgnoredAny>,
+}
+
+/// How 3D Gaussians are to be drawn.
+#[derive(Debug, Default, Deserialize)]
+#[serde(default, rename_all = "camelCase")]
+pub(super) struct GaussianExtension {
+    pub(super) kernel: Option<String>,
+    pub(super) color_space: Option<String>,
+    pub(super) projection: Option<String>,
+    pub(super) sorting_method: Option<String>,
+    pub(super) extensions: GaussianExtensions,
+}
+
+/// Extensions of 3D Gaussians.
+#[derive(Debug, Default, Deserialize)]
+#[serde(default)]
+pub(super) struct GaussianExtensions {
+    #[serde(rename = "KHR_gaussian_splatting_compression_spz_2")]
+    pub(super) spz: Option<SpzExtension>,
+    /// Those that are not read.
+    #[serde(flatten)]
+    pub(super) others: BTreeMap<String, IgnoredAny>,
+}
+
+/// Where the SPZ file of a primitive is.
+#[derive(Debug, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct SpzExtension {
+    pub(super) buffer_view: usize,
 }
 
 #[derive(Debug, Default, Deserialize)]
