@@ -1,7 +1,9 @@
 //! 3D Gaussians as web viewers and exchange formats write them.
 
 use crate::read_samples::archives::{gaussian_glb, gaussian_glb_with, ksplat, sog, sog_files, spz_glb, webp, zip};
-use crate::read_samples::gaussians::{CONSTANT, EXACT, Steps, Trained, agree, points, spz, spz_4, trained};
+use crate::read_samples::gaussians::{
+    CONSTANT, EXACT, Steps, Trained, agree, points, spz, spz_4, trained, trained_ply,
+};
 use crate::read_samples::{gzip, load};
 use read::{Loaded, Notes, ReadError, ReadParams, bytes, file, up_axis};
 use splat_core::UpAxis;
@@ -351,4 +353,42 @@ fn what_is_wrong_with_gaussians_in_gltf_is_said() {
     }
     let notes = read("a.glb", &with("\"ellipse\"", "\"sphere!\"")).unwrap().1;
     assert_eq!(notes.remarks, ["its kernel 'sphere!' is not known: ellipse is taken in its place"]);
+}
+
+#[test]
+fn ply_has_gaussians_with_colors_in_the_place_of_harmonics_and_without_a_third_deviation() {
+    let written = written(3, 0);
+    let text = String::from_utf8(trained_ply(&written, 0, "ascii")).unwrap();
+    // Columns of the sample: x y z nx ny nz, three of colours, opacity, three deviations, four of a rotation.
+    let rewritten = |kind: &str, color: &dyn Fn(f64) -> String| {
+        let (header, body) = text.split_once("end_header\n").unwrap();
+        let mut header = header.to_owned();
+        for (k, name) in ["red", "green", "blue"].iter().enumerate() {
+            header = header.replace(&format!("float f_dc_{k}"), &format!("{kind} {name}"));
+        }
+        let record = |(line, t): (&str, &Trained)| {
+            let mut words: Vec<String> = line.split(' ').map(str::to_owned).collect();
+            (0..3).for_each(|c| words[6 + c] = color(0.5 + CONSTANT * t.harmonics[0][c]));
+            words.join(" ") + "\n"
+        };
+        let body: String = body.lines().zip(&written).map(record).collect();
+        header + "end_header\n" + &body
+    };
+    let bytes = rewritten("uchar", &|c| format!("{}", (255.0 * c).round()));
+    agree(
+        "bytes",
+        &points("a.ply", bytes.as_bytes()),
+        &written,
+        0,
+        &Steps { constant: 0.501 / 255.0 / CONSTANT, ..EXACT },
+    );
+    let linear = |c: f64| if c <= 0.04045 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) };
+    let floats = rewritten("float", &|c| format!("{:e}", linear(c)));
+    agree("floats", &points("a.ply", floats.as_bytes()), &written, 0, &EXACT);
+    refused("a.ply", bytes.replace("uchar green", "uchar gruen").as_bytes(), "a property 'green' of 'vertex'");
+    // Discs: the third deviation is another property.
+    let discs = points("a.ply", text.replace("scale_2", "other").as_bytes()).gaussians;
+    for (axes, t) in discs.axes.iter().zip(&written) {
+        assert!((f64::from(axes[1].length()) / t.scale[1].exp() - 1.0).abs() < 1e-5 && axes[2].length() == 0.0);
+    }
 }

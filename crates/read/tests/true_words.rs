@@ -234,11 +234,13 @@ fn hints_name_options_that_there_are() {
     let mesh = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\n\
                 property list uchar int vertex_indices\nend_header\nnan 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
     assert!(!error("a.ply", mesh.as_bytes()).hint.contains("--drop-invalid"));
-    // Gaussians whose colours are bytes.
+    // Gaussians without colours.
     let colored = "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\nproperty float opacity\n\
-                   property float scale_0\nproperty float rot_0\nproperty uchar red\nend_header\n0 0 0 3 -3 1 255\n";
+                   property float scale_0\nproperty float rot_0\nproperty uchar value\nend_header\n0 0 0 3 -3 1 255\n";
     assert!(
-        error("a.ply", colored.as_bytes()).to_string().contains("Gaussians with their colours as f_dc_0 to f_dc_2")
+        error("a.ply", colored.as_bytes())
+            .to_string()
+            .contains("Gaussians with their colours as f_dc_0 to f_dc_2, or as red")
     );
     let required = |name: &str| {
         let json = format!("{{\"asset\":{{\"version\":\"2.0\"}},\"extensionsRequired\":[\"{name}\"]}}");
@@ -272,7 +274,7 @@ fn what_a_file_states_and_nobody_draws_is_said() {
     assert!(read("a.stl", &colored).1.remarks.is_empty());
     colored[84 + 48] = 0x1f;
     assert!(read("a.stl", &colored).1.remarks[0].contains("colours"));
-    // Deviations that are written as they are, where their logarithms are read.
+    // Deviations that are written as they are, where logarithms are read, and logarithms of deviations as large as the scene.
     let gaussians = |scale: f64| {
         let names = "f_dc_0 f_dc_1 f_dc_2 opacity scale_0 scale_1 scale_2 rot_0 rot_1 rot_2 rot_3";
         let properties: String =
@@ -281,9 +283,12 @@ fn what_a_file_states_and_nobody_draws_is_said() {
         let records: String = (0..125).map(record).collect();
         format!("ply\nformat ascii 1.0\nelement vertex 125\n{properties}end_header\n{records}")
     };
-    assert!(
-        points("a.ply", gaussians(0.1).as_bytes()).1.remarks[0].starts_with("its Gaussians are as large as the scene")
-    );
+    let (linear, notes) = points("a.ply", gaussians(0.1).as_bytes());
+    assert!(notes.remarks[0].contains("they are taken as the deviations themselves"), "{notes:?}");
+    assert!(linear.gaussians.axes.as_flattened().iter().all(|axis| (axis.length() - 0.1).abs() < 1e-6));
+    let (large, notes) = points("a.ply", gaussians(-0.1).as_bytes());
+    assert!(notes.remarks[0].starts_with("its Gaussians are as large as the scene"), "{notes:?}");
+    assert!((large.gaussians.axes[0][0].length() - (-0.1f32).exp()).abs() < 1e-6);
     assert!(points("a.ply", gaussians(-2.3).as_bytes()).1.remarks.is_empty());
 }
 

@@ -45,10 +45,9 @@ fn elements<S: Source>(
     if let Some(kind) = header.gaussians() {
         return gaussians::read(source, header, kind, reading).map(Loaded::Points);
     }
-    if header.has_gaussians_without_harmonics() {
-        let hint = "write f_dc_0 to f_dc_2 = (colour / 255 − 0.5) / 0.2820948 in the place of red, green and blue, or draw points without \
-            scale_* and rot_*";
-        let expected = "Gaussians with their colours as f_dc_0 to f_dc_2";
+    if header.has_gaussians_without_colors() {
+        let hint = "write f_dc_0 to f_dc_2, or red, green and blue, or draw points without scale_* and rot_*";
+        let expected = "Gaussians with their colours as f_dc_0 to f_dc_2, or as red, green and blue";
         return Err(ReadError::input(Place::File, expected, "Gaussians without such", hint));
     }
     let loaded = body::read(source, header, place, reading)?;

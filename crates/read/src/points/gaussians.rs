@@ -167,6 +167,17 @@ impl Gathered {
         median >= SHARE * (high - low).length()
     }
 
+    /// Makes the logarithms of deviations the deviations: none of them may be below 0.
+    pub(crate) fn take_logarithms(&mut self) {
+        let logarithm = |axis: DVec3| {
+            let length = axis.length();
+            if length > 0.0 { axis * (libm::log(length).max(0.0) / length) } else { axis }
+        };
+        for axes in &mut self.points.gaussians.axes {
+            *axes = axes.map(|axis| logarithm(axis.as_dvec3()).as_vec3());
+        }
+    }
+
     /// All of them; `place` is where they begin in the file.
     pub(crate) fn finish(self, place: Place) -> Result<RawPoints, ReadError> {
         let Self { positions, points, .. } = self;

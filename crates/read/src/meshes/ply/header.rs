@@ -118,7 +118,7 @@ pub(super) struct Header {
 /// How a file of 3D Gaussian splats is told, and how it has them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum GaussianKind {
-    /// Numbers as they are trained: colour as spherical harmonics, log scale, rotation, logit of the opacity.
+    /// Numbers as they are trained: colour as spherical harmonics, or red, green and blue, log scale, rotation, logit of the opacity.
     Trained,
     /// Words, between the bounds of chunks.
     Packed,
@@ -130,18 +130,18 @@ impl Header {
         self.elements.iter().any(|e| matches!(e.name.as_slice(), b"face" | b"tristrips") && e.count > 0)
     }
 
-    /// Whether its vertices are Gaussians whose colours are no harmonics: those of other programs than trainers.
-    pub(super) fn has_gaussians_without_harmonics(&self) -> bool {
+    /// Whether its vertices are Gaussians without any colour that is read.
+    pub(super) fn has_gaussians_without_colors(&self) -> bool {
         let Some(vertex) = self.elements.iter().find(|e| e.name == b"vertex") else { return false };
         let has = |name: &[u8]| vertex.properties.iter().any(|p| p.name == name);
-        has(b"scale_0") && has(b"rot_0") && has(b"opacity") && !has(b"f_dc_0")
+        has(b"scale_0") && has(b"rot_0") && has(b"opacity") && !has(b"f_dc_0") && !has(b"red")
     }
 
     /// How its vertices are Gaussians, if they are.
     pub(super) fn gaussians(&self) -> Option<GaussianKind> {
         let vertex = self.elements.iter().find(|e| e.name == b"vertex")?;
         let has = |names: &[&[u8]]| names.iter().all(|name| vertex.properties.iter().any(|p| p.name == *name));
-        if has(&[b"f_dc_0", b"scale_0", b"rot_0", b"opacity"]) {
+        if has(&[b"scale_0", b"rot_0", b"opacity"]) && (has(&[b"f_dc_0"]) || has(&[b"red"])) {
             return Some(GaussianKind::Trained);
         }
         has(&[b"packed_position", b"packed_rotation", b"packed_scale", b"packed_color"]).then_some(GaussianKind::Packed)
