@@ -106,7 +106,7 @@ pub(crate) fn read(content: &[u8], reading: &mut Reading<'_>) -> Result<RawPoint
                 reading.go_on()?;
             }
             let record = section.records + section.stride * i;
-            let bucket = buckets.of(i);
+            let bucket = buckets.next_bucket(i);
             let gaussian = gaussian(content, &header, section, record, bucket);
             let color = LAYOUTS[header.level].color;
             let constant = [0, 1, 2].map(|c| (f64::from(content[record + color + c]) / 255.0 - 0.5) / CONSTANT);
@@ -248,7 +248,7 @@ impl<'a> Buckets<'a> {
     }
 
     /// The bucket of Gaussian `i`; every one follows the one before.
-    fn of(&mut self, i: usize) -> usize {
+    fn next_bucket(&mut self, i: usize) -> usize {
         let Section { full, capacity, partial, .. } = self.section;
         if let Some(bucket) = i.checked_div(*capacity).filter(|bucket| bucket < full) {
             return bucket;

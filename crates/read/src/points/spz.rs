@@ -56,7 +56,7 @@ struct Parts<'a> {
 }
 
 impl Parts<'_> {
-    fn of(&self, part: usize, i: usize) -> &[u8] {
+    fn bytes(&self, part: usize, i: usize) -> &[u8] {
         &self.bytes[part][self.widths[part] * i..][..self.widths[part]]
     }
 }
@@ -86,9 +86,9 @@ pub(crate) fn read(content: &[u8], reading: &mut Reading<'_>) -> Result<RawPoint
         if i.is_multiple_of(1 << 14) {
             reading.go_on()?;
         }
-        let byte = |part: usize, k: usize| f64::from(parts.of(part, i)[k]);
+        let byte = |part: usize, k: usize| f64::from(parts.bytes(part, i)[k]);
         let coordinate = |k: usize| {
-            let bytes = parts.of(0, i);
+            let bytes = parts.bytes(0, i);
             if version == 1 {
                 f16::from_le_bytes([bytes[2 * k], bytes[2 * k + 1]]).to_f64()
             } else {
@@ -98,7 +98,7 @@ pub(crate) fn read(content: &[u8], reading: &mut Reading<'_>) -> Result<RawPoint
         let gaussian = Gaussian {
             position: DVec3::from_array([0, 1, 2].map(coordinate)),
             deviation: exponentials(DVec3::from_array([0, 1, 2].map(|k| byte(3, k) / 16.0 - 10.0))),
-            rotation: if version <= 2 { first_three(parts.of(4, i)) } else { smallest_three(parts.of(4, i)) },
+            rotation: if version <= 2 { first_three(parts.bytes(4, i)) } else { smallest_three(parts.bytes(4, i)) },
             opacity: byte(1, 0) / 255.0,
         };
         let constant = [0, 1, 2].map(|c| (byte(2, c) / 255.0 - 0.5) / COLOR_SCALE);

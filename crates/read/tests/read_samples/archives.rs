@@ -250,7 +250,7 @@ pub(crate) fn gaussian_glb_with(
     node: &str,
 ) -> Vec<u8> {
     let flat = |numbers: &dyn Fn(&Trained) -> Vec<f64>| -> Vec<u8> {
-        gaussians.iter().flat_map(|t| numbers(t)).flat_map(|v| (v as f32).to_le_bytes()).collect()
+        gaussians.iter().flat_map(numbers).flat_map(|v| (v as f32).to_le_bytes()).collect()
     };
     let mut attributes = vec![
         ("POSITION".to_owned(), "VEC3", flat(&|t| t.position.to_vec())),

@@ -137,7 +137,7 @@ fn packed(content: &[u8], view: usize, reading: &mut Reading<'_>) -> Result<RawP
     let unpacked;
     let mut bytes = content;
     if content.starts_with(&[0x1f, 0x8b]) {
-        unpacked = Stream::of(content, reading.params).gunzip().rest()?;
+        unpacked = Stream::in_memory(content, reading.params).gunzip().rest()?;
         bytes = &unpacked;
     }
     spz::read(bytes, reading).map_err(|e| {
