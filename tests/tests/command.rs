@@ -40,7 +40,7 @@ fn exit_0_render_writes_all_outputs_and_nothing_else() {
 fn options_and_sets_both_hold_and_contradictions_are_refused() {
     let place = place();
     let size = |arguments: &[&str]| {
-        let out = place.expect(0, &[&["render", "s.toml", "-o", "a.png", "--json"], arguments].concat(), "");
+        let out = place.expect(0, &[&["render", "s.toml", "-o", "a.png", "--force", "--json"], arguments].concat(), "");
         json_of(&out)["size"].clone()
     };
     let camera = "camera={ position = [0, 0, 5], target = [0, 0, 0], size = [8, 6] }";

@@ -169,9 +169,9 @@ fn what_is_not_used_is_named_and_what_cannot_be_is_refused() {
     for expected in ["a medium does not use `opacity`", "a medium does not use `smoothing_length` beside `radius`"] {
         assert!(text.contains(expected), "{text}");
     }
-    assert!(!text.contains("columns not used"), "{text}");
+    assert!(!text.contains("not used"), "{text}");
     let (code, text) = said(folder.path(), &plain.replace("as = 'medium'\nextinction = 2", ""), &[]);
-    assert!(code == Some(0) && text.contains("columns not used: smoothing_length"), "{text}");
+    assert!(code == Some(0) && text.contains("not used: smoothing_length"), "{text}");
     write(folder.path(), &slab("radius", "-0.5", 1.0, false));
     let (code, text) = said(folder.path(), &plain, &[]);
     assert!(code == Some(3) && text.contains("slab.xyz:2:") && text.contains("a finite length above 0"), "{text}");

@@ -59,14 +59,12 @@ fn columns_that_are_not_used_are_named_once() {
     assert!(out.status.success(), "{}", errors(&out));
     let said: Vec<String> = errors(&out).lines().filter(|l| l.contains("not used")).map(str::to_owned).collect();
     assert_eq!(said.len(), 1, "{said:?}");
-    assert!(
-        said[0].starts_with("note: ") && said[0].ends_with("wall.csv: columns not used: red, green, time, intensity")
-    );
+    assert!(said[0].starts_with("note: ") && said[0].ends_with("wall.csv: not used: red, green, time, intensity"));
     let document: Value = serde_json::from_slice(&out.stdout).unwrap();
     assert_eq!(document["notes"].as_array().unwrap().len(), 1);
     assert!(!document["warnings"].to_string().contains("not used"));
     let explained = run(folder.path(), &["explain", "s.toml"]);
-    assert!(errors(&explained).contains("columns not used: red, green, time, intensity"), "{}", errors(&explained));
+    assert!(errors(&explained).contains("not used: red, green, time, intensity"), "{}", errors(&explained));
     let info: Value = serde_json::from_slice(&run(folder.path(), &["info", "wall.csv", "--json"]).stdout).unwrap();
     // A scene may ask for any of them.
     assert_eq!(info["not_used"], json!([]));

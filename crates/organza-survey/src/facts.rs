@@ -281,7 +281,7 @@ fn of_grid(grid: &Grid, table: Option<&NamedTable>) -> Facts {
     let said_of_labels = match &reading {
         Reading::Labels(labels) => Some(labels.said()),
         Reading::Doubtful(said) => {
-            Some(format!("{said}; `mesh = ` or `--preset labels` draws the surface of each label"))
+            Some(Labels::doubt(said, grid, "`mesh = ` or `--preset labels` draws the surface of each label"))
         }
         Reading::Amounts => None,
     };

@@ -157,14 +157,14 @@ fn check_labels(data: &[DataFile], wish: &Wish) -> Result<(), Error> {
     };
     let reason = |file: &DataFile| {
         let SourceData::Grid(grid) = &file.data else { return None };
-        let reason = look::stated_labels(grid, wish)?.err()?;
+        let reason = look::stated_labels(grid, wish)?.err().unwrap_or_else(|| look::AS_IT_IS.to_owned());
         Some(format!("; {}: {reason}", printable(&file.path)))
     };
     let reasons: String = data.iter().filter_map(reason).collect();
     let hint = if is_look {
         "labels are whole numbers, 0 is nothing; leave the option out"
     } else {
-        "labels are whole numbers, all of which the table has; 0 is nothing. --preset labels takes a volume for labels that lacks some"
+        "labels are whole numbers, all of which the table has; 0 is nothing. without a table --preset labels draws all numbers"
     };
     Err(Error::usage(format!("{option}: no file is a volume of labels{reasons}"), hint))
 }
@@ -174,7 +174,7 @@ fn label_remarks<'a>(data: &'a [DataFile], objects: &'a [Object]) -> impl Iterat
     data.iter().zip(objects).filter_map(|(file, object)| {
         let path = printable(&file.path);
         if let Some(doubt) = object.doubt() {
-            return Some(format!("{path}: {doubt}; --preset labels draws the surface of each label"));
+            return Some(format!("{path}: {doubt}"));
         }
         let labels = counted(object.labels()? as u64, "label");
         Some(format!("{path}: whole numbers that look like {labels}: each region has its surface and its colour; --preset mri draws amounts"))

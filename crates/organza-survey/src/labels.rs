@@ -46,6 +46,12 @@ impl Labels {
         )
     }
 
+    /// A sentence about amounts, with `way`, which draws labels, where the volume can have such.
+    pub(crate) fn doubt(said: &str, grid: &Grid, way: &str) -> String {
+        let can = Self::whole(grid).is_ok();
+        format!("{said}; {}", if can { way } else { "labels are whole numbers from 0, or -1 for none" })
+    }
+
     /// The numbers of regions, by rising number.
     pub(crate) fn regions(&self) -> impl Iterator<Item = f64> {
         self.0.iter().copied().filter(|label| *label > 0.0)

@@ -335,3 +335,29 @@ pub(crate) fn of_costly<'a>(tables: impl Iterator<Item = &'a ShadowTable>) -> Op
         )
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cells_are_proposed_that_a_table_can_have() {
+        let told = |share: f64, cells: u32, bytes: u64| {
+            of_cells(Coarse { share, cells, light: "0".to_owned(), bytes }, 4 << 30).unwrap_or_default()
+        };
+        assert_eq!(told(0.1, 1024, 1 << 20), "");
+        assert!(told(0.2, 1024, 1 << 20).ends_with("shadow_cells = 4096 of that [[light]] leaves about a twentieth"));
+        let most = told(0.5, 4096, 64 << 20);
+        assert!(
+            most.ends_with("shadow_cells = 16384 of that [[light]], the most that a table may have, leave about 13 %"),
+            "{most}"
+        );
+        let fitting = told(0.5, 4096, 768 << 20);
+        assert!(
+            fitting.ends_with("shadow_cells = 8192 of that [[light]], the most that fit the memory, leave about 25 %"),
+            "{fitting}"
+        );
+        assert!(told(0.5, 4096, 4 << 30).contains("larger --max-memory"));
+        assert!(told(0.5, 16384, 1 << 20).contains("no table has finer ones"));
+    }
+}

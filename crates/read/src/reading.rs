@@ -143,7 +143,7 @@ impl Notes {
     pub fn sentences<'u>(&self, file: &str, unused: impl IntoIterator<Item = &'u str>) -> Vec<String> {
         let unused = unused.into_iter().map(|name| -> &str { name });
         let unused: Vec<&str> = self.unused.iter().map(String::as_str).chain(unused).collect();
-        let unused = (!unused.is_empty()).then(|| format!("{file}: columns not used: {}", unused.join(", ")));
+        let unused = (!unused.is_empty()).then(|| format!("{file}: not used: {}", unused.join(", ")));
         self.remarks.iter().map(|remark| format!("{file}: {remark}")).chain(unused).collect()
     }
 

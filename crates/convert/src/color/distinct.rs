@@ -3,6 +3,7 @@
 //! The first ones are listed. Each further one is the colour of a lattice in sRGB that is farthest, in `OKLab` (Ottosson 2020), from all colours before
 //! it: so many numbers have as many colours, the less alike the fewer numbers there are.
 
+use splat_core::glam::DVec3;
 use splat_core::srgb::linear_from_hex;
 use std::sync::LazyLock;
 
@@ -40,14 +41,15 @@ fn spread() -> Vec<[f32; 3]> {
             (i / (LEVELS * LEVELS) * STEP) << 16 | (i / LEVELS % LEVELS * STEP) << 8 | (i % LEVELS * STEP),
         );
         let lab = ok_lab(color);
-        let chroma_sq = lab[1] * lab[1] + lab[2] * lab[2];
-        ((LIGHTNESS[0]..=LIGHTNESS[1]).contains(&lab[0]) && chroma_sq >= CHROMA * CHROMA).then_some((color, lab))
+        let is_shown =
+            (LIGHTNESS[0]..=LIGHTNESS[1]).contains(&lab.x) && libm::sqrt(lab.y * lab.y + lab.z * lab.z) >= CHROMA;
+        is_shown.then_some((color, lab))
     };
-    let candidates: Vec<([f32; 3], [f64; 3])> = (0..LEVELS.pow(3)).filter_map(candidate).collect();
+    let candidates: Vec<([f32; 3], DVec3)> = (0..LEVELS.pow(3)).filter_map(candidate).collect();
     let mut nearest = vec![f64::INFINITY; candidates.len()];
-    let mut approach = |lab: [f64; 3]| {
+    let mut approach = |lab: DVec3| {
         for (least, (_, other)) in nearest.iter_mut().zip(&candidates) {
-            *least = least.min(distance_sq(lab, *other));
+            *least = least.min(lab.distance_squared(*other));
         }
         // The first of equal ones.
         (0..nearest.len()).fold(0, |best, i| if nearest[i] > nearest[best] { i } else { best })
@@ -64,26 +66,19 @@ fn spread() -> Vec<[f32; 3]> {
     colors
 }
 
-fn distance_sq(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a.iter().zip(&b).map(|(a, b)| (a - b) * (a - b)).sum()
-}
-
 /// Linear Rec.709 → `OKLab`, by the matrices of Ottosson.
-fn ok_lab(color: [f32; 3]) -> [f64; 3] {
-    let color = color.map(f64::from);
-    let times = |row: [f64; 3], values: [f64; 3]| row[0] * values[0] + row[1] * values[1] + row[2] * values[2];
-    let cones = [
-        [0.412_221_470_8, 0.536_332_536_3, 0.051_445_992_9],
-        [0.211_903_498_2, 0.680_699_545_1, 0.107_396_956_6],
-        [0.088_302_461_9, 0.281_718_837_6, 0.629_978_700_5],
-    ]
-    .map(|row| libm::cbrt(times(row, color)));
-    [
-        [0.210_454_255_3, 0.793_617_785_0, -0.004_072_046_8],
-        [1.977_998_495_1, -2.428_592_205_0, 0.450_593_709_9],
-        [0.025_904_037_1, 0.782_771_766_2, -0.808_675_766_0],
-    ]
-    .map(|row| times(row, cones))
+fn ok_lab(color: [f32; 3]) -> DVec3 {
+    let color = DVec3::from_array(color.map(f64::from));
+    let cones = DVec3::new(
+        libm::cbrt(color.dot(DVec3::new(0.412_221_470_8, 0.536_332_536_3, 0.051_445_992_9))),
+        libm::cbrt(color.dot(DVec3::new(0.211_903_498_2, 0.680_699_545_1, 0.107_396_956_6))),
+        libm::cbrt(color.dot(DVec3::new(0.088_302_461_9, 0.281_718_837_6, 0.629_978_700_5))),
+    );
+    DVec3::new(
+        cones.dot(DVec3::new(0.210_454_255_3, 0.793_617_785_0, -0.004_072_046_8)),
+        cones.dot(DVec3::new(1.977_998_495_1, -2.428_592_205_0, 0.450_593_709_9)),
+        cones.dot(DVec3::new(0.025_904_037_1, 0.782_771_766_2, -0.808_675_766_0)),
+    )
 }
 
 #[cfg(test)]
@@ -93,9 +88,9 @@ mod tests {
     #[test]
     fn as_many_numbers_have_as_many_colours_that_are_told_apart() {
         let apart = |count: usize| {
-            let labs: Vec<[f64; 3]> = COLORS[..count].iter().map(|color| ok_lab(*color)).collect();
+            let labs: Vec<DVec3> = COLORS[..count].iter().map(|color| ok_lab(*color)).collect();
             let pairs = (FIRST.len()..count).flat_map(|i| (0..i).map(move |k| (i, k)));
-            pairs.map(|(i, k)| distance_sq(labs[i], labs[k])).fold(f64::INFINITY, f64::min).sqrt()
+            pairs.map(|(i, k)| labs[i].distance(labs[k])).fold(f64::INFINITY, f64::min)
         };
         // About 0.02 is just noticed side by side.
         for (count, least) in [(30, 0.1), (64, 0.07), (COUNT, 0.03)] {

@@ -19,6 +19,9 @@ use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
+/// Why labels of some volumes are not drawn.
+pub(super) const AS_IT_IS: &str = "a `mesh` of labels takes no `array` and no `nodata`";
+
 /// Colours of surfaces that have none, in turns.
 const CLAYS: [[f32; 3]; 5] =
     [[0.68, 0.64, 0.59], [0.42, 0.53, 0.64], [0.70, 0.52, 0.33], [0.47, 0.58, 0.44], [0.62, 0.45, 0.50]];
@@ -307,15 +310,18 @@ fn object(file: &DataFile, wish: &Wish, table: Option<&str>, colors: Option<Stri
         SourceData::Grid(grid) => {
             let matter = Matter::in_surroundings(grid, file.value_outside);
             let is_as_it_is = file.array.is_none() && file.nodata.is_none();
-            let mut reading = reading(grid, matter.as_ref(), wish);
-            if let (Reading::Labels(known), false) = (&reading, is_as_it_is) {
-                let count = counted(known.regions().count() as u64, "label");
-                let keys = "a `mesh` of labels takes no `array` and no `nodata`";
-                reading = Reading::Doubtful(format!(
-                    "its whole numbers look like {count}, but are taken for amounts: {keys}"
-                ));
-            }
-            if let Reading::Labels(known) = &reading {
+            let reading = reading(grid, matter.as_ref(), wish);
+            let doubt = match &reading {
+                Reading::Labels(known) if !is_as_it_is => {
+                    let count = counted(known.regions().count() as u64, "label");
+                    Some(format!("its whole numbers look like {count}, but are taken for amounts: {AS_IT_IS}"))
+                }
+                Reading::Doubtful(said) => {
+                    Some(Labels::doubt(said, grid, "--preset labels draws the surface of each label"))
+                }
+                Reading::Labels(_) | Reading::Amounts => None,
+            };
+            if let (Reading::Labels(known), true) = (&reading, is_as_it_is) {
                 let labels = known.regions().count();
                 let map = preset.and_then(Preset::map).map_or("distinct", |map| map.name());
                 let colors = match table {
@@ -344,7 +350,6 @@ fn object(file: &DataFile, wish: &Wish, table: Option<&str>, colors: Option<Stri
             let about =
                 format!("{} × {} × {} voxels; {}", grid.dims[0], grid.dims[1], grid.dims[2], sides(extent(grid)));
             let keys = volume_keys(grid, matter.as_ref(), look.as_ref());
-            let doubt = if let Reading::Doubtful(said) = reading { Some(said) } else { None };
             Object { doubt, ..bare("volume", about, Some(material), keys) }
         }
         // Images are refused when they are read.

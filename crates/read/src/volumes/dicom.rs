@@ -418,10 +418,7 @@ fn of_series(
         ));
     };
     let uid = chosen.0.clone();
-    let [of_chosen, of_others]: [Vec<Refused>; 2] = {
-        let (of_chosen, of_others) = refused.into_iter().partition(|refused| refused.series == uid);
-        [of_chosen, of_others]
-    };
+    let (of_chosen, of_others): (Vec<_>, Vec<_>) = refused.into_iter().partition(|refused| refused.series == uid);
     if let Some(Refused { error, .. }) = of_chosen.into_iter().next() {
         return Err(error);
     }

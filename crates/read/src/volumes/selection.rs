@@ -226,9 +226,11 @@ fn named_channel(
         if names.len() == 1 {
             return Ok(0);
         }
-        let [first, count, others] = [shown(0), names.len().to_string(), listed(Some(0))];
+        let count = names.len();
         notes.remark(format!(
-            "{first} of {count} is drawn; `array` of a scene or --color-by chooses another by its name: {others}"
+            "{} of {count} is drawn; `array` of a scene or --color-by chooses another by its name: {}",
+            shown(0),
+            listed(Some(0))
         ));
         return Ok(0);
     };

@@ -43,7 +43,7 @@ fn candidate(statistics: &Statistics) -> Candidate {
     let leave = if drawing.len() == 1 { "leaves" } else { "leave" };
     // A technique that could is named by what the scene has it do instead.
     let could = statistics.techniques.iter().any(|technique| row(*technique).scatters_by.is_some());
-    let as_set = if could { " as the scene sets it" } else { "" };
+    let as_set = if could { ", as the scene sets it," } else { "" };
     let way =
         TABLE.iter().find_map(|row| row.scatters_by).map(|way| format!(": {way} asks for it")).unwrap_or_default();
     let drawing = listed(&drawing);
