@@ -1,6 +1,8 @@
 //! 3D Gaussians as web viewers and exchange formats write them.
 
-use crate::read_samples::archives::{gaussian_glb, gaussian_glb_with, ksplat, sog, sog_files, spz_glb, webp, zip};
+use crate::read_samples::archives::{
+    archive, gaussian_glb, gaussian_glb_with, ksplat, sog, sog_files, spz_glb, webp, zip,
+};
 use crate::read_samples::gaussians::{
     CONSTANT, EXACT, Steps, Trained, agree, points, spz, spz_4, trained, trained_ply,
 };
@@ -63,6 +65,7 @@ fn sog_lies_in_a_folder_too_or_in_one_of_an_archive() {
     }
     let within: Vec<_> = files.iter().map(|(name, content)| (format!("scene/{name}"), content.clone())).collect();
     agree("within", &points("a.sog", &zip(&within)), &written, 2, &sog_steps(true));
+    agree("packed", &points("a.sog", &archive(&files, true)), &written, 2, &sog_steps(true));
     // Images are not looked for outside of the folder.
     let json = String::from_utf8(files[0].1.clone()).unwrap().replace("means_l.webp", "../means_l.webp");
     fs::write(folder.join("meta.json"), json).unwrap();
@@ -91,7 +94,7 @@ fn what_is_wrong_with_sog_is_said() {
     let mut without = sog_files(&written(5, 1), 1, 2);
     without.remove(4);
     for (content, expected) in [
-        (zip(&without), "'quats.webp': specified file not found"),
+        (zip(&without), "an archive without 'quats.webp'"),
         (zip(&without[1..]), "an archive without meta.json"),
         (described("\"version\":2", "\"version\":3"), "expected version 1 or 2 in meta.json, found 3"),
         (
@@ -205,7 +208,7 @@ fn what_is_wrong_with_ksplat_is_said() {
         (with(20, 3), "a.ksplat@20: expected a level of compression from 0 to 2, found 3"),
         (with(16, 0), "at least one Gaussian, found none"),
         (with(16, 5), "a.ksplat@16: expected 4 Gaussians, as the sections hold, found 5"),
-        (with(6, 1), "headers of sections, of 1024 bytes each"),
+        (with(6, 1), "section headers of 1024 bytes"),
         (with(4096, 3), "at most 2 Gaussians, for which there is room, found 3"),
         (with(4096 + 40, 3), "harmonics of degree 0 to 2, found 3"),
         (with(4096 + 20, 16), "12 bytes for the middle of a bucket, found 16"),

@@ -10,6 +10,7 @@ use crate::reading::Reading;
 use half::f16;
 use splat_core::RawPoints;
 use splat_core::glam::DVec3;
+use splat_core::text::counted;
 
 /// Bytes of the header, and of that of a section.
 const HEADER: usize = 4096;
@@ -106,7 +107,7 @@ pub(crate) fn read(content: &[u8], reading: &mut Reading<'_>) -> Result<RawPoint
                 reading.go_on()?;
             }
             let record = section.records + section.stride * i;
-            let bucket = buckets.next_bucket(i);
+            let bucket = buckets.bucket_of(i);
             let gaussian = gaussian(content, &header, section, record, bucket);
             let color = LAYOUTS[header.level].color;
             let constant = [0, 1, 2].map(|c| (f64::from(content[record + color + c]) / 255.0 - 0.5) / CONSTANT);
@@ -152,7 +153,8 @@ fn header(content: &[u8]) -> Result<Header, ReadError> {
 fn sections(content: &[u8], header: &Header, reading: &Reading<'_>) -> Result<Vec<Section>, ReadError> {
     let mut at = header.sections.saturating_mul(SECTION).saturating_add(HEADER);
     if at > content.len() {
-        let expected = format!("{} headers of sections, of 1024 bytes each", header.sections);
+        let headers = counted(header.sections as u64, "section header");
+        let expected = format!("{headers} of 1024 bytes");
         return Err(wrong(HEADER, expected, format!("{} bytes behind the header", content.len() - HEADER)));
     }
     let mut found = Vec::new();
@@ -248,7 +250,7 @@ impl<'a> Buckets<'a> {
     }
 
     /// The bucket of Gaussian `i`; every one follows the one before.
-    fn next_bucket(&mut self, i: usize) -> usize {
+    fn bucket_of(&mut self, i: usize) -> usize {
         let Section { full, capacity, partial, .. } = self.section;
         if let Some(bucket) = i.checked_div(*capacity).filter(|bucket| bucket < full) {
             return bucket;

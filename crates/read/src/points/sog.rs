@@ -70,14 +70,14 @@ impl Splats<'_> {
                 reading.go_on()?;
             }
             let row = self.palette.as_ref().map_or(Ok(0), |palette| palette.row(i));
-            let taken = match (self.rotation(i), row) {
-                (Ok(rotation), Ok(row)) => {
+            let taken = match (self.gaussian(i), row) {
+                (Ok(gaussian), Ok(row)) => {
                     let constant = self.constant(i);
                     let harmonic = |k: usize| match (k, &self.palette) {
                         (0, _) | (_, None) => constant,
                         (k, Some(palette)) => palette.harmonic(row, k - 1),
                     };
-                    gathered.push(&self.gaussian(i, rotation), (0..others + 1).map(harmonic))
+                    gathered.push(&gaussian, (0..others + 1).map(harmonic))
                 }
                 (Err(reason), _) | (_, Err(reason)) => gathered.refuse(reason),
             };
@@ -86,7 +86,8 @@ impl Splats<'_> {
         gathered.finish(Place::File)
     }
 
-    fn gaussian(&self, i: usize, rotation: [f64; 4]) -> Gaussian {
+    fn gaussian(&self, i: usize) -> Result<Gaussian, Refused> {
+        let rotation = self.rotation(i)?;
         let Description { mins, maxs, scale_tables, .. } = self.description;
         let low = self.means[0].pixel(i);
         let high = self.means[1].pixel(i);
@@ -98,7 +99,7 @@ impl Splats<'_> {
             deviation.z = 0.0;
         }
         let opacity = self.description.color_tables.opacity(self.colors.pixel(i)[3]);
-        Gaussian { position: DVec3::from_array(position), deviation, rotation, opacity }
+        Ok(Gaussian { position: DVec3::from_array(position), deviation, rotation, opacity })
     }
 
     fn constant(&self, i: usize) -> [f64; 3] {

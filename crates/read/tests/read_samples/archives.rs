@@ -5,20 +5,30 @@ use super::glb;
 use image::codecs::webp::WebPEncoder;
 use image::{ExtendedColorType, ImageEncoder};
 use std::f64::consts::SQRT_2;
+use std::io::Write;
 
 /// Gaussians of a row of images.
 const WIDTH: usize = 4;
 
 /// An archive whose files are stored as they are.
 pub(crate) fn zip(files: &[(String, Vec<u8>)]) -> Vec<u8> {
+    archive(files, false)
+}
+
+/// An archive whose files are stored as they are, or packed by deflate.
+pub(crate) fn archive(files: &[(String, Vec<u8>)], is_packed: bool) -> Vec<u8> {
     let mut out = Vec::new();
     let mut directory = Vec::new();
     for (name, content) in files {
         let mut sum = flate2::Crc::new();
         sum.update(content);
-        let mut facts = vec![20, 0, 0, 0, 0, 0, 0, 0, 0x21, 0];
+        let mut encoder = flate2::write::DeflateEncoder::new(Vec::new(), flate2::Compression::best());
+        encoder.write_all(content).unwrap();
+        let packed = encoder.finish().unwrap();
+        let stored = if is_packed { &packed } else { content };
+        let mut facts = vec![20, 0, 0, 0, if is_packed { 8 } else { 0 }, 0, 0, 0, 0x21, 0];
         facts.extend(sum.sum().to_le_bytes());
-        facts.extend([content.len() as u32; 2].map(u32::to_le_bytes).as_flattened());
+        facts.extend([stored.len() as u32, content.len() as u32].map(u32::to_le_bytes).as_flattened());
         facts.extend((name.len() as u16).to_le_bytes());
         facts.extend([0, 0]);
         directory.extend(b"PK\x01\x02\x14\x00");
@@ -29,7 +39,7 @@ pub(crate) fn zip(files: &[(String, Vec<u8>)]) -> Vec<u8> {
         out.extend(b"PK\x03\x04");
         out.extend(&facts);
         out.extend(name.as_bytes());
-        out.extend(content);
+        out.extend(stored);
     }
     let start = out.len() as u32;
     out.extend(&directory);
@@ -71,9 +81,9 @@ fn even(low: f64, high: f64) -> String {
 
 /// The files of a scene of SOG of version 1 or 2.
 pub(crate) fn sog_files(gaussians: &[Trained], degree: usize, version: u32) -> Vec<(String, Vec<u8>)> {
-    let all = |k: usize| gaussians.iter().map(move |t| folded(t.position[k]));
-    let low = [0, 1, 2].map(|k| all(k).fold(f64::MAX, f64::min));
-    let high = [0, 1, 2].map(|k| all(k).fold(f64::MIN, f64::max));
+    let places = |k: usize| gaussians.iter().map(move |t| folded(t.position[k]));
+    let low = [0, 1, 2].map(|k| places(k).fold(f64::MAX, f64::min));
+    let high = [0, 1, 2].map(|k| places(k).fold(f64::MIN, f64::max));
     let whole = |t: &Trained, k: usize| {
         let range = high[k] - low[k];
         if range > 0.0 { (65535.0 * (folded(t.position[k]) - low[k]) / range).round() as u16 } else { 0 }
@@ -222,7 +232,8 @@ pub(crate) fn ksplat(gaussians: &[Trained], degree: usize, level: u16) -> Vec<u8
             data.extend(t.harmonics[0].map(|c| (255.0 * (0.5 + CONSTANT * c)).round() as u8));
             data.push((255.0 * t.opacity).round() as u8);
             let degrees = [1..4, 4..9].into_iter().take(degree);
-            for v in degrees.flat_map(|of| (0..3).flat_map(move |c| t.harmonics[of.clone()].iter().map(move |h| h[c])))
+            for v in
+                degrees.flat_map(|band| (0..3).flat_map(move |c| t.harmonics[band.clone()].iter().map(move |h| h[c])))
             {
                 match level {
                     0 => data.extend((v as f32).to_le_bytes()),

@@ -131,6 +131,10 @@ impl Description {
             color_tables.logits =
                 Some([bound("sh0", "mins", &raw.sh0.mins, 3)?, bound("sh0", "maxs", &raw.sh0.maxs, 3)?]);
         }
+        let scale_tables = tables("scales", &raw.scales, is_coded)?;
+        let [scales] = raw.scales.files;
+        let [quaternions] = raw.quats.files;
+        let [colors] = raw.sh0.files;
         let palette =
             raw.sh_n.filter(|palette| palette.bands != Some(0)).map(|palette| facts(palette, is_coded)).transpose()?;
         Ok(Self {
@@ -138,10 +142,10 @@ impl Description {
             mins,
             maxs,
             means,
-            scale_tables: tables("scales", &raw.scales, is_coded)?,
-            scales: only(raw.scales.files),
-            quaternions: only(raw.quats.files),
-            colors: only(raw.sh0.files),
+            scales,
+            scale_tables,
+            quaternions,
+            colors,
             color_tables,
             palette,
             is_flat: raw.model.as_deref() == Some("2dgs"),
@@ -158,11 +162,6 @@ impl Description {
         });
         self.is_antialiased.then(|| gaussians::ANTIALIASED.to_owned()).into_iter().chain(model).collect()
     }
-}
-
-fn only(files: [String; 1]) -> String {
-    let [file] = files;
-    file
 }
 
 fn facts(palette: RawPalette, is_coded: bool) -> Result<PaletteFacts, ReadError> {

@@ -97,8 +97,10 @@ impl<'a> Source<'a> {
             }
             Self::Archive { archive, folder, .. } => {
                 let refused = |e: zip::result::ZipError| damaged(format!("{what}: {e}"));
-                let mut file =
-                    archive.by_name_raw([folder.as_bytes(), name.as_bytes()].concat().as_slice()).map_err(refused)?;
+                let path = [folder.as_bytes(), name.as_bytes()].concat();
+                let index = archive.index_for_name_raw(&path);
+                let index = index.ok_or_else(|| damaged(format!("an archive without {what}")))?;
+                let mut file = archive.by_index(index).map_err(refused)?;
                 let length = file.size();
                 input::check_deflated(length, file.compressed_size(), "an archive")?;
                 let held = reading.params.memory.take(&what, length)?;
