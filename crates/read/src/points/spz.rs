@@ -46,6 +46,31 @@ struct Header {
     flags: u8,
 }
 
+impl Header {
+    /// Bytes of a Gaussian in each part.
+    fn widths(&self) -> [usize; 6] {
+        let place = if self.version == 1 { 6 } else { 9 };
+        let rotation = if self.version <= 2 { 3 } else { 4 };
+        [place, 1, 3, 3, rotation, 3 * coefficients(self.degree)]
+    }
+}
+
+/// Coefficients of one colour beside the constant.
+fn coefficients(degree: u8) -> usize {
+    (usize::from(degree) + 1).pow(2) - 1
+}
+
+/// A part of version 4 as it is stored.
+#[cfg(feature = "spz4")]
+struct Packed<'a> {
+    part: usize,
+    /// Its first byte in the file.
+    at: usize,
+    bytes: &'a [u8],
+    /// Bytes of it once it is unpacked.
+    length: usize,
+}
+
 /// Bytes of all Gaussians, part by part.
 struct Parts<'a> {
     bytes: Vec<Cow<'a, [u8]>>,
@@ -56,7 +81,7 @@ struct Parts<'a> {
 }
 
 impl Parts<'_> {
-    fn bytes(&self, part: usize, i: usize) -> &[u8] {
+    fn bytes_of(&self, part: usize, i: usize) -> &[u8] {
         &self.bytes[part][self.widths[part] * i..][..self.widths[part]]
     }
 }
@@ -65,15 +90,8 @@ impl Parts<'_> {
 pub(crate) fn read(content: &[u8], reading: &mut Reading<'_>) -> Result<RawPoints, ReadError> {
     let header = header(content, reading)?;
     let Header { version, count, degree: stored, fraction, .. } = header;
-    let coefficients = |degree: u8| (usize::from(degree) + 1).pow(2) - 1;
-    let place = if version == 1 { 6 } else { 9 };
-    let rotation = if version <= 2 { 3 } else { 4 };
-    let widths = [place, 1, 3, 3, rotation, 3 * coefficients(stored)];
-    let parts = if version == 4 {
-        unpacked(content, &header, widths, reading)?
-    } else {
-        stored_parts(content, &header, widths, reading)?
-    };
+    let parts =
+        if version == 4 { unpacked(content, &header, reading)? } else { stored_parts(content, &header, reading)? };
     let degree = stored.min(Gaussians::MOST_DEGREE);
     if degree < stored {
         reading
@@ -86,9 +104,9 @@ pub(crate) fn read(content: &[u8], reading: &mut Reading<'_>) -> Result<RawPoint
         if i.is_multiple_of(1 << 14) {
             reading.go_on()?;
         }
-        let byte = |part: usize, k: usize| f64::from(parts.bytes(part, i)[k]);
+        let byte = |part: usize, k: usize| f64::from(parts.bytes_of(part, i)[k]);
         let coordinate = |k: usize| {
-            let bytes = parts.bytes(0, i);
+            let bytes = parts.bytes_of(0, i);
             if version == 1 {
                 f16::from_le_bytes([bytes[2 * k], bytes[2 * k + 1]]).to_f64()
             } else {
@@ -98,7 +116,11 @@ pub(crate) fn read(content: &[u8], reading: &mut Reading<'_>) -> Result<RawPoint
         let gaussian = Gaussian {
             position: DVec3::from_array([0, 1, 2].map(coordinate)),
             deviation: exponentials(DVec3::from_array([0, 1, 2].map(|k| byte(3, k) / 16.0 - 10.0))),
-            rotation: if version <= 2 { first_three(parts.bytes(4, i)) } else { smallest_three(parts.bytes(4, i)) },
+            rotation: if version <= 2 {
+                first_three(parts.bytes_of(4, i))
+            } else {
+                smallest_three(parts.bytes_of(4, i))
+            },
             opacity: byte(1, 0) / 255.0,
         };
         let constant = [0, 1, 2].map(|c| (byte(2, c) / 255.0 - 0.5) / COLOR_SCALE);
@@ -106,7 +128,7 @@ pub(crate) fn read(content: &[u8], reading: &mut Reading<'_>) -> Result<RawPoint
             0 => constant,
             k => [0, 1, 2].map(|c| (byte(5, 3 * (k - 1) + c) - 128.0) / 128.0),
         };
-        let place = parts.places.map_or(Place::File, |start| Place::Byte((start + widths[0] * i) as u64));
+        let place = parts.places.map_or(Place::File, |start| Place::Byte((start + header.widths()[0] * i) as u64));
         let taken = gathered.push(&gaussian, (0..coefficients(degree) + 1).map(harmonic));
         taken.map_err(|wrong| refused(place, i as u64, wrong))?;
     }
@@ -114,12 +136,8 @@ pub(crate) fn read(content: &[u8], reading: &mut Reading<'_>) -> Result<RawPoint
 }
 
 /// The parts of versions 1 to 3, which follow each other.
-fn stored_parts<'a>(
-    content: &'a [u8],
-    header: &Header,
-    widths: [usize; 6],
-    reading: &mut Reading<'_>,
-) -> Result<Parts<'a>, ReadError> {
+fn stored_parts<'a>(content: &'a [u8], header: &Header, reading: &mut Reading<'_>) -> Result<Parts<'a>, ReadError> {
+    let widths = header.widths();
     let Header { count, degree, flags, .. } = *header;
     let bytes = HEADER as u128 + count as u128 * widths.iter().sum::<usize>() as u128;
     let is_longer = content.len() as u128 > bytes;
@@ -146,13 +164,9 @@ fn stored_parts<'a>(
 
 /// The parts of version 4, unpacked.
 #[cfg(feature = "spz4")]
-fn unpacked<'a>(
-    content: &'a [u8],
-    header: &Header,
-    widths: [usize; 6],
-    reading: &mut Reading<'_>,
-) -> Result<Parts<'a>, ReadError> {
+fn unpacked<'a>(content: &'a [u8], header: &Header, reading: &mut Reading<'_>) -> Result<Parts<'a>, ReadError> {
     use rayon::prelude::*;
+    let widths = header.widths();
     let wrong = |at: usize, expected: String, found: String| {
         Err(ReadError::input(Place::Byte(at as u64), expected, found, TRUNCATED))
     };
@@ -197,7 +211,7 @@ fn unpacked<'a>(
                 format!("{} bytes from byte {at} on", number(entry)),
             );
         };
-        found.push((*part, at, packed, length as usize));
+        found.push(Packed { part: *part, at, bytes: packed, length: length as usize });
         at += packed.len();
     }
     if at != content.len() {
@@ -207,7 +221,7 @@ fn unpacked<'a>(
             format!("{} bytes more", content.len() - at),
         );
     }
-    let unpack = |(part, at, packed, length): (usize, usize, &[u8], usize)| Ok((part, unpack(packed, at, length)?));
+    let unpack = |packed: Packed<'_>| Ok((packed.part, unpack(&packed)?));
     let done: Vec<(usize, Vec<u8>)> = found.into_par_iter().map(unpack).collect::<Result<_, ReadError>>()?;
     let mut bytes = vec![Cow::Borrowed(&content[..0]); widths.len()];
     done.into_iter().for_each(|(part, unpacked)| bytes[part] = Cow::Owned(unpacked));
@@ -216,15 +230,16 @@ fn unpacked<'a>(
 
 /// Without its decoder version 4 is refused.
 #[cfg(not(feature = "spz4"))]
-fn unpacked<'a>(_: &'a [u8], _: &Header, _: [usize; 6], _: &mut Reading<'_>) -> Result<Parts<'a>, ReadError> {
+fn unpacked<'a>(_: &'a [u8], _: &Header, _: &mut Reading<'_>) -> Result<Parts<'a>, ReadError> {
     Err(ReadError::input(Place::Byte(4), "SPZ up to version 3", "version 4", "build with the feature spz4"))
 }
 
-/// Unpacks the part at byte `at` of the file, which has to fill `length` bytes.
+/// Unpacks a part, which has to have its length.
 #[cfg(feature = "spz4")]
-fn unpack(packed: &[u8], at: usize, length: usize) -> Result<Vec<u8>, ReadError> {
+fn unpack(packed: &Packed<'_>) -> Result<Vec<u8>, ReadError> {
     /// Encoders that do not know the length beforehand announce a window of up to 8 MiB.
     const WINDOW: u64 = 8 << 20;
+    let Packed { at, bytes, length, .. } = *packed;
     let wrong = |found: String| {
         ReadError::input(Place::Byte(at as u64), format!("{length} bytes packed with Zstandard"), found, TRUNCATED)
     };
@@ -234,7 +249,7 @@ fn unpack(packed: &[u8], at: usize, length: usize) -> Result<Vec<u8>, ReadError>
     let mut decoder = ruzstd::decoding::FrameDecoder::new();
     decoder.set_max_window_size(WINDOW.max(length as u64));
     // The decoder indexes tables with what it finds in a stream without a checksum.
-    let filled = crate::guarded::guarded(|| decoder.decode_all(packed, &mut unpacked).map_err(|e| e.to_string()));
+    let filled = crate::guarded::guarded(|| decoder.decode_all(bytes, &mut unpacked).map_err(|e| e.to_string()));
     match filled.map_err(wrong)? {
         filled if filled == length => Ok(unpacked),
         filled => Err(wrong(format!("{filled} bytes"))),
