@@ -55,6 +55,10 @@ pub use format::unread::is_foreign_json;
 pub use format::up::{stated_up_axis, up_axis};
 pub use guarded::panic_is_input_error;
 pub use label_rows::{LabelRow, LabelRows, label_rows, label_rows_of_bytes};
+#[cfg(feature = "ply")]
+pub use meshes::texture::Rgba;
+#[cfg(feature = "ply")]
+pub use meshes::textured::{TextureImage, TexturePlaces, textured_in_memory};
 pub use reading::{Fix, Mended, NamedColumn, Notes};
 /// The nouns that this crate takes and returns.
 pub use splat_core;
@@ -314,6 +318,18 @@ pub fn points_in_memory(name: &str, points: &RawPoints, params: &ReadParams) -> 
 pub fn grid_in_memory(name: &str, grid: &Grid, params: &ReadParams) -> Result<Notes, ReadError> {
     let mut reading = Reading::new(params, None);
     remark_gaps(grid, &mut reading).map_err(|e| e.in_file(name))?;
+    Ok(reading.finish(name))
+}
+
+/// The same of the columns of a mesh: those that nobody asked for are named.
+///
+/// # Errors
+/// [`ReadError`] as [`file()`] gives it.
+pub fn mesh_columns_in_memory(name: &str, mesh: &Mesh, params: &ReadParams) -> Result<Notes, ReadError> {
+    let mut reading = Reading::new(params, None);
+    check_mesh_columns(mesh, &reading).map_err(|e| e.in_file(name))?;
+    let unused = mesh.columns.iter().filter(|column| !params.columns.contains(&column.name));
+    reading.notes.unused = unused.map(|column| escaped(column.name.as_bytes(), LONGEST_NAME)).collect();
     Ok(reading.finish(name))
 }
 

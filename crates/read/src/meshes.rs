@@ -25,5 +25,7 @@ pub(crate) mod statements;
 pub(crate) mod stl;
 #[cfg(any(feature = "obj", feature = "gltf", feature = "ply"))]
 pub(crate) mod texture;
+#[cfg(feature = "ply")]
+pub(crate) mod textured;
 #[cfg(any(feature = "obj", feature = "vti", feature = "vtk"))]
 pub(crate) mod tubes;

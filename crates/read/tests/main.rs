@@ -39,6 +39,8 @@ mod read_samples;
 mod read_series;
 #[cfg(all(feature = "tiff", feature = "png"))]
 mod read_stacks;
+#[cfg(all(feature = "obj", feature = "ply"))]
+mod read_textured;
 mod read_unread;
 mod read_volumes;
 mod read_vti;

@@ -12,7 +12,7 @@ mod faces;
 mod gaussians;
 mod header;
 mod splats;
-mod texture;
+pub(crate) mod texture;
 
 use crate::error::{Place, ReadError};
 use crate::reading::Reading;

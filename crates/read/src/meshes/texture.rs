@@ -22,7 +22,7 @@ pub(crate) enum Wrap {
 #[derive(Clone)]
 pub(crate) struct Texture {
     size: [u32; 2],
-    /// sRGB and opacity, row by row from the top.
+    /// Colours and opacities, row by row from the top.
     texels: Arc<Texels>,
     wrap: [Wrap; 2],
     /// Whether texels are squares of one colour.
@@ -31,8 +31,46 @@ pub(crate) struct Texture {
 
 /// Texels that several textures may share, with the memory that they take.
 struct Texels {
-    rgba: Vec<[u8; 4]>,
+    rgba: Rgba,
     _held: Reservation,
+}
+
+/// Colours and opacities of texels, row by row from the top.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Rgba {
+    /// Bytes of sRGB and of opacity.
+    Srgb(Vec<[u8; 4]>),
+    /// Linear numbers.
+    Linear(Vec<[f32; 4]>),
+}
+
+impl Rgba {
+    /// Texels.
+    fn len(&self) -> usize {
+        match self {
+            Self::Srgb(texels) => texels.len(),
+            Self::Linear(texels) => texels.len(),
+        }
+    }
+
+    /// Bytes that they take.
+    fn bytes(&self) -> u64 {
+        match self {
+            Self::Srgb(texels) => size_of_val(texels.as_slice()) as u64,
+            Self::Linear(texels) => size_of_val(texels.as_slice()) as u64,
+        }
+    }
+
+    /// The first texel with a colour below 0, an opacity beyond 0 and 1, or a number that is not finite.
+    fn wrong(&self) -> Option<usize> {
+        let is_right = |[r, g, b, alpha]: &[f32; 4]| {
+            [r, g, b].iter().all(|c| c.is_finite() && **c >= 0.0) && (0.0..=1.0).contains(alpha)
+        };
+        match self {
+            Self::Srgb(_) => None,
+            Self::Linear(texels) => texels.iter().position(|texel| !is_right(texel)),
+        }
+    }
 }
 
 static LINEAR: LazyLock<[f32; 256]> = LazyLock::new(|| std::array::from_fn(|i| linear_from_srgb(i as f64 / 255.0)));
@@ -91,8 +129,29 @@ impl Texture {
         let decoded = image::DynamicImage::from_decoder(decoder).map_err(|e| wrong(e.to_string()))?;
         let rgba = bytemuck::allocation::cast_vec(decoded.into_rgba8().into_raw());
         held.set(what, bytes)?;
-        let texels = Arc::new(Texels { rgba, _held: held });
+        let texels = Arc::new(Texels { rgba: Rgba::Srgb(rgba), _held: held });
         Ok(Self { size: [width, height], texels, wrap: [Wrap::Repeat; 2], is_nearest: false })
+    }
+
+    /// The texture of texels in memory, `size` columns and rows of them.
+    pub(crate) fn of_texels(size: [u32; 2], rgba: Rgba, reading: &Reading<'_>) -> Result<Self, ReadError> {
+        check_sides(size)?;
+        let expected = u64::from(size[0]) * u64::from(size[1]);
+        let found = rgba.len() as u64;
+        if found != expected {
+            let hint = "the size is that of another image";
+            return Err(ReadError::input(Place::File, format!("{expected} texels"), found.to_string(), hint));
+        }
+        if let Some(texel) = rgba.wrong() {
+            let row = texel as u64 / u64::from(size[0]);
+            let column = texel as u64 % u64::from(size[0]);
+            let expected = "finite colours from 0 on and opacities from 0 to 1";
+            let hint = "colours of a display are bytes (uint8), and linear ones numbers with a point";
+            return Err(ReadError::input(Place::File, expected, format!("others in row {row}, column {column}"), hint));
+        }
+        let held = reading.params.memory.take("the texture", rgba.bytes())?;
+        let texels = Arc::new(Texels { rgba, _held: held });
+        Ok(Self { size, texels, wrap: [Wrap::Repeat; 2], is_nearest: false })
     }
 
     /// The same image with other rules of what lies beyond its border and between its texels.
@@ -141,9 +200,15 @@ impl Texture {
                 }
             }
         });
-        let [r, g, b, alpha] = self.texels.rgba[j as usize * self.size[0] as usize + i as usize];
-        let linear: &[f32; 256] = &LINEAR;
-        let [r, g, b] = [r, g, b].map(|c| linear[usize::from(c)]);
-        [r, g, b, f32::from(alpha) / 255.0]
+        let rank = j as usize * self.size[0] as usize + i as usize;
+        match &self.texels.rgba {
+            Rgba::Linear(texels) => texels[rank],
+            Rgba::Srgb(texels) => {
+                let [r, g, b, alpha] = texels[rank];
+                let linear: &[f32; 256] = &LINEAR;
+                let [r, g, b] = [r, g, b].map(|c| linear[usize::from(c)]);
+                [r, g, b, f32::from(alpha) / 255.0]
+            }
+        }
     }
 }

@@ -22,7 +22,7 @@ pub(crate) const NONE: u32 = u32::MAX;
 /// Bytes that a corner takes while it is read and converted.
 pub(crate) const BYTES_PER_CORNER: u64 = 16 + 48 + 48;
 
-/// The mesh with the colours of its paints, times those opacities that its vertices have.
+/// The mesh with the colours of its paints, times those colours and opacities that its vertices have.
 pub(crate) fn painted(
     mut mesh: Mesh,
     mut corners: Vec<Corner>,
@@ -35,14 +35,26 @@ pub(crate) fn painted(
         smooth(&mut mesh, &mut corners, reading)?;
     }
     let place = |c: &Corner| places.get(c[2] as usize).copied().unwrap_or_default();
+    let tint = tint(&mut mesh);
     let painting = Painting {
         place: if textures.is_empty() { Vec::new() } else { corners.iter().map(place).collect() },
         paint_of: corners.iter().map(|c| c[3]).collect(),
-        tint: mesh.opacity.iter().map(|opacity| [1.0, 1.0, 1.0, *opacity]).collect(),
+        tint,
         paints,
         textures,
     };
     painting.paint(mesh, reading)
+}
+
+/// Colours and opacities of vertices, which the mesh loses: painting gives it others. Empty where it has neither.
+fn tint(mesh: &mut Mesh) -> Vec<[f32; 4]> {
+    let colors = std::mem::take(&mut mesh.color);
+    let opacities = std::mem::take(&mut mesh.opacity);
+    let of_vertex = |v: usize| {
+        let [r, g, b] = colors.get(v).copied().unwrap_or([1.0; 3]);
+        [r, g, b, opacities.get(v).copied().unwrap_or(1.0)]
+    };
+    (0..colors.len().max(opacities.len())).map(of_vertex).collect()
 }
 
 /// Gives the mesh the normals that it has where materials split no vertex: a change of material is no edge. A vertex on several sides of a

@@ -21,7 +21,7 @@ pub(super) const NUMBER: &[u8] = b"texnumber";
 
 /// The places of corners, while faces are read: corners that have all in common are one vertex.
 #[derive(Default)]
-pub(super) struct Wedges {
+pub(crate) struct Wedges {
     corners: Vec<Corner>,
     places: Vec<[f32; 2]>,
     known: HashMap<[u32; 4], u32>,
@@ -42,7 +42,7 @@ pub(super) fn has_corners(header: &Header) -> bool {
 
 impl Wedges {
     /// The vertex for a corner of the file's vertex `v`, at a place of the texture of rank `texture`; without a place where that is no number.
-    pub(super) fn corner(
+    pub(crate) fn corner(
         &mut self,
         v: u32,
         place: [f32; 2],
@@ -68,12 +68,12 @@ impl Wedges {
     }
 
     /// Corners so far.
-    pub(super) fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.corners.len()
     }
 
     /// A mesh whose triangles have the vertices of these corners, from one of the vertices of the file.
-    pub(super) fn expanded(&self, mesh: Mesh) -> Mesh {
+    pub(crate) fn expanded(&self, mesh: Mesh) -> Mesh {
         let ids = || self.corners.iter().map(|corner| corner[0] as usize);
         let columns = mesh.columns.into_iter().map(|MeshColumn { name, association, values }| {
             let of_vertex = || ids().map(|v| values[v]).collect();
@@ -88,6 +88,11 @@ impl Wedges {
             columns: columns.collect(),
             ..mesh
         }
+    }
+
+    /// The corners so far, and the places that they name.
+    pub(crate) fn into_parts(self) -> (Vec<Corner>, Vec<[f32; 2]>) {
+        (self.corners, self.places)
     }
 
     /// The mesh with the colours of its textures.

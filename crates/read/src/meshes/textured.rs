@@ -1,0 +1,119 @@
+//! Meshes in memory with a texture, which becomes colours of their vertices as that of a file does.
+
+use super::paint::corners::{BYTES_PER_CORNER, painted};
+use super::paint::{Alpha, Paint};
+use super::ply::texture::Wedges;
+use super::texture::{Rgba, Texture};
+use crate::ReadParams;
+use crate::error::{Place, ReadError};
+use crate::reading::{Notes, Reading};
+use crate::stream::input::{self, Stream};
+use splat_core::Mesh;
+use splat_core::text::escaped_path;
+use std::collections::HashMap;
+use std::path::PathBuf;
+
+/// The image that a mesh in memory is painted with. It repeats beyond its borders, and between the middles of its texels it is interpolated.
+#[derive(Debug, Clone, PartialEq)]
+pub enum TextureImage {
+    /// A PNG or JPEG file.
+    File(PathBuf),
+    /// Texels.
+    Texels {
+        /// Columns and rows.
+        size: [u32; 2],
+        /// Their colours.
+        rgba: Rgba,
+    },
+}
+
+/// Places in a texture: (0, 0) is the lower left corner of the image, (1, 1) its upper right.
+#[derive(Debug, Clone, PartialEq)]
+pub enum TexturePlaces {
+    /// One a vertex.
+    Vertices(Vec<[f32; 2]>),
+    /// One a corner of a triangle. Corners of a vertex at several places become several vertices.
+    Corners(Vec<[[f32; 2]; 3]>),
+}
+
+/// The only paint of such a mesh: the texture, whose opacities are those of the surface.
+const PAINT: Paint = Paint { factor: [1.0; 4], texture: Some(0), alpha: Alpha::Blended };
+
+/// Paints a mesh in memory with a texture: triangles are divided as those of a file are. Colours and opacities of its vertices are multiplied by those of
+/// the texture. Normals that are missing are smooth across vertices at one place. `name` serves messages.
+///
+/// # Errors
+/// [`ReadError`] as [`crate::file()`] gives it: for an image that is no PNG or JPEG, or not there; for texels and places of another number than their image
+/// or the mesh has, or that are not finite; and for what takes more memory than `params` allow.
+///
+/// # Panics
+/// If a vertex index is out of range, see [`Mesh::validate`].
+pub fn textured_in_memory(
+    name: &str,
+    mesh: Mesh,
+    places: &TexturePlaces,
+    image: TextureImage,
+    params: &ReadParams,
+) -> Result<(Mesh, Notes), ReadError> {
+    let params = &ReadParams { memory: params.memory.part(), ..params.clone() };
+    let mut reading = Reading::new(params, None);
+    let texture = texture(name, image, &reading)?;
+    let mesh = with_texture(mesh, places, texture, &mut reading).map_err(|e| e.in_file(name))?;
+    Ok((mesh, reading.finish(name)))
+}
+
+fn texture(name: &str, image: TextureImage, reading: &Reading<'_>) -> Result<Texture, ReadError> {
+    match image {
+        TextureImage::Texels { size, rgba } => Texture::of_texels(size, rgba, reading).map_err(|e| e.in_file(name)),
+        TextureImage::File(path) => {
+            let content = Stream::open(&path, reading.params).and_then(Stream::rest);
+            let decoded = content.and_then(|content| Texture::decode(&content, "the texture", reading));
+            decoded.map_err(|e| e.in_file(&escaped_path(&path)))
+        }
+    }
+}
+
+fn with_texture(
+    mut mesh: Mesh,
+    places: &TexturePlaces,
+    texture: Texture,
+    reading: &mut Reading<'_>,
+) -> Result<Mesh, ReadError> {
+    let (found, expected, what) = match places {
+        TexturePlaces::Vertices(places) => (places.len(), mesh.position.len(), "vertex"),
+        TexturePlaces::Corners(places) => (places.len(), mesh.triangles.len(), "triangle"),
+    };
+    if found != expected {
+        let expected = format!("texture coordinates of each {what}, {expected}");
+        return Err(ReadError::input(Place::File, expected, found.to_string(), "give as many as the mesh has"));
+    }
+    input::hold("the corners", 3 * mesh.triangles.len() as u64 * BYTES_PER_CORNER, reading.params)?;
+    let mut wedges = Wedges::default();
+    let mut triangles = std::mem::take(&mut mesh.triangles);
+    for (t, triangle) in triangles.iter_mut().enumerate() {
+        for (k, v) in triangle.iter_mut().enumerate() {
+            let place = match places {
+                TexturePlaces::Vertices(places) => places[*v as usize],
+                TexturePlaces::Corners(places) => places[t][k],
+            };
+            if !place.iter().all(|c| c.is_finite()) {
+                let found = format!("{}, {} at corner {k} of face {t}", place[0], place[1]);
+                let hint = "give each corner a place, or paint the mesh without a texture";
+                return Err(ReadError::input(Place::File, "texture coordinates that are finite numbers", found, hint));
+            }
+            *v = wedges.corner(*v, place, 0, reading)?;
+        }
+    }
+    let mut mesh = wedges.expanded(mesh);
+    mesh.triangles = triangles;
+    let (mut corners, places) = wedges.into_parts();
+    // The seams of a texture are no edges of the surface, whose normals are smooth across them.
+    let mut known = HashMap::new();
+    for (corner, position) in corners.iter_mut().zip(&mesh.position) {
+        // −0 and 0 are one place.
+        let place = position.to_array().map(|x| (x + 0.0).to_bits());
+        corner[0] = *known.entry(place).or_insert(corner[0]);
+    }
+    drop(known);
+    painted(mesh, corners, &places, vec![PAINT], vec![texture], reading)
+}

@@ -1,0 +1,133 @@
+//! Meshes in memory with a texture are painted as those of files are.
+
+use crate::read_samples::image;
+use read::{
+    Fault, Loaded, ReadParams, Rgba, TextureImage, TexturePlaces, file, mesh_columns_in_memory, textured_in_memory,
+};
+use splat_core::glam::Vec3;
+use splat_core::{Association, MemoryAccount, Mesh, MeshColumn, Relative};
+use std::path::{Path, PathBuf};
+
+/// A roof of two squares that share an edge, and another place in the texture for each of its corners.
+const ROOF: &str = "mtllib a.mtl\nusemtl a\nv 0 0 0\nv 1 0 0.5\nv 1 1 0.5\nv 0 1 0\nv 2 0 0\nv 2 1 0\n\
+    vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 1/1 2/2 3/3\nf 1/1 3/3 4/4\nf 2/1 5/2 6/3\nf 2/1 6/3 3/4\n";
+const POSITIONS: [[f32; 3]; 6] =
+    [[0.0, 0.0, 0.0], [1.0, 0.0, 0.5], [1.0, 1.0, 0.5], [0.0, 1.0, 0.0], [2.0, 0.0, 0.0], [2.0, 1.0, 0.0]];
+const TRIANGLES: [[u32; 3]; 4] = [[0, 1, 2], [0, 2, 3], [1, 4, 5], [1, 5, 2]];
+const LOWER: [[f32; 2]; 3] = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]];
+const UPPER: [[f32; 2]; 3] = [[0.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
+
+/// The mesh as readers have it.
+fn roof() -> Mesh {
+    let places = POSITIONS.map(|p| Vec3::from(p).as_dvec3());
+    let Relative { origin, offsets } = Relative::from_positions(&places, Vec::new()).unwrap();
+    Mesh { origin, position: offsets, triangles: TRIANGLES.to_vec(), ..Mesh::default() }
+}
+
+fn of_corners() -> TexturePlaces {
+    TexturePlaces::Corners(vec![LOWER, UPPER, LOWER, UPPER])
+}
+
+fn folder(name: &str) -> PathBuf {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+    std::fs::create_dir_all(&folder).unwrap();
+    folder
+}
+
+/// The mesh of the OBJ file, its texture and the path of that.
+fn of_file(name: &str) -> (Mesh, PathBuf) {
+    let folder = folder(name);
+    let texture = folder.join("a.png");
+    std::fs::write(&texture, image(8, image::ImageFormat::Png)).unwrap();
+    std::fs::write(folder.join("a.mtl"), "newmtl a\nmap_Kd a.png\n").unwrap();
+    std::fs::write(folder.join("a.obj"), ROOF).unwrap();
+    match file(&folder.join("a.obj"), &ReadParams::default(), None).unwrap() {
+        (Loaded::Mesh(mesh), _) => (mesh, texture),
+        other => panic!("{other:?}"),
+    }
+}
+
+fn texels(path: &Path) -> TextureImage {
+    let rgba = image::open(path).unwrap().into_rgba8();
+    let size = [rgba.width(), rgba.height()];
+    TextureImage::Texels { size, rgba: Rgba::Srgb(rgba.as_raw().as_chunks().0.to_vec()) }
+}
+
+#[test]
+fn a_texture_in_memory_paints_as_that_of_a_file() {
+    let (of_file, texture) = of_file("textured");
+    assert!(of_file.triangles.len() > 16 && !of_file.color.is_empty());
+    for image in [TextureImage::File(texture.clone()), texels(&texture)] {
+        let (mesh, notes) = textured_in_memory("roof", roof(), &of_corners(), image, &ReadParams::default()).unwrap();
+        assert_eq!(mesh, of_file);
+        assert!(notes.remarks[0].starts_with("textures became colours of vertices"), "{notes:?}");
+    }
+}
+
+#[test]
+fn vertices_that_a_seam_parts_are_shaded_as_one() {
+    let (of_file, texture) = of_file("textured-seam");
+    // Each corner has a vertex of its own.
+    let whole = roof();
+    let position = whole.triangles.iter().flatten().map(|v| whole.position[*v as usize]).collect();
+    let triangles = (0..4).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
+    let parted = Mesh { position, triangles, ..roof() };
+    let places = TexturePlaces::Vertices([LOWER, UPPER, LOWER, UPPER].concat());
+    let image = TextureImage::File(texture);
+    let (mesh, _) = textured_in_memory("roof", parted, &places, image, &ReadParams::default()).unwrap();
+    let corners = |mesh: &Mesh| {
+        let of_vertex = |v: u32| (mesh.position[v as usize], mesh.normal[v as usize], mesh.color[v as usize]);
+        mesh.triangles.iter().map(|t| t.map(of_vertex)).collect::<Vec<_>>()
+    };
+    assert_eq!(corners(&mesh)[..4], corners(&of_file)[..4]);
+}
+
+#[test]
+fn linear_texels_colours_and_columns_are_kept() {
+    let image = TextureImage::Texels { size: [1, 1], rgba: Rgba::Linear(vec![[2.0, 0.5, 0.25, 0.5]]) };
+    let column = MeshColumn { name: "heat".into(), association: Association::Vertex, values: vec![1.0; 6] };
+    let mesh = Mesh { color: vec![[0.5, 1.0, 1.0]; 6], opacity: vec![0.5; 6], columns: vec![column], ..roof() };
+    let (mesh, _) = textured_in_memory("roof", mesh, &of_corners(), image, &ReadParams::default()).unwrap();
+    mesh.validate().unwrap();
+    assert!(mesh.color.iter().all(|color| *color == [1.0, 0.5, 0.25]));
+    assert!(mesh.opacity.iter().all(|opacity| *opacity == 0.25));
+    assert_eq!(mesh.columns[0].values, vec![1.0; mesh.position.len()]);
+    let unused = |columns: &[&str]| {
+        let columns = columns.iter().map(|name| (*name).to_owned()).collect();
+        mesh_columns_in_memory("roof", &mesh, &ReadParams { columns, ..ReadParams::default() })
+    };
+    assert_eq!(unused(&[]).unwrap().unused, ["heat"]);
+    assert!(unused(&["heat"]).unwrap().unused.is_empty());
+    assert!(unused(&["cold"]).unwrap_err().expected.contains("heat"));
+}
+
+#[test]
+fn wrong_textures_are_refused_by_name() {
+    let white = |size: [u32; 2], count: usize| TextureImage::Texels { size, rgba: Rgba::Srgb(vec![[255; 4]; count]) };
+    let wrong = |texel: [f32; 4]| TextureImage::Texels { size: [1, 1], rgba: Rgba::Linear(vec![texel]) };
+    let few = TexturePlaces::Vertices(vec![[0.0; 2]; 5]);
+    let mut infinite = vec![[0.0; 2]; 6];
+    infinite[4][1] = f32::NAN;
+    let infinite = TexturePlaces::Vertices(infinite);
+    let folder = folder("textured-wrong");
+    std::fs::write(folder.join("text.png"), "no image").unwrap();
+    let cases = [
+        (of_corners(), white([2, 2], 3), "roof: expected 4 texels, found 3"),
+        (of_corners(), white([0, 0], 0), "1 to 65536 pixels a side"),
+        (of_corners(), wrong([-1.0, 0.0, 0.0, 1.0]), "found others in row 0, column 0"),
+        (of_corners(), wrong([0.0, 0.0, 0.0, 2.0]), "opacities from 0 to 1"),
+        (few, white([1, 1], 1), "expected texture coordinates of each vertex, 6, found 5"),
+        (infinite, white([1, 1], 1), "found 0, NaN at corner 1 of face 2"),
+        (of_corners(), TextureImage::File(folder.join("text.png")), "text.png: expected a whole PNG or JPEG image"),
+    ];
+    for (places, image, said) in cases {
+        let error = textured_in_memory("roof", roof(), &places, image, &ReadParams::default()).unwrap_err();
+        assert!(error.fault == Fault::Input && error.to_string().contains(said), "{error}");
+    }
+    let missing = TextureImage::File(folder.join("nothing.png"));
+    let error = textured_in_memory("roof", roof(), &of_corners(), missing, &ReadParams::default()).unwrap_err();
+    assert!(error.is_missing_file() && error.file.ends_with("nothing.png"), "{error}");
+    let params = ReadParams { memory: MemoryAccount::new(64), ..ReadParams::default() };
+    let error = textured_in_memory("roof", roof(), &of_corners(), white([8, 8], 64), &params).unwrap_err();
+    assert_eq!(error.fault, Fault::Limit);
+}
