@@ -141,7 +141,8 @@ impl Files {
         let notes = match data {
             SourceData::Points(points) => read::points_in_memory(&name, points, limits).map_err(from_read)?,
             SourceData::Grid(grid) => read::grid_in_memory(&name, grid, limits).map_err(from_read)?,
-            SourceData::Mesh(_) | SourceData::Image(_) => Notes::default(),
+            SourceData::Mesh(mesh) => read::mesh_columns_in_memory(&name, mesh, limits).map_err(from_read)?,
+            SourceData::Image(_) => Notes::default(),
         };
         let known = self.taken.borrow().iter().find(|(known, _)| known.is_same(data)).map(|(_, read)| read.clone());
         let (taken, made, held) = match known {
