@@ -13,7 +13,7 @@ use crate::preset::{Preset, Wish};
 use convert::ColorMap;
 use look::{Object, all_stand, check_material, drawn_steps, material_remarks, objects, takes_preset};
 use organza::scene::{
-    DEFAULT_AZIMUTH, FoundCamera, LoadOptions, ROOT_KEY, Recipe, name_in_memory, parse, relative_path, root_for,
+    DEFAULT_AZIMUTH, FoundCamera, LoadOptions, ROOT_KEY, Recipe, Scene, name_in_memory, parse, relative_path, root_for,
 };
 use organza::{Context, Error, InMemory, SourceData, printable};
 use splat_core::glam::DVec3;
@@ -234,6 +234,16 @@ fn camera_text(found: &FoundCamera, azimuth: f64) -> String {
     }
     let _ = writeln!(text, "fov_y = {FOV_Y:?}\nsize = [{width}, {height}]");
     text
+}
+
+/// The ground below what a scene shows, and the camera that sees it, as TOML: the tables `camera` and `object`.
+///
+/// # Errors
+/// As [`organza::fitted`]; the camera of the scene is one that sees everything.
+pub fn ground_of(scene: &Scene, context: Context<'_>) -> Result<String, Error> {
+    let found = organza::fitted(scene, context)?.1;
+    let found = found.ok_or_else(|| Error::usage("the camera of the scene has a place", "set `camera.auto`"))?;
+    Ok(format!("[camera]\n{}{}", camera_text(&found, 0.0), ground(&found, false)))
 }
 
 /// A plane below all that is seen, which may be seen through what is clear.

@@ -25,7 +25,7 @@ mod transfer;
 
 pub use data_file::DataFile;
 pub use facts::{Facts, LabelFact, facts};
-pub use first_scene::{Written, first_scene};
+pub use first_scene::{Written, first_scene, ground_of};
 pub use histogram::Histogram;
 pub use lamps::lights_of;
 pub use number::{counted, grouped, rounded, sized};
