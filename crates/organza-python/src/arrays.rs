@@ -126,12 +126,17 @@ pub(crate) fn vectors(name: &str, array: &Bound<'_, PyAny>, count: usize) -> PyR
 
 /// Colours, one a row: linear numbers, or bytes of sRGB where the array is of bytes.
 pub(crate) fn colors(name: &str, array: &Bound<'_, PyAny>, count: usize) -> PyResult<Vec<[f32; 3]>> {
-    if array.cast::<PyArrayDyn<u8>>().is_err() {
+    if !is_bytes(array) {
         return rows(name, array, Some(count), |row| row.map(|value| value as f32));
     }
     let linear: Vec<f32> = (0..=255).map(|byte| splat_core::srgb::decoded(f64::from(byte) / 255.0) as f32).collect();
     // A byte is an index of 256 entries.
     rows(name, array, Some(count), |row| row.map(|byte| linear[byte as usize]))
+}
+
+/// Whether an array is of bytes, which are colours of sRGB.
+pub(crate) fn is_bytes(array: &Bound<'_, PyAny>) -> bool {
+    array.cast::<PyArrayDyn<u8>>().is_ok()
 }
 
 /// Indices of vertices, three a triangle; the first that no vertex has is named.

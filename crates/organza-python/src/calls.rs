@@ -154,6 +154,19 @@ pub(crate) fn lights_of(py: Python<'_>, mut given: Given, how: How<'_>) -> PyRes
     run(py, how.threads, None, work)
 }
 
+/// The ground below what a scene shows, and the camera that sees it, a document in JSON.
+#[pyfunction]
+pub(crate) fn ground_of(py: Python<'_>, mut given: Given, how: How<'_>) -> PyResult<String> {
+    let options = how.options();
+    let in_memory = given.take_memory()?;
+    let work = move |progress: &Progress| {
+        let scene = given.scene(in_memory, &options)?;
+        let context = Context { files: &Files::default(), options: &options, progress };
+        json_of_toml(&organza_survey::ground_of(&scene, context)?)
+    };
+    run(py, how.threads, None, work)
+}
+
 /// What a first scene is made of: a file, or a name, data of that name, and the axis that points up in it.
 #[derive(FromPyObject)]
 pub(crate) enum Shown {

@@ -1,49 +1,90 @@
 //! Data from arrays: a mesh, points, a volume or an image, checked once and read where it lies.
 
 use crate::arrays;
-use crate::errors::refused;
+use crate::errors::{raised, refused};
 
 use numpy::{PyArray1, PyArrayMethods};
-use organza::SourceData;
+use organza::{Error, SourceData};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use read::{ReadParams, Rgba, TextureImage, TexturePlaces};
 use splat_core::glam::{DMat3, DVec3, Vec3};
-use splat_core::{Column, Grid, Mesh, RadianceImage, RawPoints, Relative};
+use splat_core::{Association, Column, Grid, Mesh, MeshColumn, RadianceImage, RawPoints, Relative};
+use std::path::{Path, PathBuf};
 
 /// A mesh, points, a volume or an image in memory, which scenes name as `memory:NAME`.
 #[pyclass(frozen, module = "organza._organza")]
 pub(crate) struct Data {
     pub(crate) data: SourceData,
+    /// What was made of the arrays that their owner should know, one sentence each.
+    notes: Vec<String>,
+}
+
+impl From<SourceData> for Data {
+    fn from(data: SourceData) -> Self {
+        Self { data, notes: Vec::new() }
+    }
+}
+
+/// What a mesh is painted with: a PNG or JPEG file, or pixels.
+#[derive(FromPyObject)]
+pub(crate) enum Texture<'py> {
+    #[pyo3(transparent)]
+    File(PathBuf),
+    #[pyo3(transparent)]
+    Pixels(Bound<'py, PyAny>),
 }
 
 #[pymethods]
 impl Data {
-    /// A mesh: vertices (n, 3), faces (m, 3) of indices, and by vertex normals and linear colours, or bytes of sRGB.
+    /// A mesh: vertices (n, 3), faces (m, 3) of indices, and by vertex normals, linear colours or bytes of sRGB, and opacities; columns by name, of
+    /// vertices (n,) and of faces (m,); places `uv` of a texture, (n, 2) or (m, 3, 2), with the texture. `unit_normals` are those of [`Self::arrays`].
     #[staticmethod]
-    #[pyo3(signature = (vertices, faces, normals=None, colors=None))]
+    #[pyo3(signature = (
+        vertices, faces, normals=None, colors=None, opacities=None, columns=None, face_columns=None, uv=None, texture=None,
+        unit_normals=None
+    ))]
+    #[expect(clippy::too_many_arguments, reason = "they are keywords of the call from Python")]
     fn mesh(
         vertices: &Bound<'_, PyAny>,
         faces: &Bound<'_, PyAny>,
         normals: Option<&Bound<'_, PyAny>>,
         colors: Option<&Bound<'_, PyAny>>,
+        opacities: Option<&Bound<'_, PyAny>>,
+        columns: Option<&Bound<'_, PyDict>>,
+        face_columns: Option<&Bound<'_, PyDict>>,
+        uv: Option<&Bound<'_, PyAny>>,
+        texture: Option<Texture<'_>>,
+        unit_normals: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
         let positions = arrays::positions("vertices", vertices)?;
         let count = positions.len();
         let Relative { origin, offsets } = relative("vertices", &positions)?;
+        let triangles = arrays::triangles("faces", faces, count)?;
+        let mut named = mesh_columns(columns, Association::Vertex, count)?;
+        named.extend(mesh_columns(face_columns, Association::Triangle, triangles.len())?);
         let mesh = Mesh {
             origin,
             position: offsets,
-            normal: unit_vectors("normals", normals, count)?,
+            normal: unit_vectors(normals, unit_normals, count)?,
             color: colors.map_or_else(|| Ok(Vec::new()), |colors| arrays::colors("colors", colors, count))?,
-            triangles: arrays::triangles("faces", faces, count)?,
-            ..Mesh::default()
+            opacity: numbers("opacities", opacities, count)?,
+            columns: named,
+            triangles,
         };
-        Ok(Self { data: SourceData::Mesh(mesh.into()) })
+        match (uv, texture) {
+            (None, None) => Ok(SourceData::Mesh(mesh.into()).into()),
+            (Some(uv), Some(texture)) => textured(mesh, uv, &texture),
+            (Some(_), None) => Err(refused("texture", "an image beside `uv`", "none")),
+            (None, Some(_)) => Err(refused("uv", "texture coordinates beside `texture`", "none")),
+        }
     }
 
     /// Points: positions (n, 3), and by point normals, linear colours or bytes of sRGB, opacities, values, and named columns of numbers.
     #[staticmethod]
-    #[pyo3(signature = (positions, normals=None, colors=None, opacities=None, values=None, columns=None))]
+    #[pyo3(signature = (
+        positions, normals=None, colors=None, opacities=None, values=None, columns=None, unit_normals=None
+    ))]
     fn points(
         positions: &Bound<'_, PyAny>,
         normals: Option<&Bound<'_, PyAny>>,
@@ -51,15 +92,11 @@ impl Data {
         opacities: Option<&Bound<'_, PyAny>>,
         values: Option<&Bound<'_, PyAny>>,
         columns: Option<&Bound<'_, PyDict>>,
+        unit_normals: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
         let places = arrays::positions("positions", positions)?;
         let count = places.len();
         let Relative { origin, offsets } = relative("positions", &places)?;
-        let numbers = |name: &str, array: Option<&Bound<'_, PyAny>>| {
-            let Some(array) = array else { return Ok(Vec::new()) };
-            arrays::check_rows(name, array, Some(count), 1)?;
-            arrays::column(name, array, |value| value as f32)
-        };
         let mut named = Vec::new();
         for (name, array) in columns.into_iter().flatten() {
             let name: String = name.extract()?;
@@ -70,14 +107,14 @@ impl Data {
         let points = RawPoints {
             origin,
             position: offsets,
-            normal: unit_vectors("normals", normals, count)?,
+            normal: unit_vectors(normals, unit_normals, count)?,
             color: colors.map_or_else(|| Ok(Vec::new()), |colors| arrays::colors("colors", colors, count))?,
-            opacity: numbers("opacities", opacities)?,
-            value: numbers("values", values)?,
+            opacity: numbers("opacities", opacities, count)?,
+            value: numbers("values", values, count)?,
             columns: named,
             ..RawPoints::default()
         };
-        Ok(Self { data: SourceData::Points(points.into()) })
+        Ok(SourceData::Points(points.into()).into())
     }
 
     /// A volume: values (nz, ny, nx), the steps along x, y and z, the place of the first value, and the directions of the steps, the columns of a 3 x 3
@@ -102,7 +139,7 @@ impl Data {
         );
         let values = arrays::column("values", values, |value| value as f32)?;
         let grid = Grid { origin: DVec3::from_array(origin), axes, dims: [width, height, depth], values };
-        Ok(Self { data: SourceData::Grid(grid.into()) })
+        Ok(SourceData::Grid(grid.into()).into())
     }
 
     /// An image of radiance: pixels (height, width, 3), linear, from the top left.
@@ -116,7 +153,7 @@ impl Data {
         let size = [side(width)?, side(height)?];
         let numbers = arrays::column("pixels", pixels, |value| value as f32)?;
         let image = RadianceImage { size, pixels: numbers.as_chunks().0.to_vec() };
-        Ok(Self { data: SourceData::Image(image.into()) })
+        Ok(SourceData::Image(image.into()).into())
     }
 
     /// `mesh`, `points`, `grid` or `image`.
@@ -136,6 +173,12 @@ impl Data {
         self.data.bytes()
     }
 
+    /// What was made of the arrays, one sentence without a name each.
+    #[getter]
+    fn notes(&self) -> Vec<String> {
+        self.notes.clone()
+    }
+
     /// Its arrays by the names of the arguments that make it again.
     fn arrays<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let parts = PyDict::new(py);
@@ -145,12 +188,23 @@ impl Data {
                 let faces: Vec<u32> = mesh.triangles.as_flattened().to_vec();
                 let count = mesh.triangles.len();
                 parts.set_item("faces", PyArray1::from_vec(py, faces).reshape([count, 3])?)?;
-                add_vectors(&parts, "normals", &mesh.normal)?;
+                add_vectors(&parts, "unit_normals", &mesh.normal)?;
                 add_colors(&parts, &mesh.color)?;
+                if !mesh.opacity.is_empty() {
+                    parts.set_item("opacities", PyArray1::from_slice(py, &mesh.opacity))?;
+                }
+                let kinds = [("columns", Association::Vertex), ("face_columns", Association::Triangle)];
+                for (name, association) in kinds {
+                    let columns = PyDict::new(py);
+                    for column in mesh.columns.iter().filter(|column| column.association == association) {
+                        columns.set_item(&column.name, PyArray1::from_slice(py, &column.values))?;
+                    }
+                    parts.set_item(name, columns)?;
+                }
             }
             SourceData::Points(points) => {
                 parts.set_item("positions", table(py, placed(points.origin, &points.position))?)?;
-                add_vectors(&parts, "normals", &points.normal)?;
+                add_vectors(&parts, "unit_normals", &points.normal)?;
                 add_colors(&parts, &points.color)?;
                 for (name, numbers) in [("opacities", &points.opacity), ("values", &points.value)] {
                     if !numbers.is_empty() {
@@ -181,6 +235,79 @@ impl Data {
     }
 }
 
+/// The mesh with the colours of a texture.
+fn textured(mesh: Mesh, uv: &Bound<'_, PyAny>, texture: &Texture<'_>) -> PyResult<Data> {
+    const NAME: &str = "texture";
+    let vertices = mesh.position.len();
+    let faces = mesh.triangles.len();
+    let sides = arrays::shape("uv", uv)?;
+    let numbers = arrays::column("uv", uv, |value| value as f32)?;
+    let (places, _) = numbers.as_chunks::<2>();
+    let places = match sides.as_slice() {
+        [rows, 2] if *rows == vertices => TexturePlaces::Vertices(places.to_vec()),
+        [rows, 3, 2] if *rows == faces => TexturePlaces::Corners(places.as_chunks().0.to_vec()),
+        _ => {
+            let expected = format!("the shape ({vertices}, 2) of vertices or ({faces}, 3, 2) of corners of triangles");
+            return Err(refused("uv", &expected, &format!("{sides:?}")));
+        }
+    };
+    let image = match texture {
+        Texture::File(path) => TextureImage::File(path.clone()),
+        Texture::Pixels(pixels) => texels(NAME, pixels)?,
+    };
+    let painted = read::textured_in_memory(NAME, mesh, &places, image, &ReadParams::default());
+    let (mesh, notes) = painted.map_err(|error| raised(&Error::from_read(Path::new(&error.file), &error)))?;
+    Ok(Data { data: SourceData::Mesh(mesh.into()), notes: notes.remarks })
+}
+
+/// The texels of an image in memory: bytes of sRGB, or linear numbers; opaque without a fourth channel.
+fn texels(name: &str, pixels: &Bound<'_, PyAny>) -> PyResult<TextureImage> {
+    let sides = arrays::shape(name, pixels)?;
+    let &[height, width, channels @ (3 | 4)] = sides.as_slice() else {
+        let expected = "a path, or an image of the shape (height, width, 3) or (height, width, 4)";
+        return Err(refused(name, expected, &format!("{sides:?}")));
+    };
+    let side = |side: usize| u32::try_from(side).map_err(|_| refused(name, "fewer pixels a side", "too many"));
+    let size = [side(width)?, side(height)?];
+    let rgba = if arrays::is_bytes(pixels) {
+        // A byte stays what it is.
+        let bytes = arrays::column(name, pixels, |value| value as u8)?;
+        Rgba::Srgb(bytes.chunks_exact(channels).map(|texel| with_opacity(texel, u8::MAX)).collect())
+    } else {
+        let numbers = arrays::column(name, pixels, |value| value as f32)?;
+        Rgba::Linear(numbers.chunks_exact(channels).map(|texel| with_opacity(texel, 1.0)).collect())
+    };
+    Ok(TextureImage::Texels { size, rgba })
+}
+
+/// The channels of a texel of three or four, with an opacity in any case.
+fn with_opacity<T: Copy>(texel: &[T], opaque: T) -> [T; 4] {
+    std::array::from_fn(|channel| texel.get(channel).copied().unwrap_or(opaque))
+}
+
+/// Named numbers of vertices or triangles.
+fn mesh_columns(
+    columns: Option<&Bound<'_, PyDict>>,
+    association: Association,
+    count: usize,
+) -> PyResult<Vec<MeshColumn>> {
+    let mut named = Vec::new();
+    for (name, array) in columns.into_iter().flatten() {
+        let name: String = name.extract()?;
+        arrays::check_rows(&name, &array, Some(count), 1)?;
+        let values = arrays::column(&name, &array, |value| value)?;
+        named.push(MeshColumn { name, association, values });
+    }
+    Ok(named)
+}
+
+/// One number a row; none stays none.
+fn numbers(name: &str, array: Option<&Bound<'_, PyAny>>, rows: usize) -> PyResult<Vec<f32>> {
+    let Some(array) = array else { return Ok(Vec::new()) };
+    arrays::check_rows(name, array, Some(rows), 1)?;
+    arrays::column(name, array, |value| value as f32)
+}
+
 /// Positions as drawing has them.
 fn relative(name: &str, positions: &[DVec3]) -> PyResult<Relative> {
     Relative::from_positions(positions, Vec::new()).map_err(|place| {
@@ -189,12 +316,20 @@ fn relative(name: &str, positions: &[DVec3]) -> PyResult<Relative> {
     })
 }
 
-/// Vectors made as long as one; none stays none.
-fn unit_vectors(name: &str, array: Option<&Bound<'_, PyAny>>, rows: usize) -> PyResult<Vec<Vec3>> {
-    let Some(array) = array else { return Ok(Vec::new()) };
-    let vectors = arrays::vectors(name, array, rows)?;
+/// Normals made as long as one, or those that are so already, which keep their bits; none stays none.
+fn unit_vectors(
+    normals: Option<&Bound<'_, PyAny>>,
+    unit_normals: Option<&Bound<'_, PyAny>>,
+    rows: usize,
+) -> PyResult<Vec<Vec3>> {
+    const NAME: &str = "normals";
+    let Some(array) = unit_normals.or(normals) else { return Ok(Vec::new()) };
+    let vectors = arrays::vectors(NAME, array, rows)?;
     if let Some(row) = vectors.iter().position(|vector| !vector.is_finite()) {
-        return Err(refused(name, "finite numbers", &format!("{} in row {row}", vectors[row])));
+        return Err(refused(NAME, "finite numbers", &format!("{} in row {row}", vectors[row])));
+    }
+    if unit_normals.is_some() {
+        return Ok(vectors);
     }
     Ok(vectors.into_iter().map(Vec3::normalize_or_zero).collect())
 }

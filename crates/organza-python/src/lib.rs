@@ -21,7 +21,7 @@ mod view;
 #[pyo3::pymodule(name = "_organza", gil_used = false)]
 mod organza_module {
     #[pymodule_export]
-    use crate::calls::{check, first_scene, lights_of, map_colors, render, toml_text};
+    use crate::calls::{check, first_scene, ground_of, lights_of, map_colors, render, toml_text};
     #[pymodule_export]
     use crate::data::Data;
     #[pymodule_export]

@@ -137,3 +137,12 @@ def test_data_of_open3d_by_its_names():
     cloud.colors = np.tile([1.0, 0.0, 0.0], (200, 1))
     red, green, _ = np.moveaxis(og.render(cloud, size=SMALL).rgb, -1, 0)
     assert red.max() > 2 * green.max()
+    mesh_of = type("TriangleMesh", (), {"__module__": "open3d.geometry"})
+    mesh = mesh_of()
+    mesh.vertices = np.eye(3)
+    mesh.triangles = [[0, 1, 2]]
+    mesh.triangle_uvs = np.zeros((3, 2))
+    mesh.textures = [np.zeros((2, 2, 3))]
+    scene = og.Scene()
+    scene.add(mesh)
+    assert scene.notes == ["mesh: not used: textures, triangle_uvs"]

@@ -126,6 +126,19 @@ def test_malformed_calls_never_end_the_interpreter():
         lambda a, b: og.Scene.load(a),
         lambda a, b: og.Scene.from_files(a, b),
         lambda a, b: scene().set(a, b),
+        lambda a, b: scene().add_mesh(PLACES, [[0, 1, 2]], uv=a, texture=b),
+        lambda a, b: scene().add_mesh(PLACES, [[0, 1, 2]], uv=np.zeros((4, 2)), texture=a, values=b),
+        lambda a, b: scene().add_mesh(PLACES, [[0, 1, 2]], columns=a, opacities=b),
+        lambda a, b: scene().add_isosurface(a, b),
+        lambda a, b: scene().add_isosurface(CUBE, 0.5, spacing=a, origin=b),
+        lambda a, b: scene().add_slice(a, normal=b),
+        lambda a, b: scene().add_slice(CUBE, center=a, clim=b),
+        lambda a, b: scene().add_labels(a, labels=b),
+        lambda a, b: scene().ground(size=a, height=b),
+        lambda a, b: scene().ground(color=a, material=b),
+        lambda a, b: scene().camera.orbit(a, b),
+        lambda a, b: scene().light.sun(a, b),
+        lambda a, b: scene().light.sun(irradiance=a, sky=b),
     ]
     is_known = (ValueError, TypeError, MemoryError, OSError, KeyError, AttributeError, IndexError, OverflowError)
     for rank in range(10 * len(calls)):

@@ -46,7 +46,10 @@ const MAY_KNOW: [(&str, &[&str]); 27] = [
     ("organza-survey", &["splat-core", "read", "convert", "organza"]),
     ("organza-view", &["splat-core", "organza", "organza-judge", "organza-survey"]),
     ("organza-cli", &["splat-core", "read", "convert", "organza", "organza-judge", "organza-survey", "organza-view"]),
-    ("organza-python", &["splat-core", "convert", "organza", "organza-judge", "organza-survey", "organza-view"]),
+    (
+        "organza-python",
+        &["splat-core", "read", "convert", "organza", "organza-judge", "organza-survey", "organza-view"],
+    ),
     (
         "organza-tests",
         &[

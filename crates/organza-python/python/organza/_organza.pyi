@@ -12,6 +12,7 @@ __all__ = [
     "check",
     "explain",
     "first_scene",
+    "ground_of",
     "info_of_file",
     "info_of_scene",
     "judge_accuracy",
@@ -29,7 +30,18 @@ class LimitError(MemoryError): ...
 @final
 class Data:
     @staticmethod
-    def mesh(vertices: Any, faces: Any, normals: Any = None, colors: Any = None) -> Data: ...
+    def mesh(
+        vertices: Any,
+        faces: Any,
+        normals: Any = None,
+        colors: Any = None,
+        opacities: Any = None,
+        columns: dict[str, Any] | None = None,
+        face_columns: dict[str, Any] | None = None,
+        uv: Any = None,
+        texture: Any = None,
+        unit_normals: Any = None,
+    ) -> Data: ...
     @staticmethod
     def points(
         positions: Any,
@@ -38,6 +50,7 @@ class Data:
         opacities: Any = None,
         values: Any = None,
         columns: dict[str, Any] | None = None,
+        unit_normals: Any = None,
     ) -> Data: ...
     @staticmethod
     def grid(values: Any, spacing: Any, origin: Any, direction: Any) -> Data: ...
@@ -47,6 +60,8 @@ class Data:
     def kind(self) -> str: ...
     @property
     def nbytes(self) -> int: ...
+    @property
+    def notes(self) -> list[str]: ...
     def arrays(self) -> dict[str, Any]: ...
 
 @final
@@ -91,6 +106,7 @@ def info_of_scene(given: dict[str, Any], how: dict[str, Any]) -> str: ...
 def judge_accuracy(given: dict[str, Any], effort: dict[str, Any], how: dict[str, Any]) -> str: ...
 def judge_orders(given: dict[str, Any], effort: dict[str, Any], how: dict[str, Any]) -> str: ...
 def lights_of(given: dict[str, Any], how: dict[str, Any]) -> str: ...
+def ground_of(given: dict[str, Any], how: dict[str, Any]) -> str: ...
 def first_scene(
     shown: list[Any], wished: dict[str, Any], how: dict[str, Any]
 ) -> tuple[str, list[str], str]: ...

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 import warnings
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,29 +16,74 @@ from organza.transfers import transfer
 if TYPE_CHECKING:
     from organza.scene import Scene
 
+# What trimesh takes as the diffuse colour of a material that states none.
+_NO_DIFFUSE = [102, 102, 102, 255]
 # Left and back to right and front.
 _HALF_TURN = np.array([-1.0, -1.0, 1.0])
+
+
+@dataclass(frozen=True)
+class Adopted:
+    """A data set for a first scene."""
+
+    name: str
+    data: Data
+    up: str | None
+    """The axis that points up in it, where that is known."""
+    color_by: str | None
+    """The column of a mesh that its library shows."""
+    remarks: list[str]
+    """What of it is not used, and what was made of it, one sentence each."""
 
 
 def add(scene: Scene, thing: Any, name: str | None, keys: Mapping[str, Any]) -> None:
     """Adds a data set to a scene."""
     kind, own, arguments = _arguments(thing)
+    unused = list(arguments.pop("unused", []))
+    if "uv" in arguments and "texture" not in arguments and "texture" not in keys:
+        del arguments["uv"]
+        unused.append("texture coordinates, as there is no `texture`")
+    if any(keys.get(look) is not None for look in ("color", "colors", "texture", "field")):
+        # The look that is asked for takes the place of the column that the library shows.
+        arguments.pop("color_by", None)
+    before = len(scene.objects)
     getattr(scene, f"add_{kind}")(name=name or own, **(arguments | dict(keys)))
+    if unused:
+        scene._remarks.append(f"{scene.objects[before]}: not used: {', '.join(unused)}")
 
 
-def data_of(thing: Any) -> tuple[str, Data, str | None]:
-    """A data set for a first scene, with a name, and the axis that points up in it, where that is known."""
+def volume_of(thing: Any) -> dict[str, Any]:
+    """The arguments of ``Scene.add_volume`` for an array or the volume of another library."""
+    for look in (_vtk, _nibabel, _simpleitk, _xarray):
+        found = look(thing)
+        if found is None:
+            continue
+        kind, _, arguments = found
+        if kind != "volume":
+            raise InputError(f"values: expected a volume, found {kind}")
+        arguments.pop("unused", None)
+        return arguments
+    return {"values": thing}
+
+
+def data_of(thing: Any) -> Adopted:
+    """A data set for a first scene."""
     from organza.scene import Scene
 
     kind, name, arguments = _arguments(thing)
     up = arguments.pop("transform", {}).get("up")
-    # What a first scene decides.
-    arguments.pop("color_by", None)
+    # What a first scene decides of points; of a mesh it shows a column if that is asked for.
+    color_by = arguments.pop("color_by", None)
     if kind == "volume":
         arguments["transfer"] = transfer()
     scene = Scene()
+    unused = list(arguments.pop("unused", []))
+    if "uv" in arguments and "texture" not in arguments:
+        del arguments["uv"]
+        unused.append("texture coordinates, as there is no `texture`")
     getattr(scene, f"add_{kind}")(name=name, **arguments)
-    return name, scene._data[name], up
+    remarks = scene._remarks + ([f"{name}: not used: {', '.join(unused)}"] if unused else [])
+    return Adopted(name, scene._data[name], up, color_by if kind == "mesh" else None, remarks)
 
 
 def _arguments(thing: Any) -> tuple[str, str, dict[str, Any]]:
@@ -71,6 +117,7 @@ def _vtk(thing: Any) -> tuple[str, str, dict[str, Any]] | None:
             thing = thing.cell_data_to_point_data()
             scalars = thing.active_scalars
         direction = getattr(thing, "direction_matrix", None)
+        names = [*map(str, thing.point_data.keys()), *map(str, thing.cell_data.keys())]
         return (
             "volume",
             thing.active_scalars_name or "volume",
@@ -79,33 +126,57 @@ def _vtk(thing: Any) -> tuple[str, str, dict[str, Any]] | None:
                 "spacing": thing.spacing,
                 "origin": thing.origin,
                 "direction": np.eye(3) if direction is None else np.asarray(direction),
+                "unused": [name for name in names if name != thing.active_scalars_name],
             },
         )
     if not thing.IsA("vtkPolyData"):
         if not hasattr(thing, "extract_surface"):
             raise InputError(f"expected points, a surface or an image of VTK, found {thing.GetClassName()}")
-        thing = thing.extract_surface()
+        thing = _vtk_surface(thing)
     if thing.n_lines:
         said = "lines are not drawn; `tube(radius=…)` makes surfaces of them"
         if thing.n_lines == thing.n_cells:
             raise InputError(f"expected points, faces or voxels, found lines alone: {said}")
         warnings.warn(f"{thing.n_lines} {said}", stacklevel=5)
     is_surface = thing.n_cells > thing.n_verts + thing.n_lines
-    colors = _vtk_colors(thing)
     if is_surface and thing.n_verts == 0:
         whole = thing.triangulate()
         faces = np.asarray(whole.faces).reshape(-1, 4)[:, 1:]
-        colors = _vtk_colors(whole)
-        return "mesh", "mesh", {"vertices": np.asarray(whole.points), "faces": faces, "colors": colors}
-    columns = {}
-    for name, array in thing.point_data.items():
-        if np.ndim(array) == 1 and np.issubdtype(array.dtype, np.number):
-            columns[str(name)] = np.asarray(array)
-    arguments: dict[str, Any] = {"positions": np.asarray(thing.points), "colors": colors, "columns": columns}
+        mesh = {"vertices": np.asarray(whole.points), "faces": faces} | _vtk_arrays(whole, has_faces=True)
+        places = whole.active_texture_coordinates
+        return "mesh", "mesh", mesh if places is None else mesh | {"uv": np.asarray(places)[:, :2]}
+    return "points", "points", {"positions": np.asarray(thing.points)} | _vtk_arrays(thing, has_faces=False)
+
+
+def _vtk_surface(thing: Any) -> Any:
+    """The surface of cells, by the algorithm that PyVista has always had, which older versions take no name of."""
+    try:
+        return thing.extract_surface(algorithm="dataset_surface")
+    except TypeError:
+        return thing.extract_surface()
+
+
+def _vtk_arrays(thing: Any, has_faces: bool) -> dict[str, Any]:
+    """Colours and columns of points, or of a mesh with its faces; the arrays that are neither are named."""
+    colors = _vtk_colors(thing)
     active = thing.active_scalars_name
+    columns = {}
+    unused = []
+    places = thing.active_texture_coordinates
+    for part, data in [("point", thing.point_data), ("cell", thing.cell_data)]:
+        for key, array in data.items():
+            name = str(key)
+            is_shown = colors is not None and name == active
+            is_uv = places is not None and part == "point" and array is data.active_texture_coordinates
+            is_column = np.ndim(array) == 1 and np.issubdtype(array.dtype, np.number) and (part == "point" or has_faces)
+            if is_column and name not in columns:
+                columns[name] = np.asarray(array)
+            elif not (is_shown or is_uv):
+                unused.append(name)
+    arguments: dict[str, Any] = {"colors": colors, "columns": columns, "unused": unused}
     if colors is None and active in columns:
         arguments["color_by"] = active
-    return "points", "points", arguments
+    return arguments
 
 
 def _vtk_colors(thing: Any) -> np.ndarray | None:
@@ -123,17 +194,41 @@ def _trimesh(thing: Any) -> tuple[str, str, dict[str, Any]] | None:
     if hasattr(thing, "geometry") and hasattr(thing, "to_geometry"):
         thing = thing.to_geometry()
     if hasattr(thing, "faces"):
-        colors = None
+        mesh = {"vertices": np.asarray(thing.vertices), "faces": np.asarray(thing.faces)}
         visual = getattr(thing, "visual", None)
-        if visual is not None and visual.defined:
-            seen = visual.to_color() if visual.kind == "texture" else visual
-            colors = np.asarray(seen.vertex_colors)[:, :3]
-        return "mesh", "mesh", {"vertices": np.asarray(thing.vertices), "faces": np.asarray(thing.faces), "colors": colors}
+        if visual is None or not visual.defined:
+            return "mesh", "mesh", mesh
+        textured = _trimesh_texture(visual, len(mesh["vertices"])) if visual.kind == "texture" else None
+        if textured is not None:
+            return "mesh", "mesh", mesh | textured
+        seen = visual.to_color() if visual.kind == "texture" else visual
+        return "mesh", "mesh", mesh | {"colors": np.asarray(seen.vertex_colors)[:, :3]}
     if hasattr(thing, "vertices"):
         colors = np.asarray(getattr(thing, "colors", np.empty(0)))
         known = colors[:, :3] if colors.ndim == 2 and len(colors) == len(thing.vertices) else None
         return "points", "points", {"positions": np.asarray(thing.vertices), "colors": known}
     return None
+
+
+def _trimesh_texture(visual: Any, count: int) -> dict[str, Any] | None:
+    """The texture of a material of trimesh with the factor of its colour, as its file has them; None without an image."""
+    material = visual.material
+    is_pbr = hasattr(material, "baseColorTexture")
+    image = getattr(material, "baseColorTexture" if is_pbr else "image", None)
+    if image is None or visual.uv is None:
+        return None
+    factor = getattr(material, "baseColorFactor" if is_pbr else "diffuse", None)
+    # Factors are linear, in bytes. The grey of a material that states none darkens no image.
+    is_stated = factor is not None and (is_pbr or list(factor) != _NO_DIFFUSE)
+    tint = np.asarray(factor, dtype=float) / 255.0 if is_stated else np.ones(4)
+    is_opaque = is_pbr and material.alphaMode not in ("BLEND", "MASK")
+    has_alpha = not is_opaque and ("A" in image.mode or "transparency" in image.info)
+    textured: dict[str, Any] = {"uv": np.asarray(visual.uv), "texture": image.convert("RGBA" if has_alpha else "RGB")}
+    if not np.array_equal(tint[:3], np.ones(3)):
+        textured["colors"] = np.tile(tint[:3], (count, 1))
+    if not is_opaque and tint[3] != 1.0:
+        textured["opacities"] = np.full(count, tint[3])
+    return textured
 
 
 def _open3d(thing: Any) -> tuple[str, str, dict[str, Any]] | None:
@@ -150,7 +245,8 @@ def _open3d(thing: Any) -> tuple[str, str, dict[str, Any]] | None:
 
     if hasattr(thing, "triangles"):
         colors = linear(part("vertex_colors"))
-        return "mesh", "mesh", {"vertices": part("vertices"), "faces": part("triangles"), "colors": colors}
+        mesh = {"vertices": part("vertices"), "faces": part("triangles"), "colors": colors}
+        return "mesh", "mesh", mesh | {"unused": [name for name in ("textures", "triangle_uvs") if len(getattr(thing, name, ()))]}
     if hasattr(thing, "points"):
         arguments = {"positions": part("points"), "normals": part("normals"), "colors": linear(part("colors"))}
         return "points", "points", arguments

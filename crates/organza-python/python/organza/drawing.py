@@ -122,7 +122,7 @@ def _frame(
     """A frame of a turn around a scene."""
     with heard(progress) as told:
         how = _how(threads, max_memory, told, False, False)
-        given = scene._given(how, None, size) | {"frame": frame, "turntable": frames}
+        given = scene._given(how, None, size, turntable=frames) | {"frame": frame}
         return Picture(_organza.render(given, how), scene._remarks)
 
 

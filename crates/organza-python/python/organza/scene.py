@@ -6,7 +6,7 @@ import copy
 import json
 import math
 import os
-from collections.abc import Container, Iterable, Mapping
+from collections.abc import Container, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,9 +15,15 @@ import numpy as np
 
 from organza import _organza, adopted
 from organza._organza import Data, InputError
+from organza.arrays import array_of, colors_of, columns_of, halved_quads, number, place_of, plain, texture_of
+from organza.lattices import lattice_of, percentiles, volume_arguments
+from organza.placing import Camera, Light
 from organza.transfers import Transfer
+from organza.transfers import transfer as make_transfer
 
 _DEFAULT_SIZE = (960, 540)
+# The material of slices that name none: the colours of their map, as they are.
+_UNLIT_SLICE = "unlit slice"
 # The material of volumes that name none.
 _LIT_VOLUME = "lit volume"
 _LIT = {"shading": "phong", "specular": 0.08, "shininess": 24}
@@ -25,6 +31,10 @@ _LIT = {"shading": "phong", "specular": 0.08, "shininess": 24}
 _NOWHERE = "scene.json"
 # A first scene lies in the working folder, as far as its paths go.
 _FIRST = "scene.toml"
+# Light enough for shadows to show.
+_GROUND_COLOR = (0.32, 0.32, 0.33)
+# Steps of a ground's splats along a side, as the ground of a first scene has them.
+_GROUND_STEPS = 320.0
 # Sources of a first scene, and how one names data in memory.
 _SOURCES = ("mesh", "points", "volume")
 _MEMORY = "memory:"
@@ -37,6 +47,15 @@ class _Written:
     document: dict[str, Any]
     text: str
     file: str
+
+
+@dataclass(frozen=True)
+class _Ground:
+    """A ground that is placed when the scene is drawn."""
+
+    name: str
+    size: float | None
+    height: float | None
 
 
 class Scene:
@@ -62,6 +81,7 @@ class Scene:
         # What a first scene decided, and how it is written.
         self._remarks: list[str] = []
         self._written: _Written | None = None
+        self._ground: _Ground | None = None
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Scene:
@@ -132,25 +152,31 @@ class Scene:
             count = len(positions)
             held["radius"] = np.broadcast_to(np.asarray(radius, dtype=float), (count,))
         data = Data.points(
-            _array(positions), _array(normals), _colors(colors), _array(opacities), _array(values), _arrays(held)
+            array_of(positions), array_of(normals), colors_of(colors), array_of(opacities), array_of(values), columns_of(held)
         )
         if color_by is None and values is not None and colors is None:
             color_by = "value"
-        if color_by is not None:
-            shown: dict[str, Any] = {"column": color_by}
-            if colormap is not None:
-                shown["map"] = colormap
-            if clim is not None:
-                shown["range"] = [float(end) for end in clim]
-            if log_scale:
-                shown["scale"] = "log"
-            keys = {"color_by": shown} | keys
-        elif colormap is not None or clim is not None or log_scale:
-            raise InputError("colormap, clim, log_scale: expected a column to colour by, found none; give `values` or `color_by`")
+        keys = _shown(color_by, colormap, clim, log_scale) | keys
         self._add("points", data, name, keys)
 
     def add_mesh(
-        self, vertices: Any, faces: Any, *, normals: Any = None, colors: Any = None, name: str | None = None, **keys: Any
+        self,
+        vertices: Any,
+        faces: Any,
+        *,
+        normals: Any = None,
+        colors: Any = None,
+        opacities: Any = None,
+        uv: Any = None,
+        texture: Any = None,
+        values: Any = None,
+        columns: Mapping[str, Any] | None = None,
+        color_by: str | None = None,
+        colormap: str | None = None,
+        clim: tuple[float, float] | None = None,
+        log_scale: bool = False,
+        name: str | None = None,
+        **keys: Any,
     ) -> None:
         """Adds a mesh.
 
@@ -163,15 +189,66 @@ class Scene:
         normals
             (n, 3); smooth ones are found where there are none.
         colors
-            (n, 3): linear numbers from 0 on, or bytes of sRGB.
+            (n, 3): linear numbers from 0 on, or bytes of sRGB. Beside a texture they are multiplied by its colours.
+        opacities
+            (n,), from 0 to 1.
+        uv
+            Places in the texture, (n, 2), or (m, 3, 2) and (m, 4, 2) for one at each corner of a face: (0, 0) is the lower left corner of the image, (1, 1)
+            its upper right, as in OBJ files.
+        texture
+            The image: the path of a PNG or JPEG file; or an array (height, width, 3) or (height, width, 4), from the top left, of bytes of sRGB or linear
+            numbers; or an image of Pillow. It repeats beyond its borders. A fourth channel is the opacity of the surface.
+        values
+            (n,) of vertices or (m,) of faces: a column that ``color_by="value"`` shows. Where there are as many vertices as faces, it is of the vertices.
+        columns
+            Further columns by name, as ``values``.
+        color_by
+            The column that colours stand for: ``"value"``, one of ``columns``, ``"x"``, ``"y"``, ``"z"`` or ``"height"``; ``values`` where they are given
+            without colours and texture.
+        colormap, clim, log_scale
+            As for :meth:`add_points`.
         name, **keys
             As for :meth:`add_points`.
+
+        Raises
+        ------
+        InputError
+            An array of another shape, an index that no vertex has, ``uv`` without ``texture``, or an image that cannot be read.
+        FileNotFoundError
+            A texture that is not there.
         """
-        corners = _array(faces)
-        if corners.ndim == 2 and corners.shape[1] == 4:
-            corners = np.concatenate([corners[:, [0, 1, 2]], corners[:, [0, 2, 3]]])
-        data = Data.mesh(_array(vertices), corners, _array(normals), _colors(colors))
-        self._add("mesh", data, name, keys)
+        corners = array_of(faces)
+        places = array_of(uv)
+        count = len(corners) if np.ndim(corners) else 0
+        is_of_quads = np.ndim(corners) == 2 and corners.shape[1] == 4
+        if is_of_quads:
+            corners = halved_quads(corners)
+            if np.ndim(places) == 3 and places.shape[1] == 4:
+                places = halved_quads(places)
+        of_vertices: dict[str, Any] = {}
+        of_faces: dict[str, Any] = {}
+        vertex_count = len(vertices) if np.ndim(vertices) else 0
+        stated = ({} if values is None else {"value": values}) | dict(columns or {})
+        for column, array in stated.items():
+            numbers = array_of(array)
+            if np.ndim(numbers) == 1 and len(numbers) == count and count != vertex_count:
+                of_faces[str(column)] = np.concatenate([numbers, numbers]) if is_of_quads else numbers
+            else:
+                of_vertices[str(column)] = numbers
+        data = Data.mesh(
+            array_of(vertices),
+            corners,
+            normals=array_of(normals),
+            colors=colors_of(colors),
+            opacities=array_of(opacities),
+            columns=of_vertices,
+            face_columns=of_faces,
+            uv=places,
+            texture=texture_of(texture),
+        )
+        if color_by is None and values is not None and colors is None and texture is None:
+            color_by = "value"
+        self._add("mesh", data, name, _shown(color_by, colormap, clim, log_scale) | keys)
 
     def add_volume(
         self,
@@ -204,27 +281,173 @@ class Scene:
         name, **keys
             As for :meth:`add_points`. Without a ``material`` a volume is lit by its gradients, as a first scene has it.
         """
-        grid = _array(values)
-        steps = np.asarray(spacing, dtype=float)
-        if steps.shape not in ((), (3,)):
-            raise InputError(f"spacing: expected one number or three, found the shape {steps.shape}")
-        steps = np.broadcast_to(steps, (3,))
+        data, lattice = lattice_of(values, spacing, origin, direction)
         if transfer is not None and not isinstance(transfer, Transfer):
             raise InputError(f"transfer: expected what organza.transfer makes, found {type(transfer).__name__}; `preset` takes a name")
-        turn = np.eye(3) if direction is None else np.asarray(direction, dtype=float).reshape(3, 3)
-        data = Data.grid(grid, steps.tolist(), np.asarray(origin, dtype=float).tolist(), turn.tolist())
         if transfer is not None and preset is not None:
             raise InputError("transfer, preset: expected one of them, found both")
+        source = "volume"
         if transfer is not None:
-            diagonal = float(np.linalg.norm(steps * (np.array(grid.shape[::-1]) - 1)))
-            keys = transfer.keys(diagonal or 1.0) | keys
+            keys = transfer.keys(lattice.diagonal or 1.0) | keys
             if "material" not in keys:
                 # As first scenes have it: lit by its gradients, so that its shape is seen.
                 self._document.setdefault("material", {}).setdefault(_LIT_VOLUME, _LIT)
                 keys = {"material": _LIT_VOLUME} | keys
         elif "transfer" not in keys:
-            keys = self._first_keys(data, name or "volume", preset) | keys
-        self._add("volume", data, name, keys)
+            source, found = self._first_keys(data, name or "volume", preset)
+            keys = found | keys
+        self._add(source, data, name, keys)
+
+    def add_isosurface(
+        self,
+        values: Any,
+        level: float,
+        *,
+        inside: str = "above",
+        spacing: Any = None,
+        origin: Any = None,
+        direction: Any = None,
+        name: str | None = None,
+        **keys: Any,
+    ) -> None:
+        """Adds the surface on which a volume has a value.
+
+        Parameters
+        ----------
+        values
+            (nz, ny, nx), any numbers; or a volume of xarray, nibabel, SimpleITK or PyVista, which brings its steps and its place; or the path of a file.
+        level
+            The value.
+        inside
+            ``"above"``, so that the surface faces lower values, or ``"below"``.
+        spacing, origin, direction
+            As for :meth:`add_volume`.
+        name, **keys
+            As for :meth:`add_points`, such as ``color`` and ``opacity``.
+
+        Raises
+        ------
+        InputError
+            For what is no volume, and a level that is not finite.
+        """
+        if inside not in ("above", "below"):
+            raise InputError(f"inside: expected 'above' or 'below', found {inside!r}")
+        table = {"level": number("level", level), "inside": inside}
+        if isinstance(values, (str, os.PathLike)):
+            self._add_file("isosurface", values, table, name, keys)
+            return
+        arguments, standing = volume_arguments(values, spacing, origin, direction)
+        data, _ = lattice_of(**arguments)
+        self._add("isosurface", data, name, standing | keys, table)
+
+    def add_slice(
+        self,
+        values: Any,
+        *,
+        normal: Any = "z",
+        center: Any = None,
+        colormap: str = "grey",
+        clim: tuple[float, float] | None = None,
+        transfer: Transfer | None = None,
+        spacing: Any = None,
+        origin: Any = None,
+        direction: Any = None,
+        name: str | None = None,
+        **keys: Any,
+    ) -> None:
+        """Adds a plane through a volume in the colours of its values, as they are, without light.
+
+        Parameters
+        ----------
+        values
+            As for :meth:`add_isosurface`.
+        normal
+            What the plane lies across: ``"x"``, ``"y"``, ``"z"``, or three numbers.
+        center
+            A point of the plane: x, y, z; the middle of the volume where it is None.
+        colormap, clim
+            The map of the colours, and the values at its two ends; the 1st and 99th percentile where ``clim`` is None.
+        transfer
+            Instead of these, what :func:`organza.transfer` makes; its opacities are not used.
+        spacing, origin, direction
+            As for :meth:`add_volume`.
+        name, **keys
+            As for :meth:`add_points`.
+
+        Raises
+        ------
+        InputError
+            For what is no volume, and for a file without ``center`` or colours.
+        """
+        axes = {"x": [1.0, 0.0, 0.0], "y": [0.0, 1.0, 0.0], "z": [0.0, 0.0, 1.0]}
+        if isinstance(normal, str) and normal not in axes:
+            raise InputError(f"normal: expected 'x', 'y', 'z' or three numbers, found {normal!r}")
+        if transfer is not None and not isinstance(transfer, Transfer):
+            raise InputError(f"transfer: expected what organza.transfer makes, found {type(transfer).__name__}; `colormap` takes a name")
+        across = axes[normal] if isinstance(normal, str) else place_of("normal", normal)
+        is_file = isinstance(values, (str, os.PathLike))
+        if is_file and (center is None or (transfer is None and clim is None)):
+            raise InputError("center, clim: expected both for the slice of a file, which is not read yet; or give its values")
+        table: dict[str, Any] = {"normal": across}
+        standing: dict[str, Any] = {}
+        if not is_file:
+            arguments, standing = volume_arguments(values, spacing, origin, direction)
+            data, lattice = lattice_of(**arguments)
+            center = lattice.middle if center is None else center
+            clim = percentiles(arguments["values"]) if clim is None and transfer is None else clim
+        table["center"] = place_of("center", center)
+        colors = transfer if transfer is not None else make_transfer(colormap, clim or (0.0, 1.0))
+        points = [{key: point[key] for key in ("value", "color")} for point in colors.points]
+        if "material" not in keys:
+            self._document.setdefault("material", {}).setdefault(_UNLIT_SLICE, {"shading": "unlit"})
+            keys = {"material": _UNLIT_SLICE} | keys
+        keys = standing | {"transfer": points} | keys
+        if is_file:
+            self._add_file("slice", values, table, name, keys)
+        else:
+            self._add("slice", data, name, keys, table)
+
+    def add_labels(
+        self,
+        values: Any,
+        *,
+        labels: Any = None,
+        spacing: Any = None,
+        origin: Any = None,
+        direction: Any = None,
+        name: str | None = None,
+        **keys: Any,
+    ) -> None:
+        """Adds a volume of labels: the surface of each region, in its own colour.
+
+        Parameters
+        ----------
+        values
+            As for :meth:`add_isosurface`: whole numbers, of which 0 is nothing.
+        labels
+            What the numbers stand for: ``{1: "bone", 2: {"name": "skin", "color": "#e6c8a0", "opacity": 0.3}}``, or the path of a table of colours. Names
+            stand in the legend of :meth:`Picture.save`. Without it each region has one of twelve colours.
+        spacing, origin, direction
+            As for :meth:`add_volume`.
+        name, **keys
+            As for :meth:`add_points`.
+
+        Raises
+        ------
+        InputError
+            For what is no volume, or not of whole numbers.
+        """
+        table = os.path.abspath(labels) if isinstance(labels, (str, os.PathLike)) else labels
+        looks: dict[str, Any] = {"color_by": {"column": "label", "map": "distinct"}} if table is None else {"labels": table}
+        if isinstance(values, (str, os.PathLike)):
+            self._add_file("mesh", values, None, name, looks | keys)
+            return
+        arguments, standing = volume_arguments(values, spacing, origin, direction)
+        numbers = array_of(arguments["values"])
+        if not np.issubdtype(numbers.dtype, np.integer) and not np.array_equal(numbers, np.round(numbers), equal_nan=True):
+            raise InputError("values: expected whole numbers that name regions, found numbers with a part")
+        data, _ = lattice_of(**(arguments | {"values": numbers}))
+        self._add("mesh", data, name, standing | looks | keys)
 
     def add(self, thing: Any, *, name: str | None = None, **keys: Any) -> None:
         """Adds a file, or a data set of another library: PyVista and VTK (points, surfaces, images), trimesh, Open3D, xarray, nibabel, SimpleITK; or an
@@ -261,62 +484,83 @@ class Scene:
                 place = _named(place, part, key)
                 continue
             if not following:
-                place[part] = _plain(value)
+                place[part] = plain(value)
                 return
             place = place.setdefault(part, {})
         raise InputError(f"{key}: expected a key of an object or a light, found its name alone")
 
-    def camera(
+    @property
+    def camera(self) -> Camera:
+        """The camera: ``scene.camera(position=…, target=…)``, or ``scene.camera.orbit(azimuth=30, elevation=20)``."""
+        return Camera(self)
+
+    @property
+    def light(self) -> Light:
+        """The lights: ``scene.light(kind, …)`` adds one, and ``scene.light.sun(…)`` a sun by its angles."""
+        return Light(self)
+
+    def ground(
         self,
         *,
-        position: Iterable[float] | None = None,
-        target: Iterable[float] | None = None,
-        azimuth: float | None = None,
-        elevation: float | None = None,
-        fit: float | None = None,
-        fov_y: float | None = None,
-        size: tuple[int, int] | None = None,
+        size: float | None = None,
+        height: float | None = None,
+        color: Any = None,
+        material: str | None = None,
+        name: str = "ground",
+        **keys: Any,
     ) -> None:
-        """Places the camera: at ``position`` looking at ``target``, or so that all is seen from an ``azimuth`` about +Y and an ``elevation`` (degrees)."""
-        self._check_open()
-        camera = self._document.setdefault("camera", {})
-        stated = {
-            "position": position,
-            "target": target,
-            "azimuth": azimuth,
-            "elevation": elevation,
-            "fit": fit,
-            "fov_y": fov_y,
-            "size": size,
-        }
-        if position is not None and not (azimuth is None and elevation is None and fit is None):
-            raise InputError("camera: expected a position, or azimuth, elevation and fit, found both")
-        # One way to place it takes the place of the other.
-        if position is not None:
-            for key in ("auto", "azimuth", "elevation", "fit"):
-                camera.pop(key, None)
-        elif not (azimuth is None and elevation is None and fit is None):
-            for key in ("position", "target", "up"):
-                camera.pop(key, None)
-            camera["auto"] = True
-        camera.update({key: _plain(value) for key, value in stated.items() if value is not None})
+        """Puts a level ground below everything that the scene shows.
 
-    def light(self, kind: str = "directional", *, name: str | None = None, **keys: Any) -> None:
-        """Adds a light, such as ``scene.light(direction=(-1, -2, -1), irradiance=(3, 3, 3), name="sun")``; ``kind`` and keys as in docs/scene.md."""
+        The place is found when the picture is drawn, so that data which is added later stands on it too. A camera that sees everything is placed by what
+        stands on the ground.
+
+        Parameters
+        ----------
+        size
+            Width and depth, in the unit of the scene; eight times the diagonal of what stands on it where it is None.
+        height
+            Its y; the lowest place of what stands on it where it is None. (A scene's y points up; ``transform={"up": "z"}`` of an object turns its data.)
+        color
+            Three linear numbers; a grey where neither ``color`` nor ``material`` is given.
+        material
+            The name of a material, see :meth:`material`.
+        name
+            How the object is called.
+        **keys
+            Further keys of an object (docs/scene.md). It is lit in every pixel (``technique="sheets"``) and casts no shadow unless they say otherwise.
+
+        Raises
+        ------
+        InputError
+            For a second ground, a size that is not above 0, and numbers that are not finite.
+        """
         self._check_open()
-        named = {} if name is None else {"name": name}
-        self._document.setdefault("light", []).append({"kind": kind} | named | _plain(keys))
+        if self._ground is not None:
+            raise InputError(f"ground: expected one ground, found a second beside '{self._ground.name}'")
+        for key, value in (("size", size), ("height", height)):
+            if value is not None:
+                number(key, value)
+        if size is not None and size <= 0.0:
+            raise InputError(f"size: expected a number above 0, found {size!r}")
+        label = self._free_name(_label(name) or "ground")
+        if color is None and material is None:
+            color = _GROUND_COLOR
+        stated = {"color": color, "material": material}
+        looks = {key: value for key, value in stated.items() if value is not None}
+        thing = {"technique": "sheets", "casts_shadow": False} | looks | keys | {"name": label}
+        self._document.setdefault("object", []).append(plain(thing))
+        self._ground = _Ground(label, size, height)
 
     def material(self, name: str, **keys: Any) -> None:
         """States a material, which objects name by ``material="NAME"``; keys as in docs/scene.md."""
         self._check_open()
-        self._document.setdefault("material", {})[name] = _plain(keys)
+        self._document.setdefault("material", {})[name] = plain(keys)
 
     def to_toml(self) -> str:
         """The scene as the text of a scene file. Data from arrays is named ``memory:NAME`` in it, which a file cannot hold."""
         if self._text is not None:
             return self._text
-        return _organza.toml_text(json.dumps(self._document))
+        return _organza.toml_text(json.dumps(self._grounded(_how(), None, None)))
 
     @property
     def objects(self) -> list[str]:
@@ -325,7 +569,7 @@ class Scene:
 
     @property
     def notes(self) -> list[str]:
-        """What a first scene decided that a user may want otherwise, one sentence each."""
+        """What a first scene decided that a user may want otherwise, and what was made of arrays, one sentence each."""
         return list(self._remarks)
 
     def __repr__(self) -> str:
@@ -333,7 +577,7 @@ class Scene:
 
     def __getstate__(self) -> dict[str, Any]:
         data = {name: (data.kind, data.arrays()) for name, data in self._data.items()}
-        return {"document": self._document, "text": self._text, "file": self._file, "data": data, "remarks": self._remarks, "written": self._written}
+        return {"document": self._document, "text": self._text, "file": self._file, "data": data, "remarks": self._remarks, "written": self._written, "ground": self._ground}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self._document = state["document"]
@@ -341,33 +585,55 @@ class Scene:
         self._file = state["file"]
         self._remarks = state["remarks"]
         self._written = state["written"]
+        self._ground = state["ground"]
         self._data = {name: getattr(Data, kind)(**arrays) for name, (kind, arrays) in state["data"].items()}
 
     def _check_open(self) -> None:
         if self._text is not None:
             raise InputError(f"{self._file}: a scene that was loaded stays as its file has it; change the file")
 
-    def _add(self, source: str, data: Data, name: str | None, keys: Mapping[str, Any]) -> None:
+    def _add(
+        self, source: str, data: Data, name: str | None, keys: Mapping[str, Any], table: Mapping[str, Any] | None = None
+    ) -> None:
+        """Adds an object of data in memory; with a table its source is that, of a volume."""
         self._check_open()
-        if name is not None and not isinstance(name, str):
-            raise InputError(f"name: expected a text, found {name!r}")
-        label = self._free_name(name or source)
+        label = self._free_name(_label(name) or source)
         _organza.check(label, data)
+        self._remarks += [f"{label}: {note}" for note in data.notes]
         self._data[label] = data
-        thing = {"name": label, source: _MEMORY + label} | _plain(dict(keys))
+        place = _MEMORY + label
+        thing = {"name": label, source: place if table is None else {"volume": place} | plain(table)} | plain(dict(keys))
+        self._document.setdefault("object", []).append(thing)
+
+    def _add_file(
+        self,
+        source: str,
+        path: str | os.PathLike[str],
+        table: Mapping[str, Any] | None,
+        name: str | None,
+        keys: Mapping[str, Any],
+    ) -> None:
+        """Adds an object of a file; with a table its source is that, of a volume."""
+        self._check_open()
+        place = os.path.abspath(path)
+        label = self._free_name(_label(name) or Path(place).name.split(".")[0] or source)
+        thing = {"name": label, source: place if table is None else {"volume": place} | plain(table)} | plain(dict(keys))
         self._document.setdefault("object", []).append(thing)
 
     def _free_name(self, name: str) -> str:
         return _free(name, self.objects)
 
-    def _first_keys(self, data: Data, name: str, preset: str | None) -> dict[str, Any]:
-        """What a first scene says of a volume; its material becomes one of this scene."""
-        text, _, _ = _organza.first_scene([(name, data, "y")], _no_wish() | {"preset": preset}, _how())
+    def _first_keys(self, data: Data, name: str, preset: str | None) -> tuple[str, dict[str, Any]]:
+        """What a first scene says of a volume, and whether that is one or the surfaces of labels; its material becomes one of this scene."""
+        text, remarks, _ = _organza.first_scene([(name, data, "y")], _no_wish() | {"preset": preset}, _how())
         first = json.loads(text)
         thing = first["object"][0]
-        keys = {key: value for key, value in thing.items() if key not in ("name", "volume")}
+        source = "mesh" if "mesh" in thing else "volume"
+        if source == "mesh":
+            self._remarks += [remark.removeprefix(_MEMORY) for remark in remarks]
+        keys = {key: value for key, value in thing.items() if key not in ("name", source)}
         self._take_material(first, keys, name)
-        return keys
+        return source, keys
 
     def _take(self, first: Scene, name: str | None, keys: Mapping[str, Any]) -> None:
         """Takes the objects of a first scene."""
@@ -377,7 +643,7 @@ class Scene:
             thing = dict(thing)
             self._take_material(first._document, thing, thing["name"])
             thing["name"] = self._free_name(name or thing["name"])
-            self._document.setdefault("object", []).append(thing | _plain(dict(keys)))
+            self._document.setdefault("object", []).append(thing | plain(dict(keys)))
 
     def _take_material(self, first: Mapping[str, Any], thing: dict[str, Any], name: str) -> None:
         material = thing.get("material")
@@ -392,27 +658,18 @@ class Scene:
         effects: Mapping[str, str] | None,
         size: tuple[int, int] | None,
         transparent: bool = False,
+        turntable: int | None = None,
     ) -> dict[str, Any]:
-        """The scene as the extension takes it, with what it does not state."""
+        """The scene as the extension takes it, with what it does not state; ``turntable`` is the pictures of a turn around it."""
         switches = [f"{name}={state}" for name, state in (effects or {}).items()]
-        given: dict[str, Any] = {
-            "text": self._text,
-            "file": self._file,
-            "data": self._data,
-            "effects": switches,
-            "changes": [],
-            "size": size,
-            "transparent": transparent,
-            "frame": None,
-            "turntable": None,
-        }
+        given = self._given_text(self._text, size, turntable) | {"effects": switches, "transparent": transparent}
         if self._text is not None:
             return given
         if self._written is not None and self._written.document == self._document:
             # A size that it states already is no change of it.
             is_stated = size is not None and list(size) == self._document.get("camera", {}).get("size")
             return given | {"text": self._written.text, "file": self._written.file, "size": None if is_stated else size}
-        document = copy.copy(self._document)
+        document = self._grounded(how, size, turntable)
         camera = dict(document.get("camera", {}))
         if "position" not in camera:
             camera.setdefault("auto", True)
@@ -424,6 +681,52 @@ class Scene:
             document |= json.loads(_organza.lights_of(unswitched, how))
         return given | {"text": json.dumps(document)}
 
+    def _given_text(self, text: str | None, size: tuple[int, int] | None, turntable: int | None) -> dict[str, Any]:
+        """A text with the scene's data as the extension takes it."""
+        return {
+            "text": text,
+            "file": self._file,
+            "data": self._data,
+            "effects": [],
+            "changes": [],
+            "size": size,
+            "transparent": False,
+            "frame": None,
+            "turntable": turntable,
+        }
+
+    def _grounded(self, how: dict[str, Any], size: tuple[int, int] | None, turntable: int | None) -> dict[str, Any]:
+        """The document with its ground in its place, and a camera that sees what stands on it."""
+        ground = self._ground
+        document = self._document
+        if ground is None:
+            return copy.copy(document)
+        standing = [thing for thing in document["object"] if thing["name"] != ground.name]
+        if not standing:
+            raise InputError("ground: expected data that stands on it, found none; add some")
+        stated = dict(document.get("camera", {}))
+        camera = {key: value for key, value in stated.items() if key not in ("position", "target", "up", "orthographic")}
+        camera = {"size": list(_DEFAULT_SIZE)} | camera | {"auto": True}
+        if "position" in stated:
+            # Level with the picture, as an automatic camera has it.
+            towards = np.subtract(stated["position"], stated.get("target", (0.0, 0.0, 0.0)))
+            camera["azimuth"] = math.degrees(math.atan2(towards[0], towards[2]))
+        above = document | {"object": standing, "camera": camera}
+        given = self._given_text(json.dumps(above), size, turntable)
+        found = json.loads(_organza.ground_of(given, how))
+        rectangle = found["object"][0]["rectangle"]
+        if ground.height is not None:
+            rectangle["center"][1] = ground.height
+        if ground.size is not None:
+            factor = 0.5 * ground.size / float(np.linalg.norm(rectangle["u"]))
+            rectangle |= {side: [factor * part for part in rectangle[side]] for side in ("u", "v")}
+            rectangle["spacing"] = ground.size / _GROUND_STEPS
+        things = [thing | {"rectangle": rectangle} if thing["name"] == ground.name else thing for thing in document["object"]]
+        if "position" not in stated:
+            kept = {key: value for key, value in stated.items() if key not in ("auto", "azimuth", "elevation", "fit")}
+            stated = kept | {key: found["camera"][key] for key in ("position", "target", "up") if key in found["camera"]}
+        return document | {"object": things, "camera": stated}
+
 
 def scene_of(what: tuple[Any, ...], wished: Mapping[str, Any], how: dict[str, Any]) -> Scene:
     """A scene, or the first scene of files and data."""
@@ -432,25 +735,29 @@ def scene_of(what: tuple[Any, ...], wished: Mapping[str, Any], how: dict[str, An
     wishes = {key: value for key, value in wished.items() if value and key not in ("size", "turntable")}
     if len(what) == 1 and (isinstance(what[0], Scene) or _is_scene(what[0])):
         if wishes:
-            raise InputError(f"{', '.join(wishes)}: expected data, found a scene, which states that itself")
+            raise InputError(f"{', '.join(wishes)}: expected data, found a scene, which states that itself: by scene.camera.orbit, scene.ground and its objects")
         return what[0] if isinstance(what[0], Scene) else Scene.load(what[0])
     shown: list[Any] = []
     data_by_name: dict[str, Data] = {}
+    adopted_remarks: list[str] = []
     for thing in what:
         if isinstance(thing, Scene) or _is_scene(thing):
             raise InputError(f"what: expected one scene, or files and data, found a scene among {len(what)}")
         if isinstance(thing, (str, os.PathLike)):
             shown.append(os.path.abspath(thing))
             continue
-        name, data, up = adopted.data_of(thing)
-        name = _free(name, data_by_name)
-        data_by_name[name] = data
-        shown.append((name, data, up))
+        found = adopted.data_of(thing)
+        name = _free(found.name, data_by_name)
+        data_by_name[name] = found.data
+        shown.append((name, found.data, found.up))
+        adopted_remarks += found.remarks
+        if len(what) == 1 and wished["color_by"] is None:
+            wished = dict(wished) | {"color_by": found.color_by}
     text, remarks, written = _organza.first_scene(shown, dict(wished), how)
     scene = Scene()
     scene._document = json.loads(text)
     scene._data = data_by_name
-    scene._remarks = remarks
+    scene._remarks = adopted_remarks + remarks
     # A scene may be drawn in another working folder than it was made in.
     for first in scene._document.get("object", []):
         for source in _SOURCES:
@@ -458,6 +765,29 @@ def scene_of(what: tuple[Any, ...], wished: Mapping[str, Any], how: dict[str, An
                 first[source] = os.path.abspath(first[source])
     scene._written = _Written(copy.deepcopy(scene._document), written, os.path.abspath(_FIRST))
     return scene
+
+
+def _label(name: Any) -> str | None:
+    """The name of an object, where it has one."""
+    if name is not None and not isinstance(name, str):
+        raise InputError(f"name: expected a text, found {name!r}")
+    return name
+
+
+def _shown(column: str | None, colormap: str | None, clim: tuple[float, float] | None, log_scale: bool) -> dict[str, Any]:
+    """The keys of an object whose colours stand for a column."""
+    if column is None:
+        if colormap is not None or clim is not None or log_scale:
+            raise InputError("colormap, clim, log_scale: expected a column to colour by, found none; give `values` or `color_by`")
+        return {}
+    shown: dict[str, Any] = {"column": column}
+    if colormap is not None:
+        shown["map"] = colormap
+    if clim is not None:
+        shown["range"] = [float(end) for end in clim]
+    if log_scale:
+        shown["scale"] = "log"
+    return {"color_by": shown}
 
 
 def _free(name: str, taken: Container[str]) -> str:
@@ -478,51 +808,6 @@ def _is_scene(thing: Any) -> bool:
     if path.suffix.lower() == ".toml":
         return True
     return path.suffix.lower() == ".json" and path.is_file() and b'"version"' in path.read_bytes()[:4096]
-
-
-def _array(thing: Any) -> Any:
-    """An array of a kind of numbers that the extension takes; None stays None."""
-    if thing is None:
-        return None
-    if isinstance(thing, np.ma.MaskedArray) and np.ma.is_masked(thing):
-        # A gap, as NaN is.
-        thing = np.where(np.ma.getmaskarray(thing), np.nan, thing.data)
-    try:
-        array = np.asarray(thing)
-    except ValueError as error:
-        raise InputError(f"expected an array of numbers, found rows of other lengths ({error})") from None
-    if array.dtype in (np.float16, np.bool_) or array.dtype.byteorder not in ("=", "|"):
-        return array.astype(np.uint8 if array.dtype == np.bool_ else array.dtype.newbyteorder("=").char.replace("e", "f"))
-    return array
-
-
-def _colors(thing: Any) -> Any:
-    """Colours: linear numbers, or bytes of sRGB; whole numbers of another kind may be either."""
-    array = _array(thing)
-    if array is not None and np.issubdtype(array.dtype, np.integer) and array.dtype != np.uint8:
-        raise InputError(f"colors: expected linear numbers with a point, or bytes (uint8) of sRGB, found {array.dtype}")
-    return array
-
-
-def _arrays(columns: Mapping[str, Any]) -> dict[str, Any]:
-    return {str(name): _array(values) for name, values in columns.items()}
-
-
-def _plain(value: Any) -> Any:
-    """A value as JSON has it."""
-    if isinstance(value, Mapping):
-        return {str(key): _plain(part) for key, part in value.items()}
-    if isinstance(value, np.ndarray):
-        return _plain(value.tolist())
-    if isinstance(value, np.generic):
-        value = value.item()
-    if isinstance(value, float) and not math.isfinite(value):
-        raise InputError(f"expected finite numbers, found {value}")
-    if isinstance(value, Transfer):
-        raise InputError("a transfer: expected it as `transfer=` of add_volume, found it as a key")
-    if isinstance(value, (list, tuple)):
-        return [_plain(part) for part in value]
-    return value
 
 
 def _named(things: list[dict[str, Any]], part: str, key: str) -> dict[str, Any]:

@@ -1,0 +1,93 @@
+"""Arguments as the extension takes them: arrays, colours, images, numbers."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from organza._organza import InputError
+from organza.transfers import Transfer
+
+
+def array_of(thing: Any) -> Any:
+    """An array of a kind of numbers that the extension takes; None stays None."""
+    if thing is None:
+        return None
+    if isinstance(thing, np.ma.MaskedArray) and np.ma.is_masked(thing):
+        # A gap, as NaN is.
+        thing = np.where(np.ma.getmaskarray(thing), np.nan, thing.data)
+    try:
+        array = np.asarray(thing)
+    except ValueError as error:
+        raise InputError(f"expected an array of numbers, found rows of other lengths ({error})") from None
+    if array.dtype in (np.float16, np.bool_) or array.dtype.byteorder not in ("=", "|"):
+        return array.astype(np.uint8 if array.dtype == np.bool_ else array.dtype.newbyteorder("=").char.replace("e", "f"))
+    return array
+
+
+def colors_of(thing: Any) -> Any:
+    """Colours: linear numbers, or bytes of sRGB; whole numbers of another kind may be either."""
+    array = array_of(thing)
+    if array is not None and np.issubdtype(array.dtype, np.integer) and array.dtype != np.uint8:
+        raise InputError(f"colors: expected linear numbers with a point, or bytes (uint8) of sRGB, found {array.dtype}")
+    return array
+
+
+def columns_of(columns: Mapping[str, Any]) -> dict[str, Any]:
+    """Columns by name."""
+    return {str(name): array_of(values) for name, values in columns.items()}
+
+
+def halved_quads(rows: np.ndarray) -> np.ndarray:
+    """Two triangles of what each corner of a four-sided face has: first one of each face, then the other."""
+    return np.concatenate([rows[:, [0, 1, 2]], rows[:, [0, 2, 3]]])
+
+
+def texture_of(thing: Any) -> Any:
+    """An image as the extension takes it: a path, or an array."""
+    if thing is None or isinstance(thing, (str, os.PathLike)):
+        return thing
+    # A texture of PyVista.
+    pixels = array_of(thing.to_array() if hasattr(thing, "to_array") else thing)
+    if np.ndim(pixels) == 2:
+        raise InputError("texture: expected three channels or four, found one number a pixel; an image of Pillow has them after `convert('RGBA')`")
+    if np.issubdtype(pixels.dtype, np.integer) and pixels.dtype != np.uint8:
+        raise InputError(f"texture: expected linear numbers with a point, or bytes (uint8) of sRGB, found {pixels.dtype}")
+    return pixels
+
+
+def plain(value: Any) -> Any:
+    """A value as JSON has it."""
+    if isinstance(value, Mapping):
+        return {str(key): plain(part) for key, part in value.items()}
+    if isinstance(value, np.ndarray):
+        return plain(value.tolist())
+    if isinstance(value, np.generic):
+        value = value.item()
+    if isinstance(value, float) and not math.isfinite(value):
+        raise InputError(f"expected finite numbers, found {value}")
+    if isinstance(value, Transfer):
+        raise InputError("a transfer: expected it as `transfer=` of add_volume, found it as a key")
+    if isinstance(value, (list, tuple)):
+        return [plain(part) for part in value]
+    return value
+
+
+def number(name: str, value: Any) -> float:
+    """A finite number."""
+    is_number = isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
+    if not is_number or not math.isfinite(value):
+        raise InputError(f"{name}: expected a finite number, found {value!r}")
+    return float(value)
+
+
+def place_of(name: str, value: Any) -> list[float]:
+    """Three finite numbers."""
+    parts = list(value) if isinstance(value, (list, tuple, np.ndarray)) and np.ndim(value) == 1 else []
+    if len(parts) != 3:
+        raise InputError(f"{name}: expected three numbers, found {value!r}")
+    return [number(name, part) for part in parts]
