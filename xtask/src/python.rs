@@ -1,5 +1,6 @@
 //! `cargo xtask python`: the Python package in an environment of its own, built, installed and tested.
 
+use crate::ci::FEATURES;
 use crate::repo::{Outcome, Repo};
 use std::path::Path;
 use std::process::Command;
@@ -29,8 +30,10 @@ pub(crate) fn run(repo: &Repo) -> Outcome {
     call(repo, &python, &["-m", "pip", "install", "--quiet", "--find-links", wheels, "organza[test]"])?;
     call(repo, &python, &["-m", "mypy", "--strict", &format!("{PACKAGE}/python/organza")])?;
     call(repo, &python, &["-m", "mypy.stubtest", "organza._organza"])?;
-    // Tests compare pictures and documents with those of the command, which they find in `target`.
-    call(repo, Path::new("cargo"), &["build", "--quiet", "-p", "organza-cli"])?;
+    // Tests compare pictures and documents with those of the command, which they find in `target`: built as the tests of the workspace have it, so
+    // that cargo compiles nothing a second time. Its profile is `dev`, that of the package `release`; pictures have the same bits.
+    let command = ["build", "--quiet", "--workspace", "--features", FEATURES, "--bin", "organza-under-test"];
+    call(repo, Path::new("cargo"), &command)?;
     call(repo, &python, &["-m", "pytest", "-q", &format!("{PACKAGE}/tests")])?;
     Ok(format!("python: the package is tested; its wheel lies in {wheels}"))
 }

@@ -13,7 +13,8 @@ ASSETS = REPOSITORY / "assets"
 def command() -> str:
     """The command `organza` of this repository, which `cargo xtask python` builds."""
     target = Path(os.environ.get("CARGO_TARGET_DIR", REPOSITORY / "target"))
-    places = [target / profile / "organza" for profile in ("debug", "release")]
+    # The command once more, as the tests of the workspace are built; else the one that a user builds.
+    places = [target / path for path in ("debug/organza-under-test", "debug/organza", "release/organza")]
     found = next((place for place in places if place.is_file()), None)
     if found is None:
         pytest.skip("the command is not built: cargo build -p organza-cli")
