@@ -114,7 +114,7 @@ fn explain_says_which_form_draws_and_why() {
         (HALF_AND_FINE, "splatted slabs", "finer than samples"),
         (&["object.ball.density.spacing=0.02"], "splatted slabs", "finer than samples"),
         (&["object.ball.density.spacing=0.2"], "splatted slabs", "wider than five samples"),
-        (&["object.ball.density.expression='exp(-2*(x^2+y^2+z^2)) - 0.8'"], "splatted slabs", "less than a quarter"),
+        (&["object.ball.density.expression='exp(-2*(x^2+y^2+z^2)) - 0.8'"], "splatted slabs", "fewer than a quarter"),
     ] {
         let text = explained(settings);
         assert!(text.contains(form), "{settings:?}: no `{form}` in {text}");

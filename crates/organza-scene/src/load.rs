@@ -71,7 +71,10 @@ pub fn parse(file: &Path, bytes: &[u8], options: &LoadOptions) -> Result<Scene, 
 fn hash(bytes: &[u8], options: &LoadOptions) -> String {
     let mut hasher = Sha256::new();
     hasher.update(bytes);
-    for change in &options.overrides {
+    // In the order in which the command applies them, whenever they were made.
+    let (sets, others): (Vec<_>, Vec<_>) =
+        options.overrides.iter().partition(|change| change.flag().starts_with("--set "));
+    for change in sets.into_iter().chain(others) {
         hasher.update(b"\n");
         hasher.update(change.flag().as_bytes());
     }

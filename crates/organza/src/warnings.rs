@@ -343,7 +343,9 @@ mod tests {
     #[test]
     fn cells_are_proposed_that_a_table_can_have() {
         let told = |share: f64, cells: u32, bytes: u64| {
-            of_cells(Coarse { share, cells, light: "0".to_owned(), bytes }, 4 << 30).unwrap_or_default()
+            let better_cells = f64::from(cells) * share / 0.05;
+            let coarse = Coarse { share, cells, better_cells, light: "0".to_owned(), bytes };
+            of_cells(coarse, 4 << 30).unwrap_or_default()
         };
         assert_eq!(told(0.1, 1024, 1 << 20), "");
         assert!(told(0.2, 1024, 1 << 20).ends_with("shadow_cells = 4096 of that [[light]] leaves about a twentieth"));
