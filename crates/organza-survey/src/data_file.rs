@@ -35,7 +35,7 @@ impl DataFile {
     /// Reads a file with the column that `wish` names, or takes it from those that were read before; refuses what a scene shows nothing of.
     ///
     /// # Errors
-    /// As [`Files::read`]; [`Error::Input`] for a file without points or faces, and for an image.
+    /// As [`organza::Files::read`]; [`Error::Input`] for a file without points or faces, and for an image.
     pub fn read(path: &Path, wish: &Wish, context: Context<'_>) -> Result<Self, Error> {
         let Context { files, options, progress } = context;
         let columns = wish.color_by.iter().cloned().collect();
