@@ -95,7 +95,7 @@ fn split_volumes_fields_and_clouds_are_predicted_closely() {
         close(cost::density(&field, bounds, &params).unwrap(), &cloud, 0.03);
     }
     // Most of the box has an extinction that f32 does not hold, or that no line shows.
-    let faint = ExpressionField::parse("exp(-(x^2 + y^2 + z^2)/0.003)").unwrap();
+    let faint = ExpressionField::parse("exp(-(x^2 + y^2 + z^2)/0.02)").unwrap();
     for omitted_optical_depth in [0.0, 1e-4] {
         let volume = VolumeParams { omitted_optical_depth, ..VolumeParams::default() };
         let params = DensityParams { density: Density::Spacing(0.02), volume, ..DensityParams::default() };
