@@ -1,6 +1,6 @@
 //! `cargo xtask python`: the Python package in an environment of its own, built, installed and tested.
 
-use crate::ci::FEATURES;
+use crate::ci::{DRIVER, FEATURES};
 use crate::repo::{Outcome, Repo};
 use std::path::Path;
 use std::process::Command;
@@ -32,8 +32,10 @@ pub(crate) fn run(repo: &Repo) -> Outcome {
     call(repo, &python, &["-m", "mypy.stubtest", "organza._organza"])?;
     // Tests compare pictures and documents with those of the command, which they find in `target`: built as the tests of the workspace have it, so
     // that cargo compiles nothing a second time. Its profile is `dev`, that of the package `release`; pictures have the same bits.
-    let command = ["build", "--quiet", "--workspace", "--features", FEATURES, "--bin", "organza-under-test"];
-    call(repo, Path::new("cargo"), &command)?;
+    let features = format!("{FEATURES},{DRIVER}");
+    let of_tests =
+        ["build", "--quiet", "--workspace", "--exclude", "organza-benches", "--tests", "--features", &features];
+    call(repo, Path::new("cargo"), &of_tests)?;
     call(repo, &python, &["-m", "pytest", "-q", &format!("{PACKAGE}/tests")])?;
     Ok(format!("python: the package is tested; its wheel lies in {wheels}"))
 }

@@ -127,7 +127,7 @@ def test_numbers_of_vertices_and_faces_are_colours():
     first = og.render(of_values, size=SMALL)
     second = og.render(of_column, size=SMALL)
     assert np.array_equal(first.rgb, second.rgb) and first.rgb.std() > 0.01
-    assert any("columns not used: other" in note for note in second.notes), second.notes
+    assert any("not used: other" in note for note in second.notes), second.notes
     of_faces = og.Scene()
     of_faces.material("flat", shading="unlit")
     of_faces.add_mesh(VERTICES, QUADS, values=[0, 5], material="flat", **shown)

@@ -10,7 +10,7 @@ use crate::scene::raw::RawScene;
 use crate::text::de;
 use crate::text::file::{BYTES_PER_CHARACTER, MAX_SCENE_BYTES, decode, read};
 use crate::text::json::read_json;
-use crate::text::overrides;
+use crate::text::overrides::{self, Override};
 use crate::text::toml::read_toml;
 use crate::text::tree::Document;
 use crate::{Error, camera};
@@ -71,10 +71,7 @@ pub fn parse(file: &Path, bytes: &[u8], options: &LoadOptions) -> Result<Scene, 
 fn hash(bytes: &[u8], options: &LoadOptions) -> String {
     let mut hasher = Sha256::new();
     hasher.update(bytes);
-    // In the order in which the command applies them, whenever they were made.
-    let (sets, others): (Vec<_>, Vec<_>) =
-        options.overrides.iter().partition(|change| change.flag().starts_with("--set "));
-    for change in sets.into_iter().chain(others) {
+    for change in Override::in_order(&options.overrides) {
         hasher.update(b"\n");
         hasher.update(change.flag().as_bytes());
     }

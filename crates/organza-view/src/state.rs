@@ -81,7 +81,7 @@ impl Source {
     pub(crate) fn told(&self, overrides: &[Override]) -> String {
         let mut text = String::from_utf8_lossy(&self.text).into_owned();
         if !self.is_json() {
-            for change in overrides {
+            for change in Override::in_order(overrides) {
                 // Writing to a String cannot fail.
                 let _ = write!(text, "\n# {}", change.flag());
             }

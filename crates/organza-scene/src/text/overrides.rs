@@ -81,6 +81,12 @@ impl Override {
         &self.path
     }
 
+    /// The changes in the order in which the command applies them: those by `--set`, then those of other options; each kind as it was made.
+    pub fn in_order(changes: &[Self]) -> impl Iterator<Item = &Self> {
+        let is_set = |change: &&Self| change.flag().starts_with("--set ");
+        changes.iter().filter(is_set).chain(changes.iter().filter(move |change| !is_set(change)))
+    }
+
     /// Returns whether a later change takes the place of a value that this one states, by another value.
     ///
     /// ```
