@@ -58,3 +58,27 @@ fn what_is_lit_evenly_has_no_error() {
         assert_eq!(map.interpolation_error(&probe(position)), 0.0, "{position}");
     }
 }
+
+#[test]
+fn what_wider_cells_would_change_is_three_times_the_error_of_cells() {
+    let ball = smooth_ball(0.05, 4.0, 0.5);
+    let light = point_light(DVec3::new(0.0, 0.0, -6.0));
+    let map = |cells| build(&ball, &light, &Params { resolution: Resolution::Cells(cells), ..Params::default() });
+    let [coarse, fine] = [map(12), map(192)];
+    let wider = coarse.wider();
+    let mut sums = [0.0; 4];
+    for k in 0..40 * 40 {
+        let position = Vec3::new((k % 40) as f32 - 19.5, (k / 40) as f32 - 19.5, 0.0) * 0.037 + Vec3::Z * 2.0;
+        let receiver = probe(position);
+        sums[0] += (wider.transmittance(&receiver)[1] - coarse.transmittance(&receiver)[1]) / 3.0;
+        sums[1] += coarse.transmittance(&receiver)[1] - fine.transmittance(&receiver)[1];
+        sums[2] += ((wider.absorbance(&receiver)[1] - coarse.absorbance(&receiver)[1]) / 3.0).abs();
+        sums[3] += (coarse.absorbance(&receiver)[1] - fine.absorbance(&receiver)[1]).abs();
+    }
+    let [light, found_light, depth, found_depth] = sums.map(|sum| sum / 1600.0);
+    assert!(found_depth > 1e-3, "{found_depth}");
+    assert!((found_depth / 2.0..2.0 * found_depth).contains(&depth), "{depth} for {found_depth}");
+    assert!((light - found_light).abs() < found_depth, "{light} for {found_light}");
+    let outside = probe(Vec3::new(30.0, 0.0, 0.0));
+    assert_eq!(wider.transmittance(&outside), coarse.transmittance(&outside));
+}

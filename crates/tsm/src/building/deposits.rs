@@ -189,7 +189,7 @@ impl<M: Mapping> Filling<'_, M> {
         progress.tick(splats.clone().count() as u64)?;
         scratch.media.clear();
         scratch.surfaces.clear();
-        let deposit = Deposit { mapping, ends, wide: plan.lit.wide, scratch };
+        let deposit = Deposit { mapping, ends, wide: plan.lit.wide(), scratch };
         pulp::Arch::new().dispatch(FillChunk { casters, plan, deposit, splats });
         let more = (scratch.media.len + scratch.surfaces.len) as u64;
         check_entries::<C>(self.made.fetch_add(more, Ordering::Relaxed) + more, &casters.params.limits)?;

@@ -118,7 +118,7 @@ impl Casting {
                 progress.tick(chunk.len() as u64)?;
                 scratch.media.clear();
                 scratch.surfaces.clear();
-                let deposit = Deposit { mapping, ends: Ends::opaque(opaque), wide: plan.lit.wide, scratch };
+                let deposit = Deposit { mapping, ends: Ends::opaque(opaque), wide: plan.lit.wide(), scratch };
                 Ok(pulp::Arch::new().dispatch(PartChunk { casters, plan, deposit, chunk }))
             })
             .collect::<Result<_, Error>>()?;
@@ -201,7 +201,7 @@ impl<M: Mapping, const C: usize> pulp::NullaryFnOnce for PartChunk<'_, M, C> {
         if casters.has_opaque_discs() {
             let Scratch { media_batches, surface_batches, ids: [ids, ..], .. } = &mut *self.deposit.scratch;
             select(casters, self.chunk.clone(), SplatKind::Medium, ids);
-            media_batches.part(mapping, self.plan.lit.wide, casters, frame, ids, &mut plain, &mut others);
+            media_batches.part(mapping, self.plan.lit.wide(), casters, frame, ids, &mut plain, &mut others);
             select(casters, self.chunk.clone(), SplatKind::Surface, ids);
             surface_batches.part(mapping, casters, frame, ids, &mut plain, &mut others);
         } else {

@@ -81,7 +81,7 @@ pub(crate) fn predict(
     let kinds = survey.kinds;
     let [media, surfaces] = [SplatKind::Medium, SplatKind::Surface].map(|kind| kinds[kind as usize]);
     let media_share = media as f64 / (media + surfaces).max(1) as f64;
-    let entries = lit.share * look.entries(cell, cells, lit.wide, media_share);
+    let entries = lit.share * look.entries(cell, cells, lit.wide(), media_share);
     let channels = if survey.coloured { 3.0 } else { 1.0 };
     // A distance and its sum.
     let knot = 4.0 + 4.0 * channels;

@@ -45,15 +45,11 @@ pub(crate) struct Lit {
     pub(crate) rounds: Option<Rounds>,
     /// Whether light falls off within a spacing of most media, so that cells have to be fine.
     pub(crate) is_steep: bool,
-    /// Where rays begin to sample footprints of media, whichever way the rounds are.
-    pub(crate) wide: Band,
 }
 
 impl Lit {
     /// All casters are lit.
-    const EVERYWHERE: Self = Self { share: 1.0, rounds: None, is_steep: false, wide: WIDE };
-    /// All are lit, and light falls off within a spacing.
-    const STEEP: Self = Self { is_steep: true, wide: WIDE_WITHIN, ..Self::EVERYWHERE };
+    const EVERYWHERE: Self = Self { share: 1.0, rounds: None, is_steep: false };
 
     /// Looks at every medium among the casters through a coarse table.
     pub(crate) fn new(casters: &Casters<'_>, survey: &Survey, frame: &Frame, coarse: Table) -> Self {
@@ -62,18 +58,24 @@ impl Lit {
             return Self::EVERYWHERE;
         }
         let is_steep = is_thick(casters);
-        if media < if is_steep { FEW } else { MANY } {
-            return if is_steep { Self::STEEP } else { Self::EVERYWHERE };
+        let many = if is_steep { FEW } else { MANY };
+        if media < many {
+            return Self { is_steep, ..Self::EVERYWHERE };
         }
         let (rounds, dark) = Rounds::new(casters, survey, frame, coarse);
         let share = survey.casters.saturating_sub(dark).max(1) as f64 / survey.casters as f64;
         if share < WORTH {
-            Self { share, rounds: Some(rounds), is_steep: true, wide: WIDE_WITHIN }
+            Self { share, rounds: Some(rounds), is_steep: true }
         } else if is_steep {
-            Self { share, ..Self::STEEP }
+            Self { share, is_steep, ..Self::EVERYWHERE }
         } else {
             Self::EVERYWHERE
         }
+    }
+
+    /// Where rays begin to sample footprints of media.
+    pub(crate) fn wide(&self) -> Band {
+        if self.is_steep { WIDE_WITHIN } else { WIDE }
     }
 }
 
