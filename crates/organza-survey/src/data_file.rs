@@ -79,6 +79,9 @@ impl DataFile {
         match &data {
             SourceData::Mesh(mesh) if mesh.triangles.is_empty() => refuse("expected at least one face, found none", ""),
             SourceData::Points(points) if points.is_empty() => refuse("expected at least one point, found none", ""),
+            SourceData::Grid(grid) if grid.values.iter().all(|value| value.is_nan()) => {
+                refuse("expected at least one number, found NaN in all voxels", "")
+            }
             SourceData::Image(_) => {
                 let message = "an image of radiance is an environment, and not a thing to look at";
                 refuse(message, "name it in a scene: [background] environment = \"FILE\"")
@@ -165,7 +168,8 @@ fn named(text: &str) -> String {
 mod tests {
     use super::*;
     use organza::{Files, Progress, RenderOptions};
-    use splat_core::RawPoints;
+    use splat_core::glam::{DMat3, DVec3};
+    use splat_core::{Grid, RawPoints};
 
     #[test]
     fn colours_that_are_all_black_are_none() {
@@ -188,6 +192,13 @@ mod tests {
         let dark = file(vec![[0.0; 3], [0.0, 0.0, 1e-3]]);
         assert!(!dark.is_black() && dark.is_colored() && dark.luminance().is_some_and(|l| l > 0.0));
         assert!(!file(Vec::new()).is_black() && !file(Vec::new()).is_colored());
+    }
+
+    #[test]
+    fn a_volume_without_a_number_is_refused_by_name() {
+        let grid = Grid { origin: DVec3::ZERO, axes: DMat3::IDENTITY, dims: [2; 3], values: vec![f32::NAN; 8] };
+        let error = DataFile::in_memory("fog", SourceData::Grid(grid.into()), None, &Wish::default()).unwrap_err();
+        assert!(error.to_string().contains("memory:fog: expected at least one number, found NaN"), "{error}");
     }
 
     #[test]

@@ -191,7 +191,7 @@ impl Labels {
     }
 }
 
-/// What the values of a volume are.
+/// The meaning of the values of a volume.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Reading {
     Labels(Labels),
