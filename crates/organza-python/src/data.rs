@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 #[pyclass(frozen, module = "organza._organza")]
 pub(crate) struct Data {
     pub(crate) data: SourceData,
-    /// What was made of the arrays that their owner should know, one sentence each.
+    /// Changes of the arrays that their owner should know, one sentence each.
     notes: Vec<String>,
 }
 
@@ -26,7 +26,7 @@ impl From<SourceData> for Data {
     }
 }
 
-/// What a mesh is painted with: a PNG or JPEG file, or pixels.
+/// The image that a mesh is painted with: a PNG or JPEG file, or pixels.
 #[derive(FromPyObject)]
 pub(crate) enum Texture<'py> {
     #[pyo3(transparent)]
@@ -173,7 +173,7 @@ impl Data {
         self.data.bytes()
     }
 
-    /// What was made of the arrays, one sentence without a name each.
+    /// Changes of the arrays, one sentence without a name each.
     #[getter]
     fn notes(&self) -> Vec<String> {
         self.notes.clone()

@@ -60,7 +60,7 @@ pub(crate) struct Shown {
     off: Option<Off>,
 }
 
-/// What of the light at a splat is off by more than the tolerance.
+/// The error of the light at a splat, where it is above the tolerance.
 #[derive(Clone, Copy)]
 struct Off {
     /// The light whose map errs most.

@@ -1,10 +1,10 @@
-//! What every step from a scene to its picture reads beside the scene.
+//! The files, options and progress that every step from a scene to its picture reads.
 
 use super::files::Files;
 use crate::RenderOptions;
 use splat_core::Progress;
 
-/// What every step from a scene to its picture reads beside the scene.
+/// The files, options and progress that every step from a scene to its picture reads beside the scene.
 #[derive(Clone, Copy)]
 pub struct Context<'a> {
     /// Files that were read, which no step reads again.

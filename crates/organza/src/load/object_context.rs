@@ -22,7 +22,7 @@ const LARGEST_SPACING: f64 = 1.7;
 /// crosses are off to both sides.
 const CLASSIFICATION_SHARE: f64 = 1.0 / 8.0;
 
-/// What the conversion of an object reads beside it.
+/// The inputs of the conversion of an object beside the object.
 pub(super) struct ObjectContext<'a> {
     pub(super) scene: &'a Scene,
     pub(super) options: &'a RenderOptions,
@@ -62,7 +62,7 @@ impl ObjectContext<'_> {
         params
     }
 
-    /// What earlier objects have left of memory and of the scene's own limit.
+    /// Limits to the splats that memory and the scene's own limit leave after earlier objects.
     fn limit(&self, params: &mut SplatParams) {
         let fits = self.files.memory(self.options).left().saturating_sub(self.used) / BYTES_PER_SPLAT;
         let asked = self.scene.render.max_points.map_or(u64::MAX, |most| most.saturating_sub(self.made));

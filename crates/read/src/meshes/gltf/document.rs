@@ -81,7 +81,7 @@ pub(super) struct PrimitiveExtensions {
     /// A draft, before the one that lies within the extension above.
     #[serde(rename = "KHR_spz_gaussian_splats_compression")]
     pub(super) spz: Option<SpzExtension>,
-    /// Those that are not read.
+    /// Extensions that are not read.
     #[serde(flatten)]
     pub(super) others: BTreeMap<String, IgnoredAny>,
 }
@@ -103,7 +103,7 @@ pub(super) struct GaussianExtension {
 pub(super) struct GaussianExtensions {
     #[serde(rename = "KHR_gaussian_splatting_compression_spz_2")]
     pub(super) spz: Option<SpzExtension>,
-    /// Those that are not read.
+    /// Extensions that are not read.
     #[serde(flatten)]
     pub(super) others: BTreeMap<String, IgnoredAny>,
 }

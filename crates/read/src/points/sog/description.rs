@@ -21,7 +21,7 @@ pub(super) struct Tables {
 }
 
 impl Tables {
-    /// What a byte of a channel stands for.
+    /// The number that a byte of a channel stands for.
     pub(super) fn number(&self, channel: usize, byte: u8) -> f64 {
         self.channels[channel.min(self.channels.len() - 1)][usize::from(byte)]
     }

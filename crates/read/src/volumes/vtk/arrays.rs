@@ -154,8 +154,8 @@ impl<'a> Arrays<'a> {
             matches!(array.role, Role::Scalars | Role::Colors | Role::Vectors | Role::Field) && array.name != GHOSTS
         };
         let owned_by = |owner: Owner| self.found.iter().filter(move |array| array.owner == owner).filter(is_field);
-        let all: Vec<&Array> = owned_by(Owner::Points).chain(owned_by(Owner::Cells)).collect();
-        let first = all.iter().find(|array| array.role != Role::Vectors).map(|array| array.owner);
+        let offered: Vec<&Array> = owned_by(Owner::Points).chain(owned_by(Owner::Cells)).collect();
+        let first = offered.iter().find(|array| array.role != Role::Vectors).map(|array| array.owner);
         let candidate = |array: &&Array| Candidate {
             name: array.name.clone(),
             numbers: array.numbers,
@@ -163,9 +163,9 @@ impl<'a> Arrays<'a> {
             is_named: Some(array.owner) == first && matches!(array.role, Role::Scalars | Role::Colors),
             is_of_cells: array.owner == Owner::Cells,
         };
-        let candidates: Vec<Candidate> = all.iter().map(candidate).collect();
-        let place = all.first().map_or(Place::File, |array| array.place);
-        Ok(chosen_array(&candidates, place, params, notes)?.map(|chosen| (all[chosen.rank], chosen.value)))
+        let candidates: Vec<Candidate> = offered.iter().map(candidate).collect();
+        let place = offered.first().map_or(Place::File, |array| array.place);
+        Ok(chosen_array(&candidates, place, params, notes)?.map(|chosen| (offered[chosen.rank], chosen.value)))
     }
 
     /// Takes a line, and passes over the arrays that it announces.
