@@ -1,6 +1,8 @@
 //! Effects of objects are left out where nobody sees them, and only there: each family crosses the threshold, and what was left out is forced on.
 
-use crate::light_effects::{Crossed, crosses_its_threshold, displayed, largest_change, loaded, render, settings};
+use crate::light_effects::{
+    Crossed, crosses_its_threshold, displayed, largest_change, loaded, render, settings, sizes,
+};
 use organza::plan::Bound;
 use organza_tests::{Place, draw};
 use splat_core::rng;
@@ -35,11 +37,6 @@ fn ball(material: &str) -> String {
     )
 }
 
-/// Sizes from one end to the other, each three times the last.
-fn sizes(from: f64, to: f64) -> Vec<f64> {
-    std::iter::successors(Some(from), |size| Some(size * 3.0)).take_while(|size| *size <= to).collect()
-}
-
 /// Draws a family and says where it crossed.
 #[track_caller]
 fn crosses(text: &str, name: &str, key: &str, sizes: &[f64], list: &[&str]) -> Crossed {
@@ -53,7 +50,7 @@ fn x7_effect_object_that_hides_nothing_is_left_out_with_its_shadow() {
     let text = scene(PANE);
     let opacity = "object.pane.opacity=SIZE";
     let bare = scene("");
-    let sizes = sizes(6e-6, 0.5);
+    let sizes = sizes(6e-6, 0.5, 3.0);
     let crossed = crosses_its_threshold(&text, "object.pane", opacity, &sizes, &[], Some(&bare));
     println!("object.pane: {crossed:?}");
     assert!(crossed.most_skipped >= 0.001 * crossed.least_visible, "{crossed:?}");
@@ -83,7 +80,7 @@ fn x7_an_object_out_of_view_goes_where_its_shadow_falls_out_of_view_too() {
 fn x7_effect_absorption_that_takes_nothing_is_left_out() {
     let text = scene(&ball("absorption_inside = [0, 0, 0]"));
     let key = "material.ball.absorption_inside=[SIZE, 0, SIZE]";
-    crosses(&text, "absorption.ball", key, &sizes(3e-6, 3.0), &[]);
+    crosses(&text, "absorption.ball", key, &sizes(3e-6, 3.0, 3.0), &[]);
     let settings = settings(&["material.ball.absorption_inside=[1e-6, 0, 1e-6]"]);
     let faint = render(&loaded(&text, &settings));
     assert_eq!(faint.plan.optical_depth_planes, 1);
@@ -94,7 +91,7 @@ fn x7_effect_absorption_that_takes_nothing_is_left_out() {
 fn x7_effect_color_of_thin_fog_is_left_out() {
     let text = scene(FOG);
     let key = "object.fog.medium_ball.extinction=SIZE";
-    let crossed = crosses(&text, "color.fog", key, &sizes(6e-6, 3.0), &["effect object.fog=on"]);
+    let crossed = crosses(&text, "color.fog", key, &sizes(6e-6, 3.0, 3.0), &["effect object.fog=on"]);
     assert!(crossed.most_skipped >= 0.001 * crossed.least_visible, "{crossed:?}");
     let thin = render(&loaded(&text, &settings(&["effect object.fog=on", "object.fog.medium_ball.extinction=3e-6"])));
     assert_eq!(thin.plan.optical_depth_planes, 1);
@@ -103,7 +100,7 @@ fn x7_effect_color_of_thin_fog_is_left_out() {
 #[test]
 fn x7_effect_gradients_of_a_dark_volume_are_left_out() {
     let text = scene(VOLUME);
-    crosses(&text, "gradients.volume", "object.volume.color=[SIZE, SIZE, SIZE]", &sizes(1e-5, 1.0), &[]);
+    crosses(&text, "gradients.volume", "object.volume.color=[SIZE, SIZE, SIZE]", &sizes(1e-5, 1.0, 3.0), &[]);
 }
 
 #[test]
@@ -261,10 +258,10 @@ mod deep {
             &["render.tolerance=0.0009"],
             &["render.exposure=-4", "light.sun.irradiance=[50, 50, 50]"],
         ] {
-            crosses(&scene(PANE), "object.pane", opacity, &sizes(1e-6, 0.5), list);
+            crosses(&scene(PANE), "object.pane", opacity, &sizes(1e-6, 0.5, 3.0), list);
         }
         let glass = scene(&ball("ior = 1.5\nabsorption_inside = [0, 0, 0]"));
         let key = "material.ball.absorption_inside=[SIZE, 0, SIZE]";
-        crosses(&glass, "absorption.ball", key, &sizes(1e-7, 3.0), &[]);
+        crosses(&glass, "absorption.ball", key, &sizes(1e-7, 3.0, 3.0), &[]);
     }
 }

@@ -4,6 +4,7 @@ use organza::scene::{LoadOptions, Override, Scene, parse};
 use organza::{Progress, Render, RenderOptions};
 use organza_tests::{Place, draw};
 use splat_core::rng;
+use std::io::Write;
 use std::path::Path;
 
 /// Fog over a ground, of which a spot lights a part; `lamp` and `more` are further lights and objects.
@@ -53,6 +54,27 @@ pub(crate) fn largest_change(a: &[f64], b: &[f64]) -> f64 {
 pub(crate) struct Crossed {
     pub(crate) least_visible: f64,
     pub(crate) most_skipped: f64,
+    /// The largest change of a pixel where the effect was left out, in tolerances.
+    most_left_out: f64,
+    /// The bound over the change that the effect makes, of each size that changes anything.
+    ratios: Vec<f64>,
+}
+
+impl Crossed {
+    /// Adds a row to the table of families, where `cargo xtask effects` asks for it.
+    fn note(&mut self, name: &str, key: &str, settings: &[String]) {
+        let Some(path) = std::env::var_os("ORGANZA_FAMILIES") else { return };
+        self.ratios.sort_by(f64::total_cmp);
+        let median = self.ratios[self.ratios.len() / 2];
+        let Self { least_visible, most_skipped, most_left_out, .. } = self;
+        let grows = key.split_once('=').map_or(key, |(key, _)| key);
+        let settings = settings.join(" and ").replace(',', "");
+        let row =
+            format!("{name},{grows},{settings},{least_visible:e},{most_skipped:e},{most_left_out:.3},{median:.1}\n");
+        let mut table = std::fs::OpenOptions::new().append(true).create(true).open(path).unwrap();
+        // One write is not torn by other tests.
+        table.write_all(row.as_bytes()).unwrap();
+    }
 }
 
 /// Draws a family whose effect grows from invisible to plain, as planned, with the effect on and with it off; `bare` is the scene without its cause.
@@ -65,7 +87,8 @@ pub(crate) fn crosses_its_threshold(
     settings: &[String],
     bare: Option<&str>,
 ) -> Crossed {
-    let mut crossed = Crossed { least_visible: f64::INFINITY, most_skipped: 0.0 };
+    let mut crossed =
+        Crossed { least_visible: f64::INFINITY, most_skipped: 0.0, most_left_out: 0.0, ratios: Vec::new() };
     for size in sizes {
         let with = |more: &[String]| {
             let size = key.replace("SIZE", &format!("{size:e}"));
@@ -86,6 +109,7 @@ pub(crate) fn crosses_its_threshold(
         } else {
             let change = largest_change(&displayed(&planned, &planned_scene), &truth);
             assert!(change <= tolerance, "{name} at {size}: {change} left out");
+            crossed.most_left_out = crossed.most_left_out.max(change / tolerance);
             assert_eq!(planned.layers, off.layers, "{name} at {size}");
             if let Some(bare) = bare {
                 let bare = render(&loaded(bare, settings));
@@ -98,14 +122,21 @@ pub(crate) fn crosses_its_threshold(
         if seen > tolerance {
             crossed.least_visible = crossed.least_visible.min(*size);
         }
+        if seen > 0.0 {
+            crossed.ratios.push(bound / seen);
+        }
     }
     assert!(crossed.most_skipped > 0.0 && crossed.least_visible.is_finite(), "{name}: {crossed:?}");
+    crossed.note(name, key, settings);
     crossed
 }
 
-/// Sizes from one end to the other, each 1.4 times the last.
-pub(crate) fn sizes(from: f64, to: f64) -> Vec<f64> {
-    std::iter::successors(Some(from), |size| Some(size * 1.4)).take_while(|size| *size <= to).collect()
+/// Sizes from one end to the other, each so many times the last. They are others where the environment states another seed, as `cargo xtask effects` does.
+pub(crate) fn sizes(from: f64, to: f64, ratio: f64) -> Vec<f64> {
+    let seed = std::env::var("ORGANZA_SEED").ok().and_then(|seed| seed.parse().ok());
+    let shift = seed.map_or(0.0, |seed: u64| rng::unit(seed, 2, from.to_bits(), to.to_bits()));
+    let first = from * ratio.powf(shift);
+    std::iter::successors(Some(first), |size| Some(size * ratio)).take_while(|size| *size <= to).collect()
 }
 
 pub(crate) fn settings(list: &[&str]) -> Vec<String> {
@@ -118,8 +149,14 @@ fn a_lamp_crosses_its_threshold(list: &[&str], from: f64) {
     let with = scene(FILL, "");
     let without = scene("", "");
     let key = "light.fill.intensity=[SIZE, SIZE, SIZE]";
-    let crossed =
-        crosses_its_threshold(&with, "light.fill", key, &sizes(from, 300.0 * from), &settings(list), Some(&without));
+    let crossed = crosses_its_threshold(
+        &with,
+        "light.fill",
+        key,
+        &sizes(from, 300.0 * from, 1.4),
+        &settings(list),
+        Some(&without),
+    );
     println!("{list:?}: {crossed:?}");
     assert!(crossed.most_skipped >= 0.1 * crossed.least_visible, "{list:?}: {crossed:?}");
 }
@@ -131,7 +168,7 @@ fn a_shadow_crosses_its_threshold(list: &[&str]) {
     let alone = ["object.fog.casts_shadow=false", "object.ground.casts_shadow=false"];
     let settings = settings(&[&alone[..], list].concat());
     let crossed =
-        crosses_its_threshold(&text, "shadow.key", "object.pane.opacity=SIZE", &sizes(3e-5, 0.5), &settings, None);
+        crosses_its_threshold(&text, "shadow.key", "object.pane.opacity=SIZE", &sizes(3e-5, 0.5, 1.4), &settings, None);
     println!("{list:?}: {crossed:?}");
     // The bound takes the ground to be black where the pane's shadow falls, and sRGB to be as steep as there.
     assert!(crossed.most_skipped >= 0.03 * crossed.least_visible, "{list:?}: {crossed:?}");
@@ -203,7 +240,7 @@ fn the_shadow_of_fog_crosses_its_threshold(list: &[&str]) {
     let settings =
         settings(&[&["object.ground.casts_shadow=false", "object.fog.medium_ball.spacing=0.05"][..], list].concat());
     let key = "object.fog.medium_ball.extinction=SIZE";
-    let crossed = crosses_its_threshold(&text, "shadow.key", key, &sizes(3e-5, 1.0), &settings, None);
+    let crossed = crosses_its_threshold(&text, "shadow.key", key, &sizes(3e-5, 1.0, 1.4), &settings, None);
     println!("{list:?}: {crossed:?}");
     assert!(crossed.most_skipped >= 0.02 * crossed.least_visible, "{list:?}: {crossed:?}");
 }

@@ -34,6 +34,8 @@ pub(crate) struct Brightness {
 pub(crate) struct ObjectBrightness {
     /// The most radiance that it sends of all lights, and of ambient radiance.
     pub(crate) sent: f64,
+    /// The most radiance that it has without light.
+    pub(crate) given_off: f64,
     /// The greatest optical depth of one of its splats, in the channel that has most; infinite of what hides all.
     pub(crate) thickest_splat: f64,
     /// An optical depth that no line through all of its splats exceeds, in that channel.
@@ -113,6 +115,7 @@ pub(crate) fn of_scene(scene: &Scene, loaded: &Loaded) -> Brightness {
     let anything = shown.fold(background, f64::max);
     let objects = of_objects.iter().zip(&sent).map(|(object, sent)| ObjectBrightness {
         sent: ambient * object.ambient + sent,
+        given_off: object.given_off,
         thickest_splat: object.thickest,
         sum_of_splats: object.depths as f64 / UNIT,
     });

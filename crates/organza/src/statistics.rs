@@ -120,6 +120,8 @@ pub struct ObjectFacts {
     pub color_spread: f64,
     /// The most radiance that it sends of lights and ambient radiance, W·m⁻²·sr⁻¹; infinite where none is known.
     pub radiance: f64,
+    /// The most radiance that it shows: of lights, of ambient radiance, and what it has without light, W·m⁻²·sr⁻¹; infinite where none is known.
+    pub shown: f64,
     /// Whether some of it may be in view.
     pub is_in_view: bool,
     /// The greatest optical depth that it has along a view ray, in the channel that has most; infinite where none is known.

@@ -84,6 +84,12 @@ pub(crate) fn displayed(radiance: f64, statistics: &Statistics) -> f64 {
     gain::displayed(radiance, gain::gain(statistics))
 }
 
+/// The most that a displayed pixel changes without an object that shows no more than this radiance, and of which each ray of the view and of lights
+/// takes no more than this share; `None` where it is not known.
+pub(crate) fn changed_without(opacity: f64, shown: f64, statistics: &Statistics) -> Option<f64> {
+    object::change(opacity, opacity, shown, statistics)
+}
+
 /// Takes effects of objects into a plan: those that are left out by their bound.
 fn leave_out(kind: EffectKind, plan: &mut Plan, candidates: &[Candidate], is_on: &[bool]) {
     let decided = candidates.iter().zip(is_on);

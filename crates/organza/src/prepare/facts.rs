@@ -1,7 +1,7 @@
 //! Facts of the effects of each object once it is loaded.
 
 use crate::brightness::ObjectBrightness;
-use crate::choose::{displayed, row, technique_of};
+use crate::choose::{changed_without, displayed, row, technique_of};
 use crate::load::Loaded;
 use crate::scene::{EffectKind, Scene, SceneObject};
 use crate::shadows::{Hiding, Shadowing, View, hiding};
@@ -27,13 +27,19 @@ pub(super) fn object_facts(
     let is_bent = (0..scene.objects.len()).any(|rank| bends(rank) && shadowing.shown()[rank]);
     // Of rays that go anywhere, and of what stays in any case, nothing need be known.
     let view = View { shadowing, is_known: !is_bent && !statistics.objects_stay };
+    // What shows other things by bent rays, or light that is scattered again and again, has no radiance of its own.
+    let shown = |rank: usize| {
+        let ObjectBrightness { sent, given_off, .. } = brightness[rank];
+        if bends(rank) || statistics.brightest.is_infinite() { statistics.brightest } else { sent + given_off }
+    };
     let is_thin = |rank: usize, depth: f64| {
         let object = &scene.objects[rank];
         let opacity = -libm::expm1(-depth);
         let change = opacity.min(depth * color_spread(&loaded.materials[object.material]).max(f64::MIN_POSITIVE));
-        let is_left_out = |share: f64| displayed(share * statistics.brightest, statistics) <= statistics.tolerance;
+        let is_within = |change: f64| change <= statistics.tolerance;
         let is_colored = EffectKind::Color.is_of(&loaded.materials[object.material]);
-        statistics.brightest.is_finite() && (is_left_out(opacity) || is_colored && is_left_out(change))
+        changed_without(opacity, shown(rank), statistics).is_some_and(is_within)
+            || is_colored && is_within(displayed(change * statistics.brightest, statistics))
     };
     let hidings = hiding(loaded, &view, brightness, &is_thin);
     let longest = longest_way(scene, loaded, is_bent);
@@ -51,6 +57,7 @@ pub(super) fn object_facts(
             absorption: f64::from(red.max(green).max(blue)) * longest,
             color_spread: color_spread(material),
             radiance: if is_splats { brightness[rank].sent } else { f64::INFINITY },
+            shown: shown(rank),
             is_in_view,
             view_depth,
             light_depths,

@@ -2,6 +2,7 @@
 
 pub(crate) mod eye;
 pub(crate) mod light;
+mod light_blocks;
 pub(crate) mod light_depth;
 pub(crate) mod light_layers;
 pub(crate) mod light_views;

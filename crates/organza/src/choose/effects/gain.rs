@@ -6,10 +6,14 @@
 //!
 //! Where an effect moves at most the share a of the weights of a pixel, from radiances to others between 0 and L, the pixel changes by a·L at most: what
 //! the weights gain in one place they lose in another, so each of the two is a at most.
+//!
+//! Where a pixel only loses, and at most the share b of what it has, it falls by 1 − s(1 − b) at most, s the encoding of sRGB: x·s'(x) grows up to white,
+//! so that white falls most, by 0.44·b for small b. A pixel that loses several shares one after another keeps their product.
 
 use crate::plan::Bound;
 use crate::shadows::DISPLAY_SLOPE;
 use crate::statistics::{LightStatistics, Statistics};
+use splat_core::srgb;
 
 /// Lights that may shine.
 pub(super) fn shining(statistics: &Statistics) -> impl Iterator<Item = &LightStatistics> + Clone {
@@ -31,6 +35,14 @@ pub(super) fn displayed(radiance: f64, gain: f64) -> f64 {
     if radiance == 0.0 { 0.0 } else { (gain * radiance).min(1.0) }
 }
 
+/// The most that a displayed pixel falls when its radiance loses this share, 0 to 1.
+pub(super) fn darkened(share: f64) -> f64 {
+    // Of a small share the difference of two encoded values would keep few digits.
+    const SMALL: f64 = 1e-6;
+    let slope_at_white = 1.055 / 2.4;
+    if share < SMALL { slope_at_white * (1.0 + SMALL) * share } else { 1.0 - srgb::encoded(1.0 - share) }
+}
+
 /// The bound of a change of radiance.
 pub(super) fn bound(radiance: f64, statistics: &Statistics) -> Bound {
     if radiance.is_finite() { Bound::at_most(displayed(radiance, gain(statistics))) } else { Bound::Unknown }
@@ -39,4 +51,27 @@ pub(super) fn bound(radiance: f64, statistics: &Statistics) -> Bound {
 /// A share of a radiance: nothing is left of none, even where the radiance is not known.
 pub(super) fn share_of(radiance: f64, share: f64) -> f64 {
     if share == 0.0 { 0.0 } else { radiance * share }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_pixel_falls_by_more_than_white_does() {
+        for share in (0..=60).map(|k| libm::exp2(-0.5 * f64::from(k))) {
+            for radiance in (-20..=4).map(|stop| libm::exp2(0.5 * f64::from(stop))) {
+                let shown = |radiance: f64| srgb::encoded(radiance.min(1.0));
+                let fall = shown(radiance) - shown(radiance * (1.0 - share));
+                assert!(fall <= darkened(share) + 1e-15, "{share} of {radiance}: {fall} and {}", darkened(share));
+            }
+        }
+        assert_eq!([darkened(0.0), darkened(1.0)], [0.0, 1.0]);
+    }
+
+    #[test]
+    fn what_falls_grows_with_the_share() {
+        let shares: Vec<f64> = (0..400).map(|k| libm::exp2(-0.1 * f64::from(k))).collect();
+        assert!(shares.windows(2).all(|pair| darkened(pair[1]) < darkened(pair[0])));
+    }
 }

@@ -1,10 +1,11 @@
-//! `shadow.NAME`: the shadow of a light. Without it its light goes through everything, and no displayed pixel changes by more than the bound of the light
-//! times 1 − e^−τ, where τ is the greatest optical depth that a ray of the light can meet on its way to anything that receives shadows and that the view
-//! may show ([`LightStatistics::opacity`]).
+//! `shadow.NAME`: the shadow of a light. Without it its light goes through everything. With it everything that is seen loses at most the share
+//! b = 1 − e^−τ of the light, where τ is the greatest optical depth that a ray of the light can meet on its way to anything that receives shadows and that
+//! the view may show ([`LightStatistics::opacity`]). A pixel then loses no more than b of what it has, and falls by 1 − s(1 − b) at most (`gain.rs`). Nor
+//! does it fall by more than b times what the light adds to it, displayed, as a displayed value grows less and less steeply.
 
 use super::Row;
 use super::candidates::{Candidate, Choice};
-use super::gain::{displayed, gain};
+use super::gain::{darkened, displayed, gain};
 use crate::plan::{Bound, Plan};
 use crate::scene::EffectKind;
 use crate::statistics::{LightStatistics, Statistics};
@@ -39,8 +40,7 @@ fn candidate(light: &LightStatistics, shines: bool, gain: f64, statistics: &Stat
         return Candidate::off(label, "its light is left out");
     }
     let opacity = greatest_opacity(light, statistics);
-    // A displayed value falls by no more than the share that its radiance loses, as it grows less and less steeply.
-    let change = displayed(light.radiance, gain) * opacity;
+    let change = (displayed(light.radiance, gain) * opacity).min(darkened(opacity));
     let is_known = light.radiance.is_finite() || opacity < 1.0;
     let bound = if is_known { Bound::at_most(change) } else { Bound::Unknown };
     if light.has_shadow == Some(false) {

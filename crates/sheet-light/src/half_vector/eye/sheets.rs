@@ -40,6 +40,8 @@ pub(crate) struct EyeBand {
     pub(crate) pixels: Pixels,
     /// Extinction of the pixels that are being lit, by volume.
     extinction: Vec<[f32; MAX_LANES]>,
+    /// All else of the same.
+    classified: Vec<Classified>,
     /// What all else lets through to them, by light.
     others: Vec<Through>,
 }
@@ -79,6 +81,20 @@ pub(crate) struct OneSlab<'a> {
     pub(crate) part: DepthSpans,
 }
 
+/// A volume in neighbouring pixels of a slab.
+#[derive(Debug, Clone, Copy)]
+struct Classified {
+    /// Whether it has a sheet there.
+    is_shown: bool,
+    /// The depth that it has across the slab.
+    depth: [f32; MAX_LANES],
+    color: [[f32; MAX_LANES]; 3],
+}
+
+impl Classified {
+    const NOTHING: Self = Self { is_shown: false, depth: [0.0; MAX_LANES], color: [[0.0; MAX_LANES]; 3] };
+}
+
 /// Splats of neighbouring pixels.
 struct Splatted<'a> {
     /// The first of the pixels.
@@ -107,7 +123,9 @@ impl EyeBand {
     pub(crate) fn new(band: Band, volumes: &[Placed<'_>], pixels: Pixels) -> Self {
         let kept = |v: &Placed<'_>| if v.compares { KEPT } else { 1 };
         let sheets = volumes.iter().map(|v| (0..kept(v)).map(|_| Sheet::new(&band)).collect()).collect();
-        Self { band, sheets, pixels, extinction: vec![[0.0; MAX_LANES]; volumes.len()], others: Vec::new() }
+        let extinction = vec![[0.0; MAX_LANES]; volumes.len()];
+        let classified = vec![Classified::NOTHING; volumes.len()];
+        Self { band, sheets, pixels, extinction, classified, others: Vec::new() }
     }
 
     /// Bytes of all planes.
@@ -247,12 +265,11 @@ impl OneSlab<'_> {
         let lower = Lanes::load(simd, &self.part.from);
         let upper = Lanes::load(simd, &self.part.to);
         for v in self.volumes() {
-            let Some([extinction, length]) = self.extinction(simd, v, k) else {
-                self.eye.extinction[v] = [0.0; MAX_LANES];
+            let Some(extinction) = self.classify(simd, v, k) else {
                 continue;
             };
+            let length = Lanes::load(simd, &self.eye.classified[v].depth);
             let tau = broadcast(0.0).where_less_or(broadcast(0.5), closed, extinction * length * stretch);
-            extinction.store(&mut self.eye.extinction[v]);
             for p in 0..planes {
                 optical_depth[p] =
                     tau.mul_add(broadcast(geometry.volumes[v].material.extinction_rgb[p]), optical_depth[p]);
@@ -284,17 +301,27 @@ impl OneSlab<'_> {
         self.composite(simd, chunk, medium, splats, &mut fragments);
     }
 
-    /// Extinction of a volume, and the depth that it has; `None` where it has no sheet.
+    /// Classifies a volume in neighbouring pixels, and returns its extinction; `None` where it has no sheet.
     #[inline(always)]
-    fn extinction<S: Simd>(&self, simd: S, v: usize, k: usize) -> Option<[Lanes<S>; 2]> {
+    fn classify<S: Simd>(&mut self, simd: S, v: usize, k: usize) -> Option<Lanes<S>> {
         let sheet = self.eye.sheet(v, self.slab());
         let stride = self.eye.band.stride;
         // No closure: what is vectorised must be inlined.
         if !sheet.shown[k / stride].contains(&(k % stride)) {
+            self.eye.extinction[v] = [0.0; MAX_LANES];
+            self.eye.classified[v] = Classified::NOTHING;
             return None;
         }
-        let [extinction, ..] = sheet.classify(simd, &self.work.geometry.placed[v], k);
-        Some([extinction, sheet.depth(simd, k, &self.part)])
+        let [extinction, red, green, blue] = sheet.classify(simd, &self.work.geometry.placed[v], k);
+        let depth = sheet.depth(simd, k, &self.part);
+        extinction.store(&mut self.eye.extinction[v]);
+        let classified = &mut self.eye.classified[v];
+        classified.is_shown = true;
+        depth.store(&mut classified.depth);
+        red.store(&mut classified.color[0]);
+        green.store(&mut classified.color[1]);
+        blue.store(&mut classified.color[2]);
+        Some(extinction)
     }
 
     /// Slab coordinates of rays at a depth.
@@ -314,7 +341,6 @@ impl OneSlab<'_> {
     fn light<S: Simd>(&mut self, simd: S, chunk: &Chunk, medium: MediumDepths<S>, most: Lanes<S>, out: &mut Fragments) {
         let SlabWork { geometry, lighting, .. } = self.work;
         let MediumDepths { near, far } = medium;
-        let slab = self.slab();
         let mut is_wanted = [0.0; MAX_LANES];
         most.store(&mut is_wanted);
         let planes = self.eye.pixels.planes;
@@ -333,13 +359,13 @@ impl OneSlab<'_> {
         let mut others = std::mem::take(&mut self.eye.others);
         let mut so_far = [[0.0; MAX_LANES]; 3];
         for (v, volume) in geometry.volumes.iter().enumerate() {
-            let Some([extinction, depth]) = self.extinction(simd, v, chunk.k) else {
+            let Classified { is_shown, depth, color } = self.eye.classified[v];
+            if !is_shown {
                 continue;
-            };
+            }
+            let extinction = Lanes::load(simd, &self.eye.extinction[v]);
             let mut tau = [0.0; MAX_LANES];
-            (extinction * depth * stretch).store(&mut tau);
-            let [_, red, green, blue] = self.eye.sheet(v, slab).classify(simd, &geometry.placed[v], chunk.k);
-            let color = stored(&[red, green, blue]);
+            (extinction * Lanes::load(simd, &depth) * stretch).store(&mut tau);
             let normals = self.normals(simd, v, chunk, &middles, &is_wanted);
             self.find_others(simd, v, &middles, &is_wanted, &mut others);
             for lane in 0..Lanes::<S>::COUNT {
@@ -395,9 +421,10 @@ impl OneSlab<'_> {
         };
         let mut through = [[0.0; MAX_LANES]; 3];
         for part in parts.parts() {
-            let optical_depth = &part.optical_depth(&fragments.optical_depth);
+            let optical_depth = &part.optical_depth(&fragments.optical_depth, planes);
             let asked = Asked { ends: part.ends(simd, &ends), extinction, optical_depth, lit: &parts.by_point };
-            part.add(&fragments.optical_depth, &light.transmittance(simd, &asked, is_wanted, planes), &mut through);
+            let of_part = light.transmittance(simd, &asked, is_wanted, planes);
+            part.add(&fragments.optical_depth, &of_part, planes, &mut through);
         }
         through
     }

@@ -10,7 +10,8 @@
 //! paper keeps one z-buffer of the light's centre, fills what lies behind it with a thickness guessed from its gradient and convolves that.
 //! Points see the polygons themselves, so nothing has to be guessed: an edge at d1 casts a penumbra 2R·d2/d1 wide at d2 behind it.
 
-use super::light_layers::{BLOCK, Beside, LightLayers};
+use super::light_blocks::{BYTES_OF_A_PIXEL, Extent, LightBlocks};
+use super::light_layers::{Beside, LightLayers};
 use super::light_views::views;
 use super::lit_way::{LitWay, Stretch, WayPart};
 use super::surfaces::Polygons;
@@ -18,6 +19,7 @@ use crate::Error;
 use crate::half_vector::sampled_light::SampledLight;
 use crate::half_vector::soft::penumbra::received;
 use splat_core::glam::{DVec3, Vec3};
+use splat_core::raster::lanes::MAX_LANES;
 use splat_core::raster::triangles::{DepthPlanes, PlacedMesh, resolve_depth};
 use splat_core::{Camera, Progress, Receiver, Transmittance, ViewTransform};
 
@@ -34,8 +36,8 @@ const STEEPEST: f32 = 8.0;
 const PARTS: usize = 16;
 const PIXELS: f32 = 8.0;
 
-/// Most blocks that are asked whether all of a way is lit, or none.
-const MOST_BLOCKS: usize = 36;
+/// By how much a box about several ways is larger than they are, as a share of its coordinates.
+const MARGIN: f32 = 1e-5;
 
 /// How far from its ends a way is looked at, as a share of it.
 const INSET: f32 = 1.0 / 1024.0;
@@ -58,9 +60,9 @@ pub(crate) struct DepthLimits {
     pub(crate) most_bytes: u64,
 }
 
-/// A straight way between two places.
+/// A straight way between two places, relative to the origin of the depths.
 #[derive(Debug, Clone, Copy)]
-struct Way {
+pub(crate) struct Way {
     from: Vec3,
     to: Vec3,
 }
@@ -95,8 +97,7 @@ struct View {
     planes: DepthPlanes,
     /// Translucent ones, if any cast shadows.
     layers: Option<LightLayers>,
-    /// Least and greatest depth of each block.
-    blocks: Vec<[f32; 2]>,
+    blocks: LightBlocks,
     transform: ViewTransform,
     focal: f32,
     size: [usize; 2],
@@ -108,6 +109,54 @@ struct Sighted<'a> {
     view: &'a View,
     place: Vec3,
     pixel: [f32; 2],
+}
+
+/// A box about neighbouring ways.
+struct Spread {
+    middle: Vec3,
+    half: Vec3,
+    /// The greatest coordinate of an end.
+    farthest: f32,
+}
+
+/// How much of a way several points of a light reach.
+#[derive(Clone, Copy)]
+struct Reached {
+    sum: f32,
+    moment: f32,
+    is_whole: bool,
+}
+
+impl Reached {
+    const NONE: Self = Self { sum: 0.0, moment: 0.0, is_whole: true };
+
+    /// Takes in a point with this share of the light.
+    fn add(&mut self, share: f32, stretch: Stretch) {
+        let Stretch { from, to } = stretch;
+        self.is_whole &= stretch == Stretch::WHOLE;
+        self.sum += share * (to - from);
+        self.moment += share * 0.5 * (to - from) * (from + to);
+    }
+
+    fn stretch(&self) -> Stretch {
+        if self.is_whole { Stretch::WHOLE } else { stretch_of(self.sum, self.moment) }
+    }
+}
+
+impl Spread {
+    fn new<'w>(ways: impl Iterator<Item = &'w Way>) -> Self {
+        let none = [Vec3::INFINITY, Vec3::NEG_INFINITY];
+        let [low, high] =
+            ways.fold(none, |[low, high], Way { from, to }| [low.min(*from).min(*to), high.max(*from).max(*to)]);
+        Self { middle: 0.5 * (low + high), half: 0.5 * (high - low), farthest: low.abs().max(high.abs()).max_element() }
+    }
+
+    /// Whether all of the ways are lit by a point, or none, where blocks of pixels tell; of lamps that are surrounded the first view alone is asked.
+    fn whole_by(&self, point: &PointDepths, rounding: f32) -> Option<bool> {
+        let view = point.views.first()?;
+        let extent = view.extent(self)?;
+        view.blocks.whole(&extent, (STEEPEST * view.width(extent.far) + rounding) * (1.0 + MARGIN))
+    }
 }
 
 impl LightDepths {
@@ -153,14 +202,16 @@ impl LightDepths {
         }
         let pixels = u64::from(side(most, samples)).pow(2);
         // Of six views each has half as many pixels a side; while one is made it has depths in double precision too.
-        u64::from(samples) * pixels * 3 / 2 * 12 + pixels * 8
+        u64::from(samples) * pixels * 3 / 2 * (12 + BYTES_OF_A_PIXEL) + pixels * 8
     }
 
     /// Bytes of the images.
     pub(crate) fn bytes(&self) -> u64 {
         let views = self.points.iter().flat_map(|point| &point.views);
-        let view_bytes =
-            |view: &View| 12 * view.planes.depth.len() as u64 + view.layers.as_ref().map_or(0, LightLayers::bytes);
+        let view_bytes = |view: &View| {
+            let layers = view.layers.as_ref().map_or(0, LightLayers::bytes);
+            12 * view.planes.depth.len() as u64 + view.blocks.bytes() + layers
+        };
         views.map(view_bytes).sum()
     }
 
@@ -188,42 +239,67 @@ impl LightDepths {
         sighted.visibility(bias, face.map(|face| sighted.view.turned(face)))
     }
 
-    /// Points of the light.
-    pub(crate) fn points(&self) -> usize {
-        self.points.len()
+    /// The way between two world positions.
+    pub(crate) fn way(&self, from: DVec3, to: DVec3) -> Way {
+        Way { from: (from - self.origin).as_vec3(), to: (to - self.origin).as_vec3() }
     }
 
-    /// Which parts of a way between world positions light reaches. Before opaque polygons that is one: where it is reached here
-    /// and there, or by some of the light's points, a part as long as all these, about their middle. How much of it each point reaches, times its
-    /// share of the light, is added to `by_point` where there are several.
-    pub(crate) fn lit(&self, from: DVec3, to: DVec3, by_point: &mut Vec<f32>) -> LitWay {
-        let way = Way { from: (from - self.origin).as_vec3(), to: (to - self.origin).as_vec3() };
-        if self.points.iter().flat_map(|point| &point.views).any(|view| view.layers.is_some()) {
-            return self.lit_through(&way, by_point);
+    /// Which parts of neighbouring ways light reaches; `None` where each point of the light reaches all of every way. Before opaque polygons that is one
+    /// part of a way: where it is reached here and there, or by some of the light's points, a part as long as all these, about their middle. How much of
+    /// each way each point reaches, times its share of the light, is added to `by_point`, way by way, where there are several points; 0 for all of them
+    /// where each reaches all.
+    pub(crate) fn lit(&self, ways: &[Option<Way>], by_point: &mut Vec<f32>) -> Option<[LitWay; MAX_LANES]> {
+        let spread = Spread::new(ways.iter().flatten());
+        let together = |point: &PointDepths| spread.whole_by(point, self.rounding);
+        let first = self.points.iter().position(|point| together(point) != Some(true))?;
+        let count = self.points.len();
+        let has_several = count > 1;
+        if has_several {
+            by_point.resize(ways.len() * count, 0.0);
         }
-        if let [point] = &self.points[..] {
-            return LitWay::lit(self.lit_by(point, &way));
+        let mut lit = [LitWay::lit(Stretch::WHOLE); MAX_LANES];
+        let has_layers = self.points.iter().flat_map(|point| &point.views).any(|view| view.layers.is_some());
+        let known = if has_several { None } else { together(&self.points[0]) };
+        if has_layers || !has_several {
+            for (lane, way) in ways.iter().enumerate() {
+                let Some(way) = way else { continue };
+                lit[lane] = match has_layers {
+                    true => self.lit_through(way, known, by_point.get_mut(lane * count..(lane + 1) * count)),
+                    false => LitWay::lit(self.lit_by(&self.points[0], way, known)),
+                };
+            }
+        } else {
+            let mut sums = [Reached::NONE; MAX_LANES];
+            for (n, point) in self.points.iter().enumerate() {
+                let known = if n < first { Some(true) } else { together(point) };
+                for (lane, way) in ways.iter().enumerate() {
+                    let Some(way) = way else { continue };
+                    let stretch = self.lit_by(point, way, known);
+                    by_point[lane * count + n] = point.share * (stretch.to - stretch.from);
+                    sums[lane].add(point.share, stretch);
+                }
+            }
+            (0..ways.len()).for_each(|lane| lit[lane] = LitWay::lit(sums[lane].stretch()));
         }
-        let mut sum = 0.0;
-        let mut moment = 0.0;
         let mut is_whole = true;
-        for point in &self.points {
-            let stretch = self.lit_by(point, &way);
-            let Stretch { from, to } = stretch;
-            is_whole &= stretch == Stretch::WHOLE;
-            by_point.push(point.share * (to - from));
-            sum += point.share * (to - from);
-            moment += point.share * 0.5 * (to - from) * (from + to);
+        for lane in (0..ways.len()).filter(|lane| ways[*lane].is_some()) {
+            if lit[lane].is_whole() {
+                by_point.iter_mut().skip(lane * count).take(count).for_each(|reached| *reached = 0.0);
+            } else {
+                is_whole = false;
+            }
         }
-        LitWay::lit(if is_whole { Stretch::WHOLE } else { stretch_of(sum, moment) })
+        (!is_whole).then_some(lit)
     }
 
-    /// Behind translucent polygons, whose shadows end in steps.
-    fn lit_through(&self, way: &Way, by_point: &mut Vec<f32>) -> LitWay {
+    /// Behind translucent polygons, whose shadows end in steps. How much of the way each point reaches goes into `by_point`, of a light of several. What
+    /// is `known` of a light of one point is whether it reaches all of the way, or nothing.
+    fn lit_through(&self, way: &Way, known: Option<bool>, by_point: Option<&mut [f32]>) -> LitWay {
         let is_one = self.points.len() == 1;
-        if is_one && let Some(is_lit) = self.is_whole(&self.points[0], way) {
+        if is_one && let Some(is_lit) = known.or_else(|| self.is_whole(&self.points[0], way)) {
             return if is_lit { LitWay::lit(Stretch::WHOLE) } else { LitWay::DARK };
         }
+        let mut by_point = by_point.into_iter().flatten();
         let length = self.points.iter().map(|point| pixels(point, way)).fold(0.0, f32::max);
         // Its ends tell what a short way has.
         let count = (2.0 * length / PIXELS).ceil().clamp(1.0, PARTS as f32) as usize;
@@ -239,8 +315,8 @@ impl LightDepths {
                 *node += light;
                 reached += mean(light) * if n == 0 || n == count { 0.5 } else { 1.0 } / count as f32;
             }
-            if !is_one {
-                by_point.push(reached);
+            if let Some(by_point) = by_point.next() {
+                *by_point = reached;
             }
         }
         let mut lit = LitWay::DARK;
@@ -265,11 +341,11 @@ impl LightDepths {
         from.view.whole(&from, &to, self.rounding)
     }
 
-    /// The same of one point, from its origin.
-    fn lit_by(&self, point: &PointDepths, way: &Way) -> Stretch {
+    /// Which part of a way one point reaches; it is `known` where it reaches all of it, or nothing.
+    fn lit_by(&self, point: &PointDepths, way: &Way, known: Option<bool>) -> Stretch {
         // Before opaque polygons all channels are alike.
         let light_at = |share: f32| self.visibility_of_point(point, way.place(share), None).x;
-        if let Some(is_lit) = self.is_whole(point, way) {
+        if let Some(is_lit) = known.or_else(|| self.is_whole(point, way)) {
             return Stretch { from: 0.0, to: if is_lit { 1.0 } else { 0.0 } };
         }
         let parts = (pixels(point, way) / PIXELS).ceil().clamp(2.0, PARTS as f32);
@@ -358,9 +434,10 @@ impl View {
         let solid: Vec<PlacedMesh<'_>> = solid.iter().map(|p| p.placed).collect();
         let planes = resolve_depth(&solid, camera, Some(progress)).map_err(Error::of_polygons)?;
         let size = camera.size.map(|s| s as usize);
+        let layers = LightLayers::new(&panes, camera, most_bytes, progress)?;
         Ok(Self {
-            layers: LightLayers::new(&panes, camera, most_bytes, progress)?,
-            blocks: blocks(&planes.depth, size),
+            blocks: LightBlocks::new(&planes.depth, size, layers.as_ref()),
+            layers,
             planes,
             transform: camera.view_from_offset(origin),
             focal: camera.focal_px() as f32,
@@ -385,28 +462,40 @@ impl View {
 
     /// Whether all of a way is lit, or none, where blocks of pixels tell.
     fn whole(&self, a: &Sighted<'_>, b: &Sighted<'_>, rounding: f32) -> Option<bool> {
-        let near = a.place.z.min(b.place.z);
-        let far = a.place.z.max(b.place.z);
-        let reach = STEEPEST * self.width(far) + rounding;
-        let [columns, rows] = [0, 1].map(|axis| {
-            // A look-up asks the pixels about a place.
-            let [low, high] = [a.pixel[axis].min(b.pixel[axis]) - 1.0, a.pixel[axis].max(b.pixel[axis]) + 1.0];
-            let block = |v: f32| (v.max(0.0) as usize).min(self.size[axis] - 1) / BLOCK;
-            block(low)..block(high) + 1
-        });
-        if columns.len() * rows.len() > MOST_BLOCKS {
+        let extent = Extent {
+            low: [0, 1].map(|axis| a.pixel[axis].min(b.pixel[axis])),
+            high: [0, 1].map(|axis| a.pixel[axis].max(b.pixel[axis])),
+            near: a.place.z.min(b.place.z),
+            far: a.place.z.max(b.place.z),
+        };
+        self.blocks.whole(&extent, STEEPEST * self.width(extent.far) + rounding)
+    }
+
+    /// Where a box lies in the image; `None` where some of it may not.
+    fn extent(&self, spread: &Spread) -> Option<Extent> {
+        let middle = self.transform.apply(spread.middle);
+        let m = &self.transform.rotation;
+        let half = m.x_axis.abs() * spread.half.x + m.y_axis.abs() * spread.half.y + m.z_axis.abs() * spread.half.z;
+        // More than sums of such numbers are rounded by: all that is told of the box holds for each of its ways alone.
+        let half = half + Vec3::splat(MARGIN * (middle.abs().max_element() + spread.farthest));
+        let near = middle.z - half.z;
+        let far = middle.z + half.z;
+        if near <= 0.0 {
             return None;
         }
-        let mut is_lit = true;
-        let mut is_dark = true;
-        for y in rows {
-            for block in columns.clone().map(|x| y * self.size[0].div_ceil(BLOCK) + x) {
-                let [least, most] = self.blocks[block];
-                let least = self.layers.as_ref().map_or(least, |layers| least.min(layers.nearest(block)));
-                (is_lit, is_dark) = (is_lit && least > far + reach, is_dark && most < near - reach);
-            }
-        }
-        (is_lit || is_dark).then_some(is_lit)
+        let center = [middle.x, -middle.y];
+        let ends = |axis: usize, sign: f32| {
+            let end = center[axis] + sign * half[axis];
+            // The end that lies farther from the axis of the view is seen farthest from it where it is near.
+            let depth = if (end > 0.0) == (sign > 0.0) { near } else { far };
+            let scale = if self.is_parallel { self.focal } else { self.focal / depth };
+            let pixel = 0.5 * self.size[axis] as f32 + end * scale;
+            pixel + sign * MARGIN * (pixel.abs() + self.size[axis] as f32)
+        };
+        let low = [0, 1].map(|axis| ends(axis, -1.0));
+        let high = [0, 1].map(|axis| ends(axis, 1.0));
+        let is_seen = (0..2).all(|axis| low[axis] >= 0.0 && high[axis] <= self.size[axis] as f32);
+        is_seen.then_some(Extent { low, high, near, far })
     }
 
     /// A world direction as the view sees it.
@@ -469,18 +558,6 @@ impl Sighted<'_> {
     }
 }
 
-/// Least and greatest depth of each block of an image.
-fn blocks(depth: &[f32], size: [usize; 2]) -> Vec<[f32; 2]> {
-    let [width, height] = size;
-    let columns = width.div_ceil(BLOCK);
-    let mut blocks = vec![[f32::INFINITY, f32::NEG_INFINITY]; columns * height.div_ceil(BLOCK)];
-    for (k, depth) in depth.iter().enumerate() {
-        let [least, most] = &mut blocks[k / width / BLOCK * columns + k % width / BLOCK];
-        (*least, *most) = (least.min(*depth), most.max(*depth));
-    }
-    blocks
-}
-
 /// What polygons and all else that is not carried let through together.
 pub(crate) struct ShadowOfAll<'a> {
     pub(crate) depths: &'a LightDepths,
@@ -505,39 +582,48 @@ mod tests {
     use super::*;
     use splat_core::{Light, LightShape, Material, Mesh, Similarity, rng};
 
-    /// Steep triangles everywhere: what is asked beside a polygon's edge follows its plane beyond the edge.
-    #[test]
-    fn blocks_say_of_a_way_what_each_of_its_places_says() {
-        let place = |k: u64| Vec3::from_array([0, 1, 2].map(|axis| rng::unit_f32(14, axis, k, 0) - 0.5));
+    fn place(k: u64) -> Vec3 {
+        Vec3::from_array([0, 1, 2].map(|axis| rng::unit_f32(14, axis, k, 0) - 0.5))
+    }
+
+    /// Steep triangles everywhere, and a wall behind most of them, so that something is dark altogether.
+    fn triangles() -> Mesh {
         let mut mesh = Mesh { triangles: (0..40).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect(), ..Mesh::default() };
         mesh.position = (0..120).map(|k| place(k / 3) + Vec3::new(0.1, 0.1, 1.0) * 0.5 * place(1000 + k)).collect();
-        // And a wall behind most of them, so that something is dark altogether.
         mesh.triangles.push([120, 121, 122]);
         mesh.position.extend([[-9.0, -9.0, -0.2], [9.0, -9.0, -0.2], [0.0, 9.0, -0.2]].map(Vec3::from_array));
-        let placed = PlacedMesh { mesh: &mesh, transform: Similarity::default() };
-        let color = [1.0; 3];
-        let optical_depth = f32::INFINITY;
-        let material = &Material::default();
-        let object = 0;
-        let shadow_coefficient = 1.0;
-        let casts_shadow = true;
-        let radius = 0.0;
-        let mesh =
-            Polygons { placed, material, color, optical_depth, object, shadow_coefficient, casts_shadow, radius };
-        for shape in [
-            LightShape::Directional { direction: DVec3::NEG_Z },
-            LightShape::Point { position: DVec3::new(0.1, 0.2, 3.0) },
-        ] {
-            let receivers = [DVec3::splat(-1.0), DVec3::ONE];
-            let light = Light { shape, intensity: [1.0; 3] };
-            let depths = LightDepths::new(
-                &[&mesh],
-                SampledLight { light: &light, samples: 1 },
-                &receivers,
-                DepthLimits { most_pixels: 128, most_bytes: 0 },
-                &Progress::new(),
-            );
-            let depths = depths.unwrap().unwrap();
+        mesh
+    }
+
+    /// What a light sees of these triangles, of which all of a ray takes this optical depth.
+    fn depths(mesh: &Mesh, optical_depth: f32, shape: LightShape, samples: u32) -> LightDepths {
+        let polygons = Polygons {
+            placed: PlacedMesh { mesh, transform: Similarity::default() },
+            material: &Material::default(),
+            color: [1.0; 3],
+            optical_depth,
+            object: 0,
+            shadow_coefficient: 1.0,
+            casts_shadow: true,
+            radius: 0.0,
+        };
+        let receivers = [DVec3::splat(-1.0), DVec3::ONE];
+        let light = Light { shape, intensity: [1.0; 3] };
+        let sampled = SampledLight { light: &light, samples };
+        let limits = DepthLimits { most_pixels: 128, most_bytes: 1 << 24 };
+        LightDepths::new(&[&polygons], sampled, &receivers, limits, &Progress::new()).unwrap().unwrap()
+    }
+
+    const SUN: LightShape = LightShape::Directional { direction: DVec3::NEG_Z };
+    const LAMP: LightShape = LightShape::Point { position: DVec3::new(0.1, 0.2, 3.0) };
+    const BULB: LightShape = LightShape::Sphere { center: DVec3::new(0.1, 0.2, 3.0), radius: 0.2 };
+
+    /// What is asked beside a polygon's edge follows its plane beyond the edge.
+    #[test]
+    fn blocks_say_of_a_way_what_each_of_its_places_says() {
+        let mesh = triangles();
+        for shape in [SUN, LAMP] {
+            let depths = depths(&mesh, f32::INFINITY, shape, 1);
             let mut told = [0; 2];
             for k in 0..20_000 {
                 let from = place(5000 + k);
@@ -552,6 +638,58 @@ mod tests {
                 }
             }
             assert!(told[0] > 50 && told[1] > 1000, "{told:?}");
+        }
+    }
+
+    #[test]
+    fn neighbouring_ways_are_lit_as_each_is_alone() {
+        let mesh = triangles();
+        // With their number of points.
+        for (shape, samples, optical_depth) in [
+            (SUN, 1, f32::INFINITY),
+            (LAMP, 1, f32::INFINITY),
+            (LAMP, 1, 0.7),
+            (BULB, 9, f32::INFINITY),
+            (BULB, 9, 0.7),
+        ] {
+            let depths = depths(&mesh, optical_depth, shape, samples);
+            let count = depths.points.len();
+            let mut told = [0; 3];
+            for k in 0..2000 {
+                let from = place(5000 + k);
+                let lane = |lane: u64| {
+                    let from = from + 0.02 * place(90_000 + 8 * k + lane);
+                    // Rays that nobody wants are among them.
+                    (lane != 5).then_some(Way { from, to: from + 0.05 * place(50_000 + k) })
+                };
+                let ways: Vec<Option<Way>> = (0..8).map(lane).collect();
+                let mut by_point = Vec::new();
+                let together = depths.lit(&ways, &mut by_point);
+                for (lane, way) in ways.iter().enumerate().filter(|(_, way)| way.is_some()) {
+                    let mut alone_by_point = Vec::new();
+                    let alone = depths.lit(&[*way], &mut alone_by_point);
+                    let is_whole = together.is_none_or(|ways| ways[lane].is_whole());
+                    assert_eq!(is_whole, alone.is_none(), "{way:?}");
+                    if let (Some(together), Some([alone, ..])) = (together, alone) {
+                        assert_eq!(together[lane].parts(), alone.parts(), "{way:?}");
+                    }
+                    if let Some(reached) = by_point.get(lane * count..(lane + 1) * count) {
+                        let none = vec![0.0; count];
+                        let alone = if alone_by_point.is_empty() { &none } else { &alone_by_point };
+                        assert_eq!(reached, alone, "{way:?}");
+                    }
+                }
+                let is_dark = together.is_some_and(|ways| ways[0].parts().iter().all(|part| part.to == part.from));
+                told[if together.is_none() {
+                    0
+                } else if is_dark {
+                    1
+                } else {
+                    2
+                }] += 1;
+            }
+            let is_dark_somewhere = optical_depth.is_infinite();
+            assert!(told[0] > 20 && told[2] > 20 && (told[1] > 20) == is_dark_somewhere, "{told:?} of {samples}");
         }
     }
 }

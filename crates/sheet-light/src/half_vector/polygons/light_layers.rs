@@ -9,9 +9,6 @@ use splat_core::glam::Vec3;
 use splat_core::raster::triangles::{PlacedMesh, TriangleLayer, TriangleLayers, depth_beside, resolve_layers};
 use splat_core::{Camera, Progress};
 
-/// Side of a block of pixels.
-pub(super) const BLOCK: usize = 16;
-
 /// One crossing.
 #[derive(Debug, Clone, Copy)]
 struct Layer {
@@ -34,8 +31,6 @@ pub(super) struct Beside {
 /// Translucent polygons that one image of a light shows.
 pub(super) struct LightLayers {
     layers: TriangleLayers<Layer>,
-    /// Least depth of each block of pixels.
-    nearest: Vec<f32>,
 }
 
 impl LightLayers {
@@ -64,20 +59,12 @@ impl LightLayers {
         };
         let layers = resolve_layers(&meshes, camera, &[], most, none, keep, Some(progress));
         let layers = layers.map_err(Error::of_polygons)?;
-        let columns = width.div_ceil(BLOCK);
-        let mut nearest = vec![f32::INFINITY; columns * (camera.size[1] as usize).div_ceil(BLOCK)];
-        for k in 0..width * camera.size[1] as usize {
-            if let Some(first) = layers.at_pixel(k).first() {
-                let least = &mut nearest[k / width / BLOCK * columns + k % width / BLOCK];
-                *least = least.min(first.depth);
-            }
-        }
-        Ok(Some(Self { layers, nearest }))
+        Ok(Some(Self { layers }))
     }
 
-    /// Least depth in a block of pixels.
-    pub(super) fn nearest(&self, block: usize) -> f32 {
-        self.nearest[block]
+    /// Depth of the first crossing that a pixel shows.
+    pub(super) fn first(&self, k: usize) -> Option<f32> {
+        self.layers.at_pixel(k).first().map(|layer| layer.depth)
     }
 
     /// Share by channel that what lies before a place of this depth lets through, as pixel `k` shows it. `is_other` returns whether a depth at the
@@ -109,6 +96,6 @@ impl LightLayers {
 
     /// Bytes of the lists.
     pub(super) fn bytes(&self) -> u64 {
-        self.layers.bytes() + 4 * self.nearest.len() as u64
+        self.layers.bytes()
     }
 }

@@ -44,24 +44,20 @@ impl LitParts {
         let mut out = Self { parts: [LitPart::DARK; MOST_PARTS], count: 1, by_point: Vec::new() };
         // Rays that nobody wants are of no meaning, but are numbers.
         out.parts[0] = LitPart { to: [1.0; MAX_LANES], through: [[1.0; MAX_LANES]; 3], ..LitPart::DARK };
-        let points = depths.points();
-        let mut is_whole = true;
+        let mut ways = [None; MAX_LANES];
         for lane in (0..Lanes::<S>::COUNT).filter(|lane| is_wanted[*lane] > 0.0) {
             let world =
                 |end: &[[f32; MAX_LANES]; 3]| frame.world(DVec3::from_array([0, 1, 2].map(|a| end[a][lane].into())));
-            out.by_point.resize(lane * points, 0.0);
-            let way = depths.lit(world(&nearer), world(&farther), &mut out.by_point);
-            if way.is_whole() {
-                out.by_point.truncate(lane * points);
-                continue;
-            }
-            is_whole = false;
-            out.count = out.count.max(way.parts().len());
+            ways[lane] = Some(depths.way(world(&nearer), world(&farther)));
+        }
+        let lit = depths.lit(&ways[..Lanes::<S>::COUNT], &mut out.by_point)?;
+        for lane in (0..Lanes::<S>::COUNT).filter(|lane| ways[*lane].is_some() && !lit[*lane].is_whole()) {
+            out.count = out.count.max(lit[lane].parts().len());
             for (n, part) in out.parts.iter_mut().enumerate() {
-                part.set(lane, way.parts().get(n));
+                part.set(lane, lit[lane].parts().get(n));
             }
         }
-        (!is_whole).then_some(out)
+        Some(out)
     }
 
     /// The parts.
@@ -88,26 +84,33 @@ impl LitPart {
         }
     }
 
-    /// Optical depth of the part, by plane.
-    pub(crate) fn optical_depth(&self, whole: &[[f32; MAX_LANES]; 3]) -> [[f32; MAX_LANES]; 3] {
+    /// Optical depth of the part in the first `planes`.
+    pub(crate) fn optical_depth(&self, whole: &[[f32; MAX_LANES]; 3], planes: usize) -> [[f32; MAX_LANES]; 3] {
         let mut part = *whole;
-        for plane in &mut part {
+        for plane in &mut part[..planes] {
             (0..MAX_LANES).for_each(|lane| plane[lane] *= self.to[lane] - self.from[lane]);
         }
         part
     }
 
-    /// Adds mean transmittances of the part to those of the whole: e^(−τa)·(1 − e^(−τ(b − a)))/(1 − e^(−τ)), times what comes to it.
+    /// Adds mean transmittances of the part to those of the whole, in the first `planes`: e^(−τa)·(1 − e^(−τ(b − a)))/(1 − e^(−τ)), times what comes to
+    /// it.
     pub(crate) fn add(
         &self,
         whole: &[[f32; MAX_LANES]; 3],
         through_part: &[[f32; MAX_LANES]; 3],
+        planes: usize,
         to: &mut [[f32; MAX_LANES]; 3],
     ) {
-        for p in 0..3 {
+        for p in 0..planes {
             for lane in 0..MAX_LANES {
                 let tau = whole[p][lane].max(f32::MIN_POSITIVE);
                 let length = self.to[lane] - self.from[lane];
+                let is_all = length == 1.0 && self.through[p][lane] == 1.0;
+                if is_all {
+                    to[p][lane] += through_part[p][lane];
+                    continue;
+                }
                 let share = libm::expm1f(-tau * length) / libm::expm1f(-tau);
                 // What is too thin for a quotient is lit by its length.
                 let share = if share.is_finite() { share } else { length };
