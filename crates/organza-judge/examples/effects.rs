@@ -1,8 +1,9 @@
 //! `cargo run --release -p organza-judge --example effects`: draws each scene of `scenes/` with each of its effects and without it, and writes what
-//! that changes into `docs/effects.csv`, and into the tables of `docs/effects.md`. `cargo xtask effects` runs it.
+//! that changes into `docs/effects.csv`, and into the tables of `docs/effects.md`. It draws each scene in two sizes on one thread and on two, and writes
+//! predicted beside measured times into `docs/predictions.csv`. `cargo xtask effects` runs it, after the tests that write `docs/effect-families.csv`.
 #![allow(clippy::unwrap_used, reason = "it stops where something is wrong")]
 
-use organza::cost::CountedPass;
+use organza::cost::{CountedPass, Prediction};
 use organza::plan::Plan;
 use organza::scene::{LoadOptions, Override, Scene, parse};
 use organza::{Context, Error, Files, Progress, RenderOptions};
@@ -13,6 +14,12 @@ use std::path::{Path, PathBuf};
 /// Pixels of the longer side of the pictures.
 const SIDE: u32 = 96;
 const CSV: &str = "docs/effects.csv";
+const FAMILIES: &str = "docs/effect-families.csv";
+const PREDICTIONS: &str = "docs/predictions.csv";
+/// Pixels of the longer side of pictures whose times are predicted, and threads.
+const TIMED: [(u32, usize); 3] = [(160, 1), (480, 1), (480, 2)];
+/// No picture is drawn that is predicted to take so many seconds.
+const LONGEST: f64 = 40.0;
 const PAGE: &str = "docs/effects.md";
 /// Between these the page holds the tables.
 const BEGIN: &str = "<!-- Made by `cargo xtask effects` from docs/effects.csv. -->\n";
@@ -83,6 +90,17 @@ struct Drawn {
     seconds: f64,
 }
 
+/// One picture with its times.
+struct Timed {
+    name: String,
+    side: u32,
+    threads: usize,
+    predicted_seconds: f64,
+    seconds: f64,
+    predicted_bytes: u64,
+    bytes: u64,
+}
+
 fn main() {
     let mut scenes: Vec<PathBuf> = std::fs::read_dir("scenes").unwrap().map(|entry| entry.unwrap().path()).collect();
     scenes.retain(|path| path.extension().is_some_and(|extension| extension == "toml"));
@@ -96,7 +114,112 @@ fn main() {
     std::fs::write(CSV, csv(&drawn)).unwrap();
     let page = std::fs::read_to_string(PAGE).unwrap();
     let page = filled(&page, BEGIN_READ, END_READ, &read(&drawn));
-    std::fs::write(PAGE, filled(&page, BEGIN, END, &tables(&drawn))).unwrap();
+    let mut timed = Vec::new();
+    for (side, threads) in TIMED {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let pictures = scenes.iter().filter_map(|path| pool.install(|| time(path, side, threads)));
+        timed.extend(
+            pictures.inspect(|one| println!("{} of {side} pixels on {threads}: {:.2} s", one.name, one.seconds)),
+        );
+    }
+    std::fs::write(PREDICTIONS, predictions(&timed)).unwrap();
+    let families = families(&std::fs::read_to_string(FAMILIES).unwrap());
+    let text = tables(&drawn) + &times(&timed) + &families;
+    std::fs::write(PAGE, filled(&page, BEGIN, END, &text)).unwrap();
+}
+
+/// A scene drawn with its longer side of so many pixels; `None` where it would take too long.
+fn time(path: &Path, side: u32, threads: usize) -> Option<Timed> {
+    let scene = sized(path, &[], side).unwrap();
+    let options = RenderOptions::default();
+    let progress = Progress::new();
+    let explained = organza::explain(&scene, &options, &progress).unwrap();
+    let predicted_seconds = drawing_seconds(&explained.predicted, threads);
+    if predicted_seconds > LONGEST {
+        return None;
+    }
+    let render = organza::render(&scene, &options, &progress).unwrap();
+    let is_drawing = |name: &str| name != organza::pass::READ && name != organza::pass::CONVERT;
+    let stages = || render.cost.stages.iter().filter(|stage| is_drawing(&stage.name));
+    Some(Timed {
+        name: path.file_stem().unwrap().to_string_lossy().into_owned(),
+        side,
+        threads,
+        predicted_seconds,
+        seconds: stages().map(|stage| stage.seconds).sum(),
+        predicted_bytes: explained.memory,
+        bytes: render.cost.stages.iter().map(|stage| stage.bytes).sum(),
+    })
+}
+
+/// Predicted seconds of all passes but reading and conversion, which other pages measure.
+fn drawing_seconds(predicted: &Prediction, threads: usize) -> f64 {
+    let is_drawing = |pass: &&CountedPass| pass.pass != organza::pass::READ && pass.pass != organza::pass::CONVERT;
+    predicted.passes().filter(is_drawing).map(|pass| pass.seconds(&predicted.rates, threads)).sum()
+}
+
+fn predictions(timed: &[Timed]) -> String {
+    let mut text =
+        "scene,pixels_of_longer_side,threads,predicted_seconds,seconds,bytes_at_most,bytes_of_passes\n".to_owned();
+    for one in timed {
+        let Timed { name, side, threads, predicted_seconds, seconds, predicted_bytes, bytes } = one;
+        writeln!(text, "{name},{side},{threads},{predicted_seconds:.4},{seconds:.4},{predicted_bytes},{bytes}")
+            .unwrap();
+    }
+    text
+}
+
+/// A line for each size and number of threads.
+fn times(timed: &[Timed]) -> String {
+    let mut text = "## Predicted times\n\nPasses behind reading and conversion, by the built-in figures; `docs/predictions.csv` has each scene. A ratio is the larger of both times over the smaller.\n\n\
+                    | longer side, pixels | threads | scenes | ratio, median | ninth tenth | most | within a quarter | within a factor of 2 |\n\
+                    |---|---|---|---|---|---|---|---|\n"
+        .to_owned();
+    for (side, threads) in TIMED {
+        let of_size = timed.iter().filter(|one| one.side == side && one.threads == threads);
+        let ratio = |one: &Timed| (one.predicted_seconds / one.seconds).max(one.seconds / one.predicted_seconds);
+        let mut ratios: Vec<f64> = of_size.map(ratio).collect();
+        ratios.sort_by(f64::total_cmp);
+        let count = ratios.len();
+        let within = |most: f64| 100.0 * ratios.iter().filter(|ratio| **ratio <= most).count() as f64 / count as f64;
+        writeln!(
+            text,
+            "| {side} | {threads} | {count} | {:.2} | {:.2} | {:.2} | {:.0} % | {:.0} % |",
+            ratios[count / 2],
+            ratios[count * 9 / 10],
+            ratios[count - 1],
+            within(1.25),
+            within(2.0)
+        )
+        .unwrap();
+    }
+    text + "\n"
+}
+
+/// The families, row by row.
+fn families(csv: &str) -> String {
+    let mut text = "## Families\n\nScenes of 32x24 pixels in which one number grows from invisible to plain. The tests draw each with the effect on, off and as planned. \
+                    `cargo xtask effects` draws other numbers each time.\n\n\
+                    | effect | what grows | settings | first visible | last left out | share of it | largest change that was left out, tolerances | bound over change, median |\n\
+                    |---|---|---|---|---|---|---|---|\n"
+        .to_owned();
+    for row in csv.lines().skip(1) {
+        let cells: Vec<&str> = row.split(',').collect();
+        let [effect, grows, settings, visible, left_out, change, ratio] = cells[..] else {
+            panic!("{FAMILIES}: {row}")
+        };
+        let number = |text: &str| text.parse::<f64>().unwrap();
+        let settings = if settings.is_empty() { String::new() } else { format!("`{settings}`") };
+        writeln!(
+            text,
+            "| `{effect}` | `{grows}` | {settings} | {:.1e} | {:.1e} | {:.3} | {change} | {ratio} |",
+            number(visible),
+            number(left_out),
+            number(left_out) / number(visible)
+        )
+        .unwrap();
+    }
+    text + "\n"
 }
 
 /// A page with this text between two lines of it.
@@ -132,13 +255,18 @@ fn read(drawn: &[Drawn]) -> String {
 
 /// The scene in `path`, small, with effects switched.
 fn scene(path: &Path, switches: &[Switch]) -> Result<Scene, Error> {
+    sized(path, switches, SIDE)
+}
+
+/// The same with a longer side of so many pixels at most.
+fn sized(path: &Path, switches: &[Switch], side: u32) -> Result<Scene, Error> {
     let words = switches.iter().map(|switch| format!("{}={}", switch.name, if switch.is_on { "on" } else { "off" }));
     let overrides = words.map(|word| Override::of_effect(&word)).collect::<Result<Vec<_>, _>>()?;
     let options = LoadOptions { overrides, ..LoadOptions::default() };
     let mut scene = parse(path, &std::fs::read(path).unwrap(), &options)?;
     let longest = scene.camera.size.into_iter().max().unwrap();
-    if longest > SIDE {
-        scene.camera.size = scene.camera.size.map(|side| (side * SIDE).div_ceil(longest));
+    if longest > side {
+        scene.camera.size = scene.camera.size.map(|pixels| (pixels * side).div_ceil(longest));
     }
     let context = Context { files: &Files::default(), options: &RenderOptions::default(), progress: &Progress::new() };
     Ok(organza::fitted(&scene, context)?.0.into_owned())
@@ -169,16 +297,13 @@ fn draw(path: &Path) -> Result<Drawn, Error> {
         }
     };
     let threads = rayon::current_num_threads();
-    // Reading and conversion are measured by other pages.
-    let is_drawing = |pass: &&CountedPass| pass.pass != organza::pass::READ && pass.pass != organza::pass::CONVERT;
-    let passes = explained.predicted.passes().filter(is_drawing);
     Ok(Drawn {
         rows: measured.changes.iter().map(row).collect(),
         left_out_together: measured.left_out_together,
         lit: measured.lit,
         idle_casters: idle_casters(&explained.plan, &planned),
         tolerance: planned.render.tolerance,
-        predicted_seconds: passes.map(|pass| pass.seconds(&explained.predicted.rates, threads)).sum(),
+        predicted_seconds: drawing_seconds(&explained.predicted, threads),
         seconds: measured.seconds,
         name,
     })
