@@ -85,7 +85,7 @@ pub(super) fn run(arguments: &ExplainArguments) -> Result<(), Error> {
         });
         return console::out(&format!("{document:#}\n"));
     }
-    let mut text = report::plan_text(&explained.plan);
+    let mut text = report::plan_text(&explained.plan, &explained.predicted);
     text.push('\n');
     text += &report::predicted_text(&explained.predicted);
     text.push('\n');

@@ -72,7 +72,8 @@ fn estimates_text(plan: &Plan) -> String {
 }
 
 /// The plan as a table.
-pub(super) fn plan_text(plan: &Plan) -> String {
+pub(super) fn plan_text(plan: &Plan, predicted: &Prediction) -> String {
+    let threads = rayon::current_num_threads();
     let present = plan.effects.iter().filter(|e| !e.is_absent);
     let effects = present.map(|e| {
         let called = match (e.called_for, e.is_lacking) {
@@ -80,15 +81,20 @@ pub(super) fn plan_text(plan: &Plan) -> String {
             (true, false) => "yes",
             (false, _) => "no",
         };
-        [e.name.clone(), called.to_owned(), bound_text(e), e.reason.clone()]
+        let work = predicted.effects.iter().find(|work| work.effect == e.name);
+        let time = work.map(|work| duration_text(work.seconds(&predicted.rates, threads)));
+        let bytes = work.filter(|work| work.bytes > 0).map(|work| bytes_text(work.bytes));
+        let or_none = |text: Option<String>| text.unwrap_or_else(|| "-".to_owned());
+        [e.name.clone(), called.to_owned(), bound_text(e), or_none(time), or_none(bytes), e.reason.clone()]
     });
     let mut text = format!("technique: {}\n\n", plan.technique);
-    text += &table(["effect", "called for", "without it", "why"], "lrrl", effects);
+    text += &table(["effect", "called for", "without it", "takes", "bytes", "why"], "lrrrrl", effects);
     let absent: Vec<&str> = plan.effects.iter().filter(|e| e.is_absent).map(|e| e.name.as_str()).collect();
     if !absent.is_empty() {
         let _ = writeln!(text, "not in this scene: {}", absent.join(", "));
     }
-    text += "without it: how much a pixel as it is displayed could change at most, of black to white; - where no bound is known\n";
+    text += "without it: how much a pixel as it is displayed could change at most, of black to white; - where no bound is known\n\
+             takes, bytes: predicted for what runs for it alone; - where that is part of passes that run in any case\n";
     text.push('\n');
     text += &estimates_text(plan);
     let settings = plan.settings.iter().map(|setting| {

@@ -1,7 +1,7 @@
 //! Plans, costs and predictions as JSON: the documents that `--json` and `--cost` write, and that programs read.
 
 use crate::effects::{EffectChange, FixedEffect, Measured};
-use organza::cost::{CountedPass, Prediction};
+use organza::cost::{CountedPass, EffectWork, Prediction};
 use organza::plan::{Estimate, Plan, PlannedObject, PlannedSetting};
 use organza::scene::{FoundCamera, Scene, SceneObject, UpBy};
 use organza::{CostRecord, ShadowTable, SplatCount};
@@ -40,9 +40,16 @@ pub fn predicted_json(predicted: &Prediction) -> Value {
             "seconds_of_one_core": p.seconds(&predicted.rates, 1), "seconds": p.seconds(&predicted.rates, threads),
         })
     };
+    let effect = |work: &EffectWork| {
+        json!({
+            "name": work.effect, "seconds": work.seconds(&predicted.rates, threads), "bytes": work.bytes,
+            "passes": work.passes.iter().filter(|pass| pass.has_work()).map(pass).collect::<Value>(),
+        })
+    };
     json!({
         "by": predicted.rates.source(),
         "threads": threads,
+        "effects": predicted.effects.iter().map(effect).collect::<Value>(),
         "passes": predicted.passes().map(pass).collect::<Value>(),
         "seconds_of_one_core": predicted.seconds(1),
         "seconds": predicted.seconds(threads),

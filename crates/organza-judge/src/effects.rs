@@ -76,7 +76,10 @@ impl Measured {
                 found.push(format!("`{}` changes a pixel by {changes}, beyond its bound of {bound}", change.name));
             }
         }
+        // What no scene can switch is in neither picture.
+        let is_switched = |effect: &&Effect| effect.kind.is_none_or(|kind| kind.fixed_because().is_none());
         let left_out = plan.effects.iter().filter(|effect| !is_simulated(effect) && !effect.is_absent);
+        let left_out = left_out.filter(is_switched);
         let sum: Option<f64> = left_out.map(|effect| effect.bound.number()).sum();
         if let (Some(change), Some(sum)) = (self.left_out_together, sum)
             && change > sum + ROUNDING

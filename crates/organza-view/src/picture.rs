@@ -5,6 +5,7 @@ use crate::desk::Request;
 use crate::event::Switch;
 use crate::layer_image::{self, Radiance};
 use crate::wording;
+use organza::cost::Prediction;
 use organza::output::{self, Format, Metadata, Params, displayed};
 use organza::plan::{Effect, Plan};
 use organza::scene::{ColorScale, EffectKind, ScaleNumbers, Scene, SwitchedEffect};
@@ -195,10 +196,8 @@ const fn passes_of(kind: EffectKind) -> &'static [&'static str] {
 
 impl EffectRow {
     fn new(effect: &Effect, scene: &Scene) -> Self {
-        let word = effect.name.split('.').next().unwrap_or(&effect.name);
-        let kind = EffectKind::ALL.into_iter().find(|kind| kind.word() == word);
-        let label = effect.name.strip_prefix(word).and_then(|rest| rest.strip_prefix('.')).unwrap_or("");
-        let switched = kind.and_then(|kind| SwitchedEffect::find(&scene.render.effects, kind, label));
+        let kind = effect.kind;
+        let switched = kind.and_then(|kind| SwitchedEffect::find(&scene.render.effects, kind, &effect.label));
         Self {
             name: effect.name.clone(),
             what: effect.what,
@@ -232,6 +231,16 @@ impl EffectRow {
             for row in &mut simulated {
                 row.predicted_ms = predicted.map(|ms| ms / parts);
                 row.measured_ms = measured.map(|ms| ms / parts);
+            }
+        }
+    }
+
+    /// Takes in the predicted times of what runs for an effect alone.
+    fn add_predicted(rows: &mut [Self], predicted: &Prediction) {
+        let threads = rayon::current_num_threads();
+        for work in &predicted.effects {
+            if let Some(row) = rows.iter_mut().find(|row| row.name == work.effect) {
+                row.predicted_ms = Some(1e3 * work.seconds(&predicted.rates, threads));
             }
         }
     }
@@ -284,6 +293,7 @@ impl Drawn {
         let passes = PassRow::of_render(&render);
         let mut effects = EffectRow::of_plan(&render.plan, scene);
         EffectRow::add_times(&mut effects, &passes);
+        EffectRow::add_predicted(&mut effects, &render.predicted);
         let facts = Facts {
             number: 0,
             generation: request.generation,

@@ -25,6 +25,8 @@ pub(crate) struct Brightness {
     pub(crate) lights: Vec<f64>,
     /// The most radiance that anything shows, the background among it.
     pub(crate) anything: f64,
+    /// π times the most radiance that a surface sends of an irradiance of 1.
+    pub(crate) reflectance: f64,
     /// The same of each object, by its rank.
     pub(crate) objects: Vec<ObjectBrightness>,
 }
@@ -51,6 +53,8 @@ struct Receiver {
     spread: f64,
     /// The most radiance that it sends of an irradiance of 1, 1/sr.
     response: f64,
+    /// The same of a surface, or of a medium that is shaded as one; 0 of another medium.
+    reflected: f64,
     /// The most radiance that it sends of an ambient radiance of 1.
     ambient: f64,
     /// The most radiance that it has of its own.
@@ -65,6 +69,7 @@ impl Receiver {
         bounds: DAabb::EMPTY,
         spread: f64::INFINITY,
         response: 0.0,
+        reflected: 0.0,
         ambient: 0.0,
         given_off: 0.0,
         thickest: 0.0,
@@ -75,6 +80,7 @@ impl Receiver {
         self.bounds = self.bounds.union(other.bounds);
         self.spread = self.spread.min(other.spread);
         self.response = self.response.max(other.response);
+        self.reflected = self.reflected.max(other.reflected);
         self.ambient = self.ambient.max(other.ambient);
         self.given_off = self.given_off.max(other.given_off);
         self.thickest = self.thickest.max(other.thickest);
@@ -113,28 +119,36 @@ pub(crate) fn of_scene(scene: &Scene, loaded: &Loaded) -> Brightness {
     };
     let shown = of_objects.iter().zip(&sent).map(|(object, sent)| object.given_off + ambient * object.ambient + sent);
     let anything = shown.fold(background, f64::max);
+    let reflected = of_objects.iter().map(|object| object.reflected).fold(0.0, f64::max);
     let objects = of_objects.iter().zip(&sent).map(|(object, sent)| ObjectBrightness {
         sent: ambient * object.ambient + sent,
         given_off: object.given_off,
         thickest_splat: object.thickest,
         sum_of_splats: object.depths as f64 / UNIT,
     });
-    Brightness { lights, anything, objects: objects.collect() }
+    Brightness { lights, anything, reflectance: std::f64::consts::PI * reflected, objects: objects.collect() }
 }
 
 /// What an object is that is drawn from its own data. How much it hides splats do not tell.
 fn as_it_is(loaded: &Loaded, native: &Own) -> Receiver {
     let material = &loaded.materials[native.material];
     let color = f64::from(native.brightest_color());
+    let response = material.brightest(color, true);
     Receiver {
         bounds: native.world_box(),
         spread: 0.0,
-        response: material.brightest(color, true),
+        response,
+        reflected: reflected(material, response),
         ambient: ambient_share(material, color),
         given_off: radiance_given_off(material, color),
         thickest: f64::INFINITY,
         depths: u64::MAX,
     }
+}
+
+/// The part of a response that is reflected by a surface.
+fn reflected(material: &Material, response: f64) -> f64 {
+    if material.shading == Shading::Phong { response } else { 0.0 }
 }
 
 /// The share of ambient radiance that a material of this colour sends.
@@ -187,10 +201,12 @@ fn splat(loaded: &Loaded, norms: &[f64], i: usize) -> Receiver {
     let extinction = f64::from(material.greatest_extinction());
     let cross_section = f64::from(cloud.cross_section[i]);
     let depth = if hides { f64::INFINITY } else { cross_section * extinction * norms[footprint] / (radius * radius) };
+    let response = if material.shading == Shading::Unlit { 0.0 } else { material.brightest(color, has_normal) };
     Receiver {
         bounds: DAabb::around(position, DVec3::splat(radius)),
         spread: LEAST_DEVIATION * radius,
-        response: if material.shading == Shading::Unlit { 0.0 } else { material.brightest(color, has_normal) },
+        response,
+        reflected: reflected(material, response),
         ambient: ambient_share(material, color),
         given_off: radiance_given_off(material, color),
         thickest: depth,

@@ -8,7 +8,7 @@ mod prediction;
 mod rates;
 
 pub(crate) use loading::{before_conversion, before_reading, converting, reading, reading_file, samples};
-pub use prediction::{Change, CountedPass, Prediction, announcement_of_frames, duration_text};
+pub use prediction::{Change, CountedPass, EffectWork, Prediction, announcement_of_frames, duration_text};
 pub(crate) use rates::Growth;
 pub use rates::{BUILT_IN_MACHINE, Item, Rates};
 
@@ -38,6 +38,10 @@ pub(crate) struct OwnWork {
     pub(crate) slab_samples: f64,
     /// Rows of footprints in slabs of sweeps.
     pub(crate) swept_rows: f64,
+    /// Samples of the eye's images and of lights' that read volumes in slabs across half vectors.
+    pub(crate) medium_samples: f64,
+    /// Looks of points of lights for the polygons before volumes and surfaces.
+    pub(crate) polygon_looks: f64,
     /// Samples of lights' images that are moved for points of lights, in all slabs.
     pub(crate) soft_samples: f64,
     /// Ranges of depth that it draws in; `None` where it does not pass over any.

@@ -6,7 +6,7 @@
 pub use crate::form::{Form, PlannedObject};
 use crate::load::Loaded;
 use crate::pass;
-use crate::scene::{LightPoint, SwitchedEffect, Technique};
+use crate::scene::{EffectKind, LightPoint, SwitchedEffect, Technique};
 use crate::shadows::ShadowTable;
 use splat_core::Object;
 
@@ -42,6 +42,10 @@ impl Bound {
 pub struct Effect {
     /// What it is, such as `shadow.sun`.
     pub name: String,
+    /// Its kind; `None` of one that a technique tells.
+    pub kind: Option<EffectKind>,
+    /// The light or object that it is of, `sun`; empty for one of the whole scene.
+    pub label: String,
     /// What effects of its kind are, in a few words.
     pub what: &'static str,
     /// Whether it is simulated, or would be if a technique of the scene had it.
@@ -54,6 +58,25 @@ pub struct Effect {
     pub is_lacking: bool,
     /// Whether nothing in the scene causes an effect of its kind.
     pub is_absent: bool,
+}
+
+impl Effect {
+    /// One that a technique tells, which no bound leaves out.
+    pub(crate) fn of_technique(name: String, what: &'static str, is_called_for: bool, reason: String) -> Self {
+        let bound = if is_called_for { Bound::Unknown } else { Bound::Nothing };
+        let label = String::new();
+        Self {
+            name,
+            kind: None,
+            label,
+            what,
+            called_for: is_called_for,
+            reason,
+            bound,
+            is_lacking: false,
+            is_absent: false,
+        }
+    }
 }
 
 /// What a technique is known to err by where it draws an object: an estimate, not a bound.
@@ -295,6 +318,8 @@ mod tests {
     fn a_picture_names_what_it_lacks_with_bounds() {
         let effect = |name: &str, called_for: bool, bound: Bound, is_lacking: bool| Effect {
             name: name.into(),
+            kind: None,
+            label: String::new(),
             what: "",
             called_for,
             reason: String::new(),

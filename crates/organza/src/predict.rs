@@ -1,8 +1,9 @@
 //! Counted work of a frame, before it is drawn, and the keys of its scene that would change it.
 
-use crate::choose::{row, technique_of};
+use crate::choose::{CausedMap, CausedObject, CausedWork, row, technique_of};
 use crate::cost::{Change, Count, CountedPass, Item, Prediction, Translucent, before_reading, samples, shadow_map};
 use crate::frame::{Extent, Frame};
+use crate::load::own::Own;
 use crate::scene::{LightPoint, SceneObject, Technique};
 use crate::technique::{EVERYWHERE, Fold, OwnWork, TABLE};
 use crate::{RenderOptions, ShadowTable, SplatCount, pass, stage};
@@ -16,11 +17,27 @@ const NEAREST: f64 = 0.4;
 
 /// Splats and objects in view of a loaded scene, counted once for all predictions.
 struct Seen {
-    /// Opaque splats.
-    opaque: Expected,
+    opaque: Opaque,
     /// By each technique of the plan.
     translucent: Vec<BySeen>,
     ranges: f64,
+}
+
+/// Opaque splats, by the time that their fragments take.
+#[derive(Clone, Copy)]
+struct Opaque {
+    /// Of the usual footprints.
+    plain: Expected,
+    /// Of footprints that are images.
+    images: Expected,
+    /// Discs that rays meet.
+    met: Expected,
+}
+
+impl Opaque {
+    fn splats(&self) -> f64 {
+        self.plain.splats + self.images.splats + self.met.splats
+    }
 }
 
 /// What one technique draws.
@@ -37,23 +54,40 @@ impl Seen {
         let of_each = frame.plan.techniques.iter().zip(folds);
         let translucent = of_each.map(|(technique, fold)| BySeen {
             technique: *technique,
-            splats: expected(frame, Some(*technique)),
+            splats: translucent(frame, *technique),
             own_work: fold.own_work(ranges),
         });
         let translucent = translucent.collect();
-        Self { opaque: expected(frame, None), translucent, ranges: ranges.len() as f64 }
+        Self { opaque: opaque(frame), translucent, ranges: ranges.len() as f64 }
     }
 }
 
-/// The opaque splats in view, or the translucent ones of a technique, and the fragments of their footprints, about.
-fn expected(frame: &Frame<'_>, technique: Option<Technique>) -> Expected {
+/// The opaque splats in view, and the fragments of their footprints, about.
+fn opaque(frame: &Frame<'_>) -> Opaque {
     let cloud = &frame.loaded.cloud;
-    raster::expected(cloud, &frame.camera, |i| match technique {
-        None => cloud.kind[i] == SplatKind::Opaque,
-        Some(t) => {
-            let object = cloud.object[i] as usize;
-            cloud.kind[i] != SplatKind::Opaque && frame.plan.by[object] == t && !frame.plan.is_own[object]
-        }
+    let is_image = |i: usize| frame.loaded.footprints.image(usize::from(cloud.footprint[i])).is_some();
+    let is_met = |i: usize| frame.plan.exact[cloud.object[i] as usize];
+    let expected = |has_image: bool, meets: bool| {
+        let is_one = |i: usize| cloud.kind[i] == SplatKind::Opaque && is_image(i) == has_image && is_met(i) == meets;
+        raster::expected(cloud, &frame.camera, is_one)
+    };
+    let any = |is_one: &dyn Fn(usize) -> bool| (0..cloud.len()).any(is_one);
+    let images = if any(&is_image) { expected(true, false) } else { Expected::default() };
+    let met = if frame.plan.exact.contains(&true) {
+        let [plain, images] = [false, true].map(|has_image| expected(has_image, true));
+        Expected { splats: plain.splats + images.splats, fragments: plain.fragments + images.fragments }
+    } else {
+        Expected::default()
+    };
+    Opaque { plain: expected(false, false), images, met }
+}
+
+/// The translucent splats of a technique in view, and the fragments of their footprints, about.
+fn translucent(frame: &Frame<'_>, technique: Technique) -> Expected {
+    let cloud = &frame.loaded.cloud;
+    raster::expected(cloud, &frame.camera, |i| {
+        let object = cloud.object[i] as usize;
+        cloud.kind[i] != SplatKind::Opaque && frame.plan.by[object] == technique && !frame.plan.is_own[object]
     })
 }
 
@@ -69,16 +103,18 @@ fn light(frame: &Frame<'_>) -> Vec<CountedPass> {
     let plan = frame.plan;
     let maps = plan.shadow_maps_built();
     let built = if frame.has_maps() { 0 } else { maps };
-    let map = |(rank, (table, point)): (usize, (&ShadowTable, &LightPoint))| {
-        let entries = table.predicted.entries;
-        CountedPass::new(pass::SHADOW_MAP, shadow_map(rank, maps, entries), cast(frame, point, entries))
+    let map = |(rank, (table, _)): (usize, (&ShadowTable, &LightPoint))| {
+        let stage = shadow_map(rank, maps, table.predicted.entries);
+        CountedPass::new(pass::SHADOW_MAP, stage, cast(frame, &table.predicted))
     };
     let mut passes: Vec<CountedPass> = (1..=built).zip(tables(frame)).map(map).collect();
     // The eye's is another in each view, of media alone.
-    let number = frame.loaded.cloud.len() as f64;
-    let counts = |entries| vec![Count::new(Item::CastSplat, number), Count::new(Item::ShadowEntry, entries)];
-    let eye = |entries| CountedPass::new(pass::EYE_MAP, stage::EYE_MAP.to_owned(), counts(entries));
-    passes.extend(plan.eye_table.iter().map(|table| eye(table.predicted.entries)));
+    let eye = |table: &ShadowTable| {
+        let number = frame.loaded.cloud.len() as f64;
+        let counts = [vec![Count::new(Item::CastSplat, number)], entries(&table.predicted)].concat();
+        CountedPass::new(pass::EYE_MAP, stage::EYE_MAP.to_owned(), counts)
+    };
+    passes.extend(plan.eye_table.iter().map(eye));
     passes
 }
 
@@ -89,16 +125,17 @@ fn tables<'b>(frame: &'b Frame<'_>) -> impl Iterator<Item = (&'b ShadowTable, &'
     each.filter_map(|(table, point)| Some((table.as_ref()?, point)))
 }
 
-/// Work of a shadow map of so many entries.
-fn cast(frame: &Frame<'_>, point: &LightPoint, entries: f64) -> Vec<Count> {
-    let entry = if point.light.shape.place().is_some() { Item::LampEntry } else { Item::ShadowEntry };
+/// Work of a shadow map of this table.
+fn cast(frame: &Frame<'_>, table: &tsm::Prediction) -> Vec<Count> {
     let cloud = &frame.loaded.cloud;
     let opaque = cloud.kind.iter().filter(|kind| **kind == SplatKind::Opaque).count() as f64;
-    vec![
-        Count::new(Item::CastSplat, cloud.len() as f64 - opaque),
-        Count::new(Item::OpaqueCaster, opaque),
-        Count::new(entry, entries),
-    ]
+    let splats = vec![Count::new(Item::CastSplat, cloud.len() as f64 - opaque), Count::new(Item::OpaqueCaster, opaque)];
+    [splats, entries(table)].concat()
+}
+
+/// Entries of a table, by the way that they are made.
+fn entries(table: &tsm::Prediction) -> Vec<Count> {
+    vec![Count::new(Item::ShadowEntry, table.entries), Count::new(Item::ShadowRay, table.rays)]
 }
 
 /// All passes behind the shadow maps.
@@ -107,12 +144,9 @@ fn surfaces(frame: &Frame<'_>, seen: &Seen) -> Vec<CountedPass> {
     let scene = frame.scene;
     let maps = plan.shadow_maps_built() as f64;
     let mut passes = Vec::new();
-    let mut drawn = 0.0;
     let mut last = Vec::new();
     for by in &seen.translucent {
         let row = row(by.technique);
-        let is_drawn = plan.by.iter().zip(&plan.draws).any(|(by_object, draws)| *by_object == by.technique && *draws);
-        drawn += if is_drawn { by.splats.splats } else { 0.0 };
         let ranges = by.own_work.ranges.map_or(seen.ranges, |ranges| ranges as f64);
         let translucent = Translucent {
             splats: by.splats.splats,
@@ -139,11 +173,14 @@ fn surfaces(frame: &Frame<'_>, seen: &Seen) -> Vec<CountedPass> {
     // A technique whose pixels are lit alone needs neither.
     let is_planned = |pass: &str| plan.passes.iter().any(|planned| planned.name == pass);
     if is_planned(pass::PROJECT) {
-        add(pass::PROJECT, stage::PROJECT, vec![Count::new(Item::ProjectedSplat, seen.opaque.splats + drawn)]);
+        add(
+            pass::PROJECT,
+            stage::PROJECT,
+            vec![Count::new(Item::ProjectedSplat, seen.opaque.splats() + drawn(frame, seen))],
+        );
     }
     if is_planned(pass::SHADE) {
-        let nearest = if plan.skips_hidden { NEAREST } else { 1.0 };
-        let shaded = nearest * seen.opaque.splats + drawn;
+        let shaded = shaded(frame, seen);
         // Thick media look up the eye's map too, and share both over each cell.
         let of_eye = if plan.eye_table.is_some() { 2.0 } else { 0.0 };
         let look_ups = Count::new(Item::ShadowLookUp, shaded * (maps + of_eye));
@@ -153,17 +190,22 @@ fn surfaces(frame: &Frame<'_>, seen: &Seen) -> Vec<CountedPass> {
         pass::OPAQUE,
         stage::OPAQUE,
         vec![
-            Count::new(Item::OpaqueSplat, seen.opaque.splats),
-            Count::new(Item::OpaqueFragment, seen.opaque.fragments),
+            Count::new(Item::OpaqueSplat, seen.opaque.splats()),
+            Count::new(Item::OpaqueFragment, seen.opaque.plain.fragments),
+            Count::new(Item::ImageFragment, seen.opaque.images.fragments),
+            Count::new(Item::MetFragment, seen.opaque.met.fragments),
         ],
     );
     passes.extend(last);
-    passes.push(CountedPass::new(
-        pass::FINISH,
-        stage::FINISH.to_owned(),
-        vec![Count::new(Item::FinishedSample, samples(scene))],
-    ));
+    passes.push(CountedPass::new(pass::FINISH, stage::FINISH.to_owned(), finished(frame)));
     passes
+}
+
+/// Samples that become parts of pixels, before an environment where there is one.
+fn finished(frame: &Frame<'_>) -> Vec<Count> {
+    let samples = samples(frame.scene);
+    let looked_up = if frame.loaded.images.environment.is_some() { samples } else { 0.0 };
+    vec![Count::new(Item::FinishedSample, samples), Count::new(Item::EnvironmentSample, looked_up)]
 }
 
 /// The prediction of a frame in these ranges of depth, whose techniques have been prepared or checked: reading, conversion and drawing.
@@ -185,12 +227,64 @@ pub(crate) fn prediction(
     }
     let whole = || Seen::new(frame, folds, &[EVERYWHERE]);
     let changes = [automatic_cells(frame, &seen), one_range(frame, &seen, whole), preferred(frame, &seen)];
+    let drawing = of_frame(frame, &seen);
     Prediction {
         loading,
-        drawing: of_frame(frame, &seen),
+        effects: caused(frame, &seen, &drawing).of_effects(&frame.plan.effects),
+        drawing,
         changes: changes.into_iter().flatten().collect(),
         rates: options.rates.clone(),
     }
+}
+
+/// What each light and object causes of these passes.
+fn caused<'b>(frame: &'b Frame<'_>, seen: &Seen, drawing: &'b [CountedPass]) -> CausedWork<'b> {
+    let loaded = frame.loaded;
+    let map = |(table, point): (&'b ShadowTable, &LightPoint)| CausedMap {
+        light: &loaded.lights[point.light_index].label,
+        pass: CountedPass::new(pass::SHADOW_MAP, pass::SHADOW_MAP.to_owned(), cast(frame, &table.predicted)),
+        bytes: table.predicted.map_bytes,
+    };
+    let shining = loaded.lights.iter().zip(&frame.plan.lights).filter(|(_, shines)| **shines);
+    let splats: u64 = loaded.splats.iter().map(|count| count.made).sum();
+    let data: u64 = loaded.own.iter().filter(|native| !native.form.is_polygons()).map(Own::bytes).sum();
+    let visible = frame.scene.objects.iter().enumerate().filter(|(_, object)| object.visible);
+    let is_polygons = |rank: usize| loaded.own.iter().any(|native| native.object == rank && native.form.is_polygons());
+    let object = |((rank, _), count): ((usize, &SceneObject), &'b SplatCount)| {
+        let bytes: u64 = loaded.own.iter().filter(|native| native.object == rank).map(Own::bytes).sum();
+        CausedObject {
+            name: &count.object,
+            converted: Count::new(Item::of_conversion(count.conversion), count.predicted as f64),
+            share_of_splats: count.made as f64 / splats.max(1) as f64,
+            share_of_data: bytes as f64 / data.max(1) as f64,
+            bytes,
+        }
+    };
+    CausedWork {
+        drawing,
+        maps: if frame.has_maps() { Vec::new() } else { tables(frame).map(map).collect() },
+        lights: shining.map(|(light, _)| light.label.as_str()).collect(),
+        shaded: shaded(frame, seen),
+        objects: visible.zip(&loaded.splats).filter(|((rank, _), _)| !is_polygons(*rank)).map(object).collect(),
+    }
+}
+
+/// Splats that get light before they are drawn; 0 where none are.
+fn shaded(frame: &Frame<'_>, seen: &Seen) -> f64 {
+    let plan = frame.plan;
+    if !plan.passes.iter().any(|planned| planned.name == pass::SHADE) {
+        return 0.0;
+    }
+    let nearest = if plan.skips_hidden { NEAREST } else { 1.0 };
+    nearest * seen.opaque.splats() + drawn(frame, seen)
+}
+
+/// Translucent splats in view that are drawn as splats.
+fn drawn(frame: &Frame<'_>, seen: &Seen) -> f64 {
+    let plan = frame.plan;
+    let is_drawn =
+        |by: &&BySeen| plan.by.iter().zip(&plan.draws).any(|(by_object, draws)| *by_object == by.technique && *draws);
+    seen.translucent.iter().filter(is_drawn).map(|by| by.splats.splats).sum()
 }
 
 /// The conversion of several objects.
@@ -205,8 +299,7 @@ fn automatic_cells(frame: &Frame<'_>, seen: &Seen) -> Option<Change> {
     frame.settings.shadow.cells?;
     let counts = tables(frame).flat_map(|(table, point)| {
         // What a light states stays.
-        let stated = point.shadow_cells.map(|_| table.predicted.entries);
-        cast(frame, point, stated.unwrap_or(table.automatic_entries))
+        cast(frame, if point.shadow_cells.is_some() { &table.predicted } else { &table.automatic })
     });
     let mut passes = surfaces(frame, seen);
     passes.push(CountedPass::new(pass::SHADOW_MAP, pass::SHADOW_MAP.to_owned(), counts.collect()));

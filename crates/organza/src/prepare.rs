@@ -471,6 +471,7 @@ fn plan_effects(
         statistics.lights.iter_mut().zip(radiances).for_each(|(light, radiance)| light.radiance = *radiance);
     }
     statistics.brightest = if statistics.scatters_again { f64::INFINITY } else { brightness.anything };
+    statistics.reflectance = brightness.reflectance;
     statistics.switched = scene.render.effects.clone();
     statistics.spent = spent;
     statistics.exposure = scene.render.exposure;

@@ -57,8 +57,8 @@ pub struct ShadowTable {
     pub tolerance: f32,
     /// Bytes within which its cells were chosen.
     pub max_bytes: u64,
-    /// Entries that the automatic resolution would have, where a scene asks for cells; else those of `predicted`.
-    pub automatic_entries: f64,
+    /// Size and work by the automatic resolution, where a scene asks for cells; else those of `predicted`.
+    pub automatic: tsm::Prediction,
 }
 
 impl ShadowTable {
@@ -182,7 +182,7 @@ pub(crate) fn eye_table(
         light_states_cells: false,
         tolerance,
         max_bytes,
-        automatic_entries: predicted.entries,
+        automatic: predicted,
     }))
 }
 
@@ -260,14 +260,12 @@ fn tables_within(
         let predict =
             |params: &Params| Deposits::predict(&scene, light, params).map_err(|e| shadow_error(&point.name(), &e));
         let predicted = predict(&params)?;
-        let automatic_entries = match params.resolution {
-            tsm::Resolution::Auto => predicted.entries,
-            tsm::Resolution::Cells(_) => {
-                predict(&Params { resolution: tsm::Resolution::Auto, ..params.clone() })?.entries
-            }
+        let automatic = match params.resolution {
+            tsm::Resolution::Auto => predicted,
+            tsm::Resolution::Cells(_) => predict(&Params { resolution: tsm::Resolution::Auto, ..params.clone() })?,
         };
         let light_states_cells = point.shadow_cells.is_some();
-        Ok(Some(ShadowTable { predicted, cells, light_states_cells, tolerance, max_bytes, automatic_entries }))
+        Ok(Some(ShadowTable { predicted, cells, light_states_cells, tolerance, max_bytes, automatic }))
     };
     requests.iter().map(table).collect()
 }

@@ -248,6 +248,8 @@ pub struct Statistics {
     pub switched: Vec<SwitchedEffect>,
     /// The most radiance that anything shows, the background among it, in the channel that has most, W·m⁻²·sr⁻¹; infinite where none is known.
     pub brightest: f64,
+    /// The greatest share of the light that comes to a surface which it sends on, in the channel that has most; more than 1 where peaks are bright.
+    pub reflectance: f64,
     /// The part of the tolerance that effects have which are left out of these statistics already.
     pub spent: f64,
     /// Whether splats are lit as they are drawn, not before.

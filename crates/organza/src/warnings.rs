@@ -8,7 +8,7 @@ mod small;
 use crate::choose::row;
 use crate::form::PlannedObject;
 use crate::load::{Loaded, own::Own};
-use crate::plan::Plan;
+use crate::plan::{Effect, Plan};
 use crate::scene::place;
 use crate::scene::{Scene, SceneLight, SceneObject, Source};
 use crate::shadows::{Coarse, thickness_of};
@@ -89,8 +89,10 @@ pub(crate) fn clear_shadows<'a>(scene: &'a Scene, loaded: &'a Loaded) -> impl It
 
 /// Effects that are called for and that no technique of the scene has.
 pub(crate) fn lacking(plan: &Plan) -> impl Iterator<Item = String> + '_ {
-    // Of lights that are scattered once a warning tells.
+    // Of lights that are scattered once a warning tells; what no technique has nobody can ask for.
+    let can_be_had = |effect: &Effect| effect.kind.is_some_and(|kind| kind.fixed_because().is_none());
     let lacking = plan.effects.iter().filter(|effect| effect.is_lacking && plan.scattered_once == 0);
+    let lacking = lacking.filter(move |effect| can_be_had(effect));
     lacking.map(|effect| {
         // The whole of what is displayed is no bound.
         let most = match effect.bound.number() {
@@ -326,7 +328,7 @@ pub(crate) fn of_shadows(limits: &[tsm::Limit]) -> Option<String> {
 pub(crate) fn of_costly<'a>(tables: impl Iterator<Item = &'a ShadowTable>) -> Option<String> {
     let table = tables.max_by(|a, b| a.predicted.entries.total_cmp(&b.predicted.entries))?;
     let entries = table.predicted.entries;
-    let times = entries / table.automatic_entries.max(1.0);
+    let times = entries / table.automatic.entries.max(1.0);
     (entries >= COSTLY && times >= TIMES).then(|| {
         let [millions, times] = [1e-6 * entries, times].map(libm::round);
         format!(

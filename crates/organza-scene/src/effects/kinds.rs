@@ -36,6 +36,10 @@ pub enum EffectKind {
     Color,
     /// The shading of a volume by its gradients.
     Gradients,
+    /// Light that surfaces send to one another.
+    Interreflection,
+    /// Light that surfaces bend and gather on others.
+    Caustics,
     /// The order of what is translucent.
     Translucency,
     /// Opaque surfaces, which hide what lies behind.
@@ -46,7 +50,7 @@ pub enum EffectKind {
 
 impl EffectKind {
     /// Every kind.
-    pub const ALL: [Self; 13] = [
+    pub const ALL: [Self; 15] = [
         Self::Object,
         Self::Light,
         Self::Shadow,
@@ -57,6 +61,8 @@ impl EffectKind {
         Self::Absorption,
         Self::Color,
         Self::Gradients,
+        Self::Interreflection,
+        Self::Caustics,
         Self::Translucency,
         Self::Opaque,
         Self::Layers,
@@ -75,6 +81,8 @@ impl EffectKind {
             Self::Absorption => "absorption",
             Self::Color => "color",
             Self::Gradients => "gradients",
+            Self::Interreflection => "interreflection",
+            Self::Caustics => "caustics",
             Self::Translucency => "translucency",
             Self::Opaque => "opaque",
             Self::Layers => "layers",
@@ -88,13 +96,20 @@ impl EffectKind {
             Self::Object | Self::Bending | Self::Dispersion | Self::Absorption | Self::Color | Self::Gradients => {
                 HangsOn::Object
             }
-            Self::Scatter | Self::Translucency | Self::Opaque | Self::Layers => HangsOn::Scene,
+            Self::Scatter
+            | Self::Interreflection
+            | Self::Caustics
+            | Self::Translucency
+            | Self::Opaque
+            | Self::Layers => HangsOn::Scene,
         }
     }
 
     /// Why a scene cannot switch it, and what to do instead; `None` where it can.
     pub const fn fixed_because(self) -> Option<&'static str> {
         match self {
+            Self::Interreflection => Some("no technique simulates it; `[ambient]` stands for it"),
+            Self::Caustics => Some("no technique simulates it"),
             Self::Translucency => Some("what is translucent has to be put in order; switch its objects instead"),
             Self::Opaque => Some("what is opaque hides what lies behind; switch its objects instead"),
             Self::Layers => Some("render.layers says which images are kept"),

@@ -176,7 +176,7 @@ fn seconds(row: &Row, asked: &Asked<'_>) -> f64 {
     let scene = asked.scene;
     let camera = scene.camera.with_samples(asked.settings.antialias);
     let own_work = (row.foresees)(asked, &camera);
-    let draws_own_data = own_work.items > 0.0;
+    let draws_own_data = own_work.items + own_work.medium_samples > 0.0;
     let samples = samples(scene);
     let maps: f64 = scene.lights.iter().filter(|light| light.shadow).map(|light| light.count() as f64).sum();
     // What is drawn from its own data carries its light, or has splats for shadow maps.

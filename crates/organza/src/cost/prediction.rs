@@ -32,6 +32,17 @@ impl CountedPass {
         self.counts.iter().map(|count| rates.seconds(count, threads)).sum()
     }
 
+    /// Whether any work is counted.
+    pub fn has_work(&self) -> bool {
+        self.counts.iter().any(|count| count.number > 0.0)
+    }
+
+    /// A share of it.
+    pub(crate) fn scaled(&self, share: f64) -> Self {
+        let counts = self.counts.iter().map(|count| Count::new(count.item, share * count.number));
+        Self { counts: counts.collect(), ..self.clone() }
+    }
+
     /// Takes in more counted work.
     pub(crate) fn add(&mut self, counts: &[Count]) {
         for count in counts {
@@ -63,6 +74,24 @@ pub struct Change {
     pub passes: Vec<CountedPass>,
 }
 
+/// The counted work that runs for one effect alone.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct EffectWork {
+    /// The effect, as the plan names it.
+    pub effect: String,
+    /// Its work, pass by pass.
+    pub passes: Vec<CountedPass>,
+    /// Bytes that it takes beside, 0 where none are counted.
+    pub bytes: u64,
+}
+
+impl EffectWork {
+    /// Predicted seconds on so many threads.
+    pub fn seconds(&self, rates: &Rates, threads: usize) -> f64 {
+        self.passes.iter().map(|pass| pass.seconds(rates, threads)).sum()
+    }
+}
+
 /// Counted work of a render, with the figures that make time of it.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Prediction {
@@ -72,6 +101,8 @@ pub struct Prediction {
     pub drawing: Vec<CountedPass>,
     /// Keys that would change the counted work.
     pub changes: Vec<Change>,
+    /// What runs for each simulated effect alone, of those whose work is not part of passes that run in any case.
+    pub effects: Vec<EffectWork>,
     /// Nanoseconds of each item.
     pub rates: Rates,
 }

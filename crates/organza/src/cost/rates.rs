@@ -28,8 +28,8 @@ pub enum Item {
     OpaqueCaster,
     /// An entry of a shadow table: a splat in a cell.
     ShadowEntry,
-    /// An entry of the shadow table of a lamp, which has a place: splats near it cover many cells.
-    LampEntry,
+    /// A ray of a cell of a shadow table that samples a splat.
+    ShadowRay,
     /// A splat that is culled and sorted.
     SortedSplat,
     /// A disc that is given to a group of discs that hardly overlap.
@@ -46,6 +46,10 @@ pub enum Item {
     OpaqueSplat,
     /// A fragment of an opaque splat.
     OpaqueFragment,
+    /// A fragment of an opaque splat whose footprint is an image.
+    ImageFragment,
+    /// A fragment of an opaque disc that rays meet.
+    MetFragment,
     /// A fragment of a translucent splat that is composited.
     BlendedFragment,
     /// A translucent splat that is composited.
@@ -78,6 +82,10 @@ pub enum Item {
     SoftSample,
     /// A sample that a slab covers, for each light.
     SlabSample,
+    /// A sample of the eye's image or a light's that reads a volume in a slab across a half vector.
+    MediumSample,
+    /// A look of a point of a light for the polygons before a place: of a surface, or of a volume in a slab across a half vector.
+    PolygonLook,
     /// A disc that is prepared for rays.
     SurfelDisc,
     /// A disc in the hierarchy of boxes that bent rays go through.
@@ -92,6 +100,8 @@ pub enum Item {
     ExactFragment,
     /// A sample that becomes part of a pixel.
     FinishedSample,
+    /// A sample that looks up an environment.
+    EnvironmentSample,
 }
 
 /// What the number of items goes with, where samples of a picture and sets of particles change.
@@ -126,50 +136,54 @@ const fn row(item: Item, name: &'static str, words: &'static str, pass: &'static
 
 /// The built-in figures, measured on [`BUILT_IN_MACHINE`] by the command in benches/README.md, in the order of [`Item`]. Enlarged and grouped discs
 /// and exact fragments are of older benchmarks, points that become discs of a million normal points on one thread and on two; points that become a
-/// medium, and parallel shares, are estimates. Those of fields, of particles by kind, of sweeps and of discs are from pictures of `scenes/` that are
-/// 96 samples wide.
-static TABLE: [Row; 41] = [
-    row(Item::FileByte, "file_byte", "bytes", pass::READ, 80.0, 0.0),
+/// medium, and parallel shares, are estimates. Those of drawing are fitted to pictures of `scenes/` that are 160 and 480 pixels wide.
+static TABLE: [Row; 46] = [
+    row(Item::FileByte, "file_byte", "bytes", pass::READ, 60.0, 0.0),
     row(Item::GeneratedObject, "generated_object", "objects", pass::READ, 1.5e7, 0.5),
-    row(Item::ConvertedSplat, "converted_splat", "splats", pass::CONVERT, 400.0, 0.5),
-    row(Item::FieldSplat, "field_splat", "splats of fields", pass::CONVERT, 3500.0, 0.9),
+    row(Item::ConvertedSplat, "converted_splat", "splats", pass::CONVERT, 350.0, 0.5),
+    row(Item::FieldSplat, "field_splat", "splats of fields", pass::CONVERT, 4500.0, 0.9),
     row(Item::SurfacePoint, "surface_point", "points that become discs", pass::CONVERT, 2700.0, 0.7),
     row(Item::MatterPoint, "matter_point", "points that become a medium", pass::CONVERT, 5000.0, 0.95),
-    row(Item::CastSplat, "cast_splat", "splats", pass::SHADOW_MAP, 30.0, 0.9),
-    row(Item::OpaqueCaster, "opaque_caster", "opaque splats", pass::SHADOW_MAP, 420.0, 0.9),
-    row(Item::ShadowEntry, "shadow_entry", "entries of a shadow table", pass::SHADOW_MAP, 47.0, 0.9),
-    row(Item::LampEntry, "lamp_entry", "entries of a lamp's shadow table", pass::SHADOW_MAP, 290.0, 0.9),
-    row(Item::SortedSplat, "sorted_splat", "splats", pass::SORT, 17.0, 0.5),
+    row(Item::CastSplat, "cast_splat", "splats", pass::SHADOW_MAP, 60.0, 0.9),
+    row(Item::OpaqueCaster, "opaque_caster", "opaque splats", pass::SHADOW_MAP, 490.0, 0.9),
+    row(Item::ShadowEntry, "shadow_entry", "entries of a shadow table", pass::SHADOW_MAP, 60.0, 0.9),
+    row(Item::ShadowRay, "shadow_ray", "rays of a shadow table", pass::SHADOW_MAP, 70.0, 0.9),
+    row(Item::SortedSplat, "sorted_splat", "splats", pass::SORT, 27.0, 0.5),
     row(Item::GroupedDisc, "grouped_disc", "discs", pass::GROUP, 1e4, 0.5),
     row(Item::EnlargedDisc, "enlarged_disc", "enlarged discs", pass::GROUP, 1e6, 0.9),
-    row(Item::ProjectedSplat, "projected_splat", "splats", pass::PROJECT, 85.0, 0.9),
-    row(Item::ShadedSplat, "shaded_splat", "splats", pass::SHADE, 100.0, 0.9),
-    row(Item::ShadowLookUp, "shadow_look_up", "look-ups in shadow tables", pass::SHADE, 210.0, 0.9),
-    row(Item::OpaqueSplat, "opaque_splat", "splats", pass::OPAQUE, 95.0, 0.9),
-    row(Item::OpaqueFragment, "opaque_fragment", "fragments", pass::OPAQUE, 1.0, 0.9),
-    row(Item::BlendedFragment, "blended_fragment", "fragments", pass::SPLAT, 1.0, 0.9),
-    row(Item::BlendedSplat, "blended_splat", "splats", pass::SPLAT, 100.0, 0.9),
+    row(Item::ProjectedSplat, "projected_splat", "splats", pass::PROJECT, 70.0, 0.9),
+    row(Item::ShadedSplat, "shaded_splat", "splats", pass::SHADE, 80.0, 0.9),
+    row(Item::ShadowLookUp, "shadow_look_up", "look-ups in shadow tables", pass::SHADE, 340.0, 0.9),
+    row(Item::OpaqueSplat, "opaque_splat", "splats", pass::OPAQUE, 190.0, 0.9),
+    row(Item::OpaqueFragment, "opaque_fragment", "fragments", pass::OPAQUE, 3.4, 0.9),
+    row(Item::ImageFragment, "image_fragment", "fragments of footprints by images", pass::OPAQUE, 98.0, 0.9),
+    row(Item::MetFragment, "met_fragment", "fragments of discs that rays meet", pass::OPAQUE, 15.0, 0.9),
+    row(Item::BlendedFragment, "blended_fragment", "fragments", pass::SPLAT, 2.7, 0.9),
+    row(Item::BlendedSplat, "blended_splat", "splats", pass::SPLAT, 150.0, 0.9),
     row(Item::RangeSample, "range_sample", "samples", pass::SPLAT, 20.0, 0.9),
-    row(Item::Particle, "particle", "particles", pass::PARTICLES, 50.0, 0.95),
-    row(Item::CellParticle, "cell_particle", "particles of cells", pass::PARTICLES, 350.0, 0.95),
+    row(Item::Particle, "particle", "particles", pass::PARTICLES, 80.0, 0.95),
+    row(Item::CellParticle, "cell_particle", "particles of cells", pass::PARTICLES, 180.0, 0.95),
     row(Item::FieldParticle, "field_particle", "particles of formulas", pass::PARTICLES, 300.0, 0.95),
-    row(Item::LatticeParticle, "lattice_particle", "particles of isosurfaces", pass::PARTICLES, 120.0, 0.95),
-    row(Item::CubicParticle, "cubic_particle", "particles of cubic isosurfaces", pass::PARTICLES, 1300.0, 0.95),
-    row(Item::ScatteredParticle, "scattered_particle", "particles through points", pass::PARTICLES, 1.2e4, 0.95),
-    row(Item::SurveyedVoxel, "surveyed_voxel", "voxels", pass::SAMPLERS, 35.0, 0.9),
-    row(Item::SearchedCell, "searched_cell", "cells about points", pass::SAMPLERS, 1e4, 0.9),
-    row(Item::SetSample, "set_sample", "samples of sets", pass::PARTICLES, 250.0, 0.95),
-    row(Item::SheetFragment, "sheet_fragment", "fragments", pass::SHEETS, 20.0, 0.9),
+    row(Item::LatticeParticle, "lattice_particle", "particles of isosurfaces", pass::PARTICLES, 150.0, 0.95),
+    row(Item::CubicParticle, "cubic_particle", "particles of cubic isosurfaces", pass::PARTICLES, 720.0, 0.95),
+    row(Item::ScatteredParticle, "scattered_particle", "particles through points", pass::PARTICLES, 9900.0, 0.95),
+    row(Item::SurveyedVoxel, "surveyed_voxel", "voxels", pass::SAMPLERS, 30.0, 0.9),
+    row(Item::SearchedCell, "searched_cell", "cells about points", pass::SAMPLERS, 1.3e4, 0.9),
+    row(Item::SetSample, "set_sample", "samples of sets", pass::PARTICLES, 170.0, 0.95),
+    row(Item::SheetFragment, "sheet_fragment", "fragments", pass::SHEETS, 37.0, 0.9),
     row(Item::SweptRow, "swept_row", "rows of footprints", pass::SHEETS, 110.0, 0.9),
-    row(Item::SoftSample, "soft_sample", "moved samples of lights", pass::SHEETS, 2.0, 0.9),
-    row(Item::SlabSample, "slab_sample", "samples of slabs", pass::SHEETS, 50.0, 0.9),
-    row(Item::SurfelDisc, "surfel_disc", "discs", pass::SURFELS, 500.0, 0.9),
-    row(Item::BoxedDisc, "boxed_disc", "discs in boxes", pass::SURFELS, 2000.0, 0.5),
-    row(Item::SurfelFragment, "surfel_fragment", "fragments", pass::SURFELS, 25.0, 0.9),
-    row(Item::SurfelSample, "surfel_sample", "samples", pass::SURFELS, 500.0, 0.9),
-    row(Item::BentSample, "bent_sample", "samples with bent rays", pass::SURFELS, 1.3e4, 0.9),
+    row(Item::SoftSample, "soft_sample", "moved samples of lights", pass::SHEETS, 0.5, 0.9),
+    row(Item::SlabSample, "slab_sample", "samples of slabs", pass::SHEETS, 95.0, 0.9),
+    row(Item::MediumSample, "medium_sample", "samples of volumes in slabs", pass::SHEETS, 540.0, 0.9),
+    row(Item::PolygonLook, "polygon_look", "looks of lights at polygons", pass::SHEETS, 55.0, 0.9),
+    row(Item::SurfelDisc, "surfel_disc", "discs", pass::SURFELS, 550.0, 0.9),
+    row(Item::BoxedDisc, "boxed_disc", "discs in boxes", pass::SURFELS, 900.0, 0.5),
+    row(Item::SurfelFragment, "surfel_fragment", "fragments", pass::SURFELS, 10.0, 0.9),
+    row(Item::SurfelSample, "surfel_sample", "samples", pass::SURFELS, 760.0, 0.9),
+    row(Item::BentSample, "bent_sample", "samples with bent rays", pass::SURFELS, 8600.0, 0.9),
     row(Item::ExactFragment, "exact_fragment", "fragments", pass::REFERENCE, 1000.0, 0.9),
-    row(Item::FinishedSample, "finished_sample", "samples", pass::FINISH, 80.0, 0.5),
+    row(Item::FinishedSample, "finished_sample", "samples", pass::FINISH, 82.0, 0.5),
+    row(Item::EnvironmentSample, "environment_sample", "samples of an environment", pass::FINISH, 250.0, 0.5),
 ];
 
 impl Item {
@@ -210,7 +224,7 @@ impl Item {
             | Self::CastSplat
             | Self::OpaqueCaster
             | Self::ShadowEntry
-            | Self::LampEntry
+            | Self::ShadowRay
             | Self::SortedSplat
             | Self::SurveyedVoxel
             | Self::SearchedCell
@@ -225,16 +239,21 @@ impl Item {
             | Self::OpaqueSplat
             | Self::BlendedSplat => Growth::Fixed,
             Self::OpaqueFragment
+            | Self::ImageFragment
+            | Self::MetFragment
             | Self::BlendedFragment
             | Self::RangeSample
             | Self::SheetFragment
             | Self::SweptRow
             | Self::SlabSample
+            | Self::MediumSample
+            | Self::PolygonLook
             | Self::SurfelFragment
             | Self::SurfelSample
             | Self::BentSample
             | Self::ExactFragment
-            | Self::FinishedSample => Growth::Samples,
+            | Self::FinishedSample
+            | Self::EnvironmentSample => Growth::Samples,
             Self::Particle
             | Self::CellParticle
             | Self::FieldParticle

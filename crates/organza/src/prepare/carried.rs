@@ -1,7 +1,7 @@
 //! Light that a technique carries through what it draws: no shadow map need have that, and which maps are left to build.
 
 use crate::Error;
-use crate::choose::{row, technique_effect, techniques};
+use crate::choose::{row, techniques};
 use crate::form::{Form, PlannedObject};
 use crate::frame::matter::{Carries, CarriesLight, Matter};
 use crate::load::Loaded;
@@ -85,7 +85,7 @@ pub(crate) fn plan(scene: &Scene, loaded: &Loaded, points: &[LightPoint], plan: 
                 soft.reason = ways;
             }
             let what = "light that slabs carry through what they draw, without a shadow map";
-            technique_effect(format!("carried.{label}"), what, called_for, reason)
+            Effect::of_technique(format!("carried.{label}"), what, called_for, reason)
         })
         .collect();
     // Behind the light itself and its shadow.

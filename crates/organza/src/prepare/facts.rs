@@ -80,7 +80,8 @@ fn causes(scene: &Scene, object: &SceneObject, material: &Material, known: &Obje
         EffectKind::Gradients => object.source.has_gradients() && !scene.lights.is_empty(),
         // Each kind by name, so that a new one of objects is not forgotten here.
         EffectKind::Light | EffectKind::Shadow | EffectKind::Soft => false,
-        EffectKind::Scatter | EffectKind::Translucency | EffectKind::Opaque | EffectKind::Layers => false,
+        EffectKind::Scatter | EffectKind::Interreflection | EffectKind::Caustics => false,
+        EffectKind::Translucency | EffectKind::Opaque | EffectKind::Layers => false,
     };
     let is_caused = |kind: EffectKind| {
         let of_any = || object.material_ids().any(|id| kind.is_of(&scene.materials[id].material));

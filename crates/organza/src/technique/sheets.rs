@@ -15,7 +15,7 @@ use crate::frame::{Extent, Frame, Shaded};
 use crate::load::Loaded;
 use crate::load::own::{Body, Own};
 use crate::pass;
-use crate::plan::{Bound, Effect, Plan, PlannedSetting};
+use crate::plan::{Effect, Plan, PlannedSetting};
 use crate::scene::{self, LightPoint, Scene, Technique};
 use crate::statistics::{MediumFacts, ObjectData, ObjectStatistics};
 use crate::technique::{Asked, Fold, OwnWork, Session, points};
@@ -60,23 +60,28 @@ pub(crate) fn counts(_: &Scene, translucent: &Translucent) -> Vec<Count> {
         Count::new(Item::SweptRow, translucent.own_work.swept_rows),
         Count::new(Item::SoftSample, translucent.own_work.soft_samples),
         Count::new(Item::SlabSample, translucent.own_work.slab_samples),
+        Count::new(Item::MediumSample, translucent.own_work.medium_samples),
+        Count::new(Item::PolygonLook, translucent.own_work.polygon_looks),
     ]
 }
 
 /// The same of a medium that is not converted yet: its splats stand for the voxels.
 pub(crate) fn foresees(asked: &Asked<'_>, camera: &Camera) -> OwnWork {
     let Some(medium) = asked.medium().filter(|medium| medium.is_lattice) else { return OwnWork::default() };
-    let is_half = matches!(asked.settings.sheets.slicing, scene::Slicing::HalfVector { .. });
     let shining = asked.scene.lights.iter().filter(|light| light.light.intensity != [0.0; 3]);
     let lights: f64 = shining.map(|light| light.count() as f64).sum();
-    let sweeps = if is_half { 2.0 * lights.max(1.0) } else { 1.0 };
-    let lit = if is_half { 1.0 } else { lights };
     let seen = Extent::new(&medium.bounds, camera);
+    if let scene::Slicing::HalfVector { light_pixels, .. } = asked.settings.sheets.slicing {
+        let slabs_of_voxel = medium.spacing / asked.settings.sheets.slab_width.unwrap_or(medium.spacing);
+        let eye = seen.share * (medium.spacing * seen.samples_per_unit).powi(2);
+        let medium_samples = lights.max(1.0) * medium.splats * slabs_of_voxel * (eye + light_pixels * light_pixels);
+        return OwnWork { medium_samples, ..OwnWork::default() };
+    }
     let radius = asked.settings.sheets.kernel_extent * medium.spacing * seen.samples_per_unit;
     let slabs = medium.bounds.diagonal() / medium.spacing;
     OwnWork {
-        items: sweeps * medium.splats * seen.share * (std::f64::consts::PI * radius * radius).max(1.0),
-        slab_samples: sweeps * seen.samples * slabs * (1.0 + lit),
+        items: medium.splats * seen.share * (std::f64::consts::PI * radius * radius).max(1.0),
+        slab_samples: seen.samples * slabs * (1.0 + lights),
         ..OwnWork::default()
     }
 }
@@ -131,11 +136,19 @@ fn own_work(frame: &Frame<'_>) -> OwnWork {
         let sections = 2.0 * extent * step / least_step + 1.0;
         let rows_of_eye = seen.share * rows(radius);
         let rows_of_light = rows(extent * half::light_pixels(frame.scene) * step / least_step);
-        // What the eye sees of a slab, and what the light does.
-        let images = if is_half { 2.0 } else { 1.0 };
+        // What the eye sees of a volume in slabs, and what the light does.
+        let unit = libm::exp2(f64::from(-frame.loaded.exponent));
+        let slabs_of_voxel = step / frame.settings.sheets.slab_width.map_or(least_step, |width| width * unit);
+        let eye = seen.share * (step * seen.samples_per_unit).powi(2);
+        let light = (half::light_pixels(frame.scene) * step / least_step).powi(2);
         OwnWork {
             items: if is_splatted && !is_half { fragments } else { 0.0 },
-            slab_samples: images * sweeps * seen.samples * slabs * (1.0 + lit) * share_of_samples,
+            slab_samples: if is_half { 0.0 } else { seen.samples * slabs * (1.0 + lit) * share_of_samples },
+            medium_samples: if is_half && !is_splatted {
+                sweeps * gathered_voxels(grid, transfer) * slabs_of_voxel * (eye + light)
+            } else {
+                0.0
+            },
             swept_rows: if is_half && is_splatted {
                 sweeps * shaping_voxels(grid, transfer) * sections * (rows_of_eye + rows_of_light)
             } else {
@@ -149,10 +162,15 @@ fn own_work(frame: &Frame<'_>) -> OwnWork {
         sum.items += work.items;
         sum.slab_samples += work.slab_samples;
         sum.swept_rows += work.swept_rows;
+        sum.medium_samples += work.medium_samples;
     }
     let bounds = volumes().map(Own::world_box).reduce(DAabb::union);
     let slabs = bounds.map_or(0.0, |bounds| bounds.diagonal() / least_step);
-    OwnWork { soft_samples: if is_half { half::soft_samples(frame, slabs) } else { 0.0 }, ..sum }
+    if !is_half {
+        return sum;
+    }
+    let polygon_looks = half::polygon_looks(frame, sum.medium_samples);
+    OwnWork { soft_samples: half::soft_samples(frame, slabs), polygon_looks, ..sum }
 }
 
 /// Voxels with extinction near them, about, from a look at some: they shape what is seen, and are splatted too.
@@ -177,6 +195,25 @@ fn shaping_voxels(grid: &Grid, transfer: &TransferFunction) -> f64 {
     (0..number).step_by(stride | 1).filter(|at| shapes(*at)).count() as f64 * (stride | 1) as f64
 }
 
+/// Voxels in bricks that hold some extinction, about, from a look at some: all of these are read where slabs are gathered.
+fn gathered_voxels(grid: &Grid, transfer: &TransferFunction) -> f64 {
+    const LOOKS: usize = 1 << 11;
+    const BRICK: usize = 8;
+    // Kernels reach into a brick from beside it.
+    const PLACES: [isize; 4] = [-1, 2, 5, 8];
+    let number = grid.values.len();
+    let stride = number.div_ceil(LOOKS).max(1) | 1;
+    let [columns, rows, _] = grid.dims;
+    let is_read = |at: usize| {
+        let corner = [at % columns, at / columns % rows, at / columns / rows].map(|place| place / BRICK * BRICK);
+        let [i, j, k] = corner.map(|place| place as isize);
+        let has_extinction =
+            |a: isize, b: isize, c: isize| transfer.at(grid.at_clamped(i + a, j + b, k + c)).extinction > 0.0;
+        PLACES.iter().any(|c| PLACES.iter().any(|b| PLACES.iter().any(|a| has_extinction(*a, *b, *c))))
+    };
+    (0..number).step_by(stride).filter(|at| is_read(*at)).count() as f64 * stride as f64
+}
+
 /// Rows of a footprint of this radius, samples, each once for 16 of its samples.
 fn rows(radius: f64) -> f64 {
     const SAMPLES_OF_A_ROW: f64 = 16.0;
@@ -197,15 +234,12 @@ pub(crate) fn plans(scene: &Scene, loaded: &Loaded, plan: &mut Plan) {
         Reconstruction::Gather(GatherKernel::Gaussian) => "gathered slabs",
         Reconstruction::Gather(GatherKernel::Linear) => "linearly gathered slabs",
     };
-    plan.effects.push(Effect {
-        name: name.into(),
-        what: "how slabs get the values of volumes",
-        called_for: true,
-        reason: form.reason.into(),
-        bound: Bound::Unknown,
-        is_lacking: false,
-        is_absent: false,
-    });
+    plan.effects.push(Effect::of_technique(
+        name.into(),
+        "how slabs get the values of volumes",
+        true,
+        form.reason.into(),
+    ));
 }
 
 /// The precision of the sums of slabs, which every planned picture of this technique has.

@@ -52,6 +52,9 @@ pub(crate) fn bumps(scene: &Scene) -> Result<(), &'static str> {
 
 /// Discs whose fragments are averaged and composited, range by range, and rays that are bent.
 pub(crate) fn counts(scene: &Scene, translucent: &Translucent) -> Vec<Count> {
+    if !translucent.any {
+        return Vec::new();
+    }
     let bends = scene.materials.iter().any(|m| m.material.bounds_matter());
     vec![
         Count::new(Item::SurfelDisc, translucent.splats),

@@ -43,11 +43,11 @@ const CLEAR: Band = [2.5, 3.5];
 /// Half extent in cells below which a corner does not matter.
 const SMALL: Band = [0.3, 0.5];
 /// Angular radius from which on casters are swept over the whole table.
-const CLOSE: Band = [0.3, NEAR];
+pub(crate) const CLOSE: Band = [0.3, NEAR];
 /// Rays along a half extent where several rays a cell are taken: more than one a deviation of the kernel.
-const RAYS: f32 = 4.0;
+pub(crate) const RAYS: f32 = 4.0;
 /// Most rays along a side of a cell.
-const FINE: f32 = 8.0;
+pub(crate) const FINE: f32 = 8.0;
 
 /// How far `x` has gone through a band, from 0 to 1.
 #[inline(always)]

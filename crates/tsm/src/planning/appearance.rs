@@ -2,7 +2,7 @@
 //! angular sizes.
 
 use crate::building::caster::Casters;
-use crate::building::deposit::{BENT, Band, WIDE};
+use crate::building::deposit::{BENT, Band, CLOSE, FINE, RAYS, WIDE};
 use crate::building::lanes::{LANES, Lane};
 use crate::building::shares::{HALF_WIDTH, cells_along};
 use crate::frame::Frame;
@@ -53,6 +53,28 @@ pub(crate) enum Apparent {
     Tangent,
     /// By length, for parallel light.
     Length,
+}
+
+/// What casters leave in a table.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Entries {
+    /// Entries, by the closed form or by rays.
+    pub(crate) entries: f64,
+    /// Rays of cells that sample.
+    pub(crate) rays: f64,
+}
+
+impl Entries {
+    /// No more entries than this number, and as many fewer rays.
+    fn within(self, most: f64) -> Self {
+        let share = if self.entries > most { most / self.entries } else { 1.0 };
+        Self { entries: share * self.entries, rays: share * self.rays }
+    }
+
+    fn add(&mut self, other: Self, times: f64) {
+        self.entries += times * other.entries;
+        self.rays += times * other.rays;
+    }
 }
 
 /// How many casters are of which size: weights at sizes a quarter octave apart. A caster counts at the two sizes about its
@@ -191,11 +213,20 @@ impl Appearance {
 
     /// Entries that translucent casters make in a table of `cells` cells of side `cell` (angle, tangent or length), where rays begin to sample
     /// footprints of media at `wide`, and `media` is their share.
-    pub(crate) fn entries(&self, cell: f64, cells: f64, wide: Band, media: f64) -> f64 {
+    pub(crate) fn entries(&self, cell: f64, cells: f64, wide: Band, media: f64) -> Entries {
         let parallel = self.apparent == Apparent::Length;
-        let by_band = |size, band| entries_of(size, cell / self.unit, band, parallel).min(cells);
-        let made = |size| media * by_band(size, wide) + (1.0 - media) * by_band(size, WIDE);
-        self.radius.sizes_and_counts().map(|(size, count)| count * made(size)).sum()
+        let by_band = |size, band| {
+            // Casters near the light are swept over the whole table.
+            let is_swept = !parallel && size > f64::from(CLOSE[0]);
+            let made = entries_of(size, cell / self.unit, band, parallel).within(cells);
+            Entries { rays: if is_swept { made.rays + cells } else { made.rays }, ..made }
+        };
+        let mut sum = Entries::default();
+        for (size, count) in self.radius.sizes_and_counts() {
+            sum.add(by_band(size, wide), count * media);
+            sum.add(by_band(size, WIDE), count * (1.0 - media));
+        }
+        sum
     }
 
     /// Cells that casters of all kinds overlap: what work goes by. Larger cells are fewer.
@@ -214,23 +245,28 @@ impl Appearance {
 
 /// Entries of a kernel of this apparent radius in cells of this side, by the ways that [`crate::building::deposit`] takes: in a band
 /// between two, both leave their entries.
-fn entries_of(radius: f64, cell: f64, wide: Band, parallel: bool) -> f64 {
+fn entries_of(radius: f64, cell: f64, wide: Band, parallel: bool) -> Entries {
     let [wide, bent] = [wide, BENT].map(|band| band.map(f64::from));
     let across = radius / cell;
     let bend = if parallel { 0.0 } else { radius * across };
-    let mut entries = 0.0;
+    let mut made = Entries::default();
     if across > wide[0] {
-        entries += PI * across * across;
+        let wide = PI * across * across;
+        made.entries += wide;
+        made.rays += wide;
     }
     if across < wide[1] && bend > bent[0] {
         // Two numbers of rays, but for the smallest.
         let sets = if across > 0.5 { 2.0 } else { 1.0 };
-        entries += sets * (1.0 + across).powi(2);
+        let cells = (1.0 + across).powi(2);
+        made.entries += sets * cells;
+        let along_cell = (f64::from(RAYS) / across).clamp(1.0, f64::from(FINE));
+        made.rays += sets * cells * along_cell * along_cell;
     }
     if across < wide[1] && bend < bent[1] {
-        entries += cells_along(HALF_OF_RADIUS * across).powi(2);
+        made.entries += cells_along(HALF_OF_RADIUS * across).powi(2);
     }
-    entries
+    made
 }
 
 /// The second look at one part of the splats, in the form that [`pulp`] compiles once per instruction set.

@@ -1,7 +1,7 @@
 //! The cost of a map: predicted before any work, counted afterwards.
 
 use crate::mapping::Octahedral;
-use crate::planning::appearance::Appearance;
+use crate::planning::appearance::{Appearance, Entries};
 use crate::planning::lit::Lit;
 use crate::planning::survey::Survey;
 use splat_core::SplatKind;
@@ -44,6 +44,8 @@ pub struct Prediction {
     pub limit: Limit,
     /// Entries that translucent splats deposit; of a ball 0.6 to 1.4 times the counted ones.
     pub entries: f64,
+    /// Rays of cells that sample splats: several a cell where footprints bend, near a lamp; none where the closed form serves.
+    pub rays: f64,
     /// Bytes that the build takes at its peak.
     pub bytes: u64,
     /// Bytes of the finished map among them.
@@ -81,7 +83,8 @@ pub(crate) fn predict(
     let kinds = survey.kinds;
     let [media, surfaces] = [SplatKind::Medium, SplatKind::Surface].map(|kind| kinds[kind as usize]);
     let media_share = media as f64 / (media + surfaces).max(1) as f64;
-    let entries = lit.share * look.entries(cell, cells, lit.wide(), media_share);
+    let Entries { entries, rays } = look.entries(cell, cells, lit.wide(), media_share);
+    let entries = lit.share * entries;
     let channels = if survey.coloured { 3.0 } else { 1.0 };
     // A distance and its sum.
     let knot = 4.0 + 4.0 * channels;
@@ -92,5 +95,6 @@ pub(crate) fn predict(
     // Before they stand in the lists, entries stand with their cells, parted by ranges.
     let peak = map + entries * (8.0 + 4.0 * channels);
     let [bytes, map_bytes] = [peak, map].map(|bytes| bytes.min(u64::MAX as f64) as u64);
-    Prediction { size: size.map(|n| n as u64), limit, entries, bytes, map_bytes }
+    let rays = lit.share * rays;
+    Prediction { size: size.map(|n| n as u64), limit, entries, rays, bytes, map_bytes }
 }

@@ -16,6 +16,7 @@ pub(super) static ROW: Row = Row {
     without: "what it bounds is clear",
     candidates,
     take: |plan, candidates, is_on| leave_out(EffectKind::Absorption, plan, candidates, is_on),
+    work: None,
 };
 
 fn candidates(statistics: &Statistics, _: &Plan) -> Vec<super::Candidate> {

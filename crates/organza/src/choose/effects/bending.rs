@@ -15,6 +15,7 @@ pub(super) static ROW: Row = Row {
     without: "light goes straight through it",
     candidates,
     take: |plan, candidates, is_on| leave_out(EffectKind::Bending, plan, candidates, is_on),
+    work: Some(|work, _| work.bending()),
 };
 
 fn candidates(statistics: &Statistics, _: &Plan) -> Vec<super::Candidate> {

@@ -67,7 +67,9 @@ impl Candidate {
         };
         let name = if is_absent { row.kind.word().to_owned() } else { row.kind.name(&self.label) };
         let is_lacking = is_on && self.is_missing;
-        Effect { name, what: row.what, called_for: is_on, reason, bound, is_lacking, is_absent }
+        let kind = Some(row.kind);
+        let label = self.label.clone();
+        Effect { name, kind, label, what: row.what, called_for: is_on, reason, bound, is_lacking, is_absent }
     }
 }
 

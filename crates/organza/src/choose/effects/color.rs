@@ -17,6 +17,7 @@ pub(super) static ROW: Row = Row {
     without: "it absorbs red, green and blue alike, each as their mean",
     candidates,
     take: |plan, candidates, is_on| leave_out(EffectKind::Color, plan, candidates, is_on),
+    work: None,
 };
 
 fn candidates(statistics: &Statistics, _: &Plan) -> Vec<super::Candidate> {

@@ -14,6 +14,7 @@ pub(super) static ROW: Row = Row {
     without: "all channels are bent as green is",
     candidates,
     take: |plan, candidates, is_on| leave_out(EffectKind::Dispersion, plan, candidates, is_on),
+    work: None,
 };
 
 fn candidates(statistics: &Statistics, _: &Plan) -> Vec<super::Candidate> {

@@ -15,6 +15,7 @@ pub(super) static ROW: Row = Row {
     without: "it scatters light by its phase function, as if it had no gradients",
     candidates,
     take: |plan, candidates, is_on| leave_out(EffectKind::Gradients, plan, candidates, is_on),
+    work: None,
 };
 
 fn candidates(statistics: &Statistics, _: &Plan) -> Vec<super::Candidate> {

@@ -15,4 +15,5 @@ pub(super) static ROW: Row = Row {
         }]
     },
     take: take_nothing,
+    work: None,
 };

@@ -16,6 +16,7 @@ pub(super) static ROW: Row = Row {
     without: WITHOUT,
     candidates,
     take: |plan, _, is_on| plan.lights = is_on.to_vec(),
+    work: Some(|work, label| work.light(label)),
 };
 
 fn candidates(statistics: &Statistics, _: &Plan) -> Vec<Candidate> {

@@ -17,6 +17,7 @@ pub(super) static ROW: Row = Row {
     without: "the picture is that of the scene without it",
     candidates,
     take: |plan, candidates, is_on| leave_out(EffectKind::Object, plan, candidates, is_on),
+    work: Some(|work, label| work.object(label)),
 };
 
 fn candidates(statistics: &Statistics, _: &Plan) -> Vec<super::Candidate> {

@@ -21,6 +21,7 @@ pub(super) static ROW: Row = Row {
     without: WITHOUT,
     candidates: |statistics, _| vec![candidate(statistics)],
     take: take_nothing,
+    work: None,
 };
 
 fn candidate(statistics: &Statistics) -> Candidate {

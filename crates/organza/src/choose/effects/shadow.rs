@@ -18,6 +18,7 @@ pub(super) static ROW: Row = Row {
     without: WITHOUT,
     candidates,
     take: |plan, _, is_on| plan.shadow_maps = is_on.to_vec(),
+    work: Some(|work, label| work.shadow(label)),
 };
 
 fn candidates(statistics: &Statistics, plan: &Plan) -> Vec<Candidate> {

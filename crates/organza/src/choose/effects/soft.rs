@@ -19,6 +19,7 @@ pub(super) static ROW: Row = Row {
     without: WITHOUT,
     candidates,
     take: take_nothing,
+    work: Some(|work, label| work.soft(label)),
 };
 
 fn candidates(statistics: &Statistics, plan: &Plan) -> Vec<Candidate> {

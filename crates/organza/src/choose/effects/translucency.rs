@@ -11,6 +11,7 @@ pub(super) static ROW: Row = Row {
     without: "nothing shows through",
     candidates: |statistics, _| vec![candidate(statistics)],
     take: take_nothing,
+    work: None,
 };
 
 fn candidate(statistics: &Statistics) -> Candidate {

@@ -6,8 +6,8 @@ mod splats;
 
 use super::{params, reconstruction, refuse, volumes};
 use crate::form::{Form, PlannedObject};
-use crate::frame::Frame;
 use crate::frame::matter::{Carries, CarriesLight, Matter};
+use crate::frame::{Extent, Frame};
 use crate::pass;
 use crate::scene::{self, LightPoint, Scene, Slicing, SoftShadows, Technique};
 use crate::technique::Session;
@@ -112,6 +112,15 @@ pub(super) fn soft_samples(frame: &Frame<'_>, slabs: f64) -> f64 {
     let whole = frame.light_points().iter().filter(|point| is_whole(frame.scene, point));
     let side = slabs * light_pixels(frame.scene);
     2.0 * whole.count() as f64 * slabs * side * side
+}
+
+/// Looks of points of lights at opaque polygons: from each sample of a surface, and from so many of volumes.
+pub(super) fn polygon_looks(frame: &Frame<'_>, medium_samples: f64) -> f64 {
+    let points = frame.light_points().iter().filter(|point| point.light.intensity != [0.0; 3]).count() as f64;
+    let polygons = || frame.loaded.own.iter().filter(|native| native.form.is_polygons());
+    let samples = polygons().map(|native| Extent::new(&native.world_box(), &frame.camera).samples);
+    let surfaces = samples.sum::<f64>().min(frame.camera.pixels() as f64);
+    if polygons().next().is_some() { points * (surfaces + medium_samples) } else { 0.0 }
 }
 
 /// Bytes of the largest sweep, among such translucent polygons.

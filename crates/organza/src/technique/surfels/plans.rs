@@ -2,7 +2,7 @@
 
 use crate::load::Loaded;
 use crate::pass;
-use crate::plan::{Bound, Effect, Plan, PlannedPass};
+use crate::plan::{Effect, Plan, PlannedPass};
 use crate::scene::{OpaqueSurfels, Scene, SurfelGroups, SurfelLayers, Technique};
 use splat_core::SplatKind;
 
@@ -26,15 +26,7 @@ pub(crate) fn plans(scene: &Scene, loaded: &Loaded, plan: &mut Plan) {
     }
     let mut add = |at: &str, name: &str, reason: String, groups: bool| {
         let Some(at) = plan.passes.iter().position(|p| p.name == at) else { return };
-        plan.effects.push(Effect {
-            name: name.into(),
-            what: "how discs of surfaces are joined",
-            called_for: true,
-            reason,
-            bound: Bound::Unknown,
-            is_lacking: false,
-            is_absent: false,
-        });
+        plan.effects.push(Effect::of_technique(name.into(), "how discs of surfaces are joined", true, reason));
         if groups {
             let reason = "groups of discs that hardly overlap".into();
             plan.passes.insert(at, PlannedPass { name: pass::GROUP.into(), reason });
