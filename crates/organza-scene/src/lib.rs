@@ -42,7 +42,7 @@ pub use in_memory::{InMemory, SourceData, name_of as name_in_memory, source_of a
 pub use light::model::{SceneLight, SlideSource};
 pub use light::points::{LightPoint, light_points};
 pub use load::options::LoadOptions;
-pub use load::{load, parse, schema};
+pub use load::{check_keys, keys_at, load, parse, schema};
 pub use material::model::SceneMaterial;
 pub use material::recipes::Recipe;
 pub use object::labels::{ObjectLabels, Table as LabelFile, read_label_table};

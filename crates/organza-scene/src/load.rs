@@ -12,7 +12,7 @@ use crate::text::file::{BYTES_PER_CHARACTER, MAX_SCENE_BYTES, decode, read};
 use crate::text::json::read_json;
 use crate::text::overrides::{self, Override};
 use crate::text::toml::read_toml;
-use crate::text::tree::Document;
+use crate::text::tree::{Document, Node};
 use crate::{Error, camera};
 use sha2::{Digest, Sha256};
 use splat_core::Exceeded;
@@ -40,9 +40,7 @@ pub fn parse(file: &Path, bytes: &[u8], options: &LoadOptions) -> Result<Scene, 
     let what = format!("the scene {}", crate::printable(file));
     let _held = options.memory.take(&what, bytes.len() as u64 * BYTES_PER_CHARACTER).map_err(Error::Limit)?;
     let text = decode(file, bytes)?;
-    let is_json = file.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
-    let root = if is_json { read_json(file, text)? } else { read_toml(file, text)? };
-    let mut document = Document { file, text, flags: Vec::new(), root };
+    let mut document = Document { file, text, flags: Vec::new(), root: read_tree(file, text)? };
     camera::raw::expand(&mut document.root);
     overrides::apply(&mut document, &options.overrides)?;
     let turn = options.turntable.map(|frames| Turn { frames: frames.max(1), frame: options.frame.unwrap_or(0) });
@@ -66,6 +64,35 @@ pub fn parse(file: &Path, bytes: &[u8], options: &LoadOptions) -> Result<Scene, 
         scene.stops.clear();
     }
     Ok(scene)
+}
+
+/// Checks the keys of a scene file, and the types of their values; `file` gives the format. Nothing that a value names is looked for.
+///
+/// # Errors
+/// [`Error::Scene`] with line and column.
+pub fn check_keys(file: &Path, text: &str) -> Result<(), Error> {
+    let mut document = Document { file, text, flags: Vec::new(), root: read_tree(file, text)? };
+    camera::raw::expand(&mut document.root);
+    de::from_document::<RawScene>(&document).map(|_| ())
+}
+
+/// The keys that lead to what is written at a line and a column (both from 1) of a scene file, such as `object`, `scan`, `color_by`, `map`: an entry of a
+/// list has its `name`, or its index from 0. `None` where no key and no value begins there, and for a text that is no scene file.
+///
+/// ```
+/// let text = "{\"version\": 1, \"object\": [{\"name\": \"scan\", \"opacty\": 0.5}]}";
+/// let error = organza_scene::check_keys("a.json".as_ref(), text).unwrap_err();
+/// assert!(error.to_string().starts_with("a.json:1:44: unknown key `opacty`"), "{error}");
+/// assert_eq!(organza_scene::keys_at("a.json".as_ref(), text, 1, 44).unwrap(), ["object", "scan", "opacty"]);
+/// ```
+pub fn keys_at(file: &Path, text: &str, line: usize, column: usize) -> Option<Vec<String>> {
+    let root = read_tree(file, text).ok()?;
+    Document { file, text, flags: Vec::new(), root }.keys_at(line, column)
+}
+
+fn read_tree(file: &Path, text: &str) -> Result<Node, Error> {
+    let is_json = file.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
+    if is_json { read_json(file, text) } else { read_toml(file, text) }
 }
 
 fn hash(bytes: &[u8], options: &LoadOptions) -> String {

@@ -137,6 +137,16 @@ impl Document<'_> {
         self.node_of(path).place
     }
 
+    /// The keys that lead to the key or value that is written at a line and a column, both from 1: of the deepest one, where several begin there.
+    /// An entry of a list has its `name`, or its index from 0.
+    pub(crate) fn keys_at(&self, line: usize, column: usize) -> Option<Vec<String>> {
+        let written = self.text.split_inclusive('\n').nth(line.checked_sub(1)?)?;
+        let (offset, _) = written.char_indices().nth(column.checked_sub(1)?)?;
+        let above: usize = self.text.split_inclusive('\n').take(line - 1).map(str::len).sum();
+        let mut keys = Vec::new();
+        find(&self.root, Place::Byte(above + offset), &mut keys).then_some(keys)
+    }
+
     /// That value.
     pub(crate) fn node_of(&self, path: &[Step<'_>]) -> &Node {
         let mut node = &self.root;
@@ -150,6 +160,33 @@ impl Document<'_> {
             node = next;
         }
         node
+    }
+}
+
+/// Returns whether a key or value below a node begins at a place; `keys` lead to it then, and stay as they were otherwise.
+fn find(node: &Node, sought: Place, keys: &mut Vec<String>) -> bool {
+    let mut below = |key: String, place: Option<Place>, node: &Node| {
+        keys.push(key);
+        let is_found = find(node, sought, keys) || place == Some(sought) || node.place == sought;
+        if !is_found {
+            keys.pop();
+        }
+        is_found
+    };
+    match &node.value {
+        Value::Table(entries) => entries.iter().any(|entry| below(entry.key.clone(), Some(entry.place), &entry.node)),
+        Value::List(items) => items.iter().enumerate().any(|(i, item)| below(label(i, item), None, item)),
+        _ => false,
+    }
+}
+
+/// What an entry of a list is called.
+fn label(index: usize, item: &Node) -> String {
+    let Value::Table(entries) = &item.value else { return index.to_string() };
+    let name = entries.iter().find(|entry| entry.key == "name").map(|entry| &entry.node.value);
+    match name {
+        Some(Value::Text(name)) => name.clone(),
+        _ => index.to_string(),
     }
 }
 
