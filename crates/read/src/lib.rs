@@ -58,7 +58,7 @@ pub use label_rows::{LabelRow, LabelRows, label_rows, label_rows_of_bytes};
 #[cfg(feature = "ply")]
 pub use meshes::texture::Rgba;
 #[cfg(feature = "ply")]
-pub use meshes::textured::{TextureImage, TexturePlaces, textured_in_memory};
+pub use meshes::textured::{TextureImage, TexturePlaces, smoothed_in_memory, textured_in_memory};
 pub use reading::{Fix, Mended, NamedColumn, Notes};
 /// The nouns that this crate takes and returns.
 pub use splat_core;

@@ -17,6 +17,8 @@ pub(crate) mod outwards;
 #[cfg(any(feature = "obj", feature = "gltf", feature = "ply"))]
 pub(crate) mod paint;
 #[cfg(feature = "ply")]
+pub(crate) mod places;
+#[cfg(feature = "ply")]
 pub(crate) mod ply;
 #[cfg(any(feature = "ply", feature = "obj", feature = "off", feature = "vti", feature = "vtk"))]
 pub(crate) mod polygon;

@@ -2,9 +2,10 @@
 
 use crate::read_samples::image;
 use read::{
-    Fault, Loaded, ReadParams, Rgba, TextureImage, TexturePlaces, file, mesh_columns_in_memory, textured_in_memory,
+    Fault, Loaded, ReadParams, Rgba, TextureImage, TexturePlaces, file, mesh_columns_in_memory, smoothed_in_memory,
+    textured_in_memory,
 };
-use splat_core::glam::Vec3;
+use splat_core::glam::{DVec3, Vec3};
 use splat_core::{Association, MemoryAccount, Mesh, MeshColumn, Relative};
 use std::path::{Path, PathBuf};
 
@@ -80,6 +81,42 @@ fn vertices_that_a_seam_parts_are_shaded_as_one() {
         mesh.triangles.iter().map(|t| t.map(of_vertex)).collect::<Vec<_>>()
     };
     assert_eq!(corners(&mesh)[..4], corners(&of_file)[..4]);
+}
+
+/// A strip around the y axis, whose last column of vertices lies where its first does, but for rounding.
+fn barrel() -> Mesh {
+    let sides = 24;
+    let place = |k: u32| {
+        let turn = f64::from(k) / f64::from(sides) * std::f64::consts::TAU;
+        [0.0, 1.0].map(|y| DVec3::new(libm::cos(turn), y, libm::sin(turn)).as_vec3())
+    };
+    let triangles = (0..sides).flat_map(|k| [[2 * k, 2 * k + 1, 2 * k + 2], [2 * k + 1, 2 * k + 3, 2 * k + 2]]);
+    let triangles = triangles.collect();
+    Mesh { position: (0..=sides).flat_map(place).collect(), triangles, ..Mesh::default() }
+}
+
+#[test]
+fn the_seam_of_a_closed_surface_is_no_edge_however_its_places_are_rounded() {
+    let barrel = barrel();
+    let last = barrel.position.len() - 2;
+    assert_ne!(barrel.position[0], barrel.position[last], "rounding parts them");
+    let params = ReadParams::default();
+    let plain = smoothed_in_memory("barrel", barrel.clone(), &params).unwrap();
+    assert_eq!((&plain.position, &plain.triangles), (&barrel.position, &barrel.triangles));
+    let image = TextureImage::Texels { size: [1, 1], rgba: Rgba::Linear(vec![[0.5; 4]]) };
+    let places = TexturePlaces::Vertices(vec![[0.5; 2]; barrel.position.len()]);
+    let (textured, _) = textured_in_memory("barrel", barrel.clone(), &places, image, &params).unwrap();
+    for mesh in [plain, textured] {
+        let normal = mesh.normal[0];
+        assert_eq!(normal, mesh.normal[last]);
+        assert!(normal.abs().distance(Vec3::X) < 0.01, "{normal}");
+    }
+    // What has normals, or no vertices at one place, stays as it is.
+    let open = Mesh { triangles: vec![[0, 1, 2]], position: barrel.position[..4].to_vec(), ..Mesh::default() };
+    let lit = Mesh { normal: vec![Vec3::Y; barrel.position.len()], ..barrel };
+    for mesh in [open, lit] {
+        assert_eq!(smoothed_in_memory("barrel", mesh.clone(), &params).unwrap(), mesh);
+    }
 }
 
 #[test]

@@ -1,7 +1,8 @@
 //! Meshes in memory with a texture, which becomes colours of their vertices as that of a file does.
 
-use super::paint::corners::{BYTES_PER_CORNER, painted};
+use super::paint::corners::{BYTES_PER_CORNER, Corner, NONE, painted, smooth};
 use super::paint::{Alpha, Paint};
+use super::places::first_at_place;
 use super::ply::texture::Wedges;
 use super::texture::{Rgba, Texture};
 use crate::ReadParams;
@@ -10,7 +11,6 @@ use crate::reading::{Notes, Reading};
 use crate::stream::input::{self, Stream};
 use splat_core::Mesh;
 use splat_core::text::escaped_path;
-use std::collections::HashMap;
 use std::path::PathBuf;
 
 /// The image that a mesh in memory is painted with. It repeats beyond its borders, and between the middles of its texels it is interpolated.
@@ -62,6 +62,29 @@ pub fn textured_in_memory(
     Ok((mesh, reading.finish(name)))
 }
 
+/// Gives a mesh in memory without normals, some of whose vertices lie at one place, the normals that it has where these are one: the seam of a closed surface is
+/// no edge. A mesh without such vertices stays as it is. `name` serves messages.
+///
+/// # Errors
+/// [`ReadError`] for what takes more memory than `params` allow.
+///
+/// # Panics
+/// If a vertex index is out of range, see [`Mesh::validate`].
+pub fn smoothed_in_memory(name: &str, mut mesh: Mesh, params: &ReadParams) -> Result<Mesh, ReadError> {
+    let params = &ReadParams { memory: params.memory.part(), ..params.clone() };
+    let reading = Reading::new(params, None);
+    if !mesh.normal.is_empty() {
+        return Ok(mesh);
+    }
+    let first = first_at_place(&mesh.position, &reading).map_err(|e| e.in_file(name))?;
+    if first.iter().enumerate().all(|(v, first)| v as u32 == *first) {
+        return Ok(mesh);
+    }
+    let mut corners: Vec<Corner> = first.into_iter().map(|v| [v, NONE, NONE, NONE]).collect();
+    smooth(&mut mesh, &mut corners, &reading).map_err(|e| e.in_file(name))?;
+    Ok(mesh)
+}
+
 fn texture(name: &str, image: TextureImage, reading: &Reading<'_>) -> Result<Texture, ReadError> {
     match image {
         TextureImage::Texels { size, rgba } => Texture::of_texels(size, rgba, reading).map_err(|e| e.in_file(name)),
@@ -108,12 +131,10 @@ fn with_texture(
     mesh.triangles = triangles;
     let (mut corners, places) = wedges.into_parts();
     // The seams of a texture are no edges of the surface, whose normals are smooth across them.
-    let mut known = HashMap::new();
-    for (corner, position) in corners.iter_mut().zip(&mesh.position) {
-        // −0 and 0 are one place.
-        let place = position.to_array().map(|x| (x + 0.0).to_bits());
-        corner[0] = *known.entry(place).or_insert(corner[0]);
+    let vertex_of: Vec<u32> = corners.iter().map(|corner| corner[0]).collect();
+    for (corner, first) in corners.iter_mut().zip(first_at_place(&mesh.position, reading)?) {
+        corner[0] = vertex_of[first as usize];
     }
-    drop(known);
+    drop(vertex_of);
     painted(mesh, corners, &places, vec![PAINT], vec![texture], reading)
 }

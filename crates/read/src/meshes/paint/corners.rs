@@ -59,7 +59,7 @@ fn tint(mesh: &mut Mesh) -> Vec<[f32; 4]> {
 
 /// Gives the mesh the normals that it has where materials split no vertex: a change of material is no edge. A vertex on several sides of a
 /// sharp edge becomes several.
-fn smooth(mesh: &mut Mesh, corners: &mut Vec<Corner>, reading: &Reading<'_>) -> Result<(), ReadError> {
+pub(crate) fn smooth(mesh: &mut Mesh, corners: &mut Vec<Corner>, reading: &Reading<'_>) -> Result<(), ReadError> {
     let count = corners.iter().map(|c| c[0] as usize + 1).max().unwrap_or(0);
     let bytes = count as u64 * BYTES_PER_WHOLE_VERTEX + mesh.triangles.len() as u64 * BYTES_PER_WHOLE_TRIANGLE;
     input::hold("the surface without materials", bytes, reading.params)?;
