@@ -124,8 +124,12 @@ pub(crate) fn vectors(name: &str, array: &Bound<'_, PyAny>, count: usize) -> PyR
     rows(name, array, Some(count), |row| DVec3::from_array(row).as_vec3())
 }
 
-/// Colours, one a row: linear numbers, or bytes of sRGB where the array is of bytes.
+/// Colours, one a row: linear numbers, or numbers of sRGB where the array is of bytes or of two bytes each.
 pub(crate) fn colors(name: &str, array: &Bound<'_, PyAny>, count: usize) -> PyResult<Vec<[f32; 3]>> {
+    if is_of_two_bytes(array) {
+        let linear = |value: f64| splat_core::srgb::decoded(value / f64::from(u16::MAX)) as f32;
+        return rows(name, array, Some(count), |row| row.map(linear));
+    }
     if !is_bytes(array) {
         return rows(name, array, Some(count), |row| row.map(|value| value as f32));
     }
@@ -137,6 +141,11 @@ pub(crate) fn colors(name: &str, array: &Bound<'_, PyAny>, count: usize) -> PyRe
 /// Whether an array is of bytes, which are colours of sRGB.
 pub(crate) fn is_bytes(array: &Bound<'_, PyAny>) -> bool {
     array.cast::<PyArrayDyn<u8>>().is_ok()
+}
+
+/// Whether an array is of whole numbers of 16 bits, which are colours of sRGB too.
+pub(crate) fn is_of_two_bytes(array: &Bound<'_, PyAny>) -> bool {
+    array.cast::<PyArrayDyn<u16>>().is_ok()
 }
 
 /// Indices of vertices, three a triangle; the first that no vertex has is named.

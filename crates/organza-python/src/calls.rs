@@ -4,8 +4,9 @@ use crate::data::Data;
 use crate::errors::{InputError, raised, refused};
 use crate::picture::Picture;
 use crate::running::run;
+use crate::wording::{self, MADE, placed};
 use convert::ColorMap;
-use organza::scene::{LoadOptions, Override, Scene, UpAxis, parse};
+use organza::scene::{self, LoadOptions, Override, Scene, UpAxis, parse};
 use organza::{Context, Error, Files, InMemory, Progress, RenderOptions};
 use organza_survey::{DataFile, Preset, Wish};
 use pyo3::prelude::*;
@@ -118,7 +119,8 @@ impl Given {
         for effect in effects {
             load.overrides.push(Override::of_effect(effect)?);
         }
-        let mut scene = parse(&self.file, self.text.as_bytes(), &load)?;
+        let parsed = parse(&self.file, self.text.as_bytes(), &load).map_err(Error::from);
+        let mut scene = parsed.map_err(|error| placed(error, &self.text))?;
         if self.transparent && !scene.render.layers.add("background") {
             return Err(Error::Internal("there is no layer of the background".into()));
         }
@@ -133,7 +135,7 @@ pub(crate) fn render(py: Python<'_>, mut given: Given, how: How<'_>) -> PyResult
     let in_memory = given.take_memory()?;
     let work = move |progress: &Progress| {
         let scene = given.scene(in_memory, &options)?;
-        let picture = organza::render(&scene, &options, progress)?;
+        let picture = organza::render(&scene, &options, progress).map_err(|error| placed(error, &given.text))?;
         Ok(Picture::new(&scene, &given.text, picture))
     };
     run(py, how.threads, how.progress.as_ref(), work)
@@ -148,8 +150,8 @@ pub(crate) fn lights_of(py: Python<'_>, mut given: Given, how: How<'_>) -> PyRes
     let work = move |progress: &Progress| {
         let scene = given.scene(in_memory, &options)?;
         let context = Context { files: &Files::default(), options: &options, progress };
-        let lights = organza_survey::lights_of(&scene, is_turned, context)?;
-        json_of_toml(&lights)
+        let lights = organza_survey::lights_of(&scene, is_turned, context);
+        json_of_toml(&lights.map_err(|error| placed(error, &given.text))?)
     };
     run(py, how.threads, None, work)
 }
@@ -162,7 +164,8 @@ pub(crate) fn ground_of(py: Python<'_>, mut given: Given, how: How<'_>) -> PyRes
     let work = move |progress: &Progress| {
         let scene = given.scene(in_memory, &options)?;
         let context = Context { files: &Files::default(), options: &options, progress };
-        json_of_toml(&organza_survey::ground_of(&scene, context)?)
+        let ground = organza_survey::ground_of(&scene, context);
+        json_of_toml(&ground.map_err(|error| placed(error, &given.text))?)
     };
     run(py, how.threads, None, work)
 }
@@ -259,8 +262,11 @@ pub(crate) fn first_scene(
             Source::InMemory(data) => Ok(data),
         };
         let data = sources.into_iter().map(read).collect::<Result<Vec<_>, Error>>()?;
-        let written = organza_survey::first_scene(&data, Path::new(FIRST), &wish, &in_memory, context)?;
-        Ok((json_of_toml(&written.text)?, written.remarks, written.text))
+        let first = Path::new(FIRST);
+        let written = organza_survey::first_scene(&data, first, &wish, &in_memory, context);
+        let written = written.map_err(|error| wording::of_first_scene(error, first))?;
+        let remarks = written.remarks.iter().map(|remark| wording::sentence(remark)).collect();
+        Ok((json_of_toml(&written.text)?, remarks, written.text))
     };
     run(py, how.threads, None, work)
 }
@@ -271,10 +277,35 @@ enum Source {
     InMemory(DataFile),
 }
 
-/// Refuses data that no scene may name so.
+/// Refuses a document in JSON that is no scene with the data that it names.
 #[pyfunction]
-pub(crate) fn check(name: &str, data: &Data) -> PyResult<()> {
-    InMemory::default().insert(name, data.data.clone()).map_err(|error| raised(&error.into()))
+pub(crate) fn check(py: Python<'_>, document: &str, data: HashMap<String, Py<Data>>) -> PyResult<()> {
+    let mut in_memory = InMemory::default();
+    for (name, data) in data {
+        in_memory.insert(&name, data.bind(py).get().data.clone()).map_err(|error| raised(&error.into()))?;
+    }
+    let load = LoadOptions { allow_path: true, in_memory, ..LoadOptions::default() };
+    let parsed = parse(Path::new(MADE), document.as_bytes(), &load).map_err(Error::from);
+    parsed.map(|_| ()).map_err(|error| raised(&placed(error, document)))
+}
+
+/// Refuses a document in JSON that has keys which no scene has, or values of other types.
+#[pyfunction]
+pub(crate) fn check_keys(document: &str) -> PyResult<()> {
+    let checked = scene::check_keys(Path::new(MADE), document).map_err(Error::from);
+    checked.map_err(|error| raised(&placed(error, document)))
+}
+
+/// The schema of scenes, a document in JSON.
+#[pyfunction]
+pub(crate) fn schema() -> String {
+    scene::schema()
+}
+
+/// A sentence of the renderer in the words of Python.
+#[pyfunction]
+pub(crate) fn in_words(sentence: &str) -> String {
+    wording::sentence(sentence)
 }
 
 /// Linear colours of a map at places from 0 to 1.

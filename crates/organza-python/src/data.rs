@@ -73,7 +73,11 @@ impl Data {
             triangles,
         };
         match (uv, texture) {
-            (None, None) => Ok(SourceData::Mesh(mesh.into()).into()),
+            (None, None) => {
+                let smooth = read::smoothed_in_memory("vertices", mesh, &ReadParams::default());
+                let smooth = smooth.map_err(|error| raised(&Error::from_read(Path::new(&error.file), &error)))?;
+                Ok(SourceData::Mesh(smooth.into()).into())
+            }
             (Some(uv), Some(texture)) => textured(mesh, uv, &texture),
             (Some(_), None) => Err(refused("texture", "an image beside `uv`", "none")),
             (None, Some(_)) => Err(refused("uv", "texture coordinates beside `texture`", "none")),
@@ -273,6 +277,13 @@ fn texels(name: &str, pixels: &Bound<'_, PyAny>) -> PyResult<TextureImage> {
         // A byte stays what it is.
         let bytes = arrays::column(name, pixels, |value| value as u8)?;
         Rgba::Srgb(bytes.chunks_exact(channels).map(|texel| with_opacity(texel, u8::MAX)).collect())
+    } else if arrays::is_of_two_bytes(pixels) {
+        let numbers = arrays::column(name, pixels, |value| (value / f64::from(u16::MAX)) as f32)?;
+        let linear = |[red, green, blue, opacity]: [f32; 4]| {
+            let decoded = |value| splat_core::srgb::decoded(f64::from(value)) as f32;
+            [decoded(red), decoded(green), decoded(blue), opacity]
+        };
+        Rgba::Linear(numbers.chunks_exact(channels).map(|texel| linear(with_opacity(texel, 1.0))).collect())
     } else {
         let numbers = arrays::column(name, pixels, |value| value as f32)?;
         Rgba::Linear(numbers.chunks_exact(channels).map(|texel| with_opacity(texel, 1.0)).collect())

@@ -2,6 +2,7 @@
 
 use crate::calls::{Given, How};
 use crate::running::run;
+use crate::wording;
 use organza::output::Target;
 use organza::scene::Scene;
 use organza::{Context, Error, Explanation, Files, Progress, RenderOptions, printable};
@@ -40,7 +41,9 @@ pub(crate) fn explain(py: Python<'_>, mut given: Given, measure: bool, how: How<
     let work = move |progress: &Progress| {
         let scene = given.scene(in_memory.clone(), &options)?;
         if !measure {
-            return Ok(explained(&scene, organza::explain(&scene, &options, progress)?, None).to_string());
+            let explanation = organza::explain(&scene, &options, progress);
+            let explanation = explanation.map_err(|error| wording::placed(error, &given.text))?;
+            return Ok(explained(&scene, explanation, None).to_string());
         }
         let switched = |switches: &[Switch]| {
             let words = |switch: &Switch| format!("{}={}", switch.name, if switch.is_on { "on" } else { "off" });
@@ -91,7 +94,7 @@ fn measured(
 /// The document of `organza explain --json`. What is known before a picture alone is null where one was drawn.
 fn explained(scene: &Scene, explanation: Explanation, measured: Option<&Measured>) -> Value {
     let before = measured.is_none();
-    json!({
+    wording::document(json!({
         "scene": Value::Null,
         "camera": documents::camera_json(scene, explanation.found.as_ref()),
         "plan": documents::plan_json(&explanation.plan),
@@ -103,14 +106,17 @@ fn explained(scene: &Scene, explanation: Explanation, measured: Option<&Measured
         "splats": before.then(|| documents::splats_json(&explanation.splats)),
         "warnings": explanation.warnings,
         "notes": explanation.notes,
-    })
+    }))
 }
 
 /// Describes a data file.
 #[pyfunction]
 pub(crate) fn info_of_file(py: Python<'_>, file: PathBuf, how: How<'_>) -> PyResult<String> {
     let options = how.options();
-    let work = move |_: &Progress| Ok(facts_json(&facts(&file, None, options.max_memory, options.strict)?).to_string());
+    let work = move |_: &Progress| {
+        let found = facts(&file, None, options.max_memory, options.strict)?;
+        Ok(wording::document(facts_json(&found)).to_string())
+    };
     run(py, how.threads, None, work)
 }
 

@@ -1,5 +1,6 @@
 //! Errors as Python has them.
 
+use crate::wording::sentence;
 use organza::Error;
 use pyo3::PyErr;
 use pyo3::exceptions::{
@@ -20,10 +21,11 @@ pyo3::create_exception!(
     "The work would take more memory than `max_memory` allows. Nothing was drawn."
 );
 
-/// An error with its hint, as the exception that stands for it.
+/// An error with its hint in the words of Python, as the exception that stands for it.
 pub(crate) fn raised(error: &Error) -> PyErr {
-    let hint = error.hint();
-    let text = if hint.is_empty() { error.to_string() } else { format!("{error}\nhint: {hint}") };
+    let message = sentence(&error.to_string());
+    let hint = sentence(error.hint());
+    let text = if hint.is_empty() { message } else { format!("{message}\nhint: {hint}") };
     match error {
         Error::Cancelled => PyKeyboardInterrupt::new_err(()),
         Error::Limit(_) | Error::TooLarge { .. } => LimitError::new_err(text),

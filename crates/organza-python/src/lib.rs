@@ -16,12 +16,15 @@ mod errors;
 mod picture;
 mod running;
 mod view;
+mod wording;
 
 /// The parts of the extension that the package uses.
 #[pyo3::pymodule(name = "_organza", gil_used = false)]
 mod organza_module {
     #[pymodule_export]
-    use crate::calls::{check, first_scene, ground_of, lights_of, map_colors, render, toml_text};
+    use crate::calls::{
+        check, check_keys, first_scene, ground_of, in_words, lights_of, map_colors, render, schema, toml_text,
+    };
     #[pymodule_export]
     use crate::data::Data;
     #[pymodule_export]

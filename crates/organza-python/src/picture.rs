@@ -2,6 +2,7 @@
 
 use crate::arrays;
 use crate::errors::{raised, refused};
+use crate::wording;
 use convert::ColorScale;
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods};
 use organza::output::{self, Format, Metadata, Params, Target};
@@ -46,6 +47,7 @@ impl Picture {
             "warnings": render.warnings,
             "notes": render.notes,
         });
+        let facts = wording::document(facts);
         let has_background = scene.background != [0.0; 3] || scene.environment.is_some();
         let scales = Some(render.scales);
         Self { metadata, facts: facts.to_string(), has_background, layers: render.layers, scales }

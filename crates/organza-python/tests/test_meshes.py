@@ -201,7 +201,7 @@ REFUSED = {
     "places of another count": ({"uv": np.zeros((5, 2)), "texture": pixels()}, r"uv: expected the shape \(6, 2\)"),
     "places that are not finite": ({"uv": np.full((6, 2), np.nan), "texture": pixels()}, "texture coordinates that are finite"),
     "a grey image": ({"uv": np.zeros((6, 2)), "texture": np.zeros((4, 4))}, "three channels or four"),
-    "an image of whole numbers": ({"uv": np.zeros((6, 2)), "texture": np.zeros((4, 4, 3), int)}, "bytes .uint8. of sRGB"),
+    "an image beyond bytes": ({"uv": np.zeros((6, 2)), "texture": np.full((4, 4, 3), 256)}, "texture: expected .* bytes of sRGB from 0 to 255"),
     "two channels": ({"uv": np.zeros((6, 2)), "texture": np.zeros((4, 4, 2))}, r"\(height, width, 3\)"),
     "an image of nothing": ({"uv": np.zeros((6, 2)), "texture": np.zeros((0, 4, 3))}, "pixels a side"),
     "a dark image": ({"uv": np.zeros((6, 2)), "texture": np.full((1, 1, 3), -1.0)}, "finite colours from 0 on"),

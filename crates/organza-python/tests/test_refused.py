@@ -1,7 +1,11 @@
 """What is wrong is refused by name, and never ends the interpreter."""
 
+import inspect
+import re
+
 import numpy as np
 import pytest
+from conftest import ASSETS, REPOSITORY
 
 import organza as og
 
@@ -41,7 +45,36 @@ REFUSED = {
     "an object alone": (lambda: scene().set("object", 1), "its name alone"),
     "no threads": (lambda: og.render(PLACES + np.arange(4)[:, None], size=SMALL, threads=0), "threads: expected a whole number from 1 on, found 0"),
     "a mask of points": (lambda: scene().add_points(np.ma.masked_greater(np.eye(3), 0.5)), "row 0"),
-    "whole colours": (lambda: scene().add_points(PLACES, colors=np.full((4, 3), 200)), "bytes .uint8. of sRGB, found int64"),
+    "colours beyond a byte": (lambda: scene().add_points(PLACES, colors=np.full((4, 3), 300)), "bytes of sRGB from 0 to 255, or uint16 of sRGB, found int64 from 300"),
+    "colours below 0": (lambda: scene().add_points(PLACES, colors=np.full((4, 3), -1)), "colors: expected linear numbers"),
+    "a key with a letter missing": (lambda: scene().add_points(PLACES, opacty=0.5), "add_points, 'points': expected an argument or a key of an object, found `opacty`; did you mean `opacity`"),
+    "the word of matplotlib": (lambda: scene().add_points(PLACES, name="scan", cmap="jet"), "'scan'.*`cmap`; did you mean `colormap`"),
+    "British colours": (lambda: scene().add_mesh(PLACES, [[0, 1, 2]], colour=(1, 0, 0)), "`colour`; did you mean `color`"),
+    "the alpha of others": (lambda: scene().add_isosurface(CUBE, 0, alpha=0.5), "`alpha`; did you mean `opacity`"),
+    "a source as a key": (lambda: scene().add_points(PLACES, mesh="a.ply"), "found `mesh`"),
+    "a map that there is not": (lambda: scene().add_points(PLACES, values=np.zeros(4), colormap="jet"), "object 'points', colormap: expected one of viridis"),
+    "an opacity beyond 1": (lambda: scene().add_points(PLACES, name="scan", opacity=2), "object 'scan', opacity: expected a number from 0 to 1"),
+    "a key of a file": (lambda: scene().add(ASSETS / "points" / "hedge.csv", cmap="turbo"), "add, 'hedge.csv'.*`cmap`; did you mean"),
+    "a key of labels": (lambda: scene().add_labels(np.ones((3, 3, 3), int), labels={1: {"colour": "red"}}), "object 'mesh', labels.1.colour: unknown key `colour`"),
+    "a key of a light": (lambda: scene().light("point", position=(0, 0, 0), intensty=1, name="lamp"), "light 'lamp', intensty: unknown key"),
+    "a kind of light": (lambda: scene().light("candle"), "candle"),
+    "a key of a material": (lambda: scene().material("skin", roughnes=1), "material 'skin', roughnes: unknown key"),
+    "a key of the scene": (lambda: scene().set("render.techniqe", "points"), "render.techniqe: unknown key `techniqe`"),
+    "a technique": (lambda: scene().set("render.technique", "raster"), "render.technique: expected \"auto\""),
+    "a key below a number": (lambda: scene().set("version.minor", 1), "expected a key below a table"),
+    "a name twice": (lambda: [each.add_points(PLACES, name="scan") for each in [scene()] for _ in range(2)], "name: expected one that no object of the scene has, found 'scan'"),
+    "a path for points": (lambda: scene().add_points("scan.ply"), "positions: expected an array, found a path; scene.add\\('scan.ply'\\) adds a file"),
+    "a path for a mesh": (lambda: scene().add_mesh("a.obj", []), "scene.add\\('a.obj'\\)"),
+    "points for a volume": (lambda: scene().add_volume(ASSETS / "points" / "hedge.csv"), "values: expected a volume, found points"),
+    "steps of a file": (lambda: scene().add_volume(ASSETS / "dose" / "dose.nrrd", spacing=2), "spacing: expected none beside a file.*`voxel_size`"),
+    "a look of points": (lambda: scene().add(PLACES, preset="mri"), "found `preset`"),
+    "a look of a file of points": (lambda: scene().add(ASSETS / "points" / "hedge.csv", preset="ct-bone"), "`preset`"),
+    "an array as a column": (lambda: scene().add_points(PLACES, color_by=np.zeros(4)), "color_by: expected the name of a column, found ndarray"),
+    "an array as a key": (lambda: scene().add_points(PLACES, unlit=object()), "unlit: expected numbers, texts, lists or tables, found builtins.object"),
+    "an effect that there is not": (lambda: og.render(PLACES + np.eye(4, 3), size=SMALL, effects={"shadow.moon": "off"}), "effects, 'shadow.moon': there is no effect"),
+    "a state of an effect": (lambda: og.render(PLACES, effects={"shadow.sun": "no"}), "effects, 'shadow.sun': expected 'on', 'off' or 'auto', found 'no'"),
+    "a picture filled twice": (lambda: og.render(PLACES + np.eye(4, 3), size=SMALL, fit=2), "^fit: expected"),
+    "a size that is too large": (lambda: og.render(PLACES + np.eye(4, 3), size=(10**6, 4)), "^size: expected 1 to"),
     "rows of other lengths": (lambda: scene().add_points([[1, 2, 3], [1, 2]]), "rows of other lengths"),
     "a name that is none": (lambda: scene().add_points(PLACES, name=5), "name: expected a text"),
     "two steps": (lambda: scene().add_volume(CUBE, spacing=(1, 2)), "spacing: expected one number or three"),
@@ -86,11 +119,61 @@ def test_too_much_memory_is_refused_before_anything_is_drawn():
     assert issubclass(og.LimitError, MemoryError) and issubclass(og.InputError, ValueError)
 
 
-def test_a_key_that_there_is_not_is_refused():
+def test_what_is_refused_changes_nothing():
     scene = og.Scene()
-    scene.add_points(np.random.default_rng(0).normal(size=(10, 3)), opacty=0.5)
-    with pytest.raises(og.InputError, match="opacty"):
+    scene.add_points(PLACES, name="scan")
+    before = scene.to_toml()
+    for call in (lambda: scene.add_points(PLACES, opacity=7), lambda: scene.set("object.scan.opacity", 7), lambda: scene.set("camera.fovy", 7)):
+        with pytest.raises(og.InputError):
+            call()
+    assert scene.to_toml() == before
+
+
+def test_a_material_may_be_stated_after_the_object_that_has_it():
+    scene = og.Scene()
+    scene.add_points(np.random.default_rng(0).normal(size=(100, 3)), material="clay")
+    with pytest.raises(og.InputError, match="object 'points', material: material `clay` is not defined"):
         og.render(scene, size=SMALL)
+    scene.material("clay", shading="phong")
+    assert og.render(scene, size=SMALL).alpha.max() > 0.5
+
+
+@pytest.mark.parametrize("call", [og.render, og.turntable, og.explain, og.info, og.accuracy, og.orders, og.view])
+def test_arguments_that_calls_do_not_have_are_named(call):
+    near = "strict" if call is og.info else "effects"
+    with pytest.raises(TypeError, match=f"{call.__name__}: expected one of its arguments, found `{near}s`; did you mean `{near}`"):
+        call(PLACES, **{f"{near}s": None})
+    with pytest.raises(TypeError, match="`cmap`; did you mean `colormap`"):
+        og.transfer(cmap="turbo")
+
+
+def test_calls_that_draw_take_the_same_arguments():
+    names = {call: set(inspect.signature(call).parameters) for call in (og.render, og.turntable, og.explain, og.view, og.dask.frames, og.dask.sets)}
+    own = {og.turntable: {"frames"}, og.explain: {"measure"}, og.view: {"height"}, og.dask.frames: {"count"}, og.dask.sets: {"count", "each", "seed"}}
+    # What a page and an explanation have no use for, and what tasks on other machines cannot tell.
+    less = {og.view: {"threads", "transparent"}, og.explain: {"transparent"}, og.dask.frames: {"progress"}, og.dask.sets: {"progress"}}
+    for call, found in names.items():
+        assert found == (names[og.render] | own.get(call, set())) - less.get(call, set()), call
+
+
+def test_no_message_has_the_words_of_the_command_line():
+    """Every option that a message of the renderer names has a word of Python."""
+    option = re.compile(r"--[a-z][a-z-]+")
+    # Options of other programs, and variables of a style sheet.
+    foreign = ("--raw", "--compress", "--accent", "--ink", "--soft", "--grid", "--faint", "--ground")
+    # Messages of the command alone: what its options are called, and what Python cannot ask for.
+    command = ("--allow-path", "--packed", "--labels", "--set ", "--effect ", "--frames {", "--turntable {", "--max-rmse", "--max-flip", "--backend {")
+    left = []
+    for path in sorted(REPOSITORY.glob("crates/*/src/**/*.rs")):
+        if path.parts[len(REPOSITORY.parts) + 1] in ("organza-cli", "organza-python", "organza-view"):
+            continue
+        lines = path.read_text(encoding="utf-8").split("#[cfg(test)]")[0].splitlines()
+        for text in re.findall(r'"((?:[^"\\]|\\.)*)"', "\n".join(line for line in lines if not line.strip().startswith("//"))):
+            if option.search(text) and not any(known in text for known in foreign + command):
+                said = og._organza.in_words(text)
+                left += [said] if option.search(said) else []
+    assert not left, left
+    assert og._organza.in_words("memory:scan: no memory: none") == "scan: no memory: none"
 
 
 def test_malformed_calls_never_end_the_interpreter():
@@ -131,6 +214,11 @@ def test_malformed_calls_never_end_the_interpreter():
         lambda a, b: scene().add_mesh(PLACES, [[0, 1, 2]], columns=a, opacities=b),
         lambda a, b: scene().add_isosurface(a, b),
         lambda a, b: scene().add_isosurface(CUBE, 0.5, spacing=a, origin=b),
+        lambda a, b: scene().add_isosurface(CUBE, 0.5, field=a, clim=b),
+        lambda a, b: scene().add_points(PLACES, field=CUBE, transfer=a, colormap=b),
+        lambda a, b: scene().add_labels(CUBE, field=a, labels=b),
+        lambda a, b: scene().add_volume(a, preset=b),
+        lambda a, b: scene().add(a, color_by=b),
         lambda a, b: scene().add_slice(a, normal=b),
         lambda a, b: scene().add_slice(CUBE, center=a, clim=b),
         lambda a, b: scene().add_labels(a, labels=b),

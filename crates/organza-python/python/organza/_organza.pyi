@@ -10,9 +10,11 @@ __all__ = [
     "Picture",
     "View",
     "check",
+    "check_keys",
     "explain",
     "first_scene",
     "ground_of",
+    "in_words",
     "info_of_file",
     "info_of_scene",
     "judge_accuracy",
@@ -20,6 +22,7 @@ __all__ = [
     "lights_of",
     "map_colors",
     "render",
+    "schema",
     "toml_text",
     "view",
 ]
@@ -112,4 +115,7 @@ def first_scene(
 ) -> tuple[str, list[str], str]: ...
 def toml_text(document: str) -> str: ...
 def map_colors(name: str, places: list[float]) -> list[list[float]]: ...
-def check(name: str, data: Data) -> None: ...
+def check(document: str, data: dict[str, Data]) -> None: ...
+def check_keys(document: str) -> None: ...
+def schema() -> str: ...
+def in_words(sentence: str) -> str: ...

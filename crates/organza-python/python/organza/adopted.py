@@ -47,7 +47,8 @@ def add(scene: Scene, thing: Any, name: str | None, keys: Mapping[str, Any]) -> 
         # The look that is asked for takes the place of the column that the library shows.
         arguments.pop("color_by", None)
     before = len(scene.objects)
-    getattr(scene, f"add_{kind}")(name=name or own, **(arguments | dict(keys)))
+    # The library's name may be taken, by a data set of the same library.
+    getattr(scene, f"add_{kind}")(name=scene._free_name(own) if name is None else name, **(arguments | dict(keys)))
     if unused:
         scene._remarks.append(f"{scene.objects[before]}: not used: {', '.join(unused)}")
 

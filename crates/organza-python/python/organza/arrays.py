@@ -12,6 +12,9 @@ import numpy as np
 from organza._organza import InputError
 from organza.transfers import Transfer
 
+# The largest number of a byte.
+_MOST_OF_A_BYTE = 255
+
 
 def array_of(thing: Any) -> Any:
     """An array of a kind of numbers that the extension takes; None stays None."""
@@ -29,12 +32,17 @@ def array_of(thing: Any) -> Any:
     return array
 
 
-def colors_of(thing: Any) -> Any:
-    """Colours: linear numbers, or bytes of sRGB; whole numbers of another kind may be either."""
+def colors_of(thing: Any, name: str = "colors") -> Any:
+    """Colours as the extension takes them: linear numbers with a point, or whole ones of sRGB of one byte or two."""
     array = array_of(thing)
-    if array is not None and np.issubdtype(array.dtype, np.integer) and array.dtype != np.uint8:
-        raise InputError(f"colors: expected linear numbers with a point, or bytes (uint8) of sRGB, found {array.dtype}")
-    return array
+    if array is None or not np.issubdtype(array.dtype, np.integer) or array.dtype in (np.uint8, np.uint16) or not array.size:
+        return array
+    low, high = (int(end) for end in (array.min(), array.max()))
+    if low < 0 or high > _MOST_OF_A_BYTE:
+        found = f"{array.dtype} from {low} to {high}"
+        raise InputError(f"{name}: expected linear numbers with a point, bytes of sRGB from 0 to {_MOST_OF_A_BYTE}, or uint16 of sRGB, found {found}")
+    # 0 and 1 are no bytes that anybody means: they are the ends of linear numbers.
+    return array.astype(np.float32 if high <= 1 else np.uint8)
 
 
 def columns_of(columns: Mapping[str, Any]) -> dict[str, Any]:
@@ -55,26 +63,30 @@ def texture_of(thing: Any) -> Any:
     pixels = array_of(thing.to_array() if hasattr(thing, "to_array") else thing)
     if np.ndim(pixels) == 2:
         raise InputError("texture: expected three channels or four, found one number a pixel; an image of Pillow has them after `convert('RGBA')`")
-    if np.issubdtype(pixels.dtype, np.integer) and pixels.dtype != np.uint8:
-        raise InputError(f"texture: expected linear numbers with a point, or bytes (uint8) of sRGB, found {pixels.dtype}")
-    return pixels
+    return colors_of(pixels, "texture")
 
 
-def plain(value: Any) -> Any:
-    """A value as JSON has it."""
+def plain(value: Any, name: str = "") -> Any:
+    """A value as JSON has it; ``name`` is that of the key in messages."""
+    place = f"{name}: " if name else ""
     if isinstance(value, Mapping):
-        return {str(key): plain(part) for key, part in value.items()}
+        return {str(key): plain(part, str(key)) for key, part in value.items()}
     if isinstance(value, np.ndarray):
-        return plain(value.tolist())
+        return plain(value.tolist(), name)
     if isinstance(value, np.generic):
         value = value.item()
     if isinstance(value, float) and not math.isfinite(value):
-        raise InputError(f"expected finite numbers, found {value}")
+        raise InputError(f"{place}expected finite numbers, found {value}")
     if isinstance(value, Transfer):
-        raise InputError("a transfer: expected it as `transfer=` of add_volume, found it as a key")
+        raise InputError(f"{place}expected a key of docs/scene.md, found what organza.transfer makes, which the argument `transfer` takes")
     if isinstance(value, (list, tuple)):
-        return [plain(part) for part in value]
-    return value
+        return [plain(part, name) for part in value]
+    if isinstance(value, os.PathLike):
+        return os.fspath(value)
+    if value is None or isinstance(value, (str, int, float)):
+        return value
+    kind = f"{type(value).__module__}.{type(value).__qualname__}"
+    raise InputError(f"{place}expected numbers, texts, lists or tables, found {kind}")
 
 
 def number(name: str, value: Any) -> float:

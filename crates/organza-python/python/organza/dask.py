@@ -26,6 +26,7 @@ except ImportError:
 
 from organza import _organza
 from organza._organza import InputError
+from organza.checking import named
 from organza.drawing import _frame, _how, _whole, _wished
 from organza.picture import Picture
 from organza.scene import Scene, scene_of
@@ -40,13 +41,25 @@ _FEWEST = 2
 _MERGED = 8
 
 
+@named
 def frames(
     what: Any,
     count: int = 36,
     *,
     size: tuple[int, int] | None = None,
+    preset: str | None = None,
+    color_by: str | None = None,
+    up: str | None = None,
+    ground: bool = False,
+    azimuth: float | None = None,
+    elevation: float | None = None,
+    fit: float | None = None,
+    effects: dict[str, str] | None = None,
+    transparent: bool = False,
     threads: int | None = 1,
     max_memory: int | None = None,
+    drop_invalid: bool = False,
+    strict: bool = False,
 ) -> list[Any]:
     """Draws a scene from all around: a task for each picture of a turn, as :func:`organza.turntable` draws them.
 
@@ -56,7 +69,7 @@ def frames(
         A :class:`organza.Scene`, a file or a data set.
     count
         Pictures of the whole circle.
-    size, max_memory
+    size, preset, color_by, …
         As for :func:`organza.render`.
     threads
         Threads of one task; as many as the worker's machine has if it is None.
@@ -67,12 +80,14 @@ def frames(
         Each computes a :class:`organza.Picture`.
     """
     total = _whole("count", count) or 1
-    wished = _wished(size, None, None, None, False, None, None, None) | {"turntable": total}
-    held = _held(scene_of((_placed(what),), wished, _how(threads, max_memory, None, False, False)))
+    wished = _wished(size, preset, color_by, up, ground, azimuth, elevation, fit) | {"turntable": total}
+    how = _how(threads, max_memory, None, drop_invalid, strict)
+    held = _held(scene_of((_placed(what),), wished, how))
     draw = delayed(_frame, name="organza-frame", pure=False)
-    return [draw(held, frame, total, size, threads, max_memory) for frame in range(total)]
+    return [draw(held, frame, total, size, effects, transparent, how) for frame in range(total)]
 
 
+@named
 def sets(
     what: Any,
     count: int = 64,
@@ -80,9 +95,19 @@ def sets(
     each: int = 4,
     seed: int = 0,
     size: tuple[int, int] | None = None,
+    preset: str | None = None,
+    color_by: str | None = None,
+    up: str | None = None,
+    ground: bool = False,
+    azimuth: float | None = None,
+    elevation: float | None = None,
+    fit: float | None = None,
+    effects: dict[str, str] | None = None,
     transparent: bool = False,
     threads: int | None = 1,
     max_memory: int | None = None,
+    drop_invalid: bool = False,
+    strict: bool = False,
 ) -> Any:
     """Draws a scene by the technique ``particles``: tasks draw independent sets, and their mean is one picture with its standard error.
 
@@ -96,7 +121,7 @@ def sets(
         Sets of one task, 2 or more. A task loads the scene: many small tasks take longer altogether, few large ones longer at least.
     seed
         Seed of the first task; the task of rank k has ``seed + k``.
-    size, transparent, max_memory
+    size, preset, color_by, …
         As for :func:`organza.render`.
     threads
         Threads of one task; as many as the worker's machine has if it is None.
@@ -118,14 +143,15 @@ def sets(
         raise InputError(f"seed: expected a whole number from 0 on, found {seed!r}")
     # One task alone has no error.
     tasks = max(total // part, 2)
-    wished = _wished(size, None, None, None, False, None, None, None)
-    held = _held(scene_of((_placed(what),), wished, _how(threads, max_memory, None, False, False)))
+    wished = _wished(size, preset, color_by, up, ground, azimuth, elevation, fit)
+    how = _how(threads, max_memory, None, drop_invalid, strict)
+    held = _held(scene_of((_placed(what),), wished, how))
     draw = delayed(_set, name="organza-sets", pure=False)
     merge = delayed(_merge, name="organza-mean", pure=False)
     means = []
     for rank in range(tasks):
         drawn = total * (rank + 1) // tasks - total * rank // tasks
-        means.append(draw(held, drawn, seed + rank, size, transparent, threads, max_memory))
+        means.append(draw(held, drawn, seed + rank, size, effects, transparent, how))
     while len(means) > 1:
         means = [merge(means[first : first + _MERGED]) for first in range(0, len(means), _MERGED)]
     return delayed(_finish, name="organza-picture", pure=False)(means[0])
@@ -162,14 +188,13 @@ def _set(
     drawn: int,
     seed: int,
     size: tuple[int, int] | None,
+    effects: dict[str, str] | None,
     transparent: bool,
-    threads: int | None,
-    max_memory: int | None,
+    how: dict[str, Any],
 ) -> _Mean:
     """Sets of one seed."""
-    how = _how(threads, max_memory, None, False, False)
     changes = ['render.technique="particles"', f"render.particles.repeat_level={drawn}", f"render.seed={seed}"]
-    given = scene._given(how, None, size, transparent) | {"changes": changes}
+    given = scene._given(how, effects, size, transparent) | {"changes": changes}
     picture = _organza.render(given, how)
     metadata = json.loads(picture.metadata)
     layers = {name: picture.layer(name).astype(np.float64) for name in picture.layers if name in _AVERAGED}
@@ -177,7 +202,7 @@ def _set(
     # A scene may state an error to reach, by which a task draws another number of sets.
     sets_drawn = metadata["sets"] or drawn
     squares = np.zeros(layers["alpha"].shape)
-    return _Mean(sets_drawn, 1, layers, squares, json.loads(picture.facts), metadata, scene._remarks, left_out)
+    return _Mean(sets_drawn, 1, layers, squares, json.loads(picture.facts), metadata, scene.notes, left_out)
 
 
 def _merge(means: list[_Mean]) -> _Mean:

@@ -11,6 +11,7 @@ from typing import Any
 
 from organza import _organza
 from organza._organza import InputError
+from organza.checking import named
 from organza.drawing import _how, _wished
 from organza.progressing import Progress, heard
 from organza.scene import Scene, _is_scene, scene_of
@@ -19,6 +20,7 @@ from organza.scene import Scene, _is_scene, scene_of
 _MOST_FINER = 4
 
 
+@named
 def info(
     what: Any,
     *,
@@ -59,6 +61,7 @@ def info(
     return _dict(_organza.info_of_file(os.fspath(what), how))
 
 
+@named
 def explain(
     *what: Any,
     measure: bool = False,
@@ -101,6 +104,7 @@ def explain(
     return document
 
 
+@named
 def accuracy(
     *what: Any,
     folder: str | os.PathLike[str] | None = None,
@@ -112,6 +116,9 @@ def accuracy(
     color_by: str | None = None,
     up: str | None = None,
     ground: bool = False,
+    azimuth: float | None = None,
+    elevation: float | None = None,
+    fit: float | None = None,
     effects: dict[str, str] | None = None,
     threads: int | None = None,
     max_memory: int | None = None,
@@ -140,17 +147,19 @@ def accuracy(
     Returns
     -------
     dict
-        ``report``, the document of ``accuracy.json``, and ``outputs``, the paths that were written.
+        ``report``, the document of ``accuracy.json``, and ``outputs``, the paths that were written. Techniques that draw the scene stand in the report's
+        ``techniques``, the others in ``absent`` with the reason.
     """
     if isinstance(finer, bool) or not isinstance(finer, int) or not 0 <= finer <= _MOST_FINER:
         raise InputError(f"finer: expected a whole number from 0 to {_MOST_FINER}, found {finer!r}")
     with heard(progress) as told, _folder(folder) as made:
         how = _how(threads, max_memory, told, drop_invalid, strict)
-        scene = scene_of(what, _wished(size, preset, color_by, up, ground, None, None, None), how)
+        scene = scene_of(what, _wished(size, preset, color_by, up, ground, azimuth, elevation, fit), how)
         effort = {"quick": quick, "finer": finer, "folder": made, "force": force}
         return _dict(_organza.judge_accuracy(scene._given(how, effects, size), effort, how))
 
 
+@named
 def orders(
     *what: Any,
     folder: str | os.PathLike[str] | None = None,
@@ -161,6 +170,9 @@ def orders(
     color_by: str | None = None,
     up: str | None = None,
     ground: bool = False,
+    azimuth: float | None = None,
+    elevation: float | None = None,
+    fit: float | None = None,
     effects: dict[str, str] | None = None,
     threads: int | None = None,
     max_memory: int | None = None,
@@ -184,7 +196,7 @@ def orders(
     """
     with heard(progress) as told, _folder(folder) as made:
         how = _how(threads, max_memory, told, drop_invalid, strict)
-        scene = scene_of(what, _wished(size, preset, color_by, up, ground, None, None, None), how)
+        scene = scene_of(what, _wished(size, preset, color_by, up, ground, azimuth, elevation, fit), how)
         effort = {"quick": quick, "finer": 0, "folder": made, "force": force}
         return _dict(_organza.judge_orders(scene._given(how, effects, size), effort, how))
 

@@ -10,11 +10,13 @@ import numpy as np
 
 from organza import _organza
 from organza._organza import InputError
+from organza.checking import named
 from organza.picture import Picture
 from organza.progressing import Progress, heard
 from organza.scene import Scene, scene_of
 
 
+@named
 def render(
     *what: Any,
     size: tuple[int, int] | None = None,
@@ -77,19 +79,32 @@ def render(
     with heard(progress) as told:
         how = _how(threads, max_memory, told, drop_invalid, strict)
         scene = scene_of(what, wished, how)
-        picture = Picture(_organza.render(scene._given(how, effects, size, transparent), how), scene._remarks)
+        picture = Picture(_organza.render(scene._given(how, effects, size, transparent), how), scene.notes)
     for sentence in picture.warnings:
-        warnings.warn(sentence, stacklevel=2)
+        # Of the caller, beyond the check of names.
+        warnings.warn(sentence, stacklevel=3)
     return picture
 
 
+@named
 def turntable(
     what: Any,
     frames: int = 36,
     *,
     size: tuple[int, int] | None = None,
+    preset: str | None = None,
+    color_by: str | None = None,
+    up: str | None = None,
+    ground: bool = False,
+    azimuth: float | None = None,
+    elevation: float | None = None,
+    fit: float | None = None,
+    effects: dict[str, str] | None = None,
+    transparent: bool = False,
     threads: int | None = None,
     max_memory: int | None = None,
+    drop_invalid: bool = False,
+    strict: bool = False,
     progress: Any = None,
 ) -> Iterator[Picture]:
     """Draws a scene from all around, one picture after the other, as ``organza render --turntable`` does.
@@ -100,14 +115,35 @@ def turntable(
         A :class:`Scene`, a file or a data set.
     frames
         Pictures of the whole circle.
-    size, threads, max_memory, progress
-        As for :func:`render`.
+    size, preset, color_by, …
+        As for :func:`render`. The camera turns about the vertical from where it stands: ``azimuth`` and ``elevation`` of data, and what
+        ``scene.camera.orbit(azimuth=…, elevation=…)`` says of a scene.
     """
     frames = _whole("frames", frames) or 1
-    wished = _wished(size, None, None, None, False, None, None, None) | {"turntable": frames}
-    scene = scene_of((what,), wished, _how(threads, max_memory, None, False, False))
+    how = _how(threads, max_memory, None, drop_invalid, strict)
+    wished = _wished(size, preset, color_by, up, ground, azimuth, elevation, fit) | {"turntable": frames}
+    # Files and names are refused by the call, not by the first picture.
+    return _turned(scene_of((what,), wished, how), frames, size, effects, transparent, how, progress)
+
+
+def _turned(
+    scene: Scene,
+    frames: int,
+    size: tuple[int, int] | None,
+    effects: dict[str, str] | None,
+    transparent: bool,
+    how: dict[str, Any],
+    progress: Any,
+) -> Iterator[Picture]:
+    """The pictures of a turn. A sentence of warning that several have is given once."""
+    told: set[str] = set()
     for frame in range(frames):
-        yield _frame(scene, frame, frames, size, threads, max_memory, progress)
+        picture = _frame(scene, frame, frames, size, effects, transparent, how, progress)
+        for sentence in picture.warnings:
+            if sentence not in told:
+                told.add(sentence)
+                warnings.warn(sentence, stacklevel=2)
+        yield picture
 
 
 def _frame(
@@ -115,15 +151,16 @@ def _frame(
     frame: int,
     frames: int,
     size: tuple[int, int] | None,
-    threads: int | None,
-    max_memory: int | None,
+    effects: dict[str, str] | None,
+    transparent: bool,
+    how: dict[str, Any],
     progress: Any = None,
 ) -> Picture:
     """A frame of a turn around a scene."""
     with heard(progress) as told:
-        how = _how(threads, max_memory, told, False, False)
-        given = scene._given(how, None, size, turntable=frames) | {"frame": frame}
-        return Picture(_organza.render(given, how), scene._remarks)
+        how = how | {"progress": told}
+        given = scene._given(how, effects, size, transparent, turntable=frames) | {"frame": frame}
+        return Picture(_organza.render(given, how), scene.notes)
 
 
 def _how(

@@ -18,6 +18,7 @@ class Lattice:
 
     diagonal: float
     middle: list[float]
+    corners: np.ndarray
 
 
 def lattice_of(values: Any, spacing: Any = 1.0, origin: Any = (0.0, 0.0, 0.0), direction: Any = None) -> tuple[Data, Lattice]:
@@ -31,7 +32,9 @@ def lattice_of(values: Any, spacing: Any = 1.0, origin: Any = (0.0, 0.0, 0.0), d
     first = np.asarray(origin, dtype=float)
     data = Data.grid(grid, steps.tolist(), first.tolist(), turn.tolist())
     sides = steps * (np.array(grid.shape[::-1]) - 1)
-    return data, Lattice(float(np.linalg.norm(sides)), (first + turn @ sides / 2.0).tolist())
+    ends = np.stack(np.meshgrid([0.0, 1.0], [0.0, 1.0], [0.0, 1.0]), -1).reshape(-1, 3)
+    corners = first + (ends * sides) @ turn.T
+    return data, Lattice(float(np.linalg.norm(sides)), (first + turn @ sides / 2.0).tolist(), corners)
 
 
 def volume_arguments(values: Any, spacing: Any, origin: Any, direction: Any) -> tuple[dict[str, Any], dict[str, Any]]:

@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
+import json
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from organza import _organza
 from organza._organza import InputError
 from organza.arrays import number, plain
 
 if TYPE_CHECKING:
     from organza.scene import Scene
+
+
+# Places of an object that are looked for in the view of a camera.
+_SAMPLES = 4096
 
 
 class Camera:
@@ -110,7 +116,9 @@ class Light:
         """
         self._scene._check_open()
         named = {} if name is None else {"name": name}
-        self._scene._document.setdefault("light", []).append({"kind": kind} | named | plain(keys))
+        light = plain({"kind": kind} | named | {key: value for key, value in keys.items() if value is not None})
+        _organza.check(json.dumps({"version": 1, "camera": {"auto": True}, "light": [light]}), {})
+        self._scene._document.setdefault("light", []).append(light)
 
     def sun(
         self,
@@ -156,6 +164,46 @@ class Light:
         self(direction=direction, irradiance=_color("irradiance", irradiance), name=name, **keys)
         if radiance is not None:
             self._scene._document.setdefault("ambient", {}).setdefault("color", radiance)
+
+
+def beyond(camera: Mapping[str, Any], places: Any, transform: Mapping[str, Any]) -> float:
+    """The share of places that a camera with a position does not see, of some thousand of them."""
+    every = np.asarray(places)
+    if every.ndim != 2 or not len(every):
+        return 0.0
+    # A large array is not copied.
+    rows = _transformed(every[:: max(len(every) // _SAMPLES, 1)].astype(float), transform)
+    eye = np.asarray(camera["position"], dtype=float)
+    forward = _unit(np.subtract(camera.get("target", (0.0, 0.0, 0.0)), eye))
+    right = _unit(np.cross(forward, camera.get("up", (0.0, 1.0, 0.0))))
+    above = np.cross(right, forward)
+    seen = rows - eye
+    depth = seen @ forward
+    width, height = camera.get("size", (16, 9))
+    half = math.tan(math.radians(camera.get("fov_y", 45.0)) / 2.0)
+    is_seen = (depth > 0.0) & (np.abs(seen @ above) <= half * depth) & (np.abs(seen @ right) <= half * depth * width / height)
+    return 1.0 - float(is_seen.mean())
+
+
+def _unit(vector: np.ndarray) -> np.ndarray:
+    unit: np.ndarray = vector / (float(np.linalg.norm(vector)) or 1.0)
+    return unit
+
+
+def _transformed(places: np.ndarray, transform: Mapping[str, Any]) -> np.ndarray:
+    """Places after the ``transform`` of an object: turned upright, scaled, rotated about x, y and z, and moved."""
+    upright = {"z": np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]]), "-y": np.diag([1.0, -1.0, -1.0])}
+    turn = upright.get(transform.get("up", "y"), np.eye(3))
+    for axis, degrees in enumerate(transform.get("rotate", (0.0, 0.0, 0.0))):
+        sine, cosine = math.sin(math.radians(degrees)), math.cos(math.radians(degrees))
+        first, second = (axis + 1) % 3, (axis + 2) % 3
+        about = np.eye(3)
+        about[first, first] = about[second, second] = cosine
+        about[first, second], about[second, first] = -sine, sine
+        turn = about @ turn
+    moved = np.asarray(transform.get("translate", (0.0, 0.0, 0.0)), dtype=float)
+    turned: np.ndarray = float(transform.get("scale", 1.0)) * places @ turn.T + moved
+    return turned
 
 
 def _color(name: str, value: Any) -> list[float]:

@@ -16,8 +16,10 @@ import numpy as np
 from organza import _organza, adopted
 from organza._organza import Data, InputError
 from organza.arrays import array_of, colors_of, columns_of, halved_quads, number, place_of, plain, texture_of
+from organza.checking import check_keys
+from organza.fields import Field, field_of
 from organza.lattices import lattice_of, percentiles, volume_arguments
-from organza.placing import Camera, Light
+from organza.placing import Camera, Light, beyond
 from organza.transfers import Transfer
 from organza.transfers import transfer as make_transfer
 
@@ -35,6 +37,8 @@ _FIRST = "scene.toml"
 _GROUND_COLOR = (0.32, 0.32, 0.33)
 # Steps of a ground's splats along a side, as the ground of a first scene has them.
 _GROUND_STEPS = 320.0
+# A place for a ground, whose own is found when the scene is drawn.
+_ANYWHERE = {"rectangle": {"center": [0.0, 0.0, 0.0], "u": [1.0, 0.0, 0.0], "v": [0.0, 0.0, 1.0], "spacing": 0.1}}
 # Sources of a first scene, and how one names data in memory.
 _SOURCES = ("mesh", "points", "volume")
 _MEMORY = "memory:"
@@ -82,12 +86,17 @@ class Scene:
         self._remarks: list[str] = []
         self._written: _Written | None = None
         self._ground: _Ground | None = None
+        # Objects that the camera of a first scene does not see in whole, and the share that it misses.
+        self._beyond: dict[str, float] = {}
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Scene:
         """A scene file as it is. It can be drawn and its effects switched; to change more of it, change the file."""
         scene = cls()
         scene._file = os.fspath(path)
+        if scene._file == _NOWHERE:
+            # A file of that name has lines, which its errors name.
+            scene._file = os.path.join(os.curdir, _NOWHERE)
         if Path(path).suffix.lower() not in (".toml", ".json"):
             raise InputError(f"{os.fspath(path)}: expected a scene, .toml or .json; Scene.from_files takes data files")
         scene._text = Path(path).read_text(encoding="utf-8")
@@ -114,6 +123,8 @@ class Scene:
         colormap: str | None = None,
         clim: tuple[float, float] | None = None,
         log_scale: bool = False,
+        field: Any = None,
+        transfer: Transfer | None = None,
         name: str | None = None,
         **keys: Any,
     ) -> None:
@@ -142,11 +153,22 @@ class Scene:
             Its map and the numbers at the two ends of it.
         log_scale
             Whether numbers lie along the map by their logarithms; those that are not above 0 have the object's colour.
+        field
+            As for :meth:`add_isosurface`: a volume whose values they show. An array has its first value at the origin and steps of 1; a table states others.
+        transfer
+            Instead of a map, what :func:`organza.transfer` makes, for the column or the field; its opacities are not used.
         name
-            How the object is called.
+            How the object is called; no other object of the scene may have the name.
         **keys
             Further keys of an object (docs/scene.md), such as ``opacity``, ``material``, ``technique``, ``unlit``.
+
+        Raises
+        ------
+        InputError
+            For arrays of another shape, names and keys that there are not, and values that they cannot have.
         """
+        _check_array("positions", positions)
+        check_keys(Scene.add_points, name or "points", keys)
         held = dict(columns or {})
         if radius is not None:
             count = len(positions)
@@ -154,10 +176,12 @@ class Scene:
         data = Data.points(
             array_of(positions), array_of(normals), colors_of(colors), array_of(opacities), array_of(values), columns_of(held)
         )
-        if color_by is None and values is not None and colors is None:
+        if color_by is None and values is not None and colors is None and field is None:
             color_by = "value"
-        keys = _shown(color_by, colormap, clim, log_scale) | keys
-        self._add("points", data, name, keys)
+        shown, colors_by = _colors_by(color_by, colormap, clim, log_scale, field, transfer)
+        keys = colors_by | keys
+        self._add("points", data, name, keys, field=shown)
+        self._note_beyond(self.objects[-1], positions, keys)
 
     def add_mesh(
         self,
@@ -175,6 +199,8 @@ class Scene:
         colormap: str | None = None,
         clim: tuple[float, float] | None = None,
         log_scale: bool = False,
+        field: Any = None,
+        transfer: Transfer | None = None,
         name: str | None = None,
         **keys: Any,
     ) -> None:
@@ -187,7 +213,7 @@ class Scene:
         faces
             (m, 3), or (m, 4) for four-sided ones: indices of vertices, from 0.
         normals
-            (n, 3); smooth ones are found where there are none.
+            (n, 3); smooth ones are found where there are none. Vertices at one place count as one vertex for them, also where rounding parts them.
         colors
             (n, 3): linear numbers from 0 on, or bytes of sRGB. Beside a texture they are multiplied by its colours.
         opacities
@@ -196,8 +222,8 @@ class Scene:
             Places in the texture, (n, 2), or (m, 3, 2) and (m, 4, 2) for one at each corner of a face: (0, 0) is the lower left corner of the image, (1, 1)
             its upper right, as in OBJ files.
         texture
-            The image: the path of a PNG or JPEG file; or an array (height, width, 3) or (height, width, 4), from the top left, of bytes of sRGB or linear
-            numbers; or an image of Pillow. It repeats beyond its borders. A fourth channel is the opacity of the surface.
+            The image: the path of a PNG or JPEG file; or an array (height, width, 3) or (height, width, 4), from the top left, of bytes or ``uint16`` of
+            sRGB, or linear numbers; or an image of Pillow. It repeats beyond its borders. A fourth channel is the opacity of the surface.
         values
             (n,) of vertices or (m,) of faces: a column that ``color_by="value"`` shows. Where there are as many vertices as faces, it is of the vertices.
         columns
@@ -205,7 +231,7 @@ class Scene:
         color_by
             The column that colours stand for: ``"value"``, one of ``columns``, ``"x"``, ``"y"``, ``"z"`` or ``"height"``; ``values`` where they are given
             without colours and texture.
-        colormap, clim, log_scale
+        colormap, clim, log_scale, field, transfer
             As for :meth:`add_points`.
         name, **keys
             As for :meth:`add_points`.
@@ -213,10 +239,12 @@ class Scene:
         Raises
         ------
         InputError
-            An array of another shape, an index that no vertex has, ``uv`` without ``texture``, or an image that cannot be read.
+            An array of another shape, a name or a key that there is not, an index that no vertex has, ``uv`` without ``texture``, or an image that cannot be read.
         FileNotFoundError
             A texture that is not there.
         """
+        _check_array("vertices", vertices)
+        check_keys(Scene.add_mesh, name or "mesh", keys)
         corners = array_of(faces)
         places = array_of(uv)
         count = len(corners) if np.ndim(corners) else 0
@@ -246,16 +274,19 @@ class Scene:
             uv=places,
             texture=texture_of(texture),
         )
-        if color_by is None and values is not None and colors is None and texture is None:
+        if color_by is None and values is not None and colors is None and texture is None and field is None:
             color_by = "value"
-        self._add("mesh", data, name, _shown(color_by, colormap, clim, log_scale) | keys)
+        shown, colors_by = _colors_by(color_by, colormap, clim, log_scale, field, transfer)
+        keys = colors_by | keys
+        self._add("mesh", data, name, keys, field=shown)
+        self._note_beyond(self.objects[-1], vertices, keys)
 
     def add_volume(
         self,
         values: Any,
         *,
-        spacing: Any = 1.0,
-        origin: Any = (0.0, 0.0, 0.0),
+        spacing: Any = None,
+        origin: Any = None,
         direction: Any = None,
         transfer: Transfer | None = None,
         preset: str | None = None,
@@ -267,11 +298,12 @@ class Scene:
         Parameters
         ----------
         values
-            (nz, ny, nx), any numbers; NaN is a gap that shows nothing.
+            (nz, ny, nx), any numbers, of which NaN is a gap that shows nothing; or a volume of xarray, nibabel, SimpleITK or PyVista, which brings its steps and
+            its place; or the path of a file.
         spacing
-            The steps along x, y and z, or one number for all.
+            The steps along x, y and z, or one number for all; 1 where neither this nor the data says others. Beside a file the key ``voxel_size`` states them.
         origin
-            The place of ``values[0, 0, 0]``: x, y, z.
+            The place of ``values[0, 0, 0]``: x, y, z; (0, 0, 0) where neither this nor the data says another.
         direction
             Columns: the directions of the steps along x, y and z; those of the axes where it is None.
         transfer
@@ -281,11 +313,19 @@ class Scene:
         name, **keys
             As for :meth:`add_points`. Without a ``material`` a volume is lit by its gradients, as a first scene has it.
         """
-        data, lattice = lattice_of(values, spacing, origin, direction)
-        if transfer is not None and not isinstance(transfer, Transfer):
-            raise InputError(f"transfer: expected what organza.transfer makes, found {type(transfer).__name__}; `preset` takes a name")
-        if transfer is not None and preset is not None:
-            raise InputError("transfer, preset: expected one of them, found both")
+        check_keys(Scene.add_volume, name or "volume", keys)
+        _check_look(transfer, preset)
+        if isinstance(values, (str, os.PathLike)):
+            stated = {"spacing": spacing, "origin": origin, "direction": direction}
+            for argument, value in stated.items():
+                if value is not None:
+                    raise InputError(f"{argument}: expected none beside a file, which has its own, found {value!r}; `voxel_size` and `transform` change these")
+            first = scene_of((os.path.abspath(values),), _no_wish() | {"preset": preset}, _how())
+            self._take(first, name, keys, transfer, "volume")
+            return
+        arguments, standing = volume_arguments(values, spacing, origin, direction)
+        keys = standing | keys
+        data, lattice = lattice_of(**arguments)
         source = "volume"
         if transfer is not None:
             keys = transfer.keys(lattice.diagonal or 1.0) | keys
@@ -297,6 +337,7 @@ class Scene:
             source, found = self._first_keys(data, name or "volume", preset)
             keys = found | keys
         self._add(source, data, name, keys)
+        self._note_beyond(self.objects[-1], lattice.corners, keys)
 
     def add_isosurface(
         self,
@@ -304,6 +345,10 @@ class Scene:
         level: float,
         *,
         inside: str = "above",
+        field: Any = None,
+        colormap: str | None = None,
+        clim: tuple[float, float] | None = None,
+        transfer: Transfer | None = None,
         spacing: Any = None,
         origin: Any = None,
         direction: Any = None,
@@ -320,6 +365,15 @@ class Scene:
             The value.
         inside
             ``"above"``, so that the surface faces lower values, or ``"below"``.
+        field
+            Another volume, whose values the surface shows: an array, which has the steps and the place of ``values``; a volume of another library, or the path
+            of a file, which have their own; or a table ``{"values": …, "spacing": …, "origin": …, "direction": …, "interpolation": "catmull-rom"}``. Both
+            have the same axes. Where the surface leaves the field it has its own colour, and a warning tells the share.
+        colormap, clim
+            The map of the field's colours, ``"viridis"`` where it is None, and the field's values at its two ends: its 1st and 99th percentile where ``clim``
+            is None.
+        transfer
+            Instead of these, what :func:`organza.transfer` makes; its opacities are not used.
         spacing, origin, direction
             As for :meth:`add_volume`.
         name, **keys
@@ -328,17 +382,26 @@ class Scene:
         Raises
         ------
         InputError
-            For what is no volume, and a level that is not finite.
+            For what is no volume, a level that is not finite, and a field of a file without ``clim``.
         """
+        if "color_by" in keys:
+            raise InputError(f"color_by: an isosurface has no columns, found {_kind(keys['color_by'])}; `field` takes a volume whose values it shows")
+        check_keys(Scene.add_isosurface, name or "isosurface", keys)
+        if field is None and not (colormap is None and clim is None and transfer is None):
+            raise InputError("colormap, clim, transfer: expected a `field` to colour by, found none; `color` takes one colour")
         if inside not in ("above", "below"):
             raise InputError(f"inside: expected 'above' or 'below', found {inside!r}")
         table = {"level": number("level", level), "inside": inside}
         if isinstance(values, (str, os.PathLike)):
-            self._add_file("isosurface", values, table, name, keys)
+            shown = None if field is None else field_of(field, {}, colormap, clim, transfer)
+            self._add_file("isosurface", values, table, name, keys, shown)
             return
         arguments, standing = volume_arguments(values, spacing, origin, direction)
-        data, _ = lattice_of(**arguments)
-        self._add("isosurface", data, name, standing | keys, table)
+        data, lattice = lattice_of(**arguments)
+        own = {key: value for key, value in arguments.items() if key != "values"}
+        shown = None if field is None else field_of(field, own, colormap, clim, transfer)
+        self._add("isosurface", data, name, standing | keys, table, shown)
+        self._note_beyond(self.objects[-1], lattice.corners, standing | keys)
 
     def add_slice(
         self,
@@ -379,6 +442,9 @@ class Scene:
         InputError
             For what is no volume, and for a file without ``center`` or colours.
         """
+        if "field" in keys:
+            raise InputError("field: a slice shows the values of its own volume, found another; give `values` the volume that it shows")
+        check_keys(Scene.add_slice, name or "slice", keys)
         axes = {"x": [1.0, 0.0, 0.0], "y": [0.0, 1.0, 0.0], "z": [0.0, 0.0, 1.0]}
         if isinstance(normal, str) and normal not in axes:
             raise InputError(f"normal: expected 'x', 'y', 'z' or three numbers, found {normal!r}")
@@ -412,6 +478,10 @@ class Scene:
         values: Any,
         *,
         labels: Any = None,
+        field: Any = None,
+        colormap: str | None = None,
+        clim: tuple[float, float] | None = None,
+        transfer: Transfer | None = None,
         spacing: Any = None,
         origin: Any = None,
         direction: Any = None,
@@ -425,8 +495,11 @@ class Scene:
         values
             As for :meth:`add_isosurface`: whole numbers, of which 0 is nothing.
         labels
-            What the numbers stand for: ``{1: "bone", 2: {"name": "skin", "color": "#e6c8a0", "opacity": 0.3}}``, or the path of a table of colours. Names
-            stand in the legend of :meth:`Picture.save`. Without it each region has one of twelve colours.
+            What the numbers stand for: ``{1: "bone", 2: {"name": "skin", "color": "#e6c8a0", "opacity": 0.3}, 3: {"visible": False}}``, or the path of a
+            table of colours. Names stand in the legend of :meth:`Picture.save`, ``"visible": False`` hides a region, and regions that are not named have
+            colours of their numbers. Without it each region has one of twelve colours.
+        field, colormap, clim, transfer
+            As for :meth:`add_isosurface`: the intensities that surfaces of the regions show; not together with ``labels``.
         spacing, origin, direction
             As for :meth:`add_volume`.
         name, **keys
@@ -437,19 +510,42 @@ class Scene:
         InputError
             For what is no volume, or not of whole numbers.
         """
+        check_keys(Scene.add_labels, name or "mesh", keys)
+        if field is None and not (colormap is None and clim is None and transfer is None):
+            raise InputError("colormap, clim, transfer: expected a `field` to colour by, found none; `labels` takes the colours of regions")
+        if field is not None and labels is not None:
+            raise InputError("labels, field: expected one of them, found both: the surfaces show the field or the colours of labels")
         table = os.path.abspath(labels) if isinstance(labels, (str, os.PathLike)) else labels
         looks: dict[str, Any] = {"color_by": {"column": "label", "map": "distinct"}} if table is None else {"labels": table}
+        looks = {} if field is not None else looks
         if isinstance(values, (str, os.PathLike)):
-            self._add_file("mesh", values, None, name, looks | keys)
+            shown = None if field is None else field_of(field, {}, colormap, clim, transfer)
+            self._add_file("mesh", values, None, name, looks | keys, shown)
             return
         arguments, standing = volume_arguments(values, spacing, origin, direction)
         numbers = array_of(arguments["values"])
         if not np.issubdtype(numbers.dtype, np.integer) and not np.array_equal(numbers, np.round(numbers), equal_nan=True):
             raise InputError("values: expected whole numbers that name regions, found numbers with a part")
-        data, _ = lattice_of(**(arguments | {"values": numbers}))
-        self._add("mesh", data, name, standing | looks | keys)
+        data, lattice = lattice_of(**(arguments | {"values": numbers}))
+        own = {key: value for key, value in arguments.items() if key != "values"}
+        shown = None if field is None else field_of(field, own, colormap, clim, transfer)
+        self._add("mesh", data, name, standing | looks | keys, field=shown)
+        self._note_beyond(self.objects[-1], lattice.corners, standing | keys)
 
-    def add(self, thing: Any, *, name: str | None = None, **keys: Any) -> None:
+    def add(
+        self,
+        thing: Any,
+        *,
+        preset: str | None = None,
+        transfer: Transfer | None = None,
+        color_by: Any = None,
+        colormap: str | None = None,
+        clim: tuple[float, float] | None = None,
+        log_scale: bool = False,
+        up: str | None = None,
+        name: str | None = None,
+        **keys: Any,
+    ) -> None:
         """Adds a file, or a data set of another library: PyVista and VTK (points, surfaces, images), trimesh, Open3D, xarray, nibabel, SimpleITK; or an
         array: (n, 3) are points, and one of three axes is a volume.
 
@@ -457,14 +553,30 @@ class Scene:
         ----------
         thing
             What to add.
-        name, **keys
+        preset, transfer
+            As for :meth:`add_volume`, of a volume.
+        color_by, colormap, clim, log_scale
+            As for :meth:`add_points`, of points or a mesh. A file shows the column that suits it where ``color_by`` is None.
+        up
+            The axis of the data that points up, ``"y"``, ``"z"`` or ``"-y"``; what the data says, or y, where it is None.
+        name
             As for :meth:`add_points`.
+        **keys
+            Further keys of an object, and of a data set or an array the further arguments of :meth:`add_points`, :meth:`add_mesh` or :meth:`add_volume`.
         """
         if isinstance(thing, (str, os.PathLike)):
-            first = scene_of((os.path.abspath(thing),), _no_wish(), _how())
-            self._take(first, name, keys)
+            label = name or Path(thing).name
+            check_keys(Scene.add, label, keys)
+            _check_look(transfer, preset)
+            wish = {"preset": preset, "up": up, "color_by": color_by if isinstance(color_by, str) else None}
+            if color_by is not None and not isinstance(color_by, str):
+                keys = {"color_by": color_by} | keys
+            scale = _shown("", colormap, clim, log_scale)["color_by"]
+            self._take(scene_of((os.path.abspath(thing),), _no_wish() | wish, _how()), name, keys, transfer, scale=scale)
             return
-        adopted.add(self, thing, name, keys)
+        stated = {"preset": preset, "transfer": transfer, "color_by": color_by, "colormap": colormap, "clim": clim, "log_scale": log_scale or None}
+        stated["transform"] = None if up is None else {"up": up}
+        adopted.add(self, thing, name, {key: value for key, value in stated.items() if value is not None} | keys)
 
     # Everything else.
 
@@ -472,22 +584,34 @@ class Scene:
         """Sets a key of docs/scene.md, such as ``scene.set("render.technique", "surfels")`` or ``scene.set("object.scan.opacity", 0.5)``; objects and lights
         are named, materials too."""
         self._check_open()
-        place: Any = self._document
         parts = key.split(".")
         if not all(parts) or value is None:
             raise InputError(f"{key!r}: expected a key and a value, such as 'render.technique' and 'surfels', found {value!r}")
+        # What is refused changes nothing.
+        changed = copy.deepcopy(self._document)
+        place: Any = changed
+        is_set = False
         for part, following in zip(parts, parts[1:] + [""]):
-            if part in ("object", "light") and place is self._document:
+            if part in ("object", "light") and place is changed:
                 place = place.setdefault(part, [])
-                continue
-            if isinstance(place, list):
+            elif isinstance(place, list):
                 place = _named(place, part, key)
-                continue
-            if not following:
-                place[part] = plain(value)
-                return
-            place = place.setdefault(part, {})
-        raise InputError(f"{key}: expected a key of an object or a light, found its name alone")
+            elif not isinstance(place, dict):
+                raise InputError(f"{key}: expected a key below a table, found {place!r} above `{part}`")
+            elif not following:
+                place[part] = plain(value, key)
+                is_set = True
+            else:
+                place = place.setdefault(part, {})
+        if not is_set:
+            raise InputError(f"{key}: expected a key of an object or a light, found its name alone")
+        if parts[0] == "object":
+            self._check_object(_named(changed["object"], parts[1], key))
+        elif key == "render.technique":
+            _organza.check(json.dumps({"version": 1, "camera": {"auto": True}, "render": {"technique": plain(value)}}), {})
+        else:
+            _check_shape(changed)
+        self._document = changed
 
     @property
     def camera(self) -> Camera:
@@ -506,7 +630,7 @@ class Scene:
         height: float | None = None,
         color: Any = None,
         material: str | None = None,
-        name: str = "ground",
+        name: str | None = None,
         **keys: Any,
     ) -> None:
         """Puts a level ground below everything that the scene shows.
@@ -525,7 +649,7 @@ class Scene:
         material
             The name of a material, see :meth:`material`.
         name
-            How the object is called.
+            How the object is called; "ground" where it is None.
         **keys
             Further keys of an object (docs/scene.md). It is lit in every pixel (``technique="sheets"``) and casts no shadow unless they say otherwise.
 
@@ -542,19 +666,25 @@ class Scene:
                 number(key, value)
         if size is not None and size <= 0.0:
             raise InputError(f"size: expected a number above 0, found {size!r}")
-        label = self._free_name(_label(name) or "ground")
+        label = self._name(name, "ground")
         if color is None and material is None:
             color = _GROUND_COLOR
         stated = {"color": color, "material": material}
         looks = {key: value for key, value in stated.items() if value is not None}
+        check_keys(Scene.ground, label, keys)
         thing = {"technique": "sheets", "casts_shadow": False} | looks | keys | {"name": label}
+        self._check_object(plain(thing) | _ANYWHERE)
         self._document.setdefault("object", []).append(plain(thing))
         self._ground = _Ground(label, size, height)
 
     def material(self, name: str, **keys: Any) -> None:
         """States a material, which objects name by ``material="NAME"``; keys as in docs/scene.md."""
         self._check_open()
-        self._document.setdefault("material", {})[name] = plain(keys)
+        if not isinstance(name, str):
+            raise InputError(f"name: expected a text, found {name!r}")
+        stated = plain(keys)
+        _check_shape({"material": {name: stated}})
+        self._document.setdefault("material", {})[name] = stated
 
     def to_toml(self) -> str:
         """The scene as the text of a scene file. Data from arrays is named ``memory:NAME`` in it, which a file cannot hold."""
@@ -569,15 +699,15 @@ class Scene:
 
     @property
     def notes(self) -> list[str]:
-        """What a first scene decided that a user may want otherwise, and what was made of arrays, one sentence each."""
-        return list(self._remarks)
+        """What a first scene decided that a user may want otherwise, what was made of arrays, and what its camera does not see, one sentence each."""
+        return self._remarks + self._beyond_remarks()
 
     def __repr__(self) -> str:
         return f"<organza.Scene {self._file}>" if self._text else f"<organza.Scene of {', '.join(self.objects) or 'nothing'}>"
 
     def __getstate__(self) -> dict[str, Any]:
         data = {name: (data.kind, data.arrays()) for name, data in self._data.items()}
-        return {"document": self._document, "text": self._text, "file": self._file, "data": data, "remarks": self._remarks, "written": self._written, "ground": self._ground}
+        return {"document": self._document, "text": self._text, "file": self._file, "data": data, "remarks": self._remarks, "written": self._written, "ground": self._ground, "beyond": self._beyond}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self._document = state["document"]
@@ -586,6 +716,7 @@ class Scene:
         self._remarks = state["remarks"]
         self._written = state["written"]
         self._ground = state["ground"]
+        self._beyond = state["beyond"]
         self._data = {name: getattr(Data, kind)(**arrays) for name, (kind, arrays) in state["data"].items()}
 
     def _check_open(self) -> None:
@@ -593,17 +724,21 @@ class Scene:
             raise InputError(f"{self._file}: a scene that was loaded stays as its file has it; change the file")
 
     def _add(
-        self, source: str, data: Data, name: str | None, keys: Mapping[str, Any], table: Mapping[str, Any] | None = None
+        self,
+        source: str,
+        data: Data,
+        name: str | None,
+        keys: Mapping[str, Any],
+        table: Mapping[str, Any] | None = None,
+        field: Field | None = None,
     ) -> None:
         """Adds an object of data in memory; with a table its source is that, of a volume."""
         self._check_open()
-        label = self._free_name(_label(name) or source)
-        _organza.check(label, data)
-        self._remarks += [f"{label}: {note}" for note in data.notes]
-        self._data[label] = data
+        label = self._name(name, source)
         place = _MEMORY + label
-        thing = {"name": label, source: place if table is None else {"volume": place} | plain(table)} | plain(dict(keys))
-        self._document.setdefault("object", []).append(thing)
+        thing = {"name": label, source: place if table is None else {"volume": place} | plain(table)}
+        self._append(thing, keys, field, {label: data})
+        self._remarks += [f"{label}: {note}" for note in data.notes]
 
     def _add_file(
         self,
@@ -612,16 +747,72 @@ class Scene:
         table: Mapping[str, Any] | None,
         name: str | None,
         keys: Mapping[str, Any],
+        field: Field | None = None,
     ) -> None:
         """Adds an object of a file; with a table its source is that, of a volume."""
         self._check_open()
         place = os.path.abspath(path)
-        label = self._free_name(_label(name) or Path(place).name.split(".")[0] or source)
-        thing = {"name": label, source: place if table is None else {"volume": place} | plain(table)} | plain(dict(keys))
+        label = self._name(name, Path(place).name.split(".")[0] or source)
+        thing = {"name": label, source: place if table is None else {"volume": place} | plain(table)}
+        self._append(thing, keys, field, {})
+
+    def _append(self, thing: dict[str, Any], keys: Mapping[str, Any], field: Field | None, data: dict[str, Data]) -> None:
+        """Adds an object that is right, with the field that it shows."""
+        if field is not None:
+            table = dict(field.table)
+            if field.data is not None:
+                name = _free(f"{thing['name']} field", {*self.objects, *self._data, *data})
+                data = data | {name: field.data}
+                table["volume"] = _MEMORY + name
+            thing |= plain({"field": table} | field.keys)
+        thing |= plain({key: value for key, value in keys.items() if value is not None})
+        self._check_object(thing, data)
+        self._data |= data
         self._document.setdefault("object", []).append(thing)
 
+    def _check_object(self, thing: Mapping[str, Any], data: Mapping[str, Data] | None = None) -> None:
+        """Refuses an object that no scene may have, whatever else it shows. Materials that it names may be stated later."""
+        is_ground = self._ground is not None and thing["name"] == self._ground.name
+        document: dict[str, Any] = {"version": 1, "camera": {"auto": True}, "object": [{**thing, **(_ANYWHERE if is_ground else {})}]}
+        materials = dict(self._document.get("material", {}))
+        listed = thing.get("materials")
+        for name in [thing.get("material"), *(listed if isinstance(listed, list) else [])]:
+            if isinstance(name, str):
+                materials.setdefault(name, {})
+        if "footprints" in self._document:
+            document["footprints"] = self._document["footprints"]
+        elif isinstance(thing.get("footprint"), int):
+            document["object"] = [{key: value for key, value in document["object"][0].items() if key != "footprint"}]
+        text = json.dumps(document | {"material": materials})
+        named = {name: part for name, part in {**self._data, **(data or {})}.items() if json.dumps(_MEMORY + name) in text}
+        _organza.check(text, named)
+
+    def _name(self, name: str | None, default: str) -> str:
+        """The name of a new object: one that no other has, or the default with a number."""
+        label = _label(name)
+        if label is None:
+            return self._free_name(default)
+        if label in self.objects or label in self._data:
+            raise InputError(f"name: expected one that no object of the scene has, found {label!r} a second time; the scene has {', '.join(self.objects)}")
+        return label
+
+    def _note_beyond(self, label: str, places: Any, keys: Mapping[str, Any]) -> None:
+        """Keeps the share of an object that the camera of a first scene does not see."""
+        if self._written is not None and "position" in self._document.get("camera", {}):
+            share = beyond(self._document["camera"], places, plain(keys.get("transform") or {}))
+            if share > 0.0:
+                self._beyond[label] = share
+
+    def _beyond_remarks(self) -> list[str]:
+        """What is said of objects that were added to a first scene, as long as its camera stays where it is."""
+        if self._written is None or self._document.get("camera") != self._written.document.get("camera"):
+            return []
+        there = [name for name in self._beyond if name in self.objects]
+        advice = "the camera stays where the first scene has it: scene.camera.orbit() sees everything"
+        return [f"{name}: {_percent(self._beyond[name])} of it lies outside the view, as {advice}" for name in there]
+
     def _free_name(self, name: str) -> str:
-        return _free(name, self.objects)
+        return _free(name, {*self.objects, *self._data})
 
     def _first_keys(self, data: Data, name: str, preset: str | None) -> tuple[str, dict[str, Any]]:
         """What a first scene says of a volume, and whether that is one or the surfaces of labels; its material becomes one of this scene."""
@@ -635,15 +826,39 @@ class Scene:
         self._take_material(first, keys, name)
         return source, keys
 
-    def _take(self, first: Scene, name: str | None, keys: Mapping[str, Any]) -> None:
-        """Takes the objects of a first scene."""
+    def _take(
+        self,
+        first: Scene,
+        name: str | None,
+        keys: Mapping[str, Any],
+        transfer: Transfer | None = None,
+        expected: str | None = None,
+        scale: Mapping[str, Any] | None = None,
+    ) -> None:
+        """Takes the object of a first scene of one file; ``expected`` is the source that it is to have, ``scale`` the map of its column."""
         self._check_open()
-        self._remarks += first._remarks
+        stated = {key: value for key, value in (scale or {}).items() if key != "column"}
         for thing in first._document.get("object", []):
             thing = dict(thing)
+            source = next(source for source in _SOURCES if source in thing)
+            file = thing[source]
+            is_volume = source == "volume" or (source == "mesh" and thing.get("color_by", {}).get("column") == "label") or "labels" in thing
+            if expected == "volume" and not is_volume:
+                raise InputError(f"values: expected a volume, found {source}: {file}; scene.add({Path(file).name!r}) adds it")
+            if transfer is not None:
+                if source != "volume":
+                    raise InputError(f"transfer: expected a volume of amounts, found {source}: {file}; leave it out")
+                thing |= transfer.keys(_diagonal(file))
+            if stated:
+                if "color_by" not in thing | dict(keys):
+                    raise InputError(f"colormap, clim, log_scale: expected a column to colour by, found none in {source}: {file}; give `color_by`")
+                thing["color_by"] = thing.get("color_by", {}) | stated
             self._take_material(first._document, thing, thing["name"])
-            thing["name"] = self._free_name(name or thing["name"])
-            self._document.setdefault("object", []).append(thing | plain(dict(keys)))
+            thing["name"] = self._name(name, thing["name"])
+            thing |= plain({key: value for key, value in keys.items() if value is not None})
+            self._check_object(thing)
+            self._document.setdefault("object", []).append(thing)
+        self._remarks += first._remarks
 
     def _take_material(self, first: Mapping[str, Any], thing: dict[str, Any], name: str) -> None:
         material = thing.get("material")
@@ -661,7 +876,9 @@ class Scene:
         turntable: int | None = None,
     ) -> dict[str, Any]:
         """The scene as the extension takes it, with what it does not state; ``turntable`` is the pictures of a turn around it."""
-        switches = [f"{name}={state}" for name, state in (effects or {}).items()]
+        if effects is not None and not isinstance(effects, Mapping):
+            raise InputError(f"effects: expected names with 'on' or 'off', such as {{'shadow.sun': 'off'}}, found {effects!r}")
+        switches = [f"{name}={_switch(str(name), state)}" for name, state in (effects or {}).items()]
         given = self._given_text(self._text, size, turntable) | {"effects": switches, "transparent": transparent}
         if self._text is not None:
             return given
@@ -767,6 +984,79 @@ def scene_of(what: tuple[Any, ...], wished: Mapping[str, Any], how: dict[str, An
     return scene
 
 
+def _check_shape(document: Mapping[str, Any]) -> None:
+    """Refuses keys that scenes do not have, and values of other types."""
+    camera = document.get("camera") or {"auto": True}
+    seen = camera if not isinstance(camera, dict) or "position" in camera else {"auto": True} | camera
+    _organza.check_keys(json.dumps(dict(document) | {"version": 1, "camera": seen, "object": []}))
+
+
+def _check_array(name: str, thing: Any) -> None:
+    """Refuses a path in the place of an array, with the call that reads it."""
+    if isinstance(thing, (str, os.PathLike)):
+        raise InputError(f"{name}: expected an array, found a path; scene.add({os.fspath(thing)!r}) adds a file")
+
+
+def _check_look(transfer: Any, preset: Any) -> None:
+    """Refuses what is no look of a volume, and two of them."""
+    if transfer is not None and not isinstance(transfer, Transfer):
+        raise InputError(f"transfer: expected what organza.transfer makes, found {type(transfer).__name__}; `preset` takes a name")
+    if transfer is not None and preset is not None:
+        raise InputError("transfer, preset: expected one of them, found both")
+    if preset is not None and not isinstance(preset, str):
+        raise InputError(f"preset: expected the name of a look, found {type(preset).__name__}")
+
+
+def _colors_by(
+    column: str | None,
+    colormap: str | None,
+    clim: tuple[float, float] | None,
+    log_scale: bool,
+    field: Any,
+    transfer: Any,
+) -> tuple[Field | None, dict[str, Any]]:
+    """The field that points or a mesh show, and else the keys of the column that they are coloured by."""
+    if field is not None:
+        if column is not None:
+            raise InputError("field, color_by: expected one of them, found both")
+        return field_of(field, {}, colormap, clim, transfer, log_scale), {}
+    keys = _shown(column, colormap, clim, log_scale)
+    if transfer is None:
+        return None, keys
+    if column is None:
+        raise InputError("transfer: expected a column or a field to colour by, found none; give `values`, `color_by` or `field`")
+    if colormap is not None or clim is not None:
+        raise InputError("transfer, colormap, clim: expected the colours of the column once, found them twice")
+    if isinstance(transfer, Transfer):
+        transfer = [{key: point[key] for key in ("value", "color")} for point in transfer.points]
+    return None, keys | {"transfer": transfer}
+
+
+def _diagonal(file: str) -> float:
+    """The diagonal of the volume of a file, in its unit."""
+    return float(np.linalg.norm(json.loads(_organza.info_of_file(file, _how()))["size"])) or 1.0
+
+
+def _switch(name: str, state: Any) -> str:
+    """A state of an effect as the command writes it."""
+    if isinstance(state, bool):
+        return "on" if state else "off"
+    if state not in ("on", "off", "auto"):
+        raise InputError(f"effects, '{name}': expected 'on', 'off' or 'auto', found {state!r}")
+    return str(state)
+
+
+def _percent(share: float) -> str:
+    """A share in words, never all or nothing by rounding."""
+    percent = 100.0 * share
+    return "less than 1 %" if percent < 1.0 else f"{math.floor(percent)} %"
+
+
+def _kind(thing: Any) -> str:
+    """What a thing is, for messages."""
+    return repr(thing) if isinstance(thing, str) else type(thing).__name__
+
+
 def _label(name: Any) -> str | None:
     """The name of an object, where it has one."""
     if name is not None and not isinstance(name, str):
@@ -776,6 +1066,10 @@ def _label(name: Any) -> str | None:
 
 def _shown(column: str | None, colormap: str | None, clim: tuple[float, float] | None, log_scale: bool) -> dict[str, Any]:
     """The keys of an object whose colours stand for a column."""
+    if column is not None and not isinstance(column, (str, Mapping)):
+        raise InputError(f"color_by: expected the name of a column, found {_kind(column)}; `values` takes its numbers, and `field` a volume")
+    if isinstance(column, Mapping):
+        return {"color_by": column}
     if column is None:
         if colormap is not None or clim is not None or log_scale:
             raise InputError("colormap, clim, log_scale: expected a column to colour by, found none; give `values` or `color_by`")
@@ -784,7 +1078,7 @@ def _shown(column: str | None, colormap: str | None, clim: tuple[float, float] |
     if colormap is not None:
         shown["map"] = colormap
     if clim is not None:
-        shown["range"] = [float(end) for end in clim]
+        shown["range"] = plain(clim, "clim")
     if log_scale:
         shown["scale"] = "log"
     return {"color_by": shown}

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from organza._organza import InputError, map_colors
+from organza.checking import named
 
 # Colours between the first value and the last: a map is a curve.
 _COLORS = 33
@@ -32,6 +33,7 @@ class Transfer:
         return {"transfer": [dict(point) for point in self.points], "unit_length": unit_length}
 
 
+@named
 def transfer(
     colormap: str = "viridis",
     clim: tuple[float, float] = (0.0, 1.0),
@@ -43,7 +45,7 @@ def transfer(
     Parameters
     ----------
     colormap
-        ``viridis``, ``magma``, ``inferno``, ``plasma``, ``cividis``, ``turbo``, ``grey`` and others that ``--preset`` of ``organza init`` has.
+        ``viridis``, ``magma``, ``inferno``, ``plasma``, ``cividis``, ``turbo``, ``grey`` and the other maps of ``docs/scene.md``.
     clim
         The values of the first and the last colour. Values beyond have the colour and the opacity of the nearest end.
     opacity

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from organza import _organza
+from organza.checking import named
 from organza.drawing import _how, _wished
 from organza.progressing import heard
 from organza.scene import scene_of
@@ -62,6 +63,7 @@ class View:
         return f'{frame}<p><a href="{url}" target="_blank" rel="noopener">Open in a page of its own</a></p>'
 
 
+@named
 def view(
     *what: Any,
     size: tuple[int, int] | None = None,

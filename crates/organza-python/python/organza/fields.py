@@ -1,0 +1,64 @@
+"""Second volumes, whose values surfaces show."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from organza._organza import Data, InputError
+from organza.lattices import lattice_of, percentiles, volume_arguments
+from organza.transfers import Transfer
+from organza.transfers import transfer as make_transfer
+
+# What a table may say of a field that is no file.
+_LATTICE = ("values", "spacing", "origin", "direction", "interpolation")
+
+
+@dataclass(frozen=True)
+class Field:
+    """A field that a surface shows: the keys of its object, and its data where that is in memory."""
+
+    data: Data | None
+    table: dict[str, Any]
+    keys: dict[str, Any]
+
+
+def field_of(
+    field: Any,
+    lattice: Mapping[str, Any],
+    colormap: str | None,
+    clim: tuple[float, float] | None,
+    transfer: Transfer | None,
+    log_scale: bool = False,
+) -> Field:
+    """A field from an argument; ``lattice`` is that of an array which states none."""
+    if transfer is not None and not isinstance(transfer, Transfer):
+        raise InputError(f"transfer: expected what organza.transfer makes, found {type(transfer).__name__}; `colormap` takes a name")
+    if transfer is not None and (colormap is not None or clim is not None):
+        raise InputError("transfer, colormap, clim: expected the colours of the field once, found them twice")
+    if log_scale:
+        raise InputError("log_scale: expected a column to colour by, found a `field`; give the logarithms of its values")
+    table: dict[str, Any] = {}
+    data = None
+    if isinstance(field, (str, os.PathLike)):
+        table["volume"] = os.path.abspath(field)
+    elif isinstance(field, Mapping) and "values" not in field:
+        table |= field
+    else:
+        stated = dict(field) if isinstance(field, Mapping) else {"values": field}
+        unknown = [str(key) for key in stated if key not in _LATTICE]
+        if unknown:
+            raise InputError(f"field: expected the keys {', '.join(_LATTICE)}, found `{unknown[0]}`")
+        if "interpolation" in stated:
+            table["interpolation"] = stated["interpolation"]
+        own = [stated.get(key) for key in ("spacing", "origin", "direction")]
+        arguments, _ = volume_arguments(stated["values"], *own)
+        data, _ = lattice_of(**(dict(lattice) | arguments))
+        if transfer is None and clim is None:
+            clim = percentiles(arguments["values"])
+    if transfer is None and clim is None:
+        raise InputError("clim: expected the values at the ends of the map for the field of a file, which is not read yet, found none")
+    colors = transfer if transfer is not None else make_transfer(colormap or "viridis", clim or (0.0, 1.0))
+    return Field(data, table, {"transfer": [{key: point[key] for key in ("value", "color")} for point in colors.points]})
