@@ -1,13 +1,16 @@
-//! `cargo xtask effects`: what each effect of every scene changes, where families of scenes cross their thresholds, and predicted beside measured times:
-//! measured, into docs/effects.csv, docs/effect-families.csv, docs/predictions.csv and docs/effects.md.
+//! `cargo xtask effects`: what each effect of every scene changes, where families of scenes cross their thresholds, and predicted beside measured times,
+//! into docs/effects.csv, docs/effect-families.csv, docs/predictions.csv and docs/effects.md.
 
 use crate::ci::{DRIVER, FEATURES};
 use crate::repo::{Outcome, Repo};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::{SystemTime, UNIX_EPOCH};
 
-const EXAMPLE: [&str; 6] = ["run", "--release", "--package", "organza-judge", "--example", "effects"];
+/// What tests are built with, so that nothing is built anew.
+const WORKSPACE: [&str; 3] = ["--workspace", "--exclude", "organza-benches"];
+/// The example, where cargo leaves it.
+const EXAMPLE: &str = "debug/examples/effects";
 /// Tests that draw families of scenes.
 const FAMILIES: &str = "x7_";
 const TABLE: &str = "docs/effect-families.csv";
@@ -15,10 +18,12 @@ const HEAD: &str = "effect,grows,settings,first_visible,last_left_out,largest_ch
 
 /// Draws families and all scenes, which takes an hour.
 pub(crate) fn run(repo: &Repo) -> Outcome {
-    let time = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |time| time.as_secs());
-    println!("families of seed {time}");
-    families(repo, &time.to_string())?;
-    cargo(repo, &EXAMPLE.map(str::to_owned), &[])?;
+    let seed = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |time| time.as_secs());
+    println!("families of seed {seed}");
+    families(repo, &seed.to_string())?;
+    cargo(repo, &words("build", &["--example", "effects"]), &[])?;
+    let target = std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| repo.root.join("target"), PathBuf::from);
+    status(Command::new(target.join(EXAMPLE)).current_dir(&repo.root), EXAMPLE)?;
     Ok("effects: docs/effects.csv, docs/effect-families.csv, docs/predictions.csv and docs/effects.md are written"
         .to_owned())
 }
@@ -28,11 +33,8 @@ fn families(repo: &Repo, seed: &str) -> Result<(), String> {
     let table = repo.root.join(TABLE);
     let write = |text: &str| std::fs::write(&table, text).map_err(|error| format!("{TABLE}: {error}"));
     write(HEAD)?;
-    let features = format!("{FEATURES},{DRIVER}");
-    let words =
-        ["test", "--workspace", "--exclude", "organza-benches", "--features", &features, "--test", "end_to_end"];
-    let words: Vec<String> = words.iter().chain(&["--", FAMILIES]).map(|word| (*word).to_owned()).collect();
     let path = table.display().to_string();
+    let words = words("test", &["--test", "end_to_end", "--", FAMILIES]);
     cargo(repo, &words, &[("ORGANZA_FAMILIES", &path), ("ORGANZA_SEED", seed)])?;
     write(&sorted(&table)?)
 }
@@ -45,13 +47,24 @@ fn sorted(table: &Path) -> Result<String, String> {
     Ok(rows.iter().fold(HEAD.to_owned(), |text, row| text + row + "\n"))
 }
 
+/// Words for cargo about the whole workspace.
+fn words(work: &str, more: &[&str]) -> Vec<String> {
+    let features = ["--features".to_owned(), format!("{FEATURES},{DRIVER}")];
+    let workspace = std::iter::once(work).chain(WORKSPACE).map(str::to_owned);
+    workspace.chain(features).chain(more.iter().map(|word| (*word).to_owned())).collect()
+}
+
 fn cargo(repo: &Repo, words: &[String], environment: &[(&str, &str)]) -> Result<(), String> {
     let program = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let mut command = Command::new(program);
     command.args(words).envs(environment.iter().copied()).current_dir(&repo.root);
+    status(&mut command, &format!("cargo {}", words.join(" ")))
+}
+
+fn status(command: &mut Command, line: &str) -> Result<(), String> {
     match command.status() {
         Ok(status) if status.success() => Ok(()),
-        Ok(status) => Err(format!("`cargo {}`: {status}", words.join(" "))),
-        Err(error) => Err(format!("cargo did not start: {error}")),
+        Ok(status) => Err(format!("`{line}`: {status}")),
+        Err(error) => Err(format!("`{line}` did not start: {error}")),
     }
 }

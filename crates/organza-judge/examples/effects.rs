@@ -1,4 +1,4 @@
-//! `cargo run --release -p organza-judge --example effects`: draws each scene of `scenes/` with each of its effects and without it, and writes what
+//! `cargo run -p organza-judge --example effects`: draws each scene of `scenes/` with each of its effects and without it, and writes what
 //! that changes into `docs/effects.csv`, and into the tables of `docs/effects.md`. It draws each scene in two sizes on one thread and on two, and writes
 //! predicted beside measured times into `docs/predictions.csv`. `cargo xtask effects` runs it, after the tests that write `docs/effect-families.csv`.
 #![allow(clippy::unwrap_used, reason = "it stops where something is wrong")]
