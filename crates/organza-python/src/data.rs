@@ -7,7 +7,7 @@ use numpy::{PyArray1, PyArrayMethods};
 use organza::{Error, SourceData};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use read::{ReadParams, Rgba, TextureImage, TexturePlaces};
+use read::{Loaded, ReadParams, Rgba, TextureImage, TexturePlaces};
 use splat_core::glam::{DMat3, DVec3, Vec3};
 use splat_core::{Association, Column, Grid, Mesh, MeshColumn, RadianceImage, RawPoints, Relative};
 use std::path::{Path, PathBuf};
@@ -260,7 +260,10 @@ fn textured(mesh: Mesh, uv: &Bound<'_, PyAny>, texture: &Texture<'_>) -> PyResul
         Texture::Pixels(pixels) => texels(NAME, pixels)?,
     };
     let painted = read::textured_in_memory(NAME, mesh, &places, image, &ReadParams::default());
-    let (mesh, notes) = painted.map_err(|error| raised(&Error::from_read(Path::new(&error.file), &error)))?;
+    let (loaded, notes) = painted.map_err(|error| raised(&Error::from_read(Path::new(&error.file), &error)))?;
+    let Loaded::Mesh(mesh) = loaded else {
+        return Err(raised(&Error::Internal("a texture that is kept where none was asked for".into())));
+    };
     Ok(Data { data: SourceData::Mesh(mesh.into()), notes: notes.remarks })
 }
 

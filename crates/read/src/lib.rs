@@ -55,11 +55,13 @@ pub use format::unread::is_foreign_json;
 pub use format::up::{stated_up_axis, up_axis};
 pub use guarded::panic_is_input_error;
 pub use label_rows::{LabelRow, LabelRows, label_rows, label_rows_of_bytes};
+#[cfg(feature = "textures")]
+pub use meshes::paint::Painting;
 #[cfg(feature = "ply")]
-pub use meshes::texture::Rgba;
+pub use meshes::rgba::Rgba;
 #[cfg(feature = "ply")]
 pub use meshes::textured::{TextureImage, TexturePlaces, smoothed_in_memory, textured_in_memory};
-pub use reading::{Fix, Mended, NamedColumn, Notes};
+pub use reading::{Fix, Mended, NamedColumn, Notes, Textures};
 /// The nouns that this crate takes and returns.
 pub use splat_core;
 
@@ -143,11 +145,13 @@ pub struct ReadParams {
     /// Whether an image says how much of each place something covers, which all three channels then hold: the alpha of a PNG or OpenEXR, or
     /// where it has none how bright it is, the samples of a PNG as numbers.
     pub is_coverage: bool,
+    /// What becomes of the textures of a mesh.
+    pub textures: Textures,
 }
 
 impl Default for ReadParams {
     /// 4 GiB, nothing dropped, what can be mended is mended, the first of a series, all points, no further columns, the first array, pictures in colours of a
-    /// display.
+    /// display, textures as colours of vertices.
     fn default() -> Self {
         Self {
             memory: MemoryAccount::default(),
@@ -162,6 +166,7 @@ impl Default for ReadParams {
             ranges: false,
             is_data: false,
             is_coverage: false,
+            textures: Textures::Divided,
         }
     }
 }
@@ -205,6 +210,9 @@ impl ReadParams {
 pub enum Loaded {
     /// Vertices with faces.
     Mesh(Mesh),
+    /// The same with colours that lie between the vertices; only with [`Textures::Kept`].
+    #[cfg(feature = "textures")]
+    Painted(Mesh, Painting),
     /// Points without faces, which may be Gaussians.
     Points(RawPoints),
     /// A regular volume.
@@ -218,6 +226,8 @@ impl Loaded {
     pub fn bytes(&self) -> u64 {
         match self {
             Self::Mesh(mesh) => mesh.bytes(),
+            #[cfg(feature = "textures")]
+            Self::Painted(mesh, painting) => mesh.bytes() + painting.bytes(),
             Self::Points(points) => points.bytes(),
             Self::Grid(grid) => grid.bytes(),
             Self::Image(image) => image.bytes(),
@@ -390,8 +400,15 @@ fn finished(loaded: Loaded, reading: &mut Reading<'_>) -> Result<Loaded, ReadErr
         }
         Loaded::Mesh(mesh) => {
             check_mesh_columns(&mesh, reading)?;
-            outwards(mesh, reading).map(Loaded::Mesh)
+            let mesh = outwards(mesh, reading)?;
+            #[cfg(feature = "textures")]
+            if let Some(painting) = reading.painting.take() {
+                return Ok(Loaded::Painted(mesh, painting));
+            }
+            Ok(Loaded::Mesh(mesh))
         }
+        #[cfg(feature = "textures")]
+        painted @ Loaded::Painted(..) => Ok(painted),
         Loaded::Image(image) => Ok(Loaded::Image(image)),
     }
 }

@@ -4,6 +4,9 @@
 pub(crate) mod fans;
 #[cfg(feature = "gltf")]
 pub(crate) mod gltf;
+#[cfg(feature = "textures")]
+#[cfg_attr(not(any(feature = "obj", feature = "gltf", feature = "ply")), expect(dead_code, reason = "readers decode"))]
+pub(crate) mod mip_maps;
 #[cfg(feature = "obj")]
 pub(crate) mod mtl;
 #[cfg(any(feature = "vti", feature = "vtk"))]
@@ -14,7 +17,8 @@ pub(crate) mod obj;
 pub(crate) mod off;
 pub(crate) mod opacity;
 pub(crate) mod outwards;
-#[cfg(any(feature = "obj", feature = "gltf", feature = "ply"))]
+#[cfg(feature = "textures")]
+#[cfg_attr(not(any(feature = "obj", feature = "gltf", feature = "ply")), expect(dead_code, reason = "readers paint"))]
 pub(crate) mod paint;
 #[cfg(feature = "ply")]
 pub(crate) mod places;
@@ -22,10 +26,13 @@ pub(crate) mod places;
 pub(crate) mod ply;
 #[cfg(any(feature = "ply", feature = "obj", feature = "off", feature = "vti", feature = "vtk"))]
 pub(crate) mod polygon;
+#[cfg(feature = "textures")]
+pub(crate) mod rgba;
 #[cfg(feature = "obj")]
 pub(crate) mod statements;
 pub(crate) mod stl;
-#[cfg(any(feature = "obj", feature = "gltf", feature = "ply"))]
+#[cfg(feature = "textures")]
+#[cfg_attr(not(any(feature = "obj", feature = "gltf", feature = "ply")), expect(dead_code, reason = "readers decode"))]
 pub(crate) mod texture;
 #[cfg(feature = "ply")]
 pub(crate) mod textured;

@@ -1,6 +1,8 @@
 //! What goes along while a file is read: its parameters, who may stop it, and what was mended in it.
 
 use super::ReadParams;
+#[cfg(feature = "textures")]
+use super::meshes::paint::Painting;
 use crate::error::{Place, ReadError};
 use crate::points::extras::LONGEST_NAME;
 use splat_core::text::escaped;
@@ -175,11 +177,32 @@ pub(crate) struct Reading<'a> {
     pub(crate) params: &'a ReadParams,
     progress: Option<&'a Progress>,
     pub(crate) notes: Notes,
+    /// Colours of the mesh that is read, with [`Textures::Kept`].
+    #[cfg(feature = "textures")]
+    pub(crate) painting: Option<Painting>,
+}
+
+/// What becomes of the textures of a mesh.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Textures {
+    /// Triangles are divided until colours of vertices show the textures.
+    #[default]
+    Divided,
+    /// They are kept beside the mesh, see [`super::Loaded::Painted`]. Triangles are divided where opacities vary alone.
+    Kept,
+    /// Sizes of images are read and no texel. Colours and opacities are those without textures.
+    Undecoded,
 }
 
 impl<'a> Reading<'a> {
     pub(crate) fn new(params: &'a ReadParams, progress: Option<&'a Progress>) -> Self {
-        Self { params, progress, notes: Notes::default() }
+        Self {
+            params,
+            progress,
+            notes: Notes::default(),
+            #[cfg(feature = "textures")]
+            painting: None,
+        }
     }
 
     /// The same file with other parameters; takes the notes, which are to be given back.
@@ -188,7 +211,7 @@ impl<'a> Reading<'a> {
     where
         'a: 'p,
     {
-        Reading { params, progress: self.progress, notes: std::mem::take(&mut self.notes) }
+        Reading { notes: std::mem::take(&mut self.notes), ..Reading::new(params, self.progress) }
     }
 
     /// Counts a fault that is mended; with [`ReadParams::strict`] it is the error that it stands for.

@@ -41,6 +41,8 @@ mod read_series;
 mod read_stacks;
 #[cfg(all(feature = "obj", feature = "ply"))]
 mod read_textured;
+#[cfg(all(feature = "off", feature = "gltf"))]
+mod read_textures;
 mod read_unread;
 mod read_volumes;
 mod read_vti;

@@ -2,10 +2,10 @@
 
 use crate::read_samples::image;
 use read::{
-    Fault, Loaded, ReadParams, Rgba, TextureImage, TexturePlaces, file, mesh_columns_in_memory, smoothed_in_memory,
-    textured_in_memory,
+    Fault, Loaded, Notes, Painting, ReadParams, Rgba, TextureImage, TexturePlaces, Textures, file,
+    mesh_columns_in_memory, smoothed_in_memory, textured_in_memory,
 };
-use splat_core::glam::{DVec3, Vec3};
+use splat_core::glam::{DVec3, Vec2, Vec3};
 use splat_core::{Association, MemoryAccount, Mesh, MeshColumn, Relative};
 use std::path::{Path, PathBuf};
 
@@ -48,6 +48,14 @@ fn of_file(name: &str) -> (Mesh, PathBuf) {
     }
 }
 
+/// The mesh as it is painted, with what there is to say.
+fn painted(mesh: Mesh, places: &TexturePlaces, image: TextureImage) -> (Mesh, Notes) {
+    match textured_in_memory("roof", mesh, places, image, &ReadParams::default()).unwrap() {
+        (Loaded::Mesh(mesh), notes) => (mesh, notes),
+        other => panic!("{other:?}"),
+    }
+}
+
 fn texels(path: &Path) -> TextureImage {
     let rgba = image::open(path).unwrap().into_rgba8();
     let size = [rgba.width(), rgba.height()];
@@ -59,9 +67,44 @@ fn a_texture_in_memory_paints_as_that_of_a_file() {
     let (of_file, texture) = of_file("textured");
     assert!(of_file.triangles.len() > 16 && !of_file.color.is_empty());
     for image in [TextureImage::File(texture.clone()), texels(&texture)] {
-        let (mesh, notes) = textured_in_memory("roof", roof(), &of_corners(), image, &ReadParams::default()).unwrap();
+        let (mesh, notes) = painted(roof(), &of_corners(), image);
         assert_eq!(mesh, of_file);
         assert!(notes.remarks[0].starts_with("textures became colours of vertices"), "{notes:?}");
+    }
+}
+
+#[test]
+fn a_kept_texture_in_memory_is_that_of_a_file() {
+    let (_, texture) = of_file("textured-kept");
+    let params = ReadParams { textures: Textures::Kept, ..ReadParams::default() };
+    let (found, _) = file(&texture.with_file_name("a.obj"), &params, None).unwrap();
+    assert!(matches!(&found, Loaded::Painted(mesh, _) if mesh.triangles.len() == 4), "{found:?}");
+    let rgba = image::open(&texture).unwrap().into_rgba8();
+    let linear = rgba.pixels().map(|p| {
+        let [r, g, b] = [0, 1, 2].map(|c| splat_core::srgb::linear_from_srgb(f64::from(p.0[c]) / 255.0));
+        [r, g, b, f32::from(p.0[3]) / 255.0]
+    });
+    let linear = Rgba::Linear(linear.collect());
+    let linear = TextureImage::Texels { size: [rgba.width(), rgba.height()], rgba: linear };
+    for image in [TextureImage::File(texture.clone()), texels(&texture)] {
+        assert_eq!(textured_in_memory("roof", roof(), &of_corners(), image, &params).unwrap().0, found);
+    }
+    // Linear texels are not stored in eight bits, so their means differ by the rounding of those.
+    let Loaded::Painted(mesh, painting) = textured_in_memory("roof", roof(), &of_corners(), linear, &params).unwrap().0
+    else {
+        panic!("no painting")
+    };
+    let Loaded::Painted(_, expected) = found else { panic!("no painting") };
+    for share in [1e-3, 0.1, 1.0] {
+        let colors_of = |painting: &Painting| {
+            let mut colors = vec![[0.0; 3]; 4];
+            let mut weights = (0..4).map(|k| Vec2::splat(0.1 * k as f32));
+            painting.colors(&mesh.triangles[1], share, &mut weights, &mut colors);
+            colors
+        };
+        for (found, expected) in colors_of(&painting).iter().zip(colors_of(&expected)) {
+            (0..3).for_each(|c| assert!((found[c] - expected[c]).abs() < 0.012, "{found:?} {expected:?}"));
+        }
     }
 }
 
@@ -75,7 +118,7 @@ fn vertices_that_a_seam_parts_are_shaded_as_one() {
     let parted = Mesh { position, triangles, ..roof() };
     let places = TexturePlaces::Vertices([LOWER, UPPER, LOWER, UPPER].concat());
     let image = TextureImage::File(texture);
-    let (mesh, _) = textured_in_memory("roof", parted, &places, image, &ReadParams::default()).unwrap();
+    let (mesh, _) = painted(parted, &places, image);
     let corners = |mesh: &Mesh| {
         let of_vertex = |v: u32| (mesh.position[v as usize], mesh.normal[v as usize], mesh.color[v as usize]);
         mesh.triangles.iter().map(|t| t.map(of_vertex)).collect::<Vec<_>>()
@@ -124,7 +167,7 @@ fn linear_texels_colours_and_columns_are_kept() {
     let image = TextureImage::Texels { size: [1, 1], rgba: Rgba::Linear(vec![[2.0, 0.5, 0.25, 0.5]]) };
     let column = MeshColumn { name: "heat".into(), association: Association::Vertex, values: vec![1.0; 6] };
     let mesh = Mesh { color: vec![[0.5, 1.0, 1.0]; 6], opacity: vec![0.5; 6], columns: vec![column], ..roof() };
-    let (mesh, _) = textured_in_memory("roof", mesh, &of_corners(), image, &ReadParams::default()).unwrap();
+    let (mesh, _) = painted(mesh, &of_corners(), image);
     mesh.validate().unwrap();
     assert!(mesh.color.iter().all(|color| *color == [1.0, 0.5, 0.25]));
     assert!(mesh.opacity.iter().all(|opacity| *opacity == 0.25));

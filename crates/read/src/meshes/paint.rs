@@ -1,8 +1,8 @@
-//! Colours of materials and textures → colours of vertices, the only ones that meshes have.
+//! Colours of materials and textures.
 //!
-//! A texture has more detail than a mesh has vertices: triangles are divided where colours between their corners are not
-//! those of the texture, down to its texels, within a bounded number of triangles. So pictures show the texture, and every
-//! stage that follows knows vertices alone.
+//! A texture has more detail than a mesh has vertices. With [`Textures::Divided`] triangles are divided where colours between their corners are not
+//! those of the texture, down to its texels, within a bounded number of triangles, and colours become those of vertices. With [`Textures::Kept`] the
+//! mesh keeps its triangles, and its [`Painting`] has the colour of any part of one. Opacities become those of vertices in both.
 
 #[cfg(any(feature = "obj", feature = "ply"))]
 pub(crate) mod corners;
@@ -11,9 +11,11 @@ mod refine;
 use super::opacity;
 use super::texture::Texture;
 use crate::error::ReadError;
-use crate::reading::Reading;
+use crate::reading::{Notes, Reading, Textures};
 use crate::stream::input;
-use splat_core::{Association, Mesh};
+use crate::{ReadParams, meshes::paint::refine::Limits};
+use splat_core::glam::{Vec2, Vec3};
+use splat_core::{Association, Mesh, Progress};
 
 /// Bytes of the colour and opacity of a vertex, and of both in the mesh.
 const BYTES_PER_COLOR: u64 = 16 + 12 + 4;
@@ -58,9 +60,9 @@ impl Paint {
     }
 }
 
-/// What the vertices of a mesh are painted with.
-#[derive(Default)]
-pub(crate) struct Painting {
+/// Colours of materials and textures, for the vertices of a mesh in their order.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Painting {
     pub(crate) paints: Vec<Paint>,
     pub(crate) textures: Vec<Texture>,
     /// Rank of its paint, one a vertex.
@@ -89,11 +91,22 @@ impl Painting {
         self.paints[self.paint_of[vertex as usize] as usize].alpha
     }
 
-    /// The mesh with its colours and opacities; where a paint says so, what is too thin to be there is left out.
+    /// Whether triangles of a paint may be divided; with `alpha_alone` those whose texture has opacities that are used.
+    fn is_divided(&self, paint: &Paint, alpha_alone: bool) -> bool {
+        let Some(texture) = paint.texture.and_then(|rank| self.textures.get(rank)) else { return false };
+        !alpha_alone || paint.alpha != Alpha::Ignored && texture.has_alpha()
+    }
+
+    /// The mesh with the colours and opacities of its vertices; [`Reading::painting`] gets those between them where textures are kept. Where a paint says so, what is too thin to be
+    /// there is left out.
     pub(crate) fn paint(mut self, mut mesh: Mesh, reading: &mut Reading<'_>) -> Result<Mesh, ReadError> {
         input::hold("the colours of vertices", mesh.position.len() as u64 * BYTES_PER_COLOR, reading.params)?;
-        if !self.textures.is_empty() {
-            refine::refine(&mut mesh, &mut self, reading)?;
+        let is_kept = reading.params.textures == Textures::Kept
+            && mesh.triangles.iter().any(|[first, ..]| self.texture_of(*first).is_some());
+        let is_decoded = reading.params.textures != Textures::Undecoded;
+        if is_decoded && !self.textures.is_empty() {
+            let limits = Limits { alpha_alone: is_kept, finest: 0.0 };
+            refine::refine(&mut mesh, &mut self, &limits, reading)?;
         }
         let vertices = 0..mesh.position.len() as u32;
         let colors: Vec<[f32; 4]> = vertices.map(|v| self.at(v)).collect();
@@ -111,14 +124,106 @@ impl Painting {
                 Alpha::Blended => mesh.opacity.is_empty() || t.iter().any(|v| alpha(*v) > 0.0),
             };
             let are_there: Vec<bool> = mesh.triangles.iter().map(is_there).collect();
-            leave_out(&mut mesh, &are_there);
+            leave_out(&mut mesh, is_kept.then_some(&mut self), &are_there);
+        }
+        if is_kept {
+            let is_seen = |(rank, _): (usize, &Texture)| {
+                self.paints.iter().any(|paint| paint.texture == Some(rank) && paint.alpha != Alpha::Ignored)
+            };
+            let by_alpha: Vec<bool> = self.textures.iter().enumerate().map(is_seen).collect();
+            self.textures = Texture::with_mip_maps(std::mem::take(&mut self.textures), &by_alpha, reading)?;
+            reading.painting = Some(self);
         }
         Ok(mesh)
+    }
+
+    /// Bytes that it holds.
+    pub fn bytes(&self) -> u64 {
+        let of_vertices = size_of_val(&self.paint_of[..]) + size_of_val(&self.tint[..]) + size_of_val(&self.place[..]);
+        of_vertices as u64 + Texture::bytes_of(&self.textures)
+    }
+
+    /// Texels within a triangle of these vertices; 0 without a texture.
+    pub fn texels(&self, triangle: &[u32; 3]) -> f64 {
+        let Some(texture) = self.texture_of(triangle[0]) else { return 0.0 };
+        let size = Vec2::from(texture.size().map(|n| n as f32)).as_dvec2();
+        let [a, b, c] = triangle.map(|v| Vec2::from(self.place[v as usize]).as_dvec2() * size);
+        0.5 * (b - a).perp_dot(c - a).abs()
+    }
+
+    /// Fills `colors` with the linear colours of parts of a triangle. Each part has its place by its `weights` of the second and third corner, and the
+    /// `share` of the triangle's area over which its texture is averaged.
+    pub fn colors(
+        &self,
+        triangle: &[u32; 3],
+        share: f64,
+        weights: &mut dyn Iterator<Item = Vec2>,
+        colors: &mut [[f32; 3]],
+    ) {
+        let factor = self.paints[self.paint_of[triangle[0] as usize] as usize].factor;
+        let tint = triangle.map(|v| self.tint.get(v as usize).map_or(Vec3::ONE, |t| Vec3::new(t[0], t[1], t[2])));
+        let texture = self.texture_of(triangle[0]);
+        let place = triangle.map(|v| self.place.get(v as usize).map_or(Vec2::ZERO, |p| Vec2::from(*p)));
+        let width = (self.texels(triangle) * share).sqrt() as f32;
+        for (color, w) in colors.iter_mut().zip(weights) {
+            let first = 1.0 - w.x - w.y;
+            let base = Vec3::new(factor[0], factor[1], factor[2])
+                // Even tints stay as they are.
+                * (tint[0] + (tint[1] - tint[0]) * w.x + (tint[2] - tint[0]) * w.y).max(Vec3::ZERO);
+            // Weights whose sum is 1 lead to no infinite place between finite ones.
+            let at = place[0] * first + place[1] * w.x + place[2] * w.y;
+            let shown = texture.map_or([1.0; 4], |texture| texture.averaged(at.to_array(), width));
+            *color = (base * Vec3::new(shown[0], shown[1], shown[2])).to_array();
+        }
+    }
+
+    /// The mesh with colours of vertices: triangles are divided as with [`Textures::Divided`], but no edge that is shorter than `finest`, in the
+    /// mesh's units. Colours are averaged over squares with such sides. The notes have remarks about the division.
+    ///
+    /// # Errors
+    /// [`ReadError`] of too little memory, and of a reader that was stopped.
+    pub fn divided(
+        &self,
+        mesh: &Mesh,
+        finest: f64,
+        params: &ReadParams,
+        progress: Option<&Progress>,
+    ) -> Result<(Mesh, Notes), ReadError> {
+        let mut reading = Reading::new(params, progress);
+        let mut mesh = mesh.clone();
+        let mut painting = self.clone();
+        let limits = Limits { alpha_alone: false, finest };
+        refine::refine(&mut mesh, &mut painting, &limits, &mut reading)?;
+        mesh.color = painting.averaged(&mesh, finest);
+        Ok((mesh, reading.notes))
+    }
+
+    /// Colours of vertices, averaged over squares of sides `finest` on the surface.
+    fn averaged(&self, mesh: &Mesh, finest: f64) -> Vec<[f32; 3]> {
+        let mut widths = vec![f64::INFINITY; mesh.position.len()];
+        for triangle in &mesh.triangles {
+            let [a, b, c] = triangle.map(|v| mesh.position[v as usize].as_dvec3());
+            let area = 0.5 * (b - a).cross(c - a).length();
+            let density = if area > 0.0 { (self.texels(triangle) / area).sqrt() } else { 0.0 };
+            // The least of the triangles around it: what lies beyond may belong to something else.
+            triangle.iter().for_each(|v| widths[*v as usize] = widths[*v as usize].min(finest * density));
+        }
+        let color = |(v, width): (usize, &f64)| {
+            let tint = self.tint.get(v).copied().unwrap_or([1.0; 4]);
+            let texture = self.texture_of(v as u32);
+            // A vertex of no triangle has the colour of its texel.
+            let width = if width.is_finite() { *width as f32 } else { 0.0 };
+            let shown = texture.map_or([1.0; 4], |texture| texture.averaged(self.place[v], width));
+            let factor = self.paints[self.paint_of[v] as usize].factor;
+            [0, 1, 2].map(|c| factor[c] * tint[c] * shown[c])
+        };
+        widths.iter().enumerate().map(color).collect()
     }
 }
 
 /// Leaves out triangles that are not there, with the vertices that no other triangle has: they would count for bounds.
-fn leave_out(mesh: &mut Mesh, are_there: &[bool]) {
+/// `painting` is that of the mesh where it is kept.
+fn leave_out(mesh: &mut Mesh, painting: Option<&mut Painting>, are_there: &[bool]) {
     if are_there.iter().all(|is_there| *is_there) {
         return;
     }
@@ -132,6 +237,11 @@ fn leave_out(mesh: &mut Mesh, are_there: &[bool]) {
     keep(&mut mesh.normal, &stays);
     keep(&mut mesh.color, &stays);
     keep(&mut mesh.opacity, &stays);
+    if let Some(painting) = painting {
+        keep(&mut painting.paint_of, &stays);
+        keep(&mut painting.tint, &stays);
+        keep(&mut painting.place, &stays);
+    }
     for column in &mut mesh.columns {
         keep(
             &mut column.values,

@@ -1,14 +1,15 @@
-//! Textures: PNG and JPEG images as linear colours between their texels.
+//! Textures: PNG and JPEG images as linear colours between their texels, or averaged over squares of texels.
 
+use super::mip_maps::{Level, MipMaps};
+use super::rgba::Rgba;
 use crate::check_sides;
 use crate::error::{Place, ReadError};
-use crate::reading::Reading;
+use crate::reading::{Reading, Textures};
 use crate::stream::input;
 use image::{ImageDecoder, ImageFormat, ImageReader, Limits};
 use splat_core::Reservation;
-use splat_core::srgb::linear_from_srgb;
 use std::io::Cursor;
-use std::sync::{Arc, LazyLock};
+use std::sync::Arc;
 
 /// What lies beyond the border.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -19,61 +20,28 @@ pub(crate) enum Wrap {
 }
 
 /// An image that surfaces are painted with.
-#[derive(Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Texture {
-    size: [u32; 2],
-    /// Colours and opacities, row by row from the top.
+    /// Its texels, which several textures may share.
     texels: Arc<Texels>,
     wrap: [Wrap; 2],
     /// Whether texels are squares of one colour.
     is_nearest: bool,
 }
 
-/// Texels that several textures may share, with the memory that they take.
+/// An image in one or all of its sizes, with the memory that it takes while its file is read.
+#[derive(Debug)]
 struct Texels {
-    rgba: Rgba,
-    _held: Reservation,
+    mip_maps: MipMaps,
+    _held: Option<Reservation>,
 }
 
-/// Colours and opacities of texels, row by row from the top.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Rgba {
-    /// Bytes of sRGB and of opacity.
-    Srgb(Vec<[u8; 4]>),
-    /// Linear numbers.
-    Linear(Vec<[f32; 4]>),
-}
-
-impl Rgba {
-    /// Texels.
-    fn len(&self) -> usize {
-        match self {
-            Self::Srgb(texels) => texels.len(),
-            Self::Linear(texels) => texels.len(),
-        }
-    }
-
-    /// Bytes that they take.
-    fn bytes(&self) -> u64 {
-        match self {
-            Self::Srgb(texels) => size_of_val(texels.as_slice()) as u64,
-            Self::Linear(texels) => size_of_val(texels.as_slice()) as u64,
-        }
-    }
-
-    /// The first texel with a colour below 0, an opacity beyond 0 and 1, or a number that is not finite.
-    fn wrong(&self) -> Option<usize> {
-        let is_right = |[r, g, b, alpha]: &[f32; 4]| {
-            [r, g, b].iter().all(|c| c.is_finite() && **c >= 0.0) && (0.0..=1.0).contains(alpha)
-        };
-        match self {
-            Self::Srgb(_) => None,
-            Self::Linear(texels) => texels.iter().position(|texel| !is_right(texel)),
-        }
+/// Two images are equal if their texels are.
+impl PartialEq for Texels {
+    fn eq(&self, other: &Self) -> bool {
+        self.mip_maps == other.mip_maps
     }
 }
-
-static LINEAR: LazyLock<[f32; 256]> = LazyLock::new(|| std::array::from_fn(|i| linear_from_srgb(i as f64 / 255.0)));
 
 /// Kinds of images that are not read, by bytes at an offset.
 const UNREAD: [(usize, &[u8], &str); 7] = [
@@ -97,8 +65,8 @@ impl Texture {
         true
     }
 
-    /// Decodes a PNG or JPEG image; `what` names it in messages.
-    pub(crate) fn decode(content: &[u8], what: &str, reading: &Reading<'_>) -> Result<Self, ReadError> {
+    /// Decodes a PNG or JPEG image; `what` names it in messages. With [`Textures::Undecoded`] only its header is read: the texture has a size and no texels.
+    pub(crate) fn decode(content: &[u8], what: &str, reading: &mut Reading<'_>) -> Result<Self, ReadError> {
         reading.go_on()?;
         let wrong = |found: String| {
             let hint = "save the texture anew as PNG or JPEG";
@@ -124,13 +92,65 @@ impl Texture {
         } else {
             input::check_packed(decoder.total_bytes(), stored, "an image")?;
         }
+        if reading.params.textures == Textures::Undecoded {
+            let shown = format!("{what} is a texture of {width} x {height} texels");
+            reading.notes.remark(shown);
+            return Ok(Self::of_level(Level::undecoded(width, height), None));
+        }
         let bytes = 4 * u64::from(width) * u64::from(height);
         let mut held = reading.params.memory.take(what, bytes.saturating_add(decoder.total_bytes()))?;
         let decoded = image::DynamicImage::from_decoder(decoder).map_err(|e| wrong(e.to_string()))?;
         let rgba = bytemuck::allocation::cast_vec(decoded.into_rgba8().into_raw());
         held.set(what, bytes)?;
-        let texels = Arc::new(Texels { rgba: Rgba::Srgb(rgba), _held: held });
-        Ok(Self { size: [width, height], texels, wrap: [Wrap::Repeat; 2], is_nearest: false })
+        Ok(Self::of_level(Level::new(width, height, Rgba::Srgb(rgba)), Some(held)))
+    }
+
+    fn of_level(level: Level, held: Option<Reservation>) -> Self {
+        let texels = Arc::new(Texels { mip_maps: MipMaps::of_level(level), _held: held });
+        Self { texels, wrap: [Wrap::Repeat; 2], is_nearest: false }
+    }
+
+    /// Makes the smaller sizes of each texture, so that [`Self::averaged`] reads them. Textures of one image share them where `by_alpha`, the rule of
+    /// [`MipMaps::new`], is the same. Nothing is held any more: whoever keeps the textures accounts [`Self::bytes_of`] for them.
+    pub(crate) fn with_mip_maps(
+        textures: Vec<Self>,
+        by_alpha: &[bool],
+        reading: &Reading<'_>,
+    ) -> Result<Vec<Self>, ReadError> {
+        let mut known: Vec<(Arc<Texels>, bool, Arc<Texels>)> = Vec::new();
+        let mut made = Vec::with_capacity(textures.len());
+        for (texture, by_alpha) in textures.into_iter().zip(by_alpha) {
+            reading.go_on()?;
+            let is_known = |(image, rule, _): &&(Arc<Texels>, bool, Arc<Texels>)| {
+                Arc::ptr_eq(image, &texture.texels) && rule == by_alpha
+            };
+            let texels = match known.iter().find(is_known) {
+                Some((.., texels)) => texels.clone(),
+                None => {
+                    let first = texture.texels.mip_maps.first().clone();
+                    // All smaller sizes together take a third of the first, and what rounding adds to it.
+                    let _held = reading.params.memory.take("the sizes of a texture", first.bytes())?;
+                    let texels = Arc::new(Texels { mip_maps: MipMaps::new(first, *by_alpha), _held: None });
+                    known.push((texture.texels.clone(), *by_alpha, texels.clone()));
+                    texels
+                }
+            };
+            made.push(Self { texels, ..texture });
+        }
+        Ok(made)
+    }
+
+    /// Bytes of these textures; an image that several share counts once.
+    pub(crate) fn bytes_of(textures: &[Self]) -> u64 {
+        let is_first = |(i, texture): &(usize, &Self)| {
+            !textures[..*i].iter().any(|earlier| Arc::ptr_eq(&earlier.texels, &texture.texels))
+        };
+        textures.iter().enumerate().filter(is_first).map(|(_, texture)| texture.texels.mip_maps.bytes()).sum()
+    }
+
+    /// Whether a texel is not opaque.
+    pub(crate) fn has_alpha(&self) -> bool {
+        self.texels.mip_maps.first().has_alpha()
     }
 
     /// The texture of texels in memory, `size` columns and rows of them.
@@ -150,8 +170,7 @@ impl Texture {
             return Err(ReadError::input(Place::File, expected, format!("others in row {row}, column {column}"), hint));
         }
         let held = reading.params.memory.take("the texture", rgba.bytes())?;
-        let texels = Arc::new(Texels { rgba, _held: held });
-        Ok(Self { size, texels, wrap: [Wrap::Repeat; 2], is_nearest: false })
+        Ok(Self::of_level(Level::new(size[0], size[1], rgba), Some(held)))
     }
 
     /// The same image with other rules of what lies beyond its border and between its texels.
@@ -161,7 +180,7 @@ impl Texture {
 
     /// Columns and rows.
     pub(crate) fn size(&self) -> [u32; 2] {
-        self.size
+        self.texels.mip_maps.first().size()
     }
 
     /// Linear colour and opacity at a place; (0, 0) is the upper left corner of the image, (1, 1) its lower right.
@@ -169,18 +188,49 @@ impl Texture {
     /// Places up to the border have the colours within it: a vertex that lies on the border belongs to what it encloses, and
     /// not to the other side of the image, to which repetition would lead.
     pub(crate) fn at(&self, place: [f32; 2]) -> [f32; 4] {
-        let wrap = [0, 1].map(|a| if (0.0..=1.0).contains(&place[a]) { Wrap::Clamp } else { self.wrap[a] });
-        let [x, y] = [0, 1].map(|a| f64::from(place[a]) * f64::from(self.size[a]));
-        if self.is_nearest {
-            return self.texel([x, y].map(|c| c.floor() as i64), wrap);
+        let first = self.texels.mip_maps.first();
+        if !self.is_nearest {
+            return self.between(first, place);
         }
+        let [x, y] = [0, 1].map(|a| f64::from(place[a]) * f64::from(first.size()[a]));
+        self.texel(first, [x, y].map(|c| c.floor() as i64), self.wrap_at(place))
+    }
+
+    /// The same averaged over a square whose sides are `width` texels: between the two sizes of the image whose texels are next to it (trilinear).
+    pub(crate) fn averaged(&self, place: [f32; 2], width: f32) -> [f32; 4] {
+        let levels = self.texels.mip_maps.levels();
+        let last = levels.len() - 1;
+        // A width that is no number is that of a texel.
+        let level = libm::log2f(width.max(1.0)).min(last as f32);
+        if level <= 0.0 {
+            return self.at(place);
+        }
+        let low = level.floor();
+        let share = level - low;
+        let fine = self.between(&levels[low as usize], place);
+        if share <= 0.0 {
+            return fine;
+        }
+        let coarse = self.between(&levels[(low as usize + 1).min(last)], place);
+        std::array::from_fn(|c| fine[c] + (coarse[c] - fine[c]) * share)
+    }
+
+    /// The rules beyond the border for a place.
+    fn wrap_at(&self, place: [f32; 2]) -> [Wrap; 2] {
+        [0, 1].map(|a| if (0.0..=1.0).contains(&place[a]) { Wrap::Clamp } else { self.wrap[a] })
+    }
+
+    /// Bilinear colour of one size of the image.
+    fn between(&self, level: &Level, place: [f32; 2]) -> [f32; 4] {
+        let wrap = self.wrap_at(place);
+        let [x, y] = [0, 1].map(|a| f64::from(place[a]) * f64::from(level.size()[a]));
         // Colours are those of the middles of texels.
         let low = [x, y].map(|c| (c - 0.5).floor());
         let share = [x - 0.5 - low[0], y - 0.5 - low[1]].map(|s| s as f32);
         let [i, j] = low.map(|c| c as i64);
         let row = |j: i64| {
-            let a = self.texel([i, j], wrap);
-            let b = self.texel([i.saturating_add(1), j], wrap);
+            let a = self.texel(level, [i, j], wrap);
+            let b = self.texel(level, [i.saturating_add(1), j], wrap);
             std::array::from_fn::<f32, 4, _>(|c| a[c] + (b[c] - a[c]) * share[0])
         };
         let a = row(j);
@@ -188,9 +238,9 @@ impl Texture {
         std::array::from_fn(|c| a[c] + (b[c] - a[c]) * share[1])
     }
 
-    fn texel(&self, at: [i64; 2], wrap: [Wrap; 2]) -> [f32; 4] {
+    fn texel(&self, level: &Level, at: [i64; 2], wrap: [Wrap; 2]) -> [f32; 4] {
         let [i, j] = [0, 1].map(|a| {
-            let n = i64::from(self.size[a]);
+            let n = i64::from(level.size()[a]);
             match wrap[a] {
                 Wrap::Repeat => at[a].rem_euclid(n),
                 Wrap::Clamp => at[a].clamp(0, n - 1),
@@ -200,15 +250,6 @@ impl Texture {
                 }
             }
         });
-        let rank = j as usize * self.size[0] as usize + i as usize;
-        match &self.texels.rgba {
-            Rgba::Linear(texels) => texels[rank],
-            Rgba::Srgb(texels) => {
-                let [r, g, b, alpha] = texels[rank];
-                let linear: &[f32; 256] = &LINEAR;
-                let [r, g, b] = [r, g, b].map(|c| linear[usize::from(c)]);
-                [r, g, b, f32::from(alpha) / 255.0]
-            }
-        }
+        level.linear(i as u32, j as u32)
     }
 }

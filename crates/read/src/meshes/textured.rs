@@ -1,14 +1,15 @@
-//! Meshes in memory with a texture, which becomes colours of their vertices as that of a file does.
+//! Meshes in memory with a texture, which becomes what that of a file does.
 
 use super::paint::corners::{BYTES_PER_CORNER, Corner, NONE, painted, smooth};
 use super::paint::{Alpha, Paint};
 use super::places::first_at_place;
 use super::ply::texture::Wedges;
-use super::texture::{Rgba, Texture};
-use crate::ReadParams;
+use super::rgba::Rgba;
+use super::texture::Texture;
 use crate::error::{Place, ReadError};
 use crate::reading::{Notes, Reading};
 use crate::stream::input::{self, Stream};
+use crate::{Loaded, ReadParams};
 use splat_core::Mesh;
 use splat_core::text::escaped_path;
 use std::path::PathBuf;
@@ -39,7 +40,7 @@ pub enum TexturePlaces {
 /// The only paint of such a mesh: the texture, whose opacities are those of the surface.
 const PAINT: Paint = Paint { factor: [1.0; 4], texture: Some(0), alpha: Alpha::Blended };
 
-/// Paints a mesh in memory with a texture: triangles are divided as those of a file are. Colours and opacities of its vertices are multiplied by those of
+/// Paints a mesh in memory with a texture, as [`ReadParams::textures`] has it for a file: the result is a [`Loaded::Mesh`] or [`Loaded::Painted`]. Colours and opacities of its vertices are multiplied by those of
 /// the texture. Normals that are missing are smooth across vertices at one place. `name` serves messages.
 ///
 /// # Errors
@@ -54,12 +55,16 @@ pub fn textured_in_memory(
     places: &TexturePlaces,
     image: TextureImage,
     params: &ReadParams,
-) -> Result<(Mesh, Notes), ReadError> {
+) -> Result<(Loaded, Notes), ReadError> {
     let params = &ReadParams { memory: params.memory.part(), ..params.clone() };
     let mut reading = Reading::new(params, None);
-    let texture = texture(name, image, &reading)?;
+    let texture = texture(name, image, &mut reading)?;
     let mesh = with_texture(mesh, places, texture, &mut reading).map_err(|e| e.in_file(name))?;
-    Ok((mesh, reading.finish(name)))
+    let loaded = match reading.painting.take() {
+        Some(painting) => Loaded::Painted(mesh, painting),
+        None => Loaded::Mesh(mesh),
+    };
+    Ok((loaded, reading.finish(name)))
 }
 
 /// Gives a mesh in memory without normals, some of whose vertices lie at one place, the normals that it has where these are one: the seam of a closed surface is
@@ -85,7 +90,7 @@ pub fn smoothed_in_memory(name: &str, mut mesh: Mesh, params: &ReadParams) -> Re
     Ok(mesh)
 }
 
-fn texture(name: &str, image: TextureImage, reading: &Reading<'_>) -> Result<Texture, ReadError> {
+fn texture(name: &str, image: TextureImage, reading: &mut Reading<'_>) -> Result<Texture, ReadError> {
     match image {
         TextureImage::Texels { size, rgba } => Texture::of_texels(size, rgba, reading).map_err(|e| e.in_file(name)),
         TextureImage::File(path) => {

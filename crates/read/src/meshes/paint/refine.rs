@@ -22,6 +22,9 @@ const LONGEST: f32 = 16_384.0;
 const TOLERANCE: f32 = 1.0 / 32.0;
 /// Most triangles that a mesh is divided into; one that has more already keeps them.
 const MOST: usize = 2 << 20;
+/// Rounds of halving at most: each edge is halved 14 times until it is as long as a texel. What takes more are slivers beside others, a few in
+/// each round, and a round takes the time of all triangles.
+const MOST_ROUNDS: usize = 32;
 /// Bytes that a triangle takes meanwhile, its share of vertices included.
 const BYTES_PER_TRIANGLE: u64 = 120;
 /// Bytes that a vertex of a divided mesh takes in the end, its place, normal, tint, place in the texture, paint and colours.
@@ -32,17 +35,42 @@ const CHUNK: usize = 256;
 /// An edge by its vertices, the lower one first.
 type Edge = [u32; 2];
 
+/// What keeps triangles from being divided.
+pub(super) struct Limits {
+    /// Whether opacities alone are looked at, where a texture has some that are used.
+    pub(super) alpha_alone: bool,
+    /// Length of edges that are not halved, in the mesh's units.
+    pub(super) finest: f64,
+}
+
+impl Limits {
+    /// What of vertices textures become.
+    fn became(&self) -> &'static str {
+        if self.alpha_alone { "opacities of vertices" } else { "colours of vertices" }
+    }
+}
+
 /// Divides the triangles of textured paints, and says so.
-pub(super) fn refine(mesh: &mut Mesh, painting: &mut Painting, reading: &mut Reading<'_>) -> Result<(), ReadError> {
+pub(super) fn refine(
+    mesh: &mut Mesh,
+    painting: &mut Painting,
+    limits: &Limits,
+    reading: &mut Reading<'_>,
+) -> Result<(), ReadError> {
     let before = mesh.triangles.len();
     let mut is_new = vec![true; before];
-    let (mut edges, mut longest) = edges_to_halve(mesh, painting, &is_new);
+    let (mut edges, mut longest) = edges_to_halve(mesh, painting, limits, &is_new);
     // What is too long already stays so.
     let too_long = Some(longest).filter(|l| *l > LONGEST);
+    let mut rounds = 0;
     let left_out = loop {
         reading.go_on()?;
         if edges.is_empty() {
             break too_long;
+        }
+        rounds += 1;
+        if rounds > MOST_ROUNDS {
+            break Some(too_long.unwrap_or(longest));
         }
         let count: usize = mesh.triangles.iter().map(|t| 1 + halved(t, &edges).iter().flatten().count()).sum();
         let bytes = (count as u64).saturating_mul(BYTES_PER_TRIANGLE);
@@ -54,7 +82,7 @@ pub(super) fn refine(mesh: &mut Mesh, painting: &mut Painting, reading: &mut Rea
         let mut parts = vec![0u32; is_new.len()];
         parents.iter().for_each(|parent| parts[*parent as usize] += 1);
         is_new = parents.iter().map(|parent| parts[*parent as usize] > 1).collect();
-        (edges, longest) = edges_to_halve(mesh, painting, &is_new);
+        (edges, longest) = edges_to_halve(mesh, painting, limits, &is_new);
     };
     let after = mesh.triangles.len();
     if after > before {
@@ -65,7 +93,7 @@ pub(super) fn refine(mesh: &mut Mesh, painting: &mut Painting, reading: &mut Rea
         reading
             .notes
             .remarks
-            .push(format!("textures became colours of vertices: {before} triangles were divided into {after}"));
+            .push(format!("textures became {}: {before} triangles were divided into {after}", limits.became()));
     }
     if let Some(longest) = left_out {
         reading.notes.remarks.push(format!(
@@ -79,18 +107,26 @@ pub(super) fn refine(mesh: &mut Mesh, painting: &mut Painting, reading: &mut Rea
 
 /// The edges that new triangles want halved, in order, each once; and the longest, in texels, of a triangle that is not as
 /// its texture.
-fn edges_to_halve(mesh: &Mesh, painting: &Painting, is_new: &[bool]) -> (Vec<Edge>, f32) {
+fn edges_to_halve(mesh: &Mesh, painting: &Painting, limits: &Limits, is_new: &[bool]) -> (Vec<Edge>, f32) {
+    let alpha_alone = limits.alpha_alone;
+    let is_looked_at: Vec<bool> = painting.paints.iter().map(|paint| painting.is_divided(paint, alpha_alone)).collect();
     let halved_edges = |(t, is_new): (&[u32; 3], &bool)| {
-        let texture = painting.texture_of(t[0]).filter(|_| *is_new)?;
+        let is_looked_at = *is_new && is_looked_at[painting.paint_of[t[0] as usize] as usize];
+        let texture = painting.texture_of(t[0]).filter(|_| is_looked_at)?;
         let corners = t.map(|v| Vec2::from(painting.place[v as usize]));
         let alpha = painting.alpha_of(t[0]);
         let lengths = lengths(corners, texture);
         let longest = lengths.iter().copied().fold(0.0, f32::max);
-        if !(longest > 1.0 && (longest > COARSE || deviates(corners, texture, longest, alpha))) {
+        let end = |k: usize| mesh.position[t[k % 3] as usize].as_dvec3();
+        let is_coarse = |k: &usize| limits.finest <= 0.0 || end(*k).distance(end(k + 1)) > limits.finest;
+        let is_long = |k: &usize| lengths[*k] > 1.0 && lengths[*k] > 0.5 * longest && is_coarse(k);
+        if !((0..3).any(|k| is_long(&k))
+            && (longest > COARSE || deviates(corners, texture, longest, alpha, alpha_alone)))
+        {
             return None;
         }
-        let is_long = |k: &usize| longest <= LONGEST && lengths[*k] > 1.0 && lengths[*k] > 0.5 * longest;
-        Some((longest, (0..3).filter(is_long).map(|k| edge(t, k)).collect::<Vec<Edge>>()))
+        let halved = (0..3).filter(|k| longest <= LONGEST && is_long(k));
+        Some((longest, halved.map(|k| edge(t, k)).collect::<Vec<Edge>>()))
     };
     let found: Vec<(f32, Vec<Edge>)> =
         mesh.triangles.par_iter().zip(is_new).with_min_len(CHUNK).filter_map(halved_edges).collect();
@@ -114,8 +150,9 @@ fn lengths(corners: [Vec2; 3], texture: &Texture) -> [f32; 3] {
     [0, 1, 2].map(|k| ((corners[(k + 1) % 3] - corners[k]) * size).length())
 }
 
-/// Whether a colour of the texture within the triangle, or an opacity that counts, is not what lies between those of its corners.
-fn deviates(corners: [Vec2; 3], texture: &Texture, longest: f32, alpha: Alpha) -> bool {
+/// Whether a colour of the texture within the triangle, or an opacity that counts, is not what lies between those of its corners. With `alpha_alone`
+/// colours are not looked at.
+fn deviates(corners: [Vec2; 3], texture: &Texture, longest: f32, alpha: Alpha, alpha_alone: bool) -> bool {
     let at = |place: Vec2| texture.at(place.to_array());
     let [a, b, c] = corners.map(at);
     // A sample a texel: `longest` is at most COARSE.
@@ -131,10 +168,11 @@ fn deviates(corners: [Vec2; 3], texture: &Texture, longest: f32, alpha: Alpha) -
             let differ = |k: usize| (found[k].sqrt() - between[k].max(0.0).sqrt()).abs() > TOLERANCE;
             let is_other = match alpha {
                 Alpha::Ignored => false,
-                Alpha::Cut(cutoff) => (found[3] < cutoff) != (between[3] < cutoff),
+                // A triangle is left out or kept as a whole, by the mean of its corners.
+                Alpha::Cut(cutoff) => (found[3] < cutoff) != ((a[3] + b[3] + c[3]) / 3.0 < cutoff),
                 Alpha::Blended => (found[3] - between[3]).abs() > TOLERANCE,
             };
-            (0..3).any(differ) || is_other
+            !alpha_alone && (0..3).any(differ) || is_other
         })
     })
 }
