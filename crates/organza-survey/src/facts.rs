@@ -9,7 +9,7 @@ use crate::stands::{cloud_stands_along, lies_flat_along, stands_along};
 use convert::{FillValue, Strays, looks_like_degrees};
 use organza::scene::LabelTable;
 use organza::{Error, printable};
-use read::{Loaded, Mended, NamedColumn, ReadParams, stated_up_axis, up_axis};
+use read::{Loaded, Mended, NamedColumn, ReadParams, Textures, stated_up_axis, up_axis};
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::{Aabb, Association, DAabb, Grid, MemoryAccount, Mesh, RadianceImage, RawPoints, UpAxis};
 use std::collections::HashSet;
@@ -96,7 +96,8 @@ pub struct LabelFact {
 /// [`Error::Io`] for the file system, [`Error::Input`] for a file that is not what its name says, [`Error::Limit`] for
 /// one that would take more than `max_bytes`.
 pub fn facts(path: &Path, table: Option<&NamedTable>, max_bytes: u64, strict: bool) -> Result<Facts, Error> {
-    let params = ReadParams { memory: MemoryAccount::new(max_bytes), strict, ranges: true, ..ReadParams::default() };
+    let memory = MemoryAccount::new(max_bytes);
+    let params = ReadParams { memory, strict, ranges: true, textures: Textures::Undecoded, ..ReadParams::default() };
     let read = read::file(path, &params, None);
     let (data, notes) = read.map_err(|e| Error::from_read(path, &e))?;
     let files = read::files_of(path).map_err(|e| Error::from_read(path, &e))?;
