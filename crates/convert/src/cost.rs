@@ -80,6 +80,14 @@ pub fn mesh(mesh: &Mesh, params: &MeshParams) -> Result<Prediction, ConvertError
     Ok(Prediction::exact(plan.report.splats as f64, plan.columns))
 }
 
+/// The spacing that [`crate::mesh_to_points`] takes, world units; 0 for a mesh of which nothing is shown.
+///
+/// # Errors
+/// As the conversion.
+pub fn mesh_spacing(mesh: &Mesh, params: &MeshParams) -> Result<f64, ConvertError> {
+    mesh_points::plan(mesh, params).map(|plan| plan.report.spacing)
+}
+
 /// Of [`crate::raw_to_surfels`]; with merged duplicates as if there were none.
 ///
 /// # Errors

@@ -44,7 +44,10 @@ pub use field_points::{
 pub use mesh::clipped_mesh::clipped_mesh;
 #[cfg(feature = "lids")]
 pub use mesh::lid::{LidReport, LiddedMesh, lidded_mesh};
-pub use mesh::mesh_points::{MeshParams, MeshReport, flatten_leaning, mesh_to_points, mesh_to_points_into};
+pub use mesh::mesh_points::{
+    MeshParams, MeshReport, flatten_leaning, mesh_to_points, mesh_to_points_into, painted_mesh_to_points,
+};
+pub use mesh::surface_colors::SurfaceColors;
 pub use points::degrees::{looks_like_degrees, metres_of_degrees};
 pub use points::discs::{DiscShape, DiscSize};
 pub use points::keep_points::{Kept, Within, kept};

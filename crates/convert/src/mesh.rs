@@ -7,3 +7,4 @@ pub(crate) mod lid;
 pub(crate) mod mesh_points;
 pub(crate) mod pieces;
 pub(crate) mod subdivide;
+pub(crate) mod surface_colors;

@@ -1,7 +1,9 @@
 //! Meshes become splats: hard cases CV1-CV6, CV10, weights, conserved areas, invariances.
 
-use convert::{ConvertError, Density, MeshParams, SplatParams, mesh_to_points, reference};
-use splat_core::glam::{DQuat, DVec3, Vec3};
+use convert::{
+    ConvertError, Density, MeshParams, SplatParams, SurfaceColors, mesh_to_points, painted_mesh_to_points, reference,
+};
+use splat_core::glam::{DQuat, DVec3, Vec2, Vec3};
 use splat_core::{Cloud, Footprint, Limits, Mesh, Similarity, SplatKind, optics, rng};
 
 fn quad(side: f32) -> Mesh {
@@ -357,5 +359,38 @@ fn opacities_of_vertices_are_those_of_pieces_and_opaque_ones_are_opaque() {
         let sum: f64 = (0..cloud.len()).filter(ramp).map(|i| f64::from(cloud.cross_section[i])).sum();
         let expected = if alpha == 1.0 { 2.0 } else { 2.0 - 2.0 * 2.0f64.ln() };
         assert!((sum - expected).abs() < 0.02, "{sum} {expected}");
+    }
+}
+
+/// The colours of a mesh's vertices, as if they lay between them.
+struct OfVertices<'a>(&'a Mesh);
+
+impl SurfaceColors for OfVertices<'_> {
+    fn fill(&self, triangle: usize, share: f64, weights: &mut dyn Iterator<Item = Vec2>, colors: &mut [[f32; 3]]) {
+        assert!(share > 0.0 && share <= 1.0);
+        let corners = self.0.triangles[triangle].map(|v| Vec3::from(self.0.color[v as usize]));
+        for (color, w) in colors.iter_mut().zip(weights) {
+            let between = corners[0] + (corners[1] - corners[0]) * w.x + (corners[2] - corners[0]) * w.y;
+            *color = between.to_array();
+        }
+    }
+}
+
+#[test]
+fn colours_between_vertices_are_asked_at_every_splat() {
+    // Congruent pieces in a table and beyond it, strips of a sliver, and one piece a triangle.
+    let mut mesh = quad(1.0);
+    let first = mesh.position.len() as u32;
+    mesh.position.extend([Vec3::new(0.0, 1.0, 0.0), Vec3::new(4.0, 1.0, 0.0), Vec3::new(1.0, 1.0, 0.1)]);
+    mesh.triangles.push([first, first + 1, first + 2]);
+    mesh.color = (0..7).map(|k| [0.1 * k as f32, 1.0 - 0.1 * k as f32, (k % 2) as f32]).collect();
+    for spacing in [0.01, 0.05, 3.0] {
+        let (expected, report) = mesh_to_points(&mesh, &params(spacing, 1.0), None).unwrap();
+        let bare = Mesh { color: Vec::new(), ..mesh.clone() };
+        let (found, same) = painted_mesh_to_points(&bare, &OfVertices(&mesh), &params(spacing, 1.0), None).unwrap();
+        assert_eq!((found.position, report), (expected.position, same));
+        let far = |(a, b): (&[f32; 3], &[f32; 3])| Vec3::from(*a).distance(Vec3::from(*b));
+        let worst = found.color.iter().zip(&expected.color).map(far).fold(0.0, f32::max);
+        assert!(worst < 1e-5, "{spacing}: {worst}");
     }
 }

@@ -16,6 +16,7 @@ use crate::common::params::{Density, SplatParams};
 use crate::mesh::borders::{Borders, open_edges};
 use crate::mesh::pieces::Pieces;
 use crate::mesh::subdivide::{self, Measure};
+use crate::mesh::surface_colors::SurfaceColors;
 use crate::splats::footprints::choose_by_place;
 use rayon::prelude::*;
 use splat_core::text::counted;
@@ -117,6 +118,37 @@ pub fn mesh_to_points(
     Ok((cloud, report))
 }
 
+/// [`mesh_to_points`] with colours that lie between the vertices: each splat has the mean over its piece. Colours of the mesh's vertices are not
+/// used.
+///
+/// ```
+/// use convert::{MeshParams, SurfaceColors, painted_mesh_to_points};
+/// use splat_core::{Mesh, glam::{Vec2, Vec3}};
+/// /// Red grows from the first corner to the second.
+/// struct Ramp;
+/// impl SurfaceColors for Ramp {
+///     fn fill(&self, _: usize, _: f64, weights: &mut dyn Iterator<Item = Vec2>, colors: &mut [[f32; 3]]) {
+///         weights.zip(colors).for_each(|(w, color)| *color = [w.x, 0.0, 0.0]);
+///     }
+/// }
+/// let mesh = Mesh { position: vec![Vec3::ZERO, Vec3::X, Vec3::Y], triangles: vec![[0, 1, 2]], ..Mesh::default() };
+/// let (cloud, _) = painted_mesh_to_points(&mesh, &Ramp, &MeshParams::default(), None).unwrap();
+/// assert!(cloud.position.iter().zip(&cloud.color).all(|(p, color)| (p.x - color[0]).abs() < 1e-6));
+/// ```
+///
+/// # Errors
+/// As [`mesh_to_points_into`].
+pub fn painted_mesh_to_points(
+    mesh: &Mesh,
+    colors: &dyn SurfaceColors,
+    params: &MeshParams,
+    progress: Option<&Progress>,
+) -> Result<(Cloud, MeshReport), ConvertError> {
+    let mut cloud = Cloud::default();
+    let report = to_points(mesh, Some(colors), params, &mut cloud, progress)?;
+    Ok((cloud, report))
+}
+
 /// Replaces the content of `cloud` by the splats of a mesh; its memory is used again. The cloud's origin is the mesh's,
 /// transformed, so a mesh far away gives the same offsets as one at 0.
 ///
@@ -127,6 +159,16 @@ pub fn mesh_to_points(
 /// any memory is taken, and [`ConvertError::Cancelled`], after which the cloud is of no use.
 pub fn mesh_to_points_into(
     mesh: &Mesh,
+    params: &MeshParams,
+    cloud: &mut Cloud,
+    progress: Option<&Progress>,
+) -> Result<MeshReport, ConvertError> {
+    to_points(mesh, None, params, cloud, progress)
+}
+
+fn to_points(
+    mesh: &Mesh,
+    colors: Option<&dyn SurfaceColors>,
     params: &MeshParams,
     cloud: &mut Cloud,
     progress: Option<&Progress>,
@@ -142,7 +184,7 @@ pub fn mesh_to_points_into(
     columns::size_columns(cloud, report.splats as usize, kind, plan.columns, p)?;
     progress.add_total(report.splats);
     if report.splats > 0 {
-        let pieces = Pieces::new(mesh, params, &plan);
+        let pieces = Pieces::new(mesh, params, &plan, colors);
         pieces.emit(cloud, progress)?;
         if mesh.opacity.is_empty() && plan.columns.crossing_depth {
             cloud.crossing_depth.fill(optics::optical_depth(params.opacity) as f32);

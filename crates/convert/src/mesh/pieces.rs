@@ -4,11 +4,12 @@ use crate::common::columns::{self, CHUNK};
 use crate::common::convert_error::check_cancelled;
 use crate::mesh::mesh_points::{Plan, plane};
 use crate::mesh::subdivide::{self, Run, Split};
+use crate::mesh::surface_colors::SurfaceColors;
 use crate::{ConvertError, MeshParams};
 use rayon::prelude::*;
 use splat_core::{
     Cloud, Mesh, Progress, SplatKind,
-    glam::{DQuat, Vec3},
+    glam::{DQuat, Vec2, Vec3, Vec3Swizzles},
     optics,
 };
 use std::ops::Range;
@@ -20,6 +21,8 @@ const TABULATED: u32 = 32;
 pub(crate) struct Pieces<'a> {
     mesh: &'a Mesh,
     plan: &'a Plan,
+    /// Colours of parts of triangles; `None` where those of vertices are interpolated.
+    colors: Option<&'a dyn SurfaceColors>,
     /// Vertices relative to the cloud's origin.
     position: Vec<Vec3>,
     normal: Vec<Vec3>,
@@ -52,7 +55,12 @@ struct Target<'a> {
 const CLEAR: f64 = 1e-30;
 
 impl<'a> Pieces<'a> {
-    pub(crate) fn new(mesh: &'a Mesh, params: &MeshParams, plan: &'a Plan) -> Self {
+    pub(crate) fn new(
+        mesh: &'a Mesh,
+        params: &MeshParams,
+        plan: &'a Plan,
+        colors: Option<&'a dyn SurfaceColors>,
+    ) -> Self {
         let t = &params.splat.transform;
         let place = |v: &Vec3| (t.rotation * (v.as_dvec3() * t.scale)).as_vec3();
         let turn = |n: &Vec3| columns::unit_or_zero(t.rotate(n.as_dvec3()).as_vec3());
@@ -61,6 +69,7 @@ impl<'a> Pieces<'a> {
         Self {
             mesh,
             plan,
+            colors,
             position: mesh.position.par_iter().with_min_len(CHUNK).map(place).collect(),
             normal: plan.normal.par_iter().with_min_len(CHUNK).map(turn).collect(),
             spacing: plan.report.spacing / t.scale,
@@ -96,7 +105,7 @@ impl<'a> Pieces<'a> {
                     return;
                 }
                 radius.fill(self.radius);
-                if self.mesh.color.is_empty() {
+                if self.mesh.color.is_empty() && self.colors.is_none() {
                     color.fill(self.color);
                 }
                 let target = Target { position, normal, shading_normal, cross_section, color, opacity };
@@ -151,7 +160,8 @@ impl pulp::NullaryFnOnce for Fill<'_> {
                 match split {
                     Split::Congruent(k) if k <= TABULATED => {
                         let weights = &pieces.weights[k as usize][skip as usize..][..end - written];
-                        corner.write_table(weights, 1.0 / f64::from(k * k), written..end, &mut target);
+                        let share = 1.0 / f64::from(k * k);
+                        corner.write_table(weights, share, written..end, &mut target);
                     }
                     split => corner.write_runs(&split, skip, written..end, &mut target),
                 }
@@ -171,7 +181,9 @@ fn weights(k: u32) -> Vec<[f32; 2]> {
 }
 
 /// One triangle as affine functions of its barycentric weights.
-struct Corners {
+struct Corners<'a> {
+    /// Its rank, with the colours of its parts.
+    painted: Option<(usize, &'a dyn SurfaceColors)>,
     position: [Vec3; 3],
     normal: [Vec3; 3],
     color: Option<[Vec3; 3]>,
@@ -184,8 +196,8 @@ struct Corners {
     depth: f64,
 }
 
-impl Corners {
-    fn new(pieces: &Pieces<'_>, triangle: usize) -> Self {
+impl<'a> Corners<'a> {
+    fn new(pieces: &Pieces<'a>, triangle: usize) -> Self {
         let ids = pieces.mesh.triangles[triangle].map(|v| v as usize);
         let position = ids.map(|v| pieces.position[v]);
         let face = plane(pieces.mesh, triangle);
@@ -196,6 +208,7 @@ impl Corners {
         let color = (!pieces.mesh.color.is_empty()).then(|| ids.map(|v| Vec3::from(pieces.mesh.color[v])));
         let opacity = (!pieces.mesh.opacity.is_empty()).then(|| ids.map(|v| pieces.mesh.opacity[v]));
         Self {
+            painted: pieces.colors.map(|colors| (triangle, colors)),
             position,
             normal,
             color,
@@ -223,6 +236,10 @@ impl Corners {
             for (c, w) in target.color[range.clone()].iter_mut().zip(weights) {
                 *c = (from + e1 * w[0] + e2 * w[1]).max(Vec3::ZERO).to_array();
             }
+        }
+        if let Some((triangle, colors)) = self.painted {
+            let mut places = weights.iter().map(|w| Vec2::from(*w));
+            colors.fill(triangle, share, &mut places, &mut target.color[range.clone()]);
         }
         if let Some([a, b, c]) = self.opacity {
             for (opacity, w) in target.opacity[range.clone()].iter_mut().zip(weights) {
@@ -294,6 +311,11 @@ impl Corners {
             for (j, c) in target.color[range.clone()].iter_mut().enumerate() {
                 *c = (from + along * (j as f32 + skip)).max(Vec3::ZERO).to_array();
             }
+        }
+        if let Some((triangle, colors)) = self.painted {
+            let place = |j: usize| (start + step * (j as f32 + skip)).yz();
+            let mut places = (0..range.len()).map(place);
+            colors.fill(triangle, run.share, &mut places, &mut target.color[range.clone()]);
         }
         if let Some([a, b, c]) = self.opacity {
             let from = a + (b - a) * start.y + (c - a) * start.z;
