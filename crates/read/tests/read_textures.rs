@@ -186,6 +186,20 @@ fn opacities_are_those_of_vertices_where_colours_are_kept() {
 }
 
 #[test]
+fn what_is_cut_out_keeps_the_area_of_its_texels() {
+    // Every fourth texel, far finer than a 1600th of the diagonal; then stripes of one texel in eight.
+    let fine = |image: RgbaImage| {
+        let (mesh, _, _) = kept(&file_of(&image, "MASK"));
+        mesh.area() / 4.0
+    };
+    let clear = |is_clear: bool| Rgba([200, 100, 50, if is_clear { 100 } else { 255 }]);
+    let quarter = fine(RgbaImage::from_fn(2048, 2048, |x, y| clear(x.max(y) >= 256 || x % 2 + y % 2 > 0)));
+    assert!((64.0 * quarter - 0.25).abs() < 0.01, "{quarter}");
+    let stripes = fine(RgbaImage::from_fn(64, 64, |x, _| clear(x % 8 > 0)));
+    assert!((stripes - 0.125).abs() < 0.01, "{stripes}");
+}
+
+#[test]
 fn an_image_that_is_not_decoded_is_named_with_its_size() {
     let mut content = file_of(&noise(32, 16), "OPAQUE");
     let (mesh, notes) = plain(&content, Textures::Undecoded);

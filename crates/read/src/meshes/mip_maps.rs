@@ -21,9 +21,60 @@ pub(crate) struct Level {
     rgba: Rgba,
 }
 
+/// The share by which the colour of a texel counts in means. Colours of clear texels are not seen: they would draw fringes around what is there.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Weight {
+    /// All texels count alike.
+    Even,
+    /// By their opacity.
+    Opacity,
+    /// Those of this opacity and more count, others do not.
+    Cut(f32),
+}
+
+impl Weight {
+    fn at(self, opacity: f32) -> f32 {
+        match self {
+            Self::Even => 1.0,
+            Self::Opacity => opacity,
+            Self::Cut(cutoff) => f32::from(u8::from(opacity >= cutoff)),
+        }
+    }
+
+    /// The mean of texels, each with its share of 1: its opacity is that of the shares, its colour that of the weights.
+    fn mean(self, texels: impl Iterator<Item = (f32, [f32; 4])> + Clone) -> [f32; 4] {
+        let mut plain = [0.0f32; 4];
+        let mut weighted = [0.0f32; 4];
+        let mut weights = texels.clone().map(|(_, texel)| self.at(texel[3]));
+        let first = weights.next().unwrap_or(1.0);
+        // Where all count alike, no rounding of weights changes an even colour.
+        let is_even = weights.all(|weight| weight == first);
+        for (share, texel) in texels {
+            (0..4).for_each(|c| plain[c] += share * texel[c]);
+            let weight = share * self.at(texel[3]);
+            (0..3).for_each(|c| weighted[c] += weight * texel[c]);
+            weighted[3] += weight;
+        }
+        if is_even || weighted[3] <= 0.0 {
+            return plain;
+        }
+        let [r, g, b] = [0, 1, 2].map(|c| weighted[c] / weighted[3]);
+        [r, g, b, plain[3]]
+    }
+
+    /// The weight in smaller sizes of an image. Opacities of [`Self::Cut`] are there the share of texels that count.
+    fn of_smaller(self) -> Self {
+        match self {
+            Self::Even => Self::Even,
+            Self::Opacity | Self::Cut(_) => Self::Opacity,
+        }
+    }
+}
+
 /// An image in its sizes, the largest first.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct MipMaps {
+    weight: Weight,
     levels: Vec<Arc<Level>>,
 }
 
@@ -48,6 +99,14 @@ impl Level {
         self.rgba.bytes()
     }
 
+    /// Hands its texels to `take`.
+    pub(crate) fn digest(&self, take: &mut dyn FnMut(&[u8])) {
+        match &self.rgba {
+            Rgba::Srgb(texels) => take(bytemuck::cast_slice(texels)),
+            Rgba::Linear(texels) => take(bytemuck::cast_slice(texels)),
+        }
+    }
+
     /// Whether a texel is not opaque.
     pub(crate) fn has_alpha(&self) -> bool {
         match &self.rgba {
@@ -62,28 +121,21 @@ impl Level {
     }
 
     /// The image of half the columns and rows.
-    fn half(&self, by_alpha: bool) -> Self {
+    fn half(&self, weight: Weight) -> Self {
         let across = spans(self.columns);
         let down = spans(self.rows);
         let columns = across.len() as u32;
         let rows = down.len() as u32;
         let texel = |span_across: &Span, span_down: &Span| {
-            // Sums of light and opacity, and of light times opacity.
-            let mut plain = [0.0f32; 4];
-            let mut weighted = [0.0f32; 3];
-            for (row, height) in span_down.texels() {
-                for (column, width) in span_across.texels() {
-                    let share = width * height;
-                    let found = self.linear(column, row);
-                    (0..4).for_each(|c| plain[c] += share * found[c]);
-                    (0..3).for_each(|c| weighted[c] += share * found[3] * found[c]);
-                }
+            let covered = span_down.texels().flat_map(|(row, height)| {
+                span_across.texels().map(move |(column, width)| (width * height, self.linear(column, row)))
+            });
+            let mut mean = weight.mean(covered.clone());
+            if let Weight::Cut(_) = weight {
+                mean[3] = covered.map(|(share, texel)| share * weight.at(texel[3])).sum();
             }
-            let alpha = plain[3];
-            // Colours of clear texels are not seen: they would draw fringes around what is there.
-            let [r, g, b] =
-                if by_alpha && alpha > 0.0 { weighted.map(|sum| sum / alpha) } else { [plain[0], plain[1], plain[2]] };
-            [r, g, b, alpha.clamp(0.0, 1.0)]
+            mean[3] = mean[3].clamp(0.0, 1.0);
+            mean
         };
         let bytes = |[r, g, b, alpha]: [f32; 4]| {
             let [r, g, b] = [r, g, b].map(stored);
@@ -105,7 +157,7 @@ struct Span {
 }
 
 impl Span {
-    fn texels(&self) -> impl Iterator<Item = (u32, f32)> + '_ {
+    fn texels(&self) -> impl Iterator<Item = (u32, f32)> + Clone + '_ {
         let shares = self.shares.iter().enumerate().filter(|(_, share)| **share > 0.0);
         shares.map(|(k, share)| (self.first + k as u32, *share))
     }
@@ -141,16 +193,23 @@ fn stored(light: f32) -> u8 {
 impl MipMaps {
     /// An image in its own size alone.
     pub(crate) fn of_level(level: Level) -> Self {
-        Self { levels: vec![level.into()] }
+        Self { weight: Weight::Even, levels: vec![level.into()] }
     }
 
-    /// An image in all sizes. With `by_alpha` a texel counts by its opacity for colours, so that colours of clear texels are not seen.
-    pub(crate) fn new(first: Arc<Level>, by_alpha: bool) -> Self {
+    /// An image in all sizes, whose colours are means by `weight`.
+    pub(crate) fn new(first: Arc<Level>, weight: Weight) -> Self {
         let mut levels = vec![first];
+        let mut weight_of_level = weight;
         while let Some(last) = levels.last().filter(|last| last.size() != [1, 1]) {
-            levels.push(last.half(by_alpha).into());
+            levels.push(last.half(weight_of_level).into());
+            weight_of_level = weight.of_smaller();
         }
-        Self { levels }
+        Self { weight, levels }
+    }
+
+    /// The mean of texels of one size, each with its share of 1.
+    pub(crate) fn mean(&self, level: usize, texels: impl Iterator<Item = (f32, [f32; 4])> + Clone) -> [f32; 4] {
+        if level == 0 { self.weight.mean(texels) } else { self.weight.of_smaller().mean(texels) }
     }
 
     /// All sizes, the largest first.
@@ -192,14 +251,22 @@ mod tests {
     #[test]
     fn an_even_image_is_even_in_every_size() {
         for texel in [[1, 2, 3, 255], [200, 100, 13, 77], [255, 255, 255, 0]] {
-            for by_alpha in [false, true] {
+            for weight in [Weight::Even, Weight::Opacity, Weight::Cut(0.2)] {
                 let even = |count: usize| Rgba::Srgb(vec![texel; count]);
-                let maps = MipMaps::new(Level::new(13, 6, even(78)).into(), by_alpha);
+                let maps = MipMaps::new(Level::new(13, 6, even(78)).into(), weight);
                 let sizes: Vec<_> = maps.levels().iter().map(|level| level.size()).collect();
                 assert_eq!(sizes, [[13, 6], [6, 3], [3, 1], [1, 1]]);
-                maps.levels().iter().for_each(|level| {
-                    assert_eq!(level.rgba, even((level.columns * level.rows) as usize));
-                });
+                for level in maps.levels() {
+                    let expected = even((level.columns * level.rows) as usize);
+                    // Of a cut one opacities are shares of texels.
+                    let is_cut = level.size() != [13, 6] && matches!(weight, Weight::Cut(_));
+                    if is_cut {
+                        let shown = level.linear(0, 0);
+                        assert!((0..3).all(|c| shown[c] == expected.linear(0)[c]) && [0.0, 1.0].contains(&shown[3]));
+                    } else {
+                        assert_eq!(level.rgba, expected);
+                    }
+                }
             }
         }
     }
@@ -208,7 +275,7 @@ mod tests {
     fn a_texel_is_the_mean_of_the_light_that_it_covers() {
         // In f64, by the area that each texel of the smaller size covers.
         for level in [noise(7, 5), noise(8, 4), noise(1, 9)] {
-            let half = level.half(false);
+            let half = level.half(Weight::Even);
             let covered = |n: u32, m: u32, i: u32, k: u32| {
                 let [low, high] = [i, i + 1].map(|edge| f64::from(edge) * f64::from(n) / f64::from(m));
                 (high.min(f64::from(k + 1)) - low.max(f64::from(k))).max(0.0) * f64::from(m) / f64::from(n)
@@ -235,7 +302,15 @@ mod tests {
     fn clear_texels_lend_no_colour() {
         let level = Level::new(2, 1, Rgba::Srgb(vec![[200, 0, 0, 255], [0, 255, 0, 0]]));
         let red = Rgba::Srgb(vec![[200, 0, 0, 128]]);
-        assert_eq!(level.half(true).rgba, red);
-        assert_ne!(level.half(false).rgba, red);
+        assert_eq!(level.half(Weight::Opacity).rgba, red);
+        assert_eq!(level.half(Weight::Cut(0.5)).rgba, red);
+        assert_ne!(level.half(Weight::Even).rgba, red);
+    }
+
+    #[test]
+    fn a_cut_is_made_before_texels_are_averaged() {
+        // A mean of 0.5 hides that one texel in four is there.
+        let level = Level::new(2, 2, Rgba::Srgb(vec![[9, 9, 9, 255], [0, 0, 0, 85], [0, 0, 0, 85], [0, 0, 0, 85]]));
+        assert_eq!(level.half(Weight::Cut(0.5)).rgba, Rgba::Srgb(vec![[9, 9, 9, 64]]));
     }
 }

@@ -8,8 +8,9 @@
 pub(crate) mod corners;
 mod refine;
 
+use super::mip_maps::Weight;
 use super::opacity;
-use super::texture::Texture;
+use super::texture::{Texture, Wrap};
 use crate::error::ReadError;
 use crate::reading::{Notes, Reading, Textures};
 use crate::stream::input;
@@ -17,6 +18,9 @@ use crate::{ReadParams, meshes::paint::refine::Limits};
 use splat_core::glam::{Vec2, Vec3};
 use splat_core::{Association, Mesh, Progress};
 
+/// Squares along the diagonal of a mesh over which opacities are averaged where textures are kept: four a splat of the usual distance. Opacities are
+/// those of vertices, so finer squares would divide the surface into more triangles than splats show.
+const OPACITY_STEPS: f64 = 1600.0;
 /// Bytes of the colour and opacity of a vertex, and of both in the mesh.
 const BYTES_PER_COLOR: u64 = 16 + 12 + 4;
 
@@ -71,6 +75,8 @@ pub struct Painting {
     pub(crate) tint: Vec<[f32; 4]>,
     /// Place in its texture, one a vertex; empty without textures.
     pub(crate) place: Vec<[f32; 2]>,
+    /// Triangles of the mesh before any was divided.
+    pub(crate) stated_triangles: u64,
 }
 
 impl Painting {
@@ -104,12 +110,18 @@ impl Painting {
         let is_kept = reading.params.textures == Textures::Kept
             && mesh.triangles.iter().any(|[first, ..]| self.texture_of(*first).is_some());
         let is_decoded = reading.params.textures != Textures::Undecoded;
+        self.stated_triangles = mesh.triangles.len() as u64;
+        let finest = if is_kept { mesh.bounds().diagonal() / OPACITY_STEPS } else { 0.0 };
+        // Sizes of an image know nothing of opacities that lie between vertices.
+        let cuts_texels = !is_kept || self.tint.iter().any(|tint| tint[3] < 1.0);
+        if is_kept {
+            self.make_sizes(reading)?;
+        }
         if is_decoded && !self.textures.is_empty() {
-            let limits = Limits { alpha_alone: is_kept, finest: 0.0 };
+            let limits = Limits { alpha_alone: is_kept, finest: if cuts_texels { 0.0 } else { finest } };
             refine::refine(&mut mesh, &mut self, &limits, reading)?;
         }
-        let vertices = 0..mesh.position.len() as u32;
-        let colors: Vec<[f32; 4]> = vertices.map(|v| self.at(v)).collect();
+        let colors = self.averaged(&mesh, finest);
         mesh.color = colors.iter().map(|[r, g, b, _]| [*r, *g, *b]).collect();
         if self.paints.iter().any(|p| p.alpha != Alpha::Ignored) {
             let opacity = |(v, color): (usize, &[f32; 4])| match self.alpha_of(v as u32) {
@@ -123,18 +135,87 @@ impl Painting {
                 Alpha::Cut(cutoff) => t.iter().map(|v| alpha(*v)).sum::<f32>() / 3.0 >= cutoff,
                 Alpha::Blended => mesh.opacity.is_empty() || t.iter().any(|v| alpha(*v) > 0.0),
             };
-            let are_there: Vec<bool> = mesh.triangles.iter().map(is_there).collect();
+            let mut are_there: Vec<bool> = mesh.triangles.iter().map(is_there).collect();
+            if !cuts_texels {
+                self.cut_by_area(&mesh, &mut are_there);
+            }
             leave_out(&mut mesh, is_kept.then_some(&mut self), &are_there);
         }
         if is_kept {
-            let is_seen = |(rank, _): (usize, &Texture)| {
-                self.paints.iter().any(|paint| paint.texture == Some(rank) && paint.alpha != Alpha::Ignored)
-            };
-            let by_alpha: Vec<bool> = self.textures.iter().enumerate().map(is_seen).collect();
-            self.textures = Texture::with_mip_maps(std::mem::take(&mut self.textures), &by_alpha, reading)?;
+            self.textures = Texture::released(&self.textures);
             reading.painting = Some(self);
         }
         Ok(mesh)
+    }
+
+    /// Decides for triangles of paints that cut out which are there, so that they have the area of the texels that are there: what one has too much or too
+    /// little is made up by the next.
+    fn cut_by_area(&self, mesh: &Mesh, are_there: &mut [bool]) {
+        let mut owed = 0.0;
+        for (triangle, is_there) in mesh.triangles.iter().zip(are_there) {
+            let (Some(cutoff), Some(texture)) = (self.alpha_of(triangle[0]).cutoff(), self.texture_of(triangle[0]))
+            else {
+                continue;
+            };
+            let corners = triangle.map(|v| self.place[v as usize]);
+            let middle = corners.iter().fold(Vec2::ZERO, |sum, corner| sum + Vec2::from(*corner) / 3.0).to_array();
+            let width = self.texels(triangle).sqrt() as f32;
+            let wrap = texture.wrap_of(&corners);
+            // Opacities of the smaller sizes are shares of texels that are there.
+            let share = if width < 2.0 {
+                let factor = self.paints[self.paint_of[triangle[0] as usize] as usize].factor[3];
+                f32::from(u8::from(factor * texture.averaged(middle, 0.0, wrap)[3] >= cutoff))
+            } else {
+                texture.averaged(middle, width, wrap)[3]
+            };
+            let [a, b, c] = triangle.map(|v| mesh.position[v as usize].as_dvec3());
+            let area = 0.5 * (b - a).cross(c - a).length();
+            owed += f64::from(share) * area;
+            *is_there = owed >= 0.5 * area && share > 0.0;
+            if *is_there {
+                owed -= area;
+            }
+            // No more than a triangle is made up: large ones beside small ones would be paid by many.
+            owed = owed.clamp(-0.5 * area, 0.5 * area);
+        }
+    }
+
+    /// Gives each paint a texture in all sizes, whose means are weighed as its opacities are used.
+    fn make_sizes(&mut self, reading: &Reading<'_>) -> Result<(), ReadError> {
+        let stated = std::mem::take(&mut self.textures);
+        let mut known = Vec::new();
+        for paint in &mut self.paints {
+            let Some(texture) = paint.texture.and_then(|rank| stated.get(rank)) else { continue };
+            let weight = match paint.alpha {
+                Alpha::Ignored => Weight::Even,
+                Alpha::Blended => Weight::Opacity,
+                // The factor of the paint counts for what is cut out too.
+                Alpha::Cut(cutoff) => Weight::Cut(if paint.factor[3] > 0.0 { cutoff / paint.factor[3] } else { 1.0 }),
+            };
+            paint.texture = Some(self.textures.len());
+            self.textures.push(texture.with_mip_maps(weight, &mut known, reading)?);
+        }
+        Ok(())
+    }
+
+    /// Triangles of the mesh before any was divided.
+    pub fn stated_triangles(&self) -> u64 {
+        self.stated_triangles
+    }
+
+    /// Vertices of the mesh that it belongs to.
+    #[expect(clippy::len_without_is_empty, reason = "an empty mesh is not painted")]
+    pub fn len(&self) -> usize {
+        self.paint_of.len()
+    }
+
+    /// Hands all of its numbers to `take`.
+    pub fn digest(&self, take: &mut dyn FnMut(&[u8])) {
+        take(format!("{:?}", self.paints).as_bytes());
+        take(bytemuck::cast_slice(&self.paint_of));
+        take(bytemuck::cast_slice(&self.tint));
+        take(bytemuck::cast_slice(&self.place));
+        self.textures.iter().for_each(|texture| texture.digest(take));
     }
 
     /// Bytes that it holds.
@@ -164,6 +245,7 @@ impl Painting {
         let tint = triangle.map(|v| self.tint.get(v as usize).map_or(Vec3::ONE, |t| Vec3::new(t[0], t[1], t[2])));
         let texture = self.texture_of(triangle[0]);
         let place = triangle.map(|v| self.place.get(v as usize).map_or(Vec2::ZERO, |p| Vec2::from(*p)));
+        let wrap = texture.map_or([Wrap::Clamp; 2], |texture| texture.wrap_of(&place.map(|p| p.to_array())));
         let width = (self.texels(triangle) * share).sqrt() as f32;
         for (color, w) in colors.iter_mut().zip(weights) {
             let first = 1.0 - w.x - w.y;
@@ -172,7 +254,7 @@ impl Painting {
                 * (tint[0] + (tint[1] - tint[0]) * w.x + (tint[2] - tint[0]) * w.y).max(Vec3::ZERO);
             // Weights whose sum is 1 lead to no infinite place between finite ones.
             let at = place[0] * first + place[1] * w.x + place[2] * w.y;
-            let shown = texture.map_or([1.0; 4], |texture| texture.averaged(at.to_array(), width));
+            let shown = texture.map_or([1.0; 4], |texture| texture.averaged(at.to_array(), width, wrap));
             *color = (base * Vec3::new(shown[0], shown[1], shown[2])).to_array();
         }
     }
@@ -194,12 +276,15 @@ impl Painting {
         let mut painting = self.clone();
         let limits = Limits { alpha_alone: false, finest };
         refine::refine(&mut mesh, &mut painting, &limits, &mut reading)?;
-        mesh.color = painting.averaged(&mesh, finest);
+        mesh.color = painting.averaged(&mesh, finest).iter().map(|[r, g, b, _]| [*r, *g, *b]).collect();
         Ok((mesh, reading.notes))
     }
 
-    /// Colours of vertices, averaged over squares of sides `finest` on the surface.
-    fn averaged(&self, mesh: &Mesh, finest: f64) -> Vec<[f32; 3]> {
+    /// Colours and opacities of vertices, averaged over squares of sides `finest` on the surface; those of what is cut out by single texels.
+    fn averaged(&self, mesh: &Mesh, finest: f64) -> Vec<[f32; 4]> {
+        if finest <= 0.0 {
+            return (0..mesh.position.len() as u32).map(|v| self.at(v)).collect();
+        }
         let mut widths = vec![f64::INFINITY; mesh.position.len()];
         for triangle in &mesh.triangles {
             let [a, b, c] = triangle.map(|v| mesh.position[v as usize].as_dvec3());
@@ -209,13 +294,17 @@ impl Painting {
             triangle.iter().for_each(|v| widths[*v as usize] = widths[*v as usize].min(finest * density));
         }
         let color = |(v, width): (usize, &f64)| {
+            if self.alpha_of(v as u32).cutoff().is_some() {
+                return self.at(v as u32);
+            }
             let tint = self.tint.get(v).copied().unwrap_or([1.0; 4]);
             let texture = self.texture_of(v as u32);
             // A vertex of no triangle has the colour of its texel.
             let width = if width.is_finite() { *width as f32 } else { 0.0 };
-            let shown = texture.map_or([1.0; 4], |texture| texture.averaged(self.place[v], width));
+            let shown = texture
+                .map_or([1.0; 4], |texture| texture.averaged(self.place[v], width, texture.wrap_of(&[self.place[v]])));
             let factor = self.paints[self.paint_of[v] as usize].factor;
-            [0, 1, 2].map(|c| factor[c] * tint[c] * shown[c])
+            std::array::from_fn(|c| factor[c] * tint[c] * shown[c])
         };
         widths.iter().enumerate().map(color).collect()
     }

@@ -1,6 +1,6 @@
 //! Textures: PNG and JPEG images as linear colours between their texels, or averaged over squares of texels.
 
-use super::mip_maps::{Level, MipMaps};
+use super::mip_maps::{Level, MipMaps, Weight};
 use super::rgba::Rgba;
 use crate::check_sides;
 use crate::error::{Place, ReadError};
@@ -34,6 +34,13 @@ pub(crate) struct Texture {
 struct Texels {
     mip_maps: MipMaps,
     _held: Option<Reservation>,
+}
+
+/// The sizes that were made of an image by a weight.
+pub(crate) struct MadeSizes {
+    image: Arc<Texels>,
+    weight: Weight,
+    sizes: Arc<Texels>,
 }
 
 /// Two images are equal if their texels are.
@@ -110,34 +117,43 @@ impl Texture {
         Self { texels, wrap: [Wrap::Repeat; 2], is_nearest: false }
     }
 
-    /// Makes the smaller sizes of each texture, so that [`Self::averaged`] reads them. Textures of one image share them where `by_alpha`, the rule of
-    /// [`MipMaps::new`], is the same. Nothing is held any more: whoever keeps the textures accounts [`Self::bytes_of`] for them.
+    /// Makes the smaller sizes of a texture by a weight, so that [`Self::averaged`] reads them. Textures of one image share them where the weight is the
+    /// same; `known` has those that were made.
     pub(crate) fn with_mip_maps(
-        textures: Vec<Self>,
-        by_alpha: &[bool],
+        &self,
+        weight: Weight,
+        known: &mut Vec<MadeSizes>,
         reading: &Reading<'_>,
-    ) -> Result<Vec<Self>, ReadError> {
-        let mut known: Vec<(Arc<Texels>, bool, Arc<Texels>)> = Vec::new();
-        let mut made = Vec::with_capacity(textures.len());
-        for (texture, by_alpha) in textures.into_iter().zip(by_alpha) {
-            reading.go_on()?;
-            let is_known = |(image, rule, _): &&(Arc<Texels>, bool, Arc<Texels>)| {
-                Arc::ptr_eq(image, &texture.texels) && rule == by_alpha
-            };
-            let texels = match known.iter().find(is_known) {
-                Some((.., texels)) => texels.clone(),
-                None => {
-                    let first = texture.texels.mip_maps.first().clone();
-                    // All smaller sizes together take a third of the first, and what rounding adds to it.
-                    let _held = reading.params.memory.take("the sizes of a texture", first.bytes())?;
-                    let texels = Arc::new(Texels { mip_maps: MipMaps::new(first, *by_alpha), _held: None });
-                    known.push((texture.texels.clone(), *by_alpha, texels.clone()));
-                    texels
-                }
-            };
-            made.push(Self { texels, ..texture });
-        }
-        Ok(made)
+    ) -> Result<Self, ReadError> {
+        reading.go_on()?;
+        let is_known = |made: &&MadeSizes| Arc::ptr_eq(&made.image, &self.texels) && made.weight == weight;
+        let sizes = match known.iter().find(is_known) {
+            Some(made) => made.sizes.clone(),
+            None => {
+                let first = self.texels.mip_maps.first().clone();
+                // All smaller sizes together take a third of the first, and what rounding adds to it.
+                let held = reading.params.memory.take("the sizes of a texture", first.bytes())?;
+                let sizes = Arc::new(Texels { mip_maps: MipMaps::new(first, weight), _held: Some(held) });
+                known.push(MadeSizes { image: self.texels.clone(), weight, sizes: sizes.clone() });
+                sizes
+            }
+        };
+        Ok(Self { texels: sizes, ..self.clone() })
+    }
+
+    /// The textures without the memory that reading held for them: whoever keeps them accounts [`Self::bytes_of`].
+    pub(crate) fn released(textures: &[Self]) -> Vec<Self> {
+        let mut known: Vec<(Arc<Texels>, Arc<Texels>)> = Vec::new();
+        let mut released = |texture: &Self| {
+            let found = known.iter().find(|(image, _)| Arc::ptr_eq(image, &texture.texels));
+            let texels = found.map_or_else(
+                || Arc::new(Texels { mip_maps: texture.texels.mip_maps.clone(), _held: None }),
+                |(_, texels)| texels.clone(),
+            );
+            known.push((texture.texels.clone(), texels.clone()));
+            Self { texels, ..texture.clone() }
+        };
+        textures.iter().map(&mut released).collect()
     }
 
     /// Bytes of these textures; an image that several share counts once.
@@ -146,6 +162,13 @@ impl Texture {
             !textures[..*i].iter().any(|earlier| Arc::ptr_eq(&earlier.texels, &texture.texels))
         };
         textures.iter().enumerate().filter(is_first).map(|(_, texture)| texture.texels.mip_maps.bytes()).sum()
+    }
+
+    /// Hands its texels and the rules of its sampling to `take`.
+    pub(crate) fn digest(&self, take: &mut dyn FnMut(&[u8])) {
+        let first = self.texels.mip_maps.first();
+        take(format!("{:?} {:?} {}", first.size(), self.wrap, self.is_nearest).as_bytes());
+        first.digest(take);
     }
 
     /// Whether a texel is not opaque.
@@ -188,54 +211,65 @@ impl Texture {
     /// Places up to the border have the colours within it: a vertex that lies on the border belongs to what it encloses, and
     /// not to the other side of the image, to which repetition would lead.
     pub(crate) fn at(&self, place: [f32; 2]) -> [f32; 4] {
-        let first = self.texels.mip_maps.first();
+        self.nearest_or_between(place, self.wrap_of(&[place]))
+    }
+
+    fn nearest_or_between(&self, place: [f32; 2], wrap: [Wrap; 2]) -> [f32; 4] {
         if !self.is_nearest {
-            return self.between(first, place);
+            return self.between(0, place, wrap);
         }
+        let first = self.texels.mip_maps.first();
         let [x, y] = [0, 1].map(|a| f64::from(place[a]) * f64::from(first.size()[a]));
-        self.texel(first, [x, y].map(|c| c.floor() as i64), self.wrap_at(place))
+        self.texel(first, [x, y].map(|c| c.floor() as i64), wrap)
     }
 
     /// The same averaged over a square whose sides are `width` texels: between the two sizes of the image whose texels are next to it (trilinear).
-    pub(crate) fn averaged(&self, place: [f32; 2], width: f32) -> [f32; 4] {
+    pub(crate) fn averaged(&self, place: [f32; 2], width: f32, wrap: [Wrap; 2]) -> [f32; 4] {
         let levels = self.texels.mip_maps.levels();
         let last = levels.len() - 1;
         // A width that is no number is that of a texel.
         let level = libm::log2f(width.max(1.0)).min(last as f32);
         if level <= 0.0 {
-            return self.at(place);
+            return self.nearest_or_between(place, wrap);
         }
         let low = level.floor();
         let share = level - low;
-        let fine = self.between(&levels[low as usize], place);
+        let fine = self.between(low as usize, place, wrap);
         if share <= 0.0 {
             return fine;
         }
-        let coarse = self.between(&levels[(low as usize + 1).min(last)], place);
-        std::array::from_fn(|c| fine[c] + (coarse[c] - fine[c]) * share)
+        let coarse = self.between((low as usize + 1).min(last), place, wrap);
+        if fine == coarse {
+            return fine;
+        }
+        // Both are means, whose opacities are weights.
+        self.texels.mip_maps.mean(1, [(1.0 - share, fine), (share, coarse)].into_iter())
     }
 
-    /// The rules beyond the border for a place.
-    fn wrap_at(&self, place: [f32; 2]) -> [Wrap; 2] {
-        [0, 1].map(|a| if (0.0..=1.0).contains(&place[a]) { Wrap::Clamp } else { self.wrap[a] })
+    /// The rules beyond the border for what lies between places: where all are within the border, what it encloses has no other side.
+    pub(crate) fn wrap_of(&self, places: &[[f32; 2]]) -> [Wrap; 2] {
+        let is_within = |a: usize| places.iter().all(|place| (0.0..=1.0).contains(&place[a]));
+        [0, 1].map(|a| if is_within(a) { Wrap::Clamp } else { self.wrap[a] })
     }
 
     /// Bilinear colour of one size of the image.
-    fn between(&self, level: &Level, place: [f32; 2]) -> [f32; 4] {
-        let wrap = self.wrap_at(place);
+    fn between(&self, rank: usize, place: [f32; 2], wrap: [Wrap; 2]) -> [f32; 4] {
+        let level = &self.texels.mip_maps.levels()[rank];
         let [x, y] = [0, 1].map(|a| f64::from(place[a]) * f64::from(level.size()[a]));
         // Colours are those of the middles of texels.
         let low = [x, y].map(|c| (c - 0.5).floor());
         let share = [x - 0.5 - low[0], y - 0.5 - low[1]].map(|s| s as f32);
         let [i, j] = low.map(|c| c as i64);
-        let row = |j: i64| {
-            let a = self.texel(level, [i, j], wrap);
-            let b = self.texel(level, [i.saturating_add(1), j], wrap);
-            std::array::from_fn::<f32, 4, _>(|c| a[c] + (b[c] - a[c]) * share[0])
-        };
-        let a = row(j);
-        let b = row(j.saturating_add(1));
-        std::array::from_fn(|c| a[c] + (b[c] - a[c]) * share[1])
+        let right = i.saturating_add(1);
+        let below = j.saturating_add(1);
+        let [a, b, c, d] = [[i, j], [right, j], [i, below], [right, below]].map(|at| self.texel(level, at, wrap));
+        if [a, b, c, d].iter().any(|texel| texel[3] != a[3]) {
+            let [across, down] = share;
+            let shares = [(1.0 - across) * (1.0 - down), across * (1.0 - down), (1.0 - across) * down, across * down];
+            return self.texels.mip_maps.mean(rank, shares.into_iter().zip([a, b, c, d]));
+        }
+        let mix = |a: [f32; 4], b: [f32; 4], share: f32| std::array::from_fn(|c| a[c] + (b[c] - a[c]) * share);
+        mix(mix(a, b, share[0]), mix(c, d, share[0]), share[1])
     }
 
     fn texel(&self, level: &Level, at: [i64; 2], wrap: [Wrap; 2]) -> [f32; 4] {

@@ -42,6 +42,7 @@ pub(crate) fn painted(
         tint,
         paints,
         textures,
+        stated_triangles: 0,
     };
     painting.paint(mesh, reading)
 }
