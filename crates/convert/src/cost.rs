@@ -80,12 +80,12 @@ pub fn mesh(mesh: &Mesh, params: &MeshParams) -> Result<Prediction, ConvertError
     Ok(Prediction::exact(plan.report.splats as f64, plan.columns))
 }
 
-/// The spacing that [`crate::mesh_to_points`] takes, world units; 0 for a mesh of which nothing is shown.
-///
-/// # Errors
-/// As the conversion.
-pub fn mesh_spacing(mesh: &Mesh, params: &MeshParams) -> Result<f64, ConvertError> {
-    mesh_points::plan(mesh, params).map(|plan| plan.report.spacing)
+/// The spacing that [`crate::Density::Auto`] takes for a mesh that had `triangles` triangles before they were divided, world units; `None` for a mesh without
+/// area.
+pub fn usual_spacing(mesh: &Mesh, triangles: u64, splat: &SplatParams) -> Option<f64> {
+    let area = mesh.area() * splat.transform.scale * splat.transform.scale;
+    let spacing = mesh_points::auto_spacing(mesh, area, triangles.max(1), splat);
+    (spacing > 0.0 && spacing.is_finite()).then_some(spacing)
 }
 
 /// Of [`crate::raw_to_surfels`]; with merged duplicates as if there were none.

@@ -307,13 +307,16 @@ fn spacing(mesh: &Mesh, measures: &[Measure], params: &MeshParams, report: &Mesh
     match params.density {
         Density::Spacing(h) => h,
         Density::Splats(n) => spacing_for(measures, n.max(1), report, scale),
-        Density::Auto => {
-            let diagonal = f64::from(splat_core::Aabb::of_points(&mesh.position).diagonal()) * scale;
-            let triangle = (report.area / (report.triangles - report.degenerate) as f64).sqrt();
-            let budget = (params.splat.most_splats() as f64 / 2.0).clamp(1.0, AUTO_SPLATS);
-            (diagonal / AUTO_STEPS).min(triangle).max((report.area / budget).sqrt())
-        }
+        Density::Auto => auto_spacing(mesh, report.area, report.triangles - report.degenerate, &params.splat),
     }
+}
+
+/// The spacing of [`Density::Auto`] for so many triangles with an area, world units².
+pub(crate) fn auto_spacing(mesh: &Mesh, area: f64, triangles: u64, splat: &SplatParams) -> f64 {
+    let diagonal = f64::from(splat_core::Aabb::of_points(&mesh.position).diagonal()) * splat.transform.scale;
+    let triangle = (area / triangles as f64).sqrt();
+    let budget = (splat.most_splats() as f64 / 2.0).clamp(1.0, AUTO_SPLATS);
+    (diagonal / AUTO_STEPS).min(triangle).max((area / budget).sqrt())
 }
 
 /// The spacing that gives about this many splats: whole pieces are up to four times too many at √(A/n), so the count is

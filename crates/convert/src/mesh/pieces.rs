@@ -205,7 +205,8 @@ impl<'a> Corners<'a> {
         let normal = ids.map(|v| if pieces.normal[v] == Vec3::ZERO { plane } else { pieces.normal[v] });
         let is_flat = pieces.plan.is_flat(pieces.mesh, triangle, face);
         let plane = if normal.iter().sum::<Vec3>().dot(plane) < 0.0 { -plane } else { plane };
-        let color = (!pieces.mesh.color.is_empty()).then(|| ids.map(|v| Vec3::from(pieces.mesh.color[v])));
+        let is_colored = !pieces.mesh.color.is_empty() && pieces.colors.is_none();
+        let color = is_colored.then(|| ids.map(|v| Vec3::from(pieces.mesh.color[v])));
         let opacity = (!pieces.mesh.opacity.is_empty()).then(|| ids.map(|v| pieces.mesh.opacity[v]));
         Self {
             painted: pieces.colors.map(|colors| (triangle, colors)),
