@@ -204,7 +204,7 @@ fn an_image_that_is_not_decoded_is_named_with_its_size() {
     let mut content = file_of(&noise(32, 16), "OPAQUE");
     let (mesh, notes) = plain(&content, Textures::Undecoded);
     assert_eq!((mesh.triangles.len(), mesh.color.len()), (2, 4));
-    assert_eq!(notes.remarks, ["image 0 is a texture of 32 x 16 texels"]);
+    assert_eq!(notes.remarks, ["image 0 is a texture of 32 x 16 texels with opacities"]);
     // Its texels are damaged, which nobody looks at.
     let at = content.windows(4).position(|w| w == b"IDAT").unwrap();
     content[at + 40] ^= 0xff;

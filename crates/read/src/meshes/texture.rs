@@ -100,7 +100,8 @@ impl Texture {
             input::check_packed(decoder.total_bytes(), stored, "an image")?;
         }
         if reading.params.textures == Textures::Undecoded {
-            let shown = format!("{what} is a texture of {width} x {height} texels");
+            let opacities = if decoder.color_type().has_alpha() { " with opacities" } else { "" };
+            let shown = format!("{what} is a texture of {width} x {height} texels{opacities}");
             reading.notes.remark(shown);
             return Ok(Self::of_level(Level::undecoded(width, height), None));
         }
