@@ -72,6 +72,7 @@ mod surfels;
 mod surfels_opaque;
 mod techniques;
 mod textured_lights;
+mod textures;
 mod thick_media;
 mod triangles;
 mod truth;

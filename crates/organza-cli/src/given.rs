@@ -66,8 +66,9 @@ pub(super) fn write_first(
     let context = Context { files, options, progress: &progress };
     let read = inputs.iter().map(|path| DataFile::read(path, wish, context));
     let mut data = read.collect::<Result<Vec<_>, _>>()?;
-    let takes_colors =
-        |d: &DataFile| matches!(d.data, SourceData::Points(_) | SourceData::Mesh(_)) || d.array.is_some();
+    let takes_colors = |d: &DataFile| {
+        matches!(d.data, SourceData::Points(_) | SourceData::Mesh(_) | SourceData::Painted(..)) || d.array.is_some()
+    };
     if wish.color_by.is_some() && !data.iter().any(takes_colors) {
         if let Some(error) = data.iter_mut().find_map(|d| d.array_error.take()) {
             return Err(error);
@@ -78,7 +79,8 @@ pub(super) fn write_first(
             hint,
         ));
     }
-    let has_map = data.iter().any(|d| matches!(d.data, SourceData::Points(_) | SourceData::Mesh(_)));
+    let has_map =
+        data.iter().any(|d| matches!(d.data, SourceData::Points(_) | SourceData::Mesh(_) | SourceData::Painted(..)));
     if (wish.color_range.is_some() || wish.is_logarithmic) && !has_map {
         let named = if wish.is_logarithmic { "--log" } else { "--color-range" };
         let message = format!("{named} is for the colours of points and meshes, and no file has such");

@@ -7,10 +7,11 @@ use numpy::{PyArray1, PyArrayMethods};
 use organza::{Error, SourceData};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use read::{Loaded, ReadParams, Rgba, TextureImage, TexturePlaces};
+use read::{Loaded, ReadParams, Rgba, TextureImage, TexturePlaces, Textures};
 use splat_core::glam::{DMat3, DVec3, Vec3};
 use splat_core::{Association, Column, Grid, Mesh, MeshColumn, RadianceImage, RawPoints, Relative};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// A mesh, points, a volume or an image in memory, which scenes name as `memory:NAME`.
 #[pyclass(frozen, module = "organza._organza")]
@@ -164,7 +165,7 @@ impl Data {
     #[getter]
     fn kind(&self) -> &'static str {
         match self.data {
-            SourceData::Mesh(_) => "mesh",
+            SourceData::Mesh(_) | SourceData::Painted(..) => "mesh",
             SourceData::Points(_) => "points",
             SourceData::Grid(_) => "grid",
             SourceData::Image(_) => "image",
@@ -183,11 +184,12 @@ impl Data {
         self.notes.clone()
     }
 
-    /// Its arrays by the names of the arguments that make it again.
+    /// Its arrays by the names of the arguments that make it again. A texture becomes colours of vertices, for which triangles are divided.
     fn arrays<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let parts = PyDict::new(py);
         match &self.data {
-            SourceData::Mesh(mesh) => {
+            SourceData::Mesh(_) | SourceData::Painted(..) => {
+                let mesh = &self.colored_mesh()?;
                 parts.set_item("vertices", table(py, placed(mesh.origin, &mesh.position))?)?;
                 let faces: Vec<u32> = mesh.triangles.as_flattened().to_vec();
                 let count = mesh.triangles.len();
@@ -239,6 +241,21 @@ impl Data {
     }
 }
 
+impl Data {
+    /// The mesh with all of its colours at vertices.
+    fn colored_mesh(&self) -> PyResult<Arc<Mesh>> {
+        match &self.data {
+            SourceData::Mesh(mesh) => Ok(mesh.clone()),
+            SourceData::Painted(mesh, painting) => {
+                let divided = painting.divided(mesh, 0.0, &ReadParams::default(), None);
+                let (mesh, _) = divided.map_err(|error| raised(&Error::from_read(Path::new("texture"), &error)))?;
+                Ok(mesh.into())
+            }
+            _ => Err(raised(&Error::Internal("a mesh that is none".into()))),
+        }
+    }
+}
+
 /// The mesh with the colours of a texture.
 fn textured(mesh: Mesh, uv: &Bound<'_, PyAny>, texture: &Texture<'_>) -> PyResult<Data> {
     const NAME: &str = "texture";
@@ -259,12 +276,15 @@ fn textured(mesh: Mesh, uv: &Bound<'_, PyAny>, texture: &Texture<'_>) -> PyResul
         Texture::File(path) => TextureImage::File(path.clone()),
         Texture::Pixels(pixels) => texels(NAME, pixels)?,
     };
-    let painted = read::textured_in_memory(NAME, mesh, &places, image, &ReadParams::default());
+    let params = ReadParams { textures: Textures::Kept, ..ReadParams::default() };
+    let painted = read::textured_in_memory(NAME, mesh, &places, image, &params);
     let (loaded, notes) = painted.map_err(|error| raised(&Error::from_read(Path::new(&error.file), &error)))?;
-    let Loaded::Mesh(mesh) = loaded else {
-        return Err(raised(&Error::Internal("a texture that is kept where none was asked for".into())));
+    let data = match loaded {
+        Loaded::Painted(mesh, painting) => SourceData::Painted(mesh.into(), painting.into()),
+        Loaded::Mesh(mesh) => SourceData::Mesh(mesh.into()),
+        _ => return Err(raised(&Error::Internal("a textured mesh that is none".into()))),
     };
-    Ok(Data { data: SourceData::Mesh(mesh.into()), notes: notes.remarks })
+    Ok(Data { data, notes: notes.remarks })
 }
 
 /// The texels of an image in memory: bytes of sRGB, or linear numbers; opaque without a fourth channel.

@@ -71,7 +71,7 @@ def test_a_texture_has_the_bits_of_its_file(files):
     textures = [of_texture, folder / "roof.png", str(folder / "roof.png"), image_module.open(folder / "roof.png")]
     for texture in textures:
         scene = roof(texture)
-        assert any("roof: textures became colours of vertices" in note for note in scene.notes)
+        assert not any("textures became colours of vertices" in note for note in scene.notes)
         assert np.array_equal(og.render(scene, size=SMALL).rgb, of_file)
     # Corners with vertices of their own, as many libraries have them.
     split = og.Scene()
@@ -113,7 +113,8 @@ def test_linear_texels_are_those_of_bytes():
     of_texture = pixels()
     fields = (of_texture > 0).astype(np.float32)
     of_texture[of_texture > 0] = 255
-    assert np.array_equal(og.render(roof(of_texture), size=SMALL).rgb, og.render(roof(fields), size=SMALL).rgb)
+    # Mip maps of bytes are bytes again, within half a step of eight bits twice.
+    assert np.abs(og.render(roof(of_texture), size=SMALL).rgb - og.render(roof(fields), size=SMALL).rgb).max() < 0.01
     tinted = og.render(roof(fields, colors=np.tile([1.0, 0.0, 0.0], (6, 1))), size=SMALL).rgb
     assert tinted[..., 0].max() > 0.1 and tinted[..., 1].max() < 0.01
 

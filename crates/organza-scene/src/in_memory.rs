@@ -1,6 +1,7 @@
 //! Data that a program has in memory: its scenes name it as `memory:NAME` where others name a file.
 
 use crate::{Error, shown};
+use read::Painting;
 use sha2::{Digest, Sha256};
 use splat_core::{Grid, Mesh, RadianceImage, RawPoints};
 use std::collections::BTreeMap;
@@ -18,6 +19,8 @@ const LONGEST_NAME: usize = 200;
 pub enum SourceData {
     /// Triangles.
     Mesh(Arc<Mesh>),
+    /// Triangles with colours that lie between their vertices, as those of a texture do.
+    Painted(Arc<Mesh>, Arc<Painting>),
     /// Points without faces.
     Points(Arc<RawPoints>),
     /// A regular volume.
@@ -31,6 +34,7 @@ impl SourceData {
     pub fn bytes(&self) -> u64 {
         match self {
             Self::Mesh(mesh) => mesh.bytes(),
+            Self::Painted(mesh, painting) => mesh.bytes() + painting.bytes(),
             Self::Points(points) => points.bytes(),
             Self::Grid(grid) => grid.bytes(),
             Self::Image(image) => image.bytes(),
@@ -41,6 +45,9 @@ impl SourceData {
     pub fn is_same(&self, other: &Self) -> bool {
         match (self, other) {
             (Self::Mesh(one), Self::Mesh(other)) => Arc::ptr_eq(one, other),
+            (Self::Painted(one, painting), Self::Painted(other, other_painting)) => {
+                Arc::ptr_eq(one, other) && Arc::ptr_eq(painting, other_painting)
+            }
             (Self::Points(one), Self::Points(other)) => Arc::ptr_eq(one, other),
             (Self::Grid(one), Self::Grid(other)) => Arc::ptr_eq(one, other),
             (Self::Image(one), Self::Image(other)) => Arc::ptr_eq(one, other),
@@ -52,6 +59,20 @@ impl SourceData {
     fn validate(&self) -> Result<(), splat_core::Error> {
         match self {
             Self::Mesh(mesh) => mesh.validate(),
+            Self::Painted(mesh, painting) => {
+                mesh.validate()?;
+                let painted = painting.len();
+                if painted != mesh.position.len() {
+                    return Err(splat_core::Error::invalid(
+                        "painting",
+                        0,
+                        "vertices",
+                        painted,
+                        "as many as the mesh has",
+                    ));
+                }
+                Ok(())
+            }
             Self::Points(points) => points.validate(),
             Self::Image(image) => image.validate(),
             Self::Grid(grid) => {
@@ -76,6 +97,10 @@ impl SourceData {
             rows.iter().for_each(|row| hasher.update(bytemuck::bytes_of(row)));
         };
         match self {
+            Self::Painted(mesh, painting) => {
+                Self::Mesh(mesh.clone()).digest(hasher);
+                painting.digest(&mut |bytes| hasher.update(bytes));
+            }
             Self::Mesh(mesh) => {
                 hasher.update(bytemuck::bytes_of(&mesh.origin));
                 vectors(hasher, &mesh.position);

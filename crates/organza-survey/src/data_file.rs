@@ -77,7 +77,9 @@ impl DataFile {
         }
         let refuse = |message: &str, hint: &str| Err(Error::input(printable(path), message, hint));
         match &data {
-            SourceData::Mesh(mesh) if mesh.triangles.is_empty() => refuse("expected at least one face, found none", ""),
+            SourceData::Mesh(mesh) | SourceData::Painted(mesh, _) if mesh.triangles.is_empty() => {
+                refuse("expected at least one face, found none", "")
+            }
             SourceData::Points(points) if points.is_empty() => refuse("expected at least one point, found none", ""),
             SourceData::Grid(grid) if grid.values.iter().all(|value| value.is_nan()) => {
                 refuse("expected at least one number, found NaN in all voxels", "")
@@ -88,7 +90,7 @@ impl DataFile {
             }
             _ => {
                 let stands = match &data {
-                    SourceData::Mesh(mesh) => stands_along(mesh.bounds()),
+                    SourceData::Mesh(mesh) | SourceData::Painted(mesh, _) => stands_along(mesh.bounds()),
                     SourceData::Points(points) => {
                         bounds_of(points.origin, &points.position).and_then(cloud_stands_along)
                     }
@@ -137,12 +139,14 @@ impl DataFile {
 
     /// Whether all its colours are black: those of a file that has room for colours, and none.
     pub(crate) fn is_black(&self) -> bool {
-        !self.colors().is_empty() && self.colors().iter().all(|color| *color == [0.0; 3])
+        // Between vertices a texture may have other colours.
+        let has_texture = matches!(self.data, SourceData::Painted(..));
+        !has_texture && !self.colors().is_empty() && self.colors().iter().all(|color| *color == [0.0; 3])
     }
 
     fn colors(&self) -> &[[f32; 3]] {
         match &self.data {
-            SourceData::Mesh(mesh) => &mesh.color,
+            SourceData::Mesh(mesh) | SourceData::Painted(mesh, _) => &mesh.color,
             SourceData::Points(points) => &points.color,
             _ => &[],
         }

@@ -12,6 +12,7 @@ mod normalize;
 pub(crate) mod object;
 mod object_context;
 pub(crate) mod own;
+mod painted;
 
 use crate::cost::{Count, before_conversion};
 use crate::form::{Form, PlannedObject};

@@ -3,7 +3,7 @@
 use crate::cost::Rates;
 use crate::device::Device;
 use convert::Cache;
-use read::ReadParams;
+use read::{ReadParams, Textures};
 use splat_core::MemoryAccount;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -51,9 +51,15 @@ impl Default for RenderOptions {
 }
 
 impl RenderOptions {
-    /// The limits that apply to a file as it is read.
+    /// The limits that apply to a file as it is read. Textures are kept: splats ask them for colours.
     pub fn read_params(&self) -> ReadParams {
         let memory = MemoryAccount::new(self.max_memory);
-        ReadParams { memory, drop_invalid: self.drop_invalid, strict: self.strict, ..ReadParams::default() }
+        ReadParams {
+            memory,
+            drop_invalid: self.drop_invalid,
+            strict: self.strict,
+            textures: Textures::Kept,
+            ..ReadParams::default()
+        }
     }
 }

@@ -6,7 +6,7 @@ use field::{MpuParams, Solid};
 use glam::Vec3;
 use organza::scene::{Scene, SceneMaterial, SceneObject, Source};
 use organza::{Error, RenderOptions, SourceData, printable};
-use read::{Loaded as FileData, ReadParams};
+use read::{Loaded as FileData, ReadParams, Textures};
 use reference::{Density, Dielectric, Liberty, Medium, Surface, SurfaceKind, SurfaceMaterial};
 use splat_core::{DAabb, Grid, Mesh, RadianceImage, RawPoints, ScalarField, Shading, Similarity, optics};
 use std::path::Path;
@@ -236,11 +236,17 @@ pub(super) fn read(
     array: Option<&String>,
     options: &RenderOptions,
 ) -> Result<FileData, Error> {
-    let params = ReadParams { frame, array: array.cloned(), ..options.read_params() };
+    let params = ReadParams { frame, array: array.cloned(), textures: Textures::Divided, ..options.read_params() };
     match scene.in_memory.get(path) {
         Some(SourceData::Mesh(mesh)) => {
             let turned = read::mesh_in_memory(&printable(path), Mesh::clone(mesh), &params);
             return turned.map(|(mesh, _)| FileData::Mesh(mesh)).map_err(|e| Error::from_read(path, &e));
+        }
+        Some(SourceData::Painted(mesh, painting)) => {
+            let divided = painting
+                .divided(mesh, 0.0, &params, None)
+                .and_then(|(mesh, _)| read::mesh_in_memory(&printable(path), mesh, &params));
+            return divided.map(|(mesh, _)| FileData::Mesh(mesh)).map_err(|e| Error::from_read(path, &e));
         }
         Some(SourceData::Points(points)) => return Ok(FileData::Points(RawPoints::clone(points))),
         Some(SourceData::Grid(grid)) => return Ok(FileData::Grid(Grid::clone(grid))),

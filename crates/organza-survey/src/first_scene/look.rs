@@ -133,7 +133,7 @@ pub(super) fn objects(data: &[DataFile], paths: &[String], table: Option<&str>, 
             // A material by name shows no column unless that is asked for too.
             SourceData::Points(_) if wish.material.is_some() && wish.color_by.is_none() => None,
             SourceData::Points(points) => point_colors(points, file.has_colors(), wish),
-            SourceData::Mesh(_) => mesh_colors(wish),
+            SourceData::Mesh(_) | SourceData::Painted(..) => mesh_colors(wish),
             SourceData::Grid(_) | SourceData::Image(_) => None,
         };
         let is_bare = !file.is_colored() && colors.is_none() && wish.material.is_none();
@@ -189,7 +189,7 @@ pub(super) fn takes_preset(file: &DataFile, wish: &Wish) -> bool {
     match &file.data {
         SourceData::Grid(_) => true,
         SourceData::Points(points) => is_map && point_colors(points, file.has_colors(), wish).is_some(),
-        SourceData::Mesh(_) => is_map && wish.color_by.is_some(),
+        SourceData::Mesh(_) | SourceData::Painted(..) => is_map && wish.color_by.is_some(),
         SourceData::Image(_) => false,
     }
 }
@@ -204,7 +204,7 @@ fn is_medium(file: &DataFile, has_labels: bool, recipe: &Recipe) -> bool {
     match &file.data {
         SourceData::Grid(_) => !has_labels,
         SourceData::Points(_) => !recipe.is_of_surfaces(),
-        SourceData::Mesh(_) | SourceData::Image(_) => false,
+        SourceData::Mesh(_) | SourceData::Painted(..) | SourceData::Image(_) => false,
     }
 }
 
@@ -240,7 +240,7 @@ pub(super) fn material_remarks<'a>(data: &'a [DataFile], wish: &'a Wish) -> impl
 /// The diagonal of the box of a file's data.
 fn size_of(file: &DataFile) -> Option<f64> {
     let bounds = match &file.data {
-        SourceData::Mesh(mesh) => mesh.bounds(),
+        SourceData::Mesh(mesh) | SourceData::Painted(mesh, _) => mesh.bounds(),
         SourceData::Points(points) => DAabb::of_points(points.position.iter().map(|p| points.origin + p.as_dvec3())),
         SourceData::Grid(grid) => extent(grid),
         SourceData::Image(_) => return None,
@@ -283,7 +283,7 @@ fn object(file: &DataFile, wish: &Wish, table: Option<&str>, colors: Option<Stri
         doubt: None,
     };
     match &file.data {
-        SourceData::Mesh(mesh) => {
+        SourceData::Mesh(mesh) | SourceData::Painted(mesh, _) => {
             let about = format!(
                 "{} triangles between {} vertices; {}",
                 grouped(mesh.triangles.len() as u64),

@@ -51,7 +51,7 @@ impl DataOfObject {
         match data {
             SourceData::Grid(grid) => Some(Self::Volume(Arc::downgrade(grid))),
             SourceData::Points(points) => Some(Self::Points(Arc::downgrade(points))),
-            SourceData::Mesh(_) | SourceData::Image(_) => None,
+            SourceData::Mesh(_) | SourceData::Painted(..) | SourceData::Image(_) => None,
         }
     }
 

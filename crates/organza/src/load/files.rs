@@ -141,7 +141,9 @@ impl Files {
         let notes = match data {
             SourceData::Points(points) => read::points_in_memory(&name, points, limits).map_err(from_read)?,
             SourceData::Grid(grid) => read::grid_in_memory(&name, grid, limits).map_err(from_read)?,
-            SourceData::Mesh(mesh) => read::mesh_columns_in_memory(&name, mesh, limits).map_err(from_read)?,
+            SourceData::Mesh(mesh) | SourceData::Painted(mesh, _) => {
+                read::mesh_columns_in_memory(&name, mesh, limits).map_err(from_read)?
+            }
             SourceData::Image(_) => Notes::default(),
         };
         let known = self.taken.borrow().iter().find(|(known, _)| known.is_same(data)).map(|(_, read)| read.clone());
@@ -164,7 +166,7 @@ impl Files {
     fn made_of(&self, source: &Path, data: &SourceData, limits: &ReadParams) -> Result<Read, Error> {
         let name = crate::printable(source);
         let memory = self.memory.up_to(limits.memory.limit());
-        let SourceData::Mesh(mesh) = data else {
+        let (SourceData::Mesh(mesh) | SourceData::Painted(mesh, _)) = data else {
             let held = memory.take(&name, data.bytes()).map_err(Error::Limit)?;
             return Ok((data.clone(), Notes::default(), held.into()));
         };
@@ -175,7 +177,11 @@ impl Files {
         let _parted = memory.take(&name, splat_core::crease_bytes(&mesh)).map_err(Error::Limit)?;
         splat_core::part_at_creases(&mut mesh);
         held.set(&name, data.bytes() + mesh.bytes()).map_err(Error::Limit)?;
-        Ok((SourceData::Mesh(mesh.into()), notes, held.into()))
+        let made = match data {
+            SourceData::Painted(_, painting) => SourceData::Painted(mesh.into(), painting.clone()),
+            _ => SourceData::Mesh(mesh.into()),
+        };
+        Ok((made, notes, held.into()))
     }
 
     /// Drops the notes about files, for callers that inspected the files before a scene uses them.
@@ -226,6 +232,8 @@ impl Files {
                 splat_core::part_at_creases(&mut mesh);
                 SourceData::Mesh(mesh.into())
             }
+            // It has normals, and so no creases to be parted at.
+            Loaded::Painted(mesh, painting) => SourceData::Painted(mesh.into(), painting.into()),
             Loaded::Points(points) => SourceData::Points(points.into()),
             Loaded::Grid(grid) => SourceData::Grid(grid.into()),
             Loaded::Image(image) => SourceData::Image(image.into()),

@@ -2,6 +2,7 @@
 
 use super::files::{Fitted, once};
 use super::object_context::ObjectContext;
+use super::painted::{self, ShownMesh};
 use crate::Error;
 use crate::scene::{
     CombinedSource, DensitySource, FieldSource, LevelSetSource, MatterSource, ObjectLabels, SceneObject, SliceSource,
@@ -22,7 +23,7 @@ use std::sync::Arc;
 /// The data of one object with the parameters of its conversion.
 pub(super) enum Input<'a> {
     /// With the name of its source.
-    Mesh(String, Arc<Mesh>, MeshParams),
+    Mesh(String, ShownMesh, MeshParams),
     Points(&'a Path, Arc<RawPoints>, SurfelParams),
     Matter(&'a Path, Arc<RawPoints>, MatterParams),
     Volume(Arc<Grid>, Cow<'a, TransferFunction>, VolumeParams),
@@ -38,7 +39,7 @@ impl Input<'_> {
     /// Bytes that it holds, and those of them that [`super::files::Files`] does not hold too.
     pub(super) fn bytes(&self) -> [u64; 2] {
         let (bytes, holders) = match self {
-            Self::Mesh(_, mesh, _) => (mesh.bytes(), Arc::strong_count(mesh)),
+            Self::Mesh(_, mesh, _) => (mesh.bytes(), Arc::strong_count(&mesh.mesh)),
             Self::Points(_, points, _) | Self::Matter(_, points, _) => (points.bytes(), Arc::strong_count(points)),
             Self::Volume(grid, ..) => (grid.bytes(), Arc::strong_count(grid)),
             _ => (0, 1),
@@ -158,8 +159,9 @@ pub(super) fn input<'a>(object: &'a SceneObject, context: &ObjectContext<'_>) ->
     Ok(match &object.source {
         Source::Mesh(path) => {
             let density = object.spacing.map_or(Density::Auto, Density::Spacing);
-            let mesh = own_mesh(path, object, &splat, context)?;
-            Input::Mesh(crate::printable(path).to_string(), mesh, MeshParams { splat, density, opacity })
+            let mut params = MeshParams { splat, density, opacity };
+            let mesh = own_mesh(path, object, &mut params, context)?;
+            Input::Mesh(crate::printable(path).to_string(), mesh, params)
         }
         Source::Points(path) | Source::Matter(MatterSource { path, .. }) => match context.read(path)? {
             SourceData::Points(points) => raw_points(path, in_metres(points, object), object, splat, context)?,
@@ -200,27 +202,39 @@ pub(super) fn input<'a>(object: &'a SceneObject, context: &ObjectContext<'_>) ->
         Source::Rectangle(r) => {
             let density = Density::Spacing(r.spacing * splat.transform.scale);
             let mesh = convert::clipped_mesh(Mesh::rectangle(r.center, r.u, r.v).into(), &object.clip);
-            Input::Mesh(object.name.clone(), mesh, MeshParams { splat, density, opacity })
+            Input::Mesh(object.name.clone(), mesh.into(), MeshParams { splat, density, opacity })
         }
     })
 }
 
-/// The mesh of an object, in the colours that it has, cut and closed again.
+/// The mesh of an object, in the colours that it has, cut and closed again. `params` gets the density of its splats.
 fn own_mesh(
     path: &Path,
     object: &SceneObject,
-    splat: &SplatParams,
+    params: &mut MeshParams,
     context: &ObjectContext<'_>,
-) -> Result<Arc<Mesh>, Error> {
-    let mut mesh = read_mesh(path, object.labels.as_ref(), context)?;
+) -> Result<ShownMesh, Error> {
     let color_by = object.points.color_by.as_ref();
+    let mut shown = read_mesh(path, object.labels.as_ref(), context)?;
+    if object.spacing.is_none() {
+        params.density = shown.density(&params.splat);
+    }
+    if color_by.is_some() || object.color.is_some() {
+        shown.painting = None;
+    }
+    if shown.painting.is_some() && !object.clip.is_empty() {
+        // Corners where a mesh is cut have no place in a texture.
+        let divided = shown.divided(path, painted::finest(params.density, &params.splat.transform), context)?;
+        shown = Arc::new(divided).into();
+    }
+    let ShownMesh { mut mesh, painting } = shown;
     // While it is cut, or gets other colours, there is another one.
     let is_colored = color_by.is_some() || !mesh.columns.is_empty();
     let is_changed = is_colored || !object.clip.is_empty() || object.color.is_some() && !mesh.color.is_empty();
     let more = if is_changed { 2 * mesh.bytes() } else { 0 };
     let _held = context.files.memory(context.options).take(&crate::printable(path), more).map_err(Error::Limit)?;
     if let Some(by) = color_by {
-        let colored = convert::colored_mesh(mesh, by, object.up.axis.direction(), splat)?;
+        let colored = convert::colored_mesh(mesh, by, object.up.axis.direction(), &params.splat)?;
         context.files.note(path, colored.said);
         context.files.scales.borrow_mut().extend(colored.scale);
         mesh = colored.mesh;
@@ -231,7 +245,8 @@ fn own_mesh(
     let LiddedMesh { mesh, report } = convert::lidded_mesh(mesh, &object.clip);
     context.files.warn(path, report.said());
     let has_others = object.color.is_some() && !mesh.color.is_empty();
-    Ok(if has_others { Mesh { color: Vec::new(), ..Mesh::clone(&mesh) }.into() } else { mesh })
+    let mesh = if has_others { Mesh { color: Vec::new(), ..Mesh::clone(&mesh) }.into() } else { mesh };
+    Ok(ShownMesh { mesh, painting })
 }
 
 /// A plane through a volume, with the volume's colours.
@@ -249,7 +264,7 @@ fn slice<'a>(
     let density = Density::Spacing(spacing * splat.transform.scale);
     let name = crate::printable(&source.path);
     let mesh = convert::clipped_mesh(mesh.into(), &object.clip);
-    Ok(Input::Mesh(name, mesh, MeshParams { splat, density, opacity }))
+    Ok(Input::Mesh(name, mesh.into(), MeshParams { splat, density, opacity }))
 }
 
 /// The lattice that a surface comes of, where that is all.
@@ -357,7 +372,7 @@ fn read_scattered(path: &Path, context: &ObjectContext<'_>) -> Result<(Arc<RawPo
             context.files.note(path, points.unused_by_fields());
             Ok((points, held))
         }
-        SourceData::Mesh(mesh) => {
+        SourceData::Mesh(mesh) | SourceData::Painted(mesh, _) => {
             mesh.validate().map_err(|e| refuse(path, &e, ""))?;
             Ok((RawPoints::of_vertices(&mesh).into(), held))
         }
@@ -365,10 +380,11 @@ fn read_scattered(path: &Path, context: &ObjectContext<'_>) -> Result<(Arc<RawPo
     }
 }
 
-fn read_mesh(path: &Path, known: Option<&ObjectLabels>, context: &ObjectContext<'_>) -> Result<Arc<Mesh>, Error> {
+fn read_mesh(path: &Path, known: Option<&ObjectLabels>, context: &ObjectContext<'_>) -> Result<ShownMesh, Error> {
     match context.read(path)? {
-        SourceData::Mesh(mesh) => Ok(mesh),
-        SourceData::Grid(grid) => labels(path, &grid, known, context),
+        SourceData::Mesh(mesh) => Ok(mesh.into()),
+        SourceData::Painted(mesh, painting) => Ok(ShownMesh { mesh, painting: Some(painting) }),
+        SourceData::Grid(grid) => labels(path, &grid, known, context).map(ShownMesh::from),
         _ => Err(Error::wrong_kind(path, "a mesh with faces", "use `points = ` or `volume = ` for this file")),
     }
 }

@@ -23,7 +23,7 @@ pub(crate) fn mesh_facts(scene: &Scene, context: Context<'_>) -> Result<Vec<Mesh
         let Source::Mesh(path) = &object.source else { continue };
         let data = loading.context(rank, 0, 0).read(path).map_err(|e| loading.named(object, e))?;
         // What is no mesh is refused where it is converted.
-        let SourceData::Mesh(mesh) = data else { continue };
+        let (SourceData::Mesh(mesh) | SourceData::Painted(mesh, _)) = data else { continue };
         facts.push(looked_at(rank, object, &mesh, scene.opacity_of(object)));
     }
     Ok(facts)

@@ -161,7 +161,11 @@ pub(super) fn convert(
     let splat = context.limited(prepared.input.splat());
     let cloud = match &prepared.input {
         Input::Mesh(name, mesh, params) => {
-            let made = convert::mesh_to_points(mesh, &MeshParams { splat, ..params.clone() }, Some(progress));
+            let params = MeshParams { splat, ..params.clone() };
+            let made = match mesh.painting {
+                Some(_) => convert::painted_mesh_to_points(mesh, mesh, &params, Some(progress)),
+                None => convert::mesh_to_points(mesh, &params, Some(progress)),
+            };
             made.inspect(|(_, report)| warnings.extend(report.said().map(|said| format!("{name}: {said}"))))
                 .map(|c| c.0)
         }

@@ -6,6 +6,7 @@
 use super::input::{Input, Isosurface};
 use super::object::{Prepared, procedural};
 use super::object_context::{self, ObjectContext};
+use super::painted;
 use crate::Error;
 use crate::form::{Form, PlannedObject};
 use crate::scene::{SurfaceSampler, Technique};
@@ -249,7 +250,10 @@ fn data(
     let meshed = |mesh: Mesh| triangles(mesh, prepared.prediction.splats, source);
     Ok(match &prepared.input {
         Input::Points(..) | Input::Matter(..) => None,
-        Input::Mesh(_, mesh, _) => meshed(Mesh::clone(mesh)),
+        Input::Mesh(name, mesh, params) => {
+            let finest = painted::finest(params.density, &params.splat.transform);
+            meshed(mesh.divided(name.as_ref(), finest, context)?)
+        }
         Input::Rectangle(r, ..) => meshed(Mesh::rectangle(r.center, r.u, r.v)),
         Input::Surface(field, bounds, params, isosurface) => {
             let spacing = params.density.spacing() / params.splat.transform.scale;
