@@ -75,7 +75,7 @@ fn a_ramp_of_texels_is_shown_by_every_technique() {
 
 #[test]
 fn texels_finer_than_splats_are_averaged_by_every_technique() {
-    // 512 texels along a square that fills 24 pixels: single texels would show as patches.
+    // 512 texels along a square of 48 pixels: single texels would show as patches.
     let board = RgbaImage::from_fn(512, 512, |x, y| grey(f64::from((x + y) % 2)));
     let folder = place(SQUARE, &board);
     for (technique, bound) in TRIALS {
@@ -98,14 +98,14 @@ fn an_even_texture_is_the_colour_of_its_texels() {
 
 #[test]
 fn a_repeated_texture_has_no_seam_where_its_copies_meet() {
-    // Three copies along the square of eight pixels each, from dark to bright. The first lies within the image, where nothing repeats.
+    // Three copies along the square of sixteen pixels each, from dark to bright. The first lies within the image, where nothing repeats.
     let wave = RgbaImage::from_fn(64, 1, |x, _| grey(f64::from(x) / 63.0));
     let repeated = SQUARE.replace("vt 1 0", "vt 3 0").replace("vt 1 1", "vt 3 1");
     let folder = place(&repeated, &wave);
     for (technique, bound) in TRIALS {
         let found = columns(folder.path(), "spacing = 0.06\n", technique);
         // Around the first edge of two copies as around the second.
-        let apart = (6..17).map(|k| (found[k] - found[k + 8]).abs()).fold(0.0, f64::max);
+        let apart = (0..14).map(|k| (found[k] - found[k + 16]).abs()).fold(0.0, f64::max);
         println!("{technique:?}: {apart:.1e}");
         assert!(apart < 2.0 * bound, "{technique:?}: {apart:e} {found:?}");
     }
