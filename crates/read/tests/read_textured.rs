@@ -148,7 +148,7 @@ fn the_seam_of_a_closed_surface_is_no_edge_however_its_places_are_rounded() {
     assert_eq!((&plain.position, &plain.triangles), (&barrel.position, &barrel.triangles));
     let image = TextureImage::Texels { size: [1, 1], rgba: Rgba::Linear(vec![[0.5; 4]]) };
     let places = TexturePlaces::Vertices(vec![[0.5; 2]; barrel.position.len()]);
-    let (textured, _) = textured_in_memory("barrel", barrel.clone(), &places, image, &params).unwrap();
+    let (textured, _) = painted(barrel.clone(), &places, image);
     for mesh in [plain, textured] {
         let normal = mesh.normal[0];
         assert_eq!(normal, mesh.normal[last]);

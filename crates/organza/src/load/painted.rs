@@ -10,6 +10,9 @@ use std::ops::Deref;
 use std::path::Path;
 use std::sync::Arc;
 
+/// Most splats that a texture asks for: two a pixel of a picture of 1280x720 that a mesh fills half of, front and back.
+const MOST_SPLATS: f64 = 1_000_000.0;
+
 /// A mesh in the colours that an object shows.
 pub(super) struct ShownMesh {
     pub(super) mesh: Arc<Mesh>,
@@ -45,11 +48,13 @@ impl ShownMesh {
 
     /// The density of splats where the object states none.
     ///
-    /// It is that of the mesh without its textures, before opacities divided triangles: a texture is averaged over a splat, however large that is.
+    /// It is that of the mesh before opacities divided triangles, or as many splats as the texture has texels on it: up to [`MOST_SPLATS`], over each of which
+    /// the texture is averaged.
     pub(super) fn density(&self, splat: &SplatParams) -> Density {
-        let triangles = self.painting.as_ref().map(|painting| painting.stated_triangles());
-        let spacing = triangles.and_then(|triangles| cost::usual_spacing(&self.mesh, triangles, splat));
-        spacing.map_or(Density::Auto, Density::Spacing)
+        let Some(painting) = &self.painting else { return Density::Auto };
+        let texels: f64 = self.mesh.triangles.iter().map(|triangle| painting.texels(triangle)).sum();
+        let pieces = painting.stated_triangles().max(texels.min(MOST_SPLATS) as u64);
+        cost::usual_spacing(&self.mesh, pieces, splat).map_or(Density::Auto, Density::Spacing)
     }
 
     /// Bytes that it holds.
