@@ -84,25 +84,29 @@ fn a_kept_texture_in_memory_is_that_of_a_file() {
         let [r, g, b] = [0, 1, 2].map(|c| splat_core::srgb::linear_from_srgb(f64::from(p.0[c]) / 255.0));
         [r, g, b, f32::from(p.0[3]) / 255.0]
     });
-    let linear = Rgba::Linear(linear.collect());
-    let linear = TextureImage::Texels { size: [rgba.width(), rgba.height()], rgba: linear };
-    for image in [TextureImage::File(texture.clone()), texels(&texture)] {
-        assert_eq!(textured_in_memory("roof", roof(), &of_corners(), image, &params).unwrap().0, found);
-    }
-    // Linear texels are not stored in eight bits, so their means differ by the rounding of those.
-    let Loaded::Painted(mesh, painting) = textured_in_memory("roof", roof(), &of_corners(), linear, &params).unwrap().0
-    else {
-        panic!("no painting")
+    let linear: Vec<[f32; 4]> = linear.collect();
+    let Loaded::Painted(of_file, expected) = found else { panic!("no painting") };
+    let in_memory = |image: TextureImage| match textured_in_memory("roof", roof(), &of_corners(), image, &params) {
+        Ok((Loaded::Painted(mesh, painting), _)) => (mesh, painting),
+        other => panic!("{other:?}"),
     };
-    let Loaded::Painted(_, expected) = found else { panic!("no painting") };
+    let colors_of = |painting: &Painting, share: f64| {
+        let mut colors = vec![[0.0; 3]; 4];
+        let mut weights = (0..4).map(|k| Vec2::splat(0.1 * k as f32));
+        painting.colors(&of_file.triangles[1], share, &mut weights, &mut colors);
+        colors
+    };
     for share in [1e-3, 0.1, 1.0] {
-        let colors_of = |painting: &Painting| {
-            let mut colors = vec![[0.0; 3]; 4];
-            let mut weights = (0..4).map(|k| Vec2::splat(0.1 * k as f32));
-            painting.colors(&mesh.triangles[1], share, &mut weights, &mut colors);
-            colors
-        };
-        for (found, expected) in colors_of(&painting).iter().zip(colors_of(&expected)) {
+        let expected = colors_of(&expected, share);
+        for image in [TextureImage::File(texture.clone()), texels(&texture)] {
+            let (mesh, painting) = in_memory(image);
+            assert_eq!(mesh, of_file);
+            assert_eq!(colors_of(&painting, share), expected);
+        }
+        // Linear texels are not stored in eight bits, so their means differ by the rounding of those.
+        let image = TextureImage::Texels { size: [rgba.width(), rgba.height()], rgba: Rgba::Linear(linear.clone()) };
+        let (_, painting) = in_memory(image);
+        for (found, expected) in colors_of(&painting, share).iter().zip(&expected) {
             (0..3).for_each(|c| assert!((found[c] - expected[c]).abs() < 0.012, "{found:?} {expected:?}"));
         }
     }
