@@ -68,6 +68,39 @@ fn ranges_of_depth_are_announced_with_their_number() {
     }
 }
 
+/// A pane over a ground in the light of two lamps, of which one is too dim to be seen.
+const EFFECTS: &str = "version = 1\n[camera]\nposition = [0, 1, 4]\ntarget = [0, 0, 0]\nsize = [32, 24]\n\
+    [[light]]\nname = 'sun'\nkind = 'directional'\ndirection = [0.2, -1, -0.3]\nirradiance = [3, 3, 3]\n\
+    [[light]]\nname = 'spark'\nkind = 'point'\nposition = [0, 2, 0]\nintensity = [1e-9, 1e-9, 1e-9]\n\
+    [[object]]\nname = 'ground'\nrectangle = { center = [0, -0.6, 0], u = [2, 0, 0], v = [0, 0, -2], spacing = 0.05 }\n\
+    [[object]]\nname = 'pane'\nopacity = 0.5\n\
+    rectangle = { center = [0, 0.2, 0.5], u = [0.4, 0, 0], v = [0, 0, -0.4], spacing = 0.05 }\n\
+    [render]\ntechnique = 'points'\n";
+
+#[test]
+fn work_of_an_effect_is_what_runs_for_it_alone() {
+    let scene = parse(Path::new("s.toml"), EFFECTS.as_bytes(), &LoadOptions::default()).unwrap();
+    let explained = organza::explain(&scene, &RenderOptions::default(), &Progress::new()).unwrap();
+    let predicted = &explained.predicted;
+    let work = |name: &str| predicted.effects.iter().find(|work| work.effect == name);
+    let shadow = work("shadow.sun").unwrap();
+    let tables = explained.plan.shadow_tables.iter().flatten();
+    assert_eq!(shadow.bytes, tables.map(|table| table.predicted.map_bytes).sum::<u64>());
+    let of_pass = |pass: &str| {
+        let passes = predicted.passes().filter(|planned| planned.pass == pass);
+        passes.map(|pass| pass.seconds(&predicted.rates, 1)).sum::<f64>()
+    };
+    let seconds = |name: &str| work(name).unwrap().seconds(&predicted.rates, 1);
+    assert!(seconds("shadow.sun") >= of_pass("tsm build") && seconds("light.sun") > seconds("shadow.sun"));
+    // The objects share all that goes by splats; samples of the picture are nobody's.
+    let shared: f64 =
+        ["tsm build", "hbsort", "project", "shade", "opaque", "splat", "convert"].map(of_pass).iter().sum();
+    let objects = seconds("object.ground") + seconds("object.pane");
+    assert!((objects / shared - 1.0).abs() < 0.05, "{objects} of {shared}");
+    // What is left out takes nothing, and what is part of other passes has no work of its own.
+    assert!(["light.spark", "shadow.spark", "translucency", "interreflection"].iter().all(|name| work(name).is_none()));
+}
+
 #[test]
 fn cells_of_a_shadow_table_are_announced_with_the_automatic_ones() {
     let predicted = predicted(LAMP);

@@ -242,6 +242,25 @@ mod tests {
     }
 
     #[test]
+    fn light_between_surfaces_lacks_where_these_are_bright() {
+        let told = |reflectance: f64, brightest: f64| {
+            let mut s = scene();
+            s.lights[0].radiance = 1.0;
+            s.reflectance = reflectance;
+            s.brightest = brightest;
+            plan(&s).effects.into_iter().find(|effect| effect.kind == Some(EffectKind::Interreflection)).unwrap()
+        };
+        let white = told(1.0, 1.0);
+        assert!(white.is_lacking && white.bound == Bound::Unknown);
+        let grey = told(0.2, 0.01);
+        assert!(grey.is_lacking && grey.bound.number().is_some_and(|bound| (bound - 12.92 * 0.0025).abs() < 1e-12));
+        let dark = told(1e-4, 1.0);
+        assert!(!dark.is_lacking && !dark.called_for && dark.bound.number().is_some_and(|bound| bound < 0.0013));
+        assert!(told(0.0, 1.0).is_absent);
+        assert!(plan(&scene()).effects.iter().any(|effect| effect.name == "caustics" && effect.is_absent));
+    }
+
+    #[test]
     fn x7_only_the_passes_for_what_is_there() {
         let mut s = scene();
         s.translucent_by.clear();
