@@ -57,7 +57,7 @@ pub use guarded::panic_is_input_error;
 pub use label_rows::{LabelRow, LabelRows, label_rows, label_rows_of_bytes};
 #[cfg(feature = "textures")]
 pub use meshes::paint::Painting;
-#[cfg(feature = "ply")]
+#[cfg(feature = "textures")]
 pub use meshes::rgba::Rgba;
 #[cfg(feature = "ply")]
 pub use meshes::textured::{TextureImage, TexturePlaces, smoothed_in_memory, textured_in_memory};

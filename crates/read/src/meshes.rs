@@ -5,7 +5,6 @@ pub(crate) mod fans;
 #[cfg(feature = "gltf")]
 pub(crate) mod gltf;
 #[cfg(feature = "textures")]
-#[cfg_attr(not(any(feature = "obj", feature = "gltf", feature = "ply")), expect(dead_code, reason = "readers decode"))]
 pub(crate) mod mip_maps;
 #[cfg(feature = "obj")]
 pub(crate) mod mtl;

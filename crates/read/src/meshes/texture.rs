@@ -178,6 +178,7 @@ impl Texture {
     }
 
     /// The texture of texels in memory, `size` columns and rows of them.
+    #[cfg(feature = "ply")]
     pub(crate) fn of_texels(size: [u32; 2], rgba: Rgba, reading: &Reading<'_>) -> Result<Self, ReadError> {
         check_sides(size)?;
         let expected = u64::from(size[0]) * u64::from(size[1]);
