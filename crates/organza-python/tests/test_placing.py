@@ -147,3 +147,36 @@ def test_wrong_places_are_refused_by_name(case):
     call, said = REFUSED[case]
     with pytest.raises(og.InputError, match=said):
         call()
+
+
+def test_an_object_is_removed_with_its_data_and_another_takes_its_name():
+    scene = og.Scene()
+    scene.add_points(np.eye(3), name="scan")
+    steps = np.indices((3, 3, 3))[0] / 2
+    scene.add_isosurface(steps, 0.4, field=steps, name="skin")
+    scene.ground()
+    before = scene.to_toml()
+    with pytest.raises(og.InputError, match="one of scan, skin, ground, found 'scann'; did you mean `scan`"):
+        scene.remove("scann")
+    with pytest.raises(og.InputError, match="found None"):
+        scene.remove(None)
+    assert scene.to_toml() == before
+    scene.remove("skin")
+    scene.remove("ground")
+    assert scene.objects == ["scan"] and list(scene._data) == ["scan"]
+    scene.ground()
+    scene.add_points(2 * np.eye(3), name="skin")
+    scene.remove("scan")
+    assert og.render(scene, size=(24, 18)).alpha.max() > 0.0
+    scene.remove("skin")
+    scene.remove("ground")
+    assert scene.to_toml() == og.Scene().to_toml()
+    with pytest.raises(og.InputError, match="one of none, found 'skin'"):
+        scene.remove("skin")
+
+
+def test_an_object_of_a_first_scene_is_removed():
+    scene = og.Scene.from_files(ASSETS / "points" / "hedge.csv")
+    scene.remove(scene.objects[0])
+    scene.add_points(np.eye(3), name="new")
+    assert og.render(scene, size=(24, 18)).size == (24, 18)

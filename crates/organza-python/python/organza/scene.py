@@ -16,7 +16,7 @@ import numpy as np
 from organza import _organza, adopted
 from organza._organza import Data, InputError
 from organza.arrays import array_of, colors_of, columns_of, halved_quads, number, place_of, plain, texture_of
-from organza.checking import check_keys
+from organza.checking import check_keys, meant
 from organza.fields import Field, field_of
 from organza.lattices import lattice_of, percentiles, volume_arguments
 from organza.placing import Camera, Light, beyond
@@ -577,6 +577,36 @@ class Scene:
         stated = {"preset": preset, "transfer": transfer, "color_by": color_by, "colormap": colormap, "clim": clim, "log_scale": log_scale or None}
         stated["transform"] = None if up is None else {"up": up}
         adopted.add(self, thing, name, {key: value for key, value in stated.items() if value is not None} | keys)
+
+    def remove(self, name: str) -> None:
+        """Removes an object with its data, so that another may have its name.
+
+        Parameters
+        ----------
+        name
+            Its name, one of :attr:`objects`.
+
+        Raises
+        ------
+        InputError
+            For a name that no object has; nothing is removed then.
+        """
+        self._check_open()
+        objects = self._document.get("object", [])
+        if name not in self.objects:
+            known = ", ".join(self.objects) or "none"
+            question = meant(name, self.objects) if isinstance(name, str) else ""
+            raise InputError(f"remove: expected the name of an object, one of {known}, found {name!r}{question}")
+        left = [thing for thing in objects if thing["name"] != name]
+        # A scene without objects states none, as a new one does.
+        self._document = {key: value for key, value in self._document.items() if key != "object"} | ({"object": left} if left else {})
+        # A field that the object showed goes with it; data that other objects show stays.
+        text = json.dumps(left)
+        self._data = {label: data for label, data in self._data.items() if json.dumps(_MEMORY + label) in text}
+        self._remarks = [remark for remark in self._remarks if not remark.startswith(f"{name}: ")]
+        self._beyond.pop(name, None)
+        if self._ground is not None and self._ground.name == name:
+            self._ground = None
 
     # Everything else.
 
