@@ -180,3 +180,20 @@ def test_an_object_of_a_first_scene_is_removed():
     scene.remove(scene.objects[0])
     scene.add_points(np.eye(3), name="new")
     assert og.render(scene, size=(24, 18)).size == (24, 18)
+
+
+def test_arrays_beside_data_that_stands_otherwise_are_named():
+    scene = og.Scene()
+    scene.add_points(np.eye(3), name="scan")
+    assert scene.notes == []
+    scene.add(ASSETS / "mni152" / "mni152_t1.nii.gz", name="head")
+    said = 'scan: its y points up, where z does in head; transform={"up": "z"} turns it alike'
+    assert said in scene.notes
+    scene.add_points(np.eye(3), name="alike", transform={"up": "z"})
+    scene.add_points(np.eye(3), name="stated", transform={"up": "y"})
+    scene.add_points(np.eye(3), name="moved", transform={"translate": [1, 0, 0]})
+    scene.ground()
+    assert [note.split(":")[0] for note in scene.notes if "points up, where" in note] == ["scan", "moved"]
+    scene.set("object.scan.transform", {"up": "z"})
+    scene.remove("moved")
+    assert said not in scene.notes

@@ -729,8 +729,9 @@ class Scene:
 
     @property
     def notes(self) -> list[str]:
-        """What a first scene decided that a user may want otherwise, what was made of arrays, and what its camera does not see, one sentence each."""
-        return self._remarks + self._beyond_remarks()
+        """What a first scene decided that a user may want otherwise, what was made of arrays, which of them stand otherwise than the rest, and what its camera does not see,
+        one sentence each."""
+        return self._remarks + self._standing_remarks() + self._beyond_remarks()
 
     def __repr__(self) -> str:
         return f"<organza.Scene {self._file}>" if self._text else f"<organza.Scene of {', '.join(self.objects) or 'nothing'}>"
@@ -802,8 +803,7 @@ class Scene:
 
     def _check_object(self, thing: Mapping[str, Any], data: Mapping[str, Data] | None = None) -> None:
         """Refuses an object that no scene may have, whatever else it shows. Materials that it names may be stated later."""
-        is_ground = self._ground is not None and thing["name"] == self._ground.name
-        document: dict[str, Any] = {"version": 1, "camera": {"auto": True}, "object": [{**thing, **(_ANYWHERE if is_ground else {})}]}
+        document: dict[str, Any] = {"version": 1, "camera": {"auto": True}, "object": [{**thing, **(_ANYWHERE if self._is_ground(thing) else {})}]}
         materials = dict(self._document.get("material", {}))
         listed = thing.get("materials")
         for name in [thing.get("material"), *(listed if isinstance(listed, list) else [])]:
@@ -840,6 +840,23 @@ class Scene:
         there = [name for name in self._beyond if name in self.objects]
         advice = "the camera stays where the first scene has it: scene.camera.orbit() sees everything"
         return [f"{name}: {_percent(self._beyond[name])} of it lies outside the view, as {advice}" for name in there]
+
+    def _standing_remarks(self) -> list[str]:
+        """What is said of arrays beside data whose z, or whose -y, points up: arrays that state no axis have y up."""
+        things = [thing for thing in self._document.get("object", []) if not self._is_ground(thing)]
+        ups = {thing["name"]: (thing.get("transform") or {}).get("up") for thing in things}
+        if not any(up is None and name in self._data for name, up in ups.items()):
+            return []
+        ups |= {thing["name"]: _up_of_file(thing) for thing in things if ups[thing["name"]] is None and thing["name"] not in self._data}
+        turned = {name: up for name, up in ups.items() if up not in (None, "y")}
+        if not turned:
+            return []
+        other, axis = next(iter(turned.items()))
+        arrays = [name for name, up in ups.items() if up is None and name in self._data]
+        return [f"{name}: its y points up, where {axis} does in {other}; transform={{\"up\": \"{axis}\"}} turns it alike" for name in arrays]
+
+    def _is_ground(self, thing: Mapping[str, Any]) -> bool:
+        return self._ground is not None and thing["name"] == self._ground.name
 
     def _free_name(self, name: str) -> str:
         return _free(name, {*self.objects, *self._data})
@@ -1060,6 +1077,24 @@ def _colors_by(
     if isinstance(transfer, Transfer):
         transfer = [{key: point[key] for key in ("value", "color")} for point in transfer.points]
     return None, keys | {"transfer": transfer}
+
+
+def _up_of_file(thing: Mapping[str, Any]) -> str | None:
+    """The axis that points up in the file of an object, by its header; None where it has no file, or one that cannot be read now."""
+    tables = [table["volume"] for table in thing.values() if isinstance(table, dict) and "volume" in table]
+    named = [(source, thing[source]) for source in ("mesh", "points") if source in thing]
+    # A volume has a source here that needs no look.
+    found = named or [("isosurface", {"volume": file, "level": 0.0}) for file in [thing.get("volume"), *tables] if file is not None]
+    if not found:
+        return None
+    source, file = found[0]
+    document = {"version": 1, "camera": {"auto": True}, "object": [{"name": "file", source: file}]}
+    given = Scene()._given_text(json.dumps(document), None, None)
+    try:
+        return str(json.loads(_organza.info_of_scene(given, _how()))["objects"][0]["up"])
+    except (InputError, OSError):
+        # Drawing says what is wrong with it.
+        return None
 
 
 def _diagonal(file: str) -> float:
