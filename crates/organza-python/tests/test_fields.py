@@ -3,6 +3,7 @@
 import numpy as np
 import organza as og
 import pytest
+from conftest import ASSETS
 
 SMALL = (64, 48)
 
@@ -203,3 +204,40 @@ def test_the_seam_of_a_turned_surface_has_no_edge():
         normals, vertices = arrays["unit_normals"], arrays["vertices"]
         radial = vertices / np.linalg.norm(vertices, axis=1, keepdims=True)
         assert (normals * radial).sum(1).min() > 0.99
+
+
+@pytest.mark.filterwarnings("ignore:.*legends")
+def test_colors_without_light_are_those_of_the_map():
+    ramp = np.indices((4, 4, 4))[0].astype(float)
+    flat = np.full((2, 2, 2), 0.25)
+    places = np.array([[x, y, 0.0] for x in range(3) for y in range(3)])
+    square = [[0, 3, 4, 1], [1, 4, 5, 2], [3, 6, 7, 4], [4, 7, 8, 5]]
+    expected = og._organza.map_colors("turbo", [0.25])[0]
+    looks = {"colormap": "turbo", "clim": (0, 1), "unlit": True}
+    calls = {
+        "points": lambda scene: scene.add_points(places, values=np.full(9, 0.25), radius=1, **looks),
+        "mesh": lambda scene: scene.add_mesh(places, square, values=np.full(9, 0.25), **looks),
+        "isosurface": lambda scene: scene.add_isosurface(ramp, 1.5, field={"values": flat, "spacing": 3.0}, **looks),
+        "labels": lambda scene: scene.add_labels(np.ones((4, 4, 4), int), field={"values": flat, "spacing": 3.0}, **looks),
+    }
+    for kind, add in calls.items():
+        scene = og.Scene()
+        add(scene)
+        picture = og.render(scene, size=(24, 18))
+        middle = picture.alpha > 0.99
+        assert middle.any(), kind
+        assert np.allclose(picture.rgb[middle], expected, atol=0.02), kind
+
+
+def test_a_surface_is_unlit_or_has_a_material():
+    scene = og.Scene()
+    before = scene.to_toml()
+    with pytest.raises(og.InputError, match="object 'mesh', unlit, material: expected one of them"):
+        scene.add_mesh(np.eye(3), [[0, 1, 2]], unlit=True, material="clay")
+    with pytest.raises(og.InputError, match="center"):
+        scene.add_slice(np.zeros((2, 2, 2)), center=(np.nan, 0, 0))
+    assert scene.to_toml() == before
+    scene.add_mesh(np.eye(3), [[0, 1, 2]], unlit=False, name="lit")
+    assert "material" not in scene.to_toml()
+    scene.add(ASSETS / "stanford-bunny" / "bunny.ply.gz", unlit=True, name="bunny")
+    assert 'shading = "unlit"' in scene.to_toml()

@@ -29,6 +29,12 @@ _UNLIT_SLICE = "unlit slice"
 # The material of volumes that name none.
 _LIT_VOLUME = "lit volume"
 _LIT = {"shading": "phong", "specular": 0.08, "shininess": 24}
+# The material of surfaces that are `unlit`, a key which scenes have for points alone.
+_UNLIT_SURFACE = "unlit surface"
+# Materials that objects name without their being stated.
+_MADE_MATERIALS: dict[str, dict[str, Any]] = {_UNLIT_SLICE: {"shading": "unlit"}, _UNLIT_SURFACE: {"shading": "unlit"}, _LIT_VOLUME: _LIT}
+# Sources whose objects are surfaces.
+_SURFACES = ("mesh", "isosurface")
 # A scene that is made here lies nowhere: files that it names are relative to the working folder.
 _NOWHERE = "scene.json"
 # A first scene lies in the working folder, as far as its paths go.
@@ -141,7 +147,7 @@ class Scene:
         radius
             (n,) or one number: the radius of a point's disc, in the unit of the positions; found from neighbours where it is None.
         values
-            (n,): a column that ``color_by="value"`` shows.
+            (n,): a column that ``color_by="value"`` shows. Light changes its colours: ``unlit=True`` shows those of the legend.
         opacities
             (n,), from 0 to 1.
         columns
@@ -150,7 +156,7 @@ class Scene:
             The column that colours stand for: ``"value"``, one of ``columns``, ``"x"``, ``"y"``, ``"z"`` or ``"height"``; ``values`` where they are given
             without colours.
         colormap, clim
-            Its map and the numbers at the two ends of it.
+            Its map and the numbers at the two ends of it. Only ``unlit=True`` shows the very colours of the map.
         log_scale
             Whether numbers lie along the map by their logarithms; those that are not above 0 have the object's colour.
         field
@@ -225,7 +231,8 @@ class Scene:
             The image: the path of a PNG or JPEG file; or an array (height, width, 3) or (height, width, 4), from the top left, of bytes or ``uint16`` of
             sRGB, or linear numbers; or an image of Pillow. It repeats beyond its borders. A fourth channel is the opacity of the surface.
         values
-            (n,) of vertices or (m,) of faces: a column that ``color_by="value"`` shows. Where there are as many vertices as faces, it is of the vertices.
+            (n,) of vertices or (m,) of faces: a column that ``color_by="value"`` shows. Where there are as many vertices as faces, it is of the vertices. Light
+            changes its colours: ``unlit=True`` shows those of the legend.
         columns
             Further columns by name, as ``values``.
         color_by
@@ -331,7 +338,6 @@ class Scene:
             keys = transfer.keys(lattice.diagonal or 1.0) | keys
             if "material" not in keys:
                 # As first scenes have it: lit by its gradients, so that its shape is seen.
-                self._document.setdefault("material", {}).setdefault(_LIT_VOLUME, _LIT)
                 keys = {"material": _LIT_VOLUME} | keys
         elif "transfer" not in keys:
             source, found = self._first_keys(data, name or "volume", preset)
@@ -371,7 +377,7 @@ class Scene:
             have the same axes. Where the surface leaves the field it has its own colour, and a warning tells the share.
         colormap, clim
             The map of the field's colours, ``"viridis"`` where it is None, and the field's values at its two ends: its 1st and 99th percentile where ``clim``
-            is None.
+            is None. Light changes the colours: ``unlit=True`` shows those of the legend.
         transfer
             Instead of these, what :func:`organza.transfer` makes; its opacities are not used.
         spacing, origin, direction
@@ -465,7 +471,6 @@ class Scene:
         colors = transfer if transfer is not None else make_transfer(colormap, clim or (0.0, 1.0))
         points = [{key: point[key] for key in ("value", "color")} for point in colors.points]
         if "material" not in keys:
-            self._document.setdefault("material", {}).setdefault(_UNLIT_SLICE, {"shading": "unlit"})
             keys = {"material": _UNLIT_SLICE} | keys
         keys = standing | {"transfer": points} | keys
         if is_file:
@@ -796,9 +801,10 @@ class Scene:
                 data = data | {name: field.data}
                 table["volume"] = _MEMORY + name
             thing |= plain({"field": table} | field.keys)
-        thing |= plain({key: value for key, value in keys.items() if value is not None})
+        thing |= plain({key: value for key, value in _with_unlit(thing, keys).items() if value is not None})
         self._check_object(thing, data)
         self._data |= data
+        self._state_material(thing)
         self._document.setdefault("object", []).append(thing)
 
     def _check_object(self, thing: Mapping[str, Any], data: Mapping[str, Data] | None = None) -> None:
@@ -808,7 +814,7 @@ class Scene:
         listed = thing.get("materials")
         for name in [thing.get("material"), *(listed if isinstance(listed, list) else [])]:
             if isinstance(name, str):
-                materials.setdefault(name, {})
+                materials.setdefault(name, _MADE_MATERIALS.get(name, {}))
         if "footprints" in self._document:
             document["footprints"] = self._document["footprints"]
         elif isinstance(thing.get("footprint"), int):
@@ -816,6 +822,12 @@ class Scene:
         text = json.dumps(document | {"material": materials})
         named = {name: part for name, part in {**self._data, **(data or {})}.items() if json.dumps(_MEMORY + name) in text}
         _organza.check(text, named)
+
+    def _state_material(self, thing: Mapping[str, Any]) -> None:
+        """States the material of an object that is made here, once the object is right."""
+        name = thing.get("material")
+        if name in _MADE_MATERIALS:
+            self._document.setdefault("material", {}).setdefault(name, dict(_MADE_MATERIALS[name]))
 
     def _name(self, name: str | None, default: str) -> str:
         """The name of a new object: one that no other has, or the default with a number."""
@@ -902,8 +914,9 @@ class Scene:
                 thing["color_by"] = thing.get("color_by", {}) | stated
             self._take_material(first._document, thing, thing["name"])
             thing["name"] = self._name(name, thing["name"])
-            thing |= plain({key: value for key, value in keys.items() if value is not None})
+            thing |= plain({key: value for key, value in _with_unlit(thing, keys).items() if value is not None})
             self._check_object(thing)
+            self._state_material(thing)
             self._document.setdefault("object", []).append(thing)
         self._remarks += first._remarks
 
@@ -1095,6 +1108,17 @@ def _up_of_file(thing: Mapping[str, Any]) -> str | None:
     except (InputError, OSError):
         # Drawing says what is wrong with it.
         return None
+
+
+def _with_unlit(thing: Mapping[str, Any], keys: Mapping[str, Any]) -> dict[str, Any]:
+    """Keys of an object, with a material in the place of ``unlit`` where it is a surface."""
+    stated = dict(keys)
+    if any(source in thing for source in _SURFACES) and isinstance(stated.get("unlit"), bool):
+        if stated.pop("unlit"):
+            if stated.get("material") is not None:
+                raise InputError(f"object '{thing['name']}', unlit, material: expected one of them, found both; a material has shading=\"unlit\"")
+            stated["material"] = _UNLIT_SURFACE
+    return stated
 
 
 def _diagonal(file: str) -> float:
