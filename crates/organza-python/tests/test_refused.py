@@ -32,7 +32,7 @@ REFUSED = {
     "an index with a part": (lambda: scene().add_mesh(PLACES, [[0, 1, 1.5]]), "found 1.5 in face 0"),
     "five sides": (lambda: scene().add_mesh(PLACES, np.zeros((1, 5), int)), r"faces: expected the shape \(n, 3\)"),
     "a flat volume": (lambda: scene().add_volume(np.zeros((2, 2))), r"values: expected the shape \(nz, ny, nx\)"),
-    "no steps": (lambda: scene().add_volume(CUBE, spacing=0, transfer=og.transfer()), "span space"),
+    "no steps": (lambda: scene().add_volume(CUBE, spacing=0, transfer=og.transfer()), "spacing: expected finite steps above 0, found 0"),
     "an infinite voxel": (lambda: scene().add_volume(CUBE + np.inf, transfer=og.transfer()), "voxel"),
     "two looks": (lambda: scene().add_volume(CUBE, transfer=og.transfer(), preset="mri"), "transfer, preset"),
     "an unknown look": (lambda: scene().add_volume(CUBE, preset="x-ray"), "there is no such preset"),
@@ -89,6 +89,31 @@ REFUSED = {
     "no key": (lambda: scene().set("", 1), "expected a key and a value"),
     "no value": (lambda: scene().set("render.seed", None), "expected a key and a value"),
     "data as a scene": (lambda: og.Scene.load("bunny.ply"), "Scene.from_files takes data files"),
+    "a radius below 0": (lambda: scene().add_points(PLACES, radius=-1, name="scan"), "object 'scan', radius: expected numbers above 0 .*, one or 4, found -1"),
+    "a radius of nothing": (lambda: scene().add_points(PLACES, radius=[1, 2, 0, 3]), "radius: expected numbers above 0 .* found 0.0 in row 2"),
+    "a radius with a unit": (lambda: scene().add_points(PLACES, radius="2mm"), "radius: .* found '2mm'"),
+    "radii of another count": (lambda: scene().add_points(PLACES, radius=[1, 2]), r"radius: .* found the shape \(2,\)"),
+    "a look of a material": (lambda: scene().material("w", preset="waxx"), "material 'w', preset: expected one of glass"),
+    "a layer": (lambda: scene().set("render.layers", ["depht"]), "there is no layer `depht`(.|\n)*`depth`"),
+    "a turn beyond the pole": (lambda: scene().camera.orbit(elevation=200), "camera.elevation: expected a number from -90 to 90, found 200"),
+    "a picture filled by nothing": (lambda: scene().camera.orbit(fit=-1), "camera.fit: expected a number above 0"),
+    "an angle of view": (lambda: scene().camera(fov_y=200), "camera.fov_y: expected degrees between 0 and 180"),
+    "an eye at what it looks at": (lambda: scene().camera(position=(0, 0, 1), target=(0, 0, 1)), "target: expected another place than the position"),
+    "an eye of two numbers": (lambda: scene().camera(position=(0, 1)), "position: expected three numbers"),
+    "steps backwards": (lambda: scene().add_volume(CUBE, spacing=(-1, 1, 1)), "spacing: expected steps above 0, found .*`direction`"),
+    "steps of no number": (lambda: scene().add_volume(CUBE, spacing=np.nan), "spacing: expected finite steps above 0, found nan"),
+    "steps in words": (lambda: scene().add_volume(CUBE, spacing="1mm"), "spacing: expected one number or three, found '1mm'"),
+    "directions in a plane": (lambda: scene().add_volume(CUBE, direction=np.zeros((3, 3))), "direction: expected three columns that span space"),
+    "a volume without voxels": (lambda: scene().add_volume(np.zeros((0, 4, 4))), r"values: expected a volume with voxels, found the shape \(0, 4, 4\)"),
+    "a level beyond": (lambda: scene().add_isosurface(CUBE + [0, 1], 50, name="bone"), "object 'bone', level: .* level 50 lies outside the values 0 to 1"),
+    "a level of gaps": (lambda: scene().add_isosurface(CUBE + np.nan, 0), "values: expected a voxel with a value, found none"),
+    "a plane beyond": (lambda: scene().add_slice(CUBE + [0, 1], center=(0, 0, 9)), r"center: expected a plane through the volume, which lies from \[0.0, 0.0, 0.0\] to"),
+    "no points": (lambda: scene().add_points(np.zeros((0, 3))), "positions: expected one row or more, found none"),
+    "no faces": (lambda: scene().add_mesh(PLACES, np.zeros((0, 3), int), name="net"), "object 'net', faces: expected one row or more, found none"),
+    "a field of half the depth": (lambda: scene().add_isosurface(CUBE + [0, 1], 0.5, field=CUBE[:1]), r"field: expected the shape \(2, 2, 2\) of `values`, found \(1, 2, 2\)"),
+    "labels of nothing": (lambda: scene().add_labels(np.zeros((3, 3, 3), int)), "values: expected a label other than 0"),
+    "a colour by name": (lambda: scene().add_points(PLACES, color="red"), "color: expected \"#rrggbb\" or three linear numbers from 0 to 1, found 'red'"),
+    "a colour of bytes": (lambda: scene().ground(color=(255, 0, 10)), 'found the bytes .*; "#ff000a" is the same colour'),
     "a name with a line": (lambda: scene().add_points(PLACES, name="a\nb"), "control characters"),
 }
 
@@ -122,8 +147,17 @@ def test_too_much_memory_is_refused_before_anything_is_drawn():
 def test_what_is_refused_changes_nothing():
     scene = og.Scene()
     scene.add_points(PLACES, name="scan")
+    scene.camera.orbit(azimuth=20)
     before = scene.to_toml()
-    for call in (lambda: scene.add_points(PLACES, opacity=7), lambda: scene.set("object.scan.opacity", 7), lambda: scene.set("camera.fovy", 7)):
+    for call in (
+        lambda: scene.add_slice(CUBE, center=(0, 0, 9)),
+        lambda: scene.add_volume(CUBE, transfer=og.transfer(), opacity=7),
+        lambda: scene.camera.orbit(elevation=200),
+        lambda: scene.camera(position=(0, 0, 1), target=(0, 0, 1)),
+        lambda: scene.material("w", preset="waxx"),
+        lambda: scene.set("render.layers", ["depht"]),
+        lambda: scene.add_points(PLACES, opacity=7), lambda: scene.set("object.scan.opacity", 7), lambda: scene.set("camera.fovy", 7),
+    ):
         with pytest.raises(og.InputError):
             call()
     assert scene.to_toml() == before
@@ -132,7 +166,7 @@ def test_what_is_refused_changes_nothing():
 def test_a_material_may_be_stated_after_the_object_that_has_it():
     scene = og.Scene()
     scene.add_points(np.random.default_rng(0).normal(size=(100, 3)), material="clay")
-    with pytest.raises(og.InputError, match="object 'points', material: material `clay` is not defined"):
+    with pytest.raises(og.InputError, match=r"object 'points', material: .* \(none\), found 'clay'; scene.material\('clay', …\)"):
         og.render(scene, size=SMALL)
     scene.material("clay", shading="phong")
     assert og.render(scene, size=SMALL).alpha.max() > 0.5
@@ -243,3 +277,21 @@ def test_sides_beyond_what_indices_count_are_refused():
     many = np.broadcast_to(np.float32(0), (2**31, 3))
     with pytest.raises(og.LimitError, match="positions: expected at most 2147483647 rows, found 2147483648"):
         og.render(many, size=SMALL)
+
+
+def test_a_color_is_that_of_its_bytes():
+    stated = og.Scene()
+    stated.add_points(PLACES, color="#ff8000", name="a")
+    stated.add_points(PLACES, name="b")
+    stated.set("object.b.color", "#ff8000")
+    stated.material("clay", color="#ff8000")
+    document = stated._document
+    colors = [document["object"][0]["color"], document["object"][1]["color"], document["material"]["clay"]["color"]]
+    assert colors[0] == colors[1] == colors[2] and np.allclose(colors[0], [1.0, 0.21586, 0.0], atol=1e-5)
+
+
+def test_what_is_odd_is_noted():
+    odd = og.Scene()
+    odd.light.sun(elevation=-5)
+    odd.add_labels(np.ones((3, 3, 3), int), labels={1: "bone", 99: "skin"}, name="regions")
+    assert odd.notes == ["sun: it stands 5° below the horizon, and lights from below", "regions: `labels` names 99, which no voxel has"]

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import math
 import os
+import re
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
-from organza._organza import InputError
+from organza._organza import Data, InputError
 from organza.transfers import Transfer
 
 # The largest number of a byte.
 _MOST_OF_A_BYTE = 255
+_HEX_COLOR = re.compile("#[0-9a-fA-F]{6}")
 
 
 def array_of(thing: Any) -> Any:
@@ -87,6 +89,45 @@ def plain(value: Any, name: str = "") -> Any:
         return value
     kind = f"{type(value).__module__}.{type(value).__qualname__}"
     raise InputError(f"{place}expected numbers, texts, lists or tables, found {kind}")
+
+
+def color_of(value: Any, name: str = "color") -> Any:
+    """A colour as scenes have it, three linear numbers: of ``"#rrggbb"`` or of these; anything else is for the scene to refuse."""
+    expected = f'{name}: expected "#rrggbb" or three linear numbers from 0 to 1'
+    if isinstance(value, str):
+        if not _HEX_COLOR.fullmatch(value):
+            raise InputError(f"{expected}, found {value!r}")
+        # Decoded as the bytes of arrays are.
+        rows = np.array([list(bytes.fromhex(value[1:]))], dtype=np.uint8)
+        return plain(Data.points(np.zeros((1, 3)), colors=rows).arrays()["colors"][0])
+    parts = list(value) if isinstance(value, (list, tuple, np.ndarray)) and np.ndim(value) == 1 else []
+    are_whole = all(isinstance(part, (int, np.integer)) for part in parts)
+    if len(parts) == 3 and are_whole and all(0 <= part <= _MOST_OF_A_BYTE for part in parts) and max(parts) > 1:
+        bytes_of = "".join(f"{int(part):02x}" for part in parts)
+        raise InputError(f'{expected}, found the bytes {value!r}; "#{bytes_of}" is the same colour')
+    return value
+
+
+def finite_steps(steps: np.ndarray, found: Any) -> None:
+    """Refuses steps of a volume that are not finite, and those of no length."""
+    if not (np.isfinite(steps).all() and steps.all()):
+        raise InputError(f"spacing: expected finite steps above 0, found {found!r}")
+
+
+def radii_of(radius: Any, count: int) -> np.ndarray:
+    """The radii of points, one a point."""
+    expected = f"radius: expected numbers above 0 in the unit of the positions, one or {count}"
+    try:
+        array = np.asarray(radius, dtype=float)
+    except (TypeError, ValueError):
+        raise InputError(f"{expected}, found {radius!r}") from None
+    if array.shape not in ((), (count,)):
+        raise InputError(f"{expected}, found the shape {array.shape}")
+    wrong = ~(np.isfinite(array) & (array > 0.0))
+    if wrong.any():
+        row = int(np.argmax(wrong))
+        raise InputError(f"{expected}, found {array.flat[row]}" + (f" in row {row}" if array.ndim else ""))
+    return np.broadcast_to(array, (count,))
 
 
 def number(name: str, value: Any) -> float:

@@ -56,6 +56,22 @@ def check_keys(call: Callable[..., Any], label: str, keys: Mapping[str, Any]) ->
             raise InputError(f"{call.__name__}, '{label}': expected an argument or a key of an object, found `{key}`{meant(key, known - {key})}")
 
 
+def of_object(call: Callable[_Parameters, _Result]) -> Callable[_Parameters, _Result]:
+    """The method that adds an object, whose errors name the object where the caller does."""
+
+    @functools.wraps(call)
+    def checked(*values: _Parameters.args, **keywords: _Parameters.kwargs) -> _Result:
+        try:
+            return call(*values, **keywords)
+        except InputError as error:
+            name = keywords.get("name")
+            if not isinstance(name, str) or f"'{name}" in str(error):
+                raise
+            raise InputError(f"object '{name}', {error}") from None
+
+    return checked
+
+
 def named(call: Callable[_Parameters, _Result]) -> Callable[_Parameters, _Result]:
     """The function, which refuses names of arguments that it does not have with the one that may be meant."""
 
@@ -70,4 +86,4 @@ def named(call: Callable[_Parameters, _Result]) -> Callable[_Parameters, _Result
     return checked
 
 
-__all__ = ["arguments_of", "check_keys", "meant", "named", "object_keys"]
+__all__ = ["arguments_of", "check_keys", "meant", "named", "object_keys", "of_object"]

@@ -7,7 +7,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from organza._organza import Data, InputError
+from organza.arrays import array_of
 from organza.lattices import lattice_of, percentiles, volume_arguments
 from organza.transfers import Transfer
 from organza.transfers import transfer as make_transfer
@@ -32,8 +35,9 @@ def field_of(
     clim: tuple[float, float] | None,
     transfer: Transfer | None,
     log_scale: bool = False,
+    shape: tuple[int, ...] | None = None,
 ) -> Field:
-    """A field from an argument; ``lattice`` is that of an array which states none."""
+    """A field from an argument; ``lattice`` is that of an array which states none, and ``shape`` the one that such an array then has."""
     if transfer is not None and not isinstance(transfer, Transfer):
         raise InputError(f"transfer: expected what organza.transfer makes, found {type(transfer).__name__}; `colormap` takes a name")
     if transfer is not None and (colormap is not None or clim is not None):
@@ -55,6 +59,11 @@ def field_of(
             table["interpolation"] = stated["interpolation"]
         own = [stated.get(key) for key in ("spacing", "origin", "direction")]
         arguments, _ = volume_arguments(stated["values"], *own)
+        found = np.shape(array_of(arguments["values"]))
+        if shape is not None and "spacing" not in arguments and found != shape:
+            raise InputError(
+                f'field: expected the shape {shape} of `values`, found {found}; {{"values": …, "spacing": …}} states steps of its own'
+            )
         data, _ = lattice_of(**(dict(lattice) | arguments))
         if transfer is None and clim is None:
             clim = percentiles(arguments["values"])

@@ -9,7 +9,7 @@ import numpy as np
 
 from organza import adopted
 from organza._organza import Data, InputError
-from organza.arrays import array_of
+from organza.arrays import array_of, finite_steps, place_of
 
 
 @dataclass(frozen=True)
@@ -24,12 +24,18 @@ class Lattice:
 def lattice_of(values: Any, spacing: Any = 1.0, origin: Any = (0.0, 0.0, 0.0), direction: Any = None) -> tuple[Data, Lattice]:
     """The data of a volume, and where it lies."""
     grid = array_of(values)
-    steps = np.asarray(spacing, dtype=float)
+    try:
+        steps = np.asarray(spacing, dtype=float)
+    except (TypeError, ValueError):
+        raise InputError(f"spacing: expected one number or three, found {spacing!r}") from None
     if steps.shape not in ((), (3,)):
         raise InputError(f"spacing: expected one number or three, found the shape {steps.shape}")
+    finite_steps(steps, spacing)
+    if np.ndim(grid) == 3 and not grid.size:
+        raise InputError(f"values: expected a volume with voxels, found the shape {grid.shape}")
     steps = np.broadcast_to(steps, (3,))
-    turn = np.eye(3) if direction is None else np.asarray(direction, dtype=float).reshape(3, 3)
-    first = np.asarray(origin, dtype=float)
+    turn = np.eye(3) if direction is None else _directions(direction)
+    first = np.array(place_of("origin", origin))
     data = Data.grid(grid, steps.tolist(), first.tolist(), turn.tolist())
     sides = steps * (np.array(grid.shape[::-1]) - 1)
     ends = np.stack(np.meshgrid([0.0, 1.0], [0.0, 1.0], [0.0, 1.0]), -1).reshape(-1, 3)
@@ -37,11 +43,52 @@ def lattice_of(values: Any, spacing: Any = 1.0, origin: Any = (0.0, 0.0, 0.0), d
     return data, Lattice(float(np.linalg.norm(sides)), (first + turn @ sides / 2.0).tolist(), corners)
 
 
+def _directions(direction: Any) -> np.ndarray:
+    """Directions of the steps, the columns of a matrix that spans space."""
+    try:
+        turn = np.asarray(direction, dtype=float).reshape(3, 3)
+    except (TypeError, ValueError):
+        raise InputError(f"direction: expected a matrix (3, 3), found {direction!r}") from None
+    if not np.isfinite(turn).all() or np.linalg.matrix_rank(turn) < 3:
+        raise InputError(f"direction: expected three columns that span space, found {turn.tolist()!r}")
+    return turn
+
+
+def check_level(level: float, values: Any) -> None:
+    """Refuses a level that no surface of the values has."""
+    low, high = _ends(values)
+    if not low <= level <= high:
+        raise InputError(f"level: expected a value of the volume, found {level:g}: level {level:g} lies outside the values {low:g} to {high:g}")
+
+
+def check_plane(center: list[float], normal: list[float], corners: np.ndarray) -> None:
+    """Refuses a plane that does not meet a volume."""
+    heights = (corners - np.array(center)) @ np.array(normal)
+    # A plane along a side of the volume meets it, whatever the rounding.
+    room = 1e-9 * float(np.abs(heights).max())
+    if (heights > room).all() or (heights < -room).all():
+        low, high = corners.min(axis=0).tolist(), corners.max(axis=0).tolist()
+        raise InputError(f"center: expected a plane through the volume, which lies from {low} to {high}, found {center}")
+
+
+def _ends(values: Any) -> tuple[float, float]:
+    """The least and the largest finite value."""
+    numbers = np.asarray(array_of(values))
+    if np.issubdtype(numbers.dtype, np.floating):
+        numbers = numbers[np.isfinite(numbers)]
+    if not numbers.size:
+        raise InputError("values: expected a voxel with a value, found none")
+    return float(numbers.min()), float(numbers.max())
+
+
 def volume_arguments(values: Any, spacing: Any, origin: Any, direction: Any) -> tuple[dict[str, Any], dict[str, Any]]:
     """Arguments of :func:`lattice_of`, of an array or a data set; and the transform that the data set's library has."""
     arguments = adopted.volume_of(values)
     stated = {"spacing": spacing, "origin": origin, "direction": direction}
     arguments |= {key: value for key, value in stated.items() if value is not None}
+    # Steps of other libraries may go backwards; those of an argument are lengths.
+    if isinstance(spacing, (int, float, list, tuple, np.ndarray)) and np.any(np.less(spacing, 0)):
+        raise InputError(f"spacing: expected steps above 0, found {spacing!r}; `direction` turns an axis, and `values[::-1]` its order")
     transform = arguments.pop("transform", None)
     return arguments, {} if transform is None else {"transform": transform}
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from organza import _organza
 from organza._organza import InputError
-from organza.arrays import number, plain
+from organza.arrays import number, place_of, plain
 
 if TYPE_CHECKING:
     from organza.scene import Scene
@@ -57,7 +57,7 @@ class Camera:
             For a position beside angles.
         """
         self._scene._check_open()
-        camera = self._scene._document.setdefault("camera", {})
+        camera = dict(self._scene._document.get("camera", {}))
         stated = {
             "position": position,
             "target": target,
@@ -77,7 +77,9 @@ class Camera:
             for key in ("position", "target", "up"):
                 camera.pop(key, None)
             camera["auto"] = True
-        camera.update({key: plain(value) for key, value in stated.items() if value is not None})
+        camera.update({key: plain(value, key) for key, value in stated.items() if value is not None})
+        _check_camera(camera)
+        self._scene._document["camera"] = camera
 
     def orbit(self, azimuth: float = 30.0, elevation: float = 20.0, fit: float = 1.0) -> None:
         """Takes the camera around the middle of what the scene shows, at the distance from which all of it is seen.
@@ -162,8 +164,21 @@ class Light:
         direction = [-math.sin(turn) * level, -math.sin(rise), -math.cos(turn) * level]
         radiance = None if sky is None else _color("sky", sky)
         self(direction=direction, irradiance=_color("irradiance", irradiance), name=name, **keys)
+        if elevation < 0.0:
+            self._scene._remarks.append(f"{name}: it stands {-elevation:g}° below the horizon, and lights from below")
         if radiance is not None:
             self._scene._document.setdefault("ambient", {}).setdefault("color", radiance)
+
+
+def _check_camera(camera: Mapping[str, Any]) -> None:
+    """Refuses keys of a camera that are beyond what they may be. A position and its target may be stated one after the other."""
+    places = [place_of(key, camera[key]) for key in ("position", "target") if key in camera]
+    if len(places) == 2 and places[0] == places[1]:
+        raise InputError(f"target: expected another place than the position, found {places[1]} for both")
+    is_placed = len(places) == 2
+    probe = {key: value for key, value in camera.items() if is_placed or key not in ("position", "target", "up")}
+    probe = {"size": [16, 9]} | probe | ({} if is_placed else {"auto": True})
+    _organza.check(json.dumps({"version": 1, "camera": probe}), {})
 
 
 def beyond(camera: Mapping[str, Any], places: Any, transform: Mapping[str, Any]) -> float:

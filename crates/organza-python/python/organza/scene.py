@@ -15,10 +15,10 @@ import numpy as np
 
 from organza import _organza, adopted
 from organza._organza import Data, InputError
-from organza.arrays import array_of, colors_of, columns_of, halved_quads, number, place_of, plain, texture_of
-from organza.checking import check_keys, meant
+from organza.arrays import array_of, color_of, colors_of, columns_of, halved_quads, number, place_of, plain, radii_of, texture_of
+from organza.checking import check_keys, meant, of_object
 from organza.fields import Field, field_of
-from organza.lattices import lattice_of, percentiles, volume_arguments
+from organza.lattices import check_level, check_plane, lattice_of, percentiles, volume_arguments
 from organza.placing import Camera, Light, beyond
 from organza.transfers import Transfer
 from organza.transfers import transfer as make_transfer
@@ -115,6 +115,7 @@ class Scene:
 
     # Data.
 
+    @of_object
     def add_points(
         self,
         positions: Any,
@@ -178,7 +179,7 @@ class Scene:
         held = dict(columns or {})
         if radius is not None:
             count = len(positions)
-            held["radius"] = np.broadcast_to(np.asarray(radius, dtype=float), (count,))
+            held["radius"] = radii_of(radius, count)
         data = Data.points(
             array_of(positions), array_of(normals), colors_of(colors), array_of(opacities), array_of(values), columns_of(held)
         )
@@ -189,6 +190,7 @@ class Scene:
         self._add("points", data, name, keys, field=shown)
         self._note_beyond(self.objects[-1], positions, keys)
 
+    @of_object
     def add_mesh(
         self,
         vertices: Any,
@@ -251,6 +253,7 @@ class Scene:
             A texture that is not there.
         """
         _check_array("vertices", vertices)
+        _check_array("faces", faces)
         check_keys(Scene.add_mesh, name or "mesh", keys)
         corners = array_of(faces)
         places = array_of(uv)
@@ -288,6 +291,7 @@ class Scene:
         self._add("mesh", data, name, keys, field=shown)
         self._note_beyond(self.objects[-1], vertices, keys)
 
+    @of_object
     def add_volume(
         self,
         values: Any,
@@ -345,6 +349,7 @@ class Scene:
         self._add(source, data, name, keys)
         self._note_beyond(self.objects[-1], lattice.corners, keys)
 
+    @of_object
     def add_isosurface(
         self,
         values: Any,
@@ -397,18 +402,21 @@ class Scene:
             raise InputError("colormap, clim, transfer: expected a `field` to colour by, found none; `color` takes one colour")
         if inside not in ("above", "below"):
             raise InputError(f"inside: expected 'above' or 'below', found {inside!r}")
-        table = {"level": number("level", level), "inside": inside}
+        height = number("level", level)
+        table = {"level": height, "inside": inside}
         if isinstance(values, (str, os.PathLike)):
             shown = None if field is None else field_of(field, {}, colormap, clim, transfer)
             self._add_file("isosurface", values, table, name, keys, shown)
             return
         arguments, standing = volume_arguments(values, spacing, origin, direction)
         data, lattice = lattice_of(**arguments)
+        check_level(height, arguments["values"])
         own = {key: value for key, value in arguments.items() if key != "values"}
-        shown = None if field is None else field_of(field, own, colormap, clim, transfer)
+        shown = None if field is None else field_of(field, own, colormap, clim, transfer, shape=np.shape(array_of(arguments["values"])))
         self._add("isosurface", data, name, standing | keys, table, shown)
         self._note_beyond(self.objects[-1], lattice.corners, standing | keys)
 
+    @of_object
     def add_slice(
         self,
         values: Any,
@@ -468,6 +476,8 @@ class Scene:
             center = lattice.middle if center is None else center
             clim = percentiles(arguments["values"]) if clim is None and transfer is None else clim
         table["center"] = place_of("center", center)
+        if not is_file:
+            check_plane(table["center"], across, lattice.corners)
         colors = transfer if transfer is not None else make_transfer(colormap, clim or (0.0, 1.0))
         points = [{key: point[key] for key in ("value", "color")} for point in colors.points]
         if "material" not in keys:
@@ -478,6 +488,7 @@ class Scene:
         else:
             self._add("slice", data, name, keys, table)
 
+    @of_object
     def add_labels(
         self,
         values: Any,
@@ -531,10 +542,15 @@ class Scene:
         numbers = array_of(arguments["values"])
         if not np.issubdtype(numbers.dtype, np.integer) and not np.array_equal(numbers, np.round(numbers), equal_nan=True):
             raise InputError("values: expected whole numbers that name regions, found numbers with a part")
+        if not np.nan_to_num(numbers).any():
+            raise InputError("values: expected a label other than 0, which is nothing, found none")
         data, lattice = lattice_of(**(arguments | {"values": numbers}))
         own = {key: value for key, value in arguments.items() if key != "values"}
-        shown = None if field is None else field_of(field, own, colormap, clim, transfer)
+        shown = None if field is None else field_of(field, own, colormap, clim, transfer, shape=np.shape(numbers))
+        missing = _missing_labels(labels, numbers)
         self._add("mesh", data, name, standing | looks | keys, field=shown)
+        if missing:
+            self._remarks.append(f"{self.objects[-1]}: `labels` names {', '.join(missing)}, which no voxel has")
         self._note_beyond(self.objects[-1], lattice.corners, standing | keys)
 
     def add(
@@ -620,6 +636,8 @@ class Scene:
         are named, materials too."""
         self._check_open()
         parts = key.split(".")
+        if parts[-1] == "color":
+            value = color_of(value, key)
         if not all(parts) or value is None:
             raise InputError(f"{key!r}: expected a key and a value, such as 'render.technique' and 'surfels', found {value!r}")
         # What is refused changes nothing.
@@ -642,6 +660,8 @@ class Scene:
             raise InputError(f"{key}: expected a key of an object or a light, found its name alone")
         if parts[0] == "object":
             self._check_object(_named(changed["object"], parts[1], key))
+        elif key == "render.layers":
+            self._check_layers(plain(value, key))
         elif key == "render.technique":
             _organza.check(json.dumps({"version": 1, "camera": {"auto": True}, "render": {"technique": plain(value)}}), {})
         else:
@@ -702,6 +722,7 @@ class Scene:
         if size is not None and size <= 0.0:
             raise InputError(f"size: expected a number above 0, found {size!r}")
         label = self._name(name, "ground")
+        color = color_of(color)
         if color is None and material is None:
             color = _GROUND_COLOR
         stated = {"color": color, "material": material}
@@ -717,8 +738,10 @@ class Scene:
         self._check_open()
         if not isinstance(name, str):
             raise InputError(f"name: expected a text, found {name!r}")
-        stated = plain(keys)
+        stated = plain(keys | ({"color": color_of(keys["color"])} if "color" in keys else {}))
         _check_shape({"material": {name: stated}})
+        # The values of its keys, too.
+        _organza.check(json.dumps({"version": 1, "camera": {"auto": True}, "material": {name: stated}}), {})
         self._document.setdefault("material", {})[name] = stated
 
     def to_toml(self) -> str:
@@ -801,11 +824,31 @@ class Scene:
                 data = data | {name: field.data}
                 table["volume"] = _MEMORY + name
             thing |= plain({"field": table} | field.keys)
-        thing |= plain({key: value for key, value in _with_unlit(thing, keys).items() if value is not None})
+        thing |= plain({key: value for key, value in _looks(thing, keys).items() if value is not None})
         self._check_object(thing, data)
         self._data |= data
         self._state_material(thing)
         self._document.setdefault("object", []).append(thing)
+
+    def _check_layers(self, layers: Any) -> None:
+        """Refuses layers that there are not. A technique that has a layer of its own may be stated later."""
+        own = "std_error"
+        listed = [layer for layer in layers if layer not in (own, "scatterN")] if isinstance(layers, list) else layers
+        _organza.check(json.dumps({"version": 1, "camera": {"auto": True}, "render": {"layers": listed}}), {})
+
+    def _check_materials(self) -> None:
+        """Refuses objects that name a material which is not stated."""
+        stated = self._document.get("material", {})
+        for thing in self._document.get("object", []):
+            listed = thing.get("materials")
+            for name in [thing.get("material"), *(listed if isinstance(listed, list) else [])]:
+                if isinstance(name, str) and name not in stated:
+                    known = ", ".join(stated) or "none"
+                    question = meant(name, stated)
+                    raise InputError(
+                        f"object '{thing['name']}', material: expected one that the scene states ({known}), found {name!r}{question or ';'} "
+                        f"scene.material({name!r}, …) states it"
+                    )
 
     def _check_object(self, thing: Mapping[str, Any], data: Mapping[str, Data] | None = None) -> None:
         """Refuses an object that no scene may have, whatever else it shows. Materials that it names may be stated later."""
@@ -914,7 +957,7 @@ class Scene:
                 thing["color_by"] = thing.get("color_by", {}) | stated
             self._take_material(first._document, thing, thing["name"])
             thing["name"] = self._name(name, thing["name"])
-            thing |= plain({key: value for key, value in _with_unlit(thing, keys).items() if value is not None})
+            thing |= plain({key: value for key, value in _looks(thing, keys).items() if value is not None})
             self._check_object(thing)
             self._state_material(thing)
             self._document.setdefault("object", []).append(thing)
@@ -946,6 +989,7 @@ class Scene:
             # A size that it states already is no change of it.
             is_stated = size is not None and list(size) == self._document.get("camera", {}).get("size")
             return given | {"text": self._written.text, "file": self._written.file, "size": None if is_stated else size}
+        self._check_materials()
         document = self._grounded(how, size, turntable)
         camera = dict(document.get("camera", {}))
         if "position" not in camera:
@@ -1052,9 +1096,11 @@ def _check_shape(document: Mapping[str, Any]) -> None:
 
 
 def _check_array(name: str, thing: Any) -> None:
-    """Refuses a path in the place of an array, with the call that reads it."""
+    """Refuses an empty array, and a path in its place, with the call that reads it."""
     if isinstance(thing, (str, os.PathLike)):
         raise InputError(f"{name}: expected an array, found a path; scene.add({os.fspath(thing)!r}) adds a file")
+    if np.shape(array_of(thing))[:1] == (0,):
+        raise InputError(f"{name}: expected one row or more, found none")
 
 
 def _check_look(transfer: Any, preset: Any) -> None:
@@ -1110,9 +1156,19 @@ def _up_of_file(thing: Mapping[str, Any]) -> str | None:
         return None
 
 
-def _with_unlit(thing: Mapping[str, Any], keys: Mapping[str, Any]) -> dict[str, Any]:
-    """Keys of an object, with a material in the place of ``unlit`` where it is a surface."""
+def _missing_labels(labels: Any, numbers: np.ndarray) -> list[str]:
+    """The labels of a table that no voxel has."""
+    if not isinstance(labels, Mapping):
+        return []
+    present = {str(int(label)) for label in np.unique(np.nan_to_num(numbers))}
+    return [str(label) for label in labels if str(label) not in present]
+
+
+def _looks(thing: Mapping[str, Any], keys: Mapping[str, Any]) -> dict[str, Any]:
+    """Keys of an object with a linear colour, and with a material in the place of ``unlit`` where it is a surface."""
     stated = dict(keys)
+    if stated.get("color") is not None:
+        stated["color"] = color_of(stated["color"])
     if any(source in thing for source in _SURFACES) and isinstance(stated.get("unlit"), bool):
         if stated.pop("unlit"):
             if stated.get("material") is not None:
