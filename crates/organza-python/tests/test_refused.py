@@ -114,6 +114,16 @@ REFUSED = {
     "labels of nothing": (lambda: scene().add_labels(np.zeros((3, 3, 3), int)), "values: expected a label other than 0"),
     "a colour by name": (lambda: scene().add_points(PLACES, color="red"), "color: expected \"#rrggbb\" or three linear numbers from 0 to 1, found 'red'"),
     "a colour of bytes": (lambda: scene().ground(color=(255, 0, 10)), 'found the bytes .*; "#ff000a" is the same colour'),
+    "a map of a volume": (lambda: scene().add_volume(CUBE, colormap="turbo"), r"found `colormap`; `transfer=og.transfer\('turbo'\)` takes a map"),
+    "the ends of a volume's map": (lambda: scene().add_volume(CUBE, clim=(0, 1)), r"found `clim`; `transfer=og.transfer\(clim=\(0, 1\)\)`"),
+    "an angle of a sun": (lambda: scene().light.sun(azimut=3), "light 'sun': expected one of azimuth, elevation, .*`azimut`; did you mean `azimuth`"),
+    "a key of no sun": (lambda: scene().light.sun(shape=3, name="noon"), "light 'noon': expected one of azimuth, elevation, .*found `shape`$"),
+    "a number for a size of points": (lambda: scene().add_points(PLACES, point_size=3), "found `point_size`; `radius` takes a number"),
+    "a column for values": (lambda: scene().add_points(PLACES, values="temperature"), "values: .* found the text 'temperature'; `color_by='temperature'`"),
+    "points of no number": (lambda: scene().add_points([[0, 0, 0], [np.nan, 0, 0]], name="scan"), r"object 'scan', positions: .*\[nan, 0.0, 0.0\] in row 1; leave such rows out"),
+    "faces of VTK": (lambda: scene().add_mesh(PLACES, [3, 0, 1, 2, 3, 1, 2, 3], name="net"), r"object 'net', faces: .*`faces.reshape\(-1, 4\)\[:, 1:\]`"),
+    "four sides of VTK": (lambda: scene().add_mesh(PLACES, [4, 0, 1, 2, 3]), r"faces: expected the shape \(m, 4\).*`faces.reshape\(-1, 5\)"),
+    "the shape of an object's array": (lambda: scene().add_volume(np.zeros((2, 2)), name="ct"), "object 'ct', values: expected the shape"),
     "a name with a line": (lambda: scene().add_points(PLACES, name="a\nb"), "control characters"),
 }
 
@@ -179,6 +189,20 @@ def test_arguments_that_calls_do_not_have_are_named(call):
         call(PLACES, **{f"{near}s": None})
     with pytest.raises(TypeError, match="`cmap`; did you mean `colormap`"):
         og.transfer(cmap="turbo")
+
+
+def test_arguments_that_cameras_do_not_have_are_named():
+    with pytest.raises(TypeError, match="camera: expected one of its arguments, found `pos`; did you mean `position`"):
+        scene().camera(pos=(0, 0, 1))
+    with pytest.raises(TypeError, match="orbit: .*`azimut`; did you mean `azimuth`"):
+        scene().camera.orbit(azimut=3)
+    with pytest.raises(TypeError, match=r"render: .*`width`; `size=\(width, height\)`"):
+        og.render(PLACES, width=64)
+
+
+def test_a_size_may_be_an_array():
+    points = np.random.default_rng(0).normal(size=(50, 3))
+    assert og.render(points, size=np.array([24, 18])).size == (24, 18)
 
 
 def test_calls_that_draw_take_the_same_arguments():

@@ -25,6 +25,8 @@ def array_of(thing: Any) -> Any:
     if isinstance(thing, np.ma.MaskedArray) and np.ma.is_masked(thing):
         # A gap, as NaN is.
         thing = np.where(np.ma.getmaskarray(thing), np.nan, thing.data)
+    if isinstance(thing, str):
+        raise InputError(f"expected an array of numbers, found the text {thing!r}")
     try:
         array = np.asarray(thing)
     except ValueError as error:

@@ -16,7 +16,18 @@ _Parameters = ParamSpec("_Parameters")
 _Result = TypeVar("_Result")
 
 # Words of other libraries that resemble no argument of this one.
-_KNOWN_ELSEWHERE = {"alpha": "opacity", "vmin": "clim", "vmax": "clim", "c": "colors", "scalars": "values", "norm": "log_scale", "size": "radius"}
+_KNOWN_ELSEWHERE = {"alpha": "opacity", "vmin": "clim", "vmax": "clim", "c": "colors", "scalars": "values", "norm": "log_scale", "size": "radius", "pos": "position"}
+# Arguments of which no key of an object is near, by the words that users have for them.
+_INSTEAD = {
+    "add_volume": {
+        "colormap": "`transfer=og.transfer({value!r})` takes a map",
+        "cmap": "`transfer=og.transfer({value!r})` takes a map",
+        "clim": "`transfer=og.transfer(clim={value!r})` takes the ends of the map",
+    },
+    "": {"point_size": "`radius` takes a number, in the unit of the positions"},
+}
+# What takes the place of a width or a height.
+_SIZE = "; `size=(width, height)` takes both"
 # Likeness from which another name is meant, of 1.
 _LIKE = 0.6
 
@@ -52,8 +63,29 @@ def check_keys(call: Callable[..., Any], label: str, keys: Mapping[str, Any]) ->
     """Refuses keys of an object that are neither arguments of the call nor keys of scenes."""
     known = {*arguments_of(call), *object_keys()}
     for key in keys:
+        instead = _INSTEAD.get(call.__name__, {}).get(key)
+        if instead is None and not isinstance(keys[key], Mapping):
+            instead = _INSTEAD[""].get(key)
+        if instead is not None:
+            raise InputError(f"{call.__name__}, '{label}': expected an argument or a key of an object, found `{key}`; {instead.format(value=keys[key])}")
         if key not in object_keys():
             raise InputError(f"{call.__name__}, '{label}': expected an argument or a key of an object, found `{key}`{meant(key, known - {key})}")
+
+
+@functools.cache
+def sun_keys() -> frozenset[str]:
+    """The keys of a directional light that a sun takes beside its arguments."""
+    kinds = json.loads(_organza.schema())["$defs"]["Light"]["oneOf"]
+    properties = next(kind["properties"] for kind in kinds if kind["properties"]["kind"].get("const") == "directional")
+    return frozenset(properties) - {"kind", "name", "direction", "irradiance"}
+
+
+def check_sun_keys(call: Callable[..., Any], label: str, keys: Mapping[str, Any]) -> None:
+    """Refuses keys of a sun that are neither its arguments nor keys of a directional light."""
+    known = [name for name in arguments_of(call) if name != "keys"] + sorted(sun_keys())
+    for key in keys:
+        if key not in sun_keys():
+            raise InputError(f"light '{label}': expected one of {', '.join(known)}, found `{key}`{meant(key, known)}")
 
 
 def of_object(call: Callable[_Parameters, _Result]) -> Callable[_Parameters, _Result]:
@@ -80,10 +112,13 @@ def named(call: Callable[_Parameters, _Result]) -> Callable[_Parameters, _Result
         known = arguments_of(call)
         for name in keywords:
             if name not in known:
-                raise TypeError(f"{call.__name__}: expected one of its arguments, found `{name}`{meant(name, known)}")
+                # A call of the camera itself is that of `camera`.
+                called = "camera" if call.__name__ == "__call__" else call.__name__
+                question = _SIZE if name in ("width", "height") and "size" in known else meant(name, known) or f"; they are {', '.join(known)}"
+                raise TypeError(f"{called}: expected one of its arguments, found `{name}`{question}")
         return call(*values, **keywords)
 
     return checked
 
 
-__all__ = ["arguments_of", "check_keys", "meant", "named", "object_keys", "of_object"]
+__all__ = ["arguments_of", "check_keys", "check_sun_keys", "meant", "named", "object_keys", "of_object", "sun_keys"]

@@ -199,6 +199,7 @@ def _wished(
         sides = [_whole("size", side) for side in size] if np.ndim(size) == 1 else []
         if len(sides) != 2:
             raise InputError(f"size: expected a width and a height, found {size!r}")
+        size = (sides[0] or 1, sides[1] or 1)
     return {
         "size": size,
         "preset": preset,

@@ -12,6 +12,7 @@ import numpy as np
 from organza import _organza
 from organza._organza import InputError
 from organza.arrays import number, place_of, plain
+from organza.checking import check_sun_keys, named
 
 if TYPE_CHECKING:
     from organza.scene import Scene
@@ -27,6 +28,7 @@ class Camera:
     def __init__(self, scene: Scene):
         self._scene = scene
 
+    @named
     def __call__(
         self,
         *,
@@ -81,6 +83,7 @@ class Camera:
         _check_camera(camera)
         self._scene._document["camera"] = camera
 
+    @named
     def orbit(self, azimuth: float = 30.0, elevation: float = 20.0, fit: float = 1.0) -> None:
         """Takes the camera around the middle of what the scene shows, at the distance from which all of it is seen.
 
@@ -117,8 +120,8 @@ class Light:
             Keys of a light (docs/scene.md).
         """
         self._scene._check_open()
-        named = {} if name is None else {"name": name}
-        light = plain({"kind": kind} | named | {key: value for key, value in keys.items() if value is not None})
+        called = {} if name is None else {"name": name}
+        light = plain({"kind": kind} | called | {key: value for key, value in keys.items() if value is not None})
         _organza.check(json.dumps({"version": 1, "camera": {"auto": True}, "light": [light]}), {})
         self._scene._document.setdefault("light", []).append(light)
 
@@ -155,6 +158,7 @@ class Light:
         InputError
             For what is no number, and for other counts than one and three.
         """
+        check_sun_keys(Light.sun, name, keys)
         turn = math.radians(number("azimuth", azimuth))
         rise = math.radians(number("elevation", elevation))
         if not -90.0 <= elevation <= 90.0:

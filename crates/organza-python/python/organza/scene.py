@@ -175,6 +175,9 @@ class Scene:
             For arrays of another shape, names and keys that there are not, and values that they cannot have.
         """
         _check_array("positions", positions)
+        _check_finite("positions", positions)
+        if isinstance(values, str):
+            raise InputError(f"values: expected an array of numbers, found the text {values!r}; `color_by={values!r}` shows a column of `columns`")
         check_keys(Scene.add_points, name or "points", keys)
         held = dict(columns or {})
         if radius is not None:
@@ -253,6 +256,10 @@ class Scene:
             A texture that is not there.
         """
         _check_array("vertices", vertices)
+        _check_finite("vertices", vertices)
+        _check_faces(faces)
+        if isinstance(values, str):
+            raise InputError(f"values: expected an array of numbers, found the text {values!r}; `color_by={values!r}` shows a column of `columns`")
         _check_array("faces", faces)
         check_keys(Scene.add_mesh, name or "mesh", keys)
         corners = array_of(faces)
@@ -1101,6 +1108,31 @@ def _check_array(name: str, thing: Any) -> None:
         raise InputError(f"{name}: expected an array, found a path; scene.add({os.fspath(thing)!r}) adds a file")
     if np.shape(array_of(thing))[:1] == (0,):
         raise InputError(f"{name}: expected one row or more, found none")
+
+
+def _check_finite(name: str, thing: Any) -> None:
+    """Refuses places that are not finite, with the first such row."""
+    array = array_of(thing)
+    if np.ndim(array) != 2 or not np.issubdtype(array.dtype, np.floating):
+        return
+    # A sum is finite where all are, but for overflow.
+    with np.errstate(over="ignore", invalid="ignore"):
+        if np.isfinite(array.sum()):
+            return
+    wrong = ~np.isfinite(array).all(axis=1)
+    if wrong.any():
+        row = int(np.argmax(wrong))
+        raise InputError(f"{name}: expected finite coordinates, found {array[row].tolist()} in row {row}; leave such rows out")
+
+
+def _check_faces(faces: Any) -> None:
+    """Refuses the list of counts and indices that VTK has."""
+    flat = array_of(faces)
+    if np.ndim(flat) != 1 or not len(flat):
+        return
+    sides = next((sides for sides in (3, 4) if len(flat) % (sides + 1) == 0 and (flat[:: sides + 1] == sides).all()), None)
+    if sides is not None:
+        raise InputError(f"faces: expected the shape (m, {sides}), found counts and indices of VTK in one row; give `faces.reshape(-1, {sides + 1})[:, 1:]`")
 
 
 def _check_look(transfer: Any, preset: Any) -> None:
