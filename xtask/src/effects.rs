@@ -34,7 +34,7 @@ fn families(repo: &Repo, seed: &str) -> Result<(), String> {
     let write = |text: &str| std::fs::write(&table, text).map_err(|error| format!("{TABLE}: {error}"));
     write(HEAD)?;
     let path = table.display().to_string();
-    let words = words("test", &["--test", "end_to_end", "--", FAMILIES]);
+    let words = words("test", &["--test", "end-to-end", "--", FAMILIES]);
     cargo(repo, &words, &[("ORGANZA_FAMILIES", &path), ("ORGANZA_SEED", seed)])?;
     write(&sorted(&table)?)
 }

@@ -93,6 +93,10 @@ impl<'a> Fold for Surfels<'a> {
     ) -> Result<(), Error> {
         let frame = self.frame;
         let params = params(frame);
+        // Opaque discs alone are met by rays before.
+        if !frame.plan.passes.iter().any(|planned| planned.name == pass::SURFELS) {
+            return Ok(());
+        }
         if self.discs.is_none() {
             if let Some(asked) = frame.settings.surfels.layers.groups() {
                 let ids = frame.translucent(Technique::Surfels);
