@@ -1,6 +1,7 @@
 //! Long calls: the interpreter is free meanwhile, an interrupt ends them, and a caller hears how far they are.
 
 use crate::errors::raised;
+use crate::wording::sentence;
 use organza::{Error, Progress};
 use pyo3::exceptions::PyOSError;
 use pyo3::prelude::*;
@@ -60,6 +61,7 @@ pub(crate) fn run<T: Send + 'static>(
             let (stage, share) = progress.report();
             heard.call1((stage, share)).map(|_| ())
         });
+        let told = told.and_then(|()| announce(py, &progress));
         if let Err(error) = py.check_signals().and(told) {
             progress.cancel();
             raised_while = Some(error);
@@ -73,6 +75,18 @@ pub(crate) fn run<T: Send + 'static>(
         Ok(result) => result.map_err(|error| raised(&error)),
         Err(_) => Err(raised(&Error::Internal("a thread that draws ended without a result; this is a bug".into()))),
     }
+}
+
+/// Prints what the work announces, such as the time that a long drawing takes, where Python's own errors go.
+fn announce(py: Python<'_>, progress: &Progress) -> PyResult<()> {
+    for announced in progress.take_announced() {
+        let errors = py.import("sys")?.getattr("stderr")?;
+        // A program without a console has none.
+        if !errors.is_none() {
+            errors.call_method1("write", (format!("{}\n", sentence(&announced)),))?;
+        }
+    }
+    Ok(())
 }
 
 /// Threads of this call alone: those of a process that was forked do not live on in its child.

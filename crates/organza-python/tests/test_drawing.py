@@ -273,3 +273,43 @@ def test_a_caller_that_raises_ends_a_picture():
     scene = volume_scene(ball(65))
     with pytest.raises(RuntimeError, match="enough"):
         og.render(scene, size=(512, 384), progress=stop)
+
+
+def test_a_long_drawing_is_announced_before_it_begins(capsys):
+    class Enough(Exception):
+        pass
+
+    scene = og.Scene()
+    scene.add_points(np.random.default_rng(0).normal(size=(500, 3)), opacity=0.5, radius=1)
+    scene.set("render.technique", "particles")
+    scene.set("render.particles.repeat_level", 1024)
+    said = ""
+
+    def stop(stage: str, share: float) -> None:
+        nonlocal said
+        said += capsys.readouterr().err
+        if "drawing takes about" in said:
+            raise Enough
+
+    with pytest.raises(Enough):
+        og.render(scene, size=(1024, 768), progress=stop)
+    assert said.startswith("drawing takes about ") and said.endswith("\n")
+
+
+def test_a_file_without_16_bits_is_refused(tmp_path):
+    picture = og.render(np.random.default_rng(0).normal(size=(50, 3)), size=(24, 18))
+    for name in ("a.jpg", "a.webp", "a.exr"):
+        with pytest.raises(og.InputError, match="deep: expected a file that can have it"):
+            picture.save(tmp_path / name, deep=True)
+    for name in ("a.jpeg", "a.webp", "a.png"):
+        picture.save(tmp_path / name)
+    assert len(list(tmp_path.iterdir())) == 3
+
+
+def test_an_effect_has_its_predicted_seconds():
+    scene = og.Scene()
+    scene.add_points(np.random.default_rng(0).normal(size=(50, 3)), name="scan")
+    predicted = og.explain(scene, size=(24, 18))["predicted"]
+    effect = next(effect for effect in predicted["effects"] if effect["name"] == "object.scan")
+    assert effect["seconds"] > 0.0 and set(effect) == {"name", "seconds", "bytes", "passes"}
+    assert set(predicted) == {"seconds", "threads", "seconds_of_one_core", "by", "passes", "announcement", "effects"}

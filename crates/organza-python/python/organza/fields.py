@@ -60,7 +60,7 @@ def field_of(
         own = [stated.get(key) for key in ("spacing", "origin", "direction")]
         arguments, _ = volume_arguments(stated["values"], *own)
         found = np.shape(array_of(arguments["values"]))
-        if shape is not None and "spacing" not in arguments and found != shape:
+        if shape is not None and "spacing" not in arguments and len(found) == len(shape) and found != shape:
             raise InputError(
                 f'field: expected the shape {shape} of `values`, found {found}; {{"values": …, "spacing": …}} states steps of its own'
             )

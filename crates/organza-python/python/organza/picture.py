@@ -106,25 +106,29 @@ class Picture:
         legend: bool = False,
         force: bool = True,
     ) -> None:
-        """Writes an OpenEXR file with all layers, or a PNG file of what is displayed, by the ending of the name.
+        """Writes an OpenEXR file with all layers, or a PNG, WebP or JPEG file of what is displayed, by the ending of the name.
 
         Parameters
         ----------
         path
-            Where; the file appears whole or not at all.
+            Where, ending in ``.exr``, ``.png``, ``.webp``, ``.jpg`` or ``.jpeg``; the file appears whole or not at all. A WebP file has the pixels of a PNG file
+            of 8 bits, and a JPEG file is near them.
         transparent
-            Opacity in the place of the background; the picture is to be drawn with ``transparent=True``.
+            Opacity in the place of the background, which a JPEG file has not; the picture is to be drawn with ``transparent=True``.
         deep
             16 bits a channel in a PNG file.
         half
             16 bits a channel in an OpenEXR file.
         legend
-            What colours stand for, over the right border of a PNG file.
+            What colours stand for, over the right border of a PNG, WebP or JPEG file.
         force
             Whether a file of that name is replaced.
         """
-        is_exr = os.fspath(path).lower().endswith(".exr")
-        without_effect = [("deep", deep and is_exr), ("legend", legend and is_exr), ("half", half and not is_exr)]
+        ending = os.path.splitext(os.fspath(path))[1].lower()
+        is_exr = ending == ".exr"
+        # Of an ending that no file has, writing says so.
+        has_bytes = ending in (".jpg", ".jpeg", ".webp")
+        without_effect = [("deep", deep and (is_exr or has_bytes)), ("legend", legend and is_exr), ("half", half and not is_exr)]
         for name, is_asked in without_effect:
             if is_asked:
                 raise InputError(f"{name}: expected a file that can have it, found {os.fspath(path)}")
