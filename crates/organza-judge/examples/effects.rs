@@ -17,7 +17,7 @@ const CSV: &str = "docs/effects.csv";
 const FAMILIES: &str = "docs/effect-families.csv";
 const PREDICTIONS: &str = "docs/predictions.csv";
 /// Pixels of the longer side of pictures whose times are predicted, and threads.
-const TIMED: [(u32, usize); 3] = [(160, 1), (480, 1), (480, 2)];
+const TIMED: [(u32, usize); 3] = [(160, 1), (160, 2), (480, 1)];
 /// No picture is drawn that is predicted to take so many seconds.
 const LONGEST: f64 = 40.0;
 const PAGE: &str = "docs/effects.md";
@@ -114,6 +114,8 @@ fn main() {
     std::fs::write(CSV, csv(&drawn)).unwrap();
     let page = std::fs::read_to_string(PAGE).unwrap();
     let page = filled(&page, BEGIN_READ, END_READ, &read(&drawn));
+    let measured = tables(&drawn) + &families(&std::fs::read_to_string(FAMILIES).unwrap());
+    std::fs::write(PAGE, filled(&page, BEGIN, END, &measured)).unwrap();
     let mut timed = Vec::new();
     for (side, threads) in TIMED {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
@@ -121,11 +123,9 @@ fn main() {
         timed.extend(
             pictures.inspect(|one| println!("{} of {side} pixels on {threads}: {:.2} s", one.name, one.seconds)),
         );
+        std::fs::write(PREDICTIONS, predictions(&timed)).unwrap();
+        std::fs::write(PAGE, filled(&page, BEGIN, END, &(measured.clone() + &times(&timed)))).unwrap();
     }
-    std::fs::write(PREDICTIONS, predictions(&timed)).unwrap();
-    let families = families(&std::fs::read_to_string(FAMILIES).unwrap());
-    let text = tables(&drawn) + &times(&timed) + &families;
-    std::fs::write(PAGE, filled(&page, BEGIN, END, &text)).unwrap();
 }
 
 /// A scene drawn with its longer side of so many pixels; `None` where it would take too long.
@@ -176,6 +176,9 @@ fn times(timed: &[Timed]) -> String {
                     |---|---|---|---|---|---|---|---|\n"
         .to_owned();
     for (side, threads) in TIMED {
+        if !timed.iter().any(|one| one.side == side && one.threads == threads) {
+            continue;
+        }
         let of_size = timed.iter().filter(|one| one.side == side && one.threads == threads);
         let ratio = |one: &Timed| (one.predicted_seconds / one.seconds).max(one.seconds / one.predicted_seconds);
         let mut ratios: Vec<f64> = of_size.map(ratio).collect();
