@@ -119,7 +119,7 @@ pub(crate) fn of_first_scene(error: Error, first: &Path) -> Error {
     }
 }
 
-/// What the keys that lead to a value are called in Python.
+/// The words of Python for the keys that lead to a value.
 fn place(keys: &[String]) -> String {
     let [list, name, rest @ ..] = keys else { return keys.join(".") };
     let path = rest.join(".");

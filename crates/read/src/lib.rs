@@ -145,7 +145,7 @@ pub struct ReadParams {
     /// Whether an image says how much of each place something covers, which all three channels then hold: the alpha of a PNG or OpenEXR, or
     /// where it has none how bright it is, the samples of a PNG as numbers.
     pub is_coverage: bool,
-    /// What becomes of the textures of a mesh.
+    /// The treatment of the textures of a mesh.
     pub textures: Textures,
 }
 

@@ -1,16 +1,10 @@
 //! Mip maps: an image in its own size and in halves of it down to one texel, each texel the mean of those that it covers.
 //!
-//! Means are taken of light, not of sRGB numbers, and stored as sRGB of eight bits again: an even image stays as it is in every size.
+//! Means are taken of light, not of sRGB numbers, and stay numbers of light: an even image is even in every size, to the bit.
 
-use super::rgba::{LINEAR, Rgba};
+use super::rgba::Rgba;
 use rayon::prelude::*;
-use splat_core::srgb::encoded;
-use std::sync::{Arc, LazyLock};
-
-/// The sRGB number of light, by its 4096th parts. The curve rises by at most 12.92 · 255 / 4096 = 0.8 numbers a part, so [`stored`] finds the
-/// nearest number next to it.
-static ENCODED: LazyLock<[u8; 4097]> =
-    LazyLock::new(|| std::array::from_fn(|i| libm::round(255.0 * encoded(i as f64 / 4096.0)) as u8));
+use std::sync::Arc;
 
 /// An image in one size.
 #[derive(Debug, Clone, PartialEq)]
@@ -28,7 +22,7 @@ pub(crate) enum Weight {
     Even,
     /// By their opacity.
     Opacity,
-    /// Those of this opacity and more count, others do not.
+    /// Texels of this opacity and more count, others do not.
     Cut(f32),
 }
 
@@ -43,23 +37,20 @@ impl Weight {
 
     /// The mean of texels, each with its share of 1: its opacity is that of the shares, its colour that of the weights.
     fn mean(self, texels: impl Iterator<Item = (f32, [f32; 4])> + Clone) -> [f32; 4] {
+        // Differences to one of them: no rounding of shares changes an even colour.
+        let first = texels.clone().next().map_or([0.0; 4], |(_, texel)| texel);
         let mut plain = [0.0f32; 4];
-        let mut weighted = [0.0f32; 4];
-        let mut weights = texels.clone().map(|(_, texel)| self.at(texel[3]));
-        let first = weights.next().unwrap_or(1.0);
-        // Where all count alike, no rounding of weights changes an even colour.
-        let is_even = weights.all(|weight| weight == first);
+        let mut weighted = [0.0f32; 3];
+        let mut sum = 0.0;
         for (share, texel) in texels {
-            (0..4).for_each(|c| plain[c] += share * texel[c]);
+            let differences: [f32; 4] = std::array::from_fn(|c| texel[c] - first[c]);
             let weight = share * self.at(texel[3]);
-            (0..3).for_each(|c| weighted[c] += weight * texel[c]);
-            weighted[3] += weight;
+            (0..4).for_each(|c| plain[c] += share * differences[c]);
+            (0..3).for_each(|c| weighted[c] += weight * differences[c]);
+            sum += weight;
         }
-        if is_even || weighted[3] <= 0.0 {
-            return plain;
-        }
-        let [r, g, b] = [0, 1, 2].map(|c| weighted[c] / weighted[3]);
-        [r, g, b, plain[3]]
+        let [r, g, b] = [0, 1, 2].map(|c| first[c] + if sum > 0.0 { weighted[c] / sum } else { plain[c] });
+        [r, g, b, first[3] + plain[3]]
     }
 
     /// The weight in smaller sizes of an image. Opacities of [`Self::Cut`] are there the share of texels that count.
@@ -137,16 +128,8 @@ impl Level {
             mean[3] = mean[3].clamp(0.0, 1.0);
             mean
         };
-        let bytes = |[r, g, b, alpha]: [f32; 4]| {
-            let [r, g, b] = [r, g, b].map(stored);
-            [r, g, b, libm::roundf(255.0 * alpha) as u8]
-        };
         let linear = down.par_iter().flat_map_iter(|span_down| across.iter().map(move |a| texel(a, span_down)));
-        let rgba = match &self.rgba {
-            Rgba::Srgb(_) => Rgba::Srgb(linear.map(bytes).collect()),
-            Rgba::Linear(_) => Rgba::Linear(linear.collect()),
-        };
-        Self { columns, rows, rgba }
+        Self { columns, rows, rgba: Rgba::Linear(linear.collect()) }
     }
 }
 
@@ -178,16 +161,6 @@ fn spans(n: u32) -> Vec<Span> {
         Span { first: 2 * i, shares: [(half - i) as f32 / whole, half as f32 / whole, (i + 1) as f32 / whole] }
     };
     (0..half).map(span).collect()
-}
-
-/// The sRGB number that is nearest to a light.
-fn stored(light: f32) -> u8 {
-    let light = light.clamp(0.0, 1.0);
-    let linear: &[f32; 256] = &LINEAR;
-    let near = ENCODED[libm::roundf(4096.0 * light) as usize];
-    let candidates = near.saturating_sub(1)..=near.saturating_add(1);
-    let distance = |number: &u8| (linear[usize::from(*number)] - light).abs();
-    candidates.min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap_or(near)
 }
 
 impl MipMaps {
@@ -242,13 +215,6 @@ mod tests {
     }
 
     #[test]
-    fn every_number_is_nearest_to_its_own_light() {
-        for number in 0..=255u8 {
-            assert_eq!(stored(LINEAR[usize::from(number)]), number);
-        }
-    }
-
-    #[test]
     fn an_even_image_is_even_in_every_size() {
         for texel in [[1, 2, 3, 255], [200, 100, 13, 77], [255, 255, 255, 0]] {
             for weight in [Weight::Even, Weight::Opacity, Weight::Cut(0.2)] {
@@ -257,14 +223,13 @@ mod tests {
                 let sizes: Vec<_> = maps.levels().iter().map(|level| level.size()).collect();
                 assert_eq!(sizes, [[13, 6], [6, 3], [3, 1], [1, 1]]);
                 for level in maps.levels() {
-                    let expected = even((level.columns * level.rows) as usize);
+                    let expected = even(1).linear(0);
                     // Of a cut one opacities are shares of texels.
                     let is_cut = level.size() != [13, 6] && matches!(weight, Weight::Cut(_));
-                    if is_cut {
-                        let shown = level.linear(0, 0);
-                        assert!((0..3).all(|c| shown[c] == expected.linear(0)[c]) && [0.0, 1.0].contains(&shown[3]));
-                    } else {
-                        assert_eq!(level.rgba, expected);
+                    for rank in 0..(level.columns * level.rows) as usize {
+                        let shown = level.rgba.linear(rank);
+                        assert_eq!(shown[..3], expected[..3]);
+                        assert!(if is_cut { [0.0, 1.0].contains(&shown[3]) } else { shown[3] == expected[3] });
                     }
                 }
             }
@@ -291,8 +256,7 @@ mod tests {
                         }
                     }
                     let found = half.linear(column, row);
-                    // Half a step of eight bits, which is at most 0.0045 in light.
-                    (0..4).for_each(|k| assert!((mean[k] - f64::from(found[k])).abs() < 0.0046, "{mean:?} {found:?}"));
+                    (0..4).for_each(|k| assert!((mean[k] - f64::from(found[k])).abs() < 1e-6, "{mean:?} {found:?}"));
                 }
             }
         }
@@ -301,7 +265,8 @@ mod tests {
     #[test]
     fn clear_texels_lend_no_colour() {
         let level = Level::new(2, 1, Rgba::Srgb(vec![[200, 0, 0, 255], [0, 255, 0, 0]]));
-        let red = Rgba::Srgb(vec![[200, 0, 0, 128]]);
+        let [light, ..] = level.linear(0, 0);
+        let red = Rgba::Linear(vec![[light, 0.0, 0.0, 0.5]]);
         assert_eq!(level.half(Weight::Opacity).rgba, red);
         assert_eq!(level.half(Weight::Cut(0.5)).rgba, red);
         assert_ne!(level.half(Weight::Even).rgba, red);
@@ -311,6 +276,7 @@ mod tests {
     fn a_cut_is_made_before_texels_are_averaged() {
         // A mean of 0.5 hides that one texel in four is there.
         let level = Level::new(2, 2, Rgba::Srgb(vec![[9, 9, 9, 255], [0, 0, 0, 85], [0, 0, 0, 85], [0, 0, 0, 85]]));
-        assert_eq!(level.half(Weight::Cut(0.5)).rgba, Rgba::Srgb(vec![[9, 9, 9, 64]]));
+        let [light, ..] = level.linear(0, 0);
+        assert_eq!(level.half(Weight::Cut(0.5)).rgba, Rgba::Linear(vec![[light, light, light, 0.25]]));
     }
 }

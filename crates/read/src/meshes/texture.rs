@@ -50,6 +50,9 @@ impl PartialEq for Texels {
     }
 }
 
+/// Bytes of a texel of the smaller sizes, four numbers of light.
+const BYTES_OF_A_MEAN: u64 = 16;
+
 /// Kinds of images that are not read, by bytes at an offset.
 const UNREAD: [(usize, &[u8], &str); 7] = [
     (0, b"\xabKTX ", "KTX2"),
@@ -132,8 +135,10 @@ impl Texture {
             Some(made) => made.sizes.clone(),
             None => {
                 let first = self.texels.mip_maps.first().clone();
-                // All smaller sizes together take a third of the first, and what rounding adds to it.
-                let held = reading.params.memory.take("the sizes of a texture", first.bytes())?;
+                // All smaller sizes together have a third of its texels, and a line of them where only one side is left to be halved.
+                let [columns, rows] = first.size().map(u64::from);
+                let texels = columns * rows / 3 + columns + rows;
+                let held = reading.params.memory.take("the sizes of a texture", BYTES_OF_A_MEAN * texels)?;
                 let sizes = Arc::new(Texels { mip_maps: MipMaps::new(first, weight), _held: Some(held) });
                 known.push(MadeSizes { image: self.texels.clone(), weight, sizes: sizes.clone() });
                 sizes
