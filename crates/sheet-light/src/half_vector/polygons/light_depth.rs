@@ -125,21 +125,27 @@ struct Reached {
     sum: f32,
     moment: f32,
     is_whole: bool,
+    /// The stretch of the last point, and how many there were.
+    last: Stretch,
+    points: u32,
 }
 
 impl Reached {
-    const NONE: Self = Self { sum: 0.0, moment: 0.0, is_whole: true };
+    const NONE: Self = Self { sum: 0.0, moment: 0.0, is_whole: true, last: Stretch::WHOLE, points: 0 };
 
     /// Takes in a point with this share of the light.
     fn add(&mut self, share: f32, stretch: Stretch) {
         let Stretch { from, to } = stretch;
         self.is_whole &= stretch == Stretch::WHOLE;
+        self.last = stretch;
+        self.points += 1;
         self.sum += share * (to - from);
         self.moment += share * 0.5 * (to - from) * (from + to);
     }
 
     fn stretch(&self) -> Stretch {
-        if self.is_whole { Stretch::WHOLE } else { stretch_of(self.sum, self.moment) }
+        // Of one point the stretch stays to the bit.
+        if self.is_whole || self.points == 1 { self.last } else { stretch_of(self.sum, self.moment) }
     }
 }
 
@@ -251,35 +257,32 @@ impl LightDepths {
     pub(crate) fn lit(&self, ways: &[Option<Way>], by_point: &mut Vec<f32>) -> Option<[LitWay; MAX_LANES]> {
         let spread = Spread::new(ways.iter().flatten());
         let together = |point: &PointDepths| spread.whole_by(point, self.rounding);
-        let first = self.points.iter().position(|point| together(point) != Some(true))?;
+        let first_unsure = self.points.iter().position(|point| together(point) != Some(true))?;
         let count = self.points.len();
-        let has_several = count > 1;
-        if has_several {
+        if count > 1 {
             by_point.resize(ways.len() * count, 0.0);
         }
         let mut lit = [LitWay::lit(Stretch::WHOLE); MAX_LANES];
+        let lanes = || ways.iter().enumerate().filter_map(|(lane, way)| Some((lane, way.as_ref()?)));
         let has_layers = self.points.iter().flat_map(|point| &point.views).any(|view| view.layers.is_some());
-        let known = if has_several { None } else { together(&self.points[0]) };
-        if has_layers || !has_several {
-            for (lane, way) in ways.iter().enumerate() {
-                let Some(way) = way else { continue };
-                lit[lane] = match has_layers {
-                    true => self.lit_through(way, known, by_point.get_mut(lane * count..(lane + 1) * count)),
-                    false => LitWay::lit(self.lit_by(&self.points[0], way, known)),
-                };
+        if has_layers {
+            let known = if count > 1 { None } else { together(&self.points[0]) };
+            for (lane, way) in lanes() {
+                lit[lane] = self.lit_through(way, known, by_point.get_mut(lane * count..(lane + 1) * count));
             }
         } else {
-            let mut sums = [Reached::NONE; MAX_LANES];
+            let mut reached = [Reached::NONE; MAX_LANES];
             for (n, point) in self.points.iter().enumerate() {
-                let known = if n < first { Some(true) } else { together(point) };
-                for (lane, way) in ways.iter().enumerate() {
-                    let Some(way) = way else { continue };
+                let known = if n < first_unsure { Some(true) } else { together(point) };
+                for (lane, way) in lanes() {
                     let stretch = self.lit_by(point, way, known);
-                    by_point[lane * count + n] = point.share * (stretch.to - stretch.from);
-                    sums[lane].add(point.share, stretch);
+                    reached[lane].add(point.share, stretch);
+                    if count > 1 {
+                        by_point[lane * count + n] = point.share * (stretch.to - stretch.from);
+                    }
                 }
             }
-            (0..ways.len()).for_each(|lane| lit[lane] = LitWay::lit(sums[lane].stretch()));
+            lanes().for_each(|(lane, _)| lit[lane] = LitWay::lit(reached[lane].stretch()));
         }
         let mut is_whole = true;
         for lane in (0..ways.len()).filter(|lane| ways[*lane].is_some()) {
