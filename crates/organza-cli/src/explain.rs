@@ -130,7 +130,12 @@ fn drawn(
     progress.leave();
     let mut warnings = render.warnings;
     let contradictions = measured.contradictions(&render.plan);
-    warnings.extend(contradictions.into_iter().map(|sentence| format!("{sentence}: please report this scene")));
+    let remedy = match scene.render.shadow.cells {
+        // Cells of shadow maps go by all that casts, so switching an object moves those of the others.
+        None => "if it stays so with `render.shadow.cells` stated, please report this scene",
+        Some(_) => "please report this scene",
+    };
+    warnings.extend(contradictions.into_iter().map(|sentence| format!("{sentence}: {remedy}")));
     Ok(Explained {
         plan: render.plan,
         cost: render.cost,

@@ -76,7 +76,7 @@ impl Measured {
                 found.push(format!("`{}` changes a pixel by {changes}, beyond its bound of {bound}", change.name));
             }
         }
-        // What no scene can switch is in neither picture.
+        // An effect that no scene can switch is in neither picture.
         let is_switched = |effect: &&Effect| effect.kind.is_none_or(|kind| kind.fixed_because().is_none());
         let left_out = plan.effects.iter().filter(|effect| !is_simulated(effect) && !effect.is_absent);
         let left_out = left_out.filter(is_switched);

@@ -8,6 +8,7 @@ mod prediction;
 mod rates;
 
 pub(crate) use loading::{before_conversion, before_reading, converting, reading, reading_file, samples};
+pub(crate) use prediction::joined;
 pub use prediction::{Change, CountedPass, EffectWork, Prediction, announcement_of_frames, duration_text};
 pub(crate) use rates::Growth;
 pub use rates::{BUILT_IN_MACHINE, Item, Rates};

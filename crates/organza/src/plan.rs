@@ -61,7 +61,7 @@ pub struct Effect {
 }
 
 impl Effect {
-    /// One that a technique tells, which no bound leaves out.
+    /// An effect that a technique tells of, and that no bound leaves out.
     pub(crate) fn of_technique(name: String, what: &'static str, is_called_for: bool, reason: String) -> Self {
         let bound = if is_called_for { Bound::Unknown } else { Bound::Nothing };
         let label = String::new();

@@ -1,7 +1,9 @@
 //! Counted work of a frame, before it is drawn, and the keys of its scene that would change it.
 
 use crate::choose::{CausedMap, CausedObject, CausedWork, row, technique_of};
-use crate::cost::{Change, Count, CountedPass, Item, Prediction, Translucent, before_reading, samples, shadow_map};
+use crate::cost::{
+    Change, Count, CountedPass, Item, Prediction, Translucent, before_reading, joined, samples, shadow_map,
+};
 use crate::frame::{Extent, Frame};
 use crate::load::own::Own;
 use crate::scene::{LightPoint, SceneObject, Technique};
@@ -65,21 +67,17 @@ impl Seen {
 /// The opaque splats in view, and the fragments of their footprints, about.
 fn opaque(frame: &Frame<'_>) -> Opaque {
     let cloud = &frame.loaded.cloud;
-    let is_image = |i: usize| frame.loaded.footprints.image(usize::from(cloud.footprint[i])).is_some();
+    let footprints = &frame.loaded.footprints;
+    let is_image = |i: usize| footprints.image(usize::from(cloud.footprint[i])).is_some();
     let is_met = |i: usize| frame.plan.exact[cloud.object[i] as usize];
-    let expected = |has_image: bool, meets: bool| {
-        let is_one = |i: usize| cloud.kind[i] == SplatKind::Opaque && is_image(i) == has_image && is_met(i) == meets;
-        raster::expected(cloud, &frame.camera, is_one)
+    let expected = |is_one: &dyn Fn(usize) -> bool| {
+        raster::expected(cloud, &frame.camera, |i| cloud.kind[i] == SplatKind::Opaque && is_one(i))
     };
-    let any = |is_one: &dyn Fn(usize) -> bool| (0..cloud.len()).any(is_one);
-    let images = if any(&is_image) { expected(true, false) } else { Expected::default() };
-    let met = if frame.plan.exact.contains(&true) {
-        let [plain, images] = [false, true].map(|has_image| expected(has_image, true));
-        Expected { splats: plain.splats + images.splats, fragments: plain.fragments + images.fragments }
-    } else {
-        Expected::default()
-    };
-    Opaque { plain: expected(false, false), images, met }
+    // Most scenes have none of the two.
+    let has_images = (0..footprints.layers().len()).any(|footprint| footprints.image(footprint).is_some());
+    let met = if frame.plan.exact.contains(&true) { expected(&is_met) } else { Expected::default() };
+    let images = if has_images { expected(&|i| !is_met(i) && is_image(i)) } else { Expected::default() };
+    Opaque { plain: expected(&|i| !is_met(i) && !is_image(i)), images, met }
 }
 
 /// The translucent splats of a technique in view, and the fragments of their footprints, about.
@@ -237,8 +235,8 @@ pub(crate) fn prediction(
     }
 }
 
-/// What each light and object causes of these passes.
-fn caused<'b>(frame: &'b Frame<'_>, seen: &Seen, drawing: &'b [CountedPass]) -> CausedWork<'b> {
+/// These passes, by the lights and objects that cause them.
+fn caused<'b>(frame: &'b Frame<'_>, seen: &Seen, drawing: &[CountedPass]) -> CausedWork<'b> {
     let loaded = frame.loaded;
     let map = |(table, point): (&'b ShadowTable, &LightPoint)| CausedMap {
         light: &loaded.lights[point.light_index].label,
@@ -252,16 +250,16 @@ fn caused<'b>(frame: &'b Frame<'_>, seen: &Seen, drawing: &'b [CountedPass]) -> 
     let is_polygons = |rank: usize| loaded.own.iter().any(|native| native.object == rank && native.form.is_polygons());
     let object = |((rank, _), count): ((usize, &SceneObject), &'b SplatCount)| {
         let bytes: u64 = loaded.own.iter().filter(|native| native.object == rank).map(Own::bytes).sum();
-        CausedObject {
-            name: &count.object,
+        let part = CausedObject {
             converted: Count::new(Item::of_conversion(count.conversion), count.predicted as f64),
             share_of_splats: count.made as f64 / splats.max(1) as f64,
             share_of_data: bytes as f64 / data.max(1) as f64,
             bytes,
-        }
+        };
+        (count.object.as_str(), part)
     };
     CausedWork {
-        drawing,
+        drawing: joined(drawing.iter()),
         maps: if frame.has_maps() { Vec::new() } else { tables(frame).map(map).collect() },
         lights: shining.map(|(light, _)| light.label.as_str()).collect(),
         shaded: shaded(frame, seen),

@@ -23,7 +23,7 @@ pub(crate) const DISPLAY_SLOPE: f64 = 12.92;
 
 /// Optical depth of a spacing that a scene needs the eye's map for: up to it light and view at 60° send 1.5 % too little by the middles of splats,
 /// and at right angles a fifth of a per cent.
-const SEEN: f32 = 0.125;
+pub(crate) const SEEN: f32 = 0.125;
 /// The eye's map, in messages.
 pub(crate) const EYE: &str = "the eye";
 /// Straight optical depths of a thick cell that lists go on for: as many as it has along the most slanted light.

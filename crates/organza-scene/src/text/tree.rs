@@ -180,7 +180,7 @@ fn find(node: &Node, sought: Place, keys: &mut Vec<String>) -> bool {
     }
 }
 
-/// What an entry of a list is called.
+/// The name of an entry of a list, or its index.
 fn label(index: usize, item: &Node) -> String {
     let Value::Table(entries) = &item.value else { return index.to_string() };
     let name = entries.iter().find(|entry| entry.key == "name").map(|entry| &entry.node.value);

@@ -101,7 +101,7 @@ pub struct Prediction {
     pub drawing: Vec<CountedPass>,
     /// Keys that would change the counted work.
     pub changes: Vec<Change>,
-    /// What runs for each simulated effect alone, of those whose work is not part of passes that run in any case.
+    /// The work of each simulated effect that has work of its own, beside passes that run in any case.
     pub effects: Vec<EffectWork>,
     /// Nanoseconds of each item.
     pub rates: Rates,
@@ -115,14 +115,7 @@ impl Prediction {
 
     /// The same, those of one name as one.
     pub fn joined(&self) -> Vec<CountedPass> {
-        let mut joined: Vec<CountedPass> = Vec::new();
-        for pass in self.passes() {
-            match joined.iter_mut().find(|known| known.pass == pass.pass) {
-                Some(known) => known.add(&pass.counts),
-                None => joined.push(pass.clone()),
-            }
-        }
-        joined
+        joined(self.passes())
     }
 
     /// Predicted seconds of all passes on so many threads.
@@ -154,6 +147,18 @@ impl Prediction {
             instead.unwrap_or_default(),
         ))
     }
+}
+
+/// Passes, those of one name as one.
+pub(crate) fn joined<'p>(passes: impl Iterator<Item = &'p CountedPass>) -> Vec<CountedPass> {
+    let mut joined: Vec<CountedPass> = Vec::new();
+    for pass in passes {
+        match joined.iter_mut().find(|known| known.pass == pass.pass) {
+            Some(known) => known.add(&pass.counts),
+            None => joined.push(pass.clone()),
+        }
+    }
+    joined
 }
 
 /// A sentence about frames that are long together, of which each is drawn in so many seconds by these figures, about. `None` for few of them, and

@@ -4,10 +4,13 @@ use crate::brightness::ObjectBrightness;
 use crate::choose::{changed_without, displayed, row, technique_of};
 use crate::load::Loaded;
 use crate::scene::{EffectKind, Scene, SceneObject};
-use crate::shadows::{Hiding, Shadowing, View, hiding};
+use crate::shadows::{Hiding, SEEN, Shadowing, View, hiding};
 use crate::statistics::{ObjectFacts, ObjectStatistics, Statistics};
 use glam::DVec3;
 use splat_core::{DAabb, Material};
+
+/// Least optical depth along the middle of a splat over that of its spacing, which a splat reaches beyond.
+const MIDDLE_OF_SPACING: f64 = 0.1;
 
 /// Ways of a bent ray: `deferred_blend` follows it through twelve surfaces at most, and there is a way to the first of them.
 const MOST_WAYS: f64 = 13.0;
@@ -27,10 +30,13 @@ pub(super) fn object_facts(
     let is_bent = (0..scene.objects.len()).any(|rank| bends(rank) && shadowing.shown()[rank]);
     // Of rays that go anywhere, and of what stays in any case, nothing need be known.
     let view = View { shadowing, is_known: !is_bent && !statistics.objects_stay };
-    // What shows other things by bent rays, or light that is scattered again and again, has no radiance of its own.
+    // Bent rays show other things, light that is scattered again and again has no bound, and in the eye's map a thick object moves the places in other
+    // media that are seen of them.
     let shown = |rank: usize| {
-        let ObjectBrightness { sent, given_off, .. } = brightness[rank];
-        if bends(rank) || statistics.brightest.is_infinite() { statistics.brightest } else { sent + given_off }
+        let ObjectBrightness { sent, given_off, thickest_splat, .. } = brightness[rank];
+        let shows_others =
+            bends(rank) || statistics.brightest.is_infinite() || thickest_splat > MIDDLE_OF_SPACING * f64::from(SEEN);
+        if shows_others { statistics.brightest } else { sent + given_off }
     };
     let is_thin = |rank: usize, depth: f64| {
         let object = &scene.objects[rank];

@@ -136,7 +136,7 @@ fn own_work(frame: &Frame<'_>) -> OwnWork {
         let sections = 2.0 * extent * step / least_step + 1.0;
         let rows_of_eye = seen.share * rows(radius);
         let rows_of_light = rows(extent * half::light_pixels(frame.scene) * step / least_step);
-        // What the eye sees of a volume in slabs, and what the light does.
+        // Samples of a voxel in the images of the eye and of the light.
         let unit = libm::exp2(f64::from(-frame.loaded.exponent));
         let slabs_of_voxel = step / frame.settings.sheets.slab_width.map_or(least_step, |width| width * unit);
         let eye = seen.share * (step * seen.samples_per_unit).powi(2);

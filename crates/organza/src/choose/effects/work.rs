@@ -1,21 +1,22 @@
-//! The counted work of one effect: what runs for it alone, and would not run without it.
+//! The counted work of one effect: passes and shares of passes that run for it alone, and would not run without it.
 
 use crate::cost::{Count, CountedPass, EffectWork, Item};
 use crate::pass;
 use crate::plan::Effect;
+use std::collections::HashMap;
 
 /// Counted work of a frame, by what causes it.
 pub(crate) struct CausedWork<'a> {
-    /// The passes that draw it.
-    pub(crate) drawing: &'a [CountedPass],
+    /// The passes that draw it, each name once.
+    pub(crate) drawing: Vec<CountedPass>,
     /// Shadow maps of lights.
     pub(crate) maps: Vec<CausedMap<'a>>,
     /// Labels of the lights that shine.
     pub(crate) lights: Vec<&'a str>,
     /// Splats that get light.
     pub(crate) shaded: f64,
-    /// Visible objects but for those that stay polygons, whose work goes by samples.
-    pub(crate) objects: Vec<CausedObject<'a>>,
+    /// Visible objects by their names, but for those that stay polygons, whose work goes by samples.
+    pub(crate) objects: HashMap<&'a str, CausedObject>,
 }
 
 /// A shadow map.
@@ -27,9 +28,8 @@ pub(crate) struct CausedMap<'a> {
     pub(crate) bytes: u64,
 }
 
-/// What an object takes.
-pub(crate) struct CausedObject<'a> {
-    pub(crate) name: &'a str,
+/// An object's part of the work.
+pub(crate) struct CausedObject {
     /// Splats that it is converted to.
     pub(crate) converted: Count,
     /// Its share of all splats, 0 to 1.
@@ -41,13 +41,22 @@ pub(crate) struct CausedObject<'a> {
 }
 
 /// Passes that go by splats.
-const BY_SPLATS: [&str; 7] =
-    [pass::SORT, pass::GROUP, pass::PROJECT, pass::SHADE, pass::OPAQUE, pass::SPLAT, pass::REFERENCE];
+const BY_SPLATS: [&str; 9] = [
+    pass::SHADOW_MAP,
+    pass::EYE_MAP,
+    pass::SORT,
+    pass::GROUP,
+    pass::PROJECT,
+    pass::SHADE,
+    pass::OPAQUE,
+    pass::SPLAT,
+    pass::REFERENCE,
+];
 /// Passes that go by data that is drawn as it is, where there is any.
 const BY_DATA: [&str; 3] = [pass::SHEETS, pass::PARTICLES, pass::SURFELS];
 
 impl CausedWork<'_> {
-    /// What runs for each of these effects alone; nothing for those that are left out.
+    /// The work of each of these effects that is simulated and has work of its own.
     pub(crate) fn of_effects(&self, effects: &[Effect]) -> Vec<EffectWork> {
         let simulated = effects.iter().filter(|effect| effect.called_for && !effect.is_lacking);
         let of_effect = |effect: &Effect| {
@@ -78,10 +87,8 @@ impl CausedWork<'_> {
 
     /// An object: its conversion, and its share of all that is drawn.
     pub(super) fn object(&self, name: &str) -> EffectWork {
-        let Some(object) = self.objects.iter().find(|object| object.name == name) else {
-            return EffectWork::default();
-        };
-        let has_data = self.objects.iter().any(|object| object.share_of_data > 0.0);
+        let Some(object) = self.objects.get(name) else { return EffectWork::default() };
+        let has_data = self.objects.values().any(|object| object.share_of_data > 0.0);
         let share = |pass: &str| match pass {
             pass if BY_SPLATS.contains(&pass) => object.share_of_splats,
             pass if BY_DATA.contains(&pass) && has_data => object.share_of_data,
@@ -90,9 +97,8 @@ impl CausedWork<'_> {
         };
         let drawn = self.drawing.iter().map(|pass| pass.scaled(share(pass.pass)));
         let conversion = CountedPass::new(pass::CONVERT, pass::CONVERT.to_owned(), vec![object.converted]);
-        let maps = self.maps.iter().map(|map| map.pass.scaled(object.share_of_splats));
         EffectWork {
-            passes: std::iter::once(conversion).chain(maps).chain(drawn).collect(),
+            passes: std::iter::once(conversion).chain(drawn).filter(CountedPass::has_work).collect(),
             bytes: object.bytes,
             ..EffectWork::default()
         }
@@ -120,6 +126,7 @@ impl CausedWork<'_> {
             let counts = pass.counts.iter().filter(|count| items.contains(&count.item)).copied().collect();
             CountedPass { counts, ..pass.clone() }
         };
-        EffectWork { passes: self.drawing.iter().map(of_pass).collect(), ..EffectWork::default() }
+        let passes = self.drawing.iter().map(of_pass).filter(CountedPass::has_work).collect();
+        EffectWork { passes, ..EffectWork::default() }
     }
 }
