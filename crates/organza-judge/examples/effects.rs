@@ -1,11 +1,12 @@
-//! `cargo run -p organza-judge --example effects`: draws each scene of `scenes/` with each of its effects and without it, and writes what
-//! that changes into `docs/effects.csv`, and into the tables of `docs/effects.md`. It draws each scene in two sizes on one thread and on two, and writes
-//! predicted beside measured times into `docs/predictions.csv`. `cargo xtask effects` runs it, after the tests that write `docs/effect-families.csv`.
+//! `cargo run -p organza-judge --example effects [STAGE…]`: draws each scene of `scenes/`, and writes tables and the parts of `docs/effects.md` that show
+//! them. Stages: `effects`, with each effect and without it (`docs/effects.csv`); `choices`, by `auto` and by each technique (`docs/choices.csv`);
+//! `predictions`, in two sizes on one thread and on two, with predicted times (`docs/predictions.csv`). All without a name. `cargo xtask effects` runs
+//! it, after the tests that write `docs/effect-families.csv`.
 #![allow(clippy::unwrap_used, reason = "it stops where something is wrong")]
 
 use organza::cost::{CountedPass, Prediction};
 use organza::plan::Plan;
-use organza::scene::{LoadOptions, Override, Scene, parse};
+use organza::scene::{LoadOptions, Override, Scene, Technique, parse};
 use organza::{Context, Error, Files, Progress, RenderOptions};
 use organza_judge::effects::{LitSplats, Switch, measure};
 use std::fmt::Write;
@@ -20,6 +21,13 @@ const PREDICTIONS: &str = "docs/predictions.csv";
 const TIMED: [(u32, usize); 3] = [(160, 1), (160, 2), (480, 1)];
 /// No picture is drawn that is predicted to take so many seconds.
 const LONGEST: f64 = 40.0;
+const CHOICES: &str = "docs/choices.csv";
+/// Seconds that a picture is drawn again for, at most three times, of which the least counts.
+const AGAIN: f64 = 1.0;
+/// No technique is drawn that is predicted to take so many times what `auto` takes.
+const MUCH_SLOWER: f64 = 6.0;
+/// Times the least time that `auto` may take.
+const NEARLY: f64 = 1.25;
 const PAGE: &str = "docs/effects.md";
 /// Between these the page holds the tables.
 const BEGIN: &str = "<!-- Made by `cargo xtask effects` from docs/effects.csv. -->\n";
@@ -28,6 +36,14 @@ const END: &str = "<!-- End of the tables. -->\n";
 /// Between these it holds some scenes as one reads them.
 const BEGIN_READ: &str = "<!-- Made by `cargo xtask effects`. -->\n";
 const END_READ: &str = "<!-- End of the scenes. -->\n";
+
+/// Between these it holds what `auto` takes.
+const BEGIN_CHOICES: &str = "<!-- Made by `cargo xtask effects` from docs/choices.csv. -->\n";
+const END_CHOICES: &str = "<!-- End of the choices. -->\n";
+
+/// Between these it holds predicted times.
+const BEGIN_TIMES: &str = "<!-- Made by `cargo xtask effects` from docs/predictions.csv. -->\n";
+const END_TIMES: &str = "<!-- End of the times. -->\n";
 
 /// A scene that the page shows beside its picture, and what one learns from it.
 struct Shown {
@@ -101,30 +117,76 @@ struct Timed {
     bytes: u64,
 }
 
+/// One scene by `auto` and by each technique that errs no more.
+struct Choice {
+    name: String,
+    /// The technique that `auto` takes, or several.
+    taken: String,
+    /// By `auto`, then by the techniques that show as much.
+    ways: Vec<DrawnBy>,
+}
+
+/// A scene drawn by one technique for all of its objects.
+struct DrawnBy {
+    technique: Technique,
+    /// Estimated error of a displayed pixel, 0 to 1.
+    displayed_error: f64,
+    /// From files to the picture.
+    seconds: f64,
+}
+
+impl Choice {
+    fn by_auto(&self) -> &DrawnBy {
+        &self.ways[0]
+    }
+
+    fn fastest(&self) -> &DrawnBy {
+        self.ways.iter().min_by(|a, b| a.seconds.total_cmp(&b.seconds)).unwrap()
+    }
+
+    fn is_nearly_fastest(&self) -> bool {
+        self.by_auto().seconds <= NEARLY * self.fastest().seconds
+    }
+}
+
 fn main() {
+    let asked: Vec<String> = std::env::args().skip(1).collect();
+    let is_asked = |stage: &str| asked.is_empty() || asked.iter().any(|named| named == stage);
     let mut scenes: Vec<PathBuf> = std::fs::read_dir("scenes").unwrap().map(|entry| entry.unwrap().path()).collect();
     scenes.retain(|path| path.extension().is_some_and(|extension| extension == "toml"));
     scenes.sort();
-    let mut drawn = Vec::new();
-    for path in &scenes {
-        let scene = draw(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
-        println!("{}: {} effects", scene.name, scene.rows.len());
-        drawn.push(scene);
+    if is_asked("effects") {
+        let mut drawn = Vec::new();
+        for path in &scenes {
+            let scene = draw(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+            println!("{}: {} effects", scene.name, scene.rows.len());
+            drawn.push(scene);
+        }
+        std::fs::write(CSV, csv(&drawn)).unwrap();
+        fill_page(BEGIN_READ, END_READ, &read(&drawn));
+        fill_page(BEGIN, END, &(tables(&drawn) + &families(&std::fs::read_to_string(FAMILIES).unwrap())));
     }
-    std::fs::write(CSV, csv(&drawn)).unwrap();
-    let page = std::fs::read_to_string(PAGE).unwrap();
-    let page = filled(&page, BEGIN_READ, END_READ, &read(&drawn));
-    let measured = tables(&drawn) + &families(&std::fs::read_to_string(FAMILIES).unwrap());
-    std::fs::write(PAGE, filled(&page, BEGIN, END, &measured)).unwrap();
-    let mut timed = Vec::new();
-    for (side, threads) in TIMED {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        let pictures = scenes.iter().filter_map(|path| pool.install(|| time(path, side, threads)));
-        timed.extend(
-            pictures.inspect(|one| println!("{} of {side} pixels on {threads}: {:.2} s", one.name, one.seconds)),
-        );
-        std::fs::write(PREDICTIONS, predictions(&timed)).unwrap();
-        std::fs::write(PAGE, filled(&page, BEGIN, END, &(measured.clone() + &times(&timed)))).unwrap();
+    if is_asked("choices") {
+        let mut chosen = Vec::new();
+        for path in &scenes {
+            let choice = choice(path);
+            println!("{}: {}", choice.name, choice.taken);
+            chosen.push(choice);
+        }
+        std::fs::write(CHOICES, choices(&chosen)).unwrap();
+        fill_page(BEGIN_CHOICES, END_CHOICES, &choice_table(&chosen));
+    }
+    if is_asked("predictions") {
+        let mut timed = Vec::new();
+        for (side, threads) in TIMED {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            let pictures = scenes.iter().filter_map(|path| pool.install(|| time(path, side, threads)));
+            timed.extend(
+                pictures.inspect(|one| println!("{} of {side} pixels on {threads}: {:.2} s", one.name, one.seconds)),
+            );
+            std::fs::write(PREDICTIONS, predictions(&timed)).unwrap();
+            fill_page(BEGIN_TIMES, END_TIMES, &times(&timed));
+        }
     }
 }
 
@@ -150,6 +212,95 @@ fn time(path: &Path, side: u32, threads: usize) -> Option<Timed> {
         predicted_bytes: explained.memory,
         bytes: render.cost.stages.iter().map(|stage| stage.bytes).sum(),
     })
+}
+
+/// A scene by `auto`, and by each technique that lacks nothing more and errs no more by its estimates, or within the tolerance.
+fn choice(path: &Path) -> Choice {
+    let options = RenderOptions::default();
+    let scene_by = |technique: Technique| {
+        let mut scene = scene(path, &[]).unwrap();
+        scene.render.technique = technique;
+        scene.objects.iter_mut().for_each(|object| object.technique = None);
+        scene
+    };
+    let drawn_by = |technique: Technique| {
+        let scene = scene_by(technique);
+        let mut seconds = f64::INFINITY;
+        let mut drawn = 0.0;
+        let mut displayed_error = 0.0;
+        for _ in 0..3 {
+            let render = organza::render(&scene, &options, &Progress::new()).unwrap();
+            let taken: f64 = render.cost.stages.iter().map(|stage| stage.seconds).sum();
+            seconds = seconds.min(taken);
+            displayed_error = error(&render.plan);
+            drawn += taken;
+            if drawn > AGAIN {
+                break;
+            }
+        }
+        DrawnBy { technique, displayed_error, seconds }
+    };
+    let explained = |technique| organza::explain(&scene_by(technique), &options, &Progress::new());
+    let lacking = |plan: &Plan| {
+        let lacking = plan.effects.iter().filter(|effect| effect.called_for && effect.is_lacking);
+        lacking.map(|effect| effect.name.clone()).collect::<Vec<_>>()
+    };
+    let by_auto = explained(Technique::Auto).unwrap();
+    let lacked = lacking(&by_auto.plan);
+    let threads = rayon::current_num_threads();
+    let seconds_of_auto = by_auto.predicted.seconds(threads);
+    let most_error = error(&by_auto.plan).max(scene_by(Technique::Auto).render.tolerance);
+    let shows_as_much = |technique: &Technique| {
+        explained(*technique).is_ok_and(|explained| {
+            let is_drawn = explained.predicted.seconds(threads) <= MUCH_SLOWER * seconds_of_auto;
+            let lacks_more = lacking(&explained.plan).iter().any(|name| !lacked.contains(name));
+            is_drawn && !lacks_more && error(&explained.plan) <= most_error
+        })
+    };
+    let named = Technique::ALL.into_iter().filter(|technique| *technique != Technique::Auto).filter(shows_as_much);
+    let mut taken: Vec<&str> = by_auto.plan.techniques.iter().map(|technique| technique.name()).collect();
+    taken.dedup();
+    Choice {
+        name: path.file_stem().unwrap().to_string_lossy().into_owned(),
+        taken: taken.join(" and "),
+        ways: std::iter::once(Technique::Auto).chain(named).map(drawn_by).collect(),
+    }
+}
+
+/// The greatest error of a displayed pixel that a plan estimates.
+fn error(plan: &Plan) -> f64 {
+    let drawing = plan.estimates.iter().filter(|estimate| plan.is_drawn_as(estimate));
+    drawing.map(|estimate| estimate.displayed_error).fold(0.0, f64::max)
+}
+
+fn choices(chosen: &[Choice]) -> String {
+    let mut text = "scene,auto_takes,technique,estimated_error,seconds\n".to_owned();
+    for Choice { name, taken, ways } in chosen {
+        for DrawnBy { technique, displayed_error, seconds } in ways {
+            writeln!(text, "{name},{taken},{},{displayed_error:.2e},{seconds:.4}", technique.name()).unwrap();
+        }
+    }
+    text
+}
+
+fn choice_table(chosen: &[Choice]) -> String {
+    let near = chosen.iter().filter(|one| one.is_nearly_fastest()).count();
+    let mut text = format!(
+        "## What `auto` takes\n\nEach scene with `technique = \"auto\"` for all of its objects, and with each technique that lacks no more effects and errs, by its \
+         estimates, within the tolerance or no more than what `auto` takes; {SIDE} pixels wide at most, from files to the picture. Those that are \
+         predicted to take {MUCH_SLOWER} times what `auto` takes are not drawn. `docs/choices.csv` has each.\n\n\
+         `auto` took the fastest of these, or at most {NEARLY} times its time, in {near} of {} scenes. The others:\n\n\
+         | scene | `auto` takes | s | fastest | s |\n|---|---|---|---|---|\n",
+        chosen.len()
+    );
+    for one in chosen.iter().filter(|one| !one.is_nearly_fastest()) {
+        let Choice { name, taken, .. } = one;
+        let fastest = one.fastest();
+        let seconds = one.by_auto().seconds;
+        writeln!(text, "| {name} | {taken} | {seconds:.2} | {} | {:.2} |", fastest.technique.name(), fastest.seconds)
+            .unwrap();
+    }
+    text + "\n"
 }
 
 /// Predicted seconds of all passes but reading and conversion, which other pages measure.
@@ -225,11 +376,12 @@ fn families(csv: &str) -> String {
     text + "\n"
 }
 
-/// A page with this text between two lines of it.
-fn filled(page: &str, begin: &str, end: &str, text: &str) -> String {
+/// Writes this text between two lines of the page.
+fn fill_page(begin: &str, end: &str, text: &str) {
+    let page = std::fs::read_to_string(PAGE).unwrap();
     let (before, rest) = page.split_once(begin).unwrap();
     let (_, after) = rest.split_once(end).unwrap();
-    format!("{before}{begin}{text}{end}{after}")
+    std::fs::write(PAGE, format!("{before}{begin}{text}{end}{after}")).unwrap();
 }
 
 /// Some scenes beside their pictures, with what was measured of each effect.
@@ -360,6 +512,8 @@ fn tables(drawn: &[Drawn]) -> String {
     let over = rows().filter(|(row, _)| row.bound.is_some_and(|bound| row.change > bound + 1e-6)).count();
     let ratios = on().filter_map(|(row, _)| row.bound.map(|bound| bound / row.change)).filter(|r| r.is_finite());
     let ratio = |scene: &Drawn| (scene.predicted_seconds / scene.seconds).max(scene.seconds / scene.predicted_seconds);
+    // Bent rays meet splats outside of the view.
+    let meets_view = |splats: &LitSplats| splats.lit <= splats.in_view;
     let mut text = format!(
         "\n{} scenes, {SIDE} pixels wide at most: {} effects could be switched.\n\n\
          - Left out: {}. Forced on, {beyond} change a pixel by more than the tolerance; the most is {}.\n\
@@ -391,7 +545,10 @@ fn tables(drawn: &[Drawn]) -> String {
             "| {} | {} | {together} | {} | {} | {:.2} | {:.2} |",
             scene.name,
             left_out.join(", "),
-            scene.lit.map_or_else(String::new, |splats| format!("{} of {}", splats.lit, splats.in_view)),
+            scene
+                .lit
+                .filter(meets_view)
+                .map_or_else(String::new, |splats| format!("{} of {}", splats.lit, splats.in_view)),
             called_for.collect::<Vec<_>>().join(", "),
             scene.predicted_seconds,
             scene.seconds,
