@@ -25,7 +25,7 @@ const CHOICES: &str = "docs/choices.csv";
 /// Seconds that a picture is drawn again for, at most three times, of which the least counts.
 const AGAIN: f64 = 1.0;
 /// No technique is drawn that is predicted to take so many times what `auto` takes.
-const MUCH_SLOWER: f64 = 6.0;
+const MUCH_SLOWER: f64 = 3.0;
 /// Times the least time that `auto` may take.
 const NEARLY: f64 = 1.25;
 const PAGE: &str = "docs/effects.md";
@@ -172,9 +172,9 @@ fn main() {
             let choice = choice(path);
             println!("{}: {}", choice.name, choice.taken);
             chosen.push(choice);
+            std::fs::write(CHOICES, choices(&chosen)).unwrap();
+            fill_page(BEGIN_CHOICES, END_CHOICES, &choice_table(&chosen));
         }
-        std::fs::write(CHOICES, choices(&chosen)).unwrap();
-        fill_page(BEGIN_CHOICES, END_CHOICES, &choice_table(&chosen));
     }
     if is_asked("predictions") {
         let mut timed = Vec::new();
