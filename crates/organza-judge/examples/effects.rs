@@ -241,19 +241,20 @@ fn choice(path: &Path) -> Choice {
         DrawnBy { technique, displayed_error, seconds }
     };
     let explained = |technique| organza::explain(&scene_by(technique), &options, &Progress::new());
-    let lacking = |plan: &Plan| {
-        let lacking = plan.effects.iter().filter(|effect| effect.called_for && effect.is_lacking);
-        lacking.map(|effect| effect.name.clone()).collect::<Vec<_>>()
+    let shown = |plan: &Plan| {
+        let shown = plan.effects.iter().filter(|effect| effect.called_for && !effect.is_lacking);
+        shown.map(|effect| effect.name.clone()).collect::<Vec<_>>()
     };
     let by_auto = explained(Technique::Auto).unwrap();
-    let lacked = lacking(&by_auto.plan);
+    let shown_by_auto = shown(&by_auto.plan);
     let threads = rayon::current_num_threads();
     let seconds_of_auto = by_auto.predicted.seconds(threads);
     let most_error = error(&by_auto.plan).max(scene_by(Technique::Auto).render.tolerance);
     let shows_as_much = |technique: &Technique| {
         explained(*technique).is_ok_and(|explained| {
             let is_drawn = explained.predicted.seconds(threads) <= MUCH_SLOWER * seconds_of_auto;
-            let lacks_more = lacking(&explained.plan).iter().any(|name| !lacked.contains(name));
+            let found = shown(&explained.plan);
+            let lacks_more = shown_by_auto.iter().any(|name| !found.contains(name));
             is_drawn && !lacks_more && error(&explained.plan) <= most_error
         })
     };
