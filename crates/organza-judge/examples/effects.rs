@@ -120,6 +120,7 @@ struct Timed {
 /// One scene by `auto` and by each technique that errs no more.
 struct Choice {
     name: String,
+    tolerance: f64,
     /// The technique that `auto` takes, or several.
     taken: String,
     /// By `auto`, then by the techniques that show as much.
@@ -140,17 +141,30 @@ impl Choice {
         &self.ways[0]
     }
 
+    /// Whether a way errs within the tolerance or, where none does, least.
+    fn suffices(&self, way: &DrawnBy) -> bool {
+        let least = self.ways.iter().map(|way| way.displayed_error).fold(f64::INFINITY, f64::min);
+        way.displayed_error <= least.max(self.tolerance)
+    }
+
     fn fastest(&self) -> &DrawnBy {
-        self.ways.iter().min_by(|a, b| a.seconds.total_cmp(&b.seconds)).unwrap()
+        let sufficient = self.ways.iter().filter(|way| self.suffices(way));
+        sufficient.min_by(|a, b| a.seconds.total_cmp(&b.seconds)).unwrap()
     }
 
     fn is_nearly_fastest(&self) -> bool {
-        self.by_auto().seconds <= NEARLY * self.fastest().seconds
+        self.suffices(self.by_auto()) && self.by_auto().seconds <= NEARLY * self.fastest().seconds
     }
 }
 
 fn main() {
     let asked: Vec<String> = std::env::args().skip(1).collect();
+    let is_known = |stage: &String| ["effects", "choices", "predictions"].contains(&stage.as_str());
+    assert!(
+        asked.iter().all(is_known),
+        "expected the stages effects, choices or predictions, found {}",
+        asked.join(" ")
+    );
     let is_asked = |stage: &str| asked.is_empty() || asked.iter().any(|named| named == stage);
     let mut scenes: Vec<PathBuf> = std::fs::read_dir("scenes").unwrap().map(|entry| entry.unwrap().path()).collect();
     scenes.retain(|path| path.extension().is_some_and(|extension| extension == "toml"));
@@ -226,15 +240,15 @@ fn choice(path: &Path) -> Choice {
     let drawn_by = |technique: Technique| {
         let scene = scene_by(technique);
         let mut seconds = f64::INFINITY;
-        let mut drawn = 0.0;
+        let mut spent = 0.0;
         let mut displayed_error = 0.0;
         for _ in 0..3 {
             let render = organza::render(&scene, &options, &Progress::new()).unwrap();
             let taken: f64 = render.cost.stages.iter().map(|stage| stage.seconds).sum();
             seconds = seconds.min(taken);
             displayed_error = error(&render.plan);
-            drawn += taken;
-            if drawn > AGAIN {
+            spent += taken;
+            if spent > AGAIN {
                 break;
             }
         }
@@ -249,7 +263,8 @@ fn choice(path: &Path) -> Choice {
     let shown_by_auto = shown(&by_auto.plan);
     let threads = rayon::current_num_threads();
     let seconds_of_auto = by_auto.predicted.seconds(threads);
-    let most_error = error(&by_auto.plan).max(scene_by(Technique::Auto).render.tolerance);
+    let tolerance = scene_by(Technique::Auto).render.tolerance;
+    let most_error = error(&by_auto.plan).max(tolerance);
     let shows_as_much = |technique: &Technique| {
         explained(*technique).is_ok_and(|explained| {
             let is_drawn = explained.predicted.seconds(threads) <= MUCH_SLOWER * seconds_of_auto;
@@ -263,6 +278,7 @@ fn choice(path: &Path) -> Choice {
     taken.dedup();
     Choice {
         name: path.file_stem().unwrap().to_string_lossy().into_owned(),
+        tolerance,
         taken: taken.join(" and "),
         ways: std::iter::once(Technique::Auto).chain(named).map(drawn_by).collect(),
     }
@@ -276,7 +292,7 @@ fn error(plan: &Plan) -> f64 {
 
 fn choices(chosen: &[Choice]) -> String {
     let mut text = "scene,auto_takes,technique,estimated_error,seconds\n".to_owned();
-    for Choice { name, taken, ways } in chosen {
+    for Choice { name, taken, ways, .. } in chosen {
         for DrawnBy { technique, displayed_error, seconds } in ways {
             writeln!(text, "{name},{taken},{},{displayed_error:.2e},{seconds:.4}", technique.name()).unwrap();
         }
@@ -290,18 +306,30 @@ fn choice_table(chosen: &[Choice]) -> String {
         "## What `auto` takes\n\nEach scene with `technique = \"auto\"` for all of its objects, and with each technique that lacks no more effects and errs, by its \
          estimates, within the tolerance or no more than what `auto` takes; {SIDE} pixels wide at most, from files to the picture. Those that are \
          predicted to take {MUCH_SLOWER} times what `auto` takes are not drawn. `docs/choices.csv` has each.\n\n\
-         `auto` took the fastest of these, or at most {NEARLY} times its time, in {near} of {} scenes. The others:\n\n\
-         | scene | `auto` takes | s | fastest | s |\n|---|---|---|---|---|\n",
+         Of those that err within the tolerance (or least, where none does) `auto` took the fastest, or one of at most {NEARLY} times its time, in {near} of {} \
+         scenes. The others:\n\n\
+         | scene | `auto` takes | estimated error | s | the fastest of those | estimated error | s |\n|---|---|---|---|---|---|---|\n",
         chosen.len()
     );
     for one in chosen.iter().filter(|one| !one.is_nearly_fastest()) {
         let Choice { name, taken, .. } = one;
+        let told = |way: &DrawnBy| format!("{} | {:.2}", error_text(way.displayed_error), way.seconds);
         let fastest = one.fastest();
-        let seconds = one.by_auto().seconds;
-        writeln!(text, "| {name} | {taken} | {seconds:.2} | {} | {:.2} |", fastest.technique.name(), fastest.seconds)
-            .unwrap();
+        writeln!(
+            text,
+            "| {name} | {taken} | {} | {} | {} |",
+            told(one.by_auto()),
+            fastest.technique.name(),
+            told(fastest)
+        )
+        .unwrap();
     }
     text + "\n"
+}
+
+/// An estimated error in words.
+fn error_text(error: f64) -> String {
+    if error.is_finite() { percent(error) } else { "not known".to_owned() }
 }
 
 /// Predicted seconds of all passes but reading and conversion, which other pages measure.

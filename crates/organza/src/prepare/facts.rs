@@ -9,7 +9,7 @@ use crate::statistics::{ObjectFacts, ObjectStatistics, Statistics};
 use glam::DVec3;
 use splat_core::{DAabb, Material};
 
-/// Least optical depth along the middle of a splat over that of its spacing, which a splat reaches beyond.
+/// The optical depth along the middle of a splat is at least this share of that of its spacing.
 const MIDDLE_OF_SPACING: f64 = 0.1;
 
 /// Ways of a bent ray: `deferred_blend` follows it through twelve surfaces at most, and there is a way to the first of them.
