@@ -189,3 +189,96 @@ fn what_scatters_again_is_chosen_as_the_scene_switches_it() {
     let named = ["render", "s.toml", "-o", "s.exr", "--technique", "points", "--effect", "scatter=on"];
     place.expect(2, &named, "nothing scatters light more than once");
 }
+
+/// The technique of each of these objects, as `explain` tells it of a scene beside which `mesh.obj` and `dots.csv` lie.
+fn drawn_by(text: &str, names: &[&str]) -> Vec<String> {
+    let place = Place::new(text);
+    place.write("mesh.obj", coarse_ball());
+    place.write("dots.csv", "x,y,z\n-0.2,0,0\n0.2,0,0\n0,0.2,0\n0,-0.2,0\n");
+    let out = place.expect(0, &["explain", "s.toml", "--json"], "");
+    let document: Value = serde_json::from_slice(&out.stdout).unwrap();
+    let objects = document["plan"]["samplers"].as_array().unwrap();
+    // Objects are listed where techniques differ in what they draw of them.
+    let technique = |name: &&str| {
+        let listed = objects.iter().find(|o| o["object"] == **name).map(|o| &o["technique"]);
+        listed.unwrap_or(&document["plan"]["technique"]).as_str().unwrap().to_owned()
+    };
+    names.iter().map(technique).collect()
+}
+
+/// A ball of radius 0.4 whose triangles bend so much at their edges that discs show it.
+fn coarse_ball() -> String {
+    let mut text = String::new();
+    let [sides, rings] = [12, 6];
+    for ring in 0..=rings {
+        let polar = std::f64::consts::PI * f64::from(ring) / f64::from(rings);
+        for side in 0..sides {
+            let around = std::f64::consts::TAU * f64::from(side) / f64::from(sides);
+            let [x, y, z] = [polar.sin() * around.cos(), polar.cos(), polar.sin() * around.sin()];
+            text += &format!("v {:?} {:?} {:?}\n", 0.4 * x, 0.4 * y, 0.4 * z);
+        }
+    }
+    for ring in 0..rings {
+        for side in 0..sides {
+            let [here, next] = [side, (side + 1) % sides].map(|side| ring * sides + side + 1);
+            text += &format!("f {here} {next} {} {}\n", next + sides, here + sides);
+        }
+    }
+    text
+}
+
+#[test]
+fn a_translucent_mesh_stays_triangles_where_no_pixel_has_anything_else_translucent() {
+    let scene = |x_of_puff: f64, ground: &str| {
+        parallel_view(4.0, 64)
+            + "[material.puff]\nmedium = { albedo = 0 }\n[[light]]\nkind = 'directional'\ndirection = [0, -1, -1]\nirradiance = [3, 3, 3]\n\
+               [[object]]\nname = 'ball'\nmesh = 'mesh.obj'\nopacity = 0.5\ntransform = { translate = [-1, 0, 0] }\n"
+            + &format!(
+                "[[object]]\nname = 'puff'\nmaterial = 'puff'\n\
+                 medium_ball = {{ center = [{x_of_puff:?}, 0, -1], radius = 0.4, extinction = 3, spacing = 0.1 }}\n{ground}"
+            )
+    };
+    assert_eq!(drawn_by(&scene(1.0, ""), &["ball", "puff"]), ["sheets", "points"]);
+    // Behind the ball, or no farther beside it than its discs reach.
+    assert_eq!(drawn_by(&scene(-1.0, ""), &["ball", "puff"]), ["points", "points"]);
+    assert_eq!(drawn_by(&scene(-0.19, ""), &["ball", "puff"]), ["points", "points"]);
+    // Points that are opaque hide it or do not, whatever the order; others may lie between.
+    let ground = |more: &str| {
+        format!("[[object]]\nname = 'ground'\npoints = 'dots.csv'\n{more}transform = {{ translate = [-1, 0, -1] }}\n")
+    };
+    assert_eq!(drawn_by(&scene(1.0, &ground("")), &["ball"]), ["sheets"]);
+    assert_eq!(drawn_by(&scene(1.0, &ground("opacity = 0.5\n")), &["ball"]), ["points"]);
+}
+
+#[test]
+fn slabs_carry_the_light_of_a_lamp_of_many_points() {
+    let volume = "[[object]]\nname = 'plate'\ndensity = { expression = 'max(0, 0.3 - abs(y))', box = [[-1, -0.4, -1], [1, 0.4, 1]], spacing = 0.03, \
+                  extinction = 60 }\n";
+    let lamp = |samples: u32| {
+        format!(
+            "[[light]]\nkind = 'sphere'\nposition = [0.5, 4, 1]\nradius = 0.5\nintensity = [20, 20, 20]\nsamples = {samples}\n"
+        )
+    };
+    let text = |samples: u32| parallel_view(4.0, 32) + volume + &lamp(samples);
+    assert_eq!(drawn_by(&text(24), &["plate"]), ["sheets"]);
+    let named = ["--technique", "sheets", "--set", "render.sheets.slicing='half_vector'"];
+    assert_eq!(draw(&text(24), &[]).sha256(1.0), draw(&text(24), &named).sha256(1.0));
+    // A single map is no work to save.
+    assert_eq!(drawn_by(&text(1), &["plate"]), ["points"]);
+    let place = Place::new(&text(24));
+    let out = place.expect(0, &["explain", "s.toml"], "");
+    let told = String::from_utf8_lossy(&out.stdout).into_owned();
+    for setting in ["render.sheets.slicing", "render.sheets.scattering"] {
+        assert!(told.lines().any(|line| line.starts_with(setting) && line.contains("plan")), "{told}");
+    }
+}
+
+#[test]
+fn bumps_are_drawn_by_the_technique_that_shows_them() {
+    let text = parallel_view(4.0, 32)
+        + "[material.clay]\nbump = { height = 0.02, size = 0.25 }\n[[light]]\nkind = 'directional'\ndirection = [0, -1, -1]\nirradiance = [3, 3, 3]\n\
+           [[object]]\nname = 'ball'\nmaterial = 'clay'\n\
+           implicit = { expression = 'x^2 + y^2 + z^2 - 1', box = [[-1.1, -1.1, -1.1], [1.1, 1.1, 1.1]], spacing = 0.2 }\n";
+    assert_eq!(drawn_by(&text, &["ball"]), ["surfels"]);
+    assert_eq!(drawn_by(&text.replace("height = 0.02", "height = 0"), &["ball"]), ["points"]);
+}

@@ -49,6 +49,9 @@ pub(crate) struct OwnWork {
     pub(crate) ranges: Option<usize>,
 }
 
+/// Entries of a shadow map for each splat, as long as its cells are not known: 18 to 62 in scenes of a hundred thousand to three million splats.
+pub(crate) const ENTRIES_PER_SPLAT: f64 = 20.0;
+
 /// Particles of a set by what they are found in.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct FoundParticles {

@@ -3,7 +3,7 @@
 
 mod coarse;
 mod engines;
-mod extent;
+pub(crate) mod extent;
 mod light;
 mod lists;
 pub(crate) mod matter;

@@ -1,5 +1,6 @@
 //! The objects of a scene become one cloud in canonical order, with its tables.
 
+mod boxes;
 pub(crate) mod context;
 pub(crate) mod files;
 mod fit;
@@ -195,14 +196,17 @@ pub(crate) struct Inputs<'a> {
     facts: SourceFacts,
 }
 
-/// What is known of media and meshes, before anything is converted. A file is read once: what reads it again takes it from `files`.
+/// The facts of the objects' data, before anything is converted. A file is read once: what reads it again takes it from `files`.
 ///
 /// # Errors
 /// Those of reading files.
 pub(crate) fn source_facts(scene: &Scene, context: Context<'_>) -> Result<SourceFacts, Error> {
     let media = media_facts::media_facts(scene, context)?;
     let meshes = mesh_facts::mesh_facts(scene, context)?;
-    Ok(SourceFacts { media, meshes })
+    // Only objects beside translucent meshes are asked for their boxes: nothing else reads points this early.
+    let is_asked = meshes.iter().any(|mesh| mesh.is_translucent);
+    let boxes = if is_asked { boxes::boxes(scene, context)? } else { vec![None; scene.objects.len()] };
+    Ok(SourceFacts { media, meshes, boxes })
 }
 
 /// Whether the splats of objects that are drawn from their own data are not needed: asked with these, how all objects are drawn, what

@@ -2,7 +2,8 @@
 
 use crate::choose::{CausedMap, CausedObject, CausedWork, row, technique_of};
 use crate::cost::{
-    Change, Count, CountedPass, Item, Prediction, Translucent, before_reading, joined, samples, shadow_map,
+    Change, Count, CountedPass, ENTRIES_PER_SPLAT, Item, Prediction, Translucent, before_reading, joined, samples,
+    shadow_map,
 };
 use crate::frame::{Extent, Frame};
 use crate::load::own::Own;
@@ -342,7 +343,9 @@ fn preferred(frame: &Frame<'_>, seen: &Seen) -> Option<Change> {
     }
     let by = BySeen { technique: first.technique, splats, own_work: OwnWork::default() };
     let drawn = splats.splats;
-    let maps = plan.shadow_maps_built() as f64;
+    // Light that is carried has a map for each of its points then.
+    let more_maps = plan.carried.iter().filter(|carried| **carried).count() as f64;
+    let maps = plan.shadow_maps_built() as f64 + more_maps;
     let as_splats = Seen { opaque: seen.opaque, translucent: vec![by], ranges: 1.0 };
     let mut passes = of_frame(frame, &as_splats);
     let shading = vec![
@@ -351,6 +354,11 @@ fn preferred(frame: &Frame<'_>, seen: &Seen) -> Option<Change> {
         Count::new(Item::ShadowLookUp, drawn * maps),
     ];
     passes.push(CountedPass::new(pass::SHADE, stage::SHADE.to_owned(), shading));
+    let casting = vec![
+        Count::new(Item::CastSplat, drawn * more_maps),
+        Count::new(Item::ShadowEntry, drawn * more_maps * ENTRIES_PER_SPLAT),
+    ];
+    passes.push(CountedPass::new(pass::SHADOW_MAP, pass::SHADOW_MAP.to_owned(), casting));
     passes.push(conversion(converted.into_iter()));
     Some(Change { key: format!("render.technique = \"{}\"", first.technique.name()), passes })
 }

@@ -45,7 +45,8 @@ pub struct MediumStatistics {
 pub struct MediumFacts {
     /// Rank of its object in the scene.
     pub object: usize,
-    /// Share of the light that it takes which it scatters, in the channel that has most, mean over its extinction; 0 to 1.
+    /// Share of the light that it takes which it scatters by a phase function, in the channel that has most, mean over its extinction; 0 to 1, and 0
+    /// where nothing lights it.
     pub albedo: f64,
     /// Mean cosine of scattering, −1 to 1.
     pub asymmetry: f64,
@@ -76,19 +77,24 @@ pub struct MeshFacts {
     pub is_translucent: bool,
     /// Whether nothing about it is seen on discs alone: a footprint, a field on its surface.
     pub stays_triangles: bool,
+    /// Number of discs after conversion, about.
+    pub splats: f64,
     /// The greatest change of the transmittance of one crossing with the logarithm of its optical depth, 0 to 1/e; 0 for what is opaque.
     pub sensitivity: f64,
     /// Sine of the angle between neighbouring triangles, root mean square, 0 to 1; 0 where the sensitivity is.
     pub bend: f64,
 }
 
-/// Facts of media and meshes, before anything is converted.
+/// Facts of the objects' data, before anything is converted.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct SourceFacts {
-    /// Facts of media that scatter light, in the order of the scene.
+    /// Facts of media in view, in the order of the scene.
     pub media: Vec<MediumFacts>,
     /// Facts of meshes, in the order of the scene.
     pub meshes: Vec<MeshFacts>,
+    /// World-space box around what may be translucent of each object, by its rank in the scene, empty where nothing is; `None` for an invisible object, where
+    /// no box is known, and for every object of a scene without a translucent mesh.
+    pub boxes: Vec<Option<DAabb>>,
 }
 
 impl SourceFacts {

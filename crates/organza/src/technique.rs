@@ -102,13 +102,13 @@ pub(crate) struct Row {
     pub(crate) is_random: bool,
     /// Bytes that it takes beside what all techniques take.
     pub(crate) bytes: fn(&Matter<'_>, &[LightPoint], colored_extinction: bool, &RenderOptions) -> u64,
-    /// How it carries light through what it draws by itself, where a scene asks for that; `None` where shadow maps have all light.
-    pub(crate) carries: fn(&Scene) -> Option<CarriesLight>,
+    /// How it carries light through what it draws by itself, where settings ask for that; `None` where shadow maps have all light.
+    pub(crate) carries: fn(&RenderSettings) -> Option<CarriesLight>,
     /// How a scene asks it for light that media scatter again and again; `None` where it has none.
     pub(crate) scatters_by: Option<&'static str>,
-    /// Settings with which it scatters light again and again, if it draws alone all that is translucent; `None` where it cannot or a scene states
-    /// otherwise. `auto` takes them with the technique.
-    pub(crate) scattering_again: fn(&RenderSettings) -> Option<RenderSettings>,
+    /// Settings with each of which it carries light through media, if it draws alone all that is translucent; none where it cannot or a scene states
+    /// otherwise. `auto` may take one of them with the technique.
+    pub(crate) alone: fn(&Scene) -> Vec<RenderSettings>,
     /// Settings of its own that have a part in a planned picture and that a scene may leave to the plan.
     pub(crate) settings: fn(&Scene, &Loaded, &Plan) -> Vec<PlannedSetting>,
     /// Adds effects and passes of its own to the plan of a scene that it draws, and takes out what it does not need.
@@ -253,16 +253,13 @@ pub(crate) static TABLE: [Row; 5] = [
         ),
         settings: sheets::settings,
         plans: sheets::plans,
-        scattering_again: |settings| {
-            let sheets = settings.sheets.scattering_again()?;
-            Some(RenderSettings { sheets, ..settings.clone() })
-        },
+        alone: sheets::alone,
         begin: sheets::begin,
         ..POINTS
     },
     Row {
         technique: Technique::Surfels,
-        is_offered: |asked| !asked.object.source.is_medium() && asked.material().bounds_matter(),
+        is_offered: surfels::is_offered,
         estimates: |asked| estimates::of_one_order(Technique::Surfels, asked),
         how: "are discs, which are averaged in each layer of a surface, and layers are composited in order",
         bends: |_| Ok(()),
@@ -343,7 +340,7 @@ const POINTS: Row = Row {
     bytes: |_, _, _, _| 0,
     carries: |_| None,
     scatters_by: None,
-    scattering_again: |_| None,
+    alone: |_| Vec::new(),
     settings: points::settings,
     plans: |_, _, _| {},
     repeats: |_| String::new(),

@@ -183,15 +183,22 @@ pub struct SheetsSettings {
 }
 
 impl SheetsSettings {
-    /// These settings with light that is scattered again and again, forward and back; `None` where the scene states otherwise.
+    /// These settings with slabs across half vectors, which carry light themselves; `None` where the scene states otherwise.
     #[must_use]
-    pub fn scattering_again(&self) -> Option<Self> {
+    pub fn carrying_light(&self) -> Option<Self> {
         let mut settings = *self;
         // Half vectors know neither of the other choices.
         let is_free = self.classify == Classify::After && self.aligned == Aligned::View;
         if self.may_slice && is_free {
             settings.slicing = Slicing::HALF_VECTOR;
         }
+        matches!(settings.slicing, Slicing::HalfVector { .. }).then_some(settings)
+    }
+
+    /// These settings with light that is scattered again and again, forward and back; `None` where the scene states otherwise.
+    #[must_use]
+    pub fn scattering_again(&self) -> Option<Self> {
+        let mut settings = self.carrying_light()?;
         let Slicing::HalfVector { scattering, .. } = &mut settings.slicing else { return None };
         if scattering.is_none() && self.may_scatter {
             *scattering = Some(Scattering::FORWARD_AND_BACK);

@@ -1,15 +1,15 @@
 //! What draws the objects whose technique a scene leaves to the plan (`auto`): settled once, before anything is converted, for all that follows.
 //!
-//! Ways to draw the scene are compared: each object by the technique of the table that suits it, and for each technique that scatters light again
-//! and again, all of them by that one. What techniques err by is estimated ([`estimates`]), and their time is counted work times the built-in
+//! Ways to draw the scene are compared: each object by the technique of the table that suits it, and for each technique that carries light through
+//! media, all of them by that one. What techniques err by is estimated ([`estimates`]), and their time is counted work times the built-in
 //! figures of one thread. So a scene is settled alike on every machine, by any number of threads.
 
 use crate::choose::technique_of;
-use crate::cost::{Count, CountedPass, Item, Rates, Translucent, samples};
+use crate::cost::{Count, CountedPass, ENTRIES_PER_SPLAT, Item, Rates, Translucent, samples};
 use crate::load::source_facts;
 use crate::plan::Estimate;
 use crate::scene::{EffectKind, RenderSettings, Scene, SceneObject, SwitchedEffect, Technique};
-use crate::statistics::SourceFacts;
+use crate::statistics::{MediumFacts, SourceFacts};
 use crate::technique::{Asked, Row, TABLE, estimates, row};
 use crate::{Context, Error, pass};
 use std::borrow::Cow;
@@ -18,11 +18,10 @@ use std::borrow::Cow;
 const MOST_TIMES: f64 = 20.0;
 /// Tolerances that the next way may err by where a way is refused for its time.
 const MOST_TOLERANCES: f64 = 10.0;
-/// Samples of the picture for each splat of a surface, and fragments for each sample: of surfaces nothing is counted before they are read.
+/// Samples of the picture for each splat of a surface, and fragments for each sample: of surfaces other than meshes nothing is counted before they are
+/// read.
 const SAMPLES_PER_SPLAT: f64 = 4.0;
 const FRAGMENTS_PER_SAMPLE: f64 = 4.0;
-/// Entries of a shadow map for each splat.
-const ENTRIES_PER_SPLAT: f64 = 8.0;
 
 /// The scene with a named technique for every object, and the settings that the plan takes with them where the scene leaves them open. A scene that
 /// names all techniques is returned as it is.
@@ -37,7 +36,7 @@ pub(crate) fn settled<'s>(scene: Cow<'s, Scene>, context: Context<'_>) -> Result
     let switched = SwitchedEffect::find(&scene.render.effects, EffectKind::Scatter, "");
     let has_layer = scene.render.layers.names().any(|name| name == SCATTERED);
     let asked_for = has_layer || switched == Some(true);
-    let fits = |way: &Way| !way.scatters_again || bytes(&scene, &facts, way) <= context.options.max_memory;
+    let fits = |way: &Way| !way.carries_light || bytes(&scene, &facts, way) <= context.options.max_memory;
     let is_wanted = |way: &Way| if way.scatters_again { switched != Some(false) } else { !asked_for };
     let ways: Vec<Way> = ways(&scene, &facts).filter(is_wanted).filter(fits).collect();
     let Some(way) = chosen(&ways, scene.render.tolerance) else {
@@ -76,6 +75,8 @@ struct Way {
     /// The technique of each object, by rank.
     by: Vec<Technique>,
     settings: RenderSettings,
+    /// Whether light is carried through media by what draws them, and whether that scatters it again and again.
+    carries_light: bool,
     scatters_again: bool,
     /// The greatest estimate of a change of a displayed pixel.
     displayed_error: f64,
@@ -92,8 +93,8 @@ fn ways<'a>(scene: &'a Scene, facts: &'a SourceFacts) -> impl Iterator<Item = Wa
         });
         way(scene, facts, by.collect(), scene.render.clone())
     });
-    let scattering = TABLE.iter().filter_map(|row| {
-        let settings = (row.scattering_again)(&scene.render)?;
+    let of_row = |row: &'static Row| (row.alone)(scene).into_iter().map(move |settings| (row, settings));
+    let alone = TABLE.iter().flat_map(of_row).filter_map(|(row, settings)| {
         let draws = |(rank, object): (usize, &SceneObject)| match technique_of(object, scene) {
             Technique::Auto => true,
             named => named == row.technique || asked(scene, rank, facts, &settings).is_opaque(),
@@ -102,12 +103,15 @@ fn ways<'a>(scene: &'a Scene, facts: &'a SourceFacts) -> impl Iterator<Item = Wa
             Technique::Auto => row.technique,
             named => named,
         };
-        let draws_all = scene.objects.iter().enumerate().filter(|(_, object)| object.visible).all(draws);
         let by: Vec<Technique> = scene.objects.iter().map(named).collect();
-        (draws_all && facts.media.iter().any(|medium| medium.is_lattice && by[medium.object] == row.technique))
-            .then(|| way(scene, facts, by, settings))
+        let scatters = settings.sheets.scattering().is_some();
+        let serves = |medium: &MediumFacts| {
+            medium.is_lattice && by[medium.object] == row.technique && (!scatters || medium.albedo > 0.0)
+        };
+        let draws_all = scene.objects.iter().enumerate().filter(|(_, object)| object.visible).all(draws);
+        (draws_all && facts.media.iter().any(serves)).then(|| way(scene, facts, by, settings))
     });
-    plain.chain(scattering)
+    plain.chain(alone)
 }
 
 /// What techniques are asked about an object.
@@ -146,8 +150,8 @@ fn bytes(scene: &Scene, facts: &SourceFacts, way: &Way) -> u64 {
 
 /// Bytes with which a settled scene is settled alike: with fewer the plan would choose otherwise. 0 where it chose nothing that it weighs by memory.
 pub(crate) fn foreseen_bytes(scene: &Scene, facts: &SourceFacts) -> u64 {
-    let is_weighed = scene.render.is_chosen && scene.render.sheets.scattering().is_some();
     let chosen = |row: &&Row| {
+        let is_weighed = scene.render.is_chosen && (row.carries)(&scene.render).is_some();
         let is_of_it = |object: &SceneObject| object.is_chosen && technique_of(object, scene) == row.technique;
         is_weighed && scene.objects.iter().any(is_of_it)
     };
@@ -166,9 +170,9 @@ fn way(scene: &Scene, facts: &SourceFacts, by: Vec<Technique>, settings: RenderS
         displayed_error = displayed_error.max(greatest(&estimates(by[rank], &asked)));
         time += seconds(row(by[rank]), &asked);
     }
-    let is_by_sheets = by.iter().any(|technique| (row(*technique).scattering_again)(&settings).is_some());
-    let scatters_again = is_by_sheets && settings.sheets.scattering().is_some();
-    Way { by, settings, scatters_again, displayed_error, seconds: time }
+    let carries_light = by.iter().any(|technique| (row(*technique).carries)(&settings).is_some());
+    let scatters_again = carries_light && settings.sheets.scattering().is_some();
+    Way { by, settings, carries_light, scatters_again, displayed_error, seconds: time }
 }
 
 /// Seconds of one thread that an object takes by a technique, counted before anything is converted.
@@ -176,12 +180,15 @@ fn seconds(row: &Row, asked: &Asked<'_>) -> f64 {
     let scene = asked.scene;
     let camera = scene.camera.with_samples(asked.settings.antialias);
     let own_work = (row.foresees)(asked, &camera);
-    let draws_own_data = own_work.items + own_work.medium_samples > 0.0;
+    let draws_own_data = own_work.items + own_work.medium_samples + own_work.polygon_looks > 0.0;
     let samples = samples(scene);
-    let maps: f64 = scene.lights.iter().filter(|light| light.shadow).map(|light| light.count() as f64).sum();
+    let casting = scene.lights.iter().filter(|light| light.shadow && light.light.intensity != [0.0; 3]);
+    let maps: f64 = casting.map(|light| light.count() as f64).sum();
     // What is drawn from its own data carries its light, or has splats for shadow maps.
-    let carries = (row.scattering_again)(asked.settings).is_some() && asked.settings.sheets.scattering().is_some();
-    let converted = asked.medium().map_or(samples / SAMPLES_PER_SPLAT, |medium| medium.splats);
+    let carries = (row.carries)(asked.settings).is_some();
+    let of_medium = asked.medium().map(|medium| medium.splats);
+    let of_mesh = asked.mesh().map(|mesh| mesh.splats);
+    let converted = of_medium.or(of_mesh).unwrap_or(samples / SAMPLES_PER_SPLAT);
     let drawn = if draws_own_data { 0.0 } else { converted };
     let fragments = if draws_own_data { 0.0 } else { samples * FRAGMENTS_PER_SAMPLE };
     let translucent = Translucent { splats: drawn, fragments, own_work, ranges: 1.0, any: true };
@@ -383,6 +390,7 @@ mod tests {
         let way = |displayed_error: f64, seconds: f64| Way {
             by: Vec::new(),
             settings: scene.render.clone(),
+            carries_light: false,
             scatters_again: false,
             displayed_error,
             seconds,

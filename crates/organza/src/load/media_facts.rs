@@ -1,4 +1,4 @@
-//! Facts of media that scatter light, from their unconverted data and from a few places of it: cheap, and known before anything is
+//! Facts of media, from their unconverted data and from a few places of it: cheap, and known before anything is
 //! converted.
 
 use super::context::Context;
@@ -23,23 +23,23 @@ const FEW_POINTS: usize = 1 << 16;
 /// Standard deviation of the place that receives light, over the diagonal of the medium: a lamp within it lights nothing infinitely.
 const SPREAD: f64 = 0.25;
 
-/// The facts of all media in view that scatter the light of some lamp, in the order of the scene; in an animation those out of view, too.
+/// The facts of all media in view, in the order of the scene; in an animation those out of view, too.
 ///
 /// # Errors
 /// Those of reading their files.
 pub(crate) fn media_facts(scene: &Scene, context: Context<'_>) -> Result<Vec<MediumFacts>, Error> {
     let loading = Loading { scene, context };
-    let is_lit = scene.lights.iter().any(|light| light.light.intensity.iter().any(|i| *i > 0.0));
     let mut facts = Vec::new();
-    for (id, object) in loading.visible().filter(|(_, object)| is_lit && scatters(object, scene)) {
+    for (id, object) in loading.visible().filter(|(_, object)| object.source.is_medium()) {
         let sampled = sampled(object, &loading.context(id, 0, 0)).map_err(|e| loading.named(object, e))?;
         facts.extend(sampled.and_then(|sampled| sampled.facts(scene, id)));
     }
     Ok(facts)
 }
 
-/// Whether an object is a medium that scatters light by a phase function: in light, volumes with Phong's shading reflect it by their gradients.
+/// Whether a medium scatters the light of some lamp by a phase function: in light, volumes with Phong's shading reflect it by their gradients.
 fn scatters(object: &SceneObject, scene: &Scene) -> bool {
+    let is_lit = scene.lights.iter().any(|light| light.light.intensity.iter().any(|i| *i > 0.0));
     let material = &scene.materials[object.material].material;
     let has_gradients = matches!(object.source, Source::Volume(_) | Source::Density(_) | Source::Cloud(_));
     let by_phase = match material.shading {
@@ -47,7 +47,7 @@ fn scatters(object: &SceneObject, scene: &Scene) -> bool {
         Shading::Phong => !has_gradients,
         Shading::Unlit => false,
     };
-    object.source.is_medium() && by_phase && material.single_scattering_albedo > 0.0
+    is_lit && by_phase && material.single_scattering_albedo > 0.0
 }
 
 /// Extinction at places of a box that may be slanted.
@@ -117,7 +117,9 @@ impl Sampled {
         if sum <= 0.0 {
             return None;
         }
-        let scattered: f64 = self.extinctions.iter().zip(&self.colors).map(|(e, color)| e * color).sum();
+        let of_color = |(extinction, color): (&f64, &f64)| extinction * color;
+        let colored: f64 = self.extinctions.iter().zip(&self.colors).map(of_color).sum();
+        let albedo = (f64::from(material.single_scattering_albedo) * colored / sum).clamp(0.0, 1.0);
         let factor = f64::from(material.greatest_extinction());
         let occupied = self.extinctions.iter().filter(|e| **e > 0.0).count() as f64 / self.extinctions.len() as f64;
         let volume = self.edges.determinant().abs() * transform.scale.powi(3);
@@ -134,7 +136,7 @@ impl Sampled {
         let greatest = self.extinctions.iter().copied().fold(0.0, f64::max);
         Some(MediumFacts {
             object: id,
-            albedo: (f64::from(material.single_scattering_albedo) * scattered / sum).clamp(0.0, 1.0),
+            albedo: if scatters(object, scene) { albedo } else { 0.0 },
             asymmetry: f64::from(material.asymmetry),
             optical_depth: optical_depth * factor,
             spacing_optical_depth: greatest * factor * self.spacing,

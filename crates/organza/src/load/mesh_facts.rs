@@ -1,16 +1,19 @@
-//! Facts of meshes that bound the error of discs: cheap, and known before anything is converted.
+//! Facts of meshes: cheap, and known before anything is converted.
 
 use super::context::Context;
 use super::loading::Loading;
 use crate::Error;
 use crate::scene::{Scene, SceneObject, Source, SourceData};
 use crate::statistics::MeshFacts;
+use convert::cost::usual_spacing;
 use glam::DVec3;
 use splat_core::{Mesh, optics, vertex_normals};
 use std::borrow::Cow;
 
 /// Triangles and vertices that are looked at, of more every nth.
 const FEW: usize = 1 << 16;
+/// Discs on the area of a square whose side is their spacing: triangles are cut into whole pieces.
+const PIECES_OF_A_SQUARE: f64 = 2.0;
 
 /// The facts of all visible meshes in files or in memory, in the order of the scene.
 ///
@@ -24,21 +27,29 @@ pub(crate) fn mesh_facts(scene: &Scene, context: Context<'_>) -> Result<Vec<Mesh
         let data = loading.context(rank, 0, 0).read(path).map_err(|e| loading.named(object, e))?;
         // What is no mesh is refused where it is converted.
         let (SourceData::Mesh(mesh) | SourceData::Painted(mesh, _)) = data else { continue };
-        facts.push(looked_at(rank, object, &mesh, scene.opacity_of(object)));
+        let spacing = object.spacing.or_else(|| {
+            let splat = loading.context(rank, 0, 0).splat_params(object);
+            usual_spacing(&mesh, mesh.triangles.len() as u64, &splat)
+        });
+        facts.push(looked_at(rank, object, &mesh, scene.opacity_of(object), spacing));
     }
     Ok(facts)
 }
 
-fn looked_at(object: usize, scene_object: &SceneObject, mesh: &Mesh, opacity: f64) -> MeshFacts {
+/// The facts of a mesh whose discs have this spacing, world units; `None` for a mesh without area.
+fn looked_at(object: usize, scene_object: &SceneObject, mesh: &Mesh, opacity: f64, spacing: Option<f64>) -> MeshFacts {
     let vertices = mesh.opacity.iter().step_by(mesh.opacity.len().div_ceil(FEW).max(1));
     let even = mesh.opacity.is_empty().then_some(1.0f32);
     let opacities = even.into_iter().chain(vertices.copied()).map(|of_vertex| opacity * f64::from(of_vertex));
     let is_translucent = opacity * f64::from(mesh.least_opacity()) < 1.0;
     let sensitivity = opacities.map(sensitivity).fold(0.0, f64::max);
+    let area = mesh.area() * scene_object.transform.scale.powi(2);
+    let pieces = spacing.map_or(0.0, |spacing| PIECES_OF_A_SQUARE * area / spacing.powi(2));
     MeshFacts {
         object,
         is_translucent,
         stays_triangles: scene_object.footprints.is_usual() && scene_object.field.is_none(),
+        splats: pieces.max(mesh.triangles.len() as f64),
         sensitivity,
         // Of what is opaque or clear nobody asks.
         bend: if sensitivity > 0.0 { bend(mesh) } else { 0.0 },

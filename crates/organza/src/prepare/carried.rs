@@ -15,7 +15,7 @@ use splat_core::{Object, SplatKind};
 
 /// How light is carried in a scene, if any technique of it does.
 pub(crate) fn of_scene(scene: &Scene) -> Option<CarriesLight> {
-    techniques(scene).into_iter().find_map(|technique| (row(technique).carries)(scene))
+    techniques(scene).into_iter().find_map(|technique| (row(technique).carries)(&scene.render))
 }
 
 /// Whether nothing needs a shadow of what is drawn from its own data but that itself, through which all light is carried. Beside

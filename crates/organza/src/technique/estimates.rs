@@ -12,6 +12,7 @@
 //! times with g = 0.6 (`again_and_again_is_near_path_tracing`).
 
 use super::{Row, row};
+use crate::frame::extent;
 use crate::plan::Estimate;
 use crate::scene::{EffectKind, RenderSettings, Scene, SceneObject, Slicing, Source, SwitchedEffect, Technique};
 use crate::statistics::{MediumFacts, MeshFacts, SourceFacts};
@@ -32,14 +33,30 @@ pub(crate) struct Asked<'a> {
 }
 
 impl<'a> Asked<'a> {
-    /// What is known of the object where it is a medium that scatters light.
+    /// What is known of the object where it is a medium in view.
     pub(crate) fn medium(&self) -> Option<&'a MediumFacts> {
         self.facts.medium(self.rank)
     }
 
     /// What is known of the object where it is a mesh.
-    fn mesh(&self) -> Option<&'a MeshFacts> {
+    pub(crate) fn mesh(&self) -> Option<&'a MeshFacts> {
         self.facts.mesh(self.rank)
+    }
+
+    /// Whether the object is a mesh of which nothing is seen on discs alone.
+    pub(crate) fn stays_triangles(&self) -> bool {
+        self.mesh().is_some_and(|mesh| mesh.stays_triangles)
+    }
+
+    /// Whether the object and another, by its rank in the scene, may be seen in one pixel of some frame.
+    fn may_share_pixel(&self, other: usize) -> bool {
+        let scene = self.scene;
+        match (self.facts.boxes[self.rank], self.facts.boxes[other]) {
+            (Some(first), Some(second)) => {
+                scene.frames.is_some() || extent::may_share_pixel(&first, &second, &scene.camera)
+            }
+            _ => true,
+        }
     }
 
     /// Whether the object is opaque for certain. Raw points may each have an opacity of their own, and so may what shows a column.
@@ -103,7 +120,7 @@ fn unshown(row: &Row, asked: &Asked<'_>) -> Vec<Estimate> {
 
 /// A medium that is too thick for the distance of its splats; no number is known of what that does.
 fn too_thick(row: &Row, asked: &Asked<'_>) -> Option<Estimate> {
-    let medium = asked.medium()?;
+    let medium = asked.medium().filter(|medium| medium.albedo > 0.0)?;
     let is_body = matches!(asked.object.source, Source::Medium(_));
     let most = row.thickest_body.filter(|_| is_body).map_or(THICKEST_SPLATS, f64::from);
     (medium.spacing_optical_depth > most).then(|| {
@@ -168,13 +185,13 @@ fn creases(technique: Technique, asked: &Asked<'_>) -> Option<Estimate> {
     (change > 0.0).then(|| asked.estimate(technique, "edges", change, words))
 }
 
-/// Whether a mesh is translucent, and drawn as triangles in slabs across the view, which are exact where nothing but such meshes is translucent.
+/// Whether a mesh is translucent, and drawn as triangles in slabs across the view, which are exact where no pixel has anything else that is translucent.
 pub(crate) fn suits_triangles(technique: Technique, asked: &Asked<'_>) -> bool {
     let suits = |(rank, object): (usize, &SceneObject)| {
         let by = object.technique.unwrap_or(asked.scene.render.technique);
         let is_free = by == Technique::Auto || by == technique;
-        let stays_triangles = asked.facts.mesh(rank).is_some_and(|mesh| mesh.stays_triangles);
-        stays_triangles && is_free || Asked { rank, object, ..*asked }.is_opaque()
+        let other = Asked { rank, object, ..*asked };
+        other.stays_triangles() && is_free || other.is_opaque() || !asked.may_share_pixel(rank)
     };
     let mut visible = asked.scene.objects.iter().enumerate().filter(|(_, object)| object.visible);
     let is_across_view = !matches!(asked.settings.sheets.slicing, Slicing::HalfVector { .. });

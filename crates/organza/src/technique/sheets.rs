@@ -65,18 +65,26 @@ pub(crate) fn counts(_: &Scene, translucent: &Translucent) -> Vec<Count> {
     ]
 }
 
-/// The same of a medium that is not converted yet: its splats stand for the voxels.
+/// Settings with which slabs carry light, each for all that is translucent: scattered again and again, and scattered once where each point of a light saves
+/// a shadow map, or where the scene states half vectors.
+pub(crate) fn alone(scene: &Scene) -> Vec<scene::RenderSettings> {
+    let sheets = &scene.render.sheets;
+    let casts_from_points = scene.lights.iter().any(|light| light.shadow && light.count() > 1);
+    let saves_maps = casts_from_points || !sheets.may_slice;
+    let once = sheets.carrying_light().filter(|sheets| saves_maps && sheets.scattering().is_none());
+    let settings = sheets.scattering_again().into_iter().chain(once);
+    settings.map(|sheets| scene::RenderSettings { sheets, ..scene.render.clone() }).collect()
+}
+
+/// The same of an object that is not converted yet: the splats of a medium stand for its voxels.
 pub(crate) fn foresees(asked: &Asked<'_>, camera: &Camera) -> OwnWork {
+    if half::carries(asked.settings).is_some() {
+        return half::foresees(asked, camera);
+    }
     let Some(medium) = asked.medium().filter(|medium| medium.is_lattice) else { return OwnWork::default() };
     let shining = asked.scene.lights.iter().filter(|light| light.light.intensity != [0.0; 3]);
     let lights: f64 = shining.map(|light| light.count() as f64).sum();
     let seen = Extent::new(&medium.bounds, camera);
-    if let scene::Slicing::HalfVector { light_pixels, .. } = asked.settings.sheets.slicing {
-        let slabs_of_voxel = medium.spacing / asked.settings.sheets.slab_width.unwrap_or(medium.spacing);
-        let eye = seen.share * (medium.spacing * seen.samples_per_unit).powi(2);
-        let medium_samples = lights.max(1.0) * medium.splats * slabs_of_voxel * (eye + light_pixels * light_pixels);
-        return OwnWork { medium_samples, ..OwnWork::default() };
-    }
     let radius = asked.settings.sheets.kernel_extent * medium.spacing * seen.samples_per_unit;
     let slabs = medium.bounds.diagonal() / medium.spacing;
     OwnWork {
@@ -242,11 +250,29 @@ pub(crate) fn plans(scene: &Scene, loaded: &Loaded, plan: &mut Plan) {
     ));
 }
 
-/// The precision of the sums of slabs, which every planned picture of this technique has.
+/// The precision of the sums of slabs, what slabs lie across, and how often they scatter light: every planned picture of this technique has these.
 pub(crate) fn settings(scene: &Scene, _: &Loaded, _: &Plan) -> Vec<PlannedSetting> {
-    let precision = points::precision(scene.render.sheets.accumulation);
+    let sheets = &scene.render.sheets;
+    let precision = points::precision(sheets.accumulation);
     let is_stated = scene.render.stated.accumulation_of_sheets;
-    vec![PlannedSetting::new("render.sheets.accumulation", precision, is_stated, points::IN_F32)]
+    let accumulation = PlannedSetting::new("render.sheets.accumulation", precision, is_stated, points::IN_F32);
+    let across = |value: &str, reason: &str| {
+        PlannedSetting::new("render.sheets.slicing", format!("\"{value}\""), !sheets.may_slice, reason)
+    };
+    let scattering = |value: &str, reason: &str| {
+        PlannedSetting::new("render.sheets.scattering", format!("\"{value}\""), !sheets.may_scatter, reason)
+    };
+    let scene::Slicing::HalfVector { scattering: again, .. } = sheets.slicing else {
+        return vec![accumulation, across("view", "slabs across the view need no sweep for each light")];
+    };
+    let often = match again {
+        None => scattering("once", "by its estimate, light that media scatter again is not worth its time"),
+        Some(scene::Scattering { back: false, .. }) => {
+            scattering("forward", "light that is scattered back is left out")
+        }
+        Some(_) => scattering("forward_and_back", "by its estimate, light that media scatter again is seen"),
+    };
+    vec![accumulation, across("half_vector", "slabs across half vectors carry light through media themselves"), often]
 }
 
 pub(crate) use half::carries;

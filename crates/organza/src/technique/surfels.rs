@@ -11,7 +11,7 @@ use crate::frame::Frame;
 use crate::frame::matter::Matter;
 use crate::pass;
 use crate::scene::{LightPoint, Scene, SurfelGroups, SurfelLayers, Technique};
-use crate::technique::{Fold, Session, points};
+use crate::technique::{Asked, Fold, Session, points};
 use crate::{CostRecord, Error, RenderOptions, stage};
 use deferred_blend::grouping::Membership;
 use deferred_blend::{BlendInput, Blended, Discs, Floors, Glass, Layering, Params, Surfaces, blend};
@@ -43,6 +43,12 @@ pub(crate) fn bytes(matter: &Matter<'_>, _: &[LightPoint], _: bool, _: &RenderOp
     let is_solid = |cloud: &Cloud| cloud.kind.contains(&SplatKind::Opaque);
     let opaque = if matter.cloud.is_some_and(is_solid) { OPAQUE_BYTES * matter.camera.pixels() } else { 0 };
     DISC_BYTES * discs + glass + group_bytes + opaque
+}
+
+/// Whether the object is a surface whose material has what discs alone show: matter inside that bends light, or bumps.
+pub(crate) fn is_offered(asked: &Asked<'_>) -> bool {
+    let material = asked.material();
+    !asked.object.source.is_medium() && (material.bounds_matter() || material.bump.height > 0.0)
 }
 
 /// Whether light falls on bumps, or what to set so that it does.

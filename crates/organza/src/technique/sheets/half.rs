@@ -9,8 +9,8 @@ use crate::form::{Form, PlannedObject};
 use crate::frame::matter::{Carries, CarriesLight, Matter};
 use crate::frame::{Extent, Frame};
 use crate::pass;
-use crate::scene::{self, LightPoint, Scene, Slicing, SoftShadows, Technique};
-use crate::technique::Session;
+use crate::scene::{self, LightPoint, RenderSettings, Scene, SceneLight, Slicing, SoftShadows, Technique};
+use crate::technique::{Asked, OwnWork, Session};
 use crate::{CostRecord, Error, RenderOptions, stage};
 use sheet_light::Params;
 use sheet_light::half::{
@@ -19,20 +19,22 @@ use sheet_light::half::{
 };
 use splat_core::raster::triangles::PlacedMesh;
 use splat_core::shade::LitBy;
-use splat_core::{Accumulator, Light, MeanTransmittance};
+use splat_core::{Accumulator, Camera, Light, MeanTransmittance};
 use splats::{OwnSplats, splat_bounds};
 
+/// Samples of the picture for each one that an opaque mesh covers, as long as nothing is known of its place.
+const SAMPLES_OF_A_MESH: f64 = 4.0;
 /// What a user can do where half vectors cannot.
 const HINT: &str = "use render.sheets.slicing = \"view\"";
 
-/// How light is carried where a scene asks for half vectors.
-pub(crate) fn carries(scene: &Scene) -> Option<CarriesLight> {
-    is_asked(scene).then_some(points_served as CarriesLight)
+/// How light is carried where settings ask for half vectors.
+pub(crate) fn carries(settings: &RenderSettings) -> Option<CarriesLight> {
+    matches!(settings.sheets.slicing, Slicing::HalfVector { .. }).then_some(points_served as CarriesLight)
 }
 
 /// Whether slabs lie across half vectors.
 pub(crate) fn is_asked(scene: &Scene) -> bool {
-    matches!(scene.render.sheets.slicing, Slicing::HalfVector { .. })
+    carries(&scene.render).is_some()
 }
 
 /// For each point of a light: whether half vectors serve it, or why not.
@@ -106,12 +108,43 @@ pub(super) fn light_pixels(scene: &Scene) -> f64 {
     }
 }
 
-/// Samples of lights' images that are moved in so many slabs, which lie one behind another across the volumes: of a slab and of its light, for each
-/// point of a light that takes one sweep.
+/// Work on an object that is not converted yet: on the samples of a medium on a lattice, or on the pixels of a mesh, from which lights are looked at.
+pub(super) fn foresees(asked: &Asked<'_>, camera: &Camera) -> OwnWork {
+    let Slicing::HalfVector { light_pixels, soft_shadows, .. } = asked.settings.sheets.slicing else {
+        return OwnWork::default();
+    };
+    let shining = || asked.scene.lights.iter().filter(|light| light.light.intensity != [0.0; 3]);
+    let points: f64 = shining().map(|light| light.count() as f64).sum();
+    if asked.stays_triangles() {
+        return OwnWork { polygon_looks: points * camera.pixels() as f64 / SAMPLES_OF_A_MESH, ..OwnWork::default() };
+    }
+    let Some(medium) = asked.medium().filter(|medium| medium.is_lattice) else { return OwnWork::default() };
+    let is_whole = |light: &&SceneLight| soft_shadows == SoftShadows::OneSweep && light.light.shape.is_extended();
+    let points_of_whole: f64 = shining().filter(is_whole).map(|light| light.count() as f64).sum();
+    let sweeps = points - points_of_whole + shining().filter(is_whole).count() as f64;
+    let seen = Extent::new(&medium.bounds, camera);
+    let width = asked.settings.sheets.slab_width.unwrap_or(medium.spacing);
+    let eye = seen.share * (medium.spacing * seen.samples_per_unit).powi(2);
+    let samples_of_a_voxel = medium.spacing / width * (eye + light_pixels * light_pixels);
+    let medium_samples = sweeps.max(1.0) * medium.splats * samples_of_a_voxel;
+    let has_meshes = asked.facts.meshes.iter().any(|mesh| mesh.stays_triangles);
+    OwnWork {
+        medium_samples,
+        polygon_looks: if has_meshes { points * medium_samples } else { 0.0 },
+        soft_samples: moved_samples(points_of_whole, medium.bounds.diagonal() / width, light_pixels),
+        ..OwnWork::default()
+    }
+}
+
+/// Samples of lights' images that are moved in so many slabs, which lie one behind another across the volumes.
 pub(super) fn soft_samples(frame: &Frame<'_>, slabs: f64) -> f64 {
     let whole = frame.light_points().iter().filter(|point| is_whole(frame.scene, point));
-    let side = slabs * light_pixels(frame.scene);
-    2.0 * whole.count() as f64 * slabs * side * side
+    moved_samples(whole.count() as f64, slabs, light_pixels(frame.scene))
+}
+
+/// The same for so many points of lights that take one sweep: samples of a slab and of its light.
+fn moved_samples(points: f64, slabs: f64, light_pixels: f64) -> f64 {
+    2.0 * points * slabs * (slabs * light_pixels).powi(2)
 }
 
 /// Looks of points of lights at opaque polygons: from each sample of a surface, and from so many of volumes.
