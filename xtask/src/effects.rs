@@ -1,5 +1,6 @@
-//! `cargo xtask effects`: what each effect of every scene changes, where families of scenes cross their thresholds, what `auto` takes, and predicted beside
-//! measured times, into docs/effects.csv, docs/effect-families.csv, docs/choices.csv, docs/predictions.csv and docs/effects.md.
+//! `cargo xtask effects`: what each effect of every scene changes, where families of scenes cross their thresholds, what `auto` takes, how budgets are kept, and
+//! predicted beside measured times, into docs/effects.csv, docs/effect-families.csv, docs/choices.csv, docs/budgets.csv, docs/predictions.csv and
+//! docs/effects.md.
 
 use crate::ci::{DRIVER, FEATURES};
 use crate::repo::{Outcome, Repo};
@@ -24,7 +25,7 @@ pub(crate) fn run(repo: &Repo) -> Outcome {
     cargo(repo, &words("build", &["--example", "effects"]), &[])?;
     let target = std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| repo.root.join("target"), PathBuf::from);
     status(Command::new(target.join(EXAMPLE)).current_dir(&repo.root), EXAMPLE)?;
-    Ok("effects: docs/effects.csv, docs/effect-families.csv, docs/choices.csv, docs/predictions.csv and docs/effects.md are written"
+    Ok("effects: docs/effects.csv, docs/effect-families.csv, docs/choices.csv, docs/budgets.csv, docs/predictions.csv and docs/effects.md are written"
         .to_owned())
 }
 

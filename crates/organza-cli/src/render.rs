@@ -52,6 +52,8 @@ struct Kept {
     expected: Duration,
     taken: Duration,
     error: ExpectedError,
+    /// Whether the errors are those of this scene.
+    is_probed: bool,
     ladder: Vec<Expected>,
 }
 
@@ -80,6 +82,9 @@ impl Kept {
         }
         let [rmse, flip] = [self.error.rmse, self.error.flip].map(error_text);
         text += &format!(", errs by about {rmse} RMSE and {flip} FLIP");
+        if !self.is_probed {
+            text += ", as typical scenes do: pictures that tell it of this one would take too much of the time";
+        }
         for GivenUp { key, asked, taken } in &self.given_up {
             text += &format!("\n  {key} = {taken}, where the scene has {asked}");
         }
@@ -118,6 +123,7 @@ impl Kept {
             "taken_seconds": self.taken.as_secs_f64(),
             "expected_rmse": self.error.rmse,
             "expected_flip": self.error.flip,
+            "errors_of": if self.is_probed { "this scene" } else { "typical scenes" },
             "given_up": self.given_up.iter().map(setting).collect::<Value>(),
             "same_again": self.options().collect::<Value>(),
             "ladder": self.ladder.iter().map(rung).collect::<Value>(),
@@ -307,9 +313,9 @@ impl Job<'_> {
         progress.enter();
         let (render, kept) = if self.goal.is_any() {
             let within = drawing.render_within(self.scene, &self.goal, &options, progress)?;
-            let WithinGoal { render, given_up, expected, taken, error, ladder } = within;
+            let WithinGoal { render, given_up, expected, taken, error, is_probed, ladder } = within;
             let without_goal = self.without_goal.clone();
-            (render, Some(Kept { goal: self.goal, given_up, without_goal, expected, taken, error, ladder }))
+            (render, Some(Kept { goal: self.goal, given_up, without_goal, expected, taken, error, is_probed, ladder }))
         } else {
             (drawing.render(self.scene, &options, progress)?, None)
         };

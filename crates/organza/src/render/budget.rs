@@ -11,6 +11,9 @@
 //! Counted work comes from the trial's counts, scaled with the quantity that an item grows with: splats, samples of the picture, or fragments of
 //! both. The chosen settings are planned in full before they are drawn. They give way to the next if the plan counts more work than the estimate.
 //! Without a time nothing is chosen by a clock: figures of a machine take its place.
+//!
+//! Media that are drawn from their own data take as long in a small picture as in a large one. A trial that would take over a tenth of the time is counted,
+//! not drawn, and so are the other small pictures: figures of a machine and errors of typical scenes stand in for them.
 
 mod errors;
 mod rung;
@@ -41,6 +44,8 @@ use trial::Trial;
 const MARGIN: f64 = 1.25;
 /// Share of the time that is left which the counted work may fill: predictions err.
 const FILLED: f64 = 0.9;
+/// Share of a time that the trial may take, and that all pictures may that tell errors.
+const FOR_PICTURES: f64 = 0.1;
 /// Most times that settings are planned: the first may tell that more fits, or less.
 const MOST_PLANS: u32 = 3;
 /// A rung is left out that takes more than this share of the time of the one before.
@@ -75,6 +80,8 @@ pub struct WithinGoal {
     pub taken: Duration,
     /// The expected error, against the scene's stated settings.
     pub error: ExpectedError,
+    /// Whether small pictures of the scene told its errors: where these would take too much of the time, errors are those of typical scenes.
+    pub is_probed: bool,
     /// The ladder, from the scene's stated settings down.
     pub ladder: Vec<Expected>,
 }
@@ -116,6 +123,7 @@ struct Search<'a> {
     goal: Goal,
     asked: Rung,
     ladder: Vec<Candidate>,
+    is_probed: bool,
     trial: Trial,
     loaded: Loaded,
     cost: CostRecord,
@@ -159,11 +167,16 @@ pub fn render_within(
     let everything = Rung { splat_share: 1.0, ..asked }.applied_to(&scene);
     let mut loaded = load_measured(&everything, context, &mut cost)?;
     let drawing = Drawing { scene: &scene, options, progress };
-    let mut trial = Trial::new(&drawing, &mut loaded)?;
-    let errors = Errors::new(&drawing, &mut loaded, goal.budget_ms.is_some())?;
+    let has_time = goal.budget_ms.is_some();
+    let for_each = goal.budget_ms.map_or(f64::INFINITY, |ms| FOR_PICTURES * 1e-3 * ms as f64);
+    let mut trial = Trial::new(&drawing, &mut loaded, for_each)?;
+    // A limit of errors is compared with what this scene errs by, however long that takes to find.
+    let has_error = goal.max_rmse.is_some() || goal.max_flip.is_some();
+    let for_errors = if has_error { f64::INFINITY } else { for_each };
+    let errors = Errors::new(&drawing, &mut loaded, &trial, has_time, for_errors)?;
     errors.thinned.iter().for_each(|thinned| trial.learn(thinned));
     // A choice by a clock would be another at each run.
-    let trial = if goal.budget_ms.is_some() { trial } else { trial.by(&options.rates) };
+    let trial = if has_time { trial } else { trial.by(&options.rates) };
     // The settings alone have to draw the same picture again: `auto` must not choose otherwise with them. Of these settings it asks for samples alone.
     let mut alike = Vec::new();
     for antialias in antialias_values(asked) {
@@ -176,7 +189,8 @@ pub fn render_within(
     let candidates =
         possible.map(|rung| Candidate { rung, seconds: trial.seconds(rung, size), error: errors.expected(rung) });
     let ladder = ladder(asked, candidates.collect());
-    let mut search = Search { drawing, goal: *goal, asked, ladder, trial, loaded, cost, found, begun };
+    let is_probed = errors.are_probed;
+    let mut search = Search { drawing, goal: *goal, asked, ladder, is_probed, trial, loaded, cost, found, begun };
     let chosen = match goal.budget_ms {
         Some(ms) => search.fitting(Duration::from_millis(ms))?,
         None => search.cheapest()?,
@@ -285,6 +299,7 @@ impl Search<'_> {
             expected: duration(expected),
             taken: duration(taken),
             error: candidate.error,
+            is_probed: self.is_probed,
             ladder: self.ladder.iter().map(rung).collect(),
         })
     }
@@ -383,6 +398,38 @@ mod tests {
         assert_eq!(seconds, [8.0, 5.0, 3.0, 1.0]);
         assert_eq!(ladder[0].rung, ASKED);
         assert!(ladder.windows(2).all(|pair| pair[0].error.rmse < pair[1].error.rmse));
+    }
+
+    #[test]
+    fn where_small_pictures_would_take_too_long_typical_errors_take_their_place() {
+        let text = "version = 1\n[camera]\nposition = [0, 0, 4]\ntarget = [0, 0, 0]\nsize = [64, 48]\n[render]\ntechnique = 'points'\n\
+            [[light]]\nkind = 'directional'\ndirection = [0, -1, -1]\nirradiance = [1, 1, 1]\n\
+            [[object]]\nname = 'fog'\nmedium_box = { min = [-1, -1, -1], max = [1, 1, 1], extinction = 1, spacing = 0.1 }\n";
+        let scene = crate::scene::parse("s.toml".as_ref(), text.as_bytes(), &crate::scene::LoadOptions::default());
+        let scene = scene.unwrap();
+        let options = RenderOptions::default();
+        let progress = Progress::new();
+        let context = Context { files: &Files::default(), options: &options, progress: &progress };
+        let mut loaded = load_measured(&scene, context, &mut CostRecord::default()).unwrap();
+        let splats = loaded.cloud.len();
+        let drawing = Drawing { scene: &scene, options: &options, progress: &progress };
+        let mut told = |most_seconds: f64| {
+            let trial = Trial::new(&drawing, &mut loaded, most_seconds).unwrap();
+            Errors::new(&drawing, &mut loaded, &trial, true, most_seconds).unwrap()
+        };
+        let typical = told(0.0);
+        assert!(!typical.are_probed && told(f64::INFINITY).are_probed);
+        let asked = Rung::of_scene(&scene);
+        let rmse = |rung: Rung| typical.expected(rung).rmse;
+        let with_share = |splat_share: f64| rmse(Rung { splat_share, ..asked });
+        assert_eq!(rmse(asked), 0.0);
+        assert!(with_share(0.5) > 0.0 && with_share(0.25) > with_share(0.5));
+        assert!(rmse(Rung { antialias: 1, ..asked }) > 0.0);
+        // Work is counted all the same, and no splat is lost.
+        let thinned = typical.thinned.unwrap();
+        let work = |prediction: &crate::cost::Prediction| prediction.seconds(1);
+        assert!(work(&thinned.base) > work(&thinned.quarter) && work(&thinned.quarter) > 0.0);
+        assert_eq!(loaded.cloud.len(), splats);
     }
 
     #[test]

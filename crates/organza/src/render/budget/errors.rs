@@ -13,7 +13,7 @@
 
 use super::rung::{Rung, antialias_values, is_random};
 use super::small::{Drawing, part_of};
-use super::trial::{TRIAL_SIDE, TRIAL_SPLATS};
+use super::trial::{TRIAL_SIDE, TRIAL_SPLATS, Trial};
 use crate::Error;
 use crate::cost::Prediction;
 use crate::load::Loaded;
@@ -27,6 +27,14 @@ const PROBE_SETS: u32 = 8;
 const ORDERS: std::ops::RangeInclusive<f64> = 0.1..=1.0;
 /// Fewest pixels of a degree that FLIP's filters can tell apart.
 const LEAST_PIXELS_PER_DEGREE: f64 = 16.0;
+
+/// Errors of typical scenes, where small pictures would take too much of the time that is asked for: RMSE of one sample of a pixel in the place of four, of half
+/// of the splats, and of one set of particles. Of the scenes of `scenes/` one sample has 0.01 to 0.03.
+const TYPICAL_SAMPLES: f64 = 0.02;
+const TYPICAL_SPLATS: f64 = 0.02;
+const TYPICAL_SET: f64 = 0.2;
+/// Mean FLIP over RMSE.
+const FLIP_OF_RMSE: f64 = 2.0;
 
 /// Powers of a pixel's width that the errors of a measure go with.
 #[derive(Debug, Clone, Copy)]
@@ -52,6 +60,8 @@ pub struct ExpectedError {
 /// What the settings of a scene err by.
 pub(super) struct Errors {
     asked: Rung,
+    /// Whether pictures of the scene told it, not those of others.
+    pub(super) are_probed: bool,
     rmse: Curves,
     flip: Curves,
     /// Counted work of the base, and of a quarter of its splats; `None` where nothing is made of splats.
@@ -100,8 +110,15 @@ struct Turned {
 }
 
 impl Errors {
-    /// Draws the small pictures; where a time has to be kept to, they are no larger than the trial's.
-    pub(super) fn new(drawing: &Drawing<'_>, loaded: &mut Loaded, has_time: bool) -> Result<Self, Error> {
+    /// Draws the small pictures; where a time has to be kept to, they are no larger than the trial's. Errors are those of typical scenes where the pictures would
+    /// take longer than `most_seconds`, as a trial tells.
+    pub(super) fn new(
+        drawing: &Drawing<'_>,
+        loaded: &mut Loaded,
+        trial: &Trial,
+        has_time: bool,
+        most_seconds: f64,
+    ) -> Result<Self, Error> {
         let asked = Rung::of_scene(drawing.scene);
         let has_splats = !loaded.cloud.is_empty();
         let whole = drawing.scene.camera.size;
@@ -114,34 +131,62 @@ impl Errors {
             sets: if is_random { asked.sets.min(PROBE_SETS) } else { asked.sets },
             ..asked
         };
+        let coarser = antialias_values(asked).into_iter().skip(1).map(|antialias| Rung { antialias, ..base });
+        let parts = if has_splats { &[0.5, 0.25][..] } else { &[] };
+        let fewer = parts.iter().map(|part| Rung { splat_share: part * base.splat_share, ..base });
+        let noisy = (is_random && base.sets >= 2).then_some(Rung { sets: base.sets / 2, ..base });
+        let every = std::iter::once(base).chain(coarser.clone()).chain(fewer.clone()).chain(noisy);
+        if every.map(|rung| trial.seconds(rung, size)).sum::<f64>() > most_seconds {
+            return Self::typical(drawing, loaded, asked, base, size);
+        }
         let mut small = |rung: Rung| displayed(drawing, loaded, rung, size);
         let reference = small(base)?;
         let smaller = f64::from(size[0].max(size[1])) / f64::from(longest);
         let mut probed = Probed { asked, base, smaller, samples: Vec::new(), thinned: Vec::new(), noise: None };
-        for antialias in antialias_values(asked).into_iter().skip(1) {
-            let rung = Rung { antialias, ..base };
-            probed.samples.push(Turned { rung, error: difference(&small(rung)?.image, &reference.image, smaller)? });
+        let turned = |rung: Rung, shown: &Shown| {
+            Ok::<_, Error>(Turned { rung, error: difference(&shown.image, &reference.image, smaller)? })
+        };
+        for rung in coarser {
+            probed.samples.push(turned(rung, &small(rung)?)?);
         }
         let mut quarter = None;
-        if has_splats {
-            for part in [0.5, 0.25] {
-                let rung = Rung { splat_share: part * base.splat_share, ..base };
-                let shown = small(rung)?;
-                probed.thinned.push(Turned { rung, error: difference(&shown.image, &reference.image, smaller)? });
-                quarter = Some(shown.predicted);
-            }
+        for rung in fewer {
+            let shown = small(rung)?;
+            probed.thinned.push(turned(rung, &shown)?);
+            quarter = Some(shown.predicted);
         }
-        if is_random && base.sets >= 2 {
-            let rung = Rung { sets: base.sets / 2, ..base };
-            probed.noise = Some(Turned { rung, error: difference(&small(rung)?.image, &reference.image, smaller)? });
+        if let Some(rung) = noisy {
+            probed.noise = Some(turned(rung, &small(rung)?)?);
         }
         let thinned = quarter.map(|quarter| Thinned { base: reference.predicted, quarter });
         Ok(Self {
             asked,
+            are_probed: true,
             rmse: Curves::new(&probed, OF_RMSE, |error| error.rmse),
             flip: Curves::new(&probed, OF_FLIP, |error| error.flip),
             thinned,
         })
+    }
+
+    /// Errors of typical scenes, without a picture: only the work of two is counted.
+    fn typical(
+        drawing: &Drawing<'_>,
+        loaded: &mut Loaded,
+        asked: Rung,
+        base: Rung,
+        size: [u32; 2],
+    ) -> Result<Self, Error> {
+        let has_splats = !loaded.cloud.is_empty();
+        let mut counted = |rung: Rung| drawing.small(loaded, rung, size, 0.0).map(|small| small.predicted);
+        let thinned = match has_splats {
+            true => Some(Thinned {
+                base: counted(base)?,
+                quarter: counted(Rung { splat_share: 0.25 * base.splat_share, ..base })?,
+            }),
+            false => None,
+        };
+        let rmse = Curves::typical(asked, 1.0);
+        Ok(Self { asked, are_probed: false, rmse, flip: Curves::typical(asked, FLIP_OF_RMSE), thinned })
     }
 
     /// What settings are expected to err by.
@@ -187,6 +232,20 @@ impl Curves {
         }
     }
 
+    /// Of a measure that is so many times the RMSE, in typical scenes.
+    fn typical(asked: Rung, times_rmse: f64) -> Self {
+        // That of one sample in the place of four is the unit: its pixels are averages of a half fewer along each side.
+        let coarser = |antialias: u32| 2.0 * (f64::from(antialias).recip() - f64::from(asked.antialias).recip());
+        let samples = antialias_values(asked).into_iter().skip(1);
+        let error = |antialias: u32| times_rmse * TYPICAL_SAMPLES * coarser(antialias);
+        Self {
+            samples: samples.map(|antialias| OfSamples { antialias, error: error(antialias) }).collect(),
+            scale: times_rmse * TYPICAL_SPLATS,
+            order: 0.5,
+            of_a_set: times_rmse * TYPICAL_SET,
+        }
+    }
+
     fn error(&self, rung: Rung, asked: Rung) -> f64 {
         let samples =
             self.samples.iter().find(|sample| sample.antialias == rung.antialias).map_or(0.0, |sample| sample.error);
@@ -207,9 +266,10 @@ struct Shown {
 }
 
 fn displayed(drawing: &Drawing<'_>, loaded: &mut Loaded, rung: Rung, size: [u32; 2]) -> Result<Shown, Error> {
-    let small = drawing.small(loaded, rung, size)?;
-    let beauty = small.layers.rgb("beauty").ok_or_else(|| Error::Internal("a render has no beauty layer".into()))?;
-    let image = Image::from_layer(small.layers.size, beauty).map_err(internal)?;
+    let small = drawing.small(loaded, rung, size, f64::INFINITY)?;
+    let layers = small.layers.ok_or_else(|| Error::Internal("a small picture was not drawn".into()))?;
+    let beauty = layers.rgb("beauty").ok_or_else(|| Error::Internal("a render has no beauty layer".into()))?;
+    let image = Image::from_layer(layers.size, beauty).map_err(internal)?;
     Ok(Shown { image: image.display(drawing.scene.render.exposure), predicted: small.predicted })
 }
 

@@ -1,8 +1,9 @@
 //! Small pictures of a part of the splats: what trials and probes draw.
 
 use super::super::draw::draw;
+use super::super::foreseen;
 use super::rung::Rung;
-use crate::cost::Prediction;
+use crate::cost::{CountedPass, Prediction};
 use crate::frame::Frame;
 use crate::load::Loaded;
 use crate::prepare::plan_alone;
@@ -21,7 +22,8 @@ pub(super) struct Drawing<'a> {
 
 /// A small picture with its account.
 pub(super) struct Small {
-    pub(super) layers: Layers,
+    /// `None` where it was predicted to take too long, and was not drawn.
+    pub(super) layers: Option<Layers>,
     pub(super) predicted: Prediction,
     pub(super) cost: CostRecord,
     /// Seconds of planning.
@@ -29,17 +31,23 @@ pub(super) struct Small {
 }
 
 impl Drawing<'_> {
-    /// Draws the scene with these settings, so many pixels wide and high.
-    pub(super) fn small(&self, loaded: &mut Loaded, rung: Rung, size: [u32; 2]) -> Result<Small, Error> {
+    /// Draws the scene with these settings, so many pixels wide and high; only its work is counted where it is predicted to take longer than `most_seconds`.
+    pub(super) fn small(
+        &self,
+        loaded: &mut Loaded,
+        rung: Rung,
+        size: [u32; 2],
+        most_seconds: f64,
+    ) -> Result<Small, Error> {
         let mut small = rung.applied_to(self.scene);
         small.camera.size = size;
         let whole = loaded.keep_share(rung.splat_share);
-        let drawn = self.drawn(&small, loaded);
+        let drawn = self.drawn(&small, loaded, most_seconds);
         loaded.take_back(whole);
         drawn
     }
 
-    fn drawn(&self, small: &Scene, loaded: &mut Loaded) -> Result<Small, Error> {
+    fn drawn(&self, small: &Scene, loaded: &mut Loaded, most_seconds: f64) -> Result<Small, Error> {
         loaded.retarget(small);
         let begun = Instant::now();
         let planned = plan_alone(small, loaded, self.options)?;
@@ -47,6 +55,13 @@ impl Drawing<'_> {
         let mut cost = CostRecord::default();
         let mut warnings = Vec::new();
         let frame = Frame::new(small, loaded, &planned.plan, self.progress);
+        if most_seconds.is_finite() {
+            let predicted = foreseen(&frame, self.options)?;
+            let seconds = |pass: &CountedPass| pass.seconds(&predicted.rates, rayon::current_num_threads());
+            if predicted.drawing.iter().map(seconds).sum::<f64>() > most_seconds {
+                return Ok(Small { layers: None, predicted, cost, planning });
+            }
+        }
         let mut session = Session {
             options: self.options,
             checkpoint: None,
@@ -56,7 +71,7 @@ impl Drawing<'_> {
             predicted: Prediction::default(),
             announces: false,
         };
-        let layers = draw(&frame, &mut session, &mut cost)?;
+        let layers = Some(draw(&frame, &mut session, &mut cost)?);
         if session.sets.is_some_and(|sets| sets.interrupted) {
             return Err(Error::Cancelled);
         }

@@ -35,13 +35,13 @@ pub(super) struct Trial {
 }
 
 impl Trial {
-    /// Draws it.
-    pub(super) fn new(drawing: &Drawing<'_>, loaded: &mut Loaded) -> Result<Self, Error> {
+    /// Draws it; counts its work alone, by the figures of a machine, where it would take longer than `most_seconds`.
+    pub(super) fn new(drawing: &Drawing<'_>, loaded: &mut Loaded, most_seconds: f64) -> Result<Self, Error> {
         let asked = Rung::of_scene(drawing.scene);
         let rung = Rung { splat_share: asked.splat_share * TRIAL_SPLATS, sets: asked.sets.min(TRIAL_SETS), ..asked };
         let part = if loaded.own.is_empty() { TRIAL_SIDE } else { TRIAL_SIDE_OF_VOXELS };
         let size = part_of(drawing.scene.camera.size, part);
-        let small = drawing.small(loaded, rung, size)?;
+        let small = drawing.small(loaded, rung, size, most_seconds)?;
         let [width, height] = size.map(f64::from);
         let samples = width * height * f64::from(rung.antialias).powi(2);
         let rates = measured_rates(&small.predicted, &small.cost);

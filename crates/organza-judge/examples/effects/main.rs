@@ -1,12 +1,15 @@
 //! `cargo run -p organza-judge --example effects [STAGE…]`: draws each scene of `scenes/`, and writes tables and the parts of `docs/effects.md` that show
 //! them. Stages: `effects`, with each effect and without it (`docs/effects.csv`); `choices`, by `auto` and by each technique (`docs/choices.csv`);
-//! `predictions`, in two sizes on one thread and on two, with predicted times (`docs/predictions.csv`). All without a name. `cargo xtask effects` runs
+//! `budgets`, within times and errors (`docs/budgets.csv`); `predictions`, in two sizes on one thread and on two, with predicted times (`docs/predictions.csv`). All without a name. `cargo xtask effects` runs
 //! it, after the tests that write `docs/effect-families.csv`.
 #![allow(clippy::unwrap_used, reason = "it stops where something is wrong")]
 
+mod budgets;
+mod choices;
+
 use organza::cost::{CountedPass, Prediction};
 use organza::plan::Plan;
-use organza::scene::{LoadOptions, Override, Scene, Technique, parse};
+use organza::scene::{LoadOptions, Override, Scene, parse};
 use organza::{Context, Error, Files, Progress, RenderOptions};
 use organza_judge::effects::{LitSplats, Switch, measure};
 use std::fmt::Write;
@@ -21,13 +24,6 @@ const PREDICTIONS: &str = "docs/predictions.csv";
 const TIMED: [(u32, usize); 3] = [(160, 1), (160, 2), (480, 1)];
 /// No picture is drawn that is predicted to take so many seconds.
 const LONGEST: f64 = 40.0;
-const CHOICES: &str = "docs/choices.csv";
-/// Seconds that a picture is drawn again for, at most three times, of which the least counts.
-const AGAIN: f64 = 1.0;
-/// No technique is drawn that is predicted to take so many times what `auto` takes.
-const MUCH_SLOWER: f64 = 3.0;
-/// Times the least time that `auto` may take.
-const NEARLY: f64 = 1.25;
 const PAGE: &str = "docs/effects.md";
 /// Between these the page holds the tables.
 const BEGIN: &str = "<!-- Made by `cargo xtask effects` from docs/effects.csv. -->\n";
@@ -36,10 +32,6 @@ const END: &str = "<!-- End of the tables. -->\n";
 /// Between these it holds some scenes as one reads them.
 const BEGIN_READ: &str = "<!-- Made by `cargo xtask effects`. -->\n";
 const END_READ: &str = "<!-- End of the scenes. -->\n";
-
-/// Between these it holds what `auto` takes.
-const BEGIN_CHOICES: &str = "<!-- Made by `cargo xtask effects` from docs/choices.csv. -->\n";
-const END_CHOICES: &str = "<!-- End of the choices. -->\n";
 
 /// Between these it holds predicted times.
 const BEGIN_TIMES: &str = "<!-- Made by `cargo xtask effects` from docs/predictions.csv. -->\n";
@@ -115,54 +107,17 @@ struct Timed {
     seconds: f64,
     predicted_bytes: u64,
     bytes: u64,
-}
-
-/// One scene by `auto` and by each technique that errs no more.
-struct Choice {
-    name: String,
-    tolerance: f64,
-    /// The technique that `auto` takes, or several.
-    taken: String,
-    /// By `auto`, then by the techniques that show as much.
-    ways: Vec<DrawnBy>,
-}
-
-/// A scene drawn by one technique for all of its objects.
-struct DrawnBy {
-    technique: Technique,
-    /// Estimated error of a displayed pixel, 0 to 1.
-    displayed_error: f64,
-    /// From files to the picture.
-    seconds: f64,
-}
-
-impl Choice {
-    fn by_auto(&self) -> &DrawnBy {
-        &self.ways[0]
-    }
-
-    /// Whether a way errs within the tolerance or, where none does, least.
-    fn suffices(&self, way: &DrawnBy) -> bool {
-        let least = self.ways.iter().map(|way| way.displayed_error).fold(f64::INFINITY, f64::min);
-        way.displayed_error <= least.max(self.tolerance)
-    }
-
-    fn fastest(&self) -> &DrawnBy {
-        let sufficient = self.ways.iter().filter(|way| self.suffices(way));
-        sufficient.min_by(|a, b| a.seconds.total_cmp(&b.seconds)).unwrap()
-    }
-
-    fn is_nearly_fastest(&self) -> bool {
-        self.suffices(self.by_auto()) && self.by_auto().seconds <= NEARLY * self.fastest().seconds
-    }
+    /// Those of all shadow maps.
+    predicted_map_bytes: u64,
+    map_bytes: u64,
 }
 
 fn main() {
     let asked: Vec<String> = std::env::args().skip(1).collect();
-    let is_known = |stage: &String| ["effects", "choices", "predictions"].contains(&stage.as_str());
+    let is_known = |stage: &String| ["effects", "choices", "budgets", "predictions"].contains(&stage.as_str());
     assert!(
         asked.iter().all(is_known),
-        "expected the stages effects, choices or predictions, found {}",
+        "expected the stages effects, choices, budgets or predictions, found {}",
         asked.join(" ")
     );
     let is_asked = |stage: &str| asked.is_empty() || asked.iter().any(|named| named == stage);
@@ -181,14 +136,10 @@ fn main() {
         fill_page(BEGIN, END, &(tables(&drawn) + &families(&std::fs::read_to_string(FAMILIES).unwrap())));
     }
     if is_asked("choices") {
-        let mut chosen = Vec::new();
-        for path in &scenes {
-            let choice = choice(path);
-            println!("{}: {}", choice.name, choice.taken);
-            chosen.push(choice);
-            std::fs::write(CHOICES, choices(&chosen)).unwrap();
-            fill_page(BEGIN_CHOICES, END_CHOICES, &choice_table(&chosen));
-        }
+        choices::run(&scenes);
+    }
+    if is_asked("budgets") {
+        budgets::run(&scenes);
     }
     if is_asked("predictions") {
         let mut timed = Vec::new();
@@ -217,119 +168,18 @@ fn time(path: &Path, side: u32, threads: usize) -> Option<Timed> {
     let render = organza::render(&scene, &options, &progress).unwrap();
     let is_drawing = |name: &str| name != organza::pass::READ && name != organza::pass::CONVERT;
     let stages = || render.cost.stages.iter().filter(|stage| is_drawing(&stage.name));
+    let is_map = |name: &str| [organza::pass::SHADOW_MAP, organza::pass::EYE_MAP].contains(&name);
     Some(Timed {
-        name: path.file_stem().unwrap().to_string_lossy().into_owned(),
+        name: name(path),
         side,
         threads,
         predicted_seconds,
         seconds: stages().map(|stage| stage.seconds).sum(),
         predicted_bytes: explained.memory,
         bytes: render.cost.stages.iter().map(|stage| stage.bytes).sum(),
+        predicted_map_bytes: render.plan.tables().map(|table| table.predicted.map_bytes).sum(),
+        map_bytes: stages().filter(|stage| is_map(&stage.name)).map(|stage| stage.bytes).sum(),
     })
-}
-
-/// A scene by `auto`, and by each technique that lacks nothing more and errs no more by its estimates, or within the tolerance.
-fn choice(path: &Path) -> Choice {
-    let options = RenderOptions::default();
-    let scene_by = |technique: Technique| {
-        let mut scene = scene(path, &[]).unwrap();
-        scene.render.technique = technique;
-        scene.objects.iter_mut().for_each(|object| object.technique = None);
-        scene
-    };
-    let drawn_by = |technique: Technique| {
-        let scene = scene_by(technique);
-        let mut seconds = f64::INFINITY;
-        let mut spent = 0.0;
-        let mut displayed_error = 0.0;
-        for _ in 0..3 {
-            let render = organza::render(&scene, &options, &Progress::new()).unwrap();
-            let taken: f64 = render.cost.stages.iter().map(|stage| stage.seconds).sum();
-            seconds = seconds.min(taken);
-            displayed_error = error(&render.plan);
-            spent += taken;
-            if spent > AGAIN {
-                break;
-            }
-        }
-        DrawnBy { technique, displayed_error, seconds }
-    };
-    let explained = |technique| organza::explain(&scene_by(technique), &options, &Progress::new());
-    let shown = |plan: &Plan| {
-        let shown = plan.effects.iter().filter(|effect| effect.called_for && !effect.is_lacking);
-        shown.map(|effect| effect.name.clone()).collect::<Vec<_>>()
-    };
-    let by_auto = explained(Technique::Auto).unwrap();
-    let shown_by_auto = shown(&by_auto.plan);
-    let threads = rayon::current_num_threads();
-    let seconds_of_auto = by_auto.predicted.seconds(threads);
-    let tolerance = scene_by(Technique::Auto).render.tolerance;
-    let most_error = error(&by_auto.plan).max(tolerance);
-    let shows_as_much = |technique: &Technique| {
-        explained(*technique).is_ok_and(|explained| {
-            let is_drawn = explained.predicted.seconds(threads) <= MUCH_SLOWER * seconds_of_auto;
-            let found = shown(&explained.plan);
-            let lacks_more = shown_by_auto.iter().any(|name| !found.contains(name));
-            is_drawn && !lacks_more && error(&explained.plan) <= most_error
-        })
-    };
-    let named = Technique::ALL.into_iter().filter(|technique| *technique != Technique::Auto).filter(shows_as_much);
-    let mut taken: Vec<&str> = by_auto.plan.techniques.iter().map(|technique| technique.name()).collect();
-    taken.dedup();
-    Choice {
-        name: path.file_stem().unwrap().to_string_lossy().into_owned(),
-        tolerance,
-        taken: taken.join(" and "),
-        ways: std::iter::once(Technique::Auto).chain(named).map(drawn_by).collect(),
-    }
-}
-
-/// The greatest error of a displayed pixel that a plan estimates.
-fn error(plan: &Plan) -> f64 {
-    let drawing = plan.estimates.iter().filter(|estimate| plan.is_drawn_as(estimate));
-    drawing.map(|estimate| estimate.displayed_error).fold(0.0, f64::max)
-}
-
-fn choices(chosen: &[Choice]) -> String {
-    let mut text = "scene,auto_takes,technique,estimated_error,seconds\n".to_owned();
-    for Choice { name, taken, ways, .. } in chosen {
-        for DrawnBy { technique, displayed_error, seconds } in ways {
-            writeln!(text, "{name},{taken},{},{displayed_error:.2e},{seconds:.4}", technique.name()).unwrap();
-        }
-    }
-    text
-}
-
-fn choice_table(chosen: &[Choice]) -> String {
-    let near = chosen.iter().filter(|one| one.is_nearly_fastest()).count();
-    let mut text = format!(
-        "## What `auto` takes\n\nEach scene with `technique = \"auto\"` for all of its objects, and with each technique that lacks no more effects and errs, by its \
-         estimates, within the tolerance or no more than what `auto` takes; {SIDE} pixels wide at most, from files to the picture. Those that are \
-         predicted to take {MUCH_SLOWER} times what `auto` takes are not drawn. `docs/choices.csv` has each.\n\n\
-         Of those that err within the tolerance (or least, where none does) `auto` took the fastest, or one of at most {NEARLY} times its time, in {near} of {} \
-         scenes. The others:\n\n\
-         | scene | `auto` takes | estimated error | s | the fastest of those | estimated error | s |\n|---|---|---|---|---|---|---|\n",
-        chosen.len()
-    );
-    for one in chosen.iter().filter(|one| !one.is_nearly_fastest()) {
-        let Choice { name, taken, .. } = one;
-        let told = |way: &DrawnBy| format!("{} | {:.2}", error_text(way.displayed_error), way.seconds);
-        let fastest = one.fastest();
-        writeln!(
-            text,
-            "| {name} | {taken} | {} | {} | {} |",
-            told(one.by_auto()),
-            fastest.technique.name(),
-            told(fastest)
-        )
-        .unwrap();
-    }
-    text + "\n"
-}
-
-/// An estimated error in words.
-fn error_text(error: f64) -> String {
-    if error.is_finite() { percent(error) } else { "not known".to_owned() }
 }
 
 /// Predicted seconds of all passes but reading and conversion, which other pages measure.
@@ -340,11 +190,15 @@ fn drawing_seconds(predicted: &Prediction, threads: usize) -> f64 {
 
 fn predictions(timed: &[Timed]) -> String {
     let mut text =
-        "scene,pixels_of_longer_side,threads,predicted_seconds,seconds,bytes_at_most,bytes_of_passes\n".to_owned();
+        "scene,pixels_of_longer_side,threads,predicted_seconds,seconds,bytes_at_most,bytes_of_passes,predicted_bytes_of_maps,bytes_of_maps\n".to_owned();
     for one in timed {
-        let Timed { name, side, threads, predicted_seconds, seconds, predicted_bytes, bytes } = one;
-        writeln!(text, "{name},{side},{threads},{predicted_seconds:.4},{seconds:.4},{predicted_bytes},{bytes}")
-            .unwrap();
+        let Timed { name, side, threads, predicted_seconds, seconds, predicted_bytes, bytes, .. } = one;
+        let Timed { predicted_map_bytes, map_bytes, .. } = one;
+        writeln!(
+            text,
+            "{name},{side},{threads},{predicted_seconds:.4},{seconds:.4},{predicted_bytes},{bytes},{predicted_map_bytes},{map_bytes}"
+        )
+        .unwrap();
     }
     text
 }
@@ -442,6 +296,11 @@ fn scene(path: &Path, switches: &[Switch]) -> Result<Scene, Error> {
     sized(path, switches, SIDE)
 }
 
+/// Its name.
+fn name(path: &Path) -> String {
+    path.file_stem().unwrap().to_string_lossy().into_owned()
+}
+
 /// The same with a longer side of so many pixels at most.
 fn sized(path: &Path, switches: &[Switch], side: u32) -> Result<Scene, Error> {
     let words = switches.iter().map(|switch| format!("{}={}", switch.name, if switch.is_on { "on" } else { "off" }));
@@ -464,7 +323,7 @@ fn draw(path: &Path) -> Result<Drawn, Error> {
     let measured = measure(&explained.plan, &planned, &|switches| scene(path, switches), &options, &progress)?;
     let contradictions = measured.contradictions(&explained.plan);
     assert!(contradictions.is_empty(), "{}: {}", path.display(), contradictions.join("; "));
-    let name = path.file_stem().unwrap().to_string_lossy().into_owned();
+    let name = name(path);
     let effect = |name: &str| explained.plan.effects.iter().find(|effect| effect.name == name).unwrap();
     let row = |change: &organza_judge::effects::EffectChange| {
         let effect = effect(&change.name);
